@@ -1,0 +1,142 @@
+/* The test runner: one file of tests is one program.
+
+       #include "test.h"
+       TEST(dot_is_symmetric) { CHECK(a == b, "a %g b %g", a, b); }
+       TEST_MAIN("sh")
+
+   build/tests/test_sh [--long] [--list] [FILTER]
+
+   A test passes when none of its CHECKs fails; each failing CHECK prints its place, its condition and the
+   values it was given (the first few of a test, then a count). SKIP("why") ends a test that cannot run here.
+   LONG_SUITE is true under --long: tests then use their full sizes. The last line is "N passed, N failed, N skipped",
+   which is also written to the file named by ISOGI_TEST_SUMMARY, where that is set, for `make test` to add up. */
+#ifndef ISOGI_TEST_H
+#define ISOGI_TEST_H
+
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+
+typedef struct test_case {
+    const char *name;
+    void (*run)(void);
+    struct test_case *next;
+} test_case;
+
+static test_case *test_first, **test_last = &test_first;
+static int test_failures, test_skipped, LONG_SUITE;
+static jmp_buf test_leave;
+
+#define TEST(name)                                                                                 \
+    static void test_body_##name(void);                                                            \
+    static test_case test_case_##name = {#name, test_body_##name, NULL};                           \
+    __attribute__((constructor)) static void test_register_##name(void) {                          \
+        *test_last = &test_case_##name;                                                            \
+        test_last = &test_case_##name.next;                                                        \
+    }                                                                                              \
+    static void test_body_##name(void)
+
+/* CHECK(condition, "format", values...): the format and its values are printed when the condition is false */
+#define CHECK(condition, ...)                                                                      \
+    do {                                                                                           \
+        if (!(condition)) test_fail(__FILE__, __LINE__, #condition, __VA_ARGS__);                  \
+    } while (0)
+
+#define SKIP(why)                                                                                  \
+    do {                                                                                           \
+        printf("    skipped: %s\n", why);                                                          \
+        test_skipped = 1;                                                                          \
+        longjmp(test_leave, 1);                                                                    \
+    } while (0)
+
+__attribute__((format(printf, 4, 5))) static void test_fail(const char *file, int line, const char *condition,
+                                                            const char *format, ...) {
+    if (test_failures++ < 8) {
+        va_list values;
+        va_start(values, format);
+        printf("    %s:%d: not true: %s   (", file, line, condition);
+        vprintf(format, values);
+        printf(")\n");
+        va_end(values);
+    }
+}
+
+/* Random numbers for tests: splitmix64, so that every test is repeatable and seeded by its own number. */
+typedef struct test_random { uint64_t state; } test_random;
+
+__attribute__((unused)) static uint64_t random_bits(test_random *r) {
+    uint64_t z = (r->state += 0x9e3779b97f4a7c15u);
+    z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9u;
+    z = (z ^ (z >> 27)) * 0x94d049bb133111ebu;
+    return z ^ (z >> 31);
+}
+__attribute__((unused)) static double random_unit(test_random *r) { return (double)(random_bits(r) >> 11) * 0x1p-53; }
+__attribute__((unused)) static double random_range(test_random *r, double low, double high) {
+    return low + (high - low) * random_unit(r);
+}
+__attribute__((unused)) static void random_direction(test_random *r, double d[3]) {
+    double z = random_range(r, -1, 1), phi = random_range(r, 0, 6.283185307179586), s = sqrt(1 - z * z);
+    d[0] = s * cos(phi), d[1] = s * sin(phi), d[2] = z;
+}
+
+/* The path of a file of real data below ISOGI_DATA, or NULL where there is none: SKIP then. The caller frees it. */
+__attribute__((unused)) static char *test_data(const char *name) {
+    const char *folder = getenv("ISOGI_DATA");
+    if (!folder || !*folder) return NULL;
+    size_t length = strlen(folder) + strlen(name) + 2;
+    char *path = (char *)malloc(length);
+    snprintf(path, length, "%s/%s", folder, name);
+    FILE *file = fopen(path, "rb");
+    if (!file) { free(path); return NULL; }
+    fclose(file);
+    return path;
+}
+
+static int test_main(const char *suite, int argc, char **argv) {
+    const char *filter = NULL, *summary = getenv("ISOGI_TEST_SUMMARY");
+    int passed = 0, failed = 0, skipped = 0;
+    setvbuf(stdout, NULL, _IOLBF, 0);
+    for (int i = 1; i < argc; i++) {
+        if (!strcmp(argv[i], "--long")) LONG_SUITE = 1;
+        else if (!strcmp(argv[i], "--list")) {
+            for (test_case *t = test_first; t; t = t->next) printf("%s.%s\n", suite, t->name);
+            return 0;
+        } else if (argv[i][0] == '-') {
+            fprintf(stderr, "usage: %s [--long] [--list] [FILTER]\n", argv[0]);
+            return 2;
+        } else filter = argv[i];
+    }
+    for (test_case *t = test_first; t; t = t->next) {
+        if (filter && !strstr(t->name, filter)) continue;
+        struct timespec start, end;
+        test_failures = test_skipped = 0;
+        clock_gettime(CLOCK_MONOTONIC, &start);
+        if (!setjmp(test_leave)) t->run();
+        clock_gettime(CLOCK_MONOTONIC, &end);
+        double seconds = (double)(end.tv_sec - start.tv_sec) + 1e-9 * (double)(end.tv_nsec - start.tv_nsec);
+        if (test_failures > 8) printf("    ... %d failing checks in all\n", test_failures);
+        printf("%s %s.%s (%.2f s)\n", test_failures ? "FAIL" : test_skipped ? "skip" : "ok  ", suite, t->name, seconds);
+        if (test_failures) failed++;
+        else if (test_skipped) skipped++;
+        else passed++;
+    }
+    if (filter && !(passed + failed + skipped)) {
+        fprintf(stderr, "%s: no test's name contains \"%s\"\n", argv[0], filter);
+        return 2;
+    }
+    printf("%d passed, %d failed, %d skipped\n", passed, failed, skipped);
+    if (summary && *summary) {
+        FILE *file = fopen(summary, "a");
+        if (file) fprintf(file, "%d passed, %d failed, %d skipped\n", passed, failed, skipped), fclose(file);
+    }
+    return failed ? 1 : 0;
+}
+
+#define TEST_MAIN(suite) int main(int argc, char **argv) { return test_main(suite, argc, argv); }
+
+#endif
