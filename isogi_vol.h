@@ -157,7 +157,8 @@ typedef struct isogi_hit {
     double t;
     double local[3];  /* position in the cell, 0..1 */
     uint32_t cell[3]; /* grid coordinates are cell + local */
-    int32_t side;     /* +1: the ray goes in (values rise); -1: it comes out; 0: a miss, the other fields are zero */
+    int32_t side;     /* +1: the ray goes in (values rise); -1: it comes out; +2, -2: the same through the volume's border
+                         (capped rays only); 0: a miss, the other fields are zero */
 } isogi_hit;
 
 ISOGI_API isogi_result isogi_vol_intersect(const isogi_pyramid *pyramid, const isogi_ray *rays, size_t count, isogi_hit *hits,
@@ -165,8 +166,8 @@ ISOGI_API isogi_result isogi_vol_intersect(const isogi_pyramid *pyramid, const i
 /* 1 where there is any hit, else 0: cheaper than the hit itself. */
 ISOGI_API isogi_result isogi_vol_occluded(const isogi_pyramid *pyramid, const isogi_ray *rays, size_t count, uint8_t *occluded,
                                           isogi_counters *counters);
-/* Rays that leave from hits, or from any other place given as cell + local that lies ON the surface of this isovalue (its t and
-   side are not read). The root they start from is divided out of the cell's cubic: no epsilon, no self-hit, no leak. t of the new
+/* Rays that leave from hits, or from any other place given as cell + local that lies ON the surface of this isovalue (its t is
+   not read; of its side, only whether it is a cap). The root they start from is divided out of the cell's cubic: no epsilon, no self-hit, no leak. t of the new
    hit counts from the start. tmax[count], or NULL = unlimited. flags as in isogi_ray. hits may be starts. */
 ISOGI_API isogi_result isogi_vol_continue(const isogi_pyramid *pyramid, const isogi_hit *starts, const float (*dirs)[3],
                                           const double *tmax, double isovalue, uint32_t flags, size_t count, isogi_hit *hits,
@@ -205,3 +206,1239 @@ ISOGI_API isogi_result isogi_vol_mesh(const isogi_pyramid *pyramid, const isogi_
 ISOGI_API void isogi_vol_mesh_free(const isogi_pyramid *pyramid, isogi_mesh *mesh);
 
 #endif /* ISOGI_VOL_H */
+
+/* ==================================================================================================================== */
+#if (defined(ISOGI_IMPLEMENTATION) || defined(ISOGI_VOL_IMPLEMENTATION)) && !defined(ISOGI_VOL_IMPLEMENTED)
+#define ISOGI_VOL_IMPLEMENTED
+
+#include <float.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#ifndef ISOGI_NO_THREADS
+#ifdef _WIN32
+#ifndef WIN32_LEAN_AND_MEAN
+#define WIN32_LEAN_AND_MEAN
+#endif
+#include <windows.h>
+#else
+#include <pthread.h>
+#include <unistd.h>
+#endif
+#endif
+
+#define ISOGI_VOL__UNLIMITED 1e300 /* stands for infinity, which -ffast-math does not promise to keep */
+#define ISOGI_VOL__LEVELS 3
+
+/* ==== memory ========================================================================================================= */
+
+/* The allocator's own pointer is kept just below the aligned block, so that malloc serves any alignment. */
+static void *isogi_vol__default_alloc(size_t size, size_t align) {
+    char *base, *aligned;
+    if (size > SIZE_MAX - align - sizeof(void *)) return NULL;
+    base = (char *)malloc(size + align + sizeof(void *));
+    if (!base) return NULL;
+    aligned = base + sizeof(void *);
+    aligned += (align - (uintptr_t)aligned % align) % align;
+    memcpy(aligned - sizeof(void *), &base, sizeof base);
+    return aligned;
+}
+
+static void isogi_vol__default_release(void *p) {
+    char *base;
+    memcpy(&base, (char *)p - sizeof(void *), sizeof base);
+    free(base);
+}
+
+ISOGI_API void *isogi_allocate(const isogi_context *context, size_t count, size_t size) {
+    if (!count || !size || count > SIZE_MAX / size) return NULL;
+    if (context && context->alloc && context->release) return context->alloc(context->user, count * size, 64);
+    return isogi_vol__default_alloc(count * size, 64);
+}
+
+ISOGI_API void isogi_release(const isogi_context *context, void *p, size_t count, size_t size) {
+    if (!p) return;
+    if (context && context->alloc && context->release) context->release(context->user, p, count * size);
+    else isogi_vol__default_release(p);
+}
+
+/* ==== threads ======================================================================================================== */
+
+typedef struct isogi_vol__job {
+    void (*task)(void *arg, size_t i);
+    void *arg;
+    size_t next, count;
+    int cancelled;
+#ifndef ISOGI_NO_THREADS
+#ifdef _WIN32
+    CRITICAL_SECTION lock;
+#else
+    pthread_mutex_t lock;
+#endif
+#endif
+} isogi_vol__job;
+
+#if defined(ISOGI_NO_THREADS)
+#define ISOGI_VOL__LOCK(job) ((void)(job))
+#define ISOGI_VOL__UNLOCK(job) ((void)(job))
+#elif defined(_WIN32)
+#define ISOGI_VOL__LOCK(job) EnterCriticalSection(&(job)->lock)
+#define ISOGI_VOL__UNLOCK(job) LeaveCriticalSection(&(job)->lock)
+#else
+#define ISOGI_VOL__LOCK(job) pthread_mutex_lock(&(job)->lock)
+#define ISOGI_VOL__UNLOCK(job) pthread_mutex_unlock(&(job)->lock)
+#endif
+
+/* Runs one task; 0 when there is none left. *begun counts the tasks that any thread has begun. */
+static int isogi_vol__job_step(isogi_vol__job *job, size_t *begun) {
+    size_t i;
+    int run;
+    ISOGI_VOL__LOCK(job);
+    run = !job->cancelled && job->next < job->count;
+    i = job->next;
+    if (run) job->next++;
+    ISOGI_VOL__UNLOCK(job);
+    if (run) job->task(job->arg, i);
+    *begun = i + 1;
+    return run;
+}
+
+static int isogi_vol__report(const isogi_context *context, double from, double to, size_t done, size_t count) {
+    if (!context || !context->progress) return 0;
+    return context->progress(context->user, from + (to - from) * ((double)done / (double)count));
+}
+
+/* The calling thread's share of the work; it alone calls the progress callback. */
+static void isogi_vol__job_lead(isogi_vol__job *job, const isogi_context *context, double from, double to) {
+    size_t begun;
+    while (isogi_vol__job_step(job, &begun)) {
+        if (isogi_vol__report(context, from, to, begun, job->count)) {
+            ISOGI_VOL__LOCK(job);
+            job->cancelled = begun < job->count || job->cancelled;
+            ISOGI_VOL__UNLOCK(job);
+        }
+    }
+}
+
+#ifndef ISOGI_NO_THREADS
+#define ISOGI_VOL__MAX_THREADS 256
+#ifdef _WIN32
+typedef HANDLE isogi_vol__thread;
+static DWORD WINAPI isogi_vol__worker(LPVOID p) {
+    size_t begun;
+    while (isogi_vol__job_step((isogi_vol__job *)p, &begun)) {}
+    return 0;
+}
+static int isogi_vol__start(isogi_vol__thread *thread, isogi_vol__job *job) {
+    *thread = CreateThread(NULL, 0, isogi_vol__worker, job, 0, NULL);
+    return *thread != NULL;
+}
+static void isogi_vol__join(isogi_vol__thread thread) {
+    WaitForSingleObject(thread, INFINITE);
+    CloseHandle(thread);
+}
+static int isogi_vol__cores(void) {
+    SYSTEM_INFO info;
+    GetSystemInfo(&info);
+    return (int)info.dwNumberOfProcessors;
+}
+#else
+typedef pthread_t isogi_vol__thread;
+static void *isogi_vol__worker(void *p) {
+    size_t begun;
+    while (isogi_vol__job_step((isogi_vol__job *)p, &begun)) {}
+    return NULL;
+}
+static int isogi_vol__start(isogi_vol__thread *thread, isogi_vol__job *job) {
+    return pthread_create(thread, NULL, isogi_vol__worker, job) == 0;
+}
+static void isogi_vol__join(isogi_vol__thread thread) { pthread_join(thread, NULL); }
+static int isogi_vol__cores(void) {
+    long cores = sysconf(_SC_NPROCESSORS_ONLN);
+    return cores < 1 ? 1 : cores > ISOGI_VOL__MAX_THREADS ? ISOGI_VOL__MAX_THREADS : (int)cores;
+}
+#endif
+
+static void isogi_vol__job_run(isogi_vol__job *job, const isogi_context *context, double from, double to) {
+    isogi_vol__thread threads[ISOGI_VOL__MAX_THREADS];
+    int wanted = context && context->threads > 0 ? context->threads : isogi_vol__cores(), started = 0;
+    if (wanted > ISOGI_VOL__MAX_THREADS) wanted = ISOGI_VOL__MAX_THREADS;
+    if ((size_t)wanted > job->count) wanted = (int)job->count;
+#ifdef _WIN32
+    InitializeCriticalSection(&job->lock);
+#else
+    pthread_mutex_init(&job->lock, NULL);
+#endif
+    /* A thread that cannot be had is done without: the calling thread finishes the work. */
+    while (started < wanted - 1 && isogi_vol__start(&threads[started], job)) started++;
+    isogi_vol__job_lead(job, context, from, to);
+    while (started) isogi_vol__join(threads[--started]);
+#ifdef _WIN32
+    DeleteCriticalSection(&job->lock);
+#else
+    pthread_mutex_destroy(&job->lock);
+#endif
+}
+#else
+static void isogi_vol__job_run(isogi_vol__job *job, const isogi_context *context, double from, double to) {
+    isogi_vol__job_lead(job, context, from, to);
+}
+#endif
+
+typedef struct isogi_vol__slice {
+    void (*task)(void *arg, size_t i);
+    void *arg;
+    size_t first;
+} isogi_vol__slice;
+
+static void isogi_vol__slice_task(void *p, size_t i) {
+    const isogi_vol__slice *slice = (const isogi_vol__slice *)p;
+    slice->task(slice->arg, slice->first + i);
+}
+
+ISOGI_API isogi_result isogi_parallel(const isogi_context *context, size_t n, void (*task)(void *arg, size_t i), void *arg,
+                                      double from, double to) {
+    if (!task) return ISOGI_INVALID;
+    if (!n) return ISOGI_OK;
+    if (context && context->parallel_for) {
+        /* A foreign scheduler is given the work in slices, so that progress and cancelling have their turn in between. */
+        size_t slices = context->progress ? (n < 32 ? n : 32) : 1, s;
+        isogi_vol__slice slice;
+        slice.task = task, slice.arg = arg;
+        for (s = 0; s < slices; s++) {
+            size_t end = n / slices * (s + 1) + n % slices * (s + 1) / slices;
+            slice.first = n / slices * s + n % slices * s / slices;
+            if (end > slice.first) context->parallel_for(context->user, end - slice.first, isogi_vol__slice_task, &slice);
+            if (isogi_vol__report(context, from, to, end, n) && end < n) return ISOGI_CANCELLED;
+        }
+        return ISOGI_OK;
+    } else {
+        isogi_vol__job job;
+        memset(&job, 0, sizeof job);
+        job.task = task, job.arg = arg, job.count = n;
+        isogi_vol__job_run(&job, context, from, to);
+        return job.cancelled ? ISOGI_CANCELLED : ISOGI_OK;
+    }
+}
+
+/* ==== numbers that survive -ffast-math =============================================================================== */
+
+static int isogi_vol__finite64(double x) {
+    uint64_t bits;
+    memcpy(&bits, &x, sizeof bits);
+    return (bits & 0x7ff0000000000000u) != 0x7ff0000000000000u;
+}
+
+static int isogi_vol__finite3(const double v[3]) {
+    return isogi_vol__finite64(v[0]) && isogi_vol__finite64(v[1]) && isogi_vol__finite64(v[2]);
+}
+
+static double isogi_vol__min(double a, double b) { return a < b ? a : b; }
+static double isogi_vol__max(double a, double b) { return a > b ? a : b; }
+
+/* Into [0, high]; NaN gives 0. */
+static double isogi_vol__clamp(double x, double high) {
+    x = x > 0 ? x : 0;
+    return x < high ? x : high;
+}
+
+/* The cell of a grid coordinate that lies in [0, voxels - 1], and the place in it; the last cell is closed. */
+static int isogi_vol__cell(double x, size_t voxels, double *local) {
+    int last = voxels > 1 ? (int)(voxels - 2) : 0, i;
+    x = isogi_vol__clamp(x, (double)(voxels - 1));
+    i = (int)x;
+    if (i > last) i = last;
+    if (i < 0) i = 0;
+    *local = x - i;
+    return i;
+}
+
+/* ==== volumes ======================================================================================================== */
+
+struct isogi_pyramid {
+    isogi_volume volume;
+    isogi_context context;
+    double to_world[9]; /* world = origin + to_world * grid */
+    double to_grid[9];  /* its inverse */
+    double range[2];
+    int cells[3]; /* size - 1 */
+    isogi_level level[ISOGI_VOL__LEVELS];
+    size_t block_count; /* of all levels */
+    float (*blocks)[2];
+};
+
+static size_t isogi_vol__type_size(isogi_type type) {
+    switch (type) {
+    case ISOGI_U8:
+    case ISOGI_I8: return 1;
+    case ISOGI_U16:
+    case ISOGI_I16: return 2;
+    case ISOGI_F32: return 4;
+    case ISOGI_F64: return 8;
+    }
+    return 0;
+}
+
+static double isogi_vol__determinant(const double m[9]) {
+    return m[0] * (m[4] * m[8] - m[5] * m[7]) + m[1] * (m[5] * m[6] - m[3] * m[8]) + m[2] * (m[3] * m[7] - m[4] * m[6]);
+}
+
+static int isogi_vol__all_zero(const double *v, int n) {
+    while (n--)
+        if (!(v[n] >= 0 && v[n] <= 0)) return 0;
+    return 1;
+}
+
+/* Fills in the zero defaults of a volume whose sizes and type are right. */
+static isogi_volume isogi_vol__resolve(const isogi_volume *volume) {
+    isogi_volume v = *volume;
+    ptrdiff_t stride = (ptrdiff_t)isogi_vol__type_size(v.type);
+    int packed = !v.stride[0] && !v.stride[1] && !v.stride[2], identity = isogi_vol__all_zero(v.axes, 9), a;
+    for (a = 0; a < 3; a++) {
+        if (packed) v.stride[a] = stride, stride *= (ptrdiff_t)v.size[a];
+        if (isogi_vol__all_zero(&v.spacing[a], 1)) v.spacing[a] = 1;
+        if (identity) v.axes[4 * a] = 1;
+    }
+    if (isogi_vol__all_zero(&v.scale, 1)) v.scale = 1;
+    return v;
+}
+
+/* Sizes within range, and every voxel's byte offset within ptrdiff_t. */
+static isogi_result isogi_vol__check_layout(const isogi_volume *v, size_t type_size) {
+    size_t reach = type_size, packed = type_size;
+    int zero = !v->stride[0] && !v->stride[1] && !v->stride[2], a;
+    for (a = 0; a < 3; a++) {
+        ptrdiff_t stride = zero ? (ptrdiff_t)packed : v->stride[a];
+        size_t step, span = v->size[a] - 1;
+        if (!v->size[a]) return ISOGI_INVALID;
+        if (v->size[a] > 0x7fffffff) return ISOGI_TOO_LARGE;
+        if (stride == PTRDIFF_MIN || stride % (ptrdiff_t)type_size) return ISOGI_INVALID;
+        step = (size_t)(stride < 0 ? -stride : stride);
+        if (span && step > ((size_t)PTRDIFF_MAX - reach) / span) return ISOGI_TOO_LARGE;
+        reach += step * span;
+        if (zero && packed > (size_t)PTRDIFF_MAX / v->size[a]) return ISOGI_TOO_LARGE;
+        if (zero) packed *= v->size[a];
+    }
+    return ISOGI_OK;
+}
+
+ISOGI_API isogi_result isogi_volume_validate(const isogi_volume *volume) {
+    size_t type_size;
+    double length = 1, determinant;
+    isogi_volume v;
+    isogi_result result;
+    int a;
+    if (!volume || !volume->data) return ISOGI_INVALID;
+    type_size = isogi_vol__type_size(volume->type);
+    if (!type_size || (uintptr_t)volume->data % type_size) return ISOGI_INVALID;
+    result = isogi_vol__check_layout(volume, type_size);
+    if (result != ISOGI_OK) return result;
+    for (a = 0; a < 9; a++)
+        if (!isogi_vol__finite64(volume->axes[a])) return ISOGI_INVALID;
+    if (!isogi_vol__finite64(volume->scale) || !isogi_vol__finite64(volume->bias)) return ISOGI_INVALID;
+    if (!isogi_vol__finite3(volume->origin) || !isogi_vol__finite3(volume->spacing)) return ISOGI_INVALID;
+    v = isogi_vol__resolve(volume);
+    for (a = 0; a < 3; a++) {
+        double x = v.axes[a], y = v.axes[3 + a], z = v.axes[6 + a];
+        if (!(v.spacing[a] > 0)) return ISOGI_INVALID;
+        length *= sqrt(x * x + y * y + z * z);
+    }
+    determinant = fabs(isogi_vol__determinant(v.axes));
+    return determinant > 1e-9 * length && isogi_vol__finite64(determinant) ? ISOGI_OK : ISOGI_INVALID;
+}
+
+static void isogi_vol__set_transform(isogi_pyramid *p) {
+    const isogi_volume *v = &p->volume;
+    const double *m = v->axes;
+    double inverse = 1 / isogi_vol__determinant(m);
+    int r, c;
+    for (r = 0; r < 3; r++) {
+        for (c = 0; c < 3; c++) {
+            /* cofactor of element (c, r), indices taken cyclically so that the sign comes out right */
+            int r1 = (c + 1) % 3, r2 = (c + 2) % 3, c1 = (r + 1) % 3, c2 = (r + 2) % 3;
+            double cofactor = m[3 * r1 + c1] * m[3 * r2 + c2] - m[3 * r1 + c2] * m[3 * r2 + c1];
+            p->to_world[3 * r + c] = m[3 * r + c] * v->spacing[c];
+            p->to_grid[3 * r + c] = cofactor * inverse / v->spacing[r];
+        }
+    }
+}
+
+static void isogi_vol__transform(const double m[9], const double v[3], double out[3]) {
+    double x = v[0], y = v[1], z = v[2];
+    out[0] = m[0] * x + m[1] * y + m[2] * z;
+    out[1] = m[3] * x + m[4] * y + m[5] * z;
+    out[2] = m[6] * x + m[7] * y + m[8] * z;
+}
+
+/* A gradient per grid unit becomes one per world unit: the transposed inverse. */
+static void isogi_vol__gradient_to_world(const isogi_pyramid *p, const double g[3], double out[3]) {
+    const double *m = p->to_grid;
+    double x = g[0], y = g[1], z = g[2];
+    out[0] = m[0] * x + m[3] * y + m[6] * z;
+    out[1] = m[1] * x + m[4] * y + m[7] * z;
+    out[2] = m[2] * x + m[5] * y + m[8] * z;
+}
+
+ISOGI_API void isogi_vol_to_world(const isogi_pyramid *pyramid, const double grid[3], double world[3]) {
+    int a;
+    isogi_vol__transform(pyramid->to_world, grid, world);
+    for (a = 0; a < 3; a++) world[a] += pyramid->volume.origin[a];
+}
+
+ISOGI_API void isogi_vol_to_grid(const isogi_pyramid *pyramid, const double world[3], double grid[3]) {
+    double v[3];
+    int a;
+    for (a = 0; a < 3; a++) v[a] = world[a] - pyramid->volume.origin[a];
+    isogi_vol__transform(pyramid->to_grid, v, grid);
+}
+
+/* ==== voxels ========================================================================================================= */
+
+/* Reads `count` voxels along x. One switch a row: everything that reads voxels goes through here or through the corners below. */
+static void isogi_vol__row(const isogi_volume *v, int x, int y, int z, int count, double *out) {
+    const char *p = (const char *)v->data + x * v->stride[0] + y * v->stride[1] + z * v->stride[2];
+    ptrdiff_t step = v->stride[0];
+    double scale = v->scale, bias = v->bias;
+    int i;
+#define ISOGI_VOL__READ(T)                                                                                                       \
+    for (i = 0; i < count; i++, p += step) out[i] = scale * (double)*(const T *)(const void *)p + bias;                          \
+    break;
+    switch (v->type) {
+    case ISOGI_U8: ISOGI_VOL__READ(uint8_t)
+    case ISOGI_I8: ISOGI_VOL__READ(int8_t)
+    case ISOGI_U16: ISOGI_VOL__READ(uint16_t)
+    case ISOGI_I16: ISOGI_VOL__READ(int16_t)
+    case ISOGI_F32: ISOGI_VOL__READ(float)
+    case ISOGI_F64: ISOGI_VOL__READ(double)
+    }
+#undef ISOGI_VOL__READ
+}
+
+/* The eight corners of a cell, minus the isovalue (subtraction keeps the sign exact): corner x + 2y + 4z.
+   0 if one of them is not finite. An axis of one voxel repeats it. */
+static int isogi_vol__corners(const isogi_pyramid *pyramid, const int cell[3], double isovalue, double corner[8]) {
+    const isogi_volume *v = &pyramid->volume;
+    const char *p = (const char *)v->data + cell[0] * v->stride[0] + cell[1] * v->stride[1] + cell[2] * v->stride[2];
+    ptrdiff_t dx = v->size[0] > 1 ? v->stride[0] : 0, dy = v->size[1] > 1 ? v->stride[1] : 0;
+    ptrdiff_t dz = v->size[2] > 1 ? v->stride[2] : 0;
+    double scale = v->scale, bias = v->bias;
+    int i, finite = 1;
+#define ISOGI_VOL__READ(T)                                                                                                       \
+    for (i = 0; i < 8; i++)                                                                                                      \
+        corner[i] = scale * (double)*(const T *)(const void *)(p + (i & 1 ? dx : 0) + (i & 2 ? dy : 0) + (i & 4 ? dz : 0)) +     \
+                    bias;                                                                                                        \
+    break;
+    switch (v->type) {
+    case ISOGI_U8: ISOGI_VOL__READ(uint8_t)
+    case ISOGI_I8: ISOGI_VOL__READ(int8_t)
+    case ISOGI_U16: ISOGI_VOL__READ(uint16_t)
+    case ISOGI_I16: ISOGI_VOL__READ(int16_t)
+    case ISOGI_F32: ISOGI_VOL__READ(float)
+    case ISOGI_F64: ISOGI_VOL__READ(double)
+    }
+#undef ISOGI_VOL__READ
+    if (v->type == ISOGI_F32 || v->type == ISOGI_F64)
+        for (i = 0; i < 8; i++) finite &= isogi_vol__finite64(corner[i]);
+    for (i = 0; i < 8; i++) corner[i] -= isovalue;
+    return finite;
+}
+
+/* ==== pyramid ======================================================================================================== */
+
+/* The nearest floats that do not cut the interval. */
+static float isogi_vol__float_below(double x) {
+    float f = x < -(double)FLT_MAX ? -HUGE_VALF : x > (double)FLT_MAX ? FLT_MAX : (float)x;
+    return (double)f > x ? nextafterf(f, -HUGE_VALF) : f;
+}
+static float isogi_vol__float_above(double x) { return -isogi_vol__float_below(-x); }
+
+typedef struct isogi_vol__build_job {
+    isogi_pyramid *pyramid;
+    double *rows; /* for each task: three rows of a volume's width */
+    double (*range)[2];
+} isogi_vol__build_job;
+
+/* Least and largest over the 5x5 rows of one row of level-0 blocks, voxel by voxel along x. */
+static void isogi_vol__reduce_rows(const isogi_volume *v, int y0, int y1, int z0, int z1, double *row, double *least, double *largest) {
+    int width = (int)v->size[0], x, y, z;
+    for (x = 0; x < width; x++) least[x] = DBL_MAX, largest[x] = -DBL_MAX;
+    for (z = z0; z <= z1; z++) {
+        for (y = y0; y <= y1; y++) {
+            isogi_vol__row(v, 0, y, z, width, row);
+            if (v->type == ISOGI_F32 || v->type == ISOGI_F64) {
+                for (x = 0; x < width; x++) {
+                    if (!isogi_vol__finite64(row[x])) continue;
+                    least[x] = isogi_vol__min(row[x], least[x]);
+                    largest[x] = isogi_vol__max(row[x], largest[x]);
+                }
+            } else {
+                for (x = 0; x < width; x++) {
+                    least[x] = isogi_vol__min(row[x], least[x]);
+                    largest[x] = isogi_vol__max(row[x], largest[x]);
+                }
+            }
+        }
+    }
+}
+
+static int isogi_vol__last_voxel(size_t block, int cells, size_t voxels) {
+    size_t end = (block + 1) * (size_t)cells;
+    return (int)(end < voxels ? end : voxels - 1);
+}
+
+/* One task: the level-0 blocks of one z. */
+static void isogi_vol__build_task(void *arg, size_t bz) {
+    isogi_vol__build_job *job = (isogi_vol__build_job *)arg;
+    const isogi_volume *v = &job->pyramid->volume;
+    const isogi_level *level = &job->pyramid->level[0];
+    size_t width = v->size[0], bx, by;
+    double *row = job->rows + 3 * width * bz, *least = row + width, *largest = least + width, range[2] = {DBL_MAX, -DBL_MAX};
+    for (by = 0; by < level->size[1]; by++) {
+        float(*block)[2] = job->pyramid->blocks + level->size[0] * (by + level->size[1] * bz);
+        isogi_vol__reduce_rows(v, (int)(4 * by), isogi_vol__last_voxel(by, 4, v->size[1]), (int)(4 * bz),
+                               isogi_vol__last_voxel(bz, 4, v->size[2]), row, least, largest);
+        for (bx = 0; bx < level->size[0]; bx++) {
+            int x = (int)(4 * bx), last = isogi_vol__last_voxel(bx, 4, v->size[0]);
+            double low = DBL_MAX, high = -DBL_MAX;
+            for (; x <= last; x++) low = isogi_vol__min(low, least[x]), high = isogi_vol__max(high, largest[x]);
+            block[bx][0] = isogi_vol__float_below(low), block[bx][1] = isogi_vol__float_above(high);
+            range[0] = isogi_vol__min(range[0], low), range[1] = isogi_vol__max(range[1], high);
+        }
+    }
+    job->range[bz][0] = range[0], job->range[bz][1] = range[1];
+}
+
+/* Level n from level n-1: four blocks a side. */
+static void isogi_vol__build_level(isogi_pyramid *p, int n) {
+    const isogi_level *from = &p->level[n - 1], *to = &p->level[n];
+    float(*out)[2] = p->blocks + (to->range - (const float(*)[2])p->blocks);
+    size_t x, y, z, i, j, k;
+    for (z = 0; z < to->size[2]; z++)
+        for (y = 0; y < to->size[1]; y++)
+            for (x = 0; x < to->size[0]; x++, out++) {
+                (*out)[0] = FLT_MAX, (*out)[1] = -FLT_MAX;
+                for (k = 4 * z; k < 4 * z + 4 && k < from->size[2]; k++)
+                    for (j = 4 * y; j < 4 * y + 4 && j < from->size[1]; j++)
+                        for (i = 4 * x; i < 4 * x + 4 && i < from->size[0]; i++) {
+                            const float *r = from->range[i + from->size[0] * (j + from->size[1] * k)];
+                            if (r[0] < (*out)[0]) (*out)[0] = r[0];
+                            if (r[1] > (*out)[1]) (*out)[1] = r[1];
+                        }
+            }
+}
+
+/* Sizes of all levels; the number of blocks, or 0 on overflow. */
+static size_t isogi_vol__plan_levels(isogi_pyramid *p) {
+    size_t total = 0;
+    int n, a;
+    for (n = 0; n < ISOGI_VOL__LEVELS; n++) {
+        isogi_level *level = &p->level[n];
+        size_t blocks = 1;
+        level->cells = 4 << (2 * n);
+        for (a = 0; a < 3; a++) {
+            size_t cells = p->volume.size[a] > 1 ? p->volume.size[a] - 1 : 1;
+            level->size[a] = (cells + (size_t)level->cells - 1) / (size_t)level->cells;
+            if (blocks > SIZE_MAX / 64 / level->size[a]) return 0;
+            blocks *= level->size[a];
+        }
+        total += blocks;
+    }
+    return total;
+}
+
+static isogi_result isogi_vol__build_blocks(isogi_pyramid *p) {
+    isogi_vol__build_job job;
+    size_t tasks = p->level[0].size[2], i;
+    isogi_result result = ISOGI_NO_MEMORY;
+    job.pyramid = p;
+    job.rows = p->volume.size[0] > SIZE_MAX / 24 / tasks
+                   ? NULL
+                   : (double *)isogi_allocate(&p->context, 3 * p->volume.size[0] * tasks, sizeof(double));
+    job.range = (double(*)[2])isogi_allocate(&p->context, tasks, sizeof *job.range);
+    if (job.rows && job.range) result = isogi_parallel(&p->context, tasks, isogi_vol__build_task, &job, 0, 1);
+    if (result == ISOGI_OK) {
+        p->range[0] = DBL_MAX, p->range[1] = -DBL_MAX;
+        for (i = 0; i < tasks; i++) {
+            p->range[0] = isogi_vol__min(p->range[0], job.range[i][0]);
+            p->range[1] = isogi_vol__max(p->range[1], job.range[i][1]);
+        }
+        if (p->range[0] > p->range[1]) p->range[0] = p->range[1] = 0;
+        isogi_vol__build_level(p, 1);
+        isogi_vol__build_level(p, 2);
+    }
+    isogi_release(&p->context, job.rows, 3 * p->volume.size[0] * tasks, sizeof(double));
+    isogi_release(&p->context, job.range, tasks, sizeof *job.range);
+    return result;
+}
+
+ISOGI_API isogi_result isogi_vol_build(isogi_pyramid **pyramid, const isogi_volume *volume, const isogi_context *context) {
+    isogi_result result = isogi_volume_validate(volume);
+    isogi_pyramid *p;
+    size_t blocks, first = 0;
+    int n, a;
+    if (!pyramid) return ISOGI_INVALID;
+    if (result != ISOGI_OK) return result;
+    p = (isogi_pyramid *)isogi_allocate(context, 1, sizeof *p);
+    if (!p) return ISOGI_NO_MEMORY;
+    memset(p, 0, sizeof *p);
+    if (context) p->context = *context;
+    p->volume = isogi_vol__resolve(volume);
+    for (a = 0; a < 3; a++) p->cells[a] = (int)(p->volume.size[a] - 1);
+    isogi_vol__set_transform(p);
+    blocks = isogi_vol__plan_levels(p);
+    p->blocks = (float(*)[2])isogi_allocate(context, blocks, sizeof *p->blocks);
+    p->block_count = blocks;
+    result = p->blocks ? ISOGI_OK : blocks ? ISOGI_NO_MEMORY : ISOGI_TOO_LARGE;
+    if (result == ISOGI_OK) {
+        for (n = 0; n < ISOGI_VOL__LEVELS; n++) {
+            p->level[n].range = (const float(*)[2])p->blocks + first;
+            first += p->level[n].size[0] * p->level[n].size[1] * p->level[n].size[2];
+        }
+        result = isogi_vol__build_blocks(p);
+    }
+    if (result == ISOGI_OK) *pyramid = p;
+    else isogi_vol_free(p);
+    return result;
+}
+
+ISOGI_API void isogi_vol_free(isogi_pyramid *pyramid) {
+    isogi_context context;
+    if (!pyramid) return;
+    context = pyramid->context;
+    isogi_release(&context, pyramid->blocks, pyramid->block_count, sizeof *pyramid->blocks);
+    isogi_release(&context, pyramid, 1, sizeof *pyramid);
+}
+
+ISOGI_API const isogi_volume *isogi_vol_volume(const isogi_pyramid *pyramid) { return &pyramid->volume; }
+ISOGI_API const isogi_context *isogi_vol_context(const isogi_pyramid *pyramid) { return &pyramid->context; }
+
+ISOGI_API isogi_level isogi_vol_level(const isogi_pyramid *pyramid, int level) {
+    isogi_level none;
+    memset(&none, 0, sizeof none);
+    return level >= 0 && level < ISOGI_VOL__LEVELS ? pyramid->level[level] : none;
+}
+
+ISOGI_API void isogi_vol_range(const isogi_pyramid *pyramid, double range[2]) {
+    range[0] = pyramid->range[0], range[1] = pyramid->range[1];
+}
+
+/* ==== values and gradients =========================================================================================== */
+
+/* (1-u) a + u b: exact at both ends, so that two cells that share a face see the same values on it, bit by bit. */
+static double isogi_vol__lerp(double a, double b, double u) { return (1 - u) * a + u * b; }
+
+static double isogi_vol__trilinear(const double c[8], const double u[3], double gradient[3]) {
+    double y0 = isogi_vol__lerp(c[0], c[1], u[0]), y1 = isogi_vol__lerp(c[2], c[3], u[0]);
+    double y2 = isogi_vol__lerp(c[4], c[5], u[0]), y3 = isogi_vol__lerp(c[6], c[7], u[0]);
+    double z0 = isogi_vol__lerp(y0, y1, u[1]), z1 = isogi_vol__lerp(y2, y3, u[1]);
+    if (gradient) {
+        gradient[0] = isogi_vol__lerp(isogi_vol__lerp(c[1] - c[0], c[3] - c[2], u[1]),
+                                      isogi_vol__lerp(c[5] - c[4], c[7] - c[6], u[1]), u[2]);
+        gradient[1] = isogi_vol__lerp(y1 - y0, y3 - y2, u[2]);
+        gradient[2] = z1 - z0;
+    }
+    return isogi_vol__lerp(z0, z1, u[2]);
+}
+
+/* Uniform cubic B-spline weights and their derivatives for the taps i-1 .. i+2 at i + u (methods: (1-u)^3/6 and so on), with
+   linear continuation past the border folded into the weights of the voxels that exist: f(-1) = 2 f(0) - f(1). */
+static void isogi_vol__bspline_weights(int i, double u, size_t voxels, double w[4], double d[4], int tap[4]) {
+    double v = 1 - u;
+    int n = (int)voxels, k;
+    w[0] = v * v * v / 6, w[1] = ((3 * u - 6) * u * u + 4) / 6, w[2] = ((3 * v - 6) * v * v + 4) / 6, w[3] = u * u * u / 6;
+    d[0] = -v * v / 2, d[1] = (3 * u - 4) * u / 2, d[2] = -(3 * v - 4) * v / 2, d[3] = u * u / 2;
+    for (k = 0; k < 4; k++) tap[k] = i + k - 1 < 0 ? 0 : i + k - 1 > n - 1 ? n - 1 : i + k - 1;
+    if (n == 1) {
+        w[0] = w[2] = w[3] = 0, w[1] = 1;
+        d[0] = d[1] = d[2] = d[3] = 0;
+        return;
+    }
+    if (i == 0) {
+        w[1] += 2 * w[0], w[2] -= w[0], w[0] = 0;
+        d[1] += 2 * d[0], d[2] -= d[0], d[0] = 0;
+    }
+    if (i == n - 2) {
+        w[2] += 2 * w[3], w[1] -= w[3], w[3] = 0;
+        d[2] += 2 * d[3], d[1] -= d[3], d[3] = 0;
+    }
+}
+
+/* Cubic B-spline value and gradient (per grid unit) at a cell and a place in it: 64 taps in one pass, row by row. */
+static double isogi_vol__bspline(const isogi_pyramid *p, const int cell[3], const double local[3], double gradient[3]) {
+    const isogi_volume *v = &p->volume;
+    double w[3][4], d[3][4], value = 0, gx = 0, gy = 0, gz = 0;
+    int tap[3][4], a, j, k;
+    for (a = 0; a < 3; a++) isogi_vol__bspline_weights(cell[a], local[a], v->size[a], w[a], d[a], tap[a]);
+    for (k = 0; k < 4; k++) {
+        double slice = 0, slice_x = 0, slice_y = 0;
+        for (j = 0; j < 4; j++) {
+            double f[4], row, row_x;
+            int x0 = tap[0][0], count = tap[0][3] - x0 + 1;
+            isogi_vol__row(v, x0, tap[1][j], tap[2][k], count, f);
+            /* taps past a border have weight 0: any finite voxel of the row stands in for them */
+            row = w[0][0] * f[0] + w[0][1] * f[tap[0][1] - x0] + w[0][2] * f[tap[0][2] - x0] + w[0][3] * f[count - 1];
+            row_x = d[0][0] * f[0] + d[0][1] * f[tap[0][1] - x0] + d[0][2] * f[tap[0][2] - x0] + d[0][3] * f[count - 1];
+            slice += w[1][j] * row, slice_x += w[1][j] * row_x, slice_y += d[1][j] * row;
+        }
+        value += w[2][k] * slice, gx += w[2][k] * slice_x, gy += w[2][k] * slice_y, gz += d[2][k] * slice;
+    }
+    gradient[0] = gx, gradient[1] = gy, gradient[2] = gz;
+    return value;
+}
+
+/* The world point's cell and place in it, moved to the border if outside. */
+static void isogi_vol__locate(const isogi_pyramid *p, const float point[3], int cell[3], double local[3]) {
+    double world[3], grid[3];
+    int a;
+    for (a = 0; a < 3; a++) world[a] = (double)point[a];
+    isogi_vol_to_grid(p, world, grid);
+    for (a = 0; a < 3; a++) cell[a] = isogi_vol__cell(grid[a], p->volume.size[a], &local[a]);
+}
+
+static isogi_result isogi_vol__sample(const isogi_pyramid *p, int smooth, const float (*points)[3], size_t count, float *values,
+                                      float (*gradients)[3]) {
+    size_t i;
+    if (!p || (count && !points)) return ISOGI_INVALID;
+    for (i = 0; i < count; i++) {
+        double local[3], value, gradient[3], corner[8];
+        int cell[3], a;
+        isogi_vol__locate(p, points[i], cell, local);
+        if (smooth) value = isogi_vol__bspline(p, cell, local, gradient);
+        else isogi_vol__corners(p, cell, 0, corner), value = isogi_vol__trilinear(corner, local, gradient);
+        if (values) values[i] = (float)value;
+        if (!gradients) continue;
+        isogi_vol__gradient_to_world(p, gradient, gradient);
+        for (a = 0; a < 3; a++) gradients[i][a] = (float)gradient[a];
+    }
+    return ISOGI_OK;
+}
+
+ISOGI_API isogi_result isogi_vol_sample(const isogi_pyramid *pyramid, const float (*points)[3], size_t count, float *values,
+                                        float (*gradients)[3]) {
+    return isogi_vol__sample(pyramid, 0, points, count, values, gradients);
+}
+
+ISOGI_API isogi_result isogi_vol_sample_smooth(const isogi_pyramid *pyramid, const float (*points)[3], size_t count, float *values,
+                                               float (*gradients)[3]) {
+    return isogi_vol__sample(pyramid, 1, points, count, values, gradients);
+}
+
+/* ==== cell cubic ===================================================================================================== */
+
+/* Along a segment inside a cell the trilinear field is a cubic. It is kept as Bernstein coefficients, which are convex sums of the
+   corners: the cubic lies in their hull, so equal signs mean no root, and rounding errors stay within a few ulp of the corners. */
+typedef struct isogi_vol__cubic { double b[4]; } isogi_vol__cubic;
+
+/* Only signs and ratios matter from here on: values whose squares leave the range of double are brought back into it. */
+static void isogi_vol__cubic_rescale(isogi_vol__cubic *cubic) {
+    double most = 0;
+    int i;
+    for (i = 0; i < 4; i++) most = isogi_vol__max(most, fabs(cubic->b[i]));
+    if (most > 1e-100 && most < 1e100) return;
+    for (i = 0; i < 4; i++) cubic->b[i] *= most < 1 ? 1e150 : 1e-180;
+}
+
+/* Blossom of the trilinear form: b[1] and b[2] are means over the choices of which coordinate is taken at which end. */
+static void isogi_vol__cubic_set(isogi_vol__cubic *cubic, const double c[8], const double from[3], const double to[3]) {
+    double x[2][4], xy[2][2][2], f[2][2][2];
+    const double *end[2];
+    int i, j, k, e;
+    end[0] = from, end[1] = to;
+    for (i = 0; i < 2; i++) {
+        double u = end[i][0];
+        for (e = 0; e < 4; e++) x[i][e] = isogi_vol__lerp(c[2 * e], c[2 * e + 1], u);
+    }
+    for (i = 0; i < 2; i++)
+        for (j = 0; j < 2; j++) {
+            double u = end[j][1];
+            xy[i][j][0] = isogi_vol__lerp(x[i][0], x[i][1], u);
+            xy[i][j][1] = isogi_vol__lerp(x[i][2], x[i][3], u);
+            for (k = 0; k < 2; k++) f[i][j][k] = isogi_vol__lerp(xy[i][j][0], xy[i][j][1], end[k][2]);
+        }
+    cubic->b[0] = f[0][0][0];
+    cubic->b[1] = (f[1][0][0] + f[0][1][0] + f[0][0][1]) / 3;
+    cubic->b[2] = (f[0][1][1] + f[1][0][1] + f[1][1][0]) / 3;
+    cubic->b[3] = f[1][1][1];
+    isogi_vol__cubic_rescale(cubic);
+}
+
+static double isogi_vol__cubic_at(const isogi_vol__cubic *cubic, double s) {
+    const double *b = cubic->b;
+    double p = isogi_vol__lerp(b[0], b[1], s), q = isogi_vol__lerp(b[1], b[2], s), r = isogi_vol__lerp(b[2], b[3], s);
+    return isogi_vol__lerp(isogi_vol__lerp(p, q, s), isogi_vol__lerp(q, r, s), s);
+}
+
+/* Real roots of a + b s + c s^2, ascending, by the formula that does not cancel; their number. A vanishing polynomial has none. */
+static int isogi_vol__quadratic_roots(double a, double b, double c, double root[2]) {
+    double discriminant = b * b - 4 * a * c, q;
+    int n = 0;
+    if (!(discriminant >= 0)) return 0;
+    q = -0.5 * (b < 0 ? b - sqrt(discriminant) : b + sqrt(discriminant));
+    if (c > 0 || c < 0) root[n++] = q / c;
+    if (q > 0 || q < 0) root[n++] = a / q;
+    if (n == 2 && root[0] > root[1]) {
+        double t = root[0];
+        root[0] = root[1], root[1] = t;
+    }
+    return n;
+}
+
+/* The root in [low, high], where the cubic is monotone and its sides differ: Newton, kept inside a shrinking bracket. */
+static double isogi_vol__cubic_refine(const isogi_vol__cubic *cubic, double low, double high, int rising) {
+    const double *b = cubic->b;
+    double c1 = 3 * (b[1] - b[0]), c2 = 3 * ((b[0] - b[1]) + (b[2] - b[1])), c3 = (b[3] - b[0]) + 3 * (b[1] - b[2]);
+    double s = 0.5 * (low + high);
+    int i;
+    for (i = 0; i < 64 && high - low > 1e-15; i++) {
+        double value = isogi_vol__cubic_at(cubic, s), slope = c1 + s * (2 * c2 + s * 3 * c3), next;
+        if ((value >= 0) == rising) high = s;
+        else low = s;
+        next = s - value / slope;
+        if (!(next > low && next < high) || (i > 8 && i % 3 == 0)) next = 0.5 * (low + high); /* also catches slope 0 */
+        if (fabs(next - s) < 1e-15) return next;
+        s = next;
+    }
+    return s;
+}
+
+/* First place in (0, 1] where inside (value >= 0) differs from `inside` at 0; 0 if there is none. `exact` 0: any bound will do.
+   *end_inside: inside at 1. */
+static int isogi_vol__cubic_first(const isogi_vol__cubic *cubic, int inside, int exact, double *root) {
+    const double *b = cubic->b;
+    double extremum[2], low = 0;
+    int n, i;
+    if ((b[1] >= 0) == inside && (b[2] >= 0) == inside && (b[3] >= 0) == inside) return 0;
+    n = isogi_vol__quadratic_roots(b[1] - b[0], 2 * ((b[0] - b[1]) + (b[2] - b[1])), (b[3] - b[0]) + 3 * (b[1] - b[2]), extremum);
+    for (i = 0; i <= n; i++) {
+        double high = i < n ? extremum[i] : 1;
+        if (!(high > low)) continue;
+        if (high > 1) high = 1;
+        if (((high < 1 ? isogi_vol__cubic_at(cubic, high) : b[3]) >= 0) != inside) {
+            *root = exact ? isogi_vol__cubic_refine(cubic, low, high, !inside) : high;
+            return 1;
+        }
+        if (high >= 1) return 0;
+        low = high;
+    }
+    return 0;
+}
+
+/* The same for a segment that begins on the surface: b[0] is 0 up to rounding and is divided out. *inside: the side on which the
+   segment leaves, -1 if the field vanishes all along it. */
+static int isogi_vol__cubic_deflated(const isogi_vol__cubic *cubic, int *inside, double *root) {
+    const double *b = cubic->b;
+    double c1 = 3 * (b[1] - b[0]), c2 = 3 * ((b[0] - b[1]) + (b[2] - b[1])), c3 = (b[3] - b[0]) + 3 * (b[1] - b[2]), r[2];
+    double first = c1 > 0 || c1 < 0 ? c1 : c2 > 0 || c2 < 0 ? c2 : c3;
+    int n, i;
+    *inside = first > 0 ? 1 : first < 0 ? 0 : -1;
+    if (*inside < 0) return 0;
+    n = isogi_vol__quadratic_roots(c1, c2, c3, r);
+    for (i = 0; i < n; i++) {
+        /* a double root touches and does not cross */
+        if (r[i] > 0 && r[i] <= 1 && !(n == 2 && r[1] - r[0] <= 0)) {
+            *root = r[i];
+            return 1;
+        }
+    }
+    return 0;
+}
+
+/* ==== traversal ====================================================================================================== */
+
+/* A ray in grid coordinates, walked cell by cell and block by block. The walk carries whether the ray is inside: every block, cell
+   face and cubic states it anew, and any change is a hit. So nothing slips between two cells, whatever rounding does: a ray that
+   began inside cannot be outside later without having reported its way out. */
+typedef struct isogi_vol__walk {
+    const isogi_pyramid *pyramid;
+    double origin[3], dir[3], inverse[3]; /* t counts from `origin`, which lies in the box */
+    double base, t, end;                  /* ray's t = base + t; the segment still to walk is [t, end] */
+    double isovalue;
+    int cell[3];
+    int entry_axis; /* of the face through which the present cell was entered, -1 if none */
+    int inside;     /* 1, 0, -1 = not known */
+    int deflate;    /* the walk begins on the surface and has not left it so far */
+    int exact;      /* 0: any hit will do */
+    int end_is_border;
+    int cap; /* what a hit in the present cell says of its side: 2 right behind the border of a capped volume, else 1 */
+    isogi_counters count;
+} isogi_vol__walk;
+
+/* A hit at t, `local` in the present cell. */
+static void isogi_vol__emit(const isogi_vol__walk *w, double t, const double local[3], int side, isogi_hit *hit) {
+    int a;
+    hit->t = w->base + t;
+    for (a = 0; a < 3; a++) hit->local[a] = local[a], hit->cell[a] = (uint32_t)w->cell[a];
+    hit->side = side;
+}
+
+static void isogi_vol__local(const isogi_vol__walk *w, double t, double local[3]) {
+    int a;
+    for (a = 0; a < 3; a++) local[a] = isogi_vol__clamp(w->origin[a] + t * w->dir[a] - w->cell[a], 1);
+}
+
+/* Takes note of the side on which the field is where the present cell was entered; 1 if that is a change, which is a hit there. */
+static int isogi_vol__state(isogi_vol__walk *w, int inside, isogi_hit *hit) {
+    double local[3];
+    int before = w->inside;
+    w->inside = inside;
+    if (before < 0 || inside < 0 || before == inside) return 0;
+    isogi_vol__local(w, w->t, local);
+    if (w->entry_axis >= 0) local[w->entry_axis] = w->dir[w->entry_axis] > 0 ? 0 : 1;
+    isogi_vol__emit(w, w->t, local, inside ? w->cap : -1, hit);
+    return 1;
+}
+
+/* Where the ray leaves the box of cells [low, high): t, and through which axis. */
+static double isogi_vol__exit(const isogi_vol__walk *w, const int low[3], const int high[3], int *axis) {
+    double t = ISOGI_VOL__UNLIMITED;
+    int a;
+    *axis = -1;
+    for (a = 0; a < 3; a++) {
+        double plane = w->dir[a] > 0 ? high[a] : low[a], at;
+        if (!(w->dir[a] > 0 || w->dir[a] < 0)) continue;
+        at = (plane - w->origin[a]) * w->inverse[a];
+        if (at < t) t = at, *axis = a;
+    }
+    return t > w->t ? t : w->t;
+}
+
+/* Steps to the cell behind the box of cells that the ray leaves at t through `axis`. The cell on that axis is known exactly; on
+   the others it follows from t, kept within the box and never turning back, so that every step makes progress. 0: out of the volume. */
+static int isogi_vol__advance(isogi_vol__walk *w, const int low[3], const int high[3], double t, int axis) {
+    int a;
+    w->t = t;
+    for (a = 0; a < 3; a++) {
+        int c;
+        if (a == axis) continue;
+        c = (int)isogi_vol__clamp(w->origin[a] + t * w->dir[a], (double)w->pyramid->cells[a]);
+        if (w->dir[a] > 0) w->cell[a] = c < w->cell[a] ? w->cell[a] : c >= high[a] ? high[a] - 1 : c;
+        if (w->dir[a] < 0) w->cell[a] = c > w->cell[a] ? w->cell[a] : c < low[a] ? low[a] : c;
+    }
+    if (axis < 0) return 0;
+    w->cell[axis] = w->dir[axis] > 0 ? high[axis] : low[axis] - 1;
+    w->entry_axis = axis;
+    return w->cell[axis] >= 0 && w->cell[axis] < w->pyramid->cells[axis];
+}
+
+/* The largest block around the present cell, no larger than level `top`, in which the surface cannot be: its bounds and the side
+   that all of it is on (-1 = it has no finite value). 0 if there is none. */
+static int isogi_vol__uniform_block(isogi_vol__walk *w, int top, int low[3], int high[3], int *inside) {
+    int n, a;
+    for (n = top; n >= 0; n--) {
+        const isogi_level *level = &w->pyramid->level[n];
+        int shift = 2 + 2 * n, b[3];
+        const float *range;
+        for (a = 0; a < 3; a++) b[a] = w->cell[a] >> shift;
+        range = level->range[(size_t)b[0] + level->size[0] * ((size_t)b[1] + level->size[1] * (size_t)b[2])];
+        w->count.blocks++;
+        if ((double)range[0] < w->isovalue && (double)range[1] >= w->isovalue) continue;
+        *inside = range[0] > range[1] ? -1 : (double)range[0] >= w->isovalue;
+        for (a = 0; a < 3; a++) {
+            low[a] = b[a] << shift;
+            high[a] = w->pyramid->cells[a] - low[a] < level->cells ? w->pyramid->cells[a] : low[a] + level->cells;
+        }
+        return 1;
+    }
+    return 0;
+}
+
+/* The part [t, t_out] of the ray in the present cell, which it leaves through `axis` (-1: the segment ends in it). 1 = hit. */
+static int isogi_vol__visit_cell(isogi_vol__walk *w, double t_out, int axis, isogi_hit *hit) {
+    double corner[8], from[3], to[3], root = 0, local[3];
+    isogi_vol__cubic cubic;
+    int low_side = 0, i, found, inside;
+    w->count.cells++;
+    if (!isogi_vol__corners(w->pyramid, w->cell, w->isovalue, corner)) {
+        w->inside = -1, w->deflate = 0;
+        return 0;
+    }
+    for (i = 0; i < 8; i++) low_side += corner[i] < 0;
+    if (!low_side || low_side == 8) {
+        w->deflate = 0;
+        return isogi_vol__state(w, !low_side, hit);
+    }
+    isogi_vol__local(w, w->t, from);
+    isogi_vol__local(w, t_out, to);
+    if (w->entry_axis >= 0) from[w->entry_axis] = w->dir[w->entry_axis] > 0 ? 0 : 1;
+    if (axis >= 0) to[axis] = w->dir[axis] > 0 ? 1 : 0;
+    w->count.cubics++;
+    isogi_vol__cubic_set(&cubic, corner, from, to);
+    if (w->deflate) {
+        /* A start within rounding of the face that the ray leaves by: the next cell divides the root out. */
+        double length = isogi_vol__max(isogi_vol__max(fabs(to[0] - from[0]), fabs(to[1] - from[1])), fabs(to[2] - from[2]));
+        if (axis >= 0 && length < 1e-9) return 0;
+        w->deflate = 0;
+        found = isogi_vol__cubic_deflated(&cubic, &inside, &root);
+        w->inside = inside;
+    } else {
+        inside = cubic.b[0] >= 0;
+        if (isogi_vol__state(w, inside, hit)) return 1;
+        found = isogi_vol__cubic_first(&cubic, inside, w->exact, &root);
+    }
+    if (!found) return 0;
+    w->inside = !inside;
+    for (i = 0; i < 3; i++) local[i] = isogi_vol__lerp(from[i], to[i], root);
+    isogi_vol__emit(w, w->t + root * (t_out - w->t), local, inside ? -1 : 1, hit);
+    return 1;
+}
+
+/* Where the ray leaves a capped volume while inside. */
+static void isogi_vol__cap_exit(isogi_vol__walk *w, isogi_hit *hit) {
+    double local[3];
+    int a;
+    for (a = 0; a < 3; a++) w->cell[a] = isogi_vol__cell(w->origin[a] + w->end * w->dir[a], w->pyramid->volume.size[a], &local[a]);
+    isogi_vol__emit(w, w->end, local, -2, hit);
+}
+
+/* Walks to the first hit; 0 if there is none. */
+static int isogi_vol__walk_on(isogi_vol__walk *w, uint32_t flags, isogi_hit *hit) {
+    int top = ISOGI_VOL__LEVELS - 1, low[3], high[3], axis, inside, a;
+    for (;;) {
+        int before[3], changed = 0;
+        double t;
+        if (isogi_vol__uniform_block(w, top, low, high, &inside)) {
+            if (isogi_vol__state(w, inside, hit)) return 1;
+            w->deflate = 0;
+            t = isogi_vol__exit(w, low, high, &axis);
+        } else {
+            for (a = 0; a < 3; a++) low[a] = w->cell[a], high[a] = w->cell[a] + 1;
+            t = isogi_vol__exit(w, low, high, &axis);
+            if (isogi_vol__visit_cell(w, t < w->end ? t : w->end, t <= w->end ? axis : -1, hit)) return 1;
+        }
+        if (t >= w->end) break;
+        w->cap = 1;
+        for (a = 0; a < 3; a++) before[a] = w->cell[a];
+        if (!isogi_vol__advance(w, low, high, t, axis)) break;
+        /* blocks whose bounds were not crossed are known to hold the surface */
+        for (a = 0; a < 3; a++) changed |= before[a] ^ w->cell[a];
+        top = changed >= 64 ? 2 : changed >= 16 ? 1 : changed >= 4 ? 0 : -1;
+    }
+    if (!(flags & ISOGI_RAY_CAPPED) || !w->end_is_border || w->inside != 1) return 0;
+    isogi_vol__cap_exit(w, hit);
+    return 1;
+}
+
+/* ==== rays =========================================================================================================== */
+
+/* Direction components that cannot matter are set to zero, so that reciprocals stay finite. 0: no direction. */
+static int isogi_vol__set_direction(isogi_vol__walk *w, const float dir[3]) {
+    double world[3], most = 0;
+    int a;
+    for (a = 0; a < 3; a++) world[a] = (double)dir[a];
+    isogi_vol__transform(w->pyramid->to_grid, world, w->dir);
+    if (!isogi_vol__finite3(world) || !isogi_vol__finite3(w->dir)) return 0;
+    for (a = 0; a < 3; a++) most = isogi_vol__max(most, fabs(w->dir[a]));
+    if (!(most > 0)) return 0;
+    for (a = 0; a < 3; a++) {
+        if (fabs(w->dir[a]) <= 1e-30 * most) w->dir[a] = 0;
+        w->inverse[a] = w->dir[a] > 0 || w->dir[a] < 0 ? 1 / w->dir[a] : 0;
+        if (!w->pyramid->cells[a]) return 0;
+    }
+    return 1;
+}
+
+/* Clips [tmin, tmax] to the box and moves the origin to where the walk begins, so that a far origin costs no precision later. */
+static int isogi_vol__clip(isogi_vol__walk *w, double tmin, double tmax) {
+    double enter = tmin, leave = tmax;
+    int a;
+    for (a = 0; a < 3; a++) {
+        double size = w->pyramid->cells[a], t0, t1;
+        if (!(w->dir[a] > 0 || w->dir[a] < 0)) {
+            if (!(w->origin[a] >= 0 && w->origin[a] <= size)) return 0;
+            continue;
+        }
+        t0 = ((w->dir[a] > 0 ? 0 : size) - w->origin[a]) * w->inverse[a];
+        t1 = ((w->dir[a] > 0 ? size : 0) - w->origin[a]) * w->inverse[a];
+        if (t0 > enter) enter = t0, w->entry_axis = a;
+        leave = isogi_vol__min(leave, t1);
+    }
+    if (!(enter <= leave)) return 0;
+    for (a = 0; a < 3; a++) w->origin[a] = isogi_vol__clamp(w->origin[a] + enter * w->dir[a], (double)w->pyramid->cells[a]);
+    w->base = enter, w->t = 0, w->end = ISOGI_VOL__UNLIMITED;
+    for (a = 0; a < 3; a++)
+        if (w->dir[a] > 0 || w->dir[a] < 0)
+            w->end = isogi_vol__min(w->end, ((w->dir[a] > 0 ? w->pyramid->cells[a] : 0) - w->origin[a]) * w->inverse[a]);
+    w->end_is_border = !(tmax - enter < w->end);
+    w->end = isogi_vol__min(w->end, tmax - enter);
+    return 1;
+}
+
+/* The cell in which the walk begins: of those that touch the origin, the one that the ray goes on in. */
+static void isogi_vol__first_cell(isogi_vol__walk *w) {
+    double local;
+    int a;
+    for (a = 0; a < 3; a++) {
+        w->cell[a] = isogi_vol__cell(w->origin[a], w->pyramid->volume.size[a], &local);
+        if (w->dir[a] < 0 && w->cell[a] > 0 && !(local > 0)) w->cell[a]--;
+    }
+}
+
+static int isogi_vol__is_nan(double x) {
+    uint64_t bits;
+    memcpy(&bits, &x, sizeof bits);
+    return (bits & 0x7fffffffffffffffu) > 0x7ff0000000000000u;
+}
+
+/* tmax as given, with 0 and anything beyond standing for unlimited. */
+static double isogi_vol__tmax(double tmax) {
+    return (tmax >= 0 && tmax <= 0) || tmax > ISOGI_VOL__UNLIMITED ? ISOGI_VOL__UNLIMITED : tmax;
+}
+
+static int isogi_vol__trace(const isogi_pyramid *p, const isogi_ray *ray, int exact, isogi_hit *hit, isogi_counters *count) {
+    isogi_vol__walk w;
+    double relative[3], tmax = isogi_vol__tmax(ray->tmax);
+    int a, found = 0;
+    memset(&w, 0, sizeof w);
+    w.pyramid = p, w.isovalue = ray->isovalue, w.inside = -1, w.entry_axis = -1, w.exact = exact, w.cap = 1;
+    for (a = 0; a < 3; a++) relative[a] = ray->origin[a] - p->volume.origin[a];
+    isogi_vol__transform(p->to_grid, relative, w.origin);
+    count->rays++;
+    if (!isogi_vol__finite3(w.origin) || !isogi_vol__finite3(ray->origin)) return 0;
+    if (isogi_vol__is_nan(ray->isovalue) || isogi_vol__is_nan(ray->tmin) || isogi_vol__is_nan(ray->tmax) || !(ray->tmin <= tmax)) return 0;
+    if (isogi_vol__set_direction(&w, ray->dir) && isogi_vol__clip(&w, isogi_vol__max(ray->tmin, -ISOGI_VOL__UNLIMITED), tmax)) {
+        if (w.entry_axis >= 0 && (ray->flags & ISOGI_RAY_CAPPED)) w.inside = 0, w.cap = 2;
+        isogi_vol__first_cell(&w);
+        found = isogi_vol__walk_on(&w, ray->flags, hit);
+    }
+    count->blocks += w.count.blocks, count->cells += w.count.cells, count->cubics += w.count.cubics;
+    return found;
+}
+
+static void isogi_vol__add(isogi_counters *to, const isogi_counters *from) {
+    if (!to) return;
+    to->rays += from->rays, to->blocks += from->blocks, to->cells += from->cells, to->cubics += from->cubics;
+}
+
+ISOGI_API isogi_result isogi_vol_intersect(const isogi_pyramid *pyramid, const isogi_ray *rays, size_t count, isogi_hit *hits,
+                                           isogi_counters *counters) {
+    isogi_counters work;
+    size_t i;
+    if (!pyramid || (count && (!rays || !hits))) return ISOGI_INVALID;
+    memset(&work, 0, sizeof work);
+    for (i = 0; i < count; i++) {
+        isogi_hit hit;
+        if (!isogi_vol__trace(pyramid, &rays[i], 1, &hit, &work)) memset(&hit, 0, sizeof hit);
+        hits[i] = hit;
+    }
+    isogi_vol__add(counters, &work);
+    return ISOGI_OK;
+}
+
+ISOGI_API isogi_result isogi_vol_occluded(const isogi_pyramid *pyramid, const isogi_ray *rays, size_t count, uint8_t *occluded,
+                                          isogi_counters *counters) {
+    isogi_counters work;
+    size_t i;
+    if (!pyramid || (count && (!rays || !occluded))) return ISOGI_INVALID;
+    memset(&work, 0, sizeof work);
+    for (i = 0; i < count; i++) {
+        isogi_hit hit;
+        occluded[i] = (uint8_t)isogi_vol__trace(pyramid, &rays[i], 0, &hit, &work);
+    }
+    isogi_vol__add(counters, &work);
+    return ISOGI_OK;
+}
+
+static int isogi_vol__trace_on(const isogi_pyramid *p, const isogi_hit *start, const float dir[3], double tmax, double isovalue,
+                               uint32_t flags, isogi_hit *hit, isogi_counters *count) {
+    isogi_vol__walk w;
+    int a, found = 0;
+    memset(&w, 0, sizeof w);
+    w.pyramid = p, w.isovalue = isovalue, w.inside = -1, w.entry_axis = -1, w.exact = 1, w.cap = 1;
+    /* the cap of a border lies where the field is not at the isovalue: nothing to divide out */
+    w.deflate = start->side != 2 && start->side != -2;
+    count->rays++;
+    for (a = 0; a < 3; a++) {
+        if (start->cell[a] >= (uint32_t)p->cells[a] || !isogi_vol__finite64(start->local[a])) return 0;
+        w.origin[a] = start->cell[a] + isogi_vol__clamp(start->local[a], 1);
+    }
+    tmax = isogi_vol__tmax(tmax);
+    if (isogi_vol__is_nan(isovalue) || !(tmax >= 0)) return 0;
+    if (isogi_vol__set_direction(&w, dir) && isogi_vol__clip(&w, 0, tmax)) {
+        isogi_vol__first_cell(&w);
+        w.entry_axis = -1;
+        found = isogi_vol__walk_on(&w, flags, hit);
+    }
+    count->blocks += w.count.blocks, count->cells += w.count.cells, count->cubics += w.count.cubics;
+    return found;
+}
+
+ISOGI_API isogi_result isogi_vol_continue(const isogi_pyramid *pyramid, const isogi_hit *starts, const float (*dirs)[3],
+                                          const double *tmax, double isovalue, uint32_t flags, size_t count, isogi_hit *hits,
+                                          isogi_counters *counters) {
+    isogi_counters work;
+    size_t i;
+    if (!pyramid || (count && (!starts || !dirs || !hits))) return ISOGI_INVALID;
+    memset(&work, 0, sizeof work);
+    for (i = 0; i < count; i++) {
+        isogi_hit hit;
+        if (!isogi_vol__trace_on(pyramid, &starts[i], dirs[i], tmax ? tmax[i] : 0, isovalue, flags, &hit, &work))
+            memset(&hit, 0, sizeof hit);
+        hits[i] = hit;
+    }
+    isogi_vol__add(counters, &work);
+    return ISOGI_OK;
+}
+
+ISOGI_API isogi_result isogi_vol_positions(const isogi_pyramid *pyramid, const isogi_hit *hits, size_t count, float (*positions)[3]) {
+    size_t i;
+    int a;
+    if (!pyramid || (count && (!hits || !positions))) return ISOGI_INVALID;
+    for (i = 0; i < count; i++) {
+        double grid[3], world[3] = {0, 0, 0};
+        for (a = 0; a < 3; a++) grid[a] = hits[i].cell[a] + hits[i].local[a];
+        if (hits[i].side) isogi_vol_to_world(pyramid, grid, world);
+        for (a = 0; a < 3; a++) positions[i][a] = (float)world[a];
+    }
+    return ISOGI_OK;
+}
+
+/* Minus the gradient (per grid unit) at a hit; at the cap of a border, a vector out of the nearest face of the box. */
+static void isogi_vol__outward(const isogi_pyramid *p, const isogi_hit *hit, isogi_normal_kind kind, double out[3]) {
+    double corner[8], nearest = 2;
+    int cell[3], a, axis = 0, upper = 0;
+    for (a = 0; a < 3; a++) {
+        double low = hit->cell[a] + hit->local[a], high = p->cells[a] - low;
+        cell[a] = (int)hit->cell[a];
+        if (low < nearest) nearest = low, axis = a, upper = 0;
+        if (high < nearest) nearest = high, axis = a, upper = 1;
+        out[a] = 0;
+    }
+    if (hit->side == 2 || hit->side == -2) {
+        out[axis] = upper ? 1 : -1;
+        return;
+    }
+    if (kind == ISOGI_NORMAL_SMOOTH) isogi_vol__bspline(p, cell, hit->local, out);
+    else isogi_vol__corners(p, cell, 0, corner), isogi_vol__trilinear(corner, hit->local, out);
+    for (a = 0; a < 3; a++) out[a] = -out[a];
+}
+
+ISOGI_API isogi_result isogi_vol_normals(const isogi_pyramid *pyramid, const isogi_hit *hits, size_t count, isogi_normal_kind kind,
+                                         float (*normals)[3]) {
+    size_t i;
+    int a;
+    if (!pyramid || (count && (!hits || !normals)) || (kind != ISOGI_NORMAL_SMOOTH && kind != ISOGI_NORMAL_TRILINEAR)) return ISOGI_INVALID;
+    for (i = 0; i < count; i++) {
+        double n[3] = {0, 0, 0}, length;
+        int usable = hits[i].side != 0;
+        for (a = 0; a < 3; a++) usable = usable && hits[i].cell[a] < (uint32_t)pyramid->cells[a];
+        if (usable) {
+            isogi_vol__outward(pyramid, &hits[i], kind, n);
+            isogi_vol__gradient_to_world(pyramid, n, n);
+        }
+        length = sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
+        usable = usable && isogi_vol__finite64(length) && length > 0;
+        for (a = 0; a < 3; a++) normals[i][a] = usable ? (float)(n[a] / length) : 0;
+    }
+    return ISOGI_OK;
+}
+
+/* ==== meshes ========================================================================================================= */
+
+/* (the section on meshes goes here) */
+
+#undef ISOGI_VOL__LEVELS
+#undef ISOGI_VOL__UNLIMITED
+#undef ISOGI_VOL__LOCK
+#undef ISOGI_VOL__UNLOCK
+#undef ISOGI_VOL__MAX_THREADS
+#endif /* ISOGI_VOL_IMPLEMENTATION */
