@@ -168,7 +168,8 @@ ISOGI_API isogi_result isogi_vol_occluded(const isogi_pyramid *pyramid, const is
                                           isogi_counters *counters);
 /* Rays that leave from hits, or from any other place given as cell + local that lies ON the surface of this isovalue (its t is
    not read; of its side, only whether it is a cap). The root they start from is divided out of the cell's cubic: no epsilon, no self-hit, no leak. t of the new
-   hit counts from the start. tmax[count], or NULL = unlimited. flags as in isogi_ray. hits may be starts. */
+   hit counts from the start. Where the surface has no thickness (a single layer of voxels that equal the isovalue) a ray touches
+   it in one point: that is a hit with side +1, and the ray goes on outside. tmax[count], or NULL = unlimited. flags as in isogi_ray. hits may be starts. */
 ISOGI_API isogi_result isogi_vol_continue(const isogi_pyramid *pyramid, const isogi_hit *starts, const float (*dirs)[3],
                                           const double *tmax, double isovalue, uint32_t flags, size_t count, isogi_hit *hits,
                                           isogi_counters *counters);
@@ -435,6 +436,7 @@ static int isogi_vol__finite3(const double v[3]) {
 
 static double isogi_vol__min(double a, double b) { return a < b ? a : b; }
 static double isogi_vol__max(double a, double b) { return a > b ? a : b; }
+static double isogi_vol__largest(double a, double b, double c) { return isogi_vol__max(isogi_vol__max(fabs(a), fabs(b)), fabs(c)); }
 
 /* Into [0, high]; NaN gives 0. */
 static double isogi_vol__clamp(double x, double high) {
@@ -1144,7 +1146,7 @@ static int isogi_vol__uniform_block(isogi_vol__walk *w, int top, int low[3], int
 
 /* The part [t, t_out] of the ray in the present cell, which it leaves through `axis` (-1: the segment ends in it). 1 = hit. */
 static int isogi_vol__visit_cell(isogi_vol__walk *w, double t_out, int axis, isogi_hit *hit) {
-    double corner[8], from[3], to[3], root = 0, local[3];
+    double corner[8], from[3], to[3], root = 0, local[3], steepest = 0;
     isogi_vol__cubic cubic;
     int low_side = 0, i, found, inside;
     w->count.cells++;
@@ -1152,7 +1154,10 @@ static int isogi_vol__visit_cell(isogi_vol__walk *w, double t_out, int axis, iso
         w->inside = -1, w->deflate = 0;
         return 0;
     }
-    for (i = 0; i < 8; i++) low_side += corner[i] < 0;
+    for (i = 0; i < 8; i++) {
+        low_side += corner[i] < 0;
+        steepest = isogi_vol__max(steepest, fabs(corner[i]));
+    }
     if (!low_side || low_side == 8) {
         w->deflate = 0;
         return isogi_vol__state(w, !low_side, hit);
@@ -1164,9 +1169,11 @@ static int isogi_vol__visit_cell(isogi_vol__walk *w, double t_out, int axis, iso
     w->count.cubics++;
     isogi_vol__cubic_set(&cubic, corner, from, to);
     if (w->deflate) {
-        /* A start within rounding of the face that the ray leaves by: the next cell divides the root out. */
-        double length = isogi_vol__max(isogi_vol__max(fabs(to[0] - from[0]), fabs(to[1] - from[1])), fabs(to[2] - from[2]));
-        if (axis >= 0 && length < 1e-9) return 0;
+        /* Still on the surface at the exit, because the start lies within rounding of it, or because the ray runs along the surface:
+           the next cell divides the root out. */
+        double length = isogi_vol__largest(to[0] - from[0], to[1] - from[1], to[2] - from[2]);
+        double reach = isogi_vol__largest(cubic.b[1] - cubic.b[0], cubic.b[2] - cubic.b[0], cubic.b[3] - cubic.b[0]);
+        if (axis >= 0 && (length < 1e-9 || reach < 1e-12 * steepest)) return 0;
         w->deflate = 0;
         found = isogi_vol__cubic_deflated(&cubic, &inside, &root);
         w->inside = inside;
@@ -1356,6 +1363,8 @@ static int isogi_vol__trace_on(const isogi_pyramid *p, const isogi_hit *start, c
     if (isogi_vol__set_direction(&w, dir) && isogi_vol__clip(&w, 0, tmax)) {
         isogi_vol__first_cell(&w);
         w.entry_axis = -1;
+        /* a cap that is left outwards */
+        if (!w.deflate && w.end * isogi_vol__largest(w.dir[0], w.dir[1], w.dir[2]) < 1e-9) return 0;
         found = isogi_vol__walk_on(&w, flags, hit);
     }
     count->blocks += w.count.blocks, count->cells += w.count.cells, count->cubics += w.count.cubics;
