@@ -283,6 +283,19 @@ ISOGI_API void isogi_vol_mesh_free(const isogi_pyramid *pyramid, isogi_mesh *mes
 
 #define ISOGI_VOL__UNLIMITED 1e300 /* stands for infinity, which -ffast-math does not promise to keep */
 #define ISOGI_VOL__LEVELS 3
+#define ISOGI_VOL__TICKS 281474976710656.0 /* 2^48 to a segment: times 2 and 2^14 planes stays within 2^63 */
+#define ISOGI_VOL__FAST_SIZE 8192 /* voxels along an axis up to which fast rays keep 1e-10 cell */
+#if (defined(__GNUC__) || defined(__clang__)) && !defined(__TINYC__)
+#define ISOGI_VOL__INLINE static inline __attribute__((always_inline))
+#define ISOGI_VOL__UNLIKELY(x) __builtin_expect(!!(x), 0)
+#else
+#define ISOGI_VOL__INLINE static inline
+#define ISOGI_VOL__UNLIKELY(x) (x)
+#endif
+#if (defined(__SSE2__) || defined(_M_X64)) && !defined(ISOGI_NO_SIMD)
+#define ISOGI_VOL__SSE2
+#include <emmintrin.h>
+#endif
 
 /* ==== memory ========================================================================================================= */
 
@@ -520,6 +533,13 @@ struct isogi_pyramid {
     isogi_level level[ISOGI_VOL__LEVELS];
     size_t block_count; /* of all levels */
     float (*blocks)[2];
+    /* the same ranges for fast rays: nodes of 64 children, least[64] then largest[64], in 8 bits over the volume's range; first the
+       nodes of level 1 (children: level 0), then those of level 2 (children: level 1) */
+    uint8_t (*nodes)[128];
+    size_t node_count, first_top_node;
+    double node_scale; /* 8-bit value = floor((value - range[0]) * node_scale) */
+    int all_finite;
+    int fast; /* 0: only the plain walk is right for this volume */
 };
 
 static size_t isogi_vol__type_size(isogi_type type) {
@@ -678,10 +698,11 @@ static int isogi_vol__corners(const isogi_pyramid *pyramid, const int cell[3], d
     ptrdiff_t dz = v->size[2] > 1 ? v->stride[2] : 0;
     double scale = v->scale, bias = v->bias;
     int i, finite = 1;
+#define ISOGI_VOL__AT(T, offset) (scale * (double)*(const T *)(const void *)(p + (offset)) + bias)
 #define ISOGI_VOL__READ(T)                                                                                                       \
-    for (i = 0; i < 8; i++)                                                                                                      \
-        corner[i] = scale * (double)*(const T *)(const void *)(p + (i & 1 ? dx : 0) + (i & 2 ? dy : 0) + (i & 4 ? dz : 0)) +     \
-                    bias;                                                                                                        \
+    corner[0] = ISOGI_VOL__AT(T, 0), corner[1] = ISOGI_VOL__AT(T, dx), corner[2] = ISOGI_VOL__AT(T, dy);                         \
+    corner[3] = ISOGI_VOL__AT(T, dx + dy), corner[4] = ISOGI_VOL__AT(T, dz), corner[5] = ISOGI_VOL__AT(T, dx + dz);              \
+    corner[6] = ISOGI_VOL__AT(T, dy + dz), corner[7] = ISOGI_VOL__AT(T, dx + dy + dz);                                           \
     break;
     switch (v->type) {
     case ISOGI_U8: ISOGI_VOL__READ(uint8_t)
@@ -691,8 +712,9 @@ static int isogi_vol__corners(const isogi_pyramid *pyramid, const int cell[3], d
     case ISOGI_F32: ISOGI_VOL__READ(float)
     case ISOGI_F64: ISOGI_VOL__READ(double)
     }
+#undef ISOGI_VOL__AT
 #undef ISOGI_VOL__READ
-    if (v->type == ISOGI_F32 || v->type == ISOGI_F64)
+    if (!pyramid->all_finite)
         for (i = 0; i < 8; i++) finite &= isogi_vol__finite64(corner[i]);
     for (i = 0; i < 8; i++) corner[i] -= isovalue;
     return finite;
@@ -711,18 +733,22 @@ typedef struct isogi_vol__build_job {
     isogi_pyramid *pyramid;
     double *rows; /* for each task: three rows of a volume's width */
     double (*range)[2];
+    int *finite;
 } isogi_vol__build_job;
 
-/* Least and largest over the 5x5 rows of one row of level-0 blocks, voxel by voxel along x. */
-static void isogi_vol__reduce_rows(const isogi_volume *v, int y0, int y1, int z0, int z1, double *row, double *least, double *largest) {
-    int width = (int)v->size[0], x, y, z;
+/* Least and largest over the 5x5 rows of one row of level-0 blocks, voxel by voxel along x; whether all of them are finite. */
+static int isogi_vol__reduce_rows(const isogi_volume *v, int y0, int y1, int z0, int z1, double *row, double *least, double *largest) {
+    int width = (int)v->size[0], finite = 1, x, y, z;
     for (x = 0; x < width; x++) least[x] = DBL_MAX, largest[x] = -DBL_MAX;
     for (z = z0; z <= z1; z++) {
         for (y = y0; y <= y1; y++) {
             isogi_vol__row(v, 0, y, z, width, row);
             if (v->type == ISOGI_F32 || v->type == ISOGI_F64) {
                 for (x = 0; x < width; x++) {
-                    if (!isogi_vol__finite64(row[x])) continue;
+                    if (!isogi_vol__finite64(row[x])) {
+                        finite = 0;
+                        continue;
+                    }
                     least[x] = isogi_vol__min(row[x], least[x]);
                     largest[x] = isogi_vol__max(row[x], largest[x]);
                 }
@@ -734,6 +760,7 @@ static void isogi_vol__reduce_rows(const isogi_volume *v, int y0, int y1, int z0
             }
         }
     }
+    return finite;
 }
 
 static int isogi_vol__last_voxel(size_t block, int cells, size_t voxels) {
@@ -747,11 +774,12 @@ static void isogi_vol__build_task(void *arg, size_t bz) {
     const isogi_volume *v = &job->pyramid->volume;
     const isogi_level *level = &job->pyramid->level[0];
     size_t width = v->size[0], bx, by;
+    int finite = 1;
     double *row = job->rows + 3 * width * bz, *least = row + width, *largest = least + width, range[2] = {DBL_MAX, -DBL_MAX};
     for (by = 0; by < level->size[1]; by++) {
         float(*block)[2] = job->pyramid->blocks + level->size[0] * (by + level->size[1] * bz);
-        isogi_vol__reduce_rows(v, (int)(4 * by), isogi_vol__last_voxel(by, 4, v->size[1]), (int)(4 * bz),
-                               isogi_vol__last_voxel(bz, 4, v->size[2]), row, least, largest);
+        finite &= isogi_vol__reduce_rows(v, (int)(4 * by), isogi_vol__last_voxel(by, 4, v->size[1]), (int)(4 * bz),
+                                         isogi_vol__last_voxel(bz, 4, v->size[2]), row, least, largest);
         for (bx = 0; bx < level->size[0]; bx++) {
             int x = (int)(4 * bx), last = isogi_vol__last_voxel(bx, 4, v->size[0]);
             double low = DBL_MAX, high = -DBL_MAX;
@@ -761,6 +789,7 @@ static void isogi_vol__build_task(void *arg, size_t bz) {
         }
     }
     job->range[bz][0] = range[0], job->range[bz][1] = range[1];
+    job->finite[bz] = finite;
 }
 
 /* Level n from level n-1: four blocks a side. */
@@ -810,12 +839,14 @@ static isogi_result isogi_vol__build_blocks(isogi_pyramid *p) {
                    ? NULL
                    : (double *)isogi_allocate(&p->context, 3 * p->volume.size[0] * tasks, sizeof(double));
     job.range = (double(*)[2])isogi_allocate(&p->context, tasks, sizeof *job.range);
-    if (job.rows && job.range) result = isogi_parallel(&p->context, tasks, isogi_vol__build_task, &job, 0, 1);
+    job.finite = (int *)isogi_allocate(&p->context, tasks, sizeof *job.finite);
+    if (job.rows && job.range && job.finite) result = isogi_parallel(&p->context, tasks, isogi_vol__build_task, &job, 0, 1);
     if (result == ISOGI_OK) {
-        p->range[0] = DBL_MAX, p->range[1] = -DBL_MAX;
+        p->range[0] = DBL_MAX, p->range[1] = -DBL_MAX, p->all_finite = 1;
         for (i = 0; i < tasks; i++) {
             p->range[0] = isogi_vol__min(p->range[0], job.range[i][0]);
             p->range[1] = isogi_vol__max(p->range[1], job.range[i][1]);
+            p->all_finite &= job.finite[i];
         }
         if (p->range[0] > p->range[1]) p->range[0] = p->range[1] = 0;
         isogi_vol__build_level(p, 1);
@@ -823,7 +854,53 @@ static isogi_result isogi_vol__build_blocks(isogi_pyramid *p) {
     }
     isogi_release(&p->context, job.rows, 3 * p->volume.size[0] * tasks, sizeof(double));
     isogi_release(&p->context, job.range, tasks, sizeof *job.range);
+    isogi_release(&p->context, job.finite, tasks, sizeof *job.finite);
     return result;
+}
+
+/* Monotone, so that comparing 8-bit values never hides a block that holds the isovalue. */
+static int isogi_vol__quantise(const isogi_pyramid *p, double value) {
+    double q = (value - p->range[0]) * p->node_scale;
+    return q < 0 ? -1 : q < 256 ? (int)q : 256;
+}
+
+static void isogi_vol__build_node(const isogi_pyramid *p, const isogi_level *children, const size_t node[3], uint8_t out[128]) {
+    size_t i;
+    for (i = 0; i < 64; i++) {
+        size_t x = 4 * node[0] + (i & 3), y = 4 * node[1] + (i >> 2 & 3), z = 4 * node[2] + (i >> 4);
+        const float *range;
+        int low, high;
+        out[i] = 255, out[64 + i] = 0; /* beyond the volume, or without a finite voxel: never entered */
+        if (x >= children->size[0] || y >= children->size[1] || z >= children->size[2]) continue;
+        range = children->range[x + children->size[0] * (y + children->size[1] * z)];
+        if (range[0] > range[1]) continue;
+        low = isogi_vol__quantise(p, (double)range[0]), high = isogi_vol__quantise(p, (double)range[1]);
+        out[i] = (uint8_t)(low < 0 ? 0 : low > 255 ? 255 : low), out[64 + i] = (uint8_t)(high < 0 ? 0 : high > 255 ? 255 : high);
+    }
+}
+
+static isogi_result isogi_vol__build_nodes(isogi_pyramid *p) {
+    size_t count = 0, node[3];
+    uint8_t(*out)[128];
+    double range = p->range[1] - p->range[0];
+    int n, a;
+    for (n = 1; n < ISOGI_VOL__LEVELS; n++) {
+        p->first_top_node = count;
+        count += p->level[n].size[0] * p->level[n].size[1] * p->level[n].size[2];
+    }
+    p->nodes = (uint8_t(*)[128])isogi_allocate(&p->context, count, sizeof *p->nodes);
+    p->node_count = count;
+    if (!p->nodes) return ISOGI_NO_MEMORY;
+    p->node_scale = range > 0 && range < 1e300 ? 255 / range : 0;
+    p->fast = p->context.force_path != 1 && p->all_finite && p->node_scale > 0 && p->node_scale < 1e300 && p->volume.scale > 0;
+    for (a = 0; a < 3; a++) p->fast = p->fast && p->volume.size[a] <= ISOGI_VOL__FAST_SIZE;
+    out = p->nodes;
+    for (n = 1; n < ISOGI_VOL__LEVELS; n++)
+        for (node[2] = 0; node[2] < p->level[n].size[2]; node[2]++)
+            for (node[1] = 0; node[1] < p->level[n].size[1]; node[1]++)
+                for (node[0] = 0; node[0] < p->level[n].size[0]; node[0]++)
+                    isogi_vol__build_node(p, &p->level[n - 1], node, *out++);
+    return ISOGI_OK;
 }
 
 ISOGI_API isogi_result isogi_vol_build(isogi_pyramid **pyramid, const isogi_volume *volume, const isogi_context *context) {
@@ -851,6 +928,7 @@ ISOGI_API isogi_result isogi_vol_build(isogi_pyramid **pyramid, const isogi_volu
         }
         result = isogi_vol__build_blocks(p);
     }
+    if (result == ISOGI_OK) result = isogi_vol__build_nodes(p);
     if (result == ISOGI_OK) *pyramid = p;
     else isogi_vol_free(p);
     return result;
@@ -861,6 +939,7 @@ ISOGI_API void isogi_vol_free(isogi_pyramid *pyramid) {
     if (!pyramid) return;
     context = pyramid->context;
     isogi_release(&context, pyramid->blocks, pyramid->block_count, sizeof *pyramid->blocks);
+    isogi_release(&context, pyramid->nodes, pyramid->node_count, sizeof *pyramid->nodes);
     isogi_release(&context, pyramid, 1, sizeof *pyramid);
 }
 
@@ -994,6 +1073,37 @@ static void isogi_vol__cubic_rescale(isogi_vol__cubic *cubic) {
 }
 
 /* Blossom of the trilinear form: b[1] and b[2] are means over the choices of which coordinate is taken at which end. */
+#ifdef ISOGI_VOL__SSE2
+ISOGI_VOL__INLINE __m128d isogi_vol__lerp2(__m128d a, __m128d b, double u) {
+    return _mm_add_pd(_mm_mul_pd(_mm_set1_pd(1 - u), a), _mm_mul_pd(_mm_set1_pd(u), b));
+}
+
+/* Two at a time, operation by operation as the plain version below: the same bits. */
+static void isogi_vol__cubic_set(isogi_vol__cubic *cubic, const double c[8], const double from[3], const double to[3]) {
+    __m128d p = _mm_loadu_pd(c), q = _mm_loadu_pd(c + 2), r = _mm_loadu_pd(c + 4), s = _mm_loadu_pd(c + 6);
+    __m128d even0 = _mm_unpacklo_pd(p, q), odd0 = _mm_unpackhi_pd(p, q), even1 = _mm_unpacklo_pd(r, s), odd1 = _mm_unpackhi_pd(r, s);
+    /* x taken at its start (0) and end (1): {y0, y1} for z0, z1 */
+    __m128d x00 = isogi_vol__lerp2(even0, odd0, from[0]), x01 = isogi_vol__lerp2(even1, odd1, from[0]);
+    __m128d x10 = isogi_vol__lerp2(even0, odd0, to[0]), x11 = isogi_vol__lerp2(even1, odd1, to[0]);
+    /* x and y taken: {z0, z1} */
+    __m128d low0 = _mm_unpacklo_pd(x00, x01), high0 = _mm_unpackhi_pd(x00, x01);
+    __m128d low1 = _mm_unpacklo_pd(x10, x11), high1 = _mm_unpackhi_pd(x10, x11);
+    __m128d y00 = isogi_vol__lerp2(low0, high0, from[1]), y01 = isogi_vol__lerp2(low0, high0, to[1]);
+    __m128d y10 = isogi_vol__lerp2(low1, high1, from[1]), y11 = isogi_vol__lerp2(low1, high1, to[1]);
+    /* all taken: {x at start, x at end} */
+    __m128d a0 = _mm_unpacklo_pd(y00, y10), a1 = _mm_unpackhi_pd(y00, y10), b0 = _mm_unpacklo_pd(y01, y11), b1 = _mm_unpackhi_pd(y01, y11);
+    double f[8];
+    _mm_storeu_pd(f + 0, isogi_vol__lerp2(a0, a1, from[2])); /* f[x + 2y + 4z] */
+    _mm_storeu_pd(f + 2, isogi_vol__lerp2(b0, b1, from[2]));
+    _mm_storeu_pd(f + 4, isogi_vol__lerp2(a0, a1, to[2]));
+    _mm_storeu_pd(f + 6, isogi_vol__lerp2(b0, b1, to[2]));
+    cubic->b[0] = f[0];
+    cubic->b[1] = (f[1] + f[2] + f[4]) * (1.0 / 3);
+    cubic->b[2] = (f[6] + f[5] + f[3]) * (1.0 / 3);
+    cubic->b[3] = f[7];
+    isogi_vol__cubic_rescale(cubic);
+}
+#else
 static void isogi_vol__cubic_set(isogi_vol__cubic *cubic, const double c[8], const double from[3], const double to[3]) {
     double x[2][4], xy[2][2][2], f[2][2][2];
     const double *end[2];
@@ -1011,11 +1121,12 @@ static void isogi_vol__cubic_set(isogi_vol__cubic *cubic, const double c[8], con
             for (k = 0; k < 2; k++) f[i][j][k] = isogi_vol__lerp(xy[i][j][0], xy[i][j][1], end[k][2]);
         }
     cubic->b[0] = f[0][0][0];
-    cubic->b[1] = (f[1][0][0] + f[0][1][0] + f[0][0][1]) / 3;
-    cubic->b[2] = (f[0][1][1] + f[1][0][1] + f[1][1][0]) / 3;
+    cubic->b[1] = (f[1][0][0] + f[0][1][0] + f[0][0][1]) * (1.0 / 3);
+    cubic->b[2] = (f[0][1][1] + f[1][0][1] + f[1][1][0]) * (1.0 / 3);
     cubic->b[3] = f[1][1][1];
     isogi_vol__cubic_rescale(cubic);
 }
+#endif
 
 static double isogi_vol__cubic_at(const isogi_vol__cubic *cubic, double s) {
     const double *b = cubic->b;
@@ -1038,19 +1149,21 @@ static int isogi_vol__quadratic_roots(double a, double b, double c, double root[
     return n;
 }
 
-/* The root in [low, high], where the cubic is monotone and its sides differ: Newton, kept inside a shrinking bracket. */
-static double isogi_vol__cubic_refine(const isogi_vol__cubic *cubic, double low, double high, int rising) {
+/* The root in [low, high], where the cubic is monotone and its sides differ: Newton from the secant's root, kept inside a shrinking
+   bracket; every third step bisects once Newton has had its chance. */
+static double isogi_vol__cubic_refine(const isogi_vol__cubic *cubic, double low, double high, double at_low, double at_high, int rising) {
     const double *b = cubic->b;
     double c1 = 3 * (b[1] - b[0]), c2 = 3 * ((b[0] - b[1]) + (b[2] - b[1])), c3 = (b[3] - b[0]) + 3 * (b[1] - b[2]);
-    double s = 0.5 * (low + high);
+    double s = low + (high - low) * (at_low / (at_low - at_high));
     int i;
-    for (i = 0; i < 64 && high - low > 1e-15; i++) {
-        double value = isogi_vol__cubic_at(cubic, s), slope = c1 + s * (2 * c2 + s * 3 * c3), next;
+    if (!(s > low && s < high)) s = 0.5 * (low + high);
+    for (i = 0; i < 64; i++) {
+        double value = b[0] + s * (c1 + s * (c2 + s * c3)), slope = c1 + s * (2 * c2 + s * 3 * c3), next;
         if ((value >= 0) == rising) high = s;
         else low = s;
         next = s - value / slope;
         if (!(next > low && next < high) || (i > 8 && i % 3 == 0)) next = 0.5 * (low + high); /* also catches slope 0 */
-        if (fabs(next - s) < 1e-15) return next;
+        if (fabs(next - s) < 1e-14) return next;
         s = next;
     }
     return s;
@@ -1060,20 +1173,26 @@ static double isogi_vol__cubic_refine(const isogi_vol__cubic *cubic, double low,
    *end_inside: inside at 1. */
 static int isogi_vol__cubic_first(const isogi_vol__cubic *cubic, int inside, int exact, double *root) {
     const double *b = cubic->b;
-    double extremum[2], low = 0;
+    double extremum[2], low = 0, at_low = b[0];
     int n, i;
     if ((b[1] >= 0) == inside && (b[2] >= 0) == inside && (b[3] >= 0) == inside) return 0;
+    if ((b[3] >= 0) != inside && ((b[1] >= 0) == inside || (b[2] >= 0) != inside)) {
+        /* the control polygon changes sides once: so does the cubic */
+        *root = exact ? isogi_vol__cubic_refine(cubic, 0, 1, b[0], b[3], !inside) : 1;
+        return 1;
+    }
     n = isogi_vol__quadratic_roots(b[1] - b[0], 2 * ((b[0] - b[1]) + (b[2] - b[1])), (b[3] - b[0]) + 3 * (b[1] - b[2]), extremum);
     for (i = 0; i <= n; i++) {
-        double high = i < n ? extremum[i] : 1;
+        double high = i < n ? extremum[i] : 1, at_high;
         if (!(high > low)) continue;
         if (high > 1) high = 1;
-        if (((high < 1 ? isogi_vol__cubic_at(cubic, high) : b[3]) >= 0) != inside) {
-            *root = exact ? isogi_vol__cubic_refine(cubic, low, high, !inside) : high;
+        at_high = high < 1 ? isogi_vol__cubic_at(cubic, high) : b[3];
+        if ((at_high >= 0) != inside) {
+            *root = exact ? isogi_vol__cubic_refine(cubic, low, high, at_low, at_high, !inside) : high;
             return 1;
         }
         if (high >= 1) return 0;
-        low = high;
+        low = high, at_low = at_high;
     }
     return 0;
 }
@@ -1278,6 +1397,277 @@ static int isogi_vol__walk_on(isogi_vol__walk *w, uint32_t flags, isogi_hit *hit
     return 1;
 }
 
+/* ==== fast traversal ================================================================================================= */
+
+/* The same walk, in integer time. Axes along which the ray falls are mirrored, so that every step goes up; plane k of an axis is
+   passed at tick at + k per. All levels take their planes from this one formula, hence agree on what lies between them exactly, and
+   a step is an integer comparison and an addition. Blocks that hold no surface lie strictly on one side, and so do the faces they
+   share with others (a convex sum of numbers of one sign has that sign in floating point too): stepping over them keeps the side. */
+typedef struct isogi_vol__ticks {
+    int64_t at[3], per[3], end;
+    int mirror[3]; /* 0, or one less than the padded number of cells: cell = mirror - mirrored cell */
+    uint32_t flip; /* child = mirrored child ^ flip */
+    int first[3];  /* mirrored cell in which the walk begins */
+    int isovalue;  /* in 8 bits */
+    union { int i; float f; double d; } threshold; /* of raw voxels: inside is raw >= threshold */
+} isogi_vol__ticks;
+
+/* Smallest raw value that is inside. Raw integers are tried around the quotient, since scale * raw + bias rounds. 0: not known. */
+static int isogi_vol__threshold(isogi_vol__ticks *k, const isogi_volume *v, double isovalue) {
+    static const int least[4] = {0, -128, 0, -32768}, largest[4] = {255, 127, 65535, 32767};
+    int plain = v->scale >= 1 && v->scale <= 1 && v->bias >= 0 && v->bias <= 0, i, tries;
+    double raw;
+    if (v->type == ISOGI_F64) return k->threshold.d = isovalue, plain;
+    if (v->type == ISOGI_F32) {
+        k->threshold.f = isogi_vol__float_above(isovalue);
+        return plain;
+    }
+    raw = plain ? isovalue : (isovalue - v->bias) / v->scale;
+    if (!(raw > least[v->type] - 2.0)) raw = least[v->type] - 2.0;
+    if (!(raw < largest[v->type] + 2.0)) raw = largest[v->type] + 2.0;
+    i = (int)ceil(raw);
+    for (tries = 0; tries < 4 && v->scale * (i - 1) + v->bias >= isovalue; tries++) i--;
+    for (tries = 0; tries < 4 && v->scale * i + v->bias < isovalue; tries++) i++;
+    k->threshold.i = i;
+    return 1;
+}
+
+/* One axis of the planes. Whatever lies beyond the segment is put at twice its length, so that no product overflows. */
+ISOGI_VOL__INLINE void isogi_vol__set_axis(isogi_vol__ticks *k, const isogi_vol__walk *w, int a, double scale) {
+    const isogi_pyramid *p = w->pyramid;
+    const double beyond = 2 * ISOGI_VOL__TICKS;
+    const int padded = (int)p->level[2].size[a] * 64, down = w->dir[a] < 0, still = !(w->dir[a] > 0 || down);
+    const int low = down ? padded - p->cells[a] : 0, high = (down ? padded : p->cells[a]) - 1;
+    const double origin = down ? padded - w->origin[a] : w->origin[a], per = fabs(w->inverse[a]) * scale;
+    double ahead;
+    int64_t border;
+    int cell = (int)origin;
+    cell = cell > high ? high : cell < low ? low : cell;
+    ahead = (cell + 1 - origin) * per;
+    k->per[a] = still || !(per < beyond) ? (int64_t)beyond : (int64_t)per;
+    k->at[a] = (still || !(ahead < beyond) ? (int64_t)beyond : (int64_t)ahead) - (cell + 1) * k->per[a];
+    border = k->at[a] + (high + 1) * k->per[a];
+    k->end = border < k->end ? border : k->end;
+    k->mirror[a] = down ? padded - 1 : 0;
+    k->flip |= (uint32_t)(down ? 3 : 0) << 2 * a;
+    k->first[a] = cell;
+}
+
+/* Sets up the planes of a walk that is ready to go; 0 if it has to be walked plainly. */
+static int isogi_vol__set_ticks(isogi_vol__ticks *k, const isogi_vol__walk *w) {
+    double scale = ISOGI_VOL__TICKS / w->end;
+    if (!(scale > 0) || !(scale < 1e300) || !isogi_vol__threshold(k, &w->pyramid->volume, w->isovalue)) return 0;
+    k->isovalue = isogi_vol__quantise(w->pyramid, w->isovalue);
+    k->end = (int64_t)ISOGI_VOL__TICKS, k->flip = 0;
+    isogi_vol__set_axis(k, w, 0, scale);
+    isogi_vol__set_axis(k, w, 1, scale);
+    isogi_vol__set_axis(k, w, 2, scale);
+    return k->end > 0;
+}
+
+/* Which of the 64 children of a node can hold the isovalue. */
+static uint64_t isogi_vol__node_mask(const uint8_t node[128], int isovalue) {
+    uint64_t mask = 0;
+    int i;
+    if (isovalue < 0 || isovalue > 255) return 0;
+#ifdef ISOGI_VOL__SSE2
+    {
+        __m128i v = _mm_set1_epi8((char)isovalue);
+        for (i = 0; i < 4; i++) {
+            __m128i low = _mm_load_si128((const __m128i *)(const void *)(node + 16 * i));
+            __m128i high = _mm_load_si128((const __m128i *)(const void *)(node + 64 + 16 * i));
+            __m128i in = _mm_and_si128(_mm_cmpeq_epi8(_mm_min_epu8(low, v), low), _mm_cmpeq_epi8(_mm_max_epu8(high, v), high));
+            mask |= (uint64_t)(uint32_t)_mm_movemask_epi8(in) << 16 * i;
+        }
+    }
+#else
+    for (i = 0; i < 64; i++) mask |= (uint64_t)(node[i] <= isovalue && node[64 + i] >= isovalue) << i;
+#endif
+    return mask;
+}
+
+/* Children of a node are walked by one number: bits 0..5 are the child (x + 4y + 16z), bits 8.. the same with a spare bit behind each
+   coordinate, which is set when a step leaves the node. */
+#define ISOGI_VOL__LEFT 0x12400u
+#define ISOGI_VOL__X(state) ((int)((state) >> 8 & 3))
+#define ISOGI_VOL__Y(state) ((int)((state) >> 11 & 3))
+#define ISOGI_VOL__Z(state) ((int)((state) >> 14 & 3))
+
+/* Where a walk stands among the children of a node: the next plane of each axis, the time between planes, the child. */
+typedef struct isogi_vol__place {
+    int64_t x, y, z, dx, dy, dz;
+    uint32_t state;
+} isogi_vol__place;
+
+ISOGI_VOL__INLINE uint32_t isogi_vol__descend_axis(const isogi_vol__ticks *k, int a, int base, int shift, int64_t t, int64_t *next, int64_t *size) {
+    int64_t plane = k->at[a] + (int64_t)(base + (1 << shift)) * k->per[a], d = k->per[a] << shift;
+    uint32_t i = (uint32_t)(t >= plane) + (uint32_t)(t >= plane + d) + (uint32_t)(t >= plane + 2 * d);
+    *size = d, *next = plane + (int64_t)i * d;
+    return i;
+}
+
+/* The child of the node at `base` (mirrored cells), with children of 2^shift cells, in which tick t falls. */
+ISOGI_VOL__INLINE isogi_vol__place isogi_vol__descend(const isogi_vol__ticks *k, const int base[3], int shift, int64_t t) {
+    isogi_vol__place p;
+    uint32_t x = isogi_vol__descend_axis(k, 0, base[0], shift, t, &p.x, &p.dx);
+    uint32_t y = isogi_vol__descend_axis(k, 1, base[1], shift, t, &p.y, &p.dy);
+    uint32_t z = isogi_vol__descend_axis(k, 2, base[2], shift, t, &p.z, &p.dz);
+    p.state = (x | y << 2 | z << 4) | (x | y << 3 | z << 6) << 8;
+    return p;
+}
+
+/* To the next child, at the time returned; *axis: the one that is crossed. Without branches: they could not be predicted. */
+ISOGI_VOL__INLINE int64_t isogi_vol__step(isogi_vol__place *p, int *axis) {
+    int y_first = p->y < p->x, z_first;
+    int64_t least = y_first ? p->y : p->x;
+    uint32_t delta = y_first ? 4 | 8 << 8 : 1 | 1 << 8;
+    int which = y_first;
+    z_first = p->z < least;
+    least = z_first ? p->z : least;
+    delta = z_first ? 16 | 64 << 8 : delta;
+    which = z_first ? 2 : which;
+    p->x += which == 0 ? p->dx : 0;
+    p->y += which == 1 ? p->dy : 0;
+    p->z += which == 2 ? p->dz : 0;
+    p->state += delta;
+    *axis = which;
+    return least;
+}
+
+/* The cell of a mirrored cell. */
+ISOGI_VOL__INLINE int isogi_vol__unmirror(const isogi_vol__ticks *k, int a, int cell) { return k->mirror[a] ? k->mirror[a] - cell : cell; }
+
+/* A cell with corners on both sides, entered through w->entry_axis and left through `axis` (-1: the segment ends in it). */
+static int isogi_vol__mixed_cell(isogi_vol__walk *w, const isogi_vol__ticks *k, const int base[3], uint32_t state, int axis, isogi_hit *hit) {
+    double out = w->end;
+    int a, in = w->entry_axis;
+    w->cell[0] = isogi_vol__unmirror(k, 0, base[0] + ISOGI_VOL__X(state));
+    w->cell[1] = isogi_vol__unmirror(k, 1, base[1] + ISOGI_VOL__Y(state));
+    w->cell[2] = isogi_vol__unmirror(k, 2, base[2] + ISOGI_VOL__Z(state));
+    a = in;
+    w->t = in < 0 ? 0 : isogi_vol__max(0, (w->cell[a] + (w->dir[a] > 0 ? 0 : 1) - w->origin[a]) * w->inverse[a]);
+    if (axis >= 0) out = isogi_vol__min(out, (w->cell[axis] + (w->dir[axis] > 0 ? 1 : 0) - w->origin[axis]) * w->inverse[axis]);
+    return isogi_vol__visit_cell(w, isogi_vol__max(out, w->t), axis, hit);
+}
+
+/* Walks the cells of one leaf block. 1: hit; 2: the segment has ended; 0: go on at *t. One function a voxel type. */
+#define ISOGI_VOL__LEAF(NAME, TYPE, THRESHOLD, MEMBER)                                                                                            \
+    static int NAME(isogi_vol__walk *w, const isogi_vol__ticks *k, const int base[3], int64_t *t, isogi_hit *hit) {                    \
+        const isogi_volume *v = &w->pyramid->volume;                                                                                   \
+        const ptrdiff_t dx = v->stride[0], dy = v->stride[1], dz = v->stride[2];                                                       \
+        const ptrdiff_t sx = k->mirror[0] ? -dx : dx, sy = k->mirror[1] ? -dy : dy, sz = k->mirror[2] ? -dz : dz;                      \
+        const int64_t end = k->end;                                                                                                    \
+        int64_t now = *t;                                                                                                              \
+        isogi_vol__place place = isogi_vol__descend(k, base, 0, now);                                                                  \
+        const char *p = (const char *)v->data + isogi_vol__unmirror(k, 0, base[0] + ISOGI_VOL__X(place.state)) * dx +                  \
+                        isogi_vol__unmirror(k, 1, base[1] + ISOGI_VOL__Y(place.state)) * dy +                                          \
+                        isogi_vol__unmirror(k, 2, base[2] + ISOGI_VOL__Z(place.state)) * dz;                                           \
+        int axis = w->entry_axis;                                                                                                      \
+        for (;;) {                                                                                                                     \
+            uint32_t here = place.state;                                                                                               \
+            int in = axis, sides;                                                                                                      \
+            const char *q = p + dy, *r = p + dz, *s = p + dy + dz;                                                                     \
+            const THRESHOLD threshold = k->threshold.MEMBER;                                                                           \
+            now = isogi_vol__step(&place, &axis);                                                                                      \
+            sides = (*(const TYPE *)(const void *)p >= threshold) + (*(const TYPE *)(const void *)(p + dx) >= threshold) +             \
+                    (*(const TYPE *)(const void *)q >= threshold) + (*(const TYPE *)(const void *)(q + dx) >= threshold) +             \
+                    (*(const TYPE *)(const void *)r >= threshold) + (*(const TYPE *)(const void *)(r + dx) >= threshold) +             \
+                    (*(const TYPE *)(const void *)s >= threshold) + (*(const TYPE *)(const void *)(s + dx) >= threshold);              \
+            w->count.cells++;                                                                                                          \
+            if ((sides & 7) || (sides == 8) != w->inside) {                                                                            \
+                w->entry_axis = in;                                                                                                    \
+                if (isogi_vol__mixed_cell(w, k, base, here, now <= end ? axis : -1, hit)) return 1;                                    \
+            }                                                                                                                          \
+            if (now >= end) return 2;                                                                                                  \
+            if (place.state & ISOGI_VOL__LEFT) break;                                                                                  \
+            p += axis == 0 ? sx : axis == 1 ? sy : sz;                                                                                 \
+        }                                                                                                                              \
+        *t = now;                                                                                                                      \
+        return 0;                                                                                                                      \
+    }
+ISOGI_VOL__LEAF(isogi_vol__leaf_u8, uint8_t, int, i)
+ISOGI_VOL__LEAF(isogi_vol__leaf_i8, int8_t, int, i)
+ISOGI_VOL__LEAF(isogi_vol__leaf_u16, uint16_t, int, i)
+ISOGI_VOL__LEAF(isogi_vol__leaf_i16, int16_t, int, i)
+ISOGI_VOL__LEAF(isogi_vol__leaf_f32, float, float, f)
+ISOGI_VOL__LEAF(isogi_vol__leaf_f64, double, double, d)
+#undef ISOGI_VOL__LEAF
+
+static int isogi_vol__leaf(isogi_vol__walk *w, const isogi_vol__ticks *k, const int base[3], int64_t *t, isogi_hit *hit) {
+    w->count.blocks++;
+    switch (w->pyramid->volume.type) {
+    case ISOGI_U8: return isogi_vol__leaf_u8(w, k, base, t, hit);
+    case ISOGI_I8: return isogi_vol__leaf_i8(w, k, base, t, hit);
+    case ISOGI_U16: return isogi_vol__leaf_u16(w, k, base, t, hit);
+    case ISOGI_I16: return isogi_vol__leaf_i16(w, k, base, t, hit);
+    case ISOGI_F32: return isogi_vol__leaf_f32(w, k, base, t, hit);
+    case ISOGI_F64: return isogi_vol__leaf_f64(w, k, base, t, hit);
+    }
+    return 2;
+}
+
+static int isogi_vol__walk_small_node(isogi_vol__walk *w, const isogi_vol__ticks *k, const int base[3], int64_t *t, isogi_hit *hit);
+
+/* Walks the children of a node of level 1 or 2; returns as a leaf does. */
+ISOGI_VOL__INLINE int isogi_vol__walk_node(isogi_vol__walk *w, const isogi_vol__ticks *k, int level, const int base[3], int64_t *t, isogi_hit *hit) {
+    const isogi_level *blocks = &w->pyramid->level[level];
+    const int shift = 2 * level; /* of the children's size */
+    size_t node = level == 2 ? w->pyramid->first_top_node : 0;
+    uint64_t mask;
+    isogi_vol__place place;
+    int64_t now = *t;
+    const int64_t end = k->end;
+    node += ((size_t)isogi_vol__unmirror(k, 0, base[0]) >> (shift + 2)) +
+            blocks->size[0] * (((size_t)isogi_vol__unmirror(k, 1, base[1]) >> (shift + 2)) +
+                               blocks->size[1] * ((size_t)isogi_vol__unmirror(k, 2, base[2]) >> (shift + 2)));
+    mask = isogi_vol__node_mask(w->pyramid->nodes[node], k->isovalue);
+    w->count.blocks++;
+    if (!mask) {
+        w->deflate = 0;
+        return 0;
+    }
+    place = isogi_vol__descend(k, base, shift, now);
+    do {
+        if (mask >> ((place.state ^ k->flip) & 63) & 1) {
+            int child[3], result;
+            child[0] = base[0] + (ISOGI_VOL__X(place.state) << shift);
+            child[1] = base[1] + (ISOGI_VOL__Y(place.state) << shift);
+            child[2] = base[2] + (ISOGI_VOL__Z(place.state) << shift);
+            result = level == 2 ? isogi_vol__walk_small_node(w, k, child, &now, hit) : isogi_vol__leaf(w, k, child, &now, hit);
+            if (result) return result;
+        } else w->deflate = 0;
+        now = isogi_vol__step(&place, &w->entry_axis);
+        if (now >= end) return 2;
+    } while (!(place.state & ISOGI_VOL__LEFT));
+    *t = now;
+    return 0;
+}
+
+static int isogi_vol__walk_small_node(isogi_vol__walk *w, const isogi_vol__ticks *k, const int base[3], int64_t *t, isogi_hit *hit) {
+    return isogi_vol__walk_node(w, k, 1, base, t, hit);
+}
+
+static int isogi_vol__walk_large_node(isogi_vol__walk *w, const isogi_vol__ticks *k, const int base[3], int64_t *t, isogi_hit *hit) {
+    return isogi_vol__walk_node(w, k, 2, base, t, hit);
+}
+
+/* The fast counterpart of walk_on for a walk with planes. */
+static int isogi_vol__walk_fast(isogi_vol__walk *w, const isogi_vol__ticks *k, isogi_hit *hit) {
+    int base[3], a, result;
+    int64_t next[3], now = 0;
+    for (a = 0; a < 3; a++) base[a] = k->first[a] & ~63, next[a] = k->at[a] + (int64_t)(base[a] + 64) * k->per[a];
+    for (;;) {
+        int axis = next[1] < next[0];
+        if (next[2] < next[axis]) axis = 2;
+        result = isogi_vol__walk_large_node(w, k, base, &now, hit);
+        if (result) return result == 1;
+        now = next[axis], w->entry_axis = axis;
+        if (now >= k->end) return 0;
+        next[axis] += k->per[axis] << 6;
+        base[axis] += 64;
+    }
+}
+
 /* ==== rays =========================================================================================================== */
 
 /* Direction components that cannot matter are set to zero, so that reciprocals stay finite. 0: no direction. */
@@ -1333,6 +1723,14 @@ static void isogi_vol__first_cell(isogi_vol__walk *w) {
     }
 }
 
+/* Walks a ray that is set up and clipped: fast where that is right, else plainly. */
+static int isogi_vol__walk_ray(isogi_vol__walk *w, uint32_t flags, isogi_hit *hit) {
+    isogi_vol__ticks ticks;
+    if (w->pyramid->fast && !(flags & ISOGI_RAY_CAPPED) && isogi_vol__set_ticks(&ticks, w)) return isogi_vol__walk_fast(w, &ticks, hit);
+    isogi_vol__first_cell(w);
+    return isogi_vol__walk_on(w, flags, hit);
+}
+
 static int isogi_vol__is_nan(double x) {
     uint64_t bits;
     memcpy(&bits, &x, sizeof bits);
@@ -1357,8 +1755,7 @@ static int isogi_vol__trace(const isogi_pyramid *p, const isogi_ray *ray, int ex
     if (isogi_vol__is_nan(ray->isovalue) || isogi_vol__is_nan(ray->tmin) || isogi_vol__is_nan(ray->tmax) || !(ray->tmin <= tmax)) return 0;
     if (isogi_vol__set_direction(&w, ray->dir) && isogi_vol__clip(&w, isogi_vol__max(ray->tmin, -ISOGI_VOL__UNLIMITED), tmax)) {
         if (w.entry_axis >= 0 && (ray->flags & ISOGI_RAY_CAPPED)) w.inside = 0, w.cap = 2;
-        isogi_vol__first_cell(&w);
-        found = isogi_vol__walk_on(&w, ray->flags, hit);
+        found = isogi_vol__walk_ray(&w, ray->flags, hit);
     }
     count->blocks += w.count.blocks, count->cells += w.count.cells, count->cubics += w.count.cubics;
     return found;
@@ -1414,11 +1811,10 @@ static int isogi_vol__trace_on(const isogi_pyramid *p, const isogi_hit *start, c
     tmax = isogi_vol__tmax(tmax);
     if (isogi_vol__is_nan(isovalue) || !(tmax >= 0)) return 0;
     if (isogi_vol__set_direction(&w, dir) && isogi_vol__clip(&w, 0, tmax)) {
-        isogi_vol__first_cell(&w);
         w.entry_axis = -1;
         /* a cap that is left outwards */
         if (!w.deflate && w.end * isogi_vol__largest(w.dir[0], w.dir[1], w.dir[2]) < 1e-9) return 0;
-        found = isogi_vol__walk_on(&w, flags, hit);
+        found = isogi_vol__walk_ray(&w, flags, hit);
     }
     count->blocks += w.count.blocks, count->cells += w.count.cells, count->cubics += w.count.cubics;
     return found;
@@ -1499,6 +1895,15 @@ ISOGI_API isogi_result isogi_vol_normals(const isogi_pyramid *pyramid, const iso
 /* (the section on meshes goes here) */
 
 #undef ISOGI_VOL__LEVELS
+#undef ISOGI_VOL__FAST_SIZE
+#undef ISOGI_VOL__TICKS
+#undef ISOGI_VOL__LEFT
+#undef ISOGI_VOL__X
+#undef ISOGI_VOL__Y
+#undef ISOGI_VOL__Z
+#undef ISOGI_VOL__INLINE
+#undef ISOGI_VOL__UNLIKELY
+#undef ISOGI_VOL__SSE2
 #undef ISOGI_VOL__UNLIMITED
 #undef ISOGI_VOL__LOCK
 #undef ISOGI_VOL__UNLOCK

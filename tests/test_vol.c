@@ -213,6 +213,56 @@ TEST(a_far_origin_costs_no_precision) {
     field_free(&f);
 }
 
+/* The fast walk and the plain one (force_path 1) are two designs: they must agree on large volumes, on any type. */
+TEST(fast_and_plain_walks_agree) {
+    test_random r = {20};
+    long different = 0, hits = 0;
+    for (int type = ISOGI_U8; type <= ISOGI_F64; type++) {
+        int size[3] = {40 + (int)(random_bits(&r) % 60), 65, 30 + (int)(random_bits(&r) % 130)}, voxels = size[0] * size[1] * size[2];
+        size_t bytes = type <= ISOGI_I8 ? 1 : type <= ISOGI_I16 ? 2 : type == ISOGI_F32 ? 4 : 8;
+        char *data = (char *)malloc((size_t)voxels * bytes);
+        for (int i = 0; i < voxels; i++) {
+            int x = i % size[0], y = i / size[0] % size[1], z = i / size[0] / size[1];
+            double v = 50 + 30 * sin(0.31 * x + 0.1 * z) * cos(0.23 * y) + 20 * sin(0.17 * z + 0.05 * x) + random_range(&r, 0, 2);
+            if (type == ISOGI_U8) ((uint8_t *)data)[i] = (uint8_t)v;
+            if (type == ISOGI_I8) ((int8_t *)data)[i] = (int8_t)v;
+            if (type == ISOGI_U16) ((uint16_t *)(void *)data)[i] = (uint16_t)(100 * v);
+            if (type == ISOGI_I16) ((int16_t *)(void *)data)[i] = (int16_t)(100 * v);
+            if (type == ISOGI_F32) ((float *)(void *)data)[i] = (float)v;
+            if (type == ISOGI_F64) ((double *)(void *)data)[i] = v;
+        }
+        isogi_volume v = {.data = data, .type = (isogi_type)type, .size = {(size_t)size[0], (size_t)size[1], (size_t)size[2]}};
+        if (type == ISOGI_U16) v.scale = 0.01, v.bias = -3;
+        isogi_context plain = {.threads = 1, .force_path = 1};
+        isogi_pyramid *a = NULL, *b = NULL;
+        isogi_vol_build(&a, &v, NULL);
+        isogi_vol_build(&b, &v, &plain);
+        field f = {{size[0], size[1], size[2]}, NULL, {0}, NULL};
+        for (int i = 0; i < (LONG_SUITE ? 200000 : 20000); i++) {
+            double isovalue = random_range(&r, 20, 80) * (type == ISOGI_I16 ? 100 : 1);
+            isogi_ray ray = random_ray(&f, i & 1 ? floor(isovalue) : isovalue, &r);
+            isogi_hit ha = {0}, hb = {0}, na = {0}, nb = {0};
+            double d[3];
+            float dir[1][3];
+            isogi_vol_intersect(a, &ray, 1, &ha, NULL);
+            isogi_vol_intersect(b, &ray, 1, &hb, NULL);
+            different += ha.side != hb.side || fabs(ha.t - hb.t) > 1e-7;
+            if (!ha.side || !hb.side) continue;
+            hits++;
+            random_direction(&r, d);
+            for (int x = 0; x < 3; x++) dir[0][x] = (float)d[x];
+            isogi_vol_continue(a, &hb, (const float(*)[3])dir, NULL, ray.isovalue, 0, 1, &na, NULL);
+            isogi_vol_continue(b, &hb, (const float(*)[3])dir, NULL, ray.isovalue, 0, 1, &nb, NULL);
+            different += na.side != nb.side || fabs(na.t - nb.t) > 1e-7;
+        }
+        isogi_vol_free(a), isogi_vol_free(b);
+        free(data);
+    }
+    printf("    %ld hits, %ld different\n", hits, different);
+    /* a ray that grazes within rounding (1e-12 of a cell) may be seen either way */
+    CHECK(different * 100000 <= hits && hits > 20000, "%ld of %ld differ", different, hits);
+}
+
 /* ---- no leaks ---- */
 
 /* A ball of noise above the isovalue inside a shell below it: from inside, every ray must come out through the surface. */
