@@ -29,7 +29,7 @@ typedef struct procedural_shape {
     isogi_type type; /* ISOGI_F32 or ISOGI_U8 */
     double isovalue;
     float albedo[3];
-    double up[3], toward[3]; /* camera: world up, direction from the centre of the box to the eye */
+    double up[3], toward[3], distance; /* camera: world up, direction from the centre of the box to the eye, radii of the box's sphere */
     const char *transfer;    /* default transfer function, in the text form of transfer_file.h */
 } procedural_shape;
 
@@ -204,7 +204,7 @@ static double procedural_engine_manifold(double x, double y, double z) {
         double collector = procedural_length(y + 6, z - 34), along = x - 18;
         d = procedural_blend(d, procedural_cylinder(collector, along, 10, 58, 1), 4);
         bore = procedural_min(bore, procedural_cylinder(collector, along - 8, 7, 60, 0));
-        d = procedural_blend(d, procedural_cylinder(collector, x - 72, 14, 3, 1), 2);
+        d = procedural_blend(d, procedural_cylinder(collector, x - 72, 12.5, 3, 1), 2);
     }
     flange = procedural_box(side, y - 26, z - 23, 17, 11, 3, 2);
     flange = procedural_min(flange, procedural_box(side, y - 26, z - 19, 19, 13, 6, 3)); /* pad on the block, over the fins */
@@ -262,38 +262,46 @@ static double procedural_skull_mandible(double x, double y, double z) {
     return procedural_blend(d, procedural_skull_teeth(x, y, z, -0.635), 0.012);
 }
 
-static double procedural_skull_face(double x, double y, double z, double cranium) {
-    double side = fabs(x), p[3], d = cranium, cheek, arch;
-    const double brow[3] = {0.06, 0.17, 0.69}, temple[3] = {0.42, 0.1, 0.52}, malar[3] = {0.39, -0.18, 0.5};
-    const double zygoma[3] = {0.47, -0.16, 0.28}, ear[3] = {0.46, -0.12, -0.02}, nose[3] = {0.22, -0.3, 0.58};
-    const double bridge_top[3] = {0, 0.1, 0.72}, bridge_end[3] = {0, -0.13, 0.8}, pterygoid[3] = {0.14, -0.34, 0.2}, palate[3] = {0.15, -0.44, 0.36};
+/* Eye sockets and the hollows at the temples: what is not bone outside of the brain case. */
+static double procedural_skull_hollows(double x, double y, double z) {
+    double side = fabs(x);
+    double socket = procedural_ellipsoid(side - 0.225, y + 0.005 + 0.12 * (side - 0.2), z - 0.74, 0.14, 0.13, 0.3);
+    return procedural_min(socket, procedural_ellipsoid(side - 0.42, y + 0.02, z - 0.3, 0.1, 0.2, 0.17));
+}
+
+static double procedural_skull_face(double x, double y, double z, double cranium, double hollows) {
+    double side = fabs(x), p[3], d = cranium, cheek, arch, nose;
+    const double brow[3] = {0.08, 0.155, 0.68}, temple[3] = {0.42, 0.09, 0.54}, malar[3] = {0.4, -0.17, 0.54};
+    const double zygoma[3] = {0.5, -0.15, 0.3}, ear[3] = {0.49, -0.1, -0.02}, maxilla[3] = {0.2, -0.3, 0.62};
+    const double bridge[3] = {0, 0.1, 0.7}, tip[3] = {0, -0.1, 0.79}, process[3] = {0.06, 0.05, 0.66}, foot[3] = {0.14, -0.3, 0.65};
+    const double pterygoid[3] = {0.14, -0.34, 0.2}, palate[3] = {0.15, -0.44, 0.36};
     p[0] = side, p[1] = y, p[2] = z;
-    d = procedural_blend(d, procedural_capsule(p, brow, temple, 0.075, 0.055), 0.1);
-    cheek = procedural_blend(procedural_capsule(p, temple, malar, 0.045, 0.075), procedural_capsule(p, malar, nose, 0.075, 0.06), 0.08);
-    arch = procedural_blend(procedural_capsule(p, malar, zygoma, 0.06, 0.036), procedural_capsule(p, zygoma, ear, 0.036, 0.04), 0.05);
+    d = procedural_blend(d, procedural_capsule(p, brow, temple, 0.065, 0.05), 0.1);
+    cheek = procedural_blend(procedural_capsule(p, temple, malar, 0.045, 0.07), procedural_capsule(p, malar, maxilla, 0.07, 0.06), 0.08);
+    arch = procedural_blend(procedural_capsule(p, malar, zygoma, 0.055, 0.034), procedural_capsule(p, zygoma, ear, 0.034, 0.04), 0.05);
     d = procedural_blend(procedural_blend(d, cheek, 0.08), arch, 0.05);
-    d = procedural_blend(d, procedural_ellipsoid(x, y + 0.36, z - 0.44, 0.2, 0.2, 0.26), 0.07);   /* upper jaw */
-    d = procedural_blend(d, procedural_capsule(p, bridge_top, bridge_end, 0.075, 0.04), 0.07);
+    d = procedural_blend(d, procedural_ellipsoid(x, y + 0.3, z - 0.46, 0.23, 0.26, 0.25), 0.07); /* upper jaw */
     d = procedural_blend(d, procedural_capsule(p, pterygoid, palate, 0.04, 0.05), 0.06);
-    /* eye sockets, nose, and the passages behind them */
-    d = procedural_carve(d, procedural_ellipsoid(side - 0.215, y + 0.015 + 0.1 * (side - 0.2), z - 0.68, 0.15, 0.135, 0.27), 0.05);
-    d = procedural_carve(d, procedural_ellipsoid(side - 0.04, y + 0.225, z - 0.74, 0.065, 0.13, 0.26), 0.04);
-    d = procedural_carve(d, procedural_ellipsoid(side - 0.345, y + 0.02, z - 0.2, 0.09, 0.2, 0.17), 0.05);
+    d = procedural_carve(d, hollows, 0.04);
+    d = procedural_blend(d, procedural_capsule(p, bridge, tip, 0.06, 0.035), 0.06);
+    d = procedural_blend(d, procedural_capsule(p, process, foot, 0.045, 0.055), 0.06); /* the nose's walls, between the sockets */
+    nose = procedural_blend(procedural_ellipsoid(side - 0.045, y + 0.25, z - 0.75, 0.05, 0.07, 0.25), procedural_ellipsoid(x, y + 0.16, z - 0.72, 0.04, 0.11, 0.2), 0.06);
+    d = procedural_carve(d, nose, 0.03);
     d = procedural_carve(d, procedural_ellipsoid(x, y + 0.58, z - 0.36, 0.15, 0.14, 0.22), 0.04); /* palate */
     return procedural_blend(d, procedural_skull_teeth(x, y, z, -0.525), 0.012);
 }
 
 static double procedural_skull(const double p[3], double voxel) {
-    double x = p[0], y = p[1] + 0.06, z = p[2] - 0.08, cranium, brain, d, opening;
-    cranium = procedural_ellipsoid(x, y - 0.3, z + 0.16, 0.58, 0.56, 0.74);
-    cranium = procedural_blend(cranium, procedural_ellipsoid(x, y - 0.16, z - 0.2, 0.46, 0.42, 0.46), 0.25);
-    cranium = procedural_blend(cranium, procedural_ellipsoid(x, y + 0.02, z + 0.42, 0.4, 0.3, 0.36), 0.2);
-    brain = procedural_ellipsoid(x, y - 0.3, z + 0.16, 0.53, 0.5, 0.69);
-    brain = procedural_blend(brain, procedural_ellipsoid(x, y - 0.2, z - 0.16, 0.4, 0.33, 0.42), 0.25);
-    d = procedural_skull_face(x, y, z, cranium);
+    double x = p[0], y = p[1] - 0.06, z = p[2] + 0.02, cranium, brain, d, hollows = procedural_skull_hollows(x, y, z);
+    cranium = procedural_ellipsoid(x, y - 0.26, z + 0.12, 0.57, 0.54, 0.72);
+    cranium = procedural_blend(cranium, procedural_ellipsoid(x, y - 0.16, z - 0.2, 0.46, 0.42, 0.47), 0.25);
+    cranium = procedural_blend(cranium, procedural_ellipsoid(x, y + 0.02, z + 0.38, 0.4, 0.3, 0.36), 0.2);
+    brain = procedural_ellipsoid(x, y - 0.26, z + 0.12, 0.52, 0.48, 0.67);
+    brain = procedural_blend(brain, procedural_ellipsoid(x, y - 0.22, z - 0.16, 0.4, 0.33, 0.44), 0.25);
+    brain = procedural_carve(brain, hollows - 0.05, 0.03); /* a wall remains between the brain case and the hollows */
+    d = procedural_skull_face(x, y, z, cranium, hollows);
     d = procedural_carve(d, brain, 0.03);
-    opening = procedural_cylinder(procedural_length(x, z + 0.3), y + 0.3, 0.12, 0.25, 0); /* where the spine enters */
-    d = procedural_carve(d, opening, 0.04);
+    d = procedural_carve(d, procedural_cylinder(procedural_length(x, z + 0.28), y + 0.3, 0.12, 0.25, 0), 0.04); /* where the spine enters */
     d = procedural_min(d, procedural_skull_mandible(x, y, z));
     return 200 * procedural_matter(d, voxel);
 }
@@ -305,26 +313,26 @@ static double procedural_skull(const double p[3], double voxel) {
 
 static const procedural_shape procedural_shapes[] = {
     {"marschner-lobb", "the test signal of Marschner and Lobb, fM 6, alpha 0.25", procedural_marschner_lobb, {128, 128, 128},
-     ISOGI_F32, 0.5, {0.7f, 0.7f, 0.7f}, {0, 1, 0}, {1.5, 1.2, 2.0}, PROCEDURAL_TENT("0", "0.45", "0.5", "0.55", "1")},
+     ISOGI_F32, 0.5, {0.7f, 0.7f, 0.7f}, {0, 1, 0}, {1.5, 1.2, 2.0}, 2.3, PROCEDURAL_TENT("0", "0.45", "0.5", "0.55", "1")},
     {"gyroid", "sin x cos y + sin y cos z + sin z cos x, two periods", procedural_gyroid, {128, 128, 128}, ISOGI_F32, 0,
-     {0.8f, 0.62f, 0.42f}, {0, 1, 0}, {1.5, 1.2, 2.0}, PROCEDURAL_TENT("-1.5", "-0.15", "0", "0.15", "1.5")},
+     {0.8f, 0.62f, 0.42f}, {0, 1, 0}, {1.5, 1.2, 2.0}, 2.3, PROCEDURAL_TENT("-1.5", "-0.15", "0", "0.15", "1.5")},
     {"hydrogen", "electron density of the 3d orbital with m = 0", procedural_hydrogen, {128, 128, 128}, ISOGI_F32, 0.05,
-     {0.45f, 0.6f, 0.8f}, {0, 1, 0}, {1.5, 1.2, 2.0},
+     {0.45f, 0.6f, 0.8f}, {0, 1, 0}, {1.5, 1.2, 2.0}, 1.9,
      "0 0 .1 .2 .9\n0.01 0 .1 .2 .9\n0.04 0.02 .1 .4 1\n0.15 0.06 .2 .8 .9\n0.4 0.2 1 .8 .3\n1 0.6 1 .3 .1\n"},
     {"coulomb", "three Coulomb potentials, two of them smaller copies of the third", procedural_coulomb, {128, 128, 128},
-     ISOGI_F32, 1.2, {0.75f, 0.3f, 0.25f}, {0, 1, 0}, {0.3, 0.25, 2.0},
+     ISOGI_F32, 1.2, {0.75f, 0.3f, 0.25f}, {0, 1, 0}, {0.3, 0.25, 2.0}, 1.9,
      "peak 0.72 0.35 .15 .3 .9\npeak 1.5 0.7 .9 .15 .1\n"},
     {"torus-sphere-plane", "a torus above a sphere above a flat plane, opaque", procedural_torus_sphere_plane, {128, 128, 128},
-     ISOGI_F32, 0.5, {0.75f, 0.72f, 0.68f}, {0, 1, 0}, {1.5, 1.2, 2.0},
+     ISOGI_F32, 0.5, {0.75f, 0.72f, 0.68f}, {0, 1, 0}, {1.5, 1.2, 2.0}, 2.3,
      "0 0 .85 .8 .75\n0.5 0 .85 .8 .75\n0.5 8 .85 .8 .75\n1 8 .85 .8 .75\n"},
     {"cavity", "half space minus a sphere that reaches through its plane; value: distance", procedural_cavity, {128, 128, 128},
-     ISOGI_F32, 0, {0.5f, 0.5f, 0.5f}, {0, 1, 0}, {1.5, 2.4, 2.0},
+     ISOGI_F32, 0, {0.5f, 0.5f, 0.5f}, {0, 1, 0}, {1.5, 2.4, 2.0}, 2.1,
      "-1 0 .8 .6 .5\n0 0 .8 .6 .5\n0 4 .8 .6 .5\n1 4 .8 .6 .5\n"},
     {"engine-block", "a machined engine block with steel liners, a piston and a manifold", procedural_engine, {160, 160, 96},
-     ISOGI_U8, 90, {0.7f, 0.7f, 0.7f}, {0, 1, 0}, {1.5, 1.2, 2.0},
+     ISOGI_U8, 90, {0.7f, 0.7f, 0.7f}, {0, 1, 0}, {1.5, 1.2, 2.0}, 1.85,
      "0 0 .7 .75 .8\n50 0 .7 .75 .8\n90 0.03 .7 .75 .8\n180 0.05 .7 .75 .8\n205 0.3 1 .6 .2\n255 0.8 1 .55 .15\n"},
     {"skull", "a skull, hollow, with teeth", procedural_skull, {128, 144, 144}, ISOGI_U8, 90, {0.8f, 0.74f, 0.62f}, {0, 1, 0},
-     {1.1, 0.5, 2.0}, "0 0 .9 .85 .7\n50 0 .9 .85 .7\n110 0.3 .9 .85 .7\n200 0.9 1 .95 .85\n"}};
+     {1.1, 0.5, 2.0}, 1.75, "0 0 .9 .85 .7\n50 0 .9 .85 .7\n110 0.3 .9 .85 .7\n200 0.9 1 .95 .85\n"}};
 
 #define PROCEDURAL_SHAPE_COUNT (sizeof procedural_shapes / sizeof procedural_shapes[0])
 

@@ -1,0 +1,170 @@
+/* files.h - whole files in and out, with one line of text when it fails
+
+   Reading stops at a limit, so that an endless or enormous file is a message and not a machine without memory. Writing goes to a
+   temporary file beside the target that takes its place only when it is complete: whatever fails, an existing file stays as it was. */
+#ifndef FILES_H
+#define FILES_H
+
+#include <errno.h>
+#include <fcntl.h>
+#include <limits.h>
+#include <stdarg.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#define FILE_ERROR_SIZE 512
+
+/* Writes the message and returns 0, so that a failing function can end with it. Control characters that came from a file or a
+   name are shown as '?', so that the message stays one line. */
+#if defined(__GNUC__)
+__attribute__((format(printf, 2, 3)))
+#endif
+static inline int file_fail(char *error, const char *format, ...) {
+    va_list values;
+    char *c;
+    va_start(values, format);
+    vsnprintf(error, FILE_ERROR_SIZE, format, values);
+    va_end(values);
+    for (c = error; *c; c++)
+        if ((unsigned char)*c < 32 || *c == 127) *c = '?';
+    return 0;
+}
+
+/* Opens a regular file for reading and tells its size. Returns the descriptor, or -1 with a message. */
+static inline int file_open(const char *path, uint64_t *size, char *error) {
+    struct stat status;
+    int file = open(path, O_RDONLY | O_NONBLOCK); /* without waiting for the other end of a pipe */
+    if (file < 0) {
+        file_fail(error, "%s: %s", path, strerror(errno));
+        return -1;
+    }
+    if (fstat(file, &status) != 0) file_fail(error, "%s: %s", path, strerror(errno));
+    else if (S_ISDIR(status.st_mode)) file_fail(error, "%s: is a folder", path);
+    else if (!S_ISREG(status.st_mode)) file_fail(error, "%s: is not a regular file", path);
+    else {
+        *size = (uint64_t)status.st_size;
+        return file;
+    }
+    close(file);
+    return -1;
+}
+
+/* Exactly `size` bytes; 0 with a message if there are fewer. */
+static inline int file_read_bytes(int file, const char *path, unsigned char *data, size_t size, char *error) {
+    size_t done = 0;
+    while (done < size) {
+        size_t piece = size - done < ((size_t)1 << 30) ? size - done : (size_t)1 << 30;
+        ssize_t got = read(file, data + done, piece);
+        if (got < 0 && errno == EINTR) continue;
+        if (got < 0) return file_fail(error, "%s: %s", path, strerror(errno));
+        if (got == 0) return file_fail(error, "%s: ends after %zu of %zu bytes", path, done, size);
+        done += (size_t)got;
+    }
+    return 1;
+}
+
+/* The whole file, with a zero byte behind it. The caller frees *data. */
+static inline int file_read(const char *path, size_t limit, unsigned char **data, size_t *size, char *error) {
+    uint64_t length;
+    unsigned char *bytes;
+    int ok, file = file_open(path, &length, error);
+    if (file < 0) return 0;
+    if (length > limit) {
+        close(file);
+        return file_fail(error, "%s: has %llu bytes, at most %zu are allowed here", path, (unsigned long long)length, limit);
+    }
+    bytes = (unsigned char *)malloc((size_t)length + 1);
+    ok = bytes ? file_read_bytes(file, path, bytes, (size_t)length, error) : file_fail(error, "%s: out of memory", path);
+    close(file);
+    if (!ok) {
+        free(bytes);
+        return 0;
+    }
+    bytes[length] = 0;
+    *data = bytes;
+    *size = (size_t)length;
+    return 1;
+}
+
+/* The file that a path really names: links are followed, so that a link is not replaced by what it points to. */
+static inline int file_target(const char *path, char target[PATH_MAX], mode_t *mode, int *special, char *error) {
+    struct stat status;
+    *special = 0;
+    *mode = 0;
+    if (!*path) return file_fail(error, "the name of the file to write is empty");
+    if (strlen(path) + 32 > PATH_MAX) return file_fail(error, "%.100s...: the name is too long", path);
+    strcpy(target, path);
+    if (stat(path, &status) != 0) return errno == ENOENT || file_fail(error, "%s: %s", path, strerror(errno));
+    if (S_ISDIR(status.st_mode)) return file_fail(error, "%s: is a folder", path);
+    *special = !S_ISREG(status.st_mode);
+    *mode = status.st_mode & 0777;
+    if (!*special && !realpath(path, target)) return file_fail(error, "%s: %s", path, strerror(errno));
+    if (strlen(target) + 32 > PATH_MAX) return file_fail(error, "%.100s...: the name is too long", path);
+    return 1;
+}
+
+static inline int file_write_bytes(int file, const unsigned char *data, size_t size) {
+    while (size) {
+        ssize_t put = write(file, data, size < ((size_t)1 << 30) ? size : (size_t)1 << 30);
+        if (put < 0 && errno == EINTR) continue;
+        if (put <= 0) return 0;
+        data += put, size -= (size_t)put;
+    }
+    return 1;
+}
+
+static inline int file_temporary(const char *target, char name[PATH_MAX], const char *path, char *error) {
+    int file, attempt = 0;
+    do {
+        snprintf(name, PATH_MAX, "%s.%ld-%d.tmp", target, (long)getpid(), attempt);
+        file = open(name, O_WRONLY | O_CREAT | O_EXCL, 0666);
+    } while (file < 0 && errno == EEXIST && ++attempt < 100);
+    if (file < 0) file_fail(error, "%s: cannot be written: %s", path, strerror(errno));
+    return file;
+}
+
+/* Whether file_write could succeed: asked before hours of work, not after. */
+static inline int file_writable(const char *path, char *error) {
+    char target[PATH_MAX], name[PATH_MAX];
+    mode_t mode;
+    int special, file;
+    if (!file_target(path, target, &mode, &special, error)) return 0;
+    if (special) return access(path, W_OK) == 0 || file_fail(error, "%s: %s", path, strerror(errno));
+    if (mode && access(target, W_OK) != 0) return file_fail(error, "%s: %s", path, strerror(errno));
+    file = file_temporary(target, name, path, error);
+    if (file < 0) return 0;
+    close(file);
+    unlink(name);
+    return 1;
+}
+
+/* Devices and pipes are written to as they are; a regular file is replaced as a whole. */
+static inline int file_write(const char *path, const void *data, size_t size, char *error) {
+    char target[PATH_MAX], name[PATH_MAX];
+    mode_t mode;
+    int special, file, ok;
+    if (!file_target(path, target, &mode, &special, error)) return 0;
+    if (special) {
+        file = open(path, O_WRONLY);
+        if (file < 0) return file_fail(error, "%s: %s", path, strerror(errno));
+        ok = file_write_bytes(file, (const unsigned char *)data, size);
+        ok = (close(file) == 0 && ok) || file_fail(error, "%s: %s", path, strerror(errno));
+        return ok;
+    }
+    file = file_temporary(target, name, path, error);
+    if (file < 0) return 0;
+    ok = file_write_bytes(file, (const unsigned char *)data, size) && (!mode || fchmod(file, mode) == 0);
+    ok = close(file) == 0 && ok;
+    ok = ok && rename(name, target) == 0;
+    if (!ok) {
+        file_fail(error, "%s: cannot be written: %s", path, strerror(errno));
+        unlink(name);
+    }
+    return ok;
+}
+
+#endif /* FILES_H */
