@@ -1,7 +1,108 @@
 /* isogi_dvr.h - volume rendering in physical space and in data space, lit by SH visibility, for C and C++
                                                                        (part of isogi; with isogi_sh.h, isogi_vol.h)
 
-   (The helper text of this header is written with its implementation.)
+   Quick start
+
+       #define ISOGI_IMPLEMENTATION
+       #include "isogi_dvr.h"
+       #include <stdio.h>
+       int main(void) {
+           static float data[32][32][32], image[32][32][4];
+           for (int i = 0; i < 32768; i++) data[i / 1024][i / 32 % 32][i % 32] = (float)(i % 32); // f = x
+           isogi_transfer_point points[] = {{0, {1, 1, 1}, 0}, {31, {1, 0.5f, 0.2f}, 0.2f}};
+           isogi_transfer transfer = {.points = points, .point_count = 2};
+           isogi_volume volume = {.data = data, .type = ISOGI_F32, .size = {32, 32, 32}};
+           isogi_view view = {.width = 32, .height = 32, .eye = {15.5f, 15.5f, 100}, .target = {15.5f, 15.5f, 0}};
+           isogi_dvr_desc desc = {0}; isogi_pyramid *pyramid; isogi_dvr *dvr;
+           if (isogi_vol_build(&pyramid, &volume, NULL)) return 1; else desc.pyramid = pyramid;
+           if (isogi_dvr_create(&dvr, &desc, NULL) || isogi_dvr_set_transfer(dvr, &transfer)) return 1;
+           if (isogi_dvr_render(dvr, &view, NULL, image[0], NULL, NULL)) return 1;
+           printf("opacity of the centre: %g\n", (double)image[16][16][3]); } // then isogi_dvr_free, isogi_vol_free
+
+   What it does
+
+   Casts a ray through every pixel, samples the trilinear field along it, maps each value to a colour and an extinction by a
+   transfer function (the mapping comes after the interpolation: post-classification), and composites front to back.
+
+   Physical space. The absorption-emission model (Kronander 2011, eq. 1): extinction tau is per length, a piece of ray of length
+   d has opacity 1 - exp(-tau d / unit). Scaling a volume together with its camera keeps the picture only because `unit` is by
+   default a voxel and scales along; a homogeneous slab is the darker the thicker it is.
+
+   Data space. The scale-invariant integral (Kraus 2005, eq. 4): extinction is per unit of the data, a piece of ray over which
+   the value changes by ds has opacity 1 - exp(-tau |ds|), with ds = grad s . dir d (eq. 10, 11; the gradient is that of the
+   trilinear field itself). Lengths cancel: no scaling of space changes any pixel. Constant data contributes nothing whatever its
+   extinction; a ray that runs once from value a to b has opacity 1 - exp(-integral of tau from a to b), whatever its way.
+
+   Peaks. Infinitely thin isosurfaces of uniform opacity, in both spaces: every crossing of the isovalue, rising or falling, is
+   found by the exact intersector of isogi_vol.h and composites exactly its opacity, whatever the gradient (Kraus 2005, 4.2).
+   Crossings stand in exact order between the samples: a sample's piece of ray is divided where a peak lies in it. A peak is not
+   closed by the volume's border.
+
+   Shading. ISOGI_DVR_UNLIT shows the transfer function's colour. ISOGI_DVR_LOCAL is diffuse shading by the smoothed gradient,
+   with the normal turned towards the eye: radiance = rgb / pi * irradiance (environment convolved with the cosine at SH order 5,
+   directional lights, point lights), no shadows; where the gradient vanishes, light is scattered as below but unshadowed.
+   ISOGI_DVR_VISIBILITY scatters light isotropically and shadows it (Kronander 2011):
+
+       g_s = rgb / (4 pi) * max(0, sum_i L_i V_i)         per channel
+
+   where L are the SH coefficients of the light that arrives (environment, directional lights as deltas; point and sphere lights
+   are added at every sample with their inverse square) and V those of the transmittance from the sample to the border of the box
+   in all directions, interpolated from a regular grid. Where nothing casts shadows, V(w) = 1, and a sky of radiance 1 from
+   everywhere gives g_s = rgb / (4 pi) * 4 pi = rgb: colour is the albedo, and under a uniform sky of 1 a medium without shadows
+   looks as it does unlit. A directional light of irradiance E gives g_s = rgb E V / (4 pi). The truncated series can be
+   negative: it is clamped at zero.
+
+   Visibility is computed by brute force: from every grid point `directions` rays, marched through the same transfer function
+   (in the same space; peaks attenuate at every crossing), projected to SH. The directions are a spherical Fibonacci lattice, and
+   its weights are corrected so that products of spherical harmonics are integrated exactly as far as the number of rays allows
+   (2 (degree + 1)^2 <= directions): with 64 rays, order 3 without shadows has V = sqrt(4 pi), 0, 0 ... to rounding. The largest
+   error of a coefficient against the closed form of a half space, order 4, worst of 1000 orientations (sqrt(4 pi) is 3.5):
+
+       rays        16     32     64    128    256    512   1024   2048
+       error     0.77   0.57   0.28   0.15  0.092  0.057  0.033  0.022
+
+   What it does not do
+
+   - No scattering beyond the first, no phase function but the isotropic one, no refraction, no glossy surfaces.
+   - No pre-integration: a transfer function with features narrower than the value's change from sample to sample needs a smaller
+     step, or a peak. Pre-classification (colours interpolated instead of values) is left out on purpose: in data space it would
+     depend on the view, and it blurs every surface to the width of a voxel.
+   - The border of the volume is no surface: outside of the box is empty space.
+   - It reads no files, opens no window, converts nothing to sRGB. Pixels are linear and premultiplied: put a background under
+     them with  out = pixel + (1 - opacity) * background.
+
+   Options (macros, to be defined before the header is included)
+
+   ISOGI_IMPLEMENTATION       in one file: the code of all isogi headers that this file includes
+   ISOGI_DVR_IMPLEMENTATION   in one file: the code of this header alone
+   ISOGI_API                  how functions are declared, in all isogi headers; default extern (extern "C" in C++)
+   ISOGI_NO_THREADS           isogi_vol.h: no threads
+
+   Memory, threads, determinism
+
+   The pyramid (and the voxels below it) is borrowed and must outlive the renderer; description, context and transfer function are
+   copied. Visibility takes grid points * order^2 floats; empty blocks one byte for each block of the pyramid; a picture in work
+   20 bytes a pixel. All of it comes from the context's allocator; where that fails the call says so and changes nothing.
+   isogi_dvr_set_transfer and isogi_dvr_step are writers: one at a time, and not during another call with the same renderer. All
+   other calls only read and may run at the same time. Calls divide their own work among the context's threads. Results are the
+   same bits for any number of threads and however visibility was cut into steps.
+
+   Samples stand at the middle of pieces of equal length, counted from where the ray enters the box (or from the eye inside it);
+   the last piece is what is left. Blocks of the pyramid in which the transfer function has no extinction are stepped over, largest
+   first; the samples elsewhere stay where they are, so pictures are the same bits as without stepping over.
+
+   Limits
+
+   Values that are not finite: a cell with such a corner is transparent. An axis of one voxel makes a box without volume, which is
+   transparent (rays within its plane do sample it). Up to ISOGI_DVR_MAX_PEAKS peaks, 2^16 directions, and 2^24 samples on the
+   longest ray. Errors: ISOGI_INVALID for anything outside of its documented range, ISOGI_TOO_LARGE where sizes overflow or pass
+   these limits, ISOGI_NO_MEMORY, ISOGI_CANCELLED.
+
+   How to choose. `step` 0.5 is right for smooth transfer functions, 0.25 for steep ones; each halving costs twice the time and
+   leaves a quarter of the error. `order` 2 is ambient light with a direction, 3 soft shadows, 4 and more for a directional light.
+   `grid`: shadows cannot be finer than its distances; time is proportional to its points. `directions`: at least 2 order^2.
+
+   History: version 1 - ray casting in both spaces, peaks, brute-force SH visibility.
 */
 #ifndef ISOGI_DVR_H
 #define ISOGI_DVR_H
@@ -11,18 +112,21 @@
 
 /* ---- transfer functions -------------------------------------------------------------------------------------------------- */
 
-/* Piecewise linear between points of ascending value, constant beyond the ends; two points of one value make a step. */
+/* Piecewise linear between points of ascending value, constant beyond the ends; two points of one value make a step, whose upper
+   side holds at the value itself. No points at all: nothing absorbs. */
 typedef struct isogi_transfer_point {
-    double value;     /* data value */
-    float rgb[3];     /* linear colour (albedo for scattered light), not premultiplied, 0..1 */
+    double value;     /* data value; finite */
+    float rgb[3];     /* linear colour (albedo for scattered light), not premultiplied, 0..1; larger values glow, >= 0 is asked for */
     float extinction; /* >= 0: per isogi_dvr_desc.unit of length in physical space, per unit of data value in data space */
 } isogi_transfer_point;
 
 /* An isosurface of uniform opacity and colour: every crossing composites exactly `opacity`, whatever the gradient (Kraus 2005, 4.2). */
 typedef struct isogi_peak {
-    double isovalue;
-    float rgb[3], opacity; /* 0..1 */
+    double isovalue;       /* finite */
+    float rgb[3], opacity; /* 0..1; rgb >= 0 */
 } isogi_peak;
+
+#define ISOGI_DVR_MAX_PEAKS 256
 
 typedef struct isogi_transfer {
     const isogi_transfer_point *points;
@@ -31,7 +135,10 @@ typedef struct isogi_transfer {
     size_t peak_count;
 } isogi_transfer;
 
-/* rgb and extinction at a data value. */
+/* Order, finiteness, ranges as stated above. */
+ISOGI_API isogi_result isogi_transfer_validate(const isogi_transfer *transfer);
+
+/* rgb and extinction at a data value, for a transfer function that is valid (peaks are not part of it). All zero for a NaN. */
 ISOGI_API void isogi_transfer_at(const isogi_transfer *transfer, double value, float rgb[3], float *extinction);
 
 /* ---- a renderer ------------------------------------------------------------------------------------------------------------- */
@@ -44,50 +151,1168 @@ typedef enum isogi_dvr_space {
 typedef enum isogi_dvr_shading {
     ISOGI_DVR_UNLIT = 0,  /* the transfer function's colour is emitted as it is */
     ISOGI_DVR_VISIBILITY, /* light scattered isotropically, L . V from SH visibility (Kronander 2011) */
-    ISOGI_DVR_LOCAL       /* two-sided diffuse shading by the gradient, no shadows */
+    ISOGI_DVR_LOCAL       /* diffuse shading by the gradient, on the side that faces the eye, no shadows */
 } isogi_dvr_shading;
 
 typedef struct isogi_dvr_desc {
     const isogi_pyramid *pyramid; /* borrowed */
     isogi_dvr_space space;
     isogi_dvr_shading shading;
-    double unit;      /* world length that extinction is per; 0 = the smallest voxel spacing */
-    double step;      /* sampling distance along a ray in units of the smallest voxel spacing; 0 = 0.5 */
-    int order;        /* SH order of visibility, 1..6; 0 = 3 */
-    int directions;   /* visibility rays per grid point; 0 = 64 */
-    size_t grid[3];   /* visibility grid points along x, y, z; 0 = about a quarter of the voxels along that axis, at least 2 */
-    float opaque;     /* a ray ends at this opacity; 0 = 0.999; 1 = never */
+    double unit;            /* world length that extinction is per; 0 = the smallest voxel spacing */
+    double step;            /* sampling distance along a ray in units of the smallest voxel spacing, 0.0001..10000; 0 = 0.5 */
+    int order;              /* SH order of visibility, 1..6; 0 = 3 */
+    int directions;         /* visibility rays per grid point, 1..65536; 0 = 64 */
+    size_t grid[3];         /* visibility grid points along x, y, z (first and last on the border; a single one at the middle);
+                               0 = about a quarter of the voxels along that axis, at least 2 (1 where there is one voxel) */
+    float opaque;           /* a ray ends at this opacity, 0..1; 0 = 0.999; 1 = never */
+    double visibility_step; /* sampling distance along visibility rays, as `step`; 0 = twice `step` */
 } isogi_dvr_desc;
 
 typedef struct isogi_dvr isogi_dvr;
 
 /* A pinhole camera. width x height pixels, row 0 on top. */
 typedef struct isogi_view {
-    int width, height;
+    int width, height;              /* 1..32768 */
     float eye[3], target[3], up[3]; /* world; up 0 = +y */
-    float fov;                      /* vertical angle of view in degrees; 0 = 45 */
+    float fov;                      /* vertical angle of view in degrees, below 180; 0 = 45 */
 } isogi_view;
 
-/* The ray through the centre of pixel (x, y); fractions are allowed: pixel x covers x-1/2 .. x+1/2. dir is a unit vector. */
+/* The ray through the centre of pixel (x, y); fractions are allowed: pixel x covers x-1/2 .. x+1/2. dir is a unit vector.
+   Where up is along the line of sight, another up is chosen; where eye and target coincide, the view is along -z. */
 ISOGI_API void isogi_view_ray(const isogi_view *view, double x, double y, double origin[3], float dir[3]);
 
+/* A renderer without a transfer function (all transparent) and without shadows. */
 ISOGI_API isogi_result isogi_dvr_create(isogi_dvr **dvr, const isogi_dvr_desc *desc, const isogi_context *context);
-ISOGI_API void isogi_dvr_free(isogi_dvr *dvr);
+ISOGI_API void isogi_dvr_free(isogi_dvr *dvr); /* NULL is fine */
 
-/* Copied. Visibility has to be stepped again before it is right for the new function. */
+/* Copied. Visibility has to be stepped again, from the beginning, before it is right for the new function; until a grid point's
+   turn comes it keeps what it had. */
 ISOGI_API isogi_result isogi_dvr_set_transfer(isogi_dvr *dvr, const isogi_transfer *transfer);
 
-/* Computes visibility within about max_rays rays (0 = to the end). *remaining (may be NULL): fraction still to do, 0 = finished. */
+/* Computes visibility within about max_rays rays, at least one grid point (0 = to the end). *remaining (may be NULL): fraction
+   still to do, 0 = finished. When cancelled, what is finished stays and the next call goes on. Without ISOGI_DVR_VISIBILITY there
+   is nothing to do. */
 ISOGI_API isogi_result isogi_dvr_step(isogi_dvr *dvr, uint64_t max_rays, double *remaining);
 
-/* Interpolated visibility coefficients at world points: visibility[count][order*order]. */
+/* Interpolated visibility coefficients at world points: visibility[count][order*order]. Outside of the box a point is moved to its
+   nearest border point. ISOGI_INVALID without ISOGI_DVR_VISIBILITY. */
 ISOGI_API isogi_result isogi_dvr_sample_visibility(const isogi_dvr *dvr, const float (*points)[3], size_t count, float *visibility);
 
 /* premultiplied[height*width]: linear RGB premultiplied by opacity, opacity. depth[height*width] (NULL = not wanted): distance along
    the ray at which half of the pixel's final opacity is reached, INFINITY where the ray meets nothing.
-   lighting: environment and directional lights (point lights too, at the sample); unused when unlit. */
+   lighting: environment and directional lights (point lights too, at the sample); unused, and may be NULL, when unlit. */
 ISOGI_API isogi_result isogi_dvr_render(const isogi_dvr *dvr, const isogi_view *view, const isogi_lighting *lighting,
                                         float (*premultiplied)[4], float *depth, isogi_counters *counters);
 ISOGI_API void isogi_dvr_counters(const isogi_dvr *dvr, isogi_counters *counters); /* adds what isogi_dvr_step did so far */
 
 #endif /* ISOGI_DVR_H */
+
+/* ==================================================================================================================== */
+#if (defined(ISOGI_IMPLEMENTATION) || defined(ISOGI_DVR_IMPLEMENTATION)) && !defined(ISOGI_DVR_IMPLEMENTED)
+#define ISOGI_DVR_IMPLEMENTED
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#define ISOGI_DVR__PI 3.14159265358979323846
+#define ISOGI_DVR__LEVELS 3
+#define ISOGI_DVR__MAX_ORDER 6
+#define ISOGI_DVR__LOCAL_ORDER 5           /* of the environment in local shading: the cosine kernel holds little beyond */
+#define ISOGI_DVR__MAX_SAMPLES 16777216.0  /* on one ray */
+#define ISOGI_DVR__NEGLIGIBLE 1e-4         /* transmittance at which a visibility ray ends */
+#define ISOGI_DVR__TILE 16                 /* pixels a side: one task */
+#define ISOGI_DVR__CHUNK 16                /* grid points: one task */
+#define ISOGI_DVR__SLAB 4096               /* grid points between two looks at a cancelled step */
+
+/* ==== numbers that survive -ffast-math =============================================================================== */
+
+static int isogi_dvr__finite64(double x) {
+    uint64_t bits;
+    memcpy(&bits, &x, sizeof bits);
+    return (bits & 0x7ff0000000000000u) != 0x7ff0000000000000u;
+}
+
+static int isogi_dvr__finite32(float x) {
+    uint32_t bits;
+    memcpy(&bits, &x, sizeof bits);
+    return (bits & 0x7f800000u) != 0x7f800000u;
+}
+
+static int isogi_dvr__finite3(const float v[3]) {
+    return isogi_dvr__finite32(v[0]) && isogi_dvr__finite32(v[1]) && isogi_dvr__finite32(v[2]);
+}
+
+/* 0 .. high; NaN becomes 0. */
+static double isogi_dvr__clamp(double x, double high) {
+    x = x > 0 ? x : 0;
+    return x < high ? x : high;
+}
+
+static double isogi_dvr__dot(const double a[3], const double b[3]) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+
+static void isogi_dvr__transform(const double m[9], const double v[3], double out[3]) {
+    double x = v[0], y = v[1], z = v[2];
+    out[0] = m[0] * x + m[1] * y + m[2] * z;
+    out[1] = m[3] * x + m[4] * y + m[5] * z;
+    out[2] = m[6] * x + m[7] * y + m[8] * z;
+}
+
+/* ==== transfer functions ============================================================================================= */
+
+ISOGI_API isogi_result isogi_transfer_validate(const isogi_transfer *transfer) {
+    size_t i;
+    int a;
+    if (!transfer || (transfer->point_count && !transfer->points) || (transfer->peak_count && !transfer->peaks)) return ISOGI_INVALID;
+    if (transfer->peak_count > ISOGI_DVR_MAX_PEAKS) return ISOGI_TOO_LARGE;
+    for (i = 0; i < transfer->point_count; i++) {
+        const isogi_transfer_point *p = &transfer->points[i];
+        if (!isogi_dvr__finite64(p->value) || !isogi_dvr__finite3(p->rgb) || !isogi_dvr__finite32(p->extinction)) return ISOGI_INVALID;
+        if (!(p->extinction >= 0) || (i && !(p->value >= p[-1].value))) return ISOGI_INVALID;
+        for (a = 0; a < 3; a++)
+            if (!(p->rgb[a] >= 0)) return ISOGI_INVALID;
+    }
+    for (i = 0; i < transfer->peak_count; i++) {
+        const isogi_peak *p = &transfer->peaks[i];
+        if (!isogi_dvr__finite64(p->isovalue) || !isogi_dvr__finite3(p->rgb) || !isogi_dvr__finite32(p->opacity)) return ISOGI_INVALID;
+        if (!(p->opacity >= 0 && p->opacity <= 1)) return ISOGI_INVALID;
+        for (a = 0; a < 3; a++)
+            if (!(p->rgb[a] >= 0)) return ISOGI_INVALID;
+    }
+    return ISOGI_OK;
+}
+
+/* How many points have a value <= x. */
+static size_t isogi_dvr__points_below(const isogi_transfer_point *points, size_t count, double x) {
+    size_t low = 0, high = count;
+    while (low < high) {
+        size_t middle = low + (high - low) / 2;
+        if (points[middle].value <= x) low = middle + 1;
+        else high = middle;
+    }
+    return low;
+}
+
+/* The piece that x lies on: its two points and the place between them. The upper side holds at a step. */
+static double isogi_dvr__piece(const isogi_transfer_point *points, size_t count, double x, size_t *low, size_t *high) {
+    size_t n = isogi_dvr__points_below(points, count, x);
+    *low = n ? n - 1 : 0, *high = n < count ? n : count - 1;
+    if (*low == *high) return 0;
+    /* halves, so that the difference of two finite values is finite */
+    return isogi_dvr__clamp((0.5 * x - 0.5 * points[*low].value) / (0.5 * points[*high].value - 0.5 * points[*low].value), 1);
+}
+
+static double isogi_dvr__extinction(const isogi_transfer_point *points, size_t count, double x) {
+    size_t low, high;
+    double u = isogi_dvr__piece(points, count, x, &low, &high), from = (double)points[low].extinction;
+    return from + u * ((double)points[high].extinction - from);
+}
+
+static void isogi_dvr__colour(const isogi_transfer_point *points, size_t count, double x, double rgb[3]) {
+    size_t low, high;
+    double u = isogi_dvr__piece(points, count, x, &low, &high);
+    int a;
+    for (a = 0; a < 3; a++) rgb[a] = (double)points[low].rgb[a] + u * ((double)points[high].rgb[a] - (double)points[low].rgb[a]);
+}
+
+ISOGI_API void isogi_transfer_at(const isogi_transfer *transfer, double value, float rgb[3], float *extinction) {
+    double colour[3];
+    int a;
+    for (a = 0; a < 3; a++) rgb[a] = 0;
+    *extinction = 0;
+    if (value > 1e308) value = 1e308;
+    if (value < -1e308) value = -1e308;
+    if (!transfer->point_count || !isogi_dvr__finite64(value)) return;
+    isogi_dvr__colour(transfer->points, transfer->point_count, value, colour);
+    for (a = 0; a < 3; a++) rgb[a] = (float)colour[a];
+    *extinction = (float)isogi_dvr__extinction(transfer->points, transfer->point_count, value);
+}
+
+/* ==== the renderer =================================================================================================== */
+
+/* An owned transfer function. most[l * point_count + i] is the largest extinction of points i .. i + 2^l - 1, so that the largest
+   over any range of values is the larger of two entries. */
+typedef struct isogi_dvr__transfer {
+    isogi_transfer_point *points;
+    isogi_peak *peaks;
+    float *most;
+    size_t point_count, peak_count, most_count;
+} isogi_dvr__transfer;
+
+struct isogi_dvr {
+    isogi_dvr_desc desc; /* zero defaults filled in */
+    isogi_context context;
+    isogi_volume volume;
+    isogi_dvr__transfer transfer;
+    double to_grid[9]; /* world directions to grid directions */
+    double spacing;    /* the smallest distance of two voxels, world */
+    int cells[3];
+    int transparent; /* no value that occurs has any extinction */
+    isogi_level level[ISOGI_DVR__LEVELS];
+    uint8_t *empty[ISOGI_DVR__LEVELS]; /* one byte a block: nothing in it has any extinction */
+    uint8_t *empty_blocks;
+    size_t block_count;
+
+    double (*direction)[6]; /* of visibility rays: in grid space, in world space */
+    float *kernel;          /* [directions][order * order]: weight times basis function */
+    size_t coefficients, point_count, kernel_count;
+    float *visibility; /* [grid points][order * order] */
+    size_t next;       /* grid point */
+    isogi_counters counters;
+};
+
+/* The largest extinction of the values low .. high, both included. */
+static double isogi_dvr__most(const isogi_dvr__transfer *t, double low, double high) {
+    size_t from, to, span;
+    double most, end;
+    int level = 0;
+    if (!t->point_count) return 0;
+    most = isogi_dvr__extinction(t->points, t->point_count, low);
+    end = isogi_dvr__extinction(t->points, t->point_count, high);
+    if (end > most) most = end;
+    from = isogi_dvr__points_below(t->points, t->point_count, low);
+    to = isogi_dvr__points_below(t->points, t->point_count, high);
+    if (from >= to) return most;
+    span = to - from;
+    while ((span >> level) > 1) level++;
+    end = (double)t->most[(size_t)level * t->point_count + from];
+    if (end > most) most = end;
+    end = (double)t->most[(size_t)level * t->point_count + to - ((size_t)1 << level)];
+    return end > most ? end : most;
+}
+
+static void isogi_dvr__transfer_free(isogi_dvr__transfer *t, const isogi_context *context) {
+    isogi_release(context, t->points, t->point_count, sizeof *t->points);
+    isogi_release(context, t->peaks, t->peak_count, sizeof *t->peaks);
+    isogi_release(context, t->most, t->most_count, sizeof *t->most);
+    memset(t, 0, sizeof *t);
+}
+
+static isogi_result isogi_dvr__transfer_copy(isogi_dvr__transfer *t, const isogi_transfer *from, const isogi_context *context) {
+    size_t levels = 1, level, i;
+    memset(t, 0, sizeof *t);
+    t->point_count = from->point_count, t->peak_count = from->peak_count;
+    while (levels < 63 && (t->point_count >> levels) > 0) levels++;
+    if (t->point_count > SIZE_MAX / levels) return ISOGI_TOO_LARGE;
+    t->most_count = levels * t->point_count;
+    t->points = (isogi_transfer_point *)isogi_allocate(context, t->point_count, sizeof *t->points);
+    t->peaks = (isogi_peak *)isogi_allocate(context, t->peak_count, sizeof *t->peaks);
+    t->most = (float *)isogi_allocate(context, t->most_count, sizeof *t->most);
+    if ((t->point_count && (!t->points || !t->most)) || (t->peak_count && !t->peaks)) {
+        isogi_dvr__transfer_free(t, context);
+        return ISOGI_NO_MEMORY;
+    }
+    if (t->peak_count) memcpy(t->peaks, from->peaks, t->peak_count * sizeof *t->peaks);
+    for (i = 0; i < t->point_count; i++) t->points[i] = from->points[i], t->most[i] = from->points[i].extinction;
+    for (level = 1; level < levels; level++) {
+        const float *lower = t->most + (level - 1) * t->point_count;
+        float *upper = t->most + level * t->point_count;
+        size_t half = (size_t)1 << (level - 1);
+        for (i = 0; i < t->point_count; i++) {
+            upper[i] = lower[i];
+            if (i + half < t->point_count && lower[i + half] > upper[i]) upper[i] = lower[i + half];
+        }
+    }
+    return ISOGI_OK;
+}
+
+static void isogi_dvr__mark_empty(isogi_dvr *d) {
+    int n;
+    d->transparent = 1;
+    for (n = 0; n < ISOGI_DVR__LEVELS; n++) {
+        const isogi_level *level = &d->level[n];
+        size_t count = level->size[0] * level->size[1] * level->size[2], i;
+        for (i = 0; i < count; i++) {
+            const float *range = level->range[i];
+            d->empty[n][i] = range[0] > range[1] || !(isogi_dvr__most(&d->transfer, (double)range[0], (double)range[1]) > 0);
+            if (!d->empty[n][i]) d->transparent = 0;
+        }
+    }
+}
+
+ISOGI_API isogi_result isogi_dvr_set_transfer(isogi_dvr *dvr, const isogi_transfer *transfer) {
+    isogi_dvr__transfer copy;
+    isogi_result result;
+    if (!dvr) return ISOGI_INVALID;
+    result = isogi_transfer_validate(transfer);
+    if (result == ISOGI_OK) result = isogi_dvr__transfer_copy(&copy, transfer, &dvr->context);
+    if (result != ISOGI_OK) return result;
+    isogi_dvr__transfer_free(&dvr->transfer, &dvr->context);
+    dvr->transfer = copy;
+    isogi_dvr__mark_empty(dvr);
+    dvr->next = 0;
+    return ISOGI_OK;
+}
+
+/* ==== directions of visibility rays ================================================================================== */
+
+/* Weights of N directions that sum spherical harmonics up to a degree L exactly: equal weights, plus the smallest correction
+   (in the sense of least squares) that makes it so. For a spherical Fibonacci lattice with N >= 2 (L+1)^2 the matrix of that
+   problem is near a multiple of the identity, and a few Richardson steps solve it to rounding.
+   y[directions][count] are the spherical harmonics, count = (L+1)^2. */
+static void isogi_dvr__weigh(const double *y, size_t count, size_t directions, double *weight) {
+    double residual[4 * ISOGI_DVR__MAX_ORDER * ISOGI_DVR__MAX_ORDER], last = 1e300;
+    size_t i, k;
+    int pass;
+    for (k = 0; k < directions; k++) weight[k] = 4 * ISOGI_DVR__PI / (double)directions;
+    for (pass = 0; pass < 64; pass++) {
+        double size = 0;
+        for (i = 0; i < count; i++) residual[i] = i ? 0 : 2 * sqrt(ISOGI_DVR__PI);
+        for (k = 0; k < directions; k++)
+            for (i = 0; i < count; i++) residual[i] -= weight[k] * y[k * count + i];
+        for (i = 0; i < count; i++) size += residual[i] * residual[i];
+        if (!(size < last) || size < 1e-30) break;
+        last = size;
+        for (k = 0; k < directions; k++) {
+            double sum = 0;
+            for (i = 0; i < count; i++) sum += residual[i] * y[k * count + i];
+            weight[k] += 4 * ISOGI_DVR__PI / (double)directions * sum;
+        }
+    }
+}
+
+/* Spherical Fibonacci lattice: equal steps of height, golden angles of longitude. */
+static void isogi_dvr__set_directions(isogi_dvr *d) {
+    size_t n = (size_t)d->desc.directions, k;
+    int a;
+    for (k = 0; k < n; k++) {
+        double z = 1 - (2 * (double)k + 1) / (double)n, r = sqrt(1 - z * z);
+        double turn = (double)k * 0.61803398874989484820, phi = 2 * ISOGI_DVR__PI * (turn - floor(turn));
+        double *world = d->direction[k] + 3;
+        world[0] = r * cos(phi), world[1] = r * sin(phi), world[2] = z;
+        /* as the isosurface rays have them: crossings and samples then share one line exactly */
+        for (a = 0; a < 3; a++) world[a] = (double)(float)world[a];
+        isogi_dvr__transform(d->to_grid, world, d->direction[k]);
+    }
+}
+
+static isogi_result isogi_dvr__set_kernel(isogi_dvr *d) {
+    size_t n = (size_t)d->desc.directions, order = 1, count, k, i;
+    double *y, *weight;
+    while (order + 1 < 2 * (size_t)d->desc.order && 2 * (order + 1) * (order + 1) <= n) order++;
+    /* the table serves the weights and then the kernel, whose order may be the larger one */
+    count = order > (size_t)d->desc.order ? order : (size_t)d->desc.order;
+    count *= count;
+    y = (double *)isogi_allocate(&d->context, n * count, sizeof *y);
+    weight = (double *)isogi_allocate(&d->context, 4 * n, sizeof *weight);
+    if (!y || !weight) {
+        isogi_release(&d->context, y, n * count, sizeof *y);
+        isogi_release(&d->context, weight, 4 * n, sizeof *weight);
+        return ISOGI_NO_MEMORY;
+    }
+    for (k = 0; k < n; k++) memcpy(weight + n + 3 * k, d->direction[k] + 3, 3 * sizeof *weight);
+    isogi_sh_eval_f64(y, (int)order, (const double(*)[3])(weight + n), n);
+    isogi_dvr__weigh(y, order * order, n, weight);
+    isogi_sh_eval_f64(y, d->desc.order, (const double(*)[3])(weight + n), n);
+    for (k = 0; k < n; k++)
+        for (i = 0; i < d->coefficients; i++) d->kernel[k * d->coefficients + i] = (float)(weight[k] * y[k * d->coefficients + i]);
+    isogi_release(&d->context, y, n * count, sizeof *y);
+    isogi_release(&d->context, weight, 4 * n, sizeof *weight);
+    return ISOGI_OK;
+}
+
+/* ==== create and free ================================================================================================ */
+
+/* The inverse of (axes * spacing), and the smallest length of its columns. */
+static void isogi_dvr__set_lattice(isogi_dvr *d) {
+    const isogi_volume *v = &d->volume;
+    const double *m = v->axes;
+    double determinant = m[0] * (m[4] * m[8] - m[5] * m[7]) + m[1] * (m[5] * m[6] - m[3] * m[8]) + m[2] * (m[3] * m[7] - m[4] * m[6]);
+    int r, c;
+    d->spacing = 0;
+    for (r = 0; r < 3; r++) {
+        double length = v->spacing[r] * sqrt(m[r] * m[r] + m[3 + r] * m[3 + r] + m[6 + r] * m[6 + r]);
+        if (!r || length < d->spacing) d->spacing = length;
+        d->cells[r] = (int)(v->size[r] - 1);
+        for (c = 0; c < 3; c++) {
+            int r1 = (c + 1) % 3, r2 = (c + 2) % 3, c1 = (r + 1) % 3, c2 = (r + 2) % 3; /* cyclic: the cofactor has its sign */
+            d->to_grid[3 * r + c] = (m[3 * r1 + c1] * m[3 * r2 + c2] - m[3 * r1 + c2] * m[3 * r2 + c1]) / determinant / v->spacing[r];
+        }
+    }
+}
+
+static isogi_result isogi_dvr__resolve(isogi_dvr_desc *desc, const isogi_dvr_desc *given) {
+    const isogi_volume *volume;
+    int a;
+    if (!given || !given->pyramid) return ISOGI_INVALID;
+    *desc = *given;
+    volume = isogi_vol_volume(desc->pyramid);
+    if (desc->space != ISOGI_DVR_PHYSICAL && desc->space != ISOGI_DVR_DATA) return ISOGI_INVALID;
+    if (desc->shading != ISOGI_DVR_UNLIT && desc->shading != ISOGI_DVR_VISIBILITY && desc->shading != ISOGI_DVR_LOCAL) return ISOGI_INVALID;
+    if (!isogi_dvr__finite64(desc->unit) || !isogi_dvr__finite64(desc->step) || !isogi_dvr__finite32(desc->opaque)) return ISOGI_INVALID;
+    if (!isogi_dvr__finite64(desc->visibility_step)) return ISOGI_INVALID;
+    if (!(desc->unit >= 0) || !(desc->step >= 0) || !(desc->visibility_step >= 0)) return ISOGI_INVALID;
+    if (!(desc->opaque >= 0 && desc->opaque <= 1)) return ISOGI_INVALID;
+    if (desc->order < 0 || desc->order > ISOGI_DVR__MAX_ORDER || desc->directions < 0 || desc->directions > 65536) return ISOGI_INVALID;
+    if (!(desc->step > 0)) desc->step = 0.5;
+    if (!(desc->visibility_step > 0)) desc->visibility_step = 2 * desc->step;
+    if (!(desc->step >= 1e-4 && desc->step <= 1e4 && desc->visibility_step >= 1e-4 && desc->visibility_step <= 2e4)) return ISOGI_INVALID;
+    if (!(desc->opaque > 0)) desc->opaque = 0.999f;
+    if (!desc->order) desc->order = 3;
+    if (!desc->directions) desc->directions = 64;
+    for (a = 0; a < 3; a++) {
+        if (!desc->grid[a]) desc->grid[a] = volume->size[a] > 8 ? (volume->size[a] + 3) / 4 : volume->size[a] > 1 ? 2 : 1;
+        if (desc->grid[a] > 0x7fffffff) return ISOGI_TOO_LARGE;
+    }
+    return ISOGI_OK;
+}
+
+/* Everything whose size is known by now. */
+static isogi_result isogi_dvr__allocate_parts(isogi_dvr *d) {
+    int n, lit = d->desc.shading == ISOGI_DVR_VISIBILITY;
+    size_t i;
+    for (n = 0; n < ISOGI_DVR__LEVELS; n++) {
+        d->level[n] = isogi_vol_level(d->desc.pyramid, n);
+        d->block_count += d->level[n].size[0] * d->level[n].size[1] * d->level[n].size[2];
+    }
+    d->empty_blocks = (uint8_t *)isogi_allocate(&d->context, d->block_count, 1);
+    if (!d->empty_blocks) return ISOGI_NO_MEMORY;
+    for (n = 0, i = 0; n < ISOGI_DVR__LEVELS; n++) {
+        d->empty[n] = d->empty_blocks + i;
+        i += d->level[n].size[0] * d->level[n].size[1] * d->level[n].size[2];
+    }
+    if (!lit) return ISOGI_OK;
+    d->coefficients = ISOGI_SH_COUNT(d->desc.order);
+    d->point_count = d->coefficients;
+    for (n = 0; n < 3; n++) {
+        if (d->desc.grid[n] > SIZE_MAX / 4 / d->point_count) return ISOGI_TOO_LARGE;
+        d->point_count *= d->desc.grid[n];
+    }
+    d->point_count /= d->coefficients;
+    d->kernel_count = (size_t)d->desc.directions * d->coefficients;
+    d->direction = (double(*)[6])isogi_allocate(&d->context, (size_t)d->desc.directions, sizeof *d->direction);
+    d->kernel = (float *)isogi_allocate(&d->context, d->kernel_count, sizeof *d->kernel);
+    d->visibility = (float *)isogi_allocate(&d->context, d->point_count * d->coefficients, sizeof *d->visibility);
+    if (!d->direction || !d->kernel || !d->visibility) return ISOGI_NO_MEMORY;
+    for (i = 0; i < d->point_count * d->coefficients; i++)
+        d->visibility[i] = i % d->coefficients ? 0 : (float)(2 * sqrt(ISOGI_DVR__PI));
+    isogi_dvr__set_directions(d);
+    return isogi_dvr__set_kernel(d);
+}
+
+ISOGI_API isogi_result isogi_dvr_create(isogi_dvr **dvr, const isogi_dvr_desc *desc, const isogi_context *context) {
+    isogi_dvr_desc resolved;
+    isogi_result result = isogi_dvr__resolve(&resolved, desc);
+    isogi_dvr *d;
+    double longest = 0;
+    int a;
+    if (!dvr) return ISOGI_INVALID;
+    if (result != ISOGI_OK) return result;
+    d = (isogi_dvr *)isogi_allocate(context, 1, sizeof *d);
+    if (!d) return ISOGI_NO_MEMORY;
+    memset(d, 0, sizeof *d);
+    if (context) d->context = *context;
+    d->desc = resolved, d->volume = *isogi_vol_volume(resolved.pyramid);
+    isogi_dvr__set_lattice(d);
+    if (!(d->desc.unit > 0)) d->desc.unit = d->spacing;
+    for (a = 0; a < 3; a++) {
+        const double *m = d->volume.axes + a;
+        longest += d->cells[a] * (d->volume.spacing[a] / d->spacing) * sqrt(m[0] * m[0] + m[3] * m[3] + m[6] * m[6]);
+    }
+    resolved.step = resolved.step < resolved.visibility_step ? resolved.step : resolved.visibility_step;
+    result = longest / resolved.step <= ISOGI_DVR__MAX_SAMPLES ? isogi_dvr__allocate_parts(d) : ISOGI_TOO_LARGE;
+    if (result != ISOGI_OK) {
+        isogi_dvr_free(d);
+        return result;
+    }
+    isogi_dvr__mark_empty(d);
+    *dvr = d;
+    return ISOGI_OK;
+}
+
+ISOGI_API void isogi_dvr_free(isogi_dvr *dvr) {
+    isogi_context context;
+    if (!dvr) return;
+    context = dvr->context;
+    isogi_dvr__transfer_free(&dvr->transfer, &context);
+    isogi_release(&context, dvr->empty_blocks, dvr->block_count, 1);
+    isogi_release(&context, dvr->direction, (size_t)dvr->desc.directions, sizeof *dvr->direction);
+    isogi_release(&context, dvr->kernel, dvr->kernel_count, sizeof *dvr->kernel);
+    isogi_release(&context, dvr->visibility, dvr->point_count * dvr->coefficients, sizeof *dvr->visibility);
+    isogi_release(&context, dvr, 1, sizeof *dvr);
+}
+
+/* ==== samples along a ray ============================================================================================ */
+
+/* A ray in grid coordinates, in double: world points as floats would lose whole voxels far from the origin, and the samples have
+   to share one parameter with the crossings of peaks. All t count from where the ray enters the box. */
+typedef struct isogi_dvr__march {
+    const isogi_dvr *dvr;
+    double origin[3], dir[3]; /* at the entry; grid units per t */
+    double enter, length;     /* t along the ray as given; of the part within the box */
+    double piece, scale;      /* t of one piece; optical depth per (extinction * t) in physical space, 1 in data space */
+    uint64_t next, count;     /* pieces */
+    int cell[3], known[3];    /* the cell in `corner`; the smallest block known not to be empty */
+    double corner[8], low, high;
+    int finite;
+    isogi_counters work;
+} isogi_dvr__march;
+
+/* A piece of ray with some extinction: all that compositing and shading ask for. */
+typedef struct isogi_dvr__sample {
+    double from, to; /* t */
+    double depth;    /* optical depth of the whole piece */
+    double value, local[3];
+    int cell[3];
+} isogi_dvr__sample;
+
+/* 0 if the ray misses the box. `origin` and `dir` in grid space, `world` = length of dir in the world, `step` in voxels. */
+static int isogi_dvr__begin(isogi_dvr__march *m, const isogi_dvr *d, const double origin[3], const double dir[3], double world, double step) {
+    double enter = 0, leave = 1e300, pieces;
+    int a;
+    memset(m, 0, sizeof *m);
+    for (a = 0; a < 3; a++) {
+        double size = d->cells[a], t0, t1, swap;
+        if (!isogi_dvr__finite64(origin[a]) || !isogi_dvr__finite64(dir[a])) return 0;
+        if (!(fabs(dir[a]) > 1e-300)) {
+            if (!(origin[a] >= 0 && origin[a] <= size)) return 0;
+            continue;
+        }
+        t0 = -origin[a] / dir[a], t1 = (size - origin[a]) / dir[a];
+        if (t0 > t1) swap = t0, t0 = t1, t1 = swap;
+        if (t0 > enter) enter = t0;
+        if (t1 < leave) leave = t1;
+    }
+    if (!(enter < leave) || !(leave < 1e300)) return 0;
+    m->dvr = d, m->enter = enter, m->length = leave - enter;
+    for (a = 0; a < 3; a++) {
+        m->dir[a] = dir[a];
+        m->origin[a] = isogi_dvr__clamp(origin[a] + enter * dir[a], d->cells[a]);
+        m->cell[a] = m->known[a] = -1;
+    }
+    m->piece = step * d->spacing / world;
+    m->scale = d->desc.space == ISOGI_DVR_PHYSICAL ? world / d->desc.unit : 1;
+    pieces = ceil(m->length / m->piece);
+    m->count = (uint64_t)isogi_dvr__clamp(pieces, 2 * ISOGI_DVR__MAX_SAMPLES);
+    return 1;
+}
+
+#define ISOGI_DVR__READ(T)                                                                                                       \
+    for (i = 0; i < 8; i++)                                                                                                      \
+        m->corner[i] = v->scale * (double)*(const T *)(const void *)(p + (i & 1 ? dx : 0) + (i & 2 ? dy : 0) + (i & 4 ? dz : 0)) \
+                       + v->bias;                                                                                                \
+    break;
+
+/* Corner x + 2y + 4z of the present cell. */
+static void isogi_dvr__fetch(isogi_dvr__march *m) {
+    const isogi_volume *v = &m->dvr->volume;
+    const char *p = (const char *)v->data + m->cell[0] * v->stride[0] + m->cell[1] * v->stride[1] + m->cell[2] * v->stride[2];
+    ptrdiff_t dx = m->dvr->cells[0] ? v->stride[0] : 0, dy = m->dvr->cells[1] ? v->stride[1] : 0, dz = m->dvr->cells[2] ? v->stride[2] : 0;
+    int i;
+    switch (v->type) {
+    case ISOGI_U8: ISOGI_DVR__READ(uint8_t)
+    case ISOGI_I8: ISOGI_DVR__READ(int8_t)
+    case ISOGI_U16: ISOGI_DVR__READ(uint16_t)
+    case ISOGI_I16: ISOGI_DVR__READ(int16_t)
+    case ISOGI_F32: ISOGI_DVR__READ(float)
+    case ISOGI_F64: ISOGI_DVR__READ(double)
+    }
+    m->finite = 1, m->low = m->high = m->corner[0];
+    for (i = 0; i < 8; i++) {
+        m->finite &= isogi_dvr__finite64(m->corner[i]);
+        if (m->corner[i] < m->low) m->low = m->corner[i];
+        if (m->corner[i] > m->high) m->high = m->corner[i];
+    }
+}
+#undef ISOGI_DVR__READ
+
+/* The trilinear value, kept within the corners' range (rounding may not carry it into extinction that the range excludes), and
+   its derivative along the ray, per t. */
+static double isogi_dvr__field(const isogi_dvr__march *m, const double u[3], double *slope) {
+    const double *c = m->corner;
+    double x00 = c[1] - c[0], x10 = c[3] - c[2], x01 = c[5] - c[4], x11 = c[7] - c[6];
+    double v00 = c[0] + u[0] * x00, v10 = c[2] + u[0] * x10, v01 = c[4] + u[0] * x01, v11 = c[6] + u[0] * x11;
+    double y0 = v10 - v00, y1 = v11 - v01, v0 = v00 + u[1] * y0, v1 = v01 + u[1] * y1, z = v1 - v0, value = v0 + u[2] * z;
+    double x0 = x00 + u[1] * (x10 - x00), x1 = x01 + u[1] * (x11 - x01);
+    *slope = m->dir[0] * (x0 + u[2] * (x1 - x0)) + m->dir[1] * (y0 + u[2] * (y1 - y0)) + m->dir[2] * z;
+    value = value > m->low ? value : m->low;
+    return value < m->high ? value : m->high;
+}
+
+/* Steps over the largest empty block around the cell `c`, in which the sample at t lies: 1 if there is one. The next sample is the
+   first that may lie outside: a rounding error too early does no harm, since it is looked at like any other. */
+static int isogi_dvr__skip(isogi_dvr__march *m, const int c[3], double t) {
+    const isogi_dvr *d = m->dvr;
+    int n, a;
+    if (c[0] >> 2 == m->known[0] && c[1] >> 2 == m->known[1] && c[2] >> 2 == m->known[2]) return 0;
+    for (n = ISOGI_DVR__LEVELS - 1; n >= 0; n--) {
+        const isogi_level *level = &d->level[n];
+        int shift = 2 + 2 * n;
+        double leave = m->length, first;
+        size_t block = (size_t)(c[0] >> shift) + level->size[0] * ((size_t)(c[1] >> shift) + level->size[1] * (size_t)(c[2] >> shift));
+        m->work.blocks++;
+        if (!d->empty[n][block]) continue;
+        for (a = 0; a < 3; a++) {
+            double border = m->dir[a] > 0 ? (double)(((c[a] >> shift) + 1)) * level->cells : (double)(c[a] >> shift) * level->cells;
+            double exit = fabs(m->dir[a]) > 1e-300 ? (border - m->origin[a]) / m->dir[a] : leave;
+            if (exit < leave) leave = exit;
+        }
+        m->work.blocks_skipped++;
+        if (leave >= m->length) m->next = m->count;
+        first = isogi_dvr__clamp((leave > t ? leave : t) / m->piece - 0.5 - 1e-6, 2 * ISOGI_DVR__MAX_SAMPLES);
+        if ((double)m->next < first) m->next = (uint64_t)ceil(first);
+        return 1;
+    }
+    for (a = 0; a < 3; a++) m->known[a] = c[a] >> 2;
+    return 0;
+}
+
+/* The next piece of the ray that has any extinction; 0 when there is none. */
+static int isogi_dvr__next(isogi_dvr__march *m, isogi_dvr__sample *s) {
+    const isogi_dvr *d = m->dvr;
+    if (d->transparent) return 0;
+    while (m->next < m->count) {
+        double extinction, slope, t;
+        int a, moved = 0;
+        s->from = (double)m->next * m->piece;
+        m->next++;
+        s->to = (double)m->next * m->piece;
+        if (s->to > m->length) s->to = m->length;
+        t = 0.5 * (s->from + s->to);
+        for (a = 0; a < 3; a++) {
+            double x = isogi_dvr__clamp(m->origin[a] + t * m->dir[a], d->cells[a]);
+            int c = (int)x;
+            if (c > 0 && c >= d->cells[a]) c = d->cells[a] - 1;
+            s->cell[a] = c, s->local[a] = x - c;
+        }
+        if (isogi_dvr__skip(m, s->cell, t)) continue;
+        m->work.samples++;
+        for (a = 0; a < 3; a++) moved |= m->cell[a] ^ s->cell[a], m->cell[a] = s->cell[a];
+        if (moved) isogi_dvr__fetch(m);
+        if (!m->finite) continue;
+        s->value = isogi_dvr__field(m, s->local, &slope);
+        extinction = isogi_dvr__extinction(d->transfer.points, d->transfer.point_count, s->value);
+        if (!(extinction > 0)) continue;
+        s->depth = extinction * (s->to - s->from) * m->scale;
+        if (d->desc.space == ISOGI_DVR_DATA) s->depth *= fabs(slope);
+        s->depth = isogi_dvr__clamp(s->depth, 1e30);
+        if (s->depth > 0) return 1;
+    }
+    return 0;
+}
+
+/* ==== crossings of peaks ============================================================================================= */
+
+/* The next crossing of every peak along one ray. `left` bounds the crossings that a ray can have (three a cell). */
+typedef struct isogi_dvr__crossings {
+    const isogi_dvr *dvr;
+    float dir[3];
+    double shift;    /* the march's t minus the ray's t */
+    size_t count;    /* peaks */
+    uint64_t left;
+    double t[ISOGI_DVR_MAX_PEAKS]; /* of the march; 1e300 = no more */
+    isogi_hit hit[ISOGI_DVR_MAX_PEAKS];
+    isogi_counters work;
+} isogi_dvr__crossings;
+
+static void isogi_dvr__begin_crossings(isogi_dvr__crossings *c, const isogi_dvr *d, const double origin[3], const float dir[3], double enter) {
+    isogi_ray ray;
+    size_t i;
+    int a;
+    c->dvr = d, c->shift = -enter, c->count = d->transfer.peak_count, c->left = 1;
+    memset(&c->work, 0, sizeof c->work);
+    if (!c->count) return;
+    memset(&ray, 0, sizeof ray);
+    for (a = 0; a < 3; a++) ray.origin[a] = origin[a], ray.dir[a] = c->dir[a] = dir[a], c->left += 3 * (uint64_t)d->volume.size[a];
+    c->left *= c->count;
+    for (i = 0; i < c->count; i++) {
+        memset(&c->hit[i], 0, sizeof c->hit[i]);
+        ray.isovalue = d->transfer.peaks[i].isovalue;
+        if (d->transfer.peaks[i].opacity > 0) isogi_vol_intersect(d->desc.pyramid, &ray, 1, &c->hit[i], &c->work);
+        c->t[i] = c->hit[i].side ? c->hit[i].t + c->shift : 1e300;
+    }
+}
+
+/* The first of the coming crossings; count when there is none before t. Peaks of one value come in the order given. */
+static size_t isogi_dvr__first_crossing(const isogi_dvr__crossings *c, double t) {
+    size_t best = c->count, i;
+    for (i = 0; i < c->count; i++)
+        if (c->t[i] < t) t = c->t[i], best = i;
+    return best;
+}
+
+static void isogi_dvr__pass_crossing(isogi_dvr__crossings *c, size_t i) {
+    isogi_hit hit;
+    memset(&hit, 0, sizeof hit);
+    if (c->left) {
+        c->left--;
+        isogi_vol_continue(c->dvr->desc.pyramid, &c->hit[i], (const float(*)[3])&c->dir, NULL, c->dvr->transfer.peaks[i].isovalue, 0, 1,
+                           &hit, &c->work);
+    }
+    c->t[i] = hit.side ? c->t[i] + hit.t : 1e300;
+    c->hit[i] = hit;
+}
+
+/* ==== visibility ===================================================================================================== */
+
+/* Trilinear in the grid of visibility: the eight points around a position given in the volume's grid coordinates. */
+static void isogi_dvr__visibility_at(const isogi_dvr *d, const double position[3], float *out) {
+    size_t base = 0, offset[3], stride = d->coefficients, i, k;
+    double u[3];
+    int a;
+    for (a = 0; a < 3; a++) {
+        size_t points = d->desc.grid[a], c;
+        double x = d->cells[a] ? isogi_dvr__clamp(position[a] / d->cells[a], 1) * (double)(points - 1) : 0;
+        c = (size_t)x;
+        if (c && c >= points - 1) c = points - 2;
+        u[a] = x - (double)c, base += c * stride, offset[a] = points > 1 ? stride : 0;
+        stride *= points;
+    }
+    for (i = 0; i < d->coefficients; i++) out[i] = 0;
+    for (k = 0; k < 8; k++) {
+        const float *v = d->visibility + base + (k & 1 ? offset[0] : 0) + (k & 2 ? offset[1] : 0) + (k & 4 ? offset[2] : 0);
+        float w = (float)((k & 1 ? u[0] : 1 - u[0]) * (k & 2 ? u[1] : 1 - u[1]) * (k & 4 ? u[2] : 1 - u[2]));
+        for (i = 0; i < d->coefficients; i++) out[i] += w * v[i];
+    }
+}
+
+static double isogi_dvr__transmittance(const isogi_dvr *d, const double grid[3], const double world[3], const double direction[6],
+                                       isogi_dvr__crossings *crossings, isogi_counters *work) {
+    isogi_dvr__march march;
+    isogi_dvr__sample sample;
+    double depth = 0, clear = 1, limit = -log(ISOGI_DVR__NEGLIGIBLE);
+    size_t i;
+    work->rays++;
+    if (!isogi_dvr__begin(&march, d, grid, direction, sqrt(isogi_dvr__dot(direction + 3, direction + 3)), d->desc.visibility_step)) return 1;
+    if (d->transfer.peak_count) {
+        float dir[3] = {(float)direction[3], (float)direction[4], (float)direction[5]};
+        isogi_dvr__begin_crossings(crossings, d, world, dir, march.enter);
+        while (clear > ISOGI_DVR__NEGLIGIBLE && (i = isogi_dvr__first_crossing(crossings, 1e300)) < crossings->count) {
+            clear *= 1 - (double)d->transfer.peaks[i].opacity;
+            isogi_dvr__pass_crossing(crossings, i);
+        }
+        work->blocks += crossings->work.blocks, work->cells += crossings->work.cells, work->cubics += crossings->work.cubics;
+    }
+    while (clear > ISOGI_DVR__NEGLIGIBLE && depth < limit && isogi_dvr__next(&march, &sample)) depth += sample.depth;
+    work->blocks += march.work.blocks, work->blocks_skipped += march.work.blocks_skipped;
+    clear *= exp(-depth);
+    return clear > ISOGI_DVR__NEGLIGIBLE ? clear : 0;
+}
+
+typedef struct isogi_dvr__step_job {
+    isogi_dvr *dvr;
+    size_t first, end;
+    isogi_counters *work; /* one for each task */
+} isogi_dvr__step_job;
+
+static void isogi_dvr__step_task(void *arg, size_t task) {
+    const isogi_dvr__step_job *job = (const isogi_dvr__step_job *)arg;
+    const isogi_dvr *d = job->dvr;
+    size_t point = job->first + task * ISOGI_DVR__CHUNK, end = point + ISOGI_DVR__CHUNK, i, k;
+    isogi_dvr__crossings crossings;
+    memset(&job->work[task], 0, sizeof *job->work);
+    for (; point < end && point < job->end; point++) {
+        double sum[ISOGI_DVR__MAX_ORDER * ISOGI_DVR__MAX_ORDER] = {0}, grid[3], world[3];
+        size_t rest = point;
+        int a;
+        for (a = 0; a < 3; a++) {
+            size_t points = d->desc.grid[a], j = rest % points;
+            grid[a] = points > 1 ? (double)j * d->cells[a] / (double)(points - 1) : 0.5 * d->cells[a];
+            rest /= points;
+        }
+        isogi_vol_to_world(d->desc.pyramid, grid, world);
+        for (k = 0; k < (size_t)d->desc.directions; k++) {
+            double clear = isogi_dvr__transmittance(d, grid, world, d->direction[k], &crossings, &job->work[task]);
+            if (clear > 0)
+                for (i = 0; i < d->coefficients; i++) sum[i] += clear * (double)d->kernel[k * d->coefficients + i];
+        }
+        for (i = 0; i < d->coefficients; i++) job->dvr->visibility[point * d->coefficients + i] = (float)sum[i];
+        job->work[task].texels++;
+    }
+}
+
+static void isogi_dvr__add(isogi_counters *to, const isogi_counters *from) {
+    if (!to) return;
+    to->rays += from->rays, to->blocks += from->blocks, to->cells += from->cells, to->cubics += from->cubics;
+    to->texels += from->texels, to->texels_skipped += from->texels_skipped;
+    to->samples += from->samples, to->blocks_skipped += from->blocks_skipped;
+}
+
+ISOGI_API isogi_result isogi_dvr_step(isogi_dvr *dvr, uint64_t max_rays, double *remaining) {
+    isogi_dvr__step_job job;
+    isogi_result result = ISOGI_OK;
+    uint64_t points;
+    size_t start, end, i;
+    if (!dvr) return ISOGI_INVALID;
+    points = max_rays / (uint64_t)dvr->desc.directions;
+    points = points ? points : 1;
+    start = dvr->next, end = max_rays && points < dvr->point_count - start ? start + (size_t)points : dvr->point_count;
+    job.dvr = dvr;
+    job.work = (isogi_counters *)isogi_allocate(&dvr->context, ISOGI_DVR__SLAB / ISOGI_DVR__CHUNK, sizeof *job.work);
+    if (!job.work) return ISOGI_NO_MEMORY;
+    while (dvr->next < end) {
+        double span = (double)(end - start);
+        size_t tasks;
+        job.first = dvr->next, job.end = end - job.first < ISOGI_DVR__SLAB ? end : job.first + ISOGI_DVR__SLAB;
+        tasks = (job.end - job.first + ISOGI_DVR__CHUNK - 1) / ISOGI_DVR__CHUNK;
+        result = isogi_parallel(&dvr->context, tasks, isogi_dvr__step_task, &job, (double)(job.first - start) / span,
+                                (double)(job.end - start) / span);
+        if (result != ISOGI_OK) break;
+        for (i = 0; i < tasks; i++) isogi_dvr__add(&dvr->counters, &job.work[i]);
+        dvr->next = job.end;
+    }
+    isogi_release(&dvr->context, job.work, ISOGI_DVR__SLAB / ISOGI_DVR__CHUNK, sizeof *job.work);
+    if (result == ISOGI_OK && remaining) *remaining = dvr->point_count ? (double)(dvr->point_count - dvr->next) / (double)dvr->point_count : 0;
+    return result;
+}
+
+ISOGI_API isogi_result isogi_dvr_sample_visibility(const isogi_dvr *dvr, const float (*points)[3], size_t count, float *visibility) {
+    size_t i;
+    int a;
+    if (!dvr || !dvr->visibility || (count && (!points || !visibility))) return ISOGI_INVALID;
+    for (i = 0; i < count; i++) {
+        double world[3], grid[3];
+        for (a = 0; a < 3; a++) world[a] = (double)points[i][a];
+        isogi_vol_to_grid(dvr->desc.pyramid, world, grid);
+        isogi_dvr__visibility_at(dvr, grid, visibility + i * dvr->coefficients);
+    }
+    return ISOGI_OK;
+}
+
+ISOGI_API void isogi_dvr_counters(const isogi_dvr *dvr, isogi_counters *counters) {
+    if (dvr) isogi_dvr__add(counters, &dvr->counters);
+}
+
+/* ==== shading ======================================================================================================== */
+
+/* Lights divided into those that are the same everywhere and those that depend on the place. */
+typedef struct isogi_dvr__lights {
+    isogi_lighting distant, nearby;
+    isogi_light *list; /* copies: the distant ones, then the nearby ones */
+    size_t count;
+    float sh[3 * ISOGI_DVR__MAX_ORDER * ISOGI_DVR__MAX_ORDER]; /* visibility: of all distant lights; local: irradiance of the environment */
+    double mean[3];                                            /* of the environment's radiance */
+} isogi_dvr__lights;
+
+static isogi_result isogi_dvr__set_lights(isogi_dvr__lights *l, const isogi_dvr *d, const isogi_lighting *lighting) {
+    isogi_lighting environment;
+    isogi_result result;
+    size_t i, distant = 0, nearby = 0;
+    int a;
+    memset(l, 0, sizeof *l);
+    if (d->desc.shading == ISOGI_DVR_UNLIT) return ISOGI_OK;
+    result = isogi_lighting_validate(lighting);
+    if (result != ISOGI_OK) return result;
+    l->count = lighting->light_count;
+    l->list = (isogi_light *)isogi_allocate(&d->context, l->count, sizeof *l->list);
+    if (l->count && !l->list) return ISOGI_NO_MEMORY;
+    for (i = 0; i < l->count; i++) {
+        const isogi_light *light = &lighting->lights[i];
+        if (light->kind == ISOGI_LIGHT_DIRECTIONAL) l->list[distant++] = *light;
+        else l->list[l->count - ++nearby] = *light;
+    }
+    l->distant.env = lighting->env, l->distant.lights = l->list, l->distant.light_count = distant;
+    if (nearby) l->nearby.lights = l->list + distant, l->nearby.light_count = nearby;
+    if (d->desc.shading == ISOGI_DVR_VISIBILITY) return isogi_sh_project(l->sh, d->desc.order, &l->distant, NULL);
+    memset(&environment, 0, sizeof environment);
+    environment.env = lighting->env;
+    result = isogi_sh_project(l->sh, ISOGI_DVR__LOCAL_ORDER, &environment, NULL);
+    for (a = 0; a < 3; a++) l->mean[a] = (double)l->sh[a] / (2 * sqrt(ISOGI_DVR__PI));
+    if (result == ISOGI_OK) result = isogi_sh_convolve_cosine(l->sh, l->sh, ISOGI_DVR__LOCAL_ORDER, 3);
+    return result;
+}
+
+/* 1/(4 pi) L . V at a place (Kronander 2011, section 4.4). */
+static void isogi_dvr__shade_visibility(const isogi_dvr *d, const isogi_dvr__lights *l, const double grid[3], double out[3]) {
+    float v[ISOGI_DVR__MAX_ORDER * ISOGI_DVR__MAX_ORDER], nearby[3 * ISOGI_DVR__MAX_ORDER * ISOGI_DVR__MAX_ORDER];
+    size_t i;
+    int a, here = 0;
+    isogi_dvr__visibility_at(d, grid, v);
+    if (l->nearby.light_count) {
+        double world[3];
+        float point[3];
+        isogi_vol_to_world(d->desc.pyramid, grid, world);
+        for (a = 0; a < 3; a++) point[a] = (float)world[a];
+        here = isogi_sh_project(nearby, d->desc.order, &l->nearby, point) == ISOGI_OK;
+    }
+    for (a = 0; a < 3; a++) {
+        double sum = 0;
+        for (i = 0; i < d->coefficients; i++) sum += (double)(l->sh[3 * i + (size_t)a] + (here ? nearby[3 * i + (size_t)a] : 0)) * (double)v[i];
+        out[a] = isogi_dvr__clamp(sum / (4 * ISOGI_DVR__PI), 1e30);
+    }
+}
+
+/* Irradiance of a light, from its direction `to` (made a unit vector); 0 if there is none. */
+static double isogi_dvr__reach(const isogi_light *light, const double world[3], double to[3]) {
+    double length, scale = 1;
+    int a;
+    for (a = 0; a < 3; a++) to[a] = (double)light->vector[a] - (light->kind == ISOGI_LIGHT_DIRECTIONAL ? 0 : world[a]);
+    length = sqrt(isogi_dvr__dot(to, to));
+    if (!(length > 1e-30)) return 0;
+    for (a = 0; a < 3; a++) to[a] /= length;
+    if (light->kind == ISOGI_LIGHT_DIRECTIONAL) return 1;
+    if (light->kind == ISOGI_LIGHT_SPHERE && length < (double)light->radius) length = (double)light->radius; /* inside of the lamp */
+    scale = 1 / (length * length);
+    return scale < 1e30 ? scale : 0;
+}
+
+/* Diffuse, unshadowed, with the smoothed normal turned towards the eye; light from all sides where there is no normal. */
+static void isogi_dvr__shade_local(const isogi_dvr *d, const isogi_dvr__lights *l, const int cell[3], const double local[3],
+                                   const float dir[3], double out[3]) {
+    float normal[3], y[ISOGI_DVR__LOCAL_ORDER * ISOGI_DVR__LOCAL_ORDER];
+    double n[3], world[3], grid[3], facing = 0;
+    isogi_hit hit;
+    size_t i;
+    int a, flat;
+    memset(&hit, 0, sizeof hit);
+    hit.side = 1;
+    for (a = 0; a < 3; a++) hit.cell[a] = (uint32_t)cell[a], hit.local[a] = local[a], grid[a] = cell[a] + local[a];
+    isogi_vol_normals(d->desc.pyramid, &hit, 1, ISOGI_NORMAL_SMOOTH, &normal);
+    isogi_vol_to_world(d->desc.pyramid, grid, world);
+    for (a = 0; a < 3; a++) n[a] = (double)normal[a], facing += n[a] * (double)dir[a];
+    flat = !(isogi_dvr__dot(n, n) > 0.5);
+    for (a = 0; a < 3; a++) {
+        if (facing > 0) n[a] = -n[a], normal[a] = -normal[a];
+        out[a] = flat ? l->mean[a] : 0;
+    }
+    if (!flat) {
+        isogi_sh_eval(y, ISOGI_DVR__LOCAL_ORDER, (const float(*)[3])&normal, 1);
+        for (i = 0; i < ISOGI_SH_COUNT(ISOGI_DVR__LOCAL_ORDER); i++)
+            for (a = 0; a < 3; a++) out[a] += (double)(l->sh[3 * i + (size_t)a] * y[i]) / ISOGI_DVR__PI;
+    }
+    for (i = 0; i < l->count; i++) {
+        double to[3], irradiance = isogi_dvr__reach(&l->list[i], world, to), cosine = isogi_dvr__dot(to, n);
+        for (a = 0; a < 3; a++)
+            out[a] += (double)l->list[i].rgb[a] * irradiance * (flat ? 0.25 : isogi_dvr__clamp(cosine, 1)) / ISOGI_DVR__PI;
+    }
+    for (a = 0; a < 3; a++) out[a] = isogi_dvr__clamp(out[a], 1e30);
+}
+
+/* ==== compositing ==================================================================================================== */
+
+typedef struct isogi_dvr__pixel_ray {
+    const isogi_dvr *dvr;
+    const isogi_dvr__lights *lights;
+    float dir[3];
+    double clear, rgb[3]; /* transmittance and premultiplied colour so far */
+    double end;           /* transmittance at which the ray ends */
+    int probe;            /* 1: no colour; where does the transmittance pass `end`? */
+    double t;             /* the answer, in the march's t */
+} isogi_dvr__pixel_ray;
+
+/* Colour as it leaves a place towards the eye, from the transfer function's. */
+static void isogi_dvr__shade(const isogi_dvr__pixel_ray *r, const int cell[3], const double local[3], double rgb[3]) {
+    double light[3], grid[3];
+    int a;
+    if (r->dvr->desc.shading == ISOGI_DVR_UNLIT) return;
+    for (a = 0; a < 3; a++) grid[a] = cell[a] + local[a];
+    if (r->dvr->desc.shading == ISOGI_DVR_VISIBILITY) isogi_dvr__shade_visibility(r->dvr, r->lights, grid, light);
+    else isogi_dvr__shade_local(r->dvr, r->lights, cell, local, r->dir, light);
+    for (a = 0; a < 3; a++) rgb[a] *= light[a];
+}
+
+static void isogi_dvr__composite(isogi_dvr__pixel_ray *r, double opacity, const double rgb[3]) {
+    int a;
+    if (!r->probe)
+        for (a = 0; a < 3; a++) r->rgb[a] += r->clear * opacity * rgb[a];
+}
+
+/* The part from..to of a sample's piece of ray: the medium is homogeneous there. */
+static void isogi_dvr__composite_part(isogi_dvr__pixel_ray *r, const isogi_dvr__sample *s, double from, double to, const double rgb[3]) {
+    double depth = s->depth * ((to - from) / (s->to - s->from));
+    double clear = r->clear * exp(-depth);
+    isogi_dvr__composite(r, -expm1(-depth), rgb);
+    if (r->probe && r->clear > r->end && clear <= r->end) r->t = from + (to - from) * isogi_dvr__clamp(log(r->clear / r->end) / depth, 1);
+    r->clear = clear;
+}
+
+static void isogi_dvr__composite_crossing(isogi_dvr__pixel_ray *r, isogi_dvr__crossings *c, size_t i) {
+    const isogi_peak *peak = &r->dvr->transfer.peaks[i];
+    const isogi_hit *hit = &c->hit[i];
+    double rgb[3];
+    int cell[3], a;
+    for (a = 0; a < 3; a++) rgb[a] = (double)peak->rgb[a], cell[a] = (int)hit->cell[a];
+    if (!r->probe) isogi_dvr__shade(r, cell, hit->local, rgb);
+    isogi_dvr__composite(r, (double)peak->opacity, rgb);
+    if (r->clear > r->end) r->t = c->t[i];
+    r->clear *= 1 - (double)peak->opacity;
+    isogi_dvr__pass_crossing(c, i);
+}
+
+/* Front to back (Kraus 2005, eq. 5): every crossing in its place, dividing the sample's piece in which it lies. */
+static void isogi_dvr__cast(isogi_dvr__pixel_ray *r, isogi_dvr__march *m, isogi_dvr__crossings *c) {
+    isogi_dvr__sample s;
+    size_t i;
+    while (r->clear > r->end && isogi_dvr__next(m, &s)) {
+        double rgb[3] = {0, 0, 0};
+        while (r->clear > r->end && (i = isogi_dvr__first_crossing(c, s.from)) < c->count) isogi_dvr__composite_crossing(r, c, i);
+        if (!(r->clear > r->end)) break;
+        if (!r->probe) {
+            isogi_dvr__colour(r->dvr->transfer.points, r->dvr->transfer.point_count, s.value, rgb);
+            isogi_dvr__shade(r, s.cell, s.local, rgb);
+        }
+        {
+            double from = s.from;
+            while (r->clear > r->end && (i = isogi_dvr__first_crossing(c, s.to)) < c->count) {
+                isogi_dvr__composite_part(r, &s, from, c->t[i], rgb);
+                from = c->t[i];
+                if (r->clear > r->end) isogi_dvr__composite_crossing(r, c, i);
+            }
+            if (r->clear > r->end) isogi_dvr__composite_part(r, &s, from, s.to, rgb);
+        }
+    }
+    while (r->clear > r->end && (i = isogi_dvr__first_crossing(c, 1e300)) < c->count) isogi_dvr__composite_crossing(r, c, i);
+}
+
+/* ==== pictures ======================================================================================================= */
+
+static int isogi_dvr__unit(double v[3]) {
+    double length = sqrt(isogi_dvr__dot(v, v));
+    int a;
+    if (!(length > 1e-30) || !(length < 1e30)) return 0;
+    for (a = 0; a < 3; a++) v[a] /= length;
+    return 1;
+}
+
+static void isogi_dvr__cross(const double a[3], const double b[3], double out[3]) {
+    out[0] = a[1] * b[2] - a[2] * b[1], out[1] = a[2] * b[0] - a[0] * b[2], out[2] = a[0] * b[1] - a[1] * b[0];
+}
+
+ISOGI_API void isogi_view_ray(const isogi_view *view, double x, double y, double origin[3], float dir[3]) {
+    double forward[3], up[3], right[3], d[3], fov = view->fov > 0 ? (double)view->fov : 45, across, down, half;
+    int a, given = 0;
+    for (a = 0; a < 3; a++) {
+        origin[a] = (double)view->eye[a];
+        forward[a] = (double)view->target[a] - (double)view->eye[a], up[a] = (double)view->up[a];
+        given |= view->up[a] > 0 || view->up[a] < 0;
+    }
+    if (!given) up[1] = 1;
+    if (!isogi_dvr__unit(forward)) forward[0] = forward[1] = 0, forward[2] = -1;
+    isogi_dvr__unit(up);
+    isogi_dvr__cross(forward, up, right);
+    if (!(isogi_dvr__dot(right, right) > 1e-12)) {
+        /* along the line of sight: the axis that is farthest from it */
+        int axis = fabs(forward[1]) < 0.8 ? 1 : 2;
+        for (a = 0; a < 3; a++) up[a] = a == axis;
+        isogi_dvr__cross(forward, up, right);
+    }
+    isogi_dvr__unit(right);
+    isogi_dvr__cross(right, forward, up);
+    half = tan(fov * (ISOGI_DVR__PI / 360));
+    across = (2 * (x + 0.5) - view->width) / view->height * half;
+    down = (2 * (y + 0.5) / view->height - 1) * half;
+    for (a = 0; a < 3; a++) d[a] = forward[a] + across * right[a] - down * up[a];
+    if (!isogi_dvr__unit(d)) memcpy(d, forward, sizeof d);
+    for (a = 0; a < 3; a++) dir[a] = (float)d[a];
+}
+
+static isogi_result isogi_dvr__check_view(const isogi_view *view) {
+    int a, same = 1;
+    if (!view || view->width < 1 || view->height < 1) return ISOGI_INVALID;
+    if (view->width > 32768 || view->height > 32768) return ISOGI_TOO_LARGE;
+    if (!isogi_dvr__finite3(view->eye) || !isogi_dvr__finite3(view->target) || !isogi_dvr__finite3(view->up)) return ISOGI_INVALID;
+    if (!isogi_dvr__finite32(view->fov) || !(view->fov >= 0 && view->fov < 180)) return ISOGI_INVALID;
+    for (a = 0; a < 3; a++) same = same && view->eye[a] >= view->target[a] && view->eye[a] <= view->target[a];
+    return same ? ISOGI_INVALID : ISOGI_OK;
+}
+
+typedef struct isogi_dvr__render_job {
+    const isogi_dvr *dvr;
+    const isogi_view *view;
+    isogi_dvr__lights lights;
+    size_t across, tiles;
+    float *pixels; /* [height*width][5]: colour, opacity, depth */
+    int depth;     /* wanted */
+    isogi_counters *work;
+} isogi_dvr__render_job;
+
+static void isogi_dvr__render_pixel(const isogi_dvr__render_job *job, int x, int y, isogi_dvr__crossings *crossings, isogi_counters *work) {
+    const isogi_dvr *d = job->dvr;
+    float *out = job->pixels + 5 * ((size_t)y * (size_t)job->view->width + (size_t)x);
+    double origin[3], world[3], grid[3], dir[3], speed;
+    isogi_dvr__pixel_ray ray;
+    isogi_dvr__march march, again;
+    int a;
+    for (a = 0; a < 4; a++) out[a] = 0;
+    out[4] = HUGE_VALF;
+    work->rays++;
+    memset(&ray, 0, sizeof ray);
+    isogi_view_ray(job->view, x, y, origin, ray.dir);
+    for (a = 0; a < 3; a++) world[a] = (double)ray.dir[a];
+    speed = sqrt(isogi_dvr__dot(world, world));
+    isogi_dvr__transform(d->to_grid, world, dir);
+    isogi_vol_to_grid(d->desc.pyramid, origin, grid);
+    if (!isogi_dvr__begin(&march, d, grid, dir, speed, d->desc.step)) return;
+    again = march;
+    ray.dvr = d, ray.lights = &job->lights, ray.clear = 1, ray.end = 1 - (double)d->desc.opaque;
+    isogi_dvr__begin_crossings(crossings, d, origin, ray.dir, march.enter);
+    isogi_dvr__cast(&ray, &march, crossings);
+    for (a = 0; a < 3; a++) out[a] = (float)ray.rgb[a];
+    out[3] = (float)(1 - ray.clear);
+    isogi_dvr__add(work, &march.work), isogi_dvr__add(work, &crossings->work);
+    if (!job->depth || !(ray.clear < 1)) return;
+    /* once more, without colours, to where half of the final opacity is reached */
+    ray.probe = 1, ray.end = 1 - 0.5 * (1 - ray.clear), ray.clear = 1;
+    isogi_dvr__begin_crossings(crossings, d, origin, ray.dir, march.enter);
+    isogi_dvr__cast(&ray, &again, crossings);
+    out[4] = (float)((again.enter + ray.t) * speed);
+}
+
+static void isogi_dvr__render_task(void *arg, size_t tile) {
+    const isogi_dvr__render_job *job = (const isogi_dvr__render_job *)arg;
+    int x0 = (int)(tile % job->across) * ISOGI_DVR__TILE, y0 = (int)(tile / job->across) * ISOGI_DVR__TILE, x, y;
+    isogi_dvr__crossings crossings;
+    isogi_counters work;
+    memset(&work, 0, sizeof work);
+    for (y = y0; y < y0 + ISOGI_DVR__TILE && y < job->view->height; y++)
+        for (x = x0; x < x0 + ISOGI_DVR__TILE && x < job->view->width; x++) isogi_dvr__render_pixel(job, x, y, &crossings, &work);
+    job->work[tile] = work;
+}
+
+/* The picture is finished in memory of its own: a cancelled call leaves its outputs as they were. */
+ISOGI_API isogi_result isogi_dvr_render(const isogi_dvr *dvr, const isogi_view *view, const isogi_lighting *lighting,
+                                        float (*premultiplied)[4], float *depth, isogi_counters *counters) {
+    isogi_dvr__render_job job;
+    isogi_result result = isogi_dvr__check_view(view);
+    size_t pixels, i;
+    if (!dvr || !premultiplied) return ISOGI_INVALID;
+    if (result != ISOGI_OK) return result;
+    memset(&job, 0, sizeof job);
+    pixels = (size_t)view->width * (size_t)view->height;
+    job.dvr = dvr, job.view = view, job.depth = depth != NULL;
+    job.across = ((size_t)view->width + ISOGI_DVR__TILE - 1) / ISOGI_DVR__TILE;
+    job.tiles = job.across * (((size_t)view->height + ISOGI_DVR__TILE - 1) / ISOGI_DVR__TILE);
+    result = isogi_dvr__set_lights(&job.lights, dvr, lighting);
+    if (result == ISOGI_OK) {
+        job.pixels = (float *)isogi_allocate(&dvr->context, pixels, 5 * sizeof *job.pixels);
+        job.work = (isogi_counters *)isogi_allocate(&dvr->context, job.tiles, sizeof *job.work);
+        if (!job.pixels || !job.work) result = ISOGI_NO_MEMORY;
+    }
+    if (result == ISOGI_OK) result = isogi_parallel(&dvr->context, job.tiles, isogi_dvr__render_task, &job, 0, 1);
+    for (i = 0; result == ISOGI_OK && i < pixels; i++) {
+        memcpy(premultiplied[i], job.pixels + 5 * i, 4 * sizeof(float));
+        if (depth) depth[i] = job.pixels[5 * i + 4];
+    }
+    for (i = 0; result == ISOGI_OK && i < job.tiles; i++) {
+        job.work[i].texels = 0;
+        isogi_dvr__add(counters, &job.work[i]);
+    }
+    isogi_release(&dvr->context, job.pixels, pixels, 5 * sizeof *job.pixels);
+    isogi_release(&dvr->context, job.work, job.tiles, sizeof *job.work);
+    isogi_release(&dvr->context, job.lights.list, job.lights.count, sizeof *job.lights.list);
+    return result;
+}
+
+#undef ISOGI_DVR__PI
+#undef ISOGI_DVR__LEVELS
+#undef ISOGI_DVR__MAX_ORDER
+#undef ISOGI_DVR__LOCAL_ORDER
+#undef ISOGI_DVR__MAX_SAMPLES
+#undef ISOGI_DVR__NEGLIGIBLE
+#undef ISOGI_DVR__TILE
+#undef ISOGI_DVR__CHUNK
+#undef ISOGI_DVR__SLAB
+#endif /* implementation */
+
+/* Licence: MIT.
+
+   Permission is hereby granted, free of charge, to any person obtaining a copy of this software and associated documentation files
+   (the "Software"), to deal in the Software without restriction, including without limitation the rights to use, copy, modify,
+   merge, publish, distribute, sublicense, and/or sell copies of the Software, and to permit persons to whom the Software is
+   furnished to do so, subject to the following conditions: the above copyright notice and this permission notice shall be included
+   in all copies or substantial portions of the Software.
+
+   THE SOFTWARE IS PROVIDED "AS IS", WITHOUT WARRANTY OF ANY KIND, EXPRESS OR IMPLIED, INCLUDING BUT NOT LIMITED TO THE WARRANTIES
+   OF MERCHANTABILITY, FITNESS FOR A PARTICULAR PURPOSE AND NONINFRINGEMENT. IN NO EVENT SHALL THE AUTHORS OR COPYRIGHT HOLDERS BE
+   LIABLE FOR ANY CLAIM, DAMAGES OR OTHER LIABILITY, WHETHER IN AN ACTION OF CONTRACT, TORT OR OTHERWISE, ARISING FROM, OUT OF OR IN
+   CONNECTION WITH THE SOFTWARE OR THE USE OR OTHER DEALINGS IN THE SOFTWARE. */
