@@ -1,6 +1,94 @@
-/* isogi_trace.h - path-traced illumination textures for isosurfaces, for C and C++   (part of isogi; with isogi_sh.h, isogi_vol.h)
+/* isogi_trace.h - path-traced illumination textures for isosurfaces, for C and C++
 
-   (The helper text of this header is written with its implementation.)
+   Quick start
+
+       #define ISOGI_IMPLEMENTATION
+       #include "isogi_trace.h"
+       #include <stdio.h>
+
+       int main(void) {
+           static float data[32][32][32], y0[3] = {3.5449f, 3.5449f, 3.5449f}, point[1][3] = {{16, 8, 16}}, light[1][3];
+           for (int i = 0; i < 32768; i++) data[i / 1024][i / 32 % 32][i % 32] = -fabsf((float)(i / 32 % 32) - 16); // a slab
+           isogi_volume volume = {.data = data, .type = ISOGI_F32, .size = {32, 32, 32}};
+           isogi_pyramid *pyramid = NULL;
+           isogi_trace *trace = NULL;
+           isogi_vol_build(&pyramid, &volume, NULL);
+           isogi_trace_desc desc = {.pyramid = pyramid, .lighting.env = {.sh = y0, .sh_order = 1}, .albedo = {0.7f, 0.7f, 0.7f}};
+           if (isogi_trace_create(&trace, &desc, NULL) != ISOGI_OK || isogi_trace_step(trace, 0, NULL) != ISOGI_OK) return 1;
+           isogi_trace_sample(trace, point, 1, light, NULL), printf("E = %g, pi\n", light[0][0]); // an open sky of radiance 1
+       }
+
+   What it does
+
+   - Computes global illumination of isosurfaces, once, for all isovalues: every texel of a 3D lattice holds the light on the
+     isosurface that passes through it (Wyman, Parker, Shirley and Hansen 2006). To light a picture, look the texture up where the
+     isosurface is seen: radiance = albedo * irradiance / pi. Moving the isovalue or the camera needs no new rays.
+   - ISOGI_TRACE_IRRADIANCE: RGB irradiance by an environment (image, spherical harmonics, or both), directional lights with or
+     without an angular size, point and sphere lights; shadows, and any number of diffuse reflections.
+   - ISOGI_TRACE_TRANSFER: radiance transfer in spherical harmonics; distant light may then turn and change without new rays.
+   - Bakes the whole lattice, the part that an interval of isovalues reads, or lazily what lookups ask for; in steps of a number of
+     rays, on all cores, with progress and cancel.
+   - Without a lattice: isogi_trace_gather lights a user's own points, such as the vertices of a mesh.
+
+   What it does NOT do
+
+   - No pictures: it tells the light at points that you found by isogi_vol_intersect or on a mesh.
+   - No gloss, no transparency, no participating media: surfaces are opaque and diffuse.
+   - No light that the isosurface itself emits, no lights within the environment nearer than infinity.
+
+   How to use it
+
+     irradiance at surface points    request (if lazy), step until remaining is 0, sample
+     keep a window alive             step(trace, rays that fit a frame, &remaining), sample: what is done so far can be shown
+     how good is it                  the error of isogi_trace_sample: standard error of luminance; it falls as 1 / sqrt(samples)
+     sharper shadows                 a finer lattice (desc.lattice); coarser ones are cheaper by the cube
+     a texture that is too dark in grooves   more bounces: each adds one reflection, -1 all of them
+
+   What a texel means
+
+     Place and isovalue     texel (i,j,k) lies at lattice_min + (lattice_max - lattice_min) * i / (lattice - 1), in grid coordinates;
+                            its isovalue v is the trilinear value there: it lies on its own isosurface.
+     Normal                 of the smoothed (B-spline) or the trilinear field there, desc.normals, towards lower values.
+     Start of rays          desc.offset voxels along the normal; where the trilinear field is still inside there, twice and four times
+                            as far, up to one voxel; where that fails, on the surface itself. A ray that then goes into matter counts
+                            as reflected where it starts.
+     Validity               A texel is left out of every lookup where no surface passes at its place: none of the voxels of the cells
+                            around it is lower than v (constant air, local minima: there f >= v all around, such a texel would see the
+                            sky through everything), where a voxel is not finite, or where the gradient vanishes. With desc.capped the
+                            border's texels, which face out of the box, are always valid.
+     Lookup                 Trilinear among the eight texels around the point, those that are valid; their weights are made to sum to
+                            1 again. So an invalid texel neither darkens nor brightens its neighbours. Where none of the eight is
+                            valid, the nearest valid one of the 4x4x4 around it is taken; a point without even that has zero light.
+
+   How light is gathered
+
+     E = integral of L (n.w) dw over the hemisphere: paths start in cosine-distributed directions (a scrambled Sobol sequence) and
+     are reflected at every hit by the albedo at the isovalue. A path that leaves brings the environment; at each of its vertices
+     every light is tried by a shadow ray, and an image with bright spots by a direction drawn by its brightness, weighed against the
+     cosine (balance heuristic). Vertices are hits on the exact trilinear surface, left without an epsilon. There the hemisphere is
+     that of the normal of desc.normals, its part below the trilinear surface mirrored up: no ray enters matter, and no energy is
+     lost (a white surface under a white sky stays white). bounces = -1: Russian roulette from the third reflection on.
+     A hit from within (only through an open border can a ray get there) is a surface too, with its normal turned.
+
+   Options, to be defined before the implementation
+
+   - ISOGI_IMPLEMENTATION         implements every isogi header that the file includes
+   - ISOGI_TRACE_IMPLEMENTATION   implements this one alone
+   - ISOGI_NO_THREADS, ISOGI_API  as in isogi_vol.h
+
+   Memory       Through the context. Bricks of 4x4x4 texels, only where texels are wanted: 16 bytes for a texel of irradiance,
+                4 + 4 order^2 channels for one of transfer; 8 bytes for every brick of the whole lattice, and 250 KB.
+                Any allocation may fail: the call says ISOGI_NO_MEMORY, the texture stays as it was and can go on.
+                Stack use stays below 32 KB.
+   Threads      Rays run on the context's threads. isogi_trace_sample and the other readers may run in any number of threads at a
+                time; request, step and relight alone, without readers.
+   Determinism  A texel's light depends on the description and its place alone: all bits are the same for any number of threads, any
+                budget of steps, lazily or fully, in any order of requests.
+   Limits       Order 6; 2^24 samples; paths end after 10000 reflections. White surfaces that enclose a light truly have infinite
+                light: what is computed then is finite and has no meaning, its error says so.
+   Cost         samples * (1 + lights that have a size) rays for a texel, and as many for each reflection.
+
+   History  1.0  first release
 */
 #ifndef ISOGI_TRACE_H
 #define ISOGI_TRACE_H
@@ -27,8 +115,9 @@ typedef struct isogi_trace_desc {
     isogi_lighting lighting;   /* IRRADIANCE: what is baked. TRANSFER: unused while baking; see isogi_trace_relight */
     isogi_trace_mode mode;
     int order;                 /* TRANSFER: 1..6; 0 = 5 */
-    size_t lattice[3];         /* texels along x, y, z; 0 = as many as voxels along that axis */
-    double lattice_min[3], lattice_max[3]; /* grid coordinates (voxels) of the first and last texel; both all zero = the whole volume */
+    size_t lattice[3];         /* texels along x, y, z; 0 = one per voxel along that axis */
+    double lattice_min[3], lattice_max[3]; /* grid coordinates (voxels) of the first and last texel, within the volume; all zero =
+                                              the whole volume */
     float albedo[3];           /* diffuse RGB reflectance, 0..1 */
     const isogi_albedo_point *albedo_points; /* piecewise linear in the isovalue, constant beyond its ends; multiplied into albedo
                                                 only if albedo is not all zero, else used alone */
@@ -36,10 +125,10 @@ typedef struct isogi_trace_desc {
     int bounces;               /* 0 = light that arrives directly; n = up to n reflections; -1 = all (Russian roulette) */
     int samples;               /* paths per texel; 0 = 64 */
     uint64_t seed;
-    float offset;              /* rays start this many voxels along the normal; 0 = the default of 0.25; negative = on the surface itself */
+    float offset;              /* rays start this many voxels along the normal, up to 16; 0 = the default of 0.25; negative = on the surface itself */
     isogi_normal_kind normals; /* of the hemisphere that is integrated over */
     double isovalue_min, isovalue_max; /* only texels that a surface within this interval reads; both 0 = all */
-    int lazy;                  /* non-zero: only texels that were requested */
+    int lazy;                  /* non-zero: only texels that were requested (and that the interval, if there is one, reads) */
     int capped;                /* non-zero: the volume's border closes the surface (ISOGI_RAY_CAPPED) */
     int transfer_channels;     /* TRANSFER: 1 = one set of coefficients (grey albedo, the mean), 3 = one per RGB; 0 = 3 if albedo is coloured, else 1 */
 } isogi_trace_desc;
@@ -52,34 +141,1620 @@ typedef struct isogi_trace isogi_trace;
 ISOGI_API isogi_result isogi_trace_create(isogi_trace **trace, const isogi_trace_desc *desc, const isogi_context *context);
 ISOGI_API void isogi_trace_free(isogi_trace *trace);
 
-/* Asks for the texels that isogi_trace_sample reads at these world points. Needed when desc.lazy; else a no-op. */
+/* Asks for the texels that isogi_trace_sample reads at these world points. Needed when desc.lazy; else a no-op. On failure some of
+   the points have been asked for. */
 ISOGI_API isogi_result isogi_trace_request(isogi_trace *trace, const float (*points)[3], size_t count);
 
-/* Works until about max_rays rays are traced (0 = to the end). *remaining (may be NULL): fraction of the work asked for that is
-   still to do, 0 = finished. The only writer: not at the same time as any other call on this texture. */
+/* Works until about max_rays rays are traced (0 = to the end), whole texels, at least one. *remaining (may be NULL): fraction of the
+   texels asked for that are still to do, 0 = finished; it never rises but by a request. ISOGI_CANCELLED and ISOGI_NO_MEMORY leave a
+   texture that can be read and stepped on. Not at the same time as any other call on this texture. */
 ISOGI_API isogi_result isogi_trace_step(isogi_trace *trace, uint64_t max_rays, double *remaining);
 
 /* Trilinear lookup among the texels that are valid and computed. irradiance[count] (RGB); error[count]: standard error of its
-   luminance, NULL = not wanted; a point none of whose texels is ready gets the zero vector and error = INFINITY.
-   TRANSFER: under the lighting last given to isogi_trace_relight (that of the description at first). */
+   luminance, NULL = not wanted; a point none of whose texels is ready gets the zero vector and error = INFINITY (so does the error
+   of a single sample, which is not known). Points beyond the lattice are moved to its border.
+   TRANSFER: under the lighting last given to isogi_trace_relight (that of the description at first); the error is that under a
+   uniform sky of the lighting's mean radiance. */
 ISOGI_API isogi_result isogi_trace_sample(const isogi_trace *trace, const float (*points)[3], size_t count, float (*irradiance)[3],
                                           float *error);
 /* TRANSFER only: a new distant lighting (environment and directional lights; point lights are ISOGI_INVALID). No rays. */
 ISOGI_API isogi_result isogi_trace_relight(isogi_trace *trace, const isogi_lighting *lighting);
 /* TRANSFER only: interpolated coefficients, transfer[count][order*order][channels]; E = sum_i transfer_i light_i. */
 ISOGI_API isogi_result isogi_trace_sample_transfer(const isogi_trace *trace, const float (*points)[3], size_t count, float *transfer);
+/* Texels along each axis, order (0 for IRRADIANCE), channels (3 for IRRADIANCE). Any of them may be NULL. */
 ISOGI_API void isogi_trace_shape(const isogi_trace *trace, size_t lattice[3], int *order, int *channels);
 
 /* Albedo at an isovalue, as the description defines it. */
 ISOGI_API void isogi_trace_albedo(const isogi_trace_desc *desc, double isovalue, float rgb[3]);
 
 /* No lattice: irradiance at a user's own world points, each on the isosurface through it, with a unit normal each (NULL = as
-   desc.normals says). Uses samples, bounces, seed, offset, albedo, lighting of the description. */
+   desc.normals says). Uses samples, bounces, seed, offset, normals, capped, albedo and lighting of the description; its mode must be
+   IRRADIANCE. A point that is not finite or has no normal gets the zero vector and error = INFINITY. error may be NULL. */
 ISOGI_API isogi_result isogi_trace_gather(const isogi_trace_desc *desc, const float (*points)[3], const float (*normals)[3], size_t count,
                                           float (*irradiance)[3], float *error, const isogi_context *context);
 
-/* 1 where the texel has an isosurface of its own, 0 where it has none and is left out of every lookup. texel < lattice. */
+/* 1 where the texel lies on an isosurface of its own, 0 where there is none and it is left out of every lookup. */
 ISOGI_API int isogi_trace_valid(const isogi_trace *trace, const size_t texel[3]);
 ISOGI_API void isogi_trace_counters(const isogi_trace *trace, isogi_counters *counters); /* adds what was done so far */
 
 #endif /* ISOGI_TRACE_H */
+
+/* ==================================================================================================================== */
+#if (defined(ISOGI_IMPLEMENTATION) || defined(ISOGI_TRACE_IMPLEMENTATION)) && !defined(ISOGI_TRACE_IMPLEMENTED)
+#define ISOGI_TRACE_IMPLEMENTED
+
+#include <float.h>
+#include <math.h>
+#include <string.h>
+
+#define ISOGI_TRACE__PI 3.14159265358979323846
+#define ISOGI_TRACE__SIDE 4          /* texels along a brick */
+#define ISOGI_TRACE__TEXELS 64       /* in a brick */
+#define ISOGI_TRACE__WAVE 32         /* paths that are traced together */
+#define ISOGI_TRACE__TASK 4          /* texels in a task */
+#define ISOGI_TRACE__BATCH 4096      /* texels in one parallel run */
+#define ISOGI_TRACE__MAX_DEPTH 10000 /* of a path, so that nothing hangs */
+#define ISOGI_TRACE__MAX_ORDER 6
+#define ISOGI_TRACE__NOT_READY HUGE_VALF
+
+/* ==== numbers that survive -ffast-math =============================================================================== */
+
+static int isogi_trace__finite(double x) {
+    uint64_t bits;
+    memcpy(&bits, &x, sizeof bits);
+    return (bits & 0x7ff0000000000000u) != 0x7ff0000000000000u;
+}
+
+static int isogi_trace__finite3(const double v[3]) {
+    return isogi_trace__finite(v[0]) && isogi_trace__finite(v[1]) && isogi_trace__finite(v[2]);
+}
+
+static int isogi_trace__zero(double x) { return x >= 0 && x <= 0; }
+
+/* Into [0, high]; NaN gives 0. */
+static double isogi_trace__clamp(double x, double high) {
+    x = x > 0 ? x : 0;
+    return x < high ? x : high;
+}
+
+static double isogi_trace__dot(const float a[3], const float b[3]) {
+    return (double)a[0] * (double)b[0] + (double)a[1] * (double)b[1] + (double)a[2] * (double)b[2];
+}
+
+static double isogi_trace__luminance(const double rgb[3]) { return 0.2126 * rgb[0] + 0.7152 * rgb[1] + 0.0722 * rgb[2]; }
+
+/* ==== random numbers ================================================================================================= */
+
+/* Every number is a function of (seed, texel, sample, dimension) alone: that is what makes a texel's light independent of threads,
+   order and slicing. The mixer is the finaliser of splitmix64 (Steele, Lea and Flood 2014). */
+static uint64_t isogi_trace__mix(uint64_t z) {
+    z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9u;
+    z = (z ^ (z >> 27)) * 0x94d049bb133111ebu;
+    return z ^ (z >> 31);
+}
+
+static uint64_t isogi_trace__key(uint64_t key, uint64_t index) {
+    return isogi_trace__mix(key + (index + 1) * 0x9e3779b97f4a7c15u);
+}
+
+static double isogi_trace__unit(uint64_t bits) { return (double)(bits >> 11) * (1.0 / 9007199254740992.0); }
+
+/* What a path's random numbers are for; a vertex at `depth` uses dimension depth * DIMENSIONS + purpose. */
+enum {
+    ISOGI_TRACE__DIRECTION = 0, /* and 1 */
+    ISOGI_TRACE__ROULETTE = 2,
+    ISOGI_TRACE__ENVIRONMENT = 3, /* and 4, 5 */
+    ISOGI_TRACE__LIGHT = 6,       /* and on: two for each light, by a second key */
+    ISOGI_TRACE__DIMENSIONS = 8
+};
+
+static double isogi_trace__random(uint64_t key, int depth, int purpose) {
+    return isogi_trace__unit(isogi_trace__key(key, (uint64_t)depth * ISOGI_TRACE__DIMENSIONS + (uint64_t)purpose));
+}
+
+static uint32_t isogi_trace__reverse(uint32_t x) {
+    x = (x >> 16) | (x << 16);
+    x = ((x & 0xff00ff00u) >> 8) | ((x & 0x00ff00ffu) << 8);
+    x = ((x & 0xf0f0f0f0u) >> 4) | ((x & 0x0f0f0f0fu) << 4);
+    x = ((x & 0xccccccccu) >> 2) | ((x & 0x33333333u) << 2);
+    return ((x & 0xaaaaaaaau) >> 1) | ((x & 0x55555555u) << 1);
+}
+
+/* A nested scramble: in the bit-reversed number, additions, odd factors and x ^= x * even let a bit depend on lower ones only, so
+   the points stay a (0,2)-net; the addition alone makes each of them uniformly distributed over the keys. */
+static double isogi_trace__scramble(uint32_t bits, uint64_t key) {
+    uint32_t x = isogi_trace__reverse(bits);
+    x += (uint32_t)key;
+    x *= (uint32_t)(key >> 32) | 1u;
+    x ^= x * 0x9d5fc2b2u;
+    x += (uint32_t)(key >> 16);
+    x ^= x * 0x3c6ef372u;
+    x *= (uint32_t)(key >> 24) | 1u;
+    x ^= x * 0xa54ff53au;
+    return (double)isogi_trace__reverse(x) * (1.0 / 4294967296.0);
+}
+
+/* Point `index` of the two-dimensional Sobol sequence, scrambled by the texel's key: the directions of a texel's first rays. */
+static void isogi_trace__sobol(uint64_t texel, uint32_t index, double u[2]) {
+    uint32_t second = 0, column = 0x80000000u, i;
+    for (i = index; i; i >>= 1, column ^= column >> 1)
+        if (i & 1) second ^= column;
+    u[0] = isogi_trace__scramble(isogi_trace__reverse(index), isogi_trace__key(texel, 0x5eed0));
+    u[1] = isogi_trace__scramble(second, isogi_trace__key(texel, 0x5eed1));
+}
+
+/* ==== directions ===================================================================================================== */
+
+/* Two unit vectors that make an orthonormal basis with the unit vector n. */
+static void isogi_trace__basis(const float n[3], double a[3], double b[3]) {
+    double x = (double)n[0], y = (double)n[1], z = (double)n[2], s;
+    if (fabs(x) > fabs(y)) s = 1 / sqrt(x * x + z * z), a[0] = -z * s, a[1] = 0, a[2] = x * s;
+    else s = 1 / sqrt(y * y + z * z), a[0] = 0, a[1] = z * s, a[2] = -y * s;
+    b[0] = y * a[2] - z * a[1], b[1] = z * a[0] - x * a[2], b[2] = x * a[1] - y * a[0];
+}
+
+/* The direction at angle theta from n, given as cos and sin, and at azimuth 2 pi u. */
+static void isogi_trace__around(const float n[3], double cosine, double sine, double u, float dir[3]) {
+    double a[3], b[3], x = sine * cos(2 * ISOGI_TRACE__PI * u), y = sine * sin(2 * ISOGI_TRACE__PI * u);
+    int i;
+    isogi_trace__basis(n, a, b);
+    for (i = 0; i < 3; i++) dir[i] = (float)(x * a[i] + y * b[i] + cosine * (double)n[i]);
+}
+
+static void isogi_trace__cosine(const float n[3], double u, double v, float dir[3]) {
+    isogi_trace__around(n, sqrt(1 - u), sqrt(u), v, dir);
+}
+
+/* ==== surface normals that light may use ============================================================================= */
+
+/* At a hit, directions are drawn about the shading normal s (smoothed) while matter begins at the geometric one g (of the trilinear
+   field). Those below g are mirrored to above it: every ray leaves into the open, nothing leaks, and no energy is lost, so that a
+   white furnace stays white. The density of what results is the kernel below, which lights use as well, so that both agree. */
+static void isogi_trace__mirror(const float g[3], float dir[3]) {
+    double below = isogi_trace__dot(g, dir);
+    int i;
+    if (below >= 0) return;
+    for (i = 0; i < 3; i++) dir[i] = (float)((double)dir[i] - 2 * below * (double)g[i]);
+}
+
+/* pi times the density of mirrored cosine-distributed directions; it takes the place of the clamped cosine. */
+static double isogi_trace__kernel(const float s[3], const float g[3], const float dir[3]) {
+    double cosine = isogi_trace__dot(s, dir), above = isogi_trace__dot(g, dir), mirrored;
+    if (!(above > 0)) return 0;
+    mirrored = cosine - 2 * above * isogi_trace__dot(g, s);
+    return (cosine > 0 ? cosine : 0) + (mirrored > 0 ? mirrored : 0);
+}
+
+/* Geometric and shading normals at hits, on the side that the path came from (+1: the low side). */
+static void isogi_trace__normals(const isogi_pyramid *pyramid, isogi_normal_kind kind, const isogi_hit *hits, const signed char *from,
+                                 size_t count, float (*s)[3], float (*g)[3]) {
+    size_t i;
+    int a;
+    isogi_vol_normals(pyramid, hits, count, ISOGI_NORMAL_TRILINEAR, g);
+    if (kind == ISOGI_NORMAL_SMOOTH) isogi_vol_normals(pyramid, hits, count, ISOGI_NORMAL_SMOOTH, s);
+    for (i = 0; i < count; i++) {
+        if (!(isogi_trace__dot(g[i], g[i]) > 0)) {
+            /* no gradient: any plane serves, the smoothed one if there is one */
+            if (kind == ISOGI_NORMAL_SMOOTH) memcpy(g[i], s[i], sizeof g[i]);
+            if (!(isogi_trace__dot(g[i], g[i]) > 0)) g[i][0] = 0, g[i][1] = 1, g[i][2] = 0;
+        }
+        if (kind != ISOGI_NORMAL_SMOOTH || !(isogi_trace__dot(s[i], g[i]) > 0)) memcpy(s[i], g[i], sizeof s[i]);
+        for (a = 0; a < 3 && from[i] < 0; a++) s[i][a] = -s[i][a], g[i][a] = -g[i][a];
+    }
+}
+
+/* ==== environment image: directions by brightness ==================================================================== */
+
+/* Piecewise constant over the image's pixels: density = mean luminance of the pixel (of the bilinear radiance, hence the weights
+   1/8 6/8 1/8) / total. Rows and pixels are found in cumulative sums. */
+typedef struct isogi_trace__sky {
+    const isogi_env *env;
+    int on;         /* whether directions are drawn from it */
+    double total;   /* integral of luminance over the sphere */
+    float *mean;    /* width * height */
+    double *row;    /* height + 1 cumulative sums */
+    double *pixel;  /* height * (width + 1) cumulative sums of a row */
+    size_t width, height;
+} isogi_trace__sky;
+
+static double isogi_trace__pixel(const isogi_env *env, int x, int y) {
+    const float *p;
+    double rgb[3];
+    x = x < 0 ? x + env->width : x >= env->width ? x - env->width : x;
+    y = y < 0 ? 0 : y >= env->height ? env->height - 1 : y;
+    p = env->rgb + 3 * ((size_t)x + (size_t)env->width * (size_t)y);
+    rgb[0] = (double)p[0], rgb[1] = (double)p[1], rgb[2] = (double)p[2];
+    return isogi_trace__clamp(isogi_trace__luminance(rgb), 1e30);
+}
+
+static double isogi_trace__pixel_mean(const isogi_env *env, int x, int y) {
+    static const double weight[3] = {0.125, 0.75, 0.125};
+    double sum = 0;
+    int i, j;
+    for (j = -1; j <= 1; j++)
+        for (i = -1; i <= 1; i++) sum += weight[i + 1] * weight[j + 1] * isogi_trace__pixel(env, x + i, y + j);
+    return sum;
+}
+
+static void isogi_trace__sky_free(isogi_trace__sky *sky, const isogi_context *context) {
+    isogi_release(context, sky->mean, sky->width * sky->height, sizeof(float));
+    isogi_release(context, sky->row, sky->height + 1, sizeof(double));
+    isogi_release(context, sky->pixel, sky->height * (sky->width + 1), sizeof(double));
+    sky->mean = NULL, sky->row = NULL, sky->pixel = NULL;
+}
+
+/* An image without peaks is left to the cosine-distributed rays: they find it as well, with half the rays. */
+static isogi_result isogi_trace__sky_build(isogi_trace__sky *sky, const isogi_env *env, const isogi_context *context) {
+    double peak = 0;
+    size_t x, y;
+    sky->env = env;
+    if (!env->rgb) return ISOGI_OK;
+    sky->width = (size_t)env->width, sky->height = (size_t)env->height;
+    sky->mean = (float *)isogi_allocate(context, sky->width * sky->height, sizeof(float));
+    sky->row = (double *)isogi_allocate(context, sky->height + 1, sizeof(double));
+    sky->pixel = (double *)isogi_allocate(context, sky->height * (sky->width + 1), sizeof(double));
+    if (!sky->mean || !sky->row || !sky->pixel) return ISOGI_NO_MEMORY;
+    sky->row[0] = 0;
+    for (y = 0; y < sky->height; y++) {
+        double *sum = sky->pixel + y * (sky->width + 1), step = ISOGI_TRACE__PI / (double)sky->height;
+        double area = 2 * ISOGI_TRACE__PI / (double)sky->width * (cos(step * (double)y) - cos(step * (double)(y + 1)));
+        sum[0] = 0;
+        for (x = 0; x < sky->width; x++) {
+            float mean = (float)isogi_trace__pixel_mean(env, (int)x, (int)y);
+            sky->mean[x + sky->width * y] = mean;
+            sum[x + 1] = sum[x] + (double)mean * area;
+            if ((double)mean > peak) peak = (double)mean;
+        }
+        sky->row[y + 1] = sky->row[y] + sum[sky->width];
+    }
+    sky->total = sky->row[sky->height];
+    sky->on = sky->total > 0 && peak * 4 * ISOGI_TRACE__PI > 8 * sky->total;
+    return ISOGI_OK;
+}
+
+/* The interval of cumulative sums that x falls into, and the place in it, 0..1. */
+static size_t isogi_trace__search(const double *sum, size_t count, double x, double *place) {
+    size_t low = 0, high = count;
+    while (high - low > 1) {
+        size_t middle = low + (high - low) / 2;
+        if (sum[middle] <= x) low = middle;
+        else high = middle;
+    }
+    *place = sum[low + 1] > sum[low] ? isogi_trace__clamp((x - sum[low]) / (sum[low + 1] - sum[low]), 1) : 0.5;
+    return low;
+}
+
+static int isogi_trace__is_identity(const float m[9]) {
+    int i;
+    for (i = 0; i < 9; i++)
+        if (!isogi_trace__zero((double)m[i])) return 0;
+    return 1;
+}
+
+/* A direction (world) drawn from the image; layout of isogi_env. */
+static void isogi_trace__sky_direction(const isogi_trace__sky *sky, double u, double v, float dir[3]) {
+    double place, longitude, d[3], sine, top, bottom;
+    size_t y = isogi_trace__search(sky->row, sky->height, u * sky->total, &place), x;
+    const double *sum = sky->pixel + y * (sky->width + 1);
+    const float *m = sky->env->rotation;
+    int a;
+    top = cos(ISOGI_TRACE__PI * (double)y / (double)sky->height);
+    bottom = cos(ISOGI_TRACE__PI * (double)(y + 1) / (double)sky->height);
+    d[1] = top + (bottom - top) * place;
+    x = isogi_trace__search(sum, sky->width, v * sum[sky->width], &place);
+    longitude = 2 * ISOGI_TRACE__PI * (((double)x + place) / (double)sky->width - 0.5);
+    sine = sqrt(isogi_trace__clamp(1 - d[1] * d[1], 1));
+    d[0] = sine * sin(longitude), d[2] = -sine * cos(longitude);
+    for (a = 0; a < 3; a++)
+        dir[a] = isogi_trace__is_identity(m) ? (float)d[a]
+                                             : (float)((double)m[3 * a] * d[0] + (double)m[3 * a + 1] * d[1] + (double)m[3 * a + 2] * d[2]);
+}
+
+/* Density (per steradian) with which the above draws a world direction. */
+static double isogi_trace__sky_density(const isogi_trace__sky *sky, const float dir[3]) {
+    const float *m = sky->env->rotation;
+    double d[3], u, v;
+    size_t x, y;
+    int a;
+    for (a = 0; a < 3; a++)
+        d[a] = isogi_trace__is_identity(m) ? (double)dir[a]
+                                           : (double)m[a] * (double)dir[0] + (double)m[3 + a] * (double)dir[1] + (double)m[6 + a] * (double)dir[2];
+    v = acos(d[1] > 1 ? 1 : d[1] < -1 ? -1 : d[1]) / ISOGI_TRACE__PI;
+    u = atan2(d[0], -d[2]) / (2 * ISOGI_TRACE__PI) + 0.5;
+    x = (size_t)isogi_trace__clamp(u * (double)sky->width, (double)(sky->width - 1));
+    y = (size_t)isogi_trace__clamp(v * (double)sky->height, (double)(sky->height - 1));
+    return (double)sky->mean[x + sky->width * y] / sky->total;
+}
+
+/* ==== lights ========================================================================================================= */
+
+/* A direction towards a light and what it brings along it, so that irradiance = rgb * cosine on average over u and v. */
+typedef struct isogi_trace__beam {
+    float dir[3];
+    double tmax; /* 0 = unlimited */
+    double rgb[3];
+} isogi_trace__beam;
+
+/* A light without extent: one ray decides. */
+static int isogi_trace__is_delta(const isogi_light *light) {
+    return light->kind == ISOGI_LIGHT_POINT || !(light->radius > 0);
+}
+
+/* Directions uniform in a cone about the unit vector n, 1 - cos(its half angle) = opening. */
+static void isogi_trace__cone(const double n[3], double opening, double u, double v, float dir[3]) {
+    double low = opening * u, sine = sqrt(isogi_trace__clamp(low * (2 - low), 1));
+    float axis[3];
+    axis[0] = (float)n[0], axis[1] = (float)n[1], axis[2] = (float)n[2];
+    isogi_trace__around(axis, 1 - low, sine, v, dir);
+}
+
+/* A sphere of radiance I / (pi r^2), seen from outside through a cone of directions, from within all around. */
+static double isogi_trace__sphere(const double to[3], double distance, double radius, double u, double v, isogi_trace__beam *beam) {
+    double n[3], ratio = radius / distance, opening = 2, along = 0, inside;
+    int a;
+    if (ratio < 1) opening = ratio * ratio / (1 + sqrt(1 - ratio * ratio));
+    for (a = 0; a < 3; a++) n[a] = to[a] / distance;
+    isogi_trace__cone(n, opening, u, v, beam->dir);
+    for (a = 0; a < 3; a++) along += to[a] * (double)beam->dir[a];
+    inside = along * along - (distance * distance - radius * radius);
+    inside = sqrt(inside > 0 ? inside : 0);
+    beam->tmax = ratio < 1 ? along - inside : along + inside;
+    return 2 * opening / (radius * radius); /* solid angle / (pi r^2) */
+}
+
+/* 0 where the light does not reach `point` by nature. */
+static int isogi_trace__light_beam(const isogi_light *light, const double point[3], double u, double v, isogi_trace__beam *beam) {
+    double to[3], length = 0, factor = 1;
+    int a;
+    for (a = 0; a < 3; a++) {
+        to[a] = (double)light->vector[a] - (light->kind == ISOGI_LIGHT_DIRECTIONAL ? 0 : point[a]);
+        length += to[a] * to[a];
+    }
+    length = sqrt(length);
+    if (!(length > 0) || !isogi_trace__finite(length)) return 0;
+    beam->tmax = 0;
+    if (light->kind == ISOGI_LIGHT_DIRECTIONAL && light->radius > 0) {
+        double angle = isogi_trace__clamp((double)light->radius, ISOGI_TRACE__PI), cosine = cos(angle);
+        for (a = 0; a < 3; a++) to[a] /= length;
+        isogi_trace__cone(to, 2 * sin(angle / 2) * sin(angle / 2), u, v, beam->dir);
+        /* radiance rgb / (pi sin^2), solid angle 2 pi (1 - cos); beyond a right angle the facing hemisphere is full */
+        factor = cosine > 0 ? 2 / (1 + cosine) : 2 * (1 - cosine);
+    } else if (light->kind == ISOGI_LIGHT_SPHERE && light->radius > 0) {
+        factor = isogi_trace__sphere(to, length, (double)light->radius, u, v, beam);
+    } else {
+        for (a = 0; a < 3; a++) beam->dir[a] = (float)(to[a] / length);
+        if (light->kind != ISOGI_LIGHT_DIRECTIONAL) beam->tmax = length, factor = 1 / (length * length);
+    }
+    for (a = 0; a < 3; a++) beam->rgb[a] = factor * (double)light->rgb[a];
+    return beam->tmax >= 0 && isogi_trace__finite(factor);
+}
+
+/* ==== voxels and texels ============================================================================================== */
+
+static double isogi_trace__voxel(const isogi_volume *v, size_t x, size_t y, size_t z) {
+    const char *p = (const char *)v->data + (ptrdiff_t)x * v->stride[0] + (ptrdiff_t)y * v->stride[1] + (ptrdiff_t)z * v->stride[2];
+    double raw = 0;
+    switch (v->type) {
+    case ISOGI_U8: raw = *(const uint8_t *)(const void *)p; break;
+    case ISOGI_I8: raw = *(const int8_t *)(const void *)p; break;
+    case ISOGI_U16: raw = *(const uint16_t *)(const void *)p; break;
+    case ISOGI_I16: raw = *(const int16_t *)(const void *)p; break;
+    case ISOGI_F32: raw = (double)*(const float *)(const void *)p; break;
+    case ISOGI_F64: raw = *(const double *)(const void *)p; break;
+    }
+    return v->scale * raw + v->bias;
+}
+
+/* Exact at both ends, where the other value is not even looked at. */
+static double isogi_trace__lerp(double a, double b, double u) { return u > 0 ? u < 1 ? (1 - u) * a + u * b : b : a; }
+
+/* The cell of grid coordinates and the place in it. 0 if the volume has no cells. */
+static int isogi_trace__locate(const isogi_volume *v, const double grid[3], isogi_hit *place) {
+    int a;
+    memset(place, 0, sizeof *place);
+    for (a = 0; a < 3; a++) {
+        double x = isogi_trace__clamp(grid[a], (double)(v->size[a] - 1));
+        uint32_t last = v->size[a] > 1 ? (uint32_t)(v->size[a] - 2) : 0, i = (uint32_t)x;
+        if (v->size[a] < 2) return 0;
+        place->cell[a] = i < last ? i : last;
+        place->local[a] = x - place->cell[a];
+    }
+    place->side = 1;
+    return 1;
+}
+
+/* Trilinear value, kept within the values it is made of, so that a constant stays constant. */
+static double isogi_trace__value(const isogi_volume *v, const isogi_hit *place) {
+    double c[8], low = DBL_MAX, high = -DBL_MAX, value;
+    int i;
+    for (i = 0; i < 8; i++) {
+        c[i] = isogi_trace__voxel(v, place->cell[0] + (size_t)(i & 1), place->cell[1] + (size_t)(i >> 1 & 1), place->cell[2] + (size_t)(i >> 2));
+        low = c[i] < low ? c[i] : low, high = c[i] > high ? c[i] : high;
+    }
+    for (i = 0; i < 8; i += 2) c[i] = isogi_trace__lerp(c[i], c[i + 1], place->local[0]);
+    for (i = 0; i < 8; i += 4) c[i] = isogi_trace__lerp(c[i], c[i + 2], place->local[1]);
+    value = isogi_trace__lerp(c[0], c[4], place->local[2]);
+    return value < low ? low : value > high ? high : value;
+}
+
+/* Least and largest voxel in [low, high], both ends included: exact. */
+static void isogi_trace__voxel_range(const isogi_volume *v, const size_t low[3], const size_t high[3], double range[2]) {
+    size_t x, y, z;
+    range[0] = DBL_MAX, range[1] = -DBL_MAX;
+    for (z = low[2]; z <= high[2]; z++)
+        for (y = low[1]; y <= high[1]; y++)
+            for (x = low[0]; x <= high[0]; x++) {
+                double value = isogi_trace__voxel(v, x, y, z);
+                if (!isogi_trace__finite(value)) continue;
+                if (value < range[0]) range[0] = value;
+                if (value > range[1]) range[1] = value;
+            }
+}
+
+/* The same from the pyramid's finest level at which few blocks are read: bounds that may be too wide. */
+static void isogi_trace__block_range(const isogi_pyramid *pyramid, const size_t low[3], const size_t high[3], double range[2]) {
+    size_t first[3], last[3], x, y, z;
+    isogi_level level;
+    int n, a;
+    for (n = 0;; n++) {
+        size_t blocks = 1;
+        level = isogi_vol_level(pyramid, n);
+        for (a = 0; a < 3; a++) {
+            first[a] = low[a] / (size_t)level.cells;
+            last[a] = high[a] / (size_t)level.cells;
+            if (first[a] >= level.size[a]) first[a] = level.size[a] - 1;
+            if (last[a] >= level.size[a]) last[a] = level.size[a] - 1;
+            blocks *= last[a] - first[a] + 1;
+        }
+        if (blocks <= 27 || !isogi_vol_level(pyramid, n + 1).cells) break;
+    }
+    range[0] = DBL_MAX, range[1] = -DBL_MAX;
+    for (z = first[2]; z <= last[2]; z++)
+        for (y = first[1]; y <= last[1]; y++)
+            for (x = first[0]; x <= last[0]; x++) {
+                const float *r = level.range[x + level.size[0] * (y + level.size[1] * z)];
+                if ((double)r[0] < range[0]) range[0] = (double)r[0];
+                if ((double)r[1] > range[1]) range[1] = (double)r[1];
+            }
+}
+
+/* ==== scene: what is the same for every texel ======================================================================== */
+
+typedef struct isogi_trace__scene {
+    isogi_trace_desc desc; /* with the zero defaults filled in */
+    const isogi_pyramid *pyramid;
+    const isogi_volume *volume;
+    uint32_t flags;
+    double to_grid[9]; /* rotation and scale from world to grid */
+    isogi_trace__sky sky;
+    int has_env;
+} isogi_trace__scene;
+
+/* Where the light is gathered. */
+typedef struct isogi_trace__site {
+    isogi_hit place; /* on its isosurface */
+    double isovalue;
+    float normal[3];
+    double origin[3]; /* of its rays, world */
+    int on_surface;   /* the rays leave from `place` itself */
+    int open;         /* the origin lies beyond an open border: what a ray meets first may be a surface seen from within */
+    uint64_t key;
+} isogi_trace__site;
+
+static void isogi_trace__scene_matrix(isogi_trace__scene *scene) {
+    const isogi_volume *v = scene->volume;
+    double reach = 0;
+    int a, c;
+    /* one long step along each world axis, so that a far origin costs no precision */
+    for (a = 0; a < 3; a++) reach += fabs(v->origin[a]) + v->spacing[a];
+    for (c = 0; c < 3; c++) {
+        double world[3], grid[3];
+        for (a = 0; a < 3; a++) world[a] = v->origin[a] + (a == c ? reach : 0);
+        isogi_vol_to_grid(scene->pyramid, world, grid);
+        for (a = 0; a < 3; a++) scene->to_grid[3 * a + c] = grid[a] / reach;
+    }
+}
+
+/* A capped volume's border texels face out of the box; elsewhere the gradient decides. 0 if there is no normal. */
+static int isogi_trace__site_normal(const isogi_trace__scene *scene, isogi_trace__site *site) {
+    double n[3] = {0, 0, 0}, length = 0;
+    int a, c, border = 0;
+    for (a = 0; a < 3; a++) {
+        double x = site->place.cell[a] + site->place.local[a], out = 0;
+        if (x <= 0) out = -1;
+        if (x >= (double)(scene->volume->size[a] - 1)) out = 1;
+        if (isogi_trace__zero(out)) continue;
+        border = 1;
+        for (c = 0; c < 3; c++) n[c] += out * scene->to_grid[3 * a + c] * scene->volume->spacing[a];
+    }
+    if (!border || !scene->desc.capped) {
+        isogi_vol_normals(scene->pyramid, &site->place, 1, scene->desc.normals, &site->normal);
+        return isogi_trace__dot(site->normal, site->normal) > 0;
+    }
+    for (c = 0; c < 3; c++) length += n[c] * n[c];
+    for (c = 0; c < 3; c++) site->normal[c] = (float)(n[c] / sqrt(length));
+    return length > 0;
+}
+
+/* Rays start `offset` voxels along the normal, twice and four times as far (up to one voxel) where that is still inside: the
+   trilinear surface has bumps that the smoothed normal does not know of (Wyman 2006, 4.1.1). Where even that ends in matter, they
+   start on the surface. */
+static void isogi_trace__site_start(const isogi_trace__scene *scene, isogi_trace__site *site) {
+    const double *m = scene->to_grid;
+    double n[3], speed = 0, offset = (double)scene->desc.offset;
+    int a, attempt;
+    for (a = 0; a < 3; a++) {
+        n[a] = m[3 * a] * (double)site->normal[0] + m[3 * a + 1] * (double)site->normal[1] + m[3 * a + 2] * (double)site->normal[2];
+        speed += n[a] * n[a];
+    }
+    speed = sqrt(speed);
+    site->on_surface = 1, site->open = 0;
+    for (attempt = 0; attempt < 3 && offset > 0 && speed > 0; attempt++, offset *= 2) {
+        double grid[3];
+        isogi_hit place;
+        int beyond = 0;
+        if (attempt && offset > 1) break;
+        for (a = 0; a < 3; a++) {
+            grid[a] = site->place.cell[a] + site->place.local[a] + n[a] * (offset / speed);
+            beyond |= grid[a] < 0 || grid[a] > (double)(scene->volume->size[a] - 1);
+        }
+        isogi_trace__locate(scene->volume, grid, &place);
+        if (!beyond && !(isogi_trace__value(scene->volume, &place) < site->isovalue)) continue;
+        isogi_vol_to_world(scene->pyramid, grid, site->origin);
+        site->on_surface = 0, site->open = beyond && !scene->desc.capped;
+        return;
+    }
+    for (a = 0; a < 3; a++) n[a] = site->place.cell[a] + site->place.local[a];
+    isogi_vol_to_world(scene->pyramid, n, site->origin);
+}
+
+/* ==== paths ========================================================================================================== */
+
+/* Paths of one site, kept in step so that their rays are traced together. Radiances are those that reach the site. */
+typedef struct isogi_trace__wave {
+    const isogi_trace__scene *scene;
+    const isogi_trace__site *site;
+    isogi_counters *counters;
+    double albedo[3];
+    double light[ISOGI_TRACE__WAVE][3]; /* of each sample: what its path brought */
+    float *basis;                       /* TRANSFER: scratch for SH values */
+    double *transfer;                   /* TRANSFER: sum over samples, coefficients x channels */
+    int count;                          /* paths alive; the arrays below are of these */
+    int slot[ISOGI_TRACE__WAVE];
+    uint64_t key[ISOGI_TRACE__WAVE];
+    double through[ISOGI_TRACE__WAVE][3];
+    double density[ISOGI_TRACE__WAVE];    /* with which dir was drawn, times pi */
+    signed char from[ISOGI_TRACE__WAVE];  /* side on which the ray travels: 1 low, -1 high, 0 not known */
+    float dir[ISOGI_TRACE__WAVE][3];
+    isogi_hit start[ISOGI_TRACE__WAVE];
+    float shading[ISOGI_TRACE__WAVE][3], geometric[ISOGI_TRACE__WAVE][3];
+    isogi_hit hit[ISOGI_TRACE__WAVE];
+} isogi_trace__wave;
+
+/* Shadow rays of one round, gathered and traced together. */
+typedef struct isogi_trace__shadows {
+    int count;
+    int path[ISOGI_TRACE__WAVE];
+    float dir[ISOGI_TRACE__WAVE][3];
+    double tmax[ISOGI_TRACE__WAVE];
+    double rgb[ISOGI_TRACE__WAVE][3]; /* what arrives if nothing is in the way: radiance reflected towards the path */
+    isogi_hit start[ISOGI_TRACE__WAVE], hit[ISOGI_TRACE__WAVE];
+} isogi_trace__shadows;
+
+/* Rays from the site itself; a miss has side 0. tmax may be NULL. */
+static void isogi_trace__site_rays(const isogi_trace__scene *scene, const isogi_trace__site *site, const float (*dirs)[3],
+                                   const double *tmax, size_t count, isogi_hit *hits, isogi_counters *counters) {
+    isogi_hit starts[ISOGI_TRACE__WAVE];
+    size_t i;
+    if (site->on_surface) {
+        for (i = 0; i < count; i++) starts[i] = site->place;
+        isogi_vol_continue(scene->pyramid, starts, dirs, tmax, site->isovalue, scene->flags, count, hits, counters);
+        return;
+    }
+    for (i = 0; i < count; i++) {
+        isogi_ray ray;
+        memset(&ray, 0, sizeof ray);
+        memcpy(ray.origin, site->origin, sizeof ray.origin);
+        memcpy(ray.dir, dirs[i], sizeof ray.dir);
+        ray.flags = scene->flags, ray.isovalue = site->isovalue, ray.tmax = tmax ? tmax[i] : 0;
+        isogi_vol_intersect(scene->pyramid, &ray, 1, &hits[i], counters);
+    }
+}
+
+/* Adds what the unblocked shadow rays bring. depth 0: they leave from the site. */
+static void isogi_trace__shadows_flush(isogi_trace__wave *w, isogi_trace__shadows *s, int depth) {
+    int i, c;
+    if (!s->count) return;
+    if (!depth) {
+        isogi_trace__site_rays(w->scene, w->site, (const float(*)[3])s->dir, s->tmax, (size_t)s->count, s->hit, w->counters);
+    } else {
+        for (i = 0; i < s->count; i++) s->start[i] = w->start[s->path[i]];
+        isogi_vol_continue(w->scene->pyramid, s->start, (const float(*)[3])s->dir, s->tmax, w->site->isovalue, w->scene->flags,
+                           (size_t)s->count, s->hit, w->counters);
+    }
+    for (i = 0; i < s->count; i++)
+        if (!s->hit[i].side)
+            for (c = 0; c < 3; c++) w->light[w->slot[s->path[i]]][c] += s->rgb[i][c];
+    s->count = 0;
+}
+
+/* pi times the density of the directions that leave path i's vertex. */
+static double isogi_trace__cosine_at(const isogi_trace__wave *w, int i, int depth, const float dir[3]) {
+    double cosine;
+    if (depth) return isogi_trace__kernel((const float *)w->shading[i], (const float *)w->geometric[i], dir);
+    cosine = isogi_trace__dot(w->site->normal, dir);
+    return cosine > 0 ? cosine : 0;
+}
+
+static void isogi_trace__shadows_add(isogi_trace__wave *w, isogi_trace__shadows *s, int i, const float dir[3], double tmax,
+                                     const double rgb[3]) {
+    int c;
+    memcpy(s->dir[s->count], dir, sizeof s->dir[0]);
+    s->path[s->count] = i, s->tmax[s->count] = tmax;
+    for (c = 0; c < 3; c++) s->rgb[s->count][c] = w->through[i][c] * rgb[c];
+    s->count++;
+}
+
+/* Next-event estimation at the vertices of all paths: the lights, one after the other. At the site, lights without extent are left
+   out: isogi_trace__site_lights does them once. */
+static void isogi_trace__wave_lights(isogi_trace__wave *w, isogi_trace__shadows *s, int depth, float (*positions)[3]) {
+    const isogi_lighting *lighting = &w->scene->desc.lighting;
+    size_t l;
+    int i, c;
+    for (l = 0; l < lighting->light_count; l++) {
+        const isogi_light *light = &lighting->lights[l];
+        if (!depth && isogi_trace__is_delta(light)) continue;
+        for (i = 0; i < w->count; i++) {
+            uint64_t key = isogi_trace__key(isogi_trace__key(w->key[i], (uint64_t)depth * ISOGI_TRACE__DIMENSIONS + ISOGI_TRACE__LIGHT), l);
+            double u = isogi_trace__unit(isogi_trace__key(key, 0)), v = isogi_trace__unit(isogi_trace__key(key, 1));
+            double point[3], cosine;
+            isogi_trace__beam beam;
+            for (c = 0; c < 3; c++) point[c] = depth ? (double)positions[i][c] : w->site->origin[c];
+            if (!isogi_trace__light_beam(light, point, u, v, &beam)) continue;
+            cosine = isogi_trace__cosine_at(w, i, depth, beam.dir);
+            if (!(cosine > 0)) continue;
+            for (c = 0; c < 3; c++) beam.rgb[c] *= cosine / ISOGI_TRACE__PI;
+            isogi_trace__shadows_add(w, s, i, beam.dir, beam.tmax, beam.rgb);
+        }
+        isogi_trace__shadows_flush(w, s, depth);
+    }
+}
+
+/* The environment's image, drawn by brightness and weighed against the cosine-distributed rays by the balance heuristic (Veach and
+   Guibas 1995): value / (density + their density). */
+static void isogi_trace__wave_sky(isogi_trace__wave *w, isogi_trace__shadows *s, int depth) {
+    const isogi_trace__sky *sky = &w->scene->sky;
+    int i, c;
+    if (!sky->on) return;
+    for (i = 0; i < w->count; i++) {
+        double u = isogi_trace__random(w->key[i], depth, ISOGI_TRACE__ENVIRONMENT);
+        double v = isogi_trace__random(w->key[i], depth, ISOGI_TRACE__ENVIRONMENT + 1), density, cosine, rgb[3];
+        float dir[3], radiance[3];
+        isogi_trace__sky_direction(sky, u, v, dir);
+        cosine = isogi_trace__cosine_at(w, i, depth, dir) / ISOGI_TRACE__PI;
+        density = isogi_trace__sky_density(sky, dir);
+        if (!(cosine > 0) || !(density > 0)) continue;
+        isogi_env_radiance(sky->env, dir, radiance);
+        for (c = 0; c < 3; c++) rgb[c] = (double)radiance[c] * cosine / (density + cosine);
+        isogi_trace__shadows_add(w, s, i, dir, 0, rgb);
+    }
+    isogi_trace__shadows_flush(w, s, depth);
+}
+
+/* Path i has left the volume. */
+static void isogi_trace__wave_escape(isogi_trace__wave *w, int i) {
+    const isogi_trace__scene *scene = w->scene;
+    double weight = 1;
+    float radiance[3];
+    int c, k, channels = scene->desc.transfer_channels, count = scene->desc.order * scene->desc.order;
+    if (scene->desc.mode == ISOGI_TRACE_TRANSFER) {
+        double grey = (w->through[i][0] + w->through[i][1] + w->through[i][2]) / 3;
+        isogi_sh_eval(w->basis, scene->desc.order, (const float(*)[3])&w->dir[i], 1);
+        for (k = 0; k < count; k++)
+            for (c = 0; c < channels; c++)
+                w->transfer[k * channels + c] += (channels == 1 ? grey : w->through[i][c]) * (double)w->basis[k];
+        for (c = 0; c < 3; c++) w->light[w->slot[i]][c] += channels == 1 ? grey : w->through[i][c];
+        return;
+    }
+    if (!scene->has_env) return;
+    if (scene->sky.on) {
+        double cosine = w->density[i] / ISOGI_TRACE__PI;
+        weight = cosine / (cosine + isogi_trace__sky_density(&scene->sky, (const float *)w->dir[i]));
+    }
+    isogi_env_radiance(&scene->desc.lighting.env, (const float *)w->dir[i], radiance);
+    for (c = 0; c < 3; c++) w->light[w->slot[i]][c] += weight * w->through[i][c] * (double)radiance[c];
+}
+
+/* Keeps path i as path j, reflected where it hit. 0: it ends there. */
+static int isogi_trace__wave_reflect(isogi_trace__wave *w, int i, int j, int depth) {
+    const isogi_trace__scene *scene = w->scene;
+    int side = w->hit[i].side > 0 ? 1 : -1, from = w->from[i], c;
+    double through[3], most = 0, survive = 1;
+    if (depth == scene->desc.bounces || depth >= ISOGI_TRACE__MAX_DEPTH) return 0;
+    for (c = 0; c < 3; c++) {
+        through[c] = w->through[i][c] * w->albedo[c];
+        if (through[c] > most) most = through[c];
+    }
+    if (!(most > 0)) return 0;
+    if (scene->desc.bounces < 0 && depth >= 3) {
+        /* Russian roulette, below 1 even for white surfaces: a path in a closed cavity lives for fifty reflections on average */
+        survive = most < 0.98 ? most : 0.98;
+        if (isogi_trace__random(w->key[i], depth, ISOGI_TRACE__ROULETTE) >= survive) return 0;
+    }
+    for (c = 0; c < 3; c++) w->through[j][c] = through[c] / survive;
+    w->slot[j] = w->slot[i], w->key[j] = w->key[i];
+    /* A ray that meets the surface from the side where it is not has begun within matter (a corner where cells with different
+       gradients meet): that is a reflection on the spot. */
+    w->start[j] = !from || from == side ? w->hit[i] : w->start[i];
+    w->from[j] = (signed char)(!from || from == side ? side : from);
+    return 1;
+}
+
+/* New directions from every vertex. */
+static void isogi_trace__wave_scatter(isogi_trace__wave *w, int depth) {
+    int i;
+    for (i = 0; i < w->count; i++) {
+        double u = isogi_trace__random(w->key[i], depth, ISOGI_TRACE__DIRECTION);
+        double v = isogi_trace__random(w->key[i], depth, ISOGI_TRACE__DIRECTION + 1);
+        isogi_trace__cosine((const float *)w->shading[i], u, v, w->dir[i]);
+        isogi_trace__mirror((const float *)w->geometric[i], w->dir[i]);
+        w->density[i] = isogi_trace__kernel((const float *)w->shading[i], (const float *)w->geometric[i], (const float *)w->dir[i]);
+    }
+}
+
+static void isogi_trace__wave_begin(isogi_trace__wave *w, int first, int count) {
+    const isogi_trace__site *site = w->site;
+    int i, c;
+    w->count = count;
+    for (i = 0; i < count; i++) {
+        double u[2];
+        w->slot[i] = i, w->key[i] = isogi_trace__key(site->key, (uint64_t)(first + i));
+        w->start[i] = site->place, w->from[i] = site->open ? 0 : 1;
+        isogi_trace__sobol(site->key, (uint32_t)(first + i), u);
+        isogi_trace__cosine(site->normal, u[0], u[1], w->dir[i]);
+        w->density[i] = isogi_trace__dot(site->normal, (const float *)w->dir[i]);
+        for (c = 0; c < 3; c++) w->through[i][c] = 1, w->light[i][c] = 0;
+    }
+}
+
+/* Samples first .. first + count - 1 of a site; w->light holds what each brought. */
+static void isogi_trace__wave_run(isogi_trace__wave *w, int first, int count) {
+    const isogi_trace__scene *scene = w->scene;
+    int lit = scene->desc.mode == ISOGI_TRACE_IRRADIANCE, depth, i;
+    float positions[ISOGI_TRACE__WAVE][3];
+    isogi_trace__shadows shadows;
+    shadows.count = 0;
+    isogi_trace__wave_begin(w, first, count);
+    for (depth = 0; w->count; depth++) {
+        int alive = 0;
+        if (depth) {
+            isogi_trace__normals(scene->pyramid, scene->desc.normals, w->start, w->from, (size_t)w->count, w->shading, w->geometric);
+            if (lit && scene->desc.lighting.light_count) isogi_vol_positions(scene->pyramid, w->start, (size_t)w->count, positions);
+            isogi_trace__wave_scatter(w, depth);
+        }
+        if (lit) isogi_trace__wave_lights(w, &shadows, depth, positions);
+        if (lit) isogi_trace__wave_sky(w, &shadows, depth);
+        if (!depth)
+            isogi_trace__site_rays(scene, w->site, (const float(*)[3])w->dir, NULL, (size_t)w->count, w->hit, w->counters);
+        else
+            isogi_vol_continue(scene->pyramid, w->start, (const float(*)[3])w->dir, NULL, w->site->isovalue, scene->flags,
+                               (size_t)w->count, w->hit, w->counters);
+        for (i = 0; i < w->count; i++) {
+            if (!w->hit[i].side) isogi_trace__wave_escape(w, i);
+            else if (isogi_trace__wave_reflect(w, i, alive, depth)) alive++;
+        }
+        w->count = alive;
+    }
+}
+
+/* ==== the light at a site ============================================================================================ */
+
+/* Irradiance by lights without extent, which one ray decides. */
+static void isogi_trace__site_lights(const isogi_trace__scene *scene, const isogi_trace__site *site, double rgb[3],
+                                     isogi_counters *counters) {
+    const isogi_lighting *lighting = &scene->desc.lighting;
+    size_t l;
+    int c;
+    for (l = 0; l < lighting->light_count; l++) {
+        isogi_trace__beam beam;
+        isogi_hit hit;
+        double cosine;
+        if (!isogi_trace__is_delta(&lighting->lights[l])) continue;
+        if (!isogi_trace__light_beam(&lighting->lights[l], site->origin, 0, 0, &beam)) continue;
+        cosine = isogi_trace__dot(site->normal, beam.dir);
+        if (!(cosine > 0)) continue;
+        isogi_trace__site_rays(scene, site, (const float(*)[3])&beam.dir, &beam.tmax, 1, &hit, counters);
+        for (c = 0; c < 3 && !hit.side; c++) rgb[c] += beam.rgb[c] * cosine;
+    }
+}
+
+/* Scene without anything that could shine: no rays are needed. */
+static int isogi_trace__dark(const isogi_trace__scene *scene) {
+    return scene->desc.mode == ISOGI_TRACE_IRRADIANCE && !scene->has_env && !scene->desc.lighting.light_count;
+}
+
+/* Computes one site: values[3] (RGB irradiance) or values[order*order*channels], and the standard error of the luminance (TRANSFER:
+   under a sky of radiance 1). */
+static void isogi_trace__gather_site(const isogi_trace__scene *scene, const isogi_trace__site *site, float *values, float *error,
+                                     isogi_counters *counters) {
+    const isogi_trace_desc *desc = &scene->desc;
+    isogi_trace__wave wave;
+    float basis[ISOGI_TRACE__MAX_ORDER * ISOGI_TRACE__MAX_ORDER], albedo[3];
+    double transfer[3 * ISOGI_TRACE__MAX_ORDER * ISOGI_TRACE__MAX_ORDER], sum[3] = {0, 0, 0}, mean = 0, square = 0, direct[3] = {0, 0, 0};
+    int coefficients = desc->order * desc->order * desc->transfer_channels, first, i, c;
+    wave.scene = scene, wave.site = site, wave.counters = counters, wave.basis = basis, wave.transfer = transfer;
+    memset(transfer, 0, sizeof transfer);
+    isogi_trace_albedo(desc, site->isovalue, albedo);
+    for (c = 0; c < 3; c++) wave.albedo[c] = (double)albedo[c];
+    for (first = 0; first < desc->samples && !isogi_trace__dark(scene); first += ISOGI_TRACE__WAVE) {
+        int count = desc->samples - first < ISOGI_TRACE__WAVE ? desc->samples - first : ISOGI_TRACE__WAVE;
+        isogi_trace__wave_run(&wave, first, count);
+        for (i = 0; i < count; i++) {
+            /* Welford's running variance: no cancellation */
+            double luminance = isogi_trace__luminance(wave.light[i]), before = luminance - mean;
+            mean += before / (first + i + 1);
+            square += before * (luminance - mean);
+            for (c = 0; c < 3; c++) sum[c] += wave.light[i][c];
+        }
+    }
+    *error = desc->samples > 1 ? (float)(ISOGI_TRACE__PI * sqrt(square / ((double)desc->samples * (desc->samples - 1)))) : ISOGI_TRACE__NOT_READY;
+    if (desc->mode == ISOGI_TRACE_TRANSFER) {
+        for (i = 0; i < coefficients; i++) values[i] = (float)(ISOGI_TRACE__PI * transfer[i] / desc->samples);
+        return;
+    }
+    isogi_trace__site_lights(scene, site, direct, counters);
+    for (c = 0; c < 3; c++) values[c] = (float)(ISOGI_TRACE__PI * sum[c] / desc->samples + direct[c]);
+}
+
+/* ==== the description ================================================================================================ */
+
+ISOGI_API void isogi_trace_albedo(const isogi_trace_desc *desc, double isovalue, float rgb[3]) {
+    const isogi_albedo_point *p = desc->albedo_points;
+    size_t n = desc->albedo_count, i = 0;
+    int c, plain = 0;
+    for (c = 0; c < 3; c++) plain |= desc->albedo[c] > 0;
+    for (c = 0; c < 3; c++) rgb[c] = desc->albedo[c];
+    if (!p || !n) return;
+    while (i < n && p[i].value < isovalue) i++;
+    for (c = 0; c < 3; c++) {
+        double value;
+        if (i == 0 || i == n) value = (double)p[i ? n - 1 : 0].rgb[c];
+        else value = isogi_trace__lerp((double)p[i - 1].rgb[c], (double)p[i].rgb[c], (isovalue - p[i - 1].value) / (p[i].value - p[i - 1].value));
+        rgb[c] = plain ? rgb[c] * (float)value : (float)value;
+    }
+}
+
+static int isogi_trace__in_unit(const float rgb[3]) {
+    int c;
+    for (c = 0; c < 3; c++)
+        if (!isogi_trace__finite((double)rgb[c]) || rgb[c] < 0 || rgb[c] > 1) return 0;
+    return 1;
+}
+
+static int isogi_trace__albedo_valid(const isogi_trace_desc *d) {
+    size_t i;
+    if (!isogi_trace__in_unit(d->albedo) || (d->albedo_count && !d->albedo_points)) return 0;
+    for (i = 0; i < d->albedo_count; i++) {
+        if (!isogi_trace__in_unit(d->albedo_points[i].rgb) || !isogi_trace__finite(d->albedo_points[i].value)) return 0;
+        if (i && !(d->albedo_points[i].value > d->albedo_points[i - 1].value)) return 0;
+    }
+    return 1;
+}
+
+/* Distant light alone can be relit without rays. */
+static int isogi_trace__distant(const isogi_lighting *lighting) {
+    size_t i;
+    for (i = 0; i < lighting->light_count; i++)
+        if (lighting->lights[i].kind != ISOGI_LIGHT_DIRECTIONAL) return 0;
+    return 1;
+}
+
+static int isogi_trace__desc_valid(const isogi_trace_desc *d) {
+    if (!d || !d->pyramid) return 0;
+    if (d->mode != ISOGI_TRACE_IRRADIANCE && d->mode != ISOGI_TRACE_TRANSFER) return 0;
+    if (d->normals != ISOGI_NORMAL_SMOOTH && d->normals != ISOGI_NORMAL_TRILINEAR) return 0;
+    if (d->order < 0 || d->order > ISOGI_TRACE__MAX_ORDER || d->bounces < -1 || d->samples < 0 || d->samples > 1 << 24) return 0;
+    if (d->transfer_channels != 0 && d->transfer_channels != 1 && d->transfer_channels != 3) return 0;
+    if (!isogi_trace__finite((double)d->offset) || d->offset > 16) return 0;
+    if (!isogi_trace__finite(d->isovalue_min) || !isogi_trace__finite(d->isovalue_max) || d->isovalue_min > d->isovalue_max) return 0;
+    if (isogi_lighting_validate(&d->lighting) != ISOGI_OK || !isogi_trace__albedo_valid(d)) return 0;
+    return d->mode == ISOGI_TRACE_IRRADIANCE || isogi_trace__distant(&d->lighting);
+}
+
+/* Grey surfaces need one set of coefficients. */
+static int isogi_trace__grey(const isogi_trace_desc *d) {
+    size_t i;
+    int grey = d->albedo[0] >= d->albedo[1] && d->albedo[0] <= d->albedo[1] && d->albedo[0] >= d->albedo[2] && d->albedo[0] <= d->albedo[2];
+    for (i = 0; i < d->albedo_count; i++) {
+        const float *c = d->albedo_points[i].rgb;
+        grey = grey && c[0] >= c[1] && c[0] <= c[1] && c[0] >= c[2] && c[0] <= c[2];
+    }
+    return grey;
+}
+
+/* The scene of a valid description. What it allocates is freed by isogi_trace__sky_free, on failure too. */
+static isogi_result isogi_trace__scene_set(isogi_trace__scene *scene, const isogi_trace_desc *desc, const isogi_context *context) {
+    isogi_trace_desc *d = &scene->desc;
+    memset(scene, 0, sizeof *scene);
+    *d = *desc;
+    scene->pyramid = d->pyramid;
+    scene->volume = isogi_vol_volume(d->pyramid);
+    scene->flags = d->capped ? (uint32_t)ISOGI_RAY_CAPPED : 0;
+    scene->has_env = d->lighting.env.rgb || d->lighting.env.sh;
+    if (!d->order) d->order = 5;
+    if (!d->samples) d->samples = 64;
+    if (!(d->offset > 0 || d->offset < 0)) d->offset = 0.25f;
+    if (!d->transfer_channels) d->transfer_channels = isogi_trace__grey(d) ? 1 : 3;
+    isogi_trace__scene_matrix(scene);
+    if (d->mode == ISOGI_TRACE_TRANSFER) return ISOGI_OK;
+    return isogi_trace__sky_build(&scene->sky, &d->lighting.env, context);
+}
+
+/* ==== the texture: bricks of texels, there where light was asked for ================================================= */
+
+enum { ISOGI_TRACE__UNKNOWN = 0, ISOGI_TRACE__NO_SURFACE, ISOGI_TRACE__NOT_ASKED, ISOGI_TRACE__READABLE, ISOGI_TRACE__WANTED, ISOGI_TRACE__DONE };
+
+typedef struct isogi_trace__brick {
+    uint8_t state[ISOGI_TRACE__TEXELS];
+    int queued;
+    float *values; /* texels x values each; NULL until one of them is computed */
+    float error[ISOGI_TRACE__TEXELS];
+} isogi_trace__brick;
+
+typedef struct isogi_trace__ref {
+    isogi_trace__brick *brick;
+    size_t texel[3];
+    uint32_t slot;
+} isogi_trace__ref;
+
+struct isogi_trace {
+    isogi_trace__scene scene;
+    isogi_context context;
+    size_t lattice[3];
+    double first[3], last[3], step[3]; /* grid coordinates of texels */
+    int values;                        /* floats of a texel */
+    size_t size[3], brick_count;       /* bricks */
+    isogi_trace__brick **bricks;       /* NULL: nothing known (lazy) or nothing in it */
+    size_t *queue;                     /* bricks with wanted texels */
+    size_t queue_first, queue_count, queue_capacity;
+    uint64_t wanted, done;
+    isogi_trace__ref *batch;
+    isogi_counters *task_counters;
+    isogi_counters counters;
+    float light[3 * ISOGI_TRACE__MAX_ORDER * ISOGI_TRACE__MAX_ORDER]; /* TRANSFER: of the lighting, RGB interleaved */
+    double brightness; /* TRANSFER: mean luminance of the lighting, for the error */
+};
+
+/* Where and on which isosurface a texel lies. Its light is that at its own place, so a surface must pass there: the value at the
+   texel is inside of its own surface, hence one of the cells around it must reach lower. 0: it does not, or it has no normal. */
+static int isogi_trace__texel_site(const isogi_trace *t, const size_t texel[3], isogi_trace__site *site) {
+    const isogi_volume *v = t->scene.volume;
+    double grid[3], range[2];
+    size_t low[3], high[3];
+    int a, border = 0;
+    for (a = 0; a < 3; a++) {
+        double nearest;
+        grid[a] = texel[a] + 1 == t->lattice[a] && texel[a] ? t->last[a] : t->first[a] + (double)texel[a] * t->step[a];
+        nearest = floor(grid[a] + 0.5);
+        if (fabs(grid[a] - nearest) < 1e-9) grid[a] = nearest;
+        border |= grid[a] <= 0 || grid[a] >= (double)(v->size[a] - 1);
+    }
+    if (!isogi_trace__locate(v, grid, &site->place)) return 0;
+    site->isovalue = isogi_trace__value(v, &site->place);
+    if (!isogi_trace__finite(site->isovalue)) return 0;
+    for (a = 0; a < 3; a++) {
+        low[a] = site->place.cell[a], high[a] = low[a] + 1;
+        if (site->place.local[a] <= 0 && low[a]) low[a]--;
+        if (site->place.local[a] >= 1 && high[a] + 1 < v->size[a]) high[a]++;
+    }
+    isogi_trace__voxel_range(v, low, high, range);
+    if (!(range[0] < site->isovalue) && !(border && t->scene.desc.capped)) return 0;
+    return isogi_trace__site_normal(&t->scene, site);
+}
+
+/* Whether a surface of the isovalue interval may read one of the texels low..high: there are values on both sides of it, or within
+   it, in the lattice cells around them. */
+static int isogi_trace__in_range(const isogi_trace *t, const size_t low[3], const size_t high[3]) {
+    const isogi_trace_desc *d = &t->scene.desc;
+    const isogi_volume *v = t->scene.volume;
+    size_t first[3], last[3], voxels = 1;
+    double range[2];
+    int a;
+    if (isogi_trace__zero(d->isovalue_min) && isogi_trace__zero(d->isovalue_max)) return 1;
+    for (a = 0; a < 3; a++) {
+        double end = (double)(v->size[a] - 1);
+        first[a] = (size_t)isogi_trace__clamp(floor(t->first[a] + ((double)low[a] - 1) * t->step[a]), end);
+        last[a] = (size_t)isogi_trace__clamp(ceil(t->first[a] + ((double)high[a] + 1) * t->step[a]), end);
+        if (low[a] == 0) first[a] = 0;
+        if (high[a] + 1 >= t->lattice[a]) last[a] = v->size[a] - 1;
+        voxels *= last[a] - first[a] + 1;
+    }
+    isogi_trace__block_range(t->scene.pyramid, first, last, range);
+    if (!(range[0] < d->isovalue_max && range[1] >= d->isovalue_min)) return 0;
+    if (voxels > 125) return 1;
+    isogi_trace__voxel_range(v, first, last, range);
+    return range[0] < d->isovalue_max && range[1] >= d->isovalue_min;
+}
+
+static int isogi_trace__classify(const isogi_trace *t, const size_t texel[3]) {
+    isogi_trace__site site;
+    if (!isogi_trace__in_range(t, texel, texel)) return ISOGI_TRACE__NOT_ASKED;
+    return isogi_trace__texel_site(t, texel, &site) ? ISOGI_TRACE__WANTED : ISOGI_TRACE__NO_SURFACE;
+}
+
+static size_t isogi_trace__brick_of(const isogi_trace *t, const size_t texel[3], uint32_t *slot) {
+    size_t x = texel[0], y = texel[1], z = texel[2];
+    *slot = (uint32_t)(x % ISOGI_TRACE__SIDE + ISOGI_TRACE__SIDE * (y % ISOGI_TRACE__SIDE + ISOGI_TRACE__SIDE * (z % ISOGI_TRACE__SIDE)));
+    return x / ISOGI_TRACE__SIDE + t->size[0] * (y / ISOGI_TRACE__SIDE + t->size[1] * (z / ISOGI_TRACE__SIDE));
+}
+
+/* 0 if the slot lies beyond the lattice. */
+static int isogi_trace__texel_of(const isogi_trace *t, size_t brick, size_t slot, size_t texel[3]) {
+    texel[0] = brick % t->size[0] * ISOGI_TRACE__SIDE + slot % ISOGI_TRACE__SIDE;
+    texel[1] = brick / t->size[0] % t->size[1] * ISOGI_TRACE__SIDE + slot / ISOGI_TRACE__SIDE % ISOGI_TRACE__SIDE;
+    texel[2] = brick / t->size[0] / t->size[1] * ISOGI_TRACE__SIDE + slot / ISOGI_TRACE__SIDE / ISOGI_TRACE__SIDE;
+    return texel[0] < t->lattice[0] && texel[1] < t->lattice[1] && texel[2] < t->lattice[2];
+}
+
+static isogi_trace__brick *isogi_trace__brick_new(const isogi_trace *t) {
+    isogi_trace__brick *brick = (isogi_trace__brick *)isogi_allocate(&t->context, 1, sizeof *brick);
+    if (brick) memset(brick, 0, sizeof *brick);
+    return brick;
+}
+
+static void isogi_trace__brick_free(const isogi_trace *t, isogi_trace__brick *brick) {
+    if (!brick) return;
+    isogi_release(&t->context, brick->values, ISOGI_TRACE__TEXELS * (size_t)t->values, sizeof(float));
+    isogi_release(&t->context, brick, 1, sizeof *brick);
+}
+
+/* Room for one more brick in the queue. */
+static isogi_result isogi_trace__queue_reserve(isogi_trace *t) {
+    size_t capacity = t->queue_capacity ? 2 * t->queue_capacity : 64, *queue;
+    if (t->queue_count < t->queue_capacity) return ISOGI_OK;
+    if (t->queue_first) {
+        memmove(t->queue, t->queue + t->queue_first, (t->queue_count - t->queue_first) * sizeof *t->queue);
+        t->queue_count -= t->queue_first, t->queue_first = 0;
+        return ISOGI_OK;
+    }
+    queue = (size_t *)isogi_allocate(&t->context, capacity, sizeof *queue);
+    if (!queue) return ISOGI_NO_MEMORY;
+    if (t->queue) memcpy(queue, t->queue, t->queue_count * sizeof *queue);
+    isogi_release(&t->context, t->queue, t->queue_capacity, sizeof *queue);
+    t->queue = queue, t->queue_capacity = capacity;
+    return ISOGI_OK;
+}
+
+/* ==== the whole lattice or an interval of isovalues: all texels are classified at once =============================== */
+
+static void isogi_trace__classify_task(void *arg, size_t i) {
+    isogi_trace *t = (isogi_trace *)arg;
+    isogi_trace__brick *brick = t->bricks[t->queue[i]];
+    size_t slot, texel[3];
+    for (slot = 0; slot < ISOGI_TRACE__TEXELS; slot++) {
+        int inside = isogi_trace__texel_of(t, t->queue[i], slot, texel);
+        brick->state[slot] = (uint8_t)(inside ? isogi_trace__classify(t, texel) : ISOGI_TRACE__NOT_ASKED);
+    }
+}
+
+/* Bricks that hold no wanted texel are given back. */
+static void isogi_trace__keep_wanted(isogi_trace *t) {
+    size_t i, slot, kept = 0;
+    for (i = 0; i < t->queue_count; i++) {
+        isogi_trace__brick *brick = t->bricks[t->queue[i]];
+        uint64_t wanted = 0;
+        for (slot = 0; slot < ISOGI_TRACE__TEXELS; slot++) {
+            wanted += brick->state[slot] == ISOGI_TRACE__WANTED;
+            t->counters.texels_skipped += brick->state[slot] == ISOGI_TRACE__NO_SURFACE;
+        }
+        t->wanted += wanted;
+        brick->queued = 1;
+        if (wanted) t->queue[kept++] = t->queue[i];
+        else isogi_trace__brick_free(t, brick), t->bricks[t->queue[i]] = NULL;
+    }
+    t->queue_count = kept;
+}
+
+static isogi_result isogi_trace__classify_all(isogi_trace *t) {
+    isogi_context silent = t->context;
+    size_t brick, end[3];
+    isogi_result result;
+    int a;
+    silent.progress = NULL;
+    for (brick = 0; brick < t->brick_count; brick++) {
+        size_t texel[3];
+        isogi_trace__texel_of(t, brick, 0, texel);
+        for (a = 0; a < 3; a++) {
+            end[a] = texel[a] + ISOGI_TRACE__SIDE - 1;
+            if (end[a] >= t->lattice[a]) end[a] = t->lattice[a] - 1;
+        }
+        if (!isogi_trace__in_range(t, texel, end)) continue;
+        result = isogi_trace__queue_reserve(t);
+        if (result != ISOGI_OK) return result;
+        t->bricks[brick] = isogi_trace__brick_new(t);
+        if (!t->bricks[brick]) return ISOGI_NO_MEMORY;
+        t->queue[t->queue_count++] = brick;
+    }
+    result = isogi_parallel(&silent, t->queue_count, isogi_trace__classify_task, t, 0, 1);
+    if (result == ISOGI_OK) isogi_trace__keep_wanted(t);
+    return result;
+}
+
+/* ==== create and free ================================================================================================ */
+
+static isogi_result isogi_trace__set_lattice(isogi_trace *t) {
+    const isogi_trace_desc *d = &t->scene.desc;
+    int whole = 1, a;
+    for (a = 0; a < 3; a++) whole &= isogi_trace__zero(d->lattice_min[a]) && isogi_trace__zero(d->lattice_max[a]);
+    t->brick_count = 1;
+    for (a = 0; a < 3; a++) {
+        double end = (double)(t->scene.volume->size[a] - 1);
+        t->first[a] = whole ? 0 : d->lattice_min[a], t->last[a] = whole ? end : d->lattice_max[a];
+        if (!(t->first[a] >= 0) || !(t->last[a] >= t->first[a]) || !(t->last[a] <= end)) return ISOGI_INVALID;
+        t->lattice[a] = d->lattice[a] ? d->lattice[a] : (size_t)(t->last[a] - t->first[a] + 0.5) + 1;
+        if (t->lattice[a] > 0x7fffffff) return ISOGI_TOO_LARGE;
+        t->step[a] = t->lattice[a] > 1 ? (t->last[a] - t->first[a]) / (double)(t->lattice[a] - 1) : 0;
+        t->size[a] = (t->lattice[a] + ISOGI_TRACE__SIDE - 1) / ISOGI_TRACE__SIDE;
+        if (t->brick_count > SIZE_MAX / sizeof(void *) / ISOGI_TRACE__TEXELS / t->size[a]) return ISOGI_TOO_LARGE;
+        t->brick_count *= t->size[a];
+    }
+    return ISOGI_OK;
+}
+
+static void isogi_trace__set_light(isogi_trace *t, const float *light) {
+    double rgb[3];
+    int c;
+    memcpy(t->light, light, 3 * (size_t)t->scene.desc.order * (size_t)t->scene.desc.order * sizeof(float));
+    /* Y_0 = 1 / sqrt(4 pi): the mean radiance is that times the first coefficient */
+    for (c = 0; c < 3; c++) rgb[c] = (double)light[c] * 0.28209479177387814;
+    t->brightness = fabs(isogi_trace__luminance(rgb));
+}
+
+static isogi_result isogi_trace__set_up(isogi_trace *t, const isogi_trace_desc *desc) {
+    isogi_result result = isogi_trace__scene_set(&t->scene, desc, &t->context);
+    float light[3 * ISOGI_TRACE__MAX_ORDER * ISOGI_TRACE__MAX_ORDER];
+    if (result == ISOGI_OK) result = isogi_trace__set_lattice(t);
+    if (result != ISOGI_OK) return result;
+    t->values = desc->mode == ISOGI_TRACE_TRANSFER ? t->scene.desc.order * t->scene.desc.order * t->scene.desc.transfer_channels : 3;
+    t->bricks = (isogi_trace__brick **)isogi_allocate(&t->context, t->brick_count, sizeof *t->bricks);
+    t->batch = (isogi_trace__ref *)isogi_allocate(&t->context, ISOGI_TRACE__BATCH, sizeof *t->batch);
+    t->task_counters = (isogi_counters *)isogi_allocate(&t->context, ISOGI_TRACE__BATCH / ISOGI_TRACE__TASK, sizeof *t->task_counters);
+    if (t->bricks) memset(t->bricks, 0, t->brick_count * sizeof *t->bricks);
+    if (!t->bricks || !t->batch || !t->task_counters) return ISOGI_NO_MEMORY;
+    if (desc->mode == ISOGI_TRACE_TRANSFER) {
+        result = isogi_sh_project(light, t->scene.desc.order, &t->scene.desc.lighting, NULL);
+        if (result != ISOGI_OK) return result;
+        isogi_trace__set_light(t, light);
+    }
+    return desc->lazy ? ISOGI_OK : isogi_trace__classify_all(t);
+}
+
+ISOGI_API isogi_result isogi_trace_create(isogi_trace **trace, const isogi_trace_desc *desc, const isogi_context *context) {
+    isogi_trace *t;
+    isogi_result result;
+    if (!trace || !isogi_trace__desc_valid(desc)) return ISOGI_INVALID;
+    if (!context) context = isogi_vol_context(desc->pyramid);
+    t = (isogi_trace *)isogi_allocate(context, 1, sizeof *t);
+    if (!t) return ISOGI_NO_MEMORY;
+    memset(t, 0, sizeof *t);
+    t->context = *context;
+    result = isogi_trace__set_up(t, desc);
+    if (result == ISOGI_OK) *trace = t;
+    else isogi_trace_free(t);
+    return result;
+}
+
+ISOGI_API void isogi_trace_free(isogi_trace *trace) {
+    isogi_context context;
+    size_t i;
+    if (!trace) return;
+    context = trace->context;
+    for (i = 0; trace->bricks && i < trace->brick_count; i++) isogi_trace__brick_free(trace, trace->bricks[i]);
+    isogi_release(&context, trace->bricks, trace->brick_count, sizeof *trace->bricks);
+    isogi_release(&context, trace->queue, trace->queue_capacity, sizeof *trace->queue);
+    isogi_release(&context, trace->batch, ISOGI_TRACE__BATCH, sizeof *trace->batch);
+    isogi_release(&context, trace->task_counters, ISOGI_TRACE__BATCH / ISOGI_TRACE__TASK, sizeof *trace->task_counters);
+    isogi_trace__sky_free(&trace->scene.sky, &context);
+    isogi_release(&context, trace, 1, sizeof *trace);
+}
+
+/* ==== lookups ======================================================================================================== */
+
+/* The lattice cell of a world point and the place in it; points beyond the lattice are moved to its border. */
+static void isogi_trace__cell(const isogi_trace *t, const float point[3], size_t cell[3], double local[3]) {
+    double world[3], grid[3];
+    int a;
+    for (a = 0; a < 3; a++) world[a] = (double)point[a];
+    isogi_vol_to_grid(t->scene.pyramid, world, grid);
+    for (a = 0; a < 3; a++) {
+        size_t last = t->lattice[a] > 1 ? t->lattice[a] - 2 : 0;
+        double x = t->step[a] > 0 ? (grid[a] - t->first[a]) / t->step[a] : 0;
+        x = isogi_trace__clamp(x, (double)(t->lattice[a] - 1));
+        cell[a] = (size_t)x < last ? (size_t)x : last;
+        local[a] = x - (double)cell[a];
+    }
+}
+
+/* Corner i of a lattice cell and its weight; 0 where that is nothing. */
+static double isogi_trace__corner(const isogi_trace *t, const size_t cell[3], const double local[3], int i, size_t texel[3]) {
+    double weight = 1;
+    int a;
+    for (a = 0; a < 3; a++) {
+        int upper = i >> a & 1;
+        texel[a] = cell[a] + (size_t)upper;
+        if (texel[a] >= t->lattice[a]) return 0;
+        weight *= upper ? local[a] : 1 - local[a];
+    }
+    return weight;
+}
+
+/* What is known of a texel without working it out. */
+static int isogi_trace__state(const isogi_trace *t, const size_t texel[3]) {
+    uint32_t slot;
+    const isogi_trace__brick *brick = t->bricks[isogi_trace__brick_of(t, texel, &slot)];
+    if (!brick) return t->scene.desc.lazy ? ISOGI_TRACE__UNKNOWN : ISOGI_TRACE__NO_SURFACE;
+    return brick->state[slot];
+}
+
+/* Among the 4x4x4 texels around a lattice cell, the one nearest to the point (in texels; of equals the first) with that state or a
+   later one. 0 if there is none. */
+static int isogi_trace__nearest(const isogi_trace *t, const size_t cell[3], const double local[3], int state, size_t nearest[3]) {
+    double best = DBL_MAX;
+    int i, a;
+    for (i = 0; i < 64; i++) {
+        double distance = 0;
+        size_t texel[3];
+        int outside = 0;
+        for (a = 0; a < 3; a++) {
+            int shift = (i >> (2 * a) & 3) - 1;
+            double d = shift - local[a];
+            outside |= (shift < 0 && !cell[a]) || (shift > 0 && cell[a] + (size_t)shift >= t->lattice[a]);
+            texel[a] = cell[a] + (size_t)(shift + 1) - 1;
+            distance += d * d;
+        }
+        if (outside || !(distance < best) || isogi_trace__state(t, texel) < state) continue;
+        best = distance;
+        memcpy(nearest, texel, 3 * sizeof *nearest);
+    }
+    return best < DBL_MAX;
+}
+
+/* The texels and weights of a lookup: the cell's corners that are computed; where none of the eight has a surface, the nearest that
+   has one. The number of them; 0: the lookup is not ready. */
+static int isogi_trace__taps(const isogi_trace *t, const float point[3], const float *values[8], float error[8], double weight[8]) {
+    size_t cell[3], texel[3];
+    double local[3], total = 0;
+    int i, count = 0, pending = 0;
+    isogi_trace__cell(t, point, cell, local);
+    for (i = 0; i < 9; i++) {
+        const isogi_trace__brick *brick;
+        uint32_t slot;
+        double w = 1;
+        if (i < 8) {
+            w = isogi_trace__corner(t, cell, local, i, texel);
+            if (!(w > 0)) continue;
+            if (isogi_trace__state(t, texel) != ISOGI_TRACE__DONE) {
+                pending |= isogi_trace__state(t, texel) != ISOGI_TRACE__NO_SURFACE;
+                continue;
+            }
+        } else if (count || pending || !isogi_trace__nearest(t, cell, local, ISOGI_TRACE__DONE, texel)) break;
+        brick = t->bricks[isogi_trace__brick_of(t, texel, &slot)];
+        values[count] = brick->values + (size_t)slot * (size_t)t->values, error[count] = brick->error[slot], weight[count] = w;
+        total += w, count++;
+    }
+    for (i = 0; i < count; i++) weight[i] /= total;
+    return count;
+}
+
+/* Irradiance out of one texel's values. */
+static void isogi_trace__irradiance(const isogi_trace *t, const float *values, double rgb[3]) {
+    int count = t->scene.desc.order * t->scene.desc.order, channels = t->scene.desc.transfer_channels, k, c;
+    for (c = 0; c < 3; c++) {
+        rgb[c] = t->scene.desc.mode == ISOGI_TRACE_TRANSFER ? 0 : (double)values[c];
+        if (t->scene.desc.mode != ISOGI_TRACE_TRANSFER) continue;
+        for (k = 0; k < count; k++) rgb[c] += (double)values[k * channels + (channels == 1 ? 0 : c)] * (double)t->light[3 * k + c];
+    }
+}
+
+ISOGI_API isogi_result isogi_trace_sample(const isogi_trace *trace, const float (*points)[3], size_t count, float (*irradiance)[3],
+                                          float *error) {
+    size_t i;
+    int k, n, c;
+    if (!trace || (count && (!points || !irradiance))) return ISOGI_INVALID;
+    for (i = 0; i < count; i++) {
+        const float *values[8];
+        float errors[8];
+        double weight[8], sum[3] = {0, 0, 0}, variance = 0, rgb[3];
+        n = isogi_trace__taps(trace, points[i], values, errors, weight);
+        for (k = 0; k < n; k++) {
+            isogi_trace__irradiance(trace, values[k], rgb);
+            for (c = 0; c < 3; c++) sum[c] += weight[k] * rgb[c];
+            variance += weight[k] * (double)errors[k] * weight[k] * (double)errors[k]; /* texels are independent of each other */
+        }
+        for (c = 0; c < 3; c++) irradiance[i][c] = (float)sum[c];
+        if (trace->scene.desc.mode == ISOGI_TRACE_TRANSFER) variance *= trace->brightness * trace->brightness;
+        if (error) error[i] = n ? (float)sqrt(variance) : ISOGI_TRACE__NOT_READY;
+    }
+    return ISOGI_OK;
+}
+
+ISOGI_API isogi_result isogi_trace_sample_transfer(const isogi_trace *trace, const float (*points)[3], size_t count, float *transfer) {
+    size_t i;
+    int k, n, j;
+    if (!trace || trace->scene.desc.mode != ISOGI_TRACE_TRANSFER || (count && (!points || !transfer))) return ISOGI_INVALID;
+    for (i = 0; i < count; i++) {
+        const float *values[8];
+        float errors[8];
+        double weight[8];
+        n = isogi_trace__taps(trace, points[i], values, errors, weight);
+        for (j = 0; j < trace->values; j++) {
+            double sum = 0;
+            for (k = 0; k < n; k++) sum += weight[k] * (double)values[k][j];
+            transfer[i * (size_t)trace->values + (size_t)j] = (float)sum;
+        }
+    }
+    return ISOGI_OK;
+}
+
+ISOGI_API isogi_result isogi_trace_relight(isogi_trace *trace, const isogi_lighting *lighting) {
+    float light[3 * ISOGI_TRACE__MAX_ORDER * ISOGI_TRACE__MAX_ORDER];
+    isogi_result result;
+    if (!trace || trace->scene.desc.mode != ISOGI_TRACE_TRANSFER) return ISOGI_INVALID;
+    if (isogi_lighting_validate(lighting) != ISOGI_OK || !isogi_trace__distant(lighting)) return ISOGI_INVALID;
+    result = isogi_sh_project(light, trace->scene.desc.order, lighting, NULL);
+    if (result == ISOGI_OK) isogi_trace__set_light(trace, light);
+    return result;
+}
+
+ISOGI_API void isogi_trace_shape(const isogi_trace *trace, size_t lattice[3], int *order, int *channels) {
+    if (lattice) memcpy(lattice, trace->lattice, sizeof trace->lattice);
+    if (order) *order = trace->scene.desc.mode == ISOGI_TRACE_TRANSFER ? trace->scene.desc.order : 0;
+    if (channels) *channels = trace->scene.desc.mode == ISOGI_TRACE_TRANSFER ? trace->scene.desc.transfer_channels : 3;
+}
+
+ISOGI_API int isogi_trace_valid(const isogi_trace *trace, const size_t texel[3]) {
+    isogi_trace__site site;
+    int a;
+    for (a = 0; a < 3; a++)
+        if (texel[a] >= trace->lattice[a]) return 0;
+    return isogi_trace__texel_site(trace, texel, &site);
+}
+
+ISOGI_API void isogi_trace_counters(const isogi_trace *trace, isogi_counters *counters) {
+    const isogi_counters *c = &trace->counters;
+    counters->rays += c->rays, counters->blocks += c->blocks, counters->cells += c->cells, counters->cubics += c->cubics;
+    counters->texels += c->texels, counters->texels_skipped += c->texels_skipped;
+}
+
+/* ==== requests ======================================================================================================= */
+
+/* Classifies a texel and puts it on the list if it is to be computed. */
+static isogi_result isogi_trace__want(isogi_trace *t, const size_t texel[3], int classify_only) {
+    uint32_t slot;
+    size_t index = isogi_trace__brick_of(t, texel, &slot);
+    isogi_trace__brick *brick = t->bricks[index];
+    isogi_result result = isogi_trace__queue_reserve(t);
+    int state;
+    if (result != ISOGI_OK) return result;
+    if (!brick) brick = t->bricks[index] = isogi_trace__brick_new(t);
+    if (!brick) return ISOGI_NO_MEMORY;
+    if (brick->state[slot] == ISOGI_TRACE__UNKNOWN) {
+        state = isogi_trace__classify(t, texel);
+        /* a texel that has a surface is asked for only by the lookup that reads it */
+        brick->state[slot] = (uint8_t)(state == ISOGI_TRACE__WANTED ? ISOGI_TRACE__READABLE : state);
+        t->counters.texels_skipped += state == ISOGI_TRACE__NO_SURFACE;
+    }
+    if (classify_only || brick->state[slot] != ISOGI_TRACE__READABLE) return ISOGI_OK;
+    brick->state[slot] = ISOGI_TRACE__WANTED;
+    t->wanted++;
+    if (!brick->queued) t->queue[t->queue_count++] = index, brick->queued = 1;
+    return ISOGI_OK;
+}
+
+/* All eight texels lack a surface: the lookup will read the nearest that has one. */
+static isogi_result isogi_trace__want_nearest(isogi_trace *t, const size_t cell[3], const double local[3]) {
+    size_t texel[3];
+    isogi_result result = ISOGI_OK;
+    int i, a;
+    for (i = 0; i < 64 && result == ISOGI_OK; i++) {
+        int outside = 0;
+        for (a = 0; a < 3; a++) {
+            int shift = i >> (2 * a) & 3;
+            outside |= cell[a] + (size_t)shift < 1 || cell[a] + (size_t)shift - 1 >= t->lattice[a];
+            texel[a] = cell[a] + (size_t)shift - 1;
+        }
+        if (!outside) result = isogi_trace__want(t, texel, 1);
+    }
+    if (result == ISOGI_OK && isogi_trace__nearest(t, cell, local, ISOGI_TRACE__READABLE, texel)) result = isogi_trace__want(t, texel, 0);
+    return result;
+}
+
+ISOGI_API isogi_result isogi_trace_request(isogi_trace *trace, const float (*points)[3], size_t count) {
+    size_t i;
+    if (!trace || (count && !points)) return ISOGI_INVALID;
+    if (!trace->scene.desc.lazy) return ISOGI_OK;
+    for (i = 0; i < count; i++) {
+        size_t cell[3], texel[3];
+        double local[3];
+        isogi_result result = ISOGI_OK;
+        int k, lacking = 1;
+        isogi_trace__cell(trace, points[i], cell, local);
+        for (k = 0; k < 8 && result == ISOGI_OK; k++) {
+            if (!(isogi_trace__corner(trace, cell, local, k, texel) > 0)) continue;
+            result = isogi_trace__want(trace, texel, 0);
+            if (result == ISOGI_OK) lacking = lacking && isogi_trace__state(trace, texel) == ISOGI_TRACE__NO_SURFACE;
+        }
+        if (result == ISOGI_OK && lacking) result = isogi_trace__want_nearest(trace, cell, local);
+        if (result != ISOGI_OK) return result;
+    }
+    return ISOGI_OK;
+}
+
+/* ==== baking within a budget ========================================================================================= */
+
+static void isogi_trace__add(isogi_counters *to, const isogi_counters *from) {
+    to->rays += from->rays, to->blocks += from->blocks, to->cells += from->cells, to->cubics += from->cubics, to->texels += from->texels;
+}
+
+typedef struct isogi_trace__job {
+    isogi_trace *trace;
+    size_t count;
+} isogi_trace__job;
+
+static void isogi_trace__bake_task(void *arg, size_t task) {
+    const isogi_trace__job *job = (const isogi_trace__job *)arg;
+    isogi_trace *t = job->trace;
+    isogi_counters *counters = &t->task_counters[task];
+    size_t i = task * ISOGI_TRACE__TASK, end = i + ISOGI_TRACE__TASK < job->count ? i + ISOGI_TRACE__TASK : job->count;
+    memset(counters, 0, sizeof *counters);
+    for (; i < end; i++) {
+        const isogi_trace__ref *ref = &t->batch[i];
+        const size_t *x = ref->texel;
+        isogi_trace__site site;
+        if (!isogi_trace__texel_site(t, x, &site)) continue; /* cannot be: it was classified by the same function */
+        site.key = isogi_trace__key(isogi_trace__key(t->scene.desc.seed, 0),
+                                    (uint64_t)x[0] + (uint64_t)t->lattice[0] * ((uint64_t)x[1] + (uint64_t)t->lattice[1] * (uint64_t)x[2]));
+        isogi_trace__site_start(&t->scene, &site);
+        isogi_trace__gather_site(&t->scene, &site, ref->brick->values + (size_t)ref->slot * (size_t)t->values,
+                                 &ref->brick->error[ref->slot], counters);
+        ref->brick->state[ref->slot] = ISOGI_TRACE__DONE;
+        counters->texels++;
+    }
+}
+
+/* The next texels to compute, at most `limit`, with room for their values. Bricks stay in the queue until they are done. */
+static isogi_result isogi_trace__fill_batch(isogi_trace *t, size_t limit, size_t *count) {
+    size_t i, slot;
+    *count = 0;
+    for (i = t->queue_first; i < t->queue_count && *count < limit; i++) {
+        isogi_trace__brick *brick = t->bricks[t->queue[i]];
+        if (!brick->values) brick->values = (float *)isogi_allocate(&t->context, ISOGI_TRACE__TEXELS * (size_t)t->values, sizeof(float));
+        if (!brick->values) return *count ? ISOGI_OK : ISOGI_NO_MEMORY;
+        for (slot = 0; slot < ISOGI_TRACE__TEXELS && *count < limit; slot++) {
+            isogi_trace__ref *ref = &t->batch[*count];
+            if (brick->state[slot] != ISOGI_TRACE__WANTED) continue;
+            ref->brick = brick, ref->slot = (uint32_t)slot;
+            isogi_trace__texel_of(t, t->queue[i], slot, ref->texel);
+            ++*count;
+        }
+    }
+    return ISOGI_OK;
+}
+
+/* Takes bricks without wanted texels off the head of the queue. */
+static void isogi_trace__queue_advance(isogi_trace *t) {
+    size_t slot;
+    for (; t->queue_first < t->queue_count; t->queue_first++) {
+        isogi_trace__brick *brick = t->bricks[t->queue[t->queue_first]];
+        for (slot = 0; slot < ISOGI_TRACE__TEXELS; slot++)
+            if (brick->state[slot] == ISOGI_TRACE__WANTED) return;
+        brick->queued = 0;
+    }
+    t->queue_first = t->queue_count = 0;
+}
+
+/* One parallel run over the batch. */
+static isogi_result isogi_trace__bake_batch(isogi_trace *t, size_t count) {
+    isogi_trace__job job;
+    uint64_t total = t->wanted + t->done, before = t->counters.texels;
+    size_t tasks = (count + ISOGI_TRACE__TASK - 1) / ISOGI_TRACE__TASK, i;
+    isogi_result result;
+    job.trace = t, job.count = count;
+    memset(t->task_counters, 0, tasks * sizeof *t->task_counters);
+    result = isogi_parallel(&t->context, tasks, isogi_trace__bake_task, &job, (double)t->done / (double)total,
+                            (double)(t->done + count) / (double)total);
+    for (i = 0; i < tasks; i++) isogi_trace__add(&t->counters, &t->task_counters[i]);
+    t->done += t->counters.texels - before, t->wanted -= t->counters.texels - before;
+    return result;
+}
+
+ISOGI_API isogi_result isogi_trace_step(isogi_trace *trace, uint64_t max_rays, double *remaining) {
+    isogi_result result = ISOGI_OK;
+    uint64_t begin;
+    if (!trace) return ISOGI_INVALID;
+    begin = trace->counters.rays;
+    while (trace->wanted && result == ISOGI_OK) {
+        uint64_t used = trace->counters.rays - begin, each = (uint64_t)trace->scene.desc.samples * 2, limit = ISOGI_TRACE__BATCH;
+        size_t count;
+        if (max_rays && used >= max_rays) break;
+        if (trace->counters.texels) each = trace->counters.rays / trace->counters.texels + 1;
+        if (max_rays && (max_rays - used) / each < limit) limit = (max_rays - used) / each;
+        result = isogi_trace__fill_batch(trace, limit ? (size_t)limit : 1, &count);
+        if (result == ISOGI_OK) result = isogi_trace__bake_batch(trace, count);
+        isogi_trace__queue_advance(trace);
+    }
+    if (remaining && result == ISOGI_OK)
+        *remaining = trace->wanted ? (double)trace->wanted / (double)(trace->wanted + trace->done) : 0;
+    return result;
+}
+
+/* ==== a user's own points ============================================================================================ */
+
+typedef struct isogi_trace__points {
+    isogi_trace__scene scene;
+    const float (*points)[3], (*normals)[3];
+    size_t count;
+    float (*irradiance)[3], *error; /* scratch, so that cancelling leaves the caller's arrays alone */
+} isogi_trace__points;
+
+static void isogi_trace__gather_task(void *arg, size_t task) {
+    isogi_trace__points *job = (isogi_trace__points *)arg;
+    size_t i = task * ISOGI_TRACE__TASK, end = i + ISOGI_TRACE__TASK < job->count ? i + ISOGI_TRACE__TASK : job->count;
+    for (; i < end; i++) {
+        double world[3], grid[3], length;
+        isogi_trace__site site;
+        isogi_counters counters;
+        int a, usable;
+        memset(&counters, 0, sizeof counters);
+        memset(job->irradiance[i], 0, sizeof job->irradiance[i]);
+        job->error[i] = ISOGI_TRACE__NOT_READY;
+        for (a = 0; a < 3; a++) world[a] = (double)job->points[i][a];
+        isogi_vol_to_grid(job->scene.pyramid, world, grid);
+        usable = isogi_trace__finite3(grid) && isogi_trace__locate(job->scene.volume, grid, &site.place);
+        if (!usable) continue;
+        site.isovalue = isogi_trace__value(job->scene.volume, &site.place);
+        if (!isogi_trace__finite(site.isovalue)) continue;
+        if (job->normals) {
+            length = sqrt(isogi_trace__dot(job->normals[i], job->normals[i]));
+            if (!(length > 0) || !isogi_trace__finite(length)) continue;
+            for (a = 0; a < 3; a++) site.normal[a] = (float)((double)job->normals[i][a] / length);
+        } else if (!isogi_trace__site_normal(&job->scene, &site)) continue;
+        site.key = isogi_trace__key(isogi_trace__key(job->scene.desc.seed, 1), (uint64_t)i);
+        isogi_trace__site_start(&job->scene, &site);
+        isogi_trace__gather_site(&job->scene, &site, job->irradiance[i], &job->error[i], &counters);
+    }
+}
+
+ISOGI_API isogi_result isogi_trace_gather(const isogi_trace_desc *desc, const float (*points)[3], const float (*normals)[3], size_t count,
+                                          float (*irradiance)[3], float *error, const isogi_context *context) {
+    isogi_trace__points job;
+    isogi_result result;
+    if (!isogi_trace__desc_valid(desc) || desc->mode != ISOGI_TRACE_IRRADIANCE || (count && (!points || !irradiance))) return ISOGI_INVALID;
+    if (!count) return ISOGI_OK;
+    if (!context) context = isogi_vol_context(desc->pyramid);
+    memset(&job, 0, sizeof job);
+    job.points = points, job.normals = normals, job.count = count;
+    job.irradiance = (float(*)[3])isogi_allocate(context, count, sizeof *job.irradiance);
+    job.error = (float *)isogi_allocate(context, count, sizeof *job.error);
+    result = isogi_trace__scene_set(&job.scene, desc, context);
+    if (!job.irradiance || !job.error) result = ISOGI_NO_MEMORY;
+    if (result == ISOGI_OK)
+        result = isogi_parallel(context, (count - 1) / ISOGI_TRACE__TASK + 1, isogi_trace__gather_task, &job, 0, 1);
+    if (result == ISOGI_OK) memcpy(irradiance, job.irradiance, count * sizeof *irradiance);
+    if (result == ISOGI_OK && error) memcpy(error, job.error, count * sizeof *error);
+    isogi_trace__sky_free(&job.scene.sky, context);
+    isogi_release(context, job.irradiance, count, sizeof *job.irradiance);
+    isogi_release(context, job.error, count, sizeof *job.error);
+    return result;
+}
+
+#undef ISOGI_TRACE__PI
+#undef ISOGI_TRACE__SIDE
+#undef ISOGI_TRACE__TEXELS
+#undef ISOGI_TRACE__WAVE
+#undef ISOGI_TRACE__TASK
+#undef ISOGI_TRACE__BATCH
+#undef ISOGI_TRACE__MAX_DEPTH
+#undef ISOGI_TRACE__MAX_ORDER
+#undef ISOGI_TRACE__NOT_READY
+#endif /* ISOGI_TRACE_IMPLEMENTATION */
