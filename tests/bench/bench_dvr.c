@@ -1,0 +1,150 @@
+/* Run time against error of isogi_dvr.h.
+
+       build/bench/bench_dvr [--quick] OUT.csv
+
+   One thread, CPU seconds. Volumes are procedural, as the scenes name them: Marschner-Lobb and gyroid on the cube, here 128^3
+   (64^3 with --quick). Frames: standard view, shaded by visibility under a uniform sky and a directional light; error = RMSE of
+   sRGB values against steps of a sixteenth of a voxel, same visibility. Visibility: order 3 on a grid of 16^3 (8^3); error =
+   relative RMSE of all coefficients against 2048 rays. Methods: default; steps, rays = other settings of the same code. */
+#define ISOGI_IMPLEMENTATION
+#include "isogi_dvr.h"
+#include <stdio.h>
+#include <time.h>
+
+static const double pi = 3.14159265358979323846;
+static const isogi_context serial = {.threads = 1};
+static FILE *csv;
+static int N = 128, WIDTH = 256;
+static size_t points = 16;
+
+static double cpu_seconds(void) {
+    struct timespec t;
+    clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &t);
+    return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
+}
+
+static void row(const char *name, const char *scene, const char *method, const char *setting, double seconds, double error, double work, const char *unit) {
+    fprintf(csv, "isogi_dvr.h,%s-%s,%s,%s,%.6g,%.6g,%.6g,%s\n", name, scene, method, setting, seconds, error, work, unit);
+    fflush(csv);
+    fprintf(stderr, "  %-12s %-8s %-8s %-14s %8.3f s %9.3f M%s/s  error %.3g\n", name, scene, method, setting, seconds, work / seconds / 1e6, unit, error);
+}
+
+static double marschner_lobb(double x, double y, double z) {
+    return (1 - sin(pi * z / 2) + 0.25 * (1 + cos(2 * pi * 6 * cos(pi * sqrt(x * x + y * y) / 2)))) / 2.5;
+}
+
+static double gyroid(double x, double y, double z) {
+    x = 2 * pi * (x + 1), y = 2 * pi * (y + 1), z = 2 * pi * (z + 1);
+    return sin(x) * cos(y) + sin(y) * cos(z) + sin(z) * cos(x);
+}
+
+static double srgb(double x) {
+    x = x < 0 ? 0 : x > 1 ? 1 : x;
+    return x < 0.0031308 ? 12.92 * x : 1.055 * pow(x, 1 / 2.4) - 0.055;
+}
+
+static isogi_dvr *create(const isogi_dvr_desc *desc, const isogi_transfer *transfer) {
+    isogi_dvr *dvr = NULL;
+    if (isogi_dvr_create(&dvr, desc, &serial) != ISOGI_OK || isogi_dvr_set_transfer(dvr, transfer) != ISOGI_OK) exit(1);
+    return dvr;
+}
+
+/* Frames of one renderer with several steps; the last is the reference. */
+static void bench_frames(const char *scene, const isogi_pyramid *pyramid, const isogi_transfer *transfer, isogi_dvr_space space, isogi_dvr_shading shading) {
+    static const float sky[3] = {3.5449077f, 3.5449077f, 3.5449077f};
+    const isogi_light sun = {ISOGI_LIGHT_DIRECTIONAL, {1, 1, 1}, {2, 2, 2}, 0};
+    const isogi_lighting lighting = {.env = {.sh = sky, .sh_order = 1}, .lights = &sun, .light_count = 1};
+    const double steps[5] = {0.0625, 1, 0.5, 0.25, 0.125}, far = sqrt(3) / sin(pi / 8) / sqrt(1.5 * 1.5 + 1.2 * 1.2 + 2 * 2);
+    const isogi_view view = {.width = WIDTH, .height = WIDTH, .eye = {(float)(1.5 * far), (float)(1.2 * far), (float)(2 * far)}};
+    size_t pixels = (size_t)WIDTH * (size_t)WIDTH;
+    float(*image)[4] = (float(*)[4])malloc(pixels * sizeof *image), (*reference)[4] = (float(*)[4])malloc(pixels * sizeof *reference);
+    for (int s = 0; s < 5; s++) {
+        const isogi_dvr_desc desc = {.pyramid = pyramid, .space = space, .shading = shading, .step = steps[s], .visibility_step = 1, .directions = 16,
+                                     .grid = {8, 8, 8}};
+        isogi_dvr *dvr = create(&desc, transfer);
+        isogi_counters count = {0};
+        double sum = 0, seconds;
+        char setting[64];
+        if (isogi_dvr_step(dvr, 0, NULL) != ISOGI_OK) exit(1);
+        seconds = cpu_seconds();
+        if (isogi_dvr_render(dvr, &view, &lighting, s ? image : reference, NULL, &count) != ISOGI_OK) exit(1);
+        seconds = cpu_seconds() - seconds;
+        for (size_t i = 0; s && i < 4 * pixels; i++) {
+            double d = srgb((double)image[i / 4][i % 4]) - srgb((double)reference[i / 4][i % 4]);
+            if (i % 4 < 3) sum += d * d;
+        }
+        snprintf(setting, sizeof setting, "%s %s step %g", space ? "data" : "physical", shading ? "lit" : "unlit", steps[s]);
+        if (s) row("frame", scene, s == 2 ? "default" : "steps", setting, seconds, sqrt(sum / (double)(3 * pixels)), (double)count.samples, "sample");
+        isogi_dvr_free(dvr);
+    }
+    free(image), free(reference);
+}
+
+static void bench_visibility(const char *scene, const isogi_pyramid *pyramid, const isogi_transfer *transfer) {
+    const int rays[5] = {2048, 16, 32, 64, 256};
+    size_t count = points * points * points;
+    float *v = (float *)malloc(count * 9 * sizeof(float)), *reference = (float *)malloc(count * 9 * sizeof(float));
+    float(*places)[3] = (float(*)[3])malloc(count * sizeof *places);
+    for (size_t i = 0; i < count; i++) {
+        size_t c[3] = {i % points, i / points % points, i / points / points};
+        for (int a = 0; a < 3; a++) places[i][a] = (float)(2 * (double)c[a] / (double)(points - 1) - 1);
+    }
+    for (int s = 0; s < 5; s++) {
+        const isogi_dvr_desc desc = {.pyramid = pyramid, .shading = ISOGI_DVR_VISIBILITY, .directions = rays[s], .grid = {points, points, points}};
+        isogi_dvr *dvr = create(&desc, transfer);
+        double sum = 0, norm = 0, seconds = cpu_seconds();
+        char setting[64];
+        if (isogi_dvr_step(dvr, 0, NULL) != ISOGI_OK) exit(1);
+        seconds = cpu_seconds() - seconds;
+        if (isogi_dvr_sample_visibility(dvr, (const float(*)[3])places, count, s ? v : reference) != ISOGI_OK) exit(1);
+        for (size_t i = 0; s && i < 9 * count; i++) {
+            double d = (double)v[i] - (double)reference[i];
+            sum += d * d, norm += (double)reference[i] * (double)reference[i];
+        }
+        snprintf(setting, sizeof setting, "%d rays", rays[s]);
+        if (s) row("visibility", scene, rays[s] == 64 ? "default" : "rays", setting, seconds, sqrt(sum / norm), (double)count * rays[s], "ray");
+        isogi_dvr_free(dvr);
+    }
+    free(v), free(reference), free(places);
+}
+
+int main(int argc, char **argv) {
+    const char *path = NULL;
+    for (int i = 1; i < argc; i++) {
+        if (!strcmp(argv[i], "--quick")) N = 64, WIDTH = 128, points = 6;
+        else path = argv[i];
+    }
+    if (!path || !(csv = fopen(path, "w"))) return fprintf(stderr, "usage: %s [--quick] OUT.csv\n", argv[0]), 2;
+    fprintf(csv, "header,case,method,setting,seconds,error,work,unit\n");
+    for (int f = 0; f < 2; f++) {
+        size_t n = (size_t)N, i;
+        float *data = (float *)malloc(n * n * n * sizeof(float)), low = 1e9f, high = -1e9f;
+        for (i = 0; i < n * n * n; i++) {
+            double x = 2.0 * (double)(i % n) / (N - 1) - 1, y = 2.0 * (double)(i / n % n) / (N - 1) - 1, z = 2.0 * (double)(i / n / n) / (N - 1) - 1;
+            data[i] = (float)(f ? gyroid(x, y, z) : marschner_lobb(x, y, z));
+            low = fminf(low, data[i]), high = fmaxf(high, data[i]);
+        }
+        double middle = f ? 0 : 0.5, half = 0.05 * (double)(high - low), at[5] = {(double)low, middle - half, middle, middle + half, (double)high};
+        isogi_transfer_point p[5] = {{0, {.2f, .3f, .9f}, 0}, {0, {0, 0, 0}, 0}, {0, {.9f, .8f, .6f}, 0.357f}, {0, {0, 0, 0}, 0}, {0, {.9f, .2f, .2f}, 0}};
+        for (i = 0; i < 5; i++) p[i].value = at[i];
+        for (int a = 0; a < 3; a++)
+            for (i = 1; i < 4; i += 2) {
+                double u = (at[i] - at[i - 1 + 0]) / (at[i + 1] - at[i - 1]);
+                p[i].rgb[a] = p[i - 1].rgb[a] + (float)u * (p[i + 1].rgb[a] - p[i - 1].rgb[a]);
+            }
+        const isogi_transfer physical = {.points = p, .point_count = 5};
+        const double spacing = 2.0 / (N - 1);
+        const isogi_volume volume = {.data = data, .type = ISOGI_F32, .size = {n, n, n}, .spacing = {spacing, spacing, spacing}, .origin = {-1, -1, -1}};
+        isogi_pyramid *pyramid = NULL;
+        if (isogi_vol_build(&pyramid, &volume, &serial) != ISOGI_OK) return 1;
+        const char *scene = f ? "gyroid" : "ml";
+        bench_frames(scene, pyramid, &physical, ISOGI_DVR_PHYSICAL, ISOGI_DVR_UNLIT);
+        bench_frames(scene, pyramid, &physical, ISOGI_DVR_PHYSICAL, ISOGI_DVR_VISIBILITY);
+        bench_visibility(scene, pyramid, &physical);
+        p[2].extinction = (float)(1 / half); /* opacity 1 - 1/e for each passage of the tent */
+        bench_frames(scene, pyramid, &physical, ISOGI_DVR_DATA, ISOGI_DVR_UNLIT);
+        isogi_vol_free(pyramid);
+        free(data);
+    }
+    return fclose(csv) ? 1 : 0;
+}
