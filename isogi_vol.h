@@ -252,11 +252,20 @@ typedef struct isogi_mesh {
     uint32_t (*triangles)[3]; /* counter-clockwise seen from the low side */
     size_t vertex_count, triangle_count;
     size_t vertex_capacity, normal_capacity, triangle_capacity; /* as allocated */
+    void *scratch; /* the library's own, kept for the next call */
+    size_t scratch_size;
 } isogi_mesh;
 
-/* Indexed and watertight: every edge inside the box belongs to exactly two triangles. Vertices lie on lattice edges, exactly on
-   the surface. Same input, same bits, for any number of threads. */
+/* Indexed and watertight: every edge inside the box belongs to exactly two triangles, which run along it in opposite directions.
+   The mesh is a manifold with the topology of the trilinear surface, tunnels through cells included. Vertices lie on lattice edges,
+   and a few inside of cells where the topology asks for them, on the surface to within the rounding of a float. Where a voxel equals
+   the isovalue, several vertices meet in it and triangles may have no area. Cells that touch a voxel that is not finite have no
+   surface: the mesh is open there. Closed: the parts of the border that are inside belong to it, with outward normals at the voxels.
+   Same input, same bits, for any number of threads. ISOGI_TOO_LARGE for more than 2^32-1 vertices. Only the passes that come before
+   the writing of the mesh (half of the work) can be cancelled; on any failure the mesh stays as it was.
+   A mesh may be used for several volumes, one after the other, if their contexts have the same allocator. */
 ISOGI_API isogi_result isogi_vol_mesh(const isogi_pyramid *pyramid, const isogi_mesh_desc *desc, isogi_mesh *mesh);
+/* Any pyramid whose context has the allocator of the mesh; afterwards the mesh is zero and ready for use again. */
 ISOGI_API void isogi_vol_mesh_free(const isogi_pyramid *pyramid, isogi_mesh *mesh);
 
 #endif /* ISOGI_VOL_H */
@@ -1890,9 +1899,907 @@ ISOGI_API isogi_result isogi_vol_normals(const isogi_pyramid *pyramid, const iso
     return ISOGI_OK;
 }
 
+/* ==== surface inside a cell ========================================================================================== */
+
+/* Corner x + 2y + 4z. Edge 4a + n runs along axis a from the corner whose bits on axes a+1 and a+2 (cyclic) are those of n.
+   Face 2a + s is the side s of axis a. All of the topology below follows from these numbers: there is no table to be believed. */
+static int isogi_vol__edge_corner(int edge, int end) {
+    int axis = edge >> 2;
+    return (edge & 1) << ((axis + 1) % 3) | (edge >> 1 & 1) << ((axis + 2) % 3) | end << axis;
+}
+
+static int isogi_vol__edge_between(int corner, int other) {
+    int axis = (corner ^ other) >> 1;
+    return 4 * axis + (corner >> ((axis + 1) % 3) & 1) + 2 * (corner >> ((axis + 2) % 3) & 1);
+}
+
+/* The two faces that an edge lies on, as bits. */
+static unsigned isogi_vol__edge_faces(int edge) {
+    int axis = edge >> 2;
+    return 1u << (2 * ((axis + 1) % 3) + (edge & 1)) | 1u << (2 * ((axis + 2) % 3) + (edge >> 1 & 1));
+}
+
+/* The corners of a face, i = 0..3, counter-clockwise seen from outside of the cell; any i is taken modulo 4. */
+static int isogi_vol__face_corner(int face, int i) {
+    int axis = face >> 1, s = face & 1 ? i & 3 : 3 - (i & 3);
+    return (face & 1) << axis | (s == 1 || s == 2) << ((axis + 1) % 3) | (s >> 1) << ((axis + 2) % 3);
+}
+
+/* A power of two that brings numbers of the size `most` to where their products neither overflow nor vanish; 1 if they are there. */
+static double isogi_vol__scale_for(double most) {
+    int exponent;
+    if ((most > 1e-60 && most < 1e60) || !(most > 0)) return 1;
+    frexp(most, &exponent);
+    return ldexp(1, exponent < -1000 ? 1000 : -exponent);
+}
+
+/* Asymptotic decider (Nielson and Hamann 1991): on a face whose corners alternate, are the two inside ones joined? The bilinear
+   saddle has the sign of the difference of the diagonals' products; on the surface is inside. Both cells of the face form the
+   same products of the same four values, so they agree whatever rounding does. */
+static int isogi_vol__face_joins(const double f[8], unsigned code, int face) {
+    int first = code >> isogi_vol__face_corner(face, 0) & 1 ? 0 : 1;
+    double a = f[isogi_vol__face_corner(face, first)], c = f[isogi_vol__face_corner(face, first + 2)];
+    double b = f[isogi_vol__face_corner(face, first + 1)], d = f[isogi_vol__face_corner(face, first + 3)];
+    double s = isogi_vol__scale_for(isogi_vol__max(isogi_vol__max(fabs(a), fabs(b)), isogi_vol__max(fabs(c), fabs(d))));
+    return a * s * (c * s) >= b * s * (d * s);
+}
+
+static int isogi_vol__face_alternates(unsigned code, int face) {
+    int i, changes = 0;
+    for (i = 0; i < 4; i++)
+        changes += (int)((code >> isogi_vol__face_corner(face, i) ^ code >> isogi_vol__face_corner(face, i + 1)) & 1);
+    return changes == 4;
+}
+
+static void isogi_vol__merge(int region[8], int a, int b) {
+    int from = region[a], to = region[b], i;
+    for (i = 0; i < 8; i++)
+        if (region[i] == from) region[i] = to;
+}
+
+/* Where the surface crosses the six faces: from crossed edge e its line leads to edge next[e], inside being on its right as seen
+   from outside of the cell. Each edge is left once and reached once, so the lines form loops. Corners of one region are connected on
+   the surface of the cell. */
+static void isogi_vol__trace_faces(const double f[8], unsigned code, int next[12], int region[8]) {
+    int face, i, n;
+    for (i = 0; i < 8; i++) region[i] = i;
+    for (i = 0; i < 12; i++) next[i] = -1;
+    for (face = 0; face < 6; face++) {
+        int alternates = isogi_vol__face_alternates(code, face), joins = alternates && isogi_vol__face_joins(f, code, face);
+        for (i = 0; i < 4; i++) {
+            int a = isogi_vol__face_corner(face, i), b = isogi_vol__face_corner(face, i + 1), in_a = code >> a & 1, in_b = code >> b & 1;
+            if (in_a == in_b) isogi_vol__merge(region, a, b);
+            if (alternates && in_a == joins) isogi_vol__merge(region, a, isogi_vol__face_corner(face, i + 2));
+            if (in_a || !in_b) continue;
+            /* this edge leads in: on to the one that leads out, around the inside corners, or around the outside one if joined */
+            for (n = i + 1; n < i + 3 && code >> isogi_vol__face_corner(face, n + 1) & 1; n++) {}
+            if (joins) n = i + 3;
+            next[isogi_vol__edge_between(a, b)] =
+                isogi_vol__edge_between(isogi_vol__face_corner(face, n), isogi_vol__face_corner(face, n + 1));
+        }
+    }
+}
+
+typedef struct isogi_vol__loop {
+    int count, inside, outside; /* the regions on its two sides */
+    uint8_t edge[12];
+} isogi_vol__loop;
+
+/* At most four loops, since each has three edges or more. */
+static int isogi_vol__trace_loops(const double f[8], unsigned code, isogi_vol__loop loop[4]) {
+    int next[12], region[8], loops = 0, first;
+    isogi_vol__trace_faces(f, code, next, region);
+    for (first = 0; first < 12; first++) {
+        isogi_vol__loop *l = &loop[loops & 3];
+        int edge = first, end = code >> isogi_vol__edge_corner(first, 1) & 1;
+        if (next[first] < 0) continue;
+        l->count = 0;
+        l->inside = region[isogi_vol__edge_corner(first, end)], l->outside = region[isogi_vol__edge_corner(first, !end)];
+        while (next[edge] >= 0) {
+            int to = next[edge];
+            l->edge[l->count++] = (uint8_t)edge;
+            next[edge] = -1;
+            edge = to;
+        }
+        loops++;
+    }
+    return loops;
+}
+
+/* A point between p and q, one of which is inside and one outside, on the surface. */
+static void isogi_vol__surface_between(const double f[8], const double p[3], const double q[3], double out[3]) {
+    double low = 0, high = 1, s = 0.5;
+    int inside = isogi_vol__trilinear(f, p, NULL) >= 0, i, a;
+    for (i = 0; i < 54; i++) {
+        s = 0.5 * (low + high);
+        for (a = 0; a < 3; a++) out[a] = isogi_vol__lerp(p[a], q[a], s);
+        if ((isogi_vol__trilinear(f, out, NULL) >= 0) == inside) low = s;
+        else high = s;
+    }
+}
+
+/* A passage between two loops through the inside of the cell, or between none. In a slice of constant z the field is bilinear, and
+   the product difference g(z) of the slice's diagonals decides as on a face. g is quadratic: columns a, d (or b, c) that neither
+   end of their interval joins can be joined around its vertex only, and no second time. That is all that the inside of a cell can
+   add to what its faces show. Half-open inside means the surface of f + e for a vanishing e > 0: every sign below is that of a
+   polynomial in e, taken from its first coefficient that is not zero, and whole numbers up to 2^12 are decided exactly. */
+typedef struct isogi_vol__passage {
+    int inside;          /* of the passage: 1 or 0 */
+    int joined[2], cut;  /* columns x + 2y: those it joins, and one of those it separates */
+    double z[3];         /* where it begins, its middle, its end */
+} isogi_vol__passage;
+
+static int isogi_vol__sign(double first, double second, double third) {
+    double x = first > 0 || first < 0 ? first : second > 0 || second < 0 ? second : third;
+    return (x > 0) - (x < 0);
+}
+
+static int isogi_vol__find_passage(const double f[8], isogi_vol__passage *passage) {
+    double d[4], a, b, c, slope, sum, root[2];
+    int sign[4], down, i, p, q;
+    for (i = 0; i < 4; i++) d[i] = f[i + 4] - f[i];
+    a = d[0] * d[3] - d[1] * d[2];
+    b = (f[0] * d[3] + f[3] * d[0]) - (f[1] * d[2] + f[2] * d[1]);
+    c = f[0] * f[3] - f[1] * f[2];
+    slope = (d[0] + d[3]) - (d[1] + d[2]), sum = (f[0] + f[3]) - (f[1] + f[2]);
+    if (!(a > 0 || a < 0) || isogi_vol__sign(b * b - 4 * a * c, 2 * b * slope - 4 * a * sum, slope * slope) <= 0) return 0;
+    down = a < 0 ? -1 : 1;
+    if (isogi_vol__sign(-b, -slope, 0) * down <= 0 || isogi_vol__sign(2 * a + b, slope, 0) * down <= 0) return 0;
+    for (i = 0; i < 4; i++) sign[i] = isogi_vol__sign(2 * a * f[i] - b * d[i], 2 * a - slope * d[i], 0) * down >= 0;
+    p = a < 0 ? 0 : 1, q = 1 - p;
+    if (sign[p] != sign[3 - p] || sign[q] != sign[3 - q] || sign[p] == sign[q]) return 0;
+    passage->inside = sign[p];
+    passage->joined[0] = p, passage->joined[1] = 3 - p, passage->cut = q;
+    passage->z[1] = isogi_vol__clamp(-b / (2 * a), 1);
+    if (isogi_vol__quadratic_roots(c, b, a, root) < 2) root[0] = root[1] = passage->z[1];
+    passage->z[0] = isogi_vol__clamp(root[0], passage->z[1]);
+    passage->z[2] = isogi_vol__max(isogi_vol__clamp(root[1], 1), passage->z[1]);
+    return 1;
+}
+
+/* The two loops that a passage connects: each separates one of the regions it joins from the region it cuts. */
+static int isogi_vol__passage_loops(const double f[8], unsigned code, const isogi_vol__passage *passage, const isogi_vol__loop *loop, int loops,
+                                    int ends[2]) {
+    int next[12], region[8], n, i, cut = passage->cut;
+    isogi_vol__trace_faces(f, code, next, region);
+    if ((int)(code >> cut & 1) == passage->inside) cut += 4;
+    for (n = 0; n < 2; n++) {
+        int end = passage->joined[n];
+        if ((int)(code >> end & 1) != passage->inside) end += 4;
+        ends[n] = -1;
+        for (i = 0; i < loops; i++)
+            if ((passage->inside ? loop[i].inside : loop[i].outside) == region[end] &&
+                (passage->inside ? loop[i].outside : loop[i].inside) == region[cut])
+                ends[n] = i;
+    }
+    return ends[0] >= 0 && ends[1] >= 0 && ends[0] != ends[1];
+}
+
+/* Triangles of one cell. Vertices 0..11 are on its edges, the others in its inside; all of them on the surface. */
+typedef struct isogi_vol__patch {
+    int triangles, extras;
+    uint8_t triangle[24][3]; /* 12 edges and 4 inner vertices in a passage: at most 20 */
+    double extra[8][3];
+} isogi_vol__patch;
+
+static void isogi_vol__patch_add(isogi_vol__patch *patch, int a, int b, int c) {
+    uint8_t *t = patch->triangle[patch->triangles++];
+    t[0] = (uint8_t)a, t[1] = (uint8_t)b, t[2] = (uint8_t)c;
+}
+
+/* Cuts a loop into triangles by chords that run through the inside of the cell: a chord in a face could be the neighbour's chord
+   too, and then four triangles would meet there. 0 if there is no such way. */
+static int isogi_vol__patch_chords(isogi_vol__patch *patch, const isogi_vol__loop *loop) {
+    uint8_t split[12][12], stack[12][2]; /* split[i][j]: the third corner of the triangle on chord i-j, 0 if it cannot be */
+    int n = loop->count, length, i, j, k, depth = 1;
+    memset(split, 0, sizeof split);
+    for (length = 2; length < n; length++)
+        for (i = 0; i + length < n; i++) {
+            j = i + length;
+            if (length < n - 1 && isogi_vol__edge_faces(loop->edge[i]) & isogi_vol__edge_faces(loop->edge[j])) continue;
+            for (k = i + 1; k < j && !split[i][j]; k++)
+                if ((k == i + 1 || split[i][k]) && (j == k + 1 || split[k][j])) split[i][j] = (uint8_t)k;
+        }
+    if (!split[0][n - 1]) return 0;
+    stack[0][0] = 0, stack[0][1] = (uint8_t)(n - 1);
+    while (depth) {
+        i = stack[--depth][0], j = stack[depth][1], k = split[i][j];
+        isogi_vol__patch_add(patch, loop->edge[i], loop->edge[k], loop->edge[j]);
+        if (k > i + 1) stack[depth][0] = (uint8_t)i, stack[depth++][1] = (uint8_t)k;
+        if (j > k + 1) stack[depth][0] = (uint8_t)k, stack[depth++][1] = (uint8_t)j;
+    }
+    return 1;
+}
+
+static void isogi_vol__edge_point(const double f[8], int edge, double out[3]) {
+    int corner = isogi_vol__edge_corner(edge, 0), a;
+    double from = f[corner], to = f[isogi_vol__edge_corner(edge, 1)];
+    for (a = 0; a < 3; a++) out[a] = corner >> a & 1;
+    out[edge >> 2] = isogi_vol__clamp(from / (from - to), 1);
+}
+
+/* A fan around a point of the surface: from the middle of the loop along the gradient, or, where that does not meet the surface,
+   towards the corner that lies deepest on the other side. */
+static void isogi_vol__patch_fan(isogi_vol__patch *patch, const double f[8], const isogi_vol__loop *loop) {
+    double middle[3] = {0, 0, 0}, gradient[3], to[3], point[3], reach = ISOGI_VOL__UNLIMITED, most = -1, sign;
+    int i, a, centre = 12 + patch->extras, inside;
+    for (i = 0; i < loop->count; i++) {
+        isogi_vol__edge_point(f, loop->edge[i], point);
+        for (a = 0; a < 3; a++) middle[a] += point[a] / loop->count;
+        isogi_vol__patch_add(patch, loop->edge[i], loop->edge[(i + 1) % loop->count], centre);
+    }
+    inside = isogi_vol__trilinear(f, middle, gradient) >= 0, sign = inside ? -1 : 1;
+    for (a = 0; a < 3; a++) {
+        double g = sign * gradient[a], room = g > 0 ? 1 - middle[a] : middle[a];
+        if (g > 0 || g < 0) reach = isogi_vol__min(reach, room / fabs(g));
+    }
+    for (a = 0; a < 3; a++) to[a] = isogi_vol__clamp(reach < 1e200 ? middle[a] + reach * sign * gradient[a] : middle[a], 1);
+    if ((isogi_vol__trilinear(f, to, NULL) >= 0) == inside)
+        for (i = 0; i < 8; i++)
+            if ((f[i] >= 0) != inside && fabs(f[i]) > most)
+                for (most = fabs(f[i]), a = 0; a < 3; a++) to[a] = i >> a & 1;
+    isogi_vol__surface_between(f, middle, to, patch->extra[patch->extras++]);
+}
+
+/* The saddle of the slice at z. */
+static void isogi_vol__slice_saddle(const double f[8], double z, double out[3]) {
+    double v[4], scale;
+    int i;
+    for (i = 0; i < 4; i++) v[i] = isogi_vol__lerp(f[i], f[i + 4], z);
+    scale = (v[0] + v[3]) - (v[1] + v[2]);
+    scale = scale > 0 || scale < 0 ? 1 / scale : 0;
+    out[0] = isogi_vol__clamp((v[0] - v[2]) * scale, 1), out[1] = isogi_vol__clamp((v[0] - v[1]) * scale, 1), out[2] = z;
+}
+
+/* Twice the area that a closed polygon spans. */
+static void isogi_vol__span(const double (*p)[3], int n, double area[3]) {
+    int i, a;
+    area[0] = area[1] = area[2] = 0;
+    for (i = 0; i < n; i++) {
+        const double *u = p[i], *v = p[(i + 1) % n];
+        for (a = 0; a < 3; a++) area[a] += u[(a + 1) % 3] * v[(a + 2) % 3] - u[(a + 2) % 3] * v[(a + 1) % 3];
+    }
+}
+
+/* Triangles between a loop and the four inner vertices of a passage, which are taken in steps of `step` (1 or 3). */
+static void isogi_vol__patch_band(isogi_vol__patch *patch, const double (*points)[3], const isogi_vol__loop *loop, int ring, int step) {
+    int n = loop->count, start = 0, i = 0, j = 0, a, r;
+    double nearest = 4;
+    for (r = 0; r < 4; r++) {
+        double distance = 0;
+        for (a = 0; a < 3; a++) distance += fabs(points[0][a] - patch->extra[ring + r][a]);
+        if (distance < nearest) nearest = distance, start = r;
+    }
+    ring += 12;
+    while (i < n || j < 4) {
+        int at = ring + (start + j * step) % 4;
+        if (j * n < i * 4) {
+            isogi_vol__patch_add(patch, loop->edge[i % n], ring + (start + (j + 1) * step) % 4, at);
+            j++;
+        } else {
+            isogi_vol__patch_add(patch, loop->edge[i], loop->edge[(i + 1) % n], at);
+            i++;
+        }
+    }
+}
+
+/* Two loops and a ring around the narrowest part of the passage between them: where its slices begin and end the saddle itself is
+   on the surface, and in its middle slice so is a point on either side, on the way from the saddle to the separated corners. */
+static void isogi_vol__patch_passage(isogi_vol__patch *patch, const double f[8], const isogi_vol__passage *passage,
+                                     const isogi_vol__loop *one, const isogi_vol__loop *two) {
+    int ring = patch->extras, n, i, step;
+    double (*extra)[3] = patch->extra + ring, saddle[3], corner[3], points[2][12][3], area[3][3], turn = 0;
+    isogi_vol__slice_saddle(f, passage->z[0], extra[0]);
+    isogi_vol__slice_saddle(f, passage->z[2], extra[2]);
+    isogi_vol__slice_saddle(f, passage->z[1], saddle);
+    for (n = 0; n < 2; n++) {
+        int column = n ? 3 - passage->cut : passage->cut;
+        corner[0] = column & 1, corner[1] = column >> 1, corner[2] = passage->z[1];
+        isogi_vol__surface_between(f, saddle, corner, extra[1 + 2 * n]);
+    }
+    patch->extras += 4;
+    for (i = 0; i < one->count; i++) isogi_vol__edge_point(f, one->edge[i], points[0][i]);
+    for (i = 0; i < two->count; i++) isogi_vol__edge_point(f, two->edge[i], points[1][i]);
+    isogi_vol__span((const double(*)[3])points[0], one->count, area[0]);
+    isogi_vol__span((const double(*)[3])points[1], two->count, area[1]);
+    isogi_vol__span((const double(*)[3])extra, 4, area[2]);
+    for (i = 0; i < 3; i++) turn += (area[0][i] - area[1][i]) * area[2][i];
+    /* the ends of a tube turn against each other; which way the ring goes with the first is a matter of looks, not of topology */
+    step = turn < 0 ? 3 : 1;
+    isogi_vol__patch_band(patch, (const double(*)[3])points[0], one, ring, step);
+    isogi_vol__patch_band(patch, (const double(*)[3])points[1], two, ring, 4 - step);
+}
+
+/* The surface of one cell: every loop bounds a disk, but for two that a passage connects. */
+static void isogi_vol__patch_cell(isogi_vol__patch *patch, const double corner[8], unsigned code) {
+    isogi_vol__loop loop[4];
+    isogi_vol__passage passage;
+    double f[8], most = 0, scale;
+    int loops, ends[2] = {-1, -1}, i;
+    for (i = 0; i < 8; i++) most = isogi_vol__max(most, fabs(corner[i]));
+    scale = isogi_vol__scale_for(most);
+    for (i = 0; i < 8; i++) f[i] = corner[i] * scale;
+    patch->triangles = patch->extras = 0;
+    loops = isogi_vol__trace_loops(corner, code, loop);
+    if (loops < 2 || !isogi_vol__find_passage(f, &passage) || !isogi_vol__passage_loops(corner, code, &passage, loop, loops, ends))
+        ends[0] = ends[1] = -1;
+    else isogi_vol__patch_passage(patch, f, &passage, &loop[ends[0]], &loop[ends[1]]);
+    for (i = 0; i < loops; i++)
+        if (i != ends[0] && i != ends[1] && !isogi_vol__patch_chords(patch, &loop[i])) isogi_vol__patch_fan(patch, f, &loop[i]);
+}
+
+/* What a border closes with: the inside part of a face, a convex polygon or two triangles. Vertices 0..11 on edges, 12..19 corners. */
+static void isogi_vol__patch_cap(isogi_vol__patch *patch, const double f[8], unsigned code, int face) {
+    int polygon[8], n = 0, i;
+    patch->triangles = patch->extras = 0;
+    for (i = 0; i < 4; i++) {
+        int a = isogi_vol__face_corner(face, i), b = isogi_vol__face_corner(face, i + 1);
+        if (code >> a & 1) polygon[n++] = 12 + a;
+        if ((code >> a ^ code >> b) & 1) polygon[n++] = isogi_vol__edge_between(a, b);
+    }
+    if (isogi_vol__face_alternates(code, face) && !isogi_vol__face_joins(f, code, face)) {
+        int first = polygon[0] >= 12 ? 0 : 1;
+        isogi_vol__patch_add(patch, polygon[(first + 5) % 6], polygon[first], polygon[first + 1]);
+        isogi_vol__patch_add(patch, polygon[first + 2], polygon[first + 3], polygon[(first + 4) % 6]);
+        return;
+    }
+    for (i = 2; i < n; i++) isogi_vol__patch_add(patch, polygon[0], polygon[i - 1], polygon[i]);
+}
+
 /* ==== meshes ========================================================================================================= */
 
-/* (the section on meshes goes here) */
+/* Everything is done on bits, 64 cells at a time. Passes over the lattice's rows of voxels along x: which voxels are inside (read only
+   where the pyramid says that the surface may be); which cells may hold surface; which edges carry vertices, and how many of each kind
+   and how many triangles a row has; then, offsets known, every row writes its own part. Vertices are numbered row by row: x-edges,
+   y-edges and z-edges that begin in the row, inside voxels of a closed border, inner vertices of the row's cells. So a cell finds the
+   numbers of its vertices by counting along its four rows, and the order owes nothing to threads. */
+enum {
+    ISOGI_VOL__CORNERS = 3,  /* kinds 0..2 are the axes of edges */
+    ISOGI_VOL__INNER = 4,
+    ISOGI_VOL__KINDS = 5,
+    ISOGI_VOL__MESH_CHUNK = 256 /* voxels read at a time */
+};
+
+/* Triangles of the 256 cells of unlike corner signs, if they follow from the signs alone. */
+typedef struct isogi_vol__case {
+    uint8_t triangles, undecided;
+    uint8_t triangle[5][3];
+} isogi_vol__case;
+
+/* First what a row has of each kind, then where these begin. */
+typedef struct isogi_vol__mesh_row {
+    size_t triangle;
+    uint32_t vertex[ISOGI_VOL__KINDS];
+} isogi_vol__mesh_row;
+
+typedef struct isogi_vol__mesher {
+    const isogi_pyramid *pyramid;
+    double isovalue;
+    int closed, mirrored, nx, ny, nz;
+    size_t words, rows, rows_per_task, block_words; /* 64-bit words for a row of voxels, of blocks */
+    isogi_vol__case *cases;
+    isogi_vol__mesh_row *row;
+    uint64_t *block, *none, *inside, *valid;
+    uint64_t *carries[4]; /* vertices of the first four kinds; until they are known, [0] says which voxels are known and finite */
+    void (*pass)(const struct isogi_vol__mesher *m, int j, int k);
+    float (*positions)[3], (*normals)[3];
+    uint32_t (*triangles)[3];
+} isogi_vol__mesher;
+
+static int isogi_vol__lowest_bit(uint64_t x) {
+#if defined(__GNUC__) && !defined(__TINYC__)
+    return __builtin_ctzll(x);
+#else
+    int n = 0;
+    for (; !(x & 0xff); x >>= 8) n += 8;
+    for (; !(x & 1); x >>= 1) n++;
+    return n;
+#endif
+}
+
+static uint32_t isogi_vol__bits(uint64_t x) {
+    x -= x >> 1 & 0x5555555555555555u;
+    x = (x & 0x3333333333333333u) + (x >> 2 & 0x3333333333333333u);
+    x = (x + (x >> 4)) & 0x0f0f0f0f0f0f0f0fu;
+    return (uint32_t)(x * 0x0101010101010101u >> 56);
+}
+
+/* A row's words; rows that do not exist are empty. */
+static uint64_t *isogi_vol__bit_row(const isogi_vol__mesher *m, uint64_t *bits, int j, int k) {
+    if (j < 0 || k < 0 || j >= m->ny || k >= m->nz) return m->none;
+    return bits + ((size_t)j + (size_t)m->ny * (size_t)k) * m->words;
+}
+
+/* Word w of a row moved so that bit i says what voxel i + 1 is. */
+static uint64_t isogi_vol__ahead(const uint64_t *row, size_t w, size_t words) {
+    return row[w] >> 1 | (w + 1 < words ? row[w + 1] << 63 : 0);
+}
+
+static int isogi_vol__border_row(const isogi_vol__mesher *m, int j, int k, int last) {
+    return j == 0 || k == 0 || j == m->ny - last || k == m->nz - last;
+}
+
+/* ---- first pass: blocks that matter ---- */
+
+static void isogi_vol__mesh_blocks(void *arg, size_t bz) {
+    const isogi_vol__mesher *m = (const isogi_vol__mesher *)arg;
+    const isogi_level *level = &m->pyramid->level[0];
+    size_t bx, by;
+    for (by = 0; by < level->size[1]; by++) {
+        uint64_t *bits = m->block + (by + level->size[1] * bz) * m->block_words;
+        const float(*range)[2] = level->range + level->size[0] * (by + level->size[1] * bz);
+        int border = m->closed && (by == 0 || bz == 0 || by == level->size[1] - 1 || bz == level->size[2] - 1);
+        memset(bits, 0, m->block_words * sizeof *bits);
+        for (bx = 0; bx < level->size[0]; bx++) {
+            int capped = border || (m->closed && (bx == 0 || bx == level->size[0] - 1));
+            int matters = (double)range[bx][1] >= m->isovalue && (capped || (double)range[bx][0] < m->isovalue);
+            bits[bx / 64] |= (uint64_t)matters << bx % 64;
+        }
+    }
+}
+
+/* ---- second pass: voxels ---- */
+
+static void isogi_vol__mesh_read(const isogi_vol__mesher *m, int first, int count, int j, int k, uint64_t *inside, uint64_t *finite) {
+    double value[ISOGI_VOL__MESH_CHUNK], isovalue = m->isovalue;
+    int all = m->pyramid->all_finite;
+    while (count > 0) {
+        int n = ISOGI_VOL__MESH_CHUNK - first % 64, i = 0; /* up to a word's end */
+        if (n > count) n = count;
+        isogi_vol__row(&m->pyramid->volume, first, j, k, n, value);
+        while (i < n) {
+            int begin = first + i, end = 64 - begin % 64 < n - i ? 64 - begin % 64 : n - i, b;
+            uint64_t in = 0, known = 0;
+            for (b = 0; b < end; b++) in |= (uint64_t)(value[i + b] >= isovalue) << b;
+            if (all) known = ~(uint64_t)0 >> (64 - end);
+            else
+                for (b = 0; b < end; b++) known |= (uint64_t)isogi_vol__finite64(value[i + b]) << b;
+            inside[begin / 64] |= (in & known) << begin % 64, finite[begin / 64] |= known << begin % 64;
+            i += end;
+        }
+        first += n, count -= n;
+    }
+}
+
+/* Runs of blocks that matter, in any of the up to four rows of blocks that share this row of voxels. */
+static void isogi_vol__mesh_voxels(const isogi_vol__mesher *m, int j, int k) {
+    const isogi_level *level = &m->pyramid->level[0];
+    uint64_t *inside = isogi_vol__bit_row(m, m->inside, j, k), *finite = isogi_vol__bit_row(m, m->carries[0], j, k);
+    size_t w, y, z, y1 = (size_t)j / 4, z1 = (size_t)k / 4;
+    memset(inside, 0, m->words * sizeof *inside);
+    memset(finite, 0, m->words * sizeof *finite);
+    for (w = 0; w < m->block_words; w++) {
+        uint64_t blocks = 0;
+        for (z = k % 4 || !k ? z1 : z1 - 1; z <= z1 && z < level->size[2]; z++)
+            for (y = j % 4 || !j ? y1 : y1 - 1; y <= y1 && y < level->size[1]; y++)
+                blocks |= m->block[(y + level->size[1] * z) * m->block_words + w];
+        while (blocks) {
+            int first = isogi_vol__lowest_bit(blocks), run = ~(blocks >> first) ? isogi_vol__lowest_bit(~(blocks >> first)) : 64, x, count;
+            blocks &= first + run < 64 ? ~(uint64_t)0 << (first + run) : 0;
+            x = 4 * ((int)(64 * w) + first), count = 4 * run + 1 < m->nx - x ? 4 * run + 1 : m->nx - x;
+            isogi_vol__mesh_read(m, x, count, j, k, inside, finite);
+        }
+    }
+}
+
+/* ---- third pass: cells all of whose corners are known and finite ---- */
+
+static void isogi_vol__mesh_valid(const isogi_vol__mesher *m, int j, int k) {
+    uint64_t *valid = isogi_vol__bit_row(m, m->valid, j, k), here = 0, next;
+    const uint64_t *f[4];
+    size_t w;
+    int r, row = j < m->ny - 1 && k < m->nz - 1;
+    for (r = 0; r < 4; r++) f[r] = row ? isogi_vol__bit_row(m, m->carries[0], j + (r & 1), k + (r >> 1)) : m->none;
+    here = f[0][0] & f[1][0] & f[2][0] & f[3][0];
+    for (w = 0; w < m->words; w++, here = next) {
+        next = w + 1 < m->words ? f[0][w + 1] & f[1][w + 1] & f[2][w + 1] & f[3][w + 1] : 0;
+        valid[w] = here & (here >> 1 | next << 63);
+    }
+}
+
+/* ---- fourth and fifth pass: walking the cells of a row ---- */
+
+/* The cells from 64 w on, in the row of cells that begins at row (j,k) of the lattice, and the counters of their vertices: x-edges of
+   its four rows (y, z), y-edges of two (z), z-edges of two (y), corners of four. */
+typedef struct isogi_vol__cell_walk {
+    uint64_t in[4], ahead[4], surface, cap, carries[12];
+    const uint64_t *inside[4], *valid, *carry_row[12];
+    uint32_t vertex[12], inner;
+    int kinds, j, k, border;
+} isogi_vol__cell_walk;
+
+static void isogi_vol__walk_start(const isogi_vol__mesher *m, isogi_vol__cell_walk *walk, int j, int k) {
+    static const uint8_t kind[12] = {0, 0, 0, 0, 1, 1, 2, 2, 3, 3, 3, 3}, row[12] = {0, 1, 2, 3, 0, 2, 0, 1, 0, 1, 2, 3};
+    int n;
+    walk->j = j, walk->k = k, walk->kinds = m->closed ? 12 : 8, walk->border = m->closed && isogi_vol__border_row(m, j, k, 2);
+    for (n = 0; n < 4; n++) walk->inside[n] = isogi_vol__bit_row(m, m->inside, j + (n & 1), k + (n >> 1));
+    walk->valid = isogi_vol__bit_row(m, m->valid, j, k);
+    for (n = 0; n < walk->kinds; n++) {
+        int y = j + (row[n] & 1), z = k + (row[n] >> 1);
+        walk->carry_row[n] = isogi_vol__bit_row(m, m->carries[kind[n]], y, z);
+        walk->vertex[n] = m->row[(size_t)y + (size_t)m->ny * (size_t)z].vertex[kind[n]];
+    }
+    walk->inner = m->row[(size_t)j + (size_t)m->ny * (size_t)k].vertex[ISOGI_VOL__INNER];
+}
+
+/* Cells of word w that hold surface, and those with a face on a closed border that is not all outside. */
+static void isogi_vol__walk_word(const isogi_vol__mesher *m, isogi_vol__cell_walk *walk, size_t w) {
+    uint64_t some, all;
+    int n;
+    for (n = 0; n < 4; n++) walk->in[n] = walk->inside[n][w], walk->ahead[n] = isogi_vol__ahead(walk->inside[n], w, m->words);
+    some = walk->in[0] | walk->in[1] | walk->in[2] | walk->in[3] | walk->ahead[0] | walk->ahead[1] | walk->ahead[2] | walk->ahead[3];
+    all = walk->in[0] & walk->in[1] & walk->in[2] & walk->in[3] & walk->ahead[0] & walk->ahead[1] & walk->ahead[2] & walk->ahead[3];
+    walk->surface = walk->valid[w] & some & ~all;
+    walk->cap = 0;
+    if (!m->closed) return;
+    if (walk->border) walk->cap = ~(uint64_t)0;
+    if (w == 0) walk->cap |= 1;
+    if (w == (size_t)(m->nx - 2) / 64) walk->cap |= (uint64_t)1 << (m->nx - 2) % 64;
+    walk->cap &= walk->valid[w] & some;
+}
+
+static unsigned isogi_vol__walk_code(const isogi_vol__cell_walk *walk, int bit) {
+    unsigned code = 0;
+    int n;
+    for (n = 0; n < 4; n++) code |= (unsigned)(walk->in[n] >> bit & 1) << 2 * n | (unsigned)(walk->ahead[n] >> bit & 1) << (2 * n + 1);
+    return code;
+}
+
+/* The corner values of a cell; their signs are what the bits say, even where a compiler flushes small differences to zero. */
+static void isogi_vol__walk_corners(const isogi_vol__mesher *m, const isogi_vol__cell_walk *walk, int i, unsigned code, double corner[8]) {
+    int cell[3], n;
+    cell[0] = i, cell[1] = walk->j, cell[2] = walk->k;
+    isogi_vol__corners(m->pyramid, cell, m->isovalue, corner);
+    for (n = 0; n < 8; n++) {
+        if (code >> n & 1) corner[n] = isogi_vol__max(corner[n], 0);
+        else if (!(corner[n] < 0)) corner[n] = -DBL_MIN;
+    }
+}
+
+/* The border faces of a cell on which something is inside, as bits. */
+static unsigned isogi_vol__capped_faces(const isogi_vol__mesher *m, const isogi_vol__cell_walk *walk, int i, unsigned code) {
+    unsigned faces = (i == 0 ? 1u : 0u) | (i == m->nx - 2 ? 2u : 0u) | (walk->j == 0 ? 4u : 0u) | (walk->j == m->ny - 2 ? 8u : 0u) |
+                     (walk->k == 0 ? 16u : 0u) | (walk->k == m->nz - 2 ? 32u : 0u);
+    static const uint8_t corners[6] = {0x55, 0xaa, 0x33, 0xcc, 0x0f, 0xf0};
+    int f;
+    for (f = 0; f < 6; f++)
+        if (!(code & corners[f])) faces &= ~(1u << f);
+    return faces;
+}
+
+/* Triangles and inner vertices of the cells of a row. */
+static void isogi_vol__count_cells(const isogi_vol__mesher *m, int j, int k, isogi_vol__mesh_row *row) {
+    isogi_vol__cell_walk walk;
+    isogi_vol__patch patch;
+    double corner[8];
+    size_t w;
+    isogi_vol__walk_start(m, &walk, j, k);
+    for (w = 0; w < m->words; w++) {
+        uint64_t cells;
+        isogi_vol__walk_word(m, &walk, w);
+        for (cells = walk.surface | walk.cap; cells; cells &= cells - 1) {
+            int bit = isogi_vol__lowest_bit(cells), i = (int)(64 * w) + bit, f;
+            unsigned code = isogi_vol__walk_code(&walk, bit), caps = 0;
+            row->triangle += m->cases[code].triangles;
+            if (walk.cap >> bit & 1) caps = isogi_vol__capped_faces(m, &walk, i, code);
+            if (!m->cases[code].undecided && !caps) continue;
+            isogi_vol__walk_corners(m, &walk, i, code, corner);
+            if (m->cases[code].undecided) {
+                isogi_vol__patch_cell(&patch, corner, code);
+                row->triangle += (size_t)patch.triangles, row->vertex[ISOGI_VOL__INNER] += (uint32_t)patch.extras;
+            }
+            for (f = 0; f < 6; f++) {
+                if (!(caps >> f & 1)) continue;
+                isogi_vol__patch_cap(&patch, corner, code, f);
+                row->triangle += (size_t)patch.triangles;
+            }
+        }
+    }
+}
+
+/* Which edges and border voxels carry vertices: those of a crossing that some valid cell has. */
+static void isogi_vol__mesh_count(const isogi_vol__mesher *m, int j, int k) {
+    isogi_vol__mesh_row *row = &m->row[(size_t)j + (size_t)m->ny * (size_t)k];
+    const uint64_t *in = isogi_vol__bit_row(m, m->inside, j, k), *in_y = isogi_vol__bit_row(m, m->inside, j + 1, k);
+    const uint64_t *in_z = isogi_vol__bit_row(m, m->inside, j, k + 1), *v[4];
+    uint64_t *carries[4], before[3] = {0, 0, 0};
+    size_t w;
+    int n, border = m->closed && isogi_vol__border_row(m, j, k, 1);
+    memset(row, 0, sizeof *row);
+    for (n = 0; n < 4; n++) {
+        v[n] = isogi_vol__bit_row(m, m->valid, j - (n & 1), k - (n >> 1));
+        carries[n] = isogi_vol__bit_row(m, m->carries[n], j, k);
+    }
+    for (w = 0; w < m->words; w++) {
+        uint64_t y = v[0][w] | v[2][w], z = v[0][w] | v[1][w], x = y | z | v[3][w], touched = x | x << 1 | before[0];
+        carries[0][w] = (in[w] ^ isogi_vol__ahead(in, w, m->words)) & x;
+        carries[1][w] = (in[w] ^ in_y[w]) & (y | y << 1 | before[1]);
+        carries[2][w] = (in[w] ^ in_z[w]) & (z | z << 1 | before[2]);
+        before[0] = x >> 63, before[1] = y >> 63, before[2] = z >> 63;
+        if (m->closed) {
+            uint64_t ends = (w == 0 ? 1 : 0) | (w == (size_t)(m->nx - 1) / 64 ? (uint64_t)1 << (m->nx - 1) % 64 : 0);
+            carries[3][w] = in[w] & touched & (border ? ~(uint64_t)0 : ends);
+        }
+        for (n = 0; n < (m->closed ? 4 : 3); n++)
+            if (carries[n][w]) row->vertex[n] += isogi_vol__bits(carries[n][w]);
+    }
+    if (j < m->ny - 1 && k < m->nz - 1) isogi_vol__count_cells(m, j, k, row);
+}
+
+/* ---- last pass: vertices ---- */
+
+/* A vertex at a grid position, with what its normal has to be: outward from a closed border, or towards lower values. */
+static void isogi_vol__mesh_vertex(const isogi_vol__mesher *m, size_t at, const double grid[3], int corner) {
+    const isogi_pyramid *p = m->pyramid;
+    double world[3], n[3], local[3], length;
+    int cell[3], a, usable;
+    isogi_vol_to_world(p, grid, world);
+    for (a = 0; a < 3; a++) m->positions[at][a] = (float)world[a];
+    if (!m->normals) return;
+    if (corner)
+        for (a = 0; a < 3; a++) n[a] = (grid[a] > p->cells[a] - 0.5) - (grid[a] < 0.5);
+    else {
+        for (a = 0; a < 3; a++) cell[a] = isogi_vol__cell(grid[a], p->volume.size[a], &local[a]);
+        isogi_vol__bspline(p, cell, local, n);
+        for (a = 0; a < 3; a++) n[a] = -n[a];
+    }
+    isogi_vol__gradient_to_world(p, n, n);
+    length = sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
+    usable = isogi_vol__finite64(length) && length > 0;
+    for (a = 0; a < 3; a++) m->normals[at][a] = usable ? (float)(n[a] / length) : 0;
+}
+
+static void isogi_vol__emit_vertices(const isogi_vol__mesher *m, int j, int k) {
+    const isogi_vol__mesh_row *row = &m->row[(size_t)j + (size_t)m->ny * (size_t)k];
+    int kind;
+    for (kind = 0; kind < (m->closed ? 4 : 3); kind++) {
+        const uint64_t *carries = isogi_vol__bit_row(m, m->carries[kind], j, k);
+        size_t at = row->vertex[kind], w;
+        for (w = 0; w < m->words; w++) {
+            uint64_t bits;
+            for (bits = carries[w]; bits; bits &= bits - 1, at++) {
+                double grid[3], from, to;
+                int i = (int)(64 * w) + isogi_vol__lowest_bit(bits);
+                grid[0] = i, grid[1] = j, grid[2] = k;
+                if (kind < 3) {
+                    isogi_vol__row(&m->pyramid->volume, i, j, k, 1, &from);
+                    isogi_vol__row(&m->pyramid->volume, i + (kind == 0), j + (kind == 1), k + (kind == 2), 1, &to);
+                    grid[kind] += isogi_vol__clamp((m->isovalue - from) / (to - from), 1);
+                }
+                isogi_vol__mesh_vertex(m, at, grid, kind == ISOGI_VOL__CORNERS);
+            }
+        }
+    }
+}
+
+/* ---- last pass: triangles ---- */
+
+static void isogi_vol__emit_triangle(const isogi_vol__mesher *m, size_t *at, const uint32_t *id, const uint8_t t[3]) {
+    uint32_t *out = m->triangles[(*at)++];
+    out[0] = id[t[0]], out[1] = id[t[1 + m->mirrored]], out[2] = id[t[2 - m->mirrored]];
+}
+
+/* A cell whose signs do not tell all, and caps. id has room for 12 edges and 8 more: inner vertices or corners. */
+static void isogi_vol__emit_undecided(const isogi_vol__mesher *m, isogi_vol__cell_walk *walk, int i, unsigned code, unsigned caps,
+                                      size_t *at, uint32_t id[20]) {
+    isogi_vol__patch patch;
+    double corner[8], grid[3];
+    int n, a, f, bit = i % 64;
+    isogi_vol__walk_corners(m, walk, i, code, corner);
+    if (m->cases[code].undecided) {
+        isogi_vol__patch_cell(&patch, corner, code);
+        for (n = 0; n < patch.extras; n++) {
+            for (a = 0; a < 3; a++) grid[a] = (a == 0 ? i : a == 1 ? walk->j : walk->k) + patch.extra[n][a];
+            isogi_vol__mesh_vertex(m, walk->inner, grid, 0);
+            id[12 + n] = walk->inner++;
+        }
+        for (n = 0; n < patch.triangles; n++) isogi_vol__emit_triangle(m, at, id, patch.triangle[n]);
+    }
+    if (!caps) return;
+    for (n = 0; n < 4; n++) id[12 + 2 * n] = walk->vertex[8 + n], id[13 + 2 * n] = walk->vertex[8 + n] + (uint32_t)(walk->carries[8 + n] >> bit & 1);
+    for (f = 0; f < 6; f++) {
+        if (!(caps >> f & 1)) continue;
+        isogi_vol__patch_cap(&patch, corner, code, f);
+        for (n = 0; n < patch.triangles; n++) isogi_vol__emit_triangle(m, at, id, patch.triangle[n]);
+    }
+}
+
+static void isogi_vol__emit_cell(const isogi_vol__mesher *m, isogi_vol__cell_walk *walk, int i, size_t *at) {
+    const uint32_t *v = walk->vertex;
+    uint32_t id[20];
+    int n, bit = i % 64;
+    unsigned code = isogi_vol__walk_code(walk, bit), caps = 0;
+    const isogi_vol__case *one = &m->cases[code];
+    for (n = 0; n < 4; n++) id[n] = v[n];
+    id[4] = v[4], id[5] = v[5], id[6] = v[4] + (uint32_t)(walk->carries[4] >> bit & 1), id[7] = v[5] + (uint32_t)(walk->carries[5] >> bit & 1);
+    id[8] = v[6], id[9] = v[6] + (uint32_t)(walk->carries[6] >> bit & 1), id[10] = v[7], id[11] = v[7] + (uint32_t)(walk->carries[7] >> bit & 1);
+    for (n = 0; n < one->triangles; n++) isogi_vol__emit_triangle(m, at, id, one->triangle[n]);
+    if (walk->cap >> bit & 1) caps = isogi_vol__capped_faces(m, walk, i, code);
+    if (one->undecided || caps) isogi_vol__emit_undecided(m, walk, i, code, caps, at, id);
+}
+
+/* Walks from event to event: a cell with triangles, or a vertex of the row that the counters have to pass. */
+static void isogi_vol__mesh_emit(const isogi_vol__mesher *m, int j, int k) {
+    isogi_vol__cell_walk walk;
+    size_t at = m->row[(size_t)j + (size_t)m->ny * (size_t)k].triangle, w;
+    isogi_vol__emit_vertices(m, j, k);
+    if (j >= m->ny - 1 || k >= m->nz - 1 || m->row[(size_t)j + (size_t)m->ny * (size_t)k + 1].triangle == at) return;
+    isogi_vol__walk_start(m, &walk, j, k);
+    for (w = 0; w < m->words; w++) {
+        uint64_t events;
+        int n;
+        isogi_vol__walk_word(m, &walk, w);
+        events = walk.surface | walk.cap;
+        for (n = 0; n < walk.kinds; n++) events |= walk.carries[n] = walk.carry_row[n][w];
+        for (; events; events &= events - 1) {
+            int bit = isogi_vol__lowest_bit(events);
+            if ((walk.surface | walk.cap) >> bit & 1) isogi_vol__emit_cell(m, &walk, (int)(64 * w) + bit, &at);
+            for (n = 0; n < walk.kinds; n++) walk.vertex[n] += (uint32_t)(walk.carries[n] >> bit & 1);
+        }
+    }
+}
+
+/* ---- memory and order of passes ---- */
+
+static void isogi_vol__mesh_task(void *arg, size_t task) {
+    const isogi_vol__mesher *m = (const isogi_vol__mesher *)arg;
+    size_t row = task * m->rows_per_task, end = row + m->rows_per_task < m->rows ? row + m->rows_per_task : m->rows;
+    for (; row < end; row++) m->pass(m, (int)(row % (size_t)m->ny), (int)(row / (size_t)m->ny));
+}
+
+static isogi_result isogi_vol__mesh_pass(isogi_vol__mesher *m, const isogi_context *context, double from, double to,
+                                         void (*pass)(const isogi_vol__mesher *m, int j, int k)) {
+    m->pass = pass;
+    return isogi_parallel(context, (m->rows + m->rows_per_task - 1) / m->rows_per_task, isogi_vol__mesh_task, m, from, to);
+}
+
+static void isogi_vol__mesh_cases(isogi_vol__case cases[256]) {
+    isogi_vol__patch patch;
+    double corner[8];
+    int code, i, alternates;
+    memset(cases, 0, 256 * sizeof *cases);
+    for (code = 1; code < 255; code++) {
+        isogi_vol__loop loop[4];
+        for (i = 0; i < 8; i++) corner[i] = code >> i & 1 ? 1 : -1;
+        for (i = 0, alternates = 0; i < 6; i++) alternates |= isogi_vol__face_alternates((unsigned)code, i);
+        isogi_vol__patch_cell(&patch, corner, (unsigned)code);
+        if (alternates || patch.extras || patch.triangles > 5 || isogi_vol__trace_loops(corner, (unsigned)code, loop) > 1) {
+            cases[code].undecided = 1;
+            continue;
+        }
+        cases[code].triangles = (uint8_t)patch.triangles;
+        memcpy(cases[code].triangle, patch.triangle, (size_t)patch.triangles * sizeof *patch.triangle);
+    }
+}
+
+/* One block of scratch memory: the cases, which stay from call to call, then rows, then bits. */
+static isogi_result isogi_vol__mesh_scratch(isogi_vol__mesher *m, isogi_mesh *mesh) {
+    const isogi_pyramid *p = m->pyramid;
+    const isogi_level *level = &p->level[0];
+    size_t planes = m->closed ? 6 : 5, per_row, blocks, size, n;
+    uint64_t *bits;
+    m->words = ((size_t)m->nx + 63) / 64, m->block_words = (level->size[0] + 63) / 64;
+    per_row = sizeof *m->row + planes * m->words * 8;
+    if ((size_t)m->ny > SIZE_MAX / 4 / per_row / (size_t)m->nz) return ISOGI_TOO_LARGE;
+    m->rows = (size_t)m->ny * (size_t)m->nz, blocks = m->block_words * level->size[1] * level->size[2];
+    m->rows_per_task = m->rows / 4096 + 1;
+    size = 256 * sizeof *m->cases + (m->rows + 1) * sizeof *m->row + (planes * m->rows * m->words + m->words + blocks) * 8;
+    if (mesh->scratch_size < size) {
+        void *scratch = isogi_allocate(&p->context, 1, size);
+        if (!scratch) return ISOGI_NO_MEMORY;
+        isogi_release(&p->context, mesh->scratch, 1, mesh->scratch_size);
+        mesh->scratch = scratch, mesh->scratch_size = size;
+        isogi_vol__mesh_cases((isogi_vol__case *)scratch);
+    }
+    m->cases = (isogi_vol__case *)mesh->scratch;
+    m->row = (isogi_vol__mesh_row *)(void *)(m->cases + 256);
+    bits = (uint64_t *)(void *)(m->row + m->rows + 1);
+    m->none = bits, bits += m->words;
+    memset(m->none, 0, m->words * 8);
+    m->block = bits, bits += blocks;
+    m->inside = bits, bits += m->rows * m->words;
+    m->valid = bits, bits += m->rows * m->words;
+    for (n = 0; n < 4; n++) m->carries[n] = bits + (n < planes - 2 ? n : 0) * m->rows * m->words; /* the fourth only if closed */
+    return ISOGI_OK;
+}
+
+/* Counts become places; the totals stand behind the last row. */
+static isogi_result isogi_vol__mesh_offsets(isogi_vol__mesh_row *row, size_t rows) {
+    uint64_t vertices = 0, triangles = 0;
+    size_t r;
+    int n;
+    for (r = 0; r < rows; r++) {
+        uint64_t here = row[r].triangle;
+        for (n = 0; n < ISOGI_VOL__KINDS; n++) {
+            uint32_t count = row[r].vertex[n];
+            row[r].vertex[n] = (uint32_t)vertices;
+            vertices += count;
+            if (vertices > UINT32_MAX) return ISOGI_TOO_LARGE;
+        }
+        row[r].triangle = (size_t)triangles;
+        triangles += here;
+        if (triangles > SIZE_MAX / 64) return ISOGI_TOO_LARGE;
+    }
+    memset(&row[rows], 0, sizeof *row);
+    row[rows].vertex[0] = (uint32_t)vertices, row[rows].triangle = (size_t)triangles;
+    return vertices > SIZE_MAX / 64 ? ISOGI_TOO_LARGE : ISOGI_OK;
+}
+
+/* A larger buffer, with room to grow on; what is there when it is large enough. NULL when there is no memory. */
+static void *isogi_vol__mesh_room(const isogi_context *context, void *old, size_t capacity, size_t need, size_t *room) {
+    *room = capacity >= need ? capacity : need + need / 2;
+    return capacity >= need ? old : isogi_allocate(context, *room, 12);
+}
+
+/* All or nothing: the old buffers go when all of the new ones are there. */
+static isogi_result isogi_vol__mesh_reserve(const isogi_context *context, isogi_mesh *mesh, size_t vertices, size_t triangles, int normals) {
+    size_t room[3], need[3];
+    void *old[3], *got[3];
+    int n, complete = 1;
+    need[0] = vertices, need[1] = normals ? vertices : 0, need[2] = triangles;
+    old[0] = mesh->positions, old[1] = mesh->normals, old[2] = mesh->triangles;
+    got[0] = isogi_vol__mesh_room(context, old[0], mesh->vertex_capacity, need[0], &room[0]);
+    got[1] = isogi_vol__mesh_room(context, old[1], mesh->normal_capacity, need[1], &room[1]);
+    got[2] = isogi_vol__mesh_room(context, old[2], mesh->triangle_capacity, need[2], &room[2]);
+    for (n = 0; n < 3; n++) complete = complete && (got[n] || !need[n]);
+    if (!complete) {
+        for (n = 0; n < 3; n++)
+            if (got[n] != old[n]) isogi_release(context, got[n], room[n], 12);
+        return ISOGI_NO_MEMORY;
+    }
+    if (got[0] != old[0]) isogi_release(context, old[0], mesh->vertex_capacity, 12);
+    if (got[1] != old[1]) isogi_release(context, old[1], mesh->normal_capacity, 12);
+    if (got[2] != old[2]) isogi_release(context, old[2], mesh->triangle_capacity, 12);
+    if (!normals) {
+        isogi_release(context, got[1], room[1], 12);
+        got[1] = NULL, room[1] = 0;
+    }
+    mesh->positions = (float(*)[3])got[0], mesh->normals = (float(*)[3])got[1], mesh->triangles = (uint32_t(*)[3])got[2];
+    mesh->vertex_capacity = room[0], mesh->normal_capacity = room[1], mesh->triangle_capacity = room[2];
+    mesh->vertex_count = vertices, mesh->triangle_count = triangles;
+    return ISOGI_OK;
+}
+
+ISOGI_API isogi_result isogi_vol_mesh(const isogi_pyramid *pyramid, const isogi_mesh_desc *desc, isogi_mesh *mesh) {
+    isogi_vol__mesher m;
+    isogi_context context;
+    isogi_result result;
+    int a, empty;
+    if (!pyramid || !desc || !mesh || !isogi_vol__finite64(desc->isovalue)) return ISOGI_INVALID;
+    context = pyramid->context;
+    empty = !(pyramid->range[1] >= desc->isovalue) || (!desc->closed && pyramid->range[0] >= desc->isovalue);
+    for (a = 0; a < 3; a++) empty = empty || pyramid->cells[a] < 1;
+    if (empty) return isogi_vol__mesh_reserve(&context, mesh, 0, 0, desc->normals != 0);
+    memset(&m, 0, sizeof m);
+    m.pyramid = pyramid, m.isovalue = desc->isovalue, m.closed = desc->closed != 0;
+    m.mirrored = isogi_vol__determinant(pyramid->volume.axes) < 0;
+    m.nx = pyramid->cells[0] + 1, m.ny = pyramid->cells[1] + 1, m.nz = pyramid->cells[2] + 1;
+    result = isogi_vol__mesh_scratch(&m, mesh);
+    if (result == ISOGI_OK) result = isogi_parallel(&context, pyramid->level[0].size[2], isogi_vol__mesh_blocks, &m, 0, 0.05);
+    if (result == ISOGI_OK) result = isogi_vol__mesh_pass(&m, &context, 0.05, 0.3, isogi_vol__mesh_voxels);
+    if (result == ISOGI_OK) result = isogi_vol__mesh_pass(&m, &context, 0.3, 0.35, isogi_vol__mesh_valid);
+    if (result == ISOGI_OK) result = isogi_vol__mesh_pass(&m, &context, 0.35, 0.5, isogi_vol__mesh_count);
+    if (result == ISOGI_OK) result = isogi_vol__mesh_offsets(m.row, m.rows);
+    if (result == ISOGI_OK)
+        result = isogi_vol__mesh_reserve(&context, mesh, m.row[m.rows].vertex[0], m.row[m.rows].triangle, desc->normals != 0);
+    if (result != ISOGI_OK) return result;
+    m.positions = mesh->positions, m.normals = mesh->normals, m.triangles = mesh->triangles;
+    /* From here on the mesh is written: there is no way back, hence nobody to ask for one. */
+    context.progress = NULL;
+    result = isogi_vol__mesh_pass(&m, &context, 0.5, 1, isogi_vol__mesh_emit);
+    isogi_vol__report(&pyramid->context, 0, 1, 1, 1);
+    return result;
+}
+
+ISOGI_API void isogi_vol_mesh_free(const isogi_pyramid *pyramid, isogi_mesh *mesh) {
+    const isogi_context *context = pyramid ? &pyramid->context : NULL;
+    if (!mesh) return;
+    isogi_release(context, mesh->positions, mesh->vertex_capacity, 12);
+    isogi_release(context, mesh->normals, mesh->normal_capacity, 12);
+    isogi_release(context, mesh->triangles, mesh->triangle_capacity, 12);
+    isogi_release(context, mesh->scratch, 1, mesh->scratch_size);
+    memset(mesh, 0, sizeof *mesh);
+}
 
 #undef ISOGI_VOL__LEVELS
 #undef ISOGI_VOL__FAST_SIZE
