@@ -233,6 +233,12 @@ static int isogi_dvr__finite64(double x) {
     return (bits & 0x7ff0000000000000u) != 0x7ff0000000000000u;
 }
 
+static int isogi_dvr__is_nan(double x) {
+    uint64_t bits;
+    memcpy(&bits, &x, sizeof bits);
+    return (bits & 0x7fffffffffffffffu) > 0x7ff0000000000000u;
+}
+
 static int isogi_dvr__finite32(float x) {
     uint32_t bits;
     memcpy(&bits, &x, sizeof bits);
@@ -320,9 +326,9 @@ ISOGI_API void isogi_transfer_at(const isogi_transfer *transfer, double value, f
     int a;
     for (a = 0; a < 3; a++) rgb[a] = 0;
     *extinction = 0;
+    if (!transfer->point_count || isogi_dvr__is_nan(value)) return;
     if (value > 1e308) value = 1e308;
     if (value < -1e308) value = -1e308;
-    if (!transfer->point_count || !isogi_dvr__finite64(value)) return;
     isogi_dvr__colour(transfer->points, transfer->point_count, value, colour);
     for (a = 0; a < 3; a++) rgb[a] = (float)colour[a];
     *extinction = (float)isogi_dvr__extinction(transfer->points, transfer->point_count, value);
