@@ -1,0 +1,1118 @@
+/* viewer.c - volume in, globally lit picture out
+
+   One run is one picture: read the volume, find what every pixel sees (a rasterized mesh, or exact rays), bake light for the texels
+   that those points read, look it up per pixel, tone-map, write. build/viewer --help tells every option. */
+#define ISOGI_IMPLEMENTATION
+#include "isogi_trace.h"
+#include "isogi_dvr.h"
+
+#include "camera.h"
+#include "hdr.h"
+#include "picture.h"
+#include "png.h"
+#include "procedural.h"
+#include "raster.h"
+#include "transfer_file.h"
+#include "volume_file.h"
+
+#include <sys/resource.h>
+#include <time.h>
+
+#define PI 3.14159265358979323846
+#define MAX_LIGHTS 64
+#define MAX_SIDE 16384
+#define SECTION 0xfffffffeu /* where the view enters matter through the box or the clip plane */
+
+/* ---- what the command line says -------------------------------------------------------------------------------------------------- */
+
+enum { LAMBERT, PHONG, VICINITY, IRRADIANCE, TRANSFER, PATHTRACE, DVR, SCALE_INVARIANT, MODE_COUNT };
+static const char *const mode_name[MODE_COUNT] = {"lambert", "phong", "vicinity", "irradiance", "transfer", "pathtrace", "dvr", "scale-invariant"};
+static const char *const shading_name[3] = {"unlit", "visibility", "local"};
+
+typedef struct scene {
+    const char *name, *volume; /* "procedural:..." or a file below ISOGI_DATA */
+    int lit, rendered;         /* which of the two tables of scenes it stands in */
+    double spacing[3], isovalue;
+    float albedo[3];
+    const char *env;       /* of the lit isosurface */
+    int uniform_sky;       /* radiance 1 from everywhere */
+    double up[3];          /* 0 = +y */
+    const char *transfer;  /* NULL = the shape's own */
+    const char *dvr_env;
+    float sun[3], dvr_sky; /* irradiance of a directional light from (1 1 1); radiance of a uniform sky */
+    int order, directions;
+    size_t grid[3];
+} scene;
+
+#define TENT "-1.49989 0 .2 .3 .9\n-0.15 0 .2 .3 .9\n0 0.357 .9 .8 .6\n0.15 0 .9 .2 .2\n1.49989 0 .9 .2 .2\n"
+static const scene scenes[] = {
+    {.name = "engine", .volume = "engine_256x256x128_uint8.raw", .lit = 1, .rendered = 1, .isovalue = 80, .albedo = {.7f, .7f, .7f},
+     .env = "hdr/grace_256x128.hdr", .dvr_env = "hdr/grace_256x128.hdr", .order = 3, .directions = 32, .grid = {32, 32, 32},
+     .transfer = "0 0 .8 .8 .8\n70 0 .8 .8 .8\n100 .02 .8 .8 .8\n150 .05 .8 .8 .8\n180 .4 1 .7 .3\n255 .8 1 .6 .2\n"},
+    {.name = "bonsai", .volume = "bonsai_256x256x256_uint8.raw", .lit = 1, .rendered = 1, .isovalue = 40, .albedo = {.6f, .7f, .5f},
+     .env = "hdr/uffizi_256x128.hdr", .dvr_env = "hdr/grace_256x128.hdr", .up = {0, 0, -1}, .order = 2, .directions = 64, .grid = {64, 64, 32},
+     .transfer = "0 0 .3 .7 .2\n25 0 .3 .7 .2\n40 .15 .3 .7 .2\n80 .2 .5 .35 .2\n160 .6 .6 .6 .6\n255 .9 .7 .7 .7\n"},
+    {.name = "cthead", .volume = "cthead8_256x256x99_uint8.raw", .lit = 1, .spacing = {1, 1, 2}, .isovalue = 130, .albedo = {.8f, .8f, .8f},
+     .env = "hdr/grace_256x128.hdr"},
+    {.name = "engine-block", .volume = "procedural:engine-block", .lit = 1, .isovalue = 90, .albedo = {.7f, .7f, .7f}},
+    {.name = "cavity", .volume = "procedural:cavity", .lit = 1, .isovalue = 0, .albedo = {.5f, .5f, .5f}, .uniform_sky = 1},
+    {.name = "furnace", .volume = "procedural:engine-block", .lit = 1, .isovalue = 90, .albedo = {1, 1, 1}, .uniform_sky = 1},
+    {.name = "ml256", .volume = "procedural:marschner-lobb:256", .rendered = 1, .isovalue = .5, .sun = {2, 2, 2}, .dvr_sky = 1, .order = 3,
+     .directions = 32, .grid = {64, 64, 64}},
+    {.name = "gyroid256", .volume = "procedural:gyroid:256", .rendered = 1, .isovalue = 0, .sun = {2, 2, 2}, .dvr_sky = 1, .order = 3,
+     .directions = 32, .grid = {64, 64, 64}, .transfer = TENT},
+    {.name = "fuel", .volume = "fuel_64x64x64_uint8.raw", .rendered = 1, .isovalue = 30, .sun = {3, 3, 3}, .order = 4, .directions = 128,
+     .grid = {64, 64, 64}, .transfer = "0 0 .2 .4 1\n10 0 .2 .4 1\n40 .1 .2 .4 1\n120 .5 1 .8 .2\n255 1 1 .2 .1\n"},
+    {.name = "torus-sphere-plane", .volume = "procedural:torus-sphere-plane", .rendered = 1, .isovalue = .5, .sun = {3, 3, 3}, .order = 4,
+     .directions = 128, .grid = {64, 64, 64}}};
+#define SCENE_COUNT (sizeof scenes / sizeof scenes[0])
+
+typedef struct options {
+    const char *volume, *env, *tf, *out;
+    const scene *scene;
+    int width, height, mode, raycast, bounces, samples, threads, stats, antialias, shading, order, directions;
+    int has_size, has_iso, has_mode, has_spacing, has_albedo, has_clip, has_camera, has_up, has_nan, has_shading, has_bounces;
+    double isovalue, spacing[3], clip[4], azimuth, elevation, distance, up[3], exposure, nan_value;
+    float albedo[3];
+    isogi_light lights[MAX_LIGHTS];
+    size_t light_count, lattice[3], grid[3];
+} options;
+
+typedef struct viewer {
+    options o;
+    isogi_context context;
+    isogi_volume volume;
+    isogi_pyramid *pyramid;
+    double range[2], isovalue, rotation[9], radius;
+    float albedo[3];
+    const procedural_shape *shape;
+    camera view;
+    hdr_image env;
+    float sky[4 * 3]; /* SH of the default sky */
+    isogi_lighting lighting;
+    float ambient[9][3]; /* SH of the unshadowed irradiance of the environment alone */
+    double key[3], key_light[3], mean_light[3];
+    transfer_file transfer;
+    isogi_mesh mesh;
+    float **inverse; /* [antialias][pixels]: 1 / depth; and what is seen there */
+    uint32_t **seen;
+    isogi_trace *trace;
+    float (*picture)[4];
+    isogi_counters counters;
+    double started, said;
+    uint64_t memory, memory_peak;
+    char error[FILE_ERROR_SIZE];
+    char path[PATH_MAX];
+} viewer;
+
+static int fail(viewer *v, const char *what, isogi_result result) {
+    return file_fail(v->error, "%s: %s", what, isogi_result_string(result));
+}
+
+/* Exactly `count` numbers parted by `separator`, each low..high; 0 otherwise. */
+static int numbers(const char *text, char separator, int count, double low, double high, double *out) {
+    double x[4];
+    char *end;
+    for (int i = 0; i < count; i++, text = end + 1) {
+        x[i] = strtod(text, &end);
+        if (end == text || !(x[i] >= low && x[i] <= high) || *end != (i + 1 < count ? separator : 0)) return 0;
+    }
+    memcpy(out, x, (size_t)count * sizeof *x);
+    return 1;
+}
+
+typedef struct option {
+    const char *name, *argument, *help;
+    enum { FLAG, INTEGER, NUMBERS, FLOATS, SIZES, TEXT, OTHER } kind;
+    size_t offset, has; /* of the value and of its "was given" in options; has 0 = not asked */
+    int count;
+    double low, high;
+    int (*other)(viewer *, const char *); /* 1 = understood */
+    const char *allowed;
+} option;
+
+static int parse_scene(viewer *v, const char *text) {
+    for (size_t i = 0; i < SCENE_COUNT; i++)
+        if (!strcmp(text, scenes[i].name)) v->o.scene = &scenes[i];
+    return v->o.scene && !strcmp(text, v->o.scene->name);
+}
+
+static int parse_name(const char *text, const char *const *names, int count, int *out) {
+    for (int i = 0; i < count; i++)
+        if (!strcmp(text, names[i])) return *out = i, 1;
+    return 0;
+}
+static int parse_mode(viewer *v, const char *text) { return parse_name(text, mode_name, MODE_COUNT, &v->o.mode); }
+static int parse_shading(viewer *v, const char *text) { return parse_name(text, shading_name, 3, &v->o.shading); }
+static int parse_lookup(viewer *v, const char *text) { return (void)v, !strcmp(text, "trilinear"); }
+
+static int parse_size(viewer *v, const char *text) {
+    double x[2];
+    if (!numbers(text, 'x', 2, 1, MAX_SIDE, x) || x[0] != floor(x[0]) || x[1] != floor(x[1])) return 0;
+    v->o.width = (int)x[0], v->o.height = (int)x[1];
+    return 1;
+}
+
+static int parse_camera(viewer *v, const char *text) {
+    double x[3];
+    if (!numbers(text, ',', 3, -1e4, 1e4, x) || fabs(x[1]) > 90 || !(x[2] > 0)) return 0;
+    v->o.azimuth = x[0], v->o.elevation = x[1], v->o.distance = x[2];
+    return 1;
+}
+
+static int parse_up(viewer *v, const char *text) {
+    double x[3];
+    if (!numbers(text, ',', 3, -1e6, 1e6, x) || !vector_normalize(x)) return 0;
+    memcpy(v->o.up, x, sizeof x);
+    return 1;
+}
+
+static int parse_clip(viewer *v, const char *text) {
+    double x[4];
+    if (!numbers(text, ',', 4, -1e9, 1e9, x) || !(vector_dot(x, x) > 1e-18)) return 0;
+    memcpy(v->o.clip, x, sizeof x);
+    return 1;
+}
+
+/* KIND:X,Y,Z:R,G,B[:RADIUS] */
+static int parse_light(viewer *v, const char *text) {
+    static const char *const kind_name[3] = {"directional", "point", "sphere"};
+    char part[4][64];
+    int parts = 0, kind;
+    double place[3], rgb[3], radius = 0;
+    isogi_light *light = &v->o.lights[v->o.light_count];
+    for (; parts < 4; parts++) {
+        size_t length = strcspn(text, ":");
+        if (length > 63) return 0;
+        memcpy(part[parts], text, length), part[parts][length] = 0;
+        text += length;
+        if (!*text) break;
+        text++;
+    }
+    if (parts < 2 || parts > 3 || v->o.light_count >= MAX_LIGHTS || !parse_name(part[0], kind_name, 3, &kind)) return 0;
+    if (!numbers(part[1], ',', 3, -1e9, 1e9, place) || !numbers(part[2], ',', 3, 0, 1e12, rgb)) return 0;
+    if (parts == 3 && !numbers(part[3], ',', 1, 0, kind == 0 ? 90 : 1e9, &radius)) return 0;
+    if (kind == ISOGI_LIGHT_DIRECTIONAL && !vector_normalize(place)) return 0;
+    if (kind == ISOGI_LIGHT_SPHERE && !(radius > 0)) return 0;
+    light->kind = (isogi_light_kind)kind;
+    light->radius = (float)(kind == ISOGI_LIGHT_DIRECTIONAL ? radius * PI / 180 : radius);
+    for (int i = 0; i < 3; i++) light->vector[i] = (float)place[i], light->rgb[i] = (float)rgb[i];
+    v->o.light_count++;
+    return 1;
+}
+
+#define AT(field) offsetof(options, field)
+static const option option_list[] = {
+    {"--scene", "NAME", "a canonical scene in place of VOLUME: volume, isovalue, light and material belong to it", OTHER, 0, 0, 0, 0, 0, parse_scene,
+     "engine bonsai cthead engine-block cavity furnace ml256 gyroid256 fuel torus-sphere-plane"},
+    {"--mode", "NAME", "what light does (below); default irradiance", OTHER, 0, AT(has_mode), 0, 0, 0, parse_mode,
+     "lambert phong vicinity irradiance transfer pathtrace dvr scale-invariant"},
+    {"--out", "FILE.png", "the picture; default isogi.png", TEXT, AT(out), 0, 0, 0, 0, 0, ""},
+    {"--size", "WxH", "pixels; default 900x900, 512x512 for dvr and scale-invariant", OTHER, 0, AT(has_size), 0, 0, 0, parse_size, "WxH, each 1 to 16384"},
+    {"--iso", "V", "isovalue; default the shape's own, or a threshold found in the histogram", NUMBERS, AT(isovalue), AT(has_iso), 1, -1e300, 1e300, 0, "a number"},
+    {"--raycast", 0, "exact rays instead of the rasterized mesh", FLAG, AT(raycast), 0, 0, 0, 0, 0, 0},
+    {"--clip", "A,B,C,D", "keep only a x + b y + c z + d >= 0 (world); what is cut shows the data", OTHER, 0, AT(has_clip), 0, 0, 0, parse_clip,
+     "four numbers, the first three not all zero"},
+    {"--spacing", "X,Y,Z", "size of a voxel; default 1,1,1", NUMBERS, AT(spacing), AT(has_spacing), 3, 1e-9, 1e9, 0, "three numbers, 1e-9 to 1e9"},
+    {"--nan", "V", "put this value in place of voxels that are not finite", NUMBERS, AT(nan_value), AT(has_nan), 1, -1e300, 1e300, 0, "a number"},
+    {"--camera", "AZ,EL,DIST", "degrees about and above the horizon of --up; distance in radii of the box's sphere", OTHER, 0, AT(has_camera), 0, 0, 0,
+     parse_camera, "azimuth in degrees, elevation -90 to 90, distance above 0"},
+    {"--up", "X,Y,Z", "which way is up, for the camera and the environment; default 0,1,0", OTHER, 0, AT(has_up), 0, 0, 0, parse_up, "three numbers, not all zero"},
+    {"--env", "FILE.hdr", "environment: equirectangular Radiance picture", TEXT, AT(env), 0, 0, 0, 0, 0, ""},
+    {"--light", "KIND:X,Y,Z:R,G,B[:RADIUS]", "directional (towards the light; irradiance; radius in degrees), point (place; intensity), sphere "
+     "(centre; intensity; radius); may be repeated", OTHER, 0, 0, 0, 0, 0, parse_light,
+     "directional|point|sphere:X,Y,Z:R,G,B with an optional :RADIUS (up to 90 degrees; needed for a sphere), at most 64 times"},
+    {"--albedo", "R,G,B", "diffuse reflectance; default 0.7,0.7,0.7", FLOATS, AT(albedo), AT(has_albedo), 3, 0, 1, 0, "three numbers, 0 to 1"},
+    {"--bounces", "N", "reflections of light; -1 = all, the default", INTEGER, AT(bounces), AT(has_bounces), 1, -1, 1000, 0, "a whole number, -1 to 1000"},
+    {"--samples", "N", "paths per texel, or per pixel for pathtrace; default 64", INTEGER, AT(samples), 0, 1, 1, 1000000, 0, "a whole number, 1 to 1000000"},
+    {"--lattice", "X,Y,Z", "texels of the illumination texture; default one per voxel", SIZES, AT(lattice), 0, 3, 2, 4096, 0, "three whole numbers, 2 to 4096"},
+    {"--lookup", "NAME", "how the texture is read: trilinear", OTHER, 0, 0, 0, 0, 0, parse_lookup, "trilinear"},
+    {"--tf", "FILE", "transfer function: lines \"value extinction r g b\" or \"peak value opacity r g b\"", TEXT, AT(tf), 0, 0, 0, 0, 0, ""},
+    {"--shading", "NAME", "for dvr and scale-invariant: unlit, visibility, local", OTHER, 0, AT(has_shading), 0, 0, 0, parse_shading, "unlit visibility local"},
+    {"--exposure", "X", "factor on the light, in place of the automatic exposure", NUMBERS, AT(exposure), 0, 1, 1e-12, 1e12, 0, "a number above 0"},
+    {"--aa", "N", "samples per pixel side by side; default 4 (1 for dvr)", INTEGER, AT(antialias), 0, 1, 1, 64, 0, "a whole number, 1 to 64"},
+    {"--threads", "N", "0 = one per core, the default", INTEGER, AT(threads), 0, 1, 0, 256, 0, "a whole number, 0 to 256"},
+    {"--stats", 0, "\"key value\" lines on the standard output", FLAG, AT(stats), 0, 0, 0, 0, 0, 0}};
+#define OPTION_COUNT (sizeof option_list / sizeof option_list[0])
+
+static void print_help(void) {
+    puts("build/viewer VOLUME [options]      volume in, globally lit picture out\n\n"
+         "VOLUME is a raw file named like engine_256x256x128_uint8.raw (x fastest, little-endian; uint8 int8 uint16 int16\n"
+         "float32 float64), or procedural:NAME[:N] with N voxels along the longest axis:");
+    for (size_t i = 0; i < PROCEDURAL_SHAPE_COUNT; i++) printf("  %-20s %s\n", procedural_shapes[i].name, procedural_shapes[i].summary);
+    puts("\nOptions");
+    for (size_t i = 0; i < OPTION_COUNT; i++) {
+        char left[64];
+        snprintf(left, sizeof left, "%s %s", option_list[i].name, option_list[i].argument ? option_list[i].argument : "");
+        printf("  %-28s %s\n", left, option_list[i].help);
+        if (option_list[i].other == parse_scene) printf("  %-28s %s\n", "", option_list[i].allowed);
+    }
+    puts("  --help                       this text\n\n"
+         "Modes\n"
+         "  lambert, phong               light by the normal alone, no shadows: the usual picture, to compare with\n"
+         "  vicinity                     a uniform sky, one bounce of nothing: how open each place is\n"
+         "  irradiance                   global light baked into a texture, only where this view looks\n"
+         "  transfer                     the same by spherical harmonics, which can be relit without new rays\n"
+         "  pathtrace                    no texture: paths from every pixel, the reference\n"
+         "  dvr                          volume rendering, lit by spherical-harmonics visibility\n"
+         "  scale-invariant              volume rendering per unit of data: the same picture at any scale of space\n\n"
+         "Light: without --env and --light a sky (radiance 1 above to 0.3 below) and a sun. The exposure is set so that nine tenths\n"
+         "of what is seen are below 0.7 of white; up to there the picture is linear, above it bends to white.\n"
+         "The variable ISOGI_DATA names the folder of the volumes that --scene asks for.\n\n"
+         "Examples\n"
+         "  build/viewer procedural:engine-block --out engine.png\n"
+         "  build/viewer head_256x256x99_uint8.raw --spacing 1,1,2 --iso 130 --env studio.hdr --out head.png\n"
+         "  build/viewer procedural:gyroid --mode vicinity --clip 1,0,0,-40 --size 600x600 --stats\n"
+         "  build/viewer --scene engine --mode pathtrace --samples 256 --out reference.png\n"
+         "  build/viewer procedural:skull --light directional:1,2,3:4,3.8,3.5:3 --camera 20,10,2.4");
+}
+
+static int parse_value(viewer *v, const option *p, const char *text) {
+    char *at = (char *)&v->o + p->offset;
+    double x[4];
+    int ok = 0;
+    if (p->kind == TEXT) return *text ? (memcpy(at, &text, sizeof text), 1) : file_fail(v->error, "%s: the name of a file is missing", p->name);
+    if (p->kind == OTHER) ok = p->other(v, text);
+    else ok = numbers(text, ',', p->count, p->low, p->high, x);
+    for (int i = 0; ok && i < p->count; i++) {
+        if ((p->kind == INTEGER || p->kind == SIZES) && x[i] != floor(x[i])) ok = 0;
+        else if (p->kind == INTEGER) ((int *)(void *)at)[i] = (int)x[i];
+        else if (p->kind == SIZES) ((size_t *)(void *)at)[i] = (size_t)x[i];
+        else if (p->kind == FLOATS) ((float *)(void *)at)[i] = (float)x[i];
+        else ((double *)(void *)at)[i] = x[i];
+    }
+    return ok || file_fail(v->error, "%s: \"%.80s\" is not allowed; allowed: %s", p->name, text, p->allowed);
+}
+
+static int parse_arguments(viewer *v, int argc, char **argv) {
+    options *o = &v->o;
+    const int one = 1;
+    o->bounces = -1, o->mode = IRRADIANCE, o->up[1] = 1;
+    for (int i = 1; i < argc; i++) {
+        const option *p = NULL;
+        for (size_t k = 0; k < OPTION_COUNT; k++)
+            if (!strcmp(argv[i], option_list[k].name)) p = &option_list[k];
+        if (!p && argv[i][0] == '-') return file_fail(v->error, "%.80s: no such option; --help lists them", argv[i]);
+        if (!p) {
+            if (o->volume) return file_fail(v->error, "%.200s: a second volume after %.200s", argv[i], o->volume);
+            if (!*argv[i]) return file_fail(v->error, "the name of the volume is empty");
+            o->volume = argv[i];
+            continue;
+        }
+        if (p->kind == FLAG) memcpy((char *)o + p->offset, &one, sizeof one);
+        else if (i + 1 >= argc) return file_fail(v->error, "%s: needs a value: %s", p->name, p->argument);
+        else if (!parse_value(v, p, argv[++i])) return 0;
+        if (p->has) memcpy((char *)o + p->has, &one, sizeof one);
+    }
+    if (!o->volume == !o->scene) return file_fail(v->error, o->volume ? "give VOLUME or --scene, not both" : "no volume: build/viewer VOLUME [options], --help explains");
+    if (!o->out) o->out = "isogi.png";
+    if (o->scene && !o->has_mode) o->mode = o->scene->lit ? IRRADIANCE : DVR;
+    if (o->scene && o->mode >= DVR && !o->scene->rendered && !o->tf)
+        return file_fail(v->error, "--scene %s has no transfer function: give one by --tf, or another --mode", o->scene->name);
+    if (o->has_clip && o->mode >= DVR) return file_fail(v->error, "--clip: works with surfaces, not with --mode %s", mode_name[o->mode]);
+    if (o->raycast && o->mode >= DVR) return file_fail(v->error, "--raycast: works with surfaces, not with --mode %s", mode_name[o->mode]);
+    if (!o->has_size) o->width = o->height = o->mode >= DVR ? 512 : 900;
+    if ((double)o->width * o->height > 100e6) return file_fail(v->error, "--size: %dx%d is too large; at most 100 million pixels", o->width, o->height);
+    if (!o->samples) o->samples = 64;
+    return 1;
+}
+
+/* ---- memory, clock, progress, stats ------------------------------------------------------------------------------------------------ */
+
+static double seconds(void) {
+    struct timespec now;
+    clock_gettime(CLOCK_MONOTONIC, &now);
+    return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
+}
+
+static void *counted_alloc(void *user, size_t size, size_t align) {
+    viewer *v = (viewer *)user;
+    void *p = NULL;
+    uint64_t now, peak;
+    if (posix_memalign(&p, align < sizeof(void *) ? sizeof(void *) : align, size) != 0) return NULL;
+    now = __atomic_add_fetch(&v->memory, size, __ATOMIC_RELAXED);
+    peak = __atomic_load_n(&v->memory_peak, __ATOMIC_RELAXED);
+    while (now > peak && !__atomic_compare_exchange_n(&v->memory_peak, &peak, now, 1, __ATOMIC_RELAXED, __ATOMIC_RELAXED)) {}
+    return p;
+}
+static void counted_release(void *user, void *p, size_t size) {
+    __atomic_sub_fetch(&((viewer *)user)->memory, size, __ATOMIC_RELAXED);
+    free(p);
+}
+
+/* A line that is rewritten on a terminal; elsewhere a new line now and then, and none for what is done within a second or two. */
+static void say(viewer *v, const char *what, double fraction, double begun) {
+    int terminal = isatty(STDERR_FILENO);
+    double now = seconds();
+    if (now - v->said < (terminal ? 0.1 : 5) && !(terminal && fraction >= 1)) return;
+    if (!terminal && now - begun < 5) return;
+    v->said = now;
+    if (terminal) fprintf(stderr, fraction >= 1 ? "\r\033[K" : "\r%s %3.0f %%, %.1f s \033[K", what, 100 * fraction, now - begun);
+    else fprintf(stderr, "%s %.0f %%, %.1f s\n", what, 100 * fraction, now - begun);
+}
+
+__attribute__((format(printf, 3, 4))) static void stat_line(const viewer *v, const char *key, const char *format, ...) {
+    va_list values;
+    if (!v->o.stats) return;
+    va_start(values, format);
+    printf("%s ", key);
+    vprintf(format, values);
+    putchar('\n');
+    va_end(values);
+}
+
+static double stat_seconds(const viewer *v, const char *stage, double begun) {
+    double now = seconds();
+    char key[64];
+    snprintf(key, sizeof key, "seconds_%s", stage);
+    stat_line(v, key, "%.4f", now - begun);
+    return now;
+}
+
+/* ---- the volume ------------------------------------------------------------------------------------------------------------------------ */
+
+static int make_procedural(viewer *v, const char *text) {
+    char name[64];
+    const char *colon = strchr(text, ':');
+    size_t length = colon ? (size_t)(colon - text) : strlen(text);
+    double longest = 0;
+    isogi_result result;
+    if (length < sizeof name) memcpy(name, text, length), name[length] = 0;
+    v->shape = length < sizeof name ? procedural_find(name) : NULL;
+    if (!v->shape) {
+        char list[256] = "";
+        for (size_t i = 0; i < PROCEDURAL_SHAPE_COUNT; i++) strcat(strcat(list, " "), procedural_shapes[i].name);
+        return file_fail(v->error, "procedural:%.40s: no such volume; there are:%s", text, list);
+    }
+    if (colon && (!numbers(colon + 1, ',', 1, 2, 2048, &longest) || longest != floor(longest)))
+        return file_fail(v->error, "procedural:%.60s: the size is a whole number, 2 to 2048", text);
+    result = procedural_make(v->shape, (size_t)longest, &v->volume, &v->context);
+    return result == ISOGI_OK || fail(v, "the volume", result);
+}
+
+static int data_path(viewer *v, const char *name) {
+    const char *folder = getenv("ISOGI_DATA");
+    if (!folder || !*folder) return file_fail(v->error, "--scene %s needs %s: set ISOGI_DATA to the folder it is in", v->o.scene->name, name);
+    if ((size_t)snprintf(v->path, sizeof v->path, "%s/%s", folder, name) >= sizeof v->path) return file_fail(v->error, "ISOGI_DATA: the name is too long");
+    return 1;
+}
+
+static int load_volume(viewer *v) {
+    const scene *s = v->o.scene;
+    const char *name = s ? s->volume : v->o.volume;
+    double begun = seconds();
+    isogi_result result;
+    size_t bad, at = 0;
+    if (!strncmp(name, "procedural:", 11)) {
+        if (!make_procedural(v, name + 11)) return 0;
+    } else {
+        if (s && !data_path(v, name)) return 0;
+        if (s) name = v->path;
+        if (!volume_read(name, &v->volume, v->error)) return 0;
+    }
+    bad = volume_not_finite(&v->volume, v->o.has_nan ? &v->o.nan_value : NULL, &at);
+    if (bad && !v->o.has_nan)
+        return file_fail(v->error, "%s: voxel %zu,%zu,%zu and %zu others are not finite numbers; --nan V puts a value in their place", name,
+                         at % v->volume.size[0], at / v->volume.size[0] % v->volume.size[1], at / v->volume.size[0] / v->volume.size[1], bad - 1);
+    for (int a = 0; a < 3; a++) {
+        v->volume.spacing[a] = v->o.has_spacing ? v->o.spacing[a] : s && s->spacing[a] > 0 ? s->spacing[a] : 1;
+        if (v->volume.size[a] < 2) return file_fail(v->error, "%s: has only one layer of voxels along %c: nothing to look at", name, "xyz"[a]);
+    }
+    begun = stat_seconds(v, "volume", begun);
+    result = isogi_vol_build(&v->pyramid, &v->volume, &v->context);
+    if (result != ISOGI_OK) return fail(v, "the volume", result);
+    isogi_vol_range(v->pyramid, v->range);
+    stat_seconds(v, "pyramid", begun);
+    stat_line(v, "volume", "%s", name);
+    stat_line(v, "size", "%zux%zux%zu", v->volume.size[0], v->volume.size[1], v->volume.size[2]);
+    stat_line(v, "type", "%s", volume_type_name(v->volume.type));
+    stat_line(v, "range", "%.9g %.9g", v->range[0], v->range[1]);
+    return 1;
+}
+
+static void choose_surface(viewer *v) {
+    const scene *s = v->o.scene;
+    static const float grey[3] = {0.7f, 0.7f, 0.7f};
+    const float *albedo = v->o.has_albedo ? v->o.albedo : s && s->lit ? s->albedo : v->shape ? v->shape->albedo : grey;
+    memcpy(v->albedo, albedo, sizeof v->albedo);
+    if (v->o.has_iso) v->isovalue = v->o.isovalue;
+    else if (s) v->isovalue = s->isovalue;
+    else if (v->shape) v->isovalue = v->shape->isovalue;
+    else v->isovalue = volume_guess_isovalue(&v->volume, v->range);
+    stat_line(v, "isovalue", "%.9g", v->isovalue);
+}
+
+/* ---- the camera and the lights ------------------------------------------------------------------------------------------------------------ */
+
+static void place_camera(viewer *v) {
+    const scene *s = v->o.scene;
+    double toward[3] = {1.5, 1.2, 2.0}, up[3] = {0, 1, 0}, centre[3], corner[3], grid[3], eye[3], distance = 1 / sin(22.5 * PI / 180);
+    if (v->o.has_up) memcpy(up, v->o.up, sizeof up);
+    else if (s && vector_dot(s->up, s->up) > 0) memcpy(up, s->up, sizeof up);
+    else if (!s && v->shape) memcpy(up, v->shape->up, sizeof up);
+    vector_normalize(up);
+    rotation_from_up(up, v->rotation);
+    if (v->o.has_camera) {
+        double azimuth = v->o.azimuth * PI / 180, elevation = v->o.elevation * PI / 180;
+        toward[0] = sin(azimuth) * cos(elevation), toward[1] = sin(elevation), toward[2] = cos(azimuth) * cos(elevation);
+        distance = v->o.distance;
+    } else if (!s && v->shape) memcpy(toward, v->shape->toward, sizeof toward), distance = v->shape->distance;
+    vector_normalize(toward);
+    rotation_apply(v->rotation, toward, toward);
+    for (int a = 0; a < 3; a++) grid[a] = 0.5 * (double)(v->volume.size[a] - 1);
+    isogi_vol_to_world(v->pyramid, grid, centre);
+    for (int a = 0; a < 3; a++) grid[a] = 0;
+    isogi_vol_to_world(v->pyramid, grid, corner);
+    for (int a = 0; a < 3; a++) corner[a] -= centre[a];
+    v->radius = sqrt(vector_dot(corner, corner));
+    for (int a = 0; a < 3; a++) eye[a] = centre[a] + toward[a] * distance * v->radius;
+    camera_look(&v->view, v->o.width, v->o.height, eye, centre, up, 45);
+}
+
+static void add_light(viewer *v, const double toward[3], const float rgb[3], double degrees) {
+    isogi_light *light = &v->o.lights[v->o.light_count++];
+    double d[3];
+    rotation_apply(v->rotation, toward, d);
+    light->kind = ISOGI_LIGHT_DIRECTIONAL, light->radius = (float)(degrees * PI / 180);
+    for (int i = 0; i < 3; i++) light->vector[i] = (float)d[i], light->rgb[i] = rgb[i];
+}
+
+/* Sky: above[] towards up, below[] downwards, linear in the cosine: two bands of spherical harmonics hold it exactly. */
+static void set_sky(viewer *v, const float above[3], const float below[3]) {
+    for (int c = 0; c < 3; c++) {
+        v->sky[c] = 0.5f * (above[c] + below[c]) * 3.5449077f;
+        v->sky[3 + c] = 0.5f * (above[c] - below[c]) * 2.0466534f; /* Y_1^-1 = sqrt(3 / 4 pi) y */
+        v->sky[6 + c] = v->sky[9 + c] = 0;
+    }
+    v->lighting.env.sh = v->sky, v->lighting.env.sh_order = 2;
+}
+
+static void set_default_light(viewer *v) {
+    /* the neutral sky of the scene engine-block, and a slightly coloured one for everything else */
+    static const float neutral_above[3] = {1, 1, 1}, neutral_below[3] = {0.3f, 0.3f, 0.3f}, neutral_sun[3] = {3, 3, 3};
+    static const float above[3] = {0.90f, 1.0f, 1.15f}, below[3] = {0.33f, 0.3f, 0.27f}, sun[3] = {3.25f, 2.95f, 2.5f}, one[3] = {1, 1, 1};
+    static const double to_sun[3] = {-0.45, 1.0, 0.85}, diagonal[3] = {1, 1, 1};
+    const scene *s = v->o.scene;
+    if (s && s->lit && s->uniform_sky) set_sky(v, one, one);
+    else if (s && v->o.mode >= DVR) {
+        const float sky[3] = {s->dvr_sky, s->dvr_sky, s->dvr_sky};
+        set_sky(v, sky, sky);
+        if (s->sun[0] > 0) add_light(v, diagonal, s->sun, 0);
+    } else if (s) set_sky(v, neutral_above, neutral_below), add_light(v, to_sun, neutral_sun, 1);
+    else set_sky(v, above, below), add_light(v, to_sun, sun, 1);
+}
+
+static void add_scaled(double to[3], const float rgb[3], double factor) {
+    for (int c = 0; c < 3; c++) to[c] += factor * (double)rgb[c];
+}
+
+/* Irradiance on a surface that faces n, with nothing in the way, from the environment alone. */
+static void ambient_at(const viewer *v, const double n[3], double out[3]) {
+    const double y[9] = {0.28209479177, 0.48860251190 * n[1], 0.48860251190 * n[2], 0.48860251190 * n[0], 1.09254843059 * n[0] * n[1],
+                         1.09254843059 * n[1] * n[2], 0.31539156525 * (3 * n[2] * n[2] - 1), 1.09254843059 * n[0] * n[2],
+                         0.54627421530 * (n[0] * n[0] - n[1] * n[1])};
+    out[0] = out[1] = out[2] = 0;
+    for (int i = 0; i < 9; i++) add_scaled(out, v->ambient[i], y[i]);
+    for (int c = 0; c < 3; c++) out[c] = out[c] > 0 ? out[c] : 0;
+}
+
+/* What lambert and phong know of the environment: three bands, and the direction most light comes from. */
+static int summarize_light(viewer *v) {
+    isogi_lighting env = v->lighting;
+    isogi_result result;
+    env.lights = NULL, env.light_count = 0;
+    result = isogi_sh_project(v->ambient[0], 3, &env, NULL);
+    if (result != ISOGI_OK) return fail(v, "the light", result);
+    for (int c = 0; c < 3; c++) v->key[c] = 0;
+    for (int i = 1; i < 4; i++) v->key[i == 3 ? 0 : i] = picture_luminance(v->ambient[i]);
+    if (!vector_normalize(v->key)) memcpy(v->key, v->view.up, sizeof v->key);
+    result = isogi_sh_convolve_cosine(v->ambient[0], v->ambient[0], 3, 3);
+    ambient_at(v, v->key, v->key_light);
+    for (int c = 0; c < 3; c++) v->mean_light[c] = (double)v->ambient[0][c] * 0.28209479177;
+    return result == ISOGI_OK || fail(v, "the light", result);
+}
+
+static int set_light(viewer *v) {
+    const scene *s = v->o.scene;
+    const char *env = v->o.env, *scene_env = s ? (v->o.mode >= DVR ? s->dvr_env : s->env) : NULL;
+    isogi_env *e = &v->lighting.env;
+    isogi_result result;
+    if (!env && !v->o.light_count && scene_env) {
+        if (!data_path(v, scene_env)) return 0;
+        env = v->path;
+    }
+    if (env) {
+        if (!hdr_read(env, &v->env, v->error)) return 0;
+        e->rgb = v->env.rgb, e->width = v->env.width, e->height = v->env.height;
+    }
+    for (int i = 0; i < 9; i++) e->rotation[i] = (float)v->rotation[i];
+    if (v->o.mode == VICINITY) {
+        static const float one[3] = {1, 1, 1};
+        e->rgb = NULL, e->width = e->height = 0, v->o.light_count = 0;
+        set_sky(v, one, one);
+    } else if (!env && !v->o.light_count) set_default_light(v);
+    v->lighting.lights = v->o.lights, v->lighting.light_count = v->o.light_count;
+    result = isogi_lighting_validate(&v->lighting);
+    if (result != ISOGI_OK) return fail(v, env ? env : "--light", result);
+    for (size_t i = 0; v->o.mode == TRANSFER && i < v->o.light_count; i++)
+        if (v->o.lights[i].kind != ISOGI_LIGHT_DIRECTIONAL) return file_fail(v->error, "--light: transfer knows distant light only: directional, or --env");
+    return summarize_light(v);
+}
+
+/* ---- what every sample sees ------------------------------------------------------------------------------------------------------------------ */
+
+/* Places of the samples within a pixel: stratified in x and, by reversed bits, in y. */
+static void sample_offset(const viewer *v, int sample, double *x, double *y) {
+    double reversed = 0, half = 0.5, n = v->o.antialias;
+    for (int i = sample; i; i >>= 1, half *= 0.5) reversed += half * (i & 1);
+    *x = (sample + 0.5) / n - 0.5, *y = reversed + 0.5 / n - 0.5;
+    if (v->o.antialias == 1) *x = *y = 0;
+}
+
+typedef struct view_job {
+    viewer *v;
+    int sample, trace; /* trace: rays find the surface; else it has been rasterized, and only sections are missing */
+    double x_offset, y_offset, near_plane;
+    isogi_counters *row_counters;
+} view_job;
+
+static void sample_ray(const view_job *job, int x, int y, float dir[3]) {
+    double d[3];
+    camera_direction(&job->v->view, x + job->x_offset, y + job->y_offset, d);
+    for (int i = 0; i < 3; i++) dir[i] = (float)d[i];
+}
+
+/* Part of the ray within the box and the kept half space; 0 if there is none. */
+static int visible_range(const view_job *job, const float dir[3], double *from, double *to) {
+    const viewer *v = job->v;
+    double far[3], a[3], b[3];
+    *from = job->near_plane, *to = 1e30;
+    for (int i = 0; i < 3; i++) far[i] = v->view.eye[i] + (double)dir[i];
+    isogi_vol_to_grid(v->pyramid, v->view.eye, a);
+    isogi_vol_to_grid(v->pyramid, far, b);
+    for (int i = 0; i < 3; i++) {
+        double d = b[i] - a[i], end = (double)(v->volume.size[i] - 1), near_t, far_t;
+        if (fabs(d) < 1e-12) {
+            if (a[i] < 0 || a[i] > end) return 0;
+            continue;
+        }
+        near_t = (d > 0 ? -a[i] : end - a[i]) / d, far_t = (d > 0 ? end - a[i] : -a[i]) / d;
+        *from = near_t > *from ? near_t : *from, *to = far_t < *to ? far_t : *to;
+    }
+    if (v->o.has_clip) {
+        double rate = 0, start = vector_dot(v->o.clip, v->view.eye) + v->o.clip[3];
+        for (int i = 0; i < 3; i++) rate += v->o.clip[i] * (double)dir[i];
+        if (fabs(rate) < 1e-12) return start >= 0 && *from < *to;
+        if (rate > 0) *from = -start / rate > *from ? -start / rate : *from;
+        else *to = -start / rate < *to ? -start / rate : *to;
+    }
+    return *from < *to;
+}
+
+static void point_at(const viewer *v, const float dir[3], double t, float p[3]) {
+    for (int i = 0; i < 3; i++) p[i] = (float)(v->view.eye[i] + (double)dir[i] * t);
+}
+
+static void view_row(void *arg, size_t row) {
+    view_job *job = (view_job *)arg;
+    viewer *v = job->v;
+    int width = v->o.width;
+    float *inverse = v->inverse[job->sample] + row * (size_t)width;
+    uint32_t *seen = v->seen[job->sample] + row * (size_t)width;
+    for (int x0 = 0; x0 < width; x0 += 64) {
+        int n = width - x0 < 64 ? width - x0 : 64;
+        isogi_ray rays[64];
+        isogi_hit hits[64];
+        float entry[64][3], value[64];
+        double from[64];
+        memset(rays, 0, sizeof rays);
+        for (int i = 0; i < n; i++) {
+            isogi_ray *r = &rays[i];
+            double to;
+            sample_ray(job, x0 + i, (int)row, r->dir);
+            memcpy(r->origin, v->view.eye, sizeof r->origin);
+            from[i] = -1, r->tmin = 1, r->tmax = 0.5, r->isovalue = v->isovalue; /* an empty range: a miss */
+            point_at(v, r->dir, 0, entry[i]);
+            if (!visible_range(job, r->dir, &from[i], &to)) from[i] = -1;
+            else r->tmin = from[i], r->tmax = to, point_at(v, r->dir, from[i], entry[i]);
+        }
+        isogi_vol_sample(v->pyramid, (const float(*)[3])entry, (size_t)n, value, NULL);
+        if (job->trace) isogi_vol_intersect(v->pyramid, rays, (size_t)n, hits, &job->row_counters[row]);
+        for (int i = 0; i < n; i++) {
+            if (job->trace) {
+                inverse[x0 + i] = hits[i].side ? (float)(1 / hits[i].t) : 0;
+                seen[x0 + i] = hits[i].side ? 0 : RASTER_NONE;
+            }
+            if (from[i] > job->near_plane && (double)value[i] >= v->isovalue) inverse[x0 + i] = (float)(1 / from[i]), seen[x0 + i] = SECTION;
+        }
+    }
+}
+
+static int view_sample(viewer *v, int sample) {
+    size_t rows = (size_t)v->o.height;
+    view_job job = {.v = v, .sample = sample, .trace = v->o.raycast, .near_plane = 1e-4 * v->radius};
+    isogi_result result = ISOGI_OK;
+    job.row_counters = (isogi_counters *)calloc(rows, sizeof *job.row_counters);
+    if (!job.row_counters) return fail(v, "the picture", ISOGI_NO_MEMORY);
+    sample_offset(v, sample, &job.x_offset, &job.y_offset);
+    if (!job.trace)
+        result = raster_draw(&v->mesh, &v->view, job.x_offset, job.y_offset, v->o.has_clip ? v->o.clip : NULL, job.near_plane,
+                             v->inverse[sample], v->seen[sample], &v->context);
+    if (result == ISOGI_OK) result = isogi_parallel(&v->context, rows, view_row, &job, 0, 0);
+    for (size_t i = 0; i < rows; i++) v->counters.rays += job.row_counters[i].rays;
+    free(job.row_counters);
+    return result == ISOGI_OK || fail(v, "the picture", result);
+}
+
+static int view_surface(viewer *v) {
+    size_t pixels = (size_t)v->o.width * (size_t)v->o.height;
+    double begun = seconds();
+    if (!v->o.raycast) {
+        isogi_mesh_desc desc = {.isovalue = v->isovalue, .normals = 1};
+        isogi_result result = isogi_vol_mesh(v->pyramid, &desc, &v->mesh);
+        if (result != ISOGI_OK) return fail(v, "the mesh", result);
+        begun = stat_seconds(v, "mesh", begun);
+        stat_line(v, "vertices", "%zu", v->mesh.vertex_count);
+        stat_line(v, "triangles", "%zu", v->mesh.triangle_count);
+    }
+    v->inverse = (float **)calloc((size_t)v->o.antialias, sizeof *v->inverse);
+    v->seen = (uint32_t **)calloc((size_t)v->o.antialias, sizeof *v->seen);
+    if (!v->inverse || !v->seen) return fail(v, "the picture", ISOGI_NO_MEMORY);
+    for (int s = 0; s < v->o.antialias; s++) {
+        v->inverse[s] = (float *)malloc(pixels * sizeof **v->inverse), v->seen[s] = (uint32_t *)malloc(pixels * sizeof **v->seen);
+        if (!v->inverse[s] || !v->seen[s]) return fail(v, "the picture", ISOGI_NO_MEMORY);
+        if (!view_sample(v, s)) return 0;
+    }
+    begun = stat_seconds(v, "view", begun);
+    stat_line(v, "rays_view", "%llu", (unsigned long long)v->counters.rays);
+    return 1;
+}
+
+/* ---- light baked into a texture, where the view looks --------------------------------------------------------------------------------------------- */
+
+static isogi_trace_desc describe_trace(const viewer *v) {
+    isogi_trace_desc desc = {.pyramid = v->pyramid, .lighting = v->lighting, .bounces = v->o.mode == VICINITY ? 0 : v->o.bounces,
+                             .samples = v->o.samples, .lazy = 1};
+    desc.mode = v->o.mode == TRANSFER ? ISOGI_TRACE_TRANSFER : ISOGI_TRACE_IRRADIANCE;
+    if (v->o.mode == TRANSFER) memset(&desc.lighting, 0, sizeof desc.lighting);
+    memcpy(desc.albedo, v->albedo, sizeof desc.albedo);
+    memcpy(desc.lattice, v->o.lattice, sizeof desc.lattice);
+    return desc;
+}
+
+static int request_seen(viewer *v) {
+    float points[1024][3];
+    size_t n = 0;
+    isogi_result result = ISOGI_OK;
+    for (int s = 0; s < v->o.antialias; s++) {
+        view_job job = {.v = v, .sample = s};
+        sample_offset(v, s, &job.x_offset, &job.y_offset);
+        for (int y = 0; y < v->o.height; y++)
+            for (int x = 0; x < v->o.width; x++) {
+                size_t at = (size_t)y * (size_t)v->o.width + (size_t)x;
+                float dir[3];
+                if (v->seen[s][at] >= SECTION) continue;
+                sample_ray(&job, x, y, dir);
+                point_at(v, dir, 1 / (double)v->inverse[s][at], points[n++]);
+                if (n == 1024) result = result == ISOGI_OK ? isogi_trace_request(v->trace, (const float(*)[3])points, n) : result, n = 0;
+            }
+    }
+    if (n && result == ISOGI_OK) result = isogi_trace_request(v->trace, (const float(*)[3])points, n);
+    return result == ISOGI_OK || fail(v, "the illumination texture", result);
+}
+
+static int bake(viewer *v) {
+    isogi_trace_desc desc = describe_trace(v);
+    isogi_counters done = {0};
+    double begun = seconds(), remaining = 1, spent;
+    uint64_t budget = 100000;
+    isogi_result result = isogi_trace_create(&v->trace, &desc, &v->context);
+    if (result != ISOGI_OK) return fail(v, "the illumination texture", result);
+    if (!request_seen(v)) return 0;
+    begun = stat_seconds(v, "request", begun);
+    while (result == ISOGI_OK && remaining > 0) {
+        double step = seconds();
+        result = isogi_trace_step(v->trace, budget, &remaining);
+        step = seconds() - step;
+        if (step < 0.1 && budget < (uint64_t)1 << 40) budget *= 2; /* between two looks at the clock: 0.1 to 0.3 s */
+        else if (step > 0.3 && budget > 10000) budget /= 2;
+        say(v, "baking light", 1 - remaining, begun);
+    }
+    if (result == ISOGI_OK && v->o.mode == TRANSFER) result = isogi_trace_relight(v->trace, &v->lighting);
+    if (result != ISOGI_OK) return fail(v, "the illumination texture", result);
+    isogi_trace_counters(v->trace, &done);
+    spent = seconds() - begun;
+    stat_seconds(v, "bake", begun);
+    stat_line(v, "rays_light", "%llu", (unsigned long long)done.rays);
+    stat_line(v, "rays_per_second", "%.6g", spent > 0 ? (double)done.rays / spent : 0);
+    stat_line(v, "texels_requested", "%llu", (unsigned long long)(done.texels + done.texels_skipped));
+    stat_line(v, "texels_computed", "%llu", (unsigned long long)done.texels);
+    stat_line(v, "texels_skipped", "%llu", (unsigned long long)done.texels_skipped);
+    return 1;
+}
+
+/* ---- colours of what is seen --------------------------------------------------------------------------------------------------------------------------- */
+
+enum { BATCH = 256 };
+typedef struct shade_batch {
+    size_t count, pixel[BATCH];
+    uint32_t seen[BATCH];
+    float point[BATCH][3], normal[BATCH][3], dir[BATCH][3], irradiance[BATCH][3], error[BATCH];
+} shade_batch;
+
+typedef struct shade_job {
+    view_job view;
+    double *row_error, *row_light; /* sums over the lit samples of a row, for the error estimate */
+    isogi_result *row_result;
+} shade_job;
+
+static void mesh_normal(const viewer *v, uint32_t triangle, const float point[3], float n[3]) {
+    double p[3] = {(double)point[0], (double)point[1], (double)point[2]}, w[3], sum[3] = {0, 0, 0};
+    raster_weights(&v->mesh, triangle, p, w);
+    for (int k = 0; k < 3; k++) add_scaled(sum, v->mesh.normals[v->mesh.triangles[triangle][k]], w[k]);
+    if (!vector_normalize(sum)) memset(sum, 0, sizeof sum);
+    for (int i = 0; i < 3; i++) n[i] = (float)sum[i];
+}
+
+/* Normal of the plane through which the view entered: the clip plane or a side of the box. */
+static void section_normal(const viewer *v, const float point[3], double n[3]) {
+    double p[3] = {(double)point[0], (double)point[1], (double)point[2]}, grid[3], nearest = 1e30;
+    if (v->o.has_clip) {
+        double length = sqrt(vector_dot(v->o.clip, v->o.clip));
+        nearest = fabs(vector_dot(v->o.clip, p) + v->o.clip[3]) / length / v->radius * 100;
+        for (int i = 0; i < 3; i++) n[i] = -v->o.clip[i] / length;
+    }
+    isogi_vol_to_grid(v->pyramid, p, grid);
+    for (int i = 0; i < 3; i++) {
+        double end = (double)(v->volume.size[i] - 1), distance[2] = {fabs(grid[i]) / end * 100, fabs(grid[i] - end) / end * 100};
+        for (int side = 0; side < 2; side++)
+            if (distance[side] < nearest) {
+                nearest = distance[side];
+                n[0] = n[1] = n[2] = 0, n[i] = side ? 1 : -1;
+            }
+    }
+}
+
+static void surface_normals(const viewer *v, shade_batch *b) {
+    if (v->o.raycast) {
+        isogi_vol_sample_smooth(v->pyramid, (const float(*)[3])b->point, b->count, NULL, b->normal);
+        for (size_t i = 0; i < b->count; i++) {
+            double n[3] = {-(double)b->normal[i][0], -(double)b->normal[i][1], -(double)b->normal[i][2]};
+            if (!vector_normalize(n)) memset(n, 0, sizeof n);
+            for (int k = 0; k < 3; k++) b->normal[i][k] = (float)n[k];
+        }
+        return;
+    }
+    for (size_t i = 0; i < b->count; i++)
+        if (b->seen[i] < SECTION) mesh_normal(v, b->seen[i], b->point[i], b->normal[i]);
+}
+
+/* Direction from a point to a light, and the irradiance on a surface that faces it. */
+static void toward_light(const isogi_light *light, const float point[3], double to[3], double *strength) {
+    *strength = 1;
+    for (int i = 0; i < 3; i++) to[i] = (double)light->vector[i] - (light->kind == ISOGI_LIGHT_DIRECTIONAL ? 0 : (double)point[i]);
+    if (light->kind != ISOGI_LIGHT_DIRECTIONAL) *strength = 1 / (vector_dot(to, to) + 1e-30);
+    vector_normalize(to);
+}
+
+static double clamped_cosine(const double a[3], const double b[3]) {
+    double c = vector_dot(a, b);
+    return c > 0 ? c : 0;
+}
+
+/* Light by the normal alone: the environment as it would arrive unshadowed, every light by Lambert's law. */
+static void lambert(const viewer *v, const float point[3], const double n[3], double irradiance[3]) {
+    ambient_at(v, n, irradiance);
+    for (size_t k = 0; k < v->o.light_count; k++) {
+        double to[3], strength;
+        toward_light(&v->o.lights[k], point, to, &strength);
+        add_scaled(irradiance, v->o.lights[k].rgb, strength * clamped_cosine(n, to));
+    }
+}
+
+/* Phong 1975: a constant ambient term, the lights (or where there are none, the direction most of the environment comes from),
+   and a highlight of exponent 32 that reflects a fifth. Adds the highlight to specular. */
+static void phong(const viewer *v, const float point[3], const double n[3], const float dir[3], double irradiance[3], double specular[3]) {
+    double view[3] = {-(double)dir[0], -(double)dir[1], -(double)dir[2]}, reflected[3], facing;
+    size_t count = v->o.light_count ? v->o.light_count : 1;
+    vector_normalize(view);
+    facing = 2 * vector_dot(n, view);
+    for (int i = 0; i < 3; i++) reflected[i] = facing * n[i] - view[i], irradiance[i] = 0.5 * v->mean_light[i];
+    for (size_t k = 0; k < count; k++) {
+        double to[3], strength = 1, cosine, highlight;
+        float rgb[3];
+        if (v->o.light_count) toward_light(&v->o.lights[k], point, to, &strength), memcpy(rgb, v->o.lights[k].rgb, sizeof rgb);
+        else for (int i = 0; i < 3; i++) to[i] = v->key[i], rgb[i] = (float)v->key_light[i];
+        cosine = clamped_cosine(n, to);
+        add_scaled(irradiance, rgb, strength * cosine);
+        highlight = cosine > 0 ? pow(clamped_cosine(reflected, to), 32) : 0;
+        add_scaled(specular, rgb, strength * 0.2 * highlight * (32 + 2) / (2 * PI));
+    }
+}
+
+/* Where matter is cut, its inside has no light of its own: it shows the data, from the isovalue up, under unshadowed light. */
+static void section_colour(const viewer *v, const float point[3], float rgb[3]) {
+    double n[3], light[3], top = v->range[1] - v->isovalue, s;
+    float value;
+    section_normal(v, point, n);
+    isogi_vol_sample(v->pyramid, (const float(*)[3])(const void *)point, 1, &value, NULL);
+    s = top > 0 ? ((double)value - v->isovalue) / top : 1;
+    s = s > 0 ? (s < 1 ? s : 1) : 0;
+    if (v->o.mode == VICINITY) light[0] = light[1] = light[2] = PI;
+    else lambert(v, point, n, light);
+    for (int c = 0; c < 3; c++) {
+        /* half of the light's colour and of the surface's colour: a section is drawn, not photographed */
+        double grey = (light[0] + light[1] + light[2]) / 3, mean = (double)(v->albedo[0] + v->albedo[1] + v->albedo[2]) / 3;
+        rgb[c] = (float)((0.5 * light[c] + 0.5 * grey) / PI * (0.5 * (double)v->albedo[c] + 0.5 * mean) * (0.15 + 0.6 * s));
+    }
+}
+
+static void shade_sample(const viewer *v, shade_batch *b, size_t i, float rgb[3]) {
+    double n[3] = {(double)b->normal[i][0], (double)b->normal[i][1], (double)b->normal[i][2]}, light[3], specular[3] = {0, 0, 0};
+    if (b->seen[i] == SECTION) {
+        section_colour(v, b->point[i], rgb);
+        return;
+    }
+    if (v->o.mode == LAMBERT) lambert(v, b->point[i], n, light);
+    else if (v->o.mode == PHONG) phong(v, b->point[i], n, b->dir[i], light, specular);
+    else for (int c = 0; c < 3; c++) light[c] = (double)b->irradiance[i][c] > 0 ? (double)b->irradiance[i][c] : 0;
+    for (int c = 0; c < 3; c++) rgb[c] = (float)((double)v->albedo[c] * light[c] / PI + specular[c]);
+}
+
+static isogi_result light_batch(const shade_job *job, shade_batch *b) {
+    const viewer *v = job->view.v;
+    isogi_trace_desc desc;
+    isogi_context serial = v->context;
+    if (v->o.mode <= PHONG) return ISOGI_OK;
+    if (v->trace) return isogi_trace_sample(v->trace, (const float(*)[3])b->point, b->count, b->irradiance, b->error);
+    desc = describe_trace(v);
+    serial.threads = 1, serial.progress = NULL;
+    desc.seed = ((uint64_t)job->view.sample << 32) + b->pixel[0]; /* each batch its own random numbers */
+    desc.samples = (v->o.samples + v->o.antialias - 1) / v->o.antialias;
+    return isogi_trace_gather(&desc, (const float(*)[3])b->point, NULL, b->count, b->irradiance, b->error, &serial);
+}
+
+static isogi_result shade_batch_now(shade_job *job, shade_batch *b, size_t row) {
+    viewer *v = job->view.v;
+    isogi_result result;
+    if (!b->count) return ISOGI_OK;
+    if (v->o.mode <= PHONG) surface_normals(v, b);
+    result = light_batch(job, b);
+    for (size_t i = 0; result == ISOGI_OK && i < b->count; i++) {
+        float rgb[3], *out = v->picture[b->pixel[i]];
+        shade_sample(v, b, i, rgb);
+        for (int c = 0; c < 3; c++) out[c] += rgb[c] / (float)v->o.antialias;
+        out[3] += 1 / (float)v->o.antialias;
+        if (v->o.mode <= PHONG || b->seen[i] == SECTION || !(b->error[i] < 1e30f)) continue;
+        job->row_error[row] += (double)b->error[i];
+        job->row_light[row] += picture_luminance(b->irradiance[i]);
+    }
+    b->count = 0;
+    return result;
+}
+
+static void shade_row(void *arg, size_t row) {
+    shade_job *job = (shade_job *)arg;
+    const viewer *v = job->view.v;
+    const float *inverse = v->inverse[job->view.sample];
+    const uint32_t *seen = v->seen[job->view.sample];
+    isogi_result result = ISOGI_OK;
+    shade_batch *b = (shade_batch *)malloc(sizeof *b);
+    if (!b) {
+        job->row_result[row] = ISOGI_NO_MEMORY;
+        return;
+    }
+    memset(b, 0, sizeof *b);
+    for (int x = 0; x < v->o.width && result == ISOGI_OK; x++) {
+        size_t at = row * (size_t)v->o.width + (size_t)x, i = b->count;
+        if (seen[at] == RASTER_NONE) continue;
+        sample_ray(&job->view, x, (int)row, b->dir[i]);
+        point_at(v, b->dir[i], 1 / (double)inverse[at], b->point[i]);
+        b->pixel[i] = at, b->seen[i] = seen[at], b->count++;
+        if (b->count == BATCH) result = shade_batch_now(job, b, row);
+    }
+    if (result == ISOGI_OK) result = shade_batch_now(job, b, row);
+    job->row_result[row] = result;
+    free(b);
+}
+
+static int shade_surface(viewer *v) {
+    size_t rows = (size_t)v->o.height;
+    double begun = seconds(), error = 0, light = 0;
+    isogi_result result = ISOGI_OK;
+    shade_job job = {.view = {.v = v}};
+    job.row_error = (double *)calloc(rows, sizeof *job.row_error), job.row_light = (double *)calloc(rows, sizeof *job.row_light);
+    job.row_result = (isogi_result *)calloc(rows, sizeof *job.row_result);
+    if (!job.row_error || !job.row_light || !job.row_result) result = ISOGI_NO_MEMORY;
+    for (int s = 0; s < v->o.antialias && result == ISOGI_OK; s++) {
+        job.view.sample = s;
+        sample_offset(v, s, &job.view.x_offset, &job.view.y_offset);
+        result = isogi_parallel(&v->context, rows, shade_row, &job, 0, 0);
+        if (v->o.mode == PATHTRACE) say(v, "tracing paths", (s + 1.0) / v->o.antialias, begun);
+    }
+    for (size_t row = 0; row < rows && result == ISOGI_OK; row++) result = job.row_result[row], error += job.row_error[row], light += job.row_light[row];
+    free(job.row_error), free(job.row_light), free(job.row_result);
+    if (result != ISOGI_OK) return fail(v, "the light", result);
+    stat_seconds(v, "shade", begun);
+    if (v->o.mode > PHONG) stat_line(v, "error_relative", "%.4g", light > 0 ? error / light : 0);
+    return 1;
+}
+
+/* ---- volume rendering --------------------------------------------------------------------------------------------------------------------------------- */
+
+/* For a volume of which nothing is known: matter from the isovalue up, warmer where it is denser. In data space an isosurface and a
+   little of everything. `thickness`: extinction that makes 1/30 of the box's diagonal half opaque at the top of the range. */
+static int default_transfer(viewer *v) {
+    char text[1024];
+    double low = v->range[0], high = v->range[1], iso = v->isovalue, width = high - low, thickness = 20 / v->radius;
+    if (!(iso > low && iso < high)) iso = 0.5 * (low + high);
+    if (v->o.mode == SCALE_INVARIANT)
+        snprintf(text, sizeof text, "%.17g %.9g .25 .45 .9\n%.17g %.9g .8 .8 .8\n%.17g %.9g .95 .55 .2\npeak %.17g .5 .9 .85 .75\n", low, 0.5 / width, iso,
+                 0.7 / width, high, 1.0 / width, iso);
+    else
+        snprintf(text, sizeof text, "%.17g 0 .5 .6 .75\n%.17g 0 .5 .6 .75\n%.17g %.9g .8 .75 .68\n%.17g %.9g 1 .75 .4\n", low, iso - 0.08 * (iso - low), iso,
+                 0.4 * thickness, high, thickness);
+    return transfer_parse(text, &v->transfer, v->error);
+}
+
+static int set_transfer(viewer *v) {
+    const scene *s = v->o.scene;
+    const char *text = s && s->transfer ? s->transfer : v->shape && v->o.mode == DVR ? v->shape->transfer : NULL;
+    if (v->o.tf) return transfer_read(v->o.tf, &v->transfer, v->error);
+    if (v->o.mode == DVR && text) return transfer_parse(text, &v->transfer, v->error);
+    return default_transfer(v);
+}
+
+static int render_volume(viewer *v) {
+    const scene *s = v->o.scene;
+    isogi_dvr_desc desc = {.pyramid = v->pyramid, .space = v->o.mode == DVR ? ISOGI_DVR_PHYSICAL : ISOGI_DVR_DATA,
+                           .shading = v->o.mode == DVR ? ISOGI_DVR_VISIBILITY : ISOGI_DVR_LOCAL};
+    int factor = (int)(sqrt((double)v->o.antialias) + 1e-9);
+    isogi_view view = {.width = v->o.width * factor, .height = v->o.height * factor};
+    size_t pixels = (size_t)view.width * (size_t)view.height;
+    float(*large)[4] = NULL;
+    isogi_dvr *dvr = NULL;
+    double begun = seconds(), remaining = 1;
+    isogi_result result;
+    if (v->o.has_shading) desc.shading = (isogi_dvr_shading)v->o.shading;
+    if (s && s->order) desc.order = s->order, desc.directions = s->directions, memcpy(desc.grid, s->grid, sizeof desc.grid);
+    for (int i = 0; i < 3; i++) view.eye[i] = (float)v->view.eye[i], view.target[i] = (float)v->view.target[i], view.up[i] = (float)v->view.up[i];
+    if (!set_transfer(v)) return 0;
+    result = isogi_dvr_create(&dvr, &desc, &v->context);
+    if (result == ISOGI_OK) result = isogi_dvr_set_transfer(dvr, &v->transfer.transfer);
+    for (uint64_t budget = 20000; result == ISOGI_OK && remaining > 0 && desc.shading == ISOGI_DVR_VISIBILITY; budget += budget / 4) {
+        result = isogi_dvr_step(dvr, budget, &remaining);
+        say(v, "visibility", 1 - remaining, begun);
+    }
+    begun = stat_seconds(v, "visibility", begun);
+    if (result == ISOGI_OK) isogi_dvr_counters(dvr, &v->counters);
+    stat_line(v, "rays_light", "%llu", (unsigned long long)v->counters.rays);
+    large = (float(*)[4])malloc(pixels * sizeof *large);
+    if (result == ISOGI_OK && !large) result = ISOGI_NO_MEMORY;
+    if (result == ISOGI_OK) result = isogi_dvr_render(dvr, &view, &v->lighting, large, NULL, &v->counters);
+    for (size_t i = 0; result == ISOGI_OK && i < pixels; i++) {
+        size_t x = i % (size_t)view.width / (size_t)factor, y = i / (size_t)view.width / (size_t)factor;
+        for (int c = 0; c < 4; c++) v->picture[y * (size_t)v->o.width + x][c] += large[i][c] / (float)(factor * factor);
+    }
+    free(large);
+    isogi_dvr_free(dvr);
+    stat_seconds(v, "render", begun);
+    stat_line(v, "samples_view", "%llu", (unsigned long long)v->counters.samples);
+    return result == ISOGI_OK || fail(v, "volume rendering", result);
+}
+
+/* ---- the picture -------------------------------------------------------------------------------------------------------------------------------------------- */
+
+/* A studio backdrop in display light: darker below, lighter behind the object, tinted by the environment. */
+static void backdrop(const viewer *v, int x, int y, double out[3]) {
+    double d[3], above, aside, strength, tint = (v->mean_light[0] + v->mean_light[1] + v->mean_light[2]) / 3;
+    camera_direction(&v->view, x, y, d);
+    above = (vector_dot(d, v->view.up) / v->view.scale), aside = vector_dot(d, v->view.right) / v->view.scale;
+    strength = 0.055 + 0.10 * exp(-0.8 * ((above + 0.1) * (above + 0.1) + 0.6 * aside * aside)) + 0.015 * above;
+    for (int c = 0; c < 3; c++) {
+        static const double slate[3] = {0.94, 1.0, 1.1};
+        double colour = tint > 0 ? v->mean_light[c] / tint : 1;
+        out[c] = strength * slate[c] * (0.75 + 0.25 * (colour < 2 ? colour : 2));
+    }
+}
+
+static int write_picture(viewer *v) {
+    size_t pixels = (size_t)v->o.width * (size_t)v->o.height;
+    double begun = seconds(), exposure = v->o.exposure;
+    unsigned char *bytes = (unsigned char *)malloc(pixels * 3);
+    int ok;
+    if (!bytes) return fail(v, "the picture", ISOGI_NO_MEMORY);
+    if (!(exposure > 0)) exposure = picture_exposure((const float(*)[4])v->picture, pixels, 0.9, 0.55);
+    for (size_t i = 0; i < pixels; i++) {
+        double behind[3];
+        backdrop(v, (int)(i % (size_t)v->o.width), (int)(i / (size_t)v->o.width), behind);
+        picture_pixel(v->picture[i], exposure, behind, bytes + 3 * i);
+    }
+    ok = png_write(v->o.out, bytes, v->o.width, v->o.height, 3, v->error);
+    free(bytes);
+    stat_line(v, "exposure", "%.6g", exposure);
+    stat_seconds(v, "picture", begun);
+    return ok;
+}
+
+static int check_surface(viewer *v) {
+    size_t covered = 0, pixels = (size_t)v->o.width * (size_t)v->o.height;
+    for (int s = 0; s < v->o.antialias; s++)
+        for (size_t i = 0; i < pixels; i++) covered += v->seen[s][i] != RASTER_NONE;
+    stat_line(v, "coverage", "%.6f", (double)covered / (double)pixels / v->o.antialias);
+    if (!covered) fprintf(stderr, "note: no surface is in view at isovalue %.9g (the data range from %.9g to %.9g)\n", v->isovalue, v->range[0], v->range[1]);
+    return 1;
+}
+
+static int run(viewer *v, int argc, char **argv) {
+    struct rusage usage;
+    if (!parse_arguments(v, argc, argv) || !file_writable(v->o.out, v->error)) return 0;
+    if (!v->o.antialias) v->o.antialias = v->o.mode >= DVR ? 1 : 4;
+    v->context.alloc = counted_alloc, v->context.release = counted_release, v->context.user = v, v->context.threads = v->o.threads;
+    stat_line(v, "mode", "%s", mode_name[v->o.mode]);
+    if (!load_volume(v)) return 0;
+    choose_surface(v);
+    place_camera(v);
+    if (!set_light(v)) return 0;
+    v->picture = (float(*)[4])calloc((size_t)v->o.width * (size_t)v->o.height, sizeof *v->picture);
+    if (!v->picture) return fail(v, "the picture", ISOGI_NO_MEMORY);
+    if (v->o.mode >= DVR) {
+        if (!render_volume(v)) return 0;
+    } else {
+        if (!view_surface(v) || !check_surface(v)) return 0;
+        if (v->o.mode >= VICINITY && v->o.mode <= TRANSFER && !bake(v)) return 0;
+        if (!shade_surface(v)) return 0;
+    }
+    if (!write_picture(v)) return 0;
+    stat_line(v, "picture", "%dx%d", v->o.width, v->o.height);
+    stat_line(v, "memory_bytes", "%llu", (unsigned long long)v->memory_peak);
+    if (getrusage(RUSAGE_SELF, &usage) == 0) stat_line(v, "process_bytes", "%llu", (unsigned long long)usage.ru_maxrss * 1024u);
+    stat_seconds(v, "total", v->started);
+    return 1;
+}
+
+static void release(viewer *v) {
+    for (int s = 0; s < v->o.antialias; s++) {
+        if (v->inverse) free(v->inverse[s]);
+        if (v->seen) free(v->seen[s]);
+    }
+    free(v->inverse), free(v->seen), free(v->picture), free(v->env.rgb);
+    isogi_trace_free(v->trace);
+    if (v->pyramid) isogi_vol_mesh_free(v->pyramid, &v->mesh);
+    isogi_vol_free(v->pyramid);
+    transfer_file_free(&v->transfer);
+    volume_free(&v->volume);
+}
+
+int main(int argc, char **argv) {
+    static viewer v;
+    int ok;
+    for (int i = 1; i < argc; i++)
+        if (!strcmp(argv[i], "--help") || !strcmp(argv[i], "-h")) return print_help(), 0;
+    v.started = seconds();
+    ok = run(&v, argc, argv);
+    if (ok && (fflush(stdout) != 0 || ferror(stdout))) ok = file_fail(v.error, "standard output: %s", strerror(errno));
+    if (!ok) fprintf(stderr, "viewer: %s\n", v.error);
+    release(&v);
+    return ok ? 0 : 1;
+}

@@ -1,0 +1,604 @@
+/* The viewer as its users meet it: pictures that stay the same, and one clear line for everything that is wrong.
+
+   The program is run as a process: build/viewer, or what ISOGI_VIEWER names. Files are made in a folder of their own below /tmp.
+   ISOGI_GOLDEN=write makes the pictures in tests/golden anew instead of comparing with them: look at them before committing. */
+#define ISOGI_VOL_IMPLEMENTATION
+#include "isogi_vol.h"
+#include "test.h"
+
+#include "camera.h"
+#include "files.h"
+#include "hdr.h"
+#include "isogi_dvr.h"
+#include "png.h"
+#include "procedural.h"
+#include "raster.h"
+#include "transfer_file.h"
+#include "volume_file.h"
+
+#include <sys/wait.h>
+
+/* ---- running the program --------------------------------------------------------------------------------------------------------- */
+
+static char folder[64]; /* removed at the end */
+
+static void remove_folder(void) {
+    char command[128];
+    if (!*folder) return;
+    snprintf(command, sizeof command, "rm -rf '%s'", folder);
+    if (system(command) != 0) fprintf(stderr, "could not remove %s\n", folder);
+}
+
+static const char *temporary(const char *name) {
+    static char path[16][256];
+    static int turn;
+    if (!*folder) {
+        strcpy(folder, "/tmp/isogi_viewer_XXXXXX");
+        if (!mkdtemp(folder)) perror("mkdtemp"), exit(2);
+        atexit(remove_folder);
+    }
+    turn = (turn + 1) % 16; /* a path stays for the next 15 calls */
+    snprintf(path[turn], sizeof path[turn], "%s/%s", folder, name);
+    return path[turn];
+}
+
+static void write_bytes(const char *path, const void *data, size_t size) {
+    FILE *file = fopen(path, "wb");
+    CHECK(file && fwrite(data, 1, size, file) == size && fclose(file) == 0, "cannot write %s", path);
+}
+
+typedef struct run_result {
+    int status;      /* exit code; -1 when it was killed */
+    size_t lines;    /* on the standard error */
+    char error[2048], output[4096];
+} run_result;
+
+static size_t read_text(const char *path, char *text, size_t size) {
+    FILE *file = fopen(path, "rb");
+    size_t n = file ? fread(text, 1, size - 1, file) : 0;
+    if (file) fclose(file);
+    text[n] = 0;
+    return n;
+}
+
+/* arguments: as a shell would read them */
+static run_result run_viewer(const char *arguments) {
+    run_result r;
+    const char *viewer = getenv("ISOGI_VIEWER");
+    char command[2048], output[256], error[256];
+    int status;
+    memset(&r, 0, sizeof r);
+    strcpy(output, temporary("stdout")), strcpy(error, temporary("stderr"));
+    snprintf(command, sizeof command, "'%s' %s >'%s' 2>'%s'", viewer && *viewer ? viewer : "build/viewer", arguments, output, error);
+    status = system(command);
+    r.status = WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+    if (r.status > 127) r.status = -1; /* the shell's way to tell of a signal */
+    read_text(error, r.error, sizeof r.error), read_text(output, r.output, sizeof r.output);
+    for (const char *c = r.error; *c; c++) r.lines += *c == '\n';
+    return r;
+}
+
+static void check_refused(const char *arguments, const char *must_say) {
+    run_result r = run_viewer(arguments);
+    CHECK(r.status == 1, "\"%s\" ended with %d: %s", arguments, r.status, r.error);
+    CHECK(r.lines == 1, "\"%s\" wrote %zu lines: %s", arguments, r.lines, r.error);
+    CHECK(strstr(r.error, must_say), "\"%s\" does not say \"%s\": %s", arguments, must_say, r.error);
+}
+
+/* ---- pictures ------------------------------------------------------------------------------------------------------------------------ */
+
+static unsigned char *read_picture(const char *path, int shape[3]) {
+    unsigned char *data = NULL, *pixels = NULL;
+    size_t size = 0;
+    char error[FILE_ERROR_SIZE] = "";
+    if (file_read(path, 1 << 26, &data, &size, error)) {
+        if (!png_decode(data, size, &pixels, shape, error)) pixels = NULL;
+        free(data);
+    }
+    CHECK(pixels, "%s: %s", path, error);
+    return pixels;
+}
+
+/* Root of the mean squared difference of sRGB values 0..255, and the share of pixels that differ by more than 32 in any channel. */
+static double picture_difference(const unsigned char *a, const unsigned char *b, int width, int height, double *outliers) {
+    double sum = 0;
+    size_t bad = 0, pixels = (size_t)width * (size_t)height;
+    for (size_t i = 0; i < pixels; i++) {
+        int worst = 0;
+        for (size_t c = 0; c < 3; c++) {
+            int d = a[3 * i + c] - b[3 * i + c];
+            sum += d * d;
+            worst = abs(d) > worst ? abs(d) : worst;
+        }
+        bad += worst > 32;
+    }
+    *outliers = (double)bad / (double)pixels;
+    return sqrt(sum / (3 * (double)pixels));
+}
+
+/* Tolerance: the pictures are the same bits on one machine and instruction path. Another path, compiler or C library changes the last
+   bits of light and of geometry: a few edge pixels flip, Monte Carlo noise of some texels changes. 2 of 255 root mean square and 1 %
+   of pixels off by more than 32 leave room for that; a light, a normal or an exposure that is wrong moves whole surfaces by more. */
+static void check_golden(const char *name, const char *arguments) {
+    char path[256], command[1024];
+    int shape[3] = {0, 0, 0}, golden_shape[3] = {0, 0, 0};
+    const char *mode = getenv("ISOGI_GOLDEN");
+    char out[256];
+    unsigned char *picture, *golden;
+    run_result r;
+    int writing = mode && !strcmp(mode, "write");
+    strcpy(out, temporary("golden.png"));
+    snprintf(path, sizeof path, "tests/golden/%s.png", name);
+    snprintf(command, sizeof command, "%s --size 96x72 --out '%s'", arguments, writing ? path : out);
+    r = run_viewer(command);
+    CHECK(r.status == 0 && !r.lines, "%s: ended with %d: %s", arguments, r.status, r.error);
+    if (writing || r.status) return;
+    picture = read_picture(out, shape), golden = read_picture(path, golden_shape);
+    if (picture && golden) {
+        double outliers, difference;
+        CHECK(shape[0] == 96 && shape[1] == 72 && shape[2] == 3 && !memcmp(shape, golden_shape, sizeof shape), "%s: %dx%dx%d", name, shape[0], shape[1], shape[2]);
+        difference = picture_difference(picture, golden, 96, 72, &outliers);
+        CHECK(difference < 2, "%s: differs by %.3f of 255 (root mean square)", name, difference);
+        CHECK(outliers < 0.01, "%s: %.2f %% of the pixels differ by more than 32", name, 100 * outliers);
+    }
+    free(picture), free(golden);
+}
+
+TEST(picture_of_the_mesh_by_lambert_stays_the_same) { check_golden("lambert", "procedural:engine-block --mode lambert"); }
+TEST(picture_of_exact_rays_by_phong_stays_the_same) { check_golden("phong", "procedural:torus-sphere-plane:64 --mode phong --raycast"); }
+TEST(picture_of_vicinity_shading_stays_the_same) { check_golden("vicinity", "procedural:skull:96 --mode vicinity"); }
+TEST(picture_of_baked_light_stays_the_same) { check_golden("irradiance", "procedural:engine-block:96 --mode irradiance"); }
+TEST(picture_of_transferred_light_stays_the_same) { check_golden("transfer", "procedural:skull:64 --mode transfer --samples 32 --bounces 2"); }
+TEST(picture_of_traced_paths_stays_the_same) { check_golden("pathtrace", "procedural:cavity:64 --mode pathtrace --samples 64 --aa 1"); }
+TEST(picture_of_a_clipped_volume_stays_the_same) { check_golden("clip", "procedural:gyroid:64 --mode irradiance --samples 16 --clip 0,0,-1,40"); }
+TEST(picture_of_volume_rendering_stays_the_same) { check_golden("dvr", "procedural:engine-block:64 --mode dvr"); }
+TEST(picture_of_scale_invariant_rendering_stays_the_same) { check_golden("scale-invariant", "procedural:marschner-lobb:64 --mode scale-invariant --aa 4"); }
+
+/* The two ways to see the surface agree: mesh and exact rays differ by less than a voxel, so only edges may differ. */
+TEST(mesh_and_exact_rays_show_the_same_surface) {
+    int shape[3];
+    double outliers, difference;
+    char mesh[256], rays[256], command[1024];
+    unsigned char *a, *b;
+    strcpy(mesh, temporary("mesh.png")), strcpy(rays, temporary("rays.png"));
+    snprintf(command, sizeof command, "procedural:engine-block --mode lambert --size 160x120 --exposure 0.4 --out '%s'", mesh);
+    CHECK(run_viewer(command).status == 0, "%s", command);
+    snprintf(command, sizeof command, "procedural:engine-block --mode lambert --size 160x120 --exposure 0.4 --raycast --out '%s'", rays);
+    CHECK(run_viewer(command).status == 0, "%s", command);
+    a = read_picture(mesh, shape), b = read_picture(rays, shape);
+    if (a && b) {
+        difference = picture_difference(a, b, 160, 120, &outliers);
+        CHECK(difference < 4 && outliers < 0.01, "differ by %.3f, %.2f %% outliers", difference, 100 * outliers);
+    }
+    free(a), free(b);
+}
+
+TEST(the_number_of_threads_changes_no_byte) {
+    char text[2][1 << 16], command[512];
+    size_t size[2];
+    for (int i = 0; i < 2; i++) {
+        const char *out = temporary(i ? "three.png" : "one.png");
+        snprintf(command, sizeof command, "procedural:engine-block:64 --samples 16 --size 80x60 --threads %d --out '%s'", i ? 3 : 1, out);
+        CHECK(run_viewer(command).status == 0, "%s", command);
+        size[i] = read_text(out, text[i], sizeof text[i]);
+    }
+    CHECK(size[0] > 100 && size[0] == size[1] && !memcmp(text[0], text[1], size[0]), "%zu and %zu bytes", size[0], size[1]);
+}
+
+/* ---- what is refused --------------------------------------------------------------------------------------------------------------------- */
+
+TEST(silly_options_get_one_line_that_names_the_option) {
+    static const char *const bad[][2] = {
+        {"", "VOLUME"}, {"procedural:gyroid --nonsense", "--nonsense"}, {"procedural:gyroid --size", "--size"},
+        {"procedural:gyroid --size 0x10", "--size"}, {"procedural:gyroid --size 10", "--size"}, {"procedural:gyroid --size 10x10x10", "--size"},
+        {"procedural:gyroid --size 1e9x1e9", "--size"}, {"procedural:gyroid --size 16384x16384", "--size"}, {"procedural:gyroid --size 10.5x10", "--size"},
+        {"procedural:gyroid --size nanx10", "--size"}, {"procedural:gyroid --size -5x10", "--size"}, {"procedural:gyroid --iso nan", "--iso"},
+        {"procedural:gyroid --iso inf", "--iso"}, {"procedural:gyroid --iso 1,2", "--iso"}, {"procedural:gyroid --iso ''", "--iso"},
+        {"procedural:gyroid --mode nice", "lambert phong vicinity"}, {"procedural:gyroid --spacing 1,1", "--spacing"},
+        {"procedural:gyroid --spacing 0,1,1", "--spacing"}, {"procedural:gyroid --spacing 1,-1,1", "--spacing"}, {"procedural:gyroid --spacing 1,1,1,1", "--spacing"},
+        {"procedural:gyroid --albedo 2,0,0", "--albedo"}, {"procedural:gyroid --albedo 1", "--albedo"}, {"procedural:gyroid --bounces 1.5", "--bounces"},
+        {"procedural:gyroid --bounces -2", "--bounces"}, {"procedural:gyroid --samples 0", "--samples"}, {"procedural:gyroid --samples 1e30", "--samples"},
+        {"procedural:gyroid --lattice 0,4,4", "--lattice"}, {"procedural:gyroid --lattice 4,4", "--lattice"}, {"procedural:gyroid --lookup magic", "--lookup"},
+        {"procedural:gyroid --clip 0,0,0,1", "--clip"}, {"procedural:gyroid --clip 1,2,3", "--clip"}, {"procedural:gyroid --mode dvr --clip 1,0,0,0", "--clip"},
+        {"procedural:gyroid --camera 1,2", "--camera"}, {"procedural:gyroid --camera 0,91,2", "--camera"}, {"procedural:gyroid --camera 0,0,0", "--camera"},
+        {"procedural:gyroid --up 0,0,0", "--up"}, {"procedural:gyroid --threads -1", "--threads"}, {"procedural:gyroid --threads 1000", "--threads"},
+        {"procedural:gyroid --light sun:1,1,1:1,1,1", "--light"}, {"procedural:gyroid --light directional:0,0,0:1,1,1", "--light"},
+        {"procedural:gyroid --light directional:1,1,1", "--light"}, {"procedural:gyroid --light point:1,1,1:-1,0,0", "--light"},
+        {"procedural:gyroid --light sphere:1,1,1:1,1,1", "--light"}, {"procedural:gyroid --light point:1,1,1:1,1,1:1:1", "--light"},
+        {"procedural:gyroid --mode transfer --light point:1,1,1:1,1,1", "--light"}, {"procedural:gyroid --exposure 0", "--exposure"},
+        {"procedural:gyroid --aa 1000", "--aa"}, {"procedural:gyroid --shading flat", "--shading"}, {"procedural:gyroid --out ''", "--out"},
+        {"procedural:gyroid procedural:skull", "second volume"}, {"procedural:gyroid --scene engine", "not both"}, {"--scene nowhere", "engine bonsai"},
+        {"procedural:teapot", "marschner-lobb"}, {"procedural:", "marschner-lobb"}, {"procedural:gyroid:1", "2 to 2048"}, {"procedural:gyroid:", "2 to 2048"},
+        {"procedural:gyroid:99999", "2 to 2048"}, {"procedural:gyroid:nan", "2 to 2048"}, {"--scene cthead --mode dvr", "--tf"}};
+    char command[1024];
+    for (size_t i = 0; i < sizeof bad / sizeof bad[0]; i++) {
+        const char *out = strstr(bad[i][0], "--out") ? "" : temporary("never.png");
+        snprintf(command, sizeof command, *out ? "%s --out '%s'" : "%s%s", bad[i][0], out);
+        if (!*bad[i][0]) strcpy(command, "");
+        check_refused(command, bad[i][1]);
+    }
+    CHECK(access(temporary("never.png"), F_OK) != 0, "a refused run wrote a picture: %s", temporary("never.png"));
+}
+
+TEST(bad_volumes_get_one_line) {
+    unsigned char bytes[64 * 4] = {0};
+    float numbers[8] = {0, 1, 2, NAN, 4, 5, 6, 7};
+    char command[512];
+    static const struct { const char *name; size_t size; const char *say; } files[] = {
+        {"short_4x4x4_uint8.raw", 63, "63 bytes"}, {"long_4x4x4_uint8.raw", 65, "65 bytes"}, {"empty_4x4x4_uint8.raw", 0, "0 bytes"},
+        {"zero_0x4x4_uint8.raw", 0, "size of 0"}, {"nosize_uint8.raw", 64, "name must end"}, {"notype_4x4x4.raw", 64, "name must end"},
+        {"two_8x8_uint8.raw", 64, "name must end"}, {"four_2x2x4x4_uint8.raw", 64, "name must end"}, {"odd_4x4x4_uint24.raw", 64, "name must end"},
+        {"minus_-4x4x4_uint8.raw", 64, "name must end"}, {"huge_99999999999x4x4_uint8.raw", 64, "name must end"},
+        {"vast_999999999x999999999x999999999_float64.raw", 64, "too large"}, {"big_2000000000x20x2_uint8.raw", 64, "64 bytes"},
+        {"flat_64x1x1_uint8.raw", 64, "only one layer"}, {"other_4x4x4_uint8.nrrd", 64, "only raw volumes"}, {"nothing", 4, "only raw volumes"},
+        {"4x4x4_uint8.raw", 63, "63 bytes"}, {"x_4x4x4_UINT8.raw", 64, "name must end"}};
+    for (size_t i = 0; i < sizeof files / sizeof files[0]; i++) {
+        const char *path = temporary(files[i].name);
+        write_bytes(path, bytes, files[i].size);
+        snprintf(command, sizeof command, "'%s' --size 8x8 --out '%s'", path, temporary("never.png"));
+        check_refused(command, files[i].say);
+    }
+    snprintf(command, sizeof command, "'%s' --out '%s'", temporary("missing_4x4x4_uint8.raw"), temporary("never.png"));
+    check_refused(command, "No such file");
+    snprintf(command, sizeof command, "'%s' --out '%s'", folder, temporary("never.png"));
+    check_refused(command, "only raw volumes");
+    {
+        char path[256];
+        strcpy(path, temporary("nan_2x2x2_float32.raw"));
+        write_bytes(path, numbers, sizeof numbers);
+        snprintf(command, sizeof command, "'%s' --size 8x8 --out '%s'", path, temporary("nan.png"));
+        check_refused(command, "voxel 1,1,0");
+        snprintf(command, sizeof command, "'%s' --size 8x8 --mode lambert --nan 3 --out '%s'", path, temporary("nan.png"));
+        CHECK(run_viewer(command).status == 0, "--nan: %s", command);
+    }
+    mkdir(temporary("dir_4x4x4_uint8.raw"), 0700);
+    snprintf(command, sizeof command, "'%s' --out '%s'", temporary("dir_4x4x4_uint8.raw"), temporary("never.png"));
+    check_refused(command, "folder");
+}
+
+TEST(bad_environments_and_transfer_functions_get_one_line) {
+    static const char *const hdr[][2] = {
+        {"", "does not begin"}, {"hello", "does not begin"}, {"#?RADIANCE\n", "within its header"}, {"#?RADIANCE\n\n", "header"}, {"#?RADIANCE\n\n-Y 4 +X 4\n", "row 0"},
+        {"#?RADIANCE\n\n+X 4 -Y 4\n", "columns"}, {"#?RADIANCE\n\n-Y 0 +X 4\nabcd", "claims"}, {"#?RADIANCE\n\n-Y 99999999 +X 99999999\nabcd", "claims"},
+        {"#?RADIANCE\n\n-Y 32768 +X 32768\nabcd", "claims"}, {"#?RADIANCE\nFORMAT=32-bit_rle_xyze\n\n-Y 1 +X 1\nabcd", "FORMAT"},
+        {"#?RADIANCE\nEXPOSURE=0\n\n-Y 1 +X 1\nabcd", "exposure"}, {"#?RADIANCE\n\n-Y 2 +X 2\nabcdabcd", "row 1"}};
+    static const char *const tf[][2] = {{"", "no point"}, {"# only words\n", "no point"}, {"1 2 3\n", "line 1"}, {"1 0 0 0 0\n0 0 0 0 0\n", "ascend"},
+        {"1 -1 0 0 0\n", "line 1"}, {"1 0 2 0 0\n", "colour"}, {"\n\nnan 0 0 0 0\n", "line 3"}, {"peak 1 2 1 1 1\n", "opacity"}, {"peak 1\n", "line 1"}, {"1 0 0 0 0 0\n", "line 1"}};
+    char command[512];
+    for (size_t i = 0; i < sizeof hdr / sizeof hdr[0]; i++) {
+        const char *path = temporary("bad.hdr");
+        write_bytes(path, hdr[i][0], strlen(hdr[i][0]));
+        snprintf(command, sizeof command, "procedural:gyroid:8 --size 8x8 --env '%s' --out '%s'", path, temporary("never.png"));
+        check_refused(command, hdr[i][1]);
+    }
+    for (size_t i = 0; i < sizeof tf / sizeof tf[0]; i++) {
+        const char *path = temporary("bad.txt");
+        write_bytes(path, tf[i][0], strlen(tf[i][0]));
+        snprintf(command, sizeof command, "procedural:gyroid:8 --mode dvr --size 8x8 --tf '%s' --out '%s'", path, temporary("never.png"));
+        check_refused(command, tf[i][1]);
+    }
+    check_refused("procedural:gyroid:8 --env /nowhere/at/all.hdr", "/nowhere/at/all.hdr");
+    check_refused("procedural:gyroid:8 --mode dvr --tf /nowhere.txt", "/nowhere.txt");
+}
+
+TEST(an_existing_file_survives_every_failure) {
+    char command[512], text[64], precious[256];
+    static const char *const failing[] = {"procedural:gyroid:8 --size 0x0", "procedural:teapot", "/nowhere_4x4x4_uint8.raw", "procedural:gyroid:8 --env /nowhere.hdr"};
+    strcpy(precious, temporary("precious.png"));
+    write_bytes(precious, "do not touch", 12);
+    for (size_t i = 0; i < sizeof failing / sizeof failing[0]; i++) {
+        snprintf(command, sizeof command, "%s --out '%s'", failing[i], precious);
+        CHECK(run_viewer(command).status == 1, "%s", command);
+        read_text(precious, text, sizeof text);
+        CHECK(!strcmp(text, "do not touch"), "after %s it holds \"%.20s\"", command, text);
+    }
+    /* a file size limit makes the write itself fail half way */
+    snprintf(command, sizeof command, "procedural:gyroid:8 --size 512x512 --mode lambert --out '%s'", precious);
+    {
+        char shell[1024];
+        const char *viewer = getenv("ISOGI_VIEWER");
+        snprintf(shell, sizeof shell, "trap '' XFSZ; ulimit -f 8; '%s' %s 2>/dev/null", viewer && *viewer ? viewer : "build/viewer", command);
+        CHECK(system(shell) != 0, "a write beyond the limit was not noticed");
+    }
+    read_text(precious, text, sizeof text);
+    CHECK(!strcmp(text, "do not touch"), "after a full disk it holds \"%.20s\"", text);
+    snprintf(command, sizeof command, "ls '%s' | grep -c tmp >/dev/null", folder);
+    CHECK(system(command) != 0, "a temporary file was left in %s", folder);
+    snprintf(command, sizeof command, "procedural:gyroid:8 --size 8x8 --out '%s/none/x.png'", folder);
+    check_refused(command, "No such file");
+    snprintf(command, sizeof command, "procedural:gyroid:8 --size 8x8 --out '%s'", folder);
+    check_refused(command, "folder");
+}
+
+TEST(stats_are_key_value_lines_and_help_is_complete) {
+    static const char *const keys[] = {"size 32x32x32", "range ", "isovalue ", "triangles ", "rays_light ", "rays_per_second ", "texels_computed ",
+                                       "texels_requested ", "memory_bytes ", "seconds_bake ", "seconds_total ", "error_relative "};
+    static const char *const named[] = {"--scene", "--size", "--iso", "--mode", "--raycast", "--spacing", "--env", "--light", "--albedo", "--bounces", "--samples",
+                                        "--lattice", "--lookup", "--tf", "--clip", "--camera", "--up", "--threads", "--out", "--stats", "procedural:", "Examples"};
+    char command[512];
+    run_result r;
+    snprintf(command, sizeof command, "procedural:gyroid:32 --size 32x32 --samples 8 --stats --out '%s'", temporary("stats.png"));
+    r = run_viewer(command);
+    CHECK(r.status == 0 && r.lines == 0, "%d: %s", r.status, r.error);
+    for (size_t i = 0; i < sizeof keys / sizeof keys[0]; i++) CHECK(strstr(r.output, keys[i]), "no \"%s\" in: %s", keys[i], r.output);
+    for (char *line = strtok(r.output, "\n"); line; line = strtok(NULL, "\n")) CHECK(strchr(line, ' ') && line[0] != ' ', "\"%s\"", line);
+    snprintf(command, sizeof command, "--help");
+    {
+        char help[16384];
+        const char *viewer = getenv("ISOGI_VIEWER");
+        char shell[512];
+        snprintf(shell, sizeof shell, "'%s' --help >'%s'", viewer && *viewer ? viewer : "build/viewer", temporary("help"));
+        CHECK(system(shell) == 0, "--help fails");
+        read_text(temporary("help"), help, sizeof help);
+        for (size_t i = 0; i < sizeof named / sizeof named[0]; i++) CHECK(strstr(help, named[i]), "--help does not tell of %s", named[i]);
+    }
+}
+
+/* ---- the parts ---------------------------------------------------------------------------------------------------------------------------------- */
+
+TEST(png_round_trip_is_exact) {
+    test_random random = {1};
+    for (int pass = 0; pass < 60; pass++) {
+        int width = 1 + (int)(random_bits(&random) % (pass < 50 ? 40 : 700)), height = 1 + (int)(random_bits(&random) % 60), channels = pass % 2 ? 3 : 4, shape[3];
+        size_t n = (size_t)width * (size_t)height * (size_t)channels, size;
+        unsigned char *pixels = (unsigned char *)malloc(n), *file, *back = NULL;
+        char error[FILE_ERROR_SIZE];
+        for (size_t i = 0; i < n; i++) /* constant, smooth, noise, and noise of few values */
+            pixels[i] = (unsigned char)(pass % 4 == 0 ? 7 : pass % 4 == 1 ? i / 9 : pass % 4 == 2 ? random_bits(&random) : random_bits(&random) % 3 * 100);
+        CHECK(png_encode(pixels, width, height, channels, &file, &size), "%dx%dx%d", width, height, channels);
+        CHECK(png_decode(file, size, &back, shape, error), "%dx%dx%d: %s", width, height, channels, error);
+        if (back) CHECK(shape[0] == width && shape[1] == height && shape[2] == channels && !memcmp(pixels, back, n), "%dx%dx%d came back as %dx%dx%d", width, height, channels, shape[0], shape[1], shape[2]);
+        free(pixels), free(file), free(back);
+    }
+}
+
+/* Noise cannot be packed, a constant picture must be: deflate's own limit is 1032 to 1. */
+TEST(png_compresses) {
+    unsigned char *pixels = (unsigned char *)calloc(300 * 300, 3), *file;
+    size_t size;
+    CHECK(png_encode(pixels, 300, 300, 3, &file, &size) && size < 1200, "%zu bytes for a black picture of 270000", size);
+    free(file);
+    for (size_t i = 0; i < 300 * 300 * 3; i++) pixels[i] = (unsigned char)((i / 3 % 300 + i / 900) / 4);
+    CHECK(png_encode(pixels, 300, 300, 3, &file, &size) && size < 6000, "%zu bytes for a gradient of 270000", size);
+    free(file), free(pixels);
+}
+
+/* Readers of hostile bytes: whatever is changed, they return, and under a sanitizer they return cleanly. */
+static size_t mutate(test_random *random, const unsigned char *from, size_t size, unsigned char *to) {
+    size_t n = size;
+    memcpy(to, from, size);
+    for (int k = 1 + (int)(random_bits(random) % 4); k; k--) {
+        size_t at = random_bits(random) % n;
+        switch (random_bits(random) % 4) {
+        case 0: to[at] ^= (unsigned char)(1u << random_bits(random) % 8); break;
+        case 1: to[at] = (unsigned char)random_bits(random); break;
+        case 2: n = at + 1; break;
+        default: to[at] = (unsigned char)("\xff\x00 -+9\n"[random_bits(random) % 7]); break;
+        }
+    }
+    return n;
+}
+
+/* A run-length coded picture of 16 x 4 and its floats. */
+static size_t make_hdr(unsigned char *file) {
+    size_t n = (size_t)sprintf((char *)file, "#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 4 +X 16\n");
+    for (int y = 0; y < 4; y++) {
+        file[n++] = 2, file[n++] = 2, file[n++] = 0, file[n++] = 16;
+        for (int channel = 0; channel < 4; channel++) {
+            file[n++] = 128 + 10, file[n++] = (unsigned char)(channel == 3 ? 129 : 100 + y);
+            file[n++] = 6;
+            for (int i = 0; i < 6; i++) file[n++] = (unsigned char)(channel == 3 ? 128 + i % 2 : 10 * channel + i);
+        }
+    }
+    return n;
+}
+
+TEST(hdr_pixels_are_right) {
+    unsigned char file[1024];
+    hdr_image image = {NULL, 0, 0};
+    char error[FILE_ERROR_SIZE];
+    size_t n = make_hdr(file);
+    CHECK(hdr_decode(file, n, &image, error), "%s", error);
+    if (!image.rgb) return;
+    CHECK(image.width == 16 && image.height == 4, "%dx%d", image.width, image.height);
+    /* mantissa m, exponent e: m * 2^(e - 136); these are exact in float */
+    CHECK(image.rgb[0] == 100.0f / 128 && image.rgb[3 * 16 * 3] == 103.0f / 128, "%g %g", (double)image.rgb[0], (double)image.rgb[3 * 16 * 3]);
+    CHECK(image.rgb[3 * 11 + 1] == 11.0f / 128 && image.rgb[3 * 12 + 2] == 22.0f / 256, "%g %g", (double)image.rgb[3 * 11 + 1], (double)image.rgb[3 * 12 + 2]);
+    free(image.rgb);
+    {
+        /* flat pixels, mirrored and upside down, exposure 2 */
+        static const char flat[] = "#?RGBE\nEXPOSURE=2\n\n+Y 2 -X 2\n\x80\x40\x20\x81\x01\x02\x03\x80\x10\x20\x30\x80\x11\x12\x13\x00";
+        CHECK(hdr_decode((const unsigned char *)flat, sizeof flat - 1, &image, error), "%s", error);
+        CHECK(image.rgb[3 * 3] == 0.5f && image.rgb[3 * 3 + 1] == 0.25f && image.rgb[3 * 2] == 0.5f / 256, "%g", (double)image.rgb[9]);
+        CHECK(image.rgb[3] == 8.0f / 256 && image.rgb[0] == 0, "%g %g", (double)image.rgb[3], (double)image.rgb[0]);
+        free(image.rgb);
+    }
+}
+
+TEST(hostile_hdr_and_png_bytes_are_survived) {
+    unsigned char hdr[1024], bad[4096], *png, pixels[24 * 10 * 3];
+    test_random random = {7};
+    size_t hdr_size = make_hdr(hdr), png_size, refused = 0;
+    char error[FILE_ERROR_SIZE];
+    int rounds = LONG_SUITE ? 1000000 : 60000, shape[3];
+    for (size_t i = 0; i < sizeof pixels; i++) pixels[i] = (unsigned char)(i % 7 * 30);
+    CHECK(png_encode(pixels, 24, 10, 3, &png, &png_size) && png_size < sizeof bad, "%zu bytes", png_size);
+    for (int i = 0; i < rounds; i++) {
+        hdr_image image;
+        unsigned char *out;
+        size_t n = mutate(&random, hdr, hdr_size, bad);
+        if (hdr_decode(bad, n, &image, error)) free(image.rgb);
+        else refused++;
+        n = mutate(&random, png, png_size, bad);
+        if (png_decode(bad, n, &out, shape, error)) free(out);
+        else refused++;
+        /* past the checksums, into the decoder itself */
+        if (n > 70) {
+            png_source in;
+            unsigned char raw[24 * 3 * 10 + 10];
+            memset(&in, 0, sizeof in);
+            in.data = bad + 8 + 25 + 13 + 8 + 2, in.size = n - 56;
+            (void)png_inflate(&in, raw, sizeof raw);
+        }
+    }
+    CHECK(refused > (size_t)rounds, "only %zu of %d were refused", refused, 2 * rounds);
+    free(png);
+}
+
+TEST(raw_names_are_read) {
+    size_t size[3];
+    isogi_type type;
+    char error[FILE_ERROR_SIZE];
+    CHECK(volume_parse_name("/some/where/engine_256x255x128_uint8.raw", size, &type, error) && size[0] == 256 && size[1] == 255 && size[2] == 128 && type == ISOGI_U8, "%s", error);
+    CHECK(volume_parse_name("a_b_c_1x2x3_float64.raw", size, &type, error) && size[0] == 1 && size[1] == 2 && size[2] == 3 && type == ISOGI_F64, "%s", error);
+    CHECK(volume_parse_name("4x5x6_int16.raw", size, &type, error) && size[2] == 6 && type == ISOGI_I16, "%s", error);
+    CHECK(!volume_parse_name("x_4x5x6_int16.raw.gz", size, &type, error), "a packed file passed");
+    CHECK(!volume_parse_name(".raw", size, &type, error) && !volume_parse_name("_.raw", size, &type, error) && !volume_parse_name("", size, &type, error), "nothing passed");
+}
+
+TEST(guessed_isovalue_parts_two_materials) {
+    unsigned char voxels[4096];
+    isogi_volume v;
+    const double range[2] = {0, 255};
+    double iso;
+    for (size_t i = 0; i < 4096; i++) voxels[i] = (unsigned char)(i % 8 < 4 ? 0 : i % 8 < 6 ? 60 + i % 5 : 190 + i % 5);
+    memset(&v, 0, sizeof v);
+    v.data = voxels, v.size[0] = v.size[1] = v.size[2] = 16;
+    iso = volume_guess_isovalue(&v, range);
+    CHECK(iso > 64 && iso < 190, "%g", iso);
+}
+
+/* A grid of triangles over the whole picture, with shared edges: every pixel is drawn, whatever the places of the corners. */
+TEST(rasterizer_leaves_no_crack) {
+    enum { n = 23 };
+    static float positions[(n + 1) * (n + 1)][3];
+    static uint32_t triangles[2 * n * n][3];
+    static float inverse[200 * 150];
+    static uint32_t seen[200 * 150];
+    test_random random = {3};
+    for (int pass = 0; pass < 40; pass++) {
+        isogi_mesh mesh;
+        camera view;
+        const double eye[3] = {0, 0, 3}, target[3] = {0, 0, 0}, up[3] = {0, 1, 0};
+        size_t holes = 0, count = 0, wrong = 0;
+        memset(&mesh, 0, sizeof mesh);
+        for (int j = 0; j <= n; j++)
+            for (int i = 0; i <= n; i++) {
+                float *p = positions[j * (n + 1) + i];
+                int inner = i > 0 && j > 0 && i < n && j < n;
+                p[0] = (float)(-3 + 6.0 * i / n + (inner ? random_range(&random, -0.12, 0.12) : 0));
+                p[1] = (float)(-3 + 6.0 * j / n + (inner ? random_range(&random, -0.12, 0.12) : 0)), p[2] = 0;
+            }
+        for (int j = 0; j < n; j++)
+            for (int i = 0; i < n; i++) {
+                uint32_t a = (uint32_t)(j * (n + 1) + i), b = a + 1, c = a + n + 1, d = c + 1;
+                uint32_t one[3] = {a, b, d}, two[3] = {a, d, c};
+                memcpy(triangles[count++], one, sizeof one), memcpy(triangles[count++], two, sizeof two);
+            }
+        mesh.positions = positions, mesh.triangles = triangles, mesh.vertex_count = (n + 1) * (n + 1), mesh.triangle_count = count;
+        camera_look(&view, 200, 150, eye, target, up, 45);
+        CHECK(raster_draw(&mesh, &view, 0.125, -0.375, NULL, 0.01, inverse, seen, NULL) == ISOGI_OK, "pass %d", pass);
+        for (int i = 0; i < 200 * 150; i++) holes += seen[i] == RASTER_NONE, wrong += fabs(1 / (double)inverse[i] - 3) > 1e-5;
+        CHECK(!holes && !wrong, "pass %d: %zu pixels are empty, %zu have a wrong depth", pass, holes, wrong);
+    }
+}
+
+/* Random triangles, some of them through the eye's plane, against a ray per pixel: Moeller and Trumbore in double. */
+static double ray_triangle(const double o[3], const double d[3], const float a[3], const float b[3], const float c[3], double *margin) {
+    double e1[3], e2[3], p[3], q[3], s[3], det, u, v;
+    for (int i = 0; i < 3; i++) e1[i] = (double)b[i] - (double)a[i], e2[i] = (double)c[i] - (double)a[i], s[i] = o[i] - (double)a[i];
+    vector_cross(d, e2, p), det = vector_dot(e1, p), u = vector_dot(s, p) / det;
+    vector_cross(s, e1, q), v = vector_dot(d, q) / det;
+    *margin = fmin(fmin(u, v), 1 - u - v);
+    return vector_dot(e2, q) / det;
+}
+
+TEST(rasterizer_agrees_with_rays) {
+    static float positions[60][3], inverse[64 * 48];
+    static uint32_t triangles[20][3], seen[64 * 48];
+    test_random random = {5};
+    size_t compared = 0, wrong = 0;
+    for (int pass = 0; pass < 50; pass++) {
+        isogi_mesh mesh;
+        camera view;
+        const double eye[3] = {0.1, 0.2, 2}, target[3] = {0, 0, 0}, up[3] = {0, 1, 0};
+        memset(&mesh, 0, sizeof mesh);
+        for (int i = 0; i < 60; i++)
+            for (int k = 0; k < 3; k++) positions[i][k] = (float)random_range(&random, -3, 3);
+        for (uint32_t i = 0; i < 60; i++) triangles[i / 3][i % 3] = i;
+        mesh.positions = positions, mesh.triangles = triangles, mesh.vertex_count = 60, mesh.triangle_count = 20;
+        camera_look(&view, 64, 48, eye, target, up, 60);
+        CHECK(raster_draw(&mesh, &view, 0, 0, NULL, 0.05, inverse, seen, NULL) == ISOGI_OK, "pass %d", pass);
+        for (int i = 0; i < 64 * 48; i++) {
+            double d[3], nearest = 1e30, closest = 1;
+            camera_direction(&view, i % 64, i / 64, d);
+            for (int t = 0; t < 20; t++) {
+                double margin, at = ray_triangle(eye, d, positions[3 * t], positions[3 * t + 1], positions[3 * t + 2], &margin);
+                if (at > 0.03 && fabs(margin) < 0.02) closest = 0; /* too near an edge for places rounded to 1/256 pixel */
+                if (at > 0.05 && margin > 0 && at < nearest) nearest = at;
+                if (fabs(at - 0.05) < 0.02) closest = 0;
+            }
+            if (closest == 0) continue;
+            compared++;
+            if (nearest > 1e29 ? inverse[i] != 0 : fabs((double)inverse[i] * nearest - 1) > 0.02) wrong++;
+        }
+    }
+    CHECK(compared > 30000, "only %zu pixels could be compared", compared);
+    CHECK(wrong <= compared / 1000, "%zu of %zu pixels differ from rays", wrong, compared); /* grazing triangles move by more than 2 % */
+}
+
+TEST(camera_up_follows_the_standard_view_of_the_scenes) {
+    /* bonsai is upside down: up -z takes the standard direction (1.5, 1.2, 2) to (1.5, 2, -1.2) */
+    const double up[3] = {0, 0, -1}, other[3][3] = {{0, -1, 0}, {0.6, 0, 0.8}, {0.36, -0.48, 0.8}};
+    double m[9], d[3] = {1.5, 1.2, 2.0};
+    rotation_from_up(up, m);
+    rotation_apply(m, d, d);
+    CHECK(fabs(d[0] - 1.5) < 1e-12 && fabs(d[1] - 2) < 1e-12 && fabs(d[2] + 1.2) < 1e-12, "%g %g %g", d[0], d[1], d[2]);
+    for (int k = 0; k < 3; k++) {
+        double y[3] = {0, 1, 0}, x[3] = {1, 0, 0}, z[3] = {0, 0, 1}, cross[3];
+        rotation_from_up(other[k], m);
+        rotation_apply(m, x, x), rotation_apply(m, y, y), rotation_apply(m, z, z);
+        vector_cross(x, y, cross);
+        for (int i = 0; i < 3; i++) CHECK(fabs(y[i] - other[k][i]) < 1e-12 && fabs(cross[i] - z[i]) < 1e-12, "up %d: %g %g", k, y[i], cross[i]);
+    }
+}
+
+TEST(procedural_volumes_hold_their_formulas) {
+    for (size_t k = 0; k < PROCEDURAL_SHAPE_COUNT; k++) {
+        const procedural_shape *shape = &procedural_shapes[k];
+        isogi_volume v;
+        double least = 1e300, most = -1e300;
+        memset(&v, 0, sizeof v);
+        CHECK(procedural_make(shape, 41, &v, NULL) == ISOGI_OK, "%s", shape->name);
+        if (!v.data) continue;
+        for (size_t i = 0; i < v.size[0] * v.size[1] * v.size[2]; i++) {
+            double x = volume_voxel(&v, i);
+            least = x < least ? x : least, most = x > most ? x : most;
+        }
+        CHECK(least < shape->isovalue && most > shape->isovalue, "%s: range %g to %g, isovalue %g", shape->name, least, most, shape->isovalue);
+        procedural_free(&v);
+    }
+    {
+        /* values that need no computer: the origin of Marschner-Lobb, a corner and a maximum of the gyroid, the orbital's lobe */
+        const double origin[3] = {0, 0, 0}, corner[3] = {-1, -1, -1}, lobe[3] = {0, 0.3, 0}, rim[3] = {0.7, 0.3, 0};
+        CHECK(fabs(procedural_marschner_lobb(origin, 0) - (1 + 0.25 * 2) / 2.5) < 1e-12, "%g", procedural_marschner_lobb(origin, 0));
+        CHECK(fabs(procedural_gyroid(corner, 0)) < 1e-12, "%g", procedural_gyroid(corner, 0));
+        CHECK(fabs(procedural_hydrogen(lobe, 0) - 1) < 1e-12, "%g", procedural_hydrogen(lobe, 0));
+        CHECK(fabs(procedural_cavity(rim, 0)) < 1e-12, "%g", procedural_cavity(rim, 0));
+    }
+}
+
+TEST(real_volumes_are_shown) {
+    char *path = test_data("fuel_64x64x64_uint8.raw"), command[1024];
+    run_result r;
+    if (!path) SKIP("ISOGI_DATA is not set, or holds no fuel_64x64x64_uint8.raw");
+    snprintf(command, sizeof command, "'%s' --size 64x64 --samples 8 --stats --out '%s'", path, temporary("fuel.png"));
+    r = run_viewer(command);
+    CHECK(r.status == 0 && strstr(r.output, "size 64x64x64"), "%d: %s", r.status, r.error);
+    snprintf(command, sizeof command, "'%s' --mode dvr --shading local --size 64x64 --out '%s'", path, temporary("fuel.png"));
+    r = run_viewer(command);
+    CHECK(r.status == 0, "%d: %s", r.status, r.error);
+    free(path);
+}
+
+TEST_MAIN("viewer")
