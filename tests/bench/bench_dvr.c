@@ -4,7 +4,7 @@
 
    One thread, CPU seconds. Volumes are procedural, as the scenes name them: Marschner-Lobb and gyroid on the cube, here 128^3
    (64^3 with --quick). Frames: standard view, shaded by visibility under a uniform sky and a directional light; error = RMSE of
-   sRGB values against steps of a sixteenth of a voxel, same visibility. Visibility: order 3 on a grid of 16^3 (8^3); error =
+   sRGB values against steps of a sixteenth of a voxel, same visibility. Visibility: order 3 on a grid of 8^3 (6^3); error =
    relative RMSE of all coefficients against 2048 rays. Methods: default; steps, rays = other settings of the same code. */
 #define ISOGI_IMPLEMENTATION
 #include "isogi_dvr.h"
@@ -14,8 +14,8 @@
 static const double pi = 3.14159265358979323846;
 static const isogi_context serial = {.threads = 1};
 static FILE *csv;
-static int N = 128, WIDTH = 256;
-static size_t points = 16;
+static int N = 128, WIDTH = 192;
+static size_t points = 8;
 
 static double cpu_seconds(void) {
     struct timespec t;
