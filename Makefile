@@ -1,35 +1,85 @@
 # make           the viewer and the example programs, into build/
 # make demo      volume in, globally lit pictures out: build/demo/*.png    (VOLUME=FILE ISO=V for your own)
 # make test      the quick tests, under two minutes; ends with "N passed, N failed, N skipped"
-# make check     the long suite: full sizes, every compiler and sanitizer that is installed
+# make check     the long suite: full sizes, every compiler, sanitizer and emulator that is installed
 # make bench     run time against error: build/bench/*.csv and *.svg      (ONLY=sh|vol|trace|dvr QUICK=1)
 # make clean
 # CC, CXX and CFLAGS may be set; nothing but a C compiler and make is needed.
 
-CC      ?= cc
-CXX     ?= c++
-CFLAGS  ?= -O2 -g
-WARN    := -Wall -Wextra -Wpedantic -Wconversion -Wsign-conversion -Wshadow -Wdouble-promotion -Wstrict-prototypes
-C99     := -std=gnu99 $(WARN) -ffp-contract=off -I. -Iexamples/common
-LIBS    := -lm -lpthread
+CC     ?= cc
+CXX    ?= c++
+CFLAGS ?= -O2 -g
+WARN   := -Wall -Wextra -Wpedantic -Wconversion -Wsign-conversion -Wshadow -Wdouble-promotion -Wstrict-prototypes
+C99    := -std=gnu99 $(WARN) -ffp-contract=off -I. -Iexamples/common
+LIBS   := -lm -lpthread
 
-HEADERS  := isogi_sh.h isogi_vol.h isogi_trace.h isogi_dvr.h
-COMMON   := $(wildcard examples/common/*.h)
 EXAMPLES := $(patsubst examples/%.c,build/%,$(wildcard examples/*.c))
 TESTS    := $(patsubst tests/%.c,build/tests/%,$(wildcard tests/test_*.c))
+BENCHES  := $(patsubst tests/bench/%.c,build/bench/%,$(wildcard tests/bench/bench_$(or $(ONLY),*).c))
+
+# As many jobs as processors, unless the caller chose a number.
+PROCESSORS := $(shell getconf _NPROCESSORS_ONLN 2>/dev/null || echo 2)
+PARALLEL    = $(if $(findstring -j,$(MAKEFLAGS)),,-j$(PROCESSORS))
+QUIET_MAKE  = $(MAKE) --no-print-directory $(PARALLEL)
+
+export CC CXX CFLAGS
 
 all: $(EXAMPLES)
 
-build/%: examples/%.c $(HEADERS) $(COMMON)
-	@mkdir -p build
-	$(CC) $(C99) $(CFLAGS) -o $@ $< $(LIBS)
+# What a source file includes is found by the compiler (the .d files). A line "LIBS: -lname" in a test's first comment names
+# libraries of its own. What does not compile must not leave an older program behind.
+COMPILE = @rm -f $@; echo "$(CC) $<"; \
+	libs=$$(sed -n '1,20s|.*LIBS: \([^*]*\).*|\1|p' $<); \
+	$(CC) $(C99) $(CFLAGS) -MMD -MP -MF $@.d -MT $@ $(1) -o $@ $< $(LIBS) $$libs
 
-build/tests/%: tests/%.c tests/test.h $(HEADERS) $(COMMON)
-	@mkdir -p build/tests
-	$(CC) $(C99) $(CFLAGS) -Itests -o $@ $< $(LIBS)
+build/%: examples/%.c build/flags
+	$(call COMPILE)
+
+build/tests/%: tests/%.c build/flags
+	$(call COMPILE,-Itests)
+
+build/bench/%: tests/bench/%.c build/flags
+	$(call COMPILE,-Itests)
+
+# Changes only when the compiler or its flags do, so that another CC builds everything anew.
+build/flags: FORCE
+	@mkdir -p build/tests build/bench build/demo
+	@printf '%s\n' '$(CC) $(C99) $(CFLAGS) $(LIBS)' | cmp -s - $@ || printf '%s\n' '$(CC) $(C99) $(CFLAGS) $(LIBS)' > $@
+
+# ---- demo: VOLUME and ISO reach the script through the environment, whatever characters they hold ----
+
+demo: export VOLUME := $(VOLUME)
+demo: export ISO := $(ISO)
+demo: build/viewer
+	@sh examples/demo.sh
+
+# ---- tests ----
+
+programs: $(TESTS) $(EXAMPLES)
+
+test:
+	@$(QUIET_MAKE) -k programs || true
+	@sh tests/suite.sh quick $(TESTS) | sh tests/run.sh $(PROCESSORS)
+
+check:
+	@$(QUIET_MAKE) -k programs || true
+	@sh tests/suite.sh long $(TESTS) | sh tests/run.sh $(PROCESSORS)
+
+# ---- benchmarks: one at a time, since they measure ----
+
+bench: build/bench/plot
+	@$(QUIET_MAKE) $(BENCHES)
+	@for b in $(patsubst build/bench/bench_%,%,$(BENCHES)); do \
+		echo "$$b"; \
+		build/bench/bench_$$b $(if $(QUICK),--quick) build/bench/$$b.csv && \
+		build/bench/plot build/bench/$$b.csv build/bench/$$b.svg || exit 1; \
+	done
 
 clean:
 	rm -rf build
 
-.PHONY: all clean
+-include $(wildcard build/*.d build/tests/*.d build/bench/*.d)
+
+FORCE:
+.PHONY: all demo programs test check bench clean FORCE
 .DELETE_ON_ERROR:

@@ -9,12 +9,14 @@
    A test passes when none of its CHECKs fails; each failing CHECK prints its place, its condition and the
    values it was given (the first few of a test, then a count). SKIP("why") ends a test that cannot run here.
    LONG_SUITE is true under --long: tests then use their full sizes. The last line is "N passed, N failed, N skipped",
-   which is also written to the file named by ISOGI_TEST_SUMMARY, where that is set, for `make test` to add up. */
+   which is also written to the file named by ISOGI_TEST_SUMMARY, where that is set, for `make test` to add up. A test that
+   crashes is named; the program then ends without counts, which `make test` counts as a failure. */
 #ifndef ISOGI_TEST_H
 #define ISOGI_TEST_H
 
 #include <math.h>
 #include <setjmp.h>
+#include <signal.h>
 #include <stdarg.h>
 #include <stdint.h>
 #include <stdio.h>
@@ -97,6 +99,22 @@ __attribute__((unused)) static char *test_data(const char *name) {
     return path;
 }
 
+/* Says which test crashed, then lets the signal do its work. Sanitizers have handlers of their own, which say more. */
+static const char *test_suite, *test_running;
+__attribute__((unused)) static void test_crashed(int number) {
+    fprintf(stderr, "FAIL %s.%s: crashed (signal %d)\n", test_suite, test_running, number);
+    signal(number, SIG_DFL);
+    raise(number);
+}
+
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+#define TEST_SANITIZED 1
+#elif defined(__has_feature)
+#if __has_feature(address_sanitizer) || __has_feature(thread_sanitizer) || __has_feature(memory_sanitizer)
+#define TEST_SANITIZED 1
+#endif
+#endif
+
 static int test_main(const char *suite, int argc, char **argv) {
     const char *filter = NULL, *summary = getenv("ISOGI_TEST_SUMMARY");
     int passed = 0, failed = 0, skipped = 0;
@@ -111,10 +129,16 @@ static int test_main(const char *suite, int argc, char **argv) {
             return 2;
         } else filter = argv[i];
     }
+    test_suite = suite;
+#ifndef TEST_SANITIZED
+    const int crashes[] = {SIGSEGV, SIGABRT, SIGFPE, SIGILL};
+    for (int i = 0; i < 4; i++) signal(crashes[i], test_crashed);
+#endif
     for (test_case *t = test_first; t; t = t->next) {
         if (filter && !strstr(t->name, filter)) continue;
         struct timespec start, end;
         test_failures = test_skipped = 0;
+        test_running = t->name;
         clock_gettime(CLOCK_MONOTONIC, &start);
         if (!setjmp(test_leave)) t->run();
         clock_gettime(CLOCK_MONOTONIC, &end);
@@ -129,11 +153,12 @@ static int test_main(const char *suite, int argc, char **argv) {
         fprintf(stderr, "%s: no test's name contains \"%s\"\n", argv[0], filter);
         return 2;
     }
-    printf("%d passed, %d failed, %d skipped\n", passed, failed, skipped);
     if (summary && *summary) {
+        printf("%s: ", suite);
         FILE *file = fopen(summary, "a");
         if (file) fprintf(file, "%d passed, %d failed, %d skipped\n", passed, failed, skipped), fclose(file);
     }
+    printf("%d passed, %d failed, %d skipped\n", passed, failed, skipped);
     return failed ? 1 : 0;
 }
 

@@ -1,0 +1,222 @@
+#!/bin/sh
+# Lists the items of the quick or of the long suite, one per line, for tests/run.sh; cheap ones first.
+#
+#     sh tests/suite.sh quick|long TEST_PROGRAMS...
+
+suite=$1
+shift
+CC=${CC:-cc} CXX=${CXX:-c++}
+tab=$(printf '\t')
+
+item() { printf '%s\t%s\t%s\n' "$1" "$2" "$3"; }
+have() { command -v "${1%% *}" > /dev/null 2>&1; }
+
+WARN='-Wall -Wextra -Wpedantic -Wconversion -Wsign-conversion -Wshadow -Wdouble-promotion -Werror'
+WARN_C="$WARN -Wstrict-prototypes"
+ALL='isogi_sh isogi_vol isogi_trace isogi_dvr'
+headers=
+for h in $ALL; do [ -f $h.h ] && headers="$headers $h"; done
+
+# ---- what the sources look like ------------------------------------------------------------------------------------------
+
+sources() {
+    for rule in shared-block includes unfinished-words private-macros top-level function-length; do
+        item check "source/$rule" "sh tests/compile/source.sh $rule"
+    done
+    for h in $headers; do
+        item check "source/symbols-$h" "sh tests/compile/source.sh symbols $h"
+        item check "source/compile-time-$h" "sh tests/compile/source.sh compile-time $h"
+    done
+}
+
+# ---- the compile matrix ---------------------------------------------------------------------------------------------------
+
+# One header, or all, with one compiler as one language: NAME COMPILER FLAGS.
+# "one.c" includes HEADER; "all.c" every header; "late.c" includes for the interface first, for the implementation later.
+compile() {
+    name=$1 compiler=$2 flags=$3 file=$4
+    item check "compile/$name" "$compiler $flags -I. -c tests/compile/$file -o \"\$OUT/object\""
+}
+
+c_flags() { echo "-std=$1 $WARN_C"; }
+cxx_flags() { echo "-x c++ -std=$1 $WARN"; }
+
+# The least: this compiler, strict C99 and C++11, interfaces alone and everything with its implementation.
+matrix_quick() {
+    for h in $headers; do
+        compile "c99-interface-$h" "$CC" "$(c_flags c99) -fsyntax-only -DHEADER='\"$h.h\"'" one.c
+        compile "c99-$h" "$CC" "$(c_flags c99) -O1 -DISOGI_IMPLEMENTATION -DHEADER='\"$h.h\"'" one.c
+    done
+    if have "$CXX"; then compile c++11-all "$CXX" "$(cxx_flags c++11) -O1 -DISOGI_IMPLEMENTATION" all.c
+    else item skip compile/c++11-all "$CXX is not installed"
+    fi
+    link_items "$CC" "$CXX" ''
+}
+
+# Several translation units: all implementations in one, each in its own, C and C++ users together.
+link_items() {
+    cc=$1 cxx=$2 prefix=$3
+    item check "link/${prefix}one-implementation" "sh tests/compile/link.sh together '$cc' '$cc'"
+    item check "link/${prefix}implementations-apart" "sh tests/compile/link.sh apart '$cc' '$cc'"
+    if have "$cxx"; then
+        item check "link/${prefix}used-from-c++" "sh tests/compile/link.sh together '$cc' '$cxx -x c++ -std=c++11'"
+        item check "link/${prefix}implemented-in-c++" "sh tests/compile/link.sh apart '$cxx -x c++ -std=c++11' '$cc'"
+    else item skip "link/${prefix}c++" "$cxx is not installed"
+    fi
+}
+
+matrix() {
+    for pair in gcc:g++ clang:clang++; do
+        cc=${pair%:*} cxx=${pair#*:}
+        if ! have $cc; then
+            item skip "compile/$cc" "$cc is not installed"
+            continue
+        fi
+        for h in $headers; do
+            compile "$cc-c99-interface-$h" $cc "$(c_flags c99) -fsyntax-only -DHEADER='\"$h.h\"'" one.c
+            compile "$cc-c99-$h" $cc "$(c_flags c99) -O2 -DISOGI_IMPLEMENTATION -DHEADER='\"$h.h\"'" one.c
+        done
+        for std in c99 c11 c17; do
+            compile "$cc-$std-all" $cc "$(c_flags $std) -fsyntax-only -DISOGI_IMPLEMENTATION" all.c
+            compile "$cc-$std-late" $cc "$(c_flags $std) -fsyntax-only" late.c
+        done
+        for level in -O0 -O3 -Os; do
+            compile "$cc-c99-all$level" $cc "$(c_flags c99) $level -DISOGI_IMPLEMENTATION" all.c
+        done
+        for option in -DISOGI_NO_THREADS -DISOGI_NO_SIMD -ffast-math -march=x86-64-v3; do
+            [ $option != -march=x86-64-v3 ] || [ "$(uname -m)" = x86_64 ] || continue
+            compile "$cc-c99-all$option" $cc "$(c_flags c99) $option -O2 -DISOGI_IMPLEMENTATION" all.c
+        done
+        if ! have $cxx; then
+            item skip "compile/$cxx" "$cxx is not installed"
+            continue
+        fi
+        for h in $headers; do
+            compile "$cxx-c++11-interface-$h" $cxx "$(cxx_flags c++11) -fsyntax-only -DHEADER='\"$h.h\"'" one.c
+            compile "$cxx-c++11-$h" $cxx "$(cxx_flags c++11) -O2 -DISOGI_IMPLEMENTATION -DHEADER='\"$h.h\"'" one.c
+        done
+        for std in c++11 c++14 c++17 c++20; do
+            compile "$cxx-$std-all" $cxx "$(cxx_flags $std) -fsyntax-only -DISOGI_IMPLEMENTATION" all.c
+            compile "$cxx-$std-late" $cxx "$(cxx_flags $std) -fsyntax-only" late.c
+        done
+        compile "$cxx-c++11-all-DISOGI_NO_THREADS" $cxx "$(cxx_flags c++11) -DISOGI_NO_THREADS -O2 -DISOGI_IMPLEMENTATION" all.c
+        link_items $cc $cxx "$cc-"
+    done
+    if have tcc; then
+        compile tcc-all tcc "-std=c99 -Wall -Werror -DISOGI_IMPLEMENTATION" all.c
+    else item skip compile/tcc-all "tcc is not installed"
+    fi
+    if echo 'int main(void) { return 0; }' | gcc -m32 -x c - -o /dev/null 2> /dev/null; then
+        compile gcc-m32-all gcc "$(c_flags c99) -m32 -O2 -DISOGI_IMPLEMENTATION" all.c
+    else item skip compile/gcc-m32-all "gcc -m32 has no libraries"
+    fi
+    if have x86_64-w64-mingw32-gcc; then
+        compile mingw-all x86_64-w64-mingw32-gcc "$(c_flags c99) -O2 -DISOGI_IMPLEMENTATION" all.c
+    else item skip compile/mingw-all "MinGW is not installed"
+    fi
+}
+
+# ---- the test programs built in other ways --------------------------------------------------------------------------------
+
+# NAME COMPILER FLAGS PREFIX PROGRAM...: PREFIX runs what was built
+variant() {
+    name=$1 compiler=$2 flags=$3 prefix=$4
+    shift 4
+    for program; do
+        base=${program##*/} source=tests/${program##*/}.c
+        libs=$(sed -n '1,20s|.*LIBS: \([^*]*\).*|\1|p' "$source")
+        item suite "$name/$base" "$compiler -std=gnu99 $flags -I. -Iexamples/common -Itests -o \"\$OUT/$base\" $source -lm -lpthread $libs && $prefix \"\$OUT/$base\""
+    done
+}
+
+CONTRACT_OFF=-ffp-contract=off
+
+variants() {
+    # Those that only start other programs have nothing to be built anew.
+    units=
+    for program; do
+        case $program in *test_docs | *test_viewer | *test_examples) ;; *) units="$units $program" ;; esac
+    done
+    variant O0 "$CC" "-O0 $CONTRACT_OFF" '' $units
+    variant O3 "$CC" "-O3 $CONTRACT_OFF" '' $units
+    variant fast-math "$CC" "-O2 -ffast-math" '' $units
+    variant no-threads "$CC" "-O2 $CONTRACT_OFF -DISOGI_NO_THREADS" '' $units
+    variant no-simd "$CC" "-O2 $CONTRACT_OFF -DISOGI_NO_SIMD" '' $units
+    if have clang; then
+        variant clang clang "-O2 $CONTRACT_OFF" '' $units
+        variant address+undefined clang "-O1 -g $CONTRACT_OFF -fsanitize=address,undefined,float-cast-overflow -fno-sanitize-recover=all" '' $units
+        variant thread clang "-O1 -g $CONTRACT_OFF -fsanitize=thread" 'TSAN_OPTIONS=halt_on_error=1' $units
+    else
+        item skip clang "clang is not installed"
+        variant address+undefined "$CC" "-O1 -g $CONTRACT_OFF -fsanitize=address,undefined -fno-sanitize-recover=all" '' $units
+        variant thread "$CC" "-O1 -g $CONTRACT_OFF -fsanitize=thread" 'TSAN_OPTIONS=halt_on_error=1' $units
+    fi
+    if have g++; then item skip c++-tests "the tests are C; the headers as C++ are in the matrix"; fi
+}
+
+# Other processors, emulated: short tests only, chosen by name, since emulation is ten times slower.
+emulators() {
+    for machine in aarch64 s390x riscv64; do
+        if have $machine-linux-gnu-gcc && have qemu-$machine-static; then
+            variant $machine $machine-linux-gnu-gcc "-O2 $CONTRACT_OFF -static" "qemu-$machine-static" "$@"
+        else item skip "$machine" "$machine-linux-gnu-gcc or qemu-$machine-static is not installed"
+        fi
+    done
+}
+
+memcheck() {
+    if ! have valgrind; then
+        item skip valgrind "valgrind is not installed"
+        return
+    fi
+    grind='valgrind -q --error-exitcode=9 --leak-check=full --errors-for-leak-kinds=all'
+    for source in examples/*.c; do
+        base=$(basename "$source" .c)
+        [ $base = viewer ] || item check "valgrind/$base" "$grind build/$base > /dev/null"
+    done
+    [ -f examples/viewer.c ] && for mode in irradiance transfer dvr scale-invariant; do
+        item check "valgrind/viewer-$mode" "$grind build/viewer procedural:engine-block:24 --size 32x32 --samples 2 --mode $mode --out \"\$OUT/x.png\""
+    done
+}
+
+fuzzers() {
+    for source in tests/fuzz/fuzz_*.c; do
+        [ -f "$source" ] || continue
+        base=$(basename "$source" .c)
+        if have clang; then
+            item check "fuzz/$base" "clang -std=gnu99 -O1 -g -fsanitize=fuzzer,address,undefined -I. -Iexamples/common -Itests -o \"\$OUT/$base\" $source -lm -lpthread && mkdir \"\$OUT/corpus\" && (cd \"\$OUT\" && ./$base -max_total_time=20 -rss_limit_mb=4096 corpus)"
+        else item skip "fuzz/$base" "clang is not installed"
+        fi
+    done
+}
+
+analysers() {
+    if have cppcheck; then
+        for h in $headers; do
+            item check "cppcheck/$h" "cppcheck --quiet --error-exitcode=1 --enable=warning,portability --inline-suppr --suppress=unmatchedSuppression -DISOGI_IMPLEMENTATION --language=c --std=c99 -I. $h.h"
+        done
+    else item skip cppcheck "cppcheck is not installed"
+    fi
+}
+
+case $suite in
+quick)
+    for program; do item live "${program##*/}" "$program"; done
+    sources
+    matrix_quick
+    ;;
+long)
+    sources
+    matrix
+    for program; do item live "${program##*/}" "$program --long"; done
+    memcheck
+    fuzzers
+    analysers
+    variants "$@"
+    emulators "$@"
+    ;;
+*)
+    echo "usage: sh tests/suite.sh quick|long TEST_PROGRAMS..." >&2
+    exit 2
+    ;;
+esac
