@@ -2662,8 +2662,10 @@ static void isogi_vol__mesh_cases(isogi_vol__case cases[256]) {
         isogi_vol__loop loop[4];
         for (i = 0; i < 8; i++) corner[i] = code >> i & 1 ? 1 : -1;
         for (i = 0, alternates = 0; i < 6; i++) alternates |= isogi_vol__face_alternates((unsigned)code, i);
-        isogi_vol__patch_cell(&patch, corner, (unsigned)code);
-        if (alternates || patch.extras || patch.triangles > 5 || isogi_vol__trace_loops(corner, (unsigned)code, loop) > 1) {
+        if (!alternates && isogi_vol__trace_loops(corner, (unsigned)code, loop) == 1)
+            isogi_vol__patch_cell(&patch, corner, (unsigned)code);
+        else patch.extras = 1;
+        if (patch.extras || patch.triangles > 5) {
             cases[code].undecided = 1;
             continue;
         }

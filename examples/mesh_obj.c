@@ -1,0 +1,36 @@
+/* Writes an isosurface as a Wavefront OBJ file that any modeller opens, and counts what it is made of.
+
+       build/mesh_obj [OUT.obj]        default: build/mesh_obj.obj */
+#define ISOGI_IMPLEMENTATION
+#include "procedural.h"
+#include <stdio.h>
+
+int main(int argc, char **argv) {
+    const char *path = argc > 1 ? argv[1] : "build/mesh_obj.obj";
+    const procedural_shape *shape = procedural_find("gyroid");
+    isogi_volume volume;
+    isogi_pyramid *pyramid = NULL;
+    isogi_mesh mesh = {0};
+    isogi_mesh_desc desc = {.isovalue = shape->isovalue, .normals = 1, .closed = 1};
+    isogi_result result = procedural_make(shape, 96, &volume, NULL);
+    if (result == ISOGI_OK) result = isogi_vol_build(&pyramid, &volume, NULL);
+    if (result == ISOGI_OK) result = isogi_vol_mesh(pyramid, &desc, &mesh);
+    if (result != ISOGI_OK) return fprintf(stderr, "%s\n", isogi_result_string(result)), 1;
+
+    FILE *file = fopen(path, "w");
+    if (!file) return perror(path), 1;
+    for (size_t i = 0; i < mesh.vertex_count; i++) {
+        const float *p = mesh.positions[i], *n = mesh.normals[i];
+        fprintf(file, "v %.7g %.7g %.7g\nvn %.4f %.4f %.4f\n", (double)p[0], (double)p[1], (double)p[2], (double)n[0], (double)n[1], (double)n[2]);
+    }
+    for (size_t i = 0; i < mesh.triangle_count; i++) {
+        const uint32_t *t = mesh.triangles[i];
+        fprintf(file, "f %u//%u %u//%u %u//%u\n", t[0] + 1, t[0] + 1, t[1] + 1, t[1] + 1, t[2] + 1, t[2] + 1);
+    }
+    if (fclose(file)) return perror(path), 1;
+    /* a closed surface has 3/2 edges for every triangle: V - E + F counts its handles, two for each */
+    long euler = (long)mesh.vertex_count - (long)mesh.triangle_count / 2;
+    printf("%s: %zu vertices, %zu triangles, closed, Euler characteristic %ld\n", path, mesh.vertex_count, mesh.triangle_count, euler);
+    isogi_vol_mesh_free(pyramid, &mesh), isogi_vol_free(pyramid), procedural_free(&volume);
+    return 0;
+}
