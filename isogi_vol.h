@@ -2256,8 +2256,7 @@ static void isogi_vol__patch_cap(isogi_vol__patch *patch, const double f[8], uns
 enum {
     ISOGI_VOL__CORNERS = 3,  /* kinds 0..2 are the axes of edges */
     ISOGI_VOL__INNER = 4,
-    ISOGI_VOL__KINDS = 5,
-    ISOGI_VOL__MESH_CHUNK = 256 /* voxels read at a time */
+    ISOGI_VOL__KINDS = 5
 };
 
 /* Triangles of the 256 cells of unlike corner signs, if they follow from the signs alone. */
@@ -2276,6 +2275,8 @@ typedef struct isogi_vol__mesher {
     const isogi_pyramid *pyramid;
     double isovalue;
     int closed, mirrored, nx, ny, nz;
+    int compares_raw; /* raw.threshold tells what is inside */
+    isogi_vol__ticks raw;
     size_t words, rows, rows_per_task, block_words; /* 64-bit words for a row of voxels, of blocks */
     isogi_vol__case *cases;
     isogi_vol__mesh_row *row;
@@ -2340,25 +2341,39 @@ static void isogi_vol__mesh_blocks(void *arg, size_t bz) {
 
 /* ---- second pass: voxels ---- */
 
-static void isogi_vol__mesh_read(const isogi_vol__mesher *m, int first, int count, int j, int k, uint64_t *inside, uint64_t *finite) {
-    double value[ISOGI_VOL__MESH_CHUNK], isovalue = m->isovalue;
-    int all = m->pyramid->all_finite;
-    while (count > 0) {
-        int n = ISOGI_VOL__MESH_CHUNK - first % 64, i = 0; /* up to a word's end */
-        if (n > count) n = count;
-        isogi_vol__row(&m->pyramid->volume, first, j, k, n, value);
-        while (i < n) {
-            int begin = first + i, end = 64 - begin % 64 < n - i ? 64 - begin % 64 : n - i, b;
-            uint64_t in = 0, known = 0;
-            for (b = 0; b < end; b++) in |= (uint64_t)(value[i + b] >= isovalue) << b;
-            if (all) known = ~(uint64_t)0 >> (64 - end);
-            else
-                for (b = 0; b < end; b++) known |= (uint64_t)isogi_vol__finite64(value[i + b]) << b;
-            inside[begin / 64] |= (in & known) << begin % 64, finite[begin / 64] |= known << begin % 64;
-            i += end;
-        }
-        first += n, count -= n;
+/* Voxels of one word: raw values against a raw threshold where that is the same thing, else converted and looked at one by one. */
+static void isogi_vol__mesh_bits(const isogi_vol__mesher *m, int first, int count, int j, int k, uint64_t *inside, uint64_t *finite) {
+    const isogi_volume *v = &m->pyramid->volume;
+    const char *p = (const char *)v->data + first * v->stride[0] + j * v->stride[1] + k * v->stride[2];
+    const ptrdiff_t step = v->stride[0];
+    uint64_t in = 0, known = 0;
+    double value[64];
+    int i;
+#define ISOGI_VOL__COMPARE(T, THRESHOLD, MEMBER)                                                                                 \
+    {                                                                                                                            \
+        const THRESHOLD threshold = m->raw.threshold.MEMBER;                                                                     \
+        for (i = 0; i < count; i++, p += step) in |= (uint64_t)(*(const T *)(const void *)p >= threshold) << i;                  \
+        break;                                                                                                                   \
     }
+    *finite |= (~(uint64_t)0 >> (64 - count)) << first % 64;
+    if (m->compares_raw) switch (v->type) {
+        case ISOGI_U8: ISOGI_VOL__COMPARE(uint8_t, int, i)
+        case ISOGI_I8: ISOGI_VOL__COMPARE(int8_t, int, i)
+        case ISOGI_U16: ISOGI_VOL__COMPARE(uint16_t, int, i)
+        case ISOGI_I16: ISOGI_VOL__COMPARE(int16_t, int, i)
+        case ISOGI_F32: ISOGI_VOL__COMPARE(float, float, f)
+        case ISOGI_F64: ISOGI_VOL__COMPARE(double, double, d)
+        }
+#undef ISOGI_VOL__COMPARE
+    else {
+        isogi_vol__row(v, first, j, k, count, value);
+        for (i = 0; i < count; i++) {
+            uint64_t good = (uint64_t)isogi_vol__finite64(value[i]);
+            in |= ((uint64_t)(value[i] >= m->isovalue) & good) << i, known |= good << i;
+        }
+        *finite &= ~((~known & ~(uint64_t)0 >> (64 - count)) << first % 64);
+    }
+    *inside |= in << first % 64;
 }
 
 /* Runs of blocks that matter, in any of the up to four rows of blocks that share this row of voxels. */
@@ -2377,7 +2392,11 @@ static void isogi_vol__mesh_voxels(const isogi_vol__mesher *m, int j, int k) {
             int first = isogi_vol__lowest_bit(blocks), run = ~(blocks >> first) ? isogi_vol__lowest_bit(~(blocks >> first)) : 64, x, count;
             blocks &= first + run < 64 ? ~(uint64_t)0 << (first + run) : 0;
             x = 4 * ((int)(64 * w) + first), count = 4 * run + 1 < m->nx - x ? 4 * run + 1 : m->nx - x;
-            isogi_vol__mesh_read(m, x, count, j, k, inside, finite);
+            while (count > 0) {
+                int n = 64 - x % 64 < count ? 64 - x % 64 : count;
+                isogi_vol__mesh_bits(m, x, n, j, k, &inside[x / 64], &finite[x / 64]);
+                x += n, count -= n;
+            }
         }
     }
 }
@@ -2438,7 +2457,7 @@ static void isogi_vol__walk_word(const isogi_vol__mesher *m, isogi_vol__cell_wal
     walk->cap &= walk->valid[w] & some;
 }
 
-static unsigned isogi_vol__walk_code(const isogi_vol__cell_walk *walk, int bit) {
+ISOGI_VOL__INLINE unsigned isogi_vol__walk_code(const isogi_vol__cell_walk *walk, int bit) {
     unsigned code = 0;
     int n;
     for (n = 0; n < 4; n++) code |= (unsigned)(walk->in[n] >> bit & 1) << 2 * n | (unsigned)(walk->ahead[n] >> bit & 1) << (2 * n + 1);
@@ -2528,45 +2547,138 @@ static void isogi_vol__mesh_count(const isogi_vol__mesher *m, int j, int k) {
 
 /* ---- last pass: vertices ---- */
 
-/* A vertex at a grid position, with what its normal has to be: outward from a closed border, or towards lower values. */
-static void isogi_vol__mesh_vertex(const isogi_vol__mesher *m, size_t at, const double grid[3], int corner) {
-    const isogi_pyramid *p = m->pyramid;
-    double world[3], n[3], local[3], length;
-    int cell[3], a, usable;
-    isogi_vol_to_world(p, grid, world);
-    for (a = 0; a < 3; a++) m->positions[at][a] = (float)world[a];
-    if (!m->normals) return;
-    if (corner)
-        for (a = 0; a < 3; a++) n[a] = (grid[a] > p->cells[a] - 0.5) - (grid[a] < 0.5);
-    else {
-        for (a = 0; a < 3; a++) cell[a] = isogi_vol__cell(grid[a], p->volume.size[a], &local[a]);
-        isogi_vol__bspline(p, cell, local, n);
-        for (a = 0; a < 3; a++) n[a] = -n[a];
+ISOGI_VOL__INLINE double isogi_vol__voxel(const isogi_volume *v, const char *p) {
+    double raw = 0;
+    switch (v->type) {
+    case ISOGI_U8: raw = *(const uint8_t *)(const void *)p; break;
+    case ISOGI_I8: raw = *(const int8_t *)(const void *)p; break;
+    case ISOGI_U16: raw = *(const uint16_t *)(const void *)p; break;
+    case ISOGI_I16: raw = *(const int16_t *)(const void *)p; break;
+    case ISOGI_F32: raw = (double)*(const float *)(const void *)p; break;
+    case ISOGI_F64: raw = *(const double *)(const void *)p; break;
     }
-    isogi_vol__gradient_to_world(p, n, n);
+    return v->scale * raw + v->bias;
+}
+
+/* On a lattice edge two of the B-spline's coordinates are whole, where its weights are (1 4 1)/6 and (-1 0 1)/2: 36 taps instead of
+   64. p: the voxel where the edge begins, stride[0] its direction; every tap must exist. Gradient in the order of the strides. */
+static void isogi_vol__edge_gradient(const isogi_volume *v, const char *p, const ptrdiff_t stride[3], double u, double gradient[3]) {
+    const ptrdiff_t y = stride[1], z = stride[2];
+    double w[4], d[4], gx = 0, gy = 0, gz = 0, c = 1 - u;
+    int q;
+    w[0] = c * c * c, w[1] = (3 * u - 6) * u * u + 4, w[2] = (3 * c - 6) * c * c + 4, w[3] = u * u * u;
+    d[0] = -c * c, d[1] = (3 * u - 4) * u, d[2] = -(3 * c - 4) * c, d[3] = u * u;
+    p -= stride[0] + y + z;
+#define ISOGI_VOL__AT(T, offset) ((double)*(const T *)(const void *)(p + (offset)))
+#define ISOGI_VOL__TAPS(T)                                                                                                       \
+    for (q = 0; q < 4; q++, p += stride[0]) {                                                                                    \
+        const double a0 = ISOGI_VOL__AT(T, 0), a1 = ISOGI_VOL__AT(T, y), a2 = ISOGI_VOL__AT(T, 2 * y);                           \
+        const double b0 = ISOGI_VOL__AT(T, z), b1 = ISOGI_VOL__AT(T, y + z), b2 = ISOGI_VOL__AT(T, 2 * y + z);                   \
+        const double c0 = ISOGI_VOL__AT(T, 2 * z), c1 = ISOGI_VOL__AT(T, y + 2 * z), c2 = ISOGI_VOL__AT(T, 2 * y + 2 * z);       \
+        const double as = (a0 + a2) + 4 * a1, bs = (b0 + b2) + 4 * b1, cs = (c0 + c2) + 4 * c1;                                  \
+        gx += d[q] * ((as + cs) + 4 * bs);                                                                                       \
+        gy += w[q] * (((a2 - a0) + (c2 - c0)) + 4 * (b2 - b0));                                                                  \
+        gz += w[q] * (cs - as);                                                                                                  \
+    }                                                                                                                            \
+    break;
+    switch (v->type) {
+    case ISOGI_U8: ISOGI_VOL__TAPS(uint8_t)
+    case ISOGI_I8: ISOGI_VOL__TAPS(int8_t)
+    case ISOGI_U16: ISOGI_VOL__TAPS(uint16_t)
+    case ISOGI_I16: ISOGI_VOL__TAPS(int16_t)
+    case ISOGI_F32: ISOGI_VOL__TAPS(float)
+    case ISOGI_F64: ISOGI_VOL__TAPS(double)
+    }
+#undef ISOGI_VOL__TAPS
+#undef ISOGI_VOL__AT
+    gradient[0] = v->scale * gx / 72, gradient[1] = v->scale * gy / 72, gradient[2] = v->scale * gz / 72;
+}
+
+/* A normal from a vector per grid unit; zero where there is none. */
+static void isogi_vol__mesh_normal(const isogi_vol__mesher *m, size_t at, double n[3]) {
+    double length;
+    int a, usable;
+    isogi_vol__gradient_to_world(m->pyramid, n, n);
     length = sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
     usable = isogi_vol__finite64(length) && length > 0;
-    for (a = 0; a < 3; a++) m->normals[at][a] = usable ? (float)(n[a] / length) : 0;
+    length = usable ? 1 / length : 0;
+    for (a = 0; a < 3; a++) m->normals[at][a] = usable ? (float)(n[a] * length) : 0;
+}
+
+static void isogi_vol__smoothed_normal(const isogi_vol__mesher *m, size_t at, const double grid[3]) {
+    double n[3], local[3];
+    int cell[3], a;
+    for (a = 0; a < 3; a++) cell[a] = isogi_vol__cell(grid[a], m->pyramid->volume.size[a], &local[a]);
+    isogi_vol__bspline(m->pyramid, cell, local, n);
+    for (a = 0; a < 3; a++) n[a] = -n[a];
+    isogi_vol__mesh_normal(m, at, n);
+}
+
+/* A vertex in the inside of a cell. */
+static void isogi_vol__inner_vertex(const isogi_vol__mesher *m, size_t at, const double grid[3]) {
+    double world[3];
+    int a;
+    isogi_vol_to_world(m->pyramid, grid, world);
+    for (a = 0; a < 3; a++) m->positions[at][a] = (float)world[a];
+    if (m->normals) isogi_vol__smoothed_normal(m, at, grid);
+}
+
+/* The normal of a vertex on the edge of direction `axis` from (i,j,k), at u of it; p: that voxel. */
+static void isogi_vol__edge_normal(const isogi_vol__mesher *m, size_t at, int axis, const int voxel[3], double u, const char *p) {
+    const isogi_volume *v = &m->pyramid->volume;
+    ptrdiff_t stride[3];
+    double n[3], gradient[3];
+    int a, whole = 1;
+    for (a = 0; a < 3; a++) {
+        whole = whole && voxel[a] >= 1 && voxel[a] + (a == axis ? 2 : 1) <= m->pyramid->cells[a];
+        stride[a] = v->stride[(axis + a) % 3];
+    }
+    if (whole) {
+        isogi_vol__edge_gradient(v, p, stride, u, gradient);
+        for (a = 0; a < 3; a++) n[(axis + a) % 3] = -gradient[a];
+        isogi_vol__mesh_normal(m, at, n);
+    } else {
+        for (a = 0; a < 3; a++) gradient[a] = voxel[a] + (a == axis ? u : 0);
+        isogi_vol__smoothed_normal(m, at, gradient);
+    }
+}
+
+/* Outward from the faces of the box that a voxel lies on. */
+static void isogi_vol__corner_normal(const isogi_vol__mesher *m, size_t at, const int voxel[3]) {
+    double n[3];
+    int a;
+    for (a = 0; a < 3; a++) n[a] = (voxel[a] == m->pyramid->cells[a]) - (voxel[a] == 0);
+    isogi_vol__mesh_normal(m, at, n);
 }
 
 static void isogi_vol__emit_vertices(const isogi_vol__mesher *m, int j, int k) {
-    const isogi_vol__mesh_row *row = &m->row[(size_t)j + (size_t)m->ny * (size_t)k];
-    int kind;
+    const isogi_volume *v = &m->pyramid->volume;
+    const double *t = m->pyramid->to_world;
+    const char *row = (const char *)v->data + j * v->stride[1] + k * v->stride[2];
+    double begin[3], grid[3];
+    int kind, a;
+    grid[0] = 0, grid[1] = j, grid[2] = k;
+    isogi_vol_to_world(m->pyramid, grid, begin);
     for (kind = 0; kind < (m->closed ? 4 : 3); kind++) {
         const uint64_t *carries = isogi_vol__bit_row(m, m->carries[kind], j, k);
-        size_t at = row->vertex[kind], w;
+        size_t at = m->row[(size_t)j + (size_t)m->ny * (size_t)k].vertex[kind], w;
+        const int axis = kind < 3 ? kind : 0;
         for (w = 0; w < m->words; w++) {
             uint64_t bits;
             for (bits = carries[w]; bits; bits &= bits - 1, at++) {
-                double grid[3], from, to;
-                int i = (int)(64 * w) + isogi_vol__lowest_bit(bits);
-                grid[0] = i, grid[1] = j, grid[2] = k;
+                const int i = (int)(64 * w) + isogi_vol__lowest_bit(bits);
+                const char *p = row + i * v->stride[0];
+                int voxel[3];
+                double u = 0;
                 if (kind < 3) {
-                    isogi_vol__row(&m->pyramid->volume, i, j, k, 1, &from);
-                    isogi_vol__row(&m->pyramid->volume, i + (kind == 0), j + (kind == 1), k + (kind == 2), 1, &to);
-                    grid[kind] += isogi_vol__clamp((m->isovalue - from) / (to - from), 1);
+                    double from = isogi_vol__voxel(v, p), to = isogi_vol__voxel(v, p + v->stride[axis]);
+                    u = isogi_vol__clamp((m->isovalue - from) / (to - from), 1);
                 }
-                isogi_vol__mesh_vertex(m, at, grid, kind == ISOGI_VOL__CORNERS);
+                for (a = 0; a < 3; a++) m->positions[at][a] = (float)(begin[a] + (i * t[3 * a] + u * t[3 * a + axis]));
+                if (!m->normals) continue;
+                voxel[0] = i, voxel[1] = j, voxel[2] = k;
+                if (kind < 3) isogi_vol__edge_normal(m, at, kind, voxel, u, p);
+                else isogi_vol__corner_normal(m, at, voxel);
             }
         }
     }
@@ -2574,7 +2686,7 @@ static void isogi_vol__emit_vertices(const isogi_vol__mesher *m, int j, int k) {
 
 /* ---- last pass: triangles ---- */
 
-static void isogi_vol__emit_triangle(const isogi_vol__mesher *m, size_t *at, const uint32_t *id, const uint8_t t[3]) {
+ISOGI_VOL__INLINE void isogi_vol__emit_triangle(const isogi_vol__mesher *m, size_t *at, const uint32_t *id, const uint8_t t[3]) {
     uint32_t *out = m->triangles[(*at)++];
     out[0] = id[t[0]], out[1] = id[t[1 + m->mirrored]], out[2] = id[t[2 - m->mirrored]];
 }
@@ -2590,7 +2702,7 @@ static void isogi_vol__emit_undecided(const isogi_vol__mesher *m, isogi_vol__cel
         isogi_vol__patch_cell(&patch, corner, code);
         for (n = 0; n < patch.extras; n++) {
             for (a = 0; a < 3; a++) grid[a] = (a == 0 ? i : a == 1 ? walk->j : walk->k) + patch.extra[n][a];
-            isogi_vol__mesh_vertex(m, walk->inner, grid, 0);
+            isogi_vol__inner_vertex(m, walk->inner, grid);
             id[12 + n] = walk->inner++;
         }
         for (n = 0; n < patch.triangles; n++) isogi_vol__emit_triangle(m, at, id, patch.triangle[n]);
@@ -2776,6 +2888,7 @@ ISOGI_API isogi_result isogi_vol_mesh(const isogi_pyramid *pyramid, const isogi_
     m.pyramid = pyramid, m.isovalue = desc->isovalue, m.closed = desc->closed != 0;
     m.mirrored = isogi_vol__determinant(pyramid->volume.axes) < 0;
     m.nx = pyramid->cells[0] + 1, m.ny = pyramid->cells[1] + 1, m.nz = pyramid->cells[2] + 1;
+    m.compares_raw = pyramid->all_finite && pyramid->volume.scale > 0 && isogi_vol__threshold(&m.raw, &pyramid->volume, desc->isovalue);
     result = isogi_vol__mesh_scratch(&m, mesh);
     if (result == ISOGI_OK) result = isogi_parallel(&context, pyramid->level[0].size[2], isogi_vol__mesh_blocks, &m, 0, 0.05);
     if (result == ISOGI_OK) result = isogi_vol__mesh_pass(&m, &context, 0.05, 0.3, isogi_vol__mesh_voxels);
