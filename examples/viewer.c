@@ -257,7 +257,7 @@ static void print_help(void) {
          "  dvr                          volume rendering, lit by spherical-harmonics visibility\n"
          "  scale-invariant              volume rendering per unit of data: the same picture at any scale of space\n\n"
          "Light: without --env and --light a sky (radiance 1 above to 0.3 below) and a sun. The exposure is set so that nine tenths\n"
-         "of what is seen are below 0.7 of white; up to there the picture is linear, above it bends to white.\n"
+         "of what is seen are below 0.6 of white; up to 0.7 the picture is linear, above it bends to white.\n"
          "The variable ISOGI_DATA names the folder of the volumes that --scene asks for.\n\n"
          "Examples\n"
          "  build/viewer procedural:engine-block --out engine.png\n"
@@ -491,7 +491,7 @@ static void set_default_light(viewer *v) {
     /* the neutral sky of the scene engine-block, and a slightly coloured one for everything else */
     static const float neutral_above[3] = {1, 1, 1}, neutral_below[3] = {0.3f, 0.3f, 0.3f}, neutral_sun[3] = {3, 3, 3};
     static const float above[3] = {0.90f, 1.0f, 1.15f}, below[3] = {0.33f, 0.3f, 0.27f}, sun[3] = {3.25f, 2.95f, 2.5f}, one[3] = {1, 1, 1};
-    static const double to_sun[3] = {-0.45, 1.0, 0.85}, diagonal[3] = {1, 1, 1};
+    static const double to_sun[3] = {-1.0, 1.0, 0.45}, diagonal[3] = {1, 1, 1};
     const scene *s = v->o.scene;
     if (s && s->lit && s->uniform_sky) set_sky(v, one, one);
     else if (s && v->o.mode >= DVR) {
@@ -954,7 +954,7 @@ static int shade_surface(viewer *v) {
     free(job.row_error), free(job.row_light), free(job.row_result);
     if (result != ISOGI_OK) return fail(v, "the light", result);
     stat_seconds(v, "shade", begun);
-    if (v->o.mode > PHONG) stat_line(v, "error_relative", "%.4g", light > 0 ? error / light : 0);
+    if (v->o.mode > PHONG) stat_line(v, "error_relative", "%.4g", light > 0 ? error / light / (v->o.mode == PATHTRACE ? sqrt((double)v->o.antialias) : 1) : 0);
     return 1;
 }
 
@@ -1028,7 +1028,7 @@ static void backdrop(const viewer *v, int x, int y, double out[3]) {
     double d[3], above, aside, strength, tint = (v->mean_light[0] + v->mean_light[1] + v->mean_light[2]) / 3;
     camera_direction(&v->view, x, y, d);
     above = (vector_dot(d, v->view.up) / v->view.scale), aside = vector_dot(d, v->view.right) / v->view.scale;
-    strength = 0.055 + 0.10 * exp(-0.8 * ((above + 0.1) * (above + 0.1) + 0.6 * aside * aside)) + 0.015 * above;
+    strength = 0.03 + 0.075 * exp(-0.8 * ((above + 0.1) * (above + 0.1) + 0.6 * aside * aside)) + 0.015 * above;
     for (int c = 0; c < 3; c++) {
         static const double slate[3] = {0.94, 1.0, 1.1};
         double colour = tint > 0 ? v->mean_light[c] / tint : 1;
@@ -1042,7 +1042,7 @@ static int write_picture(viewer *v) {
     unsigned char *bytes = (unsigned char *)malloc(pixels * 3);
     int ok;
     if (!bytes) return fail(v, "the picture", ISOGI_NO_MEMORY);
-    if (!(exposure > 0)) exposure = picture_exposure((const float(*)[4])v->picture, pixels, 0.9, 0.55);
+    if (!(exposure > 0)) exposure = picture_exposure((const float(*)[4])v->picture, pixels, 0.9, 0.6);
     for (size_t i = 0; i < pixels; i++) {
         double behind[3];
         backdrop(v, (int)(i % (size_t)v->o.width), (int)(i / (size_t)v->o.width), behind);

@@ -1,8 +1,8 @@
 /* picture.h - linear light to an 8-bit sRGB picture: automatic exposure, a shoulder, a backdrop
 
    Every pixel is premultiplied linear radiance and opacity. Tone mapping is honest up to 0.7 of display white (plain sRGB) and bends
-   softly towards white above, per channel. The automatic exposure lets nine tenths of the lit pixels stay below 0.7; it depends on
-   nothing but the picture. */
+   softly towards white above, per channel. The automatic exposure brings the brightness that a given share of the
+   covered pixels stays below to a given place; it depends on nothing but the picture. */
 #ifndef PICTURE_H
 #define PICTURE_H
 
