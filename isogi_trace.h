@@ -15,7 +15,7 @@
            isogi_vol_build(&pyramid, &volume, NULL);
            isogi_trace_desc desc = {.pyramid = pyramid, .lighting.env = {.sh = y0, .sh_order = 1}, .albedo = {0.7f, 0.7f, 0.7f}};
            if (isogi_trace_create(&trace, &desc, NULL) != ISOGI_OK || isogi_trace_step(trace, 0, NULL) != ISOGI_OK) return 1;
-           isogi_trace_sample(trace, point, 1, light, NULL), printf("E = %g, pi\n", light[0][0]); // an open sky of radiance 1
+           isogi_trace_sample(trace, (const float(*)[3])point, 1, light, NULL), printf("E = %g, pi\n", light[0][0]); // an open sky of radiance 1
        }
 
    What it does
