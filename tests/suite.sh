@@ -21,11 +21,11 @@ for h in $ALL; do [ -f $h.h ] && headers="$headers $h"; done
 
 sources() {
     for rule in shared-block includes unfinished-words private-macros top-level function-length; do
-        item check "source/$rule" "sh tests/compile/source.sh $rule"
+        item check "source/$rule" "bash tests/compile/source.sh $rule"
     done
     for h in $headers; do
-        item check "source/symbols-$h" "sh tests/compile/source.sh symbols $h"
-        item check "source/compile-time-$h" "sh tests/compile/source.sh compile-time $h"
+        item check "source/symbols-$h" "bash tests/compile/source.sh symbols $h"
+        item check "source/compile-time-$h" "bash tests/compile/source.sh compile-time $h"
     done
 }
 

@@ -101,6 +101,7 @@ __attribute__((unused)) static char *test_data(const char *name) {
 
 /* Says which test crashed, then lets the signal do its work. Sanitizers have handlers of their own, which say more. */
 static const char *test_suite, *test_running;
+static struct timespec test_started;
 __attribute__((unused)) static void test_crashed(int number) {
     fprintf(stderr, "FAIL %s.%s: crashed (signal %d)\n", test_suite, test_running, number);
     signal(number, SIG_DFL);
@@ -115,9 +116,24 @@ __attribute__((unused)) static void test_crashed(int number) {
 #endif
 #endif
 
+/* One test, and how it ended: 0 passed, 1 failed, 2 skipped. A function of its own, so that longjmp finds nothing to spoil. */
+static int test_run(const test_case *t) {
+    struct timespec end;
+    test_failures = test_skipped = 0;
+    test_running = t->name;
+    clock_gettime(CLOCK_MONOTONIC, &test_started);
+    if (!setjmp(test_leave)) t->run();
+    clock_gettime(CLOCK_MONOTONIC, &end);
+    double seconds = (double)(end.tv_sec - test_started.tv_sec) + 1e-9 * (double)(end.tv_nsec - test_started.tv_nsec);
+    if (test_failures > 8) printf("    ... %d failing checks in all\n", test_failures);
+    printf("%s %s.%s (%.2f s)\n", test_failures ? "FAIL" : test_skipped ? "skip" : "ok  ", test_suite, test_running, seconds);
+    return test_failures ? 1 : test_skipped ? 2 : 0;
+}
+
 static int test_main(const char *suite, int argc, char **argv) {
     const char *filter = NULL, *summary = getenv("ISOGI_TEST_SUMMARY");
-    int passed = 0, failed = 0, skipped = 0;
+    int count[3] = {0, 0, 0};
+    char counts[80];
     setvbuf(stdout, NULL, _IOLBF, 0);
     for (int i = 1; i < argc; i++) {
         if (!strcmp(argv[i], "--long")) LONG_SUITE = 1;
@@ -134,32 +150,20 @@ static int test_main(const char *suite, int argc, char **argv) {
     const int crashes[] = {SIGSEGV, SIGABRT, SIGFPE, SIGILL};
     for (int i = 0; i < 4; i++) signal(crashes[i], test_crashed);
 #endif
-    for (test_case *t = test_first; t; t = t->next) {
-        if (filter && !strstr(t->name, filter)) continue;
-        struct timespec start, end;
-        test_failures = test_skipped = 0;
-        test_running = t->name;
-        clock_gettime(CLOCK_MONOTONIC, &start);
-        if (!setjmp(test_leave)) t->run();
-        clock_gettime(CLOCK_MONOTONIC, &end);
-        double seconds = (double)(end.tv_sec - start.tv_sec) + 1e-9 * (double)(end.tv_nsec - start.tv_nsec);
-        if (test_failures > 8) printf("    ... %d failing checks in all\n", test_failures);
-        printf("%s %s.%s (%.2f s)\n", test_failures ? "FAIL" : test_skipped ? "skip" : "ok  ", suite, t->name, seconds);
-        if (test_failures) failed++;
-        else if (test_skipped) skipped++;
-        else passed++;
-    }
-    if (filter && !(passed + failed + skipped)) {
+    for (test_case *t = test_first; t; t = t->next)
+        if (!filter || strstr(t->name, filter)) count[test_run(t)]++;
+    if (filter && !(count[0] + count[1] + count[2])) {
         fprintf(stderr, "%s: no test's name contains \"%s\"\n", argv[0], filter);
         return 2;
     }
+    snprintf(counts, sizeof counts, "%d passed, %d failed, %d skipped", count[0], count[1], count[2]);
     if (summary && *summary) {
-        printf("%s: ", suite);
         FILE *file = fopen(summary, "a");
-        if (file) fprintf(file, "%d passed, %d failed, %d skipped\n", passed, failed, skipped), fclose(file);
+        if (file) fprintf(file, "%s\n", counts), fclose(file);
+        printf("%s: ", suite);
     }
-    printf("%d passed, %d failed, %d skipped\n", passed, failed, skipped);
-    return failed ? 1 : 0;
+    printf("%s\n", counts);
+    return count[1] ? 1 : 0;
 }
 
 #define TEST_MAIN(suite) int main(int argc, char **argv) { return test_main(suite, argc, argv); }
