@@ -40,6 +40,7 @@
    - ISOGI_API                  linkage of public functions, if extern does not suit
 
    Memory       Through isogi_context, or malloc. A pyramid takes about 1/8 byte for every voxel.
+                A mesh keeps 2/3 byte of scratch memory for every voxel until it is freed.
                 Stack use stays below 16 KB.
    Threads      A pyramid is const once built: any number of threads may read it. Building and meshing use the context's threads.
    Determinism  The same input gives the same bits for any number of threads.
@@ -128,7 +129,7 @@ typedef struct isogi_counters {
    isogi_allocate: count * size bytes, 64-byte aligned, checked for overflow; NULL on failure and for 0 bytes.
    isogi_release: NULL is fine; count and size as allocated.
    isogi_parallel: task(arg, i) for i < n on the context's threads; progress runs from `from` to `to`; ISOGI_CANCELLED when the
-   progress callback asks for it (tasks that have begun are finished first). */
+   progress callback has asked for it, be it at the very end (tasks that have begun are finished first). */
 ISOGI_API void *isogi_allocate(const isogi_context *context, size_t count, size_t size);
 ISOGI_API void isogi_release(const isogi_context *context, void *p, size_t count, size_t size);
 ISOGI_API isogi_result isogi_parallel(const isogi_context *context, size_t n, void (*task)(void *arg, size_t i), void *arg,
@@ -387,10 +388,12 @@ static int isogi_vol__report(const isogi_context *context, double from, double t
 /* The calling thread's share of the work; it alone calls the progress callback. */
 static void isogi_vol__job_lead(isogi_vol__job *job, const isogi_context *context, double from, double to) {
     size_t begun;
-    while (isogi_vol__job_step(job, &begun)) {
-        if (isogi_vol__report(context, from, to, begun, job->count)) {
+    int more = 1;
+    while (more && !job->cancelled) { /* only this thread writes `cancelled` */
+        more = isogi_vol__job_step(job, &begun);
+        if (isogi_vol__report(context, from, to, more ? begun : job->count, job->count)) {
             ISOGI_VOL__LOCK(job);
-            job->cancelled = begun < job->count || job->cancelled;
+            job->cancelled = 1;
             ISOGI_VOL__UNLOCK(job);
         }
     }
@@ -485,7 +488,7 @@ ISOGI_API isogi_result isogi_parallel(const isogi_context *context, size_t n, vo
             size_t end = n / slices * (s + 1) + n % slices * (s + 1) / slices;
             slice.first = n / slices * s + n % slices * s / slices;
             if (end > slice.first) context->parallel_for(context->user, end - slice.first, isogi_vol__slice_task, &slice);
-            if (isogi_vol__report(context, from, to, end, n) && end < n) return ISOGI_CANCELLED;
+            if (isogi_vol__report(context, from, to, end, n)) return ISOGI_CANCELLED;
         }
         return ISOGI_OK;
     } else {
@@ -2428,17 +2431,23 @@ typedef struct isogi_vol__cell_walk {
 } isogi_vol__cell_walk;
 
 static void isogi_vol__walk_start(const isogi_vol__mesher *m, isogi_vol__cell_walk *walk, int j, int k) {
-    static const uint8_t kind[12] = {0, 0, 0, 0, 1, 1, 2, 2, 3, 3, 3, 3}, row[12] = {0, 1, 2, 3, 0, 2, 0, 1, 0, 1, 2, 3};
     int n;
-    walk->j = j, walk->k = k, walk->kinds = m->closed ? 12 : 8, walk->border = m->closed && isogi_vol__border_row(m, j, k, 2);
+    walk->j = j, walk->k = k, walk->border = m->closed && isogi_vol__border_row(m, j, k, 2);
     for (n = 0; n < 4; n++) walk->inside[n] = isogi_vol__bit_row(m, m->inside, j + (n & 1), k + (n >> 1));
     walk->valid = isogi_vol__bit_row(m, m->valid, j, k);
+}
+
+/* Sets the counters to where the vertices of the rows begin. */
+static void isogi_vol__walk_number(const isogi_vol__mesher *m, isogi_vol__cell_walk *walk) {
+    static const uint8_t kind[12] = {0, 0, 0, 0, 1, 1, 2, 2, 3, 3, 3, 3}, row[12] = {0, 1, 2, 3, 0, 2, 0, 1, 0, 1, 2, 3};
+    int n;
+    walk->kinds = m->closed ? 12 : 8;
     for (n = 0; n < walk->kinds; n++) {
-        int y = j + (row[n] & 1), z = k + (row[n] >> 1);
+        int y = walk->j + (row[n] & 1), z = walk->k + (row[n] >> 1);
         walk->carry_row[n] = isogi_vol__bit_row(m, m->carries[kind[n]], y, z);
         walk->vertex[n] = m->row[(size_t)y + (size_t)m->ny * (size_t)z].vertex[kind[n]];
     }
-    walk->inner = m->row[(size_t)j + (size_t)m->ny * (size_t)k].vertex[ISOGI_VOL__INNER];
+    walk->inner = m->row[(size_t)walk->j + (size_t)m->ny * (size_t)walk->k].vertex[ISOGI_VOL__INNER];
 }
 
 /* Cells of word w that hold surface, and those with a face on a closed border that is not all outside. */
@@ -2737,6 +2746,7 @@ static void isogi_vol__mesh_emit(const isogi_vol__mesher *m, int j, int k) {
     isogi_vol__emit_vertices(m, j, k);
     if (j >= m->ny - 1 || k >= m->nz - 1 || m->row[(size_t)j + (size_t)m->ny * (size_t)k + 1].triangle == at) return;
     isogi_vol__walk_start(m, &walk, j, k);
+    isogi_vol__walk_number(m, &walk);
     for (w = 0; w < m->words; w++) {
         uint64_t events;
         int n;
