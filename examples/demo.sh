@@ -1,0 +1,33 @@
+#!/bin/sh
+# Volume in, globally lit pictures out, into build/demo. VOLUME and ISO in the environment choose a file of the user's own.
+out=build/demo
+mkdir -p "$out"
+begun=$(date +%s)
+failed=0
+
+# NAME CAPTION VIEWER_ARGUMENTS...
+picture() {
+    name=$1 caption=$2
+    shift 2
+    since=$(date +%s)
+    echo "$caption"
+    if build/viewer "$@" --out "$out/$name.png"; then echo "    $out/$name.png   $(($(date +%s) - since)) s"
+    else failed=1
+    fi
+}
+
+if [ "$VOLUME" ]; then
+    name=$(basename "$VOLUME")
+    name=${name%%.*}
+    picture "$name-phong" "$name, light by the normal alone" "$VOLUME" --mode phong ${ISO:+--iso "$ISO"}
+    picture "$name" "$name, global light" "$VOLUME" --mode irradiance ${ISO:+--iso "$ISO"}
+else
+    picture engine-block-phong "An engine block, light by the normal alone: the usual picture, to compare with" \
+        procedural:engine-block --mode phong
+    picture engine-block "The same under a sky and a sun, with shadows and every reflection" procedural:engine-block
+    picture skull "A skull, the same light" procedural:skull
+    picture gyroid "A gyroid: most of its light has been reflected a few times" procedural:gyroid
+    picture hydrogen "A hydrogen orbital, volume rendered, shaded by what each point sees of the sky" procedural:hydrogen --mode dvr
+fi
+echo "$(($(date +%s) - begun)) s in all; VOLUME=FILE [ISO=VALUE] shows a volume of your own: make demo VOLUME=head_256x256x99_uint8.raw"
+exit $failed
