@@ -1290,7 +1290,8 @@ static isogi_result isogi_trace__set_lattice(isogi_trace *t) {
     for (a = 0; a < 3; a++) {
         double end = (double)(t->scene.volume->size[a] - 1);
         t->first[a] = whole ? 0 : d->lattice_min[a], t->last[a] = whole ? end : d->lattice_max[a];
-        if (!(t->first[a] >= 0) || !(t->last[a] >= t->first[a]) || !(t->last[a] <= end)) return ISOGI_INVALID;
+        if (!isogi_trace__finite(t->first[a]) || !isogi_trace__finite(t->last[a])) return ISOGI_INVALID;
+        if (t->first[a] < 0 || t->last[a] < t->first[a] || t->last[a] > end) return ISOGI_INVALID;
         t->lattice[a] = d->lattice[a] ? d->lattice[a] : (size_t)(t->last[a] - t->first[a] + 0.5) + 1;
         if (t->lattice[a] > 0x7fffffff) return ISOGI_TOO_LARGE;
         t->step[a] = t->lattice[a] > 1 ? (t->last[a] - t->first[a]) / (double)(t->lattice[a] - 1) : 0;
