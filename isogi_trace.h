@@ -1057,6 +1057,7 @@ static int isogi_trace__desc_valid(const isogi_trace_desc *d) {
     if (d->transfer_channels != 0 && d->transfer_channels != 1 && d->transfer_channels != 3) return 0;
     if (!isogi_trace__finite((double)d->offset) || d->offset > 16) return 0;
     if (!isogi_trace__finite(d->isovalue_min) || !isogi_trace__finite(d->isovalue_max) || d->isovalue_min > d->isovalue_max) return 0;
+    if (!isogi_trace__finite3(d->lattice_min) || !isogi_trace__finite3(d->lattice_max)) return 0;
     if (isogi_lighting_validate(&d->lighting) != ISOGI_OK || !isogi_trace__albedo_valid(d)) return 0;
     return d->mode == ISOGI_TRACE_IRRADIANCE || isogi_trace__distant(&d->lighting);
 }
@@ -1290,7 +1291,6 @@ static isogi_result isogi_trace__set_lattice(isogi_trace *t) {
     for (a = 0; a < 3; a++) {
         double end = (double)(t->scene.volume->size[a] - 1);
         t->first[a] = whole ? 0 : d->lattice_min[a], t->last[a] = whole ? end : d->lattice_max[a];
-        if (!isogi_trace__finite(t->first[a]) || !isogi_trace__finite(t->last[a])) return ISOGI_INVALID;
         if (t->first[a] < 0 || t->last[a] < t->first[a] || t->last[a] > end) return ISOGI_INVALID;
         t->lattice[a] = d->lattice[a] ? d->lattice[a] : (size_t)(t->last[a] - t->first[a] + 0.5) + 1;
         if (t->lattice[a] > 0x7fffffff) return ISOGI_TOO_LARGE;
