@@ -40,7 +40,7 @@
    - ISOGI_API                  linkage of public functions, if extern does not suit
 
    Memory       Through isogi_context, or malloc. A pyramid takes about 1/8 byte for every voxel.
-                A mesh keeps 2/3 byte of scratch memory for every voxel until it is freed.
+                A mesh keeps some 3/4 byte of scratch memory for every voxel until it is freed.
                 Stack use stays below 16 KB.
    Threads      A pyramid is const once built: any number of threads may read it. Building and meshing use the context's threads.
    Determinism  The same input gives the same bits for any number of threads.

@@ -726,7 +726,7 @@ TEST(cells_with_a_voxel_that_is_not_finite_are_left_out) {
                 for (int n = 0; n < 3; n++) c += (double)whole.positions[whole.triangles[t][n]][a] / 3;
                 cell[a] = c > f.size[a] - 2 ? f.size[a] - 2 : (int)c;
             }
-            for (int n = 0; n < 8; n++) good &= isfinite(*field_at(&f, cell[0] + (n & 1), cell[1] + (n >> 1 & 1), cell[2] + (n >> 2))) != 0;
+            for (int n = 0; n < 8; n++) good &= isogi_vol__finite64(*field_at(&f, cell[0] + (n & 1), cell[1] + (n >> 1 & 1), cell[2] + (n >> 2)));
             kept += good;
         }
         CHECK((long)mesh.triangle_count == kept, "volume %d: %zu triangles, not %ld", i, mesh.triangle_count, kept);
