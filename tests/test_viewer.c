@@ -117,8 +117,9 @@ static double picture_difference(const unsigned char *a, const unsigned char *b,
 }
 
 /* Tolerance: the pictures are the same bits on one machine and instruction path. Another path, compiler or C library changes the last
-   bits of light and of geometry: a few edge pixels flip, Monte Carlo noise of some texels changes. 2 of 255 root mean square and 1 %
-   of pixels off by more than 32 leave room for that; a light, a normal or an exposure that is wrong moves whole surfaces by more. */
+   bits of light and of geometry: a few edge pixels flip, the Monte Carlo noise of a few texels changes. gcc and clang, -O1 to -O3,
+   -march=native, -ffast-math differ by at most 0.03 of 255 root mean square; 0.5, and 0.5 % of pixels off by more than 32, leave
+   room for more exotic machines, and a tenth more of red light already exceeds it. */
 static void check_golden(const char *name, const char *arguments) {
     char path[256], command[1024];
     int shape[3] = {0, 0, 0}, golden_shape[3] = {0, 0, 0};
@@ -138,8 +139,8 @@ static void check_golden(const char *name, const char *arguments) {
         double outliers, difference;
         CHECK(shape[0] == 96 && shape[1] == 72 && shape[2] == 3 && !memcmp(shape, golden_shape, sizeof shape), "%s: %dx%dx%d", name, shape[0], shape[1], shape[2]);
         difference = picture_difference(picture, golden, 96, 72, &outliers);
-        CHECK(difference < 2, "%s: differs by %.3f of 255 (root mean square)", name, difference);
-        CHECK(outliers < 0.01, "%s: %.2f %% of the pixels differ by more than 32", name, 100 * outliers);
+        CHECK(difference < 0.5, "%s: differs by %.3f of 255 (root mean square)", name, difference);
+        CHECK(outliers < 0.005, "%s: %.2f %% of the pixels differ by more than 32", name, 100 * outliers);
     }
     free(picture), free(golden);
 }
@@ -350,6 +351,27 @@ TEST(png_round_trip_is_exact) {
         if (back) CHECK(shape[0] == width && shape[1] == height && shape[2] == channels && !memcmp(pixels, back, n), "%dx%dx%d came back as %dx%dx%d", width, height, channels, shape[0], shape[1], shape[2]);
         free(pixels), free(file), free(back);
     }
+}
+
+/* A picture of 5 x 5 by another encoder (zlib, fixed Huffman codes), whose rows use the filters 0 to 4 in turn: a mistake that our
+   encoder and decoder share cannot hide here. */
+TEST(png_of_another_encoder_is_read) {
+    static const unsigned char file[] = {
+        137, 80, 78, 71, 13, 10, 26, 10, 0, 0, 0, 13, 73, 72, 68, 82, 0, 0, 0, 5, 0, 0, 0, 5, 8, 2, 0, 0, 0, 2, 13, 177,
+        178, 0, 0, 0, 79, 73, 68, 65, 84, 120, 1, 99, 96, 96, 101, 80, 21, 96, 240, 146, 102, 200, 87, 99, 152, 98, 200, 192, 104, 29, 193, 160,
+        202, 45, 11, 71, 76, 214, 193, 12, 214, 193, 178, 214, 193, 86, 214, 193, 225, 214, 193, 37, 204, 101, 43, 25, 12, 244, 173, 12, 214, 123, 26, 172,
+        15, 55, 88, 255, 140, 5, 40, 175, 26, 12, 84, 105, 101, 205, 29, 174, 202, 93, 2, 0, 37, 200, 16, 92, 72, 191, 142, 195, 0, 0, 0, 0,
+        73, 69, 78, 68, 174, 66, 96, 130};
+    unsigned char *pixels = NULL;
+    char error[FILE_ERROR_SIZE] = "";
+    int shape[3] = {0, 0, 0};
+    CHECK(png_decode(file, sizeof file, &pixels, shape, error) && shape[0] == 5 && shape[1] == 5 && shape[2] == 3, "%s", error);
+    for (int j = 0; pixels && j < 5; j++)
+        for (int i = 0; i < 5; i++) {
+            const unsigned char *p = pixels + 3 * (5 * j + i);
+            CHECK(p[0] == (i * 37 + j * 59) % 256 && p[1] == (i * 11 + j * 83 + 5) % 256 && p[2] == i * j * 29 % 256, "pixel %d,%d: %d %d %d", i, j, p[0], p[1], p[2]);
+        }
+    free(pixels);
 }
 
 /* Noise cannot be packed, a constant picture must be: deflate's own limit is 1032 to 1. */
