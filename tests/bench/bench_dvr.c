@@ -26,7 +26,7 @@ static double cpu_seconds(void) {
 static void row(const char *name, const char *scene, const char *method, const char *setting, double seconds, double error, double work, const char *unit) {
     fprintf(csv, "isogi_dvr.h,%s-%s,%s,%s,%.6g,%.6g,%.6g,%s\n", name, scene, method, setting, seconds, error, work, unit);
     fflush(csv);
-    fprintf(stderr, "  %-12s %-8s %-8s %-14s %8.3f s %9.3f M%s/s  error %.3g\n", name, scene, method, setting, seconds, work / seconds / 1e6, unit, error);
+    fprintf(stderr, "  %-20s %-8s %-8s %-10s %8.3f s %9.3f M%s/s  error %.3g\n", name, scene, method, setting, seconds, work / seconds / 1e6, unit, error);
 }
 
 static double marschner_lobb(double x, double y, double z) {
@@ -64,7 +64,7 @@ static void bench_frames(const char *scene, const isogi_pyramid *pyramid, const 
         isogi_dvr *dvr = create(&desc, transfer);
         isogi_counters count = {0};
         double sum = 0, seconds;
-        char setting[64];
+        char name[64], setting[64];
         if (isogi_dvr_step(dvr, 0, NULL) != ISOGI_OK) exit(1);
         seconds = cpu_seconds();
         if (isogi_dvr_render(dvr, &view, &lighting, s ? image : reference, NULL, &count) != ISOGI_OK) exit(1);
@@ -73,8 +73,9 @@ static void bench_frames(const char *scene, const isogi_pyramid *pyramid, const 
             double d = srgb((double)image[i / 4][i % 4]) - srgb((double)reference[i / 4][i % 4]);
             if (i % 4 < 3) sum += d * d;
         }
-        snprintf(setting, sizeof setting, "%s %s step %g", space ? "data" : "physical", shading ? "lit" : "unlit", steps[s]);
-        if (s) row("frame", scene, s == 2 ? "default" : "steps", setting, seconds, sqrt(sum / (double)(3 * pixels)), (double)count.samples, "sample");
+        snprintf(name, sizeof name, "frame-%s-%s", space ? "data" : "physical", shading ? "lit" : "unlit");
+        snprintf(setting, sizeof setting, "step %g", steps[s]);
+        if (s) row(name, scene, s == 2 ? "default" : "steps", setting, seconds, sqrt(sum / (double)(3 * pixels)), (double)count.samples, "sample");
         isogi_dvr_free(dvr);
     }
     free(image), free(reference);

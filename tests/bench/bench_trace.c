@@ -91,7 +91,7 @@ int main(int argc, char **argv) {
         desc.samples = settings[i], desc.seed = 0;
         seconds = bake(&desc, count, light, &counters);
         if (!(seconds > 0)) return 1;
-        fprintf(csv, "isogi_trace.h,engine-block,default,samples=%d,%.6g,%.6g,%.6g,rays\n", settings[i], seconds, relative_rmse(count), (double)counters.rays);
+        fprintf(csv, "isogi_trace.h,engine-block,%s,samples=%d,%.6g,%.6g,%.6g,rays\n", settings[i] == 64 ? "default" : "samples", settings[i], seconds, relative_rmse(count), (double)counters.rays);
         fprintf(stderr, "  engine-block samples=%d: %.3f s, error %.4f, %.2f Mray/s\n", settings[i], seconds, relative_rmse(count), 1e-6 * (double)counters.rays / seconds);
     }
     isogi_vol_free(pyramid), procedural_free(&volume);
