@@ -453,6 +453,659 @@ TEST(dot_is_the_integral_of_the_product) {
     CHECK(fabs(dot - integral) < 1e-12, "%.17g, expected %.17g", dot, integral);
 }
 
+/* ---- other evaluations ---- */
+
+/* Structure of arrays against array of structures: the same functions, any count. Bound: twice the float error of degree 10. */
+TEST(both_layouts_agree) {
+    enum { ORDER = 11, N = ORDER * ORDER, COUNT = 133 };
+    static float x[COUNT], y[COUNT], z[COUNT], d[COUNT][3], aos[COUNT * N], soa[COUNT * N];
+    static double X[COUNT], Y[COUNT], Z[COUNT], D[COUNT][3], wide[COUNT * N], wide_soa[COUNT * N];
+    test_random r = {20};
+    for (int i = 0; i < COUNT; i++) {
+        random_direction(&r, D[i]);
+        X[i] = D[i][0], Y[i] = D[i][1], Z[i] = D[i][2];
+        for (int k = 0; k < 3; k++) d[i][k] = (float)(3 * D[i][k]);
+        x[i] = d[i][0], y[i] = d[i][1], z[i] = d[i][2];
+    }
+    for (size_t count = 1; count <= COUNT; count += 11) {
+        for (size_t i = 0; i < COUNT * N; i++) aos[i] = soa[i] = 99, wide[i] = wide_soa[i] = 99;
+        CHECK(isogi_sh_eval(aos, ORDER, (const float(*)[3])d, count) == ISOGI_OK, "%d", (int)count);
+        CHECK(isogi_sh_eval_soa(soa, ORDER, x, y, z, count) == ISOGI_OK, "%d", (int)count);
+        CHECK(isogi_sh_eval_f64(wide, ORDER, (const double(*)[3])D, count) == ISOGI_OK, "%d", (int)count);
+        CHECK(isogi_sh_eval_soa_f64(wide_soa, ORDER, X, Y, Z, count) == ISOGI_OK, "%d", (int)count);
+        for (size_t i = 0; i < count; i++)
+            for (size_t k = 0; k < N; k++) {
+                CHECK(fabsf(aos[i * N + k] - soa[k * count + i]) < 4.4e-6f, "%g %g", (double)aos[i * N + k], (double)soa[k * count + i]);
+                CHECK(fabs(wide[i * N + k] - wide_soa[k * count + i]) < 1.4e-14, "%g %g", wide[i * N + k], wide_soa[k * count + i]);
+                CHECK(fabs(wide[i * N + k] - (double)aos[i * N + k]) < 5e-6, "%g %g", wide[i * N + k], (double)aos[i * N + k]);
+            }
+        if (count < COUNT) CHECK(aos[count * N] == 99 && soa[count * N] == 99, "written past the end at count %d", (int)count);
+    }
+}
+
+/* Gradients against central differences of the 128-bit reference (step 1e-9: error 1e-15), at poles, on axes and anywhere; tangent. */
+TEST(gradient_is_the_derivative) {
+    enum { ORDER = 11, N = ORDER * ORDER };
+    static double g[N][3];
+    static float gf[N][3];
+    static quad low[N], high[N];
+    test_random r = {21};
+    double d[1][3], worst = 0, worst_float = 0;
+    for (int i = 0; hard_direction(d[0], i, &r) && i < 400; i += 3) {
+        double length = sqrt(d[0][0] * d[0][0] + d[0][1] * d[0][1] + d[0][2] * d[0][2]);
+        float f[1][3] = {{(float)d[0][0], (float)d[0][1], (float)d[0][2]}};
+        CHECK(isogi_sh_eval_gradient_f64(g, ORDER, (const double(*)[3])d, 1) == ISOGI_OK, "%d", i);
+        CHECK(isogi_sh_eval_gradient(gf, ORDER, (const float(*)[3])f, 1) == ISOGI_OK, "%d", i);
+        for (int axis = 0; axis < 3; axis++) {
+            quad e[3] = {(quad)(d[0][0] / length), (quad)(d[0][1] / length), (quad)(d[0][2] / length)};
+            e[axis] += (quad)1e-9;
+            reference_eval(high, ORDER, e);
+            e[axis] -= (quad)2e-9;
+            reference_eval(low, ORDER, e);
+            for (int k = 0; k < N; k++) {
+                double expected = (double)((high[k] - low[k]) / (quad)2e-9);
+                worst = fmax(worst, fabs(g[k][axis] - expected));
+                worst_float = fmax(worst_float, fabs((double)gf[k][axis] - expected));
+                CHECK(fabs(g[k][axis] - expected) < 1e-12, "Y%d, axis %d: %.17g, expected %.17g", k, axis, g[k][axis], expected);
+            }
+        }
+    }
+    printf("    largest error %.3g, float %.3g\n", worst, worst_float);
+    CHECK(worst_float < 2e-5, "float: %g", worst_float);
+}
+
+/* An expansion evaluated without storing the basis is the dot product with the basis. 1e-13 and, in float, 1e-5: 121 terms of size 1. */
+TEST(sums_agree_with_the_basis) {
+    enum { ORDER = 11, N = ORDER * ORDER, COUNT = 37 };
+    static double c[3 * N], y[N], D[COUNT][3], value[COUNT][3];
+    static float cf[3 * N], d[COUNT][3], vf[COUNT][3];
+    test_random r = {22};
+    for (int order = 1; order <= ORDER; order++) {
+        for (int i = 0; i < 3 * N; i++) cf[i] = (float)random_range(&r, -1, 1), c[i] = (double)cf[i];
+        for (int i = 0; i < COUNT; i++) {
+            random_direction(&r, D[i]);
+            for (int k = 0; k < 3; k++) d[i][k] = (float)D[i][k], D[i][k] = (double)d[i][k];
+        }
+        for (int channels = 1; channels <= 3; channels++) {
+            CHECK(isogi_sh_eval_sum_f64(&value[0][0], c, order, channels, (const double(*)[3])D, COUNT) == ISOGI_OK, "order %d", order);
+            CHECK(isogi_sh_eval_sum(&vf[0][0], cf, order, channels, (const float(*)[3])d, COUNT) == ISOGI_OK, "order %d", order);
+            for (int i = 0; i < COUNT; i++) {
+                isogi_sh_eval_f64(y, order, (const double(*)[3]) & D[i], 1);
+                for (int k = 0; k < channels; k++) {
+                    double sum = 0, got = (&value[0][0])[i * channels + k], got_float = (double)(&vf[0][0])[i * channels + k];
+                    for (int j = 0; j < order * order; j++) sum += y[j] * c[channels * j + k];
+                    CHECK(fabs(sum - got) < 1e-13, "order %d, channel %d: %.17g, expected %.17g", order, k, got, sum);
+                    CHECK(fabs(sum - got_float) < 1e-5, "order %d, channel %d: %.9g, expected %.9g", order, k, got_float, sum);
+                }
+            }
+        }
+    }
+}
+
+/* ---- more projections ---- */
+
+static void smooth_function(void *user, const double d[3], double *value) {
+    (void)user;
+    value[0] = 1 + d[0] * d[1] + 0.5 * d[2];
+    value[1] = d[2] > 0 ? 1 : 0;
+}
+
+/* Monte Carlo tends to the exact projection like 1/sqrt(N) (5 sigma, sigma of Y f about 1), stratified samples much faster; the same
+   seed repeats the same numbers. */
+TEST(random_projection_converges) {
+    static double exact[2 * 16], plain[2 * 16], strata[2 * 16], again[2 * 16];
+    double rms[2] = {0, 0};
+    size_t n = 40000;
+    isogi_sh_project_function(exact, 4, 2, 512, smooth_function, NULL);
+    CHECK(isogi_sh_project_random(plain, 4, 2, n, 0, 1, smooth_function, NULL) == ISOGI_OK, "%d", 0);
+    CHECK(isogi_sh_project_random(strata, 4, 2, n, 1, 1, smooth_function, NULL) == ISOGI_OK, "%d", 1);
+    CHECK(isogi_sh_project_random(again, 4, 2, n, 1, 1, smooth_function, NULL) == ISOGI_OK && !memcmp(again, strata, sizeof again), "%d", 2);
+    for (int i = 0; i < 32; i++) {
+        rms[0] += (plain[i] - exact[i]) * (plain[i] - exact[i]) / 32;
+        rms[1] += (strata[i] - exact[i]) * (strata[i] - exact[i]) / 32;
+        CHECK(fabs(plain[i] - exact[i]) < 5 * sqrt(4 * pi) * 1.5 / sqrt((double)n), "%d: %g, expected %g", i, plain[i], exact[i]);
+    }
+    printf("    rms error %.3g, stratified %.3g\n", sqrt(rms[0]), sqrt(rms[1]));
+    CHECK(rms[1] < rms[0] / 25, "%g and %g", rms[0], rms[1]);
+}
+
+/* Weighted samples: the nodes of a quadrature with their weights give the exact projection. */
+TEST(weighted_samples_project) {
+    enum { LATITUDES = 8, LONGITUDES = 16, COUNT = LATITUDES * LONGITUDES };
+    static float d[COUNT][3], value[COUNT], weight[COUNT];
+    long double node[LATITUDES], w[LATITUDES];
+    double c[25];
+    reference_nodes(node, w, LATITUDES);
+    for (int i = 0; i < COUNT; i++) {
+        double z = (double)node[i / LONGITUDES], s = sqrt(1 - z * z), phi = 2 * pi * (i % LONGITUDES) / LONGITUDES;
+        d[i][0] = (float)(s * cos(phi)), d[i][1] = (float)(s * sin(phi)), d[i][2] = (float)z;
+        value[i] = (float)(1 + d[i][0] * d[i][1]), weight[i] = (float)((double)w[i / LONGITUDES] * 2 * pi / LONGITUDES);
+    }
+    CHECK(isogi_sh_project_samples(c, 5, 1, (const float(*)[3])d, value, weight, COUNT) == ISOGI_OK, "%d", COUNT);
+    for (int i = 0; i < 25; i++) {
+        double expected = i == 0 ? sqrt(4 * pi) : i == 4 ? sqrt(4 * pi / 15) : 0;
+        CHECK(fabs(c[i] - expected) < 2e-6, "Y%d: %g, expected %g", i, c[i], expected); /* float positions and values */
+    }
+    CHECK(isogi_sh_project_samples(c, 5, 1, (const float(*)[3])d, value, NULL, 1) == ISOGI_OK, "%s", "no weights");
+    CHECK(fabs(c[0] - 4 * pi * (double)value[0] * sqrt(1 / (4 * pi))) < 1e-6, "%g", c[0]);
+}
+
+/* Any number of channels is the same as one after the other; RGB is three of them. */
+TEST(image_channels_are_independent) {
+    enum { W = 24, H = 12, ORDER = 7, N = ORDER * ORDER };
+    static float image[W * H * 7], one[W * H], all[7 * N], single[N];
+    test_random r = {23};
+    for (int i = 0; i < W * H * 7; i++) image[i] = (float)random_unit(&r);
+    for (int channels = 1; channels <= 7; channels += 2) {
+        CHECK(isogi_sh_project_image(all, ORDER, channels, image, W, H) == ISOGI_OK, "%d channels", channels);
+        for (int k = 0; k < channels; k++) {
+            for (int i = 0; i < W * H; i++) one[i] = image[channels * i + k];
+            isogi_sh_project_image(single, ORDER, 1, one, W, H);
+            for (int i = 0; i < N; i++)
+                CHECK(fabsf(single[i] - all[channels * i + k]) < 1e-6f, "channel %d of %d, Y%d", k, channels, i);
+        }
+    }
+}
+
+/* Cube maps: painted with an expansion in the stated orientation they return it (texel centres: error about 3 / size^2), the solid
+   angles of the texels add up to 4 pi, and a lit face is where it should be. */
+TEST(cube_maps_have_exact_solid_angles_and_the_stated_orientation) {
+    enum { SIZE = 48, ORDER = 4, N = ORDER * ORDER };
+    static float pixels[6][SIZE * SIZE * 2];
+    const float *face[6];
+    float c[2 * N];
+    for (int i = 0; i < N; i++) {
+        for (int f = 0; f < 6; f++) {
+            face[f] = pixels[f];
+            for (int p = 0; p < SIZE * SIZE; p++) {
+                double s = 2 * (p % SIZE + 0.5) / SIZE - 1, t = 2 * (p / SIZE + 0.5) / SIZE - 1, y[N];
+                double table[6][3] = {{1, -t, -s}, {-1, -t, s}, {s, 1, t}, {s, -1, -t}, {s, -t, 1}, {-s, -t, -1}};
+                isogi_sh_eval_f64(y, ORDER, (const double(*)[3])table[f], 1);
+                pixels[f][2 * p] = (float)y[i], pixels[f][2 * p + 1] = 1;
+            }
+        }
+        CHECK(isogi_sh_project_cube(c, ORDER, 2, face, SIZE) == ISOGI_OK, "Y%d", i);
+        for (int k = 0; k < N; k++) CHECK(fabs((double)c[2 * k] - (k == i)) < 3.0 / (SIZE * SIZE), "Y%d on Y%d: %g", i, k, (double)c[2 * k]);
+        CHECK(fabs((double)c[1] - sqrt(4 * pi)) < 1e-6, "constant: %.9g", (double)c[1]);
+    }
+    memset(pixels, 0, sizeof pixels);
+    for (int p = 0; p < 2 * SIZE * SIZE; p++) pixels[2][p] = 1; /* the face +y alone */
+    isogi_sh_project_cube(c, ORDER, 2, face, SIZE);
+    CHECK(c[2] > 0.5f && fabsf(c[4]) < 1e-6f && fabsf(c[6]) < 1e-6f, "degree 1: %g %g %g", (double)c[2], (double)c[4], (double)c[6]);
+    CHECK(fabs((double)c[0] - 4 * pi / 6 * sqrt(1 / (4 * pi))) < 1e-6, "a face is a sixth of the sphere: %g", (double)c[0]);
+}
+
+/* ---- more rotations ---- */
+
+/* The recursion of Ivanic and Ruedenberg, as methods go in double: exact enough to degree 12 to be another opinion. */
+static double ivanic_p(int i, int a, int s, int t, const double r[3][3], const double *before) {
+    int w = 2 * i - 1;
+#define R1(x, y) r[(x) + 1][(y) + 1]
+#define R0(x, y) before[((x) + i - 1) * w + (y) + i - 1]
+    if (t == i) return R1(a, 1) * R0(s, i - 1) - R1(a, -1) * R0(s, -i + 1);
+    if (t == -i) return R1(a, 1) * R0(s, -i + 1) + R1(a, -1) * R0(s, i - 1);
+    return R1(a, 0) * R0(s, t);
+#undef R1
+#undef R0
+}
+
+static void ivanic(double *rotation, int order, const double m[9]) {
+    static const int axis[3] = {1, 2, 0}; /* y z x */
+    double r[3][3];
+    const double *before = rotation;
+    rotation[0] = 1;
+    for (int i = 0; i < 3; i++)
+        for (int j = 0; j < 3; j++) r[i][j] = m[3 * axis[i] + axis[j]];
+    for (int i = 1; i < order; i++) {
+        double *now = (double *)before + (2 * i - 1) * (2 * i - 1);
+        for (int s = -i; s <= i; s++)
+            for (int t = -i; t <= i; t++) {
+                double d = s == 0, as = abs(s), denominator = abs(t) < i ? (i + t) * (i - t) : 2 * i * (2 * i - 1);
+                double u = sqrt((i + s) * (i - s) / denominator), v = 0.5 * sqrt((1 + d) * (i + as - 1) * (i + as) / denominator) * (1 - 2 * d);
+                double w = -0.5 * sqrt(fmax(0, (i - as - 1) * (i - as) / denominator)) * (1 - d), sum = 0;
+                const double(*q)[3] = (const double(*)[3])r;
+                if (i == 1) { now[(s + 1) * 3 + t + 1] = r[s + 1][t + 1]; continue; }
+                if (abs(s) < i) sum += u * ivanic_p(i, 0, s, t, q, before);
+                if (s == 0) sum += v * (ivanic_p(i, 1, 1, t, q, before) + ivanic_p(i, -1, -1, t, q, before));
+                else if (s > 0) {
+                    sum += v * ivanic_p(i, 1, s - 1, t, q, before) * (s == 1 ? sqrt(2) : 1);
+                    if (s != 1) sum -= v * ivanic_p(i, -1, -s + 1, t, q, before);
+                } else {
+                    if (s != -1) sum += v * ivanic_p(i, 1, s + 1, t, q, before);
+                    sum += v * ivanic_p(i, -1, -s - 1, t, q, before) * (s == -1 ? sqrt(2) : 1);
+                }
+                if (abs(s) < i - 1) {
+                    if (s > 0) sum += w * (ivanic_p(i, 1, s + 1, t, q, before) + ivanic_p(i, -1, -s - 1, t, q, before));
+                    if (s < 0) sum += w * (ivanic_p(i, 1, s - 1, t, q, before) - ivanic_p(i, -1, -s + 1, t, q, before));
+                }
+                now[(s + i) * (2 * i + 1) + t + i] = sum;
+            }
+        before = now;
+    }
+}
+
+TEST(rotation_matrices_are_those_of_ivanic_and_ruedenberg) {
+    enum { ORDER = 13 };
+    static double ours[ISOGI_SH_ROTATION_COUNT(ORDER)], theirs[ISOGI_SH_ROTATION_COUNT(ORDER)];
+    test_random r = {24};
+    double worst = 0;
+    for (int round = 0; round < 50; round++) {
+        double m[9];
+        random_rotation(&r, m);
+        CHECK(isogi_sh_rotation_build_f64(ours, ORDER, m) == ISOGI_OK, "round %d", round);
+        ivanic(theirs, ORDER, m);
+        for (size_t i = 0; i < ISOGI_SH_ROTATION_COUNT(ORDER); i++) worst = fmax(worst, fabs(ours[i] - theirs[i]));
+    }
+    printf("    largest difference %.3g\n", worst);
+    CHECK(worst < 3e-14, "largest difference %g", worst);
+}
+
+/* R R^T = 1 by degree, at degrees 10, 30 and 100: the bounds the header's users may rely on; special angles among them. */
+TEST(rotation_matrices_are_orthogonal) {
+    static const struct { int degree; double bound; } cases[] = {{10, 4e-15}, {30, 1e-14}, {100, 2e-14}};
+    static const double special[][3] = {{0, 0, 0}, {0, 1e-9, 0}, {1, 1e-9, 2}, {0, 3.14159265358979323846, 0}, {0.3, 1.5707963267948966, 0}, {1, 3.1415926, 2}};
+    double *rotation = (double *)malloc(ISOGI_SH_ROTATION_COUNT(101) * sizeof(double));
+    test_random r = {25};
+    for (size_t c = 0; c < 3; c++) {
+        int degree = cases[c].degree, width = 2 * degree + 1, rounds = degree > 50 ? LONG_SUITE ? 12 : 3 : 20;
+        double worst = 0;
+        for (int round = 0; round < rounds; round++) {
+            double m[9];
+            random_rotation(&r, m);
+            if (round % 2 && round / 2 < 6) {
+                const double *a = special[round / 2 % 6];
+                double ca = cos(a[0]), sa = sin(a[0]), cb = cos(a[1]), sb = sin(a[1]), cc = cos(a[2]), sc = sin(a[2]);
+                double t[9] = {ca * cb * cc - sa * sc, -ca * cb * sc - sa * cc, ca * sb, sa * cb * cc + ca * sc, -sa * cb * sc + ca * cc, sa * sb, -sb * cc, sb * sc, cb};
+                memcpy(m, t, sizeof m);
+            }
+            isogi_sh_rotation_build_f64(rotation, degree + 1, m);
+            const double *block = rotation + ISOGI_SH_ROTATION_COUNT(degree);
+            for (int i = 0; i < width; i++)
+                for (int j = 0; j <= i; j++) {
+                    double dot = 0;
+                    for (int k = 0; k < width; k++) dot += block[i * width + k] * block[j * width + k];
+                    worst = fmax(worst, fabs(dot - (i == j)));
+                }
+        }
+        printf("    degree %d: %.4g\n", degree, worst);
+        CHECK(worst <= cases[c].bound, "degree %d: %g, bound %g", degree, worst, cases[c].bound);
+    }
+    free(rotation);
+}
+
+/* Build and apply is rotate; about z alone is rotate; the float versions follow; in place or not. */
+TEST(rotations_agree_with_each_other) {
+    enum { ORDER = 9, N = ORDER * ORDER, CHANNELS = 5 };
+    static double c[N * CHANNELS], once[N * CHANNELS], applied[N * CHANNELS], rotation[ISOGI_SH_ROTATION_COUNT(ORDER)];
+    static float cf[N * CHANNELS], f[N * CHANNELS], g[N * CHANNELS], rf[ISOGI_SH_ROTATION_COUNT(ORDER)];
+    test_random r = {26};
+    for (int order = 1; order <= ORDER; order++)
+        for (int channels = 1; channels <= CHANNELS; channels++) {
+            double m[9], angle = random_range(&r, -7, 7);
+            float mf[9];
+            random_rotation(&r, m);
+            for (int i = 0; i < 9; i++) mf[i] = (float)m[i], m[i] = (double)mf[i];
+            for (int i = 0; i < N * CHANNELS; i++) cf[i] = (float)random_range(&r, -1, 1), c[i] = (double)cf[i];
+            int n = order * order * channels;
+            isogi_sh_rotate_f64(once, c, order, channels, m);
+            isogi_sh_rotation_build_f64(rotation, order, m);
+            isogi_sh_rotation_build(rf, order, mf);
+            CHECK(isogi_sh_rotation_apply_f64(applied, c, order, channels, rotation) == ISOGI_OK, "order %d", order);
+            CHECK(isogi_sh_rotation_apply(f, cf, order, channels, rf) == ISOGI_OK, "order %d", order);
+            isogi_sh_rotate(g, cf, order, channels, mf);
+            for (int i = 0; i < n; i++) {
+                CHECK(fabs(once[i] - applied[i]) < 1e-13, "order %d, %d: %g %g", order, i, once[i], applied[i]);
+                CHECK(fabs(once[i] - (double)f[i]) < 3e-6, "order %d, float apply: %g %g", order, once[i], (double)f[i]);
+                CHECK(fabs(once[i] - (double)g[i]) < 2e-6, "order %d, float rotate: %g %g", order, once[i], (double)g[i]);
+            }
+            isogi_sh_rotate_f64(c, c, order, channels, m);
+            CHECK(!memcmp(c, once, (size_t)n * sizeof *c), "order %d: in place %g %g", order, c[n - 1], once[n - 1]);
+            CHECK(isogi_sh_matrix_from_euler_zyz(mf, angle, 0, 0) == ISOGI_OK, "angle %g", angle);
+            isogi_sh_rotate(f, cf, order, channels, mf);
+            CHECK(isogi_sh_rotate_z(g, cf, order, channels, angle) == ISOGI_OK, "angle %g", angle);
+            for (int i = 0; i < n; i++) CHECK(fabsf(f[i] - g[i]) < 3e-6f, "order %d, about z: %g %g", order, (double)f[i], (double)g[i]);
+        }
+}
+
+/* The makers of matrices agree with what they say: where the axes go. */
+TEST(matrices_are_what_they_say) {
+    float m[9], n[9], half = 0.70710678f, q[4] = {3 * half, 0, 0, 3 * half}, z[3] = {0, 0, 2}, axis[3] = {1, -2, 0.5f}, zero[4] = {0, 0, 0, 0};
+    CHECK(isogi_sh_matrix_from_quaternion(m, q) == ISOGI_OK, "%s", "a quarter turn about z");
+    CHECK(isogi_sh_matrix_from_axis_angle(n, z, pi / 2) == ISOGI_OK, "%s", "the same");
+    const float quarter[9] = {0, -1, 0, 1, 0, 0, 0, 0, 1}; /* x to y */
+    for (int i = 0; i < 9; i++)
+        CHECK(fabsf(m[i] - quarter[i]) < 1e-6f && fabsf(n[i] - quarter[i]) < 1e-6f, "entry %d: %g %g", i, (double)m[i], (double)n[i]);
+    isogi_sh_matrix_from_euler_zyz(m, 0, pi / 2, 0); /* about y: z to x */
+    CHECK(fabsf(m[2] - 1) < 1e-6f && fabsf(m[8]) < 1e-6f, "z goes to %g %g %g", (double)m[2], (double)m[5], (double)m[8]);
+    isogi_sh_matrix_from_axis_angle(m, axis, 1.234);
+    for (int i = 0; i < 3; i++) {
+        double sum = 0;
+        for (int k = 0; k < 3; k++) sum += (double)m[3 * i + k] * (double)axis[k];
+        CHECK(fabs(sum - (double)axis[i]) < 1e-6, "the axis stays: %g", sum);
+    }
+    CHECK(isogi_sh_matrix_from_quaternion(m, zero) == ISOGI_INVALID && isogi_sh_matrix_from_axis_angle(m, zero, 1) == ISOGI_INVALID, "%s", "zero");
+    CHECK(isogi_sh_matrix_from_axis_angle(m, axis, NAN) == ISOGI_INVALID && isogi_sh_matrix_from_euler_zyz(m, 0, INFINITY, 0) == ISOGI_INVALID, "%s", "not finite");
+    CHECK(isogi_sh_rotate_z(m, m, 3, 1, NAN) == ISOGI_INVALID, "%s", "angle");
+}
+
+/* Mirrored in an axis and evaluated is evaluated at the mirrored direction, exactly. */
+TEST(mirrors) {
+    enum { ORDER = 8, N = ORDER * ORDER };
+    float c[N], mirrored[N], y[N];
+    test_random r = {27};
+    for (int axis = 0; axis < 3; axis++)
+        for (int round = 0; round < 20; round++) {
+            double d[3], a = 0, b = 0;
+            float w[1][3];
+            for (int i = 0; i < N; i++) c[i] = (float)random_range(&r, -1, 1);
+            CHECK(isogi_sh_mirror(mirrored, c, ORDER, 1, axis) == ISOGI_OK, "axis %d", axis);
+            random_direction(&r, d);
+            for (int k = 0; k < 3; k++) w[0][k] = (float)d[k];
+            isogi_sh_eval(y, ORDER, (const float(*)[3])w, 1);
+            for (int i = 0; i < N; i++) a += (double)mirrored[i] * (double)y[i];
+            w[0][axis] = -w[0][axis];
+            isogi_sh_eval(y, ORDER, (const float(*)[3])w, 1);
+            for (int i = 0; i < N; i++) b += (double)c[i] * (double)y[i];
+            CHECK(fabs(a - b) < 1e-6, "axis %d: %g %g", axis, a, b);
+        }
+    CHECK(isogi_sh_mirror(c, c, ORDER, 1, 3) == ISOGI_INVALID, "%s", "axis 3");
+}
+
+/* Ten thousand small rotations in double: the norm of an order-6 expansion drifts by less than 2e-12 (the same
+   half ulp ten thousand times), and they arrive where one large
+   rotation does; in float by less than 2e-5. Rotations by 0, pi and 1e-9 do what they should. */
+TEST(composed_rotations_do_not_drift) {
+    enum { ORDER = 6, N = ORDER * ORDER, TURNS = 10000 };
+    double c[N], start[N], before = 0, after = 0, after_float = 0, angle = 2 * pi / TURNS, m[9] = {cos(angle), 0, sin(angle), 0, 1, 0, -sin(angle), 0, cos(angle)};
+    float f[N], mf[9];
+    test_random r = {28};
+    for (int i = 0; i < N; i++) f[i] = (float)random_range(&r, -1, 1), start[i] = c[i] = (double)f[i], before += c[i] * c[i];
+    for (int i = 0; i < 9; i++) mf[i] = (float)m[i];
+    for (int i = 0; i < TURNS; i++) isogi_sh_rotate_f64(c, c, ORDER, 1, m), isogi_sh_rotate(f, f, ORDER, 1, mf);
+    double worst = 0;
+    for (int i = 0; i < N; i++) after += c[i] * c[i], after_float += (double)f[i] * (double)f[i], worst = fmax(worst, fabs(c[i] - start[i]));
+    printf("    norm drift %.3g, float %.3g; distance after a full circle %.3g\n", after / before - 1, after_float / before - 1, worst);
+    CHECK(fabs(after / before - 1) < 2e-12, "drift %g", after / before - 1);
+    CHECK(fabs(after_float / before - 1) < 2e-5, "drift %g", after_float / before - 1);
+    CHECK(worst < 1e-10, "distance %g", worst);
+    double identity[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1}, half[9] = {-1, 0, 0, 0, 1, 0, 0, 0, -1}, tiny[9] = {1, 0, 1e-9, 0, 1, 0, -1e-9, 0, 1}, out[N];
+    isogi_sh_rotate_f64(out, start, ORDER, 1, identity);
+    for (int i = 0; i < N; i++) CHECK(fabs(out[i] - start[i]) < 2e-15, "identity: %g %g", out[i], start[i]);
+    isogi_sh_rotate_f64(out, start, ORDER, 1, tiny);
+    for (int i = 0; i < N; i++) CHECK(fabs(out[i] - start[i]) < 1e-8, "1e-9: %g %g", out[i], start[i]);
+    isogi_sh_rotate_f64(out, start, ORDER, 1, half);
+    isogi_sh_rotate_f64(out, out, ORDER, 1, half);
+    for (int i = 0; i < N; i++) CHECK(fabs(out[i] - start[i]) < 4e-15, "half a turn twice: %g %g", out[i], start[i]);
+}
+
+/* ---- more algebra ---- */
+
+/* A product's expansion is the projection of the product of the functions, by quadrature of the reference; orders 1..7 and, in the long
+   suite, 26. Then the matrix of a fixed factor does the same, is symmetric, and many at once are one by one. */
+TEST(products_are_exact) {
+    enum { MAX = 26, COUNT = 3 };
+    static float a[COUNT * MAX * MAX], b[COUNT * MAX * MAX], out[COUNT * MAX * MAX], matrix[MAX * MAX * MAX * MAX];
+    static double y[MAX * MAX], expected[MAX * MAX];
+    long double node[64], weight[64];
+    test_random r = {29};
+    for (int order = 1; order <= (LONG_SUITE ? MAX : 7); order += order < 7 ? 1 : 19) {
+        int n = order * order, latitudes = (3 * order) / 2 + 1, longitudes = 3 * order;
+        for (int i = 0; i < COUNT * n; i++) a[i] = (float)random_range(&r, -1, 1), b[i] = (float)random_range(&r, -1, 1);
+        CHECK(isogi_sh_product(out, a, b, order, COUNT) == ISOGI_OK, "order %d", order);
+        reference_nodes(node, weight, latitudes);
+        for (int e = 0; e < COUNT; e++) {
+            for (int i = 0; i < n; i++) expected[i] = 0;
+            for (int i = 0; i < latitudes * longitudes; i++) {
+                double z = (double)node[i / longitudes], s = sqrt(1 - z * z), phi = 2 * pi * (i % longitudes) / longitudes, f = 0, g = 0;
+                double d[1][3] = {{s * cos(phi), s * sin(phi), z}};
+                isogi_sh_eval_f64(y, order, (const double(*)[3])d, 1);
+                for (int k = 0; k < n; k++) f += (double)a[e * n + k] * y[k], g += (double)b[e * n + k] * y[k];
+                for (int k = 0; k < n; k++) expected[k] += (double)weight[i / longitudes] * 2 * pi / longitudes * f * g * y[k];
+            }
+            for (int k = 0; k < n; k++)
+                CHECK(fabs((double)out[e * n + k] - expected[k]) < 3e-6 * order, "order %d, %d of %d: %.9g, expected %.9g", order, k, e, (double)out[e * n + k], expected[k]);
+        }
+        if (order > 7) continue;
+        CHECK(isogi_sh_product_matrix(matrix, a, order) == ISOGI_OK, "order %d", order);
+        for (int i = 0; i < n; i++) {
+            double sum = 0;
+            for (int k = 0; k < n; k++) {
+                sum += (double)matrix[i * n + k] * (double)b[k];
+                CHECK(fabsf(matrix[i * n + k] - matrix[k * n + i]) < 1e-6f, "order %d: %g %g", order, (double)matrix[i * n + k], (double)matrix[k * n + i]);
+            }
+            CHECK(fabs(sum - (double)out[i]) < 1e-5, "order %d, row %d: %g, expected %g", order, i, sum, (double)out[i]);
+        }
+    }
+}
+
+/* Zonal lobes: turned to a direction and evaluated there they depend on the angle alone; convolution with the clamped cosine as a
+   zonal kernel is the cosine convolution; convolving a delta with a kernel is the kernel turned to the delta. */
+TEST(zonal_functions) {
+    enum { ORDER = 7, N = ORDER * ORDER };
+    float zonal[ORDER], lobe[N], y[N], delta[N], other[N], cosine[ORDER];
+    test_random r = {30};
+    for (int round = 0; round < 20; round++) {
+        double d[3], w[3], a = 0, b = 0, t = 0;
+        for (int l = 0; l < ORDER; l++) zonal[l] = (float)random_range(&r, -1, 1);
+        random_direction(&r, d), random_direction(&r, w);
+        float df[3] = {(float)d[0], (float)d[1], (float)d[2]}, wf[1][3] = {{(float)w[0], (float)w[1], (float)w[2]}};
+        CHECK(isogi_sh_zonal_to_direction(lobe, ORDER, zonal, df) == ISOGI_OK, "%d", round);
+        isogi_sh_eval(y, ORDER, (const float(*)[3])wf, 1);
+        for (int i = 0; i < N; i++) a += (double)lobe[i] * (double)y[i];
+        for (int k = 0; k < 3; k++) t += d[k] * w[k];
+        float at[1][3] = {{(float)sqrt(1 - t * t), 0, (float)t}};
+        isogi_sh_eval(y, ORDER, (const float(*)[3])at, 1);
+        for (int l = 0; l < ORDER; l++) b += (double)zonal[l] * (double)y[l * (l + 1)];
+        CHECK(fabs(a - b) < 5e-6, "%g, expected %g", a, b);
+        isogi_sh_eval(delta, ORDER, (const float(*)[3]) & df, 1);
+        CHECK(isogi_sh_convolve(other, delta, ORDER, 1, zonal) == ISOGI_OK, "%d", round);
+        for (int i = 0; i < N; i++) CHECK(fabsf(other[i] - lobe[i]) < 3e-6f, "%d: %g %g", i, (double)other[i], (double)lobe[i]);
+        CHECK(isogi_sh_cosine_zonal(cosine, ORDER) == ISOGI_OK, "%d", round);
+        isogi_sh_convolve(other, delta, ORDER, 1, cosine);
+        isogi_sh_convolve_cosine(delta, delta, ORDER, 1);
+        for (int i = 0; i < N; i++) CHECK(fabsf(other[i] - delta[i]) < 1e-6f, "%d: %g %g", i, (double)other[i], (double)delta[i]);
+    }
+}
+
+TEST(sums_scalings_and_energy) {
+    float a[12] = {1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12}, b[12] = {3, 3, 3, 3, 3, 3, 3, 3, 3, 3, 3, 3}, c[12];
+    double energy[2];
+    CHECK(isogi_sh_add(c, a, b, 2, 3) == ISOGI_OK && c[0] == 4 && c[11] == 15, "%g %g", (double)c[0], (double)c[11]);
+    CHECK(isogi_sh_scale(c, a, 2, 2, 3) == ISOGI_OK && c[0] == 2 && c[11] == 24, "%g %g", (double)c[0], (double)c[11]);
+    CHECK(isogi_sh_lerp(c, a, b, 0.25f, 2, 3) == ISOGI_OK && c[0] == 1.5f && c[11] == 9.75f, "%g %g", (double)c[0], (double)c[11]);
+    CHECK(isogi_sh_band_energy(energy, a, 2, 3) == ISOGI_OK && energy[0] == 14 && energy[1] == 650 - 14, "%g %g", energy[0], energy[1]);
+}
+
+/* A window of width order: the factor at half its width, nothing lost at degree 0; de-ringing leaves no negative value, and any wider
+   window would. Lobes of a delta, a hard hemisphere and a sun with sky. Rings are measured with and without. */
+TEST(windows_and_deringing) {
+    enum { ORDER = 8, N = ORDER * ORDER };
+    static const char *const names[] = {"Hann", "Lanczos", "Gauss"};
+    static const double at_half[] = {0.5, 0.63661977236758134, 0.5};
+    float delta[3 * N], sky[3 * N], out[3 * N], up[3] = {0.3f, 1, 0.2f}, white[3] = {1, 0.9f, 0.8f}, black[3] = {0, 0, 0};
+    isogi_light sun = {ISOGI_LIGHT_DIRECTIONAL, {1, 2, 3}, {1, 2, 3}, 0};
+    isogi_lighting lighting = {.lights = &sun, .light_count = 1};
+    isogi_sh_project(delta, ORDER, &lighting, NULL);
+    isogi_sh_hemisphere_sky(sky, ORDER, up, white, black);
+    for (int kind = 0; kind < 3; kind++)
+        for (int which = 0; which < 2; which++) {
+            const float *c = which ? sky : delta;
+            double width = -1, low[3] = {0, 0, 0}, high = 0;
+            CHECK(isogi_sh_window(out, c, ORDER, 3, (isogi_sh_window_kind)kind, ORDER) == ISOGI_OK, "%s", names[kind]);
+            CHECK(out[0] == c[0], "%s: degree 0 %g", names[kind], (double)out[0]);
+            int i = 3 * (4 * 5 + 1);
+            CHECK(fabs((double)out[i] - at_half[kind] * (double)c[i]) < 1e-6, "%s at half width: %g of %g", names[kind], (double)out[i], (double)c[i]);
+            for (int step = 0; step < 3; step++) { /* none, width = order, de-ringed */
+                if (step == 0) memcpy(out, c, sizeof out);
+                if (step == 1) isogi_sh_window(out, c, ORDER, 3, (isogi_sh_window_kind)kind, ORDER);
+                if (step == 2) CHECK(isogi_sh_dering(out, c, ORDER, 3, (isogi_sh_window_kind)kind, &width) == ISOGI_OK, "%s", names[kind]);
+                high = 0;
+                test_random same = {32};
+                for (int j = 0; j < 20000; j++) {
+                    double d[3];
+                    random_direction(&same, d);
+                    float w[1][3] = {{(float)d[0], (float)d[1], (float)d[2]}}, rgb[3];
+                    isogi_sh_eval_sum(rgb, out, ORDER, 3, (const float(*)[3])w, 1);
+                    low[step] = fmin(low[step], (double)rgb[0]), high = fmax(high, (double)rgb[0]);
+                }
+                low[step] /= high;
+            }
+            printf("    %s, %s: lowest value / highest %.4f, windowed %.4f, de-ringed %.6f at width %.3f\n", which ? "hemisphere" : "delta", names[kind], low[0], low[1], low[2], width);
+            CHECK(low[0] < -0.02, "there are rings to begin with: %g", low[0]);
+            CHECK(low[2] > -1e-5, "de-ringed: %g", low[2]);
+            isogi_sh_window(out, c, ORDER, 3, (isogi_sh_window_kind)kind, width * 1.1);
+            double wider = 0;
+            for (int j = 0; j < 20000; j++) {
+                double d[3];
+                test_random one = {(uint64_t)j};
+                random_direction(&one, d);
+                float w[1][3] = {{(float)d[0], (float)d[1], (float)d[2]}}, rgb[3];
+                isogi_sh_eval_sum(rgb, out, ORDER, 3, (const float(*)[3])w, 1);
+                wider = fmin(wider, (double)rgb[0]);
+            }
+            CHECK(wider < 0, "a window a tenth wider rings: %g", wider);
+        }
+    double width = -1;
+    isogi_sh_constant(out, ORDER, white);
+    CHECK(isogi_sh_dering(out, out, ORDER, 3, ISOGI_SH_HANN, &width) == ISOGI_OK && width == 0, "nothing to do: width %g", width);
+    out[1] = -1;
+    CHECK(isogi_sh_dering(out, out, ORDER, 3, ISOGI_SH_HANN, &width) == ISOGI_INVALID, "%s", "a negative mean");
+    CHECK(isogi_sh_window(out, out, ORDER, 3, ISOGI_SH_HANN, 0) == ISOGI_INVALID && isogi_sh_window(out, out, ORDER, 3, ISOGI_SH_HANN, NAN) == ISOGI_INVALID, "%s", "width");
+}
+
+/* Converted back and forth nothing changes, and written-out values of degree 1 and 2 are where other software has them. */
+TEST(conventions_convert) {
+    enum { ORDER = 6, N = ORDER * ORDER };
+    float c[2 * N], there[2 * N], back[2 * N];
+    test_random r = {33};
+    for (int i = 0; i < 2 * N; i++) c[i] = (float)random_range(&r, -1, 1);
+    for (int a = 0; a < 18; a++)
+        for (int b = 0; b < 18; b++) {
+            isogi_sh_convention from = {(isogi_sh_normalisation)(a % 3), (isogi_sh_ordering)(a / 3 % 3), a / 9};
+            isogi_sh_convention to = {(isogi_sh_normalisation)(b % 3), (isogi_sh_ordering)(b / 3 % 3), b / 9};
+            CHECK(isogi_sh_convert(there, c, ORDER, 2, from, to) == ISOGI_OK && isogi_sh_convert(back, there, ORDER, 2, to, from) == ISOGI_OK, "%d to %d", a, b);
+            for (int i = 0; i < 2 * N; i++) CHECK(fabsf(back[i] - c[i]) < 2e-7f, "%d to %d: %g %g", a, b, (double)back[i], (double)c[i]);
+        }
+    isogi_sh_convention ours = {ISOGI_SH_ORTHONORMAL, ISOGI_SH_ACN, 0}, sid = {ISOGI_SH_SN3D, ISOGI_SH_SID, 0}, pairs = {ISOGI_SH_ORTHONORMAL, ISOGI_SH_PAIRS, 1};
+    float one[9] = {0, 1, 2, 3, 4, 5, 6, 7, 8}, out[9];
+    isogi_sh_convert(out, one, 3, 1, ours, sid); /* 1 -1 0; 2 -2 1 -1 0: of l(l+1)+m: 3 1 2 8 4 7 5 6 */
+    static const int sid_order[9] = {0, 3, 1, 2, 8, 4, 7, 5, 6}, pair_order[9] = {0, 2, 3, 1, 6, 7, 5, 8, 4};
+    for (int i = 0; i < 9; i++) {
+        int l = i > 3 ? 2 : i > 0;
+        double expected = sid_order[i] * sqrt((2 * l + 1) / (4 * pi)); /* coefficients shrink where the basis grows */
+        CHECK(fabs((double)out[i] - expected) < 1e-6, "SID %d: %g, expected %g", i, (double)out[i], expected);
+    }
+    isogi_sh_convert(out, one, 3, 1, ours, pairs);
+    for (int i = 0; i < 9; i++) {
+        int odd = pair_order[i] == 1 || pair_order[i] == 3 || pair_order[i] == 5 || pair_order[i] == 7;
+        CHECK(fabsf(out[i] - (float)(odd ? -pair_order[i] : pair_order[i])) < 1e-6f, "pairs %d: %g", i, (double)out[i]);
+    }
+    ours.ordering = (isogi_sh_ordering)7;
+    CHECK(isogi_sh_convert(out, one, 3, 1, ours, sid) == ISOGI_INVALID, "%s", "ordering 7");
+}
+
+/* ---- simple environments and fits ---- */
+
+typedef struct cone_case { double axis[3], cosine; } cone_case;
+static void cone_function(void *user, const double d[3], double *value) {
+    const cone_case *c = (const cone_case *)user;
+    value[0] = d[0] * c->axis[0] + d[1] * c->axis[1] + d[2] * c->axis[2] > c->cosine ? 1 : 0;
+}
+
+/* Cones against Monte Carlo projection (stratified, 2e-2), and as closed forms: none, the hemisphere and all of the sphere. */
+TEST(cones_and_skies) {
+    enum { ORDER = 5, N = ORDER * ORDER };
+    static double expected[N];
+    const float axis[3] = {1, 2, -2}, rgb[3] = {1, 2, 0}, sky[3] = {2, 1, 4}, ground[3] = {1, 3, 0};
+    float c[3 * N], d[3 * N], value[3];
+    for (int i = 0; i < 6; i++) {
+        double angle = i == 5 ? pi : 0.1 + 0.6 * i;
+        cone_case user = {{1.0 / 3, 2.0 / 3, -2.0 / 3}, cos(angle)};
+        CHECK(isogi_sh_cone(c, ORDER, axis, angle, rgb) == ISOGI_OK, "angle %g", angle);
+        isogi_sh_project_random(expected, ORDER, 1, 60000, 1, 7, cone_function, &user);
+        for (int k = 0; k < N; k++)
+            CHECK(fabs((double)c[3 * k] - expected[k]) < 1e-2 && fabsf(c[3 * k + 1] - 2 * c[3 * k]) < 1e-5f && c[3 * k + 2] == 0,
+                  "angle %g, Y%d: %g, expected %g", angle, k, (double)c[3 * k], expected[k]);
+    }
+    isogi_sh_constant(d, ORDER, rgb);
+    for (int k = 0; k < 3 * N; k++) CHECK(fabsf(c[k] - d[k]) < 1e-6f, "a cone of pi is constant: %d: %g %g", k, (double)c[k], (double)d[k]);
+    CHECK(isogi_sh_cone(c, ORDER, axis, 4, rgb) == ISOGI_INVALID && isogi_sh_cone(c, ORDER, axis, -1, rgb) == ISOGI_INVALID, "%s", "angle");
+    isogi_sh_hemisphere_sky(c, ORDER, axis, sky, ground);
+    isogi_sh_convolve_cosine(c, c, ORDER, 3);
+    isogi_sh_eval_sum(value, c, ORDER, 3, (const float(*)[3]) & axis, 1); /* odd degrees past 1 do not reach irradiance: exact to 2e-3 */
+    for (int k = 0; k < 3; k++) CHECK(fabs((double)value[k] - pi * (double)sky[k]) < 1e-5, "below the sky: %g", (double)value[k]);
+    isogi_sh_gradient_sky(c, ORDER, axis, sky, ground);
+    for (int side = -1; side <= 1; side++) {
+        float w[1][3] = {{(float)side, (float)(2 * side), (float)(-2 * side)}};
+        if (!side) w[0][0] = 2, w[0][1] = -1, w[0][2] = 0;
+        isogi_sh_eval_sum(value, c, ORDER, 3, (const float(*)[3])w, 1);
+        for (int k = 0; k < 3; k++) {
+            double at = (double)ground[k] + 0.5 * (1 + side) * ((double)sky[k] - (double)ground[k]);
+            CHECK(fabs((double)value[k] - at) < 1e-5, "gradient at %d: %g, expected %g", side, (double)value[k], at);
+        }
+    }
+}
+
+/* One light and an ambient term are found again, and nothing negative is returned for anything else. */
+TEST(fits_find_one_light) {
+    enum { ORDER = 4, N = ORDER * ORDER };
+    test_random r = {34};
+    for (int round = 0; round < 50; round++) {
+        double d[3];
+        float c[3 * N], e[3 * N], direction[3], rgb[3], ambient[3], base[3];
+        random_direction(&r, d);
+        isogi_light sun = {ISOGI_LIGHT_DIRECTIONAL, {(float)d[0], (float)d[1], (float)d[2]}, {0, 0, 0}, 0};
+        for (int k = 0; k < 3; k++) sun.rgb[k] = (float)random_range(&r, 0.5, 3), base[k] = (float)random_range(&r, 0, 2);
+        isogi_lighting lighting = {.lights = &sun, .light_count = 1};
+        isogi_sh_project(c, ORDER, &lighting, NULL);
+        CHECK(isogi_sh_dominant_direction(direction, rgb, c, ORDER) == ISOGI_OK, "%d", round);
+        for (int k = 0; k < 3; k++)
+            CHECK(fabs((double)direction[k] - d[k]) < 1e-5 && fabsf(rgb[k] - sun.rgb[k]) < 1e-4f, "alone: %g %g, expected %g %g", (double)direction[k], (double)rgb[k], d[k], (double)sun.rgb[k]);
+        isogi_sh_constant(e, ORDER, base);
+        isogi_sh_add(c, c, e, ORDER, 3);
+        CHECK(isogi_sh_fit_directional(direction, rgb, ambient, c, ORDER) == ISOGI_OK, "%d", round);
+        for (int k = 0; k < 3; k++)
+            CHECK(fabs((double)direction[k] - d[k]) < 1e-5 && fabsf(rgb[k] - sun.rgb[k]) < 1e-4f && fabsf(ambient[k] - base[k]) < 1e-4f,
+                  "with ambient: %g %g %g, expected %g %g %g", (double)direction[k], (double)rgb[k], (double)ambient[k], d[k], (double)sun.rgb[k], (double)base[k]);
+        for (int i = 0; i < 3 * N; i++) c[i] = (float)random_range(&r, -1, 1);
+        CHECK(isogi_sh_fit_directional(direction, rgb, ambient, c, ORDER) == ISOGI_OK, "%d", round);
+        for (int k = 0; k < 3; k++) CHECK(rgb[k] >= 0 && ambient[k] >= 0, "%g %g", (double)rgb[k], (double)ambient[k]);
+    }
+    float c[3 * N] = {0}, direction[3], rgb[3];
+    CHECK(isogi_sh_dominant_direction(direction, rgb, c, ORDER) == ISOGI_OK && direction[2] == 1 && rgb[0] == 0, "darkness: %g %g", (double)direction[2], (double)rgb[0]);
+    CHECK(isogi_sh_dominant_direction(direction, rgb, c, 1) == ISOGI_INVALID, "%s", "order 1");
+}
+
+/* Truncation: what an order misses of three environments, in the mean of squares (Parseval); falls with the order, and faster the
+   smoother the environment is: a point light not at all, a hemisphere as 1/order, a soft lobe exponentially. */
+TEST(truncation_error_falls_with_order) {
+    enum { ORDER = 33, N = ORDER * ORDER };
+    static float delta[3 * N], sky[3 * N], lobe[3 * N];
+    const float up[3] = {1, 1, 0}, one[3] = {1, 1, 1}, none[3] = {0, 0, 0};
+    float zonal[ORDER], single[N];
+    double energy[3][ORDER], total[3] = {0, 0, 0};
+    isogi_light sun = {ISOGI_LIGHT_DIRECTIONAL, {1, 1, 0}, {1, 1, 1}, 0.1f};
+    isogi_lighting lighting = {.lights = &sun, .light_count = 1};
+    isogi_sh_project(delta, ORDER, &lighting, NULL);
+    isogi_sh_hemisphere_sky(sky, ORDER, up, one, none);
+    for (int l = 0; l < ORDER; l++) zonal[l] = (float)exp(-0.05 * l * (l + 1));
+    isogi_sh_zonal_to_direction(single, ORDER, zonal, up);
+    for (int i = 0; i < 3 * N; i++) lobe[i] = single[i / 3];
+    isogi_sh_band_energy(energy[0], delta, ORDER, 3), isogi_sh_band_energy(energy[1], sky, ORDER, 3), isogi_sh_band_energy(energy[2], lobe, ORDER, 3);
+    for (int e = 0; e < 3; e++)
+        for (int l = 0; l < ORDER; l++) total[e] += energy[e][l];
+    printf("    order   sun of 0.1 rad   hemisphere   soft lobe    (share of the energy of order %d that is missed)\n", ORDER);
+    for (int order = 1; order < ORDER; order *= 2) {
+        double missed[3];
+        for (int e = 0; e < 3; e++) {
+            missed[e] = 0;
+            for (int l = order; l < ORDER; l++) missed[e] += energy[e][l] / total[e];
+        }
+        printf("    %5d   %14.4f   %10.6f   %.3g\n", order, missed[0], missed[1], missed[2]);
+        if (order == 16) CHECK(missed[0] > 0.4 && missed[1] < 0.02 && missed[2] < 1e-9, "order 16: %g %g %g", missed[0], missed[1], missed[2]);
+    }
+}
+
 /* ---- what is not valid ---- */
 
 TEST(bad_input_is_reported_and_changes_nothing) {
