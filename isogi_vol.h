@@ -110,7 +110,8 @@ typedef struct isogi_context {
     int (*progress)(void *user, double fraction); /* 0..1; non-zero cancels; called on the caller's thread only */
     void *user;
     int threads;    /* 0 = all cores, 1 = serial; ignored where parallel_for is set */
-    int force_path; /* instruction path: 0 = best, 1 = scalar */
+    int force_path; /* instruction path of what is built: 0 = best, 1 = plain reference, 2 = portable, 3 = AVX2, 4 = AVX-512;
+                       no more than the machine has */
 } isogi_context;
 
 /* What work was done, for tests and tuning. Every call ADDS to the fields it knows; NULL is allowed wherever one is asked for. */
@@ -306,6 +307,11 @@ ISOGI_API void isogi_vol_mesh_free(const isogi_pyramid *pyramid, isogi_mesh *mes
 #define ISOGI_VOL__SSE2
 #include <emmintrin.h>
 #endif
+#if defined(ISOGI_VOL__SSE2) && defined(__x86_64__) && (defined(__GNUC__) || defined(__clang__)) && !defined(__TINYC__)
+#define ISOGI_VOL__AVX
+#include <immintrin.h>
+#endif
+enum { ISOGI_VOL__PATH_PLAIN = 1, ISOGI_VOL__PATH_BASE, ISOGI_VOL__PATH_AVX2, ISOGI_VOL__PATH_AVX512 };
 
 /* ==== memory ========================================================================================================= */
 
@@ -545,13 +551,14 @@ struct isogi_pyramid {
     isogi_level level[ISOGI_VOL__LEVELS];
     size_t block_count; /* of all levels */
     float (*blocks)[2];
-    /* the same ranges for fast rays: nodes of 64 children, least[64] then largest[64], in 8 bits over the volume's range; first the
-       nodes of level 1 (children: level 0), then those of level 2 (children: level 1) */
+    /* bounds for fast rays: nodes of 64 children, least[64] then largest[64], in 8 bits over the volume's range; node n of level 0
+       stands for block n and has cells as children, those of levels 1 and 2 have blocks of the level below */
     uint8_t (*nodes)[128];
-    size_t node_count, first_top_node;
+    size_t node_count, first_node[ISOGI_VOL__LEVELS];
     double node_scale; /* 8-bit value = floor((value - range[0]) * node_scale) */
     int all_finite;
     int fast; /* 0: only the plain walk is right for this volume */
+    int path; /* ISOGI_VOL__PATH_... */
 };
 
 static size_t isogi_vol__type_size(isogi_type type) {
@@ -741,43 +748,97 @@ static float isogi_vol__float_below(double x) {
 }
 static float isogi_vol__float_above(double x) { return -isogi_vol__float_below(-x); }
 
+/* Volumes are reduced in strips: a row of level-0 blocks, ISOGI_VOL__STRIP cells at a time along x, so that all scratch memory is on
+   the stack. Raw values of all types but double are exact as float. */
+#define ISOGI_VOL__STRIP 256
+#define ISOGI_VOL__STRIP_VOXELS (ISOGI_VOL__STRIP + 16) /* one more than cells, and room for whole vectors */
+
 typedef struct isogi_vol__build_job {
     isogi_pyramid *pyramid;
-    double *rows; /* for each task: three rows of a volume's width */
-    double (*range)[2];
+    double (*range)[2]; /* of each z of blocks */
     int *finite;
+    float raw_low, raw_scale; /* 8-bit value = floor((raw - raw_low) * raw_scale) */
 } isogi_vol__build_job;
-
-/* Least and largest over the 5x5 rows of one row of level-0 blocks, voxel by voxel along x; whether all of them are finite. */
-static int isogi_vol__reduce_rows(const isogi_volume *v, int y0, int y1, int z0, int z1, double *row, double *least, double *largest) {
-    int width = (int)v->size[0], finite = 1, x, y, z;
-    for (x = 0; x < width; x++) least[x] = DBL_MAX, largest[x] = -DBL_MAX;
-    for (z = z0; z <= z1; z++) {
-        for (y = y0; y <= y1; y++) {
-            isogi_vol__row(v, 0, y, z, width, row);
-            if (v->type == ISOGI_F32 || v->type == ISOGI_F64) {
-                for (x = 0; x < width; x++) {
-                    if (!isogi_vol__finite64(row[x])) {
-                        finite = 0;
-                        continue;
-                    }
-                    least[x] = isogi_vol__min(row[x], least[x]);
-                    largest[x] = isogi_vol__max(row[x], largest[x]);
-                }
-            } else {
-                for (x = 0; x < width; x++) {
-                    least[x] = isogi_vol__min(row[x], least[x]);
-                    largest[x] = isogi_vol__max(row[x], largest[x]);
-                }
-            }
-        }
-    }
-    return finite;
-}
 
 static int isogi_vol__last_voxel(size_t block, int cells, size_t voxels) {
     size_t end = (block + 1) * (size_t)cells;
     return (int)(end < voxels ? end : voxels - 1);
+}
+
+/* Raw voxels x .. x + count - 1 of a row as floats, in place where they are; not for double. */
+static const float *isogi_vol__raw_row(const isogi_volume *v, size_t x, size_t y, size_t z, int count, float *buffer) {
+    const char *p = (const char *)v->data + (ptrdiff_t)x * v->stride[0] + (ptrdiff_t)y * v->stride[1] + (ptrdiff_t)z * v->stride[2];
+    ptrdiff_t step = v->stride[0];
+    int i;
+    if (v->type == ISOGI_F32 && step == 4) return (const float *)(const void *)p;
+#define ISOGI_VOL__READ(T)                                                                                                       \
+    for (i = 0; i < count; i++, p += step) buffer[i] = (float)*(const T *)(const void *)p;                                       \
+    break;
+    switch (v->type) {
+    case ISOGI_U8: ISOGI_VOL__READ(uint8_t)
+    case ISOGI_I8: ISOGI_VOL__READ(int8_t)
+    case ISOGI_U16: ISOGI_VOL__READ(uint16_t)
+    case ISOGI_I16: ISOGI_VOL__READ(int16_t)
+    case ISOGI_F32: ISOGI_VOL__READ(float)
+    case ISOGI_F64: break;
+    }
+#undef ISOGI_VOL__READ
+    return buffer;
+}
+
+/* Takes a row into the running bounds of its columns; 0 if one of its numbers is not finite. */
+static int isogi_vol__bound_row(const float *row, int count, float *least, float *largest) {
+    int i = 0, finite = 1;
+#ifdef ISOGI_VOL__SSE2
+    const __m128i exponent = _mm_set1_epi32(0x7f800000);
+    __m128i bad = _mm_setzero_si128();
+    for (; i + 4 <= count; i += 4) {
+        const __m128 x = _mm_loadu_ps(row + i);
+        bad = _mm_or_si128(bad, _mm_cmpeq_epi32(_mm_and_si128(_mm_castps_si128(x), exponent), exponent));
+        _mm_storeu_ps(least + i, _mm_min_ps(x, _mm_loadu_ps(least + i)));
+        _mm_storeu_ps(largest + i, _mm_max_ps(x, _mm_loadu_ps(largest + i)));
+    }
+    finite = !_mm_movemask_epi8(bad);
+#endif
+    for (; i < count; i++) {
+        uint32_t bits;
+        memcpy(&bits, &row[i], sizeof bits);
+        finite &= (bits & 0x7f800000) != 0x7f800000;
+        least[i] = row[i] < least[i] ? row[i] : least[i];
+        largest[i] = row[i] > largest[i] ? row[i] : largest[i];
+    }
+    return finite;
+}
+
+/* Bounds of one level-0 block, voxel by voxel, for doubles and where numbers are not finite; whether all of them are. */
+static int isogi_vol__bound_block(const isogi_volume *v, size_t bx, size_t by, size_t bz, double range[2]) {
+    int x0 = (int)(4 * bx), x1 = isogi_vol__last_voxel(bx, 4, v->size[0]), y1 = isogi_vol__last_voxel(by, 4, v->size[1]);
+    int z1 = isogi_vol__last_voxel(bz, 4, v->size[2]), x, y, z, finite = 1;
+    range[0] = DBL_MAX, range[1] = -DBL_MAX;
+    for (z = (int)(4 * bz); z <= z1; z++)
+        for (y = (int)(4 * by); y <= y1; y++) {
+            double row[5];
+            isogi_vol__row(v, x0, y, z, x1 - x0 + 1, row);
+            for (x = 0; x <= x1 - x0; x++) {
+                if (!isogi_vol__finite64(row[x])) {
+                    finite = 0;
+                    continue;
+                }
+                range[0] = isogi_vol__min(range[0], row[x]), range[1] = isogi_vol__max(range[1], row[x]);
+            }
+        }
+    return finite;
+}
+
+/* Columns of a strip of blocks, for all types but double; 0 if a number is not finite. */
+static int isogi_vol__bound_strip(const isogi_volume *v, size_t x, int count, size_t by, size_t bz, float *least, float *largest) {
+    float buffer[ISOGI_VOL__STRIP_VOXELS];
+    int y1 = isogi_vol__last_voxel(by, 4, v->size[1]), z1 = isogi_vol__last_voxel(bz, 4, v->size[2]), y, z, i, finite = 1;
+    for (i = 0; i < count; i++) least[i] = FLT_MAX, largest[i] = -FLT_MAX;
+    for (z = (int)(4 * bz); z <= z1; z++)
+        for (y = (int)(4 * by); y <= y1; y++)
+            finite &= isogi_vol__bound_row(isogi_vol__raw_row(v, x, (size_t)y, (size_t)z, count, buffer), count, least, largest);
+    return finite;
 }
 
 /* One task: the level-0 blocks of one z. */
@@ -785,19 +846,31 @@ static void isogi_vol__build_task(void *arg, size_t bz) {
     isogi_vol__build_job *job = (isogi_vol__build_job *)arg;
     const isogi_volume *v = &job->pyramid->volume;
     const isogi_level *level = &job->pyramid->level[0];
-    size_t width = v->size[0], bx, by;
+    float least[ISOGI_VOL__STRIP_VOXELS], largest[ISOGI_VOL__STRIP_VOXELS];
+    double range[2] = {DBL_MAX, -DBL_MAX};
     int finite = 1;
-    double *row = job->rows + 3 * width * bz, *least = row + width, *largest = least + width, range[2] = {DBL_MAX, -DBL_MAX};
+    size_t bx, by;
     for (by = 0; by < level->size[1]; by++) {
         float(*block)[2] = job->pyramid->blocks + level->size[0] * (by + level->size[1] * bz);
-        finite &= isogi_vol__reduce_rows(v, (int)(4 * by), isogi_vol__last_voxel(by, 4, v->size[1]), (int)(4 * bz),
-                                         isogi_vol__last_voxel(bz, 4, v->size[2]), row, least, largest);
+        size_t strip = ISOGI_VOL__STRIP / 4, first = 0;
+        int by_rows = 0;
         for (bx = 0; bx < level->size[0]; bx++) {
-            int x = (int)(4 * bx), last = isogi_vol__last_voxel(bx, 4, v->size[0]);
-            double low = DBL_MAX, high = -DBL_MAX;
-            for (; x <= last; x++) low = isogi_vol__min(low, least[x]), high = isogi_vol__max(high, largest[x]);
-            block[bx][0] = isogi_vol__float_below(low), block[bx][1] = isogi_vol__float_above(high);
-            range[0] = isogi_vol__min(range[0], low), range[1] = isogi_vol__max(range[1], high);
+            double bound[2];
+            if (bx % strip == 0) {
+                size_t rest = v->size[0] - 4 * bx;
+                first = 4 * bx;
+                by_rows = v->type != ISOGI_F64 &&
+                          isogi_vol__bound_strip(v, first, rest < ISOGI_VOL__STRIP + 1 ? (int)rest : ISOGI_VOL__STRIP + 1, by, bz, least, largest);
+            }
+            if (by_rows) {
+                size_t x = 4 * bx - first, last = (size_t)isogi_vol__last_voxel(bx, 4, v->size[0]) - first;
+                float low = least[x], high = largest[x], swap;
+                while (x++ < last) low = least[x] < low ? least[x] : low, high = largest[x] > high ? largest[x] : high;
+                swap = v->scale < 0 ? low : high, low = v->scale < 0 ? high : low, high = swap;
+                bound[0] = v->scale * (double)low + v->bias, bound[1] = v->scale * (double)high + v->bias;
+            } else finite &= isogi_vol__bound_block(v, bx, by, bz, bound);
+            block[bx][0] = isogi_vol__float_below(bound[0]), block[bx][1] = isogi_vol__float_above(bound[1]);
+            range[0] = isogi_vol__min(range[0], bound[0]), range[1] = isogi_vol__max(range[1], bound[1]);
         }
     }
     job->range[bz][0] = range[0], job->range[bz][1] = range[1];
@@ -846,13 +919,11 @@ static isogi_result isogi_vol__build_blocks(isogi_pyramid *p) {
     isogi_vol__build_job job;
     size_t tasks = p->level[0].size[2], i;
     isogi_result result = ISOGI_NO_MEMORY;
+    memset(&job, 0, sizeof job);
     job.pyramid = p;
-    job.rows = p->volume.size[0] > SIZE_MAX / 24 / tasks
-                   ? NULL
-                   : (double *)isogi_allocate(&p->context, 3 * p->volume.size[0] * tasks, sizeof(double));
     job.range = (double(*)[2])isogi_allocate(&p->context, tasks, sizeof *job.range);
     job.finite = (int *)isogi_allocate(&p->context, tasks, sizeof *job.finite);
-    if (job.rows && job.range && job.finite) result = isogi_parallel(&p->context, tasks, isogi_vol__build_task, &job, 0, 1);
+    if (job.range && job.finite) result = isogi_parallel(&p->context, tasks, isogi_vol__build_task, &job, 0, 0.5);
     if (result == ISOGI_OK) {
         p->range[0] = DBL_MAX, p->range[1] = -DBL_MAX, p->all_finite = 1;
         for (i = 0; i < tasks; i++) {
@@ -864,16 +935,27 @@ static isogi_result isogi_vol__build_blocks(isogi_pyramid *p) {
         isogi_vol__build_level(p, 1);
         isogi_vol__build_level(p, 2);
     }
-    isogi_release(&p->context, job.rows, 3 * p->volume.size[0] * tasks, sizeof(double));
     isogi_release(&p->context, job.range, tasks, sizeof *job.range);
     isogi_release(&p->context, job.finite, tasks, sizeof *job.finite);
     return result;
 }
 
+/* ---- the same ranges in 8 bits, for fast rays ---- */
+
 /* Monotone, so that comparing 8-bit values never hides a block that holds the isovalue. */
 static int isogi_vol__quantise(const isogi_pyramid *p, double value) {
     double q = (value - p->range[0]) * p->node_scale;
-    return q < 0 ? -1 : q < 256 ? (int)q : 256;
+    return q > 0 ? q < 255 ? (int)q : 255 : 0;
+}
+
+/* What an isovalue can be in 8 bits. The margin covers other roundings of the same formula: voxels are quantised in float, whose
+   error is below 255 * 2^-22. low > high: no surface anywhere. */
+static void isogi_vol__quantise_isovalue(const isogi_pyramid *p, double isovalue, int *low, int *high) {
+    double q = (isovalue - p->range[0]) * p->node_scale;
+    *low = 1, *high = 0;
+    if (!(isovalue >= p->range[0] && isovalue <= p->range[1])) return;
+    *low = q > 0.01 ? (int)(q - 0.01) : 0;
+    *high = q < 254 ? (int)(q + 0.01) : 255;
 }
 
 static void isogi_vol__build_node(const isogi_pyramid *p, const isogi_level *children, const size_t node[3], uint8_t out[128]) {
@@ -881,37 +963,163 @@ static void isogi_vol__build_node(const isogi_pyramid *p, const isogi_level *chi
     for (i = 0; i < 64; i++) {
         size_t x = 4 * node[0] + (i & 3), y = 4 * node[1] + (i >> 2 & 3), z = 4 * node[2] + (i >> 4);
         const float *range;
-        int low, high;
         out[i] = 255, out[64 + i] = 0; /* beyond the volume, or without a finite voxel: never entered */
         if (x >= children->size[0] || y >= children->size[1] || z >= children->size[2]) continue;
         range = children->range[x + children->size[0] * (y + children->size[1] * z)];
         if (range[0] > range[1]) continue;
-        low = isogi_vol__quantise(p, (double)range[0]), high = isogi_vol__quantise(p, (double)range[1]);
-        out[i] = (uint8_t)(low < 0 ? 0 : low > 255 ? 255 : low), out[64 + i] = (uint8_t)(high < 0 ? 0 : high > 255 ? 255 : high);
+        out[i] = (uint8_t)isogi_vol__quantise(p, (double)range[0]), out[64 + i] = (uint8_t)isogi_vol__quantise(p, (double)range[1]);
     }
 }
 
+/* A row of voxels in 8 bits. */
+static void isogi_vol__quantise_row(const isogi_vol__build_job *job, size_t x, size_t y, size_t z, int count, uint8_t *out) {
+    const isogi_pyramid *p = job->pyramid;
+    const isogi_volume *v = &p->volume;
+    float buffer[ISOGI_VOL__STRIP_VOXELS];
+    const float *row = buffer;
+    int i = 0;
+    if (v->type == ISOGI_F64) {
+        double value[1];
+        for (; i < count; i++) isogi_vol__row(v, (int)x + i, (int)y, (int)z, 1, value), out[i] = (uint8_t)isogi_vol__quantise(p, value[0]);
+        return;
+    }
+    row = isogi_vol__raw_row(v, x, y, z, count, buffer);
+#ifdef ISOGI_VOL__SSE2
+    {
+        const __m128 low = _mm_set1_ps(job->raw_low), scale = _mm_set1_ps(job->raw_scale);
+#define ISOGI_VOL__Q(k) _mm_cvttps_epi32(_mm_mul_ps(_mm_sub_ps(_mm_loadu_ps(row + i + 4 * (k)), low), scale))
+        for (; i + 16 <= count; i += 16)
+            _mm_storeu_si128((__m128i *)(void *)(out + i),
+                             _mm_packus_epi16(_mm_packs_epi32(ISOGI_VOL__Q(0), ISOGI_VOL__Q(1)), _mm_packs_epi32(ISOGI_VOL__Q(2), ISOGI_VOL__Q(3))));
+#undef ISOGI_VOL__Q
+    }
+#endif
+    for (; i < count; i++) {
+        float q = (row[i] - job->raw_low) * job->raw_scale;
+        out[i] = (uint8_t)(q > 0 ? q < 255 ? (int)q : 255 : 0);
+    }
+}
+
+/* Bounds of the 4x4 rows of cells between 5x5 rows of quantised voxels; `cells` of a multiple of 16. */
+static void isogi_vol__bound_cells(uint8_t (*q)[5][ISOGI_VOL__STRIP_VOXELS], int cells, uint8_t *least, uint8_t *largest) {
+    /* least[z][y][x] of the strip, then the same of largest */
+    int x, y, z;
+    for (z = 0; z < 4; z++)
+        for (y = 0; y < 4; y++) {
+            const uint8_t *a = q[z][y], *b = q[z][y + 1], *c = q[z + 1][y], *d = q[z + 1][y + 1];
+            uint8_t *low = least + (size_t)(4 * z + y) * ISOGI_VOL__STRIP, *high = largest + (size_t)(4 * z + y) * ISOGI_VOL__STRIP;
+#ifdef ISOGI_VOL__SSE2
+#define ISOGI_VOL__AT(p) _mm_loadu_si128((const __m128i *)(const void *)((p) + x))
+            for (x = 0; x < cells; x += 16) {
+                const __m128i a0 = ISOGI_VOL__AT(a), b0 = ISOGI_VOL__AT(b), c0 = ISOGI_VOL__AT(c), d0 = ISOGI_VOL__AT(d);
+                const __m128i a1 = ISOGI_VOL__AT(a + 1), b1 = ISOGI_VOL__AT(b + 1), c1 = ISOGI_VOL__AT(c + 1), d1 = ISOGI_VOL__AT(d + 1);
+                const __m128i l0 = _mm_min_epu8(_mm_min_epu8(a0, b0), _mm_min_epu8(c0, d0)), l1 = _mm_min_epu8(_mm_min_epu8(a1, b1), _mm_min_epu8(c1, d1));
+                const __m128i h0 = _mm_max_epu8(_mm_max_epu8(a0, b0), _mm_max_epu8(c0, d0)), h1 = _mm_max_epu8(_mm_max_epu8(a1, b1), _mm_max_epu8(c1, d1));
+                _mm_storeu_si128((__m128i *)(void *)(low + x), _mm_min_epu8(l0, l1));
+                _mm_storeu_si128((__m128i *)(void *)(high + x), _mm_max_epu8(h0, h1));
+            }
+#undef ISOGI_VOL__AT
+#else
+            for (x = 0; x < cells; x++) {
+                int k, l = 255, h = 0;
+                for (k = 0; k < 2; k++) {
+                    l = a[x + k] < l ? a[x + k] : l, h = a[x + k] > h ? a[x + k] : h;
+                    l = b[x + k] < l ? b[x + k] : l, h = b[x + k] > h ? b[x + k] : h;
+                    l = c[x + k] < l ? c[x + k] : l, h = c[x + k] > h ? c[x + k] : h;
+                    l = d[x + k] < l ? d[x + k] : l, h = d[x + k] > h ? d[x + k] : h;
+                }
+                low[x] = (uint8_t)l, high[x] = (uint8_t)h;
+            }
+#endif
+        }
+}
+
+/* One task: the nodes over cells of one z. */
+static void isogi_vol__build_leaves(void *arg, size_t bz) {
+    const isogi_vol__build_job *job = (const isogi_vol__build_job *)arg;
+    const isogi_pyramid *p = job->pyramid;
+    const isogi_level *level = &p->level[0];
+    uint8_t q[5][5][ISOGI_VOL__STRIP_VOXELS], bound[2][16][ISOGI_VOL__STRIP];
+    size_t bx, by, x0;
+    int i, y, z;
+    memset(q, 0, sizeof q);
+    for (x0 = 0; x0 < (size_t)p->cells[0]; x0 += ISOGI_VOL__STRIP) {
+        const size_t rest = p->volume.size[0] - x0;
+        const int count = rest < ISOGI_VOL__STRIP + 1 ? (int)rest : ISOGI_VOL__STRIP + 1;
+        for (by = 0; by < level->size[1]; by++) {
+            for (z = 0; z < 5; z++) {
+                const size_t at_z = 4 * bz + (size_t)z;
+                if (at_z >= p->volume.size[2]) continue;
+                for (y = 0; y < 5; y++) {
+                    const size_t at_y = 4 * by + (size_t)y;
+                    if (y == 0 && by) memcpy(q[z][0], q[z][4], sizeof q[z][0]);
+                    else if (at_y < p->volume.size[1]) isogi_vol__quantise_row(job, x0, at_y, at_z, count, q[z][y]);
+                }
+            }
+            isogi_vol__bound_cells(q, (count - 1 + 15) & ~15, bound[0][0], bound[1][0]);
+            for (bx = 0; bx < (size_t)(count - 1 + 3) / 4; bx++) {
+                uint8_t *out = p->nodes[p->first_node[0] + x0 / 4 + bx + level->size[0] * (by + level->size[1] * bz)];
+                const int whole = x0 + 4 * bx + 4 <= (size_t)p->cells[0] && 4 * by + 4 <= (size_t)p->cells[1] && 4 * bz + 4 <= (size_t)p->cells[2];
+                for (i = 0; i < 16; i++) memcpy(out + 4 * i, &bound[0][i][4 * bx], 4), memcpy(out + 64 + 4 * i, &bound[1][i][4 * bx], 4);
+                for (i = 0; i < 64 && !whole; i++)
+                    if (x0 + 4 * bx + (size_t)(i & 3) >= (size_t)p->cells[0] || 4 * by + (size_t)(i >> 2 & 3) >= (size_t)p->cells[1] ||
+                        4 * bz + (size_t)(i >> 4) >= (size_t)p->cells[2])
+                        out[i] = 255, out[64 + i] = 0;
+            }
+        }
+    }
+}
+
+#ifdef ISOGI_VOL__AVX
+static int isogi_vol__machine(void);
+#endif
+
+/* Whether fast rays are right for this volume, and how its raw values become 8-bit ones. */
+static int isogi_vol__plan_nodes(isogi_pyramid *p, isogi_vol__build_job *job) {
+    const double range = p->range[1] - p->range[0], scale = p->volume.scale;
+    int a;
+    memset(job, 0, sizeof *job);
+    job->pyramid = p;
+    p->path = ISOGI_VOL__PATH_BASE;
+#ifdef ISOGI_VOL__AVX
+    p->path = isogi_vol__machine();
+#endif
+    if (p->context.force_path > 0 && p->context.force_path < p->path) p->path = p->context.force_path;
+    if (p->path == ISOGI_VOL__PATH_PLAIN || !p->all_finite || !(range > 0) || !(range < 1e300)) return 0;
+    p->node_scale = 255 / range;
+    if (!(p->node_scale < 1e300)) return 0;
+    for (a = 0; a < 3; a++)
+        if (!p->cells[a] || p->volume.size[a] > ISOGI_VOL__FAST_SIZE) return 0;
+    if (p->volume.type == ISOGI_F64) return 1;
+    /* the float formula must stay within its margin of the double one */
+    if (!(range > 1e-9 * isogi_vol__largest(p->range[0], p->range[1], 0))) return 0;
+    if (!(fabs(p->node_scale * scale) < 1e30) || !(fabs(p->node_scale * scale) > 1e-30)) return 0;
+    job->raw_low = (float)((p->range[0] - p->volume.bias) / scale), job->raw_scale = (float)(p->node_scale * scale);
+    return 1;
+}
+
 static isogi_result isogi_vol__build_nodes(isogi_pyramid *p) {
-    size_t count = 0, node[3];
+    isogi_vol__build_job job;
+    size_t node[3], count = 0;
     uint8_t(*out)[128];
-    double range = p->range[1] - p->range[0];
-    int n, a;
-    for (n = 1; n < ISOGI_VOL__LEVELS; n++) {
-        p->first_top_node = count;
+    isogi_result result;
+    int n;
+    p->fast = isogi_vol__plan_nodes(p, &job);
+    if (!p->fast) return ISOGI_OK;
+    for (n = 0; n < ISOGI_VOL__LEVELS; n++) {
+        p->first_node[n] = count;
         count += p->level[n].size[0] * p->level[n].size[1] * p->level[n].size[2];
     }
     p->nodes = (uint8_t(*)[128])isogi_allocate(&p->context, count, sizeof *p->nodes);
     p->node_count = count;
     if (!p->nodes) return ISOGI_NO_MEMORY;
-    p->node_scale = range > 0 && range < 1e300 ? 255 / range : 0;
-    p->fast = p->context.force_path != 1 && p->all_finite && p->node_scale > 0 && p->node_scale < 1e300 && p->volume.scale > 0;
-    for (a = 0; a < 3; a++) p->fast = p->fast && p->volume.size[a] <= ISOGI_VOL__FAST_SIZE;
-    out = p->nodes;
+    result = isogi_parallel(&p->context, p->level[0].size[2], isogi_vol__build_leaves, &job, 0.5, 1);
+    if (result != ISOGI_OK) return result;
+    out = p->nodes + p->first_node[1];
     for (n = 1; n < ISOGI_VOL__LEVELS; n++)
         for (node[2] = 0; node[2] < p->level[n].size[2]; node[2]++)
             for (node[1] = 0; node[1] < p->level[n].size[1]; node[1]++)
-                for (node[0] = 0; node[0] < p->level[n].size[0]; node[0]++)
-                    isogi_vol__build_node(p, &p->level[n - 1], node, *out++);
+                for (node[0] = 0; node[0] < p->level[n].size[0]; node[0]++) isogi_vol__build_node(p, &p->level[n - 1], node, *out++);
     return ISOGI_OK;
 }
 
@@ -1161,16 +1369,25 @@ static int isogi_vol__quadratic_roots(double a, double b, double c, double root[
     return n;
 }
 
-/* The root in [low, high], where the cubic is monotone and its sides differ: Newton from the secant's root, kept inside a shrinking
-   bracket; every third step bisects once Newton has had its chance. */
+/* The root in [low, high], the only one there, with different sides at its ends: Newton from the secant's root, kept inside a shrinking
+   bracket; every third step bisects once Newton has had its chance. The first steps go without the bracket and end when the error
+   left, at most |f''| step^2 / (2 |f'|) (Taylor), is below 1e-13; not where the cubic is 0 at an end, which is another root. */
 static double isogi_vol__cubic_refine(const isogi_vol__cubic *cubic, double low, double high, double at_low, double at_high, int rising) {
     const double *b = cubic->b;
-    double c1 = 3 * (b[1] - b[0]), c2 = 3 * ((b[0] - b[1]) + (b[2] - b[1])), c3 = (b[3] - b[0]) + 3 * (b[1] - b[2]);
-    double s = low + (high - low) * (at_low / (at_low - at_high));
+    const double c1 = 3 * (b[1] - b[0]), c2 = 3 * ((b[0] - b[1]) + (b[2] - b[1])), c3 = (b[3] - b[0]) + 3 * (b[1] - b[2]);
+    const double bend = 1e13 * (fabs(c2) + 3 * fabs(c3));
+    double s = low + (high - low) * (at_low / (at_low - at_high)), next = s, first = s;
     int i;
-    if (!(s > low && s < high)) s = 0.5 * (low + high);
+    for (i = 0; i < 4 && ((at_low < 0 && at_high > 0) || (at_low > 0 && at_high < 0)); i++) {
+        double value = (b[0] + s * c1) + s * s * (c2 + s * c3), slope = (c1 + 2 * s * c2) + s * s * (3 * c3), step = value / slope;
+        next = s - step;
+        if (!(next >= low && next <= high)) break;
+        if (bend * step * step <= fabs(slope)) return next;
+        s = next;
+    }
+    s = first > low && first < high ? first : 0.5 * (low + high);
     for (i = 0; i < 64; i++) {
-        double value = b[0] + s * (c1 + s * (c2 + s * c3)), slope = c1 + s * (2 * c2 + s * 3 * c3), next;
+        double value = b[0] + s * (c1 + s * (c2 + s * c3)), slope = c1 + s * (2 * c2 + s * 3 * c3);
         if ((value >= 0) == rising) high = s;
         else low = s;
         next = s - value / slope;
@@ -1236,7 +1453,7 @@ static int isogi_vol__cubic_deflated(const isogi_vol__cubic *cubic, int *inside,
    began inside cannot be outside later without having reported its way out. */
 typedef struct isogi_vol__walk {
     const isogi_pyramid *pyramid;
-    double origin[3], dir[3], inverse[3]; /* t counts from `origin`, which lies in the box */
+    double origin[4], dir[4], inverse[4]; /* t counts from `origin`, which lies in the box; the fourth is 0 */
     double base, t, end;                  /* ray's t = base + t; the segment still to walk is [t, end] */
     double isovalue;
     int cell[3];
@@ -1409,40 +1626,143 @@ static int isogi_vol__walk_on(isogi_vol__walk *w, uint32_t flags, isogi_hit *hit
     return 1;
 }
 
+/* ==== AVX2 and AVX-512 =============================================================================================== */
+
+/* Chosen when a pyramid is built. AVX2 does the plain code's operations in the plain code's order, four at a time and without fused
+   multiply-adds, hence gives its bits; AVX-512 only compares bytes. */
+#ifdef ISOGI_VOL__AVX
+#define ISOGI_VOL__TARGET(features) __attribute__((target(features)))
+
+static int isogi_vol__machine(void) {
+    __builtin_cpu_init();
+    if (!__builtin_cpu_supports("avx2")) return ISOGI_VOL__PATH_BASE;
+    return __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512bw") ? ISOGI_VOL__PATH_AVX512 : ISOGI_VOL__PATH_AVX2;
+}
+
+ISOGI_VOL__TARGET("avx2") ISOGI_VOL__INLINE uint64_t isogi_vol__node_mask_avx2(const uint8_t node[128], int low, int high) {
+    __m256i l = _mm256_set1_epi8((char)low), h = _mm256_set1_epi8((char)high);
+    const __m256i *v = (const __m256i *)(const void *)node;
+    __m256i least0 = _mm256_load_si256(v), least1 = _mm256_load_si256(v + 1), most0 = _mm256_load_si256(v + 2), most1 = _mm256_load_si256(v + 3);
+    __m256i in0 = _mm256_and_si256(_mm256_cmpeq_epi8(_mm256_min_epu8(least0, h), least0), _mm256_cmpeq_epi8(_mm256_max_epu8(most0, l), most0));
+    __m256i in1 = _mm256_and_si256(_mm256_cmpeq_epi8(_mm256_min_epu8(least1, h), least1), _mm256_cmpeq_epi8(_mm256_max_epu8(most1, l), most1));
+    return (uint64_t)(uint32_t)_mm256_movemask_epi8(in0) | (uint64_t)(uint32_t)_mm256_movemask_epi8(in1) << 32;
+}
+
+ISOGI_VOL__TARGET("avx512f,avx512bw") ISOGI_VOL__INLINE uint64_t isogi_vol__node_mask_avx512(const uint8_t node[128], int low, int high) {
+    __mmask64 in = _mm512_cmple_epu8_mask(_mm512_load_si512((const void *)node), _mm512_set1_epi8((char)high));
+    return _mm512_mask_cmpge_epu8_mask(in, _mm512_load_si512((const void *)(node + 64)), _mm512_set1_epi8((char)low));
+}
+
+ISOGI_VOL__TARGET("avx2") ISOGI_VOL__INLINE __m256d isogi_vol__lerp4(__m256d a, __m256d b, __m256d u, __m256d rest) {
+    return _mm256_add_pd(_mm256_mul_pd(rest, a), _mm256_mul_pd(u, b));
+}
+
+/* The corners x + 2y of one z, raw. */
+ISOGI_VOL__TARGET("avx2") ISOGI_VOL__INLINE __m256d isogi_vol__corners4(const isogi_volume *v, const char *p, ptrdiff_t dx, ptrdiff_t dy) {
+    const char *q = p + dy;
+#define ISOGI_VOL__FOUR(T)                                                                                                                   \
+    _mm256_set_pd((double)*(const T *)(const void *)(q + dx), (double)*(const T *)(const void *)q, (double)*(const T *)(const void *)(p + dx), \
+                  (double)*(const T *)(const void *)p)
+    switch (v->type) {
+    case ISOGI_U8: return ISOGI_VOL__FOUR(uint8_t);
+    case ISOGI_I8: return ISOGI_VOL__FOUR(int8_t);
+    case ISOGI_U16: return ISOGI_VOL__FOUR(uint16_t);
+    case ISOGI_I16: return ISOGI_VOL__FOUR(int16_t);
+    case ISOGI_F64: return ISOGI_VOL__FOUR(double);
+    case ISOGI_F32: break;
+    }
+    if (dx != 4) return ISOGI_VOL__FOUR(float);
+#undef ISOGI_VOL__FOUR
+    return _mm256_cvtps_pd(_mm_loadh_pi(_mm_castpd_ps(_mm_load_sd((const double *)(const void *)p)), (const __m64 *)(const void *)q));
+}
+
+/* Does what mixed_cell does. */
+ISOGI_VOL__TARGET("avx2") static int isogi_vol__mixed_cell_avx2(isogi_vol__walk *w, int x, int y, int z, int in, int axis, isogi_hit *hit) {
+    static const uint64_t lane[5][4] = {{0, 0, 0, 0}, {~(uint64_t)0, 0, 0, 0}, {0, ~(uint64_t)0, 0, 0}, {0, 0, ~(uint64_t)0, 0}, {0, 0, 0, ~(uint64_t)0}};
+    const isogi_volume *v = &w->pyramid->volume;
+    const ptrdiff_t dx = v->stride[0], dy = v->stride[1], dz = v->stride[2];
+    const char *p = (const char *)v->data + x * dx + y * dy + z * dz;
+    const __m256d zero = _mm256_setzero_pd(), one = _mm256_set1_pd(1), isovalue = _mm256_set1_pd(w->isovalue);
+    const __m256d scale = _mm256_set1_pd(v->scale), bias = _mm256_set1_pd(v->bias);
+    const __m256d origin = _mm256_loadu_pd(w->origin), dir = _mm256_loadu_pd(w->dir), inverse = _mm256_loadu_pd(w->inverse);
+    const __m256d in_lane = _mm256_castsi256_pd(_mm256_loadu_si256((const __m256i *)(const void *)lane[in + 1]));
+    const __m256d out_lane = _mm256_castsi256_pd(_mm256_loadu_si256((const __m256i *)(const void *)lane[axis < 0 ? 4 : axis + 1]));
+    const __m256d cell = _mm256_cvtepi32_pd(_mm_setr_epi32(x, y, z, 0));
+    const __m256d enter = _mm256_and_pd(_mm256_cmp_pd(dir, zero, _CMP_LT_OQ), one), leave = _mm256_and_pd(_mm256_cmp_pd(dir, zero, _CMP_GT_OQ), one);
+    const __m256d segment_end = _mm256_set1_pd(w->end);
+    __m256d c0 = isogi_vol__corners4(v, p, dx, dy), c1 = isogi_vol__corners4(v, p + dz, dx, dy), begin, end, from, to, rest0, rest1;
+    __m256d even, odd, low, high, near_x, far_x, near_y, far_y, f0, f1, b;
+    int sides, inside;
+    double root;
+    isogi_vol__cubic cubic;
+    w->count.cells++;
+    w->cell[0] = x, w->cell[1] = y, w->cell[2] = z, w->entry_axis = in;
+    c0 = _mm256_sub_pd(_mm256_add_pd(_mm256_mul_pd(c0, scale), bias), isovalue);
+    c1 = _mm256_sub_pd(_mm256_add_pd(_mm256_mul_pd(c1, scale), bias), isovalue);
+    /* when the ray passes the faces; every lane gets the number of the one that counts */
+    begin = _mm256_and_pd(_mm256_mul_pd(_mm256_sub_pd(_mm256_add_pd(cell, enter), origin), inverse), in_lane);
+    end = _mm256_blend_pd(_mm256_mul_pd(_mm256_sub_pd(_mm256_add_pd(cell, leave), origin), inverse), segment_end, 8);
+    end = _mm256_and_pd(end, out_lane);
+    begin = _mm256_or_pd(begin, _mm256_permute2f128_pd(begin, begin, 1)), end = _mm256_or_pd(end, _mm256_permute2f128_pd(end, end, 1));
+    begin = _mm256_or_pd(begin, _mm256_permute_pd(begin, 5)), end = _mm256_or_pd(end, _mm256_permute_pd(end, 5));
+    begin = _mm256_max_pd(begin, zero), end = _mm256_max_pd(_mm256_min_pd(end, segment_end), begin);
+    w->t = _mm256_cvtsd_f64(begin);
+    sides = _mm256_movemask_pd(_mm256_cmp_pd(c0, zero, _CMP_GE_OQ)) | _mm256_movemask_pd(_mm256_cmp_pd(c1, zero, _CMP_GE_OQ)) << 4;
+    if (ISOGI_VOL__UNLIKELY(w->deflate)) return isogi_vol__visit_cell(w, _mm256_cvtsd_f64(end), axis, hit);
+    if (sides == 0 || sides == 255) return isogi_vol__state(w, sides != 0, hit);
+    w->count.cubics++;
+    from = _mm256_sub_pd(_mm256_add_pd(origin, _mm256_mul_pd(begin, dir)), cell);
+    to = _mm256_sub_pd(_mm256_add_pd(origin, _mm256_mul_pd(end, dir)), cell);
+    from = _mm256_blendv_pd(_mm256_min_pd(_mm256_max_pd(from, zero), one), enter, in_lane);
+    to = _mm256_blendv_pd(_mm256_min_pd(_mm256_max_pd(to, zero), one), leave, out_lane);
+    rest0 = _mm256_sub_pd(one, from), rest1 = _mm256_sub_pd(one, to);
+    /* Blossom, as cubic_set has it. */
+#define ISOGI_VOL__LANE(v, i) _mm256_permute4x64_pd(v, 0x55 * (i))
+    even = _mm256_unpacklo_pd(c0, c1), odd = _mm256_unpackhi_pd(c0, c1); /* {y0 z0, y0 z1, y1 z0, y1 z1} */
+    near_x = isogi_vol__lerp4(even, odd, ISOGI_VOL__LANE(from, 0), ISOGI_VOL__LANE(rest0, 0));
+    far_x = isogi_vol__lerp4(even, odd, ISOGI_VOL__LANE(to, 0), ISOGI_VOL__LANE(rest1, 0));
+    low = _mm256_permute2f128_pd(near_x, far_x, 0x20), high = _mm256_permute2f128_pd(near_x, far_x, 0x31);
+    near_y = isogi_vol__lerp4(low, high, ISOGI_VOL__LANE(from, 1), ISOGI_VOL__LANE(rest0, 1));
+    far_y = isogi_vol__lerp4(low, high, ISOGI_VOL__LANE(to, 1), ISOGI_VOL__LANE(rest1, 1));
+    low = _mm256_unpacklo_pd(near_y, far_y), high = _mm256_unpackhi_pd(near_y, far_y);
+    f0 = isogi_vol__lerp4(low, high, ISOGI_VOL__LANE(from, 2), ISOGI_VOL__LANE(rest0, 2)); /* what is taken at its end: {none, y, x, xy} */
+    f1 = isogi_vol__lerp4(low, high, ISOGI_VOL__LANE(to, 2), ISOGI_VOL__LANE(rest1, 2));   /* {z, yz, xz, xyz} */
+#undef ISOGI_VOL__LANE
+    b = _mm256_blend_pd(_mm256_permute4x64_pd(f0, 0x08), _mm256_permute4x64_pd(f1, 0xd0), 12);                             /* none, x, yz, xyz */
+    b = _mm256_add_pd(b, _mm256_blend_pd(_mm256_blend_pd(f0, f1, 4), zero, 9));                                            /* y, xz */
+    b = _mm256_add_pd(b, _mm256_blend_pd(_mm256_blend_pd(_mm256_permute4x64_pd(f1, 0), _mm256_permute4x64_pd(f0, 0xff), 4), zero, 9)); /* z, xy */
+    b = _mm256_mul_pd(b, _mm256_setr_pd(1, 1.0 / 3, 1.0 / 3, 1));
+    sides = _mm256_movemask_pd(_mm256_cmp_pd(b, zero, _CMP_GE_OQ)), inside = sides & 1;
+    if (ISOGI_VOL__UNLIKELY(w->inside == !inside)) return isogi_vol__state(w, inside, hit);
+    w->inside = inside;
+    if (sides == 0 || sides == 15) return 0;
+    _mm256_storeu_pd(cubic.b, b);
+    isogi_vol__cubic_rescale(&cubic);
+    if (!isogi_vol__cubic_first(&cubic, inside, w->exact, &root)) return 0;
+    w->inside = !inside;
+    begin = _mm256_add_pd(begin, _mm256_mul_pd(_mm256_set1_pd(root), _mm256_sub_pd(end, begin)));
+    hit->t = w->base + _mm256_cvtsd_f64(begin);
+    _mm256_storeu_pd(hit->local, isogi_vol__lerp4(from, to, _mm256_set1_pd(root), _mm256_set1_pd(1 - root))); /* and 8 bytes of cell */
+    hit->cell[0] = (uint32_t)x, hit->cell[1] = (uint32_t)y, hit->cell[2] = (uint32_t)z;
+    hit->side = inside ? -1 : 1;
+    return 1;
+}
+#endif
+
 /* ==== fast traversal ================================================================================================= */
 
 /* The same walk, in integer time. Axes along which the ray falls are mirrored, so that every step goes up; plane k of an axis is
    passed at tick at + k per. All levels take their planes from this one formula, hence agree on what lies between them exactly, and
-   a step is an integer comparison and an addition. Blocks that hold no surface lie strictly on one side, and so do the faces they
-   share with others (a convex sum of numbers of one sign has that sign in floating point too): stepping over them keeps the side. */
+   a step is an integer comparison and an addition. Blocks and cells that cannot hold the surface lie strictly on one side, and so do
+   the faces they share with others (a convex sum of numbers of one sign has that sign in floating point too): stepping over them
+   keeps the side. */
 typedef struct isogi_vol__ticks {
     int64_t at[3], per[3], end;
     int mirror[3]; /* 0, or one less than the padded number of cells: cell = mirror - mirrored cell */
     uint32_t flip; /* child = mirrored child ^ flip */
     int first[3];  /* mirrored cell in which the walk begins */
-    int isovalue;  /* in 8 bits */
-    union { int i; float f; double d; } threshold; /* of raw voxels: inside is raw >= threshold */
+    int low, high; /* what the isovalue can be in 8 bits */
 } isogi_vol__ticks;
-
-/* Smallest raw value that is inside. Raw integers are tried around the quotient, since scale * raw + bias rounds. 0: not known. */
-static int isogi_vol__threshold(isogi_vol__ticks *k, const isogi_volume *v, double isovalue) {
-    static const int least[4] = {0, -128, 0, -32768}, largest[4] = {255, 127, 65535, 32767};
-    int plain = v->scale >= 1 && v->scale <= 1 && v->bias >= 0 && v->bias <= 0, i, tries;
-    double raw;
-    if (v->type == ISOGI_F64) return k->threshold.d = isovalue, plain;
-    if (v->type == ISOGI_F32) {
-        k->threshold.f = isogi_vol__float_above(isovalue);
-        return plain;
-    }
-    raw = plain ? isovalue : (isovalue - v->bias) / v->scale;
-    if (!(raw > least[v->type] - 2.0)) raw = least[v->type] - 2.0;
-    if (!(raw < largest[v->type] + 2.0)) raw = largest[v->type] + 2.0;
-    i = (int)ceil(raw);
-    for (tries = 0; tries < 4 && v->scale * (i - 1) + v->bias >= isovalue; tries++) i--;
-    for (tries = 0; tries < 4 && v->scale * i + v->bias < isovalue; tries++) i++;
-    k->threshold.i = i;
-    return 1;
-}
 
 /* One axis of the planes. Whatever lies beyond the segment is put at twice its length, so that no product overflows. */
 ISOGI_VOL__INLINE void isogi_vol__set_axis(isogi_vol__ticks *k, const isogi_vol__walk *w, int a, double scale) {
@@ -1468,8 +1788,8 @@ ISOGI_VOL__INLINE void isogi_vol__set_axis(isogi_vol__ticks *k, const isogi_vol_
 /* Sets up the planes of a walk that is ready to go; 0 if it has to be walked plainly. */
 static int isogi_vol__set_ticks(isogi_vol__ticks *k, const isogi_vol__walk *w) {
     double scale = ISOGI_VOL__TICKS / w->end;
-    if (!(scale > 0) || !(scale < 1e300) || !isogi_vol__threshold(k, &w->pyramid->volume, w->isovalue)) return 0;
-    k->isovalue = isogi_vol__quantise(w->pyramid, w->isovalue);
+    if (!(scale > 0) || !(scale < 1e300)) return 0;
+    isogi_vol__quantise_isovalue(w->pyramid, w->isovalue, &k->low, &k->high);
     k->end = (int64_t)ISOGI_VOL__TICKS, k->flip = 0;
     isogi_vol__set_axis(k, w, 0, scale);
     isogi_vol__set_axis(k, w, 1, scale);
@@ -1478,22 +1798,19 @@ static int isogi_vol__set_ticks(isogi_vol__ticks *k, const isogi_vol__walk *w) {
 }
 
 /* Which of the 64 children of a node can hold the isovalue. */
-static uint64_t isogi_vol__node_mask(const uint8_t node[128], int isovalue) {
+ISOGI_VOL__INLINE uint64_t isogi_vol__node_mask(const uint8_t node[128], int low, int high) {
     uint64_t mask = 0;
     int i;
-    if (isovalue < 0 || isovalue > 255) return 0;
 #ifdef ISOGI_VOL__SSE2
-    {
-        __m128i v = _mm_set1_epi8((char)isovalue);
-        for (i = 0; i < 4; i++) {
-            __m128i low = _mm_load_si128((const __m128i *)(const void *)(node + 16 * i));
-            __m128i high = _mm_load_si128((const __m128i *)(const void *)(node + 64 + 16 * i));
-            __m128i in = _mm_and_si128(_mm_cmpeq_epi8(_mm_min_epu8(low, v), low), _mm_cmpeq_epi8(_mm_max_epu8(high, v), high));
-            mask |= (uint64_t)(uint32_t)_mm_movemask_epi8(in) << 16 * i;
-        }
+    __m128i l = _mm_set1_epi8((char)low), h = _mm_set1_epi8((char)high);
+    for (i = 0; i < 4; i++) {
+        __m128i least = _mm_load_si128((const __m128i *)(const void *)(node + 16 * i));
+        __m128i largest = _mm_load_si128((const __m128i *)(const void *)(node + 64 + 16 * i));
+        __m128i in = _mm_and_si128(_mm_cmpeq_epi8(_mm_min_epu8(least, h), least), _mm_cmpeq_epi8(_mm_max_epu8(largest, l), largest));
+        mask |= (uint64_t)(uint32_t)_mm_movemask_epi8(in) << 16 * i;
     }
 #else
-    for (i = 0; i < 64; i++) mask |= (uint64_t)(node[i] <= isovalue && node[64 + i] >= isovalue) << i;
+    for (i = 0; i < 64; i++) mask |= (uint64_t)(node[i] <= high && node[64 + i] >= low) << i;
 #endif
     return mask;
 }
@@ -1501,9 +1818,6 @@ static uint64_t isogi_vol__node_mask(const uint8_t node[128], int isovalue) {
 /* Children of a node are walked by one number: bits 0..5 are the child (x + 4y + 16z), bits 8.. the same with a spare bit behind each
    coordinate, which is set when a step leaves the node. */
 #define ISOGI_VOL__LEFT 0x12400u
-#define ISOGI_VOL__X(state) ((int)((state) >> 8 & 3))
-#define ISOGI_VOL__Y(state) ((int)((state) >> 11 & 3))
-#define ISOGI_VOL__Z(state) ((int)((state) >> 14 & 3))
 
 /* Where a walk stands among the children of a node: the next plane of each axis, the time between planes, the child. */
 typedef struct isogi_vol__place {
@@ -1511,19 +1825,21 @@ typedef struct isogi_vol__place {
     uint32_t state;
 } isogi_vol__place;
 
-ISOGI_VOL__INLINE uint32_t isogi_vol__descend_axis(const isogi_vol__ticks *k, int a, int base, int shift, int64_t t, int64_t *next, int64_t *size) {
-    int64_t plane = k->at[a] + (int64_t)(base + (1 << shift)) * k->per[a], d = k->per[a] << shift;
+/* One axis of a descent into a child that ends at plane `end`: the grandchild in which tick t falls. */
+ISOGI_VOL__INLINE uint32_t isogi_vol__descend_axis(int64_t end, int64_t d, int64_t t, int64_t *next) {
+    int64_t plane = end - 3 * d;
     uint32_t i = (uint32_t)(t >= plane) + (uint32_t)(t >= plane + d) + (uint32_t)(t >= plane + 2 * d);
-    *size = d, *next = plane + (int64_t)i * d;
+    *next = plane + (int64_t)i * d;
     return i;
 }
 
-/* The child of the node at `base` (mirrored cells), with children of 2^shift cells, in which tick t falls. */
-ISOGI_VOL__INLINE isogi_vol__place isogi_vol__descend(const isogi_vol__ticks *k, const int base[3], int shift, int64_t t) {
+ISOGI_VOL__INLINE isogi_vol__place isogi_vol__descend(const isogi_vol__place *from, int64_t t) {
     isogi_vol__place p;
-    uint32_t x = isogi_vol__descend_axis(k, 0, base[0], shift, t, &p.x, &p.dx);
-    uint32_t y = isogi_vol__descend_axis(k, 1, base[1], shift, t, &p.y, &p.dy);
-    uint32_t z = isogi_vol__descend_axis(k, 2, base[2], shift, t, &p.z, &p.dz);
+    uint32_t x, y, z;
+    p.dx = from->dx >> 2, p.dy = from->dy >> 2, p.dz = from->dz >> 2;
+    x = isogi_vol__descend_axis(from->x, p.dx, t, &p.x);
+    y = isogi_vol__descend_axis(from->y, p.dy, t, &p.y);
+    z = isogi_vol__descend_axis(from->z, p.dz, t, &p.z);
     p.state = (x | y << 2 | z << 4) | (x | y << 3 | z << 6) << 8;
     return p;
 }
@@ -1546,138 +1862,106 @@ ISOGI_VOL__INLINE int64_t isogi_vol__step(isogi_vol__place *p, int *axis) {
     return least;
 }
 
-/* The cell of a mirrored cell. */
-ISOGI_VOL__INLINE int isogi_vol__unmirror(const isogi_vol__ticks *k, int a, int cell) { return k->mirror[a] ? k->mirror[a] - cell : cell; }
-
-/* A cell with corners on both sides, entered through w->entry_axis and left through `axis` (-1: the segment ends in it). */
-static int isogi_vol__mixed_cell(isogi_vol__walk *w, const isogi_vol__ticks *k, const int base[3], uint32_t state, int axis, isogi_hit *hit) {
+/* A cell that may have corners on both sides, entered through `in` and left through `out` (-1: the segment ends in it). */
+static int isogi_vol__mixed_cell(isogi_vol__walk *w, int x, int y, int z, int in, int axis, isogi_hit *hit) {
     double out = w->end;
-    int a, in = w->entry_axis;
-    w->cell[0] = isogi_vol__unmirror(k, 0, base[0] + ISOGI_VOL__X(state));
-    w->cell[1] = isogi_vol__unmirror(k, 1, base[1] + ISOGI_VOL__Y(state));
-    w->cell[2] = isogi_vol__unmirror(k, 2, base[2] + ISOGI_VOL__Z(state));
-    a = in;
-    w->t = in < 0 ? 0 : isogi_vol__max(0, (w->cell[a] + (w->dir[a] > 0 ? 0 : 1) - w->origin[a]) * w->inverse[a]);
+    w->cell[0] = x, w->cell[1] = y, w->cell[2] = z;
+    w->entry_axis = in;
+    w->t = in < 0 ? 0 : isogi_vol__max(0, (w->cell[in] + (w->dir[in] > 0 ? 0 : 1) - w->origin[in]) * w->inverse[in]);
     if (axis >= 0) out = isogi_vol__min(out, (w->cell[axis] + (w->dir[axis] > 0 ? 1 : 0) - w->origin[axis]) * w->inverse[axis]);
     return isogi_vol__visit_cell(w, isogi_vol__max(out, w->t), axis, hit);
 }
 
-/* Walks the cells of one leaf block. 1: hit; 2: the segment has ended; 0: go on at *t. One function a voxel type. */
-#define ISOGI_VOL__LEAF(NAME, TYPE, THRESHOLD, MEMBER)                                                                                            \
-    static int NAME(isogi_vol__walk *w, const isogi_vol__ticks *k, const int base[3], int64_t *t, isogi_hit *hit) {                    \
-        const isogi_volume *v = &w->pyramid->volume;                                                                                   \
-        const ptrdiff_t dx = v->stride[0], dy = v->stride[1], dz = v->stride[2];                                                       \
-        const ptrdiff_t sx = k->mirror[0] ? -dx : dx, sy = k->mirror[1] ? -dy : dy, sz = k->mirror[2] ? -dz : dz;                      \
-        const int64_t end = k->end;                                                                                                    \
-        int64_t now = *t;                                                                                                              \
-        isogi_vol__place place = isogi_vol__descend(k, base, 0, now);                                                                  \
-        const char *p = (const char *)v->data + isogi_vol__unmirror(k, 0, base[0] + ISOGI_VOL__X(place.state)) * dx +                  \
-                        isogi_vol__unmirror(k, 1, base[1] + ISOGI_VOL__Y(place.state)) * dy +                                          \
-                        isogi_vol__unmirror(k, 2, base[2] + ISOGI_VOL__Z(place.state)) * dz;                                           \
-        int axis = w->entry_axis;                                                                                                      \
-        for (;;) {                                                                                                                     \
-            uint32_t here = place.state;                                                                                               \
-            int in = axis, sides;                                                                                                      \
-            const char *q = p + dy, *r = p + dz, *s = p + dy + dz;                                                                     \
-            const THRESHOLD threshold = k->threshold.MEMBER;                                                                           \
-            now = isogi_vol__step(&place, &axis);                                                                                      \
-            sides = (*(const TYPE *)(const void *)p >= threshold) + (*(const TYPE *)(const void *)(p + dx) >= threshold) +             \
-                    (*(const TYPE *)(const void *)q >= threshold) + (*(const TYPE *)(const void *)(q + dx) >= threshold) +             \
-                    (*(const TYPE *)(const void *)r >= threshold) + (*(const TYPE *)(const void *)(r + dx) >= threshold) +             \
-                    (*(const TYPE *)(const void *)s >= threshold) + (*(const TYPE *)(const void *)(s + dx) >= threshold);              \
-            w->count.cells++;                                                                                                          \
-            if ((sides & 7) || (sides == 8) != w->inside) {                                                                            \
-                w->entry_axis = in;                                                                                                    \
-                if (isogi_vol__mixed_cell(w, k, base, here, now <= end ? axis : -1, hit)) return 1;                                    \
-            }                                                                                                                          \
-            if (now >= end) return 2;                                                                                                  \
-            if (place.state & ISOGI_VOL__LEFT) break;                                                                                  \
-            p += axis == 0 ? sx : axis == 1 ? sy : sz;                                                                                 \
-        }                                                                                                                              \
-        *t = now;                                                                                                                      \
-        return 0;                                                                                                                      \
+/* What the loops over children share. */
+typedef struct isogi_vol__stride {
+    isogi_vol__walk *w;
+    const isogi_vol__ticks *k;
+    isogi_hit *hit;
+    int64_t now;
+    int axis; /* the one last crossed */
+} isogi_vol__stride;
+
+/* Walks the children of node (x, y, z) of a level: cells of level 0, nodes of the level below else. `from` stands on the node.
+   1: hit; 2: the segment has ended; 0: go on. */
+#define ISOGI_VOL__WALK(NAME, TARGET, LEVEL, MASK, CHILD)                                                                                        \
+    TARGET ISOGI_VOL__INLINE int NAME(isogi_vol__stride *s, const isogi_vol__place *from, int x, int y, int z) {                          \
+        const isogi_pyramid *p = s->w->pyramid;                                                                                    \
+        const isogi_level *level = &p->level[LEVEL];                                                                               \
+        const size_t node = p->first_node[LEVEL] + (size_t)x + level->size[0] * ((size_t)y + level->size[1] * (size_t)z);          \
+        const uint64_t mask = MASK(p->nodes[node], s->k->low, s->k->high);                                         \
+        const uint32_t flip = s->k->flip;                                                                                          \
+        const int64_t end = s->k->end;                                                                                             \
+        isogi_vol__place place;                                                                                                    \
+        s->w->count.blocks++;                                                                                                      \
+        if (!mask) {                                                                                                               \
+            s->w->deflate = 0;                                                                                                     \
+            return 0;                                                                                                              \
+        }                                                                                                                          \
+        place = isogi_vol__descend(from, s->now);                                                                                  \
+        do {                                                                                                                       \
+            const uint32_t child = place.state ^ flip;                                                                             \
+            if (mask >> (child & 63) & 1) {                                                                                        \
+                const int result = CHILD(s, &place, 4 * x + (int)(child & 3), 4 * y + (int)(child >> 2 & 3), 4 * z + (int)(child >> 4 & 3)); \
+                if (result) return result;                                                                                         \
+            } else s->w->deflate = 0;                                                                                              \
+            s->now = isogi_vol__step(&place, &s->axis);                                                                            \
+            if (s->now >= end) return 2;                                                                                           \
+        } while (!(place.state & ISOGI_VOL__LEFT));                                                                                \
+        return 0;                                                                                                                  \
     }
-ISOGI_VOL__LEAF(isogi_vol__leaf_u8, uint8_t, int, i)
-ISOGI_VOL__LEAF(isogi_vol__leaf_i8, int8_t, int, i)
-ISOGI_VOL__LEAF(isogi_vol__leaf_u16, uint16_t, int, i)
-ISOGI_VOL__LEAF(isogi_vol__leaf_i16, int16_t, int, i)
-ISOGI_VOL__LEAF(isogi_vol__leaf_f32, float, float, f)
-ISOGI_VOL__LEAF(isogi_vol__leaf_f64, double, double, d)
-#undef ISOGI_VOL__LEAF
 
-static int isogi_vol__leaf(isogi_vol__walk *w, const isogi_vol__ticks *k, const int base[3], int64_t *t, isogi_hit *hit) {
-    w->count.blocks++;
-    switch (w->pyramid->volume.type) {
-    case ISOGI_U8: return isogi_vol__leaf_u8(w, k, base, t, hit);
-    case ISOGI_I8: return isogi_vol__leaf_i8(w, k, base, t, hit);
-    case ISOGI_U16: return isogi_vol__leaf_u16(w, k, base, t, hit);
-    case ISOGI_I16: return isogi_vol__leaf_i16(w, k, base, t, hit);
-    case ISOGI_F32: return isogi_vol__leaf_f32(w, k, base, t, hit);
-    case ISOGI_F64: return isogi_vol__leaf_f64(w, k, base, t, hit);
+#define ISOGI_VOL__WALK_CELL(NAME, TARGET, CELL)                                                                                    \
+    TARGET ISOGI_VOL__INLINE int NAME(isogi_vol__stride *s, const isogi_vol__place *from, int x, int y, int z) {                   \
+        isogi_vol__place after = *from;                                                                                            \
+        int out;                                                                                                                   \
+        const int64_t t = isogi_vol__step(&after, &out);                                                                           \
+        return CELL(s->w, x, y, z, s->axis, t <= s->k->end ? out : -1, s->hit);                                                    \
     }
-    return 2;
-}
-
-static int isogi_vol__walk_small_node(isogi_vol__walk *w, const isogi_vol__ticks *k, const int base[3], int64_t *t, isogi_hit *hit);
-
-/* Walks the children of a node of level 1 or 2; returns as a leaf does. */
-ISOGI_VOL__INLINE int isogi_vol__walk_node(isogi_vol__walk *w, const isogi_vol__ticks *k, int level, const int base[3], int64_t *t, isogi_hit *hit) {
-    const isogi_level *blocks = &w->pyramid->level[level];
-    const int shift = 2 * level; /* of the children's size */
-    size_t node = level == 2 ? w->pyramid->first_top_node : 0;
-    uint64_t mask;
-    isogi_vol__place place;
-    int64_t now = *t;
-    const int64_t end = k->end;
-    node += ((size_t)isogi_vol__unmirror(k, 0, base[0]) >> (shift + 2)) +
-            blocks->size[0] * (((size_t)isogi_vol__unmirror(k, 1, base[1]) >> (shift + 2)) +
-                               blocks->size[1] * ((size_t)isogi_vol__unmirror(k, 2, base[2]) >> (shift + 2)));
-    mask = isogi_vol__node_mask(w->pyramid->nodes[node], k->isovalue);
-    w->count.blocks++;
-    if (!mask) {
-        w->deflate = 0;
-        return 0;
-    }
-    place = isogi_vol__descend(k, base, shift, now);
-    do {
-        if (mask >> ((place.state ^ k->flip) & 63) & 1) {
-            int child[3], result;
-            child[0] = base[0] + (ISOGI_VOL__X(place.state) << shift);
-            child[1] = base[1] + (ISOGI_VOL__Y(place.state) << shift);
-            child[2] = base[2] + (ISOGI_VOL__Z(place.state) << shift);
-            result = level == 2 ? isogi_vol__walk_small_node(w, k, child, &now, hit) : isogi_vol__leaf(w, k, child, &now, hit);
-            if (result) return result;
-        } else w->deflate = 0;
-        now = isogi_vol__step(&place, &w->entry_axis);
-        if (now >= end) return 2;
-    } while (!(place.state & ISOGI_VOL__LEFT));
-    *t = now;
-    return 0;
-}
-
-static int isogi_vol__walk_small_node(isogi_vol__walk *w, const isogi_vol__ticks *k, const int base[3], int64_t *t, isogi_hit *hit) {
-    return isogi_vol__walk_node(w, k, 1, base, t, hit);
-}
-
-static int isogi_vol__walk_large_node(isogi_vol__walk *w, const isogi_vol__ticks *k, const int base[3], int64_t *t, isogi_hit *hit) {
-    return isogi_vol__walk_node(w, k, 2, base, t, hit);
-}
 
 /* The fast counterpart of walk_on for a walk with planes. */
-static int isogi_vol__walk_fast(isogi_vol__walk *w, const isogi_vol__ticks *k, isogi_hit *hit) {
-    int base[3], a, result;
-    int64_t next[3], now = 0;
-    for (a = 0; a < 3; a++) base[a] = k->first[a] & ~63, next[a] = k->at[a] + (int64_t)(base[a] + 64) * k->per[a];
-    for (;;) {
-        int axis = next[1] < next[0];
-        if (next[2] < next[axis]) axis = 2;
-        result = isogi_vol__walk_large_node(w, k, base, &now, hit);
-        if (result) return result == 1;
-        now = next[axis], w->entry_axis = axis;
-        if (now >= k->end) return 0;
-        next[axis] += k->per[axis] << 6;
-        base[axis] += 64;
+#define ISOGI_VOL__WALK_TOP(NAME, TARGET, LARGE)                                                                                    \
+    TARGET static int NAME(isogi_vol__walk *w, const isogi_vol__ticks *k, isogi_hit *hit) {                                        \
+        isogi_vol__place place;                                                                                                    \
+        isogi_vol__stride s;                                                                                                       \
+        int base[3], a, result, axis;                                                                                              \
+        int64_t next[3];                                                                                                           \
+        s.w = w, s.k = k, s.hit = hit, s.now = 0, s.axis = w->entry_axis;                                                          \
+        for (a = 0; a < 3; a++) base[a] = k->first[a] >> 6, next[a] = k->at[a] + (int64_t)(64 * base[a] + 64) * k->per[a];         \
+        place.dx = k->per[0] << 6, place.dy = k->per[1] << 6, place.dz = k->per[2] << 6, place.state = 0;                          \
+        for (;;) {                                                                                                                 \
+            axis = next[1] < next[0];                                                                                              \
+            if (next[2] < next[axis]) axis = 2;                                                                                    \
+            place.x = next[0], place.y = next[1], place.z = next[2];                                                               \
+            result = LARGE(&s, &place, k->mirror[0] ? (k->mirror[0] >> 6) - base[0] : base[0],                                     \
+                           k->mirror[1] ? (k->mirror[1] >> 6) - base[1] : base[1], k->mirror[2] ? (k->mirror[2] >> 6) - base[2] : base[2]); \
+            if (result) return result == 1;                                                                                        \
+            s.now = next[axis], s.axis = axis;                                                                                     \
+            if (s.now >= k->end) return 0;                                                                                         \
+            next[axis] += k->per[axis] << 6;                                                                                       \
+            base[axis]++;                                                                                                          \
+        }                                                                                                                          \
     }
+
+#define ISOGI_VOL__WALKS(SUFFIX, TARGET, MASK, CELL)                                                                                \
+    ISOGI_VOL__WALK_CELL(isogi_vol__walk_cell##SUFFIX, TARGET, CELL)                                                               \
+    ISOGI_VOL__WALK(isogi_vol__walk_leaf##SUFFIX, TARGET, 0, MASK, isogi_vol__walk_cell##SUFFIX)                                   \
+    ISOGI_VOL__WALK(isogi_vol__walk_small##SUFFIX, TARGET, 1, MASK, isogi_vol__walk_leaf##SUFFIX)                                  \
+    ISOGI_VOL__WALK(isogi_vol__walk_large##SUFFIX, TARGET, 2, MASK, isogi_vol__walk_small##SUFFIX)                                 \
+    ISOGI_VOL__WALK_TOP(isogi_vol__walk_fast##SUFFIX, TARGET, isogi_vol__walk_large##SUFFIX)
+
+ISOGI_VOL__WALKS(_base, , isogi_vol__node_mask, isogi_vol__mixed_cell)
+#ifdef ISOGI_VOL__AVX
+ISOGI_VOL__WALKS(_avx2, ISOGI_VOL__TARGET("avx2"), isogi_vol__node_mask_avx2, isogi_vol__mixed_cell_avx2)
+ISOGI_VOL__WALKS(_avx512, ISOGI_VOL__TARGET("avx512f,avx512bw"), isogi_vol__node_mask_avx512, isogi_vol__mixed_cell_avx2)
+#endif
+
+static int isogi_vol__walk_fast(isogi_vol__walk *w, const isogi_vol__ticks *k, isogi_hit *hit) {
+    if (k->low > k->high) return 0;
+#ifdef ISOGI_VOL__AVX
+    if (w->pyramid->path == ISOGI_VOL__PATH_AVX512) return isogi_vol__walk_fast_avx512(w, k, hit);
+    if (w->pyramid->path == ISOGI_VOL__PATH_AVX2) return isogi_vol__walk_fast_avx2(w, k, hit);
+#endif
+    return isogi_vol__walk_fast_base(w, k, hit);
 }
 
 /* ==== rays =========================================================================================================== */
@@ -1785,9 +2069,7 @@ ISOGI_API isogi_result isogi_vol_intersect(const isogi_pyramid *pyramid, const i
     if (!pyramid || (count && (!rays || !hits))) return ISOGI_INVALID;
     memset(&work, 0, sizeof work);
     for (i = 0; i < count; i++) {
-        isogi_hit hit;
-        if (!isogi_vol__trace(pyramid, &rays[i], 1, &hit, &work)) memset(&hit, 0, sizeof hit);
-        hits[i] = hit;
+        if (!isogi_vol__trace(pyramid, &rays[i], 1, &hits[i], &work)) memset(&hits[i], 0, sizeof hits[i]);
     }
     isogi_vol__add(counters, &work);
     return ISOGI_OK;
@@ -1840,10 +2122,8 @@ ISOGI_API isogi_result isogi_vol_continue(const isogi_pyramid *pyramid, const is
     if (!pyramid || (count && (!starts || !dirs || !hits))) return ISOGI_INVALID;
     memset(&work, 0, sizeof work);
     for (i = 0; i < count; i++) {
-        isogi_hit hit;
-        if (!isogi_vol__trace_on(pyramid, &starts[i], dirs[i], tmax ? tmax[i] : 0, isovalue, flags, &hit, &work))
-            memset(&hit, 0, sizeof hit);
-        hits[i] = hit;
+        if (!isogi_vol__trace_on(pyramid, &starts[i], dirs[i], tmax ? tmax[i] : 0, isovalue, flags, &hits[i], &work))
+            memset(&hits[i], 0, sizeof hits[i]);
     }
     isogi_vol__add(counters, &work);
     return ISOGI_OK;
@@ -2927,12 +3207,12 @@ ISOGI_API void isogi_vol_mesh_free(const isogi_pyramid *pyramid, isogi_mesh *mes
 }
 
 #undef ISOGI_VOL__LEVELS
+#undef ISOGI_VOL__STRIP
+#undef ISOGI_VOL__STRIP_VOXELS
 #undef ISOGI_VOL__FAST_SIZE
 #undef ISOGI_VOL__TICKS
 #undef ISOGI_VOL__LEFT
-#undef ISOGI_VOL__X
-#undef ISOGI_VOL__Y
-#undef ISOGI_VOL__Z
+#undef ISOGI_VOL__WALK
 #undef ISOGI_VOL__INLINE
 #undef ISOGI_VOL__UNLIKELY
 #undef ISOGI_VOL__SSE2

@@ -213,8 +213,8 @@ TEST(a_far_origin_costs_no_precision) {
     field_free(&f);
 }
 
-/* The fast walk and the plain one (force_path 1) are two designs: they must agree on large volumes, on any type. */
-TEST(fast_and_plain_walks_agree) {
+/* The fast walk and the plain one (force_path 1) are two designs: they must agree on large volumes, on any type, on any path. */
+static void compare_walks(int path) {
     test_random r = {20};
     long different = 0, hits = 0;
     for (int type = ISOGI_U8; type <= ISOGI_F64; type++) {
@@ -233,9 +233,9 @@ TEST(fast_and_plain_walks_agree) {
         }
         isogi_volume v = {.data = data, .type = (isogi_type)type, .size = {(size_t)size[0], (size_t)size[1], (size_t)size[2]}};
         if (type == ISOGI_U16) v.scale = 0.01, v.bias = -3;
-        isogi_context plain = {.threads = 1, .force_path = 1};
+        isogi_context plain = {.threads = 1, .force_path = 1}, fast = {.threads = 1, .force_path = path};
         isogi_pyramid *a = NULL, *b = NULL;
-        isogi_vol_build(&a, &v, NULL);
+        isogi_vol_build(&a, &v, &fast);
         isogi_vol_build(&b, &v, &plain);
         field f = {{size[0], size[1], size[2]}, NULL, {0}, NULL};
         for (int i = 0; i < (LONG_SUITE ? 200000 : 20000); i++) {
@@ -262,6 +262,10 @@ TEST(fast_and_plain_walks_agree) {
     /* a ray that grazes within rounding (1e-12 of a cell) may be seen either way */
     CHECK(different * 100000 <= hits && hits > 20000, "%ld of %ld differ", different, hits);
 }
+
+TEST(the_best_and_the_plain_walk_agree) { compare_walks(0); }
+TEST(the_portable_and_the_plain_walk_agree) { compare_walks(2); }
+TEST(the_avx2_and_the_plain_walk_agree) { compare_walks(3); }
 
 /* ---- no leaks ---- */
 
