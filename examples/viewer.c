@@ -960,15 +960,15 @@ static int shade_surface(viewer *v) {
 
 /* ---- volume rendering --------------------------------------------------------------------------------------------------------------------------------- */
 
-/* For a volume of which nothing is known: matter from the isovalue up, warmer where it is denser. In data space an isosurface and a
-   little of everything. `thickness`: extinction that makes 1/30 of the box's diagonal half opaque at the top of the range. */
+/* For a volume of which nothing is known: matter from the isovalue up, warmer where it is denser. In data space, where extinction is
+   per unit of data, an isosurface and a little of everything. `thickness`: extinction that makes 1/30 of the box's diagonal half opaque at the top of the range. */
 static int default_transfer(viewer *v) {
     char text[1024];
     double low = v->range[0], high = v->range[1], iso = v->isovalue, width = high - low, thickness = 20 / v->radius;
     if (!(iso > low && iso < high)) iso = 0.5 * (low + high);
     if (v->o.mode == SCALE_INVARIANT)
-        snprintf(text, sizeof text, "%.17g %.9g .25 .45 .9\n%.17g %.9g .8 .8 .8\n%.17g %.9g .95 .55 .2\npeak %.17g .5 .9 .85 .75\n", low, 0.5 / width, iso,
-                 0.7 / width, high, 1.0 / width, iso);
+        snprintf(text, sizeof text, "%.17g %.9g .25 .45 .9\n%.17g %.9g .8 .8 .8\n%.17g %.9g .95 .55 .2\npeak %.17g .6 .95 .88 .75\n", low, 0.35 / width, iso,
+                 0.45 / width, high, 0.8 / width, iso);
     else
         snprintf(text, sizeof text, "%.17g 0 .5 .6 .75\n%.17g 0 .5 .6 .75\n%.17g %.9g .8 .75 .68\n%.17g %.9g 1 .75 .4\n", low, iso - 0.08 * (iso - low), iso,
                  0.4 * thickness, high, thickness);
@@ -977,9 +977,9 @@ static int default_transfer(viewer *v) {
 
 static int set_transfer(viewer *v) {
     const scene *s = v->o.scene;
-    const char *text = s && s->transfer ? s->transfer : v->shape && v->o.mode == DVR ? v->shape->transfer : NULL;
+    const char *text = s && s->transfer ? s->transfer : v->shape && (v->o.mode == DVR || !strncmp(v->shape->transfer, "peak", 4)) ? v->shape->transfer : NULL;
     if (v->o.tf) return transfer_read(v->o.tf, &v->transfer, v->error);
-    if (v->o.mode == DVR && text) return transfer_parse(text, &v->transfer, v->error);
+    if (text && (v->o.mode == DVR || !strncmp(text, "peak", 4))) return transfer_parse(text, &v->transfer, v->error);
     return default_transfer(v);
 }
 
