@@ -1749,6 +1749,33 @@ ISOGI_VOL__TARGET("avx2") static int isogi_vol__mixed_cell_avx2(isogi_vol__walk 
 }
 #endif
 
+/* ==== thresholds ===================================================================================================== */
+
+/* The smallest raw value that is inside, for code that looks at raw voxels: inside is raw >= threshold. */
+typedef struct isogi_vol__raw_isovalue {
+    union { int i; float f; double d; } threshold;
+} isogi_vol__raw_isovalue;
+
+/* Raw integers are tried around the quotient, since scale * raw + bias rounds. 0: not known. */
+static int isogi_vol__threshold(isogi_vol__raw_isovalue *k, const isogi_volume *v, double isovalue) {
+    static const int least[4] = {0, -128, 0, -32768}, largest[4] = {255, 127, 65535, 32767};
+    int plain = v->scale >= 1 && v->scale <= 1 && v->bias >= 0 && v->bias <= 0, i, tries;
+    double raw;
+    if (v->type == ISOGI_F64) return k->threshold.d = isovalue, plain;
+    if (v->type == ISOGI_F32) {
+        k->threshold.f = isogi_vol__float_above(isovalue);
+        return plain;
+    }
+    raw = plain ? isovalue : (isovalue - v->bias) / v->scale;
+    if (!(raw > least[v->type] - 2.0)) raw = least[v->type] - 2.0;
+    if (!(raw < largest[v->type] + 2.0)) raw = largest[v->type] + 2.0;
+    i = (int)ceil(raw);
+    for (tries = 0; tries < 4 && v->scale * (i - 1) + v->bias >= isovalue; tries++) i--;
+    for (tries = 0; tries < 4 && v->scale * i + v->bias < isovalue; tries++) i++;
+    k->threshold.i = i;
+    return 1;
+}
+
 /* ==== fast traversal ================================================================================================= */
 
 /* The same walk, in integer time. Axes along which the ray falls are mirrored, so that every step goes up; plane k of an axis is
@@ -2559,7 +2586,7 @@ typedef struct isogi_vol__mesher {
     double isovalue;
     int closed, mirrored, nx, ny, nz;
     int compares_raw; /* raw.threshold tells what is inside */
-    isogi_vol__ticks raw;
+    isogi_vol__raw_isovalue raw;
     size_t words, rows, rows_per_task, block_words; /* 64-bit words for a row of voxels, of blocks */
     isogi_vol__case *cases;
     isogi_vol__mesh_row *row;
