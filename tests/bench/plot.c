@@ -149,7 +149,7 @@ static int overlaps(const box *boxes, int count, const box *b) {
 
 /* Puts a setting beside its point where nothing else stands; nowhere rather than on top of something. */
 static void label(double x, double y, const char *words, const char *colour, const box *frame, box *taken, int *count) {
-    static const double shift[8][2] = {{8, -6}, {8, 14}, {-8, -6}, {-8, 14}, {8, 4}, {-8, 4}, {0, -11}, {0, 19}};
+    static const double shift[8][2] = {{8, -6}, {-8, 14}, {8, 14}, {-8, -6}, {8, 4}, {-8, 4}, {0, -11}, {0, 19}};
     char shown[40], style[120];
     double width;
     snprintf(shown, sizeof shown, "%.30s", words);
@@ -244,9 +244,10 @@ static void panel(const char *name, double left, double top) {
             double px = picked[i]->error > 0 ? place(&x, picked[i]->error) : frame.x0 + 15, py = place(&y, picked[i]->seconds);
             char rate[80];
             rate_text(picked[i], rate, sizeof rate);
-            fprintf(svg, "<circle cx=\"%.1f\" cy=\"%.1f\" r=\"%s\" fill=\"%s\"><title>", px, py, m ? "3" : "4", colours[m]);
+            fputs("<g><title>", svg);
             put(method[m]), put(", "), put(picked[i]->setting), put(", "), put(rate);
-            fprintf(svg, ", %.4g s, error %.4g</title></circle>\n", picked[i]->seconds, picked[i]->error);
+            fprintf(svg, ", %.4g s, error %.4g</title><circle cx=\"%.1f\" cy=\"%.1f\" r=\"%s\" fill=\"%s\"/></g>\n", picked[i]->seconds, picked[i]->error, px, py,
+                    m ? "3" : "4", colours[m]);
         }
     }
     for (int m = 0; m < methods; m++) {
