@@ -744,6 +744,26 @@ TEST(cells_with_a_voxel_that_is_not_finite_are_left_out) {
     }
 }
 
+/* Rows are worked on 64 voxels at a time: nothing may show where one word ends and the next begins. */
+TEST(rows_of_any_length) {
+    const int lengths[] = {63, 64, 65, 66, 67, 127, 128, 129, 130, 131, 193, 257};
+    isogi_mesh open = {0};
+    for (int i = 0; i < 12; i++) {
+        test_random r = {(uint64_t)i};
+        field f = field_new(lengths[i], 3 + i % 3, 4);
+        field_fill(&f, NOISE, &r);
+        field_build(&f, &serial);
+        check_topology(&open, &f, 0, NOISE, (uint64_t)i);
+        isogi_mesh mesh = mesh_of(&f, 0, 0, 1);
+        shape s = mesh_shape(&mesh, NULL, NULL, NULL);
+        CHECK(s.bad_edges == 0 && s.open_edges == 0 && s.bad_vertices == 0, "%d voxels: %ld bad edges, %ld open, %ld bad vertices", lengths[i],
+              s.bad_edges, s.open_edges, s.bad_vertices);
+        isogi_vol_mesh_free(f.pyramid, &mesh);
+        field_free(&f);
+    }
+    isogi_vol_mesh_free(NULL, &open);
+}
+
 TEST(thin_volumes) {
     for (int i = 0; i < 27; i++) {
         field f = field_new(1 + i % 3, 1 + i / 3 % 3, 1 + i / 9);
