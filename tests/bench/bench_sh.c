@@ -1,0 +1,303 @@
+/* Run time against error of isogi_sh.h.
+
+       build/bench/bench_sh [--quick] OUT.csv
+
+   One thread, CPU seconds, data in cache, the best of several medians; error is the largest absolute one against
+   tests/reference_sh.h (128 bits). Directions include poles, axes and directions 1e-8 off them. Methods: default is what a caller
+   gets; plain and avx2 are the same calls held to a lower instruction level. */
+static int bench_level = 99;
+#define ISOGI_SH_LEVEL bench_level
+#define ISOGI_SH_IMPLEMENTATION
+#include "isogi_sh.h"
+#include "reference_sh.h"
+#include <stdint.h>
+#include <stdio.h>
+#include <string.h>
+#include <time.h>
+
+enum { MAX_ORDER = 21, MAX_N = MAX_ORDER * MAX_ORDER, MAX_COUNT = 1024, MATRICES = 16, WIDTH = 1024, HEIGHT = 512 };
+
+static FILE *csv;
+static int quick;
+static uint64_t random_state = 1;
+static float directions[MAX_COUNT][3], soa[3][MAX_COUNT], basis[MAX_N * MAX_COUNT], matrix[MATRICES][9], image[WIDTH * HEIGHT * 3];
+static double directions64[MAX_COUNT][3], basis64[MAX_N * MAX_COUNT], matrix64[MATRICES][9];
+static float in[MAX_N * 64], in2[MAX_N * 64], out[MAX_N * 64];
+static double in64[MAX_N], out64[MAX_N];
+static float rotation[ISOGI_SH_ROTATION_COUNT(16)];
+static double rotation64[ISOGI_SH_ROTATION_COUNT(16)];
+
+static double random_unit(void) {
+    uint64_t z = (random_state += 0x9e3779b97f4a7c15u);
+    z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9u;
+    z = (z ^ (z >> 27)) * 0x94d049bb133111ebu;
+    return (double)((z ^ (z >> 31)) >> 11) * 0x1p-53;
+}
+
+static double cpu_seconds(void) {
+    struct timespec t;
+    clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &t);
+    return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
+}
+
+static int compare_doubles(const void *a, const void *b) {
+    double x = *(const double *)a, y = *(const double *)b;
+    return (x > y) - (x < y);
+}
+
+/* One case: `run` does `count` operations of order `order`; `error` measures them. */
+typedef struct bench_case {
+    const char *name, *unit;
+    void (*run)(int order, size_t count);
+    double (*error)(int order, size_t count);
+    int order;
+    size_t count;
+    double goal; /* ns an operation */
+} bench_case;
+
+static double seconds_of(const bench_case *c) {
+    double times[9], target = quick ? 0.006 : 0.03;
+    int runs = quick ? 5 : 9, loops = 1;
+    for (;;) {
+        double begun = cpu_seconds(), taken;
+        for (int i = 0; i < loops; i++) c->run(c->order, c->count);
+        taken = cpu_seconds() - begun;
+        if (taken > target) break;
+        loops = taken > target / 50 ? (int)(1.2 * target / taken * loops) + 1 : loops * 10;
+    }
+    for (int r = 0; r < runs; r++) {
+        double begun = cpu_seconds();
+        for (int i = 0; i < loops; i++) c->run(c->order, c->count);
+        times[r] = (cpu_seconds() - begun) / loops;
+    }
+    qsort(times, (size_t)runs, sizeof *times, compare_doubles);
+    return times[runs / 2];
+}
+
+static void row(const bench_case *c, const char *method) {
+    double seconds = seconds_of(c), error = c->error(c->order, c->count);
+    fprintf(csv, "isogi_sh.h,%s,%s,,%.6g,%.6g,%zu,%s\n", c->name, method, seconds, error, c->count, c->unit);
+    fflush(csv);
+    fprintf(stderr, "  %-22s %-8s %12.2f ns   goal %10.1f ns   error %.2g\n", c->name, method, seconds / (double)c->count * 1e9, c->goal, error);
+}
+
+/* ---- evaluation ---- */
+
+static void run_aos_f32(int order, size_t count) { isogi_sh_eval(basis, order, (const float(*)[3])directions, count); }
+static void run_soa_f32(int order, size_t count) { isogi_sh_eval_soa(basis, order, soa[0], soa[1], soa[2], count); }
+static void run_aos_f64(int order, size_t count) { isogi_sh_eval_f64(basis64, order, (const double(*)[3])directions64, count); }
+
+static double error_of_basis(int order, size_t count, int is_double, int is_soa) {
+    static quad expected[MAX_N];
+    double worst = 0;
+    size_t n = (size_t)(order * order);
+    for (size_t i = 0; i < count; i++) {
+        quad d[3];
+        for (int k = 0; k < 3; k++) d[k] = is_double ? (quad)directions64[i][k] : (quad)directions[i][k];
+        reference_eval(expected, order, d);
+        for (size_t k = 0; k < n; k++) {
+            double error = fabs((double)(expected[k] - (is_double ? (quad)basis64[i * n + k] : (quad)basis[is_soa ? k * count + i : i * n + k])));
+            if (!(error <= worst)) worst = error;
+        }
+    }
+    return worst;
+}
+static double error_aos_f32(int order, size_t count) { return error_of_basis(order, count, 0, 0); }
+static double error_soa_f32(int order, size_t count) { return error_of_basis(order, count, 0, 1); }
+static double error_aos_f64(int order, size_t count) { return error_of_basis(order, count, 1, 0); }
+
+/* ---- rotation: the reference evaluates the input at the direction rotated back, for 32 directions, and the output at the direction ---- */
+
+static quad sum_at(int order, const float *c, const double *c64, const quad d[3]) {
+    static quad y[MAX_N];
+    quad sum = 0;
+    reference_eval(y, order, d);
+    for (int i = 0; i < order * order; i++) sum += y[i] * (c64 ? (quad)c64[i] : (quad)c[i]);
+    return sum;
+}
+
+static double error_of_rotation(int order, const double m[9], int is_double) {
+    double worst = 0;
+    for (int i = 0; i < 32; i++) {
+        quad d[3], back[3];
+        for (int k = 0; k < 3; k++) d[k] = (quad)directions64[100 + i][k];
+        for (int k = 0; k < 3; k++) back[k] = (quad)m[k] * d[0] + (quad)m[3 + k] * d[1] + (quad)m[6 + k] * d[2];
+        quad difference = sum_at(order, out, is_double ? out64 : NULL, d) - sum_at(order, in, is_double ? in64 : NULL, back);
+        worst = fmax(worst, fabs((double)difference));
+    }
+    return worst;
+}
+
+static void run_rotate_f32(int order, size_t count) {
+    for (size_t i = 0; i < count; i++) isogi_sh_rotate(out, in, order, 1, matrix[i % MATRICES]);
+}
+static void run_rotate_f64(int order, size_t count) {
+    for (size_t i = 0; i < count; i++) isogi_sh_rotate_f64(out64, in64, order, 1, matrix64[i % MATRICES]);
+}
+static double error_rotate_f32(int order, size_t count) {
+    double m[9];
+    for (int k = 0; k < 9; k++) m[k] = (double)matrix[(count - 1) % MATRICES][k];
+    return error_of_rotation(order, m, 0);
+}
+static double error_rotate_f64(int order, size_t count) { return error_of_rotation(order, matrix64[(count - 1) % MATRICES], 1); }
+
+static void run_build(int order, size_t count) {
+    for (size_t i = 0; i < count; i++) isogi_sh_rotation_build_f64(rotation64, order, matrix64[i % MATRICES]);
+}
+static double error_build(int order, size_t count) {
+    isogi_sh_rotation_apply_f64(out64, in64, order, 1, rotation64);
+    return error_rotate_f64(order, count);
+}
+static void run_apply(int order, size_t count) {
+    for (size_t i = 0; i < count; i++) isogi_sh_rotation_apply(out, in, order, 1, rotation);
+}
+static double error_apply(int order, size_t count) {
+    double m[9];
+    (void)count;
+    for (int k = 0; k < 9; k++) m[k] = (double)matrix[0][k];
+    return error_of_rotation(order, m, 0);
+}
+
+/* ---- algebra ---- */
+
+static void run_product(int order, size_t count) {
+    for (size_t i = 0; i < count; i++) isogi_sh_product(out, in, in2, order, 1);
+}
+static void run_product_batch(int order, size_t count) { isogi_sh_product(out, in, in2, order, count); }
+
+/* by a product rule in 128 bits: equally spaced azimuths, and latitudes of Fejer's second rule, exact to degree 63 */
+static double error_product(int order, size_t count) {
+    static quad y[MAX_N], expected[MAX_N];
+    double worst = 0, pi = 3.14159265358979323846;
+    int n = order * order, latitudes = 63, longitudes = 3 * order;
+    (void)count;
+    for (int i = 0; i < n; i++) expected[i] = 0;
+    for (int i = 0; i < latitudes; i++) {
+        double theta = pi * (i + 1) / (latitudes + 1), weight = 0;
+        for (int k = 1; k <= (latitudes + 1) / 2; k++) weight += sin((2 * k - 1) * theta) / (2 * k - 1);
+        weight *= 4 * sin(theta) / (latitudes + 1);
+        for (int j = 0; j < longitudes; j++) {
+            double phi = 2 * pi * j / longitudes;
+            quad d[3] = {(quad)(sin(theta) * cos(phi)), (quad)(sin(theta) * sin(phi)), (quad)cos(theta)}, a = 0, b = 0;
+            reference_eval(y, order, d);
+            for (int k = 0; k < n; k++) a += y[k] * (quad)in[k], b += y[k] * (quad)in2[k];
+            for (int k = 0; k < n; k++) expected[k] += (quad)(weight * 2 * pi / longitudes) * a * b * y[k];
+        }
+    }
+    for (int k = 0; k < n; k++) worst = fmax(worst, fabs((double)(expected[k] - (quad)out[k])));
+    return worst;
+}
+
+static void run_zonal(int order, size_t count) {
+    for (size_t i = 0; i < count; i++) isogi_sh_zonal_to_direction(out, order, in, directions[i]);
+}
+static double error_zonal(int order, size_t count) {
+    static quad y[MAX_N];
+    double worst = 0;
+    for (size_t i = 0; i < count; i++) {
+        quad d[3] = {(quad)directions[i][0], (quad)directions[i][1], (quad)directions[i][2]};
+        isogi_sh_zonal_to_direction(out, order, in, directions[i]);
+        reference_eval(y, order, d);
+        for (int l = 0; l < order; l++)
+            for (int k = l * l; k < (l + 1) * (l + 1); k++) {
+                quad expected = y[k] * (quad)in[l] * quad_sqrt(4 * (quad)3.14159265358979323846 / (quad)(2 * l + 1));
+                worst = fmax(worst, fabs((double)(expected - (quad)out[k])));
+            }
+    }
+    return worst;
+}
+
+static void run_sum(int order, size_t count) { isogi_sh_eval_sum(out, in, order, 1, (const float(*)[3])directions, count); }
+static double error_sum(int order, size_t count) {
+    double worst = 0;
+    for (size_t i = 0; i < count; i++) {
+        quad d[3] = {(quad)directions[i][0], (quad)directions[i][1], (quad)directions[i][2]};
+        worst = fmax(worst, fabs((double)(sum_at(order, in, NULL, d) - (quad)out[i])));
+    }
+    return worst;
+}
+
+/* ---- projection: of an image painted with a known expansion, whose coefficients are the answer ---- */
+
+static void run_project(int order, size_t count) {
+    (void)count;
+    isogi_sh_project_equirect(out, order, image, WIDTH, HEIGHT);
+}
+static double error_project(int order, size_t count) {
+    double worst = 0;
+    (void)count;
+    for (int i = 0; i < 3 * order * order; i++) worst = fmax(worst, fabs((double)out[i] - (double)in[i]));
+    return worst;
+}
+
+static void prepare(void) {
+    static const double off[] = {0, 1e-8, -1e-8};
+    double pi = 3.14159265358979323846;
+    for (int i = 0; i < MAX_COUNT; i++) {
+        double z = 2 * random_unit() - 1, phi = 2 * pi * random_unit(), s = sqrt(1 - z * z), d[3] = {s * cos(phi), s * sin(phi), z};
+        if (i < 54) d[i % 3] = i / 3 % 2 ? -1 : 1, d[(i + 1) % 3] = off[i / 6 % 3], d[(i + 2) % 3] = off[i / 18];
+        for (int k = 0; k < 3; k++) directions64[i][k] = d[k], soa[k][i] = directions[i][k] = (float)d[k];
+    }
+    for (int i = 0; i < MATRICES; i++) {
+        double q[4], n = 0;
+        for (int k = 0; k < 4; k++) q[k] = random_unit() - 0.5, n += q[k] * q[k];
+        for (int k = 0; k < 4; k++) q[k] /= sqrt(n);
+        double w = q[0], x = q[1], y = q[2], z = q[3];
+        double m[9] = {1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y), 2 * (x * y + w * z), 1 - 2 * (x * x + z * z),
+                       2 * (y * z - w * x), 2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)};
+        for (int k = 0; k < 9; k++) matrix64[i][k] = m[k], matrix[i][k] = (float)m[k];
+    }
+    for (int i = 0; i < MAX_N * 64; i++) in[i] = (float)(2 * random_unit() - 1), in2[i] = (float)(2 * random_unit() - 1);
+    for (int i = 0; i < MAX_N; i++) in64[i] = 2 * random_unit() - 1;
+    isogi_sh_rotation_build(rotation, 5, matrix[0]);
+    for (int j = 0; j < HEIGHT; j++)
+        for (int i = 0; i < WIDTH; i++) {
+            double u = (i + 0.5) / WIDTH, v = (j + 0.5) / HEIGHT;
+            float d[1][3] = {{(float)(sin(pi * v) * sin(2 * pi * (u - 0.5))), (float)cos(pi * v), (float)(-sin(pi * v) * cos(2 * pi * (u - 0.5)))}};
+            isogi_sh_eval_sum(image + 3 * (j * WIDTH + i), in, 5, 3, (const float(*)[3])d, 1);
+        }
+}
+
+int main(int argc, char **argv) {
+    static const bench_case cases[] = {
+        {"eval-aos-f32-L4", "direction", run_aos_f32, error_aos_f32, 5, 256, 2},
+        {"eval-aos-f32-L10", "direction", run_aos_f32, error_aos_f32, 11, 64, 12},
+        {"eval-aos-f32-L20", "direction", run_aos_f32, error_aos_f32, 21, 64, 60},
+        {"eval-soa-f32-L4", "direction", run_soa_f32, error_soa_f32, 5, 256, 0.9},
+        {"eval-soa-f32-L10", "direction", run_soa_f32, error_soa_f32, 11, 64, 3.5},
+        {"eval-soa-f32-L20", "direction", run_soa_f32, error_soa_f32, 21, 64, 20},
+        {"eval-aos-f64-L4", "direction", run_aos_f64, error_aos_f64, 5, 128, 3},
+        {"eval-aos-f64-L10", "direction", run_aos_f64, error_aos_f64, 11, 64, 20},
+        {"rotate-once-n3", "rotation", run_rotate_f32, error_rotate_f32, 3, 64, 7.5},
+        {"rotate-once-n4", "rotation", run_rotate_f32, error_rotate_f32, 4, 64, 20},
+        {"rotate-once-n5", "rotation", run_rotate_f32, error_rotate_f32, 5, 64, 32},
+        {"rotate-once-n8", "rotation", run_rotate_f64, error_rotate_f64, 8, 16, 550},
+        {"rotate-once-n16", "rotation", run_rotate_f64, error_rotate_f64, 16, 16, 2500},
+        {"rotate-build-n8", "rotation", run_build, error_build, 8, 16, 600},
+        {"rotate-build-n16", "rotation", run_build, error_build, 16, 16, 2500},
+        {"rotate-apply-n5", "rotation", run_apply, error_apply, 5, 64, 9},
+        {"product-n5", "product", run_product, error_product, 5, 16, 140},
+        {"product-batch-n5", "product", run_product_batch, error_product, 5, 64, 20},
+        {"zonal-n5", "lobe", run_zonal, error_zonal, 5, 64, 8},
+        {"sum-n5", "direction", run_sum, error_sum, 5, 256, 5},
+        {"project-equirect-n5", "image", run_project, error_project, 5, 1, 0.6e6},
+    };
+    const char *path = NULL;
+    for (int i = 1; i < argc; i++) {
+        if (!strcmp(argv[i], "--quick")) quick = 1;
+        else path = argv[i];
+    }
+    if (!path || !(csv = fopen(path, "w"))) {
+        fprintf(stderr, "usage: %s [--quick] OUT.csv\n", argv[0]);
+        return 1;
+    }
+    fprintf(csv, "header,case,method,setting,seconds,error,work,unit\n");
+    prepare();
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        row(&cases[i], "default");
+        if (quick) continue;
+        for (bench_level = 0; bench_level < 2; bench_level++) row(&cases[i], bench_level ? "avx2" : "plain");
+        bench_level = 99;
+    }
+    return fclose(csv) ? 1 : 0;
+}
