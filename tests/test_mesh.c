@@ -744,6 +744,22 @@ TEST(cells_with_a_voxel_that_is_not_finite_are_left_out) {
     }
 }
 
+/* Blocks that the pyramid knows to be on one side are not read: what is put there behind its back is not seen. A block's diagonal is
+   below 7 voxels, so none that meets the surface reaches further than that. */
+TEST(blocks_without_surface_are_not_read) {
+    field f = known_field(SPHERE);
+    long changed = 0;
+    field_build(&f, &serial);
+    isogi_mesh before = mesh_of(&f, 0, 0, 0);
+    for (int v = 0; v < 38 * 33 * 31; v++)
+        if (fabs(f.value[v]) > 7) f.value[v] = -f.value[v], changed++;
+    isogi_mesh after = mesh_of(&f, 0, 0, 0);
+    CHECK(mesh_same(&before, &after) && changed > 1000, "%zu triangles, %zu; %ld voxels changed", before.triangle_count, after.triangle_count,
+          changed);
+    isogi_vol_mesh_free(f.pyramid, &before), isogi_vol_mesh_free(f.pyramid, &after);
+    field_free(&f);
+}
+
 /* Rows are worked on 64 voxels at a time: nothing may show where one word ends and the next begins. */
 TEST(rows_of_any_length) {
     const int lengths[] = {63, 64, 65, 66, 67, 127, 128, 129, 130, 131, 193, 257};
