@@ -23,10 +23,10 @@ if [ "$VOLUME" ]; then
     picture "$name" "$name, global light" "$VOLUME" --mode irradiance ${ISO:+--iso "$ISO"}
 else
     picture engine-block-phong "An engine block, light by the normal alone: the usual picture, to compare with" \
-        procedural:engine-block --mode phong
-    picture engine-block "The same under a sky and a sun, with shadows and every reflection" procedural:engine-block
-    picture skull "A skull, the same light" procedural:skull
-    picture gyroid "A gyroid: most of its light has been reflected a few times" procedural:gyroid
+        procedural:engine-block --mode phong --size 640x640
+    picture engine-block "The same under a sky and a sun, with shadows and every reflection" procedural:engine-block --size 640x640
+    picture skull "A skull, the same light" procedural:skull --size 640x640
+    picture gyroid "A gyroid: most of its light has been reflected a few times" procedural:gyroid --size 640x640
     picture hydrogen "A hydrogen orbital, volume rendered, shaded by what each point sees of the sky" procedural:hydrogen --mode dvr
 fi
 echo "$(($(date +%s) - begun)) s in all; VOLUME=FILE [ISO=VALUE] shows a volume of your own: make demo VOLUME=head_256x256x99_uint8.raw"

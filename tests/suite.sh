@@ -142,6 +142,7 @@ variants() {
     variant fast-math "$CC" "-O2 -ffast-math" '' $units
     variant no-threads "$CC" "-O2 $CONTRACT_OFF -DISOGI_NO_THREADS" '' $units
     variant no-simd "$CC" "-O2 $CONTRACT_OFF -DISOGI_NO_SIMD" '' $units
+    variant sh-level-1 "$CC" "-O2 $CONTRACT_OFF -DISOGI_SH_LEVEL=1" '' $(echo "$units" | tr ' ' '\n' | grep 'test_sh$')
     if have clang; then
         variant clang clang "-O2 $CONTRACT_OFF" '' $units
         variant address+undefined clang "-O1 -g $CONTRACT_OFF -fsanitize=address,undefined,float-cast-overflow -fno-sanitize-recover=all" '' $units
