@@ -230,7 +230,7 @@ static const option option_list[] = {
     {"--tf", "FILE", "transfer function: lines \"value extinction r g b\" or \"peak value opacity r g b\"", TEXT, AT(tf), 0, 0, 0, 0, 0, ""},
     {"--shading", "NAME", "for dvr and scale-invariant: unlit, visibility, local", OTHER, 0, AT(has_shading), 0, 0, 0, parse_shading, "unlit visibility local"},
     {"--exposure", "X", "factor on the light, in place of the automatic exposure", NUMBERS, AT(exposure), 0, 1, 1e-12, 1e12, 0, "a number above 0"},
-    {"--aa", "N", "samples per pixel side by side; default 4 (1 for dvr)", INTEGER, AT(antialias), 0, 1, 1, 64, 0, "a whole number, 1 to 64"},
+    {"--aa", "N", "samples per pixel; default 4 (1 for dvr, where it is rounded down to a square)", INTEGER, AT(antialias), 0, 1, 1, 64, 0, "a whole number, 1 to 64"},
     {"--threads", "N", "0 = one per core, the default", INTEGER, AT(threads), 0, 1, 0, 256, 0, "a whole number, 0 to 256"},
     {"--stats", 0, "\"key value\" lines on the standard output", FLAG, AT(stats), 0, 0, 0, 0, 0, 0}};
 #define OPTION_COUNT (sizeof option_list / sizeof option_list[0])
@@ -1067,7 +1067,7 @@ static int check_surface(viewer *v) {
 static int run(viewer *v, int argc, char **argv) {
     struct rusage usage;
     if (!parse_arguments(v, argc, argv) || !file_writable(v->o.out, v->error)) return 0;
-    if (!v->o.antialias) v->o.antialias = v->o.mode >= DVR ? 1 : 4;
+    if (!v->o.antialias) v->o.antialias = v->o.mode == DVR ? 1 : 4;
     v->context.alloc = counted_alloc, v->context.release = counted_release, v->context.user = v, v->context.threads = v->o.threads;
     stat_line(v, "mode", "%s", mode_name[v->o.mode]);
     if (!load_volume(v)) return 0;
