@@ -501,12 +501,334 @@ static void isogi_sh__eval_block(const isogi_sh__output *out, size_t first, int 
     }
 }
 
+/* ==== batches on vector units ========================================================================================= */
+
+/* The same recursions with one direction in each lane, for orders up to ISOGI_SH__TABLE_ORDER, whose constants are tabled. Vectors are
+   those of gcc and clang; each function names its instruction set, so that no compiler flag is needed, and runs only where the
+   processor has it. Blocks with lengths out of range, tails and higher orders go through the plain code above. */
+#if !defined(ISOGI_NO_SIMD) && defined(__x86_64__) && (defined(__clang__) || (defined(__GNUC__) && __GNUC__ >= 12))
+#define ISOGI_SH__SIMD 1
+#define ISOGI_SH__TABLE_ORDER 21
+
+/* Written by tests/generate_sh.h, which tests/test_sh.c compares with this: for each degree l of m = 0 the factors (l-1)/l, -(2l-1)/l,
+   sqrt((2l+1)/(4 pi)); then for each m > 0 the diagonal q_m and for each l > m the factors a_l, -a_l / a_{l-1} of the recursion. */
+/* generated: begin */
+static const float isogi_sh__table_f32[463] = {
+    0.0f, 0.0f, 0.282094792f, 0.0f, -1.0f, 0.488602512f, 0.5f, -1.5f, 0.630783131f, 0.666666667f, -1.66666667f, 0.746352665f,
+    0.75f, -1.75f, 0.846284375f, 0.8f, -1.8f, 0.93560258f, 0.833333333f, -1.83333333f, 1.01710724f, 0.857142857f, -1.85714286f,
+    1.09254843f, 0.875f, -1.875f, 1.16310662f, 0.888888889f, -1.88888889f, 1.22962269f, 0.9f, -1.9f, 1.29272074f, 0.909090909f,
+    -1.90909091f, 1.35287909f, 0.916666667f, -1.91666667f, 1.41047396f, 0.923076923f, -1.92307692f, 1.46580754f, 0.928571429f,
+    -1.92857143f, 1.51912694f, 0.933333333f, -1.93333333f, 1.57063733f, 0.9375f, -1.9375f, 1.6205112f, 0.941176471f,
+    -1.94117647f, 1.66889529f, 0.944444444f, -1.94444444f, 1.71591563f, 0.947368421f, -1.94736842f, 1.76168141f, 0.95f, -1.95f,
+    1.806288f, 0.488602512f, 2.23606798f, 0.0f, 2.09165007f, -0.935414347f, 2.04939015f, -0.979795897f, 2.0310096f,
+    -0.991031209f, 2.02131499f, -0.995226703f, 2.01556444f, -0.997155044f, 2.01186954f, -0.998166818f, 2.00935313f,
+    -0.998749218f, 2.00756146f, -0.999108337f, 2.00624026f, -0.999341889f, 2.0052379f, -0.999500375f, 2.00445931f,
+    -0.999611726f, 2.00384246f, -0.99969226f, 2.00334542f, -0.999751953f, 2.00293902f, -0.99979714f, 2.00260247f, -0.999831975f,
+    2.00232064f, -0.999859264f, 2.00208225f, -0.999880945f, 2.00187882f, -0.999898389f, 0.546274215f, 2.64575131f, 0.0f,
+    2.29128785f, -0.866025404f, 2.17124059f, -0.947607083f, 2.11394182f, -0.97361012f, 2.081666f, -0.984731928f, 2.06155281f,
+    -0.990337938f, 2.04812236f, -0.993485273f, 2.0386883f, -0.995393803f, 2.0317985f, -0.99662047f, 2.02660871f, -0.997445717f,
+    2.02259959f, -0.998021759f, 2.0194368f, -0.998436277f, 2.01689695f, -0.998742296f, 2.014826f, -0.9989732f, 2.01311489f,
+    -0.999150743f, 2.01168462f, -0.99928952f, 2.01047676f, -0.99939958f, 2.00944738f, -0.999487993f, 0.59004359f, 3.0f, 0.0f,
+    2.48746859f, -0.829156198f, 2.30136835f, -0.925184889f, 2.20794022f, -0.959403224f, 2.15322169f, -0.975217387f, 2.11804417f,
+    -0.983662845f, 2.09394732f, -0.988623065f, 2.07665597f, -0.99174222f, 2.06379729f, -0.99380799f, 2.05395959f, -0.995233204f,
+    2.04625653f, -0.996249652f, 2.04010711f, -0.996994799f, 2.0351168f, -0.997553898f, 2.0310096f, -0.997981834f, 2.02758751f,
+    -0.998315079f, 2.02470537f, -0.998578535f, 2.0222547f, -0.998789618f, 0.625835735f, 3.31662479f, 0.0f, 2.67394839f,
+    -0.806225775f, 2.43086217f, -0.909090909f, 2.30488611f, -0.948176387f, 2.22917715f, -0.96715284f, 2.17944947f,
+    -0.977692361f, 2.14476106f, -0.984083865f, 2.11947812f, -0.988211769f, 2.10042013f, -0.991008167f, 2.08566536f,
+    -0.992975327f, 2.07399021f, -0.994402195f, 2.06458228f, -0.99546385f, 2.05688338f, -0.996270963f, 2.05049883f,
+    -0.996896009f, 2.04514271f, -0.997387893f, 2.04060346f, -0.997780476f, 0.656382057f, 3.60555128f, 0.0f, 2.85043856f,
+    -0.790569415f, 2.55704156f, -0.897069522f, 2.40163635f, -0.939224604f, 2.30651252f, -0.960392077f, 2.24304481f,
+    -0.972483257f, 2.19816577f, -0.979991915f, 2.16506351f, -0.98494096f, 2.13984751f, -0.988353229f, 2.1201415f, -0.99079093f,
+    2.10441712f, -0.992583334f, 2.09165007f, -0.99393321f, 2.08113038f, -0.99497063f, 2.07235201f, -0.99578192f, 2.06494552f,
+    -0.996426046f, 0.683184105f, 3.87298335f, 0.0f, 3.01780431f, -0.779193722f, 2.67913751f, -0.887777082f, 2.49687304f,
+    -0.931968978f, 2.38376864f, -0.954701581f, 2.30739552f, -0.967961184f, 2.25281778f, -0.976346607f, 2.21218218f,
+    -0.981962321f, 2.18096624f, -0.985889075f, 2.15638587f, -0.988729592f, 2.13663693f, -0.990841653f, 2.12050177f,
+    -0.992448338f, 2.10713075f, -0.993694405f, 2.09591439f, -0.994676952f, 0.707162733f, 4.12310563f, 0.0f, 3.17706626f,
+    -0.77055175f, 2.79705728f, -0.880389973f, 2.59004504f, -0.925989277f, 2.46020966f, -0.94987138f, 2.37170825f, -0.96402688f,
+    2.30792777f, -0.973107792f, 2.26007844f, -0.979267403f, 2.22306747f, -0.983624035f, 2.1937411f, -0.986808149f, 2.17004399f,
+    -0.989197855f, 2.15058132f, -0.991031209f, 2.13437475f, -0.992464098f, 0.72892666f, 4.35889894f, 0.0f, 3.32916406f,
+    -0.763762616f, 2.91095933f, -0.874381459f, 2.68095132f, -0.920985497f, 2.53546276f, -0.945732487f, 2.43553242f,
+    -0.960586942f, 2.36301734f, -0.970226187f, 2.30827316f, -0.976832937f, 2.26568606f, -0.981550233f, 2.2317637f,
+    -0.985027776f, 2.20422001f, -0.987658329f, 2.18149686f, -0.989691071f, 0.748900952f, 4.58257569f, 0.0f, 3.47491007f,
+    -0.758287544f, 3.02108989f, -0.869400885f, 2.76955855f, -0.916741523f, 2.60934774f, -0.942152946f, 2.49861073f,
+    -0.957561418f, 2.4177912f, -0.967654215f, 2.35645594f, -0.974631699f, 2.30850993f, -0.979653338f, 2.27014789f,
+    -0.983382335f, 2.23887007f, -0.986222123f, 0.767395118f, 4.79583152f, 0.0f, 3.61499403f, -0.753778361f, 3.12771621f,
+    -0.865206467f, 2.85591491f, -0.913099118f, 2.68179045f, -0.939030233f, 2.56079915f, -0.954884136f, 2.47206616f,
+    -0.965349492f, 2.40442301f, -0.972636997f, 2.35132636f, -0.977917092f, 2.30867928f, -0.981862543f, 0.784642106f, 5.0f, 0.0f,
+    3.75f, -0.75f, 3.23109888f, -0.861626369f, 2.94010727f, -0.909940357f, 2.75277638f, -0.936284333f, 2.62202212f,
+    -0.952500953f, 2.52572967f, -0.963275499f, 2.45203997f, -0.970824392f, 2.39398889f, -0.976325394f, 0.800821996f,
+    5.19615242f, 0.0f, 3.88042424f, -0.746787994f, 3.33148097f, -0.858535242f, 3.022239f, -0.907175827f, 2.82232479f,
+    -0.933852284f, 2.68224616f, -0.950367641f, 2.57871472f, -0.961401216f, 2.49921863f, -0.969172205f, 0.816077119f,
+    5.38516481f, 0.0f, 4.00669083f, -0.744023809f, 3.42908453f, -0.855839562f, 3.10241841f, -0.90473664f, 2.89047379f,
+    -0.931684062f, 2.74146402f, -0.94844798f, 2.63098421f, -0.959700433f, 0.830522083f, 5.56776436f, 0.0f, 4.12916456f,
+    -0.741619849f, 3.5241105f, -0.853468165f, 3.18075266f, -0.902568935f, 2.95727147f, -0.929739525f, 2.79968486f,
+    -0.946712158f, 0.844250651f, 5.74456265f, 0.0f, 4.24816137f, -0.739509973f, 3.61673998f, -0.85136596f, 3.25734464f,
+    -0.900630032f, 3.02277073f, -0.927986154f, 0.857340589f, 5.91607978f, 0.0f, 4.36395665f, -0.737643306f, 3.70713598f,
+    -0.849489643f, 3.3322915f, -0.898885697f, 0.869857172f, 6.08276253f, 0.0f, 4.47679201f, -0.735980072f, 3.79544535f,
+    -0.84780471f, 0.881855769f, 6.244998f, 0.0f, 4.5868806f, -0.734488723f, 0.893383784f, 6.40312424f, 0.0f, 0.904482145f,
+};
+static const double isogi_sh__table_f64[463] = {
+    0.0, 0.0, 0.28209479177387814, 0.0, -1.0, 0.48860251190291992, 0.5, -1.5, 0.63078313050503998, 0.66666666666666663,
+    -1.6666666666666667, 0.7463526651802308, 0.75, -1.75, 0.84628437532163447, 0.80000000000000004, -1.8, 0.9356025796273888,
+    0.83333333333333337, -1.8333333333333333, 1.0171072362820548, 0.8571428571428571, -1.8571428571428572, 1.0925484305920792,
+    0.875, -1.875, 1.1631066229203195, 0.88888888888888884, -1.8888888888888888, 1.2296226898414837, 0.90000000000000002,
+    -1.8999999999999999, 1.2927207364566027, 0.90909090909090906, -1.9090909090909092, 1.3528790949515024, 0.91666666666666663,
+    -1.9166666666666667, 1.4104739588693906, 0.92307692307692313, -1.9230769230769231, 1.4658075357087597, 0.9285714285714286,
+    -1.9285714285714286, 1.5191269449366245, 0.93333333333333335, -1.9333333333333333, 1.5706373285785544, 0.9375, -1.9375,
+    1.6205112036071436, 0.94117647058823528, -1.9411764705882353, 1.6688952945311364, 0.94444444444444442, -1.9444444444444444,
+    1.7159156293944244, 0.94736842105263153, -1.9473684210526316, 1.7616814099864819, 0.94999999999999996, -1.95,
+    1.8062879984608917, 0.48860251190291992, 2.2360679774997898, 0.0, 2.0916500663351889, -0.93541434669348533,
+    2.0493901531919199, -0.9797958971132712, 2.0310096011589902, -0.99103120896511487, 2.0213149892370277, -0.99522670305623862,
+    2.0155644370746373, -0.99715504402183208, 2.0118695404073912, -0.99816681789017425, 2.0093531297410121,
+    -0.99874921777190895, 2.0075614636426526, -0.99910833687128453, 2.0062402647738877, -0.99934188870792151,
+    2.0052378963551982, -0.9995003746877732, 2.0044593143431828, -0.99961172586383362, 2.0038424627162224, -0.99969226034045866,
+    2.0033454163331039, -0.99975195336341716, 2.0029390170153341, -0.99979713966725037, 2.0026024734496528,
+    -0.99983197513113353, 2.0023206350873464, -0.99985926394976399, 2.0020822493927, -0.99988094529394089, 2.0018788167600157,
+    -0.99989838947288712, 0.54627421529603959, 2.6457513110645907, 0.0, 2.2912878474779199, -0.8660254037844386,
+    2.1712405933672376, -0.94760708295868568, 2.1139418156609704, -0.97361012046232687, 2.0816659994661326, -0.9847319278346619,
+    2.0615528128088303, -0.9903379376602871, 2.0481223583578192, -0.99348527267040398, 2.0386883037875112, -0.99539380324041182,
+    2.0317984959648752, -0.99662047022596034, 2.026608708444444, -0.99744571741206722, 2.0225995873897262, -0.99802175869569076,
+    2.0194368026754388, -0.99843627738579288, 2.0168969490698876, -0.99874229606879183, 2.0148259998133362, -0.9989732002631535,
+    2.0131148946216082, -0.99915074294659367, 2.0116846174288852, -0.99928952033659668, 2.0104767610501466,
+    -0.99939957965166426, 2.0094473837049796, -0.99948799341275174, 0.59004358992664352, 3.0, 0.0, 2.4874685927665499,
+    -0.82915619758884995, 2.3013683530231086, -0.92518488865161452, 2.2079402165819619, -0.95940322360024699,
+    2.1532216876958201, -0.97521738656001777, 2.1180441711898057, -0.98366284497920964, 2.0939473213563384,
+    -0.98862306548596146, 2.0766559657295187, -0.99174222032690906, 2.0637972912229676, -0.99380798999990649,
+    2.0539595906443728, -0.9952332040455556, 2.0462565272714635, -0.99624965193668058, 2.0401071141087268, -0.99699479851094885,
+    2.0351168037383749, -0.99755389786357773, 2.0310096011589902, -0.99798183447169209, 2.0275875100994067,
+    -0.99831507883683523, 2.024705365770985, -0.99857853517341888, 2.0222546987202588, -0.99878961794038945,
+    0.62583573544917614, 3.3166247903553998, 0.0, 2.6739483914241875, -0.80622577482985491, 2.4308621740219887,
+    -0.90909090909090906, 2.3048861143232218, -0.94817638735546539, 2.229177150706235, -0.96715283972318222, 2.179449471770337,
+    -0.97769236109380364, 2.1447610589527217, -0.98408386463328368, 2.1194781197266463, -0.98821176880261852,
+    2.1004201260420148, -0.99100816681840076, 2.0856653614614209, -0.99297532698451274, 2.0739902137422357,
+    -0.99440219512922989, 2.0645822822062576, -0.99546384960081247, 2.0568833780186058, -0.99627096277343574, 2.050498830661811,
+    -0.99689600906642317, 2.0451427078940418, -0.99738789279580298, 2.0406034646643136, -0.99778047604589781,
+    0.65638205684017015, 3.6055512754639891, 0.0, 2.8504385627478448, -0.79056941504209488, 2.5570415597837939,
+    -0.89706952228389236, 2.4016363469220612, -0.93922460420437093, 2.3065125189341593, -0.9603920767980495, 2.2430448056157952,
+    -0.97248325651937384, 2.1981657747106436, -0.97999191510005046, 2.1650635094610968, -0.9849409604906143, 2.1398475105532762,
+    -0.98835322899414757, 2.1201415047114192, -0.99079092984678996, 2.1044171232366051, -0.99258333397093024,
+    2.0916500663351889, -0.99393320993236345, 2.0811303848941725, -0.9949706303122452, 2.0723520109148583, -0.99578192022804934,
+    2.0649455198624489, -0.99642604585832906, 0.6831841051919143, 3.872983346207417, 0.0, 3.017804310611087,
+    -0.77919372247397956, 2.6791375063213492, -0.88777708246391906, 2.4968730444297722, -0.93196897827695324,
+    2.3837686425440854, -0.95470158078801415, 2.3073955174772429, -0.96796118394051334, 2.2528177844479149,
+    -0.97634660697919706, 2.2121821805628938, -0.98196232106939829, 2.1809662438042814, -0.98588907503509982,
+    2.1563858652847823, -0.98872959240459257, 2.1366369348357592, -0.99084165280112557, 2.1205017749999122,
+    -0.99244833805276922, 2.1071307505705477, -0.99369440545299004, 2.0959143930173156, -0.99467695227256547,
+    0.70716273252459616, 4.1231056256176606, 0.0, 3.1770662567847086, -0.770551750371122, 2.7970572771691153,
+    -0.8803899733585745, 2.5900450446533423, -0.92598927658525143, 2.460209661583209, -0.94987138029195528, 2.3717082451262845,
+    -0.96402688037572715, 2.3079277744862159, -0.97310779233865152, 2.2600784378986818, -0.97926740294193726,
+    2.2230674720995864, -0.98362403482177097, 2.1937410968480306, -0.98680814882156564, 2.1700439878239588,
+    -0.98919785518075953, 2.1505813167606567, -0.99103120896511487, 2.1343747458109497, -0.99246409757984944,
+    0.72892666017482988, 4.358898943540674, 0.0, 3.3291640592396963, -0.76376261582597338, 2.9109593282157542,
+    -0.87438145925453414, 2.6809513236909019, -0.92098549701625909, 2.5354627641855498, -0.94573248748692074,
+    2.4355324226579662, -0.96058694178469484, 2.363017336304797, -0.97022618722766529, 2.3082731640774234, -0.97683293669229676,
+    2.2656860623955239, -0.98155023315928858, 2.2317637040621552, -0.98502777640009742, 2.2042200113840402,
+    -0.98765832931686226, 2.1814968648679218, -0.98969107149070357, 0.74890095185318828, 4.5825756949558398, 0.0,
+    3.4749100707788108, -0.758287544405155, 3.0210898905832191, -0.86940088492883505, 2.7695585470349866, -0.91674152287482091,
+    2.6093477445855915, -0.94215294613615863, 2.4986107250941583, -0.9575614175146977, 2.4177911997760035, -0.96765421499777271,
+    2.3564559438666821, -0.97463169858712206, 2.308509932184803, -0.9796533383929068, 2.2701478869385201, -0.9833823347643228,
+    2.2388700687965297, -0.98622212309517365, 0.76739511822199002, 4.7958315233127191, 0.0, 3.6149940274061061,
+    -0.75377836144440902, 3.1277162108561214, -0.86520646704923476, 2.8559149146989657, -0.9130991183874837, 2.6817904466978773,
+    -0.93903023262181384, 2.5607991541103545, -0.9548841361798045, 2.4720661623652211, -0.9653494919339114, 2.4044230077089179,
+    -0.97263699666048442, 2.351326355949745, -0.9779170921302377, 2.3086792761230392, -0.98186254336034939, 0.78464210578719684,
+    5.0, 0.0, 3.75, -0.75, 3.2310988842807022, -0.86162636914152069, 2.9401072717216916, -0.90994035683194807,
+    2.7527763762750106, -0.93628433314374193, 2.6220221204253789, -0.95250095250142874, 2.5257296658248256, -0.9632754987646972,
+    2.4520399670478454, -0.97082439194737991, 2.393988887964797, -0.97632539442130717, 0.80082199578397173, 5.196152422706632,
+    0.0, 3.8804242432615932, -0.74678799380567684, 3.3314809667922112, -0.85853524201055353, 3.0222389997200043,
+    -0.90717582656041185, 2.8223247937435034, -0.93385228435109813, 2.6822461565718467, -0.9503676410729972, 2.5787147157554005,
+    -0.96140121570767056, 2.4992186278915258, -0.96917220529352444, 0.81607711883762835, 5.3851648071345037, 0.0,
+    4.0066908326662078, -0.74402380914284494, 3.4290845264669656, -0.85583956179247289, 3.1024184114977142,
+    -0.90473663963430495, 2.8904737863674561, -0.93168406158731498, 2.7414640249326636, -0.94844798034925004,
+    2.6309842116740119, -0.9597004329606823, 0.83052208306452402, 5.5677643628300215, 0.0, 4.1291645644125152,
+    -0.74161984870956632, 3.5241105031922135, -0.85346816485954535, 3.1807526624998683, -0.90256893466271138,
+    2.9572714696920448, -0.92973952503676238, 2.7996848562146504, -0.94671215845672618, 0.84425065085737261, 5.7445626465380286,
+    0.0, 4.2481613669916074, -0.73950997288745202, 3.6167399797065976, -0.851365959826484, 3.2573446421352252,
+    -0.90063003157873467, 3.0227707252027662, -0.92798615353802616, 0.85734058883802511, 5.9160797830996161, 0.0,
+    4.3639566504559628, -0.73764330611673246, 3.7071359757712075, -0.84948964270391458, 3.3322915038553673,
+    -0.89888569656853223, 0.86985717192062806, 6.0827625302982193, 0.0, 4.4767920061877646, -0.7359800721939872,
+    3.7954453500749294, -0.84780471034368232, 0.88185576867832882, 6.2449979983983983, 0.0, 4.5868806049657023,
+    -0.73448872299751911, 0.89338378434994947, 6.4031242374328485, 0.0, 0.90448214509349101,
+};
+/* generated: end */
+/* 0 plain, 1 AVX2 and FMA, 2 AVX-512 */
+static int isogi_sh__level(void) {
+    int level = 0;
+    if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma")) level = 1;
+    if (level && __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512vl") && __builtin_cpu_supports("avx512dq")) level = 2;
+#ifdef ISOGI_SH_LEVEL
+    if (level > (ISOGI_SH_LEVEL)) level = (ISOGI_SH_LEVEL);
+#endif
+    return level;
+}
+
+typedef float isogi_sh__f8 __attribute__((vector_size(32), aligned(4), may_alias));
+typedef float isogi_sh__f16 __attribute__((vector_size(64), aligned(4), may_alias));
+typedef double isogi_sh__d4 __attribute__((vector_size(32), aligned(8), may_alias));
+typedef double isogi_sh__d8 __attribute__((vector_size(64), aligned(8), may_alias));
+typedef int32_t isogi_sh__i8 __attribute__((vector_size(32), aligned(4), may_alias));
+typedef int32_t isogi_sh__i16 __attribute__((vector_size(64), aligned(4), may_alias));
+typedef int64_t isogi_sh__l4 __attribute__((vector_size(32), aligned(8), may_alias));
+typedef int64_t isogi_sh__l8 __attribute__((vector_size(64), aligned(8), may_alias));
+
+#define ISOGI_SH__AVX2 __attribute__((target("avx2,fma")))
+#define ISOGI_SH__AVX512 __attribute__((target("avx2,fma,avx512f,avx512vl,avx512dq")))
+#define ISOGI_SH__FMA_F8(a, b, c) ((isogi_sh__f8)__builtin_ia32_vfmaddps256(a, b, c))
+#define ISOGI_SH__FMA_D4(a, b, c) ((isogi_sh__d4)__builtin_ia32_vfmaddpd256(a, b, c))
+#define ISOGI_SH__ALL8 (unsigned char)0xff
+#if defined(__clang__)
+#define ISOGI_SH__ALL16 (unsigned short)0xffff
+#else
+#define ISOGI_SH__ALL16 (short)-1
+#endif
+#define ISOGI_SH__FMA_F16(a, b, c) ((isogi_sh__f16)__builtin_ia32_vfmaddps512_mask(a, b, c, ISOGI_SH__ALL16, 4))
+#define ISOGI_SH__FMA_D8(a, b, c) ((isogi_sh__d8)__builtin_ia32_vfmaddpd512_mask(a, b, c, ISOGI_SH__ALL8, 4))
+
+/* Defines NAME(out, stride, order, x, y, z): all functions at WIDTH directions, that of index i at out + stride i. It returns 0 and
+   writes nothing where a squared length is not within [1e-30, 1e30]. Lengths that differ from 1 by rounding alone are corrected by
+   a series, others by a root in each lane. */
+#define ISOGI_SH__DEFINE_EVAL(NAME, TARGET, T, V, I, WIDTH, FMA, TABLE, NEAR, ROOT)                                            \
+    TARGET static int NAME(T *out, size_t stride, int order, const T *px, const T *py, const T *pz) {                          \
+        V x = *(const V *)px, y = *(const V *)py, z = *(const V *)pz, zero = {0}, one = zero + 1, t, p, d, c, s, sign;         \
+        V square = FMA(x, x, FMA(y, y, z * z)), e = one - square, scale = FMA(e, FMA(e, zero + (T)0.375, zero + (T)0.5), one); \
+        I top = {0};                                                                                                           \
+        T lane[WIDTH];                                                                                                         \
+        const T *table = TABLE;                                                                                                \
+        int l, m, k, far = 0;                                                                                                  \
+        memcpy(lane, &e, sizeof lane);                                                                                         \
+        for (k = 0; k < WIDTH; k++) far |= !(lane[k] < (T)NEAR && lane[k] > -(T)NEAR);                                         \
+        if (far) {                                                                                                             \
+            memcpy(lane, &square, sizeof lane);                                                                                \
+            for (k = 0; k < WIDTH; k++) {                                                                                      \
+                if (!(lane[k] > (T)1e-30 && lane[k] < (T)1e30)) return 0;                                                      \
+                lane[k] = 1 / ROOT(lane[k]);                                                                                   \
+            }                                                                                                                  \
+            memcpy(&scale, lane, sizeof lane);                                                                                 \
+        }                                                                                                                      \
+        x *= scale, y *= scale, z *= scale;                                                                                    \
+        top = (I)(-one) ^ (I)one;                                                                                              \
+        sign = (V)(((I)z & top) | (I)one);                                                                                     \
+        t = FMA(x, x, y * y) / FMA(sign, z, one);                                                                              \
+        p = one, d = zero;                                                                                                     \
+        for (l = 0; l < order; l++, table += 3) {                                                                              \
+            d = FMA(d, zero + table[0], t * p * table[1]);                                                                     \
+            p += d;                                                                                                            \
+            c = p * table[2];                                                                                                  \
+            if (l & 1) c *= sign;                                                                                              \
+            *(V *)(out + stride * (size_t)(l * (l + 1))) = c;                                                                  \
+        }                                                                                                                      \
+        table = TABLE + 3 * ISOGI_SH__TABLE_ORDER;                                                                             \
+        for (m = 1, c = x, s = y; m < order; m++) {                                                                            \
+            V q = zero + table[0], before = zero;                                                                              \
+            T *plus = out + stride * (size_t)(m * (m + 2)), *minus = out + stride * (size_t)(m * m);                           \
+            const T *pair = table + 1;                                                                                         \
+            table += 1 + 2 * (ISOGI_SH__TABLE_ORDER - 1 - m);                                                                  \
+            *(V *)plus = q * c;                                                                                                \
+            *(V *)minus = q * s;                                                                                               \
+            for (l = m + 1; l < order; l++, pair += 2) {                                                                       \
+                plus += stride * (size_t)(2 * l), minus += stride * (size_t)(2 * l);                                           \
+                d = FMA(z * pair[0], q, before * pair[1]);                                                                     \
+                before = q, q = d;                                                                                             \
+                *(V *)plus = q * c;                                                                                            \
+                *(V *)minus = q * s;                                                                                           \
+            }                                                                                                                  \
+            d = FMA(x, c, -(y * s));                                                                                           \
+            s = FMA(x, s, y * c);                                                                                              \
+            c = d;                                                                                                             \
+        }                                                                                                                      \
+        return 1;                                                                                                              \
+    }
+
+ISOGI_SH__DEFINE_EVAL(isogi_sh__eval_f8, ISOGI_SH__AVX2, float, isogi_sh__f8, isogi_sh__i8, 8, ISOGI_SH__FMA_F8, isogi_sh__table_f32, 1e-3, sqrtf)
+ISOGI_SH__DEFINE_EVAL(isogi_sh__eval_d4, ISOGI_SH__AVX2, double, isogi_sh__d4, isogi_sh__l4, 4, ISOGI_SH__FMA_D4, isogi_sh__table_f64, 1e-6, sqrt)
+ISOGI_SH__DEFINE_EVAL(isogi_sh__eval_f16, ISOGI_SH__AVX512, float, isogi_sh__f16, isogi_sh__i16, 16, ISOGI_SH__FMA_F16, isogi_sh__table_f32, 1e-3, sqrtf)
+ISOGI_SH__DEFINE_EVAL(isogi_sh__eval_d8, ISOGI_SH__AVX512, double, isogi_sh__d8, isogi_sh__l8, 8, ISOGI_SH__FMA_D8, isogi_sh__table_f64, 1e-6, sqrt)
+
+/* out[k * stride + i] = in[i * pitch + k] for an 8 x 8 tile */
+ISOGI_SH__AVX2 static void isogi_sh__transpose_f8(float *out, size_t stride, const float *in, size_t pitch) {
+    isogi_sh__f8 t[8], u[8];
+    int i;
+    for (i = 0; i < 8; i += 2) {
+        isogi_sh__f8 a = *(const isogi_sh__f8 *)(in + pitch * (size_t)i), b = *(const isogi_sh__f8 *)(in + pitch * (size_t)(i + 1));
+        t[i] = __builtin_shufflevector(a, b, 0, 8, 1, 9, 4, 12, 5, 13);
+        t[i + 1] = __builtin_shufflevector(a, b, 2, 10, 3, 11, 6, 14, 7, 15);
+    }
+    for (i = 0; i < 8; i += 4) {
+        u[i] = __builtin_shufflevector(t[i], t[i + 2], 0, 1, 8, 9, 4, 5, 12, 13);
+        u[i + 1] = __builtin_shufflevector(t[i], t[i + 2], 2, 3, 10, 11, 6, 7, 14, 15);
+        u[i + 2] = __builtin_shufflevector(t[i + 1], t[i + 3], 0, 1, 8, 9, 4, 5, 12, 13);
+        u[i + 3] = __builtin_shufflevector(t[i + 1], t[i + 3], 2, 3, 10, 11, 6, 7, 14, 15);
+    }
+    for (i = 0; i < 4; i++) {
+        *(isogi_sh__f8 *)(out + stride * (size_t)i) = __builtin_shufflevector(u[i], u[i + 4], 0, 1, 2, 3, 8, 9, 10, 11);
+        *(isogi_sh__f8 *)(out + stride * (size_t)(i + 4)) = __builtin_shufflevector(u[i], u[i + 4], 4, 5, 6, 7, 12, 13, 14, 15);
+    }
+}
+
+ISOGI_SH__AVX2 static void isogi_sh__transpose_d4(double *out, size_t stride, const double *in, size_t pitch) {
+    isogi_sh__d4 a = *(const isogi_sh__d4 *)in, b = *(const isogi_sh__d4 *)(in + pitch), c = *(const isogi_sh__d4 *)(in + 2 * pitch);
+    isogi_sh__d4 d = *(const isogi_sh__d4 *)(in + 3 * pitch), t = __builtin_shufflevector(a, b, 0, 4, 2, 6);
+    isogi_sh__d4 u = __builtin_shufflevector(a, b, 1, 5, 3, 7), v = __builtin_shufflevector(c, d, 0, 4, 2, 6);
+    isogi_sh__d4 w = __builtin_shufflevector(c, d, 1, 5, 3, 7);
+    *(isogi_sh__d4 *)out = __builtin_shufflevector(t, v, 0, 1, 4, 5);
+    *(isogi_sh__d4 *)(out + stride) = __builtin_shufflevector(u, w, 0, 1, 4, 5);
+    *(isogi_sh__d4 *)(out + 2 * stride) = __builtin_shufflevector(t, v, 2, 3, 6, 7);
+    *(isogi_sh__d4 *)(out + 3 * stride) = __builtin_shufflevector(u, w, 2, 3, 6, 7);
+}
+
+/* A block of 8 directions as rows of a structure-of-arrays scratch, then turned. n is 9 or more here. */
+ISOGI_SH__AVX2 static int isogi_sh__eval_rows_f32(float *y, int order, const float (*direction)[3]) {
+    float scratch[ISOGI_SH__TABLE_ORDER * ISOGI_SH__TABLE_ORDER * 8], d[3][8];
+    size_t i, k, n = ISOGI_SH_COUNT(order);
+    for (k = 0; k < 8; k++) d[0][k] = direction[k][0], d[1][k] = direction[k][1], d[2][k] = direction[k][2];
+    if (!isogi_sh__eval_f8(scratch, 8, order, d[0], d[1], d[2])) return 0;
+    for (i = 0; i + 8 <= n; i += 8) isogi_sh__transpose_f8(y + i, n, scratch + 8 * i, 8);
+    if (n - i > 1) isogi_sh__transpose_f8(y + n - 8, n, scratch + 8 * (n - 8), 8);
+    else if (n > i)
+        for (k = 0; k < 8; k++) y[n * k + i] = scratch[8 * i + k];
+    return 1;
+}
+
+ISOGI_SH__AVX2 static int isogi_sh__eval_rows_f64(double *y, int order, const double (*direction)[3]) {
+    double scratch[ISOGI_SH__TABLE_ORDER * ISOGI_SH__TABLE_ORDER * 4], d[3][4];
+    size_t i, k, n = ISOGI_SH_COUNT(order);
+    for (k = 0; k < 4; k++) d[0][k] = direction[k][0], d[1][k] = direction[k][1], d[2][k] = direction[k][2];
+    if (!isogi_sh__eval_d4(scratch, 4, order, d[0], d[1], d[2])) return 0;
+    for (i = 0; i + 4 <= n; i += 4) isogi_sh__transpose_d4(y + i, n, scratch + 4 * i, 4);
+    if (n > i)
+        for (k = 0; k < 4; k++) y[n * k + i] = scratch[4 * i + k];
+    return 1;
+}
+
+/* 8 single-channel sums */
+ISOGI_SH__AVX2 static int isogi_sh__sum_rows_f32(float *value, const float *c, int order, int channels, const float (*direction)[3]) {
+    float scratch[ISOGI_SH__TABLE_ORDER * ISOGI_SH__TABLE_ORDER * 8], d[3][8];
+    int i, j, n = order * order;
+    size_t k;
+    for (k = 0; k < 8; k++) d[0][k] = direction[k][0], d[1][k] = direction[k][1], d[2][k] = direction[k][2];
+    if (!isogi_sh__eval_f8(scratch, 8, order, d[0], d[1], d[2])) return 0;
+    for (j = 0; j < channels; j++) {
+        isogi_sh__f8 zero = {0}, even = zero, odd = zero;
+        for (i = 0; i + 1 < n; i += 2) {
+            even = ISOGI_SH__FMA_F8(*(const isogi_sh__f8 *)(scratch + 8 * i), zero + c[channels * i + j], even);
+            odd = ISOGI_SH__FMA_F8(*(const isogi_sh__f8 *)(scratch + 8 * i + 8), zero + c[channels * (i + 1) + j], odd);
+        }
+        if (i < n) even += *(const isogi_sh__f8 *)(scratch + 8 * i) * c[channels * i + j];
+        even += odd;
+        for (k = 0; k < 8; k++) value[(size_t)channels * k + (size_t)j] = even[k];
+    }
+    return 1;
+}
+#endif /* vector units */
+
 /* count * order^2 elements of `size` bytes are addressable */
 static int isogi_sh__fits(size_t count, int order, size_t size) { return count <= (size_t)-1 / 2 / size / ISOGI_SH_COUNT(order); }
 
 ISOGI_API isogi_result isogi_sh_eval(float *y, int order, const float (*direction)[3], size_t count) {
     isogi_sh__output out = {NULL, 0, 1, 0};
     size_t i;
+#ifdef ISOGI_SH__SIMD
+    int level = order >= 3 && order <= ISOGI_SH__TABLE_ORDER && count >= 8 ? isogi_sh__level() : 0;
+#endif
     if (!isogi_sh__order_ok(order) || (count && (!y || !direction))) return ISOGI_INVALID;
     if (!isogi_sh__fits(count, order, sizeof *y)) return ISOGI_TOO_LARGE;
     out.data = y;
@@ -514,6 +836,9 @@ ISOGI_API isogi_result isogi_sh_eval(float *y, int order, const float (*directio
     for (i = 0; i < count; i += ISOGI_SH__LANES) {
         isogi_sh__unit u[ISOGI_SH__LANES];
         int k, lanes = count - i < ISOGI_SH__LANES ? (int)(count - i) : ISOGI_SH__LANES;
+#ifdef ISOGI_SH__SIMD
+        if (level && lanes == 8 && isogi_sh__eval_rows_f32(y + i * out.direction_stride, order, direction + i)) continue;
+#endif
         for (k = 0; k < lanes; k++) {
             const float *d = direction[i + (size_t)k];
             u[k] = isogi_sh__normalise((double)d[0], (double)d[1], (double)d[2]);
@@ -526,6 +851,9 @@ ISOGI_API isogi_result isogi_sh_eval(float *y, int order, const float (*directio
 ISOGI_API isogi_result isogi_sh_eval_f64(double *y, int order, const double (*direction)[3], size_t count) {
     isogi_sh__output out = {NULL, 0, 1, 1};
     size_t i;
+#ifdef ISOGI_SH__SIMD
+    int level = order >= 3 && order <= ISOGI_SH__TABLE_ORDER && count >= 8 ? isogi_sh__level() : 0;
+#endif
     if (!isogi_sh__order_ok(order) || (count && (!y || !direction))) return ISOGI_INVALID;
     if (!isogi_sh__fits(count, order, sizeof *y)) return ISOGI_TOO_LARGE;
     out.data = y;
@@ -533,6 +861,11 @@ ISOGI_API isogi_result isogi_sh_eval_f64(double *y, int order, const double (*di
     for (i = 0; i < count; i += ISOGI_SH__LANES) {
         isogi_sh__unit u[ISOGI_SH__LANES];
         int k, lanes = count - i < ISOGI_SH__LANES ? (int)(count - i) : ISOGI_SH__LANES;
+#ifdef ISOGI_SH__SIMD
+        if (level && lanes == 8 && isogi_sh__eval_rows_f64(y + i * out.direction_stride, order, direction + i) &&
+            isogi_sh__eval_rows_f64(y + (i + 4) * out.direction_stride, order, direction + i + 4))
+            continue;
+#endif
         for (k = 0; k < lanes; k++) {
             const double *d = direction[i + (size_t)k];
             u[k] = isogi_sh__normalise(d[0], d[1], d[2]);
@@ -545,6 +878,9 @@ ISOGI_API isogi_result isogi_sh_eval_f64(double *y, int order, const double (*di
 static isogi_result isogi_sh__eval_soa(void *basis, int is_double, int order, const void *x, const void *y, const void *z, size_t count) {
     isogi_sh__output out = {NULL, 1, 0, 0};
     size_t i;
+#ifdef ISOGI_SH__SIMD
+    int level = order >= 3 && order <= ISOGI_SH__TABLE_ORDER && count >= 8 ? isogi_sh__level() : 0;
+#endif
     if (!isogi_sh__order_ok(order) || (count && (!basis || !x || !y || !z))) return ISOGI_INVALID;
     if (!isogi_sh__fits(count, order, is_double ? sizeof(double) : sizeof(float))) return ISOGI_TOO_LARGE;
     out.data = basis;
@@ -553,6 +889,23 @@ static isogi_result isogi_sh__eval_soa(void *basis, int is_double, int order, co
     for (i = 0; i < count; i += ISOGI_SH__LANES) {
         isogi_sh__unit u[ISOGI_SH__LANES];
         int k, lanes = count - i < ISOGI_SH__LANES ? (int)(count - i) : ISOGI_SH__LANES;
+#ifdef ISOGI_SH__SIMD
+        if (level && lanes == 8) {
+            const float *fx = (const float *)x + i, *fy = (const float *)y + i, *fz = (const float *)z + i;
+            const double *dx = (const double *)x + i, *dy = (const double *)y + i, *dz = (const double *)z + i;
+            float *f = (float *)basis + i;
+            double *d = (double *)basis + i;
+            if (!is_double && level > 1 && count - i >= 16 && isogi_sh__eval_f16(f, count, order, fx, fy, fz)) {
+                i += 8;
+                continue;
+            }
+            if (!is_double && isogi_sh__eval_f8(f, count, order, fx, fy, fz)) continue;
+            if (is_double && level > 1 && isogi_sh__eval_d8(d, count, order, dx, dy, dz)) continue;
+            if (is_double && level == 1 && isogi_sh__eval_d4(d, count, order, dx, dy, dz) &&
+                isogi_sh__eval_d4(d + 4, count, order, dx + 4, dy + 4, dz + 4))
+                continue;
+        }
+#endif
         for (k = 0; k < lanes; k++) {
             size_t j = i + (size_t)k;
             if (is_double) u[k] = isogi_sh__normalise(((const double *)x)[j], ((const double *)y)[j], ((const double *)z)[j]);
@@ -659,9 +1012,18 @@ ISOGI_API isogi_result isogi_sh_eval_sum(float *value, const float *c, int order
     double sum[ISOGI_SH__CHANNELS];
     size_t i;
     int k;
+#ifdef ISOGI_SH__SIMD
+    int level = order >= 3 && order <= ISOGI_SH__TABLE_ORDER && count >= 8 ? isogi_sh__level() : 0;
+#endif
     if (!isogi_sh__shape_ok(order, channels) || !c || (count && (!value || !direction))) return ISOGI_INVALID;
     for (i = 0; i < count; i++) {
         const float *d = direction[i];
+#ifdef ISOGI_SH__SIMD
+        if (level && count - i >= 8 && isogi_sh__sum_rows_f32(value + i * (size_t)channels, c, order, channels, direction + i)) {
+            i += 7;
+            continue;
+        }
+#endif
         isogi_sh__sum(sum, c, 0, order, channels, isogi_sh__normalise((double)d[0], (double)d[1], (double)d[2]));
         for (k = 0; k < channels; k++) value[i * (size_t)channels + (size_t)k] = (float)sum[k];
     }
@@ -1988,6 +2350,17 @@ ISOGI_API isogi_result isogi_sh_fit_directional(float direction[3], float rgb[3]
 }
 
 #undef ISOGI_SH__PI
+#undef ISOGI_SH__SIMD
+#undef ISOGI_SH__TABLE_ORDER
+#undef ISOGI_SH__AVX2
+#undef ISOGI_SH__AVX512
+#undef ISOGI_SH__ALL16
+#undef ISOGI_SH__ALL8
+#undef ISOGI_SH__FMA_F8
+#undef ISOGI_SH__FMA_F16
+#undef ISOGI_SH__FMA_D4
+#undef ISOGI_SH__FMA_D8
+#undef ISOGI_SH__DEFINE_EVAL
 #undef ISOGI_SH__LANES
 #undef ISOGI_SH__CHANNELS
 #undef ISOGI_SH__GROUP
