@@ -514,11 +514,10 @@ static int isogi_trace__light_beam(const isogi_light *light, const double point[
     if (!(length > 0) || !isogi_trace__finite(length)) return 0;
     beam->tmax = 0;
     if (light->kind == ISOGI_LIGHT_DIRECTIONAL && light->radius > 0) {
-        double angle = isogi_trace__clamp((double)light->radius, ISOGI_TRACE__PI), cosine = cos(angle);
+        double angle = (double)light->radius; /* at most a right angle */
         for (a = 0; a < 3; a++) to[a] /= length;
         isogi_trace__cone(to, 2 * sin(angle / 2) * sin(angle / 2), u, v, beam->dir);
-        /* radiance rgb / (pi sin^2), solid angle 2 pi (1 - cos); beyond a right angle the facing hemisphere is full */
-        factor = cosine > 0 ? 2 / (1 + cosine) : 2 * (1 - cosine);
+        factor = 2 / (1 + cos(angle)); /* radiance rgb / (pi sin^2) times solid angle 2 pi (1 - cos) */
     } else if (light->kind == ISOGI_LIGHT_SPHERE && light->radius > 0) {
         factor = isogi_trace__sphere(to, length, (double)light->radius, u, v, beam);
     } else {
