@@ -509,6 +509,7 @@ static void isogi_sh__eval_block(const isogi_sh__output *out, size_t first, int 
 #if !defined(ISOGI_NO_SIMD) && defined(__x86_64__) && (defined(__clang__) || (defined(__GNUC__) && __GNUC__ >= 12))
 #define ISOGI_SH__SIMD 1
 #define ISOGI_SH__TABLE_ORDER 21
+#define ISOGI_SH__WIDE_ORDER 12
 
 /* Written by tests/generate_sh.h, which tests/test_sh.c compares with this: for each degree l of m = 0 the factors (l-1)/l, -(2l-1)/l,
    sqrt((2l+1)/(4 pi)); then for each m > 0 the diagonal q_m and for each l > m the factors a_l, -a_l / a_{l-1} of the recursion. */
@@ -677,7 +678,9 @@ typedef int64_t isogi_sh__l8 __attribute__((vector_size(64), aligned(8), may_ali
 #define ISOGI_SH__ALL8 (unsigned char)0xff
 #if defined(__clang__)
 #define ISOGI_SH__ALL16 (unsigned short)0xffff
+#define ISOGI_SH__UNROLL _Pragma("unroll 5")
 #else
+#define ISOGI_SH__UNROLL _Pragma("GCC unroll 5")
 #define ISOGI_SH__ALL16 (short)-1
 #endif
 #define ISOGI_SH__FMA_F16(a, b, c) ((isogi_sh__f16)__builtin_ia32_vfmaddps512_mask(a, b, c, ISOGI_SH__ALL16, 4))
@@ -687,16 +690,18 @@ typedef int64_t isogi_sh__l8 __attribute__((vector_size(64), aligned(8), may_ali
    writes nothing where a squared length is not within [1e-30, 1e30]. Lengths that differ from 1 by rounding alone are corrected by
    a series, others by a root in each lane. */
 #define ISOGI_SH__DEFINE_EVAL(NAME, TARGET, T, V, I, WIDTH, FMA, TABLE, NEAR, ROOT)                                            \
-    TARGET static int NAME(T *out, size_t stride, int order, const T *px, const T *py, const T *pz) {                          \
+    TARGET static inline __attribute__((always_inline)) int NAME##_body(T *out, size_t stride, int order, const T *px, const T *py, const T *pz) { \
         V x = *(const V *)px, y = *(const V *)py, z = *(const V *)pz, zero = {0}, one = zero + 1, t, p, d, c, s, sign;         \
         V square = FMA(x, x, FMA(y, y, z * z)), e = one - square, scale = FMA(e, FMA(e, zero + (T)0.375, zero + (T)0.5), one); \
-        I top = {0};                                                                                                           \
+        I top = {0}, near_one;                                                                                                 \
+        int64_t word[sizeof(V) / 8];                                                                                           \
         T lane[WIDTH];                                                                                                         \
         const T *table = TABLE;                                                                                                \
-        int l, m, k, far = 0;                                                                                                  \
-        memcpy(lane, &e, sizeof lane);                                                                                         \
-        for (k = 0; k < WIDTH; k++) far |= !(lane[k] < (T)NEAR && lane[k] > -(T)NEAR);                                         \
-        if (far) {                                                                                                             \
+        int l, m, k;                                                                                                           \
+        near_one = (I)(e < (T)NEAR) & (I)(e > -(T)NEAR);                                                                       \
+        memcpy(word, &near_one, sizeof word);                                                                                  \
+        for (k = 1; k < (int)(sizeof word / sizeof *word); k++) word[0] &= word[k];                                            \
+        if (word[0] != -1) {                                                                                                   \
             memcpy(lane, &square, sizeof lane);                                                                                \
             for (k = 0; k < WIDTH; k++) {                                                                                      \
                 if (!(lane[k] > (T)1e-30 && lane[k] < (T)1e30)) return 0;                                                      \
@@ -709,6 +714,7 @@ typedef int64_t isogi_sh__l8 __attribute__((vector_size(64), aligned(8), may_ali
         sign = (V)(((I)z & top) | (I)one);                                                                                     \
         t = FMA(x, x, y * y) / FMA(sign, z, one);                                                                              \
         p = one, d = zero;                                                                                                     \
+        ISOGI_SH__UNROLL                                                                                                       \
         for (l = 0; l < order; l++, table += 3) {                                                                              \
             d = FMA(d, zero + table[0], t * p * table[1]);                                                                     \
             p += d;                                                                                                            \
@@ -717,6 +723,7 @@ typedef int64_t isogi_sh__l8 __attribute__((vector_size(64), aligned(8), may_ali
             *(V *)(out + stride * (size_t)(l * (l + 1))) = c;                                                                  \
         }                                                                                                                      \
         table = TABLE + 3 * ISOGI_SH__TABLE_ORDER;                                                                             \
+        ISOGI_SH__UNROLL                                                                                                       \
         for (m = 1, c = x, s = y; m < order; m++) {                                                                            \
             V q = zero + table[0], before = zero;                                                                              \
             T *plus = out + stride * (size_t)(m * (m + 2)), *minus = out + stride * (size_t)(m * m);                           \
@@ -724,6 +731,7 @@ typedef int64_t isogi_sh__l8 __attribute__((vector_size(64), aligned(8), may_ali
             table += 1 + 2 * (ISOGI_SH__TABLE_ORDER - 1 - m);                                                                  \
             *(V *)plus = q * c;                                                                                                \
             *(V *)minus = q * s;                                                                                               \
+            ISOGI_SH__UNROLL                                                                                                   \
             for (l = m + 1; l < order; l++, pair += 2) {                                                                       \
                 plus += stride * (size_t)(2 * l), minus += stride * (size_t)(2 * l);                                           \
                 d = FMA(z * pair[0], q, before * pair[1]);                                                                     \
@@ -736,6 +744,12 @@ typedef int64_t isogi_sh__l8 __attribute__((vector_size(64), aligned(8), may_ali
             c = d;                                                                                                             \
         }                                                                                                                      \
         return 1;                                                                                                              \
+    }                                                                                                                          \
+    TARGET static int NAME##_order5(T *out, size_t stride, const T *px, const T *py, const T *pz) {                            \
+        return NAME##_body(out, stride, 5, px, py, pz);                                                                        \
+    }                                                                                                                          \
+    TARGET static int NAME(T *out, size_t stride, int order, const T *px, const T *py, const T *pz) {                          \
+        return order == 5 ? NAME##_order5(out, stride, px, py, pz) : NAME##_body(out, stride, order, px, py, pz);              \
     }
 
 ISOGI_SH__DEFINE_EVAL(isogi_sh__eval_f8, ISOGI_SH__AVX2, float, isogi_sh__f8, isogi_sh__i8, 8, ISOGI_SH__FMA_F8, isogi_sh__table_f32, 1e-3, sqrtf)
@@ -747,17 +761,20 @@ ISOGI_SH__DEFINE_EVAL(isogi_sh__eval_d8, ISOGI_SH__AVX512, double, isogi_sh__d8,
 ISOGI_SH__AVX2 static void isogi_sh__transpose_f8(float *out, size_t stride, const float *in, size_t pitch) {
     isogi_sh__f8 t[8], u[8];
     int i;
+    ISOGI_SH__UNROLL
     for (i = 0; i < 8; i += 2) {
         isogi_sh__f8 a = *(const isogi_sh__f8 *)(in + pitch * (size_t)i), b = *(const isogi_sh__f8 *)(in + pitch * (size_t)(i + 1));
         t[i] = __builtin_shufflevector(a, b, 0, 8, 1, 9, 4, 12, 5, 13);
         t[i + 1] = __builtin_shufflevector(a, b, 2, 10, 3, 11, 6, 14, 7, 15);
     }
+    ISOGI_SH__UNROLL
     for (i = 0; i < 8; i += 4) {
         u[i] = __builtin_shufflevector(t[i], t[i + 2], 0, 1, 8, 9, 4, 5, 12, 13);
         u[i + 1] = __builtin_shufflevector(t[i], t[i + 2], 2, 3, 10, 11, 6, 7, 14, 15);
         u[i + 2] = __builtin_shufflevector(t[i + 1], t[i + 3], 0, 1, 8, 9, 4, 5, 12, 13);
         u[i + 3] = __builtin_shufflevector(t[i + 1], t[i + 3], 2, 3, 10, 11, 6, 7, 14, 15);
     }
+    ISOGI_SH__UNROLL
     for (i = 0; i < 4; i++) {
         *(isogi_sh__f8 *)(out + stride * (size_t)i) = __builtin_shufflevector(u[i], u[i + 4], 0, 1, 2, 3, 8, 9, 10, 11);
         *(isogi_sh__f8 *)(out + stride * (size_t)(i + 4)) = __builtin_shufflevector(u[i], u[i + 4], 4, 5, 6, 7, 12, 13, 14, 15);
@@ -775,11 +792,32 @@ ISOGI_SH__AVX2 static void isogi_sh__transpose_d4(double *out, size_t stride, co
     *(isogi_sh__d4 *)(out + 3 * stride) = __builtin_shufflevector(u, w, 2, 3, 6, 7);
 }
 
+/* 8 directions into coordinates */
+ISOGI_SH__AVX2 static void isogi_sh__load_f8(float (*d)[8], const float (*direction)[3]) {
+    const float *from = direction[0];
+    isogi_sh__f8 a = *(const isogi_sh__f8 *)from, b = *(const isogi_sh__f8 *)(from + 8), c = *(const isogi_sh__f8 *)(from + 16);
+    isogi_sh__f8 x = __builtin_shufflevector(a, b, 0, 3, 6, 9, 12, 15, 0, 0), y = __builtin_shufflevector(a, b, 1, 4, 7, 10, 13, 0, 0, 0);
+    isogi_sh__f8 z = __builtin_shufflevector(a, b, 2, 5, 8, 11, 14, 0, 0, 0);
+    *(isogi_sh__f8 *)d[0] = __builtin_shufflevector(x, c, 0, 1, 2, 3, 4, 5, 10, 13);
+    *(isogi_sh__f8 *)d[1] = __builtin_shufflevector(y, c, 0, 1, 2, 3, 4, 8, 11, 14);
+    *(isogi_sh__f8 *)d[2] = __builtin_shufflevector(z, c, 0, 1, 2, 3, 4, 9, 12, 15);
+}
+
+ISOGI_SH__AVX2 static void isogi_sh__load_d4(double (*d)[4], const double (*direction)[3]) {
+    const double *from = direction[0];
+    isogi_sh__d4 a = *(const isogi_sh__d4 *)from, b = *(const isogi_sh__d4 *)(from + 4), c = *(const isogi_sh__d4 *)(from + 8);
+    isogi_sh__d4 x = __builtin_shufflevector(a, b, 0, 3, 6, 0), y = __builtin_shufflevector(a, b, 1, 4, 7, 0);
+    isogi_sh__d4 z = __builtin_shufflevector(a, b, 2, 5, 0, 0);
+    *(isogi_sh__d4 *)d[0] = __builtin_shufflevector(x, c, 0, 1, 2, 5);
+    *(isogi_sh__d4 *)d[1] = __builtin_shufflevector(y, c, 0, 1, 2, 6);
+    *(isogi_sh__d4 *)d[2] = __builtin_shufflevector(z, c, 0, 1, 4, 7);
+}
+
 /* A block of 8 directions as rows of a structure-of-arrays scratch, then turned. n is 9 or more here. */
 ISOGI_SH__AVX2 static int isogi_sh__eval_rows_f32(float *y, int order, const float (*direction)[3]) {
     float scratch[ISOGI_SH__TABLE_ORDER * ISOGI_SH__TABLE_ORDER * 8], d[3][8];
     size_t i, k, n = ISOGI_SH_COUNT(order);
-    for (k = 0; k < 8; k++) d[0][k] = direction[k][0], d[1][k] = direction[k][1], d[2][k] = direction[k][2];
+    isogi_sh__load_f8(d, direction);
     if (!isogi_sh__eval_f8(scratch, 8, order, d[0], d[1], d[2])) return 0;
     for (i = 0; i + 8 <= n; i += 8) isogi_sh__transpose_f8(y + i, n, scratch + 8 * i, 8);
     if (n - i > 1) isogi_sh__transpose_f8(y + n - 8, n, scratch + 8 * (n - 8), 8);
@@ -791,11 +829,35 @@ ISOGI_SH__AVX2 static int isogi_sh__eval_rows_f32(float *y, int order, const flo
 ISOGI_SH__AVX2 static int isogi_sh__eval_rows_f64(double *y, int order, const double (*direction)[3]) {
     double scratch[ISOGI_SH__TABLE_ORDER * ISOGI_SH__TABLE_ORDER * 4], d[3][4];
     size_t i, k, n = ISOGI_SH_COUNT(order);
-    for (k = 0; k < 4; k++) d[0][k] = direction[k][0], d[1][k] = direction[k][1], d[2][k] = direction[k][2];
+    isogi_sh__load_d4(d, direction);
     if (!isogi_sh__eval_d4(scratch, 4, order, d[0], d[1], d[2])) return 0;
     for (i = 0; i + 4 <= n; i += 4) isogi_sh__transpose_d4(y + i, n, scratch + 4 * i, 4);
     if (n > i)
         for (k = 0; k < 4; k++) y[n * k + i] = scratch[4 * i + k];
+    return 1;
+}
+
+/* The same with twice as many lanes, for orders whose scratch leaves room in the first cache. */
+ISOGI_SH__AVX512 static int isogi_sh__eval_rows_f32_wide(float *y, int order, const float (*direction)[3]) {
+    float scratch[ISOGI_SH__WIDE_ORDER * ISOGI_SH__WIDE_ORDER * 16], d[2][3][8], all[3][16];
+    size_t i, k, n = ISOGI_SH_COUNT(order);
+    isogi_sh__load_f8(d[0], direction);
+    isogi_sh__load_f8(d[1], direction + 8);
+    for (k = 0; k < 3; k++) {
+        *(isogi_sh__f8 *)all[k] = *(const isogi_sh__f8 *)d[0][k];
+        *(isogi_sh__f8 *)(all[k] + 8) = *(const isogi_sh__f8 *)d[1][k];
+    }
+    if (!isogi_sh__eval_f16(scratch, 16, order, all[0], all[1], all[2])) return 0;
+    for (i = 0; i + 8 <= n; i += 8) {
+        isogi_sh__transpose_f8(y + i, n, scratch + 16 * i, 16);
+        isogi_sh__transpose_f8(y + 8 * n + i, n, scratch + 16 * i + 8, 16);
+    }
+    if (n - i > 1) {
+        isogi_sh__transpose_f8(y + n - 8, n, scratch + 16 * (n - 8), 16);
+        isogi_sh__transpose_f8(y + 9 * n - 8, n, scratch + 16 * (n - 8) + 8, 16);
+    } else if (n > i) {
+        for (k = 0; k < 16; k++) y[n * k + i] = scratch[16 * i + k];
+    }
     return 1;
 }
 
@@ -804,7 +866,7 @@ ISOGI_SH__AVX2 static int isogi_sh__sum_rows_f32(float *value, const float *c, i
     float scratch[ISOGI_SH__TABLE_ORDER * ISOGI_SH__TABLE_ORDER * 8], d[3][8];
     int i, j, n = order * order;
     size_t k;
-    for (k = 0; k < 8; k++) d[0][k] = direction[k][0], d[1][k] = direction[k][1], d[2][k] = direction[k][2];
+    isogi_sh__load_f8(d, direction);
     if (!isogi_sh__eval_f8(scratch, 8, order, d[0], d[1], d[2])) return 0;
     for (j = 0; j < channels; j++) {
         isogi_sh__f8 zero = {0}, even = zero, odd = zero;
@@ -837,6 +899,11 @@ ISOGI_API isogi_result isogi_sh_eval(float *y, int order, const float (*directio
         isogi_sh__unit u[ISOGI_SH__LANES];
         int k, lanes = count - i < ISOGI_SH__LANES ? (int)(count - i) : ISOGI_SH__LANES;
 #ifdef ISOGI_SH__SIMD
+        if (level > 1 && order <= ISOGI_SH__WIDE_ORDER && count - i >= 16 &&
+            isogi_sh__eval_rows_f32_wide(y + i * out.direction_stride, order, direction + i)) {
+            i += 8;
+            continue;
+        }
         if (level && lanes == 8 && isogi_sh__eval_rows_f32(y + i * out.direction_stride, order, direction + i)) continue;
 #endif
         for (k = 0; k < lanes; k++) {
@@ -2352,10 +2419,12 @@ ISOGI_API isogi_result isogi_sh_fit_directional(float direction[3], float rgb[3]
 #undef ISOGI_SH__PI
 #undef ISOGI_SH__SIMD
 #undef ISOGI_SH__TABLE_ORDER
+#undef ISOGI_SH__WIDE_ORDER
 #undef ISOGI_SH__AVX2
 #undef ISOGI_SH__AVX512
 #undef ISOGI_SH__ALL16
 #undef ISOGI_SH__ALL8
+#undef ISOGI_SH__UNROLL
 #undef ISOGI_SH__FMA_F8
 #undef ISOGI_SH__FMA_F16
 #undef ISOGI_SH__FMA_D4
