@@ -326,9 +326,14 @@ ISOGI_API isogi_result isogi_sh_fit_directional(float direction[3], float rgb[3]
 #define ISOGI_SH__PI 3.14159265358979323846
 #define ISOGI_SH__LANES 8     /* directions that the plain code evaluates together */
 #define ISOGI_SH__CHANNELS 16 /* the most that one call takes */
+#define ISOGI_SH__TABLE_ORDER 21 /* what is tabled */
 #define ISOGI_SH__TOGETHER 4  /* channels, or columns of a matrix, that are rotated in one pass */
 #define ISOGI_SH__DERING_ORDER 32
 #define ISOGI_SH__GROUP 5     /* orders m that are projected in one pass */
+
+#if !defined(ISOGI_NO_SIMD) && defined(__x86_64__) && (defined(__clang__) || (defined(__GNUC__) && __GNUC__ >= 12))
+#define ISOGI_SH__SIMD 1
+#endif
 
 /* ==== numbers ======================================================================================================== */
 
@@ -396,178 +401,9 @@ static isogi_sh__unit isogi_sh__normalise(double x, double y, double z) {
 /* Y_l^{+-m} = q_l (c_m, s_m) with c_m + i s_m = (x + i y)^m = sin^m t e^{i m p}: no trigonometry, nothing singular at the poles.
    q follows P_l^m, normalised: q_l = a_l z q_{l-1} - a_l / a_{l-1} q_{l-2}, a_l = sqrt((4 l^2 - 1) / (l^2 - m^2)), which is stable
    upwards. q grows to 1e20 at most where s_m is as small, up to degree 100: neither leaves the range of a float. */
-static double isogi_sh__a(int l, int m) { return sqrt((double)(4 * l * l - 1) / (double)((l - m) * (l + m))); }
-
-/* q_m^m from q_{m-1}^{m-1}; the sqrt 2 of m > 0 is in it. */
-static double isogi_sh__next_diagonal(double q, int m) {
-    return m == 0 ? 0.28209479177387814347 : q * sqrt((double)(2 * m + 1) / (double)(m == 1 ? 1 : 2 * m));
-}
-
-/* m = 0 near the poles: the three terms nearly cancel there and their roundings grow like l^2, but the differences of
-   P_l obey l (P_l - P_{l-1}) = (l-1) (P_{l-1} - P_{l-2}) - (2l-1) t P_{l-1} with t = 1 - |z|, which does not (after Reinsch). */
-static void isogi_sh__zonal_column(double *q, int order, double z, double z_low) {
-    double t = z < 0 ? (1 + z) + z_low : (1 - z) - z_low, p = 1, difference = 0, sign = z < 0 ? -1 : 1;
-    int l;
-    q[0] = 0.28209479177387814347;
-    for (l = 1; l < order; l++) {
-        difference = ((double)(l - 1) * difference - (double)(2 * l - 1) * t * p) / (double)l;
-        p += difference;
-        q[l] = sqrt((double)(2 * l + 1)) * 0.28209479177387814347 * (l & 1 ? sign * p : p);
-    }
-}
-
-/* q[l] for l = m .. order-1, from q[m] = diagonal */
-static void isogi_sh__column(double *q, int order, int m, double diagonal, double z, double z_low) {
-    double a_before = 0;
-    int l;
-    if (m == 0) {
-        isogi_sh__zonal_column(q, order, z, z_low);
-        return;
-    }
-    q[m] = diagonal;
-    for (l = m + 1; l < order; l++) {
-        double a = isogi_sh__a(l, m);
-        q[l] = a * (z * q[l - 1] + (z_low * q[l - 1] - (l > m + 1 ? q[l - 2] / a_before : 0)));
-        a_before = a;
-    }
-}
-
-/* A place to put basis functions: of direction k and index i at data[k * direction_stride + i * index_stride]. */
-typedef struct isogi_sh__output {
-    void *data;
-    size_t direction_stride, index_stride;
-    int is_double;
-} isogi_sh__output;
-
-static void isogi_sh__store(const isogi_sh__output *out, size_t first, int lanes, int index, const double *q, const double *factor) {
-    size_t at = first * out->direction_stride + (size_t)index * out->index_stride;
-    int k;
-    if (out->is_double) {
-        double *y = (double *)out->data + at;
-        for (k = 0; k < lanes; k++) y[(size_t)k * out->direction_stride] = q[k] * factor[k];
-    } else {
-        float *y = (float *)out->data + at;
-        for (k = 0; k < lanes; k++) y[(size_t)k * out->direction_stride] = (float)(q[k] * factor[k]);
-    }
-}
-
-/* The functions of m = 0, as in isogi_sh__zonal_column. */
-static void isogi_sh__eval_zonal(const isogi_sh__output *out, size_t first, int lanes, int order, const isogi_sh__unit *u) {
-    double t[ISOGI_SH__LANES], sign[ISOGI_SH__LANES], p[ISOGI_SH__LANES], d[ISOGI_SH__LANES], normal[ISOGI_SH__LANES];
-    int l, k;
-    for (k = 0; k < lanes; k++) {
-        sign[k] = u[k].z < 0 ? -1 : 1;
-        t[k] = u[k].z < 0 ? (1 + u[k].z) + u[k].z_low : (1 - u[k].z) - u[k].z_low;
-        p[k] = 1, d[k] = 0;
-    }
-    for (l = 0; l < order; l++) {
-        double n = sqrt((double)(2 * l + 1)) * 0.28209479177387814347;
-        double keep = l ? (double)(l - 1) / (double)l : 0, gain = l ? (double)(2 * l - 1) / (double)l : 0;
-        for (k = 0; k < lanes; k++) {
-            d[k] = keep * d[k] - gain * (t[k] * p[k]);
-            p[k] += d[k];
-            normal[k] = l & 1 ? n * sign[k] : n;
-        }
-        isogi_sh__store(out, first, lanes, l * (l + 1), p, normal);
-    }
-}
-
-/* All basis functions of up to ISOGI_SH__LANES directions. */
-static void isogi_sh__eval_block(const isogi_sh__output *out, size_t first, int lanes, int order, const isogi_sh__unit *u) {
-    double c[ISOGI_SH__LANES], s[ISOGI_SH__LANES], q[3][ISOGI_SH__LANES], diagonal = isogi_sh__next_diagonal(0, 0);
-    int l, m, k;
-    isogi_sh__eval_zonal(out, first, lanes, order, u);
-    for (k = 0; k < lanes; k++) c[k] = u[k].x, s[k] = u[k].y;
-    for (m = 1; m < order; m++) {
-        double a_before = 0, *q0 = q[0], *q1 = q[1], *q2 = q[2];
-        diagonal = isogi_sh__next_diagonal(diagonal, m);
-        for (k = 0; k < lanes; k++) q1[k] = 0, q0[k] = diagonal;
-        for (l = m; l < order; l++) {
-            double *oldest = q2;
-            if (l > m) {
-                double a = isogi_sh__a(l, m), b = l > m + 1 ? 1 / a_before : 0;
-                q2 = q1, q1 = q0, q0 = oldest;
-                for (k = 0; k < lanes; k++) q0[k] = a * (u[k].z * q1[k] + (u[k].z_low * q1[k] - b * q2[k]));
-                a_before = a;
-            }
-            isogi_sh__store(out, first, lanes, l * (l + 1) + m, q0, c);
-            isogi_sh__store(out, first, lanes, l * (l + 1) - m, q0, s);
-        }
-        for (k = 0; k < lanes; k++) {
-            double x = u[k].x * c[k] - u[k].y * s[k];
-            s[k] = u[k].x * s[k] + u[k].y * c[k];
-            c[k] = x;
-        }
-    }
-}
-
-/* ==== batches on vector units ========================================================================================= */
-
-/* The same recursions with one direction in each lane, for orders up to ISOGI_SH__TABLE_ORDER, whose constants are tabled. Vectors are
-   those of gcc and clang; each function names its instruction set, so that no compiler flag is needed, and runs only where the
-   processor has it. Blocks with lengths out of range, tails and higher orders go through the plain code above. */
-#if !defined(ISOGI_NO_SIMD) && defined(__x86_64__) && (defined(__clang__) || (defined(__GNUC__) && __GNUC__ >= 12))
-#define ISOGI_SH__SIMD 1
-#define ISOGI_SH__TABLE_ORDER 21
-#define ISOGI_SH__WIDE_ORDER 12
-
 /* Written by tests/generate_sh.h, which tests/test_sh.c compares with this: for each degree l of m = 0 the factors (l-1)/l, -(2l-1)/l,
    sqrt((2l+1)/(4 pi)); then for each m > 0 the diagonal q_m and for each l > m the factors a_l, -a_l / a_{l-1} of the recursion. */
 /* generated: begin */
-static const float isogi_sh__table_f32[463] = {
-    0.0f, 0.0f, 0.282094792f, 0.0f, -1.0f, 0.488602512f, 0.5f, -1.5f, 0.630783131f, 0.666666667f, -1.66666667f, 0.746352665f,
-    0.75f, -1.75f, 0.846284375f, 0.8f, -1.8f, 0.93560258f, 0.833333333f, -1.83333333f, 1.01710724f, 0.857142857f, -1.85714286f,
-    1.09254843f, 0.875f, -1.875f, 1.16310662f, 0.888888889f, -1.88888889f, 1.22962269f, 0.9f, -1.9f, 1.29272074f, 0.909090909f,
-    -1.90909091f, 1.35287909f, 0.916666667f, -1.91666667f, 1.41047396f, 0.923076923f, -1.92307692f, 1.46580754f, 0.928571429f,
-    -1.92857143f, 1.51912694f, 0.933333333f, -1.93333333f, 1.57063733f, 0.9375f, -1.9375f, 1.6205112f, 0.941176471f,
-    -1.94117647f, 1.66889529f, 0.944444444f, -1.94444444f, 1.71591563f, 0.947368421f, -1.94736842f, 1.76168141f, 0.95f, -1.95f,
-    1.806288f, 0.488602512f, 2.23606798f, 0.0f, 2.09165007f, -0.935414347f, 2.04939015f, -0.979795897f, 2.0310096f,
-    -0.991031209f, 2.02131499f, -0.995226703f, 2.01556444f, -0.997155044f, 2.01186954f, -0.998166818f, 2.00935313f,
-    -0.998749218f, 2.00756146f, -0.999108337f, 2.00624026f, -0.999341889f, 2.0052379f, -0.999500375f, 2.00445931f,
-    -0.999611726f, 2.00384246f, -0.99969226f, 2.00334542f, -0.999751953f, 2.00293902f, -0.99979714f, 2.00260247f, -0.999831975f,
-    2.00232064f, -0.999859264f, 2.00208225f, -0.999880945f, 2.00187882f, -0.999898389f, 0.546274215f, 2.64575131f, 0.0f,
-    2.29128785f, -0.866025404f, 2.17124059f, -0.947607083f, 2.11394182f, -0.97361012f, 2.081666f, -0.984731928f, 2.06155281f,
-    -0.990337938f, 2.04812236f, -0.993485273f, 2.0386883f, -0.995393803f, 2.0317985f, -0.99662047f, 2.02660871f, -0.997445717f,
-    2.02259959f, -0.998021759f, 2.0194368f, -0.998436277f, 2.01689695f, -0.998742296f, 2.014826f, -0.9989732f, 2.01311489f,
-    -0.999150743f, 2.01168462f, -0.99928952f, 2.01047676f, -0.99939958f, 2.00944738f, -0.999487993f, 0.59004359f, 3.0f, 0.0f,
-    2.48746859f, -0.829156198f, 2.30136835f, -0.925184889f, 2.20794022f, -0.959403224f, 2.15322169f, -0.975217387f, 2.11804417f,
-    -0.983662845f, 2.09394732f, -0.988623065f, 2.07665597f, -0.99174222f, 2.06379729f, -0.99380799f, 2.05395959f, -0.995233204f,
-    2.04625653f, -0.996249652f, 2.04010711f, -0.996994799f, 2.0351168f, -0.997553898f, 2.0310096f, -0.997981834f, 2.02758751f,
-    -0.998315079f, 2.02470537f, -0.998578535f, 2.0222547f, -0.998789618f, 0.625835735f, 3.31662479f, 0.0f, 2.67394839f,
-    -0.806225775f, 2.43086217f, -0.909090909f, 2.30488611f, -0.948176387f, 2.22917715f, -0.96715284f, 2.17944947f,
-    -0.977692361f, 2.14476106f, -0.984083865f, 2.11947812f, -0.988211769f, 2.10042013f, -0.991008167f, 2.08566536f,
-    -0.992975327f, 2.07399021f, -0.994402195f, 2.06458228f, -0.99546385f, 2.05688338f, -0.996270963f, 2.05049883f,
-    -0.996896009f, 2.04514271f, -0.997387893f, 2.04060346f, -0.997780476f, 0.656382057f, 3.60555128f, 0.0f, 2.85043856f,
-    -0.790569415f, 2.55704156f, -0.897069522f, 2.40163635f, -0.939224604f, 2.30651252f, -0.960392077f, 2.24304481f,
-    -0.972483257f, 2.19816577f, -0.979991915f, 2.16506351f, -0.98494096f, 2.13984751f, -0.988353229f, 2.1201415f, -0.99079093f,
-    2.10441712f, -0.992583334f, 2.09165007f, -0.99393321f, 2.08113038f, -0.99497063f, 2.07235201f, -0.99578192f, 2.06494552f,
-    -0.996426046f, 0.683184105f, 3.87298335f, 0.0f, 3.01780431f, -0.779193722f, 2.67913751f, -0.887777082f, 2.49687304f,
-    -0.931968978f, 2.38376864f, -0.954701581f, 2.30739552f, -0.967961184f, 2.25281778f, -0.976346607f, 2.21218218f,
-    -0.981962321f, 2.18096624f, -0.985889075f, 2.15638587f, -0.988729592f, 2.13663693f, -0.990841653f, 2.12050177f,
-    -0.992448338f, 2.10713075f, -0.993694405f, 2.09591439f, -0.994676952f, 0.707162733f, 4.12310563f, 0.0f, 3.17706626f,
-    -0.77055175f, 2.79705728f, -0.880389973f, 2.59004504f, -0.925989277f, 2.46020966f, -0.94987138f, 2.37170825f, -0.96402688f,
-    2.30792777f, -0.973107792f, 2.26007844f, -0.979267403f, 2.22306747f, -0.983624035f, 2.1937411f, -0.986808149f, 2.17004399f,
-    -0.989197855f, 2.15058132f, -0.991031209f, 2.13437475f, -0.992464098f, 0.72892666f, 4.35889894f, 0.0f, 3.32916406f,
-    -0.763762616f, 2.91095933f, -0.874381459f, 2.68095132f, -0.920985497f, 2.53546276f, -0.945732487f, 2.43553242f,
-    -0.960586942f, 2.36301734f, -0.970226187f, 2.30827316f, -0.976832937f, 2.26568606f, -0.981550233f, 2.2317637f,
-    -0.985027776f, 2.20422001f, -0.987658329f, 2.18149686f, -0.989691071f, 0.748900952f, 4.58257569f, 0.0f, 3.47491007f,
-    -0.758287544f, 3.02108989f, -0.869400885f, 2.76955855f, -0.916741523f, 2.60934774f, -0.942152946f, 2.49861073f,
-    -0.957561418f, 2.4177912f, -0.967654215f, 2.35645594f, -0.974631699f, 2.30850993f, -0.979653338f, 2.27014789f,
-    -0.983382335f, 2.23887007f, -0.986222123f, 0.767395118f, 4.79583152f, 0.0f, 3.61499403f, -0.753778361f, 3.12771621f,
-    -0.865206467f, 2.85591491f, -0.913099118f, 2.68179045f, -0.939030233f, 2.56079915f, -0.954884136f, 2.47206616f,
-    -0.965349492f, 2.40442301f, -0.972636997f, 2.35132636f, -0.977917092f, 2.30867928f, -0.981862543f, 0.784642106f, 5.0f, 0.0f,
-    3.75f, -0.75f, 3.23109888f, -0.861626369f, 2.94010727f, -0.909940357f, 2.75277638f, -0.936284333f, 2.62202212f,
-    -0.952500953f, 2.52572967f, -0.963275499f, 2.45203997f, -0.970824392f, 2.39398889f, -0.976325394f, 0.800821996f,
-    5.19615242f, 0.0f, 3.88042424f, -0.746787994f, 3.33148097f, -0.858535242f, 3.022239f, -0.907175827f, 2.82232479f,
-    -0.933852284f, 2.68224616f, -0.950367641f, 2.57871472f, -0.961401216f, 2.49921863f, -0.969172205f, 0.816077119f,
-    5.38516481f, 0.0f, 4.00669083f, -0.744023809f, 3.42908453f, -0.855839562f, 3.10241841f, -0.90473664f, 2.89047379f,
-    -0.931684062f, 2.74146402f, -0.94844798f, 2.63098421f, -0.959700433f, 0.830522083f, 5.56776436f, 0.0f, 4.12916456f,
-    -0.741619849f, 3.5241105f, -0.853468165f, 3.18075266f, -0.902568935f, 2.95727147f, -0.929739525f, 2.79968486f,
-    -0.946712158f, 0.844250651f, 5.74456265f, 0.0f, 4.24816137f, -0.739509973f, 3.61673998f, -0.85136596f, 3.25734464f,
-    -0.900630032f, 3.02277073f, -0.927986154f, 0.857340589f, 5.91607978f, 0.0f, 4.36395665f, -0.737643306f, 3.70713598f,
-    -0.849489643f, 3.3322915f, -0.898885697f, 0.869857172f, 6.08276253f, 0.0f, 4.47679201f, -0.735980072f, 3.79544535f,
-    -0.84780471f, 0.881855769f, 6.244998f, 0.0f, 4.5868806f, -0.734488723f, 0.893383784f, 6.40312424f, 0.0f, 0.904482145f,
-};
 static const double isogi_sh__table_f64[463] = {
     0.0, 0.0, 0.28209479177387814, 0.0, -1.0, 0.48860251190291992, 0.5, -1.5, 0.63078313050503998, 0.66666666666666663,
     -1.6666666666666667, 0.7463526651802308, 0.75, -1.75, 0.84628437532163447, 0.80000000000000004, -1.8, 0.9356025796273888,
@@ -650,7 +486,196 @@ static const double isogi_sh__table_f64[463] = {
     3.7954453500749294, -0.84780471034368232, 0.88185576867832882, 6.2449979983983983, 0.0, 4.5868806049657023,
     -0.73448872299751911, 0.89338378434994947, 6.4031242374328485, 0.0, 0.90448214509349101,
 };
+#ifdef ISOGI_SH__SIMD
+static const float isogi_sh__table_f32[463] = {
+    0.0f, 0.0f, 0.282094792f, 0.0f, -1.0f, 0.488602512f, 0.5f, -1.5f, 0.630783131f, 0.666666667f, -1.66666667f, 0.746352665f,
+    0.75f, -1.75f, 0.846284375f, 0.8f, -1.8f, 0.93560258f, 0.833333333f, -1.83333333f, 1.01710724f, 0.857142857f, -1.85714286f,
+    1.09254843f, 0.875f, -1.875f, 1.16310662f, 0.888888889f, -1.88888889f, 1.22962269f, 0.9f, -1.9f, 1.29272074f, 0.909090909f,
+    -1.90909091f, 1.35287909f, 0.916666667f, -1.91666667f, 1.41047396f, 0.923076923f, -1.92307692f, 1.46580754f, 0.928571429f,
+    -1.92857143f, 1.51912694f, 0.933333333f, -1.93333333f, 1.57063733f, 0.9375f, -1.9375f, 1.6205112f, 0.941176471f,
+    -1.94117647f, 1.66889529f, 0.944444444f, -1.94444444f, 1.71591563f, 0.947368421f, -1.94736842f, 1.76168141f, 0.95f, -1.95f,
+    1.806288f, 0.488602512f, 2.23606798f, 0.0f, 2.09165007f, -0.935414347f, 2.04939015f, -0.979795897f, 2.0310096f,
+    -0.991031209f, 2.02131499f, -0.995226703f, 2.01556444f, -0.997155044f, 2.01186954f, -0.998166818f, 2.00935313f,
+    -0.998749218f, 2.00756146f, -0.999108337f, 2.00624026f, -0.999341889f, 2.0052379f, -0.999500375f, 2.00445931f,
+    -0.999611726f, 2.00384246f, -0.99969226f, 2.00334542f, -0.999751953f, 2.00293902f, -0.99979714f, 2.00260247f, -0.999831975f,
+    2.00232064f, -0.999859264f, 2.00208225f, -0.999880945f, 2.00187882f, -0.999898389f, 0.546274215f, 2.64575131f, 0.0f,
+    2.29128785f, -0.866025404f, 2.17124059f, -0.947607083f, 2.11394182f, -0.97361012f, 2.081666f, -0.984731928f, 2.06155281f,
+    -0.990337938f, 2.04812236f, -0.993485273f, 2.0386883f, -0.995393803f, 2.0317985f, -0.99662047f, 2.02660871f, -0.997445717f,
+    2.02259959f, -0.998021759f, 2.0194368f, -0.998436277f, 2.01689695f, -0.998742296f, 2.014826f, -0.9989732f, 2.01311489f,
+    -0.999150743f, 2.01168462f, -0.99928952f, 2.01047676f, -0.99939958f, 2.00944738f, -0.999487993f, 0.59004359f, 3.0f, 0.0f,
+    2.48746859f, -0.829156198f, 2.30136835f, -0.925184889f, 2.20794022f, -0.959403224f, 2.15322169f, -0.975217387f, 2.11804417f,
+    -0.983662845f, 2.09394732f, -0.988623065f, 2.07665597f, -0.99174222f, 2.06379729f, -0.99380799f, 2.05395959f, -0.995233204f,
+    2.04625653f, -0.996249652f, 2.04010711f, -0.996994799f, 2.0351168f, -0.997553898f, 2.0310096f, -0.997981834f, 2.02758751f,
+    -0.998315079f, 2.02470537f, -0.998578535f, 2.0222547f, -0.998789618f, 0.625835735f, 3.31662479f, 0.0f, 2.67394839f,
+    -0.806225775f, 2.43086217f, -0.909090909f, 2.30488611f, -0.948176387f, 2.22917715f, -0.96715284f, 2.17944947f,
+    -0.977692361f, 2.14476106f, -0.984083865f, 2.11947812f, -0.988211769f, 2.10042013f, -0.991008167f, 2.08566536f,
+    -0.992975327f, 2.07399021f, -0.994402195f, 2.06458228f, -0.99546385f, 2.05688338f, -0.996270963f, 2.05049883f,
+    -0.996896009f, 2.04514271f, -0.997387893f, 2.04060346f, -0.997780476f, 0.656382057f, 3.60555128f, 0.0f, 2.85043856f,
+    -0.790569415f, 2.55704156f, -0.897069522f, 2.40163635f, -0.939224604f, 2.30651252f, -0.960392077f, 2.24304481f,
+    -0.972483257f, 2.19816577f, -0.979991915f, 2.16506351f, -0.98494096f, 2.13984751f, -0.988353229f, 2.1201415f, -0.99079093f,
+    2.10441712f, -0.992583334f, 2.09165007f, -0.99393321f, 2.08113038f, -0.99497063f, 2.07235201f, -0.99578192f, 2.06494552f,
+    -0.996426046f, 0.683184105f, 3.87298335f, 0.0f, 3.01780431f, -0.779193722f, 2.67913751f, -0.887777082f, 2.49687304f,
+    -0.931968978f, 2.38376864f, -0.954701581f, 2.30739552f, -0.967961184f, 2.25281778f, -0.976346607f, 2.21218218f,
+    -0.981962321f, 2.18096624f, -0.985889075f, 2.15638587f, -0.988729592f, 2.13663693f, -0.990841653f, 2.12050177f,
+    -0.992448338f, 2.10713075f, -0.993694405f, 2.09591439f, -0.994676952f, 0.707162733f, 4.12310563f, 0.0f, 3.17706626f,
+    -0.77055175f, 2.79705728f, -0.880389973f, 2.59004504f, -0.925989277f, 2.46020966f, -0.94987138f, 2.37170825f, -0.96402688f,
+    2.30792777f, -0.973107792f, 2.26007844f, -0.979267403f, 2.22306747f, -0.983624035f, 2.1937411f, -0.986808149f, 2.17004399f,
+    -0.989197855f, 2.15058132f, -0.991031209f, 2.13437475f, -0.992464098f, 0.72892666f, 4.35889894f, 0.0f, 3.32916406f,
+    -0.763762616f, 2.91095933f, -0.874381459f, 2.68095132f, -0.920985497f, 2.53546276f, -0.945732487f, 2.43553242f,
+    -0.960586942f, 2.36301734f, -0.970226187f, 2.30827316f, -0.976832937f, 2.26568606f, -0.981550233f, 2.2317637f,
+    -0.985027776f, 2.20422001f, -0.987658329f, 2.18149686f, -0.989691071f, 0.748900952f, 4.58257569f, 0.0f, 3.47491007f,
+    -0.758287544f, 3.02108989f, -0.869400885f, 2.76955855f, -0.916741523f, 2.60934774f, -0.942152946f, 2.49861073f,
+    -0.957561418f, 2.4177912f, -0.967654215f, 2.35645594f, -0.974631699f, 2.30850993f, -0.979653338f, 2.27014789f,
+    -0.983382335f, 2.23887007f, -0.986222123f, 0.767395118f, 4.79583152f, 0.0f, 3.61499403f, -0.753778361f, 3.12771621f,
+    -0.865206467f, 2.85591491f, -0.913099118f, 2.68179045f, -0.939030233f, 2.56079915f, -0.954884136f, 2.47206616f,
+    -0.965349492f, 2.40442301f, -0.972636997f, 2.35132636f, -0.977917092f, 2.30867928f, -0.981862543f, 0.784642106f, 5.0f, 0.0f,
+    3.75f, -0.75f, 3.23109888f, -0.861626369f, 2.94010727f, -0.909940357f, 2.75277638f, -0.936284333f, 2.62202212f,
+    -0.952500953f, 2.52572967f, -0.963275499f, 2.45203997f, -0.970824392f, 2.39398889f, -0.976325394f, 0.800821996f,
+    5.19615242f, 0.0f, 3.88042424f, -0.746787994f, 3.33148097f, -0.858535242f, 3.022239f, -0.907175827f, 2.82232479f,
+    -0.933852284f, 2.68224616f, -0.950367641f, 2.57871472f, -0.961401216f, 2.49921863f, -0.969172205f, 0.816077119f,
+    5.38516481f, 0.0f, 4.00669083f, -0.744023809f, 3.42908453f, -0.855839562f, 3.10241841f, -0.90473664f, 2.89047379f,
+    -0.931684062f, 2.74146402f, -0.94844798f, 2.63098421f, -0.959700433f, 0.830522083f, 5.56776436f, 0.0f, 4.12916456f,
+    -0.741619849f, 3.5241105f, -0.853468165f, 3.18075266f, -0.902568935f, 2.95727147f, -0.929739525f, 2.79968486f,
+    -0.946712158f, 0.844250651f, 5.74456265f, 0.0f, 4.24816137f, -0.739509973f, 3.61673998f, -0.85136596f, 3.25734464f,
+    -0.900630032f, 3.02277073f, -0.927986154f, 0.857340589f, 5.91607978f, 0.0f, 4.36395665f, -0.737643306f, 3.70713598f,
+    -0.849489643f, 3.3322915f, -0.898885697f, 0.869857172f, 6.08276253f, 0.0f, 4.47679201f, -0.735980072f, 3.79544535f,
+    -0.84780471f, 0.881855769f, 6.244998f, 0.0f, 4.5868806f, -0.734488723f, 0.893383784f, 6.40312424f, 0.0f, 0.904482145f,
+};
+#endif
 /* generated: end */
+
+/* where m > 0 starts in the table */
+static const double *isogi_sh__table(int m) { return isogi_sh__table_f64 + 3 * ISOGI_SH__TABLE_ORDER + (m - 1) * (2 * ISOGI_SH__TABLE_ORDER - 1 - m); }
+
+static double isogi_sh__a(int l, int m) { return sqrt((double)(4 * l * l - 1) / (double)((l - m) * (l + m))); }
+
+/* q_m^m from q_{m-1}^{m-1}; the sqrt 2 of m > 0 is in it. */
+static double isogi_sh__next_diagonal(double q, int m) {
+    if (m > 0 && m < ISOGI_SH__TABLE_ORDER) return isogi_sh__table(m)[0];
+    return m == 0 ? 0.28209479177387814347 : q * sqrt((double)(2 * m + 1) / (double)(m == 1 ? 1 : 2 * m));
+}
+
+/* m = 0 near the poles: the three terms nearly cancel there and their roundings grow like l^2, but the differences of
+   P_l obey l (P_l - P_{l-1}) = (l-1) (P_{l-1} - P_{l-2}) - (2l-1) t P_{l-1} with t = 1 - |z|, which does not (after Reinsch). */
+static void isogi_sh__zonal_column(double *q, int order, double z, double z_low) {
+    double t = z < 0 ? (1 + z) + z_low : (1 - z) - z_low, p = 1, difference = 0, sign = z < 0 ? -1 : 1;
+    int l;
+    q[0] = 0.28209479177387814347;
+    for (l = 1; l < order && l < ISOGI_SH__TABLE_ORDER; l++) {
+        const double *factor = isogi_sh__table_f64 + 3 * l;
+        difference = factor[0] * difference + factor[1] * t * p;
+        p += difference;
+        q[l] = factor[2] * (l & 1 ? sign * p : p);
+    }
+    for (; l < order; l++) {
+        difference = ((double)(l - 1) * difference - (double)(2 * l - 1) * t * p) / (double)l;
+        p += difference;
+        q[l] = sqrt((double)(2 * l + 1)) * 0.28209479177387814347 * (l & 1 ? sign * p : p);
+    }
+}
+
+/* q[l] for l = m .. order-1, from q[m] = diagonal */
+static void isogi_sh__column(double *q, int order, int m, double diagonal, double z, double z_low) {
+    double a_before = 0;
+    int l;
+    if (m == 0) {
+        isogi_sh__zonal_column(q, order, z, z_low);
+        return;
+    }
+    q[m] = diagonal;
+    if (order <= ISOGI_SH__TABLE_ORDER) {
+        const double *factor = isogi_sh__table(m) + 1;
+        double before = 0;
+        for (l = m + 1; l < order; l++, factor += 2) {
+            q[l] = factor[0] * (z * q[l - 1] + z_low * q[l - 1]) + factor[1] * before;
+            before = q[l - 1];
+        }
+        return;
+    }
+    for (l = m + 1; l < order; l++) {
+        double a = isogi_sh__a(l, m);
+        q[l] = a * (z * q[l - 1] + (z_low * q[l - 1] - (l > m + 1 ? q[l - 2] / a_before : 0)));
+        a_before = a;
+    }
+}
+
+/* A place to put basis functions: of direction k and index i at data[k * direction_stride + i * index_stride]. */
+typedef struct isogi_sh__output {
+    void *data;
+    size_t direction_stride, index_stride;
+    int is_double;
+} isogi_sh__output;
+
+static void isogi_sh__store(const isogi_sh__output *out, size_t first, int lanes, int index, const double *q, const double *factor) {
+    size_t at = first * out->direction_stride + (size_t)index * out->index_stride;
+    int k;
+    if (out->is_double) {
+        double *y = (double *)out->data + at;
+        for (k = 0; k < lanes; k++) y[(size_t)k * out->direction_stride] = q[k] * factor[k];
+    } else {
+        float *y = (float *)out->data + at;
+        for (k = 0; k < lanes; k++) y[(size_t)k * out->direction_stride] = (float)(q[k] * factor[k]);
+    }
+}
+
+/* The functions of m = 0, as in isogi_sh__zonal_column. */
+static void isogi_sh__eval_zonal(const isogi_sh__output *out, size_t first, int lanes, int order, const isogi_sh__unit *u) {
+    double t[ISOGI_SH__LANES], sign[ISOGI_SH__LANES], p[ISOGI_SH__LANES], d[ISOGI_SH__LANES], normal[ISOGI_SH__LANES];
+    int l, k;
+    for (k = 0; k < lanes; k++) {
+        sign[k] = u[k].z < 0 ? -1 : 1;
+        t[k] = u[k].z < 0 ? (1 + u[k].z) + u[k].z_low : (1 - u[k].z) - u[k].z_low;
+        p[k] = 1, d[k] = 0;
+    }
+    for (l = 0; l < order; l++) {
+        double n = sqrt((double)(2 * l + 1)) * 0.28209479177387814347;
+        double keep = l ? (double)(l - 1) / (double)l : 0, gain = l ? (double)(2 * l - 1) / (double)l : 0;
+        for (k = 0; k < lanes; k++) {
+            d[k] = keep * d[k] - gain * (t[k] * p[k]);
+            p[k] += d[k];
+            normal[k] = l & 1 ? n * sign[k] : n;
+        }
+        isogi_sh__store(out, first, lanes, l * (l + 1), p, normal);
+    }
+}
+
+/* All basis functions of up to ISOGI_SH__LANES directions. */
+static void isogi_sh__eval_block(const isogi_sh__output *out, size_t first, int lanes, int order, const isogi_sh__unit *u) {
+    double c[ISOGI_SH__LANES], s[ISOGI_SH__LANES], q[3][ISOGI_SH__LANES], diagonal = isogi_sh__next_diagonal(0, 0);
+    int l, m, k;
+    isogi_sh__eval_zonal(out, first, lanes, order, u);
+    for (k = 0; k < lanes; k++) c[k] = u[k].x, s[k] = u[k].y;
+    for (m = 1; m < order; m++) {
+        double a_before = 0, *q0 = q[0], *q1 = q[1], *q2 = q[2];
+        diagonal = isogi_sh__next_diagonal(diagonal, m);
+        for (k = 0; k < lanes; k++) q1[k] = 0, q0[k] = diagonal;
+        for (l = m; l < order; l++) {
+            double *oldest = q2;
+            if (l > m) {
+                double a = isogi_sh__a(l, m), b = l > m + 1 ? 1 / a_before : 0;
+                q2 = q1, q1 = q0, q0 = oldest;
+                for (k = 0; k < lanes; k++) q0[k] = a * (u[k].z * q1[k] + (u[k].z_low * q1[k] - b * q2[k]));
+                a_before = a;
+            }
+            isogi_sh__store(out, first, lanes, l * (l + 1) + m, q0, c);
+            isogi_sh__store(out, first, lanes, l * (l + 1) - m, q0, s);
+        }
+        for (k = 0; k < lanes; k++) {
+            double x = u[k].x * c[k] - u[k].y * s[k];
+            s[k] = u[k].x * s[k] + u[k].y * c[k];
+            c[k] = x;
+        }
+    }
+}
+
+/* ==== batches on vector units ========================================================================================= */
+
+/* The same recursions with one direction in each lane, for orders up to ISOGI_SH__TABLE_ORDER, whose constants are tabled. Vectors are
+   those of gcc and clang; each function names its instruction set, so that no compiler flag is needed, and runs only where the
+   processor has it. Blocks with lengths out of range, tails and higher orders go through the plain code above. */
+#ifdef ISOGI_SH__SIMD
+#define ISOGI_SH__WIDE_ORDER 12
+
 /* 0 plain, 1 AVX2 and FMA, 2 AVX-512 */
 static int isogi_sh__level(void) {
     int level = 0;
@@ -1943,6 +1968,126 @@ static void isogi_sh__row_sums(double sums[2][ISOGI_SH__GROUP][3], const isogi_s
     }
 }
 
+#ifdef ISOGI_SH__SIMD
+/* Order 5 of an RGB image of even width: opposite texels are added for even m and subtracted for odd ones, so that 9 sums need 9 fused
+   operations for two texels. RGB stays interleaved: the factors are repeated for each channel, and lanes are sorted out at the end of
+   a row. 64 pairs of columns and 16 rows at a time. Lanes sum a few hundred floats, rows are summed in double. */
+#define ISOGI_SH__PAIRS 64
+#define ISOGI_SH__ROWS 16
+
+/* factor[2 m - 1 + (sine)][3 pair + channel]; the cosine of m = 0 is 1 */
+static void isogi_sh__image_factors(float (*factor)[3 * ISOGI_SH__PAIRS], int first, int pairs, int width) {
+    double step = 2 * ISOGI_SH__PI / (double)width, start = 2 * ISOGI_SH__PI - step * ((double)first + 0.5), t;
+    double x = cos(start), y = sin(start), turn_c = cos(step), turn_s = -sin(step);
+    int i, k, m;
+    for (i = 0; i < ISOGI_SH__PAIRS; i++) {
+        double c = x, s = y;
+        for (k = 0; k < 3; k++) factor[0][3 * i + k] = i < pairs ? 1.0f : 0.0f;
+        for (m = 1; m < 5; m++) {
+            for (k = 0; k < 3; k++) {
+                factor[2 * m - 1][3 * i + k] = i < pairs ? (float)c : 0.0f;
+                factor[2 * m][3 * i + k] = i < pairs ? (float)s : 0.0f;
+            }
+            t = x * c - y * s;
+            s = x * s + y * c;
+            c = t;
+        }
+        t = x * turn_c - y * turn_s;
+        y = x * turn_s + y * turn_c;
+        x = t;
+    }
+}
+
+/* sums of one row over one block of columns, added to total[9][24] */
+ISOGI_SH__AVX2 static void isogi_sh__image_row(float (*total)[24], const float *left, const float *right, int floats, const float (*factor)[3 * ISOGI_SH__PAIRS]) {
+    float even[3 * ISOGI_SH__PAIRS], odd[3 * ISOGI_SH__PAIRS];
+    int i, j;
+    for (i = 0; i + 8 <= floats; i += 8) {
+        isogi_sh__f8 a = *(const isogi_sh__f8 *)(left + i), b = *(const isogi_sh__f8 *)(right + i);
+        *(isogi_sh__f8 *)(even + i) = a + b;
+        *(isogi_sh__f8 *)(odd + i) = a - b;
+    }
+    for (; i < floats; i++) even[i] = left[i] + right[i], odd[i] = left[i] - right[i];
+    for (; i < 3 * ISOGI_SH__PAIRS; i++) even[i] = odd[i] = 0;
+    for (j = 0; j < 9; j++) {
+        const float *value = ((j + 1) / 2) & 1 ? odd : even, *by = factor[j];
+        isogi_sh__f8 a = *(const isogi_sh__f8 *)total[j], b = *(const isogi_sh__f8 *)(total[j] + 8), c = *(const isogi_sh__f8 *)(total[j] + 16);
+        for (i = 0; i < 3 * ISOGI_SH__PAIRS; i += 24) {
+            a = ISOGI_SH__FMA_F8(*(const isogi_sh__f8 *)(value + i), *(const isogi_sh__f8 *)(by + i), a);
+            b = ISOGI_SH__FMA_F8(*(const isogi_sh__f8 *)(value + i + 8), *(const isogi_sh__f8 *)(by + i + 8), b);
+            c = ISOGI_SH__FMA_F8(*(const isogi_sh__f8 *)(value + i + 16), *(const isogi_sh__f8 *)(by + i + 16), c);
+        }
+        *(isogi_sh__f8 *)total[j] = a;
+        *(isogi_sh__f8 *)(total[j] + 8) = b;
+        *(isogi_sh__f8 *)(total[j] + 16) = c;
+    }
+}
+
+/* Fejer's weights of ISOGI_SH__ROWS rows side by side; see isogi_sh__fejer. */
+static void isogi_sh__fejer_rows(double *weight, int row, int rows) {
+    double c[ISOGI_SH__ROWS], now[ISOGI_SH__ROWS], before[ISOGI_SH__ROWS];
+    int j, k;
+    for (k = 1; k <= rows / 2; k++) {
+        double factor = 2 / ((double)(2 * k - 1) * (double)(2 * k + 1));
+        for (j = 0; j < ISOGI_SH__ROWS; j++) {
+            double angle, next;
+            if (k == 1) weight[j] = 1;
+            if ((k & 31) == 0 || k == 1) {
+                angle = ISOGI_SH__PI * (double)(2 * (row + j) + 1) / (double)rows;
+                if (k == 1) c[j] = cos(angle);
+                now[j] = cos((double)k * angle), before[j] = cos((double)(k - 1) * angle);
+            }
+            weight[j] -= factor * now[j];
+            next = 2 * c[j] * now[j] - before[j];
+            before[j] = now[j];
+            now[j] = next;
+        }
+    }
+    for (j = 0; j < ISOGI_SH__ROWS; j++) weight[j] *= 2 / (double)rows;
+}
+
+static void isogi_sh__project_fast(float *rgb, const float *image, int width, int height) {
+    float factor[9][3 * ISOGI_SH__PAIRS], lanes[ISOGI_SH__ROWS][9][24];
+    double total[25][3], weight[ISOGI_SH__ROWS], q[5];
+    int row, first, j, i, k, l, m, half = width / 2;
+    memset(total, 0, sizeof total);
+    for (row = 0; row < height; row += ISOGI_SH__ROWS) {
+        int some = height - row < ISOGI_SH__ROWS ? height - row : ISOGI_SH__ROWS;
+        memset(lanes, 0, sizeof lanes);
+        for (first = 0; first < half; first += ISOGI_SH__PAIRS) {
+            int pairs = half - first < ISOGI_SH__PAIRS ? half - first : ISOGI_SH__PAIRS;
+            isogi_sh__image_factors(factor, first, pairs, width);
+            for (j = 0; j < some; j++) {
+                const float *left = image + 3 * ((size_t)width * (size_t)(row + j) + (size_t)first);
+                isogi_sh__image_row(lanes[j], left, left + 3 * half, 3 * pairs, (const float(*)[3 * ISOGI_SH__PAIRS])factor);
+            }
+        }
+        isogi_sh__fejer_rows(weight, row, height);
+        for (j = 0; j < some; j++) {
+            double t = ISOGI_SH__PI * ((double)(row + j) + 0.5) / (double)height, z = cos(t), sine = sin(t), power = weight[j] * 2 * ISOGI_SH__PI / (double)width;
+            for (m = 0; m < 5; m++) {
+                double sums[2][3] = {{0, 0, 0}, {0, 0, 0}};
+                for (i = 0; i < 24; i++) {
+                    sums[0][i % 3] += (double)lanes[j][m ? 2 * m - 1 : 0][i];
+                    if (m) sums[1][i % 3] += (double)lanes[j][2 * m][i];
+                }
+                isogi_sh__column(q, 5, m, isogi_sh__next_diagonal(0, m), z, 0);
+                for (l = m; l < 5; l++)
+                    for (k = 0; k < 3; k++) {
+                        total[l * (l + 1) + m][k] += power * q[l] * sums[0][k];
+                        if (m) total[l * (l + 1) - m][k] += power * q[l] * sums[1][k];
+                    }
+                power *= sine;
+            }
+        }
+    }
+    for (i = 0; i < 25; i++)
+        for (k = 0; k < 3; k++) rgb[3 * i + k] = (float)total[i][k];
+}
+#undef ISOGI_SH__PAIRS
+#undef ISOGI_SH__ROWS
+#endif
+
 /* Their part of the projection, in the frame whose z is the image's pole. */
 static void isogi_sh__project_rows(float *c, int order, const isogi_sh__pixels *p) {
     double total[2][ISOGI_SH__GROUP][ISOGI_SH_MAX_ORDER][3], sums[2][ISOGI_SH__GROUP][3], q[ISOGI_SH_MAX_ORDER];
@@ -1986,6 +2131,13 @@ ISOGI_API isogi_result isogi_sh_project_image(float *c, int order, int channels,
     if (!c || !isogi_sh__shape_ok(order, channels) || !image || width < 1 || height < 1) return ISOGI_INVALID;
     if (!isogi_sh__image_fits(width, height, channels)) return ISOGI_TOO_LARGE;
     p.image = image, p.width = width, p.height = height, p.channels = channels;
+#ifdef ISOGI_SH__SIMD
+    if (order == 5 && channels == 3 && !(width & 1) && width >= 32 && isogi_sh__level()) {
+        isogi_sh__project_fast(c, image, width, height);
+        if (isogi_sh__euler_angles(&e, isogi_sh__image_to_world) == ISOGI_OK) isogi_sh__rotate(c, c, 0, order, channels, &e);
+        return ISOGI_OK;
+    }
+#endif
     for (p.first = 0; p.first < order; p.first += ISOGI_SH__GROUP)
         for (p.channel = 0; p.channel < channels; p.channel += 3) {
             p.end = p.first + ISOGI_SH__GROUP < order ? p.first + ISOGI_SH__GROUP : order;
