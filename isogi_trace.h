@@ -43,6 +43,8 @@
      how good is it                  the error of isogi_trace_sample: standard error of luminance; it falls as 1 / sqrt(samples)
      sharper shadows                 a finer lattice (desc.lattice); coarser ones are cheaper by the cube
      a texture that is too dark in grooves   more bounces: each adds one reflection, -1 all of them
+     a scan cut open by its border   desc.capped here and ISOGI_RAY_CAPPED for viewing rays; else one looks into the solid through
+                                     the cut, at surfaces whose outer side is dark because it is shut off
 
    What a texel means
 
@@ -125,12 +127,12 @@ typedef struct isogi_trace_desc {
     int bounces;               /* 0 = light that arrives directly; n = up to n reflections; -1 = all (Russian roulette) */
     int samples;               /* paths per texel; 0 = 64 */
     uint64_t seed;
-    float offset;              /* rays start this many voxels along the normal, up to 16; 0 = the default of 0.25; negative = on the surface itself */
+    float offset;              /* rays start this many voxels along the normal, up to 16; 0 = 0.25; negative = on the surface */
     isogi_normal_kind normals; /* of the hemisphere that is integrated over */
     double isovalue_min, isovalue_max; /* only texels that a surface within this interval reads; both 0 = all */
     int lazy;                  /* non-zero: only texels that were requested (and that the interval, if there is one, reads) */
     int capped;                /* non-zero: the volume's border closes the surface (ISOGI_RAY_CAPPED) */
-    int transfer_channels;     /* TRANSFER: 1 = one set of coefficients (grey albedo, the mean), 3 = one per RGB; 0 = 3 if albedo is coloured, else 1 */
+    int transfer_channels;     /* TRANSFER: sets of coefficients: 1 = grey (mean albedo), 3 = RGB; 0 = 3 if albedo is coloured, else 1 */
 } isogi_trace_desc;
 
 typedef struct isogi_trace isogi_trace;
@@ -326,8 +328,8 @@ static double isogi_trace__kernel(const float s[3], const float g[3], const floa
 }
 
 /* Geometric and shading normals at hits, on the side that the path came from (+1: the low side). */
-static void isogi_trace__normals(const isogi_pyramid *pyramid, isogi_normal_kind kind, const isogi_hit *hits, const signed char *from,
-                                 size_t count, float (*s)[3], float (*g)[3]) {
+static void isogi_trace__normals(const isogi_pyramid *pyramid, isogi_normal_kind kind, const isogi_hit *hits,
+                                 const signed char *from, size_t count, float (*s)[3], float (*g)[3]) {
     size_t i;
     int a;
     isogi_vol_normals(pyramid, hits, count, ISOGI_NORMAL_TRILINEAR, g);
@@ -349,11 +351,11 @@ static void isogi_trace__normals(const isogi_pyramid *pyramid, isogi_normal_kind
    1/8 6/8 1/8) / total. Rows and pixels are found in cumulative sums. */
 typedef struct isogi_trace__sky {
     const isogi_env *env;
-    int on;         /* whether directions are drawn from it */
-    double total;   /* integral of luminance over the sphere */
-    float *mean;    /* width * height */
-    double *row;    /* height + 1 cumulative sums */
-    double *pixel;  /* height * (width + 1) cumulative sums of a row */
+    int on;        /* whether directions are drawn from it */
+    double total;  /* integral of luminance over the sphere */
+    float *mean;   /* width * height */
+    double *row;   /* height + 1 cumulative sums */
+    double *pixel; /* height * (width + 1) cumulative sums of a row */
     size_t width, height;
 } isogi_trace__sky;
 
@@ -446,8 +448,9 @@ static void isogi_trace__sky_direction(const isogi_trace__sky *sky, double u, do
     sine = sqrt(isogi_trace__clamp(1 - d[1] * d[1], 1));
     d[0] = sine * sin(longitude), d[2] = -sine * cos(longitude);
     for (a = 0; a < 3; a++)
-        dir[a] = isogi_trace__is_identity(m) ? (float)d[a]
-                                             : (float)((double)m[3 * a] * d[0] + (double)m[3 * a + 1] * d[1] + (double)m[3 * a + 2] * d[2]);
+        dir[a] = isogi_trace__is_identity(m)
+                     ? (float)d[a]
+                     : (float)((double)m[3 * a] * d[0] + (double)m[3 * a + 1] * d[1] + (double)m[3 * a + 2] * d[2]);
 }
 
 /* Density (per steradian) with which the above draws a world direction. */
@@ -457,8 +460,9 @@ static double isogi_trace__sky_density(const isogi_trace__sky *sky, const float 
     size_t x, y;
     int a;
     for (a = 0; a < 3; a++)
-        d[a] = isogi_trace__is_identity(m) ? (double)dir[a]
-                                           : (double)m[a] * (double)dir[0] + (double)m[3 + a] * (double)dir[1] + (double)m[6 + a] * (double)dir[2];
+        d[a] = isogi_trace__is_identity(m)
+                   ? (double)dir[a]
+                   : (double)m[a] * (double)dir[0] + (double)m[3 + a] * (double)dir[1] + (double)m[6 + a] * (double)dir[2];
     v = acos(d[1] > 1 ? 1 : d[1] < -1 ? -1 : d[1]) / ISOGI_TRACE__PI;
     u = atan2(d[0], -d[2]) / (2 * ISOGI_TRACE__PI) + 0.5;
     x = (size_t)isogi_trace__clamp(u * (double)sky->width, (double)(sky->width - 1));
@@ -476,9 +480,7 @@ typedef struct isogi_trace__beam {
 } isogi_trace__beam;
 
 /* A light without extent: one ray decides. */
-static int isogi_trace__is_delta(const isogi_light *light) {
-    return light->kind == ISOGI_LIGHT_POINT || !(light->radius > 0);
-}
+static int isogi_trace__is_delta(const isogi_light *light) { return light->kind == ISOGI_LIGHT_POINT || !(light->radius > 0); }
 
 /* Directions uniform in a cone about the unit vector n, 1 - cos(its half angle) = opening. */
 static void isogi_trace__cone(const double n[3], double opening, double u, double v, float dir[3]) {
@@ -489,7 +491,8 @@ static void isogi_trace__cone(const double n[3], double opening, double u, doubl
 }
 
 /* A sphere of radiance I / (pi r^2), seen from outside through a cone of directions, from within all around. */
-static double isogi_trace__sphere(const double to[3], double distance, double radius, double u, double v, isogi_trace__beam *beam) {
+static double isogi_trace__sphere(const double to[3], double distance, double radius, double u, double v,
+                                  isogi_trace__beam *beam) {
     double n[3], ratio = radius / distance, opening = 2, along = 0, inside;
     int a;
     if (ratio < 1) opening = ratio * ratio / (1 + sqrt(1 - ratio * ratio));
@@ -503,7 +506,8 @@ static double isogi_trace__sphere(const double to[3], double distance, double ra
 }
 
 /* 0 where the light does not reach `point` by nature. */
-static int isogi_trace__light_beam(const isogi_light *light, const double point[3], double u, double v, isogi_trace__beam *beam) {
+static int isogi_trace__light_beam(const isogi_light *light, const double point[3], double u, double v,
+                                   isogi_trace__beam *beam) {
     double to[3], length = 0, factor = 1;
     int a;
     for (a = 0; a < 3; a++) {
@@ -531,7 +535,8 @@ static int isogi_trace__light_beam(const isogi_light *light, const double point[
 /* ==== voxels and texels ============================================================================================== */
 
 static double isogi_trace__voxel(const isogi_volume *v, size_t x, size_t y, size_t z) {
-    const char *p = (const char *)v->data + (ptrdiff_t)x * v->stride[0] + (ptrdiff_t)y * v->stride[1] + (ptrdiff_t)z * v->stride[2];
+    const char *p =
+        (const char *)v->data + (ptrdiff_t)x * v->stride[0] + (ptrdiff_t)y * v->stride[1] + (ptrdiff_t)z * v->stride[2];
     double raw = 0;
     switch (v->type) {
     case ISOGI_U8: raw = *(const uint8_t *)(const void *)p; break;
@@ -567,7 +572,8 @@ static double isogi_trace__value(const isogi_volume *v, const isogi_hit *place) 
     double c[8], low = DBL_MAX, high = -DBL_MAX, value;
     int i;
     for (i = 0; i < 8; i++) {
-        c[i] = isogi_trace__voxel(v, place->cell[0] + (size_t)(i & 1), place->cell[1] + (size_t)(i >> 1 & 1), place->cell[2] + (size_t)(i >> 2));
+        c[i] = isogi_trace__voxel(v, place->cell[0] + (size_t)(i & 1), place->cell[1] + (size_t)(i >> 1 & 1),
+                                  place->cell[2] + (size_t)(i >> 2));
         low = c[i] < low ? c[i] : low, high = c[i] > high ? c[i] : high;
     }
     for (i = 0; i < 8; i += 2) c[i] = isogi_trace__lerp(c[i], c[i + 1], place->local[0]);
@@ -683,7 +689,8 @@ static void isogi_trace__site_start(const isogi_trace__scene *scene, isogi_trace
     double n[3], speed = 0, offset = (double)scene->desc.offset;
     int a, attempt;
     for (a = 0; a < 3; a++) {
-        n[a] = m[3 * a] * (double)site->normal[0] + m[3 * a + 1] * (double)site->normal[1] + m[3 * a + 2] * (double)site->normal[2];
+        n[a] = m[3 * a] * (double)site->normal[0] + m[3 * a + 1] * (double)site->normal[1] +
+               m[3 * a + 2] * (double)site->normal[2];
         speed += n[a] * n[a];
     }
     speed = sqrt(speed);
@@ -722,8 +729,8 @@ typedef struct isogi_trace__wave {
     int slot[ISOGI_TRACE__WAVE];
     uint64_t key[ISOGI_TRACE__WAVE];
     double through[ISOGI_TRACE__WAVE][3];
-    double density[ISOGI_TRACE__WAVE];    /* with which dir was drawn, times pi */
-    signed char from[ISOGI_TRACE__WAVE];  /* side on which the ray travels: 1 low, -1 high, 0 not known */
+    double density[ISOGI_TRACE__WAVE];   /* with which dir was drawn, times pi */
+    signed char from[ISOGI_TRACE__WAVE]; /* side on which the ray travels: 1 low, -1 high, 0 not known */
     float dir[ISOGI_TRACE__WAVE][3];
     isogi_hit start[ISOGI_TRACE__WAVE];
     float shading[ISOGI_TRACE__WAVE][3], geometric[ISOGI_TRACE__WAVE][3];
@@ -804,7 +811,8 @@ static void isogi_trace__wave_lights(isogi_trace__wave *w, isogi_trace__shadows 
         const isogi_light *light = &lighting->lights[l];
         if (!depth && isogi_trace__is_delta(light)) continue;
         for (i = 0; i < w->count; i++) {
-            uint64_t key = isogi_trace__key(isogi_trace__key(w->key[i], (uint64_t)depth * ISOGI_TRACE__DIMENSIONS + ISOGI_TRACE__LIGHT), l);
+            uint64_t key = isogi_trace__key(
+                isogi_trace__key(w->key[i], (uint64_t)depth * ISOGI_TRACE__DIMENSIONS + ISOGI_TRACE__LIGHT), l);
             double u = isogi_trace__unit(isogi_trace__key(key, 0)), v = isogi_trace__unit(isogi_trace__key(key, 1));
             double point[3], cosine;
             isogi_trace__beam beam;
@@ -848,7 +856,7 @@ static void isogi_trace__wave_escape(isogi_trace__wave *w, int i) {
     int c, k, channels = scene->desc.transfer_channels, count = scene->desc.order * scene->desc.order;
     if (scene->desc.mode == ISOGI_TRACE_TRANSFER) {
         double grey = (w->through[i][0] + w->through[i][1] + w->through[i][2]) / 3;
-        isogi_sh_eval(w->basis, scene->desc.order, (const float(*)[3])&w->dir[i], 1);
+        isogi_sh_eval(w->basis, scene->desc.order, (const float(*)[3]) & w->dir[i], 1);
         for (k = 0; k < count; k++)
             for (c = 0; c < channels; c++)
                 w->transfer[k * channels + c] += (channels == 1 ? grey : w->through[i][c]) * (double)w->basis[k];
@@ -897,7 +905,8 @@ static void isogi_trace__wave_scatter(isogi_trace__wave *w, int depth) {
         double v = isogi_trace__random(w->key[i], depth, ISOGI_TRACE__DIRECTION + 1);
         isogi_trace__cosine((const float *)w->shading[i], u, v, w->dir[i]);
         isogi_trace__mirror((const float *)w->geometric[i], w->dir[i]);
-        w->density[i] = isogi_trace__kernel((const float *)w->shading[i], (const float *)w->geometric[i], (const float *)w->dir[i]);
+        w->density[i] =
+            isogi_trace__kernel((const float *)w->shading[i], (const float *)w->geometric[i], (const float *)w->dir[i]);
     }
 }
 
@@ -927,8 +936,10 @@ static void isogi_trace__wave_run(isogi_trace__wave *w, int first, int count) {
     for (depth = 0; w->count; depth++) {
         int alive = 0;
         if (depth) {
-            isogi_trace__normals(scene->pyramid, scene->desc.normals, w->start, w->from, (size_t)w->count, w->shading, w->geometric);
-            if (lit && scene->desc.lighting.light_count) isogi_vol_positions(scene->pyramid, w->start, (size_t)w->count, positions);
+            isogi_trace__normals(scene->pyramid, scene->desc.normals, w->start, w->from, (size_t)w->count, w->shading,
+                                 w->geometric);
+            if (lit && scene->desc.lighting.light_count)
+                isogi_vol_positions(scene->pyramid, w->start, (size_t)w->count, positions);
             isogi_trace__wave_scatter(w, depth);
         }
         if (lit) isogi_trace__wave_lights(w, &shadows, depth, positions);
@@ -962,7 +973,7 @@ static void isogi_trace__site_lights(const isogi_trace__scene *scene, const isog
         if (!isogi_trace__light_beam(&lighting->lights[l], site->origin, 0, 0, &beam)) continue;
         cosine = isogi_trace__dot(site->normal, beam.dir);
         if (!(cosine > 0)) continue;
-        isogi_trace__site_rays(scene, site, (const float(*)[3])&beam.dir, &beam.tmax, 1, &hit, counters);
+        isogi_trace__site_rays(scene, site, (const float(*)[3]) & beam.dir, &beam.tmax, 1, &hit, counters);
         for (c = 0; c < 3 && !hit.side; c++) rgb[c] += beam.rgb[c] * cosine;
     }
 }
@@ -974,12 +985,13 @@ static int isogi_trace__dark(const isogi_trace__scene *scene) {
 
 /* Computes one site: values[3] (RGB irradiance) or values[order*order*channels], and the standard error of the luminance (TRANSFER:
    under a sky of radiance 1). */
-static void isogi_trace__gather_site(const isogi_trace__scene *scene, const isogi_trace__site *site, float *values, float *error,
-                                     isogi_counters *counters) {
+static void isogi_trace__gather_site(const isogi_trace__scene *scene, const isogi_trace__site *site, float *values,
+                                     float *error, isogi_counters *counters) {
     const isogi_trace_desc *desc = &scene->desc;
     isogi_trace__wave wave;
     float basis[ISOGI_TRACE__MAX_ORDER * ISOGI_TRACE__MAX_ORDER], albedo[3];
-    double transfer[3 * ISOGI_TRACE__MAX_ORDER * ISOGI_TRACE__MAX_ORDER], sum[3] = {0, 0, 0}, mean = 0, square = 0, direct[3] = {0, 0, 0};
+    double transfer[3 * ISOGI_TRACE__MAX_ORDER * ISOGI_TRACE__MAX_ORDER], sum[3] = {0, 0, 0}, mean = 0, square = 0,
+                                                                          direct[3] = {0, 0, 0};
     int coefficients = desc->order * desc->order * desc->transfer_channels, first, i, c;
     wave.scene = scene, wave.site = site, wave.counters = counters, wave.basis = basis, wave.transfer = transfer;
     memset(transfer, 0, sizeof transfer);
@@ -996,7 +1008,8 @@ static void isogi_trace__gather_site(const isogi_trace__scene *scene, const isog
             for (c = 0; c < 3; c++) sum[c] += wave.light[i][c];
         }
     }
-    *error = desc->samples > 1 ? (float)(ISOGI_TRACE__PI * sqrt(square / ((double)desc->samples * (desc->samples - 1)))) : ISOGI_TRACE__NOT_READY;
+    *error = desc->samples > 1 ? (float)(ISOGI_TRACE__PI * sqrt(square / ((double)desc->samples * (desc->samples - 1))))
+                               : ISOGI_TRACE__NOT_READY;
     if (desc->mode == ISOGI_TRACE_TRANSFER) {
         for (i = 0; i < coefficients; i++) values[i] = (float)(ISOGI_TRACE__PI * transfer[i] / desc->samples);
         return;
@@ -1018,7 +1031,9 @@ ISOGI_API void isogi_trace_albedo(const isogi_trace_desc *desc, double isovalue,
     for (c = 0; c < 3; c++) {
         double value;
         if (i == 0 || i == n) value = (double)p[i ? n - 1 : 0].rgb[c];
-        else value = isogi_trace__lerp((double)p[i - 1].rgb[c], (double)p[i].rgb[c], (isovalue - p[i - 1].value) / (p[i].value - p[i - 1].value));
+        else
+            value = isogi_trace__lerp((double)p[i - 1].rgb[c], (double)p[i].rgb[c],
+                                      (isovalue - p[i - 1].value) / (p[i].value - p[i - 1].value));
         rgb[c] = plain ? rgb[c] * (float)value : (float)value;
     }
 }
@@ -1052,10 +1067,12 @@ static int isogi_trace__desc_valid(const isogi_trace_desc *d) {
     if (!d || !d->pyramid) return 0;
     if (d->mode != ISOGI_TRACE_IRRADIANCE && d->mode != ISOGI_TRACE_TRANSFER) return 0;
     if (d->normals != ISOGI_NORMAL_SMOOTH && d->normals != ISOGI_NORMAL_TRILINEAR) return 0;
-    if (d->order < 0 || d->order > ISOGI_TRACE__MAX_ORDER || d->bounces < -1 || d->samples < 0 || d->samples > 1 << 24) return 0;
+    if (d->order < 0 || d->order > ISOGI_TRACE__MAX_ORDER || d->bounces < -1 || d->samples < 0 || d->samples > 1 << 24)
+        return 0;
     if (d->transfer_channels != 0 && d->transfer_channels != 1 && d->transfer_channels != 3) return 0;
     if (!isogi_trace__finite((double)d->offset) || d->offset > 16) return 0;
-    if (!isogi_trace__finite(d->isovalue_min) || !isogi_trace__finite(d->isovalue_max) || d->isovalue_min > d->isovalue_max) return 0;
+    if (!isogi_trace__finite(d->isovalue_min) || !isogi_trace__finite(d->isovalue_max) || d->isovalue_min > d->isovalue_max)
+        return 0;
     if (!isogi_trace__finite3(d->lattice_min) || !isogi_trace__finite3(d->lattice_max)) return 0;
     if (isogi_lighting_validate(&d->lighting) != ISOGI_OK || !isogi_trace__albedo_valid(d)) return 0;
     return d->mode == ISOGI_TRACE_IRRADIANCE || isogi_trace__distant(&d->lighting);
@@ -1064,7 +1081,8 @@ static int isogi_trace__desc_valid(const isogi_trace_desc *d) {
 /* Grey surfaces need one set of coefficients. */
 static int isogi_trace__grey(const isogi_trace_desc *d) {
     size_t i;
-    int grey = d->albedo[0] >= d->albedo[1] && d->albedo[0] <= d->albedo[1] && d->albedo[0] >= d->albedo[2] && d->albedo[0] <= d->albedo[2];
+    int grey = d->albedo[0] >= d->albedo[1] && d->albedo[0] <= d->albedo[1] && d->albedo[0] >= d->albedo[2] &&
+               d->albedo[0] <= d->albedo[2];
     for (i = 0; i < d->albedo_count; i++) {
         const float *c = d->albedo_points[i].rgb;
         grey = grey && c[0] >= c[1] && c[0] <= c[1] && c[0] >= c[2] && c[0] <= c[2];
@@ -1073,7 +1091,8 @@ static int isogi_trace__grey(const isogi_trace_desc *d) {
 }
 
 /* The scene of a valid description. What it allocates is freed by isogi_trace__sky_free, on failure too. */
-static isogi_result isogi_trace__scene_set(isogi_trace__scene *scene, const isogi_trace_desc *desc, const isogi_context *context) {
+static isogi_result isogi_trace__scene_set(isogi_trace__scene *scene, const isogi_trace_desc *desc,
+                                           const isogi_context *context) {
     isogi_trace_desc *d = &scene->desc;
     memset(scene, 0, sizeof *scene);
     *d = *desc;
@@ -1092,7 +1111,14 @@ static isogi_result isogi_trace__scene_set(isogi_trace__scene *scene, const isog
 
 /* ==== the texture: bricks of texels, there where light was asked for ================================================= */
 
-enum { ISOGI_TRACE__UNKNOWN = 0, ISOGI_TRACE__NO_SURFACE, ISOGI_TRACE__NOT_ASKED, ISOGI_TRACE__READABLE, ISOGI_TRACE__WANTED, ISOGI_TRACE__DONE };
+enum {
+    ISOGI_TRACE__UNKNOWN = 0,
+    ISOGI_TRACE__NO_SURFACE,
+    ISOGI_TRACE__NOT_ASKED,
+    ISOGI_TRACE__READABLE,
+    ISOGI_TRACE__WANTED,
+    ISOGI_TRACE__DONE
+};
 
 typedef struct isogi_trace__brick {
     uint8_t state[ISOGI_TRACE__TEXELS];
@@ -1184,7 +1210,8 @@ static int isogi_trace__classify(const isogi_trace *t, const size_t texel[3]) {
 
 static size_t isogi_trace__brick_of(const isogi_trace *t, const size_t texel[3], uint32_t *slot) {
     size_t x = texel[0], y = texel[1], z = texel[2];
-    *slot = (uint32_t)(x % ISOGI_TRACE__SIDE + ISOGI_TRACE__SIDE * (y % ISOGI_TRACE__SIDE + ISOGI_TRACE__SIDE * (z % ISOGI_TRACE__SIDE)));
+    *slot = (uint32_t)(x % ISOGI_TRACE__SIDE +
+                       ISOGI_TRACE__SIDE * (y % ISOGI_TRACE__SIDE + ISOGI_TRACE__SIDE * (z % ISOGI_TRACE__SIDE)));
     return x / ISOGI_TRACE__SIDE + t->size[0] * (y / ISOGI_TRACE__SIDE + t->size[1] * (z / ISOGI_TRACE__SIDE));
 }
 
@@ -1315,10 +1342,12 @@ static isogi_result isogi_trace__set_up(isogi_trace *t, const isogi_trace_desc *
     float light[3 * ISOGI_TRACE__MAX_ORDER * ISOGI_TRACE__MAX_ORDER];
     if (result == ISOGI_OK) result = isogi_trace__set_lattice(t);
     if (result != ISOGI_OK) return result;
-    t->values = desc->mode == ISOGI_TRACE_TRANSFER ? t->scene.desc.order * t->scene.desc.order * t->scene.desc.transfer_channels : 3;
+    t->values =
+        desc->mode == ISOGI_TRACE_TRANSFER ? t->scene.desc.order * t->scene.desc.order * t->scene.desc.transfer_channels : 3;
     t->bricks = (isogi_trace__brick **)isogi_allocate(&t->context, t->brick_count, sizeof *t->bricks);
     t->batch = (isogi_trace__ref *)isogi_allocate(&t->context, ISOGI_TRACE__BATCH, sizeof *t->batch);
-    t->task_counters = (isogi_counters *)isogi_allocate(&t->context, ISOGI_TRACE__BATCH / ISOGI_TRACE__TASK, sizeof *t->task_counters);
+    t->task_counters =
+        (isogi_counters *)isogi_allocate(&t->context, ISOGI_TRACE__BATCH / ISOGI_TRACE__TASK, sizeof *t->task_counters);
     if (t->bricks) memset(t->bricks, 0, t->brick_count * sizeof *t->bricks);
     if (!t->bricks || !t->batch || !t->task_counters) return ISOGI_NO_MEMORY;
     if (desc->mode == ISOGI_TRACE_TRANSFER) {
@@ -1398,7 +1427,8 @@ static int isogi_trace__state(const isogi_trace *t, const size_t texel[3]) {
 
 /* Among the 4x4x4 texels around a lattice cell, the one nearest to the point (in texels; of equals the first) with that state or a
    later one. 0 if there is none. */
-static int isogi_trace__nearest(const isogi_trace *t, const size_t cell[3], const double local[3], int state, size_t nearest[3]) {
+static int isogi_trace__nearest(const isogi_trace *t, const size_t cell[3], const double local[3], int state,
+                                size_t nearest[3]) {
     double best = DBL_MAX;
     int i, a;
     for (i = 0; i < 64; i++) {
@@ -1421,7 +1451,8 @@ static int isogi_trace__nearest(const isogi_trace *t, const size_t cell[3], cons
 
 /* The texels and weights of a lookup: the cell's corners that are computed; where none of the eight has a surface, the nearest that
    has one. The number of them; 0: the lookup is not ready. */
-static int isogi_trace__taps(const isogi_trace *t, const float point[3], const float *values[8], float error[8], double weight[8]) {
+static int isogi_trace__taps(const isogi_trace *t, const float point[3], const float *values[8], float error[8],
+                             double weight[8]) {
     size_t cell[3], texel[3];
     double local[3], total = 0;
     int i, count = 0, pending = 0;
@@ -1452,12 +1483,13 @@ static void isogi_trace__irradiance(const isogi_trace *t, const float *values, d
     for (c = 0; c < 3; c++) {
         rgb[c] = t->scene.desc.mode == ISOGI_TRACE_TRANSFER ? 0 : (double)values[c];
         if (t->scene.desc.mode != ISOGI_TRACE_TRANSFER) continue;
-        for (k = 0; k < count; k++) rgb[c] += (double)values[k * channels + (channels == 1 ? 0 : c)] * (double)t->light[3 * k + c];
+        for (k = 0; k < count; k++)
+            rgb[c] += (double)values[k * channels + (channels == 1 ? 0 : c)] * (double)t->light[3 * k + c];
     }
 }
 
-ISOGI_API isogi_result isogi_trace_sample(const isogi_trace *trace, const float (*points)[3], size_t count, float (*irradiance)[3],
-                                          float *error) {
+ISOGI_API isogi_result isogi_trace_sample(const isogi_trace *trace, const float (*points)[3], size_t count,
+                                          float (*irradiance)[3], float *error) {
     size_t i;
     int k, n, c;
     if (!trace || (count && (!points || !irradiance))) return ISOGI_INVALID;
@@ -1469,7 +1501,8 @@ ISOGI_API isogi_result isogi_trace_sample(const isogi_trace *trace, const float 
         for (k = 0; k < n; k++) {
             isogi_trace__irradiance(trace, values[k], rgb);
             for (c = 0; c < 3; c++) sum[c] += weight[k] * rgb[c];
-            variance += weight[k] * (double)errors[k] * weight[k] * (double)errors[k]; /* texels are independent of each other */
+            variance +=
+                weight[k] * (double)errors[k] * weight[k] * (double)errors[k]; /* texels are independent of each other */
         }
         for (c = 0; c < 3; c++) irradiance[i][c] = (float)sum[c];
         if (trace->scene.desc.mode == ISOGI_TRACE_TRANSFER) variance *= trace->brightness * trace->brightness;
@@ -1478,7 +1511,8 @@ ISOGI_API isogi_result isogi_trace_sample(const isogi_trace *trace, const float 
     return ISOGI_OK;
 }
 
-ISOGI_API isogi_result isogi_trace_sample_transfer(const isogi_trace *trace, const float (*points)[3], size_t count, float *transfer) {
+ISOGI_API isogi_result isogi_trace_sample_transfer(const isogi_trace *trace, const float (*points)[3], size_t count,
+                                                   float *transfer) {
     size_t i;
     int k, n, j;
     if (!trace || trace->scene.desc.mode != ISOGI_TRACE_TRANSFER || (count && (!points || !transfer))) return ISOGI_INVALID;
@@ -1565,7 +1599,8 @@ static isogi_result isogi_trace__want_nearest(isogi_trace *t, const size_t cell[
         }
         if (!outside) result = isogi_trace__want(t, texel, 1);
     }
-    if (result == ISOGI_OK && isogi_trace__nearest(t, cell, local, ISOGI_TRACE__READABLE, texel)) result = isogi_trace__want(t, texel, 0);
+    if (result == ISOGI_OK && isogi_trace__nearest(t, cell, local, ISOGI_TRACE__READABLE, texel))
+        result = isogi_trace__want(t, texel, 0);
     return result;
 }
 
@@ -1593,7 +1628,8 @@ ISOGI_API isogi_result isogi_trace_request(isogi_trace *trace, const float (*poi
 /* ==== baking within a budget ========================================================================================= */
 
 static void isogi_trace__add(isogi_counters *to, const isogi_counters *from) {
-    to->rays += from->rays, to->blocks += from->blocks, to->cells += from->cells, to->cubics += from->cubics, to->texels += from->texels;
+    to->rays += from->rays, to->blocks += from->blocks, to->cells += from->cells, to->cubics += from->cubics,
+        to->texels += from->texels;
 }
 
 typedef struct isogi_trace__job {
@@ -1613,7 +1649,8 @@ static void isogi_trace__bake_task(void *arg, size_t task) {
         isogi_trace__site site;
         if (!isogi_trace__texel_site(t, x, &site)) continue; /* cannot be: it was classified by the same function */
         site.key = isogi_trace__key(isogi_trace__key(t->scene.desc.seed, 0),
-                                    (uint64_t)x[0] + (uint64_t)t->lattice[0] * ((uint64_t)x[1] + (uint64_t)t->lattice[1] * (uint64_t)x[2]));
+                                    (uint64_t)x[0] +
+                                        (uint64_t)t->lattice[0] * ((uint64_t)x[1] + (uint64_t)t->lattice[1] * (uint64_t)x[2]));
         isogi_trace__site_start(&t->scene, &site);
         isogi_trace__gather_site(&t->scene, &site, ref->brick->values + (size_t)ref->slot * (size_t)t->values,
                                  &ref->brick->error[ref->slot], counters);
@@ -1628,7 +1665,8 @@ static isogi_result isogi_trace__fill_batch(isogi_trace *t, size_t limit, size_t
     *count = 0;
     for (i = t->queue_first; i < t->queue_count && *count < limit; i++) {
         isogi_trace__brick *brick = t->bricks[t->queue[i]];
-        if (!brick->values) brick->values = (float *)isogi_allocate(&t->context, ISOGI_TRACE__TEXELS * (size_t)t->values, sizeof(float));
+        if (!brick->values)
+            brick->values = (float *)isogi_allocate(&t->context, ISOGI_TRACE__TEXELS * (size_t)t->values, sizeof(float));
         if (!brick->values) return *count ? ISOGI_OK : ISOGI_NO_MEMORY;
         for (slot = 0; slot < ISOGI_TRACE__TEXELS && *count < limit; slot++) {
             isogi_trace__ref *ref = &t->batch[*count];
@@ -1674,7 +1712,8 @@ ISOGI_API isogi_result isogi_trace_step(isogi_trace *trace, uint64_t max_rays, d
     if (!trace) return ISOGI_INVALID;
     begin = trace->counters.rays;
     while (trace->wanted && result == ISOGI_OK) {
-        uint64_t used = trace->counters.rays - begin, each = (uint64_t)trace->scene.desc.samples * 2, limit = ISOGI_TRACE__BATCH;
+        uint64_t used = trace->counters.rays - begin, each = (uint64_t)trace->scene.desc.samples * 2,
+                 limit = ISOGI_TRACE__BATCH;
         size_t count;
         if (max_rays && used >= max_rays) break;
         if (trace->counters.texels) each = trace->counters.rays / trace->counters.texels + 1;
@@ -1725,11 +1764,12 @@ static void isogi_trace__gather_task(void *arg, size_t task) {
     }
 }
 
-ISOGI_API isogi_result isogi_trace_gather(const isogi_trace_desc *desc, const float (*points)[3], const float (*normals)[3], size_t count,
-                                          float (*irradiance)[3], float *error, const isogi_context *context) {
+ISOGI_API isogi_result isogi_trace_gather(const isogi_trace_desc *desc, const float (*points)[3], const float (*normals)[3],
+                                          size_t count, float (*irradiance)[3], float *error, const isogi_context *context) {
     isogi_trace__points job;
     isogi_result result;
-    if (!isogi_trace__desc_valid(desc) || desc->mode != ISOGI_TRACE_IRRADIANCE || (count && (!points || !irradiance))) return ISOGI_INVALID;
+    if (!isogi_trace__desc_valid(desc) || desc->mode != ISOGI_TRACE_IRRADIANCE || (count && (!points || !irradiance)))
+        return ISOGI_INVALID;
     if (!count) return ISOGI_OK;
     if (!context) context = isogi_vol_context(desc->pyramid);
     memset(&job, 0, sizeof job);
@@ -1758,3 +1798,20 @@ ISOGI_API isogi_result isogi_trace_gather(const isogi_trace_desc *desc, const fl
 #undef ISOGI_TRACE__MAX_ORDER
 #undef ISOGI_TRACE__NOT_READY
 #endif /* ISOGI_TRACE_IMPLEMENTATION */
+
+/* ---------------------------------------------------------------------------------------------------------------------
+   This software is available under two licences: choose the one you prefer.
+
+   A. MIT. Copyright (c) the isogi authors. Permission is hereby granted, free of charge, to any person obtaining a copy of this
+   software and associated documentation files (the "Software"), to deal in the Software without restriction, including without
+   limitation the rights to use, copy, modify, merge, publish, distribute, sublicense, and/or sell copies of the Software, and to
+   permit persons to whom the Software is furnished to do so, subject to the following conditions: the above copyright notice and
+   this permission notice shall be included in all copies or substantial portions of the Software.
+   THE SOFTWARE IS PROVIDED "AS IS", WITHOUT WARRANTY OF ANY KIND, EXPRESS OR IMPLIED, INCLUDING BUT NOT LIMITED TO THE WARRANTIES
+   OF MERCHANTABILITY, FITNESS FOR A PARTICULAR PURPOSE AND NONINFRINGEMENT. IN NO EVENT SHALL THE AUTHORS OR COPYRIGHT HOLDERS BE
+   LIABLE FOR ANY CLAIM, DAMAGES OR OTHER LIABILITY, WHETHER IN AN ACTION OF CONTRACT, TORT OR OTHERWISE, ARISING FROM, OUT OF OR IN
+   CONNECTION WITH THE SOFTWARE OR THE USE OR OTHER DEALINGS IN THE SOFTWARE.
+
+   B. Public domain (The Unlicense, https://unlicense.org): this is free and unencumbered software released into the public domain.
+   Anyone is free to copy, modify, publish, use, compile, sell, or distribute it, for any purpose, and by any means.
+*/
