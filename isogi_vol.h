@@ -388,7 +388,7 @@ static int isogi_vol__job_step(isogi_vol__job *job, size_t *begun) {
 
 static int isogi_vol__report(const isogi_context *context, double from, double to, size_t done, size_t count) {
     if (!context || !context->progress) return 0;
-    return context->progress(context->user, from + (to - from) * ((double)done / (double)count));
+    return context->progress(context->user, done < count ? from + (to - from) * ((double)done / (double)count) : to);
 }
 
 /* The calling thread's share of the work; it alone calls the progress callback. */
