@@ -1,7 +1,10 @@
 /* Tests of isogi_sh.h. The reference is tests/reference_sh.h: 128 bits, from the definition. */
+static int instruction_level = 99; /* a test may hold the header to less than the processor has */
+#define ISOGI_SH_LEVEL instruction_level
 #define ISOGI_SH_IMPLEMENTATION
 #include "isogi_sh.h"
 #include "reference_sh.h"
+#include "generate_sh.h"
 #include "test.h"
 
 static const double pi = 3.14159265358979323846;
@@ -1104,6 +1107,85 @@ TEST(truncation_error_falls_with_order) {
         printf("    %5d   %14.4f   %10.6f   %.3g\n", order, missed[0], missed[1], missed[2]);
         if (order == 16) CHECK(missed[0] > 0.4 && missed[1] < 0.02 && missed[2] < 1e-9, "order 16: %g %g %g", missed[0], missed[1], missed[2]);
     }
+}
+
+/* ---- tables and instruction levels ---- */
+
+/* The tables in the header are what their generator writes, to the letter. */
+TEST(tables_are_as_generated) {
+    char path[4096] = __FILE__, *slash = strrchr(path, '/');
+    strcpy(slash ? slash + 1 : path, "../isogi_sh.h");
+    FILE *header = fopen(path, "rb"), *made = tmpfile();
+    if (!header) header = fopen("isogi_sh.h", "rb");
+    if (!header || !made) SKIP("isogi_sh.h is not beside the tests, or there is no place for a temporary file");
+    char line[512], expected[512];
+    int found = 0, different = 0;
+    generate(made);
+    rewind(made);
+    while (fgets(line, sizeof line, header) && !strstr(line, "generated: begin")) found = 0;
+    while (fgets(line, sizeof line, header) && !strstr(line, "generated: end")) {
+        found++;
+        if (!fgets(expected, sizeof expected, made) || strcmp(line, expected)) different++;
+    }
+    CHECK(found > 100 && different == 0 && !fgets(expected, sizeof expected, made), "%d lines, %d differ", found, different);
+    fclose(header), fclose(made);
+}
+
+/* Every level agrees with plain C within the float errors of the header, in double to 1e-14; odd counts, offsets, lengths and
+   blocks with a zero or huge vector among good ones included. */
+TEST(instruction_levels_agree) {
+    enum { ORDER = 21, N = ORDER * ORDER, COUNT = 43 };
+    static float d[COUNT][3], x[3][COUNT], base[COUNT * N], other[COUNT * N], c[3 * N], sum[COUNT * 3], sum2[COUNT * 3], p[2 * 25], p2[2 * 25], image[34 * 17 * 3], q[75], q2[75];
+    static double D[COUNT][3], X[3][COUNT], wide[COUNT * N], wide2[COUNT * N];
+    test_random r = {40};
+    double worst = 0, worst_wide = 0, worst_sum = 0, worst_product = 0, worst_image = 0; /* worst: as a share of the bound */
+    for (int i = 0; i < 3 * N; i++) c[i] = (float)random_range(&r, -1, 1);
+    for (int i = 0; i < 34 * 17 * 3; i++) image[i] = (float)random_unit(&r);
+    for (int order = 1; order <= ORDER; order++)
+        for (int odd = 0; odd < 3; odd++) {
+            size_t n = (size_t)(order * order);
+            double bound = order <= 5 ? 4.5e-7 : order <= 11 ? 2.2e-6 : 1e-5;
+            for (int i = 0; i < COUNT; i++) {
+                random_direction(&r, D[i]);
+                for (int k = 0; k < 3; k++) {
+                    D[i][k] *= odd == 1 ? exp(random_range(&r, -20, 20)) : 1;
+                    if (odd == 2 && i % 11 == 4) D[i][k] = i == 4 ? 0 : i == 15 ? 1e30 * D[i][k] : 1e-30 * D[i][k];
+                    d[i][k] = (float)D[i][k], D[i][k] = (double)d[i][k], x[k][i] = d[i][k], X[k][i] = D[i][k];
+                }
+            }
+            instruction_level = 0;
+            isogi_sh_eval(base, order, (const float(*)[3])d, COUNT);
+            isogi_sh_eval_f64(wide, order, (const double(*)[3])D, COUNT);
+            isogi_sh_eval_sum(sum, c, order, 3, (const float(*)[3])d, COUNT);
+            for (instruction_level = 1; instruction_level < 3; instruction_level++) {
+                isogi_sh_eval(other, order, (const float(*)[3])d, COUNT);
+                for (size_t i = 0; i < COUNT * n; i++) worst = fmax(worst, fabs((double)base[i] - (double)other[i]) / bound);
+                isogi_sh_eval_soa(other, order, x[0], x[1], x[2], COUNT);
+                for (size_t i = 0; i < COUNT * n; i++) worst = fmax(worst, fabs((double)base[i] - (double)other[i % n * COUNT + i / n]) / bound);
+                isogi_sh_eval_f64(wide2, order, (const double(*)[3])D, COUNT);
+                for (size_t i = 0; i < COUNT * n; i++) worst_wide = fmax(worst_wide, fabs(wide[i] - wide2[i]));
+                isogi_sh_eval_soa_f64(wide2, order, X[0], X[1], X[2], COUNT);
+                for (size_t i = 0; i < COUNT * n; i++) worst_wide = fmax(worst_wide, fabs(wide[i] - wide2[i % n * COUNT + i / n]));
+                isogi_sh_eval_sum(sum2, c, order, 3, (const float(*)[3])d, COUNT);
+                for (int i = 0; i < 3 * COUNT; i++) worst_sum = fmax(worst_sum, fabs((double)sum[i] - (double)sum2[i]));
+            }
+        }
+    for (int width = 32; width <= 34; width++) {
+        instruction_level = 0;
+        isogi_sh_product(p, c, c + 50, 5, 2);
+        isogi_sh_project_equirect(q, 5, image, width, 17);
+        instruction_level = 99;
+        isogi_sh_product(p2, c, c + 50, 5, 2);
+        isogi_sh_project_equirect(q2, 5, image, width, 17);
+        for (int i = 0; i < 50; i++) worst_product = fmax(worst_product, fabs((double)p[i] - (double)p2[i]));
+        for (int i = 0; i < 75; i++) worst_image = fmax(worst_image, fabs((double)q[i] - (double)q2[i]));
+    }
+    printf("    evaluation %.3g of the bound, double %.3g, sums %.3g, products %.3g, images %.3g\n", worst, worst_wide, worst_sum, worst_product, worst_image);
+    CHECK(worst < 1, "evaluation differs by %g of its bound", worst);
+    CHECK(worst_wide < 2e-14, "evaluation in double differs by %g", worst_wide);
+    CHECK(worst_sum < 5e-5, "sums differ by %g", worst_sum);
+    CHECK(worst_product < 2e-6, "products differ by %g", worst_product);
+    CHECK(worst_image < 1e-6, "images differ by %g", worst_image);
 }
 
 /* ---- what is not valid ---- */

@@ -1,0 +1,122 @@
+/* Writes the tables of isogi_sh.h, those between its lines "generated: begin" and "generated: end", in 128 bits.
+   tests/test_sh.c compares; `build/tests/test_sh --list` and the filter "tables" run that test alone. */
+#ifndef GENERATE_SH_H
+#define GENERATE_SH_H
+
+#include "reference_sh.h"
+#include <stdio.h>
+#include <string.h>
+
+enum { GENERATE_ORDER = 21, GENERATE_TURNS = 15, GENERATE_LATITUDES = 7 };
+
+static quad generate_pi(void) {
+    quad pi = 0;
+    for (const char *p = "314159265358979323846264338327950288"; *p; p++) pi = pi * 10 + (quad)(*p - '0');
+    for (int i = 0; i < 35; i++) pi /= 10;
+    return pi;
+}
+
+/* Factors of the recursions: see the comment in front of the tables. */
+static int generate_factors(quad *v) {
+    quad q = quad_sqrt(1 / (4 * generate_pi()));
+    int n = 0;
+    for (int l = 0; l < GENERATE_ORDER; l++) {
+        v[n++] = l ? (quad)(l - 1) / (quad)l : 0;
+        v[n++] = l ? -(quad)(2 * l - 1) / (quad)l : 0;
+        v[n++] = quad_sqrt((quad)(2 * l + 1) / (4 * generate_pi()));
+    }
+    for (int m = 1; m < GENERATE_ORDER; m++) {
+        quad before = 0;
+        q *= quad_sqrt((quad)(2 * m + 1) / (quad)(m == 1 ? 1 : 2 * m));
+        v[n++] = q;
+        for (int l = m + 1; l < GENERATE_ORDER; l++) {
+            quad a = quad_sqrt((quad)(4 * l * l - 1) / (quad)(l * l - m * m));
+            v[n++] = a;
+            v[n++] = l > m + 1 ? -(a / before) : 0;
+            before = a;
+        }
+    }
+    return n;
+}
+
+/* Entries of the quarter turn about y: d_nm(pi/2) with its sign, times 2, sqrt 2 or 1. */
+static int generate_turns(quad *v) {
+    int count = 0;
+    for (int l = 1; l <= GENERATE_TURNS; l++)
+        for (int n = 0; n <= l; n++) {
+            quad square = 1, row[GENERATE_TURNS + 2] = {0};
+            for (int k = 1; k <= 2 * l; k++) square *= (quad)k / 4; /* binomial(2l, l+n) / 4^l, from factorials */
+            for (int k = 1; k <= 2 * l; k++) square *= 4;
+            for (int k = 1; k <= l + n; k++) square /= (quad)k;
+            for (int k = 1; k <= l - n; k++) square /= (quad)k;
+            for (int k = 0; k < l; k++) square /= 4;
+            row[l] = ((l + n) & 1 ? -1 : 1) * quad_sqrt(square);
+            for (int m = l; m > n; m--)
+                row[m - 1] = (2 * (quad)n * row[m] - quad_sqrt((quad)((l - m) * (l + m + 1))) * row[m + 1]) / quad_sqrt((quad)((l - m + 1) * (l + m)));
+            for (int m = n; m <= l; m++) v[count++] = row[m] * (n ? 2 : m ? quad_sqrt(2) : 1);
+        }
+    return count;
+}
+
+/* Legendre nodes by Newton; q_l^m sin^m at each, for l, m < 5 (m outer), and the weights times pi; lane 8 is empty. */
+static int generate_latitudes(quad *v) {
+    quad node[GENERATE_LATITUDES], weight[GENERATE_LATITUDES];
+    int count = 0, n = GENERATE_LATITUDES;
+    for (int i = 0; i < n; i++) {
+        quad x = (quad)cos(3.14159265358979323846 * (i + 0.75) / (n + 0.5)), d = 1;
+        if (2 * i + 1 == n) x = 0;
+        for (int round = 0; round < 6; round++) {
+            quad p = 1, before = 0;
+            for (int k = 0; k < n; k++) {
+                quad next = ((quad)(2 * k + 1) * x * p - (quad)k * before) / (quad)(k + 1);
+                before = p, p = next;
+            }
+            d = (quad)n * (before - x * p) / (1 - x * x);
+            x -= p / d;
+        }
+        if (2 * i + 1 == n) x = 0;
+        node[i] = x;
+        weight[i] = 2 * generate_pi() / ((1 - x * x) * d * d);
+    }
+    for (int m = 0; m < 5; m++)
+        for (int l = m; l < 5; l++)
+            for (int i = 0; i < 8; i++) {
+                quad y[25], d[3] = {0, 0, 1};
+                if (i < n) d[0] = quad_sqrt(1 - node[i] * node[i]), d[2] = node[i], reference_eval(y, 5, d);
+                quad value = i < n ? y[l * (l + 1) + m] : 0;
+                v[count++] = value < (quad)1e-30 && value > (quad)-1e-30 ? 0 : value; /* zeros of P at the equator */
+            }
+    for (int i = 0; i < 8; i++) v[count++] = i < n ? weight[i] : 0;
+    return count;
+}
+
+static void generate_table(FILE *out, const char *type, const char *name, const quad *v, int count, int is_double) {
+    int column = 4;
+    fprintf(out, "static const %s %s[%d] = {\n   ", type, name, count);
+    for (int i = 0; i < count; i++) {
+        char text[64];
+        if (is_double) snprintf(text, sizeof text, "%.17g", (double)v[i]);
+        else snprintf(text, sizeof text, "%.9g", (double)(float)v[i]);
+        if (!strchr(text, '.') && !strchr(text, 'e')) strcat(text, ".0");
+        strcat(text, is_double ? "," : "f,");
+        if (column + 1 + (int)strlen(text) > 127) fprintf(out, "\n   "), column = 4;
+        column += fprintf(out, " %s", text);
+    }
+    fprintf(out, "\n};\n");
+}
+
+static void generate(FILE *out) {
+    static quad v[4096];
+    int count = generate_factors(v);
+    generate_table(out, "double", "isogi_sh__table_f64", v, count, 1);
+    count = generate_turns(v);
+    generate_table(out, "double", "isogi_sh__turn_f64", v, count, 1);
+    fprintf(out, "#ifdef ISOGI_SH__SIMD\n");
+    count = generate_factors(v);
+    generate_table(out, "float", "isogi_sh__table_f32", v, count, 0);
+    count = generate_latitudes(v);
+    generate_table(out, "float", "isogi_sh__latitudes_f32", v, count, 0);
+    fprintf(out, "#endif\n");
+}
+
+#endif
