@@ -898,6 +898,8 @@ typedef int64_t isogi_sh__l8 __attribute__((vector_size(64), aligned(8), may_ali
                 lane[k] = 1 / ROOT(lane[k]);                                                                                   \
             }                                                                                                                  \
             memcpy(&scale, lane, sizeof lane);                                                                                 \
+            x *= scale, y *= scale, z *= scale;                                                                                \
+            scale = FMA(one - FMA(x, x, FMA(y, y, z * z)), zero + (T)0.5, one);                                                \
         }                                                                                                                      \
         x *= scale, y *= scale, z *= scale;                                                                                    \
         top = (I)(-one) ^ (I)one;                                                                                              \

@@ -1159,6 +1159,8 @@ TEST(instruction_levels_agree) {
             isogi_sh_eval_sum(sum, c, order, 3, (const float(*)[3])d, COUNT);
             for (instruction_level = 1; instruction_level < 3; instruction_level++) {
                 isogi_sh_eval(other, order, (const float(*)[3])d, COUNT);
+                for (size_t i = 0; i < COUNT * n; i++)
+                    CHECK(fabs((double)base[i] - (double)other[i]) < bound, "order %d, lengths %d, direction %d: %.9g %.9g", order, odd, (int)(i / n), (double)base[i], (double)other[i]);
                 for (size_t i = 0; i < COUNT * n; i++) worst = fmax(worst, fabs((double)base[i] - (double)other[i]) / bound);
                 isogi_sh_eval_soa(other, order, x[0], x[1], x[2], COUNT);
                 for (size_t i = 0; i < COUNT * n; i++) worst = fmax(worst, fabs((double)base[i] - (double)other[i % n * COUNT + i / n]) / bound);
