@@ -186,7 +186,7 @@ fuzzers() {
         [ -f "$source" ] || continue
         base=$(basename "$source" .c)
         if have clang; then
-            item check "fuzz/$base" "clang -std=gnu99 -O1 -g -fsanitize=fuzzer,address,undefined -I. -Iexamples/common -Itests -o \"\$OUT/$base\" $source -lm -lpthread && mkdir \"\$OUT/corpus\" && (cd \"\$OUT\" && ./$base -max_total_time=20 -rss_limit_mb=4096 corpus)"
+            item check "fuzz/$base" "clang -std=gnu99 -O1 -g -fsanitize=fuzzer,address,undefined -I. -Iexamples/common -Itests -o \"\$OUT/$base\" $source -lm -lpthread && mkdir \"\$OUT/corpus\" && seeds=\$PWD/tests/golden && (cd \"\$OUT\" && ./$base -max_total_time=20 -rss_limit_mb=4096 corpus \"\$seeds\")"
         else item skip "fuzz/$base" "clang is not installed"
         fi
     done
@@ -213,6 +213,7 @@ long)
     for program; do item live "${program##*/}" "$program --long"; done
     memcheck
     fuzzers
+    item check bench/tables "sh tests/bench/contract.sh"
     analysers
     variants "$@"
     emulators "$@"
