@@ -1,5 +1,4 @@
 /* Any bytes as any file: pictures, transfer functions and the names of volumes either decode or are refused with a message. */
-#define ISOGI_IMPLEMENTATION
 #include "isogi_dvr.h"
 
 #include "hdr.h"
