@@ -21,7 +21,7 @@ int main(void) {
     if (isogi_vol_build(&pyramid, &volume, NULL) != ISOGI_OK) return 1;
     for (int i = 0; i < WIDTH * HEIGHT; i++) {
         isogi_ray ray = {.origin = {i % WIDTH * 63.0 / WIDTH, 63 - i / WIDTH * 63.0 / HEIGHT, 80}, .dir = {0, 0, -1}, .isovalue = -30};
-        isogi_hit hit;
+        isogi_hit hit = {0};
         isogi_vol_intersect(pyramid, &ray, 1, &hit, NULL);
         isogi_vol_positions(pyramid, &hit, 1, &points[count]);
         if (hit.side) pixel[i] = ++count;

@@ -23,7 +23,7 @@ int main(void) {
         for (int column = 0; column < 3 * WIDTH; column++) {
             const double isovalue[3] = {0.45, 0.8, 2};
             isogi_ray ray = {.dir = {0, 0, -1}, .isovalue = isovalue[column / WIDTH]};
-            isogi_hit hit;
+            isogi_hit hit = {0};
             float normal[1][3];
             ray.origin[0] = column % WIDTH, ray.origin[1] = N - 2.0 * row, ray.origin[2] = N;
             isogi_vol_intersect(pyramid, &ray, 1, &hit, NULL);

@@ -206,7 +206,7 @@ TEST(cavity_with_opening_follows_its_closed_form) {
     isogi_trace_desc d = desc_make(&s, 0, 0, 256);
     while (count < 200) { /* from the centre down to the wall, at least 5 % of r below the rim */
         isogi_ray ray;
-        isogi_hit hit;
+        isogi_hit hit = {0};
         double w[3];
         random_direction(&random, w);
         if (w[1] > -0.05) continue;
@@ -1013,7 +1013,7 @@ static int view_points(const isogi_pyramid *p, double isovalue, int size, float 
     up[0] = right[1] * forward[2] - right[2] * forward[1], up[1] = right[2] * forward[0] - right[0] * forward[2], up[2] = right[0] * forward[1] - right[1] * forward[0];
     for (int i = 0; i < size * size; i++) {
         isogi_ray ray;
-        isogi_hit hit;
+        isogi_hit hit = {0};
         double x = (2 * (i % size + 0.5) / size - 1) * tan(PI / 8), y = (1 - 2 * (i / size + 0.5) / size) * tan(PI / 8);
         memset(&ray, 0, sizeof ray);
         for (int a = 0; a < 3; a++) ray.origin[a] = eye[a], ray.dir[a] = (float)(forward[a] + x * right[a] + y * up[a]);
