@@ -39,9 +39,9 @@
    - ISOGI_NO_THREADS           everything runs on the calling thread
    - ISOGI_API                  linkage of public functions, if extern does not suit
 
-   Memory       Through isogi_context, or malloc. A pyramid takes about 1/8 byte for every voxel.
+   Memory       Through isogi_context, or malloc. A pyramid takes about 2.2 bytes for every voxel: bounds of every cell, in 8 bits.
                 A mesh keeps some 3/4 byte of scratch memory for every voxel until it is freed.
-                Stack use stays below 16 KB.
+                Stack use stays below 32 KB.
    Threads      A pyramid is const once built: any number of threads may read it. Building and meshing use the context's threads.
    Determinism  The same input gives the same bits for any number of threads.
    Accuracy     Rays are solved in double: against a long double reference no hit is missed or added, and t is right to 1e-12 cell but
@@ -110,7 +110,8 @@ typedef struct isogi_context {
     int (*progress)(void *user, double fraction); /* 0..1; non-zero cancels; called on the caller's thread only */
     void *user;
     int threads;    /* 0 = all cores, 1 = serial; ignored where parallel_for is set */
-    int force_path; /* instruction path of what is built: 0 = best, 1 = plain reference, 2 = portable, 3 = AVX2, 4 = AVX-512;
+    int force_path; /* instruction path of what is built: 0 = best, 1 = plain reference, 2 = portable, 3 = AVX2, 4 = AVX-512 (Ice Lake, Zen 4), and
+                       rays always in waves;
                        no more than the machine has */
 } isogi_context;
 
@@ -294,6 +295,7 @@ ISOGI_API void isogi_vol_mesh_free(const isogi_pyramid *pyramid, isogi_mesh *mes
 
 #define ISOGI_VOL__UNLIMITED 1e300 /* stands for infinity, which -ffast-math does not promise to keep */
 #define ISOGI_VOL__LEVELS 3
+#define ISOGI_VOL__NODE_LEVELS 7 /* 4^7 cells a side */
 #define ISOGI_VOL__TICKS 281474976710656.0 /* 2^48 to a segment: times 2 and 2^14 planes stays within 2^63 */
 #define ISOGI_VOL__FAST_SIZE 8192 /* voxels along an axis up to which fast rays keep 1e-10 cell */
 #if (defined(__GNUC__) || defined(__clang__)) && !defined(__TINYC__)
@@ -541,6 +543,8 @@ static int isogi_vol__cell(double x, size_t voxels, double *local) {
 
 /* ==== volumes ======================================================================================================== */
 
+typedef struct isogi_vol__node_level { size_t first, size[3], parents[3]; } isogi_vol__node_level; /* parents: size of the level above */
+
 struct isogi_pyramid {
     isogi_volume volume;
     isogi_context context;
@@ -548,13 +552,16 @@ struct isogi_pyramid {
     double to_grid[9];  /* its inverse */
     double range[2];
     int cells[3]; /* size - 1 */
+    double box[4], grid_axis[3][4]; /* cells and the columns of to_grid, for vectors of four; the fourth is 0 */
     isogi_level level[ISOGI_VOL__LEVELS];
     size_t block_count; /* of all levels */
     float (*blocks)[2];
     /* bounds for fast rays: nodes of 64 children, least[64] then largest[64], in 8 bits over the volume's range; node n of level 0
-       stands for block n and has cells as children, those of levels 1 and 2 have blocks of the level below */
+       stands for block n and has cells as children, those of the levels above have nodes */
     uint8_t (*nodes)[128];
-    size_t node_count, first_node[ISOGI_VOL__LEVELS];
+    size_t node_count;
+    isogi_vol__node_level node_level[ISOGI_VOL__NODE_LEVELS];
+    int node_levels; /* the last one has a single node */
     double node_scale; /* 8-bit value = floor((value - range[0]) * node_scale) */
     int all_finite;
     int fast; /* 0: only the plain walk is right for this volume */
@@ -653,7 +660,9 @@ static void isogi_vol__set_transform(isogi_pyramid *p) {
             double cofactor = m[3 * r1 + c1] * m[3 * r2 + c2] - m[3 * r1 + c2] * m[3 * r2 + c1];
             p->to_world[3 * r + c] = m[3 * r + c] * v->spacing[c];
             p->to_grid[3 * r + c] = cofactor * inverse / v->spacing[r];
+            p->grid_axis[c][r] = p->to_grid[3 * r + c];
         }
+        p->box[r] = p->cells[r];
     }
 }
 
@@ -958,16 +967,32 @@ static void isogi_vol__quantise_isovalue(const isogi_pyramid *p, double isovalue
     *high = q < 254 ? (int)(q + 0.01) : 255;
 }
 
-static void isogi_vol__build_node(const isogi_pyramid *p, const isogi_level *children, const size_t node[3], uint8_t out[128]) {
-    size_t i;
+/* Siblings are stored together, since a ray that looks at one soon looks at the next. */
+ISOGI_VOL__INLINE size_t isogi_vol__node_at(const isogi_pyramid *p, int n, size_t x, size_t y, size_t z) {
+    const isogi_vol__node_level *level = &p->node_level[n];
+    return level->first + 64 * ((x >> 2) + level->parents[0] * ((y >> 2) + level->parents[1] * (z >> 2))) + (x & 3) + 4 * (y & 3) + 16 * (z & 3);
+}
+
+/* A node over nodes of the level below. */
+static void isogi_vol__build_node(const isogi_pyramid *p, int n, const size_t node[3]) {
+    const isogi_vol__node_level *children = &p->node_level[n - 1];
+    uint8_t *out = p->nodes[isogi_vol__node_at(p, n, node[0], node[1], node[2])];
+    size_t i, k;
     for (i = 0; i < 64; i++) {
         size_t x = 4 * node[0] + (i & 3), y = 4 * node[1] + (i >> 2 & 3), z = 4 * node[2] + (i >> 4);
-        const float *range;
-        out[i] = 255, out[64 + i] = 0; /* beyond the volume, or without a finite voxel: never entered */
+        const uint8_t *child;
+        out[i] = 255, out[64 + i] = 0; /* beyond the volume: never entered */
         if (x >= children->size[0] || y >= children->size[1] || z >= children->size[2]) continue;
-        range = children->range[x + children->size[0] * (y + children->size[1] * z)];
-        if (range[0] > range[1]) continue;
-        out[i] = (uint8_t)isogi_vol__quantise(p, (double)range[0]), out[64 + i] = (uint8_t)isogi_vol__quantise(p, (double)range[1]);
+        if (n == 1) {
+            const float *range = p->level[0].range[x + children->size[0] * (y + children->size[1] * z)];
+            out[i] = (uint8_t)isogi_vol__quantise(p, (double)range[0]), out[64 + i] = (uint8_t)isogi_vol__quantise(p, (double)range[1]);
+            continue;
+        }
+        child = p->nodes[isogi_vol__node_at(p, n - 1, x, y, z)];
+        for (k = 0; k < 64; k++) {
+            if (child[k] < out[i]) out[i] = child[k];
+            if (child[64 + k] > out[64 + i]) out[64 + i] = child[64 + k];
+        }
     }
 }
 
@@ -1058,7 +1083,7 @@ static void isogi_vol__build_leaves(void *arg, size_t bz) {
             }
             isogi_vol__bound_cells(q, (count - 1 + 15) & ~15, bound[0][0], bound[1][0]);
             for (bx = 0; bx < (size_t)(count - 1 + 3) / 4; bx++) {
-                uint8_t *out = p->nodes[p->first_node[0] + x0 / 4 + bx + level->size[0] * (by + level->size[1] * bz)];
+                uint8_t *out = p->nodes[isogi_vol__node_at(p, 0, x0 / 4 + bx, by, bz)];
                 const int whole = x0 + 4 * bx + 4 <= (size_t)p->cells[0] && 4 * by + 4 <= (size_t)p->cells[1] && 4 * bz + 4 <= (size_t)p->cells[2];
                 for (i = 0; i < 16; i++) memcpy(out + 4 * i, &bound[0][i][4 * bx], 4), memcpy(out + 64 + 4 * i, &bound[1][i][4 * bx], 4);
                 for (i = 0; i < 64 && !whole; i++)
@@ -1100,26 +1125,30 @@ static int isogi_vol__plan_nodes(isogi_pyramid *p, isogi_vol__build_job *job) {
 
 static isogi_result isogi_vol__build_nodes(isogi_pyramid *p) {
     isogi_vol__build_job job;
-    size_t node[3], count = 0;
-    uint8_t(*out)[128];
+    size_t node[3], count = 0, nodes = 2;
     isogi_result result;
-    int n;
+    int n, a;
     p->fast = isogi_vol__plan_nodes(p, &job);
     if (!p->fast) return ISOGI_OK;
-    for (n = 0; n < ISOGI_VOL__LEVELS; n++) {
-        p->first_node[n] = count;
-        count += p->level[n].size[0] * p->level[n].size[1] * p->level[n].size[2];
+    for (n = 0; n < ISOGI_VOL__LEVELS || nodes > 1; n++) {
+        isogi_vol__node_level *level = &p->node_level[n];
+        level->first = count, nodes = 1;
+        for (a = 0; a < 3; a++) {
+            level->size[a] = (((size_t)p->cells[a] - 1) >> (2 * n + 2)) + 1, level->parents[a] = (level->size[a] + 3) / 4;
+            nodes *= level->size[a];
+        }
+        count += 64 * level->parents[0] * level->parents[1] * level->parents[2];
     }
+    p->node_levels = n;
     p->nodes = (uint8_t(*)[128])isogi_allocate(&p->context, count, sizeof *p->nodes);
     p->node_count = count;
     if (!p->nodes) return ISOGI_NO_MEMORY;
     result = isogi_parallel(&p->context, p->level[0].size[2], isogi_vol__build_leaves, &job, 0.5, 1);
     if (result != ISOGI_OK) return result;
-    out = p->nodes + p->first_node[1];
-    for (n = 1; n < ISOGI_VOL__LEVELS; n++)
-        for (node[2] = 0; node[2] < p->level[n].size[2]; node[2]++)
-            for (node[1] = 0; node[1] < p->level[n].size[1]; node[1]++)
-                for (node[0] = 0; node[0] < p->level[n].size[0]; node[0]++) isogi_vol__build_node(p, &p->level[n - 1], node, *out++);
+    for (n = 1; n < p->node_levels; n++)
+        for (node[2] = 0; node[2] < p->node_level[n].size[2]; node[2]++)
+            for (node[1] = 0; node[1] < p->node_level[n].size[1]; node[1]++)
+                for (node[0] = 0; node[0] < p->node_level[n].size[0]; node[0]++) isogi_vol__build_node(p, n, node);
     return ISOGI_OK;
 }
 
@@ -1460,6 +1489,7 @@ typedef struct isogi_vol__walk {
     int entry_axis; /* of the face through which the present cell was entered, -1 if none */
     int inside;     /* 1, 0, -1 = not known */
     int deflate;    /* the walk begins on the surface and has not left it so far */
+    double deflated; /* up to where; a cell that begins later is not next to it */
     int exact;      /* 0: any hit will do */
     int end_is_border;
     int cap; /* what a hit in the present cell says of its side: 2 right behind the border of a capped volume, else 1 */
@@ -1636,7 +1666,10 @@ static int isogi_vol__walk_on(isogi_vol__walk *w, uint32_t flags, isogi_hit *hit
 static int isogi_vol__machine(void) {
     __builtin_cpu_init();
     if (!__builtin_cpu_supports("avx2")) return ISOGI_VOL__PATH_BASE;
-    return __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512bw") ? ISOGI_VOL__PATH_AVX512 : ISOGI_VOL__PATH_AVX2;
+    return __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512bw") && __builtin_cpu_supports("avx512dq") &&
+                   __builtin_cpu_supports("avx512vl") && __builtin_cpu_supports("avx512bitalg")
+               ? ISOGI_VOL__PATH_AVX512
+               : ISOGI_VOL__PATH_AVX2;
 }
 
 ISOGI_VOL__TARGET("avx2") ISOGI_VOL__INLINE uint64_t isogi_vol__node_mask_avx2(const uint8_t node[128], int low, int high) {
@@ -1708,7 +1741,13 @@ ISOGI_VOL__TARGET("avx2") static int isogi_vol__mixed_cell_avx2(isogi_vol__walk 
     begin = _mm256_max_pd(begin, zero), end = _mm256_max_pd(_mm256_min_pd(end, segment_end), begin);
     w->t = _mm256_cvtsd_f64(begin);
     sides = _mm256_movemask_pd(_mm256_cmp_pd(c0, zero, _CMP_GE_OQ)) | _mm256_movemask_pd(_mm256_cmp_pd(c1, zero, _CMP_GE_OQ)) << 4;
-    if (ISOGI_VOL__UNLIKELY(w->deflate)) return isogi_vol__visit_cell(w, _mm256_cvtsd_f64(end), axis, hit);
+    if (ISOGI_VOL__UNLIKELY(w->deflate)) {
+        if (w->t <= w->deflated) {
+            w->deflated = _mm256_cvtsd_f64(end);
+            return isogi_vol__visit_cell(w, w->deflated, axis, hit);
+        }
+        w->deflate = 0;
+    }
     if (sides == 0 || sides == 255) return isogi_vol__state(w, sides != 0, hit);
     w->count.cubics++;
     from = _mm256_sub_pd(_mm256_add_pd(origin, _mm256_mul_pd(begin, dir)), cell);
@@ -1774,6 +1813,190 @@ static int isogi_vol__threshold(isogi_vol__raw_isovalue *k, const isogi_volume *
     for (tries = 0; tries < 4 && v->scale * i + v->bias < isovalue; tries++) i++;
     k->threshold.i = i;
     return 1;
+}
+
+/* ==== where rays begin =============================================================================================== */
+
+/* Direction components that cannot matter are set to zero, so that reciprocals stay finite. 0: no direction. */
+static int isogi_vol__set_direction(isogi_vol__walk *w, const float dir[3]) {
+    double world[3], most = 0;
+    int a;
+    for (a = 0; a < 3; a++) world[a] = (double)dir[a];
+    isogi_vol__transform(w->pyramid->to_grid, world, w->dir);
+    if (!isogi_vol__finite3(world) || !isogi_vol__finite3(w->dir)) return 0;
+    for (a = 0; a < 3; a++) most = isogi_vol__max(most, fabs(w->dir[a]));
+    if (!(most > 0)) return 0;
+    for (a = 0; a < 3; a++) {
+        if (fabs(w->dir[a]) <= 1e-30 * most) w->dir[a] = 0;
+        w->inverse[a] = w->dir[a] > 0 || w->dir[a] < 0 ? 1 / w->dir[a] : 0;
+        if (!w->pyramid->cells[a]) return 0;
+    }
+    w->dir[3] = w->inverse[3] = w->origin[3] = 0;
+    return 1;
+}
+
+/* Clips [tmin, tmax] to the box and moves the origin to where the walk begins, so that a far origin costs no precision later. */
+static int isogi_vol__clip(isogi_vol__walk *w, double tmin, double tmax) {
+    double enter = tmin, leave = tmax;
+    int a;
+    for (a = 0; a < 3; a++) {
+        double size = w->pyramid->cells[a], t0, t1;
+        if (!(w->dir[a] > 0 || w->dir[a] < 0)) {
+            if (!(w->origin[a] >= 0 && w->origin[a] <= size)) return 0;
+            continue;
+        }
+        t0 = ((w->dir[a] > 0 ? 0 : size) - w->origin[a]) * w->inverse[a];
+        t1 = ((w->dir[a] > 0 ? size : 0) - w->origin[a]) * w->inverse[a];
+        if (t0 > enter) enter = t0, w->entry_axis = a;
+        leave = isogi_vol__min(leave, t1);
+    }
+    if (!(enter <= leave)) return 0;
+    for (a = 0; a < 3; a++) w->origin[a] = isogi_vol__clamp(w->origin[a] + enter * w->dir[a], (double)w->pyramid->cells[a]);
+    w->base = enter, w->t = 0, w->end = ISOGI_VOL__UNLIMITED;
+    for (a = 0; a < 3; a++)
+        if (w->dir[a] > 0 || w->dir[a] < 0)
+            w->end = isogi_vol__min(w->end, ((w->dir[a] > 0 ? w->pyramid->cells[a] : 0) - w->origin[a]) * w->inverse[a]);
+    w->end_is_border = !(tmax - enter < w->end);
+    w->end = isogi_vol__min(w->end, tmax - enter);
+    return 1;
+}
+
+#ifdef ISOGI_VOL__AVX
+ISOGI_VOL__TARGET("avx2") ISOGI_VOL__INLINE double isogi_vol__least4(__m256d v) {
+    v = _mm256_min_pd(v, _mm256_permute2f128_pd(v, v, 1));
+    return _mm256_cvtsd_f64(_mm256_min_pd(v, _mm256_permute_pd(v, 5)));
+}
+
+/* set_direction and clip, four at a time: the same operations in the same order. */
+ISOGI_VOL__TARGET("avx2") static int isogi_vol__aim_avx2(isogi_vol__walk *w, const float dir[3], double tmin, double tmax) {
+    const isogi_pyramid *p = w->pyramid;
+    const __m256d zero = _mm256_setzero_pd(), unlimited = _mm256_set1_pd(ISOGI_VOL__UNLIMITED), minus = _mm256_set1_pd(-0.0);
+    const __m256d box = _mm256_loadu_pd(p->box);
+    __m256d d, size, keep, inverse, rising, near, far, still, t0, t1, origin = _mm256_loadu_pd(w->origin);
+    double enter, leave;
+    d = _mm256_mul_pd(_mm256_loadu_pd(p->grid_axis[0]), _mm256_set1_pd((double)dir[0]));
+    d = _mm256_add_pd(d, _mm256_mul_pd(_mm256_loadu_pd(p->grid_axis[1]), _mm256_set1_pd((double)dir[1])));
+    d = _mm256_add_pd(d, _mm256_mul_pd(_mm256_loadu_pd(p->grid_axis[2]), _mm256_set1_pd((double)dir[2])));
+    size = _mm256_andnot_pd(minus, d);
+    if (_mm256_movemask_pd(_mm256_cmp_pd(size, _mm256_set1_pd(DBL_MAX), _CMP_LE_OQ)) != 15) return 0;
+    keep = _mm256_max_pd(size, _mm256_permute2f128_pd(size, size, 1));
+    keep = _mm256_max_pd(keep, _mm256_permute_pd(keep, 5));
+    if (!(_mm256_cvtsd_f64(keep) > 0)) return 0;
+    keep = _mm256_cmp_pd(size, _mm256_mul_pd(_mm256_set1_pd(1e-30), keep), _CMP_GT_OQ);
+    d = _mm256_and_pd(d, keep), inverse = _mm256_and_pd(_mm256_div_pd(_mm256_set1_pd(1), d), keep);
+    rising = _mm256_cmp_pd(d, zero, _CMP_GT_OQ), still = _mm256_cmp_pd(d, zero, _CMP_EQ_OQ);
+    near = _mm256_andnot_pd(rising, box), far = _mm256_and_pd(rising, box);
+    t0 = _mm256_mul_pd(_mm256_sub_pd(near, origin), inverse), t1 = _mm256_mul_pd(_mm256_sub_pd(far, origin), inverse);
+    keep = _mm256_and_pd(_mm256_cmp_pd(origin, zero, _CMP_GE_OQ), _mm256_cmp_pd(origin, box, _CMP_LE_OQ));
+    if (_mm256_movemask_pd(_mm256_andnot_pd(keep, still))) return 0;
+    t0 = _mm256_blendv_pd(t0, _mm256_xor_pd(unlimited, minus), still), t1 = _mm256_blendv_pd(t1, unlimited, still);
+    enter = -isogi_vol__least4(_mm256_xor_pd(t0, minus)), leave = isogi_vol__min(tmax, isogi_vol__least4(t1));
+    if (enter > tmin) w->entry_axis = __builtin_ctz((unsigned)_mm256_movemask_pd(_mm256_cmp_pd(t0, _mm256_set1_pd(enter), _CMP_EQ_OQ)));
+    else enter = tmin;
+    if (!(enter <= leave)) return 0;
+    origin = _mm256_add_pd(origin, _mm256_mul_pd(_mm256_set1_pd(enter), d));
+    origin = _mm256_min_pd(_mm256_max_pd(origin, zero), box);
+    t1 = _mm256_blendv_pd(_mm256_mul_pd(_mm256_sub_pd(far, origin), inverse), unlimited, still);
+    w->base = enter, w->t = 0, w->end = isogi_vol__least4(t1);
+    w->end_is_border = !(tmax - enter < w->end);
+    w->end = isogi_vol__min(w->end, tmax - enter);
+    _mm256_storeu_pd(w->origin, origin), _mm256_storeu_pd(w->dir, d), _mm256_storeu_pd(w->inverse, inverse);
+    return 1;
+}
+#endif
+
+static int isogi_vol__aim(isogi_vol__walk *w, const float dir[3], double tmin, double tmax) {
+#ifdef ISOGI_VOL__AVX
+    if (w->pyramid->fast && w->pyramid->path >= ISOGI_VOL__PATH_AVX2) return isogi_vol__aim_avx2(w, dir, tmin, tmax);
+#endif
+    return isogi_vol__set_direction(w, dir) && isogi_vol__clip(w, tmin, tmax);
+}
+
+/* The cell in which the walk begins: of those that touch the origin, the one that the ray goes on in. */
+static void isogi_vol__first_cell(isogi_vol__walk *w) {
+    double local;
+    int a;
+    for (a = 0; a < 3; a++) {
+        w->cell[a] = isogi_vol__cell(w->origin[a], w->pyramid->volume.size[a], &local);
+        if (w->dir[a] < 0 && w->cell[a] > 0 && !(local > 0)) w->cell[a]--;
+    }
+}
+
+static int isogi_vol__is_nan(double x) {
+    uint64_t bits;
+    memcpy(&bits, &x, sizeof bits);
+    return (bits & 0x7fffffffffffffffu) > 0x7ff0000000000000u;
+}
+
+/* tmax as given, with 0 and anything beyond standing for unlimited. */
+static double isogi_vol__tmax(double tmax) {
+    return (tmax >= 0 && tmax <= 0) || tmax > ISOGI_VOL__UNLIMITED ? ISOGI_VOL__UNLIMITED : tmax;
+}
+
+/* What a call was given: rays, or starts on a surface. */
+typedef struct isogi_vol__batch {
+    const isogi_pyramid *pyramid;
+    const isogi_ray *rays; /* NULL: the next five instead */
+    const isogi_hit *starts;
+    const float (*dirs)[3];
+    const double *tmax; /* NULL = unlimited */
+    double isovalue;
+    uint32_t flags;
+    isogi_hit *hits;   /* either this */
+    uint8_t *occluded; /* or this */
+    isogi_counters work;
+} isogi_vol__batch;
+
+static uint32_t isogi_vol__flags(const isogi_vol__batch *b, size_t i) { return b->rays ? b->rays[i].flags : b->flags; }
+
+/* Whether the field is inside at the present cell's point that lies at t. */
+static int isogi_vol__inside_at(isogi_vol__walk *w, double t) {
+    double corner[8], local[3];
+    int a;
+    for (a = 0; a < 3; a++) w->cell[a] = isogi_vol__cell(w->origin[a] + t * w->dir[a], w->pyramid->volume.size[a], &local[a]);
+    return isogi_vol__corners(w->pyramid, w->cell, w->isovalue, corner) && isogi_vol__trilinear(corner, local, NULL) >= 0;
+}
+
+static int isogi_vol__begin_ray(const isogi_vol__batch *b, size_t i, isogi_vol__walk *w) {
+    const isogi_pyramid *p = b->pyramid;
+    const isogi_ray *ray = &b->rays[i];
+    const double tmax = isogi_vol__tmax(ray->tmax);
+    double relative[3];
+    int a;
+    for (a = 0; a < 3; a++) relative[a] = ray->origin[a] - p->volume.origin[a];
+    isogi_vol__transform(p->to_grid, relative, w->origin);
+    w->isovalue = ray->isovalue;
+    if (!isogi_vol__finite3(w->origin) || !isogi_vol__finite3(ray->origin)) return 0;
+    if (isogi_vol__is_nan(ray->isovalue) || isogi_vol__is_nan(ray->tmin) || isogi_vol__is_nan(ray->tmax) || !(ray->tmin <= tmax)) return 0;
+    if (!isogi_vol__aim(w, ray->dir, isogi_vol__max(ray->tmin, -ISOGI_VOL__UNLIMITED), tmax)) return 0;
+    if (w->entry_axis >= 0 && (ray->flags & ISOGI_RAY_CAPPED)) w->inside = 0, w->cap = 2;
+    return 1;
+}
+
+static int isogi_vol__begin_start(const isogi_vol__batch *b, size_t i, isogi_vol__walk *w) {
+    const isogi_hit *start = &b->starts[i];
+    const double tmax = isogi_vol__tmax(b->tmax ? b->tmax[i] : 0);
+    int a;
+    /* the cap of a border lies where the field is not at the isovalue: nothing to divide out */
+    w->deflate = start->side != 2 && start->side != -2;
+    w->isovalue = b->isovalue;
+    for (a = 0; a < 3; a++) {
+        if (start->cell[a] >= (uint32_t)b->pyramid->cells[a] || !isogi_vol__finite64(start->local[a])) return 0;
+        w->origin[a] = start->cell[a] + isogi_vol__clamp(start->local[a], 1);
+    }
+    if (isogi_vol__is_nan(b->isovalue) || !(tmax >= 0) || !isogi_vol__aim(w, b->dirs[i], 0, tmax)) return 0;
+    w->entry_axis = -1;
+    /* a cap that is left outwards */
+    return w->deflate || !(w->end * isogi_vol__largest(w->dir[0], w->dir[1], w->dir[2]) < 1e-9);
+}
+
+/* Sets a walk up; 0: there is nothing to walk. */
+static int isogi_vol__begin(isogi_vol__batch *b, size_t i, isogi_vol__walk *w) {
+    w->pyramid = b->pyramid, w->inside = -1, w->entry_axis = -1, w->exact = b->hits != NULL, w->cap = 1, w->deflate = 0;
+    w->origin[3] = w->deflated = 0;
+    w->count.blocks = w->count.cells = w->count.cubics = 0;
+    b->work.rays++;
+    return b->rays ? isogi_vol__begin_ray(b, i, w) : isogi_vol__begin_start(b, i, w);
 }
 
 /* ==== fast traversal ================================================================================================= */
@@ -1913,8 +2136,7 @@ typedef struct isogi_vol__stride {
 #define ISOGI_VOL__WALK(NAME, TARGET, LEVEL, MASK, CHILD)                                                                                        \
     TARGET ISOGI_VOL__INLINE int NAME(isogi_vol__stride *s, const isogi_vol__place *from, int x, int y, int z) {                          \
         const isogi_pyramid *p = s->w->pyramid;                                                                                    \
-        const isogi_level *level = &p->level[LEVEL];                                                                               \
-        const size_t node = p->first_node[LEVEL] + (size_t)x + level->size[0] * ((size_t)y + level->size[1] * (size_t)z);          \
+        const size_t node = isogi_vol__node_at(p, LEVEL, (size_t)x, (size_t)y, (size_t)z);                                         \
         const uint64_t mask = MASK(p->nodes[node], s->k->low, s->k->high);                                         \
         const uint32_t flip = s->k->flip;                                                                                          \
         const int64_t end = s->k->end;                                                                                             \
@@ -1991,169 +2213,324 @@ static int isogi_vol__walk_fast(isogi_vol__walk *w, const isogi_vol__ticks *k, i
     return isogi_vol__walk_fast_base(w, k, hit);
 }
 
+/* ==== many rays at once ============================================================================================== */
+
+/* A walk is a chain of decisions that no processor can foresee, and waits for each. So up to ISOGI_VOL__WAVE rays go together, one
+   step each, node after node and then cell after cell: their chains overlap, and there is nothing left to be foreseen. A node is
+   answered at once, without walking its children: a ray passes child (i,j,k) unless the order in which it meets the planes between
+   children forbids it. Along axes on which the ray falls children are counted backwards, so that it meets children in the order of
+   their numbers x + 4y + 16z. Times of planes come from the one formula that cells use; the lowest two bits are replaced by the axis,
+   which makes all of them different: a strict order, the same for all nodes and levels, hence face by face connected. */
+#ifdef ISOGI_VOL__AVX
+#define ISOGI_VOL__AVX512 ISOGI_VOL__TARGET("avx512f,avx512bw,avx512dq,avx512vl,avx512bitalg")
+#define ISOGI_VOL__WAVE 32
+#define ISOGI_VOL__WAVE_NODES 16384 /* 2 MB */
+
+typedef struct __attribute__((aligned(64))) isogi_vol__rider {
+    double origin[4], inverse[4], sign[4]; /* inverse is huge along axes on which the ray stands still; the fourth is 0 */
+    int32_t fall[4];
+    int32_t next[4];                             /* the child to come next, of a node of `level` */
+    int32_t node[ISOGI_VOL__NODE_LEVELS + 1][4]; /* the node of each level that is being worked through; the last has one child, the top */
+    uint64_t mask[ISOGI_VOL__NODE_LEVELS + 1];   /* its children still to come, counted backwards on falling axes */
+    int64_t end;                                 /* the segment's end as a time of a plane, axis 3 */
+    const char *address;                         /* its bounds, or the first corner of a cell */
+    int level;                                   /* 0: a cell; -1: none, the ray is done */
+    uint32_t pending;                            /* levels with children to come after that */
+    int flip;
+    int low, high; /* what the isovalue can be in 8 bits */
+} isogi_vol__rider;
+
+/* What is left of 64 children if planes a and b are met in either order: children on the far side of the one that comes later and on
+   the near side of the one that comes first are not met. */
+#define ISOGI_VOL__BELOW_0(a) (0x1111111111111111u * (uint64_t)((1 << (a)) - 1))
+#define ISOGI_VOL__BELOW_1(a) (0x0001000100010001u * (uint64_t)((1 << (4 * (a))) - 1))
+#define ISOGI_VOL__BELOW_2(a) (((uint64_t)1 << (16 * (a))) - 1)
+#define ISOGI_VOL__FIRST(f, a, s, b) ~(ISOGI_VOL__BELOW_##f(a) & ~ISOGI_VOL__BELOW_##s(b))
+#define ISOGI_VOL__LATER(f, a, s, b) ~(~ISOGI_VOL__BELOW_##f(a) & ISOGI_VOL__BELOW_##s(b))
+#define ISOGI_VOL__PAIRS(M, a, b) M(0, a, 1, b), M(1, a, 2, b), M(2, a, 0, b), ~(uint64_t)0
+#define ISOGI_VOL__BELOW(a) ISOGI_VOL__BELOW_0(a), ISOGI_VOL__BELOW_1(a), ISOGI_VOL__BELOW_2(a), ~(uint64_t)0
+#define ISOGI_VOL__ABOVE(a) ~ISOGI_VOL__BELOW_0(a), ~ISOGI_VOL__BELOW_1(a), ~ISOGI_VOL__BELOW_2(a), ~(uint64_t)0
+#define ISOGI_VOL__ALL ~(uint64_t)0, ~(uint64_t)0, ~(uint64_t)0, ~(uint64_t)0
+static const uint64_t isogi_vol__orders[13][8] = {
+    {ISOGI_VOL__PAIRS(ISOGI_VOL__FIRST, 1, 1), ISOGI_VOL__PAIRS(ISOGI_VOL__FIRST, 2, 1)},
+    {ISOGI_VOL__PAIRS(ISOGI_VOL__LATER, 1, 1), ISOGI_VOL__PAIRS(ISOGI_VOL__LATER, 2, 1)},
+    {ISOGI_VOL__PAIRS(ISOGI_VOL__FIRST, 1, 2), ISOGI_VOL__PAIRS(ISOGI_VOL__FIRST, 2, 2)},
+    {ISOGI_VOL__PAIRS(ISOGI_VOL__LATER, 1, 2), ISOGI_VOL__PAIRS(ISOGI_VOL__LATER, 2, 2)},
+    {ISOGI_VOL__PAIRS(ISOGI_VOL__FIRST, 1, 3), ISOGI_VOL__PAIRS(ISOGI_VOL__FIRST, 2, 3)},
+    {ISOGI_VOL__PAIRS(ISOGI_VOL__LATER, 1, 3), ISOGI_VOL__PAIRS(ISOGI_VOL__LATER, 2, 3)},
+    {ISOGI_VOL__PAIRS(ISOGI_VOL__FIRST, 3, 1), ISOGI_VOL__PAIRS(ISOGI_VOL__FIRST, 3, 2)},
+    {ISOGI_VOL__PAIRS(ISOGI_VOL__LATER, 3, 1), ISOGI_VOL__PAIRS(ISOGI_VOL__LATER, 3, 2)},
+    {ISOGI_VOL__PAIRS(ISOGI_VOL__FIRST, 3, 3), ISOGI_VOL__ABOVE(3)}, /* upper half: plane 3 before the entry */
+    {ISOGI_VOL__PAIRS(ISOGI_VOL__LATER, 3, 3), ISOGI_VOL__ALL},
+    {ISOGI_VOL__ABOVE(1), ISOGI_VOL__ABOVE(2)}, /* planes 1 and 2 before the entry */
+    {ISOGI_VOL__BELOW(1), ISOGI_VOL__BELOW(2)}, /* planes 1 and 2 after the exit */
+    {ISOGI_VOL__BELOW(3), ISOGI_VOL__ALL}};
+static const uint8_t isogi_vol__numbers[64] = {0,  1,  2,  3,  4,  5,  6,  7,  8,  9,  10, 11, 12, 13, 14, 15, 16, 17, 18, 19, 20, 21,
+                                               22, 23, 24, 25, 26, 27, 28, 29, 30, 31, 32, 33, 34, 35, 36, 37, 38, 39, 40, 41, 42, 43,
+                                               44, 45, 46, 47, 48, 49, 50, 51, 52, 53, 54, 55, 56, 57, 58, 59, 60, 61, 62, 63};
+
+/* Times of planes as integers, axis in the lowest two bits. */
+ISOGI_VOL__AVX512 ISOGI_VOL__INLINE __m512i isogi_vol__when(__m512d plane, __m512d origin, __m512d inverse) {
+    const __m512d t = _mm512_max_pd(_mm512_mul_pd(_mm512_sub_pd(plane, origin), inverse), _mm512_setzero_pd());
+    return _mm512_ternarylogic_epi64(_mm512_castpd_si512(t), _mm512_set1_epi64(~(int64_t)3), _mm512_setr_epi64(0, 1, 2, 3, 0, 1, 2, 3), 0xea);
+}
+
+ISOGI_VOL__AVX512 ISOGI_VOL__INLINE __m256i isogi_vol__latest(__m256i t) {
+    t = _mm256_max_epi64(t, _mm256_permute4x64_epi64(t, 0x4e));
+    return _mm256_max_epi64(t, _mm256_permute4x64_epi64(t, 0xb1));
+}
+
+ISOGI_VOL__AVX512 ISOGI_VOL__INLINE __m256i isogi_vol__earliest(__m256i t) {
+    t = _mm256_min_epi64(t, _mm256_permute4x64_epi64(t, 0x4e));
+    return _mm256_min_epi64(t, _mm256_permute4x64_epi64(t, 0xb1));
+}
+
+/* Which children of a node of level n the ray passes, in its own order. */
+ISOGI_VOL__AVX512 ISOGI_VOL__INLINE uint64_t isogi_vol__passed(const isogi_vol__rider *r, int n, __m128i node) {
+    const double child = (double)((int64_t)1 << 2 * n);
+    const __m256d base = _mm256_mul_pd(_mm256_cvtepi32_pd(_mm_add_epi32(node, _mm_load_si128((const __m128i *)(const void *)r->fall))), _mm256_set1_pd(4 * child));
+    const __m512d origin = _mm512_broadcast_f64x4(_mm256_load_pd(r->origin)), inverse = _mm512_broadcast_f64x4(_mm256_load_pd(r->inverse));
+    const __m512d step = _mm512_broadcast_f64x4(_mm256_mul_pd(_mm256_load_pd(r->sign), _mm256_set1_pd(child))), start = _mm512_broadcast_f64x4(base);
+    const __m512d plane12 = _mm512_add_pd(start, _mm512_mul_pd(step, _mm512_setr_pd(1, 1, 1, 1, 2, 2, 2, 2)));
+    const __m512d plane34 = _mm512_add_pd(start, _mm512_mul_pd(step, _mm512_setr_pd(3, 3, 3, 3, 4, 4, 4, 4)));
+    const __m512i t12 = isogi_vol__when(plane12, origin, inverse), t34 = isogi_vol__when(plane34, origin, inverse);
+    const __m512i t0 = isogi_vol__when(start, origin, inverse);
+    const __m512i in = _mm512_broadcastq_epi64(_mm256_castsi256_si128(isogi_vol__latest(_mm512_castsi512_si256(t0))));
+    const __m512i out = _mm512_broadcastq_epi64(
+        _mm256_castsi256_si128(isogi_vol__earliest(_mm256_mask_set1_epi64(_mm512_extracti64x4_epi64(t34, 1), 8, r->end))));
+    const __m512i other12 = _mm512_permutex_epi64(t12, 0xc9), other34 = _mm512_permutex_epi64(t34, 0xc9); /* y, z, x */
+    const __m512i t33 = _mm512_shuffle_i64x2(t34, t34, 0x44), other33 = _mm512_shuffle_i64x2(other34, other34, 0x44);
+    const __m512i *order = (const __m512i *)(const void *)isogi_vol__orders;
+#define ISOGI_VOL__EITHER(i, a, b) \
+    _mm512_mask_blend_epi64(_mm512_cmplt_epi64_mask(a, b), _mm512_loadu_si512(order + 2 * (i) + 1), _mm512_loadu_si512(order + 2 * (i)))
+    const __m512i v0 = ISOGI_VOL__EITHER(0, t12, _mm512_shuffle_i64x2(other12, other12, 0x44));
+    const __m512i v1 = ISOGI_VOL__EITHER(1, t12, _mm512_shuffle_i64x2(other12, other12, 0xee));
+    const __m512i v2 = ISOGI_VOL__EITHER(2, t12, other33);
+    const __m512i v3 = ISOGI_VOL__EITHER(3, t33, other12);
+    const __m512i v4 = ISOGI_VOL__EITHER(4, t33, _mm512_shuffle_i64x2(other34, in, 0x44));
+#undef ISOGI_VOL__EITHER
+    __m512i all = _mm512_and_si512(_mm512_ternarylogic_epi64(v0, v1, v2, 0x80), _mm512_and_si512(v3, v4));
+    all = _mm512_mask_and_epi64(all, _mm512_cmplt_epi64_mask(t12, in), all, _mm512_loadu_si512(order + 10));
+    all = _mm512_mask_and_epi64(all, _mm512_cmplt_epi64_mask(out, t12), all, _mm512_loadu_si512(order + 11));
+    all = _mm512_mask_and_epi64(all, _mm512_cmplt_epi64_mask(out, t33), all, _mm512_loadu_si512(order + 12));
+    return (uint64_t)_mm512_reduce_and_epi64(all);
+}
+
+/* Takes the next child of the lowest level that has any, and sends for what it needs: others have their turn until it arrives. */
+ISOGI_VOL__AVX512 ISOGI_VOL__INLINE void isogi_vol__choose(const isogi_pyramid *p, isogi_vol__rider *r) {
+    if (!r->pending) {
+        r->level = -1;
+    } else {
+        const int n = __builtin_ctz(r->pending);
+        const uint64_t mask = r->mask[n], rest = mask & (mask - 1);
+        const int child = __builtin_ctzll(mask) ^ r->flip;
+        const __m128i digits = _mm_and_si128(_mm_srlv_epi32(_mm_set1_epi32(child), _mm_setr_epi32(0, 2, 4, 31)), _mm_set1_epi32(3));
+        const __m128i parent = _mm_load_si128((const __m128i *)(const void *)r->node[n]), next = _mm_add_epi32(_mm_slli_epi32(parent, 2), digits);
+        _mm_store_si128((__m128i *)(void *)r->next, next);
+        r->mask[n] = rest, r->pending = rest ? r->pending : r->pending & (r->pending - 1), r->level = n;
+        if (n) {
+            const isogi_vol__node_level *level = &p->node_level[n - 1];
+            const size_t x = (size_t)_mm_cvtsi128_si32(parent), y = (size_t)_mm_extract_epi32(parent, 1), z = (size_t)_mm_extract_epi32(parent, 2);
+            r->address = (const char *)p->nodes[level->first + 64 * (x + level->parents[0] * (y + level->parents[1] * z)) + (size_t)child];
+            _mm_prefetch(r->address, _MM_HINT_T0), _mm_prefetch(r->address + 64, _MM_HINT_T0);
+        } else {
+            const isogi_volume *v = &p->volume;
+            const ptrdiff_t dy = v->stride[1], dz = v->stride[2];
+            r->address = (const char *)v->data + _mm_cvtsi128_si32(next) * v->stride[0] + _mm_extract_epi32(next, 1) * dy + _mm_extract_epi32(next, 2) * dz;
+            _mm_prefetch(r->address, _MM_HINT_T0), _mm_prefetch(r->address + dy, _MM_HINT_T0);
+            _mm_prefetch(r->address + dz, _MM_HINT_T0), _mm_prefetch(r->address + dy + dz, _MM_HINT_T0);
+        }
+    }
+}
+
+/* Answers a node. */
+ISOGI_VOL__AVX512 ISOGI_VOL__INLINE void isogi_vol__ride_node(const isogi_pyramid *p, isogi_vol__rider *r) {
+    const int n = r->level - 1;
+    const __m128i node = _mm_load_si128((const __m128i *)(const void *)r->next);
+    const __m512i numbers = _mm512_xor_si512(_mm512_set1_epi8((char)r->flip), _mm512_loadu_si512((const void *)isogi_vol__numbers));
+    uint64_t marked = isogi_vol__node_mask_avx512((const uint8_t *)r->address, r->low, r->high);
+    marked = (uint64_t)_mm512_bitshuffle_epi64_mask(_mm512_set1_epi64((int64_t)marked), numbers) & isogi_vol__passed(r, n, node);
+    _mm_store_si128((__m128i *)(void *)r->node[n], node);
+    r->mask[n] = marked;
+    r->pending |= (uint32_t)(marked != 0) << n;
+    isogi_vol__choose(p, r);
+}
+
+/* Solves a cell; 1: hit. */
+ISOGI_VOL__AVX512 ISOGI_VOL__INLINE int isogi_vol__ride_cell(const isogi_pyramid *p, isogi_vol__rider *r, isogi_vol__walk *w, isogi_hit *hit) {
+    const __m128i cell = _mm_load_si128((const __m128i *)(const void *)r->next);
+    const __m256d enter = _mm256_cvtepi32_pd(_mm_add_epi32(cell, _mm_load_si128((const __m128i *)(const void *)r->fall)));
+    const __m256d leave = _mm256_add_pd(enter, _mm256_load_pd(r->sign));
+    const __m512i t = isogi_vol__when(_mm512_insertf64x4(_mm512_castpd256_pd512(enter), leave, 1), _mm512_broadcast_f64x4(_mm256_load_pd(r->origin)),
+                                      _mm512_broadcast_f64x4(_mm256_load_pd(r->inverse)));
+    const int in = (int)_mm_cvtsi128_si32(_mm256_castsi256_si128(isogi_vol__latest(_mm512_castsi512_si256(t)))) & 3;
+    const int out = (int)_mm_cvtsi128_si32(_mm256_castsi256_si128(
+                        isogi_vol__earliest(_mm256_mask_set1_epi64(_mm512_extracti64x4_epi64(t, 1), 8, r->end)))) & 3;
+    if (isogi_vol__mixed_cell_avx2(w, _mm_cvtsi128_si32(cell), _mm_extract_epi32(cell, 1), _mm_extract_epi32(cell, 2), in == 3 ? w->entry_axis : in,
+                                   out == 3 ? -1 : out, hit))
+        return 1;
+    isogi_vol__choose(p, r);
+    return 0;
+}
+
+/* A rider on a walk that is set up and clipped; 0: it has to be walked alone. */
+ISOGI_VOL__TARGET("avx2") static int isogi_vol__mount(isogi_vol__rider *r, const isogi_vol__walk *w) {
+    const isogi_pyramid *p = w->pyramid;
+    const __m256d zero = _mm256_setzero_pd(), origin = _mm256_loadu_pd(w->origin), dir = _mm256_loadu_pd(w->dir), box = _mm256_loadu_pd(p->box);
+    const __m256d space = _mm256_castsi256_pd(_mm256_setr_epi64x(-1, -1, -1, 0)), one = _mm256_set1_pd(1);
+    const __m256d still = _mm256_and_pd(_mm256_cmp_pd(dir, zero, _CMP_EQ_OQ), space);
+    /* a ray that stands still on an axis keeps below the volume's upper border */
+    const __m256d fall = _mm256_or_pd(_mm256_cmp_pd(dir, zero, _CMP_LT_OQ), _mm256_and_pd(still, _mm256_cmp_pd(origin, box, _CMP_GE_OQ)));
+    const __m256d minus = _mm256_and_pd(fall, _mm256_set1_pd(-0.0));
+    const int bits = _mm256_movemask_pd(fall), top = p->node_levels;
+    double end = w->end;
+    isogi_vol__quantise_isovalue(p, w->isovalue, &r->low, &r->high);
+    if (!(end > 1e-150) || !(end < 1e150) || r->low > r->high) return 0;
+    _mm256_store_pd(r->origin, origin);
+    _mm256_store_pd(r->inverse, _mm256_blendv_pd(_mm256_loadu_pd(w->inverse), _mm256_or_pd(_mm256_set1_pd(1e200), minus), still));
+    _mm256_store_pd(r->sign, _mm256_and_pd(space, _mm256_or_pd(one, minus)));
+    _mm_store_si128((__m128i *)(void *)r->fall, _mm256_cvttpd_epi32(_mm256_and_pd(fall, one)));
+    r->flip = (bits & 1) * 3 | (bits >> 1 & 1) * 12 | (bits >> 2 & 1) * 48;
+    memcpy(&r->end, &end, sizeof end);
+    r->end |= 3;
+    _mm_store_si128((__m128i *)(void *)r->node[top], _mm_setzero_si128());
+    r->mask[top] = (uint64_t)1 << r->flip, r->pending = 1u << top;
+    return 1;
+}
+#endif
+
 /* ==== rays =========================================================================================================== */
 
-/* Direction components that cannot matter are set to zero, so that reciprocals stay finite. 0: no direction. */
-static int isogi_vol__set_direction(isogi_vol__walk *w, const float dir[3]) {
-    double world[3], most = 0;
-    int a;
-    for (a = 0; a < 3; a++) world[a] = (double)dir[a];
-    isogi_vol__transform(w->pyramid->to_grid, world, w->dir);
-    if (!isogi_vol__finite3(world) || !isogi_vol__finite3(w->dir)) return 0;
-    for (a = 0; a < 3; a++) most = isogi_vol__max(most, fabs(w->dir[a]));
-    if (!(most > 0)) return 0;
-    for (a = 0; a < 3; a++) {
-        if (fabs(w->dir[a]) <= 1e-30 * most) w->dir[a] = 0;
-        w->inverse[a] = w->dir[a] > 0 || w->dir[a] < 0 ? 1 / w->dir[a] : 0;
-        if (!w->pyramid->cells[a]) return 0;
-    }
+/* Fast rays look only at cells that may hold the surface. So a capped ray asks first whether it enters the box inside. */
+static int isogi_vol__enters_inside(isogi_vol__walk *w, isogi_hit *hit) {
+    double local[3];
+    if (w->cap != 2) return 0;
+    w->cap = 1;
+    if (!isogi_vol__inside_at(w, 0)) return 0;
+    isogi_vol__first_cell(w);
+    isogi_vol__local(w, 0, local);
+    if (w->entry_axis >= 0) local[w->entry_axis] = w->dir[w->entry_axis] > 0 ? 0 : 1;
+    isogi_vol__emit(w, 0, local, 2, hit);
     return 1;
 }
 
-/* Clips [tmin, tmax] to the box and moves the origin to where the walk begins, so that a far origin costs no precision later. */
-static int isogi_vol__clip(isogi_vol__walk *w, double tmin, double tmax) {
-    double enter = tmin, leave = tmax;
-    int a;
-    for (a = 0; a < 3; a++) {
-        double size = w->pyramid->cells[a], t0, t1;
-        if (!(w->dir[a] > 0 || w->dir[a] < 0)) {
-            if (!(w->origin[a] >= 0 && w->origin[a] <= size)) return 0;
-            continue;
-        }
-        t0 = ((w->dir[a] > 0 ? 0 : size) - w->origin[a]) * w->inverse[a];
-        t1 = ((w->dir[a] > 0 ? size : 0) - w->origin[a]) * w->inverse[a];
-        if (t0 > enter) enter = t0, w->entry_axis = a;
-        leave = isogi_vol__min(leave, t1);
-    }
-    if (!(enter <= leave)) return 0;
-    for (a = 0; a < 3; a++) w->origin[a] = isogi_vol__clamp(w->origin[a] + enter * w->dir[a], (double)w->pyramid->cells[a]);
-    w->base = enter, w->t = 0, w->end = ISOGI_VOL__UNLIMITED;
-    for (a = 0; a < 3; a++)
-        if (w->dir[a] > 0 || w->dir[a] < 0)
-            w->end = isogi_vol__min(w->end, ((w->dir[a] > 0 ? w->pyramid->cells[a] : 0) - w->origin[a]) * w->inverse[a]);
-    w->end_is_border = !(tmax - enter < w->end);
-    w->end = isogi_vol__min(w->end, tmax - enter);
+/* And one that has found nothing asks whether it leaves the box inside; `inside` is known unless nothing was looked at on the way. */
+static int isogi_vol__leaves_inside(isogi_vol__walk *w, uint32_t flags, isogi_hit *hit) {
+    if (!(flags & ISOGI_RAY_CAPPED) || !w->end_is_border) return 0;
+    if (w->inside < 0 && !w->deflate) w->inside = isogi_vol__inside_at(w, w->end);
+    if (w->inside != 1) return 0;
+    isogi_vol__cap_exit(w, hit);
     return 1;
 }
 
-/* The cell in which the walk begins: of those that touch the origin, the one that the ray goes on in. */
-static void isogi_vol__first_cell(isogi_vol__walk *w) {
-    double local;
-    int a;
-    for (a = 0; a < 3; a++) {
-        w->cell[a] = isogi_vol__cell(w->origin[a], w->pyramid->volume.size[a], &local);
-        if (w->dir[a] < 0 && w->cell[a] > 0 && !(local > 0)) w->cell[a]--;
-    }
-}
-
-/* Walks a ray that is set up and clipped: fast where that is right, else plainly. */
+/* Walks a ray that is set up: fast where that is right, else plainly. */
 static int isogi_vol__walk_ray(isogi_vol__walk *w, uint32_t flags, isogi_hit *hit) {
     isogi_vol__ticks ticks;
-    if (w->pyramid->fast && !(flags & ISOGI_RAY_CAPPED) && isogi_vol__set_ticks(&ticks, w)) return isogi_vol__walk_fast(w, &ticks, hit);
+    if (w->pyramid->fast && isogi_vol__set_ticks(&ticks, w))
+        return isogi_vol__enters_inside(w, hit) || isogi_vol__walk_fast(w, &ticks, hit) || isogi_vol__leaves_inside(w, flags, hit);
     isogi_vol__first_cell(w);
     return isogi_vol__walk_on(w, flags, hit);
 }
 
-static int isogi_vol__is_nan(double x) {
-    uint64_t bits;
-    memcpy(&bits, &x, sizeof bits);
-    return (bits & 0x7fffffffffffffffu) > 0x7ff0000000000000u;
+static void isogi_vol__finish(isogi_vol__batch *b, size_t i, const isogi_vol__walk *w, int found) {
+    b->work.blocks += w->count.blocks, b->work.cells += w->count.cells, b->work.cubics += w->count.cubics;
+    if (b->occluded) b->occluded[i] = (uint8_t)found;
+    else if (!found) memset(&b->hits[i], 0, sizeof b->hits[i]);
 }
 
-/* tmax as given, with 0 and anything beyond standing for unlimited. */
-static double isogi_vol__tmax(double tmax) {
-    return (tmax >= 0 && tmax <= 0) || tmax > ISOGI_VOL__UNLIMITED ? ISOGI_VOL__UNLIMITED : tmax;
-}
-
-static int isogi_vol__trace(const isogi_pyramid *p, const isogi_ray *ray, int exact, isogi_hit *hit, isogi_counters *count) {
+static void isogi_vol__trace_one(isogi_vol__batch *b, size_t i) {
     isogi_vol__walk w;
-    double relative[3], tmax = isogi_vol__tmax(ray->tmax);
-    int a, found = 0;
-    memset(&w, 0, sizeof w);
-    w.pyramid = p, w.isovalue = ray->isovalue, w.inside = -1, w.entry_axis = -1, w.exact = exact, w.cap = 1;
-    for (a = 0; a < 3; a++) relative[a] = ray->origin[a] - p->volume.origin[a];
-    isogi_vol__transform(p->to_grid, relative, w.origin);
-    count->rays++;
-    if (!isogi_vol__finite3(w.origin) || !isogi_vol__finite3(ray->origin)) return 0;
-    if (isogi_vol__is_nan(ray->isovalue) || isogi_vol__is_nan(ray->tmin) || isogi_vol__is_nan(ray->tmax) || !(ray->tmin <= tmax)) return 0;
-    if (isogi_vol__set_direction(&w, ray->dir) && isogi_vol__clip(&w, isogi_vol__max(ray->tmin, -ISOGI_VOL__UNLIMITED), tmax)) {
-        if (w.entry_axis >= 0 && (ray->flags & ISOGI_RAY_CAPPED)) w.inside = 0, w.cap = 2;
-        found = isogi_vol__walk_ray(&w, ray->flags, hit);
-    }
-    count->blocks += w.count.blocks, count->cells += w.count.cells, count->cubics += w.count.cubics;
-    return found;
+    isogi_hit any;
+    const int walks = isogi_vol__begin(b, i, &w);
+    isogi_vol__finish(b, i, &w, walks && isogi_vol__walk_ray(&w, isogi_vol__flags(b, i), b->hits ? &b->hits[i] : &any));
 }
 
-static void isogi_vol__add(isogi_counters *to, const isogi_counters *from) {
-    if (!to) return;
-    to->rays += from->rays, to->blocks += from->blocks, to->cells += from->cells, to->cubics += from->cubics;
+#ifdef ISOGI_VOL__AVX
+/* Any number of rays through ISOGI_VOL__WAVE places, each taken again as soon as it is free. */
+ISOGI_VOL__AVX512 static void isogi_vol__trace_wave(isogi_vol__batch *b, size_t count) {
+    isogi_vol__rider rider[ISOGI_VOL__WAVE];
+    isogi_vol__walk walk[ISOGI_VOL__WAVE];
+    isogi_hit any;
+    size_t ray[ISOGI_VOL__WAVE], next = 0;
+    uint8_t spare[ISOGI_VOL__WAVE], at_node[2 * ISOGI_VOL__WAVE], at_cell[2 * ISOGI_VOL__WAVE];
+    int spares = 0, nodes = 0, cells = 0, i, k, kept;
+    for (i = ISOGI_VOL__WAVE; i--;) spare[spares++] = (uint8_t)i;
+    do {
+        for (; spares && next < count; next++) {
+            const int place = spare[spares - 1];
+            isogi_vol__walk *w = &walk[place];
+            if (!isogi_vol__begin(b, next, w)) isogi_vol__finish(b, next, w, 0);
+            else if (isogi_vol__flags(b, next) || !isogi_vol__mount(&rider[place], w))
+                isogi_vol__finish(b, next, w, isogi_vol__walk_ray(w, isogi_vol__flags(b, next), b->hits ? &b->hits[next] : &any));
+            else isogi_vol__choose(b->pyramid, &rider[place]), at_node[nodes++] = (uint8_t)place, ray[place] = next, spares--;
+        }
+        for (k = kept = 0; k < nodes; k++) {
+            const int place = at_node[k];
+            int level;
+            isogi_vol__ride_node(b->pyramid, &rider[place]);
+            walk[place].count.blocks++;
+            level = rider[place].level;
+            at_node[kept] = at_cell[cells] = (uint8_t)place;
+            kept += level > 0, cells += level == 0;
+            if (level < 0) isogi_vol__finish(b, ray[place], &walk[place], 0), spare[spares++] = (uint8_t)place;
+        }
+        nodes = kept;
+        for (k = kept = 0; k < cells; k++) {
+            const int place = at_cell[k];
+            const int found = isogi_vol__ride_cell(b->pyramid, &rider[place], &walk[place], b->hits ? &b->hits[ray[place]] : &any);
+            const int level = found ? -1 : rider[place].level;
+            at_node[nodes] = at_cell[kept] = (uint8_t)place;
+            nodes += level > 0, kept += level == 0;
+            if (level < 0) isogi_vol__finish(b, ray[place], &walk[place], found), spare[spares++] = (uint8_t)place;
+        }
+        cells = kept;
+    } while (nodes || cells || next < count);
+}
+#endif
+
+static isogi_result isogi_vol__trace(isogi_vol__batch *b, size_t count, isogi_counters *counters) {
+    size_t i = 0;
+    memset(&b->work, 0, sizeof b->work);
+#ifdef ISOGI_VOL__AVX
+    /* small volumes stay in the cache, and so do neighbouring rays: nothing to wait for */
+    if (b->pyramid->fast && b->pyramid->path == ISOGI_VOL__PATH_AVX512 &&
+        (b->pyramid->context.force_path == ISOGI_VOL__PATH_AVX512 || (count >= 32 && b->pyramid->node_count > ISOGI_VOL__WAVE_NODES)))
+        isogi_vol__trace_wave(b, count), i = count;
+#endif
+    for (; i < count; i++) isogi_vol__trace_one(b, i);
+    if (counters) {
+        counters->rays += b->work.rays, counters->blocks += b->work.blocks;
+        counters->cells += b->work.cells, counters->cubics += b->work.cubics;
+    }
+    return ISOGI_OK;
 }
 
 ISOGI_API isogi_result isogi_vol_intersect(const isogi_pyramid *pyramid, const isogi_ray *rays, size_t count, isogi_hit *hits,
                                            isogi_counters *counters) {
-    isogi_counters work;
-    size_t i;
+    isogi_vol__batch b;
     if (!pyramid || (count && (!rays || !hits))) return ISOGI_INVALID;
-    memset(&work, 0, sizeof work);
-    for (i = 0; i < count; i++) {
-        if (!isogi_vol__trace(pyramid, &rays[i], 1, &hits[i], &work)) memset(&hits[i], 0, sizeof hits[i]);
-    }
-    isogi_vol__add(counters, &work);
-    return ISOGI_OK;
+    memset(&b, 0, sizeof b);
+    b.pyramid = pyramid, b.rays = rays, b.hits = hits;
+    return isogi_vol__trace(&b, count, counters);
 }
 
 ISOGI_API isogi_result isogi_vol_occluded(const isogi_pyramid *pyramid, const isogi_ray *rays, size_t count, uint8_t *occluded,
                                           isogi_counters *counters) {
-    isogi_counters work;
-    size_t i;
+    isogi_vol__batch b;
     if (!pyramid || (count && (!rays || !occluded))) return ISOGI_INVALID;
-    memset(&work, 0, sizeof work);
-    for (i = 0; i < count; i++) {
-        isogi_hit hit;
-        occluded[i] = (uint8_t)isogi_vol__trace(pyramid, &rays[i], 0, &hit, &work);
-    }
-    isogi_vol__add(counters, &work);
-    return ISOGI_OK;
-}
-
-static int isogi_vol__trace_on(const isogi_pyramid *p, const isogi_hit *start, const float dir[3], double tmax, double isovalue,
-                               uint32_t flags, isogi_hit *hit, isogi_counters *count) {
-    isogi_vol__walk w;
-    int a, found = 0;
-    memset(&w, 0, sizeof w);
-    w.pyramid = p, w.isovalue = isovalue, w.inside = -1, w.entry_axis = -1, w.exact = 1, w.cap = 1;
-    /* the cap of a border lies where the field is not at the isovalue: nothing to divide out */
-    w.deflate = start->side != 2 && start->side != -2;
-    count->rays++;
-    for (a = 0; a < 3; a++) {
-        if (start->cell[a] >= (uint32_t)p->cells[a] || !isogi_vol__finite64(start->local[a])) return 0;
-        w.origin[a] = start->cell[a] + isogi_vol__clamp(start->local[a], 1);
-    }
-    tmax = isogi_vol__tmax(tmax);
-    if (isogi_vol__is_nan(isovalue) || !(tmax >= 0)) return 0;
-    if (isogi_vol__set_direction(&w, dir) && isogi_vol__clip(&w, 0, tmax)) {
-        w.entry_axis = -1;
-        /* a cap that is left outwards */
-        if (!w.deflate && w.end * isogi_vol__largest(w.dir[0], w.dir[1], w.dir[2]) < 1e-9) return 0;
-        found = isogi_vol__walk_ray(&w, flags, hit);
-    }
-    count->blocks += w.count.blocks, count->cells += w.count.cells, count->cubics += w.count.cubics;
-    return found;
+    memset(&b, 0, sizeof b);
+    b.pyramid = pyramid, b.rays = rays, b.occluded = occluded;
+    return isogi_vol__trace(&b, count, counters);
 }
 
 ISOGI_API isogi_result isogi_vol_continue(const isogi_pyramid *pyramid, const isogi_hit *starts, const float (*dirs)[3],
                                           const double *tmax, double isovalue, uint32_t flags, size_t count, isogi_hit *hits,
                                           isogi_counters *counters) {
-    isogi_counters work;
-    size_t i;
+    isogi_vol__batch b;
     if (!pyramid || (count && (!starts || !dirs || !hits))) return ISOGI_INVALID;
-    memset(&work, 0, sizeof work);
-    for (i = 0; i < count; i++) {
-        if (!isogi_vol__trace_on(pyramid, &starts[i], dirs[i], tmax ? tmax[i] : 0, isovalue, flags, &hits[i], &work))
-            memset(&hits[i], 0, sizeof hits[i]);
-    }
-    isogi_vol__add(counters, &work);
-    return ISOGI_OK;
+    memset(&b, 0, sizeof b);
+    b.pyramid = pyramid, b.starts = starts, b.dirs = dirs, b.tmax = tmax, b.isovalue = isovalue, b.flags = flags, b.hits = hits;
+    return isogi_vol__trace(&b, count, counters);
 }
 
 ISOGI_API isogi_result isogi_vol_positions(const isogi_pyramid *pyramid, const isogi_hit *hits, size_t count, float (*positions)[3]) {
@@ -2305,7 +2682,7 @@ static int isogi_vol__trace_loops(const double f[8], unsigned code, isogi_vol__l
         if (next[first] < 0) continue;
         l->count = 0;
         l->inside = region[isogi_vol__edge_corner(first, end)], l->outside = region[isogi_vol__edge_corner(first, !end)];
-        while (next[edge] >= 0 && l->count < 12) {
+        while (next[edge] >= 0) {
             int to = next[edge];
             l->edge[l->count++] = (uint8_t)edge;
             next[edge] = -1;
@@ -3234,20 +3611,33 @@ ISOGI_API void isogi_vol_mesh_free(const isogi_pyramid *pyramid, isogi_mesh *mes
 }
 
 #undef ISOGI_VOL__LEVELS
+#undef ISOGI_VOL__NODE_LEVELS
 #undef ISOGI_VOL__STRIP
 #undef ISOGI_VOL__STRIP_VOXELS
 #undef ISOGI_VOL__FAST_SIZE
 #undef ISOGI_VOL__TICKS
 #undef ISOGI_VOL__LEFT
 #undef ISOGI_VOL__WALK
+#undef ISOGI_VOL__WALK_CELL
+#undef ISOGI_VOL__WALK_TOP
+#undef ISOGI_VOL__WALKS
+#undef ISOGI_VOL__TARGET
+#undef ISOGI_VOL__AVX512
+#undef ISOGI_VOL__AVX
+#undef ISOGI_VOL__WAVE
+#undef ISOGI_VOL__WAVE_NODES
+#undef ISOGI_VOL__BELOW_0
+#undef ISOGI_VOL__BELOW_1
+#undef ISOGI_VOL__BELOW_2
+#undef ISOGI_VOL__FIRST
+#undef ISOGI_VOL__LATER
+#undef ISOGI_VOL__PAIRS
+#undef ISOGI_VOL__BELOW
+#undef ISOGI_VOL__ABOVE
+#undef ISOGI_VOL__ALL
 #undef ISOGI_VOL__INLINE
 #undef ISOGI_VOL__UNLIKELY
 #undef ISOGI_VOL__SSE2
-#undef ISOGI_VOL__AVX
-#undef ISOGI_VOL__TARGET
-#undef ISOGI_VOL__WALKS
-#undef ISOGI_VOL__WALK_CELL
-#undef ISOGI_VOL__WALK_TOP
 #undef ISOGI_VOL__UNLIMITED
 #undef ISOGI_VOL__LOCK
 #undef ISOGI_VOL__UNLOCK

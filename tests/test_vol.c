@@ -13,8 +13,6 @@ typedef struct field {
     isogi_pyramid *pyramid;
 } field;
 
-static const isogi_context serial = {.threads = 1};
-
 static field field_new(int x, int y, int z) {
     field f = {{x, y, z}, (double *)calloc((size_t)x * (size_t)y * (size_t)z, sizeof(double)), {0}, NULL};
     f.volume.data = f.value, f.volume.type = ISOGI_F64;
@@ -24,8 +22,11 @@ static field field_new(int x, int y, int z) {
 
 static double *field_at(field *f, int i, int j, int k) { return &f->value[i + f->size[0] * (j + f->size[1] * k)]; }
 
+/* Every instruction path in turn, so that what holds for one volume after the other holds for all of them. */
 static void field_build(field *f) {
-    isogi_result result = isogi_vol_build(&f->pyramid, &f->volume, &serial);
+    static int builds;
+    isogi_context context = {.threads = 1, .force_path = builds++ % 5};
+    isogi_result result = isogi_vol_build(&f->pyramid, &f->volume, &context);
     CHECK(result == ISOGI_OK, "%s", isogi_result_string(result));
 }
 
@@ -263,9 +264,64 @@ static void compare_walks(int path) {
     CHECK(different * 100000 <= hits && hits > 20000, "%ld of %ld differ", different, hits);
 }
 
+/* Many rays in one call, of any isovalue, capped or not, against the same rays one by one in plain code. */
+static void compare_batches(int path, int kind) {
+    enum { COUNT = 3000 };
+    test_random r = {21};
+    field f = field_new(40, 71, 53);
+    isogi_context plain = {.threads = 1, .force_path = 1}, fast = {.threads = 1, .force_path = path};
+    isogi_pyramid *a = NULL, *b = NULL;
+    isogi_ray *rays = (isogi_ray *)malloc(COUNT * sizeof *rays);
+    isogi_hit *hits = (isogi_hit *)malloc(COUNT * sizeof *hits), *starts = (isogi_hit *)malloc(COUNT * sizeof *starts);
+    float(*dirs)[3] = (float(*)[3])malloc(COUNT * sizeof *dirs);
+    uint8_t *occluded = (uint8_t *)malloc(COUNT);
+    long different = 0, found = 0;
+    field_fill(&f, kind, &r);
+    isogi_vol_build(&a, &f.volume, &fast), isogi_vol_build(&b, &f.volume, &plain);
+    for (int i = 0; i < COUNT; i++) {
+        double d[3];
+        rays[i] = random_ray(&f, wide_isovalue(kind, &r), &r);
+        rays[i].flags = i % 3 == 0 ? ISOGI_RAY_CAPPED : 0;
+        if (i % 7 == 0) /* along lattice planes, edges and diagonals */
+            for (int x = 0; x < 3; x++) rays[i].dir[x] = (float)((int)(random_bits(&r) % 3) - 1), rays[i].origin[x] = floor(rays[i].origin[x]);
+        if (i % 101 == 0) rays[i].dir[0] = (float)NAN;
+        random_direction(&r, d);
+        for (int x = 0; x < 3; x++) dirs[i][x] = (float)d[x];
+    }
+    isogi_vol_intersect(a, rays, COUNT, hits, NULL);
+    isogi_vol_occluded(a, rays, COUNT, occluded, NULL);
+    for (int i = 0; i < COUNT; i++) {
+        isogi_vol_intersect(b, &rays[i], 1, &starts[i], NULL);
+        found += starts[i].side != 0;
+        different += hits[i].side != starts[i].side || occluded[i] != (starts[i].side != 0) || fabs(hits[i].t - starts[i].t) > 1e-7;
+    }
+    printf("    path %d: %ld hits, %ld different\n", path, found, different);
+    for (int i = 0; i < COUNT; i++) rays[i].isovalue = 0.25;
+    isogi_vol_intersect(b, rays, COUNT, starts, NULL);
+    for (int capped = 0; capped < 2; capped++) {
+        memcpy(hits, starts, COUNT * sizeof *hits);
+        isogi_vol_continue(a, hits, (const float(*)[3])dirs, NULL, 0.25, capped ? ISOGI_RAY_CAPPED : 0, COUNT, hits, NULL);
+        for (int i = 0; i < COUNT; i++) {
+            isogi_hit truth = {0};
+            isogi_vol_continue(b, &starts[i], (const float(*)[3])dirs + i, NULL, 0.25, capped ? ISOGI_RAY_CAPPED : 0, 1, &truth, NULL);
+            if (starts[i].side) different += hits[i].side != truth.side || fabs(hits[i].t - truth.t) > 1e-7;
+        }
+    }
+    CHECK(different == 0 && found > COUNT / 3, "%ld of %d differ, %ld hits", different, COUNT, found);
+    isogi_vol_free(a), isogi_vol_free(b);
+    free(rays), free(hits), free(starts), free(dirs), free(occluded);
+    free(f.value);
+}
+
+TEST(batches_agree_with_single_rays) {
+    for (int path = 0; path < 5; path++)
+        for (int kind = 0; kind < KINDS; kind++) compare_batches(path, kind);
+}
+
 TEST(the_best_and_the_plain_walk_agree) { compare_walks(0); }
 TEST(the_portable_and_the_plain_walk_agree) { compare_walks(2); }
 TEST(the_avx2_and_the_plain_walk_agree) { compare_walks(3); }
+TEST(the_avx512_and_the_plain_walk_agree) { compare_walks(4); }
 
 /* ---- no leaks ---- */
 
