@@ -1559,12 +1559,157 @@ ISOGI_API isogi_result isogi_sh_rotate_z(float *out, const float *in, int order,
     return ISOGI_OK;
 }
 
+/* Where a matrix goes. */
+typedef struct isogi_sh__blocks {
+    void *data;
+    int is_double;
+} isogi_sh__blocks;
+
+static void isogi_sh__put(const isogi_sh__blocks *out, int i, double value) {
+    if (out->is_double) ((double *)out->data)[i] = value;
+    else ((float *)out->data)[i] = (float)value;
+}
+
+/* What Wigner's d of one angle b needs, for orders up to ISOGI_SH__TURNS + 1. */
+typedef struct isogi_sh__wigner {
+    double a[ISOGI_SH__TURNS + 1][2], c[ISOGI_SH__TURNS + 1][2]; /* multiples of the outer angles */
+    double cosine[2 * ISOGI_SH__TURNS + 2], sine[2 * ISOGI_SH__TURNS + 2]; /* powers of cos b/2, -sin b/2 */
+    double zonal[ISOGI_SH__TURNS + 1][2]; /* the recursion's factors a_l, -a_l / a_{l-1} for m = 0 */
+    double less, more, less_low, more_low; /* 1 - cos b and 1 + cos b, each in two parts: an ulp of them shows l^2 times */
+    double excess;                        /* cos^2 + sin^2 of b/2 as rounded, less 1: their m-th powers would show it */
+} isogi_sh__wigner;
+
+/* x y - high in full, high being x * y as rounded (Dekker) */
+static double isogi_sh__product_rest(double x, double y, double high) {
+    double t = 134217729 * x, a = t - (t - x), b = x - a, u = 134217729 * y, c = u - (u - y), d = y - c;
+    return ((a * c - high) + (a * d + b * c)) + b * d;
+}
+
+/* power[k] = x^k, each rounded once only */
+static void isogi_sh__exact_powers(double *power, int count, double x) {
+    double high = 1, low = 0, p;
+    int k;
+    for (k = 0; k < count; k++) {
+        power[k] = high;
+        p = high * x;
+        low = low * x + isogi_sh__product_rest(high, x, p);
+        high = p + low;
+        low = (p - high) + low;
+    }
+}
+
+static void isogi_sh__wigner_start(isogi_sh__wigner *w, int order, const isogi_sh__euler *e) {
+    double half_c, half_s, cc, ss, before = 1;
+    int l;
+    if (e->b[0] > 0) half_c = sqrt(0.5 * (1 + e->b[0])), half_s = e->b[1] / (2 * half_c);
+    else half_s = sqrt(0.5 * (1 - e->b[0])), half_c = e->b[1] / (2 * half_s);
+    cc = half_c * half_c, ss = half_s * half_s;
+    w->excess = cc > ss ? ((cc - 1) + ss) : ((ss - 1) + cc);
+    w->less_low = isogi_sh__product_rest(half_s, half_s, ss), w->more_low = isogi_sh__product_rest(half_c, half_c, cc);
+    w->excess += w->less_low + w->more_low;
+    w->less_low = 2 * (w->less_low - ss * w->excess);
+    w->more_low = 2 * (w->more_low - cc * w->excess);
+    isogi_sh__powers(w->a, order, e->a[0], e->a[1]);
+    isogi_sh__powers(w->c, order, e->c[0], e->c[1]);
+    isogi_sh__exact_powers(w->cosine, 2 * order, half_c);
+    isogi_sh__exact_powers(w->sine, 2 * order, -half_s);
+    w->less = 2 * ss;
+    w->more = 2 * cc;
+    for (l = 1; l < order; l++) {
+        double a = sqrt((double)(4 * l * l - 1)) / (double)l;
+        w->zonal[l][0] = a;
+        w->zonal[l][1] = -a / before;
+        before = a;
+    }
+}
+
+/* The 2x2 block of rows (cos, sin) n and columns (cos, sin) m of degree l, from A = d and B = (-1)^m' d of the other sign:
+   Z(a) diag(A + B, A - B) Z(c) with p = n a + m c, q = n a - m c. */
+static void isogi_sh__put_block(const isogi_sh__blocks *out, int at, int l, int n, int m, double a, double b, const double p[2], const double q[2]) {
+    int width = 2 * l + 1, plus = at + width * (l + n) + l, minus = at + width * (l - n) + l;
+    isogi_sh__put(out, plus + m, a * p[0] + b * q[0]);
+    isogi_sh__put(out, plus - m, b * q[1] - a * p[1]);
+    isogi_sh__put(out, minus + m, a * p[1] + b * q[1]);
+    isogi_sh__put(out, minus - m, a * p[0] - b * q[0]);
+}
+
+static void isogi_sh__turn_product(double p[2], const double a[2], const double c[2], double sign) {
+    p[0] = a[0] * c[0] - sign * a[1] * c[1];
+    p[1] = a[1] * c[0] + sign * a[0] * c[1];
+}
+
+/* Entries (n, m) and (m, n) of all degrees, n <= m, m > 0, by the recursion over l with n and m fixed:
+   (l-1)(2l+1) d_l = a_lm a_ln (l(l-1) cos b - n m) d_{l-1} - l (2l-3) b_lm b_ln d_{l-2}, a and b as in the table. The bracket is
+   taken from 1 - cos b or 1 + cos b, which are exact where it is small. */
+static void isogi_sh__wigner_pair(const isogi_sh__blocks *out, int order, int n, int m, const isogi_sh__wigner *w) {
+    const double *fm = isogi_sh__table(m) + 1, *fn = n ? isogi_sh__table(n) + 1 + 2 * (m - n) : w->zonal[m + 1];
+    double start = fabs(isogi_sh__turn_f64[m * (m + 1) * (m + 2) / 6 - 1 + n * (m + 1) - n * (n - 1) / 2 + m - n]) * (n ? 0.5 : 0.70710678118654752440);
+    double near[2], far[2], across[2], back[2], a_before = 0, b_before = 0, a, b, sign = n & 1 ? -1 : 1, flip = (m + n) & 1 ? -1 : 1;
+    int l, at = m * (4 * m * m - 1) / 3;
+    start = ldexp(start, m) * (1 - (double)m * w->excess);
+    a = start * w->cosine[m + n] * w->sine[m - n];
+    b = start * w->cosine[m - n] * w->sine[m + n];
+    isogi_sh__turn_product(near, w->a[n], w->c[m], 1);
+    isogi_sh__turn_product(far, w->a[n], w->c[m], -1);
+    isogi_sh__turn_product(across, w->a[m], w->c[n], 1);
+    isogi_sh__turn_product(back, w->a[m], w->c[n], -1);
+    for (l = m;; l++) {
+        int width = 2 * l + 1, row = at + width * l + l;
+        double first, second, square, next;
+        if (n == 0) {
+            double value = 1.41421356237309504880 * a;
+            isogi_sh__put(out, row + m, value * near[0]);
+            isogi_sh__put(out, row - m, -value * near[1]);
+            isogi_sh__put(out, row + width * m, flip * value * across[0]);
+            isogi_sh__put(out, row - width * m, flip * value * across[1]);
+        } else {
+            isogi_sh__put_block(out, at, l, n, m, a, sign * b, near, far);
+            if (n != m) isogi_sh__put_block(out, at, l, m, n, flip * a, flip * sign * b, across, back);
+        }
+        if (l + 1 == order) break;
+        at += width * width;
+        square = (double)(l * (l + 1));
+        first = fm[0] * fn[0] / (double)(l * (2 * l + 3));
+        second = fm[1] * fn[1] * (double)((l + 1) * (2 * l - 1)) / (double)(l * (2 * l + 3));
+        next = first * (((square - (double)(n * m)) - square * w->less) - square * w->less_low) * a - second * a_before;
+        a_before = a, a = next;
+        next = first * ((square * w->more - (square - (double)(n * m))) + square * w->more_low) * b - second * b_before;
+        b_before = b, b = next;
+        fm += 2, fn += 2;
+    }
+}
+
+static void isogi_sh__rotation_build_low(const isogi_sh__blocks *out, int order, const isogi_sh__euler *e) {
+    isogi_sh__wigner w;
+    double p = 1, difference = 0;
+    int l, m, n, at = 0;
+    isogi_sh__wigner_start(&w, order, e);
+    for (l = 0; l < order; l++) { /* n = m = 0: Legendre polynomials of cos b, by differences where it is near 1 */
+        if (w.less < 1) {
+            if (l) difference = ((double)(l - 1) * difference - (double)(2 * l - 1) * (w.less * p + w.less_low * p)) / (double)l, p += difference;
+            isogi_sh__put(out, at + 2 * l * (l + 1), p);
+        } else {
+            if (l) difference = ((double)(l - 1) * difference - (double)(2 * l - 1) * (w.more * p + w.more_low * p)) / (double)l, p += difference;
+            isogi_sh__put(out, at + 2 * l * (l + 1), l & 1 ? -p : p);
+        }
+        at += (2 * l + 1) * (2 * l + 1);
+    }
+    for (m = 1; m < order; m++)
+        for (n = 0; n <= m; n++) isogi_sh__wigner_pair(out, order, n, m, &w);
+}
+
 /* Columns of the matrices are rotated unit vectors. */
 static void isogi_sh__rotation_build(void *rotation, int is_double, int order, const isogi_sh__euler *e) {
     double band[2 * ISOGI_SH_MAX_ORDER * ISOGI_SH__TOGETHER], other[2 * ISOGI_SH_MAX_ORDER * ISOGI_SH__TOGETHER];
     isogi_sh__turns turns;
     size_t at = 0;
     int l, i, k, first;
+    if (order <= ISOGI_SH__TURNS + 1) {
+        isogi_sh__blocks out;
+        out.data = rotation, out.is_double = is_double;
+        isogi_sh__rotation_build_low(&out, order, e);
+        return;
+    }
     isogi_sh__turns_start(&turns, order, e);
     for (l = 0; l < order; l++) {
         int width = 2 * l + 1;
