@@ -2222,6 +2222,10 @@ static int isogi_vol__walk_fast(isogi_vol__walk *w, const isogi_vol__ticks *k, i
    their numbers x + 4y + 16z. Times of planes come from the one formula that cells use; the lowest two bits are replaced by the axis,
    which makes all of them different: a strict order, the same for all nodes and levels, hence face by face connected. */
 #ifdef ISOGI_VOL__AVX
+#ifndef __clang__
+#pragma GCC diagnostic push
+#pragma GCC diagnostic ignored "-Wmaybe-uninitialized" /* gcc 12 says so of its own undefined vectors */
+#endif
 #define ISOGI_VOL__AVX512 ISOGI_VOL__TARGET("avx512f,avx512bw,avx512dq,avx512vl,avx512bitalg")
 #define ISOGI_VOL__WAVE 32
 #define ISOGI_VOL__WAVE_NODES 16384 /* 2 MB */
@@ -2486,6 +2490,9 @@ ISOGI_VOL__AVX512 static void isogi_vol__trace_wave(isogi_vol__batch *b, size_t 
         cells = kept;
     } while (nodes || cells || next < count);
 }
+#ifndef __clang__
+#pragma GCC diagnostic pop
+#endif
 #endif
 
 static isogi_result isogi_vol__trace(isogi_vol__batch *b, size_t count, isogi_counters *counters) {
