@@ -335,6 +335,13 @@ ISOGI_API isogi_result isogi_sh_fit_directional(float direction[3], float rgb[3]
 #if !defined(ISOGI_NO_SIMD) && defined(__x86_64__) && (defined(__clang__) || (defined(__GNUC__) && __GNUC__ >= 12))
 #define ISOGI_SH__SIMD 1
 #endif
+#if defined(__clang__)
+#define ISOGI_SH__UNROLL _Pragma("unroll 5")
+#elif defined(__GNUC__) && __GNUC__ >= 8
+#define ISOGI_SH__UNROLL _Pragma("GCC unroll 5")
+#else
+#define ISOGI_SH__UNROLL
+#endif
 
 /* ==== numbers ======================================================================================================== */
 
@@ -868,9 +875,7 @@ typedef int64_t isogi_sh__l8 __attribute__((vector_size(64), aligned(8), may_ali
 #define ISOGI_SH__ALL8 (unsigned char)0xff
 #if defined(__clang__)
 #define ISOGI_SH__ALL16 (unsigned short)0xffff
-#define ISOGI_SH__UNROLL _Pragma("unroll 5")
 #else
-#define ISOGI_SH__UNROLL _Pragma("GCC unroll 5")
 #define ISOGI_SH__ALL16 (short)-1
 #endif
 #define ISOGI_SH__FMA_F16(a, b, c) ((isogi_sh__f16)__builtin_ia32_vfmaddps512_mask(a, b, c, ISOGI_SH__ALL16, 4))
@@ -1748,9 +1753,46 @@ ISOGI_API isogi_result isogi_sh_rotation_build(float *rotation, int order, const
     return ISOGI_OK;
 }
 
+#ifdef ISOGI_SH__SIMD
+/* One channel of order 5: the 24 rows of degrees 1 to 4 times their band, eight products each, summed by turning 8 x 8 tiles. What
+   is loaded past a row meets zeros; the ninth column of degree 4 is added last. */
+ISOGI_SH__AVX2 static void isogi_sh__apply_order5(float *out, const float *in, const float *rotation) {
+    static const int32_t mask[4][8] = {
+        {-1, -1, -1, 0, 0, 0, 0, 0}, {-1, -1, -1, -1, -1, 0, 0, 0}, {-1, -1, -1, -1, -1, -1, -1, 0}, {-1, -1, -1, -1, -1, -1, -1, -1}};
+    isogi_sh__f8 products[24], turned[8], band;
+    int i;
+#define ISOGI_SH__BAND(l) band = (isogi_sh__f8)((isogi_sh__i8) * (const isogi_sh__f8 *)(in + l * l) & *(const isogi_sh__i8 *)mask[l - 1])
+#define ISOGI_SH__ROW(l, i) products[l * l - 1 + i] = *(const isogi_sh__f8 *)(rotation + l * (4 * l * l - 1) / 3 + (2 * l + 1) * i) * band
+    out[0] = rotation[0] * in[0];
+    ISOGI_SH__BAND(1);
+    ISOGI_SH__ROW(1, 0), ISOGI_SH__ROW(1, 1), ISOGI_SH__ROW(1, 2);
+    ISOGI_SH__BAND(2);
+    ISOGI_SH__ROW(2, 0), ISOGI_SH__ROW(2, 1), ISOGI_SH__ROW(2, 2), ISOGI_SH__ROW(2, 3), ISOGI_SH__ROW(2, 4);
+    ISOGI_SH__BAND(3);
+    ISOGI_SH__ROW(3, 0), ISOGI_SH__ROW(3, 1), ISOGI_SH__ROW(3, 2), ISOGI_SH__ROW(3, 3), ISOGI_SH__ROW(3, 4), ISOGI_SH__ROW(3, 5);
+    ISOGI_SH__ROW(3, 6);
+    ISOGI_SH__BAND(4);
+    ISOGI_SH__ROW(4, 0), ISOGI_SH__ROW(4, 1), ISOGI_SH__ROW(4, 2), ISOGI_SH__ROW(4, 3), ISOGI_SH__ROW(4, 4), ISOGI_SH__ROW(4, 5);
+    ISOGI_SH__ROW(4, 6), ISOGI_SH__ROW(4, 7), ISOGI_SH__ROW(4, 8);
+#undef ISOGI_SH__BAND
+#undef ISOGI_SH__ROW
+    for (i = 0; i < 24; i += 8) {
+        isogi_sh__transpose_f8((float *)turned, 8, (const float *)(products + i), 8);
+        *(isogi_sh__f8 *)(out + 1 + i) = ((turned[0] + turned[1]) + (turned[2] + turned[3])) + ((turned[4] + turned[5]) + (turned[6] + turned[7]));
+    }
+    for (i = 0; i < 9; i++) out[16 + i] += rotation[ISOGI_SH_ROTATION_COUNT(4) + 8 + 9 * (size_t)i] * in[24];
+}
+#endif
+
 ISOGI_API isogi_result isogi_sh_rotation_apply(float *out, const float *in, int order, int channels, const float *rotation) {
     int l, i, j, k;
     if (!out || !in || !rotation || !isogi_sh__shape_ok(order, channels)) return ISOGI_INVALID;
+#ifdef ISOGI_SH__SIMD
+    if (order == 5 && channels == 1 && isogi_sh__level()) {
+        isogi_sh__apply_order5(out, in, rotation);
+        return ISOGI_OK;
+    }
+#endif
     for (l = 0; l < order; l++) {
         int width = 2 * l + 1, base = channels * l * l;
         for (i = 0; i < width; i++, rotation += width)
@@ -1915,10 +1957,43 @@ ISOGI_API isogi_result isogi_sh_cosine_zonal(float *zonal, int order) {
     return ISOGI_OK;
 }
 
+/* Order 5, unrolled: the recursion of the basis with the lobe's factors instead of a sum over channels. */
+static void isogi_sh__zonal_order5(float *c, const float *zonal, isogi_sh__unit u) {
+    static const double factor[5] = {3.5449077018110321, 2.0466534158929770, 1.5853309190424045, 1.3398491713813586, 1.1816359006036774};
+    double scale[5], cm = 1, sm = 0, z = u.z + u.z_low, t;
+    const double *table = isogi_sh__table_f64;
+    int l, m;
+    ISOGI_SH__UNROLL
+    for (l = 0; l < 5; l++) scale[l] = factor[l] * (double)zonal[l];
+    c[0] = (float)(scale[0] * table[2]);
+    c[2] = (float)(scale[1] * table[5] * z);
+    c[6] = (float)(scale[2] * table[8] * (1.5 * z * z - 0.5));
+    c[12] = (float)(scale[3] * table[11] * z * (2.5 * z * z - 1.5));
+    c[20] = (float)(scale[4] * table[14] * ((4.375 * z * z - 3.75) * z * z + 0.375));
+    ISOGI_SH__UNROLL
+    for (m = 1; m < 5; m++) {
+        const double *pair = table + 3 * ISOGI_SH__TABLE_ORDER + (m - 1) * (2 * ISOGI_SH__TABLE_ORDER - 1 - m);
+        double q = *pair++, before = 0;
+        t = u.x * cm - u.y * sm;
+        sm = u.x * sm + u.y * cm;
+        cm = t;
+        ISOGI_SH__UNROLL
+        for (l = m; l < 5; l++) {
+            if (l > m) t = pair[0] * (z * q) + pair[1] * before, before = q, q = t, pair += 2;
+            c[l * (l + 1) + m] = (float)(scale[l] * q * cm);
+            c[l * (l + 1) - m] = (float)(scale[l] * q * sm);
+        }
+    }
+}
+
 ISOGI_API isogi_result isogi_sh_zonal_to_direction(float *c, int order, const float *zonal, const float direction[3]) {
     double scale[ISOGI_SH_MAX_ORDER], one = 1;
     int l, i;
     if (!c || !zonal || !direction || !isogi_sh__order_ok(order)) return ISOGI_INVALID;
+    if (order == 5) {
+        isogi_sh__zonal_order5(c, zonal, isogi_sh__normalise((double)direction[0], (double)direction[1], (double)direction[2]));
+        return ISOGI_OK;
+    }
     for (l = 0; l < order; l++) scale[l] = isogi_sh__zonal_factor(l) * (double)zonal[l];
     for (i = 0; i < order * order; i++) c[i] = 0;
     isogi_sh__add_lobe(c, order, 1, scale, isogi_sh__normalise((double)direction[0], (double)direction[1], (double)direction[2]), &one);
