@@ -7,11 +7,11 @@ failed=0
 
 # NAME CAPTION VIEWER_ARGUMENTS...
 picture() {
-    name=$1 caption=$2
+    file=$out/$1.png caption=$2
     shift 2
     since=$(date +%s)
     echo "$caption"
-    if build/viewer "$@" --out "$out/$name.png"; then echo "    $out/$name.png   $(($(date +%s) - since)) s"
+    if build/viewer "$@" --out "$file"; then echo "    $file   $(($(date +%s) - since)) s"
     else failed=1
     fi
 }
@@ -29,5 +29,6 @@ else
     picture gyroid "A gyroid: most of its light has been reflected a few times" procedural:gyroid --size 640x640
     picture hydrogen "A hydrogen orbital, volume rendered, shaded by what each point sees of the sky" procedural:hydrogen --mode dvr
 fi
-echo "$(($(date +%s) - begun)) s in all; VOLUME=FILE [ISO=VALUE] shows a volume of your own: make demo VOLUME=head_256x256x99_uint8.raw"
+echo "$(($(date +%s) - begun)) s in all"
+[ "$VOLUME" ] || echo "A volume of your own: make demo VOLUME=head_256x256x99_uint8.raw ISO=130"
 exit $failed
