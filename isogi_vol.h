@@ -311,6 +311,7 @@ ISOGI_API void isogi_vol_mesh_free(const isogi_pyramid *pyramid, isogi_mesh *mes
 #endif
 #if defined(ISOGI_VOL__SSE2) && defined(__x86_64__) && (defined(__GNUC__) || defined(__clang__)) && !defined(__TINYC__)
 #define ISOGI_VOL__AVX
+#define ISOGI_VOL__TARGET(features) __attribute__((target(features)))
 #include <immintrin.h>
 #endif
 enum { ISOGI_VOL__PATH_PLAIN = 1, ISOGI_VOL__PATH_BASE, ISOGI_VOL__PATH_AVX2, ISOGI_VOL__PATH_AVX512 };
@@ -532,11 +533,12 @@ static double isogi_vol__clamp(double x, double high) {
 
 /* The cell of a grid coordinate that lies in [0, voxels - 1], and the place in it; the last cell is closed. */
 static int isogi_vol__cell(double x, size_t voxels, double *local) {
-    int last = voxels > 1 ? (int)(voxels - 2) : 0, i;
-    x = isogi_vol__clamp(x, (double)(voxels - 1));
+    const int end = (int)voxels - 1, last = end > 0 ? end - 1 : 0;
+    int i;
+    x = isogi_vol__clamp(x, end);
     i = (int)x;
-    if (i > last) i = last;
-    if (i < 0) i = 0;
+    i = i > last ? last : i;
+    i = i < 0 ? 0 : i;
     *local = x - i;
     return i;
 }
@@ -1246,11 +1248,73 @@ static void isogi_vol__bspline_weights(int i, double u, size_t voxels, double w[
     }
 }
 
+#ifdef ISOGI_VOL__AVX
+ISOGI_VOL__TARGET("avx2") ISOGI_VOL__INLINE double isogi_vol__dot4(__m256d a, __m256d b) {
+    const __m256d p = _mm256_mul_pd(a, b);
+    const __m128d q = _mm_add_pd(_mm256_castpd256_pd128(p), _mm256_extractf128_pd(p, 1));
+    return _mm_cvtsd_f64(_mm_add_sd(q, _mm_unpackhi_pd(q, q)));
+}
+
+/* The four weights of an axis, or their derivatives, at once: the polynomials of bspline_weights in powers of u. */
+ISOGI_VOL__TARGET("avx2") ISOGI_VOL__INLINE __m256d isogi_vol__weights4(double at, __m256d *slopes) {
+    const __m256d u = _mm256_set1_pd(at), c0 = _mm256_setr_pd(1.0 / 6, 4.0 / 6, 1.0 / 6, 0), c1 = _mm256_setr_pd(-0.5, 0, 0.5, 0);
+    const __m256d c2 = _mm256_setr_pd(0.5, -1, 0.5, 0), c3 = _mm256_setr_pd(-1.0 / 6, 0.5, -0.5, 1.0 / 6);
+    const __m256d two = _mm256_set1_pd(2), three = _mm256_set1_pd(3);
+    *slopes = _mm256_add_pd(_mm256_mul_pd(_mm256_add_pd(_mm256_mul_pd(_mm256_mul_pd(three, c3), u), _mm256_mul_pd(two, c2)), u), c1);
+    return _mm256_add_pd(_mm256_mul_pd(_mm256_add_pd(_mm256_mul_pd(_mm256_add_pd(_mm256_mul_pd(c3, u), c2), u), c1), u), c0);
+}
+
+/* The sums below where all taps exist, a row at a time: rows are weighted along y and z first, x comes last. Packed floats only. */
+ISOGI_VOL__TARGET("avx2") static double isogi_vol__bspline_avx2(const isogi_volume *v, const int cell[3], const double local[3], double gradient[3]) {
+    __m256d dx, dy, dz;
+    const __m256d wx = isogi_vol__weights4(local[0], &dx), wy = isogi_vol__weights4(local[1], &dy), wz = isogi_vol__weights4(local[2], &dz);
+    const __m256d scale = _mm256_set1_pd(v->scale), bias = _mm256_set1_pd(v->bias);
+    __m256d all = _mm256_setzero_pd(), by_y = all, by_z = all;
+    const char *p = (const char *)v->data + (cell[0] - 1) * v->stride[0] + (cell[1] - 1) * v->stride[1] + (cell[2] - 1) * v->stride[2];
+#define ISOGI_VOL__LANE(m, i) _mm256_permute4x64_pd(m, 0x55 * (i))
+#define ISOGI_VOL__ROW(j) _mm256_cvtps_pd(_mm_loadu_ps((const float *)(const void *)(p + (j) * v->stride[1])))
+#define ISOGI_VOL__SLICE(k)                                                                                                                \
+    do {                                                                                                                                   \
+        const __m256d row0 = ISOGI_VOL__ROW(0), row1 = ISOGI_VOL__ROW(1), row2 = ISOGI_VOL__ROW(2), row3 = ISOGI_VOL__ROW(3);              \
+        const __m256d slice = _mm256_add_pd(_mm256_add_pd(_mm256_mul_pd(wy0, row0), _mm256_mul_pd(wy1, row1)),                             \
+                                            _mm256_add_pd(_mm256_mul_pd(wy2, row2), _mm256_mul_pd(wy3, row3)));                            \
+        const __m256d slope = _mm256_add_pd(_mm256_add_pd(_mm256_mul_pd(dy0, row0), _mm256_mul_pd(dy1, row1)),                             \
+                                            _mm256_add_pd(_mm256_mul_pd(dy2, row2), _mm256_mul_pd(dy3, row3)));                            \
+        all = _mm256_add_pd(all, _mm256_mul_pd(ISOGI_VOL__LANE(wz, k), slice));                                                            \
+        by_y = _mm256_add_pd(by_y, _mm256_mul_pd(ISOGI_VOL__LANE(wz, k), slope));                                                          \
+        by_z = _mm256_add_pd(by_z, _mm256_mul_pd(ISOGI_VOL__LANE(dz, k), slice));                                                          \
+        p += v->stride[2];                                                                                                                 \
+    } while (0)
+    {
+        const __m256d wy0 = ISOGI_VOL__LANE(wy, 0), wy1 = ISOGI_VOL__LANE(wy, 1), wy2 = ISOGI_VOL__LANE(wy, 2), wy3 = ISOGI_VOL__LANE(wy, 3);
+        const __m256d dy0 = ISOGI_VOL__LANE(dy, 0), dy1 = ISOGI_VOL__LANE(dy, 1), dy2 = ISOGI_VOL__LANE(dy, 2), dy3 = ISOGI_VOL__LANE(dy, 3);
+        ISOGI_VOL__SLICE(0);
+        ISOGI_VOL__SLICE(1);
+        ISOGI_VOL__SLICE(2);
+        ISOGI_VOL__SLICE(3);
+    }
+#undef ISOGI_VOL__LANE
+#undef ISOGI_VOL__ROW
+#undef ISOGI_VOL__SLICE
+    /* weights sum to 1 and slopes to 0: the bias enters the value only */
+    gradient[0] = isogi_vol__dot4(_mm256_mul_pd(all, scale), dx), gradient[1] = isogi_vol__dot4(_mm256_mul_pd(by_y, scale), wx);
+    gradient[2] = isogi_vol__dot4(_mm256_mul_pd(by_z, scale), wx);
+    return isogi_vol__dot4(_mm256_add_pd(_mm256_mul_pd(all, scale), bias), wx);
+}
+#endif
+
 /* Cubic B-spline value and gradient (per grid unit) at a cell and a place in it: 64 taps in one pass, row by row. */
 static double isogi_vol__bspline(const isogi_pyramid *p, const int cell[3], const double local[3], double gradient[3]) {
     const isogi_volume *v = &p->volume;
     double w[3][4], d[3][4], value = 0, gx = 0, gy = 0, gz = 0;
     int tap[3][4], a, j, k;
+#ifdef ISOGI_VOL__AVX
+    if (v->type == ISOGI_F32 && v->stride[0] == 4 && p->path >= ISOGI_VOL__PATH_AVX2) {
+        int inner = 1;
+        for (a = 0; a < 3; a++) inner &= cell[a] > 0 && (size_t)cell[a] + 2 < v->size[a];
+        if (inner) return isogi_vol__bspline_avx2(v, cell, local, gradient);
+    }
+#endif
     for (a = 0; a < 3; a++) isogi_vol__bspline_weights(cell[a], local[a], v->size[a], w[a], d[a], tap[a]);
     for (k = 0; k < 4; k++) {
         double slice = 0, slice_x = 0, slice_y = 0;
@@ -1269,10 +1333,30 @@ static double isogi_vol__bspline(const isogi_pyramid *p, const int cell[3], cons
     return value;
 }
 
-/* The world point's cell and place in it, moved to the border if outside. */
-static void isogi_vol__locate(const isogi_pyramid *p, const float point[3], int cell[3], double local[3]) {
+#ifdef ISOGI_VOL__AVX
+/* As below, four at a time. */
+ISOGI_VOL__TARGET("avx2") static void isogi_vol__locate_avx2(const isogi_pyramid *p, const float point[3], int cell[4], double local[4]) {
+    const __m256d box = _mm256_loadu_pd(p->box), zero = _mm256_setzero_pd();
+    __m256d g = _mm256_mul_pd(_mm256_loadu_pd(p->grid_axis[0]), _mm256_set1_pd((double)point[0] - p->volume.origin[0])), floor4;
+    g = _mm256_add_pd(g, _mm256_mul_pd(_mm256_loadu_pd(p->grid_axis[1]), _mm256_set1_pd((double)point[1] - p->volume.origin[1])));
+    g = _mm256_add_pd(g, _mm256_mul_pd(_mm256_loadu_pd(p->grid_axis[2]), _mm256_set1_pd((double)point[2] - p->volume.origin[2])));
+    g = _mm256_min_pd(_mm256_max_pd(g, zero), box); /* NaN gives 0 */
+    floor4 = _mm256_max_pd(_mm256_min_pd(_mm256_floor_pd(g), _mm256_sub_pd(box, _mm256_set1_pd(1))), zero);
+    _mm_storeu_si128((__m128i *)(void *)cell, _mm_max_epi32(_mm256_cvttpd_epi32(floor4), _mm_setzero_si128())); /* whatever -ffast-math does */
+    _mm256_storeu_pd(local, _mm256_sub_pd(g, floor4));
+}
+#endif
+
+/* The world point's cell and place in it, moved to the border if outside. The fourth numbers mean nothing. */
+static void isogi_vol__locate(const isogi_pyramid *p, const float point[3], int cell[4], double local[4]) {
     double world[3], grid[3];
     int a;
+#ifdef ISOGI_VOL__AVX
+    if (p->path >= ISOGI_VOL__PATH_AVX2) {
+        isogi_vol__locate_avx2(p, point, cell, local);
+        return;
+    }
+#endif
     for (a = 0; a < 3; a++) world[a] = (double)point[a];
     isogi_vol_to_grid(p, world, grid);
     for (a = 0; a < 3; a++) cell[a] = isogi_vol__cell(grid[a], p->volume.size[a], &local[a]);
@@ -1283,8 +1367,8 @@ static isogi_result isogi_vol__sample(const isogi_pyramid *p, int smooth, const 
     size_t i;
     if (!p || (count && !points)) return ISOGI_INVALID;
     for (i = 0; i < count; i++) {
-        double local[3], value, gradient[3], corner[8];
-        int cell[3], a;
+        double local[4], value, gradient[3], corner[8];
+        int cell[4], a;
         isogi_vol__locate(p, points[i], cell, local);
         if (smooth) value = isogi_vol__bspline(p, cell, local, gradient);
         else isogi_vol__corners(p, cell, 0, corner), value = isogi_vol__trilinear(corner, local, gradient);
@@ -1661,8 +1745,6 @@ static int isogi_vol__walk_on(isogi_vol__walk *w, uint32_t flags, isogi_hit *hit
 /* Chosen when a pyramid is built. AVX2 does the plain code's operations in the plain code's order, four at a time and without fused
    multiply-adds, hence gives its bits; AVX-512 only compares bytes. */
 #ifdef ISOGI_VOL__AVX
-#define ISOGI_VOL__TARGET(features) __attribute__((target(features)))
-
 static int isogi_vol__machine(void) {
     __builtin_cpu_init();
     if (!__builtin_cpu_supports("avx2")) return ISOGI_VOL__PATH_BASE;
@@ -1872,13 +1954,14 @@ ISOGI_VOL__TARGET("avx2") static int isogi_vol__aim_avx2(isogi_vol__walk *w, con
     const isogi_pyramid *p = w->pyramid;
     const __m256d zero = _mm256_setzero_pd(), unlimited = _mm256_set1_pd(ISOGI_VOL__UNLIMITED), minus = _mm256_set1_pd(-0.0);
     const __m256d box = _mm256_loadu_pd(p->box);
+    const __m256i infinite = _mm256_set1_epi64x(0x7ff0000000000000);
     __m256d d, size, keep, inverse, rising, near, far, still, t0, t1, origin = _mm256_loadu_pd(w->origin);
     double enter, leave;
     d = _mm256_mul_pd(_mm256_loadu_pd(p->grid_axis[0]), _mm256_set1_pd((double)dir[0]));
     d = _mm256_add_pd(d, _mm256_mul_pd(_mm256_loadu_pd(p->grid_axis[1]), _mm256_set1_pd((double)dir[1])));
     d = _mm256_add_pd(d, _mm256_mul_pd(_mm256_loadu_pd(p->grid_axis[2]), _mm256_set1_pd((double)dir[2])));
     size = _mm256_andnot_pd(minus, d);
-    if (_mm256_movemask_pd(_mm256_cmp_pd(size, _mm256_set1_pd(DBL_MAX), _CMP_LE_OQ)) != 15) return 0;
+    if (_mm256_movemask_pd(_mm256_castsi256_pd(_mm256_cmpeq_epi64(_mm256_and_si256(_mm256_castpd_si256(d), infinite), infinite)))) return 0;
     keep = _mm256_max_pd(size, _mm256_permute2f128_pd(size, size, 1));
     keep = _mm256_max_pd(keep, _mm256_permute_pd(keep, 5));
     if (!(_mm256_cvtsd_f64(keep) > 0)) return 0;

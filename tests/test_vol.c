@@ -691,9 +691,15 @@ static real voxel_continued(field *f, int i, int j, int k) {
 
 TEST(bspline_agrees_with_its_definition) {
     test_random r = {14};
-    for (int v = 0; v < 20; v++) {
+    for (int v = 0; v < 40; v++) {
         field f = field_new(2 + (int)(random_bits(&r) % 5), 2 + (int)(random_bits(&r) % 5), 2 + (int)(random_bits(&r) % 5));
+        int voxels = f.size[0] * f.size[1] * f.size[2];
+        float *raw = (float *)malloc((size_t)voxels * sizeof *raw);
         field_fill(&f, NOISE, &r);
+        if (v & 1) { /* floats, scaled */
+            for (int i = 0; i < voxels; i++) raw[i] = (float)f.value[i], f.value[i] = 0.25 * (double)raw[i] + 3;
+            f.volume.data = raw, f.volume.type = ISOGI_F32, f.volume.scale = 0.25, f.volume.bias = 3;
+        }
         for (int a = 0; a < 3; a++) f.volume.spacing[a] = random_range(&r, 0.2, 3);
         field_build(&f);
         for (int i = 0; i < 200; i++) {
@@ -720,6 +726,7 @@ TEST(bspline_agrees_with_its_definition) {
             }
         }
         field_free(&f);
+        free(raw);
     }
 }
 
