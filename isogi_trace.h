@@ -52,8 +52,8 @@
                             its isovalue v is the trilinear value there: it lies on its own isosurface.
      Normal                 of the smoothed (B-spline) or the trilinear field there, desc.normals, towards lower values.
      Start of rays          desc.offset voxels along the normal; where the trilinear field is still inside there, twice and four times
-                            as far, up to one voxel; where that fails, on the surface itself. A ray that then goes into matter counts
-                            as reflected where it starts.
+                            as far, up to one voxel; where that fails, on the surface itself, directions mirrored as at hits. A ray that
+                            goes into matter all the same counts as reflected where it starts.
      Validity               A texel is left out of every lookup where no surface passes at its place: none of the voxels of the cells
                             around it is lower than v (constant air, local minima: there f >= v all around, such a texel would see the
                             sky through everything), where a voxel is not finite, or where the gradient vanishes. With desc.capped the
@@ -127,7 +127,7 @@ typedef struct isogi_trace_desc {
     int bounces;               /* 0 = light that arrives directly; n = up to n reflections; -1 = all (Russian roulette) */
     int samples;               /* paths per texel; 0 = 64 */
     uint64_t seed;
-    float offset;              /* rays start this many voxels along the normal, up to 16; 0 = 0.25; negative = on the surface */
+    float offset;              /* rays start this many voxels along the normal, up to 1 (a wall may be that thin); 0 = 0.25; negative = on the surface */
     isogi_normal_kind normals; /* of the hemisphere that is integrated over */
     double isovalue_min, isovalue_max; /* only texels that a surface within this interval reads; both 0 = all */
     int lazy;                  /* non-zero: only texels that were requested (and that the interval, if there is one, reads) */
@@ -642,6 +642,7 @@ typedef struct isogi_trace__site {
     float normal[3];
     double origin[3]; /* of its rays, world */
     int on_surface;   /* the rays leave from `place` itself */
+    float geometric[3]; /* then: the trilinear normal; directions below it are mirrored, as at every later vertex */
     int open;         /* the origin lies beyond an open border: what a ray meets first may be a surface seen from within */
     uint64_t key;
 } isogi_trace__site;
@@ -712,6 +713,17 @@ static void isogi_trace__site_start(const isogi_trace__scene *scene, isogi_trace
     }
     for (a = 0; a < 3; a++) n[a] = site->place.cell[a] + site->place.local[a];
     isogi_vol_to_world(scene->pyramid, n, site->origin);
+    site->place.side = 1;
+    isogi_vol_normals(scene->pyramid, &site->place, 1, ISOGI_NORMAL_TRILINEAR, &site->geometric);
+    if (!(isogi_trace__dot(site->geometric, site->normal) > 0)) memcpy(site->geometric, site->normal, sizeof site->geometric);
+}
+
+/* The kernel of the first integral, cosine / pi for rays that begin off the surface, times pi. */
+static double isogi_trace__site_kernel(const isogi_trace__site *site, const float dir[3]) {
+    double cosine;
+    if (site->on_surface) return isogi_trace__kernel(site->normal, site->geometric, dir);
+    cosine = isogi_trace__dot(site->normal, dir);
+    return cosine > 0 ? cosine : 0;
 }
 
 /* ==== paths ========================================================================================================== */
@@ -786,10 +798,8 @@ static void isogi_trace__shadows_flush(isogi_trace__wave *w, isogi_trace__shadow
 
 /* pi times the density of the directions that leave path i's vertex. */
 static double isogi_trace__cosine_at(const isogi_trace__wave *w, int i, int depth, const float dir[3]) {
-    double cosine;
-    if (depth) return isogi_trace__kernel((const float *)w->shading[i], (const float *)w->geometric[i], dir);
-    cosine = isogi_trace__dot(w->site->normal, dir);
-    return cosine > 0 ? cosine : 0;
+    return depth ? isogi_trace__kernel((const float *)w->shading[i], (const float *)w->geometric[i], dir)
+                 : isogi_trace__site_kernel(w->site, dir);
 }
 
 static void isogi_trace__shadows_add(isogi_trace__wave *w, isogi_trace__shadows *s, int i, const float dir[3], double tmax,
@@ -920,7 +930,8 @@ static void isogi_trace__wave_begin(isogi_trace__wave *w, int first, int count) 
         w->start[i] = site->place, w->from[i] = site->open ? 0 : 1;
         isogi_trace__sobol(site->key, (uint32_t)(first + i), u);
         isogi_trace__cosine(site->normal, u[0], u[1], w->dir[i]);
-        w->density[i] = isogi_trace__dot(site->normal, (const float *)w->dir[i]);
+        if (site->on_surface) isogi_trace__mirror(site->geometric, w->dir[i]);
+        w->density[i] = isogi_trace__site_kernel(site, (const float *)w->dir[i]);
         for (c = 0; c < 3; c++) w->through[i][c] = 1, w->light[i][c] = 0;
     }
 }
@@ -971,7 +982,7 @@ static void isogi_trace__site_lights(const isogi_trace__scene *scene, const isog
         double cosine;
         if (!isogi_trace__is_delta(&lighting->lights[l])) continue;
         if (!isogi_trace__light_beam(&lighting->lights[l], site->origin, 0, 0, &beam)) continue;
-        cosine = isogi_trace__dot(site->normal, beam.dir);
+        cosine = isogi_trace__site_kernel(site, beam.dir);
         if (!(cosine > 0)) continue;
         isogi_trace__site_rays(scene, site, (const float(*)[3]) & beam.dir, &beam.tmax, 1, &hit, counters);
         for (c = 0; c < 3 && !hit.side; c++) rgb[c] += beam.rgb[c] * cosine;
@@ -1070,7 +1081,7 @@ static int isogi_trace__desc_valid(const isogi_trace_desc *d) {
     if (d->order < 0 || d->order > ISOGI_TRACE__MAX_ORDER || d->bounces < -1 || d->samples < 0 || d->samples > 1 << 24)
         return 0;
     if (d->transfer_channels != 0 && d->transfer_channels != 1 && d->transfer_channels != 3) return 0;
-    if (!isogi_trace__finite((double)d->offset) || d->offset > 16) return 0;
+    if (!isogi_trace__finite((double)d->offset) || d->offset > 1) return 0;
     if (!isogi_trace__finite(d->isovalue_min) || !isogi_trace__finite(d->isovalue_max) || d->isovalue_min > d->isovalue_max)
         return 0;
     if (!isogi_trace__finite3(d->lattice_min) || !isogi_trace__finite3(d->lattice_max)) return 0;
@@ -1185,7 +1196,7 @@ static int isogi_trace__in_range(const isogi_trace *t, const size_t low[3], cons
     const isogi_volume *v = t->scene.volume;
     size_t first[3], last[3], voxels = 1;
     double range[2];
-    int a;
+    int a, cut = 0; /* the cap of the border closes surfaces without any value below them */
     if (isogi_trace__zero(d->isovalue_min) && isogi_trace__zero(d->isovalue_max)) return 1;
     for (a = 0; a < 3; a++) {
         double end = (double)(v->size[a] - 1);
@@ -1193,13 +1204,14 @@ static int isogi_trace__in_range(const isogi_trace *t, const size_t low[3], cons
         last[a] = (size_t)isogi_trace__clamp(ceil(t->first[a] + ((double)high[a] + 1) * t->step[a]), end);
         if (low[a] == 0) first[a] = 0;
         if (high[a] + 1 >= t->lattice[a]) last[a] = v->size[a] - 1;
+        cut |= d->capped && (first[a] == 0 || last[a] == v->size[a] - 1);
         voxels *= last[a] - first[a] + 1;
     }
     isogi_trace__block_range(t->scene.pyramid, first, last, range);
-    if (!(range[0] < d->isovalue_max && range[1] >= d->isovalue_min)) return 0;
+    if (!((cut || range[0] < d->isovalue_max) && range[1] >= d->isovalue_min)) return 0;
     if (voxels > 125) return 1;
     isogi_trace__voxel_range(v, first, last, range);
-    return range[0] < d->isovalue_max && range[1] >= d->isovalue_min;
+    return (cut || range[0] < d->isovalue_max) && range[1] >= d->isovalue_min;
 }
 
 static int isogi_trace__classify(const isogi_trace *t, const size_t texel[3]) {
@@ -1647,7 +1659,12 @@ static void isogi_trace__bake_task(void *arg, size_t task) {
         const isogi_trace__ref *ref = &t->batch[i];
         const size_t *x = ref->texel;
         isogi_trace__site site;
-        if (!isogi_trace__texel_site(t, x, &site)) continue; /* cannot be: it was classified by the same function */
+        if (!isogi_trace__texel_site(t, x, &site)) {
+            /* only where the voxels were changed after they were classified, which breaks the contract but must not hang */
+            ref->brick->state[ref->slot] = ISOGI_TRACE__NO_SURFACE;
+            counters->texels++;
+            continue;
+        }
         site.key = isogi_trace__key(isogi_trace__key(t->scene.desc.seed, 0),
                                     (uint64_t)x[0] +
                                         (uint64_t)t->lattice[0] * ((uint64_t)x[1] + (uint64_t)t->lattice[1] * (uint64_t)x[2]));

@@ -761,6 +761,59 @@ TEST(capped_border_is_a_surface) {
     scene_free(&s);
 }
 
+/* The cap closes every isovalue, though no voxel lies below the interval there: the interval must not leave its texels out. */
+static double block_falling_at_one_side(const double p[3], const double *unused) {
+    (void)unused;
+    return p[0] < 4 ? 100 - 20 * (4 - p[0]) : 100;
+}
+
+TEST(capped_border_is_lit_within_an_isovalue_range) {
+    scene s = scene_make(16, 14, 14, NULL, block_falling_at_one_side, NULL);
+    isogi_trace_desc d = desc_make(&s, 0.5f, 0, 16);
+    float points[2][3] = {{10, 13, 6}, {9, 5, 0}}, e[2][3];
+    d.capped = 1, d.isovalue_min = 45, d.isovalue_max = 55;
+    bake_and_sample(&d, NULL, (const float(*)[3])points, 2, e);
+    for (int i = 0; i < 2; i++) CHECK(fabs((double)e[i][0] - PI) < 0.01 * PI, "point %d: E %g", i, (double)e[i][0]);
+    scene_free(&s);
+}
+
+/* Rough ground that reaches the open border, light from below the horizon alone: rays that begin on the surface itself, about a
+   smoothed normal, must not go into the ground and leave it by the border. */
+TEST(rays_from_the_surface_do_not_leak_through_the_ground) {
+    enum { N = 64, W = 128, H = 64, POINTS = 400 };
+    static float sky[H][W][3];
+    uint64_t state = 5;
+    double q[1] = {N / 2};
+    scene s = scene_make(N, N, N, NULL, ground, q);
+    isogi_trace_desc d = desc_make(&s, 0, 0, 256);
+    float points[POINTS][3], e[POINTS][3];
+    int n = 0, lit = 0;
+    for (int i = 0; i < N * N * N; i++) {
+        state = state * 6364136223846793005u + 1442695040888963407u;
+        s.data[i] += 1.6f * ((float)(state >> 40) / 16777216.0f - 0.5f);
+    }
+    isogi_vol_free(s.pyramid);
+    if (isogi_vol_build(&s.pyramid, &s.volume, NULL) != ISOGI_OK) abort();
+    for (int y = H / 2 + 1; y < H; y++)
+        for (int x = 0; x < W; x++) sky[y][x][0] = sky[y][x][1] = sky[y][x][2] = 1;
+    memset(&d.lighting, 0, sizeof d.lighting);
+    d.pyramid = s.pyramid, d.offset = -1;
+    d.lighting.env.rgb = sky[0][0], d.lighting.env.width = W, d.lighting.env.height = H;
+    for (int i = 0; i < POINTS; i++) {
+        isogi_ray ray;
+        isogi_hit hit;
+        memset(&ray, 0, sizeof ray), memset(&hit, 0, sizeof hit);
+        ray.origin[0] = 22.3 + i % 20, ray.origin[1] = N - 1, ray.origin[2] = 22.7 + i / 20, ray.dir[1] = -1, ray.isovalue = 0;
+        isogi_vol_intersect(s.pyramid, &ray, 1, &hit, NULL);
+        if (hit.side) isogi_vol_positions(s.pyramid, &hit, 1, &points[n++]);
+    }
+    CHECK(n == POINTS, "only %d points", n);
+    isogi_trace_gather(&d, (const float(*)[3])points, NULL, (size_t)n, e, NULL, NULL);
+    for (int i = 0; i < n; i++) lit += e[i][0] > 1e-3f;
+    CHECK(lit == 0, "%d of %d points see light through the ground", lit, n);
+    scene_free(&s);
+}
+
 TEST(albedo_by_isovalue) {
     isogi_albedo_point points[2] = {{10, {0.2f, 0.4f, 0.6f}}, {20, {0.4f, 0.4f, 0.0f}}};
     isogi_trace_desc d;
@@ -942,6 +995,7 @@ TEST(bad_input_is_refused) {
     REFUSED(d.samples = -1, ISOGI_INVALID);
     REFUSED(d.order = 7, ISOGI_INVALID);
     REFUSED(d.offset = (float)nan, ISOGI_INVALID);
+    REFUSED(d.offset = 1.5f, ISOGI_INVALID);
     REFUSED(d.isovalue_min = 1, ISOGI_INVALID);
     REFUSED(d.isovalue_max = nan, ISOGI_INVALID);
     REFUSED(d.lattice_max[0] = 15.5, ISOGI_INVALID);
