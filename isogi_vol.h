@@ -1548,6 +1548,8 @@ static int isogi_vol__cubic_deflated(const isogi_vol__cubic *cubic, int *inside,
     int n, i;
     *inside = first > 0 ? 1 : first < 0 ? 0 : -1;
     if (*inside < 0) return 0;
+    /* the Bernstein coefficients of what is left, c1 + c2 s + c3 s^2, on one side: no root */
+    if (*inside ? c1 > 0 && c1 + 0.5 * c2 > 0 && c1 + c2 + c3 > 0 : c1 < 0 && c1 + 0.5 * c2 < 0 && c1 + c2 + c3 < 0) return 0;
     n = isogi_vol__quadratic_roots(c1, c2, c3, r);
     for (i = 0; i < n; i++) {
         /* a double root touches and does not cross */
@@ -1659,9 +1661,24 @@ static int isogi_vol__uniform_block(isogi_vol__walk *w, int top, int low[3], int
     return 0;
 }
 
+/* A cell in which the ray leaves the surface that it starts from; 1 and the root if it comes back to it in the same cell. Still on
+   the surface at the exit, because the start lies within rounding of it, or because the ray runs along the surface: the next cell
+   divides the root out. */
+static int isogi_vol__leave_surface(isogi_vol__walk *w, const isogi_vol__cubic *cubic, const double corner[8], const double from[3],
+                                    const double to[3], int axis, double *root) {
+    const double length = isogi_vol__largest(to[0] - from[0], to[1] - from[1], to[2] - from[2]);
+    const double reach = isogi_vol__largest(cubic->b[1] - cubic->b[0], cubic->b[2] - cubic->b[0], cubic->b[3] - cubic->b[0]);
+    double steepest = 0;
+    int i;
+    for (i = 0; i < 8; i++) steepest = isogi_vol__max(steepest, fabs(corner[i]));
+    if (axis >= 0 && (length < 1e-9 || reach < 1e-12 * steepest)) return 0;
+    w->deflate = 0;
+    return isogi_vol__cubic_deflated(cubic, &w->inside, root);
+}
+
 /* The part [t, t_out] of the ray in the present cell, which it leaves through `axis` (-1: the segment ends in it). 1 = hit. */
 static int isogi_vol__visit_cell(isogi_vol__walk *w, double t_out, int axis, isogi_hit *hit) {
-    double corner[8], from[3], to[3], root = 0, local[3], steepest = 0;
+    double corner[8], from[3], to[3], root = 0, local[3];
     isogi_vol__cubic cubic;
     int low_side = 0, i, found, inside;
     w->count.cells++;
@@ -1669,10 +1686,7 @@ static int isogi_vol__visit_cell(isogi_vol__walk *w, double t_out, int axis, iso
         w->inside = -1, w->deflate = 0;
         return 0;
     }
-    for (i = 0; i < 8; i++) {
-        low_side += corner[i] < 0;
-        steepest = isogi_vol__max(steepest, fabs(corner[i]));
-    }
+    for (i = 0; i < 8; i++) low_side += corner[i] < 0;
     if (!low_side || low_side == 8) {
         w->deflate = 0;
         return isogi_vol__state(w, !low_side, hit);
@@ -1684,14 +1698,7 @@ static int isogi_vol__visit_cell(isogi_vol__walk *w, double t_out, int axis, iso
     w->count.cubics++;
     isogi_vol__cubic_set(&cubic, corner, from, to);
     if (w->deflate) {
-        /* Still on the surface at the exit, because the start lies within rounding of it, or because the ray runs along the surface:
-           the next cell divides the root out. */
-        double length = isogi_vol__largest(to[0] - from[0], to[1] - from[1], to[2] - from[2]);
-        double reach = isogi_vol__largest(cubic.b[1] - cubic.b[0], cubic.b[2] - cubic.b[0], cubic.b[3] - cubic.b[0]);
-        if (axis >= 0 && (length < 1e-9 || reach < 1e-12 * steepest)) return 0;
-        w->deflate = 0;
-        found = isogi_vol__cubic_deflated(&cubic, &inside, &root);
-        w->inside = inside;
+        found = isogi_vol__leave_surface(w, &cubic, corner, from, to, axis, &root), inside = w->inside;
     } else {
         inside = cubic.b[0] >= 0;
         if (isogi_vol__state(w, inside, hit)) return 1;
@@ -1823,14 +1830,12 @@ ISOGI_VOL__TARGET("avx2") static int isogi_vol__mixed_cell_avx2(isogi_vol__walk 
     begin = _mm256_max_pd(begin, zero), end = _mm256_max_pd(_mm256_min_pd(end, segment_end), begin);
     w->t = _mm256_cvtsd_f64(begin);
     sides = _mm256_movemask_pd(_mm256_cmp_pd(c0, zero, _CMP_GE_OQ)) | _mm256_movemask_pd(_mm256_cmp_pd(c1, zero, _CMP_GE_OQ)) << 4;
-    if (ISOGI_VOL__UNLIKELY(w->deflate)) {
-        if (w->t <= w->deflated) {
-            w->deflated = _mm256_cvtsd_f64(end);
-            return isogi_vol__visit_cell(w, w->deflated, axis, hit);
-        }
+    w->deflate &= w->t <= w->deflated;
+    w->deflated = _mm256_cvtsd_f64(end);
+    if (sides == 0 || sides == 255) {
         w->deflate = 0;
+        return isogi_vol__state(w, sides != 0, hit);
     }
-    if (sides == 0 || sides == 255) return isogi_vol__state(w, sides != 0, hit);
     w->count.cubics++;
     from = _mm256_sub_pd(_mm256_add_pd(origin, _mm256_mul_pd(begin, dir)), cell);
     to = _mm256_sub_pd(_mm256_add_pd(origin, _mm256_mul_pd(end, dir)), cell);
@@ -1853,13 +1858,21 @@ ISOGI_VOL__TARGET("avx2") static int isogi_vol__mixed_cell_avx2(isogi_vol__walk 
     b = _mm256_add_pd(b, _mm256_blend_pd(_mm256_blend_pd(f0, f1, 4), zero, 9));                                            /* y, xz */
     b = _mm256_add_pd(b, _mm256_blend_pd(_mm256_blend_pd(_mm256_permute4x64_pd(f1, 0), _mm256_permute4x64_pd(f0, 0xff), 4), zero, 9)); /* z, xy */
     b = _mm256_mul_pd(b, _mm256_setr_pd(1, 1.0 / 3, 1.0 / 3, 1));
-    sides = _mm256_movemask_pd(_mm256_cmp_pd(b, zero, _CMP_GE_OQ)), inside = sides & 1;
-    if (ISOGI_VOL__UNLIKELY(w->inside == !inside)) return isogi_vol__state(w, inside, hit);
-    w->inside = inside;
-    if (sides == 0 || sides == 15) return 0;
     _mm256_storeu_pd(cubic.b, b);
-    isogi_vol__cubic_rescale(&cubic);
-    if (!isogi_vol__cubic_first(&cubic, inside, w->exact, &root)) return 0;
+    if (w->deflate) {
+        double corner[8], ends[8];
+        _mm256_storeu_pd(corner, c0), _mm256_storeu_pd(corner + 4, c1), _mm256_storeu_pd(ends, from), _mm256_storeu_pd(ends + 4, to);
+        isogi_vol__cubic_rescale(&cubic);
+        if (!isogi_vol__leave_surface(w, &cubic, corner, ends, ends + 4, axis, &root)) return 0;
+        inside = w->inside;
+    } else {
+        sides = _mm256_movemask_pd(_mm256_cmp_pd(b, zero, _CMP_GE_OQ)), inside = sides & 1;
+        if (ISOGI_VOL__UNLIKELY(w->inside == !inside)) return isogi_vol__state(w, inside, hit);
+        w->inside = inside;
+        if (sides == 0 || sides == 15) return 0;
+        isogi_vol__cubic_rescale(&cubic);
+        if (!isogi_vol__cubic_first(&cubic, inside, w->exact, &root)) return 0;
+    }
     w->inside = !inside;
     begin = _mm256_add_pd(begin, _mm256_mul_pd(_mm256_set1_pd(root), _mm256_sub_pd(end, begin)));
     hit->t = w->base + _mm256_cvtsd_f64(begin);
