@@ -135,7 +135,8 @@ CONTRACT_OFF=-ffp-contract=off
 fast_math() {
     for program; do
         base=${program##*/} source=tests/${program##*/}.c
-        item suite "fast-math/$base" "$CC -std=gnu99 -O2 -ffast-math -I. -Iexamples/common -Itests -c -o \"\$OUT/object.o\" $source && $CC -o \"\$OUT/$base\" \"\$OUT/object.o\" -lm -lpthread && \"\$OUT/$base\""
+        libs=$(sed -n '1,20s|.*LIBS: \([^*]*\).*|\1|p' "$source")
+        item suite "fast-math/$base" "$CC -std=gnu99 -O2 -ffast-math -I. -Iexamples/common -Itests -c -o \"\$OUT/object.o\" $source && $CC -o \"\$OUT/$base\" \"\$OUT/object.o\" -lm -lpthread $libs && \"\$OUT/$base\""
     done
 }
 
