@@ -2785,7 +2785,7 @@ static int isogi_vol__trace_loops(const double f[8], unsigned code, isogi_vol__l
         if (next[first] < 0) continue;
         l->count = 0;
         l->inside = region[isogi_vol__edge_corner(first, end)], l->outside = region[isogi_vol__edge_corner(first, !end)];
-        while (next[edge] >= 0) {
+        while (next[edge] >= 0 && l->count < 12) {
             int to = next[edge];
             l->edge[l->count++] = (uint8_t)edge;
             next[edge] = -1;
@@ -3741,6 +3741,11 @@ ISOGI_API void isogi_vol_mesh_free(const isogi_pyramid *pyramid, isogi_mesh *mes
 #undef ISOGI_VOL__INLINE
 #undef ISOGI_VOL__UNLIKELY
 #undef ISOGI_VOL__SSE2
+#undef ISOGI_VOL__AVX
+#undef ISOGI_VOL__TARGET
+#undef ISOGI_VOL__WALKS
+#undef ISOGI_VOL__WALK_CELL
+#undef ISOGI_VOL__WALK_TOP
 #undef ISOGI_VOL__UNLIMITED
 #undef ISOGI_VOL__LOCK
 #undef ISOGI_VOL__UNLOCK
