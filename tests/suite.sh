@@ -161,7 +161,6 @@ variants() {
         variant address+undefined "$CC" "-O1 -g $CONTRACT_OFF -fsanitize=address,undefined -fno-sanitize-recover=all" '' $units
         variant thread "$CC" "-O1 -g $CONTRACT_OFF -fsanitize=thread" 'TSAN_OPTIONS=halt_on_error=1' $units
     fi
-    if have g++; then item skip c++-tests "the tests are C; the headers as C++ are in the matrix"; fi
 }
 
 # Other processors, emulated, one of them big-endian: the two headers that all others stand on, since emulation is ten times slower.
