@@ -337,10 +337,19 @@ ISOGI_API isogi_result isogi_sh_fit_directional(float direction[3], float rgb[3]
 #endif
 #if defined(__clang__)
 #define ISOGI_SH__UNROLL _Pragma("unroll 5")
+#define ISOGI_SH__UNROLL9 _Pragma("unroll 9")
 #elif defined(__GNUC__) && __GNUC__ >= 8
 #define ISOGI_SH__UNROLL _Pragma("GCC unroll 5")
+#define ISOGI_SH__UNROLL9 _Pragma("GCC unroll 9")
 #else
 #define ISOGI_SH__UNROLL
+#define ISOGI_SH__UNROLL9
+#endif
+
+#if defined(__GNUC__)
+#define ISOGI_SH__INLINE static inline __attribute__((always_inline))
+#else
+#define ISOGI_SH__INLINE static inline
 #endif
 
 /* ==== numbers ======================================================================================================== */
@@ -1355,31 +1364,36 @@ typedef struct isogi_sh__euler {
     double a[2], b[2], c[2]; /* cosine and sine of each angle */
 } isogi_sh__euler;
 
-/* ISOGI_INVALID unless m is finite and a rotation to 1e-3. */
+/* 1 / sqrt(square) for a square within 0.01 of 1, by its series: full precision where the matrix has it, and no root to wait for. */
+static double isogi_sh__inverse_near_one(double square) {
+    double d = square - 1;
+    return 1 - d * (0.5 - d * (0.375 - d * (0.3125 - d * (0.2734375 - d * 0.24609375))));
+}
+
+/* ISOGI_INVALID unless m is finite and a rotation to 1e-3. An entry that is not finite shows in the sum of the squares. */
 static isogi_result isogi_sh__euler_angles(isogi_sh__euler *e, const double m[9]) {
-    double sine, length, det;
-    int i, j;
-    for (i = 0; i < 9; i++)
-        if (!isogi_sh__finite_f64(m[i]) || fabs(m[i]) > 2) return ISOGI_INVALID;
-    for (i = 0; i < 3; i++)
-        for (j = 0; j <= i; j++) {
-            double dot = m[3 * i] * m[3 * j] + m[3 * i + 1] * m[3 * j + 1] + m[3 * i + 2] * m[3 * j + 2];
-            if (fabs(dot - (i == j ? 1 : 0)) > 1e-3) return ISOGI_INVALID;
-        }
-    det = m[0] * (m[4] * m[8] - m[5] * m[7]) - m[1] * (m[3] * m[8] - m[5] * m[6]) + m[2] * (m[3] * m[7] - m[4] * m[6]);
-    if (det < 0) return ISOGI_INVALID;
-    sine = sqrt(m[2] * m[2] + m[5] * m[5]);
-    length = sqrt(sine * sine + m[8] * m[8]);
-    e->b[0] = m[8] / length;
-    e->b[1] = sine / length;
-    e->a[0] = sine > 0 ? m[2] / sine : 1;
-    e->a[1] = sine > 0 ? m[5] / sine : 0;
+    double xx = m[0] * m[0] + m[1] * m[1] + m[2] * m[2], yy = m[3] * m[3] + m[4] * m[4] + m[5] * m[5];
+    double zz = m[6] * m[6] + m[7] * m[7] + m[8] * m[8], xy = m[0] * m[3] + m[1] * m[4] + m[2] * m[5];
+    double xz = m[0] * m[6] + m[1] * m[7] + m[2] * m[8], yz = m[3] * m[6] + m[4] * m[7] + m[5] * m[8];
+    double det = m[0] * (m[4] * m[8] - m[5] * m[7]) - m[1] * (m[3] * m[8] - m[5] * m[6]) + m[2] * (m[3] * m[7] - m[4] * m[6]);
+    double square, sine, inverse;
+    if (!isogi_sh__finite_f64(xx + yy + zz)) return ISOGI_INVALID;
+    if (fabs(xx - 1) > 1e-3 || fabs(yy - 1) > 1e-3 || fabs(zz - 1) > 1e-3) return ISOGI_INVALID;
+    if (fabs(xy) > 1e-3 || fabs(xz) > 1e-3 || fabs(yz) > 1e-3 || det < 0) return ISOGI_INVALID;
+    square = m[2] * m[2] + m[5] * m[5];
+    sine = sqrt(square);
+    inverse = isogi_sh__inverse_near_one(square + m[8] * m[8]);
+    e->b[0] = m[8] * inverse;
+    e->b[1] = sine * inverse;
+    inverse = square > 1e-280 ? 1 / sine : 0; /* below, roundings of the square would show, and a is free */
+    e->a[0] = square > 1e-280 ? m[2] * inverse : 1;
+    e->a[1] = m[5] * inverse;
     /* Given a, the second row of Z(-a) R is (sin c, cos c, 0): well defined however small b is. */
     e->c[0] = e->a[0] * m[4] - e->a[1] * m[1];
     e->c[1] = e->a[0] * m[3] - e->a[1] * m[0];
-    length = sqrt(e->c[0] * e->c[0] + e->c[1] * e->c[1]);
-    e->c[0] /= length;
-    e->c[1] /= length;
+    inverse = isogi_sh__inverse_near_one(e->c[0] * e->c[0] + e->c[1] * e->c[1]);
+    e->c[0] *= inverse;
+    e->c[1] *= inverse;
     return ISOGI_OK;
 }
 
@@ -1398,8 +1412,9 @@ static void isogi_sh__powers(double (*power)[2], int order, double cosine, doubl
 }
 
 /* A band holds a few channels interleaved, so that what is computed per coefficient serves all of them. */
-static void isogi_sh__turn_z(double *band, int l, int channels, double (*power)[2]) {
+ISOGI_SH__INLINE void isogi_sh__turn_z(double *band, int l, int channels, double (*power)[2]) {
     int m, k;
+    ISOGI_SH__UNROLL
     for (m = 1; m <= l; m++) {
         double *plus = band + channels * (l + m), *minus = band + channels * (l - m);
         for (k = 0; k < channels; k++) {
@@ -1505,13 +1520,81 @@ static void isogi_sh__rotate_band(double *band, double *other, int l, int channe
     isogi_sh__turn_z(band, l, channels, t->last);
 }
 
+/* Degrees 1 to 4 of one channel, which most callers have alone: the same steps with l a constant, so that loops, signs and table
+   are gone from what is compiled. */
+ISOGI_SH__INLINE void isogi_sh__turn_y_fixed(double *out, const double *in, int l, int transposed) {
+    const double *w = isogi_sh__turn_f64 + l * (l + 1) * (l + 2) / 6 - 1;
+    int m, n;
+    ISOGI_SH__UNROLL9
+    for (m = 0; m <= 2 * l; m++) out[m] = 0;
+    ISOGI_SH__UNROLL
+    for (n = 0; n <= l; n++) {
+        ISOGI_SH__UNROLL
+        for (m = n; m <= l; m++, w++) {
+            int sign = (l + m + n) & 1 ? -1 : 1;
+            double mirrored = (m + n) & 1 ? -*w : *w;
+            if (sign > 0 || n > 0) {
+                out[l + sign * n] += (transposed ? mirrored : *w) * in[l + sign * m];
+                if (m != n) out[l + sign * m] += (transposed ? *w : mirrored) * in[l + sign * n];
+            }
+        }
+    }
+}
+
+ISOGI_SH__INLINE void isogi_sh__rotate_fixed(void *out, const void *in, int is_double, int l, isogi_sh__turns *t) {
+    double band[9], other[9];
+    int i;
+    ISOGI_SH__UNROLL9
+    for (i = 0; i <= 2 * l; i++) band[i] = is_double ? ((const double *)in)[l * l + i] : (double)((const float *)in)[l * l + i];
+    isogi_sh__turn_z(band, l, 1, t->first);
+    isogi_sh__turn_y_fixed(other, band, l, 0);
+    isogi_sh__turn_z(other, l, 1, t->middle);
+    isogi_sh__turn_y_fixed(band, other, l, 1);
+    isogi_sh__turn_z(band, l, 1, t->last);
+    ISOGI_SH__UNROLL9
+    for (i = 0; i <= 2 * l; i++) {
+        if (is_double) ((double *)out)[l * l + i] = band[i];
+        else ((float *)out)[l * l + i] = (float)band[i];
+    }
+}
+
+ISOGI_SH__INLINE void isogi_sh__rotate_low(void *out, const void *in, int is_double, int order, isogi_sh__turns *t) {
+    if (is_double) ((double *)out)[0] = ((const double *)in)[0];
+    else ((float *)out)[0] = ((const float *)in)[0];
+    if (order > 1) isogi_sh__rotate_fixed(out, in, is_double, 1, t);
+    if (order > 2) isogi_sh__rotate_fixed(out, in, is_double, 2, t);
+    if (order > 3) isogi_sh__rotate_fixed(out, in, is_double, 3, t);
+    if (order > 4) isogi_sh__rotate_fixed(out, in, is_double, 4, t);
+}
+
+/* Four powers, without the correction, for results in float. */
+ISOGI_SH__INLINE void isogi_sh__four_powers(double (*power)[2], double cosine, double sine) {
+    double c = cosine * cosine - sine * sine, s = 2 * cosine * sine;
+    power[1][0] = cosine, power[1][1] = sine;
+    power[2][0] = c, power[2][1] = s;
+    power[3][0] = c * cosine - s * sine, power[3][1] = c * sine + s * cosine;
+    power[4][0] = c * c - s * s, power[4][1] = 2 * c * s;
+}
+
+static void isogi_sh__rotate_low_f32(float *out, const float *in, int order, const isogi_sh__euler *e) {
+    isogi_sh__turns turns;
+    isogi_sh__four_powers(turns.first, -e->c[1], e->c[0]);
+    isogi_sh__four_powers(turns.middle, e->b[0], e->b[1]);
+    isogi_sh__four_powers(turns.last, e->a[1], -e->a[0]);
+    isogi_sh__rotate_low(out, in, 0, order, &turns);
+}
+
 /* Any order, a few channels at a time; float or double alike. */
 static void isogi_sh__rotate(void *out, const void *in, int is_double, int order, int channels, const isogi_sh__euler *e) {
     double band[2 * ISOGI_SH_MAX_ORDER * ISOGI_SH__TOGETHER], other[2 * ISOGI_SH_MAX_ORDER * ISOGI_SH__TOGETHER];
     isogi_sh__turns turns;
     int l, i, k, first;
     isogi_sh__turns_start(&turns, order, e);
-    for (l = 0; l < order; l++) {
+    if (channels == 1) {
+        if (is_double) isogi_sh__rotate_low(out, in, 1, order, &turns);
+        else isogi_sh__rotate_low(out, in, 0, order, &turns);
+    }
+    for (l = channels == 1 ? 5 : 0; l < order; l++) {
         if (channels > 1 || l > ISOGI_SH__TURNS) isogi_sh__quarter_turn_start(turns.step, turns.edge, l);
         for (first = 0; first < channels; first += ISOGI_SH__TOGETHER) {
             int some = channels - first < ISOGI_SH__TOGETHER ? channels - first : ISOGI_SH__TOGETHER;
@@ -1547,7 +1630,8 @@ ISOGI_API isogi_result isogi_sh_rotate(float *out, const float *in, int order, i
     if (!out || !in || !m || !isogi_sh__shape_ok(order, channels)) return ISOGI_INVALID;
     for (i = 0; i < 9; i++) r[i] = (double)m[i];
     if (isogi_sh__euler_angles(&e, r) != ISOGI_OK) return ISOGI_INVALID;
-    isogi_sh__rotate(out, in, 0, order, channels, &e);
+    if (order <= 5 && channels == 1) isogi_sh__rotate_low_f32(out, in, order, &e);
+    else isogi_sh__rotate(out, in, 0, order, channels, &e);
     return ISOGI_OK;
 }
 
@@ -3070,6 +3154,8 @@ ISOGI_API isogi_result isogi_sh_fit_directional(float direction[3], float rgb[3]
 #undef ISOGI_SH__ALL16
 #undef ISOGI_SH__ALL8
 #undef ISOGI_SH__UNROLL
+#undef ISOGI_SH__UNROLL9
+#undef ISOGI_SH__INLINE
 #undef ISOGI_SH__FMA_F8
 #undef ISOGI_SH__FMA_F16
 #undef ISOGI_SH__FMA_D4

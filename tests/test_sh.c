@@ -770,6 +770,32 @@ TEST(rotations_agree_with_each_other) {
         }
 }
 
+/* A matrix that is off by less than 1e-3, or that tilts z by less than any square can tell, still rotates: the norm stays, to the
+   series of an inverse root (1e-13 at 1e-3) and 2 * 16 roundings; orders with and without unrolled degrees, float as well. */
+TEST(rotations_by_inexact_matrices_keep_the_norm) {
+    enum { ORDER = 7, N = ORDER * ORDER };
+    const double off[] = {0, 1e-8, 4e-4, -4e-4}, tilt[] = {0, 1e-300, 1e-162, 1e-155, 1e-140, 1e-9};
+    double c[N], out[N];
+    float cf[N], f[N];
+    test_random r = {29};
+    for (int i = 0; i < 240; i++) {
+        double m[9], before = 0, after = 0, after_float = 0;
+        float mf[9];
+        int order = 2 + i % 6, n = order * order;
+        random_rotation(&r, m);
+        if (i % 2) {
+            const double tilted[9] = {1, 0, tilt[i / 2 % 6], 0, 1, -tilt[i / 2 % 6], -tilt[i / 2 % 6], tilt[i / 2 % 6], 1};
+            memcpy(m, tilted, sizeof m);
+        } else for (int k = 0; k < 9; k++) m[k] *= 1 + off[i / 2 % 4];
+        for (int k = 0; k < 9; k++) mf[k] = (float)m[k];
+        for (int k = 0; k < n; k++) cf[k] = (float)random_range(&r, -1, 1), c[k] = (double)cf[k], before += c[k] * c[k];
+        CHECK(isogi_sh_rotate_f64(out, c, order, 1, m) == ISOGI_OK && isogi_sh_rotate(f, cf, order, 1, mf) == ISOGI_OK, "matrix %d", i);
+        for (int k = 0; k < n; k++) after += out[k] * out[k], after_float += (double)f[k] * (double)f[k];
+        CHECK(fabs(after / before - 1) < 1e-12, "matrix %d: norm off by %g", i, after / before - 1);
+        CHECK(fabs(after_float / before - 1) < 4e-7, "matrix %d: norm in float off by %g", i, after_float / before - 1);
+    }
+}
+
 /* The makers of matrices agree with what they say: where the axes go. */
 TEST(matrices_are_what_they_say) {
     float m[9], n[9], half = 0.70710678f, q[4] = {3 * half, 0, 0, 3 * half}, z[3] = {0, 0, 2}, axis[3] = {1, -2, 0.5f}, zero[4] = {0, 0, 0, 0};
