@@ -58,9 +58,12 @@
                             around it is lower than v (constant air, local minima: there f >= v all around, such a texel would see the
                             sky through everything), where a voxel is not finite, or where the gradient vanishes. With desc.capped the
                             border's texels, which face out of the box, are always valid.
-     Lookup                 Trilinear among the eight texels around the point, those that are valid; their weights are made to sum to
-                            1 again. So an invalid texel neither darkens nor brightens its neighbours. Where none of the eight is
+     Lookup                 desc.lookup; trilinear unless told otherwise: among the eight texels around the point, those that are
+                            valid; their weights are made to sum to 1 again. So an invalid texel neither darkens nor brightens its neighbours. Where none of the eight is
                             valid, the nearest valid one of the 4x4x4 around it is taken; a point without even that has zero light.
+                            Trilinear is the one to use (as the paper found, too): the others are there to be compared with it.
+                            Nearest shows the texels as blocks, closest isovalue breaks along their borders, the B-spline mixes
+                            in light of isosurfaces two texels away.
 
    How light is gathered
 
@@ -105,6 +108,14 @@ typedef enum isogi_trace_mode {
     ISOGI_TRACE_TRANSFER        /* SH radiance transfer: relit under any distant environment without new rays */
 } isogi_trace_mode;
 
+/* How a lookup reads the texels around a point (Wyman et al. 2006, fig. 6). Only valid texels take part in any of them. */
+typedef enum isogi_trace_lookup {
+    ISOGI_TRACE_TRILINEAR = 0,    /* the eight around the point, linearly weighted */
+    ISOGI_TRACE_NEAREST,          /* of those eight, the one nearest to the point (in texels; of equals the lower) */
+    ISOGI_TRACE_CLOSEST_ISOVALUE, /* of those eight, the one whose isovalue is closest to that at the point (of equals the nearest) */
+    ISOGI_TRACE_BSPLINE           /* 4x4x4, weighed by the uniform cubic B-spline: smooth, and blurred over two texels */
+} isogi_trace_lookup;
+
 typedef struct isogi_albedo_point {
     double value; /* data value; ascending */
     float rgb[3]; /* 0..1 */
@@ -133,6 +144,7 @@ typedef struct isogi_trace_desc {
     int lazy;                  /* non-zero: only texels that were requested (and that the interval, if there is one, reads) */
     int capped;                /* non-zero: the volume's border closes the surface (ISOGI_RAY_CAPPED) */
     int transfer_channels;     /* TRANSFER: sets of coefficients: 1 = grey (mean albedo), 3 = RGB; 0 = 3 if albedo is coloured, else 1 */
+    isogi_trace_lookup lookup; /* of request, sample and sample_transfer; the texels themselves do not depend on it */
 } isogi_trace_desc;
 
 typedef struct isogi_trace isogi_trace;
@@ -152,7 +164,7 @@ ISOGI_API isogi_result isogi_trace_request(isogi_trace *trace, const float (*poi
    texture that can be read and stepped on. Not at the same time as any other call on this texture. */
 ISOGI_API isogi_result isogi_trace_step(isogi_trace *trace, uint64_t max_rays, double *remaining);
 
-/* Trilinear lookup among the texels that are valid and computed. irradiance[count] (RGB); error[count]: standard error of its
+/* Lookup (desc.lookup) among the texels that are valid and computed. irradiance[count] (RGB); error[count]: standard error of its
    luminance, NULL = not wanted; a point none of whose texels is ready gets the zero vector and error = INFINITY (so does the error
    of a single sample, which is not known). Points beyond the lattice are moved to its border.
    TRANSFER: under the lighting last given to isogi_trace_relight (that of the description at first); the error is that under a
@@ -1078,6 +1090,9 @@ static int isogi_trace__desc_valid(const isogi_trace_desc *d) {
     if (!d || !d->pyramid) return 0;
     if (d->mode != ISOGI_TRACE_IRRADIANCE && d->mode != ISOGI_TRACE_TRANSFER) return 0;
     if (d->normals != ISOGI_NORMAL_SMOOTH && d->normals != ISOGI_NORMAL_TRILINEAR) return 0;
+    if (d->lookup != ISOGI_TRACE_TRILINEAR && d->lookup != ISOGI_TRACE_NEAREST && d->lookup != ISOGI_TRACE_CLOSEST_ISOVALUE &&
+        d->lookup != ISOGI_TRACE_BSPLINE)
+        return 0;
     if (d->order < 0 || d->order > ISOGI_TRACE__MAX_ORDER || d->bounces < -1 || d->samples < 0 || d->samples > 1 << 24)
         return 0;
     if (d->transfer_channels != 0 && d->transfer_channels != 1 && d->transfer_channels != 3) return 0;
@@ -1190,20 +1205,21 @@ static int isogi_trace__texel_site(const isogi_trace *t, const size_t texel[3], 
 }
 
 /* Whether a surface of the isovalue interval may read one of the texels low..high: there are values on both sides of it, or within
-   it, in the lattice cells around them. */
+   it, in the lattice cells around them that lookups reach across. */
 static int isogi_trace__in_range(const isogi_trace *t, const size_t low[3], const size_t high[3]) {
     const isogi_trace_desc *d = &t->scene.desc;
     const isogi_volume *v = t->scene.volume;
     size_t first[3], last[3], voxels = 1;
     double range[2];
+    double reach = d->lookup == ISOGI_TRACE_BSPLINE ? 2 : 1;
     int a, cut = 0; /* the cap of the border closes surfaces without any value below them */
     if (isogi_trace__zero(d->isovalue_min) && isogi_trace__zero(d->isovalue_max)) return 1;
     for (a = 0; a < 3; a++) {
         double end = (double)(v->size[a] - 1);
-        first[a] = (size_t)isogi_trace__clamp(floor(t->first[a] + ((double)low[a] - 1) * t->step[a]), end);
-        last[a] = (size_t)isogi_trace__clamp(ceil(t->first[a] + ((double)high[a] + 1) * t->step[a]), end);
-        if (low[a] == 0) first[a] = 0;
-        if (high[a] + 1 >= t->lattice[a]) last[a] = v->size[a] - 1;
+        first[a] = (size_t)isogi_trace__clamp(floor(t->first[a] + ((double)low[a] - reach) * t->step[a]), end);
+        last[a] = (size_t)isogi_trace__clamp(ceil(t->first[a] + ((double)high[a] + reach) * t->step[a]), end);
+        if ((double)low[a] < reach) first[a] = 0;
+        if ((double)high[a] + reach >= (double)t->lattice[a]) last[a] = v->size[a] - 1;
         cut |= d->capped && (first[a] == 0 || last[a] == v->size[a] - 1);
         voxels *= last[a] - first[a] + 1;
     }
@@ -1461,31 +1477,86 @@ static int isogi_trace__nearest(const isogi_trace *t, const size_t cell[3], cons
     return best < DBL_MAX;
 }
 
-/* The texels and weights of a lookup: the cell's corners that are computed; where none of the eight has a surface, the nearest that
+/* Texel i of the 4x4x4 around a lattice cell and its weight by the uniform cubic B-spline; 0 where that is nothing. */
+static double isogi_trace__spline(const isogi_trace *t, const size_t cell[3], const double local[3], int i, size_t texel[3]) {
+    double weight = 1;
+    int a;
+    for (a = 0; a < 3; a++) {
+        int shift = i >> (2 * a) & 3;
+        double d = fabs(shift - 1 - local[a]), rest = 2 - d;
+        if (cell[a] + (size_t)shift < 1 || cell[a] + (size_t)shift - 1 >= t->lattice[a]) return 0;
+        texel[a] = cell[a] + (size_t)shift - 1;
+        weight *= d < 1 ? (4 - 6 * d * d + 3 * d * d * d) / 6 : rest > 0 ? rest * rest * rest / 6 : 0;
+    }
+    return weight;
+}
+
+/* Texel i among those that desc.lookup reads or chooses from, and its weight. */
+static double isogi_trace__tap(const isogi_trace *t, const size_t cell[3], const double local[3], int i, size_t texel[3]) {
+    return t->scene.desc.lookup == ISOGI_TRACE_BSPLINE ? isogi_trace__spline(t, cell, local, i, texel)
+                                                       : isogi_trace__corner(t, cell, local, i, texel);
+}
+
+static int isogi_trace__tap_count(const isogi_trace *t) { return t->scene.desc.lookup == ISOGI_TRACE_BSPLINE ? 64 : 8; }
+
+static double isogi_trace__grid_value(const isogi_trace *t, const double grid[3]) {
+    isogi_hit place;
+    return isogi_trace__locate(t->scene.volume, grid, &place) ? isogi_trace__value(t->scene.volume, &place) : 0;
+}
+
+/* How far a texel is from the point, by isovalue or by place (squared, in texels), as the lookup chooses. */
+static void isogi_trace__apart(const isogi_trace *t, const size_t cell[3], const double local[3], const size_t texel[3],
+                               double apart[2]) {
+    double point[3], place[3], d;
+    int a;
+    apart[0] = apart[1] = 0;
+    for (a = 0; a < 3; a++) {
+        d = (double)(texel[a] - cell[a]) - local[a];
+        apart[1] += d * d;
+        point[a] = t->first[a] + t->step[a] * ((double)cell[a] + local[a]), place[a] = t->first[a] + t->step[a] * (double)texel[a];
+    }
+    if (t->scene.desc.lookup == ISOGI_TRACE_CLOSEST_ISOVALUE)
+        apart[0] = fabs(isogi_trace__grid_value(t, place) - isogi_trace__grid_value(t, point));
+}
+
+typedef struct isogi_trace__reading {
+    const float *values[64];
+    float error[64];
+    double weight[64]; /* they sum to 1 */
+} isogi_trace__reading;
+
+/* The texels and weights of a lookup: those around the point that are computed; where none of them has a surface, the nearest that
    has one. The number of them; 0: the lookup is not ready. */
-static int isogi_trace__taps(const isogi_trace *t, const float point[3], const float *values[8], float error[8],
-                             double weight[8]) {
+static int isogi_trace__taps(const isogi_trace *t, const float point[3], isogi_trace__reading *r) {
     size_t cell[3], texel[3];
-    double local[3], total = 0;
-    int i, count = 0, pending = 0;
+    double local[3], total = 0, best[2] = {DBL_MAX, DBL_MAX};
+    int i, count = 0, pending = 0, taps = isogi_trace__tap_count(t);
+    int one = t->scene.desc.lookup == ISOGI_TRACE_NEAREST || t->scene.desc.lookup == ISOGI_TRACE_CLOSEST_ISOVALUE;
     isogi_trace__cell(t, point, cell, local);
-    for (i = 0; i < 9; i++) {
+    for (i = 0; i <= taps; i++) {
         const isogi_trace__brick *brick;
         uint32_t slot;
         double w = 1;
-        if (i < 8) {
-            w = isogi_trace__corner(t, cell, local, i, texel);
+        if (i < taps) {
+            w = isogi_trace__tap(t, cell, local, i, texel);
             if (!(w > 0)) continue;
             if (isogi_trace__state(t, texel) != ISOGI_TRACE__DONE) {
                 pending |= isogi_trace__state(t, texel) != ISOGI_TRACE__NO_SURFACE;
                 continue;
             }
         } else if (count || pending || !isogi_trace__nearest(t, cell, local, ISOGI_TRACE__DONE, texel)) break;
+        if (one && i < taps) {
+            double apart[2];
+            isogi_trace__apart(t, cell, local, texel, apart);
+            if (apart[0] > best[0] || (apart[0] >= best[0] && apart[1] >= best[1])) continue;
+            best[0] = apart[0], best[1] = apart[1], count = 0, total = 0;
+        }
         brick = t->bricks[isogi_trace__brick_of(t, texel, &slot)];
-        values[count] = brick->values + (size_t)slot * (size_t)t->values, error[count] = brick->error[slot], weight[count] = w;
+        r->values[count] = brick->values + (size_t)slot * (size_t)t->values;
+        r->error[count] = brick->error[slot], r->weight[count] = w;
         total += w, count++;
     }
-    for (i = 0; i < count; i++) weight[i] /= total;
+    for (i = 0; i < count; i++) r->weight[i] /= total;
     return count;
 }
 
@@ -1506,15 +1577,14 @@ ISOGI_API isogi_result isogi_trace_sample(const isogi_trace *trace, const float 
     int k, n, c;
     if (!trace || (count && (!points || !irradiance))) return ISOGI_INVALID;
     for (i = 0; i < count; i++) {
-        const float *values[8];
-        float errors[8];
-        double weight[8], sum[3] = {0, 0, 0}, variance = 0, rgb[3];
-        n = isogi_trace__taps(trace, points[i], values, errors, weight);
+        isogi_trace__reading r;
+        double sum[3] = {0, 0, 0}, variance = 0, rgb[3];
+        n = isogi_trace__taps(trace, points[i], &r);
         for (k = 0; k < n; k++) {
-            isogi_trace__irradiance(trace, values[k], rgb);
-            for (c = 0; c < 3; c++) sum[c] += weight[k] * rgb[c];
-            variance +=
-                weight[k] * (double)errors[k] * weight[k] * (double)errors[k]; /* texels are independent of each other */
+            double part = r.weight[k] * (double)r.error[k];
+            isogi_trace__irradiance(trace, r.values[k], rgb);
+            for (c = 0; c < 3; c++) sum[c] += r.weight[k] * rgb[c];
+            variance += part * part; /* texels are independent of each other */
         }
         for (c = 0; c < 3; c++) irradiance[i][c] = (float)sum[c];
         if (trace->scene.desc.mode == ISOGI_TRACE_TRANSFER) variance *= trace->brightness * trace->brightness;
@@ -1529,13 +1599,11 @@ ISOGI_API isogi_result isogi_trace_sample_transfer(const isogi_trace *trace, con
     int k, n, j;
     if (!trace || trace->scene.desc.mode != ISOGI_TRACE_TRANSFER || (count && (!points || !transfer))) return ISOGI_INVALID;
     for (i = 0; i < count; i++) {
-        const float *values[8];
-        float errors[8];
-        double weight[8];
-        n = isogi_trace__taps(trace, points[i], values, errors, weight);
+        isogi_trace__reading r;
+        n = isogi_trace__taps(trace, points[i], &r);
         for (j = 0; j < trace->values; j++) {
             double sum = 0;
-            for (k = 0; k < n; k++) sum += weight[k] * (double)values[k][j];
+            for (k = 0; k < n; k++) sum += r.weight[k] * (double)r.values[k][j];
             transfer[i * (size_t)trace->values + (size_t)j] = (float)sum;
         }
     }
@@ -1597,7 +1665,7 @@ static isogi_result isogi_trace__want(isogi_trace *t, const size_t texel[3], int
     return ISOGI_OK;
 }
 
-/* All eight texels lack a surface: the lookup will read the nearest that has one. */
+/* All texels around the point lack a surface: the lookup will read the nearest that has one. */
 static isogi_result isogi_trace__want_nearest(isogi_trace *t, const size_t cell[3], const double local[3]) {
     size_t texel[3];
     isogi_result result = ISOGI_OK;
@@ -1626,8 +1694,8 @@ ISOGI_API isogi_result isogi_trace_request(isogi_trace *trace, const float (*poi
         isogi_result result = ISOGI_OK;
         int k, lacking = 1;
         isogi_trace__cell(trace, points[i], cell, local);
-        for (k = 0; k < 8 && result == ISOGI_OK; k++) {
-            if (!(isogi_trace__corner(trace, cell, local, k, texel) > 0)) continue;
+        for (k = 0; k < isogi_trace__tap_count(trace) && result == ISOGI_OK; k++) {
+            if (!(isogi_trace__tap(trace, cell, local, k, texel) > 0)) continue;
             result = isogi_trace__want(trace, texel, 0);
             if (result == ISOGI_OK) lacking = lacking && isogi_trace__state(trace, texel) == ISOGI_TRACE__NO_SURFACE;
         }
