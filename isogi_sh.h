@@ -1657,7 +1657,7 @@ typedef struct isogi_sh__blocks {
     int is_double;
 } isogi_sh__blocks;
 
-static void isogi_sh__put(const isogi_sh__blocks *out, int i, double value) {
+ISOGI_SH__INLINE void isogi_sh__put(const isogi_sh__blocks *out, int i, double value) {
     if (out->is_double) ((double *)out->data)[i] = value;
     else ((float *)out->data)[i] = (float)value;
 }
@@ -1717,7 +1717,7 @@ static void isogi_sh__wigner_start(isogi_sh__wigner *w, int order, const isogi_s
 
 /* The 2x2 block of rows (cos, sin) n and columns (cos, sin) m of degree l, from A = d and B = (-1)^m' d of the other sign:
    Z(a) diag(A + B, A - B) Z(c) with p = n a + m c, q = n a - m c. */
-static void isogi_sh__put_block(const isogi_sh__blocks *out, int at, int l, int n, int m, double a, double b, const double p[2], const double q[2]) {
+ISOGI_SH__INLINE void isogi_sh__put_block(const isogi_sh__blocks *out, int at, int l, int n, int m, double a, double b, const double p[2], const double q[2]) {
     int width = 2 * l + 1, plus = at + width * (l + n) + l, minus = at + width * (l - n) + l;
     isogi_sh__put(out, plus + m, a * p[0] + b * q[0]);
     isogi_sh__put(out, plus - m, b * q[1] - a * p[1]);
@@ -1725,7 +1725,7 @@ static void isogi_sh__put_block(const isogi_sh__blocks *out, int at, int l, int 
     isogi_sh__put(out, minus - m, a * p[0] - b * q[0]);
 }
 
-static void isogi_sh__turn_product(double p[2], const double a[2], const double c[2], double sign) {
+ISOGI_SH__INLINE void isogi_sh__turn_product(double p[2], const double a[2], const double c[2], double sign) {
     p[0] = a[0] * c[0] - sign * a[1] * c[1];
     p[1] = a[1] * c[0] + sign * a[0] * c[1];
 }
@@ -1733,12 +1733,12 @@ static void isogi_sh__turn_product(double p[2], const double a[2], const double 
 /* Entries (n, m) and (m, n) of all degrees, n <= m, m > 0, by the recursion over l with n and m fixed:
    (l-1)(2l+1) d_l = a_lm a_ln (l(l-1) cos b - n m) d_{l-1} - l (2l-3) b_lm b_ln d_{l-2}, a and b as in the table. The bracket is
    taken from 1 - cos b or 1 + cos b, which are exact where it is small. */
-static void isogi_sh__wigner_pair(const isogi_sh__blocks *out, int order, int n, int m, const isogi_sh__wigner *w) {
+ISOGI_SH__INLINE void isogi_sh__wigner_pair(const isogi_sh__blocks *out, int order, int n, int m, const isogi_sh__wigner *w) {
     const double *fm = isogi_sh__table(m) + 1, *fn = n ? isogi_sh__table(n) + 1 + 2 * (m - n) : w->zonal[m + 1];
     double start = fabs(isogi_sh__turn_f64[m * (m + 1) * (m + 2) / 6 - 1 + n * (m + 1) - n * (n - 1) / 2 + m - n]) * (n ? 0.5 : 0.70710678118654752440);
     double near[2], far[2], across[2], back[2], a_before = 0, b_before = 0, a, b, sign = n & 1 ? -1 : 1, flip = (m + n) & 1 ? -1 : 1;
     int l, at = m * (4 * m * m - 1) / 3;
-    start = ldexp(start, m) * (1 - (double)m * w->excess);
+    start *= (double)((int32_t)1 << m) * (1 - (double)m * w->excess);
     a = start * w->cosine[m + n] * w->sine[m - n];
     b = start * w->cosine[m - n] * w->sine[m + n];
     isogi_sh__turn_product(near, w->a[n], w->c[m], 1);
@@ -1771,7 +1771,7 @@ static void isogi_sh__wigner_pair(const isogi_sh__blocks *out, int order, int n,
     }
 }
 
-static void isogi_sh__rotation_build_low(const isogi_sh__blocks *out, int order, const isogi_sh__euler *e) {
+ISOGI_SH__INLINE void isogi_sh__build_blocks(const isogi_sh__blocks *out, int order, const isogi_sh__euler *e) {
     isogi_sh__wigner w;
     double p = 1, difference = 0;
     int l, m, n, at = 0;
@@ -1790,6 +1790,17 @@ static void isogi_sh__rotation_build_low(const isogi_sh__blocks *out, int order,
         for (n = 0; n <= m; n++) isogi_sh__wigner_pair(out, order, n, m, &w);
 }
 
+/* Compiled once for each type, so that no entry asks for it. */
+static void isogi_sh__rotation_build_low(void *rotation, int is_double, int order, const isogi_sh__euler *e) {
+    isogi_sh__blocks out;
+    out.data = rotation, out.is_double = 1;
+    if (is_double) isogi_sh__build_blocks(&out, order, e);
+    else {
+        out.is_double = 0;
+        isogi_sh__build_blocks(&out, order, e);
+    }
+}
+
 /* Columns of the matrices are rotated unit vectors. */
 static void isogi_sh__rotation_build(void *rotation, int is_double, int order, const isogi_sh__euler *e) {
     double band[2 * ISOGI_SH_MAX_ORDER * ISOGI_SH__TOGETHER], other[2 * ISOGI_SH_MAX_ORDER * ISOGI_SH__TOGETHER];
@@ -1797,9 +1808,7 @@ static void isogi_sh__rotation_build(void *rotation, int is_double, int order, c
     size_t at = 0;
     int l, i, k, first;
     if (order <= ISOGI_SH__TURNS + 1) {
-        isogi_sh__blocks out;
-        out.data = rotation, out.is_double = is_double;
-        isogi_sh__rotation_build_low(&out, order, e);
+        isogi_sh__rotation_build_low(rotation, is_double, order, e);
         return;
     }
     isogi_sh__turns_start(&turns, order, e);
