@@ -27,6 +27,7 @@
 
 enum { LAMBERT, PHONG, VICINITY, IRRADIANCE, TRANSFER, PATHTRACE, DVR, SCALE_INVARIANT, MODE_COUNT };
 static const char *const mode_name[MODE_COUNT] = {"lambert", "phong", "vicinity", "irradiance", "transfer", "pathtrace", "dvr", "scale-invariant"};
+static const char *const lookup_name[] = {"trilinear", "nearest", "closest-isovalue", "bspline"};
 static const char *const shading_name[3] = {"unlit", "visibility", "local"};
 
 typedef struct scene {
@@ -70,7 +71,7 @@ static const scene scenes[] = {
 typedef struct options {
     const char *volume, *env, *tf, *out;
     const scene *scene;
-    int width, height, mode, raycast, bounces, samples, threads, stats, antialias, shading, order, directions;
+    int width, height, mode, raycast, bounces, samples, threads, stats, antialias, shading, order, directions, lookup;
     int has_size, has_iso, has_mode, has_spacing, has_albedo, has_clip, has_camera, has_up, has_nan, has_shading, has_bounces;
     double isovalue, spacing[3], clip[4], azimuth, elevation, distance, up[3], exposure, nan_value;
     float albedo[3];
@@ -144,7 +145,7 @@ static int parse_name(const char *text, const char *const *names, int count, int
 }
 static int parse_mode(viewer *v, const char *text) { return parse_name(text, mode_name, MODE_COUNT, &v->o.mode); }
 static int parse_shading(viewer *v, const char *text) { return parse_name(text, shading_name, 3, &v->o.shading); }
-static int parse_lookup(viewer *v, const char *text) { return (void)v, !strcmp(text, "trilinear"); }
+static int parse_lookup(viewer *v, const char *text) { return parse_name(text, lookup_name, 4, &v->o.lookup); }
 
 static int parse_size(viewer *v, const char *text) {
     double x[2];
@@ -226,7 +227,8 @@ static const option option_list[] = {
     {"--bounces", "N", "reflections of light; -1 = all, the default", INTEGER, AT(bounces), AT(has_bounces), 1, -1, 1000, 0, "a whole number, -1 to 1000"},
     {"--samples", "N", "paths per texel, or per pixel for pathtrace; default 64", INTEGER, AT(samples), 0, 1, 1, 1000000, 0, "a whole number, 1 to 1000000"},
     {"--lattice", "X,Y,Z", "texels of the illumination texture; default one per voxel", SIZES, AT(lattice), 0, 3, 2, 4096, 0, "three whole numbers, 2 to 4096"},
-    {"--lookup", "NAME", "how the texture is read: trilinear", OTHER, 0, 0, 0, 0, 0, parse_lookup, "trilinear"},
+    {"--lookup", "NAME", "how the texture is read: trilinear, nearest, closest-isovalue, bspline", OTHER, 0, 0, 0, 0, 0, parse_lookup,
+     "trilinear, nearest, closest-isovalue or bspline"},
     {"--tf", "FILE", "transfer function: lines \"value extinction r g b\" or \"peak value opacity r g b\"", TEXT, AT(tf), 0, 0, 0, 0, 0, ""},
     {"--shading", "NAME", "for dvr and scale-invariant: unlit, visibility, local", OTHER, 0, AT(has_shading), 0, 0, 0, parse_shading, "unlit visibility local"},
     {"--exposure", "X", "factor on the light, in place of the automatic exposure", NUMBERS, AT(exposure), 0, 1, 1e-12, 1e12, 0, "a number above 0"},
@@ -410,6 +412,8 @@ static int load_volume(viewer *v) {
         if (s) name = v->path;
         if (!volume_read(name, &v->volume, v->error)) return 0;
     }
+    if (v->o.has_nan && v->volume.type == ISOGI_F32 && fabs(v->o.nan_value) > 3.4e38)
+        return file_fail(v->error, "--nan %g is too large for voxels of type float32", v->o.nan_value);
     bad = volume_not_finite(&v->volume, v->o.has_nan ? &v->o.nan_value : NULL, &at);
     if (bad && !v->o.has_nan)
         return file_fail(v->error, "%s: voxel %zu,%zu,%zu and %zu others are not finite numbers; --nan V puts a value in their place", name,
@@ -666,7 +670,11 @@ static int view_sample(viewer *v, int sample) {
 
 static int view_surface(viewer *v) {
     size_t pixels = (size_t)v->o.width * (size_t)v->o.height;
-    double begun = seconds();
+    double begun = seconds(), bytes = (double)pixels * v->o.antialias * (sizeof **v->inverse + sizeof **v->seen);
+    double machine = (double)sysconf(_SC_PHYS_PAGES) * (double)sysconf(_SC_PAGESIZE);
+    if (machine > 0 && bytes > machine / 2)
+        return file_fail(v->error, "--size %dx%d with --aa %d needs %.1f GiB of this machine's %.1f GiB", v->o.width, v->o.height, v->o.antialias,
+                         bytes / 0x1p30, machine / 0x1p30);
     if (!v->o.raycast) {
         isogi_mesh_desc desc = {.isovalue = v->isovalue, .normals = 1};
         isogi_result result = isogi_vol_mesh(v->pyramid, &desc, &v->mesh);
@@ -693,6 +701,7 @@ static int view_surface(viewer *v) {
 static isogi_trace_desc describe_trace(const viewer *v) {
     isogi_trace_desc desc = {.pyramid = v->pyramid, .lighting = v->lighting, .bounces = v->o.mode == VICINITY ? 0 : v->o.bounces,
                              .samples = v->o.samples, .lazy = 1};
+    desc.lookup = (isogi_trace_lookup)v->o.lookup; /* names in the order of the enum */
     desc.mode = v->o.mode == TRANSFER ? ISOGI_TRACE_TRANSFER : ISOGI_TRACE_IRRADIANCE;
     if (v->o.mode == TRANSFER) memset(&desc.lighting, 0, sizeof desc.lighting);
     memcpy(desc.albedo, v->albedo, sizeof desc.albedo);
@@ -753,7 +762,7 @@ static int bake(viewer *v) {
 
 /* ---- colours of what is seen --------------------------------------------------------------------------------------------------------------------------- */
 
-enum { BATCH = 256 };
+enum { BATCH = 4096, BAND = 16 }; /* samples shaded at once; rows of a task: a batch for path tracing sets up the light anew */
 typedef struct shade_batch {
     size_t count, pixel[BATCH];
     uint32_t seen[BATCH];
@@ -762,8 +771,8 @@ typedef struct shade_batch {
 
 typedef struct shade_job {
     view_job view;
-    double *row_error, *row_light; /* sums over the lit samples of a row, for the error estimate */
-    isogi_result *row_result;
+    double *band_error, *band_light; /* sums over the lit samples of a band of rows, for the error estimate */
+    isogi_result *band_result;
 } shade_job;
 
 static void mesh_normal(const viewer *v, uint32_t triangle, const float point[3], float n[3]) {
@@ -892,7 +901,7 @@ static isogi_result light_batch(const shade_job *job, shade_batch *b) {
     return isogi_trace_gather(&desc, (const float(*)[3])b->point, NULL, b->count, b->irradiance, b->error, &serial);
 }
 
-static isogi_result shade_batch_now(shade_job *job, shade_batch *b, size_t row) {
+static isogi_result shade_batch_now(shade_job *job, shade_batch *b, size_t band) {
     viewer *v = job->view.v;
     isogi_result result;
     if (!b->count) return ISOGI_OK;
@@ -904,57 +913,63 @@ static isogi_result shade_batch_now(shade_job *job, shade_batch *b, size_t row) 
         for (int c = 0; c < 3; c++) out[c] += rgb[c] / (float)v->o.antialias;
         out[3] += 1 / (float)v->o.antialias;
         if (v->o.mode <= PHONG || b->seen[i] == SECTION || !(b->error[i] < 1e30f)) continue;
-        job->row_error[row] += (double)b->error[i];
-        job->row_light[row] += picture_luminance(b->irradiance[i]);
+        job->band_error[band] += (double)b->error[i];
+        job->band_light[band] += picture_luminance(b->irradiance[i]);
     }
     b->count = 0;
     return result;
 }
 
-static void shade_row(void *arg, size_t row) {
+static void shade_band(void *arg, size_t band) {
     shade_job *job = (shade_job *)arg;
     const viewer *v = job->view.v;
     const float *inverse = v->inverse[job->view.sample];
     const uint32_t *seen = v->seen[job->view.sample];
+    size_t width = (size_t)v->o.width, at = band * BAND * width, end = at + BAND * width;
     isogi_result result = ISOGI_OK;
     shade_batch *b = (shade_batch *)malloc(sizeof *b);
     if (!b) {
-        job->row_result[row] = ISOGI_NO_MEMORY;
+        job->band_result[band] = ISOGI_NO_MEMORY;
         return;
     }
-    memset(b, 0, sizeof *b);
-    for (int x = 0; x < v->o.width && result == ISOGI_OK; x++) {
-        size_t at = row * (size_t)v->o.width + (size_t)x, i = b->count;
+    if (end > width * (size_t)v->o.height) end = width * (size_t)v->o.height;
+    b->count = 0;
+    for (; at < end && result == ISOGI_OK; at++) {
+        size_t i = b->count;
         if (seen[at] == RASTER_NONE) continue;
-        sample_ray(&job->view, x, (int)row, b->dir[i]);
+        sample_ray(&job->view, (int)(at % width), (int)(at / width), b->dir[i]);
         point_at(v, b->dir[i], 1 / (double)inverse[at], b->point[i]);
         b->pixel[i] = at, b->seen[i] = seen[at], b->count++;
-        if (b->count == BATCH) result = shade_batch_now(job, b, row);
+        if (b->count == BATCH) result = shade_batch_now(job, b, band);
     }
-    if (result == ISOGI_OK) result = shade_batch_now(job, b, row);
-    job->row_result[row] = result;
+    if (result == ISOGI_OK) result = shade_batch_now(job, b, band);
+    job->band_result[band] = result;
     free(b);
 }
 
 static int shade_surface(viewer *v) {
-    size_t rows = (size_t)v->o.height;
+    size_t bands = ((size_t)v->o.height + BAND - 1) / BAND;
     double begun = seconds(), error = 0, light = 0;
     isogi_result result = ISOGI_OK;
     shade_job job = {.view = {.v = v}};
-    job.row_error = (double *)calloc(rows, sizeof *job.row_error), job.row_light = (double *)calloc(rows, sizeof *job.row_light);
-    job.row_result = (isogi_result *)calloc(rows, sizeof *job.row_result);
-    if (!job.row_error || !job.row_light || !job.row_result) result = ISOGI_NO_MEMORY;
+    job.band_error = (double *)calloc(bands, sizeof *job.band_error), job.band_light = (double *)calloc(bands, sizeof *job.band_light);
+    job.band_result = (isogi_result *)calloc(bands, sizeof *job.band_result);
+    if (!job.band_error || !job.band_light || !job.band_result) result = ISOGI_NO_MEMORY;
     for (int s = 0; s < v->o.antialias && result == ISOGI_OK; s++) {
         job.view.sample = s;
         sample_offset(v, s, &job.view.x_offset, &job.view.y_offset);
-        result = isogi_parallel(&v->context, rows, shade_row, &job, 0, 0);
+        result = isogi_parallel(&v->context, bands, shade_band, &job, 0, 0);
         if (v->o.mode == PATHTRACE) say(v, "tracing paths", (s + 1.0) / v->o.antialias, begun);
     }
-    for (size_t row = 0; row < rows && result == ISOGI_OK; row++) result = job.row_result[row], error += job.row_error[row], light += job.row_light[row];
-    free(job.row_error), free(job.row_light), free(job.row_result);
+    for (size_t band = 0; band < bands && result == ISOGI_OK; band++)
+        result = job.band_result[band], error += job.band_error[band], light += job.band_light[band];
+    free(job.band_error), free(job.band_light), free(job.band_result);
     if (result != ISOGI_OK) return fail(v, "the light", result);
     stat_seconds(v, "shade", begun);
-    if (v->o.mode > PHONG) stat_line(v, "error_relative", "%.4g", light > 0 ? error / light / (v->o.mode == PATHTRACE ? sqrt((double)v->o.antialias) : 1) : 0);
+    /* one path tells nothing about its own error: then nothing is known */
+    if (v->o.mode > PHONG && light > 0)
+        stat_line(v, "error_relative", "%.4g", error / light / (v->o.mode == PATHTRACE ? sqrt((double)v->o.antialias) : 1));
+    else if (v->o.mode > PHONG) stat_line(v, "error_relative", "unknown");
     return 1;
 }
 

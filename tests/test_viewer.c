@@ -278,6 +278,13 @@ TEST(bad_environments_and_transfer_functions_get_one_line) {
         snprintf(command, sizeof command, "procedural:gyroid:8 --mode dvr --size 8x8 --tf '%s' --out '%s'", path, temporary("never.png"));
         check_refused(command, tf[i][1]);
     }
+    {
+        FILE *file = fopen(temporary("bad.txt"), "w");
+        for (int i = 0; i < 257; i++) fprintf(file, "peak %d .1 1 1 1\n", i);
+        fclose(file);
+        snprintf(command, sizeof command, "procedural:gyroid:8 --mode dvr --size 8x8 --tf '%s' --out '%s'", temporary("bad.txt"), temporary("never.png"));
+        check_refused(command, "line 257");
+    }
     check_refused("procedural:gyroid:8 --env /nowhere/at/all.hdr", "/nowhere/at/all.hdr");
     check_refused("procedural:gyroid:8 --mode dvr --tf /nowhere.txt", "/nowhere.txt");
 }

@@ -18,8 +18,8 @@
 
 #define FILE_ERROR_SIZE 512
 
-/* Writes the message and returns 0, so that a failing function can end with it. Control characters that came from a file or a
-   name are shown as '?', so that the message stays one line. */
+/* Writes the message and returns 0, so that a failing function can end with it. Whatever came from a file or a name and is not
+   plain ASCII is shown as '?', so that the message stays one line of text. */
 #if defined(__GNUC__)
 __attribute__((format(printf, 2, 3)))
 #endif
@@ -30,7 +30,7 @@ static inline int file_fail(char *error, const char *format, ...) {
     vsnprintf(error, FILE_ERROR_SIZE, format, values);
     va_end(values);
     for (c = error; *c; c++)
-        if ((unsigned char)*c < 32 || *c == 127) *c = '?';
+        if ((unsigned char)*c < 32 || (unsigned char)*c >= 127) *c = '?';
     return 0;
 }
 

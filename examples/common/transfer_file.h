@@ -12,7 +12,7 @@
 #include "files.h"
 #include "isogi_dvr.h"
 
-#define TRANSFER_FILE_LIMIT 4096
+#define TRANSFER_FILE_LIMIT 4096 /* points; peaks are limited by ISOGI_DVR_MAX_PEAKS */
 
 typedef struct transfer_file {
     isogi_transfer transfer; /* points into the arrays below */
@@ -51,7 +51,8 @@ static inline int transfer_line(transfer_file *t, const char *line, int number, 
     for (i = 2; i < 5; i++)
         if (x[i] < 0 || x[i] > 1) return file_fail(error, "line %d: a colour is 0 to 1", number);
     if (!peak && t->point_count && x[0] < t->points[t->point_count - 1].value) return file_fail(error, "line %d: values must ascend", number);
-    if ((peak ? t->peak_count : t->point_count) >= TRANSFER_FILE_LIMIT) return file_fail(error, "has more than %d lines", TRANSFER_FILE_LIMIT);
+    if (t->point_count >= TRANSFER_FILE_LIMIT && !peak) return file_fail(error, "line %d: more than %d points", number, TRANSFER_FILE_LIMIT);
+    if (t->peak_count >= ISOGI_DVR_MAX_PEAKS && peak) return file_fail(error, "line %d: more than %d peaks", number, ISOGI_DVR_MAX_PEAKS);
     if (peak) {
         isogi_peak *p = &t->peaks[t->peak_count++];
         p->isovalue = x[0], p->opacity = (float)x[1];
@@ -70,7 +71,7 @@ static inline int transfer_parse(const char *text, transfer_file *t, char *error
     int number = 1, ok = 1;
     memset(&parsed, 0, sizeof parsed);
     parsed.points = (isogi_transfer_point *)malloc(TRANSFER_FILE_LIMIT * sizeof *parsed.points);
-    parsed.peaks = (isogi_peak *)malloc(TRANSFER_FILE_LIMIT * sizeof *parsed.peaks);
+    parsed.peaks = (isogi_peak *)malloc(ISOGI_DVR_MAX_PEAKS * sizeof *parsed.peaks);
     if (!parsed.points || !parsed.peaks) ok = file_fail(error, "out of memory");
     while (ok && *text) {
         char line[256];
