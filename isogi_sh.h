@@ -58,6 +58,7 @@
    Determinism  The same input on the same instruction path gives the same bits. Paths agree within the float errors below.
    Accuracy     Largest absolute error against 128 bits, poles and all: double 1e-15 at degree 4, 3e-15 at 10, 1e-14 at 20, 6e-14 at 50,
                 2e-13 at 100; float 4.5e-7 at 4, 2.2e-6 at 10, 1e-5 at 20. tests/test_sh.c states and checks each.
+                All bounds assume IEEE arithmetic: -ffast-math may reorder what cancels, and costs up to four times as much.
    Limits       Order 1..101 (degree 0..100), 1..16 channels. Counts times order^2 must be addressable.
 
    Conventions  Real, orthonormal, without the Condon-Shortley phase, index i = l (l + 1) + m (ACN). Y1..Y3 = sqrt(3 / 4 pi) (y, z, x).
