@@ -2054,6 +2054,16 @@ ISOGI_API isogi_result isogi_sh_cosine_zonal(float *zonal, int order) {
     return ISOGI_OK;
 }
 
+/* For results in float: squares of floats stay within the range of double, and the low part of z would not show at order 5. */
+static isogi_sh__unit isogi_sh__normalise_f32(const float d[3]) {
+    isogi_sh__unit u = {0, 0, 1, 0};
+    double x = (double)d[0], y = (double)d[1], z = (double)d[2], square = x * x + y * y + z * z, inverse;
+    if (!isogi_sh__finite_f64(square) || square <= 0) return u;
+    inverse = 1 / sqrt(square);
+    u.x = x * inverse, u.y = y * inverse, u.z = z * inverse;
+    return u;
+}
+
 /* Order 5, unrolled: the recursion of the basis with the lobe's factors instead of a sum over channels. */
 static void isogi_sh__zonal_order5(float *c, const float *zonal, isogi_sh__unit u) {
     static const double factor[5] = {3.5449077018110321, 2.0466534158929770, 1.5853309190424045, 1.3398491713813586, 1.1816359006036774};
@@ -2088,7 +2098,7 @@ ISOGI_API isogi_result isogi_sh_zonal_to_direction(float *c, int order, const fl
     int l, i;
     if (!c || !zonal || !direction || !isogi_sh__order_ok(order)) return ISOGI_INVALID;
     if (order == 5) {
-        isogi_sh__zonal_order5(c, zonal, isogi_sh__normalise((double)direction[0], (double)direction[1], (double)direction[2]));
+        isogi_sh__zonal_order5(c, zonal, isogi_sh__normalise_f32(direction));
         return ISOGI_OK;
     }
     for (l = 0; l < order; l++) scale[l] = isogi_sh__zonal_factor(l) * (double)zonal[l];
