@@ -1968,7 +1968,7 @@ ISOGI_VOL__TARGET("avx2") static int isogi_vol__aim_avx2(isogi_vol__walk *w, con
     const __m256d zero = _mm256_setzero_pd(), unlimited = _mm256_set1_pd(ISOGI_VOL__UNLIMITED), minus = _mm256_set1_pd(-0.0);
     const __m256d box = _mm256_loadu_pd(p->box);
     const __m256i infinite = _mm256_set1_epi64x(0x7ff0000000000000);
-    __m256d d, size, keep, inverse, rising, near, far, still, t0, t1, origin = _mm256_loadu_pd(w->origin);
+    __m256d d, size, keep, inverse, rising, front, back, still, t0, t1, origin = _mm256_loadu_pd(w->origin);
     double enter, leave;
     d = _mm256_mul_pd(_mm256_loadu_pd(p->grid_axis[0]), _mm256_set1_pd((double)dir[0]));
     d = _mm256_add_pd(d, _mm256_mul_pd(_mm256_loadu_pd(p->grid_axis[1]), _mm256_set1_pd((double)dir[1])));
@@ -1981,8 +1981,8 @@ ISOGI_VOL__TARGET("avx2") static int isogi_vol__aim_avx2(isogi_vol__walk *w, con
     keep = _mm256_cmp_pd(size, _mm256_mul_pd(_mm256_set1_pd(1e-30), keep), _CMP_GT_OQ);
     d = _mm256_and_pd(d, keep), inverse = _mm256_and_pd(_mm256_div_pd(_mm256_set1_pd(1), d), keep);
     rising = _mm256_cmp_pd(d, zero, _CMP_GT_OQ), still = _mm256_cmp_pd(d, zero, _CMP_EQ_OQ);
-    near = _mm256_andnot_pd(rising, box), far = _mm256_and_pd(rising, box);
-    t0 = _mm256_mul_pd(_mm256_sub_pd(near, origin), inverse), t1 = _mm256_mul_pd(_mm256_sub_pd(far, origin), inverse);
+    front = _mm256_andnot_pd(rising, box), back = _mm256_and_pd(rising, box);
+    t0 = _mm256_mul_pd(_mm256_sub_pd(front, origin), inverse), t1 = _mm256_mul_pd(_mm256_sub_pd(back, origin), inverse);
     keep = _mm256_and_pd(_mm256_cmp_pd(origin, zero, _CMP_GE_OQ), _mm256_cmp_pd(origin, box, _CMP_LE_OQ));
     if (_mm256_movemask_pd(_mm256_andnot_pd(keep, still))) return 0;
     t0 = _mm256_blendv_pd(t0, _mm256_xor_pd(unlimited, minus), still), t1 = _mm256_blendv_pd(t1, unlimited, still);
@@ -1992,7 +1992,7 @@ ISOGI_VOL__TARGET("avx2") static int isogi_vol__aim_avx2(isogi_vol__walk *w, con
     if (!(enter <= leave)) return 0;
     origin = _mm256_add_pd(origin, _mm256_mul_pd(_mm256_set1_pd(enter), d));
     origin = _mm256_min_pd(_mm256_max_pd(origin, zero), box);
-    t1 = _mm256_blendv_pd(_mm256_mul_pd(_mm256_sub_pd(far, origin), inverse), unlimited, still);
+    t1 = _mm256_blendv_pd(_mm256_mul_pd(_mm256_sub_pd(back, origin), inverse), unlimited, still);
     w->base = enter, w->t = 0, w->end = isogi_vol__least4(t1);
     w->end_is_border = !(tmax - enter < w->end);
     w->end = isogi_vol__min(w->end, tmax - enter);
