@@ -333,7 +333,8 @@ ISOGI_API isogi_result isogi_sh_fit_directional(float direction[3], float rgb[3]
 #define ISOGI_SH__DERING_ORDER 32
 #define ISOGI_SH__GROUP 5     /* orders m that are projected in one pass */
 
-#if !defined(ISOGI_NO_SIMD) && defined(__x86_64__) && (defined(__clang__) || (defined(__GNUC__) && __GNUC__ >= 12))
+/* gcc for Windows does not align its stack for 32-byte vectors: no wide paths there */
+#if !defined(ISOGI_NO_SIMD) && defined(__x86_64__) && (defined(__clang__) || (defined(__GNUC__) && __GNUC__ >= 12 && !defined(_WIN32)))
 #define ISOGI_SH__SIMD 1
 #endif
 #if defined(__clang__)

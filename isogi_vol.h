@@ -309,7 +309,8 @@ ISOGI_API void isogi_vol_mesh_free(const isogi_pyramid *pyramid, isogi_mesh *mes
 #define ISOGI_VOL__SSE2
 #include <emmintrin.h>
 #endif
-#if defined(ISOGI_VOL__SSE2) && defined(__x86_64__) && (defined(__GNUC__) || defined(__clang__)) && !defined(__TINYC__)
+/* gcc for Windows does not align its stack for 32-byte vectors: no wide paths there */
+#if defined(ISOGI_VOL__SSE2) && defined(__x86_64__) && (defined(__clang__) || (defined(__GNUC__) && !defined(_WIN32))) && !defined(__TINYC__)
 #define ISOGI_VOL__AVX
 #define ISOGI_VOL__TARGET(features) __attribute__((target(features)))
 #include <immintrin.h>

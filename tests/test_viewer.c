@@ -186,6 +186,23 @@ TEST(the_number_of_threads_changes_no_byte) {
     CHECK(size[0] > 100 && size[0] == size[1] && !memcmp(text[0], text[1], size[0]), "%zu and %zu bytes", size[0], size[1]);
 }
 
+TEST(every_lookup_draws_a_picture_of_its_own) {
+    static const char *const names[5] = {"", "--lookup trilinear", "--lookup nearest", "--lookup closest-isovalue", "--lookup bspline"};
+    char text[5][1 << 15], command[512];
+    size_t size[5];
+    for (int i = 0; i < 5; i++) {
+        const char *out = temporary("lookup.png");
+        snprintf(command, sizeof command, "procedural:gyroid:32 --samples 8 --size 64x48 %s --out '%s'", names[i], out);
+        CHECK(run_viewer(command).status == 0, "%s", command);
+        size[i] = read_text(out, text[i], sizeof text[i]);
+    }
+    for (int i = 0; i < 5; i++)
+        for (int k = i + 1; k < 5; k++) {
+            int same = size[i] == size[k] && !memcmp(text[i], text[k], size[i]);
+            CHECK(size[i] > 100 && same == (i == 0 && k == 1), "\"%s\" and \"%s\": %s", names[i], names[k], same ? "the same" : "different");
+        }
+}
+
 /* ---- what is refused --------------------------------------------------------------------------------------------------------------------- */
 
 TEST(silly_options_get_one_line_that_names_the_option) {
