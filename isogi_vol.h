@@ -1727,7 +1727,11 @@ static int isogi_vol__walk_on(isogi_vol__walk *w, uint32_t flags, isogi_hit *hit
         int before[3], changed = 0;
         double t;
         if (isogi_vol__uniform_block(w, top, low, high, &inside)) {
-            if (isogi_vol__state(w, inside, hit)) return 1;
+            /* Blocks share their faces' voxels, so neighbours that lie on different sides share a face without a finite value: no
+               surface there. */
+            if (w->pyramid->all_finite || w->cap == 2) {
+                if (isogi_vol__state(w, inside, hit)) return 1;
+            } else w->inside = inside;
             w->deflate = 0;
             t = isogi_vol__exit(w, low, high, &axis);
         } else {
