@@ -693,34 +693,18 @@ static int isogi_dvr__begin(isogi_dvr__march *m, const isogi_dvr *d, const doubl
     return 1;
 }
 
-#define ISOGI_DVR__READ(T)                                                                                                       \
-    for (i = 0; i < 8; i++)                                                                                                      \
-        m->corner[i] = v->scale * (double)*(const T *)(const void *)(p + (i & 1 ? dx : 0) + (i & 2 ? dy : 0) + (i & 4 ? dz : 0)) \
-                       + v->bias;                                                                                                \
-    break;
-
 /* Corner x + 2y + 4z of the present cell. */
 static void isogi_dvr__fetch(isogi_dvr__march *m) {
-    const isogi_volume *v = &m->dvr->volume;
-    const char *p = (const char *)v->data + m->cell[0] * v->stride[0] + m->cell[1] * v->stride[1] + m->cell[2] * v->stride[2];
-    ptrdiff_t dx = m->dvr->cells[0] ? v->stride[0] : 0, dy = m->dvr->cells[1] ? v->stride[1] : 0, dz = m->dvr->cells[2] ? v->stride[2] : 0;
+    uint32_t cell[3];
     int i;
-    switch (v->type) {
-    case ISOGI_U8: ISOGI_DVR__READ(uint8_t)
-    case ISOGI_I8: ISOGI_DVR__READ(int8_t)
-    case ISOGI_U16: ISOGI_DVR__READ(uint16_t)
-    case ISOGI_I16: ISOGI_DVR__READ(int16_t)
-    case ISOGI_F32: ISOGI_DVR__READ(float)
-    case ISOGI_F64: ISOGI_DVR__READ(double)
-    }
-    m->finite = 1, m->low = m->high = m->corner[0];
-    for (i = 0; i < 8; i++) {
-        m->finite &= isogi_dvr__finite64(m->corner[i]);
+    for (i = 0; i < 3; i++) cell[i] = (uint32_t)m->cell[i];
+    m->finite = isogi_volume_corners(&m->dvr->volume, cell, m->corner);
+    m->low = m->high = m->corner[0];
+    for (i = 1; i < 8; i++) {
         if (m->corner[i] < m->low) m->low = m->corner[i];
         if (m->corner[i] > m->high) m->high = m->corner[i];
     }
 }
-#undef ISOGI_DVR__READ
 
 /* The trilinear value, kept within the corners' range (rounding may not carry it into extinction that the range excludes), and
    its derivative along the ray, per t. */

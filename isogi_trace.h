@@ -175,7 +175,7 @@ ISOGI_API isogi_result isogi_trace_sample(const isogi_trace *trace, const float 
 ISOGI_API isogi_result isogi_trace_relight(isogi_trace *trace, const isogi_lighting *lighting);
 /* TRANSFER only: interpolated coefficients, transfer[count][order*order][channels]; E = sum_i transfer_i light_i. */
 ISOGI_API isogi_result isogi_trace_sample_transfer(const isogi_trace *trace, const float (*points)[3], size_t count, float *transfer);
-/* Texels along each axis, order (0 for IRRADIANCE), channels (3 for IRRADIANCE). Any of them may be NULL. */
+/* Texels along each axis, order (0 for IRRADIANCE), channels (3 for IRRADIANCE). Any of them may be NULL. Of no trace: zeros. */
 ISOGI_API void isogi_trace_shape(const isogi_trace *trace, size_t lattice[3], int *order, int *channels);
 
 /* Albedo at an isovalue, as the description defines it. */
@@ -187,9 +187,10 @@ ISOGI_API void isogi_trace_albedo(const isogi_trace_desc *desc, double isovalue,
 ISOGI_API isogi_result isogi_trace_gather(const isogi_trace_desc *desc, const float (*points)[3], const float (*normals)[3], size_t count,
                                           float (*irradiance)[3], float *error, const isogi_context *context);
 
-/* 1 where the texel lies on an isosurface of its own, 0 where there is none and it is left out of every lookup. */
+/* 1 where the texel lies on an isosurface of its own, 0 where there is none and it is left out of every lookup; 0 for NULL and beyond the
+   lattice. */
 ISOGI_API int isogi_trace_valid(const isogi_trace *trace, const size_t texel[3]);
-ISOGI_API void isogi_trace_counters(const isogi_trace *trace, isogi_counters *counters); /* adds what was done so far */
+ISOGI_API void isogi_trace_counters(const isogi_trace *trace, isogi_counters *counters); /* adds what was done so far; NULL does nothing */
 
 #endif /* ISOGI_TRACE_H */
 
@@ -546,21 +547,6 @@ static int isogi_trace__light_beam(const isogi_light *light, const double point[
 
 /* ==== voxels and texels ============================================================================================== */
 
-static double isogi_trace__voxel(const isogi_volume *v, size_t x, size_t y, size_t z) {
-    const char *p =
-        (const char *)v->data + (ptrdiff_t)x * v->stride[0] + (ptrdiff_t)y * v->stride[1] + (ptrdiff_t)z * v->stride[2];
-    double raw = 0;
-    switch (v->type) {
-    case ISOGI_U8: raw = *(const uint8_t *)(const void *)p; break;
-    case ISOGI_I8: raw = *(const int8_t *)(const void *)p; break;
-    case ISOGI_U16: raw = *(const uint16_t *)(const void *)p; break;
-    case ISOGI_I16: raw = *(const int16_t *)(const void *)p; break;
-    case ISOGI_F32: raw = (double)*(const float *)(const void *)p; break;
-    case ISOGI_F64: raw = *(const double *)(const void *)p; break;
-    }
-    return v->scale * raw + v->bias;
-}
-
 /* Exact at both ends, where the other value is not even looked at. */
 static double isogi_trace__lerp(double a, double b, double u) { return u > 0 ? u < 1 ? (1 - u) * a + u * b : b : a; }
 
@@ -583,32 +569,15 @@ static int isogi_trace__locate(const isogi_volume *v, const double grid[3], isog
 static double isogi_trace__value(const isogi_volume *v, const isogi_hit *place) {
     double c[8], low = DBL_MAX, high = -DBL_MAX, value;
     int i;
-    for (i = 0; i < 8; i++) {
-        c[i] = isogi_trace__voxel(v, place->cell[0] + (size_t)(i & 1), place->cell[1] + (size_t)(i >> 1 & 1),
-                                  place->cell[2] + (size_t)(i >> 2));
-        low = c[i] < low ? c[i] : low, high = c[i] > high ? c[i] : high;
-    }
+    isogi_volume_corners(v, place->cell, c);
+    for (i = 0; i < 8; i++) low = c[i] < low ? c[i] : low, high = c[i] > high ? c[i] : high;
     for (i = 0; i < 8; i += 2) c[i] = isogi_trace__lerp(c[i], c[i + 1], place->local[0]);
     for (i = 0; i < 8; i += 4) c[i] = isogi_trace__lerp(c[i], c[i + 2], place->local[1]);
     value = isogi_trace__lerp(c[0], c[4], place->local[2]);
     return value < low ? low : value > high ? high : value;
 }
 
-/* Least and largest voxel in [low, high], both ends included: exact. */
-static void isogi_trace__voxel_range(const isogi_volume *v, const size_t low[3], const size_t high[3], double range[2]) {
-    size_t x, y, z;
-    range[0] = DBL_MAX, range[1] = -DBL_MAX;
-    for (z = low[2]; z <= high[2]; z++)
-        for (y = low[1]; y <= high[1]; y++)
-            for (x = low[0]; x <= high[0]; x++) {
-                double value = isogi_trace__voxel(v, x, y, z);
-                if (!isogi_trace__finite(value)) continue;
-                if (value < range[0]) range[0] = value;
-                if (value > range[1]) range[1] = value;
-            }
-}
-
-/* The same from the pyramid's finest level at which few blocks are read: bounds that may be too wide. */
+/* Bounds of the voxels in [low, high] that may be too wide: from the finest level of the pyramid at which few blocks are read. */
 static void isogi_trace__block_range(const isogi_pyramid *pyramid, const size_t low[3], const size_t high[3], double range[2]) {
     size_t first[3], last[3], x, y, z;
     isogi_level level;
@@ -1199,7 +1168,7 @@ static int isogi_trace__texel_site(const isogi_trace *t, const size_t texel[3], 
         if (site->place.local[a] <= 0 && low[a]) low[a]--;
         if (site->place.local[a] >= 1 && high[a] + 1 < v->size[a]) high[a]++;
     }
-    isogi_trace__voxel_range(v, low, high, range);
+    isogi_volume_range(v, low, high, range);
     if (!(range[0] < site->isovalue) && !(border && t->scene.desc.capped)) return 0;
     return isogi_trace__site_normal(&t->scene, site);
 }
@@ -1226,7 +1195,7 @@ static int isogi_trace__in_range(const isogi_trace *t, const size_t low[3], cons
     isogi_trace__block_range(t->scene.pyramid, first, last, range);
     if (!((cut || range[0] < d->isovalue_max) && range[1] >= d->isovalue_min)) return 0;
     if (voxels > 125) return 1;
-    isogi_trace__voxel_range(v, first, last, range);
+    isogi_volume_range(v, first, last, range);
     return (cut || range[0] < d->isovalue_max) && range[1] >= d->isovalue_min;
 }
 
@@ -1621,6 +1590,12 @@ ISOGI_API isogi_result isogi_trace_relight(isogi_trace *trace, const isogi_light
 }
 
 ISOGI_API void isogi_trace_shape(const isogi_trace *trace, size_t lattice[3], int *order, int *channels) {
+    if (!trace) {
+        if (lattice) memset(lattice, 0, sizeof trace->lattice);
+        if (order) *order = 0;
+        if (channels) *channels = 0;
+        return;
+    }
     if (lattice) memcpy(lattice, trace->lattice, sizeof trace->lattice);
     if (order) *order = trace->scene.desc.mode == ISOGI_TRACE_TRANSFER ? trace->scene.desc.order : 0;
     if (channels) *channels = trace->scene.desc.mode == ISOGI_TRACE_TRANSFER ? trace->scene.desc.transfer_channels : 3;
@@ -1629,13 +1604,16 @@ ISOGI_API void isogi_trace_shape(const isogi_trace *trace, size_t lattice[3], in
 ISOGI_API int isogi_trace_valid(const isogi_trace *trace, const size_t texel[3]) {
     isogi_trace__site site;
     int a;
+    if (!trace || !texel) return 0;
     for (a = 0; a < 3; a++)
         if (texel[a] >= trace->lattice[a]) return 0;
     return isogi_trace__texel_site(trace, texel, &site);
 }
 
 ISOGI_API void isogi_trace_counters(const isogi_trace *trace, isogi_counters *counters) {
-    const isogi_counters *c = &trace->counters;
+    const isogi_counters *c;
+    if (!trace || !counters) return;
+    c = &trace->counters;
     counters->rays += c->rays, counters->blocks += c->blocks, counters->cells += c->cells, counters->cubics += c->cubics;
     counters->texels += c->texels, counters->texels_skipped += c->texels_skipped;
 }

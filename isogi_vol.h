@@ -159,6 +159,14 @@ typedef struct isogi_volume {
 
 ISOGI_API isogi_result isogi_volume_validate(const isogi_volume *volume);
 
+/* Voxels as all of the library reads them, in double; for a volume whose zero defaults are filled in: that of isogi_vol_volume.
+   isogi_volume_corners: the eight values of a cell, corner x + 2y + 4z; an axis of one voxel repeats it. 1 if all are finite. A cell
+   that the volume does not have: zeros, and 0.
+   isogi_volume_range: {least, largest} finite voxel of the box first..last, both ends included and cut to the volume; exact, voxel by
+   voxel. least > largest where there is none. */
+ISOGI_API int isogi_volume_corners(const isogi_volume *volume, const uint32_t cell[3], double corner[8]);
+ISOGI_API void isogi_volume_range(const isogi_volume *volume, const size_t first[3], const size_t last[3], double range[2]);
+
 /* ---- the min-max pyramid: what rays, meshes and renderers skip with --------------------------------------------------- */
 
 typedef struct isogi_pyramid isogi_pyramid; /* const after build: share it between any number of threads */
@@ -175,6 +183,7 @@ typedef struct isogi_level {
 /* One pass over the voxels; right for every isovalue and every transfer function. */
 ISOGI_API isogi_result isogi_vol_build(isogi_pyramid **pyramid, const isogi_volume *volume, const isogi_context *context);
 ISOGI_API void isogi_vol_free(isogi_pyramid *pyramid); /* NULL is fine */
+/* Of no pyramid, these give NULL, zeros, or do nothing. */
 ISOGI_API const isogi_volume *isogi_vol_volume(const isogi_pyramid *pyramid); /* as given, with the zero defaults filled in */
 ISOGI_API const isogi_context *isogi_vol_context(const isogi_pyramid *pyramid);
 ISOGI_API isogi_level isogi_vol_level(const isogi_pyramid *pyramid, int level); /* all zero beyond the last */
@@ -687,6 +696,10 @@ static void isogi_vol__gradient_to_world(const isogi_pyramid *p, const double g[
 
 ISOGI_API void isogi_vol_to_world(const isogi_pyramid *pyramid, const double grid[3], double world[3]) {
     int a;
+    if (!pyramid || !grid) {
+        for (a = 0; a < 3 && world; a++) world[a] = 0;
+        return;
+    }
     isogi_vol__transform(pyramid->to_world, grid, world);
     for (a = 0; a < 3; a++) world[a] += pyramid->volume.origin[a];
 }
@@ -694,13 +707,31 @@ ISOGI_API void isogi_vol_to_world(const isogi_pyramid *pyramid, const double gri
 ISOGI_API void isogi_vol_to_grid(const isogi_pyramid *pyramid, const double world[3], double grid[3]) {
     double v[3];
     int a;
+    if (!pyramid || !world) {
+        for (a = 0; a < 3 && grid; a++) grid[a] = 0;
+        return;
+    }
     for (a = 0; a < 3; a++) v[a] = world[a] - pyramid->volume.origin[a];
     isogi_vol__transform(pyramid->to_grid, v, grid);
 }
 
 /* ==== voxels ========================================================================================================= */
 
-/* Reads `count` voxels along x. One switch a row: everything that reads voxels goes through here or through the corners below. */
+/* The voxel at an address. */
+ISOGI_VOL__INLINE double isogi_vol__voxel(const isogi_volume *v, const char *p) {
+    double raw = 0;
+    switch (v->type) {
+    case ISOGI_U8: raw = *(const uint8_t *)(const void *)p; break;
+    case ISOGI_I8: raw = *(const int8_t *)(const void *)p; break;
+    case ISOGI_U16: raw = *(const uint16_t *)(const void *)p; break;
+    case ISOGI_I16: raw = *(const int16_t *)(const void *)p; break;
+    case ISOGI_F32: raw = (double)*(const float *)(const void *)p; break;
+    case ISOGI_F64: raw = *(const double *)(const void *)p; break;
+    }
+    return v->scale * raw + v->bias;
+}
+
+/* Reads `count` voxels along x. One switch a row. */
 static void isogi_vol__row(const isogi_volume *v, int x, int y, int z, int count, double *out) {
     const char *p = (const char *)v->data + x * v->stride[0] + y * v->stride[1] + z * v->stride[2];
     ptrdiff_t step = v->stride[0];
@@ -720,15 +751,12 @@ static void isogi_vol__row(const isogi_volume *v, int x, int y, int z, int count
 #undef ISOGI_VOL__READ
 }
 
-/* The eight corners of a cell, minus the isovalue (subtraction keeps the sign exact): corner x + 2y + 4z.
-   0 if one of them is not finite. An axis of one voxel repeats it. */
-static int isogi_vol__corners(const isogi_pyramid *pyramid, const int cell[3], double isovalue, double corner[8]) {
-    const isogi_volume *v = &pyramid->volume;
+/* The eight corners of a cell: corner x + 2y + 4z. An axis of one voxel repeats it. */
+ISOGI_VOL__INLINE void isogi_vol__read_corners(const isogi_volume *v, const int cell[3], double corner[8]) {
     const char *p = (const char *)v->data + cell[0] * v->stride[0] + cell[1] * v->stride[1] + cell[2] * v->stride[2];
     ptrdiff_t dx = v->size[0] > 1 ? v->stride[0] : 0, dy = v->size[1] > 1 ? v->stride[1] : 0;
     ptrdiff_t dz = v->size[2] > 1 ? v->stride[2] : 0;
     double scale = v->scale, bias = v->bias;
-    int i, finite = 1;
 #define ISOGI_VOL__AT(T, offset) (scale * (double)*(const T *)(const void *)(p + (offset)) + bias)
 #define ISOGI_VOL__READ(T)                                                                                                       \
     corner[0] = ISOGI_VOL__AT(T, 0), corner[1] = ISOGI_VOL__AT(T, dx), corner[2] = ISOGI_VOL__AT(T, dy);                         \
@@ -745,10 +773,51 @@ static int isogi_vol__corners(const isogi_pyramid *pyramid, const int cell[3], d
     }
 #undef ISOGI_VOL__AT
 #undef ISOGI_VOL__READ
+}
+
+/* The same minus the isovalue (subtraction keeps the sign exact). 0 if one of them is not finite. */
+static int isogi_vol__corners(const isogi_pyramid *pyramid, const int cell[3], double isovalue, double corner[8]) {
+    int i, finite = 1;
+    isogi_vol__read_corners(&pyramid->volume, cell, corner);
     if (!pyramid->all_finite)
         for (i = 0; i < 8; i++) finite &= isogi_vol__finite64(corner[i]);
     for (i = 0; i < 8; i++) corner[i] -= isovalue;
     return finite;
+}
+
+ISOGI_API int isogi_volume_corners(const isogi_volume *volume, const uint32_t cell[3], double corner[8]) {
+    int at[3], i, inside = volume && volume->data && cell && corner, finite = 1;
+    for (i = 0; i < 3 && inside; i++) {
+        inside = volume->size[i] > 1 ? cell[i] < volume->size[i] - 1 : !cell[i];
+        at[i] = (int)cell[i];
+    }
+    if (!inside) {
+        if (corner) memset(corner, 0, 8 * sizeof *corner);
+        return 0;
+    }
+    isogi_vol__read_corners(volume, at, corner);
+    for (i = 0; i < 8; i++) finite &= isogi_vol__finite64(corner[i]);
+    return finite;
+}
+
+ISOGI_API void isogi_volume_range(const isogi_volume *volume, const size_t first[3], const size_t last[3], double range[2]) {
+    size_t end[3], x, y, z;
+    double row[64];
+    int a, i;
+    if (!range) return;
+    range[0] = DBL_MAX, range[1] = -DBL_MAX;
+    if (!volume || !volume->data || !first || !last) return;
+    for (a = 0; a < 3; a++) end[a] = last[a] < volume->size[a] ? last[a] + 1 : volume->size[a];
+    for (z = first[2]; z < end[2]; z++)
+        for (y = first[1]; y < end[1]; y++)
+            for (x = first[0]; x < end[0]; x += 64) {
+                const int count = end[0] - x < 64 ? (int)(end[0] - x) : 64;
+                isogi_vol__row(volume, (int)x, (int)y, (int)z, count, row);
+                for (i = 0; i < count; i++) {
+                    if (!isogi_vol__finite64(row[i])) continue;
+                    range[0] = isogi_vol__min(range[0], row[i]), range[1] = isogi_vol__max(range[1], row[i]);
+                }
+            }
 }
 
 /* ==== pyramid ======================================================================================================== */
@@ -1195,17 +1264,18 @@ ISOGI_API void isogi_vol_free(isogi_pyramid *pyramid) {
     isogi_release(&context, pyramid, 1, sizeof *pyramid);
 }
 
-ISOGI_API const isogi_volume *isogi_vol_volume(const isogi_pyramid *pyramid) { return &pyramid->volume; }
-ISOGI_API const isogi_context *isogi_vol_context(const isogi_pyramid *pyramid) { return &pyramid->context; }
+ISOGI_API const isogi_volume *isogi_vol_volume(const isogi_pyramid *pyramid) { return pyramid ? &pyramid->volume : NULL; }
+ISOGI_API const isogi_context *isogi_vol_context(const isogi_pyramid *pyramid) { return pyramid ? &pyramid->context : NULL; }
 
 ISOGI_API isogi_level isogi_vol_level(const isogi_pyramid *pyramid, int level) {
     isogi_level none;
     memset(&none, 0, sizeof none);
-    return level >= 0 && level < ISOGI_VOL__LEVELS ? pyramid->level[level] : none;
+    return pyramid && level >= 0 && level < ISOGI_VOL__LEVELS ? pyramid->level[level] : none;
 }
 
 ISOGI_API void isogi_vol_range(const isogi_pyramid *pyramid, double range[2]) {
-    range[0] = pyramid->range[0], range[1] = pyramid->range[1];
+    if (!range) return;
+    range[0] = pyramid ? pyramid->range[0] : 0, range[1] = pyramid ? pyramid->range[1] : 0;
 }
 
 /* ==== values and gradients =========================================================================================== */
@@ -3347,19 +3417,6 @@ static void isogi_vol__mesh_count(const isogi_vol__mesher *m, int j, int k) {
 }
 
 /* ---- last pass: vertices ---- */
-
-ISOGI_VOL__INLINE double isogi_vol__voxel(const isogi_volume *v, const char *p) {
-    double raw = 0;
-    switch (v->type) {
-    case ISOGI_U8: raw = *(const uint8_t *)(const void *)p; break;
-    case ISOGI_I8: raw = *(const int8_t *)(const void *)p; break;
-    case ISOGI_U16: raw = *(const uint16_t *)(const void *)p; break;
-    case ISOGI_I16: raw = *(const int16_t *)(const void *)p; break;
-    case ISOGI_F32: raw = (double)*(const float *)(const void *)p; break;
-    case ISOGI_F64: raw = *(const double *)(const void *)p; break;
-    }
-    return v->scale * raw + v->bias;
-}
 
 /* On a lattice edge two of the B-spline's coordinates are whole, where its weights are (1 4 1)/6 and (-1 0 1)/2: 36 taps instead of
    64. p: the voxel where the edge begins, stride[0] its direction; every tap must exist. Gradient in the order of the strides. */
