@@ -1033,6 +1033,16 @@ static double isogi_dvr__reach(const isogi_light *light, const double world[3], 
     if (light->kind == ISOGI_LIGHT_DIRECTIONAL) return 1;
     if (light->kind == ISOGI_LIGHT_SPHERE && length < (double)light->radius) length = (double)light->radius; /* inside of the lamp */
     scale = 1 / (length * length);
+    if (light->kind == ISOGI_LIGHT_RECTANGLE) { /* as from its centre, by the cosine to its normal */
+        const float *u = light->edge[0], *v = light->edge[1];
+        double n[3], facing;
+        for (a = 0; a < 3; a++) {
+            int b = (a + 1) % 3, c = (a + 2) % 3;
+            n[a] = (double)u[b] * (double)v[c] - (double)u[c] * (double)v[b];
+        }
+        facing = -isogi_dvr__dot(n, to) / sqrt(isogi_dvr__dot(n, n));
+        scale *= facing > 0 ? facing : 0;
+    }
     return scale < 1e30 ? scale : 0;
 }
 

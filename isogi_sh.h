@@ -7,7 +7,7 @@
        #include <stdio.h>
 
        int main(void) {
-           isogi_light sun = {ISOGI_LIGHT_DIRECTIONAL, {1, 1, 0}, {3, 3, 2}, 0.1f};
+           isogi_light sun = {.vector = {1, 1, 0}, .rgb = {3, 3, 2}, .radius = 0.1f};
            isogi_lighting lighting = {{0}, &sun, 1};
            float light[3 * 25], up[1][3] = {{0, 1, 0}}, irradiance[3];
            isogi_sh_project(light, 5, &lighting, NULL);                         // radiance, order 5: 25 coefficients x RGB
@@ -116,12 +116,15 @@ typedef enum isogi_light_kind {
     ISOGI_LIGHT_DIRECTIONAL = 0, /* vector: towards the light (any length > 0); rgb: irradiance on a surface that faces it;
                                     radius: angular radius in radians, 0 = a mathematical direction */
     ISOGI_LIGHT_POINT,           /* vector: position; rgb: radiant intensity, so that E = rgb cos / distance^2; radius unused */
-    ISOGI_LIGHT_SPHERE           /* vector: centre; rgb: radiant intensity as seen from afar; radius: world units */
+    ISOGI_LIGHT_SPHERE,          /* vector: centre; rgb: radiant intensity as seen from afar; radius: world units */
+    ISOGI_LIGHT_RECTANGLE        /* vector: centre; edge: its two sides (world), at right angles to 1e-3; it shines to the side of
+                                    edge[0] x edge[1] alone; rgb: radiant intensity along that normal, so its radiance is rgb / area */
 } isogi_light_kind;
 
 typedef struct isogi_light {
     isogi_light_kind kind;
     float vector[3], rgb[3], radius;
+    float edge[2][3]; /* RECTANGLE alone; corners at vector +- edge[0] / 2 +- edge[1] / 2 */
 } isogi_light;
 
 /* Light from infinitely far away, as an image, as SH coefficients, or as both added. All zero: black.
@@ -207,7 +210,8 @@ ISOGI_API isogi_result isogi_sh_project_cube(float *c, int order, int channels, 
 
 /* Coefficients (RGB interleaved) of the radiance of everything in `lighting` as it arrives at `point` (world; NULL = origin):
    environment rotated, directional lights as deltas (or discs), point and sphere lights with their attenuation there. A point light
-   at the very point adds nothing; inside a spherical one its light comes evenly from everywhere. */
+   at the very point adds nothing; inside a spherical one its light comes evenly from everywhere. Rectangles by quadrature over
+   parts that are small as seen from the point: 1e-5 of the largest coefficient (a thousand evaluations and more next to one). */
 ISOGI_API isogi_result isogi_sh_project(float *rgb, int order, const isogi_lighting *lighting, const float point[3]);
 
 /* ---- rotation ---- */
@@ -2892,12 +2896,25 @@ static isogi_result isogi_sh__env_rotation(double m[9], const isogi_env *env) {
     return isogi_sh__euler_angles(&e, m);
 }
 
+/* Two finite edges of some length, at right angles. */
+static int isogi_sh__edges_ok(const isogi_light *light) {
+    double aa = 0, bb = 0, ab = 0;
+    int k;
+    if (!isogi_sh__finite_array(light->edge[0], 6)) return 0;
+    for (k = 0; k < 3; k++) {
+        aa += (double)light->edge[0][k] * (double)light->edge[0][k], bb += (double)light->edge[1][k] * (double)light->edge[1][k];
+        ab += (double)light->edge[0][k] * (double)light->edge[1][k];
+    }
+    return aa > 0 && bb > 0 && fabs(ab) <= 1e-3 * sqrt(aa) * sqrt(bb);
+}
+
 static int isogi_sh__light_ok(const isogi_light *light) {
     int kind = (int)light->kind, vector_is_zero = light->vector[0] >= 0 && light->vector[0] <= 0 && light->vector[1] >= 0 &&
                                                   light->vector[1] <= 0 && light->vector[2] >= 0 && light->vector[2] <= 0;
-    if (kind < (int)ISOGI_LIGHT_DIRECTIONAL || kind > (int)ISOGI_LIGHT_SPHERE) return 0;
+    if (kind < (int)ISOGI_LIGHT_DIRECTIONAL || kind > (int)ISOGI_LIGHT_RECTANGLE) return 0;
     if (!isogi_sh__finite_array(light->vector, 3) || !isogi_sh__finite_array(light->rgb, 3)) return 0;
     if (kind == (int)ISOGI_LIGHT_POINT) return 1;
+    if (kind == (int)ISOGI_LIGHT_RECTANGLE) return isogi_sh__edges_ok(light);
     if (!isogi_sh__finite_f32(light->radius) || light->radius < 0) return 0;
     return kind == (int)ISOGI_LIGHT_SPHERE || (!vector_is_zero && light->radius <= 1.5707964f);
 }
@@ -2967,11 +2984,67 @@ ISOGI_API void isogi_env_radiance(const isogi_env *env, const float direction[3]
     for (k = 0; k < 3; k++) rgb[k] = (float)total[k];
 }
 
+/* A rectangle as seen from the point: corner, sides and normal (not of unit length). */
+typedef struct isogi_sh__rectangle {
+    double corner[3], side[2][3], normal[3], radiance[3];
+    double fineness; /* distance of a part over half its diagonal, at least */
+    int order;
+} isogi_sh__rectangle;
+
+/* Adds the part from (u, v) of that size, 0..1: four Gauss-Legendre nodes along each side where it is small as seen from the point,
+   else its quarters; no deeper than parts of 2^-16, which are next to nothing. */
+static void isogi_sh__add_part(float *c, const isogi_sh__rectangle *r, double u, double v, double size) {
+    static const double node[4] = {0.069431844202973712, 0.330009478207571868, 0.669990521792428132, 0.930568155797026288};
+    static const double weight[4] = {0.173927422568726929, 0.326072577431273071, 0.326072577431273071, 0.173927422568726929};
+    double scale[ISOGI_SH_MAX_ORDER], d[3], rgb[3], square = 0, diagonal = 0, along;
+    int i, k, l;
+    for (k = 0; k < 3; k++) {
+        d[k] = r->corner[k] + (u + 0.5 * size) * r->side[0][k] + (v + 0.5 * size) * r->side[1][k];
+        square += d[k] * d[k], diagonal += size * size * 0.25 * (r->side[0][k] * r->side[0][k] + r->side[1][k] * r->side[1][k]);
+    }
+    if (square < r->fineness * r->fineness * diagonal && size > 1.0 / 65536) {
+        for (i = 0; i < 4; i++) isogi_sh__add_part(c, r, u + 0.5 * size * (i & 1), v + 0.5 * size * (i >> 1), 0.5 * size);
+        return;
+    }
+    for (l = 0; l < r->order; l++) scale[l] = 1;
+    for (i = 0; i < 16; i++) {
+        double x = u + size * node[i & 3], y = v + size * node[i >> 2];
+        for (square = along = 0, k = 0; k < 3; k++) {
+            d[k] = r->corner[k] + x * r->side[0][k] + y * r->side[1][k];
+            square += d[k] * d[k], along -= d[k] * r->normal[k];
+        }
+        if (!(along > 0) || !(square > 0)) continue;
+        along *= size * size * weight[i & 3] * weight[i >> 2] / (square * sqrt(square)); /* the normal holds the area */
+        for (k = 0; k < 3; k++) rgb[k] = along * r->radiance[k];
+        isogi_sh__add_lobe(c, r->order, 3, scale, isogi_sh__normalise(d[0], d[1], d[2]), rgb);
+    }
+}
+
+static void isogi_sh__add_rectangle(float *c, int order, const isogi_light *light, const float point[3]) {
+    isogi_sh__rectangle r;
+    double area = 0;
+    int k;
+    for (k = 0; k < 3; k++) {
+        int a = (k + 1) % 3, b = (k + 2) % 3;
+        r.side[0][k] = (double)light->edge[0][k], r.side[1][k] = (double)light->edge[1][k];
+        r.corner[k] = (double)light->vector[k] - (point ? (double)point[k] : 0) - 0.5 * (r.side[0][k] + r.side[1][k]);
+        r.normal[k] = (double)light->edge[0][a] * (double)light->edge[1][b] - (double)light->edge[0][b] * (double)light->edge[1][a];
+        area += r.normal[k] * r.normal[k];
+    }
+    for (k = 0; k < 3; k++) r.radiance[k] = (double)light->rgb[k] / sqrt(area);
+    r.order = order, r.fineness = order > 12 ? order / 3.0 : 4;
+    isogi_sh__add_part(c, &r, 0, 0, 1);
+}
+
 /* Adds a light as it arrives at a point. A point light at the point itself adds nothing; inside a spherical one its light comes
    evenly from everywhere. */
 static void isogi_sh__add_light(float *c, int order, const isogi_light *light, const float point[3]) {
     double scale[ISOGI_SH_MAX_ORDER], rgb[3], d[3], cosine = 1, factor = 1;
     int k, l;
+    if (light->kind == ISOGI_LIGHT_RECTANGLE) {
+        isogi_sh__add_rectangle(c, order, light, point);
+        return;
+    }
     for (k = 0; k < 3; k++) d[k] = (double)light->vector[k];
     if (light->kind == ISOGI_LIGHT_DIRECTIONAL) {
         cosine = cos((double)light->radius);

@@ -24,7 +24,8 @@
      isosurface that passes through it (Wyman, Parker, Shirley and Hansen 2006). To light a picture, look the texture up where the
      isosurface is seen: radiance = albedo * irradiance / pi. Moving the isovalue or the camera needs no new rays.
    - ISOGI_TRACE_IRRADIANCE: RGB irradiance by an environment (image, spherical harmonics, or both), directional lights with or
-     without an angular size, point and sphere lights; shadows, and any number of diffuse reflections.
+     without an angular size, point, sphere and rectangle lights, and surfaces that glow; shadows, and any number of diffuse reflections, in
+     colours by isovalue and by place. Seen from the low side of the surface, the high side, or both.
    - ISOGI_TRACE_TRANSFER: radiance transfer in spherical harmonics; distant light may then turn and change without new rays.
    - Bakes the whole lattice, the part that an interval of isovalues reads, or lazily what lookups ask for; in steps of a number of
      rays, on all cores, with progress and cancel.
@@ -33,8 +34,8 @@
    What it does NOT do
 
    - No pictures: it tells the light at points that you found by isogi_vol_intersect or on a mesh.
-   - No gloss, no transparency, no participating media: surfaces are opaque and diffuse.
-   - No light that the isosurface itself emits, no lights within the environment nearer than infinity.
+   - No transparency, no participating media: surfaces are opaque and diffuse. Gloss is for display alone, an approximation that
+     radiance transfer allows: isogi_trace_sample_gloss.
 
    How to use it
 
@@ -116,10 +117,22 @@ typedef enum isogi_trace_lookup {
     ISOGI_TRACE_BSPLINE           /* 4x4x4, weighed by the uniform cubic B-spline: smooth, and blurred over two texels */
 } isogi_trace_lookup;
 
+/* A colour at a data value; tables of these are piecewise linear, and constant beyond their ends. */
 typedef struct isogi_albedo_point {
     double value; /* data value; ascending */
-    float rgb[3]; /* 0..1 */
+    float rgb[3]; /* albedo: 0..1; emission: radiance, 0 or more */
 } isogi_albedo_point;
+
+/* Which side of the surface the light is wanted for. The high side is the one that a viewer within the matter sees. */
+typedef enum isogi_trace_sides {
+    ISOGI_TRACE_LOW_SIDE = 0,
+    ISOGI_TRACE_HIGH_SIDE,
+    ISOGI_TRACE_BOTH_SIDES /* two textures in one, twice the work: see isogi_trace_high */
+} isogi_trace_sides;
+
+/* Colour that depends on the place, too: called with what the tables say for this isovalue, to change it. From any thread, at any
+   time; the same arguments must give the same colours. What is beyond 0..1 (albedo) or negative (emission) is clamped, NaN is 0. */
+typedef void isogi_trace_material_function(void *user, double isovalue, const double point[3], float albedo[3], float emission[3]);
 
 /* All zero but `pyramid`: one texel per voxel, black surface, black sky. The volume, the lights, the environment's image and the
    albedo points are borrowed and must outlive the texture; the description itself is copied. */
@@ -135,6 +148,14 @@ typedef struct isogi_trace_desc {
     const isogi_albedo_point *albedo_points; /* piecewise linear in the isovalue, constant beyond its ends; multiplied into albedo
                                                 only if albedo is not all zero, else used alone */
     size_t albedo_count;
+    const isogi_albedo_point *emission_points; /* IRRADIANCE: radiance that the surface itself sends out, by isovalue */
+    size_t emission_count;
+    isogi_trace_material_function *material;   /* colours by place; NULL = none. TRANSFER leaves its emission out */
+    void *material_user;
+    isogi_trace_sides sides;
+    int no_shadows;            /* non-zero: lights and the environment reach every surface that faces them; reflections stay as they are */
+    float reach;               /* surfaces further than this (world units) from where a ray starts do not exist for it: with 0 bounces
+                                  ambient occlusion of that radius; 0 = unlimited */
     int bounces;               /* 0 = light that arrives directly; n = up to n reflections; -1 = all (Russian roulette) */
     int samples;               /* paths per texel; 0 = 64 */
     uint64_t seed;
@@ -173,17 +194,33 @@ ISOGI_API isogi_result isogi_trace_sample(const isogi_trace *trace, const float 
                                           float *error);
 /* TRANSFER only: a new distant lighting (environment and directional lights; point lights are ISOGI_INVALID). No rays. */
 ISOGI_API isogi_result isogi_trace_relight(isogi_trace *trace, const isogi_lighting *lighting);
+/* TRANSFER only, for display: glossy light that the surface sends along the unit vector views[i] (away from it, towards the eye),
+   about the mirrored direction r, for a Phong lobe of that exponent (0 or more; the order holds lobes up to about order^2) and
+   reflectance 1; normals[i]: unit, on the side that is lit. An approximation: the lighting L is blurred by the lobe G and looked up
+   at r, exactly, but what stands in its way is judged apart from it, by the transfer blurred in the same way over that of an open
+   surface: radiance = (G * L)(r) min(1, (G * T)(r) / (G * cosine)(r)). Exact where nothing is in the way or the light is uniform
+   there; shadows come out as soft as the order, and light by reflections counts as openness. Zero where no texel is ready. */
+ISOGI_API isogi_result isogi_trace_sample_gloss(const isogi_trace *trace, const float (*points)[3], const float (*normals)[3],
+                                                const float (*views)[3], double exponent, size_t count, float (*radiance)[3]);
 /* TRANSFER only: interpolated coefficients, transfer[count][order*order][channels]; E = sum_i transfer_i light_i. */
 ISOGI_API isogi_result isogi_trace_sample_transfer(const isogi_trace *trace, const float (*points)[3], size_t count, float *transfer);
 /* Texels along each axis, order (0 for IRRADIANCE), channels (3 for IRRADIANCE). Any of them may be NULL. Of no trace: zeros. */
 ISOGI_API void isogi_trace_shape(const isogi_trace *trace, size_t lattice[3], int *order, int *channels);
 
-/* Albedo at an isovalue, as the description defines it. */
+/* Albedo at an isovalue, as the description's tables define it. */
 ISOGI_API void isogi_trace_albedo(const isogi_trace_desc *desc, double isovalue, float rgb[3]);
+/* The same at a place (world; NULL = tables alone), with the radiance that is emitted there; either output may be NULL.
+   What a viewer sees of a surface is emission + albedo * irradiance / pi. */
+ISOGI_API void isogi_trace_material(const isogi_trace_desc *desc, double isovalue, const double point[3], float albedo[3],
+                                    float emission[3]);
+
+/* The texture of the high side: the one beside `trace` for BOTH_SIDES, `trace` itself for HIGH_SIDE, else NULL. It can be requested,
+   sampled, relit and exported like any other; it is stepped, and freed, with the texture it belongs to. */
+ISOGI_API isogi_trace *isogi_trace_high(isogi_trace *trace);
 
 /* No lattice: irradiance at a user's own world points, each on the isosurface through it, with a unit normal each (NULL = as
-   desc.normals says). Uses samples, bounces, seed, offset, normals, capped, albedo and lighting of the description; its mode must be
-   IRRADIANCE. A point that is not finite or has no normal gets the zero vector and error = INFINITY. error may be NULL. */
+   desc.normals says; towards the low side, whichever side is asked for). Uses samples, bounces, seed, offset, normals, capped, side
+   (not BOTH), reach, shadows, material and lighting of the description; its mode must be IRRADIANCE. A point that is not finite or has no normal gets the zero vector and error = INFINITY. error may be NULL. */
 ISOGI_API isogi_result isogi_trace_gather(const isogi_trace_desc *desc, const float (*points)[3], const float (*normals)[3], size_t count,
                                           float (*irradiance)[3], float *error, const isogi_context *context);
 
@@ -493,7 +530,9 @@ typedef struct isogi_trace__beam {
 } isogi_trace__beam;
 
 /* A light without extent: one ray decides. */
-static int isogi_trace__is_delta(const isogi_light *light) { return light->kind == ISOGI_LIGHT_POINT || !(light->radius > 0); }
+static int isogi_trace__is_delta(const isogi_light *light) {
+    return light->kind == ISOGI_LIGHT_POINT || (light->kind != ISOGI_LIGHT_RECTANGLE && !(light->radius > 0));
+}
 
 /* Directions uniform in a cone about the unit vector n, 1 - cos(its half angle) = opening. */
 static void isogi_trace__cone(const double n[3], double opening, double u, double v, float dir[3]) {
@@ -518,11 +557,82 @@ static double isogi_trace__sphere(const double to[3], double distance, double ra
     return 2 * opening / (radius * radius); /* solid angle / (pi r^2) */
 }
 
+/* Side lengths, unit axes, and the corner as seen from a point, along these axes; z is away from the light's front. */
+typedef struct isogi_trace__frame {
+    double length[2], axis[3][3], low[3], high[2];
+} isogi_trace__frame;
+
+static void isogi_trace__frame_set(const isogi_light *light, const double point[3], isogi_trace__frame *f) {
+    double skew = 0;
+    int a, i;
+    for (i = 0; i < 2; i++) {
+        double square = 0;
+        for (a = 0; a < 3; a++) square += (double)light->edge[i][a] * (double)light->edge[i][a];
+        f->length[i] = sqrt(square);
+        for (a = 0; a < 3; a++) f->axis[i][a] = (double)light->edge[i][a] / f->length[i];
+    }
+    for (a = 0; a < 3; a++) skew += f->axis[0][a] * f->axis[1][a];
+    for (a = 0; a < 3; a++) f->axis[1][a] -= skew * f->axis[0][a]; /* at right angles to 1e-3 before, to 1e-6 now */
+    for (a = 0; a < 3; a++) {
+        int b = (a + 1) % 3, c = (a + 2) % 3;
+        f->axis[2][a] = f->axis[0][b] * f->axis[1][c] - f->axis[0][c] * f->axis[1][b];
+    }
+    for (i = 0; i < 3; i++) {
+        f->low[i] = 0;
+        for (a = 0; a < 3; a++) f->low[i] += ((double)light->vector[a] - point[a]) * f->axis[i][a];
+        if (i < 2) f->low[i] -= 0.5 * f->length[i], f->high[i] = f->low[i] + f->length[i];
+    }
+}
+
+/* Directions uniform in the solid angle of a rectangle (Urena, Fajardo and King 2013): the x that a share u of the angle ends at,
+   then y by its sine. Where the angle is so small that its excess over 2 pi is lost, uniform in its area. */
+static double isogi_trace__rectangle(const isogi_light *light, const double point[3], double u, double v,
+                                     isogi_trace__beam *beam) {
+    isogi_trace__frame f;
+    double n[4], angle, x, y, z, distance, factor;
+    int a;
+    isogi_trace__frame_set(light, point, &f);
+    z = f.low[2];
+    if (!(z < 0)) return 0;
+    /* z of the normals of the planes through the sides, and the sum of the angles between these planes, less 2 pi */
+    n[0] = -f.low[1] / sqrt(z * z + f.low[1] * f.low[1]), n[1] = f.high[0] / sqrt(z * z + f.high[0] * f.high[0]);
+    n[2] = f.high[1] / sqrt(z * z + f.high[1] * f.high[1]), n[3] = -f.low[0] / sqrt(z * z + f.low[0] * f.low[0]);
+    angle = asin(n[0] * n[1]) + asin(n[1] * n[2]) + asin(n[2] * n[3]) + asin(n[3] * n[0]);
+    if (angle < 1e-4) {
+        x = f.low[0] + u * f.length[0], y = f.low[1] + v * f.length[1];
+        distance = sqrt(x * x + y * y + z * z);
+        factor = -z / (distance * distance * distance); /* radiance rgb / area, times area cos / distance^2 */
+    } else {
+        double turn = u * angle + 2 * ISOGI_TRACE__PI - acos(-n[2] * n[3]) - acos(-n[3] * n[0]);
+        double tangent = (cos(turn) * n[0] - n[2]) / sin(turn), c = 1 / sqrt(tangent * tangent + n[0] * n[0]), d, low, high, s;
+        c = tangent > 0 ? c : -c;
+        x = -c * z / sqrt(c * c < 1 ? 1 - c * c : DBL_MIN);
+        x = x > f.low[0] ? x : f.low[0], x = x < f.high[0] ? x : f.high[0];
+        d = x * x + z * z;
+        low = f.low[1] / sqrt(d + f.low[1] * f.low[1]), high = f.high[1] / sqrt(d + f.high[1] * f.high[1]);
+        s = low + v * (high - low);
+        y = s * s < 1 ? s * sqrt(d) / sqrt(1 - s * s) : f.high[1];
+        y = y > f.low[1] ? y : f.low[1], y = y < f.high[1] ? y : f.high[1];
+        distance = sqrt(x * x + y * y + z * z);
+        factor = angle / (f.length[0] * f.length[1]);
+    }
+    if (!(distance > 0)) return 0;
+    for (a = 0; a < 3; a++)
+        beam->dir[a] = (float)((x * f.axis[0][a] + y * f.axis[1][a] + z * f.axis[2][a]) / distance);
+    beam->tmax = distance;
+    return factor;
+}
+
 /* 0 where the light does not reach `point` by nature. */
 static int isogi_trace__light_beam(const isogi_light *light, const double point[3], double u, double v,
                                    isogi_trace__beam *beam) {
     double to[3], length = 0, factor = 1;
     int a;
+    if (light->kind == ISOGI_LIGHT_RECTANGLE) {
+        factor = isogi_trace__rectangle(light, point, u, v, beam);
+        for (a = 0; a < 3; a++) beam->rgb[a] = factor * (double)light->rgb[a];
+        return factor > 0 && isogi_trace__finite(factor);
+    }
     for (a = 0; a < 3; a++) {
         to[a] = (double)light->vector[a] - (light->kind == ISOGI_LIGHT_DIRECTIONAL ? 0 : point[a]);
         length += to[a] * to[a];
@@ -546,6 +656,12 @@ static int isogi_trace__light_beam(const isogi_light *light, const double point[
 }
 
 /* ==== voxels and texels ============================================================================================== */
+
+/* A colour from outside: within [0, most], NaN is 0. */
+static void isogi_trace__tame(float rgb[3], double most) {
+    int c;
+    for (c = 0; c < 3; c++) rgb[c] = (float)isogi_trace__clamp((double)rgb[c], most);
+}
 
 /* Exact at both ends, where the other value is not even looked at. */
 static double isogi_trace__lerp(double a, double b, double u) { return u > 0 ? u < 1 ? (1 - u) * a + u * b : b : a; }
@@ -604,6 +720,47 @@ static void isogi_trace__block_range(const isogi_pyramid *pyramid, const size_t 
             }
 }
 
+/* ==== colours of the surface ======================================================================================== */
+
+/* A table at a value. */
+static void isogi_trace__colour(const isogi_albedo_point *p, size_t n, double isovalue, float rgb[3]) {
+    size_t i = 0;
+    int c;
+    while (i < n && p[i].value < isovalue) i++;
+    for (c = 0; c < 3; c++)
+        rgb[c] = i == 0 || i == n ? p[i ? n - 1 : 0].rgb[c]
+                                  : (float)isogi_trace__lerp((double)p[i - 1].rgb[c], (double)p[i].rgb[c],
+                                                             (isovalue - p[i - 1].value) / (p[i].value - p[i - 1].value));
+}
+
+ISOGI_API void isogi_trace_albedo(const isogi_trace_desc *desc, double isovalue, float rgb[3]) {
+    int c, plain = 0;
+    float table[3];
+    for (c = 0; c < 3; c++) plain |= desc->albedo[c] > 0;
+    for (c = 0; c < 3; c++) rgb[c] = desc->albedo[c];
+    if (!desc->albedo_points || !desc->albedo_count) return;
+    isogi_trace__colour(desc->albedo_points, desc->albedo_count, isovalue, table);
+    for (c = 0; c < 3; c++) rgb[c] = plain ? rgb[c] * table[c] : table[c];
+}
+
+/* What the caller's function makes of the tables' colours. */
+static void isogi_trace__colours(const isogi_trace_desc *desc, double isovalue, const double point[3], float albedo[3],
+                                 float emission[3]) {
+    desc->material(desc->material_user, isovalue, point, albedo, emission);
+    isogi_trace__tame(albedo, 1), isogi_trace__tame(emission, 1e30);
+}
+
+ISOGI_API void isogi_trace_material(const isogi_trace_desc *desc, double isovalue, const double point[3], float albedo[3],
+                                    float emission[3]) {
+    float reflected[3], sent[3] = {0, 0, 0};
+    isogi_trace_albedo(desc, isovalue, reflected);
+    if (desc->emission_points && desc->emission_count)
+        isogi_trace__colour(desc->emission_points, desc->emission_count, isovalue, sent);
+    if (point && desc->material) isogi_trace__colours(desc, isovalue, point, reflected, sent);
+    if (albedo) memcpy(albedo, reflected, sizeof reflected);
+    if (emission) memcpy(emission, sent, sizeof sent);
+}
+
 /* ==== scene: what is the same for every texel ======================================================================== */
 
 typedef struct isogi_trace__scene {
@@ -614,6 +771,8 @@ typedef struct isogi_trace__scene {
     double to_grid[9]; /* rotation and scale from world to grid */
     isogi_trace__sky sky;
     int has_env;
+    int high;    /* light is gathered on the high side */
+    double reach[ISOGI_TRACE__WAVE]; /* of rays, or all zero */
 } isogi_trace__scene;
 
 /* Where the light is gathered. */
@@ -645,7 +804,7 @@ static void isogi_trace__scene_matrix(isogi_trace__scene *scene) {
 /* A capped volume's border texels face out of the box; elsewhere the gradient decides. 0 if there is no normal. */
 static int isogi_trace__site_normal(const isogi_trace__scene *scene, isogi_trace__site *site) {
     double n[3] = {0, 0, 0}, length = 0;
-    int a, c, border = 0;
+    int a, c, border = 0, sign = scene->high ? -1 : 1;
     for (a = 0; a < 3; a++) {
         double x = site->place.cell[a] + site->place.local[a], out = 0;
         if (x <= 0) out = -1;
@@ -656,10 +815,11 @@ static int isogi_trace__site_normal(const isogi_trace__scene *scene, isogi_trace
     }
     if (!border || !scene->desc.capped) {
         isogi_vol_normals(scene->pyramid, &site->place, 1, scene->desc.normals, &site->normal);
+        for (c = 0; c < 3; c++) site->normal[c] *= (float)sign;
         return isogi_trace__dot(site->normal, site->normal) > 0;
     }
     for (c = 0; c < 3; c++) length += n[c] * n[c];
-    for (c = 0; c < 3; c++) site->normal[c] = (float)(n[c] / sqrt(length));
+    for (c = 0; c < 3; c++) site->normal[c] = (float)(sign * n[c] / sqrt(length));
     return length > 0;
 }
 
@@ -687,7 +847,7 @@ static void isogi_trace__site_start(const isogi_trace__scene *scene, isogi_trace
             beyond |= grid[a] < 0 || grid[a] > (double)(scene->volume->size[a] - 1);
         }
         isogi_trace__locate(scene->volume, grid, &place);
-        if (!beyond && !(isogi_trace__value(scene->volume, &place) < site->isovalue)) continue;
+        if (!beyond && (isogi_trace__value(scene->volume, &place) < site->isovalue) == scene->high) continue;
         isogi_vol_to_world(scene->pyramid, grid, site->origin);
         site->on_surface = 0, site->open = beyond && !scene->desc.capped;
         return;
@@ -696,6 +856,7 @@ static void isogi_trace__site_start(const isogi_trace__scene *scene, isogi_trace
     isogi_vol_to_world(scene->pyramid, n, site->origin);
     site->place.side = 1;
     isogi_vol_normals(scene->pyramid, &site->place, 1, ISOGI_NORMAL_TRILINEAR, &site->geometric);
+    for (a = 0; a < 3 && scene->high; a++) site->geometric[a] = -site->geometric[a];
     if (!(isogi_trace__dot(site->geometric, site->normal) > 0)) memcpy(site->geometric, site->normal, sizeof site->geometric);
 }
 
@@ -714,7 +875,7 @@ typedef struct isogi_trace__wave {
     const isogi_trace__scene *scene;
     const isogi_trace__site *site;
     isogi_counters *counters;
-    double albedo[3];
+    float albedo[3], emission[3];       /* at the site's isovalue */
     double light[ISOGI_TRACE__WAVE][3]; /* of each sample: what its path brought */
     float *basis;                       /* TRANSFER: scratch for SH values */
     double *transfer;                   /* TRANSFER: sum over samples, coefficients x channels */
@@ -740,7 +901,7 @@ typedef struct isogi_trace__shadows {
     isogi_hit start[ISOGI_TRACE__WAVE], hit[ISOGI_TRACE__WAVE];
 } isogi_trace__shadows;
 
-/* Rays from the site itself; a miss has side 0. tmax may be NULL. */
+/* Rays from the site itself; a miss has side 0. */
 static void isogi_trace__site_rays(const isogi_trace__scene *scene, const isogi_trace__site *site, const float (*dirs)[3],
                                    const double *tmax, size_t count, isogi_hit *hits, isogi_counters *counters) {
     isogi_hit starts[ISOGI_TRACE__WAVE];
@@ -755,7 +916,7 @@ static void isogi_trace__site_rays(const isogi_trace__scene *scene, const isogi_
         memset(&ray, 0, sizeof ray);
         memcpy(ray.origin, site->origin, sizeof ray.origin);
         memcpy(ray.dir, dirs[i], sizeof ray.dir);
-        ray.flags = scene->flags, ray.isovalue = site->isovalue, ray.tmax = tmax ? tmax[i] : 0;
+        ray.flags = scene->flags, ray.isovalue = site->isovalue, ray.tmax = tmax[i];
         isogi_vol_intersect(scene->pyramid, &ray, 1, &hits[i], counters);
     }
 }
@@ -764,7 +925,9 @@ static void isogi_trace__site_rays(const isogi_trace__scene *scene, const isogi_
 static void isogi_trace__shadows_flush(isogi_trace__wave *w, isogi_trace__shadows *s, int depth) {
     int i, c;
     if (!s->count) return;
-    if (!depth) {
+    if (w->scene->desc.no_shadows) {
+        for (i = 0; i < s->count; i++) s->hit[i].side = 0;
+    } else if (!depth) {
         isogi_trace__site_rays(w->scene, w->site, (const float(*)[3])s->dir, s->tmax, (size_t)s->count, s->hit, w->counters);
     } else {
         for (i = 0; i < s->count; i++) s->start[i] = w->start[s->path[i]];
@@ -783,11 +946,17 @@ static double isogi_trace__cosine_at(const isogi_trace__wave *w, int i, int dept
                  : isogi_trace__site_kernel(w->site, dir);
 }
 
+/* tmax within the scene's reach; 0 is unlimited in both. */
+static double isogi_trace__within(const isogi_trace__scene *scene, double tmax) {
+    double reach = scene->reach[0];
+    return reach > 0 && (!(tmax > 0) || tmax > reach) ? reach : tmax;
+}
+
 static void isogi_trace__shadows_add(isogi_trace__wave *w, isogi_trace__shadows *s, int i, const float dir[3], double tmax,
                                      const double rgb[3]) {
     int c;
     memcpy(s->dir[s->count], dir, sizeof s->dir[0]);
-    s->path[s->count] = i, s->tmax[s->count] = tmax;
+    s->path[s->count] = i, s->tmax[s->count] = isogi_trace__within(w->scene, tmax);
     for (c = 0; c < 3; c++) s->rgb[s->count][c] = w->through[i][c] * rgb[c];
     s->count++;
 }
@@ -863,14 +1032,32 @@ static void isogi_trace__wave_escape(isogi_trace__wave *w, int i) {
     for (c = 0; c < 3; c++) w->light[w->slot[i]][c] += weight * w->through[i][c] * (double)radiance[c];
 }
 
+/* Colours where path i hit; what is emitted there is brought. */
+static void isogi_trace__wave_material(isogi_trace__wave *w, int i, float albedo[3]) {
+    const isogi_trace_desc *desc = &w->scene->desc;
+    float emission[3];
+    int c;
+    memcpy(albedo, w->albedo, sizeof w->albedo), memcpy(emission, w->emission, sizeof emission);
+    if (desc->material) {
+        double grid[3], point[3];
+        for (c = 0; c < 3; c++) grid[c] = w->hit[i].cell[c] + w->hit[i].local[c];
+        isogi_vol_to_world(w->scene->pyramid, grid, point);
+        isogi_trace__colours(desc, w->site->isovalue, point, albedo, emission);
+    }
+    if (desc->mode == ISOGI_TRACE_TRANSFER) return;
+    for (c = 0; c < 3; c++) w->light[w->slot[i]][c] += w->through[i][c] * (double)emission[c];
+}
+
 /* Keeps path i as path j, reflected where it hit. 0: it ends there. */
 static int isogi_trace__wave_reflect(isogi_trace__wave *w, int i, int j, int depth) {
     const isogi_trace__scene *scene = w->scene;
     int side = w->hit[i].side > 0 ? 1 : -1, from = w->from[i], c;
     double through[3], most = 0, survive = 1;
+    float albedo[3];
+    isogi_trace__wave_material(w, i, albedo);
     if (depth == scene->desc.bounces || depth >= ISOGI_TRACE__MAX_DEPTH) return 0;
     for (c = 0; c < 3; c++) {
-        through[c] = w->through[i][c] * w->albedo[c];
+        through[c] = w->through[i][c] * (double)albedo[c];
         if (through[c] > most) most = through[c];
     }
     if (!(most > 0)) return 0;
@@ -908,7 +1095,7 @@ static void isogi_trace__wave_begin(isogi_trace__wave *w, int first, int count) 
     for (i = 0; i < count; i++) {
         double u[2];
         w->slot[i] = i, w->key[i] = isogi_trace__key(site->key, (uint64_t)(first + i));
-        w->start[i] = site->place, w->from[i] = site->open ? 0 : 1;
+        w->start[i] = site->place, w->from[i] = (signed char)(site->open ? 0 : w->scene->high ? -1 : 1);
         isogi_trace__sobol(site->key, (uint32_t)(first + i), u);
         isogi_trace__cosine(site->normal, u[0], u[1], w->dir[i]);
         if (site->on_surface) isogi_trace__mirror(site->geometric, w->dir[i]);
@@ -937,13 +1124,13 @@ static void isogi_trace__wave_run(isogi_trace__wave *w, int first, int count) {
         if (lit) isogi_trace__wave_lights(w, &shadows, depth, positions);
         if (lit) isogi_trace__wave_sky(w, &shadows, depth);
         if (!depth)
-            isogi_trace__site_rays(scene, w->site, (const float(*)[3])w->dir, NULL, (size_t)w->count, w->hit, w->counters);
+            isogi_trace__site_rays(scene, w->site, (const float(*)[3])w->dir, scene->reach, (size_t)w->count, w->hit, w->counters);
         else
-            isogi_vol_continue(scene->pyramid, w->start, (const float(*)[3])w->dir, NULL, w->site->isovalue, scene->flags,
+            isogi_vol_continue(scene->pyramid, w->start, (const float(*)[3])w->dir, scene->reach, w->site->isovalue, scene->flags,
                                (size_t)w->count, w->hit, w->counters);
         for (i = 0; i < w->count; i++) {
-            if (!w->hit[i].side) isogi_trace__wave_escape(w, i);
-            else if (isogi_trace__wave_reflect(w, i, alive, depth)) alive++;
+            if (!w->hit[i].side || scene->desc.no_shadows) isogi_trace__wave_escape(w, i);
+            if (w->hit[i].side && isogi_trace__wave_reflect(w, i, alive, depth)) alive++;
         }
         w->count = alive;
     }
@@ -965,14 +1152,17 @@ static void isogi_trace__site_lights(const isogi_trace__scene *scene, const isog
         if (!isogi_trace__light_beam(&lighting->lights[l], site->origin, 0, 0, &beam)) continue;
         cosine = isogi_trace__site_kernel(site, beam.dir);
         if (!(cosine > 0)) continue;
-        isogi_trace__site_rays(scene, site, (const float(*)[3]) & beam.dir, &beam.tmax, 1, &hit, counters);
+        beam.tmax = isogi_trace__within(scene, beam.tmax), hit.side = 0;
+        if (!scene->desc.no_shadows)
+            isogi_trace__site_rays(scene, site, (const float(*)[3]) & beam.dir, &beam.tmax, 1, &hit, counters);
         for (c = 0; c < 3 && !hit.side; c++) rgb[c] += beam.rgb[c] * cosine;
     }
 }
 
 /* Scene without anything that could shine: no rays are needed. */
 static int isogi_trace__dark(const isogi_trace__scene *scene) {
-    return scene->desc.mode == ISOGI_TRACE_IRRADIANCE && !scene->has_env && !scene->desc.lighting.light_count;
+    const isogi_trace_desc *d = &scene->desc;
+    return d->mode == ISOGI_TRACE_IRRADIANCE && !scene->has_env && !d->lighting.light_count && !d->emission_count && !d->material;
 }
 
 /* Computes one site: values[3] (RGB irradiance) or values[order*order*channels], and the standard error of the luminance (TRANSFER:
@@ -981,14 +1171,13 @@ static void isogi_trace__gather_site(const isogi_trace__scene *scene, const isog
                                      float *error, isogi_counters *counters) {
     const isogi_trace_desc *desc = &scene->desc;
     isogi_trace__wave wave;
-    float basis[ISOGI_TRACE__MAX_ORDER * ISOGI_TRACE__MAX_ORDER], albedo[3];
+    float basis[ISOGI_TRACE__MAX_ORDER * ISOGI_TRACE__MAX_ORDER];
     double transfer[3 * ISOGI_TRACE__MAX_ORDER * ISOGI_TRACE__MAX_ORDER], sum[3] = {0, 0, 0}, mean = 0, square = 0,
                                                                           direct[3] = {0, 0, 0};
     int coefficients = desc->order * desc->order * desc->transfer_channels, first, i, c;
     wave.scene = scene, wave.site = site, wave.counters = counters, wave.basis = basis, wave.transfer = transfer;
     memset(transfer, 0, sizeof transfer);
-    isogi_trace_albedo(desc, site->isovalue, albedo);
-    for (c = 0; c < 3; c++) wave.albedo[c] = (double)albedo[c];
+    isogi_trace_material(desc, site->isovalue, NULL, wave.albedo, wave.emission);
     for (first = 0; first < desc->samples && !isogi_trace__dark(scene); first += ISOGI_TRACE__WAVE) {
         int count = desc->samples - first < ISOGI_TRACE__WAVE ? desc->samples - first : ISOGI_TRACE__WAVE;
         isogi_trace__wave_run(&wave, first, count);
@@ -1012,39 +1201,27 @@ static void isogi_trace__gather_site(const isogi_trace__scene *scene, const isog
 
 /* ==== the description ================================================================================================ */
 
-ISOGI_API void isogi_trace_albedo(const isogi_trace_desc *desc, double isovalue, float rgb[3]) {
-    const isogi_albedo_point *p = desc->albedo_points;
-    size_t n = desc->albedo_count, i = 0;
-    int c, plain = 0;
-    for (c = 0; c < 3; c++) plain |= desc->albedo[c] > 0;
-    for (c = 0; c < 3; c++) rgb[c] = desc->albedo[c];
-    if (!p || !n) return;
-    while (i < n && p[i].value < isovalue) i++;
-    for (c = 0; c < 3; c++) {
-        double value;
-        if (i == 0 || i == n) value = (double)p[i ? n - 1 : 0].rgb[c];
-        else
-            value = isogi_trace__lerp((double)p[i - 1].rgb[c], (double)p[i].rgb[c],
-                                      (isovalue - p[i - 1].value) / (p[i].value - p[i - 1].value));
-        rgb[c] = plain ? rgb[c] * (float)value : (float)value;
-    }
-}
-
-static int isogi_trace__in_unit(const float rgb[3]) {
+static int isogi_trace__in_range_rgb(const float rgb[3], float most) {
     int c;
     for (c = 0; c < 3; c++)
-        if (!isogi_trace__finite((double)rgb[c]) || rgb[c] < 0 || rgb[c] > 1) return 0;
+        if (!isogi_trace__finite((double)rgb[c]) || rgb[c] < 0 || rgb[c] > most) return 0;
     return 1;
 }
 
-static int isogi_trace__albedo_valid(const isogi_trace_desc *d) {
+static int isogi_trace__table_valid(const isogi_albedo_point *p, size_t count, float most) {
     size_t i;
-    if (!isogi_trace__in_unit(d->albedo) || (d->albedo_count && !d->albedo_points)) return 0;
-    for (i = 0; i < d->albedo_count; i++) {
-        if (!isogi_trace__in_unit(d->albedo_points[i].rgb) || !isogi_trace__finite(d->albedo_points[i].value)) return 0;
-        if (i && !(d->albedo_points[i].value > d->albedo_points[i - 1].value)) return 0;
+    if (count && !p) return 0;
+    for (i = 0; i < count; i++) {
+        if (!isogi_trace__in_range_rgb(p[i].rgb, most) || !isogi_trace__finite(p[i].value)) return 0;
+        if (i && !(p[i].value > p[i - 1].value)) return 0;
     }
     return 1;
+}
+
+static int isogi_trace__material_valid(const isogi_trace_desc *d) {
+    if (!isogi_trace__in_range_rgb(d->albedo, 1) || !isogi_trace__table_valid(d->albedo_points, d->albedo_count, 1)) return 0;
+    if (d->emission_count && d->mode != ISOGI_TRACE_IRRADIANCE) return 0;
+    return isogi_trace__table_valid(d->emission_points, d->emission_count, 1e30f);
 }
 
 /* Distant light alone can be relit without rays. */
@@ -1069,7 +1246,9 @@ static int isogi_trace__desc_valid(const isogi_trace_desc *d) {
     if (!isogi_trace__finite(d->isovalue_min) || !isogi_trace__finite(d->isovalue_max) || d->isovalue_min > d->isovalue_max)
         return 0;
     if (!isogi_trace__finite3(d->lattice_min) || !isogi_trace__finite3(d->lattice_max)) return 0;
-    if (isogi_lighting_validate(&d->lighting) != ISOGI_OK || !isogi_trace__albedo_valid(d)) return 0;
+    if (d->sides != ISOGI_TRACE_LOW_SIDE && d->sides != ISOGI_TRACE_HIGH_SIDE && d->sides != ISOGI_TRACE_BOTH_SIDES) return 0;
+    if (!isogi_trace__finite((double)d->reach) || d->reach < 0) return 0;
+    if (isogi_lighting_validate(&d->lighting) != ISOGI_OK || !isogi_trace__material_valid(d)) return 0;
     return d->mode == ISOGI_TRACE_IRRADIANCE || isogi_trace__distant(&d->lighting);
 }
 
@@ -1082,15 +1261,18 @@ static int isogi_trace__grey(const isogi_trace_desc *d) {
         const float *c = d->albedo_points[i].rgb;
         grey = grey && c[0] >= c[1] && c[0] <= c[1] && c[0] >= c[2] && c[0] <= c[2];
     }
-    return grey;
+    return grey && !d->material;
 }
 
 /* The scene of a valid description. What it allocates is freed by isogi_trace__sky_free, on failure too. */
 static isogi_result isogi_trace__scene_set(isogi_trace__scene *scene, const isogi_trace_desc *desc,
                                            const isogi_context *context) {
     isogi_trace_desc *d = &scene->desc;
+    int i;
     memset(scene, 0, sizeof *scene);
     *d = *desc;
+    scene->high = d->sides == ISOGI_TRACE_HIGH_SIDE;
+    for (i = 0; i < ISOGI_TRACE__WAVE; i++) scene->reach[i] = (double)d->reach;
     scene->pyramid = d->pyramid;
     scene->volume = isogi_vol_volume(d->pyramid);
     scene->flags = d->capped ? (uint32_t)ISOGI_RAY_CAPPED : 0;
@@ -1144,6 +1326,8 @@ struct isogi_trace {
     isogi_counters counters;
     float light[3 * ISOGI_TRACE__MAX_ORDER * ISOGI_TRACE__MAX_ORDER]; /* TRANSFER: of the lighting, RGB interleaved */
     double brightness; /* TRANSFER: mean luminance of the lighting, for the error */
+    isogi_trace *high; /* BOTH_SIDES: the other side's texture, owned */
+    double share[2];   /* of the progress that baking reports, from and to */
 };
 
 /* Where and on which isosurface a texel lies. Its light is that at its own place, so a surface must pass there: the value at the
@@ -1363,17 +1547,28 @@ ISOGI_API isogi_result isogi_trace_create(isogi_trace **trace, const isogi_trace
     t = (isogi_trace *)isogi_allocate(context, 1, sizeof *t);
     if (!t) return ISOGI_NO_MEMORY;
     memset(t, 0, sizeof *t);
-    t->context = *context;
+    t->context = *context, t->share[1] = 1;
     result = isogi_trace__set_up(t, desc);
+    if (result == ISOGI_OK && desc->sides == ISOGI_TRACE_BOTH_SIDES) {
+        isogi_trace_desc other = *desc;
+        other.sides = ISOGI_TRACE_HIGH_SIDE;
+        result = isogi_trace_create(&t->high, &other, context);
+        if (result == ISOGI_OK) t->share[1] = t->high->share[0] = 0.5;
+    }
     if (result == ISOGI_OK) *trace = t;
     else isogi_trace_free(t);
     return result;
+}
+
+ISOGI_API isogi_trace *isogi_trace_high(isogi_trace *trace) {
+    return trace ? trace->scene.high ? trace : trace->high : NULL;
 }
 
 ISOGI_API void isogi_trace_free(isogi_trace *trace) {
     isogi_context context;
     size_t i;
     if (!trace) return;
+    isogi_trace_free(trace->high);
     context = trace->context;
     for (i = 0; trace->bricks && i < trace->brick_count; i++) isogi_trace__brick_free(trace, trace->bricks[i]);
     isogi_release(&context, trace->bricks, trace->brick_count, sizeof *trace->bricks);
@@ -1579,14 +1774,64 @@ ISOGI_API isogi_result isogi_trace_sample_transfer(const isogi_trace *trace, con
     return ISOGI_OK;
 }
 
+/* Factors g_l by which a Phong lobe of integral 1 blurs degree l: (s + 1) times the integral of x^s P_l(x) over [0,1]. */
+static void isogi_trace__lobe(double exponent, int order, double *g) {
+    int l;
+    g[0] = 1, g[1] = (exponent + 1) / (exponent + 2);
+    for (l = 2; l < order; l++) g[l] = g[l - 2] * (exponent - l + 2) / (exponent + l + 1);
+}
+
+/* One point of the above; T its transfer, t->light the lighting. */
+static void isogi_trace__gloss(const isogi_trace *t, const float *transfer, const float normal[3], const float view[3],
+                               const double *g, float rgb[3]) {
+    static const double cosine[6] = {3.14159265358979323846, 2.0943951023931953, 0.78539816339744831, 0, -0.13089969389957472, 0};
+    float dirs[2][3], y[2][ISOGI_TRACE__MAX_ORDER * ISOGI_TRACE__MAX_ORDER];
+    double open = 0, light[3] = {0, 0, 0}, seen[3] = {0, 0, 0}, facing = 2 * isogi_trace__dot(normal, view);
+    int order = t->scene.desc.order, channels = t->scene.desc.transfer_channels, k, c, l;
+    for (c = 0; c < 3; c++) dirs[0][c] = (float)(facing * (double)normal[c]) - view[c], dirs[1][c] = normal[c];
+    isogi_sh_eval(y[0], order, (const float(*)[3])dirs, 1);
+    isogi_sh_eval(y[1], order, (const float(*)[3])(dirs + 1), 1);
+    for (k = l = 0; k < order * order; k++) {
+        double blurred;
+        if (k >= (l + 1) * (l + 1)) l++;
+        blurred = g[l] * (double)y[0][k];
+        open += cosine[l] * blurred * (double)y[1][k];
+        for (c = 0; c < 3; c++) {
+            light[c] += blurred * (double)t->light[3 * k + c];
+            seen[c] += blurred * (double)transfer[k * channels + (channels == 1 ? 0 : c)];
+        }
+    }
+    for (c = 0; c < 3; c++)
+        rgb[c] = (float)(isogi_trace__clamp(light[c], 1e30) * isogi_trace__clamp(seen[c] / (open > 1e-3 ? open : 1e-3), 1));
+}
+
+ISOGI_API isogi_result isogi_trace_sample_gloss(const isogi_trace *trace, const float (*points)[3], const float (*normals)[3],
+                                                const float (*views)[3], double exponent, size_t count, float (*radiance)[3]) {
+    float transfer[3 * ISOGI_TRACE__MAX_ORDER * ISOGI_TRACE__MAX_ORDER];
+    double g[ISOGI_TRACE__MAX_ORDER + 1];
+    size_t i;
+    isogi_result result = ISOGI_OK;
+    if (!trace || trace->scene.desc.mode != ISOGI_TRACE_TRANSFER || (count && (!points || !normals || !views || !radiance)))
+        return ISOGI_INVALID;
+    if (!isogi_trace__finite(exponent) || exponent < 0) return ISOGI_INVALID;
+    isogi_trace__lobe(exponent, trace->scene.desc.order, g);
+    for (i = 0; i < count && result == ISOGI_OK; i++) {
+        result = isogi_trace_sample_transfer(trace, points + i, 1, transfer);
+        isogi_trace__gloss(trace, transfer, normals[i], views[i], g, radiance[i]);
+    }
+    return result;
+}
+
 ISOGI_API isogi_result isogi_trace_relight(isogi_trace *trace, const isogi_lighting *lighting) {
     float light[3 * ISOGI_TRACE__MAX_ORDER * ISOGI_TRACE__MAX_ORDER];
     isogi_result result;
     if (!trace || trace->scene.desc.mode != ISOGI_TRACE_TRANSFER) return ISOGI_INVALID;
     if (isogi_lighting_validate(lighting) != ISOGI_OK || !isogi_trace__distant(lighting)) return ISOGI_INVALID;
     result = isogi_sh_project(light, trace->scene.desc.order, lighting, NULL);
-    if (result == ISOGI_OK) isogi_trace__set_light(trace, light);
-    return result;
+    if (result != ISOGI_OK) return result;
+    isogi_trace__set_light(trace, light);
+    if (trace->high) isogi_trace__set_light(trace->high, light);
+    return ISOGI_OK;
 }
 
 ISOGI_API void isogi_trace_shape(const isogi_trace *trace, size_t lattice[3], int *order, int *channels) {
@@ -1616,6 +1861,7 @@ ISOGI_API void isogi_trace_counters(const isogi_trace *trace, isogi_counters *co
     c = &trace->counters;
     counters->rays += c->rays, counters->blocks += c->blocks, counters->cells += c->cells, counters->cubics += c->cubics;
     counters->texels += c->texels, counters->texels_skipped += c->texels_skipped;
+    if (trace->high) isogi_trace_counters(trace->high, counters);
 }
 
 /* ==== requests ======================================================================================================= */
@@ -1762,18 +2008,17 @@ static isogi_result isogi_trace__bake_batch(isogi_trace *t, size_t count) {
     isogi_result result;
     job.trace = t, job.count = count;
     memset(t->task_counters, 0, tasks * sizeof *t->task_counters);
-    result = isogi_parallel(&t->context, tasks, isogi_trace__bake_task, &job, (double)t->done / (double)total,
-                            (double)(t->done + count) / (double)total);
+    result = isogi_parallel(&t->context, tasks, isogi_trace__bake_task, &job,
+                            isogi_trace__lerp(t->share[0], t->share[1], (double)t->done / (double)total),
+                            isogi_trace__lerp(t->share[0], t->share[1], (double)(t->done + count) / (double)total));
     for (i = 0; i < tasks; i++) isogi_trace__add(&t->counters, &t->task_counters[i]);
     t->done += t->counters.texels - before, t->wanted -= t->counters.texels - before;
     return result;
 }
 
-ISOGI_API isogi_result isogi_trace_step(isogi_trace *trace, uint64_t max_rays, double *remaining) {
+static isogi_result isogi_trace__step_side(isogi_trace *trace, uint64_t max_rays) {
     isogi_result result = ISOGI_OK;
-    uint64_t begin;
-    if (!trace) return ISOGI_INVALID;
-    begin = trace->counters.rays;
+    uint64_t begin = trace->counters.rays;
     while (trace->wanted && result == ISOGI_OK) {
         uint64_t used = trace->counters.rays - begin, each = (uint64_t)trace->scene.desc.samples * 2,
                  limit = ISOGI_TRACE__BATCH;
@@ -1785,8 +2030,21 @@ ISOGI_API isogi_result isogi_trace_step(isogi_trace *trace, uint64_t max_rays, d
         if (result == ISOGI_OK) result = isogi_trace__bake_batch(trace, count);
         isogi_trace__queue_advance(trace);
     }
-    if (remaining && result == ISOGI_OK)
-        *remaining = trace->wanted ? (double)trace->wanted / (double)(trace->wanted + trace->done) : 0;
+    return result;
+}
+
+/* The high side has its turn with the rays that the low side leaves, or when that has none to trace. */
+ISOGI_API isogi_result isogi_trace_step(isogi_trace *trace, uint64_t max_rays, double *remaining) {
+    isogi_result result;
+    uint64_t begin, used, wanted, done;
+    if (!trace) return ISOGI_INVALID;
+    begin = trace->counters.rays;
+    result = isogi_trace__step_side(trace, max_rays);
+    used = trace->counters.rays - begin;
+    if (result == ISOGI_OK && trace->high && (!max_rays || used < max_rays))
+        result = isogi_trace__step_side(trace->high, max_rays ? max_rays - used : 0);
+    wanted = trace->wanted + (trace->high ? trace->high->wanted : 0), done = trace->done + (trace->high ? trace->high->done : 0);
+    if (remaining && result == ISOGI_OK) *remaining = wanted ? (double)wanted / (double)(wanted + done) : 0;
     return result;
 }
 
@@ -1819,6 +2077,7 @@ static void isogi_trace__gather_task(void *arg, size_t task) {
         if (job->normals) {
             length = sqrt(isogi_trace__dot(job->normals[i], job->normals[i]));
             if (!(length > 0) || !isogi_trace__finite(length)) continue;
+            if (job->scene.high) length = -length;
             for (a = 0; a < 3; a++) site.normal[a] = (float)((double)job->normals[i][a] / length);
         } else if (!isogi_trace__site_normal(&job->scene, &site)) continue;
         site.key = isogi_trace__key(isogi_trace__key(job->scene.desc.seed, 1), (uint64_t)i);
@@ -1833,6 +2092,7 @@ ISOGI_API isogi_result isogi_trace_gather(const isogi_trace_desc *desc, const fl
     isogi_result result;
     if (!isogi_trace__desc_valid(desc) || desc->mode != ISOGI_TRACE_IRRADIANCE || (count && (!points || !irradiance)))
         return ISOGI_INVALID;
+    if (desc->sides == ISOGI_TRACE_BOTH_SIDES) return ISOGI_INVALID;
     if (!count) return ISOGI_OK;
     if (!context) context = isogi_vol_context(desc->pyramid);
     memset(&job, 0, sizeof job);

@@ -10,7 +10,7 @@ int main(void) {
         float up = cosf(3.14159265f * ((float)(i / 128) + 0.5f) / 64);
         for (int k = 0; k < 3; k++) sky[3 * i + k] = up > 0 ? 0.3f + 0.2f * (float)k * up : 0.15f - 0.04f * (float)k;
     }
-    isogi_light sun = {ISOGI_LIGHT_DIRECTIONAL, {1, 0.25f, 0.3f}, {4, 3.5f, 3}, 0.005f}; /* low in the east */
+    isogi_light sun = {.vector = {1, 0.25f, 0.3f}, .rgb = {4, 3.5f, 3}, .radius = 0.005f}; /* low in the east */
     isogi_lighting lighting = {.env = {.rgb = sky, .width = 128, .height = 64}};
     float day[3 * 25], light[3 * 25], sunlight[3 * 25];
     if (isogi_sh_project(day, 5, &lighting, NULL) != ISOGI_OK) return 1;

@@ -72,7 +72,7 @@ typedef struct options {
     const char *volume, *env, *tf, *out;
     const scene *scene;
     int width, height, mode, raycast, bounces, samples, threads, stats, antialias, shading, order, directions, lookup;
-    int has_size, has_iso, has_mode, has_spacing, has_albedo, has_clip, has_camera, has_up, has_nan, has_shading, has_bounces;
+    int has_size, has_iso, has_mode, has_spacing, has_albedo, has_clip, has_camera, has_up, has_nan, has_shading;
     double isovalue, spacing[3], clip[4], azimuth, elevation, distance, up[3], exposure, nan_value;
     float albedo[3];
     isogi_light lights[MAX_LIGHTS];
@@ -175,14 +175,15 @@ static int parse_clip(viewer *v, const char *text) {
     return 1;
 }
 
-/* KIND:X,Y,Z:R,G,B[:RADIUS] */
+/* KIND:X,Y,Z:R,G,B[:RADIUS], or rectangle:X,Y,Z:R,G,B:UX,UY,UZ:VX,VY,VZ */
 static int parse_light(viewer *v, const char *text) {
-    static const char *const kind_name[3] = {"directional", "point", "sphere"};
-    char part[4][64];
+    static const char *const kind_name[4] = {"directional", "point", "sphere", "rectangle"};
+    char part[6][64];
     int parts = 0, kind;
-    double place[3], rgb[3], radius = 0;
+    double place[3], rgb[3], radius = 0, edge[2][3] = {{0}};
     isogi_light *light = &v->o.lights[v->o.light_count];
-    for (; parts < 4; parts++) {
+    isogi_lighting alone = {.lights = light, .light_count = 1};
+    for (; parts < 6; parts++) {
         size_t length = strcspn(text, ":");
         if (length > 63) return 0;
         memcpy(part[parts], text, length), part[parts][length] = 0;
@@ -190,14 +191,20 @@ static int parse_light(viewer *v, const char *text) {
         if (!*text) break;
         text++;
     }
-    if (parts < 2 || parts > 3 || v->o.light_count >= MAX_LIGHTS || !parse_name(part[0], kind_name, 3, &kind)) return 0;
+    if (parts < 2 || parts > 4 || v->o.light_count >= MAX_LIGHTS || !parse_name(part[0], kind_name, 4, &kind)) return 0;
+    if ((parts == 4) != (kind == ISOGI_LIGHT_RECTANGLE)) return 0;
     if (!numbers(part[1], ',', 3, -1e9, 1e9, place) || !numbers(part[2], ',', 3, 0, 1e12, rgb)) return 0;
     if (parts == 3 && !numbers(part[3], ',', 1, 0, kind == 0 ? 90 : 1e9, &radius)) return 0;
     if (kind == ISOGI_LIGHT_DIRECTIONAL && !vector_normalize(place)) return 0;
     if (kind == ISOGI_LIGHT_SPHERE && !(radius > 0)) return 0;
+    for (int k = 0; parts == 4 && k < 2; k++)
+        if (!numbers(part[3 + k], ',', 3, -1e9, 1e9, edge[k])) return 0;
+    memset(light, 0, sizeof *light);
     light->kind = (isogi_light_kind)kind;
     light->radius = (float)(kind == ISOGI_LIGHT_DIRECTIONAL ? radius * PI / 180 : radius);
     for (int i = 0; i < 3; i++) light->vector[i] = (float)place[i], light->rgb[i] = (float)rgb[i];
+    for (int i = 0; i < 6; i++) light->edge[i / 3][i % 3] = (float)edge[i / 3][i % 3];
+    if (isogi_lighting_validate(&alone) != ISOGI_OK) return 0;
     v->o.light_count++;
     return 1;
 }
@@ -221,10 +228,12 @@ static const option option_list[] = {
     {"--up", "X,Y,Z", "which way is up, for the camera and the environment; default 0,1,0", OTHER, 0, AT(has_up), 0, 0, 0, parse_up, "three numbers, not all zero"},
     {"--env", "FILE.hdr", "environment: equirectangular Radiance picture", TEXT, AT(env), 0, 0, 0, 0, 0, ""},
     {"--light", "KIND:X,Y,Z:R,G,B[:RADIUS]", "directional (towards the light; irradiance; radius in degrees), point (place; intensity), sphere "
-     "(centre; intensity; radius); may be repeated", OTHER, 0, 0, 0, 0, 0, parse_light,
-     "directional|point|sphere:X,Y,Z:R,G,B with an optional :RADIUS (up to 90 degrees; needed for a sphere), at most 64 times"},
+     "(centre; intensity; radius), rectangle:X,Y,Z:R,G,B:UX,UY,UZ:VX,VY,VZ (centre; intensity; two sides at right angles; it "
+     "shines towards U x V); may be repeated", OTHER, 0, 0, 0, 0, 0, parse_light,
+     "directional|point|sphere:X,Y,Z:R,G,B with an optional :RADIUS (up to 90 degrees; needed for a sphere), or "
+     "rectangle:X,Y,Z:R,G,B:UX,UY,UZ:VX,VY,VZ, at most 64 times"},
     {"--albedo", "R,G,B", "diffuse reflectance; default 0.7,0.7,0.7", FLOATS, AT(albedo), AT(has_albedo), 3, 0, 1, 0, "three numbers, 0 to 1"},
-    {"--bounces", "N", "reflections of light; -1 = all, the default", INTEGER, AT(bounces), AT(has_bounces), 1, -1, 1000, 0, "a whole number, -1 to 1000"},
+    {"--bounces", "N", "reflections of light; -1 = all, the default", INTEGER, AT(bounces), 0, 1, -1, 1000, 0, "a whole number, -1 to 1000"},
     {"--samples", "N", "paths per texel, or per pixel for pathtrace; default 64", INTEGER, AT(samples), 0, 1, 1, 1000000, 0, "a whole number, 1 to 1000000"},
     {"--lattice", "X,Y,Z", "texels of the illumination texture; default one per voxel", SIZES, AT(lattice), 0, 3, 2, 4096, 0, "three whole numbers, 2 to 4096"},
     {"--lookup", "NAME", "how the texture is read: trilinear, nearest, closest-isovalue, bspline", OTHER, 0, 0, 0, 0, 0, parse_lookup,
@@ -252,7 +261,7 @@ static void print_help(void) {
     puts("  --help                       this text\n\n"
          "Modes\n"
          "  lambert, phong               light by the normal alone, no shadows: the usual picture, to compare with\n"
-         "  vicinity                     a uniform sky, one bounce of nothing: how open each place is\n"
+         "  vicinity                     a uniform sky, no reflections: how open each place is\n"
          "  irradiance                   global light baked into a texture, only where this view looks\n"
          "  transfer                     the same by spherical harmonics, which can be relit without new rays\n"
          "  pathtrace                    no texture: paths from every pixel, the reference\n"
@@ -822,6 +831,15 @@ static void toward_light(const isogi_light *light, const float point[3], double 
     for (int i = 0; i < 3; i++) to[i] = (double)light->vector[i] - (light->kind == ISOGI_LIGHT_DIRECTIONAL ? 0 : (double)point[i]);
     if (light->kind != ISOGI_LIGHT_DIRECTIONAL) *strength = 1 / (vector_dot(to, to) + 1e-30);
     vector_normalize(to);
+    if (light->kind == ISOGI_LIGHT_RECTANGLE) { /* as from its centre */
+        double facing = 0, area = 0;
+        for (int i = 0; i < 3; i++) {
+            int j = (i + 1) % 3, k = (i + 2) % 3;
+            double n = (double)light->edge[0][j] * (double)light->edge[1][k] - (double)light->edge[0][k] * (double)light->edge[1][j];
+            facing -= n * to[i], area += n * n;
+        }
+        *strength *= facing > 0 ? facing / sqrt(area) : 0;
+    }
 }
 
 static double clamped_cosine(const double a[3], const double b[3]) {

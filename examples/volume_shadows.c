@@ -16,7 +16,7 @@ int main(void) {
             }
     const isogi_transfer_point points[] = {{0.3, {1, 1, 1}, 0}, {0.6, {1, 1, 1}, 0.9f}};
     const isogi_transfer transfer = {.points = points, .point_count = 2};
-    const isogi_light sun = {ISOGI_LIGHT_DIRECTIONAL, {0.7f, 2, -0.3f}, {6, 6, 6}, 0};
+    const isogi_light sun = {.vector = {0.7f, 2, -0.3f}, .rgb = {6, 6, 6}};
     const isogi_lighting lighting = {.lights = &sun, .light_count = 1};
     const isogi_view view = {.width = WIDTH, .height = HEIGHT, .eye = {24, 75, 95}, .target = {24, 17, 24}, .fov = 32};
     const isogi_volume volume = {.data = data, .type = ISOGI_F32, .size = {N, N, N}};

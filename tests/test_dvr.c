@@ -762,7 +762,7 @@ TEST(lights_add_up) {
     const isogi_transfer_point points[] = {{-1, {1, 0.2f, 0.1f}, 0}, {1, {0.3f, 1, 0.1f}, 0.05f}};
     const isogi_peak peak = {0.2, {1, 1, 1}, 0.1f};
     const isogi_transfer transfer = {points, 2, &peak, 1};
-    const isogi_light lights[] = {{ISOGI_LIGHT_DIRECTIONAL, {1, 1, 1}, {2, 1, 0.5f}, 0}, {ISOGI_LIGHT_POINT, {40, 5, 6}, {300, 900, 100}, 0}};
+    const isogi_light lights[] = {{.vector = {1, 1, 1}, .rgb = {2, 1, 0.5f}}, {.kind = ISOGI_LIGHT_POINT, .vector = {40, 5, 6}, .rgb = {300, 900, 100}}};
     const isogi_lighting parts[4] = {{.env = {.sh = sky_one, .sh_order = 1}}, {.lights = &lights[0], .light_count = 1},
                                      {.lights = &lights[1], .light_count = 1}, {.env = {.sh = sky_one, .sh_order = 1}, .lights = lights, .light_count = 2}};
     for (int shading = 1; shading < 3; shading++) {
@@ -791,7 +791,7 @@ TEST(scattered_light_has_the_stated_units) {
     field f = field_of(constant, 5);
     const isogi_transfer_point point = {0, {0.8f, 0.5f, 0.3f}, 1e-7f};
     const isogi_transfer transfer = {&point, 1, NULL, 0};
-    const isogi_light lights[] = {{ISOGI_LIGHT_DIRECTIONAL, {1, 2, -1}, {2, 2, 2}, 0}, {ISOGI_LIGHT_POINT, {2, 300, 2}, {5e4f, 5e4f, 5e4f}, 0}};
+    const isogi_light lights[] = {{.vector = {1, 2, -1}, .rgb = {2, 2, 2}}, {.kind = ISOGI_LIGHT_POINT, .vector = {2, 300, 2}, .rgb = {5e4f, 5e4f, 5e4f}}};
     const isogi_dvr_desc desc = {.pyramid = f.pyramid, .shading = ISOGI_DVR_VISIBILITY};
     const double eye[3] = {-30, 2, 2}, target[3] = {5, 2, 2}, expected[2] = {2 / (4 * PI), 5e4 / (298.0 * 298.0) / (4 * PI)};
     isogi_dvr *dvr = dvr_new(&desc, &transfer, NULL);
@@ -816,8 +816,8 @@ TEST(local_shading_faces_the_eye_on_both_sides) {
     isogi_dvr *dvr = dvr_new(&desc, &transfer, NULL);
     for (int side = -1; side <= 1; side += 2) {
         const double eye[3] = {4, 4, 4 + 30 * side}, target[3] = {4, 4, 4};
-        const isogi_light towards = {ISOGI_LIGHT_DIRECTIONAL, {0, 3, 4.0f * (float)side}, {2, 2, 2}, 0};
-        const isogi_light behind = {ISOGI_LIGHT_DIRECTIONAL, {0, 3, -4.0f * (float)side}, {2, 2, 2}, 0};
+        const isogi_light towards = {.vector = {0, 3, 4.0f * (float)side}, .rgb = {2, 2, 2}};
+        const isogi_light behind = {.vector = {0, 3, -4.0f * (float)side}, .rgb = {2, 2, 2}};
         const isogi_lighting lit[3] = {{.env = {.sh = sky_one, .sh_order = 1}}, {.lights = &towards, .light_count = 1}, {.lights = &behind, .light_count = 1}};
         const double expected[3] = {1, 2 * 0.8 / PI, 0};
         for (int i = 0; i < 3; i++) {
@@ -838,7 +838,7 @@ TEST(shadows_fall_away_from_the_light) {
     field f = field_of(floor_and_roof, 24);
     const isogi_transfer_point points[] = {{0, {1, 1, 1}, 0}, {0.3, {1, 1, 1}, 0}, {1, {1, 1, 1}, 3}};
     const isogi_transfer transfer = {points, 3, NULL, 0};
-    const isogi_light sun = {ISOGI_LIGHT_DIRECTIONAL, {0, 1, 0}, {6, 6, 6}, 0};
+    const isogi_light sun = {.vector = {0, 1, 0}, .rgb = {6, 6, 6}};
     const isogi_lighting lighting = {.lights = &sun, .light_count = 1};
     const isogi_dvr_desc desc = {.pyramid = f.pyramid, .shading = ISOGI_DVR_VISIBILITY, .directions = 256, .grid = {12, 12, 12}};
     isogi_dvr *dvr = dvr_new(&desc, &transfer, NULL);
@@ -1007,7 +1007,7 @@ TEST(ending_early_errs_by_no_more_than_what_is_left) {
 
 TEST(any_number_of_threads_and_any_slicing_gives_the_same_bits) {
     field f = field_waves(24, 6);
-    const isogi_light sun = {ISOGI_LIGHT_DIRECTIONAL, {1, 1, 1}, {6, 6, 6}, 0};
+    const isogi_light sun = {.vector = {1, 1, 1}, .rgb = {6, 6, 6}};
     const isogi_lighting lighting = {.env = {.sh = sky_one, .sh_order = 1}, .lights = &sun, .light_count = 1};
     test_random r = {7};
     isogi_view view = view_of(&f, 1, &r, 40);
@@ -1107,7 +1107,7 @@ static void scarce_release(void *user, void *p, size_t size) {
 
 TEST(every_allocation_may_fail) {
     field f = field_waves(8, 6);
-    const isogi_light sun = {ISOGI_LIGHT_POINT, {100, 1, 1}, {6, 6, 6}, 0};
+    const isogi_light sun = {.kind = ISOGI_LIGHT_POINT, .vector = {100, 1, 1}, .rgb = {6, 6, 6}};
     const isogi_lighting lighting = {.env = {.sh = sky_one, .sh_order = 1}, .lights = &sun, .light_count = 1};
     const isogi_view view = {.width = 5, .height = 4, .eye = {60, 70, 80}};
     for (int shading = 0; shading < 3; shading++)

@@ -378,12 +378,12 @@ TEST(lights_have_the_irradiance_they_state) {
     static float c[3 * ORDER * ORDER], y[ORDER * ORDER];
     const float point[3] = {1, 2, 3};
     isogi_light lights[] = {
-        {ISOGI_LIGHT_DIRECTIONAL, {2, 0, 0}, {3, 1, 2}, 0},
-        {ISOGI_LIGHT_DIRECTIONAL, {0, -5, 1}, {3, 1, 2}, 0.3f},
-        {ISOGI_LIGHT_DIRECTIONAL, {1, 1, 1}, {3, 1, 2}, 0.00465f},
-        {ISOGI_LIGHT_POINT, {1, 2, 7}, {48, 16, 32}, 0},
-        {ISOGI_LIGHT_SPHERE, {1, -2, 3}, {48, 16, 32}, 2},
-        {ISOGI_LIGHT_DIRECTIONAL, {0, 0, -1}, {3, 1, 2}, 1.5f},
+        {.vector = {2, 0, 0}, .rgb = {3, 1, 2}},
+        {.vector = {0, -5, 1}, .rgb = {3, 1, 2}, .radius = 0.3f},
+        {.vector = {1, 1, 1}, .rgb = {3, 1, 2}, .radius = 0.00465f},
+        {.kind = ISOGI_LIGHT_POINT, .vector = {1, 2, 7}, .rgb = {48, 16, 32}},
+        {.kind = ISOGI_LIGHT_SPHERE, .vector = {1, -2, 3}, .rgb = {48, 16, 32}, .radius = 2},
+        {.vector = {0, 0, -1}, .rgb = {3, 1, 2}, .radius = 1.5f},
     };
     for (size_t i = 0; i < sizeof lights / sizeof *lights; i++) {
         isogi_lighting lighting = {.lights = &lights[i], .light_count = 1};
@@ -403,7 +403,7 @@ TEST(disc_matches_quadrature) {
     enum { ORDER = 12, N = ORDER * ORDER, STEPS = 400 };
     double radius = 0.7, z[ORDER] = {0}, L = 1 / (pi * sin(radius) * sin(radius));
     float c[3 * N], small[3 * N], delta[3 * N];
-    isogi_light light = {ISOGI_LIGHT_DIRECTIONAL, {0, 0, 1}, {1, 1, 1}, (float)radius}, tiny = light, none = light;
+    isogi_light light = {.vector = {0, 0, 1}, .rgb = {1, 1, 1}, .radius = (float)radius}, tiny = light, none = light;
     tiny.radius = 1e-6f, none.radius = 0;
     isogi_lighting lighting = {.lights = &light, .light_count = 1};
     isogi_sh_project(c, ORDER, &lighting, NULL);
@@ -958,7 +958,7 @@ TEST(windows_and_deringing) {
     static const char *const names[] = {"Hann", "Lanczos", "Gauss"};
     static const double at_half[] = {0.5, 0.63661977236758134, 0.5};
     float delta[3 * N], sky[3 * N], out[3 * N], up[3] = {0.3f, 1, 0.2f}, white[3] = {1, 0.9f, 0.8f}, black[3] = {0, 0, 0};
-    isogi_light sun = {ISOGI_LIGHT_DIRECTIONAL, {1, 2, 3}, {1, 2, 3}, 0};
+    isogi_light sun = {.vector = {1, 2, 3}, .rgb = {1, 2, 3}};
     isogi_lighting lighting = {.lights = &sun, .light_count = 1};
     isogi_sh_project(delta, ORDER, &lighting, NULL);
     isogi_sh_hemisphere_sky(sky, ORDER, up, white, black);
@@ -1089,7 +1089,7 @@ TEST(fits_find_one_light) {
         double d[3];
         float c[3 * N], e[3 * N], direction[3], rgb[3], ambient[3], base[3];
         random_direction(&r, d);
-        isogi_light sun = {ISOGI_LIGHT_DIRECTIONAL, {(float)d[0], (float)d[1], (float)d[2]}, {0, 0, 0}, 0};
+        isogi_light sun = {.vector = {(float)d[0], (float)d[1], (float)d[2]}, .rgb = {0, 0, 0}};
         for (int k = 0; k < 3; k++) sun.rgb[k] = (float)random_range(&r, 0.5, 3), base[k] = (float)random_range(&r, 0, 2);
         isogi_lighting lighting = {.lights = &sun, .light_count = 1};
         isogi_sh_project(c, ORDER, &lighting, NULL);
@@ -1119,7 +1119,7 @@ TEST(truncation_error_falls_with_order) {
     const float up[3] = {1, 1, 0}, one[3] = {1, 1, 1}, none[3] = {0, 0, 0};
     float zonal[ORDER], single[N];
     double energy[3][ORDER], total[3] = {0, 0, 0};
-    isogi_light sun = {ISOGI_LIGHT_DIRECTIONAL, {1, 1, 0}, {1, 1, 1}, 0.1f};
+    isogi_light sun = {.vector = {1, 1, 0}, .rgb = {1, 1, 1}, .radius = 0.1f};
     isogi_lighting lighting = {.lights = &sun, .light_count = 1};
     isogi_sh_project(delta, ORDER, &lighting, NULL);
     isogi_sh_hemisphere_sky(sky, ORDER, up, one, none);
@@ -1258,7 +1258,7 @@ TEST(bad_input_is_reported_and_changes_nothing) {
 
 TEST(lighting_is_validated) {
     float image[2 * 4 * 3] = {0}, sh[27] = {0};
-    isogi_light lights[2] = {{ISOGI_LIGHT_DIRECTIONAL, {0, 1, 0}, {1, 1, 1}, 0}, {ISOGI_LIGHT_POINT, {0, 0, 0}, {1, 1, 1}, 0}};
+    isogi_light lights[2] = {{.vector = {0, 1, 0}, .rgb = {1, 1, 1}}, {.kind = ISOGI_LIGHT_POINT, .vector = {0, 0, 0}, .rgb = {1, 1, 1}}};
     const isogi_lighting good = {.env = {.rgb = image, .width = 4, .height = 2, .sh = sh, .sh_order = 3}, .lights = lights, .light_count = 2};
     isogi_lighting bad;
     isogi_lighting zero = {.lights = NULL};

@@ -52,7 +52,7 @@ static isogi_dvr *create(const isogi_dvr_desc *desc, const isogi_transfer *trans
 /* Frames of one renderer with several steps; the last is the reference. */
 static void bench_frames(const char *scene, const isogi_pyramid *pyramid, const isogi_transfer *transfer, isogi_dvr_space space, isogi_dvr_shading shading) {
     static const float sky[3] = {3.5449077f, 3.5449077f, 3.5449077f};
-    const isogi_light sun = {ISOGI_LIGHT_DIRECTIONAL, {1, 1, 1}, {2, 2, 2}, 0};
+    const isogi_light sun = {.vector = {1, 1, 1}, .rgb = {2, 2, 2}};
     const isogi_lighting lighting = {.env = {.sh = sky, .sh_order = 1}, .lights = &sun, .light_count = 1};
     const double steps[5] = {0.0625, 1, 0.5, 0.25, 0.125}, far = sqrt(3) / sin(pi / 8) / sqrt(1.5 * 1.5 + 1.2 * 1.2 + 2 * 2);
     const isogi_view view = {.width = WIDTH, .height = WIDTH, .eye = {(float)(1.5 * far), (float)(1.2 * far), (float)(2 * far)}};
