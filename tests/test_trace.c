@@ -602,7 +602,7 @@ TEST(texels_without_a_surface_are_left_out) {
         CHECK(fabs((double)e[0][0] - PI) < 1e-4 && error[0] < 1e-4f, "at y = %g: E %g, error %g", (double)point[0][1], (double)e[0][0], (double)error[0]);
     }
     {
-        float point[1][3] = {{5, 12, 5}}, e[1][3], error[1]; /* in the air no lookup is possible, and it says so */
+        float point[1][3] = {{5, 12, 5}}, e[1][3] = {{1, 1, 1}}, error[1] = {0}; /* in the air no lookup is possible, and it says so */
         isogi_trace_sample(t, (const float(*)[3])point, 1, e, error);
         CHECK(e[0][0] <= 0 && error[0] > 1e30f, "in the air: E %g, error %g", (double)e[0][0], (double)error[0]);
     }
