@@ -789,13 +789,14 @@ typedef struct isogi_trace__site {
 
 static void isogi_trace__scene_matrix(isogi_trace__scene *scene) {
     const isogi_volume *v = scene->volume;
-    double reach = 0;
+    double reach = 0, origin[3] = {0, 0, 0};
     int a, c;
+    isogi_vol_to_world(scene->pyramid, origin, origin);
     /* one long step along each world axis, so that a far origin costs no precision */
-    for (a = 0; a < 3; a++) reach += fabs(v->origin[a]) + v->spacing[a];
+    for (a = 0; a < 3; a++) reach += fabs(origin[a]) + v->spacing[a];
     for (c = 0; c < 3; c++) {
         double world[3], grid[3];
-        for (a = 0; a < 3; a++) world[a] = v->origin[a] + (a == c ? reach : 0);
+        for (a = 0; a < 3; a++) world[a] = origin[a] + (a == c ? reach : 0);
         isogi_vol_to_grid(scene->pyramid, world, grid);
         for (a = 0; a < 3; a++) scene->to_grid[3 * a + c] = grid[a] / reach;
     }

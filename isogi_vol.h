@@ -145,16 +145,26 @@ typedef enum isogi_type { ISOGI_U8 = 0, ISOGI_I8, ISOGI_U16, ISOGI_I16, ISOGI_F3
    Voxel (i,j,k) lies at origin + axes * (i spacing[0], j spacing[1], k spacing[2]): voxels are points at the corners of cells, so
    the volume's box reaches from voxel 0 to voxel size-1. "Grid coordinates" are (i,j,k) as real numbers.
    An axis of size 1 has no cells: such a volume can be sampled, and holds no surface.
-   A voxel that is not finite makes the cells around it hold no surface. */
+
+   Voxels that are not finite: a cell with one at a corner holds no surface for rays and meshes, no ray hits it, no mesh has a triangle
+   in it, and what a ray knew of its side is forgotten in it; all other cells are as if it were not there. Ranges leave such voxels out.
+   Trilinear samples next to one, and smooth samples within two voxels of one, are not finite themselves; normals there are zero.
+
+   Chunks: a larger field may be looked at in parts, each a volume of its own. Neighbours share the voxels of one plane, and every part
+   owns the cells between its own voxels. halo_low and halo_high say how many voxels of the larger field lie in memory before
+   and behind those, at the same strides: rays and meshes do not enter them, only the smoothed values and gradients read them (one on
+   each side is enough). `first` says where in the larger field voxel (0,0,0) lies. Then the parts have the hits, samples and normals of
+   the whole (to within the rounding of coordinates), and mesh vertices on the plane that two parts share are the same bits in both. */
 typedef struct isogi_volume {
     const void *data;    /* voxel (0,0,0), aligned for its type */
     isogi_type type;
     size_t size[3];      /* voxels along x, y, z; each 1 .. 2^31-1 */
-    ptrdiff_t stride[3]; /* bytes from voxel to voxel along x, y, z, multiples of the type's size; all 0 = packed, x fastest */
+    ptrdiff_t stride[3]; /* bytes from voxel to voxel along x, y, z, multiples of the type's size; all 0 = packed, x fastest, halo included */
     double spacing[3];   /* > 0; 0 = 1 */
-    double origin[3];    /* world position of voxel (0,0,0) */
+    double origin[3];    /* world position of voxel (0,0,0), of that of the larger field for a chunk */
     double axes[9];      /* row-major 3x3, column a = world direction of grid axis a, invertible; all 0 = identity */
     double scale, bias;  /* scale 0 = 1 */
+    size_t first[3], halo_low[3], halo_high[3]; /* of a chunk: see above; first up to 2^53, halos up to 2^31-1, without use along an axis of one voxel */
 } isogi_volume;
 
 ISOGI_API isogi_result isogi_volume_validate(const isogi_volume *volume);
@@ -238,6 +248,28 @@ ISOGI_API isogi_result isogi_vol_occluded(const isogi_pyramid *pyramid, const is
 ISOGI_API isogi_result isogi_vol_continue(const isogi_pyramid *pyramid, const isogi_hit *starts, const float (*dirs)[3],
                                           const double *tmax, double isovalue, uint32_t flags, size_t count, isogi_hit *hits,
                                           isogi_counters *counters);
+
+/* Every hit of each ray, in order: those of ray i are hits[i * capacity + n], n < counts[i]. counts[i] = capacity + 1 where there are
+   more than fit; hits[i * capacity + capacity - 1] with isogi_vol_continue leads to them. The same as isogi_vol_intersect and then
+   isogi_vol_continue along the ray until it misses, with t from the ray's own origin throughout. hits may be NULL if capacity is 0.
+   Sides alternate, but for touched layers without thickness, which leave the ray outside, and for cells that are not finite, after
+   which the side is not known. ISOGI_TOO_LARGE if count * capacity hits cannot be addressed. */
+ISOGI_API isogi_result isogi_vol_intersect_all(const isogi_pyramid *pyramid, const isogi_ray *rays, size_t count, size_t capacity,
+                                               isogi_hit *hits, size_t *counts, isogi_counters *counters);
+
+/* Rays that share everything but the direction: what gathering light at a point needs. The same bits as rays of their own. */
+typedef struct isogi_bundle {
+    const isogi_hit *start; /* the rays leave from this hit as in isogi_vol_continue, and origin and tmin are not read; NULL: from origin */
+    double origin[3];
+    double tmin, tmax; /* tmax 0 = unlimited */
+    double isovalue;
+    uint32_t flags; /* as in isogi_ray */
+} isogi_bundle;
+
+ISOGI_API isogi_result isogi_vol_bundle(const isogi_pyramid *pyramid, const isogi_bundle *bundle, const float (*dirs)[3], size_t count,
+                                        isogi_hit *hits, isogi_counters *counters);
+ISOGI_API isogi_result isogi_vol_bundle_occluded(const isogi_pyramid *pyramid, const isogi_bundle *bundle, const float (*dirs)[3],
+                                                 size_t count, uint8_t *occluded, isogi_counters *counters);
 
 typedef enum isogi_normal_kind {
     ISOGI_NORMAL_SMOOTH = 0, /* gradient of the cubic B-spline: what to shade with */
@@ -562,6 +594,7 @@ struct isogi_pyramid {
     isogi_context context;
     double to_world[9]; /* world = origin + to_world * grid */
     double to_grid[9];  /* its inverse */
+    double origin[3];   /* world position of voxel (0,0,0) */
     double range[2];
     int cells[3]; /* size - 1 */
     double box[4], grid_axis[3][4]; /* cells and the columns of to_grid, for vectors of four; the fourth is 0 */
@@ -608,7 +641,7 @@ static isogi_volume isogi_vol__resolve(const isogi_volume *volume) {
     ptrdiff_t stride = (ptrdiff_t)isogi_vol__type_size(v.type);
     int packed = !v.stride[0] && !v.stride[1] && !v.stride[2], identity = isogi_vol__all_zero(v.axes, 9), a;
     for (a = 0; a < 3; a++) {
-        if (packed) v.stride[a] = stride, stride *= (ptrdiff_t)v.size[a];
+        if (packed) v.stride[a] = stride, stride *= (ptrdiff_t)(v.halo_low[a] + v.size[a] + v.halo_high[a]);
         if (isogi_vol__all_zero(&v.spacing[a], 1)) v.spacing[a] = 1;
         if (identity) v.axes[4 * a] = 1;
     }
@@ -622,15 +655,18 @@ static isogi_result isogi_vol__check_layout(const isogi_volume *v, size_t type_s
     int zero = !v->stride[0] && !v->stride[1] && !v->stride[2], a;
     for (a = 0; a < 3; a++) {
         ptrdiff_t stride = zero ? (ptrdiff_t)packed : v->stride[a];
-        size_t step, span = v->size[a] - 1;
+        size_t step, span = v->size[a] - 1, all;
         if (!v->size[a]) return ISOGI_INVALID;
-        if (v->size[a] > 0x7fffffff) return ISOGI_TOO_LARGE;
+        if (v->size[a] > 0x7fffffff || v->halo_low[a] > 0x7fffffff || v->halo_high[a] > 0x7fffffff) return ISOGI_TOO_LARGE;
+        if ((uint64_t)v->first[a] > (uint64_t)1 << 53) return ISOGI_TOO_LARGE;
+        if (v->halo_low[a] + v->halo_high[a] > SIZE_MAX / 2 - span) return ISOGI_TOO_LARGE;
+        span += v->halo_low[a] + v->halo_high[a], all = span + 1;
         if (stride == PTRDIFF_MIN || stride % (ptrdiff_t)type_size) return ISOGI_INVALID;
         step = (size_t)(stride < 0 ? -stride : stride);
         if (span && step > ((size_t)PTRDIFF_MAX - reach) / span) return ISOGI_TOO_LARGE;
         reach += step * span;
-        if (zero && packed > (size_t)PTRDIFF_MAX / v->size[a]) return ISOGI_TOO_LARGE;
-        if (zero) packed *= v->size[a];
+        if (zero && packed > (size_t)PTRDIFF_MAX / all) return ISOGI_TOO_LARGE;
+        if (zero) packed *= all;
     }
     return ISOGI_OK;
 }
@@ -660,10 +696,17 @@ ISOGI_API isogi_result isogi_volume_validate(const isogi_volume *volume) {
     return determinant > 1e-9 * length && isogi_vol__finite64(determinant) ? ISOGI_OK : ISOGI_INVALID;
 }
 
+static void isogi_vol__transform(const double m[9], const double v[3], double out[3]) {
+    double x = v[0], y = v[1], z = v[2];
+    out[0] = m[0] * x + m[1] * y + m[2] * z;
+    out[1] = m[3] * x + m[4] * y + m[5] * z;
+    out[2] = m[6] * x + m[7] * y + m[8] * z;
+}
+
 static void isogi_vol__set_transform(isogi_pyramid *p) {
     const isogi_volume *v = &p->volume;
     const double *m = v->axes;
-    double inverse = 1 / isogi_vol__determinant(m);
+    double inverse = 1 / isogi_vol__determinant(m), first[3];
     int r, c;
     for (r = 0; r < 3; r++) {
         for (c = 0; c < 3; c++) {
@@ -676,13 +719,9 @@ static void isogi_vol__set_transform(isogi_pyramid *p) {
         }
         p->box[r] = p->cells[r];
     }
-}
-
-static void isogi_vol__transform(const double m[9], const double v[3], double out[3]) {
-    double x = v[0], y = v[1], z = v[2];
-    out[0] = m[0] * x + m[1] * y + m[2] * z;
-    out[1] = m[3] * x + m[4] * y + m[5] * z;
-    out[2] = m[6] * x + m[7] * y + m[8] * z;
+    for (r = 0; r < 3; r++) first[r] = (double)v->first[r];
+    isogi_vol__transform(p->to_world, first, p->origin);
+    for (r = 0; r < 3; r++) p->origin[r] += v->origin[r];
 }
 
 /* A gradient per grid unit becomes one per world unit: the transposed inverse. */
@@ -694,13 +733,16 @@ static void isogi_vol__gradient_to_world(const isogi_pyramid *p, const double g[
     out[2] = m[2] * x + m[5] * y + m[8] * z;
 }
 
+/* Chunks of one field take the same number of the field to the same place, bit by bit. */
 ISOGI_API void isogi_vol_to_world(const isogi_pyramid *pyramid, const double grid[3], double world[3]) {
+    double field[3];
     int a;
     if (!pyramid || !grid) {
         for (a = 0; a < 3 && world; a++) world[a] = 0;
         return;
     }
-    isogi_vol__transform(pyramid->to_world, grid, world);
+    for (a = 0; a < 3; a++) field[a] = (double)pyramid->volume.first[a] + grid[a];
+    isogi_vol__transform(pyramid->to_world, field, world);
     for (a = 0; a < 3; a++) world[a] += pyramid->volume.origin[a];
 }
 
@@ -711,7 +753,7 @@ ISOGI_API void isogi_vol_to_grid(const isogi_pyramid *pyramid, const double worl
         for (a = 0; a < 3 && grid; a++) grid[a] = 0;
         return;
     }
-    for (a = 0; a < 3; a++) v[a] = world[a] - pyramid->volume.origin[a];
+    for (a = 0; a < 3; a++) v[a] = world[a] - pyramid->origin[a];
     isogi_vol__transform(pyramid->to_grid, v, grid);
 }
 
@@ -1297,23 +1339,26 @@ static double isogi_vol__trilinear(const double c[8], const double u[3], double 
 }
 
 /* Uniform cubic B-spline weights and their derivatives for the taps i-1 .. i+2 at i + u (methods: (1-u)^3/6 and so on), with
-   linear continuation past the border folded into the weights of the voxels that exist: f(-1) = 2 f(0) - f(1). */
-static void isogi_vol__bspline_weights(int i, double u, size_t voxels, double w[4], double d[4], int tap[4]) {
+   linear continuation past the border folded into the weights of the voxels that exist: f(-1) = 2 f(0) - f(1). A halo moves the
+   border outwards. */
+static void isogi_vol__bspline_weights(const isogi_volume *volume, int axis, int i, double u, double w[4], double d[4], int tap[4]) {
+    const int n = (int)volume->size[axis], low = volume->halo_low[axis] ? -1 : 0, high = volume->halo_high[axis] ? n : n - 1;
     double v = 1 - u;
-    int n = (int)voxels, k;
+    int k;
     w[0] = v * v * v / 6, w[1] = ((3 * u - 6) * u * u + 4) / 6, w[2] = ((3 * v - 6) * v * v + 4) / 6, w[3] = u * u * u / 6;
     d[0] = -v * v / 2, d[1] = (3 * u - 4) * u / 2, d[2] = -(3 * v - 4) * v / 2, d[3] = u * u / 2;
-    for (k = 0; k < 4; k++) tap[k] = i + k - 1 < 0 ? 0 : i + k - 1 > n - 1 ? n - 1 : i + k - 1;
+    for (k = 0; k < 4; k++) tap[k] = i + k - 1 < low ? low : i + k - 1 > high ? high : i + k - 1;
     if (n == 1) {
+        for (k = 0; k < 4; k++) tap[k] = 0;
         w[0] = w[2] = w[3] = 0, w[1] = 1;
         d[0] = d[1] = d[2] = d[3] = 0;
         return;
     }
-    if (i == 0) {
+    if (i == low) {
         w[1] += 2 * w[0], w[2] -= w[0], w[0] = 0;
         d[1] += 2 * d[0], d[2] -= d[0], d[0] = 0;
     }
-    if (i == n - 2) {
+    if (i == high - 1) {
         w[2] += 2 * w[3], w[1] -= w[3], w[3] = 0;
         d[2] += 2 * d[3], d[1] -= d[3], d[3] = 0;
     }
@@ -1382,11 +1427,11 @@ static double isogi_vol__bspline(const isogi_pyramid *p, const int cell[3], cons
 #ifdef ISOGI_VOL__AVX
     if (v->type == ISOGI_F32 && v->stride[0] == 4 && p->path >= ISOGI_VOL__PATH_AVX2) {
         int inner = 1;
-        for (a = 0; a < 3; a++) inner &= cell[a] > 0 && (size_t)cell[a] + 2 < v->size[a];
+        for (a = 0; a < 3; a++) inner &= (cell[a] > 0 || v->halo_low[a]) && (size_t)cell[a] + 2 < v->size[a] + v->halo_high[a] && v->size[a] > 1;
         if (inner) return isogi_vol__bspline_avx2(v, cell, local, gradient);
     }
 #endif
-    for (a = 0; a < 3; a++) isogi_vol__bspline_weights(cell[a], local[a], v->size[a], w[a], d[a], tap[a]);
+    for (a = 0; a < 3; a++) isogi_vol__bspline_weights(v, a, cell[a], local[a], w[a], d[a], tap[a]);
     for (k = 0; k < 4; k++) {
         double slice = 0, slice_x = 0, slice_y = 0;
         for (j = 0; j < 4; j++) {
@@ -1408,9 +1453,9 @@ static double isogi_vol__bspline(const isogi_pyramid *p, const int cell[3], cons
 /* As below, four at a time. */
 ISOGI_VOL__TARGET("avx2") static void isogi_vol__locate_avx2(const isogi_pyramid *p, const float point[3], int cell[4], double local[4]) {
     const __m256d box = _mm256_loadu_pd(p->box), zero = _mm256_setzero_pd();
-    __m256d g = _mm256_mul_pd(_mm256_loadu_pd(p->grid_axis[0]), _mm256_set1_pd((double)point[0] - p->volume.origin[0])), floor4;
-    g = _mm256_add_pd(g, _mm256_mul_pd(_mm256_loadu_pd(p->grid_axis[1]), _mm256_set1_pd((double)point[1] - p->volume.origin[1])));
-    g = _mm256_add_pd(g, _mm256_mul_pd(_mm256_loadu_pd(p->grid_axis[2]), _mm256_set1_pd((double)point[2] - p->volume.origin[2])));
+    __m256d g = _mm256_mul_pd(_mm256_loadu_pd(p->grid_axis[0]), _mm256_set1_pd((double)point[0] - p->origin[0])), floor4;
+    g = _mm256_add_pd(g, _mm256_mul_pd(_mm256_loadu_pd(p->grid_axis[1]), _mm256_set1_pd((double)point[1] - p->origin[1])));
+    g = _mm256_add_pd(g, _mm256_mul_pd(_mm256_loadu_pd(p->grid_axis[2]), _mm256_set1_pd((double)point[2] - p->origin[2])));
     g = _mm256_min_pd(_mm256_max_pd(g, zero), box); /* NaN gives 0 */
     floor4 = _mm256_max_pd(_mm256_min_pd(_mm256_floor_pd(g), _mm256_sub_pd(box, _mm256_set1_pd(1))), zero);
     _mm_storeu_si128((__m128i *)(void *)cell, _mm_max_epi32(_mm256_cvttpd_epi32(floor4), _mm_setzero_si128())); /* whatever -ffast-math does */
@@ -2134,7 +2179,7 @@ static int isogi_vol__begin_ray(const isogi_vol__batch *b, size_t i, isogi_vol__
     const double tmax = isogi_vol__tmax(ray->tmax);
     double relative[3];
     int a;
-    for (a = 0; a < 3; a++) relative[a] = ray->origin[a] - p->volume.origin[a];
+    for (a = 0; a < 3; a++) relative[a] = ray->origin[a] - p->origin[a];
     isogi_vol__transform(p->to_grid, relative, w->origin);
     w->isovalue = ray->isovalue;
     if (!isogi_vol__finite3(w->origin) || !isogi_vol__finite3(ray->origin)) return 0;
@@ -2710,6 +2755,111 @@ ISOGI_API isogi_result isogi_vol_continue(const isogi_pyramid *pyramid, const is
     b.pyramid = pyramid, b.starts = starts, b.dirs = dirs, b.tmax = tmax, b.isovalue = isovalue, b.flags = flags, b.hits = hits;
     return isogi_vol__trace(&b, count, counters);
 }
+
+/* ---- all hits: groups of rays go on from hit to hit together ---- */
+
+#define ISOGI_VOL__GROUP 32
+
+typedef struct isogi_vol__followers {
+    isogi_hit start[ISOGI_VOL__GROUP], hit[ISOGI_VOL__GROUP];
+    float dir[ISOGI_VOL__GROUP][3];
+    double tmax[ISOGI_VOL__GROUP];
+    size_t ray[ISOGI_VOL__GROUP]; /* which rays are under way */
+    size_t count;
+} isogi_vol__followers;
+
+/* Notes what the rays under way have found, and sets those up that go on. */
+static void isogi_vol__follow(isogi_vol__followers *f, const isogi_ray *rays, size_t capacity, isogi_hit *hits, size_t *counts) {
+    size_t i, kept = 0, n;
+    for (i = 0; i < f->count; i++) {
+        const size_t ray = f->ray[i];
+        const isogi_hit hit = f->hit[i];
+        double left;
+        if (!hit.side) continue;
+        n = counts[ray]++;
+        if (n < capacity) hits[ray * capacity + n] = hit;
+        left = isogi_vol__tmax(rays[ray].tmax) - hit.t;
+        if (n >= capacity || !(left > 0)) continue;
+        memcpy(f->dir[kept], rays[ray].dir, sizeof f->dir[kept]);
+        f->start[kept] = hit, f->tmax[kept] = left, f->ray[kept++] = ray;
+    }
+    f->count = kept;
+}
+
+/* From the last hits to the next ones: runs of rays with one isovalue in one call. */
+static void isogi_vol__follow_on(const isogi_pyramid *pyramid, isogi_vol__followers *f, const isogi_ray *rays, isogi_counters *counters) {
+    size_t i, first, end;
+    for (first = 0; first < f->count; first = end) {
+        const isogi_ray *ray = &rays[f->ray[first]];
+        for (end = first + 1; end < f->count; end++) {
+            const isogi_ray *other = &rays[f->ray[end]];
+            if (other->isovalue < ray->isovalue || other->isovalue > ray->isovalue || other->flags != ray->flags) break;
+        }
+        isogi_vol_continue(pyramid, f->start + first, (const float(*)[3])f->dir + first, f->tmax + first, ray->isovalue, ray->flags, end - first,
+                           f->hit + first, counters);
+    }
+    for (i = 0; i < f->count; i++) f->hit[i].t += f->start[i].t;
+}
+
+ISOGI_API isogi_result isogi_vol_intersect_all(const isogi_pyramid *pyramid, const isogi_ray *rays, size_t count, size_t capacity,
+                                               isogi_hit *hits, size_t *counts, isogi_counters *counters) {
+    isogi_vol__followers f;
+    size_t first, i;
+    if (!pyramid || (count && (!rays || !counts || (capacity && !hits)))) return ISOGI_INVALID;
+    if (count && capacity > SIZE_MAX / sizeof *hits / count) return ISOGI_TOO_LARGE;
+    for (first = 0; first < count; first += ISOGI_VOL__GROUP) {
+        f.count = count - first < ISOGI_VOL__GROUP ? count - first : ISOGI_VOL__GROUP;
+        for (i = 0; i < f.count; i++) f.ray[i] = first + i, counts[first + i] = 0;
+        isogi_vol_intersect(pyramid, rays + first, f.count, f.hit, counters);
+        for (isogi_vol__follow(&f, rays, capacity, hits, counts); f.count; isogi_vol__follow(&f, rays, capacity, hits, counts))
+            isogi_vol__follow_on(pyramid, &f, rays, counters);
+    }
+    return ISOGI_OK;
+}
+
+/* ---- bundles: in groups of rays of their own ---- */
+
+/* hits or occluded, the other is NULL. */
+static isogi_result isogi_vol__bundle(const isogi_pyramid *pyramid, const isogi_bundle *bundle, const float (*dirs)[3], size_t count,
+                                      isogi_hit *hits, uint8_t *occluded, isogi_counters *counters) {
+    isogi_ray ray[ISOGI_VOL__GROUP];
+    isogi_hit start[ISOGI_VOL__GROUP];
+    double tmax[ISOGI_VOL__GROUP];
+    isogi_vol__batch b;
+    size_t first, i, n;
+    if (!pyramid || !bundle || (count && (!dirs || (!hits && !occluded)))) return ISOGI_INVALID;
+    memset(&b, 0, sizeof b);
+    b.pyramid = pyramid, b.isovalue = bundle->isovalue, b.flags = bundle->flags;
+    if (bundle->start) b.starts = start, b.tmax = tmax;
+    else b.rays = ray;
+    for (i = 0; i < ISOGI_VOL__GROUP && i < count; i++) {
+        if (bundle->start) start[i] = *bundle->start;
+        tmax[i] = ray[i].tmax = bundle->tmax;
+        memcpy(ray[i].origin, bundle->origin, sizeof ray[i].origin);
+        ray[i].tmin = bundle->tmin, ray[i].isovalue = bundle->isovalue, ray[i].flags = bundle->flags;
+    }
+    for (first = 0; first < count; first += n) {
+        n = count - first < ISOGI_VOL__GROUP ? count - first : ISOGI_VOL__GROUP;
+        for (i = 0; i < n; i++) memcpy(ray[i].dir, dirs[first + i], sizeof ray[i].dir);
+        b.dirs = dirs + first;
+        if (hits) b.hits = hits + first;
+        else b.occluded = occluded + first;
+        isogi_vol__trace(&b, n, counters);
+    }
+    return ISOGI_OK;
+}
+
+ISOGI_API isogi_result isogi_vol_bundle(const isogi_pyramid *pyramid, const isogi_bundle *bundle, const float (*dirs)[3], size_t count,
+                                        isogi_hit *hits, isogi_counters *counters) {
+    return isogi_vol__bundle(pyramid, bundle, dirs, count, hits, NULL, counters);
+}
+
+ISOGI_API isogi_result isogi_vol_bundle_occluded(const isogi_pyramid *pyramid, const isogi_bundle *bundle, const float (*dirs)[3],
+                                                 size_t count, uint8_t *occluded, isogi_counters *counters) {
+    return isogi_vol__bundle(pyramid, bundle, dirs, count, NULL, occluded, counters);
+}
+
+/* ---- what is at hits ---- */
 
 ISOGI_API isogi_result isogi_vol_positions(const isogi_pyramid *pyramid, const isogi_hit *hits, size_t count, float (*positions)[3]) {
     size_t i;
@@ -3488,7 +3638,7 @@ static void isogi_vol__edge_normal(const isogi_vol__mesher *m, size_t at, int ax
     double n[3], gradient[3];
     int a, whole = 1;
     for (a = 0; a < 3; a++) {
-        whole = whole && voxel[a] >= 1 && voxel[a] + (a == axis ? 2 : 1) <= m->pyramid->cells[a];
+        whole = whole && (voxel[a] >= 1 || v->halo_low[a]) && voxel[a] + (a == axis ? 2 : 1) <= m->pyramid->cells[a] + (v->halo_high[a] ? 1 : 0);
         stride[a] = v->stride[(axis + a) % 3];
     }
     if (whole) {
@@ -3515,7 +3665,7 @@ static void isogi_vol__emit_vertices(const isogi_vol__mesher *m, int j, int k) {
     const char *row = (const char *)v->data + j * v->stride[1] + k * v->stride[2];
     double begin[3], grid[3];
     int kind, a;
-    grid[0] = 0, grid[1] = j, grid[2] = k;
+    grid[0] = -(double)v->first[0], grid[1] = j, grid[2] = k; /* the row's beginning in the larger field */
     isogi_vol_to_world(m->pyramid, grid, begin);
     for (kind = 0; kind < (m->closed ? 4 : 3); kind++) {
         const uint64_t *carries = isogi_vol__bit_row(m, m->carries[kind], j, k);
@@ -3532,7 +3682,7 @@ static void isogi_vol__emit_vertices(const isogi_vol__mesher *m, int j, int k) {
                     double from = isogi_vol__voxel(v, p), to = isogi_vol__voxel(v, p + v->stride[axis]);
                     u = isogi_vol__clamp((m->isovalue - from) / (to - from), 1);
                 }
-                for (a = 0; a < 3; a++) m->positions[at][a] = (float)(begin[a] + (i * t[3 * a] + u * t[3 * a + axis]));
+                for (a = 0; a < 3; a++) m->positions[at][a] = (float)(begin[a] + (((double)v->first[0] + i) * t[3 * a] + u * t[3 * a + axis]));
                 if (!m->normals) continue;
                 voxel[0] = i, voxel[1] = j, voxel[2] = k;
                 if (kind < 3) isogi_vol__edge_normal(m, at, kind, voxel, u, p);
@@ -3775,6 +3925,7 @@ ISOGI_API void isogi_vol_mesh_free(const isogi_pyramid *pyramid, isogi_mesh *mes
     memset(mesh, 0, sizeof *mesh);
 }
 
+#undef ISOGI_VOL__GROUP
 #undef ISOGI_VOL__LEVELS
 #undef ISOGI_VOL__NODE_LEVELS
 #undef ISOGI_VOL__STRIP

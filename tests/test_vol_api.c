@@ -2,6 +2,7 @@
    chunks with a halo, fields given by a callback, very large volumes, arguments that make no sense. */
 #define ISOGI_IMPLEMENTATION
 #include "isogi_trace.h"
+#include "reference_ray.h"
 #include "test.h"
 #include <float.h>
 
@@ -54,7 +55,7 @@ static void field_fill(field *f, int kind, test_random *r) {
             }
 }
 
-__attribute__((unused)) static isogi_ray random_ray(const field *f, double isovalue, test_random *r) {
+static isogi_ray random_ray(const field *f, double isovalue, test_random *r) {
     isogi_ray ray = {.isovalue = isovalue};
     double d[3], target[3];
     random_direction(r, d);
@@ -102,6 +103,318 @@ TEST(corners_and_ranges_are_those_of_the_voxels) {
     double corner[8] = {1};
     CHECK(isogi_volume_corners(v, beyond, corner) == 0 && corner[0] == 0, "a cell that is not there: %g", corner[0]);
     field_free(&f);
+}
+
+/* ---- all hits ---- */
+
+static int same_hit(const isogi_hit *a, const isogi_hit *b) {
+    return a->side == b->side && !memcmp(a->cell, b->cell, sizeof a->cell) && !memcmp(a->local, b->local, sizeof a->local) &&
+           !memcmp(&a->t, &b->t, sizeof a->t);
+}
+
+/* The hits of a ray, one call after the other. */
+static size_t chain_of_hits(const isogi_pyramid *p, const isogi_ray *ray, isogi_hit *hits, size_t most) {
+    size_t n = 0;
+    isogi_hit next;
+    isogi_vol_intersect(p, ray, 1, &next, NULL);
+    while (next.side && n < most) {
+        double left = ray->tmax - next.t, t = next.t;
+        hits[n++] = next;
+        if (ray->tmax > 0 && !(left > 0)) break;
+        isogi_vol_continue(p, &hits[n - 1], (const float(*)[3])&ray->dir, ray->tmax > 0 ? &left : NULL, ray->isovalue, ray->flags, 1, &next, NULL);
+        next.t += t;
+    }
+    return n;
+}
+
+TEST(all_hits_are_the_first_and_those_that_follow) {
+    enum { RAYS = 150, MOST = 40 };
+    static isogi_ray rays[RAYS];
+    static isogi_hit all[RAYS][MOST], few[RAYS][2], chain[MOST];
+    static size_t counts[RAYS], few_counts[RAYS], none[RAYS];
+    test_random r = {2};
+    long found = 0, cut = 0;
+    for (int v = 0; v < (LONG_SUITE ? 300 : 30); v++) {
+        field f = field_new(10, 9, 11);
+        field_fill(&f, v % KINDS, &r);
+        if (v % 5 == 0)
+            for (int i = 0; i < 5; i++) f.value[random_bits(&r) % 990] = (double)NAN;
+        field_build(&f);
+        for (int i = 0; i < RAYS; i++) {
+            rays[i] = random_ray(&f, v % KINDS == QUANTISED ? floor(random_range(&r, -3, 3)) : v % 2 ? 0.1 : random_range(&r, -0.5, 0.5), &r);
+            rays[i].flags = v % 2 ? (uint32_t)(i & 1) : 0;
+            if (i % 4 == 0) rays[i].tmin = random_range(&r, 0, 10), rays[i].tmax = rays[i].tmin + random_range(&r, 0, 10);
+        }
+        memset(all, 0, sizeof all), memset(few, 0, sizeof few);
+        CHECK(isogi_vol_intersect_all(f.pyramid, rays, RAYS, MOST, all[0], counts, NULL) == ISOGI_OK, "all");
+        CHECK(isogi_vol_intersect_all(f.pyramid, rays, RAYS, 2, few[0], few_counts, NULL) == ISOGI_OK, "two");
+        CHECK(isogi_vol_intersect_all(f.pyramid, rays, RAYS, 0, NULL, none, NULL) == ISOGI_OK, "none");
+        for (int i = 0; i < RAYS; i++) {
+            size_t n = chain_of_hits(f.pyramid, &rays[i], chain, MOST);
+            CHECK(n == counts[i] || n == MOST, "%d hits, %d one by one", (int)counts[i], (int)n);
+            for (size_t k = 0; k < n; k++) CHECK(same_hit(&chain[k], &all[i][k]), "ray %d, hit %d: t %.17g, %.17g", i, (int)k, chain[k].t, all[i][k].t);
+            CHECK(few_counts[i] == (n < 3 ? n : 3) && none[i] == (n ? 1 : 0), "%d and %d of %d", (int)few_counts[i], (int)none[i], (int)n);
+            for (size_t k = 0; k < n && k < 2; k++) CHECK(same_hit(&few[i][k], &all[i][k]), "ray %d, hit %d", i, (int)k);
+            for (size_t k = n; k < MOST; k++) CHECK(all[i][k].side == 0, "written behind the last hit of ray %d", i);
+            found += (long)n, cut += few_counts[i] == 3;
+        }
+        field_free(&f);
+    }
+    printf("    %ld hits, %ld rays with more than two\n", found, cut);
+    CHECK(found > 2000 && cut > 100, "%ld hits, %ld cut off: the test says little", found, cut);
+}
+
+TEST(all_hits_are_those_of_the_reference) {
+    enum { MOST = 60 };
+    static isogi_hit hits[MOST];
+    test_random r = {3};
+    long crossings = 0, undecided = 0, different = 0;
+    for (int v = 0; v < (LONG_SUITE ? 300 : 36); v++) {
+        int kind = v % KINDS;
+        field f = field_new(8, 7, 9);
+        field_fill(&f, kind, &r);
+        field_build(&f);
+        reference_field reference = {f.value, {8, 7, 9}, 1e-10L};
+        for (int i = 0; i < 300; i++) {
+            isogi_ray ray = random_ray(&f, kind == QUANTISED ? 0.5 : random_range(&r, -0.5, 0.5), &r);
+            double dir[3] = {(double)ray.dir[0], (double)ray.dir[1], (double)ray.dir[2]};
+            if (i % 3 == 0) ray.tmin = random_range(&r, 0, 8), ray.tmax = ray.tmin + random_range(&r, 0, 8);
+            size_t count, n = 0;
+            isogi_vol_intersect_all(f.pyramid, &ray, 1, MOST, hits, &count, NULL);
+            reference_hit truth = reference_intersect(&reference, ray.origin, dir, ray.tmin, ray.tmax, ray.isovalue);
+            while (truth.decided && truth.side && n < count) {
+                if (hits[n].side != truth.side || fabs(hits[n].t - (double)truth.t) > 1e-5) break;
+                crossings++, n++;
+                truth = reference_intersect(&reference, ray.origin, dir, (double)truth.t + 1e-7, ray.tmax, ray.isovalue);
+            }
+            undecided += !truth.decided;
+            different += truth.decided && (truth.side || n < count);
+        }
+        field_free(&f);
+    }
+    printf("    %ld crossings, %ld undecided, %ld different\n", crossings, undecided, different);
+    /* two roots within 1e-7 of each other are one for the reference, as it is used here */
+    CHECK(different * 100000 <= crossings, "%ld of %ld crossings differ", different, crossings);
+    CHECK(crossings > 5000 && undecided * 20 < crossings, "%ld crossings, %ld undecided", crossings, undecided);
+}
+
+/* ---- bundles ---- */
+
+TEST(bundles_have_the_bits_of_single_rays) {
+    enum { RAYS = 100 };
+    static float dirs[RAYS][3];
+    static isogi_hit hits[RAYS];
+    static uint8_t occluded[RAYS];
+    test_random r = {4};
+    long found = 0;
+    for (int v = 0; v < 40; v++) {
+        field f = field_new(20, 21, 22);
+        field_fill(&f, v % KINDS, &r);
+        field_build(&f);
+        for (int turn = 0; turn < 8; turn++) {
+            isogi_ray ray = random_ray(&f, v % KINDS == QUANTISED ? 0 : random_range(&r, -0.5, 0.5), &r);
+            isogi_hit start = {0}, alone;
+            isogi_bundle bundle = {.isovalue = ray.isovalue, .flags = (uint32_t)(turn & 1), .tmax = turn % 3 ? 0 : 7};
+            memcpy(bundle.origin, ray.origin, sizeof bundle.origin);
+            isogi_vol_intersect(f.pyramid, &ray, 1, &start, NULL);
+            if (turn & 2 && start.side) bundle.start = &start;
+            else bundle.tmin = turn & 4 ? 1.5 : 0;
+            for (int i = 0; i < RAYS; i++) {
+                double d[3];
+                random_direction(&r, d);
+                for (int a = 0; a < 3; a++) dirs[i][a] = bundle.start || i % 2 ? (float)d[a] : ray.dir[a] + 0.2f * (float)d[a];
+            }
+            size_t count = turn % 4 ? RAYS : (size_t)v % 40;
+            CHECK(isogi_vol_bundle(f.pyramid, &bundle, (const float(*)[3])dirs, count, hits, NULL) == ISOGI_OK, "hits");
+            CHECK(isogi_vol_bundle_occluded(f.pyramid, &bundle, (const float(*)[3])dirs, count, occluded, NULL) == ISOGI_OK, "any hits");
+            for (size_t i = 0; i < count; i++) {
+                if (bundle.start) {
+                    isogi_vol_continue(f.pyramid, &start, (const float(*)[3])dirs + i, &bundle.tmax, bundle.isovalue, bundle.flags, 1, &alone, NULL);
+                } else {
+                    isogi_ray one = {.flags = bundle.flags, .tmin = bundle.tmin, .tmax = bundle.tmax, .isovalue = bundle.isovalue};
+                    memcpy(one.origin, bundle.origin, sizeof one.origin), memcpy(one.dir, dirs[i], sizeof one.dir);
+                    isogi_vol_intersect(f.pyramid, &one, 1, &alone, NULL);
+                }
+                CHECK(same_hit(&alone, &hits[i]), "side %d and %d, t %.17g and %.17g", alone.side, hits[i].side, alone.t, hits[i].t);
+                CHECK(occluded[i] == (alone.side != 0), "occluded %d, side %d", occluded[i], alone.side);
+                found += alone.side != 0;
+            }
+        }
+        field_free(&f);
+    }
+    CHECK(found > 5000, "only %ld hits", found);
+}
+
+/* ---- chunks with a halo ---- */
+
+enum { PARTS = 8, MESH_ROW = 6 };
+
+/* The field cut into 2 x 2 x 2 at voxel `cut`; every second part as a view of the whole's memory, the others as copies with just
+   their halo, packed. */
+static isogi_volume part_of(const field *whole, const int cut[3], int part, double **copy) {
+    isogi_volume v = whole->volume;
+    int low[3], size[3], halo[2][3];
+    *copy = NULL;
+    for (int a = 0; a < 3; a++) {
+        int upper = part >> a & 1;
+        low[a] = upper ? cut[a] : 0, size[a] = upper ? whole->size[a] - cut[a] : cut[a] + 1;
+        halo[0][a] = upper, halo[1][a] = !upper;
+        v.size[a] = (size_t)size[a], v.first[a] += (size_t)low[a], v.halo_low[a] = (size_t)halo[0][a], v.halo_high[a] = (size_t)halo[1][a];
+    }
+    if (part % 2) {
+        ptrdiff_t stride = 8;
+        for (int a = 0; a < 3; a++) v.stride[a] = stride, stride *= whole->size[a];
+        v.data = field_at(whole, low[0], low[1], low[2]);
+        return v;
+    }
+    int n[3];
+    for (int a = 0; a < 3; a++) n[a] = halo[0][a] + size[a] + halo[1][a];
+    *copy = (double *)calloc((size_t)(n[0] * n[1] * n[2]), sizeof(double));
+    for (int k = 0; k < n[2]; k++)
+        for (int j = 0; j < n[1]; j++)
+            for (int i = 0; i < n[0]; i++)
+                (*copy)[i + n[0] * (j + n[1] * k)] = *field_at(whole, low[0] - halo[0][0] + i, low[1] - halo[0][1] + j, low[2] - halo[0][2] + k);
+    v.data = *copy + halo[0][0] + n[0] * (halo[0][1] + n[1] * halo[0][2]);
+    return v;
+}
+
+static void place_obliquely(field *f) {
+    const double axes[9] = {0.8, -0.6, 0.1, 0.6, 0.8, 0, 0, 0.2, 1.1};
+    memcpy(f->volume.axes, axes, sizeof axes);
+    for (int a = 0; a < 3; a++) f->volume.spacing[a] = 0.1 * (a + 1.3), f->volume.origin[a] = 7.7 - 3.1 * a, f->volume.first[a] = (size_t)(1000 * a);
+}
+
+static int compare_rows(const void *a, const void *b) { return memcmp(a, b, MESH_ROW * sizeof(float)); }
+
+/* Position and normal of every vertex, sorted by their bits; twins kept once. */
+static size_t sorted_vertices(const isogi_mesh *mesh, float (**rows)[MESH_ROW], size_t have) {
+    size_t n = have, kept = 0;
+    *rows = (float(*)[MESH_ROW])realloc(*rows, (have + mesh->vertex_count + 1) * sizeof **rows);
+    for (size_t i = 0; i < mesh->vertex_count; i++, n++)
+        for (int a = 0; a < 3; a++) (*rows)[n][a] = mesh->positions[i][a] + 0.0f, (*rows)[n][3 + a] = mesh->normals[i][a] + 0.0f;
+    qsort(*rows, n, sizeof **rows, compare_rows);
+    for (size_t i = 0; i < n; i++)
+        if (!kept || compare_rows((*rows)[kept - 1], (*rows)[i])) memcpy((*rows)[kept++], (*rows)[i], sizeof **rows);
+    return kept;
+}
+
+TEST(meshes_of_chunks_meet_without_a_seam) {
+    test_random r = {5};
+    for (int v = 0; v < 12; v++) {
+        field whole = field_new(13, 12, 14);
+        const int cut[3] = {1 + (int)(random_bits(&r) % 11), 5, 1 + (int)(random_bits(&r) % 12)};
+        const isogi_mesh_desc desc = {.isovalue = 0.05, .normals = 1};
+        isogi_mesh mesh = {0};
+        float(*all)[MESH_ROW] = NULL, (*parts)[MESH_ROW] = NULL;
+        size_t vertices, in_parts = 0, triangles = 0;
+        field_fill(&whole, SMOOTH, &r);
+        if (v % 2) place_obliquely(&whole);
+        field_build(&whole);
+        CHECK(isogi_vol_mesh(whole.pyramid, &desc, &mesh) == ISOGI_OK, "mesh");
+        vertices = sorted_vertices(&mesh, &all, 0);
+        size_t expected = mesh.triangle_count;
+        for (int part = 0; part < PARTS; part++) {
+            double *copy;
+            isogi_volume chunk = part_of(&whole, cut, part, &copy);
+            isogi_pyramid *p = NULL;
+            CHECK(isogi_vol_build(&p, &chunk, NULL) == ISOGI_OK, "part %d", part);
+            CHECK(isogi_vol_mesh(p, &desc, &mesh) == ISOGI_OK, "part %d", part);
+            in_parts = sorted_vertices(&mesh, &parts, in_parts), triangles += mesh.triangle_count;
+            isogi_vol_free(p), free(copy);
+        }
+        CHECK(triangles == expected && expected > 100, "%d triangles, not %d", (int)triangles, (int)expected);
+        /* lattice edges are computed alike; a vertex within a cell may differ in its last bits */
+        size_t i = 0, k = 0, lone = 0;
+        while (i < vertices && k < in_parts) {
+            int order = compare_rows(all[i], parts[k]);
+            lone += order != 0, i += order <= 0, k += order >= 0;
+        }
+        lone += vertices - i + in_parts - k;
+        CHECK(lone == 0, "%d of %d vertices are not the whole's, bit by bit", (int)lone, (int)(vertices + in_parts));
+        isogi_vol_mesh_free(whole.pyramid, &mesh);
+        free(all), free(parts);
+        field_free(&whole);
+    }
+}
+
+TEST(hits_and_samples_of_chunks_are_those_of_the_whole) {
+    enum { RAYS = 400, MOST = 32 };
+    static isogi_ray rays[RAYS];
+    static isogi_hit hits[RAYS][MOST], theirs[RAYS][MOST];
+    static size_t counts[RAYS], their_counts[RAYS];
+    test_random r = {6};
+    long found = 0, different = 0, normals = 0;
+    for (int v = 0; v < 12; v++) {
+        field whole = field_new(13, 12, 14);
+        const int cut[3] = {1 + (int)(random_bits(&r) % 11), 5, 1 + (int)(random_bits(&r) % 12)};
+        double sum_of_t[RAYS] = {0};
+        size_t in_parts[RAYS] = {0};
+        field_fill(&whole, v % 2 ? NOISE : SMOOTH, &r);
+        if (v % 4 > 1) place_obliquely(&whole);
+        field_build(&whole);
+        for (int i = 0; i < RAYS; i++) {
+            double place[3], d[3];
+            rays[i] = random_ray(&whole, 0.05, &r);
+            for (int a = 0; a < 3; a++) d[a] = (double)rays[i].dir[a] + rays[i].origin[a];
+            isogi_vol_to_world(whole.pyramid, rays[i].origin, place), isogi_vol_to_world(whole.pyramid, d, d);
+            for (int a = 0; a < 3; a++) rays[i].origin[a] = place[a], rays[i].dir[a] = (float)(d[a] - place[a]);
+        }
+        isogi_vol_intersect_all(whole.pyramid, rays, RAYS, MOST, hits[0], counts, NULL);
+        for (int part = 0; part < PARTS; part++) {
+            double *copy;
+            isogi_volume chunk = part_of(&whole, cut, part, &copy);
+            isogi_pyramid *p = NULL;
+            isogi_vol_build(&p, &chunk, NULL);
+            isogi_vol_intersect_all(p, rays, RAYS, MOST, theirs[0], their_counts, NULL);
+            for (int i = 0; i < RAYS; i++)
+                for (size_t k = 0; k < their_counts[i]; k++) {
+                    float ours[1][3], other[1][3];
+                    in_parts[i]++, sum_of_t[i] += theirs[i][k].t;
+                    for (size_t n = 0; n < counts[i]; n++) {
+                        if (fabs(hits[i][n].t - theirs[i][k].t) > 1e-9) continue;
+                        isogi_vol_normals(whole.pyramid, &hits[i][n], 1, ISOGI_NORMAL_SMOOTH, ours);
+                        isogi_vol_normals(p, &theirs[i][k], 1, ISOGI_NORMAL_SMOOTH, other);
+                        normals++;
+                        /* the place is right to some 1e-13 of a cell, the gradient here no less than 1e-3 of its rate of change */
+                        for (int a = 0; a < 3; a++) CHECK(fabsf(ours[0][a] - other[0][a]) < 1e-6f, "normal %g, %g", (double)ours[0][a], (double)other[0][a]);
+                    }
+                }
+            for (int i = 0; i < 200; i++) {
+                double grid[3], world[3];
+                float point[1][3], ours[4], other[4];
+                for (int a = 0; a < 3; a++) grid[a] = random_range(&r, 0, (double)chunk.size[a] - 1);
+                isogi_vol_to_world(p, grid, world);
+                for (int a = 0; a < 3; a++) point[0][a] = (float)world[a];
+                isogi_vol_sample_smooth(whole.pyramid, (const float(*)[3])point, 1, ours, (float(*)[3])(ours + 1));
+                isogi_vol_sample_smooth(p, (const float(*)[3])point, 1, other, (float(*)[3])(other + 1));
+                /* a point on the chunk's border may be rounded out of it: by 1e-6 of the origin, in cells of 0.1 and more */
+                for (int a = 0; a < 4; a++) CHECK(fabsf(ours[a] - other[a]) < (v % 4 > 1 ? 2e-3f : 1e-5f), "sample %d: %g, %g", a, (double)ours[a], (double)other[a]);
+            }
+            isogi_vol_free(p), free(copy);
+        }
+        for (int i = 0; i < RAYS; i++) {
+            double sum = 0;
+            for (size_t n = 0; n < counts[i]; n++) sum += hits[i][n].t;
+            found += (long)counts[i], different += in_parts[i] != counts[i] || fabs(sum - sum_of_t[i]) > 1e-7;
+        }
+        field_free(&whole);
+    }
+    printf("    %ld hits, %ld normals compared, %ld rays differ\n", found, normals, different);
+    CHECK(different == 0 && found > 2000 && normals >= found, "%ld of %ld", different, found);
+}
+
+TEST(bad_halos_are_refused) {
+    float voxel[27] = {0};
+    isogi_volume good = {.data = &voxel[13], .type = ISOGI_F32, .size = {1, 1, 1}, .halo_low = {1, 1, 1}, .halo_high = {1, 1, 1}}, v = good;
+    CHECK(isogi_volume_validate(&good) == ISOGI_OK, "good");
+    v.halo_low[1] = SIZE_MAX;
+    CHECK(isogi_volume_validate(&v) == ISOGI_TOO_LARGE, "endless halo");
+    v = good, v.halo_high[0] = v.halo_high[1] = v.halo_high[2] = 0x7fffffff;
+    CHECK(isogi_volume_validate(&v) == ISOGI_TOO_LARGE, "overflow");
+#if SIZE_MAX > 0xffffffffu
+    v = good, v.first[2] = SIZE_MAX;
+    CHECK(isogi_volume_validate(&v) == ISOGI_TOO_LARGE, "far chunk");
+#endif
 }
 
 /* ---- arguments that make no sense ---- */
