@@ -575,7 +575,8 @@ TEST(visibility_of_a_half_space_agrees_with_its_closed_form) {
             double middle = 0.5 * (slope_direction[0] + slope_direction[1] + slope_direction[2]) - 1e-7, expected[16];
             const isogi_transfer_point points[] = {{middle, {1, 1, 1}, 1e6f}, {middle, {1, 1, 1}, 0}};
             const isogi_transfer transfer = {points, 2, NULL, 0};
-            const isogi_dvr_desc desc = {.pyramid = f.pyramid, .shading = ISOGI_DVR_VISIBILITY, .order = 4, .directions = cases[c].rays, .grid = {1, 1, 1}};
+            const isogi_dvr_desc desc = {.pyramid = f.pyramid, .shading = ISOGI_DVR_VISIBILITY, .order = 4, .directions = cases[c].rays, .grid = {1, 1, 1},
+                                         .method = ISOGI_DVR_BRUTE};
             isogi_dvr *dvr = dvr_new(&desc, &transfer, NULL);
             const float centre[3] = {1.5f, 1.5f, 1.5f};
             float v[16];
@@ -610,7 +611,7 @@ TEST(visibility_past_a_sphere_agrees_with_its_cone) {
             double z[3] = {sqrt(4 * PI) - blocked * sqrt(PI) * (1 - cosine), -blocked * sqrt(3 * PI) / 2 * sine * sine,
                            -blocked * sqrt(5 * PI) / 2 * cosine * sine * sine};
             const isogi_dvr_desc desc = {.pyramid = f.pyramid, .space = (isogi_dvr_space)space, .shading = ISOGI_DVR_VISIBILITY, .directions = 4096,
-                                         .grid = {2, 1, 1}};
+                                         .grid = {2, 1, 1}, .method = ISOGI_DVR_BRUTE};
             isogi_dvr *dvr = dvr_new(&desc, &transfers[n], NULL);
             const float point[3] = {0, 11.5f, 11.5f};
             float v[9];
@@ -628,7 +629,8 @@ TEST(visibility_within_a_homogeneous_box_agrees_with_quadrature) {
     field f = field_of(constant, 9);
     const isogi_transfer_point point = {0, {1, 1, 1}, 0.3f};
     const isogi_transfer transfer = {&point, 1, NULL, 0};
-    const isogi_dvr_desc desc = {.pyramid = f.pyramid, .shading = ISOGI_DVR_VISIBILITY, .directions = 1024, .grid = {3, 5, 2}};
+    const isogi_dvr_desc desc = {.pyramid = f.pyramid, .shading = ISOGI_DVR_VISIBILITY, .directions = 1024, .grid = {3, 5, 2},
+                                 .method = ISOGI_DVR_BRUTE};
     isogi_dvr *dvr = dvr_new(&desc, &transfer, NULL);
     const float places[4][3] = {{4, 4, 0}, {0, 6, 8}, {8, 8, 8}, {4, 2, 8}};
     double remaining;
@@ -656,7 +658,7 @@ TEST(a_new_transfer_function_starts_visibility_again) {
     field f = field_waves(10, 14);
     const isogi_transfer_point points[] = {{-1, {1, 1, 1}, 0}, {1, {1, 1, 1}, 0.4f}};
     const isogi_transfer first = {points, 2, NULL, 0}, second = {points, 1, NULL, 0};
-    const isogi_dvr_desc desc = {.pyramid = f.pyramid, .shading = ISOGI_DVR_VISIBILITY, .grid = {2, 2, 2}};
+    const isogi_dvr_desc desc = {.pyramid = f.pyramid, .shading = ISOGI_DVR_VISIBILITY, .grid = {2, 2, 2}, .method = ISOGI_DVR_BRUTE};
     isogi_dvr *dvr = dvr_new(&desc, &first, NULL);
     double remaining = 1;
     const float corner[3] = {0, 0, 0};
