@@ -129,7 +129,7 @@ typedef struct isogi_peak {
     float rgb[3], opacity; /* 0..1; rgb >= 0 */
 } isogi_peak;
 
-#define ISOGI_DVR_MAX_PEAKS 256
+#define ISOGI_DVR_MAX_PEAKS 256 /* but any number in data space, exact or pre-integrated and without visibility */
 
 typedef struct isogi_transfer {
     const isogi_transfer_point *points;
@@ -151,10 +151,18 @@ typedef enum isogi_dvr_space {
     ISOGI_DVR_DATA          /* scale-invariant: per unit of data along monotone pieces of the ray (Kraus 2005, eq. 4) */
 } isogi_dvr_space;
 
+/* How the integral along a ray is evaluated in data space. In physical space every value means ISOGI_DVR_POST_CLASSIFIED. */
+typedef enum isogi_dvr_classification {
+    ISOGI_DVR_EXACT = 0,      /* cell by cell, cut at the extrema of the cubic that the field is along a ray: no step size */
+    ISOGI_DVR_PRE_INTEGRATED, /* samples a step apart, each pair looked up in a table (Kraus 2005, eq. 5 to 7) */
+    ISOGI_DVR_POST_CLASSIFIED /* samples a step apart, each by its value and the slope of the field (Kraus 2005, eq. 10, 11) */
+} isogi_dvr_classification;
+
 typedef enum isogi_dvr_shading {
     ISOGI_DVR_UNLIT = 0,  /* the transfer function's colour is emitted as it is */
     ISOGI_DVR_VISIBILITY, /* light scattered isotropically, L . V from SH visibility (Kronander 2011) */
-    ISOGI_DVR_LOCAL       /* diffuse shading by the gradient, on the side that faces the eye, no shadows */
+    ISOGI_DVR_LOCAL,      /* diffuse shading by the gradient, on the side that faces the eye, no shadows */
+    ISOGI_DVR_TWO_SIDED   /* reflected and transmitted, diffuse and specular light (Kraus 2005, eq. 19), no shadows */
 } isogi_dvr_shading;
 
 /* How global visibility is computed; what each costs and how far it errs is told above. Only brute force knows data space and
@@ -175,6 +183,22 @@ typedef enum isogi_dvr_sphere {
     ISOGI_DVR_ICOSAHEDRON
 } isogi_dvr_sphere;
 
+/* How much more opaque a surface is that is seen aslant: f = |v| |n| / |v . n| (Kraus 2005, 5.1). Peaks in both spaces; samples in data
+   space, by the trilinear gradient (eq. 17). Colour scales with opacity. */
+typedef enum isogi_dvr_silhouette {
+    ISOGI_DVR_SILHOUETTE_NONE = 0,
+    ISOGI_DVR_SILHOUETTE_EXACT,       /* a = 1 - (1 - a0)^f (eq. 15); a peak that is seen edge on is opaque */
+    ISOGI_DVR_SILHOUETTE_APPROXIMATE, /* a = min(1, a0 f) (eq. 16) */
+    ISOGI_DVR_SILHOUETTE_GRADIENT     /* to compare with: samples weighted by the whole gradient (Levoy 1988; eq. 18), peaks as eq. 16 */
+} isogi_dvr_silhouette;
+
+/* One side of a surface, for ISOGI_DVR_TWO_SIDED. All zero: plain diffuse. */
+typedef struct isogi_material {
+    float diffuse[3];  /* factor on the transfer function's colour, >= 0; all zero = 1 */
+    float specular[3]; /* Phong highlight, >= 0; for transmission a factor on the transfer function's colour, all zero = 1 */
+    float exponent;    /* of the highlight, 0..1e6; 0 = no specular part */
+} isogi_material;
+
 typedef struct isogi_dvr_desc {
     const isogi_pyramid *pyramid; /* borrowed */
     isogi_dvr_space space;
@@ -190,6 +214,14 @@ typedef struct isogi_dvr_desc {
                                of extinction, rounded so that grid points are on it; 0 = 2 */
     isogi_dvr_method method;
     isogi_dvr_sphere sphere;
+    isogi_dvr_classification classification; /* in data space; visibility rays are always post-classified */
+    int table;                               /* entries along a side of the pre-integrated table, 2..1024; 0 = 256 */
+    isogi_dvr_silhouette silhouette;
+    isogi_normal_kind normals;   /* of shading and of silhouettes of peaks; 0 = smooth */
+    isogi_material material[3];  /* two-sided: seen from lower values, seen from higher values, light that comes through */
+    const isogi_pyramid *second; /* borrowed: a field that colours peaks; NULL = none. Its value at a crossing, through these points, gives a */
+    const isogi_transfer_point *second_points; /* factor on the peak's colour; borrowed; their extinction means nothing */
+    size_t second_count;
 } isogi_dvr_desc;
 
 typedef struct isogi_dvr isogi_dvr;
@@ -205,7 +237,7 @@ typedef struct isogi_view {
    Where up is along the line of sight, another up is chosen; where eye and target coincide, the view is along -z. */
 ISOGI_API void isogi_view_ray(const isogi_view *view, double x, double y, double origin[3], float dir[3]);
 
-/* A renderer without a transfer function (all transparent) and without shadows. */
+/* A renderer without a transfer function (all transparent) and without shadows. context NULL = the pyramid's. */
 ISOGI_API isogi_result isogi_dvr_create(isogi_dvr **dvr, const isogi_dvr_desc *desc, const isogi_context *context);
 ISOGI_API void isogi_dvr_free(isogi_dvr *dvr); /* NULL is fine */
 
@@ -329,18 +361,25 @@ static void isogi_dvr__transform(const double m[9], const double v[3], double ou
 
 /* ==== transfer functions ============================================================================================= */
 
+static int isogi_dvr__points_valid(const isogi_transfer_point *points, size_t count) {
+    size_t i;
+    int a;
+    if (count && !points) return 0;
+    for (i = 0; i < count; i++) {
+        const isogi_transfer_point *p = &points[i];
+        if (!isogi_dvr__finite64(p->value) || !isogi_dvr__finite3(p->rgb) || !isogi_dvr__finite32(p->extinction)) return 0;
+        if (!(p->extinction >= 0) || (i && !(p->value >= p[-1].value))) return 0;
+        for (a = 0; a < 3; a++)
+            if (!(p->rgb[a] >= 0)) return 0;
+    }
+    return 1;
+}
+
 ISOGI_API isogi_result isogi_transfer_validate(const isogi_transfer *transfer) {
     size_t i;
     int a;
-    if (!transfer || (transfer->point_count && !transfer->points) || (transfer->peak_count && !transfer->peaks)) return ISOGI_INVALID;
-    if (transfer->peak_count > ISOGI_DVR_MAX_PEAKS) return ISOGI_TOO_LARGE;
-    for (i = 0; i < transfer->point_count; i++) {
-        const isogi_transfer_point *p = &transfer->points[i];
-        if (!isogi_dvr__finite64(p->value) || !isogi_dvr__finite3(p->rgb) || !isogi_dvr__finite32(p->extinction)) return ISOGI_INVALID;
-        if (!(p->extinction >= 0) || (i && !(p->value >= p[-1].value))) return ISOGI_INVALID;
-        for (a = 0; a < 3; a++)
-            if (!(p->rgb[a] >= 0)) return ISOGI_INVALID;
-    }
+    if (!transfer || (transfer->peak_count && !transfer->peaks)) return ISOGI_INVALID;
+    if (!isogi_dvr__points_valid(transfer->points, transfer->point_count)) return ISOGI_INVALID;
     for (i = 0; i < transfer->peak_count; i++) {
         const isogi_peak *p = &transfer->peaks[i];
         if (!isogi_dvr__finite64(p->isovalue) || !isogi_dvr__finite3(p->rgb) || !isogi_dvr__finite32(p->opacity)) return ISOGI_INVALID;
@@ -418,6 +457,31 @@ typedef struct isogi_dvr__matter {
     float *table, *scratch;             /* while it is brought up to date: extinction of classes; rows of values */
     size_t scratch_row;
 } isogi_dvr__matter;
+/* Premultiplied colour and transmittance of a piece of ray. */
+typedef struct isogi_dvr__layer {
+    double rgb[3], clear;
+} isogi_dvr__layer;
+
+typedef struct isogi_dvr__rank {
+    double isovalue;
+    size_t peak;
+} isogi_dvr__rank;
+
+/* What the values of a transfer function need to be integrated over; made when it is set. whole[0] and whole[1] hold the layers of runs
+   of 2^l of its pieces, rising and falling, level after level: run i of level l goes from point i 2^l to point (i + 1) 2^l. */
+typedef struct isogi_dvr__integral {
+    const isogi_transfer_point *points;
+    size_t count;
+    isogi_dvr__layer *whole[2];
+    size_t run_count;
+    isogi_dvr__rank *rank; /* peaks by isovalue; those of one isovalue in the order given */
+    size_t rank_count;
+    double (*quiet)[2]; /* ranges of values, ascending, in which nothing absorbs and no peak is crossed */
+    size_t quiet_count, quiet_capacity;
+    float (*table)[4]; /* pre-integrated: [front][back]: mean colour, mean extinction */
+    size_t side;
+    double low, scale; /* entry = (value - low) * scale */
+} isogi_dvr__integral;
 
 struct isogi_dvr {
     isogi_dvr_desc desc; /* zero defaults filled in */
@@ -426,6 +490,7 @@ struct isogi_dvr {
     isogi_context context;
     isogi_volume volume;
     isogi_dvr__transfer transfer;
+    isogi_dvr__integral integral; /* where isogi_dvr__by_value */
     double to_grid[9]; /* world directions to grid directions */
     double spacing;    /* the smallest distance of two voxels, world */
     double visibility_step;
@@ -509,6 +574,366 @@ static size_t isogi_dvr__class(const isogi_dvr *d, double value) {
     return (size_t)isogi_dvr__clamp((value - d->matter.low) * d->matter.scale, ISOGI_DVR__TABLE - 1);
 }
 
+/* ==== integrals over values ========================================================================================== */
+
+/* In data space the integral over a monotone piece of a ray depends on the values at its ends alone (Kraus 2005, eq. 2, 3). Within one
+   linear piece of the transfer function, extinction k and colour c are linear in the place u = 0..1, and with K(u) = int_0^u k,
+       int_0^1 c k exp(-K) du = c(0) W + c(1) (A - W),    A = 1 - exp(-K(1)),    W = int_0^1 (1 - exp(-K)) du
+   by parts: one number W for all channels, without a difference of large numbers however opaque the piece is. */
+
+static void isogi_dvr__behind(isogi_dvr__layer *front, const isogi_dvr__layer *back) {
+    int a;
+    for (a = 0; a < 3; a++) front->rgb[a] += front->clear * back->rgb[a];
+    front->clear *= back->clear;
+}
+
+/* A and W for K(u) = p u + q u^2 of at most 1/2 in all. Gauss's rule with seven points (an error below 1e-12) and
+   1 - exp(-x) = x (1 - x/2 (1 - x/3 ...)); the loops are over eight lanes, for the compiler to turn into vectors. */
+static void isogi_dvr__weigh_linear(double p, double q, double *opacity, double *first) {
+    static const double place[8] = {0.025446043828620737737, 0.12923440720030278007, 0.29707742431130141655, 0.5,
+                                    0.70292257568869858345, 0.87076559279969721993, 0.97455395617137926226, 1};
+    static const double weight[8] = {0.064742483084434846635, 0.13985269574463833395, 0.19091502525255947248, 0.20897959183673469388,
+                                     0.19091502525255947248, 0.13985269574463833395, 0.064742483084434846635, 0};
+    double x[8], e[8], sum = 0;
+    int i;
+    for (i = 0; i < 8; i++) x[i] = place[i] * (p + q * place[i]), e[i] = 1 - x[i] * (1 / 14.0);
+    for (i = 0; i < 8; i++) e[i] = 1 - x[i] * (1 / 13.0) * e[i];
+    for (i = 0; i < 8; i++) e[i] = 1 - x[i] * (1 / 12.0) * e[i];
+    for (i = 0; i < 8; i++) e[i] = 1 - x[i] * (1 / 11.0) * e[i];
+    for (i = 0; i < 8; i++) e[i] = 1 - x[i] * (1 / 10.0) * e[i];
+    for (i = 0; i < 8; i++) e[i] = 1 - x[i] * (1 / 9.0) * e[i];
+    for (i = 0; i < 8; i++) e[i] = 1 - x[i] * (1 / 8.0) * e[i];
+    for (i = 0; i < 8; i++) e[i] = 1 - x[i] * (1 / 7.0) * e[i];
+    for (i = 0; i < 8; i++) e[i] = 1 - x[i] * (1 / 6.0) * e[i];
+    for (i = 0; i < 8; i++) e[i] = 1 - x[i] * 0.2 * e[i];
+    for (i = 0; i < 8; i++) e[i] = 1 - x[i] * 0.25 * e[i];
+    for (i = 0; i < 8; i++) e[i] = 1 - x[i] * (1 / 3.0) * e[i];
+    for (i = 0; i < 8; i++) e[i] = x[i] * (1 - x[i] * 0.5 * e[i]);
+    for (i = 0; i < 8; i++) sum += weight[i] * e[i];
+    *opacity = e[7], *first = sum;
+}
+
+/* The place u at which the depth k0 u + (k1 - k0) u^2 / 2 is reached; the depth of the whole is at least that. */
+static double isogi_dvr__depth_place(double k0, double k1, double depth) {
+    double root = k0 * k0 + 2 * (k1 - k0) * depth, u;
+    u = 2 * depth / (k0 + sqrt(root > 0 ? root : 0));
+    return isogi_dvr__clamp(u, 1);
+}
+
+/* Puts a piece behind the layer in which {rgb, extinction} goes linearly from one to the other; extinction is per `length`. Deep pieces
+   are cut where their depth reaches 1/2, until nothing is left of the light behind them. */
+static void isogi_dvr__add_linear(isogi_dvr__layer *layer, const double from[4], const double to[4], double length) {
+    double k0 = isogi_dvr__clamp(from[3] * length, 1e30), k1 = isogi_dvr__clamp(to[3] * length, 1e30), depth = 0.5 * (k0 + k1), u0 = 0;
+    double opacity, first, front[3];
+    int a;
+    if (!(depth > 0)) return;
+    for (a = 0; a < 3; a++) front[a] = from[a];
+    while (depth > 0.5 && layer->clear > 1e-20) {
+        double step = isogi_dvr__depth_place(k0, k1, 0.5), u1 = u0 + (1 - u0) * step, k = k0 + step * (k1 - k0);
+        isogi_dvr__weigh_linear(k0 * step, 0.5 * (k - k0) * step, &opacity, &first);
+        for (a = 0; a < 3; a++) {
+            double back = from[a] + u1 * (to[a] - from[a]);
+            layer->rgb[a] += layer->clear * (front[a] * first + back * (opacity - first));
+            front[a] = back;
+        }
+        layer->clear *= 1 - opacity;
+        u0 = u1, k0 = k * (1 - step), k1 *= 1 - step, depth = 0.5 * (k0 + k1);
+    }
+    if (depth > 0.5) return;
+    isogi_dvr__weigh_linear(k0, 0.5 * (k1 - k0), &opacity, &first);
+    for (a = 0; a < 3; a++) layer->rgb[a] += layer->clear * (front[a] * first + to[a] * (opacity - first));
+    layer->clear *= 1 - opacity;
+}
+
+/* {rgb, extinction} at x, on the piece between points n - 1 and n. */
+static void isogi_dvr__on_piece(const isogi_dvr__integral *g, size_t n, double x, double out[4]) {
+    const isogi_transfer_point *low = &g->points[n ? n - 1 : 0], *high = &g->points[n < g->count ? n : g->count - 1];
+    double width = 0.5 * high->value - 0.5 * low->value, u = width > 0 ? isogi_dvr__clamp((0.5 * x - 0.5 * low->value) / width, 1) : 0;
+    int a;
+    for (a = 0; a < 3; a++) out[a] = (double)low->rgb[a] + u * ((double)high->rgb[a] - (double)low->rgb[a]);
+    out[3] = (double)low->extinction + u * ((double)high->extinction - (double)low->extinction);
+}
+
+/* The part of one piece from x to y. */
+static void isogi_dvr__add_part(const isogi_dvr__integral *g, size_t n, double x, double y, double factor, isogi_dvr__layer *layer) {
+    double from[4], to[4];
+    isogi_dvr__on_piece(g, n, x, from), isogi_dvr__on_piece(g, n, y, to);
+    if (from[3] + to[3] > 0) isogi_dvr__add_linear(layer, from, to, fabs(y - x) * factor);
+}
+
+/* All pieces between two points, in the direction from first to last. */
+static void isogi_dvr__add_whole(const isogi_dvr__integral *g, size_t first, size_t last, double factor, isogi_dvr__layer *layer) {
+    int falling = last < first;
+    if (factor > 1 || factor < 1) {
+        while (first != last) {
+            size_t next = falling ? first - 1 : first + 1;
+            isogi_dvr__add_part(g, falling ? first : next, g->points[first].value, g->points[next].value, factor, layer);
+            first = next;
+        }
+        return;
+    }
+    while (first != last) {
+        size_t at = 0, level = 0, left = falling ? first - last : last - first;
+        while (!(first >> level & 1) && left >> (level + 1)) at += (g->count - 1) >> level, level++;
+        at += falling ? (first >> level) - 1 : first >> level;
+        isogi_dvr__behind(layer, &g->whole[falling][at]);
+        first = falling ? first - ((size_t)1 << level) : first + ((size_t)1 << level);
+    }
+}
+
+/* Puts the monotone piece of ray from value x to value y behind a layer. `length` takes the place of |y - x| in the integral where it is
+   not the integral of Kraus but one whose path is measured otherwise (silhouettes; physical space): then a piece of constant value
+   counts too. */
+static void isogi_dvr__add_values(const isogi_dvr__integral *g, double x, double y, double length, isogi_dvr__layer *layer) {
+    double span = fabs(y - x), factor = 1;
+    size_t from, to;
+    if (!g->count) return;
+    from = isogi_dvr__points_below(g->points, g->count, x);
+    if (!(span > 0)) {
+        double value[4];
+        isogi_dvr__on_piece(g, from, x, value);
+        isogi_dvr__add_linear(layer, value, value, length);
+        return;
+    }
+    if (length > span || length < span) factor = length / span;
+    if (!(factor < 1e300)) factor = 1e300;
+    to = isogi_dvr__points_below(g->points, g->count, y);
+    if (from == to) isogi_dvr__add_part(g, from, x, y, factor, layer);
+    else if (from < to) {
+        isogi_dvr__add_part(g, from, x, g->points[from].value, factor, layer);
+        isogi_dvr__add_whole(g, from, to - 1, factor, layer);
+        isogi_dvr__add_part(g, to, g->points[to - 1].value, y, factor, layer);
+    } else {
+        isogi_dvr__add_part(g, from, x, g->points[from - 1].value, factor, layer);
+        isogi_dvr__add_whole(g, from - 1, to, factor, layer);
+        isogi_dvr__add_part(g, to, g->points[to].value, y, factor, layer);
+    }
+}
+
+/* The value between x and y up to which the piece from x has this depth: K inverted, piece by piece. */
+static double isogi_dvr__value_at_depth(const isogi_dvr__integral *g, double x, double y, double factor, double depth) {
+    size_t n = g->count ? isogi_dvr__points_below(g->points, g->count, x) : 0, to = g->count ? isogi_dvr__points_below(g->points, g->count, y) : 0;
+    while (g->count) {
+        double end = n < to ? g->points[n].value : n > to ? g->points[n - 1].value : y, from[4], at[4], k0, k1;
+        isogi_dvr__on_piece(g, n, x, from), isogi_dvr__on_piece(g, n, end, at);
+        k0 = isogi_dvr__clamp(from[3] * fabs(end - x) * factor, 1e30), k1 = isogi_dvr__clamp(at[3] * fabs(end - x) * factor, 1e30);
+        if (0.5 * (k0 + k1) >= depth && depth > 0) return x + isogi_dvr__depth_place(k0, k1, depth) * (end - x);
+        if (n == to) break;
+        depth -= 0.5 * (k0 + k1), x = end;
+        n = n < to ? n + 1 : n - 1;
+    }
+    return y;
+}
+
+/* K(y) - K(x) for x <= y, exactly zero where nothing absorbs. */
+static double isogi_dvr__depth_between(const isogi_dvr__integral *g, double x, double y) {
+    size_t n = isogi_dvr__points_below(g->points, g->count, x), to = isogi_dvr__points_below(g->points, g->count, y);
+    double depth = 0;
+    for (; n <= to; n++) {
+        double end = n < to ? g->points[n].value : y, from[4], at[4];
+        isogi_dvr__on_piece(g, n, x, from), isogi_dvr__on_piece(g, n, end, at);
+        depth += 0.5 * (from[3] + at[3]) * (end - x), x = end;
+    }
+    return depth;
+}
+
+static void isogi_dvr__integral_free(isogi_dvr__integral *g, const isogi_context *context) {
+    isogi_release(context, g->whole[0], g->run_count, sizeof *g->whole[0]);
+    isogi_release(context, g->whole[1], g->run_count, sizeof *g->whole[1]);
+    isogi_release(context, g->rank, g->rank_count, sizeof *g->rank);
+    isogi_release(context, g->quiet, g->quiet_capacity, sizeof *g->quiet);
+    isogi_release(context, g->table, g->side * g->side, sizeof *g->table);
+    memset(g, 0, sizeof *g);
+}
+
+static void isogi_dvr__set_whole(isogi_dvr__integral *g) {
+    size_t pieces = g->count ? g->count - 1 : 0, below = 0, at = 0, i, level;
+    for (i = 0; i < pieces; i++, at++) {
+        isogi_dvr__layer clear = {{0, 0, 0}, 1};
+        g->whole[0][at] = g->whole[1][at] = clear;
+        isogi_dvr__add_part(g, i + 1, g->points[i].value, g->points[i + 1].value, 1, &g->whole[0][at]);
+        isogi_dvr__add_part(g, i + 1, g->points[i + 1].value, g->points[i].value, 1, &g->whole[1][at]);
+    }
+    for (level = 1; pieces >> level; level++) {
+        size_t above = at;
+        for (i = 0; i < pieces >> level; i++, at++) {
+            g->whole[0][at] = g->whole[0][below + 2 * i], g->whole[1][at] = g->whole[1][below + 2 * i + 1];
+            isogi_dvr__behind(&g->whole[0][at], &g->whole[0][below + 2 * i + 1]);
+            isogi_dvr__behind(&g->whole[1][at], &g->whole[1][below + 2 * i]);
+        }
+        below = above;
+    }
+}
+
+static int isogi_dvr__rank_below(const isogi_dvr__rank *a, const isogi_dvr__rank *b) {
+    return a->isovalue < b->isovalue || (!(b->isovalue < a->isovalue) && a->peak < b->peak);
+}
+
+/* Heapsort: no recursion, no memory; the number of the peak makes the order a total one. */
+static void isogi_dvr__sort_ranks(isogi_dvr__rank *r, size_t count) {
+    size_t start = count / 2, end = count;
+    while (end > 1) {
+        isogi_dvr__rank moved;
+        size_t root, child;
+        if (start) moved = r[root = --start];
+        else moved = r[--end], r[end] = r[0], root = 0;
+        while ((child = 2 * root + 1) < end) {
+            if (child + 1 < end && isogi_dvr__rank_below(&r[child], &r[child + 1])) child++;
+            if (!isogi_dvr__rank_below(&moved, &r[child])) break;
+            r[root] = r[child], root = child;
+        }
+        r[root] = moved;
+    }
+}
+
+/* How many peaks have an isovalue <= x. */
+static size_t isogi_dvr__ranks_below(const isogi_dvr__integral *g, double x) {
+    size_t low = 0, high = g->rank_count;
+    while (low < high) {
+        size_t middle = low + (high - low) / 2;
+        if (g->rank[middle].isovalue <= x) low = middle + 1;
+        else high = middle;
+    }
+    return low;
+}
+
+/* A stretch without extinction, cut below every peak: crossing one means going from below it to the value itself. */
+static void isogi_dvr__add_quiet(isogi_dvr__integral *g, double low, double high) {
+    size_t rank = isogi_dvr__ranks_below(g, low);
+    for (; rank < g->rank_count && g->rank[rank].isovalue <= high; rank++) {
+        double end = nextafter(g->rank[rank].isovalue, -1.7e308);
+        if (low <= end) g->quiet[g->quiet_count][0] = low, g->quiet[g->quiet_count++][1] = end;
+        low = g->rank[rank].isovalue;
+    }
+    g->quiet[g->quiet_count][0] = low, g->quiet[g->quiet_count++][1] = high;
+}
+
+static void isogi_dvr__set_quiet(isogi_dvr__integral *g) {
+    double start = 0;
+    size_t n;
+    int open = 0;
+    for (n = 0; n <= g->count; n++) {
+        double low = n ? g->points[n - 1].value : -1.7e308, high = n < g->count ? g->points[n].value : 1.7e308;
+        int loud = (n && g->points[n - 1].extinction > 0) || (n < g->count && g->points[n].extinction > 0);
+        if (!(low < high)) continue;
+        if (!loud && !open) start = low;
+        if (loud && open) isogi_dvr__add_quiet(g, start, low);
+        open = !loud;
+    }
+    if (open) isogi_dvr__add_quiet(g, start, 1.7e308);
+}
+
+/* 1 and the range of values around `low` if low .. high are all quiet. */
+static int isogi_dvr__is_quiet(const isogi_dvr__integral *g, double low, double high, double range[2]) {
+    size_t first = 0, end = g->quiet_count;
+    if (low >= range[0] && high <= range[1]) return 1;
+    while (first < end) {
+        size_t middle = first + (end - first) / 2;
+        if (g->quiet[middle][0] <= low) first = middle + 1;
+        else end = middle;
+    }
+    if (!first || !(high <= g->quiet[first - 1][1])) return 0;
+    range[0] = g->quiet[first - 1][0], range[1] = g->quiet[first - 1][1];
+    return 1;
+}
+
+/* Eq. 6 and 7 of Kraus 2005 for all pairs of values, from pieces of one entry each that are put behind each other. Kept are mean colour
+   and mean extinction, which go smoothly through front = back: interpolated between entries, equal values stay exactly transparent. */
+static void isogi_dvr__set_entry(isogi_dvr__integral *g, size_t front, size_t back, const isogi_dvr__layer *layer, double depth) {
+    float *entry = g->table[front * g->side + back];
+    double x = g->low + (double)front / g->scale, y = g->low + (double)back / g->scale, value[4], opacity = -expm1(-depth);
+    int a;
+    isogi_dvr__on_piece(g, isogi_dvr__points_below(g->points, g->count, 0.5 * (x + y)), 0.5 * (x + y), value);
+    for (a = 0; a < 3; a++) entry[a] = (float)(depth > 0 ? layer->rgb[a] / opacity : value[a]);
+    entry[3] = (float)isogi_dvr__clamp(front == back ? value[3] : depth / fabs(y - x), 3e38);
+}
+
+static void isogi_dvr__set_pairs(isogi_dvr__integral *g) {
+    size_t i, j;
+    const isogi_dvr__layer nothing = {{0, 0, 0}, 1};
+    for (j = 0; j < g->side; j++) {
+        isogi_dvr__layer rising = nothing, falling = nothing;
+        double depth = 0;
+        isogi_dvr__set_entry(g, j, j, &nothing, 0);
+        for (i = j; i-- > 0;) {
+            isogi_dvr__layer front = nothing;
+            isogi_dvr__add_values(g, g->low + (double)i / g->scale, g->low + (double)(i + 1) / g->scale, 1 / g->scale, &front);
+            isogi_dvr__behind(&front, &rising);
+            rising = front;
+            depth += isogi_dvr__depth_between(g, g->low + (double)i / g->scale, g->low + (double)(i + 1) / g->scale);
+            isogi_dvr__set_entry(g, i, j, &rising, depth);
+        }
+        for (i = j + 1, depth = 0; i < g->side; i++) {
+            isogi_dvr__layer front = nothing;
+            isogi_dvr__add_values(g, g->low + (double)i / g->scale, g->low + (double)(i - 1) / g->scale, 1 / g->scale, &front);
+            isogi_dvr__behind(&front, &falling);
+            falling = front;
+            depth += isogi_dvr__depth_between(g, g->low + (double)(i - 1) / g->scale, g->low + (double)i / g->scale);
+            isogi_dvr__set_entry(g, i, j, &falling, depth);
+        }
+    }
+}
+
+/* For a pair of values: mean colour and opacity. */
+static double isogi_dvr__look_up(const isogi_dvr__integral *g, double front, double back, double length, double rgb[3]) {
+    double most = (double)(g->side - 1), x = isogi_dvr__clamp((front - g->low) * g->scale, most), y = isogi_dvr__clamp((back - g->low) * g->scale, most);
+    double value[4];
+    size_t i = (size_t)x, j = (size_t)y;
+    const float *at;
+    int a;
+    if (i + 1 >= g->side) i = g->side - 2;
+    if (j + 1 >= g->side) j = g->side - 2;
+    x -= (double)i, y -= (double)j, at = g->table[i * g->side + j];
+    for (a = 0; a < 4; a++) {
+        double low = (double)at[a] + y * ((double)at[4 + a] - (double)at[a]);
+        double high = (double)at[4 * g->side + (size_t)a] + y * ((double)at[4 * g->side + 4 + (size_t)a] - (double)at[4 * g->side + (size_t)a]);
+        value[a] = low + x * (high - low);
+    }
+    for (a = 0; a < 3; a++) rgb[a] = value[a];
+    return -expm1(-isogi_dvr__clamp(value[3] * length, 1e30));
+}
+
+static isogi_result isogi_dvr__integral_build(isogi_dvr__integral *g, const isogi_dvr__transfer *t, const isogi_dvr_desc *desc,
+                                              const isogi_context *context) {
+    size_t pieces = t->point_count ? t->point_count - 1 : 0, i;
+    double range[2];
+    memset(g, 0, sizeof *g);
+    g->points = t->points, g->count = t->point_count, g->rank_count = t->peak_count;
+    for (i = 0; pieces >> i; i++) g->run_count += pieces >> i;
+    g->quiet_capacity = t->point_count + t->peak_count + 1;
+    isogi_vol_range(desc->pyramid, range);
+    if (desc->classification == ISOGI_DVR_PRE_INTEGRATED && t->point_count && range[1] > range[0]) g->side = (size_t)desc->table;
+    g->whole[0] = (isogi_dvr__layer *)isogi_allocate(context, g->run_count, sizeof *g->whole[0]);
+    g->whole[1] = (isogi_dvr__layer *)isogi_allocate(context, g->run_count, sizeof *g->whole[1]);
+    g->rank = (isogi_dvr__rank *)isogi_allocate(context, g->rank_count, sizeof *g->rank);
+    g->quiet = (double(*)[2])isogi_allocate(context, g->quiet_capacity, sizeof *g->quiet);
+    g->table = (float(*)[4])isogi_allocate(context, g->side * g->side, sizeof *g->table);
+    if ((g->run_count && (!g->whole[0] || !g->whole[1])) || (g->rank_count && !g->rank) || !g->quiet || (g->side && !g->table)) {
+        isogi_dvr__integral_free(g, context);
+        return ISOGI_NO_MEMORY;
+    }
+    for (i = 0; i < g->rank_count; i++) g->rank[i].isovalue = t->peaks[i].isovalue, g->rank[i].peak = i;
+    isogi_dvr__sort_ranks(g->rank, g->rank_count);
+    isogi_dvr__set_quiet(g);
+    isogi_dvr__set_whole(g);
+    g->low = range[0], g->scale = g->side ? (double)(g->side - 1) / (range[1] - range[0]) : 0;
+    if (g->side) isogi_dvr__set_pairs(g);
+    return ISOGI_OK;
+}
+
+/* Whether rays are integrated over values, piece by monotone piece. */
+static int isogi_dvr__by_value(const isogi_dvr *d) {
+    return d->desc.space == ISOGI_DVR_DATA && d->desc.classification != ISOGI_DVR_POST_CLASSIFIED;
+}
+
+/* Nothing in a range of values counts for anything. */
+static int isogi_dvr__range_empty(const isogi_dvr *d, const float range[2]) {
+    double quiet[2] = {1, 0};
+    if (range[0] > range[1]) return 1;
+    if (!isogi_dvr__by_value(d)) return !(isogi_dvr__most(&d->transfer, (double)range[0], (double)range[1]) > 0);
+    return !(range[0] < range[1]) || isogi_dvr__is_quiet(&d->integral, (double)range[0], (double)range[1], quiet);
+}
+
 static void isogi_dvr__mark_empty(isogi_dvr *d) {
     int n;
     d->transparent = 1;
@@ -517,7 +942,7 @@ static void isogi_dvr__mark_empty(isogi_dvr *d) {
         size_t count = level->size[0] * level->size[1] * level->size[2], i;
         for (i = 0; i < count; i++) {
             const float *range = level->range[i];
-            d->empty[n][i] = range[0] > range[1] || !(isogi_dvr__most(&d->transfer, (double)range[0], (double)range[1]) > 0);
+            d->empty[n][i] = (uint8_t)isogi_dvr__range_empty(d, range);
             if (!d->empty[n][i]) d->transparent = 0;
         }
     }
@@ -587,21 +1012,29 @@ static isogi_dvr_method isogi_dvr__method(const isogi_dvr *d) {
 ISOGI_API isogi_result isogi_dvr_set_transfer(isogi_dvr *dvr, const isogi_transfer *transfer) {
     isogi_dvr__transfer copy;
     isogi_dvr_method before;
+    isogi_dvr__integral integral;
     isogi_result result;
     uint32_t *marks;
     size_t changed;
     if (!dvr) return ISOGI_INVALID;
     result = isogi_transfer_validate(transfer);
+    if (result == ISOGI_OK && transfer->peak_count > ISOGI_DVR_MAX_PEAKS && (!isogi_dvr__by_value(dvr) || dvr->desc.shading == ISOGI_DVR_VISIBILITY))
+        result = ISOGI_TOO_LARGE;
     if (result == ISOGI_OK) result = isogi_dvr__transfer_copy(&copy, transfer, &dvr->context);
     if (result != ISOGI_OK) return result;
+    memset(&integral, 0, sizeof integral);
+    if (isogi_dvr__by_value(dvr)) result = isogi_dvr__integral_build(&integral, &copy, &dvr->desc, &dvr->context);
     marks = (uint32_t *)isogi_allocate(&dvr->context, ISOGI_DVR__TABLE + 1, sizeof *marks);
-    if (!marks) {
+    if (!marks || result != ISOGI_OK) {
+        isogi_dvr__integral_free(&integral, &dvr->context);
+        isogi_release(&dvr->context, marks, ISOGI_DVR__TABLE + 1, sizeof *marks);
         isogi_dvr__transfer_free(&copy, &dvr->context);
         return ISOGI_NO_MEMORY;
     }
     isogi_dvr__compare_transfers(dvr, &dvr->transfer, &copy, marks);
+    isogi_dvr__integral_free(&dvr->integral, &dvr->context);
     isogi_dvr__transfer_free(&dvr->transfer, &dvr->context);
-    dvr->transfer = copy;
+    dvr->transfer = copy, dvr->integral = integral;
     isogi_dvr__mark_empty(dvr);
     changed = isogi_dvr__mark_changed(dvr, marks);
     isogi_release(&dvr->context, marks, ISOGI_DVR__TABLE + 1, sizeof *marks);
@@ -870,6 +1303,17 @@ static void isogi_dvr__set_lattice(isogi_dvr *d) {
     }
 }
 
+static int isogi_dvr__resolve_material(isogi_material *m, int transmission) {
+    int a;
+    if (!isogi_dvr__finite3(m->diffuse) || !isogi_dvr__finite3(m->specular) || !isogi_dvr__finite32(m->exponent)) return 0;
+    for (a = 0; a < 3; a++)
+        if (!(m->diffuse[a] >= 0 && m->specular[a] >= 0)) return 0;
+    if (!(m->exponent >= 0 && m->exponent <= 1e6f)) return 0;
+    if (!(m->diffuse[0] > 0 || m->diffuse[1] > 0 || m->diffuse[2] > 0)) m->diffuse[0] = m->diffuse[1] = m->diffuse[2] = 1;
+    if (transmission && !(m->specular[0] > 0 || m->specular[1] > 0 || m->specular[2] > 0)) m->specular[0] = m->specular[1] = m->specular[2] = 1;
+    return 1;
+}
+
 static isogi_result isogi_dvr__resolve(isogi_dvr_desc *desc, const isogi_dvr_desc *given) {
     const isogi_volume *volume;
     int a;
@@ -877,7 +1321,14 @@ static isogi_result isogi_dvr__resolve(isogi_dvr_desc *desc, const isogi_dvr_des
     *desc = *given;
     volume = isogi_vol_volume(desc->pyramid);
     if (desc->space != ISOGI_DVR_PHYSICAL && desc->space != ISOGI_DVR_DATA) return ISOGI_INVALID;
-    if (desc->shading != ISOGI_DVR_UNLIT && desc->shading != ISOGI_DVR_VISIBILITY && desc->shading != ISOGI_DVR_LOCAL) return ISOGI_INVALID;
+    if (desc->shading != ISOGI_DVR_UNLIT && desc->shading != ISOGI_DVR_VISIBILITY && desc->shading != ISOGI_DVR_LOCAL && desc->shading != ISOGI_DVR_TWO_SIDED)
+        return ISOGI_INVALID;
+    if ((unsigned)desc->classification > ISOGI_DVR_POST_CLASSIFIED || (unsigned)desc->silhouette > ISOGI_DVR_SILHOUETTE_GRADIENT) return ISOGI_INVALID;
+    if ((unsigned)desc->normals > ISOGI_NORMAL_TRILINEAR || desc->table < 0 || desc->table == 1 || desc->table > 1024) return ISOGI_INVALID;
+    for (a = 0; a < 3; a++)
+        if (!isogi_dvr__resolve_material(&desc->material[a], a == 2)) return ISOGI_INVALID;
+    if (!isogi_dvr__points_valid(desc->second_points, desc->second_count)) return ISOGI_INVALID;
+    if (!desc->table) desc->table = 256;
     if (!isogi_dvr__finite64(desc->unit) || !isogi_dvr__finite64(desc->step) || !isogi_dvr__finite32(desc->opaque)) return ISOGI_INVALID;
     if (!isogi_dvr__finite64(desc->visibility_step)) return ISOGI_INVALID;
     if (!(desc->unit >= 0) || !(desc->step >= 0) || !(desc->visibility_step >= 0)) return ISOGI_INVALID;
@@ -953,6 +1404,7 @@ ISOGI_API isogi_result isogi_dvr_create(isogi_dvr **dvr, const isogi_dvr_desc *d
     int a;
     if (!dvr) return ISOGI_INVALID;
     if (result != ISOGI_OK) return result;
+    if (!context) context = isogi_vol_context(resolved.pyramid);
     d = (isogi_dvr *)isogi_allocate(context, 1, sizeof *d);
     if (!d) return ISOGI_NO_MEMORY;
     memset(d, 0, sizeof *d);
@@ -985,6 +1437,7 @@ ISOGI_API void isogi_dvr_free(isogi_dvr *dvr) {
     isogi_context context;
     if (!dvr) return;
     context = dvr->context;
+    isogi_dvr__integral_free(&dvr->integral, &context);
     isogi_dvr__transfer_free(&dvr->transfer, &context);
     isogi_release(&context, dvr->empty_blocks, dvr->block_count, 1);
     isogi_release(&context, dvr->changed, dvr->changed_count, 1);
@@ -1005,6 +1458,8 @@ typedef struct isogi_dvr__march {
     const isogi_dvr *dvr;
     double origin[3], dir[3]; /* at the entry; grid units per t */
     double enter, length;     /* t along the ray as given; of the part within the box */
+    double speed;             /* world length per t */
+    isogi_dvr_silhouette silhouette; /* of viewing rays */
     double piece, scale;      /* t of one piece; optical depth per (extinction * t) in physical space, 1 in data space */
     uint64_t next, count;     /* pieces */
     int cell[3], known[3];    /* the cell in `corner`; the smallest block known not to be empty */
@@ -1018,7 +1473,7 @@ typedef struct isogi_dvr__sample {
     double from, to; /* t */
     double depth;    /* optical depth of the whole piece */
     double value, local[3];
-    int cell[3];
+    int cell[3], side; /* side: +1 where the value rises along the ray */
 } isogi_dvr__sample;
 
 /* 0 if the ray misses the box. `origin` and `dir` in grid space, `world` = length of dir in the world, `step` in voxels. */
@@ -1045,7 +1500,7 @@ static int isogi_dvr__begin(isogi_dvr__march *m, const isogi_dvr *d, const doubl
         m->origin[a] = isogi_dvr__clamp(origin[a] + enter * dir[a], d->cells[a]);
         m->cell[a] = m->known[a] = -1;
     }
-    m->piece = step * d->spacing / world;
+    m->piece = step * d->spacing / world, m->speed = world;
     m->scale = d->desc.space == ISOGI_DVR_PHYSICAL ? world / d->desc.unit : 1;
     pieces = ceil(m->length / m->piece);
     m->count = (uint64_t)isogi_dvr__clamp(pieces, 2 * ISOGI_DVR__MAX_SAMPLES);
@@ -1076,6 +1531,33 @@ static double isogi_dvr__field(const isogi_dvr__march *m, const double u[3], dou
     *slope = m->dir[0] * (x0 + u[2] * (x1 - x0)) + m->dir[1] * (y0 + u[2] * (y1 - y0)) + m->dir[2] * z;
     value = value > m->low ? value : m->low;
     return value < m->high ? value : m->high;
+}
+
+/* The length of the trilinear gradient per unit of t as the ray goes: |grad s| |v|. */
+static double isogi_dvr__steepness(const isogi_dvr__march *m, const double u[3]) {
+    const double *c = m->corner, *g = m->dvr->to_grid;
+    double x00 = c[1] - c[0], x10 = c[3] - c[2], x01 = c[5] - c[4], x11 = c[7] - c[6];
+    double v00 = c[0] + u[0] * x00, v10 = c[2] + u[0] * x10, v01 = c[4] + u[0] * x01, v11 = c[6] + u[0] * x11;
+    double x0 = x00 + u[1] * (x10 - x00), x1 = x01 + u[1] * (x11 - x01), y0 = v10 - v00, y1 = v11 - v01, sum = 0, local[3];
+    int a;
+    local[0] = x0 + u[2] * (x1 - x0), local[1] = y0 + u[2] * (y1 - y0);
+    local[2] = v01 + u[1] * y1 - (v00 + u[1] * y0);
+    for (a = 0; a < 3; a++) {
+        double world = g[a] * local[0] + g[3 + a] * local[1] + g[6 + a] * local[2];
+        sum += world * world;
+    }
+    return sqrt(sum) * m->speed;
+}
+
+/* Post-classified opacity as a depth (Kraus 2005, eq. 11), with the silhouettes of eq. 15 to 18. `depth` is per unit of slope. */
+static double isogi_dvr__slope_depth(const isogi_dvr__march *m, double depth, double slope, const double u[3]) {
+    isogi_dvr_silhouette kind = m->silhouette;
+    double steep, opacity;
+    if (kind == ISOGI_DVR_SILHOUETTE_NONE) return depth * slope;
+    steep = isogi_dvr__steepness(m, u);
+    if (kind != ISOGI_DVR_SILHOUETTE_APPROXIMATE) return depth * steep;
+    opacity = slope > 0 ? -expm1(-depth * slope) * (steep / slope) : 0;
+    return opacity < 1 ? -log1p(-opacity) : 1e30;
 }
 
 /* Steps over the largest empty block around the cell `c`, in which the sample at t lies: 1 if there is one. The next sample is the
@@ -1109,7 +1591,7 @@ static int isogi_dvr__skip(isogi_dvr__march *m, const int c[3], double t) {
 /* The next piece of the ray that has any extinction; 0 when there is none. */
 static int isogi_dvr__next(isogi_dvr__march *m, isogi_dvr__sample *s) {
     const isogi_dvr *d = m->dvr;
-    if (d->transparent) return 0;
+    if (d->transparent || !d->transfer.point_count) return 0;
     while (m->next < m->count) {
         double extinction, slope, t;
         int a, moved = 0;
@@ -1129,15 +1611,298 @@ static int isogi_dvr__next(isogi_dvr__march *m, isogi_dvr__sample *s) {
         for (a = 0; a < 3; a++) moved |= m->cell[a] ^ s->cell[a], m->cell[a] = s->cell[a];
         if (moved) isogi_dvr__fetch(m);
         if (!m->finite) continue;
-        s->value = isogi_dvr__field(m, s->local, &slope);
+        s->value = isogi_dvr__field(m, s->local, &slope), s->side = slope > 0 ? 1 : -1;
         extinction = isogi_dvr__extinction(d->transfer.points, d->transfer.point_count, s->value);
         if (!(extinction > 0)) continue;
         s->depth = extinction * (s->to - s->from) * m->scale;
-        if (d->desc.space == ISOGI_DVR_DATA) s->depth *= fabs(slope);
+        if (d->desc.space == ISOGI_DVR_DATA) s->depth = isogi_dvr__slope_depth(m, s->depth, fabs(slope), s->local);
         s->depth = isogi_dvr__clamp(s->depth, 1e30);
         if (s->depth > 0) return 1;
     }
     return 0;
+}
+
+/* ==== monotone pieces of a ray ======================================================================================== */
+
+/* A piece of ray along which the value goes one way. Between t0 and t0 + dt the field is the cubic with Bernstein coefficients b; the
+   piece is the part u0..u1 of it. (Samples of pre-integration make pieces too, with a straight line for a cubic.) */
+typedef struct isogi_dvr__stretch {
+    double from, to, value[2]; /* t; values at its ends */
+    double t0, dt, u0, u1, b[4];
+    int cell[3];
+} isogi_dvr__stretch;
+
+/* The walk through the cells of a ray. Values are carried from cell to cell: what one cell ends with is what the next begins with, bit for
+   bit, so that no crossing of a peak is lost or found twice in a face. */
+typedef struct isogi_dvr__walk {
+    isogi_dvr__march *m;
+    double t, next[3], inverse[3]; /* t at which the ray leaves its cell along each axis; 1 / dir */
+    int cell[3], skipped;          /* some cells lie between the last value and the present cell, in which nothing counts */
+    double at[3];                  /* place in the cell */
+    double value;                  /* the last one */
+    int chained;                   /* there is one */
+    double quiet[2];               /* the last range of values known to be quiet */
+    double t0, dt, b[4];           /* the cell whose pieces are given out */
+    int owner[3], piece, pieces;
+    double cut[5], cut_value[5];   /* u */
+} isogi_dvr__walk;
+
+static void isogi_dvr__walk_to(isogi_dvr__walk *w) {
+    int a;
+    for (a = 0; a < 3; a++) {
+        int border = w->m->dir[a] > 0 ? w->cell[a] + 1 : w->cell[a];
+        w->next[a] = fabs(w->m->dir[a]) > 1e-300 ? (border - w->m->origin[a]) * w->inverse[a] : 1e300;
+    }
+}
+
+static void isogi_dvr__begin_walk(isogi_dvr__walk *w, isogi_dvr__march *m) {
+    int a;
+    w->m = m, w->t = 0, w->skipped = 0, w->value = 0, w->chained = 0, w->piece = w->pieces = 0;
+    w->quiet[0] = 1, w->quiet[1] = 0;
+    for (a = 0; a < 3; a++) {
+        int c = (int)m->origin[a], last = m->dvr->cells[a] - 1;
+        /* on the face between two cells the ray belongs to the one that it goes into */
+        if (c > 0 && m->dir[a] < 0 && !(m->origin[a] > c)) c--;
+        c = c < last ? c : last;
+        w->cell[a] = c > 0 ? c : 0;
+        w->at[a] = isogi_dvr__clamp(m->origin[a] - w->cell[a], 1);
+        w->inverse[a] = fabs(m->dir[a]) > 1e-300 ? 1 / m->dir[a] : 0;
+    }
+    isogi_dvr__walk_to(w);
+}
+
+/* Steps over the largest empty block around the cell: 1 if there is one. The cell it lands in follows from integers along the axis that
+   leads out, and lies within the block's reach along the others, so that rounding can neither turn the ray back nor lose it. */
+static int isogi_dvr__leave_block(isogi_dvr__walk *w) {
+    isogi_dvr__march *m = w->m;
+    const isogi_dvr *d = m->dvr;
+    const int *c = w->cell;
+    int n, a;
+    if (c[0] >> 2 == m->known[0] && c[1] >> 2 == m->known[1] && c[2] >> 2 == m->known[2]) return 0;
+    for (n = ISOGI_DVR__LEVELS - 1; n >= 0; n--) {
+        const isogi_level *level = &d->level[n];
+        int shift = 2 + 2 * n, axis = -1, first[3];
+        double leave = m->length;
+        size_t block = (size_t)(c[0] >> shift) + level->size[0] * ((size_t)(c[1] >> shift) + level->size[1] * (size_t)(c[2] >> shift));
+        m->work.blocks++;
+        if (!d->empty[n][block]) continue;
+        m->work.blocks_skipped++;
+        if (level->range[block][0] > level->range[block][1]) w->chained = 0; /* no finite value */
+        else isogi_dvr__is_quiet(&d->integral, (double)level->range[block][0], (double)level->range[block][1], w->quiet);
+        w->skipped = 1;
+        for (a = 0; a < 3; a++) {
+            double exit;
+            first[a] = c[a] >> shift << shift;
+            if (!(fabs(m->dir[a]) > 1e-300)) continue;
+            exit = ((m->dir[a] > 0 ? first[a] + (1 << shift) : first[a]) - m->origin[a]) * w->inverse[a];
+            if (exit < leave) leave = exit, axis = a;
+        }
+        w->t = leave > w->t ? leave : w->t;
+        if (axis < 0) return w->t = m->length, 1;
+        for (a = 0; a < 3; a++) {
+            double x = isogi_dvr__clamp(m->origin[a] + w->t * m->dir[a], d->cells[a]);
+            int last = first[a] + (1 << shift) - 1, to = (int)x;
+            last = last < d->cells[a] ? last : d->cells[a] - 1;
+            if (m->dir[a] > 0) to = to > c[a] ? to : c[a];
+            else to = to < c[a] ? to : c[a];
+            to = to < last ? to : last;
+            to = to > first[a] ? to : first[a];
+            if (a == axis) to = m->dir[a] > 0 ? first[a] + (1 << shift) : first[a] - 1;
+            if (to < 0 || (to >= d->cells[a] && to > 0)) return w->t = m->length, 1;
+            w->cell[a] = to, w->at[a] = isogi_dvr__clamp(x - to, 1);
+        }
+        isogi_dvr__walk_to(w);
+        return 1;
+    }
+    for (a = 0; a < 3; a++) m->known[a] = c[a] >> 2;
+    return 0;
+}
+
+/* The cubic from `in` to `out` (places in the cell) as Bernstein coefficients: values at corners of the box between the two places. */
+static void isogi_dvr__cubic(const double c[8], const double in[3], const double out[3], double b[4]) {
+    double x[2][4], y[2][2][2], z[2][2][2];
+    int i, j, k;
+    for (i = 0; i < 4; i++) {
+        double step = c[2 * i + 1] - c[2 * i];
+        x[0][i] = c[2 * i] + in[0] * step, x[1][i] = c[2 * i] + out[0] * step;
+    }
+    for (i = 0; i < 2; i++)
+        for (k = 0; k < 2; k++) {
+            double step = x[i][2 * k + 1] - x[i][2 * k];
+            y[i][0][k] = x[i][2 * k] + in[1] * step, y[i][1][k] = x[i][2 * k] + out[1] * step;
+        }
+    for (i = 0; i < 2; i++)
+        for (j = 0; j < 2; j++) {
+            double step = y[i][j][1] - y[i][j][0];
+            z[i][j][0] = y[i][j][0] + in[2] * step, z[i][j][1] = y[i][j][0] + out[2] * step;
+        }
+    b[0] = z[0][0][0], b[3] = z[1][1][1];
+    b[1] = (z[1][0][0] + z[0][1][0] + z[0][0][1]) * (1 / 3.0), b[2] = (z[1][1][0] + z[1][0][1] + z[0][1][1]) * (1 / 3.0);
+}
+
+static double isogi_dvr__bernstein(const double b[4], double u) {
+    double v = 1 - u;
+    return v * v * (v * b[0] + 3 * u * b[1]) + u * u * (3 * v * b[2] + u * b[3]);
+}
+
+/* The extrema within 0..1, in order: where the derivative, a quadratic, changes its sign. */
+static int isogi_dvr__extrema(const double b[4], double u[2]) {
+    double d0 = b[1] - b[0], d1 = b[2] - b[1], d2 = b[3] - b[2], a, half, root, q;
+    int count = 0;
+    if ((d0 >= 0 && d1 >= 0 && d2 >= 0) || (d0 <= 0 && d1 <= 0 && d2 <= 0)) return 0;
+    a = d0 - 2 * d1 + d2, half = d1 - d0, root = half * half - a * d0;
+    if (!(root > 0)) return 0;
+    q = half > 0 ? -(half + sqrt(root)) : sqrt(root) - half;
+    if (fabs(q) < 1e300 * fabs(a) && q / a > 0 && q / a < 1) u[count++] = q / a;
+    if (fabs(d0) < 1e300 * fabs(q) && d0 / q > 0 && d0 / q < 1) u[count++] = d0 / q;
+    if (count == 2 && u[0] > u[1]) root = u[0], u[0] = u[1], u[1] = root;
+    return count;
+}
+
+/* Cuts the cubic of the cell between t and t1. A value left behind before a gap joins on by a piece of no length, if it is in other
+   company than the value now: then rounding has led the ray past a sliver of a cell. */
+static void isogi_dvr__cut_cell(isogi_dvr__walk *w, const double out[3], double t1) {
+    isogi_dvr__march *m = w->m;
+    double u[2];
+    int extrema, i, n = 0;
+    isogi_dvr__cubic(m->corner, w->at, out, w->b);
+    m->work.cubics++, m->work.samples++;
+    extrema = isogi_dvr__extrema(w->b, u);
+    w->t0 = w->t, w->dt = t1 - w->t;
+    for (i = 0; i < 3; i++) w->owner[i] = w->cell[i];
+    if (w->chained && !w->skipped) w->b[0] = w->value;
+    else if (w->chained && (w->value < w->quiet[0] || w->value > w->quiet[1] || w->b[0] < w->quiet[0] || w->b[0] > w->quiet[1]))
+        w->cut[n] = 0, w->cut_value[n++] = w->value;
+    w->cut[n] = 0, w->cut_value[n++] = w->b[0];
+    for (i = 0; i < extrema; i++) {
+        double value = isogi_dvr__bernstein(w->b, u[i]);
+        value = value > m->low ? value : m->low;
+        w->cut[n] = u[i], w->cut_value[n++] = value < m->high ? value : m->high;
+    }
+    w->b[3] = w->b[3] > m->low ? w->b[3] : m->low;
+    w->b[3] = w->b[3] < m->high ? w->b[3] : m->high;
+    w->cut[n] = 1, w->cut_value[n] = w->b[3];
+    w->piece = 0, w->pieces = n;
+    w->value = w->b[3], w->chained = 1, w->skipped = 0;
+}
+
+/* To the next cell whose values count for something; 0 at the end of the ray. */
+static int isogi_dvr__next_cell(isogi_dvr__walk *w) {
+    isogi_dvr__march *m = w->m;
+    const isogi_dvr *d = m->dvr;
+    while (w->t < m->length) {
+        int axis = 0, a, cut = 0;
+        double t1, out[3];
+        if (isogi_dvr__leave_block(w)) continue;
+        if (w->next[1] < w->next[axis]) axis = 1;
+        if (w->next[2] < w->next[axis]) axis = 2;
+        t1 = w->next[axis] < m->length ? w->next[axis] : m->length;
+        if (t1 > w->t) {
+            int moved = 0;
+            for (a = 0; a < 3; a++) {
+                out[a] = isogi_dvr__clamp(m->origin[a] + t1 * m->dir[a] - w->cell[a], 1);
+                moved |= m->cell[a] ^ w->cell[a], m->cell[a] = w->cell[a];
+            }
+            if (w->next[axis] <= t1) out[axis] = m->dir[axis] > 0 ? 1 : 0;
+            m->work.cells++;
+            if (moved) isogi_dvr__fetch(m);
+            if (!m->finite) w->chained = 0, w->skipped = 1;
+            else if (isogi_dvr__is_quiet(&d->integral, m->low, m->high, w->quiet)) {
+                if (!w->chained) w->value = m->low;
+                w->chained = w->skipped = 1;
+            } else isogi_dvr__cut_cell(w, out, t1), cut = 1;
+            for (a = 0; a < 3; a++) w->at[a] = out[a];
+            w->t = t1;
+        }
+        w->cell[axis] += m->dir[axis] > 0 ? 1 : -1;
+        if (w->cell[axis] < 0 || w->cell[axis] >= d->cells[axis]) w->t = m->length;
+        w->at[axis] = m->dir[axis] > 0 ? 0 : 1;
+        w->next[axis] = ((m->dir[axis] > 0 ? w->cell[axis] + 1 : w->cell[axis]) - m->origin[axis]) * w->inverse[axis];
+        if (cut) return 1;
+    }
+    return 0;
+}
+
+static int isogi_dvr__next_monotone(isogi_dvr__walk *w, isogi_dvr__stretch *p) {
+    int i;
+    while (w->piece >= w->pieces)
+        if (!isogi_dvr__next_cell(w)) return 0;
+    i = w->piece++;
+    p->t0 = w->t0, p->dt = w->dt, p->u0 = w->cut[i], p->u1 = w->cut[i + 1];
+    p->from = w->t0 + w->cut[i] * w->dt, p->to = w->t0 + w->cut[i + 1] * w->dt;
+    p->value[0] = w->cut_value[i], p->value[1] = w->cut_value[i + 1];
+    memcpy(p->b, w->b, sizeof p->b), memcpy(p->cell, w->owner, sizeof p->cell);
+    return 1;
+}
+
+static void isogi_dvr__locate(const isogi_dvr__march *m, double t, int cell[3], double local[3]) {
+    int a;
+    for (a = 0; a < 3; a++) {
+        double x = isogi_dvr__clamp(m->origin[a] + t * m->dir[a], m->dvr->cells[a]);
+        int c = (int)x;
+        if (c > 0 && c >= m->dvr->cells[a]) c = m->dvr->cells[a] - 1;
+        cell[a] = c, local[a] = x - c;
+    }
+}
+
+/* The value at t, of a cell that has one; 0 otherwise. */
+static int isogi_dvr__value_at(isogi_dvr__march *m, double t, int cell[3], double local[3], double *value) {
+    double slope;
+    int a, moved = 0;
+    isogi_dvr__locate(m, t, cell, local);
+    for (a = 0; a < 3; a++) moved |= m->cell[a] ^ cell[a], m->cell[a] = cell[a];
+    if (moved) isogi_dvr__fetch(m);
+    m->work.samples++;
+    if (m->finite) *value = isogi_dvr__field(m, local, &slope);
+    return m->finite;
+}
+
+/* Samples a step apart (Kraus 2005, eq. 5): the pieces between them, taken as monotone. The pieces within one empty block are left out:
+   nothing that they hold counts. */
+static int isogi_dvr__next_sampled(isogi_dvr__walk *w, isogi_dvr__stretch *p) {
+    isogi_dvr__march *m = w->m;
+    double local[3], value;
+    int cell[3], i;
+    while (m->next <= m->count && m->count) {
+        double t = (double)m->next * m->piece;
+        uint64_t here = m->next++;
+        int had = w->chained;
+        if (t > m->length) t = m->length;
+        w->chained = isogi_dvr__value_at(m, t, cell, local, &value);
+        p->from = p->t0 = w->t, p->to = t, p->dt = t - w->t, p->u0 = 0, p->u1 = 1;
+        p->value[0] = w->value, p->value[1] = value;
+        if (w->chained) w->value = value;
+        w->t = t;
+        if (isogi_dvr__skip(m, cell, t)) {
+            /* to the last sample that is surely within the block: the walk's value is then right for the piece that leaves it */
+            m->next = m->next > here + 2 ? m->next - 2 : here + 1;
+            if (m->next > m->count && here < m->count) m->next = m->count;
+        }
+        if (!had || !w->chained || !(p->dt > 0)) continue;
+        for (i = 0; i < 4; i++) p->b[i] = p->value[0] + (p->value[1] - p->value[0]) * i / 3;
+        memcpy(p->cell, cell, sizeof cell);
+        return 1;
+    }
+    return 0;
+}
+
+/* u at which the piece has a value between those at its ends: bisection that Newton's step replaces where it stays within the bracket. */
+static double isogi_dvr__place_of(const isogi_dvr__stretch *p, double value) {
+    const double *b = p->b;
+    double low = p->u0, high = p->u1, rising = p->value[1] > p->value[0] ? 1 : -1, u;
+    int n;
+    u = low + (high - low) * isogi_dvr__clamp((value - p->value[0]) / (p->value[1] - p->value[0]), 1);
+    for (n = 0; n < 80; n++) {
+        double v = 1 - u, f = rising * (isogi_dvr__bernstein(b, u) - value), next;
+        double slope = 3 * rising * (v * v * (b[1] - b[0]) + 2 * u * v * (b[2] - b[1]) + u * u * (b[3] - b[2]));
+        if (f < 0) low = u;
+        else high = u;
+        next = slope > 0 ? u - f / slope : 0.5 * (low + high);
+        if (!(next > low && next < high)) next = 0.5 * (low + high);
+        if (fabs(next - u) < 1e-15) return next;
+        u = next;
+    }
+    return u;
 }
 
 /* ==== crossings of peaks ============================================================================================= */
@@ -1807,7 +2572,7 @@ static void isogi_dvr__shade_local(const isogi_dvr *d, const isogi_dvr__lights *
     memset(&hit, 0, sizeof hit);
     hit.side = 1;
     for (a = 0; a < 3; a++) hit.cell[a] = (uint32_t)cell[a], hit.local[a] = local[a], grid[a] = cell[a] + local[a];
-    isogi_vol_normals(d->desc.pyramid, &hit, 1, ISOGI_NORMAL_SMOOTH, &normal);
+    isogi_vol_normals(d->desc.pyramid, &hit, 1, d->desc.normals, &normal);
     isogi_vol_to_world(d->desc.pyramid, grid, world);
     for (a = 0; a < 3; a++) n[a] = (double)normal[a], facing += n[a] * (double)dir[a];
     flat = !(isogi_dvr__dot(n, n) > 0.5);
@@ -1828,6 +2593,41 @@ static void isogi_dvr__shade_local(const isogi_dvr *d, const isogi_dvr__lights *
     for (a = 0; a < 3; a++) out[a] = isogi_dvr__clamp(out[a], 1e30);
 }
 
+/* Kraus 2005, eq. 19, of a place with this opacity, without the factor opacity that compositing applies: out becomes a factor on the
+   transfer function's colour, `add` is the highlight. I_i is irradiance / pi. side: +1 where values rise along the ray, whatever the
+   normal says: so which side the eye is on does not depend on how normals were smoothed. H(0) = 0: light that grazes the surface,
+   and all light where there is no normal, neither comes back nor through; what remains is ambient. */
+static void isogi_dvr__shade_two_sided(const isogi_dvr *d, const isogi_dvr__lights *l, const int cell[3], const double local[3],
+                                       const float dir[3], int side, double opacity, double out[3], double add[3]) {
+    const isogi_material *front = &d->desc.material[side > 0 ? 0 : 1], *through = &d->desc.material[2];
+    float normal[3];
+    double n[3], world[3], grid[3];
+    isogi_hit hit;
+    size_t i;
+    int a;
+    memset(&hit, 0, sizeof hit);
+    hit.side = 1;
+    for (a = 0; a < 3; a++) hit.cell[a] = (uint32_t)cell[a], hit.local[a] = local[a], grid[a] = cell[a] + local[a];
+    isogi_vol_normals(d->desc.pyramid, &hit, 1, d->desc.normals, &normal);
+    isogi_vol_to_world(d->desc.pyramid, grid, world);
+    for (a = 0; a < 3; a++) n[a] = (double)normal[a] * side, out[a] = l->mean[a] * (double)front->diffuse[a], add[a] = 0;
+    for (i = 0; i < l->count; i++) {
+        double to[3], irradiance = isogi_dvr__reach(&l->list[i], world, to) / ISOGI_DVR__PI, cosine = isogi_dvr__dot(to, n), gloss = 0;
+        const isogi_material *m = cosine > 0 ? front : through;
+        double share = cosine > 0 ? 1 : 1 - opacity;
+        if (!(cosine > 0 || cosine < 0)) continue;
+        for (a = 0; a < 3; a++) gloss += (cosine > 0 ? to[a] - 2 * n[a] * cosine : to[a]) * (double)dir[a]; /* r.v and -l.v, with v = -dir */
+        gloss = m->exponent > 0 ? pow(isogi_dvr__clamp(gloss, 1), (double)m->exponent) : 0;
+        for (a = 0; a < 3; a++) {
+            double intensity = (double)l->list[i].rgb[a] * irradiance * share;
+            out[a] += intensity * fabs(cosine) * (double)m->diffuse[a];
+            if (cosine > 0) add[a] += intensity * gloss * (double)m->specular[a];
+            else out[a] += intensity * gloss * (double)m->specular[a];
+        }
+    }
+    for (a = 0; a < 3; a++) out[a] = isogi_dvr__clamp(out[a], 1e30), add[a] = isogi_dvr__clamp(add[a], 1e30);
+}
+
 /* ==== compositing ==================================================================================================== */
 
 typedef struct isogi_dvr__pixel_ray {
@@ -1840,15 +2640,18 @@ typedef struct isogi_dvr__pixel_ray {
     double t;             /* the answer, in the march's t */
 } isogi_dvr__pixel_ray;
 
-/* Colour as it leaves a place towards the eye, from the transfer function's. */
-static void isogi_dvr__shade(const isogi_dvr__pixel_ray *r, const int cell[3], const double local[3], double rgb[3]) {
-    double light[3], grid[3];
+/* Colour as it leaves a place towards the eye: rgb is the transfer function's and is multiplied by light, highlights come on top.
+   side: +1 where values rise along the ray, else -1. */
+static void isogi_dvr__shade(const isogi_dvr__pixel_ray *r, const int cell[3], const double local[3], int side, double opacity, double rgb[3]) {
+    double light[3], grid[3], add[3] = {0, 0, 0};
     int a;
     if (r->dvr->desc.shading == ISOGI_DVR_UNLIT) return;
     for (a = 0; a < 3; a++) grid[a] = cell[a] + local[a];
     if (r->dvr->desc.shading == ISOGI_DVR_VISIBILITY) isogi_dvr__shade_visibility(r->dvr, r->lights, grid, light);
+    else if (r->dvr->desc.shading == ISOGI_DVR_TWO_SIDED)
+        isogi_dvr__shade_two_sided(r->dvr, r->lights, cell, local, r->dir, side, opacity, light, add);
     else isogi_dvr__shade_local(r->dvr, r->lights, cell, local, r->dir, light);
-    for (a = 0; a < 3; a++) rgb[a] *= light[a];
+    for (a = 0; a < 3; a++) rgb[a] = rgb[a] * light[a] + add[a];
 }
 
 static void isogi_dvr__composite(isogi_dvr__pixel_ray *r, double opacity, const double rgb[3]) {
@@ -1866,30 +2669,222 @@ static void isogi_dvr__composite_part(isogi_dvr__pixel_ray *r, const isogi_dvr__
     r->clear = clear;
 }
 
-static void isogi_dvr__composite_crossing(isogi_dvr__pixel_ray *r, isogi_dvr__crossings *c, size_t i) {
-    const isogi_peak *peak = &r->dvr->transfer.peaks[i];
-    const isogi_hit *hit = &c->hit[i];
-    double rgb[3];
+/* Opacity of a peak that is seen aslant (Kraus 2005, eq. 15, 16). A surface without a normal is seen straight on. */
+static double isogi_dvr__peak_opacity(const isogi_dvr *d, double opacity, const isogi_hit *hit, const float dir[3]) {
+    float normal[3];
+    double cosine = 0, length = 0;
+    int a;
+    if (d->desc.silhouette == ISOGI_DVR_SILHOUETTE_NONE) return opacity;
+    isogi_vol_normals(d->desc.pyramid, hit, 1, d->desc.normals, &normal);
+    for (a = 0; a < 3; a++) cosine += (double)normal[a] * (double)dir[a], length += (double)normal[a] * (double)normal[a];
+    if (!(length > 0.5) || !(opacity > 0)) return opacity;
+    cosine = fabs(cosine);
+    if (d->desc.silhouette == ISOGI_DVR_SILHOUETTE_EXACT) return opacity < 1 && cosine > 1e-30 ? -expm1(log1p(-opacity) / cosine) : 1;
+    return cosine > opacity ? opacity / cosine : 1;
+}
+
+/* A peak's colour: its own, times that of the second field. */
+static void isogi_dvr__peak_colour(const isogi_dvr *d, const isogi_peak *peak, const isogi_hit *hit, double rgb[3]) {
+    float point[3], value;
+    double factor[3];
+    int a;
+    for (a = 0; a < 3; a++) rgb[a] = (double)peak->rgb[a];
+    if (!d->desc.second || !d->desc.second_count) return;
+    isogi_vol_positions(d->desc.pyramid, hit, 1, &point);
+    if (isogi_vol_sample(d->desc.second, (const float(*)[3])&point, 1, &value, NULL) != ISOGI_OK || isogi_dvr__is_nan((double)value)) return;
+    isogi_dvr__colour(d->desc.second_points, d->desc.second_count, (double)value, factor);
+    for (a = 0; a < 3; a++) rgb[a] *= factor[a];
+}
+
+static void isogi_dvr__composite_peak(isogi_dvr__pixel_ray *r, const isogi_peak *peak, const isogi_hit *hit, double t) {
+    double rgb[3], opacity = isogi_dvr__peak_opacity(r->dvr, (double)peak->opacity, hit, r->dir);
     int cell[3], a;
-    for (a = 0; a < 3; a++) rgb[a] = (double)peak->rgb[a], cell[a] = (int)hit->cell[a];
-    if (!r->probe) isogi_dvr__shade(r, cell, hit->local, rgb);
-    isogi_dvr__composite(r, (double)peak->opacity, rgb);
-    if (r->clear > r->end) r->t = c->t[i];
-    r->clear *= 1 - (double)peak->opacity;
+    for (a = 0; a < 3; a++) cell[a] = (int)hit->cell[a];
+    if (!r->probe && opacity > 0) {
+        isogi_dvr__peak_colour(r->dvr, peak, hit, rgb);
+        isogi_dvr__shade(r, cell, hit->local, hit->side > 0 ? 1 : -1, opacity, rgb);
+        isogi_dvr__composite(r, opacity, rgb);
+    }
+    if (r->clear > r->end) r->t = t;
+    r->clear *= 1 - opacity;
+}
+
+static void isogi_dvr__composite_crossing(isogi_dvr__pixel_ray *r, isogi_dvr__crossings *c, size_t i) {
+    isogi_dvr__composite_peak(r, &r->dvr->transfer.peaks[i], &c->hit[i], c->t[i]);
     isogi_dvr__pass_crossing(c, i);
 }
+
+/* ---- pieces of a ray over values ---- */
+
+/* A piece at work. */
+typedef struct isogi_dvr__span {
+    isogi_dvr__walk walk;
+    isogi_dvr__stretch piece;
+    int lit, sampled;
+    double light[3], add[3]; /* at the middle of the piece, once it is asked for */
+    double factor;           /* of silhouettes, on depth */
+    double path;             /* what stands for |change of the value| where there is none */
+    double touched, touched_t; /* the last peak that rose, and where: falling off it at once is no second crossing */
+} isogi_dvr__span;
+
+static void isogi_dvr__span_place(const isogi_dvr__span *s, double u, double local[3]) {
+    const isogi_dvr__march *m = s->walk.m;
+    double t = s->piece.t0 + u * s->piece.dt;
+    int a;
+    for (a = 0; a < 3; a++) local[a] = isogi_dvr__clamp(m->origin[a] + t * m->dir[a] - s->piece.cell[a], 1);
+}
+
+/* f of eq. 15 and 17 for the whole piece: int |grad s| |v| dt over the change of the value, by Gauss's rule with two points. */
+static double isogi_dvr__span_factor(isogi_dvr__span *s) {
+    const isogi_dvr__stretch *p = &s->piece;
+    double change = fabs(p->value[1] - p->value[0]), sum = 0, local[3];
+    int i;
+    s->path = 0;
+    if (s->walk.m->silhouette == ISOGI_DVR_SILHOUETTE_NONE || !(p->to > p->from)) return 1;
+    for (i = 0; i < 2; i++) {
+        double u = p->u0 + (i ? 0.78867513459481288225 : 0.21132486540518711775) * (p->u1 - p->u0), value;
+        int cell[3];
+        if (s->sampled) isogi_dvr__value_at(s->walk.m, p->t0 + u * p->dt, cell, local, &value);
+        else isogi_dvr__span_place(s, u, local);
+        sum += 0.5 * isogi_dvr__steepness(s->walk.m, local);
+    }
+    sum *= p->to - p->from;
+    if (!s->sampled && s->walk.m->silhouette != ISOGI_DVR_SILHOUETTE_APPROXIMATE) s->path = sum;
+    return sum > change ? change > 0 && sum < 1e300 * change ? sum / change : 1e300 : 1;
+}
+
+/* Light is looked up once for a piece, at its middle. */
+static void isogi_dvr__span_light(const isogi_dvr__pixel_ray *r, isogi_dvr__span *s, double opacity) {
+    const isogi_dvr__stretch *p = &s->piece;
+    double local[3], t = p->t0 + 0.5 * (p->u0 + p->u1) * p->dt, dark[3] = {0, 0, 0};
+    int side = p->value[1] > p->value[0] ? 1 : -1, cell[3], a;
+    for (a = 0; a < 3; a++) s->light[a] = 1, s->add[a] = 0;
+    s->lit = 1;
+    if (r->dvr->desc.shading == ISOGI_DVR_UNLIT) return;
+    isogi_dvr__span_place(s, 0.5 * (p->u0 + p->u1), local);
+    memcpy(cell, p->cell, sizeof cell);
+    if (s->sampled) isogi_dvr__locate(s->walk.m, t, cell, local);
+    isogi_dvr__shade(r, cell, local, side, opacity, s->light);
+    if (r->dvr->desc.shading != ISOGI_DVR_TWO_SIDED) return;
+    isogi_dvr__shade(r, cell, local, side, opacity, dark);
+    for (a = 0; a < 3; a++) s->add[a] = dark[a], s->light[a] -= dark[a];
+}
+
+/* Where within the part from value x to y the transmittance passes the probe's end. */
+static double isogi_dvr__span_probe(const isogi_dvr__pixel_ray *r, const isogi_dvr__span *s, double x, double y, double clear) {
+    const isogi_dvr__stretch *p = &s->piece;
+    double depth = log(r->clear / r->end), whole = log(r->clear / clear), value;
+    if (!(fabs(y - x) > 0)) return p->from + (p->to - p->from) * isogi_dvr__clamp(depth / whole, 1);
+    if (s->sampled || s->walk.m->silhouette == ISOGI_DVR_SILHOUETTE_APPROXIMATE) value = x + (y - x) * isogi_dvr__clamp(depth / whole, 1);
+    else value = isogi_dvr__value_at_depth(&r->dvr->integral, x, y, s->factor, depth);
+    return p->t0 + isogi_dvr__place_of(p, value) * p->dt;
+}
+
+/* The part of a piece from value x to y: the whole integral of Kraus 2005, eq. 2 and 3. */
+static void isogi_dvr__composite_values(isogi_dvr__pixel_ray *r, isogi_dvr__span *s, double x, double y) {
+    const isogi_dvr__integral *g = &r->dvr->integral;
+    double length = fabs(y - x), opacity, clear;
+    isogi_dvr__layer layer = {{0, 0, 0}, 1};
+    int a, approximate = s->walk.m->silhouette == ISOGI_DVR_SILHOUETTE_APPROXIMATE;
+    if (!(length > 0)) length = s->piece.value[0] < s->piece.value[1] || s->piece.value[0] > s->piece.value[1] ? 0 : s->path;
+    else if (!approximate) length *= s->factor;
+    if (!(length > 0)) return;
+    if (s->sampled) {
+        if (!g->side) return;
+        opacity = isogi_dvr__look_up(g, x, y, length, layer.rgb);
+        for (a = 0; a < 3; a++) layer.rgb[a] *= opacity;
+        layer.clear = 1 - opacity;
+    } else isogi_dvr__add_values(g, x, y, length, &layer);
+    opacity = 1 - layer.clear;
+    if (!(opacity > 0)) return;
+    if (approximate) {
+        double more = opacity * s->factor < 1 ? s->factor : 1 / opacity;
+        for (a = 0; a < 3; a++) layer.rgb[a] *= more;
+        opacity *= more, layer.clear = 1 - opacity;
+    }
+    clear = r->clear * layer.clear;
+    if (r->probe && r->clear > r->end && clear <= r->end) r->t = isogi_dvr__span_probe(r, s, x, y, clear);
+    if (!r->probe) {
+        if (!s->lit) isogi_dvr__span_light(r, s, opacity);
+        for (a = 0; a < 3; a++) r->rgb[a] += r->clear * (layer.rgb[a] * s->light[a] + opacity * s->add[a]);
+    }
+    r->clear = clear;
+}
+
+static void isogi_dvr__composite_rank(isogi_dvr__pixel_ray *r, isogi_dvr__span *s, const isogi_dvr__rank *rank) {
+    double u = isogi_dvr__place_of(&s->piece, rank->isovalue);
+    isogi_hit hit;
+    int a;
+    memset(&hit, 0, sizeof hit);
+    isogi_dvr__span_place(s, u, hit.local);
+    hit.side = s->piece.value[1] > s->piece.value[0] ? 1 : -1;
+    for (a = 0; a < 3; a++) hit.cell[a] = (uint32_t)s->piece.cell[a];
+    if (s->sampled) {
+        int cell[3];
+        isogi_dvr__locate(s->walk.m, s->piece.t0 + u * s->piece.dt, cell, hit.local);
+        for (a = 0; a < 3; a++) hit.cell[a] = (uint32_t)cell[a];
+    }
+    isogi_dvr__composite_peak(r, &r->dvr->transfer.peaks[rank->peak], &hit, s->piece.t0 + u * s->piece.dt);
+}
+
+/* Peaks of one isovalue, in the order given: the ranks first .. end - 1. */
+static void isogi_dvr__composite_ranks(isogi_dvr__pixel_ray *r, isogi_dvr__span *s, size_t first, size_t end) {
+    for (; first < end && r->clear > r->end; first++) isogi_dvr__composite_rank(r, s, &r->dvr->integral.rank[first]);
+}
+
+/* A monotone piece, divided at the peaks that it crosses: those where "value >= isovalue" changes. */
+static void isogi_dvr__composite_piece(isogi_dvr__pixel_ray *r, isogi_dvr__span *s) {
+    const isogi_dvr__integral *g = &r->dvr->integral;
+    double x = s->piece.value[0], y = s->piece.value[1];
+    size_t i, end;
+    if (x < y ? isogi_dvr__is_quiet(g, x, y, s->walk.quiet) : isogi_dvr__is_quiet(g, y, x, s->walk.quiet)) return;
+    s->lit = 0, s->factor = isogi_dvr__span_factor(s);
+    if (x < y) {
+        for (i = isogi_dvr__ranks_below(g, x); i < g->rank_count && g->rank[i].isovalue <= y && r->clear > r->end; i = end) {
+            double isovalue = g->rank[i].isovalue;
+            for (end = i + 1; end < g->rank_count && g->rank[end].isovalue <= isovalue;) end++;
+            isogi_dvr__composite_values(r, s, x, isovalue);
+            isogi_dvr__composite_ranks(r, s, i, end);
+            x = s->touched = isovalue, s->touched_t = isovalue < y ? -1 : s->piece.to;
+        }
+    } else if (y < x) {
+        for (end = isogi_dvr__ranks_below(g, x); end && g->rank[end - 1].isovalue > y && r->clear > r->end; end = i) {
+            double isovalue = g->rank[end - 1].isovalue;
+            for (i = end - 1; i && g->rank[i - 1].isovalue >= isovalue;) i--;
+            isogi_dvr__composite_values(r, s, x, isovalue);
+            if (isovalue < s->touched || isovalue > s->touched || s->piece.from > s->touched_t) isogi_dvr__composite_ranks(r, s, i, end);
+            x = isovalue;
+        }
+    }
+    if (r->clear > r->end) isogi_dvr__composite_values(r, s, x, y);
+}
+
+static void isogi_dvr__cast_values(isogi_dvr__pixel_ray *r, isogi_dvr__march *m) {
+    isogi_dvr__span s;
+    if (r->dvr->transparent) return;
+    isogi_dvr__begin_walk(&s.walk, m);
+    s.sampled = r->dvr->desc.classification == ISOGI_DVR_PRE_INTEGRATED, s.touched = 0, s.touched_t = -1;
+    while (r->clear > r->end && (s.sampled ? isogi_dvr__next_sampled(&s.walk, &s.piece) : isogi_dvr__next_monotone(&s.walk, &s.piece)))
+        isogi_dvr__composite_piece(r, &s);
+}
+
+/* ---- samples and crossings ---- */
 
 /* Front to back (Kraus 2005, eq. 5): every crossing in its place, dividing the sample's piece in which it lies. */
 static void isogi_dvr__cast(isogi_dvr__pixel_ray *r, isogi_dvr__march *m, isogi_dvr__crossings *c) {
     isogi_dvr__sample s;
     size_t i;
+    if (isogi_dvr__by_value(r->dvr)) {
+        isogi_dvr__cast_values(r, m);
+        return;
+    }
     while (r->clear > r->end && isogi_dvr__next(m, &s)) {
         double rgb[3] = {0, 0, 0};
         while (r->clear > r->end && (i = isogi_dvr__first_crossing(c, s.from)) < c->count) isogi_dvr__composite_crossing(r, c, i);
         if (!(r->clear > r->end)) break;
         if (!r->probe) {
             isogi_dvr__colour(r->dvr->transfer.points, r->dvr->transfer.point_count, s.value, rgb);
-            isogi_dvr__shade(r, s.cell, s.local, rgb);
+            isogi_dvr__shade(r, s.cell, s.local, s.side, -expm1(-s.depth), rgb);
         }
         {
             double from = s.from;
@@ -1979,17 +2974,19 @@ static void isogi_dvr__render_pixel(const isogi_dvr__render_job *job, int x, int
     isogi_dvr__transform(d->to_grid, world, dir);
     isogi_vol_to_grid(d->desc.pyramid, origin, grid);
     if (!isogi_dvr__begin(&march, d, grid, dir, speed, d->desc.step)) return;
+    march.silhouette = d->desc.silhouette;
     again = march;
     ray.dvr = d, ray.lights = &job->lights, ray.clear = 1, ray.end = 1 - (double)d->desc.opaque;
-    isogi_dvr__begin_crossings(crossings, d, origin, ray.dir, march.enter);
+    if (!isogi_dvr__by_value(d)) isogi_dvr__begin_crossings(crossings, d, origin, ray.dir, march.enter);
     isogi_dvr__cast(&ray, &march, crossings);
     for (a = 0; a < 3; a++) out[a] = (float)ray.rgb[a];
     out[3] = (float)(1 - ray.clear);
-    isogi_dvr__add(work, &march.work), isogi_dvr__add(work, &crossings->work);
+    isogi_dvr__add(work, &march.work);
+    if (!isogi_dvr__by_value(d)) isogi_dvr__add(work, &crossings->work);
     if (!job->depth || !(ray.clear < 1)) return;
     /* once more, without colours, to where half of the final opacity is reached */
     ray.probe = 1, ray.end = 1 - 0.5 * (1 - ray.clear), ray.clear = 1;
-    isogi_dvr__begin_crossings(crossings, d, origin, ray.dir, march.enter);
+    if (!isogi_dvr__by_value(d)) isogi_dvr__begin_crossings(crossings, d, origin, ray.dir, march.enter);
     isogi_dvr__cast(&ray, &again, crossings);
     out[4] = (float)((again.enter + ray.t) * speed);
 }

@@ -1,0 +1,162 @@
+/* Small volumes, renderers and single rays for tests of isogi_dvr.h in data space. */
+#ifndef DVR_FIELDS_H
+#define DVR_FIELDS_H
+
+#include "isogi_dvr.h"
+#include "test.h"
+
+#define PI 3.14159265358979323846
+
+typedef struct field {
+    int size[3];
+    double *value;
+    isogi_volume volume;
+    isogi_pyramid *pyramid;
+} field;
+
+static const isogi_context serial = {.threads = 1};
+
+static field field_new(int x, int y, int z) {
+    field f = {{x, y, z}, (double *)calloc((size_t)x * (size_t)y * (size_t)z, sizeof(double)), {0}, NULL};
+    f.volume.data = f.value, f.volume.type = ISOGI_F64;
+    for (int a = 0; a < 3; a++) f.volume.size[a] = (size_t)f.size[a];
+    return f;
+}
+
+static size_t field_count(const field *f) { return (size_t)f->size[0] * (size_t)f->size[1] * (size_t)f->size[2]; }
+
+static void field_build(field *f) {
+    isogi_result result = isogi_vol_build(&f->pyramid, &f->volume, &serial);
+    CHECK(result == ISOGI_OK, "%s", isogi_result_string(result));
+}
+
+static void field_free(field *f) {
+    isogi_vol_free(f->pyramid);
+    free(f->value);
+}
+
+typedef double field_function(double x, double y, double z); /* of grid coordinates over (size - 1): 0..1 */
+
+static field field_of(field_function *function, int n) {
+    field f = field_new(n, n, n);
+    for (int i = 0; i < n * n * n; i++) f.value[i] = function(i % n / (n - 1.0), i / n % n / (n - 1.0), i / n / n / (n - 1.0));
+    field_build(&f);
+    return f;
+}
+
+/* Independent voxels, -1..1: the worst that a cubic can be. */
+static field field_noise(int n, uint64_t seed) {
+    field f = field_new(n, n, n);
+    test_random r = {seed};
+    for (size_t i = 0; i < field_count(&f); i++) f.value[i] = random_range(&r, -1, 1);
+    field_build(&f);
+    return f;
+}
+
+/* A sum of waves in random directions: smooth, -1..1 or so. */
+static field field_waves(int n, uint64_t seed) {
+    field f = field_new(n, n, n);
+    test_random r = {seed};
+    for (int wave = 0; wave < 6; wave++) {
+        double d[3], phase = random_range(&r, 0, 6), length = random_range(&r, 0.1, 0.5);
+        random_direction(&r, d);
+        for (int i = 0; i < n * n * n; i++) f.value[i] += 0.3 * sin(length * (d[0] * (i % n) + d[1] * (i / n % n) + d[2] * (i / n / n)) + phase);
+    }
+    field_build(&f);
+    return f;
+}
+
+static isogi_dvr *dvr_new(const isogi_dvr_desc *desc, const isogi_transfer *transfer) {
+    isogi_dvr *dvr = NULL;
+    isogi_result result = isogi_dvr_create(&dvr, desc, &serial);
+    CHECK(result == ISOGI_OK, "create: %s", isogi_result_string(result));
+    if (!dvr) abort();
+    result = isogi_dvr_set_transfer(dvr, transfer);
+    CHECK(result == ISOGI_OK, "set_transfer: %s", isogi_result_string(result));
+    return dvr;
+}
+
+/* One ray: the only pixel of a picture. */
+typedef struct pixel { float c[4], depth; } pixel;
+
+static isogi_view line_of_sight(const double eye[3], const double target[3]) {
+    isogi_view view = {.width = 1, .height = 1, .fov = 1};
+    for (int a = 0; a < 3; a++) view.eye[a] = (float)eye[a], view.target[a] = (float)target[a];
+    return view;
+}
+
+static pixel cast(const isogi_dvr *dvr, const double eye[3], const double target[3], const isogi_lighting *lighting) {
+    isogi_view view = line_of_sight(eye, target);
+    pixel p;
+    isogi_result result = isogi_dvr_render(dvr, &view, lighting, (float(*)[4])p.c, &p.depth, NULL);
+    CHECK(result == ISOGI_OK, "render: %s", isogi_result_string(result));
+    return p;
+}
+
+/* A random line through the box, from outside, whose ends are floats. */
+static void random_line(const field *f, test_random *r, double eye[3], double target[3]) {
+    double d[3];
+    random_direction(r, d);
+    for (int a = 0; a < 3; a++) {
+        target[a] = (double)(float)random_range(r, 0.1, 0.9) * (f->size[a] - 1);
+        target[a] = (double)(float)target[a], eye[a] = (double)(float)(target[a] + 3 * f->size[0] * d[a]);
+    }
+}
+
+static isogi_view view_of(const field *f, double scale, test_random *r, int size) {
+    isogi_view view = {.width = size, .height = size, .fov = 35};
+    double d[3], centre[3], radius = 0;
+    random_direction(r, d);
+    for (int a = 0; a < 3; a++) centre[a] = 0.5 * (f->size[a] - 1), radius += centre[a] * centre[a];
+    for (int a = 0; a < 3; a++) {
+        view.target[a] = (float)(scale * centre[a]);
+        view.eye[a] = (float)(scale * (centre[a] + 3 * sqrt(radius) * d[a]));
+    }
+    return view;
+}
+
+static float (*picture(const isogi_dvr *dvr, const isogi_view *view, const isogi_lighting *lighting, float *depth, isogi_counters *count))[4] {
+    float(*pixels)[4] = (float(*)[4])calloc((size_t)view->width * (size_t)view->height, sizeof *pixels);
+    isogi_result result = isogi_dvr_render(dvr, view, lighting, pixels, depth, count);
+    CHECK(result == ISOGI_OK, "render: %s", isogi_result_string(result));
+    return pixels;
+}
+
+static double largest_difference(float (*a)[4], float (*b)[4], int pixels) {
+    double most = 0;
+    for (int i = 0; i < 4 * pixels; i++) most = fmax(most, fabs((double)a[i / 4][i % 4] - (double)b[i / 4][i % 4]));
+    return most;
+}
+
+static double rms_difference(float (*a)[4], float (*b)[4], int pixels) {
+    double sum = 0;
+    for (int i = 0; i < 4 * pixels; i++) sum += pow((double)a[i / 4][i % 4] - (double)b[i / 4][i % 4], 2);
+    return sqrt(sum / (4 * pixels));
+}
+
+/* ---- a second implementation, plain and slow, in long double ---- */
+
+static void reference_transfer(const isogi_transfer *t, long double x, long double out[4]) {
+    const isogi_transfer_point *p = t->points;
+    size_t n = t->point_count, i = 0;
+    for (int a = 0; a < 4; a++) out[a] = 0;
+    if (!n) return;
+    while (i < n && (long double)p[i].value <= x) i++;
+    const isogi_transfer_point *low = i ? &p[i - 1] : &p[0], *high = i < n ? &p[i] : &p[n - 1];
+    long double u = low == high ? 0 : (x - (long double)low->value) / ((long double)high->value - (long double)low->value);
+    for (int a = 0; a < 3; a++) out[a] = (long double)low->rgb[a] + u * ((long double)high->rgb[a] - (long double)low->rgb[a]);
+    out[3] = (long double)low->extinction + u * ((long double)high->extinction - (long double)low->extinction);
+}
+
+/* The trilinear value within a given cell. */
+static long double reference_value(const field *f, const int c[3], const long double p[3]) {
+    long double value = 0;
+    for (int n = 0; n < 8; n++) {
+        long double w = 1;
+        for (int a = 0; a < 3; a++) w *= n >> a & 1 ? p[a] - c[a] : 1 - (p[a] - c[a]);
+        value += w * (long double)f->value[c[0] + (n & 1) + f->size[0] * (c[1] + (n >> 1 & 1) + f->size[1] * (c[2] + (n >> 2)))];
+    }
+    return value;
+}
+
+#endif
