@@ -192,6 +192,13 @@ typedef struct isogi_level {
 
 /* One pass over the voxels; right for every isovalue and every transfer function. */
 ISOGI_API isogi_result isogi_vol_build(isogi_pyramid **pyramid, const isogi_volume *volume, const isogi_context *context);
+/* After voxels first..last (both ends included, cut to the volume) have changed: brings the pyramid to what a new build would give, bit
+   by bit, at a cost that goes with the box. Only where the range of the whole volume changes, or where the first voxel that is not
+   finite comes or the last one goes, the 8-bit bounds are made anew, which costs about half a build; a lost extreme may have to be
+   looked for in other blocks. The only call that writes to a pyramid: nobody may read it meanwhile. Things built from the pyramid
+   (isogi_trace, isogi_dvr) do not notice. counters->blocks: blocks of 4^3 cells whose voxels were read. Reports no progress, cannot be
+   cancelled. ISOGI_INVALID for an empty box or one beyond the volume; ISOGI_NO_MEMORY: the pyramid is as it was. */
+ISOGI_API isogi_result isogi_vol_update(isogi_pyramid *pyramid, const size_t first[3], const size_t last[3], isogi_counters *counters);
 ISOGI_API void isogi_vol_free(isogi_pyramid *pyramid); /* NULL is fine */
 /* Of no pyramid, these give NULL, zeros, or do nothing. */
 ISOGI_API const isogi_volume *isogi_vol_volume(const isogi_pyramid *pyramid); /* as given, with the zero defaults filled in */
@@ -573,6 +580,8 @@ static double isogi_vol__clamp(double x, double high) {
     return x < high ? x : high;
 }
 
+static size_t isogi_vol__min_size(size_t a, size_t b) { return a < b ? a : b; }
+
 /* The cell of a grid coordinate that lies in [0, voxels - 1], and the place in it; the last cell is closed. */
 static int isogi_vol__cell(double x, size_t voxels, double *local) {
     const int end = (int)voxels - 1, last = end > 0 ? end - 1 : 0;
@@ -600,6 +609,8 @@ struct isogi_pyramid {
     double box[4], grid_axis[3][4]; /* cells and the columns of to_grid, for vectors of four; the fourth is 0 */
     isogi_level level[ISOGI_VOL__LEVELS];
     size_t block_count; /* of all levels */
+    uint8_t *broken;    /* of each block of level 0: whether it has a voxel that is not finite */
+    size_t broken_count;
     float (*blocks)[2];
     /* bounds for fast rays: nodes of 64 children, least[64] then largest[64], in 8 bits over the volume's range; node n of level 0
        stands for block n and has cells as children, those of the levels above have nodes */
@@ -878,8 +889,9 @@ static float isogi_vol__float_above(double x) { return -isogi_vol__float_below(-
 
 typedef struct isogi_vol__build_job {
     isogi_pyramid *pyramid;
-    double (*range)[2]; /* of each z of blocks */
-    int *finite;
+    size_t first[3], last[3]; /* level-0 blocks to be done */
+    double (*range)[2];       /* of each z of blocks */
+    size_t *broken;           /* blocks of each z that are not all finite */
     float raw_low, raw_scale; /* 8-bit value = floor((raw - raw_low) * raw_scale) */
 } isogi_vol__build_job;
 
@@ -965,22 +977,24 @@ static int isogi_vol__bound_strip(const isogi_volume *v, size_t x, int count, si
 }
 
 /* One task: the level-0 blocks of one z. */
-static void isogi_vol__build_task(void *arg, size_t bz) {
+static void isogi_vol__build_task(void *arg, size_t task) {
     isogi_vol__build_job *job = (isogi_vol__build_job *)arg;
     const isogi_volume *v = &job->pyramid->volume;
     const isogi_level *level = &job->pyramid->level[0];
     float least[ISOGI_VOL__STRIP_VOXELS], largest[ISOGI_VOL__STRIP_VOXELS];
     double range[2] = {DBL_MAX, -DBL_MAX};
-    int finite = 1;
-    size_t bx, by;
-    for (by = 0; by < level->size[1]; by++) {
-        float(*block)[2] = job->pyramid->blocks + level->size[0] * (by + level->size[1] * bz);
+    const size_t bz = job->first[2] + task;
+    size_t bx, by, broken = 0;
+    for (by = job->first[1]; by <= job->last[1]; by++) {
+        const size_t row = level->size[0] * (by + level->size[1] * bz);
+        float(*block)[2] = job->pyramid->blocks + row;
         size_t strip = ISOGI_VOL__STRIP / 4, first = 0;
         int by_rows = 0;
-        for (bx = 0; bx < level->size[0]; bx++) {
+        for (bx = job->first[0]; bx <= job->last[0]; bx++) {
             double bound[2];
-            if (bx % strip == 0) {
-                size_t rest = v->size[0] - 4 * bx;
+            int finite = 1;
+            if ((bx - job->first[0]) % strip == 0) {
+                size_t rest = isogi_vol__min_size(v->size[0], 4 * job->last[0] + 5) - 4 * bx;
                 first = 4 * bx;
                 by_rows = v->type != ISOGI_F64 &&
                           isogi_vol__bound_strip(v, first, rest < ISOGI_VOL__STRIP + 1 ? (int)rest : ISOGI_VOL__STRIP + 1, by, bz, least, largest);
@@ -991,23 +1005,24 @@ static void isogi_vol__build_task(void *arg, size_t bz) {
                 while (x++ < last) low = least[x] < low ? least[x] : low, high = largest[x] > high ? largest[x] : high;
                 swap = v->scale < 0 ? low : high, low = v->scale < 0 ? high : low, high = swap;
                 bound[0] = v->scale * (double)low + v->bias, bound[1] = v->scale * (double)high + v->bias;
-            } else finite &= isogi_vol__bound_block(v, bx, by, bz, bound);
+            } else finite = isogi_vol__bound_block(v, bx, by, bz, bound);
+            job->pyramid->broken[row + bx] = (uint8_t)!finite, broken += !finite;
             block[bx][0] = isogi_vol__float_below(bound[0]), block[bx][1] = isogi_vol__float_above(bound[1]);
             range[0] = isogi_vol__min(range[0], bound[0]), range[1] = isogi_vol__max(range[1], bound[1]);
         }
     }
-    job->range[bz][0] = range[0], job->range[bz][1] = range[1];
-    job->finite[bz] = finite;
+    job->range[task][0] = range[0], job->range[task][1] = range[1];
+    job->broken[task] = broken;
 }
 
-/* Level n from level n-1: four blocks a side. */
-static void isogi_vol__build_level(isogi_pyramid *p, int n) {
+/* Level n over these blocks of level 0, from level n-1: four blocks a side. */
+static void isogi_vol__build_level(isogi_pyramid *p, int n, const size_t first[3], const size_t last[3]) {
     const isogi_level *from = &p->level[n - 1], *to = &p->level[n];
-    float(*out)[2] = p->blocks + (to->range - (const float(*)[2])p->blocks);
     size_t x, y, z, i, j, k;
-    for (z = 0; z < to->size[2]; z++)
-        for (y = 0; y < to->size[1]; y++)
-            for (x = 0; x < to->size[0]; x++, out++) {
+    for (z = first[2] >> 2 * n; z <= last[2] >> 2 * n; z++)
+        for (y = first[1] >> 2 * n; y <= last[1] >> 2 * n; y++)
+            for (x = first[0] >> 2 * n; x <= last[0] >> 2 * n; x++) {
+                float(*out)[2] = p->blocks + (to->range - (const float(*)[2])p->blocks) + x + to->size[0] * (y + to->size[1] * z);
                 (*out)[0] = FLT_MAX, (*out)[1] = -FLT_MAX;
                 for (k = 4 * z; k < 4 * z + 4 && k < from->size[2]; k++)
                     for (j = 4 * y; j < 4 * y + 4 && j < from->size[1]; j++)
@@ -1038,29 +1053,46 @@ static size_t isogi_vol__plan_levels(isogi_pyramid *p) {
     return total;
 }
 
+/* Bounds of the blocks of a job on all levels; *range: of their finite values, *broken: how many of them are not all finite. */
+static isogi_result isogi_vol__bound_blocks(isogi_vol__build_job *job, const isogi_context *context, double range[2], size_t *broken) {
+    isogi_pyramid *p = job->pyramid;
+    const size_t tasks = job->last[2] - job->first[2] + 1;
+    isogi_result result = ISOGI_NO_MEMORY;
+    size_t i;
+    job->range = (double(*)[2])isogi_allocate(&p->context, tasks, sizeof *job->range);
+    job->broken = (size_t *)isogi_allocate(&p->context, tasks, sizeof *job->broken);
+    if (job->range && job->broken) result = isogi_parallel(context, tasks, isogi_vol__build_task, job, 0, 0.5);
+    if (result == ISOGI_OK) {
+        range[0] = DBL_MAX, range[1] = -DBL_MAX, *broken = 0;
+        for (i = 0; i < tasks; i++) {
+            range[0] = isogi_vol__min(range[0], job->range[i][0]), range[1] = isogi_vol__max(range[1], job->range[i][1]);
+            *broken += job->broken[i];
+        }
+        isogi_vol__build_level(p, 1, job->first, job->last);
+        isogi_vol__build_level(p, 2, job->first, job->last);
+    }
+    isogi_release(&p->context, job->range, tasks, sizeof *job->range);
+    isogi_release(&p->context, job->broken, tasks, sizeof *job->broken);
+    return result;
+}
+
+static void isogi_vol__set_range(isogi_pyramid *p, double low, double high) {
+    p->range[0] = low <= high ? low : 0, p->range[1] = low <= high ? high : 0;
+}
+
 static isogi_result isogi_vol__build_blocks(isogi_pyramid *p) {
     isogi_vol__build_job job;
-    size_t tasks = p->level[0].size[2], i;
-    isogi_result result = ISOGI_NO_MEMORY;
+    isogi_result result;
+    double range[2];
+    int a;
     memset(&job, 0, sizeof job);
     job.pyramid = p;
-    job.range = (double(*)[2])isogi_allocate(&p->context, tasks, sizeof *job.range);
-    job.finite = (int *)isogi_allocate(&p->context, tasks, sizeof *job.finite);
-    if (job.range && job.finite) result = isogi_parallel(&p->context, tasks, isogi_vol__build_task, &job, 0, 0.5);
-    if (result == ISOGI_OK) {
-        p->range[0] = DBL_MAX, p->range[1] = -DBL_MAX, p->all_finite = 1;
-        for (i = 0; i < tasks; i++) {
-            p->range[0] = isogi_vol__min(p->range[0], job.range[i][0]);
-            p->range[1] = isogi_vol__max(p->range[1], job.range[i][1]);
-            p->all_finite &= job.finite[i];
-        }
-        if (p->range[0] > p->range[1]) p->range[0] = p->range[1] = 0;
-        isogi_vol__build_level(p, 1);
-        isogi_vol__build_level(p, 2);
-    }
-    isogi_release(&p->context, job.range, tasks, sizeof *job.range);
-    isogi_release(&p->context, job.finite, tasks, sizeof *job.finite);
-    return result;
+    for (a = 0; a < 3; a++) job.last[a] = p->level[0].size[a] - 1;
+    result = isogi_vol__bound_blocks(&job, &p->context, range, &p->broken_count);
+    if (result != ISOGI_OK) return result;
+    isogi_vol__set_range(p, range[0], range[1]);
+    p->all_finite = !p->broken_count;
+    return ISOGI_OK;
 }
 
 /* ---- the same ranges in 8 bits, for fast rays ---- */
@@ -1174,24 +1206,24 @@ static void isogi_vol__bound_cells(uint8_t (*q)[5][ISOGI_VOL__STRIP_VOXELS], int
 }
 
 /* One task: the nodes over cells of one z. */
-static void isogi_vol__build_leaves(void *arg, size_t bz) {
+static void isogi_vol__build_leaves(void *arg, size_t task) {
     const isogi_vol__build_job *job = (const isogi_vol__build_job *)arg;
     const isogi_pyramid *p = job->pyramid;
-    const isogi_level *level = &p->level[0];
+    const size_t bz = job->first[2] + task, end = isogi_vol__min_size((size_t)p->cells[0], 4 * job->last[0] + 4);
     uint8_t q[5][5][ISOGI_VOL__STRIP_VOXELS], bound[2][16][ISOGI_VOL__STRIP];
     size_t bx, by, x0;
     int i, y, z;
     memset(q, 0, sizeof q);
-    for (x0 = 0; x0 < (size_t)p->cells[0]; x0 += ISOGI_VOL__STRIP) {
-        const size_t rest = p->volume.size[0] - x0;
+    for (x0 = 4 * job->first[0]; x0 < end; x0 += ISOGI_VOL__STRIP) {
+        const size_t rest = end + 1 - x0;
         const int count = rest < ISOGI_VOL__STRIP + 1 ? (int)rest : ISOGI_VOL__STRIP + 1;
-        for (by = 0; by < level->size[1]; by++) {
+        for (by = job->first[1]; by <= job->last[1]; by++) {
             for (z = 0; z < 5; z++) {
                 const size_t at_z = 4 * bz + (size_t)z;
                 if (at_z >= p->volume.size[2]) continue;
                 for (y = 0; y < 5; y++) {
                     const size_t at_y = 4 * by + (size_t)y;
-                    if (y == 0 && by) memcpy(q[z][0], q[z][4], sizeof q[z][0]);
+                    if (y == 0 && by > job->first[1]) memcpy(q[z][0], q[z][4], sizeof q[z][0]);
                     else if (at_y < p->volume.size[1]) isogi_vol__quantise_row(job, x0, at_y, at_z, count, q[z][y]);
                 }
             }
@@ -1213,22 +1245,24 @@ static void isogi_vol__build_leaves(void *arg, size_t bz) {
 static int isogi_vol__machine(void);
 #endif
 
+/* Whether the volume's shape and the path allow fast rays, whatever its voxels are. */
+static int isogi_vol__may_be_fast(const isogi_pyramid *p) {
+    int a;
+    for (a = 0; a < 3; a++)
+        if (!p->cells[a] || p->volume.size[a] > ISOGI_VOL__FAST_SIZE) return 0;
+    return p->path != ISOGI_VOL__PATH_PLAIN;
+}
+
 /* Whether fast rays are right for this volume, and how its raw values become 8-bit ones. */
 static int isogi_vol__plan_nodes(isogi_pyramid *p, isogi_vol__build_job *job) {
     const double range = p->range[1] - p->range[0], scale = p->volume.scale;
     int a;
     memset(job, 0, sizeof *job);
     job->pyramid = p;
-    p->path = ISOGI_VOL__PATH_BASE;
-#ifdef ISOGI_VOL__AVX
-    p->path = isogi_vol__machine();
-#endif
-    if (p->context.force_path > 0 && p->context.force_path < p->path) p->path = p->context.force_path;
-    if (p->path == ISOGI_VOL__PATH_PLAIN || !p->all_finite || !(range > 0) || !(range < 1e300)) return 0;
+    for (a = 0; a < 3; a++) job->last[a] = p->level[0].size[a] - 1;
+    if (!isogi_vol__may_be_fast(p) || !p->all_finite || !(range > 0) || !(range < 1e300)) return 0;
     p->node_scale = 255 / range;
     if (!(p->node_scale < 1e300)) return 0;
-    for (a = 0; a < 3; a++)
-        if (!p->cells[a] || p->volume.size[a] > ISOGI_VOL__FAST_SIZE) return 0;
     if (p->volume.type == ISOGI_F64) return 1;
     /* the float formula must stay within its margin of the double one */
     if (!(range > 1e-9 * isogi_vol__largest(p->range[0], p->range[1], 0))) return 0;
@@ -1237,13 +1271,10 @@ static int isogi_vol__plan_nodes(isogi_pyramid *p, isogi_vol__build_job *job) {
     return 1;
 }
 
-static isogi_result isogi_vol__build_nodes(isogi_pyramid *p) {
-    isogi_vol__build_job job;
-    size_t node[3], count = 0, nodes = 2;
-    isogi_result result;
+/* Sizes of all levels of nodes; their number in all. */
+static size_t isogi_vol__plan_node_levels(isogi_pyramid *p) {
+    size_t count = 0, nodes = 2;
     int n, a;
-    p->fast = isogi_vol__plan_nodes(p, &job);
-    if (!p->fast) return ISOGI_OK;
     for (n = 0; n < ISOGI_VOL__LEVELS || nodes > 1; n++) {
         isogi_vol__node_level *level = &p->node_level[n];
         level->first = count, nodes = 1;
@@ -1254,16 +1285,36 @@ static isogi_result isogi_vol__build_nodes(isogi_pyramid *p) {
         count += 64 * level->parents[0] * level->parents[1] * level->parents[2];
     }
     p->node_levels = n;
-    p->nodes = (uint8_t(*)[128])isogi_allocate(&p->context, count, sizeof *p->nodes);
-    p->node_count = count;
-    if (!p->nodes) return ISOGI_NO_MEMORY;
-    result = isogi_parallel(&p->context, p->level[0].size[2], isogi_vol__build_leaves, &job, 0.5, 1);
+    return count;
+}
+
+/* The nodes over the blocks of a job, on all levels. */
+static isogi_result isogi_vol__fill_nodes(isogi_vol__build_job *job, const isogi_context *context) {
+    const isogi_pyramid *p = job->pyramid;
+    isogi_result result = isogi_parallel(context, job->last[2] - job->first[2] + 1, isogi_vol__build_leaves, job, 0.5, 1);
+    size_t node[3];
+    int n;
     if (result != ISOGI_OK) return result;
     for (n = 1; n < p->node_levels; n++)
-        for (node[2] = 0; node[2] < p->node_level[n].size[2]; node[2]++)
-            for (node[1] = 0; node[1] < p->node_level[n].size[1]; node[1]++)
-                for (node[0] = 0; node[0] < p->node_level[n].size[0]; node[0]++) isogi_vol__build_node(p, n, node);
+        for (node[2] = job->first[2] >> 2 * n; node[2] <= job->last[2] >> 2 * n; node[2]++)
+            for (node[1] = job->first[1] >> 2 * n; node[1] <= job->last[1] >> 2 * n; node[1]++)
+                for (node[0] = job->first[0] >> 2 * n; node[0] <= job->last[0] >> 2 * n; node[0]++) isogi_vol__build_node(p, n, node);
     return ISOGI_OK;
+}
+
+static isogi_result isogi_vol__reserve_nodes(isogi_pyramid *p) {
+    p->node_count = isogi_vol__plan_node_levels(p);
+    p->nodes = (uint8_t(*)[128])isogi_allocate(&p->context, p->node_count, sizeof *p->nodes);
+    return p->nodes ? ISOGI_OK : ISOGI_NO_MEMORY;
+}
+
+static isogi_result isogi_vol__build_nodes(isogi_pyramid *p) {
+    isogi_vol__build_job job;
+    isogi_result result;
+    p->fast = isogi_vol__plan_nodes(p, &job);
+    if (!p->fast) return ISOGI_OK;
+    result = isogi_vol__reserve_nodes(p);
+    return result == ISOGI_OK ? isogi_vol__fill_nodes(&job, &p->context) : result;
 }
 
 ISOGI_API isogi_result isogi_vol_build(isogi_pyramid **pyramid, const isogi_volume *volume, const isogi_context *context) {
@@ -1278,12 +1329,18 @@ ISOGI_API isogi_result isogi_vol_build(isogi_pyramid **pyramid, const isogi_volu
     memset(p, 0, sizeof *p);
     if (context) p->context = *context;
     p->volume = isogi_vol__resolve(volume);
+    p->path = ISOGI_VOL__PATH_BASE;
+#ifdef ISOGI_VOL__AVX
+    p->path = isogi_vol__machine();
+#endif
+    if (p->context.force_path > 0 && p->context.force_path < p->path) p->path = p->context.force_path;
     for (a = 0; a < 3; a++) p->cells[a] = (int)(p->volume.size[a] - 1);
     isogi_vol__set_transform(p);
     blocks = isogi_vol__plan_levels(p);
     p->blocks = (float(*)[2])isogi_allocate(context, blocks, sizeof *p->blocks);
     p->block_count = blocks;
-    result = p->blocks ? ISOGI_OK : blocks ? ISOGI_NO_MEMORY : ISOGI_TOO_LARGE;
+    if (p->blocks) p->broken = (uint8_t *)isogi_allocate(context, blocks, 1);
+    result = p->broken ? ISOGI_OK : blocks ? ISOGI_NO_MEMORY : ISOGI_TOO_LARGE;
     if (result == ISOGI_OK) {
         for (n = 0; n < ISOGI_VOL__LEVELS; n++) {
             p->level[n].range = (const float(*)[2])p->blocks + first;
@@ -1297,11 +1354,137 @@ ISOGI_API isogi_result isogi_vol_build(isogi_pyramid **pyramid, const isogi_volu
     return result;
 }
 
+/* ---- changed voxels ---- */
+
+/* The least (end 0) or largest (end 1) finite value of the volume, exactly, by way of the blocks whose rounded bounds are extreme; no
+   value is beyond what p->range says. Stops as soon as nothing can be beyond what was found: that, the bound itself, or, among raw
+   integers, less than a step from it. */
+static double isogi_vol__find_extreme(const isogi_pyramid *p, int end, uint64_t *blocks) {
+    const isogi_level *level = p->level;
+    const double step = p->volume.type < ISOGI_F32 ? fabs(p->volume.scale) : 0;
+    double found = end ? -DBL_MAX : DBL_MAX;
+    float extreme = end ? -FLT_MAX : FLT_MAX;
+    size_t n = level[2].size[0] * level[2].size[1] * level[2].size[2], i, x, y, z;
+    for (i = 0; i < n; i++)
+        if (level[2].range[i][0] <= level[2].range[i][1] && (end ? level[2].range[i][1] > extreme : level[2].range[i][0] < extreme))
+            extreme = level[2].range[i][end];
+    for (z = 0; z < level[0].size[2]; z++)
+        for (y = 0; y < level[0].size[1]; y++)
+            for (x = 0; x < level[0].size[0]; x++) {
+                const size_t at = x + level[0].size[0] * (y + level[0].size[1] * z);
+                double bound[2], beyond;
+                if (!(x & 15)) i = x / 16 + level[2].size[0] * (y / 16 + level[2].size[1] * (z / 16));
+                if (level[2].range[i][0] > level[2].range[i][1] || (end ? level[2].range[i][1] < extreme : level[2].range[i][0] > extreme)) {
+                    x |= 15;
+                    continue;
+                }
+                if (level[0].range[at][0] > level[0].range[at][1] || (end ? level[0].range[at][1] < extreme : level[0].range[at][0] > extreme)) continue;
+                isogi_vol__bound_block(&p->volume, x, y, z, bound), ++*blocks;
+                found = end ? isogi_vol__max(found, bound[1]) : isogi_vol__min(found, bound[0]);
+                beyond = fabs(found - (double)extreme);
+                if (!(beyond > 0) || beyond < 0.5 * step || (end ? found >= p->range[1] : found <= p->range[0])) return found;
+            }
+    return found;
+}
+
+/* What an update has to know of its blocks before they change. */
+typedef struct isogi_vol__before {
+    size_t broken;
+    int extreme[2]; /* whether the volume's least, largest value may lie in them */
+} isogi_vol__before;
+
+static isogi_vol__before isogi_vol__look_before(const isogi_pyramid *p, const isogi_vol__build_job *job) {
+    const isogi_level *level = &p->level[0];
+    const float low = isogi_vol__float_below(p->range[0]), high = isogi_vol__float_above(p->range[1]);
+    isogi_vol__before before;
+    size_t x, y, z;
+    memset(&before, 0, sizeof before);
+    for (z = job->first[2]; z <= job->last[2]; z++)
+        for (y = job->first[1]; y <= job->last[1]; y++)
+            for (x = job->first[0]; x <= job->last[0]; x++) {
+                const size_t at = x + level->size[0] * (y + level->size[1] * z);
+                before.broken += p->broken[at];
+                before.extreme[0] |= level->range[at][0] <= low, before.extreme[1] |= level->range[at][1] >= high;
+            }
+    return before;
+}
+
+/* The volume's range, from what it was, what the changed blocks have now, and a look elsewhere where an extreme may be gone. */
+static void isogi_vol__renew_range(isogi_pyramid *p, const isogi_vol__before *before, const double changed[2], int was_empty, uint64_t *blocks) {
+    double low = isogi_vol__min(p->range[0], changed[0]), high = isogi_vol__max(p->range[1], changed[1]);
+    if (was_empty) low = changed[0], high = changed[1];
+    else {
+        if (before->extreme[0] && changed[0] > p->range[0]) low = isogi_vol__find_extreme(p, 0, blocks);
+        if (before->extreme[1] && changed[1] < p->range[1]) high = isogi_vol__find_extreme(p, 1, blocks);
+    }
+    isogi_vol__set_range(p, low, high);
+}
+
+static int isogi_vol__is_empty(const isogi_pyramid *p) {
+    const isogi_level *top = &p->level[2];
+    size_t n = top->size[0] * top->size[1] * top->size[2], i;
+    for (i = 0; i < n; i++)
+        if (top->range[i][0] <= top->range[i][1]) return 0;
+    return 1;
+}
+
+/* The 8-bit bounds of the changed blocks, or all of them where their unit has changed. Memory for them is there. */
+static void isogi_vol__renew_nodes(isogi_pyramid *p, const isogi_vol__build_job *changed, const isogi_context *context, int same_unit) {
+    isogi_context whole = p->context;
+    isogi_vol__build_job job;
+    whole.progress = NULL;
+    p->fast = isogi_vol__plan_nodes(p, &job);
+    if (!p->fast) return;
+    if (same_unit) memcpy(job.first, changed->first, sizeof job.first), memcpy(job.last, changed->last, sizeof job.last);
+    isogi_vol__fill_nodes(&job, same_unit ? context : &whole);
+}
+
+/* The blocks that voxels first..last belong to; 0 if the volume has no such voxels. */
+static int isogi_vol__blocks_of(const isogi_pyramid *p, const size_t first[3], const size_t last[3], isogi_vol__build_job *job) {
+    int a;
+    memset(job, 0, sizeof *job);
+    for (a = 0; a < 3; a++) {
+        if (first[a] > last[a] || first[a] >= p->volume.size[a]) return 0;
+        job->first[a] = first[a] ? (first[a] - 1) / 4 : 0;
+        job->last[a] = isogi_vol__min_size(last[a] / 4, p->level[0].size[a] - 1);
+        job->first[a] = isogi_vol__min_size(job->first[a], job->last[a]);
+    }
+    return 1;
+}
+
+ISOGI_API isogi_result isogi_vol_update(isogi_pyramid *pyramid, const size_t first[3], const size_t last[3], isogi_counters *counters) {
+    isogi_pyramid *p = pyramid;
+    isogi_vol__build_job job;
+    isogi_vol__before before;
+    isogi_context context;
+    isogi_result result = ISOGI_OK;
+    double changed[2], range[2];
+    size_t broken;
+    uint64_t blocks;
+    int was_fast, was_empty;
+    if (!p || !first || !last || !isogi_vol__blocks_of(p, first, last, &job)) return ISOGI_INVALID;
+    job.pyramid = p, context = p->context, context.progress = NULL;
+    blocks = (uint64_t)(job.last[0] - job.first[0] + 1) * (job.last[1] - job.first[1] + 1) * (job.last[2] - job.first[2] + 1);
+    if (blocks < 4096) context.parallel_for = NULL, context.threads = 1; /* threads would cost more than they bring */
+    before = isogi_vol__look_before(p, &job);
+    was_fast = p->fast, was_empty = isogi_vol__is_empty(p);
+    memcpy(range, p->range, sizeof range);
+    if (!p->nodes && before.broken == p->broken_count && isogi_vol__may_be_fast(p)) result = isogi_vol__reserve_nodes(p);
+    if (result == ISOGI_OK) result = isogi_vol__bound_blocks(&job, &context, changed, &broken);
+    if (result != ISOGI_OK) return result;
+    p->broken_count = p->broken_count - before.broken + broken, p->all_finite = !p->broken_count;
+    isogi_vol__renew_range(p, &before, changed, was_empty, &blocks);
+    isogi_vol__renew_nodes(p, &job, &context, was_fast && !memcmp(range, p->range, sizeof range));
+    if (counters) counters->blocks += blocks;
+    return ISOGI_OK;
+}
+
 ISOGI_API void isogi_vol_free(isogi_pyramid *pyramid) {
     isogi_context context;
     if (!pyramid) return;
     context = pyramid->context;
     isogi_release(&context, pyramid->blocks, pyramid->block_count, sizeof *pyramid->blocks);
+    isogi_release(&context, pyramid->broken, pyramid->block_count, 1);
     isogi_release(&context, pyramid->nodes, pyramid->node_count, sizeof *pyramid->nodes);
     isogi_release(&context, pyramid, 1, sizeof *pyramid);
 }
