@@ -76,14 +76,48 @@
      lost (a white surface under a white sky stays white). bounces = -1: Russian roulette from the third reflection on.
      A hit from within (only through an open border can a ray get there) is a surface too, with its normal turned.
 
+   GLSL that lights a surface by an exported irradiance texture (GL_LINEAR, GL_CLAMP_TO_EDGE); grid: voxel coordinates
+
+       #version 330 core
+       uniform sampler3D light;
+       uniform vec3 scale, lattice_min, lattice_max, albedo; // scale: isogi_trace_export_scales
+       in vec3 grid;
+       out vec4 colour;
+       void main() {
+           vec3 size = vec3(textureSize(light, 0));
+           vec3 texel = (grid - lattice_min) / (lattice_max - lattice_min) * (size - 1.0) + 0.5;
+           vec3 irradiance = scale * texture(light, texel / size).rgb;
+           colour = vec4(albedo * irradiance / 3.14159265, 1.0);
+       }
+
+   GLSL that lights it by exported radiance transfer of order 5, one channel: 7 planes, any distant lighting without new rays
+
+       #version 400 core
+       uniform sampler3D transfer[7];
+       uniform vec4 scale[7];         // isogi_trace_export_scales, the last three components 0
+       uniform vec3 lighting[28];     // isogi_sh_project of the lighting of this frame, order 5, the last three 0
+       uniform vec3 lattice_min, lattice_max, albedo;
+       in vec3 grid;
+       out vec4 colour;
+       void main() {
+           vec3 size = vec3(textureSize(transfer[0], 0)), irradiance = vec3(0.0);
+           vec3 place = ((grid - lattice_min) / (lattice_max - lattice_min) * (size - 1.0) + 0.5) / size;
+           for (int p = 0; p < 7; p++) {
+               vec4 t = scale[p] * texture(transfer[p], place);
+               irradiance += t.x * lighting[4 * p] + t.y * lighting[4 * p + 1] + t.z * lighting[4 * p + 2] + t.w * lighting[4 * p + 3];
+           }
+           colour = vec4(albedo * max(irradiance, 0.0) / 3.14159265, 1.0);
+       }
+
    Options, to be defined before the implementation
 
    - ISOGI_IMPLEMENTATION         implements every isogi header that the file includes
    - ISOGI_TRACE_IMPLEMENTATION   implements this one alone
    - ISOGI_NO_THREADS, ISOGI_API  as in isogi_vol.h
 
-   Memory       Through the context. Bricks of 4x4x4 texels, only where texels are wanted: 16 bytes for a texel of irradiance,
-                4 + 4 order^2 channels for one of transfer; 8 bytes for every brick of the whole lattice, and 250 KB.
+   Memory       Through the context. Bricks of 4x4x4 texels: 8 bytes for each, 112 where one of its texels is wanted, and for every
+                wanted texel alone 2 + 12 bytes of irradiance, 2 + 2 order^2 channels of transfer, less in other formats; and
+                250 KB. isogi_trace_memory tells.
                 Any allocation may fail: the call says ISOGI_NO_MEMORY, the texture stays as it was and can go on.
                 Stack use stays below 32 KB.
    Threads      Rays run on the context's threads. isogi_trace_sample and the other readers may run in any number of threads at a
@@ -134,6 +168,23 @@ typedef enum isogi_trace_sides {
    time; the same arguments must give the same colours. What is beyond 0..1 (albedo) or negative (emission) is clamped, NaN is 0. */
 typedef void isogi_trace_material_function(void *user, double isovalue, const double point[3], float albedo[3], float emission[3]);
 
+/* How a texel's light is held, and exported. Bytes for a texel of RGB / of a coefficient; error of what was computed, which itself
+   has noise of about 2 % with 64 samples:
+   FLOAT   12 / 4   6e-8 of the value
+   HALF     6 / 2   5e-4 of the value
+   RGB9E5   4 / -   2e-3 of the largest of the three channels; irradiance alone
+   BYTE     3 / 1   irradiance: square roots, 4e-3 of sqrt(value * largest); transfer: 4e-3 of the texel's largest coefficient
+   `make test` prints the measured table. HALF and RGB9E5 hold up to 65000 times the irradiance of an open surface,
+   BYTE twice as much (four times with reflections); brighter texels are cut off there. */
+typedef enum isogi_trace_format {
+    ISOGI_TRACE_DEFAULT = 0, /* FLOAT for irradiance: with nothing kept for texels without light that is small enough; HALF for
+                                transfer, where it halves by far the largest part of the memory and costs nothing that can be seen */
+    ISOGI_TRACE_FLOAT,
+    ISOGI_TRACE_HALF,
+    ISOGI_TRACE_RGB9E5,
+    ISOGI_TRACE_BYTE
+} isogi_trace_format;
+
 /* All zero but `pyramid`: one texel per voxel, black surface, black sky. The volume, the lights, the environment's image and the
    albedo points are borrowed and must outlive the texture; the description itself is copied. */
 typedef struct isogi_trace_desc {
@@ -166,6 +217,8 @@ typedef struct isogi_trace_desc {
     int capped;                /* non-zero: the volume's border closes the surface (ISOGI_RAY_CAPPED) */
     int transfer_channels;     /* TRANSFER: sets of coefficients: 1 = grey (mean albedo), 3 = RGB; 0 = 3 if albedo is coloured, else 1 */
     isogi_trace_lookup lookup; /* of request, sample and sample_transfer; the texels themselves do not depend on it */
+    isogi_trace_format storage;
+    size_t box_first[3], box_end[3]; /* only texels box_first <= i < box_end: a part of the bake, in the same bits; all 0 = all */
 } isogi_trace_desc;
 
 typedef struct isogi_trace isogi_trace;
@@ -218,6 +271,31 @@ ISOGI_API void isogi_trace_material(const isogi_trace_desc *desc, double isovalu
    sampled, relit and exported like any other; it is stepped, and freed, with the texture it belongs to. */
 ISOGI_API isogi_trace *isogi_trace_high(isogi_trace *trace);
 
+/* ---- for a renderer of your own: the texture as a dense array ----
+   IRRADIANCE: texel (i,j,k) at i + lattice[0] (j + lattice[1] k), RGB: FLOAT 12 bytes (GL_RGB32F), HALF 6 (GL_RGB16F), RGB9E5 4
+   (GL_RGB9_E5 from GL_UNSIGNED_INT_5_9_9_9_REV), BYTE 3 (GL_RGB8). TRANSFER: value v = coefficient * channels + channel stands in
+   component v % 4 of plane v / 4, and every plane is a whole RGBA texture: FLOAT 16 bytes a texel, HALF 8, BYTE 4 (GL_RGBA8_SNORM).
+   Components are in the machine's byte order. Texels without light of their own (no surface, not computed) hold the mean of those
+   around them, three texels deep, and beyond that the mean of all: plain hardware interpolation then shows no dark seams.
+   Light is what the hardware reads times a scale: scales[3] of RGB, or scales[order^2 channels]; 1 for FLOAT, and for HALF and RGB9E5
+   unless something is brighter than these hold; for BYTE the largest value.
+   export_size: bytes that isogi_trace_export fills, 0 where the format is not for this mode. format 0 = that of the storage.
+   ISOGI_INVALID where `bytes` are too few; takes a byte a texel of scratch memory. Readers: any number of threads may export. */
+ISOGI_API size_t isogi_trace_export_size(const isogi_trace *trace, int format);
+ISOGI_API isogi_result isogi_trace_export(const isogi_trace *trace, int format, void *texels, size_t bytes);
+ISOGI_API isogi_result isogi_trace_export_scales(const isogi_trace *trace, int format, float *scales);
+
+/* ---- save, load, merge ----
+   A block of bytes holds the texels computed so far: the same bytes on every machine. Loading adds them to a texture that was created
+   from the same description: so a bake is resumed, to the same bits as if it had never stopped, and boxes baked apart (desc.box_first)
+   are merged by loading one after the other. Only desc.isovalue_min, isovalue_max, lazy, lookup and box may differ; else the answer is
+   ISOGI_INVALID (lighting, tables and the volume's ranges are compared by hash; a material function cannot be). Any bytes may be
+   loaded: those that are damaged, cut off or of another version are ISOGI_CORRUPT and change nothing. ISOGI_NO_MEMORY: some of the
+   texels are loaded. isogi_trace_load counts as a writer. */
+ISOGI_API size_t isogi_trace_save_size(const isogi_trace *trace);
+ISOGI_API isogi_result isogi_trace_save(const isogi_trace *trace, void *block, size_t bytes); /* bytes: isogi_trace_save_size or more */
+ISOGI_API isogi_result isogi_trace_load(isogi_trace *trace, const void *block, size_t bytes);
+
 /* No lattice: irradiance at a user's own world points, each on the isosurface through it, with a unit normal each (NULL = as
    desc.normals says; towards the low side, whichever side is asked for). Uses samples, bounces, seed, offset, normals, capped, side
    (not BOTH), reach, shadows, material and lighting of the description; its mode must be IRRADIANCE. A point that is not finite or has no normal gets the zero vector and error = INFINITY. error may be NULL. */
@@ -228,6 +306,7 @@ ISOGI_API isogi_result isogi_trace_gather(const isogi_trace_desc *desc, const fl
    lattice. */
 ISOGI_API int isogi_trace_valid(const isogi_trace *trace, const size_t texel[3]);
 ISOGI_API void isogi_trace_counters(const isogi_trace *trace, isogi_counters *counters); /* adds what was done so far; NULL does nothing */
+ISOGI_API size_t isogi_trace_memory(const isogi_trace *trace); /* bytes that the texture's light takes: bricks and their table */
 
 #endif /* ISOGI_TRACE_H */
 
@@ -771,6 +850,7 @@ typedef struct isogi_trace__scene {
     double to_grid[9]; /* rotation and scale from world to grid */
     isogi_trace__sky sky;
     int has_env;
+    double unit; /* RGB9E5, HALF and BYTE hold irradiance in units of this power of two, about that of an open surface */
     int high;    /* light is gathered on the high side */
     double reach[ISOGI_TRACE__WAVE]; /* of rays, or all zero */
 } isogi_trace__scene;
@@ -1249,6 +1329,8 @@ static int isogi_trace__desc_valid(const isogi_trace_desc *d) {
     if (!isogi_trace__finite3(d->lattice_min) || !isogi_trace__finite3(d->lattice_max)) return 0;
     if (d->sides != ISOGI_TRACE_LOW_SIDE && d->sides != ISOGI_TRACE_HIGH_SIDE && d->sides != ISOGI_TRACE_BOTH_SIDES) return 0;
     if (!isogi_trace__finite((double)d->reach) || d->reach < 0) return 0;
+    if ((int)d->storage < 0 || d->storage > ISOGI_TRACE_BYTE || (d->storage == ISOGI_TRACE_RGB9E5 && d->mode == ISOGI_TRACE_TRANSFER))
+        return 0;
     if (isogi_lighting_validate(&d->lighting) != ISOGI_OK || !isogi_trace__material_valid(d)) return 0;
     return d->mode == ISOGI_TRACE_IRRADIANCE || isogi_trace__distant(&d->lighting);
 }
@@ -1265,10 +1347,41 @@ static int isogi_trace__grey(const isogi_trace_desc *d) {
     return grey && !d->material;
 }
 
+/* Twice the irradiance of an open surface in the middle of the volume, that faces most light, as the next power of two: the unit of
+   short formats. */
+static isogi_result isogi_trace__scene_unit(isogi_trace__scene *scene) {
+    float sky[3 * 9], centre[3], glow[3];
+    double most = 0, grid[3], world[3];
+    isogi_result result;
+    size_t k;
+    int i, a, e;
+    for (a = 0; a < 3; a++) grid[a] = 0.5 * (double)(scene->volume->size[a] - 1);
+    isogi_vol_to_world(scene->pyramid, grid, world);
+    for (a = 0; a < 3; a++) centre[a] = (float)world[a];
+    result = isogi_sh_project(sky, 3, &scene->desc.lighting, centre);
+    if (result == ISOGI_OK) result = isogi_sh_convolve_cosine(sky, sky, 3, 3);
+    if (result != ISOGI_OK) return result;
+    for (i = 0; i < 27; i++) {
+        float dir[1][3], e3[3];
+        for (a = 0; a < 3; a++) dir[0][a] = (float)((a == 0 ? i : a == 1 ? i / 3 : i / 9) % 3 - 1);
+        if (i == 13) continue;
+        isogi_sh_eval_sum(e3, sky, 3, 3, (const float(*)[3])dir, 1);
+        for (a = 0; a < 3; a++) most = (double)e3[a] > most ? (double)e3[a] : most;
+    }
+    for (k = 0; k < scene->desc.emission_count; k++) {
+        memcpy(glow, scene->desc.emission_points[k].rgb, sizeof glow);
+        for (a = 0; a < 3; a++) most = ISOGI_TRACE__PI * (double)glow[a] > most ? ISOGI_TRACE__PI * (double)glow[a] : most;
+    }
+    frexp(most, &e);
+    scene->unit = most > 1e-30 && most < 1e30 ? ldexp(1, scene->desc.bounces ? e + 1 : e) : 1;
+    return ISOGI_OK;
+}
+
 /* The scene of a valid description. What it allocates is freed by isogi_trace__sky_free, on failure too. */
 static isogi_result isogi_trace__scene_set(isogi_trace__scene *scene, const isogi_trace_desc *desc,
                                            const isogi_context *context) {
     isogi_trace_desc *d = &scene->desc;
+    isogi_result result;
     int i;
     memset(scene, 0, sizeof *scene);
     *d = *desc;
@@ -1283,6 +1396,12 @@ static isogi_result isogi_trace__scene_set(isogi_trace__scene *scene, const isog
     if (!(d->offset > 0 || d->offset < 0)) d->offset = 0.25f;
     if (!d->transfer_channels) d->transfer_channels = isogi_trace__grey(d) ? 1 : 3;
     isogi_trace__scene_matrix(scene);
+    if (!d->storage) d->storage = d->mode == ISOGI_TRACE_TRANSFER ? ISOGI_TRACE_HALF : ISOGI_TRACE_FLOAT;
+    scene->unit = 1;
+    if (d->mode == ISOGI_TRACE_IRRADIANCE && d->storage != ISOGI_TRACE_FLOAT) {
+        result = isogi_trace__scene_unit(scene);
+        if (result != ISOGI_OK) return result;
+    }
     if (d->mode == ISOGI_TRACE_TRANSFER) return ISOGI_OK;
     return isogi_trace__sky_build(&scene->sky, &d->lighting.env, context);
 }
@@ -1298,11 +1417,13 @@ enum {
     ISOGI_TRACE__DONE
 };
 
+/* A brick keeps records only for the texels of `held`, in the order of their bits. A record is the standard error (the upper half of
+   a float, rounded up) and the light in the format of the storage; all little-endian, so that a record is the same bytes anywhere. */
 typedef struct isogi_trace__brick {
     uint8_t state[ISOGI_TRACE__TEXELS];
     int queued;
-    float *values; /* texels x values each; NULL until one of them is computed */
-    float error[ISOGI_TRACE__TEXELS];
+    uint64_t held;
+    uint8_t *records; /* NULL until one of them is computed */
 } isogi_trace__brick;
 
 typedef struct isogi_trace__ref {
@@ -1316,7 +1437,10 @@ struct isogi_trace {
     isogi_context context;
     size_t lattice[3];
     double first[3], last[3], step[3]; /* grid coordinates of texels */
+    size_t box_first[3], box_end[3];   /* texels that may be computed */
     int values;                        /* floats of a texel */
+    int format;                        /* isogi_trace_format of the records */
+    size_t record;                     /* bytes of one */
     size_t size[3], brick_count;       /* bricks */
     isogi_trace__brick **bricks;       /* NULL: nothing known (lazy) or nothing in it */
     size_t *queue;                     /* bricks with wanted texels */
@@ -1330,6 +1454,173 @@ struct isogi_trace {
     isogi_trace *high; /* BOTH_SIDES: the other side's texture, owned */
     double share[2];   /* of the progress that baking reports, from and to */
 };
+
+/* ==== how light is held ============================================================================================== */
+
+static uint32_t isogi_trace__float_bits(float x) {
+    uint32_t bits;
+    memcpy(&bits, &x, sizeof bits);
+    return bits;
+}
+
+static float isogi_trace__bits_float(uint32_t bits) {
+    float x;
+    memcpy(&x, &bits, sizeof x);
+    return x;
+}
+
+static void isogi_trace__put(uint8_t *to, uint64_t value, int bytes) {
+    int i;
+    for (i = 0; i < bytes; i++) to[i] = (uint8_t)(value >> 8 * i);
+}
+
+static uint64_t isogi_trace__get(const uint8_t *from, int bytes) {
+    uint64_t value = 0;
+    int i;
+    for (i = 0; i < bytes; i++) value |= (uint64_t)from[i] << 8 * i;
+    return value;
+}
+
+/* IEEE binary16, to nearest, ties to even; beyond its range the largest finite value; NaN is 0. All in integers: denormals too. */
+static uint32_t isogi_trace__to_half(float x) {
+    uint32_t bits = isogi_trace__float_bits(x), sign = bits >> 16 & 0x8000u, shift, kept, rest;
+    bits &= 0x7fffffffu;
+    if (bits > 0x7f800000u) return 0;
+    if (bits >= 0x477fe000u) return sign | 0x7bffu; /* 65504 */
+    if (bits < 0x33000000u) return sign;            /* 2^-25 and less: half of the smallest */
+    if (bits >= 0x38800000u) { /* 2^-14: normal */
+        bits -= 112u << 23;
+        return sign | (bits + 0xfffu + (bits >> 13 & 1)) >> 13;
+    }
+    shift = 126 - (bits >> 23);
+    kept = (bits & 0x7fffffu) | 0x800000u;
+    rest = kept & ((1u << shift) - 1), kept >>= shift;
+    return sign | (kept + (rest > 1u << (shift - 1) || (rest == 1u << (shift - 1) && (kept & 1))));
+}
+
+static float isogi_trace__from_half(uint32_t half) {
+    uint32_t exponent = half >> 10 & 31, mantissa = half & 1023;
+    float x = exponent ? isogi_trace__bits_float((exponent + 112) << 23 | mantissa << 13) : (float)mantissa * (1.0f / 16777216);
+    return half & 0x8000u ? -x : x;
+}
+
+/* Three mantissas of 9 bits and a common exponent (EXT_texture_shared_exponent). Negative values and NaN are 0. */
+static uint32_t isogi_trace__to_rgb9e5(const float rgb[3]) {
+    float x[3], most = 0;
+    uint32_t packed, q[3];
+    int c, exponent;
+    for (c = 0; c < 3; c++) {
+        x[c] = rgb[c] > 0 ? rgb[c] : 0;
+        x[c] = x[c] < 65408.0f ? x[c] : 65408.0f;
+        most = x[c] > most ? x[c] : most;
+    }
+    exponent = (int)(isogi_trace__float_bits(most) >> 23) - 126; /* most < 2^exponent */
+    exponent = exponent > -15 ? exponent : -15;
+    if (floor(ldexp((double)most, 9 - exponent) + 0.5) > 511) exponent++;
+    packed = (uint32_t)(exponent + 15) << 27;
+    for (c = 0; c < 3; c++) {
+        q[c] = (uint32_t)(ldexp((double)x[c], 9 - exponent) + 0.5);
+        packed |= (q[c] < 511 ? q[c] : 511) << 9 * c;
+    }
+    return packed;
+}
+
+static void isogi_trace__from_rgb9e5(uint32_t packed, float rgb[3]) {
+    int c, exponent = (int)(packed >> 27) - 24;
+    float scale = isogi_trace__bits_float((uint32_t)(exponent + 127) << 23);
+    for (c = 0; c < 3; c++) rgb[c] = (float)(packed >> 9 * c & 511) * scale;
+}
+
+/* The upper half of a float that is no less: errors are not understated. */
+static uint32_t isogi_trace__to_short(float x) {
+    uint32_t bits = isogi_trace__float_bits(x);
+    return bits >= 0x7f800000u ? 0x7f80u : (bits + 0xffffu) >> 16; /* neither NaN nor negative occur; the largest float rounds to infinity */
+}
+
+static size_t isogi_trace__bits(uint64_t x) {
+    x -= x >> 1 & 0x5555555555555555u;
+    x = (x & 0x3333333333333333u) + (x >> 2 & 0x3333333333333333u);
+    x = (x + (x >> 4)) & 0x0f0f0f0f0f0f0f0fu;
+    return (size_t)((x * 0x0101010101010101u) >> 56);
+}
+
+static size_t isogi_trace__rank(uint64_t held, uint32_t slot) { return isogi_trace__bits(held & (((uint64_t)1 << slot) - 1)); }
+
+static uint8_t *isogi_trace__record(const isogi_trace *t, const isogi_trace__brick *brick, uint32_t slot) {
+    return brick->records + isogi_trace__rank(brick->held, slot) * t->record;
+}
+
+/* 2 bytes of error; BYTE transfer has 2 of scale. */
+static size_t isogi_trace__record_size(const isogi_trace *t) {
+    size_t n = (size_t)t->values;
+    switch (t->format) {
+    case ISOGI_TRACE_HALF: return 2 + 2 * n;
+    case ISOGI_TRACE_RGB9E5: return 2 + 4;
+    case ISOGI_TRACE_BYTE: return t->scene.desc.mode == ISOGI_TRACE_TRANSFER ? 4 + n : 2 + n;
+    default: return 2 + 4 * n;
+    }
+}
+
+static float isogi_trace__record_error(const uint8_t *record) { return isogi_trace__bits_float((uint32_t)isogi_trace__get(record, 2) << 16); }
+
+/* BYTE: irradiance by its square root, since eyes judge ratios; transfer in 127ths of the texel's largest coefficient. */
+static void isogi_trace__bytes_write(const isogi_trace *t, uint8_t *to, const float *values) {
+    double most = 0, unit = 2 * t->scene.unit, scale;
+    int i;
+    if (t->scene.desc.mode != ISOGI_TRACE_TRANSFER) {
+        for (i = 0; i < 3; i++) to[i] = (uint8_t)(255 * sqrt(isogi_trace__clamp((double)values[i] / unit, 1)) + 0.5);
+        return;
+    }
+    for (i = 0; i < t->values; i++) most = fabs((double)values[i]) > most ? fabs((double)values[i]) : most;
+    isogi_trace__put(to, isogi_trace__to_short((float)most), 2);
+    scale = (double)isogi_trace__bits_float((uint32_t)isogi_trace__get(to, 2) << 16) / 127;
+    for (i = 0; i < t->values; i++) to[2 + i] = (uint8_t)(128 + (scale > 0 ? (int)floor((double)values[i] / scale + 0.5) : 0));
+}
+
+static void isogi_trace__record_write(const isogi_trace *t, uint8_t *record, const float *values, float error) {
+    float rgb[3];
+    int i;
+    isogi_trace__put(record, isogi_trace__to_short(error), 2);
+    switch (t->format) {
+    case ISOGI_TRACE_HALF:
+        for (i = 0; i < t->values; i++)
+            isogi_trace__put(record + 2 + 2 * i, isogi_trace__to_half((float)((double)values[i] / t->scene.unit)), 2);
+        break;
+    case ISOGI_TRACE_RGB9E5:
+        for (i = 0; i < 3; i++) rgb[i] = (float)((double)values[i] / t->scene.unit);
+        isogi_trace__put(record + 2, isogi_trace__to_rgb9e5(rgb), 4);
+        break;
+    case ISOGI_TRACE_BYTE: isogi_trace__bytes_write(t, record + 2, values); break;
+    default:
+        for (i = 0; i < t->values; i++) isogi_trace__put(record + 2 + 4 * i, isogi_trace__float_bits(values[i]), 4);
+    }
+}
+
+static void isogi_trace__record_read(const isogi_trace *t, const uint8_t *record, float *values) {
+    const uint8_t *from = record + 2;
+    float unit = (float)t->scene.unit, scale;
+    int i;
+    switch (t->format) {
+    case ISOGI_TRACE_HALF:
+        for (i = 0; i < t->values; i++) values[i] = unit * isogi_trace__from_half((uint32_t)(from[2 * i] | from[2 * i + 1] << 8));
+        break;
+    case ISOGI_TRACE_RGB9E5:
+        isogi_trace__from_rgb9e5((uint32_t)isogi_trace__get(from, 4), values);
+        for (i = 0; i < 3; i++) values[i] *= unit;
+        break;
+    case ISOGI_TRACE_BYTE:
+        if (t->scene.desc.mode == ISOGI_TRACE_TRANSFER) {
+            scale = isogi_trace__bits_float((uint32_t)isogi_trace__get(from, 2) << 16) / 127;
+            for (i = 0; i < t->values; i++) values[i] = scale * (float)(from[2 + i] - 128);
+        } else
+            for (i = 0; i < 3; i++) values[i] = 2 * unit * ((float)from[i] / 255) * ((float)from[i] / 255);
+        break;
+    default:
+        for (i = 0; i < t->values; i++) values[i] = isogi_trace__bits_float((uint32_t)isogi_trace__get(from + 4 * i, 4));
+    }
+}
+
+/* ==== the texels of the lattice ====================================================================================== */
 
 /* Where and on which isosurface a texel lies. Its light is that at its own place, so a surface must pass there: the value at the
    texel is inside of its own surface, hence one of the cells around it must reach lower. 0: it does not, or it has no normal. */
@@ -1384,8 +1675,16 @@ static int isogi_trace__in_range(const isogi_trace *t, const size_t low[3], cons
     return (cut || range[0] < d->isovalue_max) && range[1] >= d->isovalue_min;
 }
 
+static int isogi_trace__in_box(const isogi_trace *t, const size_t texel[3]) {
+    int a;
+    for (a = 0; a < 3; a++)
+        if (texel[a] < t->box_first[a] || texel[a] >= t->box_end[a]) return 0;
+    return 1;
+}
+
 static int isogi_trace__classify(const isogi_trace *t, const size_t texel[3]) {
     isogi_trace__site site;
+    if (!isogi_trace__in_box(t, texel)) return ISOGI_TRACE__NOT_ASKED;
     if (!isogi_trace__in_range(t, texel, texel)) return ISOGI_TRACE__NOT_ASKED;
     return isogi_trace__texel_site(t, texel, &site) ? ISOGI_TRACE__WANTED : ISOGI_TRACE__NO_SURFACE;
 }
@@ -1413,8 +1712,25 @@ static isogi_trace__brick *isogi_trace__brick_new(const isogi_trace *t) {
 
 static void isogi_trace__brick_free(const isogi_trace *t, isogi_trace__brick *brick) {
     if (!brick) return;
-    isogi_release(&t->context, brick->values, ISOGI_TRACE__TEXELS * (size_t)t->values, sizeof(float));
+    isogi_release(&t->context, brick->records, isogi_trace__bits(brick->held), t->record);
     isogi_release(&t->context, brick, 1, sizeof *brick);
+}
+
+/* Room for the records of these texels; those of others are kept. */
+static isogi_result isogi_trace__brick_hold(const isogi_trace *t, isogi_trace__brick *brick, uint64_t texels) {
+    uint64_t held = brick->held | texels;
+    uint8_t *records;
+    uint32_t slot;
+    if (held == brick->held) return ISOGI_OK;
+    records = (uint8_t *)isogi_allocate(&t->context, isogi_trace__bits(held), t->record);
+    if (!records) return ISOGI_NO_MEMORY;
+    for (slot = 0; slot < ISOGI_TRACE__TEXELS && brick->records; slot++)
+        if (brick->held >> slot & 1)
+            memcpy(records + isogi_trace__rank(held, slot) * t->record,
+                   brick->records + isogi_trace__rank(brick->held, slot) * t->record, t->record);
+    isogi_release(&t->context, brick->records, isogi_trace__bits(brick->held), t->record);
+    brick->records = records, brick->held = held;
+    return ISOGI_OK;
 }
 
 /* Room for one more brick in the queue. */
@@ -1464,6 +1780,13 @@ static void isogi_trace__keep_wanted(isogi_trace *t) {
     t->queue_count = kept;
 }
 
+static int isogi_trace__meets_box(const isogi_trace *t, const size_t low[3], const size_t high[3]) {
+    int a;
+    for (a = 0; a < 3; a++)
+        if (high[a] < t->box_first[a] || low[a] >= t->box_end[a]) return 0;
+    return 1;
+}
+
 static isogi_result isogi_trace__classify_all(isogi_trace *t) {
     isogi_context silent = t->context;
     size_t brick, end[3];
@@ -1477,7 +1800,7 @@ static isogi_result isogi_trace__classify_all(isogi_trace *t) {
             end[a] = texel[a] + ISOGI_TRACE__SIDE - 1;
             if (end[a] >= t->lattice[a]) end[a] = t->lattice[a] - 1;
         }
-        if (!isogi_trace__in_range(t, texel, end)) continue;
+        if (!isogi_trace__meets_box(t, texel, end) || !isogi_trace__in_range(t, texel, end)) continue;
         result = isogi_trace__queue_reserve(t);
         if (result != ISOGI_OK) return result;
         t->bricks[brick] = isogi_trace__brick_new(t);
@@ -1493,7 +1816,7 @@ static isogi_result isogi_trace__classify_all(isogi_trace *t) {
 
 static isogi_result isogi_trace__set_lattice(isogi_trace *t) {
     const isogi_trace_desc *d = &t->scene.desc;
-    int whole = 1, a;
+    int whole = 1, a, boxed;
     for (a = 0; a < 3; a++) whole &= isogi_trace__zero(d->lattice_min[a]) && isogi_trace__zero(d->lattice_max[a]);
     t->brick_count = 1;
     for (a = 0; a < 3; a++) {
@@ -1506,6 +1829,11 @@ static isogi_result isogi_trace__set_lattice(isogi_trace *t) {
         t->size[a] = (t->lattice[a] + ISOGI_TRACE__SIDE - 1) / ISOGI_TRACE__SIDE;
         if (t->brick_count > SIZE_MAX / sizeof(void *) / ISOGI_TRACE__TEXELS / t->size[a]) return ISOGI_TOO_LARGE;
         t->brick_count *= t->size[a];
+    }
+    for (boxed = a = 0; a < 3; a++) boxed |= d->box_first[a] || d->box_end[a];
+    for (a = 0; a < 3; a++) {
+        t->box_first[a] = boxed ? d->box_first[a] : 0, t->box_end[a] = boxed ? d->box_end[a] : t->lattice[a];
+        if (t->box_first[a] > t->box_end[a] || t->box_end[a] > t->lattice[a]) return ISOGI_INVALID;
     }
     return ISOGI_OK;
 }
@@ -1526,6 +1854,7 @@ static isogi_result isogi_trace__set_up(isogi_trace *t, const isogi_trace_desc *
     if (result != ISOGI_OK) return result;
     t->values =
         desc->mode == ISOGI_TRACE_TRANSFER ? t->scene.desc.order * t->scene.desc.order * t->scene.desc.transfer_channels : 3;
+    t->format = (int)t->scene.desc.storage, t->record = isogi_trace__record_size(t);
     t->bricks = (isogi_trace__brick **)isogi_allocate(&t->context, t->brick_count, sizeof *t->bricks);
     t->batch = (isogi_trace__ref *)isogi_allocate(&t->context, ISOGI_TRACE__BATCH, sizeof *t->batch);
     t->task_counters =
@@ -1685,8 +2014,7 @@ static void isogi_trace__apart(const isogi_trace *t, const size_t cell[3], const
 }
 
 typedef struct isogi_trace__reading {
-    const float *values[64];
-    float error[64];
+    const uint8_t *record[64];
     double weight[64]; /* they sum to 1 */
 } isogi_trace__reading;
 
@@ -1717,8 +2045,7 @@ static int isogi_trace__taps(const isogi_trace *t, const float point[3], isogi_t
             best[0] = apart[0], best[1] = apart[1], count = 0, total = 0;
         }
         brick = t->bricks[isogi_trace__brick_of(t, texel, &slot)];
-        r->values[count] = brick->values + (size_t)slot * (size_t)t->values;
-        r->error[count] = brick->error[slot], r->weight[count] = w;
+        r->record[count] = isogi_trace__record(t, brick, slot), r->weight[count] = w;
         total += w, count++;
     }
     for (i = 0; i < count; i++) r->weight[i] /= total;
@@ -1744,10 +2071,12 @@ ISOGI_API isogi_result isogi_trace_sample(const isogi_trace *trace, const float 
     for (i = 0; i < count; i++) {
         isogi_trace__reading r;
         double sum[3] = {0, 0, 0}, variance = 0, rgb[3];
+        float values[3 * ISOGI_TRACE__MAX_ORDER * ISOGI_TRACE__MAX_ORDER];
         n = isogi_trace__taps(trace, points[i], &r);
         for (k = 0; k < n; k++) {
-            double part = r.weight[k] * (double)r.error[k];
-            isogi_trace__irradiance(trace, r.values[k], rgb);
+            double part = r.weight[k] * (double)isogi_trace__record_error(r.record[k]);
+            isogi_trace__record_read(trace, r.record[k], values);
+            isogi_trace__irradiance(trace, values, rgb);
             for (c = 0; c < 3; c++) sum[c] += r.weight[k] * rgb[c];
             variance += part * part; /* texels are independent of each other */
         }
@@ -1765,12 +2094,14 @@ ISOGI_API isogi_result isogi_trace_sample_transfer(const isogi_trace *trace, con
     if (!trace || trace->scene.desc.mode != ISOGI_TRACE_TRANSFER || (count && (!points || !transfer))) return ISOGI_INVALID;
     for (i = 0; i < count; i++) {
         isogi_trace__reading r;
+        float values[3 * ISOGI_TRACE__MAX_ORDER * ISOGI_TRACE__MAX_ORDER];
+        double sum[3 * ISOGI_TRACE__MAX_ORDER * ISOGI_TRACE__MAX_ORDER] = {0};
         n = isogi_trace__taps(trace, points[i], &r);
-        for (j = 0; j < trace->values; j++) {
-            double sum = 0;
-            for (k = 0; k < n; k++) sum += r.weight[k] * (double)r.values[k][j];
-            transfer[i * (size_t)trace->values + (size_t)j] = (float)sum;
+        for (k = 0; k < n; k++) {
+            isogi_trace__record_read(trace, r.record[k], values);
+            for (j = 0; j < trace->values; j++) sum[j] += r.weight[k] * (double)values[j];
         }
+        for (j = 0; j < trace->values; j++) transfer[i * (size_t)trace->values + (size_t)j] = (float)sum[j];
     }
     return ISOGI_OK;
 }
@@ -1865,6 +2196,15 @@ ISOGI_API void isogi_trace_counters(const isogi_trace *trace, isogi_counters *co
     if (trace->high) isogi_trace_counters(trace->high, counters);
 }
 
+ISOGI_API size_t isogi_trace_memory(const isogi_trace *trace) {
+    size_t sum, i;
+    if (!trace) return 0;
+    sum = trace->brick_count * sizeof *trace->bricks;
+    for (i = 0; i < trace->brick_count; i++)
+        if (trace->bricks[i]) sum += sizeof *trace->bricks[i] + isogi_trace__bits(trace->bricks[i]->held) * trace->record;
+    return sum + (trace->high ? isogi_trace_memory(trace->high) : 0);
+}
+
 /* ==== requests ======================================================================================================= */
 
 /* Classifies a texel and puts it on the list if it is to be computed. */
@@ -1952,6 +2292,7 @@ static void isogi_trace__bake_task(void *arg, size_t task) {
         const isogi_trace__ref *ref = &t->batch[i];
         const size_t *x = ref->texel;
         isogi_trace__site site;
+        float values[3 * ISOGI_TRACE__MAX_ORDER * ISOGI_TRACE__MAX_ORDER], error;
         if (!isogi_trace__texel_site(t, x, &site)) {
             /* only where the voxels were changed after they were classified, which breaks the contract but must not hang */
             ref->brick->state[ref->slot] = ISOGI_TRACE__NO_SURFACE;
@@ -1962,8 +2303,8 @@ static void isogi_trace__bake_task(void *arg, size_t task) {
                                     (uint64_t)x[0] +
                                         (uint64_t)t->lattice[0] * ((uint64_t)x[1] + (uint64_t)t->lattice[1] * (uint64_t)x[2]));
         isogi_trace__site_start(&t->scene, &site);
-        isogi_trace__gather_site(&t->scene, &site, ref->brick->values + (size_t)ref->slot * (size_t)t->values,
-                                 &ref->brick->error[ref->slot], counters);
+        isogi_trace__gather_site(&t->scene, &site, values, &error, counters);
+        isogi_trace__record_write(t, isogi_trace__record(t, ref->brick, ref->slot), values, error);
         ref->brick->state[ref->slot] = ISOGI_TRACE__DONE;
         counters->texels++;
     }
@@ -1975,9 +2316,10 @@ static isogi_result isogi_trace__fill_batch(isogi_trace *t, size_t limit, size_t
     *count = 0;
     for (i = t->queue_first; i < t->queue_count && *count < limit; i++) {
         isogi_trace__brick *brick = t->bricks[t->queue[i]];
-        if (!brick->values)
-            brick->values = (float *)isogi_allocate(&t->context, ISOGI_TRACE__TEXELS * (size_t)t->values, sizeof(float));
-        if (!brick->values) return *count ? ISOGI_OK : ISOGI_NO_MEMORY;
+        uint64_t wanted = 0;
+        for (slot = 0; slot < ISOGI_TRACE__TEXELS; slot++)
+            wanted |= (uint64_t)(brick->state[slot] == ISOGI_TRACE__WANTED) << slot;
+        if (isogi_trace__brick_hold(t, brick, wanted) != ISOGI_OK) return *count ? ISOGI_OK : ISOGI_NO_MEMORY;
         for (slot = 0; slot < ISOGI_TRACE__TEXELS && *count < limit; slot++) {
             isogi_trace__ref *ref = &t->batch[*count];
             if (brick->state[slot] != ISOGI_TRACE__WANTED) continue;
@@ -2046,6 +2388,411 @@ ISOGI_API isogi_result isogi_trace_step(isogi_trace *trace, uint64_t max_rays, d
         result = isogi_trace__step_side(trace->high, max_rays ? max_rays - used : 0);
     wanted = trace->wanted + (trace->high ? trace->high->wanted : 0), done = trace->done + (trace->high ? trace->high->done : 0);
     if (remaining && result == ISOGI_OK) *remaining = wanted ? (double)wanted / (double)(wanted + done) : 0;
+    return result;
+}
+
+/* ==== export ========================================================================================================= */
+
+typedef struct isogi_trace__export {
+    const isogi_trace *trace;
+    int format, transfer, values;
+    size_t texels;           /* in the lattice */
+    size_t component, texel; /* bytes */
+    uint8_t *out, *filled;   /* filled: 0 = not yet, 1 = computed, n = by pass n - 1 */
+    float scale[3 * ISOGI_TRACE__MAX_ORDER * ISOGI_TRACE__MAX_ORDER];
+    double mean[3 * ISOGI_TRACE__MAX_ORDER * ISOGI_TRACE__MAX_ORDER];
+} isogi_trace__export;
+
+/* Calls for every texel that is computed, in a fixed order. */
+static void isogi_trace__each_texel(isogi_trace__export *e, void (*visit)(isogi_trace__export *e, size_t texel, const float *values)) {
+    const isogi_trace *t = e->trace;
+    float values[3 * ISOGI_TRACE__MAX_ORDER * ISOGI_TRACE__MAX_ORDER];
+    size_t i, at[3];
+    uint32_t slot;
+    for (i = 0; i < t->brick_count; i++) {
+        const isogi_trace__brick *brick = t->bricks[i];
+        for (slot = 0; brick && slot < ISOGI_TRACE__TEXELS; slot++) {
+            if (brick->state[slot] != ISOGI_TRACE__DONE || !isogi_trace__texel_of(t, i, slot, at)) continue;
+            isogi_trace__record_read(t, isogi_trace__record(t, brick, slot), values);
+            visit(e, at[0] + t->lattice[0] * (at[1] + t->lattice[1] * at[2]), values);
+        }
+    }
+}
+
+static void isogi_trace__export_most(isogi_trace__export *e, size_t texel, const float *values) {
+    int v;
+    (void)texel;
+    for (v = 0; v < e->values; v++) e->scale[v] = fabsf(values[v]) > e->scale[v] ? fabsf(values[v]) : e->scale[v];
+}
+
+/* Out of the largest values: BYTE has one scale for all colours, so that white stays white. */
+static void isogi_trace__export_set_scales(isogi_trace__export *e) {
+    float most = 0;
+    int v, exponent;
+    memset(e->scale, 0, sizeof e->scale);
+    if (e->format != ISOGI_TRACE_FLOAT) isogi_trace__each_texel(e, isogi_trace__export_most);
+    for (v = 0; v < e->values; v++) most = e->scale[v] > most ? e->scale[v] : most;
+    frexp((double)most, &exponent);
+    for (v = 0; v < e->values; v++) {
+        if (e->format != ISOGI_TRACE_BYTE) e->scale[v] = exponent > 15 ? (float)ldexp(1, exponent - 15) : 1;
+        else if (!e->transfer) e->scale[v] = most;
+        e->scale[v] = e->scale[v] > 0 ? e->scale[v] : 1;
+    }
+}
+
+static int isogi_trace__export_begin(isogi_trace__export *e, const isogi_trace *t, int format) {
+    memset(e, 0, sizeof *e);
+    if (!t) return 0;
+    e->trace = t, e->format = format ? format : t->format, e->values = t->values;
+    e->transfer = t->scene.desc.mode == ISOGI_TRACE_TRANSFER;
+    if (e->format < ISOGI_TRACE_FLOAT || e->format > ISOGI_TRACE_BYTE || (e->transfer && e->format == ISOGI_TRACE_RGB9E5)) return 0;
+    e->component = e->format == ISOGI_TRACE_FLOAT ? 4 : e->format == ISOGI_TRACE_HALF ? 2 : 1;
+    e->texel = e->format == ISOGI_TRACE_RGB9E5 ? 4 : e->component * (e->transfer ? 4 : 3);
+    e->texels = t->lattice[0] * t->lattice[1] * t->lattice[2]; /* brick_count was checked */
+    return e->texels <= SIZE_MAX / e->texel / (size_t)((e->values + 3) / 4);
+}
+
+static uint8_t *isogi_trace__export_at(const isogi_trace__export *e, size_t texel, int v) {
+    if (!e->transfer) return e->out + texel * e->texel + (size_t)v * e->component;
+    return e->out + (size_t)(v / 4) * e->texels * e->texel + texel * e->texel + (size_t)(v % 4) * e->component;
+}
+
+static void isogi_trace__export_write(isogi_trace__export *e, size_t texel, const float *values) {
+    float x[3 * ISOGI_TRACE__MAX_ORDER * ISOGI_TRACE__MAX_ORDER];
+    int v;
+    for (v = 0; v < e->values; v++) x[v] = (float)((double)values[v] / (double)e->scale[v]);
+    if (e->format == ISOGI_TRACE_RGB9E5) {
+        uint32_t packed = isogi_trace__to_rgb9e5(x);
+        memcpy(e->out + 4 * texel, &packed, 4);
+        return;
+    }
+    for (v = 0; v < e->values; v++) {
+        uint8_t *at = isogi_trace__export_at(e, texel, v);
+        uint16_t half = (uint16_t)isogi_trace__to_half(x[v]);
+        if (e->format == ISOGI_TRACE_FLOAT) memcpy(at, &x[v], 4);
+        else if (e->format == ISOGI_TRACE_HALF) memcpy(at, &half, 2);
+        else if (!e->transfer) *at = (uint8_t)(255 * isogi_trace__clamp((double)x[v], 1) + 0.5);
+        else *at = (uint8_t)(int8_t)floor(127 * isogi_trace__clamp((double)x[v] + 1, 2) - 127 + 0.5);
+    }
+}
+
+static void isogi_trace__export_read(const isogi_trace__export *e, size_t texel, float *values) {
+    uint32_t packed;
+    uint16_t half;
+    int v;
+    if (e->format == ISOGI_TRACE_RGB9E5) memcpy(&packed, e->out + 4 * texel, 4), isogi_trace__from_rgb9e5(packed, values);
+    for (v = 0; v < e->values; v++) {
+        const uint8_t *at = isogi_trace__export_at(e, texel, v);
+        if (e->format == ISOGI_TRACE_FLOAT) memcpy(&values[v], at, 4);
+        else if (e->format == ISOGI_TRACE_HALF) memcpy(&half, at, 2), values[v] = isogi_trace__from_half(half);
+        else if (e->format == ISOGI_TRACE_BYTE) values[v] = e->transfer ? (float)(*at < 128 ? *at : *at - 256) / 127 : (float)*at / 255;
+        values[v] *= e->scale[v];
+    }
+}
+
+static void isogi_trace__export_computed(isogi_trace__export *e, size_t texel, const float *values) {
+    int v;
+    isogi_trace__export_write(e, texel, values);
+    e->filled[texel] = 1;
+    for (v = 0; v < e->values; v++) e->mean[v] += (double)values[v];
+}
+
+/* Mean of the neighbours that were filled before this pass, by 1 / distance^2. 0: there are none. */
+static int isogi_trace__export_around(const isogi_trace__export *e, const size_t at[3], int pass, float *values) {
+    const size_t *size = e->trace->lattice;
+    double sum[3 * ISOGI_TRACE__MAX_ORDER * ISOGI_TRACE__MAX_ORDER], total = 0;
+    int i, v;
+    for (i = 0; i < 27; i++) {
+        int d[3], outside = 0, a;
+        size_t texel;
+        double w;
+        d[0] = i % 3 - 1, d[1] = i / 3 % 3 - 1, d[2] = i / 9 - 1;
+        for (a = 0; a < 3; a++) outside |= (d[a] < 0 && !at[a]) || (d[a] > 0 && at[a] + 1 >= size[a]);
+        if (outside || i == 13) continue;
+        texel = at[0] + (size_t)(d[0] + 1) - 1 + size[0] * (at[1] + (size_t)(d[1] + 1) - 1 + size[1] * (at[2] + (size_t)(d[2] + 1) - 1));
+        if (!e->filled[texel] || e->filled[texel] > pass) continue;
+        if (!(total > 0)) memset(sum, 0, sizeof sum);
+        w = 1.0 / (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]), total += w;
+        isogi_trace__export_read(e, texel, values);
+        for (v = 0; v < e->values; v++) sum[v] += w * (double)values[v];
+    }
+    for (v = 0; v < e->values && total > 0; v++) values[v] = (float)(sum[v] / total);
+    return total > 0;
+}
+
+/* Three passes outwards, then the mean of all. */
+static void isogi_trace__export_fill(isogi_trace__export *e) {
+    const size_t *size = e->trace->lattice;
+    float values[3 * ISOGI_TRACE__MAX_ORDER * ISOGI_TRACE__MAX_ORDER];
+    size_t at[3], texel, computed = 0;
+    int pass, v;
+    for (texel = 0; texel < e->texels; texel++) computed += e->filled[texel];
+    for (pass = 1; pass <= 4; pass++)
+        for (texel = 0; texel < e->texels; texel++) {
+            if (e->filled[texel]) continue;
+            at[0] = texel % size[0], at[1] = texel / size[0] % size[1], at[2] = texel / size[0] / size[1];
+            if (pass == 4)
+                for (v = 0; v < e->values; v++) values[v] = computed ? (float)(e->mean[v] / (double)computed) : 0;
+            else if (!isogi_trace__export_around(e, at, pass, values)) continue;
+            isogi_trace__export_write(e, texel, values);
+            e->filled[texel] = (uint8_t)(pass + 1);
+        }
+}
+
+ISOGI_API size_t isogi_trace_export_size(const isogi_trace *trace, int format) {
+    isogi_trace__export e;
+    if (!isogi_trace__export_begin(&e, trace, format)) return 0;
+    return e.texels * e.texel * (e.transfer ? (size_t)((e.values + 3) / 4) : 1);
+}
+
+ISOGI_API isogi_result isogi_trace_export(const isogi_trace *trace, int format, void *texels, size_t bytes) {
+    isogi_trace__export e;
+    if (!isogi_trace__export_begin(&e, trace, format) || !texels || bytes < isogi_trace_export_size(trace, format)) return ISOGI_INVALID;
+    e.filled = (uint8_t *)isogi_allocate(&trace->context, e.texels, 1);
+    if (!e.filled) return ISOGI_NO_MEMORY;
+    memset(e.filled, 0, e.texels);
+    e.out = (uint8_t *)texels;
+    memset(texels, 0, isogi_trace_export_size(trace, format));
+    isogi_trace__export_set_scales(&e);
+    isogi_trace__each_texel(&e, isogi_trace__export_computed);
+    isogi_trace__export_fill(&e);
+    isogi_release(&trace->context, e.filled, e.texels, 1);
+    return ISOGI_OK;
+}
+
+ISOGI_API isogi_result isogi_trace_export_scales(const isogi_trace *trace, int format, float *scales) {
+    isogi_trace__export e;
+    if (!isogi_trace__export_begin(&e, trace, format) || !scales) return ISOGI_INVALID;
+    isogi_trace__export_set_scales(&e);
+    memcpy(scales, e.scale, (size_t)e.values * sizeof *scales);
+    return ISOGI_OK;
+}
+
+/* ==== save and load ================================================================================================== */
+
+/* Header: "isogi tr", version and bytes of a record (4 each), description's hash, lattice, number of bricks (8 each). Bricks, ascending:
+   number, mask of its texels (8 each), their records. Then the hash of all that. Integers are little-endian. With BOTH_SIDES the
+   block of the low side is followed by that of the high side. */
+#define ISOGI_TRACE__VERSION 1
+#define ISOGI_TRACE__HEADER 56
+
+/* FNV-1a. */
+static uint64_t isogi_trace__hash(uint64_t hash, const uint8_t *bytes, size_t count) {
+    size_t i;
+    for (i = 0; i < count; i++) hash = (hash ^ bytes[i]) * 0x100000001b3u;
+    return hash;
+}
+
+static uint64_t isogi_trace__hash_number(uint64_t hash, uint64_t x) {
+    uint8_t bytes[8];
+    isogi_trace__put(bytes, x, 8);
+    return isogi_trace__hash(hash, bytes, 8);
+}
+
+static uint64_t isogi_trace__hash_floats(uint64_t hash, const float *x, size_t count) {
+    uint8_t bytes[4];
+    size_t i;
+    for (i = 0; i < count; i++) {
+        isogi_trace__put(bytes, isogi_trace__float_bits(x[i]), 4);
+        hash = isogi_trace__hash(hash, bytes, 4);
+    }
+    return hash;
+}
+
+static uint64_t isogi_trace__hash_doubles(uint64_t hash, const double *x, size_t count) {
+    uint64_t bits;
+    size_t i;
+    for (i = 0; i < count; i++) memcpy(&bits, &x[i], 8), hash = isogi_trace__hash_number(hash, bits);
+    return hash;
+}
+
+static uint64_t isogi_trace__hash_table(uint64_t hash, const isogi_albedo_point *p, size_t count) {
+    size_t i;
+    hash = isogi_trace__hash_number(hash, count);
+    for (i = 0; i < count; i++) hash = isogi_trace__hash_floats(isogi_trace__hash_doubles(hash, &p[i].value, 1), p[i].rgb, 3);
+    return hash;
+}
+
+/* Everything that a texel's light depends on. Lighting is left out for TRANSFER. */
+static uint64_t isogi_trace__hash_lighting(uint64_t hash, const isogi_lighting *l) {
+    size_t i;
+    hash = isogi_trace__hash_number(isogi_trace__hash_number(hash, (uint64_t)l->env.width), (uint64_t)l->env.height);
+    if (l->env.rgb) hash = isogi_trace__hash_floats(hash, l->env.rgb, 3 * (size_t)l->env.width * (size_t)l->env.height);
+    hash = isogi_trace__hash_number(hash, (uint64_t)l->env.sh_order);
+    if (l->env.sh) hash = isogi_trace__hash_floats(hash, l->env.sh, 3 * ISOGI_SH_COUNT((size_t)l->env.sh_order));
+    hash = isogi_trace__hash_floats(hash, l->env.rotation, 9);
+    for (i = 0; i < l->light_count; i++) {
+        const isogi_light *light = &l->lights[i];
+        hash = isogi_trace__hash_number(hash, (uint64_t)light->kind);
+        hash = isogi_trace__hash_floats(isogi_trace__hash_floats(hash, light->vector, 3), light->rgb, 3);
+        hash = isogi_trace__hash_floats(isogi_trace__hash_floats(hash, &light->radius, 1), light->edge[0], 6);
+    }
+    return hash;
+}
+
+static uint64_t isogi_trace__hash_volume(uint64_t hash, const isogi_pyramid *pyramid) {
+    const isogi_volume *v = isogi_vol_volume(pyramid);
+    isogi_level level = isogi_vol_level(pyramid, 2);
+    int a;
+    for (a = 0; a < 3; a++) hash = isogi_trace__hash_number(hash, v->size[a]);
+    hash = isogi_trace__hash_number(hash, (uint64_t)v->type);
+    hash = isogi_trace__hash_doubles(isogi_trace__hash_doubles(hash, v->spacing, 3), v->origin, 3);
+    hash = isogi_trace__hash_doubles(isogi_trace__hash_doubles(hash, v->axes, 9), &v->scale, 1);
+    hash = isogi_trace__hash_doubles(hash, &v->bias, 1);
+    if (!level.cells) return hash;
+    return isogi_trace__hash_floats(hash, level.range[0], 2 * level.size[0] * level.size[1] * level.size[2]);
+}
+
+static uint64_t isogi_trace__hash_trace(const isogi_trace *t) {
+    const isogi_trace_desc *d = &t->scene.desc;
+    const int numbers[12] = {(int)d->mode,    d->order,        d->bounces,           d->samples,    (int)d->normals,  d->capped != 0,
+                             t->scene.high,   !!d->no_shadows, d->transfer_channels, t->format,     d->material != 0, t->values};
+    uint64_t hash = 0xcbf29ce484222325u;
+    int i;
+    for (i = 0; i < 12; i++) hash = isogi_trace__hash_number(hash, (uint64_t)(int64_t)numbers[i]);
+    hash = isogi_trace__hash_number(hash, d->seed);
+    hash = isogi_trace__hash_floats(isogi_trace__hash_floats(isogi_trace__hash_floats(hash, d->albedo, 3), &d->offset, 1), &d->reach, 1);
+    hash = isogi_trace__hash_table(isogi_trace__hash_table(hash, d->albedo_points, d->albedo_count), d->emission_points, d->emission_count);
+    hash = isogi_trace__hash_doubles(isogi_trace__hash_doubles(isogi_trace__hash_doubles(hash, t->first, 3), t->last, 3), &t->scene.unit, 1);
+    if (d->mode == ISOGI_TRACE_IRRADIANCE) hash = isogi_trace__hash_lighting(hash, &d->lighting);
+    return isogi_trace__hash_volume(hash, t->scene.pyramid);
+}
+
+static uint64_t isogi_trace__done_texels(const isogi_trace__brick *brick) {
+    uint64_t done = 0;
+    uint32_t slot;
+    for (slot = 0; brick && slot < ISOGI_TRACE__TEXELS; slot++)
+        done |= (uint64_t)(brick->state[slot] == ISOGI_TRACE__DONE) << slot;
+    return done;
+}
+
+static size_t isogi_trace__side_size(const isogi_trace *t, size_t *bricks) {
+    size_t i, bytes = ISOGI_TRACE__HEADER + 8;
+    *bricks = 0;
+    for (i = 0; i < t->brick_count; i++) {
+        size_t texels = isogi_trace__bits(isogi_trace__done_texels(t->bricks[i]));
+        if (texels) bytes += 16 + texels * t->record, ++*bricks;
+    }
+    return bytes;
+}
+
+ISOGI_API size_t isogi_trace_save_size(const isogi_trace *trace) {
+    size_t bricks;
+    return trace ? isogi_trace__side_size(trace, &bricks) + isogi_trace_save_size(trace->high) : 0;
+}
+
+ISOGI_API isogi_result isogi_trace_save(const isogi_trace *trace, void *block, size_t bytes) {
+    uint8_t *begin = (uint8_t *)block, *to;
+    size_t i, bricks, size;
+    uint32_t slot;
+    int a;
+    if (!trace || !block || bytes < isogi_trace_save_size(trace)) return ISOGI_INVALID;
+    size = isogi_trace__side_size(trace, &bricks);
+    memcpy(begin, "isogi tr", 8);
+    isogi_trace__put(begin + 8, ISOGI_TRACE__VERSION, 4), isogi_trace__put(begin + 12, trace->record, 4);
+    isogi_trace__put(begin + 16, isogi_trace__hash_trace(trace), 8);
+    for (a = 0; a < 3; a++) isogi_trace__put(begin + 24 + 8 * a, trace->lattice[a], 8);
+    isogi_trace__put(begin + 48, bricks, 8);
+    to = begin + ISOGI_TRACE__HEADER;
+    for (i = 0; i < trace->brick_count; i++) {
+        uint64_t done = isogi_trace__done_texels(trace->bricks[i]);
+        if (!done) continue;
+        isogi_trace__put(to, i, 8), isogi_trace__put(to + 8, done, 8), to += 16;
+        for (slot = 0; slot < ISOGI_TRACE__TEXELS; slot++)
+            if (done >> slot & 1) memcpy(to, isogi_trace__record(trace, trace->bricks[i], slot), trace->record), to += trace->record;
+    }
+    isogi_trace__put(to, isogi_trace__hash(0xcbf29ce484222325u, begin, size - 8), 8);
+    return trace->high ? isogi_trace_save(trace->high, begin + size, bytes - size) : ISOGI_OK;
+}
+
+/* Whether a record can be what was written: finite numbers, an error that is no NaN. */
+static int isogi_trace__record_ok(const isogi_trace *t, const uint8_t *record) {
+    int i;
+    if (isogi_trace__get(record, 2) > 0x7f80u) return 0;
+    if (t->format == ISOGI_TRACE_FLOAT)
+        for (i = 0; i < t->values; i++)
+            if ((isogi_trace__get(record + 2 + 4 * i, 4) & 0x7f800000u) == 0x7f800000u) return 0;
+    if (t->format == ISOGI_TRACE_HALF)
+        for (i = 0; i < t->values; i++)
+            if ((isogi_trace__get(record + 2 + 2 * i, 2) & 0x7c00u) == 0x7c00u) return 0;
+    return t->format != ISOGI_TRACE_BYTE || t->scene.desc.mode != ISOGI_TRACE_TRANSFER || isogi_trace__get(record + 2, 2) < 0x7f80u;
+}
+
+/* One side's block from its first byte: checks all of it; *used: its bytes. */
+static isogi_result isogi_trace__block_check(const isogi_trace *t, const uint8_t *block, size_t bytes, size_t *used) {
+    uint64_t bricks, k, before = 0;
+    size_t at = ISOGI_TRACE__HEADER, texel[3];
+    uint32_t slot;
+    int a;
+    if (bytes < ISOGI_TRACE__HEADER + 8 || memcmp(block, "isogi tr", 8) || isogi_trace__get(block + 8, 4) != ISOGI_TRACE__VERSION)
+        return ISOGI_CORRUPT;
+    bricks = isogi_trace__get(block + 48, 8);
+    for (k = 0; k < bricks; k++) { /* first the sizes alone, so that the hash can be found: another description has other records */
+        uint64_t texels, record = isogi_trace__get(block + 12, 4);
+        if (bytes - at < 16 + 8) return ISOGI_CORRUPT;
+        texels = isogi_trace__bits(isogi_trace__get(block + at + 8, 8));
+        at += 16;
+        if (record > 4 * 3 * ISOGI_TRACE__MAX_ORDER * ISOGI_TRACE__MAX_ORDER + 4 || bytes - at < texels * record + 8) return ISOGI_CORRUPT;
+        at += (size_t)(texels * record);
+    }
+    if (isogi_trace__get(block + at, 8) != isogi_trace__hash(0xcbf29ce484222325u, block, at)) return ISOGI_CORRUPT;
+    if (isogi_trace__get(block + 16, 8) != isogi_trace__hash_trace(t) || isogi_trace__get(block + 12, 4) != t->record) return ISOGI_INVALID;
+    for (a = 0; a < 3; a++)
+        if (isogi_trace__get(block + 24 + 8 * a, 8) != t->lattice[a]) return ISOGI_INVALID;
+    *used = at + 8, at = ISOGI_TRACE__HEADER;
+    for (k = 0; k < bricks; k++) {
+        uint64_t index = isogi_trace__get(block + at, 8), mask = isogi_trace__get(block + at + 8, 8);
+        at += 16;
+        if (index >= t->brick_count || (k && index <= before)) return ISOGI_CORRUPT;
+        before = index;
+        for (slot = 0; slot < ISOGI_TRACE__TEXELS; slot++) {
+            if (!(mask >> slot & 1)) continue;
+            if (!isogi_trace__texel_of(t, (size_t)index, slot, texel) || !isogi_trace__record_ok(t, block + at)) return ISOGI_CORRUPT;
+            at += t->record;
+        }
+    }
+    return ISOGI_OK;
+}
+
+/* A block that was checked. */
+static isogi_result isogi_trace__block_load(isogi_trace *t, const uint8_t *block) {
+    uint64_t bricks = isogi_trace__get(block + 48, 8), k;
+    const uint8_t *at = block + ISOGI_TRACE__HEADER;
+    uint32_t slot;
+    for (k = 0; k < bricks; k++) {
+        size_t index = (size_t)isogi_trace__get(at, 8);
+        uint64_t mask = isogi_trace__get(at + 8, 8);
+        isogi_trace__brick *brick = t->bricks[index];
+        at += 16;
+        if (!brick) {
+            brick = isogi_trace__brick_new(t);
+            if (!brick) return ISOGI_NO_MEMORY;
+            if (!t->scene.desc.lazy) memset(brick->state, ISOGI_TRACE__NOT_ASKED, sizeof brick->state);
+            t->bricks[index] = brick;
+        }
+        if (isogi_trace__brick_hold(t, brick, mask) != ISOGI_OK) return ISOGI_NO_MEMORY;
+        for (slot = 0; slot < ISOGI_TRACE__TEXELS; slot++) {
+            if (!(mask >> slot & 1)) continue;
+            memcpy(isogi_trace__record(t, brick, slot), at, t->record);
+            at += t->record;
+            t->wanted -= brick->state[slot] == ISOGI_TRACE__WANTED;
+            t->done += brick->state[slot] != ISOGI_TRACE__DONE;
+            brick->state[slot] = ISOGI_TRACE__DONE;
+        }
+    }
+    return ISOGI_OK;
+}
+
+ISOGI_API isogi_result isogi_trace_load(isogi_trace *trace, const void *block, size_t bytes) {
+    const uint8_t *from = (const uint8_t *)block;
+    size_t used = 0, used_high = 0;
+    isogi_result result;
+    if (!trace || !block) return ISOGI_INVALID;
+    result = isogi_trace__block_check(trace, from, bytes, &used);
+    if (result == ISOGI_OK && trace->high) result = isogi_trace__block_check(trace->high, from + used, bytes - used, &used_high);
+    if (result == ISOGI_OK && used + used_high != bytes) result = ISOGI_CORRUPT;
+    if (result == ISOGI_OK) result = isogi_trace__block_load(trace, from);
+    if (result == ISOGI_OK && trace->high) result = isogi_trace__block_load(trace->high, from + used);
     return result;
 }
 
@@ -2121,6 +2868,8 @@ ISOGI_API isogi_result isogi_trace_gather(const isogi_trace_desc *desc, const fl
 #undef ISOGI_TRACE__MAX_DEPTH
 #undef ISOGI_TRACE__MAX_ORDER
 #undef ISOGI_TRACE__NOT_READY
+#undef ISOGI_TRACE__VERSION
+#undef ISOGI_TRACE__HEADER
 #endif /* ISOGI_TRACE_IMPLEMENTATION */
 
 /* ---------------------------------------------------------------------------------------------------------------------

@@ -335,7 +335,7 @@ TEST(relit_by_sh_equals_baked_directly) {
             if (colour) d.albedo[0] = 0.3f;
             d.lazy = 1, d.lighting.env.sh = sh, d.lighting.env.sh_order = order;
             bake_and_sample(&d, NULL, (const float(*)[3])points, n, direct);
-            d.mode = ISOGI_TRACE_TRANSFER, d.order = order, d.lighting.env.sh = other;
+            d.mode = ISOGI_TRACE_TRANSFER, d.order = order, d.storage = ISOGI_TRACE_FLOAT, d.lighting.env.sh = other;
             CHECK(isogi_trace_create(&t, &d, NULL) == ISOGI_OK, "order %d", order);
             isogi_trace_request(t, (const float(*)[3])points, (size_t)n), isogi_trace_step(t, 0, NULL);
             isogi_trace_counters(t, &before);
@@ -370,7 +370,7 @@ TEST(relit_by_a_rotated_environment) {
     isogi_trace *t = NULL;
     int n = surface_points(&s, 0, 50, 12, points);
     random_sky(sh, 3, 13);
-    d.lazy = 1, d.mode = ISOGI_TRACE_TRANSFER, d.order = 3, d.lighting.env.sh = sh, d.lighting.env.sh_order = 3;
+    d.lazy = 1, d.mode = ISOGI_TRACE_TRANSFER, d.order = 3, d.storage = ISOGI_TRACE_FLOAT, d.lighting.env.sh = sh, d.lighting.env.sh_order = 3;
     isogi_trace_create(&t, &d, NULL);
     isogi_trace_request(t, (const float(*)[3])points, (size_t)n), isogi_trace_step(t, 0, NULL);
     memcpy(d.lighting.env.rotation, rotation, sizeof rotation);

@@ -1,0 +1,450 @@
+/* Tests of how isogi_trace.h holds light: formats, memory, export for a GPU, save, load and merge. */
+#define ISOGI_IMPLEMENTATION
+#include "isogi_trace.h"
+#include "test.h"
+#include "trace_scenes.h"
+
+static const char *const format_name[5] = {"default", "float", "half", "rgb9e5", "byte"};
+
+/* a gyroid beside air: half of the texels have no surface */
+static double gyroid_in_air(const double p[3], const double *q) { return p[0] < q[1] ? -2 : gyroid(p, q); }
+
+static isogi_trace_desc store_desc(const scene *s, isogi_trace_mode mode, int format, int samples) {
+    static const isogi_light sun = {.vector = {1, 2, 3}, .rgb = {3, 2.5f, 2}, .radius = 0.05f};
+    isogi_trace_desc d = desc_make(s, 0.7f, 2, samples);
+    d.mode = mode, d.storage = (isogi_trace_format)format, d.lighting.lights = &sun, d.lighting.light_count = 1;
+    d.albedo[2] = mode == ISOGI_TRACE_TRANSFER ? 0.7f : 0.4f;
+    return d;
+}
+
+static isogi_trace *baked(const isogi_trace_desc *d) {
+    isogi_trace *t = NULL;
+    isogi_result result = isogi_trace_create(&t, d, NULL);
+    if (result == ISOGI_OK) result = isogi_trace_step(t, 0, NULL);
+    CHECK(result == ISOGI_OK, "result %d", result);
+    return t;
+}
+
+/* ---- numbers in few bits ----------------------------------------------------------------------------------------------------- */
+
+/* Every finite half is itself again; between neighbours the nearer one is taken, of equals the even one. */
+TEST(half_is_to_nearest_even) {
+    for (uint32_t h = 0; h < 0x7c00; h++) {
+        float x = isogi_trace__from_half(h), next = isogi_trace__from_half(h + 1 < 0x7c00 ? h + 1 : h);
+        double exact = h < 1024 ? ldexp(h, -24) : ldexp(1024 + h % 1024, (int)(h >> 10) - 25);
+        float middle = (float)(0.5 * ((double)x + (double)next)), above = nextafterf(middle, 1e9f), below = nextafterf(middle, 0);
+        CHECK((double)x >= exact && (double)x <= exact, "half %x: %g, expected %g", h, (double)x, exact);
+        CHECK(isogi_trace__to_half(x) == h && (h == 0 || isogi_trace__to_half(-x) == (h | 0x8000)), "half %x is %x", h, isogi_trace__to_half(x));
+        if (h + 1 == 0x7c00) continue;
+        CHECK(isogi_trace__to_half(middle) == (h & 1 ? h + 1 : h), "middle above %x: %x", h, isogi_trace__to_half(middle));
+        CHECK(isogi_trace__to_half(above) == h + 1 && isogi_trace__to_half(below) == h, "beside the middle above %x", h);
+    }
+    const float odd[6] = {1e30f, 65504, 65519, 65520, 1e-30f, 3e-45f};
+    const uint32_t expected[6] = {0x7bff, 0x7bff, 0x7bff, 0x7bff, 0, 0};
+    for (int i = 0; i < 6; i++) CHECK(isogi_trace__to_half(odd[i]) == expected[i], "%g: %x", (double)odd[i], isogi_trace__to_half(odd[i]));
+    CHECK(isogi_trace__to_half((float)nan_value()) == 0, "NaN: %x", isogi_trace__to_half((float)nan_value()));
+}
+
+/* Within half a step of the largest channel, over all magnitudes; what was unpacked packs to itself; never NaN, never infinite. */
+TEST(rgb9e5_is_within_half_a_step) {
+    test_random r = {3};
+    for (int i = 0; i < (LONG_SUITE ? 1000000 : 100000); i++) {
+        float rgb[3], back[3], again[3];
+        double most = 0;
+        for (int c = 0; c < 3; c++) rgb[c] = (float)(ldexp(random_unit(&r), (int)random_range(&r, -30, 17))), most = fmax(most, (double)rgb[c]);
+        if (i % 100 == 0) rgb[0] = i % 200 ? (float)nan_value() : -1, most = fmax((double)rgb[1], (double)rgb[2]);
+        uint32_t packed = isogi_trace__to_rgb9e5(rgb);
+        isogi_trace__from_rgb9e5(packed, back);
+        double step = fmax(most / 255.5, 1.0 / 16777216); /* 511.5 steps and more round up to the next exponent */
+        for (int c = 0; c < 3; c++) {
+            double x = rgb[c] > 0 ? fmin((double)rgb[c], 65408) : 0;
+            if (c == 0 && i % 100 == 0) x = 0;
+            CHECK(back[c] >= 0 && (double)back[c] <= 65408 && fabs((double)back[c] - x) <= 0.5 * step * 1.0000001, "%g of %g: %g", x, most, (double)back[c]);
+        }
+        isogi_trace__from_rgb9e5(isogi_trace__to_rgb9e5(back), again);
+        CHECK(!memcmp(back, again, sizeof back), "%g becomes %g", (double)back[0], (double)again[0]);
+    }
+}
+
+TEST(errors_are_kept_rounded_up) {
+    test_random r = {4};
+    for (int i = 0; i < 10000; i++) {
+        float x = (float)ldexp(random_unit(&r), (int)random_range(&r, -40, 40)), y = isogi_trace__bits_float(isogi_trace__to_short(x) << 16);
+        CHECK(y >= x && (double)y <= (double)x * (1 + 1.0 / 127), "%g is kept as %g", (double)x, (double)y);
+    }
+    CHECK(isogi_trace__to_short(0) == 0 && isogi_trace__to_short(HUGE_VALF) == 0x7f80 && isogi_trace__to_short(3.4e38f) == 0x7f80, "ends, %d", 0);
+}
+
+/* ---- memory -------------------------------------------------------------------------------------------------------------------- */
+
+/* The table by which the default was chosen: bytes of a valid texel, all overhead included, against the error that the format adds,
+   relative to the mean. What 64 samples leave of noise is the measure. */
+TEST(bytes_per_texel_against_error) {
+    double q[2] = {0.45, 8}, noise = 0;
+    int n = LONG_SUITE ? 32 : 16;
+    scene s = scene_make(n, n, n, NULL, gyroid_in_air, q);
+    float points[200][3], exact[200][3], e[200][3], error[200];
+    n = surface_points(&s, 0.1, 200, 1, points);
+    for (int mode = 0; mode < 2; mode++) {
+        double mean = 0;
+        static const double bound[2][5] = {{1e-6, 1e-6, 4e-4, 2e-3, 6e-3}, {6e-4, 1e-6, 6e-4, 0, 1e-2}};
+        for (int format = 1; format < 6; format++) { /* 5: the default */
+            isogi_trace_desc d = store_desc(&s, (isogi_trace_mode)mode, format % 5, 64);
+            isogi_counters counters = {0};
+            double sum = 0;
+            if (mode == 1 && format == ISOGI_TRACE_RGB9E5) continue;
+            isogi_trace *t = baked(&d);
+            isogi_trace_sample(t, (const float(*)[3])points, (size_t)n, e, error);
+            isogi_trace_counters(t, &counters);
+            for (int i = 0; i < n && format == 1; i++) {
+                memcpy(exact[i], e[i], sizeof e[i]), mean += (double)e[i][1] / n;
+                noise += (double)error[i] / n;
+            }
+            for (int i = 0; i < n; i++)
+                for (int c = 0; c < 3; c++) sum += pow((double)e[i][c] - (double)exact[i][c], 2) / n / 3;
+            double bytes = (double)isogi_trace_memory(t) / (double)counters.texels, relative = sqrt(sum) / mean;
+            printf("    %-10s %-8s %6.1f bytes a texel, error %.2e (noise of 64 samples %.1e)\n", mode ? "transfer" : "irradiance", format_name[format % 5], bytes, relative, noise / mean);
+            CHECK(relative <= bound[mode][format % 5], "%s: error %.2e", format_name[format % 5], relative);
+            CHECK(bytes < (mode ? 4.0 * 25 + 12 : 12 + 12), "%s: %.1f bytes", format_name[format % 5], bytes);
+            isogi_trace_free(t);
+        }
+        noise = 0;
+    }
+    scene_free(&s);
+}
+
+/* What a transfer texture of 256^3 texels, order 5, takes by default: bricks' table, and the texels that have a surface. Extrapolated from
+   64^3: a field whose texels are all valid stays below one gigabyte, air costs a thirtieth of it. */
+TEST(transfer_of_256_cubed_stays_below_a_gigabyte) {
+    double q[2] = {0.1, 0};
+    scene s = scene_make(64, 64, 64, NULL, gyroid_in_air, q);
+    isogi_trace_desc d = store_desc(&s, ISOGI_TRACE_TRANSFER, 0, 1);
+    isogi_trace *t = NULL;
+    size_t before, after;
+    d.isovalue_min = -0.2, d.isovalue_max = 0.2;
+    isogi_trace_create(&t, &d, NULL);
+    before = isogi_trace_memory(t);
+    isogi_trace_free(t);
+    d.isovalue_min = d.isovalue_max = 0, d.bounces = 0;
+    t = baked(&d);
+    after = isogi_trace_memory(t);
+    printf("    all texels: %.0f MB at 256^3; not yet computed, values within 0.2: %.0f MB\n", (double)after * 64 / 1e6, (double)before * 64 / 1e6);
+    CHECK((double)after * 64 < 1e9 && (double)before * 64 < 64e6, "%.0f MB, %.0f MB", (double)after * 64 / 1e6, (double)before * 64 / 1e6);
+    isogi_trace_free(t), scene_free(&s);
+}
+
+/* Units follow the light: the formats hold a sun of 1e6 beside a sky of 1e-3, and a dim world of 1e-6. */
+TEST(short_formats_follow_the_brightness) {
+    double q[4] = {15.5, 15.5, 15.5, 9};
+    scene s = scene_make(32, 32, 32, NULL, ball, q);
+    float points[50][3], exact[50][3], e[50][3];
+    int n = surface_points(&s, 0, 50, 2, points);
+    for (int bright = 0; bright < 2; bright++) {
+        float sky[3] = {3.5e-3f, 3.5e-3f, 3.5e-3f}, factor = bright ? 1e6f : 1e-6f;
+        isogi_light sun = {.vector = {1, 1, 1}, .rgb = {factor, factor, factor}};
+        for (int format = 1; format < 5; format++) {
+            isogi_trace_desc d = desc_make(&s, 0.5f, 0, 4);
+            double most = 0;
+            if (bright) d.lighting.env.sh = sky;
+            else sky[0] = sky[1] = sky[2] = 1e-6f, d.lighting.env.sh = sky;
+            d.lighting.lights = &sun, d.lighting.light_count = 1, d.storage = (isogi_trace_format)format, d.lazy = 1;
+            bake_and_sample(&d, NULL, (const float(*)[3])points, n, format == 1 ? exact : e);
+            for (int i = 0; i < n; i++) most = fmax(most, (double)exact[i][0]);
+            for (int i = 0; i < n && format > 1; i++)
+                CHECK(fabs((double)e[i][0] - (double)exact[i][0]) <= 0.01 * most, "%s: %g, exact %g", format_name[format], (double)e[i][0], (double)exact[i][0]);
+        }
+    }
+    scene_free(&s);
+}
+
+/* ---- export -------------------------------------------------------------------------------------------------------------------- */
+
+/* What a GPU would read from the dense array at a texel. */
+static void exported(const isogi_trace *t, int format, const uint8_t *bytes, const float *scales, size_t texel, float *values) {
+    size_t lattice[3], texels;
+    int order, channels, count;
+    isogi_trace_shape(t, lattice, &order, &channels);
+    texels = lattice[0] * lattice[1] * lattice[2], count = order ? order * order * channels : 3;
+    for (int v = 0; v < count; v++) {
+        size_t at = order ? 4 * ((size_t)(v / 4) * texels + texel) + (size_t)(v % 4) : 3 * texel + (size_t)v;
+        if (format == ISOGI_TRACE_FLOAT) memcpy(&values[v], bytes + 4 * at, 4);
+        if (format == ISOGI_TRACE_HALF) {
+            uint16_t h;
+            memcpy(&h, bytes + 2 * at, 2);
+            values[v] = (float)(h < 1024 ? ldexp(h, -24) : ldexp(1024 + h % 1024, (int)(h >> 10 & 31) - 25));
+            if (h & 0x8000) values[v] = -(float)(h % 0x8000 < 1024 ? ldexp(h % 0x8000, -24) : ldexp(1024 + h % 1024, (int)(h >> 10 & 31) - 25));
+        }
+        if (format == ISOGI_TRACE_RGB9E5) {
+            uint32_t p;
+            memcpy(&p, bytes + 4 * texel, 4);
+            values[v] = (float)ldexp(p >> 9 * v & 511, (int)(p >> 27) - 24);
+        }
+        if (format == ISOGI_TRACE_BYTE) values[v] = order ? fmaxf((float)(int8_t)bytes[at] / 127, -1) : (float)bytes[at] / 255;
+        values[v] *= scales[v];
+    }
+}
+
+static isogi_result export_now(const isogi_trace *t, int format, uint8_t **bytes, float *scales) {
+    size_t size = isogi_trace_export_size(t, format);
+    isogi_result result;
+    *bytes = (uint8_t *)malloc(size + 8);
+    memset(*bytes, 0xee, size + 8);
+    CHECK(isogi_trace_export(t, format, *bytes, size - 1) == ISOGI_INVALID && (*bytes)[0] == 0xee, "%d", format);
+    result = isogi_trace_export(t, format, *bytes, size);
+    for (int i = 0; i < 8; i++) CHECK((*bytes)[size + (size_t)i] == 0xee, "written beyond the end, format %d", format);
+    if (result == ISOGI_OK) result = isogi_trace_export_scales(t, format, scales);
+    return result;
+}
+
+/* At the texels themselves every format holds what the library reads there, within the format's step. */
+TEST(export_holds_the_texels) {
+    double q[2] = {0.4, 6};
+    scene s = scene_make(16, 15, 14, NULL, gyroid_in_air, q);
+    for (int mode = 0; mode < 2; mode++)
+        for (int format = 1; format < 5; format++) {
+            isogi_trace_desc d = store_desc(&s, (isogi_trace_mode)mode, ISOGI_TRACE_FLOAT, 8);
+            float scales[108], values[108], expected[108];
+            uint8_t *bytes;
+            int count = mode ? 25 : 3, seen = 0;
+            isogi_trace *t = baked(&d);
+            if (mode == 1 && format == ISOGI_TRACE_RGB9E5) {
+                CHECK(isogi_trace_export_size(t, format) == 0 && isogi_trace_export(t, format, scales, sizeof scales) == ISOGI_INVALID, "format %d", format);
+                isogi_trace_free(t);
+                continue;
+            }
+            CHECK(export_now(t, format, &bytes, scales) == ISOGI_OK, "format %d", format);
+            for (size_t texel = 0; texel < 16 * 15 * 14; texel++) {
+                size_t at[3] = {texel % 16, texel / 16 % 15, texel / 240};
+                float point[1][3] = {{(float)at[0], (float)at[1], (float)at[2]}};
+                exported(t, format, bytes, scales, texel, values);
+                for (int v = 0; v < count; v++) CHECK(values[v] > -1e6f && values[v] < 1e6f, "texel %d holds %g", (int)texel, (double)values[v]);
+                if (!isogi_trace_valid(t, at)) continue;
+                seen++;
+                if (mode) isogi_trace_sample_transfer(t, (const float(*)[3])point, 1, expected);
+                else isogi_trace_sample(t, (const float(*)[3])point, 1, (float(*)[3])expected, NULL);
+                double most = 0;
+                for (int v = 0; v < count; v++) most = fmax(most, fabs((double)expected[v]));
+                for (int v = 0; v < count; v++) {
+                    double step = format == ISOGI_TRACE_FLOAT ? 1e-6 * most : format == ISOGI_TRACE_HALF ? fabs((double)expected[v]) / 2048 + 1e-6 : format == ISOGI_TRACE_RGB9E5 ? most / 512 : (double)scales[v] / (mode ? 254 : 510);
+                    CHECK(fabs((double)values[v] - (double)expected[v]) <= step * 1.001 + 1e-6, "%s, texel %d value %d: %g, expected %g", format_name[format], (int)texel, v, (double)values[v], (double)expected[v]);
+                }
+            }
+            CHECK(seen > 500 && seen < 3000, "%d valid texels", seen);
+            free(bytes), isogi_trace_free(t);
+        }
+    scene_free(&s);
+}
+
+/* Plain trilinear interpolation of the dense array next to surfaces, as hardware does it, against the library's lookup, which leaves
+   invalid texels out. Left as zeros, invalid texels darken their neighbourhood by half and more: those are the seams. */
+TEST(exported_texture_has_no_seams) {
+    double q[2] = {0.35, 12}, sum = 0, worst = 0, dark = 0, mean = 0;
+    scene s = scene_make(32, 32, 32, NULL, gyroid_in_air, q);
+    isogi_trace_desc d = store_desc(&s, ISOGI_TRACE_IRRADIANCE, 0, LONG_SUITE ? 256 : 16);
+    isogi_trace *t = baked(&d);
+    float points[2000][3], e[2000][3], scales[3];
+    uint8_t *bytes;
+    int n = 0, beside = 0;
+    for (int k = 0; k < 4; k++) n += surface_points(&s, -1.2 + 0.4 * k, 500, 5 + (uint64_t)k, points + n);
+    CHECK(export_now(t, ISOGI_TRACE_FLOAT, &bytes, scales) == ISOGI_OK, "export %d", n);
+    isogi_trace_sample(t, (const float(*)[3])points, (size_t)n, e, NULL);
+    for (int i = 0; i < n; i++) {
+        double value = 0, zeros = 0;
+        int invalid = 0;
+        for (int k = 0; k < 8; k++) {
+            size_t at[3];
+            double w = 1;
+            float values[3];
+            for (int a = 0; a < 3; a++) {
+                double x = fmin(fmax((double)points[i][a], 0), 31);
+                size_t low = x < 30 ? (size_t)x : 30;
+                at[a] = low + (size_t)(k >> a & 1);
+                w *= k >> a & 1 ? x - (double)low : 1 - (x - (double)low);
+            }
+            exported(t, ISOGI_TRACE_FLOAT, bytes, scales, at[0] + 32 * (at[1] + 32 * at[2]), values);
+            value += w * (double)values[0];
+            if (isogi_trace_valid(t, at)) zeros += w * (double)values[0];
+            else invalid = 1;
+        }
+        mean += (double)e[i][0] / n;
+        if (!invalid) {
+            CHECK(fabs(value - (double)e[i][0]) < 1e-5 * PI, "among valid texels: %g, library %g", value, (double)e[i][0]);
+            continue;
+        }
+        beside++, sum += pow(value - (double)e[i][0], 2), worst = fmax(worst, fabs(value - (double)e[i][0])), dark += pow(zeros - (double)e[i][0], 2);
+    }
+    sum = sqrt(sum / beside) / mean, dark = sqrt(dark / beside) / mean;
+    printf("    %d of %d points read invalid texels: plain interpolation differs by %.3f of the mean (largest %.3f); without extension by %.3f\n", beside, n, sum, worst / mean, dark);
+    CHECK(beside > 50 && sum < 0.05 && worst < 0.3 * mean && dark > 5 * sum, "RMS %.4f, largest %.4f, without %.4f", sum, worst / mean, dark);
+    free(bytes), isogi_trace_free(t), scene_free(&s);
+}
+
+/* ---- save, load, merge ------------------------------------------------------------------------------------------------------------ */
+
+static uint8_t *save_now(const isogi_trace *t, size_t *size) {
+    uint8_t *block;
+    *size = isogi_trace_save_size(t);
+    block = (uint8_t *)malloc(*size);
+    CHECK(isogi_trace_save(t, block, *size - 1) == ISOGI_INVALID, "%d bytes", (int)*size);
+    CHECK(isogi_trace_save(t, block, *size) == ISOGI_OK, "%d bytes", (int)*size);
+    return block;
+}
+
+/* Stopped anywhere, saved, loaded into a new texture and finished there: the same bytes as if it had never stopped. */
+TEST(bake_resumes_to_the_same_bits) {
+    double q[2] = {0.5, 4};
+    scene s = scene_make(12, 13, 11, NULL, gyroid_in_air, q);
+    float points[30][3];
+    int n = surface_points(&s, 0, 30, 1, points);
+    for (int k = 0; k < 12; k++) {
+        isogi_trace_desc d = store_desc(&s, (isogi_trace_mode)(k & 1), k % 4 == 3 ? ISOGI_TRACE_BYTE : k % 3, 4);
+        isogi_trace *whole = NULL, *part = NULL, *rest = NULL;
+        uint8_t *a, *b, *c;
+        size_t size_a, size_b, size_c;
+        double remaining = 1;
+        d.sides = k >= 8 ? ISOGI_TRACE_BOTH_SIDES : ISOGI_TRACE_LOW_SIDE, d.lazy = k >= 4 && k < 8;
+        CHECK(isogi_trace_create(&whole, &d, NULL) == ISOGI_OK && isogi_trace_create(&part, &d, NULL) == ISOGI_OK && isogi_trace_create(&rest, &d, NULL) == ISOGI_OK, "case %d", k);
+        isogi_trace_request(whole, (const float(*)[3])points, (size_t)n), isogi_trace_request(part, (const float(*)[3])points, (size_t)n);
+        isogi_trace_step(whole, 0, NULL);
+        isogi_trace_step(part, d.lazy ? 500 : 4000, &remaining);
+        CHECK(remaining > 0 && remaining < 1, "case %d: remaining %g", k, remaining);
+        a = save_now(part, &size_a), b = save_now(whole, &size_b);
+        CHECK(isogi_trace_load(rest, a, size_a) == ISOGI_OK, "case %d", k);
+        isogi_trace_request(rest, (const float(*)[3])points, (size_t)n);
+        CHECK(isogi_trace_step(rest, 0, &remaining) == ISOGI_OK && remaining <= 0, "case %d: remaining %g", k, remaining);
+        c = save_now(rest, &size_c);
+        CHECK(size_b == size_c && !memcmp(b, c, size_b), "case %d: %d and %d bytes", k, (int)size_b, (int)size_c);
+        CHECK(isogi_trace_load(whole, a, size_a) == ISOGI_OK, "over what is there already, case %d", k);
+        isogi_trace_free(whole), isogi_trace_free(part), isogi_trace_free(rest), free(a), free(b), free(c);
+    }
+    scene_free(&s);
+}
+
+/* Boxes baked apart, one of them reaching past a brick, and loaded in any order: the same bytes as the whole, at once. */
+TEST(boxes_merge_to_the_same_bits) {
+    double q[2] = {0.5, 4};
+    scene s = scene_make(12, 13, 11, NULL, gyroid_in_air, q);
+    for (int mode = 0; mode < 2; mode++) {
+        isogi_trace_desc d = store_desc(&s, (isogi_trace_mode)mode, 0, 4);
+        isogi_trace *whole = baked(&d), *merged = NULL;
+        size_t size_a, size_b, texels = 0;
+        uint8_t *a, *b;
+        double remaining = 1;
+        isogi_counters counters = {0}, none = {0};
+        isogi_trace_create(&merged, &d, NULL);
+        isogi_trace_counters(whole, &counters);
+        for (int k = 7; k >= 0; k--) {
+            static const size_t cut[3][3] = {{0, 5, 12}, {0, 6, 13}, {0, 3, 11}};
+            isogi_counters part = {0};
+            for (int i = 0; i < 3; i++) d.box_first[i] = cut[i][k >> i & 1], d.box_end[i] = cut[i][(k >> i & 1) + 1];
+            isogi_trace *t = baked(&d);
+            isogi_trace_counters(t, &part);
+            texels += part.texels;
+            a = save_now(t, &size_a);
+            CHECK(isogi_trace_load(merged, a, size_a) == ISOGI_OK, "box %d", k);
+            isogi_trace_free(t), free(a);
+        }
+        CHECK(texels == counters.texels, "%d texels in boxes, %d in all", (int)texels, (int)counters.texels);
+        CHECK(isogi_trace_step(merged, 0, &remaining) == ISOGI_OK && remaining <= 0, "remaining %g", remaining);
+        isogi_trace_counters(merged, &none);
+        CHECK(none.rays == 0, "%d rays after merging", (int)none.rays);
+        a = save_now(whole, &size_a), b = save_now(merged, &size_b);
+        CHECK(size_a == size_b && !memcmp(a, b, size_a), "%d and %d bytes", (int)size_a, (int)size_b);
+        isogi_trace_free(whole), isogi_trace_free(merged), free(a), free(b);
+        d.box_end[1] = 14;
+        CHECK(isogi_trace_create(&merged, &d, NULL) == ISOGI_INVALID, "a box beyond the lattice, mode %d", mode);
+    }
+    scene_free(&s);
+}
+
+/* Any change of any byte, any cut: refused, and nothing changes. With the hash mended, what is left to find is found. */
+TEST(damaged_blocks_are_refused) {
+    double q[2] = {0.5, 4};
+    scene s = scene_make(12, 13, 11, NULL, gyroid_in_air, q);
+    test_random r = {8};
+    for (int format = 1; format < 5; format++) {
+        isogi_trace_desc d = store_desc(&s, ISOGI_TRACE_IRRADIANCE, format, 2);
+        isogi_trace *t = baked(&d), *other = NULL, *again = NULL;
+        size_t size, size_after;
+        uint8_t *block = save_now(t, &size), *copy = (uint8_t *)malloc(size + 1), *after;
+        isogi_trace_create(&other, &d, NULL);
+        for (int i = 0; i < (LONG_SUITE ? 3000 : 250); i++) {
+            size_t length = size;
+            memcpy(copy, block, size), copy[size] = 0;
+            if (i % 3 == 0) length = (size_t)random_range(&r, 0, (double)size);
+            else if (i == 1) length = size + 1;
+            else copy[i < 120 ? (size_t)i : (size_t)random_range(&r, 0, (double)size)] ^= (uint8_t)(1 << random_bits(&r) % 8);
+            CHECK(isogi_trace_load(other, copy, length) == ISOGI_CORRUPT, "change %d", i);
+        }
+        for (int i = 0; i < (LONG_SUITE ? 3000 : 250); i++) { /* the hash is right: sizes, numbers, order, texels and values are checked */
+            memcpy(copy, block, size);
+            for (int k = 0; k < 1 + i % 3; k++) copy[random_bits(&r) % 2 ? 8 + random_bits(&r) % 80 : random_bits(&r) % (size - 8)] = (uint8_t)random_bits(&r);
+            isogi_trace__put(copy + size - 8, isogi_trace__hash(0xcbf29ce484222325u, copy, size - 8), 8);
+            isogi_trace_free(again), again = NULL;
+            isogi_trace_create(&again, &d, NULL);
+            isogi_result result = isogi_trace_load(again, copy, size);
+            CHECK(result == ISOGI_OK || result == ISOGI_CORRUPT || result == ISOGI_INVALID, "result %d", result);
+            if (result == ISOGI_OK && i % 50 == 0) {
+                float points[20][3], e[20][3];
+                int n = surface_points(&s, 0, 20, (uint64_t)i, points);
+                isogi_trace_sample(again, (const float(*)[3])points, (size_t)n, e, NULL);
+                for (int p = 0; p < n; p++) CHECK(e[p][0] > -3.4e38f && e[p][0] < 3.4e38f, "a value that is no number %d", i);
+                CHECK(isogi_trace_step(again, 0, NULL) == ISOGI_OK, "step %d", i);
+            }
+        }
+        after = save_now(other, &size_after);
+        CHECK(size_after == 64, "%d bytes: something was loaded", (int)size_after);
+        d.seed++, isogi_trace_free(other), other = NULL;
+        isogi_trace_create(&other, &d, NULL);
+        CHECK(isogi_trace_load(other, block, size) == ISOGI_INVALID, "another seed, format %d", format);
+        CHECK(isogi_trace_load(NULL, block, size) == ISOGI_INVALID && isogi_trace_load(other, NULL, size) == ISOGI_INVALID, "nothing, format %d", format);
+        isogi_trace_free(t), isogi_trace_free(other), isogi_trace_free(again), free(block), free(copy), free(after);
+    }
+    scene_free(&s);
+}
+
+/* Every field that the light depends on makes the block another one; those that choose texels do not. */
+TEST(blocks_belong_to_their_description) {
+    double q[2] = {0.5, 4};
+    scene s = scene_make(12, 13, 11, NULL, gyroid_in_air, q), s2 = scene_make(12, 13, 11, NULL, gyroid, q);
+    isogi_light lamp = {.kind = ISOGI_LIGHT_POINT, .vector = {1, 2, 3}, .rgb = {1, 1, 1}};
+    const isogi_albedo_point table[1] = {{0, {0.5f, 0.5f, 0.5f}}};
+    const isogi_trace_desc good = store_desc(&s, ISOGI_TRACE_IRRADIANCE, 0, 1);
+    isogi_trace *t = baked(&good), *other;
+    size_t size;
+    uint8_t *block = save_now(t, &size);
+    for (int i = 0; i < 20; i++) {
+        isogi_trace_desc d = good;
+        isogi_result expected = i < 16 ? ISOGI_INVALID : ISOGI_OK, result;
+        switch (i) {
+        case 0: d.samples = 2; break;
+        case 1: d.bounces = 3; break;
+        case 2: d.albedo[1] = 0.6f; break;
+        case 3: d.lighting.lights = &lamp; break;
+        case 4: d.albedo_points = table, d.albedo_count = 1; break;
+        case 5: d.emission_points = table, d.emission_count = 1; break;
+        case 6: d.reach = 3; break;
+        case 7: d.no_shadows = 1; break;
+        case 8: d.capped = 1; break;
+        case 9: d.offset = 0.3f; break;
+        case 10: d.normals = ISOGI_NORMAL_TRILINEAR; break;
+        case 11: d.lattice[0] = 13; break;
+        case 12: d.lattice_max[0] = 10, d.lattice_max[1] = 12, d.lattice_max[2] = 10, d.lattice[0] = 12; break;
+        case 13: d.storage = ISOGI_TRACE_HALF; break;
+        case 14: d.sides = ISOGI_TRACE_HIGH_SIDE; break;
+        case 15: d.pyramid = s2.pyramid; break;
+        case 16: d.lazy = 1; break;
+        case 17: d.lookup = ISOGI_TRACE_BSPLINE; break;
+        case 18: d.isovalue_min = -0.1, d.isovalue_max = 0.1; break;
+        default: d.box_end[0] = d.box_end[1] = d.box_end[2] = 5;
+        }
+        other = NULL;
+        CHECK(isogi_trace_create(&other, &d, NULL) == ISOGI_OK, "change %d", i);
+        result = isogi_trace_load(other, block, size);
+        CHECK(result == expected, "change %d: %s", i, isogi_result_string(result));
+        isogi_trace_free(other);
+    }
+    isogi_trace_free(t), free(block), scene_free(&s), scene_free(&s2);
+}
+
+TEST_MAIN("trace_store")
