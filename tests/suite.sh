@@ -223,6 +223,9 @@ long)
     for program; do item live "${program##*/}" "$program --long"; done
     memcheck
     fuzzers
+    if have glslangValidator; then item check glsl/shaders "sh tests/compile/glsl.sh"
+    else item skip glsl/shaders "glslangValidator is not installed"
+    fi
     item check bench/tables "sh tests/bench/contract.sh"
     analysers
     variants "$@"

@@ -81,7 +81,7 @@ TEST(errors_are_kept_rounded_up) {
    relative to the mean. What 64 samples leave of noise is the measure. */
 TEST(bytes_per_texel_against_error) {
     double q[2] = {0.45, 8}, noise = 0;
-    int n = LONG_SUITE ? 32 : 16;
+    int n = LONG_SUITE ? 32 : 12;
     scene s = scene_make(n, n, n, NULL, gyroid_in_air, q);
     float points[200][3], exact[200][3], e[200][3], error[200];
     n = surface_points(&s, 0.1, 200, 1, points);
@@ -240,7 +240,7 @@ TEST(export_holds_the_texels) {
 TEST(exported_texture_has_no_seams) {
     double q[2] = {0.35, 12}, sum = 0, worst = 0, dark = 0, mean = 0;
     scene s = scene_make(32, 32, 32, NULL, gyroid_in_air, q);
-    isogi_trace_desc d = store_desc(&s, ISOGI_TRACE_IRRADIANCE, 0, LONG_SUITE ? 256 : 16);
+    isogi_trace_desc d = store_desc(&s, ISOGI_TRACE_IRRADIANCE, 0, LONG_SUITE ? 256 : 4);
     isogi_trace *t = baked(&d);
     float points[2000][3], e[2000][3], scales[3];
     uint8_t *bytes;
