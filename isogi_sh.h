@@ -217,7 +217,7 @@ ISOGI_API isogi_result isogi_sh_project(float *rgb, int order, const isogi_light
 /* ---- rotation ---- */
 
 /* Rotates: out expands f(R^-1 w), so that a lobe towards d turns into a lobe towards R d; m is R, row-major. ISOGI_INVALID unless
-   m is a rotation to 1e-3 (a reflection is none); the nearest Euler angles are used. out may be in. Wigner's d(pi/2) between
+   m is a rotation to 1e-3 (a reflection is none); the nearest Euler angles are used where it is off by more than 1e-6. out may be in. Wigner's d(pi/2) between
    rotations about z: exact at any degree, where the recursion of Ivanic and Ruedenberg (1996, 1998) loses digits beyond 30. */
 ISOGI_API isogi_result isogi_sh_rotate(float *out, const float *in, int order, int channels, const float m[9]);
 ISOGI_API isogi_result isogi_sh_rotate_f64(double *out, const double *in, int order, int channels, const double m[9]);
@@ -225,8 +225,8 @@ ISOGI_API isogi_result isogi_sh_rotate_f64(double *out, const double *in, int or
 /* About z alone, by an angle in radians. */
 ISOGI_API isogi_result isogi_sh_rotate_z(float *out, const float *in, int order, int channels, double angle);
 
-/* Built once, applied many times: order (4 order^2 - 1) / 3 numbers, degree by degree a (2l+1)^2 row-major matrix. out must not
-   overlap in. */
+/* Built once, applied many times: order (4 order^2 - 1) / 3 numbers, degree by degree a (2l+1)^2 matrix column by column: column j
+   is the rotated basis function j, and entry (i, j) stands at (2l+1) j + i. out must not overlap in. */
 #define ISOGI_SH_ROTATION_COUNT(order) ((size_t)(order) * (4 * (size_t)(order) * (size_t)(order) - 1) / 3)
 ISOGI_API isogi_result isogi_sh_rotation_build(float *rotation, int order, const float m[9]);
 ISOGI_API isogi_result isogi_sh_rotation_build_f64(double *rotation, int order, const double m[9]);
@@ -354,8 +354,10 @@ ISOGI_API isogi_result isogi_sh_fit_directional(float direction[3], float rgb[3]
 
 #if defined(__GNUC__)
 #define ISOGI_SH__INLINE static inline __attribute__((always_inline))
+#define ISOGI_SH__APART static __attribute__((noinline))
 #else
 #define ISOGI_SH__INLINE static inline
+#define ISOGI_SH__APART static
 #endif
 
 /* ==== numbers ======================================================================================================== */
@@ -728,6 +730,17 @@ static const float isogi_sh__latitudes_f32[128] = {
     -0.396409333f, -0.0524868108f, 0.0f, 0.00615790021f, 0.126805812f, 0.43665117f, 0.625835717f, 0.43665117f, 0.126805812f,
     0.00615790021f, 0.0f, 0.406789005f, 0.878720403f, 1.19955444f, 1.31305754f, 1.19955444f, 0.878720403f, 0.406789005f, 0.0f,
 };
+static const float isogi_sh__quarter_f32[96] = {
+    0.75f, 0.353553385f, 0.5f, -0.353553385f, -0.661437809f, -0.935414374f, 0.661437809f, 0.935414374f, -0.661437809f,
+    -0.935414374f, 0.661437809f, 0.935414374f, -0.75f, -0.353553385f, 0.125f, 0.353553385f, 0.0f, 0.0f, -0.559017003f, 0.0f,
+    0.0f, -0.0f, 0.73951f, 0.0f, -0.559017003f, -0.559017003f, -0.559017003f, -0.559017003f, -0.559017003f, -0.559017003f,
+    -0.559017003f, -0.559017003f, 0.73951f, 0.73951f, 0.73951f, 0.73951f, 0.73951f, 0.73951f, 0.73951f, 0.73951f, 0.375f,
+    0.375f, 0.375f, 0.375f, 0.375f, 0.375f, 0.375f, 0.375f, 0.75f, -0.353553385f, 0.5f, 0.353553385f, -0.661437809f,
+    0.935414374f, 0.661437809f, -0.935414374f, -0.661437809f, 0.935414374f, 0.661437809f, -0.935414374f, -0.75f, 0.353553385f,
+    0.125f, -0.353553385f, 0.0f, -0.0f, -0.559017003f, 0.0f, 0.0f, 0.0f, 0.73951f, 0.0f, -0.559017003f, -0.559017003f,
+    -0.559017003f, -0.559017003f, -0.559017003f, -0.559017003f, -0.559017003f, -0.559017003f, 0.73951f, 0.73951f, 0.73951f,
+    0.73951f, 0.73951f, 0.73951f, 0.73951f, 0.73951f, 0.375f, 0.375f, 0.375f, 0.375f, 0.375f, 0.375f, 0.375f, 0.375f,
+};
 #endif
 /* generated: end */
 
@@ -863,6 +876,14 @@ static void isogi_sh__eval_block(const isogi_sh__output *out, size_t first, int 
 #ifdef ISOGI_SH__SIMD
 #define ISOGI_SH__WIDE_ORDER 12
 
+/* isogi_sh__level() > 0 */
+ISOGI_SH__INLINE int isogi_sh__avx2(void) {
+#ifdef ISOGI_SH_LEVEL
+    if (!(ISOGI_SH_LEVEL)) return 0;
+#endif
+    return __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma");
+}
+
 /* 0 plain, 1 AVX2 and FMA, 2 AVX-512 */
 static int isogi_sh__level(void) {
     int level = 0;
@@ -874,6 +895,7 @@ static int isogi_sh__level(void) {
     return level;
 }
 
+typedef float isogi_sh__f4 __attribute__((vector_size(16), aligned(4), may_alias));
 typedef float isogi_sh__f8 __attribute__((vector_size(32), aligned(4), may_alias));
 typedef float isogi_sh__f16 __attribute__((vector_size(64), aligned(4), may_alias));
 typedef double isogi_sh__d4 __attribute__((vector_size(32), aligned(8), may_alias));
@@ -1590,6 +1612,160 @@ static void isogi_sh__rotate_low_f32(float *out, const float *in, int order, con
     isogi_sh__rotate_low(out, in, 0, order, &turns);
 }
 
+#ifdef ISOGI_SH__SIMD
+/* ---- one channel of orders 3 to 5 in float ---- */
+
+/* Products of two rows of R: lanes 3 to 7 are the pairs xy, yz, zz, zx, xx, lanes 0 to 2 those of y, z, x with themselves. */
+typedef struct isogi_sh__row_pairs {
+    isogi_sh__f8 ax, ay, az, bx, by, bz; /* entries of the first and of the second row */
+    isogi_sh__f8 xx, yy, zz, xy, yz, zx; /* their products, x times y in either order */
+} isogi_sh__row_pairs;
+
+/* 0 unless the matrix is a rotation to 1e-6, as rotations rounded to float are: all products of rows are 0 or 1, and the last column
+   is what the cross products of the rows say. */
+ISOGI_SH__INLINE __attribute__((target("avx2,fma"))) int isogi_sh__row_pairs_start(isogi_sh__row_pairs *r, const float m[9]) {
+    isogi_sh__f8 low = *(const isogi_sh__f8 *)m, high = *(const isogi_sh__f8 *)(m + 1), off, cross;
+    const isogi_sh__f8 same = {1, 1, 1, 0, 0, 1, 0, 1}, pair = {0, 0, 0, 1, 1, 0, 1, 0};
+    r->ax = __builtin_shufflevector(low, low, 3, 6, 0, 0, 3, 6, 6, 0), r->bx = __builtin_shufflevector(low, low, 3, 6, 0, 3, 6, 6, 0, 0);
+    r->ay = __builtin_shufflevector(low, low, 4, 7, 1, 1, 4, 7, 7, 1), r->by = __builtin_shufflevector(low, low, 4, 7, 1, 4, 7, 7, 1, 1);
+    r->az = __builtin_shufflevector(high, high, 4, 7, 1, 1, 4, 7, 7, 1), r->bz = __builtin_shufflevector(high, high, 4, 7, 1, 4, 7, 7, 1, 1);
+    r->xx = r->ax * r->bx, r->yy = r->ay * r->by, r->zz = r->az * r->bz;
+    r->xy = ISOGI_SH__FMA_F8(r->ax, r->by, r->ay * r->bx), r->yz = ISOGI_SH__FMA_F8(r->ay, r->bz, r->az * r->by);
+    r->zx = ISOGI_SH__FMA_F8(r->ax, r->bz, r->az * r->bx);
+    off = (r->xx - same) + (r->yy + r->zz);
+    cross = (ISOGI_SH__FMA_F8(r->ax, r->by, -(r->ay * r->bx)) - __builtin_shufflevector(high, high, 7, 7, 7, 7, 1, 7, 4, 7)) * pair;
+    return __builtin_ia32_movmskps256((isogi_sh__f8)(ISOGI_SH__FMA_F8(off, off, cross * cross) < 1e-12f)) == 0xff;
+}
+
+/* Degrees 1 and 2, c[1] to c[8], without angles: degree 1 is a vector v, degree 2 a traceless symmetric tensor T, and R v and R T R^T
+   need the products above; the last lane becomes xx - yy = 2 xx + zz. */
+ISOGI_SH__INLINE __attribute__((target("avx2,fma"))) isogi_sh__f8 isogi_sh__rotate_degrees12(const float *in, const isogi_sh__row_pairs *r) {
+    const isogi_sh__f8 zero = {0}, trace = {0, 0, 0, 0, 0, -0.57735026919f, 0, -0.57735026919f};
+    const isogi_sh__f8 scale = {0, 0, 0, 1, 1, 0.86602540378f, 1, 1}, half = {0, 0, 0, 0, 0, 0, 0, 0.5f};
+    isogi_sh__f8 q, v;
+    v = ISOGI_SH__FMA_F8(r->ax, in[3] - zero, ISOGI_SH__FMA_F8(r->ay, in[1] - zero, r->az * in[2]));
+    q = ISOGI_SH__FMA_F8(ISOGI_SH__FMA_F8(r->zz, 1.73205080757f - zero, trace), in[6] - zero, (r->xx - r->yy) * in[8]);
+    q = ISOGI_SH__FMA_F8(r->xy, in[4] - zero, q);
+    q = ISOGI_SH__FMA_F8(r->yz, in[5] - zero, q);
+    q = ISOGI_SH__FMA_F8(r->zx, in[7] - zero, q);
+    q = ISOGI_SH__FMA_F8(q, scale, __builtin_shufflevector(q, q, 5, 5, 5, 5, 5, 5, 5, 5) * half);
+    return __builtin_shufflevector(v, q, 0, 1, 2, 11, 12, 13, 14, 15);
+}
+
+/* Degree 3, c[8] to c[15] of which the first is not looked at, as a traceless symmetric tensor of rank 3. Its entries that are asked for
+   are yyy, zzz, xxx, xyz, yzz, zzx, zxx, one a lane: sums over i, j, k of T_ijk A_i B_j C_k with the pairs of rows and a third one. */
+ISOGI_SH__INLINE __attribute__((target("avx2,fma"))) isogi_sh__f8 isogi_sh__rotate_degree3(const float *in, const float m[9], const isogi_sh__row_pairs *r) {
+    isogi_sh__f8 low = *(const isogi_sh__f8 *)m, high = *(const isogi_sh__f8 *)(m + 1), c = *(const isogi_sh__f8 *)in, zero = {0}, p, v;
+    const isogi_sh__f8 scale = {-1.69479004f, 1.33984917f, 1.69479004f, 2.07568541f, 1.6409734f, 1.6409734f, 2.07568541f, 0};
+    const isogi_sh__f8 rest = {-1.27109253f, 0, 1.27109253f, 0, 0, 0, 1.03784271f, 0};
+    /* T: xxx, xyy, xxy, yyy, xxz, yyz, zzz, xyz; and xzz, yzz */
+    const isogi_sh__f8 k1 = {0.59004359f, -0.59004359f, 0.59004359f, -0.59004359f, 0.481768574f, -0.481768574f, 0.746352665f, 0.481768574f};
+    const isogi_sh__f8 k2 = {-0.457045799f, -0.1523486f, -0.1523486f, -0.457045799f, -0.373176333f, -0.373176333f, 0, 0};
+    const isogi_sh__f8 k3 = {0.609394399f, 0.609394399f, 0, 0, 0, 0, 0, 0};
+    float t[16];
+    *(isogi_sh__f8 *)t = ISOGI_SH__FMA_F8(k2, __builtin_shufflevector(c, c, 5, 5, 3, 3, 4, 4, 4, 4), k1 * __builtin_shufflevector(c, c, 7, 7, 1, 1, 6, 6, 4, 2));
+    *(isogi_sh__f8 *)(t + 8) = k3 * __builtin_shufflevector(c, c, 5, 3, 5, 3, 5, 3, 5, 3);
+    __asm__("" : "+m"(t)); /* spread from memory: shuffles are what this waits for */
+#define ISOGI_SH__ROWS(i0, i1, i2, i3, i4, i5)                                                                                  \
+    p = ISOGI_SH__FMA_F8(r->xx, t[i0] - zero, ISOGI_SH__FMA_F8(r->yy, t[i1] - zero, r->zz * t[i2]));                            \
+    p = ISOGI_SH__FMA_F8(r->xy, t[i3] - zero, ISOGI_SH__FMA_F8(r->yz, t[i4] - zero, ISOGI_SH__FMA_F8(r->zx, t[i5] - zero, p)))
+    ISOGI_SH__ROWS(0, 1, 8, 2, 7, 4);
+    v = p * __builtin_shufflevector(low, low, 3, 6, 0, 6, 6, 0, 0, 0);
+    ISOGI_SH__ROWS(2, 3, 9, 1, 5, 7);
+    v = ISOGI_SH__FMA_F8(p, __builtin_shufflevector(low, low, 4, 7, 1, 7, 7, 1, 1, 1), v);
+    ISOGI_SH__ROWS(4, 5, 6, 7, 9, 8);
+    v = ISOGI_SH__FMA_F8(p, __builtin_shufflevector(high, high, 4, 7, 1, 7, 7, 1, 1, 1), v);
+#undef ISOGI_SH__ROWS
+    return ISOGI_SH__FMA_F8(scale, v, rest * __builtin_shufflevector(v, v, 4, 4, 5, 4, 4, 4, 1, 4));
+}
+
+/* As isogi_sh__euler_angles, for a matrix that has passed isogi_sh__row_pairs_start, with nothing waiting for the root that need not:
+   (u, v) is sin b times the cosine and sine of c; lengths that should be 1 are so to 1e-5. */
+ISOGI_SH__INLINE __attribute__((target("avx2,fma"))) void isogi_sh__euler_close(isogi_sh__euler *e, const float m[9]) {
+    double x = (double)m[2], y = (double)m[5], z = (double)m[8], square = x * x + y * y, sine = sqrt(square);
+    double inverse_square = 1 / square, inverse = sine * inverse_square, scale = 1.5 - 0.5 * (square + z * z);
+    double u = x * (double)m[4] - y * (double)m[1], v = x * (double)m[3] - y * (double)m[0];
+    double turned = (1.5 - 0.5 * ((u * u + v * v) * inverse_square)) * inverse;
+    e->b[0] = z * scale, e->b[1] = sine * scale;
+    e->a[0] = x * inverse, e->a[1] = y * inverse;
+    e->c[0] = u * turned, e->c[1] = v * turned;
+    if (!(square > 0)) e->a[0] = 1, e->a[1] = 0, e->c[0] = (double)m[4], e->c[1] = (double)m[3];
+}
+
+/* Degree 4, in lanes that are pairs of a cosine and a sine of one m, so that a turn about z swaps neighbours; m = 0 stands in all lanes
+   of a vector of its own. A quarter turn about y is a matrix no row of which has more than three entries. */
+ISOGI_SH__INLINE __attribute__((target("avx2,fma"))) isogi_sh__f8 isogi_sh__turn_pairs(isogi_sh__f8 v, isogi_sh__f8 cosine, isogi_sh__f8 sine) {
+    return (isogi_sh__f8)__builtin_ia32_vfmaddsubps256(v, cosine, __builtin_shufflevector(v, v, 1, 0, 3, 2, 5, 4, 7, 6) * sine);
+}
+
+ISOGI_SH__INLINE __attribute__((target("avx2,fma"))) void isogi_sh__quarter_turn4(isogi_sh__f8 *pairs, isogi_sh__f8 *zonal, const float *weights) {
+    const isogi_sh__f8 *w = (const isogi_sh__f8 *)weights;
+    isogi_sh__f8 v = *pairs, z = *zonal;
+    *pairs = ISOGI_SH__FMA_F8(w[0], __builtin_shufflevector(v, v, 0, 3, 2, 1, 0, 3, 2, 1), w[1] * __builtin_shufflevector(v, v, 4, 7, 6, 5, 4, 7, 6, 5));
+    *pairs = ISOGI_SH__FMA_F8(w[2], z, *pairs);
+    *zonal = ISOGI_SH__FMA_F8(w[3], __builtin_shufflevector(v, v, 2, 2, 2, 2, 2, 2, 2, 2), w[5] * z);
+    *zonal = ISOGI_SH__FMA_F8(w[4], __builtin_shufflevector(v, v, 6, 6, 6, 6, 6, 6, 6, 6), *zonal);
+}
+
+ISOGI_SH__INLINE __attribute__((target("avx2,fma"))) void isogi_sh__rotate_degree4(isogi_sh__f8 *pairs, isogi_sh__f8 *zonal, isogi_sh__f8 cosines, isogi_sh__f8 sines) {
+#define ISOGI_SH__TURN4(i) /* cosines and sines of m = 1, 1, 2, 2, 3, 3, 4, 4 are those of 1, 1, 1, 1, 2, 2, 2, 2 and 0, 0, 1, 1, 1, 1, 2, 2 */ \
+    do {                                                                                                                             \
+        isogi_sh__f8 a = __builtin_shufflevector(cosines, cosines, i, i, i, i, i + 4, i + 4, i + 4, i + 4);                          \
+        isogi_sh__f8 b = __builtin_shufflevector(sines, sines, i, i, i, i, i + 4, i + 4, i + 4, i + 4);                              \
+        isogi_sh__f8 p = __builtin_shufflevector(cosines, cosines, 3, 3, i, i, i, i, i + 4, i + 4);                                  \
+        isogi_sh__f8 q = __builtin_shufflevector(sines, sines, 3, 3, i, i, i, i, i + 4, i + 4);                                      \
+        *pairs = isogi_sh__turn_pairs(*pairs, a * p - b * q, ISOGI_SH__FMA_F8(a, q, b * p));                                         \
+    } while (0)
+    ISOGI_SH__TURN4(0);
+    isogi_sh__quarter_turn4(pairs, zonal, isogi_sh__quarter_f32);
+    ISOGI_SH__TURN4(1);
+    isogi_sh__quarter_turn4(pairs, zonal, isogi_sh__quarter_f32 + 48);
+    ISOGI_SH__TURN4(2);
+#undef ISOGI_SH__TURN4
+}
+
+/* Cosines and sines of the three angles of Euler, 1 and 0, and those of twice the angles. */
+ISOGI_SH__INLINE __attribute__((target("avx2,fma"))) void isogi_sh__euler_lanes(isogi_sh__f8 *cosines, isogi_sh__f8 *sines, const float m[9]) {
+    isogi_sh__euler e;
+    isogi_sh__euler_close(&e, m);
+    {
+        isogi_sh__d4 c = {-e.c[1], e.b[0], e.a[1], 1}, s = {e.c[0], e.b[1], -e.a[0], 0};
+        isogi_sh__f4 c1 = __builtin_ia32_cvtpd2ps256(c), s1 = __builtin_ia32_cvtpd2ps256(s), c2 = c1 * c1 - s1 * s1, s2 = (c1 + c1) * s1;
+        *cosines = __builtin_shufflevector(c1, c2, 0, 1, 2, 3, 4, 5, 6, 7);
+        *sines = __builtin_shufflevector(s1, s2, 0, 1, 2, 3, 4, 5, 6, 7);
+    }
+}
+
+/* What waits for a root comes first, so that the rest is done meanwhile. */
+ISOGI_SH__INLINE __attribute__((target("avx2,fma"))) int isogi_sh__rotate_low_f8(float *out, const float *in, int order, const float m[9]) {
+    isogi_sh__row_pairs r;
+    isogi_sh__f8 one, three, four, zonal, zero = {0}, cosines, sines;
+    if (order > 4) isogi_sh__euler_lanes(&cosines, &sines, m);
+    if (!isogi_sh__row_pairs_start(&r, m)) return 0;
+    one = isogi_sh__rotate_degrees12(in, &r);
+    if (order > 3) {
+        three = isogi_sh__rotate_degree3(in + 8, m, &r);
+        three = __builtin_shufflevector(one, three, 7, 8, 11, 12, 9, 13, 14, 10);
+    }
+    if (order > 4) {
+        four = *(const isogi_sh__f8 *)(in + 16), zonal = in[20] - zero;
+        four = __builtin_shufflevector(four, in[24] - zero, 5, 3, 6, 2, 7, 1, 8, 0);
+        isogi_sh__rotate_degree4(&four, &zonal, cosines, sines);
+        out[24] = four[6];
+        *(isogi_sh__f8 *)(out + 16) = __builtin_shufflevector(four, zonal, 7, 5, 3, 1, 8, 0, 2, 4);
+    }
+    out[0] = in[0];
+    *(isogi_sh__f8 *)(out + 1) = one;
+    if (order > 3) *(isogi_sh__f8 *)(out + 8) = three;
+    return 1;
+}
+
+ISOGI_SH__AVX2 static int isogi_sh__rotate_order3(float *out, const float *in, const float m[9]) { return isogi_sh__rotate_low_f8(out, in, 3, m); }
+ISOGI_SH__AVX2 static int isogi_sh__rotate_order4(float *out, const float *in, const float m[9]) { return isogi_sh__rotate_low_f8(out, in, 4, m); }
+ISOGI_SH__AVX2 static int isogi_sh__rotate_order5(float *out, const float *in, const float m[9]) { return isogi_sh__rotate_low_f8(out, in, 5, m); }
+
+#endif
+
 /* Any order, a few channels at a time; float or double alike. */
 static void isogi_sh__rotate(void *out, const void *in, int is_double, int order, int channels, const isogi_sh__euler *e) {
     double band[2 * ISOGI_SH_MAX_ORDER * ISOGI_SH__TOGETHER], other[2 * ISOGI_SH_MAX_ORDER * ISOGI_SH__TOGETHER];
@@ -1629,7 +1805,8 @@ ISOGI_API isogi_result isogi_sh_rotate_f64(double *out, const double *in, int or
     return ISOGI_OK;
 }
 
-ISOGI_API isogi_result isogi_sh_rotate(float *out, const float *in, int order, int channels, const float m[9]) {
+/* Kept out of the caller, whose fast way would pay for its registers. */
+ISOGI_SH__APART isogi_result isogi_sh__rotate_f32(float *out, const float *in, int order, int channels, const float m[9]) {
     isogi_sh__euler e;
     double r[9];
     int i;
@@ -1639,6 +1816,16 @@ ISOGI_API isogi_result isogi_sh_rotate(float *out, const float *in, int order, i
     if (order <= 5 && channels == 1) isogi_sh__rotate_low_f32(out, in, order, &e);
     else isogi_sh__rotate(out, in, 0, order, channels, &e);
     return ISOGI_OK;
+}
+
+ISOGI_API isogi_result isogi_sh_rotate(float *out, const float *in, int order, int channels, const float m[9]) {
+#ifdef ISOGI_SH__SIMD
+    if (order >= 3 && order <= 5 && channels == 1 && out && in && m && isogi_sh__avx2()) {
+        if (order == 3 ? isogi_sh__rotate_order3(out, in, m) : order == 4 ? isogi_sh__rotate_order4(out, in, m) : isogi_sh__rotate_order5(out, in, m))
+            return ISOGI_OK;
+    }
+#endif
+    return isogi_sh__rotate_f32(out, in, order, channels, m);
 }
 
 ISOGI_API isogi_result isogi_sh_rotate_z(float *out, const float *in, int order, int channels, double angle) {
@@ -1724,11 +1911,11 @@ static void isogi_sh__wigner_start(isogi_sh__wigner *w, int order, const isogi_s
 /* The 2x2 block of rows (cos, sin) n and columns (cos, sin) m of degree l, from A = d and B = (-1)^m' d of the other sign:
    Z(a) diag(A + B, A - B) Z(c) with p = n a + m c, q = n a - m c. */
 ISOGI_SH__INLINE void isogi_sh__put_block(const isogi_sh__blocks *out, int at, int l, int n, int m, double a, double b, const double p[2], const double q[2]) {
-    int width = 2 * l + 1, plus = at + width * (l + n) + l, minus = at + width * (l - n) + l;
-    isogi_sh__put(out, plus + m, a * p[0] + b * q[0]);
-    isogi_sh__put(out, plus - m, b * q[1] - a * p[1]);
-    isogi_sh__put(out, minus + m, a * p[1] + b * q[1]);
-    isogi_sh__put(out, minus - m, a * p[0] - b * q[0]);
+    int width = 2 * l + 1, plus = at + width * (l + m) + l, minus = at + width * (l - m) + l;
+    isogi_sh__put(out, plus + n, a * p[0] + b * q[0]);
+    isogi_sh__put(out, minus + n, b * q[1] - a * p[1]);
+    isogi_sh__put(out, plus - n, a * p[1] + b * q[1]);
+    isogi_sh__put(out, minus - n, a * p[0] - b * q[0]);
 }
 
 ISOGI_SH__INLINE void isogi_sh__turn_product(double p[2], const double a[2], const double c[2], double sign) {
@@ -1752,14 +1939,14 @@ ISOGI_SH__INLINE void isogi_sh__wigner_pair(const isogi_sh__blocks *out, int ord
     isogi_sh__turn_product(across, w->a[m], w->c[n], 1);
     isogi_sh__turn_product(back, w->a[m], w->c[n], -1);
     for (l = m;; l++) {
-        int width = 2 * l + 1, row = at + width * l + l;
+        int width = 2 * l + 1, centre = at + width * l + l;
         double first, second, square, next;
         if (n == 0) {
             double value = 1.41421356237309504880 * a;
-            isogi_sh__put(out, row + m, value * near[0]);
-            isogi_sh__put(out, row - m, -value * near[1]);
-            isogi_sh__put(out, row + width * m, flip * value * across[0]);
-            isogi_sh__put(out, row - width * m, flip * value * across[1]);
+            isogi_sh__put(out, centre + width * m, value * near[0]);
+            isogi_sh__put(out, centre - width * m, -value * near[1]);
+            isogi_sh__put(out, centre + m, flip * value * across[0]);
+            isogi_sh__put(out, centre - m, flip * value * across[1]);
         } else {
             isogi_sh__put_block(out, at, l, n, m, a, sign * b, near, far);
             if (n != m) isogi_sh__put_block(out, at, l, m, n, flip * a, flip * sign * b, across, back);
@@ -1826,9 +2013,9 @@ static void isogi_sh__rotation_build(void *rotation, int is_double, int order, c
             for (i = 0; i < some * width; i++) band[i] = 0;
             for (k = 0; k < some; k++) band[some * (first + k) + k] = 1;
             isogi_sh__rotate_band(band, other, l, some, &turns);
-            for (i = 0; i < width; i++)
-                for (k = 0; k < some; k++) {
-                    size_t j = at + (size_t)(width * i + first + k);
+            for (k = 0; k < some; k++)
+                for (i = 0; i < width; i++) {
+                    size_t j = at + (size_t)(width * (first + k) + i);
                     if (is_double) ((double *)rotation)[j] = band[some * i + k];
                     else ((float *)rotation)[j] = (float)band[some * i + k];
                 }
@@ -1856,53 +2043,64 @@ ISOGI_API isogi_result isogi_sh_rotation_build(float *rotation, int order, const
 }
 
 #ifdef ISOGI_SH__SIMD
-/* One channel of order 5: the 24 rows of degrees 1 to 4 times their band, eight products each, summed by turning 8 x 8 tiles. What
-   is loaded past a row meets zeros; the ninth column of degree 4 is added last. */
+/* One channel of order 5: columns times numbers. What is loaded and stored past a band is overwritten by the next one; the ninth
+   row of degree 4 is a sum of its own. Loads are what this waits for, so half of the numbers are spread from registers, four a
+   load: the empty assembly keeps the compiler from fetching each by itself. */
+#define ISOGI_SH__COLUMN(sum, offset, x) sum = ISOGI_SH__FMA_F8(*(const isogi_sh__f8 *)(rotation + (offset)), x, sum)
+#define ISOGI_SH__FOUR(i)                                                                                                             \
+    four = __builtin_shufflevector(*(const isogi_sh__f4 *)(in + (i)), *(const isogi_sh__f4 *)(in + (i)), 0, 1, 2, 3, 0, 1, 2, 3); \
+    __asm__("" : "+x"(four))
+#define ISOGI_SH__OF_FOUR(i) x = __builtin_shufflevector(four, four, i, i, i, i, i + 4, i + 4, i + 4, i + 4)
+#define ISOGI_SH__BOTH(j) ISOGI_SH__COLUMN(d, 84 + 9 * (j), x), last = __builtin_fmaf(rotation[92 + 9 * (j)], x[0], last)
 ISOGI_SH__AVX2 static void isogi_sh__apply_order5(float *out, const float *in, const float *rotation) {
-    static const int32_t mask[4][8] = {
-        {-1, -1, -1, 0, 0, 0, 0, 0}, {-1, -1, -1, -1, -1, 0, 0, 0}, {-1, -1, -1, -1, -1, -1, -1, 0}, {-1, -1, -1, -1, -1, -1, -1, -1}};
-    isogi_sh__f8 products[24], turned[8], band;
-    int i;
-#define ISOGI_SH__BAND(l) band = (isogi_sh__f8)((isogi_sh__i8) * (const isogi_sh__f8 *)(in + l * l) & *(const isogi_sh__i8 *)mask[l - 1])
-#define ISOGI_SH__ROW(l, i) products[l * l - 1 + i] = *(const isogi_sh__f8 *)(rotation + l * (4 * l * l - 1) / 3 + (2 * l + 1) * i) * band
+    isogi_sh__f8 zero = {0}, a = zero, b = zero, c = zero, d = zero, x = in[16] - zero, four;
+    float last = 0;
+    int j;
+    ISOGI_SH__BOTH(0);
+    ISOGI_SH__UNROLL9
+    for (j = 0; j < 3; j++) ISOGI_SH__COLUMN(a, 1 + 3 * j, in[1 + j] - zero);
+    ISOGI_SH__FOUR(17);
+    ISOGI_SH__OF_FOUR(0), ISOGI_SH__BOTH(1);
+    ISOGI_SH__OF_FOUR(1), ISOGI_SH__BOTH(2);
+    ISOGI_SH__OF_FOUR(2), ISOGI_SH__BOTH(3);
+    ISOGI_SH__OF_FOUR(3), ISOGI_SH__BOTH(4);
+    ISOGI_SH__UNROLL9
+    for (j = 0; j < 5; j++) ISOGI_SH__COLUMN(b, 10 + 5 * j, in[4 + j] - zero);
+    ISOGI_SH__FOUR(21);
+    ISOGI_SH__OF_FOUR(0), ISOGI_SH__BOTH(5);
+    ISOGI_SH__OF_FOUR(1), ISOGI_SH__BOTH(6);
+    ISOGI_SH__OF_FOUR(2), ISOGI_SH__BOTH(7);
+    ISOGI_SH__OF_FOUR(3), ISOGI_SH__BOTH(8);
+    ISOGI_SH__UNROLL9
+    for (j = 0; j < 7; j++) ISOGI_SH__COLUMN(c, 35 + 7 * j, in[9 + j] - zero);
     out[0] = rotation[0] * in[0];
-    ISOGI_SH__BAND(1);
-    ISOGI_SH__ROW(1, 0), ISOGI_SH__ROW(1, 1), ISOGI_SH__ROW(1, 2);
-    ISOGI_SH__BAND(2);
-    ISOGI_SH__ROW(2, 0), ISOGI_SH__ROW(2, 1), ISOGI_SH__ROW(2, 2), ISOGI_SH__ROW(2, 3), ISOGI_SH__ROW(2, 4);
-    ISOGI_SH__BAND(3);
-    ISOGI_SH__ROW(3, 0), ISOGI_SH__ROW(3, 1), ISOGI_SH__ROW(3, 2), ISOGI_SH__ROW(3, 3), ISOGI_SH__ROW(3, 4), ISOGI_SH__ROW(3, 5);
-    ISOGI_SH__ROW(3, 6);
-    ISOGI_SH__BAND(4);
-    ISOGI_SH__ROW(4, 0), ISOGI_SH__ROW(4, 1), ISOGI_SH__ROW(4, 2), ISOGI_SH__ROW(4, 3), ISOGI_SH__ROW(4, 4), ISOGI_SH__ROW(4, 5);
-    ISOGI_SH__ROW(4, 6), ISOGI_SH__ROW(4, 7), ISOGI_SH__ROW(4, 8);
-#undef ISOGI_SH__BAND
-#undef ISOGI_SH__ROW
-    for (i = 0; i < 24; i += 8) {
-        isogi_sh__transpose_f8((float *)turned, 8, (const float *)(products + i), 8);
-        *(isogi_sh__f8 *)(out + 1 + i) = ((turned[0] + turned[1]) + (turned[2] + turned[3])) + ((turned[4] + turned[5]) + (turned[6] + turned[7]));
-    }
-    for (i = 0; i < 9; i++) out[16 + i] += rotation[ISOGI_SH_ROTATION_COUNT(4) + 8 + 9 * (size_t)i] * in[24];
+    *(isogi_sh__f8 *)(out + 1) = a;
+    *(isogi_sh__f8 *)(out + 4) = b;
+    *(isogi_sh__f8 *)(out + 9) = c;
+    *(isogi_sh__f8 *)(out + 16) = d;
+    out[24] = last;
 }
+#undef ISOGI_SH__COLUMN
+#undef ISOGI_SH__OF_FOUR
+#undef ISOGI_SH__BOTH
+#undef ISOGI_SH__FOUR
 #endif
 
 ISOGI_API isogi_result isogi_sh_rotation_apply(float *out, const float *in, int order, int channels, const float *rotation) {
     int l, i, j, k;
     if (!out || !in || !rotation || !isogi_sh__shape_ok(order, channels)) return ISOGI_INVALID;
 #ifdef ISOGI_SH__SIMD
-    if (order == 5 && channels == 1 && isogi_sh__level()) {
+    if (order == 5 && channels == 1 && isogi_sh__avx2()) {
         isogi_sh__apply_order5(out, in, rotation);
         return ISOGI_OK;
     }
 #endif
     for (l = 0; l < order; l++) {
         int width = 2 * l + 1, base = channels * l * l;
-        for (i = 0; i < width; i++, rotation += width)
-            for (k = 0; k < channels; k++) {
-                float sum = 0;
-                for (j = 0; j < width; j++) sum += rotation[j] * in[base + channels * j + k];
-                out[base + channels * i + k] = sum;
-            }
+        for (i = 0; i < width * channels; i++) out[base + i] = 0;
+        for (j = 0; j < width; j++, rotation += width)
+            for (i = 0; i < width; i++)
+                for (k = 0; k < channels; k++) out[base + channels * i + k] += rotation[i] * in[base + channels * j + k];
     }
     return ISOGI_OK;
 }
@@ -1912,12 +2110,10 @@ ISOGI_API isogi_result isogi_sh_rotation_apply_f64(double *out, const double *in
     if (!out || !in || !rotation || !isogi_sh__shape_ok(order, channels)) return ISOGI_INVALID;
     for (l = 0; l < order; l++) {
         int width = 2 * l + 1, base = channels * l * l;
-        for (i = 0; i < width; i++, rotation += width)
-            for (k = 0; k < channels; k++) {
-                double sum = 0;
-                for (j = 0; j < width; j++) sum += rotation[j] * in[base + channels * j + k];
-                out[base + channels * i + k] = sum;
-            }
+        for (i = 0; i < width * channels; i++) out[base + i] = 0;
+        for (j = 0; j < width; j++, rotation += width)
+            for (i = 0; i < width; i++)
+                for (k = 0; k < channels; k++) out[base + channels * i + k] += rotation[i] * in[base + channels * j + k];
     }
     return ISOGI_OK;
 }
@@ -2276,8 +2472,8 @@ ISOGI_SH__AVX2 static void isogi_sh__latitudes_f8(isogi_sh__f8 *c, isogi_sh__f8 
         isogi_sh__f8 a = zero, b = zero;
         ISOGI_SH__UNROLL
         for (l = m; l < 5; l++, q++) {
-            a = ISOGI_SH__FMA_F8(*q, zero + f[l * (l + 1) + m], a);
-            if (m) b = ISOGI_SH__FMA_F8(*q, zero + f[l * (l + 1) - m], b);
+            a = ISOGI_SH__FMA_F8(*q, f[l * (l + 1) + m] - zero, a);
+            if (m) b = ISOGI_SH__FMA_F8(*q, f[l * (l + 1) - m] - zero, b);
         }
         c[m] = a, s[m] = b;
     }
@@ -3249,6 +3445,7 @@ ISOGI_API isogi_result isogi_sh_fit_directional(float direction[3], float rgb[3]
 #undef ISOGI_SH__ALL8
 #undef ISOGI_SH__UNROLL
 #undef ISOGI_SH__UNROLL9
+#undef ISOGI_SH__APART
 #undef ISOGI_SH__INLINE
 #undef ISOGI_SH__FMA_F8
 #undef ISOGI_SH__FMA_F16
