@@ -205,6 +205,14 @@ ISOGI_API const isogi_volume *isogi_vol_volume(const isogi_pyramid *pyramid); /*
 ISOGI_API const isogi_context *isogi_vol_context(const isogi_pyramid *pyramid);
 ISOGI_API isogi_level isogi_vol_level(const isogi_pyramid *pyramid, int level); /* all zero beyond the last */
 ISOGI_API void isogi_vol_range(const isogi_pyramid *pyramid, double range[2]);  /* of the finite values; {0,0} if there are none */
+/* What the field can be in the box of voxels first..last, both ends included and cut to the volume, and in all cells between them; by
+   way of the pyramid, so that large boxes are no dearer than small ones but for their rim.
+   isogi_vol_box_range: {least, largest} finite value, rounded outwards to float where whole blocks lie in the box; least > largest where
+   there is none.
+   isogi_vol_may_hold: 0 if the field takes no value of any of the closed intervals ranges[n] = {low, high}, else 1. */
+ISOGI_API isogi_result isogi_vol_box_range(const isogi_pyramid *pyramid, const size_t first[3], const size_t last[3], double range[2]);
+ISOGI_API int isogi_vol_may_hold(const isogi_pyramid *pyramid, const size_t first[3], const size_t last[3], const double (*ranges)[2],
+                                 size_t range_count);
 ISOGI_API void isogi_vol_to_world(const isogi_pyramid *pyramid, const double grid[3], double world[3]);
 ISOGI_API void isogi_vol_to_grid(const isogi_pyramid *pyramid, const double world[3], double grid[3]);
 
@@ -263,6 +271,15 @@ ISOGI_API isogi_result isogi_vol_continue(const isogi_pyramid *pyramid, const is
    which the side is not known. ISOGI_TOO_LARGE if count * capacity hits cannot be addressed. */
 ISOGI_API isogi_result isogi_vol_intersect_all(const isogi_pyramid *pyramid, const isogi_ray *rays, size_t count, size_t capacity,
                                                isogi_hit *hits, size_t *counts, isogi_counters *counters);
+
+/* What a renderer may not skip: the next piece of the ray, at or behind t = from, that runs through blocks of 4^3 cells in which the
+   field may take a value of one of the closed intervals ranges[n] = {low, high}; pieces of neighbouring blocks are one. 1 and
+   interval = {begin, end} within the ray's tmin and tmax, or 0 and no change if there is none. Between the pieces the field takes none
+   of these values, but for roundings of 1e-12 cell. The ray's isovalue and flags are not read.
+       for (t = ray.tmin; isogi_vol_next_interval(pyramid, &ray, ranges, n, t, piece, NULL); t = piece[1]) ...
+   counters->blocks: blocks looked at. */
+ISOGI_API int isogi_vol_next_interval(const isogi_pyramid *pyramid, const isogi_ray *ray, const double (*ranges)[2], size_t range_count,
+                                      double from, double interval[2], isogi_counters *counters);
 
 /* Rays that share everything but the direction: what gathering light at a point needs. The same bits as rays of their own. */
 typedef struct isogi_bundle {
@@ -1501,6 +1518,94 @@ ISOGI_API isogi_level isogi_vol_level(const isogi_pyramid *pyramid, int level) {
 ISOGI_API void isogi_vol_range(const isogi_pyramid *pyramid, double range[2]) {
     if (!range) return;
     range[0] = pyramid ? pyramid->range[0] : 0, range[1] = pyramid ? pyramid->range[1] : 0;
+}
+
+/* ---- what a box can hold ---- */
+
+static int isogi_vol__any_overlaps(const double (*ranges)[2], size_t count, double low, double high) {
+    size_t i;
+    for (i = 0; i < count; i++)
+        if (ranges[i][0] <= ranges[i][1] && ranges[i][0] <= high && ranges[i][1] >= low) return 1;
+    return 0;
+}
+
+typedef struct isogi_vol__box_query {
+    const isogi_pyramid *pyramid;
+    size_t first[3], last[3];
+    const double (*ranges)[2]; /* NULL: the range is asked for */
+    size_t count;
+    double range[2];
+} isogi_vol__box_query;
+
+/* Takes a block into the answer, from its bounds or from those within it; 1 if nothing more has to be known. */
+static int isogi_vol__query_block(isogi_vol__box_query *q, int n, const size_t block[3]) {
+    const isogi_level *level = &q->pyramid->level[n];
+    const float *bound = level->range[block[0] + level->size[0] * (block[1] + level->size[1] * block[2])];
+    double range[2];
+    size_t low[3], high[3], child[3];
+    int a, within = 1;
+    range[0] = (double)bound[0], range[1] = (double)bound[1];
+    if (range[0] > range[1]) return 0;
+    if (q->ranges ? !isogi_vol__any_overlaps(q->ranges, q->count, range[0], range[1]) : range[0] >= q->range[0] && range[1] <= q->range[1]) return 0;
+    for (a = 0; a < 3; a++) {
+        low[a] = block[a] * (size_t)level->cells, high[a] = (size_t)isogi_vol__last_voxel(block[a], level->cells, q->pyramid->volume.size[a]);
+        within = within && low[a] >= q->first[a] && high[a] <= q->last[a];
+        low[a] = low[a] > q->first[a] ? low[a] : q->first[a], high[a] = isogi_vol__min_size(high[a], q->last[a]);
+    }
+    if (!within && n) {
+        const isogi_level *below = level - 1;
+        const size_t c = (size_t)below->cells;
+        for (a = 0; a < 3; a++) { /* the children that cover the voxels low..high; neighbours share voxels */
+            low[a] = isogi_vol__min_size(low[a] / c, below->size[a] - 1);
+            high[a] = high[a] > low[a] * c ? (high[a] - 1) / c : low[a];
+            high[a] = isogi_vol__min_size(high[a], below->size[a] - 1);
+        }
+        for (child[2] = low[2]; child[2] <= high[2]; child[2]++)
+            for (child[1] = low[1]; child[1] <= high[1]; child[1]++)
+                for (child[0] = low[0]; child[0] <= high[0]; child[0]++)
+                    if (isogi_vol__query_block(q, n - 1, child)) return 1;
+        return 0;
+    }
+    if (!within) isogi_volume_range(&q->pyramid->volume, low, high, range);
+    if (q->ranges) return range[0] <= range[1] && isogi_vol__any_overlaps(q->ranges, q->count, range[0], range[1]);
+    q->range[0] = isogi_vol__min(q->range[0], range[0]), q->range[1] = isogi_vol__max(q->range[1], range[1]);
+    return 0;
+}
+
+static int isogi_vol__query_box(isogi_vol__box_query *q, const size_t first[3], const size_t last[3]) {
+    const isogi_level *top = &q->pyramid->level[2];
+    const size_t c = (size_t)top->cells;
+    size_t block[3], end[3], begin[3];
+    int a;
+    for (a = 0; a < 3; a++) {
+        q->first[a] = first[a], q->last[a] = isogi_vol__min_size(last[a], q->pyramid->volume.size[a] - 1);
+        if (first[a] > q->last[a]) return 0;
+        begin[a] = isogi_vol__min_size(first[a] / c, top->size[a] - 1), end[a] = isogi_vol__min_size(q->last[a] / c, top->size[a] - 1);
+    }
+    for (block[2] = begin[2]; block[2] <= end[2]; block[2]++)
+        for (block[1] = begin[1]; block[1] <= end[1]; block[1]++)
+            for (block[0] = begin[0]; block[0] <= end[0]; block[0]++)
+                if (isogi_vol__query_block(q, 2, block)) return 1;
+    return 0;
+}
+
+ISOGI_API isogi_result isogi_vol_box_range(const isogi_pyramid *pyramid, const size_t first[3], const size_t last[3], double range[2]) {
+    isogi_vol__box_query q;
+    if (!pyramid || !first || !last || !range) return ISOGI_INVALID;
+    memset(&q, 0, sizeof q);
+    q.pyramid = pyramid, q.range[0] = DBL_MAX, q.range[1] = -DBL_MAX;
+    isogi_vol__query_box(&q, first, last);
+    range[0] = q.range[0], range[1] = q.range[1];
+    return ISOGI_OK;
+}
+
+ISOGI_API int isogi_vol_may_hold(const isogi_pyramid *pyramid, const size_t first[3], const size_t last[3], const double (*ranges)[2],
+                                 size_t range_count) {
+    isogi_vol__box_query q;
+    if (!pyramid || !first || !last || !ranges) return 0;
+    memset(&q, 0, sizeof q);
+    q.pyramid = pyramid, q.ranges = ranges, q.count = range_count;
+    return isogi_vol__query_box(&q, first, last);
 }
 
 /* ==== values and gradients =========================================================================================== */
@@ -2998,6 +3103,73 @@ ISOGI_API isogi_result isogi_vol_intersect_all(const isogi_pyramid *pyramid, con
             isogi_vol__follow_on(pyramid, &f, rays, counters);
     }
     return ISOGI_OK;
+}
+
+/* ---- pieces of a ray that can hold given values ---- */
+
+/* The largest block around the present cell, no larger than level `top`, that holds none of the values, else the smallest one: its
+   bounds; whether it may hold some. */
+static int isogi_vol__holding_block(isogi_vol__walk *w, const double (*ranges)[2], size_t count, int top, int low[3], int high[3]) {
+    int n, a, holds = 1;
+    for (n = top; n >= 0; n--) {
+        const isogi_level *level = &w->pyramid->level[n];
+        const int shift = 2 + 2 * n;
+        size_t b[3];
+        const float *range;
+        for (a = 0; a < 3; a++) {
+            b[a] = (size_t)(w->cell[a] >> shift), low[a] = (w->cell[a] >> shift) << shift;
+            high[a] = w->pyramid->cells[a] - low[a] < level->cells ? w->pyramid->cells[a] : low[a] + level->cells;
+        }
+        range = level->range[b[0] + level->size[0] * (b[1] + level->size[1] * b[2])];
+        w->count.blocks++;
+        holds = range[0] <= range[1] && isogi_vol__any_overlaps(ranges, count, (double)range[0], (double)range[1]);
+        if (!holds) break;
+    }
+    return holds;
+}
+
+/* From where the walk stands to the end of the next piece; t of its two ends. */
+static int isogi_vol__walk_interval(isogi_vol__walk *w, const double (*ranges)[2], size_t count, double interval[2]) {
+    int top = ISOGI_VOL__LEVELS - 1, low[3], high[3], axis, open = 0, a;
+    for (;;) {
+        int before[3], changed = 0;
+        const int holds = isogi_vol__holding_block(w, ranges, count, top, low, high);
+        const double t = isogi_vol__exit(w, low, high, &axis);
+        if (open && !holds) break;
+        if (holds && !open) interval[0] = w->t, open = 1;
+        interval[1] = isogi_vol__min(t, w->end);
+        if (t >= w->end) break;
+        for (a = 0; a < 3; a++) before[a] = w->cell[a];
+        if (!isogi_vol__advance(w, low, high, t, axis)) break;
+        for (a = 0; a < 3; a++) changed |= before[a] ^ w->cell[a];
+        top = changed >= 64 ? 2 : changed >= 16 ? 1 : 0; /* larger blocks whose bounds were not crossed are known to hold some */
+    }
+    return open;
+}
+
+ISOGI_API int isogi_vol_next_interval(const isogi_pyramid *pyramid, const isogi_ray *ray, const double (*ranges)[2], size_t range_count,
+                                      double from, double interval[2], isogi_counters *counters) {
+    isogi_vol__batch b;
+    isogi_vol__walk w;
+    isogi_hit none;
+    isogi_ray rest;
+    double piece[2] = {0, 0}, begin, end, slack;
+    int found;
+    if (!pyramid || !ray || !ranges || !interval) return 0;
+    memset(&b, 0, sizeof b);
+    rest = *ray, rest.flags = 0, rest.isovalue = 0;
+    if (from > rest.tmin) rest.tmin = from;
+    b.pyramid = pyramid, b.rays = &rest, b.hits = &none;
+    if (isogi_vol__is_nan(from) || !isogi_vol__begin(&b, 0, &w)) return 0;
+    isogi_vol__first_cell(&w);
+    found = isogi_vol__walk_interval(&w, ranges, range_count, piece);
+    if (counters) counters->blocks += w.count.blocks;
+    /* what rounding may have moved */
+    slack = 1e-12 * (fabs(w.base) + piece[1] + 1 / isogi_vol__largest(w.dir[0], w.dir[1], w.dir[2]));
+    begin = isogi_vol__max(w.base + piece[0] - slack, w.base), end = isogi_vol__min(piece[1] + slack, w.end) + w.base;
+    if (!found || !(end > begin) || !(w.end > slack)) return 0;
+    interval[0] = begin, interval[1] = end;
+    return 1;
 }
 
 /* ---- bundles: in groups of rays of their own ---- */

@@ -245,6 +245,113 @@ TEST(bundles_have_the_bits_of_single_rays) {
     CHECK(found > 5000, "only %ld hits", found);
 }
 
+/* ---- value ranges ---- */
+
+/* Whether a cell of the box first..last has a value in one of the ranges. */
+static int box_holds(const field *f, const size_t first[3], const size_t last[3], const double (*ranges)[2], size_t count) {
+    for (size_t z = first[2]; z < last[2]; z++)
+        for (size_t y = first[1]; y < last[1]; y++)
+            for (size_t x = first[0]; x < last[0]; x++) {
+                double low = DBL_MAX, high = -DBL_MAX;
+                for (int c = 0; c < 8; c++) {
+                    double value = *field_at(f, (int)x + (c & 1), (int)y + (c >> 1 & 1), (int)z + (c >> 2));
+                    if (isfinite(value)) low = fmin(low, value), high = fmax(high, value);
+                }
+                for (size_t n = 0; n < count; n++)
+                    if (low <= high && ranges[n][0] <= high && ranges[n][1] >= low) return 1;
+            }
+    return 0;
+}
+
+static size_t random_ranges(double (*ranges)[2], test_random *r) {
+    size_t count = 1 + random_bits(r) % 3;
+    for (size_t n = 0; n < count; n++) ranges[n][0] = random_range(r, -4.5, 4.5), ranges[n][1] = ranges[n][0] + random_range(r, 0, 0.3);
+    return count;
+}
+
+TEST(boxes_hold_what_their_voxels_say) {
+    test_random r = {20};
+    long held = 0, empty = 0;
+    for (int v = 0; v < 12; v++) {
+        field f = field_new(v % 3 ? 90 : 7, 30, 41);
+        field_fill(&f, v % 2 ? SMOOTH : QUANTISED, &r);
+        for (int i = 0; i < f.size[0] * f.size[1] * f.size[2]; i++) f.value[i] = (double)(float)f.value[i];
+        field_build(&f);
+        const isogi_volume *volume = isogi_vol_volume(f.pyramid);
+        for (int i = 0; i < (LONG_SUITE ? 2000 : 200); i++) {
+            size_t first[3], last[3], count;
+            double ranges[3][2], range[2], truth[2];
+            for (int a = 0; a < 3; a++) {
+                first[a] = random_bits(&r) % (volume->size[a] - 1);
+                last[a] = first[a] + 1 + random_bits(&r) % (i % 2 ? 6 : volume->size[a] - 1 - first[a]);
+                if (last[a] >= volume->size[a]) last[a] = volume->size[a] - 1;
+            }
+            CHECK(isogi_vol_box_range(f.pyramid, first, last, range) == ISOGI_OK, "box");
+            isogi_volume_range(volume, first, last, truth);
+            CHECK(range[0] == truth[0] && range[1] == truth[1], "%g..%g, not %g..%g", range[0], range[1], truth[0], truth[1]);
+            count = random_ranges(ranges, &r);
+            int holds = box_holds(&f, first, last, (const double(*)[2])ranges, count);
+            CHECK(isogi_vol_may_hold(f.pyramid, first, last, (const double(*)[2])ranges, count) == holds, "holds %d", holds);
+            held += holds, empty += !holds;
+        }
+        field_free(&f);
+    }
+    CHECK(held > 300 && empty > 300, "%ld boxes hold some, %ld none: the test says little", held, empty);
+}
+
+/* Densely sampled: a place lies in a piece if and only if its block may hold a value of the ranges. */
+TEST(pieces_of_rays_are_those_whose_blocks_hold_the_ranges) {
+    test_random r = {21};
+    long within = 0, between = 0, pieces = 0, touching = 0;
+    for (int v = 0; v < (LONG_SUITE ? 200 : 20); v++) {
+        field f = field_new(70, 34, 66);
+        field_fill(&f, v % KINDS, &r);
+        for (int i = 0; i < f.size[0] * f.size[1] * f.size[2]; i++) f.value[i] = (double)(float)f.value[i];
+        for (int i = 0; i < 300 * (v % 2); i++) f.value[random_bits(&r) % (70 * 34 * 66)] = (double)NAN;
+        for (int a = 0; a < 3; a++) f.volume.spacing[a] = 0.5 + a;
+        field_build(&f);
+        for (int i = 0; i < 40; i++) {
+            isogi_ray ray = random_ray(&f, (double)NAN, &r);
+            double ranges[3][2], piece[2] = {0, 0}, at, end = -1, step = 0.037;
+            size_t count = random_ranges(ranges, &r);
+            isogi_counters counters = {0};
+            ray.isovalue = 0;
+            for (int a = 0; a < 3; a++) ray.origin[a] *= 0.5 + a;
+            if (i % 5 == 0) ray.dir[i % 3] = 0;
+            if (i % 4 == 0) ray.tmin = random_range(&r, 0, 20), ray.tmax = ray.tmin + random_range(&r, 0, 50);
+            int more = isogi_vol_next_interval(f.pyramid, &ray, (const double(*)[2])ranges, count, ray.tmin, piece, &counters), n = 0;
+            pieces += more;
+            for (at = ray.tmin; at < (ray.tmax > 0 ? ray.tmax : 400); at += step) {
+                while (more && piece[1] < at && n++ < 1000) {
+                    end = piece[1];
+                    more = isogi_vol_next_interval(f.pyramid, &ray, (const double(*)[2])ranges, count, end, piece, &counters);
+                    CHECK(!more || (piece[0] >= end && piece[1] > piece[0]), "%g..%g after %g", piece[0], piece[1], end);
+                    pieces += more, touching += more && piece[0] - end < 1e-9;
+                }
+                size_t first[3], last[3];
+                int inside = 1, edge = 0;
+                for (int a = 0; a < 3; a++) {
+                    double grid = (ray.origin[a] + at * (double)ray.dir[a]) / (0.5 + a), block = grid / 4;
+                    edge |= fabs(block - floor(block + 0.5)) < 1e-9 || fabs(grid - (f.size[a] - 1)) < 1e-9 || fabs(grid) < 1e-9;
+                    inside &= grid >= 0 && grid <= f.size[a] - 1;
+                    first[a] = inside ? 4 * (size_t)block : 0, last[a] = first[a] + 4;
+                    if (last[a] > (size_t)f.size[a] - 1) last[a] = (size_t)f.size[a] - 1;
+                }
+                if (edge) continue;
+                int holds = inside && isogi_vol_may_hold(f.pyramid, first, last, (const double(*)[2])ranges, count);
+                int in_piece = more && at >= piece[0] && at <= piece[1];
+                CHECK(holds == in_piece, "t %g: may hold %d, in a piece %d (%g..%g)", at, holds, in_piece, piece[0], piece[1]);
+                within += holds, between += inside && !holds;
+            }
+            CHECK(n < 1000, "no end of pieces");
+        }
+        field_free(&f);
+    }
+    printf("    %ld pieces; %ld places within them, %ld between\n", pieces, within, between);
+    CHECK(touching * 50 <= pieces, "%ld of %ld pieces begin where another ends", touching, pieces);
+    CHECK(within > 10000 && between > 10000 && pieces > 300, "%ld and %ld places: the test says little", within, between);
+}
+
 /* ---- updates ---- */
 
 static void store(void *p, isogi_type type, size_t i, double v) {
