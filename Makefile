@@ -13,7 +13,9 @@ WARN   := -Wall -Wextra -Wpedantic -Wconversion -Wsign-conversion -Wshadow -Wdou
 C99    := -std=gnu99 $(WARN) -ffp-contract=off -I. -Iexamples/common
 LIBS   := -lm -lpthread
 
-EXAMPLES := $(patsubst examples/%.c,build/%,$(wildcard examples/*.c))
+# bake_mpi is built where there is an MPI compiler, and by that.
+MPICC    := $(shell command -v mpicc 2>/dev/null)
+EXAMPLES := $(patsubst examples/%.c,build/%,$(filter-out $(if $(MPICC),,examples/bake_mpi.c),$(wildcard examples/*.c)))
 TESTS    := $(patsubst tests/%.c,build/tests/%,$(wildcard tests/test_*.c))
 BENCHES  := $(patsubst tests/bench/%.c,build/bench/%,$(wildcard tests/bench/bench_$(or $(ONLY),*).c))
 
@@ -34,6 +36,10 @@ COMPILE = @rm -f $@; echo "$(CC) $<"; \
 
 build/%: examples/%.c build/flags
 	$(call COMPILE)
+
+# MPI's headers do not keep to our warnings.
+build/bake_mpi: examples/bake_mpi.c build/flags
+	@rm -f $@; echo "mpicc $<"; mpicc -std=gnu99 -Wall -Wextra -ffp-contract=off -I. -Iexamples/common $(CFLAGS) -MMD -MP -MF $@.d -MT $@ -o $@ $< $(LIBS)
 
 build/tests/%: tests/%.c build/flags
 	$(call COMPILE,-Itests)

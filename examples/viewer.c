@@ -8,6 +8,7 @@
 
 #include "camera.h"
 #include "hdr.h"
+#include "option_text.h"
 #include "picture.h"
 #include "png.h"
 #include "procedural.h"
@@ -110,18 +111,6 @@ static int fail(viewer *v, const char *what, isogi_result result) {
     return file_fail(v->error, "%s: %s", what, isogi_result_string(result));
 }
 
-/* Exactly `count` numbers parted by `separator`, each low..high; 0 otherwise. */
-static int numbers(const char *text, char separator, int count, double low, double high, double *out) {
-    double x[4];
-    char *end;
-    for (int i = 0; i < count; i++, text = end + 1) {
-        x[i] = strtod(text, &end);
-        if (end == text || !(x[i] >= low && x[i] <= high) || *end != (i + 1 < count ? separator : 0)) return 0;
-    }
-    memcpy(out, x, (size_t)count * sizeof *x);
-    return 1;
-}
-
 typedef struct option {
     const char *name, *argument, *help;
     enum { FLAG, INTEGER, NUMBERS, FLOATS, SIZES, TEXT, OTHER } kind;
@@ -138,11 +127,6 @@ static int parse_scene(viewer *v, const char *text) {
     return v->o.scene && !strcmp(text, v->o.scene->name);
 }
 
-static int parse_name(const char *text, const char *const *names, int count, int *out) {
-    for (int i = 0; i < count; i++)
-        if (!strcmp(text, names[i])) return *out = i, 1;
-    return 0;
-}
 static int parse_mode(viewer *v, const char *text) { return parse_name(text, mode_name, MODE_COUNT, &v->o.mode); }
 static int parse_shading(viewer *v, const char *text) { return parse_name(text, shading_name, 3, &v->o.shading); }
 static int parse_lookup(viewer *v, const char *text) { return parse_name(text, lookup_name, 4, &v->o.lookup); }
@@ -175,36 +159,8 @@ static int parse_clip(viewer *v, const char *text) {
     return 1;
 }
 
-/* KIND:X,Y,Z:R,G,B[:RADIUS], or rectangle:X,Y,Z:R,G,B:UX,UY,UZ:VX,VY,VZ */
 static int parse_light(viewer *v, const char *text) {
-    static const char *const kind_name[4] = {"directional", "point", "sphere", "rectangle"};
-    char part[6][64];
-    int parts = 0, kind;
-    double place[3], rgb[3], radius = 0, edge[2][3] = {{0}};
-    isogi_light *light = &v->o.lights[v->o.light_count];
-    isogi_lighting alone = {.lights = light, .light_count = 1};
-    for (; parts < 6; parts++) {
-        size_t length = strcspn(text, ":");
-        if (length > 63) return 0;
-        memcpy(part[parts], text, length), part[parts][length] = 0;
-        text += length;
-        if (!*text) break;
-        text++;
-    }
-    if (parts < 2 || parts > 4 || v->o.light_count >= MAX_LIGHTS || !parse_name(part[0], kind_name, 4, &kind)) return 0;
-    if ((parts == 4) != (kind == ISOGI_LIGHT_RECTANGLE)) return 0;
-    if (!numbers(part[1], ',', 3, -1e9, 1e9, place) || !numbers(part[2], ',', 3, 0, 1e12, rgb)) return 0;
-    if (parts == 3 && !numbers(part[3], ',', 1, 0, kind == 0 ? 90 : 1e9, &radius)) return 0;
-    if (kind == ISOGI_LIGHT_DIRECTIONAL && !vector_normalize(place)) return 0;
-    if (kind == ISOGI_LIGHT_SPHERE && !(radius > 0)) return 0;
-    for (int k = 0; parts == 4 && k < 2; k++)
-        if (!numbers(part[3 + k], ',', 3, -1e9, 1e9, edge[k])) return 0;
-    memset(light, 0, sizeof *light);
-    light->kind = (isogi_light_kind)kind;
-    light->radius = (float)(kind == ISOGI_LIGHT_DIRECTIONAL ? radius * PI / 180 : radius);
-    for (int i = 0; i < 3; i++) light->vector[i] = (float)place[i], light->rgb[i] = (float)rgb[i];
-    for (int i = 0; i < 6; i++) light->edge[i / 3][i % 3] = (float)edge[i / 3][i % 3];
-    if (isogi_lighting_validate(&alone) != ISOGI_OK) return 0;
+    if (v->o.light_count >= MAX_LIGHTS || !light_parse(text, &v->o.lights[v->o.light_count])) return 0;
     v->o.light_count++;
     return 1;
 }

@@ -183,7 +183,7 @@ memcheck() {
     grind='valgrind -q --error-exitcode=9 --leak-check=full --errors-for-leak-kinds=all'
     for source in examples/*.c; do
         base=$(basename "$source" .c)
-        case $base in viewer | bake_points) continue ;; esac # the one is below, the other takes minutes
+        case $base in viewer | bake | bake_mpi | bake_points) continue ;; esac # below, in tests of their own, or they take minutes
         item check "valgrind/$base" "$grind build/$base > /dev/null"
     done
     [ -f examples/viewer.c ] && for mode in irradiance transfer dvr scale-invariant; do
@@ -216,15 +216,20 @@ quick)
     for program; do item live "${program##*/}" "$program"; done
     sources
     matrix_quick
+    item check bake/parts-and-pauses "sh tests/compile/bake.sh"
     ;;
 long)
     sources
     matrix
     for program; do item live "${program##*/}" "$program --long"; done
+    item check bake/parts-and-pauses "sh tests/compile/bake.sh"
     memcheck
     fuzzers
     if have glslangValidator; then item check glsl/shaders "sh tests/compile/glsl.sh"
     else item skip glsl/shaders "glslangValidator is not installed"
+    fi
+    if have mpirun && have mpicc; then item check mpi/same-bits "sh tests/compile/mpi.sh"
+    else item skip mpi/same-bits "mpicc and mpirun are not installed"
     fi
     item check bench/tables "sh tests/bench/contract.sh"
     analysers

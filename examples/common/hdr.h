@@ -137,8 +137,8 @@ static inline int hdr_decode(const unsigned char *data, size_t size, hdr_image *
 }
 
 static inline int hdr_read(const char *path, hdr_image *image, char *error) {
-    unsigned char *data;
-    size_t size;
+    unsigned char *data = NULL;
+    size_t size = 0;
     char why[FILE_ERROR_SIZE];
     int ok;
     if (!file_read(path, (size_t)1 << 30, &data, &size, error)) return 0;

@@ -1,0 +1,131 @@
+/* bake_scene.h - the part that bake and bake_mpi share: a volume, a light and a material from the command line, as a description of
+   an illumination texture. Both programs make the same description of the same words, so their textures are the same bits. */
+#ifndef BAKE_SCENE_H
+#define BAKE_SCENE_H
+
+#include "isogi_trace.h"
+
+#include "hdr.h"
+#include "option_text.h"
+#include "procedural.h"
+#include "volume_file.h"
+
+#define BAKE_LIGHTS 16
+
+typedef struct bake_scene {
+    const char *volume_name, *out;
+    isogi_volume volume;
+    isogi_pyramid *pyramid;
+    isogi_context context;
+    hdr_image env;
+    isogi_light lights[BAKE_LIGHTS];
+    float sky[12];
+    double spacing[3];
+    isogi_trace_desc desc;
+    char error[FILE_ERROR_SIZE];
+} bake_scene;
+
+static const char *const bake_scene_help =
+    "  --out FILE                 the texture computed so far, to be resumed, merged or exported; needed\n"
+    "  --mode NAME                irradiance, the default, or transfer (order 5)\n"
+    "  --isovalues LOW,HIGH       only texels that isosurfaces between these read; default all\n"
+    "  --spacing X,Y,Z            size of a voxel; default 1,1,1\n"
+    "  --env FILE.hdr             environment: equirectangular Radiance picture; default a sky and a sun\n"
+    "  --light KIND:X,Y,Z:...     as build/viewer --help says; may be repeated\n"
+    "  --albedo R,G,B             diffuse reflectance; default 0.7,0.7,0.7\n"
+    "  --bounces N                reflections; -1 = all, the default\n"
+    "  --samples N                paths per texel; default 64\n"
+    "  --lattice X,Y,Z            texels; default one per voxel\n"
+    "  --storage NAME             float, half, rgb9e5 or byte; default float for irradiance, half for transfer\n"
+    "  --both-sides               the high side of the surface, too\n"
+    "  --threads N                0 = one per core, the default\n";
+
+static const char *const bake_formats[5] = {"default", "float", "half", "rgb9e5", "byte"};
+
+static inline void bake_scene_begin(bake_scene *s) {
+    memset(s, 0, sizeof *s);
+    s->spacing[0] = s->spacing[1] = s->spacing[2] = 1;
+    s->desc.bounces = -1, s->desc.albedo[0] = s->desc.albedo[1] = s->desc.albedo[2] = 0.7f;
+}
+
+static inline int bake_integer(const char *text, double low, double high, int *out) {
+    double x;
+    if (!numbers(text, ',', 1, low, high, &x) || x != floor(x)) return 0;
+    return *out = (int)x, 1;
+}
+
+/* The option at argv[*i], if it is one of those above: 1, and *i on its value. 0: it is not. -1: its value is not allowed. */
+static inline int bake_scene_option(bake_scene *s, int argc, char **argv, int *i) {
+    static const char *const names[12] = {"--out", "--mode", "--isovalues", "--spacing", "--env", "--light", "--albedo", "--bounces", "--samples",
+                                          "--lattice", "--storage", "--threads"};
+    static const char *const modes[2] = {"irradiance", "transfer"};
+    isogi_trace_desc *d = &s->desc;
+    const char *text;
+    double x[3];
+    int which, k, ok = 1;
+    if (!strcmp(argv[*i], "--both-sides")) return d->sides = ISOGI_TRACE_BOTH_SIDES, 1;
+    if (!parse_name(argv[*i], names, 12, &which)) return 0;
+    if (*i + 1 >= argc) return file_fail(s->error, "%s: needs a value", argv[*i]), -1;
+    text = argv[++*i];
+    switch (which) {
+    case 0: s->out = text; break;
+    case 1: ok = parse_name(text, modes, 2, &k), d->mode = (isogi_trace_mode)(ok ? k : 0); break;
+    case 2: ok = numbers(text, ',', 2, -1e300, 1e300, x) && x[0] <= x[1], d->isovalue_min = x[0], d->isovalue_max = x[1]; break;
+    case 3: ok = numbers(text, ',', 3, 1e-9, 1e9, s->spacing); break;
+    case 4: ok = hdr_read(text, &s->env, s->error); if (!ok) return -1; break;
+    case 5: ok = d->lighting.light_count < BAKE_LIGHTS && light_parse(text, &s->lights[d->lighting.light_count]), d->lighting.light_count += (size_t)ok; break;
+    case 6: ok = numbers(text, ',', 3, 0, 1, x); for (k = 0; ok && k < 3; k++) d->albedo[k] = (float)x[k]; break;
+    case 7: ok = bake_integer(text, -1, 1000, &d->bounces); break;
+    case 8: ok = bake_integer(text, 1, 1 << 24, &d->samples); break;
+    case 9: ok = numbers(text, ',', 3, 1, 65536, x); for (k = 0; ok && k < 3; k++) d->lattice[k] = (size_t)x[k]; break;
+    case 10: ok = parse_name(text, bake_formats, 5, &k), d->storage = (isogi_trace_format)(ok ? k : 0); break;
+    default: ok = bake_integer(text, 0, 256, &s->context.threads);
+    }
+    return ok ? 1 : (file_fail(s->error, "%s: \"%.80s\" is not allowed", argv[*i - 1], text), -1);
+}
+
+/* The volume is read, the light is put together. 0 with a message on failure. */
+static inline int bake_scene_make(bake_scene *s) {
+    isogi_lighting *l = &s->desc.lighting;
+    const procedural_shape *shape;
+    isogi_result result = ISOGI_OK;
+    char name[64];
+    double longest = 0;
+    size_t length;
+    if (!s->volume_name || !s->out) return file_fail(s->error, "VOLUME and --out are needed; --help explains");
+    if (!strncmp(s->volume_name, "procedural:", 11)) {
+        length = strcspn(s->volume_name + 11, ":");
+        snprintf(name, sizeof name, "%.*s", length < 60 ? (int)length : 0, s->volume_name + 11);
+        shape = procedural_find(name);
+        if (!shape) return file_fail(s->error, "%.60s: no such volume", s->volume_name);
+        if (s->volume_name[11 + length] && !numbers(s->volume_name + 12 + length, ',', 1, 2, 2048, &longest))
+            return file_fail(s->error, "%.60s: the size is a whole number, 2 to 2048", s->volume_name);
+        result = procedural_make(shape, (size_t)longest, &s->volume, &s->context);
+    } else if (!volume_read(s->volume_name, &s->volume, s->error)) return 0;
+    memcpy(s->volume.spacing, s->spacing, sizeof s->spacing);
+    if (result == ISOGI_OK) result = isogi_vol_build(&s->pyramid, &s->volume, &s->context);
+    if (result != ISOGI_OK) return file_fail(s->error, "%s: %s", s->volume_name, isogi_result_string(result));
+    if (s->env.rgb) l->env.rgb = s->env.rgb, l->env.width = s->env.width, l->env.height = s->env.height;
+    if (!s->env.rgb && !l->light_count) { /* radiance 1 above to 0.3 below, and a sun of a degree */
+        static const isogi_light sun = {.vector = {-1, 1, 0.45f}, .rgb = {3, 3, 3}, .radius = 0.01745f};
+        for (int c = 0; c < 3; c++) s->sky[c] = 0.65f * 3.5449077f, s->sky[3 + c] = 0.35f * 2.0466534f;
+        l->env.sh = s->sky, l->env.sh_order = 2, s->lights[0] = sun, l->light_count = 1;
+    }
+    l->lights = s->lights, s->desc.pyramid = s->pyramid;
+    if (s->desc.mode == ISOGI_TRACE_TRANSFER) memset(l, 0, sizeof *l);
+    return 1;
+}
+
+static inline void bake_scene_free(bake_scene *s) { isogi_vol_free(s->pyramid), volume_free(&s->volume), free(s->env.rgb); }
+
+/* The texture's block into a file. */
+static inline int bake_scene_save(bake_scene *s, const isogi_trace *trace, const char *path) {
+    size_t size = isogi_trace_save_size(trace);
+    void *block = malloc(size);
+    int ok = block && isogi_trace_save(trace, block, size) == ISOGI_OK ? file_write(path, block, size, s->error)
+                                                                      : file_fail(s->error, "%s: out of memory", path);
+    free(block);
+    return ok;
+}
+
+#endif
