@@ -288,4 +288,697 @@ TEST(monotone_pieces_cover_the_ray_without_a_gap) {
     }
 }
 
+/* ---- invariance (Kraus 2005, 4.1) ---- */
+
+static const isogi_transfer_point hills[] = {
+    {-1, {1, 0.2f, 0.1f}, 0}, {-0.2, {0.3f, 1, 0.1f}, 2}, {0.1, {0.1f, 0.4f, 1}, 0}, {0.4, {0.1f, 0.4f, 1}, 0}, {0.4, {1, 1, 0}, 3}, {1, {1, 0, 1}, 1}};
+static const isogi_peak sheets[] = {{0.3, {1, 1, 1}, 0.4f}, {-0.4, {0, 1, 0}, 0.2f}};
+static const isogi_transfer landscape = {hills, 6, sheets, 2};
+
+TEST(scaling_space_by_a_million_either_way_changes_no_pixel) {
+    const double scales[] = {1, 1e-6, 1e-3, 37, 1e6};
+    for (int silhouette = 0; silhouette < 2; silhouette++)
+        for (int classification = 0; classification < 3; classification++) {
+            float(*image[5])[4];
+            for (int i = 0; i < 5; i++) {
+                field f = field_waves(14, 21);
+                test_random r = {9};
+                isogi_vol_free(f.pyramid);
+                for (int a = 0; a < 3; a++) f.volume.spacing[a] = scales[i];
+                field_build(&f);
+                const isogi_dvr_desc desc = {.pyramid = f.pyramid, .space = ISOGI_DVR_DATA, .classification = (isogi_dvr_classification)classification,
+                                             .silhouette = (isogi_dvr_silhouette)silhouette};
+                isogi_dvr *dvr = dvr_new(&desc, &landscape);
+                isogi_view view = view_of(&f, scales[i], &r, 24);
+                image[i] = picture(dvr, &view, NULL, NULL, NULL);
+                isogi_dvr_free(dvr);
+                field_free(&f);
+            }
+            double seen = 0;
+            for (int p = 0; p < 24 * 24; p++) seen += (double)image[0][p][3] / (24 * 24);
+            CHECK(seen > 0.3, "the picture shows something: mean opacity %g", seen);
+            for (int i = 1; i < 5; i++) {
+                /* the rays' origins and directions are floats: 1e-7 of a gradient of 0.1 per voxel over the distance; silhouettes of
+                   surfaces seen edge on multiply it */
+                double most = largest_difference(image[0], image[i], 24 * 24), rms = rms_difference(image[0], image[i], 24 * 24);
+                CHECK(silhouette ? rms < 1e-3 : most < 2e-5, "classification %d scale %g: largest difference %g, RMS %g", classification, scales[i], most, rms);
+            }
+            for (int i = 0; i < 5; i++) free(image[i]);
+        }
+}
+
+/* Axes scaled each by its own factor, and the rays along with them: the same cells, the same cubics, the same pixels. */
+TEST(scaling_each_axis_along_with_the_rays_changes_nothing) {
+    test_random r = {10};
+    for (int n = 0; n < 60; n++) {
+        field f = field_noise(8, (uint64_t)n);
+        double scale[3], eye[2][3], target[2][3];
+        const isogi_dvr_desc desc = {.pyramid = f.pyramid, .space = ISOGI_DVR_DATA, .opaque = 1};
+        isogi_dvr *dvr = dvr_new(&desc, &landscape);
+        random_line(&f, &r, eye[0], target[0]);
+        pixel p = cast(dvr, eye[0], target[0], NULL);
+        isogi_dvr_free(dvr), isogi_vol_free(f.pyramid);
+        for (int a = 0; a < 3; a++) {
+            scale[a] = ldexp(1, (int)(random_bits(&r) % 40) - 20); /* powers of two: ends of the line stay floats */
+            f.volume.spacing[a] = scale[a], eye[1][a] = eye[0][a] * scale[a], target[1][a] = target[0][a] * scale[a];
+        }
+        field_build(&f);
+        const isogi_dvr_desc scaled = {.pyramid = f.pyramid, .space = ISOGI_DVR_DATA, .opaque = 1};
+        if (isogi_dvr_create(&dvr, &scaled, &serial) == ISOGI_TOO_LARGE) { /* more samples than the other methods take */
+            field_free(&f);
+            continue;
+        }
+        CHECK(isogi_dvr_set_transfer(dvr, &landscape) == ISOGI_OK, "set_transfer");
+        /* directions are floats: errors of 1e-7 relative in an axis of 1e6 times the others' length would lead elsewhere; so scale what
+           the renderer does, not the view */
+        double origin[3], dir[3], back[3];
+        float at[3];
+        isogi_view view = line_of_sight(eye[0], target[0]);
+        isogi_view_ray(&view, 0, 0, origin, at);
+        for (int a = 0; a < 3; a++) dir[a] = (double)at[a];
+        isogi_dvr__march m;
+        isogi_dvr__pixel_ray ray = {.dvr = dvr, .clear = 1};
+        memcpy(back, origin, sizeof back);
+        if (isogi_dvr__begin(&m, dvr, back, dir, 1, 0.5)) isogi_dvr__cast_values(&ray, &m);
+        for (int a = 0; a < 4; a++) {
+            double got = a < 3 ? ray.rgb[a] : 1 - ray.clear;
+            CHECK(fabs((double)p.c[a] - got) < 1e-7, "ray %d, channel %d: %.9g, not %.9g", n, a, got, (double)p.c[a]);
+        }
+        isogi_dvr_free(dvr);
+        field_free(&f);
+    }
+}
+
+TEST(constant_data_contributes_nothing_whatever_its_extinction) {
+    test_random r = {5};
+    for (int n = 0; n < 30; n++) {
+        field f = field_new(9, 5, 7);
+        double value = n % 3 ? random_range(&r, -1e6, 1e6) : 1.0 / 3;
+        for (size_t i = 0; i < field_count(&f); i++) f.value[i] = value;
+        field_build(&f);
+        const isogi_transfer_point point = {0, {1, 1, 1}, 1e30f};
+        const isogi_transfer transfer = {.points = &point, .point_count = 1};
+        for (int c = 0; c < 3; c++) {
+            const isogi_dvr_desc desc = {.pyramid = f.pyramid, .space = ISOGI_DVR_DATA, .classification = (isogi_dvr_classification)c};
+            isogi_dvr *dvr = dvr_new(&desc, &transfer);
+            double eye[3], target[3];
+            random_line(&f, &r, eye, target);
+            pixel p = cast(dvr, eye, target, NULL);
+            CHECK(p.c[3] <= 0 && p.c[0] <= 0 && p.depth > 1e30f, "classification %d: opacity %g", c, (double)p.c[3]);
+            isogi_dvr_free(dvr);
+        }
+        field_free(&f);
+    }
+}
+
+/* ---- peaks ---- */
+
+/* Kraus 2005, 4.5: N isosurfaces of opacity 1 - (1-a)^(1/N) converge to the constant transfer function: the rate. */
+TEST(n_isosurfaces_converge_to_the_constant_transfer_function) {
+    const int counts[] = {16, 64, 256, 1024, 4096};
+    field f = field_waves(16, 4);
+    const isogi_transfer_point points[] = {{-1, {0.2f, 0.5f, 1}, 0}, {-1, {0.2f, 0.5f, 1}, 1}, {1, {0.2f, 0.5f, 1}, 1}, {1, {0.2f, 0.5f, 1}, 0}};
+    const isogi_transfer continuous = {.points = points, .point_count = 4};
+    const isogi_dvr_desc desc = {.pyramid = f.pyramid, .space = ISOGI_DVR_DATA, .opaque = 1};
+    isogi_dvr *dvr = dvr_new(&desc, &continuous);
+    test_random r = {8};
+    isogi_view view = view_of(&f, 1, &r, 16);
+    float(*expected)[4] = picture(dvr, &view, NULL, NULL, NULL);
+    isogi_peak *peaks = (isogi_peak *)malloc(4096 * sizeof *peaks);
+    double error[5];
+    for (int n = 0; n < 5; n++) {
+        for (int i = 0; i < counts[n]; i++) peaks[i] = (isogi_peak){-1 + 2 * (i + 0.5) / counts[n], {0.2f, 0.5f, 1}, (float)-expm1(-2.0 / counts[n])};
+        const isogi_transfer surfaces = {.peaks = peaks, .peak_count = (size_t)counts[n]};
+        CHECK(isogi_dvr_set_transfer(dvr, &surfaces) == ISOGI_OK, "%d peaks", counts[n]);
+        float(*image)[4] = picture(dvr, &view, NULL, NULL, NULL);
+        error[n] = rms_difference(image, expected, 256);
+        free(image);
+        if (n) CHECK(error[n] < error[n - 1] / 3, "RMSE %g with %d, %g with %d", error[n - 1], counts[n - 1], error[n], counts[n]);
+    }
+    printf("    RMSE with 16, 64, 256, 1024, 4096 isosurfaces: %.2g %.2g %.2g %.2g %.2g: about N^%.2f\n", error[0], error[1], error[2], error[3], error[4],
+           log(error[4] / error[0]) / log(256));
+    CHECK(error[4] < 2e-4, "RMSE %g with 4096", error[4]);
+    free(peaks), free(expected);
+    isogi_dvr_free(dvr);
+    field_free(&f);
+}
+
+typedef struct crossing { double t; int side; } crossing;
+
+/* What the exact intersector of isogi_vol.h finds along the same ray. */
+static int intersector_crossings(const isogi_pyramid *pyramid, const double origin[3], const float dir[3], double isovalue, crossing *out) {
+    isogi_ray ray = {.dir = {dir[0], dir[1], dir[2]}, .isovalue = isovalue};
+    isogi_hit hit;
+    int count = 0;
+    double t = 0;
+    for (int a = 0; a < 3; a++) ray.origin[a] = origin[a];
+    isogi_vol_intersect(pyramid, &ray, 1, &hit, NULL);
+    while (hit.side && count < 60) {
+        isogi_hit next;
+        t += hit.t;
+        out[count].t = t, out[count++].side = hit.side;
+        isogi_vol_continue(pyramid, &hit, (const float(*)[3])dir, NULL, isovalue, 0, 1, &next, NULL);
+        hit = next;
+    }
+    return count;
+}
+
+/* As the renderer finds them: of one opaque probe after the other. */
+static int walk_crossings(const isogi_dvr *dvr, const double origin[3], const float dir[3], double isovalue, crossing *out) {
+    isogi_dvr__march m;
+    isogi_dvr__span s;
+    double d[3] = {(double)dir[0], (double)dir[1], (double)dir[2]};
+    int count = 0;
+    if (!isogi_dvr__begin(&m, dvr, origin, d, 1, 0.5)) return 0;
+    isogi_dvr__begin_walk(&s.walk, &m);
+    while (isogi_dvr__next_monotone(&s.walk, &s.piece) && count < 60)
+        if ((s.piece.value[0] >= isovalue) != (s.piece.value[1] >= isovalue)) {
+            double t = m.enter + s.piece.t0 + isogi_dvr__place_of(&s.piece, isovalue) * s.piece.dt;
+            if (s.piece.value[1] < isovalue && !(s.piece.value[0] > isovalue) && count && out[count - 1].t > m.enter + s.piece.from - 1e-12) continue; /* touched */
+            out[count].t = t, out[count++].side = s.piece.value[1] >= isovalue ? 1 : -1;
+        }
+    return count;
+}
+
+TEST(crossings_are_those_of_the_exact_intersector) {
+    test_random r = {77};
+    int total = 0, rays = LONG_SUITE ? 40000 : 1500, odd = 0;
+    double worst = 0;
+    for (int n = 0; n < 12; n++) {
+        field f = n < 4 ? field_noise(9, (uint64_t)n) : n < 8 ? field_waves(12, (uint64_t)n) : field_new(8, 8, 8);
+        if (n >= 8) { /* small whole numbers, and isovalues that voxels have */
+            for (size_t i = 0; i < field_count(&f); i++) f.value[i] = (double)(random_bits(&r) % 4);
+            field_build(&f);
+        }
+        double isovalue = n < 8 ? random_range(&r, -0.5, 0.5) : n % 2 ? 2 : 1.5;
+        const isogi_peak peak = {isovalue, {1, 1, 1}, 0.25f};
+        const isogi_transfer transfer = {.peaks = &peak, .peak_count = 1};
+        const isogi_dvr_desc desc = {.pyramid = f.pyramid, .space = ISOGI_DVR_DATA, .opaque = 1};
+        isogi_dvr *dvr = dvr_new(&desc, &transfer);
+        for (int i = 0; i < rays / 12; i++) {
+            double eye[3], target[3], origin[3];
+            float dir[3];
+            crossing expected[64], got[64];
+            random_line(&f, &r, eye, target);
+            isogi_view view = line_of_sight(eye, target);
+            isogi_view_ray(&view, 0, 0, origin, dir);
+            int count = intersector_crossings(f.pyramid, origin, dir, isovalue, expected), found = walk_crossings(dvr, origin, dir, isovalue, got);
+            total += count;
+            CHECK(count == found, "field %d ray %d: %d crossings, not %d", n, i, found, count);
+            for (int k = 0; k < count && count == found; k++) {
+                double error = fabs(got[k].t - expected[k].t);
+                CHECK(got[k].side == expected[k].side, "field %d ray %d crossing %d: side %d", n, i, k, got[k].side);
+                /* next to an extremum the place is ill-conditioned: the square root of a rounding error */
+                CHECK(error < 1e-6, "field %d ray %d crossing %d: t %.17g, not %.17g", n, i, k, got[k].t, expected[k].t);
+                worst = fmax(worst, error), odd += error > 1e-11;
+            }
+            pixel p = cast(dvr, eye, target, NULL);
+            CHECK(fabs((double)p.c[3] - (1 - pow(0.75, count))) < 1e-6, "field %d ray %d: opacity %g of %d crossings", n, i, (double)p.c[3], count);
+        }
+        isogi_dvr_free(dvr);
+        field_free(&f);
+    }
+    printf("    %d crossings along %d rays: the same; largest difference of t %.2g, %d above 1e-11\n", total, rays, worst, odd);
+    CHECK(total > 500, "%d crossings", total);
+}
+
+/* Along lattice lines every value that counts is a voxel's: whole numbers, exact. */
+TEST(crossings_along_lattice_lines_are_exact) {
+    test_random r = {78};
+    for (int n = 0; n < 200; n++) {
+        field f = field_new(12, 3, 3);
+        for (size_t i = 0; i < field_count(&f); i++) f.value[i] = (double)(random_bits(&r) % 3);
+        field_build(&f);
+        const isogi_peak peaks[2] = {{1, {1, 0, 0}, 0.25f}, {1.5, {0, 1, 0}, 0.5f}};
+        const isogi_transfer transfer = {.peaks = peaks, .peak_count = 2};
+        const isogi_dvr_desc desc = {.pyramid = f.pyramid, .space = ISOGI_DVR_DATA, .opaque = 1};
+        isogi_dvr *dvr = dvr_new(&desc, &transfer);
+        for (int line = 0; line < 9; line++) {
+            const double eye[3] = {line % 2 ? -3 : 20, line % 3, line / 3}, target[3] = {5, line % 3, line / 3};
+            const double *v = f.value + 12 * line;
+            double clear = 1;
+            int one = 0, two = 0;
+            for (int x = 1; x < 12; x++) {
+                one += (v[x] >= 1) != (v[x - 1] >= 1), two += (v[x] >= 1.5) != (v[x - 1] >= 1.5);
+                if (x > 1 && v[x - 2] < 1 && v[x] < 1 && !(v[x - 1] < 1) && !(v[x - 1] > 1)) one--; /* touched in one point: once */
+            }
+            clear = pow(0.75, one) * pow(0.5, two);
+            pixel p = cast(dvr, eye, target, NULL);
+            CHECK(fabs((double)p.c[3] - (1 - clear)) < 1e-7, "volume %d line %d: opacity %.9g, not %.9g (%d and %d crossings)", n, line, (double)p.c[3],
+                  1 - clear, one, two);
+        }
+        isogi_dvr_free(dvr);
+        field_free(&f);
+    }
+}
+
+/* f = x: what lies between two peaks is between them in the picture, too, from either side; peaks of one value in the order given. */
+TEST(peaks_and_media_stand_in_exact_order) {
+    field f = field_of(along_x, 6);
+    const isogi_transfer_point medium = {0, {0, 1, 0}, 3};
+    const isogi_peak peaks[] = {{0.75, {0, 0, 1}, 0.5f}, {0.3, {1, 0, 0}, 0.5f}, {0.75, {1, 1, 1}, 0.25f}};
+    const isogi_transfer transfer = {&medium, 1, peaks, 3};
+    for (int c = 0; c < 2; c++) {
+        const isogi_dvr_desc desc = {.pyramid = f.pyramid, .space = ISOGI_DVR_DATA, .opaque = 1, .classification = (isogi_dvr_classification)c};
+        isogi_dvr *dvr = dvr_new(&desc, &transfer);
+        const double left[3] = {-2, 2.3, 2.7}, right[3] = {9, 2.3, 2.7};
+        pixel up = cast(dvr, left, right, NULL), down = cast(dvr, right, left, NULL);
+        double a = exp(-3 * 0.3), b = exp(-3 * 0.45), e = exp(-3 * 0.25);
+        double rising[3] = {a * 0.5 + a * 0.5 * b * 0.5 * 0.25, 0, a * 0.5 * b * (0.5 + 0.5 * 0.25)};
+        double falling[3] = {e * (0.5 * 0.25 + 0.5 * 0.75 * b * 0.5), 0, e * (0.5 + 0.5 * 0.25)};
+        rising[1] = 1 - a + a * 0.5 * (1 - b) + a * 0.5 * b * (0.5 * 0.25 + 0.5 * 0.75 * (1 - e));
+        falling[1] = 1 - e + e * (0.5 * 0.25 + 0.375 * (1 - b) + 0.375 * b * 0.5 * (1 - a));
+        for (int i = 0; i < 3; i++) {
+            CHECK(fabs((double)up.c[i] - rising[i]) < (c ? 1e-5 : 1e-6), "classification %d rising, channel %d: %.9g, not %.9g", c, i, (double)up.c[i], rising[i]);
+            CHECK(fabs((double)down.c[i] - falling[i]) < (c ? 1e-5 : 1e-6), "classification %d falling, channel %d: %.9g, not %.9g", c, i, (double)down.c[i],
+                  falling[i]);
+        }
+        isogi_dvr_free(dvr);
+    }
+    field_free(&f);
+}
+
+/* ---- classifications against the sampling rate (Kraus 2005, 3.2.4) ---- */
+
+TEST(classifications_converge_to_the_exact_integral) {
+    const double steps[] = {2, 1, 0.5, 0.25, 0.125};
+    double error[3][5];
+    field f = field_waves(20, 3);
+    test_random r = {31};
+    isogi_view view = view_of(&f, 1, &r, 24);
+    const isogi_transfer smooth = {hills, 3, NULL, 0};
+    const isogi_dvr_desc exact = {.pyramid = f.pyramid, .space = ISOGI_DVR_DATA, .opaque = 1};
+    isogi_dvr *dvr = dvr_new(&exact, &smooth);
+    float(*expected)[4] = picture(dvr, &view, NULL, NULL, NULL);
+    isogi_dvr_free(dvr);
+    for (int c = 0; c < 3; c++)
+        for (int s = 0; s < 5; s++) {
+            const isogi_dvr_desc desc = {.pyramid = f.pyramid, .space = ISOGI_DVR_DATA, .opaque = 1, .step = steps[s],
+                                         .classification = (isogi_dvr_classification)c};
+            dvr = dvr_new(&desc, &smooth);
+            float(*image)[4] = picture(dvr, &view, NULL, NULL, NULL);
+            error[c][s] = rms_difference(image, expected, 24 * 24);
+            free(image);
+            isogi_dvr_free(dvr);
+        }
+    for (int c = 1; c < 3; c++)
+        printf("    %s: RMSE %.2g %.2g %.2g %.2g %.2g for steps of 2, 1, 1/2, 1/4, 1/8 voxel\n", c == 1 ? "pre-integrated" : "post-classified", error[c][0],
+               error[c][1], error[c][2], error[c][3], error[c][4]);
+    CHECK(error[0][0] <= 0 && error[0][4] <= 0, "exact rays know no step: %g", error[0][0]);
+    CHECK(error[1][2] < 1.5e-3 && error[2][2] < 1e-2 && error[1][4] < error[1][0] / 15 && error[2][4] < error[2][0] / 8, "pre %g .. %g, post %g .. %g",
+          error[1][0], error[1][4], error[2][0], error[2][4]);
+    for (int s = 0; s < 5; s++) CHECK(error[1][s] < error[2][s], "step %g: pre-integrated %g, post-classified %g", steps[s], error[1][s], error[2][s]);
+    free(expected);
+    field_free(&f);
+}
+
+/* ---- silhouettes (Kraus 2005, 5.1) ---- */
+
+static double tilt[3];
+static double tilted(double x, double y, double z) { return tilt[0] * x + tilt[1] * y + tilt[2] * z; }
+
+TEST(silhouettes_follow_the_angle_between_surface_and_view) {
+    test_random r = {41};
+    const double eye[3] = {-20, 5.2, 5.4}, target[3] = {5, 5.2, 5.4};
+    for (int n = 0; n < 200; n++) {
+        random_direction(&r, tilt);
+        if (n % 4 == 0) tilt[0] *= 1e-3; /* nearly edge on */
+        double length = sqrt(tilt[0] * tilt[0] + tilt[1] * tilt[1] + tilt[2] * tilt[2]), aslant = length / fabs(tilt[0]), a0 = random_range(&r, 0.02, 0.9);
+        field f = field_of(tilted, 12);
+        double middle = (tilt[1] * 5.2 + tilt[2] * 5.4 + tilt[0] * 5.5) / 11;
+        const isogi_peak peak = {middle, {1, 0.5f, 0.25f}, (float)a0};
+        const isogi_transfer transfer = {NULL, 0, &peak, 1};
+        double expected[4] = {a0, 1 - pow(1 - a0, aslant), fmin(1, a0 * aslant), fmin(1, a0 * aslant)};
+        for (int kind = 0; kind < 4; kind++)
+            for (int space = 0; space < 2; space++)
+                for (int normals = 0; normals < 2; normals++) {
+                    const isogi_dvr_desc desc = {.pyramid = f.pyramid, .space = (isogi_dvr_space)space, .opaque = 1, .silhouette = (isogi_dvr_silhouette)kind,
+                                                 .normals = (isogi_normal_kind)normals};
+                    isogi_dvr *dvr = dvr_new(&desc, &transfer);
+                    pixel p = cast(dvr, eye, target, NULL);
+                    /* normals are floats */
+                    double tolerance = 1e-6 + 4e-6 * aslant * (kind ? 1 - expected[kind] + 1e-3 : 0);
+                    CHECK(fabs((double)p.c[3] - expected[kind]) < tolerance, "kind %d space %d angle 1/%g: opacity %.9g, not %.9g", kind, space, aslant,
+                          (double)p.c[3], expected[kind]);
+                    for (int a = 0; a < 3; a++)
+                        CHECK(fabsf(p.c[a] - p.c[3] * peak.rgb[a]) < 2e-7f, "colour scales with opacity: %g of %g", (double)p.c[a], (double)p.c[3]);
+                    isogi_dvr_free(dvr);
+                }
+        /* samples: the whole ray passes a change of value of tilt[0]; silhouettes make it the length of the gradient (eq. 17, 18) */
+        const isogi_transfer_point medium = {0, {1, 1, 1}, 0.7f};
+        const isogi_transfer everywhere = {&medium, 1, NULL, 0};
+        double change = (double)0.7f * fabs(tilt[0]), plain = -expm1(-change), whole = -expm1(-change * aslant);
+        for (int kind = 0; kind < 4; kind++)
+            for (int c = 0; c < 3; c++) {
+                const isogi_dvr_desc desc = {.pyramid = f.pyramid, .space = ISOGI_DVR_DATA, .opaque = 1, .silhouette = (isogi_dvr_silhouette)kind,
+                                             .classification = (isogi_dvr_classification)c};
+                isogi_dvr *dvr = dvr_new(&desc, &everywhere);
+                pixel p = cast(dvr, eye, target, NULL);
+                /* the approximation depends on how the ray is cut: each small opacity times the factor; between the two */
+                if (kind == ISOGI_DVR_SILHOUETTE_APPROXIMATE)
+                    CHECK((double)p.c[3] > plain - 1e-6 && (double)p.c[3] < fmin(1, fmax(whole * 1.3, whole + 0.05)), "classification %d: %g for %g", c,
+                          (double)p.c[3], whole);
+                else
+                    CHECK(fabs((double)p.c[3] - (kind ? whole : plain)) < 2e-6 + 2e-4 * (c == 1), "kind %d classification %d: opacity %.9g, not %.9g", kind, c,
+                          (double)p.c[3], kind ? whole : plain);
+                isogi_dvr_free(dvr);
+            }
+        field_free(&f);
+    }
+}
+
+/* The ray runs within the surface, or within a layer of constant value: the limits of eq. 15 and 17. */
+TEST(surfaces_seen_edge_on_have_the_limit) {
+    tilt[0] = 0, tilt[1] = 1, tilt[2] = 0;
+    field f = field_of(tilted, 12);
+    const double eye[3] = {-20, 5.25, 5.4}, target[3] = {5, 5.25, 5.4};
+    const isogi_transfer_point medium = {0, {1, 1, 1}, 0.7f};
+    const isogi_transfer everywhere = {&medium, 1, NULL, 0};
+    for (int kind = 0; kind < 4; kind++) {
+        const isogi_dvr_desc desc = {.pyramid = f.pyramid, .space = ISOGI_DVR_DATA, .opaque = 1, .silhouette = (isogi_dvr_silhouette)kind};
+        isogi_dvr *dvr = dvr_new(&desc, &everywhere);
+        pixel p = cast(dvr, eye, target, NULL);
+        double expected = kind == 1 || kind == 3 ? -expm1(-(double)0.7f) : 0;
+        CHECK(fabs((double)p.c[3] - expected) < 1e-6, "kind %d: opacity %g, not %g", kind, (double)p.c[3], expected);
+        isogi_dvr_free(dvr);
+    }
+    field_free(&f);
+}
+
+/* ---- light from both sides (Kraus 2005, 5.2) ---- */
+
+/* Eq. 19 as it is printed, for unit vectors and any orientation of n. */
+static void printed_equation(const double l[3], const double v[3], const double n[3], double a, const double cd[3], const isogi_material *m, double out[3]) {
+    double ln = isogi_dvr__dot(l, n), vn = isogi_dvr__dot(v, n), r[3], rv = 0, lv = 0;
+    for (int i = 0; i < 3; i++) r[i] = 2 * n[i] * ln - l[i], rv += r[i] * v[i], lv -= l[i] * v[i];
+    for (int i = 0; i < 3; i++) {
+        double front = cd[i] * (double)m[0].diffuse[i], through = cd[i] * (double)m[2].diffuse[i], gloss = cd[i] * (double)m[2].specular[i];
+        if (ln * vn > 0) out[i] += a * front * fabs(ln) + a * (double)m[0].specular[i] * pow(fmax(0, rv), (double)m[0].exponent);
+        if (ln * vn < 0) out[i] += a * (1 - a) * through * fabs(ln) + a * (1 - a) * gloss * pow(fmax(0, lv), (double)m[2].exponent);
+    }
+}
+
+TEST(two_sided_light_is_that_of_the_equation) {
+    test_random r = {42};
+    const isogi_material front = {{0.9f, 0.8f, 0.7f}, {1, 1, 0.5f}, 20}, back = {{0.2f, 0.8f, 0.3f}, {0.5f, 0.25f, 0}, 5}, through = {{0.5f, 1, 1}, {1, 0.5f, 1}, 8};
+    for (int n = 0; n < 120; n++) {
+        random_direction(&r, tilt);
+        field f = field_of(tilted, 12);
+        double eye[3], target[3], v[3], normal[3], expected[3] = {0, 0, 0}, a0 = random_range(&r, 0.1, 0.95), middle = 0;
+        isogi_light lights[5];
+        for (int a = 0; a < 3; a++) target[a] = random_range(&r, 4, 7), target[a] = (double)(float)target[a], middle += tilt[a] * target[a] / 11;
+        random_direction(&r, v);
+        for (int a = 0; a < 3; a++) eye[a] = (double)(float)(target[a] + 40 * v[a]);
+        isogi_view view = line_of_sight(eye, target);
+        float dir[3];
+        double origin[3];
+        isogi_view_ray(&view, 0, 0, origin, dir);
+        for (int a = 0; a < 3; a++) v[a] = -(double)dir[a], normal[a] = n % 2 ? tilt[a] : -tilt[a];
+        const isogi_peak peak = {middle, {0.9f, 0.6f, 0.3f}, (float)a0};
+        const double cd[3] = {(double)0.9f, (double)0.6f, (double)0.3f};
+        const isogi_transfer transfer = {NULL, 0, &peak, 1};
+        /* values rise along the ray where the eye is on the low side */
+        int low = isogi_dvr__dot(v, tilt) < 0;
+        const isogi_material seen[3] = {low ? front : back, low ? back : front, through};
+        for (int i = 0; i < 5; i++) {
+            double l[3], scale = 1, reach = 0;
+            random_direction(&r, l);
+            lights[i] = (isogi_light){.kind = i < 3 ? ISOGI_LIGHT_DIRECTIONAL : ISOGI_LIGHT_POINT, .rgb = {(float)(1 + i), 1, (float)(2 - 0.3 * i)}};
+            for (int a = 0; a < 3; a++) lights[i].vector[a] = (float)(i < 3 ? l[a] : target[a] + 9 * l[a]);
+            for (int a = 0; a < 3; a++) l[a] = (double)lights[i].vector[a] - (i < 3 ? 0 : target[a]), reach += l[a] * l[a];
+            if (i >= 3) scale = 1 / reach;
+            for (int a = 0; a < 3; a++) l[a] /= sqrt(reach);
+            double one[3] = {0, 0, 0};
+            printed_equation(l, v, normal, (double)(float)a0, cd, seen, one);
+            for (int a = 0; a < 3; a++) expected[a] += one[a] * (double)lights[i].rgb[a] * scale / PI;
+        }
+        const float sky[3] = {3.5449077f, 3.5449077f, 3.5449077f};
+        for (int a = 0; a < 3; a++) expected[a] += (double)(float)a0 * cd[a] * (double)seen[0].diffuse[a];
+        const isogi_lighting lighting = {.env = {.sh = sky, .sh_order = 1}, .lights = lights, .light_count = 5};
+        const isogi_dvr_desc desc = {.pyramid = f.pyramid, .space = (isogi_dvr_space)(n / 2 % 2), .shading = ISOGI_DVR_TWO_SIDED, .opaque = 1,
+                                     .material = {front, back, through}};
+        isogi_dvr *dvr = dvr_new(&desc, &transfer);
+        pixel p = cast(dvr, eye, target, &lighting);
+        for (int a = 0; a < 3; a++)
+            CHECK(fabs((double)p.c[a] - expected[a]) < 2e-5, "case %d channel %d: %.9g, not %.9g", n, a, (double)p.c[a], expected[a]);
+        isogi_dvr_free(dvr);
+        field_free(&f);
+    }
+}
+
+TEST(light_that_grazes_neither_returns_nor_passes) {
+    tilt[0] = 1, tilt[1] = 0, tilt[2] = 0;
+    field f = field_of(tilted, 6);
+    const isogi_peak peak = {0.5, {1, 1, 1}, 0.5f};
+    const isogi_transfer_point medium = {0, {1, 1, 1}, 1};
+    const isogi_transfer surface = {NULL, 0, &peak, 1}, fog = {&medium, 1, NULL, 0};
+    const isogi_light light = {.kind = ISOGI_LIGHT_DIRECTIONAL, .vector = {0, 1, 0}, .rgb = {100, 100, 100}};
+    const isogi_lighting lighting = {.lights = &light, .light_count = 1};
+    const double eye[3] = {-20, 2.5, 2.5}, target[3] = {5, 2.5, 2.5};
+    isogi_dvr_desc desc = {.pyramid = f.pyramid, .space = ISOGI_DVR_DATA, .shading = ISOGI_DVR_TWO_SIDED, .material = {{.exponent = 0}, {.exponent = 0}, {.exponent = 0}}};
+    isogi_dvr *dvr = dvr_new(&desc, &surface);
+    pixel p = cast(dvr, eye, target, &lighting);
+    CHECK(fabsf(p.c[3] - 0.5f) < 1e-7f && p.c[0] < 1e-6f, "H(0) = 0: %g", (double)p.c[0]);
+    isogi_dvr_free(dvr);
+    /* no normal at all, in a constant field: only ambient light, and there is none */
+    field flat = field_new(6, 6, 6);
+    field_build(&flat);
+    desc.pyramid = flat.pyramid, desc.space = ISOGI_DVR_PHYSICAL;
+    dvr = dvr_new(&desc, &fog);
+    p = cast(dvr, eye, target, &lighting);
+    CHECK(p.c[3] > 0.5f && p.c[0] <= 0, "no normal: %g", (double)p.c[0]);
+    isogi_dvr_free(dvr);
+    field_free(&flat), field_free(&f);
+}
+
+/* Local shading where there is no gradient: light from all sides, a quarter of irradiance / pi; and within a lamp the light is that at
+   its surface. */
+TEST(local_light_without_a_gradient_and_within_a_lamp) {
+    field flat = field_new(6, 6, 6);
+    field_build(&flat);
+    const isogi_transfer_point medium = {0, {0.8f, 0.6f, 0.4f}, 1};
+    const isogi_transfer fog = {&medium, 1, NULL, 0};
+    const double eye[3] = {-20, 2.5, 2.5}, target[3] = {5, 2.5, 2.5};
+    const isogi_light sun = {.kind = ISOGI_LIGHT_DIRECTIONAL, .vector = {0, 1, 0}, .rgb = {3, 3, 3}};
+    const isogi_light lamp = {.kind = ISOGI_LIGHT_SPHERE, .vector = {2.5f, 2.5f, 2.5f}, .rgb = {50, 50, 50}, .radius = 20};
+    for (int i = 0; i < 2; i++) {
+        const isogi_lighting lighting = {.lights = i ? &lamp : &sun, .light_count = 1};
+        const isogi_dvr_desc desc = {.pyramid = flat.pyramid, .shading = ISOGI_DVR_LOCAL, .opaque = 1};
+        isogi_dvr *dvr = dvr_new(&desc, &fog);
+        pixel p = cast(dvr, eye, target, &lighting);
+        double irradiance = i ? 50 / (20.0 * 20) : 3;
+        for (int a = 0; a < 3; a++) {
+            double expected = (double)p.c[3] * (double)medium.rgb[a] * irradiance * 0.25 / PI;
+            CHECK(fabs((double)p.c[a] / expected - 1) < 1e-5, "light %d channel %d: %g, not %g", i, a, (double)p.c[a], expected);
+        }
+        isogi_dvr_free(dvr);
+    }
+    field_free(&flat);
+}
+
+/* ---- a second field ---- */
+
+TEST(a_second_field_colours_peaks) {
+    tilt[0] = 1, tilt[1] = tilt[2] = 0;
+    field f = field_of(tilted, 8);
+    tilt[0] = 0, tilt[1] = 1;
+    field second = field_of(tilted, 5); /* another lattice over the same box: y / 4 in its own units, y / 7 in the world */
+    isogi_vol_free(second.pyramid);
+    for (int a = 0; a < 3; a++) second.volume.spacing[a] = 7 / 4.0;
+    field_build(&second);
+    const isogi_transfer_point colours[] = {{0, {0, 1, 0.5f}, 0}, {1, {1, 0, 0.5f}, 0}};
+    const isogi_peak peak = {0.4, {1, 0.5f, 1}, 0.6f};
+    const isogi_transfer transfer = {NULL, 0, &peak, 1};
+    for (int c = 0; c < 3; c++) {
+        const isogi_dvr_desc desc = {.pyramid = f.pyramid, .space = ISOGI_DVR_DATA, .classification = (isogi_dvr_classification)c, .second = second.pyramid,
+                                     .second_points = colours, .second_count = 2};
+        isogi_dvr *dvr = dvr_new(&desc, &transfer);
+        for (int i = 0; i < 8; i++) {
+            double y = 0.5 + 0.8 * i, u = y / 7, expected[3] = {0.6 * u, 0.6 * 0.5 * (1 - u), 0.6 * 0.5};
+            const double eye[3] = {-20, y, 3.3}, target[3] = {5, y, 3.3};
+            pixel p = cast(dvr, eye, target, NULL);
+            for (int a = 0; a < 3; a++)
+                CHECK(fabs((double)p.c[a] - expected[a]) < 1e-6, "y %g channel %d: %g, not %g", y, a, (double)p.c[a], expected[a]);
+        }
+        isogi_dvr_free(dvr);
+    }
+    field_free(&f), field_free(&second);
+}
+
+/* ---- robustness ---- */
+
+/* Cells with a corner that is not finite are transparent, and the ray begins anew behind them: what it missed is no crossing. */
+TEST(cells_that_are_not_finite_break_the_ray) {
+    const double bad[3] = {(double)NAN, (double)INFINITY, -(double)INFINITY};
+    const isogi_transfer_point medium = {0, {1, 1, 1}, 0.9f};
+    const isogi_peak peak = {0.5, {1, 1, 1}, 0.5f};
+    for (int b = 0; b < 3; b++)
+        for (int c = 0; c < 3; c++)
+            for (int kind = 0; kind < 2; kind++) {
+                field f = field_new(11, 4, 4);
+                for (size_t i = 0; i < field_count(&f); i++) f.value[i] = (double)(i % 11) / 10;
+                f.value[5 + 11 * (1 + 4 * 1)] = bad[b]; /* cells x 4..6 of the middle lines */
+                field_build(&f);
+                const isogi_transfer transfer = {&medium, kind ? 0 : 1, &peak, kind ? 1 : 0};
+                const isogi_dvr_desc desc = {.pyramid = f.pyramid, .space = ISOGI_DVR_DATA, .opaque = 1, .classification = (isogi_dvr_classification)c, .step = 0.25};
+                isogi_dvr *dvr = dvr_new(&desc, &transfer);
+                const double eye[3] = {-5, 1.5, 1.5}, target[3] = {5, 1.5, 1.5};
+                pixel p = cast(dvr, eye, target, NULL);
+                double expected = kind ? 0 : -expm1(-(double)0.9f * 0.8); /* 0..0.4 and 0.6..1; the peak is in the gap */
+                CHECK(fabs((double)p.c[3] - expected) < (c == 1 ? 0.025 : 1e-6), "value %g classification %d: opacity %g, not %g", bad[b], c, (double)p.c[3], expected);
+                isogi_dvr_free(dvr);
+                field_free(&f);
+            }
+}
+
+static int calls_left, blocks_out;
+static void *failing_alloc(void *user, size_t size, size_t align) {
+    (void)user, (void)align;
+    if (calls_left-- == 0) return NULL;
+    blocks_out++;
+    void *p = NULL;
+    return posix_memalign(&p, align < sizeof(void *) ? sizeof(void *) : align, size) ? NULL : p;
+}
+static void counting_release(void *user, void *p, size_t size) { (void)user, (void)size, blocks_out--, free(p); }
+
+TEST(every_allocation_of_a_transfer_function_may_fail) {
+    field f = field_waves(8, 2);
+    const isogi_context context = {.alloc = failing_alloc, .release = counting_release, .threads = 1};
+    for (int c = 0; c < 3; c++) {
+        const isogi_dvr_desc desc = {.pyramid = f.pyramid, .space = ISOGI_DVR_DATA, .classification = (isogi_dvr_classification)c, .table = 16};
+        isogi_dvr *dvr = NULL;
+        calls_left = 1 << 30, blocks_out = 0;
+        CHECK(isogi_dvr_create(&dvr, &desc, &context) == ISOGI_OK && isogi_dvr_set_transfer(dvr, &landscape) == ISOGI_OK, "create");
+        int before = blocks_out, failures = 0;
+        for (int k = 0;; k++) {
+            calls_left = k;
+            isogi_result result = isogi_dvr_set_transfer(dvr, &landscape);
+            CHECK(blocks_out == before, "%d blocks, not %d", blocks_out, before);
+            if (result == ISOGI_OK) break;
+            CHECK(result == ISOGI_NO_MEMORY, "%s", isogi_result_string(result));
+            calls_left = 1 << 30, failures++;
+            const double eye[3] = {-9, 3, 4}, target[3] = {4, 4, 4};
+            CHECK(cast(dvr, eye, target, NULL).c[3] > 0, "the old function stays");
+        }
+        CHECK(failures >= (c == 2 ? 4 : 7), "%d allocations", failures);
+        calls_left = 1 << 30;
+        isogi_dvr_free(dvr);
+        CHECK(blocks_out == 0, "%d blocks left", blocks_out);
+    }
+    field_free(&f);
+}
+
+TEST(a_renderer_without_a_context_takes_the_pyramids) {
+    field f = field_new(6, 6, 6);
+    const isogi_context context = {.alloc = failing_alloc, .release = counting_release, .threads = 1};
+    isogi_dvr *dvr = NULL;
+    calls_left = 1 << 30, blocks_out = 0;
+    CHECK(isogi_vol_build(&f.pyramid, &f.volume, &context) == ISOGI_OK, "build");
+    int before = blocks_out;
+    const isogi_dvr_desc desc = {.pyramid = f.pyramid};
+    CHECK(isogi_dvr_create(&dvr, &desc, NULL) == ISOGI_OK && blocks_out > before, "%d blocks, %d before", blocks_out, before);
+    isogi_dvr_free(dvr);
+    CHECK(blocks_out == before, "%d blocks, not %d", blocks_out, before);
+    field_free(&f);
+}
+
+TEST(odd_transfer_functions_are_defined) {
+    field f = field_of(along_x, 7);
+    const double eye[3] = {-9, 3, 4}, target[3] = {4, 3, 4};
+    const struct { isogi_transfer_point points[5]; size_t count; double depth; } cases[] = {
+        {{{0.5, {1, 1, 1}, 2}}, 1, 2},                                                                       /* one point: constant */
+        {{{5, {1, 1, 1}, 2}}, 1, 2},                                                                         /* far above the data */
+        {{{0.5, {1, 1, 1}, 0}, {0.5, {1, 1, 1}, 1e6f}, {0.5, {1, 1, 1}, 0}}, 3, 0},                          /* a single value: no width */
+        {{{0.25, {1, 1, 1}, 0}, {0.25, {1, 1, 1}, 3}, {0.75, {1, 1, 1}, 3}, {0.75, {1, 1, 1}, 0}}, 4, 1.5}, /* a box */
+        {{{-1e300, {1, 1, 1}, 1}, {1e300, {1, 1, 1}, 1}}, 2, 1},                                             /* the widest that there is */
+        {{{-1.7e308, {1, 1, 1}, 1}, {1.7e308, {1, 1, 1}, 1}}, 2, 1},
+        {{{0.5, {1, 1, 1}, 4}, {0.5 + 1e-16, {1, 1, 1}, 4}}, 2, 4},
+        {{{2, {1, 1, 1}, 0}, {3, {1, 1, 1}, 9}}, 2, 0},                                                      /* nothing within the data */
+        {{{-3, {1, 1, 1}, 9}, {-2, {1, 1, 1}, 1}}, 2, 1}};
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++)
+        for (int c = 0; c < 2; c++) {
+            const isogi_transfer transfer = {cases[i].points, cases[i].count, NULL, 0};
+            const isogi_dvr_desc desc = {.pyramid = f.pyramid, .space = ISOGI_DVR_DATA, .opaque = 1, .classification = (isogi_dvr_classification)c, .table = 1024};
+            isogi_dvr *dvr = dvr_new(&desc, &transfer);
+            pixel p = cast(dvr, eye, target, NULL);
+            CHECK(fabs((double)p.c[3] + expm1(-cases[i].depth)) < (c ? 2e-3 : 2e-7), "case %zu classification %d: opacity %.9g, not %.9g", i, c,
+                  (double)p.c[3], -expm1(-cases[i].depth));
+            isogi_dvr_free(dvr);
+        }
+    field_free(&f);
+}
+
+/* Extreme fields, extinctions and peaks: every pixel is a number, opacities are 0..1. */
+TEST(extreme_values_give_numbers) {
+    test_random r = {55};
+    for (int n = 0; n < 120; n++) {
+        field f = field_new(4, 4, 4);
+        double scale = pow(10, random_range(&r, -300, 300));
+        isogi_transfer_point points[5];
+        isogi_peak peaks[3];
+        for (size_t i = 0; i < field_count(&f); i++) f.value[i] = scale * random_range(&r, -1, 1);
+        field_build(&f);
+        for (int i = 0; i < 5; i++) points[i] = (isogi_transfer_point){scale * (-1 + 0.5 * i), {1, 0.5f, 0}, i % 2 ? 0 : (float)pow(10, random_range(&r, -38, 38))};
+        for (int i = 0; i < 3; i++) peaks[i] = (isogi_peak){scale * random_range(&r, -1, 1), {0, 1, 1}, (float)random_unit(&r)};
+        const isogi_transfer transfer = {points, 5, peaks, 3};
+        for (int c = 0; c < 3; c++)
+            for (int s = 0; s < 4; s++) {
+                const isogi_dvr_desc desc = {.pyramid = f.pyramid, .space = ISOGI_DVR_DATA, .silhouette = (isogi_dvr_silhouette)s,
+                                             .classification = (isogi_dvr_classification)c, .table = 32};
+                isogi_dvr *dvr = dvr_new(&desc, &transfer);
+                double eye[3], target[3];
+                random_line(&f, &r, eye, target);
+                pixel p = cast(dvr, eye, target, NULL);
+                for (int a = 0; a < 4; a++) CHECK(p.c[a] >= 0 && p.c[a] <= 1.00001f, "scale %g classification %d silhouette %d: channel %d %g", scale, c, s, a, (double)p.c[a]);
+                CHECK(p.depth > 0, "depth %g", (double)p.depth);
+                isogi_dvr_free(dvr);
+            }
+        field_free(&f);
+    }
+}
+
+TEST(pictures_are_the_same_bits_for_any_number_of_threads) {
+    field f = field_waves(20, 8);
+    test_random r = {3};
+    isogi_view view = view_of(&f, 1, &r, 40);
+    for (int c = 0; c < 2; c++) {
+        float(*image[2])[4];
+        for (int i = 0; i < 2; i++) {
+            const isogi_context context = {.threads = i ? 3 : 1};
+            const isogi_dvr_desc desc = {.pyramid = f.pyramid, .space = ISOGI_DVR_DATA, .classification = (isogi_dvr_classification)c, .silhouette = ISOGI_DVR_SILHOUETTE_EXACT};
+            isogi_dvr *dvr = NULL;
+            CHECK(isogi_dvr_create(&dvr, &desc, &context) == ISOGI_OK && isogi_dvr_set_transfer(dvr, &landscape) == ISOGI_OK, "create");
+            image[i] = picture(dvr, &view, NULL, NULL, NULL);
+            isogi_dvr_free(dvr);
+        }
+        CHECK(!memcmp(image[0], image[1], 1600 * sizeof *image[0]), "classification %d: pixels differ by %g", c, largest_difference(image[0], image[1], 1600));
+        free(image[0]), free(image[1]);
+    }
+    field_free(&f);
+}
+
+TEST(bad_descriptions_are_refused) {
+    field f = field_waves(4, 1);
+    isogi_dvr *dvr = NULL;
+    const isogi_transfer_point wrong[] = {{1, {1, 1, 1}, 0}, {0, {1, 1, 1}, 0}};
+    const isogi_dvr_desc good = {.pyramid = f.pyramid, .space = ISOGI_DVR_DATA};
+    isogi_dvr_desc bad;
+#define REFUSED(change) bad = good, bad.change; CHECK(isogi_dvr_create(&dvr, &bad, &serial) == ISOGI_INVALID && !dvr, #change)
+    REFUSED(classification = (isogi_dvr_classification)3);
+    REFUSED(classification = (isogi_dvr_classification)-1);
+    REFUSED(silhouette = (isogi_dvr_silhouette)4);
+    REFUSED(normals = (isogi_normal_kind)2);
+    REFUSED(table = 1);
+    REFUSED(table = -1);
+    REFUSED(table = 1025);
+    REFUSED(material[0].exponent = NAN);
+    REFUSED(material[1].exponent = -1);
+    REFUSED(material[2].exponent = 2e6f);
+    REFUSED(material[0].diffuse[1] = -1);
+    REFUSED(material[2].specular[2] = INFINITY);
+    REFUSED(second_count = 1);
+    REFUSED(second_count = 2; bad.second_points = wrong);
+    field_free(&f);
+}
+
 TEST_MAIN("dvr_data")
