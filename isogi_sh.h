@@ -896,6 +896,7 @@ static int isogi_sh__level(void) {
 }
 
 typedef float isogi_sh__f4 __attribute__((vector_size(16), aligned(4), may_alias));
+typedef double isogi_sh__d2 __attribute__((vector_size(16), aligned(8), may_alias));
 typedef float isogi_sh__f8 __attribute__((vector_size(32), aligned(4), may_alias));
 typedef float isogi_sh__f16 __attribute__((vector_size(64), aligned(4), may_alias));
 typedef double isogi_sh__d4 __attribute__((vector_size(32), aligned(8), may_alias));
@@ -918,193 +919,316 @@ typedef int64_t isogi_sh__l8 __attribute__((vector_size(64), aligned(8), may_ali
 #define ISOGI_SH__FMA_F16(a, b, c) ((isogi_sh__f16)__builtin_ia32_vfmaddps512_mask(a, b, c, ISOGI_SH__ALL16, 4))
 #define ISOGI_SH__FMA_D8(a, b, c) ((isogi_sh__d8)__builtin_ia32_vfmaddpd512_mask(a, b, c, ISOGI_SH__ALL8, 4))
 
-/* Defines NAME(out, stride, order, x, y, z): all functions at WIDTH directions, that of index i at out + stride i. It returns 0 and
-   writes nothing where a squared length is not within [1e-30, 1e30]. Lengths that differ from 1 by rounding alone are corrected by
-   a series, others by a root in each lane. */
-#define ISOGI_SH__DEFINE_EVAL(NAME, TARGET, T, V, I, WIDTH, FMA, TABLE, NEAR, ROOT)                                            \
-    TARGET static inline __attribute__((always_inline)) int NAME##_body(T *out, size_t stride, int order, const T *px, const T *py, const T *pz) { \
-        V x = *(const V *)px, y = *(const V *)py, z = *(const V *)pz, zero = {0}, one = zero + 1, t, p, d, c, s, sign, low;         \
-        V square = FMA(x, x, FMA(y, y, z * z)), e = one - square, scale = FMA(e, FMA(e, zero + (T)0.375, zero + (T)0.5), one); \
-        I top = {0}, near_one;                                                                                                 \
-        int64_t word[sizeof(V) / 8];                                                                                           \
-        T lane[WIDTH];                                                                                                         \
-        const T *table = TABLE;                                                                                                \
-        int l, m, k;                                                                                                           \
-        near_one = (I)(e < (T)NEAR) & (I)(e > -(T)NEAR);                                                                       \
-        memcpy(word, &near_one, sizeof word);                                                                                  \
-        for (k = 1; k < (int)(sizeof word / sizeof *word); k++) word[0] &= word[k];                                            \
-        if (word[0] != -1) {                                                                                                   \
-            memcpy(lane, &square, sizeof lane);                                                                                \
+/* Vectors of several rows that stand one after the other in memory. gcc 12 would shuffle where an insertion costs a third. */
+#if defined(__clang__)
+#define ISOGI_SH__JOIN_F8(a, b) __builtin_shufflevector(a, b, 0, 1, 2, 3, 4, 5, 6, 7)
+#define ISOGI_SH__JOIN_D4(a, b) __builtin_shufflevector(a, b, 0, 1, 2, 3)
+#define ISOGI_SH__JOIN_F16(a, b, c, d) __builtin_shufflevector(ISOGI_SH__JOIN_F8(a, b), ISOGI_SH__JOIN_F8(c, d), 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15)
+#define ISOGI_SH__JOIN_D8(a, b, c, d) __builtin_shufflevector(ISOGI_SH__JOIN_D4(a, b), ISOGI_SH__JOIN_D4(c, d), 0, 1, 2, 3, 4, 5, 6, 7)
+#else
+#define ISOGI_SH__JOIN_F8(a, b) ((isogi_sh__f8)__builtin_ia32_vinsertf128_ps256(__builtin_ia32_ps256_ps(a), b, 1))
+#define ISOGI_SH__JOIN_D4(a, b) ((isogi_sh__d4)__builtin_ia32_vinsertf128_pd256(__builtin_ia32_pd256_pd(a), b, 1))
+#define ISOGI_SH__PUT_F16(v, a, k) __builtin_ia32_insertf32x4_mask(v, a, k, v, 0xffff)
+#define ISOGI_SH__PUT_D8(v, a, k) __builtin_ia32_insertf64x2_512_mask(v, a, k, v, ISOGI_SH__ALL8)
+#define ISOGI_SH__JOIN_F16(a, b, c, d)                                                                                        \
+    ISOGI_SH__PUT_F16(ISOGI_SH__PUT_F16(ISOGI_SH__PUT_F16(__builtin_ia32_ps512_ps(a), b, 1), c, 2), d, 3)
+#define ISOGI_SH__JOIN_D8(a, b, c, d)                                                                                         \
+    ISOGI_SH__PUT_D8(ISOGI_SH__PUT_D8(ISOGI_SH__PUT_D8(__builtin_ia32_pd512_pd(a), b, 1), c, 2), d, 3)
+#endif
+#define ISOGI_SH__ROW_F4(i) (*(const isogi_sh__f4 *)(in + pitch * (size_t)(i)))
+#define ISOGI_SH__ROW_D2(i) (*(const isogi_sh__d2 *)(in + pitch * (size_t)(i)))
+
+/* y[4][n] = in[n][pitch]: 4 x 4 transposed in each quarter of a vector, whose quarters are rows 4 apart. n is a square, 9 or more: what
+   16 and 8 rows at a time leave over is 4, 1 or none. The plain loop is for them. */
+#define ISOGI_SH__LOW_F8(a, b) __builtin_shufflevector(a, b, 0, 8, 1, 9, 4, 12, 5, 13)
+#define ISOGI_SH__HIGH_F8(a, b) __builtin_shufflevector(a, b, 2, 10, 3, 11, 6, 14, 7, 15)
+#define ISOGI_SH__EVEN_F8(a, b) __builtin_shufflevector(a, b, 0, 1, 8, 9, 4, 5, 12, 13)
+#define ISOGI_SH__ODD_F8(a, b) __builtin_shufflevector(a, b, 2, 3, 10, 11, 6, 7, 14, 15)
+#define ISOGI_SH__LOW_F16(a, b) __builtin_shufflevector(a, b, 0, 16, 1, 17, 4, 20, 5, 21, 8, 24, 9, 25, 12, 28, 13, 29)
+#define ISOGI_SH__HIGH_F16(a, b) __builtin_shufflevector(a, b, 2, 18, 3, 19, 6, 22, 7, 23, 10, 26, 11, 27, 14, 30, 15, 31)
+#define ISOGI_SH__EVEN_F16(a, b) __builtin_shufflevector(a, b, 0, 1, 16, 17, 4, 5, 20, 21, 8, 9, 24, 25, 12, 13, 28, 29)
+#define ISOGI_SH__ODD_F16(a, b) __builtin_shufflevector(a, b, 2, 3, 18, 19, 6, 7, 22, 23, 10, 11, 26, 27, 14, 15, 30, 31)
+#define ISOGI_SH__TURN(V, SUFFIX)                                                                                              \
+    {                                                                                                                          \
+        V e = ISOGI_SH__LOW_##SUFFIX(a, b), f = ISOGI_SH__HIGH_##SUFFIX(a, b), g = ISOGI_SH__LOW_##SUFFIX(c, d), h = ISOGI_SH__HIGH_##SUFFIX(c, d); \
+        *(V *)(y + i) = ISOGI_SH__EVEN_##SUFFIX(e, g);                                                                         \
+        *(V *)(y + i + n) = ISOGI_SH__ODD_##SUFFIX(e, g);                                                                      \
+        *(V *)(y + i + 2 * n) = ISOGI_SH__EVEN_##SUFFIX(f, h);                                                                 \
+        *(V *)(y + i + 3 * n) = ISOGI_SH__ODD_##SUFFIX(f, h);                                                                  \
+    }
+#define ISOGI_SH__ROWS_F8(j) ISOGI_SH__JOIN_F8(ISOGI_SH__ROW_F4(j), ISOGI_SH__ROW_F4((j) + 4))
+#define ISOGI_SH__ROWS_F16(j) ISOGI_SH__JOIN_F16(ISOGI_SH__ROW_F4(j), ISOGI_SH__ROW_F4((j) + 4), ISOGI_SH__ROW_F4((j) + 8), ISOGI_SH__ROW_F4((j) + 12))
+ISOGI_SH__AVX2 ISOGI_SH__INLINE void isogi_sh__eval_f8_turn(float *y, size_t n, const float *in, size_t pitch, size_t i) {
+    size_t k;
+    for (; i + 8 <= n; i += 8) {
+        isogi_sh__f8 a = ISOGI_SH__ROWS_F8(i), b = ISOGI_SH__ROWS_F8(i + 1), c = ISOGI_SH__ROWS_F8(i + 2), d = ISOGI_SH__ROWS_F8(i + 3);
+        ISOGI_SH__TURN(isogi_sh__f8, F8)
+    }
+    for (; i < n; i++)
+        for (k = 0; k < 4; k++) y[n * k + i] = in[pitch * i + k];
+}
+/* out[k * stride + i] = in[i * pitch + k] for an 8 x 8 tile */
+ISOGI_SH__AVX2 ISOGI_SH__INLINE void isogi_sh__transpose_f8(float *y, size_t n, const float *in, size_t pitch) {
+    size_t half, i = 0;
+    for (half = 0; half < 2; half++, y += 4 * n, in += 4) {
+        isogi_sh__f8 a = ISOGI_SH__ROWS_F8(0), b = ISOGI_SH__ROWS_F8(1), c = ISOGI_SH__ROWS_F8(2), d = ISOGI_SH__ROWS_F8(3);
+        ISOGI_SH__TURN(isogi_sh__f8, F8)
+    }
+}
+
+ISOGI_SH__AVX512 ISOGI_SH__INLINE void isogi_sh__eval_f16_turn(float *y, size_t n, const float *in, size_t pitch, size_t i) {
+    for (; i + 16 <= n; i += 16) {
+        isogi_sh__f16 a = ISOGI_SH__ROWS_F16(i), b = ISOGI_SH__ROWS_F16(i + 1), c = ISOGI_SH__ROWS_F16(i + 2), d = ISOGI_SH__ROWS_F16(i + 3);
+        ISOGI_SH__TURN(isogi_sh__f16, F16)
+    }
+    isogi_sh__eval_f8_turn(y, n, in, pitch, i);
+}
+
+/* y[2][n] = in[n][pitch] */
+#define ISOGI_SH__ROWS_D4(j) ISOGI_SH__JOIN_D4(ISOGI_SH__ROW_D2(j), ISOGI_SH__ROW_D2((j) + 2))
+#define ISOGI_SH__ROWS_D8(j) ISOGI_SH__JOIN_D8(ISOGI_SH__ROW_D2(j), ISOGI_SH__ROW_D2((j) + 2), ISOGI_SH__ROW_D2((j) + 4), ISOGI_SH__ROW_D2((j) + 6))
+ISOGI_SH__AVX2 ISOGI_SH__INLINE void isogi_sh__eval_d4_turn(double *y, size_t n, const double *in, size_t pitch, size_t i) {
+    for (; i + 4 <= n; i += 4) {
+        isogi_sh__d4 a = ISOGI_SH__ROWS_D4(i), b = ISOGI_SH__ROWS_D4(i + 1);
+        *(isogi_sh__d4 *)(y + i) = __builtin_shufflevector(a, b, 0, 4, 2, 6);
+        *(isogi_sh__d4 *)(y + i + n) = __builtin_shufflevector(a, b, 1, 5, 3, 7);
+    }
+    for (; i < n; i++) y[i] = in[pitch * i], y[n + i] = in[pitch * i + 1];
+}
+ISOGI_SH__AVX512 ISOGI_SH__INLINE void isogi_sh__eval_d8_turn(double *y, size_t n, const double *in, size_t pitch, size_t i) {
+    for (; i + 8 <= n; i += 8) {
+        isogi_sh__d8 a = ISOGI_SH__ROWS_D8(i), b = ISOGI_SH__ROWS_D8(i + 1);
+        *(isogi_sh__d8 *)(y + i) = __builtin_shufflevector(a, b, 0, 8, 2, 10, 4, 12, 6, 14);
+        *(isogi_sh__d8 *)(y + i + n) = __builtin_shufflevector(a, b, 1, 9, 3, 11, 5, 13, 7, 15);
+    }
+    isogi_sh__eval_d4_turn(y, n, in, pitch, i);
+}
+
+/* directions into coordinates */
+ISOGI_SH__AVX2 ISOGI_SH__INLINE void isogi_sh__eval_f8_split(isogi_sh__f8 *u, const float *from) {
+    isogi_sh__f8 a = *(const isogi_sh__f8 *)from, b = *(const isogi_sh__f8 *)(from + 8), c = *(const isogi_sh__f8 *)(from + 16);
+    isogi_sh__f8 x = __builtin_shufflevector(a, b, 0, 3, 6, 9, 12, 15, 0, 0), y = __builtin_shufflevector(a, b, 1, 4, 7, 10, 13, 0, 0, 0);
+    isogi_sh__f8 z = __builtin_shufflevector(a, b, 2, 5, 8, 11, 14, 0, 0, 0);
+    u[0] = __builtin_shufflevector(x, c, 0, 1, 2, 3, 4, 5, 10, 13);
+    u[1] = __builtin_shufflevector(y, c, 0, 1, 2, 3, 4, 8, 11, 14);
+    u[2] = __builtin_shufflevector(z, c, 0, 1, 2, 3, 4, 9, 12, 15);
+}
+
+ISOGI_SH__AVX2 ISOGI_SH__INLINE void isogi_sh__eval_d4_split(isogi_sh__d4 *u, const double *from) {
+    isogi_sh__d4 a = *(const isogi_sh__d4 *)from, b = *(const isogi_sh__d4 *)(from + 4), c = *(const isogi_sh__d4 *)(from + 8);
+    isogi_sh__d4 x = __builtin_shufflevector(a, b, 0, 3, 6, 0), y = __builtin_shufflevector(a, b, 1, 4, 7, 0);
+    isogi_sh__d4 z = __builtin_shufflevector(a, b, 2, 5, 0, 0);
+    u[0] = __builtin_shufflevector(x, c, 0, 1, 2, 5);
+    u[1] = __builtin_shufflevector(y, c, 0, 1, 2, 6);
+    u[2] = __builtin_shufflevector(z, c, 0, 1, 4, 7);
+}
+
+ISOGI_SH__AVX512 ISOGI_SH__INLINE void isogi_sh__eval_f16_split(isogi_sh__f16 *u, const float *from) {
+    isogi_sh__f16 a = *(const isogi_sh__f16 *)from, b = *(const isogi_sh__f16 *)(from + 16), c = *(const isogi_sh__f16 *)(from + 32);
+    isogi_sh__f16 x = __builtin_shufflevector(a, b, 0, 3, 6, 9, 12, 15, 18, 21, 24, 27, 30, 0, 0, 0, 0, 0);
+    isogi_sh__f16 y = __builtin_shufflevector(a, b, 1, 4, 7, 10, 13, 16, 19, 22, 25, 28, 31, 0, 0, 0, 0, 0);
+    isogi_sh__f16 z = __builtin_shufflevector(a, b, 2, 5, 8, 11, 14, 17, 20, 23, 26, 29, 0, 0, 0, 0, 0, 0);
+    u[0] = __builtin_shufflevector(x, c, 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 17, 20, 23, 26, 29);
+    u[1] = __builtin_shufflevector(y, c, 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 18, 21, 24, 27, 30);
+    u[2] = __builtin_shufflevector(z, c, 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 16, 19, 22, 25, 28, 31);
+}
+
+ISOGI_SH__AVX512 ISOGI_SH__INLINE void isogi_sh__eval_d8_split(isogi_sh__d8 *u, const double *from) {
+    isogi_sh__d8 a = *(const isogi_sh__d8 *)from, b = *(const isogi_sh__d8 *)(from + 8), c = *(const isogi_sh__d8 *)(from + 16);
+    isogi_sh__d8 x = __builtin_shufflevector(a, b, 0, 3, 6, 9, 12, 15, 0, 0), y = __builtin_shufflevector(a, b, 1, 4, 7, 10, 13, 0, 0, 0);
+    isogi_sh__d8 z = __builtin_shufflevector(a, b, 2, 5, 8, 11, 14, 0, 0, 0);
+    u[0] = __builtin_shufflevector(x, c, 0, 1, 2, 3, 4, 5, 10, 13);
+    u[1] = __builtin_shufflevector(y, c, 0, 1, 2, 3, 4, 8, 11, 14);
+    u[2] = __builtin_shufflevector(z, c, 0, 1, 2, 3, 4, 9, 12, 15);
+}
+
+/* Defines NAME(out, stride, order, x, y, z, count): all functions at the first directions, that of index i at out + stride i; WIDTH at a
+   time. It returns how many directions are done, and stops before a block with a squared length outside [1e-30, 1e30].
+
+   Lengths that differ from 1 by rounding alone are corrected by a series, others by a root in each lane. z = z' + low, since half an
+   ulp of z near the poles is much for m < 3; t = 1 - |z| is exact there. Columns of the recursion go in pairs, so that two chains of
+   operations hide each other's latency. Near the poles (x + i y)^m would become denormal numbers, which take a hundred times as
+   long: what is too small to matter is cleared. */
+#define ISOGI_SH__DEFINE_EVAL(NAME, TARGET, T, V, I, WIDTH, MOST, FMA, LESS, TABLE, SQUARED_ERROR, NEAR_POLE, TINY, ROOT)      \
+    /* u[0..2] becomes a unit vector, u[3] the rest of its z */                                                                \
+    TARGET ISOGI_SH__INLINE int NAME##_unit(V *u) {                                                                            \
+        V x = u[0], y = u[1], z = u[2], zero = {0}, one = zero + 1;                                                            \
+        V e = FMA(-x, x, FMA(-y, y, FMA(-z, z, one)));                                                                         \
+        if (!LESS(e * e, zero + (T)SQUARED_ERROR)) {                                                                           \
+            T lane[WIDTH];                                                                                                     \
+            int k;                                                                                                             \
+            e = FMA(x, x, FMA(y, y, z * z));                                                                                   \
+            memcpy(lane, &e, sizeof lane);                                                                                     \
             for (k = 0; k < WIDTH; k++) {                                                                                      \
                 if (!(lane[k] > (T)1e-30 && lane[k] < (T)1e30)) return 0;                                                      \
                 lane[k] = 1 / ROOT(lane[k]);                                                                                   \
             }                                                                                                                  \
-            memcpy(&scale, lane, sizeof lane);                                                                                 \
-            x *= scale, y *= scale, z *= scale;                                                                                \
-            scale = FMA(one - FMA(x, x, FMA(y, y, z * z)), zero + (T)0.5, one);                                                \
+            memcpy(&e, lane, sizeof lane);                                                                                     \
+            x *= e, y *= e, z *= e;                                                                                            \
+            e = FMA(-x, x, FMA(-y, y, FMA(-z, z, one)));                                                                       \
         }                                                                                                                      \
-        x *= scale, y *= scale, z *= scale;                                                                                    \
-        top = (I)(-one) ^ (I)one;                                                                                              \
-        sign = (V)(((I)z & top) | (I)one);                                                                                     \
-        t = FMA(x, x, y * y) / FMA(sign, z, one);                                                                              \
-        near_one = (I)(sign * z > (T)0.5);                                                                                     \
-        d = one - t, low = (V)((I)((one - d) - t) & near_one) * sign;                                                          \
-        z = (V)(((I)(d * sign) & near_one) | ((I)z & ~near_one));                                                              \
-        p = one, d = zero;                                                                                                     \
-        ISOGI_SH__UNROLL                                                                                                       \
-        for (l = 0; l < order; l++, table += 3) {                                                                              \
-            d = FMA(d, zero + table[0], t * p * table[1]);                                                                     \
-            p += d;                                                                                                            \
-            c = p * table[2];                                                                                                  \
-            if (l & 1) c *= sign;                                                                                              \
-            *(V *)(out + stride * (size_t)(l * (l + 1))) = c;                                                                  \
-        }                                                                                                                      \
-        table = TABLE + 3 * ISOGI_SH__TABLE_ORDER;                                                                             \
-        ISOGI_SH__UNROLL                                                                                                       \
-        for (m = 1, c = x, s = y; m < order; m++) {                                                                            \
-            V q = zero + table[0], before = zero;                                                                              \
-            T *plus = out + stride * (size_t)(m * (m + 2)), *minus = out + stride * (size_t)(m * m);                           \
-            const T *pair = table + 1;                                                                                         \
-            table += 1 + 2 * (ISOGI_SH__TABLE_ORDER - 1 - m);                                                                  \
-            *(V *)plus = q * c;                                                                                                \
-            *(V *)minus = q * s;                                                                                               \
-            ISOGI_SH__UNROLL                                                                                                   \
-            for (l = m + 1; l < order; l++, pair += 2) {                                                                       \
-                plus += stride * (size_t)(2 * l), minus += stride * (size_t)(2 * l);                                           \
-                d = FMA(z * pair[0], q, FMA(low * pair[0], q, before * pair[1]));                                              \
-                before = q, q = d;                                                                                             \
-                *(V *)plus = q * c;                                                                                            \
-                *(V *)minus = q * s;                                                                                           \
-            }                                                                                                                  \
-            d = FMA(x, c, -(y * s));                                                                                           \
-            s = FMA(x, s, y * c);                                                                                              \
-            c = d;                                                                                                             \
-        }                                                                                                                      \
+        e *= FMA(e, zero + (T)0.375, zero + (T)0.5);                                                                           \
+        u[0] = FMA(x, e, x), u[1] = FMA(y, e, y), u[2] = FMA(z, e, z), u[3] = FMA(z, e, z - u[2]);                             \
         return 1;                                                                                                              \
     }                                                                                                                          \
-    TARGET static int NAME##_order5(T *out, size_t stride, const T *px, const T *py, const T *pz) {                            \
-        return NAME##_body(out, stride, 5, px, py, pz);                                                                        \
+    /* order 5 as polynomials in sin^2 = x^2 + y^2, which is exact near the poles */                                           \
+    TARGET ISOGI_SH__INLINE void NAME##_order5(T *out, size_t stride, const V *u) {                                            \
+        V x = u[0], y = u[1], z = u[2], zero = {0}, w = FMA(x, x, y * y), c = (x - y) * (x + y), s = x * y, c3, s3, f;         \
+        *(V *)(out + 0 * stride) = zero + (T)0.28209479177387814;                                                              \
+        *(V *)(out + 1 * stride) = y * (T)0.48860251190291992;                                                                 \
+        *(V *)(out + 2 * stride) = z * (T)0.48860251190291992;                                                                 \
+        *(V *)(out + 3 * stride) = x * (T)0.48860251190291992;                                                                 \
+        s += s;                                                                                                                \
+        *(V *)(out + 4 * stride) = s * (T)0.54627421529603959;                                                                 \
+        f = z * (T)1.0925484305920792;                                                                                         \
+        *(V *)(out + 5 * stride) = f * y;                                                                                      \
+        *(V *)(out + 6 * stride) = FMA(w, zero - (T)0.94617469575756002, zero + (T)0.63078313050503998);                       \
+        *(V *)(out + 7 * stride) = f * x;                                                                                      \
+        *(V *)(out + 8 * stride) = c * (T)0.54627421529603959;                                                                 \
+        c3 = FMA(x, c, -(y * s)), s3 = FMA(x, s, y * c);                                                                       \
+        *(V *)(out + 9 * stride) = s3 * (T)0.59004358992664352;                                                                \
+        f = z * (T)1.4453057213202769;                                                                                         \
+        *(V *)(out + 10 * stride) = f * s;                                                                                     \
+        *(V *)(out + 14 * stride) = f * c;                                                                                     \
+        f = FMA(w, zero - (T)2.2852289973223288, zero + (T)1.8281831978578631);                                                \
+        *(V *)(out + 11 * stride) = f * y;                                                                                     \
+        *(V *)(out + 12 * stride) = z * FMA(w, zero - (T)1.8658816629505769, zero + (T)0.7463526651802308);                    \
+        *(V *)(out + 13 * stride) = f * x;                                                                                     \
+        *(V *)(out + 15 * stride) = c3 * (T)0.59004358992664352;                                                               \
+        *(V *)(out + 16 * stride) = (s * c) * (T)1.2516714708983523;                                                           \
+        f = z * (T)1.7701307697799304;                                                                                         \
+        *(V *)(out + 17 * stride) = f * s3;                                                                                    \
+        *(V *)(out + 23 * stride) = f * c3;                                                                                    \
+        f = FMA(w, zero - (T)3.3116114351514599, zero + (T)2.8385240872726802);                                                \
+        *(V *)(out + 18 * stride) = f * s;                                                                                     \
+        *(V *)(out + 22 * stride) = f * c;                                                                                     \
+        f = z * FMA(w, zero - (T)4.6833258049010246, zero + (T)2.6761861742291567);                                            \
+        *(V *)(out + 19 * stride) = f * y;                                                                                     \
+        *(V *)(out + 20 * stride) = FMA(w, FMA(w, zero + (T)3.7024941420321512, zero - (T)4.2314218766081725), zero + (T)0.84628437532163447); \
+        *(V *)(out + 21 * stride) = f * x;                                                                                     \
+        *(V *)(out + 24 * stride) = FMA(c, c, -(s * s)) * (T)0.62583573544917614;                                              \
     }                                                                                                                          \
-    TARGET static int NAME(T *out, size_t stride, int order, const T *px, const T *py, const T *pz) {                          \
-        return order == 5 ? NAME##_order5(out, stride, px, py, pz) : NAME##_body(out, stride, order, px, py, pz);              \
+    /* columns m and m + 1, whose (x + i y)^m are c[0] + i s[0] and c[1] + i s[1]; centre: where Y_m^0 goes */                 \
+    TARGET ISOGI_SH__INLINE void NAME##_columns(T *centre, size_t stride, int order, int m, V z, V low, const V *c, const V *s) { \
+        const T *a = TABLE + 3 * ISOGI_SH__TABLE_ORDER + (m - 1) * (2 * ISOGI_SH__TABLE_ORDER - 1 - m), *b = a + 2 * (ISOGI_SH__TABLE_ORDER - m) - 1; \
+        size_t first = stride * (size_t)m, second = first + stride, step = 2 * second;                                         \
+        V zero = {0}, p = a[0] - zero, q = b[0] - zero, p_before, q_before = zero, d;                                          \
+        int l;                                                                                                                 \
+        *(V *)(centre + first) = p * c[0];                                                                                     \
+        *(V *)(centre - first) = p * s[0];                                                                                     \
+        if (m + 1 == order) return;                                                                                            \
+        centre += step;                                                                                                        \
+        p_before = p;                                                                                                          \
+        p *= z * a[1];                                                                                                         \
+        *(V *)(centre + first) = p * c[0];                                                                                     \
+        *(V *)(centre - first) = p * s[0];                                                                                     \
+        *(V *)(centre + second) = q * c[1];                                                                                    \
+        *(V *)(centre - second) = q * s[1];                                                                                    \
+                for (l = m + 2; l < order; l++) {                                                                              \
+            a += 2, step += 2 * stride, centre += step;                                                                        \
+            d = p_before * a[2], p_before = p;                                                                                 \
+            if (m < 3) d = FMA(low * a[1], p, d);                                                                              \
+            p = FMA(z * a[1], p, d);                                                                                           \
+            *(V *)(centre + first) = p * c[0];                                                                                 \
+            *(V *)(centre - first) = p * s[0];                                                                                 \
+            d = q_before * b[2], q_before = q;                                                                                 \
+            if (m < 3) d = FMA(low * b[1], q, d);                                                                              \
+            q = FMA(z * b[1], q, d);                                                                                           \
+            b += 2;                                                                                                            \
+            *(V *)(centre + second) = q * c[1];                                                                                \
+            *(V *)(centre - second) = q * s[1];                                                                                \
+        }                                                                                                                      \
+    }                                                                                                                          \
+    TARGET ISOGI_SH__INLINE V NAME##_clear(V x) {                                                                              \
+        V zero = {0};                                                                                                          \
+        I top = (I)(zero - 1) ^ (I)(zero + 1);                                                                                 \
+        return (V)((I)x & (I)((V)((I)x & ~top) > (T)TINY));                                                                    \
+    }                                                                                                                          \
+    TARGET ISOGI_SH__INLINE void NAME##_any(T *out, size_t stride, int order, const V *u) {                                    \
+        V x = u[0], y = u[1], z = u[2], t, p, d, c[2], s[2], sign, zero = {0}, one = zero + 1;                                 \
+        I top = (I)(-one) ^ (I)one;                                                                                            \
+        const T *table = TABLE;                                                                                                \
+        T *centre = out;                                                                                                       \
+        int l, m, clear = !LESS(zero + (T)NEAR_POLE, FMA(x, x, y * y));                                                        \
+        size_t step = 0;                                                                                                       \
+        sign = (V)(((I)z & top) | (I)one);                                                                                     \
+        t = (one - sign * z) - sign * u[3];                                                                                    \
+        *(V *)out = table[2] - zero;                                                                                           \
+                for (l = 1, p = one, d = zero; l < order; l++) {                                                               \
+            table += 3, step += 2 * stride, centre += step;                                                                    \
+            d = FMA(d, table[0] - zero, (t * table[1]) * p);                                                                   \
+            p += d;                                                                                                            \
+            *(V *)centre = l & 1 ? (p * table[2]) * sign : p * table[2];                                                       \
+        }                                                                                                                      \
+        if (clear) x = NAME##_clear(x), y = NAME##_clear(y);                                                                   \
+        c[0] = x, s[0] = y, centre = out;                                                                                      \
+                for (m = 1; m < order; m += 2) {                                                                               \
+            c[1] = FMA(x, c[0], -(y * s[0])), s[1] = FMA(x, s[0], y * c[0]);                                                   \
+            if (clear) c[1] = NAME##_clear(c[1]), s[1] = NAME##_clear(s[1]);                                                   \
+            centre = out + stride * (size_t)(m * (m + 1));                                                                     \
+            if (m == 1) NAME##_columns(centre, stride, order, 1, z, u[3], c, s);                                               \
+            else NAME##_columns(centre, stride, order, m, z, zero, c, s);                                                      \
+            c[0] = FMA(x, c[1], -(y * s[1])), s[0] = FMA(x, s[1], y * c[1]);                                                   \
+            if (clear) c[0] = NAME##_clear(c[0]), s[0] = NAME##_clear(s[0]);                                                   \
+        }                                                                                                                      \
+    }                                                                                                                          \
+    TARGET ISOGI_SH__INLINE int NAME##_load(V *u, const T *x, const T *y, const T *z) {                                        \
+        u[0] = *(const V *)x, u[1] = *(const V *)y, u[2] = *(const V *)z;                                                      \
+        return NAME##_unit(u);                                                                                                 \
+    }                                                                                                                          \
+    TARGET static size_t NAME(T *out, size_t stride, int order, const T *x, const T *y, const T *z, size_t count) {            \
+        V u[4];                                                                                                                \
+        size_t i;                                                                                                              \
+        if (order == 5) {                                                                                                      \
+            for (i = 0; i + WIDTH <= count && NAME##_load(u, x + i, y + i, z + i); i += WIDTH) NAME##_order5(out + i, stride, u); \
+        } else {                                                                                                               \
+            for (i = 0; i + WIDTH <= count && NAME##_load(u, x + i, y + i, z + i); i += WIDTH) NAME##_any(out + i, stride, order, u); \
+        }                                                                                                                      \
+        return i;                                                                                                              \
+    }                                                                                                                          \
+    TARGET static size_t NAME##_rows(T *out, int order, const T (*direction)[3], size_t count) {                               \
+        T scratch[MOST * MOST * WIDTH];                                                                                        \
+        V u[4];                                                                                                                \
+        size_t i, k, n = (size_t)order * (size_t)order;                                                                        \
+        for (i = 0; i + WIDTH <= count; i += WIDTH) {                                                                          \
+            NAME##_split(u, direction[i]);                                                                                     \
+            if (!NAME##_unit(u)) break;                                                                                        \
+            if (order == 5) {                                                                                                  \
+                NAME##_order5(scratch, WIDTH, u);                                                                              \
+                for (k = 0; k < WIDTH; k += 16 / sizeof(T)) NAME##_turn(out + 25 * (i + k), 25, scratch + k, WIDTH, 0);        \
+            } else {                                                                                                           \
+                NAME##_any(scratch, WIDTH, order, u);                                                                          \
+                for (k = 0; k < WIDTH; k += 16 / sizeof(T)) NAME##_turn(out + n * (i + k), n, scratch + k, WIDTH, 0);          \
+            }                                                                                                                  \
+        }                                                                                                                      \
+        return i;                                                                                                              \
     }
 
-ISOGI_SH__DEFINE_EVAL(isogi_sh__eval_f8, ISOGI_SH__AVX2, float, isogi_sh__f8, isogi_sh__i8, 8, ISOGI_SH__FMA_F8, isogi_sh__table_f32, 1e-3, sqrtf)
-ISOGI_SH__DEFINE_EVAL(isogi_sh__eval_d4, ISOGI_SH__AVX2, double, isogi_sh__d4, isogi_sh__l4, 4, ISOGI_SH__FMA_D4, isogi_sh__table_f64, 1e-6, sqrt)
-ISOGI_SH__DEFINE_EVAL(isogi_sh__eval_f16, ISOGI_SH__AVX512, float, isogi_sh__f16, isogi_sh__i16, 16, ISOGI_SH__FMA_F16, isogi_sh__table_f32, 1e-3, sqrtf)
-ISOGI_SH__DEFINE_EVAL(isogi_sh__eval_d8, ISOGI_SH__AVX512, double, isogi_sh__d8, isogi_sh__l8, 8, ISOGI_SH__FMA_D8, isogi_sh__table_f64, 1e-6, sqrt)
-
-/* out[k * stride + i] = in[i * pitch + k] for an 8 x 8 tile */
-ISOGI_SH__AVX2 static void isogi_sh__transpose_f8(float *out, size_t stride, const float *in, size_t pitch) {
-    isogi_sh__f8 t[8], u[8];
-    int i;
-    ISOGI_SH__UNROLL
-    for (i = 0; i < 8; i += 2) {
-        isogi_sh__f8 a = *(const isogi_sh__f8 *)(in + pitch * (size_t)i), b = *(const isogi_sh__f8 *)(in + pitch * (size_t)(i + 1));
-        t[i] = __builtin_shufflevector(a, b, 0, 8, 1, 9, 4, 12, 5, 13);
-        t[i + 1] = __builtin_shufflevector(a, b, 2, 10, 3, 11, 6, 14, 7, 15);
-    }
-    ISOGI_SH__UNROLL
-    for (i = 0; i < 8; i += 4) {
-        u[i] = __builtin_shufflevector(t[i], t[i + 2], 0, 1, 8, 9, 4, 5, 12, 13);
-        u[i + 1] = __builtin_shufflevector(t[i], t[i + 2], 2, 3, 10, 11, 6, 7, 14, 15);
-        u[i + 2] = __builtin_shufflevector(t[i + 1], t[i + 3], 0, 1, 8, 9, 4, 5, 12, 13);
-        u[i + 3] = __builtin_shufflevector(t[i + 1], t[i + 3], 2, 3, 10, 11, 6, 7, 14, 15);
-    }
-    ISOGI_SH__UNROLL
-    for (i = 0; i < 4; i++) {
-        *(isogi_sh__f8 *)(out + stride * (size_t)i) = __builtin_shufflevector(u[i], u[i + 4], 0, 1, 2, 3, 8, 9, 10, 11);
-        *(isogi_sh__f8 *)(out + stride * (size_t)(i + 4)) = __builtin_shufflevector(u[i], u[i + 4], 4, 5, 6, 7, 12, 13, 14, 15);
-    }
-}
-
-ISOGI_SH__AVX2 static void isogi_sh__transpose_d4(double *out, size_t stride, const double *in, size_t pitch) {
-    isogi_sh__d4 a = *(const isogi_sh__d4 *)in, b = *(const isogi_sh__d4 *)(in + pitch), c = *(const isogi_sh__d4 *)(in + 2 * pitch);
-    isogi_sh__d4 d = *(const isogi_sh__d4 *)(in + 3 * pitch), t = __builtin_shufflevector(a, b, 0, 4, 2, 6);
-    isogi_sh__d4 u = __builtin_shufflevector(a, b, 1, 5, 3, 7), v = __builtin_shufflevector(c, d, 0, 4, 2, 6);
-    isogi_sh__d4 w = __builtin_shufflevector(c, d, 1, 5, 3, 7);
-    *(isogi_sh__d4 *)out = __builtin_shufflevector(t, v, 0, 1, 4, 5);
-    *(isogi_sh__d4 *)(out + stride) = __builtin_shufflevector(u, w, 0, 1, 4, 5);
-    *(isogi_sh__d4 *)(out + 2 * stride) = __builtin_shufflevector(t, v, 2, 3, 6, 7);
-    *(isogi_sh__d4 *)(out + 3 * stride) = __builtin_shufflevector(u, w, 2, 3, 6, 7);
-}
-
-/* 8 directions into coordinates */
-ISOGI_SH__AVX2 static void isogi_sh__load_f8(float (*d)[8], const float (*direction)[3]) {
-    const float *from = direction[0];
-    isogi_sh__f8 a = *(const isogi_sh__f8 *)from, b = *(const isogi_sh__f8 *)(from + 8), c = *(const isogi_sh__f8 *)(from + 16);
-    isogi_sh__f8 x = __builtin_shufflevector(a, b, 0, 3, 6, 9, 12, 15, 0, 0), y = __builtin_shufflevector(a, b, 1, 4, 7, 10, 13, 0, 0, 0);
-    isogi_sh__f8 z = __builtin_shufflevector(a, b, 2, 5, 8, 11, 14, 0, 0, 0);
-    *(isogi_sh__f8 *)d[0] = __builtin_shufflevector(x, c, 0, 1, 2, 3, 4, 5, 10, 13);
-    *(isogi_sh__f8 *)d[1] = __builtin_shufflevector(y, c, 0, 1, 2, 3, 4, 8, 11, 14);
-    *(isogi_sh__f8 *)d[2] = __builtin_shufflevector(z, c, 0, 1, 2, 3, 4, 9, 12, 15);
-}
-
-ISOGI_SH__AVX2 static void isogi_sh__load_d4(double (*d)[4], const double (*direction)[3]) {
-    const double *from = direction[0];
-    isogi_sh__d4 a = *(const isogi_sh__d4 *)from, b = *(const isogi_sh__d4 *)(from + 4), c = *(const isogi_sh__d4 *)(from + 8);
-    isogi_sh__d4 x = __builtin_shufflevector(a, b, 0, 3, 6, 0), y = __builtin_shufflevector(a, b, 1, 4, 7, 0);
-    isogi_sh__d4 z = __builtin_shufflevector(a, b, 2, 5, 0, 0);
-    *(isogi_sh__d4 *)d[0] = __builtin_shufflevector(x, c, 0, 1, 2, 5);
-    *(isogi_sh__d4 *)d[1] = __builtin_shufflevector(y, c, 0, 1, 2, 6);
-    *(isogi_sh__d4 *)d[2] = __builtin_shufflevector(z, c, 0, 1, 4, 7);
-}
-
-/* A block of 8 directions as rows of a structure-of-arrays scratch, then turned. n is 9 or more here. */
-ISOGI_SH__AVX2 static int isogi_sh__eval_rows_f32(float *y, int order, const float (*direction)[3]) {
-    float scratch[ISOGI_SH__TABLE_ORDER * ISOGI_SH__TABLE_ORDER * 8], d[3][8];
-    size_t i, k, n = ISOGI_SH_COUNT(order);
-    isogi_sh__load_f8(d, direction);
-    if (!isogi_sh__eval_f8(scratch, 8, order, d[0], d[1], d[2])) return 0;
-    for (i = 0; i + 8 <= n; i += 8) isogi_sh__transpose_f8(y + i, n, scratch + 8 * i, 8);
-    if (n - i > 1) isogi_sh__transpose_f8(y + n - 8, n, scratch + 8 * (n - 8), 8);
-    else if (n > i)
-        for (k = 0; k < 8; k++) y[n * k + i] = scratch[8 * i + k];
-    return 1;
-}
-
-ISOGI_SH__AVX2 static int isogi_sh__eval_rows_f64(double *y, int order, const double (*direction)[3]) {
-    double scratch[ISOGI_SH__TABLE_ORDER * ISOGI_SH__TABLE_ORDER * 4], d[3][4];
-    size_t i, k, n = ISOGI_SH_COUNT(order);
-    isogi_sh__load_d4(d, direction);
-    if (!isogi_sh__eval_d4(scratch, 4, order, d[0], d[1], d[2])) return 0;
-    for (i = 0; i + 4 <= n; i += 4) isogi_sh__transpose_d4(y + i, n, scratch + 4 * i, 4);
-    if (n > i)
-        for (k = 0; k < 4; k++) y[n * k + i] = scratch[4 * i + k];
-    return 1;
-}
-
-/* The same with twice as many lanes, for orders whose scratch leaves room in the first cache. */
-ISOGI_SH__AVX512 static int isogi_sh__eval_rows_f32_wide(float *y, int order, const float (*direction)[3]) {
-    float scratch[ISOGI_SH__WIDE_ORDER * ISOGI_SH__WIDE_ORDER * 16], d[2][3][8], all[3][16];
-    size_t i, k, n = ISOGI_SH_COUNT(order);
-    isogi_sh__load_f8(d[0], direction);
-    isogi_sh__load_f8(d[1], direction + 8);
-    for (k = 0; k < 3; k++) {
-        *(isogi_sh__f8 *)all[k] = *(const isogi_sh__f8 *)d[0][k];
-        *(isogi_sh__f8 *)(all[k] + 8) = *(const isogi_sh__f8 *)d[1][k];
-    }
-    if (!isogi_sh__eval_f16(scratch, 16, order, all[0], all[1], all[2])) return 0;
-    for (i = 0; i + 8 <= n; i += 8) {
-        isogi_sh__transpose_f8(y + i, n, scratch + 16 * i, 16);
-        isogi_sh__transpose_f8(y + 8 * n + i, n, scratch + 16 * i + 8, 16);
-    }
-    if (n - i > 1) {
-        isogi_sh__transpose_f8(y + n - 8, n, scratch + 16 * (n - 8), 16);
-        isogi_sh__transpose_f8(y + 9 * n - 8, n, scratch + 16 * (n - 8) + 8, 16);
-    } else if (n > i) {
-        for (k = 0; k < 16; k++) y[n * k + i] = scratch[16 * i + k];
-    }
-    return 1;
-}
+#define ISOGI_SH__LESS_F8(a, b) (__builtin_ia32_movmskps256((isogi_sh__f8)((a) < (b))) == 0xff)
+#define ISOGI_SH__LESS_D4(a, b) (__builtin_ia32_movmskpd256((isogi_sh__d4)((a) < (b))) == 0xf)
+#define ISOGI_SH__LESS_F16(a, b) ((__builtin_ia32_cmpps512_mask(a, b, 17, 0xffff, 4) & 0xffff) == 0xffff)
+#define ISOGI_SH__LESS_D8(a, b) ((__builtin_ia32_cmppd512_mask(a, b, 17, 0xff, 4) & 0xff) == 0xff)
+#define ISOGI_SH__DEFINE_F32(NAME, TARGET, V, I, WIDTH, MOST, SUFFIX) \
+    ISOGI_SH__DEFINE_EVAL(NAME, TARGET, float, V, I, WIDTH, MOST, ISOGI_SH__FMA_##SUFFIX, \
+                          ISOGI_SH__LESS_##SUFFIX, isogi_sh__table_f32, 1e-6, 1e-3, 1e-25, sqrtf)
+#define ISOGI_SH__DEFINE_F64(NAME, TARGET, V, I, WIDTH, MOST, SUFFIX) \
+    ISOGI_SH__DEFINE_EVAL(NAME, TARGET, double, V, I, WIDTH, MOST, ISOGI_SH__FMA_##SUFFIX, \
+                          ISOGI_SH__LESS_##SUFFIX, isogi_sh__table_f64, 1e-12, 1e-25, 1e-280, sqrt)
+ISOGI_SH__DEFINE_F32(isogi_sh__eval_f8, ISOGI_SH__AVX2, isogi_sh__f8, isogi_sh__i8, 8, ISOGI_SH__TABLE_ORDER, F8)
+ISOGI_SH__DEFINE_F64(isogi_sh__eval_d4, ISOGI_SH__AVX2, isogi_sh__d4, isogi_sh__l4, 4, ISOGI_SH__TABLE_ORDER, D4)
+ISOGI_SH__DEFINE_F32(isogi_sh__eval_f16, ISOGI_SH__AVX512, isogi_sh__f16, isogi_sh__i16, 16, ISOGI_SH__WIDE_ORDER, F16)
+ISOGI_SH__DEFINE_F64(isogi_sh__eval_d8, ISOGI_SH__AVX512, isogi_sh__d8, isogi_sh__l8, 8, ISOGI_SH__WIDE_ORDER, D8)
 
 /* 8 single-channel sums */
 ISOGI_SH__AVX2 static int isogi_sh__sum_rows_f32(float *value, const float *c, int order, int channels, const float (*direction)[3]) {
-    float scratch[ISOGI_SH__TABLE_ORDER * ISOGI_SH__TABLE_ORDER * 8], d[3][8];
+    float scratch[ISOGI_SH__TABLE_ORDER * ISOGI_SH__TABLE_ORDER * 8];
+    isogi_sh__f8 u[4];
     int i, j, n = order * order;
     size_t k;
-    isogi_sh__load_f8(d, direction);
-    if (!isogi_sh__eval_f8(scratch, 8, order, d[0], d[1], d[2])) return 0;
+    isogi_sh__eval_f8_split(u, direction[0]);
+    if (!isogi_sh__eval_f8_unit(u)) return 0;
+    if (order == 5) isogi_sh__eval_f8_order5(scratch, 8, u);
+    else isogi_sh__eval_f8_any(scratch, 8, order, u);
     for (j = 0; j < channels; j++) {
         isogi_sh__f8 zero = {0}, even = zero, odd = zero;
         for (i = 0; i + 1 < n; i += 2) {
@@ -1124,7 +1248,7 @@ static int isogi_sh__fits(size_t count, int order, size_t size) { return count <
 
 ISOGI_API isogi_result isogi_sh_eval(float *y, int order, const float (*direction)[3], size_t count) {
     isogi_sh__output out = {NULL, 0, 1, 0};
-    size_t i;
+    size_t i = 0;
 #ifdef ISOGI_SH__SIMD
     int level = order >= 3 && order <= ISOGI_SH__TABLE_ORDER && count >= 8 ? isogi_sh__level() : 0;
 #endif
@@ -1132,91 +1256,96 @@ ISOGI_API isogi_result isogi_sh_eval(float *y, int order, const float (*directio
     if (!isogi_sh__fits(count, order, sizeof *y)) return ISOGI_TOO_LARGE;
     out.data = y;
     out.direction_stride = ISOGI_SH_COUNT(order);
-    for (i = 0; i < count; i += ISOGI_SH__LANES) {
+    while (i < count) {
         isogi_sh__unit u[ISOGI_SH__LANES];
-        int k, lanes = count - i < ISOGI_SH__LANES ? (int)(count - i) : ISOGI_SH__LANES;
+        int k, lanes;
 #ifdef ISOGI_SH__SIMD
-        if (level > 1 && order <= ISOGI_SH__WIDE_ORDER && count - i >= 16 &&
-            isogi_sh__eval_rows_f32_wide(y + i * out.direction_stride, order, direction + i)) {
-            i += 8;
-            continue;
-        }
-        if (level && lanes == 8 && isogi_sh__eval_rows_f32(y + i * out.direction_stride, order, direction + i)) continue;
+        if (level > 1 && order <= ISOGI_SH__WIDE_ORDER) i += isogi_sh__eval_f16_rows(y + i * out.direction_stride, order, direction + i, count - i);
+        if (level) i += isogi_sh__eval_f8_rows(y + i * out.direction_stride, order, direction + i, count - i);
 #endif
+        lanes = count - i < ISOGI_SH__LANES ? (int)(count - i) : ISOGI_SH__LANES;
         for (k = 0; k < lanes; k++) {
             const float *d = direction[i + (size_t)k];
             u[k] = isogi_sh__normalise((double)d[0], (double)d[1], (double)d[2]);
         }
-        isogi_sh__eval_block(&out, i, lanes, order, u);
+        if (lanes) isogi_sh__eval_block(&out, i, lanes, order, u);
+        i += (size_t)lanes;
     }
     return ISOGI_OK;
 }
 
 ISOGI_API isogi_result isogi_sh_eval_f64(double *y, int order, const double (*direction)[3], size_t count) {
     isogi_sh__output out = {NULL, 0, 1, 1};
-    size_t i;
+    size_t i = 0;
 #ifdef ISOGI_SH__SIMD
-    int level = order >= 3 && order <= ISOGI_SH__TABLE_ORDER && count >= 8 ? isogi_sh__level() : 0;
+    int level = order >= 3 && order <= ISOGI_SH__TABLE_ORDER && count >= 4 ? isogi_sh__level() : 0;
 #endif
     if (!isogi_sh__order_ok(order) || (count && (!y || !direction))) return ISOGI_INVALID;
     if (!isogi_sh__fits(count, order, sizeof *y)) return ISOGI_TOO_LARGE;
     out.data = y;
     out.direction_stride = ISOGI_SH_COUNT(order);
-    for (i = 0; i < count; i += ISOGI_SH__LANES) {
+    while (i < count) {
         isogi_sh__unit u[ISOGI_SH__LANES];
-        int k, lanes = count - i < ISOGI_SH__LANES ? (int)(count - i) : ISOGI_SH__LANES;
+        int k, lanes;
 #ifdef ISOGI_SH__SIMD
-        if (level && lanes == 8 && isogi_sh__eval_rows_f64(y + i * out.direction_stride, order, direction + i) &&
-            isogi_sh__eval_rows_f64(y + (i + 4) * out.direction_stride, order, direction + i + 4))
-            continue;
+        if (level > 1 && order <= ISOGI_SH__WIDE_ORDER) i += isogi_sh__eval_d8_rows(y + i * out.direction_stride, order, direction + i, count - i);
+        if (level) i += isogi_sh__eval_d4_rows(y + i * out.direction_stride, order, direction + i, count - i);
 #endif
+        lanes = count - i < ISOGI_SH__LANES ? (int)(count - i) : ISOGI_SH__LANES;
         for (k = 0; k < lanes; k++) {
             const double *d = direction[i + (size_t)k];
             u[k] = isogi_sh__normalise(d[0], d[1], d[2]);
         }
-        isogi_sh__eval_block(&out, i, lanes, order, u);
+        if (lanes) isogi_sh__eval_block(&out, i, lanes, order, u);
+        i += (size_t)lanes;
     }
     return ISOGI_OK;
 }
 
+#ifdef ISOGI_SH__SIMD
+/* how many of the first directions are done; their functions stand `stride` apart */
+static size_t isogi_sh__eval_soa_wide(void *basis, size_t stride, int is_double, int order, const void *x, const void *y, const void *z, size_t count) {
+    int level = isogi_sh__level();
+    size_t done = 0;
+    if (is_double) {
+        const double *dx = (const double *)x, *dy = (const double *)y, *dz = (const double *)z;
+        double *out = (double *)basis;
+        if (level > 1) done = isogi_sh__eval_d8(out, stride, order, dx, dy, dz, count);
+        if (level) done += isogi_sh__eval_d4(out + done, stride, order, dx + done, dy + done, dz + done, count - done);
+    } else {
+        const float *fx = (const float *)x, *fy = (const float *)y, *fz = (const float *)z;
+        float *out = (float *)basis;
+        if (level > 1) done = isogi_sh__eval_f16(out, stride, order, fx, fy, fz, count);
+        if (level) done += isogi_sh__eval_f8(out + done, stride, order, fx + done, fy + done, fz + done, count - done);
+    }
+    return done;
+}
+#endif
+
 static isogi_result isogi_sh__eval_soa(void *basis, int is_double, int order, const void *x, const void *y, const void *z, size_t count) {
     isogi_sh__output out = {NULL, 1, 0, 0};
-    size_t i;
-#ifdef ISOGI_SH__SIMD
-    int level = order >= 3 && order <= ISOGI_SH__TABLE_ORDER && count >= 8 ? isogi_sh__level() : 0;
-#endif
+    size_t i = 0, size = is_double ? sizeof(double) : sizeof(float);
     if (!isogi_sh__order_ok(order) || (count && (!basis || !x || !y || !z))) return ISOGI_INVALID;
-    if (!isogi_sh__fits(count, order, is_double ? sizeof(double) : sizeof(float))) return ISOGI_TOO_LARGE;
+    if (!isogi_sh__fits(count, order, size)) return ISOGI_TOO_LARGE;
     out.data = basis;
     out.index_stride = count;
     out.is_double = is_double;
-    for (i = 0; i < count; i += ISOGI_SH__LANES) {
+    while (i < count) {
         isogi_sh__unit u[ISOGI_SH__LANES];
-        int k, lanes = count - i < ISOGI_SH__LANES ? (int)(count - i) : ISOGI_SH__LANES;
+        int k, lanes;
 #ifdef ISOGI_SH__SIMD
-        if (level && lanes == 8) {
-            const float *fx = (const float *)x + i, *fy = (const float *)y + i, *fz = (const float *)z + i;
-            const double *dx = (const double *)x + i, *dy = (const double *)y + i, *dz = (const double *)z + i;
-            float *f = (float *)basis + i;
-            double *d = (double *)basis + i;
-            if (!is_double && level > 1 && count - i >= 16 && isogi_sh__eval_f16(f, count, order, fx, fy, fz)) {
-                i += 8;
-                continue;
-            }
-            if (!is_double && isogi_sh__eval_f8(f, count, order, fx, fy, fz)) continue;
-            if (is_double && level > 1 && isogi_sh__eval_d8(d, count, order, dx, dy, dz)) continue;
-            if (is_double && level == 1 && isogi_sh__eval_d4(d, count, order, dx, dy, dz) &&
-                isogi_sh__eval_d4(d + 4, count, order, dx + 4, dy + 4, dz + 4))
-                continue;
-        }
+        if (order >= 3 && order <= ISOGI_SH__TABLE_ORDER && count - i >= 4)
+            i += isogi_sh__eval_soa_wide((char *)basis + i * size, count, is_double, order, (const char *)x + i * size, (const char *)y + i * size, (const char *)z + i * size, count - i);
 #endif
+        lanes = count - i < ISOGI_SH__LANES ? (int)(count - i) : ISOGI_SH__LANES;
         for (k = 0; k < lanes; k++) {
             size_t j = i + (size_t)k;
             if (is_double) u[k] = isogi_sh__normalise(((const double *)x)[j], ((const double *)y)[j], ((const double *)z)[j]);
             else
                 u[k] = isogi_sh__normalise((double)((const float *)x)[j], (double)((const float *)y)[j], (double)((const float *)z)[j]);
         }
-        isogi_sh__eval_block(&out, i, lanes, order, u);
+        if (lanes) isogi_sh__eval_block(&out, i, lanes, order, u);
+        i += (size_t)lanes;
     }
     return ISOGI_OK;
 }
