@@ -1210,10 +1210,10 @@ ISOGI_SH__AVX512 ISOGI_SH__INLINE void isogi_sh__eval_d8_split(isogi_sh__d8 *u, 
 #define ISOGI_SH__LESS_D8(a, b) ((__builtin_ia32_cmppd512_mask(a, b, 17, 0xff, 4) & 0xff) == 0xff)
 #define ISOGI_SH__DEFINE_F32(NAME, TARGET, V, I, WIDTH, MOST, SUFFIX) \
     ISOGI_SH__DEFINE_EVAL(NAME, TARGET, float, V, I, WIDTH, MOST, ISOGI_SH__FMA_##SUFFIX, \
-                          ISOGI_SH__LESS_##SUFFIX, isogi_sh__table_f32, 1e-6, 1e-3, 1e-25, sqrtf)
+                          ISOGI_SH__LESS_##SUFFIX, isogi_sh__table_f32, 1e-6, 1e-3, 1e-19, sqrtf)
 #define ISOGI_SH__DEFINE_F64(NAME, TARGET, V, I, WIDTH, MOST, SUFFIX) \
     ISOGI_SH__DEFINE_EVAL(NAME, TARGET, double, V, I, WIDTH, MOST, ISOGI_SH__FMA_##SUFFIX, \
-                          ISOGI_SH__LESS_##SUFFIX, isogi_sh__table_f64, 1e-12, 1e-25, 1e-280, sqrt)
+                          ISOGI_SH__LESS_##SUFFIX, isogi_sh__table_f64, 1e-12, 1e-25, 1e-200, sqrt)
 ISOGI_SH__DEFINE_F32(isogi_sh__eval_f8, ISOGI_SH__AVX2, isogi_sh__f8, isogi_sh__i8, 8, ISOGI_SH__TABLE_ORDER, F8)
 ISOGI_SH__DEFINE_F64(isogi_sh__eval_d4, ISOGI_SH__AVX2, isogi_sh__d4, isogi_sh__l4, 4, ISOGI_SH__TABLE_ORDER, D4)
 ISOGI_SH__DEFINE_F32(isogi_sh__eval_f16, ISOGI_SH__AVX512, isogi_sh__f16, isogi_sh__i16, 16, ISOGI_SH__WIDE_ORDER, F16)
