@@ -1144,7 +1144,7 @@ ISOGI_SH__AVX512 ISOGI_SH__INLINE void isogi_sh__eval_d8_split(isogi_sh__d8 *u, 
         I top = (I)(zero - 1) ^ (I)(zero + 1);                                                                                 \
         return (V)((I)x & (I)((V)((I)x & ~top) > (T)TINY));                                                                    \
     }                                                                                                                          \
-    TARGET ISOGI_SH__INLINE void NAME##_any(T *out, size_t stride, int order, const V *u) {                                    \
+    TARGET static void NAME##_any(T *out, size_t stride, int order, const V *u) {                                    \
         V x = u[0], y = u[1], z = u[2], t, p, d, c[2], s[2], sign, zero = {0}, one = zero + 1;                                 \
         I top = (I)(-one) ^ (I)one;                                                                                            \
         const T *table = TABLE;                                                                                                \
