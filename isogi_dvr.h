@@ -244,6 +244,8 @@ typedef struct isogi_dvr_desc {
                                of extinction, rounded so that grid points are on it; 0 = 2 */
     isogi_dvr_method method;
     isogi_dvr_sphere sphere;
+    double radius;          /* the paper's method: of local visibility, in units of the smallest voxel spacing, 1..32; 0 = 16 */
+    double reduction;       /* the paper's method: voxels of the volume to points of its blocks, at least 1; 0 = 4 */
     isogi_dvr_classification classification; /* in data space; visibility rays are always post-classified */
     int table;                               /* entries along a side of the pre-integrated table, 2..1024; 0 = 256 */
     isogi_dvr_silhouette silhouette;
@@ -261,6 +263,7 @@ typedef struct isogi_view {
     int width, height;              /* 1..32768 */
     float eye[3], target[3], up[3]; /* world; up 0 = +y */
     float fov;                      /* vertical angle of view in degrees, below 180; 0 = 45 */
+    int local;                      /* 1: shade by local visibility (the paper's method only): for cut planes, and lights within */
 } isogi_view;
 
 /* The ray through the centre of pixel (x, y); fractions are allowed: pixel x covers x-1/2 .. x+1/2. dir is a unit vector.
@@ -283,6 +286,31 @@ ISOGI_API isogi_result isogi_dvr_step(isogi_dvr *dvr, uint64_t max_rays, double 
 /* Interpolated visibility coefficients at world points: visibility[count][order*order]. Outside of the box a point is moved to its
    nearest border point. ISOGI_INVALID without ISOGI_DVR_VISIBILITY. */
 ISOGI_API isogi_result isogi_dvr_sample_visibility(const isogi_dvr *dvr, const float (*points)[3], size_t count, float *visibility);
+
+/* Keeps only where plane[0] x + plane[1] y + plane[2] z + plane[3] >= 0 (world) for all planes; at most ISOGI_DVR_MAX_PLANES, a box
+   is six; 0 = everything. What is cut off neither absorbs nor shadows: visibility has to be stepped again, as for a new transfer
+   function, and the blocks that no plane touches keep their levels and their classification. Shade a cut by local visibility
+   (isogi_view.local): the paper's advice, since the global grid is too coarse for a flat face. */
+#define ISOGI_DVR_MAX_PLANES 32
+ISOGI_API isogi_result isogi_dvr_set_clip(isogi_dvr *dvr, const double (*planes)[4], size_t count);
+
+/* What is held, and where. Blocks are those of the pyramid's level 1, 16 cells a side, x fastest. Without the paper's method there is
+   one level, and only the global part is counted. */
+typedef struct isogi_dvr_report {
+    size_t block_count[3];
+    const uint8_t *level;      /* [blocks], valid until the next writer: 16, 8, 4, 2, 1, or 0 for dropped; NULL without the paper's method */
+    size_t level_count[6];     /* blocks that are dropped, or of level 1, 2, 4, 8, 16 */
+    size_t points;             /* of all blocks, not counting those repeated on their upper faces */
+    double reduction;          /* voxels to points */
+    size_t data_bytes, index_bytes, local_bytes, global_bytes; /* with the repeated points: data, index of blocks, coefficients */
+    size_t blocks_classified;  /* so far: blocks whose classification a new transfer function or clip plane changed */
+    size_t blocks_computed;    /* so far: blocks whose local visibility was computed */
+} isogi_dvr_report;
+ISOGI_API isogi_result isogi_dvr_inspect(const isogi_dvr *dvr, isogi_dvr_report *report);
+
+/* The data as the blocks of the paper's method hold it, and the local visibility, at world points; values[count],
+   visibility[count][order*order]; where a block is dropped the lowest value, and no shadow. ISOGI_INVALID with another method. */
+ISOGI_API isogi_result isogi_dvr_sample_blocks(const isogi_dvr *dvr, const float (*points)[3], size_t count, float *values, float *visibility);
 
 /* premultiplied[height*width]: linear RGB premultiplied by opacity, opacity. depth[height*width] (NULL = not wanted): distance along
    the ray at which half of the pixel's final opacity is reached, INFINITY where the ray meets nothing.
@@ -513,6 +541,20 @@ typedef struct isogi_dvr__integral {
     double low, scale; /* entry = (value - low) * scale */
 } isogi_dvr__integral;
 
+/* The paper's flat blocks: see "flat blocks of several levels" below. Block (i, j, k) is i + count[0] * (j + count[1] * k). */
+typedef struct isogi_dvr__blocks {
+    size_t count[3], total, reach; /* blocks; how many blocks a local ray reaches beyond its own */
+    float *lattice[5];             /* averages of the data, nodes 2, 4, 8, 16 voxels apart; [0] is the volume */
+    size_t lattice_size[5][3];
+    uint64_t *histogram;           /* classes of values that occur in each block */
+    uint8_t *level, *lit, *stale;  /* of each block: level of its data, of its local visibility; visibility has to be computed */
+    size_t *first;                 /* [2][total]: its first node in `data` and in `sh` */
+    size_t *order, todo;           /* blocks to be computed */
+    float *data;
+    uint16_t *sh;                  /* [nodes][order * order], half floats */
+    size_t data_count, sh_count, packing;
+} isogi_dvr__blocks;
+
 struct isogi_dvr {
     isogi_dvr_desc desc; /* zero defaults filled in */
     isogi_dvr_method method; /* in force */
@@ -539,6 +581,12 @@ struct isogi_dvr {
     isogi_dvr__matter matter;
     uint8_t *changed;            /* one byte a block of level 1: its classification is no longer what `matter` holds */
     size_t changed_count;
+    size_t classified, computed; /* blocks classified anew so far; blocks whose local visibility was computed */
+    isogi_dvr__blocks blocks;
+    float *basis;                /* the paper's method: [directions][order * order] */
+    double (*clip)[4];           /* a grid position x is kept where clip . (x, 1) >= 0 for all of them */
+    size_t clip_count;
+    uint8_t *cut;                /* one byte a block of level 1: 0 within all planes, 1 cut, 2 outside */
     float *gathered;             /* sweeps: [order * order][padded_count], sums so far */
     size_t padded_count;         /* grid points, rounded up to whole vectors */
     isogi_counters counters;
@@ -964,18 +1012,46 @@ static int isogi_dvr__range_empty(const isogi_dvr *d, const float range[2]) {
     return !(range[0] < range[1]) || isogi_dvr__is_quiet(&d->integral, (double)range[0], (double)range[1], quiet);
 }
 
+static int isogi_dvr__kept(const isogi_dvr *d, const double grid[3]) {
+    size_t i;
+    for (i = 0; i < d->clip_count; i++)
+        if (!(isogi_dvr__dot(d->clip[i], grid) + d->clip[i][3] >= 0)) return 0;
+    return 1;
+}
+
+/* How the planes lie to the box of a block of level 1. */
+static uint8_t isogi_dvr__cut(const isogi_dvr *d, size_t block) {
+    const size_t *size = d->level[1].size;
+    size_t at[3] = {block % size[0], block / size[0] % size[1], block / size[0] / size[1]}, i;
+    uint8_t cut = 0;
+    for (i = 0; i < d->clip_count; i++) {
+        double low = d->clip[i][3], high = low;
+        int a;
+        for (a = 0; a < 3; a++) {
+            double from = 16 * (double)at[a] * d->clip[i][a], to = from + 16 * d->clip[i][a];
+            low += from < to ? from : to, high += from < to ? to : from;
+        }
+        if (high < 0) return 2;
+        if (low < 0) cut = 1;
+    }
+    return cut;
+}
+
 static void isogi_dvr__mark_empty(isogi_dvr *d) {
+    size_t i, count;
     int n;
     d->transparent = 1;
     for (n = 0; n < ISOGI_DVR__LEVELS; n++) {
         const isogi_level *level = &d->level[n];
-        size_t count = level->size[0] * level->size[1] * level->size[2], i;
+        count = level->size[0] * level->size[1] * level->size[2];
         for (i = 0; i < count; i++) {
             const float *range = level->range[i];
             d->empty[n][i] = (uint8_t)isogi_dvr__range_empty(d, range);
             if (!d->empty[n][i]) d->transparent = 0;
         }
     }
+    for (i = 0; i < d->changed_count; i++)
+        if (d->cut[i] == 2) d->empty[1][i] = 1;
 }
 
 /* Extinction just below a value. */
@@ -1191,7 +1267,10 @@ static isogi_result isogi_dvr__set_kernel(isogi_dvr *d) {
     if (d->desc.sphere == ISOGI_DVR_FIBONACCI) isogi_dvr__weigh(y, order * order, n, weight);
     isogi_sh_eval_f64(y, d->desc.order, (const double(*)[3])(weight + n), n);
     for (k = 0; k < n; k++)
-        for (i = 0; i < d->coefficients; i++) d->kernel[k * d->coefficients + i] = (float)(weight[k] * y[k * d->coefficients + i]);
+        for (i = 0; i < d->coefficients; i++) {
+            d->kernel[k * d->coefficients + i] = (float)(weight[k] * y[k * d->coefficients + i]);
+            if (d->basis) d->basis[k * d->coefficients + i] = (float)y[k * d->coefficients + i];
+        }
     isogi_release(&d->context, y, n * count, sizeof *y);
     isogi_release(&d->context, weight, 4 * n, sizeof *weight);
     return ISOGI_OK;
@@ -1313,6 +1392,143 @@ static isogi_result isogi_dvr__plan_matter(isogi_dvr *d) {
     return ISOGI_OK;
 }
 
+#define ISOGI_DVR__READ_ROW(T)                                                                                                   \
+    for (i = 0; i < count; i++) out[i] = (float)(v->scale * (double)*(const T *)(const void *)(p + (ptrdiff_t)i * v->stride[0]) + v->bias); \
+    break;
+
+/* Voxels first .. first + count - 1 of a row, as floats; what is not finite becomes a NaN. */
+static void isogi_dvr__read_row(const isogi_volume *v, size_t first, size_t count, size_t y, size_t z, float *out) {
+    const char *p = (const char *)v->data + (ptrdiff_t)first * v->stride[0] + (ptrdiff_t)y * v->stride[1] + (ptrdiff_t)z * v->stride[2];
+    size_t i;
+    switch (v->type) {
+    case ISOGI_U8: ISOGI_DVR__READ_ROW(uint8_t)
+    case ISOGI_I8: ISOGI_DVR__READ_ROW(int8_t)
+    case ISOGI_U16: ISOGI_DVR__READ_ROW(uint16_t)
+    case ISOGI_I16: ISOGI_DVR__READ_ROW(int16_t)
+    case ISOGI_F32: ISOGI_DVR__READ_ROW(float)
+    case ISOGI_F64: ISOGI_DVR__READ_ROW(double)
+    }
+}
+#undef ISOGI_DVR__READ_ROW
+
+/* ==== flat blocks of several levels (Kronander 2011, 4.1, after Ljung et al. 2004) =================================== */
+
+/* A block is one of the pyramid's level 1: 16^3 cells. At level n (16, 8, 4, 2 or 1) it is held at (n + 1)^3 nodes, 16 / n voxels apart;
+   at level 0 not at all. It repeats the nodes of its upper faces from its neighbours, so that a sample never leaves its block. Where
+   blocks of different levels meet, the nodes on their common face (edge, corner) take what the coarsest of them has there, between its
+   nodes too: both sides then interpolate the same function, and there is no seam. Blocks are therefore finished from coarse to fine. */
+
+/* Averages of the data on coarser lattices: nodes 2^step voxels apart, over the blocks' whole extent; each is the last one halved
+   with weights 1/4, 1/2, 1/4, which keeps linear fields. At the border the field goes on by reflection in its last value. */
+static size_t isogi_dvr__lattice_index(const isogi_dvr__blocks *b, int step, const size_t c[3]) {
+    const size_t *size = b->lattice_size[step];
+    return c[0] + size[0] * (c[1] + size[1] * c[2]);
+}
+
+/* The field at a voxel, 0 where it is not finite. */
+static float isogi_dvr__voxel(const isogi_dvr *d, size_t x, size_t y, size_t z) {
+    float value;
+    isogi_dvr__read_row(&d->volume, x < d->volume.size[0] ? x : d->volume.size[0] - 1, 1, y < d->volume.size[1] ? y : d->volume.size[1] - 1,
+                        z < d->volume.size[2] ? z : d->volume.size[2] - 1, &value);
+    return isogi_dvr__finite32(value) ? value : (float)d->matter.low;
+}
+
+static float isogi_dvr__lattice_at(const isogi_dvr *d, int step, const size_t c[3]) {
+    return step ? d->blocks.lattice[step][isogi_dvr__lattice_index(&d->blocks, step, c)] : isogi_dvr__voxel(d, c[0], c[1], c[2]);
+}
+
+typedef struct isogi_dvr__lattice_job {
+    isogi_dvr *dvr;
+    int step;
+} isogi_dvr__lattice_job;
+
+/* One plane of a lattice from the next finer one. */
+static void isogi_dvr__lattice_task(void *arg, size_t z) {
+    const isogi_dvr__lattice_job *job = (const isogi_dvr__lattice_job *)arg;
+    isogi_dvr__blocks *b = &job->dvr->blocks;
+    const size_t *size = b->lattice_size[job->step], *fine = b->lattice_size[job->step - 1];
+    size_t c[3], from[3];
+    int k, a;
+    c[2] = z;
+    for (c[1] = 0; c[1] < size[1]; c[1]++)
+        for (c[0] = 0; c[0] < size[0]; c[0]++) {
+            float sum = 0;
+            for (k = 0; k < 27; k++) {
+                int o[3] = {k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1};
+                float weight = 0.125f;
+                for (a = 0; a < 3; a++) {
+                    if (!c[a] || 2 * c[a] + 1 >= fine[a]) { /* reflected: only the middle counts */
+                        weight *= o[a] ? 0.0f : 2.0f;
+                        from[a] = 2 * c[a];
+                    } else weight *= o[a] ? 0.5f : 1.0f, from[a] = (size_t)((ptrdiff_t)(2 * c[a]) + o[a]);
+                }
+                if (weight > 0) sum += weight * isogi_dvr__lattice_at(job->dvr, job->step - 1, from);
+            }
+            b->lattice[job->step][isogi_dvr__lattice_index(b, job->step, c)] = sum;
+        }
+}
+
+/* Which of 64 classes of values occur in a block: the piecewise constant histogram, of which the largest difference needs no counts. */
+static void isogi_dvr__histogram_task(void *arg, size_t block) {
+    isogi_dvr *d = (isogi_dvr *)arg;
+    isogi_dvr__blocks *b = &d->blocks;
+    size_t at[3] = {block % b->count[0], block / b->count[0] % b->count[1], block / b->count[0] / b->count[1]}, count, x, y, z;
+    uint64_t classes = 0;
+    float row[17];
+    count = d->volume.size[0] - 16 * at[0] < 17 ? d->volume.size[0] - 16 * at[0] : 17;
+    for (z = 16 * at[2]; z <= 16 * at[2] + 16 && z < d->volume.size[2]; z++)
+        for (y = 16 * at[1]; y <= 16 * at[1] + 16 && y < d->volume.size[1]; y++) {
+            isogi_dvr__read_row(&d->volume, 16 * at[0], count, y, z, row);
+            for (x = 0; x < count; x++)
+                if (isogi_dvr__finite32(row[x])) classes |= (uint64_t)1 << isogi_dvr__class(d, (double)row[x]) / (ISOGI_DVR__TABLE / 64);
+        }
+    b->histogram[block] = classes;
+}
+
+static void isogi_dvr__free_blocks(isogi_dvr *d) {
+    isogi_dvr__blocks *b = &d->blocks;
+    int n;
+    for (n = 1; n < 5; n++) isogi_release(&d->context, b->lattice[n], b->lattice_size[n][0] * b->lattice_size[n][1] * b->lattice_size[n][2], sizeof(float));
+    isogi_release(&d->context, b->histogram, b->total, sizeof *b->histogram);
+    isogi_release(&d->context, b->level, 3 * b->total, 1);
+    isogi_release(&d->context, b->first, 2 * b->total, sizeof *b->first);
+    isogi_release(&d->context, b->order, b->total, sizeof *b->order);
+    isogi_release(&d->context, b->data, b->data_count, sizeof *b->data);
+    isogi_release(&d->context, b->sh, b->sh_count * d->coefficients, sizeof *b->sh);
+    memset(b, 0, sizeof *b);
+}
+
+/* Everything that does not depend on the transfer function. */
+static isogi_result isogi_dvr__plan_blocks(isogi_dvr *d) {
+    isogi_dvr__blocks *b = &d->blocks;
+    isogi_dvr__lattice_job job;
+    isogi_result result = ISOGI_OK;
+    size_t count;
+    int a, n;
+    for (a = 0; a < 3; a++) b->count[a] = d->level[1].size[a], b->lattice_size[0][a] = 16 * b->count[a] + 1;
+    b->total = b->count[0] * b->count[1] * b->count[2];
+    for (n = 1; n < 5; n++) {
+        for (a = 0, count = 1; a < 3; a++) count *= b->lattice_size[n][a] = (b->count[a] << (4 - n)) + 1;
+        b->lattice[n] = (float *)isogi_allocate(&d->context, count, sizeof(float));
+        if (!b->lattice[n]) return ISOGI_NO_MEMORY;
+    }
+    b->histogram = (uint64_t *)isogi_allocate(&d->context, b->total, sizeof *b->histogram);
+    b->level = (uint8_t *)isogi_allocate(&d->context, 3 * b->total, 1);
+    b->first = (size_t *)isogi_allocate(&d->context, 2 * b->total, sizeof *b->first);
+    b->order = (size_t *)isogi_allocate(&d->context, b->total, sizeof *b->order);
+    if (!b->histogram || !b->level || !b->first || !b->order) return ISOGI_NO_MEMORY;
+    memset(b->level, 0, 3 * b->total);
+    memset(b->first, 0, 2 * b->total * sizeof *b->first);
+    b->lit = b->level + b->total, b->stale = b->lit + b->total;
+    b->reach = (size_t)ceil(d->desc.radius / 16);
+    job.dvr = d;
+    for (n = 1; n < 5 && result == ISOGI_OK; n++) {
+        job.step = n;
+        result = isogi_parallel(&d->context, b->lattice_size[n][2], isogi_dvr__lattice_task, &job, 0, 0);
+    }
+    return result == ISOGI_OK ? isogi_parallel(&d->context, b->total, isogi_dvr__histogram_task, d, 0, 0) : result;
+}
+
 /* ==== create and free ================================================================================================ */
 
 /* The inverse of (axes * spacing), and the smallest length of its columns. */
@@ -1369,6 +1585,11 @@ static isogi_result isogi_dvr__resolve(isogi_dvr_desc *desc, const isogi_dvr_des
     if (desc->visibility_step > 0 && !(desc->visibility_step >= 1e-4 && desc->visibility_step <= 2e4)) return ISOGI_INVALID;
     if (!(desc->step >= 1e-4 && desc->step <= 1e4)) return ISOGI_INVALID;
     if (!desc->method) desc->method = ISOGI_DVR_SWEEP;
+    if (!isogi_dvr__finite64(desc->radius) || !isogi_dvr__finite64(desc->reduction)) return ISOGI_INVALID;
+    if (!(desc->radius >= 0) || !(desc->reduction >= 0)) return ISOGI_INVALID;
+    if (!(desc->radius > 0)) desc->radius = 16;
+    if (!(desc->reduction > 0)) desc->reduction = 4;
+    if (!(desc->radius >= 1 && desc->radius <= 32 && desc->reduction >= 1)) return ISOGI_INVALID;
     if (!(desc->opaque > 0)) desc->opaque = 0.999f;
     if (!desc->order) desc->order = 3;
     if (!desc->directions) desc->directions = 64;
@@ -1397,6 +1618,9 @@ static isogi_result isogi_dvr__allocate_parts(isogi_dvr *d) {
     d->changed = (uint8_t *)isogi_allocate(&d->context, d->changed_count, 1);
     if (!d->empty_blocks || !d->changed) return ISOGI_NO_MEMORY;
     memset(d->changed, 0, d->changed_count);
+    d->cut = (uint8_t *)isogi_allocate(&d->context, d->changed_count, 1);
+    if (!d->cut) return ISOGI_NO_MEMORY;
+    memset(d->cut, 0, d->changed_count);
     for (n = 0, i = 0; n < ISOGI_DVR__LEVELS; n++) {
         d->empty[n] = d->empty_blocks + i;
         i += d->level[n].size[0] * d->level[n].size[1] * d->level[n].size[2];
@@ -1422,6 +1646,13 @@ static isogi_result isogi_dvr__allocate_parts(isogi_dvr *d) {
         if (result != ISOGI_OK) return result;
         d->gathered = (float *)isogi_allocate(&d->context, d->padded_count * d->coefficients, sizeof *d->gathered);
         if (!d->gathered) return ISOGI_NO_MEMORY;
+    } else if (isogi_dvr__method(d) == ISOGI_DVR_PAPER) {
+        isogi_result result;
+        d->basis = (float *)isogi_allocate(&d->context, d->kernel_count, sizeof *d->basis);
+        d->matter.table = (float *)isogi_allocate(&d->context, ISOGI_DVR__TABLE, sizeof *d->matter.table);
+        if (!d->basis || !d->matter.table) return ISOGI_NO_MEMORY;
+        result = isogi_dvr__plan_blocks(d);
+        if (result != ISOGI_OK) return result;
     }
     return isogi_dvr__set_kernel(d);
 }
@@ -1471,6 +1702,11 @@ ISOGI_API void isogi_dvr_free(isogi_dvr *dvr) {
     isogi_dvr__transfer_free(&dvr->transfer, &context);
     isogi_release(&context, dvr->empty_blocks, dvr->block_count, 1);
     isogi_release(&context, dvr->changed, dvr->changed_count, 1);
+    isogi_release(&context, dvr->cut, dvr->changed_count, 1);
+    isogi_release(&context, dvr->clip, dvr->clip_count, sizeof *dvr->clip);
+    isogi_release(&context, dvr->basis, dvr->kernel_count, sizeof *dvr->basis);
+    isogi_release(&context, dvr->matter.table, ISOGI_DVR__TABLE, sizeof *dvr->matter.table);
+    isogi_dvr__free_blocks(dvr);
     isogi_release(&context, dvr->matter.extinction[0], dvr->matter.count[0], sizeof(float));
     isogi_release(&context, dvr->matter.extinction[1], dvr->matter.count[1], sizeof(float));
     isogi_release(&context, dvr->gathered, dvr->padded_count * dvr->coefficients, sizeof *dvr->gathered);
@@ -1509,6 +1745,7 @@ typedef struct isogi_dvr__sample {
 /* 0 if the ray misses the box. `origin` and `dir` in grid space, `world` = length of dir in the world, `step` in voxels. */
 static int isogi_dvr__begin(isogi_dvr__march *m, const isogi_dvr *d, const double origin[3], const double dir[3], double world, double step) {
     double enter = 0, leave = 1e300, pieces;
+    size_t k;
     int a;
     memset(m, 0, sizeof *m);
     for (a = 0; a < 3; a++) {
@@ -1522,6 +1759,16 @@ static int isogi_dvr__begin(isogi_dvr__march *m, const isogi_dvr *d, const doubl
         if (t0 > t1) swap = t0, t0 = t1, t1 = swap;
         if (t0 > enter) enter = t0;
         if (t1 < leave) leave = t1;
+    }
+    for (k = 0; k < d->clip_count; k++) {
+        double rate = isogi_dvr__dot(d->clip[k], dir), at = isogi_dvr__dot(d->clip[k], origin) + d->clip[k][3];
+        if (!(fabs(rate) > 1e-300)) {
+            if (at < 0) return 0;
+            continue;
+        }
+        at = -at / rate;
+        if (rate > 0 && at > enter) enter = at;
+        if (rate < 0 && at < leave) leave = at;
     }
     if (!(enter < leave) || !(leave < 1e300)) return 0;
     m->dvr = d, m->enter = enter, m->length = leave - enter;
@@ -2094,25 +2341,6 @@ static void isogi_dvr__set_table(const isogi_dvr *d, float table[ISOGI_DVR__TABL
     }
 }
 
-#define ISOGI_DVR__READ_ROW(T)                                                                                                   \
-    for (i = 0; i < count; i++) out[i] = (float)(v->scale * (double)*(const T *)(const void *)(p + (ptrdiff_t)i * v->stride[0]) + v->bias); \
-    break;
-
-/* Voxels first .. first + count - 1 of a row, as floats; what is not finite becomes a NaN. */
-static void isogi_dvr__read_row(const isogi_volume *v, size_t first, size_t count, size_t y, size_t z, float *out) {
-    const char *p = (const char *)v->data + (ptrdiff_t)first * v->stride[0] + (ptrdiff_t)y * v->stride[1] + (ptrdiff_t)z * v->stride[2];
-    size_t i;
-    switch (v->type) {
-    case ISOGI_U8: ISOGI_DVR__READ_ROW(uint8_t)
-    case ISOGI_I8: ISOGI_DVR__READ_ROW(int8_t)
-    case ISOGI_U16: ISOGI_DVR__READ_ROW(uint16_t)
-    case ISOGI_I16: ISOGI_DVR__READ_ROW(int16_t)
-    case ISOGI_F32: ISOGI_DVR__READ_ROW(float)
-    case ISOGI_F64: ISOGI_DVR__READ_ROW(double)
-    }
-}
-#undef ISOGI_DVR__READ_ROW
-
 /* Values between four rows of voxels. */
 static void isogi_dvr__mix_rows(const isogi_volume *v, size_t first, size_t count, const double position[2], float *row, float *scratch) {
     size_t c[2], k, i;
@@ -2171,7 +2399,7 @@ static int isogi_dvr__row_state(const isogi_dvr *d, const size_t node[2], uint8_
             for (b[1] = low[1]; b[1] <= high[1]; b[1]++)
                 for (b[0] = low[0]; b[0] <= high[0]; b[0]++) {
                     size_t block = b[0] + level->size[0] * (b[1] + level->size[1] * b[2]);
-                    uint8_t s = d->changed[block] ? (d->empty[1][block] ? 1 : 2) : 0;
+                    uint8_t s = (uint8_t)(d->changed[block] ? (d->empty[1][block] ? 1 : 2) : 0);
                     if (s > state[x]) state[x] = s;
                 }
         if (state[x] < 2) continue;
@@ -2213,8 +2441,10 @@ static void isogi_dvr__matter_task(void *arg, size_t z) {
                     isogi_dvr__classify_row(d, row, first, last, from, m->spacing[0], count, sum);
                 }
             }
-        for (i = 0; i < count; i++)
-            if (state[span[0] + i] == 2) out[span[0] + i] = sum[i] / (float)(n[0] * n[1] * n[2]);
+        for (i = 0; i < count; i++) {
+            double grid[3] = {(double)(span[0] + i) * m->spacing[0], (double)node[0] * m->spacing[1], (double)node[1] * m->spacing[2]};
+            if (state[span[0] + i] == 2 && isogi_dvr__kept(d, grid)) out[span[0] + i] = sum[i] / (float)(n[0] * n[1] * n[2]);
+        }
     }
 }
 
@@ -2233,7 +2463,7 @@ static void isogi_dvr__turn_task(void *arg, size_t y) {
 static isogi_result isogi_dvr__update_matter(isogi_dvr *d) {
     isogi_dvr__matter *m = &d->matter;
     isogi_result result;
-    size_t rows = m->size[2];
+    size_t rows = m->size[2], n;
     m->scratch_row = 2 * d->volume.size[0] + 2 * m->size[0] + ISOGI_DVR__LANES;
     if (rows > SIZE_MAX / 64 / m->scratch_row) return ISOGI_TOO_LARGE;
     m->table = (float *)isogi_allocate(&d->context, ISOGI_DVR__TABLE, sizeof *m->table);
@@ -2247,8 +2477,533 @@ static isogi_result isogi_dvr__update_matter(isogi_dvr *d) {
     isogi_release(&d->context, m->table, ISOGI_DVR__TABLE, sizeof *m->table);
     isogi_release(&d->context, m->scratch, rows * m->scratch_row, sizeof *m->scratch);
     m->table = m->scratch = NULL;
+    for (n = 0; result == ISOGI_OK && n < d->changed_count; n++) d->classified += d->changed[n];
     if (result == ISOGI_OK) memset(d->changed, 0, d->changed_count);
     return result;
+}
+
+/* ==== half floats ==================================================================================================== */
+
+/* Rounded to nearest, ties to even; what is too large becomes the largest. */
+static uint16_t isogi_dvr__to_half(float x) {
+    uint32_t bits, sign, rest, shift;
+    memcpy(&bits, &x, sizeof bits);
+    sign = bits >> 16 & 0x8000u, bits &= 0x7fffffffu;
+    if (bits >= 0x477fe000u) return (uint16_t)(sign | 0x7bffu);
+    if (bits < 0x33000001u) return (uint16_t)sign;
+    if (bits < 0x38800000u) { /* denormal: the mantissa with its leading 1, shifted */
+        shift = 126 - (bits >> 23), bits = (bits & 0x7fffffu) | 0x800000u;
+        rest = bits & (((uint32_t)1 << shift) - 1), bits >>= shift;
+        return (uint16_t)(sign | (bits + (rest > (uint32_t)1 << (shift - 1) || (rest == (uint32_t)1 << (shift - 1) && (bits & 1)))));
+    }
+    return (uint16_t)(sign | ((bits - 0x38000000u + 0xfffu + (bits >> 13 & 1)) >> 13));
+}
+
+static float isogi_dvr__from_half(uint16_t h) {
+    uint32_t bits = (uint32_t)(h & 0x7fff) << 13, sign = (uint32_t)(h & 0x8000) << 16;
+    float x;
+    memcpy(&x, &bits, sizeof x);
+    x *= 5.192296858534828e33f; /* 2^112 */
+    memcpy(&bits, &x, sizeof bits);
+    bits |= sign;
+    memcpy(&x, &bits, sizeof x);
+    return x;
+}
+
+/* ==== selection of levels ============================================================================================ */
+
+/* CIE L*u*v* (D65) of a colour seen through one voxel over black. */
+static void isogi_dvr__luv(const double rgb[3], double opacity, double luv[3]) {
+    double r = rgb[0] * opacity, g = rgb[1] * opacity, b = rgb[2] * opacity;
+    double x = 0.4124564 * r + 0.3575761 * g + 0.1804375 * b, y = 0.2126729 * r + 0.7151522 * g + 0.0721750 * b;
+    double z = 0.0193339 * r + 0.1191920 * g + 0.9503041 * b, sum = x + 15 * y + 3 * z;
+    luv[0] = y > 0.008856452 ? 116 * cbrt(y) - 16 : 903.2963 * y;
+    luv[1] = sum > 1e-12 ? 13 * luv[0] * (4 * x / sum - 0.19783982) : 0;
+    luv[2] = sum > 1e-12 ? 13 * luv[0] * (9 * y / sum - 0.46833630) : 0;
+}
+
+static void isogi_dvr__luv_of(const isogi_dvr *d, double value, double luv[3]) {
+    double rgb[3] = {0, 0, 0}, extinction = 0;
+    if (d->transfer.point_count) {
+        isogi_dvr__colour(d->transfer.points, d->transfer.point_count, value, rgb);
+        extinction = isogi_dvr__extinction(d->transfer.points, d->transfer.point_count, value);
+    }
+    isogi_dvr__luv(rgb, -expm1(-extinction * d->spacing / d->desc.unit), luv);
+}
+
+/* The largest difference between what a block holds and its average. */
+static double isogi_dvr__significance(const isogi_dvr *d, size_t block, double (*luv)[3]) {
+    const isogi_dvr__blocks *b = &d->blocks;
+    double mean = 0, at[3], most = 0;
+    size_t c[3], k, i;
+    for (k = 0; k < 8; k++) {
+        c[0] = block % b->count[0] + (k & 1), c[1] = block / b->count[0] % b->count[1] + (k >> 1 & 1), c[2] = block / b->count[0] / b->count[1] + (k >> 2);
+        mean += 0.125 * (double)isogi_dvr__lattice_at(d, 4, c);
+    }
+    isogi_dvr__luv_of(d, mean, at);
+    for (i = 0; i < 64; i++) {
+        double difference[3] = {luv[i][0] - at[0], luv[i][1] - at[1], luv[i][2] - at[2]}, size = isogi_dvr__dot(difference, difference);
+        if ((b->histogram[block] >> i & 1) && size > most) most = size;
+    }
+    return sqrt(most);
+}
+
+/* A heap of blocks; the largest gain per point on top. */
+typedef struct isogi_dvr__raise {
+    double gain;
+    size_t block;
+} isogi_dvr__raise;
+
+static int isogi_dvr__before(const isogi_dvr__raise *a, const isogi_dvr__raise *b) {
+    return a->gain > b->gain || (!(a->gain < b->gain) && a->block < b->block);
+}
+
+static void isogi_dvr__sift(isogi_dvr__raise *heap, size_t count, size_t i) {
+    for (;;) {
+        size_t child = 2 * i + 1;
+        isogi_dvr__raise swap;
+        if (child >= count) return;
+        if (child + 1 < count && isogi_dvr__before(&heap[child + 1], &heap[child])) child++;
+        if (!isogi_dvr__before(&heap[child], &heap[i])) return;
+        swap = heap[i], heap[i] = heap[child], heap[child] = swap;
+        i = child;
+    }
+}
+
+/* Points that a level takes, not counting the repeated ones. */
+static size_t isogi_dvr__level_points(size_t n) { return n * n * n; }
+
+/* Levels of all blocks: transparent ones are dropped, the others begin at 1 and are raised by largest significance for its cost,
+   taken to halve with each level, until the budget of voxels / reduction points is spent. */
+static isogi_result isogi_dvr__select_levels(isogi_dvr *d, uint8_t *level) {
+    const isogi_dvr__blocks *b = &d->blocks;
+    isogi_dvr__raise *heap = (isogi_dvr__raise *)isogi_allocate(&d->context, b->total, sizeof *heap);
+    double luv[64][3], budget = (double)d->volume.size[0] * (double)d->volume.size[1] * (double)d->volume.size[2] / d->desc.reduction;
+    size_t count = 0, i;
+    if (!heap) return ISOGI_NO_MEMORY;
+    for (i = 0; i < 64; i++) isogi_dvr__luv_of(d, d->matter.low + (d->matter.scale > 0 ? ((double)i + 0.5) * (ISOGI_DVR__TABLE / 64) / d->matter.scale : 0), luv[i]);
+    for (i = 0; i < b->total; i++) {
+        level[i] = d->empty[1][i] ? 0 : 1;
+        if (!level[i]) continue;
+        heap[count].block = i, heap[count].gain = isogi_dvr__significance(d, i, luv) / 7;
+        budget -= 1, count++;
+    }
+    for (i = count / 2; i-- > 0;) isogi_dvr__sift(heap, count, i);
+    while (count && budget > 0 && heap[0].gain > 0) {
+        size_t n = level[heap[0].block];
+        double cost = (double)(isogi_dvr__level_points(2 * n) - isogi_dvr__level_points(n));
+        if (cost <= budget) budget -= cost, level[heap[0].block] = (uint8_t)(2 * n), heap[0].gain /= 16; /* half for eight times the points */
+        else heap[0].gain = 0;
+        if (2 * n >= 16 || !(heap[0].gain > 0)) heap[0] = heap[--count];
+        isogi_dvr__sift(heap, count, 0);
+    }
+    isogi_release(&d->context, heap, b->total, sizeof *heap);
+    return ISOGI_OK;
+}
+
+/* Does any block within `reach` of this one have a mark? */
+static int isogi_dvr__any_near(const isogi_dvr__blocks *b, size_t block, size_t reach, const uint8_t *mark) {
+    size_t at[3] = {block % b->count[0], block / b->count[0] % b->count[1], block / b->count[0] / b->count[1]}, low[3], high[3], c[3];
+    int a;
+    for (a = 0; a < 3; a++) low[a] = at[a] > reach ? at[a] - reach : 0, high[a] = b->count[a] - at[a] > reach ? at[a] + reach : b->count[a] - 1;
+    for (c[2] = low[2]; c[2] <= high[2]; c[2]++)
+        for (c[1] = low[1]; c[1] <= high[1]; c[1]++)
+            for (c[0] = low[0]; c[0] <= high[0]; c[0]++)
+                if (mark[c[0] + b->count[0] * (c[1] + b->count[1] * c[2])]) return 1;
+    return 0;
+}
+
+static size_t isogi_dvr__nodes(size_t n) { return n ? (n + 1) * (n + 1) * (n + 1) : 0; }
+
+/* The coarsest of the blocks that touch a node of a block, and the one whose own the node is: the last of those of that level.
+   at: the block; node: of (n + 1)^3. */
+static void isogi_dvr__touching(const isogi_dvr__blocks *b, const uint8_t *level, const size_t at[3], const size_t node[3], size_t n,
+                                size_t *coarsest, size_t *owner) {
+    size_t low[3], high[3], c[3];
+    int a;
+    for (a = 0; a < 3; a++) {
+        low[a] = node[a] == 0 && at[a] ? at[a] - 1 : at[a];
+        high[a] = node[a] == n && at[a] + 1 < b->count[a] ? at[a] + 1 : at[a];
+    }
+    *coarsest = *owner = at[0] + b->count[0] * (at[1] + b->count[1] * at[2]);
+    for (c[2] = low[2]; c[2] <= high[2]; c[2]++)
+        for (c[1] = low[1]; c[1] <= high[1]; c[1]++)
+            for (c[0] = low[0]; c[0] <= high[0]; c[0]++) {
+                size_t i = c[0] + b->count[0] * (c[1] + b->count[1] * c[2]);
+                if (!level[i]) continue;
+                if (level[i] < level[*coarsest]) *coarsest = *owner = i;
+                else if (level[i] == level[*coarsest]) *owner = i;
+            }
+}
+
+/* A place in a block of level n: the first of its eight nodes, and the weights. */
+static size_t isogi_dvr__place(const isogi_dvr__blocks *b, size_t block, size_t n, const double position[3], float w[8]) {
+    size_t at[3] = {block % b->count[0], block / b->count[0] % b->count[1], block / b->count[0] / b->count[1]}, node[3], k;
+    float u[3];
+    int a;
+    for (a = 0; a < 3; a++) {
+        double x = isogi_dvr__clamp((position[a] - 16.0 * (double)at[a]) * (double)n / 16, (double)n);
+        node[a] = (size_t)x;
+        if (node[a] >= n) node[a] = n - 1;
+        u[a] = (float)(x - (double)node[a]);
+    }
+    for (k = 0; k < 8; k++) w[k] = (k & 1 ? u[0] : 1 - u[0]) * (k & 2 ? u[1] : 1 - u[1]) * (k & 4 ? u[2] : 1 - u[2]);
+    return node[0] + (n + 1) * (node[1] + (n + 1) * node[2]);
+}
+
+static size_t isogi_dvr__corner(size_t n, size_t k) { return (k & 1) + (n + 1) * ((k >> 1 & 1) + (n + 1) * (k >> 2)); }
+
+static size_t isogi_dvr__block_of(const isogi_dvr__blocks *b, const double position[3]) {
+    size_t c[3];
+    int a;
+    for (a = 0; a < 3; a++) c[a] = (size_t)isogi_dvr__clamp(position[a] / 16, (double)b->count[a] - 1);
+    return c[0] + b->count[0] * (c[1] + b->count[1] * c[2]);
+}
+
+static void isogi_dvr__node_position(const isogi_dvr__blocks *b, size_t block, size_t n, const size_t node[3], double position[3]) {
+    size_t at[3] = {block % b->count[0], block / b->count[0] % b->count[1], block / b->count[0] / b->count[1]};
+    int a;
+    for (a = 0; a < 3; a++) position[a] = 16.0 * (double)at[a] + 16.0 * (double)node[a] / (double)n;
+}
+
+/* ---- data in its blocks ---- */
+
+/* The data that the blocks hold, interpolated; what is not held (or not finite) is the lowest value, and `held` 0. */
+static float isogi_dvr__block_value(const isogi_dvr *d, size_t block, const double position[3]) {
+    const isogi_dvr__blocks *b = &d->blocks;
+    size_t n = b->level[block], base, k;
+    float w[8], sum = 0;
+    if (!n) return (float)d->matter.low;
+    base = b->first[block] + isogi_dvr__place(b, block, n, position, w);
+    for (k = 0; k < 8; k++) /* a node of no weight may be another thread's at work */
+        if (w[k] > 0) sum += w[k] * b->data[base + isogi_dvr__corner(n, k)];
+    return sum;
+}
+
+/* Blocks of one level, from coarse to fine: every node from the coarsest block that touches it, or from the data's average. */
+static void isogi_dvr__pack_task(void *arg, size_t block) {
+    isogi_dvr *d = (isogi_dvr *)arg;
+    isogi_dvr__blocks *b = &d->blocks;
+    size_t n = b->level[block], at[3] = {block % b->count[0], block / b->count[0] % b->count[1], block / b->count[0] / b->count[1]}, node[3], c[3];
+    float *out = b->data + b->first[block];
+    int step = 0, a;
+    if (n != b->packing) return;
+    while (((size_t)16 >> step) > n) step++;
+    for (node[2] = 0; node[2] <= n; node[2]++)
+        for (node[1] = 0; node[1] <= n; node[1]++)
+            for (node[0] = 0; node[0] <= n; node[0]++) {
+                size_t coarsest = block, owner;
+                int border = 0;
+                for (a = 0; a < 3; a++) border |= !node[a] || node[a] == n, c[a] = at[a] * n + node[a];
+                if (border) isogi_dvr__touching(b, b->level, at, node, n, &coarsest, &owner);
+                if (b->level[coarsest] < n) {
+                    double position[3];
+                    isogi_dvr__node_position(b, block, n, node, position);
+                    *out++ = isogi_dvr__block_value(d, coarsest, position);
+                } else *out++ = isogi_dvr__lattice_at(d, step, c);
+            }
+}
+
+/* Room for new levels. Local visibility of blocks that stay as they are is kept; the others begin without shadows. */
+static isogi_result isogi_dvr__lay_out(isogi_dvr *d, const uint8_t *level, const uint8_t *lit) {
+    isogi_dvr__blocks *b = &d->blocks;
+    size_t data_count = 0, sh_count = 0, i, *first = (size_t *)isogi_allocate(&d->context, 2 * b->total, sizeof *first);
+    float *data;
+    uint16_t *sh;
+    for (i = 0; first && i < b->total; i++) {
+        first[i] = data_count, first[b->total + i] = sh_count;
+        data_count += isogi_dvr__nodes(level[i]), sh_count += isogi_dvr__nodes(lit[i]);
+    }
+    data = (float *)isogi_allocate(&d->context, data_count, sizeof *data);
+    sh = (uint16_t *)isogi_allocate(&d->context, sh_count * d->coefficients, sizeof *sh);
+    if (!first || (data_count && !data) || (sh_count && !sh)) {
+        isogi_release(&d->context, first, 2 * b->total, sizeof *first);
+        isogi_release(&d->context, data, data_count, sizeof *data);
+        isogi_release(&d->context, sh, sh_count * d->coefficients, sizeof *sh);
+        return ISOGI_NO_MEMORY;
+    }
+    for (i = 0; i < b->total; i++) {
+        size_t count = isogi_dvr__nodes(lit[i]) * d->coefficients, k;
+        uint16_t *to = sh + first[b->total + i] * d->coefficients;
+        if (!count) continue;
+        if (lit[i] == b->lit[i]) memcpy(to, b->sh + b->first[b->total + i] * d->coefficients, count * sizeof *to);
+        else
+            for (k = 0; k < count; k++) to[k] = k % d->coefficients ? 0 : isogi_dvr__to_half((float)(2 * sqrt(ISOGI_DVR__PI)));
+    }
+    isogi_release(&d->context, b->first, 2 * b->total, sizeof *first);
+    isogi_release(&d->context, b->data, b->data_count, sizeof *data);
+    isogi_release(&d->context, b->sh, b->sh_count * d->coefficients, sizeof *sh);
+    b->first = first, b->data = data, b->sh = sh, b->data_count = data_count, b->sh_count = sh_count;
+    memcpy(b->level, level, b->total), memcpy(b->lit, lit, b->total);
+    return ISOGI_OK;
+}
+
+/* New levels for a new classification, the data packed anew, and the list of blocks whose local visibility has to follow: those with a
+   changed block within reach of a ray. */
+static isogi_result isogi_dvr__update_blocks(isogi_dvr *d) {
+    isogi_dvr__blocks *b = &d->blocks;
+    uint8_t *level = (uint8_t *)isogi_allocate(&d->context, 3 * b->total, 1), *lit = level + b->total, *changed = lit + b->total;
+    isogi_result result = level ? isogi_dvr__select_levels(d, level) : ISOGI_NO_MEMORY;
+    size_t i;
+    for (i = 0; result == ISOGI_OK && i < b->total; i++) {
+        changed[i] = d->changed[i] || level[i] != b->level[i];
+        lit[i] = level[i] ? level[i] : isogi_dvr__any_near(b, i, b->reach, level) ? 2 : 0;
+    }
+    for (i = 0; result == ISOGI_OK && i < b->total; i++)
+        b->stale[i] = b->stale[i] || lit[i] != b->lit[i] || isogi_dvr__any_near(b, i, b->reach > 1 ? b->reach : 1, changed);
+    if (result == ISOGI_OK) result = isogi_dvr__lay_out(d, level, lit);
+    isogi_release(&d->context, level, 3 * b->total, 1);
+    for (b->packing = 1; result == ISOGI_OK && b->packing <= 16; b->packing *= 2) {
+        isogi_context whole = d->context;
+        whole.progress = NULL;
+        result = isogi_parallel(&whole, b->total, isogi_dvr__pack_task, d, 0, 0);
+    }
+    if (result != ISOGI_OK) return result;
+    for (i = 0; i < d->changed_count; i++) d->classified += d->changed[i];
+    memset(d->changed, 0, d->changed_count);
+    isogi_dvr__set_table(d, d->matter.table);
+    for (i = 0, b->todo = 0; i < b->total; i++)
+        if (b->stale[i] && b->lit[i]) b->order[b->todo++] = i;
+    return ISOGI_OK;
+}
+
+/* ==== local and global visibility (Kronander 2011, 4.2 and 4.3) ====================================================== */
+
+/* Around a block a window of extinction is laid out, as wide as local rays reach, at the finest level that occurs in it: data as the
+   blocks hold it, classified at the window's nodes, 0 where it is dropped, cut off or outside. For one direction and one step all nodes
+   of a row of the block look at the window at the same place between its nodes, so that whole rows advance at once. */
+typedef struct isogi_dvr__local_step {
+    ptrdiff_t offset; /* from a ray's node to the first of the eight around its sample */
+    float weight[8];  /* times the optical depth of the step */
+} isogi_dvr__local_step;
+
+typedef struct isogi_dvr__local_job {
+    isogi_dvr *dvr;
+    size_t first, packing;
+    isogi_counters *work;
+    float *window;              /* of each task */
+    size_t window_count;
+    isogi_dvr__local_step *step; /* for levels 1, 2, 4, 8, 16: [directions][steps] */
+    size_t step_count;
+} isogi_dvr__local_job;
+
+/* Nodes along a side of a window of level n; its rows are padded for vectors. */
+static size_t isogi_dvr__window_side(const isogi_dvr__blocks *b, size_t n) { return (2 * b->reach + 1) * n + 1; }
+static size_t isogi_dvr__window_row(const isogi_dvr__blocks *b, size_t n) { return isogi_dvr__window_side(b, n) + 2 * ISOGI_DVR__LANES; }
+
+/* Steps of a ray at level n: a node's distance each, the last one what is left of the radius. */
+static size_t isogi_dvr__local_steps(const isogi_dvr *d, size_t n) { return (size_t)ceil(d->desc.radius * (double)n / 16 - 1e-9); }
+
+static size_t isogi_dvr__steps_before(const isogi_dvr *d, size_t n) {
+    size_t sum = 0, m;
+    for (m = 1; m < n; m *= 2) sum += isogi_dvr__local_steps(d, m) * (size_t)d->desc.directions;
+    return sum;
+}
+
+static void isogi_dvr__set_local_steps(const isogi_dvr *d, isogi_dvr__local_step *step) {
+    size_t n, k, j;
+    for (n = 1; n <= 16; n *= 2)
+        for (k = 0; k < (size_t)d->desc.directions; k++)
+            for (j = 0; j < isogi_dvr__local_steps(d, n); j++, step++) {
+                double size = 16.0 / (double)n, from = (double)j * size, to = from + size < d->desc.radius ? from + size : d->desc.radius;
+                ptrdiff_t row = (ptrdiff_t)isogi_dvr__window_row(&d->blocks, n), side = (ptrdiff_t)isogi_dvr__window_side(&d->blocks, n), c[3];
+                double u[3], depth = (to - from) * d->spacing / d->desc.unit;
+                int a;
+                for (a = 0; a < 3; a++) {
+                    double x = 0.5 * (from + to) * d->spacing * d->direction[k][a] / size, whole = floor(x);
+                    c[a] = (ptrdiff_t)whole, u[a] = x - whole;
+                }
+                step->offset = c[0] + row * (c[1] + side * c[2]);
+                for (a = 0; a < 8; a++)
+                    step->weight[a] = (float)(depth * (a & 1 ? u[0] : 1 - u[0]) * (a & 2 ? u[1] : 1 - u[1]) * (a & 4 ? u[2] : 1 - u[2]));
+            }
+}
+
+/* The nodes of a window that lie in one block (with its upper faces). Returns whether anything there absorbs. */
+static int isogi_dvr__fill_window(const isogi_dvr *d, size_t block, size_t n, const size_t corner[3], float *window) {
+    const isogi_dvr__blocks *b = &d->blocks;
+    size_t node[3], row = isogi_dvr__window_row(b, n), side = isogi_dvr__window_side(b, n), held = b->level[block];
+    const float *data = b->data + b->first[block];
+    int any = 0, a;
+    for (node[2] = 0; node[2] <= n; node[2]++)
+        for (node[1] = 0; node[1] <= n; node[1]++) {
+            float *out = window + corner[0] + row * (corner[1] + node[1] + side * (corner[2] + node[2]));
+            for (node[0] = 0; node[0] <= n; node[0]++) {
+                double position[3];
+                float value;
+                int within = 1;
+                isogi_dvr__node_position(b, block, n, node, position);
+                for (a = 0; a < 3; a++) within = within && position[a] <= d->cells[a];
+                if (!within || (d->cut[block] && !isogi_dvr__kept(d, position))) continue;
+                if (held == n) value = data[node[0] + (n + 1) * (node[1] + (n + 1) * node[2])];
+                else value = isogi_dvr__block_value(d, block, position);
+                out[node[0]] = d->matter.table[isogi_dvr__class(d, (double)value)];
+                any |= out[node[0]] > 0;
+            }
+        }
+    return any;
+}
+
+/* The window around a block; its level, 0 if nothing in it absorbs. */
+static size_t isogi_dvr__make_window(const isogi_dvr *d, size_t block, float *window) {
+    const isogi_dvr__blocks *b = &d->blocks;
+    size_t at[3] = {block % b->count[0], block / b->count[0] % b->count[1], block / b->count[0] / b->count[1]}, n = b->lit[block], o[3], i;
+    int any = 0, pass, a;
+    for (pass = 0; pass < 2; pass++) { /* first the level, then the nodes */
+        if (pass) memset(window, 0, isogi_dvr__window_row(b, n) * isogi_dvr__window_side(b, n) * isogi_dvr__window_side(b, n) * sizeof *window);
+        for (o[2] = 0; o[2] <= 2 * b->reach; o[2]++)
+            for (o[1] = 0; o[1] <= 2 * b->reach; o[1]++)
+                for (o[0] = 0; o[0] <= 2 * b->reach; o[0]++) {
+                    size_t corner[3];
+                    int within = 1;
+                    for (a = 0; a < 3; a++) within = within && at[a] + o[a] >= b->reach && at[a] + o[a] - b->reach < b->count[a], corner[a] = o[a] * n;
+                    if (!within) continue;
+                    i = at[0] + o[0] - b->reach + b->count[0] * (at[1] + o[1] - b->reach + b->count[1] * (at[2] + o[2] - b->reach));
+                    if (!pass) n = b->level[i] > n ? b->level[i] : n;
+                    else if (b->level[i]) any |= isogi_dvr__fill_window(d, i, n, corner, window);
+                }
+    }
+    return any ? n : 0;
+}
+
+/* SH coefficients of a row of nodes: sum[c][0 .. count - 1] at the window's nodes from `at` on, as many as a vector or two hold. */
+static void isogi_dvr__local_row(const isogi_dvr__local_job *job, size_t n, const float *at, size_t count, float (*sum)[2 * ISOGI_DVR__LANES]) {
+    const isogi_dvr *d = job->dvr;
+    const isogi_dvr__local_step *step = job->step + isogi_dvr__steps_before(d, n);
+    size_t steps = isogi_dvr__local_steps(d, n), row = isogi_dvr__window_row(&d->blocks, n), plane = row * isogi_dvr__window_side(&d->blocks, n), k, j, c;
+    float depth[2 * ISOGI_DVR__LANES];
+    for (c = 0; c < d->coefficients; c++) memset(sum[c], 0, sizeof sum[c]);
+    for (k = 0; k < (size_t)d->desc.directions; k++) {
+        memset(depth, 0, sizeof depth);
+        for (j = 0; j < steps; j++, step++) {
+            const float *p = at + step->offset;
+            d->kernels.sweep_row(depth, p, p + row, step->weight, count);
+            d->kernels.sweep_row(depth, p + plane, p + plane + row, step->weight + 4, count);
+        }
+        d->kernels.exp_row(depth, count);
+        for (c = 0; c < d->coefficients; c++) d->kernels.gain_row(sum[c], depth, d->kernel[k * d->coefficients + c], count);
+    }
+}
+
+/* The own nodes of a block, rows at a time. */
+static void isogi_dvr__local_task(void *arg, size_t i) {
+    const isogi_dvr__local_job *job = (const isogi_dvr__local_job *)arg;
+    isogi_dvr *d = job->dvr;
+    isogi_dvr__blocks *b = &d->blocks;
+    float *window = job->window + i * job->window_count, sum[ISOGI_DVR__MAX_ORDER * ISOGI_DVR__MAX_ORDER][2 * ISOGI_DVR__LANES];
+    size_t block = b->order[job->first + i], n = b->lit[block], fine = isogi_dvr__make_window(d, block, window), every = fine / n, node[3], c;
+    size_t at[3] = {block % b->count[0], block / b->count[0] % b->count[1], block / b->count[0] / b->count[1]};
+    uint16_t *out = b->sh + b->first[b->total + block] * d->coefficients, clear = isogi_dvr__to_half((float)(2 * sqrt(ISOGI_DVR__PI)));
+    memset(&job->work[i], 0, sizeof *job->work);
+    job->work[i].blocks++;
+    for (node[2] = 0; node[2] <= n; node[2]++)
+        for (node[1] = 0; node[1] <= n; node[1]++) {
+            size_t row = b->reach * fine + isogi_dvr__window_row(b, fine ? fine : 1) *
+                                               (b->reach * fine + node[1] * every + isogi_dvr__window_side(b, fine ? fine : 1) * (b->reach * fine + node[2] * every));
+            size_t coarsest, owner, count = fine;
+            node[0] = n;
+            isogi_dvr__touching(b, b->lit, at, node, n, &coarsest, &owner);
+            if (owner == block && b->lit[coarsest] == n) count++; /* the row's last node is this block's own, too */
+            if (fine) isogi_dvr__local_row(job, fine, window + row, count, sum);
+            for (node[0] = 0; node[0] <= n; node[0]++, out += d->coefficients) {
+                isogi_dvr__touching(b, b->lit, at, node, n, &coarsest, &owner);
+                if (owner != block || b->lit[coarsest] < n) continue;
+                for (c = 0; c < d->coefficients; c++)
+                    out[c] = fine ? isogi_dvr__to_half(sum[c][node[0] * every]) : (uint16_t)(c ? 0 : clear);
+                job->work[i].rays += (uint64_t)d->desc.directions, job->work[i].texels++;
+            }
+        }
+}
+
+/* All coefficients of local visibility at a place, given in grid coordinates. */
+static void isogi_dvr__local_at(const isogi_dvr *d, size_t block, const double position[3], float *out) {
+    const isogi_dvr__blocks *b = &d->blocks;
+    size_t n = b->lit[block], k, c;
+    const uint16_t *base;
+    float w[8];
+    for (c = 0; c < d->coefficients; c++) out[c] = c || n ? 0 : (float)(2 * sqrt(ISOGI_DVR__PI));
+    if (!n) return;
+    base = b->sh + (b->first[b->total + block] + isogi_dvr__place(b, block, n, position, w)) * d->coefficients;
+    for (k = 0; k < 8; k++) {
+        const uint16_t *v = base + isogi_dvr__corner(n, k) * d->coefficients;
+        if (!(w[k] > 0)) continue;
+        for (c = 0; c < d->coefficients; c++) out[c] += w[k] * isogi_dvr__from_half(v[c]);
+    }
+}
+
+/* Repeated nodes and those on faces of coarser blocks, from coarse to fine. */
+static void isogi_dvr__finish_task(void *arg, size_t block) {
+    const isogi_dvr__local_job *job = (const isogi_dvr__local_job *)arg;
+    isogi_dvr *d = job->dvr;
+    isogi_dvr__blocks *b = &d->blocks;
+    size_t n = b->lit[block], node[3], c, at[3] = {block % b->count[0], block / b->count[0] % b->count[1], block / b->count[0] / b->count[1]};
+    uint16_t *out = b->sh + b->first[b->total + block] * d->coefficients;
+    if (n != job->packing) return;
+    for (node[2] = 0; node[2] <= n; node[2]++)
+        for (node[1] = 0; node[1] <= n; node[1]++)
+            for (node[0] = 0; node[0] <= n; node[0]++, out += d->coefficients) {
+                float v[ISOGI_DVR__MAX_ORDER * ISOGI_DVR__MAX_ORDER];
+                double position[3];
+                size_t coarsest, owner;
+                if (node[0] % n && node[1] % n && node[2] % n) continue;
+                isogi_dvr__touching(b, b->lit, at, node, n, &coarsest, &owner);
+                if (b->lit[coarsest] >= n && owner == block) continue;
+                isogi_dvr__node_position(b, block, n, node, position);
+                isogi_dvr__local_at(d, b->lit[coarsest] < n ? coarsest : owner, position, v);
+                for (c = 0; c < d->coefficients; c++) out[c] = isogi_dvr__to_half(v[c]);
+            }
+}
+
+/* Piecewise integration: local visibility stands for the ray's next r_s voxels; the last piece, cut by the border, is no shorter in
+   what it blocks since there is nothing outside (eq. 9). */
+static float isogi_dvr__global_ray(const isogi_dvr *d, const double from[3], const double direction[6], const float *basis) {
+    double step = d->desc.radius * d->spacing, clear = 1, t, limit = 1e300, p[3];
+    float v[ISOGI_DVR__MAX_ORDER * ISOGI_DVR__MAX_ORDER];
+    size_t c;
+    int a;
+    for (a = 0; a < 3; a++) {
+        double exit = fabs(direction[a]) > 1e-300 ? ((direction[a] > 0 ? d->cells[a] : 0) - from[a]) / direction[a] : limit;
+        if (exit < limit) limit = exit;
+    }
+    for (t = 0; t < limit && clear > ISOGI_DVR__NEGLIGIBLE; t += step) {
+        double sum = 0;
+        size_t block;
+        for (a = 0; a < 3; a++) p[a] = from[a] + t * direction[a];
+        block = isogi_dvr__block_of(&d->blocks, p);
+        if (!d->blocks.lit[block]) continue;
+        isogi_dvr__local_at(d, block, p, v);
+        for (c = 0; c < d->coefficients; c++) sum += (double)v[c] * (double)basis[c];
+        clear *= isogi_dvr__clamp(sum, 1);
+    }
+    return (float)clear;
+}
+
+static void isogi_dvr__grid_position(const isogi_dvr *d, size_t point, double grid[3]) {
+    int a;
+    for (a = 0; a < 3; a++) {
+        size_t points = d->desc.grid[a], j = point % points;
+        grid[a] = points > 1 ? (double)j * d->cells[a] / (double)(points - 1) : 0.5 * d->cells[a];
+        point /= points;
+    }
+}
+
+/* A few grid points. */
+static void isogi_dvr__global_task(void *arg, size_t task) {
+    const isogi_dvr__step_job *job = (const isogi_dvr__step_job *)arg;
+    isogi_dvr *d = job->dvr;
+    size_t point = job->first + task * ISOGI_DVR__CHUNK, end = point + ISOGI_DVR__CHUNK, k, c;
+    memset(&job->work[task], 0, sizeof *job->work);
+    for (; point < end && point < job->end; point++) {
+        float sum[ISOGI_DVR__MAX_ORDER * ISOGI_DVR__MAX_ORDER] = {0};
+        double grid[3];
+        isogi_dvr__grid_position(d, point, grid);
+        for (k = 0; k < (size_t)d->desc.directions; k++) {
+            float clear = isogi_dvr__global_ray(d, grid, d->direction[k], d->basis + k * d->coefficients);
+            for (c = 0; c < d->coefficients; c++) sum[c] += clear * d->kernel[k * d->coefficients + c];
+        }
+        memcpy(d->visibility + point * d->coefficients, sum, d->coefficients * sizeof *sum);
+        job->work[task].texels++, job->work[task].rays += (uint64_t)d->desc.directions;
+    }
 }
 
 /* ==== sweeps ========================================================================================================= */
@@ -2443,6 +3198,55 @@ static isogi_result isogi_dvr__step_brute(isogi_dvr *d, size_t end) {
     return result;
 }
 
+/* The paper's method, up to `end` of first its blocks, then its grid points. */
+static isogi_result isogi_dvr__step_paper(isogi_dvr *d, size_t end) {
+    isogi_dvr__blocks *b = &d->blocks;
+    isogi_dvr__local_job local;
+    isogi_dvr__step_job global;
+    isogi_result result = ISOGI_OK;
+    size_t i, count, batch;
+    isogi_context whole = d->context;
+    whole.progress = NULL;
+    memset(&local, 0, sizeof local);
+    local.dvr = global.dvr = d;
+    local.work = global.work = (isogi_counters *)isogi_allocate(&d->context, ISOGI_DVR__SLAB / ISOGI_DVR__CHUNK, sizeof *local.work);
+    if (!local.work) return ISOGI_NO_MEMORY;
+    batch = d->next < b->todo ? (end - d->next < ISOGI_DVR__BATCH ? end - d->next : ISOGI_DVR__BATCH) : 0;
+    if (batch) {
+        local.window_count = isogi_dvr__window_row(b, 16) * isogi_dvr__window_side(b, 16) * isogi_dvr__window_side(b, 16);
+        local.step_count = isogi_dvr__steps_before(d, 32);
+        local.window = (float *)isogi_allocate(&d->context, batch * local.window_count, sizeof *local.window);
+        local.step = (isogi_dvr__local_step *)isogi_allocate(&d->context, local.step_count, sizeof *local.step);
+        if (!local.window || !local.step) result = ISOGI_NO_MEMORY;
+        else isogi_dvr__set_local_steps(d, local.step);
+    }
+    while (result == ISOGI_OK && d->next < end && d->next < b->todo) {
+        local.first = d->next, count = (end < b->todo ? end : b->todo) - d->next;
+        if (count > batch) count = batch;
+        result = isogi_parallel(&d->context, count, isogi_dvr__local_task, &local, 0, 0);
+        for (i = 0; result == ISOGI_OK && i < count; i++) {
+            isogi_dvr__add(&d->counters, &local.work[i]);
+            b->stale[b->order[d->next++]] = 0, d->computed++;
+        }
+        if (result == ISOGI_OK && d->next == b->todo)
+            for (local.packing = 1; result == ISOGI_OK && local.packing <= 16; local.packing *= 2)
+                result = isogi_parallel(&whole, b->total, isogi_dvr__finish_task, &local, 0, 0);
+    }
+    isogi_release(&d->context, local.window, batch * local.window_count, sizeof *local.window);
+    isogi_release(&d->context, local.step, local.step_count, sizeof *local.step);
+    while (result == ISOGI_OK && d->next < end) {
+        size_t point = d->next - b->todo, last = end - b->todo;
+        global.first = point, global.end = last - point < ISOGI_DVR__SLAB ? last : point + ISOGI_DVR__SLAB;
+        count = (global.end - point + ISOGI_DVR__CHUNK - 1) / ISOGI_DVR__CHUNK;
+        result = isogi_parallel(&d->context, count, isogi_dvr__global_task, &global, (double)point / (double)d->point_count,
+                                (double)global.end / (double)d->point_count);
+        for (i = 0; result == ISOGI_OK && i < count; i++) isogi_dvr__add(&d->counters, &global.work[i]);
+        if (result == ISOGI_OK) d->next = b->todo + global.end;
+    }
+    isogi_release(&d->context, local.work, ISOGI_DVR__SLAB / ISOGI_DVR__CHUNK, sizeof *local.work);
+    return result;
+}
+
 /* Sweeps, up to direction `end`. The picture keeps what it had until the last one is done. */
 static isogi_result isogi_dvr__step_sweeps(isogi_dvr *d, size_t end) {
     isogi_dvr__sweep_job job;
@@ -2474,19 +3278,26 @@ static isogi_result isogi_dvr__step_sweeps(isogi_dvr *d, size_t end) {
     return ISOGI_OK;
 }
 
+/* Units of work and the rays of each: brute force goes on by grid points, sweeps by directions, the paper's method by blocks (whose
+   rays are short: they are taken for 64 points') and then by grid points. */
 ISOGI_API isogi_result isogi_dvr_step(isogi_dvr *dvr, uint64_t max_rays, double *remaining) {
-    isogi_result result;
-    uint64_t units;
+    isogi_result result = ISOGI_OK;
+    uint64_t units, rays;
     size_t count, end;
-    int sweeps;
     if (!dvr) return ISOGI_INVALID;
-    /* brute force goes on by grid points, all directions of each; sweeps by directions, all grid points of each */
-    sweeps = dvr->method != ISOGI_DVR_BRUTE;
-    count = !dvr->point_count || !sweeps ? dvr->point_count : (size_t)dvr->desc.directions;
-    units = max_rays / (uint64_t)(sweeps && dvr->point_count ? dvr->point_count : (size_t)dvr->desc.directions);
+    if (dvr->method == ISOGI_DVR_PAPER && dvr->point_count && !dvr->next) result = isogi_dvr__update_blocks(dvr);
+    if (result != ISOGI_OK) return result;
+    count = dvr->point_count, rays = (uint64_t)dvr->desc.directions;
+    if (count && dvr->method == ISOGI_DVR_SWEEP) count = (size_t)dvr->desc.directions, rays = dvr->point_count;
+    if (count && dvr->method == ISOGI_DVR_PAPER) {
+        count += dvr->blocks.todo;
+        if (dvr->next < dvr->blocks.todo) rays *= 64;
+    }
+    units = max_rays / rays;
     units = units ? units : 1;
     end = max_rays && units < count - dvr->next ? dvr->next + (size_t)units : count;
-    result = sweeps ? isogi_dvr__step_sweeps(dvr, end) : isogi_dvr__step_brute(dvr, end);
+    if (dvr->method == ISOGI_DVR_SWEEP) result = isogi_dvr__step_sweeps(dvr, end);
+    else result = dvr->method == ISOGI_DVR_PAPER && count ? isogi_dvr__step_paper(dvr, end) : isogi_dvr__step_brute(dvr, end);
     if (result == ISOGI_OK && remaining) *remaining = count ? (double)(count - dvr->next) / (double)count : 0;
     return result;
 }
@@ -2504,6 +3315,79 @@ ISOGI_API isogi_result isogi_dvr_sample_visibility(const isogi_dvr *dvr, const f
     return ISOGI_OK;
 }
 
+ISOGI_API isogi_result isogi_dvr_set_clip(isogi_dvr *dvr, const double (*planes)[4], size_t count) {
+    double(*clip)[4], zero[3] = {0, 0, 0}, origin[3], unit[3], step[3];
+    size_t i;
+    int a;
+    if (!dvr || (count && !planes)) return ISOGI_INVALID;
+    if (count > ISOGI_DVR_MAX_PLANES) return ISOGI_TOO_LARGE;
+    for (i = 0; i < 4 * count; i++)
+        if (!isogi_dvr__finite64(planes[i / 4][i % 4])) return ISOGI_INVALID;
+    clip = (double(*)[4])isogi_allocate(&dvr->context, count, sizeof *clip);
+    if (count && !clip) return ISOGI_NO_MEMORY;
+    isogi_vol_to_world(dvr->desc.pyramid, zero, origin);
+    for (i = 0; i < count; i++) {
+        clip[i][3] = isogi_dvr__dot(planes[i], origin) + planes[i][3];
+        for (a = 0; a < 3; a++) {
+            unit[0] = a == 0, unit[1] = a == 1, unit[2] = a == 2;
+            isogi_vol_to_world(dvr->desc.pyramid, unit, step);
+            clip[i][a] = isogi_dvr__dot(planes[i], step) - isogi_dvr__dot(planes[i], origin);
+        }
+    }
+    isogi_release(&dvr->context, dvr->clip, dvr->clip_count, sizeof *clip);
+    dvr->clip = clip, dvr->clip_count = count;
+    for (i = 0; i < dvr->changed_count; i++) {
+        uint8_t cut = isogi_dvr__cut(dvr, i);
+        if ((cut || dvr->cut[i]) && !(cut == 2 && dvr->cut[i] == 2)) dvr->changed[i] = 1;
+        dvr->cut[i] = cut;
+    }
+    isogi_dvr__mark_empty(dvr);
+    dvr->next = 0;
+    return ISOGI_OK;
+}
+
+ISOGI_API isogi_result isogi_dvr_inspect(const isogi_dvr *dvr, isogi_dvr_report *report) {
+    isogi_dvr_report r;
+    size_t i;
+    int a;
+    if (!dvr || !report) return ISOGI_INVALID;
+    memset(&r, 0, sizeof r);
+    for (a = 0; a < 3; a++) r.block_count[a] = dvr->level[1].size[a];
+    r.blocks_classified = dvr->classified, r.blocks_computed = dvr->computed;
+    r.global_bytes = dvr->point_count * dvr->coefficients * sizeof(float);
+    if (dvr->blocks.total) {
+        const isogi_dvr__blocks *b = &dvr->blocks;
+        r.level = b->level;
+        for (i = 0; i < b->total; i++) {
+            a = 0;
+            while (b->level[i] >> a) a++;
+            r.level_count[a]++;
+            r.points += isogi_dvr__level_points(b->level[i]);
+        }
+        if (r.points) r.reduction = (double)dvr->volume.size[0] * (double)dvr->volume.size[1] * (double)dvr->volume.size[2] / (double)r.points;
+        r.data_bytes = b->data_count * sizeof *b->data, r.local_bytes = b->sh_count * dvr->coefficients * sizeof *b->sh;
+        r.index_bytes = b->total * (2 * sizeof *b->first + sizeof *b->order + 3);
+    }
+    *report = r;
+    return ISOGI_OK;
+}
+
+ISOGI_API isogi_result isogi_dvr_sample_blocks(const isogi_dvr *dvr, const float (*points)[3], size_t count, float *values, float *visibility) {
+    size_t i, block;
+    int a;
+    if (!dvr || !dvr->blocks.total || (count && !points)) return ISOGI_INVALID;
+    for (i = 0; i < count; i++) {
+        double world[3], grid[3];
+        for (a = 0; a < 3; a++) world[a] = (double)points[i][a];
+        isogi_vol_to_grid(dvr->desc.pyramid, world, grid);
+        for (a = 0; a < 3; a++) grid[a] = isogi_dvr__clamp(grid[a], dvr->cells[a]);
+        block = isogi_dvr__block_of(&dvr->blocks, grid);
+        if (values) values[i] = isogi_dvr__block_value(dvr, block, grid);
+        if (visibility) isogi_dvr__local_at(dvr, block, grid, visibility + i * dvr->coefficients);
+    }
+    return ISOGI_OK;
+}
+
 ISOGI_API void isogi_dvr_counters(const isogi_dvr *dvr, isogi_counters *counters) {
     if (dvr) isogi_dvr__add(counters, &dvr->counters);
 }
@@ -2517,6 +3401,7 @@ typedef struct isogi_dvr__lights {
     size_t count;
     float sh[3 * ISOGI_DVR__MAX_ORDER * ISOGI_DVR__MAX_ORDER]; /* visibility: of all distant lights; local: irradiance of the environment */
     double mean[3];                                            /* of the environment's radiance */
+    int local;                                                 /* shade by local visibility */
 } isogi_dvr__lights;
 
 static isogi_result isogi_dvr__set_lights(isogi_dvr__lights *l, const isogi_dvr *d, const isogi_lighting *lighting) {
@@ -2552,7 +3437,8 @@ static void isogi_dvr__shade_visibility(const isogi_dvr *d, const isogi_dvr__lig
     float v[ISOGI_DVR__MAX_ORDER * ISOGI_DVR__MAX_ORDER], nearby[3 * ISOGI_DVR__MAX_ORDER * ISOGI_DVR__MAX_ORDER];
     size_t i;
     int a, here = 0;
-    isogi_dvr__visibility_at(d, grid, v);
+    if (l->local) isogi_dvr__local_at(d, isogi_dvr__block_of(&d->blocks, grid), grid, v);
+    else isogi_dvr__visibility_at(d, grid, v);
     if (l->nearby.light_count) {
         double world[3];
         float point[3];
@@ -3046,6 +3932,7 @@ ISOGI_API isogi_result isogi_dvr_render(const isogi_dvr *dvr, const isogi_view *
     job.across = ((size_t)view->width + ISOGI_DVR__TILE - 1) / ISOGI_DVR__TILE;
     job.tiles = job.across * (((size_t)view->height + ISOGI_DVR__TILE - 1) / ISOGI_DVR__TILE);
     result = isogi_dvr__set_lights(&job.lights, dvr, lighting);
+    job.lights.local = view->local && dvr->blocks.total;
     if (result == ISOGI_OK) {
         job.pixels = (float *)isogi_allocate(&dvr->context, pixels, 5 * sizeof *job.pixels);
         job.work = (isogi_counters *)isogi_allocate(&dvr->context, job.tiles, sizeof *job.work);
