@@ -29,7 +29,8 @@
    - ISOGI_TRACE_TRANSFER: radiance transfer in spherical harmonics; distant light may then turn and change without new rays.
    - Bakes the whole lattice, the part that an interval of isovalues reads, or lazily what lookups ask for; in steps of a number of
      rays, on all cores, with progress and cancel.
-   - Without a lattice: isogi_trace_gather lights a user's own points, such as the vertices of a mesh.
+   - Without a lattice: isogi_trace_gather lights a user's own points, such as the vertices of a mesh; without a volume, too:
+     isogi_trace_gather_field asks a function of yours what rays meet (tetrahedral meshes, analytic fields).
 
    What it does NOT do
 
@@ -301,6 +302,26 @@ ISOGI_API isogi_result isogi_trace_load(isogi_trace *trace, const void *block, s
    (not BOTH), reach, shadows, material and lighting of the description; its mode must be IRRADIANCE. A point that is not finite or has no normal gets the zero vector and error = INFINITY. error may be NULL. */
 ISOGI_API isogi_result isogi_trace_gather(const isogi_trace_desc *desc, const float (*points)[3], const float (*normals)[3], size_t count,
                                           float (*irradiance)[3], float *error, const isogi_context *context);
+
+/* ---- surfaces of your own: tetrahedral meshes, analytic fields, anything that rays can meet ---- */
+
+/* What a ray meets first at a t in (0, tmax]. The fields come filled in with a miss and the description's albedo. */
+typedef struct isogi_trace_surface {
+    double t;          /* 0 = nothing */
+    float normal[3];   /* unit; either orientation: it is turned towards the ray */
+    float albedo[3], emission[3]; /* clamped to 0..1, and to 0 and more */
+} isogi_trace_surface;
+
+/* For each ray (origin, dir of unit length, tmax; 0 = unlimited; the other fields are zero) its first surface. Up to 32 rays, all of
+   one point or of hits of its paths; from any thread. It shall not report the surface that the ray leaves; desc.offset helps. */
+typedef void isogi_trace_intersect_function(void *user, const isogi_ray *rays, size_t count, isogi_trace_surface *surfaces);
+
+/* isogi_trace_gather on such a surface. normals are needed: unit, to the side that the light is wanted for. Uses lighting, albedo,
+   samples, bounces, seed, reach and no_shadows; offset: how far off along the normal rays start, in world units, 0 or more. The
+   other fields are not read, the pyramid may be NULL. context NULL: malloc and all cores. */
+ISOGI_API isogi_result isogi_trace_gather_field(const isogi_trace_desc *desc, isogi_trace_intersect_function *intersect, void *user,
+                                                const float (*points)[3], const float (*normals)[3], size_t count,
+                                                float (*irradiance)[3], float *error, const isogi_context *context);
 
 /* 1 where the texel lies on an isosurface of its own, 0 where there is none and it is left out of every lookup; 0 for NULL and beyond the
    lattice. */
@@ -1313,8 +1334,7 @@ static int isogi_trace__distant(const isogi_lighting *lighting) {
     return 1;
 }
 
-static int isogi_trace__desc_valid(const isogi_trace_desc *d) {
-    if (!d || !d->pyramid) return 0;
+static int isogi_trace__fields_valid(const isogi_trace_desc *d) {
     if (d->mode != ISOGI_TRACE_IRRADIANCE && d->mode != ISOGI_TRACE_TRANSFER) return 0;
     if (d->normals != ISOGI_NORMAL_SMOOTH && d->normals != ISOGI_NORMAL_TRILINEAR) return 0;
     if (d->lookup != ISOGI_TRACE_TRILINEAR && d->lookup != ISOGI_TRACE_NEAREST && d->lookup != ISOGI_TRACE_CLOSEST_ISOVALUE &&
@@ -1334,6 +1354,8 @@ static int isogi_trace__desc_valid(const isogi_trace_desc *d) {
     if (isogi_lighting_validate(&d->lighting) != ISOGI_OK || !isogi_trace__material_valid(d)) return 0;
     return d->mode == ISOGI_TRACE_IRRADIANCE || isogi_trace__distant(&d->lighting);
 }
+
+static int isogi_trace__desc_valid(const isogi_trace_desc *d) { return d && d->pyramid && isogi_trace__fields_valid(d); }
 
 /* Grey surfaces need one set of coefficients. */
 static int isogi_trace__grey(const isogi_trace_desc *d) {
@@ -2856,6 +2878,229 @@ ISOGI_API isogi_result isogi_trace_gather(const isogi_trace_desc *desc, const fl
     isogi_trace__sky_free(&job.scene.sky, context);
     isogi_release(context, job.irradiance, count, sizeof *job.irradiance);
     isogi_release(context, job.error, count, sizeof *job.error);
+    return result;
+}
+
+/* ==== surfaces of the caller's own ===================================================================================== */
+
+/* The paths of isogi_trace__wave in their plainest form: the caller's function finds what they meet. */
+typedef struct isogi_trace__field {
+    isogi_trace__scene scene;
+    isogi_trace_intersect_function *intersect;
+    void *user;
+    const float (*points)[3], (*normals)[3];
+    size_t count;
+    float (*irradiance)[3], *error;
+} isogi_trace__field;
+
+typedef struct isogi_trace__walk {
+    const isogi_trace__field *field;
+    int count; /* of paths alive */
+    int slot[ISOGI_TRACE__WAVE];
+    uint64_t key[ISOGI_TRACE__WAVE];
+    double place[ISOGI_TRACE__WAVE][3], through[ISOGI_TRACE__WAVE][3], light[ISOGI_TRACE__WAVE][3]; /* light: by slot */
+    float normal[ISOGI_TRACE__WAVE][3];
+    isogi_ray ray[ISOGI_TRACE__WAVE];
+    isogi_trace_surface met[ISOGI_TRACE__WAVE];
+    double gain[ISOGI_TRACE__WAVE][3];
+    int owner[ISOGI_TRACE__WAVE];
+} isogi_trace__walk;
+
+static void isogi_trace__field_rays(isogi_trace__walk *w, int count) {
+    const isogi_trace__field *f = w->field;
+    int i, c;
+    if (!count) return;
+    for (i = 0; i < count; i++) {
+        memset(&w->met[i], 0, sizeof w->met[i]);
+        memcpy(w->met[i].albedo, f->scene.desc.albedo, sizeof w->met[i].albedo);
+    }
+    f->intersect(f->user, w->ray, (size_t)count, w->met);
+    for (i = 0; i < count; i++) {
+        isogi_trace_surface *s = &w->met[i];
+        double length = sqrt(isogi_trace__dot(s->normal, s->normal)), facing = isogi_trace__dot(s->normal, w->ray[i].dir);
+        if (!(s->t > 0) || !isogi_trace__finite(s->t) || (w->ray[i].tmax > 0 && s->t > w->ray[i].tmax)) s->t = 0;
+        if (!(length > 0) || !isogi_trace__finite(length))
+            for (c = 0, facing = 1, length = 1; c < 3; c++) s->normal[c] = w->ray[i].dir[c];
+        for (c = 0; c < 3; c++) s->normal[c] = (float)((double)s->normal[c] / (facing > 0 ? -length : length));
+        isogi_trace__tame(s->albedo, 1), isogi_trace__tame(s->emission, 1e30);
+    }
+}
+
+static void isogi_trace__field_ray(isogi_trace__walk *w, int at, int path, const float dir[3], double tmax) {
+    memset(&w->ray[at], 0, sizeof w->ray[at]);
+    memcpy(w->ray[at].origin, w->place[path], sizeof w->ray[at].origin);
+    memcpy(w->ray[at].dir, dir, sizeof w->ray[at].dir);
+    w->ray[at].tmax = isogi_trace__within(&w->field->scene, tmax), w->owner[at] = path;
+}
+
+/* Shadow rays that were gathered: what arrives where nothing is in the way. */
+static void isogi_trace__field_flush(isogi_trace__walk *w, int count) {
+    int i, c;
+    if (!w->field->scene.desc.no_shadows) isogi_trace__field_rays(w, count);
+    for (i = 0; i < count; i++)
+        for (c = 0; c < 3 && (w->field->scene.desc.no_shadows || !(w->met[i].t > 0)); c++)
+            w->light[w->slot[w->owner[i]]][c] += w->through[w->owner[i]][c] * w->gain[i][c];
+}
+
+static void isogi_trace__field_lights(isogi_trace__walk *w, int depth) {
+    const isogi_lighting *lighting = &w->field->scene.desc.lighting;
+    const isogi_trace__sky *sky = &w->field->scene.sky;
+    size_t l;
+    int i, c, count;
+    for (l = 0; l <= lighting->light_count; l++) {
+        for (count = i = 0; i < w->count; i++) {
+            uint64_t key = isogi_trace__key(w->key[i], (uint64_t)depth * ISOGI_TRACE__DIMENSIONS + ISOGI_TRACE__LIGHT);
+            double u, v, cosine, density;
+            isogi_trace__beam beam;
+            key = isogi_trace__key(key, l), u = isogi_trace__unit(isogi_trace__key(key, 0)), v = isogi_trace__unit(isogi_trace__key(key, 1));
+            beam.tmax = 0;
+            if (l < lighting->light_count) {
+                if (!isogi_trace__light_beam(&lighting->lights[l], w->place[i], u, v, &beam)) continue;
+                cosine = isogi_trace__dot(w->normal[i], beam.dir) / ISOGI_TRACE__PI;
+                density = 0;
+            } else { /* the environment's image by brightness, weighed against the cosine */
+                float radiance[3];
+                if (!sky->on) continue;
+                isogi_trace__sky_direction(sky, u, v, beam.dir);
+                cosine = isogi_trace__dot(w->normal[i], beam.dir) / ISOGI_TRACE__PI;
+                density = isogi_trace__sky_density(sky, beam.dir) + cosine;
+                isogi_env_radiance(sky->env, beam.dir, radiance);
+                for (c = 0; c < 3; c++) beam.rgb[c] = density > 0 ? (double)radiance[c] / density : 0;
+            }
+            if (!(cosine > 0)) continue;
+            for (c = 0; c < 3; c++) w->gain[count][c] = beam.rgb[c] * cosine;
+            isogi_trace__field_ray(w, count++, i, beam.dir, beam.tmax);
+        }
+        isogi_trace__field_flush(w, count);
+    }
+}
+
+static void isogi_trace__field_escape(isogi_trace__walk *w, int i, double cosine) {
+    const isogi_trace__scene *scene = &w->field->scene;
+    double weight = 1;
+    float radiance[3];
+    int c;
+    if (!scene->has_env) return;
+    if (scene->sky.on) weight = cosine / (cosine + isogi_trace__sky_density(&scene->sky, w->ray[i].dir));
+    isogi_env_radiance(&scene->desc.lighting.env, w->ray[i].dir, radiance);
+    for (c = 0; c < 3; c++) w->light[w->slot[i]][c] += weight * w->through[i][c] * (double)radiance[c];
+}
+
+/* Path i goes on as path j from where it met something; 0: it ends. */
+static int isogi_trace__field_reflect(isogi_trace__walk *w, int i, int j, int depth) {
+    const isogi_trace_desc *d = &w->field->scene.desc;
+    double most = 0, survive = 1, through[3];
+    int c;
+    for (c = 0; c < 3; c++) {
+        w->light[w->slot[i]][c] += w->through[i][c] * (double)w->met[i].emission[c];
+        through[c] = w->through[i][c] * (double)w->met[i].albedo[c];
+        most = through[c] > most ? through[c] : most;
+    }
+    if (depth == d->bounces || depth >= ISOGI_TRACE__MAX_DEPTH || !(most > 0)) return 0;
+    if (d->bounces < 0 && depth >= 3) {
+        survive = most < 0.98 ? most : 0.98;
+        if (isogi_trace__random(w->key[i], depth, ISOGI_TRACE__ROULETTE) >= survive) return 0;
+    }
+    for (c = 0; c < 3; c++) {
+        w->through[j][c] = through[c] / survive;
+        w->place[j][c] = w->ray[i].origin[c] + w->met[i].t * (double)w->ray[i].dir[c] + (double)d->offset * (double)w->met[i].normal[c];
+        w->normal[j][c] = w->met[i].normal[c];
+    }
+    w->slot[j] = w->slot[i], w->key[j] = w->key[i];
+    return 1;
+}
+
+/* Samples first .. first + count - 1 of a point whose first ray starts are set in place[0], normal[0]. */
+static void isogi_trace__field_run(isogi_trace__walk *w, uint64_t key, int first, int count) {
+    double cosine[ISOGI_TRACE__WAVE];
+    int i, c, depth, alive;
+    w->count = count;
+    for (i = 0; i < count; i++) {
+        w->slot[i] = i, w->key[i] = isogi_trace__key(key, (uint64_t)(first + i));
+        memcpy(w->place[i], w->place[0], sizeof w->place[0]), memcpy(w->normal[i], w->normal[0], sizeof w->normal[0]);
+        for (c = 0; c < 3; c++) w->through[i][c] = 1, w->light[i][c] = 0;
+    }
+    for (depth = 0; w->count; depth++, w->count = alive) {
+        isogi_trace__field_lights(w, depth);
+        for (i = 0; i < w->count; i++) {
+            float dir[3];
+            double u[2];
+            u[0] = isogi_trace__random(w->key[i], depth, ISOGI_TRACE__DIRECTION);
+            u[1] = isogi_trace__random(w->key[i], depth, ISOGI_TRACE__DIRECTION + 1);
+            if (!depth) isogi_trace__sobol(key, (uint32_t)(first + i), u);
+            isogi_trace__cosine(w->normal[i], u[0], u[1], dir);
+            cosine[i] = isogi_trace__dot(w->normal[i], dir) / ISOGI_TRACE__PI;
+            isogi_trace__field_ray(w, i, i, dir, 0);
+        }
+        isogi_trace__field_rays(w, w->count);
+        for (alive = i = 0; i < w->count; i++) {
+            int met = w->met[i].t > 0;
+            if (!met || w->field->scene.desc.no_shadows) isogi_trace__field_escape(w, i, cosine[i]);
+            if (met && isogi_trace__field_reflect(w, i, alive, depth)) alive++;
+        }
+    }
+}
+
+static void isogi_trace__field_point(const isogi_trace__field *f, size_t index) {
+    const isogi_trace_desc *d = &f->scene.desc;
+    isogi_trace__walk w;
+    uint64_t key = isogi_trace__key(isogi_trace__key(d->seed, 2), (uint64_t)index);
+    double sum[3] = {0, 0, 0}, mean = 0, square = 0, place[3], length = sqrt(isogi_trace__dot(f->normals[index], f->normals[index]));
+    float normal[3];
+    int first, i, c;
+    memset(f->irradiance[index], 0, sizeof f->irradiance[index]);
+    f->error[index] = ISOGI_TRACE__NOT_READY;
+    if (!(length > 0) || !isogi_trace__finite(length)) return;
+    for (c = 0; c < 3; c++) {
+        normal[c] = (float)((double)f->normals[index][c] / length);
+        place[c] = (double)f->points[index][c] + (double)d->offset * (double)normal[c];
+    }
+    if (!isogi_trace__finite3(place)) return;
+    w.field = f;
+    for (first = 0; first < d->samples; first += ISOGI_TRACE__WAVE) {
+        int count = d->samples - first < ISOGI_TRACE__WAVE ? d->samples - first : ISOGI_TRACE__WAVE;
+        memcpy(w.place[0], place, sizeof place), memcpy(w.normal[0], normal, sizeof normal);
+        isogi_trace__field_run(&w, key, first, count);
+        for (i = 0; i < count; i++) {
+            double luminance = isogi_trace__luminance(w.light[i]), before = luminance - mean;
+            mean += before / (first + i + 1), square += before * (luminance - mean);
+            for (c = 0; c < 3; c++) sum[c] += w.light[i][c];
+        }
+    }
+    for (c = 0; c < 3; c++) f->irradiance[index][c] = (float)(ISOGI_TRACE__PI * sum[c] / d->samples);
+    if (d->samples > 1) f->error[index] = (float)(ISOGI_TRACE__PI * sqrt(square / ((double)d->samples * (d->samples - 1))));
+}
+
+static void isogi_trace__field_task(void *arg, size_t task) {
+    const isogi_trace__field *f = (const isogi_trace__field *)arg;
+    size_t i = task * ISOGI_TRACE__TASK, end = i + ISOGI_TRACE__TASK < f->count ? i + ISOGI_TRACE__TASK : f->count;
+    for (; i < end; i++) isogi_trace__field_point(f, i);
+}
+
+ISOGI_API isogi_result isogi_trace_gather_field(const isogi_trace_desc *desc, isogi_trace_intersect_function *intersect, void *user,
+                                                const float (*points)[3], const float (*normals)[3], size_t count,
+                                                float (*irradiance)[3], float *error, const isogi_context *context) {
+    isogi_trace__field f;
+    isogi_result result;
+    int i;
+    if (!desc || !intersect || (count && (!points || !normals || !irradiance)) || !isogi_trace__fields_valid(desc)) return ISOGI_INVALID;
+    if (desc->mode != ISOGI_TRACE_IRRADIANCE || desc->offset < 0) return ISOGI_INVALID;
+    if (!count) return ISOGI_OK;
+    memset(&f, 0, sizeof f);
+    f.intersect = intersect, f.user = user, f.points = points, f.normals = normals, f.count = count;
+    f.scene.desc = *desc, f.scene.has_env = desc->lighting.env.rgb || desc->lighting.env.sh;
+    if (!desc->samples) f.scene.desc.samples = 64;
+    for (i = 0; i < ISOGI_TRACE__WAVE; i++) f.scene.reach[i] = (double)desc->reach;
+    f.irradiance = (float(*)[3])isogi_allocate(context, count, sizeof *f.irradiance);
+    f.error = (float *)isogi_allocate(context, count, sizeof *f.error);
+    result = isogi_trace__sky_build(&f.scene.sky, &f.scene.desc.lighting.env, context);
+    if (!f.irradiance || !f.error) result = ISOGI_NO_MEMORY;
+    if (result == ISOGI_OK) result = isogi_parallel(context, (count - 1) / ISOGI_TRACE__TASK + 1, isogi_trace__field_task, &f, 0, 1);
+    if (result == ISOGI_OK) memcpy(irradiance, f.irradiance, count * sizeof *irradiance);
+    if (result == ISOGI_OK && error) memcpy(error, f.error, count * sizeof *error);
+    isogi_trace__sky_free(&f.scene.sky, context);
+    isogi_release(context, f.irradiance, count, sizeof *f.irradiance);
+    isogi_release(context, f.error, count, sizeof *f.error);
     return result;
 }
 

@@ -1,0 +1,270 @@
+/* Tests of isogi_trace_gather_field: surfaces that are no volumes, one analytic field and one tetrahedral mesh (Wyman 2006, section 2). */
+#define ISOGI_IMPLEMENTATION
+#include "isogi_trace.h"
+#include "test.h"
+#include "trace_scenes.h"
+
+/* ---- an analytic field: steps along the ray, then bisection ----------------------------------------------------------------------- */
+
+typedef struct analytic {
+    field *f;
+    const double *parameter;
+    double box, step; /* 0..box along each axis */
+} analytic;
+
+static double analytic_value(const analytic *a, const isogi_ray *r, double t) {
+    double p[3];
+    for (int i = 0; i < 3; i++) p[i] = r->origin[i] + t * (double)r->dir[i];
+    return a->f(p, a->parameter);
+}
+
+static void analytic_intersect(void *user, const isogi_ray *rays, size_t count, isogi_trace_surface *surfaces) {
+    const analytic *a = (const analytic *)user;
+    for (size_t i = 0; i < count; i++) {
+        const isogi_ray *r = &rays[i];
+        double t = 0, end = r->tmax > 0 ? r->tmax : 1e30, before = analytic_value(a, r, 0);
+        for (int k = 0; k < 3; k++) {
+            double d = (double)r->dir[k];
+            if (fabs(d) > 1e-9) end = fmin(end, ((d > 0 ? a->box : 0) - r->origin[k]) / d);
+        }
+        for (t = 0; t < end; t += a->step) {
+            double next = fmin(t + a->step, end), value = analytic_value(a, r, next), low = t, high = next;
+            if ((before < 0) == (value < 0)) continue;
+            for (int k = 0; k < 50; k++) {
+                double middle = 0.5 * (low + high);
+                if ((analytic_value(a, r, middle) < 0) == (before < 0)) low = middle;
+                else high = middle;
+            }
+            surfaces[i].t = high;
+            for (int k = 0; k < 3; k++) {
+                double p[3], q[3];
+                for (int m = 0; m < 3; m++) p[m] = q[m] = r->origin[m] + high * (double)r->dir[m];
+                p[k] += 1e-5, q[k] -= 1e-5;
+                surfaces[i].normal[k] = (float)((a->f(p, a->parameter) - a->f(q, a->parameter)) / 2e-5);
+            }
+            break;
+        }
+    }
+}
+
+/* Points where rays meet the analytic surface, with normals to the low side. */
+static int analytic_points(const analytic *a, int count, uint64_t seed, float (*points)[3], float (*normals)[3]) {
+    test_random r = {seed};
+    int found = 0;
+    for (int attempt = 0; attempt < 100 * count && found < count; attempt++) {
+        isogi_ray ray = {.tmax = 0};
+        isogi_trace_surface s = {0};
+        double d[3], length;
+        random_direction(&r, d);
+        for (int k = 0; k < 3; k++) ray.origin[k] = random_range(&r, 0, a->box), ray.dir[k] = (float)d[k];
+        analytic_intersect((void *)(uintptr_t)a, &ray, 1, &s);
+        if (!(s.t > 0)) continue;
+        length = -length3((double)s.normal[0], (double)s.normal[1], (double)s.normal[2]);
+        for (int k = 0; k < 3; k++) points[found][k] = (float)(ray.origin[k] + s.t * (double)ray.dir[k]), normals[found][k] = (float)((double)s.normal[k] / length);
+        found++;
+    }
+    return found;
+}
+
+/* Closed forms: a plane below a black sphere, E = pi (1 - (r/d)^2 cos t) (2 %, four standard errors), and the white furnace. */
+TEST(analytic_sphere_and_plane) {
+    double q[5] = {16, 16, 16, 4, 6}, worst = 0;
+    analytic a = {ball_over_plane, q, 32, 0.25};
+    isogi_trace_desc d = {.lighting.env = {.sh = white_sky, .sh_order = 1}, .samples = 1024, .offset = 1e-4f};
+    float points[8][3], up[8][3], e[8][3], error[8];
+    for (int i = 0; i < 8; i++) {
+        points[i][0] = (float)(16 + 0.8 * i), points[i][1] = 6, points[i][2] = (float)(16 - 0.5 * i);
+        up[i][0] = up[i][2] = 0, up[i][1] = 1;
+    }
+    CHECK(isogi_trace_gather_field(&d, analytic_intersect, &a, (const float(*)[3])points, (const float(*)[3])up, 8, e, error, NULL) == ISOGI_OK, "plane %d", 8);
+    for (int i = 0; i < 8; i++) {
+        double distance = length3((double)points[i][0] - 16, 10, (double)points[i][2] - 16), expected = PI * (1 - 16 / (distance * distance) * 10 / distance);
+        CHECK(fabs((double)e[i][0] - expected) < 0.02 * expected && error[i] < 0.03f * (float)PI, "at %d: E %.4f, expected %.4f, error %g", i, (double)e[i][0], expected, (double)error[i]);
+    }
+    d.albedo[0] = d.albedo[1] = d.albedo[2] = 1, d.bounces = 100, d.samples = 64;
+    isogi_trace_gather_field(&d, analytic_intersect, &a, (const float(*)[3])points, (const float(*)[3])up, 8, e, error, NULL);
+    for (int i = 0; i < 8; i++) worst = fmax(worst, fabs((double)e[i][0] - PI));
+    CHECK(worst < 1e-4, "white furnace: %.6f off", worst);
+}
+
+/* The gyroid itself and the voxels of it: the means differ by what voxels do to the surface (1 %) and by the noise. Every light too. */
+TEST(analytic_gyroid_is_lit_like_its_volume) {
+    double q[1] = {0.3}, sum[2] = {0, 0};
+    analytic a = {gyroid, q, 32, 0.4};
+    scene s = scene_make(33, 33, 33, NULL, gyroid, q);
+    isogi_light lights[2] = {light_make(ISOGI_LIGHT_DIRECTIONAL, 1, 2, 3, 1, 0.2), light_make(ISOGI_LIGHT_POINT, 16, 60, 16, 900, 0)};
+    isogi_trace_desc d = desc_make(&s, 0.6f, 3, 64);
+    float points[60][3], normals[60][3], e[60][3], f[60][3];
+    int n = analytic_points(&a, 60, 5, points, normals);
+    CHECK(n == 60, "%d points", n);
+    d.lighting.lights = lights, d.lighting.light_count = 2;
+    isogi_trace_gather(&d, (const float(*)[3])points, (const float(*)[3])normals, (size_t)n, e, NULL, NULL);
+    d.offset = 0.25f, d.pyramid = NULL;
+    isogi_trace_gather_field(&d, analytic_intersect, &a, (const float(*)[3])points, (const float(*)[3])normals, (size_t)n, f, NULL, NULL);
+    for (int i = 0; i < n; i++)
+        for (int c = 0; c < 3; c++) sum[0] += (double)e[i][c], sum[1] += (double)f[i][c];
+    printf("    mean E %.4f in voxels, %.4f analytic\n", sum[0] / n / 3, sum[1] / n / 3);
+    CHECK(fabs(sum[0] - sum[1]) < 0.02 * sum[0], "mean E %.4f in voxels, %.4f analytic", sum[0] / n / 3, sum[1] / n / 3);
+    scene_free(&s);
+}
+
+/* ---- a tetrahedral mesh ------------------------------------------------------------------------------------------------------------- */
+
+typedef struct tets {
+    int count, triangle_count;
+    float (*points)[3], *values;
+    int (*tet)[4];
+    float (*triangle)[3][3];
+} tets;
+
+/* Marching tetrahedra: one triangle where one corner is on its own, two where two are. The field is linear in each: the isosurface is
+   exactly these. */
+static void tets_surface(tets *m, double isovalue) {
+    m->triangle = (float(*)[3][3])malloc((size_t)m->count * 2 * sizeof *m->triangle);
+    m->triangle_count = 0;
+    for (int i = 0; i < m->count; i++) {
+        int in[4], out[4], n = 0, k = 0;
+        float cut[4][3];
+        for (int c = 0; c < 4; c++) {
+            if ((double)m->values[m->tet[i][c]] >= isovalue) in[n++] = m->tet[i][c];
+            else out[k++] = m->tet[i][c];
+        }
+        if (!n || !k) continue;
+        for (int e = 0; e < n * k; e++) { /* two and two: 0-0, 1-0, 1-1, 0-1, around the quadrilateral */
+            int a = n == 2 && k == 2 ? in[e == 1 || e == 2] : in[e % n], b = n == 2 && k == 2 ? out[e / 2] : out[e / n];
+            double t = (isovalue - (double)m->values[a]) / ((double)m->values[b] - (double)m->values[a]);
+            for (int c = 0; c < 3; c++) cut[e][c] = (float)((1 - t) * (double)m->points[a][c] + t * (double)m->points[b][c]);
+        }
+        memcpy(m->triangle[m->triangle_count++], cut, 3 * sizeof cut[0]);
+        if (n * k < 4) continue;
+        memcpy(m->triangle[m->triangle_count][0], cut[0], sizeof cut[0]), memcpy(m->triangle[m->triangle_count++][1], cut[2], 2 * sizeof cut[0]);
+    }
+}
+
+/* Every triangle, one after the other (Moeller and Trumbore 1997): slow, and obviously right. */
+static void tets_intersect(void *user, const isogi_ray *rays, size_t count, isogi_trace_surface *surfaces) {
+    const tets *m = (const tets *)user;
+    for (size_t i = 0; i < count; i++)
+        for (int k = 0; k < m->triangle_count; k++) {
+            double u[3], v[3], o[3], p[3], w[3], n[3], det, b, c, t;
+            for (int a = 0; a < 3; a++) {
+                u[a] = (double)m->triangle[k][1][a] - (double)m->triangle[k][0][a], v[a] = (double)m->triangle[k][2][a] - (double)m->triangle[k][0][a];
+                o[a] = rays[i].origin[a] - (double)m->triangle[k][0][a], w[a] = (double)rays[i].dir[a];
+            }
+            for (int a = 0; a < 3; a++) n[a] = u[(a + 1) % 3] * v[(a + 2) % 3] - u[(a + 2) % 3] * v[(a + 1) % 3];
+            for (int a = 0; a < 3; a++) p[a] = o[(a + 1) % 3] * w[(a + 2) % 3] - o[(a + 2) % 3] * w[(a + 1) % 3];
+            det = -(n[0] * w[0] + n[1] * w[1] + n[2] * w[2]);
+            if (fabs(det) < 1e-300) continue;
+            t = (n[0] * o[0] + n[1] * o[1] + n[2] * o[2]) / det;
+            b = (v[0] * p[0] + v[1] * p[1] + v[2] * p[2]) / det, c = -(u[0] * p[0] + u[1] * p[1] + u[2] * p[2]) / det;
+            if (b < 0 || c < 0 || b + c > 1 || !(t > 0) || (rays[i].tmax > 0 && t > rays[i].tmax) || (surfaces[i].t > 0 && t >= surfaces[i].t)) continue;
+            surfaces[i].t = t;
+            for (int a = 0; a < 3; a++) surfaces[i].normal[a] = (float)(n[a] / length3(n[0], n[1], n[2]));
+        }
+}
+
+/* Cubes in six tetrahedra each, about their main diagonal; points shaken by a fifth of a cube, so that nothing is regular. */
+static tets tets_make(int n, field *f, const double *parameter) {
+    static const int order[6][2] = {{1, 3}, {1, 5}, {2, 3}, {2, 6}, {4, 5}, {4, 6}};
+    tets m = {0};
+    test_random r = {17};
+    int points = n * n * n, cubes = n - 1;
+    m.points = (float(*)[3])malloc((size_t)points * sizeof *m.points), m.values = (float *)malloc((size_t)points * sizeof(float));
+    m.tet = (int(*)[4])malloc((size_t)(6 * cubes * cubes * cubes) * sizeof *m.tet);
+    for (int i = 0; i < points; i++) {
+        double p[3] = {i % n, i / n % n, i / n / n};
+        for (int a = 0; a < 3; a++) p[a] += random_range(&r, -0.2, 0.2), m.points[i][a] = (float)p[a];
+        m.values[i] = (float)f(p, parameter);
+    }
+    for (int i = 0; i < cubes * cubes * cubes; i++)
+        for (int k = 0; k < 6; k++, m.count++)
+            for (int c = 0; c < 4; c++) {
+                int corner = c == 0 ? 0 : c == 3 ? 7 : order[k][c - 1];
+                m.tet[m.count][c] = (i % cubes + (corner & 1)) + n * ((i / cubes % cubes + (corner >> 1 & 1)) + n * (i / cubes / cubes + (corner >> 2)));
+            }
+    return m;
+}
+
+static void tets_free(tets *m) { free(m->points), free(m->values), free(m->tet), free(m->triangle); }
+
+/* Centres of triangles, with normals to the low side: found by the gradient of the field that was sampled. */
+static int tets_points(const tets *m, field *f, const double *parameter, int count, float (*points)[3], float (*normals)[3]) {
+    int found = 0, stride = m->triangle_count / count;
+    for (int k = 0; k < m->triangle_count && found < count; k += stride ? stride : 1) {
+        double u[3], v[3], n[3], p[3], q[3], size;
+        for (int a = 0; a < 3; a++) {
+            u[a] = (double)m->triangle[k][1][a] - (double)m->triangle[k][0][a], v[a] = (double)m->triangle[k][2][a] - (double)m->triangle[k][0][a];
+            points[found][a] = (m->triangle[k][0][a] + m->triangle[k][1][a] + m->triangle[k][2][a]) / 3;
+        }
+        for (int a = 0; a < 3; a++) n[a] = u[(a + 1) % 3] * v[(a + 2) % 3] - u[(a + 2) % 3] * v[(a + 1) % 3];
+        size = length3(n[0], n[1], n[2]);
+        if (!(size > 1e-3)) continue;
+        for (int a = 0; a < 3; a++) p[a] = (double)points[found][a] + 0.3 * n[a] / size, q[a] = (double)points[found][a] - 0.3 * n[a] / size;
+        if (f(p, parameter) > f(q, parameter)) size = -size;
+        for (int a = 0; a < 3; a++) normals[found][a] = (float)(n[a] / size);
+        found++;
+    }
+    return found;
+}
+
+/* The isosurface of a tetrahedral ball is nearly convex: E = pi to the sky, less what its dents take (3 %). A pit in a mesh: with R = 0.5 the
+   mean is that of the closed form for the opening that the black run measures (3 %); white, everything is pi. */
+TEST(tetrahedral_mesh) {
+    double q_ball[4] = {6, 6, 6, 4}, q_pit[5] = {7, 6, 7, 7, 4}, mean[3] = {0, 0, 0};
+    tets m = tets_make(13, ball, q_ball);
+    isogi_trace_desc d = {.lighting.env = {.sh = white_sky, .sh_order = 1}, .samples = 32, .offset = 1e-4f};
+    float points[40][3], normals[40][3], e[40][3];
+    tets_surface(&m, 0);
+    int n = tets_points(&m, ball, q_ball, 40, points, normals);
+    CHECK(isogi_trace_gather_field(&d, tets_intersect, &m, (const float(*)[3])points, (const float(*)[3])normals, (size_t)n, e, NULL, NULL) == ISOGI_OK, "%d points", n);
+    for (int i = 0; i < n; i++) mean[0] += (double)e[i][0] / n;
+    CHECK(n > 20 && fabs(mean[0] - PI) < 0.03 * PI, "ball of %d triangles: mean E %.4f", m.triangle_count, mean[0]);
+    tets_free(&m);
+    m = tets_make(15, pit, q_pit);
+    tets_surface(&m, 0);
+    n = tets_points(&m, pit, q_pit, 40, points, normals);
+    int inside = 0;
+    for (int i = 0; i < n; i++) /* of the wall, well below the rim */
+        if (points[i][1] < 5 && length3((double)points[i][0] - 7, (double)points[i][1] - 6, (double)points[i][2] - 7) < 4.4) memcpy(points[inside], points[i], 12), memcpy(normals[inside++], normals[i], 12);
+    CHECK(inside > 8, "%d points in the pit", inside);
+    for (int k = 0; k < 3; k++) {
+        d.albedo[0] = d.albedo[1] = d.albedo[2] = 0.5f * (float)k, d.bounces = 30, mean[k] = 0, d.samples = 128;
+        isogi_trace_gather_field(&d, tets_intersect, &m, (const float(*)[3])points, (const float(*)[3])normals, (size_t)inside, e, NULL, NULL);
+        for (int i = 0; i < inside; i++) mean[k] += (double)e[i][0] / inside;
+    }
+    double opening = mean[0] / PI;
+    printf("    pit in %d tetrahedra: opening %.3f, E %.4f with albedo 0.5, closed form %.4f\n", m.count, opening, mean[1], PI * opening / (1 - 0.5 * (1 - opening)));
+    CHECK(fabs(mean[1] - PI * opening / (1 - 0.5 * (1 - opening))) < 0.03 * mean[1], "albedo 0.5: E %.4f", mean[1]);
+    CHECK(fabs(mean[2] - PI) < 2e-3 * PI, "white furnace: E %.5f", mean[2]);
+    tets_free(&m);
+}
+
+/* ---- arguments ------------------------------------------------------------------------------------------------------------------------- */
+
+/* A function that answers nonsense must not break anything: NaN normals, negative t, t beyond tmax, wild colours. */
+static void nonsense(void *user, const isogi_ray *rays, size_t count, isogi_trace_surface *surfaces) {
+    test_random *r = (test_random *)user;
+    test_random mine = {r->state ^ (uint64_t)(int64_t)(1e6 * rays[0].origin[0])};
+    for (size_t i = 0; i < count; i++) {
+        const float odd[6] = {(float)nan_value(), -1, 0, 1e30f, 5, 0.5f};
+        surfaces[i].t = (double)odd[random_bits(&mine) % 6];
+        for (int a = 0; a < 3; a++) surfaces[i].normal[a] = odd[random_bits(&mine) % 6], surfaces[i].albedo[a] = odd[random_bits(&mine) % 6], surfaces[i].emission[a] = odd[random_bits(&mine) % 3];
+    }
+}
+
+TEST(nonsense_is_survived_and_bad_arguments_refused) {
+    test_random r = {5};
+    isogi_trace_desc d = {.lighting.env = {.sh = white_sky, .sh_order = 1}, .samples = 16, .bounces = 5, .albedo = {0.5f, 0.5f, 0.5f}};
+    float points[20][3], normals[20][3], e[20][3], error[20];
+    for (int i = 0; i < 60; i++) points[i / 3][i % 3] = (float)random_range(&r, -3, 3), normals[i / 3][i % 3] = i < 3 ? 0 : (float)random_range(&r, -1, 1);
+    points[1][0] = (float)nan_value();
+    CHECK(isogi_trace_gather_field(&d, nonsense, &r, (const float(*)[3])points, (const float(*)[3])normals, 20, e, error, NULL) == ISOGI_OK, "points %d", 20);
+    for (int i = 0; i < 20; i++) CHECK(e[i][0] >= 0 && e[i][0] < 1e9f && (i > 1 || error[i] > 1e30f), "E %g", (double)e[i][0]);
+    CHECK(isogi_trace_gather_field(&d, NULL, &r, (const float(*)[3])points, (const float(*)[3])normals, 20, e, error, NULL) == ISOGI_INVALID, "no function, %d", 0);
+    CHECK(isogi_trace_gather_field(&d, nonsense, &r, (const float(*)[3])points, NULL, 20, e, error, NULL) == ISOGI_INVALID, "no normals, %d", 0);
+    CHECK(isogi_trace_gather_field(NULL, nonsense, &r, (const float(*)[3])points, (const float(*)[3])normals, 20, e, error, NULL) == ISOGI_INVALID, "no description, %d", 0);
+    d.offset = -1;
+    CHECK(isogi_trace_gather_field(&d, nonsense, &r, (const float(*)[3])points, (const float(*)[3])normals, 20, e, error, NULL) == ISOGI_INVALID, "offset %d", -1);
+}
+
+TEST_MAIN("trace_field")
