@@ -29,7 +29,10 @@
 enum { LAMBERT, PHONG, VICINITY, IRRADIANCE, TRANSFER, PATHTRACE, DVR, SCALE_INVARIANT, MODE_COUNT };
 static const char *const mode_name[MODE_COUNT] = {"lambert", "phong", "vicinity", "irradiance", "transfer", "pathtrace", "dvr", "scale-invariant"};
 static const char *const lookup_name[] = {"trilinear", "nearest", "closest-isovalue", "bspline"};
-static const char *const shading_name[3] = {"unlit", "visibility", "local"};
+static const char *const shading_name[4] = {"unlit", "visibility", "local", "two-sided"};
+static const char *const classification_name[3] = {"exact", "pre-integrated", "post-classified"};
+static const char *const silhouette_name[4] = {"none", "exact", "approximate", "gradient"};
+static const char *const transmission_name[3] = {"none", "diffuse", "specular"};
 
 typedef struct scene {
     const char *name, *volume; /* "procedural:..." or a file below ISOGI_DATA */
@@ -72,9 +75,9 @@ static const scene scenes[] = {
 typedef struct options {
     const char *volume, *env, *tf, *out;
     const scene *scene;
-    int width, height, mode, raycast, bounces, samples, threads, stats, antialias, shading, order, directions, lookup;
+    int width, height, mode, raycast, bounces, samples, threads, stats, antialias, shading, classification, silhouette, transmission, order, directions, lookup;
     int has_size, has_iso, has_mode, has_spacing, has_albedo, has_clip, has_camera, has_up, has_nan, has_shading;
-    double isovalue, spacing[3], clip[4], azimuth, elevation, distance, up[3], exposure, nan_value;
+    double step, isovalue, spacing[3], clip[4], azimuth, elevation, distance, up[3], exposure, nan_value;
     float albedo[3];
     isogi_light lights[MAX_LIGHTS];
     size_t light_count, lattice[3], grid[3];
@@ -128,7 +131,10 @@ static int parse_scene(viewer *v, const char *text) {
 }
 
 static int parse_mode(viewer *v, const char *text) { return parse_name(text, mode_name, MODE_COUNT, &v->o.mode); }
-static int parse_shading(viewer *v, const char *text) { return parse_name(text, shading_name, 3, &v->o.shading); }
+static int parse_shading(viewer *v, const char *text) { return parse_name(text, shading_name, 4, &v->o.shading); }
+static int parse_classification(viewer *v, const char *text) { return parse_name(text, classification_name, 3, &v->o.classification); }
+static int parse_silhouette(viewer *v, const char *text) { return parse_name(text, silhouette_name, 4, &v->o.silhouette); }
+static int parse_transmission(viewer *v, const char *text) { return parse_name(text, transmission_name, 3, &v->o.transmission); }
 static int parse_lookup(viewer *v, const char *text) { return parse_name(text, lookup_name, 4, &v->o.lookup); }
 
 static int parse_size(viewer *v, const char *text) {
@@ -195,7 +201,15 @@ static const option option_list[] = {
     {"--lookup", "NAME", "how the texture is read: trilinear, nearest, closest-isovalue, bspline", OTHER, 0, 0, 0, 0, 0, parse_lookup,
      "trilinear, nearest, closest-isovalue or bspline"},
     {"--tf", "FILE", "transfer function: lines \"value extinction r g b\" or \"peak value opacity r g b\"", TEXT, AT(tf), 0, 0, 0, 0, 0, ""},
-    {"--shading", "NAME", "for dvr and scale-invariant: unlit, visibility, local", OTHER, 0, AT(has_shading), 0, 0, 0, parse_shading, "unlit visibility local"},
+    {"--shading", "NAME", "for dvr and scale-invariant: unlit, visibility, local, two-sided", OTHER, 0, AT(has_shading), 0, 0, 0, parse_shading,
+     "unlit visibility local two-sided"},
+    {"--classification", "NAME", "for scale-invariant: exact, pre-integrated, post-classified", OTHER, 0, 0, 0, 0, 0, parse_classification,
+     "exact pre-integrated post-classified"},
+    {"--silhouette", "NAME", "surfaces seen aslant are more opaque: none, exact, approximate, gradient", OTHER, 0, 0, 0, 0, 0, parse_silhouette,
+     "none exact approximate gradient"},
+    {"--transmission", "NAME", "light that two-sided surfaces let through: none, diffuse, specular (both, the default)", OTHER, 0, 0, 0, 0, 0,
+     parse_transmission, "none diffuse specular"},
+    {"--step", "S", "for dvr and for sampled rays: distance of samples in voxels; default 0.5", NUMBERS, AT(step), 0, 1, 1e-3, 1e3, 0, "a number, 0.001 to 1000"},
     {"--exposure", "X", "factor on the light, in place of the automatic exposure", NUMBERS, AT(exposure), 0, 1, 1e-12, 1e12, 0, "a number above 0"},
     {"--aa", "N", "samples per pixel; default 4 (1 for dvr, where it is rounded down to a square)", INTEGER, AT(antialias), 0, 1, 1, 64, 0, "a whole number, 1 to 64"},
     {"--threads", "N", "0 = one per core, the default", INTEGER, AT(threads), 0, 1, 0, 256, 0, "a whole number, 0 to 256"},
@@ -254,7 +268,7 @@ static int parse_value(viewer *v, const option *p, const char *text) {
 static int parse_arguments(viewer *v, int argc, char **argv) {
     options *o = &v->o;
     const int one = 1;
-    o->bounces = -1, o->mode = IRRADIANCE, o->up[1] = 1;
+    o->bounces = -1, o->mode = IRRADIANCE, o->up[1] = 1, o->transmission = 2;
     for (int i = 1; i < argc; i++) {
         const option *p = NULL;
         for (size_t k = 0; k < OPTION_COUNT; k++)
@@ -954,7 +968,8 @@ static int shade_surface(viewer *v) {
 static int default_transfer(viewer *v) {
     char text[1024];
     double low = v->range[0], high = v->range[1], iso = v->isovalue, width = high - low, thickness = 20 / v->radius;
-    if (!(iso > low && iso < high)) iso = 0.5 * (low + high);
+    if (!(iso > low && iso < high)) iso = low + 0.5 * (high - low);
+    if (!(width > 1e-30)) width = 1e-30; /* an extinction is a float: data of a smaller range stay nearly transparent, but for the peak */
     if (v->o.mode == SCALE_INVARIANT)
         snprintf(text, sizeof text, "%.17g %.9g .25 .45 .9\n%.17g %.9g .8 .8 .8\n%.17g %.9g .95 .55 .2\npeak %.17g .6 .95 .88 .75\n", low, 0.35 / width, iso,
                  0.45 / width, high, 0.8 / width, iso);
@@ -984,6 +999,11 @@ static int render_volume(viewer *v) {
     double begun = seconds(), remaining = 1;
     isogi_result result;
     if (v->o.has_shading) desc.shading = (isogi_dvr_shading)v->o.shading;
+    desc.classification = (isogi_dvr_classification)v->o.classification, desc.silhouette = (isogi_dvr_silhouette)v->o.silhouette, desc.step = v->o.step;
+    for (int i = 0; i < 3; i++) {
+        desc.material[i].exponent = i < 2 || v->o.transmission == 2 ? 30 : 0;
+        for (int c = 0; c < 3; c++) desc.material[i].specular[c] = 1, desc.material[i].diffuse[c] = i < 2 || v->o.transmission ? 1 : 1e-20f;
+    }
     if (s && s->order) desc.order = s->order, desc.directions = s->directions, memcpy(desc.grid, s->grid, sizeof desc.grid);
     for (int i = 0; i < 3; i++) view.eye[i] = (float)v->view.eye[i], view.target[i] = (float)v->view.target[i], view.up[i] = (float)v->view.up[i];
     if (!set_transfer(v)) return 0;

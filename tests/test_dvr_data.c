@@ -2,6 +2,7 @@
 #define ISOGI_IMPLEMENTATION
 #include "isogi_dvr.h"
 #include "dvr_fields.h"
+#include "procedural.h"
 
 /* ---- the reference: a walk in long double, cells cut into many short pieces, each cut at the points of the transfer function ---- */
 
@@ -979,6 +980,81 @@ TEST(bad_descriptions_are_refused) {
     REFUSED(second_count = 1);
     REFUSED(second_count = 2; bad.second_points = wrong);
     field_free(&f);
+}
+
+/* ---- the figures of Kraus 2005, as numbers; as pictures they come from examples/figures_scale_invariant.sh ---- */
+
+typedef struct figure { const char *name, *shape; double isovalue, half; } figure;
+
+/* Figures 1, 8a to 8d: rays that cross the surface exactly twice. With a peak all have one opacity, with a narrow tent in physical space
+   opacity follows the gradient. Figures 1d, 5: with silhouettes opacity is never less. */
+TEST(isosurfaces_are_uniform_where_standard_rendering_follows_the_gradient) {
+    const figure figures[] = {{"1b, 1c", "coulomb", 0.72, 0.02}, {"8a, 8b", "marschner-lobb", 0.5, 0.03}, {"8c, 8d", "hydrogen", 0.06, 0.015}};
+    for (int n = 0; n < 3; n++) {
+        const procedural_shape *shape = procedural_find(figures[n].shape);
+        isogi_volume volume = {.data = NULL};
+        isogi_pyramid *pyramid = NULL;
+        double sum[2] = {0, 0}, square[2] = {0, 0}, spread[2];
+        int count = 0, enhanced = 0;
+        CHECK(procedural_make(shape, 48, &volume, &serial) == ISOGI_OK && isogi_vol_build(&pyramid, &volume, &serial) == ISOGI_OK, "volume");
+        double v = figures[n].isovalue, h = figures[n].half;
+        const isogi_peak peak = {v, {1, 1, 1}, 0.3f};
+        const isogi_transfer_point tent[] = {{v - h, {1, 1, 1}, 0}, {v, {1, 1, 1}, 0.6f}, {v + h, {1, 1, 1}, 0}};
+        const isogi_transfer surface = {NULL, 0, &peak, 1}, narrow = {tent, 3, NULL, 0};
+        const isogi_dvr_desc data = {.pyramid = pyramid, .space = ISOGI_DVR_DATA, .opaque = 1}, physical = {.pyramid = pyramid, .step = 0.05, .opaque = 1};
+        isogi_dvr_desc lines = data;
+        lines.silhouette = ISOGI_DVR_SILHOUETTE_EXACT;
+        isogi_dvr *dvr[3] = {dvr_new(&data, &surface), dvr_new(&physical, &narrow), dvr_new(&lines, &surface)};
+        isogi_view view = {.width = 28, .height = 28, .fov = 40, .target = {23.5f, 23.5f, 23.5f}, .eye = {40, 35, 120}};
+        float(*image[3])[4];
+        for (int i = 0; i < 3; i++) image[i] = picture(dvr[i], &view, NULL, NULL, NULL);
+        for (int i = 0; i < 28 * 28; i++) {
+            double origin[3];
+            float dir[3];
+            crossing at[64];
+            isogi_view_ray(&view, i % 28, i / 28, origin, dir);
+            int crossings = intersector_crossings(pyramid, origin, dir, v, at);
+            CHECK(fabs((double)image[0][i][3] - (1 - pow((double)(1 - 0.3f), crossings))) < 1e-6, "figure %s: %d crossings, opacity %g", figures[n].name, crossings,
+                  (double)image[0][i][3]);
+            CHECK(image[2][i][3] > image[0][i][3] - 1e-6f, "silhouettes only add: %g, %g", (double)image[2][i][3], (double)image[0][i][3]);
+            enhanced += image[2][i][3] > image[0][i][3] + 0.1f;
+            if (crossings != 2) continue;
+            for (int k = 0; k < 2; k++) sum[k] += (double)image[k][i][3], square[k] += pow((double)image[k][i][3], 2);
+            count++;
+        }
+        for (int k = 0; k < 2; k++) spread[k] = sqrt(fmax(0, square[k] / count - pow(sum[k] / count, 2))) / (sum[k] / count);
+        printf("    figure %s: %d rays with two crossings, spread of opacity %.2g scale-invariant, %.2g standard; %d pixels enhanced\n", figures[n].name, count,
+               spread[0], spread[1], enhanced);
+        CHECK(count > 5 && spread[0] < 1e-6 && spread[1] > 0.15 && enhanced > 10, "figure %s: %d rays, %g, %g, %d", figures[n].name, count, spread[0], spread[1],
+              enhanced);
+        for (int i = 0; i < 3; i++) free(image[i]), isogi_dvr_free(dvr[i]);
+        isogi_vol_free(pyramid), procedural_free(&volume);
+    }
+}
+
+/* Figure 6: backlight does nothing without transmission, more with diffuse, yet more with specular transmission. */
+TEST(backlight_comes_through_translucent_surfaces) {
+    isogi_volume volume = {.data = NULL};
+    isogi_pyramid *pyramid = NULL;
+    double light[3] = {0, 0, 0};
+    CHECK(procedural_make(procedural_find("coulomb"), 32, &volume, &serial) == ISOGI_OK && isogi_vol_build(&pyramid, &volume, &serial) == ISOGI_OK, "volume");
+    const isogi_peak peaks[] = {{0.72, {.15f, .3f, .9f}, 0.35f}, {1.5, {.9f, .15f, .1f}, 0.7f}};
+    const isogi_transfer sheets_of_figure = {NULL, 0, peaks, 2};
+    const isogi_light lamp = {.kind = ISOGI_LIGHT_DIRECTIONAL, .vector = {-0.05f, 0, -1}, .rgb = {6, 6, 6}};
+    const isogi_lighting lighting = {.lights = &lamp, .light_count = 1};
+    const isogi_view view = {.width = 24, .height = 24, .fov = 30, .target = {15.5f, 15.5f, 15.5f}, .eye = {15.5f, 15.5f, 80}};
+    for (int i = 0; i < 3; i++) {
+        isogi_dvr_desc desc = {.pyramid = pyramid, .space = ISOGI_DVR_DATA, .shading = ISOGI_DVR_TWO_SIDED};
+        for (int a = 0; a < 3; a++) desc.material[2].diffuse[a] = i ? 1 : 1e-20f, desc.material[2].specular[a] = 1;
+        desc.material[2].exponent = i == 2 ? 30 : 0;
+        isogi_dvr *dvr = dvr_new(&desc, &sheets_of_figure);
+        float(*image)[4] = picture(dvr, &view, &lighting, NULL, NULL);
+        for (int p = 0; p < 24 * 24; p++) light[i] += (double)image[p][0] + (double)image[p][2];
+        free(image), isogi_dvr_free(dvr);
+    }
+    printf("    light of the picture: %.3g without transmission, %.3g diffuse, %.3g diffuse and specular\n", light[0], light[1], light[2]);
+    CHECK(light[1] > 5 * light[0] && light[1] > 1 && light[2] > 1.3 * light[1], "%g %g %g", light[0], light[1], light[2]);
+    isogi_vol_free(pyramid), procedural_free(&volume);
 }
 
 TEST_MAIN("dvr_data")
