@@ -111,7 +111,7 @@ typedef struct isogi_context {
     void *user;
     int threads;    /* 0 = all cores, 1 = serial; ignored where parallel_for is set */
     int force_path; /* instruction path of what is built: 0 = best, 1 = plain reference, 2 = portable, 3 = AVX2, 4 = AVX-512 (Ice Lake, Zen 4), and
-                       rays always in waves;
+                       single rays like batches;
                        no more than the machine has */
 } isogi_context;
 
@@ -1117,17 +1117,18 @@ static isogi_result isogi_vol__build_blocks(isogi_pyramid *p) {
 /* Monotone, so that comparing 8-bit values never hides a block that holds the isovalue. */
 static int isogi_vol__quantise(const isogi_pyramid *p, double value) {
     double q = (value - p->range[0]) * p->node_scale;
-    return q > 0 ? q < 255 ? (int)q : 255 : 0;
+    return q > 0 ? q < 253 ? (int)q : 253 : 0;
 }
 
 /* What an isovalue can be in 8 bits. The margin covers other roundings of the same formula: voxels are quantised in float, whose
-   error is below 255 * 2^-22. low > high: no surface anywhere. */
-static void isogi_vol__quantise_isovalue(const isogi_pyramid *p, double isovalue, int *low, int *high) {
+   error is below 255 * 2^-22. low > high: no surface anywhere. Returns it unrounded. */
+static float isogi_vol__quantise_isovalue(const isogi_pyramid *p, double isovalue, int *low, int *high) {
     double q = (isovalue - p->range[0]) * p->node_scale;
     *low = 1, *high = 0;
-    if (!(isovalue >= p->range[0] && isovalue <= p->range[1])) return;
+    if (!(isovalue >= p->range[0] && isovalue <= p->range[1])) return 0;
     *low = q > 0.01 ? (int)(q - 0.01) : 0;
-    *high = q < 254 ? (int)(q + 0.01) : 255;
+    *high = q < 252 ? (int)(q + 0.01) : 253;
+    return (float)q;
 }
 
 /* Siblings are stored together, since a ray that looks at one soon looks at the next. */
@@ -1159,103 +1160,93 @@ static void isogi_vol__build_node(const isogi_pyramid *p, int n, const size_t no
     }
 }
 
-/* A row of voxels in 8 bits. */
-static void isogi_vol__quantise_row(const isogi_vol__build_job *job, size_t x, size_t y, size_t z, int count, uint8_t *out) {
+/* A row of voxels in units of the 8-bit values of nodes, not rounded; the last one is repeated to fill the vectors. */
+static void isogi_vol__unit_row(const isogi_vol__build_job *job, size_t x, size_t y, size_t z, int count, float *out) {
     const isogi_pyramid *p = job->pyramid;
     const isogi_volume *v = &p->volume;
-    float buffer[ISOGI_VOL__STRIP_VOXELS];
-    const float *row = buffer;
     int i = 0;
     if (v->type == ISOGI_F64) {
         double value[1];
-        for (; i < count; i++) isogi_vol__row(v, (int)x + i, (int)y, (int)z, 1, value), out[i] = (uint8_t)isogi_vol__quantise(p, value[0]);
-        return;
-    }
-    row = isogi_vol__raw_row(v, x, y, z, count, buffer);
+        for (; i < count; i++) isogi_vol__row(v, (int)x + i, (int)y, (int)z, 1, value), out[i] = (float)((value[0] - p->range[0]) * p->node_scale);
+    } else {
+        const float *row = isogi_vol__raw_row(v, x, y, z, count, out);
 #ifdef ISOGI_VOL__SSE2
-    {
         const __m128 low = _mm_set1_ps(job->raw_low), scale = _mm_set1_ps(job->raw_scale);
-#define ISOGI_VOL__Q(k) _mm_cvttps_epi32(_mm_mul_ps(_mm_sub_ps(_mm_loadu_ps(row + i + 4 * (k)), low), scale))
-        for (; i + 16 <= count; i += 16)
-            _mm_storeu_si128((__m128i *)(void *)(out + i),
-                             _mm_packus_epi16(_mm_packs_epi32(ISOGI_VOL__Q(0), ISOGI_VOL__Q(1)), _mm_packs_epi32(ISOGI_VOL__Q(2), ISOGI_VOL__Q(3))));
-#undef ISOGI_VOL__Q
-    }
+        for (; i + 4 <= count; i += 4) _mm_storeu_ps(out + i, _mm_mul_ps(_mm_sub_ps(_mm_loadu_ps(row + i), low), scale));
 #endif
-    for (; i < count; i++) {
-        float q = (row[i] - job->raw_low) * job->raw_scale;
-        out[i] = (uint8_t)(q > 0 ? q < 255 ? (int)q : 255 : 0);
+        for (; i < count; i++) out[i] = (row[i] - job->raw_low) * job->raw_scale;
     }
+    for (; i < count + 8; i++) out[i] = out[count - 1];
 }
 
-/* Bounds of the 4x4 rows of cells between 5x5 rows of quantised voxels; `cells` of a multiple of 16. */
-static void isogi_vol__bound_cells(uint8_t (*q)[5][ISOGI_VOL__STRIP_VOXELS], int cells, uint8_t *least, uint8_t *largest) {
-    /* least[z][y][x] of the strip, then the same of largest */
-    int x, y, z;
-    for (z = 0; z < 4; z++)
-        for (y = 0; y < 4; y++) {
-            const uint8_t *a = q[z][y], *b = q[z][y + 1], *c = q[z + 1][y], *d = q[z + 1][y + 1];
-            uint8_t *low = least + (size_t)(4 * z + y) * ISOGI_VOL__STRIP, *high = largest + (size_t)(4 * z + y) * ISOGI_VOL__STRIP;
+/* A leaf is the node of 4x4x4 cells. It holds no bounds but its voxels: voxel (x,y,z), 0..4 each, at byte x + 5y + 25z, in steps of
+   1/254 of what lies between the leaf's own 8-bit bounds, rounded down. So the same two cache lines tell which cells hold the surface,
+   and what it does in them to some 2 % of what the field changes by in a cell: enough to see that most rays miss it there. */
+enum { ISOGI_VOL__LEAF_LOW = 125, ISOGI_VOL__LEAF_HIGH, ISOGI_VOL__LEAF_CUT }; /* bounds; 3 - (cells - 1) of each axis, 2 bits each */
+#define ISOGI_VOL__CODES 254.0f
+#define ISOGI_VOL__DOUBT 0.625f /* error of a value made of codes + 0.5, in steps */
+
+/* Five voxels of a row for each of a strip's leaves; eight bytes are written, of which later rows overwrite three. */
+ISOGI_VOL__INLINE void isogi_vol__code_row(const float *row, int leaves, const float *low, const float *scale, uint8_t *const *out, int at) {
+    int i;
+    for (i = 0; i < leaves; i++, row += 4) {
 #ifdef ISOGI_VOL__SSE2
-#define ISOGI_VOL__AT(p) _mm_loadu_si128((const __m128i *)(const void *)((p) + x))
-            for (x = 0; x < cells; x += 16) {
-                const __m128i a0 = ISOGI_VOL__AT(a), b0 = ISOGI_VOL__AT(b), c0 = ISOGI_VOL__AT(c), d0 = ISOGI_VOL__AT(d);
-                const __m128i a1 = ISOGI_VOL__AT(a + 1), b1 = ISOGI_VOL__AT(b + 1), c1 = ISOGI_VOL__AT(c + 1), d1 = ISOGI_VOL__AT(d + 1);
-                const __m128i l0 = _mm_min_epu8(_mm_min_epu8(a0, b0), _mm_min_epu8(c0, d0)), l1 = _mm_min_epu8(_mm_min_epu8(a1, b1), _mm_min_epu8(c1, d1));
-                const __m128i h0 = _mm_max_epu8(_mm_max_epu8(a0, b0), _mm_max_epu8(c0, d0)), h1 = _mm_max_epu8(_mm_max_epu8(a1, b1), _mm_max_epu8(c1, d1));
-                _mm_storeu_si128((__m128i *)(void *)(low + x), _mm_min_epu8(l0, l1));
-                _mm_storeu_si128((__m128i *)(void *)(high + x), _mm_max_epu8(h0, h1));
-            }
-#undef ISOGI_VOL__AT
+        const __m128 l = _mm_set1_ps(low[i]), k = _mm_set1_ps(scale[i]);
+        const __m128i a = _mm_cvttps_epi32(_mm_mul_ps(_mm_sub_ps(_mm_loadu_ps(row), l), k));
+        const __m128i b = _mm_cvttps_epi32(_mm_mul_ps(_mm_sub_ps(_mm_loadu_ps(row + 4), l), k));
+        const __m128i words = _mm_packs_epi32(a, b);
+        _mm_storel_epi64((__m128i *)(void *)(out[i] + at), _mm_packus_epi16(words, words));
 #else
-            for (x = 0; x < cells; x++) {
-                int k, l = 255, h = 0;
-                for (k = 0; k < 2; k++) {
-                    l = a[x + k] < l ? a[x + k] : l, h = a[x + k] > h ? a[x + k] : h;
-                    l = b[x + k] < l ? b[x + k] : l, h = b[x + k] > h ? b[x + k] : h;
-                    l = c[x + k] < l ? c[x + k] : l, h = c[x + k] > h ? c[x + k] : h;
-                    l = d[x + k] < l ? d[x + k] : l, h = d[x + k] > h ? d[x + k] : h;
-                }
-                low[x] = (uint8_t)l, high[x] = (uint8_t)h;
-            }
-#endif
+        int x;
+        for (x = 0; x < 5; x++) {
+            const float q = (row[x] - low[i]) * scale[i];
+            out[i][at + x] = (uint8_t)(q > 0 ? q < ISOGI_VOL__CODES ? (int)q : (int)ISOGI_VOL__CODES : 0);
         }
+#endif
+    }
 }
 
-/* One task: the nodes over cells of one z. */
+/* One row of leaves, a strip of it; `end`: cells along x up to which the job goes. */
+static void isogi_vol__build_strip(const isogi_vol__build_job *job, size_t x0, size_t end, size_t by, size_t bz) {
+    const isogi_pyramid *p = job->pyramid;
+    const isogi_level *level = &p->level[0];
+    const size_t rest = end + 1 - x0;
+    const int count = rest < ISOGI_VOL__STRIP + 1 ? (int)rest : ISOGI_VOL__STRIP + 1, leaves = (count - 1 + 3) / 4;
+    float row[ISOGI_VOL__STRIP_VOXELS], low[ISOGI_VOL__STRIP / 4], scale[ISOGI_VOL__STRIP / 4];
+    uint8_t *out[ISOGI_VOL__STRIP / 4], bound[ISOGI_VOL__STRIP / 4][2];
+    int i, y, z, a;
+    for (i = 0; i < leaves; i++) {
+        const size_t bx = x0 / 4 + (size_t)i;
+        const float *range = level->range[bx + level->size[0] * (by + level->size[1] * bz)];
+        out[i] = p->nodes[isogi_vol__node_at(p, 0, bx, by, bz)];
+        bound[i][0] = (uint8_t)isogi_vol__quantise(p, (double)range[0]), bound[i][1] = (uint8_t)isogi_vol__quantise(p, (double)range[1]);
+        low[i] = (float)bound[i][0], scale[i] = ISOGI_VOL__CODES / (float)(bound[i][1] + 1 - bound[i][0]);
+    }
+    for (z = 0; z < 5; z++)
+        for (y = 0; y < 5; y++) {
+            const size_t at_y = 4 * by + (size_t)y, at_z = 4 * bz + (size_t)z;
+            isogi_vol__unit_row(job, x0, at_y < p->volume.size[1] ? at_y : p->volume.size[1] - 1, at_z < p->volume.size[2] ? at_z : p->volume.size[2] - 1,
+                                count, row);
+            isogi_vol__code_row(row, leaves, low, scale, out, 5 * y + 25 * z);
+        }
+    for (i = 0; i < leaves; i++) {
+        size_t block[3];
+        block[0] = x0 / 4 + (size_t)i, block[1] = by, block[2] = bz;
+        out[i][ISOGI_VOL__LEAF_LOW] = bound[i][0], out[i][ISOGI_VOL__LEAF_HIGH] = bound[i][1], out[i][ISOGI_VOL__LEAF_CUT] = 0;
+        for (a = 0; a < 3; a++) {
+            const size_t cells = (size_t)p->cells[a] - 4 * block[a];
+            out[i][ISOGI_VOL__LEAF_CUT] |= (uint8_t)((cells < 4 ? 4 - cells : 0) << 2 * a);
+        }
+    }
+}
+
+/* One task: the leaves of one z. */
 static void isogi_vol__build_leaves(void *arg, size_t task) {
     const isogi_vol__build_job *job = (const isogi_vol__build_job *)arg;
-    const isogi_pyramid *p = job->pyramid;
-    const size_t bz = job->first[2] + task, end = isogi_vol__min_size((size_t)p->cells[0], 4 * job->last[0] + 4);
-    uint8_t q[5][5][ISOGI_VOL__STRIP_VOXELS], bound[2][16][ISOGI_VOL__STRIP];
-    size_t bx, by, x0;
-    int i, y, z;
-    memset(q, 0, sizeof q);
-    for (x0 = 4 * job->first[0]; x0 < end; x0 += ISOGI_VOL__STRIP) {
-        const size_t rest = end + 1 - x0;
-        const int count = rest < ISOGI_VOL__STRIP + 1 ? (int)rest : ISOGI_VOL__STRIP + 1;
-        for (by = job->first[1]; by <= job->last[1]; by++) {
-            for (z = 0; z < 5; z++) {
-                const size_t at_z = 4 * bz + (size_t)z;
-                if (at_z >= p->volume.size[2]) continue;
-                for (y = 0; y < 5; y++) {
-                    const size_t at_y = 4 * by + (size_t)y;
-                    if (y == 0 && by > job->first[1]) memcpy(q[z][0], q[z][4], sizeof q[z][0]);
-                    else if (at_y < p->volume.size[1]) isogi_vol__quantise_row(job, x0, at_y, at_z, count, q[z][y]);
-                }
-            }
-            isogi_vol__bound_cells(q, (count - 1 + 15) & ~15, bound[0][0], bound[1][0]);
-            for (bx = 0; bx < (size_t)(count - 1 + 3) / 4; bx++) {
-                uint8_t *out = p->nodes[isogi_vol__node_at(p, 0, x0 / 4 + bx, by, bz)];
-                const int whole = x0 + 4 * bx + 4 <= (size_t)p->cells[0] && 4 * by + 4 <= (size_t)p->cells[1] && 4 * bz + 4 <= (size_t)p->cells[2];
-                for (i = 0; i < 16; i++) memcpy(out + 4 * i, &bound[0][i][4 * bx], 4), memcpy(out + 64 + 4 * i, &bound[1][i][4 * bx], 4);
-                for (i = 0; i < 64 && !whole; i++)
-                    if (x0 + 4 * bx + (size_t)(i & 3) >= (size_t)p->cells[0] || 4 * by + (size_t)(i >> 2 & 3) >= (size_t)p->cells[1] ||
-                        4 * bz + (size_t)(i >> 4) >= (size_t)p->cells[2])
-                        out[i] = 255, out[64 + i] = 0;
-            }
-        }
-    }
+    const size_t bz = job->first[2] + task, end = isogi_vol__min_size((size_t)job->pyramid->cells[0], 4 * job->last[0] + 4);
+    size_t by, x0;
+    for (x0 = 4 * job->first[0]; x0 < end; x0 += ISOGI_VOL__STRIP)
+        for (by = job->first[1]; by <= job->last[1]; by++) isogi_vol__build_strip(job, x0, end, by, bz);
 }
 
 #ifdef ISOGI_VOL__AVX
@@ -1278,11 +1269,11 @@ static int isogi_vol__plan_nodes(isogi_pyramid *p, isogi_vol__build_job *job) {
     job->pyramid = p;
     for (a = 0; a < 3; a++) job->last[a] = p->level[0].size[a] - 1;
     if (!isogi_vol__may_be_fast(p) || !p->all_finite || !(range > 0) || !(range < 1e300)) return 0;
-    p->node_scale = 255 / range;
+    p->node_scale = 253 / range; /* odd: isovalues in the middle of the range lie in the middle of a step */
     if (!(p->node_scale < 1e300)) return 0;
+    /* the float formula must stay within its margin of the double one, and double roundings far below the steps of leaves */
+    if (!(range > 1e-6 * isogi_vol__largest(p->range[0], p->range[1], 0))) return 0;
     if (p->volume.type == ISOGI_F64) return 1;
-    /* the float formula must stay within its margin of the double one */
-    if (!(range > 1e-9 * isogi_vol__largest(p->range[0], p->range[1], 0))) return 0;
     if (!(fabs(p->node_scale * scale) < 1e30) || !(fabs(p->node_scale * scale) > 1e-30)) return 0;
     job->raw_low = (float)((p->range[0] - p->volume.bias) / scale), job->raw_scale = (float)(p->node_scale * scale);
     return 1;
@@ -2155,6 +2146,74 @@ static int isogi_vol__walk_on(isogi_vol__walk *w, uint32_t flags, isogi_hit *hit
     return 1;
 }
 
+/* ==== leaves ========================================================================================================= */
+
+/* A leaf as one isovalue sees it. Numbers of voxels are x + step (c ... c + 1) with errors below 1/32 of a step, and so is the isovalue:
+   codes >= inside are certainly inside, codes < outside certainly outside. */
+typedef struct isogi_vol__leaf {
+    const uint8_t *code;
+    float isovalue; /* in steps, for voxels of code + 0.5 */
+    int inside, outside;
+} isogi_vol__leaf;
+
+ISOGI_VOL__INLINE void isogi_vol__open_leaf(isogi_vol__leaf *leaf, const uint8_t node[128], float level) {
+    const float low = (float)node[ISOGI_VOL__LEAF_LOW], high = (float)node[ISOGI_VOL__LEAF_HIGH];
+    float x = (level - low) * (ISOGI_VOL__CODES / (high + 1 - low));
+    x = x > -2 ? x : -2, x = x < 257 ? x : 257;
+    leaf->code = node, leaf->isovalue = x - 0.5f;
+    leaf->inside = (int)(x + 3.0625f) - 2, leaf->outside = (int)(x + 2.9375f) - 3;
+    leaf->inside = leaf->inside > 0 ? leaf->inside < 255 ? leaf->inside : 255 : 0;
+    leaf->outside = leaf->outside > 0 ? leaf->outside < 255 ? leaf->outside : 255 : 0;
+}
+
+/* Where all eight corners of a cell have their bits set, at bit x + 5y + 25z. */
+ISOGI_VOL__INLINE void isogi_vol__all_corners(uint64_t *low, uint64_t *high) {
+    uint64_t l = *low, h = *high;
+    l &= l >> 1 | h << 63, h &= h >> 1;
+    l &= l >> 5 | h << 59, h &= h >> 5;
+    *low = l & (l >> 25 | h << 39), *high = h & h >> 25;
+}
+
+/* Which of the 64 cells (x + 4y + 16z) can hold the surface, from the voxels that are certainly inside and outside. */
+ISOGI_VOL__INLINE uint64_t isogi_vol__mixed_cells(const isogi_vol__leaf *leaf, uint64_t in_low, uint64_t in_high, uint64_t out_low, uint64_t out_high) {
+    const uint64_t slices = 0x0007ffff0007ffffu; /* of 4x4 bits each in 5x5 */
+    const int cut = leaf->code[ISOGI_VOL__LEAF_CUT];
+    uint64_t a, b, mask;
+    isogi_vol__all_corners(&in_low, &in_high);
+    isogi_vol__all_corners(&out_low, &out_high);
+    in_low |= out_low, in_high |= out_high;
+    a = ((in_low & 0x1ffffff) | in_low >> 25 << 32) & slices, b = ((in_low >> 50 | (in_high << 14 & 0x1ffffff)) | in_high >> 11 << 32) & slices;
+#define ISOGI_VOL__ROWS(v) (((v) & 0x0000000f0000000fu) | ((v) >> 1 & 0x000000f0000000f0u) | ((v) >> 2 & 0x00000f0000000f00u) | ((v) >> 3 & 0x0000f0000000f000u))
+    a = ISOGI_VOL__ROWS(a), b = ISOGI_VOL__ROWS(b);
+#undef ISOGI_VOL__ROWS
+    mask = ~((a & 0xffff) | a >> 16 | (b & 0xffff) << 32 | b >> 32 << 48);
+    if (ISOGI_VOL__UNLIKELY(cut)) {
+        mask &= 0x1111111111111111u * (15u >> (cut & 3));
+        mask &= 0x0001000100010001u * (0xffffu >> 4 * (cut >> 2 & 3));
+        mask &= ~(uint64_t)0 >> 16 * (cut >> 4);
+    }
+    return mask;
+}
+
+ISOGI_VOL__INLINE uint64_t isogi_vol__leaf_mask(const uint8_t node[128], float level, isogi_vol__leaf *leaf) {
+    uint64_t in[2] = {0, 0}, out[2] = {0, 0};
+    int i;
+    isogi_vol__open_leaf(leaf, node, level);
+#ifdef ISOGI_VOL__SSE2
+    {
+        const __m128i inside = _mm_set1_epi8((char)leaf->inside), outside = _mm_set1_epi8((char)leaf->outside);
+        for (i = 0; i < 8; i++) {
+            const __m128i code = _mm_load_si128((const __m128i *)(const void *)(node + 16 * i));
+            in[i / 4] |= (uint64_t)(uint32_t)_mm_movemask_epi8(_mm_cmpeq_epi8(_mm_max_epu8(code, inside), code)) << 16 * (i % 4);
+            out[i / 4] |= (uint64_t)(uint32_t)(0xffff ^ _mm_movemask_epi8(_mm_cmpeq_epi8(_mm_max_epu8(code, outside), code))) << 16 * (i % 4);
+        }
+    }
+#else
+    for (i = 0; i < 125; i++) in[i / 64] |= (uint64_t)(node[i] >= leaf->inside) << i % 64, out[i / 64] |= (uint64_t)(node[i] < leaf->outside) << i % 64;
+#endif
+    return isogi_vol__mixed_cells(leaf, in[0], in[1], out[0], out[1]);
+}
+
 /* ==== AVX2 and AVX-512 =============================================================================================== */
 
 /* Chosen when a pyramid is built. AVX2 does the plain code's operations in the plain code's order, four at a time and without fused
@@ -2164,7 +2223,9 @@ static int isogi_vol__machine(void) {
     __builtin_cpu_init();
     if (!__builtin_cpu_supports("avx2")) return ISOGI_VOL__PATH_BASE;
     return __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512bw") && __builtin_cpu_supports("avx512dq") &&
-                   __builtin_cpu_supports("avx512vl") && __builtin_cpu_supports("avx512bitalg")
+                   __builtin_cpu_supports("avx512vl") && __builtin_cpu_supports("avx512bitalg") &&
+                   __builtin_cpu_supports("avx512vbmi") && __builtin_cpu_supports("avx512vbmi2") && __builtin_cpu_supports("avx512vpopcntdq") &&
+                   __builtin_cpu_supports("gfni")
                ? ISOGI_VOL__PATH_AVX512
                : ISOGI_VOL__PATH_AVX2;
 }
@@ -2181,6 +2242,27 @@ ISOGI_VOL__TARGET("avx2") ISOGI_VOL__INLINE uint64_t isogi_vol__node_mask_avx2(c
 ISOGI_VOL__TARGET("avx512f,avx512bw") ISOGI_VOL__INLINE uint64_t isogi_vol__node_mask_avx512(const uint8_t node[128], int low, int high) {
     __mmask64 in = _mm512_cmple_epu8_mask(_mm512_load_si512((const void *)node), _mm512_set1_epi8((char)high));
     return _mm512_mask_cmpge_epu8_mask(in, _mm512_load_si512((const void *)(node + 64)), _mm512_set1_epi8((char)low));
+}
+
+ISOGI_VOL__TARGET("avx2") ISOGI_VOL__INLINE uint64_t isogi_vol__leaf_mask_avx2(const uint8_t node[128], float level, isogi_vol__leaf *leaf) {
+    const __m256i *v = (const __m256i *)(const void *)node;
+    __m256i inside, outside;
+    isogi_vol__open_leaf(leaf, node, level);
+    inside = _mm256_set1_epi8((char)leaf->inside), outside = _mm256_set1_epi8((char)leaf->outside);
+#define ISOGI_VOL__LEAST(i, a) (uint64_t)(uint32_t)_mm256_movemask_epi8(_mm256_cmpeq_epi8(_mm256_max_epu8(_mm256_load_si256(v + (i)), a), _mm256_load_si256(v + (i))))
+    return isogi_vol__mixed_cells(leaf, ISOGI_VOL__LEAST(0, inside) | ISOGI_VOL__LEAST(1, inside) << 32, ISOGI_VOL__LEAST(2, inside) | ISOGI_VOL__LEAST(3, inside) << 32,
+                                  ~(ISOGI_VOL__LEAST(0, outside) | ISOGI_VOL__LEAST(1, outside) << 32),
+                                  ~(ISOGI_VOL__LEAST(2, outside) | ISOGI_VOL__LEAST(3, outside) << 32));
+#undef ISOGI_VOL__LEAST
+}
+
+ISOGI_VOL__TARGET("avx512f,avx512bw") ISOGI_VOL__INLINE uint64_t isogi_vol__leaf_mask_avx512(const uint8_t node[128], float level, isogi_vol__leaf *leaf) {
+    const __m512i low = _mm512_load_si512((const void *)node), high = _mm512_load_si512((const void *)(node + 64));
+    __m512i inside, outside;
+    isogi_vol__open_leaf(leaf, node, level);
+    inside = _mm512_set1_epi8((char)leaf->inside), outside = _mm512_set1_epi8((char)leaf->outside);
+    return isogi_vol__mixed_cells(leaf, _mm512_cmpge_epu8_mask(low, inside), _mm512_cmpge_epu8_mask(high, inside), _mm512_cmplt_epu8_mask(low, outside),
+                                  _mm512_cmplt_epu8_mask(high, outside));
 }
 
 ISOGI_VOL__TARGET("avx2") ISOGI_VOL__INLINE __m256d isogi_vol__lerp4(__m256d a, __m256d b, __m256d u, __m256d rest) {
@@ -2516,6 +2598,7 @@ typedef struct isogi_vol__ticks {
     uint32_t flip; /* child = mirrored child ^ flip */
     int first[3];  /* mirrored cell in which the walk begins */
     int low, high; /* what the isovalue can be in 8 bits */
+    float level;   /* and unrounded */
 } isogi_vol__ticks;
 
 /* One axis of the planes. Whatever lies beyond the segment is put at twice its length, so that no product overflows. */
@@ -2543,7 +2626,7 @@ ISOGI_VOL__INLINE void isogi_vol__set_axis(isogi_vol__ticks *k, const isogi_vol_
 static int isogi_vol__set_ticks(isogi_vol__ticks *k, const isogi_vol__walk *w) {
     double scale = ISOGI_VOL__TICKS / w->end;
     if (!(scale > 0) || !(scale < 1e300)) return 0;
-    isogi_vol__quantise_isovalue(w->pyramid, w->isovalue, &k->low, &k->high);
+    k->level = isogi_vol__quantise_isovalue(w->pyramid, w->isovalue, &k->low, &k->high);
     k->end = (int64_t)ISOGI_VOL__TICKS, k->flip = 0;
     isogi_vol__set_axis(k, w, 0, scale);
     isogi_vol__set_axis(k, w, 1, scale);
@@ -2633,6 +2716,7 @@ typedef struct isogi_vol__stride {
     isogi_hit *hit;
     int64_t now;
     int axis; /* the one last crossed */
+    isogi_vol__leaf leaf;
 } isogi_vol__stride;
 
 /* Walks the children of node (x, y, z) of a level: cells of level 0, nodes of the level below else. `from` stands on the node.
@@ -2641,7 +2725,7 @@ typedef struct isogi_vol__stride {
     TARGET ISOGI_VOL__INLINE int NAME(isogi_vol__stride *s, const isogi_vol__place *from, int x, int y, int z) {                          \
         const isogi_pyramid *p = s->w->pyramid;                                                                                    \
         const size_t node = isogi_vol__node_at(p, LEVEL, (size_t)x, (size_t)y, (size_t)z);                                         \
-        const uint64_t mask = MASK(p->nodes[node], s->k->low, s->k->high);                                         \
+        const uint64_t mask = MASK(p->nodes[node]);                                                                                \
         const uint32_t flip = s->k->flip;                                                                                          \
         const int64_t end = s->k->end;                                                                                             \
         isogi_vol__place place;                                                                                                    \
@@ -2695,17 +2779,23 @@ typedef struct isogi_vol__stride {
         }                                                                                                                          \
     }
 
-#define ISOGI_VOL__WALKS(SUFFIX, TARGET, MASK, CELL)                                                                                \
+#define ISOGI_VOL__WALKS(SUFFIX, TARGET, MASK, LEAF_MASK, CELL)                                                                     \
     ISOGI_VOL__WALK_CELL(isogi_vol__walk_cell##SUFFIX, TARGET, CELL)                                                               \
-    ISOGI_VOL__WALK(isogi_vol__walk_leaf##SUFFIX, TARGET, 0, MASK, isogi_vol__walk_cell##SUFFIX)                                   \
+    ISOGI_VOL__WALK(isogi_vol__walk_leaf##SUFFIX, TARGET, 0, LEAF_MASK, isogi_vol__walk_cell##SUFFIX)                              \
     ISOGI_VOL__WALK(isogi_vol__walk_small##SUFFIX, TARGET, 1, MASK, isogi_vol__walk_leaf##SUFFIX)                                  \
     ISOGI_VOL__WALK(isogi_vol__walk_large##SUFFIX, TARGET, 2, MASK, isogi_vol__walk_small##SUFFIX)                                 \
     ISOGI_VOL__WALK_TOP(isogi_vol__walk_fast##SUFFIX, TARGET, isogi_vol__walk_large##SUFFIX)
 
-ISOGI_VOL__WALKS(_base, , isogi_vol__node_mask, isogi_vol__mixed_cell)
+#define ISOGI_VOL__NODE_BASE(node) isogi_vol__node_mask(node, s->k->low, s->k->high)
+#define ISOGI_VOL__LEAF_BASE(node) isogi_vol__leaf_mask(node, s->k->level, &s->leaf)
+#define ISOGI_VOL__NODE_AVX2(node) isogi_vol__node_mask_avx2(node, s->k->low, s->k->high)
+#define ISOGI_VOL__LEAF_AVX2(node) isogi_vol__leaf_mask_avx2(node, s->k->level, &s->leaf)
+#define ISOGI_VOL__NODE_AVX512(node) isogi_vol__node_mask_avx512(node, s->k->low, s->k->high)
+#define ISOGI_VOL__LEAF_AVX512(node) isogi_vol__leaf_mask_avx512(node, s->k->level, &s->leaf)
+ISOGI_VOL__WALKS(_base, , ISOGI_VOL__NODE_BASE, ISOGI_VOL__LEAF_BASE, isogi_vol__mixed_cell)
 #ifdef ISOGI_VOL__AVX
-ISOGI_VOL__WALKS(_avx2, ISOGI_VOL__TARGET("avx2"), isogi_vol__node_mask_avx2, isogi_vol__mixed_cell_avx2)
-ISOGI_VOL__WALKS(_avx512, ISOGI_VOL__TARGET("avx512f,avx512bw"), isogi_vol__node_mask_avx512, isogi_vol__mixed_cell_avx2)
+ISOGI_VOL__WALKS(_avx2, ISOGI_VOL__TARGET("avx2"), ISOGI_VOL__NODE_AVX2, ISOGI_VOL__LEAF_AVX2, isogi_vol__mixed_cell_avx2)
+ISOGI_VOL__WALKS(_avx512, ISOGI_VOL__TARGET("avx512f,avx512bw"), ISOGI_VOL__NODE_AVX512, ISOGI_VOL__LEAF_AVX512, isogi_vol__mixed_cell_avx2)
 #endif
 
 static int isogi_vol__walk_fast(isogi_vol__walk *w, const isogi_vol__ticks *k, isogi_hit *hit) {
@@ -2719,34 +2809,56 @@ static int isogi_vol__walk_fast(isogi_vol__walk *w, const isogi_vol__ticks *k, i
 
 /* ==== many rays at once ============================================================================================== */
 
-/* A walk is a chain of decisions that no processor can foresee, and waits for each. So up to ISOGI_VOL__WAVE rays go together, one
-   step each, node after node and then cell after cell: their chains overlap, and there is nothing left to be foreseen. A node is
-   answered at once, without walking its children: a ray passes child (i,j,k) unless the order in which it meets the planes between
-   children forbids it. Along axes on which the ray falls children are counted backwards, so that it meets children in the order of
-   their numbers x + 4y + 16z. Times of planes come from the one formula that cells use; the lowest two bits are replaced by the axis,
-   which makes all of them different: a strict order, the same for all nodes and levels, hence face by face connected. */
+/* A walk is a chain of decisions that no processor can foresee, and waits for each. So ISOGI_VOL__POOL rays go together, in turns of
+   three stages, each of which does one thing for eight rays at once:
+   - Nodes. Every ray answers one node: which of its 64 children does it pass, and which of those can hold the surface? A ray passes
+     child (i,j,k) unless the order in which it meets the planes between children forbids it. Along axes on which the ray falls
+     children are counted backwards, so that it meets children in the order of their numbers x + 4y + 16z. Times of planes come from
+     the one formula that cells use; the lowest two bits are replaced by the axis, which makes all of them different: a strict order,
+     the same for all nodes and levels, hence face by face connected.
+   - Cells, in float, from the voxels in the leaf: the Bernstein coefficients with their error bound. Nearly all cells are certainly
+     all on the side on which the ray is, and done with.
+   - Cells that are not, in double from the volume's own voxels, by the very code that a ray alone runs: what is found, and all its
+     bits, do not depend on the stage before.
+   What a ray needs next is sent for at the end of a turn: while the others have theirs it arrives. */
 #ifdef ISOGI_VOL__AVX
 #ifndef __clang__
 #pragma GCC diagnostic push
 #pragma GCC diagnostic ignored "-Wmaybe-uninitialized" /* gcc 12 says so of its own undefined vectors */
 #endif
-#define ISOGI_VOL__AVX512 ISOGI_VOL__TARGET("avx512f,avx512bw,avx512dq,avx512vl,avx512bitalg")
-#define ISOGI_VOL__WAVE 32
-#define ISOGI_VOL__WAVE_NODES 16384 /* 2 MB */
+#define ISOGI_VOL__AVX512 ISOGI_VOL__TARGET("avx512f,avx512bw,avx512dq,avx512vl,avx512bitalg,avx512vbmi,avx512vbmi2,avx512vpopcntdq,gfni,fma")
+#define ISOGI_VOL__POOL 64
 
-typedef struct __attribute__((aligned(64))) isogi_vol__rider {
-    double origin[4], inverse[4], sign[4]; /* inverse is huge along axes on which the ray stands still; the fourth is 0 */
-    int32_t fall[4];
-    int32_t next[4];                             /* the child to come next, of a node of `level` */
-    int32_t node[ISOGI_VOL__NODE_LEVELS + 1][4]; /* the node of each level that is being worked through; the last has one child, the top */
-    uint64_t mask[ISOGI_VOL__NODE_LEVELS + 1];   /* its children still to come, counted backwards on falling axes */
-    int64_t end;                                 /* the segment's end as a time of a plane, axis 3 */
-    const char *address;                         /* its bounds, or the first corner of a cell */
-    int level;                                   /* 0: a cell; -1: none, the ray is done */
-    uint32_t pending;                            /* levels with children to come after that */
-    int flip;
-    int low, high; /* what the isovalue can be in 8 bits */
-} isogi_vol__rider;
+/* One number for each ray of the pool. */
+typedef struct __attribute__((aligned(64))) isogi_vol__pool {
+    double origin[3][ISOGI_VOL__POOL], dir[3][ISOGI_VOL__POOL];
+    double inverse[3][ISOGI_VOL__POOL]; /* of dir; huge on axes on which the ray stands still; its sign bit: children are counted backwards */
+    int64_t end[ISOGI_VOL__POOL];       /* of the segment, as a time of a plane, axis 3 */
+    uint64_t mask[ISOGI_VOL__NODE_LEVELS][ISOGI_VOL__POOL]; /* children still to come of the node of each level, counted backwards on falling axes */
+    uint64_t pending[ISOGI_VOL__POOL];  /* levels above the leaves that have any */
+    int64_t level[ISOGI_VOL__POOL];     /* of the node to be answered next; -1: none */
+    uint64_t address[ISOGI_VOL__POOL];  /* of that node, or of the leaf whose cells are being looked at */
+    int64_t cell[ISOGI_VOL__POOL];      /* x | y << 16 | z << 32 of the last cell of the way; nodes are what its leading digits say */
+    int64_t flip[ISOGI_VOL__POOL];      /* child = child counted backwards ^ flip */
+    int64_t low[ISOGI_VOL__POOL], beyond[ISOGI_VOL__POOL]; /* what the isovalue can be in 8 bits: low .. beyond - 1 */
+    double level_units[ISOGI_VOL__POOL]; /* and unrounded */
+    double step[ISOGI_VOL__POOL];       /* the isovalue in steps of the leaf, for voxels of code + 0.5 */
+    int64_t side[ISOGI_VOL__POOL];      /* 1 inside, 0 outside, -1 not known, -2 leaving a surface, only to be looked at in double */
+    double base[ISOGI_VOL__POOL], stop[ISOGI_VOL__POOL], isovalue[ISOGI_VOL__POOL], deflated[ISOGI_VOL__POOL]; /* of the walk; stop: its end */
+    size_t ray[ISOGI_VOL__POOL];
+    int8_t entry_axis[ISOGI_VOL__POOL];
+} isogi_vol__pool;
+
+/* What the loops share. */
+typedef struct isogi_vol__turn {
+    const isogi_pyramid *p;
+    __m512i first, parents0, parents1; /* of node level n - 1 at n */
+    int levels, any;
+    uint64_t choosing;                 /* rays that need their next node, a bit each */
+    int leaves, doubts;
+    uint8_t at_leaf[ISOGI_VOL__POOL + 8], in_doubt[ISOGI_VOL__POOL + 8];
+    uint64_t cells;
+} isogi_vol__turn;
 
 /* What is left of 64 children if planes a and b are met in either order: children on the far side of the one that comes later and on
    the near side of the one that comes first are not met. */
@@ -2755,156 +2867,530 @@ typedef struct __attribute__((aligned(64))) isogi_vol__rider {
 #define ISOGI_VOL__BELOW_2(a) (((uint64_t)1 << (16 * (a))) - 1)
 #define ISOGI_VOL__FIRST(f, a, s, b) ~(ISOGI_VOL__BELOW_##f(a) & ~ISOGI_VOL__BELOW_##s(b))
 #define ISOGI_VOL__LATER(f, a, s, b) ~(~ISOGI_VOL__BELOW_##f(a) & ISOGI_VOL__BELOW_##s(b))
-#define ISOGI_VOL__PAIRS(M, a, b) M(0, a, 1, b), M(1, a, 2, b), M(2, a, 0, b), ~(uint64_t)0
-#define ISOGI_VOL__BELOW(a) ISOGI_VOL__BELOW_0(a), ISOGI_VOL__BELOW_1(a), ISOGI_VOL__BELOW_2(a), ~(uint64_t)0
-#define ISOGI_VOL__ABOVE(a) ~ISOGI_VOL__BELOW_0(a), ~ISOGI_VOL__BELOW_1(a), ~ISOGI_VOL__BELOW_2(a), ~(uint64_t)0
-#define ISOGI_VOL__ALL ~(uint64_t)0, ~(uint64_t)0, ~(uint64_t)0, ~(uint64_t)0
-static const uint64_t isogi_vol__orders[13][8] = {
-    {ISOGI_VOL__PAIRS(ISOGI_VOL__FIRST, 1, 1), ISOGI_VOL__PAIRS(ISOGI_VOL__FIRST, 2, 1)},
-    {ISOGI_VOL__PAIRS(ISOGI_VOL__LATER, 1, 1), ISOGI_VOL__PAIRS(ISOGI_VOL__LATER, 2, 1)},
-    {ISOGI_VOL__PAIRS(ISOGI_VOL__FIRST, 1, 2), ISOGI_VOL__PAIRS(ISOGI_VOL__FIRST, 2, 2)},
-    {ISOGI_VOL__PAIRS(ISOGI_VOL__LATER, 1, 2), ISOGI_VOL__PAIRS(ISOGI_VOL__LATER, 2, 2)},
-    {ISOGI_VOL__PAIRS(ISOGI_VOL__FIRST, 1, 3), ISOGI_VOL__PAIRS(ISOGI_VOL__FIRST, 2, 3)},
-    {ISOGI_VOL__PAIRS(ISOGI_VOL__LATER, 1, 3), ISOGI_VOL__PAIRS(ISOGI_VOL__LATER, 2, 3)},
-    {ISOGI_VOL__PAIRS(ISOGI_VOL__FIRST, 3, 1), ISOGI_VOL__PAIRS(ISOGI_VOL__FIRST, 3, 2)},
-    {ISOGI_VOL__PAIRS(ISOGI_VOL__LATER, 3, 1), ISOGI_VOL__PAIRS(ISOGI_VOL__LATER, 3, 2)},
-    {ISOGI_VOL__PAIRS(ISOGI_VOL__FIRST, 3, 3), ISOGI_VOL__ABOVE(3)}, /* upper half: plane 3 before the entry */
-    {ISOGI_VOL__PAIRS(ISOGI_VOL__LATER, 3, 3), ISOGI_VOL__ALL},
-    {ISOGI_VOL__ABOVE(1), ISOGI_VOL__ABOVE(2)}, /* planes 1 and 2 before the entry */
-    {ISOGI_VOL__BELOW(1), ISOGI_VOL__BELOW(2)}, /* planes 1 and 2 after the exit */
-    {ISOGI_VOL__BELOW(3), ISOGI_VOL__ALL}};
-static const uint8_t isogi_vol__numbers[64] = {0,  1,  2,  3,  4,  5,  6,  7,  8,  9,  10, 11, 12, 13, 14, 15, 16, 17, 18, 19, 20, 21,
-                                               22, 23, 24, 25, 26, 27, 28, 29, 30, 31, 32, 33, 34, 35, 36, 37, 38, 39, 40, 41, 42, 43,
-                                               44, 45, 46, 47, 48, 49, 50, 51, 52, 53, 54, 55, 56, 57, 58, 59, 60, 61, 62, 63};
+#define ISOGI_VOL__ALL64(x) _mm512_set1_epi64((int64_t)(x))
 
-/* Times of planes as integers, axis in the lowest two bits. */
-ISOGI_VOL__AVX512 ISOGI_VOL__INLINE __m512i isogi_vol__when(__m512d plane, __m512d origin, __m512d inverse) {
+/* Times of a plane as integers, axis in the lowest two bits. */
+ISOGI_VOL__AVX512 ISOGI_VOL__INLINE __m512i isogi_vol__when(__m512d plane, __m512d origin, __m512d inverse, int axis) {
     const __m512d t = _mm512_max_pd(_mm512_mul_pd(_mm512_sub_pd(plane, origin), inverse), _mm512_setzero_pd());
-    return _mm512_ternarylogic_epi64(_mm512_castpd_si512(t), _mm512_set1_epi64(~(int64_t)3), _mm512_setr_epi64(0, 1, 2, 3, 0, 1, 2, 3), 0xea);
+    return _mm512_ternarylogic_epi64(_mm512_castpd_si512(t), ISOGI_VOL__ALL64(~(uint64_t)3), _mm512_set1_epi64(axis), 0xea);
 }
 
-ISOGI_VOL__AVX512 ISOGI_VOL__INLINE __m256i isogi_vol__latest(__m256i t) {
-    t = _mm256_max_epi64(t, _mm256_permute4x64_epi64(t, 0x4e));
-    return _mm256_max_epi64(t, _mm256_permute4x64_epi64(t, 0xb1));
-}
-
-ISOGI_VOL__AVX512 ISOGI_VOL__INLINE __m256i isogi_vol__earliest(__m256i t) {
-    t = _mm256_min_epi64(t, _mm256_permute4x64_epi64(t, 0x4e));
-    return _mm256_min_epi64(t, _mm256_permute4x64_epi64(t, 0xb1));
-}
-
-/* Which children of a node of level n the ray passes, in its own order. */
-ISOGI_VOL__AVX512 ISOGI_VOL__INLINE uint64_t isogi_vol__passed(const isogi_vol__rider *r, int n, __m128i node) {
-    const double child = (double)((int64_t)1 << 2 * n);
-    const __m256d base = _mm256_mul_pd(_mm256_cvtepi32_pd(_mm_add_epi32(node, _mm_load_si128((const __m128i *)(const void *)r->fall))), _mm256_set1_pd(4 * child));
-    const __m512d origin = _mm512_broadcast_f64x4(_mm256_load_pd(r->origin)), inverse = _mm512_broadcast_f64x4(_mm256_load_pd(r->inverse));
-    const __m512d step = _mm512_broadcast_f64x4(_mm256_mul_pd(_mm256_load_pd(r->sign), _mm256_set1_pd(child))), start = _mm512_broadcast_f64x4(base);
-    const __m512d plane12 = _mm512_add_pd(start, _mm512_mul_pd(step, _mm512_setr_pd(1, 1, 1, 1, 2, 2, 2, 2)));
-    const __m512d plane34 = _mm512_add_pd(start, _mm512_mul_pd(step, _mm512_setr_pd(3, 3, 3, 3, 4, 4, 4, 4)));
-    const __m512i t12 = isogi_vol__when(plane12, origin, inverse), t34 = isogi_vol__when(plane34, origin, inverse);
-    const __m512i t0 = isogi_vol__when(start, origin, inverse);
-    const __m512i in = _mm512_broadcastq_epi64(_mm256_castsi256_si128(isogi_vol__latest(_mm512_castsi512_si256(t0))));
-    const __m512i out = _mm512_broadcastq_epi64(
-        _mm256_castsi256_si128(isogi_vol__earliest(_mm256_mask_set1_epi64(_mm512_extracti64x4_epi64(t34, 1), 8, r->end))));
-    const __m512i other12 = _mm512_permutex_epi64(t12, 0xc9), other34 = _mm512_permutex_epi64(t34, 0xc9); /* y, z, x */
-    const __m512i t33 = _mm512_shuffle_i64x2(t34, t34, 0x44), other33 = _mm512_shuffle_i64x2(other34, other34, 0x44);
-    const __m512i *order = (const __m512i *)(const void *)isogi_vol__orders;
-#define ISOGI_VOL__EITHER(i, a, b) \
-    _mm512_mask_blend_epi64(_mm512_cmplt_epi64_mask(a, b), _mm512_loadu_si512(order + 2 * (i) + 1), _mm512_loadu_si512(order + 2 * (i)))
-    const __m512i v0 = ISOGI_VOL__EITHER(0, t12, _mm512_shuffle_i64x2(other12, other12, 0x44));
-    const __m512i v1 = ISOGI_VOL__EITHER(1, t12, _mm512_shuffle_i64x2(other12, other12, 0xee));
-    const __m512i v2 = ISOGI_VOL__EITHER(2, t12, other33);
-    const __m512i v3 = ISOGI_VOL__EITHER(3, t33, other12);
-    const __m512i v4 = ISOGI_VOL__EITHER(4, t33, _mm512_shuffle_i64x2(other34, in, 0x44));
-#undef ISOGI_VOL__EITHER
-    __m512i all = _mm512_and_si512(_mm512_ternarylogic_epi64(v0, v1, v2, 0x80), _mm512_and_si512(v3, v4));
-    all = _mm512_mask_and_epi64(all, _mm512_cmplt_epi64_mask(t12, in), all, _mm512_loadu_si512(order + 10));
-    all = _mm512_mask_and_epi64(all, _mm512_cmplt_epi64_mask(out, t12), all, _mm512_loadu_si512(order + 11));
-    all = _mm512_mask_and_epi64(all, _mm512_cmplt_epi64_mask(out, t33), all, _mm512_loadu_si512(order + 12));
-    return (uint64_t)_mm512_reduce_and_epi64(all);
-}
-
-/* Takes the next child of the lowest level that has any, and sends for what it needs: others have their turn until it arrives. */
-ISOGI_VOL__AVX512 ISOGI_VOL__INLINE void isogi_vol__choose(const isogi_pyramid *p, isogi_vol__rider *r) {
-    if (!r->pending) {
-        r->level = -1;
-    } else {
-        const int n = __builtin_ctz(r->pending);
-        const uint64_t mask = r->mask[n], rest = mask & (mask - 1);
-        const int child = __builtin_ctzll(mask) ^ r->flip;
-        const __m128i digits = _mm_and_si128(_mm_srlv_epi32(_mm_set1_epi32(child), _mm_setr_epi32(0, 2, 4, 31)), _mm_set1_epi32(3));
-        const __m128i parent = _mm_load_si128((const __m128i *)(const void *)r->node[n]), next = _mm_add_epi32(_mm_slli_epi32(parent, 2), digits);
-        _mm_store_si128((__m128i *)(void *)r->next, next);
-        r->mask[n] = rest, r->pending = rest ? r->pending : r->pending & (r->pending - 1), r->level = n;
-        if (n) {
-            const isogi_vol__node_level *level = &p->node_level[n - 1];
-            const size_t x = (size_t)_mm_cvtsi128_si32(parent), y = (size_t)_mm_extract_epi32(parent, 1), z = (size_t)_mm_extract_epi32(parent, 2);
-            r->address = (const char *)p->nodes[level->first + 64 * (x + level->parents[0] * (y + level->parents[1] * z)) + (size_t)child];
-            _mm_prefetch(r->address, _MM_HINT_T0), _mm_prefetch(r->address + 64, _MM_HINT_T0);
-        } else {
-            const isogi_volume *v = &p->volume;
-            const ptrdiff_t dy = v->stride[1], dz = v->stride[2];
-            r->address = (const char *)v->data + _mm_cvtsi128_si32(next) * v->stride[0] + _mm_extract_epi32(next, 1) * dy + _mm_extract_epi32(next, 2) * dz;
-            _mm_prefetch(r->address, _MM_HINT_T0), _mm_prefetch(r->address + dy, _MM_HINT_T0);
-            _mm_prefetch(r->address + dz, _MM_HINT_T0), _mm_prefetch(r->address + dy + dz, _MM_HINT_T0);
-        }
+/* Which children of their nodes the rays from slot i on pass, in their own order. */
+ISOGI_VOL__AVX512 ISOGI_VOL__INLINE __m512i isogi_vol__passed(const isogi_vol__pool *s, int i) {
+    const __m512i level = _mm512_load_si512(&s->level[i]), shift = _mm512_add_epi64(level, level), cell = _mm512_load_si512(&s->cell[i]);
+    const __m512i child = _mm512_sllv_epi64(_mm512_set1_epi64(1), shift), whole = _mm512_slli_epi64(child, 2);
+    const __m512i field = _mm512_set1_epi64(0xffff);
+    __m512i in, out;
+#define ISOGI_VOL__AXIS(a)                                                                                                                      \
+    const __m512d origin##a = _mm512_load_pd(&s->origin[a][i]), inverse##a = _mm512_load_pd(&s->inverse[a][i]);                                 \
+    const __m512i fall##a = _mm512_srai_epi64(_mm512_castpd_si512(inverse##a), 63);                                                             \
+    const __m512d step##a = _mm512_cvtepi64_pd(_mm512_sub_epi64(_mm512_xor_si512(child, fall##a), fall##a));                                    \
+    const __m512d plane##a##0 = _mm512_cvtepi64_pd(_mm512_add_epi64(_mm512_and_si512(_mm512_srli_epi64(cell, 16 * a), field), _mm512_and_si512(whole, fall##a))); \
+    const __m512d plane##a##1 = _mm512_add_pd(plane##a##0, step##a), plane##a##2 = _mm512_add_pd(plane##a##1, step##a);                         \
+    const __m512d plane##a##3 = _mm512_add_pd(plane##a##2, step##a), plane##a##4 = _mm512_add_pd(plane##a##3, step##a);                         \
+    const __m512i t##a##0 = isogi_vol__when(plane##a##0, origin##a, inverse##a, a), t##a##1 = isogi_vol__when(plane##a##1, origin##a, inverse##a, a); \
+    const __m512i t##a##2 = isogi_vol__when(plane##a##2, origin##a, inverse##a, a), t##a##3 = isogi_vol__when(plane##a##3, origin##a, inverse##a, a); \
+    const __m512i t##a##4 = isogi_vol__when(plane##a##4, origin##a, inverse##a, a);
+    ISOGI_VOL__AXIS(0)
+    ISOGI_VOL__AXIS(1)
+    ISOGI_VOL__AXIS(2)
+#undef ISOGI_VOL__AXIS
+    in = _mm512_max_epi64(_mm512_max_epi64(t00, t10), _mm512_max_epi64(t20, _mm512_set1_epi64(3))); /* planes behind the origin come before */
+    out = _mm512_min_epi64(_mm512_min_epi64(t04, t14), _mm512_min_epi64(t24, _mm512_load_si512(&s->end[i])));
+    {
+        __m512i all = ISOGI_VOL__ALL64(~(uint64_t)0);
+#define ISOGI_VOL__PAIR(f, a, g, b)                                                                                                                  \
+    _mm512_mask_blend_epi64(_mm512_cmplt_epi64_mask(t##f##a, t##g##b), ISOGI_VOL__ALL64(ISOGI_VOL__LATER(f, a, g, b)), ISOGI_VOL__ALL64(ISOGI_VOL__FIRST(f, a, g, b)))
+#define ISOGI_VOL__ROW(f, a, g)                                                                              \
+    all = _mm512_ternarylogic_epi64(all, ISOGI_VOL__PAIR(f, a, g, 1), ISOGI_VOL__PAIR(f, a, g, 2), 0x80);    \
+    all = _mm512_and_si512(all, ISOGI_VOL__PAIR(f, a, g, 3));
+#define ISOGI_VOL__ENDS(f, a)                                                                                                         \
+    all = _mm512_mask_and_epi64(all, _mm512_cmplt_epi64_mask(t##f##a, in), all, ISOGI_VOL__ALL64(~ISOGI_VOL__BELOW_##f(a)));          \
+    all = _mm512_mask_and_epi64(all, _mm512_cmplt_epi64_mask(out, t##f##a), all, ISOGI_VOL__ALL64(ISOGI_VOL__BELOW_##f(a)));
+        ISOGI_VOL__ROW(0, 1, 1) ISOGI_VOL__ROW(0, 2, 1) ISOGI_VOL__ROW(0, 3, 1)
+        ISOGI_VOL__ROW(1, 1, 2) ISOGI_VOL__ROW(1, 2, 2) ISOGI_VOL__ROW(1, 3, 2)
+        ISOGI_VOL__ROW(2, 1, 0) ISOGI_VOL__ROW(2, 2, 0) ISOGI_VOL__ROW(2, 3, 0)
+        ISOGI_VOL__ENDS(0, 1) ISOGI_VOL__ENDS(0, 2) ISOGI_VOL__ENDS(0, 3)
+        ISOGI_VOL__ENDS(1, 1) ISOGI_VOL__ENDS(1, 2) ISOGI_VOL__ENDS(1, 3)
+        ISOGI_VOL__ENDS(2, 1) ISOGI_VOL__ENDS(2, 2) ISOGI_VOL__ENDS(2, 3)
+#undef ISOGI_VOL__PAIR
+#undef ISOGI_VOL__ROW
+#undef ISOGI_VOL__ENDS
+        return all;
     }
 }
 
-/* Answers a node. */
-ISOGI_VOL__AVX512 ISOGI_VOL__INLINE void isogi_vol__ride_node(const isogi_pyramid *p, isogi_vol__rider *r) {
-    const int n = r->level - 1;
-    const __m128i node = _mm_load_si128((const __m128i *)(const void *)r->next);
-    const __m512i numbers = _mm512_xor_si512(_mm512_set1_epi8((char)r->flip), _mm512_loadu_si512((const void *)isogi_vol__numbers));
-    uint64_t marked = isogi_vol__node_mask_avx512((const uint8_t *)r->address, r->low, r->high);
-    marked = (uint64_t)_mm512_bitshuffle_epi64_mask(_mm512_set1_epi64((int64_t)marked), numbers) & isogi_vol__passed(r, n, node);
-    _mm_store_si128((__m128i *)(void *)r->node[n], node);
-    r->mask[n] = marked;
-    r->pending |= (uint32_t)(marked != 0) << n;
-    isogi_vol__choose(p, r);
+/* Where all eight corners of cells have their bits set, of 128 bits in two vectors. */
+ISOGI_VOL__AVX512 ISOGI_VOL__INLINE void isogi_vol__all_corners8(__m512i *low, __m512i *high) {
+    __m512i l = *low, h = *high;
+    l = _mm512_and_si512(l, _mm512_shrdi_epi64(l, h, 1)), h = _mm512_and_si512(h, _mm512_srli_epi64(h, 1));
+    l = _mm512_and_si512(l, _mm512_shrdi_epi64(l, h, 5)), h = _mm512_and_si512(h, _mm512_srli_epi64(h, 5));
+    *low = _mm512_and_si512(l, _mm512_shrdi_epi64(l, h, 25)), *high = _mm512_and_si512(h, _mm512_srli_epi64(h, 25));
 }
 
-/* Solves a cell; 1: hit. */
-ISOGI_VOL__AVX512 ISOGI_VOL__INLINE int isogi_vol__ride_cell(const isogi_pyramid *p, isogi_vol__rider *r, isogi_vol__walk *w, isogi_hit *hit) {
-    const __m128i cell = _mm_load_si128((const __m128i *)(const void *)r->next);
-    const __m256d enter = _mm256_cvtepi32_pd(_mm_add_epi32(cell, _mm_load_si128((const __m128i *)(const void *)r->fall)));
-    const __m256d leave = _mm256_add_pd(enter, _mm256_load_pd(r->sign));
-    const __m512i t = isogi_vol__when(_mm512_insertf64x4(_mm512_castpd256_pd512(enter), leave, 1), _mm512_broadcast_f64x4(_mm256_load_pd(r->origin)),
-                                      _mm512_broadcast_f64x4(_mm256_load_pd(r->inverse)));
-    const int in = (int)_mm_cvtsi128_si32(_mm256_castsi256_si128(isogi_vol__latest(_mm512_castsi512_si256(t)))) & 3;
-    const int out = (int)_mm_cvtsi128_si32(_mm256_castsi256_si128(
-                        isogi_vol__earliest(_mm256_mask_set1_epi64(_mm512_extracti64x4_epi64(t, 1), 8, r->end)))) & 3;
-    if (isogi_vol__mixed_cell_avx2(w, _mm_cvtsi128_si32(cell), _mm_extract_epi32(cell, 1), _mm_extract_epi32(cell, 2), in == 3 ? w->entry_axis : in,
-                                   out == 3 ? -1 : out, hit))
-        return 1;
-    isogi_vol__choose(p, r);
-    return 0;
+/* Rows of four bits at x + 5y + 25z become x + 4y + 16z: even rows from their own places, odd ones from four bits before. */
+ISOGI_VOL__AVX512 ISOGI_VOL__INLINE __m512i isogi_vol__pack_cells8(__m512i low, __m512i high) {
+    const __m512i even_at = ISOGI_VOL__ALL64(0x150b3c3223190a00), odd_at = ISOGI_VOL__ALL64(0x160c3d33241a0b01);
+    __m512i even = _mm512_multishift_epi64_epi8(even_at, low), odd = _mm512_multishift_epi64_epi8(odd_at, low);
+    even = _mm512_mask_multishift_epi64_epi8(even, 0xc0c0c0c0c0c0c0c0u, even_at, high);
+    odd = _mm512_mask_multishift_epi64_epi8(odd, 0xe0e0e0e0e0e0e0e0u, odd_at, high);
+    return _mm512_ternarylogic_epi64(_mm512_set1_epi8(0x0f), even, odd, 0xca);
 }
 
-/* A rider on a walk that is set up and clipped; 0: it has to be walked alone. */
-ISOGI_VOL__TARGET("avx2") static int isogi_vol__mount(isogi_vol__rider *r, const isogi_vol__walk *w) {
+/* Numbers of children with the axes in `flip` counted backwards. */
+ISOGI_VOL__AVX512 ISOGI_VOL__INLINE __m512i isogi_vol__mirror8(__m512i mask, __m512i flip) {
+    const __m512i words = _mm512_set_epi64(0x0e0f0c0d0a0b0809, 0x0607040502030001, 0x0e0f0c0d0a0b0809, 0x0607040502030001, 0x0e0f0c0d0a0b0809, 0x0607040502030001,
+                                           0x0e0f0c0d0a0b0809, 0x0607040502030001);
+    const __m512i quads = _mm512_set_epi64(0x09080b0a0d0c0f0e, 0x0100030205040706, 0x09080b0a0d0c0f0e, 0x0100030205040706, 0x09080b0a0d0c0f0e, 0x0100030205040706,
+                                           0x09080b0a0d0c0f0e, 0x0100030205040706);
+    mask = _mm512_mask_mov_epi64(mask, _mm512_test_epi64_mask(flip, _mm512_set1_epi64(3)), _mm512_gf2p8affine_epi64_epi8(mask, ISOGI_VOL__ALL64(0x0804020180402010), 0));
+    mask = _mm512_mask_mov_epi64(mask, _mm512_test_epi64_mask(flip, _mm512_set1_epi64(12)),
+                                 _mm512_shuffle_epi8(_mm512_gf2p8affine_epi64_epi8(mask, ISOGI_VOL__ALL64(0x1020408001020408), 0), words));
+    return _mm512_mask_mov_epi64(mask, _mm512_test_epi64_mask(flip, _mm512_set1_epi64(48)), _mm512_shuffle_epi8(mask, quads));
+}
+
+/* Which children can hold the surface: bounds of nodes and voxels of leaves are compared alike, and mean different things. */
+ISOGI_VOL__AVX512 ISOGI_VOL__INLINE __m512i isogi_vol__marked(isogi_vol__pool *s, int i, __mmask8 leaf) {
+    const __m512i address = _mm512_load_si512(&s->address[i]);
+    const __m256i tail = _mm512_mask_i64gather_epi32(_mm256_setzero_si256(), leaf, _mm512_add_epi64(address, _mm512_set1_epi64(124)), (const int *)0, 1);
+    const __m256 low = _mm256_cvtepi32_ps(_mm256_and_si256(_mm256_srli_epi32(tail, 8), _mm256_set1_epi32(255)));
+    const __m256 high = _mm256_cvtepi32_ps(_mm256_and_si256(_mm256_srli_epi32(tail, 16), _mm256_set1_epi32(255)));
+    const __m256 scale = _mm256_div_ps(_mm256_set1_ps(ISOGI_VOL__CODES), _mm256_sub_ps(_mm256_add_ps(high, _mm256_set1_ps(1)), low));
+    const __m256i zero = _mm256_setzero_si256(), most = _mm256_set1_epi32(255);
+    __m256 x = _mm256_mul_ps(_mm256_sub_ps(_mm512_cvtpd_ps(_mm512_load_pd(&s->level_units[i])), low), scale);
+    __m256i least = _mm512_cvtepi64_epi32(_mm512_load_si512(&s->low[i])), beyond = _mm512_cvtepi64_epi32(_mm512_load_si512(&s->beyond[i]));
+    __m512i in0, in1, out0, out1, inner;
+    __attribute__((aligned(64))) uint64_t mask[4][8];
+    __attribute__((aligned(32))) uint32_t bound[2][8];
+    int k;
+    x = _mm256_min_ps(_mm256_max_ps(x, _mm256_set1_ps(-2)), _mm256_set1_ps(257));
+    _mm512_mask_store_pd(&s->step[i], leaf, _mm512_cvtps_pd(_mm256_sub_ps(x, _mm256_set1_ps(0.5f))));
+    in0 = _mm512_castsi256_si512(_mm256_sub_epi32(_mm256_cvttps_epi32(_mm256_add_ps(x, _mm256_set1_ps(3.0625f))), _mm256_set1_epi32(2)));
+    out0 = _mm512_castsi256_si512(_mm256_sub_epi32(_mm256_cvttps_epi32(_mm256_add_ps(x, _mm256_set1_ps(2.9375f))), _mm256_set1_epi32(3)));
+    least = _mm256_mask_mov_epi32(least, leaf, _mm256_min_epi32(_mm256_max_epi32(_mm512_castsi512_si256(in0), zero), most));
+    beyond = _mm256_mask_mov_epi32(beyond, leaf, _mm256_min_epi32(_mm256_max_epi32(_mm512_castsi512_si256(out0), zero), most));
+    _mm256_store_si256((__m256i *)(void *)bound[0], _mm256_mullo_epi32(least, _mm256_set1_epi32(0x01010101)));
+    _mm256_store_si256((__m256i *)(void *)bound[1], _mm256_mullo_epi32(beyond, _mm256_set1_epi32(0x01010101)));
+    for (k = 0; k < 8; k++) {
+        const char *node = (const char *)(uintptr_t)s->address[i + k];
+        const __m512i a = _mm512_load_si512((const void *)node), b = _mm512_load_si512((const void *)(node + 64));
+        const __m512i l = _mm512_set1_epi32((int)bound[0][k]), h = _mm512_set1_epi32((int)bound[1][k]);
+        mask[0][k] = _mm512_cmpge_epu8_mask(a, l), mask[1][k] = _mm512_cmpge_epu8_mask(b, l);
+        mask[2][k] = _mm512_cmplt_epu8_mask(a, h), mask[3][k] = _mm512_cmplt_epu8_mask(b, h);
+    }
+    in0 = _mm512_load_si512(mask[0]), in1 = _mm512_load_si512(mask[1]), out0 = _mm512_load_si512(mask[2]), out1 = _mm512_load_si512(mask[3]);
+    inner = _mm512_and_si512(in1, out0); /* largest >= low, least < beyond */
+    isogi_vol__all_corners8(&in0, &in1);
+    isogi_vol__all_corners8(&out0, &out1);
+    in0 = isogi_vol__pack_cells8(_mm512_or_si512(in0, out0), _mm512_or_si512(in1, out1));
+    inner = _mm512_mask_andnot_epi64(inner, leaf, in0, ISOGI_VOL__ALL64(~(uint64_t)0));
+    if (ISOGI_VOL__UNLIKELY(_mm256_movemask_epi8(_mm256_cmpgt_epi32(_mm256_srli_epi32(tail, 24), zero)))) {
+        /* leaves that reach beyond the volume */
+        const __m512i cut = _mm512_cvtepu32_epi64(_mm256_srli_epi32(tail, 24)), three = _mm512_set1_epi64(3);
+#define ISOGI_VOL__CUT(a) _mm512_setr_epi64(-1, (int64_t)ISOGI_VOL__BELOW_##a(3), (int64_t)ISOGI_VOL__BELOW_##a(2), (int64_t)ISOGI_VOL__BELOW_##a(1), -1, -1, -1, -1)
+        inner = _mm512_and_si512(inner, _mm512_permutexvar_epi64(_mm512_and_si512(cut, three), ISOGI_VOL__CUT(0)));
+        inner = _mm512_and_si512(inner, _mm512_permutexvar_epi64(_mm512_and_si512(_mm512_srli_epi64(cut, 2), three), ISOGI_VOL__CUT(1)));
+        inner = _mm512_and_si512(inner, _mm512_permutexvar_epi64(_mm512_and_si512(_mm512_srli_epi64(cut, 4), three), ISOGI_VOL__CUT(2)));
+#undef ISOGI_VOL__CUT
+    }
+    return isogi_vol__mirror8(inner, _mm512_load_si512(&s->flip[i]));
+}
+
+/* Answers the nodes of the rays from slot i on. */
+ISOGI_VOL__AVX512 ISOGI_VOL__INLINE void isogi_vol__answer(isogi_vol__turn *turn, isogi_vol__pool *s, int i) {
+    const __m512i level = _mm512_load_si512(&s->level[i]), zero = _mm512_setzero_si512();
+    const __mmask8 lives = _mm512_cmpge_epi64_mask(level, zero), leaf = _mm512_cmpeq_epi64_mask(level, zero);
+    const __m512i passed = isogi_vol__passed(s, i);
+    const __m512i marked = _mm512_maskz_and_epi64(lives, passed, isogi_vol__marked(s, i, leaf));
+    const __mmask8 some = _mm512_test_epi64_mask(marked, marked);
+    unsigned cells = (unsigned)(some & leaf);
+    int n;
+    for (n = 0; n < turn->levels; n++) _mm512_mask_store_epi64(s->mask[n] + i, _mm512_cmpeq_epi64_mask(level, _mm512_set1_epi64(n)), marked);
+    _mm512_store_si512(&s->pending[i], _mm512_mask_or_epi64(_mm512_load_si512(&s->pending[i]), (__mmask8)(some & ~leaf), _mm512_load_si512(&s->pending[i]),
+                                                            _mm512_sllv_epi64(_mm512_set1_epi64(1), level)));
+    turn->choosing |= (uint64_t)(lives & ~cells) << i;
+    _mm512_store_si512(&s->level[i], _mm512_set1_epi64(-1));
+    _mm_storel_epi64((__m128i *)(void *)(turn->at_leaf + turn->leaves),
+                     _mm_maskz_compress_epi8((__mmask16)cells, _mm_add_epi8(_mm_set1_epi8((char)i), _mm_set_epi64x(0, 0x0706050403020100))));
+    turn->leaves += __builtin_popcount(cells);
+}
+
+/* Takes the next child of the lowest level that has any, and sends for it; returns the rays that have none left. */
+ISOGI_VOL__AVX512 ISOGI_VOL__INLINE unsigned isogi_vol__choose(const isogi_vol__turn *turn, isogi_vol__pool *s, int i, __mmask8 choosing) {
+    const __m512i one = _mm512_set1_epi64(1), three = _mm512_set1_epi64(3);
+    __m512i pending = _mm512_load_si512(&s->pending[i]), mask = _mm512_setzero_si512(), cell = _mm512_load_si512(&s->cell[i]);
+    const __mmask8 some = _mm512_mask_test_epi64_mask(choosing, pending, pending);
+    const __m512i n = _mm512_popcnt_epi64(_mm512_andnot_si512(pending, _mm512_sub_epi64(pending, one))), shift = _mm512_add_epi64(n, n);
+    __m512i rest, child, x, y, z, address;
+    int k;
+    for (k = 1; k < turn->levels; k++) mask = _mm512_mask_load_epi64(mask, _mm512_cmpeq_epi64_mask(n, _mm512_set1_epi64(k)), s->mask[k] + i);
+    rest = _mm512_and_si512(mask, _mm512_sub_epi64(mask, one));
+    for (k = 1; k < turn->levels; k++) _mm512_mask_store_epi64(s->mask[k] + i, _mm512_mask_cmpeq_epi64_mask(some, n, _mm512_set1_epi64(k)), rest);
+    child = _mm512_xor_si512(_mm512_popcnt_epi64(_mm512_andnot_si512(mask, _mm512_sub_epi64(mask, one))), _mm512_load_si512(&s->flip[i]));
+    pending = _mm512_mask_and_epi64(pending, (__mmask8)(some & _mm512_testn_epi64_mask(rest, rest)), pending, _mm512_sub_epi64(pending, one));
+    _mm512_store_si512(&s->pending[i], pending);
+    /* the cell's digits above the child's, then the child's */
+    {
+        const __m512i ffff = _mm512_set1_epi64(0xffff), parent = _mm512_add_epi64(shift, _mm512_set1_epi64(2));
+        const __m512i px = _mm512_srlv_epi64(_mm512_and_si512(cell, ffff), parent), py = _mm512_srlv_epi64(_mm512_and_si512(_mm512_srli_epi64(cell, 16), ffff), parent);
+        const __m512i pz = _mm512_srlv_epi64(_mm512_and_si512(_mm512_srli_epi64(cell, 32), ffff), parent);
+        x = _mm512_sllv_epi64(_mm512_or_si512(_mm512_slli_epi64(px, 2), _mm512_and_si512(child, three)), shift);
+        y = _mm512_sllv_epi64(_mm512_or_si512(_mm512_slli_epi64(py, 2), _mm512_and_si512(_mm512_srli_epi64(child, 2), three)), shift);
+        z = _mm512_sllv_epi64(_mm512_or_si512(_mm512_slli_epi64(pz, 2), _mm512_srli_epi64(child, 4)), shift);
+        address = _mm512_add_epi64(py, _mm512_mul_epu32(pz, _mm512_permutexvar_epi64(n, turn->parents1)));
+        address = _mm512_add_epi64(px, _mm512_mul_epu32(address, _mm512_permutexvar_epi64(n, turn->parents0)));
+        address = _mm512_add_epi64(_mm512_add_epi64(child, _mm512_slli_epi64(address, 6)), _mm512_permutexvar_epi64(n, turn->first));
+        address = _mm512_add_epi64(_mm512_slli_epi64(address, 7), _mm512_set1_epi64((int64_t)(uintptr_t)turn->p->nodes));
+    }
+    cell = _mm512_or_si512(x, _mm512_or_si512(_mm512_slli_epi64(y, 16), _mm512_slli_epi64(z, 32)));
+    _mm512_mask_store_epi64(&s->cell[i], some, cell);
+    _mm512_mask_store_epi64(&s->address[i], some, address);
+    _mm512_mask_store_epi64(&s->level[i], some, _mm512_sub_epi64(n, one));
+    for (k = 0; k < 8; k++) {
+        const char *node = (const char *)(uintptr_t)s->address[i + k];
+        _mm_prefetch(node, _MM_HINT_T0), _mm_prefetch(node + 64, _MM_HINT_T0);
+    }
+    return (unsigned)(choosing & ~some);
+}
+
+/* The slots of a list as numbers; beyond its end there are others, or 0. */
+ISOGI_VOL__AVX512 ISOGI_VOL__INLINE __m512i isogi_vol__slots8(const uint8_t *slots) {
+    return _mm512_cvtepu8_epi64(_mm_loadl_epi64((const __m128i *)(const void *)slots));
+}
+
+/* One lane of eight corners after the other, of x, then y, then z, at the begin and end of the way through the cell. */
+ISOGI_VOL__AVX512 ISOGI_VOL__INLINE __m256 isogi_vol__mix8(__m256 a, __m256 b, __m256 u) { return _mm256_fmadd_ps(u, _mm256_sub_ps(b, a), a); }
+
+/* The next cells of up to eight rays, in float. Rays that are certainly on one side all along are done with theirs; the others are in
+   doubt, and hits are among them. `any`: certain hits are reported at once instead; returns them. */
+ISOGI_VOL__AVX512 ISOGI_VOL__INLINE unsigned isogi_vol__look(isogi_vol__turn *turn, isogi_vol__pool *s, const uint8_t *slots, int count, int *again) {
+    const __mmask8 lanes = (__mmask8)((1u << count) - 1);
+    const __m512i slot = isogi_vol__slots8(slots);
+    const __m512i mask = _mm512_i64gather_epi64(slot, s->mask[0], 8), rest = _mm512_and_si512(mask, _mm512_sub_epi64(mask, _mm512_set1_epi64(1)));
+    const __m512i child = _mm512_xor_si512(_mm512_popcnt_epi64(_mm512_andnot_si512(mask, _mm512_sub_epi64(mask, _mm512_set1_epi64(1)))), _mm512_i64gather_epi64(slot, s->flip, 8));
+    const __m512i three = _mm512_set1_epi64(3), corner = _mm512_and_si512(_mm512_i64gather_epi64(slot, s->cell, 8), _mm512_set1_epi64(0xffffffffffff)), side = _mm512_i64gather_epi64(slot, s->side, 8);
+    __m512i cell = _mm512_andnot_si512(_mm512_set1_epi64(0x000300030003), corner), code = _mm512_i64gather_epi64(slot, s->address, 8);
+    const __m512i dx = _mm512_and_si512(child, three), dy = _mm512_and_si512(_mm512_srli_epi64(child, 2), three), dz = _mm512_srli_epi64(child, 4);
+    __m512i begin = _mm512_set1_epi64(3), end = _mm512_i64gather_epi64(slot, s->end, 8);
+    const __m256 step = _mm512_cvtpd_ps(_mm512_i64gather_pd(slot, s->step, 8));
+    __m256 from[3], to[3];
+    __mmask8 in, out, sure, hit = 0;
+    cell = _mm512_or_si512(cell, _mm512_or_si512(dx, _mm512_or_si512(_mm512_slli_epi64(dy, 16), _mm512_slli_epi64(dz, 32))));
+    code = _mm512_add_epi64(_mm512_add_epi64(code, dx), _mm512_add_epi64(_mm512_mul_epu32(dy, _mm512_set1_epi64(5)), _mm512_mul_epu32(dz, _mm512_set1_epi64(25))));
+    _mm512_mask_i64scatter_epi64(s->mask[0], lanes, slot, rest, 8);
+    {
+        __m512d local[3], dir[3];
+#define ISOGI_VOL__AXIS(a)                                                                                                              \
+    {                                                                                                                                   \
+        const __m512d at = _mm512_cvtepi64_pd(_mm512_and_si512(_mm512_srli_epi64(cell, 16 * a), _mm512_set1_epi64(0xffff)));             \
+        const __m512d origin = _mm512_i64gather_pd(slot, s->origin[a], 8), inverse = _mm512_i64gather_pd(slot, s->inverse[a], 8);        \
+        const __m512d next = _mm512_add_pd(at, _mm512_set1_pd(1));                                                                      \
+        const __mmask8 fall = _mm512_movepi64_mask(_mm512_castpd_si512(inverse));                                                       \
+        begin = _mm512_max_epi64(begin, isogi_vol__when(_mm512_mask_mov_pd(at, fall, next), origin, inverse, a));                        \
+        end = _mm512_min_epi64(end, isogi_vol__when(_mm512_mask_mov_pd(next, fall, at), origin, inverse, a));                            \
+        local[a] = _mm512_sub_pd(origin, at), dir[a] = _mm512_i64gather_pd(slot, s->dir[a], 8);                                          \
+    }
+        ISOGI_VOL__AXIS(0)
+        ISOGI_VOL__AXIS(1)
+        ISOGI_VOL__AXIS(2)
+#undef ISOGI_VOL__AXIS
+        {
+            const __m256 zero = _mm256_setzero_ps(), one = _mm256_set1_ps(1);
+            int a;
+            for (a = 0; a < 3; a++) {
+                from[a] = _mm256_min_ps(_mm256_max_ps(_mm512_cvtpd_ps(_mm512_fmadd_pd(_mm512_castsi512_pd(begin), dir[a], local[a])), zero), one);
+                to[a] = _mm256_min_ps(_mm256_max_ps(_mm512_cvtpd_ps(_mm512_fmadd_pd(_mm512_castsi512_pd(end), dir[a], local[a])), zero), one);
+            }
+        }
+    }
+    {
+        const __m256i byte = _mm256_set1_epi32(255);
+        __m256 x[2][4], f[2][2][2], near0, near1, far0, far1, sum1, sum2, ends_low, ends_high, low, high, third_low, third_high;
+        int k, e;
+        for (k = 0; k < 4; k++) {
+            const __m256i pair = _mm512_mask_i64gather_epi32(_mm256_setzero_si256(), lanes, _mm512_add_epi64(code, _mm512_set1_epi64((k & 1) * 5 + (k >> 1) * 25)), (const int *)0, 1);
+            const __m256 a = _mm256_cvtepi32_ps(_mm256_and_si256(pair, byte)), b = _mm256_cvtepi32_ps(_mm256_and_si256(_mm256_srli_epi32(pair, 8), byte));
+            x[0][k] = isogi_vol__mix8(a, b, from[0]), x[1][k] = isogi_vol__mix8(a, b, to[0]);
+        }
+        for (e = 0; e < 2; e++) {
+            near0 = isogi_vol__mix8(x[e][0], x[e][1], from[1]), near1 = isogi_vol__mix8(x[e][2], x[e][3], from[1]);
+            far0 = isogi_vol__mix8(x[e][0], x[e][1], to[1]), far1 = isogi_vol__mix8(x[e][2], x[e][3], to[1]);
+            f[e][0][0] = isogi_vol__mix8(near0, near1, from[2]), f[e][0][1] = isogi_vol__mix8(near0, near1, to[2]);
+            f[e][1][0] = isogi_vol__mix8(far0, far1, from[2]), f[e][1][1] = isogi_vol__mix8(far0, far1, to[2]);
+        }
+        sum1 = _mm256_add_ps(f[1][0][0], _mm256_add_ps(f[0][1][0], f[0][0][1])), sum2 = _mm256_add_ps(f[0][1][1], _mm256_add_ps(f[1][0][1], f[1][1][0]));
+        ends_low = _mm256_min_ps(f[0][0][0], f[1][1][1]), ends_high = _mm256_max_ps(f[0][0][0], f[1][1][1]);
+        low = _mm256_sub_ps(step, _mm256_set1_ps(ISOGI_VOL__DOUBT)), high = _mm256_add_ps(step, _mm256_set1_ps(ISOGI_VOL__DOUBT));
+        third_low = _mm256_mul_ps(low, _mm256_set1_ps(3)), third_high = _mm256_mul_ps(high, _mm256_set1_ps(3));
+        in = (__mmask8)(_mm256_cmp_ps_mask(ends_low, high, _CMP_GT_OQ) & _mm256_cmp_ps_mask(_mm256_min_ps(sum1, sum2), third_high, _CMP_GT_OQ));
+        out = (__mmask8)(_mm256_cmp_ps_mask(ends_high, low, _CMP_LT_OQ) & _mm256_cmp_ps_mask(_mm256_max_ps(sum1, sum2), third_low, _CMP_LT_OQ));
+        in = (__mmask8)(in & _mm512_test_epi64_mask(_mm512_set1_epi64(1), side));                  /* 1 or -1 */
+        out = (__mmask8)(out & _mm512_testn_epi64_mask(_mm512_add_epi64(side, _mm512_set1_epi64(1)), _mm512_set1_epi64(~1))); /* 0 or -1 */
+        sure = (__mmask8)((in | out) & lanes);
+        if (turn->any) {
+            const __mmask8 in0 = _mm256_cmp_ps_mask(f[0][0][0], high, _CMP_GT_OQ), out0 = _mm256_cmp_ps_mask(f[0][0][0], low, _CMP_LT_OQ);
+            const __mmask8 in1 = _mm256_cmp_ps_mask(f[1][1][1], high, _CMP_GT_OQ), out1 = _mm256_cmp_ps_mask(f[1][1][1], low, _CMP_LT_OQ);
+            const __mmask8 unknown = _mm512_cmpeq_epi64_mask(side, _mm512_set1_epi64(-1)), was_in = _mm512_cmpeq_epi64_mask(side, _mm512_set1_epi64(1));
+            const __mmask8 was_out = _mm512_testn_epi64_mask(side, side);
+            hit = (__mmask8)(lanes & ((out1 & (was_in | (unknown & in0))) | (in1 & (was_out | (unknown & out0)))));
+            sure = (__mmask8)(sure & ~hit);
+        }
+        _mm512_mask_i64scatter_epi64(s->side, sure, slot, _mm512_maskz_mov_epi64(in, _mm512_set1_epi64(1)), 8);
+    }
+    {
+        const __mmask8 more = _mm512_test_epi64_mask(rest, rest), doubt = (__mmask8)(lanes & ~sure & ~hit);
+        const __m128i list = _mm_loadl_epi64((const __m128i *)(const void *)slots);
+        __m512i bit = _mm512_sllv_epi64(_mm512_set1_epi64(1), slot);
+        turn->cells += (uint64_t)count;
+        /* which axes it enters and leaves by goes along */
+        cell = _mm512_or_si512(cell, _mm512_or_si512(_mm512_slli_epi64(_mm512_and_si512(begin, three), 48), _mm512_slli_epi64(_mm512_and_si512(end, three), 50)));
+        _mm512_mask_i64scatter_epi64(s->cell, doubt, slot, cell, 8);
+        _mm_storel_epi64((__m128i *)(void *)(turn->at_leaf + *again), _mm_maskz_compress_epi8((__mmask16)(sure & more), list));
+        *again += __builtin_popcount((unsigned)(sure & more));
+        _mm_storel_epi64((__m128i *)(void *)(turn->in_doubt + turn->doubts), _mm_maskz_compress_epi8((__mmask16)doubt, list));
+        turn->doubts += __builtin_popcount(doubt);
+        turn->choosing |= (uint64_t)_mm512_mask_reduce_or_epi64((__mmask8)(sure & ~more), bit);
+    }
+    return hit;
+}
+
+/* Puts a walk that is set up and clipped into a slot; 0: it has to be walked alone. */
+static int isogi_vol__seat(isogi_vol__pool *s, int i, const isogi_vol__walk *w) {
     const isogi_pyramid *p = w->pyramid;
-    const __m256d zero = _mm256_setzero_pd(), origin = _mm256_loadu_pd(w->origin), dir = _mm256_loadu_pd(w->dir), box = _mm256_loadu_pd(p->box);
-    const __m256d space = _mm256_castsi256_pd(_mm256_setr_epi64x(-1, -1, -1, 0)), one = _mm256_set1_pd(1);
-    const __m256d still = _mm256_and_pd(_mm256_cmp_pd(dir, zero, _CMP_EQ_OQ), space);
-    /* a ray that stands still on an axis keeps below the volume's upper border */
-    const __m256d fall = _mm256_or_pd(_mm256_cmp_pd(dir, zero, _CMP_LT_OQ), _mm256_and_pd(still, _mm256_cmp_pd(origin, box, _CMP_GE_OQ)));
-    const __m256d minus = _mm256_and_pd(fall, _mm256_set1_pd(-0.0));
-    const int bits = _mm256_movemask_pd(fall), top = p->node_levels;
+    int low, high, a, flip = 0;
     double end = w->end;
-    isogi_vol__quantise_isovalue(p, w->isovalue, &r->low, &r->high);
-    if (!(end > 1e-150) || !(end < 1e150) || r->low > r->high) return 0;
-    _mm256_store_pd(r->origin, origin);
-    _mm256_store_pd(r->inverse, _mm256_blendv_pd(_mm256_loadu_pd(w->inverse), _mm256_or_pd(_mm256_set1_pd(1e200), minus), still));
-    _mm256_store_pd(r->sign, _mm256_and_pd(space, _mm256_or_pd(one, minus)));
-    _mm_store_si128((__m128i *)(void *)r->fall, _mm256_cvttpd_epi32(_mm256_and_pd(fall, one)));
-    r->flip = (bits & 1) * 3 | (bits >> 1 & 1) * 12 | (bits >> 2 & 1) * 48;
-    memcpy(&r->end, &end, sizeof end);
-    r->end |= 3;
-    _mm_store_si128((__m128i *)(void *)r->node[top], _mm_setzero_si128());
-    r->mask[top] = (uint64_t)1 << r->flip, r->pending = 1u << top;
+    s->level_units[i] = (double)isogi_vol__quantise_isovalue(p, w->isovalue, &low, &high);
+    if (!(end > 1e-150) || !(end < 1e150) || low > high) return 0;
+    for (a = 0; a < 3; a++) {
+        const int still = !(w->dir[a] < 0 || w->dir[a] > 0);
+        /* a ray that stands still on an axis keeps below the volume's upper border */
+        const int fall = still ? w->origin[a] >= p->cells[a] : w->dir[a] < 0;
+        s->origin[a][i] = w->origin[a], s->dir[a][i] = w->dir[a];
+        s->inverse[a][i] = still ? fall ? -1e200 : 1e200 : w->inverse[a];
+        flip |= fall ? 3 << 2 * a : 0;
+    }
+    memcpy(&s->end[i], &end, sizeof end);
+    s->end[i] |= 3;
+    s->flip[i] = flip, s->low[i] = low, s->beyond[i] = high + 1;
+    s->level[i] = p->node_levels - 1, s->pending[i] = 0, s->cell[i] = 0;
+    s->address[i] = (uint64_t)(uintptr_t)p->nodes[p->node_level[p->node_levels - 1].first];
+    s->side[i] = w->deflate ? -2 : w->inside;
+    s->base[i] = w->base, s->stop[i] = end, s->isovalue[i] = w->isovalue, s->deflated[i] = w->deflated, s->entry_axis[i] = (int8_t)w->entry_axis;
     return 1;
 }
+
+/* A cell in doubt, in double; 1: hit. */
+static int isogi_vol__decide(isogi_vol__batch *b, isogi_vol__pool *s, int i, isogi_hit *hit) {
+    const int64_t cell = s->cell[i];
+    const int in = (int)(cell >> 48 & 3), out = (int)(cell >> 50 & 3);
+    isogi_vol__walk w;
+    int a, found;
+    for (a = 0; a < 3; a++) w.origin[a] = s->origin[a][i], w.dir[a] = s->dir[a][i], w.inverse[a] = s->inverse[a][i];
+    w.origin[3] = w.dir[3] = w.inverse[3] = 0;
+    w.pyramid = b->pyramid, w.base = s->base[i], w.t = 0, w.end = s->stop[i], w.isovalue = s->isovalue[i];
+    w.deflate = s->side[i] == -2, w.inside = w.deflate ? -1 : (int)s->side[i], w.deflated = s->deflated[i];
+    w.exact = b->hits != NULL, w.cap = 1, w.end_is_border = 0;
+    w.count.cubics = w.count.cells = 0;
+    found = isogi_vol__mixed_cell_avx2(&w, (int)(cell & 0xffff), (int)(cell >> 16 & 0xffff), (int)(cell >> 32 & 0xffff), in == 3 ? s->entry_axis[i] : in,
+                                       out == 3 ? -1 : out, hit);
+    b->work.cubics += w.count.cubics;
+    s->side[i] = w.deflate ? -2 : w.inside, s->deflated[i] = w.deflated;
+    return found;
+}
+
+/* Eight cells in doubt at once: the operations of the code for one, in its order and without contraction, hence its bits. Returns the
+   hits; *alone: those that are not an everyday crossing and are left to that code. */
+#define ISOGI_VOL__ADD(a, b) _mm512_add_round_pd(a, b, _MM_FROUND_CUR_DIRECTION)
+#define ISOGI_VOL__SUB(a, b) _mm512_sub_round_pd(a, b, _MM_FROUND_CUR_DIRECTION)
+#define ISOGI_VOL__MUL(a, b) _mm512_mul_round_pd(a, b, _MM_FROUND_CUR_DIRECTION)
+ISOGI_VOL__AVX512 ISOGI_VOL__INLINE __m512d isogi_vol__lerp8(__m512d a, __m512d b, __m512d u, __m512d rest) {
+    return ISOGI_VOL__ADD(ISOGI_VOL__MUL(rest, a), ISOGI_VOL__MUL(u, b));
+}
+
+/* The root of everyday cubics: cubic_refine's first loop. *slow: those that need its second one. */
+ISOGI_VOL__AVX512 ISOGI_VOL__INLINE __m512d isogi_vol__refine8(const __m512d b[4], __mmask8 lanes, __mmask8 *slow) {
+    const __m512d zero = _mm512_setzero_pd(), one = _mm512_set1_pd(1), three = _mm512_set1_pd(3), two = _mm512_set1_pd(2);
+    const __m512d c1 = ISOGI_VOL__MUL(three, ISOGI_VOL__SUB(b[1], b[0]));
+    const __m512d c2 = ISOGI_VOL__MUL(three, ISOGI_VOL__ADD(ISOGI_VOL__SUB(b[0], b[1]), ISOGI_VOL__SUB(b[2], b[1])));
+    const __m512d c3 = ISOGI_VOL__ADD(ISOGI_VOL__SUB(b[3], b[0]), ISOGI_VOL__MUL(three, ISOGI_VOL__SUB(b[1], b[2])));
+    const __m512d bend = ISOGI_VOL__MUL(_mm512_set1_pd(1e13), ISOGI_VOL__ADD(_mm512_abs_pd(c2), ISOGI_VOL__MUL(three, _mm512_abs_pd(c3))));
+    __m512d s = _mm512_div_pd(b[0], ISOGI_VOL__SUB(b[0], b[3])), next = s;
+    __mmask8 todo = lanes;
+    int i;
+    *slow = (__mmask8)(lanes & (_mm512_cmp_pd_mask(b[0], zero, _CMP_EQ_OQ) | _mm512_cmp_pd_mask(b[3], zero, _CMP_EQ_OQ)));
+    todo = (__mmask8)(todo & ~*slow);
+    for (i = 0; i < 4 && todo; i++) {
+        const __m512d ss = ISOGI_VOL__MUL(s, s);
+        const __m512d value = ISOGI_VOL__ADD(ISOGI_VOL__ADD(b[0], ISOGI_VOL__MUL(s, c1)), ISOGI_VOL__MUL(ss, ISOGI_VOL__ADD(c2, ISOGI_VOL__MUL(s, c3))));
+        const __m512d slope = ISOGI_VOL__ADD(ISOGI_VOL__ADD(c1, ISOGI_VOL__MUL(ISOGI_VOL__MUL(two, s), c2)), ISOGI_VOL__MUL(ss, ISOGI_VOL__MUL(three, c3)));
+        const __m512d step = _mm512_div_pd(value, slope), at = ISOGI_VOL__SUB(s, step);
+        const __mmask8 kept = _mm512_mask_cmp_pd_mask(_mm512_cmp_pd_mask(at, zero, _CMP_GE_OQ), at, one, _CMP_LE_OQ);
+        const __mmask8 done = _mm512_cmp_pd_mask(ISOGI_VOL__MUL(ISOGI_VOL__MUL(bend, step), step), _mm512_abs_pd(slope), _CMP_LE_OQ);
+        *slow = (__mmask8)(*slow | (todo & ~kept));
+        todo = (__mmask8)(todo & kept);
+        next = _mm512_mask_mov_pd(next, (__mmask8)(todo & done), at);
+        todo = (__mmask8)(todo & ~done);
+        s = at;
+    }
+    *slow = (__mmask8)(*slow | todo);
+    return next;
+}
+
+/* Corner x + 2y + 4z of eight cells, minus the isovalue. */
+ISOGI_VOL__AVX512 ISOGI_VOL__INLINE void isogi_vol__corners8(const isogi_pyramid *p, __m512i cell, __mmask8 lanes, __m512d isovalue, __m512d c[8]) {
+    const isogi_volume *v = &p->volume;
+    const __m512i field = _mm512_set1_epi64(0xffff);
+    const __m512i x = _mm512_and_si512(cell, field), y = _mm512_and_si512(_mm512_srli_epi64(cell, 16), field), z = _mm512_and_si512(_mm512_srli_epi64(cell, 32), field);
+    int k;
+    if (v->type == ISOGI_F32 && v->stride[0] == 4) {
+        const __m512d scale = _mm512_set1_pd(v->scale), bias = _mm512_set1_pd(v->bias);
+        __m512i at = _mm512_add_epi64(_mm512_slli_epi64(x, 2), _mm512_set1_epi64((int64_t)(intptr_t)v->data));
+        at = _mm512_add_epi64(at, _mm512_add_epi64(_mm512_mullo_epi64(y, _mm512_set1_epi64(v->stride[1])), _mm512_mullo_epi64(z, _mm512_set1_epi64(v->stride[2]))));
+        for (k = 0; k < 4; k++) {
+            const __m512i offset = _mm512_set1_epi64((k & 1 ? v->stride[1] : 0) + (k & 2 ? v->stride[2] : 0));
+            const __m512i pair = _mm512_mask_i64gather_epi64(_mm512_setzero_si512(), lanes, _mm512_add_epi64(at, offset), (const void *)0, 1);
+            c[2 * k] = _mm512_cvtps_pd(_mm256_castsi256_ps(_mm512_cvtepi64_epi32(pair)));
+            c[2 * k + 1] = _mm512_cvtps_pd(_mm256_castsi256_ps(_mm512_cvtepi64_epi32(_mm512_srli_epi64(pair, 32))));
+        }
+        for (k = 0; k < 8; k++) c[k] = ISOGI_VOL__SUB(ISOGI_VOL__ADD(ISOGI_VOL__MUL(c[k], scale), bias), isovalue);
+    } else {
+        __attribute__((aligned(64))) double corner[8][8];
+        __attribute__((aligned(64))) int64_t at[8];
+        int i;
+        memset(corner, 0, sizeof corner);
+        _mm512_store_si512(at, cell);
+        for (i = 0; i < 8; i++) {
+            double one[8];
+            int xyz[3];
+            if (!(lanes >> i & 1)) continue;
+            xyz[0] = (int)(at[i] & 0xffff), xyz[1] = (int)(at[i] >> 16 & 0xffff), xyz[2] = (int)(at[i] >> 32 & 0xffff);
+            isogi_vol__corners(p, xyz, 0, one);
+            for (k = 0; k < 8; k++) corner[k][i] = one[k];
+        }
+        for (k = 0; k < 8; k++) c[k] = ISOGI_VOL__SUB(_mm512_load_pd(corner[k]), isovalue);
+    }
+}
+
+ISOGI_VOL__AVX512 static unsigned isogi_vol__decide8(isogi_vol__batch *b, isogi_vol__pool *s, const uint8_t *slots, int count, unsigned *alone) {
+    const __mmask8 lanes = (__mmask8)((1u << count) - 1);
+    const __m512i slot = isogi_vol__slots8(slots);
+    const __m512i cell = _mm512_i64gather_epi64(slot, s->cell, 8), side = _mm512_i64gather_epi64(slot, s->side, 8), three = _mm512_set1_epi64(3);
+    const __m512i in = _mm512_and_si512(_mm512_srli_epi64(cell, 48), three), out = _mm512_and_si512(_mm512_srli_epi64(cell, 50), three);
+    const __m512d zero = _mm512_setzero_pd(), one = _mm512_set1_pd(1), stop = _mm512_i64gather_pd(slot, s->stop, 8);
+    /* the cell in which a ray begins, or leaves a surface, is a matter for itself */
+    __mmask8 odd = (__mmask8)(_mm512_cmpeq_epi64_mask(in, three) | _mm512_cmpeq_epi64_mask(side, _mm512_set1_epi64(-2))), low, high, b_low, b_high, inside, same, cross, slow;
+    __m512d c[8], from[3], to[3], bezier[4], begin = zero, end = stop, root;
+    *alone = 0;
+    isogi_vol__corners8(b->pyramid, cell, lanes, _mm512_i64gather_pd(slot, s->isovalue, 8), c);
+    {
+        __m512d origin[3], dir[3], at[3];
+        __mmask8 fall[3];
+        int a;
+        for (a = 0; a < 3; a++) {
+            const __mmask8 enters = _mm512_cmpeq_epi64_mask(in, _mm512_set1_epi64(a)), leaves = _mm512_cmpeq_epi64_mask(out, _mm512_set1_epi64(a));
+            const __m512d inverse = _mm512_i64gather_pd(slot, s->inverse[a], 8);
+            origin[a] = _mm512_i64gather_pd(slot, s->origin[a], 8), dir[a] = _mm512_i64gather_pd(slot, s->dir[a], 8);
+            at[a] = _mm512_cvtepi64_pd(_mm512_and_si512(_mm512_srli_epi64(cell, (unsigned)(16 * a)), _mm512_set1_epi64(0xffff)));
+            fall[a] = _mm512_movepi64_mask(_mm512_castpd_si512(inverse));
+            begin = _mm512_mask_mul_pd(begin, enters, _mm512_sub_pd(_mm512_mask_add_pd(at[a], fall[a], at[a], one), origin[a]), inverse);
+            end = _mm512_mask_mul_pd(end, leaves, _mm512_sub_pd(_mm512_mask_add_pd(at[a], (__mmask8)~fall[a], at[a], one), origin[a]), inverse);
+        }
+        begin = _mm512_max_pd(begin, zero), end = _mm512_max_pd(_mm512_min_pd(end, stop), begin);
+        for (a = 0; a < 3; a++) {
+            const __mmask8 enters = _mm512_cmpeq_epi64_mask(in, _mm512_set1_epi64(a)), leaves = _mm512_cmpeq_epi64_mask(out, _mm512_set1_epi64(a));
+            from[a] = ISOGI_VOL__SUB(ISOGI_VOL__ADD(origin[a], ISOGI_VOL__MUL(begin, dir[a])), at[a]);
+            to[a] = ISOGI_VOL__SUB(ISOGI_VOL__ADD(origin[a], ISOGI_VOL__MUL(end, dir[a])), at[a]);
+            from[a] = _mm512_min_pd(_mm512_max_pd(from[a], zero), one), to[a] = _mm512_min_pd(_mm512_max_pd(to[a], zero), one);
+            from[a] = _mm512_mask_mov_pd(from[a], enters, _mm512_maskz_mov_pd(fall[a], one));
+            to[a] = _mm512_mask_mov_pd(to[a], leaves, _mm512_maskz_mov_pd((__mmask8)~fall[a], one));
+        }
+    }
+    {
+        const __m512d rest0[3] = {_mm512_sub_pd(one, from[0]), _mm512_sub_pd(one, from[1]), _mm512_sub_pd(one, from[2])};
+        const __m512d rest1[3] = {_mm512_sub_pd(one, to[0]), _mm512_sub_pd(one, to[1]), _mm512_sub_pd(one, to[2])}, third = _mm512_set1_pd(1.0 / 3);
+        __m512d x[2][4], f[2][2][2]; /* [x][y][z] taken at its end */
+        int k;
+        low = high = 0xff;
+        for (k = 0; k < 8; k++) {
+            const __mmask8 least = _mm512_cmp_pd_mask(c[k], zero, _CMP_GE_OQ);
+            high &= least, low = (__mmask8)(low & ~least);
+        }
+        odd = (__mmask8)(odd | high | low);
+        for (k = 0; k < 4; k++)
+            x[0][k] = isogi_vol__lerp8(c[2 * k], c[2 * k + 1], from[0], rest0[0]), x[1][k] = isogi_vol__lerp8(c[2 * k], c[2 * k + 1], to[0], rest1[0]);
+        for (k = 0; k < 2; k++) {
+            const __m512d near0 = isogi_vol__lerp8(x[k][0], x[k][1], from[1], rest0[1]), near1 = isogi_vol__lerp8(x[k][2], x[k][3], from[1], rest0[1]);
+            const __m512d far0 = isogi_vol__lerp8(x[k][0], x[k][1], to[1], rest1[1]), far1 = isogi_vol__lerp8(x[k][2], x[k][3], to[1], rest1[1]);
+            f[k][0][0] = isogi_vol__lerp8(near0, near1, from[2], rest0[2]), f[k][0][1] = isogi_vol__lerp8(near0, near1, to[2], rest1[2]);
+            f[k][1][0] = isogi_vol__lerp8(far0, far1, from[2], rest0[2]), f[k][1][1] = isogi_vol__lerp8(far0, far1, to[2], rest1[2]);
+        }
+        bezier[0] = f[0][0][0], bezier[3] = f[1][1][1];
+        bezier[1] = ISOGI_VOL__MUL(ISOGI_VOL__ADD(ISOGI_VOL__ADD(f[1][0][0], f[0][1][0]), f[0][0][1]), third);
+        bezier[2] = ISOGI_VOL__MUL(ISOGI_VOL__ADD(ISOGI_VOL__ADD(f[0][1][1], f[1][0][1]), f[1][1][0]), third);
+        for (k = 1, b_low = b_high = 0; k < 3; k++) {
+            const __mmask8 least = _mm512_cmp_pd_mask(bezier[k], zero, _CMP_GE_OQ);
+            if (k == 1) b_low = least;
+            else b_high = least;
+        }
+    }
+    {
+        const __m512d most = _mm512_max_pd(_mm512_max_pd(_mm512_abs_pd(bezier[0]), _mm512_abs_pd(bezier[1])), _mm512_max_pd(_mm512_abs_pd(bezier[2]), _mm512_abs_pd(bezier[3])));
+        const __mmask8 plain = _mm512_mask_cmp_pd_mask(_mm512_cmp_pd_mask(most, _mm512_set1_pd(1e-100), _CMP_GT_OQ), most, _mm512_set1_pd(1e100), _CMP_LT_OQ);
+        const __mmask8 last = _mm512_cmp_pd_mask(bezier[3], zero, _CMP_GE_OQ), known = _mm512_cmpge_epi64_mask(side, _mm512_setzero_si512());
+        inside = _mm512_cmp_pd_mask(bezier[0], zero, _CMP_GE_OQ);
+        odd = (__mmask8)(odd | ~plain | (known & (inside ^ _mm512_test_epi64_mask(side, side))));
+        same = (__mmask8) ~((inside ^ b_low) | (inside ^ b_high) | (inside ^ last));
+        cross = (__mmask8)((inside ^ last) & (~(inside ^ b_low) | (inside ^ b_high)));
+        odd = (__mmask8)((odd | ~(same | cross)) & lanes);
+        cross = (__mmask8)(cross & lanes & ~odd), same = (__mmask8)(same & lanes & ~odd);
+    }
+    b->work.cubics += (uint64_t)__builtin_popcount((unsigned)(same | cross));
+    _mm512_mask_i64scatter_epi64(s->side, same, slot, _mm512_maskz_set1_epi64(inside, 1), 8);
+    if (b->hits && cross) {
+        __attribute__((aligned(64))) double t[8], local[3][8];
+        unsigned k;
+        root = isogi_vol__refine8(bezier, cross, &slow);
+        b->work.cubics -= (uint64_t)__builtin_popcount(slow);
+        odd = (__mmask8)(odd | slow), cross = (__mmask8)(cross & ~slow);
+        {
+            const __m512d rest = _mm512_sub_pd(one, root);
+            _mm512_store_pd(t, ISOGI_VOL__ADD(_mm512_i64gather_pd(slot, s->base, 8), ISOGI_VOL__ADD(begin, ISOGI_VOL__MUL(root, ISOGI_VOL__SUB(end, begin)))));
+            _mm512_store_pd(local[0], isogi_vol__lerp8(from[0], to[0], root, rest));
+            _mm512_store_pd(local[1], isogi_vol__lerp8(from[1], to[1], root, rest));
+            _mm512_store_pd(local[2], isogi_vol__lerp8(from[2], to[2], root, rest));
+        }
+        for (k = cross; k; k &= k - 1) {
+            const int i = __builtin_ctz(k), place = slots[i];
+            const int64_t xyz = s->cell[place];
+            isogi_hit *hit = &b->hits[s->ray[place]];
+            hit->t = t[i], hit->local[0] = local[0][i], hit->local[1] = local[1][i], hit->local[2] = local[2][i];
+            hit->cell[0] = (uint32_t)(xyz & 0xffff), hit->cell[1] = (uint32_t)(xyz >> 16 & 0xffff), hit->cell[2] = (uint32_t)(xyz >> 32 & 0xffff);
+            hit->side = inside >> i & 1 ? -1 : 1;
+        }
+    }
+    *alone = odd;
+    return cross;
+}
+
+/* Sends for the voxels of a cell in doubt. */
+ISOGI_VOL__INLINE void isogi_vol__send_for(const isogi_volume *v, int64_t cell) {
+    const char *p = (const char *)v->data + (ptrdiff_t)(cell & 0xffff) * v->stride[0] + (ptrdiff_t)(cell >> 16 & 0xffff) * v->stride[1] +
+                    (ptrdiff_t)(cell >> 32 & 0xffff) * v->stride[2];
+    const ptrdiff_t dy = v->stride[1], dz = v->stride[2];
+    _mm_prefetch(p, _MM_HINT_T0), _mm_prefetch(p + dy, _MM_HINT_T0), _mm_prefetch(p + dz, _MM_HINT_T0), _mm_prefetch(p + dy + dz, _MM_HINT_T0);
+}
+
+ISOGI_VOL__AVX512 ISOGI_VOL__INLINE void isogi_vol__open_turn(isogi_vol__turn *turn, const isogi_pyramid *p) {
+    __attribute__((aligned(64))) uint64_t first[8], parents0[8], parents1[8];
+    int n;
+    memset(turn, 0, sizeof *turn);
+    memset(first, 0, sizeof first), memset(parents0, 0, sizeof parents0), memset(parents1, 0, sizeof parents1);
+    for (n = 1; n < p->node_levels; n++)
+        first[n] = p->node_level[n - 1].first, parents0[n] = p->node_level[n - 1].parents[0], parents1[n] = p->node_level[n - 1].parents[1];
+    turn->p = p, turn->levels = p->node_levels;
+    turn->first = _mm512_load_si512(first), turn->parents0 = _mm512_load_si512(parents0), turn->parents1 = _mm512_load_si512(parents1);
+}
+
 #endif
 
 /* ==== rays =========================================================================================================== */
@@ -2954,45 +3440,84 @@ static void isogi_vol__trace_one(isogi_vol__batch *b, size_t i) {
 }
 
 #ifdef ISOGI_VOL__AVX
-/* Any number of rays through ISOGI_VOL__WAVE places, each taken again as soon as it is free. */
-ISOGI_VOL__AVX512 static void isogi_vol__trace_wave(isogi_vol__batch *b, size_t count) {
-    isogi_vol__rider rider[ISOGI_VOL__WAVE];
-    isogi_vol__walk walk[ISOGI_VOL__WAVE];
+/* Any number of rays through the slots of a pool, each taken again as soon as it is free. */
+ISOGI_VOL__AVX512 static void isogi_vol__trace_pool(isogi_vol__batch *b, size_t count) {
+    isogi_vol__pool s;
+    isogi_vol__turn turn;
     isogi_hit any;
-    size_t ray[ISOGI_VOL__WAVE], next = 0;
-    uint8_t spare[ISOGI_VOL__WAVE], at_node[2 * ISOGI_VOL__WAVE], at_cell[2 * ISOGI_VOL__WAVE];
-    int spares = 0, nodes = 0, cells = 0, i, k, kept;
-    for (i = ISOGI_VOL__WAVE; i--;) spare[spares++] = (uint8_t)i;
-    do {
+    size_t next = 0;
+    uint8_t spare[ISOGI_VOL__POOL];
+    int spares = 0, groups = count < ISOGI_VOL__POOL ? (int)(count + 7) / 8 : ISOGI_VOL__POOL / 8, i, k, doubts, again, lanes, waits, answered;
+    uint64_t nodes = 0;
+    isogi_vol__open_turn(&turn, b->pyramid);
+    turn.any = b->occluded != NULL;
+    for (i = 8 * groups; i--;) {
+        spare[spares++] = (uint8_t)i, s.level[i] = -1, s.pending[i] = 0, s.cell[i] = 0, s.address[i] = (uint64_t)(uintptr_t)b->pyramid->nodes;
+    }
+    for (;;) {
         for (; spares && next < count; next++) {
-            const int place = spare[spares - 1];
-            isogi_vol__walk *w = &walk[place];
-            if (!isogi_vol__begin(b, next, w)) isogi_vol__finish(b, next, w, 0);
-            else if (isogi_vol__flags(b, next) || !isogi_vol__mount(&rider[place], w))
-                isogi_vol__finish(b, next, w, isogi_vol__walk_ray(w, isogi_vol__flags(b, next), b->hits ? &b->hits[next] : &any));
-            else isogi_vol__choose(b->pyramid, &rider[place]), at_node[nodes++] = (uint8_t)place, ray[place] = next, spares--;
+            isogi_vol__walk w;
+            isogi_hit *hit = b->hits ? &b->hits[next] : &any;
+            const uint32_t flags = isogi_vol__flags(b, next);
+            if (!isogi_vol__begin(b, next, &w)) isogi_vol__finish(b, next, &w, 0);
+            else if (flags || !isogi_vol__seat(&s, spare[spares - 1], &w)) isogi_vol__finish(b, next, &w, isogi_vol__walk_ray(&w, flags, hit));
+            else s.ray[spare[--spares]] = next;
         }
-        for (k = kept = 0; k < nodes; k++) {
-            const int place = at_node[k];
-            int level;
-            isogi_vol__ride_node(b->pyramid, &rider[place]);
-            walk[place].count.blocks++;
-            level = rider[place].level;
-            at_node[kept] = at_cell[cells] = (uint8_t)place;
-            kept += level > 0, cells += level == 0;
-            if (level < 0) isogi_vol__finish(b, ray[place], &walk[place], 0), spare[spares++] = (uint8_t)place;
+        if (spares == 8 * groups) break;
+        turn.choosing = 0, answered = 0;
+        for (i = 0; i < groups; i++) {
+            const __mmask8 lives = _mm512_cmpge_epi64_mask(_mm512_load_si512(&s.level[8 * i]), _mm512_setzero_si512());
+            answered += __builtin_popcount(lives);
+            if (lives) isogi_vol__answer(&turn, &s, 8 * i);
         }
-        nodes = kept;
-        for (k = kept = 0; k < cells; k++) {
-            const int place = at_cell[k];
-            const int found = isogi_vol__ride_cell(b->pyramid, &rider[place], &walk[place], b->hits ? &b->hits[ray[place]] : &any);
-            const int level = found ? -1 : rider[place].level;
-            at_node[nodes] = at_cell[kept] = (uint8_t)place;
-            nodes += level > 0, kept += level == 0;
-            if (level < 0) isogi_vol__finish(b, ray[place], &walk[place], found), spare[spares++] = (uint8_t)place;
+        nodes += (uint64_t)answered;
+        /* stages wait for eight rays to work on, unless most of the pool waits already */
+        waits = 2 * answered < 8 * groups ? 1 : 8;
+        for (doubts = 0; turn.doubts - doubts >= waits; doubts += lanes) {
+            unsigned alone, hits;
+            lanes = turn.doubts - doubts < 8 ? turn.doubts - doubts : 8;
+            hits = isogi_vol__decide8(b, &s, turn.in_doubt + doubts, lanes, &alone);
+            for (k = 0; k < lanes; k++) {
+                const int slot = turn.in_doubt[doubts + k];
+                if (alone >> k & 1) hits |= (unsigned)isogi_vol__decide(b, &s, slot, b->hits ? &b->hits[s.ray[slot]] : &any) << k;
+                if (hits >> k & 1) {
+                    if (b->occluded) b->occluded[s.ray[slot]] = 1;
+                    spare[spares++] = (uint8_t)slot;
+                } else if (s.mask[0][slot]) turn.at_leaf[turn.leaves++] = (uint8_t)slot;
+                else turn.choosing |= (uint64_t)1 << slot;
+            }
         }
-        cells = kept;
-    } while (nodes || cells || next < count);
+        memmove(turn.in_doubt, turn.in_doubt + doubts, (size_t)(turn.doubts - doubts));
+        turn.doubts -= doubts, doubts = turn.doubts;
+        while (turn.leaves >= waits) {
+            for (k = again = 0; turn.leaves - k >= waits; k += lanes) {
+                uint64_t slots;
+                unsigned hits;
+                lanes = turn.leaves - k < 8 ? turn.leaves - k : 8;
+                memcpy(&slots, turn.at_leaf + k, 8);
+                hits = isogi_vol__look(&turn, &s, turn.at_leaf + k, lanes, &again);
+                for (; hits; hits &= hits - 1) {
+                    const int slot = (int)(slots >> 8 * __builtin_ctz(hits) & 255);
+                    b->occluded[s.ray[slot]] = 1;
+                    spare[spares++] = (uint8_t)slot;
+                }
+            }
+            memmove(turn.at_leaf + again, turn.at_leaf + k, (size_t)(turn.leaves - k));
+            turn.leaves += again - k;
+        }
+        for (k = doubts; k < turn.doubts; k++) isogi_vol__send_for(&b->pyramid->volume, s.cell[turn.in_doubt[k]]);
+        for (i = 0; i < groups; i++) {
+            unsigned done;
+            if (!(turn.choosing >> 8 * i & 255)) continue;
+            for (done = isogi_vol__choose(&turn, &s, 8 * i, (__mmask8)(turn.choosing >> 8 * i)); done; done &= done - 1) {
+                const int slot = 8 * i + __builtin_ctz(done);
+                if (b->occluded) b->occluded[s.ray[slot]] = 0;
+                else memset(&b->hits[s.ray[slot]], 0, sizeof b->hits[0]);
+                spare[spares++] = (uint8_t)slot;
+            }
+        }
+    }
+    b->work.blocks += nodes, b->work.cells += turn.cells;
 }
 #ifndef __clang__
 #pragma GCC diagnostic pop
@@ -3003,10 +3528,8 @@ static isogi_result isogi_vol__trace(isogi_vol__batch *b, size_t count, isogi_co
     size_t i = 0;
     memset(&b->work, 0, sizeof b->work);
 #ifdef ISOGI_VOL__AVX
-    /* small volumes stay in the cache, and so do neighbouring rays: nothing to wait for */
-    if (b->pyramid->fast && b->pyramid->path == ISOGI_VOL__PATH_AVX512 &&
-        (b->pyramid->context.force_path == ISOGI_VOL__PATH_AVX512 || (count >= 32 && b->pyramid->node_count > ISOGI_VOL__WAVE_NODES)))
-        isogi_vol__trace_wave(b, count), i = count;
+    if (b->pyramid->fast && b->pyramid->path == ISOGI_VOL__PATH_AVX512 && (count > 3 || b->pyramid->context.force_path == ISOGI_VOL__PATH_AVX512))
+        isogi_vol__trace_pool(b, count), i = count;
 #endif
     for (; i < count; i++) isogi_vol__trace_one(b, i);
     if (counters) {
@@ -4280,6 +4803,19 @@ ISOGI_API void isogi_vol_mesh_free(const isogi_pyramid *pyramid, isogi_mesh *mes
     memset(mesh, 0, sizeof *mesh);
 }
 
+#undef ISOGI_VOL__ADD
+#undef ISOGI_VOL__ALL64
+#undef ISOGI_VOL__CODES
+#undef ISOGI_VOL__DOUBT
+#undef ISOGI_VOL__LEAF_AVX2
+#undef ISOGI_VOL__LEAF_AVX512
+#undef ISOGI_VOL__LEAF_BASE
+#undef ISOGI_VOL__MUL
+#undef ISOGI_VOL__NODE_AVX2
+#undef ISOGI_VOL__NODE_AVX512
+#undef ISOGI_VOL__NODE_BASE
+#undef ISOGI_VOL__POOL
+#undef ISOGI_VOL__SUB
 #undef ISOGI_VOL__GROUP
 #undef ISOGI_VOL__LEVELS
 #undef ISOGI_VOL__NODE_LEVELS
@@ -4295,17 +4831,11 @@ ISOGI_API void isogi_vol_mesh_free(const isogi_pyramid *pyramid, isogi_mesh *mes
 #undef ISOGI_VOL__TARGET
 #undef ISOGI_VOL__AVX512
 #undef ISOGI_VOL__AVX
-#undef ISOGI_VOL__WAVE
-#undef ISOGI_VOL__WAVE_NODES
 #undef ISOGI_VOL__BELOW_0
 #undef ISOGI_VOL__BELOW_1
 #undef ISOGI_VOL__BELOW_2
 #undef ISOGI_VOL__FIRST
 #undef ISOGI_VOL__LATER
-#undef ISOGI_VOL__PAIRS
-#undef ISOGI_VOL__BELOW
-#undef ISOGI_VOL__ABOVE
-#undef ISOGI_VOL__ALL
 #undef ISOGI_VOL__INLINE
 #undef ISOGI_VOL__UNLIKELY
 #undef ISOGI_VOL__SSE2
