@@ -2896,25 +2896,23 @@ static void isogi_sh__row_sums(double sums[2][ISOGI_SH__GROUP][3], const isogi_s
 }
 
 #ifdef ISOGI_SH__SIMD
-/* Order 5 of an RGB image of even width: opposite texels are added for even m and subtracted for odd ones, so that 9 sums need 9 fused
-   operations for two texels. RGB stays interleaved: the factors are repeated for each channel, and lanes are sorted out at the end of
-   a row. 64 pairs of columns and 16 rows at a time. Lanes sum a few hundred floats, rows are summed in double. */
-#define ISOGI_SH__PAIRS 64
-#define ISOGI_SH__ROWS 16
+/* Order 5 of an RGB image whose width is a multiple of 4. Texels a quarter turn apart share their factors: with e, f the differences of
+   opposite ones and g, h their sums, m = 0 and 4 take g + h, m = 2 takes g - h, m = 1 and 3 take e and f. RGB stays interleaved: factors
+   are repeated for each channel, and a period of 24 floats, 8 texels, is three vectors. Lanes sum a few dozen floats; rows are
+   summed in double. */
+#define ISOGI_SH__QUARTER 256 /* columns whose factors are held */
+#define ISOGI_SH__PITCH (3 * ISOGI_SH__QUARTER)
+#define ISOGI_SH__ROWS 8      /* rows that share them where an image is wider than four times that */
 
-/* factor[2 m - 1 + (sine)][3 pair + channel]; the cosine of m = 0 is 1 */
-static void isogi_sh__image_factors(float (*factor)[3 * ISOGI_SH__PAIRS], int first, int pairs, int width) {
+/* factor[2 m - 2 + (sine)][3 column + channel], m = 1 .. 4, zero beyond `columns` */
+static void isogi_sh__image_factors(float (*factor)[ISOGI_SH__PITCH], int first, int columns, int width) {
     double step = 2 * ISOGI_SH__PI / (double)width, start = 2 * ISOGI_SH__PI - step * ((double)first + 0.5), t;
     double x = cos(start), y = sin(start), turn_c = cos(step), turn_s = -sin(step);
     int i, k, m;
-    for (i = 0; i < ISOGI_SH__PAIRS; i++) {
+    for (i = 0; i < columns; i++) {
         double c = x, s = y;
-        for (k = 0; k < 3; k++) factor[0][3 * i + k] = i < pairs ? 1.0f : 0.0f;
         for (m = 1; m < 5; m++) {
-            for (k = 0; k < 3; k++) {
-                factor[2 * m - 1][3 * i + k] = i < pairs ? (float)c : 0.0f;
-                factor[2 * m][3 * i + k] = i < pairs ? (float)s : 0.0f;
-            }
+            for (k = 0; k < 3; k++) factor[2 * m - 2][3 * i + k] = (float)c, factor[2 * m - 1][3 * i + k] = (float)s;
             t = x * c - y * s;
             s = x * s + y * c;
             c = t;
@@ -2923,95 +2921,109 @@ static void isogi_sh__image_factors(float (*factor)[3 * ISOGI_SH__PAIRS], int fi
         y = x * turn_s + y * turn_c;
         x = t;
     }
+    for (m = 0; m < 8; m++)
+        for (i = 3 * columns; i < ISOGI_SH__PITCH; i++) factor[m][i] = 0;
 }
 
-/* sums of one row over one block of columns, added to total[9][24] */
-ISOGI_SH__AVX2 static void isogi_sh__image_row(float (*total)[24], const float *left, const float *right, int floats, const float (*factor)[3 * ISOGI_SH__PAIRS]) {
-    float even[3 * ISOGI_SH__PAIRS], odd[3 * ISOGI_SH__PAIRS];
-    int i, j;
-    for (i = 0; i + 8 <= floats; i += 8) {
-        isogi_sh__f8 a = *(const isogi_sh__f8 *)(left + i), b = *(const isogi_sh__f8 *)(right + i);
-        *(isogi_sh__f8 *)(even + i) = a + b;
-        *(isogi_sh__f8 *)(odd + i) = a - b;
+/* The sums of one row over one block of columns, a third of the lanes: sum[0] for m = 0, then cosine and sine for each m. */
+ISOGI_SH__AVX2 static void isogi_sh__image_row(isogi_sh__f8 *sum, const float *row, size_t quarter, int floats, const float *factor) {
+    isogi_sh__f8 a = sum[0], c1 = sum[1], s1 = sum[2], c2 = sum[3], s2 = sum[4], c3 = sum[5], s3 = sum[6], c4 = sum[7], s4 = sum[8];
+    int i;
+    for (i = 0; i < floats; i += 24) {
+        const float *p = row + i, *by = factor + i;
+        isogi_sh__f8 p0 = *(const isogi_sh__f8 *)p, p1 = *(const isogi_sh__f8 *)(p + quarter);
+        isogi_sh__f8 p2 = *(const isogi_sh__f8 *)(p + 2 * quarter), p3 = *(const isogi_sh__f8 *)(p + 3 * quarter);
+        isogi_sh__f8 e = p0 - p2, f = p1 - p3, g = p0 + p2, h = p1 + p3, all = g + h;
+        isogi_sh__f8 c = *(const isogi_sh__f8 *)(by), s = *(const isogi_sh__f8 *)(by + ISOGI_SH__PITCH);
+        a += all;
+        c1 = ISOGI_SH__FMA_F8(e, c, ISOGI_SH__FMA_F8(f, s, c1)), s1 = ISOGI_SH__FMA_F8(e, s, ISOGI_SH__FMA_F8(-f, c, s1));
+        g -= h;
+        c2 = ISOGI_SH__FMA_F8(g, *(const isogi_sh__f8 *)(by + 2 * ISOGI_SH__PITCH), c2), s2 = ISOGI_SH__FMA_F8(g, *(const isogi_sh__f8 *)(by + 3 * ISOGI_SH__PITCH), s2);
+        c = *(const isogi_sh__f8 *)(by + 4 * ISOGI_SH__PITCH), s = *(const isogi_sh__f8 *)(by + 5 * ISOGI_SH__PITCH);
+        c3 = ISOGI_SH__FMA_F8(e, c, ISOGI_SH__FMA_F8(-f, s, c3)), s3 = ISOGI_SH__FMA_F8(e, s, ISOGI_SH__FMA_F8(f, c, s3));
+        c4 = ISOGI_SH__FMA_F8(all, *(const isogi_sh__f8 *)(by + 6 * ISOGI_SH__PITCH), c4), s4 = ISOGI_SH__FMA_F8(all, *(const isogi_sh__f8 *)(by + 7 * ISOGI_SH__PITCH), s4);
     }
-    for (; i < floats; i++) even[i] = left[i] + right[i], odd[i] = left[i] - right[i];
-    for (; i < 3 * ISOGI_SH__PAIRS; i++) even[i] = odd[i] = 0;
-    for (j = 0; j < 9; j++) {
-        const float *value = ((j + 1) / 2) & 1 ? odd : even, *by = factor[j];
-        isogi_sh__f8 a = *(const isogi_sh__f8 *)total[j], b = *(const isogi_sh__f8 *)(total[j] + 8), c = *(const isogi_sh__f8 *)(total[j] + 16);
-        for (i = 0; i < 3 * ISOGI_SH__PAIRS; i += 24) {
-            a = ISOGI_SH__FMA_F8(*(const isogi_sh__f8 *)(value + i), *(const isogi_sh__f8 *)(by + i), a);
-            b = ISOGI_SH__FMA_F8(*(const isogi_sh__f8 *)(value + i + 8), *(const isogi_sh__f8 *)(by + i + 8), b);
-            c = ISOGI_SH__FMA_F8(*(const isogi_sh__f8 *)(value + i + 16), *(const isogi_sh__f8 *)(by + i + 16), c);
-        }
-        *(isogi_sh__f8 *)total[j] = a;
-        *(isogi_sh__f8 *)(total[j] + 8) = b;
-        *(isogi_sh__f8 *)(total[j] + 16) = c;
-    }
+    sum[0] = a, sum[1] = c1, sum[2] = s1, sum[3] = c2, sum[4] = s2, sum[5] = c3, sum[6] = s3, sum[7] = c4, sum[8] = s4;
 }
 
-/* Fejer's weights of ISOGI_SH__ROWS rows side by side; see isogi_sh__fejer. */
-static void isogi_sh__fejer_rows(double *weight, int row, int rows) {
-    double c[ISOGI_SH__ROWS], now[ISOGI_SH__ROWS], before[ISOGI_SH__ROWS];
+/* All lanes of a row over one block of columns: what is no multiple of 8 columns goes through a copy, since nothing may be read behind
+   the image. */
+ISOGI_SH__AVX2 static void isogi_sh__image_block(isogi_sh__f8 (*sum)[9], const float *row, size_t quarter, int columns, const float *factor) {
+    float rest[4][24];
+    int j, k, whole = columns / 8 * 24;
+    for (j = 0; j < 3; j++) isogi_sh__image_row(sum[j], row + 8 * j, quarter, whole, factor + 8 * j);
+    if (whole == 3 * columns) return;
+    memset(rest, 0, sizeof rest);
+    for (k = 0; k < 4; k++) memcpy(rest[k], row + (size_t)k * quarter + whole, sizeof(float) * (size_t)(3 * columns - whole));
+    for (j = 0; j < 3; j++) isogi_sh__image_row(sum[j], rest[0] + 8 * j, 24, 24, factor + whole + 8 * j);
+}
+
+/* Fejer's weights of ISOGI_SH__ROWS rows side by side, from c = cos 2t; see isogi_sh__fejer. Chebyshev's recursion loses k^2 ulps of
+   a term that counts 1 / k^2. */
+ISOGI_SH__AVX2 static void isogi_sh__fejer_rows(double *weight, const double *cosine, int rows) {
+    isogi_sh__d4 zero = {0}, c[2], now[2], before[2], sum[2];
     int j, k;
+    for (j = 0; j < 2; j++) c[j] = now[j] = *(const isogi_sh__d4 *)(cosine + 4 * j), before[j] = sum[j] = zero + 1, c[j] += c[j];
     for (k = 1; k <= rows / 2; k++) {
-        double factor = 2 / ((double)(2 * k - 1) * (double)(2 * k + 1));
-        for (j = 0; j < ISOGI_SH__ROWS; j++) {
-            double angle, next;
-            if (k == 1) weight[j] = 1;
-            if ((k & 31) == 0 || k == 1) {
-                angle = ISOGI_SH__PI * (double)(2 * (row + j) + 1) / (double)rows;
-                if (k == 1) c[j] = cos(angle);
-                now[j] = cos((double)k * angle), before[j] = cos((double)(k - 1) * angle);
-            }
-            weight[j] -= factor * now[j];
-            next = 2 * c[j] * now[j] - before[j];
+        double factor = -2 / ((double)(2 * k - 1) * (double)(2 * k + 1));
+        for (j = 0; j < 2; j++) {
+            isogi_sh__d4 next = ISOGI_SH__FMA_D4(c[j], now[j], -before[j]);
+            sum[j] = ISOGI_SH__FMA_D4(now[j], factor - zero, sum[j]);
             before[j] = now[j];
             now[j] = next;
         }
     }
-    for (j = 0; j < ISOGI_SH__ROWS; j++) weight[j] *= 2 / (double)rows;
+    for (j = 0; j < 2; j++) *(isogi_sh__d4 *)(weight + 4 * j) = sum[j] * (2 / (double)rows);
 }
 
-static void isogi_sh__project_fast(float *rgb, const float *image, int width, int height) {
-    float factor[9][3 * ISOGI_SH__PAIRS], lanes[ISOGI_SH__ROWS][9][24];
-    double total[25][3], weight[ISOGI_SH__ROWS], q[5];
-    int row, first, j, i, k, l, m, half = width / 2;
+/* total[25][12]: += what one row, at z = cos t with weight `power`, adds to each coefficient; 4 texels x 3 channels to be summed later */
+ISOGI_SH__AVX2 static void isogi_sh__image_add(double (*total)[12], isogi_sh__f8 (*sum)[9], double z, double sine, double power) {
+    isogi_sh__d4 part[9][3], zero = {0};
+    double q[5];
+    int j, k, l, m;
+    for (k = 0; k < 9; k++) {
+        isogi_sh__f8 a = sum[0][k], b = sum[1][k], c = sum[2][k];
+        part[k][0] = (isogi_sh__d4)__builtin_ia32_cvtps2pd256(__builtin_shufflevector(a, a, 0, 1, 2, 3) + __builtin_shufflevector(b, b, 4, 5, 6, 7));
+        part[k][1] = (isogi_sh__d4)__builtin_ia32_cvtps2pd256(__builtin_shufflevector(a, a, 4, 5, 6, 7) + __builtin_shufflevector(c, c, 0, 1, 2, 3));
+        part[k][2] = (isogi_sh__d4)__builtin_ia32_cvtps2pd256(__builtin_shufflevector(b, b, 0, 1, 2, 3) + __builtin_shufflevector(c, c, 4, 5, 6, 7));
+    }
+    for (m = 0; m < 5; m++, power *= sine) {
+        isogi_sh__column(q, 5, m, isogi_sh__next_diagonal(0, m), z, 0);
+        for (l = m; l < 5; l++)
+            for (k = m ? 2 * m - 1 : 0; k <= 2 * m; k++) {
+                isogi_sh__d4 *to = (isogi_sh__d4 *)total[l * (l + 1) + (k == 2 * m ? -m : m)], by = power * q[l] - zero;
+                for (j = 0; j < 3; j++) to[j] = ISOGI_SH__FMA_D4(part[k][j], by, to[j]);
+            }
+    }
+}
+
+ISOGI_SH__AVX2 static void isogi_sh__project_fast(float *rgb, const float *image, int width, int height) {
+    float factor[8][ISOGI_SH__PITCH];
+    double total[25][12], weight[ISOGI_SH__ROWS], z[ISOGI_SH__ROWS], sine[ISOGI_SH__ROWS], cosine[ISOGI_SH__ROWS];
+    isogi_sh__f8 sum[ISOGI_SH__ROWS][3][9];
+    int row, first, j, i, k, quarter = width / 4;
     memset(total, 0, sizeof total);
     for (row = 0; row < height; row += ISOGI_SH__ROWS) {
         int some = height - row < ISOGI_SH__ROWS ? height - row : ISOGI_SH__ROWS;
-        memset(lanes, 0, sizeof lanes);
-        for (first = 0; first < half; first += ISOGI_SH__PAIRS) {
-            int pairs = half - first < ISOGI_SH__PAIRS ? half - first : ISOGI_SH__PAIRS;
-            isogi_sh__image_factors(factor, first, pairs, width);
-            for (j = 0; j < some; j++) {
-                const float *left = image + 3 * ((size_t)width * (size_t)(row + j) + (size_t)first);
-                isogi_sh__image_row(lanes[j], left, left + 3 * half, 3 * pairs, (const float(*)[3 * ISOGI_SH__PAIRS])factor);
-            }
+        memset(sum, 0, sizeof sum);
+        for (first = 0; first < quarter; first += ISOGI_SH__QUARTER) {
+            int columns = quarter - first < ISOGI_SH__QUARTER ? quarter - first : ISOGI_SH__QUARTER;
+            if (row == 0 || quarter > ISOGI_SH__QUARTER) isogi_sh__image_factors(factor, first, columns, width);
+            for (j = 0; j < some; j++)
+                isogi_sh__image_block(sum[j], image + 3 * ((size_t)width * (size_t)(row + j) + (size_t)first), 3 * (size_t)quarter, columns, factor[0]);
         }
-        isogi_sh__fejer_rows(weight, row, height);
-        for (j = 0; j < some; j++) {
-            double t = ISOGI_SH__PI * ((double)(row + j) + 0.5) / (double)height, z = cos(t), sine = sin(t), power = weight[j] * 2 * ISOGI_SH__PI / (double)width;
-            for (m = 0; m < 5; m++) {
-                double sums[2][3] = {{0, 0, 0}, {0, 0, 0}};
-                for (i = 0; i < 24; i++) {
-                    sums[0][i % 3] += (double)lanes[j][m ? 2 * m - 1 : 0][i];
-                    if (m) sums[1][i % 3] += (double)lanes[j][2 * m][i];
-                }
-                isogi_sh__column(q, 5, m, isogi_sh__next_diagonal(0, m), z, 0);
-                for (l = m; l < 5; l++)
-                    for (k = 0; k < 3; k++) {
-                        total[l * (l + 1) + m][k] += power * q[l] * sums[0][k];
-                        if (m) total[l * (l + 1) - m][k] += power * q[l] * sums[1][k];
-                    }
-                power *= sine;
-            }
+        for (j = 0; j < ISOGI_SH__ROWS; j++) {
+            double t = ISOGI_SH__PI * ((double)(row + j) + 0.5) / (double)height;
+            z[j] = cos(t), sine[j] = sin(t), cosine[j] = (z[j] - sine[j]) * (z[j] + sine[j]);
         }
+        isogi_sh__fejer_rows(weight, cosine, height);
+        for (j = 0; j < some; j++) isogi_sh__image_add(total, sum[j], z[j], sine[j], weight[j] * 2 * ISOGI_SH__PI / (double)width);
     }
     for (i = 0; i < 25; i++)
-        for (k = 0; k < 3; k++) rgb[3 * i + k] = (float)total[i][k];
+        for (k = 0; k < 3; k++) rgb[3 * i + k] = (float)(total[i][k] + total[i][k + 3] + total[i][k + 6] + total[i][k + 9]);
 }
-#undef ISOGI_SH__PAIRS
+#undef ISOGI_SH__QUARTER
+#undef ISOGI_SH__PITCH
 #undef ISOGI_SH__ROWS
 #endif
 
@@ -3059,7 +3071,7 @@ ISOGI_API isogi_result isogi_sh_project_image(float *c, int order, int channels,
     if (!isogi_sh__image_fits(width, height, channels)) return ISOGI_TOO_LARGE;
     p.image = image, p.width = width, p.height = height, p.channels = channels;
 #ifdef ISOGI_SH__SIMD
-    if (order == 5 && channels == 3 && !(width & 1) && width >= 32 && isogi_sh__level()) {
+    if (order == 5 && channels == 3 && !(width & 3) && width >= 32 && isogi_sh__level()) {
         isogi_sh__project_fast(c, image, width, height);
         if (isogi_sh__euler_angles(&e, isogi_sh__image_to_world) == ISOGI_OK) isogi_sh__rotate(c, c, 0, order, channels, &e);
         return ISOGI_OK;
