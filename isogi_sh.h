@@ -1071,9 +1071,9 @@ ISOGI_SH__AVX512 ISOGI_SH__INLINE void isogi_sh__eval_d8_split(isogi_sh__d8 *u, 
         u[0] = FMA(x, e, x), u[1] = FMA(y, e, y), u[2] = FMA(z, e, z), u[3] = FMA(z, e, z - u[2]);                             \
         return 1;                                                                                                              \
     }                                                                                                                          \
-    /* order 5 as polynomials in sin^2 = x^2 + y^2, which is exact near the poles */                                           \
+    /* order 5 as polynomials in cos 2t = z^2 - x^2 - y^2, whose coefficients are small, so that little cancels anywhere */    \
     TARGET ISOGI_SH__INLINE void NAME##_order5(T *out, size_t stride, const V *u) {                                            \
-        V x = u[0], y = u[1], z = u[2], zero = {0}, w = FMA(x, x, y * y), c = (x - y) * (x + y), s = x * y, c3, s3, f;         \
+        V x = u[0], y = u[1], z = u[2], zero = {0}, v = FMA(z, z, -FMA(x, x, y * y)), c = (x - y) * (x + y), s = x * y, c3, s3, f; \
         *(V *)(out + 0 * stride) = zero + (T)0.28209479177387814;                                                              \
         *(V *)(out + 1 * stride) = y * (T)0.48860251190291992;                                                                 \
         *(V *)(out + 2 * stride) = z * (T)0.48860251190291992;                                                                 \
@@ -1082,7 +1082,7 @@ ISOGI_SH__AVX512 ISOGI_SH__INLINE void isogi_sh__eval_d8_split(isogi_sh__d8 *u, 
         *(V *)(out + 4 * stride) = s * (T)0.54627421529603959;                                                                 \
         f = z * (T)1.0925484305920792;                                                                                         \
         *(V *)(out + 5 * stride) = f * y;                                                                                      \
-        *(V *)(out + 6 * stride) = FMA(w, zero - (T)0.94617469575756002, zero + (T)0.63078313050503998);                       \
+        *(V *)(out + 6 * stride) = FMA(v, zero + (T)0.47308734787878, zero + (T)0.15769578262626);                             \
         *(V *)(out + 7 * stride) = f * x;                                                                                      \
         *(V *)(out + 8 * stride) = c * (T)0.54627421529603959;                                                                 \
         c3 = FMA(x, c, -(y * s)), s3 = FMA(x, s, y * c);                                                                       \
@@ -1090,21 +1090,21 @@ ISOGI_SH__AVX512 ISOGI_SH__INLINE void isogi_sh__eval_d8_split(isogi_sh__d8 *u, 
         f = z * (T)1.4453057213202769;                                                                                         \
         *(V *)(out + 10 * stride) = f * s;                                                                                     \
         *(V *)(out + 14 * stride) = f * c;                                                                                     \
-        f = FMA(w, zero - (T)2.2852289973223288, zero + (T)1.8281831978578631);                                                \
+        f = FMA(v, zero + (T)1.1426144986611644, zero + (T)0.6855686991966986);                                                \
         *(V *)(out + 11 * stride) = f * y;                                                                                     \
-        *(V *)(out + 12 * stride) = z * FMA(w, zero - (T)1.8658816629505769, zero + (T)0.7463526651802308);                    \
+        *(V *)(out + 12 * stride) = z * FMA(v, zero + (T)0.9329408314752885, zero - (T)0.1865881662950577);                    \
         *(V *)(out + 13 * stride) = f * x;                                                                                     \
         *(V *)(out + 15 * stride) = c3 * (T)0.59004358992664352;                                                               \
         *(V *)(out + 16 * stride) = (s * c) * (T)1.2516714708983523;                                                           \
         f = z * (T)1.7701307697799304;                                                                                         \
         *(V *)(out + 17 * stride) = f * s3;                                                                                    \
         *(V *)(out + 23 * stride) = f * c3;                                                                                    \
-        f = FMA(w, zero - (T)3.3116114351514599, zero + (T)2.8385240872726802);                                                \
+        f = FMA(v, zero + (T)1.6558057175757301, zero + (T)1.18271836969695);                                                  \
         *(V *)(out + 18 * stride) = f * s;                                                                                     \
         *(V *)(out + 22 * stride) = f * c;                                                                                     \
-        f = z * FMA(w, zero - (T)4.6833258049010246, zero + (T)2.6761861742291567);                                            \
+        f = z * FMA(v, zero + (T)2.341662902450512, zero + (T)0.3345232717786446);                                             \
         *(V *)(out + 19 * stride) = f * y;                                                                                     \
-        *(V *)(out + 20 * stride) = FMA(w, FMA(w, zero + (T)3.7024941420321512, zero - (T)4.2314218766081725), zero + (T)0.84628437532163447); \
+        *(V *)(out + 20 * stride) = FMA(v, FMA(v, zero + (T)0.9256235355080377, zero + (T)0.26446386728801075), zero - (T)0.343803027474414); \
         *(V *)(out + 21 * stride) = f * x;                                                                                     \
         *(V *)(out + 24 * stride) = FMA(c, c, -(s * s)) * (T)0.62583573544917614;                                              \
     }                                                                                                                          \
@@ -1144,7 +1144,7 @@ ISOGI_SH__AVX512 ISOGI_SH__INLINE void isogi_sh__eval_d8_split(isogi_sh__d8 *u, 
         I top = (I)(zero - 1) ^ (I)(zero + 1);                                                                                 \
         return (V)((I)x & (I)((V)((I)x & ~top) > (T)TINY));                                                                    \
     }                                                                                                                          \
-    TARGET static void NAME##_any(T *out, size_t stride, int order, const V *u) {                                    \
+    TARGET static void NAME##_any(T *out, size_t stride, int order, const V *u) {                                              \
         V x = u[0], y = u[1], z = u[2], t, p, d, c[2], s[2], sign, zero = {0}, one = zero + 1;                                 \
         I top = (I)(-one) ^ (I)one;                                                                                            \
         const T *table = TABLE;                                                                                                \

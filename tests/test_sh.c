@@ -164,6 +164,44 @@ TEST(float_evaluation_is_exact) {
     }
 }
 
+/* Batches, in both types and at every instruction level, which go other ways than single directions: within the same bounds. More
+   directions close to the poles and the equator, where polynomials and recursions cancel most. */
+TEST(batches_are_exact_at_every_level) {
+    static const struct { int order; double bound, bound64; } cases[] = {{3, 4.5e-7, 1.1e-15}, {4, 4.5e-7, 1.1e-15}, {5, 4.5e-7, 1.1e-15}, {8, 2.2e-6, 7e-15}, {11, 2.2e-6, 7e-15}, {21, 1e-5, 3e-14}};
+    enum { MOST = 2400 };
+    static float d[MOST][3], y[MOST * 441];
+    static double wide[MOST][3], y64[MOST * 441];
+    static quad expected[441];
+    test_random r = {41};
+    for (size_t c = 0; c < sizeof cases / sizeof *cases; c++) {
+        int order = cases[c].order, n = order * order, count = LONG_SUITE ? MOST : order > 11 ? 330 : 600;
+        for (int i = 0; i < count; i++) {
+            if (!hard_direction(wide[i], i, &r)) random_direction(&r, wide[i]);
+            if (i >= 294 && i % 3 < 2) { /* within 0.2 of a pole, or 0.05 of the equator */
+                double z = i % 3 ? 0.05 * random_range(&r, -1, 1) : (i & 1 ? -1 : 1) * (1 - 0.02 * random_unit(&r)), phi = random_range(&r, 0, 2 * pi), s = sqrt(1 - z * z);
+                wide[i][0] = s * cos(phi), wide[i][1] = s * sin(phi), wide[i][2] = z;
+            }
+            for (int k = 0; k < 3; k++) d[i][k] = rounded(wide[i][k]);
+        }
+        for (instruction_level = 0; instruction_level < 3; instruction_level++) {
+            double worst = 0, worst64 = 0;
+            isogi_sh_eval(y, order, (const float(*)[3])d, (size_t)count);
+            isogi_sh_eval_f64(y64, order, (const double(*)[3])wide, (size_t)count);
+            for (int i = 0; i < count; i++) {
+                quad e[3] = {(quad)d[i][0], (quad)d[i][1], (quad)d[i][2]}, e64[3] = {(quad)wide[i][0], (quad)wide[i][1], (quad)wide[i][2]};
+                reference_eval(expected, order, e);
+                for (int k = 0; k < n; k++) worst = fmax(worst, fabs((double)(expected[k] - (quad)y[i * n + k])));
+                reference_eval(expected, order, e64);
+                for (int k = 0; k < n; k++) worst64 = fmax(worst64, fabs((double)(expected[k] - (quad)y64[i * n + k])));
+            }
+            printf("    order %2d, level %d: %.3g in float, %.3g in double\n", order, instruction_level, worst, worst64);
+            CHECK(worst <= cases[c].bound * ROUNDING_FACTOR, "order %d, level %d: float %g", order, instruction_level, worst);
+            CHECK(worst64 <= cases[c].bound64 * ROUNDING_FACTOR, "order %d, level %d: double %g", order, instruction_level, worst64);
+        }
+    }
+    instruction_level = 99;
+}
+
 /* Length does not matter, from denormal to huge; the zero vector and what is not finite count as +z. */
 TEST(any_length_and_no_length) {
     static const float scales[] = {1, 1e-44f, 1e-38f, 1e-20f, 3e20f, 3e38f};
