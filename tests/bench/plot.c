@@ -1,5 +1,5 @@
 /* Draws a table of benchmarks: run time against error, both logarithmic, one panel for each case with several settings; cases with
-   one setting as a table below. Left is more exact, down is faster.
+   one setting as a table below. Left is more exact, down is faster. Settings "order N" stand at their order instead of their time.
 
        build/bench/plot IN.csv OUT.svg      columns header,case,method,setting,seconds,error,work,unit */
 #include <math.h>
@@ -166,6 +166,12 @@ static void label(double x, double y, const char *words, const char *colour, con
     }
 }
 
+/* What stands upright: seconds, or the order where the settings are "order N", for curves of convergence. */
+static double height(const row *r) {
+    int order;
+    return sscanf(r->setting, "order %d", &order) == 1 && order > 0 ? order : r->seconds;
+}
+
 static int compare_rows(const void *a, const void *b) {
     const row *x = *(const row *const *)a, *y = *(const row *const *)b;
     return x->error != y->error ? (x->error > y->error) - (x->error < y->error) : (x->seconds > y->seconds) - (x->seconds < y->seconds);
@@ -198,7 +204,7 @@ static void panel_axes(const char *name, const box *frame, axis *x, axis *y, int
     *zeros = 0;
     for (int i = 0; i < row_count; i++) {
         if (strcmp(rows[i].name, name) != 0 || !(rows[i].seconds > 0)) continue;
-        s0 = fmin(s0, rows[i].seconds), s1 = fmax(s1, rows[i].seconds);
+        s0 = fmin(s0, height(&rows[i])), s1 = fmax(s1, height(&rows[i]));
         if (rows[i].error > 0) e0 = fmin(e0, rows[i].error), e1 = fmax(e1, rows[i].error);
         else *zeros = 1;
     }
@@ -226,11 +232,12 @@ static void panel(const char *name, double left, double top) {
     }
     fprintf(svg, "<path class=\"axis\" d=\"M%.1f %.1fV%.1fH%.1f\"/>\n", frame.x0, frame.y0, frame.y1, frame.x1);
     text((frame.x0 + frame.x1) / 2, frame.y1 + 34, "class=\"tick\" text-anchor=\"middle\"", "error");
-    fprintf(svg, "<text class=\"tick\" text-anchor=\"middle\" transform=\"translate(%.1f %.1f) rotate(-90)\">seconds</text>\n", left + 18, (frame.y0 + frame.y1) / 2);
+    fprintf(svg, "<text class=\"tick\" text-anchor=\"middle\" transform=\"translate(%.1f %.1f) rotate(-90)\">%s</text>\n", left + 18, (frame.y0 + frame.y1) / 2,
+            y.high > log10(2) && strstr(name, "truncation") ? "order" : "seconds");
     for (int m = 0; m < methods; m++) { /* every point keeps its own place free before any label is put */
         int n = pick(name, method[m], picked);
         for (int i = 0; i < n; i++) {
-            double px = picked[i]->error > 0 ? place(&x, picked[i]->error) : frame.x0 + 15, py = place(&y, picked[i]->seconds);
+            double px = picked[i]->error > 0 ? place(&x, picked[i]->error) : frame.x0 + 15, py = place(&y, height(picked[i]));
             taken[count++] = (box){px - 4, py - 4, px + 4, py + 4};
         }
     }
@@ -238,10 +245,10 @@ static void panel(const char *name, double left, double top) {
         int n = pick(name, method[m], picked), pen = 0;
         fprintf(svg, "<path class=\"curve\" stroke=\"%s\" stroke-width=\"%s\" d=\"", colours[m], m ? "1.5" : "2.5");
         for (int i = 0; i < n; i++)
-            if (picked[i]->error > 0) fprintf(svg, "%s%.1f %.1f", pen++ ? "L" : "M", place(&x, picked[i]->error), place(&y, picked[i]->seconds));
+            if (picked[i]->error > 0) fprintf(svg, "%s%.1f %.1f", pen++ ? "L" : "M", place(&x, picked[i]->error), place(&y, height(picked[i])));
         fputs(pen ? "\"/>\n" : "M0 0\"/>\n", svg);
         for (int i = 0; i < n; i++) {
-            double px = picked[i]->error > 0 ? place(&x, picked[i]->error) : frame.x0 + 15, py = place(&y, picked[i]->seconds);
+            double px = picked[i]->error > 0 ? place(&x, picked[i]->error) : frame.x0 + 15, py = place(&y, height(picked[i]));
             char rate[80];
             rate_text(picked[i], rate, sizeof rate);
             fputs("<g><title>", svg);
@@ -253,7 +260,7 @@ static void panel(const char *name, double left, double top) {
     for (int m = 0; m < methods; m++) {
         int n = pick(name, method[m], picked);
         for (int i = 0; i < n; i++)
-            label(picked[i]->error > 0 ? place(&x, picked[i]->error) : frame.x0 + 15, place(&y, picked[i]->seconds), picked[i]->setting, colours[m], &frame,
+            label(picked[i]->error > 0 ? place(&x, picked[i]->error) : frame.x0 + 15, place(&y, height(picked[i])), picked[i]->setting, colours[m], &frame,
                   taken, &count);
         fprintf(svg, "<circle cx=\"%.1f\" cy=\"%.1f\" r=\"4\" fill=\"%s\"/>\n", legend + 4, top + 45, colours[m]);
         text(legend + 13, top + 49, "class=\"key\"", method[m]);
