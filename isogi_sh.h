@@ -658,6 +658,60 @@ static const double isogi_sh__turn_f64[815] = {
     -0.00033430331878977424, 6.103515625e-05,
 };
 #ifdef ISOGI_SH__SIMD
+static const double isogi_sh__wigner_f64[448] = {
+    0.8660254037844386, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.70710678118654757, 0.0,
+    0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.52704627669472992, 0.55901699437494745,
+    0.70710678118654757, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.81649658092772603, 0.75, 0.0, 0.0,
+    0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.38188130791298669, 0.39440531887330771, 0.44095855184409843,
+    0.57735026918962573, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.8660254037844386, 0.84327404271156781,
+    0.7453559924999299, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.29999999999999999,
+    0.30618621784789724, 0.3273268353539886, 0.375, 0.5, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0,
+    0.89442719099991586, 0.88388347648318444, 0.84515425472851657, 0.73950997288745202, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0,
+    0.0, 0.0, 0.0, 0.0, 0.0, 0.2472066162365221, 0.25071326821120349, 0.26220221204253791, 0.2854496128592251,
+    0.33166247903553997, 0.44721359549995793, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.9128709291752769,
+    0.90711473522214536, 0.88741196746494244, 0.84327404271156781, 0.73484692283495345, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0,
+    0.0, 0.0, 0.0, 0.0, 0.2102800206268535, 0.21245914639969937, 0.21942686286812776, 0.23273733406281569,
+    0.25623537159526916, 0.30046260628866578, 0.40824829046386302, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0,
+    0.92582009977255142, 0.92233098421577731, 0.91084006808529761, 0.88741196746494244, 0.84087496518252169,
+    0.73124703228267685, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.18298126367784998, 0.18442777839082938,
+    0.18898223650461363, 0.19738550848793068, 0.21128856368212914, 0.23440361546924771, 0.27664166758624409,
+    0.37796447300922725, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.93541434669348533, 0.93313894963168686,
+    0.92582009977255142, 0.91168461167710357, 0.88640526042791834, 0.83862786937753464, 0.72843135908468359, 0.0, 0.0, 0.0,
+    0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.16197088596792503, 0.16298006013006622, 0.16612465981124716, 0.17179606773406919,
+    0.18081014266989476, 0.19479843061849489, 0.2173067468400883, 0.25769410160110379, 0.35355339059327379, 0.0, 0.0, 0.0,
+    0.0, 0.0, 0.0, 0.0, 0.94280904158206336, 0.94124252985083501, 0.93628167589853895, 0.92702481088695787,
+    0.91146543037529992, 0.88514526652812353, 0.83666002653407556, 0.72618437741389064, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0,
+    0.0, 0.1452966314513558, 0.14602860903839354, 0.14829275350043489, 0.15231225557722924, 0.15853162186855699,
+    0.16777409856157222, 0.18162078931419473, 0.20345597929769124, 0.2421610524189263, 0.33333333333333331, 0.0, 0.0, 0.0,
+    0.0, 0.0, 0.0, 0.94868329805051377, 0.94755873935826862, 0.94403585933146827, 0.93761446187699082, 0.92724773377364467,
+    0.91084006808529761, 0.88388347648318444, 0.83496572144686598, 0.72435582280029431, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0,
+    0.13173978860172217, 0.13228756555322954, 0.13397282541141672, 0.13693063937629152, 0.1414213562373095,
+    0.1479019945774904, 0.15718104959867515, 0.17078251276599329, 0.19194297398747862, 0.229128784747792, 0.31622776601683794,
+    0.0, 0.0, 0.0, 0.0, 0.0, 0.95346258924559235, 0.95262794416288255, 0.95003373759256704, 0.94538352005945181,
+    0.93808315196468595, 0.92702481088695787, 0.91007433439123375, 0.88270417845769067, 0.83350875346649067,
+    0.72284161474004804, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.12049980091353686, 0.12092039486566841, 0.12220910332321784,
+    0.12445165924251668, 0.12780933953638629, 0.1325543836675655, 0.13914118498945363, 0.14835622460143164,
+    0.16166744767071581, 0.18217857500000703, 0.21799234196875997, 0.30151134457776363, 0.0, 0.0, 0.0, 0.0,
+    0.9574271077563381, 0.95679056651675909, 0.95482370712520104, 0.95134142401690103, 0.94598433583033692,
+    0.93811572599292514, 0.9265990819042822, 0.90928227650889892, 0.88163072046788804, 0.83225037857647899,
+    0.72156853938125198, 0.0, 0.0, 0.0, 0.0, 0.0, 0.11102889792108188, 0.11135885079684349, 0.11236664374387369,
+    0.11410886614690961, 0.11669000700233415, 0.12028130608117203, 0.12515654358043971, 0.13176156917368248,
+    0.14085904245475275, 0.15386436372416593, 0.17376201171422898, 0.20833333333333334, 0.28867513459481287, 0.0, 0.0, 0.0,
+    0.96076892283052284, 0.96027236546357819, 0.95874497088220456, 0.9560661587986472, 0.95200739639388887,
+    0.94617896279172775, 0.93792283697556955, 0.92608794878720291, 0.90851352515899586, 0.88066348954534379,
+    0.83115657732983583, 0.72048401940794093, 0.0, 0.0, 0.0, 0.0, 0.10293952744612744, 0.10320313742306722,
+    0.10400628679223047, 0.10538757288364328, 0.10741723110591493, 0.11020775375559676, 0.11393317879691249,
+    0.1188643277625491, 0.12543630150106361, 0.13438824602209942, 0.14708710135363803, 0.16641005886756874,
+    0.19985201625794738, 0.27735009811261457, 0.0, 0.0, 0.96362411165943151, 0.96322928261529406, 0.96201911063698164,
+    0.95991224060681912, 0.95675734404529944, 0.95230383339201019, 0.94614602873568499, 0.93761446187699082,
+    0.92555029935890387, 0.90778866899655031, 0.87979455643829796, 0.83019923466043333, 0.71954949745652719, 0.0, 0.0, 0.0,
+    0.095949722283856592, 0.096163657270258995, 0.096814151657778083, 0.097928275232167183, 0.099554716061514933,
+    0.10177004891982148, 0.10468972982756285, 0.10848723666625729, 0.11342846191148866, 0.11993715285482075,
+    0.12873006086935782, 0.14112966526419035, 0.15991620380642765, 0.19232731454051799, 0.2672612419124244, 0.0,
+    0.96609178307929588, 0.96577266307071141, 0.96479732172635235, 0.96310921762766089, 0.96060473092590926,
+    0.9571162043197412, 0.95238095238095233, 0.94598433583033692, 0.9372504104317485, 0.92501608737619367,
+    0.90711473522214536, 0.87901355800967895, 0.82935558588019886, 0.71873613562493244, 0.0, 0.0,
+};
 static const float isogi_sh__table_f32[463] = {
     0.0f, 0.0f, 0.282094806f, 0.0f, -1.0f, 0.488602519f, 0.5f, -1.5f, 0.630783141f, 0.666666687f, -1.66666663f, 0.746352673f,
     0.75f, -1.75f, 0.846284389f, 0.800000012f, -1.79999995f, 0.935602605f, 0.833333313f, -1.83333337f, 1.01710725f,
@@ -899,6 +953,7 @@ typedef float isogi_sh__f4 __attribute__((vector_size(16), aligned(4), may_alias
 typedef double isogi_sh__d2 __attribute__((vector_size(16), aligned(8), may_alias));
 typedef float isogi_sh__f8 __attribute__((vector_size(32), aligned(4), may_alias));
 typedef float isogi_sh__f16 __attribute__((vector_size(64), aligned(4), may_alias));
+typedef float isogi_sh__plain_f8 __attribute__((vector_size(32)));
 typedef double isogi_sh__d4 __attribute__((vector_size(32), aligned(8), may_alias));
 typedef double isogi_sh__d8 __attribute__((vector_size(64), aligned(8), may_alias));
 typedef int32_t isogi_sh__i8 __attribute__((vector_size(32), aligned(4), may_alias));
@@ -913,8 +968,12 @@ typedef int64_t isogi_sh__l8 __attribute__((vector_size(64), aligned(8), may_ali
 #define ISOGI_SH__ALL8 (unsigned char)0xff
 #if defined(__clang__)
 #define ISOGI_SH__ALL16 (unsigned short)0xffff
+#define ISOGI_SH__MASK8 unsigned char
+#define ISOGI_SH__MASKED_F8(p) ((isogi_sh__plain_f8 *)(void *)(p)) /* what a masked store wants */
 #else
 #define ISOGI_SH__ALL16 (short)-1
+#define ISOGI_SH__MASK8 char
+#define ISOGI_SH__MASKED_F8(p) (p)
 #endif
 #define ISOGI_SH__FMA_F16(a, b, c) ((isogi_sh__f16)__builtin_ia32_vfmaddps512_mask(a, b, c, ISOGI_SH__ALL16, 4))
 #define ISOGI_SH__FMA_D8(a, b, c) ((isogi_sh__d8)__builtin_ia32_vfmaddpd512_mask(a, b, c, ISOGI_SH__ALL8, 4))
@@ -1999,20 +2058,28 @@ static double isogi_sh__product_rest(double x, double y, double high) {
     return ((a * c - high) + (a * d + b * c)) + b * d;
 }
 
-/* power[k] = x^k, each rounded once only */
-static void isogi_sh__exact_powers(double *power, int count, double x) {
-    double high = 1, low = 0, p;
+/* power[k] = x^k for 1 < count <= 2 ISOGI_SH__TURNS + 2, each rounded once only: by halving, in numbers of twice the length. `fused` where
+   the processor has fused products, whose rest costs nothing. */
+ISOGI_SH__INLINE void isogi_sh__exact_powers(double *power, int count, double x, int fused) {
+    double low[2 * ISOGI_SH__TURNS + 2];
     int k;
-    for (k = 0; k < count; k++) {
-        power[k] = high;
-        p = high * x;
-        low = low * x + isogi_sh__product_rest(high, x, p);
-        high = p + low;
-        low = (p - high) + low;
+    power[0] = 1, low[0] = 0, power[1] = x, low[1] = 0;
+    for (k = 2; k < count; k++) {
+        int i = k / 2, j = k - i;
+        double p = power[i] * power[j], rest;
+#ifdef ISOGI_SH__SIMD
+        rest = fused ? __builtin_fma(power[i], power[j], -p) : isogi_sh__product_rest(power[i], power[j], p);
+#else
+        (void)fused;
+        rest = isogi_sh__product_rest(power[i], power[j], p);
+#endif
+        rest += power[i] * low[j] + low[i] * power[j];
+        power[k] = p + rest;
+        low[k] = (p - power[k]) + rest;
     }
 }
 
-static void isogi_sh__wigner_start(isogi_sh__wigner *w, int order, const isogi_sh__euler *e) {
+ISOGI_SH__INLINE void isogi_sh__wigner_start(isogi_sh__wigner *w, int order, const isogi_sh__euler *e, int fused) {
     double half_c, half_s, cc, ss, before = 1;
     int l;
     if (e->b[0] > 0) half_c = sqrt(0.5 * (1 + e->b[0])), half_s = e->b[1] / (2 * half_c);
@@ -2025,10 +2092,11 @@ static void isogi_sh__wigner_start(isogi_sh__wigner *w, int order, const isogi_s
     w->more_low = 2 * (w->more_low - cc * w->excess);
     isogi_sh__powers(w->a, order, e->a[0], e->a[1]);
     isogi_sh__powers(w->c, order, e->c[0], e->c[1]);
-    isogi_sh__exact_powers(w->cosine, 2 * order, half_c);
-    isogi_sh__exact_powers(w->sine, 2 * order, -half_s);
+    isogi_sh__exact_powers(w->cosine, 2 * order, half_c, fused);
+    isogi_sh__exact_powers(w->sine, 2 * order, -half_s, fused);
     w->less = 2 * ss;
     w->more = 2 * cc;
+    if (fused) return; /* its table has them */
     for (l = 1; l < order; l++) {
         double a = sqrt((double)(4 * l * l - 1)) / (double)l;
         w->zonal[l][0] = a;
@@ -2052,60 +2120,66 @@ ISOGI_SH__INLINE void isogi_sh__turn_product(double p[2], const double a[2], con
     p[1] = a[1] * c[0] + sign * a[0] * c[1];
 }
 
-/* Entries (n, m) and (m, n) of all degrees, n <= m, m > 0, by the recursion over l with n and m fixed:
-   (l-1)(2l+1) d_l = a_lm a_ln (l(l-1) cos b - n m) d_{l-1} - l (2l-3) b_lm b_ln d_{l-2}, a and b as in the table. The bracket is
-   taken from 1 - cos b or 1 + cos b, which are exact where it is small. */
+/* Entries (n, m) and (m, n) of all degrees, n <= m, m > 0, by the recursion over l with n and m fixed. With a and b as in the table,
+   F = a_m a_n / (l (2l+3)), S = b_m b_n (l+1) (2l-1) / (l (2l+3)) and k = F (l(l+1) cos b - n m) - 1 - S it is
+       d_{l+1} - d_l = S (d_l - d_{l-1}) + k d_l,
+   which keeps its digits where cos b is near 1: there, for n = m, k is -F l(l+1) (1 - cos b). For the d of the other sign and cos b
+   near -1 the same holds of (-1)^l d with 1 + cos b. */
 ISOGI_SH__INLINE void isogi_sh__wigner_pair(const isogi_sh__blocks *out, int order, int n, int m, const isogi_sh__wigner *w) {
     const double *fm = isogi_sh__table(m) + 1, *fn = n ? isogi_sh__table(n) + 1 + 2 * (m - n) : w->zonal[m + 1];
     double start = fabs(isogi_sh__turn_f64[m * (m + 1) * (m + 2) / 6 - 1 + n * (m + 1) - n * (n - 1) / 2 + m - n]) * (n ? 0.5 : 0.70710678118654752440);
-    double near[2], far[2], across[2], back[2], a_before = 0, b_before = 0, a, b, sign = n & 1 ? -1 : 1, flip = (m + n) & 1 ? -1 : 1;
+    double p[2], q[2], p_across[2], q_across[2], a_step = 0, b_step = 0, a, b, sign = n & 1 ? -1 : 1, flip = (m + n) & 1 ? -1 : 1;
     int l, at = m * (4 * m * m - 1) / 3;
     start *= (double)((int32_t)1 << m) * (1 - (double)m * w->excess);
     a = start * w->cosine[m + n] * w->sine[m - n];
     b = start * w->cosine[m - n] * w->sine[m + n];
-    isogi_sh__turn_product(near, w->a[n], w->c[m], 1);
-    isogi_sh__turn_product(far, w->a[n], w->c[m], -1);
-    isogi_sh__turn_product(across, w->a[m], w->c[n], 1);
-    isogi_sh__turn_product(back, w->a[m], w->c[n], -1);
+    isogi_sh__turn_product(p, w->a[n], w->c[m], 1);
+    isogi_sh__turn_product(q, w->a[n], w->c[m], -1);
+    isogi_sh__turn_product(p_across, w->a[m], w->c[n], 1);
+    isogi_sh__turn_product(q_across, w->a[m], w->c[n], -1);
     for (l = m;; l++) {
         int width = 2 * l + 1, centre = at + width * l + l;
-        double first, second, square, next;
+        double first, second, square, k;
         if (n == 0) {
             double value = 1.41421356237309504880 * a;
-            isogi_sh__put(out, centre + width * m, value * near[0]);
-            isogi_sh__put(out, centre - width * m, -value * near[1]);
-            isogi_sh__put(out, centre + m, flip * value * across[0]);
-            isogi_sh__put(out, centre - m, flip * value * across[1]);
+            isogi_sh__put(out, centre + width * m, value * p[0]);
+            isogi_sh__put(out, centre - width * m, -value * p[1]);
+            isogi_sh__put(out, centre + m, flip * value * p_across[0]);
+            isogi_sh__put(out, centre - m, flip * value * p_across[1]);
         } else {
-            isogi_sh__put_block(out, at, l, n, m, a, sign * b, near, far);
-            if (n != m) isogi_sh__put_block(out, at, l, m, n, flip * a, flip * sign * b, across, back);
+            isogi_sh__put_block(out, at, l, n, m, a, sign * b, p, q);
+            if (n != m) isogi_sh__put_block(out, at, l, m, n, flip * a, flip * sign * b, p_across, q_across);
         }
         if (l + 1 == order) break;
         at += width * width;
         square = (double)(l * (l + 1));
         first = fm[0] * fn[0] / (double)(l * (2 * l + 3));
         second = fm[1] * fn[1] * (double)((l + 1) * (2 * l - 1)) / (double)(l * (2 * l + 3));
-        next = first * (((square - (double)(n * m)) - square * w->less) - square * w->less_low) * a - second * a_before;
-        a_before = a, a = next;
-        next = first * ((square * w->more - (square - (double)(n * m))) + square * w->more_low) * b - second * b_before;
-        b_before = b, b = next;
+        k = n == m ? 0 : first * (square - (double)(n * m)) - (1 + second);
+        first *= square;
+        a_step = second * a_step + ((k - first * w->less_low) - first * w->less) * a;
+        b_step = second * b_step + ((k - first * w->more_low) - first * w->more) * b;
+        a += a_step, b += b_step, sign = -sign;
         fm += 2, fn += 2;
     }
+}
+
+/* n = m = 0: the Legendre polynomial of |cos b|, from the one before, by differences from 1, where cos b is near. */
+ISOGI_SH__INLINE double isogi_sh__zonal_entry(const isogi_sh__wigner *w, int l, double *difference, double before) {
+    double t = w->less < 1 ? w->less : w->more, low = w->less < 1 ? w->less_low : w->more_low;
+    if (l == 0) return 1;
+    *difference = isogi_sh__table_f64[3 * l] * *difference + isogi_sh__table_f64[3 * l + 1] * (t * before + low * before);
+    return before + *difference;
 }
 
 ISOGI_SH__INLINE void isogi_sh__build_blocks(const isogi_sh__blocks *out, int order, const isogi_sh__euler *e) {
     isogi_sh__wigner w;
     double p = 1, difference = 0;
     int l, m, n, at = 0;
-    isogi_sh__wigner_start(&w, order, e);
-    for (l = 0; l < order; l++) { /* n = m = 0: Legendre polynomials of cos b, by differences where it is near 1 */
-        if (w.less < 1) {
-            if (l) difference = ((double)(l - 1) * difference - (double)(2 * l - 1) * (w.less * p + w.less_low * p)) / (double)l, p += difference;
-            isogi_sh__put(out, at + 2 * l * (l + 1), p);
-        } else {
-            if (l) difference = ((double)(l - 1) * difference - (double)(2 * l - 1) * (w.more * p + w.more_low * p)) / (double)l, p += difference;
-            isogi_sh__put(out, at + 2 * l * (l + 1), l & 1 ? -p : p);
-        }
+    isogi_sh__wigner_start(&w, order, e, 0);
+    for (l = 0; l < order; l++) {
+        p = isogi_sh__zonal_entry(&w, l, &difference, p);
+        isogi_sh__put(out, at + 2 * l * (l + 1), w.less < 1 || !(l & 1) ? p : -p);
         at += (2 * l + 1) * (2 * l + 1);
     }
     for (m = 1; m < order; m++)
@@ -2123,6 +2197,116 @@ static void isogi_sh__rotation_build_low(void *rotation, int is_double, int orde
     }
 }
 
+#ifdef ISOGI_SH__SIMD
+/* The same with eight n in the lanes, whether n or m is the larger. With F and S for the two factors of the recursion from degree l to
+   l + 1 and k = F (l(l+1) cos b - n m) - 1 - S it is
+       d_{l+1} - d_l = S (d_l - d_{l-1}) + k d_l,
+   which keeps its digits where cos b is near 1: there, for n = m, k is -F l(l+1) (1 - cos b). For cos b near -1 the same holds of
+   (-1)^l b with 1 + cos b. F and S are products of one number for n and one for m, zero where n or m has not begun. */
+typedef double isogi_sh__rows[ISOGI_SH__TURNS + 1][ISOGI_SH__TURNS + 1];
+typedef struct isogi_sh__wigner_rows {
+    isogi_sh__rows a, b; /* [m][n]: where the recursions begin, at the degree that is the larger of both; b times (-1)^l */
+    double cosine[ISOGI_SH__TURNS + 1], sine[ISOGI_SH__TURNS + 1]; /* of n a */
+    isogi_sh__wigner w;
+} isogi_sh__wigner_rows;
+
+ISOGI_SH__INLINE __attribute__((target("avx2,fma,avx512f,avx512vl,avx512dq"))) void isogi_sh__wigner_rows_start(isogi_sh__wigner_rows *r, int order, const isogi_sh__euler *e) {
+    int l, n;
+    r->a[0][0] = r->b[0][0] = 0; /* the zonal entries are not made from these */
+    isogi_sh__wigner_start(&r->w, order, e, 1);
+    for (l = 0; l < order; l++) {
+        const double *turn = isogi_sh__turn_f64 + l * (l + 1) * (l + 2) / 6 - 1 + l;
+        double scale = 0.5 * (double)((int32_t)1 << l) * (1 - (double)l * r->w.excess);
+        r->cosine[l] = r->w.a[l][0], r->sine[l] = r->w.a[l][1];
+        for (n = order; n & 7; n++) r->a[l][n] = r->b[l][n] = 0;
+        for (n = 0; n <= l && l; n++) {
+            double start = scale * fabs(*turn), a = start * r->w.cosine[l + n] * r->w.sine[l - n], b = start * r->w.cosine[l - n] * r->w.sine[l + n];
+            double flip = (l + n) & 1 ? -1 : 1;
+            r->a[n][l] = flip * a, r->a[l][n] = a;
+            r->b[n][l] = b, r->b[l][n] = flip * b; /* (-1)^n of the sines, and (-1)^l */
+            turn += l - n;
+        }
+    }
+    for (n = order; n & 7; n++) r->cosine[n] = r->sine[n] = 0;
+}
+
+ISOGI_SH__INLINE __attribute__((target("avx2,fma,avx512f,avx512vl,avx512dq"))) void isogi_sh__put_rows(void *out, int is_double, int i, isogi_sh__d8 v, unsigned mask) {
+    if (is_double) __builtin_ia32_storeupd512_mask((double *)out + i, v, (unsigned char)mask);
+    else {
+        const isogi_sh__f8 none = {0};
+        __builtin_ia32_storeups256_mask(ISOGI_SH__MASKED_F8((float *)out + i), __builtin_ia32_cvtpd2ps512_mask(v, none, (ISOGI_SH__MASK8)-1, 4), (unsigned char)mask);
+    }
+}
+
+/* Columns m and -m of all degrees, rows n to n + 7 and -n to -n - 7. Row -0 is row 0, which comes last; n = 0 has no sine: its a and b
+   are halves of the cosine. */
+ISOGI_SH__INLINE __attribute__((target("avx2,fma,avx512f,avx512vl,avx512dq"))) void isogi_sh__wigner_group(void *out, int is_double, int order, int m, int n, const isogi_sh__wigner_rows *r) {
+    const isogi_sh__d8 zero = {0}, one = {1, 1, 1, 1, 1, 1, 1, 1};
+    const isogi_sh__d8 count = {0, 1, 2, 3, 4, 5, 6, 7}, lanes = count + (double)n;
+    isogi_sh__d8 ac = *(const isogi_sh__d8 *)(r->cosine + n), as = *(const isogi_sh__d8 *)(r->sine + n);
+    isogi_sh__d8 begin_a = *(const isogi_sh__d8 *)(r->a[m] + n), begin_b = *(const isogi_sh__d8 *)(r->b[m] + n), a, b, a_step = zero, b_step = zero;
+    isogi_sh__l8 not_diagonal = (isogi_sh__l8)(lanes != zero + (double)m), alike = (isogi_sh__l8)(lanes == zero) | (isogi_sh__l8)(m == 0 ? lanes == lanes : lanes != lanes);
+    double cc = r->w.c[m][0], cs = r->w.c[m][1], sign, degree, square;
+    isogi_sh__d8 p0 = ac * cc - as * cs, p1 = as * cc + ac * cs, q0 = ac * cc + as * cs, q1 = as * cc - ac * cs, products = lanes * (double)m;
+    int l = m > n ? m : n, at;
+    if (l == 0) l = 1;
+    at = l * (4 * l * l - 1) / 3;
+    sign = l & 1 ? -1 : 1, degree = (double)l, square = degree * (degree + 1);
+    a = (isogi_sh__d8)((isogi_sh__l8)begin_a & (isogi_sh__l8)(lanes <= zero + degree));
+    b = (isogi_sh__d8)((isogi_sh__l8)begin_b & (isogi_sh__l8)(lanes <= zero + degree));
+    for (;; l++) {
+        int width = 2 * l + 1, beyond = l - n < 7 ? 7 - l + n : 0, plus = at + width * (l + m) + l, minus = at + width * (l - m) + l;
+        unsigned up = 255u >> beyond, down = 255u << beyond;
+        isogi_sh__d8 sines = b * sign, v;
+        sines = (isogi_sh__d8)(((isogi_sh__l8)a & alike) | ((isogi_sh__l8)sines & ~alike));
+        v = ISOGI_SH__FMA_D8(a, p1, sines * q1);
+        isogi_sh__put_rows(out, is_double, plus - n - 7, __builtin_shufflevector(v, v, 7, 6, 5, 4, 3, 2, 1, 0), down);
+        isogi_sh__put_rows(out, is_double, plus + n, ISOGI_SH__FMA_D8(a, p0, sines * q0), up);
+        if (m) {
+            v = ISOGI_SH__FMA_D8(a, p0, -(sines * q0));
+            isogi_sh__put_rows(out, is_double, minus - n - 7, __builtin_shufflevector(v, v, 7, 6, 5, 4, 3, 2, 1, 0), down);
+            isogi_sh__put_rows(out, is_double, minus + n, ISOGI_SH__FMA_D8(sines, q1, -(a * p1)), up);
+        }
+        if (l + 1 == order) return;
+        {
+            const double *table = isogi_sh__wigner_f64 + 32 * (l - 1);
+            isogi_sh__d8 first = *(const isogi_sh__d8 *)(table + n) * table[m], second = *(const isogi_sh__d8 *)(table + 16 + n) * table[16 + m];
+            isogi_sh__d8 k = ISOGI_SH__FMA_D8(first, square - products, -(one + second)), by_square = first * -square;
+            isogi_sh__l8 begins;
+            degree += 1;
+            begins = (isogi_sh__l8)(lanes == zero + degree);
+            k = (isogi_sh__d8)((isogi_sh__l8)k & not_diagonal);
+            a_step = ISOGI_SH__FMA_D8(ISOGI_SH__FMA_D8(by_square, zero + r->w.less, ISOGI_SH__FMA_D8(by_square, zero + r->w.less_low, k)), a, second * a_step);
+            b_step = ISOGI_SH__FMA_D8(ISOGI_SH__FMA_D8(by_square, zero + r->w.more, ISOGI_SH__FMA_D8(by_square, zero + r->w.more_low, k)), b, second * b_step);
+            a += (isogi_sh__d8)((isogi_sh__l8)begin_a & begins), b += (isogi_sh__d8)((isogi_sh__l8)begin_b & begins);
+            a += a_step, b += b_step;
+            sign = -sign, square += 2 * degree;
+        }
+        at += width * width;
+    }
+}
+
+ISOGI_SH__INLINE __attribute__((target("avx2,fma,avx512f,avx512vl,avx512dq"))) void isogi_sh__build_rows(void *out, int is_double, int order, const isogi_sh__euler *e) {
+    isogi_sh__wigner_rows r;
+    double p = 1, difference = 0;
+    int l, m, n, at = 0;
+    isogi_sh__wigner_rows_start(&r, order, e);
+    for (m = 0; m < order; m++)
+        for (n = 0; n < order; n += 8) isogi_sh__wigner_group(out, is_double, order, m, n, &r);
+    for (l = 0; l < order; l++) {
+        double value;
+        p = isogi_sh__zonal_entry(&r.w, l, &difference, p);
+        value = r.w.less < 1 || !(l & 1) ? p : -p;
+        if (is_double) ((double *)out)[at + 2 * l * (l + 1)] = value;
+        else ((float *)out)[at + 2 * l * (l + 1)] = (float)value;
+        at += (2 * l + 1) * (2 * l + 1);
+    }
+}
+
+ISOGI_SH__AVX512 static void isogi_sh__build_rows_f64(double *out, int order, const isogi_sh__euler *e) { isogi_sh__build_rows(out, 1, order, e); }
+ISOGI_SH__AVX512 static void isogi_sh__build_rows_f32(float *out, int order, const isogi_sh__euler *e) { isogi_sh__build_rows(out, 0, order, e); }
+#endif
+
 /* Columns of the matrices are rotated unit vectors. */
 static void isogi_sh__rotation_build(void *rotation, int is_double, int order, const isogi_sh__euler *e) {
     double band[2 * ISOGI_SH_MAX_ORDER * ISOGI_SH__TOGETHER], other[2 * ISOGI_SH_MAX_ORDER * ISOGI_SH__TOGETHER];
@@ -2130,6 +2314,13 @@ static void isogi_sh__rotation_build(void *rotation, int is_double, int order, c
     size_t at = 0;
     int l, i, k, first;
     if (order <= ISOGI_SH__TURNS + 1) {
+#ifdef ISOGI_SH__SIMD
+        if (order > 1 && isogi_sh__level() > 1) {
+            if (is_double) isogi_sh__build_rows_f64((double *)rotation, order, e);
+            else isogi_sh__build_rows_f32((float *)rotation, order, e);
+            return;
+        }
+#endif
         isogi_sh__rotation_build_low(rotation, is_double, order, e);
         return;
     }

@@ -58,6 +58,18 @@ static int generate_turns(quad *v) {
     return count;
 }
 
+/* Factors of the recursions for Wigner's d from degree l to l + 1, l = 1..14, as products of one for n and one for m: sixteen of d_l,
+   then sixteen of d_{l-1}. Zero where n or m has not begun. */
+static int generate_wigner(quad *v) {
+    int count = 0;
+    for (int l = 1; l < GENERATE_TURNS; l++) {
+        for (int n = 0; n <= GENERATE_TURNS; n++) v[count++] = n > l ? 0 : quad_sqrt((quad)(2 * l + 1) / (quad)(((l + 1) * (l + 1) - n * n) * l));
+        for (int n = 0; n <= GENERATE_TURNS; n++)
+            v[count++] = n >= l ? 0 : quad_sqrt((quad)((l * l - n * n) * (l + 1)) / (quad)(((l + 1) * (l + 1) - n * n) * l));
+    }
+    return count;
+}
+
 /* Legendre nodes by Newton; q_l^m sin^m at each, for l, m < 5 (m outer), and the weights times pi; lane 8 is empty. */
 static int generate_latitudes(quad *v) {
     quad node[GENERATE_LATITUDES], weight[GENERATE_LATITUDES];
@@ -139,6 +151,8 @@ static void generate(FILE *out) {
     count = generate_turns(v);
     generate_table(out, "double", "isogi_sh__turn_f64", v, count, 1);
     fprintf(out, "#ifdef ISOGI_SH__SIMD\n");
+    count = generate_wigner(v);
+    generate_table(out, "double", "isogi_sh__wigner_f64", v, count, 1);
     count = generate_factors(v);
     generate_table(out, "float", "isogi_sh__table_f32", v, count, 0);
     count = generate_latitudes(v);
