@@ -218,14 +218,30 @@ ISOGI_API void isogi_vol_to_grid(const isogi_pyramid *pyramid, const double worl
 
 /* ---- values and gradients ---------------------------------------------------------------------------------------------- */
 
+/* What lies between the voxels. Value and gradient of the cubic filters come from 4x4x4 voxels, which continue linearly beyond the
+   border. */
+typedef enum isogi_filter {
+    ISOGI_FILTER_LINEAR = 0, /* trilinear: what rays and meshes see. Its gradient jumps at cell faces: the cell on the higher side counts */
+    ISOGI_FILTER_BSPLINE,    /* uniform cubic B-spline with the voxels as control points: smooths; continuous second derivatives; the
+                                gradient is exact for quadratics (Wyman 2006, 4.1.1) */
+    ISOGI_FILTER_CATMULL_ROM /* Catmull-Rom spline (Catmull and Rom 1974): passes through the voxels, hence overshoots between them;
+                                continuous gradient; value and gradient are exact for quadratics */
+} isogi_filter;
+
 /* At world points; values[count], gradients[count] (per world unit, in world axes); either may be NULL. Outside the box a point
-   is moved to its nearest border point. The trilinear gradient jumps at cell faces: the cell on the higher side counts.
-   The smooth pair is the uniform cubic B-spline with the voxels as control points over 4x4x4 (continuous second derivatives;
-   exact gradient for quadratics; the value is smoothed, not interpolated), continued linearly beyond the border. */
+   is moved to its nearest border point; a coordinate that is not finite leaves it somewhere in the box. Many points a call go
+   several times faster than one. Points are located in double; the rest is float: values err by at most 2^-21 of the largest
+   number that enters them (a voxel, the bias), gradients by 2^-21 of the largest difference between voxels that enter them, per
+   spacing; doubles are sampled in double. The path of instructions may change results within that; the size of a call does not. */
 ISOGI_API isogi_result isogi_vol_sample(const isogi_pyramid *pyramid, const float (*points)[3], size_t count, float *values,
-                                        float (*gradients)[3]);
+                                        float (*gradients)[3]); /* trilinear */
 ISOGI_API isogi_result isogi_vol_sample_smooth(const isogi_pyramid *pyramid, const float (*points)[3], size_t count, float *values,
-                                               float (*gradients)[3]);
+                                               float (*gradients)[3]); /* B-spline */
+ISOGI_API isogi_result isogi_vol_sample_filtered(const isogi_pyramid *pyramid, isogi_filter filter, const float (*points)[3], size_t count,
+                                                 float *values, float (*gradients)[3]);
+/* The same at grid coordinates, in double: for volumes far from the origin. Gradients are per world unit all the same. */
+ISOGI_API isogi_result isogi_vol_sample_grid(const isogi_pyramid *pyramid, isogi_filter filter, const double (*points)[3], size_t count,
+                                             float *values, float (*gradients)[3]);
 
 /* ---- rays ---------------------------------------------------------------------------------------------------------------- */
 
@@ -378,7 +394,12 @@ ISOGI_API void isogi_vol_mesh_free(const isogi_pyramid *pyramid, isogi_mesh *mes
 #if defined(ISOGI_VOL__SSE2) && defined(__x86_64__) && (defined(__clang__) || (defined(__GNUC__) && !defined(_WIN32))) && !defined(__TINYC__)
 #define ISOGI_VOL__AVX
 #define ISOGI_VOL__TARGET(features) __attribute__((target(features)))
+#define ISOGI_VOL__AVX512 ISOGI_VOL__TARGET("avx512f,avx512bw,avx512dq,avx512vl,avx512bitalg,avx512vbmi,avx512vbmi2,avx512vpopcntdq,gfni,fma")
 #include <immintrin.h>
+#endif
+#if defined(__aarch64__) && defined(__ARM_NEON) && !defined(__ARM_BIG_ENDIAN) && !defined(ISOGI_NO_SIMD) && !defined(__TINYC__)
+#define ISOGI_VOL__NEON
+#include <arm_neon.h>
 #endif
 enum { ISOGI_VOL__PATH_PLAIN = 1, ISOGI_VOL__PATH_BASE, ISOGI_VOL__PATH_AVX2, ISOGI_VOL__PATH_AVX512 };
 
@@ -1617,16 +1638,22 @@ static double isogi_vol__trilinear(const double c[8], const double u[3], double 
     return isogi_vol__lerp(z0, z1, u[2]);
 }
 
-/* Uniform cubic B-spline weights and their derivatives for the taps i-1 .. i+2 at i + u (methods: (1-u)^3/6 and so on), with
-   linear continuation past the border folded into the weights of the voxels that exist: f(-1) = 2 f(0) - f(1). A halo moves the
-   border outwards. */
-static void isogi_vol__bspline_weights(const isogi_volume *volume, int axis, int i, double u, double w[4], double d[4], int tap[4]) {
+/* Weights of the taps i-1 .. i+2 at i + u as polynomials: [filter][power of u][tap]. Uniform cubic B-spline (methods, section 2) and
+   Catmull-Rom (Catmull and Rom 1974, tension 1/2). */
+static const double isogi_vol__taps[2][4][4] = {
+    {{1.0 / 6, 4.0 / 6, 1.0 / 6, 0}, {-0.5, 0, 0.5, 0}, {0.5, -1, 0.5, 0}, {-1.0 / 6, 0.5, -0.5, 1.0 / 6}},
+    {{0, 1, 0, 0}, {-0.5, 0, 0.5, 0}, {1, -2.5, 2, -0.5}, {-0.5, 1.5, -1.5, 0.5}}};
+
+/* The weights and their derivatives, with linear continuation past the border folded into the weights of the voxels that exist:
+   f(-1) = 2 f(0) - f(1). A halo moves the border outwards. */
+static void isogi_vol__tap_weights(isogi_filter filter, const isogi_volume *volume, int axis, int i, double u, double w[4], double d[4], int tap[4]) {
+    const double(*c)[4] = isogi_vol__taps[filter == ISOGI_FILTER_CATMULL_ROM];
     const int n = (int)volume->size[axis], low = volume->halo_low[axis] ? -1 : 0, high = volume->halo_high[axis] ? n : n - 1;
-    double v = 1 - u;
     int k;
-    w[0] = v * v * v / 6, w[1] = ((3 * u - 6) * u * u + 4) / 6, w[2] = ((3 * v - 6) * v * v + 4) / 6, w[3] = u * u * u / 6;
-    d[0] = -v * v / 2, d[1] = (3 * u - 4) * u / 2, d[2] = -(3 * v - 4) * v / 2, d[3] = u * u / 2;
-    for (k = 0; k < 4; k++) tap[k] = i + k - 1 < low ? low : i + k - 1 > high ? high : i + k - 1;
+    for (k = 0; k < 4; k++) {
+        w[k] = ((c[3][k] * u + c[2][k]) * u + c[1][k]) * u + c[0][k], d[k] = (3 * c[3][k] * u + 2 * c[2][k]) * u + c[1][k];
+        tap[k] = i + k - 1 < low ? low : i + k - 1 > high ? high : i + k - 1;
+    }
     if (n == 1) {
         for (k = 0; k < 4; k++) tap[k] = 0;
         w[0] = w[2] = w[3] = 0, w[1] = 1;
@@ -1650,24 +1677,28 @@ ISOGI_VOL__TARGET("avx2") ISOGI_VOL__INLINE double isogi_vol__dot4(__m256d a, __
     return _mm_cvtsd_f64(_mm_add_sd(q, _mm_unpackhi_pd(q, q)));
 }
 
-/* The four weights of an axis, or their derivatives, at once: the polynomials of bspline_weights in powers of u. */
-ISOGI_VOL__TARGET("avx2") ISOGI_VOL__INLINE __m256d isogi_vol__weights4(double at, __m256d *slopes) {
-    const __m256d u = _mm256_set1_pd(at), c0 = _mm256_setr_pd(1.0 / 6, 4.0 / 6, 1.0 / 6, 0), c1 = _mm256_setr_pd(-0.5, 0, 0.5, 0);
-    const __m256d c2 = _mm256_setr_pd(0.5, -1, 0.5, 0), c3 = _mm256_setr_pd(-1.0 / 6, 0.5, -0.5, 1.0 / 6);
+/* The four weights of an axis, and their derivatives, at once. */
+ISOGI_VOL__TARGET("avx2") ISOGI_VOL__INLINE __m256d isogi_vol__weights4(const double c[4][4], double at, __m256d *slopes) {
+    const __m256d u = _mm256_set1_pd(at), c0 = _mm256_loadu_pd(c[0]), c1 = _mm256_loadu_pd(c[1]), c2 = _mm256_loadu_pd(c[2]), c3 = _mm256_loadu_pd(c[3]);
     const __m256d two = _mm256_set1_pd(2), three = _mm256_set1_pd(3);
     *slopes = _mm256_add_pd(_mm256_mul_pd(_mm256_add_pd(_mm256_mul_pd(_mm256_mul_pd(three, c3), u), _mm256_mul_pd(two, c2)), u), c1);
     return _mm256_add_pd(_mm256_mul_pd(_mm256_add_pd(_mm256_mul_pd(_mm256_add_pd(_mm256_mul_pd(c3, u), c2), u), c1), u), c0);
 }
 
-/* The sums below where all taps exist, a row at a time: rows are weighted along y and z first, x comes last. Packed floats only. */
-ISOGI_VOL__TARGET("avx2") static double isogi_vol__bspline_avx2(const isogi_volume *v, const int cell[3], const double local[3], double gradient[3]) {
+/* The sums below where all taps exist, a row at a time: rows are weighted along y and z first, x comes last. Packed doubles or floats. */
+ISOGI_VOL__TARGET("avx2") static double isogi_vol__cubic_sum_avx2(const isogi_volume *v, const double powers[4][4], const int cell[3], const double local[3],
+                                                                  double gradient[3]) {
     __m256d dx, dy, dz;
-    const __m256d wx = isogi_vol__weights4(local[0], &dx), wy = isogi_vol__weights4(local[1], &dy), wz = isogi_vol__weights4(local[2], &dz);
+    const __m256d wx = isogi_vol__weights4(powers, local[0], &dx), wy = isogi_vol__weights4(powers, local[1], &dy);
+    const __m256d wz = isogi_vol__weights4(powers, local[2], &dz);
+    const int doubles = v->type == ISOGI_F64;
     const __m256d scale = _mm256_set1_pd(v->scale), bias = _mm256_set1_pd(v->bias);
     __m256d all = _mm256_setzero_pd(), by_y = all, by_z = all;
     const char *p = (const char *)v->data + (cell[0] - 1) * v->stride[0] + (cell[1] - 1) * v->stride[1] + (cell[2] - 1) * v->stride[2];
 #define ISOGI_VOL__LANE(m, i) _mm256_permute4x64_pd(m, 0x55 * (i))
-#define ISOGI_VOL__ROW(j) _mm256_cvtps_pd(_mm_loadu_ps((const float *)(const void *)(p + (j) * v->stride[1])))
+#define ISOGI_VOL__ROW(j)                                                                       \
+    (doubles ? _mm256_loadu_pd((const double *)(const void *)(p + (j) * v->stride[1]))          \
+             : _mm256_cvtps_pd(_mm_loadu_ps((const float *)(const void *)(p + (j) * v->stride[1]))))
 #define ISOGI_VOL__SLICE(k)                                                                                                                \
     do {                                                                                                                                   \
         const __m256d row0 = ISOGI_VOL__ROW(0), row1 = ISOGI_VOL__ROW(1), row2 = ISOGI_VOL__ROW(2), row3 = ISOGI_VOL__ROW(3);              \
@@ -1698,19 +1729,19 @@ ISOGI_VOL__TARGET("avx2") static double isogi_vol__bspline_avx2(const isogi_volu
 }
 #endif
 
-/* Cubic B-spline value and gradient (per grid unit) at a cell and a place in it: 64 taps in one pass, row by row. */
-static double isogi_vol__bspline(const isogi_pyramid *p, const int cell[3], const double local[3], double gradient[3]) {
+/* Value and gradient (per grid unit) at a cell and a place in it: 64 taps in one pass, row by row. The plain reference. */
+static double isogi_vol__cubic_sum(const isogi_pyramid *p, isogi_filter filter, const int cell[3], const double local[3], double gradient[3]) {
     const isogi_volume *v = &p->volume;
     double w[3][4], d[3][4], value = 0, gx = 0, gy = 0, gz = 0;
     int tap[3][4], a, j, k;
 #ifdef ISOGI_VOL__AVX
-    if (v->type == ISOGI_F32 && v->stride[0] == 4 && p->path >= ISOGI_VOL__PATH_AVX2) {
+    if (p->path >= ISOGI_VOL__PATH_AVX2 && (v->type == ISOGI_F32 || v->type == ISOGI_F64) && v->stride[0] == (ptrdiff_t)isogi_vol__type_size(v->type)) {
         int inner = 1;
         for (a = 0; a < 3; a++) inner &= (cell[a] > 0 || v->halo_low[a]) && (size_t)cell[a] + 2 < v->size[a] + v->halo_high[a] && v->size[a] > 1;
-        if (inner) return isogi_vol__bspline_avx2(v, cell, local, gradient);
+        if (inner) return isogi_vol__cubic_sum_avx2(v, isogi_vol__taps[filter == ISOGI_FILTER_CATMULL_ROM], cell, local, gradient);
     }
 #endif
-    for (a = 0; a < 3; a++) isogi_vol__bspline_weights(v, a, cell[a], local[a], w[a], d[a], tap[a]);
+    for (a = 0; a < 3; a++) isogi_vol__tap_weights(filter, v, a, cell[a], local[a], w[a], d[a], tap[a]);
     for (k = 0; k < 4; k++) {
         double slice = 0, slice_x = 0, slice_y = 0;
         for (j = 0; j < 4; j++) {
@@ -1728,61 +1759,646 @@ static double isogi_vol__bspline(const isogi_pyramid *p, const int cell[3], cons
     return value;
 }
 
+/* ---- many points at once ----
+
+   Points go in blocks: all of a block are located, in double, then taken through float arithmetic side by side. A point's result
+   does not depend on the others, whatever the size of a call. Against the plain code, values err by at most 2^-21 of the largest
+   number that enters them: |voxel|, |bias|. */
+
+#define ISOGI_VOL__BLOCK 64
+#define ISOGI_VOL__FETCHED 8 /* points whose taps are fetched at once */
+
+typedef struct isogi_vol__block {
+    int32_t cell[3][ISOGI_VOL__BLOCK];
+    float local[3][ISOGI_VOL__BLOCK];
+    ptrdiff_t offset[ISOGI_VOL__BLOCK]; /* of the cell's first voxel, in bytes */
+    int32_t raw[8][ISOGI_VOL__BLOCK];   /* corners x + 2y + 4z: integers, or the bits of floats */
+    /* results for raw voxels, per grid unit */
+    float value[ISOGI_VOL__BLOCK], gradient[3][ISOGI_VOL__BLOCK]; /* of the trilinear filter */
+    float sum[ISOGI_VOL__BLOCK][4];                               /* of cubic filters: value and gradient */
+} isogi_vol__block;
+
+/* Where the points of a call are: one of the two is NULL. */
+typedef struct isogi_vol__points {
+    const float (*world)[3];
+    const double (*grid)[3];
+} isogi_vol__points;
+
+/* The grid coordinates of point i, anywhere. */
+static void isogi_vol__grid_point(const isogi_pyramid *p, const isogi_vol__points *at, size_t i, double grid[3]) {
+    double world[3];
+    int a;
+    if (at->grid) {
+        for (a = 0; a < 3; a++) grid[a] = at->grid[i][a];
+        return;
+    }
+    for (a = 0; a < 3; a++) world[a] = (double)at->world[i][a];
+    isogi_vol_to_grid(p, world, grid);
+}
+
+/* Cell and place in it of points first .. first + n - 1, moved to the border if outside; n up to a multiple of 16 are filled in. */
+static void isogi_vol__locate(const isogi_pyramid *p, const isogi_vol__points *at, size_t first, int n, isogi_vol__block *b) {
+    const isogi_volume *v = &p->volume;
+    int i, a;
+    for (i = 0; i < ((n + 15) & ~15); i++) {
+        double grid[3] = {0, 0, 0}, local;
+        if (i < n) isogi_vol__grid_point(p, at, first + (size_t)i, grid);
+        b->offset[i] = 0;
+        for (a = 0; a < 3; a++) {
+            b->cell[a][i] = isogi_vol__cell(grid[a], v->size[a], &local);
+            b->local[a][i] = (float)local, b->offset[i] += b->cell[a][i] * v->stride[a];
+        }
+    }
+}
+
 #ifdef ISOGI_VOL__AVX
-/* As below, four at a time. */
-ISOGI_VOL__TARGET("avx2") static void isogi_vol__locate_avx2(const isogi_pyramid *p, const float point[3], int cell[4], double local[4]) {
-    const __m256d box = _mm256_loadu_pd(p->box), zero = _mm256_setzero_pd();
-    __m256d g = _mm256_mul_pd(_mm256_loadu_pd(p->grid_axis[0]), _mm256_set1_pd((double)point[0] - p->origin[0])), floor4;
-    g = _mm256_add_pd(g, _mm256_mul_pd(_mm256_loadu_pd(p->grid_axis[1]), _mm256_set1_pd((double)point[1] - p->origin[1])));
-    g = _mm256_add_pd(g, _mm256_mul_pd(_mm256_loadu_pd(p->grid_axis[2]), _mm256_set1_pd((double)point[2] - p->origin[2])));
-    g = _mm256_min_pd(_mm256_max_pd(g, zero), box); /* NaN gives 0 */
-    floor4 = _mm256_max_pd(_mm256_min_pd(_mm256_floor_pd(g), _mm256_sub_pd(box, _mm256_set1_pd(1))), zero);
-    _mm_storeu_si128((__m128i *)(void *)cell, _mm_max_epi32(_mm256_cvttpd_epi32(floor4), _mm_setzero_si128())); /* whatever -ffast-math does */
-    _mm256_storeu_pd(local, _mm256_sub_pd(g, floor4));
+#define ISOGI_VOL__AVX2 ISOGI_VOL__TARGET("avx2,fma")
+/* The coordinates of some points that follow each other, and zeros after the last. */
+static void isogi_vol__copy_points(const isogi_vol__points *at, size_t first, int n, int room, double *out) {
+    int r;
+    for (r = 0; r < 3 * room; r++)
+        out[r] = r >= 3 * n ? 0 : at->grid ? at->grid[first + (size_t)(r / 3)][r % 3] : (double)at->world[first + (size_t)(r / 3)][r % 3];
+}
+
+/* The same for WIDTH points at a time. Coordinates x, y, z are parted from the numbers a, b, c; then axis by axis. */
+#define ISOGI_VOL__LOCATE_AXIS(V, L, HALF, H, MADD, r, g)                                                                        \
+    do {                                                                                                                         \
+        if (at->world) g = L##mul_pd(L##set1_pd(m[4 * r]), g##0);                                                                \
+        if (at->world && !straight)                                                                                              \
+            g = MADD(L##set1_pd(m[3 * r + (r + 1) % 3]), r == 0 ? y0 : r == 1 ? z0 : x0,                                         \
+                     MADD(L##set1_pd(m[3 * r + (r + 2) % 3]), r == 0 ? z0 : r == 1 ? x0 : y0, g));                               \
+        g = L##min_pd(L##max_pd(g, L##setzero_pd()), L##set1_pd(p->box[r])); /* NaN gives 0 */                                   \
+        cell = H##max_epi32(H##min_epi32(L##cvttpd_epi32(g), H##set1_epi32(p->cells[r] - 1)), H##set1_epi32(0)); /* in any case */ \
+        memcpy(&b->cell[r][i], &cell, sizeof cell);                                                                              \
+        whole = L##cvtepi32_pd(cell);                                                                                            \
+        H##storeu_ps(&b->local[r][i], L##cvtpd_ps(L##sub_pd(g, whole)));                                                         \
+        offset = MADD(whole, L##set1_pd((double)p->volume.stride[r]), offset);                                                   \
+    } while (0)
+#define ISOGI_VOL__LOCATE(NAME, ATTRIBUTES, V, L, HALF, H, WIDTH, MADD)                                                          \
+    ATTRIBUTES static void isogi_vol__locate_##NAME(const isogi_pyramid *p, const isogi_vol__points *at, size_t first, int n,    \
+                                                    isogi_vol__block *b) {                                                       \
+        const double *m = p->to_grid, *o = p->origin;                                                                     \
+        const int straight = isogi_vol__all_zero(m + 1, 3) && isogi_vol__all_zero(m + 5, 3);                                     \
+        int i;                                                                                                                   \
+        for (i = 0; i < ((n + 15) & ~15); i += WIDTH) {                                                                          \
+            V k0, k1, k2, x, y, z, x0, y0, z0, whole, offset = L##setzero_pd();                                                  \
+            HALF cell;                                                                                                           \
+            if (at->world && i + WIDTH <= n) {                                                                                   \
+                const float *w = at->world[first + (size_t)i];                                                                   \
+                k0 = L##cvtps_pd(H##loadu_ps(w)), k1 = L##cvtps_pd(H##loadu_ps(w + WIDTH)), k2 = L##cvtps_pd(H##loadu_ps(w + 2 * WIDTH)); \
+            } else {                                                                                                             \
+                double some[3 * WIDTH];                                                                                          \
+                isogi_vol__copy_points(at, first + (size_t)i, n - i, WIDTH, some);                                               \
+                k0 = L##loadu_pd(some), k1 = L##loadu_pd(some + WIDTH), k2 = L##loadu_pd(some + 2 * WIDTH);                      \
+            }                                                                                                                    \
+            x = ISOGI_VOL__X_##NAME, y = ISOGI_VOL__Y_##NAME, z = ISOGI_VOL__Z_##NAME;                                           \
+            x0 = L##sub_pd(x, L##set1_pd(o[0])), y0 = L##sub_pd(y, L##set1_pd(o[1])), z0 = L##sub_pd(z, L##set1_pd(o[2]));       \
+            ISOGI_VOL__LOCATE_AXIS(V, L, HALF, H, MADD, 0, x);                                                                   \
+            ISOGI_VOL__LOCATE_AXIS(V, L, HALF, H, MADD, 1, y);                                                                   \
+            ISOGI_VOL__LOCATE_AXIS(V, L, HALF, H, MADD, 2, z);                                                                   \
+            ISOGI_VOL__OFFSETS_##NAME;                                                                                           \
+        }                                                                                                                        \
+    }
+
+#define ISOGI_VOL__X_avx2 _mm256_permute4x64_pd(_mm256_blend_pd(_mm256_blend_pd(k0, k1, 4), k2, 2), 0x6c)
+#define ISOGI_VOL__Y_avx2 _mm256_permute4x64_pd(_mm256_blend_pd(_mm256_blend_pd(k0, k1, 9), k2, 4), 0xb1)
+#define ISOGI_VOL__Z_avx2 _mm256_permute4x64_pd(_mm256_blend_pd(_mm256_blend_pd(k0, k1, 2), k2, 9), 0xc6)
+/* added to a number, 1.5 * 2^52 leaves it as an integer in the low bits */
+#define ISOGI_VOL__MAGIC _mm256_set1_pd(6755399441055744.0)
+#define ISOGI_VOL__OFFSETS_avx2                                                                                                  \
+    _mm256_storeu_si256((__m256i *)(void *)&b->offset[i],                                                                        \
+                        _mm256_sub_epi64(_mm256_castpd_si256(_mm256_add_pd(offset, ISOGI_VOL__MAGIC)), _mm256_castpd_si256(ISOGI_VOL__MAGIC)))
+ISOGI_VOL__LOCATE(avx2, ISOGI_VOL__AVX2, __m256d, _mm256_, __m128i, _mm_, 4, _mm256_fmadd_pd)
+
+#define ISOGI_VOL__PART(i, j, k, l, m, n, p, q, r) \
+    _mm512_permutex2var_pd(_mm512_permutex2var_pd(k0, _mm512_setr_epi64(i, j, k, l, m, n, 0, 0), k1), _mm512_setr_epi64(0, 1, 2, 3, 4, p, q, r), k2)
+#define ISOGI_VOL__X_avx512 ISOGI_VOL__PART(0, 3, 6, 9, 12, 15, 5, 10, 13)
+#define ISOGI_VOL__Y_avx512 ISOGI_VOL__PART(1, 4, 7, 10, 13, 0, 8, 11, 14)
+#define ISOGI_VOL__Z_avx512 ISOGI_VOL__PART(2, 5, 8, 11, 14, 0, 9, 12, 15)
+#define ISOGI_VOL__OFFSETS_avx512 _mm512_storeu_si512((void *)&b->offset[i], _mm512_cvtpd_epi64(offset))
+ISOGI_VOL__LOCATE(avx512, ISOGI_VOL__AVX512, __m512d, _mm512_, __m256i, _mm256_, 8, _mm512_fmadd_pd)
+#endif
+
+/* Corners side by side, so that no level of instructions needs gathers, which are slow on many processors. */
+static void isogi_vol__fetch(const isogi_volume *v, int n, isogi_vol__block *b) {
+    const char *data = (const char *)v->data;
+    const ptrdiff_t dx = v->size[0] > 1 ? v->stride[0] : 0, dy = v->size[1] > 1 ? v->stride[1] : 0, dz = v->size[2] > 1 ? v->stride[2] : 0;
+    int i;
+#define ISOGI_VOL__TAKE_INTEGER(T, k, from) b->raw[k][i] = *(const T *)(const void *)(from)
+#define ISOGI_VOL__TAKE_FLOAT(T, k, from) memcpy(&b->raw[k][i], from, sizeof(T))
+#define ISOGI_VOL__READ(TAKE, T)                                                                                                 \
+    for (i = 0; i < n; i++) {                                                                                                    \
+        const char *p = data + b->offset[i], *q = p + dy, *r = p + dz, *s = q + dz;                                              \
+        TAKE(T, 0, p), TAKE(T, 1, p + dx), TAKE(T, 2, q), TAKE(T, 3, q + dx);                                                    \
+        TAKE(T, 4, r), TAKE(T, 5, r + dx), TAKE(T, 6, s), TAKE(T, 7, s + dx);                                                    \
+    }                                                                                                                            \
+    break;
+    switch (v->type) {
+    case ISOGI_U8: ISOGI_VOL__READ(ISOGI_VOL__TAKE_INTEGER, uint8_t)
+    case ISOGI_I8: ISOGI_VOL__READ(ISOGI_VOL__TAKE_INTEGER, int8_t)
+    case ISOGI_U16: ISOGI_VOL__READ(ISOGI_VOL__TAKE_INTEGER, uint16_t)
+    case ISOGI_I16: ISOGI_VOL__READ(ISOGI_VOL__TAKE_INTEGER, int16_t)
+    case ISOGI_F32: ISOGI_VOL__READ(ISOGI_VOL__TAKE_FLOAT, float)
+    case ISOGI_F64: break;
+    }
+#undef ISOGI_VOL__TAKE_INTEGER
+#undef ISOGI_VOL__TAKE_FLOAT
+#undef ISOGI_VOL__READ
+}
+
+#ifdef ISOGI_VOL__AVX
+/* The same with gathers, which are quick where AVX-512 is: neighbours along x come as one number. Bytes bring two more with them; 0:
+   these would lie beyond the end of the volume, or voxels are not side by side. */
+ISOGI_VOL__AVX512 static int isogi_vol__gather_avx512(const isogi_volume *v, int n, isogi_vol__block *b) {
+    const int width = (int)isogi_vol__type_size(v->type), is_signed = v->type == ISOGI_I8 || v->type == ISOGI_I16;
+    const ptrdiff_t dy = v->size[1] > 1 ? v->stride[1] : 0, dz = v->size[2] > 1 ? v->stride[2] : 0;
+    const __m128i up = _mm_cvtsi32_si128(32 - 8 * width), up_second = _mm_cvtsi32_si128(32 - 16 * width);
+    ptrdiff_t end = width;
+    __m512i furthest = _mm512_set1_epi64(PTRDIFF_MIN);
+    int i, r, a;
+    if (v->stride[0] != width || v->size[0] < 2) return 0;
+    for (a = 0; a < 3; a++) end += v->stride[a] > 0 ? v->stride[a] * (ptrdiff_t)(v->size[a] - 1) : 0;
+    for (i = 0; i < n && width == 1; i += 8) furthest = _mm512_max_epi64(furthest, _mm512_loadu_si512((const void *)&b->offset[i]));
+    if (_mm512_reduce_max_epi64(furthest) > end - 4 - (dy > 0 ? dy : 0) - (dz > 0 ? dz : 0)) return 0;
+    for (i = 0; i < n; i += 16) {
+        const __m512i at0 = _mm512_loadu_si512((const void *)&b->offset[i]), at1 = _mm512_loadu_si512((const void *)&b->offset[i + 8]);
+        for (r = 0; r < 4; r++) {
+            const char *row = (const char *)v->data + (r & 1 ? dy : 0) + (r & 2 ? dz : 0);
+            __m512i first, second;
+            if (width == 4) {
+                const __m512i pair0 = _mm512_i64gather_epi64(at0, (const void *)row, 1), pair1 = _mm512_i64gather_epi64(at1, (const void *)row, 1);
+                first = _mm512_permutex2var_epi32(pair0, _mm512_setr_epi32(0, 2, 4, 6, 8, 10, 12, 14, 16, 18, 20, 22, 24, 26, 28, 30), pair1);
+                second = _mm512_permutex2var_epi32(pair0, _mm512_setr_epi32(1, 3, 5, 7, 9, 11, 13, 15, 17, 19, 21, 23, 25, 27, 29, 31), pair1);
+            } else {
+                const __m512i pair = _mm512_inserti64x4(_mm512_castsi256_si512(_mm512_i64gather_epi32(at0, (const void *)row, 1)),
+                                                        _mm512_i64gather_epi32(at1, (const void *)row, 1), 1);
+                first = _mm512_sll_epi32(pair, up), second = _mm512_sll_epi32(pair, up_second);
+                first = is_signed ? _mm512_sra_epi32(first, up) : _mm512_srl_epi32(first, up);
+                second = is_signed ? _mm512_sra_epi32(second, up) : _mm512_srl_epi32(second, up);
+            }
+            _mm512_storeu_si512((void *)&b->raw[2 * r][i], first), _mm512_storeu_si512((void *)&b->raw[2 * r + 1][i], second);
+        }
+    }
+    return 1;
 }
 #endif
 
-/* The world point's cell and place in it, moved to the border if outside. The fourth numbers mean nothing. */
-static void isogi_vol__locate(const isogi_pyramid *p, const float point[3], int cell[4], double local[4]) {
-    double world[3], grid[3];
-    int a;
+/* Trilinear values, and gradients if asked for, of a whole block; vector by vector for any width: V and the operations L##mul_ps ...
+   of the width. Differences of corners come first, so that the error of a gradient is relative to it. */
+#define ISOGI_VOL__BLEND(L, a, b, axis) L##add_ps(L##mul_ps(rest[axis], a), L##mul_ps(at[axis], b))
+#define ISOGI_VOL__TRILINEAR(NAME, ATTRIBUTES, V, L, WIDTH, INTEGERS)                                                            \
+    ATTRIBUTES static void isogi_vol__trilinear_##NAME(isogi_vol__block *b, int n, int integers, int gradients) {               \
+        int i, k;                                                                                                                \
+        for (i = 0; i < n; i += WIDTH) {                                                                                         \
+            V c[8], at[3], rest[3], y0, y1, z0, z1;                                                                              \
+            if (integers)                                                                                                        \
+                for (k = 0; k < 8; k++) c[k] = INTEGERS(&b->raw[k][i]);                                                          \
+            else                                                                                                                 \
+                for (k = 0; k < 8; k++) c[k] = L##loadu_ps((const float *)(const void *)&b->raw[k][i]);                          \
+            for (k = 0; k < 3; k++) at[k] = L##loadu_ps(&b->local[k][i]), rest[k] = L##sub_ps(L##set1_ps(1), at[k]);             \
+            y0 = ISOGI_VOL__BLEND(L, c[0], c[1], 0), y1 = ISOGI_VOL__BLEND(L, c[2], c[3], 0);                                    \
+            z0 = ISOGI_VOL__BLEND(L, y0, y1, 1);                                                                                 \
+            y0 = ISOGI_VOL__BLEND(L, c[4], c[5], 0), y1 = ISOGI_VOL__BLEND(L, c[6], c[7], 0);                                    \
+            z1 = ISOGI_VOL__BLEND(L, y0, y1, 1);                                                                                 \
+            L##storeu_ps(&b->value[i], ISOGI_VOL__BLEND(L, z0, z1, 2));                                                          \
+            for (k = 0; k < 3 && gradients; k++) {                                                                               \
+                const int s = 1 << k, p = k == 0 ? 2 : 1, q = k == 2 ? 2 : 4, e = k == 0, f = k == 2 ? 1 : 2;                    \
+                z0 = ISOGI_VOL__BLEND(L, L##sub_ps(c[s], c[0]), L##sub_ps(c[s + p], c[p]), e);                                   \
+                z1 = ISOGI_VOL__BLEND(L, L##sub_ps(c[s + q], c[q]), L##sub_ps(c[s + p + q], c[p + q]), e);                       \
+                L##storeu_ps(&b->gradient[k][i], ISOGI_VOL__BLEND(L, z0, z1, f));                                                \
+            }                                                                                                                    \
+        }                                                                                                                        \
+    }
+
+/* The first tap of a point. */
+ISOGI_VOL__INLINE const char *isogi_vol__first_tap(const isogi_volume *v, const isogi_vol__block *b, int i) {
+    return (const char *)v->data + b->offset[i] - v->stride[0] - v->stride[1] - v->stride[2];
+}
+
+/* Cubic filters over fetched taps, x fastest. Slices are summed along z first, then their columns. Taps count relative to the cell's first
+   voxel, so that rounding is relative to the variation among them. R: vectors of four, for the weights of one axis; L##spread puts
+   the weights of rows j WIDTH / 4 ... into the lanes of these rows, L##tile repeats four along all rows. */
+#define ISOGI_VOL__CUBIC(NAME, ATTRIBUTES, V, L, R, S, WIDTH, MADD)                                                              \
+    ATTRIBUTES static void isogi_vol__cubic_##NAME(isogi_vol__block *b, const float powers[4][4], const float *taps,             \
+                                                   const uint8_t *number, int n) {                                               \
+        int i, a, j, k;                                                                                                          \
+        for (i = 0; i < n; i++, taps += 64) {                                                                                    \
+            float w[3][4], d[3][4];                                                                                              \
+            const V base = L##set1_ps(taps[21]);                                                                                 \
+            V wx, dx, value = L##setzero_ps(), gx = value, gy = value, gz = value;                                               \
+            for (a = 0; a < 3; a++) {                                                                                            \
+                const R u = S##set1_ps(b->local[a][number[i]]), c3 = S##loadu_ps(powers[3]), c1 = S##loadu_ps(powers[1]);        \
+                const R q = ISOGI_VOL__MADD_base(c3, u, S##loadu_ps(powers[2]));                                                                \
+                S##storeu_ps(w[a], ISOGI_VOL__MADD_base(ISOGI_VOL__MADD_base(q, u, c1), u, S##loadu_ps(powers[0])));                                           \
+                S##storeu_ps(d[a], ISOGI_VOL__MADD_base(ISOGI_VOL__MADD_base(c3, u, S##add_ps(q, q)), u, c1));                                                 \
+            }                                                                                                                    \
+            wx = ISOGI_VOL__TILE_##NAME(w[0]), dx = ISOGI_VOL__TILE_##NAME(d[0]);                                                \
+            for (j = 0; j < 16 / WIDTH; j++) {                                                                                   \
+                const V wy = ISOGI_VOL__SPREAD_##NAME(w[1], j), dy = ISOGI_VOL__SPREAD_##NAME(d[1], j), wxy = L##mul_ps(wx, wy); \
+                V slab = L##setzero_ps(), slope = slab;                                                                          \
+                for (k = 0; k < 4; k++) {                                                                                        \
+                    const V slice = L##sub_ps(L##loadu_ps(taps + 16 * k + WIDTH * j), base);                                     \
+                    slab = MADD(L##set1_ps(w[2][k]), slice, slab), slope = MADD(L##set1_ps(d[2][k]), slice, slope);              \
+                }                                                                                                                \
+                value = MADD(slab, wxy, value), gx = MADD(slab, L##mul_ps(dx, wy), gx);                                          \
+                gy = MADD(slab, L##mul_ps(wx, dy), gy), gz = MADD(slope, wxy, gz);                                               \
+            }                                                                                                                    \
+            S##storeu_ps(b->sum[number[i]], isogi_vol__sums_##NAME(value, gx, gy, gz));                                          \
+            b->sum[number[i]][0] += taps[21];                                                                                    \
+        }                                                                                                                        \
+    }
+
+/* Floats from integers side by side. */
+#define ISOGI_VOL__WIDEN(NAME, ATTRIBUTES, L, WIDTH)                                                                             \
+    ATTRIBUTES static void isogi_vol__widen_##NAME(isogi_type type, const uint8_t *raw, float *out, int n) {                    \
+        int i;                                                                                                                   \
+        for (i = 0; i < n && type == ISOGI_U8; i += WIDTH) L##storeu_ps(out + i, ISOGI_VOL__U8_##NAME(raw + i));                 \
+        for (i = 0; i < n && type == ISOGI_I8; i += WIDTH) L##storeu_ps(out + i, ISOGI_VOL__I8_##NAME(raw + i));                 \
+        for (i = 0; i < n && type == ISOGI_U16; i += WIDTH) L##storeu_ps(out + i, ISOGI_VOL__U16_##NAME(raw + 2 * i));           \
+        for (i = 0; i < n && type == ISOGI_I16; i += WIDTH) L##storeu_ps(out + i, ISOGI_VOL__I16_##NAME(raw + 2 * i));           \
+    }
+
+#ifdef ISOGI_VOL__SSE2
+#define ISOGI_VOL__MADD_base(a, b, c) _mm_add_ps(_mm_mul_ps(a, b), c)
+#define ISOGI_VOL__TILE_base(w) _mm_loadu_ps(w)
+#define ISOGI_VOL__SPREAD_base(w, j) _mm_set1_ps((w)[j])
+#define ISOGI_VOL__INTEGERS_base(p) _mm_cvtepi32_ps(_mm_loadu_si128((const __m128i *)(const void *)(p)))
+ISOGI_VOL__INLINE __m128 isogi_vol__sums_base(__m128 a, __m128 b, __m128 c, __m128 d) {
+    const __m128 s = _mm_add_ps(_mm_unpacklo_ps(a, b), _mm_unpackhi_ps(a, b)), t = _mm_add_ps(_mm_unpacklo_ps(c, d), _mm_unpackhi_ps(c, d));
+    return _mm_add_ps(_mm_movelh_ps(s, t), _mm_movehl_ps(t, s));
+}
+ISOGI_VOL__INLINE __m128i isogi_vol__four_bytes(const uint8_t *p) {
+    int32_t x;
+    memcpy(&x, p, 4);
+    return _mm_cvtsi32_si128(x);
+}
+/* Numbers are moved to the upper end of 32 bits, then shifted back with or without their sign. */
+#define ISOGI_VOL__BYTES(p) _mm_unpacklo_epi16(_mm_setzero_si128(), _mm_unpacklo_epi8(_mm_setzero_si128(), isogi_vol__four_bytes(p)))
+#define ISOGI_VOL__SHORTS(p) _mm_unpacklo_epi16(_mm_setzero_si128(), _mm_loadl_epi64((const __m128i *)(const void *)(p)))
+#define ISOGI_VOL__U8_base(p) _mm_cvtepi32_ps(_mm_srli_epi32(ISOGI_VOL__BYTES(p), 24))
+#define ISOGI_VOL__I8_base(p) _mm_cvtepi32_ps(_mm_srai_epi32(ISOGI_VOL__BYTES(p), 24))
+#define ISOGI_VOL__U16_base(p) _mm_cvtepi32_ps(_mm_srli_epi32(ISOGI_VOL__SHORTS(p), 16))
+#define ISOGI_VOL__I16_base(p) _mm_cvtepi32_ps(_mm_srai_epi32(ISOGI_VOL__SHORTS(p), 16))
+ISOGI_VOL__TRILINEAR(base, , __m128, _mm_, 4, ISOGI_VOL__INTEGERS_base)
+ISOGI_VOL__CUBIC(base, , __m128, _mm_, __m128, _mm_, 4, ISOGI_VOL__MADD_base)
+ISOGI_VOL__WIDEN(base, , _mm_, 4)
+#endif
+
 #ifdef ISOGI_VOL__AVX
-    if (p->path >= ISOGI_VOL__PATH_AVX2) {
-        isogi_vol__locate_avx2(p, point, cell, local);
+#define ISOGI_VOL__TILE_avx2(w) _mm256_broadcast_ps((const __m128 *)(const void *)(w))
+#define ISOGI_VOL__SPREAD_avx2(w, j) _mm256_set_m128(_mm_set1_ps((w)[2 * (j) + 1]), _mm_set1_ps((w)[2 * (j)]))
+#define ISOGI_VOL__INTEGERS_avx2(p) _mm256_cvtepi32_ps(_mm256_loadu_si256((const __m256i *)(const void *)(p)))
+ISOGI_VOL__AVX2 ISOGI_VOL__INLINE __m128 isogi_vol__sums_avx2(__m256 a, __m256 b, __m256 c, __m256 d) {
+    const __m256 s = _mm256_add_ps(_mm256_unpacklo_ps(a, b), _mm256_unpackhi_ps(a, b)), t = _mm256_add_ps(_mm256_unpacklo_ps(c, d), _mm256_unpackhi_ps(c, d));
+    const __m256 all = _mm256_add_ps(_mm256_shuffle_ps(s, t, 0x44), _mm256_shuffle_ps(s, t, 0xee));
+    return _mm_add_ps(_mm256_castps256_ps128(all), _mm256_extractf128_ps(all, 1));
+}
+#define ISOGI_VOL__EIGHT(p) _mm_loadl_epi64((const __m128i *)(const void *)(p))
+#define ISOGI_VOL__SIXTEEN(p) _mm_loadu_si128((const __m128i *)(const void *)(p))
+#define ISOGI_VOL__U8_avx2(p) _mm256_cvtepi32_ps(_mm256_cvtepu8_epi32(ISOGI_VOL__EIGHT(p)))
+#define ISOGI_VOL__I8_avx2(p) _mm256_cvtepi32_ps(_mm256_cvtepi8_epi32(ISOGI_VOL__EIGHT(p)))
+#define ISOGI_VOL__U16_avx2(p) _mm256_cvtepi32_ps(_mm256_cvtepu16_epi32(ISOGI_VOL__SIXTEEN(p)))
+#define ISOGI_VOL__I16_avx2(p) _mm256_cvtepi32_ps(_mm256_cvtepi16_epi32(ISOGI_VOL__SIXTEEN(p)))
+ISOGI_VOL__TRILINEAR(avx2, ISOGI_VOL__AVX2, __m256, _mm256_, 8, ISOGI_VOL__INTEGERS_avx2)
+ISOGI_VOL__CUBIC(avx2, ISOGI_VOL__AVX2, __m256, _mm256_, __m128, _mm_, 8, _mm256_fmadd_ps)
+ISOGI_VOL__WIDEN(avx2, ISOGI_VOL__AVX2, _mm256_, 8)
+
+#define ISOGI_VOL__INTEGERS_avx512(p) _mm512_cvtepi32_ps(_mm512_loadu_si512((const void *)(p)))
+ISOGI_VOL__AVX512 ISOGI_VOL__INLINE __m128 isogi_vol__sums_avx512(__m512 a, __m512 b, __m512 c, __m512 d) {
+    const __m512 s = _mm512_add_ps(_mm512_unpacklo_ps(a, b), _mm512_unpackhi_ps(a, b)), t = _mm512_add_ps(_mm512_unpacklo_ps(c, d), _mm512_unpackhi_ps(c, d));
+    const __m512 all = _mm512_add_ps(_mm512_shuffle_ps(s, t, 0x44), _mm512_shuffle_ps(s, t, 0xee));
+    const __m256 half = _mm256_add_ps(_mm512_castps512_ps256(all), _mm512_extractf32x8_ps(all, 1));
+    return _mm_add_ps(_mm256_castps256_ps128(half), _mm256_extractf128_ps(half, 1));
+}
+#define ISOGI_VOL__FOUR_FLOATS(p) _mm_loadu_ps((const float *)(const void *)(p))
+ISOGI_VOL__TRILINEAR(avx512, ISOGI_VOL__AVX512, __m512, _mm512_, 16, ISOGI_VOL__INTEGERS_avx512)
+/* The same for whole slices of 16 taps, straight from memory. */
+ISOGI_VOL__AVX512 ISOGI_VOL__INLINE __m512 isogi_vol__slice_avx512(isogi_type type, const char *p, ptrdiff_t dy, ptrdiff_t dy3) {
+    if (type == ISOGI_F32) {
+        const __m512 two = _mm512_insertf32x4(_mm512_castps128_ps512(ISOGI_VOL__FOUR_FLOATS(p)), ISOGI_VOL__FOUR_FLOATS(p + dy), 1);
+        return _mm512_insertf32x4(_mm512_insertf32x4(two, ISOGI_VOL__FOUR_FLOATS(p + 2 * dy), 2), ISOGI_VOL__FOUR_FLOATS(p + dy3), 3);
+    } else if (type == ISOGI_U16 || type == ISOGI_I16) {
+        const __m256i all = _mm256_set_m128i(_mm_unpacklo_epi64(ISOGI_VOL__EIGHT(p + 2 * dy), ISOGI_VOL__EIGHT(p + dy3)),
+                                             _mm_unpacklo_epi64(ISOGI_VOL__EIGHT(p), ISOGI_VOL__EIGHT(p + dy)));
+        return _mm512_cvtepi32_ps(type == ISOGI_U16 ? _mm512_cvtepu16_epi32(all) : _mm512_cvtepi16_epi32(all));
+    } else {
+        int32_t row[4];
+        __m128i all;
+        memcpy(row, p, 4), memcpy(row + 1, p + dy, 4), memcpy(row + 2, p + 2 * dy, 4), memcpy(row + 3, p + dy3, 4);
+        all = _mm_setr_epi32(row[0], row[1], row[2], row[3]);
+        return _mm512_cvtepi32_ps(type == ISOGI_U8 ? _mm512_cvtepu8_epi32(all) : _mm512_cvtepi8_epi32(all));
+    }
+}
+
+ISOGI_VOL__AVX512 ISOGI_VOL__INLINE void isogi_vol__cubic_as_avx512(isogi_type type, const isogi_volume *v, isogi_vol__block *b,
+                                                                    const float powers[4][4], const uint8_t *number, int n) {
+    const __m512i each_four = _mm512_setr_epi32(0, 0, 0, 0, 1, 1, 1, 1, 2, 2, 2, 2, 3, 3, 3, 3);
+    const __m512 c0 = _mm512_broadcast_f32x4(_mm_loadu_ps(powers[0])), c1 = _mm512_broadcast_f32x4(_mm_loadu_ps(powers[1]));
+    const __m512 c2 = _mm512_broadcast_f32x4(_mm_loadu_ps(powers[2])), c3 = _mm512_broadcast_f32x4(_mm_loadu_ps(powers[3]));
+    const ptrdiff_t dy = v->stride[1], dy3 = 3 * dy, dz = v->stride[2];
+    float weight[ISOGI_VOL__FETCHED][16], slant[ISOGI_VOL__FETCHED][16];
+    int m;
+    for (m = 0; m < n; m++) { /* weights of all axes, four lanes each */
+        const int i = number[m];
+        const __m512 u = _mm512_mask_broadcastss_ps(_mm512_mask_broadcastss_ps(_mm512_set1_ps(b->local[2][i]), 0x00f0, _mm_load_ss(&b->local[1][i])),
+                                                    0x000f, _mm_load_ss(&b->local[0][i]));
+        const __m512 half = _mm512_fmadd_ps(c3, u, c2);
+        _mm512_storeu_ps(weight[m], _mm512_fmadd_ps(_mm512_fmadd_ps(half, u, c1), u, c0));
+        _mm512_storeu_ps(slant[m], _mm512_fmadd_ps(_mm512_fmadd_ps(c3, u, _mm512_add_ps(half, half)), u, c1));
+    }
+    for (m = 0; m < n; m++) {
+        const float *w = weight[m], *d = slant[m];
+        const char *p = isogi_vol__first_tap(v, b, number[m]);
+        const __m512 first = isogi_vol__slice_avx512(type, p + dz, dy, dy3), base = _mm512_permutexvar_ps(_mm512_set1_epi32(5), first);
+        const __m512 wx = _mm512_broadcast_f32x4(_mm_loadu_ps(w)), dx = _mm512_broadcast_f32x4(_mm_loadu_ps(d));
+        const __m512 wy = _mm512_permutexvar_ps(each_four, _mm512_castps128_ps512(_mm_loadu_ps(w + 4)));
+        const __m512 slope_y = _mm512_permutexvar_ps(each_four, _mm512_castps128_ps512(_mm_loadu_ps(d + 4))), wxy = _mm512_mul_ps(wx, wy);
+        __m512 s = _mm512_sub_ps(first, base), slab = _mm512_mul_ps(_mm512_set1_ps(w[9]), s), slope = _mm512_mul_ps(_mm512_set1_ps(d[9]), s);
+        s = _mm512_sub_ps(isogi_vol__slice_avx512(type, p, dy, dy3), base);
+        slab = _mm512_fmadd_ps(_mm512_set1_ps(w[8]), s, slab), slope = _mm512_fmadd_ps(_mm512_set1_ps(d[8]), s, slope);
+        p += 2 * dz;
+        s = _mm512_sub_ps(isogi_vol__slice_avx512(type, p, dy, dy3), base);
+        slab = _mm512_fmadd_ps(_mm512_set1_ps(w[10]), s, slab), slope = _mm512_fmadd_ps(_mm512_set1_ps(d[10]), s, slope);
+        s = _mm512_sub_ps(isogi_vol__slice_avx512(type, p + dz, dy, dy3), base);
+        slab = _mm512_fmadd_ps(_mm512_set1_ps(w[11]), s, slab), slope = _mm512_fmadd_ps(_mm512_set1_ps(d[11]), s, slope);
+        _mm_storeu_ps(b->sum[number[m]], _mm_add_ss(isogi_vol__sums_avx512(_mm512_mul_ps(slab, wxy), _mm512_mul_ps(slab, _mm512_mul_ps(dx, wy)),
+                                                                           _mm512_mul_ps(slab, _mm512_mul_ps(wx, slope_y)), _mm512_mul_ps(slope, wxy)),
+                                                    _mm512_castps512_ps128(base)));
+    }
+}
+
+ISOGI_VOL__AVX512 static void isogi_vol__cubic_avx512(const isogi_volume *v, isogi_vol__block *b, const float powers[4][4], const uint8_t *number, int n) {
+    switch (v->type) {
+    case ISOGI_U8: isogi_vol__cubic_as_avx512(ISOGI_U8, v, b, powers, number, n); break;
+    case ISOGI_I8: isogi_vol__cubic_as_avx512(ISOGI_I8, v, b, powers, number, n); break;
+    case ISOGI_U16: isogi_vol__cubic_as_avx512(ISOGI_U16, v, b, powers, number, n); break;
+    case ISOGI_I16: isogi_vol__cubic_as_avx512(ISOGI_I16, v, b, powers, number, n); break;
+    case ISOGI_F32: isogi_vol__cubic_as_avx512(ISOGI_F32, v, b, powers, number, n); break;
+    case ISOGI_F64: break;
+    }
+}
+#endif
+
+#ifdef ISOGI_VOL__NEON
+#define isogi_vol__neon_add_ps vaddq_f32
+#define isogi_vol__neon_sub_ps vsubq_f32
+#define isogi_vol__neon_mul_ps vmulq_f32
+#define isogi_vol__neon_set1_ps vdupq_n_f32
+#define isogi_vol__neon_setzero_ps() vdupq_n_f32(0)
+#define isogi_vol__neon_loadu_ps vld1q_f32
+#define isogi_vol__neon_storeu_ps vst1q_f32
+#define ISOGI_VOL__MADD_base(a, b, c) vfmaq_f32(c, a, b)
+#define ISOGI_VOL__TILE_base(w) vld1q_f32(w)
+#define ISOGI_VOL__SPREAD_base(w, j) vdupq_n_f32((w)[j])
+#define ISOGI_VOL__INTEGERS_base(p) vcvtq_f32_s32(vld1q_s32(p))
+ISOGI_VOL__INLINE float32x4_t isogi_vol__sums_base(float32x4_t a, float32x4_t b, float32x4_t c, float32x4_t d) {
+    return vpaddq_f32(vpaddq_f32(a, b), vpaddq_f32(c, d));
+}
+ISOGI_VOL__INLINE uint8x8_t isogi_vol__four_bytes(const uint8_t *p) {
+    uint32_t x;
+    memcpy(&x, p, 4);
+    return vcreate_u8(x);
+}
+ISOGI_VOL__INLINE uint16x4_t isogi_vol__four_shorts(const uint8_t *p) {
+    uint64_t x;
+    memcpy(&x, p, 8);
+    return vcreate_u16(x);
+}
+#define ISOGI_VOL__U8_base(p) vcvtq_f32_u32(vmovl_u16(vget_low_u16(vmovl_u8(isogi_vol__four_bytes(p)))))
+#define ISOGI_VOL__I8_base(p) vcvtq_f32_s32(vmovl_s16(vget_low_s16(vmovl_s8(vreinterpret_s8_u8(isogi_vol__four_bytes(p))))))
+#define ISOGI_VOL__U16_base(p) vcvtq_f32_u32(vmovl_u16(isogi_vol__four_shorts(p)))
+#define ISOGI_VOL__I16_base(p) vcvtq_f32_s32(vmovl_s16(vreinterpret_s16_u16(isogi_vol__four_shorts(p))))
+ISOGI_VOL__TRILINEAR(base, , float32x4_t, isogi_vol__neon_, 4, ISOGI_VOL__INTEGERS_base)
+ISOGI_VOL__CUBIC(base, , float32x4_t, isogi_vol__neon_, float32x4_t, isogi_vol__neon_, 4, ISOGI_VOL__MADD_base)
+ISOGI_VOL__WIDEN(base, , isogi_vol__neon_, 4)
+#endif
+
+#if defined(ISOGI_VOL__SSE2) || defined(ISOGI_VOL__NEON)
+/* Whether blocks serve this volume; the plain code does where not. */
+static int isogi_vol__blockwise(const isogi_pyramid *p, isogi_filter filter) {
+    const isogi_volume *v = &p->volume;
+    if (p->path == ISOGI_VOL__PATH_PLAIN || v->type == ISOGI_F64) return 0;
+    return filter == ISOGI_FILTER_LINEAR || v->stride[0] == (ptrdiff_t)isogi_vol__type_size(v->type);
+}
+
+/* Cells [low, high) of every axis have all 64 voxels of a cubic filter around them. */
+static void isogi_vol__inner_cells(const isogi_pyramid *p, int32_t low[3], int32_t high[3]) {
+    int a;
+    for (a = 0; a < 3; a++) low[a] = p->volume.halo_low[a] ? 0 : 1, high[a] = p->cells[a] - (p->volume.halo_high[a] ? 0 : 1);
+}
+
+ISOGI_VOL__INLINE int isogi_vol__all_taps(const int32_t low[3], const int32_t high[3], const isogi_vol__block *b, int i) {
+    const int32_t x = b->cell[0][i], y = b->cell[1][i], z = b->cell[2][i];
+    return (x >= low[0]) & (y >= low[1]) & (z >= low[2]) & (x < high[0]) & (y < high[1]) & (z < high[2]);
+}
+
+/* Taps of some points, to wait for all of them at once. */
+static void isogi_vol__fetch_taps(const isogi_volume *v, const isogi_vol__block *b, const uint8_t *number, int n, uint8_t *raw) {
+    const ptrdiff_t dy = v->stride[1], dz = v->stride[2];
+    int i, k;
+#define ISOGI_VOL__ROWS(BYTES)                                                                                                   \
+    for (i = 0; i < n; i++) {                                                                                                    \
+        const char *p = isogi_vol__first_tap(v, b, number[i]);                                                                   \
+        for (k = 0; k < 4; k++, p += dz, raw += 4 * (BYTES)) {                                                                   \
+            memcpy(raw, p, BYTES), memcpy(raw + (BYTES), p + dy, BYTES);                                                         \
+            memcpy(raw + 2 * (BYTES), p + 2 * dy, BYTES), memcpy(raw + 3 * (BYTES), p + 3 * dy, BYTES);                          \
+        }                                                                                                                        \
+    }
+    if (v->type == ISOGI_F32) {
+        ISOGI_VOL__ROWS(16)
+    } else if (v->type == ISOGI_U16 || v->type == ISOGI_I16) {
+        ISOGI_VOL__ROWS(8)
+    } else {
+        ISOGI_VOL__ROWS(4)
+    }
+#undef ISOGI_VOL__ROWS
+}
+
+#if defined(__GNUC__) && !defined(__TINYC__)
+#define ISOGI_VOL__PREFETCH(p) __builtin_prefetch(p)
+#else
+#define ISOGI_VOL__PREFETCH(p) ((void)(p))
+#endif
+
+/* Asks for the taps of points that do not lie beside their predecessors. */
+static void isogi_vol__prefetch_taps(const isogi_volume *v, const isogi_vol__block *b, const uint8_t *number, int n) {
+    int i, j, k, a;
+    for (i = 0; i < n; i++) {
+        const char *p = isogi_vol__first_tap(v, b, number[i]);
+        int nearby = 1;
+        for (a = 0; a < 3; a++) nearby &= (uint32_t)(b->cell[a][number[i]] - b->cell[a][number[i] - (number[i] > 0)] + 1) <= 2;
+        for (k = 0; k < 4 && !nearby; k++, p += v->stride[2])
+            for (j = 0; j < 4; j++) ISOGI_VOL__PREFETCH(p + j * v->stride[1]);
+    }
+}
+
+/* Raw values and gradients of those points of a block all of whose taps exist; their number. */
+static int isogi_vol__cubic_block(const isogi_pyramid *p, isogi_filter filter, isogi_vol__block *b, int n) {
+    const isogi_volume *v = &p->volume;
+    const double(*c)[4] = isogi_vol__taps[filter == ISOGI_FILTER_CATMULL_ROM];
+    uint8_t number[ISOGI_VOL__BLOCK], raw[ISOGI_VOL__FETCHED * 64 * 2];
+    float taps[ISOGI_VOL__FETCHED * 64], powers[4][4];
+    int32_t low[3], high[3];
+    int count = 0, i;
+    isogi_vol__inner_cells(p, low, high);
+    for (i = 0; i < 16; i++) powers[i / 4][i % 4] = (float)c[i / 4][i % 4];
+    for (i = 0; i < n; i++)
+        if (isogi_vol__all_taps(low, high, b, i)) number[count++] = (uint8_t)i;
+    for (i = 0; i < count; i += ISOGI_VOL__FETCHED) {
+        const int some = count - i < ISOGI_VOL__FETCHED ? count - i : ISOGI_VOL__FETCHED, left = count - i - some;
+        isogi_vol__prefetch_taps(v, b, number + i + some, left < ISOGI_VOL__FETCHED ? left : ISOGI_VOL__FETCHED);
+#ifdef ISOGI_VOL__AVX
+        if (p->path >= ISOGI_VOL__PATH_AVX512) {
+            isogi_vol__cubic_avx512(v, b, (const float(*)[4])powers, number + i, some);
+            continue;
+        }
+#endif
+        isogi_vol__fetch_taps(v, b, number + i, some, v->type == ISOGI_F32 ? (uint8_t *)(void *)taps : raw);
+#ifdef ISOGI_VOL__AVX
+        if (p->path == ISOGI_VOL__PATH_AVX2) {
+            isogi_vol__widen_avx2(v->type, raw, taps, 64 * some), isogi_vol__cubic_avx2(b, (const float(*)[4])powers, taps, number + i, some);
+            continue;
+        }
+#endif
+        isogi_vol__widen_base(v->type, raw, taps, 64 * some), isogi_vol__cubic_base(b, (const float(*)[4])powers, taps, number + i, some);
+    }
+    return count;
+}
+
+static void isogi_vol__trilinear_block(const isogi_pyramid *p, isogi_vol__block *b, int n, int gradients) {
+    const int integers = p->volume.type != ISOGI_F32;
+    n = (n + 15) & ~15;
+#ifdef ISOGI_VOL__AVX
+    if (p->path < ISOGI_VOL__PATH_AVX512 || !isogi_vol__gather_avx512(&p->volume, n, b))
+#endif
+        isogi_vol__fetch(&p->volume, n, b);
+#ifdef ISOGI_VOL__AVX
+    if (p->path >= ISOGI_VOL__PATH_AVX512) {
+        isogi_vol__trilinear_avx512(b, n, integers, gradients);
+        return;
+    }
+    if (p->path == ISOGI_VOL__PATH_AVX2) {
+        isogi_vol__trilinear_avx2(b, n, integers, gradients);
         return;
     }
 #endif
-    for (a = 0; a < 3; a++) world[a] = (double)point[a];
-    isogi_vol_to_grid(p, world, grid);
-    for (a = 0; a < 3; a++) cell[a] = isogi_vol__cell(grid[a], p->volume.size[a], &local[a]);
+    isogi_vol__trilinear_base(b, n, integers, gradients);
 }
 
-static isogi_result isogi_vol__sample(const isogi_pyramid *p, int smooth, const float (*points)[3], size_t count, float *values,
-                                      float (*gradients)[3]) {
-    size_t i;
-    if (!p || (count && !points)) return ISOGI_INVALID;
-    for (i = 0; i < count; i++) {
-        double local[4], value, gradient[3], corner[8];
-        int cell[4], a;
-        isogi_vol__locate(p, points[i], cell, local);
-        if (smooth) value = isogi_vol__bspline(p, cell, local, gradient);
-        else isogi_vol__corners(p, cell, 0, corner), value = isogi_vol__trilinear(corner, local, gradient);
-        if (values) values[i] = (float)value;
-        if (!gradients) continue;
-        isogi_vol__gradient_to_world(p, gradient, gradient);
-        for (a = 0; a < 3; a++) gradients[i][a] = (float)gradient[a];
+static void isogi_vol__locate_block(const isogi_pyramid *p, const isogi_vol__points *at, size_t first, int n, isogi_vol__block *b) {
+#ifdef ISOGI_VOL__AVX
+    if (p->path >= ISOGI_VOL__PATH_AVX512) {
+        isogi_vol__locate_avx512(p, at, first, n, b);
+        return;
     }
+    if (p->path == ISOGI_VOL__PATH_AVX2) {
+        isogi_vol__locate_avx2(p, at, first, n, b);
+        return;
+    }
+#endif
+    isogi_vol__locate(p, at, first, n, b);
+}
+#endif
+
+/* A gradient of raw voxels per grid unit becomes one per world unit; m: the transposed inverse, scaled. */
+ISOGI_VOL__INLINE void isogi_vol__gradient_out(const double m[9], float gx, float gy, float gz, float out[3]) {
+    const double x = (double)gx, y = (double)gy, z = (double)gz;
+    out[0] = (float)(m[0] * x + m[3] * y + m[6] * z);
+    out[1] = (float)(m[1] * x + m[4] * y + m[7] * z);
+    out[2] = (float)(m[2] * x + m[5] * y + m[8] * z);
+}
+
+/* One point by the plain code. */
+static void isogi_vol__sample_one(const isogi_pyramid *p, isogi_filter filter, const double grid[3], float *value, float *gradient) {
+    double local[3], slope[3], corner[8], result;
+    int cell[3], a;
+    for (a = 0; a < 3; a++) cell[a] = isogi_vol__cell(grid[a], p->volume.size[a], &local[a]);
+    if (filter != ISOGI_FILTER_LINEAR) result = isogi_vol__cubic_sum(p, filter, cell, local, slope);
+    else isogi_vol__corners(p, cell, 0, corner), result = isogi_vol__trilinear(corner, local, slope);
+    if (value) *value = (float)result;
+    if (!gradient) return;
+    isogi_vol__gradient_to_world(p, slope, slope);
+    for (a = 0; a < 3; a++) gradient[a] = (float)slope[a];
+}
+
+#if defined(ISOGI_VOL__SSE2) || defined(ISOGI_VOL__NEON)
+static void isogi_vol__sample_block(const isogi_pyramid *p, isogi_filter filter, const isogi_vol__points *at, size_t first, int n, float *values,
+                                    float (*gradients)[3]) {
+    const double scale = p->volume.scale, bias = p->volume.bias;
+    isogi_vol__block b;
+    double m[9];
+    int32_t low[3], high[3];
+    int i, complete = n;
+    isogi_vol__inner_cells(p, low, high);
+    isogi_vol__locate_block(p, at, first, n, &b);
+    if (filter == ISOGI_FILTER_LINEAR) isogi_vol__trilinear_block(p, &b, n, gradients != NULL);
+    else complete = isogi_vol__cubic_block(p, filter, &b, n);
+    for (i = 0; i < 9; i++) m[i] = scale * p->to_grid[i];
+    if (filter == ISOGI_FILTER_LINEAR) {
+        if (values && scale >= 1 && scale <= 1 && bias >= 0 && bias <= 0) memcpy(values, b.value, (size_t)n * sizeof *values);
+        else for (i = 0; i < n && values; i++) values[i] = (float)(scale * (double)b.value[i] + bias);
+        for (i = 0; i < n && gradients; i++) isogi_vol__gradient_out(m, b.gradient[0][i], b.gradient[1][i], b.gradient[2][i], gradients[i]);
+        return;
+    }
+    for (i = 0; i < n; i++) {
+        double grid[3];
+        if (complete < n && !isogi_vol__all_taps(low, high, &b, i)) {
+            isogi_vol__grid_point(p, at, first + (size_t)i, grid);
+            isogi_vol__sample_one(p, filter, grid, values ? values + i : NULL, gradients ? gradients[i] : NULL);
+            continue;
+        }
+        if (values) values[i] = (float)(scale * (double)b.sum[i][0] + bias);
+        if (gradients) isogi_vol__gradient_out(m, b.sum[i][1], b.sum[i][2], b.sum[i][3], gradients[i]);
+    }
+}
+#endif
+
+static void isogi_vol__sample_some(const isogi_pyramid *p, isogi_filter filter, const isogi_vol__points *at, size_t first, int n, float *values,
+                                   float (*gradients)[3]) {
+    int i;
+#if defined(ISOGI_VOL__SSE2) || defined(ISOGI_VOL__NEON)
+    if (isogi_vol__blockwise(p, filter)) {
+        isogi_vol__sample_block(p, filter, at, first, n, values, gradients);
+        return;
+    }
+#endif
+    for (i = 0; i < n; i++) {
+        double grid[3];
+        isogi_vol__grid_point(p, at, first + (size_t)i, grid);
+        isogi_vol__sample_one(p, filter, grid, values ? values + i : NULL, gradients ? gradients[i] : NULL);
+    }
+}
+
+static isogi_result isogi_vol__sample(const isogi_pyramid *p, isogi_filter filter, const float (*world)[3], const double (*grid)[3], size_t count,
+                                      float *values, float (*gradients)[3]) {
+    isogi_vol__points at;
+    size_t i;
+    at.world = world, at.grid = grid;
+    if (!p || (count && !world && !grid) || filter < ISOGI_FILTER_LINEAR || filter > ISOGI_FILTER_CATMULL_ROM) return ISOGI_INVALID;
+    for (i = 0; i < count; i += ISOGI_VOL__BLOCK)
+        isogi_vol__sample_some(p, filter, &at, i, count - i < ISOGI_VOL__BLOCK ? (int)(count - i) : ISOGI_VOL__BLOCK, values ? values + i : NULL,
+                                 gradients ? gradients + i : NULL);
     return ISOGI_OK;
 }
 
 ISOGI_API isogi_result isogi_vol_sample(const isogi_pyramid *pyramid, const float (*points)[3], size_t count, float *values,
                                         float (*gradients)[3]) {
-    return isogi_vol__sample(pyramid, 0, points, count, values, gradients);
+    return isogi_vol__sample(pyramid, ISOGI_FILTER_LINEAR, points, NULL, count, values, gradients);
 }
 
 ISOGI_API isogi_result isogi_vol_sample_smooth(const isogi_pyramid *pyramid, const float (*points)[3], size_t count, float *values,
                                                float (*gradients)[3]) {
-    return isogi_vol__sample(pyramid, 1, points, count, values, gradients);
+    return isogi_vol__sample(pyramid, ISOGI_FILTER_BSPLINE, points, NULL, count, values, gradients);
+}
+
+ISOGI_API isogi_result isogi_vol_sample_filtered(const isogi_pyramid *pyramid, isogi_filter filter, const float (*points)[3], size_t count,
+                                                 float *values, float (*gradients)[3]) {
+    return isogi_vol__sample(pyramid, filter, points, NULL, count, values, gradients);
+}
+
+ISOGI_API isogi_result isogi_vol_sample_grid(const isogi_pyramid *pyramid, isogi_filter filter, const double (*points)[3], size_t count,
+                                             float *values, float (*gradients)[3]) {
+    return isogi_vol__sample(pyramid, filter, NULL, points, count, values, gradients);
 }
 
 /* ==== cell cubic ===================================================================================================== */
@@ -2221,7 +2837,7 @@ ISOGI_VOL__INLINE uint64_t isogi_vol__leaf_mask(const uint8_t node[128], float l
 #ifdef ISOGI_VOL__AVX
 static int isogi_vol__machine(void) {
     __builtin_cpu_init();
-    if (!__builtin_cpu_supports("avx2")) return ISOGI_VOL__PATH_BASE;
+    if (!__builtin_cpu_supports("avx2") || !__builtin_cpu_supports("fma")) return ISOGI_VOL__PATH_BASE;
     return __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512bw") && __builtin_cpu_supports("avx512dq") &&
                    __builtin_cpu_supports("avx512vl") && __builtin_cpu_supports("avx512bitalg") &&
                    __builtin_cpu_supports("avx512vbmi") && __builtin_cpu_supports("avx512vbmi2") && __builtin_cpu_supports("avx512vpopcntdq") &&
@@ -2826,7 +3442,6 @@ static int isogi_vol__walk_fast(isogi_vol__walk *w, const isogi_vol__ticks *k, i
 #pragma GCC diagnostic push
 #pragma GCC diagnostic ignored "-Wmaybe-uninitialized" /* gcc 12 says so of its own undefined vectors */
 #endif
-#define ISOGI_VOL__AVX512 ISOGI_VOL__TARGET("avx512f,avx512bw,avx512dq,avx512vl,avx512bitalg,avx512vbmi,avx512vbmi2,avx512vpopcntdq,gfni,fma")
 #define ISOGI_VOL__POOL 64
 
 /* One number for each ray of the pool. */
@@ -3767,7 +4382,7 @@ static void isogi_vol__outward(const isogi_pyramid *p, const isogi_hit *hit, iso
         out[axis] = upper ? 1 : -1;
         return;
     }
-    if (kind == ISOGI_NORMAL_SMOOTH) isogi_vol__bspline(p, cell, hit->local, out);
+    if (kind == ISOGI_NORMAL_SMOOTH) isogi_vol__cubic_sum(p, ISOGI_FILTER_BSPLINE, cell, hit->local, out);
     else isogi_vol__corners(p, cell, 0, corner), isogi_vol__trilinear(corner, hit->local, out);
     for (a = 0; a < 3; a++) out[a] = -out[a];
 }
@@ -4495,7 +5110,7 @@ static void isogi_vol__smoothed_normal(const isogi_vol__mesher *m, size_t at, co
     double n[3], local[3];
     int cell[3], a;
     for (a = 0; a < 3; a++) cell[a] = isogi_vol__cell(grid[a], m->pyramid->volume.size[a], &local[a]);
-    isogi_vol__bspline(m->pyramid, cell, local, n);
+    isogi_vol__cubic_sum(m->pyramid, ISOGI_FILTER_BSPLINE, cell, local, n);
     for (a = 0; a < 3; a++) n[a] = -n[a];
     isogi_vol__mesh_normal(m, at, n);
 }
@@ -4817,6 +5432,49 @@ ISOGI_API void isogi_vol_mesh_free(const isogi_pyramid *pyramid, isogi_mesh *mes
 #undef ISOGI_VOL__POOL
 #undef ISOGI_VOL__SUB
 #undef ISOGI_VOL__GROUP
+#undef ISOGI_VOL__BLOCK
+#undef ISOGI_VOL__FETCHED
+#undef ISOGI_VOL__BLEND
+#undef ISOGI_VOL__TRILINEAR
+#undef ISOGI_VOL__CUBIC
+#undef ISOGI_VOL__WIDEN
+#undef ISOGI_VOL__MADD_base
+#undef ISOGI_VOL__TILE_base
+#undef ISOGI_VOL__SPREAD_base
+#undef ISOGI_VOL__INTEGERS_base
+#undef ISOGI_VOL__BYTES
+#undef ISOGI_VOL__SHORTS
+#undef ISOGI_VOL__U8_base
+#undef ISOGI_VOL__I8_base
+#undef ISOGI_VOL__U16_base
+#undef ISOGI_VOL__I16_base
+#undef ISOGI_VOL__AVX2
+#undef ISOGI_VOL__TILE_avx2
+#undef ISOGI_VOL__SPREAD_avx2
+#undef ISOGI_VOL__INTEGERS_avx2
+#undef ISOGI_VOL__EIGHT
+#undef ISOGI_VOL__SIXTEEN
+#undef ISOGI_VOL__FOUR_FLOATS
+#undef ISOGI_VOL__U8_avx2
+#undef ISOGI_VOL__I8_avx2
+#undef ISOGI_VOL__U16_avx2
+#undef ISOGI_VOL__I16_avx2
+#undef ISOGI_VOL__INTEGERS_avx512
+#undef ISOGI_VOL__PREFETCH
+#undef ISOGI_VOL__LOCATE
+#undef ISOGI_VOL__LOCATE_AXIS
+#undef ISOGI_VOL__X_avx2
+#undef ISOGI_VOL__Y_avx2
+#undef ISOGI_VOL__Z_avx2
+#undef ISOGI_VOL__MAGIC
+#undef ISOGI_VOL__OFFSETS_avx2
+#undef ISOGI_VOL__PART
+#undef ISOGI_VOL__X_avx512
+#undef ISOGI_VOL__Y_avx512
+#undef ISOGI_VOL__Z_avx512
+#undef ISOGI_VOL__OFFSETS_avx512
+#undef ISOGI_VOL__ROWS
+#undef ISOGI_VOL__NEON
 #undef ISOGI_VOL__LEVELS
 #undef ISOGI_VOL__NODE_LEVELS
 #undef ISOGI_VOL__STRIP
