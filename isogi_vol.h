@@ -2073,29 +2073,32 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE __m128 isogi_vol__sums_avx512(__m512 a, __m5
 #define ISOGI_VOL__FOUR_FLOATS(p) _mm_loadu_ps((const float *)(const void *)(p))
 ISOGI_VOL__TRILINEAR(avx512, ISOGI_VOL__AVX512, __m512, _mm512_, 16, ISOGI_VOL__INTEGERS_avx512)
 /* The same for whole slices of 16 taps, straight from memory. */
-ISOGI_VOL__AVX512 ISOGI_VOL__INLINE __m512 isogi_vol__slice_avx512(isogi_type type, const char *p, ptrdiff_t dy, ptrdiff_t dy3) {
-    if (type == ISOGI_F32) {
-        const __m512 two = _mm512_insertf32x4(_mm512_castps128_ps512(ISOGI_VOL__FOUR_FLOATS(p)), ISOGI_VOL__FOUR_FLOATS(p + dy), 1);
-        return _mm512_insertf32x4(_mm512_insertf32x4(two, ISOGI_VOL__FOUR_FLOATS(p + 2 * dy), 2), ISOGI_VOL__FOUR_FLOATS(p + dy3), 3);
-    } else if (type == ISOGI_U16 || type == ISOGI_I16) {
-        const __m256i all = _mm256_set_m128i(_mm_unpacklo_epi64(ISOGI_VOL__EIGHT(p + 2 * dy), ISOGI_VOL__EIGHT(p + dy3)),
-                                             _mm_unpacklo_epi64(ISOGI_VOL__EIGHT(p), ISOGI_VOL__EIGHT(p + dy)));
-        return _mm512_cvtepi32_ps(type == ISOGI_U16 ? _mm512_cvtepu16_epi32(all) : _mm512_cvtepi16_epi32(all));
-    } else {
-        int32_t row[4];
-        __m128i all;
-        memcpy(row, p, 4), memcpy(row + 1, p + dy, 4), memcpy(row + 2, p + 2 * dy, 4), memcpy(row + 3, p + dy3, 4);
-        all = _mm_setr_epi32(row[0], row[1], row[2], row[3]);
-        return _mm512_cvtepi32_ps(type == ISOGI_U8 ? _mm512_cvtepu8_epi32(all) : _mm512_cvtepi8_epi32(all));
-    }
+ISOGI_VOL__AVX512 ISOGI_VOL__INLINE __m128i isogi_vol__four_rows(const char *p, ptrdiff_t dy, ptrdiff_t dy3) {
+    int32_t row[4];
+    memcpy(row, p, 4), memcpy(row + 1, p + dy, 4), memcpy(row + 2, p + 2 * dy, 4), memcpy(row + 3, p + dy3, 4);
+    return _mm_setr_epi32(row[0], row[1], row[2], row[3]);
 }
+#define ISOGI_VOL__LONG_ROWS(p)                                                                                                  \
+    _mm256_set_m128i(_mm_unpacklo_epi64(ISOGI_VOL__EIGHT((p) + 2 * dy), ISOGI_VOL__EIGHT((p) + dy3)),                            \
+                     _mm_unpacklo_epi64(ISOGI_VOL__EIGHT(p), ISOGI_VOL__EIGHT((p) + dy)))
+#define ISOGI_VOL__SLICE_U8(p) _mm512_cvtepi32_ps(_mm512_cvtepu8_epi32(isogi_vol__four_rows(p, dy, dy3)))
+#define ISOGI_VOL__SLICE_I8(p) _mm512_cvtepi32_ps(_mm512_cvtepi8_epi32(isogi_vol__four_rows(p, dy, dy3)))
+#define ISOGI_VOL__SLICE_U16(p) _mm512_cvtepi32_ps(_mm512_cvtepu16_epi32(ISOGI_VOL__LONG_ROWS(p)))
+#define ISOGI_VOL__SLICE_I16(p) _mm512_cvtepi32_ps(_mm512_cvtepi16_epi32(ISOGI_VOL__LONG_ROWS(p)))
+#define ISOGI_VOL__SLICE_F32(p)                                                                                                  \
+    _mm512_insertf32x4(_mm512_insertf32x4(_mm512_insertf32x4(_mm512_castps128_ps512(ISOGI_VOL__FOUR_FLOATS(p)),                  \
+                                                             ISOGI_VOL__FOUR_FLOATS((p) + dy), 1),                               \
+                                          ISOGI_VOL__FOUR_FLOATS((p) + 2 * dy), 2), ISOGI_VOL__FOUR_FLOATS((p) + dy3), 3)
+#define ISOGI_VOL__SLICES(T)                                                                                                     \
+    s0 = ISOGI_VOL__SLICE_##T(p), s1 = ISOGI_VOL__SLICE_##T(p + dz), s2 = ISOGI_VOL__SLICE_##T(q), s3 = ISOGI_VOL__SLICE_##T(q + dz); \
+    break
 
-ISOGI_VOL__AVX512 ISOGI_VOL__INLINE void isogi_vol__cubic_as_avx512(isogi_type type, const isogi_volume *v, isogi_vol__block *b,
-                                                                    const float powers[4][4], const uint8_t *number, int n) {
+ISOGI_VOL__AVX512 static void isogi_vol__cubic_avx512(const isogi_volume *v, isogi_vol__block *b, const float powers[4][4], const uint8_t *number, int n) {
     const __m512i each_four = _mm512_setr_epi32(0, 0, 0, 0, 1, 1, 1, 1, 2, 2, 2, 2, 3, 3, 3, 3);
     const __m512 c0 = _mm512_broadcast_f32x4(_mm_loadu_ps(powers[0])), c1 = _mm512_broadcast_f32x4(_mm_loadu_ps(powers[1]));
     const __m512 c2 = _mm512_broadcast_f32x4(_mm_loadu_ps(powers[2])), c3 = _mm512_broadcast_f32x4(_mm_loadu_ps(powers[3]));
     const ptrdiff_t dy = v->stride[1], dy3 = 3 * dy, dz = v->stride[2];
+    const isogi_type type = v->type;
     float weight[ISOGI_VOL__FETCHED][16], slant[ISOGI_VOL__FETCHED][16];
     int m;
     for (m = 0; m < n; m++) { /* weights of all axes, four lanes each */
@@ -2108,33 +2111,29 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE void isogi_vol__cubic_as_avx512(isogi_type t
     }
     for (m = 0; m < n; m++) {
         const float *w = weight[m], *d = slant[m];
-        const char *p = isogi_vol__first_tap(v, b, number[m]);
-        const __m512 first = isogi_vol__slice_avx512(type, p + dz, dy, dy3), base = _mm512_permutexvar_ps(_mm512_set1_epi32(5), first);
+        const char *p = isogi_vol__first_tap(v, b, number[m]), *q = p + 2 * dz;
         const __m512 wx = _mm512_broadcast_f32x4(_mm_loadu_ps(w)), dx = _mm512_broadcast_f32x4(_mm_loadu_ps(d));
         const __m512 wy = _mm512_permutexvar_ps(each_four, _mm512_castps128_ps512(_mm_loadu_ps(w + 4)));
         const __m512 slope_y = _mm512_permutexvar_ps(each_four, _mm512_castps128_ps512(_mm_loadu_ps(d + 4))), wxy = _mm512_mul_ps(wx, wy);
-        __m512 s = _mm512_sub_ps(first, base), slab = _mm512_mul_ps(_mm512_set1_ps(w[9]), s), slope = _mm512_mul_ps(_mm512_set1_ps(d[9]), s);
-        s = _mm512_sub_ps(isogi_vol__slice_avx512(type, p, dy, dy3), base);
-        slab = _mm512_fmadd_ps(_mm512_set1_ps(w[8]), s, slab), slope = _mm512_fmadd_ps(_mm512_set1_ps(d[8]), s, slope);
-        p += 2 * dz;
-        s = _mm512_sub_ps(isogi_vol__slice_avx512(type, p, dy, dy3), base);
-        slab = _mm512_fmadd_ps(_mm512_set1_ps(w[10]), s, slab), slope = _mm512_fmadd_ps(_mm512_set1_ps(d[10]), s, slope);
-        s = _mm512_sub_ps(isogi_vol__slice_avx512(type, p + dz, dy, dy3), base);
-        slab = _mm512_fmadd_ps(_mm512_set1_ps(w[11]), s, slab), slope = _mm512_fmadd_ps(_mm512_set1_ps(d[11]), s, slope);
+        __m512 s0, s1, s2, s3, base, slab, slope;
+        s0 = s1 = s2 = s3 = c0;
+        switch (type) {
+        case ISOGI_U8: ISOGI_VOL__SLICES(U8);
+        case ISOGI_I8: ISOGI_VOL__SLICES(I8);
+        case ISOGI_U16: ISOGI_VOL__SLICES(U16);
+        case ISOGI_I16: ISOGI_VOL__SLICES(I16);
+        case ISOGI_F32: ISOGI_VOL__SLICES(F32);
+        case ISOGI_F64: break;
+        }
+        base = _mm512_permutexvar_ps(_mm512_set1_epi32(5), s1);
+        s0 = _mm512_sub_ps(s0, base), s1 = _mm512_sub_ps(s1, base), s2 = _mm512_sub_ps(s2, base), s3 = _mm512_sub_ps(s3, base);
+        slab = _mm512_mul_ps(_mm512_set1_ps(w[8]), s0), slope = _mm512_mul_ps(_mm512_set1_ps(d[8]), s0);
+        slab = _mm512_fmadd_ps(_mm512_set1_ps(w[9]), s1, slab), slope = _mm512_fmadd_ps(_mm512_set1_ps(d[9]), s1, slope);
+        slab = _mm512_fmadd_ps(_mm512_set1_ps(w[10]), s2, slab), slope = _mm512_fmadd_ps(_mm512_set1_ps(d[10]), s2, slope);
+        slab = _mm512_fmadd_ps(_mm512_set1_ps(w[11]), s3, slab), slope = _mm512_fmadd_ps(_mm512_set1_ps(d[11]), s3, slope);
         _mm_storeu_ps(b->sum[number[m]], _mm_add_ss(isogi_vol__sums_avx512(_mm512_mul_ps(slab, wxy), _mm512_mul_ps(slab, _mm512_mul_ps(dx, wy)),
                                                                            _mm512_mul_ps(slab, _mm512_mul_ps(wx, slope_y)), _mm512_mul_ps(slope, wxy)),
                                                     _mm512_castps512_ps128(base)));
-    }
-}
-
-ISOGI_VOL__AVX512 static void isogi_vol__cubic_avx512(const isogi_volume *v, isogi_vol__block *b, const float powers[4][4], const uint8_t *number, int n) {
-    switch (v->type) {
-    case ISOGI_U8: isogi_vol__cubic_as_avx512(ISOGI_U8, v, b, powers, number, n); break;
-    case ISOGI_I8: isogi_vol__cubic_as_avx512(ISOGI_I8, v, b, powers, number, n); break;
-    case ISOGI_U16: isogi_vol__cubic_as_avx512(ISOGI_U16, v, b, powers, number, n); break;
-    case ISOGI_I16: isogi_vol__cubic_as_avx512(ISOGI_I16, v, b, powers, number, n); break;
-    case ISOGI_F32: isogi_vol__cubic_as_avx512(ISOGI_F32, v, b, powers, number, n); break;
-    case ISOGI_F64: break;
     }
 }
 #endif
@@ -5455,6 +5454,13 @@ ISOGI_API void isogi_vol_mesh_free(const isogi_pyramid *pyramid, isogi_mesh *mes
 #undef ISOGI_VOL__EIGHT
 #undef ISOGI_VOL__SIXTEEN
 #undef ISOGI_VOL__FOUR_FLOATS
+#undef ISOGI_VOL__LONG_ROWS
+#undef ISOGI_VOL__SLICE_U8
+#undef ISOGI_VOL__SLICE_I8
+#undef ISOGI_VOL__SLICE_U16
+#undef ISOGI_VOL__SLICE_I16
+#undef ISOGI_VOL__SLICE_F32
+#undef ISOGI_VOL__SLICES
 #undef ISOGI_VOL__U8_avx2
 #undef ISOGI_VOL__I8_avx2
 #undef ISOGI_VOL__U16_avx2

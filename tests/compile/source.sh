@@ -41,7 +41,7 @@ unfinished-words)
     ;;
 private-macros) # what the implementation defines for itself is gone after it
     for h in $headers; do
-        sed -n 's/^ *# *define *\(ISOGI_[A-Z]*__[A-Z0-9_]*\).*/\1/p' $h | sort -u | while read -r macro; do
+        sed -n 's/^ *# *define *\(ISOGI_[A-Z]*__[A-Za-z0-9_]*\).*/\1/p' $h | sort -u | while read -r macro; do
             grep -qE "^ *# *undef +$macro\b" $h || echo "$h: $macro is not undefined at the end"
         done
     done > "$OUT/left"
