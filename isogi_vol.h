@@ -24,7 +24,8 @@
    - Looks at voxels that you own, of any common type, stride, spacing and orientation, without copying them.
    - Finds where rays meet the exact trilinear isosurface of ANY isovalue, without extracting anything: first hits, shadows, and
      rays that go on from a hit without an epsilon. One min-max pyramid, built once, serves every isovalue.
-   - Values and gradients: trilinear, and smoothed by the cubic B-spline (Wyman 2006, 4.1.1), for normals that do not show voxels.
+   - Values and gradients: trilinear, smoothed by the cubic B-spline (Wyman 2006, 4.1.1) for normals that do not show voxels, or
+     interpolated by cubic splines.
    - Indexed, watertight triangle meshes of isosurfaces, with smoothed normals.
 
    What it does NOT do
@@ -47,7 +48,7 @@
    Accuracy     Rays are solved in double: against a long double reference no hit is missed or added, and t is right to 1e-12 cell but
                 for grazing rays, whose t is ill-conditioned by nature. `make test` and `make check` show it.
    Limits       2^31-1 voxels along an axis. Values up to 1e300. isogi_vol_sample takes float points: for volumes far from the
-                origin use hits, which hold cell and place in double.
+                origin use isogi_vol_sample_grid, or hits, which hold cell and place in double.
 
    How rays work: in a cell the field along a ray is a cubic. Its Bernstein coefficients come from the corners by convex sums, so
    their hull rejects most cells without solving anything; else the first root is bracketed between extrema and refined by Newton
@@ -219,7 +220,10 @@ ISOGI_API void isogi_vol_to_grid(const isogi_pyramid *pyramid, const double worl
 /* ---- values and gradients ---------------------------------------------------------------------------------------------- */
 
 /* What lies between the voxels. Value and gradient of the cubic filters come from 4x4x4 voxels, which continue linearly beyond the
-   border. */
+   border. On the Marschner-Lobb signal at 81^3 voxels: RMS error of values (of a range of 1), mean angle between gradients, and by
+   how much samples leave the range of their voxels: trilinear 0.010, 17 degrees, 0; B-spline 0.017, 3.2 degrees, 0; Catmull-Rom
+   0.0025, 4.4 degrees, 0.006; B-spline of prefiltered voxels (isogi_vol_prefilter) 0.0004, 0.7 degrees, 0.012. At 41^3: 0.034, 32,
+   0; 0.046, 20, 0; 0.025, 22, 0; 0.016, 12, 0.003. */
 typedef enum isogi_filter {
     ISOGI_FILTER_LINEAR = 0, /* trilinear: what rays and meshes see. Its gradient jumps at cell faces: the cell on the higher side counts */
     ISOGI_FILTER_BSPLINE,    /* uniform cubic B-spline with the voxels as control points: smooths; continuous second derivatives; the

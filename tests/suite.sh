@@ -166,7 +166,7 @@ variants() {
 
 # Other processors, emulated, one of them big-endian: the two headers that all others stand on, since emulation is ten times slower.
 emulators() {
-    set -- $(printf '%s\n' "$@" | grep -E 'test_(sh|vol)$')
+    set -- $(printf '%s\n' "$@" | grep -E 'test_(sh|vol|sample)$')
     for machine in aarch64 s390x riscv64; do
         if have $machine-linux-gnu-gcc && have qemu-$machine-static; then
             variant $machine $machine-linux-gnu-gcc "-O2 $CONTRACT_OFF -static" "qemu-$machine-static" "$@"

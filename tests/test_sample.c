@@ -1,0 +1,411 @@
+/* Values and gradients of isogi_vol.h between voxels, against their definitions in long double, for every path of instructions. */
+#define ISOGI_IMPLEMENTATION
+#include "isogi_vol.h"
+#include "test.h"
+#if defined(__unix__)
+#include <sys/mman.h>
+#endif
+
+typedef long double real;
+enum { PATHS = 5 };
+static const isogi_filter filters[3] = {ISOGI_FILTER_LINEAR, ISOGI_FILTER_BSPLINE, ISOGI_FILTER_CATMULL_ROM};
+static const char *const filter_names[3] = {"trilinear", "B-spline", "Catmull-Rom"};
+
+/* ---- volumes of any type and layout ---- */
+
+typedef struct lattice {
+    int size[3], halo[2]; /* halo: voxels before and behind, the same on all axes */
+    char *memory;
+    isogi_volume volume;
+    double least, most; /* of all decoded values */
+} lattice;
+
+static size_t type_size(isogi_type type) { return type <= ISOGI_I8 ? 1 : type <= ISOGI_I16 ? 2 : type == ISOGI_F32 ? 4 : 8; }
+
+static char *raw_at(const lattice *l, int i, int j, int k) {
+    return (char *)(uintptr_t)l->volume.data + i * l->volume.stride[0] + j * l->volume.stride[1] + k * l->volume.stride[2];
+}
+
+static double voxel(const lattice *l, int i, int j, int k) {
+    const char *p = raw_at(l, i, j, k);
+    double raw = 0;
+    float f;
+    uint16_t u;
+    int16_t s;
+    switch (l->volume.type) {
+    case ISOGI_U8: raw = *(const uint8_t *)p; break;
+    case ISOGI_I8: raw = *(const int8_t *)p; break;
+    case ISOGI_U16: memcpy(&u, p, 2), raw = u; break;
+    case ISOGI_I16: memcpy(&s, p, 2), raw = s; break;
+    case ISOGI_F32: memcpy(&f, p, 4), raw = (double)f; break;
+    case ISOGI_F64: memcpy(&raw, p, 8); break;
+    }
+    return (l->volume.scale == 0 ? 1 : l->volume.scale) * raw + l->volume.bias;
+}
+
+static void voxel_set(lattice *l, int i, int j, int k, double unit) {
+    char *p = raw_at(l, i, j, k);
+    float f = (float)(unit * 10 - 3);
+    double d = unit * 10 - 3;
+    uint16_t u = (uint16_t)(unit * 65535);
+    int16_t s = (int16_t)(unit * 65535 - 32768);
+    switch (l->volume.type) {
+    case ISOGI_U8: *(uint8_t *)p = (uint8_t)(unit * 255); break;
+    case ISOGI_I8: *(int8_t *)p = (int8_t)(unit * 255 - 128); break;
+    case ISOGI_U16: memcpy(p, &u, 2); break;
+    case ISOGI_I16: memcpy(p, &s, 2); break;
+    case ISOGI_F32: memcpy(p, &f, 4); break;
+    case ISOGI_F64: memcpy(p, &d, 8); break;
+    }
+}
+
+enum { PACKED, INTERLEAVED, MIRRORED, CHUNK, LAYOUTS };
+
+/* Random voxels; memory of exactly the size that the volume has, so that a sanitizer sees what is read beyond. */
+static lattice lattice_new(isogi_type type, int layout, int x, int y, int z, test_random *r) {
+    lattice l;
+    memset(&l, 0, sizeof l);
+    const ptrdiff_t bytes = (ptrdiff_t)type_size(type), step = layout == INTERLEAVED ? 3 * bytes : bytes;
+    l.size[0] = x, l.size[1] = y, l.size[2] = z;
+    l.halo[0] = layout == CHUNK ? 1 : 0, l.halo[1] = layout == CHUNK ? 2 : 0;
+    size_t voxels = 1;
+    ptrdiff_t stride = step, start = 0;
+    for (int a = 0; a < 3; a++) {
+        ptrdiff_t all = l.size[a] + l.halo[0] + l.halo[1];
+        l.volume.size[a] = (size_t)l.size[a], l.volume.stride[a] = stride;
+        l.volume.halo_low[a] = (size_t)l.halo[0], l.volume.halo_high[a] = (size_t)l.halo[1];
+        start += l.halo[0] * stride;
+        if (layout == MIRRORED && a > 0) start += (all - 1) * stride, l.volume.stride[a] = -stride;
+        voxels *= (size_t)all, stride *= all;
+    }
+    l.memory = (char *)malloc(((voxels - 1) * (size_t)step + (size_t)bytes));
+    l.volume.data = l.memory + start, l.volume.type = type;
+    if (layout == PACKED || layout == CHUNK) l.volume.scale = -0.25, l.volume.bias = 7;
+    l.least = 1e300, l.most = -1e300;
+    for (int k = -l.halo[0]; k < z + l.halo[1]; k++)
+        for (int j = -l.halo[0]; j < y + l.halo[1]; j++)
+            for (int i = -l.halo[0]; i < x + l.halo[1]; i++) {
+                voxel_set(&l, i, j, k, random_unit(r));
+                l.least = fmin(l.least, voxel(&l, i, j, k)), l.most = fmax(l.most, voxel(&l, i, j, k));
+            }
+    return l;
+}
+
+/* ---- definitions ---- */
+
+/* Basis functions about 0, and their derivatives. */
+static real basis(isogi_filter filter, real x, int derivative) {
+    const real a = fabsl(x), s = x < 0 ? -1 : 1, b = 2 - a;
+    if (filter == ISOGI_FILTER_LINEAR) return a >= 1 ? 0 : derivative ? -s : 1 - a;
+    if (a >= 2) return 0;
+    if (filter == ISOGI_FILTER_BSPLINE) {
+        if (derivative) return s * (a < 1 ? (real)1.5 * a * a - 2 * a : -b * b / 2);
+        return a < 1 ? ((real)4 - 6 * a * a + 3 * a * a * a) / 6 : b * b * b / 6;
+    }
+    if (derivative) return s * (a < 1 ? (real)4.5 * a * a - 5 * a : (real)-1.5 * a * a + 5 * a - 4);
+    return a < 1 ? (real)1.5 * a * a * a - (real)2.5 * a * a + 1 : (real)-0.5 * a * a * a + (real)2.5 * a * a - 4 * a + 2;
+}
+
+/* Continued linearly beyond what the cubic filters may read: one voxel of a halo. */
+static real continued(const lattice *l, int i, int j, int k) {
+    const int at[3] = {i, j, k};
+    for (int a = 0; a < 3; a++) {
+        const int low = l->halo[0] ? -1 : 0, high = l->size[a] - 1 + (l->halo[1] ? 1 : 0);
+        int near_border[3] = {i, j, k}, inner[3] = {i, j, k};
+        if (at[a] >= low && at[a] <= high) continue;
+        if (l->size[a] == 1) near_border[a] = inner[a] = 0;
+        else near_border[a] = at[a] < low ? low : high, inner[a] = at[a] < low ? low + 1 : high - 1;
+        return 2 * continued(l, near_border[0], near_border[1], near_border[2]) - continued(l, inner[0], inner[1], inner[2]);
+    }
+    return (real)voxel(l, i, j, k);
+}
+
+/* want: value and gradient per grid unit at g, which lies in the box; its cell counts upwards at faces. */
+static void definition(const lattice *l, isogi_filter filter, const real g[3], real want[4]) {
+    int cell[3];
+    real weight[3][4], slope[3][4];
+    for (int a = 0; a < 3; a++) {
+        cell[a] = (int)g[a];
+        if (cell[a] > l->size[a] - 2) cell[a] = l->size[a] > 1 ? l->size[a] - 2 : 0;
+        for (int t = 0; t < 4; t++) {
+            const real x = g[a] - (cell[a] + t - 1);
+            const int flat = l->size[a] == 1;
+            weight[a][t] = flat ? t == 1 : basis(filter, x, 0), slope[a][t] = flat ? 0 : basis(filter, x, 1);
+            /* at the ends of a cell the derivative of its own line counts */
+            if (filter == ISOGI_FILTER_LINEAR && !flat) slope[a][t] = t == 1 ? -1 : t == 2 ? 1 : 0;
+        }
+    }
+    want[0] = want[1] = want[2] = want[3] = 0;
+    for (int k = 0; k < 4; k++)
+        for (int j = 0; j < 4; j++)
+            for (int i = 0; i < 4; i++) {
+                const real wx = weight[0][i], wy = weight[1][j], wz = weight[2][k], dx = slope[0][i], dy = slope[1][j], dz = slope[2][k];
+                if (wx == 0 && dx == 0) continue;
+                if ((wy == 0 && dy == 0) || (wz == 0 && dz == 0)) continue;
+                const real v = continued(l, cell[0] + i - 1, cell[1] + j - 1, cell[2] + k - 1);
+                want[0] += v * wx * wy * wz, want[1] += v * dx * wy * wz, want[2] += v * wx * dy * wz, want[3] += v * wx * wy * dz;
+            }
+}
+
+/* ---- every filter, type, layout and path ---- */
+
+/* Largest errors in units of 2^-24: of values, relative to the largest number; of gradients, to the range of the voxels. */
+static void compare_lattice(const lattice *l, const isogi_pyramid *p, test_random *r, double worst[3][2]) {
+    enum { COUNT = 150 };
+    static float points[COUNT][3], values[COUNT], gradients[COUNT][3];
+    static double grid[COUNT][3];
+    double size = fmax(fmax(fabs(l->least), fabs(l->most)), fabs(l->volume.bias)), range = l->most - l->least;
+    for (int i = 0; i < COUNT; i++)
+        for (int a = 0; a < 3; a++) {
+            double at = random_range(r, -0.1, 1.1) * (l->size[a] - 1);
+            if (!(random_bits(r) % 5)) at = floor(at); /* spacings are powers of two: lattice planes are met exactly */
+            points[i][a] = (float)(at * l->volume.spacing[a] + l->volume.origin[a]);
+            grid[i][a] = ((double)points[i][a] - l->volume.origin[a]) / l->volume.spacing[a];
+        }
+    for (int f = 0; f < 3; f++)
+        for (int from_grid = 0; from_grid < 2; from_grid++) {
+            if (from_grid) isogi_vol_sample_grid(p, filters[f], (const double(*)[3])grid, COUNT, values, gradients);
+            else isogi_vol_sample_filtered(p, filters[f], (const float(*)[3])points, COUNT, values, gradients);
+            for (int i = 0; i < COUNT; i++) {
+                real g[3], want[4];
+                for (int a = 0; a < 3; a++) {
+                    g[a] = (real)grid[i][a];
+                    g[a] = g[a] < 0 ? 0 : g[a] > l->size[a] - 1 ? l->size[a] - 1 : g[a];
+                }
+                definition(l, filters[f], g, want);
+                double error = fabs((double)((real)values[i] - want[0])) / size * 0x1p24;
+                worst[f][0] = fmax(worst[f][0], error);
+                for (int a = 0; a < 3; a++) {
+                    error = fabs((double)((real)gradients[i][a] * (real)l->volume.spacing[a] - want[a + 1])) / range * 0x1p24;
+                    worst[f][1] = fmax(worst[f][1], error);
+                }
+            }
+        }
+}
+
+static void every_volume_on_path(int path) {
+    test_random r = {1};
+    double worst[3][2] = {{0}};
+    for (int type = ISOGI_U8; type <= ISOGI_F64; type++)
+        for (int layout = 0; layout < LAYOUTS; layout++)
+            for (int n = 0; n < (LONG_SUITE ? 40 : 4); n++) {
+                const int flat = n == 3 && layout != CHUNK;
+                lattice l = lattice_new((isogi_type)type, layout, 2 + (int)(random_bits(&r) % 9), flat ? 1 : 2 + (int)(random_bits(&r) % 7),
+                                        2 + (int)(random_bits(&r) % 8), &r);
+                const isogi_context context = {.threads = 1, .force_path = path};
+                isogi_pyramid *p = NULL;
+                for (int a = 0; a < 3; a++) l.volume.spacing[a] = 0.25 * (1 << (a + type % 3)), l.volume.origin[a] = a - 1.5;
+                isogi_result result = isogi_vol_build(&p, &l.volume, &context);
+                CHECK(result == ISOGI_OK, "%s", isogi_result_string(result));
+                compare_lattice(&l, p, &r, worst);
+                isogi_vol_free(p);
+                free(l.memory);
+            }
+    for (int f = 0; f < 3; f++) {
+        printf("    path %d, %-11s: value %.2f, gradient %.2f in 2^-24 of the largest number, of the range\n", path, filter_names[f], worst[f][0], worst[f][1]);
+        /* what the header states */
+        CHECK(worst[f][0] < 8 * ROUNDING_FACTOR && worst[f][1] < 8 * ROUNDING_FACTOR, "path %d, %s: %g, %g", path, filter_names[f], worst[f][0], worst[f][1]);
+    }
+}
+
+TEST(samples_agree_with_their_definition_by_default) { every_volume_on_path(0); }
+TEST(samples_agree_with_their_definition_in_plain_code) { every_volume_on_path(1); }
+TEST(samples_agree_with_their_definition_in_portable_code) { every_volume_on_path(2); }
+TEST(samples_agree_with_their_definition_in_avx2) { every_volume_on_path(3); }
+TEST(samples_agree_with_their_definition_in_avx512) { every_volume_on_path(4); }
+
+TEST(the_size_of_a_call_changes_no_bit) {
+    enum { COUNT = 333 };
+    static float points[COUNT][3], whole[COUNT], parts[COUNT], whole_gradients[COUNT][3], part_gradients[COUNT][3];
+    test_random r = {2};
+    for (int type = ISOGI_U8; type <= ISOGI_F64; type++)
+        for (int path = 0; path < PATHS; path++) {
+            lattice l = lattice_new((isogi_type)type, PACKED, 9, 11, 10, &r);
+            const isogi_context context = {.threads = 1, .force_path = path};
+            isogi_pyramid *p = NULL;
+            isogi_vol_build(&p, &l.volume, &context);
+            for (int i = 0; i < COUNT; i++)
+                for (int a = 0; a < 3; a++) points[i][a] = (float)random_range(&r, -0.5, l.size[a] - 0.5);
+            for (int f = 0; f < 3; f++) {
+                isogi_vol_sample_filtered(p, filters[f], (const float(*)[3])points, COUNT, whole, whole_gradients);
+                for (int i = 0, n; i < COUNT; i += n) {
+                    n = 1 + (int)(random_bits(&r) % 20);
+                    if (n > COUNT - i) n = COUNT - i;
+                    isogi_vol_sample_filtered(p, filters[f], (const float(*)[3])points + i, (size_t)n, parts + i, part_gradients + i);
+                }
+                CHECK(!memcmp(whole, parts, sizeof whole) && !memcmp(whole_gradients, part_gradients, sizeof whole_gradients), "type %d path %d %s",
+                      type, path, filter_names[f]);
+                isogi_vol_sample_filtered(p, filters[f], (const float(*)[3])points, COUNT, parts, NULL);
+                CHECK(!memcmp(whole, parts, sizeof whole), "type %d path %d %s: values without gradients", type, path, filter_names[f]);
+            }
+            isogi_vol_free(p);
+            free(l.memory);
+        }
+}
+
+/* ---- places that are none, calls that are wrong ---- */
+
+TEST(points_that_are_not_finite_lie_somewhere_in_the_box) {
+    test_random r = {3};
+    const float odd[4] = {NAN, INFINITY, -INFINITY, 3e38f};
+    for (int path = 0; path < PATHS; path++) {
+        lattice l = lattice_new(ISOGI_U8, PACKED, 6, 7, 8, &r);
+        const isogi_context context = {.threads = 1, .force_path = path};
+        isogi_pyramid *p = NULL;
+        isogi_vol_build(&p, &l.volume, &context);
+        for (int f = 0; f < 2; f++)
+            for (int i = 0; i < 64; i++) {
+                float point[1][3] = {{odd[i & 3], i & 4 ? odd[i >> 3 & 3] : 2.5f, i & 32 ? odd[i >> 4 & 3] : 1.5f}}, value = -1e9f, g[1][3];
+                isogi_vol_sample_filtered(p, filters[f], (const float(*)[3])point, 1, &value, g);
+                CHECK((double)value >= l.least - 1e-3 && (double)value <= l.most + 1e-3, "path %d: %g", path, (double)value);
+            }
+        isogi_vol_free(p);
+        free(l.memory);
+    }
+}
+
+TEST(wrong_calls_are_refused) {
+    test_random r = {4};
+    lattice l = lattice_new(ISOGI_F32, PACKED, 4, 4, 4, &r);
+    isogi_pyramid *p = NULL;
+    float point[1][3] = {{1, 1, 1}}, value = 5, coefficients[64];
+    double grid[1][3] = {{1, 1, 1}};
+    isogi_vol_build(&p, &l.volume, NULL);
+    CHECK(isogi_vol_sample(NULL, (const float(*)[3])point, 1, &value, NULL) == ISOGI_INVALID, "no pyramid");
+    CHECK(isogi_vol_sample(p, NULL, 1, &value, NULL) == ISOGI_INVALID, "no points");
+    CHECK(isogi_vol_sample_grid(p, ISOGI_FILTER_LINEAR, NULL, 1, &value, NULL) == ISOGI_INVALID, "no points");
+    CHECK(isogi_vol_sample_grid(p, (isogi_filter)7, (const double(*)[3])grid, 1, &value, NULL) == ISOGI_INVALID, "no filter");
+    CHECK(isogi_vol_sample(p, NULL, 0, NULL, NULL) == ISOGI_OK && isogi_vol_sample(p, (const float(*)[3])point, 1, NULL, NULL) == ISOGI_OK, "nothing to do");
+    CHECK(value == 5, "a refused call wrote");
+    CHECK(isogi_vol_prefilter(NULL, coefficients, NULL) == ISOGI_INVALID && isogi_vol_prefilter(&l.volume, NULL, NULL) == ISOGI_INVALID, "prefilter");
+    isogi_vol_free(p);
+    free(l.memory);
+}
+
+/* The last voxel of a volume is the last byte before memory that must not be read. */
+TEST(nothing_is_read_beyond_the_volume) {
+#if defined(__unix__) && defined(MAP_ANONYMOUS)
+    const size_t page = 65536, voxels = 5 * 6 * 7;
+    char *memory = (char *)mmap(NULL, 3 * page, PROT_NONE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
+    if (memory == (char *)MAP_FAILED || mprotect(memory + page, page, PROT_READ | PROT_WRITE)) SKIP("no memory to be protected");
+    for (int type = ISOGI_U8; type <= ISOGI_F64; type++)
+        for (int at_end = 0; at_end < 2; at_end++)
+            for (int path = 0; path < PATHS; path++) {
+                const isogi_context context = {.threads = 1, .force_path = path};
+                isogi_volume v = {.type = (isogi_type)type, .size = {5, 6, 7}};
+                isogi_pyramid *p = NULL;
+                v.data = at_end ? memory + 2 * page - voxels * type_size((isogi_type)type) : memory + page;
+                isogi_vol_build(&p, &v, &context);
+                for (int f = 0; f < 3; f++)
+                    for (int k = 0; k < 14; k++)
+                        for (int j = 0; j < 12; j++) {
+                            float points[10][3], values[10], gradients[10][3];
+                            for (int i = 0; i < 10; i++) points[i][0] = 0.5f * (float)i, points[i][1] = 0.5f * (float)j, points[i][2] = 0.5f * (float)k;
+                            isogi_vol_sample_filtered(p, filters[f], (const float(*)[3])points, 10, values, gradients);
+                            CHECK(values[3] == 0 && gradients[3][1] == 0, "%g", (double)values[3]);
+                        }
+                isogi_vol_free(p);
+            }
+    munmap(memory, 3 * page);
+#else
+    SKIP("needs memory that can be protected");
+#endif
+}
+
+/* ---- interpolation ---- */
+
+static double marschner_lobb(double x, double y, double z, double gradient[3]) {
+    const double pi = 3.14159265358979323846, radius = sqrt(x * x + y * y), phase = 12 * pi * cos(pi * radius / 2);
+    /* d/dr of 0.25 cos(12 pi cos(pi r / 2)) / 2.5 */
+    const double slope = 0.1 * sin(phase) * 6 * pi * pi * sin(pi * radius / 2);
+    gradient[0] = radius > 0 ? slope * x / radius : 0, gradient[1] = radius > 0 ? slope * y / radius : 0;
+    gradient[2] = -0.2 * pi * cos(pi * z / 2);
+    return (1 - sin(pi * z / 2) + 0.25 * (1 + cos(phase))) / 2.5;
+}
+
+/* The signal that such filters are tested by, at N voxels a side: root mean square error of values, mean angle between gradients, and how far samples
+   leave the range of their 64 voxels, relative to the range of the field. */
+TEST(interpolation_of_marschner_lobb_errs_as_stated) {
+    enum { SIZES = 2, COUNT = 20000, METHODS = 4 };
+    const int sizes[SIZES] = {41, 81};
+    const char *const names[METHODS] = {"trilinear", "B-spline", "Catmull-Rom", "prefiltered"};
+    double rms[SIZES][METHODS], angle[SIZES][METHODS], over[SIZES][METHODS];
+    test_random r = {5};
+    for (int s = 0; s < SIZES; s++) {
+        const int n = sizes[s];
+        const size_t voxels = (size_t)n * (size_t)n * (size_t)n;
+        float *data = (float *)malloc(voxels * sizeof(float)), *coefficients = (float *)malloc(voxels * sizeof(float));
+        float(*points)[3] = (float(*)[3])malloc(COUNT * sizeof *points), (*gradients)[3] = (float(*)[3])malloc(COUNT * sizeof *gradients);
+        float *values = (float *)malloc(COUNT * sizeof *values);
+        double unused[3], h = 2.0 / (n - 1);
+        for (size_t i = 0; i < voxels; i++)
+            data[i] = (float)marschner_lobb(-1 + h * (double)(i % (size_t)n), -1 + h * (double)(i / (size_t)n % (size_t)n), -1 + h * (double)(i / (size_t)n / (size_t)n), unused);
+        isogi_volume v = {.data = data, .type = ISOGI_F32, .size = {(size_t)n, (size_t)n, (size_t)n}};
+        for (int a = 0; a < 3; a++) v.spacing[a] = h, v.origin[a] = -1;
+        isogi_volume c = v;
+        c.data = coefficients;
+        CHECK(isogi_vol_prefilter(&v, coefficients, NULL) == ISOGI_OK, "prefilter");
+        isogi_pyramid *p[2] = {NULL, NULL};
+        isogi_vol_build(&p[0], &v, NULL), isogi_vol_build(&p[1], &c, NULL);
+        for (int i = 0; i < COUNT; i++)
+            for (int a = 0; a < 3; a++) points[i][a] = (float)random_range(&r, -0.9, 0.9);
+        for (int m = 0; m < METHODS; m++) {
+            double sum = 0, angles = 0, most = 0;
+            isogi_vol_sample_filtered(p[m == 3], m == 3 ? ISOGI_FILTER_BSPLINE : filters[m], (const float(*)[3])points, COUNT, values, gradients);
+            for (int i = 0; i < COUNT; i++) {
+                double g[3], dot = 0, l0 = 0, l1 = 0, low = 1e300, high = -1e300, at[3] = {(double)points[i][0], (double)points[i][1], (double)points[i][2]};
+                double truth = marschner_lobb(at[0], at[1], at[2], g), value = (double)values[i];
+                sum += (value - truth) * (value - truth);
+                for (int a = 0; a < 3; a++) dot += g[a] * (double)gradients[i][a], l0 += g[a] * g[a], l1 += (double)gradients[i][a] * (double)gradients[i][a];
+                angles += l1 > 0 ? acos(fmax(-1, fmin(1, dot / sqrt(l0 * l1)))) : 0;
+                for (int t = 0; t < 64; t++) {
+                    int cell[3], tap[3] = {t & 3, t >> 2 & 3, t >> 4};
+                    for (int a = 0; a < 3; a++) cell[a] = (int)((at[a] + 1) / h) + tap[a] - 1;
+                    double x = (double)data[cell[0] + n * (cell[1] + n * cell[2])];
+                    low = fmin(low, x), high = fmax(high, x);
+                }
+                most = fmax(most, fmax(low - value, value - high));
+            }
+            rms[s][m] = sqrt(sum / COUNT), angle[s][m] = angles / COUNT * 180 / 3.14159265358979323846, over[s][m] = fmax(most, 0);
+            printf("    %d^3 %-11s: value RMS %.4f, gradient %.1f degrees, overshoot %.4f\n", n, names[m], rms[s][m], angle[s][m], over[s][m]);
+        }
+        isogi_vol_free(p[0]), isogi_vol_free(p[1]);
+        free(data), free(coefficients), free(points), free(gradients), free(values);
+    }
+    CHECK(rms[0][2] < rms[0][0] && rms[0][3] < rms[0][2] && rms[0][0] < rms[0][1], "order of errors at 41^3");
+    /* fourth and third order against second, where the signal is resolved */
+    CHECK(rms[1][3] < 0.2 * rms[1][0] && rms[1][2] < 0.5 * rms[1][0], "prefiltered %g, Catmull-Rom %g, trilinear %g", rms[1][3], rms[1][2], rms[1][0]);
+    CHECK(angle[1][3] < angle[1][2] && angle[1][2] < angle[1][0], "gradients");
+    /* weights that are not negative, and sum to 1, stay within the voxels up to rounding */
+    CHECK(over[0][0] < 1e-6 && over[0][1] < 1e-6, "overshoot without negative weights: %g, %g", over[0][0], over[0][1]);
+    CHECK(over[0][2] < 0.1 && over[0][3] < 0.1, "overshoot: %g, %g", over[0][2], over[0][3]);
+}
+
+TEST(interpolating_filters_pass_through_the_voxels) {
+    test_random r = {6};
+    for (int type = ISOGI_U8; type <= ISOGI_F64; type++)
+        for (int layout = 0; layout < MIRRORED; layout++)
+            for (int n = 1; n < 8; n++) {
+                lattice l = lattice_new((isogi_type)type, layout, n, 8 - n, 5, &r);
+                const size_t voxels = (size_t)l.size[0] * (size_t)l.size[1] * (size_t)l.size[2];
+                float *coefficients = (float *)malloc(voxels * sizeof(float)), value[2];
+                isogi_pyramid *p[2] = {NULL, NULL};
+                isogi_volume c = {.data = coefficients, .type = ISOGI_F32};
+                for (int a = 0; a < 3; a++) c.size[a] = l.volume.size[a];
+                CHECK(isogi_vol_prefilter(&l.volume, coefficients, NULL) == ISOGI_OK, "prefilter");
+                isogi_vol_build(&p[0], &l.volume, NULL), isogi_vol_build(&p[1], &c, NULL);
+                for (size_t i = 0; i < voxels; i++) {
+                    int at[3] = {(int)(i % c.size[0]), (int)(i / c.size[0] % c.size[1]), (int)(i / c.size[0] / c.size[1])};
+                    double grid[1][3] = {{at[0], at[1], at[2]}}, truth = voxel(&l, at[0], at[1], at[2]), size = fmax(fabs(l.least), fabs(l.most));
+                    isogi_vol_sample_grid(p[0], ISOGI_FILTER_CATMULL_ROM, (const double(*)[3])grid, 1, &value[0], NULL);
+                    isogi_vol_sample_grid(p[1], ISOGI_FILTER_BSPLINE, (const double(*)[3])grid, 1, &value[1], NULL);
+                    /* coefficients grow by 3 for each axis at most, and are floats */
+                    CHECK(fabs((double)value[0] - truth) < 1e-6 * size, "Catmull-Rom %g, not %g", (double)value[0], truth);
+                    CHECK(fabs((double)value[1] - truth) < 1e-5 * size, "prefiltered %g, not %g", (double)value[1], truth);
+                }
+                isogi_vol_free(p[0]), isogi_vol_free(p[1]);
+                free(coefficients), free(l.memory);
+            }
+}
+
+TEST_MAIN("sample")
