@@ -1566,6 +1566,7 @@ static isogi_result isogi_dvr__resolve(isogi_dvr_desc *desc, const isogi_dvr_des
     if (!given || !given->pyramid) return ISOGI_INVALID;
     *desc = *given;
     volume = isogi_vol_volume(desc->pyramid);
+    if (!volume->data) return ISOGI_INVALID; /* a field given by a function */
     if (desc->space != ISOGI_DVR_PHYSICAL && desc->space != ISOGI_DVR_DATA) return ISOGI_INVALID;
     if (desc->shading != ISOGI_DVR_UNLIT && desc->shading != ISOGI_DVR_VISIBILITY && desc->shading != ISOGI_DVR_LOCAL && desc->shading != ISOGI_DVR_TWO_SIDED)
         return ISOGI_INVALID;

@@ -1355,7 +1355,10 @@ static int isogi_trace__fields_valid(const isogi_trace_desc *d) {
     return d->mode == ISOGI_TRACE_IRRADIANCE || isogi_trace__distant(&d->lighting);
 }
 
-static int isogi_trace__desc_valid(const isogi_trace_desc *d) { return d && d->pyramid && isogi_trace__fields_valid(d); }
+/* A field given by a function has no voxels to be baked. */
+static int isogi_trace__desc_valid(const isogi_trace_desc *d) {
+    return d && d->pyramid && isogi_vol_volume(d->pyramid)->data && isogi_trace__fields_valid(d);
+}
 
 /* Grey surfaces need one set of coefficients. */
 static int isogi_trace__grey(const isogi_trace_desc *d) {

@@ -217,6 +217,35 @@ ISOGI_API int isogi_vol_may_hold(const isogi_pyramid *pyramid, const size_t firs
 ISOGI_API void isogi_vol_to_world(const isogi_pyramid *pyramid, const double grid[3], double world[3]);
 ISOGI_API void isogi_vol_to_grid(const isogi_pyramid *pyramid, const double world[3], double grid[3]);
 
+/* ---- fields given by a function -------------------------------------------------------------------------------------------- */
+
+/* A field that nobody has sampled: f(point) and its gradient in the world's box low..high. Its pyramid serves rays as any other does
+   (intersect, intersect_all, occluded, continue, bundle, next_interval, positions, normals, sample), for every isovalue at once.
+   Hits carry cells of a lattice that only serves skipping: 2, 64 or 1000 cells a side give the same hits. Both kinds of normals, and
+   both kinds of samples, are those of the function. isogi_vol_volume tells the lattice, with data = NULL; there is nothing to be meshed,
+   updated, baked or volume-rendered: ISOGI_INVALID.
+
+   What is guaranteed rests on one bound, of how fast the gradient turns: in a piece of ray that begins with value g and slope g', there
+   is no root within (g' + sqrt(g'^2 + 2 M |g|)) / M if the slope leads away from the surface (with -g' if it leads there), and at most
+   one within |g'| / M, M = hessian |dir|^2 (Taylor). The search goes from one such end to the next, so it has no step size and misses
+   no crossing, however close two of them are, but for one kind: where value and slope vanish together (tangents), it goes on by steps
+   of at least 2^-16 cell, and may overlook a dip through the surface that is shorter than that, hence shallower than
+   hessian * (2^-16 cell)^2. Where a ray runs along the surface these steps grow by a tenth each, so that no ray takes more than some
+   hundred of them in a cell. All of this in double, hence to within the rounding errors of the function itself. t is right to those.
+   A function that is not as smooth as `hessian` claims loses hits, but nothing else.
+   counters: blocks as for volumes, cubics = calls of the function. */
+typedef struct isogi_field {
+    double (*value)(void *user, const double point[3], double gradient[3]); /* gradient per world unit, never NULL; called from any thread; a result that is not finite:
+                                                                               no surface in the rest of that cell */
+    void *user;            /* must outlive the pyramid */
+    double hessian;        /* > 0: |gradient f(p) - gradient f(q)| <= hessian |p - q| in the whole box: a bound of the Hessian's norm */
+    double (*hessian_in)(void *user, const double low[3], const double high[3]); /* the same for a smaller box, where that is less; NULL = hessian everywhere */
+    double low[3], high[3]; /* low < high */
+    size_t cells[3];        /* of the lattice, along x, y, z; 0 = 64 */
+} isogi_field;
+
+ISOGI_API isogi_result isogi_vol_build_field(isogi_pyramid **pyramid, const isogi_field *field, const isogi_context *context);
+
 /* ---- values and gradients ---------------------------------------------------------------------------------------------- */
 
 /* What lies between the voxels. Value and gradient of the cubic filters come from 4x4x4 voxels, which continue linearly beyond the
@@ -648,6 +677,7 @@ typedef struct isogi_vol__node_level { size_t first, size[3], parents[3]; } isog
 
 struct isogi_pyramid {
     isogi_volume volume;
+    isogi_field field; /* instead of voxels, if it has a function */
     isogi_context context;
     double to_world[9]; /* world = origin + to_world * grid */
     double to_grid[9];  /* its inverse */
@@ -1501,7 +1531,7 @@ ISOGI_API isogi_result isogi_vol_update(isogi_pyramid *pyramid, const size_t fir
     size_t broken;
     uint64_t blocks;
     int was_fast, was_empty;
-    if (!p || !first || !last || !isogi_vol__blocks_of(p, first, last, &job)) return ISOGI_INVALID;
+    if (!p || p->field.value || !first || !last || !isogi_vol__blocks_of(p, first, last, &job)) return ISOGI_INVALID;
     job.pyramid = p, context = p->context, context.progress = NULL;
     blocks = (uint64_t)(job.last[0] - job.first[0] + 1) * (job.last[1] - job.first[1] + 1) * (job.last[2] - job.first[2] + 1);
     if (blocks < 4096) context.parallel_for = NULL, context.threads = 1; /* threads would cost more than they bring */
@@ -1588,7 +1618,7 @@ static int isogi_vol__query_block(isogi_vol__box_query *q, int n, const size_t b
                     if (isogi_vol__query_block(q, n - 1, child)) return 1;
         return 0;
     }
-    if (!within) isogi_volume_range(&q->pyramid->volume, low, high, range);
+    if (!within && !q->pyramid->field.value) isogi_volume_range(&q->pyramid->volume, low, high, range);
     if (q->ranges) return range[0] <= range[1] && isogi_vol__any_overlaps(q->ranges, q->count, range[0], range[1]);
     q->range[0] = isogi_vol__min(q->range[0], range[0]), q->range[1] = isogi_vol__max(q->range[1], range[1]);
     return 0;
@@ -2317,16 +2347,27 @@ ISOGI_VOL__INLINE void isogi_vol__gradient_out(const double m[9], float gx, floa
     out[2] = (float)(m[2] * x + m[5] * y + m[8] * z);
 }
 
+/* The field's value at a place in grid coordinates, and its gradient per world unit. */
+static double isogi_vol__field_at(const isogi_pyramid *p, const double grid[3], double gradient[3]) {
+    double world[3];
+    isogi_vol_to_world(p, grid, world);
+    gradient[0] = gradient[1] = gradient[2] = 0;
+    return p->field.value(p->field.user, world, gradient);
+}
+
 /* One point by the plain code. */
 static void isogi_vol__sample_one(const isogi_pyramid *p, isogi_filter filter, const double grid[3], float *value, float *gradient) {
     double local[3], slope[3], corner[8], result;
     int cell[3], a;
     for (a = 0; a < 3; a++) cell[a] = isogi_vol__cell(grid[a], p->volume.size[a], &local[a]);
-    if (filter != ISOGI_FILTER_LINEAR) result = isogi_vol__cubic_sum(p, filter, cell, local, slope);
+    if (p->field.value) {
+        for (a = 0; a < 3; a++) local[a] += cell[a];
+        result = isogi_vol__field_at(p, local, slope);
+    } else if (filter != ISOGI_FILTER_LINEAR) result = isogi_vol__cubic_sum(p, filter, cell, local, slope);
     else isogi_vol__corners(p, cell, 0, corner), result = isogi_vol__trilinear(corner, local, slope);
     if (value) *value = (float)result;
     if (!gradient) return;
-    isogi_vol__gradient_to_world(p, slope, slope);
+    if (!p->field.value) isogi_vol__gradient_to_world(p, slope, slope);
     for (a = 0; a < 3; a++) gradient[a] = (float)slope[a];
 }
 
@@ -2366,7 +2407,7 @@ static void isogi_vol__sample_some(const isogi_pyramid *p, isogi_filter filter, 
                                    float (*gradients)[3]) {
     int i;
 #if defined(ISOGI_VOL__SSE2) || defined(ISOGI_VOL__NEON)
-    if (isogi_vol__blockwise(p, filter)) {
+    if (!p->field.value && isogi_vol__blockwise(p, filter)) {
         isogi_vol__sample_block(p, filter, at, first, n, values, gradients);
         return;
     }
@@ -2759,12 +2800,15 @@ static int isogi_vol__leave_surface(isogi_vol__walk *w, const isogi_vol__cubic *
     return isogi_vol__cubic_deflated(cubic, &w->inside, root);
 }
 
+static int isogi_vol__visit_field(isogi_vol__walk *w, double t_out, isogi_hit *hit); /* see "fields given by a function" */
+
 /* The part [t, t_out] of the ray in the present cell, which it leaves through `axis` (-1: the segment ends in it). 1 = hit. */
 static int isogi_vol__visit_cell(isogi_vol__walk *w, double t_out, int axis, isogi_hit *hit) {
     double corner[8], from[3], to[3], root = 0, local[3];
     isogi_vol__cubic cubic;
     int low_side = 0, i, found, inside;
     w->count.cells++;
+    if (w->pyramid->field.value) return isogi_vol__visit_field(w, t_out, hit);
     if (!isogi_vol__corners(w->pyramid, w->cell, w->isovalue, corner)) {
         w->inside = -1, w->deflate = 0;
         return 0;
@@ -4454,7 +4498,12 @@ static void isogi_vol__outward(const isogi_pyramid *p, const isogi_hit *hit, iso
         out[axis] = upper ? 1 : -1;
         return;
     }
-    if (kind == ISOGI_NORMAL_SMOOTH) isogi_vol__cubic_sum(p, ISOGI_FILTER_BSPLINE, cell, hit->local, out);
+    if (p->field.value) {
+        double grid[3];
+        for (a = 0; a < 3; a++) grid[a] = hit->cell[a] + hit->local[a];
+        isogi_vol__field_at(p, grid, out);
+        for (a = 0; a < 3; a++) out[a] *= p->volume.spacing[a]; /* per grid unit; the axes are the world's */
+    } else if (kind == ISOGI_NORMAL_SMOOTH) isogi_vol__cubic_sum(p, ISOGI_FILTER_BSPLINE, cell, hit->local, out);
     else isogi_vol__corners(p, cell, 0, corner), isogi_vol__trilinear(corner, hit->local, out);
     for (a = 0; a < 3; a++) out[a] = -out[a];
 }
@@ -4477,6 +4526,208 @@ ISOGI_API isogi_result isogi_vol_normals(const isogi_pyramid *pyramid, const iso
         for (a = 0; a < 3; a++) normals[i][a] = usable ? (float)(n[a] / length) : 0;
     }
     return ISOGI_OK;
+}
+
+/* ==== fields given by a function ======================================================================================== */
+
+/* A field's pyramid has a lattice without voxels; its blocks are bounded by the field's first two Taylor terms at their middles. The
+   plain walk leads rays to the cells that may hold the surface. */
+
+/* A bound of the Hessian's norm in a box of the world, times square; as good as infinite where the callback gives no sensible one. */
+static double isogi_vol__hessian(const isogi_field *f, const double low[3], const double high[3], double square) {
+    double bound = f->hessian_in ? f->hessian_in(f->user, low, high) : f->hessian;
+    if (!isogi_vol__finite64(bound) || !(bound >= 0)) return 1e150;
+    return isogi_vol__min(isogi_vol__max(bound * square, 1e-300), 1e150);
+}
+
+/* The box of cells low..high in the world. */
+static void isogi_vol__world_box(const isogi_pyramid *p, const int low[3], const int high[3], double from[3], double to[3]) {
+    int a;
+    for (a = 0; a < 3; a++) {
+        from[a] = p->volume.origin[a] + p->volume.spacing[a] * low[a];
+        to[a] = p->volume.origin[a] + p->volume.spacing[a] * high[a];
+    }
+}
+
+/* f(c + h) = f(c) + g h + r with |r| <= hessian |h|^2 / 2. */
+static void isogi_vol__bound_field(const isogi_pyramid *p, size_t x, size_t y, size_t z, float bound[2]) {
+    const size_t block[3] = {x, y, z};
+    double from[3], to[3], middle[3], gradient[3] = {0, 0, 0}, value, error = 0, square = 0;
+    int low[3], high[3], a;
+    for (a = 0; a < 3; a++) low[a] = (int)(4 * block[a]), high[a] = p->cells[a] - low[a] < 4 ? p->cells[a] : low[a] + 4;
+    isogi_vol__world_box(p, low, high, from, to);
+    for (a = 0; a < 3; a++) middle[a] = from[a] + 0.5 * (to[a] - from[a]);
+    value = p->field.value(p->field.user, middle, gradient);
+    for (a = 0; a < 3; a++) {
+        const double half = 0.5 * (to[a] - from[a]);
+        error += fabs(gradient[a]) * half, square += half * half;
+    }
+    error = (error + 0.5 * isogi_vol__hessian(&p->field, from, to, square)) * (1 + 1e-9) + 1e-12 * fabs(value); /* and what rounding adds */
+    bound[0] = -HUGE_VALF, bound[1] = HUGE_VALF;
+    if (isogi_vol__finite64(value) && isogi_vol__finite64(error) && isogi_vol__finite3(gradient))
+        bound[0] = isogi_vol__float_below(value - error), bound[1] = isogi_vol__float_above(value + error);
+}
+
+static void isogi_vol__field_task(void *arg, size_t z) {
+    isogi_pyramid *p = (isogi_pyramid *)arg;
+    const isogi_level *level = &p->level[0];
+    size_t x, y;
+    for (y = 0; y < level->size[1]; y++)
+        for (x = 0; x < level->size[0]; x++)
+            isogi_vol__bound_field(p, x, y, z, p->blocks[x + level->size[0] * (y + level->size[1] * z)]);
+}
+
+/* ---- the search along a piece of ray ---- */
+
+typedef struct isogi_vol__probe { double t, value, slope; } isogi_vol__probe; /* value minus the isovalue; slope per t */
+
+static int isogi_vol__probe_at(isogi_vol__walk *w, double t, isogi_vol__probe *probe) {
+    const double *m = w->pyramid->to_world;
+    double grid[3], gradient[3], dir[3];
+    int a;
+    for (a = 0; a < 3; a++) grid[a] = w->origin[a] + t * w->dir[a];
+    isogi_vol__transform(m, w->dir, dir);
+    w->count.cubics++;
+    probe->t = t, probe->value = isogi_vol__field_at(w->pyramid, grid, gradient) - w->isovalue;
+    probe->slope = gradient[0] * dir[0] + gradient[1] * dir[1] + gradient[2] * dir[2];
+    return isogi_vol__finite64(probe->value) && isogi_vol__finite64(probe->slope);
+}
+
+/* The only root between two probes of different sides: Newton within a bracket that shrinks. */
+static double isogi_vol__field_root(isogi_vol__walk *w, const isogi_vol__probe *from, const isogi_vol__probe *to, int inside) {
+    double low = from->t, high = to->t, least = 1e-16 * (fabs(low) + fabs(high)), t = low + (high - low) * (from->value / (from->value - to->value)), next;
+    isogi_vol__probe at;
+    int i;
+    if (!(t > low && t < high)) t = 0.5 * (low + high);
+    for (i = 0; i < 128; i++) {
+        if (!isogi_vol__probe_at(w, t, &at)) return t;
+        if ((at.value >= 0) == inside) low = t;
+        else high = t;
+        next = t - at.value / at.slope;
+        if (!(next > low && next < high) || (i > 8 && i % 3 == 0)) next = 0.5 * (low + high);
+        if (fabs(next - t) <= least || !(high - low > least)) return next;
+        t = next;
+    }
+    return t;
+}
+
+/* How far behind a probe the next one may be: no crossing, or one at most and no other, lies between. m bounds |d slope / dt|. */
+static double isogi_vol__safe_step(const isogi_vol__probe *at, int inside, double m) {
+    const double away = inside ? at->slope : -at->slope, root = sqrt(away * away + 2 * m * fabs(at->value));
+    return away < 0 ? isogi_vol__max(2 * fabs(at->value) / (root - away), -away / m) : (away + root) / m;
+}
+
+/* Leaves the surface: the root at the start divided out, the field has the sign of its slope as far as 2 |slope| / m. The side is
+   looked at half-way there; 0 if the piece ends before. */
+static int isogi_vol__leave_field(isogi_vol__walk *w, isogi_vol__probe *at, double t_out, double m, double least) {
+    const double step = isogi_vol__max(fabs(at->slope) / m, least);
+    w->deflate = 0, w->inside = at->slope > 0;
+    if (!(at->t + step < t_out)) return 0;
+    if (!isogi_vol__probe_at(w, at->t + step, at)) {
+        w->inside = -1;
+        return 0;
+    }
+    w->inside = at->value >= 0;
+    return 1;
+}
+
+/* What visit_cell does, for a field without voxels. */
+static int isogi_vol__visit_field(isogi_vol__walk *w, double t_out, isogi_hit *hit) {
+    const isogi_pyramid *p = w->pyramid;
+    double from[3], to[3], dir[3], m, least = 1 / (65536 * isogi_vol__largest(w->dir[0], w->dir[1], w->dir[2]));
+    isogi_vol__probe at, next;
+    int above[3], a;
+    for (a = 0; a < 3; a++) above[a] = w->cell[a] + 1;
+    isogi_vol__world_box(p, w->cell, above, from, to);
+    isogi_vol__transform(p->to_world, w->dir, dir);
+    m = isogi_vol__hessian(&p->field, from, to, dir[0] * dir[0] + dir[1] * dir[1] + dir[2] * dir[2]);
+    if (!isogi_vol__probe_at(w, w->t, &at)) {
+        w->inside = -1, w->deflate = 0;
+        return 0;
+    }
+    if (w->deflate) {
+        if (!isogi_vol__leave_field(w, &at, t_out, m, least)) return 0;
+    } else if (isogi_vol__state(w, at.value >= 0, hit)) return 1;
+    while (at.t < t_out) {
+        double step = isogi_vol__safe_step(&at, w->inside, m);
+        if (!(step >= least)) step = least, least *= 1.1;
+        if (!isogi_vol__probe_at(w, at.t + step < t_out ? at.t + step : t_out, &next)) {
+            w->inside = -1;
+            return 0;
+        }
+        if ((next.value >= 0) != w->inside) {
+            const double t = w->exact ? isogi_vol__field_root(w, &at, &next, w->inside) : next.t;
+            isogi_vol__local(w, t, from);
+            isogi_vol__emit(w, t, from, w->inside ? -1 : 1, hit);
+            w->inside = !w->inside;
+            return 1;
+        }
+        if (!(next.t > at.t)) return 0; /* a step below the resolution of t */
+        at = next;
+    }
+    return 0;
+}
+
+/* ---- building ---- */
+
+static isogi_result isogi_vol__check_field(const isogi_field *f) {
+    int a;
+    if (!f || !f->value || !isogi_vol__finite3(f->low) || !isogi_vol__finite3(f->high)) return ISOGI_INVALID;
+    if (!f->hessian_in && (!(f->hessian > 0) || !isogi_vol__finite64(f->hessian))) return ISOGI_INVALID;
+    for (a = 0; a < 3; a++) {
+        if (!(f->low[a] < f->high[a]) || !isogi_vol__finite64(f->high[a] - f->low[a])) return ISOGI_INVALID;
+        if (f->cells[a] > 0x7ffffffe) return ISOGI_TOO_LARGE;
+    }
+    return ISOGI_OK;
+}
+
+/* The lattice of a field, the bounds of its blocks, and from these the range. */
+static isogi_result isogi_vol__fill_field(isogi_pyramid *p) {
+    const isogi_field *f = &p->field;
+    size_t blocks, first[3] = {0, 0, 0}, last[3], i;
+    isogi_result result;
+    double low = 1e300, high = -1e300;
+    int a, n;
+    for (a = 0; a < 3; a++) {
+        p->cells[a] = f->cells[a] ? (int)f->cells[a] : 64;
+        p->volume.size[a] = (size_t)p->cells[a] + 1, p->volume.origin[a] = f->low[a], p->volume.axes[4 * a] = 1;
+        p->volume.spacing[a] = (f->high[a] - f->low[a]) / p->cells[a];
+        if (!(p->volume.spacing[a] > 0)) return ISOGI_INVALID;
+    }
+    p->volume.type = ISOGI_F64, p->volume.scale = 1, p->path = ISOGI_VOL__PATH_PLAIN, p->all_finite = 1;
+    isogi_vol__set_transform(p);
+    blocks = isogi_vol__plan_levels(p);
+    p->blocks = (float(*)[2])isogi_allocate(&p->context, blocks, sizeof *p->blocks);
+    if (!p->blocks) return blocks ? ISOGI_NO_MEMORY : ISOGI_TOO_LARGE;
+    p->block_count = blocks;
+    for (n = 0, i = 0; n < ISOGI_VOL__LEVELS; n++) {
+        p->level[n].range = (const float(*)[2])p->blocks + i;
+        i += p->level[n].size[0] * p->level[n].size[1] * p->level[n].size[2];
+    }
+    result = isogi_parallel(&p->context, p->level[0].size[2], isogi_vol__field_task, p, 0, 1);
+    if (result != ISOGI_OK) return result;
+    for (a = 0; a < 3; a++) last[a] = p->level[0].size[a] - 1;
+    isogi_vol__build_level(p, 1, first, last), isogi_vol__build_level(p, 2, first, last);
+    for (i = 0; i < p->level[2].size[0] * p->level[2].size[1] * p->level[2].size[2]; i++)
+        low = isogi_vol__min(low, (double)p->level[2].range[i][0]), high = isogi_vol__max(high, (double)p->level[2].range[i][1]);
+    p->range[0] = isogi_vol__max(low, -1e300), p->range[1] = isogi_vol__min(high, 1e300);
+    return ISOGI_OK;
+}
+
+ISOGI_API isogi_result isogi_vol_build_field(isogi_pyramid **pyramid, const isogi_field *field, const isogi_context *context) {
+    isogi_result result = isogi_vol__check_field(field);
+    isogi_pyramid *p;
+    if (!pyramid) return ISOGI_INVALID;
+    if (result != ISOGI_OK) return result;
+    p = (isogi_pyramid *)isogi_allocate(context, 1, sizeof *p);
+    if (!p) return ISOGI_NO_MEMORY;
+    memset(p, 0, sizeof *p);
+    if (context) p->context = *context;
+    p->field = *field;
+    result = isogi_vol__fill_field(p);
+    if (result == ISOGI_OK) *pyramid = p;
+    else isogi_vol_free(p);
+    return result;
 }
 
 /* ==== surface inside a cell ========================================================================================== */
@@ -5453,7 +5704,7 @@ ISOGI_API isogi_result isogi_vol_mesh(const isogi_pyramid *pyramid, const isogi_
     isogi_context context;
     isogi_result result;
     int a, empty;
-    if (!pyramid || !desc || !mesh || !isogi_vol__finite64(desc->isovalue)) return ISOGI_INVALID;
+    if (!pyramid || pyramid->field.value || !desc || !mesh || !isogi_vol__finite64(desc->isovalue)) return ISOGI_INVALID;
     context = pyramid->context;
     empty = !(pyramid->range[1] >= desc->isovalue) || (!desc->closed && pyramid->range[0] >= desc->isovalue);
     for (a = 0; a < 3; a++) empty = empty || pyramid->cells[a] < 1;

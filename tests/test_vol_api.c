@@ -1,5 +1,5 @@
 /* Properties of the calls around the rays of isogi_vol.h: voxels read one by one, all hits of a ray, bundles, value ranges, updates,
-   chunks with a halo, fields given by a callback, very large volumes, arguments that make no sense. */
+   chunks with a halo, very large volumes, arguments that make no sense. */
 #define ISOGI_IMPLEMENTATION
 #include "isogi_trace.h"
 #include "reference_ray.h"
