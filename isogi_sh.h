@@ -49,8 +49,8 @@
 
    - ISOGI_IMPLEMENTATION       implements every isogi header that the file includes
    - ISOGI_SH_IMPLEMENTATION    implements this one alone
-   - ISOGI_NO_SIMD              plain C only; else AVX2 or AVX-512 are chosen at run time on x86-64 (gcc 12 or later, clang)
-   - ISOGI_SH_LEVEL             0 plain, 1 AVX2, 2 AVX-512: uses at most this level
+   - ISOGI_NO_SIMD              plain C only; else SSE2 or NEON, and on x86-64 AVX2 or AVX-512, chosen at run time (gcc 12 or later, clang)
+   - ISOGI_SH_LEVEL             0 SSE2 or NEON, 1 AVX2, 2 AVX-512: uses at most this level
    - ISOGI_API                  linkage of public functions, if extern does not suit
 
    Memory       None allocated. Stack use stays below 32 KB.
@@ -337,7 +337,11 @@ ISOGI_API isogi_result isogi_sh_fit_directional(float direction[3], float rgb[3]
 #define ISOGI_SH__DERING_ORDER 32
 #define ISOGI_SH__GROUP 5     /* orders m that are projected in one pass */
 
-/* gcc for Windows does not align its stack for 32-byte vectors: no wide paths there */
+/* 16-byte vectors where the compiler's target has them; 32 and 64 bytes by the processor that runs. gcc for Windows does not align its
+   stack for those. */
+#if !defined(ISOGI_NO_SIMD) && (defined(__SSE2__) || defined(__ARM_NEON)) && (defined(__clang__) || (defined(__GNUC__) && __GNUC__ >= 12))
+#define ISOGI_SH__VECTORS 1
+#endif
 #if !defined(ISOGI_NO_SIMD) && defined(__x86_64__) && (defined(__clang__) || (defined(__GNUC__) && __GNUC__ >= 12 && !defined(_WIN32)))
 #define ISOGI_SH__SIMD 1
 #endif
@@ -657,61 +661,7 @@ static const double isogi_sh__turn_f64[815] = {
     -0.0038890459770688454, 0.01971435546875, 0.0060427887192523689, 0.0012729891122201056, -0.001708984375,
     -0.00033430331878977424, 6.103515625e-05,
 };
-#ifdef ISOGI_SH__SIMD
-static const double isogi_sh__wigner_f64[448] = {
-    0.8660254037844386, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.70710678118654757, 0.0,
-    0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.52704627669472992, 0.55901699437494745,
-    0.70710678118654757, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.81649658092772603, 0.75, 0.0, 0.0,
-    0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.38188130791298669, 0.39440531887330771, 0.44095855184409843,
-    0.57735026918962573, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.8660254037844386, 0.84327404271156781,
-    0.7453559924999299, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.29999999999999999,
-    0.30618621784789724, 0.3273268353539886, 0.375, 0.5, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0,
-    0.89442719099991586, 0.88388347648318444, 0.84515425472851657, 0.73950997288745202, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0,
-    0.0, 0.0, 0.0, 0.0, 0.0, 0.2472066162365221, 0.25071326821120349, 0.26220221204253791, 0.2854496128592251,
-    0.33166247903553997, 0.44721359549995793, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.9128709291752769,
-    0.90711473522214536, 0.88741196746494244, 0.84327404271156781, 0.73484692283495345, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0,
-    0.0, 0.0, 0.0, 0.0, 0.2102800206268535, 0.21245914639969937, 0.21942686286812776, 0.23273733406281569,
-    0.25623537159526916, 0.30046260628866578, 0.40824829046386302, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0,
-    0.92582009977255142, 0.92233098421577731, 0.91084006808529761, 0.88741196746494244, 0.84087496518252169,
-    0.73124703228267685, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.18298126367784998, 0.18442777839082938,
-    0.18898223650461363, 0.19738550848793068, 0.21128856368212914, 0.23440361546924771, 0.27664166758624409,
-    0.37796447300922725, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.93541434669348533, 0.93313894963168686,
-    0.92582009977255142, 0.91168461167710357, 0.88640526042791834, 0.83862786937753464, 0.72843135908468359, 0.0, 0.0, 0.0,
-    0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.16197088596792503, 0.16298006013006622, 0.16612465981124716, 0.17179606773406919,
-    0.18081014266989476, 0.19479843061849489, 0.2173067468400883, 0.25769410160110379, 0.35355339059327379, 0.0, 0.0, 0.0,
-    0.0, 0.0, 0.0, 0.0, 0.94280904158206336, 0.94124252985083501, 0.93628167589853895, 0.92702481088695787,
-    0.91146543037529992, 0.88514526652812353, 0.83666002653407556, 0.72618437741389064, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0,
-    0.0, 0.1452966314513558, 0.14602860903839354, 0.14829275350043489, 0.15231225557722924, 0.15853162186855699,
-    0.16777409856157222, 0.18162078931419473, 0.20345597929769124, 0.2421610524189263, 0.33333333333333331, 0.0, 0.0, 0.0,
-    0.0, 0.0, 0.0, 0.94868329805051377, 0.94755873935826862, 0.94403585933146827, 0.93761446187699082, 0.92724773377364467,
-    0.91084006808529761, 0.88388347648318444, 0.83496572144686598, 0.72435582280029431, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0,
-    0.13173978860172217, 0.13228756555322954, 0.13397282541141672, 0.13693063937629152, 0.1414213562373095,
-    0.1479019945774904, 0.15718104959867515, 0.17078251276599329, 0.19194297398747862, 0.229128784747792, 0.31622776601683794,
-    0.0, 0.0, 0.0, 0.0, 0.0, 0.95346258924559235, 0.95262794416288255, 0.95003373759256704, 0.94538352005945181,
-    0.93808315196468595, 0.92702481088695787, 0.91007433439123375, 0.88270417845769067, 0.83350875346649067,
-    0.72284161474004804, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.12049980091353686, 0.12092039486566841, 0.12220910332321784,
-    0.12445165924251668, 0.12780933953638629, 0.1325543836675655, 0.13914118498945363, 0.14835622460143164,
-    0.16166744767071581, 0.18217857500000703, 0.21799234196875997, 0.30151134457776363, 0.0, 0.0, 0.0, 0.0,
-    0.9574271077563381, 0.95679056651675909, 0.95482370712520104, 0.95134142401690103, 0.94598433583033692,
-    0.93811572599292514, 0.9265990819042822, 0.90928227650889892, 0.88163072046788804, 0.83225037857647899,
-    0.72156853938125198, 0.0, 0.0, 0.0, 0.0, 0.0, 0.11102889792108188, 0.11135885079684349, 0.11236664374387369,
-    0.11410886614690961, 0.11669000700233415, 0.12028130608117203, 0.12515654358043971, 0.13176156917368248,
-    0.14085904245475275, 0.15386436372416593, 0.17376201171422898, 0.20833333333333334, 0.28867513459481287, 0.0, 0.0, 0.0,
-    0.96076892283052284, 0.96027236546357819, 0.95874497088220456, 0.9560661587986472, 0.95200739639388887,
-    0.94617896279172775, 0.93792283697556955, 0.92608794878720291, 0.90851352515899586, 0.88066348954534379,
-    0.83115657732983583, 0.72048401940794093, 0.0, 0.0, 0.0, 0.0, 0.10293952744612744, 0.10320313742306722,
-    0.10400628679223047, 0.10538757288364328, 0.10741723110591493, 0.11020775375559676, 0.11393317879691249,
-    0.1188643277625491, 0.12543630150106361, 0.13438824602209942, 0.14708710135363803, 0.16641005886756874,
-    0.19985201625794738, 0.27735009811261457, 0.0, 0.0, 0.96362411165943151, 0.96322928261529406, 0.96201911063698164,
-    0.95991224060681912, 0.95675734404529944, 0.95230383339201019, 0.94614602873568499, 0.93761446187699082,
-    0.92555029935890387, 0.90778866899655031, 0.87979455643829796, 0.83019923466043333, 0.71954949745652719, 0.0, 0.0, 0.0,
-    0.095949722283856592, 0.096163657270258995, 0.096814151657778083, 0.097928275232167183, 0.099554716061514933,
-    0.10177004891982148, 0.10468972982756285, 0.10848723666625729, 0.11342846191148866, 0.11993715285482075,
-    0.12873006086935782, 0.14112966526419035, 0.15991620380642765, 0.19232731454051799, 0.2672612419124244, 0.0,
-    0.96609178307929588, 0.96577266307071141, 0.96479732172635235, 0.96310921762766089, 0.96060473092590926,
-    0.9571162043197412, 0.95238095238095233, 0.94598433583033692, 0.9372504104317485, 0.92501608737619367,
-    0.90711473522214536, 0.87901355800967895, 0.82935558588019886, 0.71873613562493244, 0.0, 0.0,
-};
+#ifdef ISOGI_SH__VECTORS
 static const float isogi_sh__table_f32[463] = {
     0.0f, 0.0f, 0.282094806f, 0.0f, -1.0f, 0.488602519f, 0.5f, -1.5f, 0.630783141f, 0.666666687f, -1.66666663f, 0.746352673f,
     0.75f, -1.75f, 0.846284389f, 0.800000012f, -1.79999995f, 0.935602605f, 0.833333313f, -1.83333337f, 1.01710725f,
@@ -767,6 +717,62 @@ static const float isogi_sh__table_f32[463] = {
     0.0f, 4.36395645f, -0.737643301f, 3.70713592f, -0.849489629f, 3.3322916f, -0.898885667f, 0.869857192f, 6.08276272f, 0.0f,
     4.47679186f, -0.735980093f, 3.79544544f, -0.847804725f, 0.881855786f, 6.24499798f, 0.0f, 4.58688068f, -0.734488726f,
     0.893383801f, 6.40312433f, 0.0f, 0.904482126f,
+};
+#endif
+#ifdef ISOGI_SH__SIMD
+static const double isogi_sh__wigner_f64[448] = {
+    0.8660254037844386, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.70710678118654757, 0.0,
+    0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.52704627669472992, 0.55901699437494745,
+    0.70710678118654757, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.81649658092772603, 0.75, 0.0, 0.0,
+    0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.38188130791298669, 0.39440531887330771, 0.44095855184409843,
+    0.57735026918962573, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.8660254037844386, 0.84327404271156781,
+    0.7453559924999299, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.29999999999999999,
+    0.30618621784789724, 0.3273268353539886, 0.375, 0.5, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0,
+    0.89442719099991586, 0.88388347648318444, 0.84515425472851657, 0.73950997288745202, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0,
+    0.0, 0.0, 0.0, 0.0, 0.0, 0.2472066162365221, 0.25071326821120349, 0.26220221204253791, 0.2854496128592251,
+    0.33166247903553997, 0.44721359549995793, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.9128709291752769,
+    0.90711473522214536, 0.88741196746494244, 0.84327404271156781, 0.73484692283495345, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0,
+    0.0, 0.0, 0.0, 0.0, 0.2102800206268535, 0.21245914639969937, 0.21942686286812776, 0.23273733406281569,
+    0.25623537159526916, 0.30046260628866578, 0.40824829046386302, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0,
+    0.92582009977255142, 0.92233098421577731, 0.91084006808529761, 0.88741196746494244, 0.84087496518252169,
+    0.73124703228267685, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.18298126367784998, 0.18442777839082938,
+    0.18898223650461363, 0.19738550848793068, 0.21128856368212914, 0.23440361546924771, 0.27664166758624409,
+    0.37796447300922725, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.93541434669348533, 0.93313894963168686,
+    0.92582009977255142, 0.91168461167710357, 0.88640526042791834, 0.83862786937753464, 0.72843135908468359, 0.0, 0.0, 0.0,
+    0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.16197088596792503, 0.16298006013006622, 0.16612465981124716, 0.17179606773406919,
+    0.18081014266989476, 0.19479843061849489, 0.2173067468400883, 0.25769410160110379, 0.35355339059327379, 0.0, 0.0, 0.0,
+    0.0, 0.0, 0.0, 0.0, 0.94280904158206336, 0.94124252985083501, 0.93628167589853895, 0.92702481088695787,
+    0.91146543037529992, 0.88514526652812353, 0.83666002653407556, 0.72618437741389064, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0,
+    0.0, 0.1452966314513558, 0.14602860903839354, 0.14829275350043489, 0.15231225557722924, 0.15853162186855699,
+    0.16777409856157222, 0.18162078931419473, 0.20345597929769124, 0.2421610524189263, 0.33333333333333331, 0.0, 0.0, 0.0,
+    0.0, 0.0, 0.0, 0.94868329805051377, 0.94755873935826862, 0.94403585933146827, 0.93761446187699082, 0.92724773377364467,
+    0.91084006808529761, 0.88388347648318444, 0.83496572144686598, 0.72435582280029431, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0,
+    0.13173978860172217, 0.13228756555322954, 0.13397282541141672, 0.13693063937629152, 0.1414213562373095,
+    0.1479019945774904, 0.15718104959867515, 0.17078251276599329, 0.19194297398747862, 0.229128784747792, 0.31622776601683794,
+    0.0, 0.0, 0.0, 0.0, 0.0, 0.95346258924559235, 0.95262794416288255, 0.95003373759256704, 0.94538352005945181,
+    0.93808315196468595, 0.92702481088695787, 0.91007433439123375, 0.88270417845769067, 0.83350875346649067,
+    0.72284161474004804, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.12049980091353686, 0.12092039486566841, 0.12220910332321784,
+    0.12445165924251668, 0.12780933953638629, 0.1325543836675655, 0.13914118498945363, 0.14835622460143164,
+    0.16166744767071581, 0.18217857500000703, 0.21799234196875997, 0.30151134457776363, 0.0, 0.0, 0.0, 0.0,
+    0.9574271077563381, 0.95679056651675909, 0.95482370712520104, 0.95134142401690103, 0.94598433583033692,
+    0.93811572599292514, 0.9265990819042822, 0.90928227650889892, 0.88163072046788804, 0.83225037857647899,
+    0.72156853938125198, 0.0, 0.0, 0.0, 0.0, 0.0, 0.11102889792108188, 0.11135885079684349, 0.11236664374387369,
+    0.11410886614690961, 0.11669000700233415, 0.12028130608117203, 0.12515654358043971, 0.13176156917368248,
+    0.14085904245475275, 0.15386436372416593, 0.17376201171422898, 0.20833333333333334, 0.28867513459481287, 0.0, 0.0, 0.0,
+    0.96076892283052284, 0.96027236546357819, 0.95874497088220456, 0.9560661587986472, 0.95200739639388887,
+    0.94617896279172775, 0.93792283697556955, 0.92608794878720291, 0.90851352515899586, 0.88066348954534379,
+    0.83115657732983583, 0.72048401940794093, 0.0, 0.0, 0.0, 0.0, 0.10293952744612744, 0.10320313742306722,
+    0.10400628679223047, 0.10538757288364328, 0.10741723110591493, 0.11020775375559676, 0.11393317879691249,
+    0.1188643277625491, 0.12543630150106361, 0.13438824602209942, 0.14708710135363803, 0.16641005886756874,
+    0.19985201625794738, 0.27735009811261457, 0.0, 0.0, 0.96362411165943151, 0.96322928261529406, 0.96201911063698164,
+    0.95991224060681912, 0.95675734404529944, 0.95230383339201019, 0.94614602873568499, 0.93761446187699082,
+    0.92555029935890387, 0.90778866899655031, 0.87979455643829796, 0.83019923466043333, 0.71954949745652719, 0.0, 0.0, 0.0,
+    0.095949722283856592, 0.096163657270258995, 0.096814151657778083, 0.097928275232167183, 0.099554716061514933,
+    0.10177004891982148, 0.10468972982756285, 0.10848723666625729, 0.11342846191148866, 0.11993715285482075,
+    0.12873006086935782, 0.14112966526419035, 0.15991620380642765, 0.19232731454051799, 0.2672612419124244, 0.0,
+    0.96609178307929588, 0.96577266307071141, 0.96479732172635235, 0.96310921762766089, 0.96060473092590926,
+    0.9571162043197412, 0.95238095238095233, 0.94598433583033692, 0.9372504104317485, 0.92501608737619367,
+    0.90711473522214536, 0.87901355800967895, 0.82935558588019886, 0.71873613562493244, 0.0, 0.0,
 };
 static const float isogi_sh__latitudes_f32[128] = {
     0.282094806f, 0.282094806f, 0.282094806f, 0.282094806f, 0.282094806f, 0.282094806f, 0.282094806f, 0.0f, 0.463736504f,
@@ -927,179 +933,9 @@ static void isogi_sh__eval_block(const isogi_sh__output *out, size_t first, int 
 /* The same recursions with one direction in each lane, for orders up to ISOGI_SH__TABLE_ORDER, whose constants are tabled. Vectors are
    those of gcc and clang; each function names its instruction set, so that no compiler flag is needed, and runs only where the
    processor has it. Blocks with lengths out of range, tails and higher orders go through the plain code above. */
-#ifdef ISOGI_SH__SIMD
-#define ISOGI_SH__WIDE_ORDER 12
-
-/* isogi_sh__level() > 0 */
-ISOGI_SH__INLINE int isogi_sh__avx2(void) {
-#ifdef ISOGI_SH_LEVEL
-    if (!(ISOGI_SH_LEVEL)) return 0;
-#endif
-    return __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma");
-}
-
-/* 0 plain, 1 AVX2 and FMA, 2 AVX-512 */
-static int isogi_sh__level(void) {
-    int level = 0;
-    if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma")) level = 1;
-    if (level && __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512vl") && __builtin_cpu_supports("avx512dq")) level = 2;
-#ifdef ISOGI_SH_LEVEL
-    if (level > (ISOGI_SH_LEVEL)) level = (ISOGI_SH_LEVEL);
-#endif
-    return level;
-}
-
+#ifdef ISOGI_SH__VECTORS
 typedef float isogi_sh__f4 __attribute__((vector_size(16), aligned(4), may_alias));
-typedef double isogi_sh__d2 __attribute__((vector_size(16), aligned(8), may_alias));
-typedef float isogi_sh__f8 __attribute__((vector_size(32), aligned(4), may_alias));
-typedef float isogi_sh__f16 __attribute__((vector_size(64), aligned(4), may_alias));
-typedef float isogi_sh__plain_f8 __attribute__((vector_size(32)));
-typedef double isogi_sh__d4 __attribute__((vector_size(32), aligned(8), may_alias));
-typedef double isogi_sh__d8 __attribute__((vector_size(64), aligned(8), may_alias));
-typedef int32_t isogi_sh__i8 __attribute__((vector_size(32), aligned(4), may_alias));
-typedef int32_t isogi_sh__i16 __attribute__((vector_size(64), aligned(4), may_alias));
-typedef int64_t isogi_sh__l4 __attribute__((vector_size(32), aligned(8), may_alias));
-typedef int64_t isogi_sh__l8 __attribute__((vector_size(64), aligned(8), may_alias));
-
-#define ISOGI_SH__AVX2 __attribute__((target("avx2,fma")))
-#define ISOGI_SH__AVX512 __attribute__((target("avx2,fma,avx512f,avx512vl,avx512dq")))
-#define ISOGI_SH__FMA_F8(a, b, c) ((isogi_sh__f8)__builtin_ia32_vfmaddps256(a, b, c))
-#define ISOGI_SH__FMA_D4(a, b, c) ((isogi_sh__d4)__builtin_ia32_vfmaddpd256(a, b, c))
-#define ISOGI_SH__ALL8 (unsigned char)0xff
-#if defined(__clang__)
-#define ISOGI_SH__ALL16 (unsigned short)0xffff
-#define ISOGI_SH__MASK8 unsigned char
-#define ISOGI_SH__MASKED_F8(p) ((isogi_sh__plain_f8 *)(void *)(p)) /* what a masked store wants */
-#else
-#define ISOGI_SH__ALL16 (short)-1
-#define ISOGI_SH__MASK8 char
-#define ISOGI_SH__MASKED_F8(p) (p)
-#endif
-#define ISOGI_SH__FMA_F16(a, b, c) ((isogi_sh__f16)__builtin_ia32_vfmaddps512_mask(a, b, c, ISOGI_SH__ALL16, 4))
-#define ISOGI_SH__FMA_D8(a, b, c) ((isogi_sh__d8)__builtin_ia32_vfmaddpd512_mask(a, b, c, ISOGI_SH__ALL8, 4))
-
-/* Vectors of several rows that stand one after the other in memory. gcc 12 would shuffle where an insertion costs a third. */
-#if defined(__clang__)
-#define ISOGI_SH__JOIN_F8(a, b) __builtin_shufflevector(a, b, 0, 1, 2, 3, 4, 5, 6, 7)
-#define ISOGI_SH__JOIN_D4(a, b) __builtin_shufflevector(a, b, 0, 1, 2, 3)
-#define ISOGI_SH__JOIN_F16(a, b, c, d) __builtin_shufflevector(ISOGI_SH__JOIN_F8(a, b), ISOGI_SH__JOIN_F8(c, d), 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15)
-#define ISOGI_SH__JOIN_D8(a, b, c, d) __builtin_shufflevector(ISOGI_SH__JOIN_D4(a, b), ISOGI_SH__JOIN_D4(c, d), 0, 1, 2, 3, 4, 5, 6, 7)
-#else
-#define ISOGI_SH__JOIN_F8(a, b) ((isogi_sh__f8)__builtin_ia32_vinsertf128_ps256(__builtin_ia32_ps256_ps(a), b, 1))
-#define ISOGI_SH__JOIN_D4(a, b) ((isogi_sh__d4)__builtin_ia32_vinsertf128_pd256(__builtin_ia32_pd256_pd(a), b, 1))
-#define ISOGI_SH__PUT_F16(v, a, k) __builtin_ia32_insertf32x4_mask(v, a, k, v, 0xffff)
-#define ISOGI_SH__PUT_D8(v, a, k) __builtin_ia32_insertf64x2_512_mask(v, a, k, v, ISOGI_SH__ALL8)
-#define ISOGI_SH__JOIN_F16(a, b, c, d)                                                                                        \
-    ISOGI_SH__PUT_F16(ISOGI_SH__PUT_F16(ISOGI_SH__PUT_F16(__builtin_ia32_ps512_ps(a), b, 1), c, 2), d, 3)
-#define ISOGI_SH__JOIN_D8(a, b, c, d)                                                                                         \
-    ISOGI_SH__PUT_D8(ISOGI_SH__PUT_D8(ISOGI_SH__PUT_D8(__builtin_ia32_pd512_pd(a), b, 1), c, 2), d, 3)
-#endif
-#define ISOGI_SH__ROW_F4(i) (*(const isogi_sh__f4 *)(in + pitch * (size_t)(i)))
-#define ISOGI_SH__ROW_D2(i) (*(const isogi_sh__d2 *)(in + pitch * (size_t)(i)))
-
-/* y[4][n] = in[n][pitch]: 4 x 4 transposed in each quarter of a vector, whose quarters are rows 4 apart. n is a square, 9 or more: what
-   16 and 8 rows at a time leave over is 4, 1 or none. The plain loop is for them. */
-#define ISOGI_SH__LOW_F8(a, b) __builtin_shufflevector(a, b, 0, 8, 1, 9, 4, 12, 5, 13)
-#define ISOGI_SH__HIGH_F8(a, b) __builtin_shufflevector(a, b, 2, 10, 3, 11, 6, 14, 7, 15)
-#define ISOGI_SH__EVEN_F8(a, b) __builtin_shufflevector(a, b, 0, 1, 8, 9, 4, 5, 12, 13)
-#define ISOGI_SH__ODD_F8(a, b) __builtin_shufflevector(a, b, 2, 3, 10, 11, 6, 7, 14, 15)
-#define ISOGI_SH__LOW_F16(a, b) __builtin_shufflevector(a, b, 0, 16, 1, 17, 4, 20, 5, 21, 8, 24, 9, 25, 12, 28, 13, 29)
-#define ISOGI_SH__HIGH_F16(a, b) __builtin_shufflevector(a, b, 2, 18, 3, 19, 6, 22, 7, 23, 10, 26, 11, 27, 14, 30, 15, 31)
-#define ISOGI_SH__EVEN_F16(a, b) __builtin_shufflevector(a, b, 0, 1, 16, 17, 4, 5, 20, 21, 8, 9, 24, 25, 12, 13, 28, 29)
-#define ISOGI_SH__ODD_F16(a, b) __builtin_shufflevector(a, b, 2, 3, 18, 19, 6, 7, 22, 23, 10, 11, 26, 27, 14, 15, 30, 31)
-#define ISOGI_SH__TURN(V, SUFFIX)                                                                                              \
-    {                                                                                                                          \
-        V e = ISOGI_SH__LOW_##SUFFIX(a, b), f = ISOGI_SH__HIGH_##SUFFIX(a, b), g = ISOGI_SH__LOW_##SUFFIX(c, d), h = ISOGI_SH__HIGH_##SUFFIX(c, d); \
-        *(V *)(y + i) = ISOGI_SH__EVEN_##SUFFIX(e, g);                                                                         \
-        *(V *)(y + i + n) = ISOGI_SH__ODD_##SUFFIX(e, g);                                                                      \
-        *(V *)(y + i + 2 * n) = ISOGI_SH__EVEN_##SUFFIX(f, h);                                                                 \
-        *(V *)(y + i + 3 * n) = ISOGI_SH__ODD_##SUFFIX(f, h);                                                                  \
-    }
-#define ISOGI_SH__ROWS_F8(j) ISOGI_SH__JOIN_F8(ISOGI_SH__ROW_F4(j), ISOGI_SH__ROW_F4((j) + 4))
-#define ISOGI_SH__ROWS_F16(j) ISOGI_SH__JOIN_F16(ISOGI_SH__ROW_F4(j), ISOGI_SH__ROW_F4((j) + 4), ISOGI_SH__ROW_F4((j) + 8), ISOGI_SH__ROW_F4((j) + 12))
-ISOGI_SH__AVX2 ISOGI_SH__INLINE void isogi_sh__eval_f8_turn(float *y, size_t n, const float *in, size_t pitch, size_t i) {
-    size_t k;
-    for (; i + 8 <= n; i += 8) {
-        isogi_sh__f8 a = ISOGI_SH__ROWS_F8(i), b = ISOGI_SH__ROWS_F8(i + 1), c = ISOGI_SH__ROWS_F8(i + 2), d = ISOGI_SH__ROWS_F8(i + 3);
-        ISOGI_SH__TURN(isogi_sh__f8, F8)
-    }
-    for (; i < n; i++)
-        for (k = 0; k < 4; k++) y[n * k + i] = in[pitch * i + k];
-}
-/* out[k * stride + i] = in[i * pitch + k] for an 8 x 8 tile */
-ISOGI_SH__AVX2 ISOGI_SH__INLINE void isogi_sh__transpose_f8(float *y, size_t n, const float *in, size_t pitch) {
-    size_t half, i = 0;
-    for (half = 0; half < 2; half++, y += 4 * n, in += 4) {
-        isogi_sh__f8 a = ISOGI_SH__ROWS_F8(0), b = ISOGI_SH__ROWS_F8(1), c = ISOGI_SH__ROWS_F8(2), d = ISOGI_SH__ROWS_F8(3);
-        ISOGI_SH__TURN(isogi_sh__f8, F8)
-    }
-}
-
-ISOGI_SH__AVX512 ISOGI_SH__INLINE void isogi_sh__eval_f16_turn(float *y, size_t n, const float *in, size_t pitch, size_t i) {
-    for (; i + 16 <= n; i += 16) {
-        isogi_sh__f16 a = ISOGI_SH__ROWS_F16(i), b = ISOGI_SH__ROWS_F16(i + 1), c = ISOGI_SH__ROWS_F16(i + 2), d = ISOGI_SH__ROWS_F16(i + 3);
-        ISOGI_SH__TURN(isogi_sh__f16, F16)
-    }
-    isogi_sh__eval_f8_turn(y, n, in, pitch, i);
-}
-
-/* y[2][n] = in[n][pitch] */
-#define ISOGI_SH__ROWS_D4(j) ISOGI_SH__JOIN_D4(ISOGI_SH__ROW_D2(j), ISOGI_SH__ROW_D2((j) + 2))
-#define ISOGI_SH__ROWS_D8(j) ISOGI_SH__JOIN_D8(ISOGI_SH__ROW_D2(j), ISOGI_SH__ROW_D2((j) + 2), ISOGI_SH__ROW_D2((j) + 4), ISOGI_SH__ROW_D2((j) + 6))
-ISOGI_SH__AVX2 ISOGI_SH__INLINE void isogi_sh__eval_d4_turn(double *y, size_t n, const double *in, size_t pitch, size_t i) {
-    for (; i + 4 <= n; i += 4) {
-        isogi_sh__d4 a = ISOGI_SH__ROWS_D4(i), b = ISOGI_SH__ROWS_D4(i + 1);
-        *(isogi_sh__d4 *)(y + i) = __builtin_shufflevector(a, b, 0, 4, 2, 6);
-        *(isogi_sh__d4 *)(y + i + n) = __builtin_shufflevector(a, b, 1, 5, 3, 7);
-    }
-    for (; i < n; i++) y[i] = in[pitch * i], y[n + i] = in[pitch * i + 1];
-}
-ISOGI_SH__AVX512 ISOGI_SH__INLINE void isogi_sh__eval_d8_turn(double *y, size_t n, const double *in, size_t pitch, size_t i) {
-    for (; i + 8 <= n; i += 8) {
-        isogi_sh__d8 a = ISOGI_SH__ROWS_D8(i), b = ISOGI_SH__ROWS_D8(i + 1);
-        *(isogi_sh__d8 *)(y + i) = __builtin_shufflevector(a, b, 0, 8, 2, 10, 4, 12, 6, 14);
-        *(isogi_sh__d8 *)(y + i + n) = __builtin_shufflevector(a, b, 1, 9, 3, 11, 5, 13, 7, 15);
-    }
-    isogi_sh__eval_d4_turn(y, n, in, pitch, i);
-}
-
-/* directions into coordinates */
-ISOGI_SH__AVX2 ISOGI_SH__INLINE void isogi_sh__eval_f8_split(isogi_sh__f8 *u, const float *from) {
-    isogi_sh__f8 a = *(const isogi_sh__f8 *)from, b = *(const isogi_sh__f8 *)(from + 8), c = *(const isogi_sh__f8 *)(from + 16);
-    isogi_sh__f8 x = __builtin_shufflevector(a, b, 0, 3, 6, 9, 12, 15, 0, 0), y = __builtin_shufflevector(a, b, 1, 4, 7, 10, 13, 0, 0, 0);
-    isogi_sh__f8 z = __builtin_shufflevector(a, b, 2, 5, 8, 11, 14, 0, 0, 0);
-    u[0] = __builtin_shufflevector(x, c, 0, 1, 2, 3, 4, 5, 10, 13);
-    u[1] = __builtin_shufflevector(y, c, 0, 1, 2, 3, 4, 8, 11, 14);
-    u[2] = __builtin_shufflevector(z, c, 0, 1, 2, 3, 4, 9, 12, 15);
-}
-
-ISOGI_SH__AVX2 ISOGI_SH__INLINE void isogi_sh__eval_d4_split(isogi_sh__d4 *u, const double *from) {
-    isogi_sh__d4 a = *(const isogi_sh__d4 *)from, b = *(const isogi_sh__d4 *)(from + 4), c = *(const isogi_sh__d4 *)(from + 8);
-    isogi_sh__d4 x = __builtin_shufflevector(a, b, 0, 3, 6, 0), y = __builtin_shufflevector(a, b, 1, 4, 7, 0);
-    isogi_sh__d4 z = __builtin_shufflevector(a, b, 2, 5, 0, 0);
-    u[0] = __builtin_shufflevector(x, c, 0, 1, 2, 5);
-    u[1] = __builtin_shufflevector(y, c, 0, 1, 2, 6);
-    u[2] = __builtin_shufflevector(z, c, 0, 1, 4, 7);
-}
-
-ISOGI_SH__AVX512 ISOGI_SH__INLINE void isogi_sh__eval_f16_split(isogi_sh__f16 *u, const float *from) {
-    isogi_sh__f16 a = *(const isogi_sh__f16 *)from, b = *(const isogi_sh__f16 *)(from + 16), c = *(const isogi_sh__f16 *)(from + 32);
-    isogi_sh__f16 x = __builtin_shufflevector(a, b, 0, 3, 6, 9, 12, 15, 18, 21, 24, 27, 30, 0, 0, 0, 0, 0);
-    isogi_sh__f16 y = __builtin_shufflevector(a, b, 1, 4, 7, 10, 13, 16, 19, 22, 25, 28, 31, 0, 0, 0, 0, 0);
-    isogi_sh__f16 z = __builtin_shufflevector(a, b, 2, 5, 8, 11, 14, 17, 20, 23, 26, 29, 0, 0, 0, 0, 0, 0);
-    u[0] = __builtin_shufflevector(x, c, 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 17, 20, 23, 26, 29);
-    u[1] = __builtin_shufflevector(y, c, 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 18, 21, 24, 27, 30);
-    u[2] = __builtin_shufflevector(z, c, 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 16, 19, 22, 25, 28, 31);
-}
-
-ISOGI_SH__AVX512 ISOGI_SH__INLINE void isogi_sh__eval_d8_split(isogi_sh__d8 *u, const double *from) {
-    isogi_sh__d8 a = *(const isogi_sh__d8 *)from, b = *(const isogi_sh__d8 *)(from + 8), c = *(const isogi_sh__d8 *)(from + 16);
-    isogi_sh__d8 x = __builtin_shufflevector(a, b, 0, 3, 6, 9, 12, 15, 0, 0), y = __builtin_shufflevector(a, b, 1, 4, 7, 10, 13, 0, 0, 0);
-    isogi_sh__d8 z = __builtin_shufflevector(a, b, 2, 5, 8, 11, 14, 0, 0, 0);
-    u[0] = __builtin_shufflevector(x, c, 0, 1, 2, 3, 4, 5, 10, 13);
-    u[1] = __builtin_shufflevector(y, c, 0, 1, 2, 3, 4, 8, 11, 14);
-    u[2] = __builtin_shufflevector(z, c, 0, 1, 2, 3, 4, 9, 12, 15);
-}
+typedef int32_t isogi_sh__i4 __attribute__((vector_size(16), aligned(4), may_alias));
 
 /* Defines NAME(out, stride, order, x, y, z, count): all functions at the first directions, that of index i at out + stride i; WIDTH at a
    time. It returns how many directions are done, and stops before a block with a squared length outside [1e-30, 1e30].
@@ -1108,11 +944,11 @@ ISOGI_SH__AVX512 ISOGI_SH__INLINE void isogi_sh__eval_d8_split(isogi_sh__d8 *u, 
    ulp of z near the poles is much for m < 3; t = 1 - |z| is exact there. Columns of the recursion go in pairs, so that two chains of
    operations hide each other's latency. Near the poles (x + i y)^m would become denormal numbers, which take a hundred times as
    long: what is too small to matter is cleared. */
-#define ISOGI_SH__DEFINE_EVAL(NAME, TARGET, T, V, I, WIDTH, MOST, FMA, LESS, TABLE, SQUARED_ERROR, NEAR_POLE, TINY, ROOT)      \
+#define ISOGI_SH__DEFINE_EVAL(NAME, TARGET, T, V, I, WIDTH, MOST, FMA, REST, LESS, TABLE, SQUARED_ERROR, NEAR_POLE, TINY, ROOT)      \
     /* u[0..2] becomes a unit vector, u[3] the rest of its z */                                                                \
     TARGET ISOGI_SH__INLINE int NAME##_unit(V *u) {                                                                            \
         V x = u[0], y = u[1], z = u[2], zero = {0}, one = zero + 1;                                                            \
-        V e = FMA(-x, x, FMA(-y, y, FMA(-z, z, one)));                                                                         \
+        V e = FMA(-x, x, FMA(-y, y, REST(one, z)));                                                                         \
         if (!LESS(e * e, zero + (T)SQUARED_ERROR)) {                                                                           \
             T lane[WIDTH];                                                                                                     \
             int k;                                                                                                             \
@@ -1124,7 +960,7 @@ ISOGI_SH__AVX512 ISOGI_SH__INLINE void isogi_sh__eval_d8_split(isogi_sh__d8 *u, 
             }                                                                                                                  \
             memcpy(&e, lane, sizeof lane);                                                                                     \
             x *= e, y *= e, z *= e;                                                                                            \
-            e = FMA(-x, x, FMA(-y, y, FMA(-z, z, one)));                                                                       \
+            e = FMA(-x, x, FMA(-y, y, REST(one, z)));                                                                       \
         }                                                                                                                      \
         e *= FMA(e, zero + (T)0.375, zero + (T)0.5);                                                                           \
         u[0] = FMA(x, e, x), u[1] = FMA(y, e, y), u[2] = FMA(z, e, z), u[3] = FMA(z, e, z - u[2]);                             \
@@ -1263,15 +1099,228 @@ ISOGI_SH__AVX512 ISOGI_SH__INLINE void isogi_sh__eval_d8_split(isogi_sh__d8 *u, 
         return i;                                                                                                              \
     }
 
+#define ISOGI_SH__DEFINE_F32(NAME, TARGET, V, I, WIDTH, MOST, SUFFIX) \
+    ISOGI_SH__DEFINE_EVAL(NAME, TARGET, float, V, I, WIDTH, MOST, ISOGI_SH__FMA_##SUFFIX, ISOGI_SH__REST_##SUFFIX, \
+                          ISOGI_SH__LESS_##SUFFIX, isogi_sh__table_f32, 1e-6, 1e-3, 1e-19, sqrtf)
+
+/* y[k][i] = row i + .. of column k, for 4 rows (or vectors of 4 x 4 tiles) a, b, c, d */
+#define ISOGI_SH__TURN(V, SUFFIX)                                                                                              \
+    {                                                                                                                          \
+        V e = ISOGI_SH__LOW_##SUFFIX(a, b), f = ISOGI_SH__HIGH_##SUFFIX(a, b), g = ISOGI_SH__LOW_##SUFFIX(c, d), h = ISOGI_SH__HIGH_##SUFFIX(c, d); \
+        *(V *)(y + i) = ISOGI_SH__EVEN_##SUFFIX(e, g);                                                                         \
+        *(V *)(y + i + n) = ISOGI_SH__ODD_##SUFFIX(e, g);                                                                      \
+        *(V *)(y + i + 2 * n) = ISOGI_SH__EVEN_##SUFFIX(f, h);                                                                 \
+        *(V *)(y + i + 3 * n) = ISOGI_SH__ODD_##SUFFIX(f, h);                                                                  \
+    }
+#define ISOGI_SH__LOW_F4(a, b) __builtin_shufflevector(a, b, 0, 4, 1, 5)
+#define ISOGI_SH__HIGH_F4(a, b) __builtin_shufflevector(a, b, 2, 6, 3, 7)
+#define ISOGI_SH__EVEN_F4(a, b) __builtin_shufflevector(a, b, 0, 1, 4, 5)
+#define ISOGI_SH__ODD_F4(a, b) __builtin_shufflevector(a, b, 2, 3, 6, 7)
+#define ISOGI_SH__ROW_F4(i) (*(const isogi_sh__f4 *)(in + pitch * (size_t)(i)))
+
+/* y[4][n] = in[n][pitch] from row i on */
+ISOGI_SH__INLINE void isogi_sh__eval_f4_turn(float *y, size_t n, const float *in, size_t pitch, size_t i) {
+    size_t k;
+    for (; i + 4 <= n; i += 4) {
+        isogi_sh__f4 a = ISOGI_SH__ROW_F4(i), b = ISOGI_SH__ROW_F4(i + 1), c = ISOGI_SH__ROW_F4(i + 2), d = ISOGI_SH__ROW_F4(i + 3);
+        ISOGI_SH__TURN(isogi_sh__f4, F4)
+    }
+    for (; i < n; i++)
+        for (k = 0; k < 4; k++) y[n * k + i] = in[pitch * i + k];
+}
+
+ISOGI_SH__INLINE void isogi_sh__eval_f4_split(isogi_sh__f4 *u, const float *from) {
+    isogi_sh__f4 a = *(const isogi_sh__f4 *)from, b = *(const isogi_sh__f4 *)(from + 4), c = *(const isogi_sh__f4 *)(from + 8);
+    isogi_sh__f4 x = __builtin_shufflevector(a, b, 0, 3, 6, 6), y = __builtin_shufflevector(a, b, 1, 4, 7, 7), z = __builtin_shufflevector(a, b, 2, 5, 5, 5);
+    u[0] = __builtin_shufflevector(x, c, 0, 1, 2, 5), u[1] = __builtin_shufflevector(y, c, 0, 1, 2, 6), u[2] = __builtin_shufflevector(z, c, 0, 1, 4, 7);
+}
+
+ISOGI_SH__INLINE int isogi_sh__less_f4(isogi_sh__f4 a, isogi_sh__f4 b) {
+    isogi_sh__i4 less = (isogi_sh__i4)(a < b);
+    int64_t word[2];
+    memcpy(word, &less, sizeof word);
+    return (word[0] & word[1]) == -1;
+}
+#define ISOGI_SH__LESS_F4(a, b) isogi_sh__less_f4(a, b)
+#define ISOGI_SH__FMA_F4(a, b, c) ((a) * (b) + (c))
+#define ISOGI_SH__REST_F4(one, z) (((one) - (z)) * ((one) + (z))) /* 1 - z^2, exact near the poles without fused operations too */
+ISOGI_SH__DEFINE_F32(isogi_sh__eval_f4, , isogi_sh__f4, isogi_sh__i4, 4, ISOGI_SH__TABLE_ORDER, F4)
+#endif
+
+#ifdef ISOGI_SH__SIMD
+#define ISOGI_SH__WIDE_ORDER 12
+
+/* isogi_sh__level() > 0 */
+ISOGI_SH__INLINE int isogi_sh__avx2(void) {
+#ifdef ISOGI_SH_LEVEL
+    if (!(ISOGI_SH_LEVEL)) return 0;
+#endif
+    return __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma");
+}
+
+/* 0 what the compiler may use anyway, 1 AVX2 and FMA, 2 AVX-512 */
+static int isogi_sh__level(void) {
+    int level = 0;
+    if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma")) level = 1;
+    if (level && __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512vl") && __builtin_cpu_supports("avx512dq")) level = 2;
+#ifdef ISOGI_SH_LEVEL
+    if (level > (ISOGI_SH_LEVEL)) level = (ISOGI_SH_LEVEL);
+#endif
+    return level;
+}
+
+typedef float isogi_sh__f8 __attribute__((vector_size(32), aligned(4), may_alias));
+typedef float isogi_sh__f16 __attribute__((vector_size(64), aligned(4), may_alias));
+typedef float isogi_sh__plain_f8 __attribute__((vector_size(32)));
+typedef double isogi_sh__d4 __attribute__((vector_size(32), aligned(8), may_alias));
+typedef double isogi_sh__d8 __attribute__((vector_size(64), aligned(8), may_alias));
+typedef int32_t isogi_sh__i8 __attribute__((vector_size(32), aligned(4), may_alias));
+typedef int32_t isogi_sh__i16 __attribute__((vector_size(64), aligned(4), may_alias));
+typedef int64_t isogi_sh__l4 __attribute__((vector_size(32), aligned(8), may_alias));
+typedef int64_t isogi_sh__l8 __attribute__((vector_size(64), aligned(8), may_alias));
+typedef double isogi_sh__d2 __attribute__((vector_size(16), aligned(8), may_alias));
+
+#define ISOGI_SH__AVX2 __attribute__((target("avx2,fma")))
+#define ISOGI_SH__AVX512 __attribute__((target("avx2,fma,avx512f,avx512vl,avx512dq")))
+#define ISOGI_SH__FMA_F8(a, b, c) ((isogi_sh__f8)__builtin_ia32_vfmaddps256(a, b, c))
+#define ISOGI_SH__FMA_D4(a, b, c) ((isogi_sh__d4)__builtin_ia32_vfmaddpd256(a, b, c))
+#define ISOGI_SH__ALL8 (unsigned char)0xff
+#if defined(__clang__)
+#define ISOGI_SH__ALL16 (unsigned short)0xffff
+#define ISOGI_SH__MASK8 unsigned char
+#define ISOGI_SH__MASKED_F8(p) ((isogi_sh__plain_f8 *)(void *)(p)) /* what a masked store wants */
+#else
+#define ISOGI_SH__ALL16 (short)-1
+#define ISOGI_SH__MASK8 char
+#define ISOGI_SH__MASKED_F8(p) (p)
+#endif
+#define ISOGI_SH__FMA_F16(a, b, c) ((isogi_sh__f16)__builtin_ia32_vfmaddps512_mask(a, b, c, ISOGI_SH__ALL16, 4))
+#define ISOGI_SH__FMA_D8(a, b, c) ((isogi_sh__d8)__builtin_ia32_vfmaddpd512_mask(a, b, c, ISOGI_SH__ALL8, 4))
+
+/* Vectors of several rows that stand one after the other in memory. gcc 12 would shuffle where an insertion costs a third. */
+#if defined(__clang__)
+#define ISOGI_SH__JOIN_F8(a, b) __builtin_shufflevector(a, b, 0, 1, 2, 3, 4, 5, 6, 7)
+#define ISOGI_SH__JOIN_D4(a, b) __builtin_shufflevector(a, b, 0, 1, 2, 3)
+#define ISOGI_SH__JOIN_F16(a, b, c, d) __builtin_shufflevector(ISOGI_SH__JOIN_F8(a, b), ISOGI_SH__JOIN_F8(c, d), 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15)
+#define ISOGI_SH__JOIN_D8(a, b, c, d) __builtin_shufflevector(ISOGI_SH__JOIN_D4(a, b), ISOGI_SH__JOIN_D4(c, d), 0, 1, 2, 3, 4, 5, 6, 7)
+#else
+#define ISOGI_SH__JOIN_F8(a, b) ((isogi_sh__f8)__builtin_ia32_vinsertf128_ps256(__builtin_ia32_ps256_ps(a), b, 1))
+#define ISOGI_SH__JOIN_D4(a, b) ((isogi_sh__d4)__builtin_ia32_vinsertf128_pd256(__builtin_ia32_pd256_pd(a), b, 1))
+#define ISOGI_SH__PUT_F16(v, a, k) __builtin_ia32_insertf32x4_mask(v, a, k, v, 0xffff)
+#define ISOGI_SH__PUT_D8(v, a, k) __builtin_ia32_insertf64x2_512_mask(v, a, k, v, ISOGI_SH__ALL8)
+#define ISOGI_SH__JOIN_F16(a, b, c, d)                                                                                        \
+    ISOGI_SH__PUT_F16(ISOGI_SH__PUT_F16(ISOGI_SH__PUT_F16(__builtin_ia32_ps512_ps(a), b, 1), c, 2), d, 3)
+#define ISOGI_SH__JOIN_D8(a, b, c, d)                                                                                         \
+    ISOGI_SH__PUT_D8(ISOGI_SH__PUT_D8(ISOGI_SH__PUT_D8(__builtin_ia32_pd512_pd(a), b, 1), c, 2), d, 3)
+#endif
+#define ISOGI_SH__ROW_D2(i) (*(const isogi_sh__d2 *)(in + pitch * (size_t)(i)))
+
+/* y[4][n] = in[n][pitch]: 4 x 4 transposed in each quarter of a vector, whose quarters are rows 4 apart. n is a square, 9 or more: what
+   16 and 8 rows at a time leave over is 4, 1 or none. The plain loop is for them. */
+#define ISOGI_SH__LOW_F8(a, b) __builtin_shufflevector(a, b, 0, 8, 1, 9, 4, 12, 5, 13)
+#define ISOGI_SH__HIGH_F8(a, b) __builtin_shufflevector(a, b, 2, 10, 3, 11, 6, 14, 7, 15)
+#define ISOGI_SH__EVEN_F8(a, b) __builtin_shufflevector(a, b, 0, 1, 8, 9, 4, 5, 12, 13)
+#define ISOGI_SH__ODD_F8(a, b) __builtin_shufflevector(a, b, 2, 3, 10, 11, 6, 7, 14, 15)
+#define ISOGI_SH__LOW_F16(a, b) __builtin_shufflevector(a, b, 0, 16, 1, 17, 4, 20, 5, 21, 8, 24, 9, 25, 12, 28, 13, 29)
+#define ISOGI_SH__HIGH_F16(a, b) __builtin_shufflevector(a, b, 2, 18, 3, 19, 6, 22, 7, 23, 10, 26, 11, 27, 14, 30, 15, 31)
+#define ISOGI_SH__EVEN_F16(a, b) __builtin_shufflevector(a, b, 0, 1, 16, 17, 4, 5, 20, 21, 8, 9, 24, 25, 12, 13, 28, 29)
+#define ISOGI_SH__ODD_F16(a, b) __builtin_shufflevector(a, b, 2, 3, 18, 19, 6, 7, 22, 23, 10, 11, 26, 27, 14, 15, 30, 31)
+#define ISOGI_SH__ROWS_F8(j) ISOGI_SH__JOIN_F8(ISOGI_SH__ROW_F4(j), ISOGI_SH__ROW_F4((j) + 4))
+#define ISOGI_SH__ROWS_F16(j) ISOGI_SH__JOIN_F16(ISOGI_SH__ROW_F4(j), ISOGI_SH__ROW_F4((j) + 4), ISOGI_SH__ROW_F4((j) + 8), ISOGI_SH__ROW_F4((j) + 12))
+ISOGI_SH__AVX2 ISOGI_SH__INLINE void isogi_sh__eval_f8_turn(float *y, size_t n, const float *in, size_t pitch, size_t i) {
+    size_t k;
+    for (; i + 8 <= n; i += 8) {
+        isogi_sh__f8 a = ISOGI_SH__ROWS_F8(i), b = ISOGI_SH__ROWS_F8(i + 1), c = ISOGI_SH__ROWS_F8(i + 2), d = ISOGI_SH__ROWS_F8(i + 3);
+        ISOGI_SH__TURN(isogi_sh__f8, F8)
+    }
+    for (; i < n; i++)
+        for (k = 0; k < 4; k++) y[n * k + i] = in[pitch * i + k];
+}
+/* out[k * stride + i] = in[i * pitch + k] for an 8 x 8 tile */
+ISOGI_SH__AVX2 ISOGI_SH__INLINE void isogi_sh__transpose_f8(float *y, size_t n, const float *in, size_t pitch) {
+    size_t half, i = 0;
+    for (half = 0; half < 2; half++, y += 4 * n, in += 4) {
+        isogi_sh__f8 a = ISOGI_SH__ROWS_F8(0), b = ISOGI_SH__ROWS_F8(1), c = ISOGI_SH__ROWS_F8(2), d = ISOGI_SH__ROWS_F8(3);
+        ISOGI_SH__TURN(isogi_sh__f8, F8)
+    }
+}
+
+ISOGI_SH__AVX512 ISOGI_SH__INLINE void isogi_sh__eval_f16_turn(float *y, size_t n, const float *in, size_t pitch, size_t i) {
+    for (; i + 16 <= n; i += 16) {
+        isogi_sh__f16 a = ISOGI_SH__ROWS_F16(i), b = ISOGI_SH__ROWS_F16(i + 1), c = ISOGI_SH__ROWS_F16(i + 2), d = ISOGI_SH__ROWS_F16(i + 3);
+        ISOGI_SH__TURN(isogi_sh__f16, F16)
+    }
+    isogi_sh__eval_f8_turn(y, n, in, pitch, i);
+}
+
+/* y[2][n] = in[n][pitch] */
+#define ISOGI_SH__ROWS_D4(j) ISOGI_SH__JOIN_D4(ISOGI_SH__ROW_D2(j), ISOGI_SH__ROW_D2((j) + 2))
+#define ISOGI_SH__ROWS_D8(j) ISOGI_SH__JOIN_D8(ISOGI_SH__ROW_D2(j), ISOGI_SH__ROW_D2((j) + 2), ISOGI_SH__ROW_D2((j) + 4), ISOGI_SH__ROW_D2((j) + 6))
+ISOGI_SH__AVX2 ISOGI_SH__INLINE void isogi_sh__eval_d4_turn(double *y, size_t n, const double *in, size_t pitch, size_t i) {
+    for (; i + 4 <= n; i += 4) {
+        isogi_sh__d4 a = ISOGI_SH__ROWS_D4(i), b = ISOGI_SH__ROWS_D4(i + 1);
+        *(isogi_sh__d4 *)(y + i) = __builtin_shufflevector(a, b, 0, 4, 2, 6);
+        *(isogi_sh__d4 *)(y + i + n) = __builtin_shufflevector(a, b, 1, 5, 3, 7);
+    }
+    for (; i < n; i++) y[i] = in[pitch * i], y[n + i] = in[pitch * i + 1];
+}
+ISOGI_SH__AVX512 ISOGI_SH__INLINE void isogi_sh__eval_d8_turn(double *y, size_t n, const double *in, size_t pitch, size_t i) {
+    for (; i + 8 <= n; i += 8) {
+        isogi_sh__d8 a = ISOGI_SH__ROWS_D8(i), b = ISOGI_SH__ROWS_D8(i + 1);
+        *(isogi_sh__d8 *)(y + i) = __builtin_shufflevector(a, b, 0, 8, 2, 10, 4, 12, 6, 14);
+        *(isogi_sh__d8 *)(y + i + n) = __builtin_shufflevector(a, b, 1, 9, 3, 11, 5, 13, 7, 15);
+    }
+    isogi_sh__eval_d4_turn(y, n, in, pitch, i);
+}
+
+/* directions into coordinates */
+ISOGI_SH__AVX2 ISOGI_SH__INLINE void isogi_sh__eval_f8_split(isogi_sh__f8 *u, const float *from) {
+    isogi_sh__f8 a = *(const isogi_sh__f8 *)from, b = *(const isogi_sh__f8 *)(from + 8), c = *(const isogi_sh__f8 *)(from + 16);
+    isogi_sh__f8 x = __builtin_shufflevector(a, b, 0, 3, 6, 9, 12, 15, 0, 0), y = __builtin_shufflevector(a, b, 1, 4, 7, 10, 13, 0, 0, 0);
+    isogi_sh__f8 z = __builtin_shufflevector(a, b, 2, 5, 8, 11, 14, 0, 0, 0);
+    u[0] = __builtin_shufflevector(x, c, 0, 1, 2, 3, 4, 5, 10, 13);
+    u[1] = __builtin_shufflevector(y, c, 0, 1, 2, 3, 4, 8, 11, 14);
+    u[2] = __builtin_shufflevector(z, c, 0, 1, 2, 3, 4, 9, 12, 15);
+}
+
+ISOGI_SH__AVX2 ISOGI_SH__INLINE void isogi_sh__eval_d4_split(isogi_sh__d4 *u, const double *from) {
+    isogi_sh__d4 a = *(const isogi_sh__d4 *)from, b = *(const isogi_sh__d4 *)(from + 4), c = *(const isogi_sh__d4 *)(from + 8);
+    isogi_sh__d4 x = __builtin_shufflevector(a, b, 0, 3, 6, 0), y = __builtin_shufflevector(a, b, 1, 4, 7, 0);
+    isogi_sh__d4 z = __builtin_shufflevector(a, b, 2, 5, 0, 0);
+    u[0] = __builtin_shufflevector(x, c, 0, 1, 2, 5);
+    u[1] = __builtin_shufflevector(y, c, 0, 1, 2, 6);
+    u[2] = __builtin_shufflevector(z, c, 0, 1, 4, 7);
+}
+
+ISOGI_SH__AVX512 ISOGI_SH__INLINE void isogi_sh__eval_f16_split(isogi_sh__f16 *u, const float *from) {
+    isogi_sh__f16 a = *(const isogi_sh__f16 *)from, b = *(const isogi_sh__f16 *)(from + 16), c = *(const isogi_sh__f16 *)(from + 32);
+    isogi_sh__f16 x = __builtin_shufflevector(a, b, 0, 3, 6, 9, 12, 15, 18, 21, 24, 27, 30, 0, 0, 0, 0, 0);
+    isogi_sh__f16 y = __builtin_shufflevector(a, b, 1, 4, 7, 10, 13, 16, 19, 22, 25, 28, 31, 0, 0, 0, 0, 0);
+    isogi_sh__f16 z = __builtin_shufflevector(a, b, 2, 5, 8, 11, 14, 17, 20, 23, 26, 29, 0, 0, 0, 0, 0, 0);
+    u[0] = __builtin_shufflevector(x, c, 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 17, 20, 23, 26, 29);
+    u[1] = __builtin_shufflevector(y, c, 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 18, 21, 24, 27, 30);
+    u[2] = __builtin_shufflevector(z, c, 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 16, 19, 22, 25, 28, 31);
+}
+
+ISOGI_SH__AVX512 ISOGI_SH__INLINE void isogi_sh__eval_d8_split(isogi_sh__d8 *u, const double *from) {
+    isogi_sh__d8 a = *(const isogi_sh__d8 *)from, b = *(const isogi_sh__d8 *)(from + 8), c = *(const isogi_sh__d8 *)(from + 16);
+    isogi_sh__d8 x = __builtin_shufflevector(a, b, 0, 3, 6, 9, 12, 15, 0, 0), y = __builtin_shufflevector(a, b, 1, 4, 7, 10, 13, 0, 0, 0);
+    isogi_sh__d8 z = __builtin_shufflevector(a, b, 2, 5, 8, 11, 14, 0, 0, 0);
+    u[0] = __builtin_shufflevector(x, c, 0, 1, 2, 3, 4, 5, 10, 13);
+    u[1] = __builtin_shufflevector(y, c, 0, 1, 2, 3, 4, 8, 11, 14);
+    u[2] = __builtin_shufflevector(z, c, 0, 1, 2, 3, 4, 9, 12, 15);
+}
+
+#define ISOGI_SH__REST_F8(one, z) ISOGI_SH__FMA_F8(-(z), z, one)
+#define ISOGI_SH__REST_D4(one, z) ISOGI_SH__FMA_D4(-(z), z, one)
+#define ISOGI_SH__REST_F16(one, z) ISOGI_SH__FMA_F16(-(z), z, one)
+#define ISOGI_SH__REST_D8(one, z) ISOGI_SH__FMA_D8(-(z), z, one)
 #define ISOGI_SH__LESS_F8(a, b) (__builtin_ia32_movmskps256((isogi_sh__f8)((a) < (b))) == 0xff)
 #define ISOGI_SH__LESS_D4(a, b) (__builtin_ia32_movmskpd256((isogi_sh__d4)((a) < (b))) == 0xf)
 #define ISOGI_SH__LESS_F16(a, b) ((__builtin_ia32_cmpps512_mask(a, b, 17, 0xffff, 4) & 0xffff) == 0xffff)
 #define ISOGI_SH__LESS_D8(a, b) ((__builtin_ia32_cmppd512_mask(a, b, 17, 0xff, 4) & 0xff) == 0xff)
-#define ISOGI_SH__DEFINE_F32(NAME, TARGET, V, I, WIDTH, MOST, SUFFIX) \
-    ISOGI_SH__DEFINE_EVAL(NAME, TARGET, float, V, I, WIDTH, MOST, ISOGI_SH__FMA_##SUFFIX, \
-                          ISOGI_SH__LESS_##SUFFIX, isogi_sh__table_f32, 1e-6, 1e-3, 1e-19, sqrtf)
 #define ISOGI_SH__DEFINE_F64(NAME, TARGET, V, I, WIDTH, MOST, SUFFIX) \
-    ISOGI_SH__DEFINE_EVAL(NAME, TARGET, double, V, I, WIDTH, MOST, ISOGI_SH__FMA_##SUFFIX, \
+    ISOGI_SH__DEFINE_EVAL(NAME, TARGET, double, V, I, WIDTH, MOST, ISOGI_SH__FMA_##SUFFIX, ISOGI_SH__REST_##SUFFIX, \
                           ISOGI_SH__LESS_##SUFFIX, isogi_sh__table_f64, 1e-12, 1e-25, 1e-200, sqrt)
 ISOGI_SH__DEFINE_F32(isogi_sh__eval_f8, ISOGI_SH__AVX2, isogi_sh__f8, isogi_sh__i8, 8, ISOGI_SH__TABLE_ORDER, F8)
 ISOGI_SH__DEFINE_F64(isogi_sh__eval_d4, ISOGI_SH__AVX2, isogi_sh__d4, isogi_sh__l4, 4, ISOGI_SH__TABLE_ORDER, D4)
@@ -1300,7 +1349,54 @@ ISOGI_SH__AVX2 static int isogi_sh__sum_rows_f32(float *value, const float *c, i
     }
     return 1;
 }
-#endif /* vector units */
+#endif
+
+#ifdef ISOGI_SH__VECTORS
+/* Batches at the best level: how many of the first directions are done. */
+static size_t isogi_sh__eval_rows_f32(float *y, int order, const float (*direction)[3], size_t count) {
+    size_t done = 0, n = ISOGI_SH_COUNT(order);
+    int level = 0;
+    if (order < 3 || order > ISOGI_SH__TABLE_ORDER || count < 4) return 0;
+#ifdef ISOGI_SH__SIMD
+    level = isogi_sh__level();
+    if (level > 1 && order <= ISOGI_SH__WIDE_ORDER) done = isogi_sh__eval_f16_rows(y, order, direction, count);
+    if (level) done += isogi_sh__eval_f8_rows(y + n * done, order, direction + done, count - done);
+#endif
+    if (!level) done = isogi_sh__eval_f4_rows(y + n * done, order, direction + done, count);
+    return done;
+}
+
+/* The same for structures of arrays, whose functions stand `stride` apart. */
+static size_t isogi_sh__eval_columns_f32(float *out, size_t stride, int order, const float *x, const float *y, const float *z, size_t count) {
+    size_t done = 0;
+    int level = 0;
+    if (order < 3 || order > ISOGI_SH__TABLE_ORDER || count < 4) return 0;
+#ifdef ISOGI_SH__SIMD
+    level = isogi_sh__level();
+    if (level > 1) done = isogi_sh__eval_f16(out, stride, order, x, y, z, count);
+    if (level) done += isogi_sh__eval_f8(out + done, stride, order, x + done, y + done, z + done, count - done);
+#endif
+    if (!level) done = isogi_sh__eval_f4(out + done, stride, order, x, y, z, count);
+    return done;
+}
+#endif
+#ifdef ISOGI_SH__SIMD
+static size_t isogi_sh__eval_rows_f64(double *y, int order, const double (*direction)[3], size_t count) {
+    size_t done = 0, n = ISOGI_SH_COUNT(order);
+    int level = order >= 3 && order <= ISOGI_SH__TABLE_ORDER && count >= 4 ? isogi_sh__level() : 0;
+    if (level > 1 && order <= ISOGI_SH__WIDE_ORDER) done = isogi_sh__eval_d8_rows(y, order, direction, count);
+    if (level) done += isogi_sh__eval_d4_rows(y + n * done, order, direction + done, count - done);
+    return done;
+}
+
+static size_t isogi_sh__eval_columns_f64(double *out, size_t stride, int order, const double *x, const double *y, const double *z, size_t count) {
+    size_t done = 0;
+    int level = order >= 3 && order <= ISOGI_SH__TABLE_ORDER && count >= 4 ? isogi_sh__level() : 0;
+    if (level > 1) done = isogi_sh__eval_d8(out, stride, order, x, y, z, count);
+    if (level) done += isogi_sh__eval_d4(out + done, stride, order, x + done, y + done, z + done, count - done);
+    return done;
+}
+#endif
 
 /* count * order^2 elements of `size` bytes are addressable */
 static int isogi_sh__fits(size_t count, int order, size_t size) { return count <= (size_t)-1 / 2 / size / ISOGI_SH_COUNT(order); }
@@ -1308,9 +1404,6 @@ static int isogi_sh__fits(size_t count, int order, size_t size) { return count <
 ISOGI_API isogi_result isogi_sh_eval(float *y, int order, const float (*direction)[3], size_t count) {
     isogi_sh__output out = {NULL, 0, 1, 0};
     size_t i = 0;
-#ifdef ISOGI_SH__SIMD
-    int level = order >= 3 && order <= ISOGI_SH__TABLE_ORDER && count >= 8 ? isogi_sh__level() : 0;
-#endif
     if (!isogi_sh__order_ok(order) || (count && (!y || !direction))) return ISOGI_INVALID;
     if (!isogi_sh__fits(count, order, sizeof *y)) return ISOGI_TOO_LARGE;
     out.data = y;
@@ -1318,9 +1411,8 @@ ISOGI_API isogi_result isogi_sh_eval(float *y, int order, const float (*directio
     while (i < count) {
         isogi_sh__unit u[ISOGI_SH__LANES];
         int k, lanes;
-#ifdef ISOGI_SH__SIMD
-        if (level > 1 && order <= ISOGI_SH__WIDE_ORDER) i += isogi_sh__eval_f16_rows(y + i * out.direction_stride, order, direction + i, count - i);
-        if (level) i += isogi_sh__eval_f8_rows(y + i * out.direction_stride, order, direction + i, count - i);
+#ifdef ISOGI_SH__VECTORS
+        i += isogi_sh__eval_rows_f32(y + i * out.direction_stride, order, direction + i, count - i);
 #endif
         lanes = count - i < ISOGI_SH__LANES ? (int)(count - i) : ISOGI_SH__LANES;
         for (k = 0; k < lanes; k++) {
@@ -1336,9 +1428,6 @@ ISOGI_API isogi_result isogi_sh_eval(float *y, int order, const float (*directio
 ISOGI_API isogi_result isogi_sh_eval_f64(double *y, int order, const double (*direction)[3], size_t count) {
     isogi_sh__output out = {NULL, 0, 1, 1};
     size_t i = 0;
-#ifdef ISOGI_SH__SIMD
-    int level = order >= 3 && order <= ISOGI_SH__TABLE_ORDER && count >= 4 ? isogi_sh__level() : 0;
-#endif
     if (!isogi_sh__order_ok(order) || (count && (!y || !direction))) return ISOGI_INVALID;
     if (!isogi_sh__fits(count, order, sizeof *y)) return ISOGI_TOO_LARGE;
     out.data = y;
@@ -1347,8 +1436,7 @@ ISOGI_API isogi_result isogi_sh_eval_f64(double *y, int order, const double (*di
         isogi_sh__unit u[ISOGI_SH__LANES];
         int k, lanes;
 #ifdef ISOGI_SH__SIMD
-        if (level > 1 && order <= ISOGI_SH__WIDE_ORDER) i += isogi_sh__eval_d8_rows(y + i * out.direction_stride, order, direction + i, count - i);
-        if (level) i += isogi_sh__eval_d4_rows(y + i * out.direction_stride, order, direction + i, count - i);
+        i += isogi_sh__eval_rows_f64(y + i * out.direction_stride, order, direction + i, count - i);
 #endif
         lanes = count - i < ISOGI_SH__LANES ? (int)(count - i) : ISOGI_SH__LANES;
         for (k = 0; k < lanes; k++) {
@@ -1361,26 +1449,6 @@ ISOGI_API isogi_result isogi_sh_eval_f64(double *y, int order, const double (*di
     return ISOGI_OK;
 }
 
-#ifdef ISOGI_SH__SIMD
-/* how many of the first directions are done; their functions stand `stride` apart */
-static size_t isogi_sh__eval_soa_wide(void *basis, size_t stride, int is_double, int order, const void *x, const void *y, const void *z, size_t count) {
-    int level = isogi_sh__level();
-    size_t done = 0;
-    if (is_double) {
-        const double *dx = (const double *)x, *dy = (const double *)y, *dz = (const double *)z;
-        double *out = (double *)basis;
-        if (level > 1) done = isogi_sh__eval_d8(out, stride, order, dx, dy, dz, count);
-        if (level) done += isogi_sh__eval_d4(out + done, stride, order, dx + done, dy + done, dz + done, count - done);
-    } else {
-        const float *fx = (const float *)x, *fy = (const float *)y, *fz = (const float *)z;
-        float *out = (float *)basis;
-        if (level > 1) done = isogi_sh__eval_f16(out, stride, order, fx, fy, fz, count);
-        if (level) done += isogi_sh__eval_f8(out + done, stride, order, fx + done, fy + done, fz + done, count - done);
-    }
-    return done;
-}
-#endif
-
 static isogi_result isogi_sh__eval_soa(void *basis, int is_double, int order, const void *x, const void *y, const void *z, size_t count) {
     isogi_sh__output out = {NULL, 1, 0, 0};
     size_t i = 0, size = is_double ? sizeof(double) : sizeof(float);
@@ -1392,9 +1460,11 @@ static isogi_result isogi_sh__eval_soa(void *basis, int is_double, int order, co
     while (i < count) {
         isogi_sh__unit u[ISOGI_SH__LANES];
         int k, lanes;
+#ifdef ISOGI_SH__VECTORS
+        if (!is_double) i += isogi_sh__eval_columns_f32((float *)basis + i, count, order, (const float *)x + i, (const float *)y + i, (const float *)z + i, count - i);
+#endif
 #ifdef ISOGI_SH__SIMD
-        if (order >= 3 && order <= ISOGI_SH__TABLE_ORDER && count - i >= 4)
-            i += isogi_sh__eval_soa_wide((char *)basis + i * size, count, is_double, order, (const char *)x + i * size, (const char *)y + i * size, (const char *)z + i * size, count - i);
+        if (is_double) i += isogi_sh__eval_columns_f64((double *)basis + i, count, order, (const double *)x + i, (const double *)y + i, (const double *)z + i, count - i);
 #endif
         lanes = count - i < ISOGI_SH__LANES ? (int)(count - i) : ISOGI_SH__LANES;
         for (k = 0; k < lanes; k++) {
@@ -3174,9 +3244,9 @@ ISOGI_SH__AVX2 static void isogi_sh__image_add(double (*total)[12], isogi_sh__f8
     int j, k, l, m;
     for (k = 0; k < 9; k++) {
         isogi_sh__f8 a = sum[0][k], b = sum[1][k], c = sum[2][k];
-        part[k][0] = (isogi_sh__d4)__builtin_ia32_cvtps2pd256(__builtin_shufflevector(a, a, 0, 1, 2, 3) + __builtin_shufflevector(b, b, 4, 5, 6, 7));
-        part[k][1] = (isogi_sh__d4)__builtin_ia32_cvtps2pd256(__builtin_shufflevector(a, a, 4, 5, 6, 7) + __builtin_shufflevector(c, c, 0, 1, 2, 3));
-        part[k][2] = (isogi_sh__d4)__builtin_ia32_cvtps2pd256(__builtin_shufflevector(b, b, 0, 1, 2, 3) + __builtin_shufflevector(c, c, 4, 5, 6, 7));
+        part[k][0] = __builtin_convertvector(__builtin_shufflevector(a, a, 0, 1, 2, 3) + __builtin_shufflevector(b, b, 4, 5, 6, 7), isogi_sh__d4);
+        part[k][1] = __builtin_convertvector(__builtin_shufflevector(a, a, 4, 5, 6, 7) + __builtin_shufflevector(c, c, 0, 1, 2, 3), isogi_sh__d4);
+        part[k][2] = __builtin_convertvector(__builtin_shufflevector(b, b, 0, 1, 2, 3) + __builtin_shufflevector(c, c, 4, 5, 6, 7), isogi_sh__d4);
     }
     for (m = 0; m < 5; m++, power *= sine) {
         isogi_sh__column(q, 5, m, isogi_sh__next_diagonal(0, m), z, 0);
@@ -3803,6 +3873,18 @@ ISOGI_API isogi_result isogi_sh_fit_directional(float direction[3], float rgb[3]
 #undef ISOGI_SH__ROW_D2
 #undef ISOGI_SH__ROW_F4
 #undef ISOGI_SH__TURN
+#undef ISOGI_SH__EVEN_F4
+#undef ISOGI_SH__FMA_F4
+#undef ISOGI_SH__HIGH_F4
+#undef ISOGI_SH__LESS_F4
+#undef ISOGI_SH__LOW_F4
+#undef ISOGI_SH__ODD_F4
+#undef ISOGI_SH__VECTORS
+#undef ISOGI_SH__REST_F4
+#undef ISOGI_SH__REST_F8
+#undef ISOGI_SH__REST_D4
+#undef ISOGI_SH__REST_F16
+#undef ISOGI_SH__REST_D8
 #undef ISOGI_SH__UNROLL9
 #undef ISOGI_SH__APART
 #undef ISOGI_SH__INLINE

@@ -150,11 +150,12 @@ static void generate(FILE *out) {
     generate_table(out, "double", "isogi_sh__table_f64", v, count, 1);
     count = generate_turns(v);
     generate_table(out, "double", "isogi_sh__turn_f64", v, count, 1);
-    fprintf(out, "#ifdef ISOGI_SH__SIMD\n");
-    count = generate_wigner(v);
-    generate_table(out, "double", "isogi_sh__wigner_f64", v, count, 1);
+    fprintf(out, "#ifdef ISOGI_SH__VECTORS\n");
     count = generate_factors(v);
     generate_table(out, "float", "isogi_sh__table_f32", v, count, 0);
+    fprintf(out, "#endif\n#ifdef ISOGI_SH__SIMD\n");
+    count = generate_wigner(v);
+    generate_table(out, "double", "isogi_sh__wigner_f64", v, count, 1);
     count = generate_latitudes(v);
     generate_table(out, "float", "isogi_sh__latitudes_f32", v, count, 0);
     count = generate_quarter_turns(v);
