@@ -319,6 +319,44 @@ ISOGI_API isogi_result isogi_dvr_render(const isogi_dvr *dvr, const isogi_view *
                                         float (*premultiplied)[4], float *depth, isogi_counters *counters);
 ISOGI_API void isogi_dvr_counters(const isogi_dvr *dvr, isogi_counters *counters); /* adds what isogi_dvr_step did so far */
 
+/* ---- tetrahedral meshes ------------------------------------------------------------------------------------------------------ */
+
+/* Points, a value at each, and four points for each tetrahedron in any order: borrowed arrays that must outlive what is built. Between the
+   points of a tetrahedron the field is linear. Meshes may be non-convex, in several parts, and have gaps: a ray enters again. */
+typedef struct isogi_tet_mesh {
+    const float (*points)[3]; /* world; finite */
+    const float *values;      /* finite */
+    size_t point_count;
+    const uint32_t (*tets)[4]; /* below point_count */
+    size_t tet_count;          /* up to 2^29 */
+} isogi_tet_mesh;
+
+/* What was found while the mesh was built: nothing of it is an error. */
+typedef struct isogi_tet_report {
+    size_t degenerate; /* tetrahedra without volume, left out: det <= 1e-13 (longest edge)^3. Rays pass where they were */
+    size_t crowded;    /* faces of more than two tetrahedra: beyond the second they are border */
+    size_t border;     /* faces of one tetrahedron */
+} isogi_tet_report;
+
+/* What is drawn, unlit. All zero is fine. */
+typedef struct isogi_tet_desc {
+    isogi_dvr_space space;           /* both are exact: values are linear along a piece of ray */
+    isogi_dvr_silhouette silhouette; /* the approximate form once for each tetrahedron */
+    double unit;                     /* world length that extinction is per in physical space; 0 = 1 */
+    float opaque;                    /* as in isogi_dvr_desc */
+} isogi_tet_desc;
+
+typedef struct isogi_tets isogi_tets; /* const once built: any number of threads may render it */
+
+/* Finds which tetrahedra share faces; some 40 bytes for each, 100 while it works. report may be NULL. ISOGI_INVALID for a point that does not
+   exist, and for anything that is not finite. */
+ISOGI_API isogi_result isogi_dvr_tets_build(isogi_tets **tets, const isogi_tet_mesh *mesh, isogi_tet_report *report, const isogi_context *context);
+ISOGI_API void isogi_dvr_tets_free(isogi_tets *tets); /* NULL is fine */
+
+/* As isogi_dvr_render, by rays that go from face to face; any number of peaks. counters->cells: tetrahedra passed. */
+ISOGI_API isogi_result isogi_dvr_tets_render(const isogi_tets *tets, const isogi_tet_desc *desc, const isogi_transfer *transfer, const isogi_view *view,
+                                             float (*premultiplied)[4], float *depth, isogi_counters *counters);
+
 #endif /* ISOGI_DVR_H */
 
 /* ==================================================================================================================== */
@@ -979,7 +1017,8 @@ static isogi_result isogi_dvr__integral_build(isogi_dvr__integral *g, const isog
     g->points = t->points, g->count = t->point_count, g->rank_count = t->peak_count;
     for (i = 0; pieces >> i; i++) g->run_count += pieces >> i;
     g->quiet_capacity = t->point_count + t->peak_count + 1;
-    isogi_vol_range(desc->pyramid, range);
+    range[0] = range[1] = 0;
+    if (desc->classification == ISOGI_DVR_PRE_INTEGRATED) isogi_vol_range(desc->pyramid, range);
     if (desc->classification == ISOGI_DVR_PRE_INTEGRATED && t->point_count && range[1] > range[0]) g->side = (size_t)desc->table;
     g->whole[0] = (isogi_dvr__layer *)isogi_allocate(context, g->run_count, sizeof *g->whole[0]);
     g->whole[1] = (isogi_dvr__layer *)isogi_allocate(context, g->run_count, sizeof *g->whole[1]);
@@ -3586,7 +3625,14 @@ static void isogi_dvr__composite_part(isogi_dvr__pixel_ray *r, const isogi_dvr__
     r->clear = clear;
 }
 
-/* Opacity of a peak that is seen aslant (Kraus 2005, eq. 15, 16). A surface without a normal is seen straight on. */
+/* Kraus 2005, eq. 15, 16. */
+static double isogi_dvr__aslant_opacity(isogi_dvr_silhouette kind, double opacity, double cosine) {
+    if (kind == ISOGI_DVR_SILHOUETTE_NONE || !(opacity > 0)) return opacity;
+    if (kind == ISOGI_DVR_SILHOUETTE_EXACT) return opacity < 1 && cosine > 1e-30 ? -expm1(log1p(-opacity) / cosine) : 1;
+    return cosine > opacity ? opacity / cosine : 1;
+}
+
+/* Opacity of a peak that is seen aslant. A surface without a normal is seen straight on. */
 static double isogi_dvr__peak_opacity(const isogi_dvr *d, double opacity, const isogi_hit *hit, const float dir[3]) {
     float normal[3];
     double cosine = 0, length = 0;
@@ -3595,9 +3641,7 @@ static double isogi_dvr__peak_opacity(const isogi_dvr *d, double opacity, const 
     isogi_vol_normals(d->desc.pyramid, hit, 1, d->desc.normals, &normal);
     for (a = 0; a < 3; a++) cosine += (double)normal[a] * (double)dir[a], length += (double)normal[a] * (double)normal[a];
     if (!(length > 0.5) || !(opacity > 0)) return opacity;
-    cosine = fabs(cosine);
-    if (d->desc.silhouette == ISOGI_DVR_SILHOUETTE_EXACT) return opacity < 1 && cosine > 1e-30 ? -expm1(log1p(-opacity) / cosine) : 1;
-    return cosine > opacity ? opacity / cosine : 1;
+    return isogi_dvr__aslant_opacity(d->desc.silhouette, opacity, fabs(cosine));
 }
 
 /* A peak's colour: its own, times that of the second field. */
@@ -3637,7 +3681,9 @@ static void isogi_dvr__composite_crossing(isogi_dvr__pixel_ray *r, isogi_dvr__cr
 typedef struct isogi_dvr__span {
     isogi_dvr__walk walk;
     isogi_dvr__stretch piece;
-    int lit, sampled;
+    isogi_dvr_silhouette silhouette; /* of samples */
+    int lit, sampled, flat;          /* flat: in a tetrahedron, not in the cell of a lattice */
+    double aslant;                   /* flat: |grad s| |v| / |grad s . v| */
     double light[3], add[3]; /* at the middle of the piece, once it is asked for */
     double factor;           /* of silhouettes, on depth */
     double path;             /* what stands for |change of the value| where there is none */
@@ -3657,7 +3703,7 @@ static double isogi_dvr__span_factor(isogi_dvr__span *s) {
     double change = fabs(p->value[1] - p->value[0]), sum = 0, local[3];
     int i;
     s->path = 0;
-    if (s->walk.m->silhouette == ISOGI_DVR_SILHOUETTE_NONE || !(p->to > p->from)) return 1;
+    if (s->silhouette == ISOGI_DVR_SILHOUETTE_NONE || !(p->to > p->from)) return 1;
     for (i = 0; i < 2; i++) {
         double u = p->u0 + (i ? 0.78867513459481288225 : 0.21132486540518711775) * (p->u1 - p->u0), value;
         int cell[3];
@@ -3666,7 +3712,7 @@ static double isogi_dvr__span_factor(isogi_dvr__span *s) {
         sum += 0.5 * isogi_dvr__steepness(s->walk.m, local);
     }
     sum *= p->to - p->from;
-    if (!s->sampled && s->walk.m->silhouette != ISOGI_DVR_SILHOUETTE_APPROXIMATE) s->path = sum;
+    if (!s->sampled && s->silhouette != ISOGI_DVR_SILHOUETTE_APPROXIMATE) s->path = sum;
     return sum > change ? change > 0 && sum < 1e300 * change ? sum / change : 1e300 : 1;
 }
 
@@ -3692,7 +3738,7 @@ static double isogi_dvr__span_probe(const isogi_dvr__pixel_ray *r, const isogi_d
     const isogi_dvr__stretch *p = &s->piece;
     double depth = log(r->clear / r->end), whole = log(r->clear / clear), value;
     if (!(fabs(y - x) > 0)) return p->from + (p->to - p->from) * isogi_dvr__clamp(depth / whole, 1);
-    if (s->sampled || s->walk.m->silhouette == ISOGI_DVR_SILHOUETTE_APPROXIMATE) value = x + (y - x) * isogi_dvr__clamp(depth / whole, 1);
+    if (s->sampled || s->silhouette == ISOGI_DVR_SILHOUETTE_APPROXIMATE) value = x + (y - x) * isogi_dvr__clamp(depth / whole, 1);
     else value = isogi_dvr__value_at_depth(&r->dvr->integral, x, y, s->factor, depth);
     return p->t0 + isogi_dvr__place_of(p, value) * p->dt;
 }
@@ -3702,7 +3748,7 @@ static void isogi_dvr__composite_values(isogi_dvr__pixel_ray *r, isogi_dvr__span
     const isogi_dvr__integral *g = &r->dvr->integral;
     double length = fabs(y - x), opacity, clear;
     isogi_dvr__layer layer = {{0, 0, 0}, 1};
-    int a, approximate = s->walk.m->silhouette == ISOGI_DVR_SILHOUETTE_APPROXIMATE;
+    int a, approximate = s->silhouette == ISOGI_DVR_SILHOUETTE_APPROXIMATE;
     if (!(length > 0)) length = s->piece.value[0] < s->piece.value[1] || s->piece.value[0] > s->piece.value[1] ? 0 : s->path;
     else if (!approximate) length *= s->factor;
     if (!(length > 0)) return;
@@ -3728,10 +3774,24 @@ static void isogi_dvr__composite_values(isogi_dvr__pixel_ray *r, isogi_dvr__span
     r->clear = clear;
 }
 
+/* A peak in a tetrahedron: unlit. */
+static void isogi_dvr__composite_facet(isogi_dvr__pixel_ray *r, const isogi_dvr__span *s, const isogi_peak *peak, double t) {
+    double rgb[3], opacity = isogi_dvr__aslant_opacity(r->dvr->desc.silhouette, (double)peak->opacity, 1 / s->aslant);
+    int a;
+    for (a = 0; a < 3; a++) rgb[a] = (double)peak->rgb[a];
+    isogi_dvr__composite(r, opacity, rgb);
+    if (r->clear > r->end) r->t = t;
+    r->clear *= 1 - opacity;
+}
+
 static void isogi_dvr__composite_rank(isogi_dvr__pixel_ray *r, isogi_dvr__span *s, const isogi_dvr__rank *rank) {
     double u = isogi_dvr__place_of(&s->piece, rank->isovalue);
     isogi_hit hit;
     int a;
+    if (s->flat) {
+        isogi_dvr__composite_facet(r, s, &r->dvr->transfer.peaks[rank->peak], s->piece.t0 + u * s->piece.dt);
+        return;
+    }
     memset(&hit, 0, sizeof hit);
     isogi_dvr__span_place(s, u, hit.local);
     hit.side = s->piece.value[1] > s->piece.value[0] ? 1 : -1;
@@ -3750,12 +3810,10 @@ static void isogi_dvr__composite_ranks(isogi_dvr__pixel_ray *r, isogi_dvr__span 
 }
 
 /* A monotone piece, divided at the peaks that it crosses: those where "value >= isovalue" changes. */
-static void isogi_dvr__composite_piece(isogi_dvr__pixel_ray *r, isogi_dvr__span *s) {
+static void isogi_dvr__divide_piece(isogi_dvr__pixel_ray *r, isogi_dvr__span *s) {
     const isogi_dvr__integral *g = &r->dvr->integral;
     double x = s->piece.value[0], y = s->piece.value[1];
     size_t i, end;
-    if (x < y ? isogi_dvr__is_quiet(g, x, y, s->walk.quiet) : isogi_dvr__is_quiet(g, y, x, s->walk.quiet)) return;
-    s->lit = 0, s->factor = isogi_dvr__span_factor(s);
     if (x < y) {
         for (i = isogi_dvr__ranks_below(g, x); i < g->rank_count && g->rank[i].isovalue <= y && r->clear > r->end; i = end) {
             double isovalue = g->rank[i].isovalue;
@@ -3776,11 +3834,19 @@ static void isogi_dvr__composite_piece(isogi_dvr__pixel_ray *r, isogi_dvr__span 
     if (r->clear > r->end) isogi_dvr__composite_values(r, s, x, y);
 }
 
+static void isogi_dvr__composite_piece(isogi_dvr__pixel_ray *r, isogi_dvr__span *s) {
+    double x = s->piece.value[0], y = s->piece.value[1];
+    if (isogi_dvr__is_quiet(&r->dvr->integral, x < y ? x : y, x < y ? y : x, s->walk.quiet)) return;
+    s->lit = 0, s->factor = isogi_dvr__span_factor(s);
+    isogi_dvr__divide_piece(r, s);
+}
+
 static void isogi_dvr__cast_values(isogi_dvr__pixel_ray *r, isogi_dvr__march *m) {
     isogi_dvr__span s;
     if (r->dvr->transparent) return;
     isogi_dvr__begin_walk(&s.walk, m);
     s.sampled = r->dvr->desc.classification == ISOGI_DVR_PRE_INTEGRATED, s.touched = 0, s.touched_t = -1;
+    s.silhouette = m->silhouette, s.flat = 0, s.aslant = 1;
     while (r->clear > r->end && (s.sampled ? isogi_dvr__next_sampled(&s.walk, &s.piece) : isogi_dvr__next_monotone(&s.walk, &s.piece)))
         isogi_dvr__composite_piece(r, &s);
 }
@@ -3953,6 +4019,547 @@ ISOGI_API isogi_result isogi_dvr_render(const isogi_dvr *dvr, const isogi_view *
     isogi_release(&dvr->context, job.lights.list, job.lights.count, sizeof *job.lights.list);
     return result;
 }
+
+/* ==== tetrahedral meshes ============================================================================================= */
+
+#define ISOGI_DVR__NO_FACE 0xffffffffu
+#define ISOGI_DVR__LEAF 8   /* faces */
+#define ISOGI_DVR__DEEP 48  /* levels of the tree */
+
+/* A box of border faces: two children, next to each other, or a leaf. */
+typedef struct isogi_dvr__node {
+    float low[3], high[3];
+    uint32_t first, count; /* of faces; 0 = the children are nodes first and first + 1 */
+} isogi_dvr__node;
+
+/* Face f of a tetrahedron lies opposite of its point f; a face is numbered 4 * tetrahedron + f. */
+struct isogi_tets {
+    isogi_tet_mesh mesh;
+    isogi_context context;
+    uint32_t (*tet)[4]; /* positively oriented: det(b-a, c-a, d-a) > 0 */
+    uint32_t *across;   /* [4 * tetrahedron + f]: the face on the other side */
+    size_t count;       /* of tetrahedra that have a volume */
+    uint32_t *border;   /* faces, in the order of the tree's leaves */
+    size_t border_count;
+    isogi_dvr__node *node;
+    size_t node_count, node_capacity;
+    double size; /* of the whole */
+};
+
+/* Points of face f, counter-clockwise seen from outside. */
+static void isogi_dvr__face_points(const isogi_tets *m, uint32_t face, uint32_t out[3]) {
+    static const int corner[4][3] = {{1, 2, 3}, {0, 3, 2}, {0, 1, 3}, {0, 2, 1}};
+    int i;
+    for (i = 0; i < 3; i++) out[i] = m->tet[face >> 2][corner[face & 3][i]];
+}
+
+static void isogi_dvr__sub(const float a[3], const double b[3], double out[3]) {
+    int i;
+    for (i = 0; i < 3; i++) out[i] = (double)a[i] - b[i];
+}
+
+static double isogi_dvr__determinant(const double a[3], const double b[3], const double c[3]) {
+    double n[3];
+    isogi_dvr__cross(a, b, n);
+    return isogi_dvr__dot(n, c);
+}
+
+/* Takes over the tetrahedra that have a volume, turned so that it is positive. */
+static isogi_result isogi_dvr__take_tets(isogi_tets *m, isogi_tet_report *report) {
+    const isogi_tet_mesh *mesh = &m->mesh;
+    double low[3] = {1e300, 1e300, 1e300}, high[3] = {-1e300, -1e300, -1e300};
+    size_t i;
+    int a, k;
+    for (i = 0; i < mesh->point_count; i++) {
+        if (!isogi_dvr__finite3(mesh->points[i]) || !isogi_dvr__finite32(mesh->values[i])) return ISOGI_INVALID;
+        for (a = 0; a < 3; a++) {
+            double x = (double)mesh->points[i][a];
+            low[a] = x < low[a] ? x : low[a], high[a] = x > high[a] ? x : high[a];
+        }
+    }
+    for (a = 0; a < 3; a++) m->size = mesh->point_count && high[a] - low[a] > m->size ? high[a] - low[a] : m->size;
+    for (i = 0; i < mesh->tet_count; i++) {
+        const uint32_t *t = mesh->tets[i];
+        double origin[3], edge[3][3], longest = 0, volume;
+        for (k = 0; k < 4; k++)
+            if (t[k] >= mesh->point_count) return ISOGI_INVALID;
+        for (a = 0; a < 3; a++) origin[a] = (double)mesh->points[t[0]][a];
+        for (k = 0; k < 3; k++) {
+            double length;
+            isogi_dvr__sub(mesh->points[t[k + 1]], origin, edge[k]);
+            length = isogi_dvr__dot(edge[k], edge[k]);
+            longest = length > longest ? length : longest;
+        }
+        longest = sqrt(longest), volume = isogi_dvr__determinant(edge[0], edge[1], edge[2]);
+        if (!(fabs(volume) > 1e-13 * longest * longest * longest)) {
+            report->degenerate++;
+            continue;
+        }
+        memcpy(m->tet[m->count], t, sizeof m->tet[0]);
+        if (volume < 0) m->tet[m->count][2] = t[3], m->tet[m->count][3] = t[2];
+        m->count++;
+    }
+    return ISOGI_OK;
+}
+
+static void isogi_dvr__sort3(uint32_t v[3]) {
+    uint32_t swap;
+    if (v[0] > v[1]) swap = v[0], v[0] = v[1], v[1] = swap;
+    if (v[1] > v[2]) swap = v[1], v[1] = v[2], v[2] = swap;
+    if (v[0] > v[1]) swap = v[0], v[0] = v[1], v[1] = swap;
+}
+
+/* Pairs of faces with the same three points, through a hash table of faces. */
+static isogi_result isogi_dvr__join_faces(isogi_tets *m, isogi_tet_report *report) {
+    size_t slots = 16, faces = 4 * m->count, i;
+    uint32_t *table;
+    while (slots < 2 * faces) slots *= 2;
+    table = (uint32_t *)isogi_allocate(&m->context, slots, sizeof *table);
+    if (!table) return ISOGI_NO_MEMORY;
+    memset(table, 0xff, slots * sizeof *table);
+    for (i = 0; i < faces; i++) {
+        uint32_t mine[3], other[3];
+        size_t at;
+        isogi_dvr__face_points(m, (uint32_t)i, mine), isogi_dvr__sort3(mine);
+        at = (size_t)((mine[0] * 0x9e3779b97f4a7c15u ^ mine[1] * 0xbf58476d1ce4e5b9u ^ mine[2] * 0x94d049bb133111ebu) >> 20) & (slots - 1);
+        m->across[i] = ISOGI_DVR__NO_FACE;
+        for (; table[at] != ISOGI_DVR__NO_FACE; at = (at + 1) & (slots - 1)) {
+            isogi_dvr__face_points(m, table[at], other), isogi_dvr__sort3(other);
+            if (memcmp(mine, other, sizeof mine)) continue;
+            if (m->across[table[at]] == ISOGI_DVR__NO_FACE) m->across[table[at]] = (uint32_t)i, m->across[i] = table[at];
+            else report->crowded++;
+            break;
+        }
+        if (table[at] == ISOGI_DVR__NO_FACE) table[at] = (uint32_t)i;
+    }
+    isogi_release(&m->context, table, slots, sizeof *table);
+    for (i = 0; i < faces; i++) report->border += m->across[i] == ISOGI_DVR__NO_FACE;
+    return ISOGI_OK;
+}
+
+static double isogi_dvr__face_middle(const isogi_tets *m, uint32_t face, int axis) {
+    uint32_t p[3];
+    isogi_dvr__face_points(m, face, p);
+    return ((double)m->mesh.points[p[0]][axis] + (double)m->mesh.points[p[1]][axis] + (double)m->mesh.points[p[2]][axis]) / 3;
+}
+
+static void isogi_dvr__bound_faces(const isogi_tets *m, isogi_dvr__node *n) {
+    uint32_t i, p[3];
+    int a, k;
+    for (a = 0; a < 3; a++) n->low[a] = HUGE_VALF, n->high[a] = -HUGE_VALF;
+    for (i = n->first; i < n->first + n->count; i++) {
+        isogi_dvr__face_points(m, m->border[i], p);
+        for (k = 0; k < 3; k++)
+            for (a = 0; a < 3; a++) {
+                float x = m->mesh.points[p[k]][a];
+                n->low[a] = x < n->low[a] ? x : n->low[a], n->high[a] = x > n->high[a] ? x : n->high[a];
+            }
+    }
+}
+
+/* A tree of boxes over the border's faces, cut in the middle of the longest axis; leaves that cannot be cut, or lie too deep, stay large. */
+static void isogi_dvr__build_tree(isogi_tets *m) {
+    uint32_t stack[2 * ISOGI_DVR__DEEP][2];
+    int top = 0;
+    m->node[0].first = 0, m->node[0].count = (uint32_t)m->border_count, m->node_count = 1;
+    isogi_dvr__bound_faces(m, &m->node[0]);
+    stack[top][0] = 0, stack[top++][1] = 0;
+    while (top) {
+        uint32_t depth = stack[--top][1], low, high, children = (uint32_t)m->node_count;
+        isogi_dvr__node *n = &m->node[stack[top][0]];
+        int axis = 0, a;
+        double middle;
+        if (n->count <= ISOGI_DVR__LEAF || depth + 2 >= ISOGI_DVR__DEEP || m->node_count + 2 > m->node_capacity) continue;
+        for (a = 1; a < 3; a++)
+            if (n->high[a] - n->low[a] > n->high[axis] - n->low[axis]) axis = a;
+        middle = 0.5 * ((double)n->low[axis] + (double)n->high[axis]);
+        for (low = n->first, high = n->first + n->count; low < high;) {
+            uint32_t face = m->border[low];
+            if (isogi_dvr__face_middle(m, face, axis) < middle) low++;
+            else m->border[low] = m->border[--high], m->border[high] = face;
+        }
+        if (low == n->first || low == n->first + n->count) low = n->first + n->count / 2;
+        m->node[children].first = n->first, m->node[children].count = low - n->first;
+        m->node[children + 1].first = low, m->node[children + 1].count = n->first + n->count - low;
+        n->first = children, n->count = 0, m->node_count += 2;
+        for (a = 0; a < 2; a++) {
+            isogi_dvr__bound_faces(m, &m->node[children + (uint32_t)a]);
+            stack[top][0] = children + (uint32_t)a, stack[top++][1] = depth + 1;
+        }
+    }
+}
+
+ISOGI_API void isogi_dvr_tets_free(isogi_tets *tets) {
+    isogi_context context;
+    if (!tets) return;
+    context = tets->context;
+    isogi_release(&context, tets->tet, tets->mesh.tet_count, sizeof *tets->tet);
+    isogi_release(&context, tets->across, 4 * tets->count, sizeof *tets->across);
+    isogi_release(&context, tets->border, tets->border_count, sizeof *tets->border);
+    isogi_release(&context, tets->node, tets->node_capacity, sizeof *tets->node);
+    isogi_release(&context, tets, 1, sizeof *tets);
+}
+
+static isogi_result isogi_dvr__build_tets(isogi_tets *m, isogi_tet_report *report) {
+    isogi_result result;
+    size_t i, n = 0;
+    m->tet = (uint32_t(*)[4])isogi_allocate(&m->context, m->mesh.tet_count, sizeof *m->tet);
+    if (m->mesh.tet_count && !m->tet) return ISOGI_NO_MEMORY;
+    result = isogi_dvr__take_tets(m, report);
+    if (result != ISOGI_OK || !m->count) {
+        m->count = 0;
+        return result;
+    }
+    m->across = (uint32_t *)isogi_allocate(&m->context, 4 * m->count, sizeof *m->across);
+    if (!m->across) return ISOGI_NO_MEMORY;
+    result = isogi_dvr__join_faces(m, report);
+    if (result != ISOGI_OK) return result;
+    m->border_count = report->border, m->node_capacity = 2 * report->border + 1;
+    m->border = (uint32_t *)isogi_allocate(&m->context, m->border_count, sizeof *m->border);
+    m->node = (isogi_dvr__node *)isogi_allocate(&m->context, m->node_capacity, sizeof *m->node);
+    if ((m->border_count && !m->border) || !m->node) return ISOGI_NO_MEMORY;
+    for (i = 0; i < 4 * m->count; i++)
+        if (m->across[i] == ISOGI_DVR__NO_FACE) m->border[n++] = (uint32_t)i;
+    isogi_dvr__build_tree(m);
+    return ISOGI_OK;
+}
+
+ISOGI_API isogi_result isogi_dvr_tets_build(isogi_tets **tets, const isogi_tet_mesh *mesh, isogi_tet_report *report, const isogi_context *context) {
+    isogi_tet_report found;
+    isogi_result result;
+    isogi_tets *m;
+    if (!tets || !mesh || (mesh->point_count && (!mesh->points || !mesh->values)) || (mesh->tet_count && !mesh->tets)) return ISOGI_INVALID;
+    if (mesh->tet_count > (size_t)1 << 29) return ISOGI_TOO_LARGE;
+    m = (isogi_tets *)isogi_allocate(context, 1, sizeof *m);
+    if (!m) return ISOGI_NO_MEMORY;
+    memset(m, 0, sizeof *m), memset(&found, 0, sizeof found);
+    m->mesh = *mesh;
+    if (context) m->context = *context;
+    result = isogi_dvr__build_tets(m, &found);
+    if (result != ISOGI_OK) {
+        isogi_dvr_tets_free(m);
+        return result;
+    }
+    *tets = m;
+    if (report) *report = found;
+    return ISOGI_OK;
+}
+
+/* ---- rays from face to face ---- */
+
+typedef struct isogi_dvr__tet_ray {
+    const isogi_tets *mesh;
+    const isogi_tet_desc *desc;
+    double origin[3], dir[3], speed;
+    double t, value; /* where the ray is, and the field there */
+    int chained; /* 2: from the tetrahedron next to this one; 1: over a seam; 0: not at all */
+    uint64_t passed;
+} isogi_dvr__tet_ray;
+
+/* t at which the ray passes the plane of a face, and the rate at which it does: positive on the way out. */
+static double isogi_dvr__face_t(const isogi_dvr__tet_ray *r, const uint32_t p[3], double *rate) {
+    const float(*points)[3] = r->mesh->mesh.points;
+    double a[3], b[3], c[3], u[3], v[3], n[3];
+    int i;
+    isogi_dvr__sub(points[p[0]], r->origin, a), isogi_dvr__sub(points[p[1]], r->origin, b), isogi_dvr__sub(points[p[2]], r->origin, c);
+    for (i = 0; i < 3; i++) u[i] = b[i] - a[i], v[i] = c[i] - a[i];
+    isogi_dvr__cross(u, v, n);
+    *rate = isogi_dvr__dot(n, r->dir);
+    return isogi_dvr__dot(n, a) / *rate;
+}
+
+/* Which side of the line from point p to point q the ray passes. Both faces of an edge ask with the same numbers, and "upon it" is answered as
+   for a ray turned by a little towards x, by less towards y, by yet less towards z: it hits exactly one face of a closed border. */
+static int isogi_dvr__left_of(const isogi_dvr__tet_ray *r, uint32_t p, uint32_t q) {
+    double a[3], b[3], n[3], side;
+    int turned = p > q, axis;
+    isogi_dvr__sub(r->mesh->mesh.points[turned ? q : p], r->origin, a), isogi_dvr__sub(r->mesh->mesh.points[turned ? p : q], r->origin, b);
+    isogi_dvr__cross(a, b, n);
+    side = isogi_dvr__dot(n, r->dir);
+    for (axis = 0; axis < 3 && !(side > 0 || side < 0); axis++) side = n[axis];
+    return (side > 0) != turned;
+}
+
+static int isogi_dvr__hits_box(const isogi_dvr__tet_ray *r, const isogi_dvr__node *n, double from, double to) {
+    int a;
+    for (a = 0; a < 3; a++) {
+        double low = (double)n->low[a] - r->origin[a], high = (double)n->high[a] - r->origin[a], slack = 1e-9 * (fabs(low) + fabs(high)), t0, t1;
+        if (!(fabs(r->dir[a]) > 1e-300)) {
+            if (low > slack || high < -slack) return 0;
+            continue;
+        }
+        t0 = (low - slack) / r->dir[a], t1 = (high + slack) / r->dir[a];
+        if (t0 > t1) low = t0, t0 = t1, t1 = low;
+        from = t0 > from ? t0 : from, to = t1 < to ? t1 : to;
+    }
+    return from <= to;
+}
+
+/* The next border face at or behind `from` that comes after (t, face) in the order of t, then of faces: so no face is met twice. Only those
+   that lead in, or all. */
+static uint32_t isogi_dvr__next_border(const isogi_dvr__tet_ray *r, double from, double last_t, uint32_t last, int all, double *found_t) {
+    const isogi_tets *m = r->mesh;
+    uint32_t stack[2 * ISOGI_DVR__DEEP], best = ISOGI_DVR__NO_FACE, i;
+    int top = 0;
+    double nearest = 1e300;
+    if (m->border_count) stack[top++] = 0;
+    while (top) {
+        const isogi_dvr__node *n = &m->node[stack[--top]];
+        if (!isogi_dvr__hits_box(r, n, from, nearest)) continue;
+        if (!n->count) {
+            stack[top++] = n->first, stack[top++] = n->first + 1;
+            continue;
+        }
+        for (i = n->first; i < n->first + n->count; i++) {
+            uint32_t p[3];
+            double rate, t;
+            int side;
+            isogi_dvr__face_points(m, m->border[i], p);
+            side = isogi_dvr__left_of(r, p[0], p[1]);
+            if (side != isogi_dvr__left_of(r, p[1], p[2]) || side != isogi_dvr__left_of(r, p[2], p[0])) continue;
+            t = isogi_dvr__face_t(r, p, &rate);
+            if (!(rate < 0) && !(all && rate > 0)) continue;
+            if (t < from || t < last_t || (!(t > last_t) && m->border[i] <= last && last != ISOGI_DVR__NO_FACE)) continue;
+            if (t < nearest || (!(t > nearest) && m->border[i] < best)) nearest = t, best = m->border[i];
+        }
+    }
+    *found_t = nearest;
+    return best;
+}
+
+/* The face by which the ray (dir * way) leaves the tetrahedron that it entered by face `in`: the first plane on the way out. */
+static uint32_t isogi_dvr__exit_face(const isogi_dvr__tet_ray *r, uint32_t tet, uint32_t in, int way, double *exit_t) {
+    uint32_t f, best = ISOGI_DVR__NO_FACE;
+    double nearest = 1e300;
+    for (f = 0; f < 4; f++) {
+        uint32_t p[3];
+        double rate, t;
+        if (4 * tet + f == in) continue;
+        isogi_dvr__face_points(r->mesh, 4 * tet + f, p);
+        t = isogi_dvr__face_t(r, p, &rate) * way;
+        if (rate * way > 0 && t < nearest) nearest = t, best = 4 * tet + f;
+    }
+    *exit_t = nearest * way;
+    return best;
+}
+
+/* Gradient of the linear field in a tetrahedron. */
+static void isogi_dvr__tet_gradient(const isogi_tets *m, uint32_t tet, double g[3]) {
+    const uint32_t *p = m->tet[tet];
+    double origin[3], e[3][3], n[3][3], volume, value[3];
+    int a, k;
+    for (a = 0; a < 3; a++) origin[a] = (double)m->mesh.points[p[0]][a];
+    for (k = 0; k < 3; k++) isogi_dvr__sub(m->mesh.points[p[k + 1]], origin, e[k]), value[k] = (double)m->mesh.values[p[k + 1]] - (double)m->mesh.values[p[0]];
+    for (k = 0; k < 3; k++) isogi_dvr__cross(e[(k + 1) % 3], e[(k + 2) % 3], n[k]);
+    volume = isogi_dvr__dot(e[0], n[0]);
+    for (a = 0; a < 3; a++) g[a] = (value[0] * n[0][a] + value[1] * n[1][a] + value[2] * n[2][a]) / volume;
+}
+
+/* The value at t, kept within the values of the points of the face that the ray is on (a flat tetrahedron's gradient means little), or of all
+   four points where it is within. */
+static double isogi_dvr__tet_value(const isogi_dvr__tet_ray *r, uint32_t face, int within, const double g[3], double t) {
+    const isogi_tets *m = r->mesh;
+    uint32_t p[3];
+    double value, low, high, at[3];
+    int a;
+    isogi_dvr__face_points(m, face, p);
+    for (a = 0; a < 3; a++) at[a] = r->origin[a] + t * r->dir[a] - (double)m->mesh.points[p[0]][a];
+    value = low = high = (double)m->mesh.values[p[0]];
+    value += isogi_dvr__dot(g, at);
+    for (a = 1; a < 3; a++) {
+        double v = (double)m->mesh.values[p[a]];
+        low = v < low ? v : low, high = v > high ? v : high;
+    }
+    if (within) {
+        double v = (double)m->mesh.values[m->tet[face >> 2][face & 3]];
+        low = v < low ? v : low, high = v > high ? v : high;
+    }
+    value = value > low ? value : low;
+    return value < high ? value : high;
+}
+
+/* From t to the exit of a tetrahedron: one linear piece, exact in both spaces. */
+static void isogi_dvr__pass_tet(isogi_dvr__pixel_ray *pixel, isogi_dvr__tet_ray *r, isogi_dvr__span *s, uint32_t tet, uint32_t in, uint32_t out, double t) {
+    isogi_dvr__stretch *p = &s->piece;
+    double g[3], change, slope, steep;
+    int i;
+    isogi_dvr__tet_gradient(r->mesh, tet, g);
+    if (r->chained < 2) {
+        double value = in == ISOGI_DVR__NO_FACE ? isogi_dvr__tet_value(r, 4 * tet, 1, g, r->t) : isogi_dvr__tet_value(r, in, 0, g, r->t);
+        if (!r->chained || fabs(value - r->value) > 1e-6 * (fabs(value) + fabs(r->value))) r->value = value;
+    }
+    slope = isogi_dvr__dot(g, r->dir), steep = sqrt(isogi_dvr__dot(g, g)) * r->speed;
+    p->from = p->t0 = r->t, p->to = t > r->t ? t : r->t, p->dt = p->to - p->from, p->u0 = 0, p->u1 = 1;
+    p->value[0] = r->value, p->value[1] = isogi_dvr__tet_value(r, out, 0, g, p->to);
+    for (i = 0; i < 4; i++) p->b[i] = p->value[0] + (p->value[1] - p->value[0]) * i / 3;
+    r->t = p->to, r->value = p->value[1], r->chained = 2, r->passed++;
+    change = fabs(p->value[1] - p->value[0]);
+    s->lit = 0, s->aslant = fabs(slope) > 1e-30 * steep ? steep / fabs(slope) : 1e30;
+    s->aslant = s->aslant > 1 ? s->aslant : 1;
+    s->factor = 1, s->path = 0;
+    if (r->desc->space == ISOGI_DVR_PHYSICAL) s->path = p->dt * r->speed / r->desc->unit;
+    else if (r->desc->silhouette == ISOGI_DVR_SILHOUETTE_EXACT || r->desc->silhouette == ISOGI_DVR_SILHOUETTE_GRADIENT) s->path = steep * p->dt;
+    else if (r->desc->silhouette == ISOGI_DVR_SILHOUETTE_APPROXIMATE) s->factor = s->aslant;
+    if (s->path > 0) s->factor = change > 0 && s->path < 1e300 * change ? s->path / change : 1e300;
+    isogi_dvr__divide_piece(pixel, s);
+}
+
+/* The tetrahedron that holds the ray's origin: back from where the ray first leaves the mesh, if it leaves before it enters. */
+static uint32_t isogi_dvr__tet_around(isogi_dvr__tet_ray *r) {
+    double t;
+    uint32_t face = isogi_dvr__next_border(r, 0, 0, ISOGI_DVR__NO_FACE, 1, &t), p[3];
+    size_t steps;
+    if (face == ISOGI_DVR__NO_FACE) return ISOGI_DVR__NO_FACE;
+    isogi_dvr__face_points(r->mesh, face, p);
+    if (isogi_dvr__face_t(r, p, &t), !(t > 0)) return ISOGI_DVR__NO_FACE;
+    for (steps = 0; steps < r->mesh->count; steps++) {
+        uint32_t tet = face >> 2, back = isogi_dvr__exit_face(r, tet, face, -1, &t);
+        if (back == ISOGI_DVR__NO_FACE || t <= 0) return tet;
+        face = r->mesh->across[back];
+        if (face == ISOGI_DVR__NO_FACE) return ISOGI_DVR__NO_FACE;
+    }
+    return ISOGI_DVR__NO_FACE;
+}
+
+/* 0 if the ray runs in circles, which rounding may bring about next to an edge or a point. */
+static int isogi_dvr__cast_tets(isogi_dvr__pixel_ray *pixel, isogi_dvr__tet_ray *r, isogi_dvr__span *s) {
+    uint32_t tet = isogi_dvr__tet_around(r), in = ISOGI_DVR__NO_FACE, last = ISOGI_DVR__NO_FACE;
+    double last_t = 0, slack = 1e-7 * r->mesh->size / r->speed;
+    r->t = 0, r->chained = 0;
+    for (;;) {
+        int still = 0;
+        while (tet != ISOGI_DVR__NO_FACE && pixel->clear > pixel->end) {
+            double t;
+            uint32_t out = isogi_dvr__exit_face(r, tet, in, 1, &t);
+            if (out == ISOGI_DVR__NO_FACE) break;
+            still = t > r->t ? 0 : still + 1;
+            if (still > 200) return 0;
+            isogi_dvr__pass_tet(pixel, r, s, tet, in, out, t);
+            in = r->mesh->across[out];
+            tet = in == ISOGI_DVR__NO_FACE ? in : in >> 2;
+        }
+        if (!(pixel->clear > pixel->end)) return 1;
+        in = isogi_dvr__next_border(r, r->t > slack ? r->t - slack : 0, last_t, last, 0, &last_t);
+        if (in == ISOGI_DVR__NO_FACE) return 1;
+        /* over the seam of two parts that touch, the value goes on if it is the same on both sides */
+        last = in, tet = in >> 2, r->chained = r->chained && last_t <= r->t + slack;
+        r->t = last_t > r->t ? last_t : r->t;
+    }
+}
+
+typedef struct isogi_dvr__tet_job {
+    const isogi_tets *mesh;
+    const isogi_tet_desc *desc;
+    const isogi_view *view;
+    const isogi_dvr *dvr; /* what the integrals ask for: transfer function and settings */
+    size_t across;
+    float *pixels; /* as in isogi_dvr__render_job */
+    int depth;
+    isogi_counters *work;
+} isogi_dvr__tet_job;
+
+/* Tried again along a ray that differs by some billionths where it could not find its way. */
+static void isogi_dvr__try_tets(isogi_dvr__pixel_ray *pixel, const isogi_dvr__tet_job *job, const double origin[3], isogi_counters *work) {
+    isogi_dvr__pixel_ray fresh = *pixel;
+    isogi_dvr__tet_ray ray;
+    isogi_dvr__span span;
+    int attempt, a;
+    for (attempt = 0; attempt < 4; attempt++) {
+        *pixel = fresh;
+        memset(&ray, 0, sizeof ray), memset(&span, 0, sizeof span);
+        ray.mesh = job->mesh, ray.desc = job->desc;
+        for (a = 0; a < 3; a++) ray.origin[a] = origin[a], ray.dir[a] = (double)pixel->dir[a] + attempt * (a + 1) * 1e-9;
+        ray.speed = sqrt(isogi_dvr__dot(ray.dir, ray.dir));
+        span.silhouette = job->desc->space == ISOGI_DVR_DATA || job->desc->silhouette != ISOGI_DVR_SILHOUETTE_APPROXIMATE ? job->desc->silhouette
+                                                                                                                      : ISOGI_DVR_SILHOUETTE_NONE;
+        span.flat = 1, span.touched_t = -1, span.walk.quiet[0] = 1;
+        if (isogi_dvr__cast_tets(pixel, &ray, &span)) break;
+    }
+    work->cells += ray.passed;
+}
+
+static void isogi_dvr__tet_task(void *arg, size_t tile) {
+    const isogi_dvr__tet_job *job = (const isogi_dvr__tet_job *)arg;
+    int x0 = (int)(tile % job->across) * ISOGI_DVR__TILE, y0 = (int)(tile / job->across) * ISOGI_DVR__TILE, x, y, a;
+    memset(&job->work[tile], 0, sizeof *job->work);
+    for (y = y0; y < y0 + ISOGI_DVR__TILE && y < job->view->height; y++)
+        for (x = x0; x < x0 + ISOGI_DVR__TILE && x < job->view->width; x++) {
+            float *out = job->pixels + 5 * ((size_t)y * (size_t)job->view->width + (size_t)x);
+            isogi_dvr__pixel_ray ray;
+            double origin[3];
+            memset(&ray, 0, sizeof ray);
+            isogi_view_ray(job->view, x, y, origin, ray.dir);
+            ray.dvr = job->dvr, ray.clear = 1, ray.end = 1 - (double)job->desc->opaque;
+            isogi_dvr__try_tets(&ray, job, origin, &job->work[tile]);
+            for (a = 0; a < 3; a++) out[a] = (float)ray.rgb[a];
+            out[3] = (float)(1 - ray.clear), out[4] = HUGE_VALF;
+            job->work[tile].rays++;
+            if (!job->depth || !(ray.clear < 1)) continue;
+            ray.probe = 1, ray.end = 1 - 0.5 * (1 - ray.clear), ray.clear = 1;
+            isogi_dvr__try_tets(&ray, job, origin, &job->work[tile]);
+            out[4] = (float)ray.t;
+        }
+}
+
+static isogi_result isogi_dvr__resolve_tets(isogi_tet_desc *resolved, const isogi_tet_desc *desc) {
+    memset(resolved, 0, sizeof *resolved);
+    if (desc) *resolved = *desc;
+    if ((unsigned)resolved->space > ISOGI_DVR_DATA || (unsigned)resolved->silhouette > ISOGI_DVR_SILHOUETTE_GRADIENT) return ISOGI_INVALID;
+    if (!isogi_dvr__finite64(resolved->unit) || !(resolved->unit >= 0)) return ISOGI_INVALID;
+    if (!isogi_dvr__finite32(resolved->opaque) || !(resolved->opaque >= 0 && resolved->opaque <= 1)) return ISOGI_INVALID;
+    if (!(resolved->unit > 0)) resolved->unit = 1;
+    if (!(resolved->opaque > 0)) resolved->opaque = 0.999f;
+    return ISOGI_OK;
+}
+
+static isogi_result isogi_dvr__run_tets(isogi_dvr__tet_job *job, const isogi_context *context, size_t tiles, float (*premultiplied)[4], float *depth,
+                                        isogi_counters *counters) {
+    size_t pixels = (size_t)job->view->width * (size_t)job->view->height, i;
+    isogi_result result = ISOGI_OK;
+    job->pixels = (float *)isogi_allocate(context, pixels, 5 * sizeof *job->pixels);
+    job->work = (isogi_counters *)isogi_allocate(context, tiles, sizeof *job->work);
+    if (!job->pixels || !job->work) result = ISOGI_NO_MEMORY;
+    if (result == ISOGI_OK) result = isogi_parallel(context, tiles, isogi_dvr__tet_task, job, 0, 1);
+    for (i = 0; result == ISOGI_OK && i < pixels; i++) {
+        memcpy(premultiplied[i], job->pixels + 5 * i, 4 * sizeof(float));
+        if (depth) depth[i] = job->pixels[5 * i + 4];
+    }
+    for (i = 0; result == ISOGI_OK && i < tiles; i++) isogi_dvr__add(counters, &job->work[i]);
+    isogi_release(context, job->pixels, pixels, 5 * sizeof *job->pixels);
+    isogi_release(context, job->work, tiles, sizeof *job->work);
+    return result;
+}
+
+ISOGI_API isogi_result isogi_dvr_tets_render(const isogi_tets *tets, const isogi_tet_desc *desc, const isogi_transfer *transfer, const isogi_view *view,
+                                             float (*premultiplied)[4], float *depth, isogi_counters *counters) {
+    isogi_tet_desc resolved;
+    isogi_dvr__tet_job job;
+    isogi_dvr settings;
+    isogi_result result = isogi_dvr__check_view(view);
+    size_t tiles;
+    if (!tets || !premultiplied) return ISOGI_INVALID;
+    if (result == ISOGI_OK) result = isogi_dvr__resolve_tets(&resolved, desc);
+    if (result == ISOGI_OK) result = isogi_transfer_validate(transfer);
+    if (result != ISOGI_OK) return result;
+    memset(&settings, 0, sizeof settings), memset(&job, 0, sizeof job);
+    settings.desc.space = ISOGI_DVR_DATA, settings.desc.silhouette = resolved.silhouette;
+    result = isogi_dvr__transfer_copy(&settings.transfer, transfer, &tets->context);
+    if (result != ISOGI_OK) return result;
+    result = isogi_dvr__integral_build(&settings.integral, &settings.transfer, &settings.desc, &tets->context);
+    if (result == ISOGI_OK) {
+        job.mesh = tets, job.desc = &resolved, job.view = view, job.dvr = &settings, job.depth = depth != NULL;
+        job.across = ((size_t)view->width + ISOGI_DVR__TILE - 1) / ISOGI_DVR__TILE;
+        tiles = job.across * (((size_t)view->height + ISOGI_DVR__TILE - 1) / ISOGI_DVR__TILE);
+        result = isogi_dvr__run_tets(&job, &tets->context, tiles, premultiplied, depth, counters);
+        isogi_dvr__integral_free(&settings.integral, &tets->context);
+    }
+    isogi_dvr__transfer_free(&settings.transfer, &tets->context);
+    return result;
+}
+
+#undef ISOGI_DVR__NO_FACE
+#undef ISOGI_DVR__LEAF
+#undef ISOGI_DVR__DEEP
 
 #undef ISOGI_DVR__PI
 #undef ISOGI_DVR__LEVELS

@@ -1,0 +1,429 @@
+/* Properties of tetrahedral meshes of isogi_dvr.h: exact integrals, gaps and re-entry, degenerate input. */
+#define ISOGI_IMPLEMENTATION
+#include "isogi_dvr.h"
+#include "dvr_fields.h"
+
+typedef struct mesh {
+    float (*points)[3], *values;
+    uint32_t (*tets)[4];
+    isogi_tet_mesh view;
+    isogi_tets *built;
+    isogi_tet_report report;
+} mesh;
+
+/* A lattice of n^3 points with spacing 1, cells split into six tetrahedra about the diagonal from corner 0 to corner 7: conforming. Cells
+   that `keep` refuses are left out. */
+static mesh lattice_mesh(int n, field_function *f, int (*keep)(int, int, int)) {
+    static const int path[6][2] = {{1, 3}, {1, 5}, {2, 3}, {2, 6}, {4, 5}, {4, 6}};
+    size_t cells = (size_t)((n - 1) * (n - 1) * (n - 1)), count = 0;
+    mesh m = {(float(*)[3])malloc((size_t)(n * n * n) * sizeof(float[3])), (float *)malloc((size_t)(n * n * n) * sizeof(float)),
+              (uint32_t(*)[4])malloc(6 * cells * sizeof(uint32_t[4])), {0}, NULL, {0}};
+    for (int i = 0; i < n * n * n; i++) {
+        const int c[3] = {i % n, i / n % n, i / n / n};
+        for (int a = 0; a < 3; a++) m.points[i][a] = (float)c[a];
+        m.values[i] = (float)f(c[0] / (n - 1.0), c[1] / (n - 1.0), c[2] / (n - 1.0));
+    }
+    for (int k = 0; k < n - 1; k++)
+        for (int j = 0; j < n - 1; j++)
+            for (int i = 0; i < n - 1; i++) {
+                uint32_t corner[8];
+                if (keep && !keep(i, j, k)) continue;
+                for (int c = 0; c < 8; c++) corner[c] = (uint32_t)(i + (c & 1) + n * (j + (c >> 1 & 1) + n * (k + (c >> 2))));
+                for (int t = 0; t < 6; t++) {
+                    const uint32_t tet[4] = {corner[0], corner[path[t][0]], corner[path[t][1]], corner[7]};
+                    memcpy(m.tets[count++], tet, sizeof tet);
+                }
+            }
+    m.view = (isogi_tet_mesh){(const float(*)[3])m.points, m.values, (size_t)(n * n * n), (const uint32_t(*)[4])m.tets, count};
+    return m;
+}
+
+static void mesh_build(mesh *m) {
+    isogi_result result = isogi_dvr_tets_build(&m->built, &m->view, &m->report, &serial);
+    CHECK(result == ISOGI_OK, "build: %s", isogi_result_string(result));
+    if (!m->built) abort();
+}
+
+static void mesh_free(mesh *m) { isogi_dvr_tets_free(m->built), free(m->points), free(m->values), free(m->tets); }
+
+static pixel cast_tets(const isogi_tets *tets, const isogi_tet_desc *desc, const isogi_transfer *transfer, const double eye[3], const double target[3]) {
+    isogi_view view = line_of_sight(eye, target);
+    pixel p;
+    isogi_result result = isogi_dvr_tets_render(tets, desc, transfer, &view, (float(*)[4])p.c, &p.depth, NULL);
+    CHECK(result == ISOGI_OK, "render: %s", isogi_result_string(result));
+    return p;
+}
+
+static double slope[3];
+static double linear(double x, double y, double z) { return slope[0] * x + slope[1] * y + slope[2] * z; }
+
+static const isogi_transfer_point ramp[] = {{-2, {1, 0.2f, 0.1f}, 0}, {-0.5, {0.3f, 1, 0.1f}, 2}, {0.1, {0.1f, 0.4f, 1}, 0}, {0.2, {0.1f, 0.4f, 1}, 1}, {2, {1, 0, 1}, 3}};
+static const isogi_peak sheets[] = {{0.3, {1, 1, 1}, 0.4f}, {-0.4, {0, 1, 0}, 0.2f}};
+static const isogi_transfer both = {ramp, 5, sheets, 2};
+
+/* A linear field is the same in tetrahedra and in the cells that they were cut from: pictures of the lattice, exact in data space, and
+   with small steps in physical space. */
+TEST(linear_fields_look_as_on_the_lattice) {
+    enum { N = 7, SIDE = 16 };
+    test_random r = {1};
+    for (int n = 0; n < 6; n++) {
+        random_direction(&r, slope);
+        for (int a = 0; a < 3; a++) slope[a] *= 1.5;
+        field f = field_of(linear, N);
+        mesh m = lattice_mesh(N, linear, NULL);
+        mesh_build(&m);
+        CHECK(m.report.degenerate == 0 && m.report.crowded == 0 && m.report.border == 12 * (N - 1) * (N - 1), "border %zu", m.report.border);
+        isogi_view view = view_of(&f, 1, &r, SIDE);
+        for (int space = 0; space < 2; space++)
+            for (int s = 0; s < (space ? 2 : 1); s++) {
+                const isogi_dvr_desc desc = {.pyramid = f.pyramid, .space = (isogi_dvr_space)space, .step = 0.01, .opaque = 1, .silhouette = (isogi_dvr_silhouette)s};
+                const isogi_tet_desc tet_desc = {.space = (isogi_dvr_space)space, .opaque = 1, .silhouette = (isogi_dvr_silhouette)s};
+                isogi_dvr *dvr = dvr_new(&desc, &both);
+                float depth[2][SIDE * SIDE], image[SIDE * SIDE][4];
+                float(*expected)[4] = picture(dvr, &view, NULL, depth[0], NULL);
+                isogi_counters count = {0};
+                isogi_result result = isogi_dvr_tets_render(m.built, &tet_desc, &both, &view, image, depth[1], &count);
+                CHECK(result == ISOGI_OK && count.rays >= SIDE * SIDE && count.cells > 0, "%s, %d cells", isogi_result_string(result), (int)count.cells);
+                /* values of points are floats: 1e-7; steps of physical space */
+                double most = largest_difference(expected, image, SIDE * SIDE), deepest = 0;
+                for (int i = 0; i < SIDE * SIDE; i++)
+                    if (expected[i][3] > 0.01f && depth[0][i] < 1e30f) deepest = fmax(deepest, fabs((double)depth[0][i] - (double)depth[1][i]));
+                CHECK(most < (space ? 4e-6 : 2e-4), "space %d silhouette %d: largest difference %g", space, s, most);
+                CHECK(deepest < 0.02, "depth differs by %g", deepest);
+                free(expected), isogi_dvr_free(dvr);
+            }
+        mesh_free(&m), field_free(&f);
+    }
+}
+
+static double bumpy(double x, double y, double z) { return sin(5 * x + 1) * cos(4 * y) + 0.5 * sin(7 * z); }
+
+/* The piecewise linear field along a line, by brute force: for each tetrahedron the stretch within it. */
+typedef struct stretch { double t[2], value[2]; } stretch;
+static int by_begin(const void *a, const void *b) {
+    double x = ((const stretch *)a)->t[0], y = ((const stretch *)b)->t[0];
+    return (x > y) - (x < y);
+}
+static int brute_stretches(const isogi_tet_mesh *m, const double o[3], const double d[3], stretch *out) {
+    int count = 0;
+    for (size_t i = 0; i < m->tet_count; i++) {
+        double e[3][3], q[3], inverse[3][3], det, base[4], rate[4], t0 = 0, t1 = 1e30, v0 = 0, v1 = 0;
+        const uint32_t *p = m->tets[i];
+        for (int k = 0; k < 3; k++)
+            for (int a = 0; a < 3; a++) e[k][a] = (double)m->points[p[k + 1]][a] - (double)m->points[p[0]][a];
+        for (int a = 0; a < 3; a++) q[a] = o[a] - (double)m->points[p[0]][a];
+        for (int k = 0; k < 3; k++)
+            for (int a = 0; a < 3; a++) {
+                const double *u = e[(k + 1) % 3], *v = e[(k + 2) % 3];
+                inverse[k][a] = u[(a + 1) % 3] * v[(a + 2) % 3] - u[(a + 2) % 3] * v[(a + 1) % 3];
+            }
+        det = isogi_dvr__dot(e[0], inverse[0]);
+        base[0] = 1, rate[0] = 0;
+        for (int k = 0; k < 3; k++) base[k + 1] = isogi_dvr__dot(q, inverse[k]) / det, rate[k + 1] = isogi_dvr__dot(d, inverse[k]) / det;
+        for (int k = 1; k < 4; k++) base[0] -= base[k], rate[0] -= rate[k];
+        for (int k = 0; k < 4; k++) { /* barycentric coordinate base + t rate >= 0 */
+            double t = -base[k] / rate[k];
+            if (rate[k] > 0) t0 = fmax(t0, t);
+            else t1 = fmin(t1, t);
+        }
+        if (!(t1 > t0 + 1e-13)) continue;
+        for (int k = 0; k < 4; k++)
+            v0 += (base[k] + t0 * rate[k]) * (double)m->values[p[k]], v1 += (base[k] + t1 * rate[k]) * (double)m->values[p[k]];
+        out[count++] = (stretch){{t0, t1}, {v0, v1}};
+    }
+    qsort(out, (size_t)count, sizeof *out, by_begin);
+    return count;
+}
+
+/* Midpoint rule over many short pieces of each stretch; both spaces, no peaks. */
+static void brute_integral(const stretch *s, int count, const isogi_transfer *t, int data, long double out[4]) {
+    for (int a = 0; a < 3; a++) out[a] = 0;
+    out[3] = 1;
+    for (int i = 0; i < count; i++)
+        for (int k = 0; k < 100; k++) {
+            long double v[4], length = (long double)(data ? fabs(s[i].value[1] - s[i].value[0]) : s[i].t[1] - s[i].t[0]) / 100;
+            reference_transfer(t, (long double)s[i].value[0] + (k + 0.5L) / 100 * ((long double)s[i].value[1] - (long double)s[i].value[0]), v);
+            for (int a = 0; a < 3; a++) out[a] += out[3] * -expm1l(-v[3] * length) * v[a];
+            out[3] *= expl(-v[3] * length);
+        }
+}
+
+static int keep_shell(int i, int j, int k) { return !(i > 1 && i < 5 && j > 0 && j < 5 && k > 1 && k < 4) && (i + j + k) % 5 != 2; }
+static int keep_all(int i, int j, int k) { return (void)i, (void)j, (void)k, 1; }
+
+/* Random fields, and meshes with holes that rays leave and enter again, from outside and from within. */
+TEST(both_integrals_agree_with_brute_force_through_holes) {
+    test_random r = {2};
+    static stretch s[4000];
+    double most[2] = {0, 0};
+    int entered = 0;
+    for (int n = 0; n < 4; n++) {
+        mesh m = lattice_mesh(8, bumpy, n % 2 ? keep_shell : keep_all);
+        for (size_t i = 0; i < m.view.point_count; i++)
+            for (int a = 0; a < 3; a++) m.points[i][a] += (float)random_range(&r, -0.15, 0.15);
+        mesh_build(&m);
+        const isogi_transfer media = {ramp, 5, NULL, 0};
+        for (int i = 0; i < (LONG_SUITE ? 400 : 30); i++) {
+            double eye[3], target[3], origin[3], d[3], gaps = 0;
+            float dir[3];
+            long double expected[4];
+            random_direction(&r, d);
+            for (int a = 0; a < 3; a++) {
+                target[a] = (double)(float)random_range(&r, 1, 6);
+                eye[a] = (double)(float)(i % 4 ? target[a] + 20 * d[a] : random_range(&r, 1, 6)); /* every fourth from within */
+            }
+            isogi_view view = line_of_sight(eye, target);
+            isogi_view_ray(&view, 0, 0, origin, dir);
+            for (int a = 0; a < 3; a++) d[a] = (double)dir[a];
+            int count = brute_stretches(&m.view, origin, d, s);
+            for (int k = 1; k < count; k++) gaps += s[k].t[0] > s[k - 1].t[1] + 1e-6;
+            entered += gaps > 0;
+            for (int space = 0; space < 2; space++) {
+                const isogi_tet_desc desc = {.space = (isogi_dvr_space)space, .opaque = 1};
+                pixel p = cast_tets(m.built, &desc, &media, eye, target);
+                brute_integral(s, count, &media, space, expected);
+                for (int a = 0; a < 4; a++) {
+                    double error = fabs((double)p.c[a] - (double)(a < 3 ? expected[a] : 1 - expected[3]));
+                    most[space] = fmax(most[space], error);
+                    CHECK(error < 5e-5, "mesh %d ray %d space %d channel %d: %.9g, not %.9g", n, i, space, a, (double)p.c[a],
+                          (double)(a < 3 ? expected[a] : 1 - expected[3]));
+                }
+            }
+        }
+        mesh_free(&m);
+    }
+    printf("    largest difference %.2g physical, %.2g data; %d rays entered again\n", most[0], most[1], entered);
+    CHECK(entered > 15, "%d rays entered again", entered);
+}
+
+/* Along edges, through points, within faces: as beside them, to the little that the place differs. */
+TEST(rays_through_edges_and_points_find_their_way) {
+    mesh m = lattice_mesh(6, bumpy, NULL);
+    mesh_build(&m);
+    const isogi_transfer media = {ramp, 5, NULL, 0};
+    const double lines[][2][3] = {{{-5, 2, 2}, {5, 2, 2}}, {{-5, -5, -5}, {5, 5, 5}}, {{2, 2, -9}, {2, 2, 3}}, {{-4, -4, 2}, {5, 5, 2}}, {{2, 9, 2}, {2, 3, 2}},
+                                  {{12, 10, 8}, {3, 3, 3}}, {{-3, 2.5, 3}, {3, 2.5, 3}}, {{3, 3, 3}, {5, 3, 3}}, {{0, 0, 0}, {5, 4, 3}}, {{2, 2, 2}, {2, 2, 9}}};
+    for (size_t i = 0; i < sizeof lines / sizeof *lines; i++)
+        for (int space = 0; space < 2; space++) {
+            const isogi_tet_desc desc = {.space = (isogi_dvr_space)space, .opaque = 1};
+            double eye[3], target[3];
+            for (int a = 0; a < 3; a++) eye[a] = lines[i][0][a] + 1e-4 * (a + 1), target[a] = lines[i][1][a] + 1e-4 * (a + 1.5);
+            pixel p = cast_tets(m.built, &desc, &media, lines[i][0], lines[i][1]), q = cast_tets(m.built, &desc, &media, eye, target);
+            CHECK(q.c[3] > 0.05f, "line %zu sees something: %g", i, (double)q.c[3]);
+            for (int a = 0; a < 4; a++) CHECK(fabs((double)p.c[a] - (double)q.c[a]) < 3e-3, "line %zu space %d channel %d: %g, beside it %g", i, space, a, (double)p.c[a], (double)q.c[a]);
+        }
+    mesh_free(&m);
+}
+
+/* Every crossing of a peak composites its opacity: counted by brute force along the stretches. */
+TEST(peaks_in_tetrahedra_are_crossed_exactly) {
+    test_random r = {3};
+    static stretch s[4000];
+    mesh m = lattice_mesh(8, bumpy, NULL);
+    mesh_build(&m);
+    int total = 0;
+    for (int i = 0; i < 200; i++) {
+        const isogi_peak peak = {random_range(&r, -0.8, 0.8), {1, 0.5f, 0.25f}, 0.3f};
+        const isogi_transfer surface = {NULL, 0, &peak, 1};
+        double eye[3], target[3], origin[3], d[3];
+        float dir[3];
+        random_direction(&r, d);
+        for (int a = 0; a < 3; a++) target[a] = (double)(float)random_range(&r, 1, 6), eye[a] = (double)(float)(target[a] + 20 * d[a]);
+        isogi_view view = line_of_sight(eye, target);
+        isogi_view_ray(&view, 0, 0, origin, dir);
+        for (int a = 0; a < 3; a++) d[a] = (double)dir[a];
+        int count = brute_stretches(&m.view, origin, d, s), crossings = 0;
+        for (int k = 0; k < count; k++) crossings += (s[k].value[0] >= peak.isovalue) != (s[k].value[1] >= peak.isovalue);
+        total += crossings;
+        for (int space = 0; space < 2; space++) {
+            const isogi_tet_desc desc = {.space = (isogi_dvr_space)space, .opaque = 1};
+            pixel p = cast_tets(m.built, &desc, &surface, eye, target);
+            CHECK(fabs((double)p.c[3] - (1 - pow(1 - (double)0.3f, crossings))) < 1e-6, "ray %d space %d: opacity %g of %d crossings", i, space, (double)p.c[3], crossings);
+        }
+    }
+    CHECK(total > 150, "%d crossings", total);
+    mesh_free(&m);
+}
+
+/* ---- odd meshes ---- */
+
+TEST(degenerate_and_crowded_tetrahedra_are_reported) {
+    slope[0] = 1, slope[1] = slope[2] = 0;
+    mesh m = lattice_mesh(4, linear, NULL);
+    size_t count = m.view.tet_count;
+    uint32_t (*more)[4] = (uint32_t(*)[4])malloc((count + 5) * sizeof *more);
+    memcpy(more, m.tets, count * sizeof *more);
+    const uint32_t flat[5][4] = {{0, 1, 2, 3}, {0, 1, 4, 5}, {7, 7, 8, 9}, {5, 5, 5, 5}, {0, 0, 0, 0}};
+    memcpy(more + count, flat, sizeof flat);
+    memcpy(more + count + 4, more, sizeof *more); /* the first once more: its faces are crowded */
+    free(m.tets);
+    m.tets = more, m.view.tets = (const uint32_t(*)[4])more, m.view.tet_count = count + 5;
+    uint32_t swap = m.tets[3][0];
+    m.tets[3][0] = m.tets[3][1], m.tets[3][1] = swap; /* turned inside out */
+    mesh_build(&m);
+    CHECK(m.report.degenerate == 4 && m.report.crowded > 0, "%zu degenerate, %zu crowded", m.report.degenerate, m.report.crowded);
+    const isogi_transfer_point medium = {0, {1, 1, 1}, 0.5f};
+    const isogi_transfer fog = {&medium, 1, NULL, 0};
+    const isogi_tet_desc desc = {.space = ISOGI_DVR_DATA, .opaque = 1};
+    const double eye[3] = {-5, 1.3, 1.6}, target[3] = {5, 1.3, 1.6};
+    pixel p = cast_tets(m.built, &desc, &fog, eye, target);
+    CHECK(fabs((double)p.c[3] + expm1(-0.5)) < 1e-6, "opacity %g", (double)p.c[3]);
+    mesh_free(&m);
+}
+
+/* Two blocks whose points coincide without being the same: the seam shows nothing, and a peak that lies in it is crossed once. */
+TEST(blocks_that_touch_look_as_one) {
+    slope[0] = 1, slope[1] = 0.2, slope[2] = 0.1;
+    mesh m = lattice_mesh(4, linear, NULL);
+    size_t n = m.view.point_count, count = m.view.tet_count;
+    float(*points)[3] = (float(*)[3])malloc(2 * n * sizeof *points), *values = (float *)malloc(2 * n * sizeof *values);
+    uint32_t(*tets)[4] = (uint32_t(*)[4])malloc(2 * count * sizeof *tets);
+    for (size_t i = 0; i < 2 * n; i++) {
+        for (int a = 0; a < 3; a++) points[i][a] = m.points[i % n][a] + (i >= n && a == 0 ? 3.0f : 0.0f);
+        values[i] = points[i][0] / 3 + 0.1f * points[i][1];
+    }
+    for (size_t i = 0; i < 2 * count; i++)
+        for (int k = 0; k < 4; k++) tets[i][k] = m.tets[i % count][k] + (i >= count ? (uint32_t)n : 0);
+    free(m.points), free(m.values), free(m.tets);
+    m.points = points, m.values = values, m.tets = tets;
+    m.view = (isogi_tet_mesh){(const float(*)[3])points, values, 2 * n, (const uint32_t(*)[4])tets, 2 * count};
+    mesh_build(&m);
+    test_random r = {4};
+    for (int i = 0; i < 100; i++) {
+        double y = random_range(&r, 0.2, 2.8), z = random_range(&r, 0.2, 2.8), change = 2;
+        const double eye[3] = {i % 2 ? -5 : 12, (double)(float)y, (double)(float)z}, target[3] = {4, (double)(float)y, (double)(float)z};
+        const isogi_transfer_point medium = {0, {1, 1, 1}, 0.5f};
+        const isogi_peak peak = {1 + (double)0.1f * (double)(float)y, {1, 1, 1}, 0.5f}; /* in the seam */
+        const isogi_transfer fog = {&medium, 1, NULL, 0}, surface = {NULL, 0, &peak, 1};
+        const isogi_tet_desc desc = {.space = ISOGI_DVR_DATA, .opaque = 1};
+        pixel p = cast_tets(m.built, &desc, &fog, eye, target), q = cast_tets(m.built, &desc, &surface, eye, target);
+        CHECK(fabs((double)p.c[3] + expm1(-0.5 * change)) < 1e-6, "ray %d: opacity %.9g, not %.9g", i, (double)p.c[3], -expm1(-0.5 * change));
+        CHECK(fabs((double)q.c[3] - 0.5) < 1e-6, "ray %d: the peak in the seam has opacity %g", i, (double)q.c[3]);
+    }
+    mesh_free(&m);
+}
+
+static int calls_left, blocks_out;
+static void *failing_alloc(void *user, size_t size, size_t align) {
+    (void)user, (void)align;
+    if (calls_left-- == 0) return NULL;
+    void *p = NULL;
+    blocks_out++;
+    return posix_memalign(&p, align < sizeof(void *) ? sizeof(void *) : align, size) ? NULL : p;
+}
+static void counting_release(void *user, void *p, size_t size) { (void)user, (void)size, blocks_out--, free(p); }
+
+TEST(bad_meshes_are_refused_and_no_memory_is_survived) {
+    slope[0] = 1;
+    mesh m = lattice_mesh(3, linear, NULL);
+    isogi_tets *tets = NULL;
+    isogi_tet_mesh bad;
+    const isogi_context context = {.alloc = failing_alloc, .release = counting_release, .threads = 1};
+#define REFUSED(change, code) bad = m.view, bad.change; CHECK(isogi_dvr_tets_build(&tets, &bad, NULL, &serial) == code && !tets, #change)
+    REFUSED(points = NULL, ISOGI_INVALID);
+    REFUSED(values = NULL, ISOGI_INVALID);
+    REFUSED(tets = NULL, ISOGI_INVALID);
+    REFUSED(point_count = 20, ISOGI_INVALID); /* tetrahedra name points beyond */
+    REFUSED(tet_count = SIZE_MAX / 2, ISOGI_TOO_LARGE);
+    CHECK(isogi_dvr_tets_build(NULL, &m.view, NULL, NULL) == ISOGI_INVALID && isogi_dvr_tets_build(&tets, NULL, NULL, NULL) == ISOGI_INVALID, "NULL");
+    for (int i = 0; i < 3; i++) {
+        float *at = i ? &m.points[13][i] : &m.values[7], was = *at;
+        *at = i == 2 ? INFINITY : NAN;
+        CHECK(isogi_dvr_tets_build(&tets, &m.view, NULL, &serial) == ISOGI_INVALID && !tets, "not finite");
+        *at = was;
+    }
+    int failures = 0;
+    for (int k = 0;; k++) {
+        calls_left = k, blocks_out = 0;
+        isogi_result result = isogi_dvr_tets_build(&tets, &m.view, NULL, &context);
+        if (result == ISOGI_OK) break;
+        CHECK(result == ISOGI_NO_MEMORY && !tets && blocks_out == 0, "%s, %d blocks left", isogi_result_string(result), blocks_out);
+        failures++;
+    }
+    CHECK(failures == 6, "%d allocations", failures);
+    float image[1][4] = {{7, 7, 7, 7}}, depth;
+    const double eye[3] = {-3, 1.1, 1.2}, target[3] = {3, 1.1, 1.2};
+    isogi_view view = line_of_sight(eye, target);
+    int before = blocks_out;
+    for (int k = 0;; k++) {
+        calls_left = k;
+        isogi_result result = isogi_dvr_tets_render(tets, NULL, &both, &view, image, &depth, NULL);
+        CHECK(blocks_out == before, "%d blocks, not %d", blocks_out, before);
+        if (result == ISOGI_OK) break;
+        CHECK(result == ISOGI_NO_MEMORY && image[0][0] > 6.9f, "%s", isogi_result_string(result));
+    }
+    isogi_tet_desc desc = {.unit = -1};
+    calls_left = 1 << 30;
+    CHECK(isogi_dvr_tets_render(tets, &desc, &both, &view, image, NULL, NULL) == ISOGI_INVALID, "unit");
+    desc.unit = 0, desc.opaque = 2;
+    CHECK(isogi_dvr_tets_render(tets, &desc, &both, &view, image, NULL, NULL) == ISOGI_INVALID, "opaque");
+    CHECK(isogi_dvr_tets_render(tets, NULL, NULL, &view, image, NULL, NULL) == ISOGI_INVALID, "no transfer function");
+    isogi_dvr_tets_free(tets), isogi_dvr_tets_free(NULL);
+    /* nothing at all */
+    const isogi_tet_mesh empty = {NULL, NULL, 0, NULL, 0};
+    CHECK(isogi_dvr_tets_build(&tets, &empty, NULL, &serial) == ISOGI_OK, "an empty mesh");
+    CHECK(isogi_dvr_tets_render(tets, NULL, &both, &view, image, &depth, NULL) == ISOGI_OK && image[0][3] <= 0 && depth > 1e30f, "an empty picture");
+    isogi_dvr_tets_free(tets);
+    mesh_free(&m);
+}
+
+/* ---- real meshes ---- */
+
+static int read_tets(const char *name, mesh *m) {
+    char *path = test_data(name);
+    FILE *file = path ? fopen(path, "rb") : NULL;
+    int32_t head[3] = {0};
+    free(path);
+    if (!file) return 0;
+    size_t ok = fread(head, 4, 3, file), n = (size_t)head[1], t = (size_t)head[2];
+    m->points = (float(*)[3])malloc(n * 12), m->values = (float *)malloc(n * 4), m->tets = (uint32_t(*)[4])malloc(t * 16);
+    ok = ok == 3 && fread(m->points, 12, n, file) == n && fread(m->values, 4, n, file) == n && fread(m->tets, 16, t, file) == t;
+    fclose(file);
+    m->view = (isogi_tet_mesh){(const float(*)[3])m->points, m->values, n, (const uint32_t(*)[4])m->tets, t};
+    return (int)ok;
+}
+
+TEST(simulations_on_tetrahedra_are_drawn) {
+    const char *names[2] = {"tets/bluntfin_density.tet", "tets/comb_density.tet"};
+    for (int n = 0; n < 2; n++) {
+        mesh m = {0};
+        if (!read_tets(names[n], &m)) SKIP("ISOGI_DATA has no tetrahedra");
+        mesh_build(&m);
+        float low[3], high[3], image[400][4];
+        for (int a = 0; a < 3; a++) low[a] = high[a] = m.points[0][a];
+        for (size_t i = 0; i < m.view.point_count; i++)
+            for (int a = 0; a < 3; a++) low[a] = fminf(low[a], m.points[i][a]), high[a] = fmaxf(high[a], m.points[i][a]);
+        isogi_view view = {.width = 20, .height = 20, .fov = 40};
+        for (int a = 0; a < 3; a++) view.target[a] = 0.5f * (low[a] + high[a]), view.eye[a] = view.target[a] + (a == 2 ? 30.0f : 9.0f);
+        /* along every ray, values between crossings agree with brute force: opacity in both spaces */
+        const isogi_transfer_point medium[] = {{0, {1, 0, 0}, 0.2f}, {1, {0, 1, 0}, 0.5f}, {3, {0, 0, 1}, 1}};
+        const isogi_transfer fog = {medium, 3, NULL, 0};
+        static stretch s[8000];
+        double most = 0;
+        int rays = 0;
+        for (int space = 0; space < 2; space++) {
+            const isogi_tet_desc desc = {.space = (isogi_dvr_space)space, .unit = 3, .opaque = 1};
+            isogi_counters count = {0};
+            CHECK(isogi_dvr_tets_render(m.built, &desc, &fog, &view, image, NULL, &count) == ISOGI_OK, "render");
+            for (int i = 0; i < 400; i += LONG_SUITE ? 9 : 133) {
+                double origin[3], d[3];
+                float dir[3];
+                long double expected[4];
+                isogi_view_ray(&view, i % 20, i / 20, origin, dir);
+                for (int a = 0; a < 3; a++) d[a] = (double)dir[a];
+                int found = brute_stretches(&m.view, origin, d, s);
+                if (!space)
+                    for (int k = 0; k < found; k++) s[k].t[0] /= 3, s[k].t[1] /= 3;
+                brute_integral(s, found, &fog, space, expected);
+                for (int a = 0; a < 4; a++) most = fmax(most, fabs((double)image[i][a] - (double)(a < 3 ? expected[a] : 1 - expected[3])));
+                rays += found > 0;
+            }
+        }
+        printf("    %s: %zu degenerate, %zu crowded, %zu border faces; largest difference from brute force %.2g in %d rays\n", names[n], m.report.degenerate,
+               m.report.crowded, m.report.border, most, rays);
+        CHECK(most < 2e-4 && rays > 1, "largest difference %g in %d rays", most, rays);
+        mesh_free(&m);
+    }
+}
+
+TEST_MAIN("dvr_tets")
