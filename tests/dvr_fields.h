@@ -94,7 +94,7 @@ static pixel cast(const isogi_dvr *dvr, const double eye[3], const double target
 }
 
 /* A random line through the box, from outside, whose ends are floats. */
-static void random_line(const field *f, test_random *r, double eye[3], double target[3]) {
+__attribute__((unused)) static void random_line(const field *f, test_random *r, double eye[3], double target[3]) {
     double d[3];
     random_direction(r, d);
     for (int a = 0; a < 3; a++) {
@@ -128,7 +128,7 @@ static double largest_difference(float (*a)[4], float (*b)[4], int pixels) {
     return most;
 }
 
-static double rms_difference(float (*a)[4], float (*b)[4], int pixels) {
+__attribute__((unused)) static double rms_difference(float (*a)[4], float (*b)[4], int pixels) {
     double sum = 0;
     for (int i = 0; i < 4 * pixels; i++) sum += pow((double)a[i / 4][i % 4] - (double)b[i / 4][i % 4], 2);
     return sqrt(sum / (4 * pixels));
@@ -149,7 +149,7 @@ static void reference_transfer(const isogi_transfer *t, long double x, long doub
 }
 
 /* The trilinear value within a given cell. */
-static long double reference_value(const field *f, const int c[3], const long double p[3]) {
+__attribute__((unused)) static long double reference_value(const field *f, const int c[3], const long double p[3]) {
     long double value = 0;
     for (int n = 0; n < 8; n++) {
         long double w = 1;
