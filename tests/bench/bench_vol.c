@@ -2,19 +2,23 @@
 
        build/bench/bench_vol [--quick] OUT.csv
 
-   One thread, CPU seconds, medians of several runs in one process. Rays: error = missed + extra hits per million, against
-   tests/reference_ray.h on a sample of the rays. Other rows name their error in `setting`. */
+   One thread, CPU seconds, medians of several runs in one process. Rays: error = missed + extra hits per million; `default` against
+   tests/reference_ray.h on a sample of the rays, the other methods (usual_rays.h) against `default`, on one ray of METHOD_STRIDE. t99:
+   99th percentile of the error of t in voxels. Per ray: blocks, cells and cubics looked at. Other rows name their error in `setting`.
+   A table of goals and peers' figures for the same work is printed at the end. */
 #define ISOGI_IMPLEMENTATION
 #include "isogi_vol.h"
 #include "reference_ray.h"
+#include "usual_rays.h"
 #include <stdio.h>
 #include <string.h>
 #include <time.h>
 
-enum { N = 256, WIDTH = 1024, RAYS = WIDTH * WIDTH, BUNDLE = 64 };
+enum { N = 256, WIDTH = 1024, RAYS = WIDTH * WIDTH, BUNDLE = 64, METHOD_STRIDE = 16, LARGEST = 512 };
 
 typedef struct scene {
-    const char *name;
+    char name[24];
+    int n; /* voxels a side */
     double isovalue;
     float *data;
     double *reference; /* the same values for the reference */
@@ -44,12 +48,20 @@ static double median(double *seconds, int n) {
     return seconds[n / 2];
 }
 
+/* What the table at the end compares. */
+static struct { char name[48]; double speed; } result[128];
+static int results;
+
 static void row(const char *name, const char *scene_name, const char *method, const char *setting, double seconds, double error, double work,
                 const char *unit) {
     fprintf(csv, "isogi_vol.h,%s%s%s,%s,%s,%.6g,%.6g,%.6g,%s\n", name, scene_name ? "-" : "", scene_name ? scene_name : "", method, setting,
             seconds, error, work, unit);
     fflush(csv);
-    fprintf(stderr, "  %-20s %-10s %-24s %9.3f M%s  error %.3g\n", name, scene_name ? scene_name : "", setting, work / seconds / 1e6, unit, error);
+    fprintf(stderr, "  %-20s %-10s %-10s %9.3f M%s  error %.3g  %s\n", name, scene_name ? scene_name : "", method, work / seconds / 1e6, unit, error, setting);
+    if (!strcmp(method, "default") && results < 128) {
+        snprintf(result[results].name, sizeof result->name, "%s%s%s", name, scene_name ? "-" : "", scene_name ? scene_name : "");
+        result[results++].speed = work / seconds / 1e6;
+    }
 }
 
 static uint64_t random_state;
@@ -63,20 +75,23 @@ static double random_unit(void) {
 /* ---- the fields and rays of the design ---- */
 
 /* Both fields are sums of products of functions of one or two coordinates: one sine a row instead of one a voxel. */
-static void field_fill(float *data, int gyroid) {
-    static double s[N], c[N], wave[N * N];
-    for (int i = 0; i < N; i++) {
-        double x = -1 + 2.0 * i / (N - 1);
+static void field_fill(float *data, int gyroid, int n) {
+    static double s[LARGEST], c[LARGEST];
+    double *wave = (double *)malloc((size_t)n * (size_t)n * sizeof *wave);
+    const size_t size = (size_t)n;
+    for (int i = 0; i < n; i++) {
+        double x = -1 + 2.0 * i / (n - 1);
         s[i] = gyroid ? sin(2 * pi * (x + 1)) : sin(pi * x / 2), c[i] = cos(2 * pi * (x + 1));
     }
-    for (int i = 0; i < N * N && !gyroid; i++) {
-        double x = -1 + 2.0 * (i % N) / (N - 1), y = -1 + 2.0 * (double)(i / N) / (N - 1);
+    for (int i = 0; i < n * n && !gyroid; i++) {
+        double x = -1 + 2.0 * (i % n) / (n - 1), y = -1 + 2.0 * (double)(i / n) / (n - 1);
         wave[i] = cos(2 * pi * 6 * cos(pi * sqrt(x * x + y * y) / 2));
     }
-    for (size_t i = 0; i < (size_t)N * N * N; i++) {
-        size_t x = i % N, y = i / N % N, z = i / N / N;
-        data[i] = (float)(gyroid ? s[x] * c[y] + s[y] * c[z] + s[z] * c[x] : (1 - s[z] + 0.25 * (1 + wave[i % (N * N)])) / (2 * (1 + 0.25)));
+    for (size_t i = 0; i < size * size * size; i++) {
+        size_t x = i % size, y = i / size % size, z = i / size / size;
+        data[i] = (float)(gyroid ? s[x] * c[y] + s[y] * c[z] + s[z] * c[x] : (1 - s[z] + 0.25 * (1 + wave[i % (size * size)])) / (2 * (1 + 0.25)));
     }
+    free(wave);
 }
 
 static void primary_rays(isogi_ray *rays, double isovalue) {
@@ -105,11 +120,11 @@ static void cosine_direction(const float n[3], float out[3]) {
     for (int a = 0; a < 3; a++) out[a] = (float)(d[a] / sqrt(l));
 }
 
-static void surface_ray(isogi_ray *ray, const float position[3], const float normal[3], double isovalue) {
+static void surface_ray(isogi_ray *ray, const float position[3], const float normal[3], const scene *s) {
     memset(ray, 0, sizeof *ray);
-    for (int a = 0; a < 3; a++) ray->origin[a] = (double)position[a] + (double)normal[a] * 0.25 * 2 / (N - 1);
+    for (int a = 0; a < 3; a++) ray->origin[a] = (double)position[a] + (double)normal[a] * 0.25 * 2 / (s->n - 1);
     cosine_direction(normal, ray->dir);
-    ray->isovalue = isovalue;
+    ray->isovalue = s->isovalue;
 }
 
 /* Cosine-distributed rays from primary hit points in shuffled order; and bundles of 64 from one point each. */
@@ -129,27 +144,28 @@ static void surface_rays(scene *s) {
         float position[1][3], normal[1][3];
         isogi_vol_positions(s->pyramid, &hits[p % count], 1, position);
         isogi_vol_normals(s->pyramid, &hits[p % count], 1, ISOGI_NORMAL_SMOOTH, normal);
-        surface_ray(&s->surface[i], position[0], normal[0], s->isovalue);
+        surface_ray(&s->surface[i], position[0], normal[0], s);
         if (i % BUNDLE) continue;
-        for (size_t k = 0; k < BUNDLE; k++) surface_ray(&s->bundles[i + k], position[0], normal[0], s->isovalue);
+        for (size_t k = 0; k < BUNDLE; k++) surface_ray(&s->bundles[i + k], position[0], normal[0], s);
     }
     free(hits);
 }
 
-static scene scene_new(int gyroid) {
-    scene s = {.name = gyroid ? "gyroid256" : "ml256", .isovalue = gyroid ? 0 : 0.5};
-    size_t voxels = (size_t)N * N * N;
+static scene scene_new(int gyroid, int n) {
+    scene s = {.n = n, .isovalue = gyroid ? 0 : 0.5};
+    size_t voxels = (size_t)n * (size_t)n * (size_t)n;
+    snprintf(s.name, sizeof s.name, "%s%d", gyroid ? "gyroid" : "ml", n);
     s.data = (float *)malloc(voxels * sizeof(float)), s.reference = (double *)malloc(voxels * sizeof(double));
-    field_fill(s.data, gyroid);
+    field_fill(s.data, gyroid, n);
     for (size_t i = 0; i < voxels; i++) s.reference[i] = (double)s.data[i];
-    isogi_volume volume = {.data = s.data, .type = ISOGI_F32, .size = {N, N, N}};
-    for (int a = 0; a < 3; a++) volume.spacing[a] = 2.0 / (N - 1), volume.origin[a] = -1;
+    isogi_volume volume = {.data = s.data, .type = ISOGI_F32, .size = {(size_t)n, (size_t)n, (size_t)n}};
+    for (int a = 0; a < 3; a++) volume.spacing[a] = 2.0 / (n - 1), volume.origin[a] = -1;
     if (isogi_vol_build(&s.pyramid, &volume, &serial) != ISOGI_OK) exit(1);
     s.primary = (isogi_ray *)malloc(RAYS * sizeof(isogi_ray));
     s.surface = (isogi_ray *)malloc(RAYS * sizeof(isogi_ray));
     s.bundles = (isogi_ray *)malloc(RAYS * sizeof(isogi_ray));
     primary_rays(s.primary, s.isovalue);
-    surface_rays(&s);
+    if (n == N) surface_rays(&s);
     return s;
 }
 
@@ -162,8 +178,8 @@ static void scene_free(scene *s) {
 
 /* Missed and extra hits per million among a sample spread over the rays; *t99: 99th percentile of the error of t in voxels. */
 static double wrong_hits(const scene *s, const isogi_ray *rays, const isogi_hit *hits, const uint8_t *occluded, double *t99) {
-    reference_field field = {s->reference, {N, N, N}, 1e-10L};
-    double *error = (double *)malloc((size_t)sampled * sizeof *error), h = 2.0 / (N - 1);
+    reference_field field = {s->reference, {s->n, s->n, s->n}, 1e-10L};
+    double *error = (double *)malloc((size_t)sampled * sizeof *error), h = 2.0 / (s->n - 1);
     int wrong = 0, decided = 0, compared = 0;
     for (int i = 0; i < sampled; i++) {
         size_t r = (size_t)i * (RAYS / (size_t)sampled);
@@ -181,23 +197,64 @@ static double wrong_hits(const scene *s, const isogi_ray *rays, const isogi_hit 
     return 1e6 * wrong / (decided ? decided : 1);
 }
 
-static void bench_rays(const scene *s, const char *name, const isogi_ray *rays, size_t batch, int any) {
+/* The usual methods over one ray of METHOD_STRIDE; truth: what the default found. */
+static void bench_usual(const scene *s, const char *name, const isogi_ray *rays, const isogi_hit *truth) {
+    static const char *const names[USUAL_METHODS] = {"float", "double", "marching", "cardano"};
+    const size_t count = RAYS / METHOD_STRIDE;
+    double *t = (double *)malloc(count * sizeof *t), *error = (double *)malloc(count * sizeof *error);
+    for (int m = 0; m < USUAL_METHODS; m++) {
+        size_t wrong = 0, compared = 0;
+        double start = cpu_seconds(), seconds;
+        char setting[64];
+        for (size_t i = 0; i < count; i++)
+            if (!usual_trace(s->pyramid, (usual_method)m, &rays[i * METHOD_STRIDE], &t[i])) t[i] = -1;
+        seconds = cpu_seconds() - start;
+        for (size_t i = 0; i < count; i++) {
+            const isogi_hit *hit = &truth[i * METHOD_STRIDE];
+            wrong += (t[i] >= 0) != (hit->side != 0);
+            if (t[i] >= 0 && hit->side) error[compared++] = fabs(t[i] - hit->t) * (s->n - 1) / 2;
+        }
+        qsort(error, compared, sizeof *error, compare_doubles);
+        snprintf(setting, sizeof setting, "one ray a call; t99 %.2g voxels", compared ? error[compared * 99 / 100] : 0);
+        row(name, s->name, names[m], setting, seconds, 1e6 * (double)wrong / (double)count, (double)count, "rays");
+    }
+    free(t), free(error);
+}
+
+/* A call of the library over all rays, `batch` at a time. bundle: rays of a batch share their origin. */
+static void trace_all(const scene *s, const isogi_ray *rays, size_t batch, int bundle, isogi_hit *hits, uint8_t *occluded, isogi_counters *counters) {
+    static float dirs[BUNDLE][3];
+    for (size_t i = 0; i < RAYS; i += batch) {
+        if (bundle) {
+            isogi_bundle b = {.isovalue = s->isovalue};
+            memcpy(b.origin, rays[i].origin, sizeof b.origin);
+            for (size_t k = 0; k < BUNDLE; k++) memcpy(dirs[k], rays[i + k].dir, sizeof dirs[k]);
+            isogi_vol_bundle(s->pyramid, &b, (const float(*)[3])dirs, BUNDLE, hits + i, counters);
+        } else if (occluded) isogi_vol_occluded(s->pyramid, rays + i, batch, occluded + i, counters);
+        else isogi_vol_intersect(s->pyramid, rays + i, batch, hits + i, counters);
+    }
+}
+
+enum { FIRST, ANY, SHARED };
+
+static void bench_rays(const scene *s, const char *name, const isogi_ray *rays, size_t batch, int kind, int usual) {
     isogi_hit *hits = (isogi_hit *)malloc(RAYS * sizeof *hits);
     uint8_t *occluded = (uint8_t *)malloc(RAYS);
+    isogi_counters count = {0};
     double seconds[16], t99 = 0, error;
-    char setting[64];
+    char setting[128], looked[64];
+    trace_all(s, rays, batch, kind == SHARED, hits, kind == ANY ? occluded : NULL, &count);
     for (int run = 0; run < runs; run++) {
         double start = cpu_seconds();
-        for (size_t i = 0; i < RAYS; i += batch) {
-            if (any) isogi_vol_occluded(s->pyramid, rays + i, batch, occluded + i, NULL);
-            else isogi_vol_intersect(s->pyramid, rays + i, batch, hits + i, NULL);
-        }
+        trace_all(s, rays, batch, kind == SHARED, hits, kind == ANY ? occluded : NULL, NULL);
         seconds[run] = cpu_seconds() - start;
     }
-    error = wrong_hits(s, rays, any ? NULL : hits, any ? occluded : NULL, &t99);
-    if (any) snprintf(setting, sizeof setting, "batch %zu", batch);
-    else snprintf(setting, sizeof setting, "batch %zu; t99 %.2g voxels", batch, t99);
+    error = wrong_hits(s, rays, kind == ANY ? NULL : hits, kind == ANY ? occluded : NULL, &t99);
+    snprintf(looked, sizeof looked, "per ray %.2f blocks %.2f cells %.2f cubics", (double)count.blocks / RAYS, (double)count.cells / RAYS, (double)count.cubics / RAYS);
+    if (kind == ANY) snprintf(setting, sizeof setting, "batch %zu; %s", batch, looked);
+    else snprintf(setting, sizeof setting, "batch %zu; t99 %.2g voxels; %s", batch, t99, looked);
     row(name, s->name, "default", setting, median(seconds, runs), error, RAYS, "rays");
+    if (usual) bench_usual(s, name, rays, hits);
     free(hits), free(occluded);
 }
 
@@ -215,40 +272,77 @@ static void bench_build(const scene *s) {
     row("pyramid-256", NULL, "default", "float32; error: none possible", median(seconds, runs), 0, (double)N * N * N, "voxels");
 }
 
-/* Points along primary rays at half-voxel steps, or anywhere. */
-static void bench_samples(const scene *s, const char *name, int smooth, int random) {
-    size_t count = 1 << 21;
-    float(*points)[3] = (float(*)[3])malloc(count * sizeof *points), (*gradients)[3] = (float(*)[3])malloc(count * sizeof *gradients);
-    float *values = (float *)malloc(count * sizeof *values);
-    double seconds[16], worst = 0, h = 2.0 / (N - 1);
-    random_state = 2;
-    for (size_t i = 0; i < count; i++) {
-        const isogi_ray *ray = &s->primary[i / 256 * 128];
-        double t = 1.9 + 0.5 * h * (double)(i % 256);
-        for (int a = 0; a < 3; a++) points[i][a] = (float)(random ? 2 * random_unit() - 1 : ray->origin[a] + t * (double)ray->dir[a]);
+/* A cubic B-spline by its definition, for places whose 64 voxels exist. */
+static real spline_at(const scene *s, const int cell[3], const real u[3]) {
+    real sum = 0;
+    for (int t = 0; t < 64; t++) {
+        const int tap[3] = {t & 3, t >> 2 & 3, t >> 4};
+        real weight = 1;
+        for (int a = 0; a < 3; a++) {
+            const real x = fabsl(u[a] - (tap[a] - 1)), y = 2 - x;
+            weight *= x < 1 ? ((real)4 - 6 * x * x + 3 * x * x * x) / 6 : y * y * y / 6;
+        }
+        sum += weight * (real)s->reference[(cell[0] + tap[0] - 1) + (ptrdiff_t)s->n * ((cell[1] + tap[1] - 1) + (ptrdiff_t)s->n * (cell[2] + tap[2] - 1))];
     }
-    for (int run = 0; run < runs; run++) {
-        double start = cpu_seconds();
-        if (smooth) isogi_vol_sample_smooth(s->pyramid, (const float(*)[3])points, count, values, gradients);
-        else isogi_vol_sample(s->pyramid, (const float(*)[3])points, count, values, NULL);
-        seconds[run] = cpu_seconds() - start;
-    }
-    /* error against long double on a sample; of the smooth ones, only the trilinear part has a reference here */
-    reference_field field = {s->reference, {N, N, N}, 0};
-    for (size_t i = 0; i < count && !smooth; i += 1009) {
-        real p[3];
-        int cell[3];
+    return sum;
+}
+
+/* Largest error of a sample of values, against long double. */
+static double worst_sample(const scene *s, const float (*points)[3], const float *values, size_t count, int smooth, double unit, double low) {
+    double worst = 0, h = 2.0 / (s->n - 1);
+    reference_field field = {s->reference, {s->n, s->n, s->n}, 0};
+    for (size_t i = 0; i < count; i += 1009) {
+        real p[3], u[3], truth;
+        int cell[3], inner = 1;
         for (int a = 0; a < 3; a++) {
             p[a] = ((real)points[i][a] + 1) / (real)h;
-            p[a] = p[a] < 0 ? 0 : p[a] > N - 1 ? N - 1 : p[a];
-            cell[a] = (int)p[a] > N - 2 ? N - 2 : (int)p[a];
+            p[a] = p[a] < 0 ? 0 : p[a] > s->n - 1 ? s->n - 1 : p[a];
+            cell[a] = (int)p[a] > s->n - 2 ? s->n - 2 : (int)p[a], u[a] = p[a] - cell[a];
+            inner &= cell[a] > 0 && cell[a] < s->n - 2;
         }
-        double e = fabs((double)(reference_value(&field, cell, p, 0) - (real)values[i]));
+        if (smooth && !inner) continue;
+        truth = smooth ? spline_at(s, cell, u) : reference_value(&field, cell, p, 0);
+        double e = fabs((double)(truth - ((real)values[i] * (real)unit + (real)low)));
         worst = e > worst ? e : worst;
     }
-    row(name, NULL, "default", smooth ? "value and gradient; error in test_vol" : "error: largest of value", median(seconds, runs), worst, (double)count,
-        "samples");
-    free(points), free(gradients), free(values);
+    return worst;
+}
+
+enum { FAR_RAYS, NEIGHBOURS, ANYWHERE };
+
+/* Points along primary rays at half-voxel steps, 32 pixels apart or neighbours, or anywhere. bytes: the field in 8 bits. */
+static void bench_samples(const scene *s, const char *name, int smooth, int places, int bytes) {
+    const size_t count = 1 << 21, voxels = (size_t)N * N * N;
+    float(*points)[3] = (float(*)[3])malloc(count * sizeof *points), (*gradients)[3] = (float(*)[3])malloc(count * sizeof *gradients);
+    float *values = (float *)malloc(count * sizeof *values);
+    uint8_t *raw = (uint8_t *)malloc(bytes ? voxels : 1);
+    double seconds[16], worst, h = 2.0 / (N - 1);
+    isogi_pyramid *pyramid = s->pyramid;
+    if (bytes) { /* values from -1.5 to 1.5 */
+        isogi_volume v = *isogi_vol_volume(s->pyramid);
+        for (size_t i = 0; i < voxels; i++) raw[i] = (uint8_t)(((double)s->data[i] + 1.5) * 85), s->reference[i] = raw[i] / 85.0 - 1.5;
+        v.data = raw, v.type = ISOGI_U8, v.stride[0] = v.stride[1] = v.stride[2] = 0;
+        if (isogi_vol_build(&pyramid, &v, &serial) != ISOGI_OK) exit(1);
+    }
+    random_state = 2;
+    for (size_t i = 0; i < count; i++) {
+        const isogi_ray *ray = &s->primary[places == NEIGHBOURS ? RAYS / 2 - WIDTH * 2 + i / 256 : i / 256 * 128];
+        double t = 1.9 + 0.5 * h * (double)(i % 256);
+        for (int a = 0; a < 3; a++) points[i][a] = (float)(places == ANYWHERE ? 2 * random_unit() - 1 : ray->origin[a] + t * (double)ray->dir[a]);
+    }
+    for (int run = -1; run < runs; run++) { /* the first run touches the memory */
+        double start = cpu_seconds();
+        if (smooth) isogi_vol_sample_smooth(pyramid, (const float(*)[3])points, count, values, gradients);
+        else isogi_vol_sample(pyramid, (const float(*)[3])points, count, values, NULL);
+        if (run >= 0) seconds[run] = cpu_seconds() - start;
+    }
+    worst = worst_sample(s, (const float(*)[3])points, values, count, smooth, bytes ? 1 / 85.0 : 1, bytes ? -1.5 : 0);
+    row(name, NULL, "default", smooth ? "value and gradient; error: largest of value" : "error: largest of value", median(seconds, runs), worst, (double)count, "samples");
+    if (bytes) {
+        isogi_vol_free(pyramid);
+        for (size_t i = 0; i < voxels; i++) s->reference[i] = (double)s->data[i];
+    }
+    free(points), free(gradients), free(values), free(raw);
 }
 
 static void bench_mesh(const scene *s, const char *name, int normals) {
@@ -271,32 +365,73 @@ static void bench_mesh(const scene *s, const char *name, int normals) {
     isogi_vol_mesh_free(s->pyramid, &mesh);
 }
 
+/* ---- goals and peers, as measured on another machine of the same kind; ours / goal says how far the goal is ---- */
+
+static void print_table(void) {
+    static const struct { const char *name; double goal; const char *peers; } lines[] = {
+        {"primary1-ml256", 7, "Embree 6.9, Open VKL 0.28, OpenVDB 0.97"},
+        {"primary1-gyroid256", 7, "Embree 5.5, Open VKL 0.31, OpenVDB 0.91"},
+        {"primary16-ml256", 18, "Embree 18.0, Open VKL 2.7"},
+        {"primary16-gyroid256", 18, "Embree 16.5, Open VKL 2.6"},
+        {"surface-ml256", 4, "Embree 1.6, Open VKL 0.43, OpenVDB 0.44"},
+        {"surface-gyroid256", 4, "Embree 1.9, Open VKL 0.40, OpenVDB 0.41"},
+        {"anyhit-ml256", 5, "Embree 1.7"},
+        {"anyhit-gyroid256", 5, "Embree 2.2"},
+        {"bundle64-ml256", 8, "Embree 1.4"},
+        {"bundle64-gyroid256", 8, "Embree 1.6"},
+        {"pyramid-256", 419, "Open VKL 258 (65 ms), OpenVDB 140-210"},
+        {"trilinear-along-rays", 300, "Open VKL 89 (16 wide), 33 (scalar call)"},
+        {"tricubic-along-rays", 40, "Open VKL 15"},
+        {"tricubic-random", 5, "Open VKL 3.9"},
+        {"mesh-gyroid256", 280, "FlyingEdges3D 224 (75 ms), MarchingCubes 42"},
+        {"mesh-normals-gyroid256", 210, "FlyingEdges3D 193 (87 ms)"}};
+    printf("%-24s %9s %9s %8s   %s\n", "million a second", "ours", "goal", "of goal", "peers");
+    for (size_t i = 0; i < sizeof lines / sizeof *lines; i++)
+        for (int k = 0; k < results; k++) {
+            if (strcmp(result[k].name, lines[i].name)) continue;
+            printf("%-24s %9.2f %9.0f %7.0f%%   %s\n", lines[i].name, result[k].speed, lines[i].goal, 100 * result[k].speed / lines[i].goal, lines[i].peers);
+        }
+}
+
 int main(int argc, char **argv) {
     const char *path = NULL;
+    int quick = 0;
     for (int i = 1; i < argc; i++) {
-        if (!strcmp(argv[i], "--quick")) runs = 3, sampled = 1000;
+        if (!strcmp(argv[i], "--quick")) quick = 1, runs = 3, sampled = 1000;
         else path = argv[i];
     }
     csv = path ? fopen(path, "w") : NULL;
     if (!csv) return fprintf(stderr, "usage: bench_vol [--quick] OUT.csv\n"), 2;
     fprintf(csv, "header,case,method,setting,seconds,error,work,unit\n");
     for (int gyroid = 0; gyroid < 2; gyroid++) {
-        scene s = scene_new(gyroid);
-        bench_rays(&s, "primary1", s.primary, 1, 0);
-        bench_rays(&s, "primary16", s.primary, 16, 0);
-        bench_rays(&s, "surface", s.surface, RAYS, 0);
-        bench_rays(&s, "anyhit", s.surface, RAYS, 1);
-        bench_rays(&s, "bundle64", s.bundles, BUNDLE, 0);
+        scene s = scene_new(gyroid, N);
+        bench_rays(&s, "primary1", s.primary, 1, FIRST, 0);
+        bench_rays(&s, "primary16", s.primary, 16, FIRST, 1);
+        bench_rays(&s, "surface", s.surface, RAYS, FIRST, 1);
+        bench_rays(&s, "anyhit", s.surface, RAYS, ANY, 0);
+        bench_rays(&s, "bundle64", s.bundles, BUNDLE, SHARED, 0);
         if (gyroid) {
             bench_build(&s);
-            bench_samples(&s, "trilinear-along-rays", 0, 0);
-            bench_samples(&s, "tricubic-along-rays", 1, 0);
-            bench_samples(&s, "tricubic-random", 1, 1);
+            bench_samples(&s, "trilinear-along-rays", 0, FAR_RAYS, 0);
+            bench_samples(&s, "trilinear-along-neighbours", 0, NEIGHBOURS, 0);
+            bench_samples(&s, "trilinear-bytes-along-rays", 0, FAR_RAYS, 1);
+            bench_samples(&s, "tricubic-along-rays", 1, FAR_RAYS, 0);
+            bench_samples(&s, "tricubic-along-neighbours", 1, NEIGHBOURS, 0);
+            bench_samples(&s, "tricubic-bytes-along-rays", 1, FAR_RAYS, 1);
+            bench_samples(&s, "tricubic-random", 1, ANYWHERE, 0);
             bench_mesh(&s, "mesh", 0);
             bench_mesh(&s, "mesh-normals", 1);
         }
         scene_free(&s);
     }
+    /* how cost grows with resolution */
+    for (int n = 64; n <= (quick ? 128 : LARGEST); n *= 2)
+        for (int gyroid = 0; gyroid < 2 && n != N; gyroid++) {
+            scene s = scene_new(gyroid, n);
+            bench_rays(&s, "primary16", s.primary, 16, FIRST, 1);
+            scene_free(&s);
+        }
+    print_table();
     fclose(csv);
     return 0;
 }
