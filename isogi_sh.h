@@ -2684,10 +2684,50 @@ static void isogi_sh__zonal_order5(float *c, const float *zonal, isogi_sh__unit 
     }
 }
 
+#ifdef ISOGI_SH__SIMD
+/* The same in float, for directions of length 1 to 1e-3 (else 0): c[i] is a lobe's factor times a polynomial of z^2, times z where
+   l - m is odd, times cosine or sine of m. Here x, y, z, cm, sm stand in all lanes, and blends pick them. */
+ISOGI_SH__AVX2 static int isogi_sh__zonal_order5_f8(float *c, const float *zonal, const float d[3]) {
+    const isogi_sh__f8 zero = {0}, one = {1, 1, 1, 1, 1, 1, 1, 1};
+    const isogi_sh__f8 a0 = {1.0f, 1.0f, 1.0f, 1.0f, 0.866025404f, 1.73205081f, -0.5f, 1.73205081f};
+    const isogi_sh__f8 a1 = {0, 0, 0, 0, 0, 0, 1.5f, 0};
+    const isogi_sh__f8 b0 = {0.866025404f, 0.790569415f, 1.93649167f, -0.612372436f, -1.5f, -0.612372436f, 1.93649167f, 0.790569415f};
+    const isogi_sh__f8 b1 = {0, 0, 0, 3.06186218f, 2.5f, 3.06186218f, 0, 0};
+    const isogi_sh__f8 d0 = {0.739509973f, 2.09165007f, -0.559016994f, -2.37170825f, 0.375f, -2.37170825f, -0.559016994f, 2.09165007f};
+    const isogi_sh__f8 d1 = {0, 0, 3.91311896f, 5.53398591f, -3.75f, 5.53398591f, 3.91311896f, 0};
+    const isogi_sh__f8 d2 = {0, 0, 0, 0, 4.375f, 0, 0, 0};
+    isogi_sh__f8 x = d[0] - zero, y = d[1] - zero, z = d[2] - zero, e = one - ISOGI_SH__FMA_F8(x, x, ISOGI_SH__FMA_F8(y, y, z * z)), scale;
+    isogi_sh__f8 c2, s2, c3, s3, c4, s4, zz, l2 = zonal[2] - zero, l3 = zonal[3] - zero, l4 = zonal[4] - zero, v, w;
+    if (!(e[0] < 1e-3f && e[0] > -1e-3f)) return 0;
+    scale = ISOGI_SH__FMA_F8(e, ISOGI_SH__FMA_F8(e, one * 0.375f, one * 0.5f), one);
+    x *= scale, y *= scale, z *= scale, zz = z * z;
+    c2 = ISOGI_SH__FMA_F8(x, x, -(y * y)), s2 = (x + x) * y;
+    c3 = ISOGI_SH__FMA_F8(x, c2, -(y * s2)), s3 = ISOGI_SH__FMA_F8(x, s2, y * c2), c4 = ISOGI_SH__FMA_F8(c2, c2, -(s2 * s2)), s4 = (c2 + c2) * s2;
+    /* degrees 0, 1 and 2 but for its last: 1; y 1 x; s2 y 1 x */
+    w = __builtin_shufflevector(one, x, 0, 1, 2, 11, 4, 5, 6, 15), w = __builtin_shufflevector(w, y, 0, 9, 2, 3, 4, 13, 6, 7);
+    w = __builtin_shufflevector(w, s2, 0, 1, 2, 3, 12, 5, 6, 7) * ISOGI_SH__FMA_F8(a1, zz, a0) * __builtin_shufflevector(one, z, 0, 1, 10, 3, 4, 13, 6, 15);
+    v = __builtin_shufflevector(zonal[1] - zero, l2, 0, 1, 2, 3, 12, 13, 14, 15), v = __builtin_shufflevector(v, zonal[0] - zero, 8, 1, 2, 3, 4, 5, 6, 7);
+    *(isogi_sh__f8 *)c = w * v;
+    /* c2; s3 s2 y 1 x c2 c3, and from s4 on */
+    v = __builtin_shufflevector(one, x, 0, 1, 2, 3, 4, 13, 6, 7), v = __builtin_shufflevector(v, y, 0, 1, 2, 11, 4, 5, 6, 7);
+    v = __builtin_shufflevector(v, c2, 8, 1, 2, 3, 4, 5, 14, 7), v = __builtin_shufflevector(v, s2, 0, 1, 10, 3, 4, 5, 6, 7);
+    v = __builtin_shufflevector(v, c3, 0, 1, 2, 3, 4, 5, 6, 15), v = __builtin_shufflevector(v, s3, 0, 9, 2, 3, 4, 5, 6, 7);
+    w = v * ISOGI_SH__FMA_F8(b1, zz, b0) * __builtin_shufflevector(one, z, 0, 1, 10, 3, 12, 5, 14, 7);
+    *(isogi_sh__f8 *)(c + 8) = w * __builtin_shufflevector(l3, l2, 8, 1, 2, 3, 4, 5, 6, 7);
+    w = ISOGI_SH__FMA_F8(ISOGI_SH__FMA_F8(d2, zz, d1), zz, d0) * __builtin_shufflevector(one, z, 0, 9, 2, 11, 4, 13, 6, 15);
+    *(isogi_sh__f8 *)(c + 16) = __builtin_shufflevector(v, s4, 8, 1, 2, 3, 4, 5, 6, 7) * w * l4;
+    c[24] = 0.739509973f * c4[0] * l4[0];
+    return 1;
+}
+#endif
+
 ISOGI_API isogi_result isogi_sh_zonal_to_direction(float *c, int order, const float *zonal, const float direction[3]) {
     double scale[ISOGI_SH_MAX_ORDER], one = 1;
     int l, i;
     if (!c || !zonal || !direction || !isogi_sh__order_ok(order)) return ISOGI_INVALID;
+#ifdef ISOGI_SH__SIMD
+    if (order == 5 && isogi_sh__avx2() && isogi_sh__zonal_order5_f8(c, zonal, direction)) return ISOGI_OK;
+#endif
     if (order == 5) {
         isogi_sh__zonal_order5(c, zonal, isogi_sh__normalise_f32(direction));
         return ISOGI_OK;
@@ -2869,40 +2909,46 @@ ISOGI_SH__AVX2 static void isogi_sh__latitudes_f8(isogi_sh__f8 *c, isogi_sh__f8 
     }
 }
 
+/* c and s, the terms of the product of two Fourier series, from ac, as, bc, bs; sums of what is added and of what is taken away. */
+#define ISOGI_SH__FOURIER(V, FMA)                                                                                              \
+    ISOGI_SH__UNROLL                                                                                                           \
+    for (m = 0; m < 5; m++) {                                                                                                  \
+        V c_more = zero, c_less = zero, s_more = zero, s_less = zero; /* twice the terms, but for those with m = 0 */           \
+        ISOGI_SH__UNROLL                                                                                                       \
+        for (i = 1; i < m; i++) {                                                                                              \
+            c_more = FMA(ac[i], bc[m - i], c_more), c_less = FMA(as[i], bs[m - i], c_less);                                    \
+            s_more = FMA(as[i], bc[m - i], FMA(ac[i], bs[m - i], s_more));                                                     \
+        }                                                                                                                      \
+        ISOGI_SH__UNROLL                                                                                                       \
+        for (i = m + 1; i < 5; i++) {                                                                                          \
+            c_more = FMA(ac[i], bc[i - m], FMA(as[i], bs[i - m], c_more));                                                     \
+            if (!m) continue;                                                                                                  \
+            c_more = FMA(ac[i - m], bc[i], FMA(as[i - m], bs[i], c_more));                                                     \
+            s_more = FMA(as[i], bc[i - m], FMA(ac[i - m], bs[i], s_more));                                                     \
+            s_less = FMA(ac[i], bs[i - m], FMA(as[i - m], bc[i], s_less));                                                     \
+        }                                                                                                                      \
+        if (m) {                                                                                                               \
+            c[m] = (c_more - c_less) * half + FMA(ac[0], bc[m], ac[m] * bc[0]);                                                \
+            s[m] = (s_more - s_less) * half + FMA(ac[0], bs[m], as[m] * bc[0]);                                                \
+        } else {                                                                                                               \
+            c[0] = FMA(ac[0] + ac[0], bc[0], c_more), s[0] = zero;                                                             \
+        }                                                                                                                      \
+    }
+
 ISOGI_SH__AVX2 static void isogi_sh__product_order5(float *out, const float *f, const float *g) {
-    isogi_sh__f8 ac[5], as[5], bc[5], bs[5], zero = {0}, scratch[25], turned[8];
+    isogi_sh__f8 ac[5], as[5], bc[5], bs[5], c[5], s[5], zero = {0}, half = zero + 0.5f, scratch[25], turned[8];
     const isogi_sh__f8 *q = (const isogi_sh__f8 *)isogi_sh__latitudes_f32, weight = q[15];
     int i, l, m;
     isogi_sh__latitudes_f8(ac, as, f);
     isogi_sh__latitudes_f8(bc, bs, g);
+    ISOGI_SH__FOURIER(isogi_sh__f8, ISOGI_SH__FMA_F8)
     ISOGI_SH__UNROLL
     for (m = 0; m < 5; m++) {
-        isogi_sh__f8 c = zero, s = zero; /* twice the terms, but for those with m = 0 */
-        ISOGI_SH__UNROLL
-        for (i = 1; i < m; i++) {
-            c = ISOGI_SH__FMA_F8(ac[i], bc[m - i], c) - as[i] * bs[m - i];
-            s = ISOGI_SH__FMA_F8(as[i], bc[m - i], s) + ac[i] * bs[m - i];
-        }
-        ISOGI_SH__UNROLL
-        for (i = m + 1; i < 5; i++) {
-            if (m) {
-                c += ISOGI_SH__FMA_F8(ac[i], bc[i - m], as[i] * bs[i - m]) + ISOGI_SH__FMA_F8(ac[i - m], bc[i], as[i - m] * bs[i]);
-                s += ISOGI_SH__FMA_F8(as[i], bc[i - m], ac[i - m] * bs[i]) - ISOGI_SH__FMA_F8(ac[i], bs[i - m], as[i - m] * bc[i]);
-            } else {
-                c += ISOGI_SH__FMA_F8(ac[i], bc[i], as[i] * bs[i]);
-            }
-        }
-        if (m) {
-            c = c * 0.5f + ISOGI_SH__FMA_F8(ac[0], bc[m], ac[m] * bc[0]);
-            s = s * 0.5f + ISOGI_SH__FMA_F8(ac[0], bs[m], as[m] * bc[0]);
-        } else {
-            c = ISOGI_SH__FMA_F8(ac[0] + ac[0], bc[0], c);
-        }
-        c *= weight, s *= weight;
+        c[m] *= weight, s[m] *= weight;
         ISOGI_SH__UNROLL
         for (l = m; l < 5; l++, q++) {
-            scratch[l * (l + 1) + m] = *q * c;
-            if (m) scratch[l * (l + 1) - m] = *q * s;
+            scratch[l * (l + 1) + m] = *q * c[m];
+            if (m) scratch[l * (l + 1) - m] = *q * s[m];
         }
     }
     for (i = 0; i < 24; i += 8) {
@@ -2911,6 +2957,73 @@ ISOGI_SH__AVX2 static void isogi_sh__product_order5(float *out, const float *f, 
     }
     out[24] = ((scratch[24][0] + scratch[24][1]) + (scratch[24][2] + scratch[24][3])) + ((scratch[24][4] + scratch[24][5]) + scratch[24][6]);
 }
+
+/* Sixteen products of order 5 with one in each lane. Latitudes z and -z share the parts of a series that are even and odd in z:
+   latitude 3 is the equator. */
+ISOGI_SH__AVX512 ISOGI_SH__INLINE void isogi_sh__parities_f16(isogi_sh__f16 (*even)[5], isogi_sh__f16 (*odd)[5], const isogi_sh__f16 *f, int latitude) {
+    const float *q = isogi_sh__latitudes_f32 + latitude;
+    isogi_sh__f16 zero = {0};
+    int l, m;
+    ISOGI_SH__UNROLL
+    for (m = 0; m < 5; m++) {
+        isogi_sh__f16 part[2][2] = {{zero, zero}, {zero, zero}};
+        ISOGI_SH__UNROLL
+        for (l = m; l < 5; l++, q += 8) {
+            int parity = (l + m) & 1;
+            if (parity && latitude == 3) continue;
+            part[parity][0] = ISOGI_SH__FMA_F16(f[l * (l + 1) + m], *q - zero, part[parity][0]);
+            if (m) part[parity][1] = ISOGI_SH__FMA_F16(f[l * (l + 1) - m], *q - zero, part[parity][1]);
+        }
+        even[0][m] = part[0][0], even[1][m] = part[0][1], odd[0][m] = part[1][0], odd[1][m] = part[1][1];
+    }
+}
+
+ISOGI_SH__AVX512 ISOGI_SH__INLINE void isogi_sh__product_latitude_f16(isogi_sh__f16 *out, const isogi_sh__f16 *f, const isogi_sh__f16 *g, int latitude) {
+    isogi_sh__f16 f_even[2][5], f_odd[2][5], g_even[2][5], g_odd[2][5], ac[5], as[5], bc[5], bs[5], c[5], s[5], sum[2][2][5], zero = {0}, half = zero + 0.5f;
+    const float *q = isogi_sh__latitudes_f32 + latitude, weight = q[8 * 15];
+    int i, l, m, side;
+    isogi_sh__parities_f16(f_even, f_odd, f, latitude);
+    isogi_sh__parities_f16(g_even, g_odd, g, latitude);
+    for (side = 0; side < (latitude == 3 ? 1 : 2); side++) {
+        ISOGI_SH__UNROLL
+        for (m = 0; m < 5; m++) {
+            ac[m] = side ? f_even[0][m] - f_odd[0][m] : f_even[0][m] + f_odd[0][m], as[m] = side ? f_even[1][m] - f_odd[1][m] : f_even[1][m] + f_odd[1][m];
+            bc[m] = side ? g_even[0][m] - g_odd[0][m] : g_even[0][m] + g_odd[0][m], bs[m] = side ? g_even[1][m] - g_odd[1][m] : g_even[1][m] + g_odd[1][m];
+        }
+        ISOGI_SH__FOURIER(isogi_sh__f16, ISOGI_SH__FMA_F16)
+        ISOGI_SH__UNROLL
+        for (m = 0; m < 5; m++) {
+            c[m] *= weight, s[m] *= weight;
+            if (side) sum[0][0][m] += c[m], sum[0][1][m] += s[m], sum[1][0][m] -= c[m], sum[1][1][m] -= s[m];
+            else sum[0][0][m] = c[m], sum[0][1][m] = s[m], sum[1][0][m] = c[m], sum[1][1][m] = s[m];
+        }
+    }
+    ISOGI_SH__UNROLL
+    for (m = 0; m < 5; m++) {
+        ISOGI_SH__UNROLL
+        for (l = m; l < 5; l++, q += 8) {
+            int parity = (l + m) & 1;
+            if (parity && latitude == 3) continue;
+            out[l * (l + 1) + m] = ISOGI_SH__FMA_F16(sum[parity][0][m], *q - zero, out[l * (l + 1) + m]);
+            if (m) out[l * (l + 1) - m] = ISOGI_SH__FMA_F16(sum[parity][1][m], *q - zero, out[l * (l + 1) - m]);
+        }
+    }
+}
+
+ISOGI_SH__AVX512 static void isogi_sh__product_order5_f16(float *out, const float *f, const float *g) {
+    static const int columns[7] = {0, 4, 8, 12, 16, 20, 21};
+    isogi_sh__f16 a[25], b[25], c[25], zero = {0};
+    int i;
+    for (i = 0; i < 7; i++) {
+        isogi_sh__eval_f16_turn((float *)(a + columns[i]), 16, f + columns[i], 25, 0);
+        isogi_sh__eval_f16_turn((float *)(b + columns[i]), 16, g + columns[i], 25, 0);
+    }
+    for (i = 0; i < 25; i++) c[i] = zero;
+    for (i = 0; i < 3; i++) isogi_sh__product_latitude_f16(c, a, b, i);
+    isogi_sh__product_latitude_f16(c, a, b, 3);
+    for (i = 0; i < 4; i++) isogi_sh__eval_f16_turn(out + 100 * i, 25, (const float *)c + 4 * i, 16, 0);
+}
+#undef ISOGI_SH__FOURIER
 #endif
 
 ISOGI_API isogi_result isogi_sh_product(float *out, const float *a, const float *b, int order, size_t count) {
@@ -2920,7 +3033,8 @@ ISOGI_API isogi_result isogi_sh_product(float *out, const float *a, const float 
     n = ISOGI_SH_COUNT(order);
 #ifdef ISOGI_SH__SIMD
     if (order == 5 && isogi_sh__level()) {
-        for (i = 0; i < count; i++) isogi_sh__product_order5(out + n * i, a + n * i, b + n * i);
+        for (i = 0; i + 16 <= count && isogi_sh__level() > 1; i += 16) isogi_sh__product_order5_f16(out + n * i, a + n * i, b + n * i);
+        for (; i < count; i++) isogi_sh__product_order5(out + n * i, a + n * i, b + n * i);
         return ISOGI_OK;
     }
 #endif

@@ -918,7 +918,7 @@ TEST(composed_rotations_do_not_drift) {
 /* A product's expansion is the projection of the product of the functions, by quadrature of the reference; orders 1..7 and, in the long
    suite, 26. Then the matrix of a fixed factor does the same, is symmetric, and many at once are one by one. */
 TEST(products_are_exact) {
-    enum { MAX = 26, COUNT = 3 };
+    enum { MAX = 26, COUNT = 19 };
     static float a[COUNT * MAX * MAX], b[COUNT * MAX * MAX], out[COUNT * MAX * MAX], matrix[MAX * MAX * MAX * MAX];
     static double y[MAX * MAX], expected[MAX * MAX];
     long double node[64], weight[64];
@@ -928,7 +928,7 @@ TEST(products_are_exact) {
         for (int i = 0; i < COUNT * n; i++) a[i] = (float)random_range(&r, -1, 1), b[i] = (float)random_range(&r, -1, 1);
         CHECK(isogi_sh_product(out, a, b, order, COUNT) == ISOGI_OK, "order %d", order);
         reference_nodes(node, weight, latitudes);
-        for (int e = 0; e < COUNT; e++) {
+        for (int e = 0; e < COUNT; e += order == 5 ? 1 : 9) {
             for (int i = 0; i < n; i++) expected[i] = 0;
             for (int i = 0; i < latitudes * longitudes; i++) {
                 double z = (double)node[i / longitudes], s = sqrt(1 - z * z), phi = 2 * pi * (i % longitudes) / longitudes, f = 0, g = 0;
