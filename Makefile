@@ -1,5 +1,6 @@
 # make           the viewer and the example programs, into build/
 # make demo      volume in, globally lit pictures out: build/demo/*.png    (VOLUME=FILE ISO=V for your own)
+# make figures   the figures of the paper, with our data, and how far they are from path tracing: build/figures/index.html
 # make test      the quick tests, under two minutes; ends with "N passed, N failed, N skipped"
 # make check     the long suite: full sizes, every compiler, sanitizer and emulator that is installed
 # make bench     run time against error: build/bench/*.csv and *.svg      (ONLY=sh|vol|trace|dvr QUICK=1)
@@ -59,6 +60,9 @@ demo: export ISO := $(ISO)
 demo: build/viewer
 	@sh examples/demo.sh
 
+figures: build/viewer
+	@sh examples/figures.sh
+
 # ---- tests ----
 
 programs: $(TESTS) $(EXAMPLES)
@@ -87,5 +91,5 @@ clean:
 -include $(wildcard build/*.d build/tests/*.d build/bench/*.d)
 
 FORCE:
-.PHONY: all demo programs test check bench clean FORCE
+.PHONY: all demo figures programs test check bench clean FORCE
 .DELETE_ON_ERROR:

@@ -33,6 +33,10 @@ static const char *const shading_name[4] = {"unlit", "visibility", "local", "two
 static const char *const classification_name[3] = {"exact", "pre-integrated", "post-classified"};
 static const char *const silhouette_name[4] = {"none", "exact", "approximate", "gradient"};
 static const char *const transmission_name[3] = {"none", "diffuse", "specular"};
+static const char *const switch_name[2] = {"off", "on"};
+static const char *const ambient_name[2] = {"constant", "normal"};
+static const char *const normals_name[2] = {"smooth", "trilinear"};
+static const char *const storage_name[5] = {"default", "float", "half", "rgb9e5", "byte"};
 
 typedef struct scene {
     const char *name, *volume; /* "procedural:..." or a file below ISOGI_DATA */
@@ -73,11 +77,11 @@ static const scene scenes[] = {
 #define SCENE_COUNT (sizeof scenes / sizeof scenes[0])
 
 typedef struct options {
-    const char *volume, *env, *tf, *out;
+    const char *volume, *env, *tf, *out, *compare;
     const scene *scene;
-    int width, height, mode, raycast, bounces, samples, threads, stats, antialias, shading, classification, silhouette, transmission, order, directions, lookup;
-    int has_size, has_iso, has_mode, has_spacing, has_albedo, has_clip, has_camera, has_up, has_nan, has_shading;
-    double step, isovalue, spacing[3], clip[4], azimuth, elevation, distance, up[3], exposure, nan_value;
+    int width, height, mode, raycast, bounces, samples, threads, stats, antialias, shading, classification, silhouette, transmission, order, directions, lookup, shadows, ambient, normals, storage;
+    int has_size, has_iso, has_mode, has_spacing, has_albedo, has_clip, has_camera, has_up, has_nan, has_shading, has_shadows, has_ambient;
+    double step, fog, offset, reach, isovalue, spacing[3], clip[4], azimuth, elevation, distance, up[3], exposure, nan_value;
     float albedo[3];
     isogi_light lights[MAX_LIGHTS];
     size_t light_count, lattice[3], grid[3];
@@ -88,7 +92,7 @@ typedef struct viewer {
     isogi_context context;
     isogi_volume volume;
     isogi_pyramid *pyramid;
-    double range[2], isovalue, rotation[9], radius;
+    double range[2], isovalue, rotation[9], radius, centre_distance;
     float albedo[3];
     const procedural_shape *shape;
     camera view;
@@ -135,6 +139,10 @@ static int parse_shading(viewer *v, const char *text) { return parse_name(text, 
 static int parse_classification(viewer *v, const char *text) { return parse_name(text, classification_name, 3, &v->o.classification); }
 static int parse_silhouette(viewer *v, const char *text) { return parse_name(text, silhouette_name, 4, &v->o.silhouette); }
 static int parse_transmission(viewer *v, const char *text) { return parse_name(text, transmission_name, 3, &v->o.transmission); }
+static int parse_shadows(viewer *v, const char *text) { return parse_name(text, switch_name, 2, &v->o.shadows); }
+static int parse_ambient(viewer *v, const char *text) { return parse_name(text, ambient_name, 2, &v->o.ambient); }
+static int parse_normals(viewer *v, const char *text) { return parse_name(text, normals_name, 2, &v->o.normals); }
+static int parse_storage(viewer *v, const char *text) { return parse_name(text, storage_name, 5, &v->o.storage); }
 static int parse_lookup(viewer *v, const char *text) { return parse_name(text, lookup_name, 4, &v->o.lookup); }
 
 static int parse_size(viewer *v, const char *text) {
@@ -200,6 +208,16 @@ static const option option_list[] = {
     {"--lattice", "X,Y,Z", "texels of the illumination texture; default one per voxel", SIZES, AT(lattice), 0, 3, 2, 4096, 0, "three whole numbers, 2 to 4096"},
     {"--lookup", "NAME", "how the texture is read: trilinear, nearest, closest-isovalue, bspline", OTHER, 0, 0, 0, 0, 0, parse_lookup,
      "trilinear, nearest, closest-isovalue or bspline"},
+    {"--shadows", "on|off", "shadows of lights and sky; for lambert and phong, where off is the default, those of lights, per pixel", OTHER, 0, AT(has_shadows), 0,
+     0, 0, parse_shadows, "on or off"},
+    {"--ambient", "constant|normal", "for lambert (default normal) and phong (default constant): the sky's light, the same for all or by normal", OTHER, 0,
+     AT(has_ambient), 0, 0, 0, parse_ambient, "constant or normal"},
+    {"--fog", "X", "fade to the sky's mean light with distance: by exp(-X) from the front of the box's sphere to its back", NUMBERS, AT(fog), 0, 1, 0, 100, 0, "a number, 0 to 100"},
+    {"--normals", "smooth|trilinear", "of the light that is gathered; default smooth", OTHER, 0, 0, 0, 0, 0, parse_normals, "smooth or trilinear"},
+    {"--offset", "X", "rays of light start this many voxels above the surface, negative: on it; default 0.25", NUMBERS, AT(offset), 0, 1, -1, 1, 0, "a number, -1 to 1"},
+    {"--reach", "R", "surfaces further away than this (world units) cast no shadow; default 0 = unlimited", NUMBERS, AT(reach), 0, 1, 0, 1e9, 0, "a number, 0 or more"},
+    {"--storage", "NAME", "how the texture is held: default, float, half, rgb9e5, byte", OTHER, 0, 0, 0, 0, 0, parse_storage, "default, float, half, rgb9e5 or byte"},
+    {"--compare", "FILE.png", "tell how far the picture is from this one: difference_rms, of what is seen, in sRGB values of 0 to 1", TEXT, AT(compare), 0, 0, 0, 0, 0, ""},
     {"--tf", "FILE", "transfer function: lines \"value extinction r g b\" or \"peak value opacity r g b\"", TEXT, AT(tf), 0, 0, 0, 0, 0, ""},
     {"--shading", "NAME", "for dvr and scale-invariant: unlit, visibility, local, two-sided", OTHER, 0, AT(has_shading), 0, 0, 0, parse_shading,
      "unlit visibility local two-sided"},
@@ -295,6 +313,9 @@ static int parse_arguments(viewer *v, int argc, char **argv) {
     if (!o->has_size) o->width = o->height = o->mode >= DVR ? 512 : 900;
     if ((double)o->width * o->height > 100e6) return file_fail(v->error, "--size: %dx%d is too large; at most 100 million pixels", o->width, o->height);
     if (!o->samples) o->samples = 64;
+    if (!o->has_shadows) o->shadows = o->mode > PHONG;
+    if (!o->has_ambient) o->ambient = o->mode != PHONG;
+    if (o->storage == ISOGI_TRACE_RGB9E5 && o->mode == TRANSFER) return file_fail(v->error, "--storage: rgb9e5 holds colours, not the coefficients of --mode transfer");
     return 1;
 }
 
@@ -405,6 +426,8 @@ static int load_volume(viewer *v) {
     result = isogi_vol_build(&v->pyramid, &v->volume, &v->context);
     if (result != ISOGI_OK) return fail(v, "the volume", result);
     isogi_vol_range(v->pyramid, v->range);
+    for (int k = 0; k < 2; k++)
+        if (fabs(v->range[k]) > 1e300) return file_fail(v->error, "%s: values reach %.3g; up to 1e300 can be used", name, v->range[k]);
     stat_seconds(v, "pyramid", begun);
     stat_line(v, "volume", "%s", name);
     stat_line(v, "size", "%zux%zux%zu", v->volume.size[0], v->volume.size[1], v->volume.size[2]);
@@ -449,6 +472,7 @@ static void place_camera(viewer *v) {
     for (int a = 0; a < 3; a++) corner[a] -= centre[a];
     v->radius = sqrt(vector_dot(corner, corner));
     for (int a = 0; a < 3; a++) eye[a] = centre[a] + toward[a] * distance * v->radius;
+    v->centre_distance = distance * v->radius;
     camera_look(&v->view, v->o.width, v->o.height, eye, centre, up, 45);
 }
 
@@ -680,7 +704,8 @@ static int view_surface(viewer *v) {
 static isogi_trace_desc describe_trace(const viewer *v) {
     isogi_trace_desc desc = {.pyramid = v->pyramid, .lighting = v->lighting, .bounces = v->o.mode == VICINITY ? 0 : v->o.bounces,
                              .samples = v->o.samples, .lazy = 1};
-    desc.lookup = (isogi_trace_lookup)v->o.lookup; /* names in the order of the enum */
+    desc.lookup = (isogi_trace_lookup)v->o.lookup, desc.normals = (isogi_normal_kind)v->o.normals; /* names in the order of the enums */
+    desc.storage = (isogi_trace_format)v->o.storage, desc.offset = (float)v->o.offset, desc.reach = (float)v->o.reach, desc.no_shadows = !v->o.shadows;
     desc.mode = v->o.mode == TRANSFER ? ISOGI_TRACE_TRANSFER : ISOGI_TRACE_IRRADIANCE;
     if (v->o.mode == TRANSFER) memset(&desc.lighting, 0, sizeof desc.lighting);
     memcpy(desc.albedo, v->albedo, sizeof desc.albedo);
@@ -714,7 +739,12 @@ static int bake(viewer *v) {
     isogi_counters done = {0};
     double begun = seconds(), remaining = 1, spent;
     uint64_t budget = 100000;
-    isogi_result result = isogi_trace_create(&v->trace, &desc, &v->context);
+    isogi_result result;
+    double bytes = sizeof(void *) / 64.0, machine = (double)sysconf(_SC_PHYS_PAGES) * (double)sysconf(_SC_PAGESIZE);
+    for (int a = 0; a < 3; a++) bytes *= (double)(desc.lattice[a] ? desc.lattice[a] : v->volume.size[a]);
+    if (machine > 0 && bytes > machine / 4)
+        return file_fail(v->error, "--lattice: the table of its bricks alone needs %.1f GiB of this machine's %.1f GiB", bytes / 0x1p30, machine / 0x1p30);
+    result = isogi_trace_create(&v->trace, &desc, &v->context);
     if (result != ISOGI_OK) return fail(v, "the illumination texture", result);
     if (!request_seen(v)) return 0;
     begun = stat_seconds(v, "request", begun);
@@ -736,6 +766,7 @@ static int bake(viewer *v) {
     stat_line(v, "texels_requested", "%llu", (unsigned long long)(done.texels + done.texels_skipped));
     stat_line(v, "texels_computed", "%llu", (unsigned long long)done.texels);
     stat_line(v, "texels_skipped", "%llu", (unsigned long long)done.texels_skipped);
+    stat_line(v, "texture_bytes", "%zu", isogi_trace_memory(v->trace));
     return 1;
 }
 
@@ -812,22 +843,40 @@ static void toward_light(const isogi_light *light, const float point[3], double 
     }
 }
 
+/* The same with the light's shadow on a surface of that normal, where shadows are asked for: one ray, half a voxel above the surface. */
+static void shadowed_light(const viewer *v, const isogi_light *light, const float point[3], const double n[3], double to[3], double *strength) {
+    isogi_ray ray = {.isovalue = v->isovalue};
+    double distance = 0, voxel = fmin(v->volume.spacing[0], fmin(v->volume.spacing[1], v->volume.spacing[2]));
+    uint8_t blocked = 0;
+    toward_light(light, point, to, strength);
+    if (!v->o.shadows || !(vector_dot(to, n) > 0)) return;
+    for (int i = 0; i < 3; i++) {
+        double d = (double)light->vector[i] - (double)point[i];
+        ray.origin[i] = (double)point[i] + 0.5 * voxel * n[i], ray.dir[i] = (float)to[i], distance += d * d;
+    }
+    if (light->kind != ISOGI_LIGHT_DIRECTIONAL) ray.tmax = sqrt(distance);
+    isogi_vol_occluded(v->pyramid, &ray, 1, &blocked, NULL);
+    if (blocked) *strength = 0;
+}
+
 static double clamped_cosine(const double a[3], const double b[3]) {
     double c = vector_dot(a, b);
     return c > 0 ? c : 0;
 }
 
 /* Light by the normal alone: the environment as it would arrive unshadowed, every light by Lambert's law. */
-static void lambert(const viewer *v, const float point[3], const double n[3], double irradiance[3]) {
+static void lambert(const viewer *v, const float point[3], const double n[3], int by_normal, int shadows, double irradiance[3]) {
     ambient_at(v, n, irradiance);
+    for (int i = 0; i < 3 && !by_normal; i++) irradiance[i] = PI * v->mean_light[i];
     for (size_t k = 0; k < v->o.light_count; k++) {
         double to[3], strength;
-        toward_light(&v->o.lights[k], point, to, &strength);
+        if (shadows) shadowed_light(v, &v->o.lights[k], point, n, to, &strength);
+        else toward_light(&v->o.lights[k], point, to, &strength);
         add_scaled(irradiance, v->o.lights[k].rgb, strength * clamped_cosine(n, to));
     }
 }
 
-/* Phong 1975: a constant ambient term, the lights (or where there are none, the direction most of the environment comes from),
+/* Phong 1975: a constant ambient term (or one by normal), the lights (or where there are none, the direction most of the environment comes from),
    and a highlight of exponent 32 that reflects a fifth. Adds the highlight to specular. */
 static void phong(const viewer *v, const float point[3], const double n[3], const float dir[3], double irradiance[3], double specular[3]) {
     double view[3] = {-(double)dir[0], -(double)dir[1], -(double)dir[2]}, reflected[3], facing;
@@ -835,13 +884,16 @@ static void phong(const viewer *v, const float point[3], const double n[3], cons
     vector_normalize(view);
     facing = 2 * vector_dot(n, view);
     for (int i = 0; i < 3; i++) reflected[i] = facing * n[i] - view[i], irradiance[i] = 0.5 * v->mean_light[i];
+    if (v->o.ambient) ambient_at(v, n, irradiance);
     for (size_t k = 0; k < count; k++) {
         double to[3], strength = 1, cosine, highlight;
         float rgb[3];
-        if (v->o.light_count) toward_light(&v->o.lights[k], point, to, &strength), memcpy(rgb, v->o.lights[k].rgb, sizeof rgb);
-        else for (int i = 0; i < 3; i++) to[i] = v->key[i], rgb[i] = (float)v->key_light[i];
+        isogi_light key = {.kind = ISOGI_LIGHT_DIRECTIONAL};
+        const isogi_light *light = v->o.light_count ? &v->o.lights[k] : &key;
+        for (int i = 0; i < 3; i++) key.vector[i] = (float)v->key[i], key.rgb[i] = (float)v->key_light[i];
+        shadowed_light(v, light, point, n, to, &strength), memcpy(rgb, light->rgb, sizeof rgb);
         cosine = clamped_cosine(n, to);
-        add_scaled(irradiance, rgb, strength * cosine);
+        if (!v->o.ambient || light != &key) add_scaled(irradiance, rgb, strength * cosine); /* else it is in the ambient light already */
         highlight = cosine > 0 ? pow(clamped_cosine(reflected, to), 32) : 0;
         add_scaled(specular, rgb, strength * 0.2 * highlight * (32 + 2) / (2 * PI));
     }
@@ -856,12 +908,20 @@ static void section_colour(const viewer *v, const float point[3], float rgb[3]) 
     s = top > 0 ? ((double)value - v->isovalue) / top : 1;
     s = s > 0 ? (s < 1 ? s : 1) : 0;
     if (v->o.mode == VICINITY) light[0] = light[1] = light[2] = PI;
-    else lambert(v, point, n, light);
+    else lambert(v, point, n, 1, 0, light);
     for (int c = 0; c < 3; c++) {
         /* half of the light's colour and of the surface's colour: a section is drawn, not photographed */
         double grey = (light[0] + light[1] + light[2]) / 3, mean = (double)(v->albedo[0] + v->albedo[1] + v->albedo[2]) / 3;
         rgb[c] = (float)((0.5 * light[c] + 0.5 * grey) / PI * (0.5 * (double)v->albedo[c] + 0.5 * mean) * (0.15 + 0.6 * s));
     }
+}
+
+/* OpenGL's exponential fog, in the colour of half the sky's mean light. */
+static void fog(const viewer *v, const float point[3], float rgb[3]) {
+    double to[3], distance = 0, clear;
+    for (int i = 0; i < 3; i++) to[i] = (double)point[i] - v->view.eye[i], distance += to[i] * v->view.forward[i];
+    clear = exp(-v->o.fog * fmax(0, distance - v->centre_distance + v->radius) / (2 * v->radius));
+    for (int i = 0; i < 3; i++) rgb[i] = (float)(clear * (double)rgb[i] + (1 - clear) * 0.5 * v->mean_light[i]);
 }
 
 static void shade_sample(const viewer *v, shade_batch *b, size_t i, float rgb[3]) {
@@ -870,10 +930,11 @@ static void shade_sample(const viewer *v, shade_batch *b, size_t i, float rgb[3]
         section_colour(v, b->point[i], rgb);
         return;
     }
-    if (v->o.mode == LAMBERT) lambert(v, b->point[i], n, light);
+    if (v->o.mode == LAMBERT) lambert(v, b->point[i], n, v->o.ambient, v->o.shadows, light);
     else if (v->o.mode == PHONG) phong(v, b->point[i], n, b->dir[i], light, specular);
     else for (int c = 0; c < 3; c++) light[c] = (double)b->irradiance[i][c] > 0 ? (double)b->irradiance[i][c] : 0;
     for (int c = 0; c < 3; c++) rgb[c] = (float)((double)v->albedo[c] * light[c] / PI + specular[c]);
+    if (v->o.fog > 0) fog(v, b->point[i], rgb);
 }
 
 static isogi_result light_batch(const shade_job *job, shade_batch *b) {
@@ -1045,6 +1106,27 @@ static void backdrop(const viewer *v, int x, int y, double out[3]) {
     }
 }
 
+/* How far the picture is from the one in a file, over the pixels that show something. */
+static int compare_picture(viewer *v, const unsigned char *bytes) {
+    unsigned char *file, *other;
+    int shape[3];
+    size_t size, seen = 0;
+    double sum = 0;
+    char why[FILE_ERROR_SIZE];
+    if (!file_read(v->o.compare, (size_t)1 << 30, &file, &size, v->error)) return 0;
+    if (!png_decode(file, size, &other, shape, why)) return free(file), file_fail(v->error, "%.200s: %.250s", v->o.compare, why);
+    free(file);
+    if (shape[0] != v->o.width || shape[1] != v->o.height || shape[2] != 3) return free(other), file_fail(v->error, "%s: is not %dx%d in colour", v->o.compare, v->o.width, v->o.height);
+    for (size_t i = 0; i < (size_t)v->o.width * (size_t)v->o.height; i++) {
+        if (!(v->picture[i][3] > 0)) continue;
+        seen++;
+        for (int c = 0; c < 3; c++) sum += pow((bytes[3 * i + (size_t)c] - other[3 * i + (size_t)c]) / 255.0, 2) / 3;
+    }
+    free(other);
+    printf("difference_rms %.6f\n", seen ? sqrt(sum / (double)seen) : 0);
+    return 1;
+}
+
 static int write_picture(viewer *v) {
     size_t pixels = (size_t)v->o.width * (size_t)v->o.height;
     double begun = seconds(), exposure = v->o.exposure;
@@ -1057,7 +1139,7 @@ static int write_picture(viewer *v) {
         backdrop(v, (int)(i % (size_t)v->o.width), (int)(i / (size_t)v->o.width), behind);
         picture_pixel(v->picture[i], exposure, behind, bytes + 3 * i);
     }
-    ok = png_write(v->o.out, bytes, v->o.width, v->o.height, 3, v->error);
+    ok = (!v->o.compare || compare_picture(v, bytes)) && png_write(v->o.out, bytes, v->o.width, v->o.height, 3, v->error);
     free(bytes);
     stat_line(v, "exposure", "%.6g", exposure);
     stat_seconds(v, "picture", begun);

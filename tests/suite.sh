@@ -225,6 +225,7 @@ long)
     item check bake/parts-and-pauses "sh tests/compile/bake.sh"
     memcheck
     fuzzers
+    item check figures/all "ISOGI_DATA= FIGURES_OUT=\"\$OUT\" FIGURES_DIVIDE=64 FIGURES_SIZE=48x48 sh examples/figures.sh"
     if have glslangValidator; then item check glsl/shaders "sh tests/compile/glsl.sh"
     else item skip glsl/shaders "glslangValidator is not installed"
     fi

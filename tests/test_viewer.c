@@ -225,6 +225,8 @@ TEST(silly_options_get_one_line_that_names_the_option) {
         {"procedural:gyroid --light sphere:1,1,1:1,1,1", "--light"}, {"procedural:gyroid --light rectangle:1,1,1:1,1,1:1,0,0", "--light"},
         {"procedural:gyroid --light rectangle:1,1,1:1,1,1:1,0,0:1,1,0", "--light"}, {"procedural:gyroid --light point:1,1,1:1,1,1:1,0,0:0,1,0", "--light"}, {"procedural:gyroid --light point:1,1,1:1,1,1:1:1", "--light"},
         {"procedural:gyroid --mode transfer --light point:1,1,1:1,1,1", "--light"}, {"procedural:gyroid --exposure 0", "--exposure"},
+        {"procedural:gyroid --lattice 4096,4096,4096", "--lattice: the table of its bricks alone needs 8.0 GiB"}, {"procedural:gyroid --shadows maybe", "--shadows"},
+        {"procedural:gyroid --mode transfer --storage rgb9e5", "--storage"}, {"procedural:gyroid:16 --size 32x32 --compare /dev/null", "/dev/null"},
         {"procedural:gyroid --aa 1000", "--aa"}, {"procedural:gyroid --shading flat", "--shading"}, {"procedural:gyroid --out ''", "--out"},
         {"procedural:gyroid procedural:skull", "second volume"}, {"procedural:gyroid --scene engine", "not both"}, {"--scene nowhere", "engine bonsai"},
         {"procedural:teapot", "marschner-lobb"}, {"procedural:", "marschner-lobb"}, {"procedural:gyroid:1", "2 to 2048"}, {"procedural:gyroid:", "2 to 2048"},
@@ -340,7 +342,7 @@ TEST(stats_are_key_value_lines_and_help_is_complete) {
     static const char *const keys[] = {"size 32x32x32", "range ", "isovalue ", "triangles ", "rays_light ", "rays_per_second ", "texels_computed ",
                                        "texels_requested ", "memory_bytes ", "seconds_bake ", "seconds_total ", "error_relative "};
     static const char *const named[] = {"--scene", "--size", "--iso", "--mode", "--raycast", "--spacing", "--env", "--light", "--albedo", "--bounces", "--samples",
-                                        "--lattice", "--lookup", "--tf", "--clip", "--camera", "--up", "--threads", "--out", "--stats", "procedural:", "Examples"};
+                                        "--lattice", "--lookup", "--shadows", "--ambient", "--fog", "--normals", "--offset", "--reach", "--storage", "--compare", "--tf", "--clip", "--camera", "--up", "--threads", "--out", "--stats", "procedural:", "Examples"};
     char command[512];
     run_result r;
     snprintf(command, sizeof command, "procedural:gyroid:32 --size 32x32 --samples 8 --stats --out '%s'", temporary("stats.png"));
