@@ -37,7 +37,7 @@ compared() {
 }
 
 data() { [ -n "$ISOGI_DATA" ] && [ -f "$ISOGI_DATA/$1" ]; }
-if data vismale_head_128x256x256_uint8.raw; then skull="$ISOGI_DATA/vismale_head_128x256x256_uint8.raw --iso 100 --up 0,0,-1 --camera 20,8,2.4" skull_isos="88 100 112" head_grid="64,128,128 128,256,256 256,512,512"
+if data vismale_head_128x256x256_uint8.raw; then skull="$ISOGI_DATA/vismale_head_128x256x256_uint8.raw --iso 100 --spacing 1.58,1,1.01 --up 0,0,-1 --camera 150,5,1.9" skull_isos="88 100 112" head_grid="64,128,128 128,256,256 256,512,512"
 else skull="procedural:skull" skull_isos="" head_grid="64,72,72 128,144,144 256,288,288"
 fi
 if data engine_256x256x128_uint8.raw; then engine="--scene engine" engine_mode="--env $ISOGI_DATA/hdr/grace_256x128.hdr"
