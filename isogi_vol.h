@@ -3576,8 +3576,8 @@ typedef struct __attribute__((aligned(64))) isogi_vol__pool {
     double step[ISOGI_VOL__POOL];       /* the isovalue in steps of the leaf, for voxels of code + 0.5 */
     int64_t side[ISOGI_VOL__POOL];      /* 1 inside, 0 outside, -1 not known, -2 leaving a surface, only to be looked at in double */
     double base[ISOGI_VOL__POOL], stop[ISOGI_VOL__POOL], isovalue[ISOGI_VOL__POOL], deflated[ISOGI_VOL__POOL]; /* of the walk; stop: its end */
-    size_t ray[ISOGI_VOL__POOL];
-    int8_t entry_axis[ISOGI_VOL__POOL];
+    uint64_t ray[ISOGI_VOL__POOL];
+    int64_t entry_axis[ISOGI_VOL__POOL];
 } isogi_vol__pool;
 
 /* What the loops share. */
@@ -3599,6 +3599,18 @@ typedef struct isogi_vol__turn {
 #define ISOGI_VOL__FIRST(f, a, s, b) ~(ISOGI_VOL__BELOW_##f(a) & ~ISOGI_VOL__BELOW_##s(b))
 #define ISOGI_VOL__LATER(f, a, s, b) ~(~ISOGI_VOL__BELOW_##f(a) & ISOGI_VOL__BELOW_##s(b))
 #define ISOGI_VOL__ALL64(x) _mm512_set1_epi64((int64_t)(x))
+#define ISOGI_VOL__PAIR(f, a, g, b) ISOGI_VOL__FIRST(f, a, g, b), ISOGI_VOL__LATER(f, a, g, b)
+#define ISOGI_VOL__ROW(f, a, g) ISOGI_VOL__PAIR(f, a, g, 1), ISOGI_VOL__PAIR(f, a, g, 2), ISOGI_VOL__PAIR(f, a, g, 3)
+#define ISOGI_VOL__ENDS(f) \
+    ~ISOGI_VOL__BELOW_##f(1), ISOGI_VOL__BELOW_##f(1), ~ISOGI_VOL__BELOW_##f(2), ISOGI_VOL__BELOW_##f(2), ~ISOGI_VOL__BELOW_##f(3), ISOGI_VOL__BELOW_##f(3)
+/* For axes f, g = (x, y), (y, z), (z, x) and planes a, b = 1..3: if a of f comes before b of g, and if it comes later. Then for each
+   plane: if it lies before the entry, and if it lies behind the exit. */
+static const uint64_t isogi_vol__orders[72] = {
+    ISOGI_VOL__ROW(0, 1, 1), ISOGI_VOL__ROW(0, 2, 1), ISOGI_VOL__ROW(0, 3, 1), ISOGI_VOL__ROW(1, 1, 2), ISOGI_VOL__ROW(1, 2, 2), ISOGI_VOL__ROW(1, 3, 2),
+    ISOGI_VOL__ROW(2, 1, 0), ISOGI_VOL__ROW(2, 2, 0), ISOGI_VOL__ROW(2, 3, 0), ISOGI_VOL__ENDS(0),       ISOGI_VOL__ENDS(1),       ISOGI_VOL__ENDS(2)};
+#undef ISOGI_VOL__PAIR
+#undef ISOGI_VOL__ROW
+#undef ISOGI_VOL__ENDS
 
 /* Times of a plane as integers, axis in the lowest two bits. */
 ISOGI_VOL__AVX512 ISOGI_VOL__INLINE __m512i isogi_vol__when(__m512d plane, __m512d origin, __m512d inverse, int axis) {
@@ -3629,15 +3641,18 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE __m512i isogi_vol__passed(const isogi_vol__p
     in = _mm512_max_epi64(_mm512_max_epi64(t00, t10), _mm512_max_epi64(t20, _mm512_set1_epi64(3))); /* planes behind the origin come before */
     out = _mm512_min_epi64(_mm512_min_epi64(t04, t14), _mm512_min_epi64(t24, _mm512_load_si512(&s->end[i])));
     {
-        __m512i all = ISOGI_VOL__ALL64(~(uint64_t)0);
-#define ISOGI_VOL__PAIR(f, a, g, b)                                                                                                                  \
-    _mm512_mask_blend_epi64(_mm512_cmplt_epi64_mask(t##f##a, t##g##b), ISOGI_VOL__ALL64(ISOGI_VOL__LATER(f, a, g, b)), ISOGI_VOL__ALL64(ISOGI_VOL__FIRST(f, a, g, b)))
+        const uint64_t *order = isogi_vol__orders;
+        __m512i all = ISOGI_VOL__ALL64(~(uint64_t)0), other = all;
+        __asm__("" : "+r"(order)); /* constants come from memory: put together in registers they would cost as much as all comparisons */
+#define ISOGI_VOL__PAIR(f, a, g, b)                                                                                                              \
+    _mm512_mask_blend_epi64(_mm512_cmplt_epi64_mask(t##f##a, t##g##b), ISOGI_VOL__ALL64(order[18 * f + 6 * (a - 1) + 2 * (b - 1) + 1]),           \
+                            ISOGI_VOL__ALL64(order[18 * f + 6 * (a - 1) + 2 * (b - 1)]))
 #define ISOGI_VOL__ROW(f, a, g)                                                                              \
     all = _mm512_ternarylogic_epi64(all, ISOGI_VOL__PAIR(f, a, g, 1), ISOGI_VOL__PAIR(f, a, g, 2), 0x80);    \
-    all = _mm512_and_si512(all, ISOGI_VOL__PAIR(f, a, g, 3));
-#define ISOGI_VOL__ENDS(f, a)                                                                                                         \
-    all = _mm512_mask_and_epi64(all, _mm512_cmplt_epi64_mask(t##f##a, in), all, ISOGI_VOL__ALL64(~ISOGI_VOL__BELOW_##f(a)));          \
-    all = _mm512_mask_and_epi64(all, _mm512_cmplt_epi64_mask(out, t##f##a), all, ISOGI_VOL__ALL64(ISOGI_VOL__BELOW_##f(a)));
+    other = _mm512_and_si512(other, ISOGI_VOL__PAIR(f, a, g, 3));
+#define ISOGI_VOL__ENDS(f, a)                                                                                                            \
+    all = _mm512_mask_and_epi64(all, _mm512_cmplt_epi64_mask(t##f##a, in), all, ISOGI_VOL__ALL64(order[54 + 6 * f + 2 * (a - 1)]));      \
+    other = _mm512_mask_and_epi64(other, _mm512_cmplt_epi64_mask(out, t##f##a), other, ISOGI_VOL__ALL64(order[54 + 6 * f + 2 * (a - 1) + 1]));
         ISOGI_VOL__ROW(0, 1, 1) ISOGI_VOL__ROW(0, 2, 1) ISOGI_VOL__ROW(0, 3, 1)
         ISOGI_VOL__ROW(1, 1, 2) ISOGI_VOL__ROW(1, 2, 2) ISOGI_VOL__ROW(1, 3, 2)
         ISOGI_VOL__ROW(2, 1, 0) ISOGI_VOL__ROW(2, 2, 0) ISOGI_VOL__ROW(2, 3, 0)
@@ -3647,7 +3662,7 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE __m512i isogi_vol__passed(const isogi_vol__p
 #undef ISOGI_VOL__PAIR
 #undef ISOGI_VOL__ROW
 #undef ISOGI_VOL__ENDS
-        return all;
+        return _mm512_and_si512(all, other);
     }
 }
 
@@ -3775,8 +3790,8 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE unsigned isogi_vol__choose(const isogi_vol__
     }
     cell = _mm512_or_si512(x, _mm512_or_si512(_mm512_slli_epi64(y, 16), _mm512_slli_epi64(z, 32)));
     _mm512_mask_store_epi64(&s->cell[i], some, cell);
-    _mm512_mask_store_epi64(&s->address[i], some, address);
     _mm512_mask_store_epi64(&s->level[i], some, _mm512_sub_epi64(n, one));
+    _mm512_store_si512(&s->address[i], _mm512_mask_mov_epi64(_mm512_load_si512(&s->address[i]), some, address)); /* whole, so that it can be read at once */
     for (k = 0; k < 8; k++) {
         const char *node = (const char *)(uintptr_t)s->address[i + k];
         _mm_prefetch(node, _MM_HINT_T0), _mm_prefetch(node + 64, _MM_HINT_T0);
@@ -3826,11 +3841,13 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE unsigned isogi_vol__look(isogi_vol__turn *tu
         ISOGI_VOL__AXIS(2)
 #undef ISOGI_VOL__AXIS
         {
+            /* an axis alone is a denormal number, on which processors spend a hundred cycles */
+            const __m512d t0 = _mm512_castsi512_pd(_mm512_andnot_si512(three, begin)), t1 = _mm512_castsi512_pd(end);
             const __m256 zero = _mm256_setzero_ps(), one = _mm256_set1_ps(1);
             int a;
             for (a = 0; a < 3; a++) {
-                from[a] = _mm256_min_ps(_mm256_max_ps(_mm512_cvtpd_ps(_mm512_fmadd_pd(_mm512_castsi512_pd(begin), dir[a], local[a])), zero), one);
-                to[a] = _mm256_min_ps(_mm256_max_ps(_mm512_cvtpd_ps(_mm512_fmadd_pd(_mm512_castsi512_pd(end), dir[a], local[a])), zero), one);
+                from[a] = _mm256_min_ps(_mm256_max_ps(_mm512_cvtpd_ps(_mm512_fmadd_pd(t0, dir[a], local[a])), zero), one);
+                to[a] = _mm256_min_ps(_mm256_max_ps(_mm512_cvtpd_ps(_mm512_fmadd_pd(t1, dir[a], local[a])), zero), one);
             }
         }
     }
@@ -3906,7 +3923,7 @@ static int isogi_vol__seat(isogi_vol__pool *s, int i, const isogi_vol__walk *w) 
     s->level[i] = p->node_levels - 1, s->pending[i] = 0, s->cell[i] = 0;
     s->address[i] = (uint64_t)(uintptr_t)p->nodes[p->node_level[p->node_levels - 1].first];
     s->side[i] = w->deflate ? -2 : w->inside;
-    s->base[i] = w->base, s->stop[i] = end, s->isovalue[i] = w->isovalue, s->deflated[i] = w->deflated, s->entry_axis[i] = (int8_t)w->entry_axis;
+    s->base[i] = w->base, s->stop[i] = end, s->isovalue[i] = w->isovalue, s->deflated[i] = w->deflated, s->entry_axis[i] = w->entry_axis;
     return 1;
 }
 
@@ -3922,7 +3939,7 @@ static int isogi_vol__decide(isogi_vol__batch *b, isogi_vol__pool *s, int i, iso
     w.deflate = s->side[i] == -2, w.inside = w.deflate ? -1 : (int)s->side[i], w.deflated = s->deflated[i];
     w.exact = b->hits != NULL, w.cap = 1, w.end_is_border = 0;
     w.count.cubics = w.count.cells = 0;
-    found = isogi_vol__mixed_cell_avx2(&w, (int)(cell & 0xffff), (int)(cell >> 16 & 0xffff), (int)(cell >> 32 & 0xffff), in == 3 ? s->entry_axis[i] : in,
+    found = isogi_vol__mixed_cell_avx2(&w, (int)(cell & 0xffff), (int)(cell >> 16 & 0xffff), (int)(cell >> 32 & 0xffff), in == 3 ? (int)s->entry_axis[i] : in,
                                        out == 3 ? -1 : out, hit);
     b->work.cubics += w.count.cubics;
     s->side[i] = w.deflate ? -2 : w.inside, s->deflated[i] = w.deflated;
@@ -4171,84 +4188,139 @@ static void isogi_vol__trace_one(isogi_vol__batch *b, size_t i) {
 }
 
 #ifdef ISOGI_VOL__AVX
+/* Moves a ray to another slot. All members of a pool are rows of numbers of eight bytes. */
+static void isogi_vol__move(isogi_vol__pool *s, isogi_vol__turn *turn, int from, int to) {
+    char *row = (char *)s;
+    int i;
+    for (i = 0; i < (int)(sizeof *s / sizeof s->ray); i++, row += sizeof s->ray) memcpy(row + 8 * to, row + 8 * from, 8);
+    for (i = 0; i < turn->leaves; i++)
+        if (turn->at_leaf[i] == from) turn->at_leaf[i] = (uint8_t)to;
+    for (i = 0; i < turn->doubts; i++)
+        if (turn->in_doubt[i] == from) turn->in_doubt[i] = (uint8_t)to;
+}
+
+/* With no more rays to come, eight slots are cleared whenever the others can take their rays. `open`: the slots without a ray. */
+static uint64_t isogi_vol__close_ranks(isogi_vol__pool *s, isogi_vol__turn *turn, int groups, uint64_t open) {
+    for (;;) {
+        int occupied = 0, rays = 0, least = 9, which = 0, i;
+        uint64_t takes = 0, leave;
+        for (i = 0; i < groups; i++) {
+            const int n = 8 - __builtin_popcount((unsigned)(open >> 8 * i & 255));
+            if (!n) continue;
+            occupied++, rays += n;
+            takes |= (uint64_t)255 << 8 * i;
+            if (n < least) least = n, which = i;
+        }
+        if (rays > 8 * (occupied - 1)) return open;
+        takes &= open & ~((uint64_t)255 << 8 * which);
+        for (leave = ~open & (uint64_t)255 << 8 * which; leave; leave &= leave - 1, takes &= takes - 1)
+            isogi_vol__move(s, turn, __builtin_ctzll(leave), __builtin_ctzll(takes)), s->level[__builtin_ctzll(leave)] = -1,
+                open ^= (takes & (0 - takes)) | (leave & (0 - leave));
+    }
+}
+
+/* Takes rays into open slots until there are none of either. */
+static uint64_t isogi_vol__fill_pool(isogi_vol__batch *b, isogi_vol__pool *s, uint64_t open, size_t *next, size_t count) {
+    for (; open && *next < count; ++*next) {
+        isogi_vol__walk w;
+        isogi_hit any, *hit = b->hits ? &b->hits[*next] : &any;
+        const uint32_t flags = isogi_vol__flags(b, *next);
+        const int slot = __builtin_ctzll(open);
+        if (!isogi_vol__begin(b, *next, &w)) isogi_vol__finish(b, *next, &w, 0);
+        else if (flags || !isogi_vol__seat(s, slot, &w)) isogi_vol__finish(b, *next, &w, isogi_vol__walk_ray(&w, flags, hit));
+        else s->ray[slot] = *next, open &= open - 1;
+    }
+    return open;
+}
+
+/* The stage in double, for `waits` rays or more at a time; returns the slots that it leaves open. */
+ISOGI_VOL__AVX512 ISOGI_VOL__INLINE uint64_t isogi_vol__decide_all(isogi_vol__batch *b, isogi_vol__turn *turn, isogi_vol__pool *s, int waits) {
+    uint64_t open = 0;
+    int first, n, k;
+    for (first = 0; turn->doubts - first >= waits; first += n) {
+        unsigned alone, hits;
+        n = turn->doubts - first < 8 ? turn->doubts - first : 8;
+        hits = isogi_vol__decide8(b, s, turn->in_doubt + first, n, &alone);
+        for (k = 0; k < n; k++) {
+            const int slot = turn->in_doubt[first + k];
+            isogi_hit any;
+            if (alone >> k & 1) hits |= (unsigned)isogi_vol__decide(b, s, slot, b->hits ? &b->hits[s->ray[slot]] : &any) << k;
+            if (hits >> k & 1) {
+                if (b->occluded) b->occluded[s->ray[slot]] = 1;
+                open |= (uint64_t)1 << slot;
+            } else if (s->mask[0][slot]) turn->at_leaf[turn->leaves++] = (uint8_t)slot;
+            else turn->choosing |= (uint64_t)1 << slot;
+        }
+    }
+    memmove(turn->in_doubt, turn->in_doubt + first, (size_t)(turn->doubts - first));
+    turn->doubts -= first;
+    return open;
+}
+
+/* The stage in float, likewise. */
+ISOGI_VOL__AVX512 ISOGI_VOL__INLINE uint64_t isogi_vol__look_all(isogi_vol__batch *b, isogi_vol__turn *turn, isogi_vol__pool *s, int waits) {
+    const int before = turn->doubts;
+    uint64_t open = 0;
+    int first, n, again;
+    while (turn->leaves >= waits) {
+        for (first = again = 0; turn->leaves - first >= waits; first += n) {
+            uint64_t slots;
+            unsigned hits;
+            n = turn->leaves - first < 8 ? turn->leaves - first : 8;
+            memcpy(&slots, turn->at_leaf + first, 8);
+            for (hits = isogi_vol__look(turn, s, turn->at_leaf + first, n, &again); hits; hits &= hits - 1) {
+                const int slot = (int)(slots >> 8 * __builtin_ctz(hits) & 255);
+                b->occluded[s->ray[slot]] = 1;
+                open |= (uint64_t)1 << slot;
+            }
+        }
+        memmove(turn->at_leaf + again, turn->at_leaf + first, (size_t)(turn->leaves - first));
+        turn->leaves += again - first;
+    }
+    for (n = before; n < turn->doubts; n++) isogi_vol__send_for(&b->pyramid->volume, s->cell[turn->in_doubt[n]]);
+    return open;
+}
+
 /* Any number of rays through the slots of a pool, each taken again as soon as it is free. */
 ISOGI_VOL__AVX512 static void isogi_vol__trace_pool(isogi_vol__batch *b, size_t count) {
+    const int groups = count < ISOGI_VOL__POOL ? (int)(count + 7) / 8 : ISOGI_VOL__POOL / 8;
+    const uint64_t slots = ~(uint64_t)0 >> (64 - 8 * groups);
+    uint64_t open = slots;
     isogi_vol__pool s;
     isogi_vol__turn turn;
-    isogi_hit any;
     size_t next = 0;
-    uint8_t spare[ISOGI_VOL__POOL];
-    int spares = 0, groups = count < ISOGI_VOL__POOL ? (int)(count + 7) / 8 : ISOGI_VOL__POOL / 8, i, k, doubts, again, lanes, waits, answered;
-    uint64_t nodes = 0;
+    int i;
     isogi_vol__open_turn(&turn, b->pyramid);
     turn.any = b->occluded != NULL;
-    for (i = 8 * groups; i--;) {
-        spare[spares++] = (uint8_t)i, s.level[i] = -1, s.pending[i] = 0, s.cell[i] = 0, s.address[i] = (uint64_t)(uintptr_t)b->pyramid->nodes;
-    }
+    for (i = 0; i < 8 * groups; i++) s.level[i] = -1, s.pending[i] = 0, s.cell[i] = 0, s.address[i] = (uint64_t)(uintptr_t)b->pyramid->nodes;
     for (;;) {
-        for (; spares && next < count; next++) {
-            isogi_vol__walk w;
-            isogi_hit *hit = b->hits ? &b->hits[next] : &any;
-            const uint32_t flags = isogi_vol__flags(b, next);
-            if (!isogi_vol__begin(b, next, &w)) isogi_vol__finish(b, next, &w, 0);
-            else if (flags || !isogi_vol__seat(&s, spare[spares - 1], &w)) isogi_vol__finish(b, next, &w, isogi_vol__walk_ray(&w, flags, hit));
-            else s.ray[spare[--spares]] = next;
-        }
-        if (spares == 8 * groups) break;
-        turn.choosing = 0, answered = 0;
+        int answered = 0, waits;
+        open = isogi_vol__fill_pool(b, &s, open, &next, count);
+        if (open == slots) break;
+        if (open && groups > 1) open = isogi_vol__close_ranks(&s, &turn, groups, open);
+        turn.choosing = 0;
         for (i = 0; i < groups; i++) {
             const __mmask8 lives = _mm512_cmpge_epi64_mask(_mm512_load_si512(&s.level[8 * i]), _mm512_setzero_si512());
             answered += __builtin_popcount(lives);
             if (lives) isogi_vol__answer(&turn, &s, 8 * i);
         }
-        nodes += (uint64_t)answered;
-        /* stages wait for eight rays to work on, unless most of the pool waits already */
-        waits = 2 * answered < 8 * groups ? 1 : 8;
-        for (doubts = 0; turn.doubts - doubts >= waits; doubts += lanes) {
-            unsigned alone, hits;
-            lanes = turn.doubts - doubts < 8 ? turn.doubts - doubts : 8;
-            hits = isogi_vol__decide8(b, &s, turn.in_doubt + doubts, lanes, &alone);
-            for (k = 0; k < lanes; k++) {
-                const int slot = turn.in_doubt[doubts + k];
-                if (alone >> k & 1) hits |= (unsigned)isogi_vol__decide(b, &s, slot, b->hits ? &b->hits[s.ray[slot]] : &any) << k;
-                if (hits >> k & 1) {
-                    if (b->occluded) b->occluded[s.ray[slot]] = 1;
-                    spare[spares++] = (uint8_t)slot;
-                } else if (s.mask[0][slot]) turn.at_leaf[turn.leaves++] = (uint8_t)slot;
-                else turn.choosing |= (uint64_t)1 << slot;
-            }
-        }
-        memmove(turn.in_doubt, turn.in_doubt + doubts, (size_t)(turn.doubts - doubts));
-        turn.doubts -= doubts, doubts = turn.doubts;
-        while (turn.leaves >= waits) {
-            for (k = again = 0; turn.leaves - k >= waits; k += lanes) {
-                uint64_t slots;
-                unsigned hits;
-                lanes = turn.leaves - k < 8 ? turn.leaves - k : 8;
-                memcpy(&slots, turn.at_leaf + k, 8);
-                hits = isogi_vol__look(&turn, &s, turn.at_leaf + k, lanes, &again);
-                for (; hits; hits &= hits - 1) {
-                    const int slot = (int)(slots >> 8 * __builtin_ctz(hits) & 255);
-                    b->occluded[s.ray[slot]] = 1;
-                    spare[spares++] = (uint8_t)slot;
-                }
-            }
-            memmove(turn.at_leaf + again, turn.at_leaf + k, (size_t)(turn.leaves - k));
-            turn.leaves += again - k;
-        }
-        for (k = doubts; k < turn.doubts; k++) isogi_vol__send_for(&b->pyramid->volume, s.cell[turn.in_doubt[k]]);
+        b->work.blocks += (uint64_t)answered;
+        /* the other stages wait for eight rays to work on, unless most rays wait already */
+        waits = answered < turn.leaves + turn.doubts ? 1 : 8;
+        open |= isogi_vol__decide_all(b, &turn, &s, waits);
+        open |= isogi_vol__look_all(b, &turn, &s, waits);
         for (i = 0; i < groups; i++) {
-            unsigned done;
-            if (!(turn.choosing >> 8 * i & 255)) continue;
-            for (done = isogi_vol__choose(&turn, &s, 8 * i, (__mmask8)(turn.choosing >> 8 * i)); done; done &= done - 1) {
-                const int slot = 8 * i + __builtin_ctz(done);
-                if (b->occluded) b->occluded[s.ray[slot]] = 0;
-                else memset(&b->hits[s.ray[slot]], 0, sizeof b->hits[0]);
-                spare[spares++] = (uint8_t)slot;
+            const unsigned choosing = (unsigned)(turn.choosing >> 8 * i & 255);
+            unsigned done = choosing ? isogi_vol__choose(&turn, &s, 8 * i, (__mmask8)choosing) : 0;
+            open |= (uint64_t)done << 8 * i;
+            for (; done; done &= done - 1) {
+                const uint64_t ray = s.ray[8 * i + __builtin_ctz(done)];
+                if (b->occluded) b->occluded[ray] = 0;
+                else memset(&b->hits[ray], 0, sizeof b->hits[0]);
             }
         }
     }
-    b->work.blocks += nodes, b->work.cells += turn.cells;
+    b->work.cells += turn.cells;
 }
 #ifndef __clang__
 #pragma GCC diagnostic pop
