@@ -2701,7 +2701,7 @@ ISOGI_SH__AVX2 static int isogi_sh__zonal_order5_f8(float *c, const float *zonal
     if (!(e[0] < 1e-3f && e[0] > -1e-3f)) return 0;
     scale = ISOGI_SH__FMA_F8(e, ISOGI_SH__FMA_F8(e, one * 0.375f, one * 0.5f), one);
     x *= scale, y *= scale, z *= scale, zz = z * z;
-    c2 = ISOGI_SH__FMA_F8(x, x, -(y * y)), s2 = (x + x) * y;
+    c2 = (x - y) * (x + y), s2 = (x + x) * y;
     c3 = ISOGI_SH__FMA_F8(x, c2, -(y * s2)), s3 = ISOGI_SH__FMA_F8(x, s2, y * c2), c4 = ISOGI_SH__FMA_F8(c2, c2, -(s2 * s2)), s4 = (c2 + c2) * s2;
     /* degrees 0, 1 and 2 but for its last: 1; y 1 x; s2 y 1 x */
     w = __builtin_shufflevector(one, x, 0, 1, 2, 11, 4, 5, 6, 15), w = __builtin_shufflevector(w, y, 0, 9, 2, 3, 4, 13, 6, 7);
