@@ -319,6 +319,43 @@ ISOGI_API isogi_result isogi_dvr_render(const isogi_dvr *dvr, const isogi_view *
                                         float (*premultiplied)[4], float *depth, isogi_counters *counters);
 ISOGI_API void isogi_dvr_counters(const isogi_dvr *dvr, isogi_counters *counters); /* adds what isogi_dvr_step did so far */
 
+/* ---- transfer functions to begin with ---- */
+
+/* Colours in linear light. */
+typedef enum isogi_preset {
+    ISOGI_PRESET_GREY = 0,   /* one white, more of it for larger values */
+    ISOGI_PRESET_HOT,        /* black, red, yellow, white: as bodies glow */
+    ISOGI_PRESET_COOL_WARM,  /* blue, white, red about the middle */
+    ISOGI_PRESET_SPECTRUM    /* violet, blue, green, yellow, red */
+} isogi_preset;
+
+#define ISOGI_PRESET_POINTS 9
+
+/* Points at equal distances from low to high, extinction growing linearly from 0 to `extinction`. ISOGI_INVALID unless low < high, all finite. */
+ISOGI_API isogi_result isogi_transfer_preset(isogi_preset preset, double low, double high, float extinction,
+                                             isogi_transfer_point points[ISOGI_PRESET_POINTS]);
+
+enum {
+    ISOGI_TABLE_SRGB = 1,         /* colours are display light (sRGB), to be decoded; else linear */
+    ISOGI_TABLE_PREMULTIPLIED = 2 /* colours are multiplied by opacity (before coding), to be divided by it */
+};
+
+/* A colour table of another program: rgba[count], 0..1, entry i for the value low + (high - low) i / (count - 1). Opacity is that of a path of
+   `length`, in units of isogi_dvr_desc.unit or, in data space, of data: extinction = -ln(1 - a) / length; an opacity of 1 counts as
+   1 - 2^-24. Where opacity is 0, premultiplied tables have no colour: black. ISOGI_INVALID: fewer than 2 entries, low >= high,
+   length <= 0, anything not finite or outside 0..1; points[] is written on success alone. */
+ISOGI_API isogi_result isogi_transfer_import(const float (*rgba)[4], size_t count, double low, double high, double length, int flags,
+                                             isogi_transfer_point *points);
+
+#define ISOGI_SUGGEST_POINTS 6
+
+/* A transfer function for a volume of which nothing is known: values in three classes of least variance (Otsu 1979; the largest bin
+   left out, which is air or padding), the lowest transparent, the others ever denser and warmer. In physical space extinction is per voxel and
+   makes 1/30 of the box's diagonal half opaque at the top; in data space a passage through each upper class is about half opaque. A
+   volume of one value gets points that nothing meets. threshold (may be NULL): where the second class begins, for an isosurface. */
+ISOGI_API isogi_result isogi_transfer_suggest(const isogi_pyramid *pyramid, isogi_dvr_space space, isogi_transfer_point points[ISOGI_SUGGEST_POINTS],
+                                              double *threshold);
+
 /* ---- tetrahedral meshes ------------------------------------------------------------------------------------------------------ */
 
 /* Points, a value at each, and four points for each tetrahedron in any order: borrowed arrays that must outlive what is built. Between the
@@ -4019,6 +4056,122 @@ ISOGI_API isogi_result isogi_dvr_render(const isogi_dvr *dvr, const isogi_view *
     isogi_release(&dvr->context, job.lights.list, job.lights.count, sizeof *job.lights.list);
     return result;
 }
+
+/* ---- transfer functions to begin with ---- */
+
+ISOGI_API isogi_result isogi_transfer_preset(isogi_preset preset, double low, double high, float extinction,
+                                             isogi_transfer_point points[ISOGI_PRESET_POINTS]) {
+    static const float colour[4][5][3] = {{{1, 1, 1}, {1, 1, 1}, {1, 1, 1}, {1, 1, 1}, {1, 1, 1}},
+                                          {{0, 0, 0}, {0.4f, 0.01f, 0}, {0.9f, 0.12f, 0.01f}, {1, 0.6f, 0.08f}, {1, 1, 0.9f}},
+                                          {{0.05f, 0.08f, 0.55f}, {0.25f, 0.42f, 0.9f}, {0.75f, 0.75f, 0.75f}, {0.85f, 0.3f, 0.18f}, {0.45f, 0.01f, 0.02f}},
+                                          {{0.2f, 0.03f, 0.5f}, {0.03f, 0.2f, 0.85f}, {0.05f, 0.6f, 0.25f}, {0.9f, 0.7f, 0.05f}, {0.75f, 0.05f, 0.03f}}};
+    int i, a;
+    if (!points || (unsigned)preset > ISOGI_PRESET_SPECTRUM || !isogi_dvr__finite64(low) || !isogi_dvr__finite64(high) || !(low < high)) return ISOGI_INVALID;
+    if (!isogi_dvr__finite32(extinction) || !(extinction >= 0)) return ISOGI_INVALID;
+    for (i = 0; i < ISOGI_PRESET_POINTS; i++) {
+        double u = (double)i / (ISOGI_PRESET_POINTS - 1);
+        int at = i / 2 < 3 ? i / 2 : 3;
+        float part = (float)(4 * u - at);
+        points[i].value = i + 1 < ISOGI_PRESET_POINTS ? low * (1 - u) + high * u : high;
+        points[i].extinction = (float)(u * (double)extinction);
+        for (a = 0; a < 3; a++) points[i].rgb[a] = colour[preset][at][a] + part * (colour[preset][at + 1][a] - colour[preset][at][a]);
+    }
+    return ISOGI_OK;
+}
+
+static double isogi_dvr__decode_srgb(double x) { return x <= 0.04045 ? x / 12.92 : pow((x + 0.055) / 1.055, 2.4); }
+
+ISOGI_API isogi_result isogi_transfer_import(const float (*rgba)[4], size_t count, double low, double high, double length, int flags,
+                                             isogi_transfer_point *points) {
+    size_t i;
+    int a;
+    if (!rgba || !points || count < 2 || !isogi_dvr__finite64(low) || !isogi_dvr__finite64(high) || !(low < high)) return ISOGI_INVALID;
+    if (!isogi_dvr__finite64(length) || !(length > 0) || (flags & ~(ISOGI_TABLE_SRGB | ISOGI_TABLE_PREMULTIPLIED))) return ISOGI_INVALID;
+    for (i = 0; i < count; i++)
+        for (a = 0; a < 4; a++)
+            if (!isogi_dvr__finite32(rgba[i][a]) || !(rgba[i][a] >= 0 && rgba[i][a] <= 1)) return ISOGI_INVALID;
+    for (i = 0; i < count; i++) {
+        double u = (double)i / (double)(count - 1), opacity = isogi_dvr__clamp((double)rgba[i][3], 1 - 1 / 16777216.0);
+        points[i].value = i + 1 < count ? low * (1 - u) + high * u : high;
+        points[i].extinction = (float)isogi_dvr__clamp(-log1p(-opacity) / length, 3e38);
+        for (a = 0; a < 3; a++) {
+            double x = (double)rgba[i][a];
+            if (flags & ISOGI_TABLE_SRGB) x = isogi_dvr__decode_srgb(x);
+            if (flags & ISOGI_TABLE_PREMULTIPLIED) x = rgba[i][3] > 0 ? isogi_dvr__clamp(x / (double)rgba[i][3], 1) : 0;
+            points[i].rgb[a] = (float)x;
+        }
+    }
+    return ISOGI_OK;
+}
+
+#define ISOGI_DVR__BINS 256
+
+/* The two bins between which three classes have least variance: the largest sum of (sum of values)^2 / count. */
+static void isogi_dvr__three_classes(const double histogram[ISOGI_DVR__BINS], int bin[2]) {
+    double count[ISOGI_DVR__BINS + 1], sum[ISOGI_DVR__BINS + 1], best = -1;
+    int i, j;
+    count[0] = sum[0] = 0, bin[0] = ISOGI_DVR__BINS / 3, bin[1] = 2 * ISOGI_DVR__BINS / 3;
+    for (i = 0; i < ISOGI_DVR__BINS; i++) count[i + 1] = count[i] + histogram[i], sum[i + 1] = sum[i] + i * histogram[i];
+    for (i = 1; i < ISOGI_DVR__BINS - 1; i++)
+        for (j = i + 1; j < ISOGI_DVR__BINS; j++) {
+            double n[3], s[3], score = 0;
+            int k;
+            n[0] = count[i], n[1] = count[j] - count[i], n[2] = count[ISOGI_DVR__BINS] - count[j];
+            s[0] = sum[i], s[1] = sum[j] - sum[i], s[2] = sum[ISOGI_DVR__BINS] - sum[j];
+            for (k = 0; k < 3; k++) score += n[k] > 0 ? s[k] * s[k] / n[k] : 0;
+            if (score > best * (1 + 1e-12)) best = score, bin[0] = i, bin[1] = j;
+        }
+}
+
+/* Some million voxels of the lattice, the first corner of cells at equal distances. */
+static void isogi_dvr__histogram(const isogi_pyramid *pyramid, const double range[2], double histogram[ISOGI_DVR__BINS]) {
+    const isogi_volume *v = isogi_vol_volume(pyramid);
+    size_t step[3];
+    uint32_t c[3];
+    int a, largest = 0;
+    double total = 0, scale = ISOGI_DVR__BINS / (0.5 * range[1] - 0.5 * range[0]);
+    for (a = 0; a < 3; a++) step[a] = 1 + v->size[a] / 101;
+    for (a = 0; a < ISOGI_DVR__BINS; a++) histogram[a] = 0;
+    for (c[2] = 0; c[2] == 0 || c[2] < v->size[2] - 1; c[2] += (uint32_t)step[2])
+        for (c[1] = 0; c[1] == 0 || c[1] < v->size[1] - 1; c[1] += (uint32_t)step[1])
+            for (c[0] = 0; c[0] == 0 || c[0] < v->size[0] - 1; c[0] += (uint32_t)step[0]) {
+                double corner[8];
+                isogi_volume_corners(v, c, corner);
+                if (!isogi_dvr__finite64(corner[0])) continue;
+                histogram[(int)isogi_dvr__clamp((0.5 * corner[0] - 0.5 * range[0]) * scale, ISOGI_DVR__BINS - 1)]++, total++;
+            }
+    for (a = 0; a < ISOGI_DVR__BINS; a++)
+        if (histogram[a] > histogram[largest]) largest = a;
+    if (histogram[largest] > 0.3 * total) histogram[largest] = 0;
+}
+
+ISOGI_API isogi_result isogi_transfer_suggest(const isogi_pyramid *pyramid, isogi_dvr_space space, isogi_transfer_point points[ISOGI_SUGGEST_POINTS],
+                                              double *threshold) {
+    static const float colour[ISOGI_SUGGEST_POINTS][3] = {{0.4f, 0.55f, 0.8f}, {0.4f, 0.55f, 0.8f}, {0.75f, 0.7f, 0.65f},
+                                                          {0.85f, 0.75f, 0.6f}, {1, 0.7f, 0.35f},    {1, 0.65f, 0.3f}};
+    static const double share[ISOGI_SUGGEST_POINTS] = {0, 0, 0.3, 0.4, 0.8, 1};
+    double histogram[ISOGI_DVR__BINS], range[2], at[ISOGI_SUGGEST_POINTS], width, most = 0;
+    const isogi_volume *v;
+    int bin[2], i, a;
+    if (!pyramid || !points || (unsigned)space > ISOGI_DVR_DATA) return ISOGI_INVALID;
+    v = isogi_vol_volume(pyramid), isogi_vol_range(pyramid, range);
+    if (!(range[0] < range[1])) bin[0] = ISOGI_DVR__BINS / 3, bin[1] = 2 * bin[0];
+    else isogi_dvr__histogram(pyramid, range, histogram), isogi_dvr__three_classes(histogram, bin);
+    width = 0.5 * range[1] - 0.5 * range[0];
+    at[0] = range[0], at[5] = range[1];
+    at[2] = range[0] + 2 * width * bin[0] / ISOGI_DVR__BINS, at[3] = range[0] + 2 * width * bin[1] / ISOGI_DVR__BINS;
+    at[1] = at[2] - 0.3 * (at[2] - at[0]), at[4] = at[3] + 0.15 * (at[5] - at[3]);
+    for (a = 0; a < 3; a++) most += (double)v->size[a] * (double)v->size[a];
+    most = space == ISOGI_DVR_PHYSICAL ? 0.69 * 30 / sqrt(most) : width > 0 ? 2 / width : 0;
+    for (i = 0; i < ISOGI_SUGGEST_POINTS; i++) {
+        points[i].value = i && !(at[i] > at[i - 1]) ? at[i] = at[i - 1] : at[i];
+        points[i].extinction = (float)isogi_dvr__clamp(share[i] * most, 3e38);
+        for (a = 0; a < 3; a++) points[i].rgb[a] = colour[i][a];
+    }
+    if (threshold) *threshold = at[2];
+    return ISOGI_OK;
+}
+#undef ISOGI_DVR__BINS
 
 /* ==== tetrahedral meshes ============================================================================================= */
 

@@ -49,3 +49,10 @@ draw 8a marschner-lobb ml-tent --mode dvr --shading unlit --step 0.1
 draw 8b marschner-lobb ml --mode scale-invariant --shading unlit --silhouette exact
 draw 8c hydrogen orbital-tent --mode dvr --shading unlit --step 0.1
 draw 8d hydrogen orbital --mode scale-invariant --shading unlit --silhouette exact
+ball=${ISOGI_DATA:+$ISOGI_DATA/buckyball_32x32x32_uint8.raw}
+if [ -f "$ball" ]; then
+    echo 8e && build/tets "$ball" physical "$out/8e.png" "$side"
+    echo 8f && build/tets "$ball" data "$out/8f.png" "$side"
+else
+    echo "8e, 8f: left out: ISOGI_DATA has no buckyball_32x32x32_uint8.raw"
+fi

@@ -37,7 +37,7 @@ static void field_free(field *f) {
 
 typedef double field_function(double x, double y, double z); /* of grid coordinates over (size - 1): 0..1 */
 
-static field field_of(field_function *function, int n) {
+__attribute__((unused)) static field field_of(field_function *function, int n) {
     field f = field_new(n, n, n);
     for (int i = 0; i < n * n * n; i++) f.value[i] = function(i % n / (n - 1.0), i / n % n / (n - 1.0), i / n / n / (n - 1.0));
     field_build(&f);
@@ -45,7 +45,7 @@ static field field_of(field_function *function, int n) {
 }
 
 /* Independent voxels, -1..1: the worst that a cubic can be. */
-static field field_noise(int n, uint64_t seed) {
+__attribute__((unused)) static field field_noise(int n, uint64_t seed) {
     field f = field_new(n, n, n);
     test_random r = {seed};
     for (size_t i = 0; i < field_count(&f); i++) f.value[i] = random_range(&r, -1, 1);
@@ -54,7 +54,7 @@ static field field_noise(int n, uint64_t seed) {
 }
 
 /* A sum of waves in random directions: smooth, -1..1 or so. */
-static field field_waves(int n, uint64_t seed) {
+__attribute__((unused)) static field field_waves(int n, uint64_t seed) {
     field f = field_new(n, n, n);
     test_random r = {seed};
     for (int wave = 0; wave < 6; wave++) {
@@ -85,7 +85,7 @@ static isogi_view line_of_sight(const double eye[3], const double target[3]) {
     return view;
 }
 
-static pixel cast(const isogi_dvr *dvr, const double eye[3], const double target[3], const isogi_lighting *lighting) {
+__attribute__((unused)) static pixel cast(const isogi_dvr *dvr, const double eye[3], const double target[3], const isogi_lighting *lighting) {
     isogi_view view = line_of_sight(eye, target);
     pixel p;
     isogi_result result = isogi_dvr_render(dvr, &view, lighting, (float(*)[4])p.c, &p.depth, NULL);
@@ -103,7 +103,7 @@ __attribute__((unused)) static void random_line(const field *f, test_random *r, 
     }
 }
 
-static isogi_view view_of(const field *f, double scale, test_random *r, int size) {
+__attribute__((unused)) static isogi_view view_of(const field *f, double scale, test_random *r, int size) {
     isogi_view view = {.width = size, .height = size, .fov = 35};
     double d[3], centre[3], radius = 0;
     random_direction(r, d);
@@ -115,14 +115,14 @@ static isogi_view view_of(const field *f, double scale, test_random *r, int size
     return view;
 }
 
-static float (*picture(const isogi_dvr *dvr, const isogi_view *view, const isogi_lighting *lighting, float *depth, isogi_counters *count))[4] {
+__attribute__((unused)) static float (*picture(const isogi_dvr *dvr, const isogi_view *view, const isogi_lighting *lighting, float *depth, isogi_counters *count))[4] {
     float(*pixels)[4] = (float(*)[4])calloc((size_t)view->width * (size_t)view->height, sizeof *pixels);
     isogi_result result = isogi_dvr_render(dvr, view, lighting, pixels, depth, count);
     CHECK(result == ISOGI_OK, "render: %s", isogi_result_string(result));
     return pixels;
 }
 
-static double largest_difference(float (*a)[4], float (*b)[4], int pixels) {
+__attribute__((unused)) static double largest_difference(float (*a)[4], float (*b)[4], int pixels) {
     double most = 0;
     for (int i = 0; i < 4 * pixels; i++) most = fmax(most, fabs((double)a[i / 4][i % 4] - (double)b[i / 4][i % 4]));
     return most;
@@ -136,7 +136,7 @@ __attribute__((unused)) static double rms_difference(float (*a)[4], float (*b)[4
 
 /* ---- a second implementation, plain and slow, in long double ---- */
 
-static void reference_transfer(const isogi_transfer *t, long double x, long double out[4]) {
+__attribute__((unused)) static void reference_transfer(const isogi_transfer *t, long double x, long double out[4]) {
     const isogi_transfer_point *p = t->points;
     size_t n = t->point_count, i = 0;
     for (int a = 0; a < 4; a++) out[a] = 0;

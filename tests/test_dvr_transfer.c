@@ -1,0 +1,112 @@
+/* Transfer functions to begin with: presets, imported tables, suggestions from a histogram. */
+#define ISOGI_IMPLEMENTATION
+#include "isogi_dvr.h"
+#include "dvr_fields.h"
+#include "procedural.h"
+
+TEST(presets_are_valid_and_span_their_range) {
+    isogi_transfer_point p[ISOGI_PRESET_POINTS];
+    for (int preset = 0; preset < 4; preset++) {
+        CHECK(isogi_transfer_preset((isogi_preset)preset, -3, 1e6, 0.5f, p) == ISOGI_OK, "preset %d", preset);
+        const isogi_transfer t = {p, ISOGI_PRESET_POINTS, NULL, 0};
+        float rgb[3], extinction;
+        CHECK(isogi_transfer_validate(&t) == ISOGI_OK, "preset %d is valid", preset);
+        CHECK(fabs(p[0].value + 3) < 1e-12 && fabs(p[8].value - 1e6) < 1e-6 && p[0].extinction <= 0 && fabsf(p[8].extinction - 0.5f) < 1e-7f, "ends of %d", preset);
+        isogi_transfer_at(&t, (1e6 - 3) / 2, rgb, &extinction);
+        CHECK(fabsf(extinction - 0.25f) < 1e-6f, "extinction %g in the middle", (double)extinction);
+        for (int i = 0; i < 9; i++)
+            for (int a = 0; a < 3; a++) CHECK(p[i].rgb[a] >= 0 && p[i].rgb[a] <= 1, "colour %g", (double)p[i].rgb[a]);
+    }
+    CHECK(isogi_transfer_preset(ISOGI_PRESET_HOT, 1, 1, 1, p) == ISOGI_INVALID && isogi_transfer_preset(ISOGI_PRESET_HOT, 2, 1, 1, p) == ISOGI_INVALID, "range");
+    CHECK(isogi_transfer_preset(ISOGI_PRESET_HOT, 0, 1, -1, p) == ISOGI_INVALID && isogi_transfer_preset((isogi_preset)4, 0, 1, 1, p) == ISOGI_INVALID, "values");
+    CHECK(isogi_transfer_preset(ISOGI_PRESET_HOT, 0, (double)NAN, 1, p) == ISOGI_INVALID && isogi_transfer_preset(ISOGI_PRESET_HOT, 0, 1, 1, NULL) == ISOGI_INVALID, "NaN");
+}
+
+TEST(imported_tables_keep_opacity_and_colour) {
+    const float table[4][4] = {{0, 0.5f, 1, 0}, {0.1f, 0.2f, 0.05f, 0.25f}, {0.5f, 0.25f, 0, 0.5f}, {1, 1, 1, 1}};
+    isogi_transfer_point p[4];
+    for (int flags = 0; flags < 4; flags++) {
+        CHECK(isogi_transfer_import(table, 4, 10, 40, 2, flags, p) == ISOGI_OK, "flags %d", flags);
+        for (int i = 0; i < 4; i++) {
+            CHECK(fabs(p[i].value - (10 + 10 * i)) < 1e-9, "value %g", p[i].value);
+            double opacity = -expm1(-2 * (double)p[i].extinction);
+            CHECK(fabs(opacity - (double)table[i][3]) < 2e-7, "opacity of length 2: %g, not %g", opacity, (double)table[i][3]);
+            for (int a = 0; a < 3; a++) {
+                double x = (double)table[i][a];
+                if (flags & ISOGI_TABLE_SRGB) x = x <= 0.04045 ? x / 12.92 : pow((x + 0.055) / 1.055, 2.4);
+                if (flags & ISOGI_TABLE_PREMULTIPLIED) x = table[i][3] > 0 ? fmin(1, x / (double)table[i][3]) : 0;
+                CHECK(fabs((double)p[i].rgb[a] - x) < 1e-6, "flags %d entry %d channel %d: %g, not %g", flags, i, a, (double)p[i].rgb[a], x);
+            }
+        }
+    }
+    float bad[2][4] = {{0, 0, 0, 0}, {0, 0, 0, 2}};
+    CHECK(isogi_transfer_import((const float(*)[4])bad, 2, 0, 1, 1, 0, p) == ISOGI_INVALID, "opacity 2");
+    bad[1][3] = NAN;
+    CHECK(isogi_transfer_import((const float(*)[4])bad, 2, 0, 1, 1, 0, p) == ISOGI_INVALID, "NaN");
+    CHECK(isogi_transfer_import(table, 1, 0, 1, 1, 0, p) == ISOGI_INVALID && isogi_transfer_import(table, 4, 1, 1, 1, 0, p) == ISOGI_INVALID, "sizes");
+    CHECK(isogi_transfer_import(table, 4, 0, 1, 0, 0, p) == ISOGI_INVALID && isogi_transfer_import(table, 4, 0, 1, 1, 4, p) == ISOGI_INVALID, "length, flags");
+    CHECK(isogi_transfer_import(NULL, 4, 0, 1, 1, 0, p) == ISOGI_INVALID && isogi_transfer_import(table, 4, 0, 1, 1, 0, NULL) == ISOGI_INVALID, "NULL");
+}
+
+/* Three materials with noise: the thresholds part them. */
+TEST(suggestions_part_what_the_histogram_parts) {
+    test_random r = {9};
+    for (int n = 0; n < 20; n++) {
+        field f = field_new(24, 24, 24);
+        double scale = pow(10, random_range(&r, -8, 8)), bias = scale * random_range(&r, -3, 3), threshold;
+        for (size_t i = 0; i < field_count(&f); i++) {
+            double x = (double)(i % 24), level = x < 14 ? 0 : x < 19 ? 1 : 2.2;
+            f.value[i] = bias + scale * (level + random_range(&r, -0.15, 0.15));
+        }
+        field_build(&f);
+        for (int space = 0; space < 2; space++) {
+            isogi_transfer_point p[ISOGI_SUGGEST_POINTS];
+            const isogi_transfer t = {p, ISOGI_SUGGEST_POINTS, NULL, 0};
+            CHECK(isogi_transfer_suggest(f.pyramid, (isogi_dvr_space)space, p, &threshold) == ISOGI_OK && isogi_transfer_validate(&t) == ISOGI_OK, "suggest");
+            double first = (threshold - bias) / scale, second = (p[3].value - bias) / scale;
+            CHECK(first > 0.14 && first < 0.87 && second > 1.13 && second < 2.07, "thresholds %g %g", first, second);
+            float rgb[3], air, middle, top;
+            isogi_transfer_at(&t, bias, rgb, &air), isogi_transfer_at(&t, bias + scale, rgb, &middle), isogi_transfer_at(&t, bias + 2.2 * scale, rgb, &top);
+            CHECK(air <= 0 && middle > 0 && top > middle, "air %g, then %g, %g", (double)air, (double)middle, (double)top);
+        }
+        field_free(&f);
+    }
+}
+
+TEST(suggestions_for_odd_volumes_are_valid) {
+    isogi_transfer_point p[ISOGI_SUGGEST_POINTS];
+    const isogi_transfer t = {p, ISOGI_SUGGEST_POINTS, NULL, 0};
+    const double values[][2] = {{5, 5}, {0, 1e-300}, {-1e300, 1e300}, {(double)NAN, 3}, {(double)NAN, (double)NAN}, {1, 1 + 1e-15}};
+    for (size_t n = 0; n < 6; n++)
+        for (int thin = 0; thin < 2; thin++) {
+            field f = field_new(thin ? 1 : 5, 4, 3);
+            for (size_t i = 0; i < field_count(&f); i++) f.value[i] = values[n][i % 2];
+            field_build(&f);
+            for (int space = 0; space < 2; space++)
+                CHECK(isogi_transfer_suggest(f.pyramid, (isogi_dvr_space)space, p, NULL) == ISOGI_OK && isogi_transfer_validate(&t) == ISOGI_OK, "case %zu", n);
+            field_free(&f);
+        }
+    CHECK(isogi_transfer_suggest(NULL, ISOGI_DVR_DATA, p, NULL) == ISOGI_INVALID, "NULL");
+}
+
+TEST(a_suggestion_shows_the_engine_block) {
+    isogi_volume volume = {.data = NULL};
+    isogi_pyramid *pyramid = NULL;
+    isogi_transfer_point p[ISOGI_SUGGEST_POINTS];
+    CHECK(procedural_make(procedural_find("engine-block"), 48, &volume, &serial) == ISOGI_OK && isogi_vol_build(&pyramid, &volume, &serial) == ISOGI_OK, "volume");
+    for (int space = 0; space < 2; space++) {
+        CHECK(isogi_transfer_suggest(pyramid, (isogi_dvr_space)space, p, NULL) == ISOGI_OK, "suggest");
+        const isogi_transfer t = {p, ISOGI_SUGGEST_POINTS, NULL, 0};
+        const isogi_dvr_desc desc = {.pyramid = pyramid, .space = (isogi_dvr_space)space};
+        isogi_dvr *dvr = dvr_new(&desc, &t);
+        const isogi_view view = {.width = 24, .height = 24, .eye = {90, 70, 100}, .target = {23.5f, 23.5f, 14}, .fov = 30};
+        float(*image)[4] = picture(dvr, &view, NULL, NULL, NULL);
+        double seen = 0, empty = 0;
+        for (int i = 0; i < 576; i++) seen += image[i][3] > 0.3f, empty += image[i][3] < 0.02f;
+        CHECK(seen > 100 && empty > 50, "space %d: %g pixels show something, %g nothing", space, seen, empty);
+        free(image), isogi_dvr_free(dvr);
+    }
+    isogi_vol_free(pyramid), procedural_free(&volume);
+}
+
+TEST_MAIN("dvr_transfer")
