@@ -60,8 +60,9 @@ demo: export ISO := $(ISO)
 demo: build/viewer
 	@sh examples/demo.sh
 
-figures: build/viewer
+figures: build/viewer build/isolines build/tets
 	@sh examples/figures.sh
+	@sh examples/figures_scale_invariant.sh
 
 # ---- tests ----
 
