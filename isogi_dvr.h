@@ -244,6 +244,8 @@ typedef struct isogi_dvr_desc {
                                of extinction, rounded so that grid points are on it; 0 = 2 */
     isogi_dvr_method method;
     isogi_dvr_sphere sphere;
+    double anisotropy;      /* of scattering, -1..1 (both excluded): g of Henyey and Greenstein; 0 = isotropic; with visibility only */
+    double emission;        /* share of rgb that glows by itself, besides scattering light; 0..1e6; with visibility only */
     double radius;          /* the paper's method: of local visibility, in units of the smallest voxel spacing, 1..32; 0 = 16 */
     double reduction;       /* the paper's method: voxels of the volume to points of its blocks, at least 1; 0 = 4 */
     isogi_dvr_classification classification; /* in data space; visibility rays are always post-classified */
@@ -417,6 +419,9 @@ ISOGI_API isogi_result isogi_dvr_tets_render(const isogi_tets *tets, const isogi
 #define ISOGI_DVR__TABLE 4096              /* classes of values */
 #define ISOGI_DVR__BATCH 16                /* directions swept at once */
 #define ISOGI_DVR__GAIN 1024               /* grid points: one task of summing up */
+#define ISOGI_DVR__CLASSES 1024            /* of values, for pictures */
+#define ISOGI_DVR__NODES 8                 /* samples of a ray taken at once */
+#define ISOGI_DVR__LEAP 6                  /* blocks of 4^3 that a ray steps over at once, to each side */
 
 /* One vector type of 16 floats: the compiler divides it into what the machine has. */
 #if (defined(__clang__) || (defined(__GNUC__) && __GNUC__ >= 9)) && !defined(__TINYC__) && !defined(ISOGI_NO_SIMD) && !(defined(_WIN32) && !defined(__clang__))
@@ -430,6 +435,14 @@ typedef int32_t isogi_dvr__ints __attribute__((vector_size(64), aligned(4), may_
 #include <immintrin.h>
 #endif
 #endif
+
+/* A ray within the volume, in grid coordinates; sample i stands at origin + i * dir. */
+typedef struct isogi_dvr__fast_ray {
+    float origin[3], dir[3], piece, last_piece; /* world length over unit from sample to sample */
+    int count;                                  /* of samples */
+} isogi_dvr__fast_ray;
+
+typedef struct isogi_dvr__frame isogi_dvr__frame;
 
 /* Kernels of the best instruction path: 1 plain, 2 portable vectors, 3 AVX2, 4 AVX-512. */
 typedef struct isogi_dvr__kernels {
@@ -640,7 +653,7 @@ struct isogi_dvr {
     isogi_dvr__integral integral; /* where isogi_dvr__by_value */
     double to_grid[9]; /* world directions to grid directions */
     double spacing;    /* the smallest distance of two voxels, world */
-    double visibility_step;
+    double visibility_step, piece; /* of visibility rays; of pre-integrated pictures: voxels */
     int cells[3];
     int transparent; /* no value that occurs has any extinction */
     isogi_level level[ISOGI_DVR__LEVELS];
@@ -656,6 +669,8 @@ struct isogi_dvr {
     isogi_dvr__matter matter;
     uint8_t *changed;            /* one byte a block of level 1: its classification is no longer what `matter` holds */
     size_t changed_count;
+    uint8_t *leap;               /* one byte a block of level 0: how many blocks around it are empty, itself first; 0 = it is not */
+    float grid_scale[3];         /* grid points of visibility to a voxel */
     size_t classified, computed; /* blocks classified anew so far; blocks whose local visibility was computed */
     isogi_dvr__blocks blocks;
     float *basis;                /* the paper's method: [directions][order * order] */
@@ -1113,6 +1128,26 @@ static uint8_t isogi_dvr__cut(const isogi_dvr *d, size_t block) {
     return cut;
 }
 
+/* For every block of level 0, how far around it all is empty: the bytes of those that are not spread by one block at a time. */
+static void isogi_dvr__mark_leaps(isogi_dvr *d) {
+    const size_t *size = d->level[0].size;
+    size_t count = size[0] * size[1] * size[2], stride[3], i, j;
+    uint8_t *full = d->leap + count, *next = full + count;
+    int k, a;
+    stride[0] = 1, stride[1] = size[0], stride[2] = size[0] * size[1];
+    for (i = 0; i < count; i++) full[i] = !d->empty[0][i], d->leap[i] = 0;
+    for (k = 0; k < ISOGI_DVR__LEAP; k++) {
+        for (i = 0; i < count; i++) d->leap[i] = (uint8_t)(d->leap[i] + !full[i]);
+        for (a = 0; a < 3; a++) {
+            size_t line = stride[a] * size[a];
+            memcpy(next, full, count);
+            for (j = 0; j + line <= count; j += line) /* whole lines of this axis lie `line` apart */
+                for (i = j; i + stride[a] < j + line; i++) next[i] |= full[i + stride[a]], next[i + stride[a]] |= full[i];
+            memcpy(full, next, count);
+        }
+    }
+}
+
 static void isogi_dvr__mark_empty(isogi_dvr *d) {
     size_t i, count;
     int n;
@@ -1128,6 +1163,7 @@ static void isogi_dvr__mark_empty(isogi_dvr *d) {
     }
     for (i = 0; i < d->changed_count; i++)
         if (d->cut[i] == 2) d->empty[1][i] = 1;
+    if (d->desc.space == ISOGI_DVR_PHYSICAL) isogi_dvr__mark_leaps(d);
 }
 
 /* Extinction just below a value. */
@@ -1662,6 +1698,8 @@ static isogi_result isogi_dvr__resolve(isogi_dvr_desc *desc, const isogi_dvr_des
     if (desc->visibility_step > 0 && !(desc->visibility_step >= 1e-4 && desc->visibility_step <= 2e4)) return ISOGI_INVALID;
     if (!(desc->step >= 1e-4 && desc->step <= 1e4)) return ISOGI_INVALID;
     if (!desc->method) desc->method = ISOGI_DVR_SWEEP;
+    if (!isogi_dvr__finite64(desc->anisotropy) || !(desc->anisotropy > -1 && desc->anisotropy < 1)) return ISOGI_INVALID;
+    if (!isogi_dvr__finite64(desc->emission) || !(desc->emission >= 0 && desc->emission <= 1e6)) return ISOGI_INVALID;
     if (!isogi_dvr__finite64(desc->radius) || !isogi_dvr__finite64(desc->reduction)) return ISOGI_INVALID;
     if (!(desc->radius >= 0) || !(desc->reduction >= 0)) return ISOGI_INVALID;
     if (!(desc->radius > 0)) desc->radius = 16;
@@ -1696,7 +1734,8 @@ static isogi_result isogi_dvr__allocate_parts(isogi_dvr *d) {
     if (!d->empty_blocks || !d->changed) return ISOGI_NO_MEMORY;
     memset(d->changed, 0, d->changed_count);
     d->cut = (uint8_t *)isogi_allocate(&d->context, d->changed_count, 1);
-    if (!d->cut) return ISOGI_NO_MEMORY;
+    d->leap = (uint8_t *)isogi_allocate(&d->context, 3 * d->level[0].size[0] * d->level[0].size[1] * d->level[0].size[2], 1);
+    if (!d->cut || !d->leap) return ISOGI_NO_MEMORY;
     memset(d->cut, 0, d->changed_count);
     for (n = 0, i = 0; n < ISOGI_DVR__LEVELS; n++) {
         d->empty[n] = d->empty_blocks + i;
@@ -1754,6 +1793,8 @@ ISOGI_API isogi_result isogi_dvr_create(isogi_dvr **dvr, const isogi_dvr_desc *d
         const double *m = d->volume.axes + a;
         longest += d->cells[a] * (d->volume.spacing[a] / d->spacing) * sqrt(m[0] * m[0] + m[3] * m[3] + m[6] * m[6]);
     }
+    for (a = 0; a < 3; a++) d->grid_scale[a] = d->cells[a] ? (float)(((double)d->desc.grid[a] - 1) / d->cells[a]) : 0;
+    d->piece = desc->step > 0 ? resolved.step : 1;
     d->visibility_step = resolved.visibility_step > 0 ? resolved.visibility_step : 2 * resolved.step;
     isogi_vol_range(resolved.pyramid, range);
     d->matter.low = range[0];
@@ -1780,6 +1821,7 @@ ISOGI_API void isogi_dvr_free(isogi_dvr *dvr) {
     isogi_release(&context, dvr->empty_blocks, dvr->block_count, 1);
     isogi_release(&context, dvr->changed, dvr->changed_count, 1);
     isogi_release(&context, dvr->cut, dvr->changed_count, 1);
+    isogi_release(&context, dvr->leap, 3 * dvr->level[0].size[0] * dvr->level[0].size[1] * dvr->level[0].size[2], 1);
     isogi_release(&context, dvr->clip, dvr->clip_count, sizeof *dvr->clip);
     isogi_release(&context, dvr->basis, dvr->kernel_count, sizeof *dvr->basis);
     isogi_release(&context, dvr->matter.table, ISOGI_DVR__TABLE, sizeof *dvr->matter.table);
@@ -3919,6 +3961,320 @@ static void isogi_dvr__cast(isogi_dvr__pixel_ray *r, isogi_dvr__march *m, isogi_
     while (r->clear > r->end && (i = isogi_dvr__first_crossing(c, 1e300)) < c->count) isogi_dvr__composite_crossing(r, c, i);
 }
 
+/* ==== frames of physical space ======================================================================================= */
+
+/* Rays in physical space without peaks run on a path of their own. Between samples a voxel apart the field is taken as linear, and what
+   the transfer function holds between the two values is integrated exactly (pre-integration), which in physical space needs one table
+   of four running integrals over the value: of extinction, and of extinction times colour. Of a piece from value a to b
+       mean extinction (K(b) - K(a)) / (b - a),   colour (C(b) - C(a)) / (K(b) - K(a)),   opacity 1 - exp(-mean * length)
+   (Kraus 2005, eq. 6, 7 with the attenuation within a piece left to its opacity). Empty space is leapt over by the distance to the
+   nearest block that is not empty. Light is linear between grid points, so that L . V is summed at the grid points, once for a
+   picture, and looked up as a colour every fourth sample: the visibility grid is no finer. */
+typedef struct isogi_dvr__class_entry { float before[4], mean[4]; } isogi_dvr__class_entry; /* integrals up to a class, and over it: rgb, extinction */
+
+struct isogi_dvr__frame {
+    const isogi_dvr *dvr;
+    isogi_dvr__class_entry *classes;
+    float (*light)[4];  /* at grid points: scattered radiance of albedo 1, plus what glows; NULL = unlit */
+    float low, scale;   /* class of a value */
+    double step;        /* voxels between samples */
+    float glow;         /* share of the colour that is emitted */
+    void (*sample_nodes)(const isogi_dvr__frame *f, const isogi_dvr__fast_ray *r, int first, float *classes);
+    int sample_kind;    /* voxels that vectors can read: 0 float, 1 uint8, 2 uint16; -1 another type or layout */
+    uint32_t last_word; /* byte offset of the last four bytes of the data */
+};
+
+static int isogi_dvr__fast_space(const isogi_dvr *d) {
+    return d->desc.space == ISOGI_DVR_PHYSICAL && d->desc.classification != ISOGI_DVR_POST_CLASSIFIED && !d->transfer.peak_count &&
+           d->desc.shading != ISOGI_DVR_LOCAL && !(fabs(d->desc.anisotropy) > 0) && d->cells[0] && d->cells[1] && d->cells[2] && d->desc.opaque < 1;
+}
+
+static void isogi_dvr__frame_classes(isogi_dvr__frame *f) {
+    const isogi_dvr *d = f->dvr;
+    const isogi_dvr__transfer *t = &d->transfer;
+    double sum[4] = {0, 0, 0, 0}, size = d->matter.scale > 0 ? ISOGI_DVR__TABLE / d->matter.scale / ISOGI_DVR__CLASSES : 0;
+    size_t i, next;
+    int a, half;
+    for (i = 0; i <= ISOGI_DVR__CLASSES; i++) {
+        isogi_dvr__class_entry *e = &f->classes[i];
+        double from = d->matter.low + (double)i * size, to = i < ISOGI_DVR__CLASSES ? from + size : from, x = from, mean[4] = {0, 0, 0, 0};
+        next = t->point_count ? isogi_dvr__points_below(t->points, t->point_count, from) : 0;
+        while (t->point_count) { /* pieces between the function's points: the product of two linear functions, by Simpson's rule exactly */
+            double end = next < t->point_count && t->points[next].value < to ? t->points[next].value : to, weight = to > from ? (end - x) / (to - from) : 1;
+            for (half = 0; half < 3; half++) {
+                double at = x + 0.5 * half * (end - x), rgb[3], extinction;
+                if (half == 2 && end > x) { /* just below the end: the upper side of a step is not yet reached */
+                    at = x + 0.99999999 * (end - x);
+                }
+                extinction = isogi_dvr__extinction(t->points, t->point_count, at);
+                isogi_dvr__colour(t->points, t->point_count, at, rgb);
+                for (a = 0; a < 4; a++) mean[a] += weight * (half == 1 ? 4.0 : 1.0) / 6 * extinction * (a < 3 ? rgb[a] : 1);
+            }
+            if (!(end < to)) break;
+            x = end, next++;
+        }
+        for (a = 0; a < 4; a++) e->before[a] = (float)sum[a], e->mean[a] = (float)isogi_dvr__clamp(mean[a], 1e30), sum[a] += mean[a];
+    }
+    f->low = (float)d->matter.low, f->scale = (float)(d->matter.scale * ISOGI_DVR__CLASSES / ISOGI_DVR__TABLE);
+}
+
+/* Radiance scattered at grid points: 1/(4 pi) L . V with the phase function's weights, not yet clamped. */
+typedef struct isogi_dvr__frame_job {
+    isogi_dvr__frame frame;
+    const isogi_dvr__lights *lights;
+} isogi_dvr__frame_job;
+
+static void isogi_dvr__frame_light(void *arg, size_t task) {
+    isogi_dvr__frame_job *job = (isogi_dvr__frame_job *)arg;
+    const isogi_dvr *d = job->frame.dvr;
+    size_t point = task * ISOGI_DVR__GAIN, end = point + ISOGI_DVR__GAIN < d->point_count ? point + ISOGI_DVR__GAIN : d->point_count, c;
+    for (; point < end; point++) {
+        const float *v = d->visibility + point * d->coefficients;
+        float sum[3] = {0, 0, 0};
+        int a;
+        for (c = 0; c < d->coefficients; c++)
+            for (a = 0; a < 3; a++) sum[a] += job->lights->sh[3 * c + (size_t)a] * v[c];
+        for (a = 0; a < 3; a++) job->frame.light[point][a] = sum[a] * (float)(1 / (4 * ISOGI_DVR__PI));
+        job->frame.light[point][3] = 0;
+    }
+}
+
+static void isogi_dvr__fast_light(const isogi_dvr__frame *f, const float position[3], float out[4]) {
+    const isogi_dvr *d = f->dvr;
+    const float *p;
+    size_t base = 0, offset[3], stride = 4;
+    float u[3];
+    int a, i;
+    for (a = 0; a < 3; a++) {
+        int points = (int)d->desc.grid[a], c;
+        float x = position[a] * d->grid_scale[a];
+        x = x > 0 ? x : 0;
+        c = (int)x;
+        c = c < points - 1 ? c : points - 2;
+        c = c > 0 ? c : 0;
+        u[a] = x - (float)c;
+        u[a] = u[a] < 1 ? u[a] : 1;
+        base += stride * (size_t)c, offset[a] = points > 1 ? stride : 0;
+        stride *= (size_t)points;
+    }
+    p = f->light[0] + base;
+    for (i = 0; i < 4; i++) {
+        const float *q = p + i;
+        float v00 = q[0] + u[0] * (q[offset[0]] - q[0]), v10 = q[offset[1]] + u[0] * (q[offset[1] + offset[0]] - q[offset[1]]);
+        float v01 = q[offset[2]] + u[0] * (q[offset[2] + offset[0]] - q[offset[2]]);
+        float v11 = q[offset[2] + offset[1]] + u[0] * (q[offset[2] + offset[1] + offset[0]] - q[offset[2] + offset[1]]);
+        float v0 = v00 + u[1] * (v10 - v00), v1 = v01 + u[1] * (v11 - v01);
+        out[i] = v0 + u[2] * (v1 - v0);
+    }
+}
+
+/* Classes of samples first .. first + ISOGI_DVR__NODES - 1; -1 where a corner is not finite. */
+static void isogi_dvr__sample_nodes(const isogi_dvr__frame *f, const isogi_dvr__fast_ray *r, int first, float *classes) {
+    const isogi_volume *v = &f->dvr->volume;
+    int i, a, k;
+    for (i = 0; i < ISOGI_DVR__NODES; i++) {
+        const char *p = (const char *)v->data;
+        float u[3], corner[8], value;
+        for (a = 0; a < 3; a++) {
+            float x = r->origin[a] + (float)(first + i) * r->dir[a];
+            int c;
+            x = x > 0 ? x : 0, x = x < (float)f->dvr->cells[a] ? x : (float)f->dvr->cells[a];
+            c = (int)x, c = c < f->dvr->cells[a] ? c : f->dvr->cells[a] - 1;
+            u[a] = x - (float)c, p += c * v->stride[a];
+        }
+        for (k = 0; k < 8; k++) {
+            const char *q = p + (k & 1 ? v->stride[0] : 0) + (k & 2 ? v->stride[1] : 0) + (k & 4 ? v->stride[2] : 0);
+            switch (v->type) {
+            case ISOGI_U8: corner[k] = (float)*(const uint8_t *)(const void *)q; break;
+            case ISOGI_I8: corner[k] = (float)*(const int8_t *)(const void *)q; break;
+            case ISOGI_U16: corner[k] = (float)*(const uint16_t *)(const void *)q; break;
+            case ISOGI_I16: corner[k] = (float)*(const int16_t *)(const void *)q; break;
+            case ISOGI_F32: corner[k] = *(const float *)(const void *)q; break;
+            case ISOGI_F64: corner[k] = (float)*(const double *)(const void *)q; break;
+            }
+        }
+        for (k = 0; k < 4; k++) corner[k] = corner[2 * k] + u[0] * (corner[2 * k + 1] - corner[2 * k]);
+        value = corner[0] + u[1] * (corner[1] - corner[0]);
+        value += u[2] * (corner[2] + u[1] * (corner[3] - corner[2]) - value);
+        if (!isogi_dvr__finite32(value)) {
+            classes[i] = -1;
+            continue;
+        }
+        value = (value * (float)v->scale + ((float)v->bias - f->low)) * f->scale;
+        value = value > 0 ? value : 0;
+        classes[i] = value < ISOGI_DVR__CLASSES - 0.001f ? value : ISOGI_DVR__CLASSES - 0.001f;
+    }
+}
+
+#ifdef ISOGI_DVR__AVX
+__attribute__((target("avx2,fma"))) static void isogi_dvr__sample_nodes_avx2(const isogi_dvr__frame *f, const isogi_dvr__fast_ray *r, int first, float *classes) {
+    const isogi_volume *v = &f->dvr->volume;
+    const __m256 lane = _mm256_add_ps(_mm256_set1_ps((float)first), _mm256_setr_ps(0, 1, 2, 3, 4, 5, 6, 7));
+    __m256i offset = _mm256_setzero_si256(), bits;
+    __m256 u[3], corner[4], value, top = _mm256_set1_ps(ISOGI_DVR__CLASSES - 0.001f);
+    const char *data = (const char *)v->data;
+    int a, k;
+    for (a = 0; a < 3; a++) {
+        __m256 x = _mm256_fmadd_ps(lane, _mm256_set1_ps(r->dir[a]), _mm256_set1_ps(r->origin[a]));
+        __m256i c;
+        x = _mm256_min_ps(_mm256_max_ps(x, _mm256_setzero_ps()), _mm256_set1_ps((float)f->dvr->cells[a]));
+        c = _mm256_min_epi32(_mm256_cvttps_epi32(x), _mm256_set1_epi32(f->dvr->cells[a] - 1));
+        u[a] = _mm256_sub_ps(x, _mm256_cvtepi32_ps(c));
+        offset = _mm256_add_epi32(offset, _mm256_mullo_epi32(c, _mm256_set1_epi32((int)v->stride[a])));
+    }
+    for (k = 0; k < 4; k++) {
+        __m256i at = _mm256_add_epi32(offset, _mm256_set1_epi32((int)((k & 1 ? v->stride[1] : 0) + (k & 2 ? v->stride[2] : 0))));
+        __m256 x0, x1;
+        if (f->sample_kind == 0) {
+            x0 = _mm256_i32gather_ps((const float *)(const void *)data, at, 1);
+            x1 = _mm256_i32gather_ps((const float *)(const void *)(data + 4), at, 1);
+        } else { /* two voxels in one word, which must not reach beyond the data */
+            __m256i word = _mm256_min_epi32(at, _mm256_set1_epi32((int)f->last_word)), shift = _mm256_slli_epi32(_mm256_sub_epi32(at, word), 3), mask;
+            word = _mm256_srlv_epi32(_mm256_i32gather_epi32((const int *)(const void *)data, word, 1), shift);
+            mask = _mm256_set1_epi32(f->sample_kind == 1 ? 0xff : 0xffff);
+            x0 = _mm256_cvtepi32_ps(_mm256_and_si256(word, mask));
+            x1 = _mm256_cvtepi32_ps(_mm256_and_si256(_mm256_srli_epi32(word, f->sample_kind == 1 ? 8 : 16), mask));
+        }
+        corner[k] = _mm256_fmadd_ps(u[0], _mm256_sub_ps(x1, x0), x0);
+    }
+    value = _mm256_fmadd_ps(u[1], _mm256_sub_ps(corner[1], corner[0]), corner[0]);
+    corner[2] = _mm256_fmadd_ps(u[1], _mm256_sub_ps(corner[3], corner[2]), corner[2]);
+    value = _mm256_fmadd_ps(u[2], _mm256_sub_ps(corner[2], value), value);
+    bits = _mm256_and_si256(_mm256_castps_si256(value), _mm256_set1_epi32(0x7f800000));
+    bits = _mm256_cmpeq_epi32(bits, _mm256_set1_epi32(0x7f800000));
+    value = _mm256_fmadd_ps(value, _mm256_set1_ps((float)v->scale), _mm256_set1_ps((float)v->bias - f->low));
+    value = _mm256_min_ps(_mm256_max_ps(_mm256_mul_ps(value, _mm256_set1_ps(f->scale)), _mm256_setzero_ps()), top);
+    _mm256_storeu_ps(classes, _mm256_blendv_ps(value, _mm256_set1_ps(-1), _mm256_castsi256_ps(bits)));
+}
+#endif
+
+/* The mean of rgb * extinction and extinction between two classes; 0 if there is nothing. */
+static int isogi_dvr__fast_mean(const isogi_dvr__class_entry *classes, float from, float to, float mean[4]) {
+    const isogi_dvr__class_entry *e0, *e1;
+    float difference = to - from, k0, k1;
+    int a;
+    if (from < 0 || to < 0) return 0;
+    if (difference < 0.5f && difference > -0.5f) {
+        e0 = &classes[(int)(0.5f * (from + to))];
+        for (a = 0; a < 4; a++) mean[a] = e0->mean[a];
+        return mean[3] > 0;
+    }
+    e0 = &classes[(int)from], e1 = &classes[(int)to];
+    from -= (float)(int)from, to -= (float)(int)to, difference = 1 / difference;
+    k0 = e0->before[3] + from * e0->mean[3], k1 = e1->before[3] + to * e1->mean[3];
+    mean[3] = (k1 - k0) * difference;
+    if (!(mean[3] > 0)) return 0;
+    for (a = 0; a < 3; a++) {
+        mean[a] = ((e1->before[a] + to * e1->mean[a]) - (e0->before[a] + from * e0->mean[a])) * difference;
+        mean[a] = mean[a] > 0 ? mean[a] : 0;
+    }
+    return 1;
+}
+
+/* exp(-x) for x >= 0, as exp_row has it. */
+static float isogi_dvr__exp(float x) {
+    float y = x * -1.44269504f, f, p;
+    int32_t n;
+    y = y > -125 ? y : -125;
+    n = (int32_t)(y - 0.5f), f = y - (float)n;
+    p = 1.54035304e-4f * f + 1.33335581e-3f, p = p * f + 9.61812911e-3f, p = p * f + 5.55041087e-2f;
+    p = p * f + 2.40226507e-1f, p = p * f + 6.93147182e-1f, p = p * f + 1;
+    n = (n + 127) << 23;
+    memcpy(&f, &n, sizeof f);
+    return p * f;
+}
+
+/* The first sample from i on that may see something: the last one before the ray leaves the empty blocks around it. */
+static int isogi_dvr__leap(const isogi_dvr__frame *f, const isogi_dvr__fast_ray *r, const float inverse[3], int i) {
+    const isogi_dvr *d = f->dvr;
+    const isogi_level *level = &d->level[0];
+    while (i < r->count) {
+        float exit = (float)r->count;
+        int c[3], a, free;
+        for (a = 0; a < 3; a++) {
+            float x = r->origin[a] + (float)i * r->dir[a];
+            x = x > 0 ? x : 0;
+            c[a] = (int)x >> 2;
+            c[a] = c[a] < (int)level->size[a] ? c[a] : (int)level->size[a] - 1;
+        }
+        free = d->leap[(size_t)c[0] + level->size[0] * ((size_t)c[1] + level->size[1] * (size_t)c[2])];
+        if (!free) return i;
+        for (a = 0; a < 3; a++) {
+            float border = (float)(4 * (r->dir[a] > 0 ? c[a] + free : c[a] - free + 1)), t = (border - r->origin[a]) * inverse[a];
+            exit = t < exit ? t : exit;
+        }
+        i = (int)exit > i ? (int)exit : i + 1;
+        /* the piece that leaves this block may end in matter: it is looked at when its end is there */
+        {
+            int inside = 1;
+            for (a = 0; a < 3; a++) {
+                float x = r->origin[a] + (float)(i + 1) * r->dir[a];
+                int b = (int)(x > 0 ? x : 0) >> 2;
+                c[a] = b < (int)level->size[a] ? b : (int)level->size[a] - 1;
+            }
+            inside = !d->leap[(size_t)c[0] + level->size[0] * ((size_t)c[1] + level->size[1] * (size_t)c[2])];
+            if (inside) return i < r->count ? i : r->count;
+        }
+    }
+    return r->count;
+}
+
+/* Front to back. */
+static void isogi_dvr__fast_cast(const isogi_dvr__frame *f, const isogi_dvr__fast_ray *r, float out[4], isogi_counters *work) {
+    const isogi_dvr *d = f->dvr;
+    float clear = 1, end = 1 - d->desc.opaque, inverse[3], classes[ISOGI_DVR__NODES], light[2][4] = {{1, 1, 1, 0}, {1, 1, 1, 0}}, position[3];
+    int i = 0, k, a, lit = -1;
+    for (a = 0; a < 3; a++) inverse[a] = fabsf(r->dir[a]) > 1e-20f ? 1 / r->dir[a] : 1e20f, out[a] = 0;
+    while ((i = isogi_dvr__leap(f, r, inverse, i)) < r->count - 1 && clear > end) {
+        f->sample_nodes(f, r, i, classes);
+        work->samples += ISOGI_DVR__NODES;
+        for (k = 0; k + 1 < ISOGI_DVR__NODES && i + k + 1 < r->count; k++) {
+            float mean[4], opacity, share, u;
+            int place = (i + k) >> 2;
+            if (!isogi_dvr__fast_mean(f->classes, classes[k], classes[k + 1], mean)) continue;
+            if (f->light && place != lit) {
+                if (place == lit + 1 && lit >= 0) memcpy(light[0], light[1], sizeof light[0]);
+                else {
+                    for (a = 0; a < 3; a++) position[a] = r->origin[a] + (float)(4 * place) * r->dir[a];
+                    isogi_dvr__fast_light(f, position, light[0]);
+                }
+                for (a = 0; a < 3; a++) position[a] = r->origin[a] + (float)(4 * place + 4) * r->dir[a];
+                isogi_dvr__fast_light(f, position, light[1]);
+                lit = place;
+            }
+            u = ((float)(i + k - 4 * place) + 0.5f) * 0.25f;
+            opacity = mean[3] * (i + k + 2 < r->count ? r->piece : r->last_piece);
+            opacity = 1 - isogi_dvr__exp(opacity < 1e30f ? opacity : 1e30f);
+            share = clear * opacity / mean[3];
+            for (a = 0; a < 3; a++) {
+                float radiance = light[0][a] + u * (light[1][a] - light[0][a]);
+                out[a] += share * mean[a] * ((radiance > 0 ? radiance : 0) + f->glow);
+            }
+            clear *= 1 - opacity;
+            if (!(clear > end)) break;
+        }
+        i += ISOGI_DVR__NODES - 1;
+    }
+    out[3] = 1 - clear;
+}
+
+/* 0 if the ray misses what is kept of the volume. */
+static int isogi_dvr__fast_begin(const isogi_dvr__frame *f, const double origin[3], const double world[3], isogi_dvr__fast_ray *r) {
+    const isogi_dvr *d = f->dvr;
+    isogi_dvr__march march;
+    double dir[3], pieces, rest;
+    int a;
+    isogi_dvr__transform(d->to_grid, world, dir);
+    if (!isogi_dvr__begin(&march, d, origin, dir, 1, f->step)) return 0;
+    pieces = ceil(march.length / march.piece - 1e-6);
+    if (!(pieces < 1e7)) return 0;
+    rest = march.length - (pieces - 1) * march.piece;
+    r->count = (int)pieces + 1;
+    for (a = 0; a < 3; a++) r->origin[a] = (float)march.origin[a], r->dir[a] = (float)(march.dir[a] * march.piece);
+    r->piece = (float)(march.piece / d->desc.unit), r->last_piece = (float)(rest / d->desc.unit);
+    return 1;
+}
+
 /* ==== pictures ======================================================================================================= */
 
 static int isogi_dvr__unit(double v[3]) {
@@ -3929,32 +4285,45 @@ static int isogi_dvr__unit(double v[3]) {
     return 1;
 }
 
-ISOGI_API void isogi_view_ray(const isogi_view *view, double x, double y, double origin[3], float dir[3]) {
-    double forward[3], up[3], right[3], d[3], fov = view->fov > 0 ? (double)view->fov : 45, across, down, half;
+/* Directions of the rays, not yet unit vectors: forward + across * right + down * under. */
+typedef struct isogi_dvr__camera { double forward[3], right[3], under[3], half; } isogi_dvr__camera;
+
+static void isogi_dvr__set_camera(isogi_dvr__camera *c, const isogi_view *view) {
+    double up[3], fov = view->fov > 0 ? (double)view->fov : 45;
     int a, given = 0;
     for (a = 0; a < 3; a++) {
-        origin[a] = (double)view->eye[a];
-        forward[a] = (double)view->target[a] - (double)view->eye[a], up[a] = (double)view->up[a];
+        c->forward[a] = (double)view->target[a] - (double)view->eye[a], up[a] = (double)view->up[a];
         given |= view->up[a] > 0 || view->up[a] < 0;
     }
     if (!given) up[1] = 1;
-    if (!isogi_dvr__unit(forward)) forward[0] = forward[1] = 0, forward[2] = -1;
+    if (!isogi_dvr__unit(c->forward)) c->forward[0] = c->forward[1] = 0, c->forward[2] = -1;
     isogi_dvr__unit(up);
-    isogi_dvr__cross(forward, up, right);
-    if (!(isogi_dvr__dot(right, right) > 1e-12)) {
+    isogi_dvr__cross(c->forward, up, c->right);
+    if (!(isogi_dvr__dot(c->right, c->right) > 1e-12)) {
         /* along the line of sight: the axis that is farthest from it */
-        int axis = fabs(forward[1]) < 0.8 ? 1 : 2;
+        int axis = fabs(c->forward[1]) < 0.8 ? 1 : 2;
         for (a = 0; a < 3; a++) up[a] = a == axis;
-        isogi_dvr__cross(forward, up, right);
+        isogi_dvr__cross(c->forward, up, c->right);
     }
-    isogi_dvr__unit(right);
-    isogi_dvr__cross(right, forward, up);
-    half = tan(fov * (ISOGI_DVR__PI / 360));
-    across = (2 * (x + 0.5) - view->width) / view->height * half;
-    down = (2 * (y + 0.5) / view->height - 1) * half;
-    for (a = 0; a < 3; a++) d[a] = forward[a] + across * right[a] - down * up[a];
-    if (!isogi_dvr__unit(d)) memcpy(d, forward, sizeof d);
-    for (a = 0; a < 3; a++) dir[a] = (float)d[a];
+    isogi_dvr__unit(c->right);
+    isogi_dvr__cross(c->forward, c->right, c->under);
+    c->half = tan(fov * (ISOGI_DVR__PI / 360));
+}
+
+static void isogi_dvr__camera_ray(const isogi_dvr__camera *c, const isogi_view *view, double x, double y, double d[3]) {
+    double across = (2 * (x + 0.5) - view->width) / view->height * c->half, down = (2 * (y + 0.5) / view->height - 1) * c->half;
+    int a;
+    for (a = 0; a < 3; a++) d[a] = c->forward[a] + across * c->right[a] + down * c->under[a];
+    if (!isogi_dvr__unit(d)) memcpy(d, c->forward, 3 * sizeof *d);
+}
+
+ISOGI_API void isogi_view_ray(const isogi_view *view, double x, double y, double origin[3], float dir[3]) {
+    isogi_dvr__camera camera;
+    double d[3];
+    int a;
+    isogi_dvr__set_camera(&camera, view);
+    isogi_dvr__camera_ray(&camera, view, x, y, d);
+    for (a = 0; a < 3; a++) origin[a] = (double)view->eye[a], dir[a] = (float)d[a];
 }
 
 static isogi_result isogi_dvr__check_view(const isogi_view *view) {
@@ -3971,6 +4340,9 @@ typedef struct isogi_dvr__render_job {
     const isogi_dvr *dvr;
     const isogi_view *view;
     isogi_dvr__lights lights;
+    isogi_dvr__frame_job fast;  /* where frame.classes */
+    isogi_dvr__camera camera;
+    double eye[3]; /* grid */
     size_t across, tiles;
     float *pixels; /* [height*width][5]: colour, opacity, depth */
     int depth;     /* wanted */
@@ -4011,6 +4383,17 @@ static void isogi_dvr__render_pixel(const isogi_dvr__render_job *job, int x, int
     out[4] = (float)((again.enter + ray.t) * speed);
 }
 
+static void isogi_dvr__render_fast(const isogi_dvr__render_job *job, int x, int y, isogi_counters *work) {
+    float *out = job->pixels + 5 * ((size_t)y * (size_t)job->view->width + (size_t)x);
+    isogi_dvr__fast_ray ray;
+    double world[3];
+    int a;
+    work->rays++;
+    for (a = 0; a < 4; a++) out[a] = 0;
+    isogi_dvr__camera_ray(&job->camera, job->view, x, y, world);
+    if (isogi_dvr__fast_begin(&job->fast.frame, job->eye, world, &ray)) isogi_dvr__fast_cast(&job->fast.frame, &ray, out, work);
+}
+
 static void isogi_dvr__render_task(void *arg, size_t tile) {
     const isogi_dvr__render_job *job = (const isogi_dvr__render_job *)arg;
     int x0 = (int)(tile % job->across) * ISOGI_DVR__TILE, y0 = (int)(tile / job->across) * ISOGI_DVR__TILE, x, y;
@@ -4018,8 +4401,41 @@ static void isogi_dvr__render_task(void *arg, size_t tile) {
     isogi_counters work;
     memset(&work, 0, sizeof work);
     for (y = y0; y < y0 + ISOGI_DVR__TILE && y < job->view->height; y++)
-        for (x = x0; x < x0 + ISOGI_DVR__TILE && x < job->view->width; x++) isogi_dvr__render_pixel(job, x, y, &crossings, &work);
+        for (x = x0; x < x0 + ISOGI_DVR__TILE && x < job->view->width; x++)
+            if (job->fast.frame.classes) isogi_dvr__render_fast(job, x, y, &work);
+            else isogi_dvr__render_pixel(job, x, y, &crossings, &work);
     job->work[tile] = work;
+}
+
+/* Tables of a picture on the path of physical space; nothing where another path is asked for. */
+static isogi_result isogi_dvr__begin_frame(isogi_dvr__render_job *job) {
+    const isogi_dvr *d = job->dvr;
+    const isogi_volume *v = &d->volume;
+    isogi_dvr__frame *f = &job->fast.frame;
+    double eye[3], bytes;
+    int a, kind = v->type == ISOGI_F32 ? 0 : v->type == ISOGI_U8 ? 1 : v->type == ISOGI_U16 ? 2 : -1;
+    isogi_dvr__set_camera(&job->camera, job->view);
+    for (a = 0; a < 3; a++) eye[a] = (double)job->view->eye[a];
+    isogi_vol_to_grid(d->desc.pyramid, eye, job->eye);
+    if (!isogi_dvr__fast_space(d) || job->depth || job->lights.nearby.light_count || job->lights.local) return ISOGI_OK;
+    f->dvr = d, f->step = d->piece, f->sample_nodes = isogi_dvr__sample_nodes, f->glow = (float)d->desc.emission;
+    bytes = (double)v->stride[0] * (double)d->cells[0] + (double)v->stride[1] * (double)d->cells[1] + (double)v->stride[2] * (double)d->cells[2];
+    f->sample_kind = kind >= 0 && v->stride[0] == (kind == 0 ? 4 : kind) && v->stride[1] > 0 && v->stride[2] > 0 && bytes > 8 && bytes < 2e9 ? kind : -1;
+    if (f->sample_kind >= 0) f->last_word = (uint32_t)bytes + (uint32_t)v->stride[0] - 4;
+#ifdef ISOGI_DVR__AVX
+    if (f->sample_kind >= 0 && isogi_dvr__machine() >= 3 && (!d->context.force_path || d->context.force_path > 2)) f->sample_nodes = isogi_dvr__sample_nodes_avx2;
+#endif
+    f->classes = (isogi_dvr__class_entry *)isogi_allocate(&d->context, ISOGI_DVR__CLASSES + 1, sizeof *f->classes);
+    if (!f->classes) return ISOGI_NO_MEMORY;
+    isogi_dvr__frame_classes(f);
+    if (d->desc.shading == ISOGI_DVR_UNLIT) {
+        f->glow = 0;
+        return ISOGI_OK;
+    }
+    f->light = (float(*)[4])isogi_allocate(&d->context, d->point_count, sizeof *f->light);
+    if (!f->light) return ISOGI_NO_MEMORY;
+    job->fast.lights = &job->lights;
+    return isogi_parallel(&d->context, (d->point_count + ISOGI_DVR__GAIN - 1) / ISOGI_DVR__GAIN, isogi_dvr__frame_light, &job->fast, 0, 0);
 }
 
 /* The picture is finished in memory of its own: a cancelled call leaves its outputs as they were. */
@@ -4042,6 +4458,7 @@ ISOGI_API isogi_result isogi_dvr_render(const isogi_dvr *dvr, const isogi_view *
         job.work = (isogi_counters *)isogi_allocate(&dvr->context, job.tiles, sizeof *job.work);
         if (!job.pixels || !job.work) result = ISOGI_NO_MEMORY;
     }
+    if (result == ISOGI_OK) result = isogi_dvr__begin_frame(&job);
     if (result == ISOGI_OK) result = isogi_parallel(&dvr->context, job.tiles, isogi_dvr__render_task, &job, 0, 1);
     for (i = 0; result == ISOGI_OK && i < pixels; i++) {
         memcpy(premultiplied[i], job.pixels + 5 * i, 4 * sizeof(float));
@@ -4051,6 +4468,8 @@ ISOGI_API isogi_result isogi_dvr_render(const isogi_dvr *dvr, const isogi_view *
         job.work[i].texels = 0;
         isogi_dvr__add(counters, &job.work[i]);
     }
+    isogi_release(&dvr->context, job.fast.frame.classes, ISOGI_DVR__CLASSES + 1, sizeof *job.fast.frame.classes);
+    isogi_release(&dvr->context, job.fast.frame.light, dvr->point_count, sizeof *job.fast.frame.light);
     isogi_release(&dvr->context, job.pixels, pixels, 5 * sizeof *job.pixels);
     isogi_release(&dvr->context, job.work, job.tiles, sizeof *job.work);
     isogi_release(&dvr->context, job.lights.list, job.lights.count, sizeof *job.lights.list);
@@ -4727,6 +5146,9 @@ ISOGI_API isogi_result isogi_dvr_tets_render(const isogi_tets *tets, const isogi
 #undef ISOGI_DVR__TABLE
 #undef ISOGI_DVR__BATCH
 #undef ISOGI_DVR__GAIN
+#undef ISOGI_DVR__CLASSES
+#undef ISOGI_DVR__NODES
+#undef ISOGI_DVR__LEAP
 #undef ISOGI_DVR__VECTORS
 #undef ISOGI_DVR__V
 #undef ISOGI_DVR__C
