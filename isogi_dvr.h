@@ -245,6 +245,8 @@ typedef struct isogi_dvr_desc {
     isogi_dvr_method method;
     isogi_dvr_sphere sphere;
     double anisotropy;      /* of scattering, -1..1 (both excluded): g of Henyey and Greenstein; 0 = isotropic; with visibility only */
+    double tolerance;       /* pre-integrated physical space: pieces of ray across which extinction times length, times the transparency
+                               before them, changes by more are sampled seven times as densely; 0 = 0.5 */
     double emission;        /* share of rgb that glows by itself, besides scattering light; 0..1e6; with visibility only */
     double radius;          /* the paper's method: of local visibility, in units of the smallest voxel spacing, 1..32; 0 = 16 */
     double reduction;       /* the paper's method: voxels of the volume to points of its blocks, at least 1; 0 = 4 */
@@ -1699,6 +1701,7 @@ static isogi_result isogi_dvr__resolve(isogi_dvr_desc *desc, const isogi_dvr_des
     if (!(desc->step >= 1e-4 && desc->step <= 1e4)) return ISOGI_INVALID;
     if (!desc->method) desc->method = ISOGI_DVR_SWEEP;
     if (!isogi_dvr__finite64(desc->anisotropy) || !(desc->anisotropy > -1 && desc->anisotropy < 1)) return ISOGI_INVALID;
+    if (!isogi_dvr__finite64(desc->tolerance) || !(desc->tolerance >= 0)) return ISOGI_INVALID;
     if (!isogi_dvr__finite64(desc->emission) || !(desc->emission >= 0 && desc->emission <= 1e6)) return ISOGI_INVALID;
     if (!isogi_dvr__finite64(desc->radius) || !isogi_dvr__finite64(desc->reduction)) return ISOGI_INVALID;
     if (!(desc->radius >= 0) || !(desc->reduction >= 0)) return ISOGI_INVALID;
@@ -2308,6 +2311,7 @@ typedef struct isogi_dvr__crossings {
     const isogi_dvr *dvr;
     float dir[3];
     double shift;    /* the march's t minus the ray's t */
+    double end;      /* where clip planes end the ray, in the march's t */
     size_t count;    /* peaks */
     uint64_t left;
     double t[ISOGI_DVR_MAX_PEAKS]; /* of the march; 1e300 = no more */
@@ -2315,11 +2319,12 @@ typedef struct isogi_dvr__crossings {
     isogi_counters work;
 } isogi_dvr__crossings;
 
-static void isogi_dvr__begin_crossings(isogi_dvr__crossings *c, const isogi_dvr *d, const double origin[3], const float dir[3], double enter) {
+static void isogi_dvr__begin_crossings(isogi_dvr__crossings *c, const isogi_dvr *d, const double origin[3], const float dir[3], double enter,
+                                       double length) {
     isogi_ray ray;
     size_t i;
     int a;
-    c->dvr = d, c->shift = -enter, c->count = d->transfer.peak_count, c->left = 1;
+    c->dvr = d, c->shift = -enter, c->end = d->clip_count ? length : 1e300, c->count = d->transfer.peak_count, c->left = 1;
     memset(&c->work, 0, sizeof c->work);
     if (!c->count) return;
     memset(&ray, 0, sizeof ray);
@@ -2328,8 +2333,9 @@ static void isogi_dvr__begin_crossings(isogi_dvr__crossings *c, const isogi_dvr 
     for (i = 0; i < c->count; i++) {
         memset(&c->hit[i], 0, sizeof c->hit[i]);
         ray.isovalue = d->transfer.peaks[i].isovalue;
+        if (d->clip_count) ray.tmin = (float)enter;
         if (d->transfer.peaks[i].opacity > 0) isogi_vol_intersect(d->desc.pyramid, &ray, 1, &c->hit[i], &c->work);
-        c->t[i] = c->hit[i].side ? c->hit[i].t + c->shift : 1e300;
+        c->t[i] = c->hit[i].side && c->hit[i].t + c->shift <= c->end ? c->hit[i].t + c->shift : 1e300;
     }
 }
 
@@ -2349,14 +2355,24 @@ static void isogi_dvr__pass_crossing(isogi_dvr__crossings *c, size_t i) {
         isogi_vol_continue(c->dvr->desc.pyramid, &c->hit[i], (const float(*)[3])&c->dir, NULL, c->dvr->transfer.peaks[i].isovalue, 0, 1,
                            &hit, &c->work);
     }
-    c->t[i] = hit.side ? c->t[i] + hit.t : 1e300;
+    c->t[i] = hit.side && c->t[i] + hit.t <= c->end ? c->t[i] + hit.t : 1e300;
     c->hit[i] = hit;
 }
 
 /* ==== visibility ===================================================================================================== */
 
-/* Trilinear in the grid of visibility: the eight points around a position given in the volume's grid coordinates. */
-static void isogi_dvr__visibility_at(const isogi_dvr *d, const double position[3], float *out) {
+/* What a grid point counts for in shading. One on a surface sees half of its surroundings, one below it hardly any, knows nothing of the
+   surface beside it, and would leave a dark blotch there: it stands back behind its neighbours outside. */
+static float isogi_dvr__openness(float v0) {
+    float share = v0 / 1.7724539f; /* of half of sqrt(4 pi) */
+    share = share > 0.01f ? share : 0.01f;
+    return share < 1 ? share * share : 1;
+}
+
+/* Trilinear in the grid of visibility: the eight points around a position given in the volume's grid coordinates; `open`: each weighed by
+   what it counts for. */
+static void isogi_dvr__visibility_at(const isogi_dvr *d, const double position[3], int open, float *out) {
+    float total = 0;
     size_t base = 0, offset[3], stride = d->coefficients, i, k;
     double u[3];
     int a;
@@ -2372,8 +2388,12 @@ static void isogi_dvr__visibility_at(const isogi_dvr *d, const double position[3
     for (k = 0; k < 8; k++) {
         const float *v = d->visibility + base + (k & 1 ? offset[0] : 0) + (k & 2 ? offset[1] : 0) + (k & 4 ? offset[2] : 0);
         float w = (float)((k & 1 ? u[0] : 1 - u[0]) * (k & 2 ? u[1] : 1 - u[1]) * (k & 4 ? u[2] : 1 - u[2]));
+        if (open) w *= isogi_dvr__openness(v[0]);
         for (i = 0; i < d->coefficients; i++) out[i] += w * v[i];
+        total += w;
     }
+    if (open)
+        for (i = 0; i < d->coefficients; i++) out[i] /= total;
 }
 
 static double isogi_dvr__transmittance(const isogi_dvr *d, const double grid[3], const double world[3], const double direction[6],
@@ -2386,7 +2406,7 @@ static double isogi_dvr__transmittance(const isogi_dvr *d, const double grid[3],
     if (!isogi_dvr__begin(&march, d, grid, direction, sqrt(isogi_dvr__dot(direction + 3, direction + 3)), d->visibility_step)) return 1;
     if (d->transfer.peak_count) {
         float dir[3] = {(float)direction[3], (float)direction[4], (float)direction[5]};
-        isogi_dvr__begin_crossings(crossings, d, world, dir, march.enter);
+        isogi_dvr__begin_crossings(crossings, d, world, dir, march.enter, march.length);
         while (clear > ISOGI_DVR__NEGLIGIBLE && (i = isogi_dvr__first_crossing(crossings, 1e300)) < crossings->count) {
             clear *= 1 - (double)d->transfer.peaks[i].opacity;
             isogi_dvr__pass_crossing(crossings, i);
@@ -3429,7 +3449,7 @@ ISOGI_API isogi_result isogi_dvr_sample_visibility(const isogi_dvr *dvr, const f
         double world[3], grid[3];
         for (a = 0; a < 3; a++) world[a] = (double)points[i][a];
         isogi_vol_to_grid(dvr->desc.pyramid, world, grid);
-        isogi_dvr__visibility_at(dvr, grid, visibility + i * dvr->coefficients);
+        isogi_dvr__visibility_at(dvr, grid, 0, visibility + i * dvr->coefficients);
     }
     return ISOGI_OK;
 }
@@ -3551,13 +3571,26 @@ static isogi_result isogi_dvr__set_lights(isogi_dvr__lights *l, const isogi_dvr 
     return result;
 }
 
+/* Light scattered along a ray after Henyey and Greenstein: degree l of the product of light and visibility is scaled by g^l, and read
+   in the direction from which it would go on straight (which is the ray's own). g = 0 is 1/(4 pi) L . V. */
+static double isogi_dvr__scatter(const isogi_dvr *d, const float *light, const float *v, const float dir[3]) {
+    float product[ISOGI_DVR__MAX_ORDER * ISOGI_DVR__MAX_ORDER], y[ISOGI_DVR__MAX_ORDER * ISOGI_DVR__MAX_ORDER];
+    double sum = 0, power = 1;
+    int l, m;
+    if (isogi_sh_product(product, light, v, d->desc.order, 1) != ISOGI_OK) return 0;
+    isogi_sh_eval(y, d->desc.order, (const float(*)[3])dir, 1);
+    for (l = 0; l < d->desc.order; l++, power *= d->desc.anisotropy)
+        for (m = -l; m <= l; m++) sum += power * (double)product[l * (l + 1) + m] * (double)y[l * (l + 1) + m];
+    return sum;
+}
+
 /* 1/(4 pi) L . V at a place (Kronander 2011, section 4.4). */
-static void isogi_dvr__shade_visibility(const isogi_dvr *d, const isogi_dvr__lights *l, const double grid[3], double out[3]) {
+static void isogi_dvr__shade_visibility(const isogi_dvr *d, const isogi_dvr__lights *l, const double grid[3], const float dir[3], double out[3]) {
     float v[ISOGI_DVR__MAX_ORDER * ISOGI_DVR__MAX_ORDER], nearby[3 * ISOGI_DVR__MAX_ORDER * ISOGI_DVR__MAX_ORDER];
     size_t i;
     int a, here = 0;
     if (l->local) isogi_dvr__local_at(d, isogi_dvr__block_of(&d->blocks, grid), grid, v);
-    else isogi_dvr__visibility_at(d, grid, v);
+    else isogi_dvr__visibility_at(d, grid, 1, v);
     if (l->nearby.light_count) {
         double world[3];
         float point[3];
@@ -3566,9 +3599,15 @@ static void isogi_dvr__shade_visibility(const isogi_dvr *d, const isogi_dvr__lig
         here = isogi_sh_project(nearby, d->desc.order, &l->nearby, point) == ISOGI_OK;
     }
     for (a = 0; a < 3; a++) {
+        float light[ISOGI_DVR__MAX_ORDER * ISOGI_DVR__MAX_ORDER];
         double sum = 0;
-        for (i = 0; i < d->coefficients; i++) sum += (double)(l->sh[3 * i + (size_t)a] + (here ? nearby[3 * i + (size_t)a] : 0)) * (double)v[i];
-        out[a] = isogi_dvr__clamp(sum / (4 * ISOGI_DVR__PI), 1e30);
+        for (i = 0; i < d->coefficients; i++) {
+            light[i] = l->sh[3 * i + (size_t)a] + (here ? nearby[3 * i + (size_t)a] : 0);
+            sum += (double)light[i] * (double)v[i];
+        }
+        sum /= 4 * ISOGI_DVR__PI;
+        if (fabs(d->desc.anisotropy) > 0) sum = isogi_dvr__scatter(d, light, v, dir);
+        out[a] = isogi_dvr__clamp(sum, 1e30) + d->desc.emission;
     }
 }
 
@@ -3682,7 +3721,7 @@ static void isogi_dvr__shade(const isogi_dvr__pixel_ray *r, const int cell[3], c
     int a;
     if (r->dvr->desc.shading == ISOGI_DVR_UNLIT) return;
     for (a = 0; a < 3; a++) grid[a] = cell[a] + local[a];
-    if (r->dvr->desc.shading == ISOGI_DVR_VISIBILITY) isogi_dvr__shade_visibility(r->dvr, r->lights, grid, light);
+    if (r->dvr->desc.shading == ISOGI_DVR_VISIBILITY) isogi_dvr__shade_visibility(r->dvr, r->lights, grid, r->dir, light);
     else if (r->dvr->desc.shading == ISOGI_DVR_TWO_SIDED)
         isogi_dvr__shade_two_sided(r->dvr, r->lights, cell, local, r->dir, side, opacity, light, add);
     else isogi_dvr__shade_local(r->dvr, r->lights, cell, local, r->dir, light);
@@ -3969,7 +4008,7 @@ static void isogi_dvr__cast(isogi_dvr__pixel_ray *r, isogi_dvr__march *m, isogi_
        mean extinction (K(b) - K(a)) / (b - a),   colour (C(b) - C(a)) / (K(b) - K(a)),   opacity 1 - exp(-mean * length)
    (Kraus 2005, eq. 6, 7 with the attenuation within a piece left to its opacity). Empty space is leapt over by the distance to the
    nearest block that is not empty. Light is linear between grid points, so that L . V is summed at the grid points, once for a
-   picture, and looked up as a colour every fourth sample: the visibility grid is no finer. */
+   picture, and looked up as a colour every other sample. */
 typedef struct isogi_dvr__class_entry { float before[4], mean[4]; } isogi_dvr__class_entry; /* integrals up to a class, and over it: rgb, extinction */
 
 struct isogi_dvr__frame {
@@ -3978,8 +4017,9 @@ struct isogi_dvr__frame {
     float (*light)[4];  /* at grid points: scattered radiance of albedo 1, plus what glows; NULL = unlit */
     float low, scale;   /* class of a value */
     double step;        /* voxels between samples */
+    float tolerance;    /* change of extinction times length, and of what is seen of it, from which on a piece is divided */
     float glow;         /* share of the colour that is emitted */
-    void (*sample_nodes)(const isogi_dvr__frame *f, const isogi_dvr__fast_ray *r, int first, float *classes);
+    unsigned (*sample_nodes)(const isogi_dvr__frame *f, const isogi_dvr__fast_ray *r, int first, float *classes);
     int sample_kind;    /* voxels that vectors can read: 0 float, 1 uint8, 2 uint16; -1 another type or layout */
     uint32_t last_word; /* byte offset of the last four bytes of the data */
 };
@@ -4034,8 +4074,8 @@ static void isogi_dvr__frame_light(void *arg, size_t task) {
         int a;
         for (c = 0; c < d->coefficients; c++)
             for (a = 0; a < 3; a++) sum[a] += job->lights->sh[3 * c + (size_t)a] * v[c];
-        for (a = 0; a < 3; a++) job->frame.light[point][a] = sum[a] * (float)(1 / (4 * ISOGI_DVR__PI));
-        job->frame.light[point][3] = 0;
+        job->frame.light[point][3] = isogi_dvr__openness(v[0]); /* which the light is multiplied by, and divided by between grid points */
+        for (a = 0; a < 3; a++) job->frame.light[point][a] = sum[a] * (float)(1 / (4 * ISOGI_DVR__PI)) * job->frame.light[point][3];
     }
 }
 
@@ -4066,10 +4106,12 @@ static void isogi_dvr__fast_light(const isogi_dvr__frame *f, const float positio
         float v0 = v00 + u[1] * (v10 - v00), v1 = v01 + u[1] * (v11 - v01);
         out[i] = v0 + u[2] * (v1 - v0);
     }
+    for (i = 0; i < 3; i++) out[i] /= out[3];
 }
 
-/* Classes of samples first .. first + ISOGI_DVR__NODES - 1; -1 where a corner is not finite. */
-static void isogi_dvr__sample_nodes(const isogi_dvr__frame *f, const isogi_dvr__fast_ray *r, int first, float *classes) {
+/* Classes of samples first .. first + ISOGI_DVR__NODES - 1; -1 where a corner is not finite. Returns a bit for each piece between two of
+   them that may absorb: extinction at its beginning, or a change of its integral. */
+static unsigned isogi_dvr__sample_nodes(const isogi_dvr__frame *f, const isogi_dvr__fast_ray *r, int first, float *classes) {
     const isogi_volume *v = &f->dvr->volume;
     int i, a, k;
     for (i = 0; i < ISOGI_DVR__NODES; i++) {
@@ -4104,10 +4146,11 @@ static void isogi_dvr__sample_nodes(const isogi_dvr__frame *f, const isogi_dvr__
         value = value > 0 ? value : 0;
         classes[i] = value < ISOGI_DVR__CLASSES - 0.001f ? value : ISOGI_DVR__CLASSES - 0.001f;
     }
+    return (1u << (ISOGI_DVR__NODES - 1)) - 1;
 }
 
 #ifdef ISOGI_DVR__AVX
-__attribute__((target("avx2,fma"))) static void isogi_dvr__sample_nodes_avx2(const isogi_dvr__frame *f, const isogi_dvr__fast_ray *r, int first, float *classes) {
+__attribute__((target("avx2,fma"))) static unsigned isogi_dvr__sample_nodes_avx2(const isogi_dvr__frame *f, const isogi_dvr__fast_ray *r, int first, float *classes) {
     const isogi_volume *v = &f->dvr->volume;
     const __m256 lane = _mm256_add_ps(_mm256_set1_ps((float)first), _mm256_setr_ps(0, 1, 2, 3, 4, 5, 6, 7));
     __m256i offset = _mm256_setzero_si256(), bits;
@@ -4145,6 +4188,15 @@ __attribute__((target("avx2,fma"))) static void isogi_dvr__sample_nodes_avx2(con
     value = _mm256_fmadd_ps(value, _mm256_set1_ps((float)v->scale), _mm256_set1_ps((float)v->bias - f->low));
     value = _mm256_min_ps(_mm256_max_ps(_mm256_mul_ps(value, _mm256_set1_ps(f->scale)), _mm256_setzero_ps()), top);
     _mm256_storeu_ps(classes, _mm256_blendv_ps(value, _mm256_set1_ps(-1), _mm256_castsi256_ps(bits)));
+    {
+        __m256i entry = _mm256_slli_epi32(_mm256_cvttps_epi32(value), 5); /* bytes */
+        __m256 before = _mm256_i32gather_ps(&f->classes[0].before[3], entry, 1), mean = _mm256_i32gather_ps(&f->classes[0].mean[3], entry, 1);
+        __m256 share = _mm256_sub_ps(value, _mm256_floor_ps(value)), next;
+        before = _mm256_fmadd_ps(share, mean, before);
+        next = _mm256_permutevar8x32_ps(before, _mm256_setr_epi32(1, 2, 3, 4, 5, 6, 7, 7));
+        mean = _mm256_or_ps(_mm256_cmp_ps(mean, _mm256_setzero_ps(), _CMP_GT_OQ), _mm256_cmp_ps(before, next, _CMP_NEQ_OQ));
+        return (unsigned)_mm256_movemask_ps(mean) & 0x7fu;
+    }
 }
 #endif
 
@@ -4219,43 +4271,78 @@ static int isogi_dvr__leap(const isogi_dvr__frame *f, const isogi_dvr__fast_ray 
     return r->count;
 }
 
+/* What a ray has gathered. */
+typedef struct isogi_dvr__fast_state {
+    float out[3], clear, light[2][4]; /* light at samples 2 place and 2 place + 2 */
+    int place;
+} isogi_dvr__fast_state;
+
+/* Radiance of albedo 1 at a place between samples. */
+static void isogi_dvr__fast_radiance(const isogi_dvr__frame *f, const isogi_dvr__fast_ray *r, isogi_dvr__fast_state *s, float at, float radiance[3]) {
+    int place = (int)(0.5f * at), a, n;
+    float u = 0.5f * at - (float)place, position[3];
+    if (f->light && place != s->place) {
+        if (place == s->place + 1) memcpy(s->light[0], s->light[1], sizeof s->light[0]);
+        for (n = place == s->place + 1; n < 2; n++) {
+            for (a = 0; a < 3; a++) position[a] = r->origin[a] + (float)(2 * (place + n)) * r->dir[a];
+            isogi_dvr__fast_light(f, position, s->light[n]);
+        }
+        s->place = place;
+    }
+    for (a = 0; a < 3; a++) {
+        float x = s->light[0][a] + u * (s->light[1][a] - s->light[0][a]);
+        radiance[a] = (x > 0 ? x : 0) + f->glow; /* a truncated series may ring below 0 */
+    }
+}
+
+/* A piece of ray, `size` samples long from `at` on, with this mean extinction and premultiplied colour. */
+static void isogi_dvr__fast_piece(const isogi_dvr__frame *f, const isogi_dvr__fast_ray *r, isogi_dvr__fast_state *s, const float mean[4], float at, float size, float depth) {
+    float opacity, share, radiance[3];
+    int a;
+    depth = depth < 1e30f ? depth : 1e30f;
+    opacity = 1 - isogi_dvr__exp(depth), share = s->clear * opacity / mean[3];
+    /* light where the piece is seen on average: its middle when it is clear, its beginning when it is dense */
+    isogi_dvr__fast_radiance(f, r, s, at + size * 0.5f / (1 + depth * (1.0f / 6)), radiance);
+    for (a = 0; a < 3; a++) s->out[a] += share * mean[a] * radiance[a];
+    s->clear *= 1 - opacity;
+}
+
+/* A piece across which extinction changes much is looked at again in seven: the field between the samples is not quite linear, and
+   where in the piece its surface lies decides about light. */
+static void isogi_dvr__fast_divide(const isogi_dvr__frame *f, const isogi_dvr__fast_ray *r, isogi_dvr__fast_state *s, int first, float depth_of_one, isogi_counters *work) {
+    const float part = 1.0f / (ISOGI_DVR__NODES - 1);
+    float classes[ISOGI_DVR__NODES], mean[4];
+    isogi_dvr__fast_ray fine = *r;
+    int k, a;
+    for (a = 0; a < 3; a++) fine.origin[a] += (float)first * r->dir[a], fine.dir[a] *= part;
+    f->sample_nodes(f, &fine, 0, classes);
+    work->samples += ISOGI_DVR__NODES - 2;
+    for (k = 0; k + 1 < ISOGI_DVR__NODES; k++)
+        if (isogi_dvr__fast_mean(f->classes, classes[k], classes[k + 1], mean))
+            isogi_dvr__fast_piece(f, r, s, mean, (float)first + (float)k * part, part, mean[3] * depth_of_one * part);
+}
+
 /* Front to back. */
 static void isogi_dvr__fast_cast(const isogi_dvr__frame *f, const isogi_dvr__fast_ray *r, float out[4], isogi_counters *work) {
-    const isogi_dvr *d = f->dvr;
-    float clear = 1, end = 1 - d->desc.opaque, inverse[3], classes[ISOGI_DVR__NODES], light[2][4] = {{1, 1, 1, 0}, {1, 1, 1, 0}}, position[3];
-    int i = 0, k, a, lit = -1;
-    for (a = 0; a < 3; a++) inverse[a] = fabsf(r->dir[a]) > 1e-20f ? 1 / r->dir[a] : 1e20f, out[a] = 0;
-    while ((i = isogi_dvr__leap(f, r, inverse, i)) < r->count - 1 && clear > end) {
-        f->sample_nodes(f, r, i, classes);
+    float end = 1 - f->dvr->desc.opaque, inverse[3], classes[ISOGI_DVR__NODES], tolerance = f->tolerance;
+    isogi_dvr__fast_state s = {{0, 0, 0}, 1, {{1, 1, 1, 0}, {1, 1, 1, 0}}, -2};
+    int i = 0, k, a;
+    unsigned some;
+    for (a = 0; a < 3; a++) inverse[a] = fabsf(r->dir[a]) > 1e-20f ? 1 / r->dir[a] : 1e20f;
+    while (s.clear > end && (i = isogi_dvr__leap(f, r, inverse, i)) < r->count - 1) {
+        some = f->sample_nodes(f, r, i, classes);
         work->samples += ISOGI_DVR__NODES;
-        for (k = 0; k + 1 < ISOGI_DVR__NODES && i + k + 1 < r->count; k++) {
-            float mean[4], opacity, share, u;
-            int place = (i + k) >> 2;
-            if (!isogi_dvr__fast_mean(f->classes, classes[k], classes[k + 1], mean)) continue;
-            if (f->light && place != lit) {
-                if (place == lit + 1 && lit >= 0) memcpy(light[0], light[1], sizeof light[0]);
-                else {
-                    for (a = 0; a < 3; a++) position[a] = r->origin[a] + (float)(4 * place) * r->dir[a];
-                    isogi_dvr__fast_light(f, position, light[0]);
-                }
-                for (a = 0; a < 3; a++) position[a] = r->origin[a] + (float)(4 * place + 4) * r->dir[a];
-                isogi_dvr__fast_light(f, position, light[1]);
-                lit = place;
-            }
-            u = ((float)(i + k - 4 * place) + 0.5f) * 0.25f;
-            opacity = mean[3] * (i + k + 2 < r->count ? r->piece : r->last_piece);
-            opacity = 1 - isogi_dvr__exp(opacity < 1e30f ? opacity : 1e30f);
-            share = clear * opacity / mean[3];
-            for (a = 0; a < 3; a++) {
-                float radiance = light[0][a] + u * (light[1][a] - light[0][a]);
-                out[a] += share * mean[a] * ((radiance > 0 ? radiance : 0) + f->glow);
-            }
-            clear *= 1 - opacity;
-            if (!(clear > end)) break;
+        for (k = 0; some && i + k + 1 < r->count && s.clear > end; k++, some >>= 1) {
+            float mean[4], change, piece = i + k + 2 < r->count ? r->piece : r->last_piece;
+            if (!(some & 1) || !isogi_dvr__fast_mean(f->classes, classes[k], classes[k + 1], mean)) continue;
+            change = (f->classes[(int)classes[k + 1]].mean[3] - f->classes[(int)classes[k]].mean[3]) * piece * s.clear;
+            if (change > tolerance || change < -tolerance) isogi_dvr__fast_divide(f, r, &s, i + k, piece, work);
+            else isogi_dvr__fast_piece(f, r, &s, mean, (float)(i + k), 1, mean[3] * piece);
         }
         i += ISOGI_DVR__NODES - 1;
     }
-    out[3] = 1 - clear;
+    for (a = 0; a < 3; a++) out[a] = s.out[a];
+    out[3] = 1 - s.clear;
 }
 
 /* 0 if the ray misses what is kept of the volume. */
@@ -4369,7 +4456,7 @@ static void isogi_dvr__render_pixel(const isogi_dvr__render_job *job, int x, int
     march.silhouette = d->desc.silhouette;
     again = march;
     ray.dvr = d, ray.lights = &job->lights, ray.clear = 1, ray.end = 1 - (double)d->desc.opaque;
-    if (!isogi_dvr__by_value(d)) isogi_dvr__begin_crossings(crossings, d, origin, ray.dir, march.enter);
+    if (!isogi_dvr__by_value(d)) isogi_dvr__begin_crossings(crossings, d, origin, ray.dir, march.enter, march.length);
     isogi_dvr__cast(&ray, &march, crossings);
     for (a = 0; a < 3; a++) out[a] = (float)ray.rgb[a];
     out[3] = (float)(1 - ray.clear);
@@ -4378,7 +4465,7 @@ static void isogi_dvr__render_pixel(const isogi_dvr__render_job *job, int x, int
     if (!job->depth || !(ray.clear < 1)) return;
     /* once more, without colours, to where half of the final opacity is reached */
     ray.probe = 1, ray.end = 1 - 0.5 * (1 - ray.clear), ray.clear = 1;
-    if (!isogi_dvr__by_value(d)) isogi_dvr__begin_crossings(crossings, d, origin, ray.dir, march.enter);
+    if (!isogi_dvr__by_value(d)) isogi_dvr__begin_crossings(crossings, d, origin, ray.dir, march.enter, march.length);
     isogi_dvr__cast(&ray, &again, crossings);
     out[4] = (float)((again.enter + ray.t) * speed);
 }
@@ -4419,6 +4506,7 @@ static isogi_result isogi_dvr__begin_frame(isogi_dvr__render_job *job) {
     isogi_vol_to_grid(d->desc.pyramid, eye, job->eye);
     if (!isogi_dvr__fast_space(d) || job->depth || job->lights.nearby.light_count || job->lights.local) return ISOGI_OK;
     f->dvr = d, f->step = d->piece, f->sample_nodes = isogi_dvr__sample_nodes, f->glow = (float)d->desc.emission;
+    f->tolerance = d->desc.tolerance > 0 ? (float)d->desc.tolerance : 0.5f;
     bytes = (double)v->stride[0] * (double)d->cells[0] + (double)v->stride[1] * (double)d->cells[1] + (double)v->stride[2] * (double)d->cells[2];
     f->sample_kind = kind >= 0 && v->stride[0] == (kind == 0 ? 4 : kind) && v->stride[1] > 0 && v->stride[2] > 0 && bytes > 8 && bytes < 2e9 ? kind : -1;
     if (f->sample_kind >= 0) f->last_word = (uint32_t)bytes + (uint32_t)v->stride[0] - 4;

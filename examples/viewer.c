@@ -308,7 +308,6 @@ static int parse_arguments(viewer *v, int argc, char **argv) {
     if (o->scene && !o->has_mode) o->mode = o->scene->lit ? IRRADIANCE : DVR;
     if (o->scene && o->mode >= DVR && !o->scene->rendered && !o->tf)
         return file_fail(v->error, "--scene %s has no transfer function: give one by --tf, or another --mode", o->scene->name);
-    if (o->has_clip && o->mode >= DVR) return file_fail(v->error, "--clip: works with surfaces, not with --mode %s", mode_name[o->mode]);
     if (o->raycast && o->mode >= DVR) return file_fail(v->error, "--raycast: works with surfaces, not with --mode %s", mode_name[o->mode]);
     if (!o->has_size) o->width = o->height = o->mode >= DVR ? 512 : 900;
     if ((double)o->width * o->height > 100e6) return file_fail(v->error, "--size: %dx%d is too large; at most 100 million pixels", o->width, o->height);
@@ -1070,6 +1069,7 @@ static int render_volume(viewer *v) {
     if (!set_transfer(v)) return 0;
     result = isogi_dvr_create(&dvr, &desc, &v->context);
     if (result == ISOGI_OK) result = isogi_dvr_set_transfer(dvr, &v->transfer.transfer);
+    if (result == ISOGI_OK && v->o.has_clip) result = isogi_dvr_set_clip(dvr, (const double(*)[4])&v->o.clip, 1);
     for (uint64_t budget = 20000; result == ISOGI_OK && remaining > 0 && desc.shading == ISOGI_DVR_VISIBILITY; budget += budget / 4) {
         result = isogi_dvr_step(dvr, budget, &remaining);
         say(v, "visibility", 1 - remaining, begun);

@@ -217,7 +217,7 @@ TEST(silly_options_get_one_line_that_names_the_option) {
         {"procedural:gyroid --albedo 2,0,0", "--albedo"}, {"procedural:gyroid --albedo 1", "--albedo"}, {"procedural:gyroid --bounces 1.5", "--bounces"},
         {"procedural:gyroid --bounces -2", "--bounces"}, {"procedural:gyroid --samples 0", "--samples"}, {"procedural:gyroid --samples 1e30", "--samples"},
         {"procedural:gyroid --lattice 0,4,4", "--lattice"}, {"procedural:gyroid --lattice 4,4", "--lattice"}, {"procedural:gyroid --lookup magic", "--lookup"},
-        {"procedural:gyroid --clip 0,0,0,1", "--clip"}, {"procedural:gyroid --clip 1,2,3", "--clip"}, {"procedural:gyroid --mode dvr --clip 1,0,0,0", "--clip"},
+        {"procedural:gyroid --clip 0,0,0,1", "--clip"}, {"procedural:gyroid --clip 1,2,3", "--clip"},
         {"procedural:gyroid --camera 1,2", "--camera"}, {"procedural:gyroid --camera 0,91,2", "--camera"}, {"procedural:gyroid --camera 0,0,0", "--camera"},
         {"procedural:gyroid --up 0,0,0", "--up"}, {"procedural:gyroid --threads -1", "--threads"}, {"procedural:gyroid --threads 1000", "--threads"},
         {"procedural:gyroid --light sun:1,1,1:1,1,1", "--light"}, {"procedural:gyroid --light directional:0,0,0:1,1,1", "--light"},
