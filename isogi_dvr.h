@@ -4237,7 +4237,7 @@ static float isogi_dvr__exp(float x) {
 }
 
 /* The first sample from i on that may see something: the last one before the ray leaves the empty blocks around it. */
-static int isogi_dvr__leap(const isogi_dvr__frame *f, const isogi_dvr__fast_ray *r, const float inverse[3], int i) {
+static int isogi_dvr__leap(const isogi_dvr__frame *f, const isogi_dvr__fast_ray *r, const float inverse[3], int i, isogi_counters *work) {
     const isogi_dvr *d = f->dvr;
     const isogi_level *level = &d->level[0];
     while (i < r->count) {
@@ -4250,7 +4250,9 @@ static int isogi_dvr__leap(const isogi_dvr__frame *f, const isogi_dvr__fast_ray 
             c[a] = c[a] < (int)level->size[a] ? c[a] : (int)level->size[a] - 1;
         }
         free = d->leap[(size_t)c[0] + level->size[0] * ((size_t)c[1] + level->size[1] * (size_t)c[2])];
+        work->blocks++;
         if (!free) return i;
+        work->blocks_skipped++;
         for (a = 0; a < 3; a++) {
             float border = (float)(4 * (r->dir[a] > 0 ? c[a] + free : c[a] - free + 1)), t = (border - r->origin[a]) * inverse[a];
             exit = t < exit ? t : exit;
@@ -4329,7 +4331,7 @@ static void isogi_dvr__fast_cast(const isogi_dvr__frame *f, const isogi_dvr__fas
     int i = 0, k, a;
     unsigned some;
     for (a = 0; a < 3; a++) inverse[a] = fabsf(r->dir[a]) > 1e-20f ? 1 / r->dir[a] : 1e20f;
-    while (s.clear > end && (i = isogi_dvr__leap(f, r, inverse, i)) < r->count - 1) {
+    while (s.clear > end && (i = isogi_dvr__leap(f, r, inverse, i, work)) < r->count - 1) {
         some = f->sample_nodes(f, r, i, classes);
         work->samples += ISOGI_DVR__NODES;
         for (k = 0; some && i + k + 1 < r->count && s.clear > end; k++, some >>= 1) {
