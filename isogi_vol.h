@@ -2906,25 +2906,32 @@ ISOGI_VOL__INLINE void isogi_vol__all_corners(uint64_t *low, uint64_t *high) {
     *low = l & (l >> 25 | h << 39), *high = h & h >> 25;
 }
 
-/* Which of the 64 cells (x + 4y + 16z) can hold the surface, from the voxels that are certainly inside and outside. */
-ISOGI_VOL__INLINE uint64_t isogi_vol__mixed_cells(const isogi_vol__leaf *leaf, uint64_t in_low, uint64_t in_high, uint64_t out_low, uint64_t out_high) {
-    const uint64_t slices = 0x0007ffff0007ffffu; /* of 4x4 bits each in 5x5 */
-    const int cut = leaf->code[ISOGI_VOL__LEAF_CUT];
-    uint64_t a, b, mask;
-    isogi_vol__all_corners(&in_low, &in_high);
-    isogi_vol__all_corners(&out_low, &out_high);
-    in_low |= out_low, in_high |= out_high;
-    a = ((in_low & 0x1ffffff) | in_low >> 25 << 32) & slices, b = ((in_low >> 50 | (in_high << 14 & 0x1ffffff)) | in_high >> 11 << 32) & slices;
+/* Bits at x + 5y + 25z to x + 4y + 16z. */
+ISOGI_VOL__INLINE uint64_t isogi_vol__pack_cells(uint64_t low, uint64_t high) {
+    const uint64_t slices = 0x0007ffff0007ffffu; /* of 4x4 bits each in 5x5, two at a time */
+    uint64_t a = ((low & 0x1ffffff) | low >> 25 << 32) & slices, b = ((low >> 50 | (high << 14 & 0x1ffffff)) | high >> 11 << 32) & slices;
 #define ISOGI_VOL__ROWS(v) (((v) & 0x0000000f0000000fu) | ((v) >> 1 & 0x000000f0000000f0u) | ((v) >> 2 & 0x00000f0000000f00u) | ((v) >> 3 & 0x0000f0000000f000u))
     a = ISOGI_VOL__ROWS(a), b = ISOGI_VOL__ROWS(b);
 #undef ISOGI_VOL__ROWS
-    mask = ~((a & 0xffff) | a >> 16 | (b & 0xffff) << 32 | b >> 32 << 48);
+    return (a & 0xffff) | a >> 16 | (b & 0xffff) << 32 | b >> 32 << 48;
+}
+
+/* Without the cells beyond the volume. */
+ISOGI_VOL__INLINE uint64_t isogi_vol__cut_cells(const isogi_vol__leaf *leaf, uint64_t mask) {
+    const int cut = leaf->code[ISOGI_VOL__LEAF_CUT];
     if (ISOGI_VOL__UNLIKELY(cut)) {
         mask &= 0x1111111111111111u * (15u >> (cut & 3));
         mask &= 0x0001000100010001u * (0xffffu >> 4 * (cut >> 2 & 3));
         mask &= ~(uint64_t)0 >> 16 * (cut >> 4);
     }
     return mask;
+}
+
+/* Which of the 64 cells (x + 4y + 16z) can hold the surface, from the voxels that are certainly inside and outside. */
+ISOGI_VOL__INLINE uint64_t isogi_vol__mixed_cells(const isogi_vol__leaf *leaf, uint64_t in_low, uint64_t in_high, uint64_t out_low, uint64_t out_high) {
+    isogi_vol__all_corners(&in_low, &in_high);
+    isogi_vol__all_corners(&out_low, &out_high);
+    return isogi_vol__cut_cells(leaf, ~isogi_vol__pack_cells(in_low | out_low, in_high | out_high));
 }
 
 ISOGI_VOL__INLINE uint64_t isogi_vol__leaf_mask(const uint8_t node[128], float level, isogi_vol__leaf *leaf) {
@@ -2957,7 +2964,8 @@ static int isogi_vol__machine(void) {
     return __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512bw") && __builtin_cpu_supports("avx512dq") &&
                    __builtin_cpu_supports("avx512vl") && __builtin_cpu_supports("avx512bitalg") &&
                    __builtin_cpu_supports("avx512vbmi") && __builtin_cpu_supports("avx512vbmi2") && __builtin_cpu_supports("avx512vpopcntdq") &&
-                   __builtin_cpu_supports("gfni")
+                   __builtin_cpu_supports("gfni") &&
+                   __builtin_cpu_supports("bmi2")
                ? ISOGI_VOL__PATH_AVX512
                : ISOGI_VOL__PATH_AVX2;
 }
@@ -2988,13 +2996,18 @@ ISOGI_VOL__TARGET("avx2") ISOGI_VOL__INLINE uint64_t isogi_vol__leaf_mask_avx2(c
 #undef ISOGI_VOL__LEAST
 }
 
-ISOGI_VOL__TARGET("avx512f,avx512bw") ISOGI_VOL__INLINE uint64_t isogi_vol__leaf_mask_avx512(const uint8_t node[128], float level, isogi_vol__leaf *leaf) {
+ISOGI_VOL__TARGET("avx512f,avx512bw,bmi2") ISOGI_VOL__INLINE uint64_t isogi_vol__leaf_mask_avx512(const uint8_t node[128], float level, isogi_vol__leaf *leaf) {
     const __m512i low = _mm512_load_si512((const void *)node), high = _mm512_load_si512((const void *)(node + 64));
+    const uint64_t low_rows = 0xf7bc0f7bde07bdefu, high_rows = 0x3def781eu; /* bits x + 5y + 25z of cells */
     __m512i inside, outside;
+    uint64_t in_low, in_high, out_low, out_high;
     isogi_vol__open_leaf(leaf, node, level);
     inside = _mm512_set1_epi8((char)leaf->inside), outside = _mm512_set1_epi8((char)leaf->outside);
-    return isogi_vol__mixed_cells(leaf, _mm512_cmpge_epu8_mask(low, inside), _mm512_cmpge_epu8_mask(high, inside), _mm512_cmplt_epu8_mask(low, outside),
-                                  _mm512_cmplt_epu8_mask(high, outside));
+    in_low = _mm512_cmpge_epu8_mask(low, inside), in_high = _mm512_cmpge_epu8_mask(high, inside);
+    out_low = _mm512_cmplt_epu8_mask(low, outside), out_high = _mm512_cmplt_epu8_mask(high, outside);
+    isogi_vol__all_corners(&in_low, &in_high);
+    isogi_vol__all_corners(&out_low, &out_high);
+    return isogi_vol__cut_cells(leaf, ~(_pext_u64(in_low | out_low, low_rows) | _pext_u64(in_high | out_high, high_rows) << 44));
 }
 
 ISOGI_VOL__TARGET("avx2") ISOGI_VOL__INLINE __m256d isogi_vol__lerp4(__m256d a, __m256d b, __m256d u, __m256d rest) {
@@ -3260,12 +3273,13 @@ typedef struct isogi_vol__batch {
     const double *tmax; /* NULL = unlimited */
     double isovalue;
     uint32_t flags;
+    int bundle;        /* all rays are the first one, or leave from the first start, but for dirs[i] */
     isogi_hit *hits;   /* either this */
     uint8_t *occluded; /* or this */
     isogi_counters work;
 } isogi_vol__batch;
 
-static uint32_t isogi_vol__flags(const isogi_vol__batch *b, size_t i) { return b->rays ? b->rays[i].flags : b->flags; }
+static uint32_t isogi_vol__flags(const isogi_vol__batch *b, size_t i) { return b->rays ? b->rays[b->bundle ? 0 : i].flags : b->flags; }
 
 /* Whether the field is inside at the present cell's point that lies at t. */
 static int isogi_vol__inside_at(isogi_vol__walk *w, double t) {
@@ -3277,7 +3291,7 @@ static int isogi_vol__inside_at(isogi_vol__walk *w, double t) {
 
 static int isogi_vol__begin_ray(const isogi_vol__batch *b, size_t i, isogi_vol__walk *w) {
     const isogi_pyramid *p = b->pyramid;
-    const isogi_ray *ray = &b->rays[i];
+    const isogi_ray *ray = &b->rays[b->bundle ? 0 : i];
     const double tmax = isogi_vol__tmax(ray->tmax);
     double relative[3];
     int a;
@@ -3286,14 +3300,14 @@ static int isogi_vol__begin_ray(const isogi_vol__batch *b, size_t i, isogi_vol__
     w->isovalue = ray->isovalue;
     if (!isogi_vol__finite3(w->origin) || !isogi_vol__finite3(ray->origin)) return 0;
     if (isogi_vol__is_nan(ray->isovalue) || isogi_vol__is_nan(ray->tmin) || isogi_vol__is_nan(ray->tmax) || !(ray->tmin <= tmax)) return 0;
-    if (!isogi_vol__aim(w, ray->dir, isogi_vol__max(ray->tmin, -ISOGI_VOL__UNLIMITED), tmax)) return 0;
+    if (!isogi_vol__aim(w, b->bundle ? b->dirs[i] : ray->dir, isogi_vol__max(ray->tmin, -ISOGI_VOL__UNLIMITED), tmax)) return 0;
     if (w->entry_axis >= 0 && (ray->flags & ISOGI_RAY_CAPPED)) w->inside = 0, w->cap = 2;
     return 1;
 }
 
 static int isogi_vol__begin_start(const isogi_vol__batch *b, size_t i, isogi_vol__walk *w) {
-    const isogi_hit *start = &b->starts[i];
-    const double tmax = isogi_vol__tmax(b->tmax ? b->tmax[i] : 0);
+    const isogi_hit *start = &b->starts[b->bundle ? 0 : i];
+    const double tmax = isogi_vol__tmax(b->tmax ? b->tmax[b->bundle ? 0 : i] : 0);
     int a;
     /* the cap of a border lies where the field is not at the isovalue: nothing to divide out */
     w->deflate = start->side != 2 && start->side != -2;
@@ -3527,7 +3541,7 @@ typedef struct isogi_vol__stride {
 ISOGI_VOL__WALKS(_base, , ISOGI_VOL__NODE_BASE, ISOGI_VOL__LEAF_BASE, isogi_vol__mixed_cell)
 #ifdef ISOGI_VOL__AVX
 ISOGI_VOL__WALKS(_avx2, ISOGI_VOL__TARGET("avx2"), ISOGI_VOL__NODE_AVX2, ISOGI_VOL__LEAF_AVX2, isogi_vol__mixed_cell_avx2)
-ISOGI_VOL__WALKS(_avx512, ISOGI_VOL__TARGET("avx512f,avx512bw"), ISOGI_VOL__NODE_AVX512, ISOGI_VOL__LEAF_AVX512, isogi_vol__mixed_cell_avx2)
+ISOGI_VOL__WALKS(_avx512, ISOGI_VOL__TARGET("avx512f,avx512bw,bmi2"), ISOGI_VOL__NODE_AVX512, ISOGI_VOL__LEAF_AVX512, isogi_vol__mixed_cell_avx2)
 #endif
 
 static int isogi_vol__walk_fast(isogi_vol__walk *w, const isogi_vol__ticks *k, isogi_hit *hit) {
@@ -4498,36 +4512,24 @@ ISOGI_API int isogi_vol_next_interval(const isogi_pyramid *pyramid, const isogi_
     return 1;
 }
 
-/* ---- bundles: in groups of rays of their own ---- */
+/* ---- bundles ---- */
 
 /* hits or occluded, the other is NULL. */
 static isogi_result isogi_vol__bundle(const isogi_pyramid *pyramid, const isogi_bundle *bundle, const float (*dirs)[3], size_t count,
                                       isogi_hit *hits, uint8_t *occluded, isogi_counters *counters) {
-    isogi_ray ray[ISOGI_VOL__GROUP];
-    isogi_hit start[ISOGI_VOL__GROUP];
-    double tmax[ISOGI_VOL__GROUP];
     isogi_vol__batch b;
-    size_t first, i, n;
+    isogi_ray ray;
+    isogi_hit start; /* hits may hold the bundle's */
     if (!pyramid || !bundle || (count && (!dirs || (!hits && !occluded)))) return ISOGI_INVALID;
     memset(&b, 0, sizeof b);
-    b.pyramid = pyramid, b.isovalue = bundle->isovalue, b.flags = bundle->flags;
-    if (bundle->start) b.starts = start, b.tmax = tmax;
-    else b.rays = ray;
-    for (i = 0; i < ISOGI_VOL__GROUP && i < count; i++) {
-        if (bundle->start) start[i] = *bundle->start;
-        tmax[i] = ray[i].tmax = bundle->tmax;
-        memcpy(ray[i].origin, bundle->origin, sizeof ray[i].origin);
-        ray[i].tmin = bundle->tmin, ray[i].isovalue = bundle->isovalue, ray[i].flags = bundle->flags;
+    b.pyramid = pyramid, b.bundle = 1, b.dirs = dirs, b.hits = hits, b.occluded = occluded, b.isovalue = bundle->isovalue, b.flags = bundle->flags;
+    if (bundle->start) start = *bundle->start, b.starts = &start, b.tmax = &bundle->tmax;
+    else {
+        memcpy(ray.origin, bundle->origin, sizeof ray.origin);
+        ray.tmin = bundle->tmin, ray.tmax = bundle->tmax, ray.isovalue = bundle->isovalue, ray.flags = bundle->flags;
+        b.rays = &ray;
     }
-    for (first = 0; first < count; first += n) {
-        n = count - first < ISOGI_VOL__GROUP ? count - first : ISOGI_VOL__GROUP;
-        for (i = 0; i < n; i++) memcpy(ray[i].dir, dirs[first + i], sizeof ray[i].dir);
-        b.dirs = dirs + first;
-        if (hits) b.hits = hits + first;
-        else b.occluded = occluded + first;
-        isogi_vol__trace(&b, n, counters);
-    }
-    return ISOGI_OK;
+    return isogi_vol__trace(&b, count, counters);
 }
 
 ISOGI_API isogi_result isogi_vol_bundle(const isogi_pyramid *pyramid, const isogi_bundle *bundle, const float (*dirs)[3], size_t count,
