@@ -40,7 +40,8 @@
    - ISOGI_NO_THREADS           everything runs on the calling thread
    - ISOGI_API                  linkage of public functions, if extern does not suit
 
-   Memory       Through isogi_context, or malloc. A pyramid takes about 2.2 bytes for every voxel: bounds of every cell, in 8 bits.
+   Memory       Through isogi_context, or malloc. A pyramid takes about 2.2 bytes for every voxel: bounds of blocks, and all voxels in 8 bits of their block's
+                range.
                 A mesh keeps some 3/4 byte of scratch memory for every voxel until it is freed.
                 Stack use stays below 32 KB.
    Threads      A pyramid is const once built: any number of threads may read it. Building and meshing use the context's threads.
@@ -54,6 +55,10 @@
    their hull rejects most cells without solving anything; else the first root is bracketed between extrema and refined by Newton
    steps that never leave the bracket. A walk carries the side it is on from cell to cell, and any change of side is a hit: that is
    why nothing leaks through the faces that cells share.
+   Batches go through a pool of 64 rays, eight to an instruction where there is AVX-512, so hand over many at a time: from 64 on all
+   rays are faster than alone (twice to four times), from 500 on nothing is left to gain. Cells are looked at in float first, from
+   8-bit voxels that lie together in two cache lines for 4x4x4 cells, with an error bound: what is certain needs nothing else, and
+   only cells in doubt, the hits and one cell for every 25 rays besides, read your voxels and are solved in double.
 
    History  1.0  first release
 */
@@ -121,7 +126,7 @@ typedef struct isogi_counters {
     uint64_t rays;           /* rays traced */
     uint64_t blocks;         /* pyramid blocks looked at */
     uint64_t cells;          /* cells whose corner range was read */
-    uint64_t cubics;         /* cells whose cubic was set up */
+    uint64_t cubics;         /* cells whose cubic was set up in double */
     uint64_t texels;         /* texels (trace) or grid points (dvr) computed */
     uint64_t texels_skipped; /* of those asked for, the ones that need no rays */
     uint64_t samples;        /* volume samples taken along viewing rays */
@@ -691,7 +696,7 @@ struct isogi_pyramid {
     size_t broken_count;
     float (*blocks)[2];
     /* bounds for fast rays: nodes of 64 children, least[64] then largest[64], in 8 bits over the volume's range; node n of level 0
-       stands for block n and has cells as children, those of the levels above have nodes */
+       stands for block n and is a leaf, which holds voxels instead */
     uint8_t (*nodes)[128];
     size_t node_count;
     isogi_vol__node_level node_level[ISOGI_VOL__NODE_LEVELS];

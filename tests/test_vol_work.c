@@ -1,0 +1,144 @@
+/* How much work rays through isogi_vol.h do: counters per ray on the fields of the benchmark, and batches of every size. */
+#define ISOGI_IMPLEMENTATION
+#include "isogi_vol.h"
+#include "test.h"
+#include <math.h>
+#include <stdlib.h>
+
+enum { RAYS = 1 << 14, SIDE = 1 << 7 };
+static const double pi = 3.14159265358979323846;
+
+/* The fields of the design: Marschner-Lobb with isovalue 0.5, gyroid with isovalue 0, on [-1,1]^3. */
+static float *field_new(int n, int gyroid) {
+    float *data = (float *)malloc((size_t)n * (size_t)n * (size_t)n * sizeof *data), *out = data;
+    double *s = (double *)malloc((size_t)n * sizeof *s), *c = (double *)malloc((size_t)n * sizeof *c);
+    double *wave = (double *)malloc((size_t)n * (size_t)n * sizeof *wave);
+    for (int i = 0; i < n; i++) {
+        double x = -1 + 2.0 * i / (n - 1);
+        s[i] = gyroid ? sin(2 * pi * (x + 1)) : sin(pi * x / 2), c[i] = cos(2 * pi * (x + 1));
+        for (int j = 0; j < n; j++) {
+            double y = -1 + 2.0 * j / (n - 1);
+            wave[i + n * j] = cos(12 * pi * cos(pi * sqrt(x * x + y * y) / 2));
+        }
+    }
+    for (int z = 0; z < n; z++)
+        for (int y = 0; y < n; y++)
+            for (int x = 0; x < n; x++)
+                *out++ = (float)(gyroid ? s[x] * c[y] + s[y] * c[z] + s[z] * c[x] : (1 - s[z] + 0.25 * (1 + wave[x + n * y])) / 2.5);
+    free(s), free(c), free(wave);
+    return data;
+}
+
+/* A view of the volume; or rays that leave the points that the view shows in random directions. */
+static void rays_new(isogi_ray *rays, double isovalue) {
+    for (int i = 0; i < RAYS; i++) {
+        double sx = (2 * (i % SIDE + 0.5) / SIDE - 1) * tan(pi / 8), sy = (2 * ((double)(i / SIDE) + 0.5) / SIDE - 1) * tan(pi / 8);
+        const double f[3] = {-0.541, -0.433, -0.721}, r[3] = {0.8, 0, -0.6}, u[3] = {0.26, -0.9, 0.346};
+        memset(&rays[i], 0, sizeof rays[i]);
+        for (int a = 0; a < 3; a++) rays[i].dir[a] = (float)(f[a] + sx * r[a] + sy * u[a]);
+        rays[i].origin[0] = 1.5, rays[i].origin[1] = 1.2, rays[i].origin[2] = 2, rays[i].isovalue = isovalue;
+    }
+}
+
+static void leave_surface(const isogi_pyramid *p, isogi_ray *rays, int n) {
+    test_random r = {5};
+    isogi_hit *hits = (isogi_hit *)malloc(RAYS * sizeof *hits);
+    float(*position)[3] = (float(*)[3])malloc(RAYS * sizeof *position), (*normal)[3] = (float(*)[3])malloc(RAYS * sizeof *normal);
+    isogi_vol_intersect(p, rays, RAYS, hits, NULL);
+    int count = 0;
+    for (int i = 0; i < RAYS; i++)
+        if (hits[i].side) hits[count++] = hits[i];
+    isogi_vol_positions(p, hits, (size_t)count, position);
+    isogi_vol_normals(p, hits, (size_t)count, ISOGI_NORMAL_SMOOTH, normal);
+    for (int i = 0; i < RAYS; i++) {
+        double z = 2 * random_unit(&r) - 1, phi = 2 * pi * random_unit(&r), s = sqrt(1 - z * z), d[3] = {s * cos(phi), s * sin(phi), z};
+        for (int a = 0; a < 3; a++) {
+            rays[i].origin[a] = (double)position[i % count][a] + (double)normal[i % count][a] * 0.5 / (n - 1);
+            rays[i].dir[a] = (float)(d[a] + (double)normal[i % count][a]);
+        }
+    }
+    free(hits), free(position), free(normal);
+}
+
+typedef struct work { double blocks, cells, cubics; } work;
+
+static work count_work(const isogi_pyramid *p, const isogi_ray *rays, size_t batch, isogi_hit *hits) {
+    isogi_counters c = {0};
+    for (size_t i = 0; i < RAYS; i += batch) isogi_vol_intersect(p, rays + i, RAYS - i < batch ? RAYS - i : batch, hits + i, &c);
+    CHECK(c.rays == RAYS, "%g rays", (double)c.rays);
+    return (work){(double)c.blocks / RAYS, (double)c.cells / RAYS, (double)c.cubics / RAYS};
+}
+
+/* Nodes and cells that rays look at follow from the geometry alone. In batches on AVX-512 a cubic is set up in double only for cells in
+   doubt, which are the hits and few others; elsewhere for all cells that the surface may pass. Bounds: some 15 % above what was counted. */
+TEST(rays_look_at_few_nodes_and_cells_and_solve_hardly_more_cubics_than_hits) {
+    static const work most[2][2] = {{{10, 3.5, 0.85}, {11, 4.2, 0.75}}, {{11.5, 3.5, 1.05}, {12, 4.3, 0.6}}};
+    int n = LONG_SUITE ? 256 : 128;
+    for (int gyroid = 0; gyroid < 2; gyroid++) {
+        float *data = field_new(n, gyroid);
+        isogi_ray *rays = (isogi_ray *)malloc(RAYS * sizeof *rays);
+        isogi_hit *hits[5];
+        isogi_pyramid *pyramid[5];
+        isogi_volume volume = {.data = data, .type = ISOGI_F32, .size = {(size_t)n, (size_t)n, (size_t)n}};
+        for (int a = 0; a < 3; a++) volume.spacing[a] = 2.0 / (n - 1), volume.origin[a] = -1;
+        for (int path = 2; path < 5; path++) {
+            isogi_context context = {.threads = 1, .force_path = path};
+            CHECK(isogi_vol_build(&pyramid[path], &volume, &context) == ISOGI_OK, "path %d", path);
+            hits[path] = (isogi_hit *)malloc(RAYS * sizeof(isogi_hit));
+        }
+        rays_new(rays, gyroid ? 0 : 0.5);
+        for (int surface = 0; surface < 2; surface++) {
+            const work *bound = &most[gyroid][surface];
+            work done[5];
+            if (surface) leave_surface(pyramid[2], rays, n);
+            for (int path = 2; path < 5; path++) done[path] = count_work(pyramid[path], rays, RAYS, hits[path]);
+            for (int path = 2; path < 5; path++) {
+                long different = 0, found = 0;
+                const int filtered = path == 4 && done[4].cubics < done[3].cubics; /* AVX-512 is there */
+                for (int i = 0; i < RAYS; i++) different += hits[path][i].side != hits[2][i].side, found += hits[path][i].side != 0;
+                printf("    %s, %s, path %d: %.2f hits, %.2f blocks, %.2f cells, %.3f cubics per ray\n", gyroid ? "gyroid" : "Marschner-Lobb",
+                       surface ? "surface" : "primary", path, (double)found / RAYS, done[path].blocks, done[path].cells, done[path].cubics);
+                CHECK(!different, "path %d: %ld hits differ", path, different);
+                CHECK(done[path].blocks < bound->blocks && done[path].cells < bound->cells, "path %d: %g blocks, %g cells", path, done[path].blocks, done[path].cells);
+                CHECK(done[path].cubics < (filtered ? bound->cubics : bound->cells), "path %d: %g cubics", path, done[path].cubics);
+            }
+        }
+        for (int path = 2; path < 5; path++) isogi_vol_free(pyramid[path]), free(hits[path]);
+        free(rays), free(data);
+    }
+}
+
+/* A pool takes rays again and again, moves them when few are left, and reports each one once: in batches of any size, hits and work are
+   the same. Occlusion may be certain before a hit is. */
+TEST(batches_of_any_size_give_the_same_bits) {
+    static const size_t sizes[] = {1, 3, 4, 7, 8, 9, 15, 16, 17, 63, 64, 65, 200, 1000};
+    int n = 48;
+    float *data = field_new(n, 1);
+    isogi_ray *rays = (isogi_ray *)malloc(RAYS * sizeof *rays);
+    isogi_hit *whole = (isogi_hit *)malloc(RAYS * sizeof *whole), *parts = (isogi_hit *)malloc(RAYS * sizeof *parts);
+    uint8_t *occluded = (uint8_t *)malloc(RAYS);
+    isogi_volume volume = {.data = data, .type = ISOGI_F32, .size = {(size_t)n, (size_t)n, (size_t)n}};
+    isogi_context context = {.threads = 1, .force_path = 4};
+    isogi_pyramid *p;
+    for (int a = 0; a < 3; a++) volume.spacing[a] = 2.0 / (n - 1), volume.origin[a] = -1;
+    CHECK(isogi_vol_build(&p, &volume, &context) == ISOGI_OK, "build");
+    rays_new(rays, 0);
+    leave_surface(p, rays, n);
+    for (int i = 0; i < RAYS; i += 5) rays[i].flags = i % 2 ? ISOGI_RAY_CAPPED : 0, rays[i].isovalue = 0.3, rays[i].tmax = i % 3 ? 0.25 : 0;
+    for (int i = 0; i < RAYS; i += 77) rays[i].dir[0] = rays[i].dir[1] = 0, rays[i].isovalue = i % 2 ? 100 : 0;
+    memset(whole, 0, RAYS * sizeof *whole), memset(parts, 0, RAYS * sizeof *parts);
+    work all = count_work(p, rays, RAYS, whole);
+    for (size_t k = 0; k < sizeof sizes / sizeof *sizes; k++) {
+        work done = count_work(p, rays, sizes[k], parts);
+        long wrong = 0, wrong_any = 0;
+        for (size_t i = 0; i < RAYS; i += sizes[k]) isogi_vol_occluded(p, rays + i, RAYS - i < sizes[k] ? RAYS - i : sizes[k], occluded + i, NULL);
+        for (int i = 0; i < RAYS; i++) wrong += memcmp(&whole[i], &parts[i], sizeof *whole) != 0, wrong_any += occluded[i] != (whole[i].side != 0);
+        CHECK(!wrong && !wrong_any, "batches of %zu: %ld hits differ, %ld occlusions", sizes[k], wrong, wrong_any);
+        CHECK(fabs(done.blocks - all.blocks) < 1e-9 && fabs(done.cells - all.cells) < 1e-9 && fabs(done.cubics - all.cubics) < 1e-9,
+              "batches of %zu: %g, %g blocks", sizes[k], done.blocks, all.blocks);
+    }
+    isogi_vol_free(p);
+    free(rays), free(whole), free(parts), free(occluded), free(data);
+}
+
+TEST_MAIN("vol_work")
