@@ -219,6 +219,10 @@ typedef struct isogi_trace_desc {
     int transfer_channels;     /* TRANSFER: sets of coefficients: 1 = grey (mean albedo), 3 = RGB; 0 = 3 if albedo is coloured, else 1 */
     isogi_trace_lookup lookup; /* of request, sample and sample_transfer; the texels themselves do not depend on it */
     isogi_trace_format storage;
+    float hierarchy;           /* 0 = a regular lattice. Else two levels: every second texel along each axis first, then all of them only
+                                  in cells where light differs by more than this share of its mean (beyond three standard errors), or
+                                  where a texel has no surface. Saves rays and memory where light varies slowly; 0.1 to 0.5 is
+                                  sensible. Not with lazy or a box; such a texture cannot be exported or saved */
     size_t box_first[3], box_end[3]; /* only texels box_first <= i < box_end: a part of the bake, in the same bits; all 0 = all */
 } isogi_trace_desc;
 
@@ -1349,6 +1353,7 @@ static int isogi_trace__fields_valid(const isogi_trace_desc *d) {
     if (!isogi_trace__finite3(d->lattice_min) || !isogi_trace__finite3(d->lattice_max)) return 0;
     if (d->sides != ISOGI_TRACE_LOW_SIDE && d->sides != ISOGI_TRACE_HIGH_SIDE && d->sides != ISOGI_TRACE_BOTH_SIDES) return 0;
     if (!isogi_trace__finite((double)d->reach) || d->reach < 0) return 0;
+    if (!isogi_trace__finite((double)d->hierarchy) || d->hierarchy < 0 || (d->hierarchy > 0 && d->lazy)) return 0;
     if ((int)d->storage < 0 || d->storage > ISOGI_TRACE_BYTE || (d->storage == ISOGI_TRACE_RGB9E5 && d->mode == ISOGI_TRACE_TRANSFER))
         return 0;
     if (isogi_lighting_validate(&d->lighting) != ISOGI_OK || !isogi_trace__material_valid(d)) return 0;
@@ -1477,6 +1482,8 @@ struct isogi_trace {
     float light[3 * ISOGI_TRACE__MAX_ORDER * ISOGI_TRACE__MAX_ORDER]; /* TRANSFER: of the lighting, RGB interleaved */
     double brightness; /* TRANSFER: mean luminance of the lighting, for the error */
     isogi_trace *high; /* BOTH_SIDES: the other side's texture, owned */
+    isogi_trace *coarse; /* hierarchy: the texture of every second texel, owned */
+    int refined;         /* the cells in which it is not enough are wanted */
     double share[2];   /* of the progress that baking reports, from and to */
 };
 
@@ -1891,7 +1898,22 @@ static isogi_result isogi_trace__set_up(isogi_trace *t, const isogi_trace_desc *
         if (result != ISOGI_OK) return result;
         isogi_trace__set_light(t, light);
     }
-    return desc->lazy ? ISOGI_OK : isogi_trace__classify_all(t);
+    if (desc->hierarchy > 0) t->scene.desc.lazy = 1; /* texels are wanted when the coarse ones are known */
+    return t->scene.desc.lazy ? ISOGI_OK : isogi_trace__classify_all(t);
+}
+
+/* The texture of every second texel. Where an axis has an even number of texels the last one has no partner: coarse texels are then
+   a little further apart than two fine ones, which lookups do not mind. */
+static isogi_result isogi_trace__coarse_create(isogi_trace *t, const isogi_context *context) {
+    isogi_trace_desc desc = t->scene.desc;
+    int a;
+    for (a = 0; a < 3; a++) {
+        if (t->box_first[a] || t->box_end[a] != t->lattice[a]) return ISOGI_INVALID;
+        desc.lattice[a] = (t->lattice[a] + 2) / 2, desc.lattice_min[a] = t->first[a], desc.lattice_max[a] = t->last[a];
+        if (desc.lattice[a] > t->lattice[a]) desc.lattice[a] = t->lattice[a];
+    }
+    desc.hierarchy = 0, desc.lazy = 0, desc.sides = t->scene.high ? ISOGI_TRACE_HIGH_SIDE : ISOGI_TRACE_LOW_SIDE;
+    return isogi_trace_create(&t->coarse, &desc, context);
 }
 
 ISOGI_API isogi_result isogi_trace_create(isogi_trace **trace, const isogi_trace_desc *desc, const isogi_context *context) {
@@ -1904,6 +1926,7 @@ ISOGI_API isogi_result isogi_trace_create(isogi_trace **trace, const isogi_trace
     memset(t, 0, sizeof *t);
     t->context = *context, t->share[1] = 1;
     result = isogi_trace__set_up(t, desc);
+    if (result == ISOGI_OK && desc->hierarchy > 0) result = isogi_trace__coarse_create(t, context);
     if (result == ISOGI_OK && desc->sides == ISOGI_TRACE_BOTH_SIDES) {
         isogi_trace_desc other = *desc;
         other.sides = ISOGI_TRACE_HIGH_SIDE;
@@ -1924,6 +1947,7 @@ ISOGI_API void isogi_trace_free(isogi_trace *trace) {
     size_t i;
     if (!trace) return;
     isogi_trace_free(trace->high);
+    isogi_trace_free(trace->coarse);
     context = trace->context;
     for (i = 0; trace->bricks && i < trace->brick_count; i++) isogi_trace__brick_free(trace, trace->bricks[i]);
     isogi_release(&context, trace->bricks, trace->brick_count, sizeof *trace->bricks);
@@ -2062,7 +2086,8 @@ static int isogi_trace__taps(const isogi_trace *t, const float point[3], isogi_t
                 pending |= isogi_trace__state(t, texel) != ISOGI_TRACE__NO_SURFACE;
                 continue;
             }
-        } else if (count || pending || !isogi_trace__nearest(t, cell, local, ISOGI_TRACE__DONE, texel)) break;
+        } else if (t->coarse && pending) return isogi_trace__taps(t->coarse, point, r); /* not a cell of the fine level */
+        else if (count || pending || !isogi_trace__nearest(t, cell, local, ISOGI_TRACE__DONE, texel)) break;
         if (one && i < taps) {
             double apart[2];
             isogi_trace__apart(t, cell, local, texel, apart);
@@ -2187,7 +2212,9 @@ ISOGI_API isogi_result isogi_trace_relight(isogi_trace *trace, const isogi_light
     result = isogi_sh_project(light, trace->scene.desc.order, lighting, NULL);
     if (result != ISOGI_OK) return result;
     isogi_trace__set_light(trace, light);
+    if (trace->coarse) isogi_trace__set_light(trace->coarse, light);
     if (trace->high) isogi_trace__set_light(trace->high, light);
+    if (trace->high && trace->high->coarse) isogi_trace__set_light(trace->high->coarse, light);
     return ISOGI_OK;
 }
 
@@ -2219,6 +2246,7 @@ ISOGI_API void isogi_trace_counters(const isogi_trace *trace, isogi_counters *co
     counters->rays += c->rays, counters->blocks += c->blocks, counters->cells += c->cells, counters->cubics += c->cubics;
     counters->texels += c->texels, counters->texels_skipped += c->texels_skipped;
     if (trace->high) isogi_trace_counters(trace->high, counters);
+    if (trace->coarse) isogi_trace_counters(trace->coarse, counters);
 }
 
 ISOGI_API size_t isogi_trace_memory(const isogi_trace *trace) {
@@ -2227,6 +2255,7 @@ ISOGI_API size_t isogi_trace_memory(const isogi_trace *trace) {
     sum = trace->brick_count * sizeof *trace->bricks;
     for (i = 0; i < trace->brick_count; i++)
         if (trace->bricks[i]) sum += sizeof *trace->bricks[i] + isogi_trace__bits(trace->bricks[i]->held) * trace->record;
+    if (trace->coarse) sum += isogi_trace_memory(trace->coarse);
     return sum + (trace->high ? isogi_trace_memory(trace->high) : 0);
 }
 
@@ -2277,7 +2306,7 @@ static isogi_result isogi_trace__want_nearest(isogi_trace *t, const size_t cell[
 ISOGI_API isogi_result isogi_trace_request(isogi_trace *trace, const float (*points)[3], size_t count) {
     size_t i;
     if (!trace || (count && !points)) return ISOGI_INVALID;
-    if (!trace->scene.desc.lazy) return ISOGI_OK;
+    if (!trace->scene.desc.lazy || trace->coarse) return ISOGI_OK;
     for (i = 0; i < count; i++) {
         size_t cell[3], texel[3];
         double local[3];
@@ -2401,17 +2430,92 @@ static isogi_result isogi_trace__step_side(isogi_trace *trace, uint64_t max_rays
     return result;
 }
 
+/* Whether the light at the corners of a coarse cell differs too much to leave out what lies between them. */
+static int isogi_trace__cell_varies(const isogi_trace *c, const size_t cell[3], double tolerance) {
+    float values[3 * ISOGI_TRACE__MAX_ORDER * ISOGI_TRACE__MAX_ORDER];
+    double low = DBL_MAX, high = -DBL_MAX, sum = 0, error = 0, unit = c->scene.desc.mode == ISOGI_TRACE_TRANSFER ? 0.28209479177387814 : 1;
+    int i, a;
+    for (i = 0; i < 8; i++) {
+        const isogi_trace__brick *brick;
+        const uint8_t *record;
+        uint32_t slot;
+        size_t texel[3];
+        double light;
+        for (a = 0; a < 3; a++) {
+            texel[a] = cell[a] + (size_t)(i >> a & 1);
+            if (texel[a] >= c->lattice[a]) texel[a] = c->lattice[a] - 1;
+        }
+        if (isogi_trace__state(c, texel) != ISOGI_TRACE__DONE) return 1;
+        brick = c->bricks[isogi_trace__brick_of(c, texel, &slot)];
+        record = isogi_trace__record(c, brick, slot);
+        isogi_trace__record_read(c, record, values);
+        light = (c->values == 3 ? 0.2126 * (double)values[0] + 0.7152 * (double)values[1] + 0.0722 * (double)values[2] : (double)values[0]);
+        low = light < low ? light : low, high = light > high ? light : high, sum += light / 8;
+        if ((double)isogi_trace__record_error(record) * unit > error) error = (double)isogi_trace__record_error(record) * unit;
+    }
+    return high - low > tolerance * fabs(sum) + 3 * error;
+}
+
+/* Wants the fine texels of the coarse cells that vary. Lattice cells are marked by wanting all texels that a lookup in them reads. */
+static isogi_result isogi_trace__refine(isogi_trace *t) {
+    const isogi_trace *c = t->coarse;
+    size_t cell[3], texel[3], low[3], high[3], count[3];
+    isogi_result result = ISOGI_OK;
+    int a;
+    for (a = 0; a < 3; a++) count[a] = c->lattice[a] > 1 ? c->lattice[a] - 1 : 1;
+    for (cell[2] = 0; cell[2] < count[2]; cell[2]++)
+        for (cell[1] = 0; cell[1] < count[1]; cell[1]++)
+            for (cell[0] = 0; cell[0] < count[0]; cell[0]++) {
+                if (!isogi_trace__cell_varies(c, cell, (double)t->scene.desc.hierarchy)) continue;
+                for (a = 0; a < 3; a++) {
+                    double scale = t->step[a] > 0 ? c->step[a] / t->step[a] : 0;
+                    low[a] = (size_t)(scale * (double)cell[a] + 1e-9);
+                    high[a] = (size_t)isogi_trace__clamp(ceil(scale * (double)(cell[a] + 1) - 1e-9), (double)(t->lattice[a] - 1));
+                }
+                if (!isogi_trace__in_range(t, low, high)) continue;
+                for (texel[2] = low[2]; texel[2] <= high[2]; texel[2]++)
+                    for (texel[1] = low[1]; texel[1] <= high[1]; texel[1]++)
+                        for (texel[0] = low[0]; texel[0] <= high[0] && result == ISOGI_OK; texel[0]++)
+                            result = isogi_trace__want(t, texel, 0);
+            }
+    t->refined = result == ISOGI_OK;
+    return result;
+}
+
+/* One side, its coarse texels first. */
+static isogi_result isogi_trace__step_levels(isogi_trace *trace, uint64_t max_rays) {
+    isogi_result result = ISOGI_OK;
+    uint64_t used = 0;
+    if (trace->coarse) {
+        uint64_t begin = trace->coarse->counters.rays;
+        result = isogi_trace__step_side(trace->coarse, max_rays);
+        used = trace->coarse->counters.rays - begin;
+        if (result != ISOGI_OK || trace->coarse->wanted) return result;
+        if (!trace->refined) result = isogi_trace__refine(trace);
+    }
+    if (result != ISOGI_OK || (max_rays && used >= max_rays)) return result;
+    return isogi_trace__step_side(trace, max_rays ? max_rays - used : 0);
+}
+
+/* Texels to do and done; what a hierarchy may still want while it is not refined is taken to be as many as the coarse ones. */
+static void isogi_trace__progress(const isogi_trace *t, uint64_t *wanted, uint64_t *done) {
+    *wanted += t->wanted, *done += t->done;
+    if (t->coarse) *wanted += t->coarse->wanted, *done += t->coarse->done;
+    if (t->coarse && !t->refined) *wanted += 8 * (t->coarse->wanted + t->coarse->done) + 1;
+}
+
 /* The high side has its turn with the rays that the low side leaves, or when that has none to trace. */
 ISOGI_API isogi_result isogi_trace_step(isogi_trace *trace, uint64_t max_rays, double *remaining) {
     isogi_result result;
-    uint64_t begin, used, wanted, done;
+    uint64_t begin, used, wanted = 0, done = 0;
     if (!trace) return ISOGI_INVALID;
-    begin = trace->counters.rays;
-    result = isogi_trace__step_side(trace, max_rays);
-    used = trace->counters.rays - begin;
+    begin = trace->counters.rays + (trace->coarse ? trace->coarse->counters.rays : 0);
+    result = isogi_trace__step_levels(trace, max_rays);
+    used = trace->counters.rays + (trace->coarse ? trace->coarse->counters.rays : 0) - begin;
     if (result == ISOGI_OK && trace->high && (!max_rays || used < max_rays))
-        result = isogi_trace__step_side(trace->high, max_rays ? max_rays - used : 0);
-    wanted = trace->wanted + (trace->high ? trace->high->wanted : 0), done = trace->done + (trace->high ? trace->high->done : 0);
+        result = isogi_trace__step_levels(trace->high, max_rays ? max_rays - used : 0);
+    isogi_trace__progress(trace, &wanted, &done);
+    if (trace->high) isogi_trace__progress(trace->high, &wanted, &done);
     if (remaining && result == ISOGI_OK) *remaining = wanted ? (double)wanted / (double)(wanted + done) : 0;
     return result;
 }
@@ -2467,7 +2571,7 @@ static void isogi_trace__export_set_scales(isogi_trace__export *e) {
 
 static int isogi_trace__export_begin(isogi_trace__export *e, const isogi_trace *t, int format) {
     memset(e, 0, sizeof *e);
-    if (!t) return 0;
+    if (!t || t->coarse) return 0;
     e->trace = t, e->format = format ? format : t->format, e->values = t->values;
     e->transfer = t->scene.desc.mode == ISOGI_TRACE_TRANSFER;
     if (e->format < ISOGI_TRACE_FLOAT || e->format > ISOGI_TRACE_BYTE || (e->transfer && e->format == ISOGI_TRACE_RGB9E5)) return 0;
@@ -2711,7 +2815,7 @@ ISOGI_API isogi_result isogi_trace_save(const isogi_trace *trace, void *block, s
     size_t i, bricks, size;
     uint32_t slot;
     int a;
-    if (!trace || !block || bytes < isogi_trace_save_size(trace)) return ISOGI_INVALID;
+    if (!trace || trace->coarse || !block || bytes < isogi_trace_save_size(trace)) return ISOGI_INVALID;
     size = isogi_trace__side_size(trace, &bricks);
     memcpy(begin, "isogi tr", 8);
     isogi_trace__put(begin + 8, ISOGI_TRACE__VERSION, 4), isogi_trace__put(begin + 12, trace->record, 4);
@@ -2812,7 +2916,7 @@ ISOGI_API isogi_result isogi_trace_load(isogi_trace *trace, const void *block, s
     const uint8_t *from = (const uint8_t *)block;
     size_t used = 0, used_high = 0;
     isogi_result result;
-    if (!trace || !block) return ISOGI_INVALID;
+    if (!trace || trace->coarse || !block) return ISOGI_INVALID;
     result = isogi_trace__block_check(trace, from, bytes, &used);
     if (result == ISOGI_OK && trace->high) result = isogi_trace__block_check(trace->high, from + used, bytes - used, &used_high);
     if (result == ISOGI_OK && used + used_high != bytes) result = ISOGI_CORRUPT;

@@ -64,7 +64,7 @@ static double irradiance_by_parts(const isogi_light *l, const double p[3], const
 }
 
 /* Points in the open, in the half shadow and in the core shadow. The voxelised ball differs from the analytic one by 1/60 of a voxel,
-   which moves the shadow's edge by as much: 1.5 % of the unshadowed light, with 4096 samples (noise 1 %). */
+   which moves the shadow's edge by as much: 1.5 % of the unshadowed light, 3 % with 1024 samples (noise 1 %). */
 TEST(every_light_against_a_sum_over_its_parts) {
     double q[5] = {24, 22, 24, 8, 6}, centre[3] = {24, 42, 30}, u[3] = {14, 0, 0}, v[3] = {0, -3, -9}, close[3] = {9, 6.2, 12};
     double up_u[3] = {0, 0.3, 0}, up_v[3] = {0, 0, 6};
@@ -76,9 +76,9 @@ TEST(every_light_against_a_sum_over_its_parts) {
     for (int i = 0; i < 5; i++)
         for (int k = 0; k < 6; k++) {
             double p[3] = {(double)points[k][0], (double)points[k][1], (double)points[k][2]}, nowhere[4] = {0, -100, 0, 1};
-            double e = lit(&s, &lights[i], points[k], 0, LONG_SUITE ? 16384 : 4096), open = irradiance_by_parts(&lights[i], p, nowhere, 200);
-            double expected = irradiance_by_parts(&lights[i], p, q, i == 3 ? 2000 : 400);
-            CHECK(fabs(e - expected) < 0.015 * open + 1e-6, "light %d, point %d: E %.5f, expected %.5f, unshadowed %.5f", i, k, e, expected, open);
+            double e = lit(&s, &lights[i], points[k], 0, LONG_SUITE ? 16384 : 1024), open = irradiance_by_parts(&lights[i], p, nowhere, 100);
+            double expected = irradiance_by_parts(&lights[i], p, q, i == 3 ? (LONG_SUITE ? 2000 : 500) : LONG_SUITE ? 400 : 200);
+            CHECK(fabs(e - expected) < (LONG_SUITE ? 0.015 : 0.03) * open + 1e-6, "light %d, point %d: E %.5f, expected %.5f, unshadowed %.5f", i, k, e, expected, open);
         }
     scene_free(&s);
 }
@@ -351,14 +351,14 @@ TEST(gloss_against_its_integral) {
         }
         CHECK(isogi_trace_sample_gloss(t, (const float(*)[3])points, (const float(*)[3])normals, (const float(*)[3])views, 12, (size_t)n, rgb) == ISOGI_OK, "points %d", n);
         for (int i = 0; i < n; i++) {
-            double expected = gloss_by_rays(&s, light, points[i], normals[i], normals[i], 12, 20000), open = 0;
+            double expected = gloss_by_rays(&s, light, points[i], normals[i], normals[i], 12, LONG_SUITE ? 20000 : 5000), open = 0;
             float y[25];
             isogi_sh_eval(y, 5, (const float(*)[3])normals[i], 1);
             double g[5] = {1, 13.0 / 14, 12.0 / 15, 13.0 / 14 * 11 / 16, 12.0 / 15 * 10 / 17};
             for (int k = 0; k < 25; k++) open += g[(int)sqrt(k + 0.5)] * (double)light[3 * k] * (double)y[k];
             error[kind] += pow((double)rgb[i][0] - expected, 2) / n;
             if (kind) unshadowed += pow(open - expected, 2) / n, size += expected * expected / n;
-            else CHECK(fabs((double)rgb[i][0] - expected) < 0.08 * expected, "ball: %.4f, expected %.4f", (double)rgb[i][0], expected);
+            else CHECK(fabs((double)rgb[i][0] - expected) < (LONG_SUITE ? 0.08 : 0.12) * expected, "ball: %.4f, expected %.4f", (double)rgb[i][0], expected);
         }
         CHECK(isogi_trace_sample_gloss(t, (const float(*)[3])points, (const float(*)[3])normals, (const float(*)[3])views, -1, 1, rgb) == ISOGI_INVALID, "exponent %d", -1);
         isogi_trace_free(t), scene_free(&s);
@@ -385,7 +385,7 @@ TEST(rectangle_in_spherical_harmonics) {
         isogi_lighting lighting = {.lights = &light, .light_count = 1};
         for (int a = 0; a < 3; a++) normal[a] = u[(a + 1) % 3] * v[(a + 2) % 3] - u[(a + 2) % 3] * v[(a + 1) % 3];
         area = length3(normal[0], normal[1], normal[2]);
-        enum { N = 300 };
+        enum { N = 200 };
         for (int k = 0; k < N * N; k++) {
             double d[3], dd = 0, facing = 0;
             float dir[1][3], y[9];

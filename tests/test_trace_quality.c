@@ -1,0 +1,141 @@
+/* How good the picture is that isogi_trace.h makes: hierarchical lattice, resolution of the texture, hard shadows, normals and offset. */
+#define ISOGI_IMPLEMENTATION
+#include "isogi_trace.h"
+#include "test.h"
+#include "trace_scenes.h"
+
+/* Relative RMSE over points of a texture's light, and what the texture cost. */
+static double texture_error(const isogi_trace_desc *d, const float (*points)[3], const float (*reference)[3], int n, isogi_counters *counters, size_t *memory) {
+    float e[400][3];
+    isogi_trace *t = NULL;
+    double sum = 0, mean = 0, remaining = 1;
+    isogi_result result = isogi_trace_create(&t, d, NULL);
+    CHECK(result == ISOGI_OK, "result %d", result);
+    isogi_trace_request(t, points, (size_t)n);
+    for (double before = 1; remaining > 0 && result == ISOGI_OK; before = remaining) {
+        result = isogi_trace_step(t, 200000, &remaining);
+        CHECK(result == ISOGI_OK && remaining <= before, "result %d, remaining %g after %g", result, remaining, before);
+    }
+    isogi_trace_sample(t, points, (size_t)n, e, NULL);
+    memset(counters, 0, sizeof *counters);
+    isogi_trace_counters(t, counters), *memory = isogi_trace_memory(t);
+    for (int i = 0; i < n; i++) sum += pow((double)e[i][1] - (double)reference[i][1], 2) / n, mean += (double)reference[i][1] / n;
+    isogi_trace_free(t);
+    return sqrt(sum) / mean;
+}
+
+/* A wide plain with one ball: light varies only near the ball. Two levels cost a part of the regular lattice, at hardly more error. */
+TEST(hierarchical_lattice) {
+    int n = LONG_SUITE ? 65 : 33;
+    double q[5] = {0.3 * n, 0.3 * n, 0.3 * n, 0.1 * n, 0.12 * n}, error[3];
+    scene s = scene_make(n, n, n, NULL, ball_over_plane, q);
+    float points[200][3], reference[200][3];
+    int count = surface_points(&s, 0, 200, 3, points);
+    isogi_trace_desc d = desc_make(&s, 0.6f, 2, LONG_SUITE ? 1024 : 512);
+    isogi_counters counters[3];
+    size_t memory[3];
+    isogi_trace_gather(&d, (const float(*)[3])points, NULL, (size_t)count, reference, NULL, NULL);
+    d.samples = 64, d.isovalue_min = -1, d.isovalue_max = 1;
+    for (int k = 0; k < 3; k++) {
+        static const float hierarchy[3] = {0, 0.1f, 0.4f};
+        d.hierarchy = hierarchy[k];
+        error[k] = texture_error(&d, (const float(*)[3])points, (const float(*)[3])reference, count, &counters[k], &memory[k]);
+        printf("    tolerance %.1f: %7d texels, %8d rays, %7d bytes, error %.4f\n", (double)hierarchy[k], (int)counters[k].texels, (int)counters[k].rays, (int)memory[k], error[k]);
+    }
+    CHECK(counters[1].rays < 0.8 * (double)counters[0].rays && counters[2].rays <= counters[1].rays, "rays %d, %d, %d", (int)counters[0].rays, (int)counters[1].rays, (int)counters[2].rays);
+    CHECK(memory[1] < memory[0] && error[1] < error[0] + 0.02 && error[2] < error[0] + 0.05, "errors %.4f, %.4f, %.4f", error[0], error[1], error[2]);
+    d.lazy = 1;
+    isogi_trace *t = NULL;
+    CHECK(isogi_trace_create(&t, &d, NULL) == ISOGI_INVALID, "lazy and hierarchical, %d", 1);
+    d.lazy = 0, d.sides = ISOGI_TRACE_BOTH_SIDES, d.samples = 1, d.hierarchy = 0.3f, d.mode = ISOGI_TRACE_TRANSFER;
+    CHECK(isogi_trace_create(&t, &d, NULL) == ISOGI_OK && isogi_trace_step(t, 0, NULL) == ISOGI_OK, "both sides %d", 1);
+    CHECK(isogi_trace_relight(t, &d.lighting) == ISOGI_OK && isogi_trace_export_size(t, 0) == 0, "both sides %d", 2);
+    CHECK(isogi_trace_sample(isogi_trace_high(t), (const float(*)[3])points, (size_t)count, reference, NULL) == ISOGI_OK && reference[0][0] >= 0, "both sides %d", 3);
+    isogi_trace_free(t), scene_free(&s);
+}
+
+/* Textures of 1/8, 1 and 8 times the volume's texels (Wyman 2006, fig. 12): error against light gathered at the points themselves, with
+   enough samples that the lattice is what is seen. Finer is better. */
+TEST(resolution_of_the_texture) {
+    double q[1] = {0.35}, error[3];
+    scene s = scene_make(33, 33, 33, NULL, gyroid, q);
+    isogi_light sun = light_make(ISOGI_LIGHT_DIRECTIONAL, 1, 2, 0.5, 0.5, 0.05);
+    float points[100][3], reference[100][3];
+    int n = surface_points(&s, 0, LONG_SUITE ? 100 : 40, 4, points);
+    isogi_trace_desc d = desc_make(&s, 0.5f, 1, LONG_SUITE ? 2048 : 128);
+    d.lighting.lights = &sun, d.lighting.light_count = 1;
+    isogi_trace_gather(&d, (const float(*)[3])points, NULL, (size_t)n, reference, NULL, NULL);
+    d.lazy = 1;
+    for (int k = 0; k < 3; k++) {
+        isogi_counters counters;
+        size_t memory, size = k == 0 ? 17 : k == 1 ? 33 : 65;
+        d.lattice[0] = d.lattice[1] = d.lattice[2] = size;
+        error[k] = texture_error(&d, (const float(*)[3])points, (const float(*)[3])reference, n, &counters, &memory);
+        printf("    %2d^3 texels for 33^3 voxels: error %.4f\n", (int)size, error[k]);
+    }
+    CHECK(error[0] > (LONG_SUITE ? 1.4 : 1.1) * error[1] && error[1] > (LONG_SUITE ? 1 : 0.8) * error[2] && error[2] < 0.06, "errors %.4f %.4f %.4f", error[0], error[1], error[2]);
+    scene_free(&s);
+}
+
+/* The known weakness: a hard shadow is as wide as the lattice is coarse. The edge of a slab throws a straight shadow border on the ground;
+   from 10 % to 90 % of the light takes one texel to one and a half. */
+static double slab(const double p[3], const double *q) { return fmax(q[0] - p[1], fmin(fmin(16.25 - p[0], p[1] - 20), 24 - p[1])); }
+TEST(hard_shadows_blur_by_little_more_than_a_texel) {
+    double q[1] = {6.3};
+    scene s = scene_make(33, 33, 33, NULL, slab, q);
+    isogi_light sun = light_make(ISOGI_LIGHT_DIRECTIONAL, 0, 1, 0, 1, 0);
+    for (int k = 0; k < 3; k++) {
+        isogi_trace_desc d = desc_make(&s, 0, 0, 1);
+        isogi_trace *t = NULL;
+        float points[400][3], e[400][3];
+        double from = 0, to = 0, texel = k == 0 ? 2 : k == 1 ? 1 : 0.5;
+        memset(&d.lighting, 0, sizeof d.lighting);
+        d.lighting.lights = &sun, d.lighting.light_count = 1, d.lazy = 1;
+        d.lattice[0] = d.lattice[1] = d.lattice[2] = (size_t)(32 / texel) + 1;
+        for (int i = 0; i < 400; i++) points[i][0] = (float)(12 + 0.02 * i), points[i][1] = 6.3f, points[i][2] = 16;
+        isogi_trace_create(&t, &d, NULL), isogi_trace_request(t, (const float(*)[3])points, 400), isogi_trace_step(t, 0, NULL);
+        isogi_trace_sample(t, (const float(*)[3])points, 400, e, NULL);
+        for (int i = 0; i < 400; i++) {
+            if (e[i][0] < 0.1f) from = (double)points[i][0];
+            if (e[i][0] < 0.9f) to = (double)points[i][0];
+        }
+        printf("    texels of %.1f voxels: the border of a hard shadow is %.2f voxels wide\n", texel, to - from);
+        CHECK(to - from > 0.3 * texel && to - from < 1.7 * texel && e[0][0] < 0.01f && e[399][0] > 0.99f, "width %.2f of texels of %.1f, from %g to %g", to - from, texel, (double)e[0][0], (double)e[399][0]);
+        isogi_trace_free(t);
+    }
+    scene_free(&s);
+}
+
+/* Normals and offset (Wyman 2006, fig. 5), against the closed form: a ball under a sun has E = n.l. Gradient normals show voxels; rays that
+   start on the trilinear surface meet its bumps: dark specks where the sun is low. */
+TEST(normals_and_offset) {
+    double q[4] = {15.6, 15.3, 15.8, 10}, error[3];
+    int specks[3];
+    scene s = scene_make(32, 32, 32, NULL, ball, q);
+    isogi_light sun = light_make(ISOGI_LIGHT_DIRECTIONAL, 1, 2, 3, 1, 0);
+    float points[400][3], e[400][3];
+    int n = surface_points(&s, 0, 400, 6, points);
+    for (int k = 0; k < 3; k++) {
+        static const char *const name[3] = {"gradient normals", "smoothed normals", "smoothed normals and offset"};
+        isogi_trace_desc d = desc_make(&s, 0, 0, 1);
+        memset(&d.lighting, 0, sizeof d.lighting);
+        d.lighting.lights = &sun, d.lighting.light_count = 1;
+        d.normals = k ? ISOGI_NORMAL_SMOOTH : ISOGI_NORMAL_TRILINEAR, d.offset = k == 2 ? 0 : -1;
+        isogi_trace_gather(&d, (const float(*)[3])points, NULL, (size_t)n, e, NULL, NULL);
+        error[k] = 0, specks[k] = 0;
+        for (int i = 0; i < n; i++) {
+            double r[3], cosine = 0, length = 0, toward[3] = {1, 2, 3};
+            for (int a = 0; a < 3; a++) r[a] = (double)points[i][a] - q[a], length += r[a] * r[a], cosine += r[a] * toward[a];
+            cosine /= sqrt(length * 14);
+            error[k] += pow((double)e[i][0] - fmax(cosine, 0), 2) / n;
+            specks[k] += cosine > 0.02 && e[i][0] <= 0;
+        }
+        error[k] = sqrt(error[k]);
+        printf("    %-28s error %.4f of the sun, %d of %d points wrongly dark\n", name[k], error[k], specks[k], n);
+    }
+    CHECK(error[0] > 2 * error[2] && error[1] <= error[0] && error[2] <= error[1] * 1.01 && error[2] < 0.01, "errors %.4f %.4f %.4f", error[0], error[1], error[2]);
+    CHECK(specks[2] == 0, "%d wrongly dark points", specks[2]);
+    scene_free(&s);
+}
+
+TEST_MAIN("trace_quality")
