@@ -250,6 +250,65 @@ TEST(triple_roots_on_diagonals_are_crossings) {
     }
 }
 
+/* A start in a corner that the surface touches, out of whose cell the ray goes at once: the surface that comes later, behind cells
+   without any, is not the one that it starts from. */
+TEST(behind_a_touched_corner_the_next_surface_is_met) {
+    const double along[7] = {-1, 0, 3, 1, 2, 0.5, -2};
+    for (int dx = -1; dx <= 1; dx += 2)
+        for (int axis = 0; axis < 3; axis++) {
+            int n[3] = {3, 3, 3};
+            n[axis] = 7;
+            scene s = scene_new(n[0], n[1], n[2]);
+            for (size_t i = 0; i < scene_voxels(&s); i++) {
+                const int at[3] = {(int)i % n[0], (int)i / n[0] % n[1], (int)i / n[0] / n[1]};
+                s.value[i] = along[dx > 0 ? at[axis] : 6 - at[axis]];
+            }
+            scene_build(&s);
+            for (int p = 0; p < PATHS; p++)
+                for (int many = 1; many <= 64; many += 63) {
+                    static isogi_hit starts[64], hits[64];
+                    static float dirs[64][3];
+                    for (int i = 0; i < many; i++) {
+                        memset(&starts[i], 0, sizeof starts[i]);
+                        starts[i].side = 1;
+                        for (int a = 0; a < 3; a++) starts[i].local[a] = 0.5, dirs[i][a] = 0.0625f;
+                        starts[i].cell[axis] = dx > 0 ? 0 : 5, starts[i].local[axis] = dx > 0 ? 1 : 0, dirs[i][axis] = (float)dx;
+                    }
+                    isogi_vol_continue(s.pyramid[p], starts, (const float(*)[3])dirs, NULL, 0, 0, (size_t)many, hits, NULL);
+                    CHECK(hits[many - 1].side == -1 && fabs(hits[many - 1].t - 4.2) < 1e-12, "path %d axis %d: side %d at %.17g, not 4.2", p, axis,
+                          hits[many - 1].side, hits[many - 1].t);
+                }
+            scene_free(&s);
+        }
+}
+
+/* All numbers times a power of two: the same hits, however far the squares of values leave the range of double. */
+TEST(values_of_any_size_have_the_same_hits) {
+    const double unit[] = {0x1p-900, 0x1p-500, 0x1p500, 0x1p900};
+    test_random r = {11};
+    for (int k = 0; k < 4; k++) {
+        scene a = scene_new(8, 7, 9), b = scene_new(8, 7, 9);
+        isogi_ray rays[BATCH], scaled[BATCH];
+        isogi_hit ha[BATCH], hb[BATCH];
+        long hits = 0;
+        scene_noise(&a, 0, &r);
+        for (size_t i = 0; i < scene_voxels(&a); i++) b.value[i] = a.value[i] * unit[k];
+        scene_build(&a), scene_build(&b);
+        for (int i = 0; i < BATCH; i++) rays[i] = scaled[i] = ray_through(&a, random_range(&r, -0.7, 0.7), 20, &r), scaled[i].isovalue *= unit[k];
+        for (int p = 0; p < PATHS; p++) {
+            isogi_vol_intersect(a.pyramid[p], rays, BATCH, ha, NULL);
+            isogi_vol_intersect(b.pyramid[p], scaled, BATCH, hb, NULL);
+            for (int i = 0; i < BATCH; i++) {
+                hits += ha[i].side != 0;
+                CHECK(ha[i].side == hb[i].side && fabs(ha[i].t - hb[i].t) < 1e-7, "path %d: side %d at %.17g, times 2^%d side %d at %.17g", p, ha[i].side,
+                      ha[i].t, (int)log2(unit[k]), hb[i].side, hb[i].t);
+            }
+        }
+        CHECK(hits > BATCH, "%ld hits", hits);
+        scene_free(&a), scene_free(&b);
+    }
+}
+
 TEST(nearly_constant_cells_hit_like_the_reference) {
     test_random r = {6};
     tally t = {0};
