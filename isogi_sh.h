@@ -1911,12 +1911,12 @@ ISOGI_SH__INLINE __attribute__((target("avx2,fma"))) isogi_sh__f8 isogi_sh__rota
 }
 
 /* Degree 3, c[8] to c[15] of which the first is not looked at, as a traceless symmetric tensor of rank 3. Its entries that are asked for
-   are yyy, zzz, xxx, xyz, yzz, zzx, zxx, one a lane: sums over i, j, k of T_ijk A_i B_j C_k with the pairs of rows and a third one. */
+   are 222, 333, 111, 123, 233, 331, 311, one a lane: sums over i, j, k of T_ijk A_i B_j C_k with the pairs of rows and a third one. */
 ISOGI_SH__INLINE __attribute__((target("avx2,fma"))) isogi_sh__f8 isogi_sh__rotate_degree3(const float *in, const float m[9], const isogi_sh__row_pairs *r) {
     isogi_sh__f8 low = *(const isogi_sh__f8 *)m, high = *(const isogi_sh__f8 *)(m + 1), c = *(const isogi_sh__f8 *)in, zero = {0}, p, v;
     const isogi_sh__f8 scale = {-1.69479004f, 1.33984917f, 1.69479004f, 2.07568541f, 1.6409734f, 1.6409734f, 2.07568541f, 0};
     const isogi_sh__f8 rest = {-1.27109253f, 0, 1.27109253f, 0, 0, 0, 1.03784271f, 0};
-    /* T: xxx, xyy, xxy, yyy, xxz, yyz, zzz, xyz; and xzz, yzz */
+    /* T: 111, 122, 112, 222, 113, 223, 333, 123; and 133, 233 */
     const isogi_sh__f8 k1 = {0.59004359f, -0.59004359f, 0.59004359f, -0.59004359f, 0.481768574f, -0.481768574f, 0.746352665f, 0.481768574f};
     const isogi_sh__f8 k2 = {-0.457045799f, -0.1523486f, -0.1523486f, -0.457045799f, -0.373176333f, -0.373176333f, 0, 0};
     const isogi_sh__f8 k3 = {0.609394399f, 0.609394399f, 0, 0, 0, 0, 0, 0};
@@ -4000,6 +4000,8 @@ ISOGI_API isogi_result isogi_sh_fit_directional(float direction[3], float rgb[3]
 #undef ISOGI_SH__REST_F16
 #undef ISOGI_SH__REST_D8
 #undef ISOGI_SH__UNROLL9
+#undef ISOGI_SH__MASK8
+#undef ISOGI_SH__MASKED_F8
 #undef ISOGI_SH__APART
 #undef ISOGI_SH__INLINE
 #undef ISOGI_SH__FMA_F8

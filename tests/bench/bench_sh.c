@@ -368,7 +368,8 @@ int main(int argc, char **argv) {
     const char *path = NULL;
     for (int i = 1; i < argc; i++) {
         if (!strcmp(argv[i], "--quick")) quick = 1;
-        else path = argv[i];
+        else if (argv[i][0] != '-') path = argv[i];
+        else { path = NULL; break; }
     }
     if (!path || !(csv = fopen(path, "w"))) {
         fprintf(stderr, "usage: %s [--quick] OUT.csv\n", argv[0]);
