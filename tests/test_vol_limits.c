@@ -1,0 +1,393 @@
+/* The limits of isogi_vol.h: views of every shape, more than 2^31 voxels, what a pyramid costs, and numbers and pointers that no caller
+   should send. */
+#ifndef _DEFAULT_SOURCE
+#define _DEFAULT_SOURCE 1
+#endif
+#define ISOGI_IMPLEMENTATION
+#include "isogi_vol.h"
+#include "test.h"
+#include <float.h>
+#ifdef __unix__
+#include <sys/mman.h>
+#endif
+
+static size_t type_bytes(isogi_type type) { return type <= ISOGI_I8 ? 1 : type <= ISOGI_I16 ? 2 : type == ISOGI_F32 ? 4 : 8; }
+
+/* Bit by bit, but that -ffast-math lets compilers order each copy of a formula as they like. */
+static int same_hit(const isogi_hit *a, const isogi_hit *b) {
+#ifdef __FAST_MATH__
+    return a->side == b->side && fabs(a->t - b->t) <= 1e-9 * (1 + fabs(a->t));
+#else
+    return a->side == b->side && !memcmp(a->cell, b->cell, sizeof a->cell) && !memcmp(a->local, b->local, sizeof a->local) &&
+           !memcmp(&a->t, &b->t, sizeof a->t);
+#endif
+}
+
+/* ---- views ---- */
+
+/* A crop of an array of pixels with channels, mirrored, thinned out, or the same plane again and again: any of these is a view. */
+static isogi_volume random_view(void *array, const int size[3], int channels, isogi_type type, test_random *r) {
+    isogi_volume v = {.type = type};
+    ptrdiff_t bytes = (ptrdiff_t)type_bytes(type), stride = bytes * channels, offset = (ptrdiff_t)(random_bits(r) % (unsigned)channels) * bytes;
+    for (int a = 0; a < 3; a++) {
+        int kind = (int)(random_bits(r) % 8), step = kind == 0 ? 0 : kind == 1 ? 2 : 1;
+        int most = step == 2 ? (size[a] + 1) / 2 : size[a], n = kind == 2 ? 1 : 1 + (int)(random_bits(r) % (unsigned)most), first = 0;
+        if (step == 1) first = (int)(random_bits(r) % (unsigned)(size[a] - n + 1));
+        if (step == 0) first = (int)(random_bits(r) % (unsigned)size[a]);
+        v.size[a] = (size_t)n, v.stride[a] = step * stride;
+        if (random_bits(r) & 1) first += step * (n - 1), v.stride[a] = -v.stride[a];
+        offset += first * stride, stride *= size[a];
+        v.spacing[a] = pow(10, floor(random_range(r, -6, 7)));
+        v.origin[a] = random_range(r, -3, 3) * v.spacing[a];
+    }
+    if (!v.stride[0] && !v.stride[1] && !v.stride[2]) v.stride[0] = bytes * channels, v.size[0] = 1; /* all zero would mean packed */
+    v.data = (const char *)array + offset;
+    if (random_bits(r) & 1) v.scale = random_range(r, -2, 2), v.bias = random_range(r, -50, 50);
+    return v;
+}
+
+/* The same voxels, packed. */
+static void *packed_copy(const isogi_volume *v) {
+    size_t bytes = type_bytes(v->type), n = 0;
+    char *copy = (char *)malloc(v->size[0] * v->size[1] * v->size[2] * bytes);
+    for (ptrdiff_t k = 0; k < (ptrdiff_t)v->size[2]; k++)
+        for (ptrdiff_t j = 0; j < (ptrdiff_t)v->size[1]; j++)
+            for (ptrdiff_t i = 0; i < (ptrdiff_t)v->size[0]; i++)
+                memcpy(copy + bytes * n++, (const char *)v->data + i * v->stride[0] + j * v->stride[1] + k * v->stride[2], bytes);
+    return copy;
+}
+
+static isogi_ray ray_in_view(const isogi_volume *v, double isovalue, test_random *r) {
+    isogi_ray ray = {.isovalue = isovalue};
+    double d[3];
+    random_direction(r, d);
+    for (int a = 0; a < 3; a++) {
+        ray.dir[a] = (float)(d[a] * v->spacing[a]);
+        ray.origin[a] = v->origin[a] + v->spacing[a] * (random_range(r, 0, (double)v->size[a] - 1) - d[a] * random_range(r, 0, 20));
+    }
+    return ray;
+}
+
+TEST(any_view_is_as_good_as_a_packed_copy) {
+    enum { RAYS = 64, SIZE = 24 };
+    static isogi_ray rays[RAYS];
+    static isogi_hit ours[RAYS], theirs[RAYS];
+    const int size[3] = {SIZE, 9, 11};
+    test_random r = {1};
+    long found = 0, solid = 0;
+    for (int turn = 0; turn < (LONG_SUITE ? 20000 : 500); turn++) {
+        isogi_type type = (isogi_type)(random_bits(&r) % 6);
+        int channels = 1 + (int)(random_bits(&r) % 3);
+        isogi_context context = {.threads = 1, .force_path = turn % 5};
+        size_t voxels = (size_t)(size[0] * size[1] * size[2] * channels);
+        char *array = (char *)calloc(voxels, type_bytes(type));
+        for (size_t i = 0; i < voxels; i++) {
+            double value = floor(random_range(&r, 0, 100));
+            if (type == ISOGI_F32) ((float *)(void *)array)[i] = (float)value;
+            else if (type == ISOGI_F64) ((double *)(void *)array)[i] = value;
+            else if (type >= ISOGI_U16) ((uint16_t *)(void *)array)[i] = (uint16_t)value;
+            else array[i] = (char)value;
+        }
+        isogi_volume view = random_view(array, size, channels, type, &r), packed = view;
+        void *copy = packed_copy(&view);
+        isogi_pyramid *p = NULL, *q = NULL;
+        isogi_mesh mesh = {0}, other = {0};
+        isogi_mesh_desc desc = {.isovalue = 50.5 * (view.scale < 0 || view.scale > 0 ? view.scale : 1) + view.bias, .closed = turn % 2};
+        packed.data = copy, packed.stride[0] = packed.stride[1] = packed.stride[2] = 0;
+        CHECK(isogi_vol_build(&p, &view, &context) == ISOGI_OK && isogi_vol_build(&q, &packed, &context) == ISOGI_OK, "build");
+        for (int i = 0; i < RAYS; i++) rays[i] = ray_in_view(&view, desc.isovalue, &r);
+        isogi_vol_intersect(p, rays, RAYS, ours, NULL), isogi_vol_intersect(q, rays, RAYS, theirs, NULL);
+        for (int i = 0; i < RAYS; i++) {
+            CHECK(same_hit(&ours[i], &theirs[i]), "type %d: side %d and %d, t %.17g and %.17g", (int)type, ours[i].side, theirs[i].side, ours[i].t, theirs[i].t);
+            found += ours[i].side != 0;
+        }
+        CHECK(isogi_vol_mesh(p, &desc, &mesh) == ISOGI_OK && isogi_vol_mesh(q, &desc, &other) == ISOGI_OK, "mesh");
+        CHECK(mesh.vertex_count == other.vertex_count && mesh.triangle_count == other.triangle_count, "%d and %d triangles", (int)mesh.triangle_count, (int)other.triangle_count);
+        if (mesh.vertex_count == other.vertex_count && mesh.vertex_count)
+            CHECK(!memcmp(mesh.positions, other.positions, mesh.vertex_count * 12), "vertices differ");
+        solid += mesh.triangle_count > 0;
+        for (int i = 0; i < 20; i++) {
+            float point[1][3], value[2], gradient[2][3];
+            double most = 200 + fabs(view.bias);
+            for (int a = 0; a < 3; a++) point[0][a] = (float)(view.origin[a] + view.spacing[a] * random_range(&r, -1, (double)view.size[a]));
+            for (int filter = ISOGI_FILTER_LINEAR; filter <= ISOGI_FILTER_CATMULL_ROM; filter++) {
+                isogi_vol_sample_filtered(p, (isogi_filter)filter, (const float(*)[3])point, 1, &value[0], &gradient[0]);
+                isogi_vol_sample_filtered(q, (isogi_filter)filter, (const float(*)[3])point, 1, &value[1], &gradient[1]);
+                /* the documented error of either, 2^-21 of the largest number */
+                CHECK(fabs((double)value[0] - (double)value[1]) <= 0x1p-19 * most, "filter %d: %g and %g", filter, (double)value[0], (double)value[1]);
+                for (int a = 0; a < 3; a++) {
+                    CHECK(isogi_vol__finite64((double)gradient[0][a]), "gradient %g", (double)gradient[0][a]);
+                    CHECK(view.size[a] > 1 || fabsf(gradient[0][a]) <= 0, "a gradient of %g along an axis of one voxel", (double)gradient[0][a]);
+                }
+            }
+        }
+        isogi_vol_mesh_free(p, &mesh), isogi_vol_mesh_free(q, &other);
+        isogi_vol_free(p), isogi_vol_free(q);
+        free(copy), free(array);
+    }
+    printf("    %ld hits, %ld volumes with a surface\n", found, solid);
+    CHECK(found > 1500 && solid > 100, "%ld hits, %ld surfaces: the test says little", found, solid);
+}
+
+/* ---- memory, and more voxels than 2^31 ---- */
+
+static void *counting_alloc(void *user, size_t size, size_t align) {
+    (void)align;
+    *(size_t *)user += size;
+    char *base = (char *)malloc(size + 64);
+    char *p = base + (64 - (uintptr_t)base % 64);
+    p[-1] = (char)(p - base);
+    return p;
+}
+
+static void counting_release(void *user, void *p, size_t size) {
+    *(size_t *)user -= size;
+    free((char *)p - ((char *)p)[-1]);
+}
+
+TEST(a_pyramid_takes_the_memory_that_is_documented) {
+    test_random r = {2};
+    size_t used = 0;
+    const size_t n = 129;
+    uint8_t *data = (uint8_t *)malloc(n * n * n);
+    for (size_t i = 0; i < n * n * n; i++) data[i] = (uint8_t)random_bits(&r);
+    for (int path = 0; path < 2; path++) {
+        isogi_volume v = {.data = data, .type = ISOGI_U8, .size = {n, n, n}};
+        isogi_context context = {.alloc = counting_alloc, .release = counting_release, .user = &used, .threads = 1, .force_path = path};
+        isogi_pyramid *p = NULL;
+        CHECK(isogi_vol_build(&p, &v, &context) == ISOGI_OK, "build");
+        /* a side of 128 cells: others leave blocks at the border partly empty */
+        printf("    path %d: %.3f bytes for a voxel\n", path, (double)used / (double)(n * n * n));
+        CHECK((double)used < (path == 1 ? 0.17 : 2.35) * (double)(n * n * n), "%d bytes", (int)used);
+        isogi_vol_free(p);
+        CHECK(used == 0, "%d bytes are left", (int)used);
+    }
+    free(data);
+}
+
+/* A few voxels behind the first 2^31, in memory that is never touched otherwise. */
+TEST(voxels_beyond_two_to_the_31_are_found) {
+#if defined(__unix__) && defined(MAP_NORESERVE) && UINTPTR_MAX > 0xffffffffu && !defined(TEST_SANITIZED)
+    const size_t nx = 2100, ny = 1024, nz = 1030, at[3] = {2000, 1000, 1010};
+    isogi_context context = {.threads = 0, .force_path = 1}; /* the plain path: an eighth of a byte for a voxel */
+    isogi_pyramid *p = NULL;
+    double range[2], piece[2], wanted[1][2] = {{100, 300}};
+    size_t first[3], last[3], far_end[3] = {nx - 1, ny - 1, nz - 1};
+    isogi_counters counters = {0};
+    if (!LONG_SUITE) SKIP("reads 2^31 voxels: in the long suite");
+    uint8_t *data = (uint8_t *)mmap(NULL, nx * ny * nz, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE, -1, 0);
+    if (data == (uint8_t *)MAP_FAILED) SKIP("no 2 GB of addresses");
+    data[at[0] + nx * (at[1] + ny * at[2])] = 200;
+    isogi_volume v = {.data = data, .type = ISOGI_U8, .size = {nx, ny, nz}};
+    CHECK(isogi_vol_build(&p, &v, &context) == ISOGI_OK, "build");
+    isogi_vol_range(p, range);
+    CHECK(range[0] == 0 && range[1] == 200, "range %g..%g", range[0], range[1]);
+    for (int a = 0; a < 3; a++) {
+        isogi_ray ray = {.origin = {(double)at[0], (double)at[1], (double)at[2]}, .isovalue = 50};
+        isogi_hit hits[4];
+        size_t count;
+        ray.origin[a] = -10, ray.dir[a] = 1;
+        isogi_vol_intersect_all(p, &ray, 1, 4, hits, &count, NULL);
+        CHECK(count == 2 && hits[0].side == 1 && fabs(hits[0].t - ((double)at[a] + 9.25)) < 1e-9 && fabs(hits[1].t - ((double)at[a] + 10.75)) < 1e-9,
+              "axis %d: %d hits", a, (int)count);
+        CHECK(isogi_vol_next_interval(p, &ray, (const double(*)[2])wanted, 1, 0, piece, NULL) && piece[0] <= (double)at[a] + 9.5 &&
+                  piece[1] >= (double)at[a] + 10.5 && piece[1] - piece[0] < 13, "axis %d: piece %g..%g", a, piece[0], piece[1]);
+        first[a] = at[a] - 5, last[a] = at[a] - 1;
+    }
+    CHECK(!isogi_vol_may_hold(p, first, last, (const double(*)[2])wanted, 1) && isogi_vol_may_hold(p, at, at, (const double(*)[2])wanted, 1), "boxes");
+    float point[1][3] = {{(float)at[0] + 0.5f, (float)at[1], (float)at[2]}}, value;
+    isogi_vol_sample(p, (const float(*)[3])point, 1, &value, NULL);
+    CHECK(value == 100, "value %g", (double)value);
+    data[nx * ny * nz - 1] = 255;
+    CHECK(isogi_vol_update(p, far_end, far_end, &counters) == ISOGI_OK && counters.blocks <= 2, "%d blocks", (int)counters.blocks);
+    isogi_vol_range(p, range);
+    CHECK(range[1] == 255, "range %g..%g", range[0], range[1]);
+    isogi_vol_free(p);
+    munmap(data, nx * ny * nz);
+#else
+    SKIP("needs sparse memory of 2 GB");
+#endif
+}
+
+/* ---- numbers and pointers that no caller should send ---- */
+
+static double odd_number(test_random *r) {
+    const double odd[] = {0, -0.0, 1, -1, (double)NAN, (double)INFINITY, -(double)INFINITY, 1e300, -1e300, DBL_MAX, 1e-300, 5e-324, 0.5, 3, 7, 1e10, -2.5, 1e-6};
+    return random_bits(r) % 3 ? random_range(r, -2, 9) : odd[random_bits(r) % (sizeof odd / sizeof *odd)];
+}
+
+static float odd_float(test_random *r) {
+    double x = odd_number(r);
+    return fabs(x) > 3e38 && isogi_vol__finite64(x) ? FLT_MAX : (float)x;
+}
+
+static isogi_hit odd_hit(test_random *r) {
+    isogi_hit hit;
+    hit.t = odd_number(r), hit.side = (int)(random_bits(r) % 9) - 4;
+    for (int a = 0; a < 3; a++) {
+        hit.local[a] = odd_number(r);
+        hit.cell[a] = random_bits(r) % 4 ? (uint32_t)(random_bits(r) % 8) : (uint32_t)random_bits(r);
+    }
+    return hit;
+}
+
+static void check_odd_hit(const isogi_pyramid *p, const isogi_hit *hit, const char *what) {
+    const isogi_volume *v = isogi_vol_volume(p);
+    CHECK(hit->side >= -2 && hit->side <= 2, "%s: side %d", what, hit->side);
+    CHECK(isogi_vol__finite64(hit->t), "%s: t %g", what, hit->t);
+    for (int a = 0; a < 3; a++)
+        CHECK(hit->side ? hit->local[a] >= 0 && hit->local[a] <= 1 && hit->cell[a] + 1 < v->size[a] : hit->cell[a] == 0, "%s: cell %u + %g", what,
+              (unsigned)hit->cell[a], hit->local[a]);
+}
+
+static double cubic_function(void *user, const double p[3], double g[3]) {
+    (void)user;
+    g[0] = 3 * p[0] * p[0] - 12, g[1] = 1, g[2] = -1;
+    return p[0] * p[0] * p[0] - 12 * p[0] + p[1] - p[2];
+}
+
+static void odd_calls(const isogi_pyramid *p, test_random *r) {
+    enum { N = 24, MANY = 3 };
+    isogi_ray rays[N];
+    isogi_hit starts[N], hits[N], all[N * MANY];
+    float dirs[N][3], points[N][3], values[N], vectors[N][3];
+    double tmax[N], grid[N][3], ranges[2][2], piece[2], t = odd_number(r);
+    uint8_t occluded[N];
+    size_t counts[N], first[3], last[3];
+    for (int i = 0; i < N; i++) {
+        rays[i].flags = (uint32_t)(random_bits(r) % 4), rays[i].tmin = odd_number(r), rays[i].tmax = odd_number(r), rays[i].isovalue = odd_number(r);
+        tmax[i] = odd_number(r), starts[i] = odd_hit(r);
+        for (int a = 0; a < 3; a++) {
+            rays[i].origin[a] = odd_number(r), rays[i].dir[a] = odd_float(r), dirs[i][a] = odd_float(r), points[i][a] = odd_float(r);
+            grid[i][a] = odd_number(r);
+        }
+    }
+    for (int a = 0; a < 3; a++) first[a] = random_bits(r) % 12, last[a] = random_bits(r) % 12;
+    for (int n = 0; n < 4; n++) ranges[n / 2][n % 2] = odd_number(r);
+    isogi_bundle bundle = {.start = random_bits(r) & 1 ? starts : NULL, .tmin = odd_number(r), .tmax = odd_number(r), .isovalue = odd_number(r), .flags = 1};
+    memcpy(bundle.origin, rays[0].origin, sizeof bundle.origin);
+    CHECK(isogi_vol_intersect(p, rays, N, hits, NULL) == ISOGI_OK, "rays");
+    for (int i = 0; i < N; i++) check_odd_hit(p, &hits[i], "intersect");
+    CHECK(isogi_vol_occluded(p, rays, N, occluded, NULL) == ISOGI_OK, "any hits");
+    CHECK(isogi_vol_intersect_all(p, rays, N, MANY, all, counts, NULL) == ISOGI_OK, "all hits");
+    for (int i = 0; i < N; i++) {
+        CHECK(counts[i] <= MANY + 1 && (counts[i] > 0) == (hits[i].side != 0) && occluded[i] == (hits[i].side != 0), "%d hits", (int)counts[i]);
+        for (size_t n = 0; n < counts[i] && n < MANY; n++) check_odd_hit(p, &all[(size_t)i * MANY + n], "all");
+    }
+    CHECK(isogi_vol_continue(p, starts, (const float(*)[3])dirs, tmax, rays[1].isovalue, rays[1].flags, N, hits, NULL) == ISOGI_OK, "continue");
+    for (int i = 0; i < N; i++) check_odd_hit(p, &hits[i], "continue");
+    CHECK(isogi_vol_bundle(p, &bundle, (const float(*)[3])dirs, N, hits, NULL) == ISOGI_OK, "bundle");
+    for (int i = 0; i < N; i++) check_odd_hit(p, &hits[i], "bundle");
+    CHECK(isogi_vol_bundle_occluded(p, &bundle, (const float(*)[3])dirs, N, occluded, NULL) == ISOGI_OK, "bundle");
+    CHECK(isogi_vol_normals(p, starts, N, (isogi_normal_kind)(random_bits(r) % 2), vectors) == ISOGI_OK, "normals");
+    for (int i = 0; i < N; i++) {
+        double length = 0;
+        for (int a = 0; a < 3; a++) length += (double)vectors[i][a] * (double)vectors[i][a];
+        CHECK(fabs(length) <= 0 || fabs(length - 1) < 1e-5, "a normal of length %g", sqrt(length));
+    }
+    CHECK(isogi_vol_positions(p, starts, N, vectors) == ISOGI_OK, "positions");
+    CHECK(isogi_vol_sample(p, (const float(*)[3])points, N, values, vectors) == ISOGI_OK, "samples");
+    CHECK(isogi_vol_sample_smooth(p, (const float(*)[3])points, N, values, vectors) == ISOGI_OK, "samples");
+    CHECK(isogi_vol_sample_grid(p, ISOGI_FILTER_CATMULL_ROM, (const double(*)[3])grid, N, values, vectors) == ISOGI_OK, "samples");
+    for (int n = 0; n < 50 && isogi_vol_next_interval(p, rays, (const double(*)[2])ranges, 2, t, piece, NULL); n++) {
+        CHECK(isogi_vol__finite64(piece[0]) && piece[1] > piece[0] && !(piece[0] < t) && n < 49, "piece %g..%g behind %g", piece[0], piece[1], t);
+        t = piece[1];
+    }
+    isogi_vol_may_hold(p, first, last, (const double(*)[2])ranges, 2);
+    CHECK(isogi_vol_box_range(p, first, last, piece) == ISOGI_OK, "box");
+}
+
+TEST(odd_numbers_end_in_codes_and_misses) {
+    test_random r = {3};
+    for (int turn = 0; turn < (LONG_SUITE ? 20000 : 400); turn++) {
+        double data[8 * 7 * 6];
+        isogi_context context = {.threads = 1, .force_path = turn % 5};
+        isogi_volume v = {.data = data, .type = ISOGI_F64, .size = {8, 7, 6}};
+        isogi_field function = {.value = cubic_function, .hessian = 60, .low = {-1, -2, 0}, .high = {9, 7, 6}, .cells = {5, 6, 7}};
+        isogi_pyramid *p = NULL;
+        isogi_mesh mesh = {0};
+        for (int i = 0; i < 8 * 7 * 6; i++) data[i] = turn % 3 ? random_range(&r, -1, 6) : odd_number(&r);
+        if (turn % 7 == 0) v.size[random_bits(&r) % 3] = 1;
+        if (turn % 4 == 0) CHECK(isogi_vol_build_field(&p, &function, &context) == ISOGI_OK, "field");
+        else CHECK(isogi_vol_build(&p, &v, &context) == ISOGI_OK, "build");
+        odd_calls(p, &r);
+        isogi_mesh_desc desc = {.isovalue = odd_number(&r), .normals = 1, .closed = turn % 2};
+        isogi_result result = isogi_vol_mesh(p, &desc, &mesh);
+        CHECK(result == (turn % 4 == 0 || !isogi_vol__finite64(desc.isovalue) ? ISOGI_INVALID : ISOGI_OK), "mesh: %s", isogi_result_string(result));
+        isogi_vol_mesh_free(p, &mesh);
+        isogi_vol_free(p);
+    }
+}
+
+/* Descriptions of odd numbers are refused or understood, never followed into the woods. */
+TEST(odd_descriptions_are_refused_or_understood) {
+    test_random r = {4};
+    long built = 0;
+    for (int turn = 0; turn < (LONG_SUITE ? 200000 : 10000); turn++) {
+        static double data[512];
+        isogi_volume v = {.data = data + 64, .type = (isogi_type)(random_bits(&r) % 7), .size = {3, 4, 5}};
+        isogi_pyramid *p = NULL;
+        int n = (int)(random_bits(&r) % 3);
+        for (int i = 0; i < n; i++) {
+            int a = (int)(random_bits(&r) % 3);
+            switch (random_bits(&r) % 9) {
+            case 0: v.spacing[a] = odd_number(&r); break;
+            case 1: v.origin[a] = odd_number(&r); break;
+            case 2: v.axes[3 * a + (int)(random_bits(&r) % 3)] = odd_number(&r); break;
+            case 3: v.scale = odd_number(&r); break;
+            case 4: v.bias = odd_number(&r); break;
+            case 5: v.size[a] = random_bits(&r) & 1 ? (size_t)random_bits(&r) : 0; break;
+            case 6: v.stride[a] = random_bits(&r) & 1 ? PTRDIFF_MIN : PTRDIFF_MAX; break;
+            case 7: v.first[a] = (size_t)(random_bits(&r) >> 10); break;
+            case 8: v.halo_low[a] = random_bits(&r) & 1 ? 1 : (size_t)random_bits(&r); break;
+            }
+        }
+        isogi_result result = isogi_volume_validate(&v);
+        CHECK(result == ISOGI_OK || result == ISOGI_INVALID || result == ISOGI_TOO_LARGE, "%s", isogi_result_string(result));
+        if (result != ISOGI_OK || v.stride[0] || v.stride[1] || v.stride[2]) continue;
+        CHECK(isogi_vol_build(&p, &v, NULL) == ISOGI_OK, "valid, and cannot be built");
+        if (turn % 10 == 0 && p) odd_calls(p, &r);
+        isogi_vol_free(p), built++;
+    }
+    CHECK(built > 1000, "only %ld were built", built);
+}
+
+TEST(calls_without_arguments_are_refused) {
+    static const double data[8] = {0, 1, 2, 3, 4, 5, 6, 7};
+    isogi_volume v = {.data = data, .type = ISOGI_F64, .size = {2, 2, 2}};
+    isogi_pyramid *p = NULL;
+    isogi_ray ray = {.dir = {1, 0, 0}};
+    isogi_hit hit = {0};
+    isogi_bundle bundle = {0};
+    isogi_mesh mesh = {0};
+    isogi_mesh_desc desc = {0};
+    float vector[1][3] = {{0}};
+    double range[1][2] = {{0, 1}};
+    size_t count = 7, at[3] = {0, 0, 0};
+    uint8_t any;
+    CHECK(isogi_vol_build(NULL, &v, NULL) == ISOGI_INVALID && isogi_vol_build(&p, NULL, NULL) == ISOGI_INVALID, "build");
+    CHECK(isogi_vol_build(&p, &v, NULL) == ISOGI_OK, "build");
+    CHECK(isogi_vol_intersect(p, NULL, 1, &hit, NULL) == ISOGI_INVALID && isogi_vol_intersect(p, &ray, 1, NULL, NULL) == ISOGI_INVALID, "intersect");
+    CHECK(isogi_vol_occluded(NULL, &ray, 1, &any, NULL) == ISOGI_INVALID && isogi_vol_occluded(p, &ray, 1, NULL, NULL) == ISOGI_INVALID, "occluded");
+    CHECK(isogi_vol_intersect_all(NULL, &ray, 1, 1, &hit, &count, NULL) == ISOGI_INVALID, "all");
+    CHECK(isogi_vol_intersect_all(p, &ray, 1, 1, NULL, &count, NULL) == ISOGI_INVALID && isogi_vol_intersect_all(p, &ray, 1, 0, NULL, NULL, NULL) == ISOGI_INVALID, "all");
+    CHECK(isogi_vol_intersect_all(p, &ray, 2, SIZE_MAX / 2, &hit, &count, NULL) == ISOGI_TOO_LARGE && count == 7, "all: too many");
+    CHECK(isogi_vol_continue(p, NULL, (const float(*)[3])vector, NULL, 0, 0, 1, &hit, NULL) == ISOGI_INVALID, "continue");
+    CHECK(isogi_vol_continue(p, &hit, NULL, NULL, 0, 0, 1, &hit, NULL) == ISOGI_INVALID && isogi_vol_continue(p, NULL, NULL, NULL, 0, 0, 0, NULL, NULL) == ISOGI_OK, "continue");
+    CHECK(isogi_vol_bundle(p, NULL, (const float(*)[3])vector, 1, &hit, NULL) == ISOGI_INVALID && isogi_vol_bundle(p, &bundle, NULL, 1, &hit, NULL) == ISOGI_INVALID, "bundle");
+    CHECK(isogi_vol_bundle(p, &bundle, (const float(*)[3])vector, 1, NULL, NULL) == ISOGI_INVALID, "bundle");
+    CHECK(isogi_vol_bundle_occluded(p, &bundle, (const float(*)[3])vector, 1, NULL, NULL) == ISOGI_INVALID, "bundle");
+    CHECK(isogi_vol_bundle_occluded(NULL, &bundle, (const float(*)[3])vector, 1, &any, NULL) == ISOGI_INVALID, "bundle");
+    CHECK(isogi_vol_positions(p, NULL, 1, vector) == ISOGI_INVALID && isogi_vol_positions(p, &hit, 1, NULL) == ISOGI_INVALID, "positions");
+    CHECK(isogi_vol_normals(p, &hit, 1, (isogi_normal_kind)9, vector) == ISOGI_INVALID && isogi_vol_normals(NULL, &hit, 1, ISOGI_NORMAL_SMOOTH, vector) == ISOGI_INVALID, "normals");
+    CHECK(isogi_vol_sample(p, NULL, 1, NULL, NULL) == ISOGI_INVALID && isogi_vol_sample_smooth(NULL, (const float(*)[3])vector, 1, NULL, NULL) == ISOGI_INVALID, "sample");
+    CHECK(isogi_vol_sample(p, (const float(*)[3])vector, 1, NULL, NULL) == ISOGI_OK, "nothing asked for");
+    CHECK(isogi_vol_box_range(NULL, at, at, range[0]) == ISOGI_INVALID && isogi_vol_box_range(p, NULL, at, range[0]) == ISOGI_INVALID, "box");
+    CHECK(!isogi_vol_may_hold(NULL, at, at, (const double(*)[2])range, 1) && !isogi_vol_may_hold(p, at, at, NULL, 1), "box");
+    CHECK(!isogi_vol_next_interval(NULL, &ray, (const double(*)[2])range, 1, 0, range[0], NULL) && !isogi_vol_next_interval(p, NULL, NULL, 1, 0, NULL, NULL), "interval");
+    CHECK(isogi_vol_mesh(p, NULL, &mesh) == ISOGI_INVALID && isogi_vol_mesh(p, &desc, NULL) == ISOGI_INVALID && isogi_vol_mesh(NULL, &desc, &mesh) == ISOGI_INVALID, "mesh");
+    isogi_vol_mesh_free(NULL, NULL), isogi_vol_free(NULL);
+    isogi_vol_free(p);
+}
+
+TEST_MAIN("vol_limits")
