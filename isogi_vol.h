@@ -22,15 +22,20 @@
    What it does
 
    - Looks at voxels that you own, of any common type, stride, spacing and orientation, without copying them.
-   - Finds where rays meet the exact trilinear isosurface of ANY isovalue, without extracting anything: first hits, shadows, and
-     rays that go on from a hit without an epsilon. One min-max pyramid, built once, serves every isovalue.
+   - Finds where rays meet the exact trilinear isosurface of ANY isovalue, without extracting anything: first hits, all
+     hits, shadows, bundles from one point, and rays that go on from a hit without an epsilon. One min-max pyramid, built once,
+     serves every isovalue; where voxels change, it is updated at the cost of what has changed.
+   - Says what boxes and pieces of rays can hold, for renderers with transfer functions to skip the rest.
+   - Looks at chunks of larger fields, whose surfaces, normals and meshes meet without a seam.
+   - The same rays against functions with gradients (isogi_vol_build_field): no voxels, no step size.
    - Values and gradients: trilinear, smoothed by the cubic B-spline (Wyman 2006, 4.1.1) for normals that do not show voxels, or
      interpolated by cubic splines.
    - Indexed, watertight triangle meshes of isosurfaces, with smoothed normals.
 
    What it does NOT do
 
-   - No files, no windows, no images. No copy of the voxels: keep them alive and unchanged while a pyramid looks at them.
+   - No files, no windows, no images. No copy of the voxels: keep them alive while a pyramid looks at them, and
+     unchanged until isogi_vol_update has been told.
    - No time steps, no unstructured meshes, no level sets.
 
    Options, to be defined before the implementation
@@ -308,7 +313,9 @@ typedef struct isogi_hit {
     double local[3];  /* position in the cell, 0..1 */
     uint32_t cell[3]; /* grid coordinates are cell + local */
     int32_t side;     /* +1: the ray goes in (values rise); -1: it comes out; +2, -2: the same through the volume's border
-                         (capped rays only); 0: a miss, the other fields are zero */
+                         (capped rays only); 0: a miss, the other fields are zero. A field
+                         that touches the isovalue from below in a point and goes back is no hit unless a voxel or
+                         rounding puts that point inside, and then two, or one of +1 for a layer without thickness */
 } isogi_hit;
 
 ISOGI_API isogi_result isogi_vol_intersect(const isogi_pyramid *pyramid, const isogi_ray *rays, size_t count, isogi_hit *hits,
@@ -3321,7 +3328,7 @@ static int isogi_vol__begin_start(const isogi_vol__batch *b, size_t i, isogi_vol
         if (start->cell[a] >= (uint32_t)b->pyramid->cells[a] || !isogi_vol__finite64(start->local[a])) return 0;
         w->origin[a] = start->cell[a] + isogi_vol__clamp(start->local[a], 1);
     }
-    if (isogi_vol__is_nan(b->isovalue) || !(tmax >= 0) || !isogi_vol__aim(w, b->dirs[i], 0, tmax)) return 0;
+    if (isogi_vol__is_nan(b->isovalue) || isogi_vol__is_nan(tmax) || !(tmax >= 0) || !isogi_vol__aim(w, b->dirs[i], 0, tmax)) return 0;
     w->entry_axis = -1;
     /* a cap that is left outwards */
     return w->deflate || !(w->end * isogi_vol__largest(w->dir[0], w->dir[1], w->dir[2]) < 1e-9);
