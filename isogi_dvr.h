@@ -639,7 +639,7 @@ typedef struct isogi_dvr__blocks {
     uint64_t *histogram;           /* classes of values that occur in each block */
     uint8_t *level, *lit, *stale;  /* of each block: level of its data, of its local visibility; visibility has to be computed */
     size_t *first;                 /* [2][total]: its first node in `data` and in `sh` */
-    size_t *order, todo;           /* blocks to be computed */
+    size_t *order, due;           /* blocks to be computed */
     float *data;
     uint16_t *sh;                  /* [nodes][order * order], half floats */
     size_t data_count, sh_count, packing;
@@ -2901,8 +2901,8 @@ static isogi_result isogi_dvr__update_blocks(isogi_dvr *d) {
     for (i = 0; i < d->changed_count; i++) d->classified += d->changed[i];
     memset(d->changed, 0, d->changed_count);
     isogi_dvr__set_table(d, d->matter.table);
-    for (i = 0, b->todo = 0; i < b->total; i++)
-        if (b->stale[i] && b->lit[i]) b->order[b->todo++] = i;
+    for (i = 0, b->due = 0; i < b->total; i++)
+        if (b->stale[i] && b->lit[i]) b->order[b->due++] = i;
     return ISOGI_OK;
 }
 
@@ -3350,7 +3350,7 @@ static isogi_result isogi_dvr__step_paper(isogi_dvr *d, size_t end) {
     local.dvr = global.dvr = d;
     local.work = global.work = (isogi_counters *)isogi_allocate(&d->context, ISOGI_DVR__SLAB / ISOGI_DVR__CHUNK, sizeof *local.work);
     if (!local.work) return ISOGI_NO_MEMORY;
-    batch = d->next < b->todo ? (end - d->next < ISOGI_DVR__BATCH ? end - d->next : ISOGI_DVR__BATCH) : 0;
+    batch = d->next < b->due ? (end - d->next < ISOGI_DVR__BATCH ? end - d->next : ISOGI_DVR__BATCH) : 0;
     if (batch) {
         local.window_count = isogi_dvr__window_row(b, 16) * isogi_dvr__window_side(b, 16) * isogi_dvr__window_side(b, 16);
         local.step_count = isogi_dvr__steps_before(d, 32);
@@ -3359,28 +3359,28 @@ static isogi_result isogi_dvr__step_paper(isogi_dvr *d, size_t end) {
         if (!local.window || !local.step) result = ISOGI_NO_MEMORY;
         else isogi_dvr__set_local_steps(d, local.step);
     }
-    while (result == ISOGI_OK && d->next < end && d->next < b->todo) {
-        local.first = d->next, count = (end < b->todo ? end : b->todo) - d->next;
+    while (result == ISOGI_OK && d->next < end && d->next < b->due) {
+        local.first = d->next, count = (end < b->due ? end : b->due) - d->next;
         if (count > batch) count = batch;
         result = isogi_parallel(&d->context, count, isogi_dvr__local_task, &local, 0, 0);
         for (i = 0; result == ISOGI_OK && i < count; i++) {
             isogi_dvr__add(&d->counters, &local.work[i]);
             b->stale[b->order[d->next++]] = 0, d->computed++;
         }
-        if (result == ISOGI_OK && d->next == b->todo)
+        if (result == ISOGI_OK && d->next == b->due)
             for (local.packing = 1; result == ISOGI_OK && local.packing <= 16; local.packing *= 2)
                 result = isogi_parallel(&whole, b->total, isogi_dvr__finish_task, &local, 0, 0);
     }
     isogi_release(&d->context, local.window, batch * local.window_count, sizeof *local.window);
     isogi_release(&d->context, local.step, local.step_count, sizeof *local.step);
     while (result == ISOGI_OK && d->next < end) {
-        size_t point = d->next - b->todo, last = end - b->todo;
+        size_t point = d->next - b->due, last = end - b->due;
         global.first = point, global.end = last - point < ISOGI_DVR__SLAB ? last : point + ISOGI_DVR__SLAB;
         count = (global.end - point + ISOGI_DVR__CHUNK - 1) / ISOGI_DVR__CHUNK;
         result = isogi_parallel(&d->context, count, isogi_dvr__global_task, &global, (double)point / (double)d->point_count,
                                 (double)global.end / (double)d->point_count);
         for (i = 0; result == ISOGI_OK && i < count; i++) isogi_dvr__add(&d->counters, &global.work[i]);
-        if (result == ISOGI_OK) d->next = b->todo + global.end;
+        if (result == ISOGI_OK) d->next = b->due + global.end;
     }
     isogi_release(&d->context, local.work, ISOGI_DVR__SLAB / ISOGI_DVR__CHUNK, sizeof *local.work);
     return result;
@@ -3429,8 +3429,8 @@ ISOGI_API isogi_result isogi_dvr_step(isogi_dvr *dvr, uint64_t max_rays, double 
     count = dvr->point_count, rays = (uint64_t)dvr->desc.directions;
     if (count && dvr->method == ISOGI_DVR_SWEEP) count = (size_t)dvr->desc.directions, rays = dvr->point_count;
     if (count && dvr->method == ISOGI_DVR_PAPER) {
-        count += dvr->blocks.todo;
-        if (dvr->next < dvr->blocks.todo) rays *= 64;
+        count += dvr->blocks.due;
+        if (dvr->next < dvr->blocks.due) rays *= 64;
     }
     units = max_rays / rays;
     units = units ? units : 1;

@@ -1848,6 +1848,7 @@ static void isogi_vol__grid_point(const isogi_pyramid *p, const isogi_vol__point
     isogi_vol_to_grid(p, world, grid);
 }
 
+#if defined(ISOGI_VOL__SSE2) || defined(ISOGI_VOL__NEON)
 /* Cell and place in it of points first .. first + n - 1, moved to the border if outside; n up to a multiple of 16 are filled in. */
 static void isogi_vol__locate(const isogi_pyramid *p, const isogi_vol__points *at, size_t first, int n, isogi_vol__block *b) {
     const isogi_volume *v = &p->volume;
@@ -1862,6 +1863,7 @@ static void isogi_vol__locate(const isogi_pyramid *p, const isogi_vol__points *a
         }
     }
 }
+#endif
 
 #ifdef ISOGI_VOL__AVX
 #define ISOGI_VOL__AVX2 ISOGI_VOL__TARGET("avx2,fma")
@@ -1931,6 +1933,7 @@ ISOGI_VOL__LOCATE(avx2, ISOGI_VOL__AVX2, __m256d, _mm256_, __m128i, _mm_, 4, _mm
 ISOGI_VOL__LOCATE(avx512, ISOGI_VOL__AVX512, __m512d, _mm512_, __m256i, _mm256_, 8, _mm512_fmadd_pd)
 #endif
 
+#if defined(ISOGI_VOL__SSE2) || defined(ISOGI_VOL__NEON)
 /* Corners side by side, so that no level of instructions needs gathers, which are slow on many processors. */
 static void isogi_vol__fetch(const isogi_volume *v, int n, isogi_vol__block *b) {
     const char *data = (const char *)v->data;
@@ -1957,8 +1960,13 @@ static void isogi_vol__fetch(const isogi_volume *v, int n, isogi_vol__block *b) 
 #undef ISOGI_VOL__TAKE_FLOAT
 #undef ISOGI_VOL__READ
 }
+#endif
 
 #ifdef ISOGI_VOL__AVX
+#ifndef __clang__
+#pragma GCC diagnostic push
+#pragma GCC diagnostic ignored "-Wsign-conversion" /* of gcc's own macros, at -O0 */
+#endif
 /* The same with gathers, which are quick where AVX-512 is: neighbours along x come as one number. Bytes bring two more with them; 0:
    these would lie beyond the end of the volume, or voxels are not side by side. */
 ISOGI_VOL__AVX512 static int isogi_vol__gather_avx512(const isogi_volume *v, int n, isogi_vol__block *b) {
@@ -1993,6 +2001,9 @@ ISOGI_VOL__AVX512 static int isogi_vol__gather_avx512(const isogi_volume *v, int
     }
     return 1;
 }
+#ifndef __clang__
+#pragma GCC diagnostic pop
+#endif
 #endif
 
 /* Trilinear values, and gradients if asked for, of a whole block; vector by vector for any width: V and the operations L##mul_ps ...
@@ -3583,6 +3594,7 @@ static int isogi_vol__walk_fast(isogi_vol__walk *w, const isogi_vol__ticks *k, i
 #ifndef __clang__
 #pragma GCC diagnostic push
 #pragma GCC diagnostic ignored "-Wmaybe-uninitialized" /* gcc 12 says so of its own undefined vectors */
+#pragma GCC diagnostic ignored "-Wsign-conversion" /* of gcc's own macros, at -O0 */
 #endif
 #define ISOGI_VOL__POOL 64
 
@@ -3989,24 +4001,24 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE __m512d isogi_vol__refine8(const __m512d b[4
     const __m512d c3 = ISOGI_VOL__ADD(ISOGI_VOL__SUB(b[3], b[0]), ISOGI_VOL__MUL(three, ISOGI_VOL__SUB(b[1], b[2])));
     const __m512d bend = ISOGI_VOL__MUL(_mm512_set1_pd(1e13), ISOGI_VOL__ADD(_mm512_abs_pd(c2), ISOGI_VOL__MUL(three, _mm512_abs_pd(c3))));
     __m512d s = _mm512_div_pd(b[0], ISOGI_VOL__SUB(b[0], b[3])), next = s;
-    __mmask8 todo = lanes;
+    __mmask8 due = lanes;
     int i;
     *slow = (__mmask8)(lanes & (_mm512_cmp_pd_mask(b[0], zero, _CMP_EQ_OQ) | _mm512_cmp_pd_mask(b[3], zero, _CMP_EQ_OQ)));
-    todo = (__mmask8)(todo & ~*slow);
-    for (i = 0; i < 4 && todo; i++) {
+    due = (__mmask8)(due & ~*slow);
+    for (i = 0; i < 4 && due; i++) {
         const __m512d ss = ISOGI_VOL__MUL(s, s);
         const __m512d value = ISOGI_VOL__ADD(ISOGI_VOL__ADD(b[0], ISOGI_VOL__MUL(s, c1)), ISOGI_VOL__MUL(ss, ISOGI_VOL__ADD(c2, ISOGI_VOL__MUL(s, c3))));
         const __m512d slope = ISOGI_VOL__ADD(ISOGI_VOL__ADD(c1, ISOGI_VOL__MUL(ISOGI_VOL__MUL(two, s), c2)), ISOGI_VOL__MUL(ss, ISOGI_VOL__MUL(three, c3)));
         const __m512d step = _mm512_div_pd(value, slope), at = ISOGI_VOL__SUB(s, step);
         const __mmask8 kept = _mm512_mask_cmp_pd_mask(_mm512_cmp_pd_mask(at, zero, _CMP_GE_OQ), at, one, _CMP_LE_OQ);
         const __mmask8 done = _mm512_cmp_pd_mask(ISOGI_VOL__MUL(ISOGI_VOL__MUL(bend, step), step), _mm512_abs_pd(slope), _CMP_LE_OQ);
-        *slow = (__mmask8)(*slow | (todo & ~kept));
-        todo = (__mmask8)(todo & kept);
-        next = _mm512_mask_mov_pd(next, (__mmask8)(todo & done), at);
-        todo = (__mmask8)(todo & ~done);
+        *slow = (__mmask8)(*slow | (due & ~kept));
+        due = (__mmask8)(due & kept);
+        next = _mm512_mask_mov_pd(next, (__mmask8)(due & done), at);
+        due = (__mmask8)(due & ~done);
         s = at;
     }
-    *slow = (__mmask8)(*slow | todo);
+    *slow = (__mmask8)(*slow | due);
     return next;
 }
 
