@@ -93,9 +93,16 @@
        rays        16     32     64    128    256    512   1024   2048
        error     0.77   0.57   0.28   0.15  0.092  0.057  0.033  0.022
 
+   Tetrahedral meshes. isogi_dvr_tets_render draws points, values and tetrahedra, unlit, in both spaces: in a tetrahedron the field
+   is linear, so that both integrals are exact. Rays go from face to face, leave and enter again where the mesh has gaps; tetrahedra
+   without volume are left out and counted. Parts that only touch look as one where their values agree.
+
+   Transfer functions to begin with: presets, tables of other programs (gamma and premultiplication stated), and one suggested from
+   the histogram. Everything inside is linear light and not premultiplied; pixels are linear and premultiplied.
+
    What it does not do
 
-   - No scattering beyond the first, no phase function but the isotropic one, no refraction, no glossy surfaces.
+   - No light on tetrahedral meshes, no scattering beyond the first, no phase function but the isotropic one, no refraction, no glossy surfaces.
    - No pre-integration in physical space: a transfer function with features narrower than the value's change from sample to sample
      needs a smaller step, or a peak. Pre-classification (colours interpolated instead of values) is left out on purpose: in data
      space it would depend on the view, and it blurs every surface to the width of a voxel.
@@ -127,8 +134,8 @@
    Limits
 
    Values that are not finite: a cell with such a corner is transparent. An axis of one voxel makes a box without volume, which is
-   transparent (rays within its plane do sample it). Up to ISOGI_DVR_MAX_PEAKS peaks, 2^16 directions, and 2^24 samples on the
-   longest ray. Errors: ISOGI_INVALID for anything outside of its documented range, ISOGI_TOO_LARGE where sizes overflow or pass
+   transparent (rays within its plane do sample it). Up to ISOGI_DVR_MAX_PEAKS peaks (in data space,
+   exact or pre-integrated, any number), 2^16 directions, and 2^24 samples on the longest ray. Errors: ISOGI_INVALID for anything outside of its documented range, ISOGI_TOO_LARGE where sizes overflow or pass
    these limits, ISOGI_NO_MEMORY, ISOGI_CANCELLED.
 
    How to choose. `step` 0.5 is right for smooth transfer functions, 0.25 for steep ones; each halving costs twice the time and
