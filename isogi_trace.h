@@ -43,7 +43,10 @@
      irradiance at surface points    request (if lazy), step until remaining is 0, sample
      keep a window alive             step(trace, rays that fit a frame, &remaining), sample: what is done so far can be shown
      how good is it                  the error of isogi_trace_sample: standard error of luminance; it falls as 1 / sqrt(samples)
-     sharper shadows                 a finer lattice (desc.lattice); coarser ones are cheaper by the cube
+     sharper shadows                 a finer lattice (desc.lattice): the border of a hard shadow is up to one and a half texels wide;
+                                     coarser ones are cheaper by the cube, desc.hierarchy is coarse where light varies slowly
+     a renderer of your own          export, and the shaders below
+     a bake that takes a night       save now and then, load to go on; desc.box_first to share the work
      a texture that is too dark in grooves   more bounces: each adds one reflection, -1 all of them
      a scan cut open by its border   desc.capped here and ISOGI_RAY_CAPPED for viewing rays; else one looks into the solid through
                                      the cut, at surfaces whose outer side is dark because it is shut off

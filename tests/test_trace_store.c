@@ -447,4 +447,54 @@ TEST(blocks_belong_to_their_description) {
     isogi_trace_free(t), free(block), scene_free(&s), scene_free(&s2);
 }
 
+/* ---- memory that runs out --------------------------------------------------------------------------------------------------------------- */
+
+typedef struct scarce { long left, blocks; } scarce;
+static void *scarce_alloc(void *user, size_t size, size_t align) {
+    scarce *m = (scarce *)user;
+    void *p = NULL;
+    if (m->left-- == 0 || posix_memalign(&p, align < sizeof(void *) ? sizeof(void *) : align, size)) return NULL;
+    m->blocks++;
+    return p;
+}
+static void scarce_release(void *user, void *p, size_t size) {
+    (void)size, ((scarce *)user)->blocks--;
+    free(p);
+}
+
+/* The k-th allocation fails, for every k: an error or success, nothing leaks, and after a failed step or load the rest still works. */
+TEST(every_allocation_may_fail) {
+    double q[2] = {0.5, 4};
+    scene s = scene_make(9, 8, 7, NULL, gyroid_in_air, q);
+    isogi_trace_desc d = store_desc(&s, ISOGI_TRACE_IRRADIANCE, 0, 1), levels = d;
+    isogi_trace *good = baked(&d);
+    size_t size;
+    uint8_t *block = save_now(good, &size), *bytes = (uint8_t *)malloc(9 * 8 * 7 * 12);
+    int finished = 0;
+    levels.hierarchy = 0.2f, levels.sides = ISOGI_TRACE_BOTH_SIDES;
+    for (long k = 0; k < 400 && !finished; k++) {
+        scarce memory = {k, 0};
+        isogi_context context = {.alloc = scarce_alloc, .release = scarce_release, .user = &memory, .threads = 1};
+        for (int kind = 0; kind < 2; kind++) {
+            isogi_trace *t = NULL;
+            isogi_result result, loaded = ISOGI_OK;
+            d.lazy = 1, memory.left = k;
+            result = isogi_trace_create(&t, kind ? &levels : &d, &context);
+            CHECK(result == ISOGI_OK ? t != NULL : result == ISOGI_NO_MEMORY && !t, "allocation %ld: %d", k, result);
+            if (result == ISOGI_OK && !kind) loaded = isogi_trace_load(t, block, size);
+            if (result == ISOGI_OK) result = isogi_trace_step(t, 0, NULL);
+            CHECK(result == ISOGI_OK || result == ISOGI_NO_MEMORY, "allocation %ld: %d", k, result);
+            if (t && result == ISOGI_OK && loaded == ISOGI_OK && !kind) result = isogi_trace_export(t, ISOGI_TRACE_FLOAT, bytes, 9 * 8 * 7 * 12);
+            finished = memory.left >= 0;
+            memory.left = -1;
+            if (t && !kind) CHECK(isogi_trace_load(t, block, size) == ISOGI_OK && isogi_trace_export(t, ISOGI_TRACE_FLOAT, bytes, 9 * 8 * 7 * 12) == ISOGI_OK, "after allocation %ld", k);
+            if (t) CHECK(isogi_trace_step(t, 0, NULL) == ISOGI_OK, "after allocation %ld", k);
+            isogi_trace_free(t);
+            CHECK(memory.blocks == 0, "allocation %ld: %ld blocks leak", k, memory.blocks);
+        }
+    }
+    CHECK(finished, "there are more allocations, %d", finished);
+    isogi_trace_free(good), free(block), free(bytes), scene_free(&s);
+}
+
 TEST_MAIN("trace_store")
