@@ -3733,8 +3733,9 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE __m512i isogi_vol__mirror8(__m512i mask, __m
     return _mm512_mask_mov_epi64(mask, _mm512_test_epi64_mask(flip, _mm512_set1_epi64(48)), _mm512_shuffle_epi8(mask, quads));
 }
 
-/* Which children can hold the surface: bounds of nodes and voxels of leaves are compared alike, and mean different things. */
-ISOGI_VOL__AVX512 ISOGI_VOL__INLINE __m512i isogi_vol__marked(isogi_vol__pool *s, int i, __mmask8 leaf) {
+/* Bounds of nodes and voxels of leaves are compared alike, byte by byte, and mean different things: whether the two halves of the node
+   are at least `low` (0, 1), and below `beyond` (2, 3), of eight rays. Returns the last four bytes of leaves. */
+ISOGI_VOL__AVX512 ISOGI_VOL__INLINE __m256i isogi_vol__compare(isogi_vol__pool *s, int i, __mmask8 leaf, uint64_t mask[4][8]) {
     const __m512i address = _mm512_load_si512(&s->address[i]);
     const __m256i tail = _mm512_mask_i64gather_epi32(_mm256_setzero_si256(), leaf, _mm512_add_epi64(address, _mm512_set1_epi64(124)), (const int *)0, 1);
     const __m256 low = _mm256_cvtepi32_ps(_mm256_and_si256(_mm256_srli_epi32(tail, 8), _mm256_set1_epi32(255)));
@@ -3743,18 +3744,18 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE __m512i isogi_vol__marked(isogi_vol__pool *s
     const __m256i zero = _mm256_setzero_si256(), most = _mm256_set1_epi32(255);
     __m256 x = _mm256_mul_ps(_mm256_sub_ps(_mm512_cvtpd_ps(_mm512_load_pd(&s->level_units[i])), low), scale);
     __m256i least = _mm512_cvtepi64_epi32(_mm512_load_si512(&s->low[i])), beyond = _mm512_cvtepi64_epi32(_mm512_load_si512(&s->beyond[i]));
-    __m512i in0, in1, out0, out1, inner;
-    __attribute__((aligned(64))) uint64_t mask[4][8];
+    __m256i inside, outside;
     __attribute__((aligned(32))) uint32_t bound[2][8];
     int k;
     x = _mm256_min_ps(_mm256_max_ps(x, _mm256_set1_ps(-2)), _mm256_set1_ps(257));
     _mm512_mask_store_pd(&s->step[i], leaf, _mm512_cvtps_pd(_mm256_sub_ps(x, _mm256_set1_ps(0.5f))));
-    in0 = _mm512_castsi256_si512(_mm256_sub_epi32(_mm256_cvttps_epi32(_mm256_add_ps(x, _mm256_set1_ps(3.0625f))), _mm256_set1_epi32(2)));
-    out0 = _mm512_castsi256_si512(_mm256_sub_epi32(_mm256_cvttps_epi32(_mm256_add_ps(x, _mm256_set1_ps(2.9375f))), _mm256_set1_epi32(3)));
-    least = _mm256_mask_mov_epi32(least, leaf, _mm256_min_epi32(_mm256_max_epi32(_mm512_castsi512_si256(in0), zero), most));
-    beyond = _mm256_mask_mov_epi32(beyond, leaf, _mm256_min_epi32(_mm256_max_epi32(_mm512_castsi512_si256(out0), zero), most));
+    inside = _mm256_sub_epi32(_mm256_cvttps_epi32(_mm256_add_ps(x, _mm256_set1_ps(3.0625f))), _mm256_set1_epi32(2));
+    outside = _mm256_sub_epi32(_mm256_cvttps_epi32(_mm256_add_ps(x, _mm256_set1_ps(2.9375f))), _mm256_set1_epi32(3));
+    least = _mm256_mask_mov_epi32(least, leaf, _mm256_min_epi32(_mm256_max_epi32(inside, zero), most));
+    beyond = _mm256_mask_mov_epi32(beyond, leaf, _mm256_min_epi32(_mm256_max_epi32(outside, zero), most));
     _mm256_store_si256((__m256i *)(void *)bound[0], _mm256_mullo_epi32(least, _mm256_set1_epi32(0x01010101)));
     _mm256_store_si256((__m256i *)(void *)bound[1], _mm256_mullo_epi32(beyond, _mm256_set1_epi32(0x01010101)));
+#pragma GCC unroll 8
     for (k = 0; k < 8; k++) {
         const char *node = (const char *)(uintptr_t)s->address[i + k];
         const __m512i a = _mm512_load_si512((const void *)node), b = _mm512_load_si512((const void *)(node + 64));
@@ -3762,13 +3763,19 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE __m512i isogi_vol__marked(isogi_vol__pool *s
         mask[0][k] = _mm512_cmpge_epu8_mask(a, l), mask[1][k] = _mm512_cmpge_epu8_mask(b, l);
         mask[2][k] = _mm512_cmplt_epu8_mask(a, h), mask[3][k] = _mm512_cmplt_epu8_mask(b, h);
     }
+    return tail;
+}
+
+/* Which children can hold the surface. */
+ISOGI_VOL__AVX512 ISOGI_VOL__INLINE __m512i isogi_vol__marked(const isogi_vol__pool *s, int i, __mmask8 leaf, const uint64_t mask[4][8], __m256i tail) {
+    __m512i in0, in1, out0, out1, inner;
     in0 = _mm512_load_si512(mask[0]), in1 = _mm512_load_si512(mask[1]), out0 = _mm512_load_si512(mask[2]), out1 = _mm512_load_si512(mask[3]);
     inner = _mm512_and_si512(in1, out0); /* largest >= low, least < beyond */
     isogi_vol__all_corners8(&in0, &in1);
     isogi_vol__all_corners8(&out0, &out1);
     in0 = isogi_vol__pack_cells8(_mm512_or_si512(in0, out0), _mm512_or_si512(in1, out1));
     inner = _mm512_mask_andnot_epi64(inner, leaf, in0, ISOGI_VOL__ALL64(~(uint64_t)0));
-    if (ISOGI_VOL__UNLIKELY(_mm256_movemask_epi8(_mm256_cmpgt_epi32(_mm256_srli_epi32(tail, 24), zero)))) {
+    if (ISOGI_VOL__UNLIKELY(_mm256_movemask_epi8(_mm256_cmpgt_epi32(_mm256_srli_epi32(tail, 24), _mm256_setzero_si256())))) {
         /* leaves that reach beyond the volume */
         const __m512i cut = _mm512_cvtepu32_epi64(_mm256_srli_epi32(tail, 24)), three = _mm512_set1_epi64(3);
 #define ISOGI_VOL__CUT(a) _mm512_setr_epi64(-1, (int64_t)ISOGI_VOL__BELOW_##a(3), (int64_t)ISOGI_VOL__BELOW_##a(2), (int64_t)ISOGI_VOL__BELOW_##a(1), -1, -1, -1, -1)
@@ -3784,10 +3791,12 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE __m512i isogi_vol__marked(isogi_vol__pool *s
 ISOGI_VOL__AVX512 ISOGI_VOL__INLINE void isogi_vol__answer(isogi_vol__turn *turn, isogi_vol__pool *s, int i) {
     const __m512i level = _mm512_load_si512(&s->level[i]), zero = _mm512_setzero_si512();
     const __mmask8 lives = _mm512_cmpge_epi64_mask(level, zero), leaf = _mm512_cmpeq_epi64_mask(level, zero);
-    const __m512i passed = isogi_vol__passed(s, i);
-    const __m512i marked = _mm512_maskz_and_epi64(lives, passed, isogi_vol__marked(s, i, leaf));
+    __attribute__((aligned(64))) uint64_t mask[4][8];
+    const __m256i tail = isogi_vol__compare(s, i, leaf, mask);
+    const __m512i passed = isogi_vol__passed(s, i); /* meanwhile the masks get to where they can be read as vectors */
+    const __m512i marked = _mm512_maskz_and_epi64(lives, passed, isogi_vol__marked(s, i, leaf, (const uint64_t(*)[8])mask, tail));
     const __mmask8 some = _mm512_test_epi64_mask(marked, marked);
-    unsigned cells = (unsigned)(some & leaf);
+    const unsigned cells = (unsigned)(some & leaf);
     int n;
     for (n = 0; n < turn->levels; n++) _mm512_mask_store_epi64(s->mask[n] + i, _mm512_cmpeq_epi64_mask(level, _mm512_set1_epi64(n)), marked);
     _mm512_store_si512(&s->pending[i], _mm512_mask_or_epi64(_mm512_load_si512(&s->pending[i]), (__mmask8)(some & ~leaf), _mm512_load_si512(&s->pending[i]),
@@ -4319,6 +4328,15 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE uint64_t isogi_vol__look_all(isogi_vol__batc
     return open;
 }
 
+/* Slots without a ray take part in all stages, with zeros, and are left out at their ends. */
+ISOGI_VOL__AVX512 ISOGI_VOL__INLINE void isogi_vol__clear_pool(isogi_vol__pool *s, int groups, const isogi_pyramid *p) {
+    char *row = (char *)s;
+    int i, k;
+    for (i = 0; i < (int)(sizeof *s / sizeof s->ray); i++, row += sizeof s->ray)
+        for (k = 0; k < groups; k++) _mm512_store_si512(row + 64 * k, _mm512_setzero_si512());
+    for (i = 0; i < 8 * groups; i++) s->level[i] = -1, s->address[i] = (uint64_t)(uintptr_t)p->nodes;
+}
+
 /* Any number of rays through the slots of a pool, each taken again as soon as it is free. */
 ISOGI_VOL__AVX512 static void isogi_vol__trace_pool(isogi_vol__batch *b, size_t count) {
     const int groups = count < ISOGI_VOL__POOL ? (int)(count + 7) / 8 : ISOGI_VOL__POOL / 8;
@@ -4330,7 +4348,7 @@ ISOGI_VOL__AVX512 static void isogi_vol__trace_pool(isogi_vol__batch *b, size_t 
     int i;
     isogi_vol__open_turn(&turn, b->pyramid);
     turn.any = b->occluded != NULL;
-    for (i = 0; i < 8 * groups; i++) s.level[i] = -1, s.pending[i] = 0, s.cell[i] = 0, s.address[i] = (uint64_t)(uintptr_t)b->pyramid->nodes;
+    isogi_vol__clear_pool(&s, groups, b->pyramid);
     for (;;) {
         int answered = 0, waits;
         open = isogi_vol__fill_pool(b, &s, open, &next, count);
