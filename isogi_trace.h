@@ -156,6 +156,12 @@ typedef enum isogi_trace_lookup {
 } isogi_trace_lookup;
 
 /* A colour at a data value; tables of these are piecewise linear, and constant beyond their ends. */
+/* Where a ray takes the light from that it meets at a hit. */
+typedef enum isogi_trace_method {
+    ISOGI_TRACE_FEEDBACK = 0, /* from what was gathered near the hit: all reflections for the rays of one */
+    ISOGI_TRACE_PATHS         /* from a path that goes on: unbiased, the reference */
+} isogi_trace_method;
+
 typedef struct isogi_albedo_point {
     double value; /* data value; ascending */
     float rgb[3]; /* albedo: 0..1; emission: radiance, 0 or more */
@@ -212,7 +218,10 @@ typedef struct isogi_trace_desc {
     float reach;               /* surfaces further than this (world units) from where a ray starts do not exist for it: with 0 bounces
                                   ambient occlusion of that radius; 0 = unlimited */
     int bounces;               /* 0 = light that arrives directly; n = up to n reflections; -1 = all (Russian roulette) */
-    int samples;               /* paths per texel; 0 = 64 */
+    isogi_trace_method method; /* isogi_trace_gather: always PATHS */
+    int samples;               /* directions per texel; 0 = 64 */
+    float error;               /* FEEDBACK: a texel is good enough once its standard error is below this fraction of the light that an
+                                  open texel gets, averaged over all orientations; 0 = every texel gets all its samples */
     uint64_t seed;
     float offset;              /* rays start this many voxels along the normal, up to 1 (a wall may be that thin); 0 = 0.25; negative = on the surface */
     isogi_normal_kind normals; /* of the hemisphere that is integrated over */
@@ -248,9 +257,9 @@ ISOGI_API isogi_result isogi_trace_step(isogi_trace *trace, uint64_t max_rays, d
 
 /* Lookup (desc.lookup) among the texels that are valid and computed. irradiance[count] (RGB); error[count]: standard error of its
    luminance, NULL = not wanted; a point none of whose texels is ready gets the zero vector and error = INFINITY (so does the error
-   of a single sample, which is not known). Points beyond the lattice are moved to its border.
-   TRANSFER: under the lighting last given to isogi_trace_relight (that of the description at first); the error is that under a
-   uniform sky of the lighting's mean radiance. */
+   of a single sample, which is not known, and endless light). Points beyond the lattice are moved to its border.
+   TRANSFER: under the lighting last given to isogi_trace_relight (that of the description at first); its error is an upper bound.
+   FEEDBACK: the error is that of sampling; the bias of light from probes comes on top. */
 ISOGI_API isogi_result isogi_trace_sample(const isogi_trace *trace, const float (*points)[3], size_t count, float (*irradiance)[3],
                                           float *error);
 /* TRANSFER only: a new distant lighting (environment and directional lights; point lights are ISOGI_INVALID). No rays. */
@@ -267,6 +276,19 @@ ISOGI_API isogi_result isogi_trace_sample_gloss(const isogi_trace *trace, const 
 ISOGI_API isogi_result isogi_trace_sample_transfer(const isogi_trace *trace, const float (*points)[3], size_t count, float *transfer);
 /* Texels along each axis, order (0 for IRRADIANCE), channels (3 for IRRADIANCE). Any of them may be NULL. Of no trace: zeros. */
 ISOGI_API void isogi_trace_shape(const isogi_trace *trace, size_t lattice[3], int *order, int *channels);
+
+/* What has been achieved so far, over the texels that can be read (of both sides). */
+typedef struct isogi_trace_report {
+    uint64_t texels;  /* that can be read, */
+    uint64_t drafts;  /* of which so many will get more samples */
+    uint64_t probes;  /* FEEDBACK: other points whose light was gathered because rays met the surface there */
+    double light;     /* IRRADIANCE: root mean square of luminance over these texels, */
+    double error;     /* of their standard errors (TRANSFER: under a uniform sky of radiance 1; without what is not known) */
+    double worst;     /* the largest of these errors; INFINITY where one is not known */
+    double unit;      /* IRRADIANCE: light that an open texel gets, averaged over orientations: what desc.error is a fraction of */
+    int diverges;     /* FEEDBACK: reflections add the same light for ever (albedo 1, closed, with a light inside): no value means anything */
+} isogi_trace_report;
+ISOGI_API void isogi_trace_status(const isogi_trace *trace, isogi_trace_report *report);
 
 /* Albedo at an isovalue, as the description's tables define it. */
 ISOGI_API void isogi_trace_albedo(const isogi_trace_desc *desc, double isovalue, float rgb[3]);
@@ -355,6 +377,21 @@ ISOGI_API size_t isogi_trace_memory(const isogi_trace *trace); /* bytes that the
 #define ISOGI_TRACE__MAX_DEPTH 10000 /* of a path, so that nothing hangs */
 #define ISOGI_TRACE__MAX_ORDER 6
 #define ISOGI_TRACE__NOT_READY HUGE_VALF
+#define ISOGI_TRACE__SAMPLES 16384 /* samples of a batch, */
+#define ISOGI_TRACE__SPANS 4096    /* in as many pieces, */
+#define ISOGI_TRACE__SPAN 512      /* of at most this many */
+#define ISOGI_TRACE__TASK_SPANS 32 /* pieces in a task */
+#define ISOGI_TRACE__FLUSH 64      /* rays in one call */
+#define ISOGI_TRACE__SWEEP 256     /* nodes in a task that traces no rays */
+#define ISOGI_TRACE__GROUP 65536   /* texels that are worked on together, about */
+#define ISOGI_TRACE__PROBE 8u       /* samples of a probe */
+#define ISOGI_TRACE__CELL 2.0       /* of probes that texels read, in voxels, */
+#define ISOGI_TRACE__CELL_FAR 8.0   /* and of those that only probes read */
+#define ISOGI_TRACE__CELL_RATIO 8   /* length of rays to size of cells */
+#define ISOGI_TRACE__PLANE 1.0      /* voxels between the planes of a hit and its probe */
+#define ISOGI_TRACE__LIGHT_SHARE 2  /* samples to samples of a light */
+#define ISOGI_TRACE__FILTER 1       /* texels to each side */
+#define ISOGI_TRACE__FILTER_WIDTH 2.0
 
 /* ==== numbers that survive -ffast-math =============================================================================== */
 
@@ -879,6 +916,7 @@ typedef struct isogi_trace__scene {
     isogi_trace__sky sky;
     int has_env;
     double unit; /* RGB9E5, HALF and BYTE hold irradiance in units of this power of two, about that of an open surface */
+    double open_light; /* luminance of the irradiance of an open texel, averaged over orientations: the unit of desc.error */
     int high;    /* light is gathered on the high side */
     double reach[ISOGI_TRACE__WAVE]; /* of rays, or all zero */
 } isogi_trace__scene;
@@ -891,6 +929,7 @@ typedef struct isogi_trace__site {
     double origin[3]; /* of its rays, world */
     int on_surface;   /* the rays leave from `place` itself */
     float geometric[3]; /* then: the trilinear normal; directions below it are mirrored, as at every later vertex */
+    signed char from; /* FEEDBACK: side of the surface, 1 low, -1 high */
     int open;         /* the origin lies beyond an open border: what a ray meets first may be a surface seen from within */
     uint64_t key;
 } isogi_trace__site;
@@ -1014,6 +1053,7 @@ typedef struct isogi_trace__shadows {
 static void isogi_trace__site_rays(const isogi_trace__scene *scene, const isogi_trace__site *site, const float (*dirs)[3],
                                    const double *tmax, size_t count, isogi_hit *hits, isogi_counters *counters) {
     isogi_hit starts[ISOGI_TRACE__WAVE];
+    isogi_ray rays[ISOGI_TRACE__WAVE];
     size_t i;
     if (site->on_surface) {
         for (i = 0; i < count; i++) starts[i] = site->place;
@@ -1021,13 +1061,13 @@ static void isogi_trace__site_rays(const isogi_trace__scene *scene, const isogi_
         return;
     }
     for (i = 0; i < count; i++) {
-        isogi_ray ray;
-        memset(&ray, 0, sizeof ray);
-        memcpy(ray.origin, site->origin, sizeof ray.origin);
-        memcpy(ray.dir, dirs[i], sizeof ray.dir);
-        ray.flags = scene->flags, ray.isovalue = site->isovalue, ray.tmax = tmax[i];
-        isogi_vol_intersect(scene->pyramid, &ray, 1, &hits[i], counters);
+        isogi_ray *ray = &rays[i];
+        memset(ray, 0, sizeof *ray);
+        memcpy(ray->origin, site->origin, sizeof ray->origin);
+        memcpy(ray->dir, dirs[i], sizeof ray->dir);
+        ray->flags = scene->flags, ray->isovalue = site->isovalue, ray->tmax = tmax[i];
     }
+    isogi_vol_intersect(scene->pyramid, rays, count, hits, counters);
 }
 
 /* Adds what the unblocked shadow rays bring. depth 0: they leave from the site. */
@@ -1275,7 +1315,7 @@ static int isogi_trace__dark(const isogi_trace__scene *scene) {
 }
 
 /* Computes one site: values[3] (RGB irradiance) or values[order*order*channels], and the standard error of the luminance (TRANSFER:
-   under a sky of radiance 1). */
+   1 / sqrt(samples), from which isogi_trace__variance works it out under the lighting). */
 static void isogi_trace__gather_site(const isogi_trace__scene *scene, const isogi_trace__site *site, float *values,
                                      float *error, isogi_counters *counters) {
     const isogi_trace_desc *desc = &scene->desc;
@@ -1300,6 +1340,7 @@ static void isogi_trace__gather_site(const isogi_trace__scene *scene, const isog
     }
     *error = desc->samples > 1 ? (float)(ISOGI_TRACE__PI * sqrt(square / ((double)desc->samples * (desc->samples - 1))))
                                : ISOGI_TRACE__NOT_READY;
+    if (desc->samples > 1 && desc->mode == ISOGI_TRACE_TRANSFER) *error = (float)(1 / sqrt((double)desc->samples));
     if (desc->mode == ISOGI_TRACE_TRANSFER) {
         for (i = 0; i < coefficients; i++) values[i] = (float)(ISOGI_TRACE__PI * transfer[i] / desc->samples);
         return;
@@ -1343,6 +1384,8 @@ static int isogi_trace__distant(const isogi_lighting *lighting) {
 
 static int isogi_trace__fields_valid(const isogi_trace_desc *d) {
     if (d->mode != ISOGI_TRACE_IRRADIANCE && d->mode != ISOGI_TRACE_TRANSFER) return 0;
+    if (d->method != ISOGI_TRACE_FEEDBACK && d->method != ISOGI_TRACE_PATHS) return 0;
+    if (!isogi_trace__finite((double)d->error) || d->error < 0) return 0;
     if (d->normals != ISOGI_NORMAL_SMOOTH && d->normals != ISOGI_NORMAL_TRILINEAR) return 0;
     if (d->lookup != ISOGI_TRACE_TRILINEAR && d->lookup != ISOGI_TRACE_NEAREST && d->lookup != ISOGI_TRACE_CLOSEST_ISOVALUE &&
         d->lookup != ISOGI_TRACE_BSPLINE)
@@ -1410,6 +1453,22 @@ static isogi_result isogi_trace__scene_unit(isogi_trace__scene *scene) {
     return ISOGI_OK;
 }
 
+/* Luminance of the irradiance of an open texel at the middle of the volume, averaged over all orientations: pi times the mean
+   radiance, and Y_0 = 1 / sqrt(4 pi). */
+static isogi_result isogi_trace__open_light(isogi_trace__scene *scene) {
+    float light[3], centre[3];
+    double place[3], rgb[3];
+    isogi_result result;
+    int a;
+    for (a = 0; a < 3; a++) place[a] = 0.5 * (double)(scene->volume->size[a] - 1);
+    isogi_vol_to_world(scene->pyramid, place, place);
+    for (a = 0; a < 3; a++) centre[a] = (float)place[a];
+    result = isogi_sh_project(light, 1, &scene->desc.lighting, centre);
+    for (a = 0; a < 3; a++) rgb[a] = (double)light[a] * 0.28209479177387814 * ISOGI_TRACE__PI;
+    scene->open_light = result == ISOGI_OK ? isogi_trace__clamp(isogi_trace__luminance(rgb), 1e30) : 0;
+    return result;
+}
+
 /* The scene of a valid description. What it allocates is freed by isogi_trace__sky_free, on failure too. */
 static isogi_result isogi_trace__scene_set(isogi_trace__scene *scene, const isogi_trace_desc *desc,
                                            const isogi_context *context) {
@@ -1436,6 +1495,8 @@ static isogi_result isogi_trace__scene_set(isogi_trace__scene *scene, const isog
         if (result != ISOGI_OK) return result;
     }
     if (d->mode == ISOGI_TRACE_TRANSFER) return ISOGI_OK;
+    result = isogi_trace__open_light(scene);
+    if (result != ISOGI_OK) return result;
     return isogi_trace__sky_build(&scene->sky, &d->lighting.env, context);
 }
 
@@ -1447,6 +1508,8 @@ enum {
     ISOGI_TRACE__NOT_ASKED,
     ISOGI_TRACE__READABLE,
     ISOGI_TRACE__WANTED,
+    ISOGI_TRACE__QUEUED, /* wanted, and a node has been made for it */
+    ISOGI_TRACE__DRAFT,  /* readable; more samples will follow */
     ISOGI_TRACE__DONE
 };
 
@@ -1457,6 +1520,7 @@ typedef struct isogi_trace__brick {
     int queued;
     uint64_t held;
     uint8_t *records; /* NULL until one of them is computed */
+    uint32_t *node;   /* number + 1 of what gathers each texel's light, 0 = none; NULL = none at all */
 } isogi_trace__brick;
 
 typedef struct isogi_trace__ref {
@@ -1464,6 +1528,8 @@ typedef struct isogi_trace__ref {
     size_t texel[3];
     uint32_t slot;
 } isogi_trace__ref;
+
+typedef struct isogi_trace__feedback isogi_trace__feedback;
 
 struct isogi_trace {
     isogi_trace__scene scene;
@@ -1483,10 +1549,11 @@ struct isogi_trace {
     isogi_counters *task_counters;
     isogi_counters counters;
     float light[3 * ISOGI_TRACE__MAX_ORDER * ISOGI_TRACE__MAX_ORDER]; /* TRANSFER: of the lighting, RGB interleaved */
-    double brightness; /* TRANSFER: mean luminance of the lighting, for the error */
+    float square[3 * ISOGI_TRACE__MAX_ORDER * ISOGI_TRACE__MAX_ORDER]; /* TRANSFER: of the lighting's square, for the error */
     isogi_trace *high; /* BOTH_SIDES: the other side's texture, owned */
     isogi_trace *coarse; /* hierarchy: the texture of every second texel, owned */
     int refined;         /* the cells in which it is not enough are wanted */
+    struct isogi_trace__feedback *feedback; /* NULL: paths are traced */
     double share[2];   /* of the progress that baking reports, from and to */
 };
 
@@ -1745,8 +1812,15 @@ static isogi_trace__brick *isogi_trace__brick_new(const isogi_trace *t) {
     return brick;
 }
 
+/* Gives back the numbers of its nodes. */
+static void isogi_trace__brick_forget(const isogi_trace *t, isogi_trace__brick *brick) {
+    isogi_release(&t->context, brick->node, ISOGI_TRACE__TEXELS, sizeof(uint32_t));
+    brick->node = NULL;
+}
+
 static void isogi_trace__brick_free(const isogi_trace *t, isogi_trace__brick *brick) {
     if (!brick) return;
+    isogi_trace__brick_forget(t, brick);
     isogi_release(&t->context, brick->records, isogi_trace__bits(brick->held), t->record);
     isogi_release(&t->context, brick, 1, sizeof *brick);
 }
@@ -1847,6 +1921,9 @@ static isogi_result isogi_trace__classify_all(isogi_trace *t) {
     return result;
 }
 
+static void isogi_trace__feedback_free(const isogi_trace *t);
+static isogi_result isogi_trace__feedback_new(isogi_trace *t);
+
 /* ==== create and free ================================================================================================ */
 
 static isogi_result isogi_trace__set_lattice(isogi_trace *t) {
@@ -1874,12 +1951,15 @@ static isogi_result isogi_trace__set_lattice(isogi_trace *t) {
 }
 
 static void isogi_trace__set_light(isogi_trace *t, const float *light) {
-    double rgb[3];
-    int c;
-    memcpy(t->light, light, 3 * (size_t)t->scene.desc.order * (size_t)t->scene.desc.order * sizeof(float));
-    /* Y_0 = 1 / sqrt(4 pi): the mean radiance is that times the first coefficient */
-    for (c = 0; c < 3; c++) rgb[c] = (double)light[c] * 0.28209479177387814;
-    t->brightness = fabs(isogi_trace__luminance(rgb));
+    int order = t->scene.desc.order, k, c;
+    float one[ISOGI_TRACE__MAX_ORDER * ISOGI_TRACE__MAX_ORDER], square[ISOGI_TRACE__MAX_ORDER * ISOGI_TRACE__MAX_ORDER];
+    memcpy(t->light, light, 3 * (size_t)order * (size_t)order * sizeof(float));
+    memset(one, 0, sizeof one);
+    for (c = 0; c < 3; c++) {
+        for (k = 0; k < order * order; k++) one[k] = light[3 * k + c];
+        isogi_sh_product(square, one, one, order, 1);
+        for (k = 0; k < order * order; k++) t->square[3 * k + c] = square[k];
+    }
 }
 
 static isogi_result isogi_trace__set_up(isogi_trace *t, const isogi_trace_desc *desc) {
@@ -1902,6 +1982,10 @@ static isogi_result isogi_trace__set_up(isogi_trace *t, const isogi_trace_desc *
         isogi_trace__set_light(t, light);
     }
     if (desc->hierarchy > 0) t->scene.desc.lazy = 1; /* texels are wanted when the coarse ones are known */
+    if (desc->method == ISOGI_TRACE_FEEDBACK) {
+        result = isogi_trace__feedback_new(t);
+        if (result != ISOGI_OK) return result;
+    }
     return t->scene.desc.lazy ? ISOGI_OK : isogi_trace__classify_all(t);
 }
 
@@ -1957,6 +2041,7 @@ ISOGI_API void isogi_trace_free(isogi_trace *trace) {
     isogi_release(&context, trace->queue, trace->queue_capacity, sizeof *trace->queue);
     isogi_release(&context, trace->batch, ISOGI_TRACE__BATCH, sizeof *trace->batch);
     isogi_release(&context, trace->task_counters, ISOGI_TRACE__BATCH / ISOGI_TRACE__TASK, sizeof *trace->task_counters);
+    isogi_trace__feedback_free(trace);
     isogi_trace__sky_free(&trace->scene.sky, &context);
     isogi_release(&context, trace, 1, sizeof *trace);
 }
@@ -2085,12 +2170,12 @@ static int isogi_trace__taps(const isogi_trace *t, const float point[3], isogi_t
         if (i < taps) {
             w = isogi_trace__tap(t, cell, local, i, texel);
             if (!(w > 0)) continue;
-            if (isogi_trace__state(t, texel) != ISOGI_TRACE__DONE) {
+            if (isogi_trace__state(t, texel) < ISOGI_TRACE__DRAFT) {
                 pending |= isogi_trace__state(t, texel) != ISOGI_TRACE__NO_SURFACE;
                 continue;
             }
         } else if (t->coarse && pending) return isogi_trace__taps(t->coarse, point, r); /* not a cell of the fine level */
-        else if (count || pending || !isogi_trace__nearest(t, cell, local, ISOGI_TRACE__DONE, texel)) break;
+        else if (count || (pending && !t->feedback) || !isogi_trace__nearest(t, cell, local, ISOGI_TRACE__DRAFT, texel)) break;
         if (one && i < taps) {
             double apart[2];
             isogi_trace__apart(t, cell, local, texel, apart);
@@ -2116,6 +2201,19 @@ static void isogi_trace__irradiance(const isogi_trace *t, const float *values, d
     }
 }
 
+/* Variance of a texel's luminance. TRANSFER: a sample is X = pi * throughput * L(direction it left in), throughput at most 1, so that
+   E[X^2] <= pi * (E under the lighting's square), and the luminance of a square is no less than the square of the luminance; its
+   record holds 1 / sqrt(samples). */
+static double isogi_trace__variance(const isogi_trace *t, const float *values, double error, const double rgb[3]) {
+    int count = t->scene.desc.order * t->scene.desc.order, channels = t->scene.desc.transfer_channels, k, c;
+    double square[3] = {0, 0, 0}, spread;
+    if (t->scene.desc.mode != ISOGI_TRACE_TRANSFER || !isogi_trace__finite(error)) return error * error;
+    for (c = 0; c < 3; c++)
+        for (k = 0; k < count; k++) square[c] += (double)values[k * channels + (channels == 1 ? 0 : c)] * (double)t->square[3 * k + c];
+    spread = ISOGI_TRACE__PI * isogi_trace__luminance(square) - isogi_trace__luminance(rgb) * isogi_trace__luminance(rgb);
+    return error * error * (spread > 0 ? spread : 0);
+}
+
 ISOGI_API isogi_result isogi_trace_sample(const isogi_trace *trace, const float (*points)[3], size_t count,
                                           float (*irradiance)[3], float *error) {
     size_t i;
@@ -2123,18 +2221,21 @@ ISOGI_API isogi_result isogi_trace_sample(const isogi_trace *trace, const float 
     if (!trace || (count && (!points || !irradiance))) return ISOGI_INVALID;
     for (i = 0; i < count; i++) {
         isogi_trace__reading r;
-        double sum[3] = {0, 0, 0}, variance = 0, rgb[3];
+        double sum[3] = {0, 0, 0}, variance = 0, shared = 0, rgb[3];
         float values[3 * ISOGI_TRACE__MAX_ORDER * ISOGI_TRACE__MAX_ORDER];
         n = isogi_trace__taps(trace, points[i], &r);
         for (k = 0; k < n; k++) {
-            double part = r.weight[k] * (double)isogi_trace__record_error(r.record[k]);
+            double part;
             isogi_trace__record_read(trace, r.record[k], values);
             isogi_trace__irradiance(trace, values, rgb);
             for (c = 0; c < 3; c++) sum[c] += r.weight[k] * rgb[c];
-            variance += part * part; /* texels are independent of each other */
+            part = isogi_trace__variance(trace, values, (double)isogi_trace__record_error(r.record[k]), rgb);
+            /* paths at texels are independent of each other; filtered ones and probes are shared */
+            if (trace->feedback) shared += r.weight[k] * sqrt(part);
+            else variance += r.weight[k] * r.weight[k] * part;
         }
+        variance += shared * shared;
         for (c = 0; c < 3; c++) irradiance[i][c] = (float)sum[c];
-        if (trace->scene.desc.mode == ISOGI_TRACE_TRANSFER) variance *= trace->brightness * trace->brightness;
         if (error) error[i] = n ? (float)sqrt(variance) : ISOGI_TRACE__NOT_READY;
     }
     return ISOGI_OK;
@@ -2416,9 +2517,1052 @@ static isogi_result isogi_trace__bake_batch(isogi_trace *t, size_t count) {
     return result;
 }
 
+/* ==== light at hits: probes ========================================================================================= */
+
+/* By default a ray that meets the surface takes the light there from a probe (the records of Ward, Rubinstein and Clear 1988): a point on the
+   surface near the hit whose own hemisphere is gathered in the same way, once. Probes are found by place and normal (Binder, Fricke
+   and Keller 2018), in cells that grow with the ray's length, since a far ray stands for much surface. Light at probes obeys E = D + R A E, with D from sky and lights and A the means over
+   hits: n - 1 passes over the probes are n reflections, and they cost no rays. */
+
+/* What is gathered at one point: a texel (brick set) or a probe. Sums are over samples, in units of irradiance / pi but for light. */
+typedef struct isogi_trace__node {
+    isogi_hit place; /* probe: where */
+    double isovalue;
+    uint64_t key;    /* probe: of its cell */
+    isogi_trace__brick *brick;
+    size_t texel[3];
+    uint32_t slot, samples, light_samples, hits;
+    float normal[3], albedo[3];
+    signed char from;     /* side of the surface: 1 low, -1 high */
+    signed char level;    /* blocks of samples that are complete */
+    signed char finished; /* texel: no more samples are wanted */
+    double steady[3];     /* irradiance by lights without extent */
+    double light[3], light_spread;   /* by other lights; sum of squared deviations of its luminance */
+    double bright[3], bright_spread; /* by directions drawn by brightness */
+    float error;
+    double square, bounce_square;    /* squared luminance of rays that escaped, and of those that hit */
+} isogi_trace__node;
+
+/* The hits of one batch: node[i] has probe[begin[i]] .. probe[begin[i+1] - 1]. */
+typedef struct isogi_trace__segment {
+    struct isogi_trace__segment *next;
+    size_t entries, hits;
+    uint32_t *node, *begin, *probe;
+} isogi_trace__segment;
+
+/* What the filter compares. */
+typedef struct isogi_trace__guide {
+    float normal[3], mean[3], luminance, variance;
+} isogi_trace__guide;
+
+/* Texels, or probes. direct: sums over rays that escaped; bounce: over those that hit; out: irradiance or transfer. */
+typedef struct isogi_trace__set {
+    isogi_trace__node *nodes;
+    float *direct, *bounce, *out[2];
+    isogi_trace__guide *guide;
+    size_t count, capacity;
+    isogi_trace__segment *segments, *last;
+} isogi_trace__set;
+
+/* Samples first .. first + count - 1 of a node, and what they brought. */
+typedef struct isogi_trace__span {
+    uint32_t node, first, count, offset; /* offset: of its samples in the batch */
+    isogi_trace__node sum;
+} isogi_trace__span;
+
+/* What became of one cosine-distributed ray; side 0: it escaped. */
+typedef struct isogi_trace__catch {
+    uint64_t key;
+    isogi_hit hit;
+    float normal[3];
+    signed char from;
+} isogi_trace__catch;
+
+typedef struct isogi_trace__slot {
+    uint64_t key;
+    uint32_t probe; /* number + 1; 0 = empty */
+} isogi_trace__slot;
+
+struct isogi_trace__feedback {
+    isogi_trace__set texels, probes;
+    isogi_trace__slot *table;
+    size_t table_size; /* a power of two */
+    isogi_trace__span *spans;
+    isogi_trace__catch *catches;
+    float *direct; /* of spans */
+    uint32_t *task;
+    size_t span_count, sample_count, task_count;
+    size_t cursor, probe_cursor; /* nodes before these have nothing to do at this level */
+    int level;
+    int on_probes; /* the batch is of probes */
+    int diverges;   /* the last passes did not settle */
+    int unpublished; /* nodes have changed since the light was worked out last */
+    uint64_t partial; /* samples of texels that are not finished */
+    double least;   /* what isogi_trace_step reported last */
+};
+
+/* ---- memory ---- */
+
+static void isogi_trace__set_free(const isogi_trace *t, isogi_trace__set *s) {
+    size_t v = (size_t)t->values;
+    while (s->segments) {
+        isogi_trace__segment *next = s->segments->next;
+        isogi_release(&t->context, s->segments->node, 2 * s->segments->entries + 1 + s->segments->hits, sizeof(uint32_t));
+        isogi_release(&t->context, s->segments, 1, sizeof *s->segments);
+        s->segments = next;
+    }
+    isogi_release(&t->context, s->nodes, s->capacity, sizeof *s->nodes);
+    isogi_release(&t->context, s->direct, s->capacity * v, 4 * sizeof(float));
+    isogi_release(&t->context, s->guide, s->capacity, sizeof *s->guide);
+    memset(s, 0, sizeof *s);
+}
+
+/* Room for `more` nodes. The four arrays of values are one block. */
+static isogi_result isogi_trace__set_reserve(const isogi_trace *t, isogi_trace__set *s, size_t more) {
+    isogi_trace__set n = *s;
+    size_t v = (size_t)t->values, k;
+    if (s->count + more <= s->capacity) return ISOGI_OK;
+    n.capacity = s->count + more > 2 * s->capacity ? s->count + more : 2 * s->capacity;
+    if (n.capacity < 1024) n.capacity = 1024;
+    if (n.capacity > 0xfffffffeu) return ISOGI_TOO_LARGE;
+    n.nodes = (isogi_trace__node *)isogi_allocate(&t->context, n.capacity, sizeof *n.nodes);
+    n.direct = (float *)isogi_allocate(&t->context, n.capacity * v, 4 * sizeof(float));
+    n.guide = (isogi_trace__guide *)isogi_allocate(&t->context, n.capacity, sizeof *n.guide);
+    if (!n.nodes || !n.direct || !n.guide) {
+        isogi_release(&t->context, n.nodes, n.capacity, sizeof *n.nodes);
+        isogi_release(&t->context, n.direct, n.capacity * v, 4 * sizeof(float));
+        isogi_release(&t->context, n.guide, n.capacity, sizeof *n.guide);
+        return ISOGI_NO_MEMORY;
+    }
+    n.bounce = n.direct + n.capacity * v, n.out[0] = n.bounce + n.capacity * v, n.out[1] = n.out[0] + n.capacity * v;
+    if (s->count) {
+        memcpy(n.nodes, s->nodes, s->count * sizeof *n.nodes);
+        memcpy(n.guide, s->guide, s->count * sizeof *n.guide);
+        memcpy(n.direct, s->direct, s->count * v * sizeof(float));
+        memcpy(n.bounce, s->bounce, s->count * v * sizeof(float));
+        for (k = 0; k < 2; k++) memcpy(n.out[k], s->out[k], s->count * v * sizeof(float));
+    }
+    isogi_release(&t->context, s->nodes, s->capacity, sizeof *s->nodes);
+    isogi_release(&t->context, s->direct, s->capacity * v, 4 * sizeof(float));
+    isogi_release(&t->context, s->guide, s->capacity, sizeof *s->guide);
+    *s = n;
+    return ISOGI_OK;
+}
+
+static void isogi_trace__feedback_free(const isogi_trace *t) {
+    isogi_trace__feedback *f = t->feedback;
+    if (!f) return;
+    isogi_trace__set_free(t, &f->texels);
+    isogi_trace__set_free(t, &f->probes);
+    isogi_release(&t->context, f->table, f->table_size, sizeof *f->table);
+    isogi_release(&t->context, f->spans, ISOGI_TRACE__SPANS, sizeof *f->spans);
+    isogi_release(&t->context, f->catches, ISOGI_TRACE__SAMPLES, sizeof *f->catches);
+    isogi_release(&t->context, f->direct, ISOGI_TRACE__SPANS, (size_t)t->values * sizeof(float));
+    isogi_release(&t->context, f->task, ISOGI_TRACE__SPANS + 1, sizeof *f->task);
+    isogi_release(&t->context, f, 1, sizeof *f);
+}
+
+static isogi_result isogi_trace__feedback_new(isogi_trace *t) {
+    isogi_trace__feedback *f = (isogi_trace__feedback *)isogi_allocate(&t->context, 1, sizeof *f);
+    t->feedback = f;
+    if (!f) return ISOGI_NO_MEMORY;
+    memset(f, 0, sizeof *f);
+    f->table_size = 4096;
+    f->table = (isogi_trace__slot *)isogi_allocate(&t->context, f->table_size, sizeof *f->table);
+    f->spans = (isogi_trace__span *)isogi_allocate(&t->context, ISOGI_TRACE__SPANS, sizeof *f->spans);
+    f->catches = (isogi_trace__catch *)isogi_allocate(&t->context, ISOGI_TRACE__SAMPLES, sizeof *f->catches);
+    f->direct = (float *)isogi_allocate(&t->context, ISOGI_TRACE__SPANS, (size_t)t->values * sizeof(float));
+    f->task = (uint32_t *)isogi_allocate(&t->context, ISOGI_TRACE__SPANS + 1, sizeof *f->task);
+    if (f->table) memset(f->table, 0, f->table_size * sizeof *f->table);
+    return f->table && f->spans && f->catches && f->direct && f->task ? ISOGI_OK : ISOGI_NO_MEMORY;
+}
+
+/* ---- the table of probes ---- */
+
+/* Cells of 2 voxels, of 4 for rays longer than 16 voxels, and so on: an eighth of the length at most. In units of the smallest
+   spacing, so that they are cubes in the world. */
+static uint64_t isogi_trace__probe_key(const isogi_trace__scene *scene, const isogi_hit *hit, const float normal[3], double t,
+                                       double cell) {
+    const double *spacing = scene->volume->spacing;
+    double least = spacing[0], size = cell;
+    uint64_t key = 0;
+    int a, axis = 0, level = 0;
+    for (a = 1; a < 3; a++) {
+        if (spacing[a] < least) least = spacing[a];
+        if (fabsf(normal[a]) > fabsf(normal[axis])) axis = a;
+    }
+    for (; level < 8 && size * ISOGI_TRACE__CELL_RATIO < t / least; level++) size *= 2;
+    for (a = 0; a < 3; a++) {
+        double x = (hit->cell[a] + hit->local[a]) * spacing[a] / (least * size) + 1;
+        key = isogi_trace__key(key, (uint64_t)isogi_trace__clamp(x, 4e9));
+    }
+    return isogi_trace__key(key, (uint64_t)(16 * level + 2 * axis + (normal[axis] < 0))) | 1;
+}
+
+/* The place in the table where a key is or belongs. */
+static size_t isogi_trace__table_find(const isogi_trace__feedback *f, uint64_t key) {
+    size_t i = (size_t)(key >> 20) & (f->table_size - 1);
+    while (f->table[i].probe && f->table[i].key != key) i = (i + 1) & (f->table_size - 1);
+    return i;
+}
+
+static isogi_result isogi_trace__table_grow(isogi_trace *t) {
+    isogi_trace__feedback *f = t->feedback;
+    isogi_trace__slot *before = f->table;
+    size_t size = f->table_size, i;
+    if (2 * (f->probes.count + 1) <= size) return ISOGI_OK;
+    f->table = (isogi_trace__slot *)isogi_allocate(&t->context, 2 * size, sizeof *f->table);
+    if (!f->table) {
+        f->table = before;
+        return ISOGI_NO_MEMORY;
+    }
+    f->table_size = 2 * size;
+    memset(f->table, 0, f->table_size * sizeof *f->table);
+    for (i = 0; i < size; i++)
+        if (before[i].probe) f->table[isogi_trace__table_find(f, before[i].key)] = before[i];
+    isogi_release(&t->context, before, size, sizeof *before);
+    return ISOGI_OK;
+}
+
+/* A node without samples. */
+static void isogi_trace__node_begin(const isogi_trace *t, isogi_trace__set *s, double isovalue) {
+    isogi_trace__node *n = &s->nodes[s->count];
+    size_t v = (size_t)t->values;
+    memset(n, 0, sizeof *n);
+    n->isovalue = isovalue, n->from = (signed char)(t->scene.high ? -1 : 1);
+    isogi_trace_albedo(&t->scene.desc, isovalue, n->albedo);
+    memset(s->direct + s->count * v, 0, v * sizeof(float));
+    memset(s->out[0] + s->count * v, 0, v * sizeof(float));
+}
+
+/* Whether a probe may stand for a hit: it faces the same way and lies in the hit's plane, or nearly so. */
+static int isogi_trace__same_place(const isogi_trace *t, const isogi_trace__catch *c, const isogi_trace__node *n) {
+    const double *spacing = t->scene.volume->spacing;
+    double apart = 0, least = spacing[0];
+    int a;
+    for (a = 0; a < 3; a++) {
+        double d = ((double)c->hit.cell[a] - (double)n->place.cell[a] + c->hit.local[a] - n->place.local[a]) * spacing[a];
+        apart += d * (double)n->normal[a];
+        if (spacing[a] < least) least = spacing[a];
+    }
+    return fabs(apart) < ISOGI_TRACE__PLANE * least && isogi_trace__dot(c->normal, n->normal) > 0.5;
+}
+
+/* The number of the probe of a hit, which is made if there is none. */
+static isogi_result isogi_trace__probe_of(isogi_trace *t, const isogi_trace__catch *c, double isovalue, uint32_t *probe) {
+    isogi_trace__feedback *f = t->feedback;
+    size_t i = isogi_trace__table_find(f, c->key);
+    isogi_trace__node *n;
+    float geometric[1][3];
+    isogi_result result;
+    uint64_t key = c->key;
+    int tries;
+    for (tries = 0; f->table[i].probe; tries++) {
+        *probe = f->table[i].probe - 1;
+        if (tries == 32 || isogi_trace__same_place(t, c, &f->probes.nodes[*probe])) return ISOGI_OK;
+        key = isogi_trace__key(key, 1);
+        i = isogi_trace__table_find(f, key);
+    }
+    result = isogi_trace__table_grow(t);
+    if (result == ISOGI_OK) result = isogi_trace__set_reserve(t, &f->probes, 1);
+    if (result != ISOGI_OK) return result;
+    isogi_trace__node_begin(t, &f->probes, isovalue);
+    n = &f->probes.nodes[f->probes.count];
+    n->place = c->hit, n->key = key, n->from = c->from;
+    memcpy(n->normal, c->normal, sizeof n->normal);
+    if (!(n->place.side == 2 || n->place.side == -2)) isogi_trace__normals(t->scene.pyramid, t->scene.desc.normals, &n->place, &n->from, 1, (float(*)[3])n->normal, geometric);
+    if (t->scene.desc.material) {
+        double grid[3], point[3];
+        float emission[3];
+        for (tries = 0; tries < 3; tries++) grid[tries] = n->place.cell[tries] + n->place.local[tries];
+        isogi_vol_to_world(t->scene.pyramid, grid, point);
+        isogi_trace_material(&t->scene.desc, isovalue, point, n->albedo, emission);
+    }
+    i = isogi_trace__table_find(f, key);
+    *probe = (uint32_t)f->probes.count++;
+    f->table[i].key = key, f->table[i].probe = *probe + 1;
+    return ISOGI_OK;
+}
+
+/* ---- blocks of samples ---- */
+
+/* With lazy or adaptive baking a texel's samples come in blocks of 4, 16, 64, ...: coarse first. Each block is a stretch of one Sobol
+   sequence that the texels of a brick share, so that it is well spread for a texel as well as for its neighbourhood. */
+static int isogi_trace__in_blocks(const isogi_trace_desc *d) { return d->lazy || d->error > 0; }
+
+/* Samples of the blocks before number `level`. */
+static uint32_t isogi_trace__block(const isogi_trace *t, int is_probe, int level) {
+    uint32_t samples = (uint32_t)t->scene.desc.samples, sum;
+    if (is_probe) return level ? ISOGI_TRACE__PROBE : 0;
+    if (!isogi_trace__in_blocks(&t->scene.desc)) return level ? samples : 0;
+    sum = level > 12 ? samples : (((uint32_t)1 << (2 * level + 2)) - 4) / 3;
+    return sum < samples ? sum : samples;
+}
+
+/* The place of a sample in the sequence. */
+static uint32_t isogi_trace__index(const isogi_trace *t, const isogi_trace__node *n, uint32_t sample) {
+    uint32_t size = 1;
+    int level = 0;
+    if (!n->brick) return sample;
+    if (!isogi_trace__in_blocks(&t->scene.desc)) {
+        while (size < (uint32_t)t->scene.desc.samples) size *= 2;
+        return n->slot * size + sample;
+    }
+    while (isogi_trace__block(t, 0, level + 1) <= sample) level++;
+    size = (uint32_t)4 << (2 * level);
+    return ISOGI_TRACE__TEXELS * size + n->slot * size + (sample - isogi_trace__block(t, 0, level));
+}
+
+/* ---- rays of a task, gathered into batches ---- */
+
+typedef struct isogi_trace__cast {
+    isogi_trace *trace;
+    isogi_counters *counters;
+    isogi_trace__span *span; /* of this task */
+    isogi_trace__site site[ISOGI_TRACE__TASK_SPANS];
+    uint64_t sequence[ISOGI_TRACE__TASK_SPANS];
+    double sum[ISOGI_TRACE__TASK_SPANS], square[ISOGI_TRACE__TASK_SPANS]; /* of luminance by one light */
+    int shadow; /* rays towards lights; else cosine-distributed ones */
+    int bright; /* the light is the sky */
+    int count;
+    isogi_ray ray[ISOGI_TRACE__FLUSH];
+    isogi_hit hit[ISOGI_TRACE__FLUSH];
+    float normal[ISOGI_TRACE__FLUSH][3];
+    uint32_t owner[ISOGI_TRACE__FLUSH], sample[ISOGI_TRACE__FLUSH];
+    double weight[ISOGI_TRACE__FLUSH]; /* cosine: pi times the density */
+    double rgb[ISOGI_TRACE__FLUSH][3]; /* shadow: what arrives if nothing is in the way */
+} isogi_trace__cast;
+
+/* A cosine-distributed ray of span k left the volume. */
+static void isogi_trace__cast_escape(isogi_trace__cast *c, int i) {
+    const isogi_trace *t = c->trace;
+    const isogi_trace__scene *scene = &t->scene;
+    isogi_trace__span *span = &c->span[c->owner[i]];
+    float *direct = t->feedback->direct + (size_t)(span - t->feedback->spans) * (size_t)t->values;
+    const float *dir = c->ray[i].dir;
+    double weight = 1, rgb[3], luminance;
+    float basis[ISOGI_TRACE__MAX_ORDER * ISOGI_TRACE__MAX_ORDER], radiance[3];
+    int k, a, channels = scene->desc.transfer_channels, count = scene->desc.order * scene->desc.order;
+    if (scene->desc.mode == ISOGI_TRACE_TRANSFER) {
+        isogi_sh_eval(basis, scene->desc.order, (const float(*)[3])dir, 1);
+        for (k = 0; k < count; k++)
+            for (a = 0; a < channels; a++) direct[k * channels + a] += basis[k];
+        return;
+    }
+    if (!scene->has_env) return;
+    if (scene->sky.on) weight = c->weight[i] / (c->weight[i] + ISOGI_TRACE__PI * isogi_trace__sky_density(&scene->sky, dir));
+    isogi_env_radiance(&scene->desc.lighting.env, dir, radiance);
+    for (a = 0; a < 3; a++) rgb[a] = weight * (double)radiance[a], direct[a] += (float)rgb[a];
+    luminance = isogi_trace__luminance(rgb);
+    span->sum.square += luminance * luminance;
+}
+
+/* Light that the surface sends out itself where a ray hit. */
+static void isogi_trace__cast_glow(isogi_trace__cast *c, isogi_trace__span *span, const isogi_trace__catch *at) {
+    const isogi_trace *t = c->trace;
+    float *direct = t->feedback->direct + (size_t)(span - t->feedback->spans) * (size_t)t->values, albedo[3], emission[3];
+    double grid[3], point[3], rgb[3], luminance;
+    int a;
+    if (t->scene.desc.mode == ISOGI_TRACE_TRANSFER) return;
+    for (a = 0; a < 3; a++) grid[a] = at->hit.cell[a] + at->hit.local[a];
+    isogi_vol_to_world(t->scene.pyramid, grid, point);
+    isogi_trace_material(&t->scene.desc, span->sum.isovalue, point, albedo, emission);
+    for (a = 0; a < 3; a++) rgb[a] = (double)emission[a], direct[a] += emission[a];
+    luminance = isogi_trace__luminance(rgb);
+    span->sum.square += luminance * luminance;
+}
+
+/* It hit: the key of the probe that will tell the light there. A ray that meets the surface from the side where it is not has begun
+   within matter, and counts as reflected where it starts. */
+static void isogi_trace__cast_hit(isogi_trace__cast *c, int i) {
+    const isogi_trace *t = c->trace;
+    isogi_trace__span *span = &c->span[c->owner[i]];
+    const isogi_trace__site *site = &c->site[c->owner[i]];
+    isogi_trace__catch *to = &t->feedback->catches[span->offset + (c->sample[i] - span->first)];
+    int side = c->hit[i].side > 0 ? 1 : -1, a;
+    double length = c->hit[i].t;
+    to->from = (signed char)side;
+    to->hit = c->hit[i];
+    memcpy(to->normal, c->normal[i], sizeof to->normal);
+    if (!(isogi_trace__dot(to->normal, to->normal) > 0)) memcpy(to->normal, site->normal, sizeof to->normal);
+    else for (a = 0; a < 3 && side < 0; a++) to->normal[a] = -to->normal[a];
+    if (!site->open && site->from != side) {
+        to->hit = site->place, to->from = site->from, length = 0;
+        memcpy(to->normal, site->normal, sizeof to->normal);
+    }
+    if (t->scene.desc.emission_count || t->scene.desc.material) isogi_trace__cast_glow(c, span, to);
+    if (!t->scene.desc.bounces) return;
+    to->key = isogi_trace__probe_key(&t->scene, &to->hit, to->normal, length, 
+                                     span->sum.brick ? ISOGI_TRACE__CELL : ISOGI_TRACE__CELL_FAR);
+}
+
+/* Takes in the results of rays first .. first + count - 1. */
+static void isogi_trace__cast_land(isogi_trace__cast *c, int first, int count) {
+    int i, a;
+    for (i = first; i < first + count; i++) {
+        isogi_trace__span *span = &c->span[c->owner[i]];
+        if (c->shadow) {
+            double luminance = isogi_trace__luminance(c->rgb[i]);
+            if (c->hit[i].side) continue;
+            for (a = 0; a < 3; a++) *(c->bright ? &span->sum.bright[a] : &span->sum.light[a]) += c->rgb[i][a];
+            c->sum[c->owner[i]] += luminance, c->square[c->owner[i]] += luminance * luminance;
+            continue;
+        }
+        if (!c->hit[i].side || c->trace->scene.desc.no_shadows) isogi_trace__cast_escape(c, i);
+        if (c->hit[i].side) isogi_trace__cast_hit(c, i);
+    }
+}
+
+static void isogi_trace__cast_flush(isogi_trace__cast *c) {
+    const isogi_trace__scene *scene = &c->trace->scene;
+    if (!c->count) return;
+    if (c->shadow && scene->desc.no_shadows) memset(c->hit, 0, sizeof c->hit);
+    else isogi_vol_intersect(scene->pyramid, c->ray, (size_t)c->count, c->hit, c->counters);
+    if (!c->shadow)
+        isogi_vol_normals(scene->pyramid, c->hit, (size_t)c->count, ISOGI_NORMAL_TRILINEAR, c->normal);
+    isogi_trace__cast_land(c, 0, c->count);
+    c->count = 0;
+}
+
+/* The ray whose owner, sample and weights have been written to place c->count. Sites on the surface itself are rare: their rays go
+   one by one. */
+static void isogi_trace__cast_add(isogi_trace__cast *c, const float dir[3], double tmax) {
+    const isogi_trace__scene *scene = &c->trace->scene;
+    const isogi_trace__site *site = &c->site[c->owner[c->count]];
+    int i = c->count;
+    isogi_ray *ray = &c->ray[i];
+    memcpy(ray->dir, dir, sizeof ray->dir);
+    tmax = isogi_trace__within(scene, tmax);
+    if (site->on_surface) {
+        if (c->shadow && scene->desc.no_shadows) memset(&c->hit[i], 0, sizeof c->hit[i]);
+        else isogi_trace__site_rays(scene, site, (const float(*)[3])dir, &tmax, 1, &c->hit[i], c->counters);
+        isogi_vol_normals(scene->pyramid, &c->hit[i], 1, ISOGI_NORMAL_TRILINEAR, &c->normal[i]);
+        isogi_trace__cast_land(c, i, 1);
+        return;
+    }
+    memcpy(ray->origin, site->origin, sizeof ray->origin);
+    ray->flags = scene->flags, ray->tmin = 0, ray->tmax = tmax, ray->isovalue = site->isovalue;
+    if (++c->count == ISOGI_TRACE__FLUSH) isogi_trace__cast_flush(c);
+}
+
+/* ---- the rays of one span ---- */
+
+static void isogi_trace__span_hemisphere(isogi_trace__cast *c, uint32_t k) {
+    const isogi_trace__span *span = &c->span[k];
+    const isogi_trace__site *site = &c->site[k];
+    uint32_t i;
+    for (i = span->first; i < span->first + span->count; i++) {
+        double u[2];
+        float dir[3];
+        isogi_trace__sobol(c->sequence[k], isogi_trace__index(c->trace, &c->span[k].sum, i), u);
+        isogi_trace__cosine(site->normal, u[0], u[1], dir);
+        if (site->on_surface) isogi_trace__mirror(site->geometric, dir);
+        c->owner[c->count] = k, c->sample[c->count] = i;
+        c->weight[c->count] = isogi_trace__site_kernel(site, dir);
+        isogi_trace__cast_add(c, dir, 0);
+    }
+}
+
+/* Directions drawn by the brightness of the environment's image, weighed against the others by the balance heuristic. */
+static void isogi_trace__span_sky(isogi_trace__cast *c, uint32_t k) {
+    const isogi_trace__sky *sky = &c->trace->scene.sky;
+    const isogi_trace__span *span = &c->span[k];
+    uint32_t i;
+    int a;
+    for (i = span->first; i < span->first + span->count; i++) {
+        double u[2], cosine, density;
+        float dir[3], radiance[3];
+        isogi_trace__sobol(isogi_trace__key(c->sequence[k], 0x5eed2), isogi_trace__index(c->trace, &c->span[k].sum, i), u);
+        isogi_trace__sky_direction(sky, u[0], u[1], dir);
+        cosine = isogi_trace__site_kernel(&c->site[k], dir) / ISOGI_TRACE__PI;
+        density = isogi_trace__sky_density(sky, dir);
+        if (!(cosine > 0) || !(density > 0)) continue;
+        isogi_env_radiance(sky->env, dir, radiance);
+        for (a = 0; a < 3; a++) c->rgb[c->count][a] = (double)radiance[a] * cosine / (density + cosine);
+        c->owner[c->count] = k;
+        isogi_trace__cast_add(c, dir, 0);
+    }
+}
+
+/* Samples of lights go with every ISOGI_TRACE__LIGHT_SHARE-th of the others. */
+static uint32_t isogi_trace__light_samples(uint32_t samples) { return (samples + ISOGI_TRACE__LIGHT_SHARE - 1) / ISOGI_TRACE__LIGHT_SHARE; }
+
+static void isogi_trace__span_light(isogi_trace__cast *c, uint32_t k, size_t number) {
+    const isogi_light *light = &c->trace->scene.desc.lighting.lights[number];
+    const isogi_trace__span *span = &c->span[k];
+    uint32_t i, end = isogi_trace__light_samples(span->first + span->count);
+    int a;
+    for (i = isogi_trace__light_samples(span->first); i < end; i++) {
+        double u[2], cosine;
+        isogi_trace__beam beam;
+        isogi_trace__sobol(isogi_trace__key(c->sequence[k], 0x5eed3 + number), isogi_trace__index(c->trace, &c->span[k].sum, i), u);
+        if (!isogi_trace__light_beam(light, c->site[k].origin, u[0], u[1], &beam)) continue;
+        cosine = isogi_trace__site_kernel(&c->site[k], beam.dir);
+        if (!(cosine > 0)) continue;
+        for (a = 0; a < 3; a++) c->rgb[c->count][a] = beam.rgb[a] * cosine;
+        c->owner[c->count] = k;
+        isogi_trace__cast_add(c, beam.dir, beam.tmax);
+    }
+}
+
+/* Begins a round of rays; ends the one before, by one light: its spread goes to the spans. */
+static void isogi_trace__cast_round(isogi_trace__cast *c, uint32_t spans) {
+    uint32_t k;
+    isogi_trace__cast_flush(c);
+    for (k = 0; k < spans && c->shadow; k++) {
+        const isogi_trace__span *s = &c->span[k];
+        uint32_t n = c->bright ? s->count : isogi_trace__light_samples(s->first + s->count) - isogi_trace__light_samples(s->first);
+        double spread = n ? c->square[k] - c->sum[k] * c->sum[k] / n : 0;
+        *(c->bright ? &c->span[k].sum.bright_spread : &c->span[k].sum.light_spread) += spread > 0 ? spread : 0;
+    }
+    memset(c->sum, 0, sizeof c->sum);
+    memset(c->square, 0, sizeof c->square);
+}
+
+/* Where span k's rays begin; 0: nowhere (the voxels were changed after the texel was classified, which breaks the contract). */
+static int isogi_trace__span_site(isogi_trace__cast *c, uint32_t k) {
+    const isogi_trace *t = c->trace;
+    isogi_trace__node *n = &c->span[k].sum;
+    isogi_trace__site *site = &c->site[k];
+    uint64_t seed = t->scene.desc.seed;
+    if (n->brick) {
+        const size_t *x = n->texel, *l = t->lattice;
+        if (!isogi_trace__texel_site(t, x, site)) return 0;
+        site->key = isogi_trace__key(isogi_trace__key(seed, 2), (uint64_t)x[0] + (uint64_t)l[0] * ((uint64_t)x[1] + (uint64_t)l[1] * (uint64_t)x[2]));
+        c->sequence[k] = isogi_trace__key(isogi_trace__key(seed, 3), (uint64_t)isogi_trace__brick_of(t, x, &n->slot));
+        memcpy(n->normal, site->normal, sizeof n->normal);
+    } else {
+        site->place = n->place, site->isovalue = n->isovalue;
+        memcpy(site->normal, n->normal, sizeof site->normal);
+        site->key = c->sequence[k] = isogi_trace__key(isogi_trace__key(seed, 4), n->key);
+    }
+    site->from = n->from;
+    isogi_trace__site_start(&t->scene, site);
+    return 1;
+}
+
+static void isogi_trace__cast_task(void *arg, size_t task) {
+    isogi_trace *t = (isogi_trace *)arg;
+    isogi_trace__feedback *f = t->feedback;
+    const isogi_lighting *lighting = &t->scene.desc.lighting;
+    uint32_t k, spans = f->task[task + 1] - f->task[task];
+    isogi_trace__cast c;
+    size_t l;
+    c.trace = t, c.counters = &t->task_counters[task], c.span = f->spans + f->task[task], c.count = 0, c.shadow = 0, c.bright = 0;
+    memset(c.counters, 0, sizeof *c.counters);
+    memset(f->direct + f->task[task] * (size_t)t->values, 0, spans * (size_t)t->values * sizeof(float));
+    for (k = 0; k < spans; k++) {
+        isogi_trace__span *s = &c.span[k];
+        uint32_t i;
+        for (i = 0; i < s->count; i++) f->catches[s->offset + i].key = 0;
+        if (!isogi_trace__span_site(&c, k) || isogi_trace__dark(&t->scene)) s->sum.hits = 1, c.site[k].isovalue = 0;
+    }
+    for (k = 0; k < spans; k++)
+        if (!c.span[k].sum.hits) isogi_trace__span_hemisphere(&c, k);
+    isogi_trace__cast_round(&c, spans);
+    if (t->scene.desc.mode == ISOGI_TRACE_TRANSFER) return;
+    c.shadow = c.bright = 1;
+    for (k = 0; k < spans && t->scene.sky.on; k++)
+        if (!c.span[k].sum.hits) isogi_trace__span_sky(&c, k);
+    isogi_trace__cast_round(&c, spans);
+    c.bright = 0;
+    for (l = 0; l < lighting->light_count; l++) {
+        if (isogi_trace__is_delta(&lighting->lights[l])) continue;
+        for (k = 0; k < spans; k++)
+            if (!c.span[k].sum.hits) isogi_trace__span_light(&c, k, l);
+        isogi_trace__cast_round(&c, spans);
+    }
+    for (k = 0; k < spans; k++)
+        if (!c.span[k].sum.hits && !c.span[k].first) isogi_trace__site_lights(&t->scene, &c.site[k], c.span[k].sum.steady, c.counters);
+}
+
+/* ---- a batch: filled, traced, taken over ---- */
+
+/* Spans of the node's current block, as many as fit. 0: full. */
+static int isogi_trace__spans_add(isogi_trace *t, const isogi_trace__set *set, size_t node, uint64_t limit) {
+    isogi_trace__feedback *f = t->feedback;
+    const isogi_trace__node *n = &set->nodes[node];
+    uint32_t first = n->samples, end = isogi_trace__block(t, set == &f->probes, n->level + 1);
+    while (first < end) {
+        isogi_trace__span *s = &f->spans[f->span_count];
+        uint32_t count = end - first < ISOGI_TRACE__SPAN ? end - first : ISOGI_TRACE__SPAN;
+        if (f->span_count == ISOGI_TRACE__SPANS || f->sample_count + count > ISOGI_TRACE__SAMPLES) return 0;
+        if (f->span_count && f->sample_count >= limit) return 0;
+        if (f->span_count - f->task[f->task_count - 1] == ISOGI_TRACE__TASK_SPANS ||
+            f->sample_count - f->spans[f->task[f->task_count - 1]].offset >= ISOGI_TRACE__SPAN)
+            f->task[f->task_count++] = (uint32_t)f->span_count;
+        memset(s, 0, sizeof *s);
+        s->node = (uint32_t)node, s->first = first, s->count = count, s->offset = (uint32_t)f->sample_count;
+        s->sum.place = n->place, s->sum.isovalue = n->isovalue, s->sum.key = n->key, s->sum.brick = n->brick, s->sum.from = n->from;
+        memcpy(s->sum.texel, n->texel, sizeof n->texel);
+        memcpy(s->sum.normal, n->normal, sizeof n->normal);
+        s->sum.slot = n->slot;
+        f->span_count++, f->sample_count += count, first += count;
+    }
+    return 1;
+}
+
+/* Texels at the current level come first, then probes. */
+static void isogi_trace__spans_fill(isogi_trace *t, uint64_t limit) {
+    isogi_trace__feedback *f = t->feedback;
+    f->span_count = f->sample_count = 0;
+    f->task_count = 1, f->task[0] = 0, f->on_probes = 0;
+    for (; f->cursor < f->texels.count; f->cursor++) {
+        const isogi_trace__node *n = &f->texels.nodes[f->cursor];
+        if (n->finished || n->level != f->level) continue;
+        if (!isogi_trace__spans_add(t, &f->texels, f->cursor, limit)) break;
+    }
+    if (!f->span_count) {
+        f->on_probes = 1;
+        for (; f->probe_cursor < f->probes.count; f->probe_cursor++)
+            if (!f->probes.nodes[f->probe_cursor].level && !isogi_trace__spans_add(t, &f->probes, f->probe_cursor, limit)) break;
+    }
+    f->task[f->task_count] = (uint32_t)f->span_count;
+    if (!f->span_count) f->task_count = 0;
+}
+
+/* The segment of the batch's hits; probes are made where there are none. */
+static isogi_result isogi_trace__segment_new(isogi_trace *t, isogi_trace__segment **to) {
+    isogi_trace__feedback *f = t->feedback;
+    isogi_trace__segment *s;
+    size_t i, hits = 0, at = 0, k;
+    for (i = 0; i < f->sample_count; i++) hits += f->catches[i].key != 0;
+    s = (isogi_trace__segment *)isogi_allocate(&t->context, 1, sizeof *s);
+    if (!s) return ISOGI_NO_MEMORY;
+    memset(s, 0, sizeof *s);
+    s->entries = f->span_count, s->hits = hits;
+    s->node = (uint32_t *)isogi_allocate(&t->context, 2 * s->entries + 1 + hits, sizeof(uint32_t));
+    s->begin = s->node + s->entries, s->probe = s->begin + s->entries + 1;
+    *to = s;
+    if (!s->node) return ISOGI_NO_MEMORY;
+    for (i = 0; i < f->span_count; i++) {
+        s->node[i] = f->spans[i].node, s->begin[i] = (uint32_t)at;
+        for (k = f->spans[i].offset; k < f->spans[i].offset + f->spans[i].count; k++) {
+            isogi_result result;
+            if (!f->catches[k].key) continue;
+            result = isogi_trace__probe_of(t, &f->catches[k], f->spans[i].sum.isovalue, &s->probe[at++]);
+            if (result != ISOGI_OK) return result;
+        }
+    }
+    s->begin[s->entries] = (uint32_t)at;
+    return ISOGI_OK;
+}
+
+/* A first answer, before any probe is known: the surroundings that its rays met are taken to be as bright as the texel itself. */
+static void isogi_trace__texel_guess(isogi_trace *t, size_t node) {
+    isogi_trace__feedback *f = t->feedback;
+    isogi_trace__node *n = &f->texels.nodes[node];
+    float to[3 * ISOGI_TRACE__MAX_ORDER * ISOGI_TRACE__MAX_ORDER];
+    const float *direct = f->texels.direct + node * (size_t)t->values;
+    double hidden = (double)n->hits / n->samples;
+    int i, channels = t->scene.desc.mode == ISOGI_TRACE_TRANSFER ? t->scene.desc.transfer_channels : 3;
+    for (i = 0; i < t->values; i++) {
+        int a = i % channels;
+        double e = ISOGI_TRACE__PI / n->samples * ((double)direct[i] + n->bright[a]) + n->steady[a], lost = (double)n->albedo[a] * hidden;
+        if (n->light_samples) e += n->light[a] / n->light_samples;
+        to[i] = (float)(e / (1 - (lost < 0.9 ? lost : 0.9)));
+    }
+    isogi_trace__record_write(t, isogi_trace__record(t, n->brick, n->slot), to,
+                              t->scene.desc.mode == ISOGI_TRACE_TRANSFER ? (float)(1 / sqrt((double)n->samples)) : fabsf(to[1]));
+    n->brick->state[n->slot] = ISOGI_TRACE__DRAFT;
+}
+
+static void isogi_trace__span_commit(isogi_trace *t, isogi_trace__set *set, const isogi_trace__span *s, uint32_t hits) {
+    isogi_trace__node *n = &set->nodes[s->node];
+    float *direct = set->direct + s->node * (size_t)t->values;
+    const float *from = t->feedback->direct + (size_t)(s - t->feedback->spans) * (size_t)t->values;
+    int a;
+    for (a = 0; a < t->values; a++) direct[a] += from[a];
+    for (a = 0; a < 3; a++)
+        n->steady[a] += s->sum.steady[a], n->light[a] += s->sum.light[a], n->bright[a] += s->sum.bright[a];
+    n->light_spread += s->sum.light_spread, n->bright_spread += s->sum.bright_spread, n->square += s->sum.square;
+    if (!n->samples) t->counters.texels += n->brick != NULL;
+    if (n->brick) t->feedback->partial += s->count;
+    n->samples = s->first + s->count, n->light_samples = isogi_trace__light_samples(n->samples), n->hits += hits;
+    if (n->brick) memcpy(n->normal, s->sum.normal, sizeof n->normal);
+    if (n->samples == isogi_trace__block(t, !n->brick, n->level + 1)) n->level++;
+}
+
+/* Traces the batch and takes it over; on failure nothing but probes without samples has been added. */
+static isogi_result isogi_trace__spans_run(isogi_trace *t, double from, double to) {
+    isogi_trace__feedback *f = t->feedback;
+    isogi_trace__set *set = f->on_probes ? &f->probes : &f->texels;
+    isogi_trace__segment *segment = NULL;
+    isogi_result cancelled = isogi_parallel(&t->context, f->task_count, isogi_trace__cast_task, t, from, to), result;
+    size_t i;
+    if (cancelled != ISOGI_OK) return cancelled;
+    result = isogi_trace__segment_new(t, &segment);
+    if (result != ISOGI_OK) {
+        if (segment) isogi_release(&t->context, segment->node, 2 * segment->entries + 1 + segment->hits, sizeof(uint32_t));
+        isogi_release(&t->context, segment, 1, sizeof *segment);
+        return result;
+    }
+    if (set->last) set->last->next = segment;
+    else set->segments = segment;
+    set->last = segment;
+    for (i = 0; i < f->task_count; i++) isogi_trace__add(&t->counters, &t->task_counters[i]);
+    for (i = 0; i < f->span_count; i++) {
+        int first = f->spans[i].sum.brick && !set->nodes[f->spans[i].node].samples;
+        isogi_trace__span_commit(t, set, &f->spans[i], segment->begin[i + 1] - segment->begin[i]);
+        if (first) isogi_trace__texel_guess(t, f->spans[i].node);
+    }
+    return ISOGI_OK;
+}
+
+/* ---- passes over probes ---- */
+
+typedef struct isogi_trace__sweep {
+    isogi_trace *trace;
+    const isogi_trace__segment *segment;
+    double *change, *largest; /* of each task */
+} isogi_trace__sweep;
+
+/* What comes from sky and lights, as irradiance or transfer. */
+static double isogi_trace__node_direct(const isogi_trace *t, const isogi_trace__set *set, size_t node, int value) {
+    const isogi_trace__node *n = &set->nodes[node];
+    double e = n->samples ? ISOGI_TRACE__PI / n->samples * (double)set->direct[node * (size_t)t->values + (size_t)value] : 0;
+    if (t->scene.desc.mode == ISOGI_TRACE_TRANSFER) return e;
+    if (n->samples) e += ISOGI_TRACE__PI / n->samples * n->bright[value];
+    return e + n->steady[value] + (n->light_samples ? n->light[value] / n->light_samples : 0);
+}
+
+static int isogi_trace__channel(const isogi_trace *t, int value) {
+    return t->scene.desc.mode == ISOGI_TRACE_TRANSFER ? value % t->scene.desc.transfer_channels : value;
+}
+
+/* Albedo where a node's rays hit a probe: at the node's isovalue; where colours go by place, that of the probe. Grey transfer has one
+   channel, of the mean. */
+static double isogi_trace__hit_albedo(const isogi_trace *t, const isogi_trace__node *n, uint32_t probe, int value) {
+    if (t->scene.desc.material) n = &t->feedback->probes.nodes[probe];
+    if (t->scene.desc.mode == ISOGI_TRACE_TRANSFER && t->scene.desc.transfer_channels == 1)
+        return ((double)n->albedo[0] + (double)n->albedo[1] + (double)n->albedo[2]) / 3;
+    return (double)n->albedo[isogi_trace__channel(t, value)];
+}
+
+/* One pass over the probes of a segment, each of which has one entry: from out[0] to out[1]. */
+static void isogi_trace__pass_task(void *arg, size_t task) {
+    const isogi_trace__sweep *sweep = (const isogi_trace__sweep *)arg;
+    const isogi_trace *t = sweep->trace;
+    const isogi_trace__segment *s = sweep->segment;
+    isogi_trace__set *set = &t->feedback->probes;
+    size_t i = task * ISOGI_TRACE__SWEEP, end = i + ISOGI_TRACE__SWEEP < s->entries ? i + ISOGI_TRACE__SWEEP : s->entries, v = (size_t)t->values, k;
+    sweep->change[task] = sweep->largest[task] = 0;
+    for (; i < end; i++) {
+        size_t node = s->node[i];
+        const isogi_trace__node *n = &set->nodes[node];
+        double sum[3 * ISOGI_TRACE__MAX_ORDER * ISOGI_TRACE__MAX_ORDER];
+        int a;
+        memset(sum, 0, v * sizeof *sum);
+        for (k = s->begin[i]; k < s->begin[i + 1]; k++)
+            for (a = 0; a < t->values; a++)
+                sum[a] += isogi_trace__hit_albedo(t, n, s->probe[k], a) * (double)set->out[0][s->probe[k] * v + (size_t)a];
+        for (a = 0; a < t->values; a++) {
+            double e = isogi_trace__node_direct(t, set, node, a) + sum[a] / n->samples;
+            double change = fabs(e - (double)set->out[0][node * v + (size_t)a]);
+            set->out[1][node * v + (size_t)a] = (float)e;
+            if (change > sweep->change[task]) sweep->change[task] = change;
+            if (fabs(e) > sweep->largest[task]) sweep->largest[task] = fabs(e);
+        }
+    }
+}
+
+/* One pass over all probes; the largest change and the largest value. */
+static void isogi_trace__pass(isogi_trace *t, double change[2]) {
+    isogi_trace__feedback *f = t->feedback;
+    isogi_context silent = t->context;
+    isogi_trace__sweep sweep;
+    double changes[ISOGI_TRACE__SPANS / ISOGI_TRACE__SWEEP + 1], largest[ISOGI_TRACE__SPANS / ISOGI_TRACE__SWEEP + 1];
+    float *out;
+    change[0] = change[1] = 0;
+    silent.progress = NULL;
+    sweep.trace = t, sweep.change = changes, sweep.largest = largest;
+    for (sweep.segment = f->probes.segments; sweep.segment; sweep.segment = sweep.segment->next) {
+        size_t tasks = (sweep.segment->entries + ISOGI_TRACE__SWEEP - 1) / ISOGI_TRACE__SWEEP, i;
+        isogi_parallel(&silent, tasks, isogi_trace__pass_task, &sweep, 0, 1);
+        for (i = 0; i < tasks; i++) {
+            if (changes[i] > change[0]) change[0] = changes[i];
+            if (largest[i] > change[1]) change[1] = largest[i];
+        }
+    }
+    out = f->probes.out[0], f->probes.out[0] = f->probes.out[1], f->probes.out[1] = out;
+}
+
+/* As many passes as reflections (the first brings what comes from sky and lights alone), or until all that later ones would add, by
+   the ratio of the last two changes, is below 1/1000. Where albedo 1 meets a closed cavity the light grows by the same step for
+   ever: said so when 500 passes have not made the step smaller by a third. */
+static void isogi_trace__solve(isogi_trace *t) {
+    isogi_trace__feedback *f = t->feedback;
+    int bounces = t->scene.desc.bounces, pass;
+    double change[2] = {0, 0}, before = 0, middle = 0;
+    f->diverges = 0;
+    memset(f->probes.out[0], 0, f->probes.count * (size_t)t->values * sizeof(float));
+    for (pass = 0; bounces < 0 || pass < bounces; pass++) {
+        isogi_trace__pass(t, change);
+        if (change[0] <= 1e-7 * change[1]) break;
+        if (pass > 1 && change[0] < before && change[0] * change[0] < 1e-3 * change[1] * (before - change[0])) break;
+        before = change[0];
+        if (pass % 500 == 499) {
+            f->diverges = pass > 500 && change[0] > 0.67 * middle;
+            middle = change[0];
+            if (f->diverges || pass > ISOGI_TRACE__MAX_DEPTH) break;
+        }
+    }
+}
+
+/* ---- what a texel ends up with ---- */
+
+/* Sums over the texels' hits. */
+static void isogi_trace__bounce_task(void *arg, size_t task) {
+    const isogi_trace__sweep *sweep = (const isogi_trace__sweep *)arg;
+    const isogi_trace *t = sweep->trace;
+    const isogi_trace__segment *s = sweep->segment;
+    const float *light = t->feedback->probes.out[0];
+    size_t i = task * ISOGI_TRACE__SWEEP, end = i + ISOGI_TRACE__SWEEP < s->entries ? i + ISOGI_TRACE__SWEEP : s->entries, v = (size_t)t->values, k;
+    for (; i < end; i++) {
+        isogi_trace__node *n = &t->feedback->texels.nodes[s->node[i]];
+        float *bounce = t->feedback->texels.bounce + s->node[i] * v;
+        int a;
+        for (k = s->begin[i]; k < s->begin[i + 1]; k++) {
+            const float *e = light + s->probe[k] * v;
+            double rgb[3], luminance;
+            for (a = 0; a < t->values; a++) bounce[a] += (float)(isogi_trace__hit_albedo(t, n, s->probe[k], a) * (double)e[a]);
+            if (t->scene.desc.mode == ISOGI_TRACE_TRANSFER) continue;
+            for (a = 0; a < 3; a++) rgb[a] = isogi_trace__hit_albedo(t, n, s->probe[k], a) * (double)e[a] / ISOGI_TRACE__PI;
+            luminance = isogi_trace__luminance(rgb);
+            n->bounce_square += luminance * luminance;
+        }
+    }
+}
+
+/* Variance of a mean of n samples out of their sum and their sum of squares. */
+static double isogi_trace__mean_variance(double sum, double square, double n) {
+    double spread = square - sum * sum / n;
+    return n > 1 && spread > 0 ? spread / (n * (n - 1)) : 0;
+}
+
+/* The part of a texel's irradiance that neighbours may share, and its variance: what cosine-distributed rays brought. */
+static void isogi_trace__guide_task(void *arg, size_t task) {
+    isogi_trace *t = (isogi_trace *)arg;
+    isogi_trace__set *set = &t->feedback->texels;
+    size_t i = task * ISOGI_TRACE__SWEEP, end = i + ISOGI_TRACE__SWEEP < set->count ? i + ISOGI_TRACE__SWEEP : set->count, v = (size_t)t->values;
+    for (; i < end; i++) {
+        const isogi_trace__node *n = &set->nodes[i];
+        isogi_trace__guide *g = &set->guide[i];
+        double scale = n->samples ? 1.0 / n->samples : 0, rgb[3];
+        int a;
+        memcpy(g->normal, n->normal, sizeof g->normal);
+        for (a = 0; a < t->values; a++)
+            set->out[0][i * v + (size_t)a] = (float)(ISOGI_TRACE__PI * scale * (double)set->direct[i * v + (size_t)a] +
+                                                      scale * (double)set->bounce[i * v + (size_t)a]);
+        for (a = 0; a < 3 && t->scene.desc.mode == ISOGI_TRACE_IRRADIANCE; a++) {
+            rgb[a] = (double)set->direct[i * v + (size_t)a] + (double)set->bounce[i * v + (size_t)a] / ISOGI_TRACE__PI;
+            g->mean[a] = set->out[0][i * v + (size_t)a];
+        }
+        if (t->scene.desc.mode == ISOGI_TRACE_TRANSFER) continue;
+        g->luminance = (float)(ISOGI_TRACE__PI * scale * isogi_trace__luminance(rgb));
+        g->variance = (float)(ISOGI_TRACE__PI * ISOGI_TRACE__PI *
+                              isogi_trace__mean_variance(isogi_trace__luminance(rgb), n->square + n->bounce_square, (double)n->samples));
+    }
+}
+
+/* The guide of a texel; NULL: nothing was gathered there. */
+static const isogi_trace__guide *isogi_trace__guide_at(const isogi_trace *t, const size_t texel[3], uint32_t *node) {
+    uint32_t slot;
+    const isogi_trace__brick *brick = t->bricks[isogi_trace__brick_of(t, texel, &slot)];
+    if (!brick || !brick->node || !brick->node[slot]) return NULL;
+    *node = brick->node[slot] - 1;
+    return t->feedback->texels.nodes[*node].samples ? &t->feedback->texels.guide[*node] : NULL;
+}
+
+/* Variance of the light that is not filtered. */
+static double isogi_trace__light_variance(const isogi_trace__node *n) {
+    double k = (double)n->samples, l = (double)n->light_samples;
+    return (k > 1 ? ISOGI_TRACE__PI * ISOGI_TRACE__PI * n->bright_spread / (k * (k - 1)) : 0) + (l > 1 ? n->light_spread / (l * (l - 1)) : 0);
+}
+
+/* Mean over the texels around that face the same way and whose light may be the same within its noise. Writes the filtered rgb, its
+   variance, and the variance of other light, averaged over the same texels. */
+static void isogi_trace__filter(const isogi_trace *t, size_t node, double rgb[3], double variance[2]) {
+    const isogi_trace__set *set = &t->feedback->texels;
+    const isogi_trace__guide *g = &set->guide[node];
+    const isogi_trace__node *n = &set->nodes[node];
+    double total = 0;
+    int d[3], a;
+    rgb[0] = rgb[1] = rgb[2] = variance[0] = variance[1] = 0;
+    for (d[2] = -ISOGI_TRACE__FILTER; d[2] <= ISOGI_TRACE__FILTER; d[2]++)
+        for (d[1] = -ISOGI_TRACE__FILTER; d[1] <= ISOGI_TRACE__FILTER; d[1]++)
+            for (d[0] = -ISOGI_TRACE__FILTER; d[0] <= ISOGI_TRACE__FILTER; d[0]++) {
+                const isogi_trace__guide *q;
+                size_t x[3];
+                uint32_t other;
+                double w, facing, apart, noise;
+                for (a = 0; a < 3; a++) x[a] = n->texel[a] + (size_t)d[a]; /* wraps below zero: beyond the lattice */
+                if (x[0] >= t->lattice[0] || x[1] >= t->lattice[1] || x[2] >= t->lattice[2]) continue;
+                q = isogi_trace__guide_at(t, x, &other);
+                if (!q) continue;
+                facing = isogi_trace__dot(g->normal, q->normal);
+                if (!(facing > 0.5)) continue;
+                facing *= facing, facing *= facing, facing *= facing;
+                apart = (double)g->luminance - (double)q->luminance, noise = (double)g->variance + (double)q->variance;
+                apart = apart * apart - noise;
+                w = apart > 0 ? noise > 0 ? exp(-apart / noise) : 0 : 1;
+                w *= facing * facing * exp(-(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]) / ISOGI_TRACE__FILTER_WIDTH);
+                w *= set->nodes[other].samples;
+                total += w;
+                for (a = 0; a < 3; a++) rgb[a] += w * (double)q->mean[a];
+                variance[0] += w * w * (double)q->variance;
+                variance[1] += w * isogi_trace__light_variance(&set->nodes[other]);
+            }
+    for (a = 0; a < 3; a++) rgb[a] /= total;
+    variance[0] /= total * total, variance[1] /= total;
+}
+
+/* Light and error of every texel into its brick. */
+static void isogi_trace__publish_task(void *arg, size_t task) {
+    isogi_trace *t = (isogi_trace *)arg;
+    isogi_trace__set *set = &t->feedback->texels;
+    size_t i = task * ISOGI_TRACE__SWEEP, end = i + ISOGI_TRACE__SWEEP < set->count ? i + ISOGI_TRACE__SWEEP : set->count, v = (size_t)t->values;
+    for (; i < end; i++) {
+        isogi_trace__node *n = &set->nodes[i];
+        float to[3], error;
+        double rgb[3], variance[2];
+        int a;
+        if (!n->samples) continue;
+        if (t->scene.desc.mode == ISOGI_TRACE_TRANSFER) {
+            error = n->samples > 1 && !t->feedback->diverges ? (float)(1 / sqrt((double)n->samples)) : ISOGI_TRACE__NOT_READY;
+            isogi_trace__record_write(t, isogi_trace__record(t, n->brick, n->slot), set->out[0] + i * v, error);
+        } else {
+            isogi_trace__filter(t, i, rgb, variance);
+            for (a = 0; a < 3; a++) {
+                double e = rgb[a] + n->steady[a] + ISOGI_TRACE__PI / n->samples * n->bright[a];
+                to[a] = (float)(e + (n->light_samples ? n->light[a] / n->light_samples : 0));
+            }
+            variance[0] += 0.25 * (double)set->guide[i].variance; /* for what the filter blurs */
+            error = n->samples > 1 && !t->feedback->diverges ? (float)sqrt(variance[0] + variance[1]) : ISOGI_TRACE__NOT_READY;
+            isogi_trace__record_write(t, isogi_trace__record(t, n->brick, n->slot), to, error);
+        }
+        n->error = error;
+    }
+}
+
+/* No rays: the light at probes, then that of the texels. */
+static void isogi_trace__publish(isogi_trace *t) {
+    isogi_trace__feedback *f = t->feedback;
+    isogi_trace__set *set = &f->texels;
+    isogi_context silent = t->context;
+    isogi_trace__sweep sweep;
+    size_t tasks = (set->count + ISOGI_TRACE__SWEEP - 1) / ISOGI_TRACE__SWEEP, i;
+    silent.progress = NULL;
+    isogi_trace__solve(t);
+    memset(set->bounce, 0, set->count * (size_t)t->values * sizeof(float));
+    for (i = 0; i < set->count; i++) set->nodes[i].bounce_square = 0;
+    memset(&sweep, 0, sizeof sweep);
+    sweep.trace = t;
+    for (sweep.segment = set->segments; sweep.segment; sweep.segment = sweep.segment->next)
+        isogi_parallel(&silent, (sweep.segment->entries + ISOGI_TRACE__SWEEP - 1) / ISOGI_TRACE__SWEEP, isogi_trace__bounce_task, &sweep, 0, 1);
+    isogi_parallel(&silent, tasks, isogi_trace__guide_task, t, 0, 1);
+    isogi_parallel(&silent, tasks, isogi_trace__publish_task, t, 0, 1);
+    f->unpublished = 0;
+}
+
+/* ---- stepping ---- */
+
+/* Wanted, or readable from a time before something changed. */
+static int isogi_trace__to_do(const isogi_trace__brick *brick, size_t slot) {
+    return brick->state[slot] == ISOGI_TRACE__WANTED || (brick->state[slot] == ISOGI_TRACE__DRAFT && !(brick->node && brick->node[slot]));
+}
+
+/* Nodes for the wanted texels: of all bricks in the queue when lazy, every other texel along each axis first; else of a group. */
+static isogi_result isogi_trace__nodes_make(isogi_trace *t) {
+    isogi_trace__feedback *f = t->feedback;
+    size_t end = t->queue_first, i, slot, texels = 0, half;
+    if (t->queue_first == t->queue_count || (f->texels.count && !t->scene.desc.lazy)) return ISOGI_OK;
+    for (; end < t->queue_count && (t->scene.desc.lazy || texels < ISOGI_TRACE__GROUP); end++) {
+        isogi_trace__brick *brick = t->bricks[t->queue[end]];
+        uint64_t wanted = 0;
+        for (slot = 0; slot < ISOGI_TRACE__TEXELS; slot++) wanted |= (uint64_t)isogi_trace__to_do(brick, slot) << slot;
+        if (isogi_trace__brick_hold(t, brick, wanted) != ISOGI_OK) return ISOGI_NO_MEMORY;
+        if (!brick->node) {
+            brick->node = (uint32_t *)isogi_allocate(&t->context, ISOGI_TRACE__TEXELS, sizeof(uint32_t));
+            if (!brick->node) return ISOGI_NO_MEMORY;
+            memset(brick->node, 0, ISOGI_TRACE__TEXELS * sizeof(uint32_t));
+        }
+        texels += isogi_trace__bits(wanted);
+    }
+    if (isogi_trace__set_reserve(t, &f->texels, texels) != ISOGI_OK) return ISOGI_NO_MEMORY;
+    for (half = 0; half < 2; half++)
+        for (i = t->queue_first; i < end; i++) {
+            isogi_trace__brick *brick = t->bricks[t->queue[i]];
+            for (slot = 0; slot < ISOGI_TRACE__TEXELS; slot++) {
+                isogi_trace__node *n = &f->texels.nodes[f->texels.count];
+                isogi_trace__site site;
+                size_t x[3];
+                if (!isogi_trace__to_do(brick, slot)) continue;
+                if (!half && (slot & 0x15)) continue; /* odd along some axis */
+                isogi_trace__texel_of(t, t->queue[i], slot, x);
+                if (!isogi_trace__texel_site(t, x, &site)) site.isovalue = 0;
+                isogi_trace__node_begin(t, &f->texels, site.isovalue);
+                n->brick = brick, n->slot = (uint32_t)slot;
+                memcpy(n->texel, x, sizeof x);
+                brick->node[slot] = (uint32_t)++f->texels.count;
+                if (brick->state[slot] == ISOGI_TRACE__WANTED) brick->state[slot] = ISOGI_TRACE__QUEUED;
+            }
+            if (half) brick->queued = 0;
+        }
+    t->queue_first = end;
+    if (t->queue_first == t->queue_count) t->queue_first = t->queue_count = 0;
+    f->level = 0, f->cursor = 0;
+    return ISOGI_OK;
+}
+
+/* Nothing is left to trace at this level: texels that are good enough are finished, the others go on. */
+static void isogi_trace__level_end(isogi_trace *t) {
+    isogi_trace__feedback *f = t->feedback;
+    double target = (double)t->scene.desc.error * t->scene.open_light;
+    size_t i, open = 0;
+    isogi_trace__publish(t);
+    for (i = 0; i < f->texels.count; i++) {
+        isogi_trace__node *n = &f->texels.nodes[i];
+        if (n->finished) continue;
+        if (n->samples >= (uint32_t)t->scene.desc.samples || (target > 0 && (double)n->error <= target)) {
+            n->finished = 1, n->brick->state[n->slot] = ISOGI_TRACE__DONE, f->partial -= n->samples, t->wanted--, t->done++;
+        } else open++;
+    }
+    f->level++, f->cursor = 0;
+    if (open || t->scene.desc.lazy) return;
+    for (i = 0; i < f->texels.count; i++) isogi_trace__brick_forget(t, f->texels.nodes[i].brick);
+    isogi_trace__set_free(t, &f->texels);
+    if (t->wanted) return;
+    isogi_trace__set_free(t, &f->probes);
+    memset(f->table, 0, f->table_size * sizeof *f->table);
+    f->probe_cursor = 0;
+}
+
+static isogi_result isogi_trace__feedback_step(isogi_trace *t, uint64_t max_rays) {
+    isogi_trace__feedback *f = t->feedback;
+    uint64_t begin = t->counters.rays, each = 1 + (uint64_t)t->scene.sky.on + (uint64_t)t->scene.desc.lighting.light_count;
+    isogi_result result = isogi_trace__nodes_make(t);
+    while (result == ISOGI_OK && (t->wanted || f->unpublished)) {
+        uint64_t used = t->counters.rays - begin;
+        double all = (double)(t->wanted + t->done) * t->scene.desc.samples, left;
+        if (max_rays && used >= max_rays) break;
+        isogi_trace__spans_fill(t, max_rays ? (max_rays - used) / each + 1 : UINT64_MAX);
+        f->unpublished |= f->span_count != 0;
+        left = ((double)t->done * t->scene.desc.samples + (double)f->partial) / all;
+        if (f->span_count)
+            result = isogi_trace__spans_run(t, isogi_trace__lerp(t->share[0], t->share[1], left),
+                                            isogi_trace__lerp(t->share[0], t->share[1], left + (f->on_probes ? 0 : (double)f->sample_count / all)));
+        else isogi_trace__level_end(t), result = isogi_trace__nodes_make(t);
+    }
+    return result;
+}
+
+/* ==== stepping ======================================================================================================= */
+
 static isogi_result isogi_trace__step_side(isogi_trace *trace, uint64_t max_rays) {
     isogi_result result = ISOGI_OK;
     uint64_t begin = trace->counters.rays;
+    if (trace->feedback) return isogi_trace__feedback_step(trace, max_rays);
     while (trace->wanted && result == ISOGI_OK) {
         uint64_t used = trace->counters.rays - begin, each = (uint64_t)trace->scene.desc.samples * 2,
                  limit = ISOGI_TRACE__BATCH;
@@ -2448,7 +3592,7 @@ static int isogi_trace__cell_varies(const isogi_trace *c, const size_t cell[3], 
             texel[a] = cell[a] + (size_t)(i >> a & 1);
             if (texel[a] >= c->lattice[a]) texel[a] = c->lattice[a] - 1;
         }
-        if (isogi_trace__state(c, texel) != ISOGI_TRACE__DONE) return 1;
+        if (isogi_trace__state(c, texel) < ISOGI_TRACE__DRAFT) return 1;
         brick = c->bricks[isogi_trace__brick_of(c, texel, &slot)];
         record = isogi_trace__record(c, brick, slot);
         isogi_trace__record_read(c, record, values);
@@ -2500,17 +3644,24 @@ static isogi_result isogi_trace__step_levels(isogi_trace *trace, uint64_t max_ra
     return isogi_trace__step_side(trace, max_rays ? max_rays - used : 0);
 }
 
-/* Texels to do and done; what a hierarchy may still want while it is not refined is taken to be as many as the coarse ones. */
-static void isogi_trace__progress(const isogi_trace *t, uint64_t *wanted, uint64_t *done) {
-    *wanted += t->wanted, *done += t->done;
-    if (t->coarse) *wanted += t->coarse->wanted, *done += t->coarse->done;
-    if (t->coarse && !t->refined) *wanted += 8 * (t->coarse->wanted + t->coarse->done) + 1;
+/* Texels to do, less the parts of them that are done, and done; what a hierarchy may still want while it is not refined is taken to be
+   as many as the coarse ones. */
+static void isogi_trace__progress(const isogi_trace *t, double *wanted, double *done) {
+    double left = (double)t->wanted, all = (double)t->wanted + (double)t->done;
+    if (t->feedback && (t->wanted || t->feedback->unpublished)) {
+        left -= (double)t->feedback->partial / t->scene.desc.samples;
+        left = left > 1e-6 ? left : 1e-6;
+    }
+    *wanted += left, *done += all - left;
+    if (t->coarse) isogi_trace__progress(t->coarse, wanted, done);
+    if (t->coarse && !t->refined) *wanted += 8 * ((double)t->coarse->wanted + (double)t->coarse->done) + 1;
 }
 
 /* The high side has its turn with the rays that the low side leaves, or when that has none to trace. */
 ISOGI_API isogi_result isogi_trace_step(isogi_trace *trace, uint64_t max_rays, double *remaining) {
     isogi_result result;
-    uint64_t begin, used, wanted = 0, done = 0;
+    uint64_t begin, used;
+    double wanted = 0, done = 0;
     if (!trace) return ISOGI_INVALID;
     begin = trace->counters.rays + (trace->coarse ? trace->coarse->counters.rays : 0);
     result = isogi_trace__step_levels(trace, max_rays);
@@ -2519,8 +3670,47 @@ ISOGI_API isogi_result isogi_trace_step(isogi_trace *trace, uint64_t max_rays, d
         result = isogi_trace__step_levels(trace->high, max_rays ? max_rays - used : 0);
     isogi_trace__progress(trace, &wanted, &done);
     if (trace->high) isogi_trace__progress(trace->high, &wanted, &done);
-    if (remaining && result == ISOGI_OK) *remaining = wanted ? (double)wanted / (double)(wanted + done) : 0;
+    if (remaining && result == ISOGI_OK) *remaining = wanted > 0 ? wanted / (wanted + done) : 0;
     return result;
+}
+
+/* ==== what has been achieved ========================================================================================= */
+
+static void isogi_trace__status_add(const isogi_trace *t, isogi_trace_report *r) {
+    float values[3 * ISOGI_TRACE__MAX_ORDER * ISOGI_TRACE__MAX_ORDER];
+    size_t i;
+    uint32_t slot;
+    for (i = 0; i < t->brick_count; i++)
+        for (slot = 0; t->bricks[i] && slot < ISOGI_TRACE__TEXELS; slot++) {
+            const uint8_t *record;
+            double error, rgb[3];
+            int a;
+            if (t->bricks[i]->state[slot] < ISOGI_TRACE__DRAFT) continue;
+            record = isogi_trace__record(t, t->bricks[i], slot);
+            isogi_trace__record_read(t, record, values);
+            error = (double)isogi_trace__record_error(record);
+            for (a = 0; a < 3; a++) rgb[a] = (double)values[a];
+            r->texels++, r->drafts += t->bricks[i]->state[slot] == ISOGI_TRACE__DRAFT;
+            if (t->scene.desc.mode == ISOGI_TRACE_IRRADIANCE) r->light += isogi_trace__luminance(rgb) * isogi_trace__luminance(rgb);
+            if (error > r->worst) r->worst = error;
+            if (isogi_trace__finite(error)) r->error += error * error;
+        }
+    if (t->coarse) isogi_trace__status_add(t->coarse, r);
+    if (!t->feedback) return;
+    r->probes += t->feedback->probes.count;
+    r->diverges |= t->feedback->diverges;
+}
+
+ISOGI_API void isogi_trace_status(const isogi_trace *trace, isogi_trace_report *report) {
+    if (!report) return;
+    memset(report, 0, sizeof *report);
+    if (!trace) return;
+    isogi_trace__status_add(trace, report);
+    if (trace->high) isogi_trace__status_add(trace->high, report);
+    report->unit = trace->scene.open_light;
+    if (!report->texels) return;
+    report->light = sqrt(report->light / (double)report->texels);
+    report->error = sqrt(report->error / (double)report->texels);
 }
 
 /* ==== export ========================================================================================================= */
@@ -2907,7 +4097,7 @@ static isogi_result isogi_trace__block_load(isogi_trace *t, const uint8_t *block
             if (!(mask >> slot & 1)) continue;
             memcpy(isogi_trace__record(t, brick, slot), at, t->record);
             at += t->record;
-            t->wanted -= brick->state[slot] == ISOGI_TRACE__WANTED;
+            t->wanted -= brick->state[slot] >= ISOGI_TRACE__WANTED && brick->state[slot] < ISOGI_TRACE__DONE;
             t->done += brick->state[slot] != ISOGI_TRACE__DONE;
             brick->state[slot] = ISOGI_TRACE__DONE;
         }
@@ -3223,6 +4413,21 @@ ISOGI_API isogi_result isogi_trace_gather_field(const isogi_trace_desc *desc, is
 #undef ISOGI_TRACE__MAX_DEPTH
 #undef ISOGI_TRACE__MAX_ORDER
 #undef ISOGI_TRACE__NOT_READY
+#undef ISOGI_TRACE__FILTER_WIDTH
+#undef ISOGI_TRACE__FILTER
+#undef ISOGI_TRACE__LIGHT_SHARE
+#undef ISOGI_TRACE__PLANE
+#undef ISOGI_TRACE__CELL_RATIO
+#undef ISOGI_TRACE__CELL_FAR
+#undef ISOGI_TRACE__CELL
+#undef ISOGI_TRACE__PROBE
+#undef ISOGI_TRACE__GROUP
+#undef ISOGI_TRACE__SWEEP
+#undef ISOGI_TRACE__FLUSH
+#undef ISOGI_TRACE__TASK_SPANS
+#undef ISOGI_TRACE__SPAN
+#undef ISOGI_TRACE__SPANS
+#undef ISOGI_TRACE__SAMPLES
 #undef ISOGI_TRACE__VERSION
 #undef ISOGI_TRACE__HEADER
 #endif /* ISOGI_TRACE_IMPLEMENTATION */

@@ -90,7 +90,7 @@ SHARED double rough_shell(const double p[3], const double *q) { return shell(p, 
 SHARED isogi_trace_desc desc_make(const scene *s, float albedo, int bounces, int samples) {
     isogi_trace_desc d;
     memset(&d, 0, sizeof d);
-    d.pyramid = s->pyramid, d.bounces = bounces, d.samples = samples;
+    d.pyramid = s->pyramid, d.bounces = bounces, d.samples = samples, d.method = ISOGI_TRACE_PATHS;
     d.albedo[0] = d.albedo[1] = d.albedo[2] = albedo;
     d.lighting.env.sh = white_sky, d.lighting.env.sh_order = 1;
     return d;
