@@ -1827,47 +1827,25 @@ ISOGI_SH__INLINE void isogi_sh__turn_y_fixed(double *out, const double *in, int 
     }
 }
 
-ISOGI_SH__INLINE void isogi_sh__rotate_fixed(void *out, const void *in, int is_double, int l, isogi_sh__turns *t) {
+ISOGI_SH__INLINE void isogi_sh__rotate_fixed(double *c, int l, isogi_sh__turns *t) {
     double band[9], other[9];
     int i;
     ISOGI_SH__UNROLL9
-    for (i = 0; i <= 2 * l; i++) band[i] = is_double ? ((const double *)in)[l * l + i] : (double)((const float *)in)[l * l + i];
+    for (i = 0; i <= 2 * l; i++) band[i] = c[l * l + i];
     isogi_sh__turn_z(band, l, 1, t->first);
     isogi_sh__turn_y_fixed(other, band, l, 0);
     isogi_sh__turn_z(other, l, 1, t->middle);
     isogi_sh__turn_y_fixed(band, other, l, 1);
     isogi_sh__turn_z(band, l, 1, t->last);
     ISOGI_SH__UNROLL9
-    for (i = 0; i <= 2 * l; i++) {
-        if (is_double) ((double *)out)[l * l + i] = band[i];
-        else ((float *)out)[l * l + i] = (float)band[i];
-    }
+    for (i = 0; i <= 2 * l; i++) c[l * l + i] = band[i];
 }
 
-ISOGI_SH__INLINE void isogi_sh__rotate_low(void *out, const void *in, int is_double, int order, isogi_sh__turns *t) {
-    if (is_double) ((double *)out)[0] = ((const double *)in)[0];
-    else ((float *)out)[0] = ((const float *)in)[0];
-    if (order > 1) isogi_sh__rotate_fixed(out, in, is_double, 1, t);
-    if (order > 2) isogi_sh__rotate_fixed(out, in, is_double, 2, t);
-    if (order > 3) isogi_sh__rotate_fixed(out, in, is_double, 3, t);
-    if (order > 4) isogi_sh__rotate_fixed(out, in, is_double, 4, t);
-}
-
-/* Four powers, without the correction, for results in float. */
-ISOGI_SH__INLINE void isogi_sh__four_powers(double (*power)[2], double cosine, double sine) {
-    double c = cosine * cosine - sine * sine, s = 2 * cosine * sine;
-    power[1][0] = cosine, power[1][1] = sine;
-    power[2][0] = c, power[2][1] = s;
-    power[3][0] = c * cosine - s * sine, power[3][1] = c * sine + s * cosine;
-    power[4][0] = c * c - s * s, power[4][1] = 2 * c * s;
-}
-
-static void isogi_sh__rotate_low_f32(float *out, const float *in, int order, const isogi_sh__euler *e) {
-    isogi_sh__turns turns;
-    isogi_sh__four_powers(turns.first, -e->c[1], e->c[0]);
-    isogi_sh__four_powers(turns.middle, e->b[0], e->b[1]);
-    isogi_sh__four_powers(turns.last, e->a[1], -e->a[0]);
-    isogi_sh__rotate_low(out, in, 0, order, &turns);
+static void isogi_sh__rotate_low(double *c, int order, isogi_sh__turns *t) {
+    if (order > 1) isogi_sh__rotate_fixed(c, 1, t);
+    if (order > 2) isogi_sh__rotate_fixed(c, 2, t);
+    if (order > 3) isogi_sh__rotate_fixed(c, 3, t);
+    if (order > 4) isogi_sh__rotate_fixed(c, 4, t);
 }
 
 #ifdef ISOGI_SH__SIMD
@@ -2031,8 +2009,13 @@ static void isogi_sh__rotate(void *out, const void *in, int is_double, int order
     int l, i, k, first;
     isogi_sh__turns_start(&turns, order, e);
     if (channels == 1) {
-        if (is_double) isogi_sh__rotate_low(out, in, 1, order, &turns);
-        else isogi_sh__rotate_low(out, in, 0, order, &turns);
+        int low = order < 5 ? order * order : 25;
+        for (i = 0; i < low; i++) band[i] = is_double ? ((const double *)in)[i] : (double)((const float *)in)[i];
+        isogi_sh__rotate_low(band, order, &turns);
+        for (i = 0; i < low; i++) {
+            if (is_double) ((double *)out)[i] = band[i];
+            else ((float *)out)[i] = (float)band[i];
+        }
     }
     for (l = channels == 1 ? 5 : 0; l < order; l++) {
         if (channels > 1 || l > ISOGI_SH__TURNS) isogi_sh__quarter_turn_start(turns.step, turns.edge, l);
@@ -2071,8 +2054,7 @@ ISOGI_SH__APART isogi_result isogi_sh__rotate_f32(float *out, const float *in, i
     if (!out || !in || !m || !isogi_sh__shape_ok(order, channels)) return ISOGI_INVALID;
     for (i = 0; i < 9; i++) r[i] = (double)m[i];
     if (isogi_sh__euler_angles(&e, r) != ISOGI_OK) return ISOGI_INVALID;
-    if (order <= 5 && channels == 1) isogi_sh__rotate_low_f32(out, in, order, &e);
-    else isogi_sh__rotate(out, in, 0, order, channels, &e);
+    isogi_sh__rotate(out, in, 0, order, channels, &e);
     return ISOGI_OK;
 }
 
@@ -2242,7 +2224,7 @@ ISOGI_SH__INLINE double isogi_sh__zonal_entry(const isogi_sh__wigner *w, int l, 
     return before + *difference;
 }
 
-ISOGI_SH__INLINE void isogi_sh__build_blocks(const isogi_sh__blocks *out, int order, const isogi_sh__euler *e) {
+static void isogi_sh__build_blocks(const isogi_sh__blocks *out, int order, const isogi_sh__euler *e) {
     isogi_sh__wigner w;
     double p = 1, difference = 0;
     int l, m, n, at = 0;
@@ -2254,17 +2236,6 @@ ISOGI_SH__INLINE void isogi_sh__build_blocks(const isogi_sh__blocks *out, int or
     }
     for (m = 1; m < order; m++)
         for (n = 0; n <= m; n++) isogi_sh__wigner_pair(out, order, n, m, &w);
-}
-
-/* Compiled once for each type, so that no entry asks for it. */
-static void isogi_sh__rotation_build_low(void *rotation, int is_double, int order, const isogi_sh__euler *e) {
-    isogi_sh__blocks out;
-    out.data = rotation, out.is_double = 1;
-    if (is_double) isogi_sh__build_blocks(&out, order, e);
-    else {
-        out.is_double = 0;
-        isogi_sh__build_blocks(&out, order, e);
-    }
 }
 
 #ifdef ISOGI_SH__SIMD
@@ -2356,7 +2327,7 @@ ISOGI_SH__INLINE __attribute__((target("avx2,fma,avx512f,avx512vl,avx512dq"))) v
     }
 }
 
-ISOGI_SH__INLINE __attribute__((target("avx2,fma,avx512f,avx512vl,avx512dq"))) void isogi_sh__build_rows(void *out, int is_double, int order, const isogi_sh__euler *e) {
+ISOGI_SH__AVX512 static void isogi_sh__build_rows(void *out, int is_double, int order, const isogi_sh__euler *e) {
     isogi_sh__wigner_rows r;
     double p = 1, difference = 0;
     int l, m, n, at = 0;
@@ -2372,26 +2343,24 @@ ISOGI_SH__INLINE __attribute__((target("avx2,fma,avx512f,avx512vl,avx512dq"))) v
         at += (2 * l + 1) * (2 * l + 1);
     }
 }
-
-ISOGI_SH__AVX512 static void isogi_sh__build_rows_f64(double *out, int order, const isogi_sh__euler *e) { isogi_sh__build_rows(out, 1, order, e); }
-ISOGI_SH__AVX512 static void isogi_sh__build_rows_f32(float *out, int order, const isogi_sh__euler *e) { isogi_sh__build_rows(out, 0, order, e); }
 #endif
 
 /* Columns of the matrices are rotated unit vectors. */
 static void isogi_sh__rotation_build(void *rotation, int is_double, int order, const isogi_sh__euler *e) {
     double band[2 * ISOGI_SH_MAX_ORDER * ISOGI_SH__TOGETHER], other[2 * ISOGI_SH_MAX_ORDER * ISOGI_SH__TOGETHER];
     isogi_sh__turns turns;
+    isogi_sh__blocks out;
     size_t at = 0;
     int l, i, k, first;
     if (order <= ISOGI_SH__TURNS + 1) {
 #ifdef ISOGI_SH__SIMD
         if (order > 1 && isogi_sh__level() > 1) {
-            if (is_double) isogi_sh__build_rows_f64((double *)rotation, order, e);
-            else isogi_sh__build_rows_f32((float *)rotation, order, e);
+            isogi_sh__build_rows(rotation, is_double, order, e);
             return;
         }
 #endif
-        isogi_sh__rotation_build_low(rotation, is_double, order, e);
+        out.data = rotation, out.is_double = is_double;
+        isogi_sh__build_blocks(&out, order, e);
         return;
     }
     isogi_sh__turns_start(&turns, order, e);
