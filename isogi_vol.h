@@ -1849,6 +1849,13 @@ static void isogi_vol__grid_point(const isogi_pyramid *p, const isogi_vol__point
 }
 
 #if defined(ISOGI_VOL__SSE2) || defined(ISOGI_VOL__NEON)
+#if defined(ISOGI_VOL__AVX) && !defined(__clang__)
+#pragma GCC diagnostic push
+#pragma GCC diagnostic ignored "-Wmaybe-uninitialized" /* gcc 12 says so of its own undefined vectors */
+#pragma GCC diagnostic ignored "-Wuninitialized"
+#pragma GCC diagnostic ignored "-Wsign-conversion" /* and of masks in its own macros, at -O0 */
+#endif
+
 /* Cell and place in it of points first .. first + n - 1, moved to the border if outside; n up to a multiple of 16 are filled in. */
 static void isogi_vol__locate(const isogi_pyramid *p, const isogi_vol__points *at, size_t first, int n, isogi_vol__block *b) {
     const isogi_volume *v = &p->volume;
@@ -1863,7 +1870,6 @@ static void isogi_vol__locate(const isogi_pyramid *p, const isogi_vol__points *a
         }
     }
 }
-#endif
 
 #ifdef ISOGI_VOL__AVX
 #define ISOGI_VOL__AVX2 ISOGI_VOL__TARGET("avx2,fma")
@@ -1933,7 +1939,6 @@ ISOGI_VOL__LOCATE(avx2, ISOGI_VOL__AVX2, __m256d, _mm256_, __m128i, _mm_, 4, _mm
 ISOGI_VOL__LOCATE(avx512, ISOGI_VOL__AVX512, __m512d, _mm512_, __m256i, _mm256_, 8, _mm512_fmadd_pd)
 #endif
 
-#if defined(ISOGI_VOL__SSE2) || defined(ISOGI_VOL__NEON)
 /* Corners side by side, so that no level of instructions needs gathers, which are slow on many processors. */
 static void isogi_vol__fetch(const isogi_volume *v, int n, isogi_vol__block *b) {
     const char *data = (const char *)v->data;
@@ -1960,13 +1965,8 @@ static void isogi_vol__fetch(const isogi_volume *v, int n, isogi_vol__block *b) 
 #undef ISOGI_VOL__TAKE_FLOAT
 #undef ISOGI_VOL__READ
 }
-#endif
 
 #ifdef ISOGI_VOL__AVX
-#ifndef __clang__
-#pragma GCC diagnostic push
-#pragma GCC diagnostic ignored "-Wsign-conversion" /* of gcc's own macros, at -O0 */
-#endif
 /* The same with gathers, which are quick where AVX-512 is: neighbours along x come as one number. Bytes bring two more with them; 0:
    these would lie beyond the end of the volume, or voxels are not side by side. */
 ISOGI_VOL__AVX512 static int isogi_vol__gather_avx512(const isogi_volume *v, int n, isogi_vol__block *b) {
@@ -2001,9 +2001,6 @@ ISOGI_VOL__AVX512 static int isogi_vol__gather_avx512(const isogi_volume *v, int
     }
     return 1;
 }
-#ifndef __clang__
-#pragma GCC diagnostic pop
-#endif
 #endif
 
 /* Trilinear values, and gradients if asked for, of a whole block; vector by vector for any width: V and the operations L##mul_ps ...
@@ -2235,7 +2232,10 @@ ISOGI_VOL__CUBIC(base, , float32x4_t, isogi_vol__neon_, float32x4_t, isogi_vol__
 ISOGI_VOL__WIDEN(base, , isogi_vol__neon_, 4)
 #endif
 
-#if defined(ISOGI_VOL__SSE2) || defined(ISOGI_VOL__NEON)
+#if defined(ISOGI_VOL__AVX) && !defined(__clang__)
+#pragma GCC diagnostic pop
+#endif
+
 /* Whether blocks serve this volume; the plain code does where not. */
 static int isogi_vol__blockwise(const isogi_pyramid *p, isogi_filter filter) {
     const isogi_volume *v = &p->volume;
@@ -3594,7 +3594,8 @@ static int isogi_vol__walk_fast(isogi_vol__walk *w, const isogi_vol__ticks *k, i
 #ifndef __clang__
 #pragma GCC diagnostic push
 #pragma GCC diagnostic ignored "-Wmaybe-uninitialized" /* gcc 12 says so of its own undefined vectors */
-#pragma GCC diagnostic ignored "-Wsign-conversion" /* of gcc's own macros, at -O0 */
+#pragma GCC diagnostic ignored "-Wuninitialized"
+#pragma GCC diagnostic ignored "-Wsign-conversion" /* and of masks in its own macros, at -O0 */
 #endif
 #define ISOGI_VOL__POOL 64
 
