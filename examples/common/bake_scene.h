@@ -46,6 +46,7 @@ static inline void bake_scene_begin(bake_scene *s) {
     memset(s, 0, sizeof *s);
     s->spacing[0] = s->spacing[1] = s->spacing[2] = 1;
     s->desc.bounces = -1, s->desc.albedo[0] = s->desc.albedo[1] = s->desc.albedo[2] = 0.7f;
+    s->desc.method = ISOGI_TRACE_PATHS; /* parts of a bake are then the same bits as the whole */
 }
 
 static inline int bake_integer(const char *text, double low, double high, int *out) {

@@ -1,18 +1,42 @@
-/* Run time against error of isogi_trace.h: the scene engine-block of the design, a lazily baked standard view.
+/* Run time against error of isogi_trace.h on the lit scenes of the design.
 
        build/bench/bench_trace [--quick] OUT.csv
 
-   All threads, wall seconds. error = relative RMSE of irradiance over the surface points of the view, against the same texels baked
-   with 16 (quick: 8) times the samples of the largest setting and another seed; work = rays. */
+   Error: relative RMSE, sqrt(sum (E - R)^2 / sum R^2), of irradiance over pixels of the standard view (every k-th of 900x900), against
+   paths of 4096 samples through the same texels (kept in build/bench/, by everything that defines them). Naive is the paper's way:
+   uniform hemisphere, independent numbers, whole paths with shadow rays, every texel of the view; `converged` is its error with 100
+   samples, `usable` with 10. Its time is that of its texels behind the measured pixels, scaled to all of the view. Wall seconds, two
+   threads, but for the rows rays-SCENE.
+
+     speedup-SCENE          work: time of naive over time of the default at the error converged
+     rays-SCENE             rays a second while baking, one thread
+     lazy-SCENE             seconds from the request to usable; lazy-converged-SCENE: to converged
+     full-SCENE             the whole texture (full bench only) */
 #define ISOGI_IMPLEMENTATION
 #include "isogi_trace.h"
 #include "camera.h"
+#include "hdr.h"
 #include "procedural.h"
+#include "volume_file.h"
 #include <stdio.h>
 #include <time.h>
 
-enum { MAX_SIZE = 256 };
-static float points[MAX_SIZE * MAX_SIZE][3], reference[MAX_SIZE * MAX_SIZE][3], light[MAX_SIZE * MAX_SIZE][3];
+enum { SIZE = 900, MOST = 6000, REFERENCE = 4096 };
+
+typedef struct bench_scene {
+    const char *name, *file, *image_file;
+    isogi_volume volume;
+    isogi_pyramid *pyramid;
+    isogi_trace_desc desc;
+    hdr_image image;
+    double isovalue, up[3], toward[3];
+} bench_scene;
+
+static const float sky[12] = {2.3042f, 2.3042f, 2.3042f, 0.71633f, 0.71633f, 0.71633f}; /* 1 above to 0.3 below */
+static const isogi_light sun = {.vector = {1, 2, 1.5f}, .rgb = {3, 3, 3}, .radius = 0.0175f};
+static float points[SIZE * SIZE][3], chosen[MOST][3], reference[MOST][3], light[MOST][3];
+static size_t seen, picked;
+static const isogi_context two = {.threads = 2}, one = {.threads = 1};
 
 static double seconds_now(void) {
     struct timespec t;
@@ -20,80 +44,334 @@ static double seconds_now(void) {
     return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
 }
 
-/* Points of the isosurface that the standard view sees. */
-static size_t view(const isogi_pyramid *pyramid, double isovalue, int size) {
-    const isogi_volume *v = isogi_vol_volume(pyramid);
-    double toward[3] = {1.5, 1.2, 2.0}, up[3] = {0, 1, 0}, right[3], above[3], centre[3], radius = 0, reach = tan(PROCEDURAL_PI / 8);
-    size_t count = 0;
-    vector_normalize(toward);
-    vector_cross(up, toward, right), vector_normalize(right), vector_cross(toward, right, above);
-    for (int a = 0; a < 3; a++) centre[a] = 0.5 * v->spacing[a] * (double)(v->size[a] - 1);
-    radius = sqrt(vector_dot(centre, centre));
-    for (int i = 0; i < size * size; i++) {
-        double x = (2 * (i % size + 0.5) / size - 1) * reach, y = (1 - 2 * (i / size + 0.5) / size) * reach;
-        isogi_ray ray = {.flags = ISOGI_RAY_CAPPED, .isovalue = isovalue};
-        isogi_hit hit;
-        for (int a = 0; a < 3; a++) {
-            ray.origin[a] = centre[a] + toward[a] * radius / sin(PROCEDURAL_PI / 8);
-            ray.dir[a] = (float)(x * right[a] + y * above[a] - toward[a]);
+/* ---- scenes --------------------------------------------------------------------------------------------------------------- */
+
+static int scene_load(bench_scene *s, const char *name) {
+    const char *data = getenv("ISOGI_DATA"), *hdr = "grace";
+    char path[1024], error[FILE_ERROR_SIZE];
+    isogi_trace_desc *d = &s->desc;
+    memset(s, 0, sizeof *s);
+    s->name = name, s->up[1] = 1, s->toward[0] = 1.5, s->toward[1] = 1.2, s->toward[2] = 2;
+    d->lazy = 1, d->bounces = -1, d->albedo[0] = d->albedo[1] = d->albedo[2] = 0.7f;
+    if (!strcmp(name, "engine-block")) {
+        const procedural_shape *shape = procedural_find(name);
+        if (procedural_make(shape, 0, &s->volume, NULL) != ISOGI_OK) return 0;
+        s->isovalue = shape->isovalue;
+        d->lighting.env.sh = sky, d->lighting.env.sh_order = 2, d->lighting.lights = &sun, d->lighting.light_count = 1;
+    } else {
+        if (!data) return fprintf(stderr, "  %s is left out: ISOGI_DATA is not set\n", name), 0;
+        if (!strcmp(name, "bonsai")) {
+            d->albedo[0] = 0.6f, d->albedo[2] = 0.5f, hdr = "uffizi", s->isovalue = 40;
+            s->up[1] = 0, s->up[2] = -1, s->toward[1] = 2, s->toward[2] = -1.2;
+        } else if (!strcmp(name, "cthead")) d->albedo[0] = d->albedo[1] = d->albedo[2] = 0.8f, s->isovalue = 130;
+        else s->isovalue = 80;
+        snprintf(path, sizeof path, "%s/%s", data, !strcmp(name, "bonsai") ? "bonsai_256x256x256_uint8.raw" : !strcmp(name, "cthead") ? "cthead8_256x256x99_uint8.raw" : "engine_256x256x128_uint8.raw");
+        if (!volume_read(path, &s->volume, error)) return fprintf(stderr, "  %s is left out: %s\n", name, error), 0;
+        if (!strcmp(name, "cthead")) s->volume.spacing[0] = s->volume.spacing[1] = 1, s->volume.spacing[2] = 2;
+        snprintf(path, sizeof path, "%s/hdr/%s_256x128.hdr", data, hdr);
+        if (!hdr_read(path, &s->image, error)) return fprintf(stderr, "  %s is left out: %s\n", name, error), 0;
+        d->lighting.env.rgb = s->image.rgb, d->lighting.env.width = s->image.width, d->lighting.env.height = s->image.height;
+    }
+    if (isogi_vol_build(&s->pyramid, &s->volume, NULL) != ISOGI_OK) return 0;
+    d->pyramid = s->pyramid;
+    return 1;
+}
+
+/* Points of the isosurface that the standard view sees, and every so many of them to measure at. */
+static void view(const bench_scene *s, size_t pixels) {
+    const isogi_volume *v = isogi_vol_volume(s->pyramid);
+    static isogi_ray ray[SIZE];
+    static isogi_hit hit[SIZE];
+    double centre[3], eye[3], t[3], radius;
+    camera c;
+    for (int a = 0; a < 3; a++) centre[a] = 0.5 * v->spacing[a] * (double)(v->size[a] - 1), t[a] = s->toward[a];
+    radius = sqrt(vector_dot(centre, centre)), vector_normalize(t), seen = picked = 0;
+    for (int a = 0; a < 3; a++) eye[a] = centre[a] + t[a] * radius / sin(PROCEDURAL_PI / 8);
+    camera_look(&c, SIZE, SIZE, eye, centre, s->up, 45);
+    for (int y = 0; y < SIZE; y++) {
+        for (int x = 0; x < SIZE; x++) {
+            double d[3];
+            memset(&ray[x], 0, sizeof ray[x]);
+            camera_direction(&c, x, y, d);
+            for (int a = 0; a < 3; a++) ray[x].origin[a] = eye[a], ray[x].dir[a] = (float)d[a];
+            ray[x].isovalue = s->isovalue;
         }
-        isogi_vol_intersect(pyramid, &ray, 1, &hit, NULL);
-        isogi_vol_positions(pyramid, &hit, 1, (float(*)[3])points[count]);
-        count += hit.side != 0;
+        isogi_vol_intersect(s->pyramid, ray, SIZE, hit, NULL);
+        for (int x = 0; x < SIZE; x++)
+            if (hit[x].side) isogi_vol_positions(s->pyramid, &hit[x], 1, (float(*)[3])points[seen++]);
     }
-    return count;
+    for (size_t i = 0; i < pixels && pixels < seen; i++) memcpy(chosen[picked++], points[i * (seen / pixels) + isogi_trace__mix(i + 1) % (seen / pixels)], sizeof chosen[0]);
 }
 
-/* Seconds of a lazy bake of the view; 0 on failure. */
-static double bake(const isogi_trace_desc *desc, size_t count, float (*out)[3], isogi_counters *counters) {
-    isogi_trace *trace = NULL;
+static double error_of(float (*e)[3]) {
+    double sum = 0, all = 0;
+    for (size_t i = 0; i < picked; i++)
+        for (int c = 0; c < 3; c++) {
+            double d = (double)(e[i][c] - reference[i][c]);
+            sum += d * d, all += (double)reference[i][c] * (double)reference[i][c];
+        }
+    return sqrt(sum / all);
+}
+
+/* ---- the reference, kept ---------------------------------------------------------------------------------------------------- */
+
+static int reference_make(const bench_scene *s) {
+    isogi_trace_desc d = s->desc;
+    isogi_trace *t = NULL;
+    char path[256];
+    double remaining = 1, begin = seconds_now();
+    uint64_t key = 1;
+    FILE *file;
+    for (size_t i = 0; i < picked; i++)
+        for (int c = 0; c < 3; c++) key = isogi_trace__key(key, (uint64_t)isogi_trace__float_bits(chosen[i][c]));
+    snprintf(path, sizeof path, "build/bench/reference-%s-%d-%016llx", s->name, REFERENCE, (unsigned long long)key);
+    file = fopen(path, "rb");
+    if (file) {
+        size_t n = fread(reference, sizeof reference[0], picked, file);
+        fclose(file);
+        if (n == picked) return 1;
+    }
+    d.samples = REFERENCE, d.seed = 77, d.method = ISOGI_TRACE_PATHS;
+    if (isogi_trace_create(&t, &d, &two) != ISOGI_OK || isogi_trace_request(t, (const float(*)[3])chosen, picked) != ISOGI_OK) return 0;
+    while (remaining > 0) {
+        if (isogi_trace_step(t, 4000000, &remaining) != ISOGI_OK) return 0;
+        fprintf(stderr, "\r  reference of %s: %3.0f %%, %.0f s", s->name, 100 * (1 - remaining), seconds_now() - begin);
+    }
+    fprintf(stderr, "\n");
+    isogi_trace_sample(t, (const float(*)[3])chosen, picked, reference, NULL);
+    isogi_trace_free(t);
+    file = fopen(path, "wb");
+    if (file) fwrite(reference, sizeof reference[0], picked, file), fclose(file);
+    return 1;
+}
+
+/* ---- naive ------------------------------------------------------------------------------------------------------------------ */
+
+typedef struct naive_job {
+    isogi_trace *trace; /* its texels are overwritten */
+    int samples;
+    size_t *brick, count;
+    uint64_t *rays;
+} naive_job;
+
+typedef struct naive_path {
+    const isogi_trace__scene *scene;
+    const isogi_trace__site *site;
+    isogi_counters counters;
+    uint64_t key, number;
+    isogi_hit start;
+    float shading[3], geometric[3];
+    double sum[3];
+} naive_path;
+
+static double naive_number(naive_path *p) { return isogi_trace__unit(isogi_trace__key(p->key, p->number++)); }
+
+static void naive_ray(naive_path *p, int depth, const float dir[3], double tmax, isogi_hit *hit) {
+    if (!depth) isogi_trace__site_rays(p->scene, p->site, (const float(*)[3])dir, &tmax, 1, hit, &p->counters);
+    else isogi_vol_continue(p->scene->pyramid, &p->start, (const float(*)[3])dir, &tmax, p->site->isovalue, p->scene->flags, 1, hit, &p->counters);
+}
+
+static double naive_cosine(const naive_path *p, int depth, const float dir[3]) {
+    return depth ? isogi_trace__kernel(p->shading, p->geometric, dir) : isogi_trace__site_kernel(p->site, dir);
+}
+
+/* Shadow rays to all lights. through: of irradiance. */
+static void naive_lights(naive_path *p, int depth, const double through[3]) {
+    const isogi_lighting *lighting = &p->scene->desc.lighting;
+    float position[1][3];
+    double point[3];
+    if (depth) isogi_vol_positions(p->scene->pyramid, &p->start, 1, position);
+    for (int a = 0; a < 3; a++) point[a] = depth ? (double)position[0][a] : p->site->origin[a];
+    for (size_t l = 0; l < lighting->light_count; l++) {
+        double u = naive_number(p), v = naive_number(p), cosine;
+        isogi_trace__beam beam;
+        isogi_hit hit;
+        if (!isogi_trace__light_beam(&lighting->lights[l], point, u, v, &beam)) continue;
+        cosine = naive_cosine(p, depth, beam.dir);
+        if (!(cosine > 0)) continue;
+        naive_ray(p, depth, beam.dir, beam.tmax, &hit);
+        for (int a = 0; a < 3 && !hit.side; a++) p->sum[a] += through[a] * beam.rgb[a] * cosine;
+    }
+}
+
+/* One path; adds its irradiance to p->sum. Directions uniform on the hemisphere, mirrored as the library's are. */
+static void naive_trace(naive_path *p, const float albedo[3]) {
+    double through[3] = {1, 1, 1}, most = fmax((double)albedo[0], fmax((double)albedo[1], (double)albedo[2]));
+    signed char from = p->site->open ? 0 : 1;
+    p->start = p->site->place;
+    for (int depth = 0;; depth++) {
+        double u, v, cosine, density = 1;
+        float dir[3], radiance[3], s[1][3], g[1][3];
+        isogi_hit hit;
+        if (depth) {
+            isogi_trace__normals(p->scene->pyramid, p->scene->desc.normals, &p->start, &from, 1, s, g);
+            memcpy(p->shading, s, sizeof s), memcpy(p->geometric, g, sizeof g);
+        } else memcpy(p->shading, p->site->normal, sizeof p->shading), memcpy(p->geometric, p->site->geometric, sizeof p->geometric);
+        naive_lights(p, depth, through);
+        u = naive_number(p), v = naive_number(p);
+        isogi_trace__around(p->shading, u, sqrt(1 - u * u), v, dir);
+        if (depth || p->site->on_surface) {
+            double mirrored;
+            isogi_trace__mirror(p->geometric, dir);
+            mirrored = isogi_trace__dot(p->shading, dir) - 2 * isogi_trace__dot(p->geometric, dir) * isogi_trace__dot(p->geometric, p->shading);
+            density = (isogi_trace__dot(p->shading, dir) > 0) + (mirrored > 0);
+        }
+        cosine = naive_cosine(p, depth, dir);
+        for (int a = 0; a < 3; a++) through[a] *= 2 * cosine / (density > 0 ? density : 1);
+        naive_ray(p, depth, dir, 0, &hit);
+        if (!hit.side) {
+            isogi_env_radiance(&p->scene->desc.lighting.env, dir, radiance);
+            for (int a = 0; a < 3; a++) p->sum[a] += PROCEDURAL_PI * through[a] * (double)radiance[a];
+            return;
+        }
+        for (int a = 0; a < 3; a++) through[a] *= (double)albedo[a] / (depth >= 3 ? most : 1);
+        if (depth >= 3 && naive_number(p) >= most) return;
+        if (!from || from == (hit.side > 0 ? 1 : -1)) p->start = hit, from = (signed char)(hit.side > 0 ? 1 : -1);
+    }
+}
+
+static void naive_task(void *arg, size_t task) {
+    const naive_job *job = (const naive_job *)arg;
+    isogi_trace *t = job->trace;
+    for (uint32_t slot = 0; slot < sizeof t->bricks[0]->state; slot++) {
+        const isogi_trace__brick *brick = t->bricks[job->brick[task]];
+        isogi_trace__site site;
+        naive_path p;
+        float albedo[3], e[3];
+        size_t x[3];
+        if (brick->state[slot] != ISOGI_TRACE__DONE) continue;
+        isogi_trace__texel_of(t, job->brick[task], slot, x);
+        isogi_trace__texel_site(t, x, &site), isogi_trace__site_start(&t->scene, &site);
+        isogi_trace_albedo(&t->scene.desc, site.isovalue, albedo);
+        memset(&p, 0, sizeof p);
+        p.scene = &t->scene, p.site = &site, p.key = isogi_trace__key(5, x[0] + 4096 * (x[1] + 4096 * x[2]));
+        for (int k = 0; k < job->samples; k++) naive_trace(&p, albedo);
+        for (int a = 0; a < 3; a++) e[a] = (float)(p.sum[a] / job->samples);
+        isogi_trace__record_write(t, isogi_trace__record(t, brick, slot), e, 0);
+        job->rays[task] += p.counters.rays;
+    }
+}
+
+/* Seconds for the texels of the chosen pixels; *error, *texels. */
+static double naive(const bench_scene *s, int samples, double *error, double *texels) {
+    isogi_trace_desc d = s->desc;
+    naive_job job = {.samples = samples};
+    isogi_trace_report report;
+    double begin, spent;
+    d.samples = 1, d.method = ISOGI_TRACE_PATHS, d.bounces = 0; /* to find the texels */
+    if (isogi_trace_create(&job.trace, &d, &two) != ISOGI_OK || isogi_trace_request(job.trace, (const float(*)[3])chosen, picked) != ISOGI_OK || isogi_trace_step(job.trace, 0, NULL) != ISOGI_OK) return 0;
+    isogi_trace_status(job.trace, &report);
+    job.brick = calloc(job.trace->brick_count, sizeof *job.brick), job.rays = calloc(job.trace->brick_count, sizeof *job.rays);
+    for (size_t i = 0; i < job.trace->brick_count; i++)
+        if (job.trace->bricks[i]) job.brick[job.count++] = i;
+    begin = seconds_now();
+    isogi_parallel(&two, job.count, naive_task, &job, 0, 1);
+    spent = seconds_now() - begin;
+    isogi_trace_sample(job.trace, (const float(*)[3])chosen, picked, light, NULL);
+    *error = error_of(light), *texels = (double)report.texels;
+    isogi_trace_free(job.trace), free(job.brick), free(job.rays);
+    return spent;
+}
+
+/* ---- ours ------------------------------------------------------------------------------------------------------------------- */
+
+typedef struct outcome { double seconds, error, rays, texels; } outcome;
+
+/* The whole view, lazily; or the whole texture. */
+static outcome ours(const bench_scene *s, const isogi_trace_desc *desc, const isogi_context *context) {
+    isogi_trace *t = NULL;
+    isogi_counters counters = {0};
+    outcome o = {0};
     double begin = seconds_now();
-    isogi_result result = isogi_trace_create(&trace, desc, NULL);
-    if (result == ISOGI_OK) result = isogi_trace_request(trace, (const float(*)[3])points, count);
-    if (result == ISOGI_OK) result = isogi_trace_step(trace, 0, NULL);
-    if (result == ISOGI_OK) result = isogi_trace_sample(trace, (const float(*)[3])points, count, out, NULL);
-    if (result == ISOGI_OK) isogi_trace_counters(trace, counters);
-    isogi_trace_free(trace);
-    return result == ISOGI_OK ? seconds_now() - begin : 0;
+    isogi_result result = isogi_trace_create(&t, desc, context);
+    (void)s;
+    if (result == ISOGI_OK) result = isogi_trace_request(t, (const float(*)[3])points, seen);
+    if (result == ISOGI_OK) result = isogi_trace_step(t, 0, NULL);
+    o.seconds = seconds_now() - begin;
+    if (result != ISOGI_OK) exit(1);
+    isogi_trace_sample(t, (const float(*)[3])chosen, picked, light, NULL);
+    isogi_trace_counters(t, &counters);
+    o.error = error_of(light), o.rays = (double)counters.rays, o.texels = (double)counters.texels;
+    isogi_trace_free(t);
+    return o;
 }
 
-static double relative_rmse(size_t count) {
-    double sum = 0;
-    for (size_t i = 0; i < count; i++) {
-        double e = (double)light[i][1], r = (double)reference[i][1];
-        sum += r > 0 ? (e - r) * (e - r) / (r * r) : 0;
+/* Seconds until the error is below the bound, in steps; the error then. */
+static outcome lazily(const bench_scene *s, double bound) {
+    isogi_trace_desc d = s->desc;
+    isogi_trace *t = NULL;
+    isogi_counters counters = {0};
+    outcome o = {0};
+    double remaining = 1;
+    d.samples = 340;
+    double begin = seconds_now();
+    if (isogi_trace_create(&t, &d, &two) != ISOGI_OK || isogi_trace_request(t, (const float(*)[3])points, seen) != ISOGI_OK) exit(1);
+    o.seconds = seconds_now() - begin;
+    for (o.error = 1e9; remaining > 0 && o.error > bound;) {
+        begin = seconds_now();
+        if (isogi_trace_step(t, 100000, &remaining) != ISOGI_OK) exit(1);
+        o.seconds += seconds_now() - begin; /* measuring the error is not counted */
+        isogi_trace_sample(t, (const float(*)[3])chosen, picked, light, NULL);
+        o.error = error_of(light);
     }
-    return sqrt(sum / (double)count);
+    isogi_trace_counters(t, &counters);
+    o.rays = (double)counters.rays;
+    isogi_trace_free(t);
+    return o;
+}
+
+static void row(FILE *csv, const char *name, const bench_scene *s, const char *method, const char *setting, double seconds, double error, double work, const char *unit) {
+    fprintf(csv, "isogi_trace.h,%s%s,%s,%s,%.6g,%.6g,%.6g,%s\n", name, s->name, method, setting, seconds, error, work, unit);
+    fprintf(stderr, "  %s%s %s %s: %.3g s, error %.4f, %.4g %s\n", name, s->name, method, setting, seconds, error, work, unit);
+}
+
+static void bench(FILE *csv, const char *name, int quick) {
+    bench_scene s;
+    double usable, converged, texels, seconds;
+    outcome o, best = {0};
+    int found = 0;
+    char setting[64];
+    isogi_trace_desc d;
+    if (!scene_load(&s, name)) return;
+    view(&s, quick ? 600 : 3000);
+    if (!reference_make(&s)) exit(1);
+    (void)naive(&s, 10, &usable, &texels);
+    seconds = naive(&s, 100, &converged, &texels);
+    d = s.desc;
+    for (int samples = 1; samples <= (quick ? 16 : 256); samples *= 4) { /* the curve, and the first point below the error of naive */
+        d.samples = samples, o = ours(&s, &d, &two);
+        snprintf(setting, sizeof setting, "samples=%d", samples);
+        row(csv, "", &s, samples == 16 ? "default" : "feedback", setting, o.seconds, o.error, o.rays, "rays");
+        if (!found && (o.error <= converged || samples == (quick ? 16 : 256))) best = o, found = 1;
+        d.method = ISOGI_TRACE_PATHS;
+        if (!quick) o = ours(&s, &d, &two), row(csv, "", &s, "paths", setting, o.seconds, o.error, o.rays, "rays");
+        d.method = ISOGI_TRACE_FEEDBACK;
+    }
+    seconds *= best.texels / texels; /* of all texels of the view */
+    if (best.error > converged) best.seconds *= best.error * best.error / (converged * converged);
+    row(csv, "speedup-", &s, "default", "at converged", best.seconds, converged, seconds / best.seconds, "x");
+    row(csv, "speedup-", &s, "naive", "samples=100", seconds, converged, 1, "x");
+    d.samples = 16, o = ours(&s, &d, &one);
+    row(csv, "rays-", &s, "default", "samples=16", o.seconds, o.error, o.rays / o.seconds, "rays/s");
+    o = lazily(&s, usable);
+    row(csv, "lazy-", &s, "default", "usable", o.seconds, o.error, o.rays, "rays");
+    o = lazily(&s, converged);
+    row(csv, "lazy-converged-", &s, "default", "converged", o.seconds, o.error, o.rays, "rays");
+    if (!quick) {
+        d.lazy = 0, d.samples = 8, o = ours(&s, &d, &two);
+        row(csv, "full-", &s, "default", "samples=8", o.seconds, o.error, o.rays, "rays");
+    }
+    isogi_vol_free(s.pyramid), free(s.image.rgb);
+    if (!strcmp(name, "engine-block")) procedural_free(&s.volume);
+    else volume_free(&s.volume);
 }
 
 int main(int argc, char **argv) {
-    int quick = argc > 1 && !strcmp(argv[1], "--quick"), size = quick ? 32 : 160, settings[3] = {4, 16, 64};
-    const procedural_shape *shape = procedural_find("engine-block");
-    /* radiance 1 above to 0.3 below: 0.65 + 0.35 y; Y_0 = 0.2821, Y_1 = 0.4886 y */
-    float sky[12] = {2.3042f, 2.3042f, 2.3042f, 0.71633f, 0.71633f, 0.71633f};
-    isogi_light sun = {.vector = {1, 2, 1.5f}, .rgb = {3, 3, 3}, .radius = 0.0175f};
-    isogi_trace_desc desc = {.lazy = 1, .capped = 1, .bounces = -1, .albedo = {0.7f, 0.7f, 0.7f}};
-    isogi_pyramid *pyramid = NULL;
-    isogi_volume volume;
+    int quick = argc > 1 && !strcmp(argv[1], "--quick");
     FILE *csv = argc == 2 + quick ? fopen(argv[1 + quick], "w") : NULL;
-    size_t count;
     if (!csv) return fprintf(stderr, "usage: bench_trace [--quick] OUT.csv\n"), 2;
-    if (procedural_make(shape, 0, &volume, NULL) != ISOGI_OK || isogi_vol_build(&pyramid, &volume, NULL) != ISOGI_OK) return 1;
-    count = view(pyramid, shape->isovalue, size);
-    desc.pyramid = pyramid, desc.lighting.env.sh = sky, desc.lighting.env.sh_order = 2;
-    desc.lighting.lights = &sun, desc.lighting.light_count = 1;
     fprintf(csv, "header,case,method,setting,seconds,error,work,unit\n");
-    desc.samples = settings[2] * (quick ? 8 : 16), desc.seed = 1;
-    if (!(bake(&desc, count, reference, &(isogi_counters){0}) > 0)) return 1;
-    for (int i = 0; i < 3; i++) {
-        isogi_counters counters = {0};
-        double seconds;
-        desc.samples = settings[i], desc.seed = 0;
-        seconds = bake(&desc, count, light, &counters);
-        if (!(seconds > 0)) return 1;
-        fprintf(csv, "isogi_trace.h,engine-block,%s,samples=%d,%.6g,%.6g,%.6g,rays\n", settings[i] == 64 ? "default" : "samples", settings[i], seconds, relative_rmse(count), (double)counters.rays);
-        fprintf(stderr, "  engine-block samples=%d: %.3f s, error %.4f, %.2f Mray/s\n", settings[i], seconds, relative_rmse(count), 1e-6 * (double)counters.rays / seconds);
-    }
-    isogi_vol_free(pyramid), procedural_free(&volume);
+    bench(csv, "engine-block", quick), bench(csv, "engine", quick);
+    if (!quick) bench(csv, "bonsai", quick), bench(csv, "cthead", quick);
     return fclose(csv) != 0;
 }
