@@ -9,6 +9,7 @@
    Data space: frames of 512x512 at 256^3, whatever the mode; tables of pieces. */
 #define ISOGI_IMPLEMENTATION
 #include "isogi_dvr.h"
+#include "hdr.h"
 #include <stdio.h>
 #include <time.h>
 
@@ -218,6 +219,239 @@ static void bench_tables(void) {
     free(table), free(piece), free(exact);
 }
 
+/* ---- the scenes: frames and updates of a transfer function ------------------------------------------------------------------- */
+
+typedef struct bench_scene {
+    const char *name, *file, *hdr; /* file NULL: procedural, 256^3 on the cube */
+    size_t size[3], grid[3];
+    double reduction;
+    int order, rays, points, threads, flipped, update, frame;
+    isogi_transfer_point point[6];
+    isogi_light sun;
+} bench_scene;
+
+static const bench_scene bench_scenes[] = {
+    {.name = "ml256", .size = {256, 256, 256}, .grid = {64, 64, 64}, .order = 3, .rays = 32, .threads = 1, .frame = 1, .sun = {.kind = ISOGI_LIGHT_DIRECTIONAL, .vector = {1, 1, 1}, .rgb = {2, 2, 2}}},
+    {.name = "gyroid256", .size = {256, 256, 256}, .grid = {64, 64, 64}, .order = 3, .rays = 32, .threads = 1, .frame = 1, .sun = {.kind = ISOGI_LIGHT_DIRECTIONAL, .vector = {1, 1, 1}, .rgb = {2, 2, 2}}},
+    {.name = "fuel", .file = "fuel_64x64x64_uint8.raw", .size = {64, 64, 64}, .grid = {64, 64, 64}, .order = 4, .rays = 128, .reduction = 4, .threads = 2, .update = 1,
+     .points = 5, .point = {{0, {.2f, .4f, 1}, 0}, {10, {.2f, .4f, 1}, 0}, {40, {.2f, .4f, 1}, .1f}, {120, {1, .8f, .2f}, .5f}, {255, {1, .2f, .1f}, 1}},
+     .sun = {.kind = ISOGI_LIGHT_DIRECTIONAL, .vector = {1, 1, 1}, .rgb = {3, 3, 3}}},
+    {.name = "engine", .file = "engine_256x256x128_uint8.raw", .hdr = "hdr/grace_256x128.hdr", .size = {256, 256, 128}, .grid = {32, 32, 32}, .order = 3, .rays = 32,
+     .reduction = 2.8, .threads = 2, .update = 1, .frame = 1, .points = 6, .point = {{0, {.8f, .8f, .8f}, 0}, {70, {.8f, .8f, .8f}, 0}, {100, {.8f, .8f, .8f}, .02f},
+     {150, {.8f, .8f, .8f}, .05f}, {180, {1, .7f, .3f}, .4f}, {255, {1, .6f, .2f}, .8f}}},
+    {.name = "bonsai", .file = "bonsai_256x256x256_uint8.raw", .hdr = "hdr/grace_256x128.hdr", .size = {256, 256, 256}, .grid = {64, 64, 32}, .order = 2, .rays = 64,
+     .reduction = 6.7, .threads = 2, .update = 1, .frame = 1, .flipped = 1, .points = 6, .point = {{0, {.3f, .7f, .2f}, 0}, {25, {.3f, .7f, .2f}, 0}, {40, {.3f, .7f, .2f}, .15f},
+     {80, {.5f, .35f, .2f}, .2f}, {160, {.6f, .6f, .6f}, .6f}, {255, {.7f, .7f, .7f}, .9f}}}};
+
+static double wall_seconds(void) {
+    struct timespec t;
+    clock_gettime(CLOCK_MONOTONIC, &t);
+    return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
+}
+
+/* Transmittance as the text books have it: half-voxel steps through the trilinear field of bytes; nothing of the header. */
+static double bench_ray(const bench_scene *s, const uint8_t *data, const float *table, const double from[3], const double dir[3]) {
+    double leave = 1e9, depth = 0;
+    for (int a = 0; a < 3; a++) {
+        double t = ((dir[a] > 0 ? (double)s->size[a] - 1 : 0) - from[a]) / dir[a];
+        if (fabs(dir[a]) > 1e-12 && t < leave) leave = t;
+    }
+    for (double t = 0.25; t < leave && depth < 12; t += 0.5) {
+        size_t at = 0, stride = 1, step[3];
+        double u[3], v[4];
+        for (int a = 0; a < 3; a++) {
+            double x = fmin(fmax(from[a] + t * dir[a], 0), (double)s->size[a] - 1.000001);
+            u[a] = x - floor(x), at += stride * (size_t)x, step[a] = stride, stride *= s->size[a];
+        }
+        for (int k = 0; k < 4; k++) {
+            const uint8_t *p = data + at + (k & 1 ? step[1] : 0) + (k & 2 ? step[2] : 0);
+            v[k] = p[0] + u[0] * ((double)p[1] - (double)p[0]);
+        }
+        v[0] += u[1] * (v[1] - v[0]), v[2] += u[1] * (v[3] - v[2]), v[0] += u[2] * (v[2] - v[0]);
+        depth += 0.5 * (double)table[(size_t)(v[0] * 16)];
+    }
+    return exp(-depth);
+}
+
+/* Relative RMSE of all coefficients against 2048 rays, on 1024 points of the grid drawn at random. */
+typedef struct bench_reference { float place[1024][3]; double v[1024][16]; } bench_reference;
+
+static void bench_make_reference(const bench_scene *s, const uint8_t *data, const isogi_transfer *transfer, bench_reference *out) {
+    double(*dir)[3] = (double(*)[3])malloc(2048 * sizeof *dir), *y = (double *)malloc(2048 * 16 * sizeof *y);
+    float table[4096];
+    uint32_t seed = 1;
+    for (int i = 0; i < 4096; i++) {
+        float rgb[3];
+        isogi_transfer_at(transfer, i / 16.0, rgb, &table[i]);
+    }
+    for (int k = 0; k < 2048; k++) {
+        double z = 1 - (2 * k + 1) / 2048.0, r = sqrt(1 - z * z), phi = 2 * pi * fmod(k * 0.6180339887498949, 1);
+        dir[k][0] = r * cos(phi), dir[k][1] = r * sin(phi), dir[k][2] = z;
+    }
+    isogi_sh_eval_f64(y, s->order, (const double(*)[3])dir, 2048);
+    for (int i = 0; i < 1024; i++) {
+        int n = s->order * s->order;
+        double from[3];
+        for (int a = 0; a < 3; a++) {
+            seed = seed * 1664525u + 1013904223u;
+            from[a] = (double)((seed >> 8) % s->grid[a]) * ((double)s->size[a] - 1) / ((double)s->grid[a] - 1), out->place[i][a] = (float)from[a];
+        }
+        memset(out->v[i], 0, sizeof out->v[i]);
+        for (int k = 0; k < 2048; k++) {
+            double clear = bench_ray(s, data, table, from, dir[k]);
+            for (int c = 0; c < n; c++) out->v[i][c] += clear * y[k * n + c] * 4 * pi / 2048;
+        }
+    }
+    free(dir), free(y);
+}
+
+static void bench_update(const bench_scene *s, const isogi_pyramid *pyramid, const uint8_t *data, const isogi_transfer *transfer) {
+    static const char *const names[] = {"default", "brute", "paper", "sweep"};
+    bench_reference *reference = (bench_reference *)malloc(sizeof *reference);
+    const isogi_context threads = {.threads = s->threads};
+    bench_make_reference(s, data, transfer, reference);
+    for (int m = 0; m < 7; m++) {
+        isogi_dvr_desc desc = {.pyramid = pyramid, .shading = ISOGI_DVR_VISIBILITY, .order = s->order, .directions = s->rays, .grid = {s->grid[0], s->grid[1], s->grid[2]}};
+        float(*v)[16] = (float(*)[16])calloc(1024, sizeof *v);
+        double seconds = 1e9, sum = 0, norm = 0;
+        int n = s->order * s->order;
+        char name[32], setting[32];
+        if (m == 1) continue; /* minutes; its error is that of its rays */
+        desc.method = (isogi_dvr_method)(m < 4 ? m : ISOGI_DVR_SWEEP), desc.reduction = s->reduction;
+        if (m == ISOGI_DVR_PAPER) desc.sphere = ISOGI_DVR_OCTAHEDRON;
+        if (m == 4) desc.directions = s->rays / 2;
+        if (m > 4) desc.directions = s->rays << (m - 4);
+        for (int turn = 0; turn < (m == ISOGI_DVR_PAPER ? 1 : 3); turn++) {
+            isogi_dvr *dvr = NULL;
+            double begun;
+            if (isogi_dvr_create(&dvr, &desc, &threads) != ISOGI_OK) exit(1);
+            begun = wall_seconds();
+            if (isogi_dvr_set_transfer(dvr, transfer) != ISOGI_OK || isogi_dvr_step(dvr, 0, NULL) != ISOGI_OK) exit(1);
+            seconds = fmin(seconds, wall_seconds() - begun);
+            if (!turn && isogi_dvr_sample_visibility(dvr, (const float(*)[3])reference->place, 1024, v[0]) != ISOGI_OK) exit(1);
+            isogi_dvr_free(dvr);
+        }
+        for (int i = 0; i < 1024; i++)
+            for (int c = 0; c < n; c++) {
+                double d = (double)v[0][i * n + c] - reference->v[i][c];
+                sum += d * d, norm += reference->v[i][c] * reference->v[i][c];
+            }
+        snprintf(name, sizeof name, "%s", m < 4 ? names[m] : "sweep"), snprintf(setting, sizeof setting, "%d rays", desc.directions);
+        row("tf-update", s->name, name, setting, seconds, sqrt(sum / norm), (double)(s->grid[0] * s->grid[1] * s->grid[2]) * desc.directions, "ray");
+        free(v);
+    }
+    free(reference);
+}
+
+/* The reference picture: visibility of 2048 directions, post-classified steps of 1/8 voxel, kept in build/bench. */
+static void bench_frame(const bench_scene *s, const isogi_pyramid *pyramid, const isogi_transfer *transfer, const isogi_lighting *lighting) {
+    const isogi_volume *volume = isogi_vol_volume(pyramid);
+    const isogi_context threads = {.threads = s->threads}, all = {0};
+    const double steps[] = {0.125, 0, 0.5, 2};
+    isogi_view view = {.width = 512, .height = 512};
+    double toward[3] = {1.5, s->flipped ? 2.0 : 1.2, s->flipped ? -1.2 : 2.0}, radius = 0, length = sqrt(1.5 * 1.5 + 1.2 * 1.2 + 4);
+    size_t pixels = 512 * 512;
+    float(*image)[4] = (float(*)[4])malloc(pixels * sizeof *image), (*reference)[4] = (float(*)[4])malloc(pixels * sizeof *reference);
+    char path[64];
+    FILE *kept;
+    if (s->flipped) view.up[2] = -1;
+    for (int a = 0; a < 3; a++) radius += pow(0.5 * (double)(s->size[a] - 1) * volume->spacing[a], 2);
+    for (int a = 0; a < 3; a++) {
+        view.target[a] = (float)(volume->origin[a] + 0.5 * (double)(s->size[a] - 1) * volume->spacing[a]);
+        view.eye[a] = (float)((double)view.target[a] + toward[a] / length * sqrt(radius) / sin(pi / 8));
+    }
+    snprintf(path, sizeof path, "build/bench/frame-%s.bin", s->name);
+    kept = fopen(path, "rb");
+    for (int i = kept && fread(reference, sizeof *reference, pixels, kept) == pixels ? 1 : 0; i < 4; i++) {
+        isogi_dvr_desc desc = {.pyramid = pyramid, .shading = ISOGI_DVR_VISIBILITY, .order = s->order, .directions = i ? s->rays : 2048,
+                               .grid = {s->grid[0], s->grid[1], s->grid[2]}, .step = steps[i], .classification = i ? ISOGI_DVR_EXACT : ISOGI_DVR_POST_CLASSIFIED};
+        double seconds = 1e9, sum = 0;
+        isogi_counters count;
+        isogi_dvr *dvr = NULL;
+        char setting[32];
+        if (isogi_dvr_create(&dvr, &desc, i ? &threads : &all) != ISOGI_OK || isogi_dvr_set_transfer(dvr, transfer) != ISOGI_OK) exit(1);
+        if (isogi_dvr_step(dvr, 0, NULL) != ISOGI_OK) exit(1);
+        for (int turn = 0; turn < (i ? 3 : 1); turn++) {
+            double begun = s->threads == 1 ? cpu_seconds() : wall_seconds();
+            memset(&count, 0, sizeof count);
+            if (isogi_dvr_render(dvr, &view, lighting, i ? image : reference, NULL, &count) != ISOGI_OK) exit(1);
+            seconds = fmin(seconds, (s->threads == 1 ? cpu_seconds() : wall_seconds()) - begun);
+        }
+        isogi_dvr_free(dvr);
+        if (!i) {
+            FILE *out = fopen(path, "wb");
+            if (out && fwrite(reference, sizeof *reference, pixels, out) != pixels) fprintf(stderr, "%s: not written\n", path);
+            if (out) fclose(out);
+            continue;
+        }
+        for (size_t k = 0; k < 3 * pixels; k++) {
+            double d = srgb((double)image[k / 3][k % 3]) - srgb((double)reference[k / 3][k % 3]);
+            sum += d * d;
+        }
+        snprintf(setting, sizeof setting, "step %g", i == 1 ? 1 : steps[i]);
+        row("frame", s->name, i == 1 ? "default" : "steps", setting, seconds, sqrt(sum / (double)(3 * pixels)), (double)count.samples, "sample");
+    }
+    if (kept) fclose(kept);
+    free(image), free(reference);
+}
+
+static void bench_scene_rows(const bench_scene *s) {
+    const char *folder = getenv("ISOGI_DATA");
+    static const float sky[3] = {3.5449077f, 3.5449077f, 3.5449077f};
+    size_t count = s->size[0] * s->size[1] * s->size[2];
+    isogi_lighting lighting = {.env = {.sh = sky, .sh_order = 1}, .lights = &s->sun, .light_count = s->sun.rgb[0] > 0};
+    isogi_volume volume = {.size = {s->size[0], s->size[1], s->size[2]}};
+    isogi_transfer_point p[6];
+    isogi_transfer transfer = {.points = p, .point_count = (size_t)s->points};
+    isogi_pyramid *pyramid = NULL;
+    hdr_image image = {0};
+    char path[512], error[512];
+    void *data = malloc(count * (s->file ? 1 : sizeof(float)));
+    memcpy(p, s->point, sizeof p);
+    if (s->file) {
+        FILE *file;
+        snprintf(path, sizeof path, "%s/%s", folder ? folder : "", s->file);
+        file = folder ? fopen(path, "rb") : NULL;
+        if (!file || fread(data, 1, count, file) != count) {
+            fprintf(stderr, "  %s: left out, ISOGI_DATA holds no %s\n", s->name, s->file);
+            if (file) fclose(file);
+            free(data);
+            return;
+        }
+        fclose(file);
+        if (s->hdr) {
+            snprintf(path, sizeof path, "%s/%s", folder, s->hdr);
+            if (!hdr_read(path, &image, error)) fprintf(stderr, "  %s: %s\n", path, error);
+            else lighting.env.sh = NULL, lighting.env.sh_order = 0, lighting.env.rgb = image.rgb, lighting.env.width = image.width, lighting.env.height = image.height;
+        }
+    } else {
+        float *f = (float *)data, low = 1e9f, high = -1e9f, u;
+        double iso = s->name[0] == 'g' ? 0 : 0.5;
+        for (size_t i = 0; i < count; i++) {
+            double x = 2.0 * (double)(i % 256) / 255 - 1, y = 2.0 * (double)(i / 256 % 256) / 255 - 1, z = 2.0 * (double)(i / 65536) / 255 - 1;
+            f[i] = (float)(s->name[0] == 'g' ? gyroid(x, y, z) : marschner_lobb(x, y, z));
+            low = fminf(low, f[i]), high = fmaxf(high, f[i]);
+        }
+        const isogi_transfer_point tent[5] = {{(double)low, {.2f, .3f, .9f}, 0}, {iso - 0.05 * (double)(high - low), {0, 0, 0}, 0}, {iso, {.9f, .8f, .6f}, 0.357f},
+                                              {iso + 0.05 * (double)(high - low), {0, 0, 0}, 0}, {(double)high, {.9f, .2f, .2f}, 0}};
+        memcpy(p, tent, sizeof tent);
+        for (int i = 1; i < 4; i += 2) {
+            int end = i == 1 ? 0 : 4;
+            u = (float)((p[i].value - p[2].value) / (p[end].value - p[2].value));
+            for (int a = 0; a < 3; a++) p[i].rgb[a] = p[2].rgb[a] + u * (p[end].rgb[a] - p[2].rgb[a]);
+        }
+        transfer.point_count = 5, volume.type = ISOGI_F32;
+        for (int a = 0; a < 3; a++) volume.spacing[a] = 2.0 / 255, volume.origin[a] = -1;
+    }
+    if (s->file && !s->hdr) lighting.env.sh = NULL, lighting.env.sh_order = 0;
+    volume.data = data;
+    if (isogi_vol_build(&pyramid, &volume, NULL) != ISOGI_OK) exit(1);
+    if (s->frame) bench_frame(s, pyramid, &transfer, &lighting);
+    if (s->update) bench_update(s, pyramid, (const uint8_t *)data, &transfer);
+    isogi_vol_free(pyramid);
+    free(image.rgb), free(data);
+}
+
 int main(int argc, char **argv) {
     const char *path = NULL;
     for (int i = 1; i < argc; i++) {
@@ -254,6 +488,7 @@ int main(int argc, char **argv) {
         isogi_vol_free(pyramid);
         free(data);
     }
+    for (size_t i = 0; i < sizeof bench_scenes / sizeof bench_scenes[0]; i++) bench_scene_rows(&bench_scenes[i]);
     bench_scale_invariant();
     bench_tables();
     return fclose(csv) ? 1 : 0;

@@ -1,0 +1,113 @@
+/* Visibility of isogi_dvr.h by sweeps and by the paper's blocks, and pictures of physical space. */
+#define ISOGI_IMPLEMENTATION
+#include "isogi_dvr.h"
+#include "test.h"
+
+enum { N = 49 };
+static float data[N][N][N];
+static const isogi_context serial = {.threads = 1};
+
+static isogi_pyramid *linear_field(void) {
+    isogi_pyramid *pyramid = NULL;
+    for (int i = 0; i < N * N * N; i++) data[i / N / N][i / N % N][i % N] = (float)(i % N) + 0.37f * (float)(i / N % N) - 0.2f * (float)(i / N / N);
+    const isogi_volume volume = {.data = data, .type = ISOGI_F32, .size = {N, N, N}};
+    CHECK(isogi_vol_build(&pyramid, &volume, &serial) == ISOGI_OK, "build");
+    return pyramid;
+}
+
+static isogi_dvr *renderer(isogi_dvr_desc desc, const isogi_transfer *transfer, const isogi_context *context) {
+    isogi_dvr *dvr = NULL;
+    CHECK(isogi_dvr_create(&dvr, &desc, context) == ISOGI_OK && isogi_dvr_set_transfer(dvr, transfer) == ISOGI_OK, "create");
+    return dvr;
+}
+
+static const isogi_transfer_point ramp[] = {{-20, {1, 0.5f, 0.2f}, 0}, {80, {0.2f, 0.5f, 1}, 0.1f}};
+static const isogi_transfer ramp_transfer = {ramp, 2, NULL, 0};
+
+TEST(blocks_of_all_levels_hold_a_linear_field_without_a_seam) {
+    isogi_pyramid *pyramid = linear_field();
+    int mixed = 0;
+    for (double reduction = 1; reduction < 1e7; reduction *= 6) { /* the last budgets are smaller than a block */
+        const isogi_dvr_desc desc = {.pyramid = pyramid, .shading = ISOGI_DVR_VISIBILITY, .method = ISOGI_DVR_PAPER, .directions = 8,
+                                     .sphere = ISOGI_DVR_OCTAHEDRON, .order = 2, .grid = {3, 3, 3}, .reduction = reduction};
+        isogi_dvr *dvr = renderer(desc, &ramp_transfer, &serial);
+        isogi_dvr_report report;
+        test_random r = {7};
+        CHECK(isogi_dvr_step(dvr, 0, NULL) == ISOGI_OK && isogi_dvr_inspect(dvr, &report) == ISOGI_OK, "step");
+        CHECK((double)report.points <= fmax(N * N * N / reduction, 27), "%d points of %g", (int)report.points, N * N * N / reduction);
+        mixed |= report.level_count[3] && report.level_count[4];
+        for (int i = 0; i < 2000; i++) {
+            float p[3], value;
+            for (int a = 0; a < 3; a++) p[a] = i % 4 == a ? 16 * (float)(1 + i % 2) : (float)random_range(&r, 0, N - 1);
+            isogi_dvr_sample_blocks(dvr, (const float(*)[3])p, 1, &value, NULL);
+            double expected = (double)p[0] + 0.37 * (double)p[1] - 0.2 * (double)p[2];
+            CHECK(fabs((double)value - expected) < 1e-4, "reduction %g: %g, not %g", reduction, (double)value, expected); /* float rounding of 70 */
+        }
+        isogi_dvr_free(dvr);
+    }
+    CHECK(mixed, "no budget mixed levels");
+    isogi_vol_free(pyramid);
+}
+
+TEST(visibility_is_the_same_bits_for_any_threads_and_slicing) {
+    isogi_pyramid *pyramid = linear_field();
+    for (int method = ISOGI_DVR_PAPER; method <= ISOGI_DVR_SWEEP; method++) {
+        float v[2][27 * 9], points[27][3];
+        for (int i = 0; i < 27; i++) points[i][0] = (float)(24 * (i % 3)), points[i][1] = (float)(24 * (i / 3 % 3)), points[i][2] = (float)(24 * (i / 9));
+        for (int n = 0; n < 2; n++) {
+            const isogi_context two = {.threads = 2};
+            const isogi_dvr_desc desc = {.pyramid = pyramid, .shading = ISOGI_DVR_VISIBILITY, .method = (isogi_dvr_method)method, .directions = 20, .grid = {5, 3, 4}};
+            isogi_dvr *dvr = renderer(desc, &ramp_transfer, n ? &two : &serial);
+            double remaining = 1;
+            while (remaining > 0) CHECK(isogi_dvr_step(dvr, n ? 100 : 0, &remaining) == ISOGI_OK, "step");
+            isogi_dvr_sample_visibility(dvr, (const float(*)[3])points, 27, v[n]);
+            isogi_dvr_free(dvr);
+        }
+        CHECK(!memcmp(v[0], v[1], sizeof v[0]), "method %d", method);
+    }
+    isogi_vol_free(pyramid);
+}
+
+TEST(an_edit_computes_only_what_it_changes_and_light_computes_nothing) {
+    isogi_pyramid *pyramid = linear_field();
+    for (int method = ISOGI_DVR_PAPER; method <= ISOGI_DVR_SWEEP; method++) {
+        const isogi_dvr_desc desc = {.pyramid = pyramid, .shading = ISOGI_DVR_VISIBILITY, .method = (isogi_dvr_method)method, .directions = 8, .grid = {3, 3, 3}, .reduction = 1};
+        isogi_transfer_point high[] = {{50, {1, 1, 1}, 0}, {60, {1, 1, 1}, 0.3f}};
+        const isogi_transfer edited = {high, 2, NULL, 0};
+        isogi_dvr *dvr = renderer(desc, &edited, &serial);
+        isogi_dvr_report before, after;
+        isogi_counters count = {0}, again = {0};
+        float image[64][4];
+        const isogi_view view = {.width = 8, .height = 8, .eye = {100, 90, 120}, .target = {24, 24, 24}};
+        const isogi_light sun = {.kind = ISOGI_LIGHT_DIRECTIONAL, .vector = {1, 2, 3}, .rgb = {1, 1, 1}};
+        const isogi_lighting lighting = {.lights = &sun, .light_count = 1};
+        isogi_dvr_step(dvr, 0, NULL), isogi_dvr_inspect(dvr, &before);
+        CHECK(before.blocks_classified > 0 && before.blocks_classified < 20, "%d of 27 blocks", (int)before.blocks_classified);
+        isogi_dvr_counters(dvr, &count);
+        high[0].rgb[1] = 0.5f; /* colour alone, and light */
+        isogi_dvr_set_transfer(dvr, &edited), isogi_dvr_step(dvr, 0, NULL);
+        CHECK(isogi_dvr_render(dvr, &view, &lighting, image, NULL, NULL) == ISOGI_OK, "render");
+        isogi_dvr_step(dvr, 0, NULL), isogi_dvr_counters(dvr, &again), isogi_dvr_inspect(dvr, &after);
+        CHECK(again.rays == count.rays && after.blocks_classified == before.blocks_classified, "method %d: %d rays more", method, (int)(again.rays - count.rays));
+        isogi_dvr_free(dvr);
+    }
+    isogi_vol_free(pyramid);
+}
+
+TEST(opacity_does_not_depend_on_the_step) {
+    isogi_pyramid *pyramid = linear_field();
+    const isogi_view view = {.width = 1, .height = 1, .eye = {200, 20, 22}, .target = {0, 20, 22}};
+    double expected = 0; /* depth: the integral of extinction (f + 20) / 1000 from x = 0 to 48 at y = 20, z = 22 */
+    expected = 48 * (24 + 0.37 * 20 - 0.2 * 22 + 20) / 1000;
+    for (double step = 0.1; step < 20; step *= 2.3) {
+        float pixel[1][4];
+        const isogi_dvr_desc desc = {.pyramid = pyramid, .step = step};
+        isogi_dvr *dvr = renderer(desc, &ramp_transfer, &serial);
+        CHECK(isogi_dvr_render(dvr, &view, NULL, pixel, NULL, NULL) == ISOGI_OK, "render");
+        CHECK(fabs((double)pixel[0][3] - (1 - exp(-expected))) < 1e-4, "step %g: %g", step, (double)pixel[0][3]); /* 1024 classes, float sums */
+        isogi_dvr_free(dvr);
+    }
+    isogi_vol_free(pyramid);
+}
+
+TEST_MAIN("dvr_visibility")
