@@ -4364,7 +4364,7 @@ static int isogi_dvr__fast_begin(const isogi_dvr__frame *f, const double origin[
     double dir[3], pieces, rest;
     int a;
     isogi_dvr__transform(d->to_grid, world, dir);
-    if (!isogi_dvr__begin(&march, d, origin, dir, 1, f->step)) return 0;
+    if (d->transparent || !isogi_dvr__begin(&march, d, origin, dir, 1, f->step)) return 0;
     pieces = ceil(march.length / march.piece - 1e-6);
     if (!(pieces < 1e7)) return 0;
     rest = march.length - (pieces - 1) * march.piece;
