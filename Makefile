@@ -29,20 +29,30 @@ export CC CXX CFLAGS
 
 all: $(EXAMPLES)
 
+# The implementation of each header is compiled once, and what a program would implement itself is switched off: it takes most of the
+# time. Tests that look at what is private (isogi_vol__name), and benchmarks, hold their own.
+OBJECTS := $(patsubst %,build/%.o,isogi_sh isogi_vol isogi_trace isogi_dvr)
+SHARED  := -DISOGI_SH_IMPLEMENTED -DISOGI_VOL_IMPLEMENTED -DISOGI_TRACE_IMPLEMENTED -DISOGI_DVR_IMPLEMENTED $(OBJECTS)
+
 # What a source file includes is found by the compiler (the .d files). A line "LIBS: -lname" in a test's first comment names
 # libraries of its own. What does not compile must not leave an older program behind.
 COMPILE = @rm -f $@; echo "$(CC) $<"; \
 	libs=$$(sed -n '1,20s|.*LIBS: \([^*]*\).*|\1|p' $<); \
-	$(CC) $(C99) $(CFLAGS) -MMD -MP -MF $@.d -MT $@ $(1) -o $@ $< $(LIBS) $$libs
+	grep -q 'isogi_[a-z]*__\|ISOGI_SH_LEVEL' $< || shared="$(SHARED)"; \
+	$(CC) $(C99) $(CFLAGS) -MMD -MP -MF $@.d -MT $@ $(1) -o $@ $< $$shared $(LIBS) $$libs
 
-build/%: examples/%.c build/flags
+$(OBJECTS): build/%.o: %.h tests/compile/one.c build/flags
+	@echo "$(CC) $<"; $(CC) $(C99) $(CFLAGS) -MMD -MP -MF $@.d -MT $@ -DHEADER='"$<"' \
+		-D$$(echo $* | tr a-z A-Z)_IMPLEMENTATION -c -o $@ tests/compile/one.c
+
+build/%: examples/%.c build/flags $(OBJECTS)
 	$(call COMPILE)
 
 # MPI's headers do not keep to our warnings.
 build/bake_mpi: examples/bake_mpi.c build/flags
 	@rm -f $@; echo "mpicc $<"; mpicc -std=gnu99 -Wall -Wextra -ffp-contract=off -I. -Iexamples/common $(CFLAGS) -MMD -MP -MF $@.d -MT $@ -o $@ $< $(LIBS)
 
-build/tests/%: tests/%.c build/flags
+build/tests/%: tests/%.c build/flags $(OBJECTS)
 	$(call COMPILE,-Itests)
 
 build/bench/%: tests/bench/%.c build/flags
