@@ -144,21 +144,21 @@ fast_math() {
 only() { printf '%s\n' $units | grep -E "test_($1)\$"; }
 
 variants() {
-    threaded='vol|vol_api|mesh|trace|trace_bake|dvr|dvr_visibility'
+    threaded='vol|mesh|trace_bake|dvr_visibility'
     # Those that only start other programs have nothing to be built anew.
     units=
     for program; do
         case $program in *test_docs | *test_viewer | *test_examples) ;; *) units="$units $program" ;; esac
     done
-    # A variant runs what it can change: clang and the address sanitizer all of them, the others those that stand for their kind.
-    variant O0 "$CC" "-O0 $CONTRACT_OFF" '' $(only 'sh|vol_api|dvr')
-    variant O3 "$CC" "-O3 $CONTRACT_OFF" '' $(only 'sh|sample|vol|mesh|trace|dvr')
-    fast_math $(only 'sh|sample|vol|vol_api|mesh|trace|trace_store|dvr|dvr_data|dvr_visibility')
-    variant no-threads "$CC" "-O2 $CONTRACT_OFF -DISOGI_NO_THREADS" '' $(only 'vol|mesh|trace|dvr')
-    variant no-simd "$CC" "-O2 $CONTRACT_OFF -DISOGI_NO_SIMD" '' $(only 'sh|sample|vol|trace_bake|dvr|dvr_visibility')
+    # A variant runs what it can change: the address sanitizer all of them, the others those that stand for their kind.
+    variant O0 "$CC" "-O0 $CONTRACT_OFF" '' $(only sh)
+    variant O3 "$CC" "-O3 $CONTRACT_OFF" '' $(only 'sh|vol|dvr')
+    fast_math $(only 'sh|sample|vol|trace|dvr')
+    variant no-threads "$CC" "-O2 $CONTRACT_OFF -DISOGI_NO_THREADS" '' $(only 'vol|trace')
+    variant no-simd "$CC" "-O2 $CONTRACT_OFF -DISOGI_NO_SIMD" '' $(only 'sh|sample|vol|dvr')
     variant sh-level-1 "$CC" "-O2 $CONTRACT_OFF -DISOGI_SH_LEVEL=1" '' $(only sh)
     if have clang; then
-        variant clang clang "-O2 $CONTRACT_OFF" '' $units
+        variant clang clang "-O2 $CONTRACT_OFF" '' $(only 'sh|sample|vol|mesh|trace|dvr')
         variant address+undefined clang "-O1 -g $CONTRACT_OFF -fsanitize=address,undefined,float-cast-overflow -fno-sanitize-recover=all" '' $units
         variant thread clang "-O1 -g $CONTRACT_OFF -fsanitize=thread" 'TSAN_OPTIONS=halt_on_error=1' $(only "$threaded")
     else
@@ -225,7 +225,7 @@ quick)
 long)
     sources
     matrix
-    for program; do item live "${program##*/}" "$program --long"; done
+    for program; do item live "${program##*/}" "ISOGI_TEST_SECONDS=\${ISOGI_TEST_SECONDS:-90} $program --long"; done
     item check bake/parts-and-pauses "sh tests/compile/bake.sh"
     memcheck
     fuzzers

@@ -1,8 +1,8 @@
 /* Very many rays: against a reference that is cheap and knows when it does not know, and out of closed surfaces, which nothing may leave
    unseen. Runs on all cores.
 
-   The long suite tries 100 million and a billion rays, or as many as fit into five minutes each; ISOGI_TEST_RAYS and
-   ISOGI_TEST_SECONDS set other numbers for both. */
+   With --long, 100 million and a billion rays, or as many as fit into five minutes each (`make check`: a minute and a half);
+   ISOGI_TEST_RAYS and ISOGI_TEST_SECONDS set other numbers for both. */
 #define ISOGI_IMPLEMENTATION
 #include "isogi_vol.h"
 #include "test.h"
