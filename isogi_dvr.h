@@ -3612,6 +3612,7 @@ static void isogi_dvr__shade_visibility(const isogi_dvr *d, const isogi_dvr__lig
         float light[ISOGI_DVR__MAX_ORDER * ISOGI_DVR__MAX_ORDER];
         double sum = 0;
         for (i = 0; i < d->coefficients; i++) {
+            /* cppcheck-suppress uninitvar */
             light[i] = l->sh[3 * i + (size_t)a] + (here ? nearby[3 * i + (size_t)a] : 0);
             sum += (double)light[i] * (double)v[i];
         }
@@ -4107,7 +4108,7 @@ static void isogi_dvr__fast_light(const isogi_dvr__frame *f, const float positio
         base += stride * (size_t)c, offset[a] = points > 1 ? stride : 0;
         stride *= (size_t)points;
     }
-    p = f->light[0] + base;
+    p = (const float *)f->light + base;
     for (i = 0; i < 4; i++) {
         const float *q = p + i;
         float v00 = q[0] + u[0] * (q[offset[0]] - q[0]), v10 = q[offset[1]] + u[0] * (q[offset[1] + offset[0]] - q[offset[1]]);

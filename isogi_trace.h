@@ -3291,7 +3291,9 @@ static void isogi_trace__pass(isogi_trace *t, double change[2]) {
         size_t tasks = (sweep.segment->entries + ISOGI_TRACE__SWEEP - 1) / ISOGI_TRACE__SWEEP, i;
         isogi_parallel(&silent, tasks, isogi_trace__pass_task, &sweep, 0, 1);
         for (i = 0; i < tasks; i++) {
+            /* cppcheck-suppress uninitvar */
             if (changes[i] > change[0]) change[0] = changes[i];
+            /* cppcheck-suppress uninitvar */
             if (largest[i] > change[1]) change[1] = largest[i];
         }
     }

@@ -1272,6 +1272,7 @@ ISOGI_VOL__INLINE void isogi_vol__code_row(const float *row, int leaves, const f
 #else
         int x;
         for (x = 0; x < 5; x++) {
+            /* cppcheck-suppress uninitvar */
             const float q = (row[x] - low[i]) * scale[i];
             out[i][at + x] = (uint8_t)(q > 0 ? q < ISOGI_VOL__CODES ? (int)q : (int)ISOGI_VOL__CODES : 0);
         }
