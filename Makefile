@@ -38,7 +38,7 @@ SHARED  := -DISOGI_SH_IMPLEMENTED -DISOGI_VOL_IMPLEMENTED -DISOGI_TRACE_IMPLEMEN
 # libraries of its own. What does not compile must not leave an older program behind.
 COMPILE = @rm -f $@; echo "$(CC) $<"; \
 	libs=$$(sed -n '1,20s|.*LIBS: \([^*]*\).*|\1|p' $<); \
-	grep -q 'isogi_[a-z]*__\|ISOGI_SH_LEVEL' $< || shared="$(SHARED)"; \
+	grep -q 'isogi_[a-z]*__\|ISOGI_SH_LEVEL\|looks inside' $< || shared="$(SHARED)"; \
 	$(CC) $(C99) $(CFLAGS) -MMD -MP -MF $@.d -MT $@ $(1) -o $@ $< $$shared $(LIBS) $$libs
 
 $(OBJECTS): build/%.o: %.h tests/compile/one.c build/flags

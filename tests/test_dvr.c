@@ -1,4 +1,5 @@
 /* Properties of isogi_dvr.h: transfer functions, ray casting in both spaces, peaks, SH visibility, lighting. */
+/* One test looks inside an isogi_dvr, for what has no call. */
 #define ISOGI_IMPLEMENTATION
 #include "isogi_dvr.h"
 #include "test.h"
