@@ -966,7 +966,8 @@ typedef int32_t isogi_sh__i4 __attribute__((vector_size(16), aligned(4), may_ali
         u[0] = FMA(x, e, x), u[1] = FMA(y, e, y), u[2] = FMA(z, e, z), u[3] = FMA(z, e, z - u[2]);                             \
         return 1;                                                                                                              \
     }                                                                                                                          \
-    /* order 5 as polynomials in cos 2t = z^2 - x^2 - y^2, whose coefficients are small, so that little cancels anywhere */    \
+    /* order 5 as polynomials in cos 2t = z^2 - x^2 - y^2, whose coefficients are small, so that little cancels anywhere; not for   \
+       16-byte vectors, whose products are not fused: 4.7e-7 was seen */                                                      \
     TARGET ISOGI_SH__INLINE void NAME##_order5(T *out, size_t stride, const V *u) {                                            \
         V x = u[0], y = u[1], z = u[2], zero = {0}, v = FMA(z, z, -FMA(x, x, y * y)), c = (x - y) * (x + y), s = x * y, c3, s3, f; \
         *(V *)(out + 0 * stride) = zero + (T)0.28209479177387814;                                                              \
@@ -1074,7 +1075,7 @@ typedef int32_t isogi_sh__i4 __attribute__((vector_size(16), aligned(4), may_ali
     TARGET static size_t NAME(T *out, size_t stride, int order, const T *x, const T *y, const T *z, size_t count) {            \
         V u[4];                                                                                                                \
         size_t i;                                                                                                              \
-        if (order == 5) {                                                                                                      \
+        if (order == 5 && WIDTH * sizeof(T) > 16) {                                                                            \
             for (i = 0; i + WIDTH <= count && NAME##_load(u, x + i, y + i, z + i); i += WIDTH) NAME##_order5(out + i, stride, u); \
         } else {                                                                                                               \
             for (i = 0; i + WIDTH <= count && NAME##_load(u, x + i, y + i, z + i); i += WIDTH) NAME##_any(out + i, stride, order, u); \
@@ -1088,7 +1089,7 @@ typedef int32_t isogi_sh__i4 __attribute__((vector_size(16), aligned(4), may_ali
         for (i = 0; i + WIDTH <= count; i += WIDTH) {                                                                          \
             NAME##_split(u, direction[i]);                                                                                     \
             if (!NAME##_unit(u)) break;                                                                                        \
-            if (order == 5) {                                                                                                  \
+            if (order == 5 && WIDTH * sizeof(T) > 16) {                                                                        \
                 NAME##_order5(scratch, WIDTH, u);                                                                              \
                 for (k = 0; k < WIDTH; k += 16 / sizeof(T)) NAME##_turn(out + 25 * (i + k), 25, scratch + k, WIDTH, 0);        \
             } else {                                                                                                           \

@@ -137,7 +137,7 @@
                 time; request, step and relight alone, without readers.
    Determinism  The same bits for any number of threads and any budget of steps. PATHS: a texel's light depends on the description
                 and its place alone, lazily or fully, in parts (desc.box_first, isogi_trace_merge), in any order of requests.
-                FEEDBACK: which probes there are depends on what was asked for and in which order: within 3 % at a point.
+                FEEDBACK: which probes there are depends on what was asked for and in which order: within 6 % (rms over points).
    Limits       Order 6; 2^24 samples; paths end after 10000 reflections. White surfaces that enclose a light truly have infinite
                 light: what is computed then is finite and has no meaning; its error says so, and isogi_trace_report.diverges.
    Cost         PATHS: samples * (1 + lights that have a size) rays for a texel, and as many for each reflection. FEEDBACK:
