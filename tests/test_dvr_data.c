@@ -45,17 +45,23 @@ static void reference_values(const isogi_transfer *t, long double x, long double
     }
 }
 
+/* Where the ray o + t d enters and leaves the box. */
+static void reference_ends(const field *f, const long double o[3], const long double d[3], long double ends[2]) {
+    ends[0] = 0, ends[1] = 1e30L;
+    for (int a = 0; a < 3; a++) {
+        long double t0 = -o[a] / d[a], t1 = (f->size[a] - 1 - o[a]) / d[a];
+        ends[0] = fmaxl(ends[0], fminl(t0, t1)), ends[1] = fminl(ends[1], fmaxl(t0, t1));
+    }
+}
+
 /* Premultiplied colour and transmittance up to where the transmittance falls below `end` (at *t, if so); unit-spaced volume at 0. */
 static void reference_ray(const field *f, const isogi_transfer *t, const double eye[3], const float dir[3], int pieces, long double end,
                           long double out[4], long double *stop, int *crossings) {
-    long double enter = 0, leave = 1e30L, o[3], d[3];
+    long double ends[2], leave, o[3], d[3];
     for (int a = 0; a < 3; a++) out[a] = 0, o[a] = (long double)eye[a], d[a] = (long double)dir[a];
     out[3] = 1, *stop = -1;
-    for (int a = 0; a < 3; a++) {
-        long double t0 = -o[a] / d[a], t1 = (f->size[a] - 1 - o[a]) / d[a];
-        enter = fmaxl(enter, fminl(t0, t1)), leave = fminl(leave, fmaxl(t0, t1));
-    }
-    for (long double at = enter; at < leave - 1e-15L;) {
+    reference_ends(f, o, d, ends), leave = ends[1];
+    for (long double at = ends[0]; at < leave - 1e-15L;) {
         long double to = leave, last = 0;
         int c[3];
         for (int a = 0; a < 3; a++) {
@@ -111,29 +117,37 @@ TEST(exact_rays_agree_with_a_long_double_quadrature) {
                 isogi_dvr *dvr = dvr_new(&desc, &transfer);
                 double eye[3], target[3], origin[3];
                 float dir[3];
-                long double expected[4], stop;
+                long double expected[4], stop = -1;
                 random_line(&f, &r, eye, target);
                 isogi_view view = line_of_sight(eye, target);
                 isogi_view_ray(&view, 0, 0, origin, dir);
                 pixel p = cast(dvr, eye, target, NULL);
-                reference_ray(&f, &transfer, origin, dir, 600, -1, expected, &stop, NULL);
-                /* float pixels: 6e-8; extrema within the reference's short pieces: some 1e-7 of the extinction */
-                double tolerance = 2e-7 + 2e-7 * extinctions[e] * (double)expected[3] + (e == 2 ? 8e-7 : 3e-7);
-                if (tolerance > 1e-6) tolerance = 1e-6;
+                double tolerance = 0, errors[4];
+                /* a step of the extinction within a short piece that holds an extremum takes shorter pieces: then these decide */
+                for (int pieces = 600, again = 1; again && pieces <= 4800; pieces *= 8) {
+                    reference_ray(&f, &transfer, origin, dir, pieces, -1, expected, &stop, NULL);
+                    /* float pixels: 6e-8; extrema within the reference's short pieces: some 1e-7 of the extinction */
+                    tolerance = fmin(1e-6, 2e-7 + 2e-7 * extinctions[e] * (double)expected[3] + (e == 2 ? 8e-7 : 3e-7));
+                    again = 0;
+                    for (int a = 0; a < 4; a++) {
+                        errors[a] = fabs((double)p.c[a] - (double)(a < 3 ? expected[a] : 1 - expected[3]));
+                        again |= !(errors[a] <= tolerance);
+                    }
+                }
                 for (int a = 0; a < 4; a++) {
-                    double error = fabs((double)p.c[a] - (double)(a < 3 ? expected[a] : 1 - expected[3]));
+                    double error = errors[a];
                     most = fmax(most, error);
                     CHECK(error <= tolerance, "field %d extinction %g ray %d channel %d: %.9g, not %.9g", kind, extinctions[e], n, a, (double)p.c[a],
                           (double)(a < 3 ? expected[a] : 1 - expected[3]));
                 }
                 long double clear[4];
-                reference_ray(&f, &transfer, origin, dir, 600, 1 - 0.5L * (1 - expected[3]), clear, &stop, NULL);
+                if (expected[3] < 1) reference_ray(&f, &transfer, origin, dir, 600, 1 - 0.5L * (1 - expected[3]), clear, &stop, NULL);
                 if (stop > 0) {
                     /* float depth, and one short piece of the reference */
                     double error = fabs((double)p.depth - (double)stop);
                     deepest = fmax(deepest, error), half++;
                     CHECK(error < 4e-3, "field %d extinction %g ray %d: half depth %.9g, not %.9g", kind, extinctions[e], n, (double)p.depth, (double)stop);
-                } else CHECK(p.depth > 1e30f || expected[3] > 1 - 1e-9L, "nothing is seen: depth %g", (double)p.depth);
+                } else CHECK(p.depth > 1e30f, "nothing is seen: depth %g", (double)p.depth);
                 isogi_dvr_free(dvr);
                 field_free(&f);
             }
@@ -449,21 +463,41 @@ static int walk_crossings(const isogi_dvr *dvr, const double origin[3], const fl
     isogi_dvr__march m;
     isogi_dvr__span s;
     double d[3] = {(double)dir[0], (double)dir[1], (double)dir[2]};
+    double touched = -1; /* t at which the last piece ended with the isovalue itself */
     int count = 0;
     if (!isogi_dvr__begin(&m, dvr, origin, d, 1, 0.5)) return 0;
     isogi_dvr__begin_walk(&s.walk, &m);
     while (isogi_dvr__next_monotone(&s.walk, &s.piece) && count < 60)
         if ((s.piece.value[0] >= isovalue) != (s.piece.value[1] >= isovalue)) {
             double t = m.enter + s.piece.t0 + isogi_dvr__place_of(&s.piece, isovalue) * s.piece.dt;
-            if (s.piece.value[1] < isovalue && !(s.piece.value[0] > isovalue) && count && out[count - 1].t > m.enter + s.piece.from - 1e-12) continue; /* touched */
+            if (s.piece.value[1] < isovalue && !(s.piece.value[0] > isovalue) && s.piece.from <= touched) continue; /* in one point: once */
+            touched = s.piece.value[1] > isovalue || s.piece.value[1] < isovalue ? -1 : s.piece.to;
             out[count].t = t, out[count++].side = s.piece.value[1] >= isovalue ? 1 : -1;
         }
     return count;
 }
 
+/* The ray enters or leaves the box where the field is the isovalue, as on a face of voxels that all have it: then the rounding of that
+   place decides whether the surface is passed. */
+static int ends_on_surface(const field *f, const double origin[3], const float dir[3], double isovalue) {
+    long double o[3], d[3], ends[2];
+    for (int a = 0; a < 3; a++) o[a] = (long double)origin[a], d[a] = (long double)dir[a];
+    reference_ends(f, o, d, ends);
+    for (int i = 0; i < 2; i++) {
+        long double p[3];
+        int c[3];
+        for (int a = 0; a < 3; a++) {
+            p[a] = o[a] + ends[i] * d[a], c[a] = (int)floorl(p[a]);
+            c[a] = c[a] < 0 ? 0 : c[a] > f->size[a] - 2 ? f->size[a] - 2 : c[a];
+        }
+        if (fabsl(reference_value(f, c, p) - (long double)isovalue) < 1e-13L) return 1; /* a double's rounding of t, times the slope: 1e-14 */
+    }
+    return 0;
+}
+
 TEST(crossings_are_those_of_the_exact_intersector) {
     test_random r = {77};
-    int total = 0, rays = LONG_SUITE ? 40000 : 1500, odd = 0;
+    int total = 0, rays = LONG_SUITE ? 40000 : 1500, odd = 0, open = 0;
     double worst = 0;
     for (int n = 0; n < 12; n++) {
         field f = n < 4 ? field_noise(9, (uint64_t)n) : n < 8 ? field_waves(12, (uint64_t)n) : field_new(8, 8, 8);
@@ -483,6 +517,10 @@ TEST(crossings_are_those_of_the_exact_intersector) {
             random_line(&f, &r, eye, target);
             isogi_view view = line_of_sight(eye, target);
             isogi_view_ray(&view, 0, 0, origin, dir);
+            if (ends_on_surface(&f, origin, dir, isovalue)) {
+                open++;
+                continue;
+            }
             int count = intersector_crossings(f.pyramid, origin, dir, isovalue, expected), found = walk_crossings(dvr, origin, dir, isovalue, got);
             total += count;
             CHECK(count == found, "field %d ray %d: %d crossings, not %d", n, i, found, count);
@@ -499,8 +537,9 @@ TEST(crossings_are_those_of_the_exact_intersector) {
         isogi_dvr_free(dvr);
         field_free(&f);
     }
-    printf("    %d crossings along %d rays: the same; largest difference of t %.2g, %d above 1e-11\n", total, rays, worst, odd);
-    CHECK(total > 500, "%d crossings", total);
+    printf("    %d crossings along %d rays: the same; largest difference of t %.2g, %d above 1e-11; %d rays end on the surface\n", total, rays - open,
+           worst, odd, open);
+    CHECK(total > 500 && open < rays / 100, "%d crossings, %d rays left out", total, open);
 }
 
 /* Along lattice lines every value that counts is a voxel's: whole numbers, exact. */
