@@ -436,7 +436,8 @@ ISOGI_API isogi_result isogi_dvr_tets_render(const isogi_tets *tets, const isogi
 #define ISOGI_DVR__LEAP 6                  /* blocks of 4^3 that a ray steps over at once, to each side */
 
 /* One vector type of 16 floats: the compiler divides it into what the machine has. */
-#if (defined(__clang__) || (defined(__GNUC__) && __GNUC__ >= 9)) && !defined(__TINYC__) && !defined(ISOGI_NO_SIMD) && !(defined(_WIN32) && !defined(__clang__))
+#if (defined(__clang__) || (defined(__GNUC__) && __GNUC__ >= 9)) && !defined(__TINYC__) && !defined(ISOGI_NO_SIMD) && !(defined(_WIN32) && !defined(__clang__)) && \
+    (!defined(__FLT_EVAL_METHOD__) || __FLT_EVAL_METHOD__ == 0)
 #define ISOGI_DVR__VECTORS
 typedef float isogi_dvr__floats __attribute__((vector_size(64), aligned(4), may_alias));
 typedef int32_t isogi_dvr__ints __attribute__((vector_size(64), aligned(4), may_alias));

@@ -759,7 +759,7 @@ static isogi_result isogi_vol__check_layout(const isogi_volume *v, size_t type_s
         size_t step, span = v->size[a] - 1, all;
         if (!v->size[a]) return ISOGI_INVALID;
         if (v->size[a] > 0x7fffffff || v->halo_low[a] > 0x7fffffff || v->halo_high[a] > 0x7fffffff) return ISOGI_TOO_LARGE;
-        if ((uint64_t)v->first[a] > (uint64_t)1 << 53) return ISOGI_TOO_LARGE;
+        if ((double)v->first[a] > 9007199254740992.0) return ISOGI_TOO_LARGE; /* 2^53 */
         if (v->halo_low[a] + v->halo_high[a] > SIZE_MAX / 2 - span) return ISOGI_TOO_LARGE;
         span += v->halo_low[a] + v->halo_high[a], all = span + 1;
         if (stride == PTRDIFF_MIN || stride % (ptrdiff_t)type_size) return ISOGI_INVALID;
