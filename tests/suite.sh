@@ -145,12 +145,13 @@ only() { printf '%s\n' $units | grep -E "test_($1)\$"; }
 
 variants() {
     threaded='vol|mesh|trace_bake|dvr_visibility'
+    checked='sh|sample|vol|vol_api|vol_field|mesh|trace|trace_bake|trace_light|trace_store|dvr|dvr_data|dvr_tets|dvr_transfer|dvr_visibility'
     # Those that only start other programs have nothing to be built anew.
     units=
     for program; do
         case $program in *test_docs | *test_viewer | *test_examples) ;; *) units="$units $program" ;; esac
     done
-    # A variant runs what it can change: the address sanitizer all of them, the others those that stand for their kind.
+    # A variant runs what it can change: the address sanitizer most of them, the others those that stand for their kind.
     variant O0 "$CC" "-O0 $CONTRACT_OFF" '' $(only sh)
     variant O3 "$CC" "-O3 $CONTRACT_OFF" '' $(only 'sh|vol|dvr')
     fast_math $(only 'sh|sample|vol|trace|dvr')
@@ -159,11 +160,11 @@ variants() {
     variant sh-level-1 "$CC" "-O2 $CONTRACT_OFF -DISOGI_SH_LEVEL=1" '' $(only sh)
     if have clang; then
         variant clang clang "-O2 $CONTRACT_OFF" '' $(only 'sh|sample|vol|mesh|trace|dvr')
-        variant address+undefined clang "-O1 -g $CONTRACT_OFF -fsanitize=address,undefined,float-cast-overflow -fno-sanitize-recover=all" '' $units
+        variant address+undefined clang "-O1 -g $CONTRACT_OFF -fsanitize=address,undefined,float-cast-overflow -fno-sanitize-recover=all" '' $(only "$checked")
         variant thread clang "-O1 -g $CONTRACT_OFF -fsanitize=thread" 'TSAN_OPTIONS=halt_on_error=1' $(only "$threaded")
     else
         item skip clang "clang is not installed"
-        variant address+undefined "$CC" "-O1 -g $CONTRACT_OFF -fsanitize=address,undefined -fno-sanitize-recover=all" '' $units
+        variant address+undefined "$CC" "-O1 -g $CONTRACT_OFF -fsanitize=address,undefined -fno-sanitize-recover=all" '' $(only "$checked")
         variant thread "$CC" "-O1 -g $CONTRACT_OFF -fsanitize=thread" 'TSAN_OPTIONS=halt_on_error=1' $(only "$threaded")
     fi
 }
