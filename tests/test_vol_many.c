@@ -1,7 +1,7 @@
 /* Very many rays: against a reference that is cheap and knows when it does not know, and out of closed surfaces, which nothing may leave
    unseen. Runs on all cores.
 
-   With --long, 100 million and a billion rays, or as many as fit into five minutes each (`make check`: a minute and a half);
+   With --long, 100 million and a billion rays, or as many as fit into five minutes each (`make check`: a minute);
    ISOGI_TEST_RAYS and ISOGI_TEST_SECONDS set other numbers for both. */
 #define ISOGI_IMPLEMENTATION
 #include "isogi_vol.h"
