@@ -3099,8 +3099,9 @@ static int isogi_trace__spans_add(isogi_trace *t, const isogi_trace__set *set, s
         uint32_t count = end - first < ISOGI_TRACE__SPAN ? end - first : ISOGI_TRACE__SPAN;
         if (f->span_count == ISOGI_TRACE__SPANS || f->sample_count + count > ISOGI_TRACE__SAMPLES) return 0;
         if (f->span_count && f->sample_count >= limit) return 0;
-        if (f->span_count - f->task[f->task_count - 1] == ISOGI_TRACE__TASK_SPANS ||
-            f->sample_count - f->spans[f->task[f->task_count - 1]].offset >= ISOGI_TRACE__SPAN)
+        if (f->span_count > f->task[f->task_count - 1] && /* the task has a span: is it full? */
+            (f->span_count - f->task[f->task_count - 1] == ISOGI_TRACE__TASK_SPANS ||
+             f->sample_count - f->spans[f->task[f->task_count - 1]].offset >= ISOGI_TRACE__SPAN))
             f->task[f->task_count++] = (uint32_t)f->span_count;
         memset(s, 0, sizeof *s);
         s->node = (uint32_t)node, s->first = first, s->count = count, s->offset = (uint32_t)f->sample_count;
