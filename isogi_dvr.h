@@ -1409,20 +1409,22 @@ static void isogi_dvr__sweep_row(float *depth, const float *r0, const float *r1,
     for (i = 0; i < count; i++) depth[i] += (w[0] * r0[i] + w[1] * r0[i + 1]) + (w[2] * r1[i] + w[3] * r1[i + 1]);
 }
 
-/* x = exp(-x) for 0 <= x; below 1e-37 it is that. Relative error 2e-7. */
+/* exp(-x) for x >= 0; below 1e-37 it is that. Relative error 2e-7. */
+static float isogi_dvr__exp(float x) {
+    float y = x * -1.44269504f, f, p;
+    int32_t n;
+    y = y > -125 ? y : -125;
+    n = (int32_t)(y - 0.5f), f = y - (float)n;
+    p = 1.54035304e-4f * f + 1.33335581e-3f, p = p * f + 9.61812911e-3f, p = p * f + 5.55041087e-2f;
+    p = p * f + 2.40226507e-1f, p = p * f + 6.93147182e-1f, p = p * f + 1;
+    n = (n + 127) << 23;
+    memcpy(&f, &n, sizeof f);
+    return p * f;
+}
+
 static void isogi_dvr__exp_row(float *x, size_t count) {
     size_t i;
-    for (i = 0; i < count; i++) {
-        float y = x[i] * -1.44269504f, f, p;
-        int32_t n;
-        y = y > -125 ? y : -125;
-        n = (int32_t)(y - 0.5f), f = y - (float)n;
-        p = 1.54035304e-4f * f + 1.33335581e-3f, p = p * f + 9.61812911e-3f, p = p * f + 5.55041087e-2f;
-        p = p * f + 2.40226507e-1f, p = p * f + 6.93147182e-1f, p = p * f + 1;
-        n = (n + 127) << 23;
-        memcpy(&f, &n, sizeof f);
-        x[i] = p * f;
-    }
+    for (i = 0; i < count; i++) x[i] = isogi_dvr__exp(x[i]);
 }
 
 /* sum[i] += factor * from[i] */
@@ -4233,19 +4235,6 @@ static int isogi_dvr__fast_mean(const isogi_dvr__class_entry *classes, float fro
         mean[a] = mean[a] > 0 ? mean[a] : 0;
     }
     return 1;
-}
-
-/* exp(-x) for x >= 0, as exp_row has it. */
-static float isogi_dvr__exp(float x) {
-    float y = x * -1.44269504f, f, p;
-    int32_t n;
-    y = y > -125 ? y : -125;
-    n = (int32_t)(y - 0.5f), f = y - (float)n;
-    p = 1.54035304e-4f * f + 1.33335581e-3f, p = p * f + 9.61812911e-3f, p = p * f + 5.55041087e-2f;
-    p = p * f + 2.40226507e-1f, p = p * f + 6.93147182e-1f, p = p * f + 1;
-    n = (n + 127) << 23;
-    memcpy(&f, &n, sizeof f);
-    return p * f;
 }
 
 /* The first sample from i on that may see something: the last one before the ray leaves the empty blocks around it. */
