@@ -2273,7 +2273,7 @@ static int isogi_dvr__value_at(isogi_dvr__march *m, double t, int cell[3], doubl
    nothing that they hold counts. */
 static int isogi_dvr__next_sampled(isogi_dvr__walk *w, isogi_dvr__stretch *p) {
     isogi_dvr__march *m = w->m;
-    double local[3], value;
+    double local[3], value = 0;
     int cell[3], i;
     while (m->next <= m->count && m->count) {
         double t = (double)m->next * m->piece;

@@ -2764,7 +2764,7 @@ static isogi_result isogi_trace__probe_of(isogi_trace *t, const isogi_trace__cat
     isogi_trace__feedback *f = t->feedback;
     size_t i = isogi_trace__table_find(f, c->key);
     isogi_trace__node *n;
-    float geometric[1][3];
+    float geometric[1][3] = {{0, 0, 0}};
     isogi_result result;
     uint64_t key = c->key;
     int tries;
@@ -3362,7 +3362,7 @@ static void isogi_trace__guide_task(void *arg, size_t task) {
     for (; i < end; i++) {
         const isogi_trace__node *n = &set->nodes[i];
         isogi_trace__guide *g = &set->guide[i];
-        double scale = n->samples ? 1.0 / n->samples : 0, rgb[3];
+        double scale = n->samples ? 1.0 / n->samples : 0, rgb[3] = {0, 0, 0};
         int a;
         memcpy(g->normal, n->normal, sizeof g->normal);
         for (a = 0; a < t->values; a++)
