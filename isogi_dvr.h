@@ -106,7 +106,7 @@
 
    - No light on tetrahedral meshes, no scattering beyond the first, no refraction, no glossy surfaces.
    - Pictures of physical space are pre-integrated (ISOGI_DVR_EXACT is the same there), unless they have peaks, local shading, nearby
-     lights or depth: those are post-classified, and features narrower than the value's change from sample to sample need a smaller
+     lights, jitter or depth: those are post-classified, and features narrower than the value's change from sample to sample need a smaller
      step. Pre-classification (colours interpolated instead of values) is left out on purpose: in data
      space it would depend on the view, and it blurs every surface to the width of a voxel.
    - The border of the volume is no surface: outside of the box is empty space.
@@ -132,7 +132,8 @@
    Samples stand at the middle of pieces of equal length, counted from where the ray enters the box (or from the eye inside it);
    the last piece is what is left. Blocks of the pyramid in which the transfer function has no extinction are stepped over, largest
    first; the samples elsewhere stay where they are, so pictures are the same bits as without stepping over. In data space a block of
-   one value, or one whose values meet neither extinction nor peak, is empty too.
+   one value, or one whose values meet neither extinction nor peak, is empty too. A block in which all values have one extinction and one
+   colour is passed in one piece by brute-force visibility rays and by post-classified unlit ones (if all voxels are finite).
 
    Limits
 
@@ -169,7 +170,7 @@ typedef struct isogi_peak {
     float rgb[3], opacity; /* 0..1; rgb >= 0 */
 } isogi_peak;
 
-#define ISOGI_DVR_MAX_PEAKS 256 /* but any number in data space, exact or pre-integrated and without visibility */
+#define ISOGI_DVR_MAX_PEAKS 256 /* but any number in data space, exact or pre-integrated */
 
 typedef struct isogi_transfer {
     const isogi_transfer_point *points;
@@ -250,6 +251,8 @@ typedef struct isogi_dvr_desc {
     size_t grid[3];         /* visibility grid points along x, y, z (first and last on the border; a single one at the middle);
                                0 = about a quarter of the voxels along that axis, at least 2 (1 where there is one voxel) */
     float opaque;           /* a ray ends at this opacity, 0..1; 0 = 0.999; 1 = never */
+    uint32_t jitter;        /* not 0: every pixel's samples are moved by a part of a step of its own, which turns rings of large steps into noise.
+                               The same number gives the same picture. Sampled rays only; physical space is post-classified then */
     double visibility_step; /* sampling distance along visibility rays, as `step`; 0 = twice `step`. Sweeps: distance of the lattice
                                of extinction, rounded so that grid points are on it; 0 = 2 */
     isogi_dvr_method method;
@@ -260,7 +263,7 @@ typedef struct isogi_dvr_desc {
     double emission;        /* share of rgb that glows by itself, besides scattering light; 0..1e6; with visibility only */
     double radius;          /* the paper's method: of local visibility, in units of the smallest voxel spacing, 1..32; 0 = 16 */
     double reduction;       /* the paper's method: voxels of the volume to points of its blocks, at least 1; 0 = 4 */
-    isogi_dvr_classification classification; /* in data space; visibility rays are always post-classified */
+    isogi_dvr_classification classification; /* in data space; visibility rays are exact there, unless this says post-classified */
     int table;                               /* entries along a side of the pre-integrated table, 2..1024; 0 = 256 */
     isogi_dvr_silhouette silhouette;
     isogi_normal_kind normals;   /* of shading and of silhouettes of peaks; 0 = smooth */
@@ -272,12 +275,19 @@ typedef struct isogi_dvr_desc {
 
 typedef struct isogi_dvr isogi_dvr;
 
+/* Which place along a ray is its depth. */
+typedef enum isogi_depth_kind {
+    ISOGI_DEPTH_HALF = 0, /* where half of the pixel's final opacity is reached: what stands for a surface among rasterized geometry */
+    ISOGI_DEPTH_FIRST     /* where opacity begins (a 2^-40th of the final one): geometry before it is not covered by anything */
+} isogi_depth_kind;
+
 /* A pinhole camera. width x height pixels, row 0 on top. */
 typedef struct isogi_view {
     int width, height;              /* 1..32768 */
     float eye[3], target[3], up[3]; /* world; up 0 = +y */
     float fov;                      /* vertical angle of view in degrees, below 180; 0 = 45 */
     int local;                      /* 1: shade by local visibility (the paper's method only): for cut planes, and lights within */
+    isogi_depth_kind depth;         /* what is asked for where depth is */
 } isogi_view;
 
 /* The ray through the centre of pixel (x, y); fractions are allowed: pixel x covers x-1/2 .. x+1/2. dir is a unit vector.
@@ -326,8 +336,8 @@ ISOGI_API isogi_result isogi_dvr_inspect(const isogi_dvr *dvr, isogi_dvr_report 
    visibility[count][order*order]; where a block is dropped the lowest value, and no shadow. ISOGI_INVALID with another method. */
 ISOGI_API isogi_result isogi_dvr_sample_blocks(const isogi_dvr *dvr, const float (*points)[3], size_t count, float *values, float *visibility);
 
-/* premultiplied[height*width]: linear RGB premultiplied by opacity, opacity. depth[height*width] (NULL = not wanted): distance along
-   the ray at which half of the pixel's final opacity is reached, INFINITY where the ray meets nothing.
+/* premultiplied[height*width]: linear RGB premultiplied by opacity, opacity. depth[height*width] (NULL = not wanted): distance from the
+   eye along the ray to the place that view->depth names, INFINITY where the ray meets nothing.
    lighting: environment and directional lights (point lights too, at the sample); unused, and may be NULL, when unlit. */
 ISOGI_API isogi_result isogi_dvr_render(const isogi_dvr *dvr, const isogi_view *view, const isogi_lighting *lighting,
                                         float (*premultiplied)[4], float *depth, isogi_counters *counters);
@@ -671,7 +681,8 @@ struct isogi_dvr {
     int transparent; /* no value that occurs has any extinction */
     isogi_level level[ISOGI_DVR__LEVELS];
     uint8_t *empty[ISOGI_DVR__LEVELS]; /* one byte a block: nothing in it has any extinction */
-    uint8_t *empty_blocks;
+    uint8_t *steady[ISOGI_DVR__LEVELS]; /* all of it has one extinction and one colour; NULL in data space, and where voxels are not finite */
+    uint8_t *empty_blocks;             /* of both */
     size_t block_count;
 
     double (*direction)[6]; /* of visibility rays: in grid space, in world space */
@@ -1116,6 +1127,17 @@ static int isogi_dvr__range_empty(const isogi_dvr *d, const float range[2]) {
     return !(range[0] < range[1]) || isogi_dvr__is_quiet(&d->integral, (double)range[0], (double)range[1], quiet);
 }
 
+/* All values of a range are classified alike. */
+static int isogi_dvr__range_steady(const isogi_dvr__transfer *t, const float range[2]) {
+    size_t n;
+    if (!t->point_count || !(range[0] <= range[1])) return 0;
+    n = isogi_dvr__points_below(t->points, t->point_count, (double)range[0]);
+    if (!(range[0] < range[1])) return 1;
+    if (n != isogi_dvr__points_below(t->points, t->point_count, (double)range[1])) return 0;
+    return !n || n == t->point_count || (!memcmp(t->points[n].rgb, t->points[n - 1].rgb, sizeof t->points[n].rgb) &&
+                                         !(t->points[n].extinction < t->points[n - 1].extinction) && !(t->points[n].extinction > t->points[n - 1].extinction));
+}
+
 static int isogi_dvr__kept(const isogi_dvr *d, const double grid[3]) {
     size_t i;
     for (i = 0; i < d->clip_count; i++)
@@ -1172,6 +1194,7 @@ static void isogi_dvr__mark_empty(isogi_dvr *d) {
             const float *range = level->range[i];
             d->empty[n][i] = (uint8_t)isogi_dvr__range_empty(d, range);
             if (!d->empty[n][i]) d->transparent = 0;
+            if (d->steady[n]) d->steady[n][i] = (uint8_t)isogi_dvr__range_steady(&d->transfer, range);
         }
     }
     for (i = 0; i < d->changed_count; i++)
@@ -1249,8 +1272,7 @@ ISOGI_API isogi_result isogi_dvr_set_transfer(isogi_dvr *dvr, const isogi_transf
     size_t changed;
     if (!dvr) return ISOGI_INVALID;
     result = isogi_transfer_validate(transfer);
-    if (result == ISOGI_OK && transfer->peak_count > ISOGI_DVR_MAX_PEAKS && (!isogi_dvr__by_value(dvr) || dvr->desc.shading == ISOGI_DVR_VISIBILITY))
-        result = ISOGI_TOO_LARGE;
+    if (result == ISOGI_OK && transfer->peak_count > ISOGI_DVR_MAX_PEAKS && !isogi_dvr__by_value(dvr)) result = ISOGI_TOO_LARGE;
     if (result == ISOGI_OK) result = isogi_dvr__transfer_copy(&copy, transfer, &dvr->context);
     if (result != ISOGI_OK) return result;
     memset(&integral, 0, sizeof integral);
@@ -1744,7 +1766,7 @@ static isogi_result isogi_dvr__allocate_parts(isogi_dvr *d) {
         d->level[n] = isogi_vol_level(d->desc.pyramid, n);
         d->block_count += d->level[n].size[0] * d->level[n].size[1] * d->level[n].size[2];
     }
-    d->empty_blocks = (uint8_t *)isogi_allocate(&d->context, d->block_count, 1);
+    d->empty_blocks = (uint8_t *)isogi_allocate(&d->context, d->block_count, 2);
     d->changed_count = d->level[1].size[0] * d->level[1].size[1] * d->level[1].size[2];
     d->changed = (uint8_t *)isogi_allocate(&d->context, d->changed_count, 1);
     if (!d->empty_blocks || !d->changed) return ISOGI_NO_MEMORY;
@@ -1755,6 +1777,7 @@ static isogi_result isogi_dvr__allocate_parts(isogi_dvr *d) {
     memset(d->cut, 0, d->changed_count);
     for (n = 0, i = 0; n < ISOGI_DVR__LEVELS; n++) {
         d->empty[n] = d->empty_blocks + i;
+        if (d->desc.space == ISOGI_DVR_PHYSICAL && isogi_vol_finite(d->desc.pyramid)) d->steady[n] = d->empty_blocks + d->block_count + i;
         i += d->level[n].size[0] * d->level[n].size[1] * d->level[n].size[2];
     }
     if (!lit) return ISOGI_OK;
@@ -1834,7 +1857,7 @@ ISOGI_API void isogi_dvr_free(isogi_dvr *dvr) {
     context = dvr->context;
     isogi_dvr__integral_free(&dvr->integral, &context);
     isogi_dvr__transfer_free(&dvr->transfer, &context);
-    isogi_release(&context, dvr->empty_blocks, dvr->block_count, 1);
+    isogi_release(&context, dvr->empty_blocks, dvr->block_count, 2);
     isogi_release(&context, dvr->changed, dvr->changed_count, 1);
     isogi_release(&context, dvr->cut, dvr->changed_count, 1);
     isogi_release(&context, dvr->leap, 3 * dvr->level[0].size[0] * dvr->level[0].size[1] * dvr->level[0].size[2], 1);
@@ -1862,6 +1885,8 @@ typedef struct isogi_dvr__march {
     double speed;             /* world length per t */
     isogi_dvr_silhouette silhouette; /* of viewing rays */
     double piece, scale;      /* t of one piece; optical depth per (extinction * t) in physical space, 1 in data space */
+    double shift;             /* pieces by which all of them begin early: the first is cut by the entry */
+    int unlit;                /* blocks in which nothing changes may be passed in one piece */
     uint64_t next, count;     /* pieces */
     int cell[3], known[3];    /* the cell in `corner`; the smallest block known not to be empty */
     double corner[8], low, high;
@@ -1919,6 +1944,21 @@ static int isogi_dvr__begin(isogi_dvr__march *m, const isogi_dvr *d, const doubl
     return 1;
 }
 
+/* t at which piece n begins. */
+static double isogi_dvr__piece_begin(const isogi_dvr__march *m, uint64_t n) {
+    double t = ((double)n - m->shift) * m->piece;
+    return t > 0 ? t : 0;
+}
+
+/* A shift of its own for every pixel. */
+static void isogi_dvr__jitter(isogi_dvr__march *m, uint32_t seed, int x, int y) {
+    uint32_t h = seed * 0x9e3779b9u ^ ((uint32_t)x * 0x85ebca6bu + (uint32_t)y * 0xc2b2ae35u);
+    if (!seed) return;
+    h ^= h >> 16, h *= 0x7feb352du, h ^= h >> 15, h *= 0x846ca68bu, h ^= h >> 16;
+    m->shift = (double)h / 4294967296.0;
+    m->count = (uint64_t)isogi_dvr__clamp(ceil(m->length / m->piece + m->shift), 2 * ISOGI_DVR__MAX_SAMPLES);
+}
+
 /* Corner x + 2y + 4z of the present cell. */
 static void isogi_dvr__fetch(isogi_dvr__march *m) {
     uint32_t cell[3];
@@ -1973,7 +2013,8 @@ static double isogi_dvr__slope_depth(const isogi_dvr__march *m, double depth, do
 }
 
 /* Steps over the largest empty block around the cell `c`, in which the sample at t lies: 1 if there is one. The next sample is the
-   first that may lie outside: a rounding error too early does no harm, since it is looked at like any other. */
+   first that may lie outside: a rounding error too early does no harm, since it is looked at like any other. 2 where the block has one
+   extinction and one colour, and whole pieces of the ray lie in it: those make one. */
 static int isogi_dvr__skip(isogi_dvr__march *m, const int c[3], double t) {
     const isogi_dvr *d = m->dvr;
     int n, a;
@@ -1983,16 +2024,23 @@ static int isogi_dvr__skip(isogi_dvr__march *m, const int c[3], double t) {
         int shift = 2 + 2 * n;
         double leave = m->length, first;
         size_t block = (size_t)(c[0] >> shift) + level->size[0] * ((size_t)(c[1] >> shift) + level->size[1] * (size_t)(c[2] >> shift));
+        int steady = m->unlit && d->steady[n] && d->steady[n][block];
         m->work.blocks++;
-        if (!d->empty[n][block]) continue;
+        if (!d->empty[n][block] && !steady) continue;
         for (a = 0; a < 3; a++) {
             double border = m->dir[a] > 0 ? (double)(((c[a] >> shift) + 1)) * level->cells : (double)(c[a] >> shift) * level->cells;
             double exit = fabs(m->dir[a]) > 1e-300 ? (border - m->origin[a]) / m->dir[a] : leave;
             if (exit < leave) leave = exit;
         }
+        if (steady && !d->empty[n][block]) {
+            first = leave >= m->length ? (double)m->count : isogi_dvr__clamp(floor(leave / m->piece + m->shift), (double)m->count);
+            if (!(first > (double)m->next)) break;
+            m->next = (uint64_t)first;
+            return 2;
+        }
         m->work.blocks_skipped++;
         if (leave >= m->length) m->next = m->count;
-        first = isogi_dvr__clamp((leave > t ? leave : t) / m->piece - 0.5 - 1e-6, 2 * ISOGI_DVR__MAX_SAMPLES);
+        first = isogi_dvr__clamp((leave > t ? leave : t) / m->piece - 0.5 - 1e-6 + m->shift, 2 * ISOGI_DVR__MAX_SAMPLES);
         if ((double)m->next < first) m->next = (uint64_t)ceil(first);
         return 1;
     }
@@ -2006,10 +2054,10 @@ static int isogi_dvr__next(isogi_dvr__march *m, isogi_dvr__sample *s) {
     if (d->transparent || !d->transfer.point_count) return 0;
     while (m->next < m->count) {
         double extinction, slope, t;
-        int a, moved = 0;
-        s->from = (double)m->next * m->piece;
+        int a, moved = 0, skip;
+        s->from = isogi_dvr__piece_begin(m, m->next);
         m->next++;
-        s->to = (double)m->next * m->piece;
+        s->to = isogi_dvr__piece_begin(m, m->next);
         if (s->to > m->length) s->to = m->length;
         t = 0.5 * (s->from + s->to);
         for (a = 0; a < 3; a++) {
@@ -2018,7 +2066,9 @@ static int isogi_dvr__next(isogi_dvr__march *m, isogi_dvr__sample *s) {
             if (c > 0 && c >= d->cells[a]) c = d->cells[a] - 1;
             s->cell[a] = c, s->local[a] = x - c;
         }
-        if (isogi_dvr__skip(m, s->cell, t)) continue;
+        skip = isogi_dvr__skip(m, s->cell, t);
+        if (skip == 1) continue;
+        if (skip == 2) s->to = m->next < m->count ? isogi_dvr__piece_begin(m, m->next) : m->length;
         m->work.samples++;
         for (a = 0; a < 3; a++) moved |= m->cell[a] ^ s->cell[a], m->cell[a] = s->cell[a];
         if (moved) isogi_dvr__fetch(m);
@@ -2276,7 +2326,7 @@ static int isogi_dvr__next_sampled(isogi_dvr__walk *w, isogi_dvr__stretch *p) {
     double local[3], value = 0;
     int cell[3], i;
     while (m->next <= m->count && m->count) {
-        double t = (double)m->next * m->piece;
+        double t = isogi_dvr__piece_begin(m, m->next);
         uint64_t here = m->next++;
         int had = w->chained;
         if (t > m->length) t = m->length;
@@ -2374,6 +2424,13 @@ static void isogi_dvr__pass_crossing(isogi_dvr__crossings *c, size_t i) {
 
 /* ==== visibility ===================================================================================================== */
 
+static void isogi_dvr__add(isogi_counters *to, const isogi_counters *from) {
+    if (!to) return;
+    to->rays += from->rays, to->blocks += from->blocks, to->cells += from->cells, to->cubics += from->cubics;
+    to->texels += from->texels, to->texels_skipped += from->texels_skipped;
+    to->samples += from->samples, to->blocks_skipped += from->blocks_skipped;
+}
+
 /* What a grid point counts for in shading. One on a surface sees half of its surroundings, one below it hardly any, knows nothing of the
    surface beside it, and would leave a dark blotch there: it stands back behind its neighbours outside. */
 static float isogi_dvr__openness(float v0) {
@@ -2409,6 +2466,41 @@ static void isogi_dvr__visibility_at(const isogi_dvr *d, const double position[3
         for (i = 0; i < d->coefficients; i++) out[i] /= total;
 }
 
+/* What the peaks crossed on a monotone piece let through. `touched`: the last peak that a rising piece ended on, and where it did: a
+   falling one that begins there does not cross it again (as in isogi_dvr__divide_piece). */
+static double isogi_dvr__clear_of_peaks(const isogi_dvr *d, const isogi_dvr__stretch *p, double touched[2]) {
+    const isogi_dvr__integral *g = &d->integral;
+    double clear = 1;
+    size_t i = isogi_dvr__ranks_below(g, p->value[0]);
+    if (p->value[0] < p->value[1])
+        for (; i < g->rank_count && g->rank[i].isovalue <= p->value[1]; i++) {
+            clear *= 1 - (double)d->transfer.peaks[g->rank[i].peak].opacity;
+            touched[0] = g->rank[i].isovalue, touched[1] = g->rank[i].isovalue < p->value[1] ? -1 : p->to;
+        }
+    else
+        for (; i && g->rank[i - 1].isovalue > p->value[1]; i--)
+            if (g->rank[i - 1].isovalue < touched[0] || g->rank[i - 1].isovalue > touched[0] || p->from > touched[1])
+                clear *= 1 - (double)d->transfer.peaks[g->rank[i - 1].peak].opacity;
+    return clear;
+}
+
+/* In data space, cell by cell without a step: only the values at the ends of monotone pieces count (Kraus 2005, eq. 3). */
+static double isogi_dvr__clear_of_values(isogi_dvr__march *m) {
+    const isogi_dvr *d = m->dvr;
+    isogi_dvr__walk walk;
+    isogi_dvr__stretch p;
+    double depth = 0, clear = 1, limit = -log(ISOGI_DVR__NEGLIGIBLE), touched[2] = {0, -1};
+    if (d->transparent) return 1;
+    isogi_dvr__begin_walk(&walk, m);
+    while (clear > ISOGI_DVR__NEGLIGIBLE && depth < limit && isogi_dvr__next_monotone(&walk, &p)) {
+        double low = p.value[0] < p.value[1] ? p.value[0] : p.value[1], high = p.value[0] < p.value[1] ? p.value[1] : p.value[0];
+        if (isogi_dvr__is_quiet(&d->integral, low, high, walk.quiet)) continue;
+        if (d->integral.count) depth += isogi_dvr__depth_between(&d->integral, low, high);
+        if (d->integral.rank_count) clear *= isogi_dvr__clear_of_peaks(d, &p, touched);
+    }
+    return clear * exp(-depth);
+}
+
 static double isogi_dvr__transmittance(const isogi_dvr *d, const double grid[3], const double world[3], const double direction[6],
                                        isogi_dvr__crossings *crossings, isogi_counters *work) {
     isogi_dvr__march march;
@@ -2417,6 +2509,12 @@ static double isogi_dvr__transmittance(const isogi_dvr *d, const double grid[3],
     size_t i;
     work->rays++;
     if (!isogi_dvr__begin(&march, d, grid, direction, sqrt(isogi_dvr__dot(direction + 3, direction + 3)), d->visibility_step)) return 1;
+    march.unlit = 1;
+    if (isogi_dvr__by_value(d)) {
+        clear = isogi_dvr__clear_of_values(&march);
+        isogi_dvr__add(work, &march.work);
+        return clear > ISOGI_DVR__NEGLIGIBLE ? clear : 0;
+    }
     if (d->transfer.peak_count) {
         float dir[3] = {(float)direction[3], (float)direction[4], (float)direction[5]};
         isogi_dvr__begin_crossings(crossings, d, world, dir, march.enter, march.length);
@@ -2462,13 +2560,6 @@ static void isogi_dvr__step_task(void *arg, size_t task) {
         for (i = 0; i < d->coefficients; i++) job->dvr->visibility[point * d->coefficients + i] = (float)sum[i];
         job->work[task].texels++;
     }
-}
-
-static void isogi_dvr__add(isogi_counters *to, const isogi_counters *from) {
-    if (!to) return;
-    to->rays += from->rays, to->blocks += from->blocks, to->cells += from->cells, to->cubics += from->cubics;
-    to->texels += from->texels, to->texels_skipped += from->texels_skipped;
-    to->samples += from->samples, to->blocks_skipped += from->blocks_skipped;
 }
 
 /* The mean of a transfer function's extinction over every entry's part of the data's range: exact, piece by piece, so that a peak
@@ -4039,7 +4130,7 @@ struct isogi_dvr__frame {
 };
 
 static int isogi_dvr__fast_space(const isogi_dvr *d) {
-    return d->desc.space == ISOGI_DVR_PHYSICAL && d->desc.classification != ISOGI_DVR_POST_CLASSIFIED && !d->transfer.peak_count &&
+    return d->desc.space == ISOGI_DVR_PHYSICAL && d->desc.classification != ISOGI_DVR_POST_CLASSIFIED && !d->transfer.peak_count && !d->desc.jitter &&
            d->desc.shading != ISOGI_DVR_LOCAL && !(fabs(d->desc.anisotropy) > 0) && d->cells[0] && d->cells[1] && d->cells[2] && d->desc.opaque < 1;
 }
 
@@ -4422,8 +4513,15 @@ static isogi_result isogi_dvr__check_view(const isogi_view *view) {
     if (view->width > 32768 || view->height > 32768) return ISOGI_TOO_LARGE;
     if (!isogi_dvr__finite3(view->eye) || !isogi_dvr__finite3(view->target) || !isogi_dvr__finite3(view->up)) return ISOGI_INVALID;
     if (!isogi_dvr__finite32(view->fov) || !(view->fov >= 0 && view->fov < 180)) return ISOGI_INVALID;
+    if ((unsigned)view->depth > ISOGI_DEPTH_FIRST) return ISOGI_INVALID;
     for (a = 0; a < 3; a++) same = same && view->eye[a] >= view->target[a] && view->eye[a] <= view->target[a];
     return same ? ISOGI_INVALID : ISOGI_OK;
+}
+
+/* The transmittance at whose passing the depth of a pixel is read; below 1 by the least that a double knows. */
+static double isogi_dvr__depth_end(const isogi_view *view, double clear) {
+    double end = 1 - (view->depth == ISOGI_DEPTH_FIRST ? 1.0 / 1099511627776.0 : 0.5) * (1 - clear), most = 1 - 1.0 / 9007199254740992.0;
+    return end < most ? end : most;
 }
 
 typedef struct isogi_dvr__render_job {
@@ -4456,7 +4554,8 @@ static void isogi_dvr__render_pixel(const isogi_dvr__render_job *job, int x, int
     isogi_dvr__transform(d->to_grid, world, dir);
     isogi_vol_to_grid(d->desc.pyramid, origin, grid);
     if (!isogi_dvr__begin(&march, d, grid, dir, speed, d->desc.step)) return;
-    march.silhouette = d->desc.silhouette;
+    march.silhouette = d->desc.silhouette, march.unlit = d->desc.shading == ISOGI_DVR_UNLIT;
+    isogi_dvr__jitter(&march, d->desc.jitter, x, y);
     again = march;
     ray.dvr = d, ray.lights = &job->lights, ray.clear = 1, ray.end = 1 - (double)d->desc.opaque;
     if (!isogi_dvr__by_value(d)) isogi_dvr__begin_crossings(crossings, d, origin, ray.dir, march.enter, march.length);
@@ -4466,8 +4565,8 @@ static void isogi_dvr__render_pixel(const isogi_dvr__render_job *job, int x, int
     isogi_dvr__add(work, &march.work);
     if (!isogi_dvr__by_value(d)) isogi_dvr__add(work, &crossings->work);
     if (!job->depth || !(ray.clear < 1)) return;
-    /* once more, without colours, to where half of the final opacity is reached */
-    ray.probe = 1, ray.end = 1 - 0.5 * (1 - ray.clear), ray.clear = 1;
+    /* once more, without colours, to the place that is asked for */
+    ray.probe = 1, ray.end = isogi_dvr__depth_end(job->view, ray.clear), ray.clear = 1;
     if (!isogi_dvr__by_value(d)) isogi_dvr__begin_crossings(crossings, d, origin, ray.dir, march.enter, march.length);
     isogi_dvr__cast(&ray, &again, crossings);
     out[4] = (float)((again.enter + ray.t) * speed);
@@ -5158,7 +5257,7 @@ static void isogi_dvr__tet_task(void *arg, size_t tile) {
             out[3] = (float)(1 - ray.clear), out[4] = HUGE_VALF;
             job->work[tile].rays++;
             if (!job->depth || !(ray.clear < 1)) continue;
-            ray.probe = 1, ray.end = 1 - 0.5 * (1 - ray.clear), ray.clear = 1;
+            ray.probe = 1, ray.end = isogi_dvr__depth_end(job->view, ray.clear), ray.clear = 1;
             isogi_dvr__try_tets(&ray, job, origin, &job->work[tile]);
             out[4] = (float)ray.t;
         }

@@ -215,6 +215,7 @@ ISOGI_API void isogi_vol_free(isogi_pyramid *pyramid); /* NULL is fine */
 ISOGI_API const isogi_volume *isogi_vol_volume(const isogi_pyramid *pyramid); /* as given, with the zero defaults filled in */
 ISOGI_API const isogi_context *isogi_vol_context(const isogi_pyramid *pyramid);
 ISOGI_API isogi_level isogi_vol_level(const isogi_pyramid *pyramid, int level); /* all zero beyond the last */
+ISOGI_API int isogi_vol_finite(const isogi_pyramid *pyramid); /* 1 if every voxel is a finite number */
 ISOGI_API void isogi_vol_range(const isogi_pyramid *pyramid, double range[2]);  /* of the finite values; {0,0} if there are none */
 /* What the field can be in the box of voxels first..last, both ends included and cut to the volume, and in all cells between them; by
    way of the pyramid, so that large boxes are no dearer than small ones but for their rim.
@@ -1579,6 +1580,8 @@ ISOGI_API isogi_level isogi_vol_level(const isogi_pyramid *pyramid, int level) {
     memset(&none, 0, sizeof none);
     return pyramid && level >= 0 && level < ISOGI_VOL__LEVELS ? pyramid->level[level] : none;
 }
+
+ISOGI_API int isogi_vol_finite(const isogi_pyramid *pyramid) { return pyramid && pyramid->all_finite; }
 
 ISOGI_API void isogi_vol_range(const isogi_pyramid *pyramid, double range[2]) {
     if (!range) return;
