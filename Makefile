@@ -29,16 +29,18 @@ export CC CXX CFLAGS
 
 all: $(EXAMPLES)
 
-# The implementation of each header is compiled once, and what a program would implement itself is switched off: it takes most of the
-# time. Tests that look at what is private (isogi_vol__name), and benchmarks, hold their own.
-OBJECTS := $(patsubst %,build/%.o,isogi_sh isogi_vol isogi_trace isogi_dvr)
-SHARED  := -DISOGI_SH_IMPLEMENTED -DISOGI_VOL_IMPLEMENTED -DISOGI_TRACE_IMPLEMENTED -DISOGI_DVR_IMPLEMENTED $(OBJECTS)
+# The implementation of each header is compiled once, and switched off in the programs that are linked with it: it takes most of the
+# time. A test that looks at what is private to a header (isogi_vol__name) holds that header's implementation itself; benchmarks
+# hold all.
+HEADERS := sh vol trace dvr
+OBJECTS := $(HEADERS:%=build/isogi_%.o)
 
 # What a source file includes is found by the compiler (the .d files). A line "LIBS: -lname" in a test's first comment names
 # libraries of its own. What does not compile must not leave an older program behind.
 COMPILE = @rm -f $@; echo "$(CC) $<"; \
 	libs=$$(sed -n '1,20s|.*LIBS: \([^*]*\).*|\1|p' $<); \
-	grep -q 'isogi_[a-z]*__\|ISOGI_SH_LEVEL\|looks inside' $< || shared="$(SHARED)"; \
+	shared=$$(for h in $(2); do grep -q "isogi_$${h}__\|looks inside.*isogi_$$h" $< || \
+		echo "-D$$(echo isogi_$$h | tr a-z A-Z)_IMPLEMENTED build/isogi_$$h.o"; done); \
 	$(CC) $(C99) $(CFLAGS) -MMD -MP -MF $@.d -MT $@ $(1) -o $@ $< $$shared $(LIBS) $$libs
 
 $(OBJECTS): build/%.o: %.h tests/compile/one.c build/flags
@@ -46,14 +48,14 @@ $(OBJECTS): build/%.o: %.h tests/compile/one.c build/flags
 		-D$$(echo $* | tr a-z A-Z)_IMPLEMENTATION -c -o $@ tests/compile/one.c
 
 build/%: examples/%.c build/flags $(OBJECTS)
-	$(call COMPILE)
+	$(call COMPILE,,$(HEADERS))
 
 # MPI's headers do not keep to our warnings.
 build/bake_mpi: examples/bake_mpi.c build/flags
 	@rm -f $@; echo "mpicc $<"; mpicc -std=gnu99 -Wall -Wextra -ffp-contract=off -I. -Iexamples/common $(CFLAGS) -MMD -MP -MF $@.d -MT $@ -o $@ $< $(LIBS)
 
 build/tests/%: tests/%.c build/flags $(OBJECTS)
-	$(call COMPILE,-Itests)
+	$(call COMPILE,-Itests,$(HEADERS))
 
 build/bench/%: tests/bench/%.c build/flags
 	$(call COMPILE,-Itests)

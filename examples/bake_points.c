@@ -1,6 +1,7 @@
 /* Draws a knot of tubes as text, lit by the sky and by what it reflects itself: one bake of the points that are seen. */
 #define ISOGI_IMPLEMENTATION
 #include "isogi_trace.h"
+#include <math.h>
 #include <stdio.h>
 
 enum { N = 64, WIDTH = 76, HEIGHT = 38 };

@@ -1,6 +1,7 @@
 /* Draws a surface that nobody has sampled, as text: rays against a function and its gradient, without voxels and without a step size. */
 #define ISOGI_IMPLEMENTATION
 #include "isogi_vol.h"
+#include <math.h>
 #include <stdio.h>
 
 enum { WIDTH = 96, HEIGHT = 44 };

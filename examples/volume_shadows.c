@@ -1,6 +1,7 @@
 /* A ring of fog above a floor, as text (a character stands for 1x2 pixels), shaded in three ways: as it glows, by its gradient, and with shadows. */
 #define ISOGI_IMPLEMENTATION
 #include "isogi_dvr.h"
+#include <math.h>
 #include <stdio.h>
 
 enum { N = 48, WIDTH = 52, HEIGHT = 44 };

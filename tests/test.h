@@ -86,6 +86,13 @@ __attribute__((unused)) static void random_direction(test_random *r, double d[3]
     d[0] = s * cos(phi), d[1] = s * sin(phi), d[2] = z;
 }
 
+/* By bits, since -ffast-math lets compilers take every number for finite. */
+__attribute__((unused)) static int test_finite(double x) {
+    uint64_t bits;
+    memcpy(&bits, &x, sizeof bits);
+    return (bits >> 52 & 0x7ff) != 0x7ff;
+}
+
 /* Bounds of rounding errors are for arithmetic as it is written; -ffast-math changes the order of sums. */
 #ifdef __FAST_MATH__
 #define ROUNDING_FACTOR 4

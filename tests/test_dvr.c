@@ -1,5 +1,5 @@
-/* Properties of isogi_dvr.h: transfer functions, ray casting in both spaces, peaks, SH visibility, lighting. */
-/* One test looks inside an isogi_dvr, for what has no call. */
+/* Properties of isogi_dvr.h: transfer functions, ray casting in both spaces, peaks, SH visibility, lighting. Some tests look inside
+   what isogi_dvr.h keeps private, for what has no call: this program looks inside isogi_dvr.h. */
 #define ISOGI_IMPLEMENTATION
 #include "isogi_dvr.h"
 #include "test.h"

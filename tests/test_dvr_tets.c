@@ -104,6 +104,7 @@ static int by_begin(const void *a, const void *b) {
     double x = ((const stretch *)a)->t[0], y = ((const stretch *)b)->t[0];
     return (x > y) - (x < y);
 }
+static double dot3(const double a[3], const double b[3]) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 static int brute_stretches(const isogi_tet_mesh *m, const double o[3], const double d[3], stretch *out) {
     int count = 0;
     for (size_t i = 0; i < m->tet_count; i++) {
@@ -117,9 +118,9 @@ static int brute_stretches(const isogi_tet_mesh *m, const double o[3], const dou
                 const double *u = e[(k + 1) % 3], *v = e[(k + 2) % 3];
                 inverse[k][a] = u[(a + 1) % 3] * v[(a + 2) % 3] - u[(a + 2) % 3] * v[(a + 1) % 3];
             }
-        det = isogi_dvr__dot(e[0], inverse[0]);
+        det = dot3(e[0], inverse[0]);
         base[0] = 1, rate[0] = 0;
-        for (int k = 0; k < 3; k++) base[k + 1] = isogi_dvr__dot(q, inverse[k]) / det, rate[k + 1] = isogi_dvr__dot(d, inverse[k]) / det;
+        for (int k = 0; k < 3; k++) base[k + 1] = dot3(q, inverse[k]) / det, rate[k + 1] = dot3(d, inverse[k]) / det;
         for (int k = 1; k < 4; k++) base[0] -= base[k], rate[0] -= rate[k];
         for (int k = 0; k < 4; k++) { /* barycentric coordinate base + t rate >= 0 */
             double t = -base[k] / rate[k];

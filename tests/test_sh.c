@@ -1,4 +1,5 @@
-/* Tests of isogi_sh.h. The reference is tests/reference_sh.h: 128 bits, from the definition. */
+/* Tests of isogi_sh.h. The reference is tests/reference_sh.h: 128 bits, from the definition. This program looks inside isogi_sh.h only
+   to choose the instructions. */
 static int instruction_level = 99; /* a test may hold the header to less than the processor has */
 #define ISOGI_SH_LEVEL instruction_level
 #define ISOGI_SH_IMPLEMENTATION
@@ -254,28 +255,28 @@ TEST(any_vector_at_any_order) {
             isogi_sh_eval(one, order, (const float(*)[3])d + i, 1);
             for (int k = 0; k < n; k++) {
                 double at[4] = {(double)y[i * n + k], (double)columns[k * COUNT + i], y64[i * n + k], columns64[k * COUNT + i]};
-                for (int p = 0; p < 4; p++) bad += !isogi_sh__finite_f64(at[p]);
+                for (int p = 0; p < 4; p++) bad += !test_finite(at[p]);
                 for (int p = 0; p < 2; p++) worst = fmax(worst, fabs(at[p] - (double)one[k]));
                 worst64 = fmax(worst64, fabs(at[2] - at[3]));
             }
         }
         isogi_sh_eval_gradient(gradient[0], order, (const float(*)[3])d, COUNT);
         for (int i = 0; i < COUNT * n; i++)
-            for (int k = 0; k < 3; k++) bad += !isogi_sh__finite_f32((&gradient[0][0])[i][k]);
+            for (int k = 0; k < 3; k++) bad += !test_finite((double)(&gradient[0][0])[i][k]);
         CHECK(isogi_sh_eval_sum(value, c, order, 1, (const float(*)[3])d, COUNT) == ISOGI_OK, "order %d", order);
         for (int k = 0; k < n; k++) samples[k] = (double)c[k];
         CHECK(isogi_sh_eval_sum_f64(value64, samples, order, 1, (const double(*)[3])wide, COUNT) == ISOGI_OK, "order %d", order);
         for (int i = 0; i < COUNT; i++) {
-            bad += !isogi_sh__finite_f32(value[i]) + !isogi_sh__finite_f64(value64[i]);
+            bad += !test_finite((double)value[i]) + !test_finite(value64[i]);
             CHECK(fabs((double)value[i] - value64[i]) < 2e-5, "order %d, vector %d: %.9g %.9g", order, i, (double)value[i], value64[i]);
         }
         CHECK(isogi_sh_project_samples(samples, order, 1, (const float(*)[3])d, ones, NULL, COUNT) == ISOGI_OK, "order %d", order);
-        for (int k = 0; k < n; k++) bad += !isogi_sh__finite_f64(samples[k]);
+        for (int k = 0; k < n; k++) bad += !test_finite(samples[k]);
         for (int i = 0; i < COUNT; i++) {
             isogi_result result = isogi_sh_zonal_to_direction(one, order, zonal, d[i]);
             CHECK(result == ISOGI_OK || result == ISOGI_INVALID, "order %d, vector %d: %d", order, i, (int)result);
             if (result != ISOGI_OK) continue;
-            for (int k = 0; k < n; k++) bad += !isogi_sh__finite_f32(one[k]);
+            for (int k = 0; k < n; k++) bad += !test_finite((double)one[k]);
         }
         CHECK(bad == 0, "order %d: %d values are not finite", order, bad);
         CHECK(worst <= 4e-6 && worst64 < 1e-13, "order %d: alone and in a batch differ by %g; layouts by %g", order, worst, worst64);

@@ -82,7 +82,7 @@ TEST(corners_and_ranges_are_those_of_the_voxels) {
         int finite = 1, told = isogi_volume_corners(v, cell, corner);
         for (int c = 0; c < 8; c++) {
             double value = *field_at(&f, (int)cell[0] + (c & 1), 0, (int)cell[2] + (c >> 2));
-            finite &= isogi_vol__finite64(value);
+            finite &= test_finite(value);
             CHECK(!memcmp(&value, &corner[c], sizeof value), "corner %d: %g, not %g", c, corner[c], value);
         }
         CHECK(finite == told, "finite %d, told %d", finite, told);
@@ -94,7 +94,7 @@ TEST(corners_and_ranges_are_those_of_the_voxels) {
         for (size_t z = first[2]; z <= last[2] && z < 70; z++)
             for (size_t x = first[0]; x <= last[0] && x < 7; x++) {
                 double value = *field_at(&f, (int)x, 0, (int)z);
-                if (isogi_vol__finite64(value)) least = fmin(least, value), largest = fmax(largest, value);
+                if (test_finite(value)) least = fmin(least, value), largest = fmax(largest, value);
             }
         isogi_volume_range(v, first, last, range);
         CHECK(range[0] == least && range[1] == largest, "%g..%g, not %g..%g", range[0], range[1], least, largest);
@@ -260,7 +260,7 @@ static int box_holds(const field *f, const size_t first[3], const size_t last[3]
                 double low = DBL_MAX, high = -DBL_MAX;
                 for (int c = 0; c < 8; c++) {
                     double value = *field_at(f, (int)x + (c & 1), (int)y + (c >> 1 & 1), (int)z + (c >> 2));
-                    if (isogi_vol__finite64(value)) low = fmin(low, value), high = fmax(high, value);
+                    if (test_finite(value)) low = fmin(low, value), high = fmax(high, value);
                 }
                 for (size_t n = 0; n < count; n++)
                     if (low <= high && ranges[n][0] <= high && ranges[n][1] >= low) return 1;
@@ -420,7 +420,7 @@ static void check_updates(isogi_type type, double scale, double bias, int shape,
         for (size_t z = first[2]; z <= last[2] && z < size[2]; z++)
             for (size_t y = first[1]; y <= last[1] && y < size[1]; y++)
                 for (size_t x = first[0]; x <= last[0] && x < size[0]; x++) {
-                    size_t i = x + size[0] * (y + size[1] * z), bytes = isogi_vol__type_size(type);
+                    size_t i = x + size[0] * (y + size[1] * z), bytes = type <= ISOGI_I8 ? 1 : type <= ISOGI_I16 ? 2 : type == ISOGI_F32 ? 4 : (size_t)8;
                     if (kind == 0) store(raw, type, i, floor(random_range(r, 30, 90)));
                     else if (kind == 5 || (kind == 4 && type < ISOGI_F32 && type != ISOGI_U16)) memcpy((char *)raw + bytes * i, (char *)base + bytes * i, bytes);
                     else if (kind != 4 || random_bits(r) % 4 == 0) store(raw, type, i, level);
@@ -669,6 +669,18 @@ TEST(calls_without_an_object_say_so) {
     CHECK(!isogi_trace_valid(NULL, texel), "a texel of nothing");
     isogi_trace_counters(NULL, &counters), isogi_trace_counters(NULL, NULL);
     CHECK(counters.rays == 5, "%d rays", (int)counters.rays);
+}
+
+/* No volume of this size fits in a test: the step that adds up what the rows have is given rows that say so. */
+TEST(more_vertices_than_indices_are_too_large) {
+    isogi_vol__mesh_row row[4];
+    for (int over = 0; over < 2; over++) {
+        memset(row, 0, sizeof row);
+        row[0].vertex[0] = 0x7fffffff, row[1].vertex[2] = 0x7fffffff, row[2].vertex[4] = over ? 2 : 1;
+        isogi_result result = isogi_vol__mesh_offsets(row, 3);
+        CHECK(result == (over ? ISOGI_TOO_LARGE : ISOGI_OK), "%d: %s", over, isogi_result_string(result));
+        if (!over) CHECK(row[3].vertex[0] == UINT32_MAX && row[2].vertex[4] == UINT32_MAX - 1, "%u %u", row[3].vertex[0], row[2].vertex[4]);
+    }
 }
 
 TEST_MAIN("vol_api")

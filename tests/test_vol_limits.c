@@ -116,7 +116,7 @@ TEST(any_view_is_as_good_as_a_packed_copy) {
                 /* the documented error of either, 2^-21 of the largest number */
                 CHECK(fabs((double)value[0] - (double)value[1]) <= 0x1p-19 * most, "filter %d: %g and %g", filter, (double)value[0], (double)value[1]);
                 for (int a = 0; a < 3; a++) {
-                    CHECK(isogi_vol__finite64((double)gradient[0][a]), "gradient %g", (double)gradient[0][a]);
+                    CHECK(test_finite((double)gradient[0][a]), "gradient %g", (double)gradient[0][a]);
                     CHECK(view.size[a] > 1 || fabsf(gradient[0][a]) <= 0, "a gradient of %g along an axis of one voxel", (double)gradient[0][a]);
                 }
             }
@@ -218,7 +218,7 @@ static double odd_number(test_random *r) {
 
 static float odd_float(test_random *r) {
     double x = odd_number(r);
-    return fabs(x) > 3e38 && isogi_vol__finite64(x) ? FLT_MAX : (float)x;
+    return fabs(x) > 3e38 && test_finite(x) ? FLT_MAX : (float)x;
 }
 
 static isogi_hit odd_hit(test_random *r) {
@@ -234,7 +234,7 @@ static isogi_hit odd_hit(test_random *r) {
 static void check_odd_hit(const isogi_pyramid *p, const isogi_hit *hit, const char *what) {
     const isogi_volume *v = isogi_vol_volume(p);
     CHECK(hit->side >= -2 && hit->side <= 2, "%s: side %d", what, hit->side);
-    CHECK(isogi_vol__finite64(hit->t), "%s: t %g", what, hit->t);
+    CHECK(test_finite(hit->t), "%s: t %g", what, hit->t);
     for (int a = 0; a < 3; a++)
         CHECK(hit->side ? hit->local[a] >= 0 && hit->local[a] <= 1 && hit->cell[a] + 1 < v->size[a] : hit->cell[a] == 0, "%s: cell %u + %g", what,
               (unsigned)hit->cell[a], hit->local[a]);
@@ -290,7 +290,7 @@ static void odd_calls(const isogi_pyramid *p, test_random *r) {
     CHECK(isogi_vol_sample_smooth(p, (const float(*)[3])points, N, values, vectors) == ISOGI_OK, "samples");
     CHECK(isogi_vol_sample_grid(p, ISOGI_FILTER_CATMULL_ROM, (const double(*)[3])grid, N, values, vectors) == ISOGI_OK, "samples");
     for (int n = 0; n < 50 && isogi_vol_next_interval(p, rays, (const double(*)[2])ranges, 2, t, piece, NULL); n++) {
-        CHECK(isogi_vol__finite64(piece[0]) && piece[1] > piece[0] && !(piece[0] < t) && n < 49, "piece %g..%g behind %g", piece[0], piece[1], t);
+        CHECK(test_finite(piece[0]) && piece[1] > piece[0] && !(piece[0] < t) && n < 49, "piece %g..%g behind %g", piece[0], piece[1], t);
         t = piece[1];
     }
     isogi_vol_may_hold(p, first, last, (const double(*)[2])ranges, 2);
@@ -313,7 +313,7 @@ TEST(odd_numbers_end_in_codes_and_misses) {
         odd_calls(p, &r);
         isogi_mesh_desc desc = {.isovalue = odd_number(&r), .normals = 1, .closed = turn % 2};
         isogi_result result = isogi_vol_mesh(p, &desc, &mesh);
-        CHECK(result == (turn % 4 == 0 || !isogi_vol__finite64(desc.isovalue) ? ISOGI_INVALID : ISOGI_OK), "mesh: %s", isogi_result_string(result));
+        CHECK(result == (turn % 4 == 0 || !test_finite(desc.isovalue) ? ISOGI_INVALID : ISOGI_OK), "mesh: %s", isogi_result_string(result));
         isogi_vol_mesh_free(p, &mesh);
         isogi_vol_free(p);
     }
