@@ -3,37 +3,11 @@
 #define DVR_FIELDS_H
 
 #include "isogi_dvr.h"
-#include "test.h"
+#include "fields.h"
 
 #define PI 3.14159265358979323846
 
-typedef struct field {
-    int size[3];
-    double *value;
-    isogi_volume volume;
-    isogi_pyramid *pyramid;
-} field;
-
-static const isogi_context serial = {.threads = 1};
-
-static field field_new(int x, int y, int z) {
-    field f = {{x, y, z}, (double *)calloc((size_t)x * (size_t)y * (size_t)z, sizeof(double)), {0}, NULL};
-    f.volume.data = f.value, f.volume.type = ISOGI_F64;
-    for (int a = 0; a < 3; a++) f.volume.size[a] = (size_t)f.size[a];
-    return f;
-}
-
-static size_t field_count(const field *f) { return (size_t)f->size[0] * (size_t)f->size[1] * (size_t)f->size[2]; }
-
-static void field_build(field *f) {
-    isogi_result result = isogi_vol_build(&f->pyramid, &f->volume, &serial);
-    CHECK(result == ISOGI_OK, "%s", isogi_result_string(result));
-}
-
-static void field_free(field *f) {
-    isogi_vol_free(f->pyramid);
-    free(f->value);
-}
+static void field_build(field *f) { field_build_with(f, &serial); }
 
 typedef double field_function(double x, double y, double z); /* of grid coordinates over (size - 1): 0..1 */
 
@@ -66,15 +40,17 @@ __attribute__((unused)) static field field_waves(int n, uint64_t seed) {
     return f;
 }
 
-static isogi_dvr *dvr_new(const isogi_dvr_desc *desc, const isogi_transfer *transfer) {
+static isogi_dvr *dvr_new_with(const isogi_dvr_desc *desc, const isogi_transfer *transfer, const isogi_context *context) {
     isogi_dvr *dvr = NULL;
-    isogi_result result = isogi_dvr_create(&dvr, desc, &serial);
+    isogi_result result = isogi_dvr_create(&dvr, desc, context);
     CHECK(result == ISOGI_OK, "create: %s", isogi_result_string(result));
     if (!dvr) abort();
     result = isogi_dvr_set_transfer(dvr, transfer);
     CHECK(result == ISOGI_OK, "set_transfer: %s", isogi_result_string(result));
     return dvr;
 }
+
+static isogi_dvr *dvr_new(const isogi_dvr_desc *desc, const isogi_transfer *transfer) { return dvr_new_with(desc, transfer, &serial); }
 
 /* One ray: the only pixel of a picture. */
 typedef struct pixel { float c[4], depth; } pixel;

@@ -2,67 +2,7 @@
    what isogi_dvr.h keeps private, for what has no call: this program looks inside isogi_dvr.h. */
 #define ISOGI_IMPLEMENTATION
 #include "isogi_dvr.h"
-#include "test.h"
-
-#define PI 3.14159265358979323846
-
-/* ---- volumes and renderers for tests ---- */
-
-typedef struct field {
-    int size[3];
-    double *value;
-    isogi_volume volume;
-    isogi_pyramid *pyramid;
-} field;
-
-static const isogi_context serial = {.threads = 1};
-
-static field field_new(int x, int y, int z) {
-    field f = {{x, y, z}, (double *)calloc((size_t)x * (size_t)y * (size_t)z, sizeof(double)), {0}, NULL};
-    f.volume.data = f.value, f.volume.type = ISOGI_F64;
-    for (int a = 0; a < 3; a++) f.volume.size[a] = (size_t)f.size[a];
-    return f;
-}
-
-static double *field_at(field *f, int i, int j, int k) { return &f->value[i + f->size[0] * (j + f->size[1] * k)]; }
-
-static void field_build(field *f) {
-    isogi_result result = isogi_vol_build(&f->pyramid, &f->volume, &serial);
-    CHECK(result == ISOGI_OK, "%s", isogi_result_string(result));
-}
-
-static void field_free(field *f) {
-    isogi_vol_free(f->pyramid);
-    free(f->value);
-}
-
-typedef double field_function(double x, double y, double z); /* of grid coordinates over (size - 1): 0..1 */
-
-static field field_of(field_function *function, int n) {
-    field f = field_new(n, n, n);
-    for (int k = 0; k < n; k++)
-        for (int j = 0; j < n; j++)
-            for (int i = 0; i < n; i++)
-                *field_at(&f, i, j, k) = function(i / (n - 1.0), j / (n - 1.0), k / (n - 1.0));
-    field_build(&f);
-    return f;
-}
-
-/* sums of waves with random directions: smooth, -1..1 or so */
-static field field_waves(int n, uint64_t seed) {
-    field f = field_new(n, n, n);
-    test_random r = {seed};
-    for (int wave = 0; wave < 6; wave++) {
-        double d[3], phase = random_range(&r, 0, 6), length = random_range(&r, 0.1, 0.5);
-        random_direction(&r, d);
-        for (int k = 0; k < n; k++)
-            for (int j = 0; j < n; j++)
-                for (int i = 0; i < n; i++)
-                    *field_at(&f, i, j, k) += 0.3 * sin(length * (d[0] * i + d[1] * j + d[2] * k) + phase);
-    }
-    field_build(&f);
-    return f;
-}
+#include "dvr_fields.h"
 
 static double coulomb(double x, double y, double z) { /* three potentials, two of them smaller */
     const double c[3][4] = {{0.35, 0.4, 0.5, 0.10}, {0.7, 0.35, 0.45, 0.05}, {0.55, 0.7, 0.6, 0.03}};
@@ -79,85 +19,23 @@ static double marschner_lobb(double x, double y, double z) {
     return (1 - sin(PI * w / 2) + 0.25 * (1 + cos(2 * PI * 6 * cos(PI * sqrt(u * u + v * v) / 2)))) / (2 * (1 + 0.25));
 }
 
-static isogi_dvr *dvr_new(const isogi_dvr_desc *desc, const isogi_transfer *transfer, const isogi_context *context) {
-    isogi_dvr *dvr = NULL;
-    isogi_result result = isogi_dvr_create(&dvr, desc, context ? context : &serial);
-    CHECK(result == ISOGI_OK, "create: %s", isogi_result_string(result));
-    if (!dvr) abort();
-    result = isogi_dvr_set_transfer(dvr, transfer);
-    CHECK(result == ISOGI_OK, "set_transfer: %s", isogi_result_string(result));
-    return dvr;
-}
-
-/* One ray: the only pixel of a picture. */
-typedef struct pixel { float c[4], depth; } pixel;
-
-static pixel cast(const isogi_dvr *dvr, const double eye[3], const double target[3], const isogi_lighting *lighting) {
-    isogi_view view = {.width = 1, .height = 1, .fov = 1};
-    pixel p;
-    for (int a = 0; a < 3; a++) view.eye[a] = (float)eye[a], view.target[a] = (float)target[a];
-    isogi_result result = isogi_dvr_render(dvr, &view, lighting, (float(*)[4])p.c, &p.depth, NULL);
-    CHECK(result == ISOGI_OK, "render: %s", isogi_result_string(result));
-    return p;
-}
-
-/* A picture of the whole box from a random side; the camera keeps its place relative to a box whose corner is the origin. */
-static isogi_view view_of(const field *f, double scale, test_random *r, int size) {
-    isogi_view view = {.width = size, .height = size, .fov = 35};
-    double d[3], centre[3], radius = 0;
-    random_direction(r, d);
-    for (int a = 0; a < 3; a++) centre[a] = 0.5 * (f->size[a] - 1), radius += centre[a] * centre[a];
-    for (int a = 0; a < 3; a++) {
-        view.target[a] = (float)(scale * centre[a]);
-        view.eye[a] = (float)(scale * (centre[a] + 3 * sqrt(radius) * d[a]));
-    }
-    return view;
-}
-
-static float (*picture(const isogi_dvr *dvr, const isogi_view *view, const isogi_lighting *lighting, float *depth, isogi_counters *count))[4] {
-    float(*pixels)[4] = (float(*)[4])calloc((size_t)view->width * (size_t)view->height, sizeof *pixels);
-    isogi_result result = isogi_dvr_render(dvr, view, lighting, pixels, depth, count);
-    CHECK(result == ISOGI_OK, "render: %s", isogi_result_string(result));
-    return pixels;
-}
-
-static double largest_difference(float (*a)[4], float (*b)[4], int pixels) {
-    double most = 0;
-    for (int i = 0; i < 4 * pixels; i++) most = fmax(most, fabs((double)a[i / 4][i % 4] - (double)b[i / 4][i % 4]));
-    return most;
-}
-
 /* ---- a second implementation, plain and slow, in long double ---- */
 
-static void reference_transfer(const isogi_transfer *t, long double x, long double rgb[3], long double *extinction) {
-    const isogi_transfer_point *p = t->points;
-    size_t n = t->point_count, i = 0;
-    while (i < n && (long double)p[i].value <= x) i++;
-    const isogi_transfer_point *low = i ? &p[i - 1] : &p[0], *high = i < n ? &p[i] : &p[n - 1];
-    long double u = low == high ? 0 : (x - (long double)low->value) / ((long double)high->value - (long double)low->value);
-    for (int a = 0; a < 3; a++) rgb[a] = (long double)low->rgb[a] + u * ((long double)high->rgb[a] - (long double)low->rgb[a]);
-    *extinction = (long double)low->extinction + u * ((long double)high->extinction - (long double)low->extinction);
-}
-
-static long double reference_value(const field *f, const long double p[3], const long double dir[3], long double *slope) {
-    long double u[3], value = 0;
+/* The trilinear value at p, and how fast it changes along dir. */
+static long double reference_along(const field *f, const long double p[3], const long double dir[3], long double *slope) {
     int c[3];
     *slope = 0;
     for (int a = 0; a < 3; a++) {
         c[a] = (int)p[a];
         if (c[a] > f->size[a] - 2) c[a] = f->size[a] - 2;
         if (c[a] < 0) c[a] = 0;
-        u[a] = p[a] - c[a];
     }
-    for (int n = 0; n < 8; n++) {
-        int at[3] = {c[0] + (n & 1), c[1] + (n >> 1 & 1), c[2] + (n >> 2)};
-        long double w[3], corner = (long double)f->value[at[0] + f->size[0] * (at[1] + f->size[1] * at[2])];
-        for (int a = 0; a < 3; a++) w[a] = n >> a & 1 ? u[a] : 1 - u[a];
-        value += corner * w[0] * w[1] * w[2];
-        for (int a = 0; a < 3; a++)
-            *slope += corner * dir[a] * (n >> a & 1 ? 1 : -1) * w[(a + 1) % 3] * w[(a + 2) % 3];
+    for (int a = 0; a < 3; a++) { /* linear along each axis, so the difference of the cell's faces is the derivative */
+        long double low[3] = {p[0], p[1], p[2]}, high[3] = {p[0], p[1], p[2]};
+        low[a] = c[a], high[a] = c[a] + 1;
+        *slope += dir[a] * (reference_value(f, c, high) - reference_value(f, c, low));
     }
-    return value;
+    return reference_value(f, c, p);
 }
 
 /* Unlit radiance and opacity along a ray through a unit-spaced volume at the origin: the midpoint rule with `steps` equal pieces,
@@ -179,11 +57,11 @@ static void reference_ray(const field *f, const isogi_transfer *t, int data_spac
     if (enter >= leave) return;
     long double piece = 1 / per_voxel;
     for (long i = 0; i * piece < leave - enter; i++) {
-        long double from = i * piece, to = fminl(from + piece, leave - enter), p[3], slope, rgb[3], extinction;
+        long double from = i * piece, to = fminl(from + piece, leave - enter), p[3], slope, c[4];
         for (int a = 0; a < 3; a++) p[a] = (long double)eye[a] + (enter + 0.5L * (from + to)) * d[a];
-        reference_transfer(t, reference_value(f, p, d, &slope), rgb, &extinction);
-        long double depth = extinction * (to - from) * (data_space ? fabsl(slope) : 1);
-        for (int a = 0; a < 3; a++) out[a] += clear * -expm1l(-depth) * rgb[a];
+        reference_transfer(t, reference_along(f, p, d, &slope), c);
+        long double depth = c[3] * (to - from) * (data_space ? fabsl(slope) : 1);
+        for (int a = 0; a < 3; a++) out[a] += clear * -expm1l(-depth) * c[a];
         clear *= expl(-depth);
     }
     out[3] = 1 - clear;
@@ -221,10 +99,10 @@ TEST(transfer_function_of_many_points_agrees_with_a_plain_search) {
     for (int i = 0; i < 20000; i++) {
         double at = i < N ? points[i].value : random_range(&r, -5, 15);
         float rgb[3], extinction;
-        long double c[3], e;
+        long double c[4];
         isogi_transfer_at(&t, at, rgb, &extinction);
-        reference_transfer(&t, (long double)at, c, &e);
-        CHECK(fabs((double)extinction - (double)e) < 1e-6, "x %.17g: %g, not %g", at, (double)extinction, (double)e);
+        reference_transfer(&t, (long double)at, c);
+        CHECK(fabs((double)extinction - (double)c[3]) < 1e-6, "x %.17g: %g, not %g", at, (double)extinction, (double)c[3]);
         CHECK(fabs((double)rgb[0] - (double)c[0]) < 1e-6, "x %.17g: red %g, not %g", at, (double)rgb[0], (double)c[0]);
     }
 }
@@ -241,7 +119,7 @@ TEST(homogeneous_slab_has_the_transmittance_of_beer_and_lambert) {
             const isogi_transfer_point point = {0, {0.2f, 0.5f, 1}, (float)extinctions[e]};
             const isogi_transfer transfer = {&point, 1, NULL, 0};
             const isogi_dvr_desc desc = {.pyramid = f.pyramid, .step = steps[s], .unit = unit, .opaque = 1};
-            isogi_dvr *dvr = dvr_new(&desc, &transfer, NULL);
+            isogi_dvr *dvr = dvr_new(&desc, &transfer);
             const double eye[3] = {-30, 3, 5}, target[3] = {50, 12, 9}; /* in at x = 0, out at x = 19 */
             double along = sqrt(80 * 80 + 9 * 9 + 4 * 4) / 80, depth = (double)(float)extinctions[e] * 19 * along / unit;
             pixel p = cast(dvr, eye, target, NULL);
@@ -264,7 +142,7 @@ TEST(rays_that_miss_are_transparent_and_infinitely_deep) {
     const isogi_transfer_point point = {0, {1, 1, 1}, 1};
     const isogi_transfer transfer = {&point, 1, NULL, 0}, none = {NULL, 0, NULL, 0};
     const isogi_dvr_desc desc = {.pyramid = f.pyramid};
-    isogi_dvr *dvr = dvr_new(&desc, &transfer, NULL);
+    isogi_dvr *dvr = dvr_new(&desc, &transfer);
     const double eye[3] = {-30, 3, 5}, away[3] = {-40, 3, 5}, past[3] = {8, 20, 9}, in[3] = {5, 3, 5};
     pixel p = cast(dvr, eye, away, NULL), q = cast(dvr, eye, past, NULL), inside = cast(dvr, in, eye, NULL);
     CHECK(p.c[3] <= 0 && p.depth > 1e30f, "behind: %g %g", (double)p.c[3], (double)p.depth);
@@ -302,7 +180,7 @@ TEST(casting_converges_to_the_integral_in_both_spaces) {
             for (int s = 0; s < 4; s++) {
                 const isogi_dvr_desc desc = {.pyramid = f.pyramid, .step = steps[s], .opaque = 1, .space = (isogi_dvr_space)space,
                                              .classification = ISOGI_DVR_POST_CLASSIFIED};
-                isogi_dvr *dvr = dvr_new(&desc, &transfer, NULL);
+                isogi_dvr *dvr = dvr_new(&desc, &transfer);
                 float(*image)[4] = picture(dvr, &view, NULL, NULL, NULL);
                 for (int i = 0; i < 144; i++) {
                     double e = fabs((double)image[i / 4][i % 4] - (double)expected[i / 4][i % 4]);
@@ -330,7 +208,7 @@ TEST(constant_data_contributes_nothing_in_data_space) {
     const isogi_transfer_point point = {0, {1, 1, 1}, 1e6f};
     const isogi_transfer transfer = {&point, 1, NULL, 0};
     const isogi_dvr_desc desc = {.pyramid = f.pyramid, .space = ISOGI_DVR_DATA};
-    isogi_dvr *dvr = dvr_new(&desc, &transfer, NULL);
+    isogi_dvr *dvr = dvr_new(&desc, &transfer);
     test_random r = {5};
     for (int i = 0; i < 200; i++) {
         double eye[3], target[3];
@@ -356,7 +234,7 @@ TEST(linear_data_has_the_opacity_of_the_values_passed) {
         const isogi_transfer_point ramp[] = {{-3, {1, 1, 1}, 0}, {3, {1, 1, 1}, 4}}; /* tau = (s + 3) 2/3, integral (s + 3)^2 / 3 */
         const isogi_transfer constant_tau = {&flat, 1, NULL, 0}, ramp_tau = {ramp, 2, NULL, 0};
         const isogi_dvr_desc desc = {.pyramid = f.pyramid, .space = ISOGI_DVR_DATA, .opaque = 1, .step = random_range(&r, 0.05, 2)};
-        isogi_dvr *dvr = dvr_new(&desc, &constant_tau, NULL);
+        isogi_dvr *dvr = dvr_new(&desc, &constant_tau);
         random_direction(&r, d);
         for (int a = 0; a < 3; a++) target[a] = (double)(float)random_range(&r, 2, 9), eye[a] = (double)(float)(target[a] - 40 * d[a]);
         pixel p = cast(dvr, eye, target, NULL);
@@ -395,7 +273,7 @@ TEST(scaling_space_changes_no_pixel_in_data_space) {
         for (int a = 0; a < 3; a++) f.volume.spacing[a] = scales[i];
         field_build(&f);
         const isogi_dvr_desc desc = {.pyramid = f.pyramid, .space = ISOGI_DVR_DATA};
-        isogi_dvr *dvr = dvr_new(&desc, &transfer, NULL);
+        isogi_dvr *dvr = dvr_new(&desc, &transfer);
         isogi_view view = view_of(&f, scales[i], &r, 32);
         image[i] = picture(dvr, &view, NULL, NULL, NULL);
         isogi_dvr_free(dvr);
@@ -427,7 +305,7 @@ static int reference_crossings(const field *f, double isovalue, const double eye
             begun = 0;
             continue;
         }
-        long double v = reference_value(f, p, d, &slope) - (long double)isovalue;
+        long double v = reference_along(f, p, d, &slope) - (long double)isovalue;
         if (!begun && fabsl(v) < 0.01L) *unsure = 1;
         if (begun && (v >= 0) != (last >= 0)) count++;
         if (begun && (slope > 0) != rising) closest = fminl(closest, fabsl(v)); /* an extremum next to the isovalue */
@@ -447,7 +325,7 @@ TEST(every_crossing_of_a_peak_has_its_opacity_whatever_the_gradient) {
         const isogi_transfer transfer = {NULL, 0, &peak, 1};
         for (int space = 0; space < 2; space++) {
             const isogi_dvr_desc desc = {.pyramid = f.pyramid, .space = (isogi_dvr_space)space, .opaque = 1};
-            isogi_dvr *dvr = dvr_new(&desc, &transfer, NULL);
+            isogi_dvr *dvr = dvr_new(&desc, &transfer);
             test_random r = {31};
             for (int view_number = 0; view_number < 3; view_number++) {
                 isogi_view view = view_of(&f, 1, &r, 12);
@@ -486,7 +364,7 @@ TEST(two_crossings_in_one_cell_both_count) {
     const isogi_peak peak = {0.3, {1, 1, 1}, 0.25f};
     const isogi_transfer transfer = {NULL, 0, &peak, 1};
     const isogi_dvr_desc desc = {.pyramid = f.pyramid, .opaque = 1};
-    isogi_dvr *dvr = dvr_new(&desc, &transfer, NULL);
+    isogi_dvr *dvr = dvr_new(&desc, &transfer);
     const double eye[3] = {-1, -1, 0.4}, target[3] = {2, 2, 0.6}; /* 2 x (1 - x): 0, up to 0.5, 0 */
     pixel p = cast(dvr, eye, target, NULL);
     CHECK(fabs((double)p.c[3] - (1 - 0.75 * 0.75)) < 1e-7, "opacity %.9g", (double)p.c[3]);
@@ -504,7 +382,7 @@ TEST(peaks_stand_in_order_between_samples) {
         const isogi_peak peaks[] = {{1, {0, 0, 1}, 0}, {x / 10, {1, 0, 0}, 0.5f}, {(x + 0.01) / 10, {0, 0, 1}, 1}};
         const isogi_transfer transfer = {&medium, 1, peaks, 3};
         const isogi_dvr_desc desc = {.pyramid = f.pyramid, .step = 2.5, .opaque = 1};
-        isogi_dvr *dvr = dvr_new(&desc, &transfer, NULL);
+        isogi_dvr *dvr = dvr_new(&desc, &transfer);
         pixel p = cast(dvr, eye, target, NULL);
         double before = exp(-0.1 * x), after = exp(-0.1 * (x + 0.01));
         /* a homogeneous medium divided at the crossings is exact whatever the step */
@@ -524,7 +402,7 @@ TEST(many_isosurfaces_converge_to_a_constant_transfer_function) {
     const isogi_transfer_point points[] = {{-1, {1, 1, 1}, 0}, {-1, {1, 1, 1}, 1}, {1, {1, 1, 1}, 1}, {1, {1, 1, 1}, 0}};
     const isogi_transfer continuous = {points, 4, NULL, 0};
     const isogi_dvr_desc fine = {.pyramid = f.pyramid, .space = ISOGI_DVR_DATA, .step = 0.02, .opaque = 1};
-    isogi_dvr *dvr = dvr_new(&fine, &continuous, NULL);
+    isogi_dvr *dvr = dvr_new(&fine, &continuous);
     test_random r = {8};
     isogi_view view = view_of(&f, 1, &r, 10);
     float(*expected)[4] = picture(dvr, &view, NULL, NULL, NULL);
@@ -579,7 +457,7 @@ TEST(visibility_of_a_half_space_agrees_with_its_closed_form) {
             const isogi_transfer transfer = {points, 2, NULL, 0};
             const isogi_dvr_desc desc = {.pyramid = f.pyramid, .shading = ISOGI_DVR_VISIBILITY, .order = 4, .directions = cases[c].rays, .grid = {1, 1, 1},
                                          .method = ISOGI_DVR_BRUTE};
-            isogi_dvr *dvr = dvr_new(&desc, &transfer, NULL);
+            isogi_dvr *dvr = dvr_new(&desc, &transfer);
             const float centre[3] = {1.5f, 1.5f, 1.5f};
             float v[16];
             visibility_of(dvr, centre, v);
@@ -614,7 +492,7 @@ TEST(visibility_past_a_sphere_agrees_with_its_cone) {
                            -blocked * sqrt(5 * PI) / 2 * cosine * sine * sine};
             const isogi_dvr_desc desc = {.pyramid = f.pyramid, .space = (isogi_dvr_space)space, .shading = ISOGI_DVR_VISIBILITY, .directions = 4096,
                                          .grid = {2, 1, 1}, .method = ISOGI_DVR_BRUTE};
-            isogi_dvr *dvr = dvr_new(&desc, &transfers[n], NULL);
+            isogi_dvr *dvr = dvr_new(&desc, &transfers[n]);
             const float point[3] = {0, 11.5f, 11.5f};
             float v[9];
             visibility_of(dvr, point, v);
@@ -633,7 +511,7 @@ TEST(visibility_within_a_homogeneous_box_agrees_with_quadrature) {
     const isogi_transfer transfer = {&point, 1, NULL, 0};
     const isogi_dvr_desc desc = {.pyramid = f.pyramid, .shading = ISOGI_DVR_VISIBILITY, .directions = 1024, .grid = {3, 5, 2},
                                  .method = ISOGI_DVR_BRUTE};
-    isogi_dvr *dvr = dvr_new(&desc, &transfer, NULL);
+    isogi_dvr *dvr = dvr_new(&desc, &transfer);
     const float places[4][3] = {{4, 4, 0}, {0, 6, 8}, {8, 8, 8}, {4, 2, 8}};
     double remaining;
     isogi_dvr_step(dvr, 0, &remaining);
@@ -661,7 +539,7 @@ TEST(a_new_transfer_function_starts_visibility_again) {
     const isogi_transfer_point points[] = {{-1, {1, 1, 1}, 0}, {1, {1, 1, 1}, 0.4f}};
     const isogi_transfer first = {points, 2, NULL, 0}, second = {points, 1, NULL, 0};
     const isogi_dvr_desc desc = {.pyramid = f.pyramid, .shading = ISOGI_DVR_VISIBILITY, .grid = {2, 2, 2}, .method = ISOGI_DVR_BRUTE};
-    isogi_dvr *dvr = dvr_new(&desc, &first, NULL);
+    isogi_dvr *dvr = dvr_new(&desc, &first);
     double remaining = 1;
     const float corner[3] = {0, 0, 0};
     float v[9];
@@ -680,7 +558,7 @@ TEST(interpolated_visibility_is_trilinear_between_grid_points) {
     const isogi_transfer_point points[] = {{-1, {1, 1, 1}, 0}, {1, {1, 1, 1}, 0.4f}};
     const isogi_transfer transfer = {points, 2, NULL, 0};
     const isogi_dvr_desc desc = {.pyramid = f.pyramid, .shading = ISOGI_DVR_VISIBILITY, .order = 2, .directions = 16, .grid = {3, 2, 5}};
-    isogi_dvr *dvr = dvr_new(&desc, &transfer, NULL);
+    isogi_dvr *dvr = dvr_new(&desc, &transfer);
     test_random r = {2};
     isogi_dvr_step(dvr, 0, NULL);
     for (int n = 0; n < 100; n++) {
@@ -719,7 +597,7 @@ TEST(a_medium_without_shadows_shows_its_albedo_under_a_uniform_sky) {
             for (int stepped = 0; stepped < 2; stepped++) {
                 const isogi_dvr_desc desc = {.pyramid = f.pyramid, .shading = ISOGI_DVR_VISIBILITY, .order = order, .directions = directions,
                                              .grid = {2, 2, 1}};
-                isogi_dvr *dvr = dvr_new(&desc, &transfer, NULL);
+                isogi_dvr *dvr = dvr_new(&desc, &transfer);
                 if (stepped) isogi_dvr_step(dvr, 0, NULL);
                 pixel p = cast(dvr, eye, target, &sky);
                 /* a medium of optical depth 1e-6, float coefficients */
@@ -771,7 +649,7 @@ TEST(lights_add_up) {
                                      {.lights = &lights[1], .light_count = 1}, {.env = {.sh = sky_one, .sh_order = 1}, .lights = lights, .light_count = 2}};
     for (int shading = 1; shading < 3; shading++) {
         const isogi_dvr_desc desc = {.pyramid = f.pyramid, .shading = (isogi_dvr_shading)shading, .grid = {4, 4, 4}};
-        isogi_dvr *dvr = dvr_new(&desc, &transfer, NULL);
+        isogi_dvr *dvr = dvr_new(&desc, &transfer);
         test_random r = {12};
         isogi_view view = view_of(&f, 1, &r, 16);
         float(*image[4])[4];
@@ -798,7 +676,7 @@ TEST(scattered_light_has_the_stated_units) {
     const isogi_light lights[] = {{.vector = {1, 2, -1}, .rgb = {2, 2, 2}}, {.kind = ISOGI_LIGHT_POINT, .vector = {2, 300, 2}, .rgb = {5e4f, 5e4f, 5e4f}}};
     const isogi_dvr_desc desc = {.pyramid = f.pyramid, .shading = ISOGI_DVR_VISIBILITY};
     const double eye[3] = {-30, 2, 2}, target[3] = {5, 2, 2}, expected[2] = {2 / (4 * PI), 5e4 / (298.0 * 298.0) / (4 * PI)};
-    isogi_dvr *dvr = dvr_new(&desc, &transfer, NULL);
+    isogi_dvr *dvr = dvr_new(&desc, &transfer);
     for (int i = 0; i < 2; i++) {
         const isogi_lighting lighting = {.lights = &lights[i], .light_count = 1};
         pixel p = cast(dvr, eye, target, &lighting);
@@ -817,7 +695,7 @@ TEST(local_shading_faces_the_eye_on_both_sides) {
     const isogi_peak peak = {0.5, {0.8f, 0.5f, 0.3f}, 1};
     const isogi_transfer transfer = {NULL, 0, &peak, 1};
     const isogi_dvr_desc desc = {.pyramid = f.pyramid, .shading = ISOGI_DVR_LOCAL};
-    isogi_dvr *dvr = dvr_new(&desc, &transfer, NULL);
+    isogi_dvr *dvr = dvr_new(&desc, &transfer);
     for (int side = -1; side <= 1; side += 2) {
         const double eye[3] = {4, 4, 4 + 30 * side}, target[3] = {4, 4, 4};
         const isogi_light towards = {.vector = {0, 3, 4.0f * (float)side}, .rgb = {2, 2, 2}};
@@ -845,7 +723,7 @@ TEST(shadows_fall_away_from_the_light) {
     const isogi_light sun = {.vector = {0, 1, 0}, .rgb = {6, 6, 6}};
     const isogi_lighting lighting = {.lights = &sun, .light_count = 1};
     const isogi_dvr_desc desc = {.pyramid = f.pyramid, .shading = ISOGI_DVR_VISIBILITY, .directions = 256, .grid = {12, 12, 12}};
-    isogi_dvr *dvr = dvr_new(&desc, &transfer, NULL);
+    isogi_dvr *dvr = dvr_new(&desc, &transfer);
     isogi_dvr_step(dvr, 0, NULL);
     const double eye[3] = {11.5, 10, -40}, lit[3] = {4, 2.2, 6}, dark[3] = {19, 2.2, 6};
     pixel in_light = cast(dvr, eye, lit, &lighting), in_shadow = cast(dvr, eye, dark, &lighting);
@@ -869,7 +747,7 @@ TEST(stepping_over_empty_blocks_changes_no_bit) {
             const isogi_dvr_desc desc = {.pyramid = f.pyramid, .space = (isogi_dvr_space)space, .shading = ISOGI_DVR_VISIBILITY, .step = steps[seed - 1],
                                          .directions = 20, .grid = {3, 3, 3}};
             const isogi_lighting sky = {.env = {.sh = sky_one, .sh_order = 1}};
-            isogi_dvr *dvr = dvr_new(&desc, &sparse, NULL);
+            isogi_dvr *dvr = dvr_new(&desc, &sparse);
             isogi_counters count[2] = {{0}, {0}};
             float(*image[2])[4], *depth = (float *)calloc(2 * 48 * 48, sizeof(float)), v[2][27 * 9];
             test_random r = {seed};
@@ -912,7 +790,7 @@ TEST(samples_stay_within_the_range_of_their_cell) {
                                                {nextafter(largest, 1e9), {1, 1, 1}, 1}};
         const isogi_transfer transfer = {points, 4, NULL, 0};
         const isogi_dvr_desc desc = {.pyramid = f.pyramid, .opaque = 1, .step = 0.1};
-        isogi_dvr *dvr = dvr_new(&desc, &transfer, NULL);
+        isogi_dvr *dvr = dvr_new(&desc, &transfer);
         const double eye[3] = {2, 2, 20}, target[3] = {2, 2, 0};
         memset(dvr->empty_blocks, 0, dvr->block_count), dvr->transparent = 0;
         pixel p = cast(dvr, eye, target, NULL);
@@ -937,7 +815,7 @@ TEST(blocks_are_marked_empty_exactly_where_nothing_absorbs) {
             x += random_unit(&r) < 0.2 ? 0 : random_range(&r, 0, 0.1);
         }
         const isogi_transfer transfer = {points, (size_t)(1 + trial % N), NULL, 0};
-        isogi_dvr *dvr = dvr_new(&desc, &transfer, NULL);
+        isogi_dvr *dvr = dvr_new(&desc, &transfer);
         isogi_level level = isogi_vol_level(f.pyramid, 0);
         for (size_t b = 0; b < level.size[0] * level.size[1] * level.size[2]; b++) {
             float most = 0, rgb[3], extinction;
@@ -963,7 +841,7 @@ TEST(an_empty_scene_costs_next_to_nothing) {
     const isogi_transfer_point beyond[] = {{1e3, {1, 1, 1}, 0}, {2e3, {1, 1, 1}, 5}};
     const isogi_transfer transfer = {beyond, 2, NULL, 0};
     const isogi_dvr_desc desc = {.pyramid = f.pyramid, .shading = ISOGI_DVR_VISIBILITY, .grid = {4, 4, 4}};
-    isogi_dvr *dvr = dvr_new(&desc, &transfer, NULL);
+    isogi_dvr *dvr = dvr_new(&desc, &transfer);
     const isogi_lighting sky = {.env = {.sh = sky_one, .sh_order = 1}};
     isogi_counters count = {0};
     test_random r = {4};
@@ -991,7 +869,7 @@ TEST(ending_early_errs_by_no_more_than_what_is_left) {
     uint64_t samples[4];
     for (int i = 0; i < 4; i++) {
         const isogi_dvr_desc desc = {.pyramid = f.pyramid, .opaque = opaque[i]};
-        isogi_dvr *dvr = dvr_new(&desc, &transfer, NULL);
+        isogi_dvr *dvr = dvr_new(&desc, &transfer);
         isogi_counters count = {0};
         float(*image)[4] = picture(dvr, &view, NULL, NULL, &count);
         samples[i] = count.samples;
@@ -1023,7 +901,7 @@ TEST(any_number_of_threads_and_any_slicing_gives_the_same_bits) {
     for (int i = 0; i < 4; i++) {
         const isogi_context context = {.threads = threads[i]};
         const isogi_dvr_desc desc = {.pyramid = f.pyramid, .shading = ISOGI_DVR_VISIBILITY, .grid = {7, 6, 5}};
-        isogi_dvr *dvr = dvr_new(&desc, &sparse, &context);
+        isogi_dvr *dvr = dvr_new_with(&desc, &sparse, &context);
         double remaining = 1, last = 2;
         int calls = 0;
         for (; remaining > 0 && calls < 1000; calls++) {
@@ -1065,7 +943,7 @@ TEST(cancelling_leaves_outputs_alone_and_stepping_goes_on) {
     /* one thread: with more, the others may have finished everything before the callback has its first turn */
     const isogi_context context = {.progress = stop_after, .user = &s, .threads = 1};
     const isogi_dvr_desc desc = {.pyramid = f.pyramid, .shading = ISOGI_DVR_VISIBILITY, .order = 1, .directions = 2, .grid = {20, 20, 20}};
-    isogi_dvr *dvr = dvr_new(&desc, &sparse, &context), *whole = dvr_new(&desc, &sparse, NULL);
+    isogi_dvr *dvr = dvr_new_with(&desc, &sparse, &context), *whole = dvr_new(&desc, &sparse);
     const isogi_lighting sky = {.env = {.sh = sky_one, .sh_order = 1}};
     const isogi_view view = {.width = 64, .height = 64, .eye = {60, 70, 80}, .target = {12, 12, 12}};
     static float image[64 * 64][4], depth[64 * 64];
@@ -1242,7 +1120,7 @@ TEST(cells_that_are_not_finite_are_transparent) {
             const isogi_transfer_point point = {0, {1, 1, 1}, 1};
             const isogi_transfer transfer = {&point, 1, NULL, 0};
             const isogi_dvr_desc desc = {.pyramid = f.pyramid, .opaque = 1, .space = (isogi_dvr_space)space};
-            isogi_dvr *dvr = dvr_new(&desc, &transfer, NULL);
+            isogi_dvr *dvr = dvr_new(&desc, &transfer);
             const double eye[3] = {-5, 5.5, 4.5}, target[3] = {5, 5.5, 4.5};
             pixel p = cast(dvr, eye, target, NULL);
             double expected = -expm1(space ? -0.8 : -8); /* two cells of ten are left out */
@@ -1270,7 +1148,7 @@ TEST(odd_volumes_and_extinctions_are_defined) {
                 for (int shading = 0; shading < 3; shading++) {
                     const isogi_dvr_desc desc = {.pyramid = f.pyramid, .space = (isogi_dvr_space)((s + e) % 2), .shading = (isogi_dvr_shading)shading,
                                                  .directions = 9};
-                    isogi_dvr *dvr = dvr_new(&desc, &transfer, NULL);
+                    isogi_dvr *dvr = dvr_new(&desc, &transfer);
                     isogi_view view = {.width = 6, .height = 6, .eye = {20, 30, 40}, .target = {0.5f, 0.5f, 0.5f}, .fov = 20};
                     float(*image)[4], depth[36];
                     if (r.state % 2) view.eye[1] = 0.5f;
@@ -1296,7 +1174,7 @@ TEST(a_ray_within_a_flat_volume_samples_it) {
     const isogi_transfer_point point = {0, {1, 1, 1}, 0.25f};
     const isogi_transfer transfer = {&point, 1, NULL, 0};
     const isogi_dvr_desc desc = {.pyramid = f.pyramid};
-    isogi_dvr *dvr = dvr_new(&desc, &transfer, NULL);
+    isogi_dvr *dvr = dvr_new(&desc, &transfer);
     const double eye[3] = {-5, 4, 0}, target[3] = {5, 4, 0};
     pixel p = cast(dvr, eye, target, NULL);
     CHECK(fabs((double)p.c[3] - -expm1(-2)) < 1e-6, "opacity %g, not %g", (double)p.c[3], -expm1(-2));
@@ -1345,7 +1223,7 @@ TEST(engine_under_its_transfer_function_is_lit_and_shadowed) {
     const isogi_context all = {0};
     CHECK(isogi_vol_build(&pyramid, &volume, &all) == ISOGI_OK, "build");
     const isogi_dvr_desc desc = {.pyramid = pyramid, .shading = ISOGI_DVR_VISIBILITY, .directions = 32, .grid = {16, 16, 8}};
-    isogi_dvr *dvr = dvr_new(&desc, &transfer, &all);
+    isogi_dvr *dvr = dvr_new_with(&desc, &transfer, &all);
     const isogi_lighting sky = {.env = {.sh = sky_one, .sh_order = 1}};
     const isogi_view view = {.width = 64, .height = 64, .eye = {400, 340, 470}, .target = {127.5f, 127.5f, 63.5f}};
     isogi_counters count = {0};

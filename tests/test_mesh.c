@@ -1,37 +1,9 @@
 /* Properties of the meshes of isogi_vol.h. */
 #define ISOGI_IMPLEMENTATION
 #include "isogi_vol.h"
-#include "test.h"
-
-static const isogi_context serial = {.threads = 1};
+#include "fields.h"
 
 /* ---- volumes for tests ---- */
-
-typedef struct field {
-    int size[3];
-    double *value;
-    isogi_volume volume;
-    isogi_pyramid *pyramid;
-} field;
-
-static field field_new(int x, int y, int z) {
-    field f = {{x, y, z}, (double *)calloc((size_t)x * (size_t)y * (size_t)z, sizeof(double)), {0}, NULL};
-    f.volume.data = f.value, f.volume.type = ISOGI_F64;
-    for (int a = 0; a < 3; a++) f.volume.size[a] = (size_t)f.size[a];
-    return f;
-}
-
-static double *field_at(const field *f, int i, int j, int k) { return &f->value[i + f->size[0] * (j + f->size[1] * k)]; }
-
-static void field_build(field *f, const isogi_context *context) {
-    isogi_result result = isogi_vol_build(&f->pyramid, &f->volume, context);
-    CHECK(result == ISOGI_OK, "%s", isogi_result_string(result));
-}
-
-static void field_free(field *f) {
-    isogi_vol_free(f->pyramid);
-    free(f->value);
-}
 
 /* Random; few whole levels, so that the isovalue 0 meets data, face saddles and body saddles; columns of opposite corners against
    the others, where most passages are; a sum of waves; values over six decades. */
@@ -442,7 +414,7 @@ TEST(one_cell_has_the_topology_of_the_trilinear_surface) {
         field f = field_new(2, 2, 2);
         int kind = i % 3 == 2 ? LEVELS : i % 3 ? OPPOSED : NOISE;
         field_fill(&f, kind, &r);
-        field_build(&f, &serial);
+        field_build_with(&f, &serial);
         check_topology(&mesh, &f, 0, kind, (uint64_t)i);
         field_free(&f);
     }
@@ -457,7 +429,7 @@ TEST(volumes_have_the_topology_of_the_trilinear_surface) {
         int kind = i % KINDS, x = 2 + (int)(random_bits(&r) % 7), y = 2 + (int)(random_bits(&r) % 7), z = 2 + (int)(random_bits(&r) % 7);
         field f = field_new(x, y, z);
         field_fill(&f, kind, &r);
-        field_build(&f, &serial);
+        field_build_with(&f, &serial);
         check_topology(&mesh, &f, 0, kind, (uint64_t)i);
         field_free(&f);
     }
@@ -488,7 +460,7 @@ TEST(known_shapes_have_their_euler_characteristic) {
     const long euler[] = {2, 0, 4, 0}, components[] = {1, 1, 2, 2};
     for (int shape_kind = 0; shape_kind < 4; shape_kind++) {
         field f = known_field(shape_kind);
-        field_build(&f, NULL);
+        field_build_with(&f, NULL);
         isogi_mesh mesh = mesh_of(&f, 0, 0, 0);
         shape s = mesh_shape(&mesh, NULL, NULL, NULL);
         CHECK(s.bad_edges == 0 && s.open_edges == 0 && s.bad_vertices == 0, "shape %d: %ld bad edges, %ld open, %ld bad vertices", shape_kind,
@@ -532,7 +504,7 @@ TEST(vertices_lie_on_the_surface) {
         test_random r = {(uint64_t)i};
         field f = field_new(8, 7, 6);
         field_fill(&f, i & 1 ? OPPOSED : NOISE, &r);
-        field_build(&f, &serial);
+        field_build_with(&f, &serial);
         isogi_mesh mesh = mesh_of(&f, 0.05, 0, 0);
         for (size_t v = 0; v < mesh.vertex_count; v++) {
             double p[3];
@@ -555,7 +527,7 @@ TEST(triangles_turn_counter_clockwise_seen_from_the_low_side) {
         long wrong = 0;
         double centre[3], grid[3] = {14.3, 16.1, 15.2}, expected;
         oriented(&f, mirrored);
-        field_build(&f, NULL);
+        field_build_with(&f, NULL);
         isogi_vol_to_world(f.pyramid, grid, centre);
         isogi_mesh mesh = mesh_of(&f, 0, 0, 0);
         for (size_t i = 0; i < mesh.triangle_count; i++) {
@@ -583,7 +555,7 @@ TEST(normals_are_those_of_the_smoothed_field) {
         field f = field_new(40, 30, 30);
         double centre[3], middle[3] = {20.2, 14.1, 15.3}, worst = 0;
         oriented(&f, mirrored);
-        field_build(&f, NULL);
+        field_build_with(&f, NULL);
         isogi_vol_to_world(f.pyramid, middle, centre);
         for (int k = 0; k < 30; k++)
             for (int j = 0; j < 30; j++)
@@ -594,7 +566,7 @@ TEST(normals_are_those_of_the_smoothed_field) {
                     *field_at(&f, i, j, k) = 36 - d;
                 }
         isogi_vol_free(f.pyramid);
-        field_build(&f, NULL);
+        field_build_with(&f, NULL);
         isogi_mesh mesh = mesh_of(&f, 0, 1, 0);
         for (size_t v = 0; v < mesh.vertex_count; v++) {
             double n[3], length = 0, e = 0;
@@ -617,7 +589,7 @@ TEST(normals_agree_with_sampling) {
         field f = field_new(sizes[i % 4][0], sizes[i % 4][1], sizes[i % 4][2]);
         field_fill(&f, SMOOTH, &r);
         oriented(&f, i & 1);
-        field_build(&f, &serial);
+        field_build_with(&f, &serial);
         isogi_mesh mesh = mesh_of(&f, 0.1, 1, 0);
         double worst = 0;
         for (size_t v = 0; v < mesh.vertex_count; v++) {
@@ -648,7 +620,7 @@ TEST(closed_meshes_have_no_border) {
         int n[3] = {f.size[0], f.size[1], f.size[2]}, inside = 0, parts = 0;
         double inner = 0;
         field_fill(&f, i % KINDS, &r);
-        field_build(&f, &serial);
+        field_build_with(&f, &serial);
         isogi_mesh mesh = mesh_of(&f, 0, 1, 1), open = mesh_of(&f, 0, 0, 0);
         shape s = mesh_shape(&mesh, NULL, NULL, NULL);
         CHECK(s.bad_edges == 0 && s.open_edges == 0 && s.bad_vertices == 0, "volume %d: %ld bad edges, %ld open, %ld bad vertices", i, s.bad_edges,
@@ -658,7 +630,7 @@ TEST(closed_meshes_have_no_border) {
         /* what it holds and what its negative holds fill the box; half-open makes no difference to volumes */
         for (int v = 0; v < n[0] * n[1] * n[2]; v++) f.value[v] = -f.value[v];
         isogi_vol_free(f.pyramid);
-        field_build(&f, &serial);
+        field_build_with(&f, &serial);
         isogi_mesh rest = mesh_of(&f, 0, 0, 1);
         inner = mesh_volume(&mesh);
         CHECK(inner >= 0 && inner <= (n[0] - 1) * (n[1] - 1) * (n[2] - 1) * 1.000001, "volume %d: %g", i, inner);
@@ -673,7 +645,7 @@ TEST(closed_meshes_have_no_border) {
 TEST(a_closed_box_is_a_box) {
     field f = field_new(5, 4, 3);
     for (int i = 0; i < 60; i++) f.value[i] = 1;
-    field_build(&f, NULL);
+    field_build_with(&f, NULL);
     isogi_mesh mesh = mesh_of(&f, 0, 1, 1), full = mesh_of(&f, 1, 0, 1), none = mesh_of(&f, 1.5, 1, 1), open = mesh_of(&f, 0, 0, 0);
     shape s = mesh_shape(&mesh, NULL, NULL, NULL);
     CHECK(s.euler == 2 && s.components == 1 && s.open_edges == 0 && s.bad_edges == 0, "Euler %ld, components %ld", s.euler, s.components);
@@ -694,7 +666,7 @@ TEST(a_closed_box_is_a_box) {
 TEST(a_closed_half_space_holds_its_volume) {
     field f = field_new(6, 6, 6);
     for (int i = 0; i < 216; i++) f.value[i] = 5.25 - (i % 6 + 0.5 * (i / 6 % 6)); /* x + y/2 <= 5.25 */
-    field_build(&f, NULL);
+    field_build_with(&f, NULL);
     isogi_mesh mesh = mesh_of(&f, 0, 0, 1);
     /* area of {x + y/2 <= 5.25} in the square of side 5: 25 minus the triangle with legs 2.25 and 4.5 */
     CHECK(fabs(mesh_volume(&mesh) - 5 * (25 - 0.5 * 2.25 * 4.5)) < 1e-4, "%g", mesh_volume(&mesh));
@@ -714,12 +686,12 @@ TEST(cells_with_a_voxel_that_is_not_finite_are_left_out) {
         field_fill(&f, i & 1 ? SMOOTH : NOISE, &r);
         if (i % 5 == 0)
             for (int v = 0; v < 7 * 6 * 8; v++) f.value[v] = fabs(f.value[v]) * (v % 7 < 3 ? 1 : -1); /* sides that meet in a bad plane only */
-        field_build(&f, &serial);
+        field_build_with(&f, &serial);
         isogi_mesh whole = mesh_of(&f, 0, 0, i & 2);
         isogi_vol_free(f.pyramid);
         for (int v = 0; v < 7 * 6 * 8; v++)
             if (i % 5 == 0 ? v % 7 == 3 : random_unit(&r) < 0.02) f.value[v] = bad[v % 3];
-        field_build(&f, &serial);
+        field_build_with(&f, &serial);
         isogi_mesh mesh = mesh_of(&f, 0, 1, i & 2);
         for (size_t t = 0; t < whole.triangle_count; t++) {
             int cell[3], good = 1;
@@ -751,7 +723,7 @@ TEST(cells_with_a_voxel_that_is_not_finite_are_left_out) {
 TEST(blocks_without_surface_are_not_read) {
     field f = known_field(SPHERE);
     long changed = 0;
-    field_build(&f, &serial);
+    field_build_with(&f, &serial);
     isogi_mesh before = mesh_of(&f, 0, 0, 0);
     for (int v = 0; v < 38 * 33 * 31; v++)
         if (fabs(f.value[v]) > 7) f.value[v] = -f.value[v], changed++;
@@ -770,7 +742,7 @@ TEST(rows_of_any_length) {
         test_random r = {(uint64_t)i};
         field f = field_new(lengths[i], 3 + i % 3, 4);
         field_fill(&f, NOISE, &r);
-        field_build(&f, &serial);
+        field_build_with(&f, &serial);
         check_topology(&open, &f, 0, NOISE, (uint64_t)i);
         isogi_mesh mesh = mesh_of(&f, 0, 0, 1);
         shape s = mesh_shape(&mesh, NULL, NULL, NULL);
@@ -787,7 +759,7 @@ TEST(thin_volumes) {
         field f = field_new(1 + i % 3, 1 + i / 3 % 3, 1 + i / 9);
         int flat = f.size[0] == 1 || f.size[1] == 1 || f.size[2] == 1;
         for (int v = 0; v < f.size[0] * f.size[1] * f.size[2]; v++) f.value[v] = v ? -1 : 1;
-        field_build(&f, NULL);
+        field_build_with(&f, NULL);
         isogi_mesh mesh = mesh_of(&f, 0, 1, 0), closed = mesh_of(&f, 0, 1, 1);
         CHECK(mesh.triangle_count == (flat ? 0 : 1), "size %d %d %d: %zu", f.size[0], f.size[1], f.size[2], mesh.triangle_count);
         CHECK(closed.triangle_count == (flat ? 0 : 4), "size %d %d %d: %zu", f.size[0], f.size[1], f.size[2], closed.triangle_count);
@@ -805,7 +777,7 @@ TEST(bytes_at_the_isovalue_are_inside) {
         field f = field_new(N, N, N);
         for (int v = 0; v < N * N * N; v++) f.value[v] = data[v] = (uint8_t)(random_bits(&r) % (i & 1 ? 4 : 256));
         f.volume.data = data, f.volume.type = ISOGI_U8;
-        field_build(&f, &serial);
+        field_build_with(&f, &serial);
         double level = i & 1 ? 2 : 100;
         isogi_mesh at = mesh_of(&f, level, 0, 0);
         shape s = mesh_shape(&at, on_border, &f, NULL);
@@ -845,7 +817,7 @@ TEST(every_type_and_stride_gives_the_same_mesh) {
         for (int k = 0; k < Z; k++)
             for (int j = 0; j < Y; j++)
                 for (int n = 0; n < X; n++) *field_at(&f, n, j, k) = floor(50 + 40 * sin(0.3 * n + 0.1 * j) * cos(0.5 * k) + 8 * random_unit(&r));
-        field_build(&f, &serial);
+        field_build_with(&f, &serial);
         isogi_mesh expected = mesh_of(&f, 50, 1, 1);
         isogi_vol_free(f.pyramid);
         ptrdiff_t s[3] = {size, size * X, size * X * Y};
@@ -858,7 +830,7 @@ TEST(every_type_and_stride_gives_the_same_mesh) {
                 for (int n = 0; n < X; n++) store(base + n * s[0] + j * s[1] + k * s[2], type, *field_at(&f, n, j, k));
         f.volume.data = base, f.volume.type = type;
         for (int a = 0; a < 3; a++) f.volume.stride[a] = layout ? s[a] : 0;
-        field_build(&f, &serial);
+        field_build_with(&f, &serial);
         isogi_mesh mesh = mesh_of(&f, 50, 1, 1);
         CHECK(mesh_same(&mesh, &expected) && mesh.triangle_count > 1000, "type %d layout %d: %zu triangles, %zu", (int)type, layout,
               mesh.triangle_count, expected.triangle_count);
@@ -874,7 +846,7 @@ TEST(extreme_values_still_give_a_manifold) {
         test_random r = {(uint64_t)i};
         field f = field_new(5, 5, 5);
         for (int v = 0; v < 125; v++) f.value[v] = random_range(&r, -1, 1) * (i % 6 < 5 ? sizes[i % 6] : pow(10, random_range(&r, -300, 300)));
-        field_build(&f, &serial);
+        field_build_with(&f, &serial);
         isogi_mesh mesh = mesh_of(&f, 0, 1, i & 1);
         shape s = mesh_shape(&mesh, i & 1 ? NULL : on_border, &f, NULL);
         CHECK(s.bad_edges == 0 && s.bad_vertices == 0 && mesh.triangle_count > 50, "volume %d: %ld, %ld", i, s.bad_edges, s.bad_vertices);
@@ -902,7 +874,7 @@ TEST(any_number_of_threads_gives_the_same_bits) {
         isogi_mesh first = {0};
         for (int i = 0; i < 6; i++) {
             isogi_context context = {.threads = i < 5 ? threads[i] : 0, .parallel_for = i < 5 ? NULL : backwards};
-            field_build(&f, &context);
+            field_build_with(&f, &context);
             isogi_mesh mesh = mesh_of(&f, 0.2, 1, closed);
             if (!i) first = mesh;
             else {
@@ -954,7 +926,7 @@ TEST(a_moving_isovalue_soon_allocates_nothing) {
     isogi_mesh mesh = {0};
     long after = 0;
     field_fill(&f, SMOOTH, &r);
-    field_build(&f, &context);
+    field_build_with(&f, &context);
     for (int round = 0; round < 3; round++) {
         for (int i = 0; i <= 20; i++) {
             isogi_mesh_desc desc = {.isovalue = -3 + 0.3 * i, .normals = 1, .closed = 1};
@@ -984,7 +956,7 @@ static void check_failure(int cancel) {
         isogi_context context = {.alloc = log_alloc, .release = log_release, .progress = log_progress, .user = &log, .threads = 1};
         isogi_mesh mesh = {0}, before;
         isogi_mesh_desc small = {.isovalue = 2.9, .normals = 1}, large = {.isovalue = 0, .normals = 1, .closed = 1};
-        field_build(&f, &context);
+        field_build_with(&f, &context);
         int kept = !!(k & 1); /* into a mesh that holds another one, or into an empty one */
         if (kept) CHECK(isogi_vol_mesh(f.pyramid, &small, &mesh) == ISOGI_OK && mesh.triangle_count, "%zu", mesh.triangle_count);
         isogi_mesh copy = kept ? mesh_of(&f, 2.9, 1, 0) : mesh;
@@ -1018,7 +990,7 @@ TEST(cancelling_leaves_the_mesh_as_it_was) { check_failure(1); }
 
 TEST(bad_arguments_are_refused) {
     field f = known_field(SPHERE);
-    field_build(&f, &serial);
+    field_build_with(&f, &serial);
     isogi_mesh mesh = {0};
     isogi_mesh_desc good = {.isovalue = 0}, nan_value = {.isovalue = NAN}, infinite = {.isovalue = INFINITY}, huge = {.isovalue = 1e300};
     CHECK(isogi_vol_mesh(NULL, &good, &mesh) == ISOGI_INVALID, "%zu", mesh.vertex_count);
@@ -1045,7 +1017,7 @@ static void check_scan(const char *name, int x, int y, int z, double isovalue) {
     CHECK(file && fread(data, 1, bytes, file) == bytes, "%s", path);
     if (file) fclose(file);
     f.volume.data = data, f.volume.type = ISOGI_U8;
-    field_build(&f, NULL);
+    field_build_with(&f, NULL);
     isogi_mesh open = mesh_of(&f, isovalue, 0, 0), closed = mesh_of(&f, isovalue, 1, 1);
     shape s = mesh_shape(&open, on_box, &f, NULL), c = mesh_shape(&closed, NULL, NULL, NULL);
     printf("    %s at %g: %ld triangles, %ld components, Euler %ld; closed: %ld, %ld, %ld\n", name, isovalue, s.triangles, s.components, s.euler,

@@ -65,23 +65,12 @@ TEST(white_furnace) {
 /* E = pi F / (1 - R (1 - F)), the same everywhere in the pit; F, the opening's share of the sphere, from the run without reflections
    (voxels erode the lip: 2.5 %), the dependence on R within 2 %. Rays above the rim see sky alone. */
 TEST(cavity_with_opening_follows_its_closed_form) {
-    int n = LONG_SUITE ? 128 : 64, count = 0;
+    int n = LONG_SUITE ? 128 : 64, count = 200;
     double r = 0.4 * n, c = n / 2.0, q[5] = {c, 0.75 * n, c, 0.75 * n, r}, opening;
     scene s = scene_make(n, n, n, NULL, pit, q);
     float points[200][3];
-    test_random random = {3};
     isogi_trace_desc d = desc_make(&s, 0, 0, 256);
-    while (count < 200) { /* from the centre down to the wall, at least 5 % of r below the rim */
-        isogi_ray ray;
-        isogi_hit hit = {0};
-        double w[3];
-        random_direction(&random, w);
-        if (w[1] > -0.05) continue;
-        memset(&ray, 0, sizeof ray);
-        for (int a = 0; a < 3; a++) ray.origin[a] = q[a], ray.dir[a] = (float)w[a];
-        isogi_vol_intersect(s.pyramid, &ray, 1, &hit, NULL);
-        isogi_vol_positions(s.pyramid, &hit, 1, (float(*)[3])points[count++]);
-    }
+    pit_points(&s, q, count, points);
     opening = mean_irradiance(&d, (const float(*)[3])points, count, NULL) / PI;
     CHECK(fabs(opening - 0.5) < 0.025 * 0.5, "F %.4f, one half expected", opening);
     for (int i = 0; i < 3; i++) {

@@ -1,57 +1,8 @@
 /* Properties of isogi_vol.h: volumes, pyramid, sampling, rays. Meshes have their own file. */
 #define ISOGI_IMPLEMENTATION
 #include "isogi_vol.h"
+#include "ray_fields.h"
 #include "reference_ray.h"
-#include "test.h"
-
-/* ---- volumes for tests ---- */
-
-typedef struct field {
-    int size[3];
-    double *value;
-    isogi_volume volume;
-    isogi_pyramid *pyramid;
-} field;
-
-static field field_new(int x, int y, int z) {
-    field f = {{x, y, z}, (double *)calloc((size_t)x * (size_t)y * (size_t)z, sizeof(double)), {0}, NULL};
-    f.volume.data = f.value, f.volume.type = ISOGI_F64;
-    for (int a = 0; a < 3; a++) f.volume.size[a] = (size_t)f.size[a];
-    return f;
-}
-
-static double *field_at(field *f, int i, int j, int k) { return &f->value[i + f->size[0] * (j + f->size[1] * k)]; }
-
-/* Every instruction path in turn, so that what holds for one volume after the other holds for all of them. */
-static void field_build(field *f) {
-    static int builds;
-    isogi_context context = {.threads = 1, .force_path = builds++ % 5};
-    isogi_result result = isogi_vol_build(&f->pyramid, &f->volume, &context);
-    CHECK(result == ISOGI_OK, "%s", isogi_result_string(result));
-}
-
-static void field_free(field *f) {
-    isogi_vol_free(f->pyramid);
-    free(f->value);
-}
-
-enum { NOISE, SMOOTH, QUANTISED, KINDS };
-
-/* White noise; a sum of a few waves; the same rounded to few levels, so that isovalues can equal data. */
-static void field_fill(field *f, int kind, test_random *r) {
-    double wave[4][4];
-    for (int w = 0; w < 4; w++)
-        for (int a = 0; a < 4; a++) wave[w][a] = random_range(r, -1, 1) * (a < 3 ? 0.9 : 6.28);
-    for (int k = 0; k < f->size[2]; k++)
-        for (int j = 0; j < f->size[1]; j++)
-            for (int i = 0; i < f->size[0]; i++) {
-                double v = 0;
-                for (int w = 0; w < 4; w++) v += sin(wave[w][0] * i + wave[w][1] * j + wave[w][2] * k + wave[w][3]);
-                if (kind == NOISE) v = random_range(r, -1, 1);
-                if (kind == QUANTISED) v = floor(2 * v);
-                *field_at(f, i, j, k) = v;
-            }
-}
 
 static double wide_isovalue(int kind, test_random *r) {
     return kind == QUANTISED ? floor(random_range(r, -4, 4)) + (random_bits(r) & 1 ? 0.5 : 0) : random_range(r, -0.9, 0.9);
@@ -98,17 +49,11 @@ static void tally_check(const char *what, const ray_tally *t) {
     CHECK(t->undecided * 20 <= t->rays, "%ld of %ld undecided: the test says little", t->undecided, t->rays);
 }
 
-static isogi_ray random_ray(const field *f, double isovalue, test_random *r) {
-    isogi_ray ray = {.isovalue = isovalue};
-    double d[3], target[3];
-    random_direction(r, d);
-    for (int a = 0; a < 3; a++) {
-        target[a] = random_range(r, 0, f->size[a] - 1);
-        ray.dir[a] = (float)d[a];
-        ray.origin[a] = target[a] - (double)ray.dir[a] * random_range(r, 0, 1) * 2 * f->size[a];
-    }
+/* Half of them from within the box, some with limits. */
+static isogi_ray any_ray(const field *f, double isovalue, test_random *r) {
+    isogi_ray ray = random_ray(f, isovalue, r);
     if (random_bits(r) & 1)
-        for (int a = 0; a < 3; a++) ray.origin[a] = target[a];
+        for (int a = 0; a < 3; a++) ray.origin[a] = random_range(r, 0, f->size[a] - 1);
     if (!(random_bits(r) & 7)) ray.tmin = random_range(r, 0, 3), ray.tmax = ray.tmin + random_range(r, 0, 6);
     return ray;
 }
@@ -123,7 +68,7 @@ static void random_rays(int kind, const char *name, uint64_t seed) {
         field_build(&f);
         reference_field reference = {f.value, {f.size[0], f.size[1], f.size[2]}, 1e-12L};
         for (int i = 0; i < rays; i++) {
-            isogi_ray ray = random_ray(&f, wide_isovalue(kind, &r), &r);
+            isogi_ray ray = any_ray(&f, wide_isovalue(kind, &r), &r);
             tally_ray(&f, &reference, &ray, &tally);
         }
         field_free(&f);
@@ -176,7 +121,7 @@ TEST(hits_do_not_depend_on_the_scale_of_values_and_space) {
         field_build(&g);
         long different = 0, hits = 0;
         for (int i = 0; i < 4000; i++) {
-            isogi_ray a = random_ray(&f, random_range(&r, -0.5, 0.5), &r), b = a;
+            isogi_ray a = any_ray(&f, random_range(&r, -0.5, 0.5), &r), b = a;
             isogi_hit ha = {0}, hb = {0};
             b.isovalue *= fabs(values[v]), b.tmin = b.tmax = a.tmin = a.tmax = 0;
             for (int x = 0; x < 3; x++) b.origin[x] *= g.volume.spacing[x], b.dir[x] = (float)((double)b.dir[x] * g.volume.spacing[x]);
@@ -199,7 +144,7 @@ TEST(a_far_origin_costs_no_precision) {
     field_build(&f);
     double worst = 0;
     for (int i = 0; i < 5000; i++) {
-        isogi_ray near_ray = random_ray(&f, 0.1, &r), far_ray = near_ray;
+        isogi_ray near_ray = any_ray(&f, 0.1, &r), far_ray = near_ray;
         isogi_hit a = {0}, b = {0};
         near_ray.tmin = near_ray.tmax = far_ray.tmin = far_ray.tmax = 0;
         for (int x = 0; x < 3; x++) near_ray.origin[x] = random_range(&r, 0, 11) - 30 * (double)near_ray.dir[x];
@@ -244,7 +189,7 @@ static void compare_walks(int path) {
         field f = {{size[0], size[1], size[2]}, NULL, {0}, NULL};
         for (int i = 0; i < (LONG_SUITE ? 200000 : 20000); i++) {
             double isovalue = random_range(&r, 20, 80) * (type == ISOGI_I16 ? 100 : 1);
-            isogi_ray ray = random_ray(&f, i & 1 ? floor(isovalue) : isovalue, &r);
+            isogi_ray ray = any_ray(&f, i & 1 ? floor(isovalue) : isovalue, &r);
             isogi_hit ha = {0}, hb = {0}, na = {0}, nb = {0};
             double d[3];
             float dir[1][3];
@@ -283,7 +228,7 @@ static void compare_batches(int path, int kind) {
     isogi_vol_build(&a, &f.volume, &fast), isogi_vol_build(&b, &f.volume, &plain);
     for (int i = 0; i < COUNT; i++) {
         double d[3];
-        rays[i] = random_ray(&f, wide_isovalue(kind, &r), &r);
+        rays[i] = any_ray(&f, wide_isovalue(kind, &r), &r);
         rays[i].flags = i % 3 == 0 ? ISOGI_RAY_CAPPED : 0;
         if (i % 7 == 0) /* along lattice planes, edges and diagonals */
             for (int x = 0; x < 3; x++) rays[i].dir[x] = (float)((int)(random_bits(&r) % 3) - 1), rays[i].origin[x] = floor(rays[i].origin[x]);
@@ -394,7 +339,7 @@ TEST(continuing_along_a_ray_finds_every_crossing_of_the_reference) {
         field_build(&f);
         reference_field reference = {f.value, {8, 7, 9}, 1e-10L};
         for (int i = 0; i < 500; i++) {
-            isogi_ray ray = random_ray(&f, kind == QUANTISED ? 0.5 : random_range(&r, -0.5, 0.5), &r);
+            isogi_ray ray = any_ray(&f, kind == QUANTISED ? 0.5 : random_range(&r, -0.5, 0.5), &r);
             double dir[3] = {(double)ray.dir[0], (double)ray.dir[1], (double)ray.dir[2]}, at = 0;
             isogi_hit hit = {0}, next = {0};
             ray.tmin = ray.tmax = 0;
@@ -559,7 +504,7 @@ TEST(cells_that_touch_a_nan_hold_no_surface) {
         for (int i = 0; i < 40; i++) f.value[random_bits(&r) % 729] = bad[b];
         field_build(&f);
         for (int i = 0; i < 20000; i++) {
-            isogi_ray ray = random_ray(&f, random_range(&r, -0.5, 0.5), &r);
+            isogi_ray ray = any_ray(&f, random_range(&r, -0.5, 0.5), &r);
             isogi_hit hit = {0};
             isogi_vol_intersect(f.pyramid, &ray, 1, &hit, NULL);
             if (!hit.side) continue;
@@ -836,7 +781,7 @@ TEST(skipping_proves_itself_by_counters) {
     test_random r = {18};
     isogi_counters count = {0};
     for (int i = 0; i < 20000; i++) {
-        isogi_ray ray = random_ray(&f, 0, &r);
+        isogi_ray ray = any_ray(&f, 0, &r);
         isogi_hit hit = {0};
         ray.tmin = ray.tmax = 0;
         isogi_vol_intersect(f.pyramid, &ray, 1, &hit, &count);

@@ -2,70 +2,9 @@
    chunks with a halo, very large volumes, arguments that make no sense. */
 #define ISOGI_IMPLEMENTATION
 #include "isogi_trace.h"
+#include "ray_fields.h"
 #include "reference_ray.h"
-#include "test.h"
 #include <float.h>
-
-/* ---- volumes for tests ---- */
-
-typedef struct field {
-    int size[3];
-    double *value;
-    isogi_volume volume;
-    isogi_pyramid *pyramid;
-} field;
-
-static field field_new(int x, int y, int z) {
-    field f = {{x, y, z}, (double *)calloc((size_t)x * (size_t)y * (size_t)z, sizeof(double)), {0}, NULL};
-    f.volume.data = f.value, f.volume.type = ISOGI_F64;
-    for (int a = 0; a < 3; a++) f.volume.size[a] = (size_t)f.size[a];
-    return f;
-}
-
-static double *field_at(const field *f, int i, int j, int k) { return &f->value[i + f->size[0] * (j + f->size[1] * k)]; }
-
-/* Every instruction path in turn, so that what holds for one volume after the other holds for all of them. */
-static void field_build(field *f) {
-    static int builds;
-    isogi_context context = {.threads = 1, .force_path = builds++ % 5};
-    isogi_result result = isogi_vol_build(&f->pyramid, &f->volume, &context);
-    CHECK(result == ISOGI_OK, "%s", isogi_result_string(result));
-}
-
-static void field_free(field *f) {
-    isogi_vol_free(f->pyramid);
-    free(f->value);
-}
-
-enum { NOISE, SMOOTH, QUANTISED, KINDS };
-
-/* White noise; a sum of a few waves; the same rounded to few levels, so that isovalues can equal data. */
-static void field_fill(field *f, int kind, test_random *r) {
-    double wave[4][4];
-    for (int w = 0; w < 4; w++)
-        for (int a = 0; a < 4; a++) wave[w][a] = random_range(r, -1, 1) * (a < 3 ? 0.9 : 6.28);
-    for (int k = 0; k < f->size[2]; k++)
-        for (int j = 0; j < f->size[1]; j++)
-            for (int i = 0; i < f->size[0]; i++) {
-                double v = 0;
-                for (int w = 0; w < 4; w++) v += sin(wave[w][0] * i + wave[w][1] * j + wave[w][2] * k + wave[w][3]);
-                if (kind == NOISE) v = random_range(r, -1, 1);
-                if (kind == QUANTISED) v = floor(2 * v);
-                *field_at(f, i, j, k) = v;
-            }
-}
-
-static isogi_ray random_ray(const field *f, double isovalue, test_random *r) {
-    isogi_ray ray = {.isovalue = isovalue};
-    double d[3], target[3];
-    random_direction(r, d);
-    for (int a = 0; a < 3; a++) {
-        target[a] = random_range(r, 0, f->size[a] - 1);
-        ray.dir[a] = (float)d[a];
-        ray.origin[a] = target[a] - (double)ray.dir[a] * random_range(r, 0, 1) * 2 * f->size[a];
-    }
-    return ray;
-}
 
 /* ---- voxels one by one ---- */
 
@@ -106,16 +45,6 @@ TEST(corners_and_ranges_are_those_of_the_voxels) {
 }
 
 /* ---- all hits ---- */
-
-/* Bit by bit, but that -ffast-math lets compilers order each copy of a formula as they like. */
-static int same_hit(const isogi_hit *a, const isogi_hit *b) {
-#ifdef __FAST_MATH__
-    return a->side == b->side && fabs(a->t - b->t) <= 1e-9 * (1 + fabs(a->t));
-#else
-    return a->side == b->side && !memcmp(a->cell, b->cell, sizeof a->cell) && !memcmp(a->local, b->local, sizeof a->local) &&
-           !memcmp(&a->t, &b->t, sizeof a->t);
-#endif
-}
 
 /* The hits of a ray, one call after the other. */
 static size_t chain_of_hits(const isogi_pyramid *p, const isogi_ray *ray, isogi_hit *hits, size_t most) {
@@ -420,7 +349,7 @@ static void check_updates(isogi_type type, double scale, double bias, int shape,
         for (size_t z = first[2]; z <= last[2] && z < size[2]; z++)
             for (size_t y = first[1]; y <= last[1] && y < size[1]; y++)
                 for (size_t x = first[0]; x <= last[0] && x < size[0]; x++) {
-                    size_t i = x + size[0] * (y + size[1] * z), bytes = type <= ISOGI_I8 ? 1 : type <= ISOGI_I16 ? 2 : type == ISOGI_F32 ? 4 : (size_t)8;
+                    size_t i = x + size[0] * (y + size[1] * z), bytes = type_bytes(type);
                     if (kind == 0) store(raw, type, i, floor(random_range(r, 30, 90)));
                     else if (kind == 5 || (kind == 4 && type < ISOGI_F32 && type != ISOGI_U16)) memcpy((char *)raw + bytes * i, (char *)base + bytes * i, bytes);
                     else if (kind != 4 || random_bits(r) % 4 == 0) store(raw, type, i, level);

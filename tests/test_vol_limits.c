@@ -5,23 +5,11 @@
 #endif
 #define ISOGI_IMPLEMENTATION
 #include "isogi_vol.h"
-#include "test.h"
+#include "fields.h"
 #include <float.h>
 #ifdef __unix__
 #include <sys/mman.h>
 #endif
-
-static size_t type_bytes(isogi_type type) { return type <= ISOGI_I8 ? 1 : type <= ISOGI_I16 ? 2 : type == ISOGI_F32 ? 4 : 8; }
-
-/* Bit by bit, but that -ffast-math lets compilers order each copy of a formula as they like. */
-static int same_hit(const isogi_hit *a, const isogi_hit *b) {
-#ifdef __FAST_MATH__
-    return a->side == b->side && fabs(a->t - b->t) <= 1e-9 * (1 + fabs(a->t));
-#else
-    return a->side == b->side && !memcmp(a->cell, b->cell, sizeof a->cell) && !memcmp(a->local, b->local, sizeof a->local) &&
-           !memcmp(&a->t, &b->t, sizeof a->t);
-#endif
-}
 
 /* ---- views ---- */
 

@@ -119,6 +119,22 @@ SHARED int surface_points(const scene *s, double isovalue, int count, uint64_t s
     return found;
 }
 
+/* From the centre of a pit down to its wall, at least 5 % of its radius below the rim. */
+SHARED void pit_points(const scene *s, const double q[5], int count, float (*points)[3]) {
+    test_random r = {3};
+    for (int found = 0; found < count;) {
+        isogi_ray ray;
+        isogi_hit hit = {0, {0, 0, 0}, {0, 0, 0}, 0};
+        double d[3];
+        random_direction(&r, d);
+        if (d[1] > -0.05) continue;
+        memset(&ray, 0, sizeof ray);
+        for (int a = 0; a < 3; a++) ray.origin[a] = q[a], ray.dir[a] = (float)d[a];
+        isogi_vol_intersect(s->pyramid, &ray, 1, &hit, NULL);
+        isogi_vol_positions(s->pyramid, &hit, 1, (float(*)[3])points[found++]);
+    }
+}
+
 SHARED double mean_irradiance(const isogi_trace_desc *d, const float (*points)[3], int count, double *worst) {
     float(*e)[3] = (float(*)[3])malloc((size_t)count * sizeof *e);
     double sum = 0;
