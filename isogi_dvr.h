@@ -7,17 +7,17 @@
        #include "isogi_dvr.h"
        #include <stdio.h>
        int main(void) {
+           static const isogi_transfer_point points[] = {{0, {1, 1, 1}, 0}, {31, {1, 0.5f, 0.2f}, 0.2f}}; // value, colour, extinction
            static float data[32][32][32], image[32][32][4];
+           static isogi_volume volume; static isogi_transfer transfer; static isogi_view view; static isogi_dvr_desc desc; // static: all zero
+           isogi_pyramid *pyramid; isogi_dvr *dvr;
            for (int i = 0; i < 32768; i++) data[i / 1024][i / 32 % 32][i % 32] = (float)(i % 32); // f = x
-           isogi_transfer_point points[] = {{0, {1, 1, 1}, 0}, {31, {1, 0.5f, 0.2f}, 0.2f}};
-           isogi_transfer transfer = {.points = points, .point_count = 2};
-           isogi_volume volume = {.data = data, .type = ISOGI_F32, .size = {32, 32, 32}};
-           isogi_view view = {.width = 32, .height = 32, .eye = {15.5f, 15.5f, 100}, .target = {15.5f, 15.5f, 0}};
-           isogi_dvr_desc desc = {0}; isogi_pyramid *pyramid; isogi_dvr *dvr;
+           volume.data = data, volume.type = ISOGI_F32, volume.size[0] = volume.size[1] = volume.size[2] = 32;
+           transfer.points = points, transfer.point_count = 2, view.width = view.height = 32;
+           view.eye[0] = view.eye[1] = view.target[0] = view.target[1] = 15.5f, view.eye[2] = 100;
            if (isogi_vol_build(&pyramid, &volume, NULL)) return 1; else desc.pyramid = pyramid;
-           if (isogi_dvr_create(&dvr, &desc, NULL) || isogi_dvr_set_transfer(dvr, &transfer)) return 1;
-           if (isogi_dvr_render(dvr, &view, NULL, image[0], NULL, NULL)) return 1;
-           printf("opacity of the centre: %g\n", (double)image[16][16][3]); } // then isogi_dvr_free, isogi_vol_free
+           if (isogi_dvr_create(&dvr, &desc, NULL) || isogi_dvr_set_transfer(dvr, &transfer)) return 1; // then isogi_dvr_free, isogi_vol_free
+           if (!isogi_dvr_render(dvr, &view, NULL, image[0], NULL, NULL)) printf("opacity of the centre: %g\n", (double)image[16][16][3]); }
 
    What it does
 

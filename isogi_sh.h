@@ -5,15 +5,17 @@
        #define ISOGI_IMPLEMENTATION
        #include "isogi_sh.h"
        #include <stdio.h>
-
        int main(void) {
-           isogi_light sun = {.vector = {1, 1, 0}, .rgb = {3, 3, 2}, .radius = 0.1f};
-           isogi_lighting lighting = {{0}, &sun, 1};
-           float light[3 * 25], up[1][3] = {{0, 1, 0}}, irradiance[3];
-           isogi_sh_project(light, 5, &lighting, NULL);                         // radiance, order 5: 25 coefficients x RGB
-           isogi_sh_convolve_cosine(light, light, 5, 3);                        // radiance to irradiance
-           isogi_sh_eval_sum(irradiance, light, 5, 3, (const float(*)[3])up, 1); // on a surface that faces up
-           printf("%g %g %g\n", irradiance[0], irradiance[1], irradiance[2]);   // about 3 cos 45 = 2.1 in red
+           static isogi_light sun; // static: all zero, which is the default everywhere
+           static isogi_lighting lighting;
+           const float up[1][3] = {{0, 1, 0}};
+           float light[3 * 25], irradiance[3];
+           sun.vector[0] = sun.vector[1] = 1, sun.rgb[0] = sun.rgb[1] = 3, sun.rgb[2] = 2, sun.radius = 0.1f;
+           lighting.lights = &sun, lighting.light_count = 1;
+           isogi_sh_project(light, 5, &lighting, NULL);                       // radiance, order 5: 25 coefficients x RGB
+           isogi_sh_convolve_cosine(light, light, 5, 3);                      // radiance to irradiance
+           isogi_sh_eval_sum(irradiance, light, 5, 3, up, 1);                 // on a surface that faces up
+           printf("%g %g %g\n", irradiance[0], irradiance[1], irradiance[2]); // about 3 cos 45 = 2.1 in red
        }
 
    What it does

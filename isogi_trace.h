@@ -5,18 +5,18 @@
        #define ISOGI_IMPLEMENTATION
        #include "isogi_trace.h"
        #include <stdio.h>
-
        int main(void) {
-           static float data[32][32][32], y0[3] = {3.5449f, 3.5449f, 3.5449f}, point[1][3] = {{16, 8, 16}}, light[1][3];
-           for (int i = 0; i < 32768; i++) data[i / 1024][i / 32 % 32][i % 32] = -fabsf((float)(i / 32 % 32) - 16); // a slab
-           isogi_volume volume = {.data = data, .type = ISOGI_F32, .size = {32, 32, 32}};
-           isogi_pyramid *pyramid = NULL;
-           isogi_trace *trace = NULL;
-           isogi_vol_build(&pyramid, &volume, NULL);
-           isogi_trace_desc desc = {.pyramid = pyramid, .lighting.env = {.sh = y0, .sh_order = 1}, .albedo = {0.7f, 0.7f, 0.7f}};
-           if (isogi_trace_create(&trace, &desc, NULL) != ISOGI_OK || isogi_trace_step(trace, 0, NULL) != ISOGI_OK) return 1;
-           isogi_trace_sample(trace, (const float(*)[3])point, 1, light, NULL), printf("E = %g, pi\n", light[0][0]); // an open sky of radiance 1
-       }
+           static const float sky[3] = {3.5449f, 3.5449f, 3.5449f}, point[1][3] = {{16, 8, 16}}; // radiance 1 as SH
+           static float data[32][32][32], light[1][3];
+           static isogi_volume volume; static isogi_trace_desc desc; // static: all zero, which is the default everywhere
+           isogi_pyramid *pyramid; isogi_trace *trace;
+           for (int i = 0; i < 32768; i++) data[i / 1024][i / 32 % 32][i % 32] = -(float)((i / 32 % 32 - 16) * (i / 32 % 32 - 16)); // -(y - 16)^2
+           volume.data = data, volume.type = ISOGI_F32, volume.size[0] = volume.size[1] = volume.size[2] = 32;
+           if (isogi_vol_build(&pyramid, &volume, NULL)) return 1; else desc.pyramid = pyramid;
+           desc.lighting.env.sh = sky, desc.lighting.env.sh_order = 1, desc.albedo[0] = desc.albedo[1] = desc.albedo[2] = 0.7f;
+           if (isogi_trace_create(&trace, &desc, NULL) || isogi_trace_step(trace, 0, NULL)) return 1;
+           if (!isogi_trace_sample(trace, point, 1, light, NULL)) printf("E = %g, pi\n", light[0][0]); // nothing hides the sky
+           isogi_trace_free(trace), isogi_vol_free(pyramid); }
 
    What it does
 

@@ -5,16 +5,15 @@
        #define ISOGI_IMPLEMENTATION
        #include "isogi_vol.h"
        #include <stdio.h>
-
        int main(void) {
            static float data[32][32][32];
+           static isogi_volume volume; // static: all zero, which is the default everywhere
+           static isogi_ray ray;
+           isogi_pyramid *pyramid; isogi_hit hit;
            for (int i = 0; i < 32768; i++) data[i / 1024][i / 32 % 32][i % 32] = (float)(i % 32 - i / 1024); // f = x - z
-           isogi_volume volume = {.data = data, .type = ISOGI_F32, .size = {32, 32, 32}};
-           isogi_ray ray = {.origin = {16, 16, 40}, .dir = {0, 0, -1}, .isovalue = 4.5};
-           isogi_pyramid *pyramid;
-           isogi_hit hit;
-           if (isogi_vol_build(&pyramid, &volume, NULL) != ISOGI_OK) return 1;
-           isogi_vol_intersect(pyramid, &ray, 1, &hit, NULL);
+           volume.data = data, volume.type = ISOGI_F32, volume.size[0] = volume.size[1] = volume.size[2] = 32;
+           ray.origin[0] = ray.origin[1] = 16, ray.origin[2] = 40, ray.dir[2] = -1, ray.isovalue = 4.5;
+           if (isogi_vol_build(&pyramid, &volume, NULL) || isogi_vol_intersect(pyramid, &ray, 1, &hit, NULL)) return 1;
            printf("the surface f = 4.5 is met after %g\n", hit.t); // at z = 11.5: after 28.5
            isogi_vol_free(pyramid);
        }

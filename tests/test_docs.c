@@ -73,50 +73,70 @@ static int readme_program(const char *readme, int n, char *program, size_t size)
     return 0;
 }
 
-/* Compiles and runs a program in build/docs; 0 = failed, with what was said in `output`. */
-static int compiles_and_runs(const char *name, const char *program, char *output, size_t size) {
-    char command[1024];
-    const char *cc = getenv("CC");
+/* The shell command's output and whether it succeeded and said something. */
+static int succeeds(const char *command, char *said, size_t size) {
     FILE *file;
     size_t got;
     int status;
-    mkdir("build", 0777), mkdir("build/docs", 0777);
-    snprintf(command, sizeof command, "build/docs/%s.c", name);
-    if (!(file = fopen(command, "w"))) return snprintf(output, size, "cannot write %s", command), 0;
-    fputs(program, file), fclose(file);
-    snprintf(command, sizeof command,
-             "%s -std=c99 -Wall -Wextra -Wpedantic -Werror -O1 -I. -o build/docs/%s build/docs/%s.c -lm -lpthread 2>&1 && build/docs/%s 2>&1",
-             cc && *cc ? cc : "cc", name, name, name);
     fflush(stdout);
-    if (!(file = popen(command, "r"))) return snprintf(output, size, "cannot run %s", command), 0;
-    got = fread(output, 1, size - 1, file);
-    output[got] = 0;
+    if (!(file = popen(command, "r"))) return snprintf(said, size, "cannot run %s", command), 0;
+    got = fread(said, 1, size - 1, file);
+    said[got] = 0;
     status = pclose(file);
     return WIFEXITED(status) && WEXITSTATUS(status) == 0 && got > 0;
 }
 
+static const char *variable(const char *name, const char *otherwise) {
+    const char *value = getenv(name);
+    return value && *value ? value : otherwise;
+}
+
 static char program[8192], other[8192], output[4096];
+
+/* Compiles and runs a program in build/docs, pasted into a file of its own: as C99 and as C++11, without a warning. Quick: linked with the
+   implementations that were compiled before, which must not change what the program needs to include; --long: by itself, as users do. */
+static void check_program(const char *name, const char *text) {
+    char command[2048], path[64];
+    FILE *file;
+    mkdir("build", 0777), mkdir("build/docs", 0777);
+    snprintf(path, sizeof path, "build/docs/%s.c", name);
+    file = fopen(path, "w");
+    CHECK(file && fputs(text, file) >= 0 && fclose(file) == 0, "cannot write %s", path);
+    for (int cxx = 0; cxx < 2; cxx++) {
+        const char *compiler = cxx ? variable("CXX", "c++") : variable("CC", "cc");
+        snprintf(command, sizeof command, "%s --version", compiler);
+        if (cxx && !succeeds(command, output, sizeof output)) continue; /* a C++ compiler is not needed */
+        snprintf(command, sizeof command, "{ %s %s %s -Wall -Wextra -Wpedantic -Werror %s -I. -c -o build/docs/%s.o %s && %s %s -o build/docs/%s build/docs/%s.o %s "
+                 "-lm -lpthread && build/docs/%s; } 2>&1", compiler, cxx ? "-x c++ -std=c++11" : "-std=c99", variable("CFLAGS", ""),
+                 LONG_SUITE ? "" : "-DISOGI_SH_IMPLEMENTED -DISOGI_VOL_IMPLEMENTED -DISOGI_TRACE_IMPLEMENTED -DISOGI_DVR_IMPLEMENTED", name, path,
+                 compiler, variable("CFLAGS", ""), name, name, LONG_SUITE ? "" : "build/isogi_sh.o build/isogi_vol.o build/isogi_trace.o build/isogi_dvr.o", name);
+        CHECK(succeeds(command, output, sizeof output), "%s as %s: %s", name, cxx ? "C++11" : "C99", output);
+    }
+    printf("    %s", output);
+}
 
 static void check_header(const char *header) {
     int lines = quick_start(header, program, sizeof program);
     CHECK(lines >= 5 && strstr(program, "int main(void)"), "%s.h has no quick start", header);
     CHECK(lines <= MOST_LINES, "%s.h: the quick start has %d lines, at most %d are allowed", header, lines, MOST_LINES);
-    CHECK(compiles_and_runs(header, program, output, sizeof output), "%s.h: %s", header, output);
-    printf("    %s", output);
+    check_program(header, program);
 }
 TEST(quick_start_of_isogi_sh_compiles_and_runs) { check_header("isogi_sh"); }
 TEST(quick_start_of_isogi_vol_compiles_and_runs) { check_header("isogi_vol"); }
 TEST(quick_start_of_isogi_trace_compiles_and_runs) { check_header("isogi_trace"); }
 TEST(quick_start_of_isogi_dvr_compiles_and_runs) { check_header("isogi_dvr"); }
 
+/* Those that are no header's quick start. */
 TEST(programs_of_the_readme_compile_and_run) {
     char *readme = read_text("README.md");
     int count = 0;
     CHECK(readme != NULL, "no README.md");
     while (readme && readme_program(readme, count, program, sizeof program)) {
         char name[32];
+        int known = 0;
+        for (int h = 0; h < HEADERS; h++) quick_start(headers[h], other, sizeof other), known |= !strcmp(program, other);
         snprintf(name, sizeof name, "readme_%d", count++);
-        CHECK(compiles_and_runs(name, program, output, sizeof output), "program %d of the README: %s", count, output);
+        if (!known) check_program(name, program);
     }
     CHECK(count >= HEADERS, "%d programs in the README, one for each header is the least", count);
     free(readme);
