@@ -1758,6 +1758,12 @@ static isogi_result isogi_dvr__resolve(isogi_dvr_desc *desc, const isogi_dvr_des
     return ISOGI_OK;
 }
 
+/* Nothing casts a shadow: V = 1 everywhere. */
+static void isogi_dvr__clear_visibility(isogi_dvr *d) {
+    size_t i;
+    for (i = 0; i < d->point_count * d->coefficients; i++) d->visibility[i] = i % d->coefficients ? 0 : (float)(2 * sqrt(ISOGI_DVR__PI));
+}
+
 /* Everything whose size is known by now. */
 static isogi_result isogi_dvr__allocate_parts(isogi_dvr *d) {
     int n, lit = d->desc.shading == ISOGI_DVR_VISIBILITY;
@@ -1793,8 +1799,7 @@ static isogi_result isogi_dvr__allocate_parts(isogi_dvr *d) {
     d->kernel = (float *)isogi_allocate(&d->context, d->kernel_count, sizeof *d->kernel);
     d->visibility = (float *)isogi_allocate(&d->context, d->point_count * d->coefficients, sizeof *d->visibility);
     if (!d->direction || !d->kernel || !d->visibility) return ISOGI_NO_MEMORY;
-    for (i = 0; i < d->point_count * d->coefficients; i++)
-        d->visibility[i] = i % d->coefficients ? 0 : (float)(2 * sqrt(ISOGI_DVR__PI));
+    isogi_dvr__clear_visibility(d);
     d->padded_count = (d->point_count + ISOGI_DVR__LANES - 1) / ISOGI_DVR__LANES * ISOGI_DVR__LANES;
     if (isogi_dvr__method(d) == ISOGI_DVR_SWEEP) {
         isogi_result result = isogi_dvr__plan_matter(d);
@@ -2816,7 +2821,17 @@ static void isogi_dvr__sift(isogi_dvr__raise *heap, size_t count, size_t i) {
 /* Points that a level takes, not counting the repeated ones. */
 static size_t isogi_dvr__level_points(size_t n) { return n * n * n; }
 
-/* Levels of all blocks: transparent ones are dropped, the others begin at 1 and are raised by largest significance for its cost,
+/* The least level of a block: 1, or one whose nodes are no further apart than what the block holds of the volume is wide. */
+static uint8_t isogi_dvr__least_level(const isogi_dvr *d, size_t block) {
+    const isogi_dvr__blocks *b = &d->blocks;
+    size_t at[3] = {block % b->count[0], block / b->count[0] % b->count[1], block / b->count[0] / b->count[1]};
+    int level = 1, a;
+    for (a = 0; a < 3; a++)
+        while (level < 16 && level * (d->cells[a] - 16 * (int)at[a]) < 16) level *= 2;
+    return (uint8_t)level;
+}
+
+/* Levels of all blocks: transparent ones are dropped, the others begin at the least and are raised by largest significance for its cost,
    taken to halve with each level, until the budget of voxels / reduction points is spent. */
 static isogi_result isogi_dvr__select_levels(isogi_dvr *d, uint8_t *level) {
     const isogi_dvr__blocks *b = &d->blocks;
@@ -2826,10 +2841,10 @@ static isogi_result isogi_dvr__select_levels(isogi_dvr *d, uint8_t *level) {
     if (!heap) return ISOGI_NO_MEMORY;
     for (i = 0; i < 64; i++) isogi_dvr__luv_of(d, d->matter.low + (d->matter.scale > 0 ? ((double)i + 0.5) * (ISOGI_DVR__TABLE / 64) / d->matter.scale : 0), luv[i]);
     for (i = 0; i < b->total; i++) {
-        level[i] = d->empty[1][i] ? 0 : 1;
+        level[i] = d->empty[1][i] ? 0 : isogi_dvr__least_level(d, i);
         if (!level[i]) continue;
-        heap[count].block = i, heap[count].gain = isogi_dvr__significance(d, i, luv) / 7;
-        budget -= 1, count++;
+        budget -= (double)isogi_dvr__level_points(level[i]);
+        if (level[i] < 16) heap[count].block = i, heap[count++].gain = isogi_dvr__significance(d, i, luv) / 7;
     }
     for (i = count / 2; i-- > 0;) isogi_dvr__sift(heap, count, i);
     while (count && budget > 0 && heap[0].gain > 0) {
@@ -3530,6 +3545,11 @@ ISOGI_API isogi_result isogi_dvr_step(isogi_dvr *dvr, uint64_t max_rays, double 
     if (!dvr) return ISOGI_INVALID;
     if (dvr->method == ISOGI_DVR_PAPER && dvr->point_count && !dvr->next) result = isogi_dvr__update_blocks(dvr);
     if (result != ISOGI_OK) return result;
+    if (dvr->transparent && dvr->point_count) {
+        isogi_dvr__clear_visibility(dvr);
+        if (remaining) *remaining = 0;
+        return ISOGI_OK;
+    }
     count = dvr->point_count, rays = (uint64_t)dvr->desc.directions;
     if (count && dvr->method == ISOGI_DVR_SWEEP) count = (size_t)dvr->desc.directions, rays = dvr->point_count;
     if (count && dvr->method == ISOGI_DVR_PAPER) {

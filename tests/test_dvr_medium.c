@@ -1,0 +1,328 @@
+/* Pictures of media by isogi_dvr.h: every path of physical space, limits, emission and phase function, depth, jitter, steady blocks. */
+#define ISOGI_IMPLEMENTATION
+#include "isogi_dvr.h"
+#include "dvr_fields.h"
+
+static const float sky_one[3] = {3.5449077f, 3.5449077f, 3.5449077f}; /* radiance 1: sqrt(4 pi) */
+static const isogi_lighting sky = {.env = {.sh = sky_one, .sh_order = 1}};
+
+static double even(double x, double y, double z) { return (void)x, (void)y, (void)z, 2; }
+static double along_x(double x, double y, double z) { return (void)y, (void)z, 48 * x; }
+
+/* One pixel without depth: physical space is pre-integrated then. */
+static void colour_of(const isogi_dvr *dvr, const double eye[3], const double target[3], const isogi_lighting *lighting, float out[4], isogi_counters *count) {
+    const isogi_view view = line_of_sight(eye, target);
+    isogi_result result = isogi_dvr_render(dvr, &view, lighting, (float(*)[4])out, NULL, count);
+    CHECK(result == ISOGI_OK, "render: %s", isogi_result_string(result));
+}
+
+/* What is integrated along a line through f = x, in physical space (per = length of the line per unit of x) or in data space (per = 1),
+   by the midpoint rule in long double; jumps of the transfer function at whole values stay between pieces. */
+static void along_values(const isogi_transfer *t, double low, double high, double per, long double out[4]) {
+    enum { PIECES = 480 }; /* for each unit */
+    long double clear = 1;
+    for (int a = 0; a < 4; a++) out[a] = 0;
+    for (long i = 0; i < (high - low) * PIECES; i++) {
+        long double v[4], depth;
+        reference_transfer(t, low + (i + 0.5L) / PIECES, v);
+        depth = v[3] * per / PIECES;
+        for (int a = 0; a < 3; a++) out[a] += clear * -expm1l(-depth) * v[a];
+        clear *= expl(-depth);
+    }
+    out[3] = 1 - clear;
+}
+
+/* ---- homogeneous media and limits ---- */
+
+TEST(homogeneous_media_follow_beer_and_lambert_without_depth_too) {
+    field f = field_of(even, 20);
+    const double steps[] = {0, 0.37, 3.3}, extinctions[] = {1e-9, 1e-3, 0.05, 0.4, 2, 1e6};
+    const double eye[3] = {-30, 3, 5}, target[3] = {50, 12, 9}, length = 19 * sqrt(80 * 80 + 9 * 9 + 4 * 4) / 80;
+    for (int s = 0; s < 3; s++)
+        for (int e = 0; e < 6; e++)
+            for (int lit = 0; lit < 2; lit++) {
+                const isogi_transfer_point point = {0, {0.2f, 0.5f, 1}, (float)extinctions[e]};
+                const isogi_transfer transfer = {&point, 1, NULL, 0};
+                const isogi_dvr_desc desc = {.pyramid = f.pyramid, .step = steps[s], .shading = lit ? ISOGI_DVR_VISIBILITY : ISOGI_DVR_UNLIT, .grid = {2, 2, 2}};
+                isogi_dvr *dvr = dvr_new(&desc, &transfer);
+                double expected = -expm1(-length * (double)point.extinction);
+                float c[4];
+                colour_of(dvr, eye, target, &sky, c, NULL);
+                /* floats, and rays end at 0.999; a thin medium keeps its relative accuracy but for 1 - T in float */
+                CHECK(fabs((double)c[3] - expected) < 2e-6 + (expected > 0.99 ? 1e-3 : 0), "step %g extinction %g: %g, not %g", steps[s], extinctions[e], (double)c[3], expected);
+                for (int a = 0; a < 3; a++) /* no shadows yet: under a sky of 1 lit looks as unlit */
+                    CHECK(fabs((double)(c[a] - c[3] * point.rgb[a])) < 1e-6 + 1e-4 * expected, "step %g extinction %g lit %d channel %d: %g of %g", steps[s], extinctions[e], lit, a, (double)c[a], (double)c[3]);
+                isogi_dvr_free(dvr);
+            }
+    field_free(&f);
+}
+
+/* One point, several at one value, all of them beyond the data, values as far away as doubles go, and the opaque limit of each: by both
+   paths of physical space, and in data space. */
+TEST(odd_transfer_functions_are_integrated_as_they_say) {
+    const isogi_transfer_point cases[][5] = {
+        {{24, {1, 0.5f, 0.2f}, 0.05f}, {0, {0, 0, 0}, 0}},
+        {{24, {1, 0, 0}, 0.01f}, {24, {0, 1, 0}, 7}, {24, {0, 0, 1}, 3}, {24, {0.5f, 0.5f, 1}, 0.1f}},
+        {{-1e9, {1, 0, 0}, 0.02f}, {-5, {0.5f, 1, 0}, 0.04f}},
+        {{90, {1, 0, 0}, 0.02f}, {1e9, {0.5f, 1, 0}, 0.04f}},
+        {{-1e308, {1, 0, 0}, 0.02f}, {1e308, {0, 1, 0}, 0.06f}},
+        {{10, {1, 0, 0}, 0}, {20, {1, 0, 0}, 0.2f}, {20, {0, 0, 1}, 0}, {48, {0, 0, 1}, 0.1f}},
+        {{12, {0, 0, 0}, 0}, {12, {0.2f, 0.9f, 0.4f}, 1e6f}},
+    };
+    const size_t counts[] = {1, 4, 2, 2, 2, 4, 2};
+    field f = field_of(along_x, 49);
+    const double eye[3] = {-30, 10, 15}, target[3] = {64, 37, 30}, per = sqrt(94 * 94 + 27 * 27 + 15 * 15) / 94;
+    for (size_t n = 0; n < sizeof cases / sizeof *cases; n++) {
+        const isogi_transfer transfer = {cases[n], counts[n], NULL, 0};
+        for (int way = 0; way < 4; way++) { /* pre-integrated, post-classified; data space exactly, pre-integrated */
+            const isogi_dvr_desc desc = {.pyramid = f.pyramid, .space = way < 2 ? ISOGI_DVR_PHYSICAL : ISOGI_DVR_DATA, .opaque = way ? 1 : 0, .step = way == 1 ? 0.05 : 0,
+                                         .classification = way == 1 ? ISOGI_DVR_POST_CLASSIFIED : way == 3 ? ISOGI_DVR_PRE_INTEGRATED : ISOGI_DVR_EXACT, .table = 300};
+            /* a thousand classes of value; steps of a 20th of a voxel at jumps; exact; 300 entries a side, blurred over two of them */
+            const double tolerance[4] = {0.004, 0.01, 1e-5, 0.05};
+            isogi_dvr *dvr = dvr_new(&desc, &transfer);
+            long double expected[4];
+            float c[4];
+            along_values(&transfer, 0, 48, way < 2 ? per : 1, expected);
+            colour_of(dvr, eye, target, NULL, c, NULL);
+            for (int a = 0; a < 4; a++)
+                CHECK(fabs((double)c[a] - (double)expected[a]) < tolerance[way], "case %zu way %d channel %d: %.6g, not %.6g", n, way, a, (double)c[a], (double)expected[a]);
+            isogi_dvr_free(dvr);
+        }
+    }
+    field_free(&f);
+}
+
+TEST(opaque_matter_hides_what_is_behind_it) {
+    field f = field_of(along_x, 49);
+    const isogi_transfer_point p[] = {{16, {1, 1, 1}, 0}, {16, {0.9f, 0.2f, 0.1f}, 1e6f}, {17, {0.9f, 0.2f, 0.1f}, 1e6f}, {17, {0.1f, 0.2f, 0.9f}, 1e6f}};
+    const isogi_transfer transfer = {p, 4, NULL, 0};
+    for (int space = 0; space < 2; space++)
+        for (int back = 0; back < 2; back++) {
+            const isogi_dvr_desc desc = {.pyramid = f.pyramid, .space = (isogi_dvr_space)space};
+            isogi_dvr *dvr = dvr_new(&desc, &transfer);
+            const double ends[2][3] = {{-20, 20, 22}, {70, 22, 20}};
+            pixel seen = cast(dvr, ends[back], ends[!back], NULL);
+            float c[4];
+            colour_of(dvr, ends[back], ends[!back], NULL, c, NULL);
+            for (int a = 0; a < 3; a++)
+                CHECK(fabsf(c[a] - p[back ? 3 : 1].rgb[a]) < 2e-3f && fabsf(seen.c[a] - p[back ? 3 : 1].rgb[a]) < 2e-3f, "space %d side %d channel %d: %g, with depth %g", space, back, a,
+                      (double)c[a], (double)seen.c[a]);
+            double surface = back ? 70 - 48 : 16 + 20; /* along x; the line leans by a tenth of a percent */
+            CHECK(fabs((double)seen.depth - surface) < (space ? 0.03 : 0.3), "space %d side %d: depth %g, not %g", space, back, (double)seen.depth, surface);
+            isogi_dvr_free(dvr);
+        }
+    field_free(&f);
+}
+
+/* ---- light: emission and phase function ---- */
+
+TEST(emission_glows_without_light_and_adds_to_it) {
+    field f = field_of(even, 12);
+    const isogi_transfer_point point = {0, {0.8f, 0.5f, 0.3f}, 0.1f};
+    const isogi_transfer transfer = {&point, 1, NULL, 0};
+    const isogi_lighting dark = {.lights = NULL};
+    const double eye[3] = {-30, 3, 5}, target[3] = {5, 7, 6};
+    for (int way = 0; way < 2; way++) /* both paths of physical space */
+        for (int n = 0; n < 3; n++) {
+            const double emission = n ? 2.5 : 0;
+            const isogi_dvr_desc desc = {.pyramid = f.pyramid, .shading = ISOGI_DVR_VISIBILITY, .emission = emission, .grid = {2, 2, 2},
+                                         .classification = way ? ISOGI_DVR_POST_CLASSIFIED : ISOGI_DVR_EXACT};
+            isogi_dvr *dvr = dvr_new(&desc, &transfer);
+            float c[4];
+            colour_of(dvr, eye, target, n == 1 ? &dark : &sky, c, NULL); /* visibility is not stepped: no shadows, light 1 */
+            for (int a = 0; a < 3; a++) {
+                double expected = (double)(c[3] * point.rgb[a]) * (emission + (n == 1 ? 0 : 1));
+                CHECK(fabs((double)c[a] - expected) < 1e-4 * expected + 1e-6, "way %d case %d: %g, not %g", way, n, (double)c[a], expected);
+            }
+            isogi_dvr_free(dvr);
+        }
+    field_free(&f);
+}
+
+/* Without shadows light from one direction, scattered by an angle: E / (4 pi) sum of (2 l + 1) g^l P_l(cosine), the series of Henyey and
+   Greenstein's function up to the order; and a sky of 1 looks the same whatever g is. */
+TEST(scattering_follows_henyey_and_greenstein) {
+    enum { L = 6 };
+    field f = field_of(even, 12);
+    const isogi_transfer_point point = {0, {1, 1, 1}, 1e-5f}; /* too thin for shadows */
+    const isogi_transfer transfer = {&point, 1, NULL, 0};
+    const double g[] = {0, 0.3, 0.7, -0.5, 0.99}, eye[3] = {-30, 3, 5}, target[3] = {5, 7, 6};
+    test_random r = {3};
+    for (int n = 0; n < 5; n++) {
+        const isogi_dvr_desc desc = {.pyramid = f.pyramid, .shading = ISOGI_DVR_VISIBILITY, .anisotropy = g[n], .order = L, .grid = {2, 2, 2}};
+        isogi_dvr *dvr = dvr_new(&desc, &transfer);
+        double view[3], length = 0;
+        float c[4];
+        for (int a = 0; a < 3; a++) view[a] = target[a] - eye[a], length += view[a] * view[a];
+        colour_of(dvr, eye, target, &sky, c, NULL);
+        CHECK(fabs((double)(c[0] / c[3]) - 1) < 1e-4, "g %g: a sky of 1 looks like %g", g[n], (double)(c[0] / c[3]));
+        for (int k = 0; k < 20; k++) {
+            double to[3], cosine = 0, series = 0, p0 = 1, p1;
+            random_direction(&r, to);
+            const isogi_light sun = {.vector = {(float)to[0], (float)to[1], (float)to[2]}, .rgb = {2, 2, 2}};
+            const isogi_lighting lighting = {.lights = &sun, .light_count = 1};
+            for (int a = 0; a < 3; a++) cosine += to[a] * view[a] / sqrt(length); /* light that comes from where the ray goes goes straight on */
+            p1 = cosine;
+            for (int l = 0; l < L; l++) {
+                double p2 = ((2 * l + 3) * cosine * p1 - (l + 1) * p0) / (l + 2);
+                series += (2 * l + 1) * pow(g[n], l) * p0, p0 = p1, p1 = p2;
+            }
+            colour_of(dvr, eye, target, &lighting, c, NULL);
+            double expected = fmax(0, 2 / (4 * PI) * series); /* what rings below zero is cut */
+            CHECK(fabs((double)(c[0] / c[3]) - expected) < 2e-4 * (1 + expected), "g %g cosine %g: %g, not %g", g[n], cosine, (double)(c[0] / c[3]), expected);
+        }
+        isogi_dvr_free(dvr);
+    }
+    field_free(&f);
+}
+
+/* ---- depth ---- */
+
+/* Matter from x = 16 to 40: opacity begins at the face, half of it is reached ln 2 further or so. */
+TEST(depth_is_that_of_first_or_of_half_opacity_as_asked) {
+    field f = field_of(along_x, 49);
+    const double eye[3] = {-20, 20, 22}, target[3] = {80, 21, 24}, per = sqrt(100 * 100 + 1 + 4) / 100;
+    for (int space = 0; space < 2; space++)
+        for (double k = 1e-6; k < 2; k *= 10) {
+            const isogi_transfer_point p[] = {{16, {1, 1, 1}, 0}, {16, {1, 1, 1}, (float)k}, {40, {1, 1, 1}, (float)k}, {40, {1, 1, 1}, 0}};
+            const isogi_peak peak = {30, {1, 1, 1}, 0.25f};
+            for (int peaks = 0; peaks < 2; peaks++) {
+                const isogi_transfer transfer = {p, peaks ? 0u : 4u, &peak, (size_t)peaks};
+                const isogi_dvr_desc desc = {.pyramid = f.pyramid, .space = (isogi_dvr_space)space, .step = 0.25, .opaque = 1};
+                isogi_dvr *dvr = dvr_new(&desc, &transfer);
+                isogi_view view = line_of_sight(eye, target);
+                float c[2][4], depth[2];
+                for (int first = 0; first < 2; first++) {
+                    view.depth = first ? ISOGI_DEPTH_FIRST : ISOGI_DEPTH_HALF;
+                    CHECK(isogi_dvr_render(dvr, &view, NULL, &c[first], &depth[first], NULL) == ISOGI_OK, "render");
+                }
+                double whole = 24 * (space ? 1 : per) * k, half = peaks ? 30 : 16 + 24 * -log1p(0.5 * expm1(-whole)) / whole;
+                CHECK(!memcmp(c[0], c[1], sizeof c[0]), "the picture does not depend on what depth means");
+                /* steps of a quarter: half of one */
+                CHECK(fabs((double)depth[1] - (20 + (peaks ? 30 : 16)) * per) < 0.15, "space %d extinction %g peaks %d: first %g, not %g", space, k, peaks, (double)depth[1], (20 + (peaks ? 30 : 16)) * per);
+                CHECK(fabs((double)depth[0] - (20 + half) * per) < 0.15, "space %d extinction %g peaks %d: half %g, not %g", space, k, peaks, (double)depth[0], (20 + half) * per);
+                view.depth = (isogi_depth_kind)2;
+                CHECK(isogi_dvr_render(dvr, &view, NULL, &c[0], NULL, NULL) == ISOGI_INVALID, "a kind of depth that does not exist");
+                isogi_dvr_free(dvr);
+            }
+        }
+    field_free(&f);
+}
+
+TEST(depth_through_tetrahedra_is_as_on_the_lattice) {
+    const float points[4][3] = {{0, 0, 0}, {10, 0, 0}, {0, 10, 0}, {0, 0, 10}};
+    const float values[4] = {0, 10, 0, 0}; /* f = x */
+    const uint32_t tet[1][4] = {{0, 1, 2, 3}};
+    const isogi_tet_mesh mesh = {points, values, 4, tet, 1};
+    const isogi_transfer_point p[] = {{2, {1, 1, 1}, 0}, {2, {1, 1, 1}, 0.3f}, {7, {1, 1, 1}, 0.3f}, {7, {1, 1, 1}, 0}};
+    const isogi_transfer transfer = {p, 4, NULL, 0};
+    isogi_tets *tets = NULL;
+    CHECK(isogi_dvr_tets_build(&tets, &mesh, NULL, &serial) == ISOGI_OK, "build");
+    const double eye[3] = {-10, 1, 1}, target[3] = {10, 1, 1};
+    isogi_view view = line_of_sight(eye, target);
+    for (int first = 0; first < 2; first++) {
+        float c[1][4], depth;
+        view.depth = first ? ISOGI_DEPTH_FIRST : ISOGI_DEPTH_HALF;
+        CHECK(isogi_dvr_tets_render(tets, NULL, &transfer, &view, c, &depth, NULL) == ISOGI_OK, "render");
+        double expected = 12 + (first ? 0 : -log1p(0.5 * expm1(-1.5)) / 0.3);
+        CHECK(fabs((double)depth - expected) < 1e-4, "%s: %g, not %g", first ? "first" : "half", (double)depth, expected);
+    }
+    isogi_dvr_tets_free(tets);
+}
+
+/* ---- jitter ---- */
+
+TEST(jitter_is_off_by_default_repeats_itself_and_is_right_on_average) {
+    field f = field_waves(24, 6);
+    const isogi_transfer_point p[] = {{-1, {1, 0.2f, 0.1f}, 0}, {0.2, {0.3f, 1, 0.1f}, 0.3f}, {0.3, {0.3f, 1, 0.1f}, 0}, {1, {0, 0, 1}, 0.2f}};
+    const isogi_transfer transfer = {p, 4, NULL, 0};
+    const isogi_context two = {.threads = 2};
+    test_random r = {7};
+    isogi_view view = view_of(&f, 1, &r, 24);
+    for (int space = 0; space < 2; space++) {
+        isogi_dvr_desc desc = {.pyramid = f.pyramid, .space = (isogi_dvr_space)space, .classification = ISOGI_DVR_POST_CLASSIFIED, .step = 0.02, .opaque = 1};
+        isogi_dvr *dvr = dvr_new(&desc, &transfer);
+        float(*fine)[4] = picture(dvr, &view, NULL, NULL, NULL), (*plain)[4], mean[576][4] = {{0}};
+        isogi_dvr_free(dvr);
+        desc.step = 2;
+        dvr = dvr_new(&desc, &transfer), plain = picture(dvr, &view, NULL, NULL, NULL), isogi_dvr_free(dvr);
+        for (uint32_t seed = 1; seed <= 64; seed++) {
+            desc.jitter = seed;
+            dvr = dvr_new(&desc, &transfer);
+            float(*image)[4] = picture(dvr, &view, NULL, NULL, NULL), (*again)[4];
+            isogi_dvr_free(dvr);
+            CHECK(isogi_dvr_create(&dvr, &desc, &two) == ISOGI_OK && isogi_dvr_set_transfer(dvr, &transfer) == ISOGI_OK, "create");
+            again = picture(dvr, &view, NULL, NULL, NULL), isogi_dvr_free(dvr);
+            CHECK(!memcmp(image, again, 576 * sizeof *image), "seed %u: the same bits with two threads", (unsigned)seed);
+            CHECK(memcmp(image, plain, 576 * sizeof *image), "seed %u: not those without jitter", (unsigned)seed);
+            for (int i = 0; i < 2304; i++) mean[i / 4][i % 4] += image[i / 4][i % 4] / 64;
+            free(image), free(again);
+        }
+        /* of 64 shifts the mean is that of steps 64 times as fine, but for what products of opacities lose */
+        double error[2] = {rms_difference(plain, fine, 576), rms_difference(mean, fine, 576)};
+        CHECK(error[1] < 0.35 * error[0] && error[0] > 0.002, "space %d: RMSE %g of the mean, %g without jitter", space, error[1], error[0]);
+        free(fine), free(plain);
+    }
+    field_free(&f);
+}
+
+TEST(jitter_changes_no_homogeneous_medium_and_no_exact_ray) {
+    field f = field_of(even, 20), waves = field_waves(12, 3);
+    const isogi_transfer_point point = {0, {0.2f, 0.5f, 1}, 0.1f};
+    const isogi_transfer transfer = {&point, 1, NULL, 0};
+    const double eye[3] = {-30, 3, 5}, target[3] = {50, 12, 9}, length = 19 * sqrt(80 * 80 + 9 * 9 + 4 * 4) / 80;
+    for (uint32_t seed = 1; seed < 50; seed++) {
+        isogi_dvr_desc desc = {.pyramid = f.pyramid, .jitter = seed, .step = 0.1 * seed, .shading = seed % 2 ? ISOGI_DVR_UNLIT : ISOGI_DVR_VISIBILITY, .grid = {2, 2, 2}};
+        isogi_dvr *dvr = dvr_new(&desc, &transfer);
+        pixel c = cast(dvr, eye, target, &sky);
+        CHECK(fabs((double)c.c[3] - -expm1(-0.1 * length)) < 1e-6, "seed %u: %g, not %g", (unsigned)seed, (double)c.c[3], -expm1(-0.1 * length));
+        isogi_dvr_free(dvr);
+        const isogi_dvr_desc exact = {.pyramid = waves.pyramid, .space = ISOGI_DVR_DATA, .jitter = seed}, without = {.pyramid = waves.pyramid, .space = ISOGI_DVR_DATA};
+        isogi_dvr *a = dvr_new(&exact, &transfer), *b = dvr_new(&without, &transfer);
+        pixel x = cast(a, eye, target, NULL), y = cast(b, eye, target, NULL);
+        CHECK(!memcmp(x.c, y.c, sizeof x.c), "exact rays have no samples to move: %g, %g", (double)x.c[3], (double)y.c[3]);
+        isogi_dvr_free(a), isogi_dvr_free(b);
+    }
+    field_free(&f), field_free(&waves);
+}
+
+/* ---- blocks of one classification ---- */
+
+static double waves_and_steps(double x, double y, double z) { return x < 0.3 ? 1 : x > 0.7 ? 5 : 2 + sin(9 * y) * cos(7 * z); }
+
+TEST(blocks_of_one_classification_take_one_sample) {
+    field f = field_of(even, 65), g = field_of(waves_and_steps, 65), broken = field_of(even, 65);
+    const isogi_transfer_point point = {0, {0.2f, 0.5f, 1}, 0.01f}, p[] = {{1.5, {1, 0, 0}, 0.01f}, {1.6, {0, 1, 0}, 0.05f}, {4, {0, 0, 1}, 0.02f}};
+    const isogi_transfer one = {&point, 1, NULL, 0}, three = {p, 3, NULL, 0};
+    const double eye[3] = {-30, 3, 5}, target[3] = {90, 42, 30}, length = 64 * sqrt(120 * 120 + 39 * 39 + 25 * 25) / 120;
+    isogi_dvr_desc desc = {.pyramid = f.pyramid, .classification = ISOGI_DVR_POST_CLASSIFIED, .step = 0.5};
+    isogi_dvr *dvr = dvr_new(&desc, &one);
+    isogi_counters count = {0};
+    float c[4];
+    colour_of(dvr, eye, target, NULL, c, &count);
+    CHECK(fabs((double)c[3] - -expm1(-0.01 * length)) < 1e-6 && count.samples <= 2, "opacity %g, not %g; %d samples of 139", (double)c[3], -expm1(-0.01 * length), (int)count.samples);
+    isogi_dvr_free(dvr);
+    /* a voxel that is not finite: nothing is passed unseen */
+    *(broken.value + 32 + 65 * (20 + 65 * 20)) = (double)NAN, isogi_vol_free(broken.pyramid), field_build(&broken);
+    desc.pyramid = broken.pyramid, dvr = dvr_new(&desc, &one), memset(&count, 0, sizeof count);
+    colour_of(dvr, eye, target, NULL, c, &count);
+    CHECK(count.samples > 100, "%d samples", (int)count.samples);
+    isogi_dvr_free(dvr);
+    /* a mixed field: the same picture with fewer samples, depth and all; and where there is light every sample is looked at */
+    isogi_view view = {.width = 20, .height = 20, .eye = {150, 90, 110}, .target = {32, 32, 32}, .fov = 30};
+    uint64_t samples[2];
+    float(*image[2])[4], depth[2][400];
+    for (int lit = 0; lit < 2; lit++) {
+        desc.pyramid = g.pyramid, desc.shading = lit ? ISOGI_DVR_VISIBILITY : ISOGI_DVR_UNLIT, desc.grid[0] = desc.grid[1] = desc.grid[2] = 2;
+        dvr = dvr_new(&desc, &three), memset(&count, 0, sizeof count);
+        image[lit] = picture(dvr, &view, &sky, depth[lit], &count), samples[lit] = count.samples;
+        isogi_dvr_free(dvr);
+    }
+    CHECK(samples[0] < 0.85 * (double)samples[1], "%d samples, %d with light", (int)samples[0], (int)samples[1]);
+    CHECK(largest_difference(image[0], image[1], 400) < 2e-5, "the pictures differ by %g", largest_difference(image[0], image[1], 400));
+    for (int i = 0; i < 400; i++) CHECK(fabsf(depth[0][i] - depth[1][i]) < 1e-3f || depth[0][i] > 1e30f, "pixel %d: depth %g, %g", i, (double)depth[0][i], (double)depth[1][i]);
+    free(image[0]), free(image[1]);
+    field_free(&f), field_free(&g), field_free(&broken);
+}
+
+TEST_MAIN("dvr_medium")
