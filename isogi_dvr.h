@@ -3545,7 +3545,7 @@ ISOGI_API isogi_result isogi_dvr_step(isogi_dvr *dvr, uint64_t max_rays, double 
     if (!dvr) return ISOGI_INVALID;
     if (dvr->method == ISOGI_DVR_PAPER && dvr->point_count && !dvr->next) result = isogi_dvr__update_blocks(dvr);
     if (result != ISOGI_OK) return result;
-    if (dvr->transparent && dvr->point_count) {
+    if (dvr->transparent && dvr->point_count && (isogi_dvr__by_value(dvr) || !dvr->transfer.peak_count)) {
         isogi_dvr__clear_visibility(dvr);
         if (remaining) *remaining = 0;
         return ISOGI_OK;

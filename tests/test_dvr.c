@@ -537,7 +537,8 @@ TEST(visibility_within_a_homogeneous_box_agrees_with_quadrature) {
 TEST(a_new_transfer_function_starts_visibility_again) {
     field f = field_waves(10, 14);
     const isogi_transfer_point points[] = {{-1, {1, 1, 1}, 0}, {1, {1, 1, 1}, 0.4f}};
-    const isogi_transfer first = {points, 2, NULL, 0}, second = {points, 1, NULL, 0};
+    const isogi_transfer_point next_to_nothing = {0, {1, 1, 1}, 1e-9f};
+    const isogi_transfer first = {points, 2, NULL, 0}, second = {&next_to_nothing, 1, NULL, 0};
     const isogi_dvr_desc desc = {.pyramid = f.pyramid, .shading = ISOGI_DVR_VISIBILITY, .grid = {2, 2, 2}, .method = ISOGI_DVR_BRUTE};
     isogi_dvr *dvr = dvr_new(&desc, &first);
     double remaining = 1;
