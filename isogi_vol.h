@@ -687,6 +687,14 @@ static int isogi_vol__cell(double x, size_t voxels, double *local) {
 
 typedef struct isogi_vol__node_level { size_t first, size[3], parents[3]; } isogi_vol__node_level; /* parents: size of the level above */
 
+/* Grid coordinates of world points w in floats, to 2^-24 of a cell: (high + low) w + (at_high + at_low). at_high is a multiple of 2^-10, so
+   that the number of a cell is subtracted from it exactly; what is left of the sum is small. */
+typedef struct isogi_vol__float_grid {
+    float high[3], low[3], at_high[3], at_low[3];
+    int32_t stride[3]; /* in voxels, hence 2^shift bytes */
+    int shift, usable;
+} isogi_vol__float_grid;
+
 struct isogi_pyramid {
     isogi_volume volume;
     isogi_field field; /* instead of voxels, if it has a function */
@@ -696,6 +704,7 @@ struct isogi_pyramid {
     double origin[3];   /* world position of voxel (0,0,0) */
     double range[2];
     int cells[3]; /* size - 1 */
+    isogi_vol__float_grid float_grid;
     double box[4], grid_axis[3][4]; /* cells and the columns of to_grid, for vectors of four; the fourth is 0 */
     isogi_level level[ISOGI_VOL__LEVELS];
     size_t block_count; /* of all levels */
@@ -823,6 +832,28 @@ static void isogi_vol__set_transform(isogi_pyramid *p) {
     for (r = 0; r < 3; r++) first[r] = (double)v->first[r];
     isogi_vol__transform(p->to_world, first, p->origin);
     for (r = 0; r < 3; r++) p->origin[r] += v->origin[r];
+}
+
+/* Floats do for volumes whose axes are the world's, of at most 8192 voxels along an axis, no further than that from the world's origin. */
+static void isogi_vol__plan_float_grid(isogi_pyramid *p) {
+    const isogi_volume *v = &p->volume;
+    const ptrdiff_t size = (ptrdiff_t)isogi_vol__type_size(v->type);
+    isogi_vol__float_grid *g = &p->float_grid;
+    double reach = 0;
+    int a;
+    g->usable = isogi_vol__all_zero(p->to_grid + 1, 3) && isogi_vol__all_zero(p->to_grid + 5, 3);
+    for (g->shift = 0; size >> g->shift > 1; g->shift++) {}
+    for (a = 0; a < 3; a++) {
+        const double m = p->to_grid[4 * a], at = -p->origin[a] * m;
+        reach += fabs((double)(v->stride[a] / size)) * p->cells[a];
+        if (!(fabs(m) > 1e-7 && fabs(m) < 1e7 && fabs(at) < ISOGI_VOL__FAST_SIZE) || p->cells[a] >= ISOGI_VOL__FAST_SIZE || !(reach < 2e9)) {
+            g->usable = 0;
+            return;
+        }
+        g->high[a] = (float)m, g->low[a] = (float)(m - (double)g->high[a]);
+        g->at_high[a] = (float)((double)(int)(at * 1024) / 1024), g->at_low[a] = (float)(at - (double)g->at_high[a]);
+        g->stride[a] = p->cells[a] ? (int32_t)(v->stride[a] / size) : 0;
+    }
 }
 
 /* A gradient per grid unit becomes one per world unit: the transposed inverse. */
@@ -1418,6 +1449,7 @@ ISOGI_API isogi_result isogi_vol_build(isogi_pyramid **pyramid, const isogi_volu
     if (p->context.force_path > 0 && p->context.force_path < p->path) p->path = p->context.force_path;
     for (a = 0; a < 3; a++) p->cells[a] = (int)(p->volume.size[a] - 1);
     isogi_vol__set_transform(p);
+    isogi_vol__plan_float_grid(p);
     blocks = isogi_vol__plan_levels(p);
     p->blocks = (float(*)[2])isogi_allocate(context, blocks, sizeof *p->blocks);
     p->block_count = blocks;
@@ -1816,21 +1848,19 @@ static double isogi_vol__cubic_sum(const isogi_pyramid *p, isogi_filter filter, 
 
 /* ---- many points at once ----
 
-   Points go in blocks: all of a block are located, in double, then taken through float arithmetic side by side. A point's result
+   Points go in blocks: all of a block are located, then taken through float arithmetic side by side. A point's result
    does not depend on the others, whatever the size of a call. Against the plain code, values err by at most 2^-21 of the largest
    number that enters them: |voxel|, |bias|. */
 
 #define ISOGI_VOL__BLOCK 64
-#define ISOGI_VOL__FETCHED 8 /* points whose taps are fetched at once */
 
 typedef struct isogi_vol__block {
     int32_t cell[3][ISOGI_VOL__BLOCK];
     float local[3][ISOGI_VOL__BLOCK];
     ptrdiff_t offset[ISOGI_VOL__BLOCK]; /* of the cell's first voxel, in bytes */
-    int32_t raw[8][ISOGI_VOL__BLOCK];   /* corners x + 2y + 4z: integers, or the bits of floats */
     /* results for raw voxels, per grid unit */
     float value[ISOGI_VOL__BLOCK], gradient[3][ISOGI_VOL__BLOCK]; /* of the trilinear filter */
-    float sum[ISOGI_VOL__BLOCK][4];                               /* of cubic filters: value and gradient */
+    float sum[4 * ISOGI_VOL__BLOCK];                              /* of cubic filters: value and gradient of each point */
 } isogi_vol__block;
 
 /* Where the points of a call are: one of the two is NULL. */
@@ -1876,79 +1906,96 @@ static void isogi_vol__locate(const isogi_pyramid *p, const isogi_vol__points *a
 
 #ifdef ISOGI_VOL__AVX
 #define ISOGI_VOL__AVX2 ISOGI_VOL__TARGET("avx2,fma")
-/* The coordinates of some points that follow each other, and zeros after the last. */
-static void isogi_vol__copy_points(const isogi_vol__points *at, size_t first, int n, int room, double *out) {
+/* The coordinates of four points that follow each other, and zeros after the last. */
+static void isogi_vol__copy_points(const isogi_vol__points *at, size_t first, int n, double out[12]) {
     int r;
-    for (r = 0; r < 3 * room; r++)
+    for (r = 0; r < 12; r++)
         out[r] = r >= 3 * n ? 0 : at->grid ? at->grid[first + (size_t)(r / 3)][r % 3] : (double)at->world[first + (size_t)(r / 3)][r % 3];
 }
 
-/* The same for WIDTH points at a time. Coordinates x, y, z are parted from the numbers a, b, c; then axis by axis. */
-#define ISOGI_VOL__LOCATE_AXIS(V, L, HALF, H, MADD, r, g)                                                                        \
-    do {                                                                                                                         \
-        if (at->world) g = L##mul_pd(L##set1_pd(m[4 * r]), g##0);                                                                \
-        if (at->world && !straight)                                                                                              \
-            g = MADD(L##set1_pd(m[3 * r + (r + 1) % 3]), r == 0 ? y0 : r == 1 ? z0 : x0,                                         \
-                     MADD(L##set1_pd(m[3 * r + (r + 2) % 3]), r == 0 ? z0 : r == 1 ? x0 : y0, g));                               \
-        g = L##min_pd(L##max_pd(g, L##setzero_pd()), L##set1_pd(p->box[r])); /* NaN gives 0 */                                   \
-        cell = H##max_epi32(H##min_epi32(L##cvttpd_epi32(g), H##set1_epi32(p->cells[r] - 1)), H##set1_epi32(0)); /* in any case */ \
-        memcpy(&b->cell[r][i], &cell, sizeof cell);                                                                              \
-        whole = L##cvtepi32_pd(cell);                                                                                            \
-        H##storeu_ps(&b->local[r][i], L##cvtpd_ps(L##sub_pd(g, whole)));                                                         \
-        offset = MADD(whole, L##set1_pd((double)p->volume.stride[r]), offset);                                                   \
-    } while (0)
-#define ISOGI_VOL__LOCATE(NAME, ATTRIBUTES, V, L, HALF, H, WIDTH, MADD)                                                          \
-    ATTRIBUTES static void isogi_vol__locate_##NAME(const isogi_pyramid *p, const isogi_vol__points *at, size_t first, int n,    \
-                                                    isogi_vol__block *b) {                                                       \
-        const double *m = p->to_grid, *o = p->origin;                                                                     \
-        const int straight = isogi_vol__all_zero(m + 1, 3) && isogi_vol__all_zero(m + 5, 3);                                     \
-        int i;                                                                                                                   \
-        for (i = 0; i < ((n + 15) & ~15); i += WIDTH) {                                                                          \
-            V k0, k1, k2, x, y, z, x0, y0, z0, whole, offset = L##setzero_pd();                                                  \
-            HALF cell;                                                                                                           \
-            if (at->world && i + WIDTH <= n) {                                                                                   \
-                const float *w = at->world[first + (size_t)i];                                                                   \
-                k0 = L##cvtps_pd(H##loadu_ps(w)), k1 = L##cvtps_pd(H##loadu_ps(w + WIDTH)), k2 = L##cvtps_pd(H##loadu_ps(w + 2 * WIDTH)); \
-            } else {                                                                                                             \
-                double some[3 * WIDTH];                                                                                          \
-                isogi_vol__copy_points(at, first + (size_t)i, n - i, WIDTH, some);                                               \
-                k0 = L##loadu_pd(some), k1 = L##loadu_pd(some + WIDTH), k2 = L##loadu_pd(some + 2 * WIDTH);                      \
-            }                                                                                                                    \
-            x = ISOGI_VOL__X_##NAME, y = ISOGI_VOL__Y_##NAME, z = ISOGI_VOL__Z_##NAME;                                           \
-            x0 = L##sub_pd(x, L##set1_pd(o[0])), y0 = L##sub_pd(y, L##set1_pd(o[1])), z0 = L##sub_pd(z, L##set1_pd(o[2]));       \
-            ISOGI_VOL__LOCATE_AXIS(V, L, HALF, H, MADD, 0, x);                                                                   \
-            ISOGI_VOL__LOCATE_AXIS(V, L, HALF, H, MADD, 1, y);                                                                   \
-            ISOGI_VOL__LOCATE_AXIS(V, L, HALF, H, MADD, 2, z);                                                                   \
-            ISOGI_VOL__OFFSETS_##NAME;                                                                                           \
-        }                                                                                                                        \
+/* The same for four points at a time. Coordinates x, y, z are parted from the numbers a, b, c; then axis by axis. */
+ISOGI_VOL__AVX2 static void isogi_vol__locate_avx2(const isogi_pyramid *p, const isogi_vol__points *at, size_t first, int n, isogi_vol__block *b) {
+    const double *m = p->to_grid, *o = p->origin;
+    const __m256d magic = _mm256_set1_pd(6755399441055744.0); /* 1.5 * 2^52: added to a number, it leaves it as an integer in the low bits */
+    int i, r;
+    for (i = 0; i < ((n + 15) & ~15); i += 4) {
+        __m256d k0, k1, k2, g[3], offset = _mm256_setzero_pd();
+        if (at->world && i + 4 <= n) {
+            const float *w = at->world[first + (size_t)i];
+            k0 = _mm256_cvtps_pd(_mm_loadu_ps(w)), k1 = _mm256_cvtps_pd(_mm_loadu_ps(w + 4)), k2 = _mm256_cvtps_pd(_mm_loadu_ps(w + 8));
+        } else {
+            double some[12];
+            isogi_vol__copy_points(at, first + (size_t)i, n - i, some);
+            k0 = _mm256_loadu_pd(some), k1 = _mm256_loadu_pd(some + 4), k2 = _mm256_loadu_pd(some + 8);
+        }
+        g[0] = _mm256_permute4x64_pd(_mm256_blend_pd(_mm256_blend_pd(k0, k1, 4), k2, 2), 0x6c);
+        g[1] = _mm256_permute4x64_pd(_mm256_blend_pd(_mm256_blend_pd(k0, k1, 9), k2, 4), 0xb1);
+        g[2] = _mm256_permute4x64_pd(_mm256_blend_pd(_mm256_blend_pd(k0, k1, 2), k2, 9), 0xc6);
+        if (at->world) {
+            for (r = 0; r < 3; r++) g[r] = _mm256_sub_pd(g[r], _mm256_set1_pd(o[r]));
+            k0 = g[0], k1 = g[1], k2 = g[2];
+            for (r = 0; r < 3; r++)
+                g[r] = _mm256_fmadd_pd(_mm256_set1_pd(m[3 * r + 2]), k2,
+                                       _mm256_fmadd_pd(_mm256_set1_pd(m[3 * r + 1]), k1, _mm256_mul_pd(_mm256_set1_pd(m[3 * r]), k0)));
+        }
+        for (r = 0; r < 3; r++) {
+            __m256d whole;
+            __m128i cell;
+            g[r] = _mm256_min_pd(_mm256_max_pd(g[r], _mm256_setzero_pd()), _mm256_set1_pd(p->box[r])); /* NaN gives 0 */
+            cell = _mm_max_epi32(_mm_min_epi32(_mm256_cvttpd_epi32(g[r]), _mm_set1_epi32(p->cells[r] - 1)), _mm_setzero_si128()); /* in any case */
+            whole = _mm256_cvtepi32_pd(cell);
+            _mm_storeu_si128((__m128i *)(void *)&b->cell[r][i], cell);
+            _mm_storeu_ps(&b->local[r][i], _mm256_cvtpd_ps(_mm256_sub_pd(g[r], whole)));
+            offset = _mm256_fmadd_pd(whole, _mm256_set1_pd((double)p->volume.stride[r]), offset);
+        }
+        _mm256_storeu_si256((__m256i *)(void *)&b->offset[i], _mm256_sub_epi64(_mm256_castpd_si256(_mm256_add_pd(offset, magic)), _mm256_castpd_si256(magic)));
     }
+}
 
-#define ISOGI_VOL__X_avx2 _mm256_permute4x64_pd(_mm256_blend_pd(_mm256_blend_pd(k0, k1, 4), k2, 2), 0x6c)
-#define ISOGI_VOL__Y_avx2 _mm256_permute4x64_pd(_mm256_blend_pd(_mm256_blend_pd(k0, k1, 9), k2, 4), 0xb1)
-#define ISOGI_VOL__Z_avx2 _mm256_permute4x64_pd(_mm256_blend_pd(_mm256_blend_pd(k0, k1, 2), k2, 9), 0xc6)
-/* added to a number, 1.5 * 2^52 leaves it as an integer in the low bits */
-#define ISOGI_VOL__MAGIC _mm256_set1_pd(6755399441055744.0)
-#define ISOGI_VOL__OFFSETS_avx2                                                                                                  \
-    _mm256_storeu_si256((__m256i *)(void *)&b->offset[i],                                                                        \
-                        _mm256_sub_epi64(_mm256_castpd_si256(_mm256_add_pd(offset, ISOGI_VOL__MAGIC)), _mm256_castpd_si256(ISOGI_VOL__MAGIC)))
-ISOGI_VOL__LOCATE(avx2, ISOGI_VOL__AVX2, __m256d, _mm256_, __m128i, _mm_, 4, _mm256_fmadd_pd)
-
-#define ISOGI_VOL__PART(i, j, k, l, m, n, p, q, r) \
-    _mm512_permutex2var_pd(_mm512_permutex2var_pd(k0, _mm512_setr_epi64(i, j, k, l, m, n, 0, 0), k1), _mm512_setr_epi64(0, 1, 2, 3, 4, p, q, r), k2)
-#define ISOGI_VOL__X_avx512 ISOGI_VOL__PART(0, 3, 6, 9, 12, 15, 5, 10, 13)
-#define ISOGI_VOL__Y_avx512 ISOGI_VOL__PART(1, 4, 7, 10, 13, 0, 8, 11, 14)
-#define ISOGI_VOL__Z_avx512 ISOGI_VOL__PART(2, 5, 8, 11, 14, 0, 9, 12, 15)
-#define ISOGI_VOL__OFFSETS_avx512 _mm512_storeu_si512((void *)&b->offset[i], _mm512_cvtpd_epi64(offset))
-ISOGI_VOL__LOCATE(avx512, ISOGI_VOL__AVX512, __m512d, _mm512_, __m256i, _mm256_, 8, _mm512_fmadd_pd)
+/* The same in floats, for sixteen world points at a time where isogi_vol__plan_float_grid allows it. A first guess of the cell is never too
+   high and at most one too low, as 2^-9 is more than its error; from there the place in the cell is right to 2^-24. */
+ISOGI_VOL__AVX512 static void isogi_vol__locate_avx512(const isogi_pyramid *p, const float (*world)[3], int n, isogi_vol__block *b) {
+    const isogi_vol__float_grid *g = &p->float_grid;
+    const __m512i threes = _mm512_setr_epi32(0, 3, 6, 9, 12, 15, 18, 21, 24, 27, 30, 33, 36, 39, 42, 45);
+    const __m512 zero = _mm512_setzero_ps(), one = _mm512_set1_ps(1);
+    const __m128i width = _mm_cvtsi32_si128(g->shift);
+    int i, r;
+    for (i = 0; i < n; i += 16) {
+        const uint64_t there = n - i >= 16 ? ~(uint64_t)0 : ((uint64_t)1 << 3 * (n - i)) - 1;
+        const __m512 k0 = _mm512_maskz_loadu_ps((__mmask16)there, world[i]), k1 = _mm512_maskz_loadu_ps((__mmask16)(there >> 16), world[i] + 16);
+        const __m512 k2 = _mm512_maskz_loadu_ps((__mmask16)(there >> 32), world[i] + 32);
+        __m512i voxel = _mm512_setzero_si512();
+        for (r = 0; r < 3; r++) {
+            const __m512i from = _mm512_add_epi32(threes, _mm512_set1_epi32(r)), end = _mm512_set1_epi32(p->cells[r] - 1);
+            const __m512 w = _mm512_mask_permutexvar_ps(_mm512_permutex2var_ps(k0, from, k1), (__mmask16)(r < 2 ? 0xf800 : 0xfc00), from, k2);
+            const __m512 high = _mm512_set1_ps(g->high[r]), guess = _mm512_fmadd_ps(high, w, _mm512_set1_ps(g->at_high[r] - 0x1p-9f));
+            const __m512 clamped = _mm512_min_ps(_mm512_max_ps(guess, zero), _mm512_set1_ps((float)(p->cells[r] - 1))); /* NaN gives 0 */
+            __m512i cell = _mm512_cvttps_epi32(clamped);
+            __m512 local = _mm512_fmadd_ps(high, w, _mm512_sub_ps(_mm512_set1_ps(g->at_high[r]), _mm512_cvtepi32_ps(cell)));
+            __mmask16 next;
+            local = _mm512_add_ps(local, _mm512_fmadd_ps(_mm512_set1_ps(g->low[r]), w, _mm512_set1_ps(g->at_low[r])));
+            next = _mm512_mask_cmp_ps_mask(_mm512_cmplt_epi32_mask(cell, end), local, one, _CMP_GE_OQ);
+            cell = _mm512_mask_add_epi32(cell, next, cell, _mm512_set1_epi32(1)), local = _mm512_mask_sub_ps(local, next, local, one);
+            _mm512_storeu_si512((void *)&b->cell[r][i], cell);
+            _mm512_storeu_ps(&b->local[r][i], _mm512_min_ps(_mm512_max_ps(local, zero), one)); /* of points outside; NaN gives 0 */
+            voxel = _mm512_add_epi32(voxel, _mm512_mullo_epi32(cell, _mm512_set1_epi32(g->stride[r])));
+        }
+        _mm512_storeu_si512((void *)&b->offset[i], _mm512_sll_epi64(_mm512_cvtepi32_epi64(_mm512_castsi512_si256(voxel)), width));
+        _mm512_storeu_si512((void *)&b->offset[i + 8], _mm512_sll_epi64(_mm512_cvtepi32_epi64(_mm512_extracti64x4_epi64(voxel, 1)), width));
+    }
+}
 #endif
 
-/* Corners side by side, so that no level of instructions needs gathers, which are slow on many processors. */
-static void isogi_vol__fetch(const isogi_volume *v, int n, isogi_vol__block *b) {
+/* ---- trilinear values of a block ---- */
+
+/* Corners x + 2y + 4z side by side, integers or the bits of floats, so that no level of instructions needs gathers, which are slow on many
+   processors. */
+static void isogi_vol__fetch(const isogi_volume *v, int n, const isogi_vol__block *b, int32_t raw[8][ISOGI_VOL__BLOCK]) {
     const char *data = (const char *)v->data;
     const ptrdiff_t dx = v->size[0] > 1 ? v->stride[0] : 0, dy = v->size[1] > 1 ? v->stride[1] : 0, dz = v->size[2] > 1 ? v->stride[2] : 0;
     int i;
-#define ISOGI_VOL__TAKE_INTEGER(T, k, from) b->raw[k][i] = *(const T *)(const void *)(from)
-#define ISOGI_VOL__TAKE_FLOAT(T, k, from) memcpy(&b->raw[k][i], from, sizeof(T))
+#define ISOGI_VOL__TAKE_INTEGER(T, k, from) raw[k][i] = *(const T *)(const void *)(from)
+#define ISOGI_VOL__TAKE_FLOAT(T, k, from) memcpy(&raw[k][i], from, sizeof(T))
 #define ISOGI_VOL__READ(TAKE, T)                                                                                                 \
     for (i = 0; i < n; i++) {                                                                                                    \
         const char *p = data + b->offset[i], *q = p + dy, *r = p + dz, *s = q + dz;                                              \
@@ -1969,234 +2016,214 @@ static void isogi_vol__fetch(const isogi_volume *v, int n, isogi_vol__block *b) 
 #undef ISOGI_VOL__READ
 }
 
-#ifdef ISOGI_VOL__AVX
-/* The same with gathers, which are quick where AVX-512 is: neighbours along x come as one number. Bytes bring two more with them; 0:
-   these would lie beyond the end of the volume, or voxels are not side by side. */
-ISOGI_VOL__AVX512 static int isogi_vol__gather_avx512(const isogi_volume *v, int n, isogi_vol__block *b) {
-    const int width = (int)isogi_vol__type_size(v->type), is_signed = v->type == ISOGI_I8 || v->type == ISOGI_I16;
-    const ptrdiff_t dy = v->size[1] > 1 ? v->stride[1] : 0, dz = v->size[2] > 1 ? v->stride[2] : 0;
-    const __m128i up = _mm_cvtsi32_si128(32 - 8 * width), up_second = _mm_cvtsi32_si128(32 - 16 * width);
-    ptrdiff_t end = width;
-    __m512i furthest = _mm512_set1_epi64(PTRDIFF_MIN);
-    int i, r, a;
-    if (v->stride[0] != width || v->size[0] < 2) return 0;
-    for (a = 0; a < 3; a++) end += v->stride[a] > 0 ? v->stride[a] * (ptrdiff_t)(v->size[a] - 1) : 0;
-    for (i = 0; i < n && width == 1; i += 8) furthest = _mm512_max_epi64(furthest, _mm512_loadu_si512((const void *)&b->offset[i]));
-    if (_mm512_reduce_max_epi64(furthest) > end - 4 - (dy > 0 ? dy : 0) - (dz > 0 ? dz : 0)) return 0;
-    for (i = 0; i < n; i += 16) {
-        const __m512i at0 = _mm512_loadu_si512((const void *)&b->offset[i]), at1 = _mm512_loadu_si512((const void *)&b->offset[i + 8]);
-        for (r = 0; r < 4; r++) {
-            const char *row = (const char *)v->data + (r & 1 ? dy : 0) + (r & 2 ? dz : 0);
-            __m512i first, second;
-            if (width == 4) {
-                const __m512i pair0 = _mm512_i64gather_epi64(at0, (const void *)row, 1), pair1 = _mm512_i64gather_epi64(at1, (const void *)row, 1);
-                first = _mm512_permutex2var_epi32(pair0, _mm512_setr_epi32(0, 2, 4, 6, 8, 10, 12, 14, 16, 18, 20, 22, 24, 26, 28, 30), pair1);
-                second = _mm512_permutex2var_epi32(pair0, _mm512_setr_epi32(1, 3, 5, 7, 9, 11, 13, 15, 17, 19, 21, 23, 25, 27, 29, 31), pair1);
-            } else {
-                const __m512i pair = _mm512_inserti64x4(_mm512_castsi256_si512(_mm512_i64gather_epi32(at0, (const void *)row, 1)),
-                                                        _mm512_i64gather_epi32(at1, (const void *)row, 1), 1);
-                first = _mm512_sll_epi32(pair, up), second = _mm512_sll_epi32(pair, up_second);
-                first = is_signed ? _mm512_sra_epi32(first, up) : _mm512_srl_epi32(first, up);
-                second = is_signed ? _mm512_sra_epi32(second, up) : _mm512_srl_epi32(second, up);
-            }
-            _mm512_storeu_si512((void *)&b->raw[2 * r][i], first), _mm512_storeu_si512((void *)&b->raw[2 * r + 1][i], second);
-        }
-    }
-    return 1;
-}
-#endif
-
-/* Trilinear values, and gradients if asked for, of a whole block; vector by vector for any width: V and the operations L##mul_ps ...
-   of the width. Differences of corners come first, so that the error of a gradient is relative to it. */
-#define ISOGI_VOL__BLEND(L, a, b, axis) L##add_ps(L##mul_ps(rest[axis], a), L##mul_ps(at[axis], b))
-#define ISOGI_VOL__TRILINEAR(NAME, ATTRIBUTES, V, L, WIDTH, INTEGERS)                                                            \
-    ATTRIBUTES static void isogi_vol__trilinear_##NAME(isogi_vol__block *b, int n, int integers, int gradients) {               \
-        int i, k;                                                                                                                \
-        for (i = 0; i < n; i += WIDTH) {                                                                                         \
-            V c[8], at[3], rest[3], y0, y1, z0, z1;                                                                              \
-            if (integers)                                                                                                        \
-                for (k = 0; k < 8; k++) c[k] = INTEGERS(&b->raw[k][i]);                                                          \
-            else                                                                                                                 \
-                for (k = 0; k < 8; k++) c[k] = L##loadu_ps((const float *)(const void *)&b->raw[k][i]);                          \
-            for (k = 0; k < 3; k++) at[k] = L##loadu_ps(&b->local[k][i]), rest[k] = L##sub_ps(L##set1_ps(1), at[k]);             \
-            y0 = ISOGI_VOL__BLEND(L, c[0], c[1], 0), y1 = ISOGI_VOL__BLEND(L, c[2], c[3], 0);                                    \
-            z0 = ISOGI_VOL__BLEND(L, y0, y1, 1);                                                                                 \
-            y0 = ISOGI_VOL__BLEND(L, c[4], c[5], 0), y1 = ISOGI_VOL__BLEND(L, c[6], c[7], 0);                                    \
-            z1 = ISOGI_VOL__BLEND(L, y0, y1, 1);                                                                                 \
-            L##storeu_ps(&b->value[i], ISOGI_VOL__BLEND(L, z0, z1, 2));                                                          \
-            for (k = 0; k < 3 && gradients; k++) {                                                                               \
-                const int s = 1 << k, p = k == 0 ? 2 : 1, q = k == 2 ? 2 : 4, e = k == 0, f = k == 2 ? 1 : 2;                    \
-                z0 = ISOGI_VOL__BLEND(L, L##sub_ps(c[s], c[0]), L##sub_ps(c[s + p], c[p]), e);                                   \
-                z1 = ISOGI_VOL__BLEND(L, L##sub_ps(c[s + q], c[q]), L##sub_ps(c[s + p + q], c[p + q]), e);                       \
-                L##storeu_ps(&b->gradient[k][i], ISOGI_VOL__BLEND(L, z0, z1, f));                                                \
-            }                                                                                                                    \
+/* Trilinear values, and gradients if asked for, of the vector of points from i on with corners c; for any width: V and the operations
+   L##mul_ps ... of the width. Differences of corners come first, so that the error of a gradient is relative to it. */
+#define ISOGI_VOL__BLEND(NAME, L, a, b, axis) ISOGI_VOL__MADD_##NAME(at[axis], b, L##mul_ps(rest[axis], a))
+#define ISOGI_VOL__TRILINEAR(NAME, ATTRIBUTES, V, L)                                                                             \
+    ATTRIBUTES ISOGI_VOL__INLINE void isogi_vol__trilinear_##NAME(isogi_vol__block *b, int i, const V c[8], int gradients) {     \
+        V at[3], rest[3], y0, y1, z0, z1;                                                                                        \
+        int k;                                                                                                                   \
+        for (k = 0; k < 3; k++) at[k] = L##loadu_ps(&b->local[k][i]), rest[k] = L##sub_ps(L##set1_ps(1), at[k]);                 \
+        y0 = ISOGI_VOL__BLEND(NAME, L, c[0], c[1], 0), y1 = ISOGI_VOL__BLEND(NAME, L, c[2], c[3], 0);                            \
+        z0 = ISOGI_VOL__BLEND(NAME, L, y0, y1, 1);                                                                               \
+        y0 = ISOGI_VOL__BLEND(NAME, L, c[4], c[5], 0), y1 = ISOGI_VOL__BLEND(NAME, L, c[6], c[7], 0);                            \
+        z1 = ISOGI_VOL__BLEND(NAME, L, y0, y1, 1);                                                                               \
+        L##storeu_ps(&b->value[i], ISOGI_VOL__BLEND(NAME, L, z0, z1, 2));                                                        \
+        for (k = 0; k < 3 && gradients; k++) {                                                                                   \
+            const int s = 1 << k, p = k == 0 ? 2 : 1, q = k == 2 ? 2 : 4, e = k == 0, f = k == 2 ? 1 : 2;                        \
+            z0 = ISOGI_VOL__BLEND(NAME, L, L##sub_ps(c[s], c[0]), L##sub_ps(c[s + p], c[p]), e);                                 \
+            z1 = ISOGI_VOL__BLEND(NAME, L, L##sub_ps(c[s + q], c[q]), L##sub_ps(c[s + p + q], c[p + q]), e);                     \
+            L##storeu_ps(&b->gradient[k][i], ISOGI_VOL__BLEND(NAME, L, z0, z1, f));                                              \
         }                                                                                                                        \
     }
+/* A whole block from fetched corners. */
+#define ISOGI_VOL__TRILINEAR_BLOCK(NAME, ATTRIBUTES, V, L, WIDTH)                                                                \
+    ATTRIBUTES static void isogi_vol__trilinear_block_##NAME(const isogi_volume *v, isogi_vol__block *b, int n, int gradients) { \
+        int32_t raw[8][ISOGI_VOL__BLOCK];                                                                                        \
+        int i, k;                                                                                                                \
+        isogi_vol__fetch(v, n, b, raw);                                                                                          \
+        for (i = 0; i < n; i += WIDTH) {                                                                                         \
+            V c[8];                                                                                                              \
+            if (v->type == ISOGI_F32)                                                                                            \
+                for (k = 0; k < 8; k++) c[k] = L##loadu_ps((const float *)(const void *)&raw[k][i]);                             \
+            else                                                                                                                 \
+                for (k = 0; k < 8; k++) c[k] = ISOGI_VOL__INTEGERS_##NAME(&raw[k][i]);                                           \
+            isogi_vol__trilinear_##NAME(b, i, c, gradients);                                                                     \
+        }                                                                                                                        \
+    }
+
+/* ---- cubic filters ---- */
 
 /* The first tap of a point. */
 ISOGI_VOL__INLINE const char *isogi_vol__first_tap(const isogi_volume *v, const isogi_vol__block *b, int i) {
     return (const char *)v->data + b->offset[i] - v->stride[0] - v->stride[1] - v->stride[2];
 }
 
-/* Cubic filters over fetched taps, x fastest. Slices are summed along z first, then their columns. Taps count relative to the cell's first
-   voxel, so that rounding is relative to the variation among them. R: vectors of four, for the weights of one axis; L##spread puts
-   the weights of rows j WIDTH / 4 ... into the lanes of these rows, L##tile repeats four along all rows. */
-#define ISOGI_VOL__CUBIC(NAME, ATTRIBUTES, V, L, R, S, WIDTH, MADD)                                                              \
-    ATTRIBUTES static void isogi_vol__cubic_##NAME(isogi_vol__block *b, const float powers[4][4], const float *taps,             \
-                                                   const uint8_t *number, int n) {                                               \
-        int i, a, j, k;                                                                                                          \
-        for (i = 0; i < n; i++, taps += 64) {                                                                                    \
-            float w[3][4], d[3][4];                                                                                              \
-            const V base = L##set1_ps(taps[21]);                                                                                 \
-            V wx, dx, value = L##setzero_ps(), gx = value, gy = value, gz = value;                                               \
-            for (a = 0; a < 3; a++) {                                                                                            \
-                const R u = S##set1_ps(b->local[a][number[i]]), c3 = S##loadu_ps(powers[3]), c1 = S##loadu_ps(powers[1]);        \
-                const R q = ISOGI_VOL__MADD_base(c3, u, S##loadu_ps(powers[2]));                                                                \
-                S##storeu_ps(w[a], ISOGI_VOL__MADD_base(ISOGI_VOL__MADD_base(q, u, c1), u, S##loadu_ps(powers[0])));                                           \
-                S##storeu_ps(d[a], ISOGI_VOL__MADD_base(ISOGI_VOL__MADD_base(c3, u, S##add_ps(q, q)), u, c1));                                                 \
-            }                                                                                                                    \
-            wx = ISOGI_VOL__TILE_##NAME(w[0]), dx = ISOGI_VOL__TILE_##NAME(d[0]);                                                \
-            for (j = 0; j < 16 / WIDTH; j++) {                                                                                   \
-                const V wy = ISOGI_VOL__SPREAD_##NAME(w[1], j), dy = ISOGI_VOL__SPREAD_##NAME(d[1], j), wxy = L##mul_ps(wx, wy); \
-                V slab = L##setzero_ps(), slope = slab;                                                                          \
-                for (k = 0; k < 4; k++) {                                                                                        \
-                    const V slice = L##sub_ps(L##loadu_ps(taps + 16 * k + WIDTH * j), base);                                     \
-                    slab = MADD(L##set1_ps(w[2][k]), slice, slab), slope = MADD(L##set1_ps(d[2][k]), slice, slope);              \
+/* Cubic filters for n points all of whose taps exist. Every four lanes are a point of their own and hold four taps of a row; rows are summed
+   along y, then z, and x comes last. Taps count relative to the cell's first voxel, so that rounding is relative to the variation among
+   them: hence the slices go 1, 2, 3, 0. What a width has to offer: SPREAD, a number for each point; TILE, four numbers for every point; LANE, the
+   number of one lane of four in all of them; TURN, lanes moved down by one of four; ROW_type, a row of each point, q[...] bytes from p; SUMS, the sums
+   of four vectors over lanes, side by side. sum is a parameter of its own since gcc 12 forgets calls that only write into b. */
+#define ISOGI_VOL__WEIGHTS(NAME, L, axis, w, d)                                                                                  \
+    u = ISOGI_VOL__SPREAD_##NAME(&b->local[axis][i]), half = ISOGI_VOL__MADD_##NAME(c3, u, c2);                                  \
+    w = ISOGI_VOL__MADD_##NAME(ISOGI_VOL__MADD_##NAME(half, u, c1), u, c0);                                                      \
+    d = ISOGI_VOL__MADD_##NAME(ISOGI_VOL__MADD_##NAME(c3, u, L##add_ps(half, half)), u, c1)
+#define ISOGI_VOL__FOUR_ROWS(ROW)                                                                                                \
+    row0 = ROW(p), row1 = ROW(p + sy), row2 = ROW(p + 2 * sy), row3 = ROW(p + sy3);                                              \
+    break
+#define ISOGI_VOL__ALONG_Y(NAME, L, w)                                                                                           \
+    ISOGI_VOL__MADD_##NAME(w##3, row3, ISOGI_VOL__MADD_##NAME(w##2, row2, ISOGI_VOL__MADD_##NAME(w##1, row1, L##mul_ps(w##0, row0))))
+#define ISOGI_VOL__CUBIC(NAME, ATTRIBUTES, V, L, WIDTH)                                                                          \
+    ATTRIBUTES static void isogi_vol__cubic_##NAME(const isogi_volume *v, const isogi_vol__block *b, const float powers[5][4], int n, float *sum) { \
+        const V c0 = ISOGI_VOL__TILE_##NAME(powers[0]), c1 = ISOGI_VOL__TILE_##NAME(powers[1]), c2 = ISOGI_VOL__TILE_##NAME(powers[2]); \
+        const V c3 = ISOGI_VOL__TILE_##NAME(powers[3]), to_value = ISOGI_VOL__TILE_##NAME(powers[4]);                            \
+        const ptrdiff_t sy = v->stride[1], sy3 = 3 * sy, sz = v->stride[2];                                                      \
+        int i, k;                                                                                                                \
+        for (i = 0; i < n; i += WIDTH / 4) {                                                                                     \
+            const ptrdiff_t *q = &b->offset[i];                                                                                  \
+            const char *p = (const char *)v->data - v->stride[0] - sy;                                                           \
+            V u, half, wx, dx, wy, dy, wz, dz, wy0, wy1, wy2, wy3, dy0, dy1, dy2, dy3, slice, slope, base, row0, row1, row2, row3; \
+            V value = L##setzero_ps(), by_y = value, by_z = value;                                                               \
+            ISOGI_VOL__WEIGHTS(NAME, L, 0, wx, dx);                                                                              \
+            ISOGI_VOL__WEIGHTS(NAME, L, 1, wy, dy);                                                                              \
+            ISOGI_VOL__WEIGHTS(NAME, L, 2, wz, dz);                                                                              \
+            wy0 = ISOGI_VOL__LANE_##NAME(wy, 0), wy1 = ISOGI_VOL__LANE_##NAME(wy, 1);                                            \
+            wy2 = ISOGI_VOL__LANE_##NAME(wy, 2), wy3 = ISOGI_VOL__LANE_##NAME(wy, 3);                                            \
+            dy0 = ISOGI_VOL__LANE_##NAME(dy, 0), dy1 = ISOGI_VOL__LANE_##NAME(dy, 1);                                            \
+            dy2 = ISOGI_VOL__LANE_##NAME(dy, 2), dy3 = ISOGI_VOL__LANE_##NAME(dy, 3);                                            \
+            base = row0 = row1 = row2 = row3 = value;                                                                            \
+            for (k = 0; k < 4; k++, p += k == 3 ? -3 * sz : sz) {                                                                \
+                switch (v->type) {                                                                                               \
+                case ISOGI_U8: ISOGI_VOL__FOUR_ROWS(ISOGI_VOL__U8_##NAME);                                                       \
+                case ISOGI_I8: ISOGI_VOL__FOUR_ROWS(ISOGI_VOL__I8_##NAME);                                                       \
+                case ISOGI_U16: ISOGI_VOL__FOUR_ROWS(ISOGI_VOL__U16_##NAME);                                                     \
+                case ISOGI_I16: ISOGI_VOL__FOUR_ROWS(ISOGI_VOL__I16_##NAME);                                                     \
+                case ISOGI_F32: ISOGI_VOL__FOUR_ROWS(ISOGI_VOL__F32_##NAME);                                                     \
+                case ISOGI_F64: break;                                                                                           \
                 }                                                                                                                \
-                value = MADD(slab, wxy, value), gx = MADD(slab, L##mul_ps(dx, wy), gx);                                          \
-                gy = MADD(slab, L##mul_ps(wx, dy), gy), gz = MADD(slope, wxy, gz);                                               \
+                if (!k) base = ISOGI_VOL__LANE_##NAME(row1, 1);                                                                  \
+                row0 = L##sub_ps(row0, base), row1 = L##sub_ps(row1, base), row2 = L##sub_ps(row2, base), row3 = L##sub_ps(row3, base); \
+                slice = ISOGI_VOL__ALONG_Y(NAME, L, wy), slope = ISOGI_VOL__ALONG_Y(NAME, L, dy);                                \
+                wz = ISOGI_VOL__TURN_##NAME(wz), dz = ISOGI_VOL__TURN_##NAME(dz), u = ISOGI_VOL__LANE_##NAME(wz, 0);             \
+                value = ISOGI_VOL__MADD_##NAME(u, slice, value), by_y = ISOGI_VOL__MADD_##NAME(u, slope, by_y);                  \
+                by_z = ISOGI_VOL__MADD_##NAME(ISOGI_VOL__LANE_##NAME(dz, 0), slice, by_z);                                       \
             }                                                                                                                    \
-            S##storeu_ps(b->sum[number[i]], isogi_vol__sums_##NAME(value, gx, gy, gz));                                          \
-            b->sum[number[i]][0] += taps[21];                                                                                    \
+            slice = ISOGI_VOL__SUMS_##NAME(L##mul_ps(value, wx), L##mul_ps(value, dx), L##mul_ps(by_y, wx), L##mul_ps(by_z, wx)); \
+            L##storeu_ps(sum + 4 * i, ISOGI_VOL__MADD_##NAME(base, to_value, slice));                                            \
         }                                                                                                                        \
-    }
-
-/* Floats from integers side by side. */
-#define ISOGI_VOL__WIDEN(NAME, ATTRIBUTES, L, WIDTH)                                                                             \
-    ATTRIBUTES static void isogi_vol__widen_##NAME(isogi_type type, const uint8_t *raw, float *out, int n) {                    \
-        int i;                                                                                                                   \
-        for (i = 0; i < n && type == ISOGI_U8; i += WIDTH) L##storeu_ps(out + i, ISOGI_VOL__U8_##NAME(raw + i));                 \
-        for (i = 0; i < n && type == ISOGI_I8; i += WIDTH) L##storeu_ps(out + i, ISOGI_VOL__I8_##NAME(raw + i));                 \
-        for (i = 0; i < n && type == ISOGI_U16; i += WIDTH) L##storeu_ps(out + i, ISOGI_VOL__U16_##NAME(raw + 2 * i));           \
-        for (i = 0; i < n && type == ISOGI_I16; i += WIDTH) L##storeu_ps(out + i, ISOGI_VOL__I16_##NAME(raw + 2 * i));           \
     }
 
 #ifdef ISOGI_VOL__SSE2
 #define ISOGI_VOL__MADD_base(a, b, c) _mm_add_ps(_mm_mul_ps(a, b), c)
-#define ISOGI_VOL__TILE_base(w) _mm_loadu_ps(w)
-#define ISOGI_VOL__SPREAD_base(w, j) _mm_set1_ps((w)[j])
 #define ISOGI_VOL__INTEGERS_base(p) _mm_cvtepi32_ps(_mm_loadu_si128((const __m128i *)(const void *)(p)))
-ISOGI_VOL__INLINE __m128 isogi_vol__sums_base(__m128 a, __m128 b, __m128 c, __m128 d) {
-    const __m128 s = _mm_add_ps(_mm_unpacklo_ps(a, b), _mm_unpackhi_ps(a, b)), t = _mm_add_ps(_mm_unpacklo_ps(c, d), _mm_unpackhi_ps(c, d));
-    return _mm_add_ps(_mm_movelh_ps(s, t), _mm_movehl_ps(t, s));
-}
-ISOGI_VOL__INLINE __m128i isogi_vol__four_bytes(const uint8_t *p) {
+#define ISOGI_VOL__SPREAD_base(p) _mm_set1_ps(*(p))
+#define ISOGI_VOL__TILE_base(p) _mm_loadu_ps(p)
+#define ISOGI_VOL__LANE_base(v, i) _mm_shuffle_ps(v, v, 0x55 * (i))
+#define ISOGI_VOL__TURN_base(v) _mm_shuffle_ps(v, v, 0x39)
+/* sums of a and b in turn, of c and d, then of all; S: vectors */
+#define ISOGI_VOL__HALVES(L, a, b) L##add_ps(L##unpacklo_ps(a, b), L##unpackhi_ps(a, b))
+#define ISOGI_VOL__WHOLES(L, s, t) L##add_ps(L##shuffle_ps(s, t, 0x44), L##shuffle_ps(s, t, 0xee))
+#define ISOGI_VOL__SUMS_base(a, b, c, d) ISOGI_VOL__WHOLES(_mm_, ISOGI_VOL__HALVES(_mm_, a, b), ISOGI_VOL__HALVES(_mm_, c, d))
+ISOGI_VOL__INLINE __m128i isogi_vol__four_bytes(const char *p) {
     int32_t x;
     memcpy(&x, p, 4);
     return _mm_cvtsi32_si128(x);
 }
+#define ISOGI_VOL__EIGHT(p) _mm_loadl_epi64((const __m128i *)(const void *)(p))
 /* Numbers are moved to the upper end of 32 bits, then shifted back with or without their sign. */
 #define ISOGI_VOL__BYTES(p) _mm_unpacklo_epi16(_mm_setzero_si128(), _mm_unpacklo_epi8(_mm_setzero_si128(), isogi_vol__four_bytes(p)))
-#define ISOGI_VOL__SHORTS(p) _mm_unpacklo_epi16(_mm_setzero_si128(), _mm_loadl_epi64((const __m128i *)(const void *)(p)))
-#define ISOGI_VOL__U8_base(p) _mm_cvtepi32_ps(_mm_srli_epi32(ISOGI_VOL__BYTES(p), 24))
-#define ISOGI_VOL__I8_base(p) _mm_cvtepi32_ps(_mm_srai_epi32(ISOGI_VOL__BYTES(p), 24))
-#define ISOGI_VOL__U16_base(p) _mm_cvtepi32_ps(_mm_srli_epi32(ISOGI_VOL__SHORTS(p), 16))
-#define ISOGI_VOL__I16_base(p) _mm_cvtepi32_ps(_mm_srai_epi32(ISOGI_VOL__SHORTS(p), 16))
-ISOGI_VOL__TRILINEAR(base, , __m128, _mm_, 4, ISOGI_VOL__INTEGERS_base)
-ISOGI_VOL__CUBIC(base, , __m128, _mm_, __m128, _mm_, 4, ISOGI_VOL__MADD_base)
-ISOGI_VOL__WIDEN(base, , _mm_, 4)
+#define ISOGI_VOL__SHORTS(p) _mm_unpacklo_epi16(_mm_setzero_si128(), ISOGI_VOL__EIGHT(p))
+#define ISOGI_VOL__U8_base(p) _mm_cvtepi32_ps(_mm_srli_epi32(ISOGI_VOL__BYTES((p) + q[0]), 24))
+#define ISOGI_VOL__I8_base(p) _mm_cvtepi32_ps(_mm_srai_epi32(ISOGI_VOL__BYTES((p) + q[0]), 24))
+#define ISOGI_VOL__U16_base(p) _mm_cvtepi32_ps(_mm_srli_epi32(ISOGI_VOL__SHORTS((p) + q[0]), 16))
+#define ISOGI_VOL__I16_base(p) _mm_cvtepi32_ps(_mm_srai_epi32(ISOGI_VOL__SHORTS((p) + q[0]), 16))
+#define ISOGI_VOL__FLOATS(p, i) _mm_loadu_ps((const float *)(const void *)((p) + q[i]))
+#define ISOGI_VOL__F32_base(p) ISOGI_VOL__FLOATS(p, 0)
+ISOGI_VOL__TRILINEAR(base, , __m128, _mm_)
+ISOGI_VOL__TRILINEAR_BLOCK(base, , __m128, _mm_, 4)
+ISOGI_VOL__CUBIC(base, , __m128, _mm_, 4)
 #endif
 
 #ifdef ISOGI_VOL__AVX
-#define ISOGI_VOL__TILE_avx2(w) _mm256_broadcast_ps((const __m128 *)(const void *)(w))
-#define ISOGI_VOL__SPREAD_avx2(w, j) _mm256_set_m128(_mm_set1_ps((w)[2 * (j) + 1]), _mm_set1_ps((w)[2 * (j)]))
+#define ISOGI_VOL__MADD_avx2 _mm256_fmadd_ps
 #define ISOGI_VOL__INTEGERS_avx2(p) _mm256_cvtepi32_ps(_mm256_loadu_si256((const __m256i *)(const void *)(p)))
-ISOGI_VOL__AVX2 ISOGI_VOL__INLINE __m128 isogi_vol__sums_avx2(__m256 a, __m256 b, __m256 c, __m256 d) {
-    const __m256 s = _mm256_add_ps(_mm256_unpacklo_ps(a, b), _mm256_unpackhi_ps(a, b)), t = _mm256_add_ps(_mm256_unpacklo_ps(c, d), _mm256_unpackhi_ps(c, d));
-    const __m256 all = _mm256_add_ps(_mm256_shuffle_ps(s, t, 0x44), _mm256_shuffle_ps(s, t, 0xee));
-    return _mm_add_ps(_mm256_castps256_ps128(all), _mm256_extractf128_ps(all, 1));
-}
-#define ISOGI_VOL__EIGHT(p) _mm_loadl_epi64((const __m128i *)(const void *)(p))
-#define ISOGI_VOL__SIXTEEN(p) _mm_loadu_si128((const __m128i *)(const void *)(p))
-#define ISOGI_VOL__U8_avx2(p) _mm256_cvtepi32_ps(_mm256_cvtepu8_epi32(ISOGI_VOL__EIGHT(p)))
-#define ISOGI_VOL__I8_avx2(p) _mm256_cvtepi32_ps(_mm256_cvtepi8_epi32(ISOGI_VOL__EIGHT(p)))
-#define ISOGI_VOL__U16_avx2(p) _mm256_cvtepi32_ps(_mm256_cvtepu16_epi32(ISOGI_VOL__SIXTEEN(p)))
-#define ISOGI_VOL__I16_avx2(p) _mm256_cvtepi32_ps(_mm256_cvtepi16_epi32(ISOGI_VOL__SIXTEEN(p)))
-ISOGI_VOL__TRILINEAR(avx2, ISOGI_VOL__AVX2, __m256, _mm256_, 8, ISOGI_VOL__INTEGERS_avx2)
-ISOGI_VOL__CUBIC(avx2, ISOGI_VOL__AVX2, __m256, _mm256_, __m128, _mm_, 8, _mm256_fmadd_ps)
-ISOGI_VOL__WIDEN(avx2, ISOGI_VOL__AVX2, _mm256_, 8)
+#define ISOGI_VOL__SPREAD_avx2(p) _mm256_set_m128(_mm_set1_ps((p)[1]), _mm_set1_ps((p)[0]))
+#define ISOGI_VOL__TILE_avx2(p) _mm256_broadcast_ps((const __m128 *)(const void *)(p))
+#define ISOGI_VOL__LANE_avx2(v, i) _mm256_permute_ps(v, 0x55 * (i))
+#define ISOGI_VOL__TURN_avx2(v) _mm256_permute_ps(v, 0x39)
+#define ISOGI_VOL__SUMS_avx2(a, b, c, d) ISOGI_VOL__WHOLES(_mm256_, ISOGI_VOL__HALVES(_mm256_, a, b), ISOGI_VOL__HALVES(_mm256_, c, d))
+#define ISOGI_VOL__LONG(p, i) _mm_unpacklo_epi64(ISOGI_VOL__EIGHT((p) + q[i]), ISOGI_VOL__EIGHT((p) + q[(i) + 1]))
+#define ISOGI_VOL__SHORT(p) _mm_unpacklo_epi32(isogi_vol__four_bytes((p) + q[0]), isogi_vol__four_bytes((p) + q[1]))
+#define ISOGI_VOL__U8_avx2(p) _mm256_cvtepi32_ps(_mm256_cvtepu8_epi32(ISOGI_VOL__SHORT(p)))
+#define ISOGI_VOL__I8_avx2(p) _mm256_cvtepi32_ps(_mm256_cvtepi8_epi32(ISOGI_VOL__SHORT(p)))
+#define ISOGI_VOL__U16_avx2(p) _mm256_cvtepi32_ps(_mm256_cvtepu16_epi32(ISOGI_VOL__LONG(p, 0)))
+#define ISOGI_VOL__I16_avx2(p) _mm256_cvtepi32_ps(_mm256_cvtepi16_epi32(ISOGI_VOL__LONG(p, 0)))
+#define ISOGI_VOL__F32_avx2(p) _mm256_set_m128(ISOGI_VOL__FLOATS(p, 1), ISOGI_VOL__FLOATS(p, 0))
+ISOGI_VOL__TRILINEAR(avx2, ISOGI_VOL__AVX2, __m256, _mm256_)
+ISOGI_VOL__TRILINEAR_BLOCK(avx2, ISOGI_VOL__AVX2, __m256, _mm256_, 8)
+ISOGI_VOL__CUBIC(avx2, ISOGI_VOL__AVX2, __m256, _mm256_, 8)
 
-#define ISOGI_VOL__INTEGERS_avx512(p) _mm512_cvtepi32_ps(_mm512_loadu_si512((const void *)(p)))
-ISOGI_VOL__AVX512 ISOGI_VOL__INLINE __m128 isogi_vol__sums_avx512(__m512 a, __m512 b, __m512 c, __m512 d) {
-    const __m512 s = _mm512_add_ps(_mm512_unpacklo_ps(a, b), _mm512_unpackhi_ps(a, b)), t = _mm512_add_ps(_mm512_unpacklo_ps(c, d), _mm512_unpackhi_ps(c, d));
-    const __m512 all = _mm512_add_ps(_mm512_shuffle_ps(s, t, 0x44), _mm512_shuffle_ps(s, t, 0xee));
-    const __m256 half = _mm256_add_ps(_mm512_castps512_ps256(all), _mm512_extractf32x8_ps(all, 1));
-    return _mm_add_ps(_mm256_castps256_ps128(half), _mm256_extractf128_ps(half, 1));
+#define ISOGI_VOL__MADD_avx512 _mm512_fmadd_ps
+#define ISOGI_VOL__SPREAD_avx512(p) \
+    _mm512_permutexvar_ps(_mm512_setr_epi32(0, 0, 0, 0, 1, 1, 1, 1, 2, 2, 2, 2, 3, 3, 3, 3), _mm512_castps128_ps512(_mm_loadu_ps(p)))
+#define ISOGI_VOL__TILE_avx512(p) _mm512_broadcast_f32x4(_mm_loadu_ps(p))
+#define ISOGI_VOL__LANE_avx512(v, i) _mm512_permute_ps(v, 0x55 * (i))
+#define ISOGI_VOL__TURN_avx512(v) _mm512_permute_ps(v, 0x39)
+#define ISOGI_VOL__SUMS_avx512(a, b, c, d) ISOGI_VOL__WHOLES(_mm512_, ISOGI_VOL__HALVES(_mm512_, a, b), ISOGI_VOL__HALVES(_mm512_, c, d))
+ISOGI_VOL__AVX512 ISOGI_VOL__INLINE __m128i isogi_vol__sixteen_bytes(const char *p, const ptrdiff_t q[4]) {
+    int32_t x[4];
+    memcpy(x, p + q[0], 4), memcpy(x + 1, p + q[1], 4), memcpy(x + 2, p + q[2], 4), memcpy(x + 3, p + q[3], 4);
+    return _mm_setr_epi32(x[0], x[1], x[2], x[3]);
 }
-#define ISOGI_VOL__FOUR_FLOATS(p) _mm_loadu_ps((const float *)(const void *)(p))
-ISOGI_VOL__TRILINEAR(avx512, ISOGI_VOL__AVX512, __m512, _mm512_, 16, ISOGI_VOL__INTEGERS_avx512)
-/* The same for whole slices of 16 taps, straight from memory. */
-ISOGI_VOL__AVX512 ISOGI_VOL__INLINE __m128i isogi_vol__four_rows(const char *p, ptrdiff_t dy, ptrdiff_t dy3) {
-    int32_t row[4];
-    memcpy(row, p, 4), memcpy(row + 1, p + dy, 4), memcpy(row + 2, p + 2 * dy, 4), memcpy(row + 3, p + dy3, 4);
-    return _mm_setr_epi32(row[0], row[1], row[2], row[3]);
-}
-#define ISOGI_VOL__LONG_ROWS(p)                                                                                                  \
-    _mm256_set_m128i(_mm_unpacklo_epi64(ISOGI_VOL__EIGHT((p) + 2 * dy), ISOGI_VOL__EIGHT((p) + dy3)),                            \
-                     _mm_unpacklo_epi64(ISOGI_VOL__EIGHT(p), ISOGI_VOL__EIGHT((p) + dy)))
-#define ISOGI_VOL__SLICE_U8(p) _mm512_cvtepi32_ps(_mm512_cvtepu8_epi32(isogi_vol__four_rows(p, dy, dy3)))
-#define ISOGI_VOL__SLICE_I8(p) _mm512_cvtepi32_ps(_mm512_cvtepi8_epi32(isogi_vol__four_rows(p, dy, dy3)))
-#define ISOGI_VOL__SLICE_U16(p) _mm512_cvtepi32_ps(_mm512_cvtepu16_epi32(ISOGI_VOL__LONG_ROWS(p)))
-#define ISOGI_VOL__SLICE_I16(p) _mm512_cvtepi32_ps(_mm512_cvtepi16_epi32(ISOGI_VOL__LONG_ROWS(p)))
-#define ISOGI_VOL__SLICE_F32(p)                                                                                                  \
-    _mm512_insertf32x4(_mm512_insertf32x4(_mm512_insertf32x4(_mm512_castps128_ps512(ISOGI_VOL__FOUR_FLOATS(p)),                  \
-                                                             ISOGI_VOL__FOUR_FLOATS((p) + dy), 1),                               \
-                                          ISOGI_VOL__FOUR_FLOATS((p) + 2 * dy), 2), ISOGI_VOL__FOUR_FLOATS((p) + dy3), 3)
-#define ISOGI_VOL__SLICES(T)                                                                                                     \
-    s0 = ISOGI_VOL__SLICE_##T(p), s1 = ISOGI_VOL__SLICE_##T(p + dz), s2 = ISOGI_VOL__SLICE_##T(q), s3 = ISOGI_VOL__SLICE_##T(q + dz); \
-    break
+#define ISOGI_VOL__U8_avx512(p) _mm512_cvtepi32_ps(_mm512_cvtepu8_epi32(isogi_vol__sixteen_bytes(p, q)))
+#define ISOGI_VOL__I8_avx512(p) _mm512_cvtepi32_ps(_mm512_cvtepi8_epi32(isogi_vol__sixteen_bytes(p, q)))
+#define ISOGI_VOL__U16_avx512(p) _mm512_cvtepi32_ps(_mm512_cvtepu16_epi32(_mm256_set_m128i(ISOGI_VOL__LONG(p, 2), ISOGI_VOL__LONG(p, 0))))
+#define ISOGI_VOL__I16_avx512(p) _mm512_cvtepi32_ps(_mm512_cvtepi16_epi32(_mm256_set_m128i(ISOGI_VOL__LONG(p, 2), ISOGI_VOL__LONG(p, 0))))
+#define ISOGI_VOL__F32_avx512(p)                                                                                                 \
+    _mm512_insertf32x4(_mm512_insertf32x4(_mm512_insertf32x4(_mm512_castps128_ps512(ISOGI_VOL__FLOATS(p, 0)), ISOGI_VOL__FLOATS(p, 1), 1), \
+                                          ISOGI_VOL__FLOATS(p, 2), 2), ISOGI_VOL__FLOATS(p, 3), 3)
+ISOGI_VOL__TRILINEAR(avx512, ISOGI_VOL__AVX512, __m512, _mm512_)
+ISOGI_VOL__CUBIC(avx512, ISOGI_VOL__AVX512, __m512, _mm512_, 16)
 
-ISOGI_VOL__AVX512 static void isogi_vol__cubic_avx512(const isogi_volume *v, isogi_vol__block *b, const float powers[4][4], const uint8_t *number, int n) {
-    const __m512i each_four = _mm512_setr_epi32(0, 0, 0, 0, 1, 1, 1, 1, 2, 2, 2, 2, 3, 3, 3, 3);
-    const __m512 c0 = _mm512_broadcast_f32x4(_mm_loadu_ps(powers[0])), c1 = _mm512_broadcast_f32x4(_mm_loadu_ps(powers[1]));
-    const __m512 c2 = _mm512_broadcast_f32x4(_mm_loadu_ps(powers[2])), c3 = _mm512_broadcast_f32x4(_mm_loadu_ps(powers[3]));
-    const ptrdiff_t dy = v->stride[1], dy3 = 3 * dy, dz = v->stride[2];
-    const isogi_type type = v->type;
-    float weight[ISOGI_VOL__FETCHED][16], slant[ISOGI_VOL__FETCHED][16];
-    int m;
-    for (m = 0; m < n; m++) { /* weights of all axes, four lanes each */
-        const int i = number[m];
-        const __m512 u = _mm512_mask_broadcastss_ps(_mm512_mask_broadcastss_ps(_mm512_set1_ps(b->local[2][i]), 0x00f0, _mm_load_ss(&b->local[1][i])),
-                                                    0x000f, _mm_load_ss(&b->local[0][i]));
-        const __m512 half = _mm512_fmadd_ps(c3, u, c2);
-        _mm512_storeu_ps(weight[m], _mm512_fmadd_ps(_mm512_fmadd_ps(half, u, c1), u, c0));
-        _mm512_storeu_ps(slant[m], _mm512_fmadd_ps(_mm512_fmadd_ps(c3, u, _mm512_add_ps(half, half)), u, c1));
-    }
-    for (m = 0; m < n; m++) {
-        const float *w = weight[m], *d = slant[m];
-        const char *p = isogi_vol__first_tap(v, b, number[m]), *q = p + 2 * dz;
-        const __m512 wx = _mm512_broadcast_f32x4(_mm_loadu_ps(w)), dx = _mm512_broadcast_f32x4(_mm_loadu_ps(d));
-        const __m512 wy = _mm512_permutexvar_ps(each_four, _mm512_castps128_ps512(_mm_loadu_ps(w + 4)));
-        const __m512 slope_y = _mm512_permutexvar_ps(each_four, _mm512_castps128_ps512(_mm_loadu_ps(d + 4))), wxy = _mm512_mul_ps(wx, wy);
-        __m512 s0, s1, s2, s3, base, slab, slope;
-        s0 = s1 = s2 = s3 = c0;
-        switch (type) {
-        case ISOGI_U8: ISOGI_VOL__SLICES(U8);
-        case ISOGI_I8: ISOGI_VOL__SLICES(I8);
-        case ISOGI_U16: ISOGI_VOL__SLICES(U16);
-        case ISOGI_I16: ISOGI_VOL__SLICES(I16);
-        case ISOGI_F32: ISOGI_VOL__SLICES(F32);
-        case ISOGI_F64: break;
+/* Corners by gathers, which are quick where AVX-512 is: neighbours along x come as one number. Of bytes, two more come with them; where these would
+   lie behind the volume, what comes begins earlier and is shifted. */
+ISOGI_VOL__AVX512 static void isogi_vol__trilinear_block_avx512(const isogi_volume *v, isogi_vol__block *b, int n, int gradients) {
+    const int width = (int)isogi_vol__type_size(v->type), is_signed = v->type == ISOGI_I8 || v->type == ISOGI_I16;
+    const ptrdiff_t dy = v->size[1] > 1 ? v->stride[1] : 0, dz = v->size[2] > 1 ? v->stride[2] : 0;
+    const __m128i unused = _mm_cvtsi32_si128(32 - 8 * width);
+    const __m512i even = _mm512_setr_epi32(0, 2, 4, 6, 8, 10, 12, 14, 16, 18, 20, 22, 24, 26, 28, 30), odd = _mm512_or_si512(even, _mm512_set1_epi32(1));
+    ptrdiff_t last = -4;
+    int i, r;
+    for (r = 0; r < 3; r++) last += v->stride[r] > 0 ? v->stride[r] * (ptrdiff_t)(v->size[r] - 1) : 0;
+    last += 1 - (dy > 0 ? dy : 0) - (dz > 0 ? dz : 0); /* where four bytes of the first row may begin, so that those of the fourth exist */
+    for (i = 0; i < n; i += 16) {
+        __m512i at0 = _mm512_loadu_si512((const void *)&b->offset[i]), at1 = _mm512_loadu_si512((const void *)&b->offset[i + 8]);
+        __m512 c[8];
+        if (width == 4)
+            for (r = 0; r < 4; r++) {
+                const char *row = (const char *)v->data + (r & 1 ? dy : 0) + (r & 2 ? dz : 0);
+                const __m512i pair0 = _mm512_i64gather_epi64(at0, (const void *)row, 1), pair1 = _mm512_i64gather_epi64(at1, (const void *)row, 1);
+                c[2 * r] = _mm512_castsi512_ps(_mm512_permutex2var_epi32(pair0, even, pair1));
+                c[2 * r + 1] = _mm512_castsi512_ps(_mm512_permutex2var_epi32(pair0, odd, pair1));
+            }
+        else {
+            __m512i shift = _mm512_setzero_si512();
+            if (width == 1) {
+                const __m512i end = _mm512_set1_epi64(last), move0 = _mm512_max_epi64(_mm512_sub_epi64(at0, end), shift);
+                const __m512i move1 = _mm512_max_epi64(_mm512_sub_epi64(at1, end), shift);
+                at0 = _mm512_sub_epi64(at0, move0), at1 = _mm512_sub_epi64(at1, move1);
+                shift = _mm512_slli_epi32(_mm512_permutex2var_epi32(move0, even, move1), 3);
+            }
+            for (r = 0; r < 4; r++) {
+                const char *row = (const char *)v->data + (r & 1 ? dy : 0) + (r & 2 ? dz : 0);
+                const __m512i all = _mm512_srlv_epi32(_mm512_inserti64x4(_mm512_castsi256_si512(_mm512_i64gather_epi32(at0, (const void *)row, 1)),
+                                                                         _mm512_i64gather_epi32(at1, (const void *)row, 1), 1), shift);
+                const __m512i first = _mm512_sll_epi32(all, unused), second = _mm512_sll_epi32(width == 1 ? _mm512_srli_epi32(all, 8) : _mm512_srli_epi32(all, 16), unused);
+                c[2 * r] = _mm512_cvtepi32_ps(is_signed ? _mm512_sra_epi32(first, unused) : _mm512_srl_epi32(first, unused));
+                c[2 * r + 1] = _mm512_cvtepi32_ps(is_signed ? _mm512_sra_epi32(second, unused) : _mm512_srl_epi32(second, unused));
+            }
         }
-        base = _mm512_permutexvar_ps(_mm512_set1_epi32(5), s1);
-        s0 = _mm512_sub_ps(s0, base), s1 = _mm512_sub_ps(s1, base), s2 = _mm512_sub_ps(s2, base), s3 = _mm512_sub_ps(s3, base);
-        slab = _mm512_mul_ps(_mm512_set1_ps(w[8]), s0), slope = _mm512_mul_ps(_mm512_set1_ps(d[8]), s0);
-        slab = _mm512_fmadd_ps(_mm512_set1_ps(w[9]), s1, slab), slope = _mm512_fmadd_ps(_mm512_set1_ps(d[9]), s1, slope);
-        slab = _mm512_fmadd_ps(_mm512_set1_ps(w[10]), s2, slab), slope = _mm512_fmadd_ps(_mm512_set1_ps(d[10]), s2, slope);
-        slab = _mm512_fmadd_ps(_mm512_set1_ps(w[11]), s3, slab), slope = _mm512_fmadd_ps(_mm512_set1_ps(d[11]), s3, slope);
-        _mm_storeu_ps(b->sum[number[m]], _mm_add_ss(isogi_vol__sums_avx512(_mm512_mul_ps(slab, wxy), _mm512_mul_ps(slab, _mm512_mul_ps(dx, wy)),
-                                                                           _mm512_mul_ps(slab, _mm512_mul_ps(wx, slope_y)), _mm512_mul_ps(slope, wxy)),
-                                                    _mm512_castps512_ps128(base)));
+        isogi_vol__trilinear_avx512(b, i, c, gradients);
     }
 }
 #endif
@@ -2210,41 +2237,35 @@ ISOGI_VOL__AVX512 static void isogi_vol__cubic_avx512(const isogi_volume *v, iso
 #define isogi_vol__neon_loadu_ps vld1q_f32
 #define isogi_vol__neon_storeu_ps vst1q_f32
 #define ISOGI_VOL__MADD_base(a, b, c) vfmaq_f32(c, a, b)
-#define ISOGI_VOL__TILE_base(w) vld1q_f32(w)
-#define ISOGI_VOL__SPREAD_base(w, j) vdupq_n_f32((w)[j])
 #define ISOGI_VOL__INTEGERS_base(p) vcvtq_f32_s32(vld1q_s32(p))
-ISOGI_VOL__INLINE float32x4_t isogi_vol__sums_base(float32x4_t a, float32x4_t b, float32x4_t c, float32x4_t d) {
-    return vpaddq_f32(vpaddq_f32(a, b), vpaddq_f32(c, d));
-}
-ISOGI_VOL__INLINE uint8x8_t isogi_vol__four_bytes(const uint8_t *p) {
+#define ISOGI_VOL__SPREAD_base(p) vdupq_n_f32(*(p))
+#define ISOGI_VOL__TILE_base(p) vld1q_f32(p)
+#define ISOGI_VOL__LANE_base(v, i) vdupq_laneq_f32(v, i)
+#define ISOGI_VOL__TURN_base(v) vextq_f32(v, v, 1)
+#define ISOGI_VOL__SUMS_base(a, b, c, d) vpaddq_f32(vpaddq_f32(a, b), vpaddq_f32(c, d))
+ISOGI_VOL__INLINE uint8x8_t isogi_vol__four_bytes(const char *p) {
     uint32_t x;
     memcpy(&x, p, 4);
     return vcreate_u8(x);
 }
-ISOGI_VOL__INLINE uint16x4_t isogi_vol__four_shorts(const uint8_t *p) {
+ISOGI_VOL__INLINE uint16x4_t isogi_vol__four_shorts(const char *p) {
     uint64_t x;
     memcpy(&x, p, 8);
     return vcreate_u16(x);
 }
-#define ISOGI_VOL__U8_base(p) vcvtq_f32_u32(vmovl_u16(vget_low_u16(vmovl_u8(isogi_vol__four_bytes(p)))))
-#define ISOGI_VOL__I8_base(p) vcvtq_f32_s32(vmovl_s16(vget_low_s16(vmovl_s8(vreinterpret_s8_u8(isogi_vol__four_bytes(p))))))
-#define ISOGI_VOL__U16_base(p) vcvtq_f32_u32(vmovl_u16(isogi_vol__four_shorts(p)))
-#define ISOGI_VOL__I16_base(p) vcvtq_f32_s32(vmovl_s16(vreinterpret_s16_u16(isogi_vol__four_shorts(p))))
-ISOGI_VOL__TRILINEAR(base, , float32x4_t, isogi_vol__neon_, 4, ISOGI_VOL__INTEGERS_base)
-ISOGI_VOL__CUBIC(base, , float32x4_t, isogi_vol__neon_, float32x4_t, isogi_vol__neon_, 4, ISOGI_VOL__MADD_base)
-ISOGI_VOL__WIDEN(base, , isogi_vol__neon_, 4)
+#define ISOGI_VOL__U8_base(p) vcvtq_f32_u32(vmovl_u16(vget_low_u16(vmovl_u8(isogi_vol__four_bytes((p) + q[0])))))
+#define ISOGI_VOL__I8_base(p) vcvtq_f32_s32(vmovl_s16(vget_low_s16(vmovl_s8(vreinterpret_s8_u8(isogi_vol__four_bytes((p) + q[0]))))))
+#define ISOGI_VOL__U16_base(p) vcvtq_f32_u32(vmovl_u16(isogi_vol__four_shorts((p) + q[0])))
+#define ISOGI_VOL__I16_base(p) vcvtq_f32_s32(vmovl_s16(vreinterpret_s16_u16(isogi_vol__four_shorts((p) + q[0]))))
+#define ISOGI_VOL__F32_base(p) vld1q_f32((const float *)(const void *)((p) + q[0]))
+ISOGI_VOL__TRILINEAR(base, , float32x4_t, isogi_vol__neon_)
+ISOGI_VOL__TRILINEAR_BLOCK(base, , float32x4_t, isogi_vol__neon_, 4)
+ISOGI_VOL__CUBIC(base, , float32x4_t, isogi_vol__neon_, 4)
 #endif
 
 #if defined(ISOGI_VOL__AVX) && !defined(__clang__)
 #pragma GCC diagnostic pop
 #endif
-
-/* Whether blocks serve this volume; the plain code does where not. */
-static int isogi_vol__blockwise(const isogi_pyramid *p, isogi_filter filter) {
-    const isogi_volume *v = &p->volume;
-    if (p->path == ISOGI_VOL__PATH_PLAIN || v->type == ISOGI_F64) return 0;
-    return filter == ISOGI_FILTER_LINEAR || v->stride[0] == (ptrdiff_t)isogi_vol__type_size(v->type);
-}
 
 /* Cells [low, high) of every axis have all 64 voxels of a cubic filter around them. */
 static void isogi_vol__inner_cells(const isogi_pyramid *p, int32_t low[3], int32_t high[3]) {
@@ -2252,111 +2273,70 @@ static void isogi_vol__inner_cells(const isogi_pyramid *p, int32_t low[3], int32
     for (a = 0; a < 3; a++) low[a] = p->volume.halo_low[a] ? 0 : 1, high[a] = p->cells[a] - (p->volume.halo_high[a] ? 0 : 1);
 }
 
-ISOGI_VOL__INLINE int isogi_vol__all_taps(const int32_t low[3], const int32_t high[3], const isogi_vol__block *b, int i) {
-    const int32_t x = b->cell[0][i], y = b->cell[1][i], z = b->cell[2][i];
-    return (x >= low[0]) & (y >= low[1]) & (z >= low[2]) & (x < high[0]) & (y < high[1]) & (z < high[2]);
+/* Whether blocks serve this volume; the plain code does where not. */
+static int isogi_vol__blockwise(const isogi_pyramid *p, isogi_filter filter) {
+    const isogi_volume *v = &p->volume;
+    int32_t low[3], high[3];
+    if (p->path == ISOGI_VOL__PATH_PLAIN || v->type == ISOGI_F64 || p->field.value) return 0;
+    isogi_vol__inner_cells(p, low, high);
+    return filter == ISOGI_FILTER_LINEAR ||
+           (v->stride[0] == (ptrdiff_t)isogi_vol__type_size(v->type) && low[0] < high[0] && low[1] < high[1] && low[2] < high[2]);
 }
 
-/* Taps of some points, to wait for all of them at once. */
-static void isogi_vol__fetch_taps(const isogi_volume *v, const isogi_vol__block *b, const uint8_t *number, int n, uint8_t *raw) {
-    const ptrdiff_t dy = v->stride[1], dz = v->stride[2];
-    int i, k;
-#define ISOGI_VOL__ROWS(BYTES)                                                                                                   \
-    for (i = 0; i < n; i++) {                                                                                                    \
-        const char *p = isogi_vol__first_tap(v, b, number[i]);                                                                   \
-        for (k = 0; k < 4; k++, p += dz, raw += 4 * (BYTES)) {                                                                   \
-            memcpy(raw, p, BYTES), memcpy(raw + (BYTES), p + dy, BYTES);                                                         \
-            memcpy(raw + 2 * (BYTES), p + 2 * dy, BYTES), memcpy(raw + 3 * (BYTES), p + 3 * dy, BYTES);                          \
-        }                                                                                                                        \
-    }
-    if (v->type == ISOGI_F32) {
-        ISOGI_VOL__ROWS(16)
-    } else if (v->type == ISOGI_U16 || v->type == ISOGI_I16) {
-        ISOGI_VOL__ROWS(8)
-    } else {
-        ISOGI_VOL__ROWS(4)
-    }
-#undef ISOGI_VOL__ROWS
-}
-
-#if defined(__GNUC__) && !defined(__TINYC__)
-#define ISOGI_VOL__PREFETCH(p) __builtin_prefetch(p)
-#else
-#define ISOGI_VOL__PREFETCH(p) ((void)(p))
-#endif
-
-/* Asks for the taps of points that do not lie beside their predecessors. */
-static void isogi_vol__prefetch_taps(const isogi_volume *v, const isogi_vol__block *b, const uint8_t *number, int n) {
-    int i, j, k, a;
-    for (i = 0; i < n; i++) {
-        const char *p = isogi_vol__first_tap(v, b, number[i]);
-        int nearby = 1;
-        for (a = 0; a < 3; a++) nearby &= (uint32_t)(b->cell[a][number[i]] - b->cell[a][number[i] - (number[i] > 0)] + 1) <= 2;
-        for (k = 0; k < 4 && !nearby; k++, p += v->stride[2])
-            for (j = 0; j < 4; j++) ISOGI_VOL__PREFETCH(p + j * v->stride[1]);
-    }
-}
-
-/* Raw values and gradients of those points of a block all of whose taps exist; their number. */
-static int isogi_vol__cubic_block(const isogi_pyramid *p, isogi_filter filter, isogi_vol__block *b, int n) {
+/* Raw values and gradients of those points of a block all of whose taps exist, whose number it returns; outer[i]: the others. */
+static int isogi_vol__cubic_block(const isogi_pyramid *p, isogi_filter filter, isogi_vol__block *b, int n, uint8_t outer[ISOGI_VOL__BLOCK]) {
     const isogi_volume *v = &p->volume;
     const double(*c)[4] = isogi_vol__taps[filter == ISOGI_FILTER_CATMULL_ROM];
-    uint8_t number[ISOGI_VOL__BLOCK], raw[ISOGI_VOL__FETCHED * 64 * 2];
-    float taps[ISOGI_VOL__FETCHED * 64], powers[4][4];
+    float powers[5][4] = {{0}};
     int32_t low[3], high[3];
-    int count = 0, i;
+    int i, inner = 0;
     isogi_vol__inner_cells(p, low, high);
     for (i = 0; i < 16; i++) powers[i / 4][i % 4] = (float)c[i / 4][i % 4];
-    for (i = 0; i < n; i++)
-        if (isogi_vol__all_taps(low, high, b, i)) number[count++] = (uint8_t)i;
-    for (i = 0; i < count; i += ISOGI_VOL__FETCHED) {
-        const int some = count - i < ISOGI_VOL__FETCHED ? count - i : ISOGI_VOL__FETCHED, left = count - i - some;
-        isogi_vol__prefetch_taps(v, b, number + i + some, left < ISOGI_VOL__FETCHED ? left : ISOGI_VOL__FETCHED);
-#ifdef ISOGI_VOL__AVX
-        if (p->path >= ISOGI_VOL__PATH_AVX512) {
-            isogi_vol__cubic_avx512(v, b, (const float(*)[4])powers, number + i, some);
-            continue;
-        }
-#endif
-        isogi_vol__fetch_taps(v, b, number + i, some, v->type == ISOGI_F32 ? (uint8_t *)(void *)taps : raw);
-#ifdef ISOGI_VOL__AVX
-        if (p->path == ISOGI_VOL__PATH_AVX2) {
-            isogi_vol__widen_avx2(v->type, raw, taps, 64 * some), isogi_vol__cubic_avx2(b, (const float(*)[4])powers, taps, number + i, some);
-            continue;
-        }
-#endif
-        isogi_vol__widen_base(v->type, raw, taps, 64 * some), isogi_vol__cubic_base(b, (const float(*)[4])powers, taps, number + i, some);
+    powers[4][0] = 1;
+    for (i = 0; i < n; i++) {
+        const int32_t x = b->cell[0][i], y = b->cell[1][i], z = b->cell[2][i];
+        outer[i] = (x < low[0]) | (y < low[1]) | (z < low[2]) | (x >= high[0]) | (y >= high[1]) | (z >= high[2]);
+        if (outer[i]) b->offset[i] = low[0] * v->stride[0] + low[1] * v->stride[1] + low[2] * v->stride[2]; /* whatever comes of it is not used */
+        inner += !outer[i];
     }
-    return count;
+    for (; i % 4; i++) b->offset[i] = b->offset[i - 1];
+#ifdef ISOGI_VOL__AVX
+    if (p->path >= ISOGI_VOL__PATH_AVX512) {
+        isogi_vol__cubic_avx512(v, b, (const float(*)[4])powers, n, b->sum);
+        return inner;
+    }
+    if (p->path == ISOGI_VOL__PATH_AVX2) {
+        isogi_vol__cubic_avx2(v, b, (const float(*)[4])powers, n, b->sum);
+        return inner;
+    }
+#endif
+    isogi_vol__cubic_base(v, b, (const float(*)[4])powers, n, b->sum);
+    return inner;
 }
 
 static void isogi_vol__trilinear_block(const isogi_pyramid *p, isogi_vol__block *b, int n, int gradients) {
-    const int integers = p->volume.type != ISOGI_F32;
+    const isogi_volume *v = &p->volume;
     n = (n + 15) & ~15;
 #ifdef ISOGI_VOL__AVX
-    if (p->path < ISOGI_VOL__PATH_AVX512 || !isogi_vol__gather_avx512(&p->volume, n, b))
-#endif
-        isogi_vol__fetch(&p->volume, n, b);
-#ifdef ISOGI_VOL__AVX
-    if (p->path >= ISOGI_VOL__PATH_AVX512) {
-        isogi_vol__trilinear_avx512(b, n, integers, gradients);
+    if (p->path >= ISOGI_VOL__PATH_AVX512 && v->size[0] >= 4 && v->stride[0] == (ptrdiff_t)isogi_vol__type_size(v->type)) {
+        isogi_vol__trilinear_block_avx512(v, b, n, gradients);
         return;
     }
-    if (p->path == ISOGI_VOL__PATH_AVX2) {
-        isogi_vol__trilinear_avx2(b, n, integers, gradients);
+    if (p->path >= ISOGI_VOL__PATH_AVX2) {
+        isogi_vol__trilinear_block_avx2(v, b, n, gradients);
         return;
     }
 #endif
-    isogi_vol__trilinear_base(b, n, integers, gradients);
+    isogi_vol__trilinear_block_base(v, b, n, gradients);
 }
 
 static void isogi_vol__locate_block(const isogi_pyramid *p, const isogi_vol__points *at, size_t first, int n, isogi_vol__block *b) {
 #ifdef ISOGI_VOL__AVX
-    if (p->path >= ISOGI_VOL__PATH_AVX512) {
-        isogi_vol__locate_avx512(p, at, first, n, b);
+    if (p->path >= ISOGI_VOL__PATH_AVX512 && at->world && p->float_grid.usable) {
+        isogi_vol__locate_avx512(p, at->world + first, n, b);
         return;
     }
-    if (p->path == ISOGI_VOL__PATH_AVX2) {
+    if (p->path >= ISOGI_VOL__PATH_AVX2) {
         isogi_vol__locate_avx2(p, at, first, n, b);
         return;
     }
@@ -2402,13 +2382,12 @@ static void isogi_vol__sample_block(const isogi_pyramid *p, isogi_filter filter,
                                     float (*gradients)[3]) {
     const double scale = p->volume.scale, bias = p->volume.bias;
     isogi_vol__block b;
+    uint8_t outer[ISOGI_VOL__BLOCK];
     double m[9];
-    int32_t low[3], high[3];
-    int i, complete = n;
-    isogi_vol__inner_cells(p, low, high);
+    int i, inner = n;
     isogi_vol__locate_block(p, at, first, n, &b);
     if (filter == ISOGI_FILTER_LINEAR) isogi_vol__trilinear_block(p, &b, n, gradients != NULL);
-    else complete = isogi_vol__cubic_block(p, filter, &b, n);
+    else inner = isogi_vol__cubic_block(p, filter, &b, n, outer);
     for (i = 0; i < 9; i++) m[i] = scale * p->to_grid[i];
     if (filter == ISOGI_FILTER_LINEAR) {
         if (values && scale >= 1 && scale <= 1 && bias >= 0 && bias <= 0) memcpy(values, b.value, (size_t)n * sizeof *values);
@@ -2417,14 +2396,14 @@ static void isogi_vol__sample_block(const isogi_pyramid *p, isogi_filter filter,
         return;
     }
     for (i = 0; i < n; i++) {
+        if (values) values[i] = (float)(scale * (double)b.sum[4 * i] + bias);
+        if (gradients) isogi_vol__gradient_out(m, b.sum[4 * i + 1], b.sum[4 * i + 2], b.sum[4 * i + 3], gradients[i]);
+    }
+    for (i = 0; i < n && inner < n; i++) {
         double grid[3];
-        if (complete < n && !isogi_vol__all_taps(low, high, &b, i)) {
-            isogi_vol__grid_point(p, at, first + (size_t)i, grid);
-            isogi_vol__sample_one(p, filter, grid, values ? values + i : NULL, gradients ? gradients[i] : NULL);
-            continue;
-        }
-        if (values) values[i] = (float)(scale * (double)b.sum[i][0] + bias);
-        if (gradients) isogi_vol__gradient_out(m, b.sum[i][1], b.sum[i][2], b.sum[i][3], gradients[i]);
+        if (!outer[i]) continue;
+        isogi_vol__grid_point(p, at, first + (size_t)i, grid);
+        isogi_vol__sample_one(p, filter, grid, values ? values + i : NULL, gradients ? gradients[i] : NULL);
     }
 }
 #endif
@@ -2433,7 +2412,7 @@ static void isogi_vol__sample_some(const isogi_pyramid *p, isogi_filter filter, 
                                    float (*gradients)[3]) {
     int i;
 #if defined(ISOGI_VOL__SSE2) || defined(ISOGI_VOL__NEON)
-    if (!p->field.value && isogi_vol__blockwise(p, filter)) {
+    if (isogi_vol__blockwise(p, filter)) {
         isogi_vol__sample_block(p, filter, at, first, n, values, gradients);
         return;
     }
@@ -2938,7 +2917,6 @@ ISOGI_VOL__INLINE uint64_t isogi_vol__pack_cells(uint64_t low, uint64_t high) {
     uint64_t a = ((low & 0x1ffffff) | low >> 25 << 32) & slices, b = ((low >> 50 | (high << 14 & 0x1ffffff)) | high >> 11 << 32) & slices;
 #define ISOGI_VOL__ROWS(v) (((v) & 0x0000000f0000000fu) | ((v) >> 1 & 0x000000f0000000f0u) | ((v) >> 2 & 0x00000f0000000f00u) | ((v) >> 3 & 0x0000f0000000f000u))
     a = ISOGI_VOL__ROWS(a), b = ISOGI_VOL__ROWS(b);
-#undef ISOGI_VOL__ROWS
     return (a & 0xffff) | a >> 16 | (b & 0xffff) << 32 | b >> 32 << 48;
 }
 
@@ -5876,12 +5854,39 @@ ISOGI_API void isogi_vol_mesh_free(const isogi_pyramid *pyramid, isogi_mesh *mes
 #undef ISOGI_VOL__SUB
 #undef ISOGI_VOL__GROUP
 #undef ISOGI_VOL__BLOCK
-#undef ISOGI_VOL__FETCHED
 #undef ISOGI_VOL__PIVOTS
+#undef ISOGI_VOL__ALONG_Y
+#undef ISOGI_VOL__F32_avx2
+#undef ISOGI_VOL__F32_avx512
+#undef ISOGI_VOL__F32_base
+#undef ISOGI_VOL__FLOATS
+#undef ISOGI_VOL__FOUR_ROWS
+#undef ISOGI_VOL__HALVES
+#undef ISOGI_VOL__I16_avx512
+#undef ISOGI_VOL__I8_avx512
+#undef ISOGI_VOL__LANE_avx2
+#undef ISOGI_VOL__LANE_avx512
+#undef ISOGI_VOL__LANE_base
+#undef ISOGI_VOL__LONG
+#undef ISOGI_VOL__MADD_avx2
+#undef ISOGI_VOL__MADD_avx512
+#undef ISOGI_VOL__SHORT
+#undef ISOGI_VOL__SPREAD_avx512
+#undef ISOGI_VOL__SUMS_avx2
+#undef ISOGI_VOL__SUMS_avx512
+#undef ISOGI_VOL__SUMS_base
+#undef ISOGI_VOL__TILE_avx512
+#undef ISOGI_VOL__TRILINEAR_BLOCK
+#undef ISOGI_VOL__TURN_avx2
+#undef ISOGI_VOL__TURN_avx512
+#undef ISOGI_VOL__TURN_base
+#undef ISOGI_VOL__U16_avx512
+#undef ISOGI_VOL__U8_avx512
+#undef ISOGI_VOL__WEIGHTS
+#undef ISOGI_VOL__WHOLES
 #undef ISOGI_VOL__BLEND
 #undef ISOGI_VOL__TRILINEAR
 #undef ISOGI_VOL__CUBIC
-#undef ISOGI_VOL__WIDEN
 #undef ISOGI_VOL__MADD_base
 #undef ISOGI_VOL__TILE_base
 #undef ISOGI_VOL__SPREAD_base
@@ -5897,34 +5902,10 @@ ISOGI_API void isogi_vol_mesh_free(const isogi_pyramid *pyramid, isogi_mesh *mes
 #undef ISOGI_VOL__SPREAD_avx2
 #undef ISOGI_VOL__INTEGERS_avx2
 #undef ISOGI_VOL__EIGHT
-#undef ISOGI_VOL__SIXTEEN
-#undef ISOGI_VOL__FOUR_FLOATS
-#undef ISOGI_VOL__LONG_ROWS
-#undef ISOGI_VOL__SLICE_U8
-#undef ISOGI_VOL__SLICE_I8
-#undef ISOGI_VOL__SLICE_U16
-#undef ISOGI_VOL__SLICE_I16
-#undef ISOGI_VOL__SLICE_F32
-#undef ISOGI_VOL__SLICES
 #undef ISOGI_VOL__U8_avx2
 #undef ISOGI_VOL__I8_avx2
 #undef ISOGI_VOL__U16_avx2
 #undef ISOGI_VOL__I16_avx2
-#undef ISOGI_VOL__INTEGERS_avx512
-#undef ISOGI_VOL__PREFETCH
-#undef ISOGI_VOL__LOCATE
-#undef ISOGI_VOL__LOCATE_AXIS
-#undef ISOGI_VOL__X_avx2
-#undef ISOGI_VOL__Y_avx2
-#undef ISOGI_VOL__Z_avx2
-#undef ISOGI_VOL__MAGIC
-#undef ISOGI_VOL__OFFSETS_avx2
-#undef ISOGI_VOL__PART
-#undef ISOGI_VOL__X_avx512
-#undef ISOGI_VOL__Y_avx512
-#undef ISOGI_VOL__Z_avx512
-#undef ISOGI_VOL__OFFSETS_avx512
-#undef ISOGI_VOL__ROWS
 #undef ISOGI_VOL__NEON
 #undef ISOGI_VOL__LEVELS
 #undef ISOGI_VOL__NODE_LEVELS
