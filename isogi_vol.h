@@ -2283,35 +2283,38 @@ static int isogi_vol__blockwise(const isogi_pyramid *p, isogi_filter filter) {
            (v->stride[0] == (ptrdiff_t)isogi_vol__type_size(v->type) && low[0] < high[0] && low[1] < high[1] && low[2] < high[2]);
 }
 
-/* Raw values and gradients of those points of a block all of whose taps exist, whose number it returns; outer[i]: the others. */
+/* Raw values and gradients of those points of a block all of whose taps exist. Returns how many others there are; if any, outer[i] marks them. */
 static int isogi_vol__cubic_block(const isogi_pyramid *p, isogi_filter filter, isogi_vol__block *b, int n, uint8_t outer[ISOGI_VOL__BLOCK]) {
     const isogi_volume *v = &p->volume;
     const double(*c)[4] = isogi_vol__taps[filter == ISOGI_FILTER_CATMULL_ROM];
     float powers[5][4] = {{0}};
-    int32_t low[3], high[3];
-    int i, inner = 0;
+    int32_t low[3], high[3], beyond = 0;
+    int i, a, count = 0;
     isogi_vol__inner_cells(p, low, high);
     for (i = 0; i < 16; i++) powers[i / 4][i % 4] = (float)c[i / 4][i % 4];
     powers[4][0] = 1;
-    for (i = 0; i < n; i++) {
-        const int32_t x = b->cell[0][i], y = b->cell[1][i], z = b->cell[2][i];
-        outer[i] = (x < low[0]) | (y < low[1]) | (z < low[2]) | (x >= high[0]) | (y >= high[1]) | (z >= high[2]);
+    for (i = 0; i < n; i += 16) /* in most blocks there are none: no difference is negative */
+        for (a = 0; a < 16; a++)
+            beyond |= (b->cell[0][i + a] - low[0]) | (b->cell[1][i + a] - low[1]) | (b->cell[2][i + a] - low[2]) | (high[0] - 1 - b->cell[0][i + a]) |
+                      (high[1] - 1 - b->cell[1][i + a]) | (high[2] - 1 - b->cell[2][i + a]);
+    for (i = 0; i < n && beyond < 0; i++) {
+        for (a = 0, outer[i] = 0; a < 3; a++) outer[i] |= b->cell[a][i] < low[a] || b->cell[a][i] >= high[a];
         if (outer[i]) b->offset[i] = low[0] * v->stride[0] + low[1] * v->stride[1] + low[2] * v->stride[2]; /* whatever comes of it is not used */
-        inner += !outer[i];
+        count += outer[i];
     }
-    for (; i % 4; i++) b->offset[i] = b->offset[i - 1];
+    for (i = n; i % 4; i++) b->offset[i] = b->offset[i - 1];
 #ifdef ISOGI_VOL__AVX
     if (p->path >= ISOGI_VOL__PATH_AVX512) {
         isogi_vol__cubic_avx512(v, b, (const float(*)[4])powers, n, b->sum);
-        return inner;
+        return count;
     }
     if (p->path == ISOGI_VOL__PATH_AVX2) {
         isogi_vol__cubic_avx2(v, b, (const float(*)[4])powers, n, b->sum);
-        return inner;
+        return count;
     }
 #endif
     isogi_vol__cubic_base(v, b, (const float(*)[4])powers, n, b->sum);
-    return inner;
+    return count;
 }
 
 static void isogi_vol__trilinear_block(const isogi_pyramid *p, isogi_vol__block *b, int n, int gradients) {
@@ -2353,6 +2356,30 @@ ISOGI_VOL__INLINE void isogi_vol__gradient_out(const double m[9], float gx, floa
     out[2] = (float)(m[2] * x + m[5] * y + m[8] * z);
 }
 
+#ifdef ISOGI_VOL__AVX
+/* Values and gradients from sums of raw voxels: {value, x, y, z} of n points. */
+ISOGI_VOL__AVX2 static void isogi_vol__sums_out_avx2(const isogi_pyramid *p, const double m[9], const float *sum, int n, float *values, float (*gradients)[3]) {
+    const __m256d scale = _mm256_setr_pd(p->volume.scale, m[0], m[4], m[8]), bias = _mm256_setr_pd(p->volume.bias, 0, 0, 0);
+    const __m256d x = _mm256_setr_pd(0, m[0], m[1], m[2]), y = _mm256_setr_pd(0, m[3], m[4], m[5]), z = _mm256_setr_pd(0, m[6], m[7], m[8]);
+    const int straight = isogi_vol__all_zero(m + 1, 3) && isogi_vol__all_zero(m + 5, 3);
+    int i;
+    for (i = 0; i < n; i++) {
+        const __m256d raw = _mm256_cvtps_pd(_mm_loadu_ps(sum + 4 * i));
+        __m256d all = _mm256_fmadd_pd(raw, scale, bias);
+        __m128 out;
+        if (!straight)
+            all = _mm256_blend_pd(_mm256_fmadd_pd(_mm256_permute4x64_pd(raw, 0xff), z,
+                                                  _mm256_fmadd_pd(_mm256_permute4x64_pd(raw, 0xaa), y, _mm256_mul_pd(_mm256_permute4x64_pd(raw, 0x55), x))), all, 1);
+        out = _mm256_cvtpd_ps(all);
+        if (values) _mm_store_ss(values + i, out);
+        if (!gradients) continue;
+        out = _mm_shuffle_ps(out, out, 0xf9); /* {x, y, z, z}: the last one is overwritten by the next point */
+        if (i + 1 < n) _mm_storeu_ps(gradients[i], out);
+        else _mm_storel_pi((__m64 *)(void *)gradients[i], out), _mm_store_ss(&gradients[i][2], _mm_movehl_ps(out, out));
+    }
+}
+#endif
+
 /* The field's value at a place in grid coordinates, and its gradient per world unit. */
 static double isogi_vol__field_at(const isogi_pyramid *p, const double grid[3], double gradient[3]) {
     double world[3];
@@ -2384,10 +2411,10 @@ static void isogi_vol__sample_block(const isogi_pyramid *p, isogi_filter filter,
     isogi_vol__block b;
     uint8_t outer[ISOGI_VOL__BLOCK];
     double m[9];
-    int i, inner = n;
+    int i, outer_count = 0;
     isogi_vol__locate_block(p, at, first, n, &b);
     if (filter == ISOGI_FILTER_LINEAR) isogi_vol__trilinear_block(p, &b, n, gradients != NULL);
-    else inner = isogi_vol__cubic_block(p, filter, &b, n, outer);
+    else outer_count = isogi_vol__cubic_block(p, filter, &b, n, outer);
     for (i = 0; i < 9; i++) m[i] = scale * p->to_grid[i];
     if (filter == ISOGI_FILTER_LINEAR) {
         if (values && scale >= 1 && scale <= 1 && bias >= 0 && bias <= 0) memcpy(values, b.value, (size_t)n * sizeof *values);
@@ -2395,11 +2422,15 @@ static void isogi_vol__sample_block(const isogi_pyramid *p, isogi_filter filter,
         for (i = 0; i < n && gradients; i++) isogi_vol__gradient_out(m, b.gradient[0][i], b.gradient[1][i], b.gradient[2][i], gradients[i]);
         return;
     }
-    for (i = 0; i < n; i++) {
-        if (values) values[i] = (float)(scale * (double)b.sum[4 * i] + bias);
-        if (gradients) isogi_vol__gradient_out(m, b.sum[4 * i + 1], b.sum[4 * i + 2], b.sum[4 * i + 3], gradients[i]);
-    }
-    for (i = 0; i < n && inner < n; i++) {
+#ifdef ISOGI_VOL__AVX
+    if (p->path >= ISOGI_VOL__PATH_AVX2) isogi_vol__sums_out_avx2(p, m, b.sum, n, values, gradients);
+    else
+#endif
+        for (i = 0; i < n; i++) {
+            if (values) values[i] = (float)(scale * (double)b.sum[4 * i] + bias);
+            if (gradients) isogi_vol__gradient_out(m, b.sum[4 * i + 1], b.sum[4 * i + 2], b.sum[4 * i + 3], gradients[i]);
+        }
+    for (i = 0; i < n && outer_count; i++) {
         double grid[3];
         if (!outer[i]) continue;
         isogi_vol__grid_point(p, at, first + (size_t)i, grid);
