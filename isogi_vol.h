@@ -1968,7 +1968,7 @@ ISOGI_VOL__AVX512 static void isogi_vol__locate_avx512(const isogi_pyramid *p, c
         for (r = 0; r < 3; r++) {
             const __m512i from = _mm512_add_epi32(threes, _mm512_set1_epi32(r)), end = _mm512_set1_epi32(p->cells[r] - 1);
             const __m512 w = _mm512_mask_permutexvar_ps(_mm512_permutex2var_ps(k0, from, k1), (__mmask16)(r < 2 ? 0xf800 : 0xfc00), from, k2);
-            const __m512 high = _mm512_set1_ps(g->high[r]), guess = _mm512_fmadd_ps(high, w, _mm512_set1_ps(g->at_high[r] - 0x1p-9f));
+            const __m512 high = _mm512_set1_ps(g->high[r]), guess = _mm512_fmadd_ps(high, w, _mm512_set1_ps(g->at_high[r] - 1.0f / 512));
             const __m512 clamped = _mm512_min_ps(_mm512_max_ps(guess, zero), _mm512_set1_ps((float)(p->cells[r] - 1))); /* NaN gives 0 */
             __m512i cell = _mm512_cvttps_epi32(clamped);
             __m512 local = _mm512_fmadd_ps(high, w, _mm512_sub_ps(_mm512_set1_ps(g->at_high[r]), _mm512_cvtepi32_ps(cell)));
@@ -5886,6 +5886,7 @@ ISOGI_API void isogi_vol_mesh_free(const isogi_pyramid *pyramid, isogi_mesh *mes
 #undef ISOGI_VOL__GROUP
 #undef ISOGI_VOL__BLOCK
 #undef ISOGI_VOL__PIVOTS
+#undef ISOGI_VOL__ROWS
 #undef ISOGI_VOL__ALONG_Y
 #undef ISOGI_VOL__F32_avx2
 #undef ISOGI_VOL__F32_avx512
