@@ -273,7 +273,8 @@ ISOGI_API isogi_result isogi_trace_step(isogi_trace *trace, uint64_t max_rays, d
    FEEDBACK: the error is that of sampling; the bias of light from probes comes on top. */
 ISOGI_API isogi_result isogi_trace_sample(const isogi_trace *trace, const float (*points)[3], size_t count, float (*irradiance)[3],
                                           float *error);
-/* TRANSFER only: a new distant lighting (environment and directional lights; point lights are ISOGI_INVALID). No rays. */
+/* A new lighting. TRANSFER: a distant one (environment and directional lights; point lights are ISOGI_INVALID); no rays. IRRADIANCE keeps
+   nothing that could be lit anew: isogi_trace_change with this lighting, hence as many rays as all computed texels took at first. */
 ISOGI_API isogi_result isogi_trace_relight(isogi_trace *trace, const isogi_lighting *lighting);
 /* TRANSFER only, for display: glossy light that the surface sends along the unit vector views[i] (away from it, towards the eye),
    about the mirrored direction r, for a Phong lobe of that exponent (0 or more; the order holds lobes up to about order^2) and
@@ -285,6 +286,26 @@ ISOGI_API isogi_result isogi_trace_sample_gloss(const isogi_trace *trace, const 
                                                 const float (*views)[3], double exponent, size_t count, float (*radiance)[3]);
 /* TRANSFER only: interpolated coefficients, transfer[count][order*order][channels]; E = sum_i transfer_i light_i. */
 ISOGI_API isogi_result isogi_trace_sample_transfer(const isogi_trace *trace, const float (*points)[3], size_t count, float *transfer);
+/* ---- when something changes: only what depends on it is computed again ----
+   Texels that are to be computed again keep their light until isogi_trace_step has come to them, can be read meanwhile, and count as
+   drafts in isogi_trace_report. With PATHS the result is the same bits as a new bake; FEEDBACK begins with new probes, and takes samples
+   of lazy texels that were not finished anew. Both count as writers; on failure nothing has changed. */
+
+/* A new description for the same texture. Texels computed again:
+     lighting                        IRRADIANCE: all. TRANSFER: none, no rays
+     albedo, emission, their tables  those on whose isovalue the tables give another colour, since a texel's paths stay on one isosurface
+                                     (all, where an array's contents were changed in place); none for albedo with 0 bounces
+     isovalue_min, isovalue_max, lookup  none; texels that come in are computed, those that go out stay
+     material, material_user, samples, bounces, method's error, seed, offset, normals, reach, no_shadows, capped   all
+   All else must be as it was: ISOGI_INVALID. transfer_channels 0 keeps the number of channels. */
+ISOGI_API isogi_result isogi_trace_change(isogi_trace *trace, const isogi_trace_desc *desc);
+
+/* Voxels first..last (both ends included, cut to the volume) are going to change, or have changed. To be called twice: before they do, and
+   after isogi_vol_update. Computed again are texels at these voxels or within two of them, and those whose isosurface passes there, before
+   or after: no others can see the change. With desc.reach and n bounces, only those within n + 1 reaches. What a lazy texture was asked for at
+   places where there was no surface has to be requested again. */
+ISOGI_API isogi_result isogi_trace_touch(isogi_trace *trace, const size_t first[3], const size_t last[3]);
+
 /* Texels along each axis, order (0 for IRRADIANCE), channels (3 for IRRADIANCE). Any of them may be NULL. Of no trace: zeros. */
 ISOGI_API void isogi_trace_shape(const isogi_trace *trace, size_t lattice[3], int *order, int *channels);
 
@@ -328,9 +349,9 @@ ISOGI_API isogi_result isogi_trace_export_scales(const isogi_trace *trace, int f
 
 /* ---- save, load, merge ----
    A block of bytes holds the texels computed so far: the same bytes on every machine. Loading adds them to a texture that was created
-   from the same description: so a bake is resumed, to the same bits as if it had never stopped, and boxes baked apart (desc.box_first)
-   are merged by loading one after the other. Only desc.isovalue_min, isovalue_max, lazy, lookup and box may differ; else the answer is
-   ISOGI_INVALID (lighting, tables and the volume's ranges are compared by hash; a material function cannot be). Any bytes may be
+   from the same description: so a bake is resumed, to the same bits as if it had never stopped (FEEDBACK: full bakes, of which whole
+   groups of some 65536 texels are saved), and boxes baked apart (desc.box_first) are merged by loading one after the other. Only desc.isovalue_min, isovalue_max, lazy, lookup and box may differ; else the answer is
+   ISOGI_INVALID (lighting, tables and the ranges of the volume's blocks are compared by hash; a material function cannot be). Any bytes may be
    loaded: those that are damaged, cut off or of another version are ISOGI_CORRUPT and change nothing. ISOGI_NO_MEMORY: some of the
    texels are loaded. isogi_trace_load counts as a writer. */
 ISOGI_API size_t isogi_trace_save_size(const isogi_trace *trace);
@@ -1566,6 +1587,7 @@ struct isogi_trace {
     int refined;         /* the cells in which it is not enough are wanted */
     struct isogi_trace__feedback *feedback; /* NULL: paths are traced */
     double share[2];   /* of the progress that baking reports, from and to */
+    uint64_t lighting_hash, colours_hash; /* of what the light was gathered under: borrowed arrays may change in place */
 };
 
 /* ==== how light is held ============================================================================================== */
@@ -1735,6 +1757,16 @@ static void isogi_trace__record_read(const isogi_trace *t, const uint8_t *record
 
 /* ==== the texels of the lattice ====================================================================================== */
 
+static void isogi_trace__texel_grid(const isogi_trace *t, const size_t texel[3], double grid[3]) {
+    int a;
+    for (a = 0; a < 3; a++) {
+        double nearest;
+        grid[a] = texel[a] + 1 == t->lattice[a] && texel[a] ? t->last[a] : t->first[a] + (double)texel[a] * t->step[a];
+        nearest = floor(grid[a] + 0.5);
+        if (fabs(grid[a] - nearest) < 1e-9) grid[a] = nearest;
+    }
+}
+
 /* Where and on which isosurface a texel lies. Its light is that at its own place, so a surface must pass there: the value at the
    texel is inside of its own surface, hence one of the cells around it must reach lower. 0: it does not, or it has no normal. */
 static int isogi_trace__texel_site(const isogi_trace *t, const size_t texel[3], isogi_trace__site *site) {
@@ -1742,13 +1774,8 @@ static int isogi_trace__texel_site(const isogi_trace *t, const size_t texel[3], 
     double grid[3], range[2];
     size_t low[3], high[3];
     int a, border = 0;
-    for (a = 0; a < 3; a++) {
-        double nearest;
-        grid[a] = texel[a] + 1 == t->lattice[a] && texel[a] ? t->last[a] : t->first[a] + (double)texel[a] * t->step[a];
-        nearest = floor(grid[a] + 0.5);
-        if (fabs(grid[a] - nearest) < 1e-9) grid[a] = nearest;
-        border |= grid[a] <= 0 || grid[a] >= (double)(v->size[a] - 1);
-    }
+    isogi_trace__texel_grid(t, texel, grid);
+    for (a = 0; a < 3; a++) border |= grid[a] <= 0 || grid[a] >= (double)(v->size[a] - 1);
     if (!isogi_trace__locate(v, grid, &site->place)) return 0;
     site->isovalue = isogi_trace__value(v, &site->place);
     if (!isogi_trace__finite(site->isovalue)) return 0;
@@ -1933,6 +1960,7 @@ static isogi_result isogi_trace__classify_all(isogi_trace *t) {
 }
 
 static void isogi_trace__feedback_free(const isogi_trace *t);
+static void isogi_trace__hash_changeable(isogi_trace *t);
 static isogi_result isogi_trace__feedback_new(isogi_trace *t);
 
 /* ==== create and free ================================================================================================ */
@@ -1992,6 +2020,7 @@ static isogi_result isogi_trace__set_up(isogi_trace *t, const isogi_trace_desc *
         if (result != ISOGI_OK) return result;
         isogi_trace__set_light(t, light);
     }
+    isogi_trace__hash_changeable(t);
     if (desc->hierarchy > 0) t->scene.desc.lazy = 1; /* texels are wanted when the coarse ones are known */
     if (desc->method == ISOGI_TRACE_FEEDBACK) {
         result = isogi_trace__feedback_new(t);
@@ -2319,20 +2348,6 @@ ISOGI_API isogi_result isogi_trace_sample_gloss(const isogi_trace *trace, const 
     return result;
 }
 
-ISOGI_API isogi_result isogi_trace_relight(isogi_trace *trace, const isogi_lighting *lighting) {
-    float light[3 * ISOGI_TRACE__MAX_ORDER * ISOGI_TRACE__MAX_ORDER];
-    isogi_result result;
-    if (!trace || trace->scene.desc.mode != ISOGI_TRACE_TRANSFER) return ISOGI_INVALID;
-    if (isogi_lighting_validate(lighting) != ISOGI_OK || !isogi_trace__distant(lighting)) return ISOGI_INVALID;
-    result = isogi_sh_project(light, trace->scene.desc.order, lighting, NULL);
-    if (result != ISOGI_OK) return result;
-    isogi_trace__set_light(trace, light);
-    if (trace->coarse) isogi_trace__set_light(trace->coarse, light);
-    if (trace->high) isogi_trace__set_light(trace->high, light);
-    if (trace->high && trace->high->coarse) isogi_trace__set_light(trace->high->coarse, light);
-    return ISOGI_OK;
-}
-
 ISOGI_API void isogi_trace_shape(const isogi_trace *trace, size_t lattice[3], int *order, int *channels) {
     if (!trace) {
         if (lattice) memset(lattice, 0, sizeof trace->lattice);
@@ -2479,6 +2494,11 @@ static void isogi_trace__bake_task(void *arg, size_t task) {
     }
 }
 
+/* Wanted, or readable from a time before something changed. */
+static int isogi_trace__to_do(const isogi_trace__brick *brick, size_t slot) {
+    return brick->state[slot] == ISOGI_TRACE__WANTED || (brick->state[slot] == ISOGI_TRACE__DRAFT && !(brick->node && brick->node[slot]));
+}
+
 /* The next texels to compute, at most `limit`, with room for their values. Bricks stay in the queue until they are done. */
 static isogi_result isogi_trace__fill_batch(isogi_trace *t, size_t limit, size_t *count) {
     size_t i, slot;
@@ -2487,11 +2507,11 @@ static isogi_result isogi_trace__fill_batch(isogi_trace *t, size_t limit, size_t
         isogi_trace__brick *brick = t->bricks[t->queue[i]];
         uint64_t wanted = 0;
         for (slot = 0; slot < ISOGI_TRACE__TEXELS; slot++)
-            wanted |= (uint64_t)(brick->state[slot] == ISOGI_TRACE__WANTED) << slot;
+            wanted |= (uint64_t)isogi_trace__to_do(brick, slot) << slot;
         if (isogi_trace__brick_hold(t, brick, wanted) != ISOGI_OK) return *count ? ISOGI_OK : ISOGI_NO_MEMORY;
         for (slot = 0; slot < ISOGI_TRACE__TEXELS && *count < limit; slot++) {
             isogi_trace__ref *ref = &t->batch[*count];
-            if (brick->state[slot] != ISOGI_TRACE__WANTED) continue;
+            if (!isogi_trace__to_do(brick, slot)) continue;
             ref->brick = brick, ref->slot = (uint32_t)slot;
             isogi_trace__texel_of(t, t->queue[i], slot, ref->texel);
             ++*count;
@@ -2506,7 +2526,7 @@ static void isogi_trace__queue_advance(isogi_trace *t) {
     for (; t->queue_first < t->queue_count; t->queue_first++) {
         isogi_trace__brick *brick = t->bricks[t->queue[t->queue_first]];
         for (slot = 0; slot < ISOGI_TRACE__TEXELS; slot++)
-            if (brick->state[slot] == ISOGI_TRACE__WANTED) return;
+            if (isogi_trace__to_do(brick, slot)) return;
         brick->queued = 0;
     }
     t->queue_first = t->queue_count = 0;
@@ -3481,11 +3501,6 @@ static void isogi_trace__publish(isogi_trace *t) {
 
 /* ---- stepping ---- */
 
-/* Wanted, or readable from a time before something changed. */
-static int isogi_trace__to_do(const isogi_trace__brick *brick, size_t slot) {
-    return brick->state[slot] == ISOGI_TRACE__WANTED || (brick->state[slot] == ISOGI_TRACE__DRAFT && !(brick->node && brick->node[slot]));
-}
-
 /* Nodes for the wanted texels: of all bricks in the queue when lazy, every other texel along each axis first; else of a group. */
 static isogi_result isogi_trace__nodes_make(isogi_trace *t) {
     isogi_trace__feedback *f = t->feedback;
@@ -3496,7 +3511,7 @@ static isogi_result isogi_trace__nodes_make(isogi_trace *t) {
         uint64_t wanted = 0;
         for (slot = 0; slot < ISOGI_TRACE__TEXELS; slot++) wanted |= (uint64_t)isogi_trace__to_do(brick, slot) << slot;
         if (isogi_trace__brick_hold(t, brick, wanted) != ISOGI_OK) return ISOGI_NO_MEMORY;
-        if (!brick->node) {
+        if (!brick->node && wanted) {
             brick->node = (uint32_t *)isogi_allocate(&t->context, ISOGI_TRACE__TEXELS, sizeof(uint32_t));
             if (!brick->node) return ISOGI_NO_MEMORY;
             memset(brick->node, 0, ISOGI_TRACE__TEXELS * sizeof(uint32_t));
@@ -3545,8 +3560,8 @@ static void isogi_trace__level_end(isogi_trace *t) {
     f->level++, f->cursor = 0;
     if (open || t->scene.desc.lazy) return;
     for (i = 0; i < f->texels.count; i++) isogi_trace__brick_forget(t, f->texels.nodes[i].brick);
+    /* the next group begins anew, so that a bake that was saved in between goes on to the same bits */
     isogi_trace__set_free(t, &f->texels);
-    if (t->wanted) return;
     isogi_trace__set_free(t, &f->probes);
     memset(f->table, 0, f->table_size * sizeof *f->table);
     f->probe_cursor = 0;
@@ -3956,7 +3971,7 @@ static uint64_t isogi_trace__hash_lighting(uint64_t hash, const isogi_lighting *
     if (l->env.rgb) hash = isogi_trace__hash_floats(hash, l->env.rgb, 3 * (size_t)l->env.width * (size_t)l->env.height);
     hash = isogi_trace__hash_number(hash, (uint64_t)l->env.sh_order);
     if (l->env.sh) hash = isogi_trace__hash_floats(hash, l->env.sh, 3 * ISOGI_SH_COUNT((size_t)l->env.sh_order));
-    hash = isogi_trace__hash_floats(hash, l->env.rotation, 9);
+    hash = isogi_trace__hash_number(isogi_trace__hash_floats(hash, l->env.rotation, 9), l->light_count);
     for (i = 0; i < l->light_count; i++) {
         const isogi_light *light = &l->lights[i];
         hash = isogi_trace__hash_number(hash, (uint64_t)light->kind);
@@ -3968,8 +3983,9 @@ static uint64_t isogi_trace__hash_lighting(uint64_t hash, const isogi_lighting *
 
 static uint64_t isogi_trace__hash_volume(uint64_t hash, const isogi_pyramid *pyramid) {
     const isogi_volume *v = isogi_vol_volume(pyramid);
-    isogi_level level = isogi_vol_level(pyramid, 2);
+    isogi_level level = isogi_vol_level(pyramid, 0);
     int a;
+    for (a = 0; a < 2 && level.size[0] * level.size[1] * level.size[2] > (size_t)1 << 20; a++) level = isogi_vol_level(pyramid, a + 1);
     for (a = 0; a < 3; a++) hash = isogi_trace__hash_number(hash, v->size[a]);
     hash = isogi_trace__hash_number(hash, (uint64_t)v->type);
     hash = isogi_trace__hash_doubles(isogi_trace__hash_doubles(hash, v->spacing, 3), v->origin, 3);
@@ -3981,22 +3997,26 @@ static uint64_t isogi_trace__hash_volume(uint64_t hash, const isogi_pyramid *pyr
 
 static uint64_t isogi_trace__hash_trace(const isogi_trace *t) {
     const isogi_trace_desc *d = &t->scene.desc;
-    const int numbers[12] = {(int)d->mode,    d->order,        d->bounces,           d->samples,    (int)d->normals,  d->capped != 0,
-                             t->scene.high,   !!d->no_shadows, d->transfer_channels, t->format,     d->material != 0, t->values};
+    const int transfer = d->mode == ISOGI_TRACE_TRANSFER;
+    const int numbers[13] = {(int)d->mode,  transfer ? d->order : 0, d->bounces, d->samples, (int)d->normals,  d->capped != 0, t->scene.high,
+                             !!d->no_shadows, transfer ? d->transfer_channels : 0, t->format, d->material != 0, t->values, (int)d->method};
     uint64_t hash = 0xcbf29ce484222325u;
     int i;
-    for (i = 0; i < 12; i++) hash = isogi_trace__hash_number(hash, (uint64_t)(int64_t)numbers[i]);
+    for (i = 0; i < 13; i++) hash = isogi_trace__hash_number(hash, (uint64_t)(int64_t)numbers[i]);
     hash = isogi_trace__hash_number(hash, d->seed);
     hash = isogi_trace__hash_floats(isogi_trace__hash_floats(isogi_trace__hash_floats(hash, d->albedo, 3), &d->offset, 1), &d->reach, 1);
+    if (d->method == ISOGI_TRACE_FEEDBACK) hash = isogi_trace__hash_floats(hash, &d->error, 1);
     hash = isogi_trace__hash_table(isogi_trace__hash_table(hash, d->albedo_points, d->albedo_count), d->emission_points, d->emission_count);
     hash = isogi_trace__hash_doubles(isogi_trace__hash_doubles(isogi_trace__hash_doubles(hash, t->first, 3), t->last, 3), &t->scene.unit, 1);
     if (d->mode == ISOGI_TRACE_IRRADIANCE) hash = isogi_trace__hash_lighting(hash, &d->lighting);
     return isogi_trace__hash_volume(hash, t->scene.pyramid);
 }
 
-static uint64_t isogi_trace__done_texels(const isogi_trace__brick *brick) {
+/* Texels to be saved. A group of full feedback is saved as a whole: what is left of it would be gathered with other probes. */
+static uint64_t isogi_trace__done_texels(const isogi_trace *t, const isogi_trace__brick *brick) {
     uint64_t done = 0;
     uint32_t slot;
+    if (brick && brick->node && !t->scene.desc.lazy) return 0;
     for (slot = 0; brick && slot < ISOGI_TRACE__TEXELS; slot++)
         done |= (uint64_t)(brick->state[slot] == ISOGI_TRACE__DONE) << slot;
     return done;
@@ -4006,7 +4026,7 @@ static size_t isogi_trace__side_size(const isogi_trace *t, size_t *bricks) {
     size_t i, bytes = ISOGI_TRACE__HEADER + 8;
     *bricks = 0;
     for (i = 0; i < t->brick_count; i++) {
-        size_t texels = isogi_trace__bits(isogi_trace__done_texels(t->bricks[i]));
+        size_t texels = isogi_trace__bits(isogi_trace__done_texels(t, t->bricks[i]));
         if (texels) bytes += 16 + texels * t->record, ++*bricks;
     }
     return bytes;
@@ -4031,7 +4051,7 @@ ISOGI_API isogi_result isogi_trace_save(const isogi_trace *trace, void *block, s
     isogi_trace__put(begin + 48, bricks, 8);
     to = begin + ISOGI_TRACE__HEADER;
     for (i = 0; i < trace->brick_count; i++) {
-        uint64_t done = isogi_trace__done_texels(trace->bricks[i]);
+        uint64_t done = isogi_trace__done_texels(trace, trace->bricks[i]);
         if (!done) continue;
         isogi_trace__put(to, i, 8), isogi_trace__put(to + 8, done, 8), to += 16;
         for (slot = 0; slot < ISOGI_TRACE__TEXELS; slot++)
@@ -4129,6 +4149,324 @@ ISOGI_API isogi_result isogi_trace_load(isogi_trace *trace, const void *block, s
     if (result == ISOGI_OK && used + used_high != bytes) result = ISOGI_CORRUPT;
     if (result == ISOGI_OK) result = isogi_trace__block_load(trace, from);
     if (result == ISOGI_OK && trace->high) result = isogi_trace__block_load(trace->high, from + used);
+    return result;
+}
+
+/* ==== changes ======================================================================================================== */
+
+/* What changes in one texture. The texture's scene is exchanged with `scene` before anything is marked, and back where memory runs out. */
+typedef struct isogi_trace__change {
+    isogi_trace *trace;
+    const isogi_trace_desc *desc; /* NULL: voxels change */
+    isogi_trace__scene scene;     /* afterwards: as it was */
+    float light[3 * ISOGI_TRACE__MAX_ORDER * ISOGI_TRACE__MAX_ORDER];
+    uint64_t lighting_hash, colours_hash;
+    int all, colours, choice; /* to be computed again: all; where colours differ. Texels are chosen anew */
+    double low[3], high[3];   /* voxels: grid coordinates of what texels and hits there read */
+    double range[2];          /* isovalues of surfaces there */
+    size_t *queue, capacity;
+} isogi_trace__change;
+
+static uint64_t isogi_trace__hash_colours(const isogi_trace_desc *d) {
+    return isogi_trace__hash_table(isogi_trace__hash_table(0, d->albedo_points, d->albedo_count), d->emission_points, d->emission_count);
+}
+
+static void isogi_trace__hash_changeable(isogi_trace *t) {
+    t->colours_hash = isogi_trace__hash_colours(&t->scene.desc);
+    t->lighting_hash = t->scene.desc.mode == ISOGI_TRACE_IRRADIANCE ? isogi_trace__hash_lighting(0, &t->scene.desc.lighting) : 0;
+}
+
+/* Whether a new description is of the same texels. */
+static int isogi_trace__same_texels(const isogi_trace *t, const isogi_trace_desc *d) {
+    const isogi_trace_desc *b = &t->scene.desc;
+    int order = d->order ? d->order : 5, lazy = d->lazy != 0 || d->hierarchy > 0, a;
+    isogi_trace_format storage = d->storage ? d->storage : d->mode == ISOGI_TRACE_TRANSFER ? ISOGI_TRACE_HALF : ISOGI_TRACE_FLOAT;
+    for (a = 0; a < 3; a++) {
+        if (d->lattice[a] != b->lattice[a] || d->box_first[a] != b->box_first[a] || d->box_end[a] != b->box_end[a]) return 0;
+        if (!isogi_trace__zero(d->lattice_min[a] - b->lattice_min[a]) || !isogi_trace__zero(d->lattice_max[a] - b->lattice_max[a])) return 0;
+    }
+    return d->pyramid == b->pyramid && d->mode == b->mode && order == b->order && d->method == b->method && d->normals == b->normals &&
+           lazy == (b->lazy != 0) && !d->capped == !b->capped && d->sides == b->sides && storage == b->storage &&
+           isogi_trace__zero((double)d->hierarchy - (double)b->hierarchy) &&
+           (!d->transfer_channels || d->transfer_channels == b->transfer_channels);
+}
+
+static void isogi_trace__scene_swap(isogi_trace__change *c) {
+    isogi_trace__scene before = c->trace->scene;
+    c->trace->scene = c->scene, c->scene = before;
+    c->trace->scene.sky.env = &c->trace->scene.desc.lighting.env, c->scene.sky.env = &c->scene.desc.lighting.env;
+}
+
+/* The scene of the new description, and what it means for the texels. On success the texture has it. */
+static isogi_result isogi_trace__change_scene(isogi_trace__change *c) {
+    isogi_trace *t = c->trace;
+    const isogi_trace_desc *n = c->desc, *b = &t->scene.desc;
+    isogi_trace_desc d = t->scene.desc;
+    isogi_result result;
+    int a, paints;
+    d.lighting = n->lighting, d.material = n->material, d.material_user = n->material_user;
+    d.albedo_points = n->albedo_points, d.albedo_count = n->albedo_count;
+    d.emission_points = n->emission_points, d.emission_count = n->emission_count;
+    d.isovalue_min = n->isovalue_min, d.isovalue_max = n->isovalue_max, d.lookup = n->lookup;
+    d.samples = n->samples, d.bounces = n->bounces, d.error = n->error, d.seed = n->seed, d.offset = n->offset, d.reach = n->reach;
+    d.no_shadows = n->no_shadows;
+    for (a = 0; a < 3; a++) d.albedo[a] = n->albedo[a];
+    result = isogi_trace__scene_set(&c->scene, &d, &t->context);
+    if (result == ISOGI_OK && d.mode == ISOGI_TRACE_TRANSFER) result = isogi_sh_project(c->light, d.order, &d.lighting, NULL);
+    if (result != ISOGI_OK) {
+        isogi_trace__sky_free(&c->scene.sky, &t->context);
+        return result;
+    }
+    c->colours_hash = isogi_trace__hash_colours(&d);
+    c->lighting_hash = d.mode == ISOGI_TRACE_IRRADIANCE ? isogi_trace__hash_lighting(0, &d.lighting) : 0;
+    c->choice = !isogi_trace__zero(d.isovalue_min - b->isovalue_min) || !isogi_trace__zero(d.isovalue_max - b->isovalue_max) ||
+                d.lookup != b->lookup;
+    n = &c->scene.desc; /* zero defaults filled in */
+    c->all = c->lighting_hash != t->lighting_hash || n->samples != b->samples || n->bounces != b->bounces || n->seed != b->seed ||
+             !n->no_shadows != !b->no_shadows || !isogi_trace__zero((double)n->error - (double)b->error) ||
+             !isogi_trace__zero((double)n->offset - (double)b->offset) || !isogi_trace__zero((double)n->reach - (double)b->reach);
+    c->colours = n->albedo_points != b->albedo_points || n->emission_points != b->emission_points ||
+                 n->albedo_count != b->albedo_count || n->emission_count != b->emission_count;
+    for (a = 0; a < 3; a++) c->colours |= !isogi_trace__zero((double)n->albedo[a] - (double)b->albedo[a]);
+    paints = n->material != b->material || n->material_user != b->material_user || (n->material && c->colours);
+    c->all |= paints || (!c->colours && c->colours_hash != t->colours_hash);
+    isogi_trace__scene_swap(c);
+    return ISOGI_OK;
+}
+
+/* Texels read voxels up to two away; so do smoothed normals at hits. The field's values there are those of all surfaces there. A place
+   that goes from outside to inside is crossed by the isovalue: voxels around it that do not change are on one of both sides. */
+static isogi_result isogi_trace__change_box(isogi_trace__change *c, const size_t first[3], const size_t last[3]) {
+    const isogi_volume *v = c->trace->scene.volume;
+    size_t low[3], high[3];
+    int a;
+    for (a = 0; a < 3; a++) {
+        if (first[a] > last[a] || first[a] >= v->size[a]) return ISOGI_INVALID;
+        low[a] = first[a] > 2 ? first[a] - 2 : 0;
+        high[a] = v->size[a] - 1 - first[a] > 2 && last[a] < v->size[a] - 3 ? last[a] + 2 : v->size[a] - 1;
+        c->low[a] = (double)low[a], c->high[a] = (double)high[a];
+    }
+    isogi_volume_range(v, low, high, c->range);
+    return ISOGI_OK;
+}
+
+static int isogi_trace__colours_differ(const isogi_trace_desc *a, const isogi_trace_desc *b, double isovalue) {
+    float albedo[2][3], emission[2][3];
+    int c, differ = 0;
+    isogi_trace_material(a, isovalue, NULL, albedo[0], emission[0]);
+    isogi_trace_material(b, isovalue, NULL, albedo[1], emission[1]);
+    for (c = 0; c < 3; c++) {
+        differ |= !isogi_trace__zero((double)emission[0][c] - (double)emission[1][c]);
+        differ |= a->bounces && !isogi_trace__zero((double)albedo[0][c] - (double)albedo[1][c]);
+    }
+    return differ;
+}
+
+static int isogi_trace__in_change(const isogi_trace__change *c, const double grid[3], const double margin[3]) {
+    int a;
+    for (a = 0; a < 3; a++)
+        if (grid[a] < c->low[a] - margin[a] || grid[a] > c->high[a] + margin[a]) return 0;
+    return 1;
+}
+
+static int isogi_trace__in_reach(const isogi_trace__change *c, const double grid[3]) {
+    const isogi_trace_desc *d = &c->trace->scene.desc;
+    const double *spacing = c->trace->scene.volume->spacing;
+    double square = 0, most = 0, limit;
+    int a;
+    if (!(d->reach > 0) || d->bounces < 0) return 1;
+    for (a = 0; a < 3; a++) {
+        double apart = grid[a] < c->low[a] ? c->low[a] - grid[a] : grid[a] > c->high[a] ? grid[a] - c->high[a] : 0;
+        square += apart * apart * spacing[a] * spacing[a];
+        most = spacing[a] > most ? spacing[a] : most;
+    }
+    limit = (double)d->reach * (d->bounces + 1) + 2 * most; /* rays start up to a voxel off the texel */
+    return square <= limit * limit;
+}
+
+/* Whether a computed texel that is not at the changed voxels depends on the change. */
+static int isogi_trace__depends(const isogi_trace__change *c, const double grid[3]) {
+    isogi_hit place;
+    double isovalue;
+    if (c->all) return 1;
+    if (c->desc && !c->colours) return 0;
+    if (!isogi_trace__locate(c->trace->scene.volume, grid, &place)) return 0;
+    isovalue = isogi_trace__value(c->trace->scene.volume, &place);
+    if (c->desc) return isogi_trace__colours_differ(&c->scene.desc, &c->trace->scene.desc, isovalue);
+    return isovalue >= c->range[0] && isovalue <= c->range[1] && isogi_trace__in_reach(c, grid);
+}
+
+/* How far from changed voxels the choice of texels by an interval of isovalues depends on them. */
+static void isogi_trace__choice_margin(const isogi_trace *t, double margin[3]) {
+    int a, chosen = !isogi_trace__zero(t->scene.desc.isovalue_min) || !isogi_trace__zero(t->scene.desc.isovalue_max);
+    for (a = 0; a < 3; a++) margin[a] = chosen ? 2 * t->step[a] + 1 : 0;
+}
+
+/* Whether a brick without texels may get some. */
+static int isogi_trace__may_hold(const isogi_trace__change *c, size_t brick) {
+    const isogi_trace *t = c->trace;
+    size_t low[3], high[3];
+    double margin[3], end;
+    int a;
+    isogi_trace__texel_of(t, brick, 0, low);
+    isogi_trace__choice_margin(t, margin);
+    for (a = 0; a < 3; a++) {
+        high[a] = low[a] + ISOGI_TRACE__SIDE < t->lattice[a] ? low[a] + ISOGI_TRACE__SIDE - 1 : t->lattice[a] - 1;
+        if (c->desc) continue;
+        end = t->first[a] + (double)high[a] * t->step[a];
+        if (end < c->low[a] - margin[a] - 1 || t->first[a] + (double)low[a] * t->step[a] > c->high[a] + margin[a]) return 0;
+    }
+    return (!c->desc || c->choice) && isogi_trace__meets_box(t, low, high) && isogi_trace__in_range(t, low, high);
+}
+
+/* All memory that marking takes. Bricks that stay empty say what no brick says. */
+static isogi_result isogi_trace__change_reserve(isogi_trace__change *c) {
+    isogi_trace *t = c->trace;
+    size_t i;
+    for (i = 0; i < t->brick_count; i++) {
+        if (!t->bricks[i] && !t->scene.desc.lazy && isogi_trace__may_hold(c, i)) {
+            t->bricks[i] = isogi_trace__brick_new(t);
+            if (!t->bricks[i]) return ISOGI_NO_MEMORY;
+            memset(t->bricks[i]->state, c->desc ? ISOGI_TRACE__NOT_ASKED : ISOGI_TRACE__NO_SURFACE, sizeof t->bricks[i]->state);
+        }
+        c->capacity += t->bricks[i] != NULL;
+    }
+    if (!c->capacity) c->capacity = 1;
+    c->queue = (size_t *)isogi_allocate(&t->context, c->capacity, sizeof *c->queue);
+    return c->queue ? ISOGI_OK : ISOGI_NO_MEMORY;
+}
+
+static void isogi_trace__change_undo(isogi_trace__change *c) {
+    isogi_release(&c->trace->context, c->queue, c->capacity, sizeof *c->queue);
+    if (!c->desc) return;
+    isogi_trace__scene_swap(c);
+    isogi_trace__sky_free(&c->scene.sky, &c->trace->context);
+}
+
+/* The new state of a texel. What can be read stays readable, where it still has a surface. */
+static uint8_t isogi_trace__changed_state(const isogi_trace__change *c, const size_t texel[3], int state) {
+    const isogi_trace *t = c->trace;
+    double grid[3], margin[3], none[3] = {0, 0, 0};
+    int again, lazy = t->scene.desc.lazy, now;
+    isogi_trace__texel_grid(t, texel, grid);
+    isogi_trace__choice_margin(t, margin);
+    if (c->desc) again = c->choice && (state == ISOGI_TRACE__NOT_ASKED || (state == ISOGI_TRACE__WANTED && !lazy));
+    else again = isogi_trace__in_change(c, grid, none) || (state == ISOGI_TRACE__NOT_ASKED && isogi_trace__in_change(c, grid, margin));
+    if (!again) return (uint8_t)(state == ISOGI_TRACE__DONE && isogi_trace__depends(c, grid) ? ISOGI_TRACE__DRAFT : state);
+    if (lazy && state < ISOGI_TRACE__WANTED) return ISOGI_TRACE__UNKNOWN;
+    now = isogi_trace__classify(t, texel);
+    return (uint8_t)(now == ISOGI_TRACE__WANTED && state >= ISOGI_TRACE__DRAFT ? ISOGI_TRACE__DRAFT : now);
+}
+
+/* Light that is kept, in the unit of the new scene. */
+static void isogi_trace__change_unit(const isogi_trace__change *c, const isogi_trace__brick *brick, uint32_t slot) {
+    isogi_trace *t = c->trace;
+    uint8_t *record = isogi_trace__record(t, brick, slot);
+    float values[3 * ISOGI_TRACE__MAX_ORDER * ISOGI_TRACE__MAX_ORDER];
+    double unit = t->scene.unit;
+    t->scene.unit = c->scene.unit;
+    isogi_trace__record_read(t, record, values);
+    t->scene.unit = unit;
+    isogi_trace__record_write(t, record, values, isogi_trace__record_error(record));
+}
+
+/* All nodes are forgotten: what was gathered belongs to another scene. */
+static void isogi_trace__feedback_reset(isogi_trace *t) {
+    isogi_trace__feedback *f = t->feedback;
+    size_t i;
+    if (!f) return;
+    for (i = 0; i < t->brick_count; i++)
+        if (t->bricks[i]) isogi_trace__brick_forget(t, t->bricks[i]);
+    isogi_trace__set_free(t, &f->texels), isogi_trace__set_free(t, &f->probes);
+    memset(f->table, 0, f->table_size * sizeof *f->table);
+    f->cursor = f->probe_cursor = 0, f->span_count = 0, f->partial = 0;
+    f->level = f->unpublished = f->diverges = 0;
+}
+
+/* Marks the texels and queues their bricks; needs no memory. */
+static void isogi_trace__change_commit(isogi_trace__change *c) {
+    isogi_trace *t = c->trace;
+    int begin = !c->desc || c->all || c->colours, converts = c->desc && !isogi_trace__zero(c->scene.unit - t->scene.unit);
+    size_t i, texel[3], count = 0;
+    uint32_t slot;
+    if (begin) isogi_trace__feedback_reset(t);
+    t->wanted = t->done = 0;
+    for (i = 0; i < t->brick_count; i++) {
+        isogi_trace__brick *brick = t->bricks[i];
+        if (!brick) continue;
+        brick->queued = 0;
+        for (slot = 0; slot < ISOGI_TRACE__TEXELS; slot++) {
+            uint8_t *state = &brick->state[slot];
+            if (!isogi_trace__texel_of(t, i, slot, texel)) continue;
+            if (converts && *state >= ISOGI_TRACE__DRAFT) isogi_trace__change_unit(c, brick, slot);
+            if (begin && *state == ISOGI_TRACE__QUEUED) *state = ISOGI_TRACE__WANTED;
+            *state = isogi_trace__changed_state(c, texel, *state);
+            t->done += *state == ISOGI_TRACE__DONE, t->wanted += *state >= ISOGI_TRACE__WANTED && *state < ISOGI_TRACE__DONE;
+            brick->queued |= isogi_trace__to_do(brick, slot);
+        }
+        if (brick->queued) c->queue[count++] = i;
+    }
+    isogi_release(&t->context, t->queue, t->queue_capacity, sizeof *t->queue);
+    t->queue = c->queue, t->queue_capacity = c->capacity, t->queue_first = 0, t->queue_count = count;
+    t->refined = 0;
+    if (!c->desc) return;
+    isogi_trace__sky_free(&c->scene.sky, &t->context);
+    t->lighting_hash = c->lighting_hash, t->colours_hash = c->colours_hash;
+    if (t->scene.desc.mode == ISOGI_TRACE_TRANSFER) isogi_trace__set_light(t, c->light);
+}
+
+/* The same change to both sides and both levels: all of them or none. */
+static isogi_result isogi_trace__apply(isogi_trace *trace, const isogi_trace_desc *desc, const size_t *first, const size_t *last) {
+    isogi_trace__change change[4];
+    isogi_trace *side;
+    isogi_result result = ISOGI_OK;
+    int count = 0, ready = 0, i;
+    memset(change, 0, sizeof change);
+    for (side = trace; side; side = side->high) {
+        change[count++].trace = side;
+        if (side->coarse) change[count++].trace = side->coarse;
+    }
+    while (ready < count && result == ISOGI_OK) {
+        isogi_trace__change *c = &change[ready];
+        c->desc = desc;
+        result = desc ? isogi_trace__change_scene(c) : isogi_trace__change_box(c, first, last);
+        if (result != ISOGI_OK) break;
+        ready++;
+        result = isogi_trace__change_reserve(c);
+    }
+    for (i = 0; i < ready; i++) {
+        if (result == ISOGI_OK) isogi_trace__change_commit(&change[i]);
+        else isogi_trace__change_undo(&change[i]);
+    }
+    return result;
+}
+
+ISOGI_API isogi_result isogi_trace_change(isogi_trace *trace, const isogi_trace_desc *desc) {
+    if (!trace || !isogi_trace__desc_valid(desc) || !isogi_trace__same_texels(trace, desc)) return ISOGI_INVALID;
+    return isogi_trace__apply(trace, desc, NULL, NULL);
+}
+
+ISOGI_API isogi_result isogi_trace_touch(isogi_trace *trace, const size_t first[3], const size_t last[3]) {
+    if (!trace || !first || !last) return ISOGI_INVALID;
+    return isogi_trace__apply(trace, NULL, first, last);
+}
+
+ISOGI_API isogi_result isogi_trace_relight(isogi_trace *trace, const isogi_lighting *lighting) {
+    float light[3 * ISOGI_TRACE__MAX_ORDER * ISOGI_TRACE__MAX_ORDER];
+    isogi_trace_desc desc;
+    isogi_trace *side;
+    isogi_result result;
+    if (!trace || !lighting || isogi_lighting_validate(lighting) != ISOGI_OK) return ISOGI_INVALID;
+    if (trace->scene.desc.mode == ISOGI_TRACE_IRRADIANCE) {
+        desc = trace->scene.desc, desc.lighting = *lighting;
+        return isogi_trace__apply(trace, &desc, NULL, NULL);
+    }
+    if (!isogi_trace__distant(lighting)) return ISOGI_INVALID;
+    result = isogi_sh_project(light, trace->scene.desc.order, lighting, NULL);
+    for (side = trace; side && result == ISOGI_OK; side = side->high) {
+        isogi_trace__set_light(side, light);
+        if (side->coarse) isogi_trace__set_light(side->coarse, light);
+    }
     return result;
 }
 

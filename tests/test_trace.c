@@ -944,7 +944,7 @@ TEST(bad_input_is_refused) {
     CHECK(isogi_trace_step(NULL, 0, NULL) == ISOGI_INVALID && isogi_trace_request(NULL, NULL, 0) == ISOGI_INVALID, "NULL texture");
     isogi_trace_free(NULL);
     CHECK(isogi_trace_create(&t, &good, NULL) == ISOGI_OK, "good");
-    CHECK(isogi_trace_relight(t, &good.lighting) == ISOGI_INVALID, "relighting irradiance");
+    CHECK(isogi_trace_relight(t, &(isogi_lighting){.light_count = 1}) == ISOGI_INVALID, "lights that are not there");
     CHECK(isogi_trace_sample_transfer(t, (const float(*)[3])p, 1, e[0]) == ISOGI_INVALID, "transfer of irradiance");
     CHECK(isogi_trace_sample(t, NULL, 1, e, NULL) == ISOGI_INVALID && isogi_trace_sample(t, (const float(*)[3])p, 1, NULL, NULL) == ISOGI_INVALID, "NULL points");
     CHECK(isogi_trace_sample(t, (const float(*)[3])p, 1, e, error) == ISOGI_OK, "NaN point: a lookup that is not ready, no crash");

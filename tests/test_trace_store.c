@@ -320,6 +320,36 @@ TEST(bake_resumes_to_the_same_bits) {
     scene_free(&s);
 }
 
+/* Feedback: groups of texels do not know of each other. A bake of two of them, stopped in the second, goes on to the same bits; adaptive
+   ones, too, where the texels of a group are finished at different times. */
+TEST(feedback_resumes_to_the_same_bits) {
+    double q[2] = {0.5, 2};
+    int size = 45;
+    scene s = scene_make(size, size, size, NULL, gyroid_in_air, q);
+    for (int k = 0; k < 1 + LONG_SUITE; k++) {
+        isogi_trace_desc d = store_desc(&s, ISOGI_TRACE_IRRADIANCE, 0, k ? 8 : 1);
+        isogi_trace *part = NULL, *rest = NULL;
+        isogi_trace_report report;
+        uint8_t *block[3];
+        size_t bytes[3];
+        double remaining = 1;
+        d.method = ISOGI_TRACE_FEEDBACK, d.bounces = 2, d.error = k ? 0.1f : 0;
+        CHECK(isogi_trace_create(&part, &d, NULL) == ISOGI_OK && isogi_trace_create(&rest, &d, NULL) == ISOGI_OK, "case %d", k);
+        for (int step = 0; remaining > (k ? 0.15 : 0.1); step++) CHECK(isogi_trace_step(part, 20000, &remaining) == ISOGI_OK && step < 1000, "case %d", k);
+        block[0] = save_now(part, &bytes[0]);
+        isogi_trace_status(part, &report);
+        CHECK(remaining > 0 && isogi_trace_load(rest, block[0], bytes[0]) == ISOGI_OK, "case %d: remaining %g", k, remaining);
+        isogi_trace_step(part, 0, &remaining), block[1] = save_now(part, &bytes[1]); /* it was not disturbed by saving */
+        CHECK(bytes[0] > bytes[1] / 2 && bytes[0] < bytes[1], "case %d: %d of %d bytes", k, (int)bytes[0], (int)bytes[1]);
+        CHECK(isogi_trace_step(rest, 0, &remaining) == ISOGI_OK && remaining <= 0, "case %d: remaining %g", k, remaining);
+        block[2] = save_now(rest, &bytes[2]);
+        CHECK(bytes[1] == bytes[2] && !memcmp(block[1], block[2], bytes[1]), "case %d: %d and %d bytes", k, (int)bytes[1], (int)bytes[2]);
+        for (int i = 0; i < 3; i++) free(block[i]);
+        isogi_trace_free(part), isogi_trace_free(rest);
+    }
+    scene_free(&s);
+}
+
 /* Boxes baked apart, one of them reaching past a brick, and loaded in any order: the same bytes as the whole, at once. */
 TEST(boxes_merge_to_the_same_bits) {
     double q[2] = {0.5, 4};
@@ -403,48 +433,112 @@ TEST(damaged_blocks_are_refused) {
     scene_free(&s);
 }
 
-/* Every field that the light depends on makes the block another one; those that choose texels do not. */
+/* Every field that the light depends on makes the block another one; those that choose texels, and those that mean nothing here, do not. */
+static void no_paint(void *user, double isovalue, const double point[3], float albedo[3], float emission[3]) { (void)user, (void)isovalue, (void)point, (void)albedo, (void)emission; }
 TEST(blocks_belong_to_their_description) {
-    double q[2] = {0.5, 4};
-    scene s = scene_make(12, 13, 11, NULL, gyroid_in_air, q), s2 = scene_make(12, 13, 11, NULL, gyroid, q);
-    isogi_light lamp = {.kind = ISOGI_LIGHT_POINT, .vector = {1, 2, 3}, .rgb = {1, 1, 1}};
-    const isogi_albedo_point table[1] = {{0, {0.5f, 0.5f, 0.5f}}};
-    const isogi_trace_desc good = store_desc(&s, ISOGI_TRACE_IRRADIANCE, 0, 1);
-    isogi_trace *t = baked(&good), *other;
-    size_t size;
-    uint8_t *block = save_now(t, &size);
-    for (int i = 0; i < 20; i++) {
-        isogi_trace_desc d = good;
-        isogi_result expected = i < 16 ? ISOGI_INVALID : ISOGI_OK, result;
-        switch (i) {
-        case 0: d.samples = 2; break;
-        case 1: d.bounces = 3; break;
-        case 2: d.albedo[1] = 0.6f; break;
-        case 3: d.lighting.lights = &lamp; break;
-        case 4: d.albedo_points = table, d.albedo_count = 1; break;
-        case 5: d.emission_points = table, d.emission_count = 1; break;
-        case 6: d.reach = 3; break;
-        case 7: d.no_shadows = 1; break;
-        case 8: d.capped = 1; break;
-        case 9: d.offset = 0.3f; break;
-        case 10: d.normals = ISOGI_NORMAL_TRILINEAR; break;
-        case 11: d.lattice[0] = 13; break;
-        case 12: d.lattice_max[0] = 10, d.lattice_max[1] = 12, d.lattice_max[2] = 10, d.lattice[0] = 12; break;
-        case 13: d.storage = ISOGI_TRACE_HALF; break;
-        case 14: d.sides = ISOGI_TRACE_HIGH_SIDE; break;
-        case 15: d.pyramid = s2.pyramid; break;
-        case 16: d.lazy = 1; break;
-        case 17: d.lookup = ISOGI_TRACE_BSPLINE; break;
-        case 18: d.isovalue_min = -0.1, d.isovalue_max = 0.1; break;
-        default: d.box_end[0] = d.box_end[1] = d.box_end[2] = 5;
+    double q[2] = {0.5, 4}, wide[3] = {1, 1.5, 1};
+    scene s = scene_make(12, 13, 11, NULL, gyroid_in_air, q), s2 = scene_make(12, 13, 11, wide, gyroid_in_air, q);
+    static float image[4][8][3], image2[8][4][3], voxels[12 * 13 * 11];
+    isogi_pyramid *other_pyramid = NULL, *shifted = NULL;
+    isogi_volume volume = s.volume;
+    isogi_light lamp = {.kind = ISOGI_LIGHT_POINT, .vector = {1, 2, 3}, .rgb = {1, 1, 1}}, lamps[2], sphere = lamp, moved = lamp, red = lamp;
+    isogi_light rectangle = {.kind = ISOGI_LIGHT_RECTANGLE, .vector = {1, 2, 3}, .rgb = {1, 1, 1}, .edge = {{1, 0, 0}, {0, 1, 0}}}, turned = rectangle;
+    const isogi_albedo_point table[1] = {{0, {0.5f, 0.5f, 0.5f}}}, longer[2] = {{0, {0.5f, 0.5f, 0.5f}}, {1, {0.5f, 0.5f, 0.5f}}}, elsewhere[1] = {{0.1, {0.5f, 0.5f, 0.5f}}};
+    const float sky[12] = {1, 1, 1, 0.1f}, other_sky[3] = {1, 2, 3};
+    memset(lamps, 0, sizeof lamps), lamps[0] = lamp;
+    sphere.kind = ISOGI_LIGHT_SPHERE, sphere.radius = 0.5f, moved.vector[2] = 4, red.rgb[1] = 0.5f, turned.edge[1][1] = 2;
+    for (int i = 0; i < 96; i++) (&image[0][0][0])[i] = (&image2[0][0][0])[i] = (float)(i % 5);
+    memcpy(voxels, s.data, sizeof voxels), voxels[6 + 12 * (6 + 13 * 5)] += 5; /* one voxel, beyond its block's range */
+    volume.data = voxels;
+    isogi_vol_build(&other_pyramid, &volume, NULL);
+    volume.data = s.data, volume.origin[1] = 2;
+    isogi_vol_build(&shifted, &volume, NULL);
+    enum { FIELDS = 46, SAME = 6 };
+    for (int base = 0; base < 5; base++) {
+        isogi_trace_desc good = store_desc(&s, base == 4 ? ISOGI_TRACE_TRANSFER : ISOGI_TRACE_IRRADIANCE, 0, 1);
+        isogi_trace *t, *other;
+        uint8_t *block;
+        size_t size;
+        int refused = 0;
+        if (base == 1) good.method = ISOGI_TRACE_FEEDBACK;
+        if (base == 2) good.lighting.lights = &lamp, good.lighting.light_count = 1, good.albedo_points = table, good.albedo_count = 1, good.emission_points = table, good.emission_count = 1;
+        if (base == 3) good.lighting.lights = &rectangle, good.lighting.light_count = 1, good.lighting.env.rgb = &image[0][0][0], good.lighting.env.width = 8, good.lighting.env.height = 4;
+        good.sides = ISOGI_TRACE_LOW_SIDE;
+        t = baked(&good), block = save_now(t, &size);
+        for (int i = 0; i < FIELDS + SAME; i++) {
+            isogi_trace_desc d = good;
+            isogi_result expected = i < FIELDS ? ISOGI_INVALID : ISOGI_OK, result;
+            int light = base < 4; /* the lighting of transfer is not in it */
+            switch (i) {
+            case 0: d.samples = 2; break;
+            case 1: d.bounces = 3; break;
+            case 2: d.albedo[1] = 0.6f; break;
+            case 3: d.lighting.lights = base == 2 ? lamps : &lamp, d.lighting.light_count = base == 2 ? 2 : 1, lamps[1] = red; break;
+            case 4: d.albedo_points = base == 2 ? longer : table, d.albedo_count = base == 2 ? 2 : 1; break;
+            case 5: d.emission_points = base == 2 ? longer : table, d.emission_count = base == 2 ? 2 : 1; break;
+            case 6: d.reach = 3; break;
+            case 7: d.no_shadows = 1; break;
+            case 8: d.capped = 1; break;
+            case 9: d.offset = 0.3f; break;
+            case 10: d.normals = ISOGI_NORMAL_TRILINEAR; break;
+            case 11: d.lattice[0] = 13; break;
+            case 12: d.lattice_max[0] = 10, d.lattice_max[1] = 12, d.lattice_max[2] = 10, d.lattice[0] = 12; break;
+            case 13: d.storage = base == 4 ? ISOGI_TRACE_FLOAT : ISOGI_TRACE_HALF; break;
+            case 14: d.sides = ISOGI_TRACE_HIGH_SIDE; break;
+            case 15: d.pyramid = s2.pyramid; break;
+            case 16: d.pyramid = other_pyramid; break;
+            case 17: d.pyramid = shifted; break;
+            case 18: d.seed++; break;
+            case 19: d.method = d.method ? ISOGI_TRACE_FEEDBACK : ISOGI_TRACE_PATHS; break;
+            case 20: if (base != 1) continue; d.error = 0.1f; break;
+            case 21: d.material = no_paint; break;
+            case 22: d.lighting.env.rgb = &image[0][0][0], d.lighting.env.width = 8, d.lighting.env.height = 4, d.lighting.env.rotation[0] = d.lighting.env.rotation[5] = -1, d.lighting.env.rotation[7] = -1; break;
+            case 23: d.lighting.env.rgb = &image2[0][0][0], d.lighting.env.width = 4, d.lighting.env.height = 8; break;
+            case 24: d.lighting.env.sh = other_sky, d.lighting.env.sh_order = 1; break;
+            case 25: d.lighting.env.sh = sky, d.lighting.env.sh_order = 2; break;
+            case 26: d.lighting.lights = &sphere, d.lighting.light_count = 1; break;
+            case 27: d.lighting.lights = &moved, d.lighting.light_count = 1; break;
+            case 28: d.lighting.lights = &red, d.lighting.light_count = 1; break;
+            case 29: d.lighting.lights = &turned, d.lighting.light_count = 1; break;
+            case 30: d.albedo_points = elsewhere, d.albedo_count = 1; break;
+            case 31: d.emission_points = elsewhere, d.emission_count = 1; break;
+            case 32: if (base != 4) continue; d.order = 3; break;
+            case 33: if (base != 4) continue; d.transfer_channels = 3; break;
+            case 34: d.lattice_min[2] = 1, d.lattice_max[0] = 11, d.lattice_max[1] = 12, d.lattice_max[2] = 10, d.lattice[2] = 11; break;
+            case 35: d.lattice[1] = 14; break;
+            case 36: d.lattice[2] = 12; break;
+            case 37: d.albedo[0] = 0.1f; break;
+            case 38: d.albedo[2] = 0.1f; break;
+            case 39: d.bounces = -1; break;
+            case 40: d.offset = -1; break;
+            case 41: d.mode = base == 4 ? ISOGI_TRACE_IRRADIANCE : ISOGI_TRACE_TRANSFER; break;
+            case 42: d.storage = ISOGI_TRACE_BYTE; break;
+            case 43: d.storage = base == 4 ? ISOGI_TRACE_BYTE : ISOGI_TRACE_RGB9E5; break;
+            case 44: d.seed += (uint64_t)1 << 40; break;
+            case 45: d.lighting.lights = NULL, d.lighting.light_count = 0, d.lighting.env.sh = NULL, d.lighting.env.sh_order = 0, d.lighting.env.rgb = NULL, d.lighting.env.width = d.lighting.env.height = 0; break;
+            case FIELDS: d.lazy = 1; break;
+            case FIELDS + 1: d.lookup = ISOGI_TRACE_BSPLINE; break;
+            case FIELDS + 2: d.isovalue_min = -0.1, d.isovalue_max = 0.1; break;
+            case FIELDS + 3: if (base == 4) continue; d.transfer_channels = 3, d.order = 2; break;
+            case FIELDS + 4: if (base == 1) continue; d.error = 0.1f; break;
+            default: d.box_end[0] = d.box_end[1] = d.box_end[2] = 5;
+            }
+            if (!light && (i == 3 || i == 5 || (i >= 22 && i <= 29) || i == 31 || i == 45)) continue;
+            if (base == 4 && i == 41) d.emission_count = 0;
+            if (i == 41 && (base == 2 || base == 3)) continue; /* no lamps, no emission in transfer */
+            other = NULL;
+            result = isogi_trace_create(&other, &d, NULL);
+            CHECK(result == ISOGI_OK, "base %d, change %d: %s", base, i, isogi_result_string(result));
+            if (result != ISOGI_OK) continue;
+            result = isogi_trace_load(other, block, size);
+            CHECK(result == expected, "base %d, change %d: %s", base, i, isogi_result_string(result));
+            refused += result == ISOGI_INVALID;
+            isogi_trace_free(other);
         }
-        other = NULL;
-        CHECK(isogi_trace_create(&other, &d, NULL) == ISOGI_OK, "change %d", i);
-        result = isogi_trace_load(other, block, size);
-        CHECK(result == expected, "change %d: %s", i, isogi_result_string(result));
-        isogi_trace_free(other);
+        CHECK(refused > 30, "%d descriptions were refused", refused);
+        isogi_trace_free(t), free(block);
     }
-    isogi_trace_free(t), free(block), scene_free(&s), scene_free(&s2);
+    isogi_vol_free(other_pyramid), isogi_vol_free(shifted), scene_free(&s), scene_free(&s2);
 }
 
 /* ---- memory that runs out --------------------------------------------------------------------------------------------------------------- */

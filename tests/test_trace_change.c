@@ -1,0 +1,423 @@
+/* Tests of what isogi_trace.h computes again when something changes: lighting, colours, isovalues, voxels. Path-traced, the changed texture
+   has the bits of a new one; counters say what it cost. */
+#define ISOGI_IMPLEMENTATION
+#include "isogi_trace.h"
+#include "test.h"
+#include "trace_scenes.h"
+
+static isogi_trace *baked(const isogi_trace_desc *d) {
+    isogi_trace *t = NULL;
+    CHECK(isogi_trace_create(&t, d, NULL) == ISOGI_OK && isogi_trace_step(t, 0, NULL) == ISOGI_OK, "create and step %d", 1);
+    return t;
+}
+
+static isogi_counters counted(const isogi_trace *t) {
+    isogi_counters c = {0};
+    isogi_trace_counters(t, &c);
+    return c;
+}
+
+static int same_bits(const isogi_trace *a, const isogi_trace *b) {
+    size_t size[2] = {isogi_trace_save_size(a), isogi_trace_save_size(b)};
+    uint8_t *block[2] = {(uint8_t *)malloc(size[0]), (uint8_t *)malloc(size[1])};
+    int same = isogi_trace_save(a, block[0], size[0]) == ISOGI_OK && isogi_trace_save(b, block[1], size[1]) == ISOGI_OK;
+    same = same && size[0] == size[1] && size[0] > 64 && !memcmp(block[0], block[1], size[0]);
+    free(block[0]), free(block[1]);
+    return same;
+}
+
+/* Steps to the end: texels and rays it took. The result is that of a new texture, bit by bit. */
+static isogi_counters finished(isogi_trace *t, const isogi_trace_desc *d, const char *what) {
+    isogi_counters before = counted(t), after;
+    double remaining = 1;
+    isogi_trace *fresh = baked(d);
+    isogi_trace_report report;
+    CHECK(isogi_trace_step(t, 0, &remaining) == ISOGI_OK && remaining <= 0, "%s: remaining %g", what, remaining);
+    isogi_trace_status(t, &report);
+    CHECK(report.drafts == 0 && same_bits(t, fresh), "%s: other bits than a new texture, %d drafts", what, (int)report.drafts);
+    after = counted(t);
+    after.rays -= before.rays, after.texels -= before.texels;
+    isogi_trace_free(fresh);
+    return after;
+}
+
+/* A new lighting, thousands of times as bright, too: irradiance is baked anew at its first price, and the old light can be read until the new
+   one is there. Short formats then have another unit. */
+TEST(irradiance_is_relit_at_the_price_of_a_bake) {
+    double q[1] = {0.5};
+    scene s = scene_make(8, 9, 7, NULL, gyroid, q);
+    isogi_light sun = light_make(ISOGI_LIGHT_DIRECTIONAL, 1, 2, 3, 5000, 0.1);
+    float points[30][3], e[3][30][3];
+    int n = surface_points(&s, 0, 30, 1, points);
+    for (int format = 1; format < 5; format++) {
+        isogi_trace_desc d = desc_make(&s, 0.5f, 2, 2), other = d;
+        isogi_counters counters, first;
+        isogi_trace_report report;
+        double remaining = 0;
+        d.storage = other.storage = (isogi_trace_format)format, d.sides = other.sides = format & 1 ? ISOGI_TRACE_BOTH_SIDES : ISOGI_TRACE_LOW_SIDE;
+        other.lighting.lights = &sun, other.lighting.light_count = 1;
+        isogi_trace *t = baked(&d), *fresh = baked(&other);
+        first = counted(fresh);
+        isogi_trace_sample(t, (const float(*)[3])points, (size_t)n, e[0], NULL);
+        CHECK(isogi_trace_relight(t, &other.lighting) == ISOGI_OK, "format %d", format);
+        isogi_trace_sample(t, (const float(*)[3])points, (size_t)n, e[1], NULL);
+        /* the error of the other unit: it is 2^11 larger */
+        double rounding = format == ISOGI_TRACE_FLOAT ? 0 : format == ISOGI_TRACE_HALF ? 0.02 : 4;
+        for (int i = 0; i < n; i++) CHECK(fabs((double)e[0][i][1] - (double)e[1][i][1]) <= rounding * PI, "format %d: %g before, %g after", format, (double)e[0][i][1], (double)e[1][i][1]);
+        isogi_trace_status(t, &report);
+        CHECK(report.drafts == report.texels && report.texels > 50, "%d drafts of %d texels", (int)report.drafts, (int)report.texels);
+        CHECK(isogi_trace_step(t, 200, &remaining) == ISOGI_OK && remaining > 0 && remaining < 1, "remaining %g", remaining);
+        counters = finished(t, &other, "another lighting");
+        CHECK(counted(t).texels == 2 * first.texels && counters.texels > 0, "%d texels of %d", (int)counters.texels, (int)first.texels);
+        isogi_trace_sample(fresh, (const float(*)[3])points, (size_t)n, e[2], NULL);
+        CHECK(isogi_trace_relight(t, &other.lighting) == ISOGI_OK, "the same again, format %d", format);
+        CHECK(finished(t, &other, "the same lighting").rays == 0, "the same lighting costs rays, format %d", format);
+        sun.rgb[0] *= 2; /* in place */
+        CHECK(isogi_trace_relight(t, &other.lighting) == ISOGI_OK && finished(t, &other, "changed in place").rays == first.rays, "changed in place, format %d", format);
+        isogi_trace_free(t), isogi_trace_free(fresh);
+    }
+    scene_free(&s);
+}
+
+/* Texels whose isovalue lies in [low, high]. */
+static int texels_between(const isogi_trace *t, const scene *s, double low, double high) {
+    size_t x[3], size[3], i = 0;
+    int n = 0;
+    isogi_trace_shape(t, size, NULL, NULL);
+    for (x[2] = 0; x[2] < size[2]; x[2]++)
+        for (x[1] = 0; x[1] < size[1]; x[1]++)
+            for (x[0] = 0; x[0] < size[0]; x[0]++, i++)
+                n += (double)s->data[i] > low && (double)s->data[i] < high && isogi_trace_valid(t, x);
+    return n;
+}
+
+/* Paths stay on the isosurface they begin on: a colour that changes between two isovalues changes the light of the texels in between. */
+TEST(colours_concern_their_isovalues) {
+    double q[1] = {0.5};
+    scene s = scene_make(11, 10, 12, NULL, gyroid, q);
+    isogi_albedo_point table[3][4] = {{{-1, {0.5f, 0.5f, 0.5f}}, {0, {0.5f, 0.5f, 0.5f}}, {0.4, {0.5f, 0.5f, 0.5f}}, {0.8, {0.5f, 0.5f, 0.5f}}}};
+    memcpy(table[1], table[0], sizeof table[0]), memcpy(table[2], table[0], sizeof table[0]);
+    table[1][2].rgb[1] = 0.9f; /* changes between 0 and 0.8 */
+    for (int mode = 0; mode < 2; mode++) {
+        isogi_trace_desc d = desc_make(&s, 0, 3, 2);
+        d.albedo_points = table[0], d.albedo_count = 4, d.mode = (isogi_trace_mode)mode, d.transfer_channels = 3;
+        isogi_trace *t = baked(&d);
+        isogi_counters counters;
+        d.albedo_points = table[1];
+        CHECK(isogi_trace_change(t, &d) == ISOGI_OK, "mode %d", mode);
+        counters = finished(t, &d, "colours between 0 and 0.8");
+        CHECK((int)counters.texels == texels_between(t, &s, 0, 0.8) && counters.texels > 50, "%d texels, %d expected", (int)counters.texels, texels_between(t, &s, 0, 0.8));
+        d.albedo_points = table[2];
+        CHECK(isogi_trace_change(t, &d) == ISOGI_OK && finished(t, &d, "back").texels == counters.texels, "back, mode %d", mode);
+        d.albedo_points = table[0];
+        CHECK(isogi_trace_change(t, &d) == ISOGI_OK && finished(t, &d, "equal").texels == 0, "an equal table, mode %d", mode);
+        table[0][0].rgb[0] = 0.6f;
+        CHECK(isogi_trace_change(t, &d) == ISOGI_OK && finished(t, &d, "in place").texels == (uint64_t)texels_between(t, &s, -9, 9), "in place, mode %d", mode);
+        table[0][0].rgb[0] = 0.5f;
+        d.bounces = 0;
+        CHECK(isogi_trace_change(t, &d) == ISOGI_OK, "mode %d", mode);
+        finished(t, &d, "no reflections");
+        d.albedo_points = table[1];
+        CHECK(isogi_trace_change(t, &d) == ISOGI_OK && finished(t, &d, "colours without reflections").texels == 0, "without reflections, mode %d", mode);
+        if (!mode) { /* what glows is seen without reflections */
+            d.emission_points = table[1], d.emission_count = 4;
+            isogi_trace *glowing = baked(&d);
+            d.emission_points = table[2];
+            CHECK(isogi_trace_change(glowing, &d) == ISOGI_OK && finished(glowing, &d, "emission").texels == counters.texels, "emission, mode %d", mode);
+            isogi_trace_free(glowing);
+        }
+        isogi_trace_free(t);
+    }
+    scene_free(&s);
+}
+
+/* An interval that grows adds texels; one that shrinks costs nothing, and what was computed is still there when it grows again. */
+TEST(isovalues_add_texels) {
+    double q[1] = {0.5};
+    scene s = scene_make(14, 13, 15, NULL, gyroid, q);
+    isogi_trace_desc d = desc_make(&s, 0.5f, 1, 4);
+    isogi_counters narrow, wide, more;
+    d.isovalue_min = 0.9, d.isovalue_max = 1;
+    isogi_trace *t = baked(&d);
+    narrow = counted(t);
+    d.isovalue_min = 0;
+    isogi_trace *fresh = baked(&d);
+    wide = counted(fresh);
+    CHECK(isogi_trace_change(t, &d) == ISOGI_OK, "wider %d", 1);
+    more = finished(t, &d, "a wider interval");
+    CHECK(more.texels == wide.texels - narrow.texels && more.texels > 100 && narrow.texels > 50, "%d and %d more texels, %d in all", (int)narrow.texels, (int)more.texels, (int)wide.texels);
+    d.isovalue_min = 0.9;
+    CHECK(isogi_trace_change(t, &d) == ISOGI_OK && isogi_trace_step(t, 0, NULL) == ISOGI_OK && counted(t).texels == wide.texels, "narrower %d", 1);
+    d.isovalue_min = 0;
+    CHECK(isogi_trace_change(t, &d) == ISOGI_OK && finished(t, &d, "wider again").texels == 0, "wider again %d", 1);
+    d.lookup = ISOGI_TRACE_BSPLINE; /* reads further */
+    CHECK(isogi_trace_change(t, &d) == ISOGI_OK, "lookup %d", 1);
+    finished(t, &d, "B-spline");
+    isogi_trace_free(t), isogi_trace_free(fresh), scene_free(&s);
+}
+
+/* Lazily an isovalue that moves costs the texels that were not read before, and none when it moves back. */
+TEST(moving_the_isovalue_lazily) {
+    double q[1] = {0.4};
+    scene s = scene_make(20, 20, 20, NULL, gyroid, q);
+    isogi_trace_desc d = desc_make(&s, 0.5f, 1, 4);
+    isogi_trace *t = NULL;
+    float points[100][3];
+    uint64_t texels[4];
+    d.lazy = 1;
+    isogi_trace_create(&t, &d, NULL);
+    for (int k = 0; k < 4; k++) {
+        static const double isovalue[4] = {0, 0.02, 0.5, 0};
+        int n = surface_points(&s, isovalue[k], 100, 3, points);
+        uint64_t before = counted(t).texels;
+        isogi_trace_request(t, (const float(*)[3])points, (size_t)n), isogi_trace_step(t, 0, NULL);
+        texels[k] = counted(t).texels - before;
+    }
+    CHECK(texels[0] > 100 && texels[1] < texels[0] / 4 && texels[2] > 100 && texels[3] == 0, "texels: %d at first, %d a little further, %d elsewhere, %d back", (int)texels[0], (int)texels[1], (int)texels[2], (int)texels[3]);
+    isogi_trace_free(t), scene_free(&s);
+}
+
+/* Random boxes of voxels take random values; full textures of many kinds then have the bits of new ones, for fewer texels. */
+static void change_box(scene *s, isogi_trace *t, test_random *r, int large) {
+    size_t first[3], last[3];
+    for (int a = 0; a < 3; a++) {
+        first[a] = (size_t)random_range(r, 0, (double)s->volume.size[a]);
+        last[a] = first[a] + (size_t)random_range(r, 0, large ? 6 : 2);
+        if (last[a] >= s->volume.size[a]) last[a] = s->volume.size[a] - 1;
+    }
+    double low = random_range(r, -1, 0.9), high = low + random_range(r, 0, 0.2);
+    CHECK(isogi_trace_touch(t, first, last) == ISOGI_OK, "before %d", 1);
+    for (size_t z = first[2]; z <= last[2]; z++)
+        for (size_t y = first[1]; y <= last[1]; y++)
+            for (size_t x = first[0]; x <= last[0]; x++)
+                s->data[x + s->volume.size[0] * (y + s->volume.size[1] * z)] = random_bits(r) % 40 ? (float)random_range(r, low, high) : (float)nan_value();
+    CHECK(isogi_vol_update(s->pyramid, first, last, NULL) == ISOGI_OK && isogi_trace_touch(t, first, last) == ISOGI_OK, "after %d", 1);
+}
+TEST(changed_voxels_give_the_bits_of_a_new_bake) {
+    double q[1] = {0.3}, saved = 0;
+    test_random r = {5};
+    int rounds = LONG_SUITE ? 60 : 8;
+    for (int k = 0; k < rounds; k++) {
+        scene s = scene_make(19, 17, 18, NULL, gyroid, q);
+        isogi_trace_desc d = desc_make(&s, 0.6f, k % 3 == 2 ? -1 : k % 3, 2);
+        isogi_trace *t;
+        uint64_t all;
+        if (k % 8 == 1) d.sides = ISOGI_TRACE_BOTH_SIDES;
+        if (k % 8 == 2) d.capped = 1;
+        if (k % 8 == 3) d.isovalue_min = -0.1, d.isovalue_max = 0.2;
+        if (k % 8 == 4) d.mode = ISOGI_TRACE_TRANSFER, d.order = 2;
+        if (k % 8 == 5) d.lattice[0] = 7, d.lattice[1] = 40, d.lattice[2] = 9;
+        if (k % 8 == 6) d.reach = 4, d.bounces = 0;
+        if (k % 8 == 7) d.lattice[0] = 6, d.lattice[1] = d.lattice[2] = 5, d.isovalue_min = -0.02, d.isovalue_max = 0.02;
+        t = baked(&d);
+        change_box(&s, t, &r, k & 1), change_box(&s, t, &r, 0);
+        all = counted(t).texels;
+        isogi_counters again = finished(t, &d, k % 8 == 6 ? "within reach" : "a box of voxels");
+        CHECK(again.texels > 0 || k % 8 == 7, "case %d: nothing was computed again", k);
+        saved += 1 - (double)again.texels / (double)all;
+        isogi_trace_free(t), scene_free(&s);
+    }
+    printf("    two boxes of up to 6 voxels in 19: on average %.0f %% of the texels are kept\n", 100 * saved / rounds);
+    CHECK(saved / rounds > 0.05, "%.2f of the texels are kept", saved / rounds);
+}
+
+/* On layers y = const, each an isosurface of its own, voxels of layers 10 and 11 change within the values of these: layers 8 to 13 are what
+   texels and normals there read, and no other surface passes there. With a reach of 3 and one reflection, only texels within 6 of the box. */
+TEST(only_surfaces_at_changed_voxels_are_computed_again) {
+    double q[1] = {8};
+    size_t first[3] = {15, 10, 15}, last[3] = {16, 11, 16};
+    for (int k = 0; k < 3; k++) {
+        scene s = scene_make(32, 24, 32, NULL, ground, q);
+        isogi_trace_desc d = desc_make(&s, 0.5f, 1, 2);
+        d.reach = k ? 3 : 0, d.lattice[1] = k == 2 ? 47 : 0;
+        isogi_trace *t = baked(&d);
+        CHECK(isogi_trace_touch(t, first, last) == ISOGI_OK, "before %d", k);
+        s.data[15 + 32 * (10 + 24 * 15)] = -2.5f, s.data[16 + 32 * (11 + 24 * 15)] = -2.75f;
+        isogi_vol_update(s.pyramid, first, last, NULL);
+        CHECK(isogi_trace_touch(t, first, last) == ISOGI_OK, "after %d", k);
+        isogi_counters c = finished(t, &d, "layers");
+        int layers = k == 2 ? 11 : 6;
+        if (!k) CHECK((int)c.texels == layers * 32 * 32, "%d texels, %d expected", (int)c.texels, layers * 32 * 32);
+        else CHECK((int)c.texels < layers * 23 * 23 && (int)c.texels > layers * 17 * 17, "%d texels within reach", (int)c.texels);
+        isogi_trace_free(t), scene_free(&s);
+    }
+}
+
+/* A lattice of every eighth voxel, an interval of isovalues: a lump in the air brings texels in that are far from it, and its end does away with
+   what is to be done. */
+TEST(changed_voxels_bring_texels_into_the_interval) {
+    double q[1] = {6.5};
+    scene s = scene_make(33, 33, 33, NULL, ground, q);
+    size_t first[3] = {17, 18, 17}, last[3] = {20, 21, 20};
+    isogi_trace_desc d = desc_make(&s, 0.5f, 1, 2);
+    d.lattice[0] = d.lattice[1] = d.lattice[2] = 5, d.isovalue_min = 0.4, d.isovalue_max = 0.6;
+    isogi_trace *t = baked(&d);
+    for (int k = 0; k < 2; k++) {
+        CHECK(isogi_trace_touch(t, first, last) == ISOGI_OK, "before %d", k);
+        for (size_t z = first[2]; z <= last[2]; z++)
+            for (size_t y = first[1]; y <= last[1]; y++)
+                for (size_t x = first[0]; x <= last[0]; x++) s.data[x + 33 * (y + 33 * z)] = k ? (float)(6.5 - (double)y) : 3;
+        isogi_vol_update(s.pyramid, first, last, NULL);
+        CHECK(isogi_trace_touch(t, first, last) == ISOGI_OK, "after %d", k);
+        if (!k) CHECK(finished(t, &d, "a lump").texels >= 8, "texels around the lump %d", k);
+    }
+    isogi_trace_step(t, 0, NULL);
+    isogi_trace_free(t), scene_free(&s);
+}
+
+/* Without feedback's exactness: light after a change agrees with a new bake as two seeds do; lazily what was asked for stays asked for. */
+TEST(feedback_follows_changes) {
+    double q[5] = {16, 15, 16, 20, 9};
+    isogi_light sun = light_make(ISOGI_LIGHT_DIRECTIONAL, 1, 3, 1, 2, 0.2);
+    for (int lazy = 0; lazy < 2; lazy++) {
+        scene s = scene_make(33, 33, 33, NULL, pit, q);
+        size_t first[3] = {14, 7, 14}, last[3] = {17, 12, 17};
+        isogi_trace_desc d = desc_make(&s, 0.7f, -1, 16);
+        isogi_trace *t = NULL, *fresh = NULL;
+        float points[200][3], e[2][200][3];
+        double sum = 0, mean = 0, moved = 0, remaining = 1;
+        d.method = ISOGI_TRACE_FEEDBACK, d.lazy = lazy, d.isovalue_min = -0.01, d.isovalue_max = 0.01;
+        int n = surface_points(&s, 0, 200, 7, points);
+        isogi_trace_create(&t, &d, NULL), isogi_trace_request(t, (const float(*)[3])points, (size_t)n);
+        isogi_trace_step(t, lazy ? 3000 : 0, &remaining); /* lazily in the middle of its work */
+        uint64_t whole = counted(t).rays;
+        d.lighting.lights = &sun, d.lighting.light_count = 1;
+        CHECK(isogi_trace_change(t, &d) == ISOGI_OK && isogi_trace_step(t, 0, &remaining) == ISOGI_OK && remaining <= 0, "lighting, remaining %g", remaining);
+        isogi_trace_sample(t, (const float(*)[3])points, (size_t)n, e[0], NULL);
+        CHECK(isogi_trace_touch(t, first, last) == ISOGI_OK, "before %d", lazy);
+        for (size_t z = first[2]; z <= last[2]; z++)
+            for (size_t y = first[1]; y <= last[1]; y++)
+                for (size_t x = first[0]; x <= last[0]; x++) s.data[x + 33 * (y + 33 * z)] = 3 + 0.1f * (float)(x + y + z); /* a block in the pit */
+        isogi_vol_update(s.pyramid, first, last, NULL);
+        CHECK(isogi_trace_touch(t, first, last) == ISOGI_OK, "after %d", lazy);
+        n = surface_points(&s, 0, 200, 8, points);
+        isogi_trace_request(t, (const float(*)[3])points, (size_t)n);
+        CHECK(isogi_trace_step(t, 0, &remaining) == ISOGI_OK && remaining <= 0 && counted(t).rays > whole, "voxels, remaining %g", remaining);
+        isogi_trace_sample(t, (const float(*)[3])points, (size_t)n, e[0], NULL);
+        isogi_trace_create(&fresh, &d, NULL), isogi_trace_request(fresh, (const float(*)[3])points, (size_t)n), isogi_trace_step(fresh, 0, NULL);
+        isogi_trace_sample(fresh, (const float(*)[3])points, (size_t)n, e[1], NULL);
+        for (int i = 0; i < n; i++) sum += pow((double)e[0][i][1] - (double)e[1][i][1], 2) / n, mean += (double)e[1][i][1] / n, moved += (double)e[0][i][1] / n;
+        printf("    %s: after changes of light and voxels %.3f rms from a new bake, means %.4f and %.4f\n", lazy ? "lazy" : "full", sqrt(sum) / mean, moved / mean, 1.0);
+        CHECK(sqrt(sum) / mean < 0.08 && fabs(moved / mean - 1) < 0.02, "lazy %d: %.4f rms, mean %.4f", lazy, sqrt(sum) / mean, moved / mean);
+        isogi_trace_free(t), isogi_trace_free(fresh), scene_free(&s);
+    }
+}
+
+/* Two levels on both sides: the coarse one is computed again, and decides anew. */
+TEST(hierarchies_follow_changes) {
+    double q[5] = {10, 12, 10, 4, 5};
+    scene s = scene_make(25, 25, 25, NULL, ball_over_plane, q);
+    size_t first[3] = {16, 8, 16}, last[3] = {18, 10, 18};
+    isogi_light sun = light_make(ISOGI_LIGHT_DIRECTIONAL, 1, 3, 1, 2, 0.2);
+    isogi_trace_desc d = desc_make(&s, 0.5f, 1, 16);
+    float points[100][3], e[2][100][3];
+    double worst = 0, remaining = 1;
+    d.hierarchy = 0.2f, d.isovalue_min = -0.5, d.isovalue_max = 0.5, d.sides = ISOGI_TRACE_BOTH_SIDES;
+    isogi_trace *t = baked(&d), *fresh;
+    CHECK(isogi_trace_relight(t, &(isogi_lighting){.lights = &sun, .light_count = 1}) == ISOGI_OK, "relight %d", 1);
+    CHECK(isogi_trace_touch(t, first, last) == ISOGI_OK, "before %d", 1);
+    for (size_t z = first[2]; z <= last[2]; z++)
+        for (size_t y = first[1]; y <= last[1]; y++)
+            for (size_t x = first[0]; x <= last[0]; x++) s.data[x + 25 * (y + 25 * z)] = 1.5f;
+    isogi_vol_update(s.pyramid, first, last, NULL);
+    CHECK(isogi_trace_touch(t, first, last) == ISOGI_OK && isogi_trace_step(t, 0, &remaining) == ISOGI_OK && remaining <= 0, "after: remaining %g", remaining);
+    memset(&d.lighting, 0, sizeof d.lighting), d.lighting.lights = &sun, d.lighting.light_count = 1;
+    fresh = baked(&d);
+    int n = surface_points(&s, 0, 100, 4, points);
+    isogi_trace_sample(t, (const float(*)[3])points, (size_t)n, e[0], NULL), isogi_trace_sample(fresh, (const float(*)[3])points, (size_t)n, e[1], NULL);
+    for (int i = 0; i < n; i++) worst = fmax(worst, fabs((double)e[0][i][1] - (double)e[1][i][1]));
+    /* cells that were fine before stay so: where they need not be, the fine texels' noise is seen instead of the coarse ones' */
+    CHECK(worst < 0.35 * PI, "largest difference %.4f", worst);
+    isogi_trace_free(t), isogi_trace_free(fresh), scene_free(&s);
+}
+
+/* ---- what cannot change, and memory ---------------------------------------------------------------------------------------------- */
+
+TEST(other_textures_are_refused) {
+    double q[1] = {0.5};
+    scene s = scene_make(8, 8, 8, NULL, gyroid, q), s2 = scene_make(8, 8, 8, NULL, gyroid, q);
+    const isogi_trace_desc good = desc_make(&s, 0.5f, 1, 1);
+    isogi_trace *t = baked(&good);
+    size_t first[3] = {1, 2, 3}, last[3] = {2, 1, 3}, beyond[3] = {8, 8, 8}, far_off[3] = {1000, 1000, (size_t)-1};
+    for (int i = 0; i < 17; i++) {
+        isogi_trace_desc d = good;
+        switch (i) {
+        case 0: d.pyramid = s2.pyramid; break;
+        case 1: d.mode = ISOGI_TRACE_TRANSFER; break;
+        case 2: d.lattice[1] = 8; break;
+        case 3: d.lattice_max[0] = d.lattice_max[1] = d.lattice_max[2] = 5; break;
+        case 4: d.normals = ISOGI_NORMAL_TRILINEAR; break;
+        case 5: d.lazy = 1; break;
+        case 6: d.capped = 1; break;
+        case 7: d.sides = ISOGI_TRACE_HIGH_SIDE; break;
+        case 8: d.storage = ISOGI_TRACE_HALF; break;
+        case 9: d.hierarchy = 0.3f; break;
+        case 10: d.box_end[0] = d.box_end[1] = d.box_end[2] = 3; break;
+        case 11: d.method = ISOGI_TRACE_FEEDBACK; break;
+        case 12: d.albedo[0] = 2; break;
+        case 13: d.pyramid = NULL; break;
+        case 14: d.order = 3; break;
+        case 15: d.lattice_min[2] = 1, d.lattice_max[2] = 2; break;
+        default: d.box_first[0] = 1, d.box_end[0] = d.box_end[1] = d.box_end[2] = 8;
+        }
+        CHECK(isogi_trace_change(t, &d) == ISOGI_INVALID, "change %d", i);
+    }
+    CHECK(isogi_trace_change(NULL, &good) == ISOGI_INVALID && isogi_trace_change(t, NULL) == ISOGI_INVALID && isogi_trace_relight(t, NULL) == ISOGI_INVALID, "nothing %d", 1);
+    CHECK(isogi_trace_touch(t, first, last) == ISOGI_INVALID && isogi_trace_touch(t, beyond, beyond) == ISOGI_INVALID && isogi_trace_touch(t, NULL, last) == ISOGI_INVALID, "an empty box %d", 1);
+    CHECK(counted(t).rays == finished(t, &good, "nothing changed").rays + counted(t).rays, "rays %d", 0);
+    CHECK(isogi_trace_touch(t, first, far_off) == ISOGI_OK, "cut to the volume %d", 1);
+    finished(t, &good, "touched, not changed");
+    isogi_trace_free(t), scene_free(&s), scene_free(&s2);
+}
+
+typedef struct scarce { long left, blocks; } scarce;
+static void *scarce_alloc(void *user, size_t size, size_t align) {
+    scarce *m = (scarce *)user;
+    void *p = NULL;
+    if (m->left-- == 0 || posix_memalign(&p, align < sizeof(void *) ? sizeof(void *) : align, size)) return NULL;
+    m->blocks++;
+    return p;
+}
+static void scarce_release(void *user, void *p, size_t size) { (void)size, ((scarce *)user)->blocks--, free(p); }
+
+/* The k-th allocation fails, for every k: the texture is as it was, and the same call works afterwards. */
+TEST(every_allocation_may_fail) {
+    enum { W = 16, H = 8 };
+    static float image[2][H][W][3];
+    double q[1] = {0.5};
+    scene s = scene_make(9, 8, 9, NULL, gyroid, q);
+    size_t first[3] = {0, 0, 0}, last[3] = {4, 4, 4};
+    for (int i = 0; i < 2 * W * H * 3; i++) (&image[0][0][0][0])[i] = i < W * H * 3 ? 1 : (float)(i % 7);
+    for (int kind = 0; kind < 4; kind++) {
+        int finished_once = 0;
+        for (long k = 0; k < 60 && !finished_once; k++) {
+            scarce memory = {-1, 0};
+            isogi_context context = {.alloc = scarce_alloc, .release = scarce_release, .user = &memory, .threads = 1};
+            isogi_trace_desc d = desc_make(&s, 0.5f, 1, 1), other;
+            isogi_trace *t = NULL, *same;
+            d.sides = kind & 1 ? ISOGI_TRACE_BOTH_SIDES : ISOGI_TRACE_LOW_SIDE, d.isovalue_min = 0.6, d.isovalue_max = 0.7;
+            d.method = kind < 2 ? ISOGI_TRACE_PATHS : ISOGI_TRACE_FEEDBACK;
+            d.lighting.env.sh = NULL, d.lighting.env.sh_order = 0, d.lighting.env.rgb = &image[0][0][0][0], d.lighting.env.width = W, d.lighting.env.height = H;
+            isogi_trace_create(&t, &d, &context), isogi_trace_step(t, 0, NULL);
+            same = baked(&d), other = d;
+            other.lighting.env.rgb = &image[1][0][0][0], other.isovalue_min = -0.5, other.albedo[0] = 0.9f;
+            memory.left = k;
+            isogi_result result = kind == 3 ? isogi_trace_touch(t, first, last) : isogi_trace_change(t, &other);
+            finished_once = memory.left >= 0;
+            memory.left = -1;
+            CHECK(result == (finished_once ? ISOGI_OK : ISOGI_NO_MEMORY), "kind %d, allocation %ld: %d", kind, k, result);
+            if (result != ISOGI_OK) {
+                CHECK(isogi_trace_step(t, 0, NULL) == ISOGI_OK && same_bits(t, same), "kind %d: changed after allocation %ld", kind, k);
+                CHECK((kind == 3 ? isogi_trace_touch(t, first, last) : isogi_trace_change(t, &other)) == ISOGI_OK, "kind %d: again after allocation %ld", kind, k);
+            }
+            if (kind < 2) finished(t, &other, "after a failure");
+            else CHECK(isogi_trace_step(t, 0, NULL) == ISOGI_OK, "kind %d: step after allocation %ld", kind, k);
+            isogi_trace_free(t), isogi_trace_free(same);
+            CHECK(memory.blocks == 0, "kind %d, allocation %ld: %ld blocks leak", kind, k, memory.blocks);
+        }
+        CHECK(finished_once, "kind %d: there are more allocations", kind);
+    }
+    scene_free(&s);
+}
+
+TEST_MAIN("trace_change")
