@@ -58,7 +58,7 @@
    Memory       None allocated. Stack use stays below 32 KB.
    Threads      Every function is pure: call them from any thread.
    Determinism  The same input on the same instruction path gives the same bits. Paths agree within the float errors below.
-   Accuracy     Largest absolute error against 128 bits, poles and all: double 1e-15 at degree 4, 3e-15 at 10, 1e-14 at 20, 6e-14 at 50,
+   Accuracy     Largest absolute error against 128 bits, poles and all: double 1e-15 at degree 4, 5e-15 at 10, 1.5e-14 at 20, 6e-14 at 50,
                 2e-13 at 100; float 4.5e-7 at 4, 2.2e-6 at 10, 1e-5 at 20. tests/test_sh.c states and checks each.
                 All bounds assume IEEE arithmetic: -ffast-math may reorder what cancels, and costs up to four times as much.
    Limits       Order 1..101 (degree 0..100), 1..16 channels. Counts times order^2 must be addressable.
@@ -340,8 +340,9 @@ ISOGI_API isogi_result isogi_sh_fit_directional(float direction[3], float rgb[3]
 #define ISOGI_SH__GROUP 5     /* orders m that are projected in one pass */
 
 /* 16-byte vectors where the compiler's target has them; 32 and 64 bytes by the processor that runs. gcc for Windows does not align its
-   stack for those. */
-#if !defined(ISOGI_NO_SIMD) && (defined(__SSE2__) || defined(__ARM_NEON)) && (defined(__clang__) || (defined(__GNUC__) && __GNUC__ >= 12))
+   stack for those. Not where floats are computed in x87 registers, whose scalars do not mix with vectors. */
+#if !defined(ISOGI_NO_SIMD) && (defined(__SSE2__) || defined(__ARM_NEON)) && (defined(__clang__) || (defined(__GNUC__) && __GNUC__ >= 12)) && \
+    !(defined(__FLT_EVAL_METHOD__) && __FLT_EVAL_METHOD__ == 2)
 #define ISOGI_SH__VECTORS 1
 #endif
 #if !defined(ISOGI_NO_SIMD) && defined(__x86_64__) && (defined(__clang__) || (defined(__GNUC__) && __GNUC__ >= 12 && !defined(_WIN32)))
@@ -350,12 +351,15 @@ ISOGI_API isogi_result isogi_sh_fit_directional(float direction[3], float rgb[3]
 #if defined(__clang__)
 #define ISOGI_SH__UNROLL _Pragma("unroll 5")
 #define ISOGI_SH__UNROLL9 _Pragma("unroll 9")
+#define ISOGI_SH__UNROLL25 _Pragma("unroll 25")
 #elif defined(__GNUC__) && __GNUC__ >= 8
 #define ISOGI_SH__UNROLL _Pragma("GCC unroll 5")
 #define ISOGI_SH__UNROLL9 _Pragma("GCC unroll 9")
+#define ISOGI_SH__UNROLL25 _Pragma("GCC unroll 25")
 #else
 #define ISOGI_SH__UNROLL
 #define ISOGI_SH__UNROLL9
+#define ISOGI_SH__UNROLL25
 #endif
 
 #if defined(__GNUC__)
@@ -435,6 +439,7 @@ static isogi_sh__unit isogi_sh__normalise(double x, double y, double z) {
 /* Written by tests/generate_sh.h, which tests/test_sh.c compares with this.
    table: for each degree l of m = 0 the factors (l-1)/l, -(2l-1)/l, sqrt((2l+1)/(4 pi)); then for each m > 0 the diagonal q_m and for
    each l > m the factors a_l, -a_l / a_{l-1} of the recursion.
+   polynomials: for m = 1 .. 10, l = m .. 10 those of isogi_sh__eval_f8_low and its like, the highest coefficient first.
    turn: for l = 1 .. 15, n = 0 .. l, m = n .. l the entries of a quarter turn about y, see isogi_sh__turn_y.
    latitudes: for m = 0 .. 4, l = m .. 4 the values q_l^m sin^m at 7 Legendre nodes (and an empty lane); pi times their weights. */
 /* generated: begin */
@@ -722,6 +727,46 @@ static const float isogi_sh__table_f32[463] = {
 };
 #endif
 #ifdef ISOGI_SH__SIMD
+static const float isogi_sh__polynomials_f32[125] = {
+    0.488602519f, 1.09254849f, 1.14261448f, 0.68556869f, 2.34166288f, 0.334523261f, 2.37796998f, 1.58531332f, -0.339709997f,
+    4.80662632f, 0.873932064f, -1.0195874f, 4.84403229f, 3.35356092f, -1.72759199f, -0.68877852f, 9.7455616f, 1.9491123f,
+    -4.3480196f, -0.368014216f, 9.79113674f, 6.91139078f, -5.7594924f, -3.01265764f, 0.318181753f, 19.6563091f, 4.13817024f,
+    -13.5099096f, -1.70395255f, 1.00645542f, 0.546274245f, 1.44530571f, 1.65580571f, 0.76876694f, 3.59515262f, 0.299596041f,
+    3.79997158f, 1.55453384f, -0.510981023f, 7.91027164f, -0.30424124f, -1.35871363f, 8.15372181f, 2.03843045f, -3.17524743f,
+    -0.544353545f, 16.6998196f, -3.68378377f, -6.20103598f, 0.234959289f, 17.0228634f, 0.895940185f, -11.1663132f,
+    -1.34061635f, 0.721474469f, 0.590043604f, 1.77013075f, 2.20157242f, 1.16194093f, 5.06662893f, 1.03635597f, 5.59340668f,
+    3.22696543f, -0.256690443f, 12.0438452f, 2.00730753f, -1.5633837f, 12.7546978f, 6.18977976f, -3.23556685f, -0.989246547f,
+    26.7076645f, 1.05425f, -8.7595768f, -0.525833011f, 0.625835717f, 2.07566237f, 2.77510691f, 1.5767653f, 6.74590254f,
+    1.94593346f, 7.77426863f, 5.44198799f, 0.186881453f, 17.3302212f, 5.60683632f, -1.46542311f, 18.8851719f, 12.6729441f,
+    -2.33506656f, -1.38039351f, 0.656382084f, 2.36661911f, 3.37295127f, 2.01079798f, 8.62477684f, 3.01867175f, 10.3567886f,
+    8.22450829f, 0.830066144f, 23.8880615f, 10.6867647f, -0.984550536f, 0.683184087f, 2.64596057f, 3.99249578f, 2.46203899f,
+    10.6964455f, 4.247118f, 13.3538322f, 11.5967493f, 1.68214881f, 0.707162738f, 2.91570663f, 4.6316967f, 2.92886686f,
+    12.955121f, 5.62524986f, 0.728926659f, 3.17731762f, 5.2889061f, 3.4099524f, 0.74890095f, 3.43189526f, 0.767395139f,
+};
+static const double isogi_sh__polynomials_f64[125] = {
+    0.48860251190291992, 1.0925484305920792, 1.1426144986611644, 0.68556869919669861, 2.341662902450512, 0.3345232717786446,
+    2.377969918777409, 1.5853132791849391, -0.33970998839677269, 4.8066262407795337, 0.87393204377809708, -1.0195873844077799,
+    4.8440324566124913, 3.3535609315009554, -1.7275919950156435, -0.68877850781669447, 9.7455613522034579, 1.9491122704406918,
+    -4.3480196802138504, -0.36801420490838233, 9.7911371020665339, 6.9113908955763765, -5.7594924129803138,
+    -3.0126575698666258, 0.31818174868912225, 19.656309531350573, 4.138170427652752, -13.509909337336927, -1.7039525290334863,
+    1.0064554773137349, 0.54627421529603959, 1.4453057213202771, 1.6558057175757301, 0.76876694030301751, 3.5951525887299929,
+    0.29959604906083276, 3.7999716954990594, 1.5545338754314335, -0.51098104238718411, 7.9102718774540648,
+    -0.30424122605592557, -1.3587136572724858, 8.1537216195240063, 2.0384304048810016, -3.1752473614492525,
+    -0.54435357403072204, 16.699819552772645, -3.6837837248763186, -6.2010359368751367, 0.23495928245204725,
+    17.022863398799789, 0.89594017888419941, -11.166313258887634, -1.3406163706098131, 0.72147445223743711,
+    0.59004358992664352, 1.7701307697799304, 2.2015723474586268, 1.1619409611587197, 5.0666289273320793, 1.0363559169542889,
+    5.5934068855770116, 3.2269655109098143, -0.25669043836782612, 12.043845014131556, 2.0073075023552591, -1.5633837277959231,
+    12.754697865447371, 6.1897798464671068, -3.2355667379259878, -0.98924657511282288, 26.707665430062931, 1.0542499511866945,
+    -8.7595768003012129, -0.52583300261395183, 0.62583573544917614, 2.0756623148810411, 2.7751069540079829,
+    1.5767653147772629, 6.7459025233633838, 1.9459334202009761, 7.7742685273391237, 5.4419879691373865, 0.18688145498411354,
+    17.330221764598988, 5.6068364532526136, -1.4654231639182966, 18.885171335259027, 12.672943922344874, -2.3350666569718497,
+    -1.3803934736637187, 0.65638205684017015, 2.3666191622317521, 3.3729512616816919, 2.0107978675410085, 8.6247765552452709,
+    3.0186717943358445, 10.356788429579144, 8.2245084587834381, 0.83006613148832853, 23.888062168776749, 10.686764654452755,
+    -0.98455054991281876, 0.6831841051919143, 2.6459606618019, 3.9924957454465693, 2.4620390430253845, 10.696445095454319,
+    4.2471179055480377, 13.353832715031466, 11.596749463053641, 1.6821488191728877, 0.70716273252459616, 2.9157066406993195,
+    4.6316965914244523, 2.9288669622242858, 12.955120656683151, 5.6252497588229469, 0.72892666017482988, 3.1773176489546975,
+    5.2889058608439745, 3.4099524629125626, 0.74890095185318828, 3.4318952998917145, 0.76739511822199002,
+};
 static const double isogi_sh__wigner_f64[448] = {
     0.8660254037844386, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.70710678118654757, 0.0,
     0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.52704627669472992, 0.55901699437494745,
@@ -939,91 +984,77 @@ static void isogi_sh__eval_block(const isogi_sh__output *out, size_t first, int 
 typedef float isogi_sh__f4 __attribute__((vector_size(16), aligned(4), may_alias));
 typedef int32_t isogi_sh__i4 __attribute__((vector_size(16), aligned(4), may_alias));
 
-/* Defines NAME(out, stride, order, x, y, z, count): all functions at the first directions, that of index i at out + stride i; WIDTH at a
-   time. It returns how many directions are done, and stops before a block with a squared length outside [1e-30, 1e30].
+/* Defines NAME_any: all functions for WIDTH directions, that of index i at out + stride i; NAME_load and NAME_unit: directions of
+   length 1, or 0 for a squared length outside [1e-30, 1e30].
 
    Lengths that differ from 1 by rounding alone are corrected by a series, others by a root in each lane. z = z' + low, since half an
    ulp of z near the poles is much for m < 3; t = 1 - |z| is exact there. Columns of the recursion go in pairs, so that two chains of
    operations hide each other's latency. Near the poles (x + i y)^m would become denormal numbers, which take a hundred times as
    long: what is too small to matter is cleared. */
-#define ISOGI_SH__DEFINE_EVAL(NAME, TARGET, T, V, I, WIDTH, MOST, FMA, REST, LESS, TABLE, SQUARED_ERROR, NEAR_POLE, TINY, ROOT)      \
+#define ISOGI_SH__DEFINE_EVAL(NAME, TARGET, T, V, I, WIDTH, FMA, REST, LESS, TABLE, SQUARED_ERROR, NEAR_POLE, TINY, ROOT)      \
+    /* scales vectors to about length 1, in place; 0 if a squared length is out of range */                                    \
+    TARGET ISOGI_SH__APART int NAME##_scale(V *u) {                                                                            \
+        V square = FMA(u[0], u[0], FMA(u[1], u[1], u[2] * u[2]));                                                              \
+        T lane[WIDTH];                                                                                                         \
+        int k;                                                                                                                 \
+        memcpy(lane, &square, sizeof lane);                                                                                    \
+        for (k = 0; k < WIDTH; k++) {                                                                                          \
+            if (!(lane[k] > (T)1e-30 && lane[k] < (T)1e30)) return 0;                                                          \
+            lane[k] = 1 / ROOT(lane[k]);                                                                                       \
+        }                                                                                                                      \
+        memcpy(&square, lane, sizeof lane);                                                                                    \
+        u[0] *= square, u[1] *= square, u[2] *= square;                                                                        \
+        return 1;                                                                                                              \
+    }                                                                                                                          \
     /* u[0..2] becomes a unit vector, u[3] the rest of its z */                                                                \
     TARGET ISOGI_SH__INLINE int NAME##_unit(V *u) {                                                                            \
-        V x = u[0], y = u[1], z = u[2], zero = {0}, one = zero + 1;                                                            \
-        V e = FMA(-x, x, FMA(-y, y, REST(one, z)));                                                                         \
+        V x = u[0], y = u[1], z = u[2], zero = {0}, one = zero + 1, e = FMA(-x, x, FMA(-y, y, REST(one, z)));                  \
         if (!LESS(e * e, zero + (T)SQUARED_ERROR)) {                                                                           \
-            T lane[WIDTH];                                                                                                     \
-            int k;                                                                                                             \
-            e = FMA(x, x, FMA(y, y, z * z));                                                                                   \
-            memcpy(lane, &e, sizeof lane);                                                                                     \
-            for (k = 0; k < WIDTH; k++) {                                                                                      \
-                if (!(lane[k] > (T)1e-30 && lane[k] < (T)1e30)) return 0;                                                      \
-                lane[k] = 1 / ROOT(lane[k]);                                                                                   \
-            }                                                                                                                  \
-            memcpy(&e, lane, sizeof lane);                                                                                     \
-            x *= e, y *= e, z *= e;                                                                                            \
-            e = FMA(-x, x, FMA(-y, y, REST(one, z)));                                                                       \
+            V scaled[3];                                                                                                       \
+            scaled[0] = x, scaled[1] = y, scaled[2] = z;                                                                       \
+            if (!NAME##_scale(scaled)) return 0;                                                                               \
+            x = scaled[0], y = scaled[1], z = scaled[2];                                                                       \
+            e = FMA(-x, x, FMA(-y, y, REST(one, z)));                                                                          \
         }                                                                                                                      \
         e *= FMA(e, zero + (T)0.375, zero + (T)0.5);                                                                           \
         u[0] = FMA(x, e, x), u[1] = FMA(y, e, y), u[2] = FMA(z, e, z), u[3] = FMA(z, e, z - u[2]);                             \
         return 1;                                                                                                              \
     }                                                                                                                          \
-    /* order 5 as polynomials in cos 2t = z^2 - x^2 - y^2, whose coefficients are small, so that little cancels anywhere; not for   \
-       16-byte vectors, whose products are not fused: 4.7e-7 was seen */                                                      \
-    TARGET ISOGI_SH__INLINE void NAME##_order5(T *out, size_t stride, const V *u) {                                            \
-        V x = u[0], y = u[1], z = u[2], zero = {0}, v = FMA(z, z, -FMA(x, x, y * y)), c = (x - y) * (x + y), s = x * y, c3, s3, f; \
-        *(V *)(out + 0 * stride) = zero + (T)0.28209479177387814;                                                              \
-        *(V *)(out + 1 * stride) = y * (T)0.48860251190291992;                                                                 \
-        *(V *)(out + 2 * stride) = z * (T)0.48860251190291992;                                                                 \
-        *(V *)(out + 3 * stride) = x * (T)0.48860251190291992;                                                                 \
-        s += s;                                                                                                                \
-        *(V *)(out + 4 * stride) = s * (T)0.54627421529603959;                                                                 \
-        f = z * (T)1.0925484305920792;                                                                                         \
-        *(V *)(out + 5 * stride) = f * y;                                                                                      \
-        *(V *)(out + 6 * stride) = FMA(v, zero + (T)0.47308734787878, zero + (T)0.15769578262626);                             \
-        *(V *)(out + 7 * stride) = f * x;                                                                                      \
-        *(V *)(out + 8 * stride) = c * (T)0.54627421529603959;                                                                 \
-        c3 = FMA(x, c, -(y * s)), s3 = FMA(x, s, y * c);                                                                       \
-        *(V *)(out + 9 * stride) = s3 * (T)0.59004358992664352;                                                                \
-        f = z * (T)1.4453057213202769;                                                                                         \
-        *(V *)(out + 10 * stride) = f * s;                                                                                     \
-        *(V *)(out + 14 * stride) = f * c;                                                                                     \
-        f = FMA(v, zero + (T)1.1426144986611644, zero + (T)0.6855686991966986);                                                \
-        *(V *)(out + 11 * stride) = f * y;                                                                                     \
-        *(V *)(out + 12 * stride) = z * FMA(v, zero + (T)0.9329408314752885, zero - (T)0.1865881662950577);                    \
-        *(V *)(out + 13 * stride) = f * x;                                                                                     \
-        *(V *)(out + 15 * stride) = c3 * (T)0.59004358992664352;                                                               \
-        *(V *)(out + 16 * stride) = (s * c) * (T)1.2516714708983523;                                                           \
-        f = z * (T)1.7701307697799304;                                                                                         \
-        *(V *)(out + 17 * stride) = f * s3;                                                                                    \
-        *(V *)(out + 23 * stride) = f * c3;                                                                                    \
-        f = FMA(v, zero + (T)1.6558057175757301, zero + (T)1.18271836969695);                                                  \
-        *(V *)(out + 18 * stride) = f * s;                                                                                     \
-        *(V *)(out + 22 * stride) = f * c;                                                                                     \
-        f = z * FMA(v, zero + (T)2.341662902450512, zero + (T)0.3345232717786446);                                             \
-        *(V *)(out + 19 * stride) = f * y;                                                                                     \
-        *(V *)(out + 20 * stride) = FMA(v, FMA(v, zero + (T)0.9256235355080377, zero + (T)0.26446386728801075), zero - (T)0.343803027474414); \
-        *(V *)(out + 21 * stride) = f * x;                                                                                     \
-        *(V *)(out + 24 * stride) = FMA(c, c, -(s * s)) * (T)0.62583573544917614;                                              \
+    TARGET ISOGI_SH__INLINE int NAME##_load(V *u, const T *x, const T *y, const T *z) {                                        \
+        u[0] = *(const V *)x, u[1] = *(const V *)y, u[2] = *(const V *)z;                                                      \
+        return NAME##_unit(u);                                                                                                 \
     }                                                                                                                          \
-    /* columns m and m + 1, whose (x + i y)^m are c[0] + i s[0] and c[1] + i s[1]; centre: where Y_m^0 goes */                 \
-    TARGET ISOGI_SH__INLINE void NAME##_columns(T *centre, size_t stride, int order, int m, V z, V low, const V *c, const V *s) { \
+    TARGET ISOGI_SH__INLINE V NAME##_clear(V x) {                                                                              \
+        V zero = {0};                                                                                                          \
+        I top = (I)(zero - 1) ^ (I)(zero + 1);                                                                                 \
+        return (V)((I)x & (I)((V)((I)x & ~top) > (T)TINY));                                                                    \
+    }                                                                                                                          \
+    /* degrees `from` to `to` - 1 of columns m and m + 1, whose (x + i y)^m are c[0] + i s[0] and c[1] + i s[1]; centre: where Y_l^0 of the \
+       first of them goes, not before m. In `state` stands where the recursion was left off, and will be, where it is not NULL. */ \
+    TARGET ISOGI_SH__INLINE void NAME##_columns(T *centre, size_t stride, int from, int to, int m, V z, V low, const V *c, const V *s, V *state) { \
         const T *a = TABLE + 3 * ISOGI_SH__TABLE_ORDER + (m - 1) * (2 * ISOGI_SH__TABLE_ORDER - 1 - m), *b = a + 2 * (ISOGI_SH__TABLE_ORDER - m) - 1; \
-        size_t first = stride * (size_t)m, second = first + stride, step = 2 * second;                                         \
-        V zero = {0}, p = a[0] - zero, q = b[0] - zero, p_before, q_before = zero, d;                                          \
-        int l;                                                                                                                 \
-        *(V *)(centre + first) = p * c[0];                                                                                     \
-        *(V *)(centre - first) = p * s[0];                                                                                     \
-        if (m + 1 == order) return;                                                                                            \
-        centre += step;                                                                                                        \
-        p_before = p;                                                                                                          \
-        p *= z * a[1];                                                                                                         \
-        *(V *)(centre + first) = p * c[0];                                                                                     \
-        *(V *)(centre - first) = p * s[0];                                                                                     \
-        *(V *)(centre + second) = q * c[1];                                                                                    \
-        *(V *)(centre - second) = q * s[1];                                                                                    \
-                for (l = m + 2; l < order; l++) {                                                                              \
-            a += 2, step += 2 * stride, centre += step;                                                                        \
+        size_t first = stride * (size_t)m, second = first + stride, step = 2 * stride * (size_t)from;                          \
+        V zero = {0}, p, q, p_before, q_before, d;                                                                             \
+        int l = from;                                                                                                          \
+        if (m < from) {                                                                                                        \
+            p = state[0], p_before = state[1], q = state[2], q_before = state[3];                                              \
+            a += 2 * (l - m - 2), b += 2 * (l - m - 2);                                                                        \
+        } else {                                                                                                               \
+            p = a[0] - zero, q = b[0] - zero, q_before = zero;                                                                 \
+            *(V *)(centre + first) = p * c[0];                                                                                 \
+            *(V *)(centre - first) = p * s[0];                                                                                 \
+            if (m + 1 == to) return;                                                                                           \
+            step += 2 * stride, centre += step;                                                                                \
+            p_before = p;                                                                                                      \
+            p *= z * a[1];                                                                                                     \
+            *(V *)(centre + first) = p * c[0];                                                                                 \
+            *(V *)(centre - first) = p * s[0];                                                                                 \
+            *(V *)(centre + second) = q * c[1];                                                                                \
+            *(V *)(centre - second) = q * s[1];                                                                                \
+            step += 2 * stride, centre += step, l = m + 2;                                                                     \
+        }                                                                                                                      \
+        for (; l < to; l++) {                                                                                                  \
+            a += 2;                                                                                                            \
             d = p_before * a[2], p_before = p;                                                                                 \
             if (m < 3) d = FMA(low * a[1], p, d);                                                                              \
             p = FMA(z * a[1], p, d);                                                                                           \
@@ -1035,76 +1066,49 @@ typedef int32_t isogi_sh__i4 __attribute__((vector_size(16), aligned(4), may_ali
             b += 2;                                                                                                            \
             *(V *)(centre + second) = q * c[1];                                                                                \
             *(V *)(centre - second) = q * s[1];                                                                                \
+            step += 2 * stride, centre += step;                                                                                \
         }                                                                                                                      \
+        if (state) state[0] = p, state[1] = p_before, state[2] = q, state[3] = q_before;                                       \
     }                                                                                                                          \
-    TARGET ISOGI_SH__INLINE V NAME##_clear(V x) {                                                                              \
-        V zero = {0};                                                                                                          \
-        I top = (I)(zero - 1) ^ (I)(zero + 1);                                                                                 \
-        return (V)((I)x & (I)((V)((I)x & ~top) > (T)TINY));                                                                    \
-    }                                                                                                                          \
-    TARGET static void NAME##_any(T *out, size_t stride, int order, const V *u) {                                              \
-        V x = u[0], y = u[1], z = u[2], t, p, d, c[2], s[2], sign, zero = {0}, one = zero + 1;                                 \
+    /* m = 0, as isogi_sh__zonal_column */                                                                                     \
+    TARGET ISOGI_SH__INLINE void NAME##_zonal(T *centre, size_t stride, int from, int to, const V *u, V *state) {              \
+        V zero = {0}, one = zero + 1, p = one, d = zero, t, sign;                                                              \
         I top = (I)(-one) ^ (I)one;                                                                                            \
-        const T *table = TABLE;                                                                                                \
-        T *centre = out;                                                                                                       \
-        int l, m, clear = !LESS(zero + (T)NEAR_POLE, FMA(x, x, y * y));                                                        \
-        size_t step = 0;                                                                                                       \
-        sign = (V)(((I)z & top) | (I)one);                                                                                     \
-        t = (one - sign * z) - sign * u[3];                                                                                    \
-        *(V *)out = table[2] - zero;                                                                                           \
-                for (l = 1, p = one, d = zero; l < order; l++) {                                                               \
-            table += 3, step += 2 * stride, centre += step;                                                                    \
-            d = FMA(d, table[0] - zero, (t * table[1]) * p);                                                                   \
+        const T *table = TABLE + 3 * from;                                                                                     \
+        int l;                                                                                                                 \
+        sign = (V)(((I)u[2] & top) | (I)one);                                                                                  \
+        t = (one - sign * u[2]) - sign * u[3];                                                                                 \
+        if (from) p = state[0], d = state[1];                                                                                  \
+        for (l = from; l < to; l++, table += 3) {                                                                              \
+            d = FMA(t * table[1], p, d * table[0]);                                                                            \
             p += d;                                                                                                            \
             *(V *)centre = l & 1 ? (p * table[2]) * sign : p * table[2];                                                       \
+            centre += 2 * stride * (size_t)(l + 1);                                                                            \
         }                                                                                                                      \
+        if (state) state[0] = p, state[1] = d;                                                                                 \
+    }                                                                                                                          \
+    /* degrees `from` to `to` - 1: `from` is odd or 0; state: 2 TABLE_ORDER vectors, or NULL where these are all */            \
+    TARGET static void NAME##_any(T *out, size_t stride, int from, int to, const V *u, V *state) {                             \
+        V x = u[0], y = u[1], z = u[2], c[2], s[2], zero = {0};                                                                \
+        size_t base = (size_t)from * (size_t)from;                                                                             \
+        T *centre = out + stride * (size_t)from;                                                                               \
+        int l, m, clear = !LESS(zero + (T)NEAR_POLE, FMA(x, x, y * y));                                                        \
+        NAME##_zonal(centre, stride, from, to, u, state);                                                                      \
+        if (state) state += 2;                                                                                                 \
         if (clear) x = NAME##_clear(x), y = NAME##_clear(y);                                                                   \
-        c[0] = x, s[0] = y, centre = out;                                                                                      \
-                for (m = 1; m < order; m += 2) {                                                                               \
+        c[0] = x, s[0] = y;                                                                                                    \
+        for (m = 1; m < to; m += 2) {                                                                                          \
+            l = m < from ? from : m;                                                                                           \
             c[1] = FMA(x, c[0], -(y * s[0])), s[1] = FMA(x, s[0], y * c[0]);                                                   \
             if (clear) c[1] = NAME##_clear(c[1]), s[1] = NAME##_clear(s[1]);                                                   \
-            centre = out + stride * (size_t)(m * (m + 1));                                                                     \
-            if (m == 1) NAME##_columns(centre, stride, order, 1, z, u[3], c, s);                                               \
-            else NAME##_columns(centre, stride, order, m, z, zero, c, s);                                                      \
+            centre = out + stride * ((size_t)(l * (l + 1)) - base);                                                            \
+            if (m == 1) NAME##_columns(centre, stride, l, to, 1, z, u[3], c, s, state);                                        \
+            else NAME##_columns(centre, stride, l, to, m, z, zero, c, s, state);                                               \
+            if (state) state += 4;                                                                                             \
             c[0] = FMA(x, c[1], -(y * s[1])), s[0] = FMA(x, s[1], y * c[1]);                                                   \
             if (clear) c[0] = NAME##_clear(c[0]), s[0] = NAME##_clear(s[0]);                                                   \
         }                                                                                                                      \
-    }                                                                                                                          \
-    TARGET ISOGI_SH__INLINE int NAME##_load(V *u, const T *x, const T *y, const T *z) {                                        \
-        u[0] = *(const V *)x, u[1] = *(const V *)y, u[2] = *(const V *)z;                                                      \
-        return NAME##_unit(u);                                                                                                 \
-    }                                                                                                                          \
-    TARGET static size_t NAME(T *out, size_t stride, int order, const T *x, const T *y, const T *z, size_t count) {            \
-        V u[4];                                                                                                                \
-        size_t i;                                                                                                              \
-        if (order == 5 && WIDTH * sizeof(T) > 16) {                                                                            \
-            for (i = 0; i + WIDTH <= count && NAME##_load(u, x + i, y + i, z + i); i += WIDTH) NAME##_order5(out + i, stride, u); \
-        } else {                                                                                                               \
-            for (i = 0; i + WIDTH <= count && NAME##_load(u, x + i, y + i, z + i); i += WIDTH) NAME##_any(out + i, stride, order, u); \
-        }                                                                                                                      \
-        return i;                                                                                                              \
-    }                                                                                                                          \
-    TARGET static size_t NAME##_rows(T *out, int order, const T (*direction)[3], size_t count) {                               \
-        T scratch[MOST * MOST * WIDTH];                                                                                        \
-        V u[4];                                                                                                                \
-        size_t i, k, n = (size_t)order * (size_t)order;                                                                        \
-        for (i = 0; i + WIDTH <= count; i += WIDTH) {                                                                          \
-            NAME##_split(u, direction[i]);                                                                                     \
-            if (!NAME##_unit(u)) break;                                                                                        \
-            if (order == 5 && WIDTH * sizeof(T) > 16) {                                                                        \
-                NAME##_order5(scratch, WIDTH, u);                                                                              \
-                for (k = 0; k < WIDTH; k += 16 / sizeof(T)) NAME##_turn(out + 25 * (i + k), 25, scratch + k, WIDTH, 0);        \
-            } else {                                                                                                           \
-                NAME##_any(scratch, WIDTH, order, u);                                                                          \
-                for (k = 0; k < WIDTH; k += 16 / sizeof(T)) NAME##_turn(out + n * (i + k), n, scratch + k, WIDTH, 0);          \
-            }                                                                                                                  \
-        }                                                                                                                      \
-        return i;                                                                                                              \
     }
-
-#define ISOGI_SH__DEFINE_F32(NAME, TARGET, V, I, WIDTH, MOST, SUFFIX) \
-    ISOGI_SH__DEFINE_EVAL(NAME, TARGET, float, V, I, WIDTH, MOST, ISOGI_SH__FMA_##SUFFIX, ISOGI_SH__REST_##SUFFIX, \
-                          ISOGI_SH__LESS_##SUFFIX, isogi_sh__table_f32, 1e-6, 1e-3, 1e-19, sqrtf)
 
 /* y[k][i] = row i + .. of column k, for 4 rows (or vectors of 4 x 4 tiles) a, b, c, d */
 #define ISOGI_SH__TURN(V, SUFFIX)                                                                                              \
@@ -1147,11 +1151,33 @@ ISOGI_SH__INLINE int isogi_sh__less_f4(isogi_sh__f4 a, isogi_sh__f4 b) {
 #define ISOGI_SH__LESS_F4(a, b) isogi_sh__less_f4(a, b)
 #define ISOGI_SH__FMA_F4(a, b, c) ((a) * (b) + (c))
 #define ISOGI_SH__REST_F4(one, z) (((one) - (z)) * ((one) + (z))) /* 1 - z^2, exact near the poles without fused operations too */
-ISOGI_SH__DEFINE_F32(isogi_sh__eval_f4, , isogi_sh__f4, isogi_sh__i4, 4, ISOGI_SH__TABLE_ORDER, F4)
+ISOGI_SH__DEFINE_EVAL(isogi_sh__eval_f4, , float, isogi_sh__f4, isogi_sh__i4, 4, ISOGI_SH__FMA_F4, ISOGI_SH__REST_F4, ISOGI_SH__LESS_F4,
+                      isogi_sh__table_f32, 1e-6, 1e-3, 1e-19, sqrtf)
+
+/* Blocks of 4 from the first direction on: how many are done. */
+static size_t isogi_sh__eval_f4(float *out, size_t stride, int order, const float *x, const float *y, const float *z, size_t count) {
+    isogi_sh__f4 u[4];
+    size_t i;
+    for (i = 0; i + 4 <= count && isogi_sh__eval_f4_load(u, x + i, y + i, z + i); i += 4) isogi_sh__eval_f4_any(out + i, stride, 0, order, u, NULL);
+    return i;
+}
+
+static size_t isogi_sh__eval_f4_rows(float *out, int order, const float (*direction)[3], size_t count) {
+    float scratch[4 * ISOGI_SH__TABLE_ORDER * ISOGI_SH__TABLE_ORDER];
+    isogi_sh__f4 u[4];
+    size_t i, n = ISOGI_SH_COUNT(order);
+    for (i = 0; i + 4 <= count; i += 4) {
+        isogi_sh__eval_f4_split(u, direction[i]);
+        if (!isogi_sh__eval_f4_unit(u)) break;
+        isogi_sh__eval_f4_any(scratch, 4, 0, order, u, NULL);
+        isogi_sh__eval_f4_turn(out + n * i, n, scratch, 4, 0);
+    }
+    return i;
+}
 #endif
 
 #ifdef ISOGI_SH__SIMD
-#define ISOGI_SH__WIDE_ORDER 12
+#define ISOGI_SH__SPLIT 15 /* rows of functions are turned degree by degree up to here, then the rest; odd */
 
 /* isogi_sh__level() > 0 */
 ISOGI_SH__INLINE int isogi_sh__avx2(void) {
@@ -1200,23 +1226,19 @@ typedef double isogi_sh__d2 __attribute__((vector_size(16), aligned(8), may_alia
 #define ISOGI_SH__FMA_F16(a, b, c) ((isogi_sh__f16)__builtin_ia32_vfmaddps512_mask(a, b, c, ISOGI_SH__ALL16, 4))
 #define ISOGI_SH__FMA_D8(a, b, c) ((isogi_sh__d8)__builtin_ia32_vfmaddpd512_mask(a, b, c, ISOGI_SH__ALL8, 4))
 
-/* Vectors of several rows that stand one after the other in memory. gcc 12 would shuffle where an insertion costs a third. */
+/* Vectors of several rows that stand one after the other in memory, and halves of a vector: gcc 12 would shuffle where an insertion or
+   an extraction costs a third. */
 #if defined(__clang__)
+#define ISOGI_SH__HALF_D8(v, k) __builtin_shufflevector(v, v, 4 * k, 4 * k + 1, 4 * k + 2, 4 * k + 3)
 #define ISOGI_SH__JOIN_F8(a, b) __builtin_shufflevector(a, b, 0, 1, 2, 3, 4, 5, 6, 7)
-#define ISOGI_SH__JOIN_D4(a, b) __builtin_shufflevector(a, b, 0, 1, 2, 3)
 #define ISOGI_SH__JOIN_F16(a, b, c, d) __builtin_shufflevector(ISOGI_SH__JOIN_F8(a, b), ISOGI_SH__JOIN_F8(c, d), 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15)
-#define ISOGI_SH__JOIN_D8(a, b, c, d) __builtin_shufflevector(ISOGI_SH__JOIN_D4(a, b), ISOGI_SH__JOIN_D4(c, d), 0, 1, 2, 3, 4, 5, 6, 7)
 #else
 #define ISOGI_SH__JOIN_F8(a, b) ((isogi_sh__f8)__builtin_ia32_vinsertf128_ps256(__builtin_ia32_ps256_ps(a), b, 1))
-#define ISOGI_SH__JOIN_D4(a, b) ((isogi_sh__d4)__builtin_ia32_vinsertf128_pd256(__builtin_ia32_pd256_pd(a), b, 1))
+#define ISOGI_SH__HALF_D8(v, k) ((isogi_sh__d4)__builtin_ia32_extractf64x4_mask(v, k, none, ISOGI_SH__ALL8))
 #define ISOGI_SH__PUT_F16(v, a, k) __builtin_ia32_insertf32x4_mask(v, a, k, v, 0xffff)
-#define ISOGI_SH__PUT_D8(v, a, k) __builtin_ia32_insertf64x2_512_mask(v, a, k, v, ISOGI_SH__ALL8)
 #define ISOGI_SH__JOIN_F16(a, b, c, d)                                                                                        \
     ISOGI_SH__PUT_F16(ISOGI_SH__PUT_F16(ISOGI_SH__PUT_F16(__builtin_ia32_ps512_ps(a), b, 1), c, 2), d, 3)
-#define ISOGI_SH__JOIN_D8(a, b, c, d)                                                                                         \
-    ISOGI_SH__PUT_D8(ISOGI_SH__PUT_D8(ISOGI_SH__PUT_D8(__builtin_ia32_pd512_pd(a), b, 1), c, 2), d, 3)
 #endif
-#define ISOGI_SH__ROW_D2(i) (*(const isogi_sh__d2 *)(in + pitch * (size_t)(i)))
 
 /* y[4][n] = in[n][pitch]: 4 x 4 transposed in each quarter of a vector, whose quarters are rows 4 apart. n is a square, 9 or more: what
    16 and 8 rows at a time leave over is 4, 1 or none. The plain loop is for them. */
@@ -1230,7 +1252,7 @@ typedef double isogi_sh__d2 __attribute__((vector_size(16), aligned(8), may_alia
 #define ISOGI_SH__ODD_F16(a, b) __builtin_shufflevector(a, b, 2, 3, 18, 19, 6, 7, 22, 23, 10, 11, 26, 27, 14, 15, 30, 31)
 #define ISOGI_SH__ROWS_F8(j) ISOGI_SH__JOIN_F8(ISOGI_SH__ROW_F4(j), ISOGI_SH__ROW_F4((j) + 4))
 #define ISOGI_SH__ROWS_F16(j) ISOGI_SH__JOIN_F16(ISOGI_SH__ROW_F4(j), ISOGI_SH__ROW_F4((j) + 4), ISOGI_SH__ROW_F4((j) + 8), ISOGI_SH__ROW_F4((j) + 12))
-ISOGI_SH__AVX2 ISOGI_SH__INLINE void isogi_sh__eval_f8_turn(float *y, size_t n, const float *in, size_t pitch, size_t i) {
+ISOGI_SH__AVX2 ISOGI_SH__INLINE void isogi_sh__join_f8_turn(float *y, size_t n, const float *in, size_t pitch, size_t i) {
     size_t k;
     for (; i + 8 <= n; i += 8) {
         isogi_sh__f8 a = ISOGI_SH__ROWS_F8(i), b = ISOGI_SH__ROWS_F8(i + 1), c = ISOGI_SH__ROWS_F8(i + 2), d = ISOGI_SH__ROWS_F8(i + 3);
@@ -1239,41 +1261,97 @@ ISOGI_SH__AVX2 ISOGI_SH__INLINE void isogi_sh__eval_f8_turn(float *y, size_t n, 
     for (; i < n; i++)
         for (k = 0; k < 4; k++) y[n * k + i] = in[pitch * i + k];
 }
-/* out[k * stride + i] = in[i * pitch + k] for an 8 x 8 tile */
-ISOGI_SH__AVX2 ISOGI_SH__INLINE void isogi_sh__transpose_f8(float *y, size_t n, const float *in, size_t pitch) {
-    size_t half, i = 0;
+/* y[k][i] = row i of column k for an 8 x 8 tile in memory */
+ISOGI_SH__AVX2 ISOGI_SH__INLINE void isogi_sh__transpose_f8(float *y, size_t n, const isogi_sh__f8 *row) {
+    const float *in = (const float *)row;
+    size_t half, i = 0, pitch = 8;
     for (half = 0; half < 2; half++, y += 4 * n, in += 4) {
         isogi_sh__f8 a = ISOGI_SH__ROWS_F8(0), b = ISOGI_SH__ROWS_F8(1), c = ISOGI_SH__ROWS_F8(2), d = ISOGI_SH__ROWS_F8(3);
         ISOGI_SH__TURN(isogi_sh__f8, F8)
     }
 }
 
-ISOGI_SH__AVX512 ISOGI_SH__INLINE void isogi_sh__eval_f16_turn(float *y, size_t n, const float *in, size_t pitch, size_t i) {
+ISOGI_SH__AVX512 ISOGI_SH__INLINE void isogi_sh__join_f16_turn(float *y, size_t n, const float *in, size_t pitch, size_t i) {
     for (; i + 16 <= n; i += 16) {
         isogi_sh__f16 a = ISOGI_SH__ROWS_F16(i), b = ISOGI_SH__ROWS_F16(i + 1), c = ISOGI_SH__ROWS_F16(i + 2), d = ISOGI_SH__ROWS_F16(i + 3);
         ISOGI_SH__TURN(isogi_sh__f16, F16)
     }
-    isogi_sh__eval_f8_turn(y, n, in, pitch, i);
+    isogi_sh__join_f8_turn(y, n, in, pitch, i);
 }
 
-/* y[2][n] = in[n][pitch] */
-#define ISOGI_SH__ROWS_D4(j) ISOGI_SH__JOIN_D4(ISOGI_SH__ROW_D2(j), ISOGI_SH__ROW_D2((j) + 2))
-#define ISOGI_SH__ROWS_D8(j) ISOGI_SH__JOIN_D8(ISOGI_SH__ROW_D2(j), ISOGI_SH__ROW_D2((j) + 2), ISOGI_SH__ROW_D2((j) + 4), ISOGI_SH__ROW_D2((j) + 6))
-ISOGI_SH__AVX2 ISOGI_SH__INLINE void isogi_sh__eval_d4_turn(double *y, size_t n, const double *in, size_t pitch, size_t i) {
-    for (; i + 4 <= n; i += 4) {
-        isogi_sh__d4 a = ISOGI_SH__ROWS_D4(i), b = ISOGI_SH__ROWS_D4(i + 1);
-        *(isogi_sh__d4 *)(y + i) = __builtin_shufflevector(a, b, 0, 4, 2, 6);
-        *(isogi_sh__d4 *)(y + i + n) = __builtin_shufflevector(a, b, 1, 5, 3, 7);
+/* y[k][i] = row i of column k for 8 rows and as many columns as are lanes, from registers: 4 x 4 (or 2 x 2) transposed in each quarter
+   of a vector, then quarters of both halves of the rows joined. Halves of 64 bytes are stored each by itself, which costs as much as the
+   last shuffle would. */
+ISOGI_SH__AVX2 ISOGI_SH__INLINE void isogi_sh__eval_f8_turn(float *y, size_t n, const isogi_sh__f8 *row) {
+    int half;
+    ISOGI_SH__UNROLL
+    for (half = 0; half < 2; half++, row += 4, y += 4) {
+        isogi_sh__f8 e = ISOGI_SH__LOW_F8(row[0], row[1]), f = ISOGI_SH__HIGH_F8(row[0], row[1]), v[4];
+        isogi_sh__f8 g = ISOGI_SH__LOW_F8(row[2], row[3]), h = ISOGI_SH__HIGH_F8(row[2], row[3]);
+        size_t k;
+        v[0] = ISOGI_SH__EVEN_F8(e, g), v[1] = ISOGI_SH__ODD_F8(e, g), v[2] = ISOGI_SH__EVEN_F8(f, h), v[3] = ISOGI_SH__ODD_F8(f, h);
+        ISOGI_SH__UNROLL
+        for (k = 0; k < 4; k++) {
+            *(isogi_sh__f4 *)(y + n * k) = __builtin_shufflevector(v[k], v[k], 0, 1, 2, 3);
+            *(isogi_sh__f4 *)(y + n * (k + 4)) = __builtin_shufflevector(v[k], v[k], 4, 5, 6, 7);
+        }
     }
-    for (; i < n; i++) y[i] = in[pitch * i], y[n + i] = in[pitch * i + 1];
 }
-ISOGI_SH__AVX512 ISOGI_SH__INLINE void isogi_sh__eval_d8_turn(double *y, size_t n, const double *in, size_t pitch, size_t i) {
-    for (; i + 8 <= n; i += 8) {
-        isogi_sh__d8 a = ISOGI_SH__ROWS_D8(i), b = ISOGI_SH__ROWS_D8(i + 1);
-        *(isogi_sh__d8 *)(y + i) = __builtin_shufflevector(a, b, 0, 8, 2, 10, 4, 12, 6, 14);
-        *(isogi_sh__d8 *)(y + i + n) = __builtin_shufflevector(a, b, 1, 9, 3, 11, 5, 13, 7, 15);
+
+ISOGI_SH__AVX512 ISOGI_SH__INLINE void isogi_sh__eval_f16_turn(float *y, size_t n, const isogi_sh__f16 *row) {
+    const isogi_sh__d4 none = {0};
+    isogi_sh__d8 v[2][4];
+    int half;
+    size_t k;
+    ISOGI_SH__UNROLL
+    for (half = 0; half < 2; half++, row += 4) {
+        isogi_sh__f16 e = ISOGI_SH__LOW_F16(row[0], row[1]), f = ISOGI_SH__HIGH_F16(row[0], row[1]);
+        isogi_sh__f16 g = ISOGI_SH__LOW_F16(row[2], row[3]), h = ISOGI_SH__HIGH_F16(row[2], row[3]);
+        v[half][0] = (isogi_sh__d8)ISOGI_SH__EVEN_F16(e, g), v[half][1] = (isogi_sh__d8)ISOGI_SH__ODD_F16(e, g);
+        v[half][2] = (isogi_sh__d8)ISOGI_SH__EVEN_F16(f, h), v[half][3] = (isogi_sh__d8)ISOGI_SH__ODD_F16(f, h);
     }
-    isogi_sh__eval_d4_turn(y, n, in, pitch, i);
+    (void)none; /* clang */
+    ISOGI_SH__UNROLL
+    for (k = 0; k < 4; k++) {
+        isogi_sh__d8 p = __builtin_shufflevector(v[0][k], v[1][k], 0, 1, 8, 9, 2, 3, 10, 11);
+        isogi_sh__d8 q = __builtin_shufflevector(v[0][k], v[1][k], 4, 5, 12, 13, 6, 7, 14, 15);
+        *(isogi_sh__d4 *)(y + n * k) = ISOGI_SH__HALF_D8(p, 0);
+        *(isogi_sh__d4 *)(y + n * (k + 4)) = ISOGI_SH__HALF_D8(p, 1);
+        *(isogi_sh__d4 *)(y + n * (k + 8)) = ISOGI_SH__HALF_D8(q, 0);
+        *(isogi_sh__d4 *)(y + n * (k + 12)) = ISOGI_SH__HALF_D8(q, 1);
+    }
+}
+
+ISOGI_SH__AVX2 ISOGI_SH__INLINE void isogi_sh__eval_d4_turn(double *y, size_t n, const isogi_sh__d4 *row) {
+    int half;
+    ISOGI_SH__UNROLL
+    for (half = 0; half < 2; half++, row += 4, y += 4) {
+        isogi_sh__d4 a = __builtin_shufflevector(row[0], row[1], 0, 4, 2, 6), b = __builtin_shufflevector(row[0], row[1], 1, 5, 3, 7);
+        isogi_sh__d4 c = __builtin_shufflevector(row[2], row[3], 0, 4, 2, 6), d = __builtin_shufflevector(row[2], row[3], 1, 5, 3, 7);
+        *(isogi_sh__d4 *)y = __builtin_shufflevector(a, c, 0, 1, 4, 5);
+        *(isogi_sh__d4 *)(y + n) = __builtin_shufflevector(b, d, 0, 1, 4, 5);
+        *(isogi_sh__d4 *)(y + 2 * n) = __builtin_shufflevector(a, c, 2, 3, 6, 7);
+        *(isogi_sh__d4 *)(y + 3 * n) = __builtin_shufflevector(b, d, 2, 3, 6, 7);
+    }
+}
+
+ISOGI_SH__AVX512 ISOGI_SH__INLINE void isogi_sh__eval_d8_turn(double *y, size_t n, const isogi_sh__d8 *row) {
+    int odd;
+    ISOGI_SH__UNROLL
+    for (odd = 0; odd < 2; odd++, y += n) {
+        isogi_sh__d8 v[4], p, q;
+        int k;
+        ISOGI_SH__UNROLL
+        for (k = 0; k < 4; k++)
+            v[k] = odd ? __builtin_shufflevector(row[2 * k], row[2 * k + 1], 1, 9, 3, 11, 5, 13, 7, 15) :
+                         __builtin_shufflevector(row[2 * k], row[2 * k + 1], 0, 8, 2, 10, 4, 12, 6, 14);
+        p = __builtin_shufflevector(v[0], v[1], 0, 1, 2, 3, 8, 9, 10, 11), q = __builtin_shufflevector(v[2], v[3], 0, 1, 2, 3, 8, 9, 10, 11);
+        *(isogi_sh__d8 *)y = __builtin_shufflevector(p, q, 0, 1, 4, 5, 8, 9, 12, 13);
+        *(isogi_sh__d8 *)(y + 2 * n) = __builtin_shufflevector(p, q, 2, 3, 6, 7, 10, 11, 14, 15);
+        p = __builtin_shufflevector(v[0], v[1], 4, 5, 6, 7, 12, 13, 14, 15), q = __builtin_shufflevector(v[2], v[3], 4, 5, 6, 7, 12, 13, 14, 15);
+        *(isogi_sh__d8 *)(y + 4 * n) = __builtin_shufflevector(p, q, 0, 1, 4, 5, 8, 9, 12, 13);
+        *(isogi_sh__d8 *)(y + 6 * n) = __builtin_shufflevector(p, q, 2, 3, 6, 7, 10, 11, 14, 15);
+    }
 }
 
 /* directions into coordinates */
@@ -1322,31 +1400,188 @@ ISOGI_SH__AVX512 ISOGI_SH__INLINE void isogi_sh__eval_d8_split(isogi_sh__d8 *u, 
 #define ISOGI_SH__LESS_D4(a, b) (__builtin_ia32_movmskpd256((isogi_sh__d4)((a) < (b))) == 0xf)
 #define ISOGI_SH__LESS_F16(a, b) ((__builtin_ia32_cmpps512_mask(a, b, 17, 0xffff, 4) & 0xffff) == 0xffff)
 #define ISOGI_SH__LESS_D8(a, b) ((__builtin_ia32_cmppd512_mask(a, b, 17, 0xff, 4) & 0xff) == 0xff)
-#define ISOGI_SH__DEFINE_F64(NAME, TARGET, V, I, WIDTH, MOST, SUFFIX) \
-    ISOGI_SH__DEFINE_EVAL(NAME, TARGET, double, V, I, WIDTH, MOST, ISOGI_SH__FMA_##SUFFIX, ISOGI_SH__REST_##SUFFIX, \
-                          ISOGI_SH__LESS_##SUFFIX, isogi_sh__table_f64, 1e-12, 1e-25, 1e-200, sqrt)
-ISOGI_SH__DEFINE_F32(isogi_sh__eval_f8, ISOGI_SH__AVX2, isogi_sh__f8, isogi_sh__i8, 8, ISOGI_SH__TABLE_ORDER, F8)
-ISOGI_SH__DEFINE_F64(isogi_sh__eval_d4, ISOGI_SH__AVX2, isogi_sh__d4, isogi_sh__l4, 4, ISOGI_SH__TABLE_ORDER, D4)
-ISOGI_SH__DEFINE_F32(isogi_sh__eval_f16, ISOGI_SH__AVX512, isogi_sh__f16, isogi_sh__i16, 16, ISOGI_SH__WIDE_ORDER, F16)
-ISOGI_SH__DEFINE_F64(isogi_sh__eval_d8, ISOGI_SH__AVX512, isogi_sh__d8, isogi_sh__l8, 8, ISOGI_SH__WIDE_ORDER, D8)
+
+/* With fused products: low orders as polynomials in v = cos 2t = z^2 - x^2 - y^2, whose coefficients are small, so that little cancels
+   anywhere, and of which no operation waits for the one before (4.7e-7 was seen at order 5 where products are not fused). Function l of
+   column m is (c, s) times a polynomial, times z where l - m is odd; t: the polynomials of that column. centre: where Y_l^0 goes. From
+   m = 2 on they are in v + 1/4, which is smaller where sin^m t is not. */
+#define ISOGI_SH__LOW_ORDER 11
+#define ISOGI_SH__P0(FMA, t) ((t)[0] - zero)
+#define ISOGI_SH__P1(FMA, t) FMA(ISOGI_SH__P0(FMA, t), v, (t)[1] - zero)
+#define ISOGI_SH__P2(FMA, t) FMA(ISOGI_SH__P1(FMA, t), v, (t)[2] - zero)
+#define ISOGI_SH__P3(FMA, t) FMA(ISOGI_SH__P2(FMA, t), v, (t)[3] - zero)
+#define ISOGI_SH__P4(FMA, t) FMA(ISOGI_SH__P3(FMA, t), v, (t)[4] - zero)
+#define ISOGI_SH__PUT_PAIR(V, value) p = value, *(V *)(centre + first) = p * c, *(V *)(centre - first) = p * s, centre -= step, step -= 2 * stride
+#define ISOGI_SH__POLYNOMIALS(V, FMA)                                                                                          \
+    switch (order - m) {                                                                                                       \
+    case 10: ISOGI_SH__PUT_PAIR(V, ISOGI_SH__P4(FMA, t + 25) * z); __attribute__((fallthrough));                               \
+    case 9: ISOGI_SH__PUT_PAIR(V, ISOGI_SH__P4(FMA, t + 20)); __attribute__((fallthrough));                                    \
+    case 8: ISOGI_SH__PUT_PAIR(V, ISOGI_SH__P3(FMA, t + 16) * z); __attribute__((fallthrough));                                \
+    case 7: ISOGI_SH__PUT_PAIR(V, ISOGI_SH__P3(FMA, t + 12)); __attribute__((fallthrough));                                    \
+    case 6: ISOGI_SH__PUT_PAIR(V, ISOGI_SH__P2(FMA, t + 9) * z); __attribute__((fallthrough));                                 \
+    case 5: ISOGI_SH__PUT_PAIR(V, ISOGI_SH__P2(FMA, t + 6)); __attribute__((fallthrough));                                     \
+    case 4: ISOGI_SH__PUT_PAIR(V, ISOGI_SH__P1(FMA, t + 4) * z); __attribute__((fallthrough));                                 \
+    case 3: ISOGI_SH__PUT_PAIR(V, ISOGI_SH__P1(FMA, t + 2)); __attribute__((fallthrough));                                     \
+    case 2: ISOGI_SH__PUT_PAIR(V, ISOGI_SH__P0(FMA, t + 1) * z); __attribute__((fallthrough));                                 \
+    default: ISOGI_SH__PUT_PAIR(V, ISOGI_SH__P0(FMA, t));                                                                      \
+    }
+
+/* Defines NAME(out, stride, order, x, y, z, count): all functions at the first directions, that of index i at out + stride i; WIDTH at a
+   time. It returns how many directions are done, and stops before a block whose lengths are out of range. NAME_rows: the same with the
+   functions of a direction together. */
+#define ISOGI_SH__DEFINE_FUSED(NAME, TARGET, T, V, I, WIDTH, FMA, LESS, POLYNOMIALS, NEAR_POLE, TURN)                          \
+    TARGET ISOGI_SH__INLINE void NAME##_order5(V *out, const V *u) {                                                           \
+        V x = u[0], y = u[1], z = u[2], zero = {0}, v = FMA(z, z, -FMA(x, x, y * y)), c = (x - y) * (x + y), s = x * y, c3, s3, f; \
+        out[0] = zero + (T)0.28209479177387814;                                                                                \
+        out[1] = y * (T)0.48860251190291992;                                                                                   \
+        out[2] = z * (T)0.48860251190291992;                                                                                   \
+        out[3] = x * (T)0.48860251190291992;                                                                                   \
+        s += s;                                                                                                                \
+        out[4] = s * (T)0.54627421529603959;                                                                                   \
+        f = z * (T)1.0925484305920792;                                                                                         \
+        out[5] = f * y;                                                                                                        \
+        out[6] = FMA(v, zero + (T)0.47308734787878, zero + (T)0.15769578262626);                                               \
+        out[7] = f * x;                                                                                                        \
+        out[8] = c * (T)0.54627421529603959;                                                                                   \
+        c3 = FMA(x, c, -(y * s)), s3 = FMA(x, s, y * c);                                                                       \
+        out[9] = s3 * (T)0.59004358992664352;                                                                                  \
+        f = z * (T)1.4453057213202769;                                                                                         \
+        out[10] = f * s;                                                                                                       \
+        out[14] = f * c;                                                                                                       \
+        f = FMA(v, zero + (T)1.1426144986611644, zero + (T)0.6855686991966986);                                                \
+        out[11] = f * y;                                                                                                       \
+        out[12] = z * FMA(v, zero + (T)0.9329408314752885, zero - (T)0.1865881662950577);                                      \
+        out[13] = f * x;                                                                                                       \
+        out[15] = c3 * (T)0.59004358992664352;                                                                                 \
+        out[16] = (s * c) * (T)1.2516714708983523;                                                                             \
+        f = z * (T)1.7701307697799304;                                                                                         \
+        out[17] = f * s3;                                                                                                      \
+        out[23] = f * c3;                                                                                                      \
+        f = FMA(v, zero + (T)1.6558057175757301, zero + (T)1.18271836969695);                                                  \
+        out[18] = f * s;                                                                                                       \
+        out[22] = f * c;                                                                                                       \
+        f = z * FMA(v, zero + (T)2.341662902450512, zero + (T)0.3345232717786446);                                             \
+        out[19] = f * y;                                                                                                       \
+        out[20] = FMA(v, FMA(v, zero + (T)0.9256235355080377, zero + (T)0.26446386728801075), zero - (T)0.343803027474414);    \
+        out[21] = f * x;                                                                                                       \
+        out[24] = FMA(c, c, -(s * s)) * (T)0.62583573544917614;                                                                \
+    }                                                                                                                          \
+    /* one column after the other, each from its last degree */                                                                   \
+    TARGET static void NAME##_low(T *out, size_t stride, int order, const V *u) {                                              \
+        V x = u[0], y = u[1], z = u[2], zero = {0}, v = FMA(z, z, -FMA(x, x, y * y)), c = x, s = y, p, before;                 \
+        const T *t = POLYNOMIALS;                                                                                              \
+        size_t last = (size_t)order - 1, first = 0, step = 2 * stride * last;                                                  \
+        T *centre = out + stride * last * (last + 1);                                                                          \
+        int m, clear = !LESS(zero + (T)NEAR_POLE, FMA(x, x, y * y));                                                           \
+        NAME##_zonal(out, stride, 0, order, u, NULL);                                                                          \
+        for (m = 1; m < order; m++) {                                                                                          \
+            if (m > 1) before = c, c = FMA(x, c, -(y * s)), s = FMA(x, s, y * before);                                         \
+            if (m == 2) v = FMA(z + z, z, zero - (T)0.75);                                                                     \
+            if (clear) c = NAME##_clear(c), s = NAME##_clear(s);                                                               \
+            first += stride, step = 2 * stride * last, centre = out + stride * last * (last + 1);                              \
+            ISOGI_SH__POLYNOMIALS(V, FMA)                                                                                      \
+            t += (ISOGI_SH__LOW_ORDER + 1 - m) * (ISOGI_SH__LOW_ORDER + 1 - m) / 4;                                            \
+        }                                                                                                                      \
+    }                                                                                                                          \
+    TARGET ISOGI_SH__INLINE void NAME##_block(T *out, size_t stride, int order, const V *u) {                                  \
+        if (order <= ISOGI_SH__LOW_ORDER) NAME##_low(out, stride, order, u);                                                   \
+        else NAME##_any(out, stride, 0, order, u, NULL);                                                                       \
+    }                                                                                                                          \
+    TARGET static size_t NAME(T *out, size_t stride, int order, const T *x, const T *y, const T *z, size_t count) {            \
+        size_t i = 0;                                                                                                          \
+        for (; order == 5 && i + WIDTH <= count; i += WIDTH) {                                                                 \
+            V u[4], basis[25];                                                                                                 \
+            int k;                                                                                                             \
+            if (!NAME##_load(u, x + i, y + i, z + i)) break;                                                                   \
+            NAME##_order5(basis, u);                                                                                           \
+            ISOGI_SH__UNROLL25                                                                                                 \
+            for (k = 0; k < 25; k++) *(V *)(out + i + stride * (size_t)k) = basis[k];                                          \
+        }                                                                                                                      \
+        for (; order != 5 && i + WIDTH <= count; i += WIDTH) {                                                                 \
+            V u[4];                                                                                                            \
+            if (!NAME##_load(u, x + i, y + i, z + i)) break;                                                                   \
+            NAME##_block(out + i, stride, order, u);                                                                           \
+        }                                                                                                                      \
+        return i;                                                                                                              \
+    }                                                                                                                          \
+    /* order 5, with the next directions made ready meanwhile */                                                               \
+    TARGET static size_t NAME##_rows5(T *out, const T (*direction)[3], size_t count) {                                         \
+        V zero = {0}, u[4], next[4] = {zero, zero, zero, zero}, basis[25];                                                     \
+        size_t i = 0, k;                                                                                                       \
+        int more;                                                                                                              \
+        if (count < WIDTH) return 0;                                                                                           \
+        NAME##_split(u, direction[0]);                                                                                         \
+        for (more = NAME##_unit(u); more; out += 25 * WIDTH) {                                                                 \
+            i += WIDTH, more = 0;                                                                                              \
+            if (i + WIDTH <= count) {                                                                                          \
+                NAME##_split(next, direction[i]);                                                                              \
+                more = NAME##_unit(next);                                                                                      \
+            }                                                                                                                  \
+            NAME##_order5(basis, u);                                                                                           \
+            for (k = 0; k < WIDTH; k++) out[25 * k] = (T)0.28209479177387814;                                                  \
+            NAME##_turn(out + 1, 25, basis + 1);                                                                               \
+            NAME##_turn(out + 9, 25, basis + 9);                                                                               \
+            NAME##_turn(out + 17, 25, basis + 17);                                                                             \
+            u[0] = next[0], u[1] = next[1], u[2] = next[2];                                                                    \
+        }                                                                                                                      \
+        return i;                                                                                                              \
+    }                                                                                                                          \
+    /* `count` rows, 9 or more, for as many directions as are lanes: by eight, after one alone or eight of which some come again */ \
+    TARGET ISOGI_SH__INLINE void NAME##_turn_all(T *out, size_t n, const V *rows, size_t count) {                              \
+        size_t k;                                                                                                              \
+        if ((count & 7) == 1)                                                                                                  \
+            for (k = 0; k < WIDTH; k++) out[n * k] = ((const T *)rows)[k];                                                     \
+        else if (count & 7) TURN(out, n, rows);                                                                                \
+        for (k = count & 7; k < count; k += 8) TURN(out + k, n, rows + k);                                                     \
+    }                                                                                                                          \
+    TARGET static size_t NAME##_rows(T *out, int order, const T (*direction)[3], size_t count) {                               \
+        V rows[ISOGI_SH__SPLIT * ISOGI_SH__SPLIT] __attribute__((aligned(64))), state[2 * ISOGI_SH__TABLE_ORDER], u[4];        \
+        size_t i, n = ISOGI_SH_COUNT(order), first = n;                                                                        \
+        if (order == 5) return NAME##_rows5(out, direction, count);                                                            \
+        if (order > ISOGI_SH__SPLIT) first = ISOGI_SH__SPLIT * ISOGI_SH__SPLIT;                                                \
+        for (i = 0; i + WIDTH <= count; i += WIDTH, out += n * WIDTH) {                                                        \
+            NAME##_split(u, direction[i]);                                                                                     \
+            if (!NAME##_unit(u)) break;                                                                                        \
+            if (order <= ISOGI_SH__LOW_ORDER) NAME##_low((T *)rows, WIDTH, order, u);                                          \
+            else NAME##_any((T *)rows, WIDTH, 0, order < ISOGI_SH__SPLIT ? order : ISOGI_SH__SPLIT, u, state);                 \
+            NAME##_turn_all(out, n, rows, first);                                                                              \
+            if (order <= ISOGI_SH__SPLIT) continue;                                                                            \
+            NAME##_any((T *)rows, WIDTH, ISOGI_SH__SPLIT, order, u, state);                                                    \
+            NAME##_turn_all(out + first, n, rows, n - first);                                                                  \
+        }                                                                                                                      \
+        return i;                                                                                                              \
+    }
+
+#define ISOGI_SH__DEFINE_F32(NAME, TARGET, V, I, WIDTH, SUFFIX, TURN)                                                              \
+    ISOGI_SH__DEFINE_EVAL(NAME, TARGET, float, V, I, WIDTH, ISOGI_SH__FMA_##SUFFIX, ISOGI_SH__REST_##SUFFIX, ISOGI_SH__LESS_##SUFFIX, \
+                          isogi_sh__table_f32, 1e-6, 1e-3, 1e-19, sqrtf)                                                           \
+    ISOGI_SH__DEFINE_FUSED(NAME, TARGET, float, V, I, WIDTH, ISOGI_SH__FMA_##SUFFIX, ISOGI_SH__LESS_##SUFFIX, isogi_sh__polynomials_f32, 1e-3, TURN)
+#define ISOGI_SH__DEFINE_F64(NAME, TARGET, V, I, WIDTH, SUFFIX, TURN)                                                              \
+    ISOGI_SH__DEFINE_EVAL(NAME, TARGET, double, V, I, WIDTH, ISOGI_SH__FMA_##SUFFIX, ISOGI_SH__REST_##SUFFIX, ISOGI_SH__LESS_##SUFFIX, \
+                          isogi_sh__table_f64, 1e-12, 1e-25, 1e-200, sqrt)                                                         \
+    ISOGI_SH__DEFINE_FUSED(NAME, TARGET, double, V, I, WIDTH, ISOGI_SH__FMA_##SUFFIX, ISOGI_SH__LESS_##SUFFIX, isogi_sh__polynomials_f64, 1e-25, TURN)
+ISOGI_SH__DEFINE_F32(isogi_sh__eval_f8, ISOGI_SH__AVX2, isogi_sh__f8, isogi_sh__i8, 8, F8, isogi_sh__transpose_f8)
+ISOGI_SH__DEFINE_F64(isogi_sh__eval_d4, ISOGI_SH__AVX2, isogi_sh__d4, isogi_sh__l4, 4, D4, isogi_sh__eval_d4_turn)
+ISOGI_SH__DEFINE_F32(isogi_sh__eval_f16, ISOGI_SH__AVX512, isogi_sh__f16, isogi_sh__i16, 16, F16, isogi_sh__eval_f16_turn)
+ISOGI_SH__DEFINE_F64(isogi_sh__eval_d8, ISOGI_SH__AVX512, isogi_sh__d8, isogi_sh__l8, 8, D8, isogi_sh__eval_d8_turn)
 
 /* 8 single-channel sums */
 ISOGI_SH__AVX2 static int isogi_sh__sum_rows_f32(float *value, const float *c, int order, int channels, const float (*direction)[3]) {
-    float scratch[ISOGI_SH__TABLE_ORDER * ISOGI_SH__TABLE_ORDER * 8];
+    isogi_sh__f8 scratch[ISOGI_SH__TABLE_ORDER * ISOGI_SH__TABLE_ORDER];
     isogi_sh__f8 u[4];
     int i, j, n = order * order;
     size_t k;
     isogi_sh__eval_f8_split(u, direction[0]);
     if (!isogi_sh__eval_f8_unit(u)) return 0;
-    if (order == 5) isogi_sh__eval_f8_order5(scratch, 8, u);
-    else isogi_sh__eval_f8_any(scratch, 8, order, u);
+    if (order == 5) isogi_sh__eval_f8_order5(scratch, u);
+    else isogi_sh__eval_f8_block((float *)scratch, 8, order, u);
     for (j = 0; j < channels; j++) {
         isogi_sh__f8 zero = {0}, even = zero, odd = zero;
         for (i = 0; i + 1 < n; i += 2) {
-            even = ISOGI_SH__FMA_F8(*(const isogi_sh__f8 *)(scratch + 8 * i), zero + c[channels * i + j], even);
-            odd = ISOGI_SH__FMA_F8(*(const isogi_sh__f8 *)(scratch + 8 * i + 8), zero + c[channels * (i + 1) + j], odd);
+            even = ISOGI_SH__FMA_F8(scratch[i], zero + c[channels * i + j], even);
+            odd = ISOGI_SH__FMA_F8(scratch[i + 1], zero + c[channels * (i + 1) + j], odd);
         }
-        if (i < n) even += *(const isogi_sh__f8 *)(scratch + 8 * i) * c[channels * i + j];
+        if (i < n) even += scratch[i] * c[channels * i + j];
         even += odd;
         for (k = 0; k < 8; k++) value[(size_t)channels * k + (size_t)j] = even[k];
     }
@@ -1362,7 +1597,7 @@ static size_t isogi_sh__eval_rows_f32(float *y, int order, const float (*directi
     if (order < 3 || order > ISOGI_SH__TABLE_ORDER || count < 4) return 0;
 #ifdef ISOGI_SH__SIMD
     level = isogi_sh__level();
-    if (level > 1 && order <= ISOGI_SH__WIDE_ORDER) done = isogi_sh__eval_f16_rows(y, order, direction, count);
+    if (level > 1) done = isogi_sh__eval_f16_rows(y, order, direction, count);
     if (level) done += isogi_sh__eval_f8_rows(y + n * done, order, direction + done, count - done);
 #endif
     if (!level) done = isogi_sh__eval_f4_rows(y + n * done, order, direction + done, count);
@@ -1387,7 +1622,7 @@ static size_t isogi_sh__eval_columns_f32(float *out, size_t stride, int order, c
 static size_t isogi_sh__eval_rows_f64(double *y, int order, const double (*direction)[3], size_t count) {
     size_t done = 0, n = ISOGI_SH_COUNT(order);
     int level = order >= 3 && order <= ISOGI_SH__TABLE_ORDER && count >= 4 ? isogi_sh__level() : 0;
-    if (level > 1 && order <= ISOGI_SH__WIDE_ORDER) done = isogi_sh__eval_d8_rows(y, order, direction, count);
+    if (level > 1) done = isogi_sh__eval_d8_rows(y, order, direction, count);
     if (level) done += isogi_sh__eval_d4_rows(y + n * done, order, direction + done, count - done);
     return done;
 }
@@ -2924,7 +3159,7 @@ ISOGI_SH__AVX2 static void isogi_sh__product_order5(float *out, const float *f, 
         }
     }
     for (i = 0; i < 24; i += 8) {
-        isogi_sh__transpose_f8((float *)turned, 8, (const float *)(scratch + i), 8);
+        isogi_sh__transpose_f8((float *)turned, 8, scratch + i);
         *(isogi_sh__f8 *)(out + i) = ((turned[0] + turned[1]) + (turned[2] + turned[3])) + ((turned[4] + turned[5]) + turned[6]);
     }
     out[24] = ((scratch[24][0] + scratch[24][1]) + (scratch[24][2] + scratch[24][3])) + ((scratch[24][4] + scratch[24][5]) + scratch[24][6]);
@@ -2987,13 +3222,13 @@ ISOGI_SH__AVX512 static void isogi_sh__product_order5_f16(float *out, const floa
     isogi_sh__f16 a[25], b[25], c[25], zero = {0};
     int i;
     for (i = 0; i < 7; i++) {
-        isogi_sh__eval_f16_turn((float *)(a + columns[i]), 16, f + columns[i], 25, 0);
-        isogi_sh__eval_f16_turn((float *)(b + columns[i]), 16, g + columns[i], 25, 0);
+        isogi_sh__join_f16_turn((float *)(a + columns[i]), 16, f + columns[i], 25, 0);
+        isogi_sh__join_f16_turn((float *)(b + columns[i]), 16, g + columns[i], 25, 0);
     }
     for (i = 0; i < 25; i++) c[i] = zero;
     for (i = 0; i < 3; i++) isogi_sh__product_latitude_f16(c, a, b, i);
     isogi_sh__product_latitude_f16(c, a, b, 3);
-    for (i = 0; i < 4; i++) isogi_sh__eval_f16_turn(out + 100 * i, 25, (const float *)c + 4 * i, 16, 0);
+    for (i = 0; i < 4; i++) isogi_sh__join_f16_turn(out + 100 * i, 25, (const float *)c + 4 * i, 16, 0);
 }
 #undef ISOGI_SH__FOURIER
 #endif
@@ -3926,7 +4161,7 @@ ISOGI_API isogi_result isogi_sh_fit_directional(float direction[3], float rgb[3]
 #undef ISOGI_SH__PI
 #undef ISOGI_SH__SIMD
 #undef ISOGI_SH__TABLE_ORDER
-#undef ISOGI_SH__WIDE_ORDER
+#undef ISOGI_SH__SPLIT
 #undef ISOGI_SH__AVX2
 #undef ISOGI_SH__AVX512
 #undef ISOGI_SH__ALL16
@@ -3938,8 +4173,7 @@ ISOGI_API isogi_result isogi_sh_fit_directional(float direction[3], float rgb[3]
 #undef ISOGI_SH__EVEN_F8
 #undef ISOGI_SH__HIGH_F16
 #undef ISOGI_SH__HIGH_F8
-#undef ISOGI_SH__JOIN_D4
-#undef ISOGI_SH__JOIN_D8
+#undef ISOGI_SH__HALF_D8
 #undef ISOGI_SH__JOIN_F16
 #undef ISOGI_SH__JOIN_F8
 #undef ISOGI_SH__LESS_D4
@@ -3950,13 +4184,9 @@ ISOGI_API isogi_result isogi_sh_fit_directional(float direction[3], float rgb[3]
 #undef ISOGI_SH__LOW_F8
 #undef ISOGI_SH__ODD_F16
 #undef ISOGI_SH__ODD_F8
-#undef ISOGI_SH__PUT_D8
 #undef ISOGI_SH__PUT_F16
-#undef ISOGI_SH__ROWS_D4
-#undef ISOGI_SH__ROWS_D8
 #undef ISOGI_SH__ROWS_F16
 #undef ISOGI_SH__ROWS_F8
-#undef ISOGI_SH__ROW_D2
 #undef ISOGI_SH__ROW_F4
 #undef ISOGI_SH__TURN
 #undef ISOGI_SH__EVEN_F4
@@ -3981,6 +4211,16 @@ ISOGI_API isogi_result isogi_sh_fit_directional(float direction[3], float rgb[3]
 #undef ISOGI_SH__FMA_D4
 #undef ISOGI_SH__FMA_D8
 #undef ISOGI_SH__DEFINE_EVAL
+#undef ISOGI_SH__DEFINE_FUSED
+#undef ISOGI_SH__LOW_ORDER
+#undef ISOGI_SH__P0
+#undef ISOGI_SH__P1
+#undef ISOGI_SH__P2
+#undef ISOGI_SH__P3
+#undef ISOGI_SH__P4
+#undef ISOGI_SH__POLYNOMIALS
+#undef ISOGI_SH__PUT_PAIR
+#undef ISOGI_SH__UNROLL25
 #undef ISOGI_SH__LANES
 #undef ISOGI_SH__CHANNELS
 #undef ISOGI_SH__GROUP

@@ -7,7 +7,7 @@
 #include <stdio.h>
 #include <string.h>
 
-enum { GENERATE_ORDER = 21, GENERATE_TURNS = 15, GENERATE_LATITUDES = 7 };
+enum { GENERATE_ORDER = 21, GENERATE_TURNS = 15, GENERATE_LATITUDES = 7, GENERATE_LOW = 11 };
 
 static quad generate_pi(void) {
     quad pi = 0;
@@ -66,6 +66,34 @@ static int generate_wigner(quad *v) {
         for (int n = 0; n <= GENERATE_TURNS; n++) v[count++] = n > l ? 0 : quad_sqrt((quad)(2 * l + 1) / (quad)(((l + 1) * (l + 1) - n * n) * l));
         for (int n = 0; n <= GENERATE_TURNS; n++)
             v[count++] = n >= l ? 0 : quad_sqrt((quad)((l * l - n * n) * (l + 1)) / (quad)(((l + 1) * (l + 1) - n * n) * l));
+    }
+    return count;
+}
+
+/* Y_l^m = q_l^m (c_m, s_m) for l < 11: coefficients of q in v = 2 z^2 - 1 for m = 1, in v + 1/4 for m > 1, the highest first, without the
+   factor z of an odd q; m outer. */
+static int generate_polynomials(quad *v) {
+    static quad factors[1024];
+    int count = 0;
+    generate_factors(factors);
+    for (int m = 1; m < GENERATE_LOW; m++) {
+        quad p[2][GENERATE_LOW + 1] = {{0}}, a_before = 1;
+        const quad *table = factors + 3 * GENERATE_ORDER + (m - 1) * (2 * GENERATE_ORDER - 1 - m);
+        for (int l = m; l < GENERATE_LOW; l++) {
+            quad *q = p[l & 1], *before = p[~l & 1], a = l > m ? quad_sqrt((quad)(4 * l * l - 1) / (quad)(l * l - m * m)) : 1;
+            if (l == m) q[0] = table[0];
+            for (int k = GENERATE_LOW - 1; k >= 0 && l > m; k--) { /* z times z is (1 + v) / 2 */
+                quad next = (l - m) & 1 ? before[k] : (before[k] + (k ? before[k - 1] : 0)) / 2;
+                q[k] = a * next - (l > m + 1 ? a / a_before * q[k] : 0);
+            }
+            a_before = a;
+            quad shifted[GENERATE_LOW];
+            int degree = (l - m) / 2;
+            for (int k = 0; k <= degree; k++) shifted[k] = q[k];
+            for (int i = 0; i < degree && m > 1; i++)
+                for (int k = degree - 1; k >= i; k--) shifted[k] -= shifted[k + 1] / 4;
+            for (int k = degree; k >= 0; k--) v[count++] = shifted[k];
+        }
     }
     return count;
 }
@@ -154,6 +182,9 @@ static void generate(FILE *out) {
     count = generate_factors(v);
     generate_table(out, "float", "isogi_sh__table_f32", v, count, 0);
     fprintf(out, "#endif\n#ifdef ISOGI_SH__SIMD\n");
+    count = generate_polynomials(v);
+    generate_table(out, "float", "isogi_sh__polynomials_f32", v, count, 0);
+    generate_table(out, "double", "isogi_sh__polynomials_f64", v, count, 1);
     count = generate_wigner(v);
     generate_table(out, "double", "isogi_sh__wigner_f64", v, count, 1);
     count = generate_latitudes(v);
