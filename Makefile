@@ -3,7 +3,7 @@
 # make figures   the figures of the paper, with our data, and how far they are from path tracing: build/figures/index.html
 # make test      the quick tests, under two minutes; ends with "N passed, N failed, N skipped"
 # make check     the long suite: full sizes, every compiler, sanitizer and emulator that is installed
-# make bench     run time against error: build/bench/*.csv and *.svg      (ONLY=sh|vol|trace|dvr QUICK=1)
+# make bench     run time against error: build/bench/*.csv and *.svg      (ONLY=sh|vol|trace|dvr|visibility QUICK=1)
 # make clean
 # CC, CXX and CFLAGS may be set; nothing but a C compiler and make is needed.
 

@@ -74,7 +74,7 @@ int main(int argc, char **argv) {
         for (int a = 0; a < 3; a++) low[a] = fmin(low[a], (double)points[i][a]), high[a] = fmax(high[a], (double)points[i][a]);
         least = fmin(least, (double)values[i]), most = fmax(most, (double)values[i]);
     }
-    isogi_view view = {.width = side, .height = side, .fov = 40};
+    isogi_view view = {.width = 2 * side, .height = 2 * side, .fov = 40}; /* four rays a pixel */
     for (int a = 0; a < 3; a++) radius += 0.25 * (high[a] - low[a]) * (high[a] - low[a]);
     radius = sqrt(radius);
     for (int a = 0; a < 3; a++) {
@@ -83,19 +83,24 @@ int main(int argc, char **argv) {
         view.eye[a] = (float)(0.5 * (low[a] + high[a]) + 2.5 * radius * toward[a] / 2.773);
     }
     double third = (most - least) / 3, half = 0.03 * (most - least);
-    const isogi_peak peaks[] = {{least + third, {.2f, .45f, .9f}, 0.25f}, {least + 2 * third, {.9f, .5f, .15f}, 0.6f}};
+    const isogi_peak peaks[] = {{least + third, {.2f, .45f, .9f}, 0.2f}, {least + 2 * third, {.9f, .5f, .15f}, 0.3f}};
     const float dense = (float)(20 / radius); /* the same surfaces as tents in physical space: their opacity follows the gradient */
     const isogi_transfer_point tents[] = {{least + third - half, {.2f, .45f, .9f}, 0}, {least + third, {.2f, .45f, .9f}, dense}, {least + third + half, {.2f, .45f, .9f}, 0},
                                           {least + 2 * third - half, {.9f, .5f, .15f}, 0}, {least + 2 * third, {.9f, .5f, .15f}, 3 * dense}, {least + 2 * third + half, {.9f, .5f, .15f}, 0}};
     const isogi_transfer surfaces = {NULL, 0, peaks, 2}, thick = {tents, 6, NULL, 0};
     const isogi_tet_desc desc = {.space = data ? ISOGI_DVR_DATA : ISOGI_DVR_PHYSICAL, .silhouette = data ? ISOGI_DVR_SILHOUETTE_EXACT : ISOGI_DVR_SILHOUETTE_NONE};
-    float(*image)[4] = (float(*)[4])malloc((size_t)side * (size_t)side * sizeof *image);
+    float(*image)[4] = (float(*)[4])malloc(4 * (size_t)side * (size_t)side * sizeof *image);
     unsigned char *bytes = (unsigned char *)malloc((size_t)side * (size_t)side * 3);
     if (!image || !bytes) return 1;
     result = isogi_dvr_tets_render(built, &desc, data ? &surfaces : &thick, &view, image, NULL, NULL);
     if (result != ISOGI_OK) return fprintf(stderr, "tets: %s\n", isogi_result_string(result)), 1;
     const double behind[3] = {0.09, 0.095, 0.1};
-    for (size_t i = 0; i < (size_t)side * (size_t)side; i++) picture_pixel(image[i], 1, behind, bytes + 3 * i);
+    for (size_t i = 0; i < (size_t)side * (size_t)side; i++) {
+        const size_t row = 2 * (size_t)side, at = 2 * (i / (size_t)side) * row + 2 * (i % (size_t)side);
+        float mean[4];
+        for (int c = 0; c < 4; c++) mean[c] = 0.25f * (image[at][c] + image[at + 1][c] + image[at + row][c] + image[at + row + 1][c]);
+        picture_pixel(mean, 1, behind, bytes + 3 * i);
+    }
     if (!png_write(argv[3], bytes, side, side, 3, error)) return fprintf(stderr, "tets: %s\n", error), 1;
     isogi_dvr_tets_free(built);
     free(image), free(bytes), free(points), free(values), free(tets), volume_free(&volume);

@@ -218,7 +218,8 @@ static const option option_list[] = {
     {"--reach", "R", "surfaces further away than this (world units) cast no shadow; default 0 = unlimited", NUMBERS, AT(reach), 0, 1, 0, 1e9, 0, "a number, 0 or more"},
     {"--storage", "NAME", "how the texture is held: default, float, half, rgb9e5, byte", OTHER, 0, 0, 0, 0, 0, parse_storage, "default, float, half, rgb9e5 or byte"},
     {"--compare", "FILE.png", "tell how far the picture is from this one: difference_rms, of what is seen, in sRGB values of 0 to 1", TEXT, AT(compare), 0, 0, 0, 0, 0, ""},
-    {"--tf", "FILE", "transfer function: lines \"value extinction r g b\" or \"peak value opacity r g b\"", TEXT, AT(tf), 0, 0, 0, 0, 0, ""},
+    {"--tf", "FILE", "transfer function: lines \"value extinction r g b\" or \"peak value opacity r g b\"; default the scene's or shape's own, "
+     "else one suggested by the histogram", TEXT, AT(tf), 0, 0, 0, 0, 0, ""},
     {"--shading", "NAME", "for dvr and scale-invariant: unlit, visibility, local, two-sided", OTHER, 0, AT(has_shading), 0, 0, 0, parse_shading,
      "unlit visibility local two-sided"},
     {"--classification", "NAME", "for scale-invariant: exact, pre-integrated, post-classified", OTHER, 0, 0, 0, 0, 0, parse_classification,
@@ -256,7 +257,7 @@ static void print_help(void) {
          "  dvr                          volume rendering, lit by spherical-harmonics visibility\n"
          "  scale-invariant              volume rendering per unit of data: the same picture at any scale of space\n\n"
          "Light: without --env and --light a sky (radiance 1 above to 0.3 below) and a sun. The exposure is set so that nine tenths\n"
-         "of what is seen are below 0.6 of white; up to 0.7 the picture is linear, above it bends to white.\n"
+         "of what is seen are below 0.6 of white; up to 0.7 the picture is linear, above it bends to white; then it is coded as sRGB.\n"
          "The variable ISOGI_DATA names the folder of the volumes that --scene asks for.\n\n"
          "Examples\n"
          "  build/viewer procedural:engine-block --out engine.png\n"
@@ -1023,19 +1024,20 @@ static int shade_surface(viewer *v) {
 
 /* ---- volume rendering --------------------------------------------------------------------------------------------------------------------------------- */
 
-/* For a volume of which nothing is known: matter from the isovalue up, warmer where it is denser. In data space, where extinction is
-   per unit of data, an isosurface and a little of everything. `thickness`: extinction that makes 1/30 of the box's diagonal half opaque at the top of the range. */
+/* For a volume of which nothing is known: what its histogram suggests. In data space with the isosurface that is asked for, or the one that
+   bounds the second class of values; what stands between surfaces is thin then. */
 static int default_transfer(viewer *v) {
-    char text[1024];
-    double low = v->range[0], high = v->range[1], iso = v->isovalue, width = high - low, thickness = 20 / v->radius;
-    if (!(iso > low && iso < high)) iso = low + 0.5 * (high - low);
-    if (!(width > 1e-30)) width = 1e-30; /* an extinction is a float: data of a smaller range stay nearly transparent, but for the peak */
-    if (v->o.mode == SCALE_INVARIANT)
-        snprintf(text, sizeof text, "%.17g %.9g .25 .45 .9\n%.17g %.9g .8 .8 .8\n%.17g %.9g .95 .55 .2\npeak %.17g .6 .95 .88 .75\n", low, 0.35 / width, iso,
-                 0.45 / width, high, 0.8 / width, iso);
-    else
-        snprintf(text, sizeof text, "%.17g 0 .5 .6 .75\n%.17g 0 .5 .6 .75\n%.17g %.9g .8 .75 .68\n%.17g %.9g 1 .75 .4\n", low, iso - 0.08 * (iso - low), iso,
-                 0.4 * thickness, high, thickness);
+    isogi_transfer_point points[ISOGI_SUGGEST_POINTS];
+    isogi_dvr_space space = v->o.mode == DVR ? ISOGI_DVR_PHYSICAL : ISOGI_DVR_DATA;
+    char text[4096], *at = text, *end = text + sizeof text;
+    double threshold;
+    isogi_result result = isogi_transfer_suggest(v->pyramid, space, points, &threshold);
+    if (result != ISOGI_OK) return fail(v, "a transfer function", result);
+    if (v->o.has_iso || v->shape) threshold = v->isovalue;
+    for (int i = 0; i < ISOGI_SUGGEST_POINTS; i++)
+        at += snprintf(at, (size_t)(end - at), "%.17g %.9g %.6f %.6f %.6f\n", points[i].value, fmin((double)points[i].extinction * (space ? 0.4 : 1), 1e30), (double)points[i].rgb[0],
+                       (double)points[i].rgb[1], (double)points[i].rgb[2]);
+    if (space == ISOGI_DVR_DATA) snprintf(at, (size_t)(end - at), "peak %.17g .6 .95 .88 .75\n", threshold);
     return transfer_parse(text, &v->transfer, v->error);
 }
 

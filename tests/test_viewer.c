@@ -155,6 +155,31 @@ TEST(picture_of_a_clipped_volume_stays_the_same) { check_golden("clip", "procedu
 TEST(picture_of_volume_rendering_stays_the_same) { check_golden("dvr", "procedural:engine-block:64 --mode dvr"); }
 TEST(picture_of_scale_invariant_rendering_stays_the_same) { check_golden("scale-invariant", "procedural:marschner-lobb:64 --mode scale-invariant"); }
 
+/* A volume of which nothing is known: what its histogram suggests shows the ball and not the air around it, in both spaces. */
+TEST(a_transfer_function_is_suggested_where_none_is_given) {
+    static unsigned char ball[24][24][24];
+    const char *modes[] = {"dvr", "scale-invariant"};
+    char command[1024];
+    for (int i = 0; i < 24 * 24 * 24; i++) {
+        double d[3] = {i % 24 - 11.5, i / 24 % 24 - 11.5, i / 576 - 11.5}, r = sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
+        ball[i / 576][i / 24 % 24][i % 24] = (unsigned char)(r < 4 ? 220 : r < 8 ? 110 : 10 + i % 5);
+    }
+    const char *path = temporary("ball_24x24x24_uint8.raw");
+    write_bytes(path, ball, sizeof ball);
+    for (int m = 0; m < 2; m++) {
+        const char *out = temporary("ball.png");
+        int shape[3] = {0, 0, 0};
+        snprintf(command, sizeof command, "'%s' --mode %s --size 48x48 --out '%s'", path, modes[m], out);
+        run_result r = run_viewer(command);
+        CHECK(r.status == 0, "%s: %s", modes[m], r.error);
+        unsigned char *picture = read_picture(out, shape);
+        if (!picture) continue;
+        const unsigned char *middle = picture + 3 * (24 * 48 + 24), *corner = picture + 3 * (6 * 48 + 24);
+        CHECK(middle[0] > corner[0] + 40, "%s: the ball %d, above it %d", modes[m], middle[0], corner[0]);
+        free(picture);
+    }
+}
+
 /* The two ways to see the surface agree: mesh and exact rays differ by less than a voxel, so only edges may differ. */
 TEST(mesh_and_exact_rays_show_the_same_surface) {
     int shape[3];
