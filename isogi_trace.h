@@ -83,7 +83,7 @@
      probe: a point of the surface near by, in cells of 2 voxels or an eighth of the ray's length, whose own hemisphere is gathered once
      in the same way; passes over the probes then bring all reflections without rays. What cosine-distributed rays brought is averaged
      over neighbouring texels that face the same way, as far as their noise could explain the difference. Probes cost accuracy: about
-     0.5 % of the mean and 2 % at a point in narrow channels of albedo 0.8 (tests/test_trace_bake.c prints it). Lazy and adaptive bakes
+     0.9 % of the mean and 1.7 % at a point in narrow channels of albedo 0.8 (tests/test_trace_bake.c prints it). Lazy and adaptive bakes
      take samples in blocks of 4, 16, 64, ... and every other texel along each axis first: soon every lookup has a value.
      A hit from within (only through an open border can a ray get there) is a surface too, with its normal turned.
 
@@ -141,7 +141,8 @@
    Limits       Order 6; 2^24 samples; paths end after 10000 reflections. White surfaces that enclose a light truly have infinite
                 light: what is computed then is finite and has no meaning; its error says so, and isogi_trace_report.diverges.
    Cost         PATHS: samples * (1 + lights that have a size) rays for a texel, and as many for each reflection. FEEDBACK:
-                samples * (1 + half of these lights), and 8 times that number for each probe.
+                samples * (1 + half of these lights), and an eighth of that, of 4 to 32 samples, for each probe
+                (desc.error: 8 samples).
 
    History  1.0  first release
 */
@@ -416,10 +417,13 @@ ISOGI_API size_t isogi_trace_memory(const isogi_trace *trace); /* bytes that the
 #define ISOGI_TRACE__FLUSH 64      /* rays in one call */
 #define ISOGI_TRACE__SWEEP 256     /* nodes in a task that traces no rays */
 #define ISOGI_TRACE__GROUP 65536   /* texels that are worked on together, about */
-#define ISOGI_TRACE__PROBE 8u       /* samples of a probe */
+#define ISOGI_TRACE__PROBE_SHARE 8   /* samples of a texel to those of a probe, */
+#define ISOGI_TRACE__PROBE_LEAST 4   /* which has at least so many, */
+#define ISOGI_TRACE__PROBE_MOST 32   /* and at most so many */
 #define ISOGI_TRACE__CELL 2.0       /* of probes that texels read, in voxels, */
 #define ISOGI_TRACE__CELL_FAR 8.0   /* and of those that only probes read */
-#define ISOGI_TRACE__CELL_RATIO 8   /* length of rays to size of cells */
+#define ISOGI_TRACE__CELL_RATIO 8   /* length of rays to size of cells, */
+#define ISOGI_TRACE__NEAR_RATIO 2   /* up to CELL_FAR */
 #define ISOGI_TRACE__PLANE 1.0      /* voxels between the planes of a hit and its probe */
 #define ISOGI_TRACE__LIGHT_SHARE 2  /* samples to samples of a light */
 #define ISOGI_TRACE__FILTER 1       /* texels to each side */
@@ -2710,18 +2714,20 @@ static isogi_result isogi_trace__feedback_new(isogi_trace *t) {
 
 /* ---- the table of probes ---- */
 
-/* Cells of 2 voxels, of 4 for rays longer than 16 voxels, and so on: an eighth of the length at most. In units of the smallest
-   spacing, so that they are cubes in the world. */
+/* Cells of 2 voxels, of 4 for rays longer than 16 voxels, and so on: an eighth of the length at most. Rays of probes, whose light
+   matters less, take half of their length up to `cell` voxels; no more, or what stands beside a narrow gap would light it. In units of
+   the smallest spacing, so that they are cubes in the world. */
 static uint64_t isogi_trace__probe_key(const isogi_trace__scene *scene, const isogi_hit *hit, const float normal[3], double t,
                                        double cell) {
     const double *spacing = scene->volume->spacing;
-    double least = spacing[0], size = cell;
+    double least = spacing[0], size = ISOGI_TRACE__CELL;
     uint64_t key = 0;
     int a, axis = 0, level = 0;
     for (a = 1; a < 3; a++) {
         if (spacing[a] < least) least = spacing[a];
         if (fabsf(normal[a]) > fabsf(normal[axis])) axis = a;
     }
+    for (; size < cell && size * ISOGI_TRACE__NEAR_RATIO < t / least; level++) size *= 2;
     for (; level < 8 && size * ISOGI_TRACE__CELL_RATIO < t / least; level++) size *= 2;
     for (a = 0; a < 3; a++) {
         double x = (hit->cell[a] + hit->local[a]) * spacing[a] / (least * size) + 1;
@@ -2784,7 +2790,6 @@ static isogi_result isogi_trace__probe_of(isogi_trace *t, const isogi_trace__cat
     isogi_trace__feedback *f = t->feedback;
     size_t i = isogi_trace__table_find(f, c->key);
     isogi_trace__node *n;
-    float geometric[1][3] = {{0, 0, 0}};
     isogi_result result;
     uint64_t key = c->key;
     int tries;
@@ -2801,7 +2806,6 @@ static isogi_result isogi_trace__probe_of(isogi_trace *t, const isogi_trace__cat
     n = &f->probes.nodes[f->probes.count];
     n->place = c->hit, n->key = key, n->from = c->from;
     memcpy(n->normal, c->normal, sizeof n->normal);
-    if (!(n->place.side == 2 || n->place.side == -2)) isogi_trace__normals(t->scene.pyramid, t->scene.desc.normals, &n->place, &n->from, 1, (float(*)[3])n->normal, geometric);
     if (t->scene.desc.material) {
         double grid[3], point[3];
         float emission[3];
@@ -2824,7 +2828,11 @@ static int isogi_trace__in_blocks(const isogi_trace_desc *d) { return d->lazy ||
 /* Samples of the blocks before number `level`. */
 static uint32_t isogi_trace__block(const isogi_trace *t, int is_probe, int level) {
     uint32_t samples = (uint32_t)t->scene.desc.samples, sum;
-    if (is_probe) return level ? ISOGI_TRACE__PROBE : 0;
+    if (is_probe) {
+        sum = (t->scene.desc.error > 0 ? 64 : samples) / ISOGI_TRACE__PROBE_SHARE; /* adaptive texels have few samples, most of them */
+        sum = sum > ISOGI_TRACE__PROBE_LEAST ? sum : ISOGI_TRACE__PROBE_LEAST;
+        return level ? sum < ISOGI_TRACE__PROBE_MOST ? sum : ISOGI_TRACE__PROBE_MOST : 0;
+    }
     if (!isogi_trace__in_blocks(&t->scene.desc)) return level ? samples : 0;
     sum = level > 12 ? samples : (((uint32_t)1 << (2 * level + 2)) - 4) / 3;
     return sum < samples ? sum : samples;
@@ -3063,8 +3071,11 @@ static int isogi_trace__span_site(isogi_trace__cast *c, uint32_t k) {
         c->sequence[k] = isogi_trace__key(isogi_trace__key(seed, 3), (uint64_t)isogi_trace__brick_of(t, x, &n->slot));
         memcpy(n->normal, site->normal, sizeof n->normal);
     } else {
+        float geometric[1][3];
         site->place = n->place, site->isovalue = n->isovalue;
-        memcpy(site->normal, n->normal, sizeof site->normal);
+        memcpy(site->normal, n->normal, sizeof site->normal); /* of a cap */
+        if (n->place.side == 1 || n->place.side == -1)
+            isogi_trace__normals(t->scene.pyramid, t->scene.desc.normals, &n->place, &n->from, 1, &site->normal, geometric);
         site->key = c->sequence[k] = isogi_trace__key(isogi_trace__key(seed, 4), n->key);
     }
     site->from = n->from;
@@ -4772,7 +4783,10 @@ ISOGI_API isogi_result isogi_trace_gather_field(const isogi_trace_desc *desc, is
 #undef ISOGI_TRACE__CELL_RATIO
 #undef ISOGI_TRACE__CELL_FAR
 #undef ISOGI_TRACE__CELL
-#undef ISOGI_TRACE__PROBE
+#undef ISOGI_TRACE__PROBE_SHARE
+#undef ISOGI_TRACE__PROBE_LEAST
+#undef ISOGI_TRACE__PROBE_MOST
+#undef ISOGI_TRACE__NEAR_RATIO
 #undef ISOGI_TRACE__GROUP
 #undef ISOGI_TRACE__SWEEP
 #undef ISOGI_TRACE__FLUSH
