@@ -21,16 +21,16 @@ static double marschner_lobb(double x, double y, double z) {
 
 /* ---- a second implementation, plain and slow, in long double ---- */
 
-/* The trilinear value at p, and how fast it changes along dir. */
+/* The trilinear value at p and, if asked for, how fast it changes along dir. */
 static long double reference_along(const field *f, const long double p[3], const long double dir[3], long double *slope) {
     int c[3];
-    *slope = 0;
+    if (slope) *slope = 0;
     for (int a = 0; a < 3; a++) {
         c[a] = (int)p[a];
         if (c[a] > f->size[a] - 2) c[a] = f->size[a] - 2;
         if (c[a] < 0) c[a] = 0;
     }
-    for (int a = 0; a < 3; a++) { /* linear along each axis, so the difference of the cell's faces is the derivative */
+    for (int a = 0; a < 3 && slope; a++) { /* linear along each axis, so the difference of the cell's faces is the derivative */
         long double low[3] = {p[0], p[1], p[2]}, high[3] = {p[0], p[1], p[2]};
         low[a] = c[a], high[a] = c[a] + 1;
         *slope += dir[a] * (reference_value(f, c, high) - reference_value(f, c, low));
@@ -293,7 +293,7 @@ TEST(scaling_space_changes_no_pixel_in_data_space) {
 
 /* The number of crossings along a ray, by another way: signs between fine samples of the long double reference. */
 static int reference_crossings(const field *f, double isovalue, const double eye[3], const float dir[3], int *unsure) {
-    long double d[3], p[3], slope, last = 0, closest = 1e30L;
+    long double d[3], p[3], last = 0, closest = 1e30L;
     int count = 0, begun = 0, rising = 0;
     for (int a = 0; a < 3; a++) d[a] = (long double)dir[a];
     *unsure = 0;
@@ -305,11 +305,11 @@ static int reference_crossings(const field *f, double isovalue, const double eye
             begun = 0;
             continue;
         }
-        long double v = reference_along(f, p, d, &slope) - (long double)isovalue;
+        long double v = reference_along(f, p, d, NULL) - (long double)isovalue;
         if (!begun && fabsl(v) < 0.01L) *unsure = 1;
         if (begun && (v >= 0) != (last >= 0)) count++;
-        if (begun && (slope > 0) != rising) closest = fminl(closest, fabsl(v)); /* an extremum next to the isovalue */
-        rising = slope > 0, last = v, begun = 1;
+        if (begun > 1 && (v > last) != rising) closest = fminl(closest, fminl(fabsl(v), fabsl(last))); /* an extremum next to the isovalue */
+        rising = v > last, last = v, begun++;
     }
     if (closest < 1e-3L) *unsure = 1;
     return count;

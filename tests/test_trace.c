@@ -38,7 +38,7 @@ TEST(white_furnace) {
             isogi_trace_desc d = desc_make(&s, 1, 64, 64);
             float points[64][3];
             double worst, mean;
-            int n = surface_points(&s, 0, LONG_SUITE ? 64 : 24, 2, points);
+            int n = surface_points(&s, 0, LONG_SUITE ? 64 : 16, 2, points);
             d.normals = kind ? ISOGI_NORMAL_TRILINEAR : ISOGI_NORMAL_SMOOTH;
             mean = mean_irradiance(&d, (const float(*)[3])points, n, &worst);
             CHECK(fabs(mean - PI) < 0.002 * PI && worst < 0.01 * PI, "%s, normals %d: mean E %.5f, largest deviation %.5f", name[i], kind, mean, worst);
@@ -315,7 +315,7 @@ TEST(relit_by_sh_equals_baked_directly) {
     int n = surface_points(&s, 0, 200, 9, points);
     for (int order = 3; order <= 5; order += 2)
         for (int colour = 0; colour < 2; colour++) {
-            isogi_trace_desc d = desc_make(&s, 0.7f, 3, 64);
+            isogi_trace_desc d = desc_make(&s, 0.7f, 3, LONG_SUITE ? 64 : 24);
             isogi_lighting lighting;
             isogi_counters before = {0}, after = {0};
             isogi_trace *t = NULL;
@@ -389,8 +389,8 @@ static isogi_trace_desc busy_desc(const scene *s, const isogi_light *sun, isogi_
 }
 
 TEST(same_bits_for_any_threads_budget_and_lazily) {
-    double q[5] = {10, 9, 10, 13, 6};
-    scene s = scene_make(21, 20, 19, NULL, pit, q);
+    double q[5] = {8, 7, 8, 10.5, 5};
+    scene s = scene_make(17, 16, 15, NULL, pit, q);
     isogi_light sun = light_make(ISOGI_LIGHT_DIRECTIONAL, 1, 2, 0.5, 2, 0.2);
     static float points[400][3], first[400][3], e[400][3];
     int n = surface_points(&s, 0, 400, 14, points);
@@ -541,17 +541,17 @@ TEST(lookups_follow_their_definitions) {
 }
 
 /* Wyman et al. 2006, fig. 6, in numbers: RMS error of each lookup against light gathered at the points themselves. Trilinear has to be
-   the best, as the paper found; the noise of both sides (1024 samples) is far below the differences. */
+   the best, as the paper found; the noise of both sides is far below the differences. */
 TEST(trilinear_lookup_errs_least) {
     double q[1] = {0.5}, rms[4];
     scene s = scene_make(20, 20, 20, NULL, gyroid, q);
     enum { N = 150 };
     static float point[N][3], e[N][3], truth[N][3];
-    isogi_trace_desc d = desc_make(&s, 0.5f, 2, 1024);
+    isogi_trace_desc d = desc_make(&s, 0.5f, LONG_SUITE ? 2 : 0, LONG_SUITE ? 1024 : 512);
     int n = surface_points(&s, 0.1, N, 72, point);
     d.lazy = 1;
     isogi_trace_gather(&d, (const float(*)[3])point, NULL, (size_t)n, truth, NULL, NULL);
-    d.samples = 256;
+    d.samples = LONG_SUITE ? 256 : 192;
     for (int kind = 0; kind < 4; kind++) {
         double sum = 0;
         d.lookup = (isogi_trace_lookup)kind;
@@ -1022,7 +1022,7 @@ static void real_volume(const char *name, size_t x, size_t y, size_t z, double i
     isogi_trace *t = NULL;
     isogi_trace_desc d;
     static float points[160 * 160][3], e[160 * 160][3], error[160 * 160];
-    int size = LONG_SUITE ? 160 : 64, n, dark = 0, bright = 0, unready = 0, wrong = 0;
+    int size = LONG_SUITE ? 160 : 48, n, dark = 0, bright = 0, unready = 0, wrong = 0;
     double sum = 0;
     if (!data) SKIP("ISOGI_DATA is not set");
     memset(&v, 0, sizeof v), memset(&d, 0, sizeof d);
@@ -1051,7 +1051,9 @@ static void real_volume(const char *name, size_t x, size_t y, size_t z, double i
     isogi_trace_free(t), isogi_vol_free(p), free(data);
 }
 
-TEST(engine_has_no_specks) { real_volume("engine_256x256x128_uint8.raw", 256, 256, 128, 80); }
-TEST(bonsai_has_no_specks) { real_volume("bonsai_256x256x256_uint8.raw", 256, 256, 256, 40); }
+TEST(scans_have_no_specks) {
+    real_volume("engine_256x256x128_uint8.raw", 256, 256, 128, 80);
+    if (LONG_SUITE) real_volume("bonsai_256x256x256_uint8.raw", 256, 256, 256, 40);
+}
 
 TEST_MAIN("trace")
