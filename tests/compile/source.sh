@@ -63,8 +63,9 @@ function-length) # reported, not refused: unrolled kernels and tables are long b
     [ -z "$long" ] || echo "note: over 80 lines: $long"
     ;;
 symbols) # only isogi_ is exported, nothing can change behind a caller's back, nothing prints or ends the program
-    $CC -std=c99 -O0 -fno-pic -I. -DISOGI_IMPLEMENTATION -DHEADER="\"$header.h\"" -c tests/compile/one.c -o "$OUT/one.o" || exit 1
     command -v nm > /dev/null || fail "nm is missing"
+    own=$(echo "${header}_IMPLEMENTATION" | tr a-z A-Z)
+    $CC -std=c99 -O0 -fno-pic -I. -D"$own" -DHEADER="\"$header.h\"" -c tests/compile/one.c -o "$OUT/one.o" || exit 1
     bad=$(nm -g --defined-only "$OUT/one.o" | awk '{print $3}' | grep -v '^isogi_')
     [ -z "$bad" ] || fail "exported without the prefix: $bad"
     bad=$(nm "$OUT/one.o" | awk '$2 ~ /[bBdDC]/ {print $3}')
