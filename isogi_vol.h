@@ -2054,34 +2054,40 @@ static void isogi_vol__fetch(const isogi_volume *v, int n, const isogi_vol__bloc
 
 /* ---- cubic filters ---- */
 
+/* Taps of points as floats: point n's begin offset[n] bytes from `first`, rows and slices follow at y and z; powers: of the filter, and {1, 0, 0, 0}. */
+typedef struct isogi_vol__taps_at {
+    const char *first;
+    const ptrdiff_t *offset;
+    ptrdiff_t y, z;
+    float powers[5][4];
+} isogi_vol__taps_at;
+
 /* The first tap of a point. */
-ISOGI_VOL__INLINE const char *isogi_vol__first_tap(const isogi_volume *v, const isogi_vol__block *b, int i) {
-    return (const char *)v->data + b->offset[i] - v->stride[0] - v->stride[1] - v->stride[2];
+ISOGI_VOL__INLINE const char *isogi_vol__first_tap(const isogi_volume *v, ptrdiff_t offset) {
+    return (const char *)v->data + offset - v->stride[0] - v->stride[1] - v->stride[2];
 }
 
 /* Cubic filters for n points all of whose taps exist. Every four lanes are a point of their own and hold four taps of a row; rows are summed
    along y, then z, and x comes last. Taps count relative to the cell's first voxel, so that rounding is relative to the variation among
    them: hence the slices go 1, 2, 3, 0. What a width has to offer: SPREAD, a number for each point; TILE, four numbers for every point; LANE, the
-   number of one lane of four in all of them; TURN, lanes moved down by one of four; ROW_type, a row of each point, q[...] bytes from p; SUMS, the sums
+   number of one lane of four in all of them; TURN, lanes moved down by one of four; ROW, a row of each point, q[...] bytes from p; SUMS, the sums
    of four vectors over lanes, side by side. sum is a parameter of its own since gcc 12 forgets calls that only write into b. */
 #define ISOGI_VOL__WEIGHTS(NAME, L, axis, w, d)                                                                                  \
     u = ISOGI_VOL__SPREAD_##NAME(&b->local[axis][i]), half = ISOGI_VOL__MADD_##NAME(c3, u, c2);                                  \
     w = ISOGI_VOL__MADD_##NAME(ISOGI_VOL__MADD_##NAME(half, u, c1), u, c0);                                                      \
     d = ISOGI_VOL__MADD_##NAME(ISOGI_VOL__MADD_##NAME(c3, u, L##add_ps(half, half)), u, c1)
-#define ISOGI_VOL__FOUR_ROWS(ROW)                                                                                                \
-    row0 = ROW(p), row1 = ROW(p + sy), row2 = ROW(p + 2 * sy), row3 = ROW(p + sy3);                                              \
-    break
 #define ISOGI_VOL__ALONG_Y(NAME, L, w)                                                                                           \
     ISOGI_VOL__MADD_##NAME(w##3, row3, ISOGI_VOL__MADD_##NAME(w##2, row2, ISOGI_VOL__MADD_##NAME(w##1, row1, L##mul_ps(w##0, row0))))
 #define ISOGI_VOL__CUBIC(NAME, ATTRIBUTES, V, L, WIDTH)                                                                          \
-    ATTRIBUTES static void isogi_vol__cubic_##NAME(const isogi_volume *v, const isogi_vol__block *b, const float powers[5][4], int n, float *sum) { \
+    ATTRIBUTES static void isogi_vol__cubic_##NAME(const isogi_vol__taps_at *taps, const isogi_vol__block *b, int from, int n, float *sum) { \
+        const float(*powers)[4] = taps->powers;                                                                                  \
         const V c0 = ISOGI_VOL__TILE_##NAME(powers[0]), c1 = ISOGI_VOL__TILE_##NAME(powers[1]), c2 = ISOGI_VOL__TILE_##NAME(powers[2]); \
         const V c3 = ISOGI_VOL__TILE_##NAME(powers[3]), to_value = ISOGI_VOL__TILE_##NAME(powers[4]);                            \
-        const ptrdiff_t sy = v->stride[1], sy3 = 3 * sy, sz = v->stride[2];                                                      \
+        const ptrdiff_t sy = taps->y, sz = taps->z;                                                                              \
         int i, k;                                                                                                                \
-        for (i = 0; i < n; i += WIDTH / 4) {                                                                                     \
-            const ptrdiff_t *q = &b->offset[i];                                                                                  \
-            const char *p = (const char *)v->data - v->stride[0] - sy;                                                           \
+        for (i = from; i < n; i += WIDTH / 4) {                                                                                  \
+            const ptrdiff_t *q = taps->offset + (i - from);                                                                      \
+            const char *p = taps->first + sz;                                                                                    \
             V u, half, wx, dx, wy, dy, wz, dz, wy0, wy1, wy2, wy3, dy0, dy1, dy2, dy3, slice, slope, base, row0, row1, row2, row3; \
             V value = L##setzero_ps(), by_y = value, by_z = value;                                                               \
             ISOGI_VOL__WEIGHTS(NAME, L, 0, wx, dx);                                                                              \
@@ -2093,14 +2099,8 @@ ISOGI_VOL__INLINE const char *isogi_vol__first_tap(const isogi_volume *v, const 
             dy2 = ISOGI_VOL__LANE_##NAME(dy, 2), dy3 = ISOGI_VOL__LANE_##NAME(dy, 3);                                            \
             base = row0 = row1 = row2 = row3 = value;                                                                            \
             for (k = 0; k < 4; k++, p += k == 3 ? -3 * sz : sz) {                                                                \
-                switch (v->type) {                                                                                               \
-                case ISOGI_U8: ISOGI_VOL__FOUR_ROWS(ISOGI_VOL__U8_##NAME);                                                       \
-                case ISOGI_I8: ISOGI_VOL__FOUR_ROWS(ISOGI_VOL__I8_##NAME);                                                       \
-                case ISOGI_U16: ISOGI_VOL__FOUR_ROWS(ISOGI_VOL__U16_##NAME);                                                     \
-                case ISOGI_I16: ISOGI_VOL__FOUR_ROWS(ISOGI_VOL__I16_##NAME);                                                     \
-                case ISOGI_F32: ISOGI_VOL__FOUR_ROWS(ISOGI_VOL__F32_##NAME);                                                     \
-                case ISOGI_F64: break;                                                                                           \
-                }                                                                                                                \
+                row0 = ISOGI_VOL__ROW_##NAME(p), row1 = ISOGI_VOL__ROW_##NAME(p + sy);                                           \
+                row2 = ISOGI_VOL__ROW_##NAME(p + 2 * sy), row3 = ISOGI_VOL__ROW_##NAME(p + 3 * sy);                              \
                 if (!k) base = ISOGI_VOL__LANE_##NAME(row1, 1);                                                                  \
                 row0 = L##sub_ps(row0, base), row1 = L##sub_ps(row1, base), row2 = L##sub_ps(row2, base), row3 = L##sub_ps(row3, base); \
                 slice = ISOGI_VOL__ALONG_Y(NAME, L, wy), slope = ISOGI_VOL__ALONG_Y(NAME, L, dy);                                \
@@ -2110,6 +2110,25 @@ ISOGI_VOL__INLINE const char *isogi_vol__first_tap(const isogi_volume *v, const 
             }                                                                                                                    \
             slice = ISOGI_VOL__SUMS_##NAME(L##mul_ps(value, wx), L##mul_ps(value, dx), L##mul_ps(by_y, wx), L##mul_ps(by_z, wx)); \
             L##storeu_ps(sum + 4 * i, ISOGI_VOL__MADD_##NAME(base, to_value, slice));                                            \
+        }                                                                                                                        \
+    }
+
+/* The 64 taps of a point from integers, which become floats first so that the filters need but one form. */
+#define ISOGI_VOL__WIDEN_ROWS(L, ROW)                                                                                            \
+    for (; out < end; p += v->stride[2] - 4 * v->stride[1])                                                                      \
+        for (y = 0; y < 4; y++, p += v->stride[1], out += 4) L##storeu_ps(out, ROW(p));                                          \
+    break
+#define ISOGI_VOL__WIDEN(NAME, ATTRIBUTES, L)                                                                                    \
+    ATTRIBUTES static void isogi_vol__widen_##NAME(const isogi_volume *v, const char *p, float *out) {                           \
+        const float *end = out + 64;                                                                                             \
+        int y;                                                                                                                   \
+        switch (v->type) {                                                                                                       \
+        case ISOGI_U8: ISOGI_VOL__WIDEN_ROWS(L, ISOGI_VOL__U8_##NAME);                                                           \
+        case ISOGI_I8: ISOGI_VOL__WIDEN_ROWS(L, ISOGI_VOL__I8_##NAME);                                                           \
+        case ISOGI_U16: ISOGI_VOL__WIDEN_ROWS(L, ISOGI_VOL__U16_##NAME);                                                         \
+        case ISOGI_I16: ISOGI_VOL__WIDEN_ROWS(L, ISOGI_VOL__I16_##NAME);                                                         \
+        case ISOGI_F32:                                                                                                          \
+        case ISOGI_F64: break;                                                                                                   \
         }                                                                                                                        \
     }
 
@@ -2133,14 +2152,15 @@ ISOGI_VOL__INLINE __m128i isogi_vol__four_bytes(const char *p) {
 /* Numbers are moved to the upper end of 32 bits, then shifted back with or without their sign. */
 #define ISOGI_VOL__BYTES(p) _mm_unpacklo_epi16(_mm_setzero_si128(), _mm_unpacklo_epi8(_mm_setzero_si128(), isogi_vol__four_bytes(p)))
 #define ISOGI_VOL__SHORTS(p) _mm_unpacklo_epi16(_mm_setzero_si128(), ISOGI_VOL__EIGHT(p))
-#define ISOGI_VOL__U8_base(p) _mm_cvtepi32_ps(_mm_srli_epi32(ISOGI_VOL__BYTES((p) + q[0]), 24))
-#define ISOGI_VOL__I8_base(p) _mm_cvtepi32_ps(_mm_srai_epi32(ISOGI_VOL__BYTES((p) + q[0]), 24))
-#define ISOGI_VOL__U16_base(p) _mm_cvtepi32_ps(_mm_srli_epi32(ISOGI_VOL__SHORTS((p) + q[0]), 16))
-#define ISOGI_VOL__I16_base(p) _mm_cvtepi32_ps(_mm_srai_epi32(ISOGI_VOL__SHORTS((p) + q[0]), 16))
+#define ISOGI_VOL__U8_base(p) _mm_cvtepi32_ps(_mm_srli_epi32(ISOGI_VOL__BYTES(p), 24))
+#define ISOGI_VOL__I8_base(p) _mm_cvtepi32_ps(_mm_srai_epi32(ISOGI_VOL__BYTES(p), 24))
+#define ISOGI_VOL__U16_base(p) _mm_cvtepi32_ps(_mm_srli_epi32(ISOGI_VOL__SHORTS(p), 16))
+#define ISOGI_VOL__I16_base(p) _mm_cvtepi32_ps(_mm_srai_epi32(ISOGI_VOL__SHORTS(p), 16))
 #define ISOGI_VOL__FLOATS(p, i) _mm_loadu_ps((const float *)(const void *)((p) + q[i]))
-#define ISOGI_VOL__F32_base(p) ISOGI_VOL__FLOATS(p, 0)
+#define ISOGI_VOL__ROW_base(p) ISOGI_VOL__FLOATS(p, 0)
 ISOGI_VOL__TRILINEAR(base, , __m128, _mm_)
 ISOGI_VOL__TRILINEAR_BLOCK(base, , __m128, _mm_, 4)
+ISOGI_VOL__WIDEN(base, , _mm_)
 ISOGI_VOL__CUBIC(base, , __m128, _mm_, 4)
 #endif
 
@@ -2152,15 +2172,14 @@ ISOGI_VOL__CUBIC(base, , __m128, _mm_, 4)
 #define ISOGI_VOL__LANE_avx2(v, i) _mm256_permute_ps(v, 0x55 * (i))
 #define ISOGI_VOL__TURN_avx2(v) _mm256_permute_ps(v, 0x39)
 #define ISOGI_VOL__SUMS_avx2(a, b, c, d) ISOGI_VOL__WHOLES(_mm256_, ISOGI_VOL__HALVES(_mm256_, a, b), ISOGI_VOL__HALVES(_mm256_, c, d))
-#define ISOGI_VOL__LONG(p, i) _mm_unpacklo_epi64(ISOGI_VOL__EIGHT((p) + q[i]), ISOGI_VOL__EIGHT((p) + q[(i) + 1]))
-#define ISOGI_VOL__SHORT(p) _mm_unpacklo_epi32(isogi_vol__four_bytes((p) + q[0]), isogi_vol__four_bytes((p) + q[1]))
-#define ISOGI_VOL__U8_avx2(p) _mm256_cvtepi32_ps(_mm256_cvtepu8_epi32(ISOGI_VOL__SHORT(p)))
-#define ISOGI_VOL__I8_avx2(p) _mm256_cvtepi32_ps(_mm256_cvtepi8_epi32(ISOGI_VOL__SHORT(p)))
-#define ISOGI_VOL__U16_avx2(p) _mm256_cvtepi32_ps(_mm256_cvtepu16_epi32(ISOGI_VOL__LONG(p, 0)))
-#define ISOGI_VOL__I16_avx2(p) _mm256_cvtepi32_ps(_mm256_cvtepi16_epi32(ISOGI_VOL__LONG(p, 0)))
-#define ISOGI_VOL__F32_avx2(p) _mm256_set_m128(ISOGI_VOL__FLOATS(p, 1), ISOGI_VOL__FLOATS(p, 0))
+#define ISOGI_VOL__ROW_avx2(p) _mm256_set_m128(ISOGI_VOL__FLOATS(p, 1), ISOGI_VOL__FLOATS(p, 0))
+#define ISOGI_VOL__U8_avx2(p) _mm_cvtepi32_ps(_mm_cvtepu8_epi32(isogi_vol__four_bytes(p)))
+#define ISOGI_VOL__I8_avx2(p) _mm_cvtepi32_ps(_mm_cvtepi8_epi32(isogi_vol__four_bytes(p)))
+#define ISOGI_VOL__U16_avx2(p) _mm_cvtepi32_ps(_mm_cvtepu16_epi32(ISOGI_VOL__EIGHT(p)))
+#define ISOGI_VOL__I16_avx2(p) _mm_cvtepi32_ps(_mm_cvtepi16_epi32(ISOGI_VOL__EIGHT(p)))
 ISOGI_VOL__TRILINEAR(avx2, ISOGI_VOL__AVX2, __m256, _mm256_)
 ISOGI_VOL__TRILINEAR_BLOCK(avx2, ISOGI_VOL__AVX2, __m256, _mm256_, 8)
+ISOGI_VOL__WIDEN(avx2, ISOGI_VOL__AVX2, _mm_)
 ISOGI_VOL__CUBIC(avx2, ISOGI_VOL__AVX2, __m256, _mm256_, 8)
 
 #define ISOGI_VOL__MADD_avx512 _mm512_fmadd_ps
@@ -2170,16 +2189,7 @@ ISOGI_VOL__CUBIC(avx2, ISOGI_VOL__AVX2, __m256, _mm256_, 8)
 #define ISOGI_VOL__LANE_avx512(v, i) _mm512_permute_ps(v, 0x55 * (i))
 #define ISOGI_VOL__TURN_avx512(v) _mm512_permute_ps(v, 0x39)
 #define ISOGI_VOL__SUMS_avx512(a, b, c, d) ISOGI_VOL__WHOLES(_mm512_, ISOGI_VOL__HALVES(_mm512_, a, b), ISOGI_VOL__HALVES(_mm512_, c, d))
-ISOGI_VOL__AVX512 ISOGI_VOL__INLINE __m128i isogi_vol__sixteen_bytes(const char *p, const ptrdiff_t q[4]) {
-    int32_t x[4];
-    memcpy(x, p + q[0], 4), memcpy(x + 1, p + q[1], 4), memcpy(x + 2, p + q[2], 4), memcpy(x + 3, p + q[3], 4);
-    return _mm_setr_epi32(x[0], x[1], x[2], x[3]);
-}
-#define ISOGI_VOL__U8_avx512(p) _mm512_cvtepi32_ps(_mm512_cvtepu8_epi32(isogi_vol__sixteen_bytes(p, q)))
-#define ISOGI_VOL__I8_avx512(p) _mm512_cvtepi32_ps(_mm512_cvtepi8_epi32(isogi_vol__sixteen_bytes(p, q)))
-#define ISOGI_VOL__U16_avx512(p) _mm512_cvtepi32_ps(_mm512_cvtepu16_epi32(_mm256_set_m128i(ISOGI_VOL__LONG(p, 2), ISOGI_VOL__LONG(p, 0))))
-#define ISOGI_VOL__I16_avx512(p) _mm512_cvtepi32_ps(_mm512_cvtepi16_epi32(_mm256_set_m128i(ISOGI_VOL__LONG(p, 2), ISOGI_VOL__LONG(p, 0))))
-#define ISOGI_VOL__F32_avx512(p)                                                                                                 \
+#define ISOGI_VOL__ROW_avx512(p)                                                                                                 \
     _mm512_insertf32x4(_mm512_insertf32x4(_mm512_insertf32x4(_mm512_castps128_ps512(ISOGI_VOL__FLOATS(p, 0)), ISOGI_VOL__FLOATS(p, 1), 1), \
                                           ISOGI_VOL__FLOATS(p, 2), 2), ISOGI_VOL__FLOATS(p, 3), 3)
 ISOGI_VOL__TRILINEAR(avx512, ISOGI_VOL__AVX512, __m512, _mm512_)
@@ -2253,13 +2263,14 @@ ISOGI_VOL__INLINE uint16x4_t isogi_vol__four_shorts(const char *p) {
     memcpy(&x, p, 8);
     return vcreate_u16(x);
 }
-#define ISOGI_VOL__U8_base(p) vcvtq_f32_u32(vmovl_u16(vget_low_u16(vmovl_u8(isogi_vol__four_bytes((p) + q[0])))))
-#define ISOGI_VOL__I8_base(p) vcvtq_f32_s32(vmovl_s16(vget_low_s16(vmovl_s8(vreinterpret_s8_u8(isogi_vol__four_bytes((p) + q[0]))))))
-#define ISOGI_VOL__U16_base(p) vcvtq_f32_u32(vmovl_u16(isogi_vol__four_shorts((p) + q[0])))
-#define ISOGI_VOL__I16_base(p) vcvtq_f32_s32(vmovl_s16(vreinterpret_s16_u16(isogi_vol__four_shorts((p) + q[0]))))
-#define ISOGI_VOL__F32_base(p) vld1q_f32((const float *)(const void *)((p) + q[0]))
+#define ISOGI_VOL__U8_base(p) vcvtq_f32_u32(vmovl_u16(vget_low_u16(vmovl_u8(isogi_vol__four_bytes(p)))))
+#define ISOGI_VOL__I8_base(p) vcvtq_f32_s32(vmovl_s16(vget_low_s16(vmovl_s8(vreinterpret_s8_u8(isogi_vol__four_bytes(p))))))
+#define ISOGI_VOL__U16_base(p) vcvtq_f32_u32(vmovl_u16(isogi_vol__four_shorts(p)))
+#define ISOGI_VOL__I16_base(p) vcvtq_f32_s32(vmovl_s16(vreinterpret_s16_u16(isogi_vol__four_shorts(p))))
+#define ISOGI_VOL__ROW_base(p) vld1q_f32((const float *)(const void *)((p) + q[0]))
 ISOGI_VOL__TRILINEAR(base, , float32x4_t, isogi_vol__neon_)
 ISOGI_VOL__TRILINEAR_BLOCK(base, , float32x4_t, isogi_vol__neon_, 4)
+ISOGI_VOL__WIDEN(base, , isogi_vol__neon_)
 ISOGI_VOL__CUBIC(base, , float32x4_t, isogi_vol__neon_, 4)
 #endif
 
@@ -2283,16 +2294,55 @@ static int isogi_vol__blockwise(const isogi_pyramid *p, isogi_filter filter) {
            (v->stride[0] == (ptrdiff_t)isogi_vol__type_size(v->type) && low[0] < high[0] && low[1] < high[1] && low[2] < high[2]);
 }
 
+static void isogi_vol__cubic_points(const isogi_pyramid *p, const isogi_vol__taps_at *taps, isogi_vol__block *b, int from, int n) {
+#ifdef ISOGI_VOL__AVX
+    if (p->path >= ISOGI_VOL__PATH_AVX512) {
+        isogi_vol__cubic_avx512(taps, b, from, n, b->sum);
+        return;
+    }
+    if (p->path == ISOGI_VOL__PATH_AVX2) {
+        isogi_vol__cubic_avx2(taps, b, from, n, b->sum);
+        return;
+    }
+#endif
+    isogi_vol__cubic_base(taps, b, from, n, b->sum);
+    (void)p;
+}
+
+/* Sixteen points at a time become floats. n: up to a multiple of four, offsets are there. */
+static void isogi_vol__cubic_integers(const isogi_pyramid *p, isogi_vol__taps_at *taps, isogi_vol__block *b, int n) {
+    float some[16][64];
+    ptrdiff_t offset[16];
+    int i, k;
+    for (k = 0; k < 16; k++) offset[k] = k * (ptrdiff_t)sizeof some[0];
+    taps->first = (const char *)(const void *)some, taps->offset = offset, taps->y = 4 * sizeof(float), taps->z = 16 * sizeof(float);
+    for (i = 0; i < n; i += 16) {
+        const int end = i + 16 < n ? i + 16 : n;
+        for (k = i; k < ((end + 3) & ~3); k++) {
+            const char *first = isogi_vol__first_tap(&p->volume, b->offset[k]);
+#ifdef ISOGI_VOL__AVX
+            if (p->path >= ISOGI_VOL__PATH_AVX2) {
+                isogi_vol__widen_avx2(&p->volume, first, some[k - i]);
+                continue;
+            }
+#endif
+            isogi_vol__widen_base(&p->volume, first, some[k - i]);
+        }
+        isogi_vol__cubic_points(p, taps, b, i, end);
+    }
+}
+
 /* Raw values and gradients of those points of a block all of whose taps exist. Returns how many others there are; if any, outer[i] marks them. */
 static int isogi_vol__cubic_block(const isogi_pyramid *p, isogi_filter filter, isogi_vol__block *b, int n, uint8_t outer[ISOGI_VOL__BLOCK]) {
     const isogi_volume *v = &p->volume;
     const double(*c)[4] = isogi_vol__taps[filter == ISOGI_FILTER_CATMULL_ROM];
-    float powers[5][4] = {{0}};
+    isogi_vol__taps_at taps;
     int32_t low[3], high[3], beyond = 0;
     int i, a, count = 0;
+    memset(&taps, 0, sizeof taps);
+    for (i = 0; i < 16; i++) taps.powers[i / 4][i % 4] = (float)c[i / 4][i % 4];
+    taps.powers[4][0] = 1;
     isogi_vol__inner_cells(p, low, high);
-    for (i = 0; i < 16; i++) powers[i / 4][i % 4] = (float)c[i / 4][i % 4];
-    powers[4][0] = 1;
     for (i = 0; i < n; i += 16) /* in most blocks there are none: no difference is negative */
         for (a = 0; a < 16; a++)
             beyond |= (b->cell[0][i + a] - low[0]) | (b->cell[1][i + a] - low[1]) | (b->cell[2][i + a] - low[2]) | (high[0] - 1 - b->cell[0][i + a]) |
@@ -2303,17 +2353,10 @@ static int isogi_vol__cubic_block(const isogi_pyramid *p, isogi_filter filter, i
         count += outer[i];
     }
     for (i = n; i % 4; i++) b->offset[i] = b->offset[i - 1];
-#ifdef ISOGI_VOL__AVX
-    if (p->path >= ISOGI_VOL__PATH_AVX512) {
-        isogi_vol__cubic_avx512(v, b, (const float(*)[4])powers, n, b->sum);
-        return count;
-    }
-    if (p->path == ISOGI_VOL__PATH_AVX2) {
-        isogi_vol__cubic_avx2(v, b, (const float(*)[4])powers, n, b->sum);
-        return count;
-    }
-#endif
-    isogi_vol__cubic_base(v, b, (const float(*)[4])powers, n, b->sum);
+    if (v->type == ISOGI_F32) {
+        taps.first = isogi_vol__first_tap(v, 0), taps.offset = b->offset, taps.y = v->stride[1], taps.z = v->stride[2];
+        isogi_vol__cubic_points(p, &taps, b, 0, n);
+    } else isogi_vol__cubic_integers(p, &taps, b, n);
     return count;
 }
 
@@ -5886,23 +5929,20 @@ ISOGI_API void isogi_vol_mesh_free(const isogi_pyramid *pyramid, isogi_mesh *mes
 #undef ISOGI_VOL__GROUP
 #undef ISOGI_VOL__BLOCK
 #undef ISOGI_VOL__PIVOTS
+#undef ISOGI_VOL__WIDEN
+#undef ISOGI_VOL__WIDEN_ROWS
+#undef ISOGI_VOL__ROW_base
+#undef ISOGI_VOL__ROW_avx2
+#undef ISOGI_VOL__ROW_avx512
 #undef ISOGI_VOL__ROWS
 #undef ISOGI_VOL__ALONG_Y
-#undef ISOGI_VOL__F32_avx2
-#undef ISOGI_VOL__F32_avx512
-#undef ISOGI_VOL__F32_base
 #undef ISOGI_VOL__FLOATS
-#undef ISOGI_VOL__FOUR_ROWS
 #undef ISOGI_VOL__HALVES
-#undef ISOGI_VOL__I16_avx512
-#undef ISOGI_VOL__I8_avx512
 #undef ISOGI_VOL__LANE_avx2
 #undef ISOGI_VOL__LANE_avx512
 #undef ISOGI_VOL__LANE_base
-#undef ISOGI_VOL__LONG
 #undef ISOGI_VOL__MADD_avx2
 #undef ISOGI_VOL__MADD_avx512
-#undef ISOGI_VOL__SHORT
 #undef ISOGI_VOL__SPREAD_avx512
 #undef ISOGI_VOL__SUMS_avx2
 #undef ISOGI_VOL__SUMS_avx512
@@ -5912,8 +5952,6 @@ ISOGI_API void isogi_vol_mesh_free(const isogi_pyramid *pyramid, isogi_mesh *mes
 #undef ISOGI_VOL__TURN_avx2
 #undef ISOGI_VOL__TURN_avx512
 #undef ISOGI_VOL__TURN_base
-#undef ISOGI_VOL__U16_avx512
-#undef ISOGI_VOL__U8_avx512
 #undef ISOGI_VOL__WEIGHTS
 #undef ISOGI_VOL__WHOLES
 #undef ISOGI_VOL__BLEND
