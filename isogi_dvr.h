@@ -467,11 +467,27 @@ typedef struct isogi_dvr__fast_ray {
 
 typedef struct isogi_dvr__frame isogi_dvr__frame;
 
+/* Rows that lie a fixed distance apart, for the vector kernels. */
+typedef struct isogi_dvr__rows {
+    float *depth, *out;
+    const float *from;
+    size_t depth_row, out_row, from_row, rows, count, beside; /* beside: from a row of `from` to the other one that is read with it */
+} isogi_dvr__rows;
+
+/* Sums over directions: sum[c][i] += kernel[k][c] * from[k][i]. */
+typedef struct isogi_dvr__sums {
+    float *sum;
+    const float *from, *kernel;
+    size_t sum_row, from_row, coefficients, directions, count;
+} isogi_dvr__sums;
+
 /* Kernels of the best instruction path: 1 plain, 2 portable vectors, 3 AVX2, 4 AVX-512. */
 typedef struct isogi_dvr__kernels {
-    void (*sweep_row)(float *depth, const float *r0, const float *r1, const float w[4], size_t count);
+    void (*pass)(const isogi_dvr__rows *a, const float w[4]);
+    void (*pass_out)(const isogi_dvr__rows *a, const float w[4]);
+    void (*between)(const isogi_dvr__rows *a, const float part[2]);
     void (*exp_row)(float *x, size_t count);
-    void (*gain_row)(float *sum, const float *from, float factor, size_t count);
+    void (*gather)(const isogi_dvr__sums *a);
 } isogi_dvr__kernels;
 
 #ifdef ISOGI_DVR__AVX
@@ -701,7 +717,8 @@ struct isogi_dvr {
     double (*clip)[4];           /* a grid position x is kept where clip . (x, 1) >= 0 for all of them */
     size_t clip_count;
     uint8_t *cut;                /* one byte a block of level 1: 0 within all planes, 1 cut, 2 outside */
-    float *gathered;             /* sweeps: [order * order][padded_count], sums so far */
+    size_t turned;               /* sweeps: how many of the first directions are along x */
+    float *gathered;             /* sweeps and the paper's method: [order * order][padded_count], sums so far; points z fastest up to there */
     size_t padded_count;         /* grid points, rounded up to whole vectors */
     isogi_counters counters;
 };
@@ -1394,6 +1411,30 @@ static void isogi_dvr__set_directions(isogi_dvr *d, double *area) {
     }
 }
 
+/* The axis that a direction is nearest to, in nodes of the lattice of extinction: slices lie across it. */
+static int isogi_dvr__sweep_axis(const isogi_dvr *d, const double direction[3], double w[3]) {
+    double most = 0;
+    int axis = 2, a;
+    for (a = 0; a < 3; a++) w[a] = direction[a] / d->matter.spacing[a];
+    for (a = 0; a < 3; a++)
+        if (fabs(w[a]) > most) most = fabs(w[a]), axis = a;
+    return axis;
+}
+
+/* Puts the directions that are swept along x before the others; their areas move along. */
+static void isogi_dvr__sort_directions(isogi_dvr *d, double *area) {
+    size_t k;
+    double w[3];
+    for (k = 0, d->turned = 0; k < (size_t)d->desc.directions; k++) {
+        double direction[6], moved = area[k];
+        size_t to = d->turned;
+        if (isogi_dvr__sweep_axis(d, d->direction[k], w) != 0) continue;
+        memcpy(direction, d->direction[k], sizeof direction);
+        memcpy(d->direction[k], d->direction[to], sizeof direction), memcpy(d->direction[to], direction, sizeof direction);
+        area[k] = area[to], area[to] = moved, d->turned++;
+    }
+}
+
 static isogi_result isogi_dvr__set_kernel(isogi_dvr *d) {
     size_t n = (size_t)d->desc.directions, order = 1, count, k, i;
     double *y, *weight;
@@ -1409,6 +1450,7 @@ static isogi_result isogi_dvr__set_kernel(isogi_dvr *d) {
         return ISOGI_NO_MEMORY;
     }
     isogi_dvr__set_directions(d, weight);
+    if (isogi_dvr__method(d) == ISOGI_DVR_SWEEP) isogi_dvr__sort_directions(d, weight);
     for (k = 0; k < n; k++) memcpy(weight + n + 3 * k, d->direction[k] + 3, 3 * sizeof *weight);
     isogi_sh_eval_f64(y, (int)order, (const double(*)[3])(weight + n), n);
     if (d->desc.sphere == ISOGI_DVR_FIBONACCI) isogi_dvr__weigh(y, order * order, n, weight);
@@ -1425,10 +1467,15 @@ static isogi_result isogi_dvr__set_kernel(isogi_dvr *d) {
 
 /* ==== vector kernels ================================================================================================= */
 
-/* depth[i] += extinction between four nodes, the weights times the length of the piece in w. Runs over the end by less than a vector. */
-static void isogi_dvr__sweep_row(float *depth, const float *r0, const float *r1, const float w[4], size_t count) {
-    size_t i;
-    for (i = 0; i < count; i++) depth[i] += (w[0] * r0[i] + w[1] * r0[i + 1]) + (w[2] * r1[i] + w[3] * r1[i + 1]);
+/* For every row, depth[i] += extinction between four nodes of two rows, with the weights times the length of the piece in w. Vectors run
+   over the end of a row: the first float there is put back, the others add padding, which is 0. */
+static void isogi_dvr__pass(const isogi_dvr__rows *a, const float w[4]) {
+    size_t c, i;
+    for (c = 0; c < a->rows; c++) {
+        const float *r0 = a->from + c * a->from_row, *r1 = r0 + a->beside;
+        float *depth = a->depth + c * a->depth_row;
+        for (i = 0; i < a->count; i++) depth[i] += (w[0] * r0[i] + w[1] * r0[i + 1]) + (w[2] * r1[i] + w[3] * r1[i + 1]);
+    }
 }
 
 /* exp(-x) for x >= 0; below 1e-37 it is that. Relative error 2e-7. */
@@ -1449,39 +1496,118 @@ static void isogi_dvr__exp_row(float *x, size_t count) {
     for (i = 0; i < count; i++) x[i] = isogi_dvr__exp(x[i]);
 }
 
-/* sum[i] += factor * from[i] */
-static void isogi_dvr__gain_row(float *sum, const float *from, float factor, size_t count) {
-    size_t i;
-    for (i = 0; i < count; i++) sum[i] += factor * from[i];
+/* The same as above twice, and between the two what is left of the light. */
+static void isogi_dvr__pass_out(const isogi_dvr__rows *a, const float w[4]) {
+    size_t c, i;
+    for (c = 0; c < a->rows; c++) {
+        const float *r0 = a->from + c * a->from_row, *r1 = r0 + a->beside;
+        float *depth = a->depth + c * a->depth_row, *out = a->out + c * a->out_row;
+        for (i = 0; i < a->count; i++) {
+            float more = (w[0] * r0[i] + w[1] * r0[i + 1]) + (w[2] * r1[i] + w[3] * r1[i + 1]);
+            out[i] = isogi_dvr__exp(depth[i] + more), depth[i] += 2 * more;
+        }
+    }
+}
+
+/* Between the rows and columns of `from`, past the second of each by a share of `part` towards the first. */
+static void isogi_dvr__between(const isogi_dvr__rows *a, const float part[2]) {
+    size_t c, i;
+    for (c = 0; c < a->rows; c++) {
+        const float *r0 = a->from + c * a->from_row, *r1 = r0 + a->from_row;
+        for (i = 0; i < a->count; i++) {
+            float x0 = r0[i + 1] + part[1] * (r0[i] - r0[i + 1]), x1 = r1[i + 1] + part[1] * (r1[i] - r1[i + 1]);
+            a->out[c * a->out_row + i] = x1 + part[0] * (x0 - x1);
+        }
+    }
+}
+
+static void isogi_dvr__gather(const isogi_dvr__sums *a) {
+    size_t c, k, i;
+    for (c = 0; c < a->coefficients; c++)
+        for (k = 0; k < a->directions; k++)
+            for (i = 0; i < a->count; i++) a->sum[c * a->sum_row + i] += a->kernel[k * a->coefficients + c] * a->from[k * a->from_row + i];
 }
 
 #ifdef ISOGI_DVR__VECTORS
-#define ISOGI_DVR__KERNELS(SUFFIX, TARGET)                                                                                                    \
-    TARGET static void isogi_dvr__sweep_row##SUFFIX(float *depth, const float *r0, const float *r1, const float w[4], size_t count) {         \
-        float w0 = w[0], w1 = w[1], w2 = w[2], w3 = w[3];                                                                                     \
-        size_t i;                                                                                                                             \
-        for (i = 0; i < count; i += ISOGI_DVR__LANES)                                                                                         \
-            ISOGI_DVR__V(depth + i) += (w0 * ISOGI_DVR__C(r0 + i) + w1 * ISOGI_DVR__C(r0 + i + 1)) +                                          \
-                                       (w2 * ISOGI_DVR__C(r1 + i) + w3 * ISOGI_DVR__C(r1 + i + 1));                                           \
-    }                                                                                                                                         \
-    TARGET static void isogi_dvr__exp_row##SUFFIX(float *x, size_t count) {                                                                   \
-        size_t i;                                                                                                                             \
-        for (i = 0; i < count; i += ISOGI_DVR__LANES) {                                                                                       \
-            isogi_dvr__floats y = ISOGI_DVR__V(x + i) * -1.44269504f, f, p;                                                                   \
-            isogi_dvr__ints n, in = y > -125.0f;                                                                                              \
-            isogi_dvr__floats least = {0};                                                                                                    \
-            least -= 125.0f;                                                                                                                  \
-            n = ((isogi_dvr__ints)y & in) | ((isogi_dvr__ints)least & ~in);                                                        \
-            y = (isogi_dvr__floats)n, n = __builtin_convertvector(y - 0.5f, isogi_dvr__ints);                                                 \
-            f = y - __builtin_convertvector(n, isogi_dvr__floats);                                                                            \
-            p = 1.54035304e-4f * f + 1.33335581e-3f, p = p * f + 9.61812911e-3f, p = p * f + 5.55041087e-2f;                                  \
-            p = p * f + 2.40226507e-1f, p = p * f + 6.93147182e-1f, p = p * f + 1.0f;                                                         \
-            ISOGI_DVR__V(x + i) = p * (isogi_dvr__floats)((n + 127) << 23);                                                                   \
-        }                                                                                                                                     \
-    }                                                                                                                                         \
-    TARGET static void isogi_dvr__gain_row##SUFFIX(float *sum, const float *from, float factor, size_t count) {                               \
-        size_t i;                                                                                                                             \
-        for (i = 0; i < count; i += ISOGI_DVR__LANES) ISOGI_DVR__V(sum + i) += factor * ISOGI_DVR__C(from + i);                               \
+/* e = exp(-x) */
+#define ISOGI_DVR__EXP(e, x)                                                                                    \
+    {                                                                                                           \
+        isogi_dvr__floats y = (x) * -1.44269504f, f, p, least = {0};                                            \
+        isogi_dvr__ints n, in = y > -125.0f;                                                                    \
+        least -= 125.0f;                                                                                        \
+        y = (isogi_dvr__floats)(((isogi_dvr__ints)y & in) | ((isogi_dvr__ints)least & ~in));                    \
+        n = __builtin_convertvector(y - 0.5f, isogi_dvr__ints), f = y - __builtin_convertvector(n, isogi_dvr__floats); \
+        p = 1.54035304e-4f * f + 1.33335581e-3f, p = p * f + 9.61812911e-3f, p = p * f + 5.55041087e-2f;        \
+        p = p * f + 2.40226507e-1f, p = p * f + 6.93147182e-1f, p = p * f + 1.0f;                               \
+        e = p * (isogi_dvr__floats)((n + 127) << 23);                                                           \
+    }
+#define ISOGI_DVR__MORE                                                                  \
+    ((w[0] * ISOGI_DVR__C(r0 + i) + w[1] * ISOGI_DVR__C(r0 + i + 1)) +                   \
+     (w[2] * ISOGI_DVR__C(r0 + a->beside + i) + w[3] * ISOGI_DVR__C(r0 + a->beside + i + 1)))
+#define ISOGI_DVR__KERNELS(SUFFIX, TARGET)                                                                                          \
+    TARGET static void isogi_dvr__pass##SUFFIX(const isogi_dvr__rows *a, const float weight[4]) {                                  \
+        const float w[4] = {weight[0], weight[1], weight[2], weight[3]};                                                            \
+        size_t c, i;                                                                                                                \
+        for (c = 0; c < a->rows; c++) {                                                                                             \
+            const float *r0 = a->from + c * a->from_row;                                                                            \
+            float *depth = a->depth + c * a->depth_row, outside = depth[a->count];                                                  \
+            for (i = 0; i < a->count; i += ISOGI_DVR__LANES) ISOGI_DVR__V(depth + i) += ISOGI_DVR__MORE;                            \
+            depth[a->count] = outside;                                                                                              \
+        }                                                                                                                           \
+    }                                                                                                                               \
+    TARGET static void isogi_dvr__pass_out##SUFFIX(const isogi_dvr__rows *a, const float weight[4]) {                              \
+        const float w[4] = {weight[0], weight[1], weight[2], weight[3]};                                                            \
+        size_t c, i;                                                                                                                \
+        for (c = 0; c < a->rows; c++) {                                                                                             \
+            const float *r0 = a->from + c * a->from_row;                                                                            \
+            float *depth = a->depth + c * a->depth_row, *out = a->out + c * a->out_row, outside = depth[a->count];                  \
+            for (i = 0; i < a->count; i += ISOGI_DVR__LANES) {                                                                      \
+                isogi_dvr__floats more = ISOGI_DVR__MORE, x = ISOGI_DVR__C(depth + i) + more, e;                                    \
+                ISOGI_DVR__EXP(e, x)                                                                                                \
+                ISOGI_DVR__V(out + i) = e, ISOGI_DVR__V(depth + i) = x + more;                                                      \
+            }                                                                                                                       \
+            depth[a->count] = outside;                                                                                              \
+        }                                                                                                                           \
+    }                                                                                                                               \
+    TARGET static void isogi_dvr__between##SUFFIX(const isogi_dvr__rows *a, const float part[2]) {                                  \
+        const float p0 = part[0], p1 = part[1];                                                                                     \
+        size_t c, i;                                                                                                                \
+        for (c = 0; c < a->rows; c++)                                                                                               \
+            for (i = 0; i < a->count; i += ISOGI_DVR__LANES) {                                                                      \
+                const float *r0 = a->from + c * a->from_row + i, *r1 = r0 + a->from_row;                                            \
+                isogi_dvr__floats x0 = ISOGI_DVR__C(r0 + 1), x1 = ISOGI_DVR__C(r1 + 1);                                             \
+                x0 += p1 * (ISOGI_DVR__C(r0) - x0), x1 += p1 * (ISOGI_DVR__C(r1) - x1), x1 += p0 * (x0 - x1);                       \
+                if (a->count - i >= ISOGI_DVR__LANES) ISOGI_DVR__V(a->out + c * a->out_row + i) = x1;                               \
+                else memcpy(a->out + c * a->out_row + i, &x1, (a->count - i) * sizeof(float));                                      \
+            }                                                                                                                       \
+    }                                                                                                                               \
+    TARGET static void isogi_dvr__exp_row##SUFFIX(float *x, size_t count) {                                                         \
+        size_t i;                                                                                                                   \
+        for (i = 0; i < count; i += ISOGI_DVR__LANES) ISOGI_DVR__EXP(ISOGI_DVR__V(x + i), ISOGI_DVR__C(x + i))                      \
+    }                                                                                                                               \
+    TARGET static void isogi_dvr__gather##SUFFIX(const isogi_dvr__sums *a) {                                                        \
+        size_t n = a->coefficients, c, k, i;                                                                                        \
+        for (i = 0; i < a->count; i += ISOGI_DVR__LANES) {                                                                          \
+            for (c = 0; c + 4 <= n; c += 4) { /* four sums in registers */                                                          \
+                float *sum = a->sum + c * a->sum_row + i, *at1 = sum + a->sum_row, *at2 = at1 + a->sum_row, *at3 = at2 + a->sum_row; \
+                isogi_dvr__floats s0 = ISOGI_DVR__C(sum), s1 = ISOGI_DVR__C(at1), s2 = ISOGI_DVR__C(at2), s3 = ISOGI_DVR__C(at3);   \
+                for (k = 0; k < a->directions; k++) {                                                                               \
+                    isogi_dvr__floats x = ISOGI_DVR__C(a->from + k * a->from_row + i);                                              \
+                    const float *w = a->kernel + k * n + c;                                                                         \
+                    s0 += w[0] * x, s1 += w[1] * x, s2 += w[2] * x, s3 += w[3] * x;                                                 \
+                }                                                                                                                   \
+                ISOGI_DVR__V(sum) = s0, ISOGI_DVR__V(at1) = s1, ISOGI_DVR__V(at2) = s2, ISOGI_DVR__V(at3) = s3;                     \
+            }                                                                                                                       \
+            for (; c < n; c++) {                                                                                                    \
+                isogi_dvr__floats s0 = ISOGI_DVR__C(a->sum + c * a->sum_row + i);                                                   \
+                for (k = 0; k < a->directions; k++) s0 += a->kernel[k * n + c] * ISOGI_DVR__C(a->from + k * a->from_row + i);       \
+                ISOGI_DVR__V(a->sum + c * a->sum_row + i) = s0;                                                                     \
+            }                                                                                                                       \
+        }                                                                                                                           \
+    }                                                                                                                               \
+    static void isogi_dvr__set_kernels##SUFFIX(isogi_dvr__kernels *k) {                                                             \
+        k->pass = isogi_dvr__pass##SUFFIX, k->pass_out = isogi_dvr__pass_out##SUFFIX, k->between = isogi_dvr__between##SUFFIX;  \
+        k->exp_row = isogi_dvr__exp_row##SUFFIX, k->gather = isogi_dvr__gather##SUFFIX;                                             \
     }
 ISOGI_DVR__KERNELS(_base, )
 #ifdef ISOGI_DVR__AVX
@@ -1489,18 +1615,20 @@ ISOGI_DVR__KERNELS(_avx2, __attribute__((target("avx2,fma"))))
 ISOGI_DVR__KERNELS(_avx512, __attribute__((target("avx512f,avx512vl,avx512dq,avx512bw,fma"))))
 #endif
 #undef ISOGI_DVR__KERNELS
+#undef ISOGI_DVR__MORE
+#undef ISOGI_DVR__EXP
 #endif
 
 static isogi_dvr__kernels isogi_dvr__choose_kernels(int force_path) {
-    isogi_dvr__kernels k = {isogi_dvr__sweep_row, isogi_dvr__exp_row, isogi_dvr__gain_row};
+    isogi_dvr__kernels k = {isogi_dvr__pass, isogi_dvr__pass_out, isogi_dvr__between, isogi_dvr__exp_row, isogi_dvr__gather};
 #ifdef ISOGI_DVR__VECTORS
     if (force_path == 1) return k;
-    k.sweep_row = isogi_dvr__sweep_row_base, k.exp_row = isogi_dvr__exp_row_base, k.gain_row = isogi_dvr__gain_row_base;
+    isogi_dvr__set_kernels_base(&k);
 #ifdef ISOGI_DVR__AVX
     if (force_path == 2) return k;
-    if (isogi_dvr__machine() >= 3) k.sweep_row = isogi_dvr__sweep_row_avx2, k.exp_row = isogi_dvr__exp_row_avx2, k.gain_row = isogi_dvr__gain_row_avx2;
+    if (isogi_dvr__machine() >= 3) isogi_dvr__set_kernels_avx2(&k);
     if (force_path == 3 || isogi_dvr__machine() < 4) return k;
-    k.sweep_row = isogi_dvr__sweep_row_avx512, k.exp_row = isogi_dvr__exp_row_avx512, k.gain_row = isogi_dvr__gain_row_avx512;
+    isogi_dvr__set_kernels_avx512(&k);
 #endif
 #endif
     (void)force_path;
@@ -2747,15 +2875,13 @@ static uint16_t isogi_dvr__to_half(float x) {
     return (uint16_t)(sign | ((bits - 0x38000000u + 0xfffu + (bits >> 13 & 1)) >> 13));
 }
 
+/* No denormal float is touched, which would take a hundred times as long. */
 static float isogi_dvr__from_half(uint16_t h) {
-    uint32_t bits = (uint32_t)(h & 0x7fff) << 13, sign = (uint32_t)(h & 0x8000) << 16;
+    uint32_t rest = h & 0x7fffu, bits = (rest << 13) + 0x38000000u;
     float x;
     memcpy(&x, &bits, sizeof x);
-    x *= 5.192296858534828e33f; /* 2^112 */
-    memcpy(&bits, &x, sizeof bits);
-    bits |= sign;
-    memcpy(&x, &bits, sizeof x);
-    return x;
+    if (rest < 0x400u) x = (float)rest * 5.9604644775390625e-8f; /* 2^-24 */
+    return h & 0x8000u ? -x : x;
 }
 
 /* ==== selection of levels ============================================================================================ */
@@ -3130,16 +3256,20 @@ static void isogi_dvr__local_row(const isogi_dvr__local_job *job, size_t n, cons
     const isogi_dvr__local_step *step = job->step + isogi_dvr__steps_before(d, n);
     size_t steps = isogi_dvr__local_steps(d, n), row = isogi_dvr__window_row(&d->blocks, n), plane = row * isogi_dvr__window_side(&d->blocks, n), k, j, c;
     float depth[2 * ISOGI_DVR__LANES];
+    isogi_dvr__rows rows = {depth, NULL, NULL, 0, 0, 0, 1, count, row};
+    isogi_dvr__sums sums = {sum[0], depth, NULL, 2 * ISOGI_DVR__LANES, 0, d->coefficients, 1, count};
     for (c = 0; c < d->coefficients; c++) memset(sum[c], 0, sizeof sum[c]);
     for (k = 0; k < (size_t)d->desc.directions; k++) {
         memset(depth, 0, sizeof depth);
         for (j = 0; j < steps; j++, step++) {
-            const float *p = at + step->offset;
-            d->kernels.sweep_row(depth, p, p + row, step->weight, count);
-            d->kernels.sweep_row(depth, p + plane, p + plane + row, step->weight + 4, count);
+            rows.from = at + step->offset;
+            d->kernels.pass(&rows, step->weight);
+            rows.from += plane;
+            d->kernels.pass(&rows, step->weight + 4);
         }
         d->kernels.exp_row(depth, count);
-        for (c = 0; c < d->coefficients; c++) d->kernels.gain_row(sum[c], depth, d->kernel[k * d->coefficients + c], count);
+        sums.kernel = d->kernel + k * d->coefficients;
+        d->kernels.gather(&sums);
     }
 }
 
@@ -3280,7 +3410,7 @@ typedef struct isogi_dvr__sweep {
     double slip[2];                /* of the bundle from slice to slice: rows, lanes */
     float piece;                   /* half the depth that extinction 1 adds from slice to slice */
     float *depth, *row;            /* of rays; scratch */
-    size_t depth_row;
+    size_t depth_row, out_row;
     size_t points[3], first[3], every[3], out_stride[3]; /* of the visibility grid, by slices, rows, lanes */
     isogi_dvr__kernels kernels;
 } isogi_dvr__sweep;
@@ -3306,18 +3436,34 @@ static isogi_dvr__slip isogi_dvr__slip_at(const isogi_dvr__sweep *s, size_t slic
     return at;
 }
 
-/* Adds `piece` times the extinction at every ray of the bundle that is within the lattice. */
-static void isogi_dvr__sweep_add(const isogi_dvr__sweep *s, size_t slice, const isogi_dvr__slip *at, float piece) {
-    const float *plane = s->extinction + (s->backwards ? s->size[0] - 1 - slice : slice) * s->slice_stride;
-    size_t rows = s->size[1] - (at->part[0] > 0), lanes = s->size[2] - (at->part[1] > 0), c;
+/* Adds `piece` times the extinction at every ray of the bundle that is within the lattice; `out`: twice, and between the two all rays'
+   transmittance goes to s->row, of every row from ray 0 on. */
+static void isogi_dvr__sweep_add(const isogi_dvr__sweep *s, size_t slice, const isogi_dvr__slip *at, float piece, int out) {
+    isogi_dvr__rows a;
     float w[4];
+    size_t c;
     w[0] = piece * (1 - at->part[0]) * (1 - at->part[1]), w[1] = piece * (1 - at->part[0]) * at->part[1];
     w[2] = piece * at->part[0] * (1 - at->part[1]), w[3] = piece * at->part[0] * at->part[1];
-    for (c = 1; c <= rows; c++) {
-        const float *r0 = plane + (c - 1) * s->row_stride, *r1 = c < s->size[1] ? r0 + s->row_stride : r0;
-        float *depth = s->depth + (at->row + c) * s->depth_row + at->lane + 1, outside = depth[s->size[2] - 1];
-        s->kernels.sweep_row(depth, r0, r1, w, lanes);
-        if (lanes < s->size[2]) depth[s->size[2] - 1] = outside; /* the vector's end has touched it */
+    a.from = s->extinction + (s->backwards ? s->size[0] - 1 - slice : slice) * s->slice_stride, a.from_row = s->row_stride;
+    a.beside = at->part[0] > 0 ? s->row_stride : 0;
+    a.rows = s->size[1] - (at->part[0] > 0), a.count = s->size[2] - (at->part[1] > 0);
+    a.depth = s->depth + (at->row + 1) * s->depth_row + at->lane + 1, a.depth_row = s->depth_row;
+    a.out = s->row + s->out_row + 1, a.out_row = s->out_row;
+    if (!out) {
+        s->kernels.pass(&a, w);
+        return;
+    }
+    s->kernels.pass_out(&a, w);
+    for (c = 0; c <= s->size[1]; c++) { /* rays that are outside keep what they have */
+        const float *depth = s->depth + (at->row + c) * s->depth_row + at->lane;
+        float *e = s->row + c * s->out_row;
+        if (c && c <= a.rows) {
+            e[0] = isogi_dvr__exp(depth[0]);
+            if (a.count < s->size[2]) e[s->size[2]] = isogi_dvr__exp(depth[s->size[2]]);
+        } else {
+            memcpy(e, depth, (s->size[2] + 1) * sizeof *e);
+            s->kernels.exp_row(e, s->size[2] + 1);
+        }
     }
 }
 
@@ -3326,59 +3472,59 @@ static void isogi_dvr__sweep_row_out(const isogi_dvr__sweep *s, const isogi_dvr_
     const float *depth = s->depth + (at->row + c) * s->depth_row + at->lane;
     float *e = s->row, part = at->part[1];
     size_t n = s->points[2], every = s->every[2], i;
-    if (every == 1) {
-        memcpy(e, depth + s->first[2], (n + 1) * sizeof *e);
-        s->kernels.exp_row(e, n + 1);
-        for (i = 0; i < n; i++) out[i] = e[i + 1] + part * (e[i] - e[i + 1]);
-    } else {
-        for (i = 0; i < n; i++) e[2 * i] = depth[s->first[2] + i * every], e[2 * i + 1] = depth[s->first[2] + i * every + 1];
-        s->kernels.exp_row(e, 2 * n);
-        for (i = 0; i < n; i++) out[i] = e[2 * i + 1] + part * (e[2 * i] - e[2 * i + 1]);
-    }
+    for (i = 0; i < n; i++) e[2 * i] = depth[s->first[2] + i * every], e[2 * i + 1] = depth[s->first[2] + i * every + 1];
+    s->kernels.exp_row(e, 2 * n);
+    for (i = 0; i < n; i++) out[i] = e[2 * i + 1] + part * (e[2 * i] - e[2 * i + 1]);
 }
 
-static void isogi_dvr__sweep_out(const isogi_dvr__sweep *s, const isogi_dvr__slip *at, float *out) {
-    float *r0 = s->row + 2 * s->points[2] + ISOGI_DVR__LANES, *r1 = r0 + s->points[2], *swap;
+/* Grid points at some of the nodes only. */
+static void isogi_dvr__sweep_points(const isogi_dvr__sweep *s, const isogi_dvr__slip *at, float *out) {
+    float *r0 = s->row + 2 * s->points[2] + ISOGI_DVR__LANES, *r1 = r0 + s->points[2];
     size_t i, j;
     for (j = 0; j < s->points[1]; j++) {
         size_t c = s->first[1] + j * s->every[1];
-        if (j && s->every[1] == 1) swap = r0, r0 = r1, r1 = swap;
-        else isogi_dvr__sweep_row_out(s, at, c, r0);
+        isogi_dvr__sweep_row_out(s, at, c, r0);
         isogi_dvr__sweep_row_out(s, at, c + 1, r1);
-        for (i = 0; i < s->points[2]; i++) out[j * s->out_stride[1] + i * s->out_stride[2]] = r1[i] + at->part[0] * (r0[i] - r1[i]);
+        for (i = 0; i < s->points[2]; i++) out[j * s->out_stride[1] + i] = r1[i] + at->part[0] * (r0[i] - r1[i]);
     }
 }
 
-/* Transmittance of all grid points towards a direction, in their order. */
+/* Transmittance of all grid points towards a direction, in their order (z fastest where slices lie across x). */
 static void isogi_dvr__sweep_run(isogi_dvr__sweep *s, float *out) {
     size_t k, rays = (s->size[1] + s->size[0] + 2) * s->depth_row;
+    int all = s->every[1] == 1 && s->every[2] == 1 && s->points[1] == s->size[1] && s->points[2] == s->size[2];
     memset(s->depth, 0, rays * sizeof *s->depth);
     for (k = 0; k < s->size[0]; k++) {
         isogi_dvr__slip at = isogi_dvr__slip_at(s, k);
         size_t slice = s->backwards ? s->size[0] - 1 - k : k, point = (slice - s->first[0]) / s->every[0];
-        if (slice < s->first[0] || (slice - s->first[0]) % s->every[0] || point >= s->points[0]) {
-            isogi_dvr__sweep_add(s, k, &at, k ? 2 * s->piece : s->piece);
-            continue;
+        float *plane = out + point * s->out_stride[0];
+        if (slice < s->first[0] || (slice - s->first[0]) % s->every[0] || point >= s->points[0])
+            isogi_dvr__sweep_add(s, k, &at, k ? 2 * s->piece : s->piece, 0);
+        else if (k && all) {
+            isogi_dvr__rows a = {NULL, NULL, NULL, 0, 0, 0, 0, 0, 0};
+            isogi_dvr__sweep_add(s, k, &at, s->piece, 1);
+            a.from = s->row, a.from_row = s->out_row, a.rows = s->points[1], a.count = s->points[2];
+            a.out = plane, a.out_row = s->out_stride[1];
+            s->kernels.between(&a, at.part);
+        } else {
+            if (k) isogi_dvr__sweep_add(s, k, &at, s->piece, 0);
+            isogi_dvr__sweep_points(s, &at, plane);
+            isogi_dvr__sweep_add(s, k, &at, s->piece, 0);
         }
-        if (k) isogi_dvr__sweep_add(s, k, &at, s->piece);
-        isogi_dvr__sweep_out(s, &at, out + point * s->out_stride[0]);
-        isogi_dvr__sweep_add(s, k, &at, s->piece);
     }
 }
 
 /* Slices across the axis that the direction is nearest to. */
 static void isogi_dvr__set_sweep(isogi_dvr__sweep *s, const isogi_dvr *d, const double direction[3], float *scratch) {
     const isogi_dvr__matter *m = &d->matter;
-    double w[3], most = 0;
+    double w[3], most;
     size_t stride[3], out[3];
     int axis[3] = {2, 1, 0}, turned, a;
-    for (a = 0; a < 3; a++) w[a] = direction[a] / m->spacing[a];
-    for (a = 0; a < 3; a++)
-        if (fabs(w[a]) > most) most = fabs(w[a]), axis[0] = a;
+    axis[0] = isogi_dvr__sweep_axis(d, direction, w), most = fabs(w[axis[0]]);
     if (axis[0] != 2) axis[1] = axis[0] ? 2 : 1, axis[2] = axis[0] ? 0 : 2;
     turned = axis[0] == 0;
     stride[1] = m->row[turned], stride[turned ? 2 : 0] = 1, stride[turned ? 0 : 2] = m->row[turned] * m->size[1];
-    out[0] = 1, out[1] = d->desc.grid[0], out[2] = d->desc.grid[0] * d->desc.grid[1];
+    out[turned ? 2 : 0] = 1, out[1] = d->desc.grid[turned ? 2 : 0], out[turned ? 0 : 2] = out[1] * d->desc.grid[1];
     for (a = 0; a < 3; a++) {
         s->size[a] = m->size[axis[a]], s->points[a] = d->desc.grid[axis[a]], s->first[a] = m->first[axis[a]], s->every[a] = m->every[axis[a]];
         s->out_stride[a] = out[axis[a]];
@@ -3388,7 +3534,7 @@ static void isogi_dvr__set_sweep(isogi_dvr__sweep *s, const isogi_dvr *d, const 
     s->slip[0] = -w[axis[1]] / most, s->slip[1] = -w[axis[2]] / most;
     s->piece = (float)(0.5 / (most * d->desc.unit));
     s->kernels = d->kernels;
-    s->depth_row = s->size[2] + s->size[0] + 2 + 2 * ISOGI_DVR__LANES;
+    s->depth_row = s->size[2] + s->size[0] + 2 + 2 * ISOGI_DVR__LANES, s->out_row = s->size[2] + 1 + 2 * ISOGI_DVR__LANES;
     s->depth = scratch, s->row = scratch + (s->size[1] + s->size[0] + 2) * s->depth_row;
 }
 
@@ -3400,7 +3546,9 @@ static size_t isogi_dvr__sweep_scratch(const isogi_dvr *d) {
         if (d->matter.size[a] > most) most = d->matter.size[a];
         if (d->desc.grid[a] > row) row = d->desc.grid[a];
     }
-    return (2 * most + 2) * (2 * most + 2 + 2 * ISOGI_DVR__LANES) + 4 * row + 2 * ISOGI_DVR__LANES;
+    row = 4 * row + 2 * ISOGI_DVR__LANES;
+    if (row < (most + 2) * (most + 1 + 2 * ISOGI_DVR__LANES)) row = (most + 2) * (most + 1 + 2 * ISOGI_DVR__LANES);
+    return (2 * most + 2) * (2 * most + 2 + 2 * ISOGI_DVR__LANES) + row;
 }
 
 /* One batch of directions: a sweep each, then all coefficients of a few grid points each. Sums run in the order of the directions,
@@ -3421,14 +3569,43 @@ static void isogi_dvr__sweep_task(void *arg, size_t i) {
 static void isogi_dvr__gain_task(void *arg, size_t task) {
     const isogi_dvr__sweep_job *job = (const isogi_dvr__sweep_job *)arg;
     isogi_dvr *d = job->dvr;
-    size_t from = task * ISOGI_DVR__GAIN, count = d->padded_count - from, c, k;
+    size_t from = task * ISOGI_DVR__GAIN, count = d->padded_count - from, c;
+    isogi_dvr__sums a;
     if (count > ISOGI_DVR__GAIN) count = ISOGI_DVR__GAIN;
-    for (c = 0; c < d->coefficients; c++) {
-        float *sum = d->gathered + c * d->padded_count + from;
-        if (!job->first) memset(sum, 0, count * sizeof *sum);
-        for (k = 0; k < job->count; k++)
-            d->kernels.gain_row(sum, job->transmittance + k * d->padded_count + from, d->kernel[(job->first + k) * d->coefficients + c], count);
+    for (c = 0; c < d->coefficients && !job->first; c++) memset(d->gathered + c * d->padded_count + from, 0, count * sizeof *d->gathered);
+    a.sum = d->gathered + from, a.from = job->transmittance + from, a.kernel = d->kernel + job->first * d->coefficients;
+    a.sum_row = a.from_row = d->padded_count, a.coefficients = d->coefficients, a.directions = job->count, a.count = count;
+    d->kernels.gather(&a);
+}
+
+/* One coefficient from "z fastest" to the order of grid points, by way of a direction's transmittance. */
+static void isogi_dvr__unturn_task(void *arg, size_t i) {
+    const isogi_dvr__sweep_job *job = (const isogi_dvr__sweep_job *)arg;
+    const isogi_dvr *d = job->dvr;
+    const size_t *n = d->desc.grid;
+    float *plane = d->gathered + (job->first + i) * d->padded_count, *to = job->transmittance + i * d->padded_count;
+    size_t x0, x, y, z;
+    for (x0 = 0; x0 < n[0]; x0 += ISOGI_DVR__LANES)
+        for (y = 0; y < n[1]; y++)
+            for (z = 0; z < n[2]; z++)
+                for (x = x0; x < x0 + ISOGI_DVR__LANES && x < n[0]; x++) to[x + n[0] * (y + n[1] * z)] = plane[z + n[2] * (y + n[1] * x)];
+    memcpy(plane, to, d->point_count * sizeof *plane);
+}
+
+/* Sums up a batch. Not cancelled half way: it could not be repeated. */
+static isogi_result isogi_dvr__gain(isogi_dvr__sweep_job *job, size_t planes) {
+    isogi_dvr *d = job->dvr;
+    isogi_context whole = d->context;
+    size_t next = job->first + job->count, c, count;
+    isogi_result result;
+    whole.progress = NULL;
+    result = isogi_parallel(&whole, (d->padded_count + ISOGI_DVR__GAIN - 1) / ISOGI_DVR__GAIN, isogi_dvr__gain_task, job, 0, 0);
+    if (next != d->turned) return result;
+    for (c = 0; result == ISOGI_OK && c < d->coefficients; c += count) {
+        job->first = c, count = d->coefficients - c < planes ? d->coefficients - c : planes;
+        result = isogi_parallel(&whole, count, isogi_dvr__unturn_task, job, 0, 0);
     }
+    return result;
 }
 
 /* ==== steps of visibility =============================================================================================== */
@@ -3511,8 +3688,6 @@ static isogi_result isogi_dvr__step_sweeps(isogi_dvr *d, size_t end) {
     isogi_result result = ISOGI_OK;
     size_t batch = end - d->next < ISOGI_DVR__BATCH ? end - d->next : ISOGI_DVR__BATCH, start = d->next, i, c;
     double span = (double)(end - start);
-    isogi_context whole = d->context; /* summing up is not cancelled half way: it could not be repeated */
-    whole.progress = NULL;
     if (!batch) return ISOGI_OK;
     job.dvr = d, job.scratch_count = isogi_dvr__sweep_scratch(d);
     job.scratch = (float *)isogi_allocate(&d->context, batch * job.scratch_count, sizeof(float));
@@ -3521,10 +3696,10 @@ static isogi_result isogi_dvr__step_sweeps(isogi_dvr *d, size_t end) {
     if (result == ISOGI_OK && !d->next) result = isogi_dvr__update_matter(d);
     while (result == ISOGI_OK && d->next < end) {
         job.first = d->next, job.count = end - d->next < batch ? end - d->next : batch;
+        if (d->next < d->turned && d->turned - d->next < job.count) job.count = d->turned - d->next;
         result = isogi_parallel(&d->context, job.count, isogi_dvr__sweep_task, &job, (double)(job.first - start) / span,
                                 (double)(job.first + job.count - start) / span);
-        if (result == ISOGI_OK)
-            result = isogi_parallel(&whole, (d->padded_count + ISOGI_DVR__GAIN - 1) / ISOGI_DVR__GAIN, isogi_dvr__gain_task, &job, 0, 0);
+        if (result == ISOGI_OK) result = isogi_dvr__gain(&job, batch);
         if (result == ISOGI_OK) d->next += job.count, d->counters.rays += job.count * d->point_count;
     }
     isogi_release(&d->context, job.scratch, batch * job.scratch_count, sizeof(float));
