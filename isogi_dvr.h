@@ -441,6 +441,7 @@ ISOGI_API isogi_result isogi_dvr_tets_render(const isogi_tets *tets, const isogi
 #define ISOGI_DVR__TABLE 4096              /* classes of values */
 #define ISOGI_DVR__BATCH 16                /* directions swept at once */
 #define ISOGI_DVR__GAIN 1024               /* grid points: one task of summing up */
+#define ISOGI_DVR__TOWARD 8                /* directions towards which local visibility is evaluated at once */
 #define ISOGI_DVR__CLASSES 1024            /* of values, for pictures */
 #define ISOGI_DVR__NODES 8                 /* samples of a ray taken at once */
 #define ISOGI_DVR__LEAP 6                  /* blocks of 4^3 that a ray steps over at once, to each side */
@@ -1932,8 +1933,6 @@ static isogi_result isogi_dvr__allocate_parts(isogi_dvr *d) {
     if (isogi_dvr__method(d) == ISOGI_DVR_SWEEP) {
         isogi_result result = isogi_dvr__plan_matter(d);
         if (result != ISOGI_OK) return result;
-        d->gathered = (float *)isogi_allocate(&d->context, d->padded_count * d->coefficients, sizeof *d->gathered);
-        if (!d->gathered) return ISOGI_NO_MEMORY;
     } else if (isogi_dvr__method(d) == ISOGI_DVR_PAPER) {
         isogi_result result;
         d->basis = (float *)isogi_allocate(&d->context, d->kernel_count, sizeof *d->basis);
@@ -1941,6 +1940,10 @@ static isogi_result isogi_dvr__allocate_parts(isogi_dvr *d) {
         if (!d->basis || !d->matter.table) return ISOGI_NO_MEMORY;
         result = isogi_dvr__plan_blocks(d);
         if (result != ISOGI_OK) return result;
+    }
+    if (isogi_dvr__method(d) != ISOGI_DVR_BRUTE) {
+        d->gathered = (float *)isogi_allocate(&d->context, d->padded_count * d->coefficients, sizeof *d->gathered);
+        if (!d->gathered) return ISOGI_NO_MEMORY;
     }
     return isogi_dvr__set_kernel(d);
 }
@@ -3342,55 +3345,88 @@ static void isogi_dvr__finish_task(void *arg, size_t block) {
             }
 }
 
+/* One batch of directions: transmittance of all grid points towards each, then all coefficients of a few grid points each. Sums run in
+   the order of the directions, whatever the batches. */
+typedef struct isogi_dvr__batch {
+    isogi_dvr *dvr;
+    size_t first, count, scratch_count;
+    float *scratch, *transmittance; /* of each direction */
+} isogi_dvr__batch;
+
+/* Local visibility of some nodes, evaluated towards each direction of the batch: what global rays interpolate. */
+static void isogi_dvr__toward_task(void *arg, size_t task) {
+    const isogi_dvr__batch *job = (const isogi_dvr__batch *)arg;
+    const isogi_dvr *d = job->dvr;
+    const isogi_dvr__blocks *b = &d->blocks;
+    float basis[ISOGI_DVR__MAX_ORDER * ISOGI_DVR__MAX_ORDER][ISOGI_DVR__TOWARD];
+    size_t node = task * ISOGI_DVR__GAIN, end = b->sh_count - node < ISOGI_DVR__GAIN ? b->sh_count : node + ISOGI_DVR__GAIN, c, k;
+    for (c = 0; c < d->coefficients; c++)
+        for (k = 0; k < ISOGI_DVR__TOWARD; k++) basis[c][k] = k < job->count ? d->basis[(job->first + k) * d->coefficients + c] : 0;
+    for (; node < end; node++) {
+        float sum[ISOGI_DVR__TOWARD] = {0};
+        for (c = 0; c < d->coefficients; c++) {
+            float v = isogi_dvr__from_half(b->sh[node * d->coefficients + c]);
+            for (k = 0; k < ISOGI_DVR__TOWARD; k++) sum[k] += v * basis[c][k];
+        }
+        for (k = 0; k < job->count; k++) job->scratch[k * job->scratch_count + node] = sum[k];
+    }
+}
+
 /* Piecewise integration: local visibility stands for the ray's next r_s voxels; the last piece, cut by the border, is no shorter in
    what it blocks since there is nothing outside (eq. 9). */
-static float isogi_dvr__global_ray(const isogi_dvr *d, const double from[3], const double direction[6], const float *basis) {
-    double step = d->desc.radius * d->spacing, clear = 1, t, limit = 1e300, p[3];
-    float v[ISOGI_DVR__MAX_ORDER * ISOGI_DVR__MAX_ORDER];
-    size_t c;
+static float isogi_dvr__global_ray(const isogi_dvr *d, const float *toward, const double from[3], const double direction[6]) {
+    const isogi_dvr__blocks *b = &d->blocks;
+    double step = d->desc.radius * d->spacing, t, limit = 1e300, clear = 1;
     int a;
     for (a = 0; a < 3; a++) {
         double exit = fabs(direction[a]) > 1e-300 ? ((direction[a] > 0 ? d->cells[a] : 0) - from[a]) / direction[a] : limit;
         if (exit < limit) limit = exit;
     }
     for (t = 0; t < limit && clear > ISOGI_DVR__NEGLIGIBLE; t += step) {
-        double sum = 0;
-        size_t block;
-        for (a = 0; a < 3; a++) p[a] = from[a] + t * direction[a];
-        block = isogi_dvr__block_of(&d->blocks, p);
-        if (!d->blocks.lit[block]) continue;
-        isogi_dvr__local_at(d, block, p, v);
-        for (c = 0; c < d->coefficients; c++) sum += (double)v[c] * (double)basis[c];
-        clear *= isogi_dvr__clamp(sum, 1);
+        size_t block = 0, stride = 1, n, node, offset[3];
+        double u[3], v[4];
+        const float *p;
+        for (a = 0; a < 3; a++) {
+            double x = isogi_dvr__clamp((from[a] + t * direction[a]) * (1.0 / 16), (double)b->count[a]);
+            node = (size_t)x;
+            node = node < b->count[a] ? node : b->count[a] - 1;
+            u[a] = x - (double)node, block += stride * node, stride *= b->count[a];
+        }
+        n = b->lit[block];
+        if (!n) continue;
+        p = toward + b->first[b->total + block];
+        for (a = 0, stride = 1; a < 3; a++) {
+            double x = u[a] * (double)n;
+            node = (size_t)x;
+            node = node < n ? node : n - 1;
+            u[a] = x - (double)node, p += stride * node, offset[a] = stride, stride *= n + 1;
+        }
+        for (a = 0; a < 4; a++) {
+            const float *q = p + (a & 1 ? offset[1] : 0) + (a & 2 ? offset[2] : 0);
+            v[a] = (double)q[0] + u[0] * ((double)q[1] - (double)q[0]);
+        }
+        v[0] += u[1] * (v[1] - v[0]), v[2] += u[1] * (v[3] - v[2]);
+        clear *= isogi_dvr__clamp(v[0] + u[2] * (v[2] - v[0]), 1);
     }
     return (float)clear;
 }
 
-static void isogi_dvr__grid_position(const isogi_dvr *d, size_t point, double grid[3]) {
-    int a;
-    for (a = 0; a < 3; a++) {
-        size_t points = d->desc.grid[a], j = point % points;
-        grid[a] = points > 1 ? (double)j * d->cells[a] / (double)(points - 1) : 0.5 * d->cells[a];
-        point /= points;
-    }
-}
-
-/* A few grid points. */
+/* A plane of grid points, in one direction. */
 static void isogi_dvr__global_task(void *arg, size_t task) {
-    const isogi_dvr__step_job *job = (const isogi_dvr__step_job *)arg;
-    isogi_dvr *d = job->dvr;
-    size_t point = job->first + task * ISOGI_DVR__CHUNK, end = point + ISOGI_DVR__CHUNK, k, c;
-    memset(&job->work[task], 0, sizeof *job->work);
-    for (; point < end && point < job->end; point++) {
-        float sum[ISOGI_DVR__MAX_ORDER * ISOGI_DVR__MAX_ORDER] = {0};
+    const isogi_dvr__batch *job = (const isogi_dvr__batch *)arg;
+    const isogi_dvr *d = job->dvr;
+    size_t k = task % job->count, plane = d->desc.grid[0] * d->desc.grid[1], point = task / job->count * plane, end = point + plane;
+    for (; point < end; point++) {
+        size_t rest = point;
         double grid[3];
-        isogi_dvr__grid_position(d, point, grid);
-        for (k = 0; k < (size_t)d->desc.directions; k++) {
-            float clear = isogi_dvr__global_ray(d, grid, d->direction[k], d->basis + k * d->coefficients);
-            for (c = 0; c < d->coefficients; c++) sum[c] += clear * d->kernel[k * d->coefficients + c];
+        int a;
+        for (a = 0; a < 3; a++) {
+            size_t points = d->desc.grid[a], j = rest % points;
+            grid[a] = points > 1 ? (double)j * d->cells[a] / (double)(points - 1) : 0.5 * d->cells[a];
+            rest /= points;
         }
-        memcpy(d->visibility + point * d->coefficients, sum, d->coefficients * sizeof *sum);
-        job->work[task].texels++, job->work[task].rays += (uint64_t)d->desc.directions;
+        job->transmittance[k * d->padded_count + point] =
+            isogi_dvr__global_ray(d, job->scratch + k * job->scratch_count, grid, d->direction[job->first + k]);
     }
 }
 
@@ -3551,23 +3587,15 @@ static size_t isogi_dvr__sweep_scratch(const isogi_dvr *d) {
     return (2 * most + 2) * (2 * most + 2 + 2 * ISOGI_DVR__LANES) + row;
 }
 
-/* One batch of directions: a sweep each, then all coefficients of a few grid points each. Sums run in the order of the directions,
-   whatever the batches. */
-typedef struct isogi_dvr__sweep_job {
-    isogi_dvr *dvr;
-    size_t first, count, scratch_count;
-    float *scratch, *transmittance; /* of each sweep of the batch */
-} isogi_dvr__sweep_job;
-
 static void isogi_dvr__sweep_task(void *arg, size_t i) {
-    const isogi_dvr__sweep_job *job = (const isogi_dvr__sweep_job *)arg;
+    const isogi_dvr__batch *job = (const isogi_dvr__batch *)arg;
     isogi_dvr__sweep s;
     isogi_dvr__set_sweep(&s, job->dvr, job->dvr->direction[job->first + i], job->scratch + i * job->scratch_count);
     isogi_dvr__sweep_run(&s, job->transmittance + i * job->dvr->padded_count);
 }
 
 static void isogi_dvr__gain_task(void *arg, size_t task) {
-    const isogi_dvr__sweep_job *job = (const isogi_dvr__sweep_job *)arg;
+    const isogi_dvr__batch *job = (const isogi_dvr__batch *)arg;
     isogi_dvr *d = job->dvr;
     size_t from = task * ISOGI_DVR__GAIN, count = d->padded_count - from, c;
     isogi_dvr__sums a;
@@ -3580,7 +3608,7 @@ static void isogi_dvr__gain_task(void *arg, size_t task) {
 
 /* One coefficient from "z fastest" to the order of grid points, by way of a direction's transmittance. */
 static void isogi_dvr__unturn_task(void *arg, size_t i) {
-    const isogi_dvr__sweep_job *job = (const isogi_dvr__sweep_job *)arg;
+    const isogi_dvr__batch *job = (const isogi_dvr__batch *)arg;
     const isogi_dvr *d = job->dvr;
     const size_t *n = d->desc.grid;
     float *plane = d->gathered + (job->first + i) * d->padded_count, *to = job->transmittance + i * d->padded_count;
@@ -3593,7 +3621,7 @@ static void isogi_dvr__unturn_task(void *arg, size_t i) {
 }
 
 /* Sums up a batch. Not cancelled half way: it could not be repeated. */
-static isogi_result isogi_dvr__gain(isogi_dvr__sweep_job *job, size_t planes) {
+static isogi_result isogi_dvr__gain(isogi_dvr__batch *job, size_t planes) {
     isogi_dvr *d = job->dvr;
     isogi_context whole = d->context;
     size_t next = job->first + job->count, c, count;
@@ -3633,18 +3661,55 @@ static isogi_result isogi_dvr__step_brute(isogi_dvr *d, size_t end) {
     return result;
 }
 
-/* The paper's method, up to `end` of first its blocks, then its grid points. */
+/* What directions have gathered, once they all have. */
+static void isogi_dvr__finish_gathered(isogi_dvr *d) {
+    size_t i, c;
+    for (i = 0; i < d->point_count; i++)
+        for (c = 0; c < d->coefficients; c++) d->visibility[i * d->coefficients + c] = d->gathered[c * d->padded_count + i];
+    d->counters.texels += d->point_count;
+}
+
+/* The paper's second pass, up to `end` of first its blocks, then its directions. */
+static isogi_result isogi_dvr__step_global(isogi_dvr *d, size_t end) {
+    isogi_dvr__blocks *b = &d->blocks;
+    isogi_dvr__batch job;
+    isogi_result result = ISOGI_OK;
+    size_t start = d->next - b->due, directions = (size_t)d->desc.directions, batch = end - d->next;
+    double span = (double)batch;
+    if (!batch) return ISOGI_OK;
+    batch = batch < ISOGI_DVR__TOWARD ? batch : ISOGI_DVR__TOWARD;
+    job.dvr = d, job.scratch_count = b->sh_count;
+    job.scratch = (float *)isogi_allocate(&d->context, batch * b->sh_count, sizeof *job.scratch);
+    job.transmittance = (float *)isogi_allocate(&d->context, batch * d->padded_count, sizeof *job.transmittance);
+    if ((b->sh_count && !job.scratch) || !job.transmittance) result = ISOGI_NO_MEMORY;
+    else memset(job.transmittance, 0, batch * d->padded_count * sizeof *job.transmittance);
+    while (result == ISOGI_OK && d->next < end) {
+        job.first = d->next - b->due, job.count = end - d->next < batch ? end - d->next : batch;
+        result = isogi_parallel(&d->context, (b->sh_count + ISOGI_DVR__GAIN - 1) / ISOGI_DVR__GAIN, isogi_dvr__toward_task, &job,
+                                (double)(job.first - start) / span, (double)(job.first - start) / span);
+        if (result == ISOGI_OK)
+            result = isogi_parallel(&d->context, job.count * d->desc.grid[2], isogi_dvr__global_task, &job, (double)(job.first - start) / span,
+                                    (double)(job.first + job.count - start) / span);
+        if (result == ISOGI_OK) result = isogi_dvr__gain(&job, batch);
+        if (result == ISOGI_OK) d->next += job.count, d->counters.rays += job.count * d->point_count;
+    }
+    isogi_release(&d->context, job.scratch, batch * b->sh_count, sizeof *job.scratch);
+    isogi_release(&d->context, job.transmittance, batch * d->padded_count, sizeof *job.transmittance);
+    if (result == ISOGI_OK && d->next == b->due + directions) isogi_dvr__finish_gathered(d);
+    return result;
+}
+
+/* The paper's method, up to `end` of first its blocks, then its directions. */
 static isogi_result isogi_dvr__step_paper(isogi_dvr *d, size_t end) {
     isogi_dvr__blocks *b = &d->blocks;
     isogi_dvr__local_job local;
-    isogi_dvr__step_job global;
     isogi_result result = ISOGI_OK;
     size_t i, count, batch;
     isogi_context whole = d->context;
     whole.progress = NULL;
     memset(&local, 0, sizeof local);
-    local.dvr = global.dvr = d;
-    local.work = global.work = (isogi_counters *)isogi_allocate(&d->context, ISOGI_DVR__SLAB / ISOGI_DVR__CHUNK, sizeof *local.work);
+    local.dvr = d;
+    local.work = (isogi_counters *)isogi_allocate(&d->context, ISOGI_DVR__SLAB / ISOGI_DVR__CHUNK, sizeof *local.work);
     if (!local.work) return ISOGI_NO_MEMORY;
     batch = d->next < b->due ? (end - d->next < ISOGI_DVR__BATCH ? end - d->next : ISOGI_DVR__BATCH) : 0;
     if (batch) {
@@ -3669,24 +3734,15 @@ static isogi_result isogi_dvr__step_paper(isogi_dvr *d, size_t end) {
     }
     isogi_release(&d->context, local.window, batch * local.window_count, sizeof *local.window);
     isogi_release(&d->context, local.step, local.step_count, sizeof *local.step);
-    while (result == ISOGI_OK && d->next < end) {
-        size_t point = d->next - b->due, last = end - b->due;
-        global.first = point, global.end = last - point < ISOGI_DVR__SLAB ? last : point + ISOGI_DVR__SLAB;
-        count = (global.end - point + ISOGI_DVR__CHUNK - 1) / ISOGI_DVR__CHUNK;
-        result = isogi_parallel(&d->context, count, isogi_dvr__global_task, &global, (double)point / (double)d->point_count,
-                                (double)global.end / (double)d->point_count);
-        for (i = 0; result == ISOGI_OK && i < count; i++) isogi_dvr__add(&d->counters, &global.work[i]);
-        if (result == ISOGI_OK) d->next = b->due + global.end;
-    }
     isogi_release(&d->context, local.work, ISOGI_DVR__SLAB / ISOGI_DVR__CHUNK, sizeof *local.work);
-    return result;
+    return result == ISOGI_OK && d->next >= b->due ? isogi_dvr__step_global(d, end) : result;
 }
 
 /* Sweeps, up to direction `end`. The picture keeps what it had until the last one is done. */
 static isogi_result isogi_dvr__step_sweeps(isogi_dvr *d, size_t end) {
-    isogi_dvr__sweep_job job;
+    isogi_dvr__batch job;
     isogi_result result = ISOGI_OK;
-    size_t batch = end - d->next < ISOGI_DVR__BATCH ? end - d->next : ISOGI_DVR__BATCH, start = d->next, i, c;
+    size_t batch = end - d->next < ISOGI_DVR__BATCH ? end - d->next : ISOGI_DVR__BATCH, start = d->next;
     double span = (double)(end - start);
     if (!batch) return ISOGI_OK;
     job.dvr = d, job.scratch_count = isogi_dvr__sweep_scratch(d);
@@ -3704,15 +3760,12 @@ static isogi_result isogi_dvr__step_sweeps(isogi_dvr *d, size_t end) {
     }
     isogi_release(&d->context, job.scratch, batch * job.scratch_count, sizeof(float));
     isogi_release(&d->context, job.transmittance, batch * d->padded_count, sizeof(float));
-    if (result != ISOGI_OK || d->next < (size_t)d->desc.directions) return result;
-    for (i = 0; i < d->point_count; i++)
-        for (c = 0; c < d->coefficients; c++) d->visibility[i * d->coefficients + c] = d->gathered[c * d->padded_count + i];
-    d->counters.texels += d->point_count;
-    return ISOGI_OK;
+    if (result == ISOGI_OK && d->next == (size_t)d->desc.directions) isogi_dvr__finish_gathered(d);
+    return result;
 }
 
 /* Units of work and the rays of each: brute force goes on by grid points, sweeps by directions, the paper's method by blocks (whose
-   rays are short: they are taken for 64 points') and then by grid points. */
+   rays are short: they are taken for 64 points') and then by directions. */
 ISOGI_API isogi_result isogi_dvr_step(isogi_dvr *dvr, uint64_t max_rays, double *remaining) {
     isogi_result result = ISOGI_OK;
     uint64_t units, rays;
@@ -3728,8 +3781,8 @@ ISOGI_API isogi_result isogi_dvr_step(isogi_dvr *dvr, uint64_t max_rays, double 
     count = dvr->point_count, rays = (uint64_t)dvr->desc.directions;
     if (count && dvr->method == ISOGI_DVR_SWEEP) count = (size_t)dvr->desc.directions, rays = dvr->point_count;
     if (count && dvr->method == ISOGI_DVR_PAPER) {
-        count += dvr->blocks.due;
-        if (dvr->next < dvr->blocks.due) rays *= 64;
+        rays = dvr->next < dvr->blocks.due ? 64 * rays : dvr->point_count;
+        count = dvr->blocks.due + (size_t)dvr->desc.directions;
     }
     units = max_rays / rays;
     units = units ? units : 1;
@@ -5531,6 +5584,7 @@ ISOGI_API isogi_result isogi_dvr_tets_render(const isogi_tets *tets, const isogi
 #undef ISOGI_DVR__TABLE
 #undef ISOGI_DVR__BATCH
 #undef ISOGI_DVR__GAIN
+#undef ISOGI_DVR__TOWARD
 #undef ISOGI_DVR__CLASSES
 #undef ISOGI_DVR__NODES
 #undef ISOGI_DVR__LEAP
