@@ -454,6 +454,11 @@ typedef float isogi_dvr__floats __attribute__((vector_size(64), aligned(4), may_
 typedef int32_t isogi_dvr__ints __attribute__((vector_size(64), aligned(4), may_alias));
 #define ISOGI_DVR__V(p) (*(isogi_dvr__floats *)(void *)(p))
 #define ISOGI_DVR__C(p) (*(const isogi_dvr__floats *)(const void *)(p))
+typedef float isogi_dvr__four __attribute__((vector_size(16), aligned(4), may_alias)); /* a colour and something */
+typedef int32_t isogi_dvr__four_ints __attribute__((vector_size(16), aligned(4), may_alias));
+#define ISOGI_DVR__C4I(p) (*(const isogi_dvr__four_ints *)(const void *)(p))
+#define ISOGI_DVR__4(p) (*(isogi_dvr__four *)(void *)(p))
+#define ISOGI_DVR__C4(p) (*(const isogi_dvr__four *)(const void *)(p))
 #if defined(__x86_64__)
 #define ISOGI_DVR__AVX
 #include <immintrin.h>
@@ -462,9 +467,15 @@ typedef int32_t isogi_dvr__ints __attribute__((vector_size(64), aligned(4), may_
 
 /* A ray within the volume, in grid coordinates; sample i stands at origin + i * dir. */
 typedef struct isogi_dvr__fast_ray {
-    float origin[3], dir[3], piece, last_piece; /* world length over unit from sample to sample */
+    float origin[4], dir[4], piece, last_piece; /* world length over unit from sample to sample */
     int count;                                  /* of samples */
 } isogi_dvr__fast_ray;
+
+/* Rays side by side, which look for matter together. */
+typedef struct isogi_dvr__packet {
+    float origin[3][ISOGI_DVR__LANES], dir[3][ISOGI_DVR__LANES], inverse[3][ISOGI_DVR__LANES];
+    int32_t next[ISOGI_DVR__LANES], count[ISOGI_DVR__LANES]; /* next = count: done */
+} isogi_dvr__packet;
 
 typedef struct isogi_dvr__frame isogi_dvr__frame;
 
@@ -488,6 +499,7 @@ typedef struct isogi_dvr__kernels {
     void (*pass_out)(const isogi_dvr__rows *a, const float w[4]);
     void (*between)(const isogi_dvr__rows *a, const float part[2]);
     void (*exp_row)(float *x, size_t count);
+    void (*leap)(const isogi_dvr *d, isogi_dvr__packet *p, isogi_counters *work);
     void (*gather)(const isogi_dvr__sums *a);
 } isogi_dvr__kernels;
 
@@ -1522,6 +1534,36 @@ static void isogi_dvr__between(const isogi_dvr__rows *a, const float part[2]) {
     }
 }
 
+/* For every ray of a packet the first sample from `next` on that may see something: the last one before the ray leaves the empty blocks
+   around it. The sample after it is what is looked at: a piece may end in matter. */
+static void isogi_dvr__leap(const isogi_dvr *d, isogi_dvr__packet *p, isogi_counters *work) {
+    const isogi_level *level = &d->level[0];
+    int k;
+    for (k = 0; k < ISOGI_DVR__LANES; k++) {
+        int first = p->next[k], i = first, count = p->count[k];
+        while (i < count) {
+            float exit = (float)count;
+            int c[3], a, free;
+            for (a = 0; a < 3; a++) {
+                float x = p->origin[a][k] + (float)i * p->dir[a][k];
+                x = x > 0 ? x : 0;
+                c[a] = (int)x >> 2;
+                c[a] = c[a] < (int)level->size[a] ? c[a] : (int)level->size[a] - 1;
+            }
+            free = d->leap[(size_t)c[0] + level->size[0] * ((size_t)c[1] + level->size[1] * (size_t)c[2])];
+            work->blocks++;
+            if (!free) break;
+            work->blocks_skipped++;
+            for (a = 0; a < 3; a++) {
+                float border = (float)(4 * (p->inverse[a][k] > 0 ? c[a] + free : c[a] - free + 1)), t = (border - p->origin[a][k]) * p->inverse[a][k];
+                exit = t < exit ? t : exit;
+            }
+            i = ((int)exit > i ? (int)exit : i) + 1;
+        }
+        p->next[k] = i >= count ? count : i > first ? i - 1 : first;
+    }
+}
+
 static void isogi_dvr__gather(const isogi_dvr__sums *a) {
     size_t c, k, i;
     for (c = 0; c < a->coefficients; c++)
@@ -1545,6 +1587,22 @@ static void isogi_dvr__gather(const isogi_dvr__sums *a) {
 #define ISOGI_DVR__MORE                                                                  \
     ((w[0] * ISOGI_DVR__C(r0 + i) + w[1] * ISOGI_DVR__C(r0 + i + 1)) +                   \
      (w[2] * ISOGI_DVR__C(r0 + a->beside + i) + w[3] * ISOGI_DVR__C(r0 + a->beside + i + 1)))
+/* The blocks of level 0 that samples lie in, along an axis; where they leave the empty ones around. */
+#define ISOGI_DVR__BLOCK(a, c)                                                                                          \
+    {                                                                                                                   \
+        isogi_dvr__floats x = ISOGI_DVR__C(p->origin[a]) + at * ISOGI_DVR__C(p->dir[a]);                                \
+        isogi_dvr__ints last = zero + (int)(level->size[a] - 1), more;                                                  \
+        x = (isogi_dvr__floats)((isogi_dvr__ints)x & (x > 0.0f)), c = __builtin_convertvector(x, isogi_dvr__ints) >> 2; \
+        more = c > last, c = (last & more) | (c & ~more);                                                               \
+    }
+#define ISOGI_DVR__EXIT(a, c, inverse, up)                                                                                           \
+    {                                                                                                                                \
+        isogi_dvr__ints border = (((c + free) & up) | ((c - free + 1) & ~up)) << 2, less;                                            \
+        isogi_dvr__floats t = (__builtin_convertvector(border, isogi_dvr__floats) - ISOGI_DVR__C(p->origin[a])) * inverse;           \
+        less = t < exit, exit = (isogi_dvr__floats)(((isogi_dvr__ints)t & less) | ((isogi_dvr__ints)exit & ~less));                  \
+    }
+#define ISOGI_DVR__VI(p) (*(isogi_dvr__ints *)(void *)(p))
+#define ISOGI_DVR__CI(p) (*(const isogi_dvr__ints *)(const void *)(p))
 #define ISOGI_DVR__KERNELS(SUFFIX, TARGET)                                                                                          \
     TARGET static void isogi_dvr__pass##SUFFIX(const isogi_dvr__rows *a, const float weight[4]) {                                  \
         const float w[4] = {weight[0], weight[1], weight[2], weight[3]};                                                            \
@@ -1606,9 +1664,39 @@ static void isogi_dvr__gather(const isogi_dvr__sums *a) {
             }                                                                                                                       \
         }                                                                                                                           \
     }                                                                                                                               \
+    TARGET static void isogi_dvr__leap##SUFFIX(const isogi_dvr *d, isogi_dvr__packet *p, isogi_counters *work) {                    \
+        const isogi_level *level = &d->level[0];                                                                                    \
+        int lane;                                                                                                                   \
+        isogi_dvr__ints first = ISOGI_DVR__CI(p->next), count = ISOGI_DVR__CI(p->count), i = first, active = i < count, zero = {0}, blocks = {0}, \
+                        skipped = {0}, row = zero + (int)level->size[0], plane = zero + (int)(level->size[0] * level->size[1]), to;  \
+        isogi_dvr__floats inverse0 = ISOGI_DVR__C(p->inverse[0]), inverse1 = ISOGI_DVR__C(p->inverse[1]), inverse2 = ISOGI_DVR__C(p->inverse[2]); \
+        isogi_dvr__ints up0 = inverse0 > 0.0f, up1 = inverse1 > 0.0f, up2 = inverse2 > 0.0f;                                        \
+        for (;;) {                                                                                                                  \
+            isogi_dvr__floats at = __builtin_convertvector(i, isogi_dvr__floats), exit = __builtin_convertvector(count, isogi_dvr__floats); \
+            isogi_dvr__ints free, move, c0, c1, c2;                                                                                 \
+            int32_t number[ISOGI_DVR__LANES];                                                                                       \
+            uint64_t any[ISOGI_DVR__LANES / 2];                                                                                     \
+            int k;                                                                                                                  \
+            memcpy(any, &active, sizeof any);                                                                                       \
+            if (!((any[0] | any[1] | any[2] | any[3]) | (any[4] | any[5] | any[6] | any[7]))) break;                                \
+            ISOGI_DVR__BLOCK(0, c0) ISOGI_DVR__BLOCK(1, c1) ISOGI_DVR__BLOCK(2, c2)                                                 \
+            ISOGI_DVR__VI(number) = c0 + row * c1 + plane * c2;                                                                     \
+            for (k = 0; k < ISOGI_DVR__LANES; k++) number[k] = d->leap[number[k]];                                                  \
+            free = ISOGI_DVR__CI(number), move = active & (free > 0);                                                               \
+            ISOGI_DVR__EXIT(0, c0, inverse0, up0) ISOGI_DVR__EXIT(1, c1, inverse1, up1) ISOGI_DVR__EXIT(2, c2, inverse2, up2)       \
+            exit = (isogi_dvr__floats)((isogi_dvr__ints)exit & (exit > 0.0f)), to = __builtin_convertvector(exit, isogi_dvr__ints); \
+            to = ((to & (to > i)) | (i & ~(to > i))) + 1;                                                           \
+            blocks -= active, skipped -= move;                                                                                      \
+            i = (to & move) | (i & ~move), active = move & (i < count);                                                             \
+        }                                                                                                                           \
+        to = i - ((i > first) & 1), first = i < count;                                                                                \
+        ISOGI_DVR__VI(p->next) = (to & first) | (count & ~first);                                                                   \
+        for (lane = 0; lane < ISOGI_DVR__LANES; lane++)                                                                             \
+            work->blocks += (uint64_t)blocks[lane], work->blocks_skipped += (uint64_t)skipped[lane];                                \
+    }                                                                                                                               \
     static void isogi_dvr__set_kernels##SUFFIX(isogi_dvr__kernels *k) {                                                             \
         k->pass = isogi_dvr__pass##SUFFIX, k->pass_out = isogi_dvr__pass_out##SUFFIX, k->between = isogi_dvr__between##SUFFIX;  \
-        k->exp_row = isogi_dvr__exp_row##SUFFIX, k->gather = isogi_dvr__gather##SUFFIX;                                             \
+        k->exp_row = isogi_dvr__exp_row##SUFFIX, k->gather = isogi_dvr__gather##SUFFIX, k->leap = isogi_dvr__leap##SUFFIX;          \
     }
 ISOGI_DVR__KERNELS(_base, )
 #ifdef ISOGI_DVR__AVX
@@ -1617,11 +1705,15 @@ ISOGI_DVR__KERNELS(_avx512, __attribute__((target("avx512f,avx512vl,avx512dq,avx
 #endif
 #undef ISOGI_DVR__KERNELS
 #undef ISOGI_DVR__MORE
+#undef ISOGI_DVR__BLOCK
+#undef ISOGI_DVR__EXIT
+#undef ISOGI_DVR__VI
+#undef ISOGI_DVR__CI
 #undef ISOGI_DVR__EXP
 #endif
 
 static isogi_dvr__kernels isogi_dvr__choose_kernels(int force_path) {
-    isogi_dvr__kernels k = {isogi_dvr__pass, isogi_dvr__pass_out, isogi_dvr__between, isogi_dvr__exp_row, isogi_dvr__gather};
+    isogi_dvr__kernels k = {isogi_dvr__pass, isogi_dvr__pass_out, isogi_dvr__between, isogi_dvr__exp_row, isogi_dvr__leap, isogi_dvr__gather};
 #ifdef ISOGI_DVR__VECTORS
     if (force_path == 1) return k;
     isogi_dvr__set_kernels_base(&k);
@@ -4368,11 +4460,17 @@ struct isogi_dvr__frame {
     const isogi_dvr *dvr;
     isogi_dvr__class_entry *classes;
     float (*light)[4];  /* at grid points: scattered radiance of albedo 1, plus what glows; NULL = unlit */
+    float light_scale[4]; /* grid points of light to a voxel */
+    int32_t light_last[4]; /* cell of the grid */
+    size_t light_stride[3], light_row[2]; /* floats to the neighbours (0 where there is one point); rows, planes */
     float low, scale;   /* class of a value */
     double step;        /* voxels between samples */
+    float end, dim;     /* transmittance at which a ray ends; at which its samples stand twice as far apart */
+    void (*leap)(const isogi_dvr *d, isogi_dvr__packet *p, isogi_counters *work);
+    void (*exp_row)(float *x, size_t count);
     float tolerance;    /* change of extinction times length, and of what is seen of it, from which on a piece is divided */
     float glow;         /* share of the colour that is emitted */
-    unsigned (*sample_nodes)(const isogi_dvr__frame *f, const isogi_dvr__fast_ray *r, int first, float *classes);
+    unsigned (*sample_nodes)(const isogi_dvr__frame *f, const isogi_dvr__fast_ray *r, float first, float stride, float *classes);
     int sample_kind;    /* voxels that vectors can read: 0 float, 1 uint8, 2 uint16; -1 another type or layout */
     uint32_t last_word; /* byte offset of the last four bytes of the data */
 };
@@ -4432,46 +4530,74 @@ static void isogi_dvr__frame_light(void *arg, size_t task) {
     }
 }
 
-static void isogi_dvr__fast_light(const isogi_dvr__frame *f, const float position[3], float out[4]) {
-    const isogi_dvr *d = f->dvr;
-    const float *p;
-    size_t base = 0, offset[3], stride = 4;
-    float u[3];
-    int a, i;
-    for (a = 0; a < 3; a++) {
-        int points = (int)d->desc.grid[a], c;
-        float x = position[a] * d->grid_scale[a];
-        x = x > 0 ? x : 0;
-        c = (int)x;
-        c = c < points - 1 ? c : points - 2;
-        c = c > 0 ? c : 0;
-        u[a] = x - (float)c;
-        u[a] = u[a] < 1 ? u[a] : 1;
-        base += stride * (size_t)c, offset[a] = points > 1 ? stride : 0;
-        stride *= (size_t)points;
-    }
-    p = (const float *)f->light + base;
-    for (i = 0; i < 4; i++) {
-        const float *q = p + i;
-        float v00 = q[0] + u[0] * (q[offset[0]] - q[0]), v10 = q[offset[1]] + u[0] * (q[offset[1] + offset[0]] - q[offset[1]]);
-        float v01 = q[offset[2]] + u[0] * (q[offset[2] + offset[0]] - q[offset[2]]);
-        float v11 = q[offset[2] + offset[1]] + u[0] * (q[offset[2] + offset[1] + offset[0]] - q[offset[2] + offset[1]]);
-        float v0 = v00 + u[1] * (v10 - v00), v1 = v01 + u[1] * (v11 - v01);
-        out[i] = v0 + u[2] * (v1 - v0);
-    }
-    for (i = 0; i < 3; i++) out[i] /= out[3];
+/* out = from + u * (from[beside ..] - from), four numbers at once. */
+static void isogi_dvr__mix4(float *out, const float *from, size_t beside, float u) {
+#ifdef ISOGI_DVR__VECTORS
+    ISOGI_DVR__4(out) = ISOGI_DVR__C4(from) + u * (ISOGI_DVR__C4(from + beside) - ISOGI_DVR__C4(from));
+#else
+    int i;
+    for (i = 0; i < 4; i++) out[i] = from[i] + u * (from[beside + (size_t)i] - from[i]);
+#endif
 }
 
-/* Classes of samples first .. first + ISOGI_DVR__NODES - 1; -1 where a corner is not finite. Returns a bit for each piece between two of
+/* out += factor * from, four numbers at once. */
+static void isogi_dvr__add4(float *out, const float *from, float factor) {
+#ifdef ISOGI_DVR__VECTORS
+    ISOGI_DVR__4(out) += factor * ISOGI_DVR__C4(from);
+#else
+    int i;
+    for (i = 0; i < 4; i++) out[i] += factor * from[i];
+#endif
+}
+
+/* Light at a place in the volume's grid coordinates (four numbers, the last one means nothing). */
+#ifdef ISOGI_DVR__VECTORS
+static isogi_dvr__four isogi_dvr__fast_light(const isogi_dvr__frame *f, isogi_dvr__four position) {
+    isogi_dvr__four x = position * ISOGI_DVR__C4(f->light_scale), u, p0, p1, p2, p3;
+    isogi_dvr__four_ints last = ISOGI_DVR__C4I(f->light_last), c, more;
+    const float *p = (const float *)f->light;
+    size_t across = f->light_stride[0], y = f->light_stride[1], z = f->light_stride[2];
+    x = (isogi_dvr__four)((isogi_dvr__four_ints)x & (x > 0.0f)), c = __builtin_convertvector(x, isogi_dvr__four_ints);
+    more = c > last, c = (last & more) | (c & ~more), u = x - __builtin_convertvector(c, isogi_dvr__four);
+    more = u > 1.0f, u = (isogi_dvr__four)((isogi_dvr__four_ints)u & ~more) - __builtin_convertvector(more, isogi_dvr__four); /* true is -1 */
+    p += 4 * (size_t)c[0] + f->light_row[0] * (size_t)c[1] + f->light_row[1] * (size_t)c[2];
+    p0 = ISOGI_DVR__C4(p), p1 = ISOGI_DVR__C4(p + y), p2 = ISOGI_DVR__C4(p + z), p3 = ISOGI_DVR__C4(p + y + z);
+    p0 += u[0] * (ISOGI_DVR__C4(p + across) - p0), p1 += u[0] * (ISOGI_DVR__C4(p + across + y) - p1);
+    p2 += u[0] * (ISOGI_DVR__C4(p + across + z) - p2), p3 += u[0] * (ISOGI_DVR__C4(p + across + y + z) - p3);
+    p0 += u[1] * (p1 - p0), p2 += u[1] * (p3 - p2), p0 += u[2] * (p2 - p0);
+    return p0 * (1 / p0[3]);
+}
+#else
+static void isogi_dvr__fast_light(const isogi_dvr__frame *f, const float position[4], float out[4]) {
+    const float *p = (const float *)f->light;
+    const size_t *to = f->light_stride;
+    float u[3], row[4][4];
+    int a;
+    for (a = 0; a < 3; a++) {
+        float x = position[a] * f->light_scale[a];
+        int c;
+        x = x > 0 ? x : 0;
+        c = (int)x, c = c < f->light_last[a] ? c : f->light_last[a];
+        u[a] = x - (float)c, u[a] = u[a] < 1 ? u[a] : 1;
+        p += (a ? f->light_row[a - 1] : 4) * (size_t)c;
+    }
+    for (a = 0; a < 4; a++) isogi_dvr__mix4(row[a], p + (a & 1 ? to[1] : 0) + (a & 2 ? to[2] : 0), to[0], u[0]);
+    isogi_dvr__mix4(row[0], row[0], 4, u[1]), isogi_dvr__mix4(row[1], row[2], 4, u[1]);
+    isogi_dvr__mix4(out, row[0], 4, u[2]);
+    for (a = 0; a < 3; a++) out[a] /= out[3];
+}
+#endif
+
+/* Classes of ISOGI_DVR__NODES samples from `first` on, a stride apart; -1 where a corner is not finite. Returns a bit for each piece between two of
    them that may absorb: extinction at its beginning, or a change of its integral. */
-static unsigned isogi_dvr__sample_nodes(const isogi_dvr__frame *f, const isogi_dvr__fast_ray *r, int first, float *classes) {
+static unsigned isogi_dvr__sample_nodes(const isogi_dvr__frame *f, const isogi_dvr__fast_ray *r, float first, float stride, float *classes) {
     const isogi_volume *v = &f->dvr->volume;
     int i, a, k;
     for (i = 0; i < ISOGI_DVR__NODES; i++) {
         const char *p = (const char *)v->data;
         float u[3], corner[8], value;
         for (a = 0; a < 3; a++) {
-            float x = r->origin[a] + (float)(first + i) * r->dir[a];
+            float x = r->origin[a] + (first + stride * (float)i) * r->dir[a];
             int c;
             x = x > 0 ? x : 0, x = x < (float)f->dvr->cells[a] ? x : (float)f->dvr->cells[a];
             c = (int)x, c = c < f->dvr->cells[a] ? c : f->dvr->cells[a] - 1;
@@ -4503,9 +4629,9 @@ static unsigned isogi_dvr__sample_nodes(const isogi_dvr__frame *f, const isogi_d
 }
 
 #ifdef ISOGI_DVR__AVX
-__attribute__((target("avx2,fma"))) static unsigned isogi_dvr__sample_nodes_avx2(const isogi_dvr__frame *f, const isogi_dvr__fast_ray *r, int first, float *classes) {
+__attribute__((target("avx2,fma"))) static unsigned isogi_dvr__sample_nodes_avx2(const isogi_dvr__frame *f, const isogi_dvr__fast_ray *r, float first, float stride, float *classes) {
     const isogi_volume *v = &f->dvr->volume;
-    const __m256 lane = _mm256_add_ps(_mm256_set1_ps((float)first), _mm256_setr_ps(0, 1, 2, 3, 4, 5, 6, 7));
+    const __m256 lane = _mm256_fmadd_ps(_mm256_set1_ps(stride), _mm256_setr_ps(0, 1, 2, 3, 4, 5, 6, 7), _mm256_set1_ps(first));
     __m256i offset = _mm256_setzero_si256(), bits;
     __m256 u[3], corner[4], value, top = _mm256_set1_ps(ISOGI_DVR__CLASSES - 0.001f);
     const char *data = (const char *)v->data;
@@ -4521,9 +4647,13 @@ __attribute__((target("avx2,fma"))) static unsigned isogi_dvr__sample_nodes_avx2
     for (k = 0; k < 4; k++) {
         __m256i at = _mm256_add_epi32(offset, _mm256_set1_epi32((int)((k & 1 ? v->stride[1] : 0) + (k & 2 ? v->stride[2] : 0))));
         __m256 x0, x1;
-        if (f->sample_kind == 0) {
-            x0 = _mm256_i32gather_ps((const float *)(const void *)data, at, 1);
-            x1 = _mm256_i32gather_ps((const float *)(const void *)(data + 4), at, 1);
+        if (f->sample_kind == 0) { /* two floats in one word of eight bytes */
+            __m256d low, high;
+            at = _mm256_permute4x64_epi64(at, 0xd8); /* so that the halves come together again in order */
+            low = _mm256_i32gather_pd((const double *)(const void *)data, _mm256_castsi256_si128(at), 1);
+            high = _mm256_i32gather_pd((const double *)(const void *)data, _mm256_extracti128_si256(at, 1), 1);
+            x0 = _mm256_shuffle_ps(_mm256_castpd_ps(low), _mm256_castpd_ps(high), 0x88);
+            x1 = _mm256_shuffle_ps(_mm256_castpd_ps(low), _mm256_castpd_ps(high), 0xdd);
         } else { /* two voxels in one word, which must not reach beyond the data */
             __m256i word = _mm256_min_epi32(at, _mm256_set1_epi32((int)f->last_word)), shift = _mm256_slli_epi32(_mm256_sub_epi32(at, word), 3), mask;
             word = _mm256_srlv_epi32(_mm256_i32gather_epi32((const int *)(const void *)data, word, 1), shift);
@@ -4556,135 +4686,137 @@ __attribute__((target("avx2,fma"))) static unsigned isogi_dvr__sample_nodes_avx2
 /* The mean of rgb * extinction and extinction between two classes; 0 if there is nothing. */
 static int isogi_dvr__fast_mean(const isogi_dvr__class_entry *classes, float from, float to, float mean[4]) {
     const isogi_dvr__class_entry *e0, *e1;
-    float difference = to - from, k0, k1;
+    float difference = to - from, before[4];
     int a;
     if (from < 0 || to < 0) return 0;
     if (difference < 0.5f && difference > -0.5f) {
-        e0 = &classes[(int)(0.5f * (from + to))];
-        for (a = 0; a < 4; a++) mean[a] = e0->mean[a];
+        memcpy(mean, classes[(int)(0.5f * (from + to))].mean, 4 * sizeof *mean);
         return mean[3] > 0;
     }
     e0 = &classes[(int)from], e1 = &classes[(int)to];
-    from -= (float)(int)from, to -= (float)(int)to, difference = 1 / difference;
-    k0 = e0->before[3] + from * e0->mean[3], k1 = e1->before[3] + to * e1->mean[3];
-    mean[3] = (k1 - k0) * difference;
-    if (!(mean[3] > 0)) return 0;
-    for (a = 0; a < 3; a++) {
-        mean[a] = ((e1->before[a] + to * e1->mean[a]) - (e0->before[a] + from * e0->mean[a])) * difference;
-        mean[a] = mean[a] > 0 ? mean[a] : 0;
-    }
-    return 1;
-}
-
-/* The first sample from i on that may see something: the last one before the ray leaves the empty blocks around it. */
-static int isogi_dvr__leap(const isogi_dvr__frame *f, const isogi_dvr__fast_ray *r, const float inverse[3], int i, isogi_counters *work) {
-    const isogi_dvr *d = f->dvr;
-    const isogi_level *level = &d->level[0];
-    while (i < r->count) {
-        float exit = (float)r->count;
-        int c[3], a, free;
-        for (a = 0; a < 3; a++) {
-            float x = r->origin[a] + (float)i * r->dir[a];
-            x = x > 0 ? x : 0;
-            c[a] = (int)x >> 2;
-            c[a] = c[a] < (int)level->size[a] ? c[a] : (int)level->size[a] - 1;
-        }
-        free = d->leap[(size_t)c[0] + level->size[0] * ((size_t)c[1] + level->size[1] * (size_t)c[2])];
-        work->blocks++;
-        if (!free) return i;
-        work->blocks_skipped++;
-        for (a = 0; a < 3; a++) {
-            float border = (float)(4 * (r->dir[a] > 0 ? c[a] + free : c[a] - free + 1)), t = (border - r->origin[a]) * inverse[a];
-            exit = t < exit ? t : exit;
-        }
-        i = (int)exit > i ? (int)exit : i + 1;
-        /* the piece that leaves this block may end in matter: it is looked at when its end is there */
-        {
-            int inside = 1;
-            for (a = 0; a < 3; a++) {
-                float x = r->origin[a] + (float)(i + 1) * r->dir[a];
-                int b = (int)(x > 0 ? x : 0) >> 2;
-                c[a] = b < (int)level->size[a] ? b : (int)level->size[a] - 1;
-            }
-            inside = !d->leap[(size_t)c[0] + level->size[0] * ((size_t)c[1] + level->size[1] * (size_t)c[2])];
-            if (inside) return i < r->count ? i : r->count;
-        }
-    }
-    return r->count;
+    memcpy(mean, e1->before, 4 * sizeof *mean), memcpy(before, e0->before, sizeof before);
+    isogi_dvr__add4(mean, e1->mean, to - (float)(int)to), isogi_dvr__add4(before, e0->mean, from - (float)(int)from);
+    isogi_dvr__add4(mean, before, -1);
+    difference = 1 / difference;
+    for (a = 0; a < 4; a++) mean[a] *= difference, mean[a] = mean[a] > 0 ? mean[a] : 0;
+    return mean[3] > 0;
 }
 
 /* What a ray has gathered. */
 typedef struct isogi_dvr__fast_state {
-    float out[3], clear, light[2][4]; /* light at samples 2 place and 2 place + 2 */
+    float out[4], light[2][4], clear; /* light at samples 2 place and 2 place + 2 */
     int place;
 } isogi_dvr__fast_state;
 
 /* Radiance of albedo 1 at a place between samples. */
-static void isogi_dvr__fast_radiance(const isogi_dvr__frame *f, const isogi_dvr__fast_ray *r, isogi_dvr__fast_state *s, float at, float radiance[3]) {
+static void isogi_dvr__fast_radiance(const isogi_dvr__frame *f, const isogi_dvr__fast_ray *r, isogi_dvr__fast_state *s, float at, float radiance[4]) {
     int place = (int)(0.5f * at), a, n;
-    float u = 0.5f * at - (float)place, position[3];
     if (f->light && place != s->place) {
         if (place == s->place + 1) memcpy(s->light[0], s->light[1], sizeof s->light[0]);
         for (n = place == s->place + 1; n < 2; n++) {
-            for (a = 0; a < 3; a++) position[a] = r->origin[a] + (float)(2 * (place + n)) * r->dir[a];
+#ifdef ISOGI_DVR__VECTORS
+            ISOGI_DVR__4(s->light[n]) = isogi_dvr__fast_light(f, ISOGI_DVR__C4(r->origin) + (float)(2 * (place + n)) * ISOGI_DVR__C4(r->dir));
+#else
+            float position[4];
+            memcpy(position, r->origin, sizeof position);
+            isogi_dvr__add4(position, r->dir, (float)(2 * (place + n)));
             isogi_dvr__fast_light(f, position, s->light[n]);
+#endif
         }
         s->place = place;
     }
-    for (a = 0; a < 3; a++) {
-        float x = s->light[0][a] + u * (s->light[1][a] - s->light[0][a]);
-        radiance[a] = (x > 0 ? x : 0) + f->glow; /* a truncated series may ring below 0 */
-    }
+    isogi_dvr__mix4(radiance, s->light[0], 4, 0.5f * at - (float)place);
+    for (a = 0; a < 3; a++) radiance[a] = (radiance[a] > 0 ? radiance[a] : 0) + f->glow; /* a truncated series may ring below 0 */
 }
 
-/* A piece of ray, `size` samples long from `at` on, with this mean extinction and premultiplied colour. */
-static void isogi_dvr__fast_piece(const isogi_dvr__frame *f, const isogi_dvr__fast_ray *r, isogi_dvr__fast_state *s, const float mean[4], float at, float size, float depth) {
-    float opacity, share, radiance[3];
+/* A piece of ray, `size` samples long from `at` on, with this mean extinction and premultiplied colour, depth and transmittance. */
+static void isogi_dvr__fast_piece(const isogi_dvr__frame *f, const isogi_dvr__fast_ray *r, isogi_dvr__fast_state *s, const float mean[4], float at, float size, float depth, float clear) {
+    float share = s->clear * (1 - clear) / mean[3], radiance[4];
     int a;
-    depth = depth < 1e30f ? depth : 1e30f;
-    opacity = 1 - isogi_dvr__exp(depth), share = s->clear * opacity / mean[3];
     /* light where the piece is seen on average: its middle when it is clear, its beginning when it is dense */
     isogi_dvr__fast_radiance(f, r, s, at + size * 0.5f / (1 + depth * (1.0f / 6)), radiance);
-    for (a = 0; a < 3; a++) s->out[a] += share * mean[a] * radiance[a];
-    s->clear *= 1 - opacity;
+    for (a = 0; a < 3; a++) radiance[a] *= mean[a];
+    isogi_dvr__add4(s->out, radiance, share);
+    s->clear *= clear;
 }
+
+static float isogi_dvr__fast_depth(float depth) { return depth < 1e30f ? depth : 1e30f; }
 
 /* A piece across which extinction changes much is looked at again in seven: the field between the samples is not quite linear, and
    where in the piece its surface lies decides about light. */
-static void isogi_dvr__fast_divide(const isogi_dvr__frame *f, const isogi_dvr__fast_ray *r, isogi_dvr__fast_state *s, int first, float depth_of_one, isogi_counters *work) {
-    const float part = 1.0f / (ISOGI_DVR__NODES - 1);
+static void isogi_dvr__fast_divide(const isogi_dvr__frame *f, const isogi_dvr__fast_ray *r, isogi_dvr__fast_state *s, float first, float size, float depth_of_one, isogi_counters *work) {
+    const float part = size / (ISOGI_DVR__NODES - 1);
     float classes[ISOGI_DVR__NODES], mean[4];
-    isogi_dvr__fast_ray fine = *r;
-    int k, a;
-    for (a = 0; a < 3; a++) fine.origin[a] += (float)first * r->dir[a], fine.dir[a] *= part;
-    f->sample_nodes(f, &fine, 0, classes);
+    int k;
+    f->sample_nodes(f, r, first, part, classes);
     work->samples += ISOGI_DVR__NODES - 2;
     for (k = 0; k + 1 < ISOGI_DVR__NODES; k++)
-        if (isogi_dvr__fast_mean(f->classes, classes[k], classes[k + 1], mean))
-            isogi_dvr__fast_piece(f, r, s, mean, (float)first + (float)k * part, part, mean[3] * depth_of_one * part);
+        if (isogi_dvr__fast_mean(f->classes, classes[k], classes[k + 1], mean)) {
+            float depth = isogi_dvr__fast_depth(mean[3] * depth_of_one * (1.0f / (ISOGI_DVR__NODES - 1)));
+            isogi_dvr__fast_piece(f, r, s, mean, first + (float)k * part, part, depth, isogi_dvr__exp(depth));
+        }
 }
 
-/* Front to back. */
-static void isogi_dvr__fast_cast(const isogi_dvr__frame *f, const isogi_dvr__fast_ray *r, float out[4], isogi_counters *work) {
-    float end = 1 - f->dvr->desc.opaque, inverse[3], classes[ISOGI_DVR__NODES], tolerance = f->tolerance;
-    isogi_dvr__fast_state s = {{0, 0, 0}, 1, {{1, 1, 1, 0}, {1, 1, 1, 0}}, -2};
-    int i = 0, k, a;
+/* Some pieces of a ray: its samples from `first` on, and which pieces between them may absorb. */
+typedef struct isogi_dvr__fast_run {
+    float classes[ISOGI_DVR__NODES];
+    int first, stride;
     unsigned some;
-    for (a = 0; a < 3; a++) inverse[a] = fabsf(r->dir[a]) > 1e-20f ? 1 / r->dir[a] : 1e20f;
-    while (s.clear > end && (i = isogi_dvr__leap(f, r, inverse, i, work)) < r->count - 1) {
-        some = f->sample_nodes(f, r, i, classes);
-        work->samples += ISOGI_DVR__NODES;
-        for (k = 0; some && i + k + 1 < r->count && s.clear > end; k++, some >>= 1) {
-            float mean[4], change, piece = i + k + 2 < r->count ? r->piece : r->last_piece;
-            if (!(some & 1) || !isogi_dvr__fast_mean(f->classes, classes[k], classes[k + 1], mean)) continue;
-            change = (f->classes[(int)classes[k + 1]].mean[3] - f->classes[(int)classes[k]].mean[3]) * piece * s.clear;
-            if (change > tolerance || change < -tolerance) isogi_dvr__fast_divide(f, r, &s, i + k, piece, work);
-            else isogi_dvr__fast_piece(f, r, &s, mean, (float)(i + k), 1, mean[3] * piece);
-        }
-        i += ISOGI_DVR__NODES - 1;
+} isogi_dvr__fast_run;
+
+static void isogi_dvr__fast_pieces(const isogi_dvr__frame *f, const isogi_dvr__fast_ray *r, isogi_dvr__fast_state *s, const isogi_dvr__fast_run *run, isogi_counters *work) {
+    const float *classes = run->classes;
+    float mean[ISOGI_DVR__NODES][4], depth[ISOGI_DVR__LANES] = {0}, clear[ISOGI_DVR__LANES], size = (float)run->stride;
+    unsigned some = run->some;
+    int k, left = r->count - 1 - run->first; /* pieces of the ray; a stride of 2 is not used at its end */
+    for (k = 0; some >> k; k++) {
+        float piece = k + 1 < left || run->stride > 1 ? r->piece * size : r->last_piece;
+        if (!(some >> k & 1)) continue;
+        if (k >= left || !isogi_dvr__fast_mean(f->classes, classes[k], classes[k + 1], mean[k])) some &= ~(1u << k);
+        else depth[k] = isogi_dvr__fast_depth(mean[k][3] * piece);
     }
-    for (a = 0; a < 3; a++) out[a] = s.out[a];
-    out[3] = 1 - s.clear;
+    if (!some) return;
+    memcpy(clear, depth, sizeof clear);
+    f->exp_row(clear, ISOGI_DVR__NODES);
+    for (k = 0; some >> k && s->clear > f->end; k++) {
+        float change, at = (float)(run->first + k * run->stride), piece = k + 1 < left || run->stride > 1 ? r->piece * size : r->last_piece;
+        if (!(some >> k & 1)) continue;
+        change = (f->classes[(int)classes[k + 1]].mean[3] - f->classes[(int)classes[k]].mean[3]) * piece * s->clear;
+        if (change > f->tolerance || change < -f->tolerance) isogi_dvr__fast_divide(f, r, s, at, size, piece, work);
+        else isogi_dvr__fast_piece(f, r, s, mean[k], at, size, depth[k], clear[k]);
+    }
+}
+
+/* Front to back: all rays of a packet go to where the next matter may be, then each passes some of it. */
+static void isogi_dvr__fast_cast(const isogi_dvr__frame *f, const isogi_dvr__fast_ray r[ISOGI_DVR__LANES], isogi_dvr__fast_state s[ISOGI_DVR__LANES], isogi_counters *work) {
+    isogi_dvr__packet p;
+    isogi_dvr__fast_run run[ISOGI_DVR__LANES];
+    int k, a, any = 1;
+    for (k = 0; k < ISOGI_DVR__LANES; k++) {
+        for (a = 0; a < 3; a++) {
+            p.origin[a][k] = r[k].origin[a], p.dir[a][k] = r[k].dir[a];
+            p.inverse[a][k] = fabsf(r[k].dir[a]) > 1e-20f ? 1 / r[k].dir[a] : r[k].dir[a] > 0 ? 1e20f : -1e20f;
+        }
+        p.next[k] = 0, p.count[k] = r[k].count;
+        memset(&s[k], 0, sizeof s[k]);
+        for (a = 0; a < 3; a++) s[k].light[0][a] = s[k].light[1][a] = 1;
+        s[k].clear = 1, s[k].place = -2;
+    }
+    while (any) {
+        f->leap(f->dvr, &p, work);
+        for (k = 0, any = 0; k < ISOGI_DVR__LANES; k++) { /* waiting for memory together */
+            run[k].some = 0, run[k].first = p.next[k];
+            if (p.next[k] >= p.count[k] - 1) continue;
+            run[k].stride = s[k].clear < f->dim && p.next[k] + 2 * (ISOGI_DVR__NODES - 1) < p.count[k] - 1 ? 2 : 1;
+            run[k].some = f->sample_nodes(f, &r[k], (float)p.next[k], (float)run[k].stride, run[k].classes);
+            work->samples += ISOGI_DVR__NODES, any = 1;
+            p.next[k] += run[k].stride * (ISOGI_DVR__NODES - 1);
+        }
+        for (k = 0; k < ISOGI_DVR__LANES; k++) {
+            if (run[k].some) isogi_dvr__fast_pieces(f, &r[k], &s[k], &run[k], work);
+            if (!(s[k].clear > f->end)) p.next[k] = p.count[k];
+        }
+    }
 }
 
 /* 0 if the ray misses what is kept of the volume. */
@@ -4700,6 +4832,7 @@ static int isogi_dvr__fast_begin(const isogi_dvr__frame *f, const double origin[
     rest = march.length - (pieces - 1) * march.piece;
     r->count = (int)pieces + 1;
     for (a = 0; a < 3; a++) r->origin[a] = (float)march.origin[a], r->dir[a] = (float)(march.dir[a] * march.piece);
+    r->origin[3] = r->dir[3] = 0;
     r->piece = (float)(march.piece / d->desc.unit), r->last_piece = (float)(rest / d->desc.unit);
     return 1;
 }
@@ -4820,15 +4953,28 @@ static void isogi_dvr__render_pixel(const isogi_dvr__render_job *job, int x, int
     out[4] = (float)((again.enter + ray.t) * speed);
 }
 
-static void isogi_dvr__render_fast(const isogi_dvr__render_job *job, int x, int y, isogi_counters *work) {
-    float *out = job->pixels + 5 * ((size_t)y * (size_t)job->view->width + (size_t)x);
-    isogi_dvr__fast_ray ray;
-    double world[3];
-    int a;
-    work->rays++;
-    for (a = 0; a < 4; a++) out[a] = 0;
-    isogi_dvr__camera_ray(&job->camera, job->view, x, y, world);
-    if (isogi_dvr__fast_begin(&job->fast.frame, job->eye, world, &ray)) isogi_dvr__fast_cast(&job->fast.frame, &ray, out, work);
+/* A packet: four by four pixels. */
+static void isogi_dvr__render_fast(const isogi_dvr__render_job *job, int x0, int y0, isogi_counters *work) {
+    isogi_dvr__fast_ray ray[ISOGI_DVR__LANES];
+    isogi_dvr__fast_state state[ISOGI_DVR__LANES];
+    int k, a;
+    for (k = 0; k < ISOGI_DVR__LANES; k++) {
+        int x = x0 + k % 4, y = y0 + k / 4;
+        double world[3];
+        memset(&ray[k], 0, sizeof ray[k]);
+        if (x >= job->view->width || y >= job->view->height) continue;
+        isogi_dvr__camera_ray(&job->camera, job->view, x, y, world);
+        if (!isogi_dvr__fast_begin(&job->fast.frame, job->eye, world, &ray[k])) ray[k].count = 0;
+        work->rays++;
+    }
+    isogi_dvr__fast_cast(&job->fast.frame, ray, state, work);
+    for (k = 0; k < ISOGI_DVR__LANES; k++) {
+        int x = x0 + k % 4, y = y0 + k / 4;
+        float *out = job->pixels + 5 * ((size_t)y * (size_t)job->view->width + (size_t)x);
+        if (x >= job->view->width || y >= job->view->height) continue;
+        for (a = 0; a < 3; a++) out[a] = state[k].out[a];
+        out[3] = 1 - state[k].clear;
+    }
 }
 
 static void isogi_dvr__render_task(void *arg, size_t tile) {
@@ -4836,10 +4982,11 @@ static void isogi_dvr__render_task(void *arg, size_t tile) {
     int x0 = (int)(tile % job->across) * ISOGI_DVR__TILE, y0 = (int)(tile / job->across) * ISOGI_DVR__TILE, x, y;
     isogi_dvr__crossings crossings;
     isogi_counters work;
+    int side = job->fast.frame.classes ? 4 : 1; /* of a packet */
     memset(&work, 0, sizeof work);
-    for (y = y0; y < y0 + ISOGI_DVR__TILE && y < job->view->height; y++)
-        for (x = x0; x < x0 + ISOGI_DVR__TILE && x < job->view->width; x++)
-            if (job->fast.frame.classes) isogi_dvr__render_fast(job, x, y, &work);
+    for (y = y0; y < y0 + ISOGI_DVR__TILE && y < job->view->height; y += side)
+        for (x = x0; x < x0 + ISOGI_DVR__TILE && x < job->view->width; x += side)
+            if (side > 1) isogi_dvr__render_fast(job, x, y, &work);
             else isogi_dvr__render_pixel(job, x, y, &crossings, &work);
     job->work[tile] = work;
 }
@@ -4849,13 +4996,17 @@ static isogi_result isogi_dvr__begin_frame(isogi_dvr__render_job *job) {
     const isogi_dvr *d = job->dvr;
     const isogi_volume *v = &d->volume;
     isogi_dvr__frame *f = &job->fast.frame;
-    double eye[3], bytes;
+    double eye[3], bytes, blocks;
     int a, kind = v->type == ISOGI_F32 ? 0 : v->type == ISOGI_U8 ? 1 : v->type == ISOGI_U16 ? 2 : -1;
     isogi_dvr__set_camera(&job->camera, job->view);
     for (a = 0; a < 3; a++) eye[a] = (double)job->view->eye[a];
     isogi_vol_to_grid(d->desc.pyramid, eye, job->eye);
     if (!isogi_dvr__fast_space(d) || job->depth || job->lights.nearby.light_count || job->lights.local) return ISOGI_OK;
     f->dvr = d, f->step = d->piece, f->sample_nodes = isogi_dvr__sample_nodes, f->glow = (float)d->desc.emission;
+    f->end = 1 - d->desc.opaque, f->dim = 0.125f;
+    blocks = (double)d->level[0].size[0] * (double)d->level[0].size[1] * (double)d->level[0].size[2];
+    f->exp_row = d->kernels.exp_row;
+    f->leap = blocks < 2e9 ? d->kernels.leap : isogi_dvr__leap;
     f->tolerance = d->desc.tolerance > 0 ? (float)d->desc.tolerance : 0.5f;
     bytes = (double)v->stride[0] * (double)d->cells[0] + (double)v->stride[1] * (double)d->cells[1] + (double)v->stride[2] * (double)d->cells[2];
     f->sample_kind = kind >= 0 && v->stride[0] == (kind == 0 ? 4 : kind) && v->stride[1] > 0 && v->stride[2] > 0 && bytes > 8 && bytes < 2e9 ? kind : -1;
@@ -4873,6 +5024,11 @@ static isogi_result isogi_dvr__begin_frame(isogi_dvr__render_job *job) {
     f->light = (float(*)[4])isogi_allocate(&d->context, d->point_count, sizeof *f->light);
     if (!f->light) return ISOGI_NO_MEMORY;
     job->fast.lights = &job->lights;
+    f->light_row[0] = 4 * d->desc.grid[0], f->light_row[1] = f->light_row[0] * d->desc.grid[1];
+    for (a = 0; a < 3; a++) {
+        f->light_scale[a] = d->grid_scale[a], f->light_last[a] = d->desc.grid[a] > 2 ? (int32_t)(d->desc.grid[a] - 2) : 0;
+        f->light_stride[a] = d->desc.grid[a] < 2 ? 0 : a ? f->light_row[a - 1] : 4;
+    }
     return isogi_parallel(&d->context, (d->point_count + ISOGI_DVR__GAIN - 1) / ISOGI_DVR__GAIN, isogi_dvr__frame_light, &job->fast, 0, 0);
 }
 
@@ -5591,6 +5747,9 @@ ISOGI_API isogi_result isogi_dvr_tets_render(const isogi_tets *tets, const isogi
 #undef ISOGI_DVR__VECTORS
 #undef ISOGI_DVR__V
 #undef ISOGI_DVR__C
+#undef ISOGI_DVR__4
+#undef ISOGI_DVR__C4
+#undef ISOGI_DVR__C4I
 #undef ISOGI_DVR__AVX
 #endif /* implementation */
 
