@@ -4550,6 +4550,26 @@ static void isogi_dvr__add4(float *out, const float *from, float factor) {
 #endif
 }
 
+/* x = max(factor x, 0) + more, and out += factor * a * b: not a mixture of single and four numbers, whose loads would wait for the stores. */
+static void isogi_dvr__positive4(float *x, float factor, float more) {
+#ifdef ISOGI_DVR__VECTORS
+    isogi_dvr__four y = factor * ISOGI_DVR__C4(x);
+    ISOGI_DVR__4(x) = (isogi_dvr__four)((isogi_dvr__four_ints)y & (y > 0.0f)) + more;
+#else
+    int i;
+    for (i = 0; i < 4; i++) x[i] = (factor * x[i] > 0 ? factor * x[i] : 0) + more;
+#endif
+}
+
+static void isogi_dvr__add_product4(float *out, const float *a, const float *b, float factor) {
+#ifdef ISOGI_DVR__VECTORS
+    ISOGI_DVR__4(out) += factor * ISOGI_DVR__C4(a) * ISOGI_DVR__C4(b);
+#else
+    int i;
+    for (i = 0; i < 4; i++) out[i] += factor * a[i] * b[i];
+#endif
+}
+
 /* Light at a place in the volume's grid coordinates (four numbers, the last one means nothing). */
 #ifdef ISOGI_DVR__VECTORS
 static isogi_dvr__four isogi_dvr__fast_light(const isogi_dvr__frame *f, isogi_dvr__four position) {
@@ -4687,7 +4707,6 @@ __attribute__((target("avx2,fma"))) static unsigned isogi_dvr__sample_nodes_avx2
 static int isogi_dvr__fast_mean(const isogi_dvr__class_entry *classes, float from, float to, float mean[4]) {
     const isogi_dvr__class_entry *e0, *e1;
     float difference = to - from, before[4];
-    int a;
     if (from < 0 || to < 0) return 0;
     if (difference < 0.5f && difference > -0.5f) {
         memcpy(mean, classes[(int)(0.5f * (from + to))].mean, 4 * sizeof *mean);
@@ -4697,8 +4716,7 @@ static int isogi_dvr__fast_mean(const isogi_dvr__class_entry *classes, float fro
     memcpy(mean, e1->before, 4 * sizeof *mean), memcpy(before, e0->before, sizeof before);
     isogi_dvr__add4(mean, e1->mean, to - (float)(int)to), isogi_dvr__add4(before, e0->mean, from - (float)(int)from);
     isogi_dvr__add4(mean, before, -1);
-    difference = 1 / difference;
-    for (a = 0; a < 4; a++) mean[a] *= difference, mean[a] = mean[a] > 0 ? mean[a] : 0;
+    isogi_dvr__positive4(mean, 1 / difference, 0);
     return mean[3] > 0;
 }
 
@@ -4710,7 +4728,7 @@ typedef struct isogi_dvr__fast_state {
 
 /* Radiance of albedo 1 at a place between samples. */
 static void isogi_dvr__fast_radiance(const isogi_dvr__frame *f, const isogi_dvr__fast_ray *r, isogi_dvr__fast_state *s, float at, float radiance[4]) {
-    int place = (int)(0.5f * at), a, n;
+    int place = (int)(0.5f * at), n;
     if (f->light && place != s->place) {
         if (place == s->place + 1) memcpy(s->light[0], s->light[1], sizeof s->light[0]);
         for (n = place == s->place + 1; n < 2; n++) {
@@ -4726,17 +4744,15 @@ static void isogi_dvr__fast_radiance(const isogi_dvr__frame *f, const isogi_dvr_
         s->place = place;
     }
     isogi_dvr__mix4(radiance, s->light[0], 4, 0.5f * at - (float)place);
-    for (a = 0; a < 3; a++) radiance[a] = (radiance[a] > 0 ? radiance[a] : 0) + f->glow; /* a truncated series may ring below 0 */
+    isogi_dvr__positive4(radiance, 1, f->glow); /* a truncated series may ring below 0 */
 }
 
 /* A piece of ray, `size` samples long from `at` on, with this mean extinction and premultiplied colour, depth and transmittance. */
 static void isogi_dvr__fast_piece(const isogi_dvr__frame *f, const isogi_dvr__fast_ray *r, isogi_dvr__fast_state *s, const float mean[4], float at, float size, float depth, float clear) {
-    float share = s->clear * (1 - clear) / mean[3], radiance[4];
-    int a;
+    float radiance[4];
     /* light where the piece is seen on average: its middle when it is clear, its beginning when it is dense */
     isogi_dvr__fast_radiance(f, r, s, at + size * 0.5f / (1 + depth * (1.0f / 6)), radiance);
-    for (a = 0; a < 3; a++) radiance[a] *= mean[a];
-    isogi_dvr__add4(s->out, radiance, share);
+    isogi_dvr__add_product4(s->out, radiance, mean, s->clear * (1 - clear) / mean[3]);
     s->clear *= clear;
 }
 
@@ -4757,33 +4773,40 @@ static void isogi_dvr__fast_divide(const isogi_dvr__frame *f, const isogi_dvr__f
         }
 }
 
-/* Some pieces of a ray: its samples from `first` on, and which pieces between them may absorb. */
+/* Some pieces of a ray: its samples from `first` on, which pieces between them absorb, and how. */
 typedef struct isogi_dvr__fast_run {
-    float classes[ISOGI_DVR__NODES];
+    float classes[ISOGI_DVR__NODES], mean[ISOGI_DVR__NODES][4], depth[ISOGI_DVR__NODES];
     int first, stride;
     unsigned some;
 } isogi_dvr__fast_run;
 
-static void isogi_dvr__fast_pieces(const isogi_dvr__frame *f, const isogi_dvr__fast_ray *r, isogi_dvr__fast_state *s, const isogi_dvr__fast_run *run, isogi_counters *work) {
-    const float *classes = run->classes;
-    float mean[ISOGI_DVR__NODES][4], depth[ISOGI_DVR__LANES] = {0}, clear[ISOGI_DVR__LANES], size = (float)run->stride;
-    unsigned some = run->some;
-    int k, left = r->count - 1 - run->first; /* pieces of the ray; a stride of 2 is not used at its end */
-    for (k = 0; some >> k; k++) {
-        float piece = k + 1 < left || run->stride > 1 ? r->piece * size : r->last_piece;
-        if (!(some >> k & 1)) continue;
-        if (k >= left || !isogi_dvr__fast_mean(f->classes, classes[k], classes[k + 1], mean[k])) some &= ~(1u << k);
-        else depth[k] = isogi_dvr__fast_depth(mean[k][3] * piece);
+/* Length of a piece; a stride of 2 is not used at the ray's end. */
+static float isogi_dvr__fast_length(const isogi_dvr__fast_ray *r, const isogi_dvr__fast_run *run, int k) {
+    return run->stride > 1 || run->first + k + 2 < r->count ? r->piece * (float)run->stride : r->last_piece;
+}
+
+static void isogi_dvr__fast_means(const isogi_dvr__frame *f, const isogi_dvr__fast_ray *r, isogi_dvr__fast_run *run) {
+    unsigned some;
+    int k;
+    memset(run->depth, 0, sizeof run->depth);
+    for (k = 0, some = run->some; some; k++, some >>= 1) {
+        if (!(some & 1)) continue;
+        if (run->first + k * run->stride + 1 >= r->count || !isogi_dvr__fast_mean(f->classes, run->classes[k], run->classes[k + 1], run->mean[k])) run->some &= ~(1u << k);
+        else run->depth[k] = isogi_dvr__fast_depth(run->mean[k][3] * isogi_dvr__fast_length(r, run, k));
     }
-    if (!some) return;
-    memcpy(clear, depth, sizeof clear);
-    f->exp_row(clear, ISOGI_DVR__NODES);
-    for (k = 0; some >> k && s->clear > f->end; k++) {
-        float change, at = (float)(run->first + k * run->stride), piece = k + 1 < left || run->stride > 1 ? r->piece * size : r->last_piece;
-        if (!(some >> k & 1)) continue;
-        change = (f->classes[(int)classes[k + 1]].mean[3] - f->classes[(int)classes[k]].mean[3]) * piece * s->clear;
+}
+
+static void isogi_dvr__fast_pieces(const isogi_dvr__frame *f, const isogi_dvr__fast_ray *r, isogi_dvr__fast_state *s, const isogi_dvr__fast_run *run, const float *clear,
+                                   isogi_counters *work) {
+    unsigned some = run->some;
+    int k;
+    for (k = 0; some && s->clear > f->end; k++, some >>= 1) {
+        float change, at = (float)(run->first + k * run->stride), size = (float)run->stride, piece;
+        if (!(some & 1)) continue;
+        piece = isogi_dvr__fast_length(r, run, k);
+        change = (f->classes[(int)run->classes[k + 1]].mean[3] - f->classes[(int)run->classes[k]].mean[3]) * piece * s->clear;
         if (change > f->tolerance || change < -f->tolerance) isogi_dvr__fast_divide(f, r, s, at, size, piece, work);
-        else isogi_dvr__fast_piece(f, r, s, mean[k], at, size, depth[k], clear[k]);
+        else isogi_dvr__fast_piece(f, r, s, run->mean[k], at, size, run->depth[k], clear[k]);
     }
 }
 
@@ -4791,6 +4814,7 @@ static void isogi_dvr__fast_pieces(const isogi_dvr__frame *f, const isogi_dvr__f
 static void isogi_dvr__fast_cast(const isogi_dvr__frame *f, const isogi_dvr__fast_ray r[ISOGI_DVR__LANES], isogi_dvr__fast_state s[ISOGI_DVR__LANES], isogi_counters *work) {
     isogi_dvr__packet p;
     isogi_dvr__fast_run run[ISOGI_DVR__LANES];
+    float clear[ISOGI_DVR__LANES * (ISOGI_DVR__NODES + 1)];
     int k, a, any = 1;
     for (k = 0; k < ISOGI_DVR__LANES; k++) {
         for (a = 0; a < 3; a++) {
@@ -4803,6 +4827,7 @@ static void isogi_dvr__fast_cast(const isogi_dvr__frame *f, const isogi_dvr__fas
         s[k].clear = 1, s[k].place = -2;
     }
     while (any) {
+        size_t used = 0;
         f->leap(f->dvr, &p, work);
         for (k = 0, any = 0; k < ISOGI_DVR__LANES; k++) { /* waiting for memory together */
             run[k].some = 0, run[k].first = p.next[k];
@@ -4813,7 +4838,13 @@ static void isogi_dvr__fast_cast(const isogi_dvr__frame *f, const isogi_dvr__fas
             p.next[k] += run[k].stride * (ISOGI_DVR__NODES - 1);
         }
         for (k = 0; k < ISOGI_DVR__LANES; k++) {
-            if (run[k].some) isogi_dvr__fast_pieces(f, &r[k], &s[k], &run[k], work);
+            if (run[k].some) isogi_dvr__fast_means(f, &r[k], &run[k]);
+            if (run[k].some) memcpy(clear + used, run[k].depth, sizeof run[k].depth), used += ISOGI_DVR__NODES;
+        }
+        memset(clear + used, 0, ISOGI_DVR__LANES * sizeof *clear);
+        f->exp_row(clear, used);
+        for (k = 0, used = 0; k < ISOGI_DVR__LANES; k++) {
+            if (run[k].some) isogi_dvr__fast_pieces(f, &r[k], &s[k], &run[k], clear + used, work), used += ISOGI_DVR__NODES;
             if (!(s[k].clear > f->end)) p.next[k] = p.count[k];
         }
     }
