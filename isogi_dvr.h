@@ -4668,10 +4668,10 @@ __attribute__((target("avx2,fma"))) static unsigned isogi_dvr__sample_nodes_avx2
         __m256i at = _mm256_add_epi32(offset, _mm256_set1_epi32((int)((k & 1 ? v->stride[1] : 0) + (k & 2 ? v->stride[2] : 0))));
         __m256 x0, x1;
         if (f->sample_kind == 0) { /* two floats in one word of eight bytes */
-            __m256d low, high;
+            __m256d zero = _mm256_setzero_pd(), all = _mm256_castsi256_pd(_mm256_set1_epi64x(-1)), low, high; /* or g++ misses what is undefined */
             at = _mm256_permute4x64_epi64(at, 0xd8); /* so that the halves come together again in order */
-            low = _mm256_i32gather_pd((const double *)(const void *)data, _mm256_castsi256_si128(at), 1);
-            high = _mm256_i32gather_pd((const double *)(const void *)data, _mm256_extracti128_si256(at, 1), 1);
+            low = _mm256_mask_i32gather_pd(zero, (const double *)(const void *)data, _mm256_castsi256_si128(at), all, 1);
+            high = _mm256_mask_i32gather_pd(zero, (const double *)(const void *)data, _mm256_extracti128_si256(at, 1), all, 1);
             x0 = _mm256_shuffle_ps(_mm256_castpd_ps(low), _mm256_castpd_ps(high), 0x88);
             x1 = _mm256_shuffle_ps(_mm256_castpd_ps(low), _mm256_castpd_ps(high), 0xdd);
         } else { /* two voxels in one word, which must not reach beyond the data */
