@@ -83,7 +83,8 @@
 
    Visibility is sampled in `directions` directions and projected to SH, by one of the methods of isogi_dvr_method. Brute force
    marches every ray from every grid point through the same transfer function (in the same space; peaks attenuate at every
-   crossing). Sweeps, the default in physical space without peaks, follow a bundle of parallel rays for each direction through a
+   crossing). In data space its rays walk the cells as those of pictures do: against steps of a voxel 1.8 times the time, a relative error
+   of 3e-5 in place of 1e-2 for a steep transfer function. Where nothing absorbs no ray is cast at all. Sweeps, the default in physical space without peaks, follow a bundle of parallel rays for each direction through a
    lattice of extinction and read it at all grid points on the way: 10 to 30 times faster at the same error, as a bundle's rays are
    straight and nothing is interpolated twice. The paper's method (Kronander 2011) has local visibility on blocks of several levels,
    which pictures may use on its own (isogi_view.local), and global visibility pieced together from it; relative errors on the same
@@ -111,7 +112,8 @@
      space it would depend on the view, and it blurs every surface to the width of a voxel.
    - The border of the volume is no surface: outside of the box is empty space.
    - It reads no files, opens no window, converts nothing to sRGB. Pixels are linear and premultiplied: put a background under
-     them with  out = pixel + (1 - opacity) * background.
+     them with  out = pixel + (1 - opacity) * background. For a display, what examples/common/picture.h does: multiply by an exposure, bend what
+     is above 0.7 by  x -> 0.7 + 0.3 (1 - exp((0.7 - x) / 0.3)), and code as sRGB:  12.92 x  up to 0.0031308, above it  1.055 x^(1/2.4) - 0.055.
 
    Options (macros, to be defined before the header is included)
 
@@ -262,7 +264,8 @@ typedef struct isogi_dvr_desc {
                                before them, changes by more are sampled seven times as densely; 0 = 0.5 */
     double emission;        /* share of rgb that glows by itself, besides scattering light; 0..1e6; with visibility only */
     double radius;          /* the paper's method: of local visibility, in units of the smallest voxel spacing, 1..32; 0 = 16 */
-    double reduction;       /* the paper's method: voxels of the volume to points of its blocks, at least 1; 0 = 4 */
+    double reduction;       /* the paper's method: voxels of the volume to points of its blocks, at least 1; 0 = 4. A block that is not
+                               transparent holds a point whatever the budget is, one that the border cuts thinner as many as it takes */
     isogi_dvr_classification classification; /* in data space; visibility rays are exact there, unless this says post-classified */
     int table;                               /* entries along a side of the pre-integrated table, 2..1024; 0 = 256 */
     isogi_dvr_silhouette silhouette;

@@ -1,6 +1,6 @@
 /* The parameter study of Kronander 2011 (section 5), its tables 1 and 2 and the baseline of its figure 14, with our data.
 
-       build/bench/bench_visibility [--quick] OUT.csv
+       build/bench/bench_visibility [--quick] [--only SCENE] [--sweeps] OUT.csv      --sweeps: without the paper's method, which takes most of the time
 
    Two threads, wall seconds. torus-sphere-plane, the paper's worst case (9 coefficients, 128 rays, radius 16, 1:3, grid 64^3), and bonsai under Grace
    (4 coefficients, 64 rays, radius 16, 1:6.7, grid 64x64x32); one parameter is varied at a time, by sweeps (the default) and by the paper's
@@ -20,7 +20,7 @@
 static const double pi = 3.14159265358979323846;
 static const isogi_context two = {.threads = 2};
 static FILE *csv;
-static int quick, SIDE = 512;
+static int quick, sweeps_alone, SIDE = 512;
 
 typedef struct study {
     const char *name;
@@ -97,7 +97,7 @@ static void study_rays(const study *s) {
     isogi_dvr_desc desc = s->base;
     desc.directions = quick ? 256 : 2048;
     frame reference = frame_of(s, &desc, 0, &s->lighting);
-    for (int paper = 0; paper < 2; paper++)
+    for (int paper = 0; paper < 2 - sweeps_alone; paper++)
         for (int rays = 16; rays <= (quick ? 64 : paper ? 256 : 2048); rays *= 2) {
             char setting[32];
             desc = s->base, desc.directions = rays;
@@ -113,7 +113,7 @@ static void study_coefficients(const study *s) {
     isogi_dvr_desc desc = s->base;
     desc.order = 6, desc.directions = 256;
     frame reference = frame_of(s, &desc, 0, &s->lighting);
-    for (int paper = 0; paper < (quick ? 1 : 2); paper++)
+    for (int paper = 0; paper < (quick || sweeps_alone ? 1 : 2); paper++)
         for (int order = 1; order <= 4; order++) {
             char setting[32];
             desc = s->base, desc.order = order;
@@ -132,7 +132,7 @@ static void study_blocks(const study *s) {
     desc.directions = quick ? 256 : 2048;
     frame reference = frame_of(s, &desc, 0, &s->lighting);
     measure("reduction", s, &s->base, 1, "sweeps", &reference), measure("radius", s, &s->base, 1, "sweeps", &reference);
-    for (int i = 0; i < 5; i++) {
+    for (int i = 0; i < 5 && !sweeps_alone; i++) {
         if (quick && i % 2) continue;
         desc = s->base, desc.method = ISOGI_DVR_PAPER, desc.directions = 32, desc.reduction = reductions[i];
         snprintf(setting, sizeof setting, "1:%g", reductions[i]);
@@ -150,7 +150,7 @@ static void study_grids(const study *s) {
     isogi_dvr_desc desc = s->base;
     for (int a = 0; a < 3; a++) desc.grid[a] *= most;
     frame reference = frame_of(s, &desc, 0, &s->lighting);
-    for (int paper = 0; paper < (quick ? 1 : 2); paper++)
+    for (int paper = 0; paper < (quick || sweeps_alone ? 1 : 2); paper++)
         for (size_t half = 1; half <= most; half *= 2) { /* in halves of the base; the reference itself has no error */
             char setting[80];
             desc = s->base;
@@ -193,8 +193,10 @@ static void study_shading(const study *s) {
     reference = frame_of(s, &desc, 0, &s->lighting);
     f = frame_of(s, &s->base, 0, &s->lighting), rows("shading", s, "default", "global visibility", &f, &reference, 1, 1, "frame"), free(f.srgb);
     desc = s->base, desc.method = ISOGI_DVR_PAPER;
-    f = frame_of(s, &desc, 0, &s->lighting), rows("shading", s, "paper", "global visibility", &f, &reference, 1, 1, "frame"), free(f.srgb);
-    f = frame_of(s, &desc, 1, &s->lighting), rows("shading", s, "paper-local", "local visibility", &f, &reference, 1, 1, "frame"), free(f.srgb);
+    for (int local = 0; local < 2 && !sweeps_alone; local++) {
+        f = frame_of(s, &desc, local, &s->lighting);
+        rows("shading", s, local ? "paper-local" : "paper", local ? "local visibility" : "global visibility", &f, &reference, 1, 1, "frame"), free(f.srgb);
+    }
     desc = s->base, desc.shading = ISOGI_DVR_LOCAL;
     f = frame_of(s, &desc, 0, &s->lighting), rows("shading", s, "diffuse", "by the gradient", &f, &reference, 1, 1, "frame"), free(f.srgb);
     desc.shading = ISOGI_DVR_UNLIT;
@@ -210,6 +212,7 @@ static void tables(const study *s) {
     row("table-1", s->name, "", "default", "update", f.update, 0, 1, "update"), row("table-1", s->name, "", "frame", "by sweeps", f.render, 0, 1, "frame");
     row("table-2", s->name, "", "default", "megabytes: global", f.update, (double)f.report.global_bytes / megabyte, 1, "update");
     free(f.srgb);
+    if (sweeps_alone) return;
     desc.method = ISOGI_DVR_PAPER, f = frame_of(s, &desc, 0, &s->lighting);
     row("table-1", s->name, "", "paper", "update", f.update, 0, 1, "update"), row("table-1", s->name, "", "paper-frame", "by blocks", f.render, 0, 1, "frame");
     row("table-2", s->name, "", "paper", "megabytes: data", f.update, (double)f.report.data_bytes / megabyte, 1, "update");
@@ -287,14 +290,18 @@ static void bench_real(int which) {
 }
 
 int main(int argc, char **argv) {
-    const char *path = NULL;
+    static const char *const names[3] = {"bonsai", "engine", "fuel"};
+    const char *path = NULL, *only = NULL;
     for (int i = 1; i < argc; i++) {
         if (!strcmp(argv[i], "--quick")) quick = 1, SIDE = 128;
+        else if (!strcmp(argv[i], "--sweeps")) sweeps_alone = 1;
+        else if (!strcmp(argv[i], "--only") && i + 1 < argc) only = argv[++i];
         else path = argv[i];
     }
-    if (!path || !(csv = fopen(path, "w"))) return fprintf(stderr, "usage: %s [--quick] OUT.csv\n", argv[0]), 2;
+    if (!path || !(csv = fopen(path, "w"))) return fprintf(stderr, "usage: %s [--quick] [--only SCENE] [--sweeps] OUT.csv\n", argv[0]), 2;
     fprintf(csv, "header,case,method,setting,seconds,error,work,unit\n");
-    bench_procedural();
-    for (int which = 0; which < 3 && !quick; which++) bench_real(which);
+    if (!only || !strcmp(only, "torus-sphere-plane")) bench_procedural();
+    for (int which = 0; which < 3 && !quick; which++)
+        if (!only || !strcmp(only, names[which])) bench_real(which);
     return fclose(csv) ? 1 : 0;
 }
