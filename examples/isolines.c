@@ -8,6 +8,7 @@
 #include "picture.h"
 #include "png.h"
 #include "procedural.h"
+#include <stdlib.h>
 
 enum { SIDE = 512 };
 static unsigned char picture[SIDE][SIDE][3];
@@ -19,9 +20,13 @@ int main(int argc, char **argv) {
     isogi_pyramid *pyramid = NULL;
     char error[FILE_ERROR_SIZE];
     if (!shape) return fprintf(stderr, "usage: %s SHAPE LINES LOW HIGH OUT.png\n", argv[0]), 2;
-    double lines = atof(argv[2]), low = atof(argv[3]), gap = (atof(argv[4]) - low) / (lines > 1 ? lines - 1 : 1);
-    if (!(gap > 0) || procedural_make(shape, 0, &volume, NULL) != ISOGI_OK) return 1;
-    if (isogi_vol_build(&pyramid, &volume, NULL) != ISOGI_OK) return 1;
+    char *end[3];
+    double lines = strtod(argv[2], &end[0]), low = strtod(argv[3], &end[1]), gap = (strtod(argv[4], &end[2]) - low) / (lines > 1 ? lines - 1 : 1);
+    if (*end[0] || *end[1] || *end[2] || !(lines >= 1 && lines <= 1000 && gap > 1e-9 && gap < 1e9))
+        return fprintf(stderr, "isolines: LINES is 1 to 1000, LOW is a number below HIGH\n"), 1;
+    isogi_result result = procedural_make(shape, 0, &volume, NULL);
+    if (result == ISOGI_OK) result = isogi_vol_build(&pyramid, &volume, NULL);
+    if (result != ISOGI_OK) return fprintf(stderr, "isolines: %s\n", isogi_result_string(result)), 1;
     double pixel = (double)(volume.size[0] - 1) / SIDE;
     for (int y = 0; y < SIDE; y++) {
         for (int x = 0; x < SIDE; x++) {

@@ -7,6 +7,7 @@
 
 int main(int argc, char **argv) {
     const char *path = argc > 1 ? argv[1] : "build/mesh_obj.obj";
+    if (argc > 2 || *path == '-') return fprintf(stderr, "usage: %s [OUT.obj]\n", argv[0]), 2;
     const procedural_shape *shape = procedural_find("gyroid");
     isogi_volume volume;
     isogi_pyramid *pyramid = NULL;
@@ -27,7 +28,7 @@ int main(int argc, char **argv) {
         const uint32_t *t = mesh.triangles[i];
         fprintf(file, "f %u//%u %u//%u %u//%u\n", t[0] + 1, t[0] + 1, t[1] + 1, t[1] + 1, t[2] + 1, t[2] + 1);
     }
-    if (fclose(file)) return perror(path), 1;
+    if (ferror(file) | fclose(file)) return perror(path), 1;
     /* a closed surface has 3/2 edges for every triangle: V - E + F counts its handles, two for each */
     long euler = (long)mesh.vertex_count - (long)mesh.triangle_count / 2;
     printf("%s: %zu vertices, %zu triangles, closed, Euler characteristic %ld\n", path, mesh.vertex_count, mesh.triangle_count, euler);

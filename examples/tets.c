@@ -60,12 +60,15 @@ int main(int argc, char **argv) {
     isogi_volume volume = {.data = NULL};
     isogi_tet_report report;
     isogi_tets *built = NULL;
-    if (argc < 4) return fprintf(stderr, "usage: %s MESH physical|data OUT.png [WIDTH]\n", argv[0]), 2;
-    int data = !strcmp(argv[2], "data"), side = argc > 4 ? atoi(argv[4]) : 512, raw = strstr(argv[1], ".raw") != NULL;
+    int data = argc > 2 && !strcmp(argv[2], "data"), side = argc > 4 ? atoi(argv[4]) : 512;
+    if (argc < 4 || argc > 5 || (!data && strcmp(argv[2], "physical")) || side < 1 || side > 8192)
+        return fprintf(stderr, "usage: %s MESH physical|data OUT.png [WIDTH], 1 to 8192 pixels wide\n", argv[0]), 2;
+    int raw = strstr(argv[1], ".raw") != NULL;
     if (raw ? !volume_read(argv[1], &volume, error) || !split(&volume) : !read_tets(argv[1], error)) return fprintf(stderr, "tets: %s\n", error), 1;
     mesh.points = (const float(*)[3])points, mesh.values = values, mesh.tets = (const uint32_t(*)[4])tets;
     isogi_result result = isogi_dvr_tets_build(&built, &mesh, &report, NULL);
-    if (result != ISOGI_OK || side < 1 || side > 8192 || !mesh.point_count) return fprintf(stderr, "tets: %s\n", isogi_result_string(result)), 1;
+    if (result == ISOGI_OK && !mesh.point_count) result = ISOGI_INVALID;
+    if (result != ISOGI_OK) return fprintf(stderr, "tets: %s: %s\n", argv[1], isogi_result_string(result)), 1;
     printf("%zu tetrahedra, %zu degenerate, %zu faces on the border, %zu crowded\n", mesh.tet_count, report.degenerate, report.border, report.crowded);
 
     double low[3], high[3], least = 1e30, most = -1e30, radius = 0;
@@ -91,7 +94,7 @@ int main(int argc, char **argv) {
     const isogi_tet_desc desc = {.space = data ? ISOGI_DVR_DATA : ISOGI_DVR_PHYSICAL, .silhouette = data ? ISOGI_DVR_SILHOUETTE_EXACT : ISOGI_DVR_SILHOUETTE_NONE};
     float(*image)[4] = (float(*)[4])malloc(4 * (size_t)side * (size_t)side * sizeof *image);
     unsigned char *bytes = (unsigned char *)malloc((size_t)side * (size_t)side * 3);
-    if (!image || !bytes) return 1;
+    if (!image || !bytes) return fprintf(stderr, "tets: out of memory\n"), 1;
     result = isogi_dvr_tets_render(built, &desc, data ? &surfaces : &thick, &view, image, NULL, NULL);
     if (result != ISOGI_OK) return fprintf(stderr, "tets: %s\n", isogi_result_string(result)), 1;
     const double behind[3] = {0.09, 0.095, 0.1};

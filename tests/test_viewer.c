@@ -12,78 +12,19 @@
 #include "isogi_dvr.h"
 #include "png.h"
 #include "procedural.h"
+#include "programs.h"
 #include "raster.h"
 #include "transfer_file.h"
 #include "volume_file.h"
 
-#include <sys/wait.h>
-
 /* ---- running the program --------------------------------------------------------------------------------------------------------- */
 
-static char folder[64]; /* removed at the end */
-
-static void remove_folder(void) {
-    char command[128];
-    if (!*folder) return;
-    snprintf(command, sizeof command, "rm -rf '%s'", folder);
-    if (system(command) != 0) fprintf(stderr, "could not remove %s\n", folder);
-}
-
-static const char *temporary(const char *name) {
-    static char path[16][256];
-    static int turn;
-    if (!*folder) {
-        strcpy(folder, "/tmp/isogi_viewer_XXXXXX");
-        if (!mkdtemp(folder)) perror("mkdtemp"), exit(2);
-        atexit(remove_folder);
-    }
-    turn = (turn + 1) % 16; /* a path stays for the next 15 calls */
-    snprintf(path[turn], sizeof path[turn], "%s/%s", folder, name);
-    return path[turn];
-}
-
-static void write_bytes(const char *path, const void *data, size_t size) {
-    FILE *file = fopen(path, "wb");
-    CHECK(file && fwrite(data, 1, size, file) == size && fclose(file) == 0, "cannot write %s", path);
-}
-
-typedef struct run_result {
-    int status;      /* exit code; -1 when it was killed */
-    size_t lines;    /* on the standard error */
-    char error[2048], output[4096];
-} run_result;
-
-static size_t read_text(const char *path, char *text, size_t size) {
-    FILE *file = fopen(path, "rb");
-    size_t n = file ? fread(text, 1, size - 1, file) : 0;
-    if (file) fclose(file);
-    text[n] = 0;
-    return n;
-}
-
-/* arguments: as a shell would read them */
-static run_result run_viewer(const char *arguments) {
-    run_result r;
+static const char *viewer_path(void) {
     const char *viewer = getenv("ISOGI_VIEWER");
-    char command[2048], output[256], error[256];
-    int status;
-    memset(&r, 0, sizeof r);
-    strcpy(output, temporary("stdout")), strcpy(error, temporary("stderr"));
-    snprintf(command, sizeof command, "'%s' %s >'%s' 2>'%s'", viewer && *viewer ? viewer : "build/viewer", arguments, output, error);
-    status = system(command);
-    r.status = WIFEXITED(status) ? WEXITSTATUS(status) : -1;
-    if (r.status > 127) r.status = -1; /* the shell's way to tell of a signal */
-    read_text(error, r.error, sizeof r.error), read_text(output, r.output, sizeof r.output);
-    for (const char *c = r.error; *c; c++) r.lines += *c == '\n';
-    return r;
+    return viewer && *viewer ? viewer : "build/viewer";
 }
-
-static void check_refused(const char *arguments, const char *must_say) {
-    run_result r = run_viewer(arguments);
-    CHECK(r.status == 1, "\"%s\" ended with %d: %s", arguments, r.status, r.error);
-    CHECK(r.lines == 1, "\"%s\" wrote %zu lines: %s", arguments, r.lines, r.error);
-    CHECK(strstr(r.error, must_say), "\"%s\" does not say \"%s\": %s", arguments, must_say, r.error);
-}
+static run_result run_viewer(const char *arguments) { return run_program(viewer_path(), arguments); }
+static void check_refused(const char *arguments, const char *must_say) { check_refusal(viewer_path(), arguments, 1, must_say); }
 
 /* ---- pictures ------------------------------------------------------------------------------------------------------------------------ */
 

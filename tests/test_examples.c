@@ -1,0 +1,76 @@
+/* The example programs as their users meet them: they run, and everything that is wrong is one clear line, an exit code other than 0 and
+   no change to any file. The viewer has a file of its own. */
+#include "programs.h"
+
+TEST(programs_without_arguments_run) {
+    static const char *const names[] = {"bake_points", "isosurface_rays", "procedural_rays", "sh_light", "volume_shadows"};
+    for (size_t i = 0; i < sizeof names / sizeof *names; i++) {
+        char path[64];
+        snprintf(path, sizeof path, "build/%s", names[i]);
+        run_result r = run_program(path, "");
+        CHECK(r.status == 0 && !*r.error && strlen(r.output) > 20, "%s: status %d, %s", names[i], r.status, r.error);
+    }
+}
+
+TEST(meshes_are_written) {
+    char arguments[300], text[64];
+    snprintf(arguments, sizeof arguments, "'%s'", temporary("a.obj"));
+    run_result r = run_program("build/mesh_obj", arguments);
+    CHECK(r.status == 0 && strstr(r.output, "closed"), "status %d: %s", r.status, r.error);
+    CHECK(read_text(temporary("a.obj"), text, sizeof text) && !strncmp(text, "v ", 2), "begins with %s", text);
+    check_refusal("build/mesh_obj", "--help", 2, "usage");
+    check_refusal("build/mesh_obj", "a.obj b.obj", 2, "usage");
+    check_refusal("build/mesh_obj", "/nowhere/a.obj", 1, "/nowhere/a.obj: No such file");
+}
+
+/* Every refusal leaves the file named as output as it was. */
+static void check_kept(const char *program, const char *format, int status, const char *must_say) {
+    char arguments[1024], kept[256], text[64];
+    strcpy(kept, temporary("kept"));
+    write_bytes(kept, "do not touch", 12);
+    snprintf(arguments, sizeof arguments, format, kept);
+    check_refusal(program, arguments, status, must_say);
+    CHECK(read_text(kept, text, sizeof text) == 12 && !strcmp(text, "do not touch"), "%s %s changed its output", program, arguments);
+}
+
+TEST(bad_isolines_get_one_line) {
+    static const char *const bad[] = {"gyroid x 0 1 '%s'", "gyroid 3 1 0 '%s'", "gyroid 3 0 nan '%s'", "gyroid 1e30 0 1 '%s'", "gyroid 0 0 1 '%s'", "gyroid 3 0 1x '%s'"};
+    for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) check_kept("build/isolines", bad[i], 1, "LINES is 1 to 1000");
+    check_kept("build/isolines", "", 2, "usage");
+    check_kept("build/isolines", "teapot 3 0 1 '%s'", 2, "usage");
+    check_kept("build/isolines", "gyroid 3 0 1 /nowhere/a.png", 1, "/nowhere/a.png: cannot be written");
+}
+
+TEST(bad_meshes_of_tetrahedra_get_one_line) {
+    const struct { const char *name; size_t size; unsigned char bytes[64]; const char *say; } files[] = {
+        {"empty.tet", 0, {0}, "is not a .tet file"}, {"other.tet", 16, {"RIFFxxxxxxxxxxx"}, "is not a .tet file"},
+        {"cut.tet", 20, {'T', 'E', 'T', 'S', 4, 0, 0, 0, 1}, "is cut off"}, {"vast.tet", 20, {'T', 'E', 'T', 'S', 255, 255, 255, 255, 255, 255, 255, 255}, "is cut off"},
+        {"none.tet", 12, {'T', 'E', 'T', 'S'}, "invalid"}, /* no point */
+        {"beyond.tet", 44, {'T', 'E', 'T', 'S', 1, 0, 0, 0, 1, 0, 0, 0, [28] = 9}, "invalid"}, /* a corner that is no point */
+        {"short_4x4x4_uint8.raw", 63, {0}, "63 bytes"}};
+    char arguments[600];
+    for (size_t i = 0; i < sizeof files / sizeof *files; i++) {
+        write_bytes(temporary(files[i].name), files[i].bytes, files[i].size);
+        snprintf(arguments, sizeof arguments, "'%s' data '%%s'", temporary(files[i].name));
+        check_kept("build/tets", arguments, 1, files[i].say);
+    }
+    check_kept("build/tets", "/nowhere.tet data '%s'", 1, "No such file");
+    check_kept("build/tets", "/nowhere.tet magic '%s'", 2, "usage");
+    check_kept("build/tets", "/nowhere.tet data '%s' 0", 2, "usage");
+    check_kept("build/tets", "/nowhere.tet data '%s' 100000", 2, "usage");
+    check_kept("build/tets", "", 2, "usage");
+}
+
+TEST(bad_bakes_get_one_line) {
+    static const char *const bad[][2] = {{"", "VOLUME and --out are needed"}, {"--out '%s'", "VOLUME and --out are needed"}, {"procedural:gyroid:8 --out", "--out: needs a value"},
+        {"procedural:teapot --out '%s'", "no such volume"}, {"procedural:gyroid:8 --samples 1 --out '%s'", "corrupt"}, {"procedural:gyroid:8 --samples 0 --out '%s'", "--samples"},
+        {"procedural:gyroid:8 --samples nan --out '%s'", "--samples"}, {"procedural:gyroid:8 --lattice 0,0,0 --out '%s'", "--lattice"},
+        {"procedural:gyroid:8 --spacing 0,1,1 --out '%s'", "--spacing"}, {"procedural:gyroid:8 --format best --out '%s'", "--format"},
+        {"procedural:gyroid:8 --storage best --out '%s'", "--storage"}, {"procedural:gyroid:8 --env /nowhere.hdr --out '%s'", "/nowhere.hdr"},
+        {"procedural:gyroid:8 --merge /nowhere.bake --out '%s'", "/nowhere.bake"}, {"procedural:gyroid:8 --box 1,2,3 --out '%s'", "--box"},
+        {"/nowhere_4x4x4_uint8.raw --out '%s'", "No such file"}, {"procedural:gyroid:8 --samples 1 --out /nowhere/a.bake", "/nowhere/a.bake: cannot be written"},
+        {"procedural:gyroid:8 --nonsense --out '%s'", "no such option"}};
+    for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) check_kept("build/bake", bad[i][0], 1, bad[i][1]);
+}
+
+TEST_MAIN("examples")
