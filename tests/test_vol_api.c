@@ -600,6 +600,51 @@ TEST(calls_without_an_object_say_so) {
     CHECK(counters.rays == 5, "%d rays", (int)counters.rays);
 }
 
+/* ---- what other headers stand on ---- */
+
+typedef struct ledger { size_t blocks, bytes, align; } ledger;
+static void *ledger_alloc(void *user, size_t size, size_t align) {
+    ledger *l = (ledger *)user;
+    l->blocks++, l->bytes += size, l->align = align;
+    return malloc(size);
+}
+static void ledger_release(void *user, void *p, size_t size) {
+    ledger *l = (ledger *)user;
+    l->blocks--, l->bytes -= size;
+    free(p);
+}
+
+TEST(memory_is_aligned_counted_and_never_wraps_around) {
+    ledger l = {0, 0, 0};
+    const isogi_context context = {.alloc = ledger_alloc, .release = ledger_release, .user = &l};
+    const isogi_context *const contexts[2] = {NULL, &context};
+    for (int c = 0; c < 2; c++) {
+        CHECK(!isogi_allocate(contexts[c], 0, 8) && !isogi_allocate(contexts[c], 8, 0), "nothing is NULL, %d", c);
+        CHECK(!isogi_allocate(contexts[c], SIZE_MAX / 2, 3) && !isogi_allocate(contexts[c], SIZE_MAX, SIZE_MAX), "a product that overflows, %d", c);
+        char *p = (char *)isogi_allocate(contexts[c], 7, 9);
+        CHECK(p != NULL && (c || (uintptr_t)p % 64 == 0), "block %p", (void *)p);
+        if (p) memset(p, 1, 63);
+        CHECK(!c || (l.blocks == 1 && l.bytes == 63 && l.align == 64), "%zu blocks, %zu bytes, alignment %zu", l.blocks, l.bytes, l.align);
+        isogi_release(contexts[c], p, 7, 9), isogi_release(contexts[c], NULL, 7, 9);
+    }
+    CHECK(!isogi_allocate(NULL, SIZE_MAX - 8, 1), "no room beside %d bytes", 8);
+    CHECK(!l.blocks && !l.bytes, "%zu blocks, %zu bytes left", l.blocks, l.bytes);
+}
+
+TEST(a_pyramid_knows_whether_all_voxels_are_finite) {
+    const double odd[3] = {(double)NAN, (double)INFINITY, -(double)INFINITY};
+    CHECK(!isogi_vol_finite(NULL), "no pyramid, %d", 0);
+    for (int n = 0; n < 4; n++) {
+        test_random r = {77};
+        field f = field_new(9, 10, 11);
+        field_fill(&f, NOISE, &r);
+        if (n) f.value[300 * n] = odd[n - 1];
+        field_build(&f);
+        CHECK(isogi_vol_finite(f.pyramid) == !n, "case %d: %d", n, isogi_vol_finite(f.pyramid));
+        field_free(&f);
+    }
+}
+
 /* No volume of this size fits in a test: the step that adds up what the rows have is given rows that say so. */
 TEST(more_vertices_than_indices_are_too_large) {
     isogi_vol__mesh_row row[4];

@@ -1,16 +1,47 @@
 #!/bin/sh
-# Benchmarks write the table that is promised: the eight columns, positive times, and for each case one row of the default. Those of
-# sh and vol, which need no converged pictures first.
+# Benchmarks write the table that is promised: the eight columns, finite positive numbers, for each case one row of the default, and every
+# case that is asked for. contract.sh [sh|vol|trace|dvr]...; cases of real volumes are wanted where ISOGI_DATA holds them.
 set -e
-for only in sh vol; do
+[ $# -gt 0 ] || set -- sh vol trace dvr
+
+wanted() {
+    case $1 in
+    sh) echo eval-aos-f32-L4 eval-aos-f32-L10 eval-aos-f32-L20 eval-soa-f32-L4 eval-soa-f32-L10 eval-soa-f32-L20 eval-aos-f64-L4 eval-aos-f64-L10 \
+        rotate-once-n3 rotate-once-n4 rotate-once-n5 rotate-once-n8 rotate-once-n16 rotate-build-n8 rotate-build-n16 rotate-apply-n5 \
+        product-n5 product-batch-n5 zonal-n5 sum-n5 project-equirect-n5 ;;
+    vol) for field in ml256 gyroid256; do
+            for rays in primary1 primary16 surface anyhit bundle64; do echo $rays-$field; done
+         done
+         echo pyramid-256 trilinear-along-rays tricubic-along-rays tricubic-random mesh-gyroid256 mesh-normals-gyroid256 ;;
+    trace) for scene in engine-block $(have engine_256x256x128_uint8.raw engine); do
+            echo speedup-$scene rays-$scene lazy-$scene lazy-converged-$scene
+           done ;;
+    dvr) echo frame-ml256 frame-gyroid256 frame-scale-invariant-gyroid256 \
+        $(have engine_256x256x128_uint8.raw frame-engine tf-update-engine tf-update-engine:paper tf-update-engine:sweep) \
+        $(have bonsai_256x256x256_uint8.raw frame-bonsai tf-update-bonsai tf-update-bonsai:paper tf-update-bonsai:sweep) \
+        $(have fuel_64x64x64_uint8.raw tf-update-fuel tf-update-fuel:paper tf-update-fuel:sweep) ;;
+    esac
+}
+have() { [ -z "$ISOGI_DATA" ] || [ ! -f "$ISOGI_DATA/$1" ] || { shift; echo "$@"; }; }
+
+lines=0
+for only; do
+    begun=$(date +%s)
     ${MAKE:-make} --no-print-directory bench QUICK=1 ONLY=$only
-done
-for table in build/bench/sh.csv build/bench/vol.csv; do
+    table=build/bench/$only.csv
     [ "$(head -n 1 "$table")" = header,case,method,setting,seconds,error,work,unit ] || { echo "$table: other columns"; exit 1; }
-    awk -F, -v file="$table" '
-        NR > 1 && (NF != 8 || !($5 > 0) || !($6 >= 0) || !($7 > 0)) { print file ":" NR ": " $0; bad = 1 }
-        NR > 1 { cases[$2] = 1; if ($3 == "default") defaults[$2]++ }
-        END { for (c in cases) if (defaults[c] != 1) { print file ": case " c " has " defaults[c] + 0 " default rows"; bad = 1 }; exit bad }' "$table"
+    awk -F, -v file="$table" -v wanted="$(wanted $only | tr '\n' ' ')" '
+        function number(x) { return x ~ /^[0-9]*\.?[0-9]+([eE][-+]?[0-9]+)?$/ }
+        NR > 1 && (NF != 8 || !number($5) || !number($6) || !number($7) || $5 + 0 <= 0 || $7 + 0 <= 0) { print file ":" NR ": " $0; bad = 1 }
+        NR > 1 { rows[$2 ":" $3]++; cases[$2] = 1 }
+        END {
+            for (c in cases) if (rows[c ":default"] != 1) { print file ": case " c " has " rows[c ":default"] + 0 " default rows"; bad = 1 }
+            n = split(wanted, want, " ")
+            for (i = 1; i <= n; i++) if (!rows[want[i] ~ /:/ ? want[i] : want[i] ":default"]) { print file ": " want[i] " is missing"; bad = 1 }
+            exit bad
+        }' "$table"
     [ -s "${table%.csv}.svg" ] || { echo "${table%.csv}.svg is missing"; exit 1; }
+    lines=$((lines + $(wc -l < "$table")))
+    took="$took $only $(($(date +%s) - begun)) s"
 done
-echo "note: $(cat build/bench/sh.csv build/bench/vol.csv | wc -l) lines of measurements"
+echo "note: $lines lines of measurements;$took"
