@@ -588,7 +588,8 @@ TEST(texels_without_a_surface_are_left_out) {
     for (int i = 0; i < 200; i++) {
         float point[1][3] = {{(float)(0.07 * i), (float)(7.001 + 0.998 * i / 200), (float)(14 - 0.06 * i)}}, e[1][3], error[1];
         isogi_trace_sample(t, (const float(*)[3])point, 1, e, error);
-        CHECK(fabs((double)e[0][0] - PI) < 1e-4 && error[0] < 1e-4f, "at y = %g: E %g, error %g", (double)point[0][1], (double)e[0][0], (double)error[0]);
+        /* four samples a texel that agree may have missed something, but not much */
+        CHECK(fabs((double)e[0][0] - PI) < 1e-4 && error[0] > 0 && error[0] < 0.2f, "at y = %g: E %g, error %g", (double)point[0][1], (double)e[0][0], (double)error[0]);
     }
     {
         float point[1][3] = {{5, 12, 5}}, e[1][3] = {{1, 1, 1}}, error[1] = {0}; /* in the air no lookup is possible, and it says so */

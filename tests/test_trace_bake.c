@@ -268,6 +268,64 @@ TEST(lazy_bakes_are_usable_at_once) {
 
 /* ---- errors ---------------------------------------------------------------------------------------------------------------- */
 
+/* Lookups, and how many of them are within two of the errors that they report; half of 1/1000 for the passes that end early. */
+static void covered(const char *name, const isogi_trace_desc *d, const float (*points)[3], int n, const float *expected, double least) {
+    isogi_trace *t = NULL;
+    static float e[200][3], error[200];
+    int within = 0;
+    double square = 0, claimed = 0;
+    isogi_trace_create(&t, d, NULL), isogi_trace_request(t, points, (size_t)n);
+    CHECK(isogi_trace_step(t, 0, NULL) == ISOGI_OK, "step");
+    isogi_trace_sample(t, points, (size_t)n, e, error);
+    for (int i = 0; i < n; i++) {
+        double apart = fabs((double)e[i][1] - (double)expected[i]);
+        within += apart <= 2 * (double)error[i] + 5e-4 * (double)expected[i], square += apart * apart / n, claimed += (double)error[i] * (double)error[i] / n;
+        CHECK(error[i] > 0, "%s: no error at %d", name, i);
+    }
+    printf("    %-14s %-8s %4d samples: %5.1f %% within 2 standard errors, rms %.4f, reported %.4f\n", name, d->method ? "paths" : "feedback", d->samples, 100.0 * within / n, sqrt(square), sqrt(claimed));
+    CHECK(within >= least * n && sqrt(claimed) < 6 * sqrt(square) + 0.1 * (double)expected[0], "%s: %d of %d, reported %g, rms %g", name, within, n, sqrt(claimed), sqrt(square));
+    isogi_trace_free(t);
+}
+
+/* 95 % of the reported errors cover the true ones (twice the standard error), with few samples and many, on scenes with closed forms:
+   a plane below a black sphere, a glowing closed cavity; and a pit, whose closed form holds for no voxels: against many paths. */
+TEST(errors_are_honest) {
+    double q_plane[5] = {32, 30, 32, 8, 12}, q_shell[5] = {15.5, 15.5, 15.5, 8, 13}, q_pit[5] = {16, 15, 16, 20.3, 10};
+    scene s[3];
+    isogi_albedo_point glow[1] = {{0, {0.5f, 1, 2}}};
+    static float points[3][60][3], expected[3][60], e[60][3];
+    isogi_trace_desc d[3];
+    int n = 60;
+    s[0] = scene_make(64, 64, 64, NULL, ball_over_plane, q_plane), s[1] = scene_make(32, 32, 32, NULL, shell, q_shell), s[2] = scene_make(32, 32, 32, NULL, pit, q_pit);
+    d[0] = feedback(&s[0], 0, 0, 0), d[1] = feedback(&s[1], 0.6f, -1, 0), d[2] = feedback(&s[2], 0.5f, -1, LONG_SUITE ? 4096 : 512);
+    d[1].emission_points = glow, d[1].emission_count = 1, d[1].lighting.env.sh = NULL, d[1].lighting.env.sh_order = 0;
+    for (int i = 0; i < n; i++) {
+        double distance, x = 0.45 * i, z = -0.16 * i;
+        points[0][i][0] = (float)(32 + x), points[0][i][1] = 12, points[0][i][2] = (float)(32 + z);
+        distance = length3(x, 18, z), expected[0][i] = (float)(PI * (1 - 64 / (distance * distance) * 18 / distance));
+        expected[1][i] = (float)(PI / (1 - 0.6));
+    }
+    n = surface_points(&s[2], 0, 60, 21, points[2]);
+    CHECK(surface_points(&s[1], 0, 60, 22, points[1]) == n, "too few points");
+    for (int i = 0; i < 60; i++) { /* onto the inner wall */
+        double w[3], l = 0;
+        for (int a = 0; a < 3; a++) w[a] = (double)points[1][i][a] - 15.5, l += w[a] * w[a];
+        for (int a = 0; a < 3; a++) points[1][i][a] = (float)(15.5 + 8 * w[a] / sqrt(l));
+    }
+    d[2].method = ISOGI_TRACE_PATHS, d[2].lazy = 1, bake_and_sample(&d[2], NULL, (const float(*)[3])points[2], n, e);
+    for (int i = 0; i < n; i++) expected[2][i] = e[i][1];
+    for (int k = 0; k < 3; k++) {
+        const char *name[3] = {"plane", "closed cavity", "pit"};
+        for (int method = 0; method < 2; method++)
+            for (int samples = 4; samples <= 64; samples *= 4) {
+                if (samples == 64 && !LONG_SUITE) continue;
+                d[k].method = (isogi_trace_method)method, d[k].samples = samples, d[k].lazy = 1;
+                covered(name[k], &d[k], (const float(*)[3])points[k], n, expected[k], 0.95);
+            }
+        scene_free(&s[k]);
+    }
+}
+
 /* More samples go where the error is above the target: it is met everywhere, with fewer rays than the same number for all. */
 TEST(adaptive_bakes_meet_their_target) {
     double q[5] = {32, 31, 32, 45, 20};
