@@ -303,7 +303,7 @@ static outcome lazily(const bench_scene *s, double bound) {
     isogi_counters counters = {0};
     outcome o = {0};
     double remaining = 1;
-    d.samples = 340;
+    d.samples = 20; /* blocks of 4 and of 16 */
     double begin = seconds_now();
     if (isogi_trace_create(&t, &d, &two) != ISOGI_OK || isogi_trace_request(t, (const float(*)[3])points, seen) != ISOGI_OK) exit(1);
     o.seconds = seconds_now() - begin;
@@ -333,26 +333,35 @@ static void bench(FILE *csv, const char *name, int quick) {
     char setting[64];
     isogi_trace_desc d;
     if (!scene_load(&s, name)) return;
-    view(&s, quick ? 600 : 3000);
+    view(&s, quick ? 400 : 3000);
     if (!reference_make(&s)) exit(1);
     (void)naive(&s, 10, &usable, &texels);
     seconds = naive(&s, 100, &converged, &texels);
     d = s.desc;
-    for (int samples = 1; samples <= (quick ? 16 : 256); samples *= 4) { /* the curve, and the first point below the error of naive */
-        d.samples = samples, o = ours(&s, &d, &two);
-        snprintf(setting, sizeof setting, "samples=%d", samples);
-        row(csv, "", &s, samples == 16 ? "default" : "feedback", setting, o.seconds, o.error, o.rays, "rays");
-        if (!found && (o.error <= converged || samples == (quick ? 16 : 256))) best = o, found = 1;
+    for (int i = 0; i < (quick ? 5 : 9); i++) { /* the curve, and the first point below the error of naive */
+        const int sweep[9] = {1, 4, 5, 6, 8, 16, 64, 128, 256};
+        d.samples = sweep[i], o = ours(&s, &d, &two);
+        snprintf(setting, sizeof setting, "samples=%d", d.samples);
+        row(csv, "", &s, d.samples == (quick ? 8 : 64) ? "default" : "feedback", setting, o.seconds, o.error, o.rays, "rays");
+        if (!found && (o.error <= converged || i == (quick ? 4 : 8))) best = o, found = d.samples;
+        if (quick || (d.samples & (d.samples - 1))) continue;
         d.method = ISOGI_TRACE_PATHS;
-        if (!quick) o = ours(&s, &d, &two), row(csv, "", &s, "paths", setting, o.seconds, o.error, o.rays, "rays");
+        o = ours(&s, &d, &two), row(csv, "", &s, "paths", setting, o.seconds, o.error, o.rays, "rays");
         d.method = ISOGI_TRACE_FEEDBACK;
+    }
+    for (int i = 0; i < 2; i++) { /* the best of three, in turn with naive: other work on the machine is no part of either */
+        double again = naive(&s, 100, &converged, &texels);
+        seconds = again < seconds ? again : seconds;
+        d.samples = found, o = ours(&s, &d, &two);
+        best.seconds = o.seconds < best.seconds ? o.seconds : best.seconds;
     }
     seconds *= best.texels / texels; /* of all texels of the view */
     if (best.error > converged) best.seconds *= best.error * best.error / (converged * converged);
-    row(csv, "speedup-", &s, "default", "at converged", best.seconds, converged, seconds / best.seconds, "x");
+    snprintf(setting, sizeof setting, "samples=%d", found);
+    row(csv, "speedup-", &s, "default", setting, best.seconds, converged, seconds / best.seconds, "x");
     row(csv, "speedup-", &s, "naive", "samples=100", seconds, converged, 1, "x");
-    d.samples = 16, o = ours(&s, &d, &one);
-    row(csv, "rays-", &s, "default", "samples=16", o.seconds, o.error, o.rays / o.seconds, "rays/s");
+    d.samples = 8, o = ours(&s, &d, &one);
+    row(csv, "rays-", &s, "default", "samples=8", o.seconds, o.error, o.rays / o.seconds, "rays/s");
     o = lazily(&s, usable);
     row(csv, "lazy-", &s, "default", "usable", o.seconds, o.error, o.rays, "rays");
     o = lazily(&s, converged);
