@@ -45,7 +45,7 @@
    - ISOGI_API                  linkage of public functions, if extern does not suit
 
    Memory       Through isogi_context, or malloc. A pyramid takes about 2.2 bytes for every voxel: bounds of blocks, and all voxels in 8 bits of their block's
-                range.
+                range; and 22 KB.
                 A mesh keeps some 3/4 byte of scratch memory for every voxel until it is freed.
                 Stack use stays below 32 KB.
    Threads      A pyramid is const once built: any number of threads may read it. Building and meshing use the context's threads.
@@ -445,7 +445,7 @@ ISOGI_API void isogi_vol_mesh_free(const isogi_pyramid *pyramid, isogi_mesh *mes
 #if defined(ISOGI_VOL__SSE2) && defined(__x86_64__) && (defined(__clang__) || (defined(__GNUC__) && !defined(_WIN32))) && !defined(__TINYC__)
 #define ISOGI_VOL__AVX
 #define ISOGI_VOL__TARGET(features) __attribute__((target(features)))
-#define ISOGI_VOL__AVX512 ISOGI_VOL__TARGET("avx512f,avx512bw,avx512dq,avx512vl,avx512bitalg,avx512vbmi,avx512vbmi2,avx512vpopcntdq,gfni,fma")
+#define ISOGI_VOL__AVX512 ISOGI_VOL__TARGET("avx512f,avx512bw,avx512dq,avx512vl,avx512bitalg,avx512vbmi,avx512vbmi2,avx512vpopcntdq,gfni,fma,bmi,bmi2")
 #include <immintrin.h>
 #endif
 #if defined(__aarch64__) && defined(__ARM_NEON) && !defined(__ARM_BIG_ENDIAN) && !defined(ISOGI_NO_SIMD) && !defined(__TINYC__)
@@ -718,6 +718,7 @@ struct isogi_pyramid {
     isogi_vol__node_level node_level[ISOGI_VOL__NODE_LEVELS];
     int node_levels; /* the last one has a single node */
     double node_scale; /* 8-bit value = floor((value - range[0]) * node_scale) */
+    struct isogi_vol__ways *ways; /* for single rays by AVX-512, else NULL */
     int all_finite;
     int fast; /* 0: only the plain walk is right for this volume */
     int path; /* ISOGI_VOL__PATH_... */
@@ -1415,8 +1416,52 @@ static isogi_result isogi_vol__fill_nodes(isogi_vol__build_job *job, const isogi
     return ISOGI_OK;
 }
 
+/* What single rays look up, see walk_one. Which of 64 children a ray meets, as far as the order of two axes' planes says: bit 3(a-1) + b-1
+   stands for plane a of axis f before plane b of the next axis (x y, y z, z x). And as far as entry and exit say: bit 3f + a-1 stands for
+   plane a of axis f before it. */
+#define ISOGI_VOL__ORDERS 512
+struct isogi_vol__ways {
+    uint64_t before[3][ISOGI_VOL__ORDERS], entered[ISOGI_VOL__ORDERS], left[ISOGI_VOL__ORDERS];
+    uint8_t child[8][64], voxel[8][128]; /* children of nodes and voxels of leaves with axes counted backwards: bit a of the index */
+};
+
+static void isogi_vol__set_ways(struct isogi_vol__ways *ways) {
+    uint64_t below[3][4];
+    int i, f, a, b;
+    for (a = 1; a < 4; a++) {
+        below[0][a] = 0x1111111111111111u * (uint64_t)((1 << a) - 1), below[1][a] = 0x0001000100010001u * (uint64_t)((1 << 4 * a) - 1);
+        below[2][a] = ((uint64_t)1 << 16 * a) - 1;
+    }
+    for (i = 0; i < ISOGI_VOL__ORDERS; i++) {
+        ways->entered[i] = ways->left[i] = ~(uint64_t)0;
+        for (f = 0; f < 3; f++) {
+            const int g = (f + 1) % 3;
+            uint64_t met = ~(uint64_t)0;
+            for (a = 1; a < 4; a++) {
+                if (i >> (3 * f + a - 1) & 1) ways->entered[i] &= ~below[f][a];
+                else ways->left[i] &= below[f][a];
+                /* not on the near side of the plane that comes first and on the far side of the other */
+                for (b = 1; b < 4; b++) met &= i >> (3 * (a - 1) + b - 1) & 1 ? ~below[f][a] | below[g][b] : below[f][a] | ~below[g][b];
+            }
+            ways->before[f][i] = met;
+        }
+    }
+    memset(ways->voxel, 0, sizeof ways->voxel);
+    for (f = 0; f < 8; f++) {
+        const int x = f & 1, y = f >> 1 & 1, z = f >> 2;
+        for (i = 0; i < 64; i++) ways->child[f][i] = (uint8_t)(i ^ (3 * x | 12 * y | 48 * z));
+        for (i = 0; i < 125; i++)
+            ways->voxel[f][i] = (uint8_t)((x ? 4 - i % 5 : i % 5) + 5 * (y ? 4 - i / 5 % 5 : i / 5 % 5) + 25 * (z ? 4 - i / 25 : i / 25));
+    }
+}
+
 static isogi_result isogi_vol__reserve_nodes(isogi_pyramid *p) {
     p->node_count = isogi_vol__plan_node_levels(p);
+    if (p->path == ISOGI_VOL__PATH_AVX512 && !p->ways) {
+        p->ways = (struct isogi_vol__ways *)isogi_allocate(&p->context, 1, sizeof *p->ways);
+        if (!p->ways) return ISOGI_NO_MEMORY;
+        isogi_vol__set_ways(p->ways);
+    }
     p->nodes = (uint8_t(*)[128])isogi_allocate(&p->context, p->node_count, sizeof *p->nodes);
     return p->nodes ? ISOGI_OK : ISOGI_NO_MEMORY;
 }
@@ -1600,6 +1645,7 @@ ISOGI_API void isogi_vol_free(isogi_pyramid *pyramid) {
     isogi_release(&context, pyramid->blocks, pyramid->block_count, sizeof *pyramid->blocks);
     isogi_release(&context, pyramid->broken, pyramid->block_count, 1);
     isogi_release(&context, pyramid->nodes, pyramid->node_count, sizeof *pyramid->nodes);
+    isogi_release(&context, pyramid->ways, 1, sizeof *pyramid->ways);
     isogi_release(&context, pyramid, 1, sizeof *pyramid);
 }
 
@@ -3034,7 +3080,7 @@ ISOGI_VOL__INLINE uint64_t isogi_vol__leaf_mask(const uint8_t node[128], float l
 /* ==== AVX2 and AVX-512 =============================================================================================== */
 
 /* Chosen when a pyramid is built. AVX2 does the plain code's operations in the plain code's order, four at a time and without fused
-   multiply-adds, hence gives its bits; AVX-512 only compares bytes. */
+   multiply-adds, hence gives its bits. What AVX-512 adds stands in sections of its own. */
 #ifdef ISOGI_VOL__AVX
 static int isogi_vol__machine(void) {
     __builtin_cpu_init();
@@ -3057,11 +3103,6 @@ ISOGI_VOL__TARGET("avx2") ISOGI_VOL__INLINE uint64_t isogi_vol__node_mask_avx2(c
     return (uint64_t)(uint32_t)_mm256_movemask_epi8(in0) | (uint64_t)(uint32_t)_mm256_movemask_epi8(in1) << 32;
 }
 
-ISOGI_VOL__TARGET("avx512f,avx512bw") ISOGI_VOL__INLINE uint64_t isogi_vol__node_mask_avx512(const uint8_t node[128], int low, int high) {
-    __mmask64 in = _mm512_cmple_epu8_mask(_mm512_load_si512((const void *)node), _mm512_set1_epi8((char)high));
-    return _mm512_mask_cmpge_epu8_mask(in, _mm512_load_si512((const void *)(node + 64)), _mm512_set1_epi8((char)low));
-}
-
 ISOGI_VOL__TARGET("avx2") ISOGI_VOL__INLINE uint64_t isogi_vol__leaf_mask_avx2(const uint8_t node[128], float level, isogi_vol__leaf *leaf) {
     const __m256i *v = (const __m256i *)(const void *)node;
     __m256i inside, outside;
@@ -3072,20 +3113,6 @@ ISOGI_VOL__TARGET("avx2") ISOGI_VOL__INLINE uint64_t isogi_vol__leaf_mask_avx2(c
                                   ~(ISOGI_VOL__LEAST(0, outside) | ISOGI_VOL__LEAST(1, outside) << 32),
                                   ~(ISOGI_VOL__LEAST(2, outside) | ISOGI_VOL__LEAST(3, outside) << 32));
 #undef ISOGI_VOL__LEAST
-}
-
-ISOGI_VOL__TARGET("avx512f,avx512bw,bmi2") ISOGI_VOL__INLINE uint64_t isogi_vol__leaf_mask_avx512(const uint8_t node[128], float level, isogi_vol__leaf *leaf) {
-    const __m512i low = _mm512_load_si512((const void *)node), high = _mm512_load_si512((const void *)(node + 64));
-    const uint64_t low_rows = 0xf7bc0f7bde07bdefu, high_rows = 0x3def781eu; /* bits x + 5y + 25z of cells */
-    __m512i inside, outside;
-    uint64_t in_low, in_high, out_low, out_high;
-    isogi_vol__open_leaf(leaf, node, level);
-    inside = _mm512_set1_epi8((char)leaf->inside), outside = _mm512_set1_epi8((char)leaf->outside);
-    in_low = _mm512_cmpge_epu8_mask(low, inside), in_high = _mm512_cmpge_epu8_mask(high, inside);
-    out_low = _mm512_cmplt_epu8_mask(low, outside), out_high = _mm512_cmplt_epu8_mask(high, outside);
-    isogi_vol__all_corners(&in_low, &in_high);
-    isogi_vol__all_corners(&out_low, &out_high);
-    return isogi_vol__cut_cells(leaf, ~(_pext_u64(in_low | out_low, low_rows) | _pext_u64(in_high | out_high, high_rows) << 44));
 }
 
 ISOGI_VOL__TARGET("avx2") ISOGI_VOL__INLINE __m256d isogi_vol__lerp4(__m256d a, __m256d b, __m256d u, __m256d rest) {
@@ -3614,19 +3641,15 @@ typedef struct isogi_vol__stride {
 #define ISOGI_VOL__LEAF_BASE(node) isogi_vol__leaf_mask(node, s->k->level, &s->leaf)
 #define ISOGI_VOL__NODE_AVX2(node) isogi_vol__node_mask_avx2(node, s->k->low, s->k->high)
 #define ISOGI_VOL__LEAF_AVX2(node) isogi_vol__leaf_mask_avx2(node, s->k->level, &s->leaf)
-#define ISOGI_VOL__NODE_AVX512(node) isogi_vol__node_mask_avx512(node, s->k->low, s->k->high)
-#define ISOGI_VOL__LEAF_AVX512(node) isogi_vol__leaf_mask_avx512(node, s->k->level, &s->leaf)
 ISOGI_VOL__WALKS(_base, , ISOGI_VOL__NODE_BASE, ISOGI_VOL__LEAF_BASE, isogi_vol__mixed_cell)
 #ifdef ISOGI_VOL__AVX
 ISOGI_VOL__WALKS(_avx2, ISOGI_VOL__TARGET("avx2"), ISOGI_VOL__NODE_AVX2, ISOGI_VOL__LEAF_AVX2, isogi_vol__mixed_cell_avx2)
-ISOGI_VOL__WALKS(_avx512, ISOGI_VOL__TARGET("avx512f,avx512bw,bmi2"), ISOGI_VOL__NODE_AVX512, ISOGI_VOL__LEAF_AVX512, isogi_vol__mixed_cell_avx2)
 #endif
 
 static int isogi_vol__walk_fast(isogi_vol__walk *w, const isogi_vol__ticks *k, isogi_hit *hit) {
     if (k->low > k->high) return 0;
 #ifdef ISOGI_VOL__AVX
-    if (w->pyramid->path == ISOGI_VOL__PATH_AVX512) return isogi_vol__walk_fast_avx512(w, k, hit);
-    if (w->pyramid->path == ISOGI_VOL__PATH_AVX2) return isogi_vol__walk_fast_avx2(w, k, hit);
+    if (w->pyramid->path >= ISOGI_VOL__PATH_AVX2) return isogi_vol__walk_fast_avx2(w, k, hit);
 #endif
     return isogi_vol__walk_fast_base(w, k, hit);
 }
@@ -3854,6 +3877,7 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE void isogi_vol__answer(isogi_vol__turn *turn
     const __mmask8 some = _mm512_test_epi64_mask(marked, marked);
     const unsigned cells = (unsigned)(some & leaf);
     int n;
+#pragma GCC unroll 8
     for (n = 0; n < turn->levels; n++) _mm512_mask_store_epi64(s->mask[n] + i, _mm512_cmpeq_epi64_mask(level, _mm512_set1_epi64(n)), marked);
     _mm512_store_si512(&s->pending[i], _mm512_mask_or_epi64(_mm512_load_si512(&s->pending[i]), (__mmask8)(some & ~leaf), _mm512_load_si512(&s->pending[i]),
                                                             _mm512_sllv_epi64(_mm512_set1_epi64(1), level)));
@@ -3872,8 +3896,10 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE unsigned isogi_vol__choose(const isogi_vol__
     const __m512i n = _mm512_popcnt_epi64(_mm512_andnot_si512(pending, _mm512_sub_epi64(pending, one))), shift = _mm512_add_epi64(n, n);
     __m512i rest, child, x, y, z, address;
     int k;
+#pragma GCC unroll 8
     for (k = 1; k < turn->levels; k++) mask = _mm512_mask_load_epi64(mask, _mm512_cmpeq_epi64_mask(n, _mm512_set1_epi64(k)), s->mask[k] + i);
     rest = _mm512_and_si512(mask, _mm512_sub_epi64(mask, one));
+#pragma GCC unroll 8
     for (k = 1; k < turn->levels; k++) _mm512_mask_store_epi64(s->mask[k] + i, _mm512_mask_cmpeq_epi64_mask(some, n, _mm512_set1_epi64(k)), rest);
     child = _mm512_xor_si512(_mm512_popcnt_epi64(_mm512_andnot_si512(mask, _mm512_sub_epi64(mask, one))), _mm512_load_si512(&s->flip[i]));
     pending = _mm512_mask_and_epi64(pending, (__mmask8)(some & _mm512_testn_epi64_mask(rest, rest)), pending, _mm512_sub_epi64(pending, one));
@@ -3895,6 +3921,7 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE unsigned isogi_vol__choose(const isogi_vol__
     _mm512_mask_store_epi64(&s->cell[i], some, cell);
     _mm512_mask_store_epi64(&s->level[i], some, _mm512_sub_epi64(n, one));
     _mm512_store_si512(&s->address[i], _mm512_mask_mov_epi64(_mm512_load_si512(&s->address[i]), some, address)); /* whole, so that it can be read at once */
+#pragma GCC unroll 8
     for (k = 0; k < 8; k++) {
         const char *node = (const char *)(uintptr_t)s->address[i + k];
         _mm_prefetch(node, _MM_HINT_T0), _mm_prefetch(node + 64, _MM_HINT_T0);
@@ -3910,85 +3937,105 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE __m512i isogi_vol__slots8(const uint8_t *slo
 /* One lane of eight corners after the other, of x, then y, then z, at the begin and end of the way through the cell. */
 ISOGI_VOL__AVX512 ISOGI_VOL__INLINE __m256 isogi_vol__mix8(__m256 a, __m256 b, __m256 u) { return _mm256_fmadd_ps(u, _mm256_sub_ps(b, a), a); }
 
+/* Cells as x | y << 16 | z << 32, the times at which rays enter and leave them (rounded down to the axis, whose number they carry), and
+   where in the cell that is. */
+ISOGI_VOL__AVX512 ISOGI_VOL__INLINE void isogi_vol__way8(__m512i cell, const __m512d origin[3], const __m512d inverse[3], const __m512d dir[3], __m512i *begin, __m512i *end,
+                                                         __m256 from[3], __m256 to[3]) {
+    const __m256 zero = _mm256_setzero_ps(), one = _mm256_set1_ps(1);
+    __m512d local[3], t0, t1;
+    int a;
+#pragma GCC unroll 8
+    for (a = 0; a < 3; a++) {
+        const __m512d at = _mm512_cvtepi64_pd(_mm512_and_si512(_mm512_srli_epi64(cell, (unsigned)(16 * a)), _mm512_set1_epi64(0xffff)));
+        const __m512d next = _mm512_add_pd(at, _mm512_set1_pd(1));
+        const __mmask8 fall = _mm512_movepi64_mask(_mm512_castpd_si512(inverse[a]));
+        *begin = _mm512_max_epi64(*begin, isogi_vol__when(_mm512_mask_mov_pd(at, fall, next), origin[a], inverse[a], a));
+        *end = _mm512_min_epi64(*end, isogi_vol__when(_mm512_mask_mov_pd(next, fall, at), origin[a], inverse[a], a));
+        local[a] = _mm512_sub_pd(origin[a], at);
+    }
+    /* an axis alone is a denormal number, on which processors spend a hundred cycles */
+    t0 = _mm512_castsi512_pd(_mm512_andnot_si512(_mm512_set1_epi64(3), *begin)), t1 = _mm512_castsi512_pd(*end);
+#pragma GCC unroll 8
+    for (a = 0; a < 3; a++) {
+        from[a] = _mm256_min_ps(_mm256_max_ps(_mm512_cvtpd_ps(_mm512_fmadd_pd(t0, dir[a], local[a])), zero), one);
+        to[a] = _mm256_min_ps(_mm256_max_ps(_mm512_cvtpd_ps(_mm512_fmadd_pd(t1, dir[a], local[a])), zero), one);
+    }
+}
+
+/* What is certain of cells: that the ray is inside all along, or outside; that it is so where the way begins, and where it ends. */
+typedef struct isogi_vol__sides { __mmask8 in, out, in0, out0, in1, out1; } isogi_vol__sides;
+
+/* By the hull of Bernstein coefficients in float. code: the leaf's byte at the lowest corner, as an address; step: the isovalue. */
+ISOGI_VOL__AVX512 ISOGI_VOL__INLINE isogi_vol__sides isogi_vol__sides8(__m512i code, __mmask8 lanes, __m256 step, const __m256 from[3], const __m256 to[3]) {
+    const __m256i byte = _mm256_set1_epi32(255);
+    const __m256 low = _mm256_sub_ps(step, _mm256_set1_ps(ISOGI_VOL__DOUBT)), high = _mm256_add_ps(step, _mm256_set1_ps(ISOGI_VOL__DOUBT));
+    const __m256 third_low = _mm256_mul_ps(low, _mm256_set1_ps(3)), third_high = _mm256_mul_ps(high, _mm256_set1_ps(3));
+    __m256 x[2][4], f[2][2][2], sum1, sum2;
+    isogi_vol__sides sides;
+    int k, e;
+#pragma GCC unroll 8
+    for (k = 0; k < 4; k++) {
+        const __m256i pair = _mm512_mask_i64gather_epi32(_mm256_setzero_si256(), lanes, _mm512_add_epi64(code, _mm512_set1_epi64((k & 1) * 5 + (k >> 1) * 25)), (const int *)0, 1);
+        const __m256 a = _mm256_cvtepi32_ps(_mm256_and_si256(pair, byte)), b = _mm256_cvtepi32_ps(_mm256_and_si256(_mm256_srli_epi32(pair, 8), byte));
+        x[0][k] = isogi_vol__mix8(a, b, from[0]), x[1][k] = isogi_vol__mix8(a, b, to[0]);
+    }
+#pragma GCC unroll 8
+    for (e = 0; e < 2; e++) {
+        const __m256 near0 = isogi_vol__mix8(x[e][0], x[e][1], from[1]), near1 = isogi_vol__mix8(x[e][2], x[e][3], from[1]);
+        const __m256 far0 = isogi_vol__mix8(x[e][0], x[e][1], to[1]), far1 = isogi_vol__mix8(x[e][2], x[e][3], to[1]);
+        f[e][0][0] = isogi_vol__mix8(near0, near1, from[2]), f[e][0][1] = isogi_vol__mix8(near0, near1, to[2]);
+        f[e][1][0] = isogi_vol__mix8(far0, far1, from[2]), f[e][1][1] = isogi_vol__mix8(far0, far1, to[2]);
+    }
+    sum1 = _mm256_add_ps(f[1][0][0], _mm256_add_ps(f[0][1][0], f[0][0][1])), sum2 = _mm256_add_ps(f[0][1][1], _mm256_add_ps(f[1][0][1], f[1][1][0]));
+    sides.in0 = _mm256_cmp_ps_mask(f[0][0][0], high, _CMP_GT_OQ), sides.out0 = _mm256_cmp_ps_mask(f[0][0][0], low, _CMP_LT_OQ);
+    sides.in1 = _mm256_cmp_ps_mask(f[1][1][1], high, _CMP_GT_OQ), sides.out1 = _mm256_cmp_ps_mask(f[1][1][1], low, _CMP_LT_OQ);
+    sides.in = _mm256_mask_cmp_ps_mask((__mmask8)(sides.in0 & sides.in1), _mm256_min_ps(sum1, sum2), third_high, _CMP_GT_OQ);
+    sides.out = _mm256_mask_cmp_ps_mask((__mmask8)(sides.out0 & sides.out1), _mm256_max_ps(sum1, sum2), third_low, _CMP_LT_OQ);
+    return sides;
+}
+
+/* Cells of leaves by their children's numbers: their own numbers, given any cell of the leaf, and their lowest corners' bytes. */
+ISOGI_VOL__AVX512 ISOGI_VOL__INLINE __m512i isogi_vol__cells8(__m512i child, __m512i corner, __m512i *code) {
+    const __m512i three = _mm512_set1_epi64(3);
+    const __m512i dx = _mm512_and_si512(child, three), dy = _mm512_and_si512(_mm512_srli_epi64(child, 2), three), dz = _mm512_srli_epi64(child, 4);
+    *code = _mm512_add_epi64(_mm512_add_epi64(*code, dx), _mm512_add_epi64(_mm512_mul_epu32(dy, _mm512_set1_epi64(5)), _mm512_mul_epu32(dz, _mm512_set1_epi64(25))));
+    return _mm512_or_si512(_mm512_and_si512(corner, _mm512_set1_epi64(0xfffcfffcfffc)),
+                           _mm512_or_si512(dx, _mm512_or_si512(_mm512_slli_epi64(dy, 16), _mm512_slli_epi64(dz, 32))));
+}
+
 /* The next cells of up to eight rays, in float. Rays that are certainly on one side all along are done with theirs; the others are in
    doubt, and hits are among them. `any`: certain hits are reported at once instead; returns them. */
 ISOGI_VOL__AVX512 ISOGI_VOL__INLINE unsigned isogi_vol__look(isogi_vol__turn *turn, isogi_vol__pool *s, const uint8_t *slots, int count, int *again) {
     const __mmask8 lanes = (__mmask8)((1u << count) - 1);
     const __m512i slot = isogi_vol__slots8(slots);
-    const __m512i mask = _mm512_i64gather_epi64(slot, s->mask[0], 8), rest = _mm512_and_si512(mask, _mm512_sub_epi64(mask, _mm512_set1_epi64(1)));
-    const __m512i child = _mm512_xor_si512(_mm512_popcnt_epi64(_mm512_andnot_si512(mask, _mm512_sub_epi64(mask, _mm512_set1_epi64(1)))), _mm512_i64gather_epi64(slot, s->flip, 8));
-    const __m512i three = _mm512_set1_epi64(3), corner = _mm512_and_si512(_mm512_i64gather_epi64(slot, s->cell, 8), _mm512_set1_epi64(0xffffffffffff)), side = _mm512_i64gather_epi64(slot, s->side, 8);
-    __m512i cell = _mm512_andnot_si512(_mm512_set1_epi64(0x000300030003), corner), code = _mm512_i64gather_epi64(slot, s->address, 8);
-    const __m512i dx = _mm512_and_si512(child, three), dy = _mm512_and_si512(_mm512_srli_epi64(child, 2), three), dz = _mm512_srli_epi64(child, 4);
+    const __m512i mask = _mm512_i64gather_epi64(slot, s->mask[0], 8), below = _mm512_sub_epi64(mask, _mm512_set1_epi64(1)), rest = _mm512_and_si512(mask, below);
+    const __m512i child = _mm512_xor_si512(_mm512_popcnt_epi64(_mm512_andnot_si512(mask, below)), _mm512_i64gather_epi64(slot, s->flip, 8));
+    const __m512i side = _mm512_i64gather_epi64(slot, s->side, 8);
+    __m512i code = _mm512_i64gather_epi64(slot, s->address, 8), cell = isogi_vol__cells8(child, _mm512_i64gather_epi64(slot, s->cell, 8), &code);
     __m512i begin = _mm512_set1_epi64(3), end = _mm512_i64gather_epi64(slot, s->end, 8);
-    const __m256 step = _mm512_cvtpd_ps(_mm512_i64gather_pd(slot, s->step, 8));
+    __m512d origin[3], inverse[3], dir[3];
     __m256 from[3], to[3];
-    __mmask8 in, out, sure, hit = 0;
-    cell = _mm512_or_si512(cell, _mm512_or_si512(dx, _mm512_or_si512(_mm512_slli_epi64(dy, 16), _mm512_slli_epi64(dz, 32))));
-    code = _mm512_add_epi64(_mm512_add_epi64(code, dx), _mm512_add_epi64(_mm512_mul_epu32(dy, _mm512_set1_epi64(5)), _mm512_mul_epu32(dz, _mm512_set1_epi64(25))));
+    isogi_vol__sides sides;
+    __mmask8 sure, hit = 0;
+    int a;
     _mm512_mask_i64scatter_epi64(s->mask[0], lanes, slot, rest, 8);
-    {
-        __m512d local[3], dir[3];
-#define ISOGI_VOL__AXIS(a)                                                                                                              \
-    {                                                                                                                                   \
-        const __m512d at = _mm512_cvtepi64_pd(_mm512_and_si512(_mm512_srli_epi64(cell, 16 * a), _mm512_set1_epi64(0xffff)));             \
-        const __m512d origin = _mm512_i64gather_pd(slot, s->origin[a], 8), inverse = _mm512_i64gather_pd(slot, s->inverse[a], 8);        \
-        const __m512d next = _mm512_add_pd(at, _mm512_set1_pd(1));                                                                      \
-        const __mmask8 fall = _mm512_movepi64_mask(_mm512_castpd_si512(inverse));                                                       \
-        begin = _mm512_max_epi64(begin, isogi_vol__when(_mm512_mask_mov_pd(at, fall, next), origin, inverse, a));                        \
-        end = _mm512_min_epi64(end, isogi_vol__when(_mm512_mask_mov_pd(next, fall, at), origin, inverse, a));                            \
-        local[a] = _mm512_sub_pd(origin, at), dir[a] = _mm512_i64gather_pd(slot, s->dir[a], 8);                                          \
+#pragma GCC unroll 8
+    for (a = 0; a < 3; a++)
+        origin[a] = _mm512_i64gather_pd(slot, s->origin[a], 8), inverse[a] = _mm512_i64gather_pd(slot, s->inverse[a], 8), dir[a] = _mm512_i64gather_pd(slot, s->dir[a], 8);
+    isogi_vol__way8(cell, origin, inverse, dir, &begin, &end, from, to);
+    sides = isogi_vol__sides8(code, lanes, _mm512_cvtpd_ps(_mm512_i64gather_pd(slot, s->step, 8)), from, to);
+    sides.in = (__mmask8)(sides.in & _mm512_test_epi64_mask(_mm512_set1_epi64(1), side));                  /* 1 or -1 */
+    sides.out = (__mmask8)(sides.out & _mm512_testn_epi64_mask(_mm512_add_epi64(side, _mm512_set1_epi64(1)), _mm512_set1_epi64(~1))); /* 0 or -1 */
+    sure = (__mmask8)((sides.in | sides.out) & lanes);
+    if (turn->any) {
+        const __mmask8 unknown = _mm512_cmpeq_epi64_mask(side, _mm512_set1_epi64(-1)), was_in = _mm512_cmpeq_epi64_mask(side, _mm512_set1_epi64(1));
+        const __mmask8 was_out = _mm512_testn_epi64_mask(side, side);
+        hit = (__mmask8)(lanes & ((sides.out1 & (was_in | (unknown & sides.in0))) | (sides.in1 & (was_out | (unknown & sides.out0)))));
+        sure = (__mmask8)(sure & ~hit);
     }
-        ISOGI_VOL__AXIS(0)
-        ISOGI_VOL__AXIS(1)
-        ISOGI_VOL__AXIS(2)
-#undef ISOGI_VOL__AXIS
-        {
-            /* an axis alone is a denormal number, on which processors spend a hundred cycles */
-            const __m512d t0 = _mm512_castsi512_pd(_mm512_andnot_si512(three, begin)), t1 = _mm512_castsi512_pd(end);
-            const __m256 zero = _mm256_setzero_ps(), one = _mm256_set1_ps(1);
-            int a;
-            for (a = 0; a < 3; a++) {
-                from[a] = _mm256_min_ps(_mm256_max_ps(_mm512_cvtpd_ps(_mm512_fmadd_pd(t0, dir[a], local[a])), zero), one);
-                to[a] = _mm256_min_ps(_mm256_max_ps(_mm512_cvtpd_ps(_mm512_fmadd_pd(t1, dir[a], local[a])), zero), one);
-            }
-        }
-    }
+    _mm512_mask_i64scatter_epi64(s->side, sure, slot, _mm512_maskz_mov_epi64(sides.in, _mm512_set1_epi64(1)), 8);
     {
-        const __m256i byte = _mm256_set1_epi32(255);
-        __m256 x[2][4], f[2][2][2], near0, near1, far0, far1, sum1, sum2, ends_low, ends_high, low, high, third_low, third_high;
-        int k, e;
-        for (k = 0; k < 4; k++) {
-            const __m256i pair = _mm512_mask_i64gather_epi32(_mm256_setzero_si256(), lanes, _mm512_add_epi64(code, _mm512_set1_epi64((k & 1) * 5 + (k >> 1) * 25)), (const int *)0, 1);
-            const __m256 a = _mm256_cvtepi32_ps(_mm256_and_si256(pair, byte)), b = _mm256_cvtepi32_ps(_mm256_and_si256(_mm256_srli_epi32(pair, 8), byte));
-            x[0][k] = isogi_vol__mix8(a, b, from[0]), x[1][k] = isogi_vol__mix8(a, b, to[0]);
-        }
-        for (e = 0; e < 2; e++) {
-            near0 = isogi_vol__mix8(x[e][0], x[e][1], from[1]), near1 = isogi_vol__mix8(x[e][2], x[e][3], from[1]);
-            far0 = isogi_vol__mix8(x[e][0], x[e][1], to[1]), far1 = isogi_vol__mix8(x[e][2], x[e][3], to[1]);
-            f[e][0][0] = isogi_vol__mix8(near0, near1, from[2]), f[e][0][1] = isogi_vol__mix8(near0, near1, to[2]);
-            f[e][1][0] = isogi_vol__mix8(far0, far1, from[2]), f[e][1][1] = isogi_vol__mix8(far0, far1, to[2]);
-        }
-        sum1 = _mm256_add_ps(f[1][0][0], _mm256_add_ps(f[0][1][0], f[0][0][1])), sum2 = _mm256_add_ps(f[0][1][1], _mm256_add_ps(f[1][0][1], f[1][1][0]));
-        ends_low = _mm256_min_ps(f[0][0][0], f[1][1][1]), ends_high = _mm256_max_ps(f[0][0][0], f[1][1][1]);
-        low = _mm256_sub_ps(step, _mm256_set1_ps(ISOGI_VOL__DOUBT)), high = _mm256_add_ps(step, _mm256_set1_ps(ISOGI_VOL__DOUBT));
-        third_low = _mm256_mul_ps(low, _mm256_set1_ps(3)), third_high = _mm256_mul_ps(high, _mm256_set1_ps(3));
-        in = (__mmask8)(_mm256_cmp_ps_mask(ends_low, high, _CMP_GT_OQ) & _mm256_cmp_ps_mask(_mm256_min_ps(sum1, sum2), third_high, _CMP_GT_OQ));
-        out = (__mmask8)(_mm256_cmp_ps_mask(ends_high, low, _CMP_LT_OQ) & _mm256_cmp_ps_mask(_mm256_max_ps(sum1, sum2), third_low, _CMP_LT_OQ));
-        in = (__mmask8)(in & _mm512_test_epi64_mask(_mm512_set1_epi64(1), side));                  /* 1 or -1 */
-        out = (__mmask8)(out & _mm512_testn_epi64_mask(_mm512_add_epi64(side, _mm512_set1_epi64(1)), _mm512_set1_epi64(~1))); /* 0 or -1 */
-        sure = (__mmask8)((in | out) & lanes);
-        if (turn->any) {
-            const __mmask8 in0 = _mm256_cmp_ps_mask(f[0][0][0], high, _CMP_GT_OQ), out0 = _mm256_cmp_ps_mask(f[0][0][0], low, _CMP_LT_OQ);
-            const __mmask8 in1 = _mm256_cmp_ps_mask(f[1][1][1], high, _CMP_GT_OQ), out1 = _mm256_cmp_ps_mask(f[1][1][1], low, _CMP_LT_OQ);
-            const __mmask8 unknown = _mm512_cmpeq_epi64_mask(side, _mm512_set1_epi64(-1)), was_in = _mm512_cmpeq_epi64_mask(side, _mm512_set1_epi64(1));
-            const __mmask8 was_out = _mm512_testn_epi64_mask(side, side);
-            hit = (__mmask8)(lanes & ((out1 & (was_in | (unknown & in0))) | (in1 & (was_out | (unknown & out0)))));
-            sure = (__mmask8)(sure & ~hit);
-        }
-        _mm512_mask_i64scatter_epi64(s->side, sure, slot, _mm512_maskz_mov_epi64(in, _mm512_set1_epi64(1)), 8);
-    }
-    {
+        const __m512i three = _mm512_set1_epi64(3);
         const __mmask8 more = _mm512_test_epi64_mask(rest, rest), doubt = (__mmask8)(lanes & ~sure & ~hit);
         const __m128i list = _mm_loadl_epi64((const __m128i *)(const void *)slots);
         __m512i bit = _mm512_sllv_epi64(_mm512_set1_epi64(1), slot);
@@ -4097,12 +4144,14 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE void isogi_vol__corners8(const isogi_pyramid
         const __m512d scale = _mm512_set1_pd(v->scale), bias = _mm512_set1_pd(v->bias);
         __m512i at = _mm512_add_epi64(_mm512_slli_epi64(x, 2), _mm512_set1_epi64((int64_t)(intptr_t)v->data));
         at = _mm512_add_epi64(at, _mm512_add_epi64(_mm512_mullo_epi64(y, _mm512_set1_epi64(v->stride[1])), _mm512_mullo_epi64(z, _mm512_set1_epi64(v->stride[2]))));
+#pragma GCC unroll 8
         for (k = 0; k < 4; k++) {
             const __m512i offset = _mm512_set1_epi64((k & 1 ? v->stride[1] : 0) + (k & 2 ? v->stride[2] : 0));
             const __m512i pair = _mm512_mask_i64gather_epi64(_mm512_setzero_si512(), lanes, _mm512_add_epi64(at, offset), (const void *)0, 1);
             c[2 * k] = _mm512_cvtps_pd(_mm256_castsi256_ps(_mm512_cvtepi64_epi32(pair)));
             c[2 * k + 1] = _mm512_cvtps_pd(_mm256_castsi256_ps(_mm512_cvtepi64_epi32(_mm512_srli_epi64(pair, 32))));
         }
+#pragma GCC unroll 8
         for (k = 0; k < 8; k++) c[k] = ISOGI_VOL__SUB(ISOGI_VOL__ADD(ISOGI_VOL__MUL(c[k], scale), bias), isovalue);
     } else {
         __attribute__((aligned(64))) double corner[8][8];
@@ -4116,8 +4165,10 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE void isogi_vol__corners8(const isogi_pyramid
             if (!(lanes >> i & 1)) continue;
             xyz[0] = (int)(at[i] & 0xffff), xyz[1] = (int)(at[i] >> 16 & 0xffff), xyz[2] = (int)(at[i] >> 32 & 0xffff);
             isogi_vol__corners(p, xyz, 0, one);
+#pragma GCC unroll 8
             for (k = 0; k < 8; k++) corner[k][i] = one[k];
         }
+#pragma GCC unroll 8
         for (k = 0; k < 8; k++) c[k] = ISOGI_VOL__SUB(_mm512_load_pd(corner[k]), isovalue);
     }
 }
@@ -4137,6 +4188,7 @@ ISOGI_VOL__AVX512 static unsigned isogi_vol__decide8(isogi_vol__batch *b, isogi_
         __m512d origin[3], dir[3], at[3];
         __mmask8 fall[3];
         int a;
+#pragma GCC unroll 8
         for (a = 0; a < 3; a++) {
             const __mmask8 enters = _mm512_cmpeq_epi64_mask(in, _mm512_set1_epi64(a)), leaves = _mm512_cmpeq_epi64_mask(out, _mm512_set1_epi64(a));
             const __m512d inverse = _mm512_i64gather_pd(slot, s->inverse[a], 8);
@@ -4147,6 +4199,7 @@ ISOGI_VOL__AVX512 static unsigned isogi_vol__decide8(isogi_vol__batch *b, isogi_
             end = _mm512_mask_mul_pd(end, leaves, _mm512_sub_pd(_mm512_mask_add_pd(at[a], (__mmask8)~fall[a], at[a], one), origin[a]), inverse);
         }
         begin = _mm512_max_pd(begin, zero), end = _mm512_max_pd(_mm512_min_pd(end, stop), begin);
+#pragma GCC unroll 8
         for (a = 0; a < 3; a++) {
             const __mmask8 enters = _mm512_cmpeq_epi64_mask(in, _mm512_set1_epi64(a)), leaves = _mm512_cmpeq_epi64_mask(out, _mm512_set1_epi64(a));
             from[a] = ISOGI_VOL__SUB(ISOGI_VOL__ADD(origin[a], ISOGI_VOL__MUL(begin, dir[a])), at[a]);
@@ -4162,13 +4215,16 @@ ISOGI_VOL__AVX512 static unsigned isogi_vol__decide8(isogi_vol__batch *b, isogi_
         __m512d x[2][4], f[2][2][2]; /* [x][y][z] taken at its end */
         int k;
         low = high = 0xff;
+#pragma GCC unroll 8
         for (k = 0; k < 8; k++) {
             const __mmask8 least = _mm512_cmp_pd_mask(c[k], zero, _CMP_GE_OQ);
             high &= least, low = (__mmask8)(low & ~least);
         }
         odd = (__mmask8)(odd | high | low);
+#pragma GCC unroll 8
         for (k = 0; k < 4; k++)
             x[0][k] = isogi_vol__lerp8(c[2 * k], c[2 * k + 1], from[0], rest0[0]), x[1][k] = isogi_vol__lerp8(c[2 * k], c[2 * k + 1], to[0], rest1[0]);
+#pragma GCC unroll 8
         for (k = 0; k < 2; k++) {
             const __m512d near0 = isogi_vol__lerp8(x[k][0], x[k][1], from[1], rest0[1]), near1 = isogi_vol__lerp8(x[k][2], x[k][3], from[1], rest0[1]);
             const __m512d far0 = isogi_vol__lerp8(x[k][0], x[k][1], to[1], rest1[1]), far1 = isogi_vol__lerp8(x[k][2], x[k][3], to[1], rest1[1]);
@@ -4178,6 +4234,7 @@ ISOGI_VOL__AVX512 static unsigned isogi_vol__decide8(isogi_vol__batch *b, isogi_
         bezier[0] = f[0][0][0], bezier[3] = f[1][1][1];
         bezier[1] = ISOGI_VOL__MUL(ISOGI_VOL__ADD(ISOGI_VOL__ADD(f[1][0][0], f[0][1][0]), f[0][0][1]), third);
         bezier[2] = ISOGI_VOL__MUL(ISOGI_VOL__ADD(ISOGI_VOL__ADD(f[0][1][1], f[1][0][1]), f[1][1][0]), third);
+#pragma GCC unroll 8
         for (k = 1, b_low = b_high = 0; k < 3; k++) {
             const __mmask8 least = _mm512_cmp_pd_mask(bezier[k], zero, _CMP_GE_OQ);
             if (k == 1) b_low = least;
@@ -4223,6 +4280,136 @@ ISOGI_VOL__AVX512 static unsigned isogi_vol__decide8(isogi_vol__batch *b, isogi_
     return cross;
 }
 
+/* Sets up to eight rays up at once and puts them into slots: the operations of begin and aim, in their order and without contraction.
+   Returns the rays that have a slot now; *odd: those that are left to the code for one. The others miss the box. */
+ISOGI_VOL__AVX512 static unsigned isogi_vol__seat8(isogi_vol__batch *b, isogi_vol__pool *s, size_t first, int count, const uint8_t *slots, unsigned *odd) {
+    const isogi_pyramid *p = b->pyramid;
+    const __mmask8 lanes = (__mmask8)((1u << count) - 1);
+    const __m512i lane = _mm512_set_epi64(7, 6, 5, 4, 3, 2, 1, 0), slot = isogi_vol__slots8(slots), none = _mm512_setzero_si512();
+    const size_t element = b->rays ? sizeof *b->rays : sizeof *b->starts, dir_bytes = b->bundle || !b->rays ? sizeof *b->dirs : sizeof *b->rays;
+    const char *from = b->rays ? (const char *)(b->rays + (b->bundle ? 0 : first)) : (const char *)(b->starts + (b->bundle ? 0 : first));
+    const char *to = b->bundle || !b->rays ? (const char *)b->dirs[first] : (const char *)b->rays[first].dir;
+    const __m512i at = b->bundle ? none : _mm512_mullo_epi64(lane, _mm512_set1_epi64((int64_t)element)), dir_at = _mm512_mullo_epi64(lane, _mm512_set1_epi64((int64_t)dir_bytes));
+    const __m512d zero = _mm512_setzero_pd(), unlimited = _mm512_set1_pd(ISOGI_VOL__UNLIMITED), finite = _mm512_set1_pd(DBL_MAX);
+    __m512d origin[3], d[3], inverse[3], tmin, tmax, isovalue, enter, leave, stop, q;
+    __m512i axis = _mm512_set1_epi64(-1), flip = none;
+    __mmask8 good = lanes, meets, rising[3], still[3];
+    int a;
+#define ISOGI_VOL__TAKE(member) _mm512_mask_i64gather_pd(zero, lanes, at, from + (member), 1)
+    if (b->rays) {
+        __m512d relative[3];
+#pragma GCC unroll 8
+        for (a = 0; a < 3; a++) {
+            origin[a] = ISOGI_VOL__TAKE(offsetof(isogi_ray, origin) + 8 * (size_t)a);
+            good = _mm512_mask_cmp_pd_mask(good, _mm512_abs_pd(origin[a]), finite, _CMP_LE_OQ);
+            relative[a] = ISOGI_VOL__SUB(origin[a], _mm512_set1_pd(p->origin[a]));
+        }
+#pragma GCC unroll 8
+        for (a = 0; a < 3; a++)
+            origin[a] = ISOGI_VOL__ADD(ISOGI_VOL__ADD(ISOGI_VOL__MUL(_mm512_set1_pd(p->to_grid[3 * a]), relative[0]), ISOGI_VOL__MUL(_mm512_set1_pd(p->to_grid[3 * a + 1]), relative[1])),
+                                       ISOGI_VOL__MUL(_mm512_set1_pd(p->to_grid[3 * a + 2]), relative[2]));
+#pragma GCC unroll 8
+        for (a = 0; a < 3; a++) good = _mm512_mask_cmp_pd_mask(good, _mm512_abs_pd(origin[a]), finite, _CMP_LE_OQ);
+        tmin = ISOGI_VOL__TAKE(offsetof(isogi_ray, tmin)), tmax = ISOGI_VOL__TAKE(offsetof(isogi_ray, tmax)), isovalue = ISOGI_VOL__TAKE(offsetof(isogi_ray, isovalue));
+        good = _mm256_mask_testn_epi32_mask(good, _mm512_mask_i64gather_epi32(_mm256_setzero_si256(), lanes, at, from + offsetof(isogi_ray, flags), 1), _mm256_set1_epi32(-1));
+    } else {
+        const __m256i side = _mm256_abs_epi32(_mm512_mask_i64gather_epi32(_mm256_setzero_si256(), lanes, at, from + offsetof(isogi_hit, side), 1));
+        good = b->flags ? 0 : _mm256_mask_cmpneq_epi32_mask(good, side, _mm256_set1_epi32(2));
+#pragma GCC unroll 8
+        for (a = 0; a < 3; a++) {
+            const __m256i cell = _mm512_mask_i64gather_epi32(_mm256_setzero_si256(), lanes, at, from + offsetof(isogi_hit, cell) + 4 * (size_t)a, 1);
+            const __m512d local = ISOGI_VOL__TAKE(offsetof(isogi_hit, local) + 8 * (size_t)a);
+            good = _mm256_mask_cmplt_epu32_mask(good, cell, _mm256_set1_epi32(p->cells[a]));
+            good = _mm512_mask_cmp_pd_mask(good, _mm512_abs_pd(local), finite, _CMP_LE_OQ);
+            origin[a] = ISOGI_VOL__ADD(_mm512_cvtepu32_pd(cell), _mm512_min_pd(_mm512_max_pd(local, zero), _mm512_set1_pd(1)));
+        }
+        isovalue = _mm512_set1_pd(b->isovalue), tmin = tmax = zero;
+        if (b->tmax)
+            tmax = _mm512_mask_i64gather_pd(zero, lanes, b->bundle ? none : _mm512_slli_epi64(lane, 3), b->tmax + (b->bundle ? 0 : first), 1);
+    }
+#undef ISOGI_VOL__TAKE
+    good = _mm512_mask_cmp_pd_mask(_mm512_mask_cmp_pd_mask(good, tmax, tmax, _CMP_ORD_Q), tmin, tmin, _CMP_ORD_Q);
+    tmax = _mm512_min_pd(_mm512_mask_mov_pd(tmax, _mm512_cmp_pd_mask(tmax, zero, _CMP_EQ_OQ), unlimited), unlimited);
+    good = _mm512_mask_cmp_pd_mask(good, tmin, tmax, _CMP_LE_OQ);
+    tmin = _mm512_max_pd(tmin, ISOGI_VOL__SUB(zero, unlimited));
+    good = _mm512_mask_cmp_pd_mask(_mm512_mask_cmp_pd_mask(good, isovalue, _mm512_set1_pd(p->range[0]), _CMP_GE_OQ), isovalue, _mm512_set1_pd(p->range[1]), _CMP_LE_OQ);
+    {
+        __m512d world[3], most;
+#pragma GCC unroll 8
+        for (a = 0; a < 3; a++) {
+            world[a] = _mm512_cvtps_pd(_mm512_mask_i64gather_ps(_mm256_setzero_ps(), lanes, dir_at, to + 4 * a, 1));
+            good = _mm512_mask_cmp_pd_mask(good, _mm512_abs_pd(world[a]), finite, _CMP_LE_OQ);
+        }
+#pragma GCC unroll 8
+        for (a = 0; a < 3; a++) {
+            d[a] = ISOGI_VOL__ADD(ISOGI_VOL__ADD(ISOGI_VOL__MUL(_mm512_set1_pd(p->to_grid[3 * a]), world[0]), ISOGI_VOL__MUL(_mm512_set1_pd(p->to_grid[3 * a + 1]), world[1])),
+                                  ISOGI_VOL__MUL(_mm512_set1_pd(p->to_grid[3 * a + 2]), world[2]));
+            good = _mm512_mask_cmp_pd_mask(good, _mm512_abs_pd(d[a]), finite, _CMP_LE_OQ);
+        }
+        most = _mm512_max_pd(_mm512_max_pd(_mm512_abs_pd(d[0]), _mm512_abs_pd(d[1])), _mm512_abs_pd(d[2]));
+        good = _mm512_mask_cmp_pd_mask(good, most, zero, _CMP_GT_OQ);
+        most = ISOGI_VOL__MUL(_mm512_set1_pd(1e-30), most);
+#pragma GCC unroll 8
+        for (a = 0; a < 3; a++) {
+            const __mmask8 keep = _mm512_cmp_pd_mask(_mm512_abs_pd(d[a]), most, _CMP_GT_OQ);
+            d[a] = _mm512_maskz_mov_pd(keep, d[a]), inverse[a] = _mm512_maskz_div_pd(keep, _mm512_set1_pd(1), d[a]);
+            still[a] = (__mmask8)~keep, rising[a] = _mm512_cmp_pd_mask(d[a], zero, _CMP_GT_OQ);
+        }
+    }
+    /* the box */
+    meets = 0xff, enter = _mm512_sub_pd(zero, unlimited), leave = unlimited;
+#pragma GCC unroll 8
+    for (a = 0; a < 3; a++) {
+        const __m512d box = _mm512_set1_pd(p->box[a]);
+        const __m512d t0 = ISOGI_VOL__MUL(ISOGI_VOL__SUB(_mm512_mask_mov_pd(box, rising[a], zero), origin[a]), inverse[a]);
+        const __m512d t1 = ISOGI_VOL__MUL(ISOGI_VOL__SUB(_mm512_maskz_mov_pd(rising[a], box), origin[a]), inverse[a]);
+        const __mmask8 within = _mm512_mask_cmp_pd_mask(_mm512_cmp_pd_mask(origin[a], zero, _CMP_GE_OQ), origin[a], box, _CMP_LE_OQ);
+        const __mmask8 later = _mm512_mask_cmp_pd_mask((__mmask8)~still[a], t0, enter, _CMP_GT_OQ);
+        meets = (__mmask8)(meets & (~still[a] | within));
+        enter = _mm512_mask_mov_pd(enter, later, t0), axis = _mm512_mask_set1_epi64(axis, later, a);
+        leave = _mm512_mask_min_pd(leave, (__mmask8)~still[a], leave, t1);
+    }
+    axis = _mm512_mask_set1_epi64(axis, (__mmask8)~_mm512_cmp_pd_mask(enter, tmin, _CMP_GT_OQ), -1);
+    enter = _mm512_max_pd(enter, tmin);
+    meets = _mm512_mask_cmp_pd_mask(meets, enter, _mm512_min_pd(tmax, leave), _CMP_LE_OQ);
+    stop = unlimited;
+#pragma GCC unroll 8
+    for (a = 0; a < 3; a++) {
+        const __m512d box = _mm512_set1_pd(p->box[a]);
+        origin[a] = _mm512_min_pd(_mm512_max_pd(ISOGI_VOL__ADD(origin[a], ISOGI_VOL__MUL(enter, d[a])), zero), box);
+        stop = _mm512_mask_min_pd(stop, (__mmask8)~still[a], stop, ISOGI_VOL__MUL(ISOGI_VOL__SUB(_mm512_maskz_mov_pd(rising[a], box), origin[a]), inverse[a]));
+    }
+    stop = _mm512_min_pd(stop, ISOGI_VOL__SUB(tmax, enter));
+    good = (__mmask8)(good & (~meets | _mm512_mask_cmp_pd_mask(_mm512_cmp_pd_mask(stop, _mm512_set1_pd(1e-150), _CMP_GT_OQ), stop, _mm512_set1_pd(1e150), _CMP_LT_OQ)));
+    meets = (__mmask8)(meets & good);
+#define ISOGI_VOL__PUT(member, value) _mm512_mask_i64scatter_epi64(s->member, meets, slot, value, 8)
+#define ISOGI_VOL__PUT_REAL(member, value) ISOGI_VOL__PUT(member, _mm512_castpd_si512(value))
+#pragma GCC unroll 8
+    for (a = 0; a < 3; a++) {
+        /* a ray that stands still on an axis keeps below the volume's upper border */
+        const __mmask8 upper = _mm512_mask_cmp_pd_mask(still[a], origin[a], _mm512_set1_pd(p->box[a]), _CMP_GE_OQ), fall = (__mmask8)(upper | ~(still[a] | rising[a]));
+        inverse[a] = _mm512_mask_mov_pd(_mm512_mask_mov_pd(inverse[a], still[a], _mm512_set1_pd(1e200)), upper, _mm512_set1_pd(-1e200));
+        flip = _mm512_mask_or_epi64(flip, fall, flip, _mm512_set1_epi64(3 << 2 * a));
+        ISOGI_VOL__PUT_REAL(origin[a], origin[a]), ISOGI_VOL__PUT_REAL(dir[a], d[a]), ISOGI_VOL__PUT_REAL(inverse[a], inverse[a]);
+    }
+    q = ISOGI_VOL__MUL(ISOGI_VOL__SUB(isovalue, _mm512_set1_pd(p->range[0])), _mm512_set1_pd(p->node_scale)); /* as quantise_isovalue has it */
+    ISOGI_VOL__PUT_REAL(level_units, _mm512_cvtps_pd(_mm512_cvtpd_ps(q)));
+    ISOGI_VOL__PUT(low, _mm512_cvttpd_epi64(_mm512_max_pd(ISOGI_VOL__SUB(q, _mm512_set1_pd(0.01)), zero)));
+    ISOGI_VOL__PUT(beyond, _mm512_add_epi64(_mm512_min_epi64(_mm512_cvttpd_epi64(ISOGI_VOL__ADD(q, _mm512_set1_pd(0.01))), _mm512_set1_epi64(253)), _mm512_set1_epi64(1)));
+    ISOGI_VOL__PUT(end, _mm512_or_si512(_mm512_castpd_si512(stop), _mm512_set1_epi64(3)));
+    ISOGI_VOL__PUT(flip, flip), ISOGI_VOL__PUT(pending, none), ISOGI_VOL__PUT(cell, none);
+    ISOGI_VOL__PUT(level, _mm512_set1_epi64(p->node_levels - 1));
+    ISOGI_VOL__PUT(address, _mm512_set1_epi64((int64_t)(uintptr_t)p->nodes[p->node_level[p->node_levels - 1].first]));
+    ISOGI_VOL__PUT(side, _mm512_set1_epi64(b->rays ? -1 : -2)), ISOGI_VOL__PUT(entry_axis, b->rays ? axis : _mm512_set1_epi64(-1));
+    ISOGI_VOL__PUT_REAL(base, enter), ISOGI_VOL__PUT_REAL(stop, stop), ISOGI_VOL__PUT_REAL(isovalue, isovalue), ISOGI_VOL__PUT(deflated, none);
+    ISOGI_VOL__PUT(ray, _mm512_add_epi64(_mm512_set1_epi64((int64_t)first), lane));
+#undef ISOGI_VOL__PUT
+#undef ISOGI_VOL__PUT_REAL
+    *odd = (unsigned)(lanes & ~good);
+    b->work.rays += (uint64_t)__builtin_popcount((unsigned)(lanes & good));
+    return meets;
+}
+
 /* Sends for the voxels of a cell in doubt. */
 ISOGI_VOL__INLINE void isogi_vol__send_for(const isogi_volume *v, int64_t cell) {
     const char *p = (const char *)v->data + (ptrdiff_t)(cell & 0xffff) * v->stride[0] + (ptrdiff_t)(cell >> 16 & 0xffff) * v->stride[1] +
@@ -4240,6 +4427,218 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE void isogi_vol__open_turn(isogi_vol__turn *t
         first[n] = p->node_level[n - 1].first, parents0[n] = p->node_level[n - 1].parents[0], parents1[n] = p->node_level[n - 1].parents[1];
     turn->p = p, turn->levels = p->node_levels;
     turn->first = _mm512_load_si512(first), turn->parents0 = _mm512_load_si512(parents0), turn->parents1 = _mm512_load_si512(parents1);
+}
+
+/* ---- one ray alone ---- */
+
+/* A ray alone has nothing to do while it waits, so what counts are waits and branches that are foretold wrongly. The way through a
+   node's children is not walked but looked up: the planes between them are met in an order that 27 comparisons tell, nine for every
+   two axes, all at once, and where the ray enters and leaves the node cuts the way at its ends. Times are integers as in the walk
+   above, exact sums, hence the same on all levels. All cells of a leaf are looked at together, in float. */
+typedef struct __attribute__((aligned(64))) isogi_vol__course {
+    int64_t pair[3][8];      /* plane a of an axis less plane b of the next, for units of a cell, a = 1 1 1 2 2 2 3 3, b = 1 2 3 1 2 3 1 2 */
+    int64_t plane[8];        /* planes 1 2 3 of x and y, 1 2 of z */
+    int64_t last_pair[3];    /* a = b = 3 */
+    int64_t at[3], per[3], end; /* plane k of axis a, counted from the border that rays enter by, is met at at + k per */
+    double origin[3], inverse[3], dir[3], stop; /* as in a pool */
+    int64_t backwards;       /* cell = cell counted backwards ^ this, packed as in a pool */
+    int flip, octant;        /* children; axes */
+    int low, high;           /* what the isovalue can be in 8 bits */
+    float level;             /* and unrounded */
+    int entry_axis;
+    uint64_t cells;
+} isogi_vol__course;
+
+/* One axis; whatever lies beyond the segment is put behind its end, so that no sum overflows. */
+ISOGI_VOL__INLINE void isogi_vol__set_course_axis(isogi_vol__course *c, const isogi_vol__walk *w, int a, double ticks) {
+    const isogi_pyramid *p = w->pyramid;
+    const double beyond = 1.25 * ticks, unlimited = 1e200;
+    const int padded = 1 << 2 * p->node_levels, still = !(w->dir[a] < 0 || w->dir[a] > 0);
+    const int fall = still ? w->origin[a] >= p->cells[a] : w->dir[a] < 0; /* a ray that stands still keeps below the upper border */
+    const int least = fall ? padded - p->cells[a] : 0, most = (fall ? padded : p->cells[a]) - 1;
+    const double origin = fall ? padded - w->origin[a] : w->origin[a], per = fabs(w->inverse[a]) * (ticks / w->end);
+    double ahead;
+    int64_t border;
+    int cell = (int)origin;
+    cell = cell > most ? most : cell < least ? least : cell;
+    ahead = (cell + 1 - origin) * per;
+    c->per[a] = still || !(per < beyond) ? (int64_t)beyond : (int64_t)per;
+    c->at[a] = (still || !(ahead < beyond) ? (int64_t)beyond : (int64_t)ahead) - (cell + 1) * c->per[a];
+    border = c->at[a] + (most + 1) * c->per[a];
+    c->end = border < c->end ? border : c->end;
+    c->origin[a] = w->origin[a], c->dir[a] = w->dir[a];
+    c->inverse[a] = still ? fall ? -unlimited : unlimited : w->inverse[a];
+    c->backwards |= fall ? (int64_t)(padded - 1) << 16 * a : 0;
+    c->flip |= fall ? 3 << 2 * a : 0, c->octant |= fall << a;
+}
+
+/* One, two and three times a number: twice and thrice where the masks say. */
+ISOGI_VOL__AVX512 ISOGI_VOL__INLINE __m512i isogi_vol__multiples(__m512i per, __mmask8 twice, __mmask8 thrice) {
+    const __m512i two = _mm512_mask_add_epi64(per, twice, per, per);
+    return _mm512_mask_add_epi64(two, thrice, two, per);
+}
+
+/* Sets up the course of a walk that is ready to go; 0 if it has to be walked plainly. */
+ISOGI_VOL__AVX512 ISOGI_VOL__INLINE int isogi_vol__set_course(isogi_vol__course *c, const isogi_vol__walk *w) {
+    const int levels = w->pyramid->node_levels;
+    const double ticks = (double)((int64_t)1 << (61 - 2 * levels)); /* times 4^levels planes, times 1.25, times 2 for differences: below 2^63 */
+    int a;
+    if (!(w->end > 1e-150) || !(w->end < 1e150)) return 0;
+    c->end = (int64_t)ticks, c->backwards = 0, c->flip = c->octant = 0, c->stop = w->end, c->entry_axis = w->entry_axis, c->cells = 0;
+    c->level = isogi_vol__quantise_isovalue(w->pyramid, w->isovalue, &c->low, &c->high);
+    isogi_vol__set_course_axis(c, w, 0, ticks);
+    isogi_vol__set_course_axis(c, w, 1, ticks);
+    isogi_vol__set_course_axis(c, w, 2, ticks);
+#pragma GCC unroll 8
+    for (a = 0; a < 3; a++) {
+        const int64_t f = c->per[a], g = c->per[a < 2 ? a + 1 : 0];
+        _mm512_store_si512(c->pair[a], _mm512_sub_epi64(isogi_vol__multiples(_mm512_set1_epi64(f), 0xf8, 0xc0), isogi_vol__multiples(_mm512_set1_epi64(g), 0xb6, 0x24)));
+        c->last_pair[a] = 3 * (f - g);
+    }
+    {
+        const __m512i x = _mm512_set1_epi64(c->per[0]), xy = _mm512_mask_set1_epi64(x, 0x38, c->per[1]);
+        _mm512_store_si512(c->plane, isogi_vol__multiples(_mm512_mask_set1_epi64(xy, 0xc0, c->per[2]), 0xb6, 0x24));
+    }
+    return c->end > 0;
+}
+
+/* Which children of a node the ray passes, in its own order; cell: the node's corner, counted backwards where the ray falls. */
+ISOGI_VOL__AVX512 ISOGI_VOL__INLINE uint64_t isogi_vol__way(const isogi_vol__course *c, const struct isogi_vol__ways *ways, int64_t cell, int level) {
+    const int shift = 2 * level;
+    const __m512i shifts = _mm512_set1_epi64(shift);
+    const int64_t x = c->at[0] + (cell & 0xffff) * c->per[0], y = c->at[1] + (cell >> 16 & 0xffff) * c->per[1], z = c->at[2] + (cell >> 32) * c->per[2];
+    const int64_t xy = x - y - 1, yz = y - z - 1, zx = z - x; /* at the same time, x comes before y, and y before z */
+    const int64_t x4 = x + (c->per[0] << 2 << shift), y4 = y + (c->per[1] << 2 << shift), z4 = z + (c->per[2] << 2 << shift), z3 = z4 - (c->per[2] << shift);
+    int64_t in = x > y ? x : y, out = x4 < y4 ? x4 : y4;
+    __m512i planes = _mm512_mask_set1_epi64(_mm512_mask_set1_epi64(_mm512_set1_epi64(x), 0x38, y), 0xc0, z);
+    uint64_t met;
+    in = in > z ? in : z, in = in > 0 ? in : 0, out = out < z4 ? out : z4, out = out < c->end ? out : c->end;
+    planes = _mm512_add_epi64(planes, _mm512_sllv_epi64(_mm512_load_si512(c->plane), shifts));
+#define ISOGI_VOL__ORDER(f, base)                                                                                                          \
+    ways->before[f][(unsigned)_mm512_movepi64_mask(_mm512_add_epi64(_mm512_sllv_epi64(_mm512_load_si512(c->pair[f]), shifts), _mm512_set1_epi64(base))) | \
+                    (unsigned)((uint64_t)((base) + (int64_t)((uint64_t)c->last_pair[f] << shift)) >> 63) << 8]
+    met = ISOGI_VOL__ORDER(0, xy) & ISOGI_VOL__ORDER(1, yz) & ISOGI_VOL__ORDER(2, zx);
+#undef ISOGI_VOL__ORDER
+    met &= ways->entered[(unsigned)_mm512_cmple_epi64_mask(planes, _mm512_set1_epi64(in)) | (unsigned)(z3 <= in) << 8];
+    return met & ways->left[(unsigned)_mm512_cmplt_epi64_mask(planes, _mm512_set1_epi64(out)) | (unsigned)(z3 < out) << 8];
+}
+
+/* Which children of a node, or cells of a leaf, can hold the surface, in the ray's order. */
+ISOGI_VOL__AVX512 ISOGI_VOL__INLINE uint64_t isogi_vol__held(const isogi_vol__course *c, const struct isogi_vol__ways *ways, const uint8_t *node) {
+    const __m512i order = _mm512_load_si512(ways->child[c->octant]);
+    const __m512i least = _mm512_permutexvar_epi8(order, _mm512_load_si512(node)), most = _mm512_permutexvar_epi8(order, _mm512_load_si512(node + 64));
+    return _mm512_mask_cmpge_epu8_mask(_mm512_cmple_epu8_mask(least, _mm512_set1_epi8((char)c->high)), most, _mm512_set1_epi8((char)c->low));
+}
+
+/* Cells beyond the volume are not left out, since no ray passes them. */
+ISOGI_VOL__AVX512 ISOGI_VOL__INLINE uint64_t isogi_vol__held_cells(const isogi_vol__course *c, const struct isogi_vol__ways *ways, const isogi_vol__leaf *leaf) {
+    const uint64_t low_rows = 0xf7bc0f7bde07bdefu, high_rows = 0x3def781eu; /* bits x + 5y + 25z of cells */
+    const __m512i code0 = _mm512_load_si512(leaf->code), code1 = _mm512_load_si512(leaf->code + 64);
+    const __m512i low = _mm512_permutex2var_epi8(code0, _mm512_load_si512(ways->voxel[c->octant]), code1);
+    const __m512i high = _mm512_permutex2var_epi8(code0, _mm512_load_si512(ways->voxel[c->octant] + 64), code1);
+    const __m512i inside = _mm512_set1_epi8((char)leaf->inside), outside = _mm512_set1_epi8((char)leaf->outside);
+    uint64_t in_low = _mm512_cmpge_epu8_mask(low, inside), in_high = _mm512_cmpge_epu8_mask(high, inside);
+    uint64_t out_low = _mm512_cmplt_epu8_mask(low, outside), out_high = _mm512_cmplt_epu8_mask(high, outside);
+    isogi_vol__all_corners(&in_low, &in_high);
+    isogi_vol__all_corners(&out_low, &out_high);
+    return ~(_pext_u64(in_low | out_low, low_rows) | _pext_u64(in_high | out_high, high_rows) << 44);
+}
+
+/* Goes through up to eight cells of a leaf, numbered backwards where the ray falls; corner: any cell of the leaf. 1: hit. */
+ISOGI_VOL__AVX512 ISOGI_VOL__INLINE int isogi_vol__walk_cells(isogi_vol__walk *w, isogi_vol__course *c, const isogi_vol__leaf *leaf, __m128i list, int count, int64_t corner,
+                                                              isogi_hit *hit) {
+    const __m512i child = _mm512_xor_si512(_mm512_cvtepu8_epi64(list), _mm512_set1_epi64(c->flip)), three = _mm512_set1_epi64(3);
+    __m512i code = _mm512_set1_epi64((int64_t)(uintptr_t)leaf->code), cell = isogi_vol__cells8(child, _mm512_set1_epi64(corner), &code), begin = three, end;
+    __m512d origin[3], inverse[3], dir[3];
+    __m256 from[3], to[3];
+    __attribute__((aligned(64))) int64_t at[8];
+    isogi_vol__sides sides;
+    unsigned lanes = (1u << count) - 1;
+    int a;
+#pragma GCC unroll 8
+    for (a = 0; a < 3; a++) origin[a] = _mm512_set1_pd(c->origin[a]), inverse[a] = _mm512_set1_pd(c->inverse[a]), dir[a] = _mm512_set1_pd(c->dir[a]);
+    end = _mm512_or_si512(_mm512_castpd_si512(_mm512_set1_pd(c->stop)), three);
+    isogi_vol__way8(cell, origin, inverse, dir, &begin, &end, from, to);
+    sides = isogi_vol__sides8(code, (__mmask8)lanes, _mm256_set1_ps(leaf->isovalue), from, to);
+    _mm512_store_si512(at, _mm512_or_si512(cell, _mm512_or_si512(_mm512_slli_epi64(_mm512_and_si512(begin, three), 48), _mm512_slli_epi64(_mm512_and_si512(end, three), 50))));
+    c->cells += (uint64_t)count;
+    while (lanes) {
+        const unsigned first = lanes & (0 - lanes);
+        unsigned doubt = lanes;
+        if (!w->deflate) {
+            if (w->inside < 0) w->inside = sides.in & first ? 1 : sides.out & first ? 0 : -1;
+            doubt &= ~(unsigned)(w->inside > 0 ? sides.in : w->inside == 0 ? sides.out : 0);
+            if (!doubt) break;
+            doubt &= 0 - doubt;
+            /* any hit will do, and this one is certain */
+            if (!w->exact && doubt & (w->inside > 0 ? sides.out1 : w->inside == 0 ? sides.in1 : (sides.in0 & sides.out1) | (sides.out0 & sides.in1))) return 1;
+        } else doubt = first;
+        {
+            const int64_t one = at[__builtin_ctz(doubt)];
+            const int in = (int)(one >> 48 & 3), out = (int)(one >> 50 & 3);
+            if (isogi_vol__mixed_cell_avx2(w, (int)(one & 0xffff), (int)(one >> 16 & 0xffff), (int)(one >> 32 & 0xffff), in == 3 ? c->entry_axis : in, out == 3 ? -1 : out, hit))
+                return 1;
+        }
+        lanes &= ~(doubt | (doubt - 1));
+    }
+    return 0;
+}
+
+/* From node to node, the lowest level that has children left first. */
+ISOGI_VOL__AVX512 static int isogi_vol__walk_one(isogi_vol__walk *w, isogi_hit *hit) {
+    const isogi_pyramid *p = w->pyramid;
+    const struct isogi_vol__ways *ways = p->ways;
+    const uint8_t *children[ISOGI_VOL__NODE_LEVELS], *node = p->nodes[p->node_level[p->node_levels - 1].first];
+    uint64_t left[ISOGI_VOL__NODE_LEVELS];
+    unsigned pending = 0;
+    int n = p->node_levels - 1;
+    int64_t cell = 0; /* corner of the node, counted backwards where the ray falls */
+    isogi_vol__course c;
+    if (!isogi_vol__set_course(&c, w)) return -1;
+    if (c.low > c.high) return 0;
+    for (;;) {
+        uint64_t mask = isogi_vol__way(&c, ways, cell, n);
+        int child;
+        w->count.blocks++;
+        if (n) {
+            mask &= isogi_vol__held(&c, ways, node);
+        } else {
+            isogi_vol__leaf leaf;
+            isogi_vol__open_leaf(&leaf, node, c.level);
+            mask &= isogi_vol__held_cells(&c, ways, &leaf);
+            if (mask) {
+                const int count = __builtin_popcountll(mask);
+                const __m128i list = _mm512_castsi512_si128(_mm512_maskz_compress_epi8(mask, _mm512_load_si512(ways->child[0])));
+                if (isogi_vol__walk_cells(w, &c, &leaf, list, count < 8 ? count : 8, cell ^ c.backwards, hit) ||
+                    (count > 8 && isogi_vol__walk_cells(w, &c, &leaf, _mm_srli_si128(list, 8), count - 8, cell ^ c.backwards, hit))) {
+                    w->count.cells = c.cells;
+                    return 1;
+                }
+                mask = 0;
+            }
+        }
+        if (mask) {
+            const isogi_vol__node_level *level = &p->node_level[n - 1];
+            const int64_t at = cell ^ c.backwards;
+            const int shift = 2 * n + 2;
+            children[n] = p->nodes[level->first + 64 * ((size_t)(at & 0xffff) >> shift) +
+                                   64 * level->parents[0] * (((size_t)(at >> 16 & 0xffff) >> shift) + level->parents[1] * ((size_t)(at >> 32) >> shift))];
+            pending |= 1u << n;
+        } else {
+            if (!pending) break;
+            n = __builtin_ctz(pending), mask = left[n];
+        }
+        child = __builtin_ctzll(mask);
+        left[n] = mask & (mask - 1);
+        if (!left[n]) pending &= pending - 1;
+        node = children[n] + 128 * (child ^ c.flip);
+        cell = (int64_t)(((uint64_t)cell & 0x0000ffffffffffffu & ~(0x000100010001u * ((4u << 2 * n) - 1))) | _pdep_u64((uint64_t)child, 0x000300030003u) << 2 * n);
+        n--;
+    }
+    w->count.cells = c.cells;
+    /* what was skipped behind the last cell lies on one side */
+    if (!(w->deflated >= w->end)) w->deflate = 0;
+    return 0;
 }
 
 #endif
@@ -4271,6 +4670,12 @@ static int isogi_vol__leaves_inside(isogi_vol__walk *w, uint32_t flags, isogi_hi
 /* Walks a ray that is set up: fast where that is right, else plainly. */
 static int isogi_vol__walk_ray(isogi_vol__walk *w, uint32_t flags, isogi_hit *hit) {
     isogi_vol__ticks ticks;
+#ifdef ISOGI_VOL__AVX
+    if (w->pyramid->fast && w->pyramid->path == ISOGI_VOL__PATH_AVX512) {
+        const int found = isogi_vol__enters_inside(w, hit) ? 1 : isogi_vol__walk_one(w, hit);
+        if (found >= 0) return found || isogi_vol__leaves_inside(w, flags, hit);
+    } else
+#endif
     if (w->pyramid->fast && isogi_vol__set_ticks(&ticks, w))
         return isogi_vol__enters_inside(w, hit) || isogi_vol__walk_fast(w, &ticks, hit) || isogi_vol__leaves_inside(w, flags, hit);
     isogi_vol__first_cell(w);
@@ -4291,47 +4696,77 @@ static void isogi_vol__trace_one(isogi_vol__batch *b, size_t i) {
 }
 
 #ifdef ISOGI_VOL__AVX
-/* Moves a ray to another slot. All members of a pool are rows of numbers of eight bytes. */
-static void isogi_vol__move(isogi_vol__pool *s, isogi_vol__turn *turn, int from, int to) {
+/* Moves up to eight rays from one group of slots to another; the masks have as many bits. All members of a pool are rows of numbers of
+   eight bytes. */
+ISOGI_VOL__AVX512 static void isogi_vol__move(isogi_vol__pool *s, isogi_vol__turn *turn, int from, __mmask8 leave, int to, __mmask8 take) {
+    __attribute__((aligned(64))) uint8_t place[64];
     char *row = (char *)s;
+    unsigned l = leave, t = take;
     int i;
-    for (i = 0; i < (int)(sizeof *s / sizeof s->ray); i++, row += sizeof s->ray) memcpy(row + 8 * to, row + 8 * from, 8);
-    for (i = 0; i < turn->leaves; i++)
-        if (turn->at_leaf[i] == from) turn->at_leaf[i] = (uint8_t)to;
-    for (i = 0; i < turn->doubts; i++)
-        if (turn->in_doubt[i] == from) turn->in_doubt[i] = (uint8_t)to;
+    for (i = 0; i < (int)(sizeof *s / sizeof s->ray); i++, row += sizeof s->ray)
+        _mm512_store_si512(row + 64 * to, _mm512_mask_expand_epi64(_mm512_load_si512(row + 64 * to), take, _mm512_maskz_compress_epi64(leave, _mm512_load_si512(row + 64 * from))));
+    _mm512_mask_store_epi64(&s->level[8 * from], leave, _mm512_set1_epi64(-1));
+    _mm512_store_si512(place, _mm512_load_si512(turn->p->ways->child[0]));
+    for (; l; l &= l - 1, t &= t - 1) place[8 * from + __builtin_ctz(l)] = (uint8_t)(8 * to + __builtin_ctz(t));
+    _mm512_storeu_si512(turn->at_leaf, _mm512_permutexvar_epi8(_mm512_loadu_si512(turn->at_leaf), _mm512_load_si512(place)));
+    _mm512_storeu_si512(turn->in_doubt, _mm512_permutexvar_epi8(_mm512_loadu_si512(turn->in_doubt), _mm512_load_si512(place)));
 }
 
-/* With no more rays to come, eight slots are cleared whenever the others can take their rays. `open`: the slots without a ray. */
-static uint64_t isogi_vol__close_ranks(isogi_vol__pool *s, isogi_vol__turn *turn, int groups, uint64_t open) {
+/* With no more rays to come, a group of eight slots is cleared whenever the others can take its rays. `open`: the slots without a ray. */
+ISOGI_VOL__AVX512 static uint64_t isogi_vol__close_ranks(isogi_vol__pool *s, isogi_vol__turn *turn, int groups, uint64_t open) {
     for (;;) {
         int occupied = 0, rays = 0, least = 9, which = 0, i;
-        uint64_t takes = 0, leave;
+        unsigned leave;
         for (i = 0; i < groups; i++) {
             const int n = 8 - __builtin_popcount((unsigned)(open >> 8 * i & 255));
             if (!n) continue;
             occupied++, rays += n;
-            takes |= (uint64_t)255 << 8 * i;
             if (n < least) least = n, which = i;
         }
         if (rays > 8 * (occupied - 1)) return open;
-        takes &= open & ~((uint64_t)255 << 8 * which);
-        for (leave = ~open & (uint64_t)255 << 8 * which; leave; leave &= leave - 1, takes &= takes - 1)
-            isogi_vol__move(s, turn, __builtin_ctzll(leave), __builtin_ctzll(takes)), s->level[__builtin_ctzll(leave)] = -1,
-                open ^= (takes & (0 - takes)) | (leave & (0 - leave));
+        leave = (unsigned)(~open >> 8 * which & 255);
+        for (i = 0; leave; i++) {
+            const unsigned room = (unsigned)(open >> 8 * i & 255);
+            unsigned take, some;
+            if (i == which || !room || room == 255) continue;
+            some = _pdep_u32((1u << __builtin_popcount(room)) - 1, leave), take = _pdep_u32((1u << __builtin_popcount(leave)) - 1, room);
+            isogi_vol__move(s, turn, which, (__mmask8)some, i, (__mmask8)take);
+            leave &= ~some, open ^= (uint64_t)take << 8 * i | (uint64_t)some << 8 * which;
+        }
     }
 }
 
-/* Takes rays into open slots until there are none of either. */
-static uint64_t isogi_vol__fill_pool(isogi_vol__batch *b, isogi_vol__pool *s, uint64_t open, size_t *next, size_t count) {
-    for (; open && *next < count; ++*next) {
-        isogi_vol__walk w;
-        isogi_hit any, *hit = b->hits ? &b->hits[*next] : &any;
-        const uint32_t flags = isogi_vol__flags(b, *next);
-        const int slot = __builtin_ctzll(open);
-        if (!isogi_vol__begin(b, *next, &w)) isogi_vol__finish(b, *next, &w, 0);
-        else if (flags || !isogi_vol__seat(s, slot, &w)) isogi_vol__finish(b, *next, &w, isogi_vol__walk_ray(&w, flags, hit));
-        else s->ray[slot] = *next, open &= open - 1;
+/* A ray that cannot be set up with seven others; whether it takes the slot. */
+static int isogi_vol__seat_odd(isogi_vol__batch *b, isogi_vol__pool *s, size_t i, int slot) {
+    isogi_vol__walk w;
+    isogi_hit any, *hit = b->hits ? &b->hits[i] : &any;
+    const uint32_t flags = isogi_vol__flags(b, i);
+    if (!isogi_vol__begin(b, i, &w)) isogi_vol__finish(b, i, &w, 0);
+    else if (flags || !isogi_vol__seat(s, slot, &w)) isogi_vol__finish(b, i, &w, isogi_vol__walk_ray(&w, flags, hit));
+    else {
+        s->ray[slot] = i;
+        return 1;
+    }
+    return 0;
+}
+
+/* Takes rays into open slots until there are none of either, but not for the sake of a few slots. */
+ISOGI_VOL__AVX512 ISOGI_VOL__INLINE uint64_t isogi_vol__fill_pool(isogi_vol__batch *b, isogi_vol__pool *s, uint64_t slots, uint64_t open, size_t *next, size_t count) {
+    while (open && *next < count) {
+        const size_t rays = count - *next;
+        const int room = __builtin_popcountll(open), n = rays < 8 ? room < (int)rays ? room : (int)rays : room < 8 ? room : 8;
+        uint8_t list[16];
+        unsigned odd, seated;
+        int k;
+        if (room < 6 && open != slots && rays > (size_t)room) break;
+        _mm_storeu_si128((__m128i *)(void *)list, _mm512_castsi512_si128(_mm512_maskz_compress_epi8(open, _mm512_load_si512(b->pyramid->ways->child[0]))));
+        seated = isogi_vol__seat8(b, s, *next, n, list, &odd);
+        for (k = 0; k < n; k++, ++*next) {
+            if (seated >> k & 1 || (odd >> k & 1 && isogi_vol__seat_odd(b, s, *next, list[k]))) open &= ~((uint64_t)1 << list[k]);
+            else if (odd >> k & 1) continue;
+            else if (b->occluded) b->occluded[*next] = 0;
+            else memset(&b->hits[*next], 0, sizeof b->hits[0]);
+        }
     }
     return open;
 }
@@ -4407,9 +4842,9 @@ ISOGI_VOL__AVX512 static void isogi_vol__trace_pool(isogi_vol__batch *b, size_t 
     isogi_vol__clear_pool(&s, groups, b->pyramid);
     for (;;) {
         int answered = 0, waits;
-        open = isogi_vol__fill_pool(b, &s, open, &next, count);
+        open = isogi_vol__fill_pool(b, &s, slots, open, &next, count);
         if (open == slots) break;
-        if (open && groups > 1) open = isogi_vol__close_ranks(&s, &turn, groups, open);
+        if (open && groups > 1 && next == count) open = isogi_vol__close_ranks(&s, &turn, groups, open);
         turn.choosing = 0;
         for (i = 0; i < groups; i++) {
             const __mmask8 lives = _mm512_cmpge_epi64_mask(_mm512_load_si512(&s.level[8 * i]), _mm512_setzero_si512());
@@ -5918,13 +6353,12 @@ ISOGI_API void isogi_vol_mesh_free(const isogi_pyramid *pyramid, isogi_mesh *mes
 #undef ISOGI_VOL__CODES
 #undef ISOGI_VOL__DOUBT
 #undef ISOGI_VOL__LEAF_AVX2
-#undef ISOGI_VOL__LEAF_AVX512
 #undef ISOGI_VOL__LEAF_BASE
 #undef ISOGI_VOL__MUL
 #undef ISOGI_VOL__NODE_AVX2
-#undef ISOGI_VOL__NODE_AVX512
 #undef ISOGI_VOL__NODE_BASE
 #undef ISOGI_VOL__POOL
+#undef ISOGI_VOL__ORDERS
 #undef ISOGI_VOL__SUB
 #undef ISOGI_VOL__GROUP
 #undef ISOGI_VOL__BLOCK
