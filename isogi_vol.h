@@ -3119,6 +3119,12 @@ ISOGI_VOL__TARGET("avx2") ISOGI_VOL__INLINE __m256d isogi_vol__lerp4(__m256d a, 
     return _mm256_add_pd(_mm256_mul_pd(rest, a), _mm256_mul_pd(u, b));
 }
 
+/* All bits of one of four lanes set; -1: of none. */
+ISOGI_VOL__TARGET("avx2") ISOGI_VOL__INLINE __m256d isogi_vol__lane(int i) {
+    static const uint64_t lane[5][4] = {{0, 0, 0, 0}, {~(uint64_t)0, 0, 0, 0}, {0, ~(uint64_t)0, 0, 0}, {0, 0, ~(uint64_t)0, 0}, {0, 0, 0, ~(uint64_t)0}};
+    return _mm256_castsi256_pd(_mm256_loadu_si256((const __m256i *)(const void *)lane[i + 1]));
+}
+
 /* The corners x + 2y of one z, raw. */
 ISOGI_VOL__TARGET("avx2") ISOGI_VOL__INLINE __m256d isogi_vol__corners4(const isogi_volume *v, const char *p, ptrdiff_t dx, ptrdiff_t dy) {
     const char *q = p + dy;
@@ -3140,15 +3146,13 @@ ISOGI_VOL__TARGET("avx2") ISOGI_VOL__INLINE __m256d isogi_vol__corners4(const is
 
 /* Does what mixed_cell does. */
 ISOGI_VOL__TARGET("avx2") static int isogi_vol__mixed_cell_avx2(isogi_vol__walk *w, int x, int y, int z, int in, int axis, isogi_hit *hit) {
-    static const uint64_t lane[5][4] = {{0, 0, 0, 0}, {~(uint64_t)0, 0, 0, 0}, {0, ~(uint64_t)0, 0, 0}, {0, 0, ~(uint64_t)0, 0}, {0, 0, 0, ~(uint64_t)0}};
     const isogi_volume *v = &w->pyramid->volume;
     const ptrdiff_t dx = v->stride[0], dy = v->stride[1], dz = v->stride[2];
     const char *p = (const char *)v->data + x * dx + y * dy + z * dz;
     const __m256d zero = _mm256_setzero_pd(), one = _mm256_set1_pd(1), isovalue = _mm256_set1_pd(w->isovalue);
     const __m256d scale = _mm256_set1_pd(v->scale), bias = _mm256_set1_pd(v->bias);
     const __m256d origin = _mm256_loadu_pd(w->origin), dir = _mm256_loadu_pd(w->dir), inverse = _mm256_loadu_pd(w->inverse);
-    const __m256d in_lane = _mm256_castsi256_pd(_mm256_loadu_si256((const __m256i *)(const void *)lane[in + 1]));
-    const __m256d out_lane = _mm256_castsi256_pd(_mm256_loadu_si256((const __m256i *)(const void *)lane[axis < 0 ? 4 : axis + 1]));
+    const __m256d in_lane = isogi_vol__lane(in), out_lane = isogi_vol__lane(axis < 0 ? 3 : axis);
     const __m256d cell = _mm256_cvtepi32_pd(_mm_setr_epi32(x, y, z, 0));
     const __m256d enter = _mm256_and_pd(_mm256_cmp_pd(dir, zero, _CMP_LT_OQ), one), leave = _mm256_and_pd(_mm256_cmp_pd(dir, zero, _CMP_GT_OQ), one);
     const __m256d segment_end = _mm256_set1_pd(w->end);
@@ -3287,6 +3291,7 @@ static int isogi_vol__clip(isogi_vol__walk *w, double tmin, double tmax) {
     }
     if (!(enter <= leave)) return 0;
     for (a = 0; a < 3; a++) w->origin[a] = isogi_vol__clamp(w->origin[a] + enter * w->dir[a], (double)w->pyramid->cells[a]);
+    if (w->entry_axis >= 0) w->origin[w->entry_axis] = w->dir[w->entry_axis] > 0 ? 0 : w->pyramid->cells[w->entry_axis]; /* on the face, whatever rounding says */
     w->base = enter, w->t = 0, w->end = ISOGI_VOL__UNLIMITED;
     for (a = 0; a < 3; a++)
         if (w->dir[a] > 0 || w->dir[a] < 0)
@@ -3332,6 +3337,7 @@ ISOGI_VOL__TARGET("avx2") static int isogi_vol__aim_avx2(isogi_vol__walk *w, con
     if (!(enter <= leave)) return 0;
     origin = _mm256_add_pd(origin, _mm256_mul_pd(_mm256_set1_pd(enter), d));
     origin = _mm256_min_pd(_mm256_max_pd(origin, zero), box);
+    origin = _mm256_blendv_pd(origin, front, isogi_vol__lane(w->entry_axis));
     t1 = _mm256_blendv_pd(_mm256_mul_pd(_mm256_sub_pd(back, origin), inverse), unlimited, still);
     w->base = enter, w->t = 0, w->end = isogi_vol__least4(t1);
     w->end_is_border = !(tmax - enter < w->end);
@@ -4377,6 +4383,7 @@ ISOGI_VOL__AVX512 static unsigned isogi_vol__seat8(isogi_vol__batch *b, isogi_vo
     for (a = 0; a < 3; a++) {
         const __m512d box = _mm512_set1_pd(p->box[a]);
         origin[a] = _mm512_min_pd(_mm512_max_pd(ISOGI_VOL__ADD(origin[a], ISOGI_VOL__MUL(enter, d[a])), zero), box);
+        origin[a] = _mm512_mask_mov_pd(origin[a], _mm512_cmpeq_epi64_mask(axis, _mm512_set1_epi64(a)), _mm512_mask_mov_pd(box, rising[a], zero));
         stop = _mm512_mask_min_pd(stop, (__mmask8)~still[a], stop, ISOGI_VOL__MUL(ISOGI_VOL__SUB(_mm512_maskz_mov_pd(rising[a], box), origin[a]), inverse[a]));
     }
     stop = _mm512_min_pd(stop, ISOGI_VOL__SUB(tmax, enter));
