@@ -114,7 +114,10 @@ TEST(every_method_agrees_with_closed_forms_coefficient_by_coefficient) {
         for (int method = ISOGI_DVR_BRUTE; method <= ISOGI_DVR_SWEEP; method++) {
             isogi_dvr_desc desc = lit_by(f.pyramid, method);
             double most = 0;
-            if (method == ISOGI_DVR_PAPER && !LONG_SUITE) desc.directions = 64;
+            if (method == ISOGI_DVR_PAPER && !LONG_SUITE) {
+                if (s % 2) continue; /* the slow one: half of the scenes, a quarter of the rays */
+                desc.directions = 64;
+            }
             isogi_dvr *dvr = dvr_new(&desc, &transfer);
             CHECK(isogi_dvr_step(dvr, 0, NULL) == ISOGI_OK, "step");
             for (size_t k = 0; k < sizeof places / sizeof *places; k++) {

@@ -19,7 +19,7 @@ static void colour_of(const isogi_dvr *dvr, const double eye[3], const double ta
 /* What is integrated along a line through f = x, in physical space (per = length of the line per unit of x) or in data space (per = 1),
    by the midpoint rule in long double; jumps of the transfer function at whole values stay between pieces. */
 static void along_values(const isogi_transfer *t, double low, double high, double per, long double out[4]) {
-    enum { PIECES = 480 }; /* for each unit */
+    enum { PIECES = 200 }; /* for each unit */
     long double clear = 1;
     for (int a = 0; a < 4; a++) out[a] = 0;
     for (long i = 0; i < (high - low) * PIECES; i++) {
@@ -74,15 +74,15 @@ TEST(odd_transfer_functions_are_integrated_as_they_say) {
     const double eye[3] = {-30, 10, 15}, target[3] = {64, 37, 30}, per = sqrt(94 * 94 + 27 * 27 + 15 * 15) / 94;
     for (size_t n = 0; n < sizeof cases / sizeof *cases; n++) {
         const isogi_transfer transfer = {cases[n], counts[n], NULL, 0};
+        long double expected[4];
         for (int way = 0; way < 4; way++) { /* pre-integrated, post-classified; data space exactly, pre-integrated */
             const isogi_dvr_desc desc = {.pyramid = f.pyramid, .space = way < 2 ? ISOGI_DVR_PHYSICAL : ISOGI_DVR_DATA, .opaque = way ? 1 : 0, .step = way == 1 ? 0.05 : 0,
-                                         .classification = way == 1 ? ISOGI_DVR_POST_CLASSIFIED : way == 3 ? ISOGI_DVR_PRE_INTEGRATED : ISOGI_DVR_EXACT, .table = 300};
-            /* a thousand classes of value; steps of a 20th of a voxel at jumps; exact; 300 entries a side, blurred over two of them */
+                                         .classification = way == 1 ? ISOGI_DVR_POST_CLASSIFIED : way == 3 ? ISOGI_DVR_PRE_INTEGRATED : ISOGI_DVR_EXACT};
+            /* a thousand classes of value; steps of a 20th of a voxel at jumps; exact; 256 entries a side, blurred over two of them */
             const double tolerance[4] = {0.004, 0.01, 1e-5, 0.05};
             isogi_dvr *dvr = dvr_new(&desc, &transfer);
-            long double expected[4];
             float c[4];
-            along_values(&transfer, 0, 48, way < 2 ? per : 1, expected);
+            if (way % 2 == 0) along_values(&transfer, 0, 48, way < 2 ? per : 1, expected);
             colour_of(dvr, eye, target, NULL, c, NULL);
             for (int a = 0; a < 4; a++)
                 CHECK(fabs((double)c[a] - (double)expected[a]) < tolerance[way], "case %zu way %d channel %d: %.6g, not %.6g", n, way, a, (double)c[a], (double)expected[a]);
@@ -246,7 +246,8 @@ TEST(jitter_is_off_by_default_repeats_itself_and_is_right_on_average) {
         isogi_dvr_free(dvr);
         desc.step = 2;
         dvr = dvr_new(&desc, &transfer), plain = picture(dvr, &view, NULL, NULL, NULL), isogi_dvr_free(dvr);
-        for (uint32_t seed = 1; seed <= 64; seed++) {
+        const uint32_t seeds = LONG_SUITE ? 64 : 16;
+        for (uint32_t seed = 1; seed <= seeds; seed++) {
             desc.jitter = seed;
             dvr = dvr_new(&desc, &transfer);
             float(*image)[4] = picture(dvr, &view, NULL, NULL, NULL), (*again)[4];
@@ -255,12 +256,12 @@ TEST(jitter_is_off_by_default_repeats_itself_and_is_right_on_average) {
             again = picture(dvr, &view, NULL, NULL, NULL), isogi_dvr_free(dvr);
             CHECK(!memcmp(image, again, 576 * sizeof *image), "seed %u: the same bits with two threads", (unsigned)seed);
             CHECK(memcmp(image, plain, 576 * sizeof *image), "seed %u: not those without jitter", (unsigned)seed);
-            for (int i = 0; i < 2304; i++) mean[i / 4][i % 4] += image[i / 4][i % 4] / 64;
+            for (int i = 0; i < 2304; i++) mean[i / 4][i % 4] += image[i / 4][i % 4] / (float)seeds;
             free(image), free(again);
         }
-        /* of 64 shifts the mean is that of steps 64 times as fine, but for what products of opacities lose */
+        /* of many shifts the mean is that of steps as many times as fine, but for chance and what products of opacities lose */
         double error[2] = {rms_difference(plain, fine, 576), rms_difference(mean, fine, 576)};
-        CHECK(error[1] < 0.35 * error[0] && error[0] > 0.002, "space %d: RMSE %g of the mean, %g without jitter", space, error[1], error[0]);
+        CHECK(error[1] < (LONG_SUITE ? 0.35 : 0.5) * error[0] && error[0] > 0.002, "space %d: RMSE %g of the mean, %g without jitter", space, error[1], error[0]);
         free(fine), free(plain);
     }
     field_free(&f);
