@@ -1,6 +1,7 @@
 # make           the viewer and the example programs, into build/
 # make demo      volume in, globally lit pictures out: build/demo/*.png    (VOLUME=FILE ISO=V for your own)
 # make figures   the figures of the paper, with our data, and how far they are from path tracing: build/figures/index.html
+# make pictures  the pictures of README.md anew: examples/*.png
 # make test      the quick tests, under two minutes; ends with "N passed, N failed, N skipped"
 # make check     the long suite: full sizes, every compiler, sanitizer and emulator that is installed
 # make bench     run time against error: build/bench/*.csv and *.svg      (ONLY=sh|vol|trace|dvr|visibility QUICK=1)
@@ -77,6 +78,9 @@ figures: build/viewer build/isolines build/tets
 	@sh examples/figures.sh
 	@sh examples/figures_scale_invariant.sh
 
+pictures: build/viewer
+	@sh examples/pictures.sh
+
 # ---- tests ----
 
 programs: $(TESTS) $(EXAMPLES)
@@ -105,5 +109,5 @@ clean:
 -include $(wildcard build/*.d build/tests/*.d build/bench/*.d)
 
 FORCE:
-.PHONY: all demo figures programs test check bench clean FORCE
+.PHONY: all demo figures pictures programs test check bench clean FORCE
 .DELETE_ON_ERROR:

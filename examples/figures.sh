@@ -1,9 +1,10 @@
 #!/bin/sh
 # The figures of Wyman et al. 2006 with our data, into build/figures with an index.html; numbers beside the pictures are differences to
 # the reference that the caption names, RMS in sRGB values of 0 to 1. With ISOGI_DATA real volumes, else procedural stand-ins.
-#     FIGURES_SIZE=900x900   pixels; default 400x400            FIGURES_SAMPLES=1    times as many samples; 40 is about the paper's 10,000
+# A few minutes of one processor's time; the last line tells how many.
+#     FIGURES_SIZE=900x900   pixels; default 320x320            FIGURES_SAMPLES=1    times as many samples; 300 is about the paper's 10,000
 out=${FIGURES_OUT:-build/figures}
-size=${FIGURES_SIZE:-400x400} more=${FIGURES_SAMPLES:-1}
+size=${FIGURES_SIZE:-320x320} more=${FIGURES_SAMPLES:-1}
 mkdir -p "$out"
 page=$out/index.html
 begun=$(date +%s) failed=0
@@ -21,7 +22,7 @@ picture() {
     name=$1 caption=$2
     shift 2
     since=$(date +%s)
-    if number=$(build/viewer --samples "$(samples 64)" "$@" --size "$size" --out "$out/$name.png"); then
+    if number=$(build/viewer --samples "$(samples 32)" "$@" --size "$size" --out "$out/$name.png"); then
         number=$(echo "$number" | sed -n 's/^difference_rms //p')
         echo "    $name   ${number:+difference $number   }$(($(date +%s) - since)) s"
         echo "<figure><img src=\"$name.png\" alt=\"$name\"><figcaption>$caption${number:+<br>difference $number}</figcaption></figure>" >> "$page"
@@ -37,77 +38,79 @@ compared() {
 }
 
 data() { [ -n "$ISOGI_DATA" ] && [ -f "$ISOGI_DATA/$1" ]; }
-if data vismale_head_128x256x256_uint8.raw; then skull="$ISOGI_DATA/vismale_head_128x256x256_uint8.raw --iso 100 --spacing 1.58,1,1.01 --up 0,0,-1 --camera 150,5,1.9" skull_isos="88 100 112" head_grid="64,128,128 128,256,256 256,512,512"
-else skull="procedural:skull" skull_isos="" head_grid="64,72,72 128,144,144 256,288,288"
+if data vismale_head_128x256x256_uint8.raw; then
+    skull="--samples $(samples 16) $ISOGI_DATA/vismale_head_128x256x256_uint8.raw --iso 100 --spacing 1.58,1,1.01 --up 0,0,-1 --camera 150,5,1.7"
+    skull_sun="--env sky --light directional:1,-1,-1:3,2.8,2.4:0.5" skull_isos="88 100 112" head_grid="64,128,128 128,256,256 256,512,512"
+else
+    skull="--samples $(samples 16) procedural:skull --camera 30,8,2" skull_sun="--env sky --light directional:1,1,0.6:3,2.8,2.4:0.5" skull_isos="" head_grid="64,72,72 128,144,144 256,288,288"
 fi
-if data engine_256x256x128_uint8.raw; then engine="--scene engine" engine_mode="--env $ISOGI_DATA/hdr/grace_256x128.hdr"
-else engine="--scene engine-block" engine_mode=""
+if data engine_256x256x128_uint8.raw; then engine="--scene engine --camera 37,25,2"
+else engine="--scene engine-block --camera 37,25,2"
 fi
-if data hydrogen_128x128x128_uint8.raw; then field="$ISOGI_DATA/hydrogen_128x128x128_uint8.raw --iso 15"
-else field="procedural:marschner-lobb:128"
+if data neghip_64x64x64_uint8.raw; then field="$ISOGI_DATA/neghip_64x64x64_uint8.raw --iso 50" close=30,25,1.1 whole=30,25,1.7
+else field="procedural:hydrogen" close=30,25,1.4 whole=30,25,2.2
 fi
-sun="--light directional:-1,1,0.45:3,3,3"
 
 head_of 1 "Global light beside Phong with shadows"
-picture 1a-global "a skull, global light" $skull
-picture 1a-phong "Phong with shadows" $skull --mode phong --shadows on $sun
-picture 1b-global "a simulation, global light" $field
-picture 1b-phong "Phong with shadows" $field --mode phong --shadows on $sun
+picture 1a-global "a skull, global light" $skull $skull_sun
+picture 1a-phong "Phong with shadows" $skull --mode phong --shadows on $skull_sun
+picture 1b-global "a simulation, global light" $field --camera $whole
+picture 1b-phong "Phong with shadows" $field --camera $whole --mode phong --shadows on
 
-head_of 4 "A hard shadow as the isovalue rises: it fades, since texels lie on isosurfaces of their own"
+head_of 4 "Hard shadows as the isovalue rises: they fade in and out, since texels lie on isosurfaces of their own"
 if [ "$skull_isos" ]; then
-    for iso in $skull_isos; do picture "4-iso-$iso" "isovalue $iso" $(echo "$skull" | sed "s/--iso [0-9]*/--iso $iso/") $sun --bounces 1; done
+    for iso in $skull_isos; do picture "4-iso-$iso" "isovalue $iso" $(echo "$skull" | sed "s/--iso [0-9]*/--iso $iso/") $skull_sun --bounces 1; done
 else
-    for iso in 0.4 0.5 0.6; do picture "4-iso-$iso" "isovalue $iso" procedural:torus-sphere-plane --iso $iso --light point:64,250,64:90000,90000,90000 --bounces 1; done
+    for iso in 0.4 0.5 0.6; do picture "4-iso-$iso" "isovalue $iso" procedural:torus-sphere-plane --iso $iso --env sky --light point:64,250,64:90000,90000,90000 --bounces 1; done
 fi
 
 head_of 5 "Normals and offset: artefacts of voxels on the surface and along shadow borders; differences to smoothed + offset"
-direct="--mode pathtrace --bounces 0 --samples $(samples 16) $sun"
+direct="--mode pathtrace --bounces 0 --samples $(samples 16) $skull_sun"
 picture 5-smoothed-offset "direct light, smoothed normals, offset" $skull $direct
 compared 5-smoothed-offset 5-gradient "gradient normals" $skull $direct --normals trilinear --offset -1
 compared 5-smoothed-offset 5-smoothed "smoothed normals" $skull $direct --offset -1
-picture 5-global-smoothed-offset "four bounces, smoothed normals, offset" $skull $sun --bounces 4
-compared 5-global-smoothed-offset 5-global-gradient "four bounces, gradient normals" $skull $sun --bounces 4 --normals trilinear --offset -1
+picture 5-global-smoothed-offset "four bounces, smoothed normals, offset" $skull $skull_sun --bounces 4
+compared 5-global-smoothed-offset 5-global-gradient "four bounces, gradient normals" $skull $skull_sun --bounces 4 --normals trilinear --offset -1
 
 head_of 6 "Lookups; differences to path tracing"
-picture 6-reference "path tracing" $engine --mode pathtrace --samples $(samples 64)
-for lookup in closest-isovalue nearest trilinear bspline; do compared 6-reference "6-$lookup" $lookup $engine --lookup $lookup --samples $(samples 64); done
+picture 6-reference "path tracing" $engine --mode pathtrace --samples $(samples 128)
+for lookup in closest-isovalue nearest trilinear bspline; do compared 6-reference "6-$lookup" $lookup $engine --lookup $lookup; done
 
-head_of 7 "Samples; differences to path tracing with $(samples 256)"
-picture 7-reference "path tracing, $(samples 256)" $engine --mode pathtrace --samples $(samples 256)
-for n in 2 8 32 128; do
+head_of 7 "Samples; differences to path tracing with $(samples 128)"
+for n in 2 8 32; do
     n=$(samples $n)
-    compared 7-reference "7-transfer-$n" "transfer, $n" $engine --mode transfer --samples "$n"
-    compared 7-reference "7-irradiance-$n" "irradiance, $n" $engine --samples "$n"
-    compared 7-reference "7-pathtrace-$n" "path tracing, $n" $engine --mode pathtrace --samples "$n"
+    compared 6-reference "7-transfer-$n" "transfer, $n" $engine --mode transfer --samples "$n"
+    compared 6-reference "7-irradiance-$n" "irradiance, $n" $engine --samples "$n"
+    compared 6-reference "7-pathtrace-$n" "path tracing, $n" $engine --mode pathtrace --samples "$n"
 done
 
 head_of "8 and 9" "A simulation, from close and whole: ours, vicinity shading, Lambert with fog, Phong and Lambert with ambient by normal, Lambert without shadows"
 for view in 8 9; do
-    camera=$([ $view = 8 ] && echo "--camera 30,25,1.1" || echo "--camera 30,25,2.7")
+    camera=$([ $view = 8 ] && echo "--camera $close" || echo "--camera $whole")
     picture $view-ours "global light" $field $camera
     picture $view-vicinity "vicinity shading" $field $camera --mode vicinity
-    picture $view-fog "Lambert with fog" $field $camera --mode lambert $sun --fog 2
-    picture $view-phong "Phong, ambient by normal, shadows" $field $camera --mode phong --ambient normal --shadows on $sun
-    picture $view-lambert-shadows "Lambert, ambient by normal, shadows" $field $camera --mode lambert --shadows on $sun
-    picture $view-lambert "Lambert without shadows" $field $camera --mode lambert $sun
+    picture $view-fog "Lambert with fog" $field $camera --mode lambert --fog 2
+    picture $view-phong "Phong, ambient by normal, shadows" $field $camera --mode phong --ambient normal --shadows on
+    picture $view-lambert-shadows "Lambert, ambient by normal, shadows" $field $camera --mode lambert --shadows on
+    picture $view-lambert "Lambert without shadows, ambient constant" $field $camera --mode lambert --ambient constant
 done
 
 head_of 10 "Global light beside vicinity shading"
-picture 10-ours "global light" $skull --samples $(samples 64)
-picture 10-vicinity "vicinity shading" $skull --mode vicinity --samples $(samples 64)
+picture 10-ours "global light" $skull
+picture 10-vicinity "vicinity shading" $skull --mode vicinity
 
 head_of 11 "Textures beside path tracing; differences to it"
-compared 7-reference 11-irradiance "irradiance texture" $engine --samples $(samples 64)
-compared 7-reference 11-transfer "transfer of order 5" $engine --mode transfer --samples $(samples 64)
+compared 6-reference 11-irradiance "irradiance texture" $engine --samples $(samples 64)
+compared 6-reference 11-transfer "transfer of order 5" $engine --mode transfer --samples $(samples 64)
 
 head_of 12 "Texture of 1/8, 1 and 8 times the volume's resolution; differences to path tracing"
-picture 12-reference "path tracing" $skull --mode pathtrace --samples $(samples 64)
+picture 12-reference "path tracing" $skull $skull_sun --mode pathtrace --samples $(samples 64)
 k=0
 for grid in $head_grid; do
     k=$((k + 1))
-    compared 12-reference "12-$k" "$grid texels" $skull --lattice $grid --samples $(samples 64)
+    compared 12-reference "12-$k" "$grid texels" $skull $skull_sun --lattice $grid
 done
 
 echo "$(($(date +%s) - begun)) s in all: $page"
+times | tail -n 1 # of the viewer: processor time
 exit $failed

@@ -196,7 +196,7 @@ static const option option_list[] = {
     {"--camera", "AZ,EL,DIST", "degrees about and above the horizon of --up; distance in radii of the box's sphere", OTHER, 0, AT(has_camera), 0, 0, 0,
      parse_camera, "azimuth in degrees, elevation -90 to 90, distance above 0"},
     {"--up", "X,Y,Z", "which way is up, for the camera and the environment; default 0,1,0", OTHER, 0, AT(has_up), 0, 0, 0, parse_up, "three numbers, not all zero"},
-    {"--env", "FILE.hdr", "environment: equirectangular Radiance picture", TEXT, AT(env), 0, 0, 0, 0, 0, ""},
+    {"--env", "FILE.hdr", "environment: equirectangular Radiance picture; sky: the default's sky, to go with --light", TEXT, AT(env), 0, 0, 0, 0, 0, ""},
     {"--light", "KIND:X,Y,Z:R,G,B[:RADIUS]", "directional (towards the light; irradiance; radius in degrees), point (place; intensity), sphere "
      "(centre; intensity; radius), rectangle:X,Y,Z:R,G,B:UX,UY,UZ:VX,VY,VZ (centre; intensity; two sides at right angles; it "
      "shines towards U x V); may be repeated", OTHER, 0, 0, 0, 0, 0, parse_light,
@@ -494,10 +494,12 @@ static void set_sky(viewer *v, const float above[3], const float below[3]) {
     v->lighting.env.sh = v->sky, v->lighting.env.sh_order = 2;
 }
 
+static const float sky_above[3] = {0.90f, 1.0f, 1.15f}, sky_below[3] = {0.33f, 0.3f, 0.27f}; /* a slightly coloured sky */
+
 static void set_default_light(viewer *v) {
-    /* the neutral sky of the scene engine-block, and a slightly coloured one for everything else */
+    /* the neutral sky of the scene engine-block, and the coloured one for everything else */
     static const float neutral_above[3] = {1, 1, 1}, neutral_below[3] = {0.3f, 0.3f, 0.3f}, neutral_sun[3] = {3, 3, 3};
-    static const float above[3] = {0.90f, 1.0f, 1.15f}, below[3] = {0.33f, 0.3f, 0.27f}, sun[3] = {3.25f, 2.95f, 2.5f}, one[3] = {1, 1, 1};
+    static const float sun[3] = {3.25f, 2.95f, 2.5f}, one[3] = {1, 1, 1};
     static const double to_sun[3] = {-1.0, 1.0, 0.45}, diagonal[3] = {1, 1, 1};
     const scene *s = v->o.scene;
     if (s && s->lit && s->uniform_sky) set_sky(v, one, one);
@@ -506,7 +508,7 @@ static void set_default_light(viewer *v) {
         set_sky(v, sky, sky);
         if (s->sun[0] > 0) add_light(v, diagonal, s->sun, 0);
     } else if (s) set_sky(v, neutral_above, neutral_below), add_light(v, to_sun, neutral_sun, 1);
-    else set_sky(v, above, below), add_light(v, to_sun, sun, 1);
+    else set_sky(v, sky_above, sky_below), add_light(v, to_sun, sun, 1);
 }
 
 static void add_scaled(double to[3], const float rgb[3], double factor) {
@@ -543,12 +545,14 @@ static int set_light(viewer *v) {
     const scene *s = v->o.scene;
     const char *env = v->o.env, *scene_env = s ? (v->o.mode >= DVR ? s->dvr_env : s->env) : NULL;
     isogi_env *e = &v->lighting.env;
+    int sky = env && !strcmp(env, "sky");
     isogi_result result;
     if (!env && !v->o.light_count && scene_env) {
         if (!data_path(v, scene_env)) return 0;
         env = v->path;
     }
-    if (env) {
+    if (sky) set_sky(v, sky_above, sky_below);
+    else if (env) {
         if (!hdr_read(env, &v->env, v->error)) return 0;
         e->rgb = v->env.rgb, e->width = v->env.width, e->height = v->env.height;
     }

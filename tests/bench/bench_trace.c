@@ -1,6 +1,6 @@
 /* Run time against error of isogi_trace.h on the lit scenes of the design.
 
-       build/bench/bench_trace [--quick] OUT.csv
+       build/bench/bench_trace [--quick | --tables] OUT.csv      (--tables: tables 1 and 2 alone, of engine-block and engine)
 
    Error: relative RMSE, sqrt(sum (E - R)^2 / sum R^2), of irradiance over pixels of the standard view (every k-th of 900x900), against
    paths of 4096 samples through the same texels (kept in build/bench/, by everything that defines them). Naive is the paper's way:
@@ -11,7 +11,14 @@
      speedup-SCENE          work: time of naive over time of the default at the error converged
      rays-SCENE             rays a second while baking, one thread
      lazy-SCENE             seconds from the request to usable; lazy-converged-SCENE: to converged
-     full-SCENE             the whole texture (full bench only) */
+     full-SCENE             the whole texture (full bench only)
+     table1-SCENE           Wyman 2006, table 1: irradiance, transfer, and the path-traced picture (a path for every pixel that shows the
+                            surface), with 100, 625, 2500 and 10,000 samples, whole paths. Lazily: the texels of the view; fully: all
+                            texels. Time grows as the samples do: it is measured on as many of both as fit (texels: those of the
+                            chosen pixels; samples: 625), and scaled to all, which the setting says; work: samples. Transfer's errors
+                            are those of relighting by order 5
+     table2-SCENE           Wyman 2006, table 2: seconds and frames/s of displaying the standard view, 512 x 512, two threads; extra memory in the
+                            setting. Lambert, shadowed Lambert, Phong with shadows, irradiance texture, transfer of order 5 */
 #define ISOGI_IMPLEMENTATION
 #include "isogi_trace.h"
 #include "camera.h"
@@ -325,7 +332,159 @@ static void row(FILE *csv, const char *name, const bench_scene *s, const char *m
     fprintf(stderr, "  %s%s %s %s: %.3g s, error %.4f, %.4g %s\n", name, s->name, method, setting, seconds, error, work, unit);
 }
 
-static void bench(FILE *csv, const char *name, int quick) {
+/* ---- tables 1 and 2 of Wyman 2006 --------------------------------------------------------------------------------------------------- */
+
+/* Error of transfer, relit by the scene's lighting. */
+static outcome transferred(const bench_scene *s, const isogi_trace_desc *desc) {
+    isogi_trace *t = NULL;
+    isogi_counters counters = {0};
+    outcome o = {0};
+    double begin = seconds_now();
+    if (isogi_trace_create(&t, desc, &two) != ISOGI_OK || isogi_trace_request(t, (const float(*)[3])chosen, picked) != ISOGI_OK || isogi_trace_step(t, 0, NULL) != ISOGI_OK) exit(1);
+    o.seconds = seconds_now() - begin;
+    if (desc->mode == ISOGI_TRACE_TRANSFER && isogi_trace_relight(t, &s->desc.lighting) != ISOGI_OK) exit(1);
+    isogi_trace_sample(t, (const float(*)[3])chosen, picked, light, NULL);
+    isogi_trace_counters(t, &counters);
+    o.error = error_of(light), o.rays = (double)counters.rays, o.texels = (double)counters.texels;
+    isogi_trace_free(t);
+    return o;
+}
+
+/* Texels that a texture has in all, and that the view reads. */
+static double texel_count(const bench_scene *s, int lazy) {
+    isogi_trace_desc d = s->desc;
+    isogi_trace *t = NULL;
+    double count;
+    d.lazy = lazy, d.method = ISOGI_TRACE_PATHS;
+    if (isogi_trace_create(&t, &d, &two) != ISOGI_OK || isogi_trace_request(t, (const float(*)[3])points, seen) != ISOGI_OK) exit(1);
+    count = (double)t->wanted;
+    isogi_trace_free(t);
+    return count;
+}
+
+static void table1(FILE *csv, const bench_scene *s) {
+    static const int samples[4] = {100, 625, 2500, 10000};
+    static float e[MOST][3];
+    double all[2] = {texel_count(s, 0), texel_count(s, 1)}, begin, base = 0;
+    outcome o[2];
+    isogi_trace_desc d = s->desc;
+    char setting[96];
+    for (int mode = 0; mode < 2; mode++) {
+        d.method = ISOGI_TRACE_PATHS, d.samples = samples[0], d.mode = (isogi_trace_mode)mode, d.order = 5;
+        if (mode) memset(&d.lighting, 0, sizeof d.lighting);
+        o[mode] = transferred(s, &d);
+        d.samples = samples[1]; /* with which the error falls; more would take minutes for no more insight */
+        outcome more = transferred(s, &d);
+        for (int k = 0; k < 4; k++) {
+            double error = k == 0 ? o[mode].error : more.error;
+            for (int lazy = 0; lazy < 2; lazy++) {
+                double seconds = (k ? more.seconds * samples[k] / samples[1] : o[mode].seconds) / o[mode].texels * all[lazy];
+                snprintf(setting, sizeof setting, "%s samples=%d (%s)", lazy ? "lazy" : "full", samples[k], k < 2 ? "texels scaled" : "texels and samples scaled; error of 625");
+                row(csv, "table1-", s, mode ? "transfer" : "irradiance", setting, seconds, error, samples[k], "samples");
+            }
+        }
+    }
+    d = s->desc, d.samples = samples[0], d.method = ISOGI_TRACE_PATHS;
+    begin = seconds_now();
+    if (isogi_trace_gather(&d, (const float(*)[3])chosen, NULL, picked, e, NULL, &two) != ISOGI_OK) exit(1);
+    base = (seconds_now() - begin) * (double)seen / (double)picked;
+    for (int k = 0; k < 4; k++) {
+        snprintf(setting, sizeof setting, "samples=%d (pixels%s scaled)", samples[k], k ? " and samples; error of 100" : "");
+        row(csv, "table1-", s, "path-traced picture", setting, base * samples[k] / samples[0], error_of(e), samples[k], "samples");
+    }
+    d.method = ISOGI_TRACE_FEEDBACK, d.samples = 16;
+    o[0] = ours(s, &d, &two);
+    row(csv, "table1-", s, "default", "lazy samples=16 by feedback", o[0].seconds, o[0].error, 16, "samples");
+}
+
+enum { FRAME = 512 };
+typedef struct frame_job {
+    const bench_scene *s;
+    const isogi_trace *texture; /* NULL: by normals */
+    int shadows, phong;
+    double eye[3], centre[3];
+    float *image;
+} frame_job;
+
+/* A row of the picture: rays, then light by the texture or by normal, lamp and shadow ray. */
+static void frame_task(void *arg, size_t y) {
+    const frame_job *job = (const frame_job *)arg;
+    const bench_scene *s = job->s;
+    static const double lamp[3] = {0.371, 0.743, 0.557};
+    isogi_ray ray[FRAME], shadow[FRAME];
+    isogi_hit hit[FRAME];
+    float position[FRAME][3], normal[FRAME][3], e[FRAME][3], *image = job->image + 3 * y * FRAME;
+    uint8_t blocked[FRAME];
+    size_t at[FRAME], n = 0;
+    camera c;
+    camera_look(&c, FRAME, FRAME, job->eye, job->centre, s->up, 45);
+    memset(ray, 0, sizeof ray);
+    for (int x = 0; x < FRAME; x++) {
+        double d[3];
+        camera_direction(&c, x, (int)y, d);
+        for (int a = 0; a < 3; a++) ray[x].origin[a] = job->eye[a], ray[x].dir[a] = (float)d[a];
+        ray[x].isovalue = s->isovalue;
+    }
+    isogi_vol_intersect(s->pyramid, ray, FRAME, hit, NULL);
+    for (size_t x = 0; x < FRAME; x++)
+        if (hit[x].side) hit[n] = hit[x], ray[n] = ray[x], at[n++] = x;
+    isogi_vol_positions(s->pyramid, hit, n, position);
+    memset(image, 0, 3 * FRAME * sizeof *image);
+    if (job->texture) {
+        isogi_trace_sample(job->texture, (const float(*)[3])position, n, e, NULL);
+        for (size_t i = 0; i < n; i++) memcpy(image + 3 * at[i], e[i], sizeof e[i]);
+        return;
+    }
+    isogi_vol_normals(s->pyramid, hit, n, ISOGI_NORMAL_SMOOTH, normal);
+    for (size_t i = 0; i < n; i++) {
+        memset(&shadow[i], 0, sizeof shadow[i]);
+        for (int a = 0; a < 3; a++) shadow[i].origin[a] = (double)position[i][a] + 0.5 * (double)normal[i][a], shadow[i].dir[a] = (float)lamp[a];
+        shadow[i].isovalue = s->isovalue, blocked[i] = 0;
+    }
+    if (job->shadows) isogi_vol_occluded(s->pyramid, shadow, n, blocked, NULL);
+    for (size_t i = 0; i < n; i++) {
+        double cosine = 0, mirrored = 0, shine = 0;
+        for (int a = 0; a < 3; a++) cosine += lamp[a] * (double)normal[i][a];
+        for (int a = 0; a < 3; a++) mirrored -= (double)ray[i].dir[a] * (2 * cosine * (double)normal[i][a] - lamp[a]);
+        if (job->phong && mirrored > 0) shine = pow(mirrored, 40);
+        for (int a = 0; a < 3; a++) image[3 * at[i] + (size_t)a] = (float)(0.5 + (blocked[i] || cosine < 0 ? 0 : 3 * cosine + shine));
+    }
+}
+
+static void table2(FILE *csv, const bench_scene *s) {
+    static const char *const name[5] = {"lambert", "lambert shadowed", "phong shadowed", "default", "transfer"};
+    const isogi_volume *v = isogi_vol_volume(s->pyramid);
+    frame_job job = {.s = s, .image = calloc(3 * FRAME * FRAME, sizeof *job.image)};
+    double toward[3], radius, best;
+    for (int a = 0; a < 3; a++) job.centre[a] = 0.5 * v->spacing[a] * (double)(v->size[a] - 1), toward[a] = s->toward[a];
+    radius = sqrt(vector_dot(job.centre, job.centre)), vector_normalize(toward);
+    for (int a = 0; a < 3; a++) job.eye[a] = job.centre[a] + toward[a] * radius / sin(PROCEDURAL_PI / 8);
+    for (int k = 0; k < 5; k++) {
+        isogi_trace *t = NULL;
+        isogi_trace_desc d = s->desc;
+        char setting[64];
+        size_t whole;
+        if (k > 2) {
+            d.samples = 1, d.bounces = 0, d.method = ISOGI_TRACE_PATHS;
+            if (k == 4) d.mode = ISOGI_TRACE_TRANSFER, memset(&d.lighting, 0, sizeof d.lighting);
+            if (isogi_trace_create(&t, &d, &two) != ISOGI_OK || isogi_trace_request(t, (const float(*)[3])points, seen) != ISOGI_OK || isogi_trace_step(t, 0, NULL) != ISOGI_OK) exit(1);
+            if (k == 4 && isogi_trace_relight(t, &s->desc.lighting) != ISOGI_OK) exit(1);
+        }
+        job.texture = t, job.shadows = k == 1 || k == 2, job.phong = k == 2, best = 1e9;
+        for (int i = 0; i < 7; i++) {
+            double begin = seconds_now();
+            isogi_parallel(&two, FRAME, frame_task, &job, 0, 1);
+            best = fmin(best, seconds_now() - begin);
+        }
+        whole = k > 2 ? (size_t)(texel_count(s, 0) * (k == 3 ? 14 : 52)) : 0; /* bytes of a record; a lazy texture holds what was seen */
+        snprintf(setting, sizeof setting, "memory lazy=%.1fMB full=%.1fMB", (double)isogi_trace_memory(t) / 1e6, (double)whole / 1e6);
+        row(csv, "table2-", s, name[k], setting, best, 0, 1 / best, "frames/s");
+        isogi_trace_free(t);
+    }
+    free(job.image);
+}
+
+static void bench(FILE *csv, const char *name, int quick, int tables) {
     bench_scene s;
     double usable, converged, texels, seconds;
     outcome o, best = {0};
@@ -335,6 +494,10 @@ static void bench(FILE *csv, const char *name, int quick) {
     if (!scene_load(&s, name)) return;
     view(&s, quick ? 400 : 3000);
     if (!reference_make(&s)) exit(1);
+    if (tables) {
+        table1(csv, &s), table2(csv, &s);
+        return;
+    }
     (void)naive(&s, 10, &usable, &texels);
     seconds = naive(&s, 100, &converged, &texels);
     d = s.desc;
@@ -369,6 +532,7 @@ static void bench(FILE *csv, const char *name, int quick) {
     if (!quick) {
         d.lazy = 0, d.samples = 8, o = ours(&s, &d, &two);
         row(csv, "full-", &s, "default", "samples=8", o.seconds, o.error, o.rays, "rays");
+        table1(csv, &s), table2(csv, &s);
     }
     isogi_vol_free(s.pyramid), free(s.image.rgb);
     if (!strcmp(name, "engine-block")) procedural_free(&s.volume);
@@ -376,11 +540,11 @@ static void bench(FILE *csv, const char *name, int quick) {
 }
 
 int main(int argc, char **argv) {
-    int quick = argc > 1 && !strcmp(argv[1], "--quick");
+    int tables = argc > 1 && !strcmp(argv[1], "--tables"), quick = tables || (argc > 1 && !strcmp(argv[1], "--quick"));
     FILE *csv = argc == 2 + quick ? fopen(argv[1 + quick], "w") : NULL;
-    if (!csv) return fprintf(stderr, "usage: bench_trace [--quick] OUT.csv\n"), 2;
+    if (!csv) return fprintf(stderr, "usage: bench_trace [--quick | --tables] OUT.csv\n"), 2;
     fprintf(csv, "header,case,method,setting,seconds,error,work,unit\n");
-    bench(csv, "engine-block", quick), bench(csv, "engine", quick);
-    if (!quick) bench(csv, "bonsai", quick), bench(csv, "cthead", quick);
+    bench(csv, "engine-block", quick, tables), bench(csv, "engine", quick, tables);
+    if (!quick) bench(csv, "bonsai", quick, tables), bench(csv, "cthead", quick, tables);
     return fclose(csv) != 0;
 }
