@@ -180,7 +180,7 @@ static void study_frames(const study *s) {
             if (!kind && !lighting.env.rgb && !lighting.env.sh) continue;
             desc.order = order, desc.directions = 32;
             frame f = frame_of(s, &desc, 0, &lighting);
-            snprintf(setting, sizeof setting, "%s, %d coefficients", kinds[kind], order * order);
+            snprintf(setting, sizeof setting, "%s %d coefficients", kinds[kind], order * order);
             row("frames", s->name, "", order == s->base.order && kind == 1 ? "default" : kinds[kind], setting, f.render, 0, 1, "frame");
             free(f.srgb);
         }
