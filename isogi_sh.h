@@ -1528,26 +1528,24 @@ ISOGI_SH__AVX512 ISOGI_SH__INLINE void isogi_sh__eval_d8_split(isogi_sh__d8 *u, 
     }                                                                                                                          \
     /* `count` rows, 9 or more, for as many directions as are lanes: by eight, after one alone or eight of which some come again */ \
     TARGET ISOGI_SH__INLINE void NAME##_turn_all(T *out, size_t n, const V *rows, size_t count) {                              \
-        size_t k;                                                                                                              \
-        if ((count & 7) == 1)                                                                                                  \
-            for (k = 0; k < WIDTH; k++) out[n * k] = ((const T *)rows)[k];                                                     \
-        else if (count & 7) TURN(out, n, rows);                                                                                \
-        for (k = count & 7; k < count; k += 8) TURN(out + k, n, rows + k);                                                     \
+        size_t k, rest = count & 7;                                                                                            \
+        for (k = 0; k < WIDTH && rest == 1; k++) out[n * k] = ((const T *)rows)[k];                                            \
+        for (k = rest == 1; k < count; k = k || !rest ? k + 8 : rest) TURN(out + k, n, rows + k);                              \
     }                                                                                                                          \
     TARGET static size_t NAME##_rows(T *out, int order, const T (*direction)[3], size_t count) {                               \
         V rows[ISOGI_SH__SPLIT * ISOGI_SH__SPLIT] __attribute__((aligned(64))), state[2 * ISOGI_SH__TABLE_ORDER], u[4];        \
-        size_t i, n = ISOGI_SH_COUNT(order), first = n;                                                                        \
+        size_t i, n = ISOGI_SH_COUNT(order);                                                                                   \
         if (order == 5) return NAME##_rows5(out, direction, count);                                                            \
-        if (order > ISOGI_SH__SPLIT) first = ISOGI_SH__SPLIT * ISOGI_SH__SPLIT;                                                \
         for (i = 0; i + WIDTH <= count; i += WIDTH, out += n * WIDTH) {                                                        \
+            int from, to;                                                                                                      \
             NAME##_split(u, direction[i]);                                                                                     \
             if (!NAME##_unit(u)) break;                                                                                        \
-            if (order <= ISOGI_SH__LOW_ORDER) NAME##_low((T *)rows, WIDTH, order, u);                                          \
-            else NAME##_any((T *)rows, WIDTH, 0, order < ISOGI_SH__SPLIT ? order : ISOGI_SH__SPLIT, u, state);                 \
-            NAME##_turn_all(out, n, rows, first);                                                                              \
-            if (order <= ISOGI_SH__SPLIT) continue;                                                                            \
-            NAME##_any((T *)rows, WIDTH, ISOGI_SH__SPLIT, order, u, state);                                                    \
-            NAME##_turn_all(out + first, n, rows, n - first);                                                                  \
+            for (from = 0; from < order; from = to) {                                                                          \
+                to = from || order < ISOGI_SH__SPLIT ? order : ISOGI_SH__SPLIT;                                                \
+                if (order <= ISOGI_SH__LOW_ORDER) NAME##_low((T *)rows, WIDTH, order, u);                                      \
+                else NAME##_any((T *)rows, WIDTH, from, to, u, state);                                                         \
+                NAME##_turn_all(out + from * from, n, rows, (size_t)(to * to - from * from));                                  \
+            }                                                                                                                  \
         }                                                                                                                      \
         return i;                                                                                                              \
     }
