@@ -203,6 +203,42 @@ TEST(batches_are_exact_at_every_level) {
     instruction_level = 99;
 }
 
+/* Floats against doubles of the plain code, which the tests above compare with 128 bits: cheap, so that many directions are seen.
+   Bounds are those of the next degree that the header names. */
+TEST(floats_are_exact_at_many_directions) {
+    static const struct { int order; double bound; } cases[] = {{3, 4.5e-7}, {5, 4.5e-7}, {6, 2.2e-6}, {8, 2.2e-6}, {10, 2.2e-6}, {11, 2.2e-6}, {12, 1e-5}, {15, 1e-5}, {16, 1e-5}, {21, 1e-5}};
+    enum { BLOCK = 64 };
+    static float d[BLOCK][3], y[BLOCK * 441];
+    static double wide[BLOCK][3], expected[BLOCK * 441];
+    test_random r = {43};
+    for (size_t c = 0; c < sizeof cases / sizeof *cases; c++) {
+        double worst[3] = {0, 0, 0};
+        size_t count = (size_t)BLOCK * ISOGI_SH_COUNT(cases[c].order);
+        for (int block = 0; block < (LONG_SUITE ? 4000 : 160); block++) {
+            for (int i = 0; i < BLOCK; i++) {
+                double z = random_range(&r, -1, 1), phi = random_range(&r, 0, 2 * pi), s;
+                if (i % 4 == 1) z = 1 - pow(10, -6 * random_unit(&r));
+                if (i % 4 == 2) z = pow(10, -7 * random_unit(&r));
+                s = sqrt(1 - z * z);
+                d[i][0] = rounded(s * cos(phi)), d[i][1] = rounded(s * sin(phi)), d[i][2] = rounded(z);
+                for (int k = 0; k < 3; k++) wide[i][k] = (double)d[i][k];
+            }
+            instruction_level = 0;
+            isogi_sh_eval_f64(expected, cases[c].order, (const double(*)[3])wide, BLOCK);
+            for (; instruction_level < 3; instruction_level++) {
+                isogi_sh_eval(y, cases[c].order, (const float(*)[3])d, BLOCK);
+                for (size_t i = 0; i < count; i++) {
+                    double error = fabs((double)y[i] - expected[i]);
+                    if (!(error <= worst[instruction_level])) worst[instruction_level] = error;
+                }
+            }
+        }
+        instruction_level = 99;
+        printf("    order %2d: %.3g, %.3g, %.3g at levels 0, 1, 2\n", cases[c].order, worst[0], worst[1], worst[2]);
+        for (int k = 0; k < 3; k++) CHECK(worst[k] <= cases[c].bound * ROUNDING_FACTOR, "order %d, level %d: %g", cases[c].order, k, worst[k]);
+    }
+}
+
 /* Length does not matter, from denormal to huge; the zero vector and what is not finite count as +z. */
 TEST(any_length_and_no_length) {
     static const float scales[] = {1, 1e-44f, 1e-38f, 1e-20f, 3e20f, 3e38f};
