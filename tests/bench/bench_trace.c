@@ -389,7 +389,7 @@ static void table1(FILE *csv, const bench_scene *s) {
     if (isogi_trace_gather(&d, (const float(*)[3])chosen, NULL, picked, e, NULL, &two) != ISOGI_OK) exit(1);
     base = (seconds_now() - begin) * (double)seen / (double)picked;
     for (int k = 0; k < 4; k++) {
-        snprintf(setting, sizeof setting, "samples=%d (pixels%s scaled)", samples[k], k ? " and samples; error of 100" : "");
+        snprintf(setting, sizeof setting, "samples=%d (pixels%s)", samples[k], k ? " and samples scaled; error of 100" : " scaled");
         row(csv, "table1-", s, "path-traced picture", setting, base * samples[k] / samples[0], error_of(e), samples[k], "samples");
     }
     d.method = ISOGI_TRACE_FEEDBACK, d.samples = 16;
