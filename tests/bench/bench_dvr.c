@@ -321,7 +321,7 @@ static void bench_update(const bench_scene *s, const isogi_pyramid *pyramid, con
         if (m == ISOGI_DVR_PAPER) desc.sphere = ISOGI_DVR_OCTAHEDRON;
         if (m == 4) desc.directions = s->rays / 2;
         if (m > 4) desc.directions = s->rays << (m - 4);
-        for (int turn = 0; turn < (m == ISOGI_DVR_PAPER ? 1 : 3); turn++) {
+        for (int turn = 0; turn < (m == ISOGI_DVR_PAPER || m > 4 ? 1 : 3); turn++) {
             isogi_dvr *dvr = NULL;
             double begun;
             if (isogi_dvr_create(&dvr, &desc, &threads) != ISOGI_OK) exit(1);
