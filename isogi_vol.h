@@ -4287,7 +4287,8 @@ ISOGI_VOL__AVX512 static unsigned isogi_vol__decide8(isogi_vol__batch *b, isogi_
 }
 
 /* Sets up to eight rays up at once and puts them into slots: the operations of begin and aim, in their order and without contraction.
-   Returns the rays that have a slot now; *odd: those that are left to the code for one. The others miss the box. */
+   Returns the rays that have a slot now; *odd: those that are left to the code for one. The others miss the box. A kernel, longer than a
+   screen: nothing in it is worth a name of its own. */
 ISOGI_VOL__AVX512 static unsigned isogi_vol__seat8(isogi_vol__batch *b, isogi_vol__pool *s, size_t first, int count, const uint8_t *slots, unsigned *odd) {
     const isogi_pyramid *p = b->pyramid;
     const __mmask8 lanes = (__mmask8)((1u << count) - 1);
