@@ -31,8 +31,8 @@ export CC CXX CFLAGS
 all: $(EXAMPLES)
 
 # The implementation of each header is compiled once, and switched off in the programs that are linked with it: it takes most of the
-# time. A test that looks at what is private to a header (isogi_vol__name) holds that header's implementation itself; benchmarks
-# hold all.
+# time. A test that looks at what is private to a header (isogi_vol__name), or sets what it is compiled with, holds that header's
+# implementation itself.
 HEADERS := sh vol trace dvr
 OBJECTS := $(HEADERS:%=build/isogi_%.o)
 
@@ -40,8 +40,8 @@ OBJECTS := $(HEADERS:%=build/isogi_%.o)
 # libraries of its own. What does not compile must not leave an older program behind.
 COMPILE = @rm -f $@; echo "$(CC) $<"; \
 	libs=$$(sed -n '1,20s|.*LIBS: \([^*]*\).*|\1|p' $<); \
-	shared=$$(for h in $(2); do grep -q "isogi_$${h}__\|looks inside.*isogi_$$h" $< || \
-		echo "-D$$(echo isogi_$$h | tr a-z A-Z)_IMPLEMENTED build/isogi_$$h.o"; done); \
+	shared=$$(for h in $(2); do H=ISOGI_$$(echo $$h | tr a-z A-Z); \
+		grep -q "isogi_$${h}__\|looks inside.*isogi_$$h\|define $${H}_LEVEL" $< || echo "-D$${H}_IMPLEMENTED build/isogi_$$h.o"; done); \
 	$(CC) $(C99) $(CFLAGS) -MMD -MP -MF $@.d -MT $@ $(1) -o $@ $< $$shared $(LIBS) $$libs
 
 # As strict C99; what the compiler said is kept for the tests, which want silence.
@@ -59,8 +59,8 @@ build/bake_mpi: examples/bake_mpi.c build/flags
 build/tests/%: tests/%.c build/flags $(OBJECTS)
 	$(call COMPILE,-Itests,$(HEADERS))
 
-build/bench/%: tests/bench/%.c build/flags
-	$(call COMPILE,-Itests)
+build/bench/%: tests/bench/%.c build/flags $(OBJECTS)
+	$(call COMPILE,-Itests,$(HEADERS))
 
 # Changes only when the compiler or its flags do, so that another CC builds everything anew.
 build/flags: FORCE

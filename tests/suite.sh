@@ -243,7 +243,7 @@ long)
     if have mpirun && have mpicc; then item check mpi/same-bits "sh tests/compile/mpi.sh"
     else item skip mpi/same-bits "mpicc and mpirun are not installed"
     fi
-    item check bench/tables "sh tests/bench/contract.sh"
+    item check bench/tables "sh tests/bench/contract.sh sh vol" # trace and dvr take too long beside other work
     analysers
     variants "$@"
     emulators "$@"
