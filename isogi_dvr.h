@@ -79,7 +79,8 @@
    in all directions, interpolated from a regular grid. Where nothing casts shadows, V(w) = 1, and a sky of radiance 1 from
    everywhere gives g_s = rgb / (4 pi) * 4 pi = rgb: colour is the albedo, and under a uniform sky of 1 a medium without shadows
    looks as it does unlit. A directional light of irradiance E gives g_s = rgb E V / (4 pi). The truncated series can be
-   negative: it is clamped at zero.
+   negative: it is clamped at zero. Matter that is dense for the grid is lit as what is in front of it: in physical space V is looked up
+   off = r x^2 / (x^2 + 16) nearer to the eye, where r is 1.5 grid distances and x the optical depth of r in the matter of the sample.
 
    Visibility is sampled in `directions` directions and projected to SH, by one of the methods of isogi_dvr_method. Brute force
    marches every ray from every grid point through the same transfer function (in the same space; peaks attenuate at every
@@ -727,6 +728,7 @@ struct isogi_dvr {
     size_t changed_count;
     uint8_t *leap;               /* one byte a block of level 0: how many blocks around it are empty, itself first; 0 = it is not */
     float grid_scale[3];         /* grid points of visibility to a voxel */
+    double reach;                /* how far visibility may be looked up in front of dense matter: units of `spacing` */
     size_t classified, computed; /* blocks classified anew so far; blocks whose local visibility was computed */
     isogi_dvr__blocks blocks;
     float *basis;                /* the paper's method: [directions][order * order] */
@@ -2063,7 +2065,13 @@ ISOGI_API isogi_result isogi_dvr_create(isogi_dvr **dvr, const isogi_dvr_desc *d
         const double *m = d->volume.axes + a;
         longest += d->cells[a] * (d->volume.spacing[a] / d->spacing) * sqrt(m[0] * m[0] + m[3] * m[3] + m[6] * m[6]);
     }
-    for (a = 0; a < 3; a++) d->grid_scale[a] = d->cells[a] ? (float)(((double)d->desc.grid[a] - 1) / d->cells[a]) : 0;
+    for (a = 0; a < 3; a++) {
+        const double *m = d->volume.axes + a;
+        double distance = d->volume.spacing[a] / d->spacing * sqrt(m[0] * m[0] + m[3] * m[3] + m[6] * m[6]);
+        d->grid_scale[a] = d->cells[a] ? (float)(((double)d->desc.grid[a] - 1) / d->cells[a]) : 0;
+        distance = d->grid_scale[a] > 0 ? 1.5 * distance / (double)d->grid_scale[a] : 0;
+        d->reach = distance > d->reach ? distance : d->reach;
+    }
     d->piece = desc->step > 0 ? resolved.step : 1;
     d->visibility_step = resolved.visibility_step > 0 ? resolved.visibility_step : 2 * resolved.step;
     isogi_vol_range(resolved.pyramid, range);
@@ -2669,6 +2677,11 @@ static float isogi_dvr__openness(float v0) {
     share = share > 0.01f ? share : 0.01f;
     return share < 1 ? share * share : 1;
 }
+
+/* How far in front of a sample visibility is looked up, towards the eye; in units of the smallest spacing. Where much of the light is lost
+   from one grid point to the next, what lies between two of them is not visibility but how deep each is buried: rings and blotches.
+   The skin of dense matter is therefore lit as the points in front of it are. depth: optical, of the reach. */
+static double isogi_dvr__stand_off(double reach, double depth) { return reach * depth * depth / (depth * depth + 16); }
 
 /* Trilinear in the grid of visibility: the eight points around a position given in the volume's grid coordinates; `open`: each weighed by
    what it counts for. */
@@ -4032,12 +4045,17 @@ static double isogi_dvr__scatter(const isogi_dvr *d, const float *light, const f
 }
 
 /* 1/(4 pi) L . V at a place (Kronander 2011, section 4.4). */
-static void isogi_dvr__shade_visibility(const isogi_dvr *d, const isogi_dvr__lights *l, const double grid[3], const float dir[3], double out[3]) {
+static void isogi_dvr__shade_visibility(const isogi_dvr *d, const isogi_dvr__lights *l, const double grid[3], const double front[3], const float dir[3],
+                                        double out[3]) {
     float v[ISOGI_DVR__MAX_ORDER * ISOGI_DVR__MAX_ORDER], nearby[3 * ISOGI_DVR__MAX_ORDER * ISOGI_DVR__MAX_ORDER];
     size_t i;
     int a, here = 0;
     if (l->local) isogi_dvr__local_at(d, isogi_dvr__block_of(&d->blocks, grid), grid, v);
-    else isogi_dvr__visibility_at(d, grid, 1, v);
+    else {
+        double place[3];
+        for (a = 0; a < 3; a++) place[a] = grid[a] + front[a];
+        isogi_dvr__visibility_at(d, place, 1, v);
+    }
     if (l->nearby.light_count) {
         double world[3];
         float point[3];
@@ -4158,6 +4176,7 @@ typedef struct isogi_dvr__pixel_ray {
     float dir[3];
     double clear, rgb[3]; /* transmittance and premultiplied colour so far */
     double end;           /* transmittance at which the ray ends */
+    double front[3];      /* from a sample to where its visibility is looked up: grid */
     int probe;            /* 1: no colour; where does the transmittance pass `end`? */
     double t;             /* the answer, in the march's t */
 } isogi_dvr__pixel_ray;
@@ -4169,7 +4188,7 @@ static void isogi_dvr__shade(const isogi_dvr__pixel_ray *r, const int cell[3], c
     int a;
     if (r->dvr->desc.shading == ISOGI_DVR_UNLIT) return;
     for (a = 0; a < 3; a++) grid[a] = cell[a] + local[a];
-    if (r->dvr->desc.shading == ISOGI_DVR_VISIBILITY) isogi_dvr__shade_visibility(r->dvr, r->lights, grid, r->dir, light);
+    if (r->dvr->desc.shading == ISOGI_DVR_VISIBILITY) isogi_dvr__shade_visibility(r->dvr, r->lights, grid, r->front, r->dir, light);
     else if (r->dvr->desc.shading == ISOGI_DVR_TWO_SIDED)
         isogi_dvr__shade_two_sided(r->dvr, r->lights, cell, local, r->dir, side, opacity, light, add);
     else isogi_dvr__shade_local(r->dvr, r->lights, cell, local, r->dir, light);
@@ -4423,6 +4442,7 @@ static void isogi_dvr__cast_values(isogi_dvr__pixel_ray *r, isogi_dvr__march *m)
 static void isogi_dvr__cast(isogi_dvr__pixel_ray *r, isogi_dvr__march *m, isogi_dvr__crossings *c) {
     isogi_dvr__sample s;
     size_t i;
+    int a;
     if (isogi_dvr__by_value(r->dvr)) {
         isogi_dvr__cast_values(r, m);
         return;
@@ -4433,7 +4453,13 @@ static void isogi_dvr__cast(isogi_dvr__pixel_ray *r, isogi_dvr__march *m, isogi_
         if (!(r->clear > r->end)) break;
         if (!r->probe) {
             isogi_dvr__colour(r->dvr->transfer.points, r->dvr->transfer.point_count, s.value, rgb);
+            if (r->dvr->desc.space == ISOGI_DVR_PHYSICAL && r->dvr->desc.shading == ISOGI_DVR_VISIBILITY) {
+                double reach = r->dvr->reach * r->dvr->spacing / m->speed, off = isogi_dvr__stand_off(reach, s.depth / (s.to - s.from) * reach);
+                off = isogi_dvr__clamp(off, 0.5 * (s.from + s.to)); /* not before the ray begins */
+                for (a = 0; a < 3; a++) r->front[a] = -off * m->dir[a];
+            }
             isogi_dvr__shade(r, s.cell, s.local, s.side, -expm1(-s.depth), rgb);
+            for (a = 0; a < 3; a++) r->front[a] = 0;
         }
         {
             double from = s.from;
@@ -4468,6 +4494,7 @@ struct isogi_dvr__frame {
     size_t light_stride[3], light_row[2]; /* floats to the neighbours (0 where there is one point); rows, planes */
     float low, scale;   /* class of a value */
     double step;        /* voxels between samples */
+    float reach;        /* as isogi_dvr.reach, in samples */
     float end, dim;     /* transmittance at which a ray ends; at which its samples stand twice as far apart */
     void (*leap)(const isogi_dvr *d, isogi_dvr__packet *p, isogi_counters *work);
     void (*exp_row)(float *x, size_t count);
@@ -4752,9 +4779,10 @@ static void isogi_dvr__fast_radiance(const isogi_dvr__frame *f, const isogi_dvr_
 
 /* A piece of ray, `size` samples long from `at` on, with this mean extinction and premultiplied colour, depth and transmittance. */
 static void isogi_dvr__fast_piece(const isogi_dvr__frame *f, const isogi_dvr__fast_ray *r, isogi_dvr__fast_state *s, const float mean[4], float at, float size, float depth, float clear) {
-    float radiance[4];
     /* light where the piece is seen on average: its middle when it is clear, its beginning when it is dense */
-    isogi_dvr__fast_radiance(f, r, s, at + size * 0.5f / (1 + depth * (1.0f / 6)), radiance);
+    float radiance[4], off = (float)isogi_dvr__stand_off((double)f->reach, (double)(depth / size * f->reach));
+    off = at + size * 0.5f / (1 + depth * (1.0f / 6)) - off;
+    isogi_dvr__fast_radiance(f, r, s, off > 0 ? off : 0, radiance);
     isogi_dvr__add_product4(s->out, radiance, mean, s->clear * (1 - clear) / mean[3]);
     s->clear *= clear;
 }
@@ -5039,7 +5067,7 @@ static isogi_result isogi_dvr__begin_frame(isogi_dvr__render_job *job) {
     f->dvr = d, f->step = d->piece, f->sample_nodes = isogi_dvr__sample_nodes, f->glow = (float)d->desc.emission;
     f->end = 1 - d->desc.opaque, f->dim = 0.125f;
     blocks = (double)d->level[0].size[0] * (double)d->level[0].size[1] * (double)d->level[0].size[2];
-    f->exp_row = d->kernels.exp_row;
+    f->exp_row = d->kernels.exp_row, f->reach = (float)(d->reach / f->step);
     f->leap = blocks < 2e9 ? d->kernels.leap : isogi_dvr__leap;
     f->tolerance = d->desc.tolerance > 0 ? (float)d->desc.tolerance : 0.5f;
     bytes = (double)v->stride[0] * (double)d->cells[0] + (double)v->stride[1] * (double)d->cells[1] + (double)v->stride[2] * (double)d->cells[2];
