@@ -232,7 +232,8 @@ typedef struct isogi_trace_desc {
     isogi_trace_method method; /* isogi_trace_gather: always PATHS */
     int samples;               /* directions per texel; 0 = 64 */
     float error;               /* FEEDBACK: a texel is good enough once its standard error is below this fraction of the light that an
-                                  open texel gets, averaged over all orientations; 0 = every texel gets all its samples */
+                                  open texel gets, averaged over all orientations, or once more samples would hardly lower it: light
+                                  from probes is itself uncertain by 2 %; 0 = every texel gets all its samples */
     uint64_t seed;
     float offset;              /* rays start this many voxels along the normal, up to 1 (a wall may be that thin); 0 = 0.25; negative = on the surface */
     isogi_normal_kind normals; /* of the hemisphere that is integrated over */
