@@ -306,7 +306,7 @@ ISOGI_API void isogi_dvr_free(isogi_dvr *dvr); /* NULL is fine */
    turn comes it keeps what it had. */
 ISOGI_API isogi_result isogi_dvr_set_transfer(isogi_dvr *dvr, const isogi_transfer *transfer);
 
-/* Computes visibility within about max_rays rays, at least one grid point (0 = to the end). *remaining (may be NULL): fraction
+/* Computes visibility within about max_rays rays, at least one grid point, block or direction (0 = to the end). *remaining (may be NULL): fraction
    still to do, 0 = finished. When cancelled, what is finished stays and the next call goes on. Without ISOGI_DVR_VISIBILITY there
    is nothing to do. */
 ISOGI_API isogi_result isogi_dvr_step(isogi_dvr *dvr, uint64_t max_rays, double *remaining);
@@ -1486,7 +1486,7 @@ static isogi_result isogi_dvr__set_kernel(isogi_dvr *d) {
 /* ==== vector kernels ================================================================================================= */
 
 /* For every row, depth[i] += extinction between four nodes of two rows, with the weights times the length of the piece in w. Vectors run
-   over the end of a row: the first float there is put back, the others add padding, which is 0. */
+   over the end of a row: the first float there is put back, the others add padding or, in windows, what nobody reads. */
 static void isogi_dvr__pass(const isogi_dvr__rows *a, const float w[4]) {
     size_t c, i;
     for (c = 0; c < a->rows; c++) {
@@ -3210,7 +3210,7 @@ static isogi_result isogi_dvr__lay_out(isogi_dvr *d, const uint8_t *level, const
         data_count += isogi_dvr__nodes(level[i]), sh_count += isogi_dvr__nodes(lit[i]);
     }
     data = (float *)isogi_allocate(&d->context, data_count, sizeof *data);
-    sh = (uint16_t *)isogi_allocate(&d->context, sh_count * d->coefficients, sizeof *sh);
+    sh = sh_count > SIZE_MAX / d->coefficients ? NULL : (uint16_t *)isogi_allocate(&d->context, sh_count * d->coefficients, sizeof *sh);
     if (!first || (data_count && !data) || (sh_count && !sh)) {
         isogi_release(&d->context, first, 2 * b->total, sizeof *first);
         isogi_release(&d->context, data, data_count, sizeof *data);
@@ -3219,8 +3219,9 @@ static isogi_result isogi_dvr__lay_out(isogi_dvr *d, const uint8_t *level, const
     }
     for (i = 0; i < b->total; i++) {
         size_t count = isogi_dvr__nodes(lit[i]) * d->coefficients, k;
-        uint16_t *to = sh + first[b->total + i] * d->coefficients;
+        uint16_t *to;
         if (!count) continue;
+        to = sh + first[b->total + i] * d->coefficients;
         if (lit[i] == b->lit[i]) memcpy(to, b->sh + b->first[b->total + i] * d->coefficients, count * sizeof *to);
         else
             for (k = 0; k < count; k++) to[k] = k % d->coefficients ? 0 : isogi_dvr__to_half((float)(2 * sqrt(ISOGI_DVR__PI)));
@@ -3641,10 +3642,13 @@ static void isogi_dvr__sweep_run(isogi_dvr__sweep *s, float *out) {
     for (k = 0; k < s->size[0]; k++) {
         isogi_dvr__slip at = isogi_dvr__slip_at(s, k);
         size_t slice = s->backwards ? s->size[0] - 1 - k : k, point = (slice - s->first[0]) / s->every[0];
-        float *plane = out + point * s->out_stride[0];
-        if (slice < s->first[0] || (slice - s->first[0]) % s->every[0] || point >= s->points[0])
+        float *plane;
+        if (slice < s->first[0] || (slice - s->first[0]) % s->every[0] || point >= s->points[0]) {
             isogi_dvr__sweep_add(s, k, &at, k ? 2 * s->piece : s->piece, 0);
-        else if (k && all) {
+            continue;
+        }
+        plane = out + point * s->out_stride[0];
+        if (k && all) {
             isogi_dvr__rows a = {NULL, NULL, NULL, 0, 0, 0, 0, 0, 0};
             isogi_dvr__sweep_add(s, k, &at, s->piece, 1);
             a.from = s->row, a.from_row = s->out_row, a.rows = s->points[1], a.count = s->points[2];

@@ -1315,10 +1315,10 @@ ISOGI_SH__AVX512 ISOGI_SH__INLINE void isogi_sh__eval_f16_turn(float *y, size_t 
     for (k = 0; k < 4; k++) {
         isogi_sh__d8 p = __builtin_shufflevector(v[0][k], v[1][k], 0, 1, 8, 9, 2, 3, 10, 11);
         isogi_sh__d8 q = __builtin_shufflevector(v[0][k], v[1][k], 4, 5, 12, 13, 6, 7, 14, 15);
-        *(isogi_sh__d4 *)(y + n * k) = ISOGI_SH__HALF_D8(p, 0);
-        *(isogi_sh__d4 *)(y + n * (k + 4)) = ISOGI_SH__HALF_D8(p, 1);
-        *(isogi_sh__d4 *)(y + n * (k + 8)) = ISOGI_SH__HALF_D8(q, 0);
-        *(isogi_sh__d4 *)(y + n * (k + 12)) = ISOGI_SH__HALF_D8(q, 1);
+        *(isogi_sh__f8 *)(y + n * k) = (isogi_sh__f8)ISOGI_SH__HALF_D8(p, 0);
+        *(isogi_sh__f8 *)(y + n * (k + 4)) = (isogi_sh__f8)ISOGI_SH__HALF_D8(p, 1);
+        *(isogi_sh__f8 *)(y + n * (k + 8)) = (isogi_sh__f8)ISOGI_SH__HALF_D8(q, 0);
+        *(isogi_sh__f8 *)(y + n * (k + 12)) = (isogi_sh__f8)ISOGI_SH__HALF_D8(q, 1);
     }
 }
 

@@ -290,20 +290,22 @@ ISOGI_API isogi_result isogi_trace_sample_gloss(const isogi_trace *trace, const 
 ISOGI_API isogi_result isogi_trace_sample_transfer(const isogi_trace *trace, const float (*points)[3], size_t count, float *transfer);
 /* ---- when something changes: only what depends on it is computed again ----
    Texels that are to be computed again keep their light until isogi_trace_step has come to them, can be read meanwhile, and count as
-   drafts in isogi_trace_report. With PATHS the result is the same bits as a new bake; FEEDBACK begins with new probes, and takes samples
-   of lazy texels that were not finished anew. Both count as writers; on failure nothing has changed. */
+   drafts in isogi_trace_report. With PATHS the result is the same bits as a new bake; FEEDBACK begins with new probes, takes samples
+   of lazy texels that were not finished anew, and texels that are kept keep what a neighbour on another isosurface lent them. Both count
+   as writers; on failure nothing has changed. */
 
 /* A new description for the same texture. Texels computed again:
      lighting                        IRRADIANCE: all. TRANSFER: none, no rays
      albedo, emission, their tables  those on whose isovalue the tables give another colour, since a texel's paths stay on one isosurface
-                                     (all, where an array's contents were changed in place); none for albedo with 0 bounces
+                                     (all, where an array's contents were changed in place, or emission changes what may be the brightest
+                                     light, to which errors and the formats below FLOAT refer); none for albedo with 0 bounces
      isovalue_min, isovalue_max, lookup  none; texels that come in are computed, those that go out stay
-     material, material_user, samples, bounces, method's error, seed, offset, normals, reach, no_shadows, capped   all
+     material, material_user, samples, bounces, error, seed, offset, reach, no_shadows   all
    All else must be as it was: ISOGI_INVALID. transfer_channels 0 keeps the number of channels. */
 ISOGI_API isogi_result isogi_trace_change(isogi_trace *trace, const isogi_trace_desc *desc);
 
-/* Voxels first..last (both ends included, cut to the volume) are going to change, or have changed. To be called twice: before they do, and
-   after isogi_vol_update. Computed again are texels at these voxels or within two of them, and those whose isosurface passes there, before
+/* Voxels first..last (both ends included, cut to the volume) are going to change, or have changed. To be called twice, without
+   isogi_trace_step in between: before they do, and after isogi_vol_update. Computed again are texels at these voxels or within two of them, and those whose isosurface passes there, before
    or after: no others can see the change. With desc.reach and n bounces, only those within n + 1 reaches. What a lazy texture was asked for at
    places where there was no surface has to be requested again. */
 ISOGI_API isogi_result isogi_trace_touch(isogi_trace *trace, const size_t first[3], const size_t last[3]);
@@ -450,6 +452,8 @@ static double isogi_trace__clamp(double x, double high) {
     x = x > 0 ? x : 0;
     return x < high ? x : high;
 }
+
+static double isogi_trace__dot_wide(const double a[3], const double b[3]) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 
 static double isogi_trace__dot(const float a[3], const float b[3]) {
     return (double)a[0] * (double)b[0] + (double)a[1] * (double)b[1] + (double)a[2] * (double)b[2];
@@ -3360,7 +3364,7 @@ static void isogi_trace__solve(isogi_trace *t) {
     int bounces = t->scene.desc.bounces, pass;
     double change[2] = {0, 0}, before = 0, middle = 0;
     f->diverges = 0;
-    memset(f->probes.out[0], 0, f->probes.count * (size_t)t->values * sizeof(float));
+    if (f->probes.count) memset(f->probes.out[0], 0, f->probes.count * (size_t)t->values * sizeof(float));
     for (pass = 0; bounces < 0 || pass < bounces; pass++) {
         isogi_trace__pass(t, change);
         if (change[0] <= 1e-7 * change[1]) break;
@@ -4265,7 +4269,11 @@ static isogi_result isogi_trace__change_scene(isogi_trace__change *c) {
                  n->albedo_count != b->albedo_count || n->emission_count != b->emission_count;
     for (a = 0; a < 3; a++) c->colours |= !isogi_trace__zero((double)n->albedo[a] - (double)b->albedo[a]);
     paints = n->material != b->material || n->material_user != b->material_user || (n->material && c->colours);
-    c->all |= paints || (!c->colours && c->colours_hash != t->colours_hash);
+    /* arrays changed in place: how they were is not known */
+    c->all |= paints || isogi_trace__hash_colours(b) != t->colours_hash;
+    /* what errors and coarse formats refer to */
+    c->all |= d.mode == ISOGI_TRACE_IRRADIANCE && (!isogi_trace__zero(c->scene.possible - t->scene.possible) ||
+                                                   !isogi_trace__zero(c->scene.unit - t->scene.unit));
     isogi_trace__scene_swap(c);
     return ISOGI_OK;
 }
@@ -4307,17 +4315,28 @@ static int isogi_trace__in_change(const isogi_trace__change *c, const double gri
 
 static int isogi_trace__in_reach(const isogi_trace__change *c, const double grid[3]) {
     const isogi_trace_desc *d = &c->trace->scene.desc;
-    const double *spacing = c->trace->scene.volume->spacing;
-    double square = 0, most = 0, limit;
-    int a;
+    const isogi_pyramid *pyramid = c->trace->scene.pyramid;
+    const double zero[3] = {0, 0, 0};
+    double world[3], origin[3], edge[3][3], apart = 0, most = 0;
+    int a, b;
     if (!(d->reach > 0) || d->bounces < 0) return 1;
-    for (a = 0; a < 3; a++) {
-        double apart = grid[a] < c->low[a] ? c->low[a] - grid[a] : grid[a] > c->high[a] ? grid[a] - c->high[a] : 0;
-        square += apart * apart * spacing[a] * spacing[a];
-        most = spacing[a] > most ? spacing[a] : most;
+    isogi_vol_to_world(pyramid, zero, origin);
+    for (a = 0; a < 3; a++) { /* of a voxel, however axes lie */
+        double one[3] = {0, 0, 0}, square;
+        one[a] = 1;
+        isogi_vol_to_world(pyramid, one, world);
+        for (b = 0; b < 3; b++) edge[a][b] = world[b] - origin[b];
+        square = isogi_trace__dot_wide(edge[a], edge[a]);
+        most = square > most ? square : most;
     }
-    limit = (double)d->reach * (d->bounces + 1) + 2 * most; /* rays start up to a voxel off the texel */
-    return square <= limit * limit;
+    for (a = 0; a < 3; a++) { /* no closer than the planes between which a coordinate lies */
+        const double *u = edge[(a + 1) % 3], *v = edge[(a + 2) % 3];
+        double n[3], voxels = grid[a] < c->low[a] ? c->low[a] - grid[a] : grid[a] > c->high[a] ? grid[a] - c->high[a] : 0, away;
+        for (b = 0; b < 3; b++) n[b] = u[(b + 1) % 3] * v[(b + 2) % 3] - u[(b + 2) % 3] * v[(b + 1) % 3];
+        away = voxels * fabs(isogi_trace__dot_wide(n, edge[a])) / sqrt(isogi_trace__dot_wide(n, n));
+        apart = away > apart ? away : apart;
+    }
+    return apart <= (double)d->reach * (d->bounces + 1) + 2 * sqrt(most); /* rays start up to a voxel off the texel */
 }
 
 /* Whether a computed texel that is not at the changed voxels depends on the change. */

@@ -2086,15 +2086,16 @@ ISOGI_VOL__AVX512 static void isogi_vol__locate_avx512(const isogi_pyramid *p, c
     int i, r;
     for (i = 0; i < n; i += 16) {
         const uint64_t there = n - i >= 16 ? ~(uint64_t)0 : ((uint64_t)1 << 3 * (n - i)) - 1;
-        const __m512 k0 = _mm512_maskz_loadu_ps((__mmask16)there, world[i]), k1 = _mm512_maskz_loadu_ps((__mmask16)(there >> 16), world[i] + 16);
-        const __m512 k2 = _mm512_maskz_loadu_ps((__mmask16)(there >> 32), world[i] + 32);
+        const float *points = (const float *)world + 3 * (size_t)i;
+        const __m512 k0 = _mm512_maskz_loadu_ps((__mmask16)there, points), k1 = _mm512_maskz_loadu_ps((__mmask16)(there >> 16), points + 16);
+        const __m512 k2 = _mm512_maskz_loadu_ps((__mmask16)(there >> 32), points + 32);
         __m512i voxel = _mm512_setzero_si512();
         for (r = 0; r < 3; r++) {
             const __m512i from = _mm512_add_epi32(threes, _mm512_set1_epi32(r)), end = _mm512_set1_epi32(p->cells[r] - 1);
             const __m512 w = _mm512_mask_permutexvar_ps(_mm512_permutex2var_ps(k0, from, k1), (__mmask16)(r < 2 ? 0xf800 : 0xfc00), from, k2);
             const __m512 high = _mm512_set1_ps(g->high[r]), guess = _mm512_fmadd_ps(high, w, _mm512_set1_ps(g->at_high[r] - 1.0f / 512));
             const __m512 clamped = _mm512_min_ps(_mm512_max_ps(guess, zero), _mm512_set1_ps((float)(p->cells[r] - 1))); /* NaN gives 0 */
-            __m512i cell = _mm512_cvttps_epi32(clamped);
+            __m512i cell = _mm512_max_epi32(_mm512_min_epi32(_mm512_cvttps_epi32(clamped), end), _mm512_setzero_si512()); /* in any case */
             __m512 local = _mm512_fmadd_ps(high, w, _mm512_sub_ps(_mm512_set1_ps(g->at_high[r]), _mm512_cvtepi32_ps(cell)));
             __mmask16 next;
             local = _mm512_add_ps(local, _mm512_fmadd_ps(_mm512_set1_ps(g->low[r]), w, _mm512_set1_ps(g->at_low[r])));
@@ -3167,7 +3168,7 @@ static int isogi_vol__machine(void) {
                    __builtin_cpu_supports("avx512vl") && __builtin_cpu_supports("avx512bitalg") &&
                    __builtin_cpu_supports("avx512vbmi") && __builtin_cpu_supports("avx512vbmi2") && __builtin_cpu_supports("avx512vpopcntdq") &&
                    __builtin_cpu_supports("gfni") &&
-                   __builtin_cpu_supports("bmi2")
+                   __builtin_cpu_supports("bmi") && __builtin_cpu_supports("bmi2")
                ? ISOGI_VOL__PATH_AVX512
                : ISOGI_VOL__PATH_AVX2;
 }
@@ -4478,7 +4479,7 @@ ISOGI_VOL__AVX512 static unsigned isogi_vol__seat8(isogi_vol__batch *b, isogi_vo
         flip = _mm512_mask_or_epi64(flip, fall, flip, _mm512_set1_epi64(3 << 2 * a));
         ISOGI_VOL__PUT_REAL(origin[a], origin[a]), ISOGI_VOL__PUT_REAL(dir[a], d[a]), ISOGI_VOL__PUT_REAL(inverse[a], inverse[a]);
     }
-    q = ISOGI_VOL__MUL(ISOGI_VOL__SUB(isovalue, _mm512_set1_pd(p->range[0])), _mm512_set1_pd(p->node_scale)); /* as quantise_isovalue has it */
+    q = ISOGI_VOL__MUL(ISOGI_VOL__SUB(isovalue, _mm512_set1_pd(p->range[0])), _mm512_set1_pd(p->node_scale)); /* as quantise_isovalue has it, up to the last code */
     ISOGI_VOL__PUT_REAL(level_units, _mm512_cvtps_pd(_mm512_cvtpd_ps(q)));
     ISOGI_VOL__PUT(low, _mm512_cvttpd_epi64(_mm512_max_pd(ISOGI_VOL__SUB(q, _mm512_set1_pd(0.01)), zero)));
     ISOGI_VOL__PUT(beyond, _mm512_add_epi64(_mm512_min_epi64(_mm512_cvttpd_epi64(ISOGI_VOL__ADD(q, _mm512_set1_pd(0.01))), _mm512_set1_epi64(253)), _mm512_set1_epi64(1)));
