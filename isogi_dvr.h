@@ -3180,9 +3180,10 @@ static void isogi_dvr__pack_task(void *arg, size_t block) {
     isogi_dvr *d = (isogi_dvr *)arg;
     isogi_dvr__blocks *b = &d->blocks;
     size_t n = b->level[block], at[3] = {block % b->count[0], block / b->count[0] % b->count[1], block / b->count[0] / b->count[1]}, node[3], c[3];
-    float *out = b->data + b->first[block];
+    float *out;
     int step = 0, a;
     if (n != b->packing) return;
+    out = b->data + b->first[block];
     while (((size_t)16 >> step) > n) step++;
     for (node[2] = 0; node[2] <= n; node[2]++)
         for (node[1] = 0; node[1] <= n; node[1]++)
