@@ -370,16 +370,6 @@ TEST(other_textures_are_refused) {
     isogi_trace_free(t), scene_free(&s), scene_free(&s2);
 }
 
-typedef struct scarce { long left, blocks; } scarce;
-static void *scarce_alloc(void *user, size_t size, size_t align) {
-    scarce *m = (scarce *)user;
-    void *p = NULL;
-    if (m->left-- == 0 || posix_memalign(&p, align < sizeof(void *) ? sizeof(void *) : align, size)) return NULL;
-    m->blocks++;
-    return p;
-}
-static void scarce_release(void *user, void *p, size_t size) { (void)size, ((scarce *)user)->blocks--, free(p); }
-
 /* The k-th allocation fails, for every k: the texture is as it was, and the same call works afterwards. */
 TEST(every_allocation_may_fail) {
     enum { W = 16, H = 8 };

@@ -543,19 +543,6 @@ TEST(blocks_belong_to_their_description) {
 
 /* ---- memory that runs out --------------------------------------------------------------------------------------------------------------- */
 
-typedef struct scarce { long left, blocks; } scarce;
-static void *scarce_alloc(void *user, size_t size, size_t align) {
-    scarce *m = (scarce *)user;
-    void *p = NULL;
-    if (m->left-- == 0 || posix_memalign(&p, align < sizeof(void *) ? sizeof(void *) : align, size)) return NULL;
-    m->blocks++;
-    return p;
-}
-static void scarce_release(void *user, void *p, size_t size) {
-    (void)size, ((scarce *)user)->blocks--;
-    free(p);
-}
-
 /* The k-th allocation fails, for every k: an error or success, nothing leaks, and after a failed step or load the rest still works. */
 TEST(every_allocation_may_fail) {
     double q[2] = {0.5, 4};

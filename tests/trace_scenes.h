@@ -11,6 +11,18 @@
 /* radiance 1 = SH coefficient sqrt(4 pi) */
 static const float white_sky[3] = {3.5449077f, 3.5449077f, 3.5449077f};
 
+/* ---- memory whose allocation number `left` fails; blocks: those in use ---- */
+
+typedef struct scarce { long left, blocks; } scarce;
+SHARED void *scarce_alloc(void *user, size_t size, size_t align) {
+    scarce *m = (scarce *)user;
+    void *p = NULL;
+    if (m->left-- == 0 || posix_memalign(&p, align < sizeof(void *) ? sizeof(void *) : align, size)) return NULL;
+    m->blocks++;
+    return p;
+}
+SHARED void scarce_release(void *user, void *p, size_t size) { (void)size, ((scarce *)user)->blocks--, free(p); }
+
 /* ---- scenes -------------------------------------------------------------------------------------------------------------- */
 
 typedef double field(const double p[3], const double *parameter);
