@@ -2419,24 +2419,19 @@ static int isogi_dvr__leave_block(isogi_dvr__walk *w) {
     return 0;
 }
 
+/* Exact at both ends, and between equal values: a face whose voxels all have the value of a peak is on it wherever the ray passes. */
+static double isogi_dvr__mix(double a, double b, double u) { return u < 0.5 ? a + u * (b - a) : b - (1 - u) * (b - a); }
+
 /* The cubic from `in` to `out` (places in the cell) as Bernstein coefficients: values at corners of the box between the two places. */
 static void isogi_dvr__cubic(const double c[8], const double in[3], const double out[3], double b[4]) {
     double x[2][4], y[2][2][2], z[2][2][2];
     int i, j, k;
-    for (i = 0; i < 4; i++) {
-        double step = c[2 * i + 1] - c[2 * i];
-        x[0][i] = c[2 * i] + in[0] * step, x[1][i] = c[2 * i] + out[0] * step;
-    }
+    for (i = 0; i < 4; i++) x[0][i] = isogi_dvr__mix(c[2 * i], c[2 * i + 1], in[0]), x[1][i] = isogi_dvr__mix(c[2 * i], c[2 * i + 1], out[0]);
     for (i = 0; i < 2; i++)
-        for (k = 0; k < 2; k++) {
-            double step = x[i][2 * k + 1] - x[i][2 * k];
-            y[i][0][k] = x[i][2 * k] + in[1] * step, y[i][1][k] = x[i][2 * k] + out[1] * step;
-        }
+        for (k = 0; k < 2; k++)
+            y[i][0][k] = isogi_dvr__mix(x[i][2 * k], x[i][2 * k + 1], in[1]), y[i][1][k] = isogi_dvr__mix(x[i][2 * k], x[i][2 * k + 1], out[1]);
     for (i = 0; i < 2; i++)
-        for (j = 0; j < 2; j++) {
-            double step = y[i][j][1] - y[i][j][0];
-            z[i][j][0] = y[i][j][0] + in[2] * step, z[i][j][1] = y[i][j][0] + out[2] * step;
-        }
+        for (j = 0; j < 2; j++) z[i][j][0] = isogi_dvr__mix(y[i][j][0], y[i][j][1], in[2]), z[i][j][1] = isogi_dvr__mix(y[i][j][0], y[i][j][1], out[2]);
     b[0] = z[0][0][0], b[3] = z[1][1][1];
     b[1] = (z[1][0][0] + z[0][1][0] + z[0][0][1]) * (1 / 3.0), b[2] = (z[1][1][0] + z[1][0][1] + z[0][1][1]) * (1 / 3.0);
 }

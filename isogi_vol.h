@@ -2839,7 +2839,15 @@ static double isogi_vol__cubic_refine(const isogi_vol__cubic *cubic, double low,
     return s;
 }
 
-/* First place in (0, 1] where inside (value >= 0) differs from `inside` at 0; 0 if there is none. `exact` 0: any bound will do.
+/* The same for a cubic that is monotone there, or has no root within: zero at an end is the root itself, so that a layer without
+   thickness in a face is touched in one point, not passed in two. */
+static double isogi_vol__cubic_cross(const isogi_vol__cubic *cubic, double low, double high, double at_low, double at_high, int rising) {
+    if (!(at_high > 0 || at_high < 0)) return high;
+    if (!(at_low > 0 || at_low < 0)) return low;
+    return isogi_vol__cubic_refine(cubic, low, high, at_low, at_high, rising);
+}
+
+/* First place in [0, 1] where inside (value >= 0) differs from `inside` at 0; 0 if there is none. `exact` 0: any bound will do.
    *end_inside: inside at 1. */
 static int isogi_vol__cubic_first(const isogi_vol__cubic *cubic, int inside, int exact, double *root) {
     const double *b = cubic->b;
@@ -2848,7 +2856,9 @@ static int isogi_vol__cubic_first(const isogi_vol__cubic *cubic, int inside, int
     if ((b[1] >= 0) == inside && (b[2] >= 0) == inside && (b[3] >= 0) == inside) return 0;
     if ((b[3] >= 0) != inside && ((b[1] >= 0) == inside || (b[2] >= 0) != inside)) {
         /* the control polygon changes sides once: so does the cubic */
-        *root = exact ? isogi_vol__cubic_refine(cubic, 0, 1, b[0], b[3], !inside) : 1;
+        if (!exact) *root = 1;
+        else if (b[1] > 0 || b[2] > 0) *root = isogi_vol__cubic_refine(cubic, 0, 1, b[0], b[3], !inside);
+        else *root = isogi_vol__cubic_cross(cubic, 0, 1, b[0], b[3], !inside);
         return 1;
     }
     n = isogi_vol__quadratic_roots(b[1] - b[0], 2 * ((b[0] - b[1]) + (b[2] - b[1])), (b[3] - b[0]) + 3 * (b[1] - b[2]), extremum);
@@ -2858,7 +2868,7 @@ static int isogi_vol__cubic_first(const isogi_vol__cubic *cubic, int inside, int
         if (high > 1) high = 1;
         at_high = high < 1 ? isogi_vol__cubic_at(cubic, high) : b[3];
         if ((at_high >= 0) != inside) {
-            *root = exact ? isogi_vol__cubic_refine(cubic, low, high, at_low, at_high, !inside) : high;
+            *root = exact ? isogi_vol__cubic_cross(cubic, low, high, at_low, at_high, !inside) : high;
             return 1;
         }
         if (high >= 1) return 0;
@@ -2876,7 +2886,12 @@ static int isogi_vol__cubic_deflated(const isogi_vol__cubic *cubic, int *inside,
     int n, i;
     *inside = first > 0 ? 1 : first < 0 ? 0 : -1;
     if (*inside < 0) return 0;
-    /* the Bernstein coefficients of what is left, c1 + c2 s + c3 s^2, on one side: no root */
+    if (!(b[3] > 0 || b[3] < 0)) { /* 1 is a root of what is left, c1 + c2 s + c3 s^2; their product is c1 / c3 */
+        const int between = c1 * c3 > 0 && fabs(c1) < fabs(c3);
+        *root = between ? c1 / c3 : 1;
+        return between || !*inside;
+    }
+    /* the Bernstein coefficients of what is left on one side: no root */
     if (*inside ? c1 > 0 && c1 + 0.5 * c2 > 0 && c1 + c2 + c3 > 0 : c1 < 0 && c1 + 0.5 * c2 < 0 && c1 + c2 + c3 < 0) return 0;
     n = isogi_vol__quadratic_roots(c1, c2, c3, r);
     for (i = 0; i < n; i++) {
@@ -3563,7 +3578,8 @@ static int isogi_vol__set_ticks(isogi_vol__ticks *k, const isogi_vol__walk *w) {
     double scale = ISOGI_VOL__TICKS / w->end;
     if (!(scale > 0) || !(scale < 1e300)) return 0;
     k->level = isogi_vol__quantise_isovalue(w->pyramid, w->isovalue, &k->low, &k->high);
-    k->end = (int64_t)ISOGI_VOL__TICKS, k->flip = 0;
+    /* a segment that ends at the border ends with the plane of the border, however that is rounded */
+    k->end = (int64_t)(w->end_is_border ? 2 * ISOGI_VOL__TICKS : ISOGI_VOL__TICKS), k->flip = 0;
     isogi_vol__set_axis(k, w, 0, scale);
     isogi_vol__set_axis(k, w, 1, scale);
     isogi_vol__set_axis(k, w, 2, scale);

@@ -11,6 +11,14 @@ static void field_build(field *f) {
     field_build_with(f, &context);
 }
 
+/* Of hits that two paths may differ in: rays that only touch the surface, in lattice points and faces of its value, are decided by the
+   order of sums, which -ffast-math leaves open. */
+#ifdef __FAST_MATH__
+#define TOUCHES_PER_HIT 1e-3
+#else
+#define TOUCHES_PER_HIT 0
+#endif
+
 enum { NOISE, SMOOTH, QUANTISED, KINDS };
 
 /* White noise; a sum of a few waves; the same rounded to few levels, so that isovalues can equal data. */

@@ -132,6 +132,46 @@ TEST(all_hits_are_those_of_the_reference) {
     CHECK(crossings > 5000 && undecided * 20 < crossings, "%ld crossings, %ld undecided", crossings, undecided);
 }
 
+/* On small whole numbers and an isovalue among them many faces have the isovalue all over: a ray that comes from outside and goes
+   outside again touches such a layer in one point, which is one hit on the face itself. On every path alike. */
+TEST(layers_without_thickness_are_touched_once_on_every_path) {
+    enum { RAYS = 200, MOST = 40 };
+    static isogi_ray rays[RAYS];
+    static isogi_hit hits[5][RAYS][MOST], first[RAYS];
+    static size_t counts[5][RAYS];
+    test_random r = {31};
+    long touched = 0, found = 0, different = 0, wrong = 0;
+    for (int v = 0; v < (LONG_SUITE ? 400 : 40); v++) {
+        field f = field_new(8, 8, 8);
+        for (int i = 0; i < 512; i++) f.value[i] = (double)(random_bits(&r) % 4);
+        for (int i = 0; i < RAYS; i++) rays[i] = random_ray(&f, 1 + i % 2, &r);
+        for (int path = 1; path < 5; path++) {
+            isogi_context context = {.threads = 1, .force_path = path};
+            field_build_with(&f, &context);
+            isogi_vol_intersect_all(f.pyramid, rays, RAYS, MOST, hits[path][0], counts[path], NULL);
+            isogi_vol_intersect(f.pyramid, rays, RAYS, first, NULL);
+            for (int i = 0; i < RAYS; i++) {
+                different += counts[path][i] != counts[1][i] || first[i].side != (counts[1][i] ? hits[1][i][0].side : 0);
+                for (size_t k = 0; k < counts[path][i] && k < counts[1][i]; k++) different += !same_hit(&hits[path][i][k], &hits[1][i][k]);
+            }
+            if (path < 4) isogi_vol_free(f.pyramid), f.pyramid = NULL;
+        }
+        for (int i = 0; i < RAYS; i++)
+            for (size_t k = 0; k + 1 < counts[1][i]; k++) {
+                const isogi_hit *h = &hits[1][i][k];
+                int on_face = 0;
+                for (int a = 0; a < 3; a++) on_face |= !(h->local[a] > 0) || !(h->local[a] < 1);
+                found++;
+                if (h[0].side != h[1].side) continue;
+                touched++, wrong += h->side != 1 || !on_face;
+            }
+        field_free(&f);
+    }
+    printf("    %ld hits, %ld layers touched, %ld wrong, %ld different\n", found, touched, wrong, different);
+    CHECK(wrong == 0 && different <= found * TOUCHES_PER_HIT, "%ld of %ld wrong, %ld different", wrong, touched, different);
+    CHECK(touched > 15, "%ld touched: the test says little", touched);
+}
+
 /* ---- bundles ---- */
 
 TEST(bundles_have_the_bits_of_single_rays) {
