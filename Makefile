@@ -5,6 +5,7 @@
 # make test      the quick tests, under two minutes; ends with "N passed, N failed, N skipped"
 # make check     the long suite: full sizes, every compiler, sanitizer and emulator that is installed
 # make bench     run time against error: build/bench/*.csv and *.svg      (ONLY=sh|vol|trace|dvr|visibility QUICK=1)
+# make bench-peers   rays beside Embree 3, on this machine, where <embree3/rtcore.h> is (libembree-dev)
 # make clean
 # CC, CXX and CFLAGS may be set; nothing but a C compiler and make is needed.
 
@@ -103,11 +104,16 @@ bench: build/bench/plot
 		build/bench/plot build/bench/$$b.csv build/bench/$$b.svg || exit 1; \
 	done
 
+bench-peers:
+	@if echo '#include <embree3/rtcore.h>' | $(CC) -E - > build/bench/peers.log 2>&1; then \
+		$(QUIET_MAKE) build/bench/peer_embree && build/bench/peer_embree; \
+	else echo "bench-peers: <embree3/rtcore.h> is not there (libembree-dev): nothing to compare with"; fi
+
 clean:
 	rm -rf build
 
 -include $(wildcard build/*.d build/tests/*.d build/bench/*.d)
 
 FORCE:
-.PHONY: all demo figures pictures programs test check bench clean FORCE
+.PHONY: all demo figures pictures programs test check bench bench-peers clean FORCE
 .DELETE_ON_ERROR:
