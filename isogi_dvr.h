@@ -266,7 +266,7 @@ typedef struct isogi_dvr_desc {
     double emission;        /* share of rgb that glows by itself, besides scattering light; 0..1e6; with visibility only */
     double radius;          /* the paper's method: of local visibility, in units of the smallest voxel spacing, 1..32; 0 = 16 */
     double reduction;       /* the paper's method: voxels of the volume to points of its blocks, at least 1; 0 = 4. A block that is not
-                               transparent holds a point whatever the budget is, one that the border cuts thinner as many as it takes */
+                               transparent holds a point whatever the budget is; those that the border cuts thin come first for more */
     isogi_dvr_classification classification; /* in data space; visibility rays are exact there, unless this says post-classified */
     int table;                               /* entries along a side of the pre-integrated table, 2..1024; 0 = 256 */
     isogi_dvr_silhouette silhouette;
@@ -688,6 +688,7 @@ typedef struct isogi_dvr__integral {
 /* The paper's flat blocks: see "flat blocks of several levels" below. Block (i, j, k) is i + count[0] * (j + count[1] * k). */
 typedef struct isogi_dvr__blocks {
     size_t count[3], total, reach; /* blocks; how many blocks a local ray reaches beyond its own */
+    size_t rest[3];                /* cells along the last block, 1 .. 16 */
     float *lattice[5];             /* averages of the data, nodes 2, 4, 8, 16 voxels apart; [0] is the volume */
     size_t lattice_size[5][3];
     uint64_t *histogram;           /* classes of values that occur in each block */
@@ -1789,7 +1790,7 @@ static void isogi_dvr__read_row(const isogi_volume *v, size_t first, size_t coun
 /* ==== flat blocks of several levels (Kronander 2011, 4.1, after Ljung et al. 2004) =================================== */
 
 /* A block is one of the pyramid's level 1: 16^3 cells. At level n (16, 8, 4, 2 or 1) it is held at (n + 1)^3 nodes, 16 / n voxels apart;
-   at level 0 not at all. It repeats the nodes of its upper faces from its neighbours, so that a sample never leaves its block. Where
+   at level 0 not at all, and where the volume's border cuts it, at those that surround what is left. It repeats the nodes of its upper faces from its neighbours, so that a sample never leaves its block. Where
    blocks of different levels meet, the nodes on their common face (edge, corner) take what the coarsest of them has there, between its
    nodes too: both sides then interpolate the same function, and there is no seam. Blocks are therefore finished from coarse to fine. */
 
@@ -1798,6 +1799,13 @@ static void isogi_dvr__read_row(const isogi_volume *v, size_t first, size_t coun
 static size_t isogi_dvr__lattice_index(const isogi_dvr__blocks *b, int step, const size_t c[3]) {
     const size_t *size = b->lattice_size[step];
     return c[0] + size[0] * (c[1] + size[1] * c[2]);
+}
+
+/* Intervals between the nodes of a block of level n: n, but fewer where the volume ends within it. */
+static void isogi_dvr__sides(const isogi_dvr__blocks *b, size_t block, size_t n, size_t side[3]) {
+    size_t at[3] = {block % b->count[0], block / b->count[0] % b->count[1], block / b->count[0] / b->count[1]};
+    int a;
+    for (a = 0; a < 3; a++) side[a] = at[a] + 1 < b->count[a] ? n : (b->rest[a] * n + 15) / 16;
 }
 
 /* The field at a voxel, 0 where it is not finite. */
@@ -1882,6 +1890,7 @@ static isogi_result isogi_dvr__plan_blocks(isogi_dvr *d) {
     int a, n;
     for (a = 0; a < 3; a++) b->count[a] = d->level[1].size[a], b->lattice_size[0][a] = 16 * b->count[a] + 1;
     b->total = b->count[0] * b->count[1] * b->count[2];
+    for (a = 0; a < 3; a++) b->rest[a] = d->cells[a] ? (size_t)((d->cells[a] - 1) % 16) + 1 : 1;
     for (n = 1; n < 5; n++) {
         for (a = 0, count = 1; a < 3; a++) count *= b->lattice_size[n][a] = (b->count[a] << (4 - n)) + 1;
         b->lattice[n] = (float *)isogi_allocate(&d->context, count, sizeof(float));
@@ -3050,21 +3059,25 @@ static void isogi_dvr__sift(isogi_dvr__raise *heap, size_t count, size_t i) {
     }
 }
 
-/* Points that a level takes, not counting the repeated ones. */
-static size_t isogi_dvr__level_points(size_t n) { return n * n * n; }
+/* Points of a block at a level, not counting the repeated ones. */
+static size_t isogi_dvr__level_points(const isogi_dvr__blocks *b, size_t block, size_t n) {
+    size_t side[3];
+    isogi_dvr__sides(b, block, n, side);
+    return side[0] * side[1] * side[2];
+}
 
-/* The least level of a block: 1, or one whose nodes are no further apart than what the block holds of the volume is wide. */
-static uint8_t isogi_dvr__least_level(const isogi_dvr *d, size_t block) {
-    const isogi_dvr__blocks *b = &d->blocks;
-    size_t at[3] = {block % b->count[0], block / b->count[0] % b->count[1], block / b->count[0] / b->count[1]};
-    int level = 1, a;
+/* The level that a block should have: 1, or one whose nodes are no further apart than what the block holds of the volume is wide. */
+static uint8_t isogi_dvr__fair_level(const isogi_dvr__blocks *b, size_t block) {
+    size_t at[3] = {block % b->count[0], block / b->count[0] % b->count[1], block / b->count[0] / b->count[1]}, level = 1;
+    int a;
     for (a = 0; a < 3; a++)
-        while (level < 16 && level * (d->cells[a] - 16 * (int)at[a]) < 16) level *= 2;
+        while (at[a] + 1 == b->count[a] && level * b->rest[a] < 16) level *= 2;
     return (uint8_t)level;
 }
 
-/* Levels of all blocks: transparent ones are dropped, the others begin at the least and are raised by largest significance for its cost,
-   taken to halve with each level, until the budget of voxels / reduction points is spent. */
+/* Levels of all blocks: transparent ones are dropped, the others begin with one point each. Those that the border cuts thin take what
+   they should have, in their order; then blocks are raised by largest significance for its cost, taken to halve with each level, until
+   the budget of voxels / reduction points is spent. */
 static isogi_result isogi_dvr__select_levels(isogi_dvr *d, uint8_t *level) {
     const isogi_dvr__blocks *b = &d->blocks;
     isogi_dvr__raise *heap = (isogi_dvr__raise *)isogi_allocate(&d->context, b->total, sizeof *heap);
@@ -3073,15 +3086,20 @@ static isogi_result isogi_dvr__select_levels(isogi_dvr *d, uint8_t *level) {
     if (!heap) return ISOGI_NO_MEMORY;
     for (i = 0; i < 64; i++) isogi_dvr__luv_of(d, d->matter.low + (d->matter.scale > 0 ? ((double)i + 0.5) * (ISOGI_DVR__TABLE / 64) / d->matter.scale : 0), luv[i]);
     for (i = 0; i < b->total; i++) {
-        level[i] = d->empty[1][i] ? 0 : isogi_dvr__least_level(d, i);
+        level[i] = !d->empty[1][i];
+        budget -= level[i];
+    }
+    for (i = 0; i < b->total; i++) {
+        uint8_t fair = isogi_dvr__fair_level(b, i);
+        double cost = (double)isogi_dvr__level_points(b, i, fair) - 1;
         if (!level[i]) continue;
-        budget -= (double)isogi_dvr__level_points(level[i]);
+        if (cost <= 0 || cost <= budget) budget -= cost, level[i] = fair;
         if (level[i] < 16) heap[count].block = i, heap[count++].gain = isogi_dvr__significance(d, i, luv) / 7;
     }
     for (i = count / 2; i-- > 0;) isogi_dvr__sift(heap, count, i);
     while (count && budget > 0 && heap[0].gain > 0) {
         size_t n = level[heap[0].block];
-        double cost = (double)(isogi_dvr__level_points(2 * n) - isogi_dvr__level_points(n));
+        double cost = (double)(isogi_dvr__level_points(b, heap[0].block, 2 * n) - isogi_dvr__level_points(b, heap[0].block, n));
         if (cost <= budget) budget -= cost, level[heap[0].block] = (uint8_t)(2 * n), heap[0].gain /= 16; /* half for eight times the points */
         else heap[0].gain = 0;
         if (2 * n >= 16 || !(heap[0].gain > 0)) heap[0] = heap[--count];
@@ -3103,10 +3121,14 @@ static int isogi_dvr__any_near(const isogi_dvr__blocks *b, size_t block, size_t 
     return 0;
 }
 
-static size_t isogi_dvr__nodes(size_t n) { return n ? (n + 1) * (n + 1) * (n + 1) : 0; }
+static size_t isogi_dvr__nodes(const isogi_dvr__blocks *b, size_t block, size_t n) {
+    size_t side[3];
+    isogi_dvr__sides(b, block, n, side);
+    return n ? (side[0] + 1) * (side[1] + 1) * (side[2] + 1) : 0;
+}
 
 /* The coarsest of the blocks that touch a node of a block, and the one whose own the node is: the last of those of that level.
-   at: the block; node: of (n + 1)^3. */
+   at: the block; node: of its level n. */
 static void isogi_dvr__touching(const isogi_dvr__blocks *b, const uint8_t *level, const size_t at[3], const size_t node[3], size_t n,
                                 size_t *coarsest, size_t *owner) {
     size_t low[3], high[3], c[3];
@@ -3126,22 +3148,22 @@ static void isogi_dvr__touching(const isogi_dvr__blocks *b, const uint8_t *level
             }
 }
 
-/* A place in a block of level n: the first of its eight nodes, and the weights. */
-static size_t isogi_dvr__place(const isogi_dvr__blocks *b, size_t block, size_t n, const double position[3], float w[8]) {
-    size_t at[3] = {block % b->count[0], block / b->count[0] % b->count[1], block / b->count[0] / b->count[1]}, node[3], k;
+/* A place in a block of level n: the first of its eight nodes, how far from it they are, and the weights. */
+static size_t isogi_dvr__place(const isogi_dvr__blocks *b, size_t block, size_t n, const double position[3], size_t corner[8], float w[8]) {
+    size_t at[3] = {block % b->count[0], block / b->count[0] % b->count[1], block / b->count[0] / b->count[1]}, node[3], side[3], k;
     float u[3];
     int a;
+    isogi_dvr__sides(b, block, n, side);
     for (a = 0; a < 3; a++) {
-        double x = isogi_dvr__clamp((position[a] - 16.0 * (double)at[a]) * (double)n / 16, (double)n);
+        double x = isogi_dvr__clamp((position[a] - 16.0 * (double)at[a]) * (double)n / 16, (double)side[a]);
         node[a] = (size_t)x;
-        if (node[a] >= n) node[a] = n - 1;
+        if (node[a] >= side[a]) node[a] = side[a] - 1;
         u[a] = (float)(x - (double)node[a]);
     }
+    for (k = 0; k < 8; k++) corner[k] = (k & 1) + (side[0] + 1) * ((k >> 1 & 1) + (side[1] + 1) * (k >> 2));
     for (k = 0; k < 8; k++) w[k] = (k & 1 ? u[0] : 1 - u[0]) * (k & 2 ? u[1] : 1 - u[1]) * (k & 4 ? u[2] : 1 - u[2]);
-    return node[0] + (n + 1) * (node[1] + (n + 1) * node[2]);
+    return node[0] + (side[0] + 1) * (node[1] + (side[1] + 1) * node[2]);
 }
-
-static size_t isogi_dvr__corner(size_t n, size_t k) { return (k & 1) + (n + 1) * ((k >> 1 & 1) + (n + 1) * (k >> 2)); }
 
 static size_t isogi_dvr__block_of(const isogi_dvr__blocks *b, const double position[3]) {
     size_t c[3];
@@ -3161,12 +3183,12 @@ static void isogi_dvr__node_position(const isogi_dvr__blocks *b, size_t block, s
 /* The data that the blocks hold, interpolated; what is not held (or not finite) is the lowest value, and `held` 0. */
 static float isogi_dvr__block_value(const isogi_dvr *d, size_t block, const double position[3]) {
     const isogi_dvr__blocks *b = &d->blocks;
-    size_t n = b->level[block], base, k;
+    size_t n = b->level[block], base, corner[8], k;
     float w[8], sum = 0;
     if (!n) return (float)d->matter.low;
-    base = b->first[block] + isogi_dvr__place(b, block, n, position, w);
+    base = b->first[block] + isogi_dvr__place(b, block, n, position, corner, w);
     for (k = 0; k < 8; k++) /* a node of no weight may be another thread's at work */
-        if (w[k] > 0) sum += w[k] * b->data[base + isogi_dvr__corner(n, k)];
+        if (w[k] > 0) sum += w[k] * b->data[base + corner[k]];
     return sum;
 }
 
@@ -3174,15 +3196,16 @@ static float isogi_dvr__block_value(const isogi_dvr *d, size_t block, const doub
 static void isogi_dvr__pack_task(void *arg, size_t block) {
     isogi_dvr *d = (isogi_dvr *)arg;
     isogi_dvr__blocks *b = &d->blocks;
-    size_t n = b->level[block], at[3] = {block % b->count[0], block / b->count[0] % b->count[1], block / b->count[0] / b->count[1]}, node[3], c[3];
+    size_t n = b->level[block], at[3] = {block % b->count[0], block / b->count[0] % b->count[1], block / b->count[0] / b->count[1]}, node[3], side[3], c[3];
     float *out;
     int step = 0, a;
     if (n != b->packing) return;
     out = b->data + b->first[block];
     while (((size_t)16 >> step) > n) step++;
-    for (node[2] = 0; node[2] <= n; node[2]++)
-        for (node[1] = 0; node[1] <= n; node[1]++)
-            for (node[0] = 0; node[0] <= n; node[0]++) {
+    isogi_dvr__sides(b, block, n, side);
+    for (node[2] = 0; node[2] <= side[2]; node[2]++)
+        for (node[1] = 0; node[1] <= side[1]; node[1]++)
+            for (node[0] = 0; node[0] <= side[0]; node[0]++) {
                 size_t coarsest = block, owner;
                 int border = 0;
                 for (a = 0; a < 3; a++) border |= !node[a] || node[a] == n, c[a] = at[a] * n + node[a];
@@ -3203,7 +3226,7 @@ static isogi_result isogi_dvr__lay_out(isogi_dvr *d, const uint8_t *level, const
     uint16_t *sh;
     for (i = 0; first && i < b->total; i++) {
         first[i] = data_count, first[b->total + i] = sh_count;
-        data_count += isogi_dvr__nodes(level[i]), sh_count += isogi_dvr__nodes(lit[i]);
+        data_count += isogi_dvr__nodes(b, i, level[i]), sh_count += isogi_dvr__nodes(b, i, lit[i]);
     }
     data = (float *)isogi_allocate(&d->context, data_count, sizeof *data);
     sh = sh_count > SIZE_MAX / d->coefficients ? NULL : (uint16_t *)isogi_allocate(&d->context, sh_count * d->coefficients, sizeof *sh);
@@ -3214,7 +3237,7 @@ static isogi_result isogi_dvr__lay_out(isogi_dvr *d, const uint8_t *level, const
         return ISOGI_NO_MEMORY;
     }
     for (i = 0; i < b->total; i++) {
-        size_t count = isogi_dvr__nodes(lit[i]) * d->coefficients, k;
+        size_t count = isogi_dvr__nodes(b, i, lit[i]) * d->coefficients, k;
         uint16_t *to;
         if (!count) continue;
         to = sh + first[b->total + i] * d->coefficients;
@@ -3314,20 +3337,21 @@ static void isogi_dvr__set_local_steps(const isogi_dvr *d, isogi_dvr__local_step
 /* The nodes of a window that lie in one block (with its upper faces). Returns whether anything there absorbs. */
 static int isogi_dvr__fill_window(const isogi_dvr *d, size_t block, size_t n, const size_t corner[3], float *window) {
     const isogi_dvr__blocks *b = &d->blocks;
-    size_t node[3], row = isogi_dvr__window_row(b, n), side = isogi_dvr__window_side(b, n), held = b->level[block];
+    size_t node[3], side[3], row = isogi_dvr__window_row(b, n), rows = isogi_dvr__window_side(b, n), held = b->level[block];
     const float *data = b->data + b->first[block];
     int any = 0, a;
-    for (node[2] = 0; node[2] <= n; node[2]++)
-        for (node[1] = 0; node[1] <= n; node[1]++) {
-            float *out = window + corner[0] + row * (corner[1] + node[1] + side * (corner[2] + node[2]));
-            for (node[0] = 0; node[0] <= n; node[0]++) {
+    isogi_dvr__sides(b, block, n, side);
+    for (node[2] = 0; node[2] <= side[2]; node[2]++)
+        for (node[1] = 0; node[1] <= side[1]; node[1]++) {
+            float *out = window + corner[0] + row * (corner[1] + node[1] + rows * (corner[2] + node[2]));
+            for (node[0] = 0; node[0] <= side[0]; node[0]++) {
                 double position[3];
                 float value;
                 int within = 1;
                 isogi_dvr__node_position(b, block, n, node, position);
                 for (a = 0; a < 3; a++) within = within && position[a] <= d->cells[a];
                 if (!within || (d->cut[block] && !isogi_dvr__kept(d, position))) continue;
-                if (held == n) value = data[node[0] + (n + 1) * (node[1] + (n + 1) * node[2])];
+                if (held == n) value = data[node[0] + (side[0] + 1) * (node[1] + (side[1] + 1) * node[2])];
                 else value = isogi_dvr__block_value(d, block, position);
                 out[node[0]] = d->matter.table[isogi_dvr__class(d, (double)value)];
                 any |= out[node[0]] > 0;
@@ -3387,21 +3411,22 @@ static void isogi_dvr__local_task(void *arg, size_t i) {
     isogi_dvr *d = job->dvr;
     isogi_dvr__blocks *b = &d->blocks;
     float *window = job->window + i * job->window_count, sum[ISOGI_DVR__MAX_ORDER * ISOGI_DVR__MAX_ORDER][2 * ISOGI_DVR__LANES];
-    size_t block = b->order[job->first + i], n = b->lit[block], fine = isogi_dvr__make_window(d, block, window), every = fine / n, node[3], c;
+    size_t block = b->order[job->first + i], n = b->lit[block], fine = isogi_dvr__make_window(d, block, window), every = fine / n, node[3], side[3], c;
     size_t at[3] = {block % b->count[0], block / b->count[0] % b->count[1], block / b->count[0] / b->count[1]};
     uint16_t *out = b->sh + b->first[b->total + block] * d->coefficients, clear = isogi_dvr__to_half((float)(2 * sqrt(ISOGI_DVR__PI)));
     memset(&job->work[i], 0, sizeof *job->work);
     job->work[i].blocks++;
-    for (node[2] = 0; node[2] <= n; node[2]++)
-        for (node[1] = 0; node[1] <= n; node[1]++) {
+    isogi_dvr__sides(b, block, n, side);
+    for (node[2] = 0; node[2] <= side[2]; node[2]++)
+        for (node[1] = 0; node[1] <= side[1]; node[1]++) {
             size_t row = b->reach * fine + isogi_dvr__window_row(b, fine ? fine : 1) *
                                                (b->reach * fine + node[1] * every + isogi_dvr__window_side(b, fine ? fine : 1) * (b->reach * fine + node[2] * every));
-            size_t coarsest, owner, count = fine;
-            node[0] = n;
+            size_t coarsest, owner, count = side[0] * every;
+            node[0] = side[0];
             isogi_dvr__touching(b, b->lit, at, node, n, &coarsest, &owner);
             if (owner == block && b->lit[coarsest] == n) count++; /* the row's last node is this block's own, too */
             if (fine) isogi_dvr__local_row(job, fine, window + row, count, sum);
-            for (node[0] = 0; node[0] <= n; node[0]++, out += d->coefficients) {
+            for (node[0] = 0; node[0] <= side[0]; node[0]++, out += d->coefficients) {
                 isogi_dvr__touching(b, b->lit, at, node, n, &coarsest, &owner);
                 if (owner != block || b->lit[coarsest] < n) continue;
                 for (c = 0; c < d->coefficients; c++)
@@ -3414,14 +3439,14 @@ static void isogi_dvr__local_task(void *arg, size_t i) {
 /* All coefficients of local visibility at a place, given in grid coordinates. */
 static void isogi_dvr__local_at(const isogi_dvr *d, size_t block, const double position[3], float *out) {
     const isogi_dvr__blocks *b = &d->blocks;
-    size_t n = b->lit[block], k, c;
+    size_t n = b->lit[block], corner[8], k, c;
     const uint16_t *base;
     float w[8];
     for (c = 0; c < d->coefficients; c++) out[c] = c || n ? 0 : (float)(2 * sqrt(ISOGI_DVR__PI));
     if (!n) return;
-    base = b->sh + (b->first[b->total + block] + isogi_dvr__place(b, block, n, position, w)) * d->coefficients;
+    base = b->sh + (b->first[b->total + block] + isogi_dvr__place(b, block, n, position, corner, w)) * d->coefficients;
     for (k = 0; k < 8; k++) {
-        const uint16_t *v = base + isogi_dvr__corner(n, k) * d->coefficients;
+        const uint16_t *v = base + corner[k] * d->coefficients;
         if (!(w[k] > 0)) continue;
         for (c = 0; c < d->coefficients; c++) out[c] += w[k] * isogi_dvr__from_half(v[c]);
     }
@@ -3432,12 +3457,13 @@ static void isogi_dvr__finish_task(void *arg, size_t block) {
     const isogi_dvr__local_job *job = (const isogi_dvr__local_job *)arg;
     isogi_dvr *d = job->dvr;
     isogi_dvr__blocks *b = &d->blocks;
-    size_t n = b->lit[block], node[3], c, at[3] = {block % b->count[0], block / b->count[0] % b->count[1], block / b->count[0] / b->count[1]};
+    size_t n = b->lit[block], node[3], side[3], c, at[3] = {block % b->count[0], block / b->count[0] % b->count[1], block / b->count[0] / b->count[1]};
     uint16_t *out = b->sh + b->first[b->total + block] * d->coefficients;
     if (n != job->packing) return;
-    for (node[2] = 0; node[2] <= n; node[2]++)
-        for (node[1] = 0; node[1] <= n; node[1]++)
-            for (node[0] = 0; node[0] <= n; node[0]++, out += d->coefficients) {
+    isogi_dvr__sides(b, block, n, side);
+    for (node[2] = 0; node[2] <= side[2]; node[2]++)
+        for (node[1] = 0; node[1] <= side[1]; node[1]++)
+            for (node[0] = 0; node[0] <= side[0]; node[0]++, out += d->coefficients) {
                 float v[ISOGI_DVR__MAX_ORDER * ISOGI_DVR__MAX_ORDER];
                 double position[3];
                 size_t coarsest, owner;
@@ -3488,13 +3514,14 @@ static float isogi_dvr__global_ray(const isogi_dvr *d, const float *toward, cons
         if (exit < limit) limit = exit;
     }
     for (t = 0; t < limit && clear > ISOGI_DVR__NEGLIGIBLE; t += step) {
-        size_t block = 0, stride = 1, n, node, offset[3];
+        size_t block = 0, stride = 1, n, node, side[3], offset[3];
         double u[3], v[4];
         const float *p;
         for (a = 0; a < 3; a++) {
             double x = isogi_dvr__clamp((from[a] + t * direction[a]) * (1.0 / 16), (double)b->count[a]);
             node = (size_t)x;
             node = node < b->count[a] ? node : b->count[a] - 1;
+            side[a] = node + 1 < b->count[a] ? 16 : b->rest[a];
             u[a] = x - (double)node, block += stride * node, stride *= b->count[a];
         }
         n = b->lit[block];
@@ -3502,9 +3529,10 @@ static float isogi_dvr__global_ray(const isogi_dvr *d, const float *toward, cons
         p = toward + b->first[b->total + block];
         for (a = 0, stride = 1; a < 3; a++) {
             double x = u[a] * (double)n;
+            size_t nodes = (side[a] * n + 15) / 16;
             node = (size_t)x;
-            node = node < n ? node : n - 1;
-            u[a] = x - (double)node, p += stride * node, offset[a] = stride, stride *= n + 1;
+            node = node < nodes ? node : nodes - 1;
+            u[a] = x - (double)node, p += stride * node, offset[a] = stride, stride *= nodes + 1;
         }
         for (a = 0; a < 4; a++) {
             const float *q = p + (a & 1 ? offset[1] : 0) + (a & 2 ? offset[2] : 0);
@@ -3961,7 +3989,7 @@ ISOGI_API isogi_result isogi_dvr_inspect(const isogi_dvr *dvr, isogi_dvr_report 
             a = 0;
             while (b->level[i] >> a) a++;
             r.level_count[a]++;
-            r.points += isogi_dvr__level_points(b->level[i]);
+            r.points += b->level[i] ? isogi_dvr__level_points(b, i, b->level[i]) : 0;
         }
         if (r.points) r.reduction = (double)dvr->volume.size[0] * (double)dvr->volume.size[1] * (double)dvr->volume.size[2] / (double)r.points;
         r.data_bytes = b->data_count * sizeof *b->data, r.local_bytes = b->sh_count * dvr->coefficients * sizeof *b->sh;
