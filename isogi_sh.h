@@ -992,14 +992,15 @@ typedef int32_t isogi_sh__i4 __attribute__((vector_size(16), aligned(4), may_ali
    operations hide each other's latency. Near the poles (x + i y)^m would become denormal numbers, which take a hundred times as
    long: what is too small to matter is cleared. */
 #define ISOGI_SH__DEFINE_EVAL(NAME, TARGET, T, V, I, WIDTH, FMA, REST, LESS, TABLE, SQUARED_ERROR, NEAR_POLE, TINY, ROOT)      \
-    /* scales vectors to about length 1, in place; 0 if a squared length is out of range */                                    \
+    /* scales vectors to about length 1, in place; 0 if a squared length is out of range: by its bits, as -ffast-math wants it */  \
     TARGET ISOGI_SH__APART int NAME##_scale(V *u) {                                                                            \
-        V square = FMA(u[0], u[0], FMA(u[1], u[1], u[2] * u[2]));                                                              \
+        V zero = {0}, square = FMA(u[0], u[0], FMA(u[1], u[1], u[2] * u[2]));                                                  \
+        I good = ((I)square > (I)(zero + (T)1e-30)) & ((I)square < (I)(zero + (T)1e30));                                       \
         T lane[WIDTH];                                                                                                         \
         int k;                                                                                                                 \
         memcpy(lane, &square, sizeof lane);                                                                                    \
         for (k = 0; k < WIDTH; k++) {                                                                                          \
-            if (!(lane[k] > (T)1e-30 && lane[k] < (T)1e30)) return 0;                                                          \
+            if (!good[k]) return 0;                                                                                            \
             lane[k] = 1 / ROOT(lane[k]);                                                                                       \
         }                                                                                                                      \
         memcpy(&square, lane, sizeof lane);                                                                                    \
@@ -1009,7 +1010,8 @@ typedef int32_t isogi_sh__i4 __attribute__((vector_size(16), aligned(4), may_ali
     /* u[0..2] becomes a unit vector, u[3] the rest of its z */                                                                \
     TARGET ISOGI_SH__INLINE int NAME##_unit(V *u) {                                                                            \
         V x = u[0], y = u[1], z = u[2], zero = {0}, one = zero + 1, e = FMA(-x, x, FMA(-y, y, REST(one, z)));                  \
-        if (!LESS(e * e, zero + (T)SQUARED_ERROR)) {                                                                           \
+        I sign = (I)(zero - 1) ^ (I)one;                                                                                       \
+        if (!LESS((I)(e * e) & ~sign, (I)(zero + (T)SQUARED_ERROR))) {                                                         \
             V scaled[3];                                                                                                       \
             scaled[0] = x, scaled[1] = y, scaled[2] = z;                                                                       \
             if (!NAME##_scale(scaled)) return 0;                                                                               \
@@ -1092,7 +1094,7 @@ typedef int32_t isogi_sh__i4 __attribute__((vector_size(16), aligned(4), may_ali
         V x = u[0], y = u[1], z = u[2], c[2], s[2], zero = {0};                                                                \
         size_t base = (size_t)from * (size_t)from;                                                                             \
         T *centre = out + stride * (size_t)from;                                                                               \
-        int l, m, clear = !LESS(zero + (T)NEAR_POLE, FMA(x, x, y * y));                                                        \
+        int l, m, clear = !LESS((I)(zero + (T)NEAR_POLE), (I)FMA(x, x, y * y));                                                        \
         NAME##_zonal(centre, stride, from, to, u, state);                                                                      \
         if (state) state += 2;                                                                                                 \
         if (clear) x = NAME##_clear(x), y = NAME##_clear(y);                                                                   \
@@ -1142,8 +1144,9 @@ ISOGI_SH__INLINE void isogi_sh__eval_f4_split(isogi_sh__f4 *u, const float *from
     u[0] = __builtin_shufflevector(x, c, 0, 1, 2, 5), u[1] = __builtin_shufflevector(y, c, 0, 1, 2, 6), u[2] = __builtin_shufflevector(z, c, 0, 1, 4, 7);
 }
 
-ISOGI_SH__INLINE int isogi_sh__less_f4(isogi_sh__f4 a, isogi_sh__f4 b) {
-    isogi_sh__i4 less = (isogi_sh__i4)(a < b);
+/* a < b in all lanes, for the bits of numbers that are not negative: NaN is greater than all others, with -ffast-math too */
+ISOGI_SH__INLINE int isogi_sh__less_f4(isogi_sh__i4 a, isogi_sh__i4 b) {
+    isogi_sh__i4 less = a < b;
     int64_t word[2];
     memcpy(word, &less, sizeof word);
     return (word[0] & word[1]) == -1;
@@ -1206,7 +1209,7 @@ typedef double isogi_sh__d8 __attribute__((vector_size(64), aligned(8), may_alia
 typedef int32_t isogi_sh__i8 __attribute__((vector_size(32), aligned(4), may_alias));
 typedef int32_t isogi_sh__i16 __attribute__((vector_size(64), aligned(4), may_alias));
 typedef int64_t isogi_sh__l4 __attribute__((vector_size(32), aligned(8), may_alias));
-typedef int64_t isogi_sh__l8 __attribute__((vector_size(64), aligned(8), may_alias));
+typedef long long isogi_sh__l8 __attribute__((vector_size(64), aligned(8), may_alias));
 typedef double isogi_sh__d2 __attribute__((vector_size(16), aligned(8), may_alias));
 
 #define ISOGI_SH__AVX2 __attribute__((target("avx2,fma")))
@@ -1398,8 +1401,8 @@ ISOGI_SH__AVX512 ISOGI_SH__INLINE void isogi_sh__eval_d8_split(isogi_sh__d8 *u, 
 #define ISOGI_SH__REST_D8(one, z) ISOGI_SH__FMA_D8(-(z), z, one)
 #define ISOGI_SH__LESS_F8(a, b) (__builtin_ia32_movmskps256((isogi_sh__f8)((a) < (b))) == 0xff)
 #define ISOGI_SH__LESS_D4(a, b) (__builtin_ia32_movmskpd256((isogi_sh__d4)((a) < (b))) == 0xf)
-#define ISOGI_SH__LESS_F16(a, b) ((__builtin_ia32_cmpps512_mask(a, b, 17, 0xffff, 4) & 0xffff) == 0xffff)
-#define ISOGI_SH__LESS_D8(a, b) ((__builtin_ia32_cmppd512_mask(a, b, 17, 0xff, 4) & 0xff) == 0xff)
+#define ISOGI_SH__LESS_F16(a, b) ((__builtin_ia32_cmpd512_mask(a, b, 1, 0xffff) & 0xffff) == 0xffff)
+#define ISOGI_SH__LESS_D8(a, b) ((__builtin_ia32_cmpq512_mask(a, b, 1, 0xff) & 0xff) == 0xff)
 
 /* With fused products: low orders as polynomials in v = cos 2t = z^2 - x^2 - y^2, whose coefficients are small, so that little cancels
    anywhere, and of which no operation waits for the one before (4.7e-7 was seen at order 5 where products are not fused). Function l of
@@ -1472,7 +1475,7 @@ ISOGI_SH__AVX512 ISOGI_SH__INLINE void isogi_sh__eval_d8_split(isogi_sh__d8 *u, 
         const T *t = POLYNOMIALS;                                                                                              \
         size_t last = (size_t)order - 1, first = 0, step = 2 * stride * last;                                                  \
         T *centre = out + stride * last * (last + 1);                                                                          \
-        int m, clear = !LESS(zero + (T)NEAR_POLE, FMA(x, x, y * y));                                                           \
+        int m, clear = !LESS((I)(zero + (T)NEAR_POLE), (I)FMA(x, x, y * y));                                                           \
         NAME##_zonal(out, stride, 0, order, u, NULL);                                                                          \
         for (m = 1; m < order; m++) {                                                                                          \
             if (m > 1) before = c, c = FMA(x, c, -(y * s)), s = FMA(x, s, y * before);                                         \

@@ -319,6 +319,48 @@ TEST(any_vector_at_any_order) {
     }
 }
 
+/* One coordinate that is not finite among directions that are good, in any lane and at every level, in both types and layouts: its
+   direction counts as +z, the others are not touched. By bits, so that -ffast-math does not take the question for answered. */
+TEST(one_bad_direction_in_a_batch_counts_as_up) {
+    enum { COUNT = 16, N = 441 };
+    static const int orders[] = {2, 3, 5, 8, 11, 12, 21};
+    static const float odd[] = {NAN, -NAN, INFINITY, -INFINITY};
+    static float d[COUNT][3], x[3][COUNT], y[COUNT * N], columns[COUNT * N];
+    static double wide[COUNT][3], x64[3][COUNT], y64[COUNT * N], columns64[COUNT * N], expected[COUNT * N];
+    test_random r = {44};
+    double worst = 0;
+    int bad = 0;
+    for (int round = 0; round < 7 * 48; round++) {
+        int order = orders[round % 7], n = order * order, at = round / 7 % COUNT;
+        double good[COUNT][3];
+        for (int i = 0; i < COUNT; i++) {
+            random_direction(&r, good[i]);
+            for (int k = 0; k < 3; k++) {
+                d[i][k] = rounded(good[i][k]), good[i][k] = (double)d[i][k];
+                if (i == at) d[i][k] = round / 112 == k ? odd[round % 4] : d[i][k], good[i][k] = k == 2;
+                x[k][i] = d[i][k], wide[i][k] = x64[k][i] = (double)d[i][k];
+            }
+        }
+        instruction_level = 0;
+        isogi_sh_eval_f64(expected, order, (const double(*)[3])good, COUNT);
+        for (; instruction_level < 3; instruction_level++) {
+            isogi_sh_eval(y, order, (const float(*)[3])d, COUNT);
+            isogi_sh_eval_f64(y64, order, (const double(*)[3])wide, COUNT);
+            isogi_sh_eval_soa(columns, order, x[0], x[1], x[2], COUNT);
+            isogi_sh_eval_soa_f64(columns64, order, x64[0], x64[1], x64[2], COUNT);
+            for (int i = 0; i < COUNT * n; i++) {
+                double value[4] = {(double)y[i], (double)columns[i % n * COUNT + i / n], y64[i], columns64[i % n * COUNT + i / n]};
+                for (int k = 0; k < 4; k++) {
+                    bad += !test_finite(value[k]);
+                    worst = fmax(worst, test_finite(value[k]) ? fabs(value[k] - expected[i]) : 0);
+                }
+            }
+        }
+        instruction_level = 99;
+    }
+    CHECK(!bad && worst <= 1e-5 * ROUNDING_FACTOR, "%d values are not finite, the others differ by %g", bad, worst);
+}
+
 /* ---- rotation ---- */
 
 /* f rotated, evaluated at w, is f evaluated at R^-1 w: 1000 random rotations, every order 1..16 in turn, and a few high ones.
