@@ -136,12 +136,14 @@ variant() {
 
 CONTRACT_OFF=-ffp-contract=off
 
-# Linked without -ffast-math, which would flush the denormal numbers of the whole process to zero: the tests use some.
+# COMPILER PROGRAM...: linked without -ffast-math, which would flush the denormal numbers of the whole process to zero: the tests use some.
 fast_math() {
+    compiler=$1
+    shift
     for program; do
         base=${program##*/} source=tests/${program##*/}.c
         libs=$(sed -n '1,20s|.*LIBS: \([^*]*\).*|\1|p' "$source")
-        item suite "fast-math/$base" "$CC -std=gnu99 -O2 -ffast-math -I. -Iexamples/common -Itests -c -o \"\$OUT/object.o\" $source && $CC -o \"\$OUT/$base\" \"\$OUT/object.o\" -lm -lpthread $libs && \"\$OUT/$base\""
+        item suite "fast-math-${compiler%% *}/$base" "$compiler -std=gnu99 -O2 -ffast-math -I. -Iexamples/common -Itests -c -o \"\$OUT/object.o\" $source && $compiler -o \"\$OUT/$base\" \"\$OUT/object.o\" -lm -lpthread $libs && \"\$OUT/$base\""
     done
 }
 
@@ -158,12 +160,13 @@ variants() {
     # A variant runs what it can change: the address sanitizer most of them, the others those that stand for their kind.
     variant O0 "$CC" "-O0 $CONTRACT_OFF" '' $(only sh)
     variant O3 "$CC" "-O3 $CONTRACT_OFF" '' $(only 'sh|vol|dvr')
-    fast_math $(only 'sh|sample|vol|trace|dvr')
+    fast_math "$CC" $(only 'sh|sample|vol|trace|dvr')
     variant no-threads "$CC" "-O2 $CONTRACT_OFF -DISOGI_NO_THREADS" '' $(only 'vol|trace')
     variant no-simd "$CC" "-O2 $CONTRACT_OFF -DISOGI_NO_SIMD" '' $(only 'sh|sample|vol|dvr')
     variant sh-level-1 "$CC" "-O2 $CONTRACT_OFF -DISOGI_SH_LEVEL=1" '' $(only sh)
     if have clang; then
         variant clang clang "-O2 $CONTRACT_OFF" '' $(only 'sh|sample|vol|mesh|trace|dvr')
+        fast_math clang $(only sh)
         variant address+undefined clang "-O1 -g $CONTRACT_OFF -fsanitize=address,undefined,float-cast-overflow -fno-sanitize-recover=all" '' $(only "$checked")
         variant thread clang "-O1 -g $CONTRACT_OFF -fsanitize=thread" 'TSAN_OPTIONS=halt_on_error=1' $(only "$threaded")
     else
