@@ -439,7 +439,7 @@ static isogi_sh__unit isogi_sh__normalise(double x, double y, double z) {
 /* Written by tests/generate_sh.h, which tests/test_sh.c compares with this.
    table: for each degree l of m = 0 the factors (l-1)/l, -(2l-1)/l, sqrt((2l+1)/(4 pi)); then for each m > 0 the diagonal q_m and for
    each l > m the factors a_l, -a_l / a_{l-1} of the recursion.
-   polynomials: for m = 1 .. 10, l = m .. 10 those of isogi_sh__eval_f8_low and its like, the highest coefficient first.
+   polynomials: for m = 0 .. 10, l = m .. 10 those of isogi_sh__eval_f8_low and its like, the highest coefficient first.
    turn: for l = 1 .. 15, n = 0 .. l, m = n .. l the entries of a quarter turn about y, see isogi_sh__turn_y.
    latitudes: for m = 0 .. 4, l = m .. 4 the values q_l^m sin^m at 7 Legendre nodes (and an empty lane); pi times their weights. */
 /* generated: begin */
@@ -727,23 +727,35 @@ static const float isogi_sh__table_f32[463] = {
 };
 #endif
 #ifdef ISOGI_SH__SIMD
-static const float isogi_sh__polynomials_f32[125] = {
-    0.488602519f, 1.09254849f, 1.14261448f, 0.68556869f, 2.34166288f, 0.334523261f, 2.37796998f, 1.58531332f, -0.339709997f,
-    4.80662632f, 0.873932064f, -1.0195874f, 4.84403229f, 3.35356092f, -1.72759199f, -0.68877852f, 9.7455616f, 1.9491123f,
-    -4.3480196f, -0.368014216f, 9.79113674f, 6.91139078f, -5.7594924f, -3.01265764f, 0.318181753f, 19.6563091f, 4.13817024f,
-    -13.5099096f, -1.70395255f, 1.00645542f, 0.546274245f, 1.44530571f, 1.65580571f, 0.76876694f, 3.59515262f, 0.299596041f,
-    3.79997158f, 1.55453384f, -0.510981023f, 7.91027164f, -0.30424124f, -1.35871363f, 8.15372181f, 2.03843045f, -3.17524743f,
-    -0.544353545f, 16.6998196f, -3.68378377f, -6.20103598f, 0.234959289f, 17.0228634f, 0.895940185f, -11.1663132f,
-    -1.34061635f, 0.721474469f, 0.590043604f, 1.77013075f, 2.20157242f, 1.16194093f, 5.06662893f, 1.03635597f, 5.59340668f,
-    3.22696543f, -0.256690443f, 12.0438452f, 2.00730753f, -1.5633837f, 12.7546978f, 6.18977976f, -3.23556685f, -0.989246547f,
-    26.7076645f, 1.05425f, -8.7595768f, -0.525833011f, 0.625835717f, 2.07566237f, 2.77510691f, 1.5767653f, 6.74590254f,
-    1.94593346f, 7.77426863f, 5.44198799f, 0.186881453f, 17.3302212f, 5.60683632f, -1.46542311f, 18.8851719f, 12.6729441f,
-    -2.33506656f, -1.38039351f, 0.656382084f, 2.36661911f, 3.37295127f, 2.01079798f, 8.62477684f, 3.01867175f, 10.3567886f,
-    8.22450829f, 0.830066144f, 23.8880615f, 10.6867647f, -0.984550536f, 0.683184087f, 2.64596057f, 3.99249578f, 2.46203899f,
-    10.6964455f, 4.247118f, 13.3538322f, 11.5967493f, 1.68214881f, 0.707162738f, 2.91570663f, 4.6316967f, 2.92886686f,
-    12.955121f, 5.62524986f, 0.728926659f, 3.17731762f, 5.2889061f, 3.4099524f, 0.74890095f, 3.43189526f, 0.767395139f,
+static const float isogi_sh__polynomials_f32[161] = {
+    0.282094806f, 0.488602519f, 0.473087341f, 0.157695785f, 0.932940841f, -0.186588168f, 0.925623536f, 0.264463872f,
+    -0.343803018f, 1.84196758f, -0.409326136f, -0.497038871f, 1.83556068f, 0.500607491f, -1.16808414f, -0.150976852f,
+    3.66174436f, -0.84501791f, -1.92049527f, 0.1963173f, 3.6545856f, 0.974556148f, -3.2610147f, -0.552021325f, 0.347001046f,
+    7.29788256f, -1.7171489f, -5.66659117f, 0.818947911f, 0.496532202f, 7.28875446f, 1.91809332f, -8.34934711f, -1.57960629f,
+    1.86601841f, 0.148808062f, 0.488602519f, 1.09254849f, 1.14261448f, 0.68556869f, 2.34166288f, 0.334523261f, 2.37796998f,
+    1.58531332f, -0.339709997f, 4.80662632f, 0.873932064f, -1.0195874f, 4.84403229f, 3.35356092f, -1.72759199f, -0.68877852f,
+    9.7455616f, 1.9491123f, -4.3480196f, -0.368014216f, 9.79113674f, 6.91139078f, -5.7594924f, -3.01265764f, 0.318181753f,
+    19.6563091f, 4.13817024f, -13.5099096f, -1.70395255f, 1.00645542f, 0.546274245f, 1.44530571f, 1.65580571f, 0.76876694f,
+    3.59515262f, 0.299596041f, 3.79997158f, 1.55453384f, -0.510981023f, 7.91027164f, -0.30424124f, -1.35871363f, 8.15372181f,
+    2.03843045f, -3.17524743f, -0.544353545f, 16.6998196f, -3.68378377f, -6.20103598f, 0.234959289f, 17.0228634f,
+    0.895940185f, -11.1663132f, -1.34061635f, 0.721474469f, 0.590043604f, 1.77013075f, 2.20157242f, 1.16194093f, 5.06662893f,
+    1.03635597f, 5.59340668f, 3.22696543f, -0.256690443f, 12.0438452f, 2.00730753f, -1.5633837f, 12.7546978f, 6.18977976f,
+    -3.23556685f, -0.989246547f, 26.7076645f, 1.05425f, -8.7595768f, -0.525833011f, 0.625835717f, 2.07566237f, 2.77510691f,
+    1.5767653f, 6.74590254f, 1.94593346f, 7.77426863f, 5.44198799f, 0.186881453f, 17.3302212f, 5.60683632f, -1.46542311f,
+    18.8851719f, 12.6729441f, -2.33506656f, -1.38039351f, 0.656382084f, 2.36661911f, 3.37295127f, 2.01079798f, 8.62477684f,
+    3.01867175f, 10.3567886f, 8.22450829f, 0.830066144f, 23.8880615f, 10.6867647f, -0.984550536f, 0.683184087f, 2.64596057f,
+    3.99249578f, 2.46203899f, 10.6964455f, 4.247118f, 13.3538322f, 11.5967493f, 1.68214881f, 0.707162738f, 2.91570663f,
+    4.6316967f, 2.92886686f, 12.955121f, 5.62524986f, 0.728926659f, 3.17731762f, 5.2889061f, 3.4099524f, 0.74890095f,
+    3.43189526f, 0.767395139f,
 };
-static const double isogi_sh__polynomials_f64[125] = {
+static const double isogi_sh__polynomials_f64[161] = {
+    0.28209479177387814, 0.48860251190291992, 0.47308734787877998, 0.15769578262625999, 0.9329408314752885,
+    -0.1865881662950577, 0.92562353550803766, 0.26446386728801075, -0.34380302747441399, 1.8419675786414216,
+    -0.40932612858698258, -0.49703887042705031, 1.8355607154777709, 0.50060746785757382, -1.1680840916676722,
+    -0.1509768553856175, 3.6617443494062649, -0.84501792678606114, -1.9204952881501389, 0.19631729612201421,
+    3.6545855070762969, 0.9745561352203459, -3.2610147601603878, -0.55202130736257349, 0.34700104814663829,
+    7.2978827124136885, -1.7171488735091032, -5.6665912825800406, 0.81894792428895691, 0.49653220922798197, 7.288754650414309,
+    1.9180933290563971, -8.3493474323631407, -1.5796062709876211, 1.8660183970458162, 0.14880806329084184,
     0.48860251190291992, 1.0925484305920792, 1.1426144986611644, 0.68556869919669861, 2.341662902450512, 0.3345232717786446,
     2.377969918777409, 1.5853132791849391, -0.33970998839677269, 4.8066262407795337, 0.87393204377809708, -1.0195873844077799,
     4.8440324566124913, 3.3535609315009554, -1.7275919950156435, -0.68877850781669447, 9.7455613522034579, 1.9491122704406918,
@@ -1414,19 +1426,22 @@ ISOGI_SH__AVX512 ISOGI_SH__INLINE void isogi_sh__eval_d8_split(isogi_sh__d8 *u, 
 #define ISOGI_SH__P2(FMA, t) FMA(ISOGI_SH__P1(FMA, t), v, (t)[2] - zero)
 #define ISOGI_SH__P3(FMA, t) FMA(ISOGI_SH__P2(FMA, t), v, (t)[3] - zero)
 #define ISOGI_SH__P4(FMA, t) FMA(ISOGI_SH__P3(FMA, t), v, (t)[4] - zero)
+#define ISOGI_SH__P5(FMA, t) FMA(ISOGI_SH__P4(FMA, t), v, (t)[5] - zero)
+#define ISOGI_SH__PUT_ONE(V, value) *(V *)centre = value, centre -= step, step -= 2 * stride
 #define ISOGI_SH__PUT_PAIR(V, value) p = value, *(V *)(centre + first) = p * c, *(V *)(centre - first) = p * s, centre -= step, step -= 2 * stride
-#define ISOGI_SH__POLYNOMIALS(V, FMA)                                                                                          \
+#define ISOGI_SH__POLYNOMIALS(V, FMA, PUT)                                                                                     \
     switch (order - m) {                                                                                                       \
-    case 10: ISOGI_SH__PUT_PAIR(V, ISOGI_SH__P4(FMA, t + 25) * z); __attribute__((fallthrough));                               \
-    case 9: ISOGI_SH__PUT_PAIR(V, ISOGI_SH__P4(FMA, t + 20)); __attribute__((fallthrough));                                    \
-    case 8: ISOGI_SH__PUT_PAIR(V, ISOGI_SH__P3(FMA, t + 16) * z); __attribute__((fallthrough));                                \
-    case 7: ISOGI_SH__PUT_PAIR(V, ISOGI_SH__P3(FMA, t + 12)); __attribute__((fallthrough));                                    \
-    case 6: ISOGI_SH__PUT_PAIR(V, ISOGI_SH__P2(FMA, t + 9) * z); __attribute__((fallthrough));                                 \
-    case 5: ISOGI_SH__PUT_PAIR(V, ISOGI_SH__P2(FMA, t + 6)); __attribute__((fallthrough));                                     \
-    case 4: ISOGI_SH__PUT_PAIR(V, ISOGI_SH__P1(FMA, t + 4) * z); __attribute__((fallthrough));                                 \
-    case 3: ISOGI_SH__PUT_PAIR(V, ISOGI_SH__P1(FMA, t + 2)); __attribute__((fallthrough));                                     \
-    case 2: ISOGI_SH__PUT_PAIR(V, ISOGI_SH__P0(FMA, t + 1) * z); __attribute__((fallthrough));                                 \
-    default: ISOGI_SH__PUT_PAIR(V, ISOGI_SH__P0(FMA, t));                                                                      \
+    case 11: PUT(V, ISOGI_SH__P5(FMA, t + 30)); __attribute__((fallthrough));                                                  \
+    case 10: PUT(V, ISOGI_SH__P4(FMA, t + 25) * z); __attribute__((fallthrough));                               \
+    case 9: PUT(V, ISOGI_SH__P4(FMA, t + 20)); __attribute__((fallthrough));                                    \
+    case 8: PUT(V, ISOGI_SH__P3(FMA, t + 16) * z); __attribute__((fallthrough));                                \
+    case 7: PUT(V, ISOGI_SH__P3(FMA, t + 12)); __attribute__((fallthrough));                                    \
+    case 6: PUT(V, ISOGI_SH__P2(FMA, t + 9) * z); __attribute__((fallthrough));                                 \
+    case 5: PUT(V, ISOGI_SH__P2(FMA, t + 6)); __attribute__((fallthrough));                                     \
+    case 4: PUT(V, ISOGI_SH__P1(FMA, t + 4) * z); __attribute__((fallthrough));                                 \
+    case 3: PUT(V, ISOGI_SH__P1(FMA, t + 2)); __attribute__((fallthrough));                                     \
+    case 2: PUT(V, ISOGI_SH__P0(FMA, t + 1) * z); __attribute__((fallthrough));                                 \
+    default: PUT(V, ISOGI_SH__P0(FMA, t));                                                                      \
     }
 
 /* Defines NAME(out, stride, order, x, y, z, count): all functions at the first directions, that of index i at out + stride i; WIDTH at a
@@ -1469,21 +1484,21 @@ ISOGI_SH__AVX512 ISOGI_SH__INLINE void isogi_sh__eval_d8_split(isogi_sh__d8 *u, 
         out[21] = f * x;                                                                                                       \
         out[24] = FMA(c, c, -(s * s)) * (T)0.62583573544917614;                                                                \
     }                                                                                                                          \
-    /* one column after the other, each from its last degree */                                                                   \
+    /* one column after the other, each from its last degree */                                                                \
     TARGET static void NAME##_low(T *out, size_t stride, int order, const V *u) {                                              \
         V x = u[0], y = u[1], z = u[2], zero = {0}, v = FMA(z, z, -FMA(x, x, y * y)), c = x, s = y, p, before;                 \
         const T *t = POLYNOMIALS;                                                                                              \
         size_t last = (size_t)order - 1, first = 0, step = 2 * stride * last;                                                  \
         T *centre = out + stride * last * (last + 1);                                                                          \
-        int m, clear = !LESS((I)(zero + (T)NEAR_POLE), (I)FMA(x, x, y * y));                                                           \
-        NAME##_zonal(out, stride, 0, order, u, NULL);                                                                          \
+        int m = 0, clear = !LESS((I)(zero + (T)NEAR_POLE), (I)FMA(x, x, y * y));                                               \
+        ISOGI_SH__POLYNOMIALS(V, FMA, ISOGI_SH__PUT_ONE)                                                                       \
         for (m = 1; m < order; m++) {                                                                                          \
+            t += (ISOGI_SH__LOW_ORDER + 2 - m) * (ISOGI_SH__LOW_ORDER + 2 - m) / 4;                                            \
             if (m > 1) before = c, c = FMA(x, c, -(y * s)), s = FMA(x, s, y * before);                                         \
             if (m == 2) v = FMA(z + z, z, zero - (T)0.75);                                                                     \
             if (clear) c = NAME##_clear(c), s = NAME##_clear(s);                                                               \
             first += stride, step = 2 * stride * last, centre = out + stride * last * (last + 1);                              \
-            ISOGI_SH__POLYNOMIALS(V, FMA)                                                                                      \
-            t += (ISOGI_SH__LOW_ORDER + 1 - m) * (ISOGI_SH__LOW_ORDER + 1 - m) / 4;                                            \
+            ISOGI_SH__POLYNOMIALS(V, FMA, ISOGI_SH__PUT_PAIR)                                                                  \
         }                                                                                                                      \
     }                                                                                                                          \
     TARGET ISOGI_SH__INLINE void NAME##_block(T *out, size_t stride, int order, const V *u) {                                  \
@@ -4221,6 +4236,8 @@ ISOGI_API isogi_result isogi_sh_fit_directional(float direction[3], float rgb[3]
 #undef ISOGI_SH__P4
 #undef ISOGI_SH__POLYNOMIALS
 #undef ISOGI_SH__PUT_PAIR
+#undef ISOGI_SH__PUT_ONE
+#undef ISOGI_SH__P5
 #undef ISOGI_SH__UNROLL25
 #undef ISOGI_SH__LANES
 #undef ISOGI_SH__CHANNELS

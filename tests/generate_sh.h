@@ -76,9 +76,9 @@ static int generate_polynomials(quad *v) {
     static quad factors[1024];
     int count = 0;
     generate_factors(factors);
-    for (int m = 1; m < GENERATE_LOW; m++) {
+    for (int m = 0; m < GENERATE_LOW; m++) {
         quad p[2][GENERATE_LOW + 1] = {{0}}, a_before = 1;
-        const quad *table = factors + 3 * GENERATE_ORDER + (m - 1) * (2 * GENERATE_ORDER - 1 - m);
+        const quad *table = m ? factors + 3 * GENERATE_ORDER + (m - 1) * (2 * GENERATE_ORDER - 1 - m) : factors + 2;
         for (int l = m; l < GENERATE_LOW; l++) {
             quad *q = p[l & 1], *before = p[~l & 1], a = l > m ? quad_sqrt((quad)(4 * l * l - 1) / (quad)(l * l - m * m)) : 1;
             if (l == m) q[0] = table[0];
