@@ -104,7 +104,7 @@ bench: build/bench/plot
 		build/bench/plot build/bench/$$b.csv build/bench/$$b.svg || exit 1; \
 	done
 
-bench-peers:
+bench-peers: build/flags
 	@if echo '#include <embree3/rtcore.h>' | $(CC) -E - > build/bench/peers.log 2>&1; then \
 		$(QUIET_MAKE) build/bench/peer_embree && build/bench/peer_embree; \
 	else echo "bench-peers: <embree3/rtcore.h> is not there (libembree-dev): nothing to compare with"; fi

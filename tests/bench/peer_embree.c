@@ -3,11 +3,11 @@
 
        build/bench/peer_embree [ml|gyroid] [high] [REPETITIONS]
 
-   CPU seconds, medians. A first turn asks Embree in each of its ways (one ray a call, packets of 16, streams); its fastest counts. Its
-   scene: one mesh with shared indices, no robust flag, Embree's usual build quality; high takes four times as long and is hardly faster
-   on these meshes. Writing the rays into Embree's structures counts, as
-   reading isogi_ray does for us. wrong: Embree's missed and extra hits per million, t99: 99th percentile of the distance between its t
-   and ours in voxels; both are errors of the mesh, and of hits that begin a quarter of a voxel away from it.
+   CPU seconds, medians. A first turn asks Embree in each of its ways (one ray a call, packets of 16, streams); its fastest counts.
+   Writing the rays into Embree's structures counts, as reading isogi_ray does for us. Its scene: one mesh with shared indices, no robust
+   flag, Embree's usual build quality; `high` takes four times as long and is hardly faster on these meshes. wrong: Embree's missed and
+   extra hits per million, t99: 99th percentile of the distance between its t and ours in voxels; both are errors of the mesh, and of
+   rays that begin a quarter of a voxel away from it.
    goal: the design's goal / Embree's speed when the goals were set. */
 #define ISOGI_IMPLEMENTATION
 #include "isogi_vol.h"
