@@ -219,8 +219,10 @@ ISOGI_API isogi_result isogi_sh_project(float *rgb, int order, const isogi_light
 /* ---- rotation ---- */
 
 /* Rotates: out expands f(R^-1 w), so that a lobe towards d turns into a lobe towards R d; m is R, row-major. ISOGI_INVALID unless
-   m is a rotation to 1e-3 (a reflection is none); the nearest Euler angles are used where it is off by more than 1e-6. out may be in. Wigner's d(pi/2) between
-   rotations about z: exact at any degree, where the recursion of Ivanic and Ruedenberg (1996, 1998) loses digits beyond 30. */
+   m is a rotation to 1e-3 (a reflection is none); the nearest Euler angles are used where it is off by more than 1e-6. out may be in.
+   Wigner's d(pi/2) between rotations about z: exact at any degree, where the recursion of Ivanic and Ruedenberg (1996, 1998) loses digits
+   beyond 30. One channel of order 3 to 5 in float is turned as tensors by the matrix as it is, whose roundings add up: 4e-4 of the norm
+   after 10,000 calls with one matrix. To go on turning, rotate the first expansion by the product of the matrices, or use double. */
 ISOGI_API isogi_result isogi_sh_rotate(float *out, const float *in, int order, int channels, const float m[9]);
 ISOGI_API isogi_result isogi_sh_rotate_f64(double *out, const double *in, int order, int channels, const double m[9]);
 
@@ -848,17 +850,6 @@ static const float isogi_sh__latitudes_f32[128] = {
     0.45044294f, 0.178194046f, 0.0184337348f, 0.0f, 0.0524868108f, 0.396409333f, 0.548430264f, 0.0f, -0.548430264f,
     -0.396409333f, -0.0524868108f, 0.0f, 0.00615790021f, 0.126805812f, 0.43665117f, 0.625835717f, 0.43665117f, 0.126805812f,
     0.00615790021f, 0.0f, 0.406789005f, 0.878720403f, 1.19955444f, 1.31305754f, 1.19955444f, 0.878720403f, 0.406789005f, 0.0f,
-};
-static const float isogi_sh__quarter_f32[96] = {
-    0.75f, 0.353553385f, 0.5f, -0.353553385f, -0.661437809f, -0.935414374f, 0.661437809f, 0.935414374f, -0.661437809f,
-    -0.935414374f, 0.661437809f, 0.935414374f, -0.75f, -0.353553385f, 0.125f, 0.353553385f, 0.0f, 0.0f, -0.559017003f, 0.0f,
-    0.0f, -0.0f, 0.73951f, 0.0f, -0.559017003f, -0.559017003f, -0.559017003f, -0.559017003f, -0.559017003f, -0.559017003f,
-    -0.559017003f, -0.559017003f, 0.73951f, 0.73951f, 0.73951f, 0.73951f, 0.73951f, 0.73951f, 0.73951f, 0.73951f, 0.375f,
-    0.375f, 0.375f, 0.375f, 0.375f, 0.375f, 0.375f, 0.375f, 0.75f, -0.353553385f, 0.5f, 0.353553385f, -0.661437809f,
-    0.935414374f, 0.661437809f, -0.935414374f, -0.661437809f, 0.935414374f, 0.661437809f, -0.935414374f, -0.75f, 0.353553385f,
-    0.125f, -0.353553385f, 0.0f, -0.0f, -0.559017003f, 0.0f, 0.0f, 0.0f, 0.73951f, 0.0f, -0.559017003f, -0.559017003f,
-    -0.559017003f, -0.559017003f, -0.559017003f, -0.559017003f, -0.559017003f, -0.559017003f, 0.73951f, 0.73951f, 0.73951f,
-    0.73951f, 0.73951f, 0.73951f, 0.73951f, 0.73951f, 0.375f, 0.375f, 0.375f, 0.375f, 0.375f, 0.375f, 0.375f, 0.375f,
 };
 #endif
 /* generated: end */
@@ -2169,81 +2160,49 @@ ISOGI_SH__INLINE __attribute__((target("avx2,fma"))) isogi_sh__f8 isogi_sh__rota
     return ISOGI_SH__FMA_F8(scale, v, rest * __builtin_shufflevector(v, v, 4, 4, 5, 4, 4, 4, 1, 4));
 }
 
-/* As isogi_sh__euler_angles, for a matrix that has passed isogi_sh__row_pairs_start, with nothing waiting for the root that need not:
-   (u, v) is sin b times the cosine and sine of c; lengths that should be 1 are so to 1e-5. */
-ISOGI_SH__INLINE __attribute__((target("avx2,fma"))) void isogi_sh__euler_close(isogi_sh__euler *e, const float m[9]) {
-    double x = (double)m[2], y = (double)m[5], z = (double)m[8], square = x * x + y * y, sine = sqrt(square);
-    double inverse_square = 1 / square, inverse = sine * inverse_square, scale = 1.5 - 0.5 * (square + z * z);
-    double u = x * (double)m[4] - y * (double)m[1], v = x * (double)m[3] - y * (double)m[0];
-    double turned = (1.5 - 0.5 * ((u * u + v * v) * inverse_square)) * inverse;
-    e->b[0] = z * scale, e->b[1] = sine * scale;
-    e->a[0] = x * inverse, e->a[1] = y * inverse;
-    e->c[0] = u * turned, e->c[1] = v * turned;
-    if (!(square > 0)) e->a[0] = 1, e->a[1] = 0, e->c[0] = (double)m[4], e->c[1] = (double)m[3];
+/* Degree 4, c[0] to c[8], as a traceless symmetric tensor of rank 4, whose entries with two equal pairs of indices are a symmetric matrix T
+   over the pairs xx, yy, xy, yz, zx; zz is what the trace leaves, so that pairs of rows count as Q: xx - zz, yy - zz, xy, yz, zx. Lanes of M
+   are Q T; those times Q of the rows zz and xx are the entries asked for: yyzz, zzzz, xxzz, xyzz, yzzz, -, zxzz, -, and xxyy, xxzz, -,
+   xxxy, xxyz, -, xxzx, -. An entry is a coefficient of the polynomial in x, y, z by the number of orders its factors can stand in;
+   constants: 3/16 sqrt(35/pi), 3/8 sqrt(70/pi), 3/8 sqrt(5/pi), 3/8 sqrt(10/pi), 3/16 sqrt(1/pi) of m = 4, 3, 2, 1, 0 in them. */
+ISOGI_SH__INLINE __attribute__((target("avx2,fma"))) void isogi_sh__rotate_degree4(float *out, const float *in, const isogi_sh__row_pairs *r) {
+    isogi_sh__f8 c = *(const isogi_sh__f8 *)in, zero = {0}, q0 = r->xx - r->zz, q1 = r->yy - r->zz, m, zz, xx;
+    /* T: xxxx, xxyy, yyyy, xxxy, yyxy, xxyz, xxzx, yyyz; yyzx, yyzz, xyzz, xxzz */
+    const isogi_sh__f8 k1 = {-0.473087348f, 0, 0.473087348f, 0.625835735f, -0.625835735f, 0.442532692f, 0.442532692f, -0.442532692f}, k2 = {0.317356641f, 0.105785547f, 0.317356641f, -0.236543674f, -0.236543674f, -0.167261636f, -0.501784908f, -0.501784908f};
+    const isogi_sh__f8 k3 = {0.625835735f, -0.625835735f, 0.625835735f, 0, 0, 0, 0, 0}, k4 = {-0.442532692f, -0.473087348f, 0.473087348f, 0.473087348f, 0, 0, 0, 0}, k5 = {-0.167261636f, -0.423142188f, 0, -0.423142188f, 0, 0, 0, 0};
+    const isogi_sh__f8 s1 = {0.798931687f, 0.564930014f, 2.11377456f, 1.49466432f, 1.1816359f, 1.49466432f, -1.05688728f, 1.69479004f}, s2 = {1.59786337f, 2.25972005f, 0, 0, 0, 0, 1.05688728f, 2.25972005f};
+    float t[16], last = in[8];
+    *(isogi_sh__f8 *)t = ISOGI_SH__FMA_F8(k3, last - zero, ISOGI_SH__FMA_F8(k2, __builtin_shufflevector(c, c, 4, 4, 4, 2, 2, 3, 5, 3), k1 * __builtin_shufflevector(c, c, 6, 6, 6, 0, 0, 1, 7, 1)));
+    *(isogi_sh__f8 *)(t + 8) = ISOGI_SH__FMA_F8(k5, __builtin_shufflevector(c, c, 5, 4, 4, 4, 5, 4, 4, 4), k4 * __builtin_shufflevector(c, c, 7, 6, 2, 6, 7, 6, 2, 6));
+    __asm__("" : "+m"(t)); /* spread from memory, as in degree 3 */
+#define ISOGI_SH__ENTRIES(q, i0, i1, i2, i3, i4)                                                                                 \
+    m = ISOGI_SH__FMA_F8(q0, t[i0] - zero, q1 * t[i1]);                                                                         \
+    m = ISOGI_SH__FMA_F8(r->xy, t[i2] - zero, ISOGI_SH__FMA_F8(r->yz, t[i3] - zero, ISOGI_SH__FMA_F8(r->zx, t[i4] - zero, m))); \
+    zz = ISOGI_SH__FMA_F8(m, __builtin_shufflevector(q, q, 1, 1, 1, 1, 5, 5, 5, 5), zz);                                         \
+    xx = ISOGI_SH__FMA_F8(m, __builtin_shufflevector(q, q, 2, 2, 2, 2, 7, 7, 7, 7), xx)
+    zz = xx = zero;
+    ISOGI_SH__ENTRIES(q0, 0, 1, 3, 5, 6);
+    ISOGI_SH__ENTRIES(q1, 1, 2, 4, 7, 8);
+    ISOGI_SH__ENTRIES(r->xy, 3, 4, 1, 8, 5);
+    ISOGI_SH__ENTRIES(r->yz, 5, 7, 8, 9, 10);
+    ISOGI_SH__ENTRIES(r->zx, 6, 8, 5, 10, 11);
+#undef ISOGI_SH__ENTRIES
+    m = s1 * __builtin_shufflevector(zz, zz, 3, 4, 3, 4, 1, 6, 0, 6);
+    *(isogi_sh__f8 *)out = ISOGI_SH__FMA_F8(s2, __builtin_shufflevector(xx, xx, 3, 4, 3, 4, 1, 6, 1, 6), m);
+    out[8] = (0.125f * zz[1] - xx[0]) * 1.59786337f;
 }
 
-/* Degree 4, in lanes that are pairs of a cosine and a sine of one m, so that a turn about z swaps neighbours; m = 0 stands in all lanes
-   of a vector of its own. A quarter turn about y is a matrix no row of which has more than three entries. */
-ISOGI_SH__INLINE __attribute__((target("avx2,fma"))) isogi_sh__f8 isogi_sh__turn_pairs(isogi_sh__f8 v, isogi_sh__f8 cosine, isogi_sh__f8 sine) {
-    return (isogi_sh__f8)__builtin_ia32_vfmaddsubps256(v, cosine, __builtin_shufflevector(v, v, 1, 0, 3, 2, 5, 4, 7, 6) * sine);
-}
-
-ISOGI_SH__INLINE __attribute__((target("avx2,fma"))) void isogi_sh__quarter_turn4(isogi_sh__f8 *pairs, isogi_sh__f8 *zonal, const float *weights) {
-    const isogi_sh__f8 *w = (const isogi_sh__f8 *)weights;
-    isogi_sh__f8 v = *pairs, z = *zonal;
-    *pairs = ISOGI_SH__FMA_F8(w[0], __builtin_shufflevector(v, v, 0, 3, 2, 1, 0, 3, 2, 1), w[1] * __builtin_shufflevector(v, v, 4, 7, 6, 5, 4, 7, 6, 5));
-    *pairs = ISOGI_SH__FMA_F8(w[2], z, *pairs);
-    *zonal = ISOGI_SH__FMA_F8(w[3], __builtin_shufflevector(v, v, 2, 2, 2, 2, 2, 2, 2, 2), w[5] * z);
-    *zonal = ISOGI_SH__FMA_F8(w[4], __builtin_shufflevector(v, v, 6, 6, 6, 6, 6, 6, 6, 6), *zonal);
-}
-
-ISOGI_SH__INLINE __attribute__((target("avx2,fma"))) void isogi_sh__rotate_degree4(isogi_sh__f8 *pairs, isogi_sh__f8 *zonal, isogi_sh__f8 cosines, isogi_sh__f8 sines) {
-#define ISOGI_SH__TURN4(i) /* cosines and sines of m = 1, 1, 2, 2, 3, 3, 4, 4 are those of 1, 1, 1, 1, 2, 2, 2, 2 and 0, 0, 1, 1, 1, 1, 2, 2 */ \
-    do {                                                                                                                             \
-        isogi_sh__f8 a = __builtin_shufflevector(cosines, cosines, i, i, i, i, i + 4, i + 4, i + 4, i + 4);                          \
-        isogi_sh__f8 b = __builtin_shufflevector(sines, sines, i, i, i, i, i + 4, i + 4, i + 4, i + 4);                              \
-        isogi_sh__f8 p = __builtin_shufflevector(cosines, cosines, 3, 3, i, i, i, i, i + 4, i + 4);                                  \
-        isogi_sh__f8 q = __builtin_shufflevector(sines, sines, 3, 3, i, i, i, i, i + 4, i + 4);                                      \
-        *pairs = isogi_sh__turn_pairs(*pairs, a * p - b * q, ISOGI_SH__FMA_F8(a, q, b * p));                                         \
-    } while (0)
-    ISOGI_SH__TURN4(0);
-    isogi_sh__quarter_turn4(pairs, zonal, isogi_sh__quarter_f32);
-    ISOGI_SH__TURN4(1);
-    isogi_sh__quarter_turn4(pairs, zonal, isogi_sh__quarter_f32 + 48);
-    ISOGI_SH__TURN4(2);
-#undef ISOGI_SH__TURN4
-}
-
-/* Cosines and sines of the three angles of Euler, 1 and 0, and those of twice the angles. */
-ISOGI_SH__INLINE __attribute__((target("avx2,fma"))) void isogi_sh__euler_lanes(isogi_sh__f8 *cosines, isogi_sh__f8 *sines, const float m[9]) {
-    isogi_sh__euler e;
-    isogi_sh__euler_close(&e, m);
-    {
-        isogi_sh__d4 c = {-e.c[1], e.b[0], e.a[1], 1}, s = {e.c[0], e.b[1], -e.a[0], 0};
-        isogi_sh__f4 c1 = __builtin_ia32_cvtpd2ps256(c), s1 = __builtin_ia32_cvtpd2ps256(s), c2 = c1 * c1 - s1 * s1, s2 = (c1 + c1) * s1;
-        *cosines = __builtin_shufflevector(c1, c2, 0, 1, 2, 3, 4, 5, 6, 7);
-        *sines = __builtin_shufflevector(s1, s2, 0, 1, 2, 3, 4, 5, 6, 7);
-    }
-}
-
-/* What waits for a root comes first, so that the rest is done meanwhile. */
+/* The first degrees from what they share. */
 ISOGI_SH__INLINE __attribute__((target("avx2,fma"))) int isogi_sh__rotate_low_f8(float *out, const float *in, int order, const float m[9]) {
     isogi_sh__row_pairs r;
-    isogi_sh__f8 one, three, four, zonal, zero = {0}, cosines, sines;
-    if (order > 4) isogi_sh__euler_lanes(&cosines, &sines, m);
+    isogi_sh__f8 one, three;
     if (!isogi_sh__row_pairs_start(&r, m)) return 0;
     one = isogi_sh__rotate_degrees12(in, &r);
     if (order > 3) {
         three = isogi_sh__rotate_degree3(in + 8, m, &r);
         three = __builtin_shufflevector(one, three, 7, 8, 11, 12, 9, 13, 14, 10);
     }
-    if (order > 4) {
-        four = *(const isogi_sh__f8 *)(in + 16), zonal = in[20] - zero;
-        four = __builtin_shufflevector(four, in[24] - zero, 5, 3, 6, 2, 7, 1, 8, 0);
-        isogi_sh__rotate_degree4(&four, &zonal, cosines, sines);
-        out[24] = four[6];
-        *(isogi_sh__f8 *)(out + 16) = __builtin_shufflevector(four, zonal, 7, 5, 3, 1, 8, 0, 2, 4);
-    }
+    if (order > 4) isogi_sh__rotate_degree4(out + 16, in + 16, &r);
     out[0] = in[0];
     *(isogi_sh__f8 *)(out + 1) = one;
     if (order > 3) *(isogi_sh__f8 *)(out + 8) = three;

@@ -130,33 +130,6 @@ static int generate_latitudes(quad *v) {
     return count;
 }
 
-/* Entry (row, column) of the quarter turn about y between functions m = row and m = column of degree l, from its table. */
-static quad generate_quarter(const quad *turns, int l, int row, int column) {
-    int n = row < 0 ? -row : row, m = column < 0 ? -column : column, flip = n > m && ((n + m) & 1);
-    if (n > m) { int t = n; n = m, m = t; }
-    if ((row < 0) != (column < 0) && row && column) return 0;
-    if (((l + m + n) & 1) != (row < 0 || column < 0)) return 0;
-    turns += l * (l + 1) * (l + 2) / 6 - 1;
-    for (int k = 0; k < n; k++) turns += l - k + 1;
-    return flip ? -turns[m - n] : turns[m - n];
-}
-
-/* Those of degree 4 in the lanes of isogi_sh__quarter_turn4, there and back: three vectors of weights for its pairs, three for m = 0. */
-static int generate_quarter_turns(quad *v) {
-    static const int lane[8] = {1, -1, 2, -2, 3, -3, 4, -4}; /* m */
-    static const int from[3][8] = {{1, -2, 2, -1, 1, -2, 2, -1}, {3, -4, 4, -3, 3, -4, 4, -3}, {0, 0, 0, 0, 0, 0, 0, 0}}, zonal[3] = {2, 4, 0};
-    static quad turns[1024];
-    int count = 0;
-    generate_turns(turns);
-    for (int back = 0; back < 2; back++)
-        for (int t = 0; t < 6; t++)
-            for (int i = 0; i < 8; i++) {
-                int row = t < 3 ? lane[i] : 0, column = t < 3 ? from[t][i] : zonal[t - 3];
-                v[count++] = back ? generate_quarter(turns, 4, column, row) : generate_quarter(turns, 4, row, column);
-            }
-    return count;
-}
-
 static void generate_table(FILE *out, const char *type, const char *name, const quad *v, int count, int is_double) {
     int column = 4;
     fprintf(out, "static const %s %s[%d] = {\n   ", type, name, count);
@@ -189,8 +162,6 @@ static void generate(FILE *out) {
     generate_table(out, "double", "isogi_sh__wigner_f64", v, count, 1);
     count = generate_latitudes(v);
     generate_table(out, "float", "isogi_sh__latitudes_f32", v, count, 0);
-    count = generate_quarter_turns(v);
-    generate_table(out, "float", "isogi_sh__quarter_f32", v, count, 0);
     fprintf(out, "#endif\n");
 }
 
