@@ -381,6 +381,14 @@ static int isogi_sh__finite_f32(float x) {
     return (bits & 0x7f800000u) != 0x7f800000u;
 }
 
+/* |x| < limit; not for NaN */
+ISOGI_SH__INLINE int isogi_sh__below(float x, float limit) {
+    uint32_t bits, most;
+    memcpy(&bits, &x, sizeof bits);
+    memcpy(&most, &limit, sizeof most);
+    return (bits & 0x7fffffffu) < most;
+}
+
 static int isogi_sh__finite_f64(double x) {
     uint64_t bits;
     memcpy(&bits, &x, sizeof bits);
@@ -2658,15 +2666,10 @@ ISOGI_SH__AVX2 static void isogi_sh__apply_order5(float *out, const float *in, c
 #undef ISOGI_SH__FOUR
 #endif
 
-ISOGI_API isogi_result isogi_sh_rotation_apply(float *out, const float *in, int order, int channels, const float *rotation) {
+/* Kept out of the caller, whose fast way would pay for its registers. */
+ISOGI_SH__APART isogi_result isogi_sh__rotation_apply(float *out, const float *in, int order, int channels, const float *rotation) {
     int l, i, j, k;
     if (!out || !in || !rotation || !isogi_sh__shape_ok(order, channels)) return ISOGI_INVALID;
-#ifdef ISOGI_SH__SIMD
-    if (order == 5 && channels == 1 && isogi_sh__avx2()) {
-        isogi_sh__apply_order5(out, in, rotation);
-        return ISOGI_OK;
-    }
-#endif
     for (l = 0; l < order; l++) {
         int width = 2 * l + 1, base = channels * l * l;
         for (i = 0; i < width * channels; i++) out[base + i] = 0;
@@ -2675,6 +2678,16 @@ ISOGI_API isogi_result isogi_sh_rotation_apply(float *out, const float *in, int 
                 for (k = 0; k < channels; k++) out[base + channels * i + k] += rotation[i] * in[base + channels * j + k];
     }
     return ISOGI_OK;
+}
+
+ISOGI_API isogi_result isogi_sh_rotation_apply(float *out, const float *in, int order, int channels, const float *rotation) {
+#ifdef ISOGI_SH__SIMD
+    if (order == 5 && channels == 1 && out && in && rotation && isogi_sh__avx2()) {
+        isogi_sh__apply_order5(out, in, rotation);
+        return ISOGI_OK;
+    }
+#endif
+    return isogi_sh__rotation_apply(out, in, order, channels, rotation);
 }
 
 ISOGI_API isogi_result isogi_sh_rotation_apply_f64(double *out, const double *in, int order, int channels, const double *rotation) {
@@ -2880,7 +2893,7 @@ ISOGI_SH__AVX2 static int isogi_sh__zonal_order5_f8(float *c, const float *zonal
     const isogi_sh__f8 d2 = {0, 0, 0, 0, 4.375f, 0, 0, 0};
     isogi_sh__f8 x = d[0] - zero, y = d[1] - zero, z = d[2] - zero, e = one - ISOGI_SH__FMA_F8(x, x, ISOGI_SH__FMA_F8(y, y, z * z)), scale;
     isogi_sh__f8 c2, s2, c3, s3, c4, s4, zz, l2 = zonal[2] - zero, l3 = zonal[3] - zero, l4 = zonal[4] - zero, v, w;
-    if (!(e[0] < 1e-3f && e[0] > -1e-3f)) return 0;
+    if (!isogi_sh__below(e[0], 1e-3f)) return 0;
     scale = ISOGI_SH__FMA_F8(e, ISOGI_SH__FMA_F8(e, one * 0.375f, one * 0.5f), one);
     x *= scale, y *= scale, z *= scale, zz = z * z;
     c2 = (x - y) * (x + y), s2 = (x + x) * y;
@@ -2903,13 +2916,11 @@ ISOGI_SH__AVX2 static int isogi_sh__zonal_order5_f8(float *c, const float *zonal
 }
 #endif
 
-ISOGI_API isogi_result isogi_sh_zonal_to_direction(float *c, int order, const float *zonal, const float direction[3]) {
+/* Kept out of the caller, whose fast way would pay for its registers. */
+ISOGI_SH__APART isogi_result isogi_sh__zonal_to_direction(float *c, int order, const float *zonal, const float direction[3]) {
     double scale[ISOGI_SH_MAX_ORDER], one = 1;
     int l, i;
     if (!c || !zonal || !direction || !isogi_sh__order_ok(order)) return ISOGI_INVALID;
-#ifdef ISOGI_SH__SIMD
-    if (order == 5 && isogi_sh__avx2() && isogi_sh__zonal_order5_f8(c, zonal, direction)) return ISOGI_OK;
-#endif
     if (order == 5) {
         isogi_sh__zonal_order5(c, zonal, isogi_sh__normalise_f32(direction));
         return ISOGI_OK;
@@ -2918,6 +2929,13 @@ ISOGI_API isogi_result isogi_sh_zonal_to_direction(float *c, int order, const fl
     for (i = 0; i < order * order; i++) c[i] = 0;
     isogi_sh__add_lobe(c, order, 1, scale, isogi_sh__normalise((double)direction[0], (double)direction[1], (double)direction[2]), &one);
     return ISOGI_OK;
+}
+
+ISOGI_API isogi_result isogi_sh_zonal_to_direction(float *c, int order, const float *zonal, const float direction[3]) {
+#ifdef ISOGI_SH__SIMD
+    if (order == 5 && c && zonal && direction && isogi_sh__avx2() && isogi_sh__zonal_order5_f8(c, zonal, direction)) return ISOGI_OK;
+#endif
+    return isogi_sh__zonal_to_direction(c, order, zonal, direction);
 }
 
 static double isogi_sh__window(isogi_sh_window_kind kind, double l, double width) {
