@@ -115,15 +115,16 @@ static void bench_build(const scene *s) {
     row("pyramid-256", NULL, "default", "float32; error: none possible", median(seconds, runs), 0, (double)N * N * N, "voxels");
 }
 
-/* A cubic B-spline by its definition, for places whose 64 voxels exist. */
-static real spline_at(const scene *s, const int cell[3], const real u[3]) {
+/* A cubic B-spline by its definition, for places whose 64 voxels exist; or its slope along an axis (0..2; -1: the value). */
+static real spline_at(const scene *s, const int cell[3], const real u[3], int along) {
     real sum = 0;
     for (int t = 0; t < 64; t++) {
         const int tap[3] = {t & 3, t >> 2 & 3, t >> 4};
         real weight = 1;
         for (int a = 0; a < 3; a++) {
-            const real x = fabsl(u[a] - (tap[a] - 1)), y = 2 - x;
-            weight *= x < 1 ? ((real)4 - 6 * x * x + 3 * x * x * x) / 6 : y * y * y / 6;
+            const real d = u[a] - (tap[a] - 1), x = fabsl(d), y = 2 - x;
+            if (a == along) weight *= (x < 1 ? (9 * x - 12) * x / 6 : -y * y / 2) * (d < 0 ? -1 : 1);
+            else weight *= x < 1 ? ((real)4 - 6 * x * x + 3 * x * x * x) / 6 : y * y * y / 6;
         }
         sum += weight * (real)s->reference[(cell[0] + tap[0] - 1) + (ptrdiff_t)s->n * ((cell[1] + tap[1] - 1) + (ptrdiff_t)s->n * (cell[2] + tap[2] - 1))];
     }
@@ -144,7 +145,7 @@ static double worst_sample(const scene *s, const float (*points)[3], const float
             inner &= cell[a] > 0 && cell[a] < s->n - 2;
         }
         if (smooth && !inner) continue;
-        truth = smooth ? spline_at(s, cell, u) : reference_value(&field, cell, p, 0);
+        truth = smooth ? spline_at(s, cell, u, -1) : reference_value(&field, cell, p, 0);
         double e = fabs((double)(truth - ((real)values[i] * (real)unit + (real)low)));
         worst = e > worst ? e : worst;
     }
@@ -188,22 +189,82 @@ static void bench_samples(const scene *s, const char *name, int smooth, int plac
     free(points), free(gradients), free(values), free(raw);
 }
 
+/* The cell of a world point, and the place in it. */
+static void place_of(const scene *s, const double point[3], int cell[3], real at[3]) {
+    for (int a = 0; a < 3; a++) {
+        at[a] = ((real)point[a] + 1) * (s->n - 1) / 2;
+        cell[a] = at[a] < 0 ? 0 : (int)at[a] > s->n - 2 ? s->n - 2 : (int)at[a];
+    }
+}
+
+/* How far a point is from the trilinear surface of its cell, in voxels, to first order. */
+static double off_surface(const scene *s, const double point[3]) {
+    reference_field field = {s->reference, {s->n, s->n, s->n}, 0};
+    real at[3], slope = 0;
+    int cell[3];
+    place_of(s, point, cell, at);
+    for (int a = 0; a < 3; a++) {
+        real low[3] = {at[0], at[1], at[2]}, high[3] = {at[0], at[1], at[2]}, difference;
+        low[a] = cell[a], high[a] = cell[a] + 1;
+        difference = reference_value(&field, cell, high, 0) - reference_value(&field, cell, low, 0);
+        slope += difference * difference;
+    }
+    return (double)(fabsl(reference_value(&field, cell, at, (real)s->isovalue)) / sqrtl(slope));
+}
+
+/* Largest distance of vertices from the exact trilinear surface, in voxels; *middles: 99th percentile of that of the triangles' middles. */
+static double worst_vertex(const scene *s, const isogi_mesh *mesh, double *middles) {
+    const size_t stride = 11, count = mesh->triangle_count / stride;
+    double *off = (double *)malloc((count + 1) * sizeof *off), worst = 0;
+    for (size_t i = 0; i < mesh->vertex_count; i += stride) {
+        const double point[3] = {(double)mesh->positions[i][0], (double)mesh->positions[i][1], (double)mesh->positions[i][2]};
+        worst = fmax(worst, off_surface(s, point));
+    }
+    for (size_t i = 0; i < count; i++) {
+        double middle[3] = {0, 0, 0};
+        for (int k = 0; k < 9; k++) middle[k % 3] += (double)mesh->positions[mesh->triangles[i * stride][k / 3]][k % 3] / 3;
+        off[i] = off_surface(s, middle);
+    }
+    qsort(off, count, sizeof *off, compare_doubles);
+    *middles = off[count * 99 / 100];
+    free(off);
+    return worst;
+}
+
+/* Largest angle between a normal and minus the gradient of the B-spline where its vertex is. */
+static double worst_normal(const scene *s, const isogi_mesh *mesh) {
+    double worst = 0;
+    for (size_t i = 0; i < mesh->vertex_count; i += 101) {
+        const double point[3] = {(double)mesh->positions[i][0], (double)mesh->positions[i][1], (double)mesh->positions[i][2]};
+        real at[3], g[3], length = 0, off = 0;
+        int cell[3], inner = 1;
+        place_of(s, point, cell, at);
+        for (int a = 0; a < 3; a++) inner &= cell[a] > 0 && cell[a] < s->n - 2, at[a] -= cell[a];
+        if (!inner) continue;
+        for (int a = 0; a < 3; a++) g[a] = spline_at(s, cell, at, a), length += g[a] * g[a];
+        for (int a = 0; a < 3; a++) {
+            const real d = g[a] / sqrtl(length) + (real)mesh->normals[i][a];
+            off += d * d;
+        }
+        worst = fmax(worst, (double)sqrtl(off));
+    }
+    return worst;
+}
+
 static void bench_mesh(const scene *s, const char *name, int normals) {
     isogi_mesh mesh = {0};
     isogi_mesh_desc desc = {.isovalue = s->isovalue, .normals = normals};
-    double seconds[16], worst = 0;
+    double seconds[16], worst, middles = 0;
     for (int run = 0; run < runs; run++) {
         double start = cpu_seconds();
         if (isogi_vol_mesh(s->pyramid, &desc, &mesh) != ISOGI_OK) exit(1);
         seconds[run] = cpu_seconds() - start;
     }
-    for (size_t i = 0; i < mesh.vertex_count; i += 101) {
-        float value;
-        isogi_vol_sample(s->pyramid, (const float(*)[3])mesh.positions + i, 1, &value, NULL);
-        worst = fabs((double)value - s->isovalue) > worst ? fabs((double)value - s->isovalue) : worst;
-    }
-    char setting[64];
-    snprintf(setting, sizeof setting, "%zu triangles; error: of value", mesh.triangle_count);
+    if (normals) worst = worst_normal(s, &mesh);
+    else worst = worst_vertex(s, &mesh, &middles);
+    char setting[128];
+    if (normals) snprintf(setting, sizeof setting, "%zu triangles; error: largest of normals in radians", mesh.triangle_count);
+    else snprintf(setting, sizeof setting, "%zu triangles; error: largest of vertices in voxels; 99 %% of triangles' middles within %.2g", mesh.triangle_count, middles);
     row(name, s->name, "default", setting, median(seconds, runs), worst, (double)N * N * N, "voxels");
     isogi_vol_mesh_free(s->pyramid, &mesh);
 }
