@@ -488,6 +488,7 @@ typedef struct isogi_dvr__rows {
     float *depth, *out;
     const float *from;
     size_t depth_row, out_row, from_row, rows, count, beside; /* beside: from a row of `from` to the other one that is read with it */
+    size_t weight;                                            /* from transmittance to its weight, in what pass_out writes and between reads */
 } isogi_dvr__rows;
 
 /* Sums over directions: sum[c][i] += kernel[k][c] * from[k][i]. */
@@ -1515,7 +1516,11 @@ static void isogi_dvr__exp_row(float *x, size_t count) {
     for (i = 0; i < count; i++) x[i] = isogi_dvr__exp(x[i]);
 }
 
-/* The same as above twice, and between the two what is left of the light. */
+/* What a ray counts for at a grid point beside it. Where matter ends between the two, the ray within knows nothing of what arrives outside.
+   depth: of half a piece of the ray. */
+#define ISOGI_DVR__COUNTS(depth) (1.0f / (1.0f + 16.0f * (depth) * (depth)) * 0.999999f + 1e-6f)
+
+/* The same as above twice, and between the two what is left of the light, weighed, and its weight. */
 static void isogi_dvr__pass_out(const isogi_dvr__rows *a, const float w[4]) {
     size_t c, i;
     for (c = 0; c < a->rows; c++) {
@@ -1523,7 +1528,8 @@ static void isogi_dvr__pass_out(const isogi_dvr__rows *a, const float w[4]) {
         float *depth = a->depth + c * a->depth_row, *out = a->out + c * a->out_row;
         for (i = 0; i < a->count; i++) {
             float more = (w[0] * r0[i] + w[1] * r0[i + 1]) + (w[2] * r1[i] + w[3] * r1[i + 1]);
-            out[i] = isogi_dvr__exp(depth[i] + more), depth[i] += 2 * more;
+            float weight = ISOGI_DVR__COUNTS(more);
+            out[i] = weight * isogi_dvr__exp(depth[i] + more), out[a->weight + i] = weight, depth[i] += 2 * more;
         }
     }
 }
@@ -1534,8 +1540,10 @@ static void isogi_dvr__between(const isogi_dvr__rows *a, const float part[2]) {
     for (c = 0; c < a->rows; c++) {
         const float *r0 = a->from + c * a->from_row, *r1 = r0 + a->from_row;
         for (i = 0; i < a->count; i++) {
+            const float *w0 = r0 + a->weight + i, *w1 = r1 + a->weight + i;
             float x0 = r0[i + 1] + part[1] * (r0[i] - r0[i + 1]), x1 = r1[i + 1] + part[1] * (r1[i] - r1[i + 1]);
-            a->out[c * a->out_row + i] = x1 + part[0] * (x0 - x1);
+            float y0 = w0[1] + part[1] * (w0[0] - w0[1]), y1 = w1[1] + part[1] * (w1[0] - w1[1]);
+            a->out[c * a->out_row + i] = (x1 + part[0] * (x0 - x1)) / (y1 + part[0] * (y0 - y1));
         }
     }
 }
@@ -1620,16 +1628,16 @@ static void isogi_dvr__gather(const isogi_dvr__sums *a) {
             depth[a->count] = outside;                                                                                              \
         }                                                                                                                           \
     }                                                                                                                               \
-    TARGET static void isogi_dvr__pass_out##SUFFIX(const isogi_dvr__rows *a, const float weight[4]) {                              \
-        const float w[4] = {weight[0], weight[1], weight[2], weight[3]};                                                            \
+    TARGET static void isogi_dvr__pass_out##SUFFIX(const isogi_dvr__rows *a, const float share[4]) {                               \
+        const float w[4] = {share[0], share[1], share[2], share[3]};                                                                \
         size_t c, i;                                                                                                                \
         for (c = 0; c < a->rows; c++) {                                                                                             \
             const float *r0 = a->from + c * a->from_row;                                                                            \
             float *depth = a->depth + c * a->depth_row, *out = a->out + c * a->out_row, outside = depth[a->count];                  \
             for (i = 0; i < a->count; i += ISOGI_DVR__LANES) {                                                                      \
-                isogi_dvr__floats more = ISOGI_DVR__MORE, x = ISOGI_DVR__C(depth + i) + more, e;                                    \
+                isogi_dvr__floats more = ISOGI_DVR__MORE, x = ISOGI_DVR__C(depth + i) + more, e, weight = ISOGI_DVR__COUNTS(more);  \
                 ISOGI_DVR__EXP(e, x)                                                                                                \
-                ISOGI_DVR__V(out + i) = e, ISOGI_DVR__V(depth + i) = x + more;                                                      \
+                ISOGI_DVR__V(out + i) = e * weight, ISOGI_DVR__V(out + a->weight + i) = weight, ISOGI_DVR__V(depth + i) = x + more; \
             }                                                                                                                       \
             depth[a->count] = outside;                                                                                              \
         }                                                                                                                           \
@@ -1641,7 +1649,10 @@ static void isogi_dvr__gather(const isogi_dvr__sums *a) {
             for (i = 0; i < a->count; i += ISOGI_DVR__LANES) {                                                                      \
                 const float *r0 = a->from + c * a->from_row + i, *r1 = r0 + a->from_row;                                            \
                 isogi_dvr__floats x0 = ISOGI_DVR__C(r0 + 1), x1 = ISOGI_DVR__C(r1 + 1);                                             \
+                isogi_dvr__floats y0 = ISOGI_DVR__C(r0 + a->weight + 1), y1 = ISOGI_DVR__C(r1 + a->weight + 1);                     \
                 x0 += p1 * (ISOGI_DVR__C(r0) - x0), x1 += p1 * (ISOGI_DVR__C(r1) - x1), x1 += p0 * (x0 - x1);                       \
+                y0 += p1 * (ISOGI_DVR__C(r0 + a->weight) - y0), y1 += p1 * (ISOGI_DVR__C(r1 + a->weight) - y1);                     \
+                x1 /= y1 + p0 * (y0 - y1);                                                                                          \
                 if (a->count - i >= ISOGI_DVR__LANES) ISOGI_DVR__V(a->out + c * a->out_row + i) = x1;                               \
                 else memcpy(a->out + c * a->out_row + i, &x1, (a->count - i) * sizeof(float));                                      \
             }                                                                                                                       \
@@ -3388,7 +3399,7 @@ static void isogi_dvr__local_row(const isogi_dvr__local_job *job, size_t n, cons
     const isogi_dvr__local_step *step = job->step + isogi_dvr__steps_before(d, n);
     size_t steps = isogi_dvr__local_steps(d, n), row = isogi_dvr__window_row(&d->blocks, n), plane = row * isogi_dvr__window_side(&d->blocks, n), k, j, c;
     float depth[2 * ISOGI_DVR__LANES];
-    isogi_dvr__rows rows = {depth, NULL, NULL, 0, 0, 0, 1, count, row};
+    isogi_dvr__rows rows = {depth, NULL, NULL, 0, 0, 0, 1, count, row, 0};
     isogi_dvr__sums sums = {sum[0], depth, NULL, 2 * ISOGI_DVR__LANES, 0, d->coefficients, 1, count};
     for (c = 0; c < d->coefficients; c++) memset(sum[c], 0, sizeof sum[c]);
     for (k = 0; k < (size_t)d->desc.directions; k++) {
@@ -3570,7 +3581,8 @@ static void isogi_dvr__global_task(void *arg, size_t task) {
    of a node; extinction is interpolated at the rays' places, the depth that a ray has gathered stays with the ray: nothing is
    interpolated twice, so that a shadow is as sharp after a hundred slices as after one. A ray that leaves at a side is forgotten
    when it is one node outside, and a new one enters at the other side. At the slices of the visibility grid the transmittance of
-   the four rays around a grid point is interpolated. */
+   the four rays around a grid point is interpolated, rays in dense matter counting less: across its surfaces light does not blur, and
+   the share of each ray, another one for each direction and grid point, does not show as a weave. */
 typedef struct isogi_dvr__sweep {
     const float *extinction;       /* node (slice, row, lane) at slice * slice_stride + row * row_stride + lane */
     size_t size[3];                /* nodes: slices, rows, lanes */
@@ -3579,12 +3591,12 @@ typedef struct isogi_dvr__sweep {
     double slip[2];                /* of the bundle from slice to slice: rows, lanes */
     float piece;                   /* half the depth that extinction 1 adds from slice to slice */
     float *depth, *row;            /* of rays; scratch */
-    size_t depth_row, out_row;
+    size_t depth_row, out_row, weight; /* weight: from a row of transmittance to its weights */
     size_t points[3], first[3], every[3], out_stride[3]; /* of the visibility grid, by slices, rows, lanes */
     isogi_dvr__kernels kernels;
 } isogi_dvr__sweep;
 
-/* The bundle at one slice: how far it has slipped. Ray c of a row stands between nodes c - 2 and c - 1, a share of `part` past the
+/* The bundle at one slice: how far it has slipped. Ray c of a row stands between nodes c - 1 and c, a share of `part` past the
    former (0 <= part < 1): 0 is just outside, size just outside at the other end. */
 typedef struct isogi_dvr__slip {
     size_t row, lane;   /* where ray 0 of row 0 is in the buffer */
@@ -3610,14 +3622,14 @@ static isogi_dvr__slip isogi_dvr__slip_at(const isogi_dvr__sweep *s, size_t slic
 static void isogi_dvr__sweep_add(const isogi_dvr__sweep *s, size_t slice, const isogi_dvr__slip *at, float piece, int out) {
     isogi_dvr__rows a;
     float w[4];
-    size_t c;
+    size_t c, i;
     w[0] = piece * (1 - at->part[0]) * (1 - at->part[1]), w[1] = piece * (1 - at->part[0]) * at->part[1];
     w[2] = piece * at->part[0] * (1 - at->part[1]), w[3] = piece * at->part[0] * at->part[1];
     a.from = s->extinction + (s->backwards ? s->size[0] - 1 - slice : slice) * s->slice_stride, a.from_row = s->row_stride;
     a.beside = at->part[0] > 0 ? s->row_stride : 0;
     a.rows = s->size[1] - (at->part[0] > 0), a.count = s->size[2] - (at->part[1] > 0);
     a.depth = s->depth + (at->row + 1) * s->depth_row + at->lane + 1, a.depth_row = s->depth_row;
-    a.out = s->row + s->out_row + 1, a.out_row = s->out_row;
+    a.out = s->row + s->out_row + 1, a.out_row = s->out_row, a.weight = s->weight;
     if (!out) {
         s->kernels.pass(&a, w);
         return;
@@ -3627,34 +3639,45 @@ static void isogi_dvr__sweep_add(const isogi_dvr__sweep *s, size_t slice, const 
         const float *depth = s->depth + (at->row + c) * s->depth_row + at->lane;
         float *e = s->row + c * s->out_row;
         if (c && c <= a.rows) {
-            e[0] = isogi_dvr__exp(depth[0]);
-            if (a.count < s->size[2]) e[s->size[2]] = isogi_dvr__exp(depth[s->size[2]]);
+            e[0] = isogi_dvr__exp(depth[0]), e[s->weight] = 1;
+            if (a.count < s->size[2]) e[s->size[2]] = isogi_dvr__exp(depth[s->size[2]]), e[s->weight + s->size[2]] = 1;
         } else {
             memcpy(e, depth, (s->size[2] + 1) * sizeof *e);
             s->kernels.exp_row(e, s->size[2] + 1);
+            for (i = 0; i <= s->size[2]; i++) e[s->weight + i] = 1;
         }
     }
 }
 
-/* Transmittance between the two rays beside every grid point of a row of rays. */
-static void isogi_dvr__sweep_row_out(const isogi_dvr__sweep *s, const isogi_dvr__slip *at, size_t c, float *out) {
-    const float *depth = s->depth + (at->row + c) * s->depth_row + at->lane;
-    float *e = s->row, part = at->part[1];
-    size_t n = s->points[2], every = s->every[2], i;
-    for (i = 0; i < n; i++) e[2 * i] = depth[s->first[2] + i * every], e[2 * i + 1] = depth[s->first[2] + i * every + 1];
+/* Transmittance between the two rays beside every grid point of a row of rays, weighed, and its weight. */
+static void isogi_dvr__sweep_row_out(const isogi_dvr__sweep *s, size_t slice, const isogi_dvr__slip *at, size_t c, float *out, float *weight) {
+    const float *depth = s->depth + (at->row + c) * s->depth_row + at->lane, *from = s->extinction + slice * s->slice_stride;
+    const float *low = from + (c ? c - 1 : 0) * s->row_stride, *high = from + (c < s->size[1] ? c : 0) * s->row_stride; /* the nodes beside */
+    float *e = s->row, part = at->part[1], share[2];
+    size_t n = s->points[2], i;
+    share[0] = c ? s->piece * (1 - at->part[0]) : 0, share[1] = c < s->size[1] ? s->piece * at->part[0] : 0;
+    for (i = 0; i < n; i++) e[2 * i] = depth[s->first[2] + i * s->every[2]], e[2 * i + 1] = depth[s->first[2] + i * s->every[2] + 1];
     s->kernels.exp_row(e, 2 * n);
-    for (i = 0; i < n; i++) out[i] = e[2 * i + 1] + part * (e[2 * i] - e[2 * i + 1]);
+    for (i = 0; i < n; i++) {
+        size_t h = s->first[2] + i * s->every[2];
+        float x1 = share[0] * low[h] + share[1] * high[h], x2 = share[0] * low[h + 1] + share[1] * high[h + 1]; /* 0 past the end */
+        float x0 = h ? share[0] * low[h - 1] + share[1] * high[h - 1] : 0, e0 = e[2 * i], e1 = e[2 * i + 1];
+        weight[i] = 1, out[i] = e1 + part * (e0 - e1);
+        if (!(x0 + x1 + x2 > 0)) continue; /* no matter beside it */
+        x0 += part * (x1 - x0), x1 += part * (x2 - x1), x0 = ISOGI_DVR__COUNTS(x0), x1 = ISOGI_DVR__COUNTS(x1);
+        e0 *= x0, e1 *= x1, weight[i] = x1 + part * (x0 - x1), out[i] = e1 + part * (e0 - e1);
+    }
 }
 
 /* Grid points at some of the nodes only. */
-static void isogi_dvr__sweep_points(const isogi_dvr__sweep *s, const isogi_dvr__slip *at, float *out) {
-    float *r0 = s->row + 2 * s->points[2] + ISOGI_DVR__LANES, *r1 = r0 + s->points[2];
-    size_t i, j;
+static void isogi_dvr__sweep_points(const isogi_dvr__sweep *s, size_t slice, const isogi_dvr__slip *at, float *out) {
+    size_t n = s->points[2], i, j;
+    float *r0 = s->row + 2 * n + ISOGI_DVR__LANES, *r1 = r0 + n, *w0 = r1 + n, *w1 = w0 + n;
     for (j = 0; j < s->points[1]; j++) {
         size_t c = s->first[1] + j * s->every[1];
-        isogi_dvr__sweep_row_out(s, at, c, r0);
-        isogi_dvr__sweep_row_out(s, at, c + 1, r1);
-        for (i = 0; i < s->points[2]; i++) out[j * s->out_stride[1] + i] = r1[i] + at->part[0] * (r0[i] - r1[i]);
+        isogi_dvr__sweep_row_out(s, slice, at, c, r0, w0);
+        isogi_dvr__sweep_row_out(s, slice, at, c + 1, r1, w1);
+        for (i = 0; i < n; i++) out[j * s->out_stride[1] + i] = (r1[i] + at->part[0] * (r0[i] - r1[i])) / (w1[i] + at->part[0] * (w0[i] - w1[i]));
     }
 }
 
@@ -3673,14 +3696,14 @@ static void isogi_dvr__sweep_run(isogi_dvr__sweep *s, float *out) {
         }
         plane = out + point * s->out_stride[0];
         if (k && all) {
-            isogi_dvr__rows a = {NULL, NULL, NULL, 0, 0, 0, 0, 0, 0};
+            isogi_dvr__rows a = {NULL, NULL, NULL, 0, 0, 0, 0, 0, 0, 0};
             isogi_dvr__sweep_add(s, k, &at, s->piece, 1);
             a.from = s->row, a.from_row = s->out_row, a.rows = s->points[1], a.count = s->points[2];
-            a.out = plane, a.out_row = s->out_stride[1];
+            a.out = plane, a.out_row = s->out_stride[1], a.weight = s->weight;
             s->kernels.between(&a, at.part);
         } else {
             if (k) isogi_dvr__sweep_add(s, k, &at, s->piece, 0);
-            isogi_dvr__sweep_points(s, &at, plane);
+            isogi_dvr__sweep_points(s, slice, &at, plane);
             isogi_dvr__sweep_add(s, k, &at, s->piece, 0);
         }
     }
@@ -3706,7 +3729,7 @@ static void isogi_dvr__set_sweep(isogi_dvr__sweep *s, const isogi_dvr *d, const 
     s->slip[0] = -w[axis[1]] / most, s->slip[1] = -w[axis[2]] / most;
     s->piece = (float)(0.5 / (most * d->desc.unit));
     s->kernels = d->kernels;
-    s->depth_row = s->size[2] + s->size[0] + 2 + 2 * ISOGI_DVR__LANES, s->out_row = s->size[2] + 1 + 2 * ISOGI_DVR__LANES;
+    s->depth_row = s->size[2] + s->size[0] + 2 + 2 * ISOGI_DVR__LANES, s->weight = s->size[2] + 1 + 2 * ISOGI_DVR__LANES, s->out_row = 2 * s->weight;
     s->depth = scratch, s->row = scratch + (s->size[1] + s->size[0] + 2) * s->depth_row;
 }
 
@@ -3718,8 +3741,8 @@ static size_t isogi_dvr__sweep_scratch(const isogi_dvr *d) {
         if (d->matter.size[a] > most) most = d->matter.size[a];
         if (d->desc.grid[a] > row) row = d->desc.grid[a];
     }
-    row = 4 * row + 2 * ISOGI_DVR__LANES;
-    if (row < (most + 2) * (most + 1 + 2 * ISOGI_DVR__LANES)) row = (most + 2) * (most + 1 + 2 * ISOGI_DVR__LANES);
+    row = 6 * row + 2 * ISOGI_DVR__LANES;
+    if (row < 2 * (most + 2) * (most + 1 + 2 * ISOGI_DVR__LANES)) row = 2 * (most + 2) * (most + 1 + 2 * ISOGI_DVR__LANES);
     return (2 * most + 2) * (2 * most + 2 + 2 * ISOGI_DVR__LANES) + row;
 }
 
@@ -5840,6 +5863,7 @@ ISOGI_API isogi_result isogi_dvr_tets_render(const isogi_tets *tets, const isogi
 #undef ISOGI_DVR__4
 #undef ISOGI_DVR__C4
 #undef ISOGI_DVR__C4I
+#undef ISOGI_DVR__COUNTS
 #undef ISOGI_DVR__AVX
 #endif /* implementation */
 

@@ -1,6 +1,6 @@
 /* Run time against error of isogi_dvr.h.
 
-       build/bench/bench_dvr [--quick] OUT.csv
+       build/bench/bench_dvr [--quick] [--only SCENE] OUT.csv
 
    One thread, CPU seconds. Volumes are procedural, as the scenes name them: Marschner-Lobb and gyroid on the cube, here 128^3
    (64^3 with --quick). Frames: standard view, shaded by visibility under a uniform sky and a directional light; error = RMSE of
@@ -457,14 +457,15 @@ static void bench_scene_rows(const bench_scene *s) {
 }
 
 int main(int argc, char **argv) {
-    const char *path = NULL;
+    const char *path = NULL, *only = NULL;
     for (int i = 1; i < argc; i++) {
         if (!strcmp(argv[i], "--quick")) N = 64, WIDTH = 128, points = 6, POINTS = 256, PIXELS = 128;
+        else if (!strcmp(argv[i], "--only") && i + 1 < argc) only = argv[++i];
         else path = argv[i];
     }
-    if (!path || !(csv = fopen(path, "w"))) return fprintf(stderr, "usage: %s [--quick] OUT.csv\n", argv[0]), 2;
+    if (!path || !(csv = fopen(path, "w"))) return fprintf(stderr, "usage: %s [--quick] [--only SCENE] OUT.csv\n", argv[0]), 2;
     fprintf(csv, "header,case,method,setting,seconds,error,work,unit\n");
-    for (int f = 0; f < 2; f++) {
+    for (int f = only ? 2 : 0; f < 2; f++) {
         size_t n = (size_t)N, i;
         float *data = (float *)malloc(n * n * n * sizeof(float)), low = 1e9f, high = -1e9f;
         for (i = 0; i < n * n * n; i++) {
@@ -492,8 +493,9 @@ int main(int argc, char **argv) {
         isogi_vol_free(pyramid);
         free(data);
     }
-    for (size_t i = 0; i < sizeof bench_scenes / sizeof bench_scenes[0]; i++) bench_scene_rows(&bench_scenes[i]);
-    bench_scale_invariant();
-    bench_tables();
+    for (size_t i = 0; i < sizeof bench_scenes / sizeof bench_scenes[0]; i++)
+        if (!only || !strcmp(only, bench_scenes[i].name)) bench_scene_rows(&bench_scenes[i]);
+    if (!only || !strcmp(only, "scale-invariant")) bench_scale_invariant();
+    if (!only) bench_tables();
     return fclose(csv) ? 1 : 0;
 }
