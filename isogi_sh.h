@@ -1115,8 +1115,7 @@ typedef int32_t isogi_sh__i4 __attribute__((vector_size(16), aligned(4), may_ali
             c[1] = FMA(x, c[0], -(y * s[0])), s[1] = FMA(x, s[0], y * c[0]);                                                   \
             if (clear) c[1] = NAME##_clear(c[1]), s[1] = NAME##_clear(s[1]);                                                   \
             centre = out + stride * ((size_t)(l * (l + 1)) - base);                                                            \
-            if (m == 1) NAME##_columns(centre, stride, l, to, 1, z, u[3], c, s, state);                                        \
-            else NAME##_columns(centre, stride, l, to, m, z, zero, c, s, state);                                               \
+            NAME##_columns(centre, stride, l, to, m, z, u[3], c, s, state);                                                    \
             if (state) state += 4;                                                                                             \
             c[0] = FMA(x, c[1], -(y * s[1])), s[0] = FMA(x, s[1], y * c[1]);                                                   \
             if (clear) c[0] = NAME##_clear(c[0]), s[0] = NAME##_clear(s[0]);                                                   \
@@ -1505,43 +1504,40 @@ ISOGI_SH__AVX512 ISOGI_SH__INLINE void isogi_sh__eval_d8_split(isogi_sh__d8 *u, 
         else NAME##_any(out, stride, 0, order, u, NULL);                                                                       \
     }                                                                                                                          \
     TARGET static size_t NAME(T *out, size_t stride, int order, const T *x, const T *y, const T *z, size_t count) {            \
-        size_t i = 0;                                                                                                          \
-        for (; order == 5 && i + WIDTH <= count; i += WIDTH) {                                                                 \
-            V u[4], basis[25];                                                                                                 \
-            int k;                                                                                                             \
-            if (!NAME##_load(u, x + i, y + i, z + i)) break;                                                                   \
-            NAME##_order5(basis, u);                                                                                           \
-            ISOGI_SH__UNROLL25                                                                                                 \
-            for (k = 0; k < 25; k++) *(V *)(out + i + stride * (size_t)k) = basis[k];                                          \
-        }                                                                                                                      \
-        for (; order != 5 && i + WIDTH <= count; i += WIDTH) {                                                                 \
-            V u[4];                                                                                                            \
-            if (!NAME##_load(u, x + i, y + i, z + i)) break;                                                                   \
-            NAME##_block(out + i, stride, order, u);                                                                           \
+        V u[4], basis[25];                                                                                                     \
+        size_t i;                                                                                                              \
+        int k;                                                                                                                 \
+        for (i = 0; i + WIDTH <= count && NAME##_load(u, x + i, y + i, z + i); i += WIDTH) {                                   \
+            if (order == 5) {                                                                                                  \
+                NAME##_order5(basis, u);                                                                                       \
+                ISOGI_SH__UNROLL25                                                                                             \
+                for (k = 0; k < 25; k++) *(V *)(out + i + stride * (size_t)k) = basis[k];                                      \
+            } else NAME##_block(out + i, stride, order, u);                                                                    \
         }                                                                                                                      \
         return i;                                                                                                              \
     }                                                                                                                          \
     /* order 5, with the next directions made ready meanwhile */                                                               \
     TARGET static size_t NAME##_rows5(T *out, const T (*direction)[3], size_t count) {                                         \
-        V zero = {0}, u[4], next[4] = {zero, zero, zero, zero}, basis[25];                                                     \
-        size_t i = 0, k;                                                                                                       \
+        V zero = {0}, u[4] = {zero, zero, zero, zero}, next[4] = {zero, zero, zero, zero}, basis[25];                          \
+        size_t i, k;                                                                                                           \
         int more;                                                                                                              \
-        if (count < WIDTH) return 0;                                                                                           \
-        NAME##_split(u, direction[0]);                                                                                         \
-        for (more = NAME##_unit(u); more; out += 25 * WIDTH) {                                                                 \
-            i += WIDTH, more = 0;                                                                                              \
-            if (i + WIDTH <= count) {                                                                                          \
+        for (i = 0;; i += WIDTH) {                                                                                             \
+            more = i + WIDTH <= count;                                                                                         \
+            if (more) {                                                                                                        \
                 NAME##_split(next, direction[i]);                                                                              \
                 more = NAME##_unit(next);                                                                                      \
             }                                                                                                                  \
-            NAME##_order5(basis, u);                                                                                           \
-            for (k = 0; k < WIDTH; k++) out[25 * k] = (T)0.28209479177387814;                                                  \
-            NAME##_turn(out + 1, 25, basis + 1);                                                                               \
-            NAME##_turn(out + 9, 25, basis + 9);                                                                               \
-            NAME##_turn(out + 17, 25, basis + 17);                                                                             \
+            if (i) {                                                                                                           \
+                NAME##_order5(basis, u);                                                                                       \
+                for (k = 0; k < WIDTH; k++) out[25 * k] = (T)0.28209479177387814;                                              \
+                NAME##_turn(out + 1, 25, basis + 1);                                                                           \
+                NAME##_turn(out + 9, 25, basis + 9);                                                                           \
+                NAME##_turn(out + 17, 25, basis + 17);                                                                         \
+                out += 25 * WIDTH;                                                                                             \
+            }                                                                                                                  \
+            if (!more) return i;                                                                                               \
             u[0] = next[0], u[1] = next[1], u[2] = next[2];                                                                    \
         }                                                                                                                      \
-        return i;                                                                                                              \
     }                                                                                                                          \
     /* `count` rows, 9 or more, for as many directions as are lanes: by eight, after one alone or eight of which some come again */ \
     TARGET ISOGI_SH__INLINE void NAME##_turn_all(T *out, size_t n, const V *rows, size_t count) {                              \
