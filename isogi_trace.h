@@ -137,11 +137,12 @@
                 time; request, step and relight alone, without readers.
    Determinism  The same bits for any number of threads and any budget of steps. PATHS: a texel's light depends on the description
                 and its place alone, lazily or fully, in parts (desc.box_first, isogi_trace_merge), in any order of requests.
-                FEEDBACK: which probes there are depends on what was asked for and in which order: within 6 % (rms over points).
+                FEEDBACK: which probes there are depends on what was asked for and in which order: within 5 % (rms over points).
    Limits       Order 6; 2^24 samples; paths end after 10000 reflections. White surfaces that enclose a light truly have infinite
                 light: what is computed then is finite and has no meaning; its error says so, and isogi_trace_report.diverges.
    Cost         PATHS: samples * (1 + lights that have a size) rays for a texel, and as many for each reflection. FEEDBACK:
-                samples * (1 + half of these lights), and as if by an eighth of the samples, but 4 to 8, for each probe.
+                samples * (1 + half of these lights), each of the first four with all lights; for each probe as if by a
+                quarter of the samples, but 2 to 8.
 
    History  1.0  first release
 */
@@ -420,8 +421,8 @@ ISOGI_API size_t isogi_trace_memory(const isogi_trace *trace); /* bytes that the
 #define ISOGI_TRACE__FLUSH 64      /* rays in one call */
 #define ISOGI_TRACE__SWEEP 256     /* nodes in a task that traces no rays */
 #define ISOGI_TRACE__GROUP 65536   /* texels that are worked on together, about */
-#define ISOGI_TRACE__PROBE_SHARE 8   /* samples of a texel to those of a probe, */
-#define ISOGI_TRACE__PROBE_LEAST 4   /* which has at least so many, */
+#define ISOGI_TRACE__PROBE_SHARE 4   /* samples of a texel to those of a probe, */
+#define ISOGI_TRACE__PROBE_LEAST 2   /* which has at least so many, */
 #define ISOGI_TRACE__PROBE_MOST 8   /* and at most so many */
 #define ISOGI_TRACE__PROBE_ERROR 0.02 /* standard error of light from probes */
 #define ISOGI_TRACE__CELL 2.0       /* of probes that texels read, in voxels, */
@@ -429,9 +430,10 @@ ISOGI_API size_t isogi_trace_memory(const isogi_trace *trace); /* bytes that the
 #define ISOGI_TRACE__CELL_RATIO 8   /* length of rays to size of cells, */
 #define ISOGI_TRACE__NEAR_RATIO 2   /* up to CELL_FAR */
 #define ISOGI_TRACE__PLANE 1.0      /* voxels between the planes of a hit and its probe */
-#define ISOGI_TRACE__LIGHT_SHARE 2  /* samples to samples of a light */
+#define ISOGI_TRACE__COLOURS 0.05   /* of albedo, or share of the glow, by which isosurfaces of the same probe may differ */
+#define ISOGI_TRACE__LIGHT_FIRST 4u /* samples of a texel with one of each light */
 #define ISOGI_TRACE__FILTER 1       /* texels to each side */
-#define ISOGI_TRACE__FILTER_WIDTH 2.0
+#define ISOGI_TRACE__FILTER_WIDTH 4.0
 
 /* ==== numbers that survive -ffast-math =============================================================================== */
 
@@ -2462,22 +2464,27 @@ static isogi_result isogi_trace__want_nearest(isogi_trace *t, const size_t cell[
 }
 
 ISOGI_API isogi_result isogi_trace_request(isogi_trace *trace, const float (*points)[3], size_t count) {
-    size_t i;
+    size_t i, known[3] = {SIZE_MAX, 0, 0}; /* known: a cell all of whose texels have been asked for, as the next pixel will again */
     if (!trace || (count && !points)) return ISOGI_INVALID;
     if (!trace->scene.desc.lazy || trace->coarse) return ISOGI_OK;
     for (i = 0; i < count; i++) {
         size_t cell[3], texel[3];
         double local[3];
         isogi_result result = ISOGI_OK;
-        int k, lacking = 1;
+        int k, lacking = 1, all = 1;
         isogi_trace__cell(trace, points[i], cell, local);
+        if (!memcmp(cell, known, sizeof cell)) continue;
         for (k = 0; k < isogi_trace__tap_count(trace) && result == ISOGI_OK; k++) {
-            if (!(isogi_trace__tap(trace, cell, local, k, texel) > 0)) continue;
+            if (!(isogi_trace__tap(trace, cell, local, k, texel) > 0)) {
+                all = 0;
+                continue;
+            }
             result = isogi_trace__want(trace, texel, 0);
             if (result == ISOGI_OK) lacking = lacking && isogi_trace__state(trace, texel) == ISOGI_TRACE__NO_SURFACE;
         }
         if (result == ISOGI_OK && lacking) result = isogi_trace__want_nearest(trace, cell, local);
         if (result != ISOGI_OK) return result;
+        if (all && !lacking) memcpy(known, cell, sizeof known);
     }
     return ISOGI_OK;
 }
@@ -2491,7 +2498,7 @@ static void isogi_trace__add(isogi_counters *to, const isogi_counters *from) {
 
 typedef struct isogi_trace__job {
     isogi_trace *trace;
-    size_t count;
+    size_t first, count;
 } isogi_trace__job;
 
 static void isogi_trace__bake_task(void *arg, size_t task) {
@@ -2566,7 +2573,7 @@ static isogi_result isogi_trace__bake_batch(isogi_trace *t, size_t count) {
     uint64_t total = t->wanted + t->done, before = t->counters.texels;
     size_t tasks = (count + ISOGI_TRACE__TASK - 1) / ISOGI_TRACE__TASK, i;
     isogi_result result;
-    job.trace = t, job.count = count;
+    job.trace = t, job.first = 0, job.count = count;
     memset(t->task_counters, 0, tasks * sizeof *t->task_counters);
     result = isogi_parallel(&t->context, tasks, isogi_trace__bake_task, &job,
                             isogi_trace__lerp(t->share[0], t->share[1], (double)t->done / (double)total),
@@ -2585,7 +2592,7 @@ static isogi_result isogi_trace__bake_batch(isogi_trace *t, size_t count) {
 
 /* What is gathered at one point: a texel (brick set) or a probe. Sums are over samples, in units of irradiance / pi but for light. */
 typedef struct isogi_trace__node {
-    isogi_hit place; /* probe: where */
+    isogi_hit place; /* where */
     double isovalue;
     uint64_t key;    /* probe: of its cell */
     isogi_trace__brick *brick;
@@ -2609,9 +2616,11 @@ typedef struct isogi_trace__segment {
     uint32_t *node, *begin, *probe;
 } isogi_trace__segment;
 
-/* What the filter compares. */
+/* What the filter compares. albedo, glow: of the surface through the texel, which is the one that its rays meet. */
 typedef struct isogi_trace__guide {
     float normal[3], mean[3], luminance, variance;
+    float albedo[3], glow[3];
+    float hidden, reflected; /* share of rays that hit, and luminance of what was reflected there */
 } isogi_trace__guide;
 
 /* Texels, or probes. direct: sums over rays that escaped; bounce: over those that hit; out: irradiance or transfer. */
@@ -2634,6 +2643,7 @@ typedef struct isogi_trace__catch {
     uint64_t key;
     isogi_hit hit;
     float normal[3];
+    uint32_t probe; /* number + 1 of the probe of this hit; 0: none was there when the ray was traced */
     signed char from;
 } isogi_trace__catch;
 
@@ -2786,12 +2796,11 @@ static isogi_result isogi_trace__table_grow(isogi_trace *t) {
 }
 
 /* A node without samples. */
-static void isogi_trace__node_begin(const isogi_trace *t, isogi_trace__set *s, double isovalue) {
+static void isogi_trace__node_begin(const isogi_trace *t, isogi_trace__set *s) {
     isogi_trace__node *n = &s->nodes[s->count];
     size_t v = (size_t)t->values;
     memset(n, 0, sizeof *n);
-    n->isovalue = isovalue, n->from = (signed char)(t->scene.high ? -1 : 1);
-    isogi_trace_albedo(&t->scene.desc, isovalue, n->albedo);
+    n->from = (signed char)(t->scene.high ? -1 : 1);
     memset(s->direct + s->count * v, 0, v * sizeof(float));
     memset(s->out[0] + s->count * v, 0, v * sizeof(float));
 }
@@ -2809,31 +2818,68 @@ static int isogi_trace__same_place(const isogi_trace *t, const isogi_trace__catc
     return fabs(apart) < ISOGI_TRACE__PLANE * least && isogi_trace__dot(c->normal, n->normal) > 0.5;
 }
 
+/* Whether two isosurfaces have nearly the same colours where c hit: if not, neither's light tells that of the other. */
+static int isogi_trace__same_colours(const isogi_trace *t, const isogi_trace__catch *c, double one, double two) {
+    const isogi_trace_desc *d = &t->scene.desc;
+    double point[3];
+    float albedo[2][3], glow[2][3];
+    int a, same = 1;
+    if (!d->albedo_count && !d->emission_count && !d->material) return 1;
+    for (a = 0; a < 3; a++) point[a] = c->hit.cell[a] + c->hit.local[a];
+    isogi_vol_to_world(t->scene.pyramid, point, point);
+    isogi_trace_material(d, one, point, albedo[0], glow[0]);
+    isogi_trace_material(d, two, point, albedo[1], glow[1]);
+    for (a = 0; a < 3; a++) {
+        double most = (double)(glow[0][a] > glow[1][a] ? glow[0][a] : glow[1][a]);
+        same = same && fabs((double)albedo[0][a] - (double)albedo[1][a]) <= ISOGI_TRACE__COLOURS;
+        same = same && fabs((double)glow[0][a] - (double)glow[1][a]) <= ISOGI_TRACE__COLOURS * most;
+    }
+    return same;
+}
+
+/* The number + 1 of the probe of a hit; 0: there is none, and it would have *key. Probes are only ever added to the end of a chain,
+   so what was found once is found again. */
+static uint32_t isogi_trace__probe_find(const isogi_trace *t, const isogi_trace__catch *c, double isovalue, uint64_t *key) {
+    const isogi_trace__feedback *f = t->feedback;
+    size_t i = isogi_trace__table_find(f, c->key);
+    int tries;
+    *key = c->key;
+    for (tries = 0; f->table[i].probe; tries++) {
+        const isogi_trace__node *n = &f->probes.nodes[f->table[i].probe - 1];
+        if (tries == 32) return f->table[i].probe;
+        if (isogi_trace__same_place(t, c, n) && isogi_trace__same_colours(t, c, n->isovalue, isovalue)) return f->table[i].probe;
+        *key = isogi_trace__key(*key, 1);
+        i = isogi_trace__table_find(f, *key);
+    }
+    return 0;
+}
+
 /* The number of the probe of a hit, which is made if there is none. */
 static isogi_result isogi_trace__probe_of(isogi_trace *t, const isogi_trace__catch *c, double isovalue, uint32_t *probe) {
     isogi_trace__feedback *f = t->feedback;
-    size_t i = isogi_trace__table_find(f, c->key);
+    size_t i;
     isogi_trace__node *n;
     isogi_result result;
-    uint64_t key = c->key;
-    int tries;
-    for (tries = 0; f->table[i].probe; tries++) {
-        *probe = f->table[i].probe - 1;
-        if (tries == 32 || isogi_trace__same_place(t, c, &f->probes.nodes[*probe])) return ISOGI_OK;
-        key = isogi_trace__key(key, 1);
-        i = isogi_trace__table_find(f, key);
+    uint64_t key;
+    uint32_t known = c->probe ? c->probe : isogi_trace__probe_find(t, c, isovalue, &key);
+    int a;
+    if (known) {
+        *probe = known - 1;
+        return ISOGI_OK;
     }
     result = isogi_trace__table_grow(t);
     if (result == ISOGI_OK) result = isogi_trace__set_reserve(t, &f->probes, 1);
     if (result != ISOGI_OK) return result;
-    isogi_trace__node_begin(t, &f->probes, isovalue);
+    isogi_trace__node_begin(t, &f->probes);
     n = &f->probes.nodes[f->probes.count];
+    n->isovalue = isovalue;
+    isogi_trace_albedo(&t->scene.desc, isovalue, n->albedo);
     n->place = c->hit, n->key = key, n->from = c->from;
     memcpy(n->normal, c->normal, sizeof n->normal);
     if (t->scene.desc.material) {
         double grid[3], point[3];
         float emission[3];
-        for (tries = 0; tries < 3; tries++) grid[tries] = n->place.cell[tries] + n->place.local[tries];
+        for (a = 0; a < 3; a++) grid[a] = n->place.cell[a] + n->place.local[a];
         isogi_vol_to_world(t->scene.pyramid, grid, point);
         isogi_trace_material(&t->scene.desc, isovalue, point, n->albedo, emission);
     }
@@ -2944,6 +2990,7 @@ static void isogi_trace__cast_hit(isogi_trace__cast *c, int i) {
     isogi_trace__catch *to = &t->feedback->catches[span->offset + (c->sample[i] - span->first)];
     int side = c->hit[i].side > 0 ? 1 : -1, a;
     double length = c->hit[i].t;
+    uint64_t made;
     to->from = (signed char)side;
     to->hit = c->hit[i];
     memcpy(to->normal, c->normal[i], sizeof to->normal);
@@ -2955,8 +3002,9 @@ static void isogi_trace__cast_hit(isogi_trace__cast *c, int i) {
     }
     if (t->scene.desc.emission_count || t->scene.desc.material) isogi_trace__cast_glow(c, span, to);
     if (!t->scene.desc.bounces) return;
-    to->key = isogi_trace__probe_key(&t->scene, &to->hit, to->normal, length, 
+    to->key = isogi_trace__probe_key(&t->scene, &to->hit, to->normal, length,
                                      span->sum.brick ? ISOGI_TRACE__CELL : ISOGI_TRACE__CELL_FAR);
+    to->probe = isogi_trace__probe_find(t, to, span->sum.isovalue, &made);
 }
 
 /* Takes in the results of rays first .. first + count - 1. */
@@ -3047,15 +3095,18 @@ static void isogi_trace__span_sky(isogi_trace__cast *c, uint32_t k) {
     }
 }
 
-/* Samples of lights go with every ISOGI_TRACE__LIGHT_SHARE-th of the others. */
-static uint32_t isogi_trace__light_samples(uint32_t samples) { return (samples + ISOGI_TRACE__LIGHT_SHARE - 1) / ISOGI_TRACE__LIGHT_SHARE; }
+/* Samples of lights go with every second of the others, but at texels with each of the first four: what lights bring is not filtered. */
+static uint32_t isogi_trace__light_samples(uint32_t samples, int is_texel) {
+    if (is_texel && samples <= ISOGI_TRACE__LIGHT_FIRST) return samples;
+    return (samples + 1 + (is_texel ? ISOGI_TRACE__LIGHT_FIRST : 0)) / 2;
+}
 
 static void isogi_trace__span_light(isogi_trace__cast *c, uint32_t k, size_t number) {
     const isogi_light *light = &c->trace->scene.desc.lighting.lights[number];
     const isogi_trace__span *span = &c->span[k];
-    uint32_t i, end = isogi_trace__light_samples(span->first + span->count);
+    uint32_t i, end = isogi_trace__light_samples(span->first + span->count, span->sum.brick != NULL);
     int a;
-    for (i = isogi_trace__light_samples(span->first); i < end; i++) {
+    for (i = isogi_trace__light_samples(span->first, span->sum.brick != NULL); i < end; i++) {
         double u[2], cosine;
         isogi_trace__beam beam;
         isogi_trace__sobol(isogi_trace__key(c->sequence[k], 0x5eed3 + number), isogi_trace__index(c->trace, &c->span[k].sum, i), u);
@@ -3074,7 +3125,8 @@ static void isogi_trace__cast_round(isogi_trace__cast *c, uint32_t spans) {
     isogi_trace__cast_flush(c);
     for (k = 0; k < spans && c->shadow; k++) {
         const isogi_trace__span *s = &c->span[k];
-        uint32_t n = c->bright ? s->count : isogi_trace__light_samples(s->first + s->count) - isogi_trace__light_samples(s->first);
+        int texel = s->sum.brick != NULL;
+        uint32_t n = c->bright ? s->count : isogi_trace__light_samples(s->first + s->count, texel) - isogi_trace__light_samples(s->first, texel);
         double spread = n ? c->square[k] - c->sum[k] * c->sum[k] / n : 0;
         *(c->bright ? &c->span[k].sum.bright_spread : &c->span[k].sum.light_spread) += spread > 0 ? spread : 0;
     }
@@ -3090,10 +3142,12 @@ static int isogi_trace__span_site(isogi_trace__cast *c, uint32_t k) {
     uint64_t seed = t->scene.desc.seed;
     if (n->brick) {
         const size_t *x = n->texel, *l = t->lattice;
-        if (!isogi_trace__texel_site(t, x, site)) return 0;
+        if (!(isogi_trace__dot(n->normal, n->normal) > 0)) return 0;
+        memset(site, 0, sizeof *site);
+        site->place = n->place, site->isovalue = n->isovalue;
+        memcpy(site->normal, n->normal, sizeof site->normal);
         site->key = isogi_trace__key(isogi_trace__key(seed, 2), (uint64_t)x[0] + (uint64_t)l[0] * ((uint64_t)x[1] + (uint64_t)l[1] * (uint64_t)x[2]));
         c->sequence[k] = isogi_trace__key(isogi_trace__key(seed, 3), (uint64_t)isogi_trace__brick_of(t, x, &n->slot));
-        memcpy(n->normal, site->normal, sizeof n->normal);
     } else {
         float geometric[1][3];
         site->place = n->place, site->isovalue = n->isovalue;
@@ -3245,8 +3299,7 @@ static void isogi_trace__span_commit(isogi_trace *t, isogi_trace__set *set, cons
     n->light_spread += s->sum.light_spread, n->bright_spread += s->sum.bright_spread, n->square += s->sum.square;
     if (!n->samples) t->counters.texels += n->brick != NULL;
     if (n->brick) t->feedback->partial += s->count;
-    n->samples = s->first + s->count, n->light_samples = isogi_trace__light_samples(n->samples), n->hits += hits;
-    if (n->brick) memcpy(n->normal, s->sum.normal, sizeof n->normal);
+    n->samples = s->first + s->count, n->light_samples = isogi_trace__light_samples(n->samples, n->brick != NULL), n->hits += hits;
     if (n->samples == isogi_trace__block(t, !n->brick, n->level + 1)) n->level++;
 }
 
@@ -3409,6 +3462,16 @@ static double isogi_trace__mean_variance(double sum, double square, double n) {
     return n > 1 && spread > 0 ? spread / (n * (n - 1)) : 0;
 }
 
+/* Colours by place are those at the texel: which of its own its rays will meet is not known. */
+static void isogi_trace__guide_colours(const isogi_trace *t, const isogi_trace__node *n, isogi_trace__guide *g) {
+    const isogi_trace_desc *d = &t->scene.desc;
+    double point[3];
+    if (!d->albedo_count && !d->emission_count && !d->material) return;
+    isogi_trace__texel_grid(t, n->texel, point);
+    isogi_vol_to_world(t->scene.pyramid, point, point);
+    isogi_trace_material(d, n->isovalue, point, g->albedo, g->glow);
+}
+
 /* The part of a texel's irradiance that neighbours may share, and its variance: what cosine-distributed rays brought. */
 static void isogi_trace__guide_task(void *arg, size_t task) {
     isogi_trace *t = (isogi_trace *)arg;
@@ -3420,6 +3483,7 @@ static void isogi_trace__guide_task(void *arg, size_t task) {
         double scale = n->samples ? 1.0 / n->samples : 0, rgb[3] = {0, 0, 0};
         int a;
         memcpy(g->normal, n->normal, sizeof g->normal);
+        isogi_trace__guide_colours(t, n, g);
         for (a = 0; a < t->values; a++)
             set->out[0][i * v + (size_t)a] = (float)(ISOGI_TRACE__PI * scale * (double)set->direct[i * v + (size_t)a] +
                                                       scale * (double)set->bounce[i * v + (size_t)a]);
@@ -3431,6 +3495,9 @@ static void isogi_trace__guide_task(void *arg, size_t task) {
         g->luminance = (float)(ISOGI_TRACE__PI * scale * isogi_trace__luminance(rgb));
         g->variance = (float)(ISOGI_TRACE__PI * ISOGI_TRACE__PI *
                               isogi_trace__mean_variance(isogi_trace__luminance(rgb), n->square + n->bounce_square, (double)n->samples));
+        for (a = 0; a < 3; a++) rgb[a] = scale * (double)set->bounce[i * v + (size_t)a];
+        g->hidden = (float)(scale * (t->scene.desc.bounces ? n->hits : n->samples)); /* hits are counted if they reflect */
+        g->reflected = (float)isogi_trace__luminance(rgb);
     }
 }
 
@@ -3449,6 +3516,22 @@ static double isogi_trace__light_variance(const isogi_trace__node *n) {
     return (k > 1 ? ISOGI_TRACE__PI * ISOGI_TRACE__PI * n->bright_spread / (k * (k - 1)) : 0) + (l > 1 ? n->light_spread / (l * (l - 1)) : 0);
 }
 
+/* How much the light of two texels differs because their isosurfaces have other colours: what no sample has to show. */
+static double isogi_trace__other_colours(const isogi_trace *t, const isogi_trace__guide *g, const isogi_trace__guide *q) {
+    static const double weight[3] = {0.2126, 0.7152, 0.0722};
+    const isogi_trace_desc *d = &t->scene.desc;
+    double hidden = ((double)g->hidden + (double)q->hidden) / 2, most = 0, glow = 0, albedo = 0;
+    int a;
+    if (!d->albedo_count && !d->emission_count && !d->material) return 0;
+    for (a = 0; a < 3; a++) {
+        double larger = (double)(g->albedo[a] > q->albedo[a] ? g->albedo[a] : q->albedo[a]);
+        glow += weight[a] * fabs((double)g->glow[a] - (double)q->glow[a]);
+        if (larger > 0) albedo += weight[a] * fabs((double)g->albedo[a] - (double)q->albedo[a]) / larger;
+    }
+    most = (double)(g->reflected > q->reflected ? g->reflected : q->reflected);
+    return ISOGI_TRACE__PI * hidden * glow + most * albedo;
+}
+
 /* Mean over the texels around that face the same way and whose light may be the same within its noise. Writes the filtered rgb, its
    variance, and the variance of other light, averaged over the same texels. Returns the number of samples that this is as good as. */
 static double isogi_trace__filter(const isogi_trace *t, size_t node, double rgb[3], double variance[2]) {
@@ -3464,7 +3547,7 @@ static double isogi_trace__filter(const isogi_trace *t, size_t node, double rgb[
                 const isogi_trace__guide *q;
                 size_t x[3];
                 uint32_t other;
-                double w, facing, apart, noise;
+                double w, facing, apart, noise, colours;
                 for (a = 0; a < 3; a++) x[a] = n->texel[a] + (size_t)d[a]; /* wraps below zero: beyond the lattice */
                 if (x[0] >= t->lattice[0] || x[1] >= t->lattice[1] || x[2] >= t->lattice[2]) continue;
                 q = isogi_trace__guide_at(t, x, &other);
@@ -3474,6 +3557,8 @@ static double isogi_trace__filter(const isogi_trace *t, size_t node, double rgb[
                 facing *= facing, facing *= facing, facing *= facing;
                 apart = (double)g->luminance - (double)q->luminance, noise = (double)g->variance + (double)q->variance;
                 apart = apart * apart - noise;
+                colours = isogi_trace__other_colours(t, g, q);
+                if (colours > 0) apart = (apart > 0 ? apart : 0) + 4 * colours * colours;
                 w = apart > 0 ? noise > 0 ? exp(-apart / noise) : 0 : 1;
                 w *= facing * facing * exp(-(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]) / ISOGI_TRACE__FILTER_WIDTH);
                 squares += w * w * set->nodes[other].samples;
@@ -3541,10 +3626,29 @@ static void isogi_trace__publish(isogi_trace *t) {
 
 /* ---- stepping ---- */
 
+/* Where texels lie, and on which isosurface. Without a normal there is no surface: only where the voxels were changed after the
+   texel was classified, which breaks the contract but must not hang. */
+static void isogi_trace__place_task(void *arg, size_t task) {
+    const isogi_trace__job *job = (const isogi_trace__job *)arg;
+    const isogi_trace *t = job->trace;
+    size_t i = task * ISOGI_TRACE__SWEEP, end = i + ISOGI_TRACE__SWEEP < job->count ? i + ISOGI_TRACE__SWEEP : job->count;
+    for (; i < end; i++) {
+        isogi_trace__node *n = &t->feedback->texels.nodes[job->first + i];
+        isogi_trace__site site;
+        if (isogi_trace__texel_site(t, n->texel, &site)) {
+            n->place = site.place, n->isovalue = site.isovalue;
+            memcpy(n->normal, site.normal, sizeof n->normal);
+        }
+        isogi_trace_albedo(&t->scene.desc, n->isovalue, n->albedo);
+    }
+}
+
 /* Nodes for the wanted texels: of all bricks in the queue when lazy, every other texel along each axis first; else of a group. */
 static isogi_result isogi_trace__nodes_make(isogi_trace *t) {
     isogi_trace__feedback *f = t->feedback;
-    size_t end = t->queue_first, i, slot, texels = 0, half;
+    size_t end = t->queue_first, i, slot, texels = 0, half, before = f->texels.count;
+    isogi_context silent = t->context;
+    isogi_trace__job fresh;
     if (t->queue_first == t->queue_count || (f->texels.count && !t->scene.desc.lazy)) return ISOGI_OK;
     for (; end < t->queue_count && (t->scene.desc.lazy || texels < ISOGI_TRACE__GROUP); end++) {
         isogi_trace__brick *brick = t->bricks[t->queue[end]];
@@ -3564,13 +3668,11 @@ static isogi_result isogi_trace__nodes_make(isogi_trace *t) {
             isogi_trace__brick *brick = t->bricks[t->queue[i]];
             for (slot = 0; slot < ISOGI_TRACE__TEXELS; slot++) {
                 isogi_trace__node *n = &f->texels.nodes[f->texels.count];
-                isogi_trace__site site;
                 size_t x[3];
                 if (!isogi_trace__to_do(brick, slot)) continue;
                 if (!half && (slot & 0x15)) continue; /* odd along some axis */
                 isogi_trace__texel_of(t, t->queue[i], slot, x);
-                if (!isogi_trace__texel_site(t, x, &site)) site.isovalue = 0;
-                isogi_trace__node_begin(t, &f->texels, site.isovalue);
+                isogi_trace__node_begin(t, &f->texels);
                 n->brick = brick, n->slot = (uint32_t)slot;
                 memcpy(n->texel, x, sizeof x);
                 brick->node[slot] = (uint32_t)++f->texels.count;
@@ -3580,6 +3682,8 @@ static isogi_result isogi_trace__nodes_make(isogi_trace *t) {
         }
     t->queue_first = end;
     if (t->queue_first == t->queue_count) t->queue_first = t->queue_count = 0;
+    silent.progress = NULL, fresh.trace = t, fresh.count = f->texels.count - before, fresh.first = before;
+    isogi_parallel(&silent, (fresh.count + ISOGI_TRACE__SWEEP - 1) / ISOGI_TRACE__SWEEP, isogi_trace__place_task, &fresh, 0, 1);
     f->level = 0, f->cursor = 0;
     return ISOGI_OK;
 }
@@ -4822,8 +4926,9 @@ ISOGI_API isogi_result isogi_trace_gather_field(const isogi_trace_desc *desc, is
 #undef ISOGI_TRACE__NOT_READY
 #undef ISOGI_TRACE__FILTER_WIDTH
 #undef ISOGI_TRACE__FILTER
-#undef ISOGI_TRACE__LIGHT_SHARE
+#undef ISOGI_TRACE__LIGHT_FIRST
 #undef ISOGI_TRACE__PLANE
+#undef ISOGI_TRACE__COLOURS
 #undef ISOGI_TRACE__CELL_RATIO
 #undef ISOGI_TRACE__CELL_FAR
 #undef ISOGI_TRACE__CELL

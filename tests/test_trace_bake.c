@@ -200,8 +200,8 @@ TEST(same_bits_for_any_threads_and_budget) {
     scene_free(&s);
 }
 
-/* Lazily other probes may be the first in their cells: the same light within 6 % (rms), as the header says; 4.5 % were seen with 84
-   samples, so it is the probes, not the noise. */
+/* Lazily other probes may be the first in their cells: the same light within 5 % (rms), as the header says; with 84 samples the
+   difference is the same, so it is the probes, not the noise. */
 TEST(lazily_and_fully_agree) {
     double q[5] = {12, 11, 12, 15, 7}, square = 0, sum = 0;
     scene s = scene_make(25, 25, 25, NULL, pit, q);
@@ -213,11 +213,12 @@ TEST(lazily_and_fully_agree) {
     bake_and_sample(&d, NULL, (const float(*)[3])points, n, lazy);
     for (int i = 0; i < n; i++) square += pow((double)(full[i][1] - lazy[i][1]), 2), sum += (double)full[i][1] * (double)full[i][1];
     printf("    lazily against fully: %.4f (rms)\n", sqrt(square / sum));
-    CHECK(sqrt(square / sum) < 0.06, "rms %g", sqrt(square / sum));
+    CHECK(sqrt(square / sum) < 0.05, "rms %g", sqrt(square / sum));
     scene_free(&s);
 }
 
-/* Within the first rays every point that was asked for has a value; steps keep to their budget; what follows changes little. */
+/* Within the first rays every point that was asked for has a value; steps keep to their budget; what follows changes little: the largest
+   step is the one from the first guess, of 4 samples and no reflections, to light from probes (16 % of the picture, rms). */
 TEST(lazy_bakes_are_usable_at_once) {
     double q[5] = {32, 31, 32, 45, 20};
     scene s = scene_make(64, 64, 64, NULL, pit, q);
@@ -226,7 +227,7 @@ TEST(lazy_bakes_are_usable_at_once) {
     isogi_trace *t = NULL;
     isogi_counters c = {0};
     isogi_trace_report report;
-    double remaining = 1, jump = 0;
+    double remaining = 1, jump = 0, whole = 0;
     int n = surface_points(&s, 0, 600, 9, points), missing = 0, steps = 0;
     uint64_t usable = 0;
     d.lazy = 1;
@@ -244,12 +245,19 @@ TEST(lazy_bakes_are_usable_at_once) {
         missing = 0;
         for (int i = 0; i < n; i++) missing += error[i] > 1e30f;
         if (!missing && !usable) usable = c.rays;
-        else if (usable)
-            for (int i = 0; i < n; i++) jump = fmax(jump, fabs((double)(e[i][1] - last[i][1])));
+        else if (usable) {
+            double square = 0, sum = 0;
+            for (int i = 0; i < n; i++) {
+                double change = fabs((double)(e[i][1] - last[i][1]));
+                jump = fmax(jump, change), square += change * change, sum += (double)e[i][1] * (double)e[i][1];
+            }
+            whole = fmax(whole, sqrt(square / sum));
+        }
         memcpy(last, e, sizeof e);
     }
     isogi_trace_status(t, &report);
-    printf("    usable after %.3f of the rays; largest step of a value %.3f; %d steps, %g texels, %g probes\n", (double)usable / (double)c.rays, jump, steps, (double)report.texels, (double)report.probes);
+    printf("    usable after %.3f of the rays; largest step of a value %.3f, of the picture %.3f (rms); %d steps, %g texels, %g probes\n", (double)usable / (double)c.rays, jump, whole, steps, (double)report.texels, (double)report.probes);
+    CHECK(whole < 0.2 && jump < 0.4 * PI, "a step changes the picture by %.3f, a point by %.3f", whole, jump);
     CHECK(missing == 0 && usable > 0 && usable * 8 < c.rays, "usable after %g of %g rays", (double)usable, (double)c.rays);
     CHECK(report.texels == c.texels && report.drafts == 0 && report.error < 0.05 * report.light, "%g texels, error %g of %g", (double)report.texels, report.error, report.light);
     /* what has been asked for before costs nothing; another isovalue only its own texels */
@@ -326,13 +334,83 @@ TEST(errors_are_honest) {
     }
 }
 
+/* The error falls as the sampler promises: independent numbers would give a slope of -1/2 on a log-log plot; a (0,2)-sequence does better
+   where the light is smooth (up to -1), and no worse at the shadows' borders. 60 points of a pit and of the plane below a ball, of the
+   method that has no bias; the slope of a least-squares line over 4 .. 256 samples. */
+TEST(error_falls_with_the_samples) {
+    double q_pit[5] = {16, 15, 16, 22.3, 12}, q_plane[5] = {16, 17, 16, 5, 7};
+    for (int k = 0; k < 2; k++) {
+        scene s = scene_make(32, 32, 32, NULL, k ? ball_over_plane : pit, k ? q_plane : q_pit);
+        float points[60][3], reference[60][3], e[60][3];
+        int n = surface_points(&s, 0, 60, 5, points);
+        double xy = 0, xx = 0, error[4], mean = 0;
+        isogi_trace_desc d = desc_make(&s, 0.5f, 2, LONG_SUITE ? 32768 : 2048);
+        d.seed = 9;
+        isogi_trace_gather(&d, (const float(*)[3])points, NULL, (size_t)n, reference, NULL, NULL);
+        for (int i = 0; i < 4; i++) {
+            d.samples = 4 << (2 * i), d.seed = 1, error[i] = 0;
+            isogi_trace_gather(&d, (const float(*)[3])points, NULL, (size_t)n, e, NULL, NULL);
+            for (int j = 0; j < n; j++) error[i] += pow((double)e[j][1] - (double)reference[j][1], 2) / n;
+            error[i] = sqrt(error[i]), mean += log(error[i]) / 4;
+        }
+        for (int i = 0; i < 4; i++) xy += (i - 1.5) * log(4) * (log(error[i]) - mean), xx += pow((i - 1.5) * log(4), 2);
+        printf("    %s: errors %.4f %.4f %.4f %.4f, slope %.3f\n", k ? "plane" : "pit", error[0], error[1], error[2], error[3], xy / xx);
+        CHECK(xy / xx > -1 && xy / xx < -0.5, "slope %.3f", xy / xx);
+        scene_free(&s);
+    }
+}
+
+/* Texels of a glowing or pale range of isovalues lie beside those of a dark one, on other isosurfaces: its light is no part of theirs,
+   however noisy. Neither probes nor the filter may mix them (mixed: 60 % and 20 % too much for the dark). Texels of a pit within a voxel of the border
+   between two ranges, against paths. What the filter averages lies on one side of the border then, where the pit is half a voxel
+   deeper: 8 %; noise of 4 samples at 100 texels: 3 %. */
+TEST(isovalues_of_other_colours_do_not_light_each_other) {
+    double q[5] = {16, 15, 16, 22.3, 12};
+    scene s = scene_make(32, 32, 32, NULL, pit, q);
+    isogi_albedo_point glow[2] = {{0, {0, 0, 0}}, {0.001, {3, 3, 3}}}, albedo[2] = {{0, {0.05f, 0.05f, 0.05f}}, {0.001, {0.9f, 0.9f, 0.9f}}};
+    static float points[2][400][3], e[400][3];
+    int n[2] = {0, 0};
+    for (int x = 4; x < 28; x++)
+        for (int z = 4 + x % 3; z < 28; z += 3)
+            for (int y = 4 + x % 2; y < 20; y += 2) {
+                double p[3] = {x, y, z}, value = pit(p, q);
+                float *to = points[value > 0][n[value > 0]];
+                if (fabs(value) > 1 || length3(x - 16, y - 15, z - 16) > 14) continue;
+                to[0] = (float)x, to[1] = (float)y, to[2] = (float)z, n[value > 0]++;
+            }
+    for (int kind = 0; kind < 2; kind++) {
+        double mean[2][2] = {{0, 0}, {0, 0}};
+        for (int method = 0; method < 2; method++) {
+            isogi_trace_desc d = desc_make(&s, kind ? 0 : 0.5f, -1, method ? 64 : 4);
+            isogi_trace *t = NULL;
+            d.method = (isogi_trace_method)method, d.lazy = method, d.isovalue_min = -1, d.isovalue_max = 1;
+            if (kind) d.albedo_points = albedo, d.albedo_count = 2;
+            else d.emission_points = glow, d.emission_count = 2;
+            CHECK(isogi_trace_create(&t, &d, NULL) == ISOGI_OK, "create");
+            for (int side = 0; side < 2; side++) isogi_trace_request(t, (const float(*)[3])points[side], (size_t)n[side]);
+            CHECK(isogi_trace_step(t, 0, NULL) == ISOGI_OK, "step");
+            for (int side = 0; side < 2; side++) {
+                isogi_trace_sample(t, (const float(*)[3])points[side], (size_t)n[side], e, NULL);
+                for (int i = 0; i < n[side]; i++) mean[side][method] += (double)e[i][1] / n[side];
+            }
+            isogi_trace_free(t);
+        }
+        for (int side = 0; side < 2; side++) {
+            double by_paths = mean[side][1];
+            printf("    %s, %s: %d texels, E %.3f, by paths %.3f\n", kind ? "albedo" : "glow", side ? "bright" : "dark", n[side], mean[side][0], by_paths);
+            CHECK(n[side] > 100 && fabs(mean[side][0] - by_paths) < 0.12 * by_paths, "%s %d: E %.4f, by paths %.4f", kind ? "albedo" : "glow", side, mean[side][0], by_paths);
+        }
+    }
+    scene_free(&s);
+}
+
 /* More samples go where the error is above the target: it is met everywhere, with fewer rays than the same number for all. */
 TEST(adaptive_bakes_meet_their_target) {
     double q[5] = {32, 31, 32, 45, 20};
     scene s = scene_make(64, 64, 64, NULL, pit, q);
     static float points[400][3];
     isogi_light sun = light_make(ISOGI_LIGHT_DIRECTIONAL, 1, 2, 0.5, 2, 0.1);
-    int n = surface_points(&s, 0, 60, 9, points);
+    int n = surface_points(&s, 0, LONG_SUITE ? 400 : 60, 9, points);
     isogi_counters c[2] = {{0}, {0}};
     for (int adaptive = 0; adaptive < 2; adaptive++) {
         isogi_trace_desc d = feedback(&s, 0.5f, -1, 5460);
