@@ -8,7 +8,8 @@
    a lower instruction level. A table on stderr sets ours beside the goal and the best other library known (measured on one core of an
    AVX-512 server, data in cache, whose clock is not known: sphericart's float evaluation took 12, 73 and 276 ns at degrees 4, 10 and 20
    there). Cycles are ns times the clock that a chain of dependent operations shows beside the case, for comparing figures of different
-   days. Cases truncation-*: what an order misses of three environments; build/bench/sh.svg shows them against the order. */
+   days. Cases truncation-*: what an order misses of three environments; build/bench/sh.svg shows them against the order. Cases ringing-*:
+   how far the projection falls below zero, as a share of its highest value, without a window and with one as wide as the order. */
 static int bench_level = 99;
 #define ISOGI_SH_LEVEL bench_level
 #define ISOGI_SH_IMPLEMENTATION
@@ -311,6 +312,8 @@ static void truncation(void) {
             isogi_sh_window(single, single, orders[o], 1, ISOGI_SH_HANN, orders[o]);
             windowed = ring(single, orders[o]);
             fprintf(csv, "isogi_sh.h,%s,%s,order %d,%.6g,%.6g,1,image\n", names[kind], orders[o] == 5 ? "default" : "other orders", orders[o], fmax(seconds, 1e-9), missed);
+            fprintf(csv, "isogi_sh.h,ringing-%s,%s,order %d,%.6g,%.6g,1,image\n", strchr(names[kind], '-') + 1, orders[o] == 5 ? "default" : "no window", orders[o], fmax(seconds, 1e-9), fmax(0, -plain));
+            fprintf(csv, "isogi_sh.h,ringing-%s,hann,order %d,%.6g,%.6g,1,image\n", strchr(names[kind], '-') + 1, orders[o], fmax(seconds, 1e-9), fmax(0, -windowed));
             fprintf(stderr, "  %-22s order %2d   error %-9.3g ring %8.4f   windowed %8.4f\n", names[kind], orders[o], missed, plain, windowed);
         }
     }
