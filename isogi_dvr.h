@@ -1681,6 +1681,12 @@ static void isogi_dvr__gather(const isogi_dvr__sums *a) {
             }                                                                                                                       \
         }                                                                                                                           \
     }                                                                                                                               \
+    static void isogi_dvr__set_kernels##SUFFIX(isogi_dvr__kernels *k) {                                                             \
+        k->pass = isogi_dvr__pass##SUFFIX, k->pass_out = isogi_dvr__pass_out##SUFFIX, k->between = isogi_dvr__between##SUFFIX;  \
+        k->exp_row = isogi_dvr__exp_row##SUFFIX, k->gather = isogi_dvr__gather##SUFFIX;                                               \
+    }
+/* Of the wide path only: in narrower vectors conversions and comparisons go lane by lane, and are no faster than plain code. */
+#define ISOGI_DVR__LEAP_KERNEL(SUFFIX, TARGET) \
     TARGET static void isogi_dvr__leap##SUFFIX(const isogi_dvr *d, isogi_dvr__packet *p, isogi_counters *work) {                    \
         const isogi_level *level = &d->level[0];                                                                                    \
         int lane;                                                                                                                   \
@@ -1710,17 +1716,15 @@ static void isogi_dvr__gather(const isogi_dvr__sums *a) {
         ISOGI_DVR__VI(p->next) = (to & first) | (count & ~first);                                                                   \
         for (lane = 0; lane < ISOGI_DVR__LANES; lane++)                                                                             \
             work->blocks += (uint64_t)blocks[lane], work->blocks_skipped += (uint64_t)skipped[lane];                                \
-    }                                                                                                                               \
-    static void isogi_dvr__set_kernels##SUFFIX(isogi_dvr__kernels *k) {                                                             \
-        k->pass = isogi_dvr__pass##SUFFIX, k->pass_out = isogi_dvr__pass_out##SUFFIX, k->between = isogi_dvr__between##SUFFIX;  \
-        k->exp_row = isogi_dvr__exp_row##SUFFIX, k->gather = isogi_dvr__gather##SUFFIX, k->leap = isogi_dvr__leap##SUFFIX;          \
     }
 ISOGI_DVR__KERNELS(_base, )
 #ifdef ISOGI_DVR__AVX
 ISOGI_DVR__KERNELS(_avx2, __attribute__((target("avx2,fma"))))
 ISOGI_DVR__KERNELS(_avx512, __attribute__((target("avx512f,avx512vl,avx512dq,avx512bw,fma"))))
+ISOGI_DVR__LEAP_KERNEL(_avx512, __attribute__((target("avx512f,avx512vl,avx512dq,avx512bw,fma"))))
 #endif
 #undef ISOGI_DVR__KERNELS
+#undef ISOGI_DVR__LEAP_KERNEL
 #undef ISOGI_DVR__MORE
 #undef ISOGI_DVR__BLOCK
 #undef ISOGI_DVR__EXIT
@@ -1739,6 +1743,7 @@ static isogi_dvr__kernels isogi_dvr__choose_kernels(int force_path) {
     if (isogi_dvr__machine() >= 3) isogi_dvr__set_kernels_avx2(&k);
     if (force_path == 3 || isogi_dvr__machine() < 4) return k;
     isogi_dvr__set_kernels_avx512(&k);
+    k.leap = isogi_dvr__leap_avx512;
 #endif
 #endif
     (void)force_path;
