@@ -142,7 +142,7 @@
                 light: what is computed then is finite and has no meaning; its error says so, and isogi_trace_report.diverges.
    Cost         PATHS: samples * (1 + lights that have a size) rays for a texel, and as many for each reflection. FEEDBACK:
                 samples * (1 + half of these lights), each of the first four with all lights; for each probe as if by a
-                quarter of the samples, but 2 to 8.
+                fifth of the samples, but 2 to 8.
 
    History  1.0  first release
 */
@@ -421,7 +421,7 @@ ISOGI_API size_t isogi_trace_memory(const isogi_trace *trace); /* bytes that the
 #define ISOGI_TRACE__FLUSH 64      /* rays in one call */
 #define ISOGI_TRACE__SWEEP 256     /* nodes in a task that traces no rays */
 #define ISOGI_TRACE__GROUP 65536   /* texels that are worked on together, about */
-#define ISOGI_TRACE__PROBE_SHARE 4   /* samples of a texel to those of a probe, */
+#define ISOGI_TRACE__PROBE_SHARE 5   /* samples of a texel to those of a probe, */
 #define ISOGI_TRACE__PROBE_LEAST 2   /* which has at least so many, */
 #define ISOGI_TRACE__PROBE_MOST 8   /* and at most so many */
 #define ISOGI_TRACE__PROBE_ERROR 0.02 /* standard error of light from probes */
