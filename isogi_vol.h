@@ -6894,4 +6894,6 @@ ISOGI_API void isogi_vol_mesh_free(const isogi_pyramid *pyramid, isogi_mesh *mes
 #undef ISOGI_VOL__LOCK
 #undef ISOGI_VOL__UNLOCK
 #undef ISOGI_VOL__MAX_THREADS
+#undef ISOGI_VOL__PACKET
+#undef ISOGI_VOL__REACH
 #endif /* ISOGI_VOL_IMPLEMENTATION */
