@@ -434,8 +434,12 @@ ISOGI_API void isogi_vol_mesh_free(const isogi_pyramid *pyramid, isogi_mesh *mes
 #define ISOGI_VOL__FAST_SIZE 8192 /* voxels along an axis up to which fast rays keep 1e-10 cell */
 #if (defined(__GNUC__) || defined(__clang__)) && !defined(__TINYC__)
 #define ISOGI_VOL__INLINE static inline __attribute__((always_inline))
+#define ISOGI_VOL__NOINLINE __attribute__((noinline))
+#define ISOGI_VOL__COLD __attribute__((cold, noinline)) /* small rather than fast: quick to compile */
 #define ISOGI_VOL__UNLIKELY(x) __builtin_expect(!!(x), 0)
 #else
+#define ISOGI_VOL__NOINLINE
+#define ISOGI_VOL__COLD
 #define ISOGI_VOL__INLINE static inline
 #define ISOGI_VOL__UNLIKELY(x) (x)
 #endif
@@ -816,7 +820,7 @@ static void isogi_vol__transform(const double m[9], const double v[3], double ou
     out[2] = m[6] * x + m[7] * y + m[8] * z;
 }
 
-static void isogi_vol__set_transform(isogi_pyramid *p) {
+ISOGI_VOL__COLD static void isogi_vol__set_transform(isogi_pyramid *p) {
     const isogi_volume *v = &p->volume;
     const double *m = v->axes;
     double inverse = 1 / isogi_vol__determinant(m), first[3];
@@ -909,7 +913,7 @@ ISOGI_VOL__INLINE double isogi_vol__voxel(const isogi_volume *v, const char *p) 
 }
 
 /* Reads `count` voxels along x. One switch a row. */
-static void isogi_vol__row(const isogi_volume *v, int x, int y, int z, int count, double *out) {
+ISOGI_VOL__NOINLINE static void isogi_vol__row(const isogi_volume *v, int x, int y, int z, int count, double *out) {
     const char *p = (const char *)v->data + x * v->stride[0] + y * v->stride[1] + z * v->stride[2];
     ptrdiff_t step = v->stride[0];
     double scale = v->scale, bias = v->bias;
@@ -1207,7 +1211,7 @@ static void isogi_vol__build_level(isogi_pyramid *p, int n, const size_t first[3
 }
 
 /* Sizes of all levels; the number of blocks, or 0 on overflow. */
-static size_t isogi_vol__plan_levels(isogi_pyramid *p) {
+ISOGI_VOL__COLD static size_t isogi_vol__plan_levels(isogi_pyramid *p) {
     size_t total = 0;
     int n, a;
     for (n = 0; n < ISOGI_VOL__LEVELS; n++) {
@@ -1447,7 +1451,7 @@ static int isogi_vol__may_be_fast(const isogi_pyramid *p) {
 }
 
 /* Whether fast rays are right for this volume, and how its raw values become 8-bit ones. */
-static int isogi_vol__plan_nodes(isogi_pyramid *p, isogi_vol__build_job *job) {
+ISOGI_VOL__COLD static int isogi_vol__plan_nodes(isogi_pyramid *p, isogi_vol__build_job *job) {
     const double range = p->range[1] - p->range[0], scale = p->volume.scale;
     int a;
     memset(job, 0, sizeof *job);
@@ -1465,7 +1469,7 @@ static int isogi_vol__plan_nodes(isogi_pyramid *p, isogi_vol__build_job *job) {
 }
 
 /* Sizes of all levels of nodes; their number in all. */
-static size_t isogi_vol__plan_node_levels(isogi_pyramid *p) {
+ISOGI_VOL__COLD static size_t isogi_vol__plan_node_levels(isogi_pyramid *p) {
     size_t count = 0, nodes = 2;
     int n, a;
     for (n = 0; n < ISOGI_VOL__LEVELS || nodes > 1; n++) {
@@ -1504,7 +1508,7 @@ struct isogi_vol__ways {
     uint8_t child[8][64], voxel[8][128]; /* children of nodes and voxels of leaves with axes counted backwards: bit a of the index */
 };
 
-static void isogi_vol__set_ways(struct isogi_vol__ways *ways) {
+ISOGI_VOL__COLD static void isogi_vol__set_ways(struct isogi_vol__ways *ways) {
     uint64_t below[3][4];
     int i, f, a, b;
     for (a = 1; a < 4; a++) {
@@ -1534,7 +1538,7 @@ static void isogi_vol__set_ways(struct isogi_vol__ways *ways) {
     }
 }
 
-static isogi_result isogi_vol__reserve_nodes(isogi_pyramid *p) {
+ISOGI_VOL__COLD static isogi_result isogi_vol__reserve_nodes(isogi_pyramid *p) {
     p->node_count = isogi_vol__plan_node_levels(p);
     if (p->path == ISOGI_VOL__PATH_AVX512 && !p->ways) {
         p->ways = (struct isogi_vol__ways *)isogi_allocate(&p->context, 1, sizeof *p->ways);
@@ -1597,7 +1601,7 @@ ISOGI_API isogi_result isogi_vol_build(isogi_pyramid **pyramid, const isogi_volu
 /* The least (end 0) or largest (end 1) finite value of the volume, exactly, by way of the blocks whose rounded bounds are extreme; no
    value is beyond what p->range says. Stops as soon as nothing can be beyond what was found: that, the bound itself, or, among raw
    integers, less than a step from it. */
-static double isogi_vol__find_extreme(const isogi_pyramid *p, int end, uint64_t *blocks) {
+ISOGI_VOL__COLD static double isogi_vol__find_extreme(const isogi_pyramid *p, int end, uint64_t *blocks) {
     const isogi_level *level = p->level;
     const double step = p->volume.type < ISOGI_F32 ? fabs(p->volume.scale) : 0;
     double found = end ? -DBL_MAX : DBL_MAX;
@@ -5600,7 +5604,7 @@ static double isogi_vol__hessian(const isogi_field *f, const double low[3], cons
 }
 
 /* The box of cells low..high in the world. */
-static void isogi_vol__world_box(const isogi_pyramid *p, const int low[3], const int high[3], double from[3], double to[3]) {
+ISOGI_VOL__COLD static void isogi_vol__world_box(const isogi_pyramid *p, const int low[3], const int high[3], double from[3], double to[3]) {
     int a;
     for (a = 0; a < 3; a++) {
         from[a] = p->volume.origin[a] + p->volume.spacing[a] * low[a];
@@ -6372,7 +6376,7 @@ static void isogi_vol__walk_corners(const isogi_vol__mesher *m, const isogi_vol_
 }
 
 /* The border faces of a cell on which something is inside, as bits. */
-static unsigned isogi_vol__capped_faces(const isogi_vol__mesher *m, const isogi_vol__cell_walk *walk, int i, unsigned code) {
+ISOGI_VOL__COLD static unsigned isogi_vol__capped_faces(const isogi_vol__mesher *m, const isogi_vol__cell_walk *walk, int i, unsigned code) {
     unsigned faces = (i == 0 ? 1u : 0u) | (i == m->nx - 2 ? 2u : 0u) | (walk->j == 0 ? 4u : 0u) | (walk->j == m->ny - 2 ? 8u : 0u) |
                      (walk->k == 0 ? 16u : 0u) | (walk->k == m->nz - 2 ? 32u : 0u);
     static const uint8_t corners[6] = {0x55, 0xaa, 0x33, 0xcc, 0x0f, 0xf0};
@@ -6527,7 +6531,7 @@ static void isogi_vol__edge_normal(const isogi_vol__mesher *m, size_t at, int ax
 }
 
 /* Outward from the faces of the box that a voxel lies on. */
-static void isogi_vol__corner_normal(const isogi_vol__mesher *m, size_t at, const int voxel[3]) {
+ISOGI_VOL__COLD static void isogi_vol__corner_normal(const isogi_vol__mesher *m, size_t at, const int voxel[3]) {
     double n[3];
     int a;
     for (a = 0; a < 3; a++) n[a] = (voxel[a] == m->pyramid->cells[a]) - (voxel[a] == 0);
@@ -6649,7 +6653,7 @@ static isogi_result isogi_vol__mesh_pass(isogi_vol__mesher *m, const isogi_conte
     return isogi_parallel(context, (m->rows + m->rows_per_task - 1) / m->rows_per_task, isogi_vol__mesh_task, m, from, to);
 }
 
-static void isogi_vol__mesh_cases(isogi_vol__case cases[256]) {
+ISOGI_VOL__COLD static void isogi_vol__mesh_cases(isogi_vol__case cases[256]) {
     isogi_vol__patch patch;
     double corner[8];
     int code, i, alternates;
@@ -6671,7 +6675,7 @@ static void isogi_vol__mesh_cases(isogi_vol__case cases[256]) {
 }
 
 /* One block of scratch memory: the cases, which stay from call to call, then rows, then bits. */
-static isogi_result isogi_vol__mesh_scratch(isogi_vol__mesher *m, isogi_mesh *mesh) {
+ISOGI_VOL__COLD static isogi_result isogi_vol__mesh_scratch(isogi_vol__mesher *m, isogi_mesh *mesh) {
     const isogi_pyramid *p = m->pyramid;
     const isogi_level *level = &p->level[0];
     size_t planes = m->closed ? 6 : 5, per_row, blocks, size, n;
@@ -6702,7 +6706,7 @@ static isogi_result isogi_vol__mesh_scratch(isogi_vol__mesher *m, isogi_mesh *me
 }
 
 /* Counts become places; the totals stand behind the last row. */
-static isogi_result isogi_vol__mesh_offsets(isogi_vol__mesh_row *row, size_t rows) {
+ISOGI_VOL__COLD static isogi_result isogi_vol__mesh_offsets(isogi_vol__mesh_row *row, size_t rows) {
     uint64_t vertices = 0, triangles = 0;
     size_t r;
     int n;
@@ -6724,13 +6728,13 @@ static isogi_result isogi_vol__mesh_offsets(isogi_vol__mesh_row *row, size_t row
 }
 
 /* A larger buffer, with room to grow on; what is there when it is large enough. NULL when there is no memory. */
-static void *isogi_vol__mesh_room(const isogi_context *context, void *old, size_t capacity, size_t need, size_t *room) {
+ISOGI_VOL__COLD static void *isogi_vol__mesh_room(const isogi_context *context, void *old, size_t capacity, size_t need, size_t *room) {
     *room = capacity >= need ? capacity : need + need / 2;
     return capacity >= need ? old : isogi_allocate(context, *room, 12);
 }
 
 /* All or nothing: the old buffers go when all of the new ones are there. */
-static isogi_result isogi_vol__mesh_reserve(const isogi_context *context, isogi_mesh *mesh, size_t vertices, size_t triangles, int normals) {
+ISOGI_VOL__COLD static isogi_result isogi_vol__mesh_reserve(const isogi_context *context, isogi_mesh *mesh, size_t vertices, size_t triangles, int normals) {
     size_t room[3], need[3];
     void *old[3], *got[3];
     int n, complete = 1;
@@ -6883,6 +6887,8 @@ ISOGI_API void isogi_vol_mesh_free(const isogi_pyramid *pyramid, isogi_mesh *mes
 #undef ISOGI_VOL__FIRST
 #undef ISOGI_VOL__LATER
 #undef ISOGI_VOL__INLINE
+#undef ISOGI_VOL__COLD
+#undef ISOGI_VOL__NOINLINE
 #undef ISOGI_VOL__UNLIKELY
 #undef ISOGI_VOL__SSE2
 #undef ISOGI_VOL__AVX
