@@ -151,7 +151,8 @@ static int same_hit(const isogi_hit *a, const isogi_hit *b) {
 }
 
 /* Rays side by side, as those of neighbouring pixels, may go together: they hit what each of them hits alone, with the same bits, on every
-   kind of grid, direction and border. Some run in lattice planes, along axes, out of corners; some end within the volume. */
+   kind of grid, direction and border. Some run in lattice planes, along axes, out of corners; some end within the volume. (In lattice
+   planes where the field is the isovalue all over, other paths may see a touch where these see none, so they are not asked.) */
 TEST(rays_side_by_side_hit_what_they_hit_alone) {
     enum { TURNS = 600, MOST = 40 };
     test_random r = {11};
@@ -202,7 +203,7 @@ TEST(rays_side_by_side_hit_what_they_hit_alone) {
             for (int i = 0; i < count; i++) {
                 isogi_vol_intersect(p, &rays[i], 1, &alone[i], NULL), isogi_vol_intersect(plain, &rays[i], 1, &other[i], NULL);
                 hits += alone[i].side != 0, wrong += !same_hit(&together[i], &alone[i]), wrong_any += any[i] != (alone[i].side != 0);
-                wrong_plain += together[i].side != other[i].side;
+                wrong_plain += together[i].side != other[i].side && !(levels && (grid || axial));
                 spread_out += spread > 0.03;
             }
         }
