@@ -843,7 +843,7 @@ static const double isogi_sh__wigner_f64[448] = {
     0.9571162043197412, 0.95238095238095233, 0.94598433583033692, 0.9372504104317485, 0.92501608737619367,
     0.90711473522214536, 0.87901355800967895, 0.82935558588019886, 0.71873613562493244, 0.0, 0.0,
 };
-static const float isogi_sh__latitudes_f32[128] = {
+static const float isogi_sh__latitudes_f32[240] = {
     0.282094806f, 0.282094806f, 0.282094806f, 0.282094806f, 0.282094806f, 0.282094806f, 0.282094806f, 0.0f, 0.463736504f,
     0.362313986f, 0.198296964f, 0.0f, -0.198296964f, -0.362313986f, -0.463736504f, 0.0f, 0.536928117f, 0.204880089f,
     -0.159546867f, -0.31539157f, -0.159546867f, 0.204880089f, 0.536928117f, 0.0f, 0.532703996f, -0.0693624169f, -0.329627067f,
@@ -857,7 +857,20 @@ static const float isogi_sh__latitudes_f32[128] = {
     -0.473087341f, 0.060449183f, 0.606715798f, 0.248980492f, 0.0f, 0.0184337348f, 0.178194046f, 0.45044294f, 0.590043604f,
     0.45044294f, 0.178194046f, 0.0184337348f, 0.0f, 0.0524868108f, 0.396409333f, 0.548430264f, 0.0f, -0.548430264f,
     -0.396409333f, -0.0524868108f, 0.0f, 0.00615790021f, 0.126805812f, 0.43665117f, 0.625835717f, 0.43665117f, 0.126805812f,
-    0.00615790021f, 0.0f, 0.406789005f, 0.878720403f, 1.19955444f, 1.31305754f, 1.19955444f, 0.878720403f, 0.406789005f, 0.0f,
+    0.00615790021f, 0.0f, 0.11475306f, 0.247882456f, 0.338388085f, 0.370406687f, 0.338388085f, 0.247882456f, 0.11475306f,
+    0.0f, 0.188642919f, 0.318372697f, 0.237868011f, 0.0f, -0.237868011f, -0.318372697f, -0.188642919f, 0.0f, 0.218416467f,
+    0.180032313f, -0.19138515f, -0.41412726f, -0.19138515f, 0.180032313f, 0.218416467f, 0.0f, 0.216698125f, -0.0609501712f,
+    -0.39540562f, 0.0f, 0.39540562f, 0.0609501712f, -0.216698125f, 0.0f, 0.188336253f, -0.270837963f, -0.125852048f,
+    0.416707516f, -0.125852048f, -0.270837963f, 0.188336253f, 0.0f, 0.0312995426f, 0.144027725f, 0.267833084f, 0.320781589f,
+    0.267833084f, 0.144027725f, 0.0312995426f, 0.0f, 0.066426076f, 0.238814414f, 0.243057832f, 0.0f, -0.243057832f,
+    -0.238814414f, -0.066426076f, 0.0f, 0.102591112f, 0.235681221f, -0.0442065261f, -0.300063699f, -0.0442065261f,
+    0.235681221f, 0.102591112f, 0.0f, 0.134465188f, 0.12417224f, -0.274915189f, 0.0f, 0.274915189f, -0.12417224f,
+    -0.134465188f, 0.0f, 0.0110213822f, 0.108036578f, 0.273676693f, 0.358644724f, 0.273676693f, 0.108036578f, 0.0110213822f,
+    0.0f, 0.0276758317f, 0.211957738f, 0.293864548f, 0.0f, -0.293864548f, -0.211957738f, -0.0276758317f, 0.0f, 0.0506412648f,
+    0.266566783f, 0.0362560451f, -0.310595453f, 0.0362560451f, 0.266566783f, 0.0506412648f, 0.0f, 0.00374932028f,
+    0.0782913715f, 0.270165443f, 0.38738057f, 0.270165443f, 0.0782913715f, 0.00374932028f, 0.0f, 0.010675529f, 0.174166486f,
+    0.328935981f, 0.0f, -0.328935981f, -0.174166486f, -0.010675529f, 0.0f, 0.00125248311f, 0.05571343f, 0.261893421f,
+    0.410879165f, 0.261893421f, 0.05571343f, 0.00125248311f, 0.0f,
 };
 #endif
 /* generated: end */
@@ -3105,42 +3118,39 @@ ISOGI_SH__AVX2 static void isogi_sh__latitudes_f8(isogi_sh__f8 *c, isogi_sh__f8 
     }
 }
 
-/* c and s, the terms of the product of two Fourier series, from ac, as, bc, bs; sums of what is added and of what is taken away. */
+/* c and s, twice the terms of the product of two Fourier series, from ac, as, bc, bs; the table for the way back halves them. */
 #define ISOGI_SH__FOURIER(V, FMA)                                                                                              \
+    a0 = ac[0] + ac[0], b0 = bc[0] + bc[0], c[0] = a0 * bc[0];                                                                 \
     ISOGI_SH__UNROLL                                                                                                           \
-    for (m = 0; m < 5; m++) {                                                                                                  \
-        V c_more = zero, c_less = zero, s_more = zero, s_less = zero; /* twice the terms, but for those with m = 0 */           \
+    for (i = 1; i < 5; i++) c[0] = FMA(ac[i], bc[i], FMA(as[i], bs[i], c[0]));                                                 \
+    ISOGI_SH__UNROLL                                                                                                           \
+    for (m = 1; m < 5; m++) {                                                                                                  \
+        V cosine = zero, sine = zero;                                                                                          \
         ISOGI_SH__UNROLL                                                                                                       \
-        for (i = 1; i < m; i++) {                                                                                              \
-            c_more = FMA(ac[i], bc[m - i], c_more), c_less = FMA(as[i], bs[m - i], c_less);                                    \
-            s_more = FMA(as[i], bc[m - i], FMA(ac[i], bs[m - i], s_more));                                                     \
+        for (i = 1; i < 5; i++) { /* what is taken away */                                                                     \
+            if (i < m) cosine = FMA(as[i], bs[m - i], cosine);                                                                 \
+            if (i > m) sine = FMA(ac[i], bs[i - m], FMA(as[i - m], bc[i], sine));                                              \
         }                                                                                                                      \
+        cosine = FMA(a0, bc[m], FMA(ac[m], b0, -cosine)), sine = FMA(a0, bs[m], FMA(as[m], b0, -sine));                        \
         ISOGI_SH__UNROLL                                                                                                       \
-        for (i = m + 1; i < 5; i++) {                                                                                          \
-            c_more = FMA(ac[i], bc[i - m], FMA(as[i], bs[i - m], c_more));                                                     \
-            if (!m) continue;                                                                                                  \
-            c_more = FMA(ac[i - m], bc[i], FMA(as[i - m], bs[i], c_more));                                                     \
-            s_more = FMA(as[i], bc[i - m], FMA(ac[i - m], bs[i], s_more));                                                     \
-            s_less = FMA(ac[i], bs[i - m], FMA(as[i - m], bc[i], s_less));                                                     \
+        for (i = 1; i < 5; i++) {                                                                                              \
+            if (i < m) cosine = FMA(ac[i], bc[m - i], cosine), sine = FMA(as[i], bc[m - i], FMA(ac[i], bs[m - i], sine));      \
+            if (i <= m) continue;                                                                                              \
+            cosine = FMA(ac[i], bc[i - m], FMA(as[i], bs[i - m], cosine)), sine = FMA(as[i], bc[i - m], sine);                 \
+            cosine = FMA(ac[i - m], bc[i], FMA(as[i - m], bs[i], cosine)), sine = FMA(ac[i - m], bs[i], sine);                 \
         }                                                                                                                      \
-        if (m) {                                                                                                               \
-            c[m] = (c_more - c_less) * half + FMA(ac[0], bc[m], ac[m] * bc[0]);                                                \
-            s[m] = (s_more - s_less) * half + FMA(ac[0], bs[m], as[m] * bc[0]);                                                \
-        } else {                                                                                                               \
-            c[0] = FMA(ac[0] + ac[0], bc[0], c_more), s[0] = zero;                                                             \
-        }                                                                                                                      \
+        c[m] = cosine, s[m] = sine;                                                                                            \
     }
 
 ISOGI_SH__AVX2 static void isogi_sh__product_order5(float *out, const float *f, const float *g) {
-    isogi_sh__f8 ac[5], as[5], bc[5], bs[5], c[5], s[5], zero = {0}, half = zero + 0.5f, scratch[25], turned[8];
-    const isogi_sh__f8 *q = (const isogi_sh__f8 *)isogi_sh__latitudes_f32, weight = q[15];
+    isogi_sh__f8 ac[5], as[5], bc[5], bs[5], a0, b0, c[5], s[5], zero = {0}, scratch[25], turned[8];
+    const isogi_sh__f8 *q = (const isogi_sh__f8 *)isogi_sh__latitudes_f32 + 15;
     int i, l, m;
     isogi_sh__latitudes_f8(ac, as, f);
     isogi_sh__latitudes_f8(bc, bs, g);
     ISOGI_SH__FOURIER(isogi_sh__f8, ISOGI_SH__FMA_F8)
     ISOGI_SH__UNROLL
     for (m = 0; m < 5; m++) {
-        c[m] *= weight, s[m] *= weight;
         ISOGI_SH__UNROLL
         for (l = m; l < 5; l++, q++) {
             scratch[l * (l + 1) + m] = *q * c[m];
@@ -3175,21 +3185,22 @@ ISOGI_SH__AVX512 ISOGI_SH__INLINE void isogi_sh__parities_f16(isogi_sh__f16 (*ev
 }
 
 ISOGI_SH__AVX512 ISOGI_SH__INLINE void isogi_sh__product_latitude_f16(isogi_sh__f16 *out, const isogi_sh__f16 *f, const isogi_sh__f16 *g, int latitude) {
-    isogi_sh__f16 f_even[2][5], f_odd[2][5], g_even[2][5], g_odd[2][5], ac[5], as[5], bc[5], bs[5], c[5], s[5], sum[2][2][5], zero = {0}, half = zero + 0.5f;
-    const float *q = isogi_sh__latitudes_f32 + latitude, weight = q[8 * 15];
+    isogi_sh__f16 f_even[2][5], f_odd[2][5], g_even[2][5], g_odd[2][5], ac[5], as[5], bc[5], bs[5], c[5], s[5], a0, b0, sum[2][2][5], zero = {0};
+    const float *q = isogi_sh__latitudes_f32 + 8 * 15 + latitude;
     int i, l, m, side;
     isogi_sh__parities_f16(f_even, f_odd, f, latitude);
     isogi_sh__parities_f16(g_even, g_odd, g, latitude);
     for (side = 0; side < (latitude == 3 ? 1 : 2); side++) {
         ISOGI_SH__UNROLL
         for (m = 0; m < 5; m++) {
-            ac[m] = side ? f_even[0][m] - f_odd[0][m] : f_even[0][m] + f_odd[0][m], as[m] = side ? f_even[1][m] - f_odd[1][m] : f_even[1][m] + f_odd[1][m];
-            bc[m] = side ? g_even[0][m] - g_odd[0][m] : g_even[0][m] + g_odd[0][m], bs[m] = side ? g_even[1][m] - g_odd[1][m] : g_even[1][m] + g_odd[1][m];
+            ac[m] = f_even[0][m], as[m] = f_even[1][m], bc[m] = g_even[0][m], bs[m] = g_even[1][m];
+            if (m == 4 || latitude == 3) continue; /* nothing is odd */
+            ac[m] = side ? ac[m] - f_odd[0][m] : ac[m] + f_odd[0][m], as[m] = side ? as[m] - f_odd[1][m] : as[m] + f_odd[1][m];
+            bc[m] = side ? bc[m] - g_odd[0][m] : bc[m] + g_odd[0][m], bs[m] = side ? bs[m] - g_odd[1][m] : bs[m] + g_odd[1][m];
         }
         ISOGI_SH__FOURIER(isogi_sh__f16, ISOGI_SH__FMA_F16)
         ISOGI_SH__UNROLL
         for (m = 0; m < 5; m++) {
-            c[m] *= weight, s[m] *= weight;
             if (side) sum[0][0][m] += c[m], sum[0][1][m] += s[m], sum[1][0][m] -= c[m], sum[1][1][m] -= s[m];
             else sum[0][0][m] = c[m], sum[0][1][m] = s[m], sum[1][0][m] = c[m], sum[1][1][m] = s[m];
         }

@@ -98,7 +98,8 @@ static int generate_polynomials(quad *v) {
     return count;
 }
 
-/* Legendre nodes by Newton; q_l^m sin^m at each, for l, m < 5 (m outer), and the weights times pi; lane 8 is empty. */
+/* Legendre nodes by Newton; q_l^m sin^m at each, for l, m < 5 (m outer), and again times the weights and pi / 2, or pi where m = 0;
+   lane 8 is empty. */
 static int generate_latitudes(quad *v) {
     quad node[GENERATE_LATITUDES], weight[GENERATE_LATITUDES];
     int count = 0, n = GENERATE_LATITUDES;
@@ -118,15 +119,17 @@ static int generate_latitudes(quad *v) {
         node[i] = x;
         weight[i] = 2 * generate_pi() / ((1 - x * x) * d * d);
     }
-    for (int m = 0; m < 5; m++)
-        for (int l = m; l < 5; l++)
-            for (int i = 0; i < 8; i++) {
-                quad y[25], d[3] = {0, 0, 1};
-                if (i < n) d[0] = quad_sqrt(1 - node[i] * node[i]), d[2] = node[i], reference_eval(y, 5, d);
-                quad value = i < n ? y[l * (l + 1) + m] : 0;
-                v[count++] = value < (quad)1e-30 && value > (quad)-1e-30 ? 0 : value; /* zeros of P at the equator */
-            }
-    for (int i = 0; i < 8; i++) v[count++] = i < n ? weight[i] : 0;
+    for (int weighted = 0; weighted < 2; weighted++) {
+        for (int m = 0; m < 5; m++)
+            for (int l = m; l < 5; l++)
+                for (int i = 0; i < 8; i++) {
+                    quad y[25], d[3] = {0, 0, 1};
+                    if (i < n) d[0] = quad_sqrt(1 - node[i] * node[i]), d[2] = node[i], reference_eval(y, 5, d);
+                    quad value = i < n ? y[l * (l + 1) + m] : 0;
+                    if (value < (quad)1e-30 && value > (quad)-1e-30) value = 0; /* zeros of P at the equator */
+                    v[count++] = weighted && i < n ? value * weight[i] / (m ? 2 : 1) : value;
+                }
+    }
     return count;
 }
 
