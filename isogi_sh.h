@@ -1516,16 +1516,26 @@ ISOGI_SH__AVX512 ISOGI_SH__INLINE void isogi_sh__eval_d8_split(isogi_sh__d8 *u, 
         if (order <= ISOGI_SH__LOW_ORDER) NAME##_low(out, stride, order, u);                                                   \
         else NAME##_any(out, stride, 0, order, u, NULL);                                                                       \
     }                                                                                                                          \
+    /* any order but 5, with the next directions made ready while the values of those before are stored */                     \
+    TARGET static size_t NAME##_blocks(T *out, size_t stride, int order, const T *x, const T *y, const T *z, size_t count) {   \
+        V u[2][4];                                                                                                             \
+        size_t i;                                                                                                              \
+        int more, now = 0;                                                                                                     \
+        for (i = 0;; i += WIDTH, now = !now) {                                                                                 \
+            more = i + WIDTH <= count && NAME##_load(u[now], x + i, y + i, z + i);                                             \
+            if (i) NAME##_block(out + i - WIDTH, stride, order, u[!now]);                                                      \
+            if (!more) return i;                                                                                               \
+        }                                                                                                                      \
+    }                                                                                                                          \
     TARGET static size_t NAME(T *out, size_t stride, int order, const T *x, const T *y, const T *z, size_t count) {            \
         V u[4], basis[25];                                                                                                     \
         size_t i;                                                                                                              \
         int k;                                                                                                                 \
+        if (order != 5) return NAME##_blocks(out, stride, order, x, y, z, count);                                              \
         for (i = 0; i + WIDTH <= count && NAME##_load(u, x + i, y + i, z + i); i += WIDTH) {                                   \
-            if (order == 5) {                                                                                                  \
-                NAME##_order5(basis, u);                                                                                       \
-                ISOGI_SH__UNROLL25                                                                                             \
-                for (k = 0; k < 25; k++) *(V *)(out + i + stride * (size_t)k) = basis[k];                                      \
-            } else NAME##_block(out + i, stride, order, u);                                                                    \
+            NAME##_order5(basis, u);                                                                                           \
+            ISOGI_SH__UNROLL25                                                                                                 \
+            for (k = 0; k < 25; k++) *(V *)(out + i + stride * (size_t)k) = basis[k];                                          \
         }                                                                                                                      \
         return i;                                                                                                              \
     }                                                                                                                          \
@@ -1622,7 +1632,7 @@ static size_t isogi_sh__eval_rows_f32(float *y, int order, const float (*directi
 #ifdef ISOGI_SH__SIMD
     level = isogi_sh__level();
     if (level > 1) done = isogi_sh__eval_f16_rows(y, order, direction, count);
-    if (level) done += isogi_sh__eval_f8_rows(y + n * done, order, direction + done, count - done);
+    if (level && done < count) done += isogi_sh__eval_f8_rows(y + n * done, order, direction + done, count - done);
 #endif
     if (!level) done = isogi_sh__eval_f4_rows(y + n * done, order, direction + done, count);
     return done;
@@ -1636,7 +1646,7 @@ static size_t isogi_sh__eval_columns_f32(float *out, size_t stride, int order, c
 #ifdef ISOGI_SH__SIMD
     level = isogi_sh__level();
     if (level > 1) done = isogi_sh__eval_f16(out, stride, order, x, y, z, count);
-    if (level) done += isogi_sh__eval_f8(out + done, stride, order, x + done, y + done, z + done, count - done);
+    if (level && done < count) done += isogi_sh__eval_f8(out + done, stride, order, x + done, y + done, z + done, count - done);
 #endif
     if (!level) done = isogi_sh__eval_f4(out + done, stride, order, x, y, z, count);
     return done;
@@ -1647,7 +1657,7 @@ static size_t isogi_sh__eval_rows_f64(double *y, int order, const double (*direc
     size_t done = 0, n = ISOGI_SH_COUNT(order);
     int level = order >= 3 && order <= ISOGI_SH__TABLE_ORDER && count >= 4 ? isogi_sh__level() : 0;
     if (level > 1) done = isogi_sh__eval_d8_rows(y, order, direction, count);
-    if (level) done += isogi_sh__eval_d4_rows(y + n * done, order, direction + done, count - done);
+    if (level && done < count) done += isogi_sh__eval_d4_rows(y + n * done, order, direction + done, count - done);
     return done;
 }
 
@@ -1655,7 +1665,7 @@ static size_t isogi_sh__eval_columns_f64(double *out, size_t stride, int order, 
     size_t done = 0;
     int level = order >= 3 && order <= ISOGI_SH__TABLE_ORDER && count >= 4 ? isogi_sh__level() : 0;
     if (level > 1) done = isogi_sh__eval_d8(out, stride, order, x, y, z, count);
-    if (level) done += isogi_sh__eval_d4(out + done, stride, order, x + done, y + done, z + done, count - done);
+    if (level && done < count) done += isogi_sh__eval_d4(out + done, stride, order, x + done, y + done, z + done, count - done);
     return done;
 }
 #endif
