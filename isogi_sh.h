@@ -1569,21 +1569,24 @@ ISOGI_SH__AVX512 ISOGI_SH__INLINE void isogi_sh__eval_d8_split(isogi_sh__d8 *u, 
         for (k = rest == 1; k < count; k = k || !rest ? k + 8 : rest) TURN(out + k, n, rows + k);                              \
     }                                                                                                                          \
     TARGET static size_t NAME##_rows(T *out, int order, const T (*direction)[3], size_t count) {                               \
-        V rows[ISOGI_SH__SPLIT * ISOGI_SH__SPLIT] __attribute__((aligned(64))), state[2 * ISOGI_SH__TABLE_ORDER], u[4];        \
+        V rows[ISOGI_SH__SPLIT * ISOGI_SH__SPLIT] __attribute__((aligned(64))), state[2 * ISOGI_SH__TABLE_ORDER], u[2][4];     \
         size_t i, n = ISOGI_SH_COUNT(order);                                                                                   \
+        int from, to, more, now = 0;                                                                                           \
         if (order == 5) return NAME##_rows5(out, direction, count);                                                            \
-        for (i = 0; i + WIDTH <= count; i += WIDTH, out += n * WIDTH) {                                                        \
-            int from, to;                                                                                                      \
-            NAME##_split(u, direction[i]);                                                                                     \
-            if (!NAME##_unit(u)) break;                                                                                        \
-            for (from = 0; from < order; from = to) {                                                                          \
-                to = from || order < ISOGI_SH__SPLIT ? order : ISOGI_SH__SPLIT;                                                \
-                if (order <= ISOGI_SH__LOW_ORDER) NAME##_low((T *)rows, WIDTH, order, u);                                      \
-                else NAME##_any((T *)rows, WIDTH, from, to, u, state);                                                         \
-                NAME##_turn_all(out + from * from, n, rows, (size_t)(to * to - from * from));                                  \
+        for (i = 0;; i += WIDTH, now = !now) {                                                                                 \
+            more = i + WIDTH <= count;                                                                                         \
+            if (more) {                                                                                                        \
+                NAME##_split(u[now], direction[i]);                                                                            \
+                more = NAME##_unit(u[now]);                                                                                    \
             }                                                                                                                  \
+            for (from = 0; i && from < order; from = to) {                                                                     \
+                to = from || order < ISOGI_SH__SPLIT ? order : ISOGI_SH__SPLIT;                                                \
+                if (order <= ISOGI_SH__LOW_ORDER) NAME##_low((T *)rows, WIDTH, order, u[!now]);                                \
+                else NAME##_any((T *)rows, WIDTH, from, to, u[!now], state);                                                   \
+                NAME##_turn_all(out + n * (i - WIDTH) + from * from, n, rows, (size_t)(to * to - from * from));                \
+            }                                                                                                                  \
+            if (!more) return i;                                                                                               \
         }                                                                                                                      \
-        return i;                                                                                                              \
     }
 
 #define ISOGI_SH__DEFINE_F32(NAME, TARGET, V, I, WIDTH, SUFFIX, TURN)                                                              \
