@@ -1362,22 +1362,23 @@ ISOGI_SH__AVX2 ISOGI_SH__INLINE void isogi_sh__eval_d4_turn(double *y, size_t n,
 }
 
 ISOGI_SH__AVX512 ISOGI_SH__INLINE void isogi_sh__eval_d8_turn(double *y, size_t n, const isogi_sh__d8 *row) {
-    int odd;
+    const isogi_sh__d4 none = {0};
+    int half, odd;
     ISOGI_SH__UNROLL
-    for (odd = 0; odd < 2; odd++, y += n) {
-        isogi_sh__d8 v[4], p, q;
-        int k;
+    for (half = 0; half < 2; half++, row += 4, y += 4) {
         ISOGI_SH__UNROLL
-        for (k = 0; k < 4; k++)
-            v[k] = odd ? __builtin_shufflevector(row[2 * k], row[2 * k + 1], 1, 9, 3, 11, 5, 13, 7, 15) :
-                         __builtin_shufflevector(row[2 * k], row[2 * k + 1], 0, 8, 2, 10, 4, 12, 6, 14);
-        p = __builtin_shufflevector(v[0], v[1], 0, 1, 2, 3, 8, 9, 10, 11), q = __builtin_shufflevector(v[2], v[3], 0, 1, 2, 3, 8, 9, 10, 11);
-        *(isogi_sh__d8 *)y = __builtin_shufflevector(p, q, 0, 1, 4, 5, 8, 9, 12, 13);
-        *(isogi_sh__d8 *)(y + 2 * n) = __builtin_shufflevector(p, q, 2, 3, 6, 7, 10, 11, 14, 15);
-        p = __builtin_shufflevector(v[0], v[1], 4, 5, 6, 7, 12, 13, 14, 15), q = __builtin_shufflevector(v[2], v[3], 4, 5, 6, 7, 12, 13, 14, 15);
-        *(isogi_sh__d8 *)(y + 4 * n) = __builtin_shufflevector(p, q, 0, 1, 4, 5, 8, 9, 12, 13);
-        *(isogi_sh__d8 *)(y + 6 * n) = __builtin_shufflevector(p, q, 2, 3, 6, 7, 10, 11, 14, 15);
+        for (odd = 0; odd < 2; odd++) {
+            isogi_sh__d8 a = odd ? __builtin_shufflevector(row[0], row[1], 1, 9, 3, 11, 5, 13, 7, 15) : __builtin_shufflevector(row[0], row[1], 0, 8, 2, 10, 4, 12, 6, 14);
+            isogi_sh__d8 b = odd ? __builtin_shufflevector(row[2], row[3], 1, 9, 3, 11, 5, 13, 7, 15) : __builtin_shufflevector(row[2], row[3], 0, 8, 2, 10, 4, 12, 6, 14);
+            isogi_sh__d8 p = __builtin_shufflevector(a, b, 0, 1, 8, 9, 2, 3, 10, 11), q = __builtin_shufflevector(a, b, 4, 5, 12, 13, 6, 7, 14, 15);
+            double *to = y + (odd ? n : 0);
+            *(isogi_sh__d4 *)to = ISOGI_SH__HALF_D8(p, 0);
+            *(isogi_sh__d4 *)(to + 2 * n) = ISOGI_SH__HALF_D8(p, 1);
+            *(isogi_sh__d4 *)(to + 4 * n) = ISOGI_SH__HALF_D8(q, 0);
+            *(isogi_sh__d4 *)(to + 6 * n) = ISOGI_SH__HALF_D8(q, 1);
+        }
     }
+    (void)none; /* clang */
 }
 
 /* directions into coordinates */
