@@ -311,7 +311,7 @@ ISOGI_API isogi_result isogi_sh_convert(float *out, const float *in, int order, 
 /* ---- simple environments and fits; RGB interleaved ---- */
 
 /* Radiance rgb from everywhere; from a cone of half_angle (radians, 0..pi) around `axis`; from a hemisphere `sky` around `up` and
-   `ground` below it; and from a sky that runs linearly in height from ground (at -up) to sky (at up). */
+   `ground` below it; and from a sky that runs linearly in height from ground (at -up) to sky (at up). Axes of any length > 0. */
 ISOGI_API isogi_result isogi_sh_constant(float *c, int order, const float rgb[3]);
 ISOGI_API isogi_result isogi_sh_cone(float *c, int order, const float axis[3], double half_angle, const float rgb[3]);
 ISOGI_API isogi_result isogi_sh_hemisphere_sky(float *c, int order, const float up[3], const float sky[3], const float ground[3]);
@@ -3842,14 +3842,15 @@ static int isogi_sh__edges_ok(const isogi_light *light) {
 }
 
 static int isogi_sh__light_ok(const isogi_light *light) {
-    int kind = (int)light->kind, vector_is_zero = light->vector[0] >= 0 && light->vector[0] <= 0 && light->vector[1] >= 0 &&
-                                                  light->vector[1] <= 0 && light->vector[2] >= 0 && light->vector[2] <= 0;
+    int kind = (int)light->kind;
+    const float *v = light->vector;
     if (kind < (int)ISOGI_LIGHT_DIRECTIONAL || kind > (int)ISOGI_LIGHT_RECTANGLE) return 0;
-    if (!isogi_sh__finite_array(light->vector, 3) || !isogi_sh__finite_array(light->rgb, 3)) return 0;
+    /* before any comparison: with -ffast-math what equals zero may be taken for zero, and NaN for what equals zero */
+    if (!isogi_sh__finite_array(v, 3) || !isogi_sh__finite_array(light->rgb, 3)) return 0;
     if (kind == (int)ISOGI_LIGHT_POINT) return 1;
     if (kind == (int)ISOGI_LIGHT_RECTANGLE) return isogi_sh__edges_ok(light);
     if (!isogi_sh__finite_f32(light->radius) || light->radius < 0) return 0;
-    return kind == (int)ISOGI_LIGHT_SPHERE || (!vector_is_zero && light->radius <= 1.5707964f);
+    return kind == (int)ISOGI_LIGHT_SPHERE || (fabs((double)v[0]) + fabs((double)v[1]) + fabs((double)v[2]) > 0 && light->radius <= 1.5707964f);
 }
 
 ISOGI_API isogi_result isogi_lighting_validate(const isogi_lighting *lighting) {

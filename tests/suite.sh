@@ -151,7 +151,7 @@ only() { printf '%s\n' $units | grep -E "test_($1)\$"; }
 
 variants() {
     threaded='vol|mesh|trace_bake|dvr_visibility'
-    checked='sh|sample|vol|vol_api|vol_field|mesh|trace|trace_bake|trace_light|trace_store|trace_change|dvr|dvr_data|dvr_tets|dvr_transfer|dvr_visibility|dvr_closed|dvr_medium'
+    checked='sh|sh_limits|sample|vol|vol_api|vol_field|mesh|trace|trace_bake|trace_light|trace_store|trace_change|dvr|dvr_data|dvr_tets|dvr_transfer|dvr_visibility|dvr_closed|dvr_medium'
     # Those that only start other programs have nothing to be built anew.
     units=
     for program; do
@@ -160,13 +160,13 @@ variants() {
     # A variant runs what it can change: the address sanitizer most of them, the others those that stand for their kind.
     variant O0 "$CC" "-O0 $CONTRACT_OFF" '' $(only sh)
     variant O3 "$CC" "-O3 $CONTRACT_OFF" '' $(only 'sh|vol|dvr')
-    fast_math "$CC" $(only 'sh|sample|vol|trace|dvr')
+    fast_math "$CC" $(only 'sh|sh_limits|sample|vol|trace|dvr')
     variant no-threads "$CC" "-O2 $CONTRACT_OFF -DISOGI_NO_THREADS" '' $(only 'vol|trace')
     variant no-simd "$CC" "-O2 $CONTRACT_OFF -DISOGI_NO_SIMD" '' $(only 'sh|sample|vol|dvr')
     variant sh-level-1 "$CC" "-O2 $CONTRACT_OFF -DISOGI_SH_LEVEL=1" '' $(only sh)
     if have clang; then
         variant clang clang "-O2 $CONTRACT_OFF" '' $(only 'sh|sample|vol|mesh|trace|dvr')
-        fast_math clang $(only sh)
+        fast_math clang $(only 'sh|sh_limits')
         variant address+undefined clang "-O1 -g $CONTRACT_OFF -fsanitize=address,undefined,float-cast-overflow -fno-sanitize-recover=all" '' $(only "$checked")
         variant thread clang "-O1 -g $CONTRACT_OFF -fsanitize=thread" 'TSAN_OPTIONS=halt_on_error=1' $(only "$threaded")
     else

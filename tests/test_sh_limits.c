@@ -1,0 +1,235 @@
+/* The least and the highest order, and vectors without length, as short and as long as floats are, for what isogi_sh.h does besides
+   evaluation: cones, skies, lights, windows, conventions. The reference is tests/reference_sh.h: 128 bits, from the definition. */
+#define ISOGI_SH_IMPLEMENTATION
+#include "isogi_sh.h"
+#include "reference_sh.h"
+#include "test.h"
+
+static const double pi = 3.14159265358979323846;
+
+enum { MOST = ISOGI_SH_MAX_ORDER, N = MOST * MOST };
+
+static const int orders[] = {1, 2, 101};
+enum { ORDERS = sizeof orders / sizeof *orders };
+
+/* axes of every length: poles, beside them, denormal (the least float too), huge (the sum of squares overflows floats) */
+static const float axes[][3] = {{0, 0, 1},         {0, 0, -1},  {1, 0, 0},           {0, -1, 0},           {1, 2, -2}, {1e-8f, 0, 1}, {0, 1e-30f, -1},
+                                {1e-40f, 2e-40f, -2e-40f}, {1e-45f, 0, 0}, {3e38f, -3e38f, 1e38f}, {0, 0, 3.4e38f}, {1e-40f, 0, 1e38f}};
+enum { AXES = sizeof axes / sizeof *axes };
+
+static quad basis[N];
+static float c[3 * N], d[3 * N], e[3 * N];
+static double zonal[MOST], expected[N];
+
+static void basis_at(int order, const float v[3]) {
+    quad q[3];
+    for (int k = 0; k < 3; k++) q[k] = (quad)v[k];
+    reference_eval(basis, order, q);
+}
+
+/* expected = the axis-symmetric function of zonal coefficients around v */
+static void turn_zonal(int order, const float v[3]) {
+    basis_at(order, v);
+    for (int l = 0; l < order; l++)
+        for (int i = l * l; i < (l + 1) * (l + 1); i++) expected[i] = sqrt(4 * pi / (2 * l + 1)) * zonal[l] * (double)basis[i];
+}
+
+/* zonal = that of 1 within `angle` of the axis: Y_l^0 integrated over z by 64 Gauss-Legendre nodes, exact to degree 127 */
+static void cone_zonal(int order, double angle) {
+    double below = 2 * sin(angle / 2) * sin(angle / 2); /* the part of z from 1 down */
+    for (int l = 0; l < order; l++) zonal[l] = 0;
+    for (int i = 0; i < 64; i++) {
+        long double x = cosl(3.14159265358979323846264L * ((long double)i + 0.75L) / 64.5L), slope = 1, p, before;
+        for (int round = 0; round < 12; round++) {
+            p = 1, before = 0;
+            for (int k = 0; k < 64; k++) {
+                long double next = ((long double)(2 * k + 1) * x * p - (long double)k * before) / (long double)(k + 1);
+                before = p, p = next;
+            }
+            slope = 64 * (before - x * p) / (1 - x * x);
+            x -= p / slope;
+        }
+        long double z = 1 - (long double)below * (1 - x) / 2, weight = (long double)below / ((1 - x * x) * slope * slope);
+        p = 1, before = 0;
+        for (int l = 0; l < order; l++) {
+            long double next = ((long double)(2 * l + 1) * z * p - (long double)l * before) / (long double)(l + 1);
+            zonal[l] += (double)(2 * 3.14159265358979323846264L * weight * sqrtl((long double)(2 * l + 1) / (4 * 3.14159265358979323846264L)) * p);
+            before = p, p = next;
+        }
+    }
+}
+
+/* channel `channel` of c is `factor` times expected; a float's rounding, and that of the largest coefficient in double */
+static void check_channel(const char *what, int order, int channel, double factor) {
+    double worst = 0, largest = 0, allowed;
+    int at = 0;
+    for (int i = 0; i < order * order; i++) largest = fmax(largest, fabs(factor * expected[i]));
+    for (int i = 0; i < order * order; i++) {
+        double error = fabs((double)c[3 * i + channel] - factor * expected[i]) / (largest > 0 ? largest : 1);
+        if (!(error <= worst)) worst = error, at = i;
+    }
+    allowed = 1.2e-7; /* half an ulp of a float, 6e-8, and as much for the recursions to degree 100 */
+    CHECK(worst <= allowed, "%s, order %d, channel %d: %g of the largest coefficient at Y%d", what, order, channel, worst, at);
+}
+
+TEST(cones_of_any_axis_and_order) {
+    const double angles[] = {0, 1e-6, 0.01, 0.3, pi / 2, 3, pi};
+    const float rgb[3] = {1, 3, 0};
+    char what[64];
+    for (int o = 0; o < ORDERS; o++)
+        for (int i = 0; i < 7; i++) {
+            cone_zonal(orders[o], angles[i]);
+            for (int a = 0; a < AXES; a++) {
+                if (orders[o] > 2 && !LONG_SUITE && (a + i) % 4) continue;
+                snprintf(what, sizeof what, "axis %d, angle %g", a, angles[i]);
+                CHECK(isogi_sh_cone(c, orders[o], axes[a], angles[i], rgb) == ISOGI_OK, "%s", what);
+                turn_zonal(orders[o], axes[a]);
+                for (int k = 0; k < 3; k++) check_channel(what, orders[o], k, (double)rgb[k]);
+            }
+        }
+}
+
+/* A hemisphere over the ground, and a sky linear in height: s/2 + g/2 + (s - g)/2 cos t. */
+TEST(skies_of_any_axis_and_order) {
+    const float sky[3] = {2, 1, 4}, ground[3] = {1, 3, 0};
+    char what[64];
+    for (int o = 0; o < ORDERS; o++)
+        for (int a = 0; a < AXES; a++) {
+            int order = orders[o];
+            if (order > 2 && !LONG_SUITE && a % 4) continue;
+            snprintf(what, sizeof what, "axis %d", a);
+            CHECK(isogi_sh_hemisphere_sky(c, order, axes[a], sky, ground) == ISOGI_OK, "%s", what);
+            for (int k = 0; k < 3; k++) {
+                cone_zonal(order, pi / 2);
+                for (int l = 0; l < order; l++) zonal[l] *= (double)sky[k] - (double)ground[k];
+                zonal[0] += sqrt(4 * pi) * (double)ground[k];
+                turn_zonal(order, axes[a]);
+                check_channel(what, order, k, 1);
+            }
+            CHECK(isogi_sh_gradient_sky(c, order, axes[a], sky, ground) == ISOGI_OK, "%s", what);
+            for (int k = 0; k < 3; k++) {
+                for (int l = 0; l < order; l++) zonal[l] = 0;
+                zonal[0] = sqrt(4 * pi) * ((double)sky[k] + (double)ground[k]) / 2;
+                if (order > 1) zonal[1] = sqrt(4 * pi / 3) * ((double)sky[k] - (double)ground[k]) / 2;
+                turn_zonal(order, axes[a]);
+                check_channel(what, order, k, 1);
+            }
+        }
+}
+
+/* What has no direction is refused where it is an axis, and changes nothing; to evaluation it is +z. */
+TEST(axes_without_direction) {
+    const float bad[][3] = {{0, 0, 0}, {NAN, 0, 1}, {0, INFINITY, 0}, {1, 0, -INFINITY}}, rgb[3] = {1, 1, 1}, wrong[3] = {1, NAN, 1}, up[3] = {0, 0, 1};
+    float z[MOST];
+    for (int o = 0; o < ORDERS; o++) {
+        int order = orders[o];
+        for (int i = 0; i < 3 * order * order; i++) c[i] = d[i] = (float)i;
+        for (int i = 0; i < 4; i++) {
+            isogi_light light = {.vector = {bad[i][0], bad[i][1], bad[i][2]}, .rgb = {1, 1, 1}};
+            isogi_lighting lighting = {.lights = &light, .light_count = 1};
+            CHECK(isogi_sh_cone(c, order, bad[i], 1, rgb) == ISOGI_INVALID, "cone %d", i);
+            CHECK(isogi_sh_hemisphere_sky(c, order, bad[i], rgb, rgb) == ISOGI_INVALID && isogi_sh_gradient_sky(c, order, bad[i], rgb, rgb) == ISOGI_INVALID, "sky %d", i);
+            CHECK(isogi_sh_project(c, order, &lighting, NULL) == ISOGI_INVALID, "light %d", i);
+        }
+        CHECK(isogi_sh_cone(c, order, up, 1, wrong) == ISOGI_INVALID && isogi_sh_constant(c, order, wrong) == ISOGI_INVALID, "%s", "radiance");
+        CHECK(isogi_sh_cone(c, order, up, (double)NAN, rgb) == ISOGI_INVALID && isogi_sh_cone(c, order, up, HUGE_VAL, rgb) == ISOGI_INVALID, "%s", "angle");
+        CHECK(isogi_sh_gradient_sky(c, order, up, wrong, rgb) == ISOGI_INVALID && isogi_sh_hemisphere_sky(c, order, up, rgb, wrong) == ISOGI_INVALID, "%s", "sky");
+        CHECK(!memcmp(c, d, 3 * ISOGI_SH_COUNT(order) * sizeof *c), "order %d: outputs untouched", order);
+        for (int l = 0; l < order; l++) z[l] = 1 / (float)(1 + l);
+        for (int l = 0; l < order; l++) zonal[l] = (double)z[l];
+        for (int i = 0; i < 4 + AXES; i++) {
+            const float *axis = i < 4 ? bad[i] : axes[i - 4];
+            CHECK(isogi_sh_zonal_to_direction(d, order, z, axis) == ISOGI_OK, "%d", i);
+            turn_zonal(order, i < 4 ? up : axis);
+            for (int k = 0; k < order * order; k++) c[3 * k] = d[k];
+            check_channel("zonal lobe", order, 0, 1);
+        }
+    }
+}
+
+/* Directional lights of any length are Y at their direction; point lights fall off with the square; inside a sphere all is even; and
+   the first coefficients do not depend on how many are asked for, by rectangles neither (1e-5 of the largest, as the header states). */
+TEST(lights_of_any_length_and_order) {
+    const float rgb[3] = {3, 2, 1};
+    for (int o = 0; o < ORDERS; o++)
+        for (int a = 0; a < AXES; a++) {
+            int order = orders[o];
+            if (order > 2 && !LONG_SUITE && a % 3) continue;
+            isogi_light light = {.vector = {axes[a][0], axes[a][1], axes[a][2]}, .rgb = {3, 2, 1}};
+            isogi_lighting lighting = {.lights = &light, .light_count = 1};
+            CHECK(isogi_sh_project(c, order, &lighting, NULL) == ISOGI_OK, "axis %d", a);
+            basis_at(order, axes[a]);
+            for (int i = 0; i < order * order; i++) expected[i] = (double)basis[i];
+            for (int k = 0; k < 3; k++) check_channel("directional light", order, k, (double)rgb[k]);
+        }
+    for (int o = 0; o < ORDERS; o++) {
+        int order = orders[o];
+        const float point[3] = {10, 20, 30}, towards[3] = {2, -1, 2};
+        isogi_light light = {.kind = ISOGI_LIGHT_POINT, .vector = {16, 17, 36}, .rgb = {3, 2, 1}};
+        isogi_lighting lighting = {.lights = &light, .light_count = 1};
+        CHECK(isogi_sh_project(c, order, &lighting, point) == ISOGI_OK, "%s", "point");
+        basis_at(order, towards);
+        for (int i = 0; i < order * order; i++) expected[i] = (double)basis[i] / 81;
+        for (int k = 0; k < 3; k++) check_channel("point light", order, k, (double)rgb[k]);
+        light.kind = ISOGI_LIGHT_SPHERE, light.radius = 10; /* all around: radiance I / (pi r^2) */
+        CHECK(isogi_sh_project(c, order, &lighting, point) == ISOGI_OK, "%s", "inside");
+        for (int i = 0; i < order * order; i++) expected[i] = i ? 0 : sqrt(4 * pi) / (pi * 100);
+        for (int k = 0; k < 3; k++) check_channel("inside a spherical light", order, k, (double)rgb[k]);
+        light.kind = ISOGI_LIGHT_RECTANGLE, light.edge[0][0] = 4, light.edge[1][2] = 2; /* shines to -y, where the point is not: dark */
+        CHECK(isogi_sh_project(c, order, &lighting, point) == ISOGI_OK && c[0] == 0 && c[3 * order * order - 1] == 0, "behind: %g", (double)c[0]);
+        light.edge[1][2] = -2;
+        CHECK(isogi_sh_project(c, order, &lighting, point) == ISOGI_OK && c[0] > 0, "before: %g", (double)c[0]);
+        isogi_sh_project(d, 5, &lighting, point);
+        for (int i = 0; i < 3 * order * order && i < 75; i++) CHECK(fabsf(c[i] - d[i]) <= 2e-5f * d[0], "rectangle, order %d: %g, at order 5 %g", order, (double)c[i], (double)d[i]);
+    }
+}
+
+/* The factors are those of the header's formulas; order 1 is never changed; a window in place is the same. */
+TEST(windows_of_any_order) {
+    const double widths[] = {1e-300, 0.5, 1, 7.5, 101, 1e300};
+    for (int o = 0; o < ORDERS; o++)
+        for (int kind = 0; kind < 3; kind++)
+            for (int w = 0; w < 6; w++) {
+                int order = orders[o], n = order * order;
+                for (int i = 0; i < 3 * n; i++) c[i] = d[i] = (float)(1 + i % 7);
+                CHECK(isogi_sh_window(d, d, order, 3, (isogi_sh_window_kind)kind, widths[w]) == ISOGI_OK, "kind %d, width %g", kind, widths[w]);
+                for (int l = 0; l < order; l++) {
+                    double t = l / widths[w], factor = kind == ISOGI_SH_HANN ? (1 + cos(pi * t)) / 2 : kind == ISOGI_SH_GAUSS ? exp2(-4 * t * t) : l ? sin(pi * t) / (pi * t) : 1;
+                    if (kind != ISOGI_SH_GAUSS && t >= 1) factor = 0;
+                    for (int i = 3 * l * l; i < 3 * (l + 1) * (l + 1); i++)
+                        CHECK(fabs((double)d[i] - factor * (double)c[i]) <= 1.2e-7 * (double)c[i], "kind %d, width %g, degree %d: %g, expected %g", kind, widths[w], l, (double)d[i], factor * (double)c[i]);
+                }
+            }
+    double width = -1;
+    c[0] = 1;
+    CHECK(isogi_sh_dering(d, c, 1, 1, ISOGI_SH_HANN, &width) == ISOGI_OK && d[0] == 1 && width == 0, "order 1: %g, width %g", (double)d[0], width);
+    CHECK(isogi_sh_dering(d, c, 101, 1, ISOGI_SH_HANN, &width) == ISOGI_TOO_LARGE && width == 0, "order 101: width %g", width);
+    const double wrong[] = {0, -1, (double)NAN};
+    for (int i = 0; i < 3; i++) CHECK(isogi_sh_window(d, c, 1, 1, ISOGI_SH_HANN, wrong[i]) == ISOGI_INVALID, "width %g", wrong[i]);
+}
+
+/* Where each (l, m) goes and by how much it is scaled, and back again from every convention to every other. */
+TEST(conventions_of_any_order) {
+    for (int o = 0; o < ORDERS; o++)
+        for (int i = 0; i < 18; i++) {
+            int order = orders[o], n = order * order;
+            isogi_sh_convention ours = {ISOGI_SH_ORTHONORMAL, ISOGI_SH_ACN, 0}, theirs = {(isogi_sh_normalisation)(i % 3), (isogi_sh_ordering)(i / 3 % 3), i / 9};
+            for (int k = 0; k < n; k++) c[k] = (float)(1 + k % 1000);
+            CHECK(isogi_sh_convert(d, c, order, 1, ours, theirs) == ISOGI_OK, "%d", i);
+            for (int l = 0; l < order; l++)
+                for (int m = -l; m <= l; m++) {
+                    int size = m < 0 ? -m : m, pair = 2 * size - (m > 0), sid = m ? 2 * (l - size) + (m < 0) : 2 * l;
+                    int at = l * l + (theirs.ordering == ISOGI_SH_ACN ? l + m : theirs.ordering == ISOGI_SH_PAIRS ? pair : sid);
+                    double factor = theirs.normalisation ? 1 / sqrt(4 * pi) : 1; /* coefficients shrink as the basis grows */
+                    if (theirs.normalisation == ISOGI_SH_SN3D) factor *= sqrt(2 * l + 1);
+                    if (theirs.condon_shortley && m % 2) factor = -factor;
+                    double value = factor * (double)c[l * (l + 1) + m];
+                    CHECK(fabs((double)d[at] - value) <= 1.2e-7 * fabs(value), "convention %d, Y_%d^%d: %g, expected %g", i, l, m, (double)d[at], value);
+                }
+            isogi_sh_convention third = {(isogi_sh_normalisation)((i + 1) % 3), (isogi_sh_ordering)((i / 3 + 1) % 3), !(i / 9)};
+            CHECK(isogi_sh_convert(e, d, order, 1, theirs, third) == ISOGI_OK && isogi_sh_convert(d, e, order, 1, third, ours) == ISOGI_OK, "%d", i);
+            for (int k = 0; k < n; k++) CHECK(fabsf(d[k] - c[k]) <= 3e-7f * c[k], "there and back by %d: Y%d %g, was %g", i, k, (double)d[k], (double)c[k]);
+        }
+}
+
+TEST_MAIN("sh_limits")
