@@ -60,8 +60,8 @@
    steps that never leave the bracket. A walk carries the side it is on from cell to cell, and any change of side is a hit: that is
    why nothing leaks through the faces that cells share.
    Batches go through a pool of 64 rays, eight to an instruction where there is AVX-512, so hand over many at a time: from 64 on all
-   rays are faster than alone (twice to four times), from 500 on nothing is left to gain. Rays that nearly coincide, sixteen in a row
-   as in a tile of pixels, go as one and are faster still. Cells are looked at in float first, from
+   rays are faster than alone (twice to four times), from 500 on nothing is left to gain. There, rays of one isovalue that nearly
+   coincide, up to sixteen in a row as in a tile of pixels, go as one and are faster still. Cells are looked at in float first, from
    8-bit voxels that lie together in two cache lines for 4x4x4 cells, with an error bound: what is certain needs nothing else, and
    only cells in doubt, the hits and one cell for every 25 rays besides, read your voxels and are solved in double.
 
@@ -126,7 +126,7 @@ typedef struct isogi_context {
                        no more than the machine has */
 } isogi_context;
 
-/* What work was done, for tests and tuning. Every call ADDS to the fields it knows; NULL is allowed wherever one is asked for. */
+/* What work was done, for tests and tuning: it depends on which rays go together, what they hit does not. Every call ADDS to the fields it knows; NULL is allowed wherever one is asked for. */
 typedef struct isogi_counters {
     uint64_t rays;           /* rays traced */
     uint64_t blocks;         /* pyramid blocks looked at */
@@ -427,6 +427,7 @@ ISOGI_API void isogi_vol_mesh_free(const isogi_pyramid *pyramid, isogi_mesh *mes
 #endif
 #endif
 
+#define ISOGI_VOL__ROUNDING (1.0 / 562949953421312) /* 2^-49, 16 roundings: of places along rays, relative to the way there */
 #define ISOGI_VOL__UNLIMITED 1e300 /* stands for infinity, which -ffast-math does not promise to keep */
 #define ISOGI_VOL__LEVELS 3
 #define ISOGI_VOL__NODE_LEVELS 7 /* 4^7 cells a side */
@@ -2938,9 +2939,15 @@ static void isogi_vol__emit(const isogi_vol__walk *w, double t, const double loc
     hit->side = side;
 }
 
+/* Where the ray is at t in the present cell. What rounding has moved off a face is put back on it, so that a ray through a corner or an
+   edge of the lattice meets the values there, whichever of the cells around it comes next. `base` tells how far the ray has come. */
 static void isogi_vol__local(const isogi_vol__walk *w, double t, double local[3]) {
     int a;
-    for (a = 0; a < 3; a++) local[a] = isogi_vol__clamp(w->origin[a] + t * w->dir[a] - w->cell[a], 1);
+    for (a = 0; a < 3; a++) {
+        const double slack = ISOGI_VOL__ROUNDING * (fabs(w->base * w->dir[a]) + w->pyramid->box[a]);
+        const double at = isogi_vol__clamp(w->origin[a] + t * w->dir[a] - w->cell[a], 1);
+        local[a] = at < slack ? 0 : at > 1 - slack ? 1 : at;
+    }
 }
 
 /* Takes note of the side on which the field is where the present cell was entered; 1 if that is a change, which is a hit there. */
@@ -3243,6 +3250,14 @@ ISOGI_VOL__TARGET("avx2") ISOGI_VOL__INLINE __m256d isogi_vol__corners4(const is
     return _mm256_cvtps_pd(_mm_loadh_pi(_mm_castpd_ps(_mm_load_sd((const double *)(const void *)p)), (const __m64 *)(const void *)q));
 }
 
+/* Places in the cell, on its faces where they are within rounding of them. */
+ISOGI_VOL__TARGET("avx2") ISOGI_VOL__INLINE __m256d isogi_vol__snap4(__m256d at, __m256d slack) {
+    const __m256d one = _mm256_set1_pd(1);
+    at = _mm256_min_pd(_mm256_max_pd(at, _mm256_setzero_pd()), one);
+    at = _mm256_andnot_pd(_mm256_cmp_pd(at, slack, _CMP_LT_OQ), at);
+    return _mm256_blendv_pd(at, one, _mm256_cmp_pd(at, _mm256_sub_pd(one, slack), _CMP_GT_OQ));
+}
+
 /* Does what mixed_cell does. */
 ISOGI_VOL__TARGET("avx2") static int isogi_vol__mixed_cell_avx2(isogi_vol__walk *w, int x, int y, int z, int in, int axis, isogi_hit *hit) {
     const isogi_volume *v = &w->pyramid->volume;
@@ -3254,7 +3269,8 @@ ISOGI_VOL__TARGET("avx2") static int isogi_vol__mixed_cell_avx2(isogi_vol__walk 
     const __m256d in_lane = isogi_vol__lane(in), out_lane = isogi_vol__lane(axis < 0 ? 3 : axis);
     const __m256d cell = _mm256_cvtepi32_pd(_mm_setr_epi32(x, y, z, 0));
     const __m256d enter = _mm256_and_pd(_mm256_cmp_pd(dir, zero, _CMP_LT_OQ), one), leave = _mm256_and_pd(_mm256_cmp_pd(dir, zero, _CMP_GT_OQ), one);
-    const __m256d segment_end = _mm256_set1_pd(w->end);
+    const __m256d segment_end = _mm256_set1_pd(w->end), way = _mm256_andnot_pd(_mm256_set1_pd(-0.0), _mm256_mul_pd(_mm256_set1_pd(w->base), dir));
+    const __m256d slack = _mm256_mul_pd(_mm256_set1_pd(ISOGI_VOL__ROUNDING), _mm256_add_pd(way, _mm256_loadu_pd(w->pyramid->box)));
     __m256d c0 = isogi_vol__corners4(v, p, dx, dy), c1 = isogi_vol__corners4(v, p + dz, dx, dy), begin, end, from, to, rest0, rest1;
     __m256d even, odd, low, high, near_x, far_x, near_y, far_y, f0, f1, b;
     int sides, inside;
@@ -3282,8 +3298,8 @@ ISOGI_VOL__TARGET("avx2") static int isogi_vol__mixed_cell_avx2(isogi_vol__walk 
     w->count.cubics++;
     from = _mm256_sub_pd(_mm256_add_pd(origin, _mm256_mul_pd(begin, dir)), cell);
     to = _mm256_sub_pd(_mm256_add_pd(origin, _mm256_mul_pd(end, dir)), cell);
-    from = _mm256_blendv_pd(_mm256_min_pd(_mm256_max_pd(from, zero), one), enter, in_lane);
-    to = _mm256_blendv_pd(_mm256_min_pd(_mm256_max_pd(to, zero), one), leave, out_lane);
+    from = _mm256_blendv_pd(isogi_vol__snap4(from, slack), enter, in_lane);
+    to = _mm256_blendv_pd(isogi_vol__snap4(to, slack), leave, out_lane);
     rest0 = _mm256_sub_pd(one, from), rest1 = _mm256_sub_pd(one, to);
     /* Blossom, as cubic_set has it. */
 #define ISOGI_VOL__LANE(v, i) _mm256_permute4x64_pd(v, 0x55 * (i))
@@ -4211,6 +4227,13 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE __m512d isogi_vol__lerp8(__m512d a, __m512d 
     return ISOGI_VOL__ADD(ISOGI_VOL__MUL(rest, a), ISOGI_VOL__MUL(u, b));
 }
 
+ISOGI_VOL__AVX512 ISOGI_VOL__INLINE __m512d isogi_vol__snap8(__m512d at, __m512d slack) {
+    const __m512d one = _mm512_set1_pd(1);
+    at = _mm512_min_pd(_mm512_max_pd(at, _mm512_setzero_pd()), one);
+    at = _mm512_maskz_mov_pd(_mm512_cmp_pd_mask(at, slack, _CMP_NLT_UQ), at);
+    return _mm512_mask_mov_pd(at, _mm512_cmp_pd_mask(at, _mm512_sub_pd(one, slack), _CMP_GT_OQ), one);
+}
+
 /* The root of everyday cubics: cubic_refine's first loop. *slow: those that need its second one. */
 ISOGI_VOL__AVX512 ISOGI_VOL__INLINE __m512d isogi_vol__refine8(const __m512d b[4], __mmask8 lanes, __mmask8 *slow) {
     const __m512d zero = _mm512_setzero_pd(), one = _mm512_set1_pd(1), three = _mm512_set1_pd(3), two = _mm512_set1_pd(2);
@@ -4308,9 +4331,11 @@ ISOGI_VOL__AVX512 static unsigned isogi_vol__decide8(isogi_vol__batch *b, isogi_
 #pragma GCC unroll 8
         for (a = 0; a < 3; a++) {
             const __mmask8 enters = _mm512_cmpeq_epi64_mask(in, _mm512_set1_epi64(a)), leaves = _mm512_cmpeq_epi64_mask(out, _mm512_set1_epi64(a));
+            const __m512d way = _mm512_abs_pd(ISOGI_VOL__MUL(_mm512_i64gather_pd(slot, s->base, 8), dir[a]));
+            const __m512d slack = ISOGI_VOL__MUL(_mm512_set1_pd(ISOGI_VOL__ROUNDING), ISOGI_VOL__ADD(way, _mm512_set1_pd(b->pyramid->box[a])));
             from[a] = ISOGI_VOL__SUB(ISOGI_VOL__ADD(origin[a], ISOGI_VOL__MUL(begin, dir[a])), at[a]);
             to[a] = ISOGI_VOL__SUB(ISOGI_VOL__ADD(origin[a], ISOGI_VOL__MUL(end, dir[a])), at[a]);
-            from[a] = _mm512_min_pd(_mm512_max_pd(from[a], zero), one), to[a] = _mm512_min_pd(_mm512_max_pd(to[a], zero), one);
+            from[a] = isogi_vol__snap8(from[a], slack), to[a] = isogi_vol__snap8(to[a], slack);
             from[a] = _mm512_mask_mov_pd(from[a], enters, _mm512_maskz_mov_pd(fall[a], one));
             to[a] = _mm512_mask_mov_pd(to[a], leaves, _mm512_maskz_mov_pd((__mmask8)~fall[a], one));
         }
@@ -4818,22 +4843,24 @@ static void isogi_vol__trace_one(isogi_vol__batch *b, size_t i) {
 #define ISOGI_VOL__REACH 4e-6f /* times below are sums of a few numbers up to 4 children, with errors below 1e-6 */
 
 typedef struct __attribute__((aligned(64))) isogi_vol__layers {
-    __m512 enter[3][4], leave[3][4]; /* times at which the rays enter and leave layers of children, from `zero` on */
-    __m512 at[3], dir[3];            /* where they are at zero, in children from the node's corner, and their way per time */
+    __m512 per[3], first[3], last[3], stop; /* from `zero` on, the rays enter layer i of children at i per - first, leave it at (i + 1) per - last */
 } isogi_vol__layers;
+
+/* Where the rays are at `zero`, in children from the node's corner, and their way per time: of the node that was opened last. */
+typedef struct isogi_vol__places { __m512 at[3], dir[3]; } isogi_vol__places;
 
 ISOGI_VOL__AVX512 ISOGI_VOL__INLINE __m512 isogi_vol__halves(__m512d low, __m512d high) {
     return _mm512_insertf32x8(_mm512_castps256_ps512(_mm512_cvtpd_ps(low)), _mm512_cvtpd_ps(high), 1);
 }
 
 /* The layers of a node of level n; cell: its corner, counted backwards. */
-ISOGI_VOL__AVX512 static void isogi_vol__open_layers(isogi_vol__layers *l, const isogi_vol__pool *s, int n, int64_t cell, int64_t backwards) {
+ISOGI_VOL__AVX512 static void isogi_vol__open_layers(isogi_vol__layers *l, isogi_vol__places *places, const isogi_vol__pool *s, int n, int64_t cell, int64_t backwards) {
     const double size = (double)((int64_t)1 << 2 * n);
     const __m512 most = _mm512_set1_ps(1e30f), reach = _mm512_set1_ps(ISOGI_VOL__REACH);
     double from[3], step[3];
     __m512d zero[2];
     __m512 stop;
-    int a, h, i;
+    int a, h;
     for (a = 0; a < 3; a++) { /* the corner in cells as they are, which rays enter by */
         const int fall = (backwards >> 16 * a & 0xffff) != 0;
         const int64_t corner = cell >> 16 * a & 0xffff;
@@ -4857,17 +4884,22 @@ ISOGI_VOL__AVX512 static void isogi_vol__open_layers(isogi_vol__layers *l, const
         const __m512d p1 = _mm512_mul_pd(_mm512_sub_pd(_mm512_fmadd_pd(zero[1], d1, _mm512_load_pd(&s->origin[a][8])), corner), unit);
         const __m512d scale = _mm512_set1_pd(step[a] < 0 ? -size : size);
         const __m512 at = isogi_vol__halves(p0, p1);
-        const __m512 inverse = _mm512_min_ps(isogi_vol__halves(_mm512_mul_pd(_mm512_load_pd(&s->inverse[a][0]), scale), _mm512_mul_pd(_mm512_load_pd(&s->inverse[a][8]), scale)), most);
-        const __m512 first = _mm512_mul_ps(_mm512_add_ps(at, reach), inverse), last = _mm512_mul_ps(_mm512_sub_ps(at, reach), inverse);
-        l->at[a] = at, l->dir[a] = isogi_vol__halves(_mm512_mul_pd(d0, unit), _mm512_mul_pd(d1, unit));
-#pragma GCC unroll 4
-        for (i = 0; i < 4; i++) {
-            l->enter[a][i] = _mm512_fmsub_ps(_mm512_set1_ps((float)i), inverse, first);
-            l->leave[a][i] = _mm512_fmsub_ps(_mm512_set1_ps((float)(i + 1)), inverse, last);
-        }
+        const __m512 per = _mm512_min_ps(isogi_vol__halves(_mm512_mul_pd(_mm512_load_pd(&s->inverse[a][0]), scale), _mm512_mul_pd(_mm512_load_pd(&s->inverse[a][8]), scale)), most);
+        l->per[a] = per, l->first[a] = _mm512_mul_ps(_mm512_add_ps(at, reach), per), l->last[a] = _mm512_mul_ps(_mm512_sub_ps(at, reach), per);
+        places->at[a] = at, places->dir[a] = isogi_vol__halves(_mm512_mul_pd(d0, unit), _mm512_mul_pd(d1, unit));
     }
-#pragma GCC unroll 4
-    for (i = 0; i < 4; i++) l->enter[0][i] = _mm512_max_ps(l->enter[0][i], _mm512_setzero_ps()), l->leave[0][i] = _mm512_min_ps(l->leave[0][i], stop);
+    l->stop = stop;
+}
+
+/* A layer's number comes from memory, which spreads it in passing. */
+static const float isogi_vol__layer_numbers[5] = {0, 1, 2, 3, 4};
+
+ISOGI_VOL__AVX512 ISOGI_VOL__INLINE __m512 isogi_vol__enter16(const isogi_vol__layers *l, int axis, int layer) {
+    return _mm512_fmsub_ps(_mm512_set1_ps(isogi_vol__layer_numbers[layer]), l->per[axis], l->first[axis]);
+}
+
+ISOGI_VOL__AVX512 ISOGI_VOL__INLINE __m512 isogi_vol__leave16(const isogi_vol__layers *l, int axis, int layer) {
+    return _mm512_fmsub_ps(_mm512_set1_ps(isogi_vol__layer_numbers[layer + 1]), l->per[axis], l->last[axis]);
 }
 
 /* Cells of a leaf, for isovalue `step`: for which rays it is certain that they stay on one side. Like sides8, for one cell and many rays. */
@@ -4875,7 +4907,7 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE __m512 isogi_vol__mix16(__m512 a, __m512 b, 
 
 typedef struct isogi_vol__sides16 { unsigned in, out, in0, out0, in1, out1; } isogi_vol__sides16;
 
-ISOGI_VOL__AVX512 ISOGI_VOL__INLINE void isogi_vol__look16(isogi_vol__sides16 *sides, const isogi_vol__layers *l, __m512 enter, __m512 leave, int child, const __m512i voxel[2], float step) {
+ISOGI_VOL__AVX512 ISOGI_VOL__INLINE void isogi_vol__look16(isogi_vol__sides16 *sides, const isogi_vol__places *places, __m512 enter, __m512 leave, int child, const __m512i voxel[2], float step) {
     static const uint8_t corners[16] = {0, 1, 5, 6, 25, 26, 30, 31};
     const __m512 zero = _mm512_setzero_ps(), one = _mm512_set1_ps(1);
     const __m512 low = _mm512_set1_ps(step - ISOGI_VOL__DOUBT), high = _mm512_set1_ps(step + ISOGI_VOL__DOUBT);
@@ -4888,9 +4920,9 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE void isogi_vol__look16(isogi_vol__sides16 *s
     _mm256_store_ps(corner, _mm256_cvtepi32_ps(_mm256_cvtepu8_epi32(_mm512_castsi512_si128(_mm512_permutex2var_epi8(voxel[0], _mm512_castsi128_si512(index), voxel[1])))));
 #pragma GCC unroll 3
     for (k = 0; k < 3; k++) {
-        const __m512 base = _mm512_sub_ps(l->at[k], _mm512_set1_ps((float)(k == 0 ? x : k == 1 ? y : z)));
-        from[k] = _mm512_min_ps(_mm512_max_ps(_mm512_fmadd_ps(enter, l->dir[k], base), zero), one);
-        to[k] = _mm512_min_ps(_mm512_max_ps(_mm512_fmadd_ps(leave, l->dir[k], base), zero), one);
+        const __m512 base = _mm512_sub_ps(places->at[k], _mm512_set1_ps((float)(k == 0 ? x : k == 1 ? y : z)));
+        from[k] = _mm512_min_ps(_mm512_max_ps(_mm512_fmadd_ps(enter, places->dir[k], base), zero), one);
+        to[k] = _mm512_min_ps(_mm512_max_ps(_mm512_fmadd_ps(leave, places->dir[k], base), zero), one);
     }
 #pragma GCC unroll 4
     for (k = 0; k < 4; k++) {
@@ -5058,6 +5090,7 @@ ISOGI_VOL__AVX512 static void isogi_vol__trace_packet(isogi_vol__batch *b, isogi
     uint64_t left[ISOGI_VOL__NODE_LEVELS];
     unsigned met[ISOGI_VOL__NODE_LEVELS], active = rays, lanes = rays, in = 0, out = 0, seen_in = 0, seen_out = 0, hits = 0;
     isogi_vol__layers layers[ISOGI_VOL__NODE_LEVELS];
+    isogi_vol__places places;
     isogi_vol__beam beam;
     isogi_vol__leaf leaf;
     __m512i voxel[2] = {_mm512_setzero_si512(), _mm512_setzero_si512()};
@@ -5074,7 +5107,7 @@ ISOGI_VOL__AVX512 static void isogi_vol__trace_packet(isogi_vol__batch *b, isogi
             left[0] &= isogi_vol__cut_order(&leaf, octant, isogi_vol__held_cells(ways, octant, &leaf, voxel));
         }
         if (left[n]) {
-            isogi_vol__open_layers(&layers[n], s, n, cell, backwards);
+            isogi_vol__open_layers(&layers[n], &places, s, n, cell, backwards);
             if (n) {
                 const isogi_vol__node_level *below = &p->node_level[n - 1];
                 const int64_t at = cell ^ backwards;
@@ -5092,8 +5125,9 @@ ISOGI_VOL__AVX512 static void isogi_vol__trace_packet(isogi_vol__batch *b, isogi
                 if (++n == p->node_levels) goto out;
             l = &layers[n];
             child = __builtin_ctzll(left[n]), left[n] &= left[n] - 1;
-            enter = _mm512_max_ps(_mm512_max_ps(l->enter[0][child & 3], l->enter[1][child >> 2 & 3]), l->enter[2][child >> 4]);
-            leave = _mm512_min_ps(_mm512_min_ps(l->leave[0][child & 3], l->leave[1][child >> 2 & 3]), l->leave[2][child >> 4]);
+            enter = _mm512_max_ps(isogi_vol__enter16(l, 0, child & 3), _mm512_setzero_ps()), leave = _mm512_min_ps(isogi_vol__leave16(l, 0, child & 3), l->stop);
+            enter = _mm512_max_ps(enter, _mm512_max_ps(isogi_vol__enter16(l, 1, child >> 2 & 3), isogi_vol__enter16(l, 2, child >> 4)));
+            leave = _mm512_min_ps(leave, _mm512_min_ps(isogi_vol__leave16(l, 1, child >> 2 & 3), isogi_vol__leave16(l, 2, child >> 4)));
             lanes &= _mm512_cmp_ps_mask(enter, leave, _CMP_LE_OQ);
             if (!lanes) continue;
             cell = (int64_t)(((uint64_t)cell & 0x0000ffffffffffffu & ~(0x000100010001u * ((4u << 2 * n) - 1))) | _pdep_u64((uint64_t)child, 0x000300030003u) << 2 * n);
@@ -5103,7 +5137,7 @@ ISOGI_VOL__AVX512 static void isogi_vol__trace_packet(isogi_vol__batch *b, isogi
             } else {
                 isogi_vol__sides16 sides;
                 unsigned hit, doubt;
-                isogi_vol__look16(&sides, l, enter, leave, child, voxel, leaf.isovalue);
+                isogi_vol__look16(&sides, &places, enter, leave, child, voxel, leaf.isovalue);
                 hit = lanes & ((sides.out1 & (seen_in | sides.in0)) | (sides.in1 & (seen_out | sides.out0)));
                 sides.in &= lanes & ~out, sides.out &= lanes & ~in, doubt = lanes & ~(hit | sides.in | sides.out);
                 seen_in |= sides.in, seen_out |= sides.out;
@@ -6897,6 +6931,7 @@ ISOGI_API void isogi_vol_mesh_free(const isogi_pyramid *pyramid, isogi_mesh *mes
 #undef ISOGI_VOL__WALK_CELL
 #undef ISOGI_VOL__WALK_TOP
 #undef ISOGI_VOL__UNLIMITED
+#undef ISOGI_VOL__ROUNDING
 #undef ISOGI_VOL__LOCK
 #undef ISOGI_VOL__UNLOCK
 #undef ISOGI_VOL__MAX_THREADS

@@ -233,6 +233,43 @@ TEST(tangent_rays_and_saddles_hit_like_the_reference) {
 
 /* ---- triple roots: (x - a)(y - a)(z - a) is trilinear, and (s - a)^3 along the diagonal of the cell ---- */
 
+/* Rays through corners of the lattice: rounding moves them off it by some 1e-16, and what they meet there must not depend on that. One
+   voxel has the isovalue, all others are below it: exact rays touch it, from however far they come, alone or together, on every path. */
+TEST(one_voxel_is_touched_by_every_ray_through_it) {
+    enum { N = 9, RAYS = 16 };
+    static float data[N * N * N];
+    isogi_volume volume = {.data = data, .type = ISOGI_F32, .size = {N, N, N}};
+    long rays = 0, missed[5] = {0}, apart[5] = {0};
+    isogi_pyramid *p[5];
+    for (int i = 0; i < N * N * N; i++) data[i] = i == 4 + N * 4 + N * N * 4 ? 0.0f : -1.0f;
+    for (int path = 1; path < 5; path++) {
+        isogi_context context = {.threads = 1, .force_path = path};
+        CHECK(isogi_vol_build(&p[path], &volume, &context) == ISOGI_OK, "build");
+    }
+    for (int d = 0; d < 15 * 15 * 15; d++) {
+        isogi_ray ray[RAYS];
+        isogi_hit hit[RAYS];
+        const int dir[3] = {d % 15 - 7, d / 15 % 15 - 7, d / 225 - 7};
+        if (!dir[0] && !dir[1] && !dir[2]) continue;
+        for (int away = 1; away < 80; away += LONG_SUITE ? 1 : 26) {
+            memset(ray, 0, sizeof ray);
+            for (int i = 0; i < RAYS; i++)
+                for (int a = 0; a < 3; a++) ray[i].dir[a] = (float)dir[a], ray[i].origin[a] = 4 - 0.5 * away * dir[a];
+            rays++;
+            for (int path = 1; path < 5; path++) {
+                isogi_vol_intersect(p[path], ray, 1, hit, NULL);
+                missed[path] += hit[0].side != 1 || fabs(hit[0].t - 0.5 * away) > 1e-9;
+                isogi_vol_intersect(p[path], ray, RAYS, hit, NULL);
+                for (int i = 0; i < RAYS; i++) apart[path] += hit[i].side != 1;
+            }
+        }
+    }
+    for (int path = 1; path < 5; path++) {
+        CHECK(!missed[path] && !apart[path], "path %d: %ld of %ld rays miss the voxel, %ld together", path, missed[path], rays, apart[path]);
+        isogi_vol_free(p[path]);
+    }
+}
+
 TEST(triple_roots_on_diagonals_are_crossings) {
     for (int k = 1; k < 16; k++) {
         scene s = scene_new(2, 2, 2);

@@ -108,8 +108,8 @@ TEST(rays_look_at_few_nodes_and_cells_and_solve_hardly_more_cubics_than_hits) {
     }
 }
 
-/* A pool takes rays again and again, moves them when few are left, and reports each one once: in batches of any size, hits and work are
-   the same. Occlusion may be certain before a hit is. */
+/* A pool takes rays again and again, moves them when few are left, and reports each one once: in batches of any size, hits are
+   the same, and so is the work for rays that do not coincide. Occlusion may be certain before a hit is. */
 TEST(batches_of_any_size_give_the_same_bits) {
     static const size_t sizes[] = {1, 3, 4, 7, 8, 9, 15, 16, 17, 63, 64, 65, 200, 1000};
     int n = 48;
@@ -151,8 +151,7 @@ static int same_hit(const isogi_hit *a, const isogi_hit *b) {
 }
 
 /* Rays side by side, as those of neighbouring pixels, may go together: they hit what each of them hits alone, with the same bits, on every
-   kind of grid, direction and border. Some run in lattice planes, along axes, out of corners; some end within the volume. (In lattice
-   planes where the field is the isovalue all over, other paths may see a touch where these see none, so they are not asked.) */
+   kind of grid, direction and border. Some run in lattice planes, along axes, out of corners; some end within the volume. */
 TEST(rays_side_by_side_hit_what_they_hit_alone) {
     enum { TURNS = 600, MOST = 40 };
     test_random r = {11};
@@ -203,7 +202,7 @@ TEST(rays_side_by_side_hit_what_they_hit_alone) {
             for (int i = 0; i < count; i++) {
                 isogi_vol_intersect(p, &rays[i], 1, &alone[i], NULL), isogi_vol_intersect(plain, &rays[i], 1, &other[i], NULL);
                 hits += alone[i].side != 0, wrong += !same_hit(&together[i], &alone[i]), wrong_any += any[i] != (alone[i].side != 0);
-                wrong_plain += together[i].side != other[i].side && !(levels && (grid || axial));
+                wrong_plain += together[i].side != other[i].side;
                 spread_out += spread > 0.03;
             }
         }
@@ -211,7 +210,8 @@ TEST(rays_side_by_side_hit_what_they_hit_alone) {
         free(data);
     }
     CHECK(hits > 1000 && spread_out, "%ld hits", hits);
-    CHECK(!wrong && !wrong_any && !wrong_plain, "%ld of %ld hits differ, %ld occlusions, %ld from the plain path", wrong, hits, wrong_any, wrong_plain);
+    /* a ray that begins in a face, within rounding, in matter that is the isovalue all over, may be seen on either side */
+    CHECK(!wrong && !wrong_any && wrong_plain * 2000000 <= hits, "%ld of %ld hits differ, %ld occlusions, %ld from the plain path", wrong, hits, wrong_any, wrong_plain);
 }
 
 TEST_MAIN("vol_work")
