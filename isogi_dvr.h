@@ -1498,11 +1498,11 @@ static void isogi_dvr__pass(const isogi_dvr__rows *a, const float w[4]) {
     }
 }
 
-/* exp(-x) for x >= 0; below 1e-37 it is that. Relative error 2e-7. */
+/* exp(-x) for x >= 0; below 2^-80 it is that: shares of it times weights (1e-6) are still normal numbers. Relative error 2e-7. */
 static float isogi_dvr__exp(float x) {
     float y = x * -1.44269504f, f, p;
     int32_t n;
-    y = y > -125 ? y : -125;
+    y = y > -80 ? y : -80;
     n = (int32_t)(y - 0.5f), f = y - (float)n;
     p = 1.54035304e-4f * f + 1.33335581e-3f, p = p * f + 9.61812911e-3f, p = p * f + 5.55041087e-2f;
     p = p * f + 2.40226507e-1f, p = p * f + 6.93147182e-1f, p = p * f + 1;
@@ -1517,8 +1517,14 @@ static void isogi_dvr__exp_row(float *x, size_t count) {
 }
 
 /* What a ray counts for at a grid point beside it. Where matter ends between the two, the ray within knows nothing of what arrives outside.
-   depth: of half a piece of the ray. */
+   depth: of half a piece of the ray; up to ISOGI_DVR__MOST_DEPTH, lest its square overflow. */
 #define ISOGI_DVR__COUNTS(depth) (1.0f / (1.0f + 16.0f * (depth) * (depth)) * 0.999999f + 1e-6f)
+#define ISOGI_DVR__MOST_DEPTH 1024.0f
+
+static float isogi_dvr__counts(float depth) {
+    depth = depth < ISOGI_DVR__MOST_DEPTH ? depth : ISOGI_DVR__MOST_DEPTH;
+    return ISOGI_DVR__COUNTS(depth);
+}
 
 /* The same as above twice, and between the two what is left of the light, weighed, and its weight. */
 static void isogi_dvr__pass_out(const isogi_dvr__rows *a, const float w[4]) {
@@ -1528,7 +1534,7 @@ static void isogi_dvr__pass_out(const isogi_dvr__rows *a, const float w[4]) {
         float *depth = a->depth + c * a->depth_row, *out = a->out + c * a->out_row;
         for (i = 0; i < a->count; i++) {
             float more = (w[0] * r0[i] + w[1] * r0[i + 1]) + (w[2] * r1[i] + w[3] * r1[i + 1]);
-            float weight = ISOGI_DVR__COUNTS(more);
+            float weight = isogi_dvr__counts(more);
             out[i] = weight * isogi_dvr__exp(depth[i] + more), out[a->weight + i] = weight, depth[i] += 2 * more;
         }
     }
@@ -1590,13 +1596,21 @@ static void isogi_dvr__gather(const isogi_dvr__sums *a) {
 #define ISOGI_DVR__EXP(e, x)                                                                                    \
     {                                                                                                           \
         isogi_dvr__floats y = (x) * -1.44269504f, f, p, least = {0};                                            \
-        isogi_dvr__ints n, in = y > -125.0f;                                                                    \
-        least -= 125.0f;                                                                                        \
+        isogi_dvr__ints n, in = y > -80.0f;                                                                     \
+        least -= 80.0f;                                                                                         \
         y = (isogi_dvr__floats)(((isogi_dvr__ints)y & in) | ((isogi_dvr__ints)least & ~in));                    \
         n = __builtin_convertvector(y - 0.5f, isogi_dvr__ints), f = y - __builtin_convertvector(n, isogi_dvr__floats); \
         p = 1.54035304e-4f * f + 1.33335581e-3f, p = p * f + 9.61812911e-3f, p = p * f + 5.55041087e-2f;        \
         p = p * f + 2.40226507e-1f, p = p * f + 6.93147182e-1f, p = p * f + 1.0f;                               \
         e = p * (isogi_dvr__floats)((n + 127) << 23);                                                           \
+    }
+/* x >= 0, but ISOGI_DVR__MOST_DEPTH at most; bits of such floats are in their order. */
+#define ISOGI_DVR__LESS(less, x)                                                                                \
+    {                                                                                                           \
+        isogi_dvr__floats most = {0};                                                                           \
+        isogi_dvr__ints in;                                                                                     \
+        most += ISOGI_DVR__MOST_DEPTH, in = ((isogi_dvr__ints)(x) - (isogi_dvr__ints)most) >> 31;               \
+        less = (isogi_dvr__floats)(((isogi_dvr__ints)(x) & in) | ((isogi_dvr__ints)most & ~in));                \
     }
 #define ISOGI_DVR__MORE                                                                  \
     ((w[0] * ISOGI_DVR__C(r0 + i) + w[1] * ISOGI_DVR__C(r0 + i + 1)) +                   \
@@ -1635,7 +1649,9 @@ static void isogi_dvr__gather(const isogi_dvr__sums *a) {
             const float *r0 = a->from + c * a->from_row;                                                                            \
             float *depth = a->depth + c * a->depth_row, *out = a->out + c * a->out_row, outside = depth[a->count];                  \
             for (i = 0; i < a->count; i += ISOGI_DVR__LANES) {                                                                      \
-                isogi_dvr__floats more = ISOGI_DVR__MORE, x = ISOGI_DVR__C(depth + i) + more, e, weight = ISOGI_DVR__COUNTS(more);  \
+                isogi_dvr__floats more = ISOGI_DVR__MORE, x = ISOGI_DVR__C(depth + i) + more, e, less, weight;                      \
+                ISOGI_DVR__LESS(less, more)                                                                                         \
+                weight = ISOGI_DVR__COUNTS(less);                                                                                   \
                 ISOGI_DVR__EXP(e, x)                                                                                                \
                 ISOGI_DVR__V(out + i) = e * weight, ISOGI_DVR__V(out + a->weight + i) = weight, ISOGI_DVR__V(depth + i) = x + more; \
             }                                                                                                                       \
@@ -1726,6 +1742,7 @@ ISOGI_DVR__LEAP_KERNEL(_avx512, __attribute__((target("avx512f,avx512vl,avx512dq
 #undef ISOGI_DVR__KERNELS
 #undef ISOGI_DVR__LEAP_KERNEL
 #undef ISOGI_DVR__MORE
+#undef ISOGI_DVR__LESS
 #undef ISOGI_DVR__BLOCK
 #undef ISOGI_DVR__EXIT
 #undef ISOGI_DVR__VI
@@ -3660,7 +3677,8 @@ static void isogi_dvr__sweep_row_out(const isogi_dvr__sweep *s, size_t slice, co
     const float *low = from + (c ? c - 1 : 0) * s->row_stride, *high = from + (c < s->size[1] ? c : 0) * s->row_stride; /* the nodes beside */
     float *e = s->row, part = at->part[1], share[2];
     size_t n = s->points[2], i;
-    share[0] = c ? s->piece * (1 - at->part[0]) : 0, share[1] = c < s->size[1] ? s->piece * at->part[0] : 0;
+    int within = c && (c < s->size[1] || !(at->part[0] > 0)); /* rays outside count in full, as in sweep_add */
+    share[0] = s->piece * (1 - at->part[0]), share[1] = c < s->size[1] ? s->piece * at->part[0] : 0;
     for (i = 0; i < n; i++) e[2 * i] = depth[s->first[2] + i * s->every[2]], e[2 * i + 1] = depth[s->first[2] + i * s->every[2] + 1];
     s->kernels.exp_row(e, 2 * n);
     for (i = 0; i < n; i++) {
@@ -3668,8 +3686,8 @@ static void isogi_dvr__sweep_row_out(const isogi_dvr__sweep *s, size_t slice, co
         float x1 = share[0] * low[h] + share[1] * high[h], x2 = share[0] * low[h + 1] + share[1] * high[h + 1]; /* 0 past the end */
         float x0 = h ? share[0] * low[h - 1] + share[1] * high[h - 1] : 0, e0 = e[2 * i], e1 = e[2 * i + 1];
         weight[i] = 1, out[i] = e1 + part * (e0 - e1);
-        if (!(x0 + x1 + x2 > 0)) continue; /* no matter beside it */
-        x0 += part * (x1 - x0), x1 += part * (x2 - x1), x0 = ISOGI_DVR__COUNTS(x0), x1 = ISOGI_DVR__COUNTS(x1);
+        if (!within || !(x0 + x1 + x2 > 0)) continue; /* no matter beside it */
+        x0 = h ? isogi_dvr__counts(x0 + part * (x1 - x0)) : 1, x1 = h + 1 < s->size[2] || !(part > 0) ? isogi_dvr__counts(x1 + part * (x2 - x1)) : 1;
         e0 *= x0, e1 *= x1, weight[i] = x1 + part * (x0 - x1), out[i] = e1 + part * (e0 - e1);
     }
 }
@@ -5869,6 +5887,7 @@ ISOGI_API isogi_result isogi_dvr_tets_render(const isogi_tets *tets, const isogi
 #undef ISOGI_DVR__C4
 #undef ISOGI_DVR__C4I
 #undef ISOGI_DVR__COUNTS
+#undef ISOGI_DVR__MOST_DEPTH
 #undef ISOGI_DVR__AVX
 #endif /* implementation */
 
