@@ -83,7 +83,7 @@
      probe: a point of the surface near by, in cells of 2 voxels or an eighth of the ray's length, whose own hemisphere is gathered once
      in the same way; passes over the probes then bring all reflections without rays. What cosine-distributed rays brought is averaged
      over neighbouring texels that face the same way, as far as their noise could explain the difference. Probes cost accuracy: about
-     0.9 % of the mean and 1.7 % at a point in narrow channels of albedo 0.8 (tests/test_trace_bake.c prints it). Lazy and adaptive bakes
+     0.9 % of the mean and 1.8 % at a point in narrow channels of albedo 0.8 (test_trace_bake --long prints it). Lazy and adaptive bakes
      take samples in blocks of 4, 16, 64, ... and every other texel along each axis first: soon every lookup has a value.
      A hit from within (only through an open border can a ray get there) is a surface too, with its normal turned.
 
@@ -191,7 +191,7 @@ typedef enum isogi_trace_sides {
 typedef void isogi_trace_material_function(void *user, double isovalue, const double point[3], float albedo[3], float emission[3]);
 
 /* How a texel's light is held, and exported. Bytes for a texel of RGB / of a coefficient; error of what was computed, which itself
-   has noise of about 2 % with 64 samples:
+   has an error of about 1.5 % with 16 samples (an engine block; README.md):
    FLOAT   12 / 4   6e-8 of the value
    HALF     6 / 2   5e-4 of the value
    RGB9E5   4 / -   2e-3 of the largest of the three channels; irradiance alone
@@ -2471,9 +2471,11 @@ ISOGI_API isogi_result isogi_trace_request(isogi_trace *trace, const float (*poi
         size_t cell[3], texel[3];
         double local[3];
         isogi_result result = ISOGI_OK;
-        int k, lacking = 1, all = 1;
+        int k, lacking = 1, all = 1, inner;
         isogi_trace__cell(trace, points[i], cell, local);
-        if (!memcmp(cell, known, sizeof cell)) continue;
+        /* on a face of the cell a lookup reads fewer of its texels: none of those may have a surface */
+        inner = local[0] > 0 && local[0] < 1 && local[1] > 0 && local[1] < 1 && local[2] > 0 && local[2] < 1;
+        if (inner && !memcmp(cell, known, sizeof cell)) continue;
         for (k = 0; k < isogi_trace__tap_count(trace) && result == ISOGI_OK; k++) {
             if (!(isogi_trace__tap(trace, cell, local, k, texel) > 0)) {
                 all = 0;
@@ -2824,7 +2826,7 @@ static int isogi_trace__same_colours(const isogi_trace *t, const isogi_trace__ca
     double point[3];
     float albedo[2][3], glow[2][3];
     int a, same = 1;
-    if (!d->albedo_count && !d->emission_count && !d->material) return 1;
+    if (isogi_trace__zero(one - two) || (!d->albedo_count && !d->emission_count && !d->material)) return 1;
     for (a = 0; a < 3; a++) point[a] = c->hit.cell[a] + c->hit.local[a];
     isogi_vol_to_world(t->scene.pyramid, point, point);
     isogi_trace_material(d, one, point, albedo[0], glow[0]);
@@ -2838,7 +2840,8 @@ static int isogi_trace__same_colours(const isogi_trace *t, const isogi_trace__ca
 }
 
 /* The number + 1 of the probe of a hit; 0: there is none, and it would have *key. Probes are only ever added to the end of a chain,
-   so what was found once is found again. */
+   so what was found once is found again. In a cell with more than 32 planes and colours the last of the chain stands for all others,
+   whatever its place and colour: else colours that differ at every point would need ever more probes, and time to search them. */
 static uint32_t isogi_trace__probe_find(const isogi_trace *t, const isogi_trace__catch *c, double isovalue, uint64_t *key) {
     const isogi_trace__feedback *f = t->feedback;
     size_t i = isogi_trace__table_find(f, c->key);
@@ -3462,7 +3465,8 @@ static double isogi_trace__mean_variance(double sum, double square, double n) {
     return n > 1 && spread > 0 ? spread / (n * (n - 1)) : 0;
 }
 
-/* Colours by place are those at the texel: which of its own its rays will meet is not known. */
+/* Colours by place are those at the texel: which of its own its rays will meet is not known. Once for all levels: other colours
+   begin with other nodes. */
 static void isogi_trace__guide_colours(const isogi_trace *t, const isogi_trace__node *n, isogi_trace__guide *g) {
     const isogi_trace_desc *d = &t->scene.desc;
     double point[3];
@@ -3483,7 +3487,6 @@ static void isogi_trace__guide_task(void *arg, size_t task) {
         double scale = n->samples ? 1.0 / n->samples : 0, rgb[3] = {0, 0, 0};
         int a;
         memcpy(g->normal, n->normal, sizeof g->normal);
-        isogi_trace__guide_colours(t, n, g);
         for (a = 0; a < t->values; a++)
             set->out[0][i * v + (size_t)a] = (float)(ISOGI_TRACE__PI * scale * (double)set->direct[i * v + (size_t)a] +
                                                       scale * (double)set->bounce[i * v + (size_t)a]);
@@ -3518,18 +3521,17 @@ static double isogi_trace__light_variance(const isogi_trace__node *n) {
 
 /* How much the light of two texels differs because their isosurfaces have other colours: what no sample has to show. */
 static double isogi_trace__other_colours(const isogi_trace *t, const isogi_trace__guide *g, const isogi_trace__guide *q) {
-    static const double weight[3] = {0.2126, 0.7152, 0.0722};
     const isogi_trace_desc *d = &t->scene.desc;
-    double hidden = ((double)g->hidden + (double)q->hidden) / 2, most = 0, glow = 0, albedo = 0;
+    double hidden = ((double)g->hidden + (double)q->hidden) / 2, most, glow[3], albedo[3];
     int a;
     if (!d->albedo_count && !d->emission_count && !d->material) return 0;
     for (a = 0; a < 3; a++) {
         double larger = (double)(g->albedo[a] > q->albedo[a] ? g->albedo[a] : q->albedo[a]);
-        glow += weight[a] * fabs((double)g->glow[a] - (double)q->glow[a]);
-        if (larger > 0) albedo += weight[a] * fabs((double)g->albedo[a] - (double)q->albedo[a]) / larger;
+        glow[a] = fabs((double)g->glow[a] - (double)q->glow[a]);
+        albedo[a] = larger > 0 ? fabs((double)g->albedo[a] - (double)q->albedo[a]) / larger : 0;
     }
     most = (double)(g->reflected > q->reflected ? g->reflected : q->reflected);
-    return ISOGI_TRACE__PI * hidden * glow + most * albedo;
+    return ISOGI_TRACE__PI * hidden * isogi_trace__luminance(glow) + most * isogi_trace__luminance(albedo);
 }
 
 /* Mean over the texels around that face the same way and whose light may be the same within its noise. Writes the filtered rgb, its
@@ -3640,6 +3642,7 @@ static void isogi_trace__place_task(void *arg, size_t task) {
             memcpy(n->normal, site.normal, sizeof n->normal);
         }
         isogi_trace_albedo(&t->scene.desc, n->isovalue, n->albedo);
+        if (t->scene.desc.mode == ISOGI_TRACE_IRRADIANCE) isogi_trace__guide_colours(t, n, &t->feedback->texels.guide[job->first + i]);
     }
 }
 

@@ -428,6 +428,44 @@ TEST(same_bits_for_any_threads_budget_and_lazily) {
     scene_free(&s);
 }
 
+static double clamped_ball(const double p[3], const double *q) { return fmax(-1, fmin(1, ball(p, q))); }
+
+/* A point inside a cell, then a corner of the cell that has no surface around it, in one request: the corner reads another texel, the
+   nearest that has one, which no lookup inside the cell asked for. */
+TEST(requests_on_faces_follow_those_inside) {
+    double q[4] = {11.5, 11.5, 11.5, 8.3};
+    scene s = scene_make(24, 24, 24, NULL, clamped_ball, q);
+    isogi_trace_lookup lookup[2] = {ISOGI_TRACE_TRILINEAR, ISOGI_TRACE_BSPLINE};
+    for (int l = 0; l < 2; l++) {
+        isogi_trace_desc d = desc_make(&s, 0, 0, 4);
+        isogi_trace *whole = NULL, *t = NULL;
+        size_t x[3];
+        int tried = 0, apart = 0;
+        d.lookup = lookup[l];
+        isogi_trace_create(&whole, &d, NULL), isogi_trace_step(whole, 0, NULL);
+        d.lazy = 1;
+        for (size_t i = 0; i < 24 * 24 * 24; i += 5) {
+            float point[2][3], e[3], expected[3];
+            int have = 0;
+            x[0] = i % 24, x[1] = i / 24 % 24, x[2] = i / 576;
+            for (int k = 0; k < 8; k++) {
+                size_t texel[3] = {x[0] + (size_t)(k & 1), x[1] + (size_t)(k >> 1 & 1), x[2] + (size_t)(k >> 2)};
+                have |= isogi_trace_valid(whole, texel) << k;
+            }
+            if (!have || (have & 1)) continue;
+            for (int a = 0; a < 3; a++) point[1][a] = (float)x[a], point[0][a] = (float)x[a] + 0.5f;
+            isogi_trace_create(&t, &d, NULL), isogi_trace_request(t, (const float(*)[3])point, 2), isogi_trace_step(t, 0, NULL);
+            isogi_trace_sample(t, (const float(*)[3])&point[1], 1, &e, NULL);
+            isogi_trace_sample(whole, (const float(*)[3])&point[1], 1, &expected, NULL);
+            tried++, apart += memcmp(e, expected, sizeof e) != 0;
+            isogi_trace_free(t);
+        }
+        CHECK(tried > 50 && !apart, "lookup %d: %d of %d corners differ from the full bake", l, apart, tried);
+        isogi_trace_free(whole);
+    }
+    scene_free(&s);
+}
+
 /* Another seed is another estimate; the same seed the same, in gather as well. */
 TEST(seed_decides) {
     double q[5] = {10, 9, 10, 13, 6};

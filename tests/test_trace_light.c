@@ -153,6 +153,38 @@ static void red_and_green(void *user, double isovalue, const double p[3], float 
     if (q->wild) albedo[2] = (float)nan_value(), albedo[0] *= 100, emission[1] = -5, emission[2] = (float)nan_value();
 }
 
+static void counted(void *user, double isovalue, const double p[3], float albedo[3], float emission[3]) {
+    (void)isovalue, (void)p, (void)albedo, (void)emission;
+    ++*(long *)user;
+}
+
+/* The colours of a texel and of a probe do not change: as many questions after three levels of samples as there are places. One for
+   each probe, and for texels of irradiance one, and (for its glow) one for each ray that hits; about a ball, whose rays all
+   escape, that is one for each texel. */
+TEST(colours_are_asked_for_once) {
+    double q[4] = {8, 8, 8, 5};
+    scene s = scene_make(17, 17, 17, NULL, ball, q);
+    isogi_context serial;
+    float points[40][3];
+    int n = surface_points(&s, 0, 40, 3, points);
+    memset(&serial, 0, sizeof serial), serial.threads = 1;
+    for (int mode = 0; mode < 2; mode++) {
+        isogi_trace_desc d = desc_make(&s, 0.5f, 2, 84);
+        isogi_trace *t = NULL;
+        isogi_trace_report report;
+        long calls = 0;
+        d.method = ISOGI_TRACE_FEEDBACK, d.mode = (isogi_trace_mode)mode, d.order = 2, d.lazy = 1, d.normals = ISOGI_NORMAL_TRILINEAR;
+        d.material = counted, d.material_user = &calls;
+        CHECK(isogi_trace_create(&t, &d, &serial) == ISOGI_OK, "create");
+        calls = 0;
+        isogi_trace_request(t, (const float(*)[3])points, (size_t)n), isogi_trace_step(t, 0, NULL), isogi_trace_status(t, &report);
+        printf("    mode %d: %ld questions, %g texels, %g probes\n", mode, calls, (double)report.texels, (double)report.probes);
+        CHECK(report.texels > 50 && calls <= (long)report.probes + (mode ? 0 : (long)report.texels), "%ld questions, %g texels, %g probes", calls, (double)report.texels, (double)report.probes);
+        isogi_trace_free(t);
+    }
+    scene_free(&s);
+}
+
 /* The pit's light takes the colour of the wall opposite: near the red wall more green arrives by reflection, and the other way
    round (a little: from the wall of a sphere all its parts look equally large, only their light differs); the mean of both walls is the same by symmetry. The colours of tables and callback are those of isogi_trace_material. */
 TEST(colour_bleeds) {
