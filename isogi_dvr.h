@@ -126,8 +126,11 @@
    Memory, threads, determinism
 
    The pyramid (and the voxels below it) is borrowed and must outlive the renderer; description, context and transfer function are
-   copied (not what they point to: the second field and its points are borrowed). Visibility takes grid points * order^2 floats; empty blocks one byte for each block of the pyramid; a picture in work
-   20 bytes a pixel; exact rays 150 bytes a point of the transfer function, pre-integrated ones 16 table^2. All of it comes from the context's allocator; where that fails the call says so and changes nothing.
+   copied (not what they point to: the second field and its points are borrowed). Visibility takes grid points * order^2 floats; sweeps
+   as many again, two floats for each node of their lattice, and during a step, for each of up to 16 directions, a float for each grid
+   point and about 6 m (m + 24) of scratch for m nodes on the longest axis. Empty blocks take one byte for each block of the pyramid; a
+   picture in work 20 bytes a pixel; exact rays 150 bytes a point of the transfer function, pre-integrated ones 16 table^2. All of it
+   comes from the context's allocator; where that fails the call says so and changes nothing.
    isogi_dvr_set_transfer and isogi_dvr_step are writers: one at a time, and not during another call with the same renderer. All
    other calls only read and may run at the same time. Calls divide their own work among the context's threads. Results are the
    same bits for any number of threads and however visibility was cut into steps.
@@ -1698,11 +1701,11 @@ static void isogi_dvr__gather(const isogi_dvr__sums *a) {
         }                                                                                                                           \
     }                                                                                                                               \
     static void isogi_dvr__set_kernels##SUFFIX(isogi_dvr__kernels *k) {                                                             \
-        k->pass = isogi_dvr__pass##SUFFIX, k->pass_out = isogi_dvr__pass_out##SUFFIX, k->between = isogi_dvr__between##SUFFIX;  \
-        k->exp_row = isogi_dvr__exp_row##SUFFIX, k->gather = isogi_dvr__gather##SUFFIX;                                               \
+        k->pass = isogi_dvr__pass##SUFFIX, k->pass_out = isogi_dvr__pass_out##SUFFIX, k->between = isogi_dvr__between##SUFFIX;      \
+        k->exp_row = isogi_dvr__exp_row##SUFFIX, k->gather = isogi_dvr__gather##SUFFIX;                                             \
     }
 /* Of the wide path only: in narrower vectors conversions and comparisons go lane by lane, and are no faster than plain code. */
-#define ISOGI_DVR__LEAP_KERNEL(SUFFIX, TARGET) \
+#define ISOGI_DVR__LEAP_KERNEL(SUFFIX, TARGET)                                                                                      \
     TARGET static void isogi_dvr__leap##SUFFIX(const isogi_dvr *d, isogi_dvr__packet *p, isogi_counters *work) {                    \
         const isogi_level *level = &d->level[0];                                                                                    \
         int lane;                                                                                                                   \
@@ -1822,10 +1825,11 @@ static void isogi_dvr__read_row(const isogi_volume *v, size_t first, size_t coun
 
 /* ==== flat blocks of several levels (Kronander 2011, 4.1, after Ljung et al. 2004) =================================== */
 
-/* A block is one of the pyramid's level 1: 16^3 cells. At level n (16, 8, 4, 2 or 1) it is held at (n + 1)^3 nodes, 16 / n voxels apart;
-   at level 0 not at all, and where the volume's border cuts it, at those that surround what is left. It repeats the nodes of its upper faces from its neighbours, so that a sample never leaves its block. Where
-   blocks of different levels meet, the nodes on their common face (edge, corner) take what the coarsest of them has there, between its
-   nodes too: both sides then interpolate the same function, and there is no seam. Blocks are therefore finished from coarse to fine. */
+/* A block is one of the pyramid's level 1: 16^3 cells. At level n (16, 8, 4, 2 or 1) it is held at (n + 1)^3 nodes, 16 / n voxels apart,
+   or where the volume's border cuts it, at those of them that surround what is left; at level 0 it is not held. It repeats the nodes of
+   its upper faces from its neighbours, so that a sample never leaves its block. Where blocks of different levels meet, the nodes on
+   their common face (edge, corner) take what the coarsest of them has there, between its nodes too: both sides then interpolate the
+   same function, and there is no seam. Blocks are therefore finished from coarse to fine. */
 
 /* Averages of the data on coarser lattices: nodes 2^step voxels apart, over the blocks' whole extent; each is the last one halved
    with weights 1/4, 1/2, 1/4, which keeps linear fields. At the border the field goes on by reflection in its last value. */
@@ -3109,8 +3113,8 @@ static uint8_t isogi_dvr__fair_level(const isogi_dvr__blocks *b, size_t block) {
 }
 
 /* Levels of all blocks: transparent ones are dropped, the others begin with one point each. Those that the border cuts thin take what
-   they should have, in their order; then blocks are raised by largest significance for its cost, taken to halve with each level, until
-   the budget of voxels / reduction points is spent. */
+   they should have, in their order; then blocks are raised by largest significance for its cost until the budget of voxels / reduction
+   points is spent. Significance is taken to halve with each raise and points to grow eightfold, from the level that a block began with. */
 static isogi_result isogi_dvr__select_levels(isogi_dvr *d, uint8_t *level) {
     const isogi_dvr__blocks *b = &d->blocks;
     isogi_dvr__raise *heap = (isogi_dvr__raise *)isogi_allocate(&d->context, b->total, sizeof *heap);
@@ -3213,7 +3217,7 @@ static void isogi_dvr__node_position(const isogi_dvr__blocks *b, size_t block, s
 
 /* ---- data in its blocks ---- */
 
-/* The data that the blocks hold, interpolated; what is not held (or not finite) is the lowest value, and `held` 0. */
+/* The data that the blocks hold, interpolated; what is not held is the lowest value. */
 static float isogi_dvr__block_value(const isogi_dvr *d, size_t block, const double position[3]) {
     const isogi_dvr__blocks *b = &d->blocks;
     size_t n = b->level[block], base, corner[8], k;
@@ -4035,7 +4039,7 @@ ISOGI_API isogi_result isogi_dvr_inspect(const isogi_dvr *dvr, isogi_dvr_report 
             a = 0;
             while (b->level[i] >> a) a++;
             r.level_count[a]++;
-            r.points += b->level[i] ? isogi_dvr__level_points(b, i, b->level[i]) : 0;
+            r.points += isogi_dvr__level_points(b, i, b->level[i]);
         }
         if (r.points) r.reduction = (double)dvr->volume.size[0] * (double)dvr->volume.size[1] * (double)dvr->volume.size[2] / (double)r.points;
         r.data_bytes = b->data_count * sizeof *b->data, r.local_bytes = b->sh_count * dvr->coefficients * sizeof *b->sh;
