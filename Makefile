@@ -5,7 +5,8 @@
 # make test      the quick tests, under two minutes; ends with "N passed, N failed, N skipped"
 # make check     the long suite: full sizes, every compiler, sanitizer and emulator that is installed
 # make bench     run time against error: build/bench/*.csv and *.svg      (ONLY=sh|vol|trace|dvr|visibility QUICK=1)
-# make bench-peers   rays beside Embree 3, on this machine, where <embree3/rtcore.h> is (libembree-dev)
+# make bench-peers   rays beside Embree 3, on this machine, where <embree3/rtcore.h> is (libembree-dev), and evaluation of harmonics
+#                    beside sphericart's, where SPHERICART names a folder with its include/ and lib/libsphericart.so
 # make clean
 # CC, CXX and CFLAGS may be set; nothing but a C compiler and make is needed.
 
@@ -27,7 +28,9 @@ PROCESSORS := $(shell getconf _NPROCESSORS_ONLN 2>/dev/null || echo 2)
 PARALLEL    = $(if $(findstring -j,$(MAKEFLAGS)),,-j$(PROCESSORS))
 QUIET_MAKE  = $(MAKE) --no-print-directory $(PARALLEL)
 
-export CC CXX CFLAGS
+export CC CXX CFLAGS SPHERICART
+
+comma := ,
 
 all: $(EXAMPLES)
 
@@ -62,6 +65,9 @@ build/tests/%: tests/%.c build/flags $(OBJECTS)
 
 build/bench/%: tests/bench/%.c build/flags $(OBJECTS)
 	$(call COMPILE,-Itests,$(HEADERS))
+
+build/bench/peer_sphericart: tests/bench/peer_sphericart.c build/flags $(OBJECTS)
+	$(call COMPILE,-isystem "$(SPHERICART)/include" "-L$(SPHERICART)/lib" "-Wl$(comma)-rpath$(comma)$(SPHERICART)/lib",$(HEADERS))
 
 # Changes only when the compiler or its flags do, so that another CC builds everything anew.
 build/flags: FORCE
@@ -108,6 +114,9 @@ bench-peers: build/flags
 	@if echo '#include <embree3/rtcore.h>' | $(CC) -E - > build/bench/peers.log 2>&1; then \
 		$(QUIET_MAKE) build/bench/peer_embree && build/bench/peer_embree; \
 	else echo "bench-peers: <embree3/rtcore.h> is not there (libembree-dev): nothing to compare with"; fi
+	@if [ -f "$(SPHERICART)/include/sphericart.h" ]; then \
+		$(QUIET_MAKE) build/bench/peer_sphericart && OMP_NUM_THREADS=1 build/bench/peer_sphericart; \
+	else echo "bench-peers: SPHERICART names no folder with include/sphericart.h: nothing to compare with"; fi
 
 clean:
 	rm -rf build
