@@ -43,11 +43,11 @@ int main(void) {
         sphericart_spherical_harmonics_calculator_f_t *peer = sphericart_spherical_harmonics_new_f((size_t)orders[o] - 1);
         double best[3] = {1, 1, 1}, difference = 0;
         if (!peer) return fprintf(stderr, "sphericart makes no calculator\n"), 1;
-        for (int run = 0; run < 3000; run++)
+        for (int run = 0; run < 500; run++)
             for (int way = 0; way < 3; way++) {
                 double begun = cpu_seconds(), taken;
-                for (int i = 0; i < 8; i++) evaluate(way, orders[o], counts[o], peer);
-                taken = (cpu_seconds() - begun) / (8 * (double)counts[o]);
+                for (int i = 0; i < 64; i++) evaluate(way, orders[o], counts[o], peer);
+                taken = (cpu_seconds() - begun) / (64 * (double)counts[o]);
                 if (taken < best[way]) best[way] = taken;
             }
         evaluate(1, orders[o], counts[o], peer);
