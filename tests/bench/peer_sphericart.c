@@ -15,7 +15,7 @@
 #include <time.h>
 
 enum { COUNT = 128, ORDER = 21 };
-static float directions[COUNT][3], soa[3][COUNT], ours[ORDER * ORDER * COUNT], theirs[ORDER * ORDER * COUNT];
+static __attribute__((aligned(64))) float directions[COUNT][3], soa[3][COUNT], ours[ORDER * ORDER * COUNT], theirs[ORDER * ORDER * COUNT];
 
 static double cpu_seconds(void) {
     struct timespec t;
