@@ -1509,27 +1509,32 @@ struct isogi_vol__ways {
     uint8_t child[8][64], voxel[8][128]; /* children of nodes and voxels of leaves with axes counted backwards: bit a of the index */
 };
 
-ISOGI_VOL__COLD static void isogi_vol__set_ways(struct isogi_vol__ways *ways) {
-    uint64_t below[3][4];
+/* What is left of 64 children for every choice of nine bits, each of which leaves some if it is 0, others if it is 1. */
+static void isogi_vol__set_orders(uint64_t table[ISOGI_VOL__ORDERS], uint64_t (*leaves)[2]) {
+    int bit, i;
+    table[0] = ~(uint64_t)0;
+    for (bit = 0; bit < 9; bit++)
+        for (i = 0; i < 1 << bit; i++) table[i + (1 << bit)] = table[i] & leaves[bit][1], table[i] &= leaves[bit][0];
+}
+
+static void isogi_vol__set_ways(struct isogi_vol__ways *ways) {
+    uint64_t below[3][4], leaves[9][2];
     int i, f, a, b;
     for (a = 1; a < 4; a++) {
         below[0][a] = 0x1111111111111111u * (uint64_t)((1 << a) - 1), below[1][a] = 0x0001000100010001u * (uint64_t)((1 << 4 * a) - 1);
         below[2][a] = ((uint64_t)1 << 16 * a) - 1;
     }
-    for (i = 0; i < ISOGI_VOL__ORDERS; i++) {
-        ways->entered[i] = ways->left[i] = ~(uint64_t)0;
-        for (f = 0; f < 3; f++) {
-            const int g = (f + 1) % 3;
-            uint64_t met = ~(uint64_t)0;
-            for (a = 1; a < 4; a++) {
-                if (i >> (3 * f + a - 1) & 1) ways->entered[i] &= ~below[f][a];
-                else ways->left[i] &= below[f][a];
-                /* not on the near side of the plane that comes first and on the far side of the other */
-                for (b = 1; b < 4; b++) met &= i >> (3 * (a - 1) + b - 1) & 1 ? ~below[f][a] | below[g][b] : below[f][a] | ~below[g][b];
-            }
-            ways->before[f][i] = met;
-        }
+    for (f = 0; f < 3; f++) {
+        const uint64_t *first = below[f], *second = below[(f + 1) % 3];
+        /* not on the near side of the plane that comes first and on the far side of the other */
+        for (a = 1; a < 4; a++)
+            for (b = 1; b < 4; b++) leaves[3 * a + b - 4][0] = first[a] | ~second[b], leaves[3 * a + b - 4][1] = ~first[a] | second[b];
+        isogi_vol__set_orders(ways->before[f], leaves);
     }
+    for (i = 0; i < 9; i++) leaves[i][0] = ~(uint64_t)0, leaves[i][1] = ~below[i / 3][i % 3 + 1];
+    isogi_vol__set_orders(ways->entered, leaves);
+    for (i = 0; i < 9; i++) leaves[i][0] = below[i / 3][i % 3 + 1], leaves[i][1] = ~(uint64_t)0;
+    isogi_vol__set_orders(ways->left, leaves);
     memset(ways->voxel, 0, sizeof ways->voxel);
     for (f = 0; f < 8; f++) {
         const int x = f & 1, y = f >> 1 & 1, z = f >> 2;
