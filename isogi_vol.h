@@ -2249,7 +2249,7 @@ ISOGI_VOL__INLINE const char *isogi_vol__first_tap(const isogi_volume *v, ptrdif
         }                                                                                                                        \
     }
 
-/* The 64 taps of a point from integers, which become floats first so that the filters need but one form. */
+/* The 64 taps of a point side by side as floats, so that the filters need but one form. */
 #define ISOGI_VOL__WIDEN_ROWS(L, ROW)                                                                                            \
     for (; out < end; p += v->stride[2] - 4 * v->stride[1])                                                                      \
         for (y = 0; y < 4; y++, p += v->stride[1], out += 4) L##storeu_ps(out, ROW(p));                                          \
@@ -2263,7 +2263,7 @@ ISOGI_VOL__INLINE const char *isogi_vol__first_tap(const isogi_volume *v, ptrdif
         case ISOGI_I8: ISOGI_VOL__WIDEN_ROWS(L, ISOGI_VOL__I8_##NAME);                                                           \
         case ISOGI_U16: ISOGI_VOL__WIDEN_ROWS(L, ISOGI_VOL__U16_##NAME);                                                         \
         case ISOGI_I16: ISOGI_VOL__WIDEN_ROWS(L, ISOGI_VOL__I16_##NAME);                                                         \
-        case ISOGI_F32:                                                                                                          \
+        case ISOGI_F32: ISOGI_VOL__WIDEN_ROWS(L, ISOGI_VOL__F32_##NAME);                                                         \
         case ISOGI_F64: break;                                                                                                   \
         }                                                                                                                        \
     }
@@ -2292,7 +2292,8 @@ ISOGI_VOL__INLINE __m128i isogi_vol__four_bytes(const char *p) {
 #define ISOGI_VOL__I8_base(p) _mm_cvtepi32_ps(_mm_srai_epi32(ISOGI_VOL__BYTES(p), 24))
 #define ISOGI_VOL__U16_base(p) _mm_cvtepi32_ps(_mm_srli_epi32(ISOGI_VOL__SHORTS(p), 16))
 #define ISOGI_VOL__I16_base(p) _mm_cvtepi32_ps(_mm_srai_epi32(ISOGI_VOL__SHORTS(p), 16))
-#define ISOGI_VOL__FLOATS(p, i) _mm_loadu_ps((const float *)(const void *)((p) + q[i]))
+#define ISOGI_VOL__F32_base(p) _mm_loadu_ps((const float *)(const void *)(p))
+#define ISOGI_VOL__FLOATS(p, i) ISOGI_VOL__F32_base((p) + q[i])
 #define ISOGI_VOL__ROW_base(p) ISOGI_VOL__FLOATS(p, 0)
 ISOGI_VOL__TRILINEAR(base, , __m128, _mm_)
 ISOGI_VOL__TRILINEAR_BLOCK(base, , __m128, _mm_, 4)
@@ -2313,6 +2314,7 @@ ISOGI_VOL__CUBIC(base, , __m128, _mm_, 4)
 #define ISOGI_VOL__I8_avx2(p) _mm_cvtepi32_ps(_mm_cvtepi8_epi32(isogi_vol__four_bytes(p)))
 #define ISOGI_VOL__U16_avx2(p) _mm_cvtepi32_ps(_mm_cvtepu16_epi32(ISOGI_VOL__EIGHT(p)))
 #define ISOGI_VOL__I16_avx2(p) _mm_cvtepi32_ps(_mm_cvtepi16_epi32(ISOGI_VOL__EIGHT(p)))
+#define ISOGI_VOL__F32_avx2(p) ISOGI_VOL__F32_base(p)
 ISOGI_VOL__TRILINEAR(avx2, ISOGI_VOL__AVX2, __m256, _mm256_)
 ISOGI_VOL__TRILINEAR_BLOCK(avx2, ISOGI_VOL__AVX2, __m256, _mm256_, 8)
 ISOGI_VOL__WIDEN(avx2, ISOGI_VOL__AVX2, _mm_)
@@ -2330,6 +2332,28 @@ ISOGI_VOL__CUBIC(avx2, ISOGI_VOL__AVX2, __m256, _mm256_, 8)
                                           ISOGI_VOL__FLOATS(p, 2), 2), ISOGI_VOL__FLOATS(p, 3), 3)
 ISOGI_VOL__TRILINEAR(avx512, ISOGI_VOL__AVX512, __m512, _mm512_)
 ISOGI_VOL__CUBIC(avx512, ISOGI_VOL__AVX512, __m512, _mm512_, 16)
+
+/* The 64 taps of a point, eight rows to a gather. */
+ISOGI_VOL__AVX512 static void isogi_vol__widen_avx512(const isogi_volume *v, const char *p, float *out) {
+    const __m512i up = _mm512_setr_epi64(0, 1, 2, 3, 0, 1, 2, 3), behind = _mm512_setr_epi64(0, 0, 0, 0, 1, 1, 1, 1);
+    const __m512i rows = _mm512_add_epi64(_mm512_mullo_epi64(up, _mm512_set1_epi64(v->stride[1])), _mm512_mullo_epi64(behind, _mm512_set1_epi64(v->stride[2])));
+    int k;
+#define ISOGI_VOL__SLICES(T, GATHER, HALF, WIDEN, FIRST)                                                                                 \
+    do {                                                                                                                                   \
+        const T two = GATHER(rows, (const void *)p, 1);                                                                                    \
+        _mm512_storeu_ps(out, _mm512_cvtepi32_ps(WIDEN(FIRST(two)))), _mm512_storeu_ps(out + 16, _mm512_cvtepi32_ps(WIDEN(HALF(two, 1)))); \
+    } while (0)
+    for (k = 0; k < 2; k++, p += 2 * v->stride[2], out += 32)
+        switch (v->type) {
+        case ISOGI_U8: ISOGI_VOL__SLICES(__m256i, _mm512_i64gather_epi32, _mm256_extracti128_si256, _mm512_cvtepu8_epi32, _mm256_castsi256_si128); break;
+        case ISOGI_I8: ISOGI_VOL__SLICES(__m256i, _mm512_i64gather_epi32, _mm256_extracti128_si256, _mm512_cvtepi8_epi32, _mm256_castsi256_si128); break;
+        case ISOGI_U16: ISOGI_VOL__SLICES(__m512i, _mm512_i64gather_epi64, _mm512_extracti64x4_epi64, _mm512_cvtepu16_epi32, _mm512_castsi512_si256); break;
+        case ISOGI_I16: ISOGI_VOL__SLICES(__m512i, _mm512_i64gather_epi64, _mm512_extracti64x4_epi64, _mm512_cvtepi16_epi32, _mm512_castsi512_si256); break;
+        case ISOGI_F32:
+        case ISOGI_F64: break;
+        }
+#undef ISOGI_VOL__SLICES
+}
 
 /* Corners by gathers, which are quick where AVX-512 is: neighbours along x come as one number. Of bytes, two more come with them; where these would
    lie behind the volume, what comes begins earlier and is shifted. */
@@ -2403,7 +2427,8 @@ ISOGI_VOL__INLINE uint16x4_t isogi_vol__four_shorts(const char *p) {
 #define ISOGI_VOL__I8_base(p) vcvtq_f32_s32(vmovl_s16(vget_low_s16(vmovl_s8(vreinterpret_s8_u8(isogi_vol__four_bytes(p))))))
 #define ISOGI_VOL__U16_base(p) vcvtq_f32_u32(vmovl_u16(isogi_vol__four_shorts(p)))
 #define ISOGI_VOL__I16_base(p) vcvtq_f32_s32(vmovl_s16(vreinterpret_s16_u16(isogi_vol__four_shorts(p))))
-#define ISOGI_VOL__ROW_base(p) vld1q_f32((const float *)(const void *)((p) + q[0]))
+#define ISOGI_VOL__F32_base(p) vld1q_f32((const float *)(const void *)(p))
+#define ISOGI_VOL__ROW_base(p) ISOGI_VOL__F32_base((p) + q[0])
 ISOGI_VOL__TRILINEAR(base, , float32x4_t, isogi_vol__neon_)
 ISOGI_VOL__TRILINEAR_BLOCK(base, , float32x4_t, isogi_vol__neon_, 4)
 ISOGI_VOL__WIDEN(base, , isogi_vol__neon_)
@@ -2445,55 +2470,62 @@ static void isogi_vol__cubic_points(const isogi_pyramid *p, const isogi_vol__tap
     (void)p;
 }
 
-/* Sixteen points at a time become floats. n: up to a multiple of four, offsets are there. */
-static void isogi_vol__cubic_integers(const isogi_pyramid *p, isogi_vol__taps_at *taps, isogi_vol__block *b, int n) {
-    float some[16][64];
-    ptrdiff_t offset[16];
-    int i, k;
-    for (k = 0; k < 16; k++) offset[k] = k * (ptrdiff_t)sizeof some[0];
-    taps->first = (const char *)(const void *)some, taps->offset = offset, taps->y = 4 * sizeof(float), taps->z = 16 * sizeof(float);
-    for (i = 0; i < n; i += 16) {
-        const int end = i + 16 < n ? i + 16 : n;
-        for (k = i; k < ((end + 3) & ~3); k++) {
-            const char *first = isogi_vol__first_tap(&p->volume, b->offset[k]);
+/* The 64 taps of point i side by side. At the border they are those of the nearest inner cell, moved by one along each axis concerned; what is
+   missing then continues linearly. */
+static void isogi_vol__copy_taps(const isogi_pyramid *p, const isogi_vol__block *b, int i, const int32_t low[3], const int32_t high[3], float taps[64]) {
+    const isogi_volume *v = &p->volume;
+    ptrdiff_t offset = b->offset[i];
+    int move[3], a, k;
+    for (a = 0; a < 3; a++) {
+        move[a] = (b->cell[a][i] >= high[a]) - (b->cell[a][i] < low[a]);
+        offset -= move[a] * v->stride[a];
+    }
 #ifdef ISOGI_VOL__AVX
-            if (p->path >= ISOGI_VOL__PATH_AVX2) {
-                isogi_vol__widen_avx2(&p->volume, first, some[k - i]);
-                continue;
-            }
+    if (p->path >= ISOGI_VOL__PATH_AVX512 && v->type != ISOGI_F32) isogi_vol__widen_avx512(v, isogi_vol__first_tap(v, offset), taps);
+    else if (p->path >= ISOGI_VOL__PATH_AVX2) isogi_vol__widen_avx2(v, isogi_vol__first_tap(v, offset), taps);
+    else
 #endif
-            isogi_vol__widen_base(&p->volume, first, some[k - i]);
+        isogi_vol__widen_base(v, isogi_vol__first_tap(v, offset), taps);
+    for (a = 0; a < 3; a++) {
+        const int step = move[a] * (1 << 2 * a); /* from tap to tap, away from the border for those that move down */
+        for (k = 0; k < 16 && step; k++) {
+            float *t = taps + (a == 0 ? 4 * k : a == 1 ? 16 * (k / 4) + k % 4 : k) + (step < 0 ? -3 * step : 0);
+            t[0] = t[step], t[step] = t[2 * step], t[2 * step] = t[3 * step];
+            t[3 * step] = t[2 * step] + (t[2 * step] - t[step]);
         }
-        isogi_vol__cubic_points(p, taps, b, i, end);
     }
 }
 
-/* Raw values and gradients of those points of a block all of whose taps exist. Returns how many others there are; if any, outer[i] marks them. */
-static int isogi_vol__cubic_block(const isogi_pyramid *p, isogi_filter filter, isogi_vol__block *b, int n, uint8_t outer[ISOGI_VOL__BLOCK]) {
+/* Raw values and gradients of a block. Floats are taken where they lie; integers, and points at the border, are copied first. */
+static void isogi_vol__cubic_block(const isogi_pyramid *p, isogi_filter filter, isogi_vol__block *b, int n) {
     const isogi_volume *v = &p->volume;
     const double(*c)[4] = isogi_vol__taps[filter == ISOGI_FILTER_CATMULL_ROM];
     isogi_vol__taps_at taps;
-    int32_t low[3], high[3], beyond = 0;
-    int i, a, count = 0;
+    float room[17 * 64], *some = room + (64 - (uintptr_t)room % 64) % 64 / sizeof *room; /* aligned for what is stored into it */
+    ptrdiff_t offset[16];
+    int32_t low[3], high[3];
+    int i, k, a;
     memset(&taps, 0, sizeof taps);
-    for (i = 0; i < 16; i++) taps.powers[i / 4][i % 4] = (float)c[i / 4][i % 4];
+    for (i = 0; i < 16; i++) taps.powers[i / 4][i % 4] = (float)c[i / 4][i % 4], offset[i] = i * 64 * (ptrdiff_t)sizeof *some;
     taps.powers[4][0] = 1;
     isogi_vol__inner_cells(p, low, high);
-    for (i = 0; i < n; i += 16) /* in most blocks there are none: no difference is negative */
-        for (a = 0; a < 16; a++)
-            beyond |= (b->cell[0][i + a] - low[0]) | (b->cell[1][i + a] - low[1]) | (b->cell[2][i + a] - low[2]) | (high[0] - 1 - b->cell[0][i + a]) |
-                      (high[1] - 1 - b->cell[1][i + a]) | (high[2] - 1 - b->cell[2][i + a]);
-    for (i = 0; i < n && beyond < 0; i++) {
-        for (a = 0, outer[i] = 0; a < 3; a++) outer[i] |= b->cell[a][i] < low[a] || b->cell[a][i] >= high[a];
-        if (outer[i]) b->offset[i] = low[0] * v->stride[0] + low[1] * v->stride[1] + low[2] * v->stride[2]; /* whatever comes of it is not used */
-        count += outer[i];
+    for (i = 0; i < n; i += 16) {
+        const int end = i + 16 < n ? i + 16 : n, whole = (end + 3) & ~3;
+        int32_t beyond = v->type == ISOGI_F32 ? 0 : -1;
+        for (k = end; k < i + 16; k++) { /* the last point again */
+            for (a = 0; a < 3; a++) b->cell[a][k] = b->cell[a][end - 1];
+            b->offset[k] = b->offset[end - 1];
+        }
+        for (k = 0; k < 16; k++) /* no difference is negative */
+            beyond |= (b->cell[0][i + k] - low[0]) | (b->cell[1][i + k] - low[1]) | (b->cell[2][i + k] - low[2]) | (high[0] - 1 - b->cell[0][i + k]) |
+                      (high[1] - 1 - b->cell[1][i + k]) | (high[2] - 1 - b->cell[2][i + k]);
+        taps.first = isogi_vol__first_tap(v, 0), taps.offset = b->offset + i, taps.y = v->stride[1], taps.z = v->stride[2];
+        if (beyond < 0) {
+            for (k = i; k < whole; k++) isogi_vol__copy_taps(p, b, k, low, high, some + 64 * (k - i));
+            taps.first = (const char *)(const void *)some, taps.offset = offset, taps.y = 4 * sizeof(float), taps.z = 16 * sizeof(float);
+        }
+        isogi_vol__cubic_points(p, &taps, b, i, end);
     }
-    for (i = n; i % 4; i++) b->offset[i] = b->offset[i - 1];
-    if (v->type == ISOGI_F32) {
-        taps.first = isogi_vol__first_tap(v, 0), taps.offset = b->offset, taps.y = v->stride[1], taps.z = v->stride[2];
-        isogi_vol__cubic_points(p, &taps, b, 0, n);
-    } else isogi_vol__cubic_integers(p, &taps, b, n);
-    return count;
 }
 
 static void isogi_vol__trilinear_block(const isogi_pyramid *p, isogi_vol__block *b, int n, int gradients) {
@@ -2588,12 +2620,11 @@ static void isogi_vol__sample_block(const isogi_pyramid *p, isogi_filter filter,
                                     float (*gradients)[3]) {
     const double scale = p->volume.scale, bias = p->volume.bias;
     isogi_vol__block b;
-    uint8_t outer[ISOGI_VOL__BLOCK];
     double m[9];
-    int i, outer_count = 0;
+    int i;
     isogi_vol__locate_block(p, at, first, n, &b);
     if (filter == ISOGI_FILTER_LINEAR) isogi_vol__trilinear_block(p, &b, n, gradients != NULL);
-    else outer_count = isogi_vol__cubic_block(p, filter, &b, n, outer);
+    else isogi_vol__cubic_block(p, filter, &b, n);
     for (i = 0; i < 9; i++) m[i] = scale * p->to_grid[i];
     if (filter == ISOGI_FILTER_LINEAR) {
         if (values && scale >= 1 && scale <= 1 && bias >= 0 && bias <= 0) memcpy(values, b.value, (size_t)n * sizeof *values);
@@ -2609,12 +2640,6 @@ static void isogi_vol__sample_block(const isogi_pyramid *p, isogi_filter filter,
             if (values) values[i] = (float)(scale * (double)b.sum[4 * i] + bias);
             if (gradients) isogi_vol__gradient_out(m, b.sum[4 * i + 1], b.sum[4 * i + 2], b.sum[4 * i + 3], gradients[i]);
         }
-    for (i = 0; i < n && outer_count; i++) {
-        double grid[3];
-        if (!outer[i]) continue;
-        isogi_vol__grid_point(p, at, first + (size_t)i, grid);
-        isogi_vol__sample_one(p, filter, grid, values ? values + i : NULL, gradients ? gradients[i] : NULL);
-    }
 }
 #endif
 
