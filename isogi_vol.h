@@ -2760,8 +2760,11 @@ ISOGI_API isogi_result isogi_vol_prefilter(const isogi_volume *volume, float *co
    corners: the cubic lies in their hull, so equal signs mean no root, and rounding errors stay within a few ulp of the corners. */
 typedef struct isogi_vol__cubic { double b[4]; } isogi_vol__cubic;
 
+/* What code for AVX calls is inlined there: compiled for SSE it would cost hundreds of cycles at each change between the two, since
+   compilers that see all of a function may call it without clearing the registers' upper halves. */
+
 /* Only signs and ratios matter from here on: values whose squares leave the range of double are brought back into it. */
-static void isogi_vol__cubic_rescale(isogi_vol__cubic *cubic) {
+ISOGI_VOL__INLINE void isogi_vol__cubic_rescale(isogi_vol__cubic *cubic) {
     double most = 0;
     int i;
     for (i = 0; i < 4; i++) most = isogi_vol__max(most, fabs(cubic->b[i]));
@@ -2825,14 +2828,14 @@ static void isogi_vol__cubic_set(isogi_vol__cubic *cubic, const double c[8], con
 }
 #endif
 
-static double isogi_vol__cubic_at(const isogi_vol__cubic *cubic, double s) {
+ISOGI_VOL__INLINE double isogi_vol__cubic_at(const isogi_vol__cubic *cubic, double s) {
     const double *b = cubic->b;
     double p = isogi_vol__lerp(b[0], b[1], s), q = isogi_vol__lerp(b[1], b[2], s), r = isogi_vol__lerp(b[2], b[3], s);
     return isogi_vol__lerp(isogi_vol__lerp(p, q, s), isogi_vol__lerp(q, r, s), s);
 }
 
 /* Real roots of a + b s + c s^2, ascending, by the formula that does not cancel; their number. A vanishing polynomial has none. */
-static int isogi_vol__quadratic_roots(double a, double b, double c, double root[2]) {
+ISOGI_VOL__INLINE int isogi_vol__quadratic_roots(double a, double b, double c, double root[2]) {
     double discriminant = b * b - 4 * a * c, q;
     int n = 0;
     if (!(discriminant >= 0)) return 0;
@@ -2849,7 +2852,7 @@ static int isogi_vol__quadratic_roots(double a, double b, double c, double root[
 /* The root in [low, high], the only one there, with different sides at its ends: Newton from the secant's root, kept inside a shrinking
    bracket; every third step bisects once Newton has had its chance. The first steps go without the bracket and end when the error
    left, at most |f''| step^2 / (2 |f'|) (Taylor), is below 1e-13; not where the cubic is 0 at an end, which is another root. */
-static double isogi_vol__cubic_refine(const isogi_vol__cubic *cubic, double low, double high, double at_low, double at_high, int rising) {
+ISOGI_VOL__INLINE double isogi_vol__cubic_refine(const isogi_vol__cubic *cubic, double low, double high, double at_low, double at_high, int rising) {
     const double *b = cubic->b;
     const double c1 = 3 * (b[1] - b[0]), c2 = 3 * ((b[0] - b[1]) + (b[2] - b[1])), c3 = (b[3] - b[0]) + 3 * (b[1] - b[2]);
     const double bend = 1e13 * (fabs(c2) + 3 * fabs(c3));
@@ -2875,42 +2878,32 @@ static double isogi_vol__cubic_refine(const isogi_vol__cubic *cubic, double low,
     return s;
 }
 
-/* The same for a cubic that is monotone there, or has no root within: zero at an end is the root itself, so that a layer without
-   thickness in a face is touched in one point, not passed in two. */
-static double isogi_vol__cubic_cross(const isogi_vol__cubic *cubic, double low, double high, double at_low, double at_high, int rising) {
-    if (!(at_high > 0 || at_high < 0)) return high;
-    if (!(at_low > 0 || at_low < 0)) return low;
-    return isogi_vol__cubic_refine(cubic, low, high, at_low, at_high, rising);
-}
-
-/* First place in [0, 1] where inside (value >= 0) differs from `inside` at 0; 0 if there is none. `exact` 0: any bound will do.
-   *end_inside: inside at 1. */
-static int isogi_vol__cubic_first(const isogi_vol__cubic *cubic, int inside, int exact, double *root) {
+/* First place in [0, 1] where inside (value >= 0) differs from `inside` at 0; 0 if there is none. `exact` 0: any bound will do. */
+ISOGI_VOL__INLINE int isogi_vol__cubic_first(const isogi_vol__cubic *cubic, int inside, int exact, double *root) {
     const double *b = cubic->b;
-    double extremum[2], low = 0, at_low = b[0];
-    int n, i;
+    double extremum[2], low = 0, high = 1, at_low = b[0], at_high = b[3];
+    int layer = 1, n, i;
     if ((b[1] >= 0) == inside && (b[2] >= 0) == inside && (b[3] >= 0) == inside) return 0;
     if ((b[3] >= 0) != inside && ((b[1] >= 0) == inside || (b[2] >= 0) != inside)) {
-        /* the control polygon changes sides once: so does the cubic */
-        if (!exact) *root = 1;
-        else if (b[1] > 0 || b[2] > 0) *root = isogi_vol__cubic_refine(cubic, 0, 1, b[0], b[3], !inside);
-        else *root = isogi_vol__cubic_cross(cubic, 0, 1, b[0], b[3], !inside);
-        return 1;
-    }
-    n = isogi_vol__quadratic_roots(b[1] - b[0], 2 * ((b[0] - b[1]) + (b[2] - b[1])), (b[3] - b[0]) + 3 * (b[1] - b[2]), extremum);
-    for (i = 0; i <= n; i++) {
-        double high = i < n ? extremum[i] : 1, at_high;
-        if (!(high > low)) continue;
-        if (high > 1) high = 1;
-        at_high = high < 1 ? isogi_vol__cubic_at(cubic, high) : b[3];
-        if ((at_high >= 0) != inside) {
-            *root = exact ? isogi_vol__cubic_cross(cubic, low, high, at_low, at_high, !inside) : high;
-            return 1;
+        layer = !(b[1] > 0 || b[2] > 0); /* the control polygon changes sides once: so does the cubic */
+    } else {
+        n = isogi_vol__quadratic_roots(b[1] - b[0], 2 * ((b[0] - b[1]) + (b[2] - b[1])), (b[3] - b[0]) + 3 * (b[1] - b[2]), extremum);
+        for (i = 0;; i++) { /* from extremum to extremum */
+            if (i > n) return 0;
+            high = i < n ? extremum[i] : 1;
+            if (!(high > low)) continue;
+            if (high > 1) high = 1;
+            at_high = high < 1 ? isogi_vol__cubic_at(cubic, high) : b[3];
+            if ((at_high >= 0) != inside) break;
+            if (high >= 1) return 0;
+            low = high, at_low = at_high;
         }
-        if (high >= 1) return 0;
-        low = high, at_low = at_high;
     }
-    return 0;
+    /* zero at an end is the root itself: a layer without thickness in a face is touched in one point, not passed in two */
+    if (!exact || (layer && !(at_high > 0 || at_high < 0))) *root = high;
+    else if (layer && !(at_low > 0 || at_low < 0)) *root = low;
+    else *root = isogi_vol__cubic_refine(cubic, low, high, at_low, at_high, !inside);
+    return 1;
 }
 
 /* The same for a segment that begins on the surface: b[0] is 0 up to rounding and is divided out. *inside: the side on which the
@@ -4230,7 +4223,7 @@ static int isogi_vol__seat(isogi_vol__pool *s, int i, const isogi_vol__walk *w) 
 }
 
 /* A cell in doubt, in double; 1: hit. */
-static int isogi_vol__decide(isogi_vol__batch *b, isogi_vol__pool *s, int i, isogi_hit *hit) {
+ISOGI_VOL__TARGET("avx2") static int isogi_vol__decide(isogi_vol__batch *b, isogi_vol__pool *s, int i, isogi_hit *hit) {
     const int64_t cell = s->cell[i];
     const int in = (int)(cell >> 48 & 3), out = (int)(cell >> 50 & 3);
     isogi_vol__walk w;
@@ -4299,8 +4292,8 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE void isogi_vol__corners8(const isogi_pyramid
     const __m512i field = _mm512_set1_epi64(0xffff);
     const __m512i x = _mm512_and_si512(cell, field), y = _mm512_and_si512(_mm512_srli_epi64(cell, 16), field), z = _mm512_and_si512(_mm512_srli_epi64(cell, 32), field);
     int k;
+    const __m512d scale = _mm512_set1_pd(v->scale), bias = _mm512_set1_pd(v->bias);
     if (v->type == ISOGI_F32 && v->stride[0] == 4) {
-        const __m512d scale = _mm512_set1_pd(v->scale), bias = _mm512_set1_pd(v->bias);
         __m512i at = _mm512_add_epi64(_mm512_slli_epi64(x, 2), _mm512_set1_epi64((int64_t)(intptr_t)v->data));
         at = _mm512_add_epi64(at, _mm512_add_epi64(_mm512_mullo_epi64(y, _mm512_set1_epi64(v->stride[1])), _mm512_mullo_epi64(z, _mm512_set1_epi64(v->stride[2]))));
 #pragma GCC unroll 8
@@ -4310,26 +4303,26 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE void isogi_vol__corners8(const isogi_pyramid
             c[2 * k] = _mm512_cvtps_pd(_mm256_castsi256_ps(_mm512_cvtepi64_epi32(pair)));
             c[2 * k + 1] = _mm512_cvtps_pd(_mm256_castsi256_ps(_mm512_cvtepi64_epi32(_mm512_srli_epi64(pair, 32))));
         }
-#pragma GCC unroll 8
-        for (k = 0; k < 8; k++) c[k] = ISOGI_VOL__SUB(ISOGI_VOL__ADD(ISOGI_VOL__MUL(c[k], scale), bias), isovalue);
     } else {
         __attribute__((aligned(64))) double corner[8][8];
         __attribute__((aligned(64))) int64_t at[8];
-        int i;
+        unsigned left;
         memset(corner, 0, sizeof corner);
         _mm512_store_si512(at, cell);
-        for (i = 0; i < 8; i++) {
+        for (left = lanes; left; left &= left - 1) {
+            const int i = __builtin_ctz(left);
+            const char *q = (const char *)v->data + (at[i] & 0xffff) * v->stride[0] + (at[i] >> 16 & 0xffff) * v->stride[1] + (at[i] >> 32 & 0xffff) * v->stride[2];
             double one[8];
-            int xyz[3];
-            if (!(lanes >> i & 1)) continue;
-            xyz[0] = (int)(at[i] & 0xffff), xyz[1] = (int)(at[i] >> 16 & 0xffff), xyz[2] = (int)(at[i] >> 32 & 0xffff);
-            isogi_vol__corners(p, xyz, 0, one);
+            _mm256_storeu_pd(one, isogi_vol__corners4(v, q, v->stride[0], v->stride[1]));
+            _mm256_storeu_pd(one + 4, isogi_vol__corners4(v, q + v->stride[2], v->stride[0], v->stride[1]));
 #pragma GCC unroll 8
             for (k = 0; k < 8; k++) corner[k][i] = one[k];
         }
 #pragma GCC unroll 8
-        for (k = 0; k < 8; k++) c[k] = ISOGI_VOL__SUB(_mm512_load_pd(corner[k]), isovalue);
+        for (k = 0; k < 8; k++) c[k] = _mm512_load_pd(corner[k]);
     }
+#pragma GCC unroll 8
+    for (k = 0; k < 8; k++) c[k] = ISOGI_VOL__SUB(ISOGI_VOL__ADD(ISOGI_VOL__MUL(c[k], scale), bias), isovalue);
 }
 
 ISOGI_VOL__AVX512 static unsigned isogi_vol__decide8(isogi_vol__batch *b, isogi_vol__pool *s, const uint8_t *slots, int count, unsigned *alone) {
