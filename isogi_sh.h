@@ -1257,10 +1257,12 @@ typedef double isogi_sh__d2 __attribute__((vector_size(16), aligned(8), may_alia
 #if defined(__clang__)
 #define ISOGI_SH__HALF_D8(v, k) __builtin_shufflevector(v, v, 4 * k, 4 * k + 1, 4 * k + 2, 4 * k + 3)
 #define ISOGI_SH__JOIN_F8(a, b) __builtin_shufflevector(a, b, 0, 1, 2, 3, 4, 5, 6, 7)
+#define ISOGI_SH__JOIN_HALVES(a, b) __builtin_shufflevector(a, b, 0, 1, 2, 3, 4, 5, 6, 7)
 #define ISOGI_SH__JOIN_F16(a, b, c, d) __builtin_shufflevector(ISOGI_SH__JOIN_F8(a, b), ISOGI_SH__JOIN_F8(c, d), 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15)
 #else
 #define ISOGI_SH__JOIN_F8(a, b) ((isogi_sh__f8)__builtin_ia32_vinsertf128_ps256(__builtin_ia32_ps256_ps(a), b, 1))
 #define ISOGI_SH__HALF_D8(v, k) ((isogi_sh__d4)__builtin_ia32_extractf64x4_mask(v, k, none, ISOGI_SH__ALL8))
+#define ISOGI_SH__JOIN_HALVES(a, b) ((isogi_sh__d8)__builtin_ia32_insertf64x4_mask(__builtin_ia32_pd512_256pd(a), b, 1, __builtin_ia32_pd512_256pd(a), ISOGI_SH__ALL8))
 #define ISOGI_SH__PUT_F16(v, a, k) __builtin_ia32_insertf32x4_mask(v, a, k, v, 0xffff)
 #define ISOGI_SH__JOIN_F16(a, b, c, d)                                                                                        \
     ISOGI_SH__PUT_F16(ISOGI_SH__PUT_F16(ISOGI_SH__PUT_F16(__builtin_ia32_ps512_ps(a), b, 1), c, 2), d, 3)
@@ -1276,6 +1278,7 @@ typedef double isogi_sh__d2 __attribute__((vector_size(16), aligned(8), may_alia
 #define ISOGI_SH__HIGH_F16(a, b) __builtin_shufflevector(a, b, 2, 18, 3, 19, 6, 22, 7, 23, 10, 26, 11, 27, 14, 30, 15, 31)
 #define ISOGI_SH__EVEN_F16(a, b) __builtin_shufflevector(a, b, 0, 1, 16, 17, 4, 5, 20, 21, 8, 9, 24, 25, 12, 13, 28, 29)
 #define ISOGI_SH__ODD_F16(a, b) __builtin_shufflevector(a, b, 2, 3, 18, 19, 6, 7, 22, 23, 10, 11, 26, 27, 14, 15, 30, 31)
+#define ISOGI_SH__JOIN_D8(i, j) ISOGI_SH__JOIN_HALVES(*(const isogi_sh__d4 *)(const void *)(in + pitch * (i)), *(const isogi_sh__d4 *)(const void *)(in + pitch * (j)))
 #define ISOGI_SH__ROWS_F8(j) ISOGI_SH__JOIN_F8(ISOGI_SH__ROW_F4(j), ISOGI_SH__ROW_F4((j) + 4))
 #define ISOGI_SH__ROWS_F16(j) ISOGI_SH__JOIN_F16(ISOGI_SH__ROW_F4(j), ISOGI_SH__ROW_F4((j) + 4), ISOGI_SH__ROW_F4((j) + 8), ISOGI_SH__ROW_F4((j) + 12))
 ISOGI_SH__AVX2 ISOGI_SH__INLINE void isogi_sh__join_f8_turn(float *y, size_t n, const float *in, size_t pitch, size_t i) {
@@ -1381,6 +1384,43 @@ ISOGI_SH__AVX512 ISOGI_SH__INLINE void isogi_sh__eval_d8_turn(double *y, size_t 
     (void)none; /* clang */
 }
 
+/* The same for 16 rows of floats and 8 of doubles from memory, where halves of two rows are joined by an insertion, so that one shuffle
+   is less and whole vectors are stored. */
+ISOGI_SH__AVX512 ISOGI_SH__INLINE void isogi_sh__transpose_f16(float *y, size_t n, const isogi_sh__f16 *row) {
+    const float *in = (const float *)row;
+    size_t half, k, pitch = 16;
+    for (half = 0; half < 2; half++, y += 8 * n, in += 8) {
+        isogi_sh__f16 v[2][4];
+        ISOGI_SH__UNROLL
+        for (k = 0; k < 2; k++) {
+            const isogi_sh__f16 a = (isogi_sh__f16)ISOGI_SH__JOIN_D8(8 * k, 8 * k + 4), b = (isogi_sh__f16)ISOGI_SH__JOIN_D8(8 * k + 1, 8 * k + 5);
+            const isogi_sh__f16 c = (isogi_sh__f16)ISOGI_SH__JOIN_D8(8 * k + 2, 8 * k + 6), d = (isogi_sh__f16)ISOGI_SH__JOIN_D8(8 * k + 3, 8 * k + 7);
+            isogi_sh__f16 e = ISOGI_SH__LOW_F16(a, b), f = ISOGI_SH__HIGH_F16(a, b), g = ISOGI_SH__LOW_F16(c, d), h = ISOGI_SH__HIGH_F16(c, d);
+            v[k][0] = ISOGI_SH__EVEN_F16(e, g), v[k][1] = ISOGI_SH__ODD_F16(e, g), v[k][2] = ISOGI_SH__EVEN_F16(f, h), v[k][3] = ISOGI_SH__ODD_F16(f, h);
+        }
+        ISOGI_SH__UNROLL
+        for (k = 0; k < 4; k++) {
+            isogi_sh__d8 p = (isogi_sh__d8)v[0][k], q = (isogi_sh__d8)v[1][k];
+            *(isogi_sh__f16 *)(y + n * k) = (isogi_sh__f16)__builtin_shufflevector(p, q, 0, 1, 4, 5, 8, 9, 12, 13);
+            *(isogi_sh__f16 *)(y + n * (k + 4)) = (isogi_sh__f16)__builtin_shufflevector(p, q, 2, 3, 6, 7, 10, 11, 14, 15);
+        }
+    }
+}
+
+ISOGI_SH__AVX512 ISOGI_SH__INLINE void isogi_sh__transpose_d8(double *y, size_t n, const isogi_sh__d8 *row) {
+    const double *in = (const double *)row;
+    size_t half, pitch = 8;
+    for (half = 0; half < 2; half++, y += 4 * n, in += 4) {
+        const isogi_sh__d8 a = ISOGI_SH__JOIN_D8(0, 2), b = ISOGI_SH__JOIN_D8(1, 3), c = ISOGI_SH__JOIN_D8(4, 6), d = ISOGI_SH__JOIN_D8(5, 7);
+        isogi_sh__d8 e = __builtin_shufflevector(a, b, 0, 8, 2, 10, 4, 12, 6, 14), f = __builtin_shufflevector(a, b, 1, 9, 3, 11, 5, 13, 7, 15);
+        isogi_sh__d8 g = __builtin_shufflevector(c, d, 0, 8, 2, 10, 4, 12, 6, 14), h = __builtin_shufflevector(c, d, 1, 9, 3, 11, 5, 13, 7, 15);
+        *(isogi_sh__d8 *)y = __builtin_shufflevector(e, g, 0, 1, 4, 5, 8, 9, 12, 13);
+        *(isogi_sh__d8 *)(y + n) = __builtin_shufflevector(f, h, 0, 1, 4, 5, 8, 9, 12, 13);
+        *(isogi_sh__d8 *)(y + 2 * n) = __builtin_shufflevector(e, g, 2, 3, 6, 7, 10, 11, 14, 15);
+        *(isogi_sh__d8 *)(y + 3 * n) = __builtin_shufflevector(f, h, 2, 3, 6, 7, 10, 11, 14, 15);
+    }
+}
+
 /* directions into coordinates */
 ISOGI_SH__AVX2 ISOGI_SH__INLINE void isogi_sh__eval_f8_split(isogi_sh__f8 *u, const float *from) {
     isogi_sh__f8 a = *(const isogi_sh__f8 *)from, b = *(const isogi_sh__f8 *)(from + 8), c = *(const isogi_sh__f8 *)(from + 16);
@@ -1459,7 +1499,7 @@ ISOGI_SH__AVX512 ISOGI_SH__INLINE void isogi_sh__eval_d8_split(isogi_sh__d8 *u, 
 /* Defines NAME(out, stride, order, x, y, z, count): all functions at the first directions, that of index i at out + stride i; WIDTH at a
    time. It returns how many directions are done, and stops before a block whose lengths are out of range. NAME_rows: the same with the
    functions of a direction together. */
-#define ISOGI_SH__DEFINE_FUSED(NAME, TARGET, T, V, I, WIDTH, FMA, LESS, POLYNOMIALS, NEAR_POLE, TURN)                          \
+#define ISOGI_SH__DEFINE_FUSED(NAME, TARGET, T, V, I, WIDTH, FMA, LESS, POLYNOMIALS, NEAR_POLE, TURN, TILE)                          \
     TARGET ISOGI_SH__INLINE void NAME##_order5(V *out, const V *u) {                                                           \
         V x = u[0], y = u[1], z = u[2], zero = {0}, v = FMA(z, z, -FMA(x, x, y * y)), c = (x - y) * (x + y), s = x * y, c3, s3, f; \
         out[0] = zero + (T)0.28209479177387814;                                                                                \
@@ -1517,91 +1557,102 @@ ISOGI_SH__AVX512 ISOGI_SH__INLINE void isogi_sh__eval_d8_split(isogi_sh__d8 *u, 
         if (order <= ISOGI_SH__LOW_ORDER) NAME##_low(out, stride, order, u);                                                   \
         else NAME##_any(out, stride, 0, order, u, NULL);                                                                       \
     }                                                                                                                          \
-    /* any order but 5, with the next directions made ready while the values of those before are stored */                     \
+    /* any order but 5, with the next directions made ready while the values of those before are stored; the last block ends with the last \
+       direction, and repeats some */                                                                                          \
     TARGET static size_t NAME##_blocks(T *out, size_t stride, int order, const T *x, const T *y, const T *z, size_t count) {   \
         V u[2][4];                                                                                                             \
-        size_t i;                                                                                                              \
+        size_t i, at = 0;                                                                                                      \
         int more, now = 0;                                                                                                     \
         for (i = 0;; i += WIDTH, now = !now) {                                                                                 \
-            more = i + WIDTH <= count && NAME##_load(u[now], x + i, y + i, z + i);                                             \
-            if (i) NAME##_block(out + i - WIDTH, stride, order, u[!now]);                                                      \
-            if (!more) return i;                                                                                               \
+            size_t next = i < count - WIDTH ? i : count - WIDTH;                                                               \
+            more = i < count && NAME##_load(u[now], x + next, y + next, z + next);                                             \
+            if (i) NAME##_block(out + at, stride, order, u[!now]);                                                             \
+            if (!more) return i < count ? i : count;                                                                           \
+            at = next;                                                                                                         \
         }                                                                                                                      \
     }                                                                                                                          \
     TARGET static size_t NAME(T *out, size_t stride, int order, const T *x, const T *y, const T *z, size_t count) {            \
         V u[4], basis[25];                                                                                                     \
-        size_t i;                                                                                                              \
+        size_t i, at;                                                                                                          \
         int k;                                                                                                                 \
+        if (count < WIDTH) return 0;                                                                                           \
         if (order != 5) return NAME##_blocks(out, stride, order, x, y, z, count);                                              \
-        for (i = 0; i + WIDTH <= count && NAME##_load(u, x + i, y + i, z + i); i += WIDTH) {                                   \
+        for (i = 0; i < count; i += WIDTH) {                                                                                   \
+            at = i < count - WIDTH ? i : count - WIDTH;                                                                        \
+            if (!NAME##_load(u, x + at, y + at, z + at)) return i;                                                             \
             NAME##_order5(basis, u);                                                                                           \
             ISOGI_SH__UNROLL25                                                                                                 \
-            for (k = 0; k < 25; k++) *(V *)(out + i + stride * (size_t)k) = basis[k];                                          \
+            for (k = 0; k < 25; k++) *(V *)(out + at + stride * (size_t)k) = basis[k];                                         \
         }                                                                                                                      \
-        return i;                                                                                                              \
+        return count;                                                                                                          \
+    }                                                                                                                          \
+    /* `count` rows, 9 or more, for as many directions as are lanes: by 8 or TILE, after one alone, or the last with some that come again */ \
+    TARGET ISOGI_SH__INLINE void NAME##_turn_all(T *out, size_t n, const V *rows, size_t count) {                              \
+        size_t k, at, alone = count % TILE == 1 || count == 9;                                                                 \
+        for (k = 0; k < WIDTH && alone; k++) out[n * k] = ((const T *)rows)[k];                                                \
+        for (k = alone; k < count && count <= 16; k += 8) NAME##_turn(out + k, n, rows + k);                                   \
+        for (; k < count; k += TILE) at = k < count - TILE ? k : count - TILE, TURN(out + at, n, rows + at);                   \
     }                                                                                                                          \
     /* order 5, with the next directions made ready meanwhile */                                                               \
     TARGET static size_t NAME##_rows5(T *out, const T (*direction)[3], size_t count) {                                         \
         V zero = {0}, u[4] = {zero, zero, zero, zero}, next[4] = {zero, zero, zero, zero}, basis[25];                          \
-        size_t i, k;                                                                                                           \
+        size_t i, k, at = 0;                                                                                                   \
         int more;                                                                                                              \
         for (i = 0;; i += WIDTH) {                                                                                             \
-            more = i + WIDTH <= count;                                                                                         \
+            size_t after = i < count - WIDTH ? i : count - WIDTH;                                                              \
+            more = i < count;                                                                                                  \
             if (more) {                                                                                                        \
-                NAME##_split(next, direction[i]);                                                                              \
+                NAME##_split(next, direction[after]);                                                                          \
                 more = NAME##_unit(next);                                                                                      \
             }                                                                                                                  \
             if (i) {                                                                                                           \
+                T *row = out + 25 * at;                                                                                        \
                 NAME##_order5(basis, u);                                                                                       \
-                for (k = 0; k < WIDTH; k++) out[25 * k] = (T)0.28209479177387814;                                              \
-                NAME##_turn(out + 1, 25, basis + 1);                                                                           \
-                NAME##_turn(out + 9, 25, basis + 9);                                                                           \
-                NAME##_turn(out + 17, 25, basis + 17);                                                                         \
-                out += 25 * WIDTH;                                                                                             \
+                for (k = 0; k < WIDTH; k++) row[25 * k] = (T)0.28209479177387814;                                              \
+                NAME##_turn(row + 1, 25, basis + 1);                                                                           \
+                NAME##_turn(row + 9, 25, basis + 9);                                                                           \
+                NAME##_turn(row + 17, 25, basis + 17);                                                                         \
             }                                                                                                                  \
-            if (!more) return i;                                                                                               \
-            u[0] = next[0], u[1] = next[1], u[2] = next[2];                                                                    \
+            if (!more) return i < count ? i : count;                                                                           \
+            u[0] = next[0], u[1] = next[1], u[2] = next[2], at = after;                                                        \
         }                                                                                                                      \
-    }                                                                                                                          \
-    /* `count` rows, 9 or more, for as many directions as are lanes: by eight, after one alone or eight of which some come again */ \
-    TARGET ISOGI_SH__INLINE void NAME##_turn_all(T *out, size_t n, const V *rows, size_t count) {                              \
-        size_t k, rest = count & 7;                                                                                            \
-        for (k = 0; k < WIDTH && rest == 1; k++) out[n * k] = ((const T *)rows)[k];                                            \
-        for (k = rest == 1; k < count; k = k || !rest ? k + 8 : rest) TURN(out + k, n, rows + k);                              \
     }                                                                                                                          \
     TARGET static size_t NAME##_rows(T *out, int order, const T (*direction)[3], size_t count) {                               \
         V rows[ISOGI_SH__SPLIT * ISOGI_SH__SPLIT] __attribute__((aligned(64))), state[2 * ISOGI_SH__TABLE_ORDER], u[2][4];     \
-        size_t i, n = ISOGI_SH_COUNT(order);                                                                                   \
+        size_t i, n = ISOGI_SH_COUNT(order), at = 0;                                                                           \
         int from, to, more, now = 0;                                                                                           \
+        if (count < WIDTH) return 0;                                                                                           \
         if (order == 5) return NAME##_rows5(out, direction, count);                                                            \
         for (i = 0;; i += WIDTH, now = !now) {                                                                                 \
-            more = i + WIDTH <= count;                                                                                         \
+            size_t next = i < count - WIDTH ? i : count - WIDTH;                                                               \
+            more = i < count;                                                                                                  \
             if (more) {                                                                                                        \
-                NAME##_split(u[now], direction[i]);                                                                            \
+                NAME##_split(u[now], direction[next]);                                                                         \
                 more = NAME##_unit(u[now]);                                                                                    \
             }                                                                                                                  \
-            for (from = 0; i && from < order; from = to) {                                                                     \
+            for (from = 0; i && from < order; from = to) {                                                       \
                 to = from || order < ISOGI_SH__SPLIT ? order : ISOGI_SH__SPLIT;                                                \
                 if (order <= ISOGI_SH__LOW_ORDER) NAME##_low((T *)rows, WIDTH, order, u[!now]);                                \
                 else NAME##_any((T *)rows, WIDTH, from, to, u[!now], state);                                                   \
-                NAME##_turn_all(out + n * (i - WIDTH) + from * from, n, rows, (size_t)(to * to - from * from));                \
+                NAME##_turn_all(out + n * at + from * from, n, rows, (size_t)(to * to - from * from));                         \
             }                                                                                                                  \
-            if (!more) return i;                                                                                               \
+            if (!more) return i < count ? i : count;                                                                           \
+            at = next;                                                                                                         \
         }                                                                                                                      \
     }
 
-#define ISOGI_SH__DEFINE_F32(NAME, TARGET, V, I, WIDTH, SUFFIX, TURN)                                                              \
+#define ISOGI_SH__DEFINE_F32(NAME, TARGET, V, I, WIDTH, SUFFIX, TURN, TILE)                                                              \
     ISOGI_SH__DEFINE_EVAL(NAME, TARGET, float, V, I, WIDTH, ISOGI_SH__FMA_##SUFFIX, ISOGI_SH__REST_##SUFFIX, ISOGI_SH__LESS_##SUFFIX, \
                           isogi_sh__table_f32, 1e-6, 1e-3, 1e-19, sqrtf)                                                           \
-    ISOGI_SH__DEFINE_FUSED(NAME, TARGET, float, V, I, WIDTH, ISOGI_SH__FMA_##SUFFIX, ISOGI_SH__LESS_##SUFFIX, isogi_sh__polynomials_f32, 1e-3, TURN)
-#define ISOGI_SH__DEFINE_F64(NAME, TARGET, V, I, WIDTH, SUFFIX, TURN)                                                              \
+    ISOGI_SH__DEFINE_FUSED(NAME, TARGET, float, V, I, WIDTH, ISOGI_SH__FMA_##SUFFIX, ISOGI_SH__LESS_##SUFFIX, isogi_sh__polynomials_f32, 1e-3, TURN, TILE)
+#define ISOGI_SH__DEFINE_F64(NAME, TARGET, V, I, WIDTH, SUFFIX, TURN, TILE)                                                              \
     ISOGI_SH__DEFINE_EVAL(NAME, TARGET, double, V, I, WIDTH, ISOGI_SH__FMA_##SUFFIX, ISOGI_SH__REST_##SUFFIX, ISOGI_SH__LESS_##SUFFIX, \
                           isogi_sh__table_f64, 1e-12, 1e-25, 1e-200, sqrt)                                                         \
-    ISOGI_SH__DEFINE_FUSED(NAME, TARGET, double, V, I, WIDTH, ISOGI_SH__FMA_##SUFFIX, ISOGI_SH__LESS_##SUFFIX, isogi_sh__polynomials_f64, 1e-25, TURN)
-ISOGI_SH__DEFINE_F32(isogi_sh__eval_f8, ISOGI_SH__AVX2, isogi_sh__f8, isogi_sh__i8, 8, F8, isogi_sh__transpose_f8)
-ISOGI_SH__DEFINE_F64(isogi_sh__eval_d4, ISOGI_SH__AVX2, isogi_sh__d4, isogi_sh__l4, 4, D4, isogi_sh__eval_d4_turn)
-ISOGI_SH__DEFINE_F32(isogi_sh__eval_f16, ISOGI_SH__AVX512, isogi_sh__f16, isogi_sh__i16, 16, F16, isogi_sh__eval_f16_turn)
-ISOGI_SH__DEFINE_F64(isogi_sh__eval_d8, ISOGI_SH__AVX512, isogi_sh__d8, isogi_sh__l8, 8, D8, isogi_sh__eval_d8_turn)
+    ISOGI_SH__DEFINE_FUSED(NAME, TARGET, double, V, I, WIDTH, ISOGI_SH__FMA_##SUFFIX, ISOGI_SH__LESS_##SUFFIX, isogi_sh__polynomials_f64, 1e-25, TURN, TILE)
+ISOGI_SH__DEFINE_F32(isogi_sh__eval_f8, ISOGI_SH__AVX2, isogi_sh__f8, isogi_sh__i8, 8, F8, isogi_sh__transpose_f8, 8)
+ISOGI_SH__DEFINE_F64(isogi_sh__eval_d4, ISOGI_SH__AVX2, isogi_sh__d4, isogi_sh__l4, 4, D4, isogi_sh__eval_d4_turn, 8)
+ISOGI_SH__DEFINE_F32(isogi_sh__eval_f16, ISOGI_SH__AVX512, isogi_sh__f16, isogi_sh__i16, 16, F16, isogi_sh__transpose_f16, 16)
+ISOGI_SH__DEFINE_F64(isogi_sh__eval_d8, ISOGI_SH__AVX512, isogi_sh__d8, isogi_sh__l8, 8, D8, isogi_sh__transpose_d8, 8)
 
 /* 8 single-channel sums */
 ISOGI_SH__AVX2 static int isogi_sh__sum_rows_f32(float *value, const float *c, int order, int channels, const float (*direction)[3]) {
@@ -4190,7 +4241,9 @@ ISOGI_API isogi_result isogi_sh_fit_directional(float direction[3], float rgb[3]
 #undef ISOGI_SH__HIGH_F8
 #undef ISOGI_SH__HALF_D8
 #undef ISOGI_SH__JOIN_F16
+#undef ISOGI_SH__JOIN_D8
 #undef ISOGI_SH__JOIN_F8
+#undef ISOGI_SH__JOIN_HALVES
 #undef ISOGI_SH__LESS_D4
 #undef ISOGI_SH__LESS_D8
 #undef ISOGI_SH__LESS_F16

@@ -322,7 +322,7 @@ TEST(any_vector_at_any_order) {
 /* One coordinate that is not finite among directions that are good, in any lane and at every level, in both types and layouts: its
    direction counts as +z, the others are not touched. By bits, so that -ffast-math does not take the question for answered. */
 TEST(one_bad_direction_in_a_batch_counts_as_up) {
-    enum { COUNT = 16, N = 441 };
+    enum { COUNT = 24, N = 441 };
     static const int orders[] = {2, 3, 5, 8, 11, 12, 21};
     static const float odd[] = {NAN, -NAN, INFINITY, -INFINITY};
     static float d[COUNT][3], x[3][COUNT], y[COUNT * N], columns[COUNT * N];
