@@ -1,5 +1,5 @@
 /* The least and the highest order, and vectors without length, as short and as long as floats are, for what isogi_sh.h does besides
-   evaluation: cones, skies, lights, windows, conventions. The reference is tests/reference_sh.h: 128 bits, from the definition. */
+   evaluation: cones, skies, lights, windows, conventions, algebra, rotations, projections, fits. The reference is tests/reference_sh.h: 128 bits, from the definition. */
 #define ISOGI_SH_IMPLEMENTATION
 #include "isogi_sh.h"
 #include "reference_sh.h"
@@ -229,6 +229,166 @@ TEST(conventions_of_any_order) {
             isogi_sh_convention third = {(isogi_sh_normalisation)((i + 1) % 3), (isogi_sh_ordering)((i / 3 + 1) % 3), !(i / 9)};
             CHECK(isogi_sh_convert(e, d, order, 1, theirs, third) == ISOGI_OK && isogi_sh_convert(d, e, order, 1, third, ours) == ISOGI_OK, "%d", i);
             for (int k = 0; k < n; k++) CHECK(fabsf(d[k] - c[k]) <= 3e-7f * c[k], "there and back by %d: Y%d %g, was %g", i, k, (double)d[k], (double)c[k]);
+        }
+}
+
+/* sum of coefficients times the basis at v, every third of c */
+static double value_at(int order, const float *f, const float v[3]) {
+    quad sum = 0;
+    basis_at(order, v);
+    for (int i = 0; i < order * order; i++) sum += basis[i] * (quad)f[3 * i];
+    return (double)sum;
+}
+
+static int close_to(double a, double b, double part) { return fabs(a - b) <= part * fmax(fabs(a), fabs(b)); } /* false for NaN */
+
+TEST(algebra_of_any_order) {
+    test_random r = {50};
+    for (int o = 0; o < ORDERS; o++) {
+        int order = orders[o], n = order * order;
+        double dot = 0, energy[MOST], squares[MOST] = {0}, a = 1;
+        float one[MOST], single[2][N];
+        for (int i = 0; i < 3 * n; i++) c[i] = (float)random_range(&r, -1, 1), d[i] = (float)random_range(&r, -1, 1);
+        for (int i = 0; i < n; i++) single[0][i] = c[i], single[1][i] = d[i], dot += (double)c[i] * (double)d[i];
+        CHECK(fabs(isogi_sh_dot(c, d, order) - dot) <= 1e-12, "order %d: dot %.17g, expected %.17g", order, isogi_sh_dot(c, d, order), dot);
+        CHECK(isogi_sh_add(e, c, d, order, 3) == ISOGI_OK && close_to((double)e[3 * n - 1], (double)c[3 * n - 1] + (double)d[3 * n - 1], 1e-6), "order %d: add", order);
+        CHECK(isogi_sh_scale(e, c, 0.5f, order, 3) == ISOGI_OK && e[0] == 0.5f * c[0] && e[3 * n - 1] == 0.5f * c[3 * n - 1], "order %d: scale", order);
+        CHECK(isogi_sh_lerp(e, c, d, 0.25f, order, 3) == ISOGI_OK && fabs((double)e[3 * n - 1] - 0.75 * (double)c[3 * n - 1] - 0.25 * (double)d[3 * n - 1]) <= 1.2e-7, "order %d: lerp", order);
+        CHECK(isogi_sh_band_energy(energy, c, order, 3) == ISOGI_OK, "order %d", order);
+        for (int l = 0; l < order; l++) {
+            for (int i = 3 * l * l; i < 3 * (l + 1) * (l + 1); i++) squares[l] += (double)c[i] * (double)c[i];
+            CHECK(close_to(energy[l], squares[l], 1e-12), "order %d, band %d: energy %g, expected %g", order, l, energy[l], squares[l]);
+        }
+        for (int axis = 0; axis < 3; axis++) {
+            float v[3] = {0.36f, 0.48f, -0.8f};
+            CHECK(isogi_sh_mirror(e, c, order, 3, axis) == ISOGI_OK, "axis %d", axis);
+            double mirrored = value_at(order, e, v);
+            v[axis] = -v[axis];
+            CHECK(fabs(mirrored - value_at(order, c, v)) <= 1e-11, "order %d, axis %d: %g, expected %g", order, axis, mirrored, value_at(order, c, v));
+        }
+        /* a product with a constant scales; its mean is the dot product */
+        for (int i = 0; i < n; i++) e[i] = i ? 0 : sqrtf(4 * (float)pi), e[n + i] = 9;
+        if (order <= 2 || LONG_SUITE) CHECK(isogi_sh_product(e + n, single[0], e, order, 1) == ISOGI_OK, "order %d", order);
+        for (int i = 0; i < n && (order <= 2 || LONG_SUITE); i++) CHECK(fabsf(e[n + i] - c[i]) <= 3e-7f, "order %d: %g times 1 is %g", order, (double)c[i], (double)e[n + i]);
+        CHECK(isogi_sh_product(e, single[0], single[1], order, 1) == ISOGI_OK && close_to((double)e[0], 0.28209479177387814 * dot, 1e-6), "order %d: mean %g, expected %g", order, (double)e[0], 0.28209479177387814 * dot);
+        /* clamped cosine: Ramamoorthi and Hanrahan 2001, eq. 19 */
+        CHECK(isogi_sh_cosine_zonal(one, order) == ISOGI_OK && isogi_sh_convolve_cosine(d, c, order, 3) == ISOGI_OK && isogi_sh_convolve(e, c, order, 3, one) == ISOGI_OK, "order %d", order);
+        for (int l = 0; l < order; l++) {
+            double factor = l == 1 ? 2 * pi / 3 : l & 1 ? 0 : 2 * pi * a / ((l + 2) * (1 - l)) * (l & 2 ? -1 : 1);
+            if (!(l & 1)) a *= (l + 1) / (double)(l + 2); /* l! / (2^l (l/2)!^2) */
+            CHECK(fabs((double)one[l] - factor * sqrt((2 * l + 1) / (4 * pi))) <= 1.2e-7, "degree %d: %g, expected %g", l, (double)one[l], factor * sqrt((2 * l + 1) / (4 * pi)));
+            for (int i = 3 * l * l; i < 3 * (l + 1) * (l + 1); i++)
+                CHECK(fabs((double)d[i] - factor * (double)c[i]) <= 4e-7 && fabs((double)e[i] - factor * (double)c[i]) <= 6e-7, "degree %d: %g and %g, expected %g", l, (double)d[i], (double)e[i], factor * (double)c[i]);
+        }
+    }
+}
+
+TEST(rotations_of_any_order) {
+    const double angles[][3] = {{0, 0, 0}, {0, 1e-9, 0}, {0, 3.14159265358979323846, 0}, {3, 1.5, -2}};
+    static double wide[N], turned[N];
+    float *rotation = (float *)malloc(ISOGI_SH_ROTATION_COUNT(MOST) * sizeof *rotation), m[9], z[9];
+    test_random r = {51};
+    for (int o = 0; o < ORDERS; o++)
+        for (int a = 0; a < 4 && rotation; a++) {
+            int order = orders[o], n = order * order;
+            if (order > 2 && !LONG_SUITE && a != 3) continue;
+            double m64[9], worst = 0, worst_applied = 0, worst_z = 0;
+            const float v[3] = {0.36f, 0.48f, -0.8f};
+            float back[3];
+            for (int i = 0; i < 3 * n; i++) c[i] = (float)random_range(&r, -1, 1);
+            for (int i = 0; i < n; i++) wide[i] = (double)c[3 * i];
+            CHECK(isogi_sh_matrix_from_euler_zyz(m, angles[a][0], angles[a][1], angles[a][2]) == ISOGI_OK, "%d", a);
+            for (int k = 0; k < 9; k++) m64[k] = (double)m[k];
+            for (int k = 0; k < 3; k++) back[k] = m[k] * v[0] + m[3 + k] * v[1] + m[6 + k] * v[2];
+            CHECK(isogi_sh_rotate(d, c, order, 3, m) == ISOGI_OK && isogi_sh_rotate_f64(turned, wide, order, 1, m64) == ISOGI_OK, "order %d", order);
+            CHECK(isogi_sh_rotation_build(rotation, order, m) == ISOGI_OK && isogi_sh_rotation_apply(e, c, order, 3, rotation) == ISOGI_OK, "order %d", order);
+            for (int i = 0; i < n; i++) worst = fmax(worst, fabs((double)d[3 * i] - turned[i])), worst_applied = fmax(worst_applied, fabs((double)e[3 * i] - turned[i]));
+            /* roundings of the result; of 2 l + 1 entries of a matrix and their products besides */
+            CHECK(worst <= 3e-7 && worst_applied <= 3e-7 * sqrt(order), "order %d, rotation %d: %g in float, %g applied", order, a, worst, worst_applied);
+            /* the derivative of a sum is `order` times the sum, and a float matrix is off by 1e-7 */
+            CHECK(fabs(value_at(order, d, v) - value_at(order, c, back)) <= 2e-6 * order * sqrt(n), "order %d, rotation %d: %g, expected %g", order, a, value_at(order, d, v), value_at(order, c, back));
+            CHECK(isogi_sh_matrix_from_euler_zyz(z, angles[a][0], 0, 0) == ISOGI_OK && isogi_sh_rotate(e, c, order, 3, z) == ISOGI_OK && isogi_sh_rotate_z(d, c, order, 3, angles[a][0]) == ISOGI_OK, "%d", a);
+            for (int i = 0; i < 3 * n; i++) worst_z = fmax(worst_z, fabs((double)d[i] - (double)e[i]));
+            CHECK(worst_z <= 3e-7 * (order + 1), "order %d, about z: %g", order, worst_z);
+        }
+    CHECK(rotation != NULL, "%s", "memory");
+    free(rotation);
+    for (int a = 0; a < AXES; a++) {
+        float q[4] = {0, axes[a][0], axes[a][1], axes[a][2]};
+        for (int kind = 0; kind < 2; kind++) {
+            double off = 0;
+            CHECK((kind ? isogi_sh_matrix_from_quaternion(m, q) : isogi_sh_matrix_from_axis_angle(m, axes[a], 1e9)) == ISOGI_OK, "axis %d, kind %d", a, kind);
+            for (int i = 0; i < 3; i++)
+                for (int j = 0; j < 3; j++) {
+                    double dot = 0;
+                    for (int k = 0; k < 3; k++) dot += (double)m[3 * i + k] * (double)m[3 * j + k];
+                    off = fmax(off, test_finite(dot) ? fabs(dot - (i == j)) : 1e9);
+                }
+            CHECK(off <= 4e-7, "axis %d, kind %d: %g from orthonormal", a, kind, off);
+        }
+    }
+}
+
+static void constant(void *user, const double direction[3], double *value) {
+    (void)user, (void)direction;
+    value[0] = 2, value[1] = -1;
+}
+
+/* A constant is its mean, whatever the order and the number of samples. */
+TEST(projections_of_any_order) {
+    enum { WIDTH = 204, HEIGHT = 103 };
+    static double wide[2 * N];
+    static float image[WIDTH * HEIGHT * 3];
+    const double mean = sqrt(4 * pi);
+    for (int i = 0; i < WIDTH * HEIGHT * 3; i++) image[i] = 2;
+    for (int o = 0; o < ORDERS; o++) {
+        int order = orders[o], n = order * order, sizes[] = {1, 2, 5};
+        double worst = 0;
+        CHECK(isogi_sh_project_function(wide, order, 2, 0, constant, NULL) == ISOGI_OK && close_to(wide[0], 2 * mean, 1e-13) && close_to(wide[1], -mean, 1e-13), "order %d: %g %g", order, wide[0], wide[1]);
+        for (int i = 2; i < 2 * n; i++) worst = fmax(worst, fabs(wide[i]));
+        CHECK(worst <= 1e-12, "order %d: a constant has %g", order, worst);
+        for (int stratified = 0; stratified < 2; stratified++)
+            CHECK(isogi_sh_project_random(wide, order, 2, 3, stratified, 7, constant, NULL) == ISOGI_OK && close_to(wide[0], 2 * mean, 1e-13) && test_finite(wide[2 * n - 1]), "order %d: %g", order, wide[0]);
+        CHECK(isogi_sh_project_equirect(c, order, image, WIDTH, HEIGHT) == ISOGI_OK, "order %d", order);
+        worst = 0;
+        for (int i = 3; i < 3 * n; i++) worst = fmax(worst, fabs((double)c[i]));
+        CHECK(close_to((double)c[0], 2 * mean, 3e-7) && worst <= 2e-6, "order %d: %g, and %g", order, (double)c[0], worst);
+        for (int k = 0; k < 3; k++) {
+            const float *faces[6] = {image, image, image, image, image, image};
+            CHECK(isogi_sh_project_image(c, order, 1, image, sizes[k], sizes[2 - k]) == ISOGI_OK && close_to((double)c[0], 2 * mean, 3e-7) && test_finite((double)c[n - 1]), "order %d, size %d: %g", order, sizes[k], (double)c[0]);
+            CHECK(isogi_sh_project_cube(c, order, 3, faces, sizes[k]) == ISOGI_OK && close_to((double)c[0], 2 * mean, 3e-7) && test_finite((double)c[3 * n - 1]), "order %d, cube of %d: %g", order, sizes[k], (double)c[0]);
+        }
+        for (int i = 0; i < 3 * n; i++) c[i] = (float)(i % 5) / (float)n;
+        for (int a = 0; a < AXES; a++) { /* an environment of coefficients, and derivatives, in any direction */
+            static double gradient[N][3];
+            const double direction[1][3] = {{(double)axes[a][0], (double)axes[a][1], (double)axes[a][2]}};
+            const isogi_env env = {.sh = c, .sh_order = order};
+            float rgb[3];
+            isogi_env_radiance(&env, axes[a], rgb);
+            CHECK(fabs((double)rgb[0] - value_at(order, c, axes[a])) <= 1e-6, "order %d, axis %d: %g, expected %g", order, a, (double)rgb[0], value_at(order, c, axes[a]));
+            CHECK(isogi_sh_eval_gradient_f64(gradient, order, direction, 1) == ISOGI_OK, "axis %d", a);
+            double length = sqrt(direction[0][0] * direction[0][0] + direction[0][1] * direction[0][1] + direction[0][2] * direction[0][2]);
+            for (int i = 0; i < n; i++) {
+                double along = 0;
+                for (int k = 0; k < 3; k++) along += gradient[i][k] * (direction[0][k] / length);
+                if (!(fabs(along) <= 1e-12 * order)) worst = 1e9;
+            }
+            CHECK(worst < 1, "order %d, axis %d: a gradient is not tangent", order, a);
+        }
+    }
+}
+
+TEST(fits_of_any_order) {
+    for (int o = 1; o < ORDERS; o++)
+        for (int a = 0; a < AXES; a++) {
+            isogi_light sun = {.vector = {axes[a][0], axes[a][1], axes[a][2]}, .rgb = {3, 2, 1}};
+            isogi_lighting lighting = {.lights = &sun, .light_count = 1};
+            float direction[3], rgb[3], ambient[3];
+            double length = sqrt((double)axes[a][0] * (double)axes[a][0] + (double)axes[a][1] * (double)axes[a][1] + (double)axes[a][2] * (double)axes[a][2]), off = 0;
+            isogi_sh_project(c, orders[o], &lighting, NULL);
+            CHECK(isogi_sh_fit_directional(direction, rgb, ambient, c, orders[o]) == ISOGI_OK, "axis %d", a);
+            for (int k = 0; k < 3; k++) off = fmax(off, fabs((double)direction[k] - (double)axes[a][k] / length));
+            CHECK(off <= 1e-5 && fabs((double)rgb[0] - 3) <= 1e-4 && fabs((double)ambient[0]) <= 1e-4, "order %d, axis %d: %g off, %g %g", orders[o], a, off, (double)rgb[0], (double)ambient[0]);
         }
 }
 
