@@ -6372,7 +6372,7 @@ static void isogi_vol__mesh_valid(const isogi_vol__mesher *m, int j, int k) {
 /* The cells from 64 w on, in the row of cells that begins at row (j,k) of the lattice, and the counters of their vertices: x-edges of
    its four rows (y, z), y-edges of two (z), z-edges of two (y), corners of four. */
 typedef struct isogi_vol__cell_walk {
-    uint64_t in[4], ahead[4], surface, cap, carries[12];
+    uint64_t corner[8], surface, cap, carries[12]; /* corner: x + 2y + 4z */
     const uint64_t *inside[4], *valid, *carry_row[12];
     uint32_t vertex[12], inner;
     int kinds, j, k, border;
@@ -6400,11 +6400,10 @@ static void isogi_vol__walk_number(const isogi_vol__mesher *m, isogi_vol__cell_w
 
 /* Cells of word w that hold surface, and those with a face on a closed border that is not all outside. */
 static void isogi_vol__walk_word(const isogi_vol__mesher *m, isogi_vol__cell_walk *walk, size_t w) {
-    uint64_t some, all;
+    uint64_t *c = walk->corner, some, all;
     int n;
-    for (n = 0; n < 4; n++) walk->in[n] = walk->inside[n][w], walk->ahead[n] = isogi_vol__ahead(walk->inside[n], w, m->words);
-    some = walk->in[0] | walk->in[1] | walk->in[2] | walk->in[3] | walk->ahead[0] | walk->ahead[1] | walk->ahead[2] | walk->ahead[3];
-    all = walk->in[0] & walk->in[1] & walk->in[2] & walk->in[3] & walk->ahead[0] & walk->ahead[1] & walk->ahead[2] & walk->ahead[3];
+    for (n = 0; n < 4; n++) c[2 * n] = walk->inside[n][w], c[2 * n + 1] = isogi_vol__ahead(walk->inside[n], w, m->words);
+    some = c[0] | c[1] | c[2] | c[3] | c[4] | c[5] | c[6] | c[7], all = c[0] & c[1] & c[2] & c[3] & c[4] & c[5] & c[6] & c[7];
     walk->surface = walk->valid[w] & some & ~all;
     walk->cap = 0;
     if (!m->closed) return;
@@ -6414,11 +6413,33 @@ static void isogi_vol__walk_word(const isogi_vol__mesher *m, isogi_vol__cell_wal
     walk->cap &= walk->valid[w] & some;
 }
 
-ISOGI_VOL__INLINE unsigned isogi_vol__walk_code(const isogi_vol__cell_walk *walk, int bit) {
-    unsigned code = 0;
+/* Bit `bit` of eight words, side by side. */
+ISOGI_VOL__INLINE unsigned isogi_vol__walk_bits(const uint64_t words[8], int bit) {
+#ifdef ISOGI_VOL__SSE2
+    const __m128i *w = (const __m128i *)(const void *)words, up = _mm_cvtsi32_si128(63 - bit);
+#define ISOGI_VOL__TWO(n) (unsigned)_mm_movemask_pd(_mm_castsi128_pd(_mm_sll_epi64(_mm_loadu_si128(w + (n)), up))) << 2 * (n)
+    return ISOGI_VOL__TWO(0) | ISOGI_VOL__TWO(1) | ISOGI_VOL__TWO(2) | ISOGI_VOL__TWO(3);
+#undef ISOGI_VOL__TWO
+#else
+    unsigned bits = 0;
     int n;
-    for (n = 0; n < 4; n++) code |= (unsigned)(walk->in[n] >> bit & 1) << 2 * n | (unsigned)(walk->ahead[n] >> bit & 1) << (2 * n + 1);
-    return code;
+    for (n = 0; n < 8; n++) bits |= (unsigned)(words[n] >> bit & 1) << n;
+    return bits;
+#endif
+}
+
+/* Adds each of eight bits to a counter. */
+ISOGI_VOL__INLINE void isogi_vol__walk_count(uint32_t counter[8], unsigned bits) {
+    int n;
+#ifdef ISOGI_VOL__SSE2
+    const __m128i all = _mm_set1_epi32((int)bits);
+    for (n = 0; n < 2; n++) {
+        __m128i *four = (__m128i *)(void *)(counter + 4 * n), bit = n ? _mm_setr_epi32(16, 32, 64, 128) : _mm_setr_epi32(1, 2, 4, 8);
+        _mm_storeu_si128(four, _mm_sub_epi32(_mm_loadu_si128(four), _mm_cmpeq_epi32(_mm_and_si128(all, bit), bit)));
+    }
+#else
+    for (n = 0; n < 8; n++) counter[n] += bits >> n & 1;
+#endif
 }
 
 /* The corner values of a cell; their signs are what the bits say, even where a compiler flushes small differences to zero. */
@@ -6455,7 +6476,7 @@ static void isogi_vol__count_cells(const isogi_vol__mesher *m, int j, int k, iso
         isogi_vol__walk_word(m, &walk, w);
         for (cells = walk.surface | walk.cap; cells; cells &= cells - 1) {
             int bit = isogi_vol__lowest_bit(cells), i = (int)(64 * w) + bit, f;
-            unsigned code = isogi_vol__walk_code(&walk, bit), caps = 0;
+            unsigned code = isogi_vol__walk_bits(walk.corner, bit), caps = 0;
             row->triangle += m->cases[code].triangles;
             if (walk.cap >> bit & 1) caps = isogi_vol__capped_faces(m, &walk, i, code);
             if (!m->cases[code].undecided && !caps) continue;
@@ -6660,15 +6681,15 @@ static void isogi_vol__emit_undecided(const isogi_vol__mesher *m, isogi_vol__cel
     }
 }
 
-static void isogi_vol__emit_cell(const isogi_vol__mesher *m, isogi_vol__cell_walk *walk, int i, size_t *at) {
+static void isogi_vol__emit_cell(const isogi_vol__mesher *m, isogi_vol__cell_walk *walk, int i, unsigned carries, size_t *at) {
     const uint32_t *v = walk->vertex;
     uint32_t id[20];
     int n, bit = i % 64;
-    unsigned code = isogi_vol__walk_code(walk, bit), caps = 0;
+    unsigned code = isogi_vol__walk_bits(walk->corner, bit), caps = 0;
     const isogi_vol__case *one = &m->cases[code];
     for (n = 0; n < 4; n++) id[n] = v[n];
-    id[4] = v[4], id[5] = v[5], id[6] = v[4] + (uint32_t)(walk->carries[4] >> bit & 1), id[7] = v[5] + (uint32_t)(walk->carries[5] >> bit & 1);
-    id[8] = v[6], id[9] = v[6] + (uint32_t)(walk->carries[6] >> bit & 1), id[10] = v[7], id[11] = v[7] + (uint32_t)(walk->carries[7] >> bit & 1);
+    id[4] = v[4], id[5] = v[5], id[6] = v[4] + (carries >> 4 & 1), id[7] = v[5] + (carries >> 5 & 1);
+    id[8] = v[6], id[9] = v[6] + (carries >> 6 & 1), id[10] = v[7], id[11] = v[7] + (carries >> 7);
     for (n = 0; n < one->triangles; n++) isogi_vol__emit_triangle(m, at, id, one->triangle[n]);
     if (walk->cap >> bit & 1) caps = isogi_vol__capped_faces(m, walk, i, code);
     if (one->undecided || caps) isogi_vol__emit_undecided(m, walk, i, code, caps, at, id);
@@ -6690,8 +6711,10 @@ static void isogi_vol__mesh_emit(const isogi_vol__mesher *m, int j, int k) {
         for (n = 0; n < walk.kinds; n++) events |= walk.carries[n] = walk.carry_row[n][w];
         for (; events; events &= events - 1) {
             int bit = isogi_vol__lowest_bit(events);
-            if ((walk.surface | walk.cap) >> bit & 1) isogi_vol__emit_cell(m, &walk, (int)(64 * w) + bit, &at);
-            for (n = 0; n < walk.kinds; n++) walk.vertex[n] += (uint32_t)(walk.carries[n] >> bit & 1);
+            const unsigned carries = isogi_vol__walk_bits(walk.carries, bit);
+            if ((walk.surface | walk.cap) >> bit & 1) isogi_vol__emit_cell(m, &walk, (int)(64 * w) + bit, carries, &at);
+            isogi_vol__walk_count(walk.vertex, carries);
+            for (n = 8; n < walk.kinds; n++) walk.vertex[n] += (uint32_t)(walk.carries[n] >> bit & 1);
         }
     }
 }
@@ -6910,6 +6933,8 @@ ISOGI_API void isogi_vol_mesh_free(const isogi_pyramid *pyramid, isogi_mesh *mes
 #undef ISOGI_VOL__INTEGERS_base
 #undef ISOGI_VOL__BYTES
 #undef ISOGI_VOL__SHORTS
+#undef ISOGI_VOL__F32_base
+#undef ISOGI_VOL__F32_avx2
 #undef ISOGI_VOL__U8_base
 #undef ISOGI_VOL__I8_base
 #undef ISOGI_VOL__U16_base
