@@ -2910,7 +2910,7 @@ ISOGI_VOL__INLINE int isogi_vol__cubic_first(const isogi_vol__cubic *cubic, int 
    segment leaves, -1 if the field vanishes all along it. */
 static int isogi_vol__cubic_deflated(const isogi_vol__cubic *cubic, int *inside, double *root) {
     const double *b = cubic->b;
-    double c1 = 3 * (b[1] - b[0]), c2 = 3 * ((b[0] - b[1]) + (b[2] - b[1])), c3 = (b[3] - b[0]) + 3 * (b[1] - b[2]), r[2];
+    double c1 = 3 * (b[1] - b[0]), c2 = 3 * ((b[0] - b[1]) + (b[2] - b[1])), c3 = (b[3] - b[0]) + 3 * (b[1] - b[2]), r[2] = {0, 0};
     double first = c1 > 0 || c1 < 0 ? c1 : c2 > 0 || c2 < 0 ? c2 : c3;
     int n, i;
     *inside = first > 0 ? 1 : first < 0 ? 0 : -1;
