@@ -80,11 +80,12 @@
      that of the normal of desc.normals, its part below the trilinear surface mirrored up: no ray enters matter, and no energy is
      lost (a white surface under a white sky stays white). bounces = -1: Russian roulette from the third reflection on.
      So with ISOGI_TRACE_PATHS, the reference. By default (FEEDBACK) a path ends at its first hit and takes the light there from a
-     probe: a point of the surface near by, in cells of 2 voxels or an eighth of the ray's length, whose own hemisphere is gathered once
-     in the same way; passes over the probes then bring all reflections without rays. What cosine-distributed rays brought is averaged
-     over neighbouring texels that face the same way, as far as their noise could explain the difference. Probes cost accuracy: about
-     0.9 % of the mean and 1.8 % at a point in narrow channels of albedo 0.8 (test_trace_bake --long prints it). Lazy and adaptive bakes
-     take samples in blocks of 4, 16, 64, ... and every other texel along each axis first: soon every lookup has a value.
+     probe: a point of the surface near by, in cells of 2 voxels (of the smallest spacing, but half a voxel along every axis at least) or
+     an eighth of the ray's length, whose own hemisphere is gathered once in the same way; passes over the probes then bring all
+     reflections without rays. What cosine-distributed rays brought is averaged over neighbouring texels that face the same way, as far as
+     their noise could explain the difference. Probes cost accuracy: about 0.9 % of the mean and 1.8 % at a point in narrow channels of
+     albedo 0.8 (test_trace_bake --long prints it). Lazy and adaptive bakes take samples in blocks of 4, 16, 64, ... and every other texel
+     along each axis first: soon every lookup has a value.
      A hit from within (only through an open border can a ray get there) is a surface too, with its normal turned.
 
    GLSL that lights a surface by an exported irradiance texture (GL_LINEAR, GL_CLAMP_TO_EDGE); grid: voxel coordinates
@@ -427,6 +428,7 @@ ISOGI_API size_t isogi_trace_memory(const isogi_trace *trace); /* bytes that the
 #define ISOGI_TRACE__PROBE_ERROR 0.02 /* standard error of light from probes */
 #define ISOGI_TRACE__CELL 2.0       /* of probes that texels read, in voxels, */
 #define ISOGI_TRACE__CELL_FAR 8.0   /* and of those that only probes read */
+#define ISOGI_TRACE__HALF 0.5       /* of a voxel: the least extent of a cell along an axis */
 #define ISOGI_TRACE__CELL_RATIO 8   /* length of rays to size of cells, */
 #define ISOGI_TRACE__NEAR_RATIO 2   /* up to CELL_FAR */
 #define ISOGI_TRACE__PLANE 1.0      /* voxels between the planes of a hit and its probe */
@@ -2752,7 +2754,8 @@ static isogi_result isogi_trace__feedback_new(isogi_trace *t) {
 
 /* Cells of 2 voxels, of 4 for rays longer than 16 voxels, and so on: an eighth of the length at most. Rays of probes, whose light
    matters less, take half of their length up to `cell` voxels; no more, or what stands beside a narrow gap would light it. In units of
-   the smallest spacing, so that they are cubes in the world. */
+   the smallest spacing, so that they are cubes in the world, but half a voxel along every axis at least: flat or long voxels would be
+   cut into very many. */
 static uint64_t isogi_trace__probe_key(const isogi_trace__scene *scene, const isogi_hit *hit, const float normal[3], double t,
                                        double cell) {
     const double *spacing = scene->volume->spacing;
@@ -2766,7 +2769,8 @@ static uint64_t isogi_trace__probe_key(const isogi_trace__scene *scene, const is
     for (; size < cell && size * ISOGI_TRACE__NEAR_RATIO < t / least; level++) size *= 2;
     for (; level < 8 && size * ISOGI_TRACE__CELL_RATIO < t / least; level++) size *= 2;
     for (a = 0; a < 3; a++) {
-        double x = (hit->cell[a] + hit->local[a]) * spacing[a] / (least * size) + 1;
+        double side = least * size, half = ISOGI_TRACE__HALF * spacing[a];
+        double x = (hit->cell[a] + hit->local[a]) * (spacing[a] / (side > half ? side : half)) + 1;
         key = isogi_trace__key(key, (uint64_t)isogi_trace__clamp(x, 4e9));
     }
     return isogi_trace__key(key, (uint64_t)(16 * level + 2 * axis + (normal[axis] < 0))) | 1;
@@ -2807,17 +2811,21 @@ static void isogi_trace__node_begin(const isogi_trace *t, isogi_trace__set *s) {
     memset(s->out[0] + s->count * v, 0, v * sizeof(float));
 }
 
-/* Whether a probe may stand for a hit: it faces the same way and lies in the hit's plane, or nearly so. */
+/* Whether a probe may stand for a hit: it faces the same way and lies in the hit's plane, or nearly so: half as far from it as the
+   smallest cells reach along the normal. */
 static int isogi_trace__same_place(const isogi_trace *t, const isogi_trace__catch *c, const isogi_trace__node *n) {
     const double *spacing = t->scene.volume->spacing;
-    double apart = 0, least = spacing[0];
+    double apart = 0, least = spacing[0], reach = 0;
     int a;
     for (a = 0; a < 3; a++) {
         double d = ((double)c->hit.cell[a] - (double)n->place.cell[a] + c->hit.local[a] - n->place.local[a]) * spacing[a];
+        double along = 0.5 * ISOGI_TRACE__HALF * spacing[a] * fabs((double)n->normal[a]);
         apart += d * (double)n->normal[a];
         if (spacing[a] < least) least = spacing[a];
+        if (along > reach) reach = along;
     }
-    return fabs(apart) < ISOGI_TRACE__PLANE * least && isogi_trace__dot(c->normal, n->normal) > 0.5;
+    if (ISOGI_TRACE__PLANE * least > reach) reach = ISOGI_TRACE__PLANE * least;
+    return fabs(apart) < reach && isogi_trace__dot(c->normal, n->normal) > 0.5;
 }
 
 /* Whether two isosurfaces have nearly the same colours where c hit: if not, neither's light tells that of the other. */
@@ -4933,6 +4941,7 @@ ISOGI_API isogi_result isogi_trace_gather_field(const isogi_trace_desc *desc, is
 #undef ISOGI_TRACE__PLANE
 #undef ISOGI_TRACE__COLOURS
 #undef ISOGI_TRACE__CELL_RATIO
+#undef ISOGI_TRACE__HALF
 #undef ISOGI_TRACE__CELL_FAR
 #undef ISOGI_TRACE__CELL
 #undef ISOGI_TRACE__PROBE_SHARE

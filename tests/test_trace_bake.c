@@ -161,6 +161,43 @@ TEST(bias_against_paths_is_small) {
     scene_free(&s);
 }
 
+/* Voxels that are flat, long or both. Cells of probes that were cubes of the smallest spacing would number up to its ratio squared; they
+   are half a voxel wide at least, so at most some 8 times as many. Light stays that of paths: noise 1 %, bias of probes as above. */
+TEST(flat_and_long_voxels_need_few_probes) {
+    static const double spacings[6][3] = {{1, 1, 1}, {1, 1, 100}, {1, 1, 1000}, {1, 1, 0.01}, {0.1, 1, 10}, {1e-9, 1, 1e9}};
+    double q[1] = {0.5};
+    scene s = scene_make(24, 24, 24, NULL, gyroid, q);
+    uint64_t cubes = 0;
+    for (int k = 0; k < 6; k++) {
+        static float points[200][3], e[2][200][3];
+        double mean[2] = {0, 0}, remaining = 1;
+        isogi_trace_report report = {0};
+        int n;
+        isogi_vol_free(s.pyramid), s.pyramid = NULL;
+        memcpy(s.volume.spacing, spacings[k], sizeof s.volume.spacing);
+        CHECK(isogi_vol_build(&s.pyramid, &s.volume, NULL) == ISOGI_OK, "pyramid %d", k);
+        n = surface_points(&s, 0, LONG_SUITE ? 200 : 100, 6, points);
+        for (int method = 0; method < 2; method++) {
+            isogi_trace_desc d = desc_make(&s, 0.7f, -1, LONG_SUITE ? 64 : 16);
+            isogi_trace *t = NULL;
+            d.method = (isogi_trace_method)method, d.lazy = 1;
+            CHECK(isogi_trace_create(&t, &d, NULL) == ISOGI_OK && isogi_trace_request(t, (const float(*)[3])points, (size_t)n) == ISOGI_OK, "spacing %d", k);
+            remaining = 1;
+            for (int step = 0; step < (LONG_SUITE ? 40 : 10) && remaining > 0; step++) isogi_trace_step(t, 50000, &remaining);
+            CHECK(remaining <= 0, "spacing %d, method %d: does not end, %g remain", k, method, remaining);
+            isogi_trace_sample(t, (const float(*)[3])points, (size_t)n, e[method], NULL);
+            if (!method) isogi_trace_status(t, &report);
+            for (int i = 0; i < n; i++) mean[method] += (double)e[method][i][1] / n;
+            isogi_trace_free(t);
+        }
+        if (!k) cubes = report.probes;
+        printf("    spacing %g %g %g: %llu probes, E %.4f, of paths %.4f\n", spacings[k][0], spacings[k][1], spacings[k][2], (unsigned long long)report.probes, mean[0], mean[1]);
+        CHECK(report.probes < 10 * cubes, "spacing %d: %llu probes, %llu in cubes", k, (unsigned long long)report.probes, (unsigned long long)cubes);
+        CHECK(fabs(mean[0] - mean[1]) < 0.03 * mean[1], "spacing %d: E %.4f, of paths %.4f", k, mean[0], mean[1]);
+    }
+    scene_free(&s);
+}
+
 /* ---- determinism and stepping ---------------------------------------------------------------------------------------------- */
 
 TEST(same_bits_for_any_threads_and_budget) {
