@@ -119,7 +119,7 @@ TEST(convention) {
 
 /* Largest absolute error in double over hard and random directions. The bounds are those that the header states. */
 TEST(double_evaluation_is_exact) {
-    static const struct { int degree; double bound; } cases[] = {{4, 1.1e-15}, {10, 7e-15}, {20, 3e-14}, {50, 2e-13}, {100, 1e-12}};
+    static const struct { int degree; double bound; } cases[] = {{4, 1e-15}, {10, 5e-15}, {20, 1.5e-14}, {50, 6e-14}, {100, 2e-13}};
     static double y[MAX_COUNT];
     static quad expected[MAX_COUNT];
     for (size_t c = 0; c < sizeof cases / sizeof *cases; c++) {
@@ -174,7 +174,7 @@ TEST(float_evaluation_is_exact) {
 /* Batches, in both types and at every instruction level, which go other ways than single directions: within the same bounds. More
    directions close to the poles and the equator, where polynomials and recursions cancel most. */
 TEST(batches_are_exact_at_every_level) {
-    static const struct { int order; double bound, bound64; } cases[] = {{3, 4.5e-7, 1.1e-15}, {4, 4.5e-7, 1.1e-15}, {5, 4.5e-7, 1.1e-15}, {8, 2.2e-6, 7e-15}, {11, 2.2e-6, 7e-15}, {21, 1e-5, 3e-14}};
+    static const struct { int order; double bound, bound64; } cases[] = {{3, 4.5e-7, 1e-15}, {4, 4.5e-7, 1e-15}, {5, 4.5e-7, 1e-15}, {8, 2.2e-6, 5e-15}, {11, 2.2e-6, 5e-15}, {21, 1e-5, 1.5e-14}};
     enum { MOST = 2400 };
     static float d[MOST][3], y[MOST * 441];
     static double wide[MOST][3], y64[MOST * 441];
@@ -371,15 +371,17 @@ TEST(one_bad_direction_in_a_batch_counts_as_up) {
 
 /* f rotated, evaluated at w, is f evaluated at R^-1 w: 1000 random rotations, every order 1..16 in turn, and a few high ones.
    1e-12: thousands of roundings of coefficients of size 1. */
+/* Within what evaluation at both directions may err: its bound at the order, of a vector of that norm. */
 TEST(rotation_agrees_with_evaluation) {
     static double c[MAX_COUNT], rotated[MAX_COUNT], y[MAX_COUNT];
     test_random r = {4};
     double worst = 0;
     for (int i = 0; i < 1010; i++) {
         int order = i < 1000 ? 1 + i % 16 : 101, n = order * order;
-        double m[9], w[1][3], back[1][3], a = 0, b = 0;
+        const double bound = order <= 5 ? 1e-15 : order <= 11 ? 5e-15 : order <= 21 ? 1.5e-14 : 2e-13;
+        double m[9], w[1][3], back[1][3], a = 0, b = 0, norm = 0;
         random_rotation(&r, m);
-        for (int k = 0; k < n; k++) c[k] = random_range(&r, -1, 1) / (i < 1000 ? 1 : order);
+        for (int k = 0; k < n; k++) c[k] = random_range(&r, -1, 1), norm += c[k] * c[k];
         CHECK(isogi_sh_rotate_f64(rotated, c, order, 1, m) == ISOGI_OK, "rotation %d", i);
         random_direction(&r, w[0]);
         apply(back[0], m, w[0], 1);
@@ -387,10 +389,10 @@ TEST(rotation_agrees_with_evaluation) {
         for (int k = 0; k < n; k++) a += rotated[k] * y[k];
         isogi_sh_eval_f64(y, order, (const double(*)[3])back, 1);
         for (int k = 0; k < n; k++) b += c[k] * y[k];
-        worst = fmax(worst, fabs(a - b));
-        CHECK(fabs(a - b) < 1e-12, "rotation %d, order %d: %.17g and %.17g", i, order, a, b);
+        worst = fmax(worst, fabs(a - b) / (2 * bound * sqrt(norm)));
+        CHECK(fabs(a - b) < 2 * bound * sqrt(norm) * ROUNDING_FACTOR, "rotation %d, order %d: %.17g and %.17g", i, order, a, b);
     }
-    printf("    largest difference %.3g\n", worst);
+    printf("    largest difference %.3g of what evaluation may err\n", worst);
 }
 
 /* ---- projection ---- */
@@ -1057,7 +1059,7 @@ TEST(composed_rotations_do_not_drift) {
             }
             for (int i = 1; i < order * order; i++) before += start[i] * start[i], after_float += (double)f[i] * (double)f[i];
             printf("    order %d in float, %s: norm drift %.3g\n", order, random ? "random rotations" : "the same rotation", sqrt(after_float / before) - 1);
-            CHECK(fabs(sqrt(after_float / before) - 1) < (random ? 5e-4 : 2e-3), "order %d: drift %g", order, sqrt(after_float / before) - 1);
+            CHECK(fabs(sqrt(after_float / before) - 1) < 5e-4, "order %d: drift %g", order, sqrt(after_float / before) - 1);
         }
     double identity[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1}, half[9] = {-1, 0, 0, 0, 1, 0, 0, 0, -1}, tiny[9] = {1, 0, 1e-9, 0, 1, 0, -1e-9, 0, 1}, out[N];
     isogi_sh_rotate_f64(out, start, ORDER, 1, identity);
@@ -1494,7 +1496,7 @@ TEST(lighting_is_validated) {
     }
     lights[0].vector[1] = 0;
     CHECK(isogi_lighting_validate(&good) == ISOGI_INVALID, "%s", "a direction of no length");
-    lights[0].vector[1] = 1, lights[0].kind = (isogi_light_kind)3;
+    lights[0].vector[1] = 1, lights[0].kind = (isogi_light_kind)(ISOGI_LIGHT_RECTANGLE + 1);
     CHECK(isogi_lighting_validate(&good) == ISOGI_INVALID, "%s", "kind");
     lights[0].kind = ISOGI_LIGHT_SPHERE, lights[0].radius = -1;
     CHECK(isogi_lighting_validate(&good) == ISOGI_INVALID, "%s", "negative radius");
