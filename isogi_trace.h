@@ -423,7 +423,7 @@ ISOGI_API size_t isogi_trace_memory(const isogi_trace *trace); /* bytes that the
 #define ISOGI_TRACE__SWEEP 256     /* nodes in a task that traces no rays */
 #define ISOGI_TRACE__GROUP 65536   /* texels that are worked on together, about */
 #define ISOGI_TRACE__PROBE_SHARE 5   /* samples of a texel to those of a probe, */
-#define ISOGI_TRACE__PROBE_LEAST 2   /* which has at least so many, */
+#define ISOGI_TRACE__PROBE_LEAST 2  /* which has at least so many (if the texel has), */
 #define ISOGI_TRACE__PROBE_MOST 8   /* and at most so many */
 #define ISOGI_TRACE__PROBE_ERROR 0.02 /* standard error of light from probes */
 #define ISOGI_TRACE__CELL 2.0       /* of probes that texels read, in voxels, */
@@ -434,8 +434,6 @@ ISOGI_API size_t isogi_trace_memory(const isogi_trace *trace); /* bytes that the
 #define ISOGI_TRACE__PLANE 1.0      /* voxels between the planes of a hit and its probe */
 #define ISOGI_TRACE__COLOURS 0.05   /* of albedo, or share of the glow, by which isosurfaces of the same probe may differ */
 #define ISOGI_TRACE__LIGHT_FIRST 4u /* samples of a texel with one of each light */
-#define ISOGI_TRACE__FILTER 1       /* texels to each side */
-#define ISOGI_TRACE__FILTER_WIDTH 4.0
 
 /* ==== numbers that survive -ffast-math =============================================================================== */
 
@@ -2615,25 +2613,29 @@ typedef struct isogi_trace__node {
 
 /* The hits of one batch: node[i] has probe[begin[i]] .. probe[begin[i+1] - 1]. */
 typedef struct isogi_trace__segment {
-    struct isogi_trace__segment *next;
     size_t entries, hits;
     uint32_t *node, *begin, *probe;
+    double change, largest; /* by the last pass, of probes */
 } isogi_trace__segment;
 
-/* What the filter compares. albedo, glow: of the surface through the texel, which is the one that its rays meet. */
+/* What the filter compares. lights: variance of the light that is not filtered. albedo, glow: of the surface through the texel, which
+   is the one that its rays meet. */
 typedef struct isogi_trace__guide {
-    float normal[3], mean[3], luminance, variance;
+    float normal[3], mean[3], luminance, variance, lights;
+    uint32_t samples; /* 0: nothing was gathered */
     float albedo[3], glow[3];
     float hidden, reflected; /* share of rays that hit, and luminance of what was reflected there */
 } isogi_trace__guide;
 
-/* Texels, or probes. direct: sums over rays that escaped; bounce: over those that hit; out: irradiance or transfer. */
+/* Texels, or probes. direct: sums over rays that escaped; bounce: of texels over rays that hit, of probes what comes from sky and lights;
+   out: irradiance or transfer. */
 typedef struct isogi_trace__set {
     isogi_trace__node *nodes;
     float *direct, *bounce, *out[2];
     isogi_trace__guide *guide;
     size_t count, capacity;
-    isogi_trace__segment *segments, *last;
+    isogi_trace__segment *segments;
+    size_t segment_count, segment_capacity;
 } isogi_trace__set;
 
 /* Samples first .. first + count - 1 of a node, and what they brought. */
@@ -2678,12 +2680,10 @@ struct isogi_trace__feedback {
 
 static void isogi_trace__set_free(const isogi_trace *t, isogi_trace__set *s) {
     size_t v = (size_t)t->values;
-    while (s->segments) {
-        isogi_trace__segment *next = s->segments->next;
-        isogi_release(&t->context, s->segments->node, 2 * s->segments->entries + 1 + s->segments->hits, sizeof(uint32_t));
-        isogi_release(&t->context, s->segments, 1, sizeof *s->segments);
-        s->segments = next;
-    }
+    size_t i;
+    for (i = 0; i < s->segment_count; i++)
+        isogi_release(&t->context, s->segments[i].node, 2 * s->segments[i].entries + 1 + s->segments[i].hits, sizeof(uint32_t));
+    isogi_release(&t->context, s->segments, s->segment_capacity, sizeof *s->segments);
     isogi_release(&t->context, s->nodes, s->capacity, sizeof *s->nodes);
     isogi_release(&t->context, s->direct, s->capacity * v, 4 * sizeof(float));
     isogi_release(&t->context, s->guide, s->capacity, sizeof *s->guide);
@@ -2912,6 +2912,7 @@ static uint32_t isogi_trace__block(const isogi_trace *t, int is_probe, int level
     if (is_probe) {
         sum = samples / ISOGI_TRACE__PROBE_SHARE;
         sum = sum > ISOGI_TRACE__PROBE_LEAST ? sum : ISOGI_TRACE__PROBE_LEAST;
+        sum = sum < samples ? sum : samples;
         return level ? sum < ISOGI_TRACE__PROBE_MOST ? sum : ISOGI_TRACE__PROBE_MOST : 0;
     }
     if (!isogi_trace__in_blocks(&t->scene.desc)) return level ? samples : 0;
@@ -2947,6 +2948,7 @@ typedef struct isogi_trace__cast {
     int count;
     isogi_ray ray[ISOGI_TRACE__FLUSH];
     isogi_hit hit[ISOGI_TRACE__FLUSH];
+    uint8_t blocked[ISOGI_TRACE__FLUSH]; /* shadow: in place of the hits */
     float normal[ISOGI_TRACE__FLUSH][3];
     uint32_t owner[ISOGI_TRACE__FLUSH], sample[ISOGI_TRACE__FLUSH];
     double weight[ISOGI_TRACE__FLUSH]; /* cosine: pi times the density */
@@ -3025,7 +3027,7 @@ static void isogi_trace__cast_land(isogi_trace__cast *c, int first, int count) {
         isogi_trace__span *span = &c->span[c->owner[i]];
         if (c->shadow) {
             double luminance = isogi_trace__luminance(c->rgb[i]);
-            if (c->hit[i].side) continue;
+            if (c->blocked[i]) continue;
             for (a = 0; a < 3; a++) *(c->bright ? &span->sum.bright[a] : &span->sum.light[a]) += c->rgb[i][a];
             c->sum[c->owner[i]] += luminance, c->square[c->owner[i]] += luminance * luminance;
             continue;
@@ -3038,10 +3040,13 @@ static void isogi_trace__cast_land(isogi_trace__cast *c, int first, int count) {
 static void isogi_trace__cast_flush(isogi_trace__cast *c) {
     const isogi_trace__scene *scene = &c->trace->scene;
     if (!c->count) return;
-    if (c->shadow && scene->desc.no_shadows) memset(c->hit, 0, sizeof c->hit);
-    else isogi_vol_intersect(scene->pyramid, c->ray, (size_t)c->count, c->hit, c->counters);
-    if (!c->shadow)
+    if (c->shadow) {
+        memset(c->blocked, 0, sizeof c->blocked);
+        if (!scene->desc.no_shadows) isogi_vol_occluded(scene->pyramid, c->ray, (size_t)c->count, c->blocked, c->counters);
+    } else {
+        isogi_vol_intersect(scene->pyramid, c->ray, (size_t)c->count, c->hit, c->counters);
         isogi_vol_normals(scene->pyramid, c->hit, (size_t)c->count, ISOGI_NORMAL_TRILINEAR, c->normal);
+    }
     isogi_trace__cast_land(c, 0, c->count);
     c->count = 0;
 }
@@ -3058,7 +3063,8 @@ static void isogi_trace__cast_add(isogi_trace__cast *c, const float dir[3], doub
     if (site->on_surface) {
         if (c->shadow && scene->desc.no_shadows) memset(&c->hit[i], 0, sizeof c->hit[i]);
         else isogi_trace__site_rays(scene, site, (const float(*)[3])dir, &tmax, 1, &c->hit[i], c->counters);
-        isogi_vol_normals(scene->pyramid, &c->hit[i], 1, ISOGI_NORMAL_TRILINEAR, &c->normal[i]);
+        c->blocked[i] = c->hit[i].side != 0;
+        if (!c->shadow) isogi_vol_normals(scene->pyramid, &c->hit[i], 1, ISOGI_NORMAL_TRILINEAR, &c->normal[i]);
         isogi_trace__cast_land(c, i, 1);
         return;
     }
@@ -3253,27 +3259,38 @@ static void isogi_trace__spans_fill(isogi_trace *t, uint64_t limit) {
     if (!f->span_count) f->task_count = 0;
 }
 
+/* Room for one more segment. */
+static isogi_result isogi_trace__segments_reserve(const isogi_trace *t, isogi_trace__set *set) {
+    size_t capacity = set->segment_capacity ? 2 * set->segment_capacity : 32;
+    isogi_trace__segment *segments;
+    if (set->segment_count < set->segment_capacity) return ISOGI_OK;
+    segments = (isogi_trace__segment *)isogi_allocate(&t->context, capacity, sizeof *segments);
+    if (!segments) return ISOGI_NO_MEMORY;
+    if (set->segment_count) memcpy(segments, set->segments, set->segment_count * sizeof *segments);
+    isogi_release(&t->context, set->segments, set->segment_capacity, sizeof *segments);
+    set->segments = segments, set->segment_capacity = capacity;
+    return ISOGI_OK;
+}
+
 /* The segment of the batch's hits; probes are made where there are none. */
-static isogi_result isogi_trace__segment_new(isogi_trace *t, isogi_trace__segment **to) {
+static isogi_result isogi_trace__segment_new(isogi_trace *t, isogi_trace__segment *s) {
     isogi_trace__feedback *f = t->feedback;
-    isogi_trace__segment *s;
     size_t i, hits = 0, at = 0, k;
     for (i = 0; i < f->sample_count; i++) hits += f->catches[i].key != 0;
-    s = (isogi_trace__segment *)isogi_allocate(&t->context, 1, sizeof *s);
-    if (!s) return ISOGI_NO_MEMORY;
     memset(s, 0, sizeof *s);
     s->entries = f->span_count, s->hits = hits;
     s->node = (uint32_t *)isogi_allocate(&t->context, 2 * s->entries + 1 + hits, sizeof(uint32_t));
-    s->begin = s->node + s->entries, s->probe = s->begin + s->entries + 1;
-    *to = s;
     if (!s->node) return ISOGI_NO_MEMORY;
+    s->begin = s->node + s->entries, s->probe = s->begin + s->entries + 1;
     for (i = 0; i < f->span_count; i++) {
         s->node[i] = f->spans[i].node, s->begin[i] = (uint32_t)at;
         for (k = f->spans[i].offset; k < f->spans[i].offset + f->spans[i].count; k++) {
             isogi_result result;
             if (!f->catches[k].key) continue;
             result = isogi_trace__probe_of(t, &f->catches[k], f->spans[i].sum.isovalue, &s->probe[at++]);
-            if (result != ISOGI_OK) return result;
+            if (result == ISOGI_OK) continue;
+            isogi_release(&t->context, s->node, 2 * s->entries + 1 + hits, sizeof(uint32_t));
+            return result;
         }
     }
     s->begin[s->entries] = (uint32_t)at;
@@ -3318,23 +3335,17 @@ static void isogi_trace__span_commit(isogi_trace *t, isogi_trace__set *set, cons
 static isogi_result isogi_trace__spans_run(isogi_trace *t, double from, double to) {
     isogi_trace__feedback *f = t->feedback;
     isogi_trace__set *set = f->on_probes ? &f->probes : &f->texels;
-    isogi_trace__segment *segment = NULL;
-    isogi_result cancelled = isogi_parallel(&t->context, f->task_count, isogi_trace__cast_task, t, from, to), result;
+    isogi_trace__segment segment;
+    isogi_result result = isogi_parallel(&t->context, f->task_count, isogi_trace__cast_task, t, from, to);
     size_t i;
-    if (cancelled != ISOGI_OK) return cancelled;
-    result = isogi_trace__segment_new(t, &segment);
-    if (result != ISOGI_OK) {
-        if (segment) isogi_release(&t->context, segment->node, 2 * segment->entries + 1 + segment->hits, sizeof(uint32_t));
-        isogi_release(&t->context, segment, 1, sizeof *segment);
-        return result;
-    }
-    if (set->last) set->last->next = segment;
-    else set->segments = segment;
-    set->last = segment;
+    if (result == ISOGI_OK) result = isogi_trace__segments_reserve(t, set);
+    if (result == ISOGI_OK) result = isogi_trace__segment_new(t, &segment);
+    if (result != ISOGI_OK) return result;
+    set->segments[set->segment_count++] = segment;
     for (i = 0; i < f->task_count; i++) isogi_trace__add(&t->counters, &t->task_counters[i]);
     for (i = 0; i < f->span_count; i++) {
         int first = f->spans[i].sum.brick && !set->nodes[f->spans[i].node].samples;
-        isogi_trace__span_commit(t, set, &f->spans[i], segment->begin[i + 1] - segment->begin[i]);
+        isogi_trace__span_commit(t, set, &f->spans[i], segment.begin[i + 1] - segment.begin[i]);
         if (first) isogi_trace__texel_guess(t, f->spans[i].node);
     }
     return ISOGI_OK;
@@ -3345,7 +3356,6 @@ static isogi_result isogi_trace__spans_run(isogi_trace *t, double from, double t
 typedef struct isogi_trace__sweep {
     isogi_trace *trace;
     const isogi_trace__segment *segment;
-    double *change, *largest; /* of each task */
 } isogi_trace__sweep;
 
 /* What comes from sky and lights, as irradiance or transfer. */
@@ -3370,54 +3380,76 @@ static double isogi_trace__hit_albedo(const isogi_trace *t, const isogi_trace__n
     return (double)n->albedo[isogi_trace__channel(t, value)];
 }
 
-/* One pass over the probes of a segment, each of which has one entry: from out[0] to out[1]. */
-static void isogi_trace__pass_task(void *arg, size_t task) {
-    const isogi_trace__sweep *sweep = (const isogi_trace__sweep *)arg;
-    const isogi_trace *t = sweep->trace;
-    const isogi_trace__segment *s = sweep->segment;
+/* What passes read of probes, in few bytes: light from sky and lights, and in their guides albedo by channel and 1 / samples. The
+   first pass begins without any light. */
+static void isogi_trace__direct_task(void *arg, size_t task) {
+    const isogi_trace *t = (const isogi_trace *)arg;
     isogi_trace__set *set = &t->feedback->probes;
-    size_t i = task * ISOGI_TRACE__SWEEP, end = i + ISOGI_TRACE__SWEEP < s->entries ? i + ISOGI_TRACE__SWEEP : s->entries, v = (size_t)t->values, k;
-    sweep->change[task] = sweep->largest[task] = 0;
+    size_t v = (size_t)t->values, i = task * ISOGI_TRACE__SWEEP, end = i + ISOGI_TRACE__SWEEP < set->count ? i + ISOGI_TRACE__SWEEP : set->count;
+    int a;
     for (; i < end; i++) {
-        size_t node = s->node[i];
-        const isogi_trace__node *n = &set->nodes[node];
-        double sum[3 * ISOGI_TRACE__MAX_ORDER * ISOGI_TRACE__MAX_ORDER];
-        int a;
-        memset(sum, 0, v * sizeof *sum);
-        for (k = s->begin[i]; k < s->begin[i + 1]; k++)
-            for (a = 0; a < t->values; a++)
-                sum[a] += isogi_trace__hit_albedo(t, n, s->probe[k], a) * (double)set->out[0][s->probe[k] * v + (size_t)a];
+        const isogi_trace__node *n = &set->nodes[i];
+        isogi_trace__guide *g = &set->guide[i];
         for (a = 0; a < t->values; a++) {
-            double e = isogi_trace__node_direct(t, set, node, a) + sum[a] / n->samples;
-            double change = fabs(e - (double)set->out[0][node * v + (size_t)a]);
-            set->out[1][node * v + (size_t)a] = (float)e;
-            if (change > sweep->change[task]) sweep->change[task] = change;
-            if (fabs(e) > sweep->largest[task]) sweep->largest[task] = fabs(e);
+            set->bounce[i * v + (size_t)a] = (float)isogi_trace__node_direct(t, set, i, a);
+            set->out[0][i * v + (size_t)a] = 0;
+            if (a < 3) g->albedo[a] = (float)isogi_trace__hit_albedo(t, n, (uint32_t)i, a);
+        }
+        g->mean[0] = n->samples ? 1.0f / (float)n->samples : 0;
+    }
+}
+
+/* One pass over the probes of a segment, each of which has one entry: from out[0] to out[1]. by_place: hits have the albedo of the
+   probe that they meet, else that of the probe that they come from. */
+static void isogi_trace__pass_segment(isogi_trace__set *set, isogi_trace__segment *s, size_t values, size_t channels, int by_place) {
+    const float *out = set->out[0];
+    size_t i, k, a;
+    double largest = 0, most = 0;
+    for (i = 0; i < s->entries; i++) {
+        size_t node = s->node[i];
+        const isogi_trace__guide *g = &set->guide[node];
+        double sum[3 * ISOGI_TRACE__MAX_ORDER * ISOGI_TRACE__MAX_ORDER];
+        for (a = 0; a < values; a++) sum[a] = 0;
+        for (k = s->begin[i]; k < s->begin[i + 1]; k++) {
+            const float *e = out + s->probe[k] * values;
+            if (by_place)
+                for (a = 0; a < values; a++) sum[a] += (double)set->guide[s->probe[k]].albedo[a % channels] * (double)e[a];
+            else
+                for (a = 0; a < values; a++) sum[a] += (double)e[a];
+        }
+        for (a = 0; a < values; a++) {
+            double share = (double)g->mean[0] * (by_place ? 1 : (double)g->albedo[a % channels]);
+            double e = (double)set->bounce[node * values + a] + share * sum[a], change = fabs(e - (double)out[node * values + a]);
+            set->out[1][node * values + a] = (float)e;
+            most = change > most ? change : most, largest = fabs(e) > largest ? fabs(e) : largest;
         }
     }
+    s->change = most, s->largest = largest;
+}
+
+static void isogi_trace__pass_task(void *arg, size_t segment) {
+    const isogi_trace *t = (const isogi_trace *)arg;
+    isogi_trace__set *set = &t->feedback->probes;
+    isogi_trace__segment *s = &set->segments[segment];
+    size_t channels = t->scene.desc.mode == ISOGI_TRACE_TRANSFER ? (size_t)t->scene.desc.transfer_channels : 3;
+    if (t->values == 3 && channels == 3 && !t->scene.desc.material) isogi_trace__pass_segment(set, s, 3, 3, 0); /* the compiler unrolls it */
+    else isogi_trace__pass_segment(set, s, (size_t)t->values, channels, t->scene.desc.material != NULL);
 }
 
 /* One pass over all probes; the largest change and the largest value. */
 static void isogi_trace__pass(isogi_trace *t, double change[2]) {
-    isogi_trace__feedback *f = t->feedback;
+    isogi_trace__set *set = &t->feedback->probes;
     isogi_context silent = t->context;
-    isogi_trace__sweep sweep;
-    double changes[ISOGI_TRACE__SPANS / ISOGI_TRACE__SWEEP + 1], largest[ISOGI_TRACE__SPANS / ISOGI_TRACE__SWEEP + 1];
     float *out;
-    change[0] = change[1] = 0;
+    size_t i;
     silent.progress = NULL;
-    sweep.trace = t, sweep.change = changes, sweep.largest = largest;
-    for (sweep.segment = f->probes.segments; sweep.segment; sweep.segment = sweep.segment->next) {
-        size_t tasks = (sweep.segment->entries + ISOGI_TRACE__SWEEP - 1) / ISOGI_TRACE__SWEEP, i;
-        isogi_parallel(&silent, tasks, isogi_trace__pass_task, &sweep, 0, 1);
-        for (i = 0; i < tasks; i++) {
-            /* cppcheck-suppress uninitvar */
-            if (changes[i] > change[0]) change[0] = changes[i];
-            /* cppcheck-suppress uninitvar */
-            if (largest[i] > change[1]) change[1] = largest[i];
-        }
+    isogi_parallel(&silent, set->segment_count, isogi_trace__pass_task, t, 0, 1);
+    change[0] = change[1] = 0;
+    for (i = 0; i < set->segment_count; i++) {
+        if (set->segments[i].change > change[0]) change[0] = set->segments[i].change;
+        if (set->segments[i].largest > change[1]) change[1] = set->segments[i].largest;
     }
-    out = f->probes.out[0], f->probes.out[0] = f->probes.out[1], f->probes.out[1] = out;
+    out = set->out[0], set->out[0] = set->out[1], set->out[1] = out;
 }
 
 /* As many passes as reflections (the first brings what comes from sky and lights alone), or until all that later ones would add, by
@@ -3427,8 +3459,9 @@ static void isogi_trace__solve(isogi_trace *t) {
     isogi_trace__feedback *f = t->feedback;
     int bounces = t->scene.desc.bounces, pass;
     double change[2] = {0, 0}, before = 0, middle = 0;
-    f->diverges = 0;
-    if (f->probes.count) memset(f->probes.out[0], 0, f->probes.count * (size_t)t->values * sizeof(float));
+    isogi_context silent = t->context;
+    silent.progress = NULL, f->diverges = 0;
+    isogi_parallel(&silent, (f->probes.count + ISOGI_TRACE__SWEEP - 1) / ISOGI_TRACE__SWEEP, isogi_trace__direct_task, t, 0, 1);
     for (pass = 0; bounces < 0 || pass < bounces; pass++) {
         isogi_trace__pass(t, change);
         if (change[0] <= 1e-7 * change[1]) break;
@@ -3484,6 +3517,12 @@ static void isogi_trace__guide_colours(const isogi_trace *t, const isogi_trace__
     isogi_trace_material(d, n->isovalue, point, g->albedo, g->glow);
 }
 
+/* Variance of the light that is not filtered. */
+static double isogi_trace__light_variance(const isogi_trace__node *n) {
+    double k = (double)n->samples, l = (double)n->light_samples;
+    return (k > 1 ? ISOGI_TRACE__PI * ISOGI_TRACE__PI * n->bright_spread / (k * (k - 1)) : 0) + (l > 1 ? n->light_spread / (l * (l - 1)) : 0);
+}
+
 /* The part of a texel's irradiance that neighbours may share, and its variance: what cosine-distributed rays brought. */
 static void isogi_trace__guide_task(void *arg, size_t task) {
     isogi_trace *t = (isogi_trace *)arg;
@@ -3495,6 +3534,7 @@ static void isogi_trace__guide_task(void *arg, size_t task) {
         double scale = n->samples ? 1.0 / n->samples : 0, rgb[3] = {0, 0, 0};
         int a;
         memcpy(g->normal, n->normal, sizeof g->normal);
+        g->samples = n->samples, g->lights = (float)isogi_trace__light_variance(n);
         for (a = 0; a < t->values; a++)
             set->out[0][i * v + (size_t)a] = (float)(ISOGI_TRACE__PI * scale * (double)set->direct[i * v + (size_t)a] +
                                                       scale * (double)set->bounce[i * v + (size_t)a]);
@@ -3512,21 +3552,6 @@ static void isogi_trace__guide_task(void *arg, size_t task) {
     }
 }
 
-/* The guide of a texel; NULL: nothing was gathered there. */
-static const isogi_trace__guide *isogi_trace__guide_at(const isogi_trace *t, const size_t texel[3], uint32_t *node) {
-    uint32_t slot;
-    const isogi_trace__brick *brick = t->bricks[isogi_trace__brick_of(t, texel, &slot)];
-    if (!brick || !brick->node || !brick->node[slot]) return NULL;
-    *node = brick->node[slot] - 1;
-    return t->feedback->texels.nodes[*node].samples ? &t->feedback->texels.guide[*node] : NULL;
-}
-
-/* Variance of the light that is not filtered. */
-static double isogi_trace__light_variance(const isogi_trace__node *n) {
-    double k = (double)n->samples, l = (double)n->light_samples;
-    return (k > 1 ? ISOGI_TRACE__PI * ISOGI_TRACE__PI * n->bright_spread / (k * (k - 1)) : 0) + (l > 1 ? n->light_spread / (l * (l - 1)) : 0);
-}
-
 /* How much the light of two texels differs because their isosurfaces have other colours: what no sample has to show. */
 static double isogi_trace__other_colours(const isogi_trace *t, const isogi_trace__guide *g, const isogi_trace__guide *q) {
     const isogi_trace_desc *d = &t->scene.desc;
@@ -3542,42 +3567,58 @@ static double isogi_trace__other_colours(const isogi_trace *t, const isogi_trace
     return ISOGI_TRACE__PI * hidden * isogi_trace__luminance(glow) + most * isogi_trace__luminance(albedo);
 }
 
+/* What lies around a texel, itself included: guides of those that have one, and squares of their distances. */
+static int isogi_trace__around_texel(const isogi_trace *t, const size_t texel[3], const isogi_trace__guide **guide, int *apart) {
+    const isogi_trace__set *set = &t->feedback->texels;
+    size_t brick[3][3], pitch = 1;
+    uint32_t slot[3][3], node;
+    int first[3], last[3], d[3], a, count = 0;
+    for (a = 0; a < 3; a++) {
+        first[a] = texel[a] ? -1 : 0, last[a] = texel[a] + 1 < t->lattice[a] ? 1 : 0;
+        for (d[0] = first[a]; d[0] <= last[a]; d[0]++) {
+            size_t x = texel[a] + (size_t)d[0]; /* wraps twice */
+            brick[a][d[0] + 1] = x / ISOGI_TRACE__SIDE * pitch, slot[a][d[0] + 1] = (uint32_t)(x % ISOGI_TRACE__SIDE) << (2 * a);
+        }
+        pitch *= t->size[a];
+    }
+    for (d[2] = first[2]; d[2] <= last[2]; d[2]++)
+        for (d[1] = first[1]; d[1] <= last[1]; d[1]++)
+            for (d[0] = first[0]; d[0] <= last[0]; d[0]++) {
+                const isogi_trace__brick *b = t->bricks[brick[0][d[0] + 1] + brick[1][d[1] + 1] + brick[2][d[2] + 1]];
+                if (!b || !b->node) continue;
+                node = b->node[slot[0][d[0] + 1] + slot[1][d[1] + 1] + slot[2][d[2] + 1]];
+                if (!node || !set->guide[node - 1].samples) continue;
+                guide[count] = &set->guide[node - 1], apart[count++] = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
+            }
+    return count;
+}
+
 /* Mean over the texels around that face the same way and whose light may be the same within its noise. Writes the filtered rgb, its
    variance, and the variance of other light, averaged over the same texels. Returns the number of samples that this is as good as. */
 static double isogi_trace__filter(const isogi_trace *t, size_t node, double rgb[3], double variance[2]) {
-    const isogi_trace__set *set = &t->feedback->texels;
-    const isogi_trace__guide *g = &set->guide[node];
-    const isogi_trace__node *n = &set->nodes[node];
+    static const double by_distance[4] = {1, 0.77880078307140488, 0.60653065971263342, 0.47236655274101469}; /* exp(-square / 4) */
+    const isogi_trace__guide *g = &t->feedback->texels.guide[node], *around[27];
     double total = 0, squares = 0;
-    int d[3], a;
+    int square[27], count = isogi_trace__around_texel(t, t->feedback->texels.nodes[node].texel, around, square), i, a;
     rgb[0] = rgb[1] = rgb[2] = variance[0] = variance[1] = 0;
-    for (d[2] = -ISOGI_TRACE__FILTER; d[2] <= ISOGI_TRACE__FILTER; d[2]++)
-        for (d[1] = -ISOGI_TRACE__FILTER; d[1] <= ISOGI_TRACE__FILTER; d[1]++)
-            for (d[0] = -ISOGI_TRACE__FILTER; d[0] <= ISOGI_TRACE__FILTER; d[0]++) {
-                const isogi_trace__guide *q;
-                size_t x[3];
-                uint32_t other;
-                double w, facing, apart, noise, colours;
-                for (a = 0; a < 3; a++) x[a] = n->texel[a] + (size_t)d[a]; /* wraps below zero: beyond the lattice */
-                if (x[0] >= t->lattice[0] || x[1] >= t->lattice[1] || x[2] >= t->lattice[2]) continue;
-                q = isogi_trace__guide_at(t, x, &other);
-                if (!q) continue;
-                facing = isogi_trace__dot(g->normal, q->normal);
-                if (!(facing > 0.5)) continue;
-                facing *= facing, facing *= facing, facing *= facing;
-                apart = (double)g->luminance - (double)q->luminance, noise = (double)g->variance + (double)q->variance;
-                apart = apart * apart - noise;
-                colours = isogi_trace__other_colours(t, g, q);
-                if (colours > 0) apart = (apart > 0 ? apart : 0) + 4 * colours * colours;
-                w = apart > 0 ? noise > 0 ? exp(-apart / noise) : 0 : 1;
-                w *= facing * facing * exp(-(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]) / ISOGI_TRACE__FILTER_WIDTH);
-                squares += w * w * set->nodes[other].samples;
-                w *= set->nodes[other].samples;
-                total += w;
-                for (a = 0; a < 3; a++) rgb[a] += w * (double)q->mean[a];
-                variance[0] += w * w * (double)q->variance;
-                variance[1] += w * isogi_trace__light_variance(&set->nodes[other]);
-            }
+    for (i = 0; i < count; i++) {
+        const isogi_trace__guide *q = around[i];
+        double w, facing = isogi_trace__dot(g->normal, q->normal), apart, noise, colours;
+        if (!(facing > 0.5)) continue;
+        facing *= facing, facing *= facing, facing *= facing;
+        apart = (double)g->luminance - (double)q->luminance, noise = (double)g->variance + (double)q->variance;
+        apart = apart * apart - noise;
+        colours = isogi_trace__other_colours(t, g, q);
+        if (colours > 0) apart = (apart > 0 ? apart : 0) + 4 * colours * colours;
+        w = facing * facing * by_distance[square[i]];
+        if (apart > 0) w *= noise > 0 ? exp(-apart / noise) : 0;
+        squares += w * w * q->samples;
+        w *= q->samples;
+        total += w;
+        for (a = 0; a < 3; a++) rgb[a] += w * (double)q->mean[a];
+        variance[0] += w * w * (double)q->variance;
+        variance[1] += w * (double)q->lights;
+    }
     for (a = 0; a < 3; a++) rgb[a] /= total;
     variance[0] /= total * total, variance[1] /= total;
     return total * total / squares;
@@ -3625,9 +3666,8 @@ static void isogi_trace__publish(isogi_trace *t) {
     isogi_trace__solve(t);
     memset(set->bounce, 0, set->count * (size_t)t->values * sizeof(float));
     for (i = 0; i < set->count; i++) set->nodes[i].bounce_square = 0;
-    memset(&sweep, 0, sizeof sweep);
     sweep.trace = t;
-    for (sweep.segment = set->segments; sweep.segment; sweep.segment = sweep.segment->next)
+    for (sweep.segment = set->segments; sweep.segment < set->segments + set->segment_count; sweep.segment++)
         isogi_parallel(&silent, (sweep.segment->entries + ISOGI_TRACE__SWEEP - 1) / ISOGI_TRACE__SWEEP, isogi_trace__bounce_task, &sweep, 0, 1);
     isogi_parallel(&silent, tasks, isogi_trace__guide_task, t, 0, 1);
     isogi_parallel(&silent, tasks, isogi_trace__publish_task, t, 0, 1);
