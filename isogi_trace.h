@@ -994,8 +994,9 @@ static void isogi_trace__scene_matrix(isogi_trace__scene *scene) {
     }
 }
 
-/* A capped volume's border texels face out of the box; elsewhere the gradient decides. 0 if there is no normal. */
-static int isogi_trace__site_normal(const isogi_trace__scene *scene, isogi_trace__site *site) {
+/* A capped volume's border texels face out of the box; elsewhere the gradient decides, by the normal of desc.normals.
+   0 if there is no normal. */
+static int isogi_trace__site_normal(const isogi_trace__scene *scene, const float gradient[3], isogi_trace__site *site) {
     double n[3] = {0, 0, 0}, length = 0;
     int a, c, border = 0, sign = scene->high ? -1 : 1;
     for (a = 0; a < 3; a++) {
@@ -1007,8 +1008,7 @@ static int isogi_trace__site_normal(const isogi_trace__scene *scene, isogi_trace
         for (c = 0; c < 3; c++) n[c] += out * scene->to_grid[3 * a + c] * scene->volume->spacing[a];
     }
     if (!border || !scene->desc.capped) {
-        isogi_vol_normals(scene->pyramid, &site->place, 1, scene->desc.normals, &site->normal);
-        for (c = 0; c < 3; c++) site->normal[c] *= (float)sign;
+        for (c = 0; c < 3; c++) site->normal[c] = gradient[c] * (float)sign;
         return isogi_trace__dot(site->normal, site->normal) > 0;
     }
     for (c = 0; c < 3; c++) length += n[c] * n[c];
@@ -1796,8 +1796,8 @@ static void isogi_trace__texel_grid(const isogi_trace *t, const size_t texel[3],
 }
 
 /* Where and on which isosurface a texel lies. Its light is that at its own place, so a surface must pass there: the value at the
-   texel is inside of its own surface, hence one of the cells around it must reach lower. 0: it does not, or it has no normal. */
-static int isogi_trace__texel_site(const isogi_trace *t, const size_t texel[3], isogi_trace__site *site) {
+   texel is inside of its own surface, hence one of the cells around it must reach lower. 0: it does not. */
+static int isogi_trace__texel_place(const isogi_trace *t, const size_t texel[3], isogi_trace__site *site) {
     const isogi_volume *v = t->scene.volume;
     double grid[3], range[2];
     size_t low[3], high[3];
@@ -1813,8 +1813,28 @@ static int isogi_trace__texel_site(const isogi_trace *t, const size_t texel[3], 
         if (site->place.local[a] >= 1 && high[a] + 1 < v->size[a]) high[a]++;
     }
     isogi_volume_range(v, low, high, range);
-    if (!(range[0] < site->isovalue) && !(border && t->scene.desc.capped)) return 0;
-    return isogi_trace__site_normal(&t->scene, site);
+    return range[0] < site->isovalue || (border && t->scene.desc.capped);
+}
+
+/* Where texels lie, and their normals; up to TEXELS of them. valid: 0 where there is no surface, or no normal. */
+static void isogi_trace__texel_sites(const isogi_trace *t, const size_t (*texels)[3], size_t count, isogi_trace__site *sites,
+                                     uint8_t *valid) {
+    isogi_hit place[ISOGI_TRACE__TEXELS];
+    float normal[ISOGI_TRACE__TEXELS][3];
+    size_t i, n = 0;
+    for (i = 0; i < count; i++) {
+        valid[i] = (uint8_t)isogi_trace__texel_place(t, texels[i], &sites[i]);
+        if (valid[i]) place[n++] = sites[i].place;
+    }
+    isogi_vol_normals(t->scene.pyramid, place, n, t->scene.desc.normals, normal);
+    for (i = n = 0; i < count; i++)
+        if (valid[i]) valid[i] = (uint8_t)isogi_trace__site_normal(&t->scene, normal[n++], &sites[i]);
+}
+
+static int isogi_trace__texel_site(const isogi_trace *t, const size_t texel[3], isogi_trace__site *site) {
+    uint8_t valid;
+    isogi_trace__texel_sites(t, (const size_t(*)[3])texel, 1, site, &valid);
+    return valid;
 }
 
 /* Whether a surface of the isovalue interval may read one of the texels low..high: there are values on both sides of it, or within
@@ -1850,11 +1870,26 @@ static int isogi_trace__in_box(const isogi_trace *t, const size_t texel[3]) {
     return 1;
 }
 
+/* Up to TEXELS texels: not asked for, without a surface, or wanted. */
+static void isogi_trace__classify_texels(const isogi_trace *t, const size_t (*texels)[3], size_t count, uint8_t *state) {
+    size_t asked[ISOGI_TRACE__TEXELS][3], i, n = 0;
+    isogi_trace__site site[ISOGI_TRACE__TEXELS];
+    uint8_t valid[ISOGI_TRACE__TEXELS];
+    for (i = 0; i < count; i++) {
+        state[i] = ISOGI_TRACE__NOT_ASKED;
+        if (!isogi_trace__in_box(t, texels[i]) || !isogi_trace__in_range(t, texels[i], texels[i])) continue;
+        state[i] = ISOGI_TRACE__UNKNOWN;
+        memcpy(asked[n++], texels[i], sizeof asked[0]);
+    }
+    isogi_trace__texel_sites(t, (const size_t(*)[3])asked, n, site, valid);
+    for (i = n = 0; i < count; i++)
+        if (state[i] == ISOGI_TRACE__UNKNOWN) state[i] = valid[n++] ? ISOGI_TRACE__WANTED : ISOGI_TRACE__NO_SURFACE;
+}
+
 static int isogi_trace__classify(const isogi_trace *t, const size_t texel[3]) {
-    isogi_trace__site site;
-    if (!isogi_trace__in_box(t, texel)) return ISOGI_TRACE__NOT_ASKED;
-    if (!isogi_trace__in_range(t, texel, texel)) return ISOGI_TRACE__NOT_ASKED;
-    return isogi_trace__texel_site(t, texel, &site) ? ISOGI_TRACE__WANTED : ISOGI_TRACE__NO_SURFACE;
+    uint8_t state;
+    isogi_trace__classify_texels(t, (const size_t(*)[3])texel, 1, &state);
+    return state;
 }
 
 static size_t isogi_trace__brick_of(const isogi_trace *t, const size_t texel[3], uint32_t *slot) {
@@ -1930,11 +1965,16 @@ static isogi_result isogi_trace__queue_reserve(isogi_trace *t) {
 static void isogi_trace__classify_task(void *arg, size_t i) {
     isogi_trace *t = (isogi_trace *)arg;
     isogi_trace__brick *brick = t->bricks[t->queue[i]];
-    size_t slot, texel[3];
+    size_t slot, texel[ISOGI_TRACE__TEXELS][3], n = 0;
+    uint8_t state[ISOGI_TRACE__TEXELS];
     for (slot = 0; slot < ISOGI_TRACE__TEXELS; slot++) {
-        int inside = isogi_trace__texel_of(t, t->queue[i], slot, texel);
-        brick->state[slot] = (uint8_t)(inside ? isogi_trace__classify(t, texel) : ISOGI_TRACE__NOT_ASKED);
+        int inside = isogi_trace__texel_of(t, t->queue[i], slot, texel[n]);
+        brick->state[slot] = (uint8_t)(inside ? ISOGI_TRACE__UNKNOWN : ISOGI_TRACE__NOT_ASKED);
+        n += inside ? 1 : 0;
     }
+    isogi_trace__classify_texels(t, (const size_t(*)[3])texel, n, state);
+    for (slot = n = 0; slot < ISOGI_TRACE__TEXELS; slot++)
+        if (brick->state[slot] == ISOGI_TRACE__UNKNOWN) brick->state[slot] = state[n++];
 }
 
 /* Bricks that hold no wanted texel are given back. */
@@ -2421,22 +2461,22 @@ ISOGI_API size_t isogi_trace_memory(const isogi_trace *trace) {
 
 /* ==== requests ======================================================================================================= */
 
+/* A texel that has a surface is asked for only by the lookup that reads it. */
+static void isogi_trace__learn(isogi_trace *t, isogi_trace__brick *brick, uint32_t slot, int state) {
+    brick->state[slot] = (uint8_t)(state == ISOGI_TRACE__WANTED ? ISOGI_TRACE__READABLE : state);
+    t->counters.texels_skipped += state == ISOGI_TRACE__NO_SURFACE;
+}
+
 /* Classifies a texel and puts it on the list if it is to be computed. */
 static isogi_result isogi_trace__want(isogi_trace *t, const size_t texel[3], int classify_only) {
     uint32_t slot;
     size_t index = isogi_trace__brick_of(t, texel, &slot);
     isogi_trace__brick *brick = t->bricks[index];
     isogi_result result = isogi_trace__queue_reserve(t);
-    int state;
     if (result != ISOGI_OK) return result;
     if (!brick) brick = t->bricks[index] = isogi_trace__brick_new(t);
     if (!brick) return ISOGI_NO_MEMORY;
-    if (brick->state[slot] == ISOGI_TRACE__UNKNOWN) {
-        state = isogi_trace__classify(t, texel);
-        /* a texel that has a surface is asked for only by the lookup that reads it */
-        brick->state[slot] = (uint8_t)(state == ISOGI_TRACE__WANTED ? ISOGI_TRACE__READABLE : state);
-        t->counters.texels_skipped += state == ISOGI_TRACE__NO_SURFACE;
-    }
+    if (brick->state[slot] == ISOGI_TRACE__UNKNOWN) isogi_trace__learn(t, brick, slot, isogi_trace__classify(t, texel));
     if (classify_only || brick->state[slot] != ISOGI_TRACE__READABLE) return ISOGI_OK;
     brick->state[slot] = ISOGI_TRACE__WANTED;
     t->wanted++;
@@ -2463,32 +2503,96 @@ static isogi_result isogi_trace__want_nearest(isogi_trace *t, const size_t cell[
     return result;
 }
 
-ISOGI_API isogi_result isogi_trace_request(isogi_trace *trace, const float (*points)[3], size_t count) {
-    size_t i, known[3] = {SIZE_MAX, 0, 0}; /* known: a cell all of whose texels have been asked for, as the next pixel will again */
-    if (!trace || (count && !points)) return ISOGI_INVALID;
-    if (!trace->scene.desc.lazy || trace->coarse) return ISOGI_OK;
+typedef struct isogi_trace__job {
+    isogi_trace *trace;
+    size_t first, count;
+} isogi_trace__job;
+
+/* What the next pixel will mostly ask for again: a cell all of whose texels have been seen to. Not on its faces, where a lookup reads
+   fewer of them. */
+static int isogi_trace__seen(const size_t cell[3], const double local[3], const size_t known[3]) {
+    int inner = local[0] > 0 && local[0] < 1 && local[1] > 0 && local[1] < 1 && local[2] > 0 && local[2] < 1;
+    return inner && !memcmp(cell, known, 3 * sizeof *cell);
+}
+
+static void isogi_trace__learn_task(void *arg, size_t task) {
+    const isogi_trace__job *job = (const isogi_trace__job *)arg;
+    isogi_trace__ref *ref = job->trace->batch + task * ISOGI_TRACE__TEXELS;
+    size_t i, left = job->count - task * ISOGI_TRACE__TEXELS, count = left < ISOGI_TRACE__TEXELS ? left : ISOGI_TRACE__TEXELS, texel[ISOGI_TRACE__TEXELS][3];
+    uint8_t state[ISOGI_TRACE__TEXELS];
+    for (i = 0; i < count; i++) memcpy(texel[i], ref[i].texel, sizeof texel[i]);
+    isogi_trace__classify_texels(job->trace, (const size_t(*)[3])texel, count, state);
+    for (i = 0; i < count; i++) ref[i].brick->state[ref[i].slot] = state[i]; /* each by one task alone */
+}
+
+/* Classifies the texels that lookups at the next points will read, as many as a batch holds, on all cores. *end: of these points. */
+static isogi_result isogi_trace__learn_points(isogi_trace *t, const float (*points)[3], size_t count, size_t *end) {
+    isogi_context silent = t->context;
+    isogi_trace__job job;
+    isogi_result result = ISOGI_OK;
+    size_t i, known[3] = {SIZE_MAX, 0, 0};
+    job.trace = t, job.first = job.count = 0;
+    for (i = 0; i < count && job.count + 64 <= ISOGI_TRACE__BATCH && result == ISOGI_OK; i++) {
+        size_t cell[3];
+        double local[3];
+        int k, all = 1;
+        isogi_trace__cell(t, points[i], cell, local);
+        if (isogi_trace__seen(cell, local, known)) continue;
+        for (k = 0; k < isogi_trace__tap_count(t) && result == ISOGI_OK; k++) {
+            isogi_trace__ref *ref = &t->batch[job.count];
+            size_t index;
+            if (!(isogi_trace__tap(t, cell, local, k, ref->texel) > 0)) {
+                all = 0;
+                continue;
+            }
+            index = isogi_trace__brick_of(t, ref->texel, &ref->slot);
+            if (!t->bricks[index]) t->bricks[index] = isogi_trace__brick_new(t);
+            ref->brick = t->bricks[index];
+            if (!ref->brick) result = ISOGI_NO_MEMORY;
+            else if (ref->brick->state[ref->slot] == ISOGI_TRACE__UNKNOWN) ref->brick->state[ref->slot] = ISOGI_TRACE__NOT_ASKED, job.count++;
+        }
+        if (all) memcpy(known, cell, sizeof known);
+    }
+    *end = i, silent.progress = NULL;
+    isogi_parallel(&silent, (job.count + ISOGI_TRACE__TEXELS - 1) / ISOGI_TRACE__TEXELS, isogi_trace__learn_task, &job, 0, 1);
+    for (i = 0; i < job.count; i++) isogi_trace__learn(t, t->batch[i].brick, t->batch[i].slot, t->batch[i].brick->state[t->batch[i].slot]);
+    return result;
+}
+
+static isogi_result isogi_trace__want_points(isogi_trace *t, const float (*points)[3], size_t count) {
+    size_t i, known[3] = {SIZE_MAX, 0, 0};
     for (i = 0; i < count; i++) {
         size_t cell[3], texel[3];
         double local[3];
         isogi_result result = ISOGI_OK;
-        int k, lacking = 1, all = 1, inner;
-        isogi_trace__cell(trace, points[i], cell, local);
-        /* on a face of the cell a lookup reads fewer of its texels: none of those may have a surface */
-        inner = local[0] > 0 && local[0] < 1 && local[1] > 0 && local[1] < 1 && local[2] > 0 && local[2] < 1;
-        if (inner && !memcmp(cell, known, sizeof cell)) continue;
-        for (k = 0; k < isogi_trace__tap_count(trace) && result == ISOGI_OK; k++) {
-            if (!(isogi_trace__tap(trace, cell, local, k, texel) > 0)) {
+        int k, lacking = 1, all = 1;
+        isogi_trace__cell(t, points[i], cell, local);
+        if (isogi_trace__seen(cell, local, known)) continue;
+        for (k = 0; k < isogi_trace__tap_count(t) && result == ISOGI_OK; k++) {
+            if (!(isogi_trace__tap(t, cell, local, k, texel) > 0)) {
                 all = 0;
                 continue;
             }
-            result = isogi_trace__want(trace, texel, 0);
-            if (result == ISOGI_OK) lacking = lacking && isogi_trace__state(trace, texel) == ISOGI_TRACE__NO_SURFACE;
+            result = isogi_trace__want(t, texel, 0);
+            if (result == ISOGI_OK) lacking = lacking && isogi_trace__state(t, texel) == ISOGI_TRACE__NO_SURFACE;
         }
-        if (result == ISOGI_OK && lacking) result = isogi_trace__want_nearest(trace, cell, local);
+        if (result == ISOGI_OK && lacking) result = isogi_trace__want_nearest(t, cell, local);
         if (result != ISOGI_OK) return result;
         if (all && !lacking) memcpy(known, cell, sizeof known);
     }
     return ISOGI_OK;
+}
+
+ISOGI_API isogi_result isogi_trace_request(isogi_trace *trace, const float (*points)[3], size_t count) {
+    isogi_result result = ISOGI_OK;
+    size_t i, end;
+    if (!trace || (count && !points)) return ISOGI_INVALID;
+    if (!trace->scene.desc.lazy || trace->coarse) return ISOGI_OK;
+    for (i = 0; i < count && result == ISOGI_OK; i += end) {
+        result = isogi_trace__learn_points(trace, points + i, count - i, &end);
+        if (result == ISOGI_OK) result = isogi_trace__want_points(trace, points + i, end);
+    }
+    return result;
 }
 
 /* ==== baking within a budget ========================================================================================= */
@@ -2497,11 +2601,6 @@ static void isogi_trace__add(isogi_counters *to, const isogi_counters *from) {
     to->rays += from->rays, to->blocks += from->blocks, to->cells += from->cells, to->cubics += from->cubics,
         to->texels += from->texels;
 }
-
-typedef struct isogi_trace__job {
-    isogi_trace *trace;
-    size_t first, count;
-} isogi_trace__job;
 
 static void isogi_trace__bake_task(void *arg, size_t task) {
     const isogi_trace__job *job = (const isogi_trace__job *)arg;
@@ -3682,15 +3781,23 @@ static void isogi_trace__place_task(void *arg, size_t task) {
     const isogi_trace__job *job = (const isogi_trace__job *)arg;
     const isogi_trace *t = job->trace;
     size_t i = task * ISOGI_TRACE__SWEEP, end = i + ISOGI_TRACE__SWEEP < job->count ? i + ISOGI_TRACE__SWEEP : job->count;
-    for (; i < end; i++) {
+    while (i < end) {
         isogi_trace__node *n = &t->feedback->texels.nodes[job->first + i];
-        isogi_trace__site site;
-        if (isogi_trace__texel_site(t, n->texel, &site)) {
-            n->place = site.place, n->isovalue = site.isovalue;
-            memcpy(n->normal, site.normal, sizeof n->normal);
+        isogi_trace__guide *g = &t->feedback->texels.guide[job->first + i];
+        size_t count = end - i < ISOGI_TRACE__TEXELS ? end - i : ISOGI_TRACE__TEXELS, texel[ISOGI_TRACE__TEXELS][3], k;
+        isogi_trace__site site[ISOGI_TRACE__TEXELS];
+        uint8_t valid[ISOGI_TRACE__TEXELS];
+        for (k = 0; k < count; k++) memcpy(texel[k], n[k].texel, sizeof texel[k]);
+        isogi_trace__texel_sites(t, (const size_t(*)[3])texel, count, site, valid);
+        for (k = 0; k < count; k++) {
+            if (valid[k]) {
+                n[k].place = site[k].place, n[k].isovalue = site[k].isovalue;
+                memcpy(n[k].normal, site[k].normal, sizeof n->normal);
+            }
+            isogi_trace_albedo(&t->scene.desc, n[k].isovalue, n[k].albedo);
+            if (t->scene.desc.mode == ISOGI_TRACE_IRRADIANCE) isogi_trace__guide_colours(t, &n[k], &g[k]);
         }
-        isogi_trace_albedo(&t->scene.desc, n->isovalue, n->albedo);
-        if (t->scene.desc.mode == ISOGI_TRACE_IRRADIANCE) isogi_trace__guide_colours(t, n, &t->feedback->texels.guide[job->first + i]);
+        i += count;
     }
 }
 
@@ -4711,7 +4818,11 @@ static void isogi_trace__gather_task(void *arg, size_t task) {
             if (!(length > 0) || !isogi_trace__finite(length)) continue;
             if (job->scene.high) length = -length;
             for (a = 0; a < 3; a++) site.normal[a] = (float)((double)job->normals[i][a] / length);
-        } else if (!isogi_trace__site_normal(&job->scene, &site)) continue;
+        } else {
+            float gradient[1][3];
+            isogi_vol_normals(job->scene.pyramid, &site.place, 1, job->scene.desc.normals, gradient);
+            if (!isogi_trace__site_normal(&job->scene, gradient[0], &site)) continue;
+        }
         site.key = isogi_trace__key(isogi_trace__key(job->scene.desc.seed, 1), (uint64_t)i);
         isogi_trace__site_start(&job->scene, &site);
         isogi_trace__gather_site(&job->scene, &site, job->irradiance[i], &job->error[i], &counters);
