@@ -1826,7 +1826,7 @@ static void isogi_trace__texel_sites(const isogi_trace *t, const size_t (*texels
         valid[i] = (uint8_t)isogi_trace__texel_place(t, texels[i], &sites[i]);
         if (valid[i]) place[n++] = sites[i].place;
     }
-    isogi_vol_normals(t->scene.pyramid, place, n, t->scene.desc.normals, normal);
+    if (n) isogi_vol_normals(t->scene.pyramid, place, n, t->scene.desc.normals, normal);
     for (i = n = 0; i < count; i++)
         if (valid[i]) valid[i] = (uint8_t)isogi_trace__site_normal(&t->scene, normal[n++], &sites[i]);
 }

@@ -1907,20 +1907,29 @@ ISOGI_VOL__TARGET("avx2") ISOGI_VOL__INLINE __m256d isogi_vol__weights4(const do
     return _mm256_add_pd(_mm256_mul_pd(_mm256_add_pd(_mm256_mul_pd(_mm256_add_pd(_mm256_mul_pd(c3, u), c2), u), c1), u), c0);
 }
 
-/* The sums below where all taps exist, a row at a time: rows are weighted along y and z first, x comes last. Packed doubles or floats. */
+/* Four packed voxels, as they are stored. */
+ISOGI_VOL__TARGET("avx2") ISOGI_VOL__INLINE __m256d isogi_vol__raw4(isogi_type type, const char *p) {
+    int32_t bytes;
+    if (type == ISOGI_F32) return _mm256_cvtps_pd(_mm_loadu_ps((const float *)(const void *)p));
+    if (type == ISOGI_F64) return _mm256_loadu_pd((const double *)(const void *)p);
+    if (type == ISOGI_U16) return _mm256_cvtepi32_pd(_mm_cvtepu16_epi32(_mm_loadl_epi64((const __m128i *)(const void *)p)));
+    if (type == ISOGI_I16) return _mm256_cvtepi32_pd(_mm_cvtepi16_epi32(_mm_loadl_epi64((const __m128i *)(const void *)p)));
+    memcpy(&bytes, p, sizeof bytes);
+    return _mm256_cvtepi32_pd(type == ISOGI_U8 ? _mm_cvtepu8_epi32(_mm_cvtsi32_si128(bytes)) : _mm_cvtepi8_epi32(_mm_cvtsi32_si128(bytes)));
+}
+
+/* The sums below where all taps exist, a row at a time: rows are weighted along y and z first, x comes last. Packed voxels. */
 ISOGI_VOL__TARGET("avx2") static double isogi_vol__cubic_sum_avx2(const isogi_volume *v, const double powers[4][4], const int cell[3], const double local[3],
                                                                   double gradient[3]) {
     __m256d dx, dy, dz;
     const __m256d wx = isogi_vol__weights4(powers, local[0], &dx), wy = isogi_vol__weights4(powers, local[1], &dy);
     const __m256d wz = isogi_vol__weights4(powers, local[2], &dz);
-    const int doubles = v->type == ISOGI_F64;
+    const isogi_type type = v->type;
     const __m256d scale = _mm256_set1_pd(v->scale), bias = _mm256_set1_pd(v->bias);
     __m256d all = _mm256_setzero_pd(), by_y = all, by_z = all;
     const char *p = (const char *)v->data + (cell[0] - 1) * v->stride[0] + (cell[1] - 1) * v->stride[1] + (cell[2] - 1) * v->stride[2];
 #define ISOGI_VOL__LANE(m, i) _mm256_permute4x64_pd(m, 0x55 * (i))
-#define ISOGI_VOL__ROW(j)                                                                       \
-    (doubles ? _mm256_loadu_pd((const double *)(const void *)(p + (j) * v->stride[1]))          \
-             : _mm256_cvtps_pd(_mm_loadu_ps((const float *)(const void *)(p + (j) * v->stride[1]))))
+#define ISOGI_VOL__ROW(j) isogi_vol__raw4(type, p + (j) * v->stride[1])
 #define ISOGI_VOL__SLICE(k)                                                                                                                \
     do {                                                                                                                                   \
         const __m256d row0 = ISOGI_VOL__ROW(0), row1 = ISOGI_VOL__ROW(1), row2 = ISOGI_VOL__ROW(2), row3 = ISOGI_VOL__ROW(3);              \
@@ -1957,7 +1966,7 @@ static double isogi_vol__cubic_sum(const isogi_pyramid *p, isogi_filter filter, 
     double w[3][4], d[3][4], value = 0, gx = 0, gy = 0, gz = 0;
     int tap[3][4], a, j, k;
 #ifdef ISOGI_VOL__AVX
-    if (p->path >= ISOGI_VOL__PATH_AVX2 && (v->type == ISOGI_F32 || v->type == ISOGI_F64) && v->stride[0] == (ptrdiff_t)isogi_vol__type_size(v->type)) {
+    if (p->path >= ISOGI_VOL__PATH_AVX2 && v->stride[0] == (ptrdiff_t)isogi_vol__type_size(v->type)) {
         int inner = 1;
         for (a = 0; a < 3; a++) inner &= (cell[a] > 0 || v->halo_low[a]) && (size_t)cell[a] + 2 < v->size[a] + v->halo_high[a] && v->size[a] > 1;
         if (inner) return isogi_vol__cubic_sum_avx2(v, isogi_vol__taps[filter == ISOGI_FILTER_CATMULL_ROM], cell, local, gradient);
