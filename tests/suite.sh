@@ -187,6 +187,10 @@ emulators() {
         else item skip "$machine" "$machine-linux-gnu-gcc or qemu-$machine-static is not installed"
         fi
     done
+    # What a bake saves is the same bytes where the bytes of numbers are the other way round.
+    if have s390x-linux-gnu-gcc && have qemu-s390x-static; then
+        item suite s390x/test_trace_store "s390x-linux-gnu-gcc -std=gnu99 -O1 $CONTRACT_OFF -static -I. -Iexamples/common -Itests -o \"\$OUT/store\" tests/test_trace_store.c -lm -lpthread && qemu-s390x-static \"\$OUT/store\" same_bytes"
+    fi
 }
 
 memcheck() {
