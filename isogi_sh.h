@@ -57,6 +57,9 @@
 
    Memory       None allocated. Stack use stays below 32 KB.
    Threads      Every function is pure: call them from any thread.
+   Speed        Batches of 16 directions and more (8 of doubles) use all lanes, whatever the count. Results that stay in the first-level cache, such
+                as 64 directions at order 11, take half or a third of the time; rows of a structure of arrays that are a multiple of 4096
+                bytes long take twice as long again, since all functions of a direction compete for the same lines of the cache.
    Determinism  The same input on the same instruction path gives the same bits. Paths agree within the float errors below.
    Accuracy     Largest absolute error against 128 bits, poles and all: double 1e-15 at degree 4, 5e-15 at 10, 1.5e-14 at 20, 6e-14 at 50,
                 2e-13 at 100; float 4.5e-7 at 4, 2.2e-6 at 10, 1e-5 at 20. tests/test_sh.c states and checks each.
