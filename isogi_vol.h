@@ -45,7 +45,7 @@
    - ISOGI_API                  linkage of public functions, if extern does not suit
 
    Memory       Through isogi_context, or malloc. A pyramid takes about 2.2 bytes for every voxel: bounds of blocks, and all voxels in 8 bits of their block's
-                range; and 22 KB.
+                range; and 23 KB.
                 A mesh keeps some 3/4 byte of scratch memory for every voxel until it is freed.
                 Stack use stays below 32 KB.
    Threads      A pyramid is const once built: any number of threads may read it. Building and meshing use the context's threads.
@@ -1507,6 +1507,7 @@ static isogi_result isogi_vol__fill_nodes(isogi_vol__build_job *job, const isogi
 struct isogi_vol__ways {
     uint64_t before[3][ISOGI_VOL__ORDERS], entered[ISOGI_VOL__ORDERS], left[ISOGI_VOL__ORDERS];
     uint8_t child[8][64], voxel[8][128]; /* children of nodes and voxels of leaves with axes counted backwards: bit a of the index */
+    float scale[256];                    /* steps of a leaf in a unit of nodes, by how far its bounds are apart */
 };
 
 /* What is left of 64 children for every choice of nine bits, each of which leaves some if it is 0, others if it is 1. */
@@ -1536,6 +1537,7 @@ static void isogi_vol__set_ways(struct isogi_vol__ways *ways) {
     for (i = 0; i < 9; i++) leaves[i][0] = below[i / 3][i % 3 + 1], leaves[i][1] = ~(uint64_t)0;
     isogi_vol__set_orders(ways->left, leaves);
     memset(ways->voxel, 0, sizeof ways->voxel);
+    for (i = 0; i < 256; i++) ways->scale[i] = ISOGI_VOL__CODES / (float)(i + 1);
     for (f = 0; f < 8; f++) {
         const int x = f & 1, y = f >> 1 & 1, z = f >> 2;
         for (i = 0; i < 64; i++) ways->child[f][i] = (uint8_t)(i ^ (3 * x | 12 * y | 48 * z));
@@ -3511,6 +3513,19 @@ ISOGI_VOL__TARGET("avx2") static int isogi_vol__aim_avx2(isogi_vol__walk *w, con
 }
 #endif
 
+#ifdef ISOGI_VOL__AVX
+/* A ray's origin in grid coordinates, stored as it will be loaded; 0: not finite. The sums are those of isogi_vol__transform. */
+ISOGI_VOL__TARGET("avx2") static int isogi_vol__place_avx2(isogi_vol__walk *w, const double origin[3]) {
+    const isogi_pyramid *p = w->pyramid;
+    const __m256i infinite = _mm256_set1_epi64x(0x7ff0000000000000);
+    __m256d at = _mm256_mul_pd(_mm256_loadu_pd(p->grid_axis[0]), _mm256_set1_pd(origin[0] - p->origin[0]));
+    at = _mm256_add_pd(at, _mm256_mul_pd(_mm256_loadu_pd(p->grid_axis[1]), _mm256_set1_pd(origin[1] - p->origin[1])));
+    at = _mm256_add_pd(at, _mm256_mul_pd(_mm256_loadu_pd(p->grid_axis[2]), _mm256_set1_pd(origin[2] - p->origin[2])));
+    _mm256_storeu_pd(w->origin, at);
+    return !_mm256_movemask_pd(_mm256_castsi256_pd(_mm256_cmpeq_epi64(_mm256_and_si256(_mm256_castpd_si256(at), infinite), infinite)));
+}
+#endif
+
 static int isogi_vol__aim(isogi_vol__walk *w, const float dir[3], double tmin, double tmax) {
 #ifdef ISOGI_VOL__AVX
     if (w->pyramid->fast && w->pyramid->path >= ISOGI_VOL__PATH_AVX2) return isogi_vol__aim_avx2(w, dir, tmin, tmax);
@@ -3554,6 +3569,13 @@ typedef struct isogi_vol__batch {
     isogi_counters work;
 } isogi_vol__batch;
 
+/* Member by member: of one memset compilers make an instruction that is slow to start. */
+ISOGI_VOL__INLINE void isogi_vol__clear_batch(isogi_vol__batch *b, const isogi_pyramid *pyramid) {
+    b->pyramid = pyramid, b->rays = NULL, b->starts = NULL, b->dirs = NULL, b->tmax = NULL, b->isovalue = 0, b->flags = 0, b->bundle = 0;
+    b->hits = NULL, b->occluded = NULL;
+    b->work.rays = b->work.blocks = b->work.cells = b->work.cubics = 0;
+}
+
 static uint32_t isogi_vol__flags(const isogi_vol__batch *b, size_t i) { return b->rays ? b->rays[b->bundle ? 0 : i].flags : b->flags; }
 
 /* Whether the field is inside at the present cell's point that lies at t. */
@@ -3570,10 +3592,17 @@ static int isogi_vol__begin_ray(const isogi_vol__batch *b, size_t i, isogi_vol__
     const double tmax = isogi_vol__tmax(ray->tmax);
     double relative[3];
     int a;
-    for (a = 0; a < 3; a++) relative[a] = ray->origin[a] - p->origin[a];
-    isogi_vol__transform(p->to_grid, relative, w->origin);
     w->isovalue = ray->isovalue;
-    if (!isogi_vol__finite3(w->origin) || !isogi_vol__finite3(ray->origin)) return 0;
+#ifdef ISOGI_VOL__AVX
+    if (p->fast && p->path >= ISOGI_VOL__PATH_AVX2) {
+        if (!isogi_vol__place_avx2(w, ray->origin)) return 0;
+    } else
+#endif
+    {
+        for (a = 0; a < 3; a++) relative[a] = ray->origin[a] - p->origin[a];
+        isogi_vol__transform(p->to_grid, relative, w->origin);
+        if (!isogi_vol__finite3(w->origin) || !isogi_vol__finite3(ray->origin)) return 0;
+    }
     if (isogi_vol__is_nan(ray->isovalue) || isogi_vol__is_nan(ray->tmin) || isogi_vol__is_nan(ray->tmax) || !(ray->tmin <= tmax)) return 0;
     if (!isogi_vol__aim(w, b->bundle ? b->dirs[i] : ray->dir, isogi_vol__max(ray->tmin, -ISOGI_VOL__UNLIMITED), tmax)) return 0;
     if (w->entry_axis >= 0 && (ray->flags & ISOGI_RAY_CAPPED)) w->inside = 0, w->cap = 2;
@@ -4624,6 +4653,7 @@ typedef struct __attribute__((aligned(64))) isogi_vol__course {
     int64_t at[3], per[3], end; /* plane k of axis a, counted from the border that rays enter by, is met at at + k per */
     double origin[3], inverse[3], dir[3], stop; /* as in a pool */
     int64_t backwards;       /* cell = cell counted backwards ^ this, packed as in a pool */
+    int first[3];            /* cell in which the walk begins */
     int flip, octant;        /* children; axes */
     int low, high;           /* what the isovalue can be in 8 bits */
     float level;             /* and unrounded */
@@ -4650,7 +4680,7 @@ ISOGI_VOL__INLINE void isogi_vol__set_course_axis(isogi_vol__course *c, const is
     c->end = border < c->end ? border : c->end;
     c->origin[a] = w->origin[a], c->dir[a] = w->dir[a];
     c->inverse[a] = still ? fall ? -unlimited : unlimited : w->inverse[a];
-    c->backwards |= fall ? (int64_t)(padded - 1) << 16 * a : 0;
+    c->backwards |= fall ? (int64_t)(padded - 1) << 16 * a : 0, c->first[a] = fall ? padded - 1 - cell : cell;
     c->flip |= fall ? 3 << 2 * a : 0, c->octant |= fall << a;
 }
 
@@ -4712,15 +4742,29 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE uint64_t isogi_vol__held(const struct isogi_
     return _mm512_mask_cmpge_epu8_mask(_mm512_cmple_epu8_mask(least, _mm512_set1_epi8((char)isovalue_high)), most, _mm512_set1_epi8((char)isovalue_low));
 }
 
+/* open_leaf without leaving the vector registers; the leaf's bounds hold the isovalue, since its parent's did. */
+ISOGI_VOL__AVX512 ISOGI_VOL__INLINE void isogi_vol__unlock_leaf(const struct isogi_vol__ways *ways, isogi_vol__leaf *leaf, const uint8_t *node, float level, __m512i *inside, __m512i *outside) {
+    const int low = node[ISOGI_VOL__LEAF_LOW], high = node[ISOGI_VOL__LEAF_HIGH];
+    const float x = (level - (float)low) * ways->scale[(high - low) & 255];
+    __m128i bound = _mm_cvttps_epi32(_mm_add_ps(_mm_set1_ps(x), _mm_setr_ps(3.0625f, 2.9375f, 0, 0)));
+    bound = _mm_sub_epi32(bound, _mm_setr_epi32(2, 3, 0, 0));
+    bound = _mm_min_epi32(_mm_max_epi32(bound, _mm_setzero_si128()), _mm_set1_epi32(255));
+    *inside = _mm512_broadcastb_epi8(bound), *outside = _mm512_broadcastb_epi8(_mm_srli_epi64(bound, 32));
+    leaf->code = node, leaf->isovalue = x - 0.5f;
+}
+
 /* The same for the cells of a leaf; voxel: its bytes in the ray's order. Cells beyond the volume are not left out: no ray passes them. */
-ISOGI_VOL__AVX512 ISOGI_VOL__INLINE uint64_t isogi_vol__held_cells(const struct isogi_vol__ways *ways, int octant, const isogi_vol__leaf *leaf, __m512i voxel[2]) {
+ISOGI_VOL__AVX512 ISOGI_VOL__INLINE uint64_t isogi_vol__held_cells(const struct isogi_vol__ways *ways, int octant, isogi_vol__leaf *leaf, const uint8_t *node, float level,
+                                                                   __m512i voxel[2]) {
     const uint64_t low_rows = 0xf7bc0f7bde07bdefu, high_rows = 0x3def781eu; /* bits x + 5y + 25z of cells */
-    const __m512i code0 = _mm512_load_si512(leaf->code), code1 = _mm512_load_si512(leaf->code + 64);
+    const __m512i code0 = _mm512_load_si512(node), code1 = _mm512_load_si512(node + 64);
     const __m512i low = _mm512_permutex2var_epi8(code0, _mm512_load_si512(ways->voxel[octant]), code1);
     const __m512i high = _mm512_permutex2var_epi8(code0, _mm512_load_si512(ways->voxel[octant] + 64), code1);
-    const __m512i inside = _mm512_set1_epi8((char)leaf->inside), outside = _mm512_set1_epi8((char)leaf->outside);
-    uint64_t in_low = _mm512_cmpge_epu8_mask(low, inside), in_high = _mm512_cmpge_epu8_mask(high, inside);
-    uint64_t out_low = _mm512_cmplt_epu8_mask(low, outside), out_high = _mm512_cmplt_epu8_mask(high, outside);
+    __m512i inside, outside;
+    uint64_t in_low, in_high, out_low, out_high;
+    isogi_vol__unlock_leaf(ways, leaf, node, level, &inside, &outside);
+    in_low = _mm512_cmpge_epu8_mask(low, inside), in_high = _mm512_cmpge_epu8_mask(high, inside);
+    out_low = _mm512_cmplt_epu8_mask(low, outside), out_high = _mm512_cmplt_epu8_mask(high, outside);
     voxel[0] = low, voxel[1] = high;
     isogi_vol__all_corners(&in_low, &in_high);
     isogi_vol__all_corners(&out_low, &out_high);
@@ -4738,6 +4782,7 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE int isogi_vol__walk_cells(isogi_vol__walk *w
     isogi_vol__sides sides;
     unsigned lanes = (1u << count) - 1;
     int a;
+    isogi_vol__send_for(&w->pyramid->volume, _mm_cvtsi128_si64(_mm512_castsi512_si128(cell)));
 #pragma GCC unroll 8
     for (a = 0; a < 3; a++) origin[a] = _mm512_set1_pd(c->origin[a]), inverse[a] = _mm512_set1_pd(c->inverse[a]), dir[a] = _mm512_set1_pd(c->dir[a]);
     end = _mm512_or_si512(_mm512_castpd_si512(_mm512_set1_pd(c->stop)), three);
@@ -4767,7 +4812,11 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE int isogi_vol__walk_cells(isogi_vol__walk *w
     return 0;
 }
 
-/* From node to node, the lowest level that has children left first. */
+ISOGI_VOL__INLINE void isogi_vol__fetch_node(const uint8_t *node) {
+    _mm_prefetch((const char *)node, _MM_HINT_T0), _mm_prefetch((const char *)node + 64, _MM_HINT_T0);
+}
+
+/* From node to node, the lowest level that has children left first. What will be needed soon is sent for. */
 ISOGI_VOL__AVX512 static int isogi_vol__walk_one(isogi_vol__walk *w, isogi_hit *hit) {
     const isogi_pyramid *p = w->pyramid;
     const struct isogi_vol__ways *ways = p->ways;
@@ -4779,6 +4828,8 @@ ISOGI_VOL__AVX512 static int isogi_vol__walk_one(isogi_vol__walk *w, isogi_hit *
     isogi_vol__course c;
     if (!isogi_vol__set_course(&c, w)) return -1;
     if (c.low > c.high) return 0;
+    isogi_vol__fetch_node(p->nodes[isogi_vol__node_at(p, 0, (size_t)c.first[0] >> 2, (size_t)c.first[1] >> 2, (size_t)c.first[2] >> 2)]);
+    isogi_vol__fetch_node(p->nodes[isogi_vol__node_at(p, 1, (size_t)c.first[0] >> 4, (size_t)c.first[1] >> 4, (size_t)c.first[2] >> 4)]);
     for (;;) {
         uint64_t mask = isogi_vol__way(&c, ways, cell, n);
         int child;
@@ -4788,8 +4839,7 @@ ISOGI_VOL__AVX512 static int isogi_vol__walk_one(isogi_vol__walk *w, isogi_hit *
         } else {
             isogi_vol__leaf leaf;
             __m512i voxel[2];
-            isogi_vol__open_leaf(&leaf, node, c.level);
-            mask &= isogi_vol__held_cells(ways, c.octant, &leaf, voxel);
+            mask &= isogi_vol__held_cells(ways, c.octant, &leaf, node, c.level, voxel);
             if (mask) {
                 const int count = __builtin_popcountll(mask);
                 const __m128i list = _mm512_castsi512_si128(_mm512_maskz_compress_epi8(mask, _mm512_load_si512(ways->child[0])));
@@ -4816,6 +4866,7 @@ ISOGI_VOL__AVX512 static int isogi_vol__walk_one(isogi_vol__walk *w, isogi_hit *
         left[n] = mask & (mask - 1);
         if (!left[n]) pending &= pending - 1;
         node = children[n] + 128 * (child ^ c.flip);
+        isogi_vol__fetch_node(children[n] + 128 * (__builtin_ctzll(left[n] ? left[n] : mask) ^ c.flip)); /* its successor */
         cell = (int64_t)(((uint64_t)cell & 0x0000ffffffffffffu & ~(0x000100010001u * ((4u << 2 * n) - 1))) | _pdep_u64((uint64_t)child, 0x000300030003u) << 2 * n);
         n--;
     }
@@ -5152,8 +5203,8 @@ ISOGI_VOL__AVX512 static void isogi_vol__trace_packet(isogi_vol__batch *b, isogi
         met[n] = lanes, left[n] = isogi_vol__in_beam(&beam, n, cell);
         if (n) left[n] &= isogi_vol__held(ways, octant, low, high, node);
         else {
-            isogi_vol__open_leaf(&leaf, node, level);
-            left[0] &= isogi_vol__cut_order(&leaf, octant, isogi_vol__held_cells(ways, octant, &leaf, voxel));
+            const uint64_t held = isogi_vol__held_cells(ways, octant, &leaf, node, level, voxel);
+            left[0] &= isogi_vol__cut_order(&leaf, octant, held);
         }
         if (left[n]) {
             isogi_vol__open_layers(&layers[n], &places, s, n, cell, backwards);
@@ -5415,7 +5466,6 @@ ISOGI_VOL__AVX512 static void isogi_vol__trace_pool(isogi_vol__batch *b, size_t 
 
 static isogi_result isogi_vol__trace(isogi_vol__batch *b, size_t count, isogi_counters *counters) {
     size_t i = 0;
-    memset(&b->work, 0, sizeof b->work);
 #ifdef ISOGI_VOL__AVX
     if (b->pyramid->fast && b->pyramid->path == ISOGI_VOL__PATH_AVX512 && (count > 3 || b->pyramid->context.force_path == ISOGI_VOL__PATH_AVX512))
         isogi_vol__trace_pool(b, count), i = count;
@@ -5432,8 +5482,8 @@ ISOGI_API isogi_result isogi_vol_intersect(const isogi_pyramid *pyramid, const i
                                            isogi_counters *counters) {
     isogi_vol__batch b;
     if (!pyramid || (count && (!rays || !hits))) return ISOGI_INVALID;
-    memset(&b, 0, sizeof b);
-    b.pyramid = pyramid, b.rays = rays, b.hits = hits;
+    isogi_vol__clear_batch(&b, pyramid);
+    b.rays = rays, b.hits = hits;
     return isogi_vol__trace(&b, count, counters);
 }
 
@@ -5441,8 +5491,8 @@ ISOGI_API isogi_result isogi_vol_occluded(const isogi_pyramid *pyramid, const is
                                           isogi_counters *counters) {
     isogi_vol__batch b;
     if (!pyramid || (count && (!rays || !occluded))) return ISOGI_INVALID;
-    memset(&b, 0, sizeof b);
-    b.pyramid = pyramid, b.rays = rays, b.occluded = occluded;
+    isogi_vol__clear_batch(&b, pyramid);
+    b.rays = rays, b.occluded = occluded;
     return isogi_vol__trace(&b, count, counters);
 }
 
@@ -5451,8 +5501,8 @@ ISOGI_API isogi_result isogi_vol_continue(const isogi_pyramid *pyramid, const is
                                           isogi_counters *counters) {
     isogi_vol__batch b;
     if (!pyramid || (count && (!starts || !dirs || !hits))) return ISOGI_INVALID;
-    memset(&b, 0, sizeof b);
-    b.pyramid = pyramid, b.starts = starts, b.dirs = dirs, b.tmax = tmax, b.isovalue = isovalue, b.flags = flags, b.hits = hits;
+    isogi_vol__clear_batch(&b, pyramid);
+    b.starts = starts, b.dirs = dirs, b.tmax = tmax, b.isovalue = isovalue, b.flags = flags, b.hits = hits;
     return isogi_vol__trace(&b, count, counters);
 }
 
@@ -5568,7 +5618,7 @@ ISOGI_API int isogi_vol_next_interval(const isogi_pyramid *pyramid, const isogi_
     double piece[2] = {0, 0}, begin, end, slack;
     int found;
     if (!pyramid || !ray || !ranges || !interval) return 0;
-    memset(&b, 0, sizeof b);
+    isogi_vol__clear_batch(&b, pyramid);
     rest = *ray, rest.flags = 0, rest.isovalue = 0;
     if (from > rest.tmin) rest.tmin = from;
     b.pyramid = pyramid, b.rays = &rest, b.hits = &none;
@@ -5593,8 +5643,8 @@ static isogi_result isogi_vol__bundle(const isogi_pyramid *pyramid, const isogi_
     isogi_ray ray;
     isogi_hit start; /* hits may hold the bundle's */
     if (!pyramid || !bundle || (count && (!dirs || (!hits && !occluded)))) return ISOGI_INVALID;
-    memset(&b, 0, sizeof b);
-    b.pyramid = pyramid, b.bundle = 1, b.dirs = dirs, b.hits = hits, b.occluded = occluded, b.isovalue = bundle->isovalue, b.flags = bundle->flags;
+    isogi_vol__clear_batch(&b, pyramid);
+    b.bundle = 1, b.dirs = dirs, b.hits = hits, b.occluded = occluded, b.isovalue = bundle->isovalue, b.flags = bundle->flags;
     if (bundle->start) start = *bundle->start, b.starts = &start, b.tmax = &bundle->tmax;
     else {
         memcpy(ray.origin, bundle->origin, sizeof ray.origin);
