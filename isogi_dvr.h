@@ -474,7 +474,7 @@ typedef int32_t isogi_dvr__four_ints __attribute__((vector_size(16), aligned(4),
 
 /* A ray within the volume, in grid coordinates; sample i stands at origin + i * dir. */
 typedef struct isogi_dvr__fast_ray {
-    float origin[4], dir[4], piece, last_piece; /* world length over unit from sample to sample */
+    float origin[3], dir[3], piece, last_piece; /* world length over unit from sample to sample */
     int count;                                  /* of samples */
 } isogi_dvr__fast_ray;
 
@@ -485,6 +485,8 @@ typedef struct isogi_dvr__packet {
 } isogi_dvr__packet;
 
 typedef struct isogi_dvr__frame isogi_dvr__frame;
+typedef struct isogi_dvr__fast_run isogi_dvr__fast_run;
+typedef struct isogi_dvr__fast_state isogi_dvr__fast_state;
 
 /* Rows that lie a fixed distance apart, for the vector kernels. */
 typedef struct isogi_dvr__rows {
@@ -2187,12 +2189,11 @@ typedef struct isogi_dvr__sample {
     int cell[3], side; /* side: +1 where the value rises along the ray */
 } isogi_dvr__sample;
 
-/* 0 if the ray misses the box. `origin` and `dir` in grid space, `world` = length of dir in the world, `step` in voxels. */
-static int isogi_dvr__begin(isogi_dvr__march *m, const isogi_dvr *d, const double origin[3], const double dir[3], double world, double step) {
-    double enter = 0, leave = 1e300, pieces;
+/* The part of a ray within the box and the clip planes, in t; 0 if there is none. */
+static int isogi_dvr__inside(const isogi_dvr *d, const double origin[3], const double dir[3], double span[2]) {
+    double enter = 0, leave = 1e300;
     size_t k;
     int a;
-    memset(m, 0, sizeof *m);
     for (a = 0; a < 3; a++) {
         double size = d->cells[a], t0, t1, swap;
         if (!isogi_dvr__finite64(origin[a]) || !isogi_dvr__finite64(dir[a])) return 0;
@@ -2215,11 +2216,20 @@ static int isogi_dvr__begin(isogi_dvr__march *m, const isogi_dvr *d, const doubl
         if (rate > 0 && at > enter) enter = at;
         if (rate < 0 && at < leave) leave = at;
     }
-    if (!(enter < leave) || !(leave < 1e300)) return 0;
-    m->dvr = d, m->enter = enter, m->length = leave - enter;
+    span[0] = enter, span[1] = leave;
+    return enter < leave && leave < 1e300;
+}
+
+/* 0 if the ray misses the box. `origin` and `dir` in grid space, `world` = length of dir in the world, `step` in voxels. */
+static int isogi_dvr__begin(isogi_dvr__march *m, const isogi_dvr *d, const double origin[3], const double dir[3], double world, double step) {
+    double span[2], pieces;
+    int a;
+    memset(m, 0, sizeof *m);
+    if (!isogi_dvr__inside(d, origin, dir, span)) return 0;
+    m->dvr = d, m->enter = span[0], m->length = span[1] - span[0];
     for (a = 0; a < 3; a++) {
         m->dir[a] = dir[a];
-        m->origin[a] = isogi_dvr__clamp(origin[a] + enter * dir[a], d->cells[a]);
+        m->origin[a] = isogi_dvr__clamp(origin[a] + span[0] * dir[a], d->cells[a]);
         m->cell[a] = m->known[a] = -1;
     }
     m->piece = step * d->spacing / world, m->speed = world;
@@ -4575,10 +4585,10 @@ struct isogi_dvr__frame {
     float reach;        /* as isogi_dvr.reach, in samples */
     float end, dim;     /* transmittance at which a ray ends; at which its samples stand twice as far apart */
     void (*leap)(const isogi_dvr *d, isogi_dvr__packet *p, isogi_counters *work);
-    void (*exp_row)(float *x, size_t count);
     float tolerance;    /* change of extinction times length, and of what is seen of it, from which on a piece is divided */
     float glow;         /* share of the colour that is emitted */
-    unsigned (*sample_nodes)(const isogi_dvr__frame *f, const isogi_dvr__fast_ray *r, float first, float stride, float *classes);
+    void (*look)(const isogi_dvr__frame *f, const isogi_dvr__fast_ray *r, isogi_dvr__fast_run *run);
+    void (*shade)(const isogi_dvr__frame *f, const isogi_dvr__fast_ray *r, isogi_dvr__fast_state *s, const isogi_dvr__fast_run *run, isogi_counters *work);
     int sample_kind;    /* voxels that vectors can read: 0 float, 1 uint8, 2 uint16; -1 another type or layout */
     uint32_t last_word; /* byte offset of the last four bytes of the data */
 };
@@ -4617,37 +4627,6 @@ static void isogi_dvr__frame_classes(isogi_dvr__frame *f) {
     f->low = (float)d->matter.low, f->scale = (float)(d->matter.scale * ISOGI_DVR__CLASSES / ISOGI_DVR__TABLE);
 }
 
-/* Radiance scattered at grid points: 1/(4 pi) L . V with the phase function's weights, not yet clamped. */
-typedef struct isogi_dvr__frame_job {
-    isogi_dvr__frame frame;
-    const isogi_dvr__lights *lights;
-} isogi_dvr__frame_job;
-
-static void isogi_dvr__frame_light(void *arg, size_t task) {
-    isogi_dvr__frame_job *job = (isogi_dvr__frame_job *)arg;
-    const isogi_dvr *d = job->frame.dvr;
-    size_t point = task * ISOGI_DVR__GAIN, end = point + ISOGI_DVR__GAIN < d->point_count ? point + ISOGI_DVR__GAIN : d->point_count, c;
-    for (; point < end; point++) {
-        const float *v = d->visibility + point * d->coefficients;
-        float sum[3] = {0, 0, 0};
-        int a;
-        for (c = 0; c < d->coefficients; c++)
-            for (a = 0; a < 3; a++) sum[a] += job->lights->sh[3 * c + (size_t)a] * v[c];
-        job->frame.light[point][3] = isogi_dvr__openness(v[0]); /* which the light is multiplied by, and divided by between grid points */
-        for (a = 0; a < 3; a++) job->frame.light[point][a] = sum[a] * (float)(1 / (4 * ISOGI_DVR__PI)) * job->frame.light[point][3];
-    }
-}
-
-/* out = from + u * (from[beside ..] - from), four numbers at once. */
-static void isogi_dvr__mix4(float *out, const float *from, size_t beside, float u) {
-#ifdef ISOGI_DVR__VECTORS
-    ISOGI_DVR__4(out) = ISOGI_DVR__C4(from) + u * (ISOGI_DVR__C4(from + beside) - ISOGI_DVR__C4(from));
-#else
-    int i;
-    for (i = 0; i < 4; i++) out[i] = from[i] + u * (from[beside + (size_t)i] - from[i]);
-#endif
-}
-
 /* out += factor * from, four numbers at once. */
 static void isogi_dvr__add4(float *out, const float *from, float factor) {
 #ifdef ISOGI_DVR__VECTORS
@@ -4658,74 +4637,61 @@ static void isogi_dvr__add4(float *out, const float *from, float factor) {
 #endif
 }
 
-/* x = max(factor x, 0) + more, and out += factor * a * b: not a mixture of single and four numbers, whose loads would wait for the stores. */
-static void isogi_dvr__positive4(float *x, float factor, float more) {
-#ifdef ISOGI_DVR__VECTORS
-    isogi_dvr__four y = factor * ISOGI_DVR__C4(x);
-    ISOGI_DVR__4(x) = (isogi_dvr__four)((isogi_dvr__four_ints)y & (y > 0.0f)) + more;
-#else
-    int i;
-    for (i = 0; i < 4; i++) x[i] = (factor * x[i] > 0 ? factor * x[i] : 0) + more;
-#endif
-}
+/* Radiance scattered at grid points: 1/(4 pi) L . V with the phase function's weights, not yet clamped. */
+typedef struct isogi_dvr__frame_job {
+    isogi_dvr__frame frame;
+    const isogi_dvr__lights *lights;
+} isogi_dvr__frame_job;
 
-static void isogi_dvr__add_product4(float *out, const float *a, const float *b, float factor) {
-#ifdef ISOGI_DVR__VECTORS
-    ISOGI_DVR__4(out) += factor * ISOGI_DVR__C4(a) * ISOGI_DVR__C4(b);
-#else
-    int i;
-    for (i = 0; i < 4; i++) out[i] += factor * a[i] * b[i];
-#endif
-}
-
-/* Light at a place in the volume's grid coordinates (four numbers, the last one means nothing). */
-#ifdef ISOGI_DVR__VECTORS
-static isogi_dvr__four isogi_dvr__fast_light(const isogi_dvr__frame *f, isogi_dvr__four position) {
-    isogi_dvr__four x = position * ISOGI_DVR__C4(f->light_scale), u, p0, p1, p2, p3;
-    isogi_dvr__four_ints last = ISOGI_DVR__C4I(f->light_last), c, more;
-    const float *p = (const float *)f->light;
-    size_t across = f->light_stride[0], y = f->light_stride[1], z = f->light_stride[2];
-    x = (isogi_dvr__four)((isogi_dvr__four_ints)x & (x > 0.0f)), c = __builtin_convertvector(x, isogi_dvr__four_ints);
-    more = c > last, c = (last & more) | (c & ~more), u = x - __builtin_convertvector(c, isogi_dvr__four);
-    more = u > 1.0f, u = (isogi_dvr__four)((isogi_dvr__four_ints)u & ~more) - __builtin_convertvector(more, isogi_dvr__four); /* true is -1 */
-    p += 4 * (size_t)c[0] + f->light_row[0] * (size_t)c[1] + f->light_row[1] * (size_t)c[2];
-    p0 = ISOGI_DVR__C4(p), p1 = ISOGI_DVR__C4(p + y), p2 = ISOGI_DVR__C4(p + z), p3 = ISOGI_DVR__C4(p + y + z);
-    p0 += u[0] * (ISOGI_DVR__C4(p + across) - p0), p1 += u[0] * (ISOGI_DVR__C4(p + across + y) - p1);
-    p2 += u[0] * (ISOGI_DVR__C4(p + across + z) - p2), p3 += u[0] * (ISOGI_DVR__C4(p + across + y + z) - p3);
-    p0 += u[1] * (p1 - p0), p2 += u[1] * (p3 - p2), p0 += u[2] * (p2 - p0);
-    return p0 * (1 / p0[3]);
-}
-#else
-static void isogi_dvr__fast_light(const isogi_dvr__frame *f, const float position[4], float out[4]) {
-    const float *p = (const float *)f->light;
-    const size_t *to = f->light_stride;
-    float u[3], row[4][4];
-    int a;
-    for (a = 0; a < 3; a++) {
-        float x = position[a] * f->light_scale[a];
-        int c;
-        x = x > 0 ? x : 0;
-        c = (int)x, c = c < f->light_last[a] ? c : f->light_last[a];
-        u[a] = x - (float)c, u[a] = u[a] < 1 ? u[a] : 1;
-        p += (a ? f->light_row[a - 1] : 4) * (size_t)c;
+static void isogi_dvr__frame_light(void *arg, size_t task) {
+    isogi_dvr__frame_job *job = (isogi_dvr__frame_job *)arg;
+    const isogi_dvr *d = job->frame.dvr;
+    size_t point = task * ISOGI_DVR__GAIN, end = point + ISOGI_DVR__GAIN < d->point_count ? point + ISOGI_DVR__GAIN : d->point_count, c;
+    float sh[ISOGI_DVR__MAX_ORDER * ISOGI_DVR__MAX_ORDER][4];
+    memset(sh, 0, sizeof sh);
+    for (c = 0; c < 3 * d->coefficients; c++) sh[c / 3][c % 3] = job->lights->sh[c] * (float)(1 / (4 * ISOGI_DVR__PI));
+    for (; point < end; point++) {
+        const float *v = d->visibility + point * d->coefficients;
+        float sum[4] = {0, 0, 0, 0}, open = isogi_dvr__openness(v[0]);
+        for (c = 0; c < d->coefficients; c++) isogi_dvr__add4(sum, sh[c], v[c]);
+        sum[3] = 1; /* openness, which the light is multiplied by, and divided by between grid points */
+        for (c = 0; c < 4; c++) job->frame.light[point][c] = sum[c] * open;
     }
-    for (a = 0; a < 4; a++) isogi_dvr__mix4(row[a], p + (a & 1 ? to[1] : 0) + (a & 2 ? to[2] : 0), to[0], u[0]);
-    isogi_dvr__mix4(row[0], row[0], 4, u[1]), isogi_dvr__mix4(row[1], row[2], 4, u[1]);
-    isogi_dvr__mix4(out, row[0], 4, u[2]);
-    for (a = 0; a < 3; a++) out[a] /= out[3];
 }
-#endif
 
-/* Classes of ISOGI_DVR__NODES samples from `first` on, a stride apart; -1 where a corner is not finite. Returns a bit for each piece between two of
-   them that may absorb: extinction at its beginning, or a change of its integral. */
-static unsigned isogi_dvr__sample_nodes(const isogi_dvr__frame *f, const isogi_dvr__fast_ray *r, float first, float stride, float *classes) {
+/* out = from + u * (to - from), four numbers at once. */
+static void isogi_dvr__mix4(float *out, const float *from, const float *to, float u) {
+#ifdef ISOGI_DVR__VECTORS
+    ISOGI_DVR__4(out) = ISOGI_DVR__C4(from) + u * (ISOGI_DVR__C4(to) - ISOGI_DVR__C4(from));
+#else
+    int i;
+    for (i = 0; i < 4; i++) out[i] = from[i] + u * (to[i] - from[i]);
+#endif
+}
+
+/* Some samples of a ray, the pieces between them that absorb, and how. */
+struct isogi_dvr__fast_run {
+    float first, stride;                      /* the first sample, and from one to the next, in samples of the ray */
+    float length, last;                       /* of a piece and of the last one, as isogi_dvr__fast_ray.piece */
+    float tolerance;                          /* change of depth across a piece from which on it is divided */
+    int pieces;                               /* up to ISOGI_DVR__NODES - 1 */
+    unsigned some;                            /* a bit for each piece that absorbs */
+    float classes[ISOGI_DVR__NODES];          /* of samples; -1 where a corner is not finite */
+    float mean[ISOGI_DVR__NODES], depth[ISOGI_DVR__NODES], change[ISOGI_DVR__NODES]; /* of pieces: extinction, optical depth, and its change across them */
+};
+
+/* What a ray has gathered. */
+struct isogi_dvr__fast_state { float out[4], clear; };
+
+/* Classes of a run's samples. */
+static void isogi_dvr__fast_classes(const isogi_dvr__frame *f, const isogi_dvr__fast_ray *r, isogi_dvr__fast_run *run) {
     const isogi_volume *v = &f->dvr->volume;
     int i, a, k;
     for (i = 0; i < ISOGI_DVR__NODES; i++) {
         const char *p = (const char *)v->data;
         float u[3], corner[8], value;
         for (a = 0; a < 3; a++) {
-            float x = r->origin[a] + (first + stride * (float)i) * r->dir[a];
+            float x = r->origin[a] + (run->first + run->stride * (float)i) * r->dir[a];
             int c;
             x = x > 0 ? x : 0, x = x < (float)f->dvr->cells[a] ? x : (float)f->dvr->cells[a];
             c = (int)x, c = c < f->dvr->cells[a] ? c : f->dvr->cells[a] - 1;
@@ -4746,22 +4712,116 @@ static unsigned isogi_dvr__sample_nodes(const isogi_dvr__frame *f, const isogi_d
         value = corner[0] + u[1] * (corner[1] - corner[0]);
         value += u[2] * (corner[2] + u[1] * (corner[3] - corner[2]) - value);
         if (!isogi_dvr__finite32(value)) {
-            classes[i] = -1;
+            run->classes[i] = -1;
             continue;
         }
         value = (value * (float)v->scale + ((float)v->bias - f->low)) * f->scale;
         value = value > 0 ? value : 0;
-        classes[i] = value < ISOGI_DVR__CLASSES - 0.001f ? value : ISOGI_DVR__CLASSES - 0.001f;
+        run->classes[i] = value < ISOGI_DVR__CLASSES - 0.001f ? value : ISOGI_DVR__CLASSES - 0.001f;
     }
-    return (1u << (ISOGI_DVR__NODES - 1)) - 1;
+}
+
+/* Factors of before[] and mean[] of the two ends of a piece whose sum is what lies between them, over the difference of their classes;
+   within half a class the mean of both. */
+static void isogi_dvr__fast_factors(float from, float to, float factor[3]) {
+    float difference = to - from;
+    if (difference < 0.5f && difference > -0.5f) factor[0] = 0, factor[1] = factor[2] = 0.5f;
+    else factor[0] = 1 / difference, factor[1] = -(from - (float)(int)from) * factor[0], factor[2] = (to - (float)(int)to) * factor[0];
+}
+
+/* Takes a run's samples, and looks up what lies between them. */
+static void isogi_dvr__fast_look(const isogi_dvr__frame *f, const isogi_dvr__fast_ray *r, isogi_dvr__fast_run *run) {
+    int k;
+    isogi_dvr__fast_classes(f, r, run);
+    for (k = 0, run->some = 0; k < run->pieces; k++) {
+        float from = run->classes[k], to = run->classes[k + 1], length = k + 1 < run->pieces ? run->length : run->last, factor[3], mean;
+        const isogi_dvr__class_entry *e0, *e1;
+        if (from < 0 || to < 0) continue;
+        e0 = &f->classes[(int)from], e1 = &f->classes[(int)to];
+        isogi_dvr__fast_factors(from, to, factor);
+        mean = (e1->before[3] - e0->before[3]) * factor[0] + e0->mean[3] * factor[1] + e1->mean[3] * factor[2];
+        if (!(mean > 0)) continue;
+        run->some |= 1u << k, run->mean[k] = mean;
+        run->depth[k] = mean * length < 1e30f ? mean * length : 1e30f, run->change[k] = fabsf(e1->mean[3] - e0->mean[3]) * length;
+    }
+}
+
+/* Radiance of albedo 1 at a sample's place along the ray (four numbers, the last one means nothing). */
+static void isogi_dvr__fast_light(const isogi_dvr__frame *f, const isogi_dvr__fast_ray *r, float at, float out[4]) {
+    const float *p = (const float *)f->light;
+    const size_t *to = f->light_stride;
+    float u[3], row[4][4];
+    int a;
+    for (a = 0; a < 3; a++) {
+        float x = (r->origin[a] + at * r->dir[a]) * f->light_scale[a];
+        int c;
+        x = x > 0 ? x : 0;
+        c = (int)x, c = c < f->light_last[a] ? c : f->light_last[a];
+        u[a] = x - (float)c, u[a] = u[a] < 1 ? u[a] : 1;
+        p += (a ? f->light_row[a - 1] : 4) * (size_t)c;
+    }
+    for (a = 0; a < 4; a++) {
+        const float *q = p + (a & 1 ? to[1] : 0) + (a & 2 ? to[2] : 0);
+        isogi_dvr__mix4(row[a], q, q + 4, u[0]);
+    }
+    isogi_dvr__mix4(row[0], row[0], row[1], u[1]), isogi_dvr__mix4(row[2], row[2], row[3], u[1]);
+    isogi_dvr__mix4(out, row[0], row[2], u[2]);
+    for (a = 0; a < 3; a++) out[a] /= out[3];
+}
+
+/* Where along the ray light is looked up for a piece: where it is seen on average, its middle when it is clear, its beginning when it is
+   dense; and off dense matter. */
+static float isogi_dvr__fast_place(const isogi_dvr__frame *f, const isogi_dvr__fast_ray *r, const isogi_dvr__fast_run *run, int k) {
+    float off = (float)isogi_dvr__stand_off((double)f->reach, (double)(run->mean[k] * (r->piece * f->reach)));
+    off = run->first + run->stride * ((float)k + 0.5f / (1 + run->depth[k] * (1.0f / 6))) - off;
+    return off > 0 ? off : 0;
+}
+
+/* A piece across which extinction changes much is looked at again in seven: the field between the samples is not quite linear, and
+   where in the piece its surface lies decides about light. */
+static void isogi_dvr__fast_divide(const isogi_dvr__frame *f, const isogi_dvr__fast_ray *r, isogi_dvr__fast_state *s, const isogi_dvr__fast_run *run, int k, isogi_counters *work) {
+    isogi_dvr__fast_run part;
+    memset(&part, 0, sizeof part);
+    part.pieces = ISOGI_DVR__NODES - 1, part.first = run->first + run->stride * (float)k, part.stride = run->stride / (float)part.pieces;
+    part.length = part.last = (k + 1 < run->pieces ? run->length : run->last) / (float)part.pieces;
+    part.tolerance = 3e38f;
+    work->samples += ISOGI_DVR__NODES - 2;
+    f->look(f, r, &part);
+    f->shade(f, r, s, &part, work);
+}
+
+/* The pieces of a run, front to back. */
+static void isogi_dvr__fast_shade(const isogi_dvr__frame *f, const isogi_dvr__fast_ray *r, isogi_dvr__fast_state *s, const isogi_dvr__fast_run *run, isogi_counters *work) {
+    int k, a;
+    for (k = 0; k < run->pieces && s->clear > f->end; k++) {
+        float light[4] = {1, 1, 1, 1}, colour[4] = {0, 0, 0, 0}, factor[3], clear;
+        const isogi_dvr__class_entry *e0 = &f->classes[(int)run->classes[k]], *e1 = &f->classes[(int)run->classes[k + 1]];
+        if (!(run->some >> k & 1)) continue;
+        if (run->change[k] * s->clear > run->tolerance) {
+            isogi_dvr__fast_divide(f, r, s, run, k, work);
+            continue;
+        }
+        clear = isogi_dvr__exp(run->depth[k]);
+        isogi_dvr__fast_factors(run->classes[k], run->classes[k + 1], factor);
+        isogi_dvr__add4(colour, e1->before, factor[0]), isogi_dvr__add4(colour, e0->before, -factor[0]);
+        isogi_dvr__add4(colour, e0->mean, factor[1]), isogi_dvr__add4(colour, e1->mean, factor[2]);
+        if (f->light) isogi_dvr__fast_light(f, r, isogi_dvr__fast_place(f, r, run, k), light);
+        for (a = 0; a < 3; a++) { /* a truncated series may ring below 0 */
+            colour[a] = colour[a] > 0 ? colour[a] : 0, light[a] = light[a] > 0 ? light[a] : 0;
+            s->out[a] += (light[a] + f->glow) * colour[a] * (s->clear * (1 - clear) / run->mean[k]);
+        }
+        s->clear *= clear;
+    }
 }
 
 #ifdef ISOGI_DVR__AVX
-__attribute__((target("avx2,fma"))) static unsigned isogi_dvr__sample_nodes_avx2(const isogi_dvr__frame *f, const isogi_dvr__fast_ray *r, float first, float stride, float *classes) {
+#define ISOGI_DVR__AVX2 __attribute__((target("avx2,fma"))) static
+/* Values of a run's samples, not yet scaled. */
+ISOGI_DVR__AVX2 inline __m256 isogi_dvr__samples_avx2(const isogi_dvr__frame *f, const isogi_dvr__fast_ray *r, const isogi_dvr__fast_run *run) {
     const isogi_volume *v = &f->dvr->volume;
-    const __m256 lane = _mm256_fmadd_ps(_mm256_set1_ps(stride), _mm256_setr_ps(0, 1, 2, 3, 4, 5, 6, 7), _mm256_set1_ps(first));
-    __m256i offset = _mm256_setzero_si256(), bits;
-    __m256 u[3], corner[4], value, top = _mm256_set1_ps(ISOGI_DVR__CLASSES - 0.001f);
+    const __m256 lane = _mm256_fmadd_ps(_mm256_set1_ps(run->stride), _mm256_setr_ps(0, 1, 2, 3, 4, 5, 6, 7), _mm256_set1_ps(run->first));
+    __m256i offset = _mm256_setzero_si256();
+    __m256 u[3], corner[4], value;
     const char *data = (const char *)v->data;
     int a, k;
     for (a = 0; a < 3; a++) {
@@ -4793,137 +4853,155 @@ __attribute__((target("avx2,fma"))) static unsigned isogi_dvr__sample_nodes_avx2
     }
     value = _mm256_fmadd_ps(u[1], _mm256_sub_ps(corner[1], corner[0]), corner[0]);
     corner[2] = _mm256_fmadd_ps(u[1], _mm256_sub_ps(corner[3], corner[2]), corner[2]);
-    value = _mm256_fmadd_ps(u[2], _mm256_sub_ps(corner[2], value), value);
-    bits = _mm256_and_si256(_mm256_castps_si256(value), _mm256_set1_epi32(0x7f800000));
-    bits = _mm256_cmpeq_epi32(bits, _mm256_set1_epi32(0x7f800000));
-    value = _mm256_fmadd_ps(value, _mm256_set1_ps((float)v->scale), _mm256_set1_ps((float)v->bias - f->low));
-    value = _mm256_min_ps(_mm256_max_ps(_mm256_mul_ps(value, _mm256_set1_ps(f->scale)), _mm256_setzero_ps()), top);
-    _mm256_storeu_ps(classes, _mm256_blendv_ps(value, _mm256_set1_ps(-1), _mm256_castsi256_ps(bits)));
-    {
-        __m256i entry = _mm256_slli_epi32(_mm256_cvttps_epi32(value), 5); /* bytes */
-        __m256 before = _mm256_i32gather_ps(&f->classes[0].before[3], entry, 1), mean = _mm256_i32gather_ps(&f->classes[0].mean[3], entry, 1);
-        __m256 share = _mm256_sub_ps(value, _mm256_floor_ps(value)), next;
-        before = _mm256_fmadd_ps(share, mean, before);
-        next = _mm256_permutevar8x32_ps(before, _mm256_setr_epi32(1, 2, 3, 4, 5, 6, 7, 7));
-        mean = _mm256_or_ps(_mm256_cmp_ps(mean, _mm256_setzero_ps(), _CMP_GT_OQ), _mm256_cmp_ps(before, next, _CMP_NEQ_OQ));
-        return (unsigned)_mm256_movemask_ps(mean) & 0x7fu;
+    return _mm256_fmadd_ps(u[2], _mm256_sub_ps(corner[2], value), value);
+}
+
+/* Lane k + 1 at lane k. */
+ISOGI_DVR__AVX2 inline __m256 isogi_dvr__next_avx2(__m256 x) { return _mm256_permutevar8x32_ps(x, _mm256_setr_epi32(1, 2, 3, 4, 5, 6, 7, 7)); }
+
+ISOGI_DVR__AVX2 inline __m256 isogi_dvr__magnitude_avx2(__m256 x) { return _mm256_andnot_ps(_mm256_set1_ps(-0.0f), x); }
+
+/* As isogi_dvr__fast_look. */
+ISOGI_DVR__AVX2 void isogi_dvr__fast_look_avx2(const isogi_dvr__frame *f, const isogi_dvr__fast_ray *r, isogi_dvr__fast_run *run) {
+    const __m256 zero = _mm256_setzero_ps();
+    const __m256i lane = _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7), infinite = _mm256_set1_epi32(0x7f800000);
+    __m256 value = isogi_dvr__samples_avx2(f, r, run), before, node, sum, change, difference, mean, length, in, close;
+    __m256i entry, bad = _mm256_cmpeq_epi32(_mm256_and_si256(_mm256_castps_si256(value), infinite), infinite);
+    value = _mm256_fmadd_ps(value, _mm256_set1_ps((float)f->dvr->volume.scale), _mm256_set1_ps((float)f->dvr->volume.bias - f->low));
+    value = _mm256_min_ps(_mm256_max_ps(_mm256_mul_ps(value, _mm256_set1_ps(f->scale)), zero), _mm256_set1_ps(ISOGI_DVR__CLASSES - 0.001f));
+    value = _mm256_andnot_ps(_mm256_castsi256_ps(bad), value);
+    entry = _mm256_slli_epi32(_mm256_cvttps_epi32(value), 5); /* bytes */
+    before = _mm256_i32gather_ps(&f->classes[0].before[3], entry, 1), node = _mm256_i32gather_ps(&f->classes[0].mean[3], entry, 1);
+    sum = _mm256_mul_ps(_mm256_sub_ps(value, _mm256_floor_ps(value)), node);
+    difference = _mm256_sub_ps(isogi_dvr__next_avx2(value), value), change = isogi_dvr__next_avx2(node);
+    close = _mm256_cmp_ps(isogi_dvr__magnitude_avx2(difference), _mm256_set1_ps(0.5f), _CMP_LT_OQ);
+    mean = _mm256_add_ps(_mm256_sub_ps(isogi_dvr__next_avx2(before), before), _mm256_sub_ps(isogi_dvr__next_avx2(sum), sum));
+    mean = _mm256_blendv_ps(_mm256_div_ps(mean, difference), _mm256_mul_ps(_mm256_set1_ps(0.5f), _mm256_add_ps(node, change)), close);
+    in = _mm256_castsi256_ps(_mm256_or_si256(bad, _mm256_castps_si256(isogi_dvr__next_avx2(_mm256_castsi256_ps(bad)))));
+    in = _mm256_andnot_ps(in, _mm256_castsi256_ps(_mm256_cmpgt_epi32(_mm256_set1_epi32(run->pieces), lane)));
+    in = _mm256_and_ps(in, _mm256_cmp_ps(mean, zero, _CMP_GT_OQ)), mean = _mm256_and_ps(in, mean);
+    length = _mm256_castsi256_ps(_mm256_cmpeq_epi32(_mm256_set1_epi32(run->pieces - 1), lane));
+    length = _mm256_blendv_ps(_mm256_set1_ps(run->length), _mm256_set1_ps(run->last), length);
+    run->some = (unsigned)_mm256_movemask_ps(in);
+    _mm256_storeu_ps(run->classes, value), _mm256_storeu_ps(run->mean, mean);
+    _mm256_storeu_ps(run->depth, _mm256_min_ps(_mm256_mul_ps(mean, length), _mm256_set1_ps(1e30f)));
+    _mm256_storeu_ps(run->change, _mm256_mul_ps(isogi_dvr__magnitude_avx2(_mm256_sub_ps(change, node)), length));
+}
+
+/* As isogi_dvr__exp. */
+ISOGI_DVR__AVX2 inline __m256 isogi_dvr__exp_avx2(__m256 x) {
+    __m256 y = _mm256_max_ps(_mm256_mul_ps(x, _mm256_set1_ps(-1.44269504f)), _mm256_set1_ps(-80)), p = _mm256_set1_ps(1.54035304e-4f);
+    __m256i n = _mm256_cvttps_epi32(_mm256_sub_ps(y, _mm256_set1_ps(0.5f)));
+    y = _mm256_sub_ps(y, _mm256_cvtepi32_ps(n));
+    p = _mm256_fmadd_ps(p, y, _mm256_set1_ps(1.33335581e-3f)), p = _mm256_fmadd_ps(p, y, _mm256_set1_ps(9.61812911e-3f));
+    p = _mm256_fmadd_ps(p, y, _mm256_set1_ps(5.55041087e-2f)), p = _mm256_fmadd_ps(p, y, _mm256_set1_ps(2.40226507e-1f));
+    p = _mm256_fmadd_ps(p, y, _mm256_set1_ps(6.93147182e-1f)), p = _mm256_fmadd_ps(p, y, _mm256_set1_ps(1));
+    return _mm256_mul_ps(p, _mm256_castsi256_ps(_mm256_slli_epi32(_mm256_add_epi32(n, _mm256_set1_epi32(127)), 23)));
+}
+
+/* Products of lanes 0 .. k - 1 at lane k, times first. */
+ISOGI_DVR__AVX2 inline __m256 isogi_dvr__products_avx2(__m256 x, float first) {
+    __m256 shifted = _mm256_permutevar8x32_ps(x, _mm256_setr_epi32(0, 0, 1, 2, 3, 4, 5, 6));
+    const __m256 one = _mm256_set1_ps(1);
+    x = _mm256_blend_ps(shifted, _mm256_set1_ps(first), 1);
+    x = _mm256_mul_ps(x, _mm256_blend_ps(_mm256_permutevar8x32_ps(x, _mm256_setr_epi32(0, 0, 1, 2, 3, 4, 5, 6)), one, 1));
+    x = _mm256_mul_ps(x, _mm256_blend_ps(_mm256_permutevar8x32_ps(x, _mm256_setr_epi32(0, 0, 0, 1, 2, 3, 4, 5)), one, 3));
+    return _mm256_mul_ps(x, _mm256_blend_ps(_mm256_permute2f128_ps(x, x, 0), one, 15));
+}
+
+/* For each piece of a run: what its colour is a sum of (see isogi_dvr__fast_factors), and where its light is. */
+typedef struct isogi_dvr__fast_parts {
+    float factor[3][8], u[3][8], clear[8], weight[8]; /* clear: before the piece */
+    int32_t entry[8], place[8];
+} isogi_dvr__fast_parts;
+
+ISOGI_DVR__AVX2 inline void isogi_dvr__parts_avx2(const isogi_dvr__frame *f, const isogi_dvr__fast_ray *r, const isogi_dvr__fast_run *run, isogi_dvr__fast_parts *parts) {
+    const __m256 zero = _mm256_setzero_ps(), one = _mm256_set1_ps(1), half = _mm256_set1_ps(0.5f), reach = _mm256_set1_ps(f->reach);
+    __m256 value = _mm256_loadu_ps(run->classes), next = isogi_dvr__next_avx2(value), difference = _mm256_sub_ps(next, value), x, at, close;
+    __m256i index = _mm256_setzero_si256();
+    int a;
+    close = _mm256_cmp_ps(isogi_dvr__magnitude_avx2(difference), half, _CMP_LT_OQ), x = _mm256_div_ps(one, difference);
+    _mm256_storeu_si256((__m256i *)(void *)parts->entry, _mm256_cvttps_epi32(value));
+    _mm256_storeu_ps(parts->factor[0], _mm256_andnot_ps(close, x));
+    _mm256_storeu_ps(parts->factor[1], _mm256_blendv_ps(_mm256_mul_ps(_mm256_sub_ps(_mm256_floor_ps(value), value), x), half, close));
+    _mm256_storeu_ps(parts->factor[2], _mm256_blendv_ps(_mm256_mul_ps(_mm256_sub_ps(next, _mm256_floor_ps(next)), x), half, close));
+    if (!f->light) return;
+    x = _mm256_min_ps(_mm256_mul_ps(_mm256_loadu_ps(run->mean), _mm256_set1_ps(r->piece * f->reach)), _mm256_set1_ps(1e15f)), x = _mm256_mul_ps(x, x);
+    x = _mm256_div_ps(_mm256_mul_ps(reach, x), _mm256_add_ps(x, _mm256_set1_ps(16)));
+    at = _mm256_div_ps(half, _mm256_fmadd_ps(_mm256_loadu_ps(run->depth), _mm256_set1_ps(1.0f / 6), one));
+    at = _mm256_add_ps(at, _mm256_setr_ps(0, 1, 2, 3, 4, 5, 6, 7));
+    at = _mm256_max_ps(_mm256_sub_ps(_mm256_fmadd_ps(at, _mm256_set1_ps(run->stride), _mm256_set1_ps(run->first)), x), zero);
+    for (a = 0; a < 3; a++) {
+        __m256i c;
+        x = _mm256_mul_ps(_mm256_fmadd_ps(at, _mm256_set1_ps(r->dir[a]), _mm256_set1_ps(r->origin[a])), _mm256_set1_ps(f->light_scale[a]));
+        x = _mm256_max_ps(x, zero);
+        c = _mm256_min_epi32(_mm256_cvttps_epi32(x), _mm256_set1_epi32(f->light_last[a]));
+        _mm256_storeu_ps(parts->u[a], _mm256_min_ps(_mm256_sub_ps(x, _mm256_cvtepi32_ps(c)), one));
+        index = _mm256_add_epi32(index, a ? _mm256_mullo_epi32(c, _mm256_set1_epi32((int)(f->light_row[a - 1] / 4))) : c);
     }
-}
-#endif
-
-/* The mean of rgb * extinction and extinction between two classes; 0 if there is nothing. */
-static int isogi_dvr__fast_mean(const isogi_dvr__class_entry *classes, float from, float to, float mean[4]) {
-    const isogi_dvr__class_entry *e0, *e1;
-    float difference = to - from, before[4];
-    if (from < 0 || to < 0) return 0;
-    if (difference < 0.5f && difference > -0.5f) {
-        memcpy(mean, classes[(int)(0.5f * (from + to))].mean, 4 * sizeof *mean);
-        return mean[3] > 0;
-    }
-    e0 = &classes[(int)from], e1 = &classes[(int)to];
-    memcpy(mean, e1->before, 4 * sizeof *mean), memcpy(before, e0->before, sizeof before);
-    isogi_dvr__add4(mean, e1->mean, to - (float)(int)to), isogi_dvr__add4(before, e0->mean, from - (float)(int)from);
-    isogi_dvr__add4(mean, before, -1);
-    isogi_dvr__positive4(mean, 1 / difference, 0);
-    return mean[3] > 0;
+    _mm256_storeu_si256((__m256i *)(void *)parts->place, index);
 }
 
-/* What a ray has gathered. */
-typedef struct isogi_dvr__fast_state {
-    float out[4], light[2][4], clear; /* light at samples 2 place and 2 place + 2 */
-    int place;
-} isogi_dvr__fast_state;
-
-/* Radiance of albedo 1 at a place between samples. */
-static void isogi_dvr__fast_radiance(const isogi_dvr__frame *f, const isogi_dvr__fast_ray *r, isogi_dvr__fast_state *s, float at, float radiance[4]) {
-    int place = (int)(0.5f * at), n;
-    if (f->light && place != s->place) {
-        if (place == s->place + 1) memcpy(s->light[0], s->light[1], sizeof s->light[0]);
-        for (n = place == s->place + 1; n < 2; n++) {
-#ifdef ISOGI_DVR__VECTORS
-            ISOGI_DVR__4(s->light[n]) = isogi_dvr__fast_light(f, ISOGI_DVR__C4(r->origin) + (float)(2 * (place + n)) * ISOGI_DVR__C4(r->dir));
-#else
-            float position[4];
-            memcpy(position, r->origin, sizeof position);
-            isogi_dvr__add4(position, r->dir, (float)(2 * (place + n)));
-            isogi_dvr__fast_light(f, position, s->light[n]);
-#endif
-        }
-        s->place = place;
-    }
-    isogi_dvr__mix4(radiance, s->light[0], 4, 0.5f * at - (float)place);
-    isogi_dvr__positive4(radiance, 1, f->glow); /* a truncated series may ring below 0 */
+/* Colour times light of a piece, without its weight. */
+ISOGI_DVR__AVX2 inline __m128 isogi_dvr__part_avx2(const isogi_dvr__frame *f, const isogi_dvr__fast_parts *parts, int k) {
+    const isogi_dvr__class_entry *e0 = &f->classes[parts->entry[k]], *e1 = &f->classes[parts->entry[k + 1]];
+    const float *p, *q;
+    __m128 colour = _mm_mul_ps(_mm_sub_ps(_mm_loadu_ps(e1->before), _mm_loadu_ps(e0->before)), _mm_set1_ps(parts->factor[0][k])), light;
+    __m256 u, front, back;
+    colour = _mm_fmadd_ps(_mm_loadu_ps(e0->mean), _mm_set1_ps(parts->factor[1][k]), colour);
+    colour = _mm_max_ps(_mm_fmadd_ps(_mm_loadu_ps(e1->mean), _mm_set1_ps(parts->factor[2][k]), colour), _mm_setzero_ps());
+    if (!f->light) return colour;
+    p = (const float *)f->light + 4 * (size_t)parts->place[k], q = p + f->light_stride[2];
+    u = _mm256_set1_ps(parts->u[1][k]), front = _mm256_loadu_ps(p), back = _mm256_loadu_ps(q);
+    front = _mm256_fmadd_ps(u, _mm256_sub_ps(_mm256_loadu_ps(p + f->light_stride[1]), front), front);
+    back = _mm256_fmadd_ps(u, _mm256_sub_ps(_mm256_loadu_ps(q + f->light_stride[1]), back), back);
+    front = _mm256_fmadd_ps(_mm256_set1_ps(parts->u[2][k]), _mm256_sub_ps(back, front), front);
+    light = _mm256_castps256_ps128(front);
+    light = _mm_fmadd_ps(_mm_set1_ps(parts->u[0][k]), _mm_sub_ps(_mm256_extractf128_ps(front, 1), light), light);
+    light = _mm_div_ps(light, _mm_shuffle_ps(light, light, 0xff));
+    return _mm_mul_ps(colour, _mm_add_ps(_mm_max_ps(light, _mm_setzero_ps()), _mm_set1_ps(f->glow))); /* a truncated series may ring below 0 */
 }
 
-/* A piece of ray, `size` samples long from `at` on, with this mean extinction and premultiplied colour, depth and transmittance. */
-static void isogi_dvr__fast_piece(const isogi_dvr__frame *f, const isogi_dvr__fast_ray *r, isogi_dvr__fast_state *s, const float mean[4], float at, float size, float depth, float clear) {
-    /* light where the piece is seen on average: its middle when it is clear, its beginning when it is dense */
-    float radiance[4], off = (float)isogi_dvr__stand_off((double)f->reach, (double)(depth / size * f->reach));
-    off = at + size * 0.5f / (1 + depth * (1.0f / 6)) - off;
-    isogi_dvr__fast_radiance(f, r, s, off > 0 ? off : 0, radiance);
-    isogi_dvr__add_product4(s->out, radiance, mean, s->clear * (1 - clear) / mean[3]);
-    s->clear *= clear;
-}
-
-static float isogi_dvr__fast_depth(float depth) { return depth < 1e30f ? depth : 1e30f; }
-
-/* A piece across which extinction changes much is looked at again in seven: the field between the samples is not quite linear, and
-   where in the piece its surface lies decides about light. */
-static void isogi_dvr__fast_divide(const isogi_dvr__frame *f, const isogi_dvr__fast_ray *r, isogi_dvr__fast_state *s, float first, float size, float depth_of_one, isogi_counters *work) {
-    const float part = size / (ISOGI_DVR__NODES - 1);
-    float classes[ISOGI_DVR__NODES], mean[4];
-    int k;
-    f->sample_nodes(f, r, first, part, classes);
-    work->samples += ISOGI_DVR__NODES - 2;
-    for (k = 0; k + 1 < ISOGI_DVR__NODES; k++)
-        if (isogi_dvr__fast_mean(f->classes, classes[k], classes[k + 1], mean)) {
-            float depth = isogi_dvr__fast_depth(mean[3] * depth_of_one * (1.0f / (ISOGI_DVR__NODES - 1)));
-            isogi_dvr__fast_piece(f, r, s, mean, first + (float)k * part, part, depth, isogi_dvr__exp(depth));
-        }
-}
-
-/* Some pieces of a ray: its samples from `first` on, which pieces between them absorb, and how. */
-typedef struct isogi_dvr__fast_run {
-    float classes[ISOGI_DVR__NODES], mean[ISOGI_DVR__NODES][4], depth[ISOGI_DVR__NODES];
-    int first, stride;
-    unsigned some;
-} isogi_dvr__fast_run;
-
-/* Length of a piece; a stride of 2 is not used at the ray's end. */
-static float isogi_dvr__fast_length(const isogi_dvr__fast_ray *r, const isogi_dvr__fast_run *run, int k) {
-    return run->stride > 1 || run->first + k + 2 < r->count ? r->piece * (float)run->stride : r->last_piece;
-}
-
-static void isogi_dvr__fast_means(const isogi_dvr__frame *f, const isogi_dvr__fast_ray *r, isogi_dvr__fast_run *run) {
-    unsigned some;
-    int k;
-    memset(run->depth, 0, sizeof run->depth);
-    for (k = 0, some = run->some; some; k++, some >>= 1) {
-        if (!(some & 1)) continue;
-        if (run->first + k * run->stride + 1 >= r->count || !isogi_dvr__fast_mean(f->classes, run->classes[k], run->classes[k + 1], run->mean[k])) run->some &= ~(1u << k);
-        else run->depth[k] = isogi_dvr__fast_depth(run->mean[k][3] * isogi_dvr__fast_length(r, run, k));
-    }
-}
-
-static void isogi_dvr__fast_pieces(const isogi_dvr__frame *f, const isogi_dvr__fast_ray *r, isogi_dvr__fast_state *s, const isogi_dvr__fast_run *run, const float *clear,
-                                   isogi_counters *work) {
+/* As isogi_dvr__fast_shade. */
+ISOGI_DVR__AVX2 void isogi_dvr__fast_shade_avx2(const isogi_dvr__frame *f, const isogi_dvr__fast_ray *r, isogi_dvr__fast_state *s, const isogi_dvr__fast_run *run, isogi_counters *work) {
+    const __m256i lane = _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7);
+    __m256 passed = isogi_dvr__exp_avx2(_mm256_loadu_ps(run->depth));
+    isogi_dvr__fast_parts parts;
+    __m128 out = _mm_loadu_ps(s->out);
     unsigned some = run->some;
-    int k;
-    for (k = 0; some && s->clear > f->end; k++, some >>= 1) {
-        float change, at = (float)(run->first + k * run->stride), size = (float)run->stride, piece;
-        if (!(some & 1)) continue;
-        piece = isogi_dvr__fast_length(r, run, k);
-        change = (f->classes[(int)run->classes[k + 1]].mean[3] - f->classes[(int)run->classes[k]].mean[3]) * piece * s->clear;
-        if (change > f->tolerance || change < -f->tolerance) isogi_dvr__fast_divide(f, r, s, at, size, piece, work);
-        else isogi_dvr__fast_piece(f, r, s, run->mean[k], at, size, run->depth[k], clear[k]);
+    isogi_dvr__parts_avx2(f, r, run, &parts);
+    for (;;) {
+        __m256 before = isogi_dvr__products_avx2(passed, s->clear), weight = _mm256_mul_ps(before, _mm256_sub_ps(_mm256_set1_ps(1), passed));
+        __m256 change = _mm256_mul_ps(before, _mm256_loadu_ps(run->change));
+        unsigned seen = (unsigned)_mm256_movemask_ps(_mm256_cmp_ps(before, _mm256_set1_ps(f->end), _CMP_GT_OQ)), bits = some & seen;
+        unsigned divided = bits & (unsigned)_mm256_movemask_ps(_mm256_cmp_ps(change, _mm256_set1_ps(run->tolerance), _CMP_GT_OQ));
+        _mm256_storeu_ps(parts.clear, before), _mm256_storeu_ps(parts.weight, _mm256_div_ps(weight, _mm256_loadu_ps(run->mean)));
+        if (divided) bits &= (divided & (0 - divided)) - 1;
+        for (; bits; bits &= bits - 1) {
+            int k = __builtin_ctz(bits);
+            out = _mm_fmadd_ps(isogi_dvr__part_avx2(f, &parts, k), _mm_set1_ps(parts.weight[k]), out);
+        }
+        if (!divided) {
+            s->clear = parts.clear[__builtin_ctz(~seen | 1u << (ISOGI_DVR__NODES - 1))];
+            break;
+        } else {
+            int k = __builtin_ctz(divided);
+            s->clear = parts.clear[k];
+            _mm_storeu_ps(s->out, out);
+            isogi_dvr__fast_divide(f, r, s, run, k, work);
+            out = _mm_loadu_ps(s->out), some &= ~((2u << k) - 1);
+            passed = _mm256_blendv_ps(_mm256_set1_ps(1), passed, _mm256_castsi256_ps(_mm256_cmpgt_epi32(lane, _mm256_set1_epi32(k))));
+        }
     }
+    _mm_storeu_ps(s->out, out);
 }
+#undef ISOGI_DVR__AVX2
+#endif
 
 /* Front to back: all rays of a packet go to where the next matter may be, then each passes some of it. */
 static void isogi_dvr__fast_cast(const isogi_dvr__frame *f, const isogi_dvr__fast_ray r[ISOGI_DVR__LANES], isogi_dvr__fast_state s[ISOGI_DVR__LANES], isogi_counters *work) {
     isogi_dvr__packet p;
     isogi_dvr__fast_run run[ISOGI_DVR__LANES];
-    float clear[ISOGI_DVR__LANES * (ISOGI_DVR__NODES + 1)];
     int k, a, any = 1;
     for (k = 0; k < ISOGI_DVR__LANES; k++) {
         for (a = 0; a < 3; a++) {
@@ -4932,28 +5010,22 @@ static void isogi_dvr__fast_cast(const isogi_dvr__frame *f, const isogi_dvr__fas
         }
         p.next[k] = 0, p.count[k] = r[k].count;
         memset(&s[k], 0, sizeof s[k]);
-        for (a = 0; a < 3; a++) s[k].light[0][a] = s[k].light[1][a] = 1;
-        s[k].clear = 1, s[k].place = -2;
+        s[k].clear = 1, run[k].tolerance = f->tolerance;
     }
     while (any) {
-        size_t used = 0;
         f->leap(f->dvr, &p, work);
         for (k = 0, any = 0; k < ISOGI_DVR__LANES; k++) { /* waiting for memory together */
-            run[k].some = 0, run[k].first = p.next[k];
-            if (p.next[k] >= p.count[k] - 1) continue;
-            run[k].stride = s[k].clear < f->dim && p.next[k] + 2 * (ISOGI_DVR__NODES - 1) < p.count[k] - 1 ? 2 : 1;
-            run[k].some = f->sample_nodes(f, &r[k], (float)p.next[k], (float)run[k].stride, run[k].classes);
+            int left = p.count[k] - 1 - p.next[k], stride = s[k].clear < f->dim && left > 2 * (ISOGI_DVR__NODES - 1) ? 2 : 1;
+            run[k].some = 0;
+            if (left <= 0) continue;
+            run[k].first = (float)p.next[k], run[k].stride = (float)stride, run[k].pieces = left < ISOGI_DVR__NODES ? left : ISOGI_DVR__NODES - 1;
+            run[k].length = r[k].piece * run[k].stride, run[k].last = left < ISOGI_DVR__NODES ? r[k].last_piece : run[k].length;
+            f->look(f, &r[k], &run[k]);
             work->samples += ISOGI_DVR__NODES, any = 1;
-            p.next[k] += run[k].stride * (ISOGI_DVR__NODES - 1);
+            p.next[k] += stride * (ISOGI_DVR__NODES - 1);
         }
         for (k = 0; k < ISOGI_DVR__LANES; k++) {
-            if (run[k].some) isogi_dvr__fast_means(f, &r[k], &run[k]);
-            if (run[k].some) memcpy(clear + used, run[k].depth, sizeof run[k].depth), used += ISOGI_DVR__NODES;
-        }
-        memset(clear + used, 0, ISOGI_DVR__LANES * sizeof *clear);
-        f->exp_row(clear, used);
-        for (k = 0, used = 0; k < ISOGI_DVR__LANES; k++) {
-            if (run[k].some) isogi_dvr__fast_pieces(f, &r[k], &s[k], &run[k], clear + used, work), used += ISOGI_DVR__NODES;
+            if (run[k].some) f->shade(f, &r[k], &s[k], &run[k], work);
             if (!(s[k].clear > f->end)) p.next[k] = p.count[k];
         }
     }
@@ -4962,18 +5034,15 @@ static void isogi_dvr__fast_cast(const isogi_dvr__frame *f, const isogi_dvr__fas
 /* 0 if the ray misses what is kept of the volume. */
 static int isogi_dvr__fast_begin(const isogi_dvr__frame *f, const double origin[3], const double world[3], isogi_dvr__fast_ray *r) {
     const isogi_dvr *d = f->dvr;
-    isogi_dvr__march march;
-    double dir[3], pieces, rest;
+    double dir[3], span[2], piece = f->step * d->spacing, pieces;
     int a;
     isogi_dvr__transform(d->to_grid, world, dir);
-    if (d->transparent || !isogi_dvr__begin(&march, d, origin, dir, 1, f->step)) return 0;
-    pieces = ceil(march.length / march.piece - 1e-6);
+    if (d->transparent || !isogi_dvr__inside(d, origin, dir, span)) return 0;
+    pieces = ceil((span[1] - span[0]) / piece - 1e-6);
     if (!(pieces < 1e7)) return 0;
-    rest = march.length - (pieces - 1) * march.piece;
     r->count = (int)pieces + 1;
-    for (a = 0; a < 3; a++) r->origin[a] = (float)march.origin[a], r->dir[a] = (float)(march.dir[a] * march.piece);
-    r->origin[3] = r->dir[3] = 0;
-    r->piece = (float)(march.piece / d->desc.unit), r->last_piece = (float)(rest / d->desc.unit);
+    for (a = 0; a < 3; a++) r->origin[a] = (float)isogi_dvr__clamp(origin[a] + span[0] * dir[a], d->cells[a]), r->dir[a] = (float)(dir[a] * piece);
+    r->piece = (float)(piece / d->desc.unit), r->last_piece = (float)((span[1] - span[0] - (pieces - 1) * piece) / d->desc.unit);
     return 1;
 }
 
@@ -5142,17 +5211,18 @@ static isogi_result isogi_dvr__begin_frame(isogi_dvr__render_job *job) {
     for (a = 0; a < 3; a++) eye[a] = (double)job->view->eye[a];
     isogi_vol_to_grid(d->desc.pyramid, eye, job->eye);
     if (!isogi_dvr__fast_space(d) || job->depth || job->lights.nearby.light_count || job->lights.local) return ISOGI_OK;
-    f->dvr = d, f->step = d->piece, f->sample_nodes = isogi_dvr__sample_nodes, f->glow = (float)d->desc.emission;
+    f->dvr = d, f->step = d->piece, f->look = isogi_dvr__fast_look, f->shade = isogi_dvr__fast_shade, f->glow = (float)d->desc.emission;
     f->end = 1 - d->desc.opaque, f->dim = 0.125f;
     blocks = (double)d->level[0].size[0] * (double)d->level[0].size[1] * (double)d->level[0].size[2];
-    f->exp_row = d->kernels.exp_row, f->reach = (float)(d->reach / f->step);
+    f->reach = (float)(d->reach / f->step);
     f->leap = blocks < 2e9 ? d->kernels.leap : isogi_dvr__leap;
     f->tolerance = d->desc.tolerance > 0 ? (float)d->desc.tolerance : 0.5f;
     bytes = (double)v->stride[0] * (double)d->cells[0] + (double)v->stride[1] * (double)d->cells[1] + (double)v->stride[2] * (double)d->cells[2];
     f->sample_kind = kind >= 0 && v->stride[0] == (kind == 0 ? 4 : kind) && v->stride[1] > 0 && v->stride[2] > 0 && bytes > 8 && bytes < 2e9 ? kind : -1;
     if (f->sample_kind >= 0) f->last_word = (uint32_t)bytes + (uint32_t)v->stride[0] - 4;
 #ifdef ISOGI_DVR__AVX
-    if (f->sample_kind >= 0 && isogi_dvr__machine() >= 3 && (!d->context.force_path || d->context.force_path > 2)) f->sample_nodes = isogi_dvr__sample_nodes_avx2;
+    if (f->sample_kind >= 0 && isogi_dvr__machine() >= 3 && (!d->context.force_path || d->context.force_path > 2) && d->point_count < 0x7fffffff)
+        f->look = isogi_dvr__fast_look_avx2, f->shade = isogi_dvr__fast_shade_avx2;
 #endif
     f->classes = (isogi_dvr__class_entry *)isogi_allocate(&d->context, ISOGI_DVR__CLASSES + 1, sizeof *f->classes);
     if (!f->classes) return ISOGI_NO_MEMORY;
@@ -5161,8 +5231,9 @@ static isogi_result isogi_dvr__begin_frame(isogi_dvr__render_job *job) {
         f->glow = 0;
         return ISOGI_OK;
     }
-    f->light = (float(*)[4])isogi_allocate(&d->context, d->point_count, sizeof *f->light);
+    f->light = (float(*)[4])isogi_allocate(&d->context, d->point_count + 1, sizeof *f->light); /* one more, for a grid of one point along x */
     if (!f->light) return ISOGI_NO_MEMORY;
+    memset(f->light[d->point_count], 0, sizeof *f->light);
     job->fast.lights = &job->lights;
     f->light_row[0] = 4 * d->desc.grid[0], f->light_row[1] = f->light_row[0] * d->desc.grid[1];
     for (a = 0; a < 3; a++) {
@@ -5203,7 +5274,7 @@ ISOGI_API isogi_result isogi_dvr_render(const isogi_dvr *dvr, const isogi_view *
         isogi_dvr__add(counters, &job.work[i]);
     }
     isogi_release(&dvr->context, job.fast.frame.classes, ISOGI_DVR__CLASSES + 1, sizeof *job.fast.frame.classes);
-    isogi_release(&dvr->context, job.fast.frame.light, dvr->point_count, sizeof *job.fast.frame.light);
+    isogi_release(&dvr->context, job.fast.frame.light, dvr->point_count + 1, sizeof *job.fast.frame.light);
     isogi_release(&dvr->context, job.pixels, pixels, 5 * sizeof *job.pixels);
     isogi_release(&dvr->context, job.work, job.tiles, sizeof *job.work);
     isogi_release(&dvr->context, job.lights.list, job.lights.count, sizeof *job.lights.list);
