@@ -496,6 +496,19 @@ typedef struct isogi_dvr__rows {
     size_t weight;                                            /* from transmittance to its weight, in what pass_out writes and between reads */
 } isogi_dvr__rows;
 
+/* A step of local visibility's rays: see "local and global visibility" below. */
+typedef struct isogi_dvr__local_step {
+    ptrdiff_t offset; /* from a ray's node to the first of the eight around its sample */
+    float weight[8];  /* times the optical depth of the step */
+} isogi_dvr__local_step;
+
+/* Rays of local visibility in one direction from a row of nodes, through a window. */
+typedef struct isogi_dvr__local_rays {
+    const float *at;
+    const isogi_dvr__local_step *step;
+    size_t steps, row, plane, count;
+} isogi_dvr__local_rays;
+
 /* Sums over directions: sum[c][i] += kernel[k][c] * from[k][i]. */
 typedef struct isogi_dvr__sums {
     float *sum;
@@ -511,6 +524,7 @@ typedef struct isogi_dvr__kernels {
     void (*exp_row)(float *x, size_t count);
     void (*leap)(const isogi_dvr *d, isogi_dvr__packet *p, isogi_counters *work);
     void (*gather)(const isogi_dvr__sums *a);
+    void (*local)(const isogi_dvr__local_rays *a, float *clear);
 } isogi_dvr__kernels;
 
 #ifdef ISOGI_DVR__AVX
@@ -1596,6 +1610,19 @@ static void isogi_dvr__gather(const isogi_dvr__sums *a) {
             for (i = 0; i < a->count; i++) a->sum[c * a->sum_row + i] += a->kernel[k * a->coefficients + c] * a->from[k * a->from_row + i];
 }
 
+/* What rays let through: clear[0 .. count - 1], and up to the end of a vector anything. */
+static void isogi_dvr__local(const isogi_dvr__local_rays *a, float *clear) {
+    size_t i, j;
+    for (i = 0; i < a->count; i++) {
+        float depth = 0;
+        for (j = 0; j < a->steps; j++) {
+            const float *p = a->at + a->step[j].offset + i, *q = p + a->plane, *w = a->step[j].weight;
+            depth += ((w[0] * p[0] + w[1] * p[1]) + (w[2] * p[a->row] + w[3] * p[a->row + 1])) + ((w[4] * q[0] + w[5] * q[1]) + (w[6] * q[a->row] + w[7] * q[a->row + 1]));
+        }
+        clear[i] = isogi_dvr__exp(depth);
+    }
+}
+
 #ifdef ISOGI_DVR__VECTORS
 /* e = exp(-x) */
 #define ISOGI_DVR__EXP(e, x)                                                                                    \
@@ -1702,9 +1729,21 @@ static void isogi_dvr__gather(const isogi_dvr__sums *a) {
             }                                                                                                                       \
         }                                                                                                                           \
     }                                                                                                                               \
+    TARGET static void isogi_dvr__local##SUFFIX(const isogi_dvr__local_rays *a, float *clear) {                                     \
+        size_t i, j;                                                                                                                \
+        for (i = 0; i < a->count; i += ISOGI_DVR__LANES) {                                                                          \
+            isogi_dvr__floats depth = {0};                                                                                          \
+            for (j = 0; j < a->steps; j++) {                                                                                        \
+                const float *p = a->at + a->step[j].offset + i, *q = p + a->plane, *p1 = p + a->row, *q1 = q + a->row, *w = a->step[j].weight; \
+                depth += ((w[0] * ISOGI_DVR__C(p) + w[1] * ISOGI_DVR__C(p + 1)) + (w[2] * ISOGI_DVR__C(p1) + w[3] * ISOGI_DVR__C(p1 + 1))) + \
+                         ((w[4] * ISOGI_DVR__C(q) + w[5] * ISOGI_DVR__C(q + 1)) + (w[6] * ISOGI_DVR__C(q1) + w[7] * ISOGI_DVR__C(q1 + 1)));  \
+            }                                                                                                                       \
+            ISOGI_DVR__EXP(ISOGI_DVR__V(clear + i), depth)                                                                          \
+        }                                                                                                                           \
+    }                                                                                                                               \
     static void isogi_dvr__set_kernels##SUFFIX(isogi_dvr__kernels *k) {                                                             \
         k->pass = isogi_dvr__pass##SUFFIX, k->pass_out = isogi_dvr__pass_out##SUFFIX, k->between = isogi_dvr__between##SUFFIX;      \
-        k->exp_row = isogi_dvr__exp_row##SUFFIX, k->gather = isogi_dvr__gather##SUFFIX;                                             \
+        k->exp_row = isogi_dvr__exp_row##SUFFIX, k->gather = isogi_dvr__gather##SUFFIX, k->local = isogi_dvr__local##SUFFIX;         \
     }
 /* Of the wide path only: in narrower vectors conversions and comparisons go lane by lane, and are no faster than plain code. */
 #define ISOGI_DVR__LEAP_KERNEL(SUFFIX, TARGET)                                                                                      \
@@ -1756,7 +1795,7 @@ ISOGI_DVR__LEAP_KERNEL(_avx512, __attribute__((target("avx512f,avx512vl,avx512dq
 #endif
 
 static isogi_dvr__kernels isogi_dvr__choose_kernels(int force_path) {
-    isogi_dvr__kernels k = {isogi_dvr__pass, isogi_dvr__pass_out, isogi_dvr__between, isogi_dvr__exp_row, isogi_dvr__leap, isogi_dvr__gather};
+    isogi_dvr__kernels k = {isogi_dvr__pass, isogi_dvr__pass_out, isogi_dvr__between, isogi_dvr__exp_row, isogi_dvr__leap, isogi_dvr__gather, isogi_dvr__local};
 #ifdef ISOGI_DVR__VECTORS
     if (force_path == 1) return k;
     isogi_dvr__set_kernels_base(&k);
@@ -3334,11 +3373,6 @@ static isogi_result isogi_dvr__update_blocks(isogi_dvr *d) {
 /* Around a block a window of extinction is laid out, as wide as local rays reach, at the finest level that occurs in it: data as the
    blocks hold it, classified at the window's nodes, 0 where it is dropped, cut off or outside. For one direction and one step all nodes
    of a row of the block look at the window at the same place between its nodes, so that whole rows advance at once. */
-typedef struct isogi_dvr__local_step {
-    ptrdiff_t offset; /* from a ray's node to the first of the eight around its sample */
-    float weight[8];  /* times the optical depth of the step */
-} isogi_dvr__local_step;
-
 typedef struct isogi_dvr__local_job {
     isogi_dvr *dvr;
     size_t first, packing;
@@ -3381,25 +3415,49 @@ static void isogi_dvr__set_local_steps(const isogi_dvr *d, isogi_dvr__local_step
             }
 }
 
+/* Where the nodes of level n lie among those that a block holds, along an axis: the node before, and how far past it. Returns how many. */
+static size_t isogi_dvr__along(const isogi_dvr *d, size_t block, size_t n, int axis, size_t before[17], float u[17]) {
+    const isogi_dvr__blocks *b = &d->blocks;
+    size_t at[3] = {block % b->count[0], block / b->count[0] % b->count[1], block / b->count[0] / b->count[1]}, held = b->level[block], side[3], i;
+    isogi_dvr__sides(b, block, held, side);
+    for (i = 0; i <= n && 16 * at[axis] + 16 * i / n <= (size_t)d->cells[axis]; i++) {
+        before[i] = i * held / n < side[axis] ? i * held / n : side[axis] - 1;
+        u[i] = (float)i * (float)held / (float)n - (float)before[i];
+    }
+    return i;
+}
+
+/* A row of the nodes that a block holds, between four of them. */
+static void isogi_dvr__held_row(const float *data, size_t row, size_t plane, float v, float w, float line[17]) {
+    size_t i;
+    for (i = 0; i < row; i++) {
+        float x = data[i], y = w > 0 ? data[plane + i] : x;
+        if (v > 0) x += v * (data[row + i] - x), y = w > 0 ? y + v * (data[plane + row + i] - y) : x;
+        line[i] = x + w * (y - x);
+    }
+}
+
 /* The nodes of a window that lie in one block (with its upper faces). Returns whether anything there absorbs. */
 static int isogi_dvr__fill_window(const isogi_dvr *d, size_t block, size_t n, const size_t corner[3], float *window) {
     const isogi_dvr__blocks *b = &d->blocks;
-    size_t node[3], side[3], row = isogi_dvr__window_row(b, n), rows = isogi_dvr__window_side(b, n), held = b->level[block];
-    const float *data = b->data + b->first[block];
+    size_t before[3][17], count[3], node[3], side[3], row = isogi_dvr__window_row(b, n), rows = isogi_dvr__window_side(b, n);
+    float u[3][17], line[17];
     int any = 0, a;
-    isogi_dvr__sides(b, block, n, side);
-    for (node[2] = 0; node[2] <= side[2]; node[2]++)
-        for (node[1] = 0; node[1] <= side[1]; node[1]++) {
+    isogi_dvr__sides(b, block, b->level[block], side);
+    for (a = 0; a < 3; a++) count[a] = isogi_dvr__along(d, block, n, a, before[a], u[a]);
+    for (node[2] = 0; node[2] < count[2]; node[2]++)
+        for (node[1] = 0; node[1] < count[1]; node[1]++) {
+            const float *data = b->data + b->first[block] + (side[0] + 1) * (before[1][node[1]] + (side[1] + 1) * before[2][node[2]]);
             float *out = window + corner[0] + row * (corner[1] + node[1] + rows * (corner[2] + node[2]));
-            for (node[0] = 0; node[0] <= side[0]; node[0]++) {
+            isogi_dvr__held_row(data, side[0] + 1, (side[0] + 1) * (side[1] + 1), u[1][node[1]], u[2][node[2]], line);
+            for (node[0] = 0; node[0] < count[0]; node[0]++) {
+                float value = line[before[0][node[0]]], end = line[before[0][node[0]] + 1];
                 double position[3];
-                float value;
-                int within = 1;
-                isogi_dvr__node_position(b, block, n, node, position);
-                for (a = 0; a < 3; a++) within = within && position[a] <= d->cells[a];
-                if (!within || (d->cut[block] && !isogi_dvr__kept(d, position))) continue;
-                if (held == n) value = data[node[0] + (side[0] + 1) * (node[1] + (side[1] + 1) * node[2])];
-                else value = isogi_dvr__block_value(d, block, position);
+                if (d->cut[block]) {
+                    isogi_dvr__node_position(b, block, n, node, position);
+                    if (!isogi_dvr__kept(d, position)) continue;
+                }
+                value += u[0][node[0]] * (end - value);
                 out[node[0]] = d->matter.table[isogi_dvr__class(d, (double)value)];
                 any |= out[node[0]] > 0;
             }
@@ -3433,20 +3491,14 @@ static size_t isogi_dvr__make_window(const isogi_dvr *d, size_t block, float *wi
 static void isogi_dvr__local_row(const isogi_dvr__local_job *job, size_t n, const float *at, size_t count, float (*sum)[2 * ISOGI_DVR__LANES]) {
     const isogi_dvr *d = job->dvr;
     const isogi_dvr__local_step *step = job->step + isogi_dvr__steps_before(d, n);
-    size_t steps = isogi_dvr__local_steps(d, n), row = isogi_dvr__window_row(&d->blocks, n), plane = row * isogi_dvr__window_side(&d->blocks, n), k, j, c;
-    float depth[2 * ISOGI_DVR__LANES];
-    isogi_dvr__rows rows = {depth, NULL, NULL, 0, 0, 0, 1, count, row, 0};
-    isogi_dvr__sums sums = {sum[0], depth, NULL, 2 * ISOGI_DVR__LANES, 0, d->coefficients, 1, count};
+    size_t steps = isogi_dvr__local_steps(d, n), row = isogi_dvr__window_row(&d->blocks, n), plane = row * isogi_dvr__window_side(&d->blocks, n), k, c;
+    float clear[2 * ISOGI_DVR__LANES];
+    isogi_dvr__local_rays rays = {at, step, steps, row, plane, count};
+    isogi_dvr__sums sums = {sum[0], clear, NULL, 2 * ISOGI_DVR__LANES, 0, d->coefficients, 1, count};
     for (c = 0; c < d->coefficients; c++) memset(sum[c], 0, sizeof sum[c]);
     for (k = 0; k < (size_t)d->desc.directions; k++) {
-        memset(depth, 0, sizeof depth);
-        for (j = 0; j < steps; j++, step++) {
-            rows.from = at + step->offset;
-            d->kernels.pass(&rows, step->weight);
-            rows.from += plane;
-            d->kernels.pass(&rows, step->weight + 4);
-        }
-        d->kernels.exp_row(depth, count);
+        d->kernels.local(&rays, clear);
+        rays.step += steps;
         sums.kernel = d->kernel + k * d->coefficients;
         d->kernels.gather(&sums);
     }
@@ -3550,63 +3602,83 @@ static void isogi_dvr__toward_task(void *arg, size_t task) {
     }
 }
 
-/* Piecewise integration: local visibility stands for the ray's next r_s voxels; the last piece, cut by the border, is no shorter in
-   what it blocks since there is nothing outside (eq. 9). */
-static float isogi_dvr__global_ray(const isogi_dvr *d, const float *toward, const double from[3], const double direction[6]) {
-    const isogi_dvr__blocks *b = &d->blocks;
-    double step = d->desc.radius * d->spacing, t, limit = 1e300, clear = 1;
+/* A place along an axis, for every level that a block may have: the node before it, how far past that, and how many nodes there are. */
+typedef struct isogi_dvr__global_axis {
+    size_t block, node[17], nodes[17];
+    float u[17];
+} isogi_dvr__global_axis;
+
+static void isogi_dvr__global_at(const isogi_dvr__blocks *b, int axis, double position, isogi_dvr__global_axis *out) {
+    double x = isogi_dvr__clamp(position * (1.0 / 16), (double)b->count[axis]);
+    size_t n, side;
+    out->block = (size_t)x < b->count[axis] ? (size_t)x : b->count[axis] - 1;
+    side = out->block + 1 < b->count[axis] ? 16 : b->rest[axis];
+    for (n = 1; n <= 16; n *= 2) {
+        double at = (x - (double)out->block) * (double)n;
+        size_t last = (side * n + 15) / 16 - 1;
+        out->nodes[n] = last + 2, out->node[n] = (size_t)at < last ? (size_t)at : last, out->u[n] = (float)(at - (double)out->node[n]);
+    }
+}
+
+/* Local visibility at a place, already evaluated towards one direction. */
+static float isogi_dvr__global_piece(const isogi_dvr__blocks *b, const float *toward, double x, const isogi_dvr__global_axis *y, const isogi_dvr__global_axis *z) {
+    size_t at, block, n, node, last, row, plane;
+    const float *p;
+    float u, v[4];
     int a;
-    for (a = 0; a < 3; a++) {
+    x = isogi_dvr__clamp(x * (1.0 / 16), (double)b->count[0]);
+    at = (size_t)x < b->count[0] ? (size_t)x : b->count[0] - 1, block = at + b->count[0] * (y->block + b->count[1] * z->block);
+    n = b->lit[block];
+    if (!n) return 1;
+    last = at + 1 < b->count[0] ? n - 1 : (b->rest[0] * n + 15) / 16 - 1, row = last + 2, plane = row * y->nodes[n];
+    x = (x - (double)at) * (double)n, node = (size_t)x < last ? (size_t)x : last, u = (float)(x - (double)node);
+    p = toward + b->first[b->total + block] + node + row * y->node[n] + plane * z->node[n];
+    for (a = 0; a < 4; a++) {
+        const float *q = p + (a & 1 ? row : 0) + (a & 2 ? plane : 0);
+        v[a] = q[0] + u * (q[1] - q[0]);
+    }
+    v[0] += y->u[n] * (v[1] - v[0]), v[2] += y->u[n] * (v[3] - v[2]), v[0] += z->u[n] * (v[2] - v[0]);
+    return v[0] > 0 ? v[0] < 1 ? v[0] : 1 : 0;
+}
+
+/* Piecewise integration: local visibility stands for the ray's next r_s voxels; the last piece, cut by the border, is no shorter in
+   what it blocks since there is nothing outside (eq. 9). A row of grid points at once: it shares places along y and z. */
+static void isogi_dvr__global_row(const isogi_dvr *d, const float *toward, const double from[3], double apart, size_t count, const double direction[6], float *clear) {
+    double step = d->desc.radius * d->spacing, t, limit = 1e300, across = fabs(direction[0]) > 1e-300 ? 1 / direction[0] : 0;
+    isogi_dvr__global_axis y, z;
+    size_t i, left = count;
+    int a;
+    for (a = 1; a < 3; a++) {
         double exit = fabs(direction[a]) > 1e-300 ? ((direction[a] > 0 ? d->cells[a] : 0) - from[a]) / direction[a] : limit;
         if (exit < limit) limit = exit;
     }
-    for (t = 0; t < limit && clear > ISOGI_DVR__NEGLIGIBLE; t += step) {
-        size_t block = 0, stride = 1, n, node, side[3], offset[3];
-        double u[3], v[4];
-        const float *p;
-        for (a = 0; a < 3; a++) {
-            double x = isogi_dvr__clamp((from[a] + t * direction[a]) * (1.0 / 16), (double)b->count[a]);
-            node = (size_t)x;
-            node = node < b->count[a] ? node : b->count[a] - 1;
-            side[a] = node + 1 < b->count[a] ? 16 : b->rest[a];
-            u[a] = x - (double)node, block += stride * node, stride *= b->count[a];
+    for (i = 0; i < count; i++) clear[i] = 1;
+    for (t = 0; t < limit && left; t += step) {
+        isogi_dvr__global_at(&d->blocks, 1, from[1] + t * direction[1], &y), isogi_dvr__global_at(&d->blocks, 2, from[2] + t * direction[2], &z);
+        for (i = 0, left = 0; i < count; i++) {
+            double x = from[0] + (double)i * apart;
+            if (!(clear[i] > (float)ISOGI_DVR__NEGLIGIBLE) || (fabs(across) > 0 && !(t < ((across > 0 ? d->cells[0] : 0) - x) * across))) continue;
+            clear[i] *= isogi_dvr__global_piece(&d->blocks, toward, x + t * direction[0], &y, &z), left++;
         }
-        n = b->lit[block];
-        if (!n) continue;
-        p = toward + b->first[b->total + block];
-        for (a = 0, stride = 1; a < 3; a++) {
-            double x = u[a] * (double)n;
-            size_t nodes = (side[a] * n + 15) / 16;
-            node = (size_t)x;
-            node = node < nodes ? node : nodes - 1;
-            u[a] = x - (double)node, p += stride * node, offset[a] = stride, stride *= nodes + 1;
-        }
-        for (a = 0; a < 4; a++) {
-            const float *q = p + (a & 1 ? offset[1] : 0) + (a & 2 ? offset[2] : 0);
-            v[a] = (double)q[0] + u[0] * ((double)q[1] - (double)q[0]);
-        }
-        v[0] += u[1] * (v[1] - v[0]), v[2] += u[1] * (v[3] - v[2]);
-        clear *= isogi_dvr__clamp(v[0] + u[2] * (v[2] - v[0]), 1);
     }
-    return (float)clear;
 }
 
 /* A plane of grid points, in one direction. */
 static void isogi_dvr__global_task(void *arg, size_t task) {
     const isogi_dvr__batch *job = (const isogi_dvr__batch *)arg;
     const isogi_dvr *d = job->dvr;
-    size_t k = task % job->count, plane = d->desc.grid[0] * d->desc.grid[1], point = task / job->count * plane, end = point + plane;
-    for (; point < end; point++) {
-        size_t rest = point;
-        double grid[3];
-        int a;
-        for (a = 0; a < 3; a++) {
-            size_t points = d->desc.grid[a], j = rest % points;
-            grid[a] = points > 1 ? (double)j * d->cells[a] / (double)(points - 1) : 0.5 * d->cells[a];
-            rest /= points;
-        }
-        job->transmittance[k * d->padded_count + point] =
-            isogi_dvr__global_ray(d, job->scratch + k * job->scratch_count, grid, d->direction[job->first + k]);
+    size_t k = task % job->count, z = task / job->count, y;
+    double first[3], apart[3];
+    int a;
+    for (a = 0; a < 3; a++) {
+        size_t points = d->desc.grid[a];
+        apart[a] = points > 1 ? d->cells[a] / (double)(points - 1) : 0, first[a] = points > 1 ? 0 : 0.5 * d->cells[a];
+    }
+    for (y = 0; y < d->desc.grid[1]; y++) {
+        double from[3];
+        from[0] = first[0], from[1] = first[1] + (double)y * apart[1], from[2] = first[2] + (double)z * apart[2];
+        isogi_dvr__global_row(d, job->scratch + k * job->scratch_count, from, apart[0], d->desc.grid[0], d->direction[job->first + k],
+                              job->transmittance + k * d->padded_count + d->desc.grid[0] * (y + d->desc.grid[1] * z));
     }
 }
 
