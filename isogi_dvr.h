@@ -658,6 +658,12 @@ ISOGI_API void isogi_transfer_at(const isogi_transfer *transfer, double value, f
     *extinction = (float)isogi_dvr__extinction(transfer->points, transfer->point_count, value);
 }
 
+/* Between two such points nothing changes. */
+static int isogi_dvr__alike(const isogi_transfer_point *a, const isogi_transfer_point *b) {
+    if (a->extinction < b->extinction || a->extinction > b->extinction) return 0;
+    return !(a->extinction > 0) || !memcmp(a->rgb, b->rgb, sizeof a->rgb);
+}
+
 /* ==== the renderer =================================================================================================== */
 
 /* An owned transfer function. most[l * point_count + i] is the largest extinction of points i .. i + 2^l - 1, so that the largest
@@ -675,7 +681,7 @@ typedef struct isogi_dvr__matter {
     size_t row[2], count[2];            /* padded row and number of floats of the two layouts */
     double spacing[3];                  /* voxels from node to node */
     float *extinction[2];               /* [z][y][x] and [x][y][z], per desc.unit */
-    double low, scale;                  /* class of a value: (value - low) * scale */
+    double low, scale;                  /* class of a value: (value - low) * scale; see isogi_dvr__set_classes */
     float *table, *scratch;             /* while it is brought up to date: extinction of classes; rows of values */
     size_t scratch_row;
 } isogi_dvr__matter;
@@ -711,7 +717,8 @@ typedef struct isogi_dvr__blocks {
     size_t rest[3];                /* cells along the last block, 1 .. 16 */
     float *lattice[5];             /* averages of the data, nodes 2, 4, 8, 16 voxels apart; [0] is the volume */
     size_t lattice_size[5][3];
-    uint64_t *histogram;           /* classes of values that occur in each block */
+    uint64_t *histogram;           /* classes of values that occur in each block, */
+    double low, scale;             /* for these classes */
     uint8_t *level, *lit, *stale;  /* of each block: level of its data, of its local visibility; visibility has to be computed */
     size_t *first;                 /* [2][total]: its first node in `data` and in `sh` */
     size_t *order, due;           /* blocks to be computed */
@@ -730,6 +737,7 @@ struct isogi_dvr {
     isogi_dvr__integral integral; /* where isogi_dvr__by_value */
     double to_grid[9]; /* world directions to grid directions */
     double spacing;    /* the smallest distance of two voxels, world */
+    double range[2];   /* of values */
     double visibility_step, piece; /* of visibility rays; of pre-integrated pictures: voxels */
     int cells[3];
     int transparent; /* no value that occurs has any extinction */
@@ -815,6 +823,34 @@ static isogi_result isogi_dvr__transfer_copy(isogi_dvr__transfer *t, const isogi
         }
     }
     return ISOGI_OK;
+}
+
+/* The values between which a transfer function is not constant; span[0] > span[1] where there are none. */
+static void isogi_dvr__transfer_span(const isogi_dvr__transfer *t, double span[2]) {
+    size_t first = 0, end = t->point_count;
+    while (first + 1 < end && isogi_dvr__alike(&t->points[first], &t->points[first + 1])) first++;
+    while (end > first + 1 && isogi_dvr__alike(&t->points[end - 1], &t->points[end - 2])) end--;
+    span[0] = end ? t->points[first].value : 1, span[1] = end ? t->points[end - 1].value : 0;
+}
+
+/* `count` classes of values, the class of a value being (value - low) * scale, kept within 0 .. count - 1. The first and the last one hold
+   whatever lies before and beyond the values of the span that occur; the others divide these. So neither an outlier nor a wide range of
+   values takes classes from the values that the transfer function tells apart. A thousandth of a class keeps the ends of the span, where
+   a step may stand, on their upper side whatever is rounded. */
+static void isogi_dvr__set_classes(const isogi_dvr *d, const double span[2], size_t count, double *low, double *scale) {
+    double from = span[0] > d->range[0] ? span[0] : d->range[0], to = span[1] < d->range[1] ? span[1] : d->range[1], width;
+    if (!(from < to)) to = from + (d->range[1] > d->range[0] ? 0.5 * d->range[1] - 0.5 * d->range[0] : 0);
+    width = (0.5 * to - 0.5 * from) / (0.5 * (double)(count - 2));
+    if (!(width > 1e-7 * fabs(from) / (double)count)) width = 1e-7 * fabs(from) / (double)count;
+    if (!(width > 1e-300)) width = 1e-300;
+    *low = from - 1.001 * width, *scale = 1 / width;
+}
+
+/* The values that a class stands for: one that lies before or beyond the span for the outer ones. */
+static void isogi_dvr__class_ends(double low, double scale, size_t i, size_t count, double ends[2]) {
+    ends[0] = low + ((double)i + (i == 1 ? 0.001 : 0)) / scale, ends[1] = low + (double)(i + 1) / scale;
+    if (!i) ends[1] = ends[0];
+    if (i == count - 1) ends[0] = ends[1];
 }
 
 /* The class of a value: 0 .. ISOGI_DVR__TABLE - 1. */
@@ -1274,13 +1310,18 @@ static double isogi_dvr__extinction_below(const isogi_transfer_point *points, si
 }
 
 /* Marks the classes of values whose extinction is not the same in both functions. Between two points of either both are linear:
-   they agree where they agree at both ends. */
-static void isogi_dvr__compare_transfers(const isogi_dvr *d, const isogi_dvr__transfer *old, const isogi_dvr__transfer *now, uint32_t *marks) {
+   they agree where they agree at both ends. Leaves the classes as they suit both. */
+static void isogi_dvr__compare_transfers(isogi_dvr *d, const isogi_dvr__transfer *old, const isogi_dvr__transfer *now, uint32_t *marks) {
     const isogi_dvr__transfer *t[2];
     size_t next[2] = {0, 0}, i;
-    double from = -1e308, to = from;
+    double from = -1e308, to = from, span[2], other[2], both[2];
     int n;
     t[0] = old, t[1] = now;
+    isogi_dvr__transfer_span(old, span), isogi_dvr__transfer_span(now, other);
+    for (n = 0; n < 2; n++)
+        if (!(span[0] <= span[1]) || (other[0] <= other[1] && (n ? other[n] > span[n] : other[n] < span[n]))) both[n] = other[n];
+        else both[n] = span[n];
+    isogi_dvr__set_classes(d, both, ISOGI_DVR__TABLE, &d->matter.low, &d->matter.scale);
     memset(marks, 0, (ISOGI_DVR__TABLE + 1) * sizeof *marks);
     for (; to < 1e308; from = to) {
         double at[2] = {0, 0}, end[2] = {0, 0};
@@ -1313,6 +1354,16 @@ static size_t isogi_dvr__mark_changed(isogi_dvr *d, const uint32_t *marks) {
     return count;
 }
 
+/* Marks the blocks whose values were told apart too coarsely: those between the ends of the former function. */
+static size_t isogi_dvr__mark_coarse(isogi_dvr *d, const double span[2]) {
+    size_t i, count = 0;
+    for (i = 0; i < d->changed_count; i++) {
+        const float *range = d->level[1].range[i];
+        if (!d->changed[i] && (double)range[1] > span[0] && (double)range[0] < span[1]) d->changed[i] = 1, count++;
+    }
+    return count;
+}
+
 /* Sweeps and the paper's method know neither data space nor peaks. */
 static isogi_dvr_method isogi_dvr__method(const isogi_dvr *d) {
     if (d->desc.space != ISOGI_DVR_PHYSICAL || d->transfer.peak_count || !d->cells[0] || !d->cells[1] || !d->cells[2]) return ISOGI_DVR_BRUTE;
@@ -1324,6 +1375,7 @@ ISOGI_API isogi_result isogi_dvr_set_transfer(isogi_dvr *dvr, const isogi_transf
     isogi_dvr_method before;
     isogi_dvr__integral integral;
     isogi_result result;
+    double span[2], old[2], scale;
     uint32_t *marks;
     size_t changed;
     if (!dvr) return ISOGI_INVALID;
@@ -1340,12 +1392,15 @@ ISOGI_API isogi_result isogi_dvr_set_transfer(isogi_dvr *dvr, const isogi_transf
         isogi_dvr__transfer_free(&copy, &dvr->context);
         return ISOGI_NO_MEMORY;
     }
+    isogi_dvr__transfer_span(&dvr->transfer, old), scale = dvr->matter.scale;
     isogi_dvr__compare_transfers(dvr, &dvr->transfer, &copy, marks);
     isogi_dvr__integral_free(&dvr->integral, &dvr->context);
     isogi_dvr__transfer_free(&dvr->transfer, &dvr->context);
     dvr->transfer = copy, dvr->integral = integral;
     isogi_dvr__mark_empty(dvr);
     changed = isogi_dvr__mark_changed(dvr, marks);
+    isogi_dvr__transfer_span(&copy, span), isogi_dvr__set_classes(dvr, span, ISOGI_DVR__TABLE, &dvr->matter.low, &dvr->matter.scale);
+    if (dvr->matter.scale > 2 * scale) changed += isogi_dvr__mark_coarse(dvr, old);
     isogi_release(&dvr->context, marks, ISOGI_DVR__TABLE + 1, sizeof *marks);
     before = dvr->method, dvr->method = isogi_dvr__method(dvr);
     if (changed || dvr->method == ISOGI_DVR_BRUTE || dvr->method != before) dvr->next = 0;
@@ -1886,12 +1941,12 @@ static void isogi_dvr__sides(const isogi_dvr__blocks *b, size_t block, size_t n,
     for (a = 0; a < 3; a++) side[a] = at[a] + 1 < b->count[a] ? n : (b->rest[a] * n + 15) / 16;
 }
 
-/* The field at a voxel, 0 where it is not finite. */
+/* The field at a voxel, the lowest value where it is not finite. */
 static float isogi_dvr__voxel(const isogi_dvr *d, size_t x, size_t y, size_t z) {
     float value;
     isogi_dvr__read_row(&d->volume, x < d->volume.size[0] ? x : d->volume.size[0] - 1, 1, y < d->volume.size[1] ? y : d->volume.size[1] - 1,
                         z < d->volume.size[2] ? z : d->volume.size[2] - 1, &value);
-    return isogi_dvr__finite32(value) ? value : (float)d->matter.low;
+    return isogi_dvr__finite32(value) ? value : (float)d->range[0];
 }
 
 static float isogi_dvr__lattice_at(const isogi_dvr *d, int step, const size_t c[3]) {
@@ -1929,7 +1984,19 @@ static void isogi_dvr__lattice_task(void *arg, size_t z) {
         }
 }
 
-/* Which of 64 classes of values occur in a block: the piecewise constant histogram, of which the largest difference needs no counts. */
+/* 64 bins of classes: the first and the last class by themselves, and the others. */
+static unsigned isogi_dvr__bin(size_t class_) {
+    if (!class_) return 0;
+    return class_ < ISOGI_DVR__TABLE - 1 ? 1 + (unsigned)((class_ - 1) * 62 / (ISOGI_DVR__TABLE - 2)) : 63;
+}
+
+/* The value in the middle of a bin; where the outer ones begin. */
+static double isogi_dvr__bin_value(const isogi_dvr *d, unsigned bin) {
+    double at = bin ? bin < 63 ? 1 + (bin - 0.5) * (ISOGI_DVR__TABLE - 2) / 62 : ISOGI_DVR__TABLE : 0;
+    return d->matter.low + at / d->matter.scale;
+}
+
+/* Which bins of values occur in a block: the piecewise constant histogram, of which the largest difference needs no counts. */
 static void isogi_dvr__histogram_task(void *arg, size_t block) {
     isogi_dvr *d = (isogi_dvr *)arg;
     isogi_dvr__blocks *b = &d->blocks;
@@ -1941,7 +2008,7 @@ static void isogi_dvr__histogram_task(void *arg, size_t block) {
         for (y = 16 * at[1]; y <= 16 * at[1] + 16 && y < d->volume.size[1]; y++) {
             isogi_dvr__read_row(&d->volume, 16 * at[0], count, y, z, row);
             for (x = 0; x < count; x++)
-                if (isogi_dvr__finite32(row[x])) classes |= (uint64_t)1 << isogi_dvr__class(d, (double)row[x]) / (ISOGI_DVR__TABLE / 64);
+                if (isogi_dvr__finite32(row[x])) classes |= (uint64_t)1 << isogi_dvr__bin(isogi_dvr__class(d, (double)row[x]));
         }
     b->histogram[block] = classes;
 }
@@ -1988,7 +2055,7 @@ static isogi_result isogi_dvr__plan_blocks(isogi_dvr *d) {
         job.step = n;
         result = isogi_parallel(&d->context, b->lattice_size[n][2], isogi_dvr__lattice_task, &job, 0, 0);
     }
-    return result == ISOGI_OK ? isogi_parallel(&d->context, b->total, isogi_dvr__histogram_task, d, 0, 0) : result;
+    return result;
 }
 
 /* ==== create and free ================================================================================================ */
@@ -2136,7 +2203,7 @@ ISOGI_API isogi_result isogi_dvr_create(isogi_dvr **dvr, const isogi_dvr_desc *d
     isogi_dvr_desc resolved;
     isogi_result result = isogi_dvr__resolve(&resolved, desc);
     isogi_dvr *d;
-    double longest = 0, range[2];
+    double longest = 0;
     int a;
     if (!dvr) return ISOGI_INVALID;
     if (result != ISOGI_OK) return result;
@@ -2161,9 +2228,8 @@ ISOGI_API isogi_result isogi_dvr_create(isogi_dvr **dvr, const isogi_dvr_desc *d
     }
     d->piece = desc->step > 0 ? resolved.step : 1;
     d->visibility_step = resolved.visibility_step > 0 ? resolved.visibility_step : 2 * resolved.step;
-    isogi_vol_range(resolved.pyramid, range);
-    d->matter.low = range[0];
-    d->matter.scale = 0.5 * range[1] - 0.5 * range[0] > 0 ? 0.5 * ISOGI_DVR__TABLE / (0.5 * range[1] - 0.5 * range[0]) : 0;
+    isogi_vol_range(resolved.pyramid, d->range);
+    isogi_dvr__set_classes(d, d->range, ISOGI_DVR__TABLE, &d->matter.low, &d->matter.scale);
     d->method = isogi_dvr__method(d);
     d->kernels = isogi_dvr__choose_kernels(d->context.force_path);
     resolved.step = resolved.step < d->visibility_step ? resolved.step : d->visibility_step;
@@ -2902,9 +2968,10 @@ static void isogi_dvr__set_table(const isogi_dvr *d, float table[ISOGI_DVR__TABL
     const isogi_dvr__transfer *t = &d->transfer;
     size_t i;
     for (i = 0; i < ISOGI_DVR__TABLE; i++) {
-        double from = d->matter.low + (d->matter.scale > 0 ? (double)i / d->matter.scale : 0), mean = 0, x = from, at;
-        double to = d->matter.low + (d->matter.scale > 0 ? (double)(i + 1) / d->matter.scale : 0);
+        double ends[2], from, to, mean = 0, x, at;
         size_t next;
+        isogi_dvr__class_ends(d->matter.low, d->matter.scale, i, ISOGI_DVR__TABLE, ends);
+        from = x = ends[0], to = ends[1];
         if (t->point_count && !(to > from)) mean = isogi_dvr__extinction(t->points, t->point_count, from);
         else if (t->point_count) {
             at = isogi_dvr__extinction(t->points, t->point_count, x);
@@ -3170,7 +3237,7 @@ static isogi_result isogi_dvr__select_levels(isogi_dvr *d, uint8_t *level) {
     double luv[64][3], budget = (double)d->volume.size[0] * (double)d->volume.size[1] * (double)d->volume.size[2] / d->desc.reduction;
     size_t count = 0, i;
     if (!heap) return ISOGI_NO_MEMORY;
-    for (i = 0; i < 64; i++) isogi_dvr__luv_of(d, d->matter.low + (d->matter.scale > 0 ? ((double)i + 0.5) * (ISOGI_DVR__TABLE / 64) / d->matter.scale : 0), luv[i]);
+    for (i = 0; i < 64; i++) isogi_dvr__luv_of(d, isogi_dvr__bin_value(d, (unsigned)i), luv[i]);
     for (i = 0; i < b->total; i++) {
         level[i] = !d->empty[1][i];
         budget -= level[i];
@@ -3271,7 +3338,7 @@ static float isogi_dvr__block_value(const isogi_dvr *d, size_t block, const doub
     const isogi_dvr__blocks *b = &d->blocks;
     size_t n = b->level[block], base, corner[8], k;
     float w[8], sum = 0;
-    if (!n) return (float)d->matter.low;
+    if (!n) return (float)d->range[0];
     base = b->first[block] + isogi_dvr__place(b, block, n, position, corner, w);
     for (k = 0; k < 8; k++) /* a node of no weight may be another thread's at work */
         if (w[k] > 0) sum += w[k] * b->data[base + corner[k]];
@@ -3344,8 +3411,16 @@ static isogi_result isogi_dvr__lay_out(isogi_dvr *d, const uint8_t *level, const
 static isogi_result isogi_dvr__update_blocks(isogi_dvr *d) {
     isogi_dvr__blocks *b = &d->blocks;
     uint8_t *level = (uint8_t *)isogi_allocate(&d->context, 3 * b->total, 1), *lit = level + b->total, *changed = lit + b->total;
-    isogi_result result = level ? isogi_dvr__select_levels(d, level) : ISOGI_NO_MEMORY;
+    isogi_result result = level ? ISOGI_OK : ISOGI_NO_MEMORY;
+    const isogi_dvr__matter *m = &d->matter;
+    isogi_context whole = d->context;
     size_t i;
+    whole.progress = NULL;
+    if (result == ISOGI_OK && (b->low < m->low || b->low > m->low || b->scale < m->scale || b->scale > m->scale)) {
+        result = isogi_parallel(&whole, b->total, isogi_dvr__histogram_task, d, 0, 0);
+        if (result == ISOGI_OK) b->low = m->low, b->scale = m->scale;
+    }
+    if (result == ISOGI_OK) result = isogi_dvr__select_levels(d, level);
     for (i = 0; result == ISOGI_OK && i < b->total; i++) {
         changed[i] = d->changed[i] || level[i] != b->level[i];
         lit[i] = level[i] ? level[i] : isogi_dvr__any_near(b, i, b->reach, level) ? 2 : 0;
@@ -3355,8 +3430,6 @@ static isogi_result isogi_dvr__update_blocks(isogi_dvr *d) {
     if (result == ISOGI_OK) result = isogi_dvr__lay_out(d, level, lit);
     isogi_release(&d->context, level, 3 * b->total, 1);
     for (b->packing = 1; result == ISOGI_OK && b->packing <= 16; b->packing *= 2) {
-        isogi_context whole = d->context;
-        whole.progress = NULL;
         result = isogi_parallel(&whole, b->total, isogi_dvr__pack_task, d, 0, 0);
     }
     if (result != ISOGI_OK) return result;
@@ -4673,12 +4746,12 @@ static int isogi_dvr__fast_space(const isogi_dvr *d) {
 static void isogi_dvr__frame_classes(isogi_dvr__frame *f) {
     const isogi_dvr *d = f->dvr;
     const isogi_dvr__transfer *t = &d->transfer;
-    double sum[4] = {0, 0, 0, 0}, size = d->matter.scale > 0 ? ISOGI_DVR__TABLE / d->matter.scale / ISOGI_DVR__CLASSES : 0;
+    double sum[4] = {0, 0, 0, 0}, size = (0.5 * d->range[1] - 0.5 * d->range[0]) / (0.5 * ISOGI_DVR__CLASSES);
     size_t i, next;
     int a, half;
     for (i = 0; i <= ISOGI_DVR__CLASSES; i++) {
         isogi_dvr__class_entry *e = &f->classes[i];
-        double from = d->matter.low + (double)i * size, to = i < ISOGI_DVR__CLASSES ? from + size : from, x = from, mean[4] = {0, 0, 0, 0};
+        double from = d->range[0] + (double)i * size, to = i < ISOGI_DVR__CLASSES ? from + size : from, x = from, mean[4] = {0, 0, 0, 0};
         next = t->point_count ? isogi_dvr__points_below(t->points, t->point_count, from) : 0;
         while (t->point_count) { /* pieces between the function's points: the product of two linear functions, by Simpson's rule exactly */
             double end = next < t->point_count && t->points[next].value < to ? t->points[next].value : to, weight = to > from ? (end - x) / (to - from) : 1;
@@ -4696,7 +4769,7 @@ static void isogi_dvr__frame_classes(isogi_dvr__frame *f) {
         }
         for (a = 0; a < 4; a++) e->before[a] = (float)sum[a], e->mean[a] = (float)isogi_dvr__clamp(mean[a], 1e30), sum[a] += mean[a];
     }
-    f->low = (float)d->matter.low, f->scale = (float)(d->matter.scale * ISOGI_DVR__CLASSES / ISOGI_DVR__TABLE);
+    f->low = (float)d->range[0], f->scale = size > 0 ? (float)(1 / size) : 0;
 }
 
 /* out += factor * from, four numbers at once. */
@@ -5403,9 +5476,11 @@ ISOGI_API isogi_result isogi_transfer_import(const float (*rgba)[4], size_t coun
 #define ISOGI_DVR__BINS 256
 
 /* The two bins between which three classes have least variance: the largest sum of (sum of values)^2 / count. */
-static void isogi_dvr__three_classes(const double histogram[ISOGI_DVR__BINS], int bin[2]) {
-    double count[ISOGI_DVR__BINS + 1], sum[ISOGI_DVR__BINS + 1], best = -1;
-    int i, j;
+static void isogi_dvr__three_classes(double histogram[ISOGI_DVR__BINS], int bin[2]) {
+    double count[ISOGI_DVR__BINS + 1], sum[ISOGI_DVR__BINS + 1], best = -1, total = 0;
+    int i, j, largest = 0;
+    for (i = 0; i < ISOGI_DVR__BINS; i++) total += histogram[i], largest = histogram[i] > histogram[largest] ? i : largest;
+    if (histogram[largest] > 0.3 * total) histogram[largest] = 0; /* air, or padding */
     count[0] = sum[0] = 0, bin[0] = ISOGI_DVR__BINS / 3, bin[1] = 2 * ISOGI_DVR__BINS / 3;
     for (i = 0; i < ISOGI_DVR__BINS; i++) count[i + 1] = count[i] + histogram[i], sum[i + 1] = sum[i] + i * histogram[i];
     for (i = 1; i < ISOGI_DVR__BINS - 1; i++)
@@ -5424,8 +5499,8 @@ static void isogi_dvr__histogram(const isogi_pyramid *pyramid, const double rang
     const isogi_volume *v = isogi_vol_volume(pyramid);
     size_t step[3];
     uint32_t c[3];
-    int a, largest = 0;
-    double total = 0, scale = ISOGI_DVR__BINS / (0.5 * range[1] - 0.5 * range[0]);
+    int a;
+    double scale = ISOGI_DVR__BINS / (0.5 * range[1] - 0.5 * range[0]);
     for (a = 0; a < 3; a++) step[a] = 1 + v->size[a] / 101;
     for (a = 0; a < ISOGI_DVR__BINS; a++) histogram[a] = 0;
     for (c[2] = 0; c[2] == 0 || c[2] < v->size[2] - 1; c[2] += (uint32_t)step[2])
@@ -5434,11 +5509,25 @@ static void isogi_dvr__histogram(const isogi_pyramid *pyramid, const double rang
                 double corner[8];
                 isogi_volume_corners(v, c, corner);
                 if (!isogi_dvr__finite64(corner[0])) continue;
-                histogram[(int)isogi_dvr__clamp((0.5 * corner[0] - 0.5 * range[0]) * scale, ISOGI_DVR__BINS - 1)]++, total++;
+                histogram[(int)isogi_dvr__clamp((0.5 * corner[0] - 0.5 * range[0]) * scale, ISOGI_DVR__BINS - 1)]++;
             }
-    for (a = 0; a < ISOGI_DVR__BINS; a++)
-        if (histogram[a] > histogram[largest]) largest = a;
-    if (histogram[largest] > 0.3 * total) histogram[largest] = 0;
+}
+
+/* Leaves out up to a thousandth of the voxels at either end of the range where that halves it. */
+static void isogi_dvr__leave_outliers(const isogi_pyramid *pyramid, double range[2]) {
+    double histogram[ISOGI_DVR__BINS], share, width;
+    int low, high, pass;
+    for (pass = 0; pass < 32 && range[0] < range[1]; pass++) {
+        double total = 0, below = 0, above = 0;
+        isogi_dvr__histogram(pyramid, range, histogram);
+        for (low = 0; low < ISOGI_DVR__BINS; low++) total += histogram[low];
+        share = 0.001 * total;
+        for (low = 0; low < ISOGI_DVR__BINS - 1 && below + histogram[low] <= share; low++) below += histogram[low];
+        for (high = ISOGI_DVR__BINS; high > low + 1 && above + histogram[high - 1] <= share; high--) above += histogram[high - 1];
+        if (2 * (high - low) > ISOGI_DVR__BINS) return;
+        width = (0.5 * range[1] - 0.5 * range[0]) / (0.5 * ISOGI_DVR__BINS);
+        range[1] = high < ISOGI_DVR__BINS ? range[0] + high * width : range[1], range[0] += low * width;
+    }
 }
 
 ISOGI_API isogi_result isogi_transfer_suggest(const isogi_pyramid *pyramid, isogi_dvr_space space, isogi_transfer_point points[ISOGI_SUGGEST_POINTS],
@@ -5451,6 +5540,7 @@ ISOGI_API isogi_result isogi_transfer_suggest(const isogi_pyramid *pyramid, isog
     int bin[2], i, a;
     if (!pyramid || !points || (unsigned)space > ISOGI_DVR_DATA) return ISOGI_INVALID;
     v = isogi_vol_volume(pyramid), isogi_vol_range(pyramid, range);
+    isogi_dvr__leave_outliers(pyramid, range);
     if (!(range[0] < range[1])) bin[0] = ISOGI_DVR__BINS / 3, bin[1] = 2 * bin[0];
     else isogi_dvr__histogram(pyramid, range, histogram), isogi_dvr__three_classes(histogram, bin);
     width = 0.5 * range[1] - 0.5 * range[0];
