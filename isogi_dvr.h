@@ -381,7 +381,7 @@ ISOGI_API isogi_result isogi_transfer_import(const float (*rgba)[4], size_t coun
 #define ISOGI_SUGGEST_POINTS 6
 
 /* A transfer function for a volume of which nothing is known: values in three classes of least variance (Otsu 1979; the largest bin
-   left out, which is air or padding), the lowest transparent, the others ever denser and warmer. In physical space extinction is per voxel and
+   left out, which is air or padding; and up to a thousandth of the voxels at either end of the range where that halves it), the lowest transparent, the others ever denser and warmer. In physical space extinction is per voxel and
    makes 1/30 of the box's diagonal half opaque at the top; in data space a passage through each upper class is about half opaque. A
    volume of one value gets points that nothing meets. threshold (may be NULL): where the second class begins, for an isosurface. */
 ISOGI_API isogi_result isogi_transfer_suggest(const isogi_pyramid *pyramid, isogi_dvr_space space, isogi_transfer_point points[ISOGI_SUGGEST_POINTS],
@@ -717,8 +717,9 @@ typedef struct isogi_dvr__blocks {
     size_t rest[3];                /* cells along the last block, 1 .. 16 */
     float *lattice[5];             /* averages of the data, nodes 2, 4, 8, 16 voxels apart; [0] is the volume */
     size_t lattice_size[5][3];
-    uint64_t *histogram;           /* classes of values that occur in each block, */
-    double low, scale;             /* for these classes */
+    uint64_t *histogram;           /* bins of values that occur in each block, */
+    double low, scale;             /* for these classes of values */
+    uint8_t bin[ISOGI_DVR__TABLE]; /* and these bins of classes */
     uint8_t *level, *lit, *stale;  /* of each block: level of its data, of its local visibility; visibility has to be computed */
     size_t *first;                 /* [2][total]: its first node in `data` and in `sh` */
     size_t *order, due;           /* blocks to be computed */
@@ -1984,16 +1985,20 @@ static void isogi_dvr__lattice_task(void *arg, size_t z) {
         }
 }
 
-/* 64 bins of classes: the first and the last class by themselves, and the others. */
-static unsigned isogi_dvr__bin(size_t class_) {
-    if (!class_) return 0;
-    return class_ < ISOGI_DVR__TABLE - 1 ? 1 + (unsigned)((class_ - 1) * 62 / (ISOGI_DVR__TABLE - 2)) : 63;
-}
-
-/* The value in the middle of a bin; where the outer ones begin. */
-static double isogi_dvr__bin_value(const isogi_dvr *d, unsigned bin) {
-    double at = bin ? bin < 63 ? 1 + (bin - 0.5) * (ISOGI_DVR__TABLE - 2) / 62 : ISOGI_DVR__TABLE : 0;
-    return d->matter.low + at / d->matter.scale;
+/* Divides the classes among 64 bins, half by their number and half by how much opacity changes across them, so that no tent is lost in a
+   bin that is mostly air. A change of colours alone leaves bins as they are. */
+static void isogi_dvr__set_bins(const isogi_dvr *d, uint8_t bin[ISOGI_DVR__TABLE]) {
+    double sum = 0, total = 0, last = 0;
+    size_t i;
+    int pass;
+    for (pass = 0; pass < 2; pass++)
+        for (i = 0, sum = 0; i < ISOGI_DVR__TABLE; i++) {
+            double opacity = -expm1(-(double)d->matter.table[i] * d->spacing / d->desc.unit);
+            sum += i ? fabs(opacity - last) : 0, last = opacity;
+            if (!pass) total = sum;
+            else bin[i] = (uint8_t)isogi_dvr__clamp(1 + 62 * (total > 0 ? 0.5 * (double)i / ISOGI_DVR__TABLE + 0.5 * sum / total : (double)i / ISOGI_DVR__TABLE), 62);
+        }
+    bin[0] = 0, bin[ISOGI_DVR__TABLE - 1] = 63; /* what lies outside of the function's span is all alike */
 }
 
 /* Which bins of values occur in a block: the piecewise constant histogram, of which the largest difference needs no counts. */
@@ -2008,7 +2013,7 @@ static void isogi_dvr__histogram_task(void *arg, size_t block) {
         for (y = 16 * at[1]; y <= 16 * at[1] + 16 && y < d->volume.size[1]; y++) {
             isogi_dvr__read_row(&d->volume, 16 * at[0], count, y, z, row);
             for (x = 0; x < count; x++)
-                if (isogi_dvr__finite32(row[x])) classes |= (uint64_t)1 << isogi_dvr__bin(isogi_dvr__class(d, (double)row[x]));
+                if (isogi_dvr__finite32(row[x])) classes |= (uint64_t)1 << b->bin[isogi_dvr__class(d, (double)row[x])];
         }
     b->histogram[block] = classes;
 }
@@ -3235,9 +3240,12 @@ static isogi_result isogi_dvr__select_levels(isogi_dvr *d, uint8_t *level) {
     const isogi_dvr__blocks *b = &d->blocks;
     isogi_dvr__raise *heap = (isogi_dvr__raise *)isogi_allocate(&d->context, b->total, sizeof *heap);
     double luv[64][3], budget = (double)d->volume.size[0] * (double)d->volume.size[1] * (double)d->volume.size[2] / d->desc.reduction;
-    size_t count = 0, i;
+    size_t count = 0, i, end;
     if (!heap) return ISOGI_NO_MEMORY;
-    for (i = 0; i < 64; i++) isogi_dvr__luv_of(d, isogi_dvr__bin_value(d, (unsigned)i), luv[i]);
+    for (i = 0; i < ISOGI_DVR__TABLE; i = end) { /* a bin by the class in its middle */
+        for (end = i + 1; end < ISOGI_DVR__TABLE && b->bin[end] == b->bin[i];) end++;
+        isogi_dvr__luv_of(d, d->matter.low + 0.5 * (double)(i + end) / d->matter.scale, luv[b->bin[i]]);
+    }
     for (i = 0; i < b->total; i++) {
         level[i] = !d->empty[1][i];
         budget -= level[i];
@@ -3414,9 +3422,12 @@ static isogi_result isogi_dvr__update_blocks(isogi_dvr *d) {
     isogi_result result = level ? ISOGI_OK : ISOGI_NO_MEMORY;
     const isogi_dvr__matter *m = &d->matter;
     isogi_context whole = d->context;
+    uint8_t bin[ISOGI_DVR__TABLE];
     size_t i;
     whole.progress = NULL;
-    if (result == ISOGI_OK && (b->low < m->low || b->low > m->low || b->scale < m->scale || b->scale > m->scale)) {
+    isogi_dvr__set_table(d, m->table), isogi_dvr__set_bins(d, bin);
+    if (result == ISOGI_OK && (memcmp(b->bin, bin, sizeof bin) || b->low < m->low || b->low > m->low || b->scale < m->scale || b->scale > m->scale)) {
+        memcpy(b->bin, bin, sizeof bin), b->scale = 0;
         result = isogi_parallel(&whole, b->total, isogi_dvr__histogram_task, d, 0, 0);
         if (result == ISOGI_OK) b->low = m->low, b->scale = m->scale;
     }
@@ -3435,7 +3446,6 @@ static isogi_result isogi_dvr__update_blocks(isogi_dvr *d) {
     if (result != ISOGI_OK) return result;
     for (i = 0; i < d->changed_count; i++) d->classified += d->changed[i];
     memset(d->changed, 0, d->changed_count);
-    isogi_dvr__set_table(d, d->matter.table);
     for (i = 0, b->due = 0; i < b->total; i++)
         if (b->stale[i] && b->lit[i]) b->order[b->due++] = i;
     return ISOGI_OK;

@@ -50,21 +50,26 @@ TEST(an_outlier_takes_no_shadow_from_any_method) {
 
 /* The same, where the transfer function goes from end to end of the range: a tent as wide as a thousandth of it. */
 TEST(narrow_tents_in_a_wide_range_cast_shadows) {
-    field f = radius_field(49, 4000);
-    const isogi_transfer_point p[] = {{0, {1, 1, 1}, 0}, {14, {1, 1, 1}, 0}, {16, {1, 1, 1}, 0.3f}, {18, {1, 1, 1}, 0}, {4000, {1, 1, 1}, 0.001f}};
-    const isogi_transfer transfer = {p, 5, NULL, 0};
-    const float middle[3] = {24, 24, 24};
-    for (int method = ISOGI_DVR_BRUTE; method <= ISOGI_DVR_SWEEP; method++) {
-        const isogi_dvr_desc desc = {.pyramid = f.pyramid, .shading = ISOGI_DVR_VISIBILITY, .method = (isogi_dvr_method)method, .directions = 32, .grid = {7, 7, 7},
-                                     .visibility_step = 0.5, .reduction = 1};
-        isogi_dvr *dvr = dvr_new(&desc, &transfer);
-        float v[COUNT];
-        CHECK(isogi_dvr_step(dvr, 0, NULL) == ISOGI_OK && isogi_dvr_sample_visibility(dvr, &middle, 1, v) == ISOGI_OK, "step");
-        /* the paper's rays take local steps of a voxel between nodes */
-        CHECK(fabs((double)v[0] / (sqrt(4 * PI) * exp(-0.6)) - 1) < (method == ISOGI_DVR_PAPER ? 0.2 : 0.05), "method %d: %g", method, (double)v[0]);
-        isogi_dvr_free(dvr);
+    float v[2][4][COUNT];
+    for (int wide = 0; wide < 2; wide++) {
+        field f = radius_field(49, wide ? 4000 : 0);
+        const isogi_transfer_point p[] = {{0, {1, 1, 1}, 0}, {14, {1, 1, 1}, 0}, {16, {1, 1, 1}, 0.3f}, {18, {1, 1, 1}, 0}, {4000, {1, 1, 1}, 0.001f}};
+        const isogi_transfer transfer = {p, wide ? 5 : 4, NULL, 0};
+        const float middle[3] = {24, 24, 24};
+        for (int method = ISOGI_DVR_BRUTE; method <= ISOGI_DVR_SWEEP; method++) {
+            const isogi_dvr_desc desc = {.pyramid = f.pyramid, .shading = ISOGI_DVR_VISIBILITY, .method = (isogi_dvr_method)method, .directions = 32, .grid = {7, 7, 7},
+                                         .visibility_step = 0.5};
+            isogi_dvr *dvr = dvr_new(&desc, &transfer);
+            float *at = v[wide][method];
+            CHECK(isogi_dvr_step(dvr, 0, NULL) == ISOGI_OK && isogi_dvr_sample_visibility(dvr, &middle, 1, at) == ISOGI_OK, "step");
+            if (method != ISOGI_DVR_PAPER) CHECK(fabs((double)at[0] / (sqrt(4 * PI) * exp(-0.6)) - 1) < 0.02, "method %d: %g", method, (double)at[0]);
+            isogi_dvr_free(dvr);
+        }
+        field_free(&f);
     }
-    field_free(&f);
+    /* local rays take steps of a voxel between nodes: what they blur of a tent, they blur in either range */
+    CHECK(fabs((double)v[1][ISOGI_DVR_PAPER][0] / (double)v[0][ISOGI_DVR_PAPER][0] - 1) < 0.04, "the paper's method: %g, and %g in a wide range",
+          (double)v[0][ISOGI_DVR_PAPER][0], (double)v[1][ISOGI_DVR_PAPER][0]);
 }
 
 /* Outliers leave the suggested points where they were. */
