@@ -6,7 +6,8 @@
    (64^3 with --quick). Frames: standard view, shaded by visibility under a uniform sky and a directional light; error = RMSE of
    sRGB values against steps of a sixteenth of a voxel, same visibility. Visibility: order 3 on a grid of 8^3 (6^3); error =
    relative RMSE of all coefficients against 2048 rays. Methods: default; steps, rays = other settings of the same code.
-   Data space: frames of 512x512 at 256^3, whatever the mode; tables of pieces. */
+   Data space: frames of 512x512 at 256^3, whatever the mode; tables of pieces. Frames of the scenes: error against visibility of 2048
+   directions (512 with --quick, by which the errors come out a hundredth larger: computing it takes most of the time). */
 #define ISOGI_IMPLEMENTATION
 #include "isogi_dvr.h"
 #include "hdr.h"
@@ -16,7 +17,7 @@
 static const double pi = 3.14159265358979323846;
 static const isogi_context serial = {.threads = 1};
 static FILE *csv;
-static int N = 128, WIDTH = 192, POINTS = 1024, PIXELS = 512; /* samples of visibility; pixels a side of frames whose error is measured */
+static int N = 128, WIDTH = 192, POINTS = 1024, PIXELS = 512, REFERENCE = 2048; /* samples of visibility; pixels a side of frames whose error is measured; directions of their reference */
 static size_t points = 8;
 
 static double cpu_seconds(void) {
@@ -343,7 +344,7 @@ static void bench_update(const bench_scene *s, const isogi_pyramid *pyramid, con
     free(reference);
 }
 
-/* The reference picture: visibility of 2048 directions, post-classified steps of 1/8 voxel, kept in build/bench. Times are those of 512x512
+/* The reference picture: visibility of many directions, post-classified steps of 1/8 voxel, kept in build/bench. Times are those of 512x512
    pixels; with --quick the error is that of 128x128 pixels of the same view. */
 static void bench_frame(const bench_scene *s, const isogi_pyramid *pyramid, const isogi_transfer *transfer, const isogi_lighting *lighting) {
     const isogi_volume *volume = isogi_vol_volume(pyramid);
@@ -361,10 +362,10 @@ static void bench_frame(const bench_scene *s, const isogi_pyramid *pyramid, cons
         view.target[a] = (float)(volume->origin[a] + 0.5 * (double)(s->size[a] - 1) * volume->spacing[a]);
         view.eye[a] = (float)((double)view.target[a] + toward[a] / length * sqrt(radius) / sin(pi / 8));
     }
-    snprintf(path, sizeof path, "build/bench/frame-%s-%d.bin", s->name, PIXELS);
+    snprintf(path, sizeof path, "build/bench/frame-%s-%d-%d.bin", s->name, PIXELS, REFERENCE);
     kept = fopen(path, "rb");
     for (int i = kept && fread(reference, sizeof *reference, pixels, kept) == pixels ? 1 : 0; i < 4; i++) {
-        isogi_dvr_desc desc = {.pyramid = pyramid, .shading = ISOGI_DVR_VISIBILITY, .order = s->order, .directions = i ? s->rays : 2048,
+        isogi_dvr_desc desc = {.pyramid = pyramid, .shading = ISOGI_DVR_VISIBILITY, .order = s->order, .directions = i ? s->rays : REFERENCE,
                                .grid = {s->grid[0], s->grid[1], s->grid[2]}, .step = steps[i], .classification = i ? ISOGI_DVR_EXACT : ISOGI_DVR_POST_CLASSIFIED};
         double seconds = 1e9, sum = 0;
         isogi_counters count;
@@ -459,7 +460,7 @@ static void bench_scene_rows(const bench_scene *s) {
 int main(int argc, char **argv) {
     const char *path = NULL, *only = NULL;
     for (int i = 1; i < argc; i++) {
-        if (!strcmp(argv[i], "--quick")) N = 64, WIDTH = 128, points = 6, POINTS = 256, PIXELS = 128;
+        if (!strcmp(argv[i], "--quick")) N = 64, WIDTH = 128, points = 6, POINTS = 256, PIXELS = 128, REFERENCE = 512;
         else if (!strcmp(argv[i], "--only") && i + 1 < argc) only = argv[++i];
         else path = argv[i];
     }
