@@ -63,7 +63,7 @@
    Determinism  The same input on the same instruction path gives the same bits. Paths agree within the float errors below.
    Accuracy     Largest absolute error against 128 bits, poles and all: double 1e-15 at degree 4, 5e-15 at 10, 1.5e-14 at 20, 6e-14 at 50,
                 2e-13 at 100; float 4.5e-7 at 4, 2.2e-6 at 10, 1e-5 at 20. tests/test_sh.c states and checks each.
-                All bounds assume IEEE arithmetic: -ffast-math may reorder what cancels, and costs up to four times as much.
+                All bounds assume IEEE arithmetic: -ffast-math may reorder what cancels, and costs up to four times as much, six at degree 100.
    Limits       Order 1..101 (degree 0..100), 1..16 channels. Counts times order^2 must be addressable.
 
    Conventions  Real, orthonormal, without the Condon-Shortley phase, index i = l (l + 1) + m (ACN). Y1..Y3 = sqrt(3 / 4 pi) (y, z, x).
@@ -1592,9 +1592,13 @@ ISOGI_SH__AVX512 ISOGI_SH__INLINE void isogi_sh__eval_d8_split(isogi_sh__d8 *u, 
     /* `count` rows, 9 or more, for as many directions as are lanes: by 8 or TILE, after one alone, or the last with some that come again */ \
     TARGET ISOGI_SH__INLINE void NAME##_turn_all(T *out, size_t n, const V *rows, size_t count) {                              \
         size_t k, at, alone = count % TILE == 1 || count == 9;                                                                 \
-        for (k = 0; k < WIDTH && alone; k++) out[n * k] = ((const T *)rows)[k];                                                \
-        for (k = alone; k < count && count <= 16; k += 8) NAME##_turn(out + k, n, rows + k);                                   \
-        for (; k < count; k += TILE) at = k < count - TILE ? k : count - TILE, TURN(out + at, n, rows + at);                   \
+        if (alone)                                                                                                             \
+            for (k = 0; k < WIDTH; k++) out[n * k] = ((const T *)rows)[k];                                                     \
+        if (count <= 16) {                                                                                                     \
+            NAME##_turn(out + alone, n, rows + alone);                                                                         \
+            if (count == 16) NAME##_turn(out + 8, n, rows + 8);                                                                \
+        } else                                                                                                                 \
+            for (k = alone; k < count; k += TILE) at = k < count - TILE ? k : count - TILE, TURN(out + at, n, rows + at);      \
     }                                                                                                                          \
     /* order 5, with the next directions made ready meanwhile */                                                               \
     TARGET static size_t NAME##_rows5(T *out, const T (*direction)[3], size_t count) {                                         \
