@@ -590,6 +590,7 @@ static void isogi_trace__normals(const isogi_pyramid *pyramid, isogi_normal_kind
 typedef struct isogi_trace__sky {
     const isogi_env *env;
     int on;        /* whether directions are drawn from it */
+    int turned;    /* it has a rotation */
     double total;  /* integral of luminance over the sphere */
     float *mean;   /* width * height */
     double *row;   /* height + 1 cumulative sums */
@@ -623,11 +624,18 @@ static void isogi_trace__sky_free(isogi_trace__sky *sky, const isogi_context *co
     sky->mean = NULL, sky->row = NULL, sky->pixel = NULL;
 }
 
+static int isogi_trace__is_identity(const float m[9]) {
+    int i;
+    for (i = 0; i < 9; i++)
+        if (!isogi_trace__zero((double)m[i])) return 0;
+    return 1;
+}
+
 /* An image without peaks is left to the cosine-distributed rays: they find it as well, with half the rays. */
 static isogi_result isogi_trace__sky_build(isogi_trace__sky *sky, const isogi_env *env, const isogi_context *context) {
     double peak = 0;
     size_t x, y;
-    sky->env = env;
+    sky->env = env, sky->turned = !isogi_trace__is_identity(env->rotation);
     if (!env->rgb) return ISOGI_OK;
     sky->width = (size_t)env->width, sky->height = (size_t)env->height;
     sky->mean = (float *)isogi_allocate(context, sky->width * sky->height, sizeof(float));
@@ -654,25 +662,17 @@ static isogi_result isogi_trace__sky_build(isogi_trace__sky *sky, const isogi_en
 
 /* The interval of cumulative sums that x falls into, and the place in it, 0..1. */
 static size_t isogi_trace__search(const double *sum, size_t count, double x, double *place) {
-    size_t low = 0, high = count;
-    while (high - low > 1) {
-        size_t middle = low + (high - low) / 2;
-        if (sum[middle] <= x) low = middle;
-        else high = middle;
+    size_t low = 0, half;
+    for (; count > 1; count -= half) { /* without a branch: which half is a matter of chance */
+        half = count / 2;
+        low += sum[low + half] <= x ? half : 0;
     }
     *place = sum[low + 1] > sum[low] ? isogi_trace__clamp((x - sum[low]) / (sum[low + 1] - sum[low]), 1) : 0.5;
     return low;
 }
 
-static int isogi_trace__is_identity(const float m[9]) {
-    int i;
-    for (i = 0; i < 9; i++)
-        if (!isogi_trace__zero((double)m[i])) return 0;
-    return 1;
-}
-
-/* A direction (world) drawn from the image; layout of isogi_env. */
-static void isogi_trace__sky_direction(const isogi_trace__sky *sky, double u, double v, float dir[3]) {
+/* A direction (world) drawn from the image, and its density (per steradian); layout of isogi_env. */
+static double isogi_trace__sky_direction(const isogi_trace__sky *sky, double u, double v, float dir[3]) {
     double place, longitude, d[3], sine, top, bottom;
     size_t y = isogi_trace__search(sky->row, sky->height, u * sky->total, &place), x;
     const double *sum = sky->pixel + y * (sky->width + 1);
@@ -686,9 +686,9 @@ static void isogi_trace__sky_direction(const isogi_trace__sky *sky, double u, do
     sine = sqrt(isogi_trace__clamp(1 - d[1] * d[1], 1));
     d[0] = sine * sin(longitude), d[2] = -sine * cos(longitude);
     for (a = 0; a < 3; a++)
-        dir[a] = isogi_trace__is_identity(m)
-                     ? (float)d[a]
-                     : (float)((double)m[3 * a] * d[0] + (double)m[3 * a + 1] * d[1] + (double)m[3 * a + 2] * d[2]);
+        dir[a] = !sky->turned ? (float)d[a]
+                              : (float)((double)m[3 * a] * d[0] + (double)m[3 * a + 1] * d[1] + (double)m[3 * a + 2] * d[2]);
+    return (double)sky->mean[x + sky->width * y] / sky->total;
 }
 
 /* Density (per steradian) with which the above draws a world direction. */
@@ -698,9 +698,8 @@ static double isogi_trace__sky_density(const isogi_trace__sky *sky, const float 
     size_t x, y;
     int a;
     for (a = 0; a < 3; a++)
-        d[a] = isogi_trace__is_identity(m)
-                   ? (double)dir[a]
-                   : (double)m[a] * (double)dir[0] + (double)m[3 + a] * (double)dir[1] + (double)m[6 + a] * (double)dir[2];
+        d[a] = !sky->turned ? (double)dir[a]
+                            : (double)m[a] * (double)dir[0] + (double)m[3 + a] * (double)dir[1] + (double)m[6 + a] * (double)dir[2];
     v = acos(d[1] > 1 ? 1 : d[1] < -1 ? -1 : d[1]) / ISOGI_TRACE__PI;
     u = atan2(d[0], -d[2]) / (2 * ISOGI_TRACE__PI) + 0.5;
     x = (size_t)isogi_trace__clamp(u * (double)sky->width, (double)(sky->width - 1));
@@ -1191,9 +1190,8 @@ static void isogi_trace__wave_sky(isogi_trace__wave *w, isogi_trace__shadows *s,
         double u = isogi_trace__random(w->key[i], depth, ISOGI_TRACE__ENVIRONMENT);
         double v = isogi_trace__random(w->key[i], depth, ISOGI_TRACE__ENVIRONMENT + 1), density, cosine, rgb[3];
         float dir[3], radiance[3];
-        isogi_trace__sky_direction(sky, u, v, dir);
+        density = isogi_trace__sky_direction(sky, u, v, dir);
         cosine = isogi_trace__cosine_at(w, i, depth, dir) / ISOGI_TRACE__PI;
-        density = isogi_trace__sky_density(sky, dir);
         if (!(cosine > 0) || !(density > 0)) continue;
         isogi_env_radiance(sky->env, dir, radiance);
         for (c = 0; c < 3; c++) rgb[c] = (double)radiance[c] * cosine / (density + cosine);
@@ -3050,7 +3048,7 @@ typedef struct isogi_trace__cast {
     uint8_t blocked[ISOGI_TRACE__FLUSH]; /* shadow: in place of the hits */
     float normal[ISOGI_TRACE__FLUSH][3];
     uint32_t owner[ISOGI_TRACE__FLUSH], sample[ISOGI_TRACE__FLUSH];
-    double weight[ISOGI_TRACE__FLUSH]; /* cosine: pi times the density */
+    double weight[ISOGI_TRACE__FLUSH]; /* pi times the density of cosine-distributed rays; of the sky's radiance, for those drawn by it */
     double rgb[ISOGI_TRACE__FLUSH][3]; /* shadow: what arrives if nothing is in the way */
 } isogi_trace__cast;
 
@@ -3125,8 +3123,14 @@ static void isogi_trace__cast_land(isogi_trace__cast *c, int first, int count) {
     for (i = first; i < first + count; i++) {
         isogi_trace__span *span = &c->span[c->owner[i]];
         if (c->shadow) {
-            double luminance = isogi_trace__luminance(c->rgb[i]);
+            double luminance;
+            float radiance[3];
             if (c->blocked[i]) continue;
+            if (c->bright) {
+                isogi_env_radiance(&c->trace->scene.desc.lighting.env, c->ray[i].dir, radiance);
+                for (a = 0; a < 3; a++) c->rgb[i][a] = c->weight[i] * (double)radiance[a];
+            }
+            luminance = isogi_trace__luminance(c->rgb[i]);
             for (a = 0; a < 3; a++) *(c->bright ? &span->sum.bright[a] : &span->sum.light[a]) += c->rgb[i][a];
             c->sum[c->owner[i]] += luminance, c->square[c->owner[i]] += luminance * luminance;
             continue;
@@ -3195,17 +3199,14 @@ static void isogi_trace__span_sky(isogi_trace__cast *c, uint32_t k) {
     const isogi_trace__sky *sky = &c->trace->scene.sky;
     const isogi_trace__span *span = &c->span[k];
     uint32_t i;
-    int a;
     for (i = span->first; i < span->first + span->count; i++) {
         double u[2], cosine, density;
-        float dir[3], radiance[3];
+        float dir[3];
         isogi_trace__sobol(isogi_trace__key(c->sequence[k], 0x5eed2), isogi_trace__index(c->trace, &c->span[k].sum, i), u);
-        isogi_trace__sky_direction(sky, u[0], u[1], dir);
+        density = isogi_trace__sky_direction(sky, u[0], u[1], dir);
         cosine = isogi_trace__site_kernel(&c->site[k], dir) / ISOGI_TRACE__PI;
-        density = isogi_trace__sky_density(sky, dir);
         if (!(cosine > 0) || !(density > 0)) continue;
-        isogi_env_radiance(sky->env, dir, radiance);
-        for (a = 0; a < 3; a++) c->rgb[c->count][a] = (double)radiance[a] * cosine / (density + cosine);
+        c->weight[c->count] = cosine / (density + cosine);
         c->owner[c->count] = k;
         isogi_trace__cast_add(c, dir, 0);
     }
@@ -4934,9 +4935,9 @@ static void isogi_trace__field_lights(isogi_trace__walk *w, int depth) {
             } else { /* the environment's image by brightness, weighed against the cosine */
                 float radiance[3];
                 if (!sky->on) continue;
-                isogi_trace__sky_direction(sky, u, v, beam.dir);
+                density = isogi_trace__sky_direction(sky, u, v, beam.dir);
                 cosine = isogi_trace__dot(w->normal[i], beam.dir) / ISOGI_TRACE__PI;
-                density = isogi_trace__sky_density(sky, beam.dir) + cosine;
+                density += cosine;
                 isogi_env_radiance(sky->env, beam.dir, radiance);
                 for (c = 0; c < 3; c++) beam.rgb[c] = density > 0 ? (double)radiance[c] / density : 0;
             }

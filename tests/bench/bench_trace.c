@@ -8,7 +8,8 @@
    samples, `usable` with 10. Its time is that of its texels behind the measured pixels, scaled to all of the view. Wall seconds, two
    threads, but for the rows rays-SCENE.
 
-     speedup-SCENE          work: time of naive over time of the default at the error converged
+     speedup-SCENE          work: time of naive over time of the default at the error converged. Where even one sample of the default has
+                            a smaller error e, method equal-error: at that one, for which naive's time is scaled by (converged / e)^2
      rays-SCENE             rays a second while baking, one thread
      lazy-SCENE             seconds from the request to usable; lazy-converged-SCENE: to converged
      full-SCENE             the whole texture (full bench only)
@@ -522,6 +523,11 @@ static void bench(FILE *csv, const char *name, int quick, int tables) {
     if (best.error > converged) best.seconds *= best.error * best.error / (converged * converged);
     snprintf(setting, sizeof setting, "samples=%d", found);
     row(csv, "speedup-", &s, "default", setting, best.seconds, converged, seconds / best.seconds, "x");
+    if (best.error < converged) {
+        double scaled = seconds * converged * converged / (best.error * best.error);
+        snprintf(setting, sizeof setting, "samples=%d (naive scaled to %.0f samples)", found, 100 * scaled / seconds);
+        row(csv, "speedup-", &s, "equal-error", setting, best.seconds, best.error, scaled / best.seconds, "x");
+    }
     row(csv, "speedup-", &s, "naive", "samples=100", seconds, converged, 1, "x");
     d.samples = 8, o = ours(&s, &d, &one);
     row(csv, "rays-", &s, "default", "samples=8", o.seconds, o.error, o.rays / o.seconds, "rays/s");
