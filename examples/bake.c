@@ -6,7 +6,6 @@
 #include "bake_scene.h"
 
 #include <signal.h>
-#include <time.h>
 
 static volatile sig_atomic_t interrupted;
 static void interrupt(int number) { (void)number, interrupted = 1; }
@@ -22,7 +21,8 @@ typedef struct program {
 static void help(void) {
     puts("build/bake VOLUME --out FILE [options]      volume in, illumination texture out\n\n"
          "VOLUME is a raw file named like engine_256x256x128_uint8.raw, or procedural:NAME[:N]. Where FILE exists and holds a part of\n"
-         "this very texture, baking goes on there; Ctrl-C stops and keeps what is done. The result is the same bits in any case.\n\nOptions");
+         "this very texture, baking goes on there. It is written at the end, every minute meanwhile, and when Ctrl-C or SIGTERM stops the work (status 3).\n"
+         "The result is the same bits in any case.\n\nOptions");
     fputs(bake_scene_help, stdout);
     puts("  --box X,Y,Z,X,Y,Z          only texels from the first three numbers to before the last three\n"
          "  --merge FILE...            puts parts together (up to the next option); what none of them holds is baked\n"
@@ -48,12 +48,8 @@ static int parse(program *p, int argc, char **argv) {
             while (i + 1 < argc && strncmp(argv[i + 1], "--", 2)) i++, p->merge_count++;
             if (!p->merge_count) return file_fail(s->error, "--merge: needs names of files");
         } else if (!strcmp(argv[i], "--box") && i + 1 < argc) {
-            const char *comma = argv[++i];
-            char first[128];
-            for (int k = 0; comma && k < 3; k++) comma = strchr(comma + (k > 0), ',');
-            snprintf(first, sizeof first, "%.*s", comma ? (int)(comma - argv[i]) : 0, argv[i]);
-            if (!comma || !numbers(first, ',', 3, 0, 65536, x) || !numbers(comma + 1, ',', 3, 0, 65536, x + 3))
-                return file_fail(s->error, "--box: \"%.80s\" is not allowed: six whole numbers", argv[i]);
+            if (!whole_numbers(argv[++i], ',', 6, 0, 65536, x) || !(x[0] < x[3] && x[1] < x[4] && x[2] < x[5]))
+                return file_fail(s->error, "--box: \"%.80s\" is not allowed: six whole numbers, the last three above the first", argv[i]);
             for (int k = 0; k < 3; k++) s->desc.box_first[k] = (size_t)x[k], s->desc.box_end[k] = (size_t)x[k + 3];
         } else if (!strcmp(argv[i], "--raw") && i + 1 < argc) p->raw = argv[++i];
         else if (!strcmp(argv[i], "--format") && i + 1 < argc) {
@@ -65,47 +61,22 @@ static int parse(program *p, int argc, char **argv) {
     return 1;
 }
 
-static int load(program *p, const char *path) {
-    unsigned char *block;
-    size_t size;
-    isogi_result result;
-    if (!file_read(path, (size_t)-1, &block, &size, p->scene.error)) return 0;
-    result = isogi_trace_load(p->trace, block, size);
-    free(block);
-    if (result == ISOGI_INVALID) return file_fail(p->scene.error, "%s: holds another texture: volume, light and options must be the same", path);
-    return result == ISOGI_OK || file_fail(p->scene.error, "%s: %s", path, isogi_result_string(result));
-}
-
-static double seconds(void) {
-    struct timespec now;
-    clock_gettime(CLOCK_MONOTONIC, &now);
-    return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
-}
-
-/* On a terminal a bar that is rewritten, elsewhere a line every few seconds. */
-static void say(double done, double begun, double *said) {
-    int terminal = isatty(STDERR_FILENO), filled = (int)(30 * done);
-    double spent = seconds() - begun, left = done > 0 ? spent * (1 - done) / done : 0;
-    if (spent - *said < (terminal ? 0.1 : 5)) return;
-    *said = spent;
-    if (terminal) fprintf(stderr, "\r[%.*s%.*s] %3.0f %%, %.0f s left \033[K", filled, "##############################", 30 - filled, "..............................", 100 * done, left);
-    else fprintf(stderr, "%.0f %%, %.0f s left\n", 100 * done, left);
-}
-
 static int bake(program *p) {
-    double begun = seconds(), said = 0, remaining = 1, first = -1;
+    double remaining = 1, first = -1;
+    bake_clock clock = bake_clock_start();
     uint64_t budget = 100000;
     isogi_result result = ISOGI_OK;
     while (result == ISOGI_OK && remaining > 0 && !interrupted) {
-        double step = seconds();
+        double step = bake_seconds();
         result = isogi_trace_step(p->trace, budget, &remaining);
-        step = seconds() - step;
+        step = bake_seconds() - step;
         if (first < 0) first = remaining; /* what was loaded took no time */
         if (step < 0.1 && budget < (uint64_t)1 << 40) budget *= 2;
         else if (step > 0.3 && budget > 10000) budget /= 2;
-        if (first > 0) say((first - remaining) / first, begun, &said);
+        if (first > 0) bake_say(&clock, (first - remaining) / first);
+        if (result == ISOGI_OK) bake_save_now_and_then(&p->scene, p->trace, &clock);
     }
-    if (isatty(STDERR_FILENO)) fputs("\r\033[K", stderr);
+    bake_say_end();
     if (result != ISOGI_OK) return file_fail(p->scene.error, "baking: %s", isogi_result_string(result));
     if (interrupted) fprintf(stderr, "stopped with %.1f %% to do; the same command goes on\n", 100 * remaining);
     return 1;
@@ -116,7 +87,7 @@ static int write_raw(program *p) {
     void *texels = size ? malloc(size) : NULL;
     int values, channels, ok = texels && isogi_trace_export(p->trace, p->format, texels, size) == ISOGI_OK;
     float scales[108];
-    ok = ok ? file_write(p->raw, texels, size, p->scene.error) : file_fail(p->scene.error, "%s: this format is not for this mode, or out of memory", p->raw);
+    ok = ok ? file_write(p->raw, texels, size, p->scene.error) : file_fail(p->scene.error, "%s: out of memory", p->raw);
     free(texels);
     if (!ok) return 0;
     isogi_trace_shape(p->trace, lattice, &values, &channels);
@@ -130,12 +101,16 @@ static int write_raw(program *p) {
 static int run(program *p, int argc, char **argv) {
     bake_scene *s = &p->scene;
     isogi_result result;
-    if (!parse(p, argc, argv) || !bake_scene_make(s) || !file_writable(s->out, s->error)) return 0;
+    if (!parse(p, argc, argv)) return 0;
+    if (p->raw && s->out && !strcmp(p->raw, s->out)) return file_fail(s->error, "--raw: is the same file as --out");
+    if (p->format && !p->raw) return file_fail(s->error, "--format: is that of --raw, which is missing");
+    if (!bake_scene_make(s) || !file_writable(s->out, s->error) || (p->raw && !file_writable(p->raw, s->error))) return 0;
     result = isogi_trace_create(&p->trace, &s->desc, &s->context);
     if (result != ISOGI_OK) return file_fail(s->error, "the texture: %s", isogi_result_string(result));
+    if (p->raw && !isogi_trace_export_size(p->trace, p->format)) return file_fail(s->error, "--format: this one is not for this mode");
     for (int i = 0; i < p->merge_count; i++)
-        if (!load(p, p->merge[i])) return 0;
-    if (!p->merge_count && access(s->out, F_OK) == 0 && !load(p, s->out)) return 0;
+        if (!bake_scene_load(s, p->trace, p->merge[i])) return 0;
+    if (!p->merge_count && access(s->out, F_OK) == 0 && !bake_scene_load(s, p->trace, s->out)) return 0;
     return bake(p) && bake_scene_save(s, p->trace, s->out) && (!p->raw || interrupted || write_raw(p));
 }
 
@@ -144,7 +119,7 @@ int main(int argc, char **argv) {
     int ok;
     for (int i = 1; i < argc; i++)
         if (!strcmp(argv[i], "--help") || !strcmp(argv[i], "-h")) return help(), 0;
-    signal(SIGINT, interrupt);
+    signal(SIGINT, interrupt), signal(SIGTERM, interrupt);
     ok = run(&p, argc, argv);
     if (!ok) fprintf(stderr, "bake: %s\n", p.scene.error);
     isogi_trace_free(p.trace);

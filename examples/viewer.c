@@ -7,6 +7,7 @@
 #include "isogi_dvr.h"
 
 #include "camera.h"
+#include "daylight.h"
 #include "hdr.h"
 #include "option_text.h"
 #include "picture.h"
@@ -97,7 +98,7 @@ typedef struct viewer {
     const procedural_shape *shape;
     camera view;
     hdr_image env;
-    float sky[4 * 3]; /* SH of the default sky */
+    float sky[4][3]; /* SH of the default sky */
     isogi_lighting lighting;
     float ambient[9][3]; /* SH of the unshadowed irradiance of the environment alone */
     double key[3], key_light[3], mean_light[3];
@@ -147,7 +148,7 @@ static int parse_lookup(viewer *v, const char *text) { return parse_name(text, l
 
 static int parse_size(viewer *v, const char *text) {
     double x[2];
-    if (!numbers(text, 'x', 2, 1, MAX_SIDE, x) || x[0] != floor(x[0]) || x[1] != floor(x[1])) return 0;
+    if (!whole_numbers(text, 'x', 2, 1, MAX_SIDE, x)) return 0;
     v->o.width = (int)x[0], v->o.height = (int)x[1];
     return 1;
 }
@@ -273,10 +274,9 @@ static int parse_value(viewer *v, const option *p, const char *text) {
     int ok = 0;
     if (p->kind == TEXT) return *text ? (memcpy(at, &text, sizeof text), 1) : file_fail(v->error, "%s: the name of a file is missing", p->name);
     if (p->kind == OTHER) ok = p->other(v, text);
-    else ok = numbers(text, ',', p->count, p->low, p->high, x);
+    else ok = (p->kind == INTEGER || p->kind == SIZES ? whole_numbers : numbers)(text, ',', p->count, p->low, p->high, x);
     for (int i = 0; ok && i < p->count; i++) {
-        if ((p->kind == INTEGER || p->kind == SIZES) && x[i] != floor(x[i])) ok = 0;
-        else if (p->kind == INTEGER) ((int *)(void *)at)[i] = (int)x[i];
+        if (p->kind == INTEGER) ((int *)(void *)at)[i] = (int)x[i];
         else if (p->kind == SIZES) ((size_t *)(void *)at)[i] = (size_t)x[i];
         else if (p->kind == FLOATS) ((float *)(void *)at)[i] = (float)x[i];
         else ((double *)(void *)at)[i] = x[i];
@@ -386,7 +386,7 @@ static int make_procedural(viewer *v, const char *text) {
         for (size_t i = 0; i < PROCEDURAL_SHAPE_COUNT; i++) strcat(strcat(list, " "), procedural_shapes[i].name);
         return file_fail(v->error, "procedural:%.40s: no such volume; there are:%s", text, list);
     }
-    if (colon && (!numbers(colon + 1, ',', 1, 2, 2048, &longest) || longest != floor(longest)))
+    if (colon && !whole_numbers(colon + 1, ',', 1, 2, 2048, &longest))
         return file_fail(v->error, "procedural:%.60s: the size is a whole number, 2 to 2048", text);
     result = procedural_make(v->shape, (size_t)longest, &v->volume, &v->context);
     return result == ISOGI_OK || fail(v, "the volume", result);
@@ -484,31 +484,25 @@ static void add_light(viewer *v, const double toward[3], const float rgb[3], dou
     for (int i = 0; i < 3; i++) light->vector[i] = (float)d[i], light->rgb[i] = rgb[i];
 }
 
-/* Sky: above[] towards up, below[] downwards, linear in the cosine: two bands of spherical harmonics hold it exactly. */
 static void set_sky(viewer *v, const float above[3], const float below[3]) {
-    for (int c = 0; c < 3; c++) {
-        v->sky[c] = 0.5f * (above[c] + below[c]) * 3.5449077f;
-        v->sky[3 + c] = 0.5f * (above[c] - below[c]) * 2.0466534f; /* Y_1^-1 = sqrt(3 / 4 pi) y */
-        v->sky[6 + c] = v->sky[9 + c] = 0;
-    }
-    v->lighting.env.sh = v->sky, v->lighting.env.sh_order = 2;
+    daylight_sky(v->sky, above, below);
+    v->lighting.env.sh = v->sky[0], v->lighting.env.sh_order = 2;
 }
 
 static const float sky_above[3] = {0.90f, 1.0f, 1.15f}, sky_below[3] = {0.33f, 0.3f, 0.27f}; /* a slightly coloured sky */
 
 static void set_default_light(viewer *v) {
     /* the neutral sky of the scene engine-block, and the coloured one for everything else */
-    static const float neutral_above[3] = {1, 1, 1}, neutral_below[3] = {0.3f, 0.3f, 0.3f}, neutral_sun[3] = {3, 3, 3};
     static const float sun[3] = {3.25f, 2.95f, 2.5f}, one[3] = {1, 1, 1};
-    static const double to_sun[3] = {-1.0, 1.0, 0.45}, diagonal[3] = {1, 1, 1};
+    static const double diagonal[3] = {1, 1, 1};
     const scene *s = v->o.scene;
     if (s && s->lit && s->uniform_sky) set_sky(v, one, one);
     else if (s && v->o.mode >= DVR) {
         const float sky[3] = {s->dvr_sky, s->dvr_sky, s->dvr_sky};
         set_sky(v, sky, sky);
         if (s->sun[0] > 0) add_light(v, diagonal, s->sun, 0);
-    } else if (s) set_sky(v, neutral_above, neutral_below), add_light(v, to_sun, neutral_sun, 1);
-    else set_sky(v, sky_above, sky_below), add_light(v, to_sun, sun, 1);
+    } else if (s) set_sky(v, daylight_above, daylight_below), add_light(v, daylight_to_sun, daylight_sun, 1);
+    else set_sky(v, sky_above, sky_below), add_light(v, daylight_to_sun, sun, 1);
 }
 
 static void add_scaled(double to[3], const float rgb[3], double factor) {

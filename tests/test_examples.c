@@ -68,6 +68,9 @@ TEST(bad_bakes_get_one_line) {
         {"procedural:gyroid:8 --spacing 0,1,1 --out '%s'", "--spacing"}, {"procedural:gyroid:8 --format best --out '%s'", "--format"},
         {"procedural:gyroid:8 --storage best --out '%s'", "--storage"}, {"procedural:gyroid:8 --env /nowhere.hdr --out '%s'", "/nowhere.hdr"},
         {"procedural:gyroid:8 --merge /nowhere.bake --out '%s'", "/nowhere.bake"}, {"procedural:gyroid:8 --box 1,2,3 --out '%s'", "--box"},
+        {"procedural:gyroid:8.5 --out '%s'", "whole number"}, {"procedural:gyroid:8 --lattice 8,8,8.5 --out '%s'", "--lattice"}, {"procedural:gyroid:8 --box 0,0,0,8,8,4.5 --out '%s'", "--box"},
+        {"procedural:gyroid:8 --box 0,0,0,0,0,0 --out '%s'", "--box"}, {"procedural:gyroid:8 --raw /nowhere/a.rgb --samples 1 --out '%s'", "/nowhere/a.rgb: cannot be written"},
+        {"procedural:gyroid:8 --mode transfer --light directional:1,1,1:1,1,1 --out '%s'", "--mode transfer bakes for any light"},
         {"/nowhere_4x4x4_uint8.raw --out '%s'", "No such file"}, {"procedural:gyroid:8 --samples 1 --out /nowhere/a.bake", "/nowhere/a.bake: cannot be written"},
         {"procedural:gyroid:8 --nonsense --out '%s'", "no such option"}};
     for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) check_kept("build/bake", bad[i][0], 1, bad[i][1]);

@@ -120,7 +120,7 @@ static inline int file_write_bytes(int file, const unsigned char *data, size_t s
 static inline int file_temporary(const char *target, char name[PATH_MAX], const char *path, char *error) {
     int file, attempt = 0;
     do {
-        snprintf(name, PATH_MAX, "%s.%ld-%d.tmp", target, (long)getpid(), attempt);
+        snprintf(name, PATH_MAX, "%.*s.%ld-%d.tmp", PATH_MAX - 32, target, (long)getpid(), attempt);
         file = open(name, O_WRONLY | O_CREAT | O_EXCL, 0666);
     } while (file < 0 && errno == EEXIST && ++attempt < 100);
     if (file < 0) file_fail(error, "%s: cannot be written: %s", path, strerror(errno));

@@ -8,14 +8,24 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Exactly `count` numbers parted by `separator`, each low..high; 0 otherwise. */
+/* Exactly `count` numbers, 6 at most, parted by `separator`, each low..high; 0 otherwise. */
 static inline int numbers(const char *text, char separator, int count, double low, double high, double *out) {
-    double x[4];
+    double x[6];
     char *end;
     for (int i = 0; i < count; i++, text = end + 1) {
         x[i] = strtod(text, &end);
         if (end == text || !(x[i] >= low && x[i] <= high) || *end != (i + 1 < count ? separator : 0)) return 0;
     }
+    memcpy(out, x, (size_t)count * sizeof *x);
+    return 1;
+}
+
+/* The same for numbers without a fraction: 16.5 is refused, not cut to 16. */
+static inline int whole_numbers(const char *text, char separator, int count, double low, double high, double *out) {
+    double x[6];
+    if (!numbers(text, separator, count, low, high, x)) return 0;
+    for (int i = 0; i < count; i++)
+        if (x[i] < floor(x[i]) || x[i] > floor(x[i])) return 0;
     memcpy(out, x, (size_t)count * sizeof *x);
     return 1;
 }

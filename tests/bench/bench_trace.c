@@ -23,6 +23,7 @@
 #define ISOGI_IMPLEMENTATION
 #include "isogi_trace.h"
 #include "camera.h"
+#include "daylight.h"
 #include "hdr.h"
 #include "procedural.h"
 #include "volume_file.h"
@@ -37,11 +38,11 @@ typedef struct bench_scene {
     isogi_pyramid *pyramid;
     isogi_trace_desc desc;
     hdr_image image;
+    float sky[4][3];
+    isogi_light sun;
     double isovalue, up[3], toward[3];
 } bench_scene;
 
-static const float sky[12] = {2.3042f, 2.3042f, 2.3042f, 0.71633f, 0.71633f, 0.71633f}; /* 1 above to 0.3 below */
-static const isogi_light sun = {.vector = {1, 2, 1.5f}, .rgb = {3, 3, 3}, .radius = 0.0175f};
 static float points[SIZE * SIZE][3], chosen[MOST][3], reference[MOST][3], light[MOST][3];
 static size_t seen, picked;
 static const isogi_context two = {.threads = 2}, one = {.threads = 1};
@@ -65,7 +66,7 @@ static int scene_load(bench_scene *s, const char *name) {
         const procedural_shape *shape = procedural_find(name);
         if (procedural_make(shape, 0, &s->volume, NULL) != ISOGI_OK) return 0;
         s->isovalue = shape->isovalue;
-        d->lighting.env.sh = sky, d->lighting.env.sh_order = 2, d->lighting.lights = &sun, d->lighting.light_count = 1;
+        daylight_make(&d->lighting, s->sky, &s->sun);
     } else {
         if (!data) return fprintf(stderr, "  %s is left out: ISOGI_DATA is not set\n", name), 0;
         if (!strcmp(name, "bonsai")) {

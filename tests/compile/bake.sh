@@ -2,6 +2,7 @@
 # build/bake: boxes merged, and a bake that was stopped and resumed, are the same file as one bake; bad input is one line and status 1.
 OUT=${OUT:-build/check/bake}
 mkdir -p "$OUT"
+rm -f "$OUT"/*.bake "$OUT"/*.tmp # or baking would go on there
 set -e
 scene="procedural:gyroid:20 --samples 4 --bounces 1 --threads 1"
 build/bake $scene --out "$OUT/whole.bake" --raw "$OUT/whole.rgb" --format rgb9e5 > "$OUT/log"
@@ -14,6 +15,36 @@ grep -q '^20x20x20 texels, scales 1 1 1$' "$OUT/log"
 cp "$OUT/a.bake" "$OUT/resumed.bake"
 build/bake $scene --out "$OUT/resumed.bake"
 cmp "$OUT/whole.bake" "$OUT/resumed.bake"
+# the surface at 0 alone is less than all, and just what lies within a hair of it
+build/bake $scene --isovalues 0,0 --out "$OUT/zero.bake"
+build/bake $scene --isovalues -1e-300,0 --out "$OUT/hair.bake"
+cmp "$OUT/zero.bake" "$OUT/hair.bake"
+[ "$(wc -c < "$OUT/zero.bake")" -lt "$(wc -c < "$OUT/whole.bake")" ]
+# stopped by a signal, and killed: what was done is kept, and the same command goes on to the same bytes
+slow="procedural:gyroid:40 --samples 12 --threads 1"
+rm -f "$OUT/stopped.bake"
+build/bake $slow --out "$OUT/stopped.bake" 2> "$OUT/message" &
+job=$!
+sleep 0.3
+kill -TERM $job
+stopped=0
+wait $job || stopped=$?
+[ $stopped = 3 ] || { echo "SIGTERM: status $stopped"; cat "$OUT/message"; exit 1; }
+grep -q "the same command goes on" "$OUT/message"
+build/bake $slow --save-every 0 --out "$OUT/stopped.bake" &
+job=$!
+before=$(cksum < "$OUT/stopped.bake")
+for turn in 1 2 3 4 5 6 7 8 9 10 11 12 13 14 15 16 17 18 19 20; do
+    sleep 0.1
+    [ "$(cksum < "$OUT/stopped.bake")" = "$before" ] || break
+done
+kill -KILL $job
+if wait $job; then echo "it was over before it could be killed"; exit 1; fi
+[ "$(cksum < "$OUT/stopped.bake")" != "$before" ] || { echo "not saved while it worked"; exit 1; }
+build/bake $slow --out "$OUT/stopped.bake"
+build/bake $slow --out "$OUT/at-once.bake"
+cmp "$OUT/stopped.bake" "$OUT/at-once.bake"
+rm -f "$OUT"/*.tmp
 build/bake --help | grep -q -- '--merge'
 refused() {
     what=$1
@@ -25,6 +56,16 @@ refused "no such volume" procedural:nothing --out "$OUT/x.bake"
 refused "another texture" $scene --samples 5 --merge "$OUT/a.bake" --out "$OUT/x.bake"
 refused "corrupt" $scene --merge "$OUT/whole.rgb" --out "$OUT/x.bake"
 refused "box" $scene --box 1,2,3 --out "$OUT/x.bake"
+refused "box" $scene --box 0.5,0,0,16,16,8.5 --out "$OUT/x.bake"
+refused "box" $scene --box 0,0,0,0,0,0 --out "$OUT/x.bake"
+refused "lattice" $scene --lattice 1.5,2,2 --out "$OUT/x.bake"
+refused "whole number" procedural:gyroid:16.5 --out "$OUT/x.bake"
+refused "transfer bakes for any light" $scene --mode transfer --light directional:1,1,1:1,1,1 --out "$OUT/x.bake"
+refused "format" $scene --mode transfer --raw "$OUT/x.rgb" --format rgb9e5 --out "$OUT/x.bake"
+refused "format" $scene --format byte --out "$OUT/x.bake"
+refused "storage" $scene --mode transfer --storage rgb9e5 --out "$OUT/x.bake"
+refused "/nowhere/x.rgb: cannot be written" $scene --raw /nowhere/x.rgb --out "$OUT/x.bake"
+refused "same file" $scene --raw "$OUT/x.bake" --out "$OUT/x.bake"
 refused "invalid" $scene --box 0,0,0,99,99,99 --out "$OUT/x.bake"
 refused "needed" $scene
 refused "no such option" $scene --out "$OUT/x.bake" --nothing
