@@ -81,8 +81,8 @@ typedef struct options {
     const char *volume, *env, *tf, *out, *compare;
     const scene *scene;
     int width, height, mode, raycast, bounces, samples, threads, stats, antialias, shading, classification, silhouette, transmission, order, directions, lookup, shadows, ambient, normals, storage;
-    int has_size, has_iso, has_mode, has_spacing, has_albedo, has_clip, has_camera, has_up, has_nan, has_shading, has_shadows, has_ambient;
-    double step, fog, offset, reach, isovalue, spacing[3], clip[4], azimuth, elevation, distance, up[3], exposure, nan_value;
+    int has_size, has_iso, has_mode, has_spacing, has_albedo, has_clip, has_camera, has_up, has_nan, has_shading, has_shadows, has_ambient, has_gloss;
+    double step, fog, gloss, offset, reach, isovalue, spacing[3], clip[4], azimuth, elevation, distance, up[3], exposure, nan_value;
     float albedo[3];
     isogi_light lights[MAX_LIGHTS];
     size_t light_count, lattice[3], grid[3];
@@ -109,7 +109,10 @@ typedef struct viewer {
     isogi_trace *trace;
     float (*picture)[4];
     isogi_counters counters;
-    double started, said;
+    double started, said, tracing_begun;
+    uint64_t covered, traced; /* samples that show a surface, and those of them whose light is known */
+    char saying;
+    unsigned char *compared;  /* the picture to compare with */
     uint64_t memory, memory_peak;
     char error[FILE_ERROR_SIZE];
     char path[PATH_MAX];
@@ -214,6 +217,8 @@ static const option option_list[] = {
     {"--ambient", "constant|normal", "for lambert (default normal) and phong (default constant): the sky's light, the same for all or by normal", OTHER, 0,
      AT(has_ambient), 0, 0, 0, parse_ambient, "constant or normal"},
     {"--fog", "X", "fade to the sky's mean light with distance: by exp(-X) from the front of the box's sphere to its back", NUMBERS, AT(fog), 0, 1, 0, 100, 0, "a number, 0 to 100"},
+    {"--gloss", "EXPONENT", "for transfer: gloss as well, a Phong lobe that reflects a fifth; its highlights are as soft as the order of the texture, "
+     "which holds exponents up to about 25", NUMBERS, AT(gloss), AT(has_gloss), 1, 0, 1000, 0, "a number, 0 to 1000"},
     {"--normals", "smooth|trilinear", "of the light that is gathered; default smooth", OTHER, 0, 0, 0, 0, 0, parse_normals, "smooth or trilinear"},
     {"--offset", "X", "rays of light start this many voxels above the surface, negative: on it; default 0.25", NUMBERS, AT(offset), 0, 1, -1, 1, 0, "a number, -1 to 1"},
     {"--reach", "R", "surfaces further away than this (world units) cast no shadow; default 0 = unlimited", NUMBERS, AT(reach), 0, 1, 0, 1e9, 0, "a number, 0 or more"},
@@ -315,6 +320,7 @@ static int parse_arguments(viewer *v, int argc, char **argv) {
     if (!o->samples) o->samples = 64;
     if (!o->has_shadows) o->shadows = o->mode > PHONG;
     if (!o->has_ambient) o->ambient = o->mode != PHONG;
+    if (o->has_gloss && o->mode != TRANSFER) return file_fail(v->error, "--gloss: needs --mode transfer, whose texture knows where light comes from");
     if (o->storage == ISOGI_TRACE_RGB9E5 && o->mode == TRANSFER) return file_fail(v->error, "--storage: rgb9e5 holds colours, not the coefficients of --mode transfer");
     return 1;
 }
@@ -774,7 +780,7 @@ enum { BATCH = 4096, BAND = 16 }; /* samples shaded at once; rows of a task: a b
 typedef struct shade_batch {
     size_t count, pixel[BATCH];
     uint32_t seen[BATCH];
-    float point[BATCH][3], normal[BATCH][3], dir[BATCH][3], irradiance[BATCH][3], error[BATCH];
+    float point[BATCH][3], normal[BATCH][3], dir[BATCH][3], irradiance[BATCH][3], error[BATCH], gloss[BATCH][3], view[BATCH][3]; /* view: unit, to the eye */
 } shade_batch;
 
 typedef struct shade_job {
@@ -931,8 +937,19 @@ static void shade_sample(const viewer *v, shade_batch *b, size_t i, float rgb[3]
     if (v->o.mode == LAMBERT) lambert(v, b->point[i], n, v->o.ambient, v->o.shadows, light);
     else if (v->o.mode == PHONG) phong(v, b->point[i], n, b->dir[i], light, specular);
     else for (int c = 0; c < 3; c++) light[c] = (double)b->irradiance[i][c] > 0 ? (double)b->irradiance[i][c] : 0;
+    for (int c = 0; c < 3 && v->o.has_gloss; c++) specular[c] = 0.2 * (double)b->gloss[i][c];
     for (int c = 0; c < 3; c++) rgb[c] = (float)((double)v->albedo[c] * light[c] / PI + specular[c]);
     if (v->o.fog > 0) fog(v, b->point[i], rgb);
+}
+
+static isogi_result gloss_batch(const viewer *v, shade_batch *b) {
+    surface_normals(v, b);
+    for (size_t i = 0; i < b->count; i++) {
+        double to[3] = {-(double)b->dir[i][0], -(double)b->dir[i][1], -(double)b->dir[i][2]};
+        vector_normalize(to);
+        for (int c = 0; c < 3; c++) b->view[i][c] = (float)to[c];
+    }
+    return isogi_trace_sample_gloss(v->trace, (const float(*)[3])b->point, (const float(*)[3])b->normal, (const float(*)[3])b->view, v->o.gloss, b->count, b->gloss);
 }
 
 static isogi_result light_batch(const shade_job *job, shade_batch *b) {
@@ -940,12 +957,23 @@ static isogi_result light_batch(const shade_job *job, shade_batch *b) {
     isogi_trace_desc desc;
     isogi_context serial = v->context;
     if (v->o.mode <= PHONG) return ISOGI_OK;
-    if (v->trace) return isogi_trace_sample(v->trace, (const float(*)[3])b->point, b->count, b->irradiance, b->error);
+    if (v->trace) {
+        isogi_result result = isogi_trace_sample(v->trace, (const float(*)[3])b->point, b->count, b->irradiance, b->error);
+        return v->o.has_gloss && result == ISOGI_OK ? gloss_batch(v, b) : result;
+    }
     desc = describe_trace(v);
     serial.threads = 1, serial.progress = NULL;
     desc.seed = ((uint64_t)job->view.sample << 32) + b->pixel[0]; /* each batch its own random numbers */
     desc.samples = (v->o.samples + v->o.antialias - 1) / v->o.antialias;
     return isogi_trace_gather(&desc, (const float(*)[3])b->point, NULL, b->count, b->irradiance, b->error, &serial);
+}
+
+/* So many samples of points are done; whoever comes while another thread tells of it goes on. */
+static void say_traced(viewer *v, size_t count) {
+    uint64_t done = __atomic_add_fetch(&v->traced, count, __ATOMIC_RELAXED);
+    if (v->o.mode != PATHTRACE || __atomic_test_and_set(&v->saying, __ATOMIC_ACQUIRE)) return;
+    say(v, "tracing paths", (double)done / (double)(v->covered ? v->covered : 1), v->tracing_begun);
+    __atomic_clear(&v->saying, __ATOMIC_RELEASE);
 }
 
 static isogi_result shade_batch_now(shade_job *job, shade_batch *b, size_t band) {
@@ -963,6 +991,7 @@ static isogi_result shade_batch_now(shade_job *job, shade_batch *b, size_t band)
         job->band_error[band] += (double)b->error[i];
         job->band_light[band] += picture_luminance(b->irradiance[i]);
     }
+    say_traced(v, b->count);
     b->count = 0;
     return result;
 }
@@ -973,6 +1002,8 @@ static void shade_band(void *arg, size_t band) {
     const float *inverse = v->inverse[job->view.sample];
     const uint32_t *seen = v->seen[job->view.sample];
     size_t width = (size_t)v->o.width, at = band * BAND * width, end = at + BAND * width;
+    /* where a point takes long, fewer at a time, so that there is progress to tell of */
+    size_t most = ((size_t)1 << 20) / (size_t)(v->o.samples / v->o.antialias + 1), batch = v->o.mode != PATHTRACE || most > BATCH ? BATCH : most > 4 ? most : 4;
     isogi_result result = ISOGI_OK;
     shade_batch *b = (shade_batch *)malloc(sizeof *b);
     if (!b) {
@@ -987,7 +1018,7 @@ static void shade_band(void *arg, size_t band) {
         sample_ray(&job->view, (int)(at % width), (int)(at / width), b->dir[i]);
         point_at(v, b->dir[i], 1 / (double)inverse[at], b->point[i]);
         b->pixel[i] = at, b->seen[i] = seen[at], b->count++;
-        if (b->count == BATCH) result = shade_batch_now(job, b, band);
+        if (b->count == batch) result = shade_batch_now(job, b, band);
     }
     if (result == ISOGI_OK) result = shade_batch_now(job, b, band);
     job->band_result[band] = result;
@@ -999,6 +1030,7 @@ static int shade_surface(viewer *v) {
     double begun = seconds(), error = 0, light = 0;
     isogi_result result = ISOGI_OK;
     shade_job job = {.view = {.v = v}};
+    v->tracing_begun = begun;
     job.band_error = (double *)calloc(bands, sizeof *job.band_error), job.band_light = (double *)calloc(bands, sizeof *job.band_light);
     job.band_result = (isogi_result *)calloc(bands, sizeof *job.band_result);
     if (!job.band_error || !job.band_light || !job.band_result) result = ISOGI_NO_MEMORY;
@@ -1006,7 +1038,6 @@ static int shade_surface(viewer *v) {
         job.view.sample = s;
         sample_offset(v, s, &job.view.x_offset, &job.view.y_offset);
         result = isogi_parallel(&v->context, bands, shade_band, &job, 0, 0);
-        if (v->o.mode == PATHTRACE) say(v, "tracing paths", (s + 1.0) / v->o.antialias, begun);
     }
     for (size_t band = 0; band < bands && result == ISOGI_OK; band++)
         result = job.band_result[band], error += job.band_error[band], light += job.band_light[band];
@@ -1106,25 +1137,30 @@ static void backdrop(const viewer *v, int x, int y, double out[3]) {
     }
 }
 
-/* How far the picture is from the one in a file, over the pixels that show something. */
-static int compare_picture(viewer *v, const unsigned char *bytes) {
-    unsigned char *file, *other;
-    int shape[3];
-    size_t size, seen = 0;
-    double sum = 0;
+/* The picture to compare with: read before the work, so that one that cannot be used is known at once. */
+static int read_compared(viewer *v) {
+    unsigned char *file;
+    int shape[3] = {0}, ok;
+    size_t size;
     char why[FILE_ERROR_SIZE];
     if (!file_read(v->o.compare, (size_t)1 << 30, &file, &size, v->error)) return 0;
-    if (!png_decode(file, size, &other, shape, why)) return free(file), file_fail(v->error, "%.200s: %.250s", v->o.compare, why);
+    ok = png_decode(file, size, &v->compared, shape, why) || file_fail(v->error, "%.200s: %.250s", v->o.compare, why);
     free(file);
-    if (shape[0] != v->o.width || shape[1] != v->o.height || shape[2] != 3) return free(other), file_fail(v->error, "%s: is not %dx%d in colour", v->o.compare, v->o.width, v->o.height);
+    if (!ok) return v->compared = NULL, 0;
+    return (shape[0] == v->o.width && shape[1] == v->o.height && shape[2] == 3) || file_fail(v->error, "%s: is not %dx%d in colour", v->o.compare, v->o.width, v->o.height);
+}
+
+/* How far the picture is from it, over the pixels that show something. */
+static void compare_picture(const viewer *v, const unsigned char *bytes) {
+    const unsigned char *other = v->compared;
+    size_t seen = 0;
+    double sum = 0;
     for (size_t i = 0; i < (size_t)v->o.width * (size_t)v->o.height; i++) {
         if (!(v->picture[i][3] > 0)) continue;
         seen++;
         for (int c = 0; c < 3; c++) sum += pow((bytes[3 * i + (size_t)c] - other[3 * i + (size_t)c]) / 255.0, 2) / 3;
     }
-    free(other);
     printf("difference_rms %.6f\n", seen ? sqrt(sum / (double)seen) : 0);
-    return 1;
 }
 
 static int write_picture(viewer *v) {
@@ -1139,7 +1175,8 @@ static int write_picture(viewer *v) {
         backdrop(v, (int)(i % (size_t)v->o.width), (int)(i / (size_t)v->o.width), behind);
         picture_pixel(v->picture[i], exposure, behind, bytes + 3 * i);
     }
-    ok = (!v->o.compare || compare_picture(v, bytes)) && png_write(v->o.out, bytes, v->o.width, v->o.height, 3, v->error);
+    if (v->compared) compare_picture(v, bytes);
+    ok = png_write(v->o.out, bytes, v->o.width, v->o.height, 3, v->error);
     free(bytes);
     stat_line(v, "exposure", "%.6g", exposure);
     stat_seconds(v, "picture", begun);
@@ -1150,6 +1187,7 @@ static int check_surface(viewer *v) {
     size_t covered = 0, pixels = (size_t)v->o.width * (size_t)v->o.height;
     for (int s = 0; s < v->o.antialias; s++)
         for (size_t i = 0; i < pixels; i++) covered += v->seen[s][i] != RASTER_NONE;
+    v->covered = covered;
     stat_line(v, "coverage", "%.6f", (double)covered / (double)pixels / v->o.antialias);
     if (!covered) fprintf(stderr, "note: no surface is in view at isovalue %.9g (the data range from %.9g to %.9g)\n", v->isovalue, v->range[0], v->range[1]);
     return 1;
@@ -1158,6 +1196,7 @@ static int check_surface(viewer *v) {
 static int run(viewer *v, int argc, char **argv) {
     struct rusage usage;
     if (!parse_arguments(v, argc, argv) || !file_writable(v->o.out, v->error)) return 0;
+    if (v->o.compare && !read_compared(v)) return 0;
     if (!v->o.antialias) v->o.antialias = v->o.mode == DVR ? 1 : 4;
     v->context.alloc = counted_alloc, v->context.release = counted_release, v->context.user = v, v->context.threads = v->o.threads;
     stat_line(v, "mode", "%s", mode_name[v->o.mode]);
@@ -1187,7 +1226,7 @@ static void release(viewer *v) {
         if (v->inverse) free(v->inverse[s]);
         if (v->seen) free(v->seen[s]);
     }
-    free(v->inverse), free(v->seen), free(v->picture), free(v->env.rgb);
+    free(v->inverse), free(v->seen), free(v->picture), free(v->compared), free(v->env.rgb);
     isogi_trace_free(v->trace);
     if (v->pyramid) isogi_vol_mesh_free(v->pyramid, &v->mesh);
     isogi_vol_free(v->pyramid);

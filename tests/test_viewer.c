@@ -169,6 +169,28 @@ TEST(every_lookup_draws_a_picture_of_its_own) {
         }
 }
 
+/* Gloss adds light to the diffuse picture of the same exposure, and highlights of another exponent are others. */
+TEST(gloss_of_transfer_adds_highlights) {
+    static const char *const names[3] = {"", "--gloss 2", "--gloss 25"};
+    unsigned char *picture[3];
+    char command[512];
+    for (int i = 0; i < 3; i++) {
+        const char *out = temporary("gloss.png");
+        int shape[3];
+        snprintf(command, sizeof command, "procedural:gyroid:32 --mode transfer --samples 8 --size 64x48 --exposure 0.3 %s --out '%s'", names[i], out);
+        CHECK(run_viewer(command).status == 0, "%s", command);
+        picture[i] = read_picture(out, shape);
+    }
+    for (int i = 1; i < 3 && picture[0] && picture[1] && picture[2]; i++) {
+        int darker = 0, brighter = 0;
+        double outliers;
+        for (int k = 0; k < 3 * 64 * 48; k++) darker += picture[i][k] < picture[0][k], brighter += picture[i][k] > picture[0][k] + 3;
+        CHECK(!darker && brighter > 1000, "%s: %d values are darker, %d brighter", names[i], darker, brighter);
+        CHECK(i == 1 || picture_difference(picture[1], picture[2], 64, 48, &outliers) > 1, "exponents 2 and 25 look the same");
+    }
+    for (int i = 0; i < 3; i++) free(picture[i]);
+}
+
 /* ---- what is refused --------------------------------------------------------------------------------------------------------------------- */
 
 TEST(silly_options_get_one_line_that_names_the_option) {
@@ -193,6 +215,8 @@ TEST(silly_options_get_one_line_that_names_the_option) {
         {"procedural:gyroid --mode transfer --light point:1,1,1:1,1,1", "--light"}, {"procedural:gyroid --exposure 0", "--exposure"},
         {"procedural:gyroid --lattice 4096,4096,4096", "--lattice: the table of its bricks alone needs 8.0 GiB"}, {"procedural:gyroid --shadows maybe", "--shadows"},
         {"procedural:gyroid --mode transfer --storage rgb9e5", "--storage"}, {"procedural:gyroid:16 --size 32x32 --compare /dev/null", "/dev/null"},
+        {"procedural:gyroid:2048 --compare /nowhere.png", "/nowhere.png"}, {"procedural:gyroid:2048 --compare tests/golden/dvr.png", "is not 900x900"},
+        {"procedural:gyroid --gloss 10", "--gloss"}, {"procedural:gyroid --mode transfer --gloss -1", "--gloss"},
         {"procedural:gyroid --aa 1000", "--aa"}, {"procedural:gyroid --shading flat", "--shading"}, {"procedural:gyroid --out ''", "--out"},
         {"procedural:gyroid procedural:skull", "second volume"}, {"procedural:gyroid --scene engine", "not both"}, {"--scene nowhere", "engine bonsai"},
         {"procedural:teapot", "marschner-lobb"}, {"procedural:", "marschner-lobb"}, {"procedural:gyroid:1", "2 to 2048"}, {"procedural:gyroid:", "2 to 2048"},
@@ -308,7 +332,7 @@ TEST(stats_are_key_value_lines_and_help_is_complete) {
     static const char *const keys[] = {"size 32x32x32", "range ", "isovalue ", "triangles ", "rays_light ", "rays_per_second ", "texels_computed ",
                                        "texels_requested ", "memory_bytes ", "seconds_bake ", "seconds_total ", "error_relative "};
     static const char *const named[] = {"--scene", "--size", "--iso", "--mode", "--raycast", "--spacing", "--env", "--light", "--albedo", "--bounces", "--samples",
-                                        "--lattice", "--lookup", "--shadows", "--ambient", "--fog", "--normals", "--offset", "--reach", "--storage", "--compare", "--tf", "--clip", "--camera", "--up", "--threads", "--out", "--stats", "procedural:", "Examples"};
+                                        "--lattice", "--lookup", "--shadows", "--ambient", "--fog", "--gloss", "--normals", "--offset", "--reach", "--storage", "--compare", "--tf", "--clip", "--camera", "--up", "--threads", "--out", "--stats", "procedural:", "Examples"};
     char command[512];
     run_result r;
     snprintf(command, sizeof command, "procedural:gyroid:32 --size 32x32 --samples 8 --stats --out '%s'", temporary("stats.png"));
