@@ -1,6 +1,6 @@
 #!/bin/sh
 # The figures of Wyman et al. 2006 with our data, into build/figures with an index.html; numbers beside the pictures are differences to
-# the reference that the caption names, RMS in sRGB values of 0 to 1. With ISOGI_DATA real volumes, else procedural stand-ins.
+# the reference that the caption names, at its exposure, RMS in sRGB values of 0 to 1. With ISOGI_DATA real volumes, else procedural stand-ins.
 # A few minutes of one processor's time; the last line tells how many.
 #     FIGURES_SIZE=900x900   pixels; default 320x320            FIGURES_SAMPLES=1    times as many samples; 300 is about the paper's 10,000
 out=${FIGURES_OUT:-build/figures}
@@ -22,19 +22,21 @@ picture() {
     name=$1 caption=$2
     shift 2
     since=$(date +%s)
-    if number=$(build/viewer --samples "$(samples 32)" "$@" --size "$size" --out "$out/$name.png"); then
-        number=$(echo "$number" | sed -n 's/^difference_rms //p')
+    if stats=$(build/viewer --samples "$(samples 32)" "$@" --size "$size" --stats --out "$out/$name.png"); then
+        number=$(echo "$stats" | sed -n 's/^difference_rms //p')
+        echo "$stats" | sed -n 's/^exposure //p' > "$out/$name.exposure"
         echo "    $name   ${number:+difference $number   }$(($(date +%s) - since)) s"
         echo "<figure><img src=\"$name.png\" alt=\"$name\"><figcaption>$caption${number:+<br>difference $number}</figcaption></figure>" >> "$page"
     else failed=1
     fi
 }
 
-# LIKE NAME CAPTION ARGUMENTS...: the same, compared with the picture LIKE
+# LIKE NAME CAPTION ARGUMENTS...: the same, compared with the picture LIKE. At its exposure: one of its own would hide differences of
+# brightness, or add some
 compared() {
     like=$1 name=$2 caption=$3
     shift 3
-    picture "$name" "$caption" "$@" --compare "$out/$like.png"
+    picture "$name" "$caption" "$@" --compare "$out/$like.png" --exposure "$(cat "$out/$like.exposure")"
 }
 
 data() { [ -n "$ISOGI_DATA" ] && [ -f "$ISOGI_DATA/$1" ]; }
