@@ -393,6 +393,9 @@ ISOGI_API isogi_result isogi_trace_gather_field(const isogi_trace_desc *desc, is
 /* 1 where the texel lies on an isosurface of its own, 0 where there is none and it is left out of every lookup; 0 for NULL and beyond the
    lattice. */
 ISOGI_API int isogi_trace_valid(const isogi_trace *trace, const size_t texel[3]);
+/* 1 where isogi_trace_step has yet to compute the texel, or to refine it, on either of BOTH_SIDES; 0 where light is there already or
+   none was asked for, for NULL and beyond the lattice. */
+ISOGI_API int isogi_trace_wanted(const isogi_trace *trace, const size_t texel[3]);
 ISOGI_API void isogi_trace_counters(const isogi_trace *trace, isogi_counters *counters); /* adds what was done so far; NULL does nothing */
 ISOGI_API size_t isogi_trace_memory(const isogi_trace *trace); /* bytes that the texture's light takes: bricks and their table */
 
@@ -2435,6 +2438,15 @@ ISOGI_API int isogi_trace_valid(const isogi_trace *trace, const size_t texel[3])
     for (a = 0; a < 3; a++)
         if (texel[a] >= trace->lattice[a]) return 0;
     return isogi_trace__texel_site(trace, texel, &site);
+}
+
+ISOGI_API int isogi_trace_wanted(const isogi_trace *trace, const size_t texel[3]) {
+    int a, state;
+    if (!trace || !texel) return 0;
+    for (a = 0; a < 3; a++)
+        if (texel[a] >= trace->lattice[a]) return 0;
+    state = isogi_trace__state(trace, texel);
+    return (state >= ISOGI_TRACE__WANTED && state < ISOGI_TRACE__DONE) || isogi_trace_wanted(trace->high, texel);
 }
 
 ISOGI_API void isogi_trace_counters(const isogi_trace *trace, isogi_counters *counters) {

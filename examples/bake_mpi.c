@@ -2,7 +2,8 @@
 
        mpirun -n 5 build/bake_mpi VOLUME --out FILE [the options of build/bake that describe the texture]
 
-   Rank 0 hands out bricks of texels to whoever is free, and loads what comes back; the others bake. Every process reads the volume. */
+   Rank 0 hands out bricks of texels to whoever is free, loads what comes back and saves it every minute; the others bake. Every process
+   reads the volume. Where FILE holds a part of the texture, whoever baked it, only bricks that lack texels are baked. */
 #define ISOGI_IMPLEMENTATION
 #include "bake_scene.h"
 
@@ -14,10 +15,10 @@ typedef struct bricks {
     size_t lattice[3], size[3], count;
 } bricks;
 
-/* The lattice without any texel computed: nothing is classified, since nothing is asked for. */
-static isogi_result empty_texture(const bake_scene *s, isogi_trace **trace) {
+/* Rank 0 asks for all texels; to the others the lattice is enough: nothing is classified, since nothing is asked for. */
+static isogi_result empty_texture(const bake_scene *s, int rank, isogi_trace **trace) {
     isogi_trace_desc desc = s->desc;
-    desc.lazy = 1;
+    desc.lazy = rank > 0;
     return isogi_trace_create(trace, &desc, &s->context);
 }
 
@@ -27,16 +28,40 @@ static void count_bricks(const isogi_trace *trace, bricks *b) {
     for (int a = 0; a < 3; a++) b->size[a] = (b->lattice[a] + SIDE - 1) / SIDE, b->count *= b->size[a];
 }
 
+/* Texels first <= i < end. */
+static void brick_place(const bricks *b, size_t brick, size_t first[3], size_t end[3]) {
+    size_t at[3] = {brick % b->size[0], brick / b->size[0] % b->size[1], brick / b->size[0] / b->size[1]};
+    for (int a = 0; a < 3; a++) {
+        first[a] = at[a] * SIDE;
+        end[a] = first[a] + SIDE < b->lattice[a] ? first[a] + SIDE : b->lattice[a];
+    }
+}
+
+/* The first brick from this one on that lacks texels; b->count if there is none. */
+static size_t next_brick(const isogi_trace *whole, const bricks *b, size_t brick) {
+    for (; brick < b->count; brick++) {
+        size_t first[3], end[3], at[3];
+        brick_place(b, brick, first, end);
+        for (at[2] = first[2]; at[2] < end[2]; at[2]++)
+            for (at[1] = first[1]; at[1] < end[1]; at[1]++)
+                for (at[0] = first[0]; at[0] < end[0]; at[0]++)
+                    if (isogi_trace_wanted(whole, at)) return brick;
+    }
+    return brick;
+}
+
+static double count_wanted(const isogi_trace *whole, const bricks *b) {
+    double count = 0;
+    for (size_t brick = 0; (brick = next_brick(whole, b, brick)) < b->count; brick++) count++;
+    return count;
+}
+
 /* Bakes one brick and returns its block, to be freed; NULL on failure. */
 static unsigned char *bake_brick(const bake_scene *s, const bricks *b, size_t brick, size_t *size) {
     isogi_trace_desc desc = s->desc;
     isogi_trace *trace = NULL;
     unsigned char *block = NULL;
-    size_t at[3] = {brick % b->size[0], brick / b->size[0] % b->size[1], brick / b->size[0] / b->size[1]};
-    for (int a = 0; a < 3; a++) {
-        desc.box_first[a] = at[a] * SIDE;
-        desc.box_end[a] = desc.box_first[a] + SIDE < b->lattice[a] ? desc.box_first[a] + SIDE : b->lattice[a];
-    }
+    brick_place(b, brick, desc.box_first, desc.box_end);
     if (isogi_trace_create(&trace, &desc, &s->context) == ISOGI_OK && isogi_trace_step(trace, 0, NULL) == ISOGI_OK) {
         *size = isogi_trace_save_size(trace);
         block = (unsigned char *)malloc(*size);
@@ -62,23 +87,24 @@ static void work(const bake_scene *s, const bricks *b) {
 }
 
 /* Rank 0: hands out bricks, loads results. Every worker is told that nothing is left, whatever failed. */
-static isogi_result coordinate(isogi_trace *whole, const bricks *b, int workers) {
+static isogi_result coordinate(bake_scene *s, isogi_trace *whole, const bricks *b, int workers) {
     isogi_result result = ISOGI_OK;
-    uint64_t next = 0;
-    int terminal = isatty(STDERR_FILENO);
+    size_t next = 0;
+    bake_clock clock = bake_clock_start();
+    double done = 0, all = count_wanted(whole, b);
     while (workers) {
         MPI_Status status;
-        uint64_t brick = result == ISOGI_OK && next < b->count ? next : b->count;
+        uint64_t brick;
         unsigned char *block;
         int size;
         MPI_Probe(MPI_ANY_SOURCE, MPI_ANY_TAG, MPI_COMM_WORLD, &status);
         if (status.MPI_TAG == ASK) {
             uint64_t none;
             MPI_Recv(&none, 1, MPI_UINT64_T, status.MPI_SOURCE, ASK, MPI_COMM_WORLD, MPI_STATUS_IGNORE);
+            brick = result == ISOGI_OK ? next_brick(whole, b, next) : b->count;
             MPI_Send(&brick, 1, MPI_UINT64_T, status.MPI_SOURCE, WORK, MPI_COMM_WORLD);
-            if (brick < b->count) next++;
-            else workers--;
-            if (terminal) fprintf(stderr, "\r%3.0f %% \033[K", 100.0 * (double)next / (double)b->count);
+            next = (size_t)brick + 1;
+            if (brick >= b->count) workers--;
             continue;
         }
         MPI_Get_count(&status, MPI_BYTE, &size);
@@ -87,20 +113,27 @@ static isogi_result coordinate(isogi_trace *whole, const bricks *b, int workers)
         MPI_Recv(block, size, MPI_BYTE, status.MPI_SOURCE, RESULT, MPI_COMM_WORLD, MPI_STATUS_IGNORE);
         if (result == ISOGI_OK) result = size ? isogi_trace_load(whole, block, (size_t)size) : ISOGI_NO_MEMORY;
         free(block);
+        bake_say(&clock, ++done / all);
+        if (result == ISOGI_OK) bake_save_now_and_then(s, whole, &clock);
     }
-    if (terminal) fputs("\r\033[K", stderr);
+    bake_say_end();
     return result;
 }
 
 /* One process alone bakes every brick itself. */
-static isogi_result alone(const bake_scene *s, isogi_trace *whole, const bricks *b) {
+static isogi_result alone(bake_scene *s, isogi_trace *whole, const bricks *b) {
     isogi_result result = ISOGI_OK;
-    for (size_t brick = 0; brick < b->count && result == ISOGI_OK; brick++) {
+    bake_clock clock = bake_clock_start();
+    double done = 0, all = count_wanted(whole, b);
+    for (size_t brick = 0; result == ISOGI_OK && (brick = next_brick(whole, b, brick)) < b->count; brick++) {
         size_t size = 0;
         unsigned char *block = bake_brick(s, b, brick, &size);
         result = block ? isogi_trace_load(whole, block, size) : ISOGI_NO_MEMORY;
         free(block);
+        bake_say(&clock, ++done / all);
+        if (result == ISOGI_OK) bake_save_now_and_then(s, whole, &clock);
     }
+    bake_say_end();
     return result;
 }
 
@@ -119,8 +152,9 @@ static int run(bake_scene *s, int argc, char **argv, int rank, int ranks) {
         else ok = 0;
     }
     ok = ok && bake_scene_make(s) && (rank || file_writable(s->out, s->error));
-    result = ok ? empty_texture(s, &whole) : ISOGI_OK;
+    result = ok ? empty_texture(s, rank, &whole) : ISOGI_OK;
     if (result != ISOGI_OK) ok = file_fail(s->error, "the texture: %s", isogi_result_string(result));
+    if (ok && !rank && access(s->out, F_OK) == 0) ok = bake_scene_load(s, whole, s->out);
     failing = ok ? ranks : rank; /* all of them go on, or none, and the first that cannot says why */
     MPI_Allreduce(MPI_IN_PLACE, &failing, 1, MPI_INT, MPI_MIN, MPI_COMM_WORLD);
     if (!ok && rank != failing) s->error[0] = 0;
@@ -128,7 +162,7 @@ static int run(bake_scene *s, int argc, char **argv, int rank, int ranks) {
         count_bricks(whole, &b);
         if (rank) work(s, &b);
         else {
-            result = ranks > 1 ? coordinate(whole, &b, ranks - 1) : alone(s, whole, &b);
+            result = ranks > 1 ? coordinate(s, whole, &b, ranks - 1) : alone(s, whole, &b);
             ok = result == ISOGI_OK ? bake_scene_save(s, whole, s->out) : file_fail(s->error, "baking: %s", isogi_result_string(result));
         }
     }

@@ -468,4 +468,28 @@ TEST(adaptive_bakes_meet_their_target) {
     scene_free(&s);
 }
 
+/* Of a full bake every texel with a surface is wanted, and none at the end; of one that is stopped, those that a save does not hold. */
+TEST(what_is_wanted_is_what_is_missing) {
+    double q[1] = {0.5};
+    scene s = scene_make(12, 12, 12, NULL, gyroid, q);
+    isogi_trace_desc d = desc_make(&s, 0.5f, 0, 4);
+    isogi_trace *t = NULL;
+    isogi_trace_report report;
+    size_t beyond[3] = {0, 12, 0};
+    double remaining = 1;
+    CHECK(isogi_trace_create(&t, &d, NULL) == ISOGI_OK && !isogi_trace_wanted(NULL, beyond) && !isogi_trace_wanted(t, NULL) && !isogi_trace_wanted(t, beyond), "arguments");
+    for (int phase = 0; phase < 3; phase++) {
+        size_t wanted = 0, valid = 0, odd = 0;
+        if (phase) CHECK(isogi_trace_step(t, phase == 1 ? 1000 : 0, &remaining) == ISOGI_OK, "phase %d", phase);
+        for (size_t i = 0; i < 12 * 12 * 12; i++) {
+            size_t texel[3] = {i % 12, i / 12 % 12, i / 144};
+            wanted += (size_t)isogi_trace_wanted(t, texel), valid += (size_t)isogi_trace_valid(t, texel);
+            odd += isogi_trace_wanted(t, texel) && !isogi_trace_valid(t, texel);
+        }
+        isogi_trace_status(t, &report);
+        CHECK(!odd && wanted + report.texels == valid && (wanted == 0) == (phase == 2), "phase %d: %zu wanted, %zu valid, %llu there", phase, wanted, valid, (unsigned long long)report.texels);
+    }
+    isogi_trace_free(t), scene_free(&s);
+}
+
 TEST_MAIN("trace_bake")

@@ -2,6 +2,7 @@
 # bake_mpi on four ranks, on one, and bake: the same file, byte by byte; with errors in one line.
 OUT=${OUT:-build/check/mpi}
 mkdir -p "$OUT"
+rm -f "$OUT"/*.bake "$OUT"/*.tmp # or baking would go on there
 set -e
 scene="procedural:engine-block:40 --samples 8 --bounces 2"
 ranks() { n=$1; shift; mpirun --allow-run-as-root --oversubscribe -n "$n" build/bake_mpi "$@"; }
@@ -10,6 +11,30 @@ ranks 4 $scene --out "$OUT/four.bake"
 ranks 1 $scene --out "$OUT/alone.bake"
 cmp "$OUT/one.bake" "$OUT/four.bake"
 cmp "$OUT/one.bake" "$OUT/alone.bake"
+# it goes on where a file stops, of either program and however its box lies, and where it was killed
+build/bake $scene --box 3,0,0,40,40,17 --out "$OUT/part.bake"
+ranks 3 $scene --out "$OUT/part.bake"
+cmp "$OUT/one.bake" "$OUT/part.bake"
+ranks 3 $scene --out "$OUT/part.bake"
+cmp "$OUT/one.bake" "$OUT/part.bake"
+slow="procedural:engine-block:40 --samples 64 --bounces 2"
+rm -f "$OUT/killed.bake"
+setsid mpirun --allow-run-as-root --oversubscribe -n 3 build/bake_mpi $slow --save-every 0 --out "$OUT/killed.bake" > "$OUT/message" 2>&1 &
+job=$!
+for turn in 1 2 3 4 5 6 7 8 9 10 11 12 13 14 15 16 17 18 19 20 21 22 23 24 25 26 27 28 29 30; do
+    [ -e "$OUT/killed.bake" ] && break
+    sleep 0.1
+done
+kill -TERM $job
+if wait $job; then echo "it was over before it could be killed"; exit 1; fi
+[ -s "$OUT/killed.bake" ] || { echo "not saved while it worked"; exit 1; }
+build/bake $slow --out "$OUT/slow.bake" 2> "$OUT/message"
+[ "$(wc -c < "$OUT/killed.bake")" -lt "$(wc -c < "$OUT/slow.bake")" ]
+ranks 3 $slow --out "$OUT/killed.bake" 2> "$OUT/message"
+cmp "$OUT/killed.bake" "$OUT/slow.bake"
+rm -f "$OUT"/*.tmp
+if ranks 2 $scene --samples 9 --out "$OUT/one.bake" 2> "$OUT/message"; then echo "another texture was taken"; exit 1; fi
+grep -q "holds another texture" "$OUT/message"
 ranks 2 $scene --mode transfer --both-sides --out "$OUT/transfer.bake"
 build/bake $scene --mode transfer --both-sides --out "$OUT/transfer-one.bake"
 cmp "$OUT/transfer.bake" "$OUT/transfer-one.bake"
