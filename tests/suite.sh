@@ -234,7 +234,7 @@ quick)
     for program; do item live "${program##*/}" "$program"; done
     sources
     matrix_quick
-    item check bake/parts-and-pauses "sh tests/compile/bake.sh"
+    item check bake/parts-and-pauses "sh tests/compile/bake.sh quick"
     ;;
 long)
     sources
