@@ -449,7 +449,7 @@ ISOGI_API isogi_result isogi_dvr_tets_render(const isogi_tets *tets, const isogi
 #define ISOGI_DVR__BATCH 16                /* directions swept at once */
 #define ISOGI_DVR__GAIN 1024               /* grid points: one task of summing up */
 #define ISOGI_DVR__TOWARD 8                /* directions towards which local visibility is evaluated at once */
-#define ISOGI_DVR__CLASSES 1024            /* of values, for pictures */
+#define ISOGI_DVR__CLASSES 1024            /* of values, for pictures; 16 times as many for a transfer function with narrow pieces */
 #define ISOGI_DVR__NODES 8                 /* samples of a ray taken at once */
 #define ISOGI_DVR__LEAP 6                  /* blocks of 4^3 that a ray steps over at once, to each side */
 
@@ -4735,7 +4735,9 @@ struct isogi_dvr__frame {
     float light_scale[4]; /* grid points of light to a voxel */
     int32_t light_last[4]; /* cell of the grid */
     size_t light_stride[3], light_row[2]; /* floats to the neighbours (0 where there is one point); rows, planes */
-    float low, scale;   /* class of a value */
+    size_t count;       /* of classes */
+    float low, scale;   /* place of a value among them, which goes on before the first and beyond the last, both of one extinction and colour */
+    float top, close;   /* of the last class; places so close that their classes' mean is taken, as the difference of two sums has no digits left */
     double step;        /* voxels between samples */
     float reach;        /* as isogi_dvr.reach, in samples */
     float end, dim;     /* transmittance at which a ray ends; at which its samples stand twice as far apart */
@@ -4748,20 +4750,46 @@ struct isogi_dvr__frame {
     uint32_t last_word; /* byte offset of the last four bytes of the data */
 };
 
-static int isogi_dvr__fast_space(const isogi_dvr *d) {
-    return d->desc.space == ISOGI_DVR_PHYSICAL && d->desc.classification != ISOGI_DVR_POST_CLASSIFIED && !d->transfer.peak_count && !d->desc.jitter &&
-           d->desc.shading != ISOGI_DVR_LOCAL && !(fabs(d->desc.anisotropy) > 0) && d->cells[0] && d->cells[1] && d->cells[2] && d->desc.opaque < 1;
+/* Whether any peak lies within the range of values. */
+static int isogi_dvr__any_peak(const isogi_dvr *d) {
+    size_t i;
+    for (i = 0; i < d->transfer.peak_count; i++)
+        if (d->transfer.peaks[i].isovalue >= d->range[0] && d->transfer.peaks[i].isovalue <= d->range[1]) return 1;
+    return 0;
 }
 
-static void isogi_dvr__frame_classes(isogi_dvr__frame *f) {
+static int isogi_dvr__fast_space(const isogi_dvr *d) {
+    return d->desc.space == ISOGI_DVR_PHYSICAL && d->desc.classification != ISOGI_DVR_POST_CLASSIFIED && !isogi_dvr__any_peak(d) && !d->desc.jitter &&
+           d->desc.shading != ISOGI_DVR_LOCAL && !(fabs(d->desc.anisotropy) > 0) && d->cells[0] && d->cells[1] && d->cells[2];
+}
+
+/* Four classes at least to the narrowest piece of the transfer function, as far as their number allows. */
+static size_t isogi_dvr__count_classes(const isogi_dvr *d, double *low, double *scale) {
+    const isogi_dvr__transfer *t = &d->transfer;
+    double span[2], narrow = 1e300;
+    size_t i, count;
+    isogi_dvr__transfer_span(t, span);
+    for (i = 1; i < t->point_count; i++) {
+        double width = t->points[i].value - t->points[i - 1].value;
+        if (width > 0 && width < narrow && !isogi_dvr__alike(&t->points[i], &t->points[i - 1])) narrow = width;
+    }
+    for (count = ISOGI_DVR__CLASSES;; count *= 2) {
+        isogi_dvr__set_classes(d, span, count, low, scale);
+        if (count == 16 * ISOGI_DVR__CLASSES || narrow * *scale >= 4) return count;
+    }
+}
+
+static void isogi_dvr__frame_classes(isogi_dvr__frame *f, double low, double scale) {
     const isogi_dvr *d = f->dvr;
     const isogi_dvr__transfer *t = &d->transfer;
-    double sum[4] = {0, 0, 0, 0}, size = (0.5 * d->range[1] - 0.5 * d->range[0]) / (0.5 * ISOGI_DVR__CLASSES);
+    double sum[4] = {0, 0, 0, 0};
     size_t i, next;
     int a, half;
-    for (i = 0; i <= ISOGI_DVR__CLASSES; i++) {
+    for (i = 0; i < f->count; i++) {
         isogi_dvr__class_entry *e = &f->classes[i];
-        double from = d->range[0] + (double)i * size, to = i < ISOGI_DVR__CLASSES ? from + size : from, x = from, mean[4] = {0, 0, 0, 0};
+        double ends[2], from, to, x, mean[4] = {0, 0, 0, 0};
+        isogi_dvr__class_ends(low, scale, i, f->count, ends);
+        from = x = ends[0], to = ends[1];
         next = t->point_count ? isogi_dvr__points_below(t->points, t->point_count, from) : 0;
         while (t->point_count) { /* pieces between the function's points: the product of two linear functions, by Simpson's rule exactly */
             double end = next < t->point_count && t->points[next].value < to ? t->points[next].value : to, weight = to > from ? (end - x) / (to - from) : 1;
@@ -4779,7 +4807,8 @@ static void isogi_dvr__frame_classes(isogi_dvr__frame *f) {
         }
         for (a = 0; a < 4; a++) e->before[a] = (float)sum[a], e->mean[a] = (float)isogi_dvr__clamp(mean[a], 1e30), sum[a] += mean[a];
     }
-    f->low = (float)d->range[0], f->scale = size > 0 ? (float)(1 / size) : 0;
+    f->low = (float)low, f->scale = (float)scale;
+    f->top = (float)f->count - 0.01f, f->close = (float)f->count / (2 * ISOGI_DVR__CLASSES);
 }
 
 /* out += factor * from, four numbers at once. */
@@ -4831,7 +4860,7 @@ struct isogi_dvr__fast_run {
     float tolerance;                          /* change of depth across a piece from which on it is divided */
     int pieces;                               /* up to ISOGI_DVR__NODES - 1 */
     unsigned some;                            /* a bit for each piece that absorbs */
-    float classes[ISOGI_DVR__NODES];          /* of samples; -1 where a corner is not finite */
+    float classes[ISOGI_DVR__NODES];          /* of samples: places among the frame's classes */
     float mean[ISOGI_DVR__NODES], depth[ISOGI_DVR__NODES], change[ISOGI_DVR__NODES]; /* of pieces: extinction, optical depth, and its change across them */
 };
 
@@ -4867,21 +4896,29 @@ static void isogi_dvr__fast_classes(const isogi_dvr__frame *f, const isogi_dvr__
         value = corner[0] + u[1] * (corner[1] - corner[0]);
         value += u[2] * (corner[2] + u[1] * (corner[3] - corner[2]) - value);
         if (!isogi_dvr__finite32(value)) {
-            run->classes[i] = -1;
+            run->classes[i] = 1e30f; /* as AVX2 code: no piece */
             continue;
         }
         value = (value * (float)v->scale + ((float)v->bias - f->low)) * f->scale;
-        value = value > 0 ? value : 0;
-        run->classes[i] = value < ISOGI_DVR__CLASSES - 0.001f ? value : ISOGI_DVR__CLASSES - 0.001f;
+        value = value > -1e15f ? value : -1e15f;
+        run->classes[i] = value < 1e15f ? value : 1e15f;
     }
 }
 
-/* Factors of before[] and mean[] of the two ends of a piece whose sum is what lies between them, over the difference of their classes;
-   within half a class the mean of both. */
-static void isogi_dvr__fast_factors(float from, float to, float factor[3]) {
+/* The class of a place among them. */
+static int isogi_dvr__fast_class(const isogi_dvr__frame *f, float at) {
+    at = at > 0 ? at : 0;
+    return (int)(at < f->top ? at : f->top);
+}
+
+/* Factors of before[] and mean[] of the two ends of a piece whose sum is what lies between them, over the difference of their places;
+   within a class, and where they are close, the mean of both. */
+static void isogi_dvr__fast_factors(const isogi_dvr__frame *f, float from, float to, const isogi_dvr__class_entry *e[2], float factor[3]) {
     float difference = to - from;
-    if (difference < 0.5f && difference > -0.5f) factor[0] = 0, factor[1] = factor[2] = 0.5f;
-    else factor[0] = 1 / difference, factor[1] = -(from - (float)(int)from) * factor[0], factor[2] = (to - (float)(int)to) * factor[0];
+    int first = isogi_dvr__fast_class(f, from), last = isogi_dvr__fast_class(f, to);
+    e[0] = &f->classes[first], e[1] = &f->classes[last];
+    if (first == last || (difference < f->close && difference > -f->close)) factor[0] = 0, factor[1] = factor[2] = 0.5f;
+    else factor[0] = 1 / difference, factor[1] = -(from - (float)first) * factor[0], factor[2] = (to - (float)last) * factor[0];
 }
 
 /* Takes a run's samples, and looks up what lies between them. */
@@ -4890,14 +4927,13 @@ static void isogi_dvr__fast_look(const isogi_dvr__frame *f, const isogi_dvr__fas
     isogi_dvr__fast_classes(f, r, run);
     for (k = 0, run->some = 0; k < run->pieces; k++) {
         float from = run->classes[k], to = run->classes[k + 1], length = k + 1 < run->pieces ? run->length : run->last, factor[3], mean;
-        const isogi_dvr__class_entry *e0, *e1;
-        if (from < 0 || to < 0) continue;
-        e0 = &f->classes[(int)from], e1 = &f->classes[(int)to];
-        isogi_dvr__fast_factors(from, to, factor);
-        mean = (e1->before[3] - e0->before[3]) * factor[0] + e0->mean[3] * factor[1] + e1->mean[3] * factor[2];
+        const isogi_dvr__class_entry *e[2];
+        if (from > 1e20f || to > 1e20f) continue;
+        isogi_dvr__fast_factors(f, from, to, e, factor);
+        mean = (e[1]->before[3] - e[0]->before[3]) * factor[0] + e[0]->mean[3] * factor[1] + e[1]->mean[3] * factor[2];
         if (!(mean > 0)) continue;
         run->some |= 1u << k, run->mean[k] = mean;
-        run->depth[k] = mean * length < 1e30f ? mean * length : 1e30f, run->change[k] = fabsf(e1->mean[3] - e0->mean[3]) * length;
+        run->depth[k] = mean * length < 1e30f ? mean * length : 1e30f, run->change[k] = fabsf(e[1]->mean[3] - e[0]->mean[3]) * length;
     }
 }
 
@@ -4950,16 +4986,16 @@ static void isogi_dvr__fast_shade(const isogi_dvr__frame *f, const isogi_dvr__fa
     int k, a;
     for (k = 0; k < run->pieces && s->clear > f->end; k++) {
         float light[4] = {1, 1, 1, 1}, colour[4] = {0, 0, 0, 0}, factor[3], clear;
-        const isogi_dvr__class_entry *e0 = &f->classes[(int)run->classes[k]], *e1 = &f->classes[(int)run->classes[k + 1]];
+        const isogi_dvr__class_entry *e[2];
         if (!(run->some >> k & 1)) continue;
         if (run->change[k] * s->clear > run->tolerance) {
             isogi_dvr__fast_divide(f, r, s, run, k, work);
             continue;
         }
         clear = isogi_dvr__exp(run->depth[k]);
-        isogi_dvr__fast_factors(run->classes[k], run->classes[k + 1], factor);
-        isogi_dvr__add4(colour, e1->before, factor[0]), isogi_dvr__add4(colour, e0->before, -factor[0]);
-        isogi_dvr__add4(colour, e0->mean, factor[1]), isogi_dvr__add4(colour, e1->mean, factor[2]);
+        isogi_dvr__fast_factors(f, run->classes[k], run->classes[k + 1], e, factor);
+        isogi_dvr__add4(colour, e[1]->before, factor[0]), isogi_dvr__add4(colour, e[0]->before, -factor[0]);
+        isogi_dvr__add4(colour, e[0]->mean, factor[1]), isogi_dvr__add4(colour, e[1]->mean, factor[2]);
         if (f->light) isogi_dvr__fast_light(f, r, isogi_dvr__fast_place(f, r, run, k), light);
         for (a = 0; a < 3; a++) { /* a truncated series may ring below 0 */
             colour[a] = colour[a] > 0 ? colour[a] : 0, light[a] = light[a] > 0 ? light[a] : 0;
@@ -5016,20 +5052,32 @@ ISOGI_DVR__AVX2 inline __m256 isogi_dvr__next_avx2(__m256 x) { return _mm256_per
 
 ISOGI_DVR__AVX2 inline __m256 isogi_dvr__magnitude_avx2(__m256 x) { return _mm256_andnot_ps(_mm256_set1_ps(-0.0f), x); }
 
+ISOGI_DVR__AVX2 inline __m256i isogi_dvr__fast_classes_avx2(const isogi_dvr__frame *f, __m256 value) {
+    return _mm256_cvttps_epi32(_mm256_min_ps(_mm256_max_ps(value, _mm256_setzero_ps()), _mm256_set1_ps(f->top)));
+}
+
+/* Where isogi_dvr__fast_factors takes the mean. */
+ISOGI_DVR__AVX2 inline __m256 isogi_dvr__close_avx2(const isogi_dvr__frame *f, __m256 difference, __m256i index) {
+    __m256i next = _mm256_castps_si256(isogi_dvr__next_avx2(_mm256_castsi256_ps(index)));
+    __m256 close = _mm256_cmp_ps(isogi_dvr__magnitude_avx2(difference), _mm256_set1_ps(f->close), _CMP_LT_OQ);
+    return _mm256_or_ps(close, _mm256_castsi256_ps(_mm256_cmpeq_epi32(index, next)));
+}
+
 /* As isogi_dvr__fast_look. */
 ISOGI_DVR__AVX2 void isogi_dvr__fast_look_avx2(const isogi_dvr__frame *f, const isogi_dvr__fast_ray *r, isogi_dvr__fast_run *run) {
     const __m256 zero = _mm256_setzero_ps();
     const __m256i lane = _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7), infinite = _mm256_set1_epi32(0x7f800000);
     __m256 value = isogi_dvr__samples_avx2(f, r, run), before, node, sum, change, difference, mean, length, in, close;
-    __m256i entry, bad = _mm256_cmpeq_epi32(_mm256_and_si256(_mm256_castps_si256(value), infinite), infinite);
+    __m256i index, entry, bad = _mm256_cmpeq_epi32(_mm256_and_si256(_mm256_castps_si256(value), infinite), infinite);
     value = _mm256_fmadd_ps(value, _mm256_set1_ps((float)f->dvr->volume.scale), _mm256_set1_ps((float)f->dvr->volume.bias - f->low));
-    value = _mm256_min_ps(_mm256_max_ps(_mm256_mul_ps(value, _mm256_set1_ps(f->scale)), zero), _mm256_set1_ps(ISOGI_DVR__CLASSES - 0.001f));
+    value = _mm256_min_ps(_mm256_max_ps(_mm256_mul_ps(value, _mm256_set1_ps(f->scale)), _mm256_set1_ps(-1e15f)), _mm256_set1_ps(1e15f));
     value = _mm256_andnot_ps(_mm256_castsi256_ps(bad), value);
-    entry = _mm256_slli_epi32(_mm256_cvttps_epi32(value), 5); /* bytes */
+    index = isogi_dvr__fast_classes_avx2(f, value);
+    entry = _mm256_slli_epi32(index, 5); /* bytes */
     before = _mm256_i32gather_ps(&f->classes[0].before[3], entry, 1), node = _mm256_i32gather_ps(&f->classes[0].mean[3], entry, 1);
-    sum = _mm256_mul_ps(_mm256_sub_ps(value, _mm256_floor_ps(value)), node);
+    sum = _mm256_mul_ps(_mm256_sub_ps(value, _mm256_cvtepi32_ps(index)), node);
     difference = _mm256_sub_ps(isogi_dvr__next_avx2(value), value), change = isogi_dvr__next_avx2(node);
-    close = _mm256_cmp_ps(isogi_dvr__magnitude_avx2(difference), _mm256_set1_ps(0.5f), _CMP_LT_OQ);
+    close = isogi_dvr__close_avx2(f, difference, index);
     mean = _mm256_add_ps(_mm256_sub_ps(isogi_dvr__next_avx2(before), before), _mm256_sub_ps(isogi_dvr__next_avx2(sum), sum));
     mean = _mm256_blendv_ps(_mm256_div_ps(mean, difference), _mm256_mul_ps(_mm256_set1_ps(0.5f), _mm256_add_ps(node, change)), close);
     in = _mm256_castsi256_ps(_mm256_or_si256(bad, _mm256_castps_si256(isogi_dvr__next_avx2(_mm256_castsi256_ps(bad)))));
@@ -5073,14 +5121,17 @@ typedef struct isogi_dvr__fast_parts {
 ISOGI_DVR__AVX2 inline void isogi_dvr__parts_avx2(const isogi_dvr__frame *f, const isogi_dvr__fast_ray *r, const isogi_dvr__fast_run *run, isogi_dvr__fast_parts *parts) {
     const __m256 zero = _mm256_setzero_ps(), one = _mm256_set1_ps(1), half = _mm256_set1_ps(0.5f), reach = _mm256_set1_ps(f->reach);
     __m256 value = _mm256_loadu_ps(run->classes), next = isogi_dvr__next_avx2(value), difference = _mm256_sub_ps(next, value), x, at, close;
-    __m256i index = _mm256_setzero_si256();
+    __m256i index;
     int a;
-    close = _mm256_cmp_ps(isogi_dvr__magnitude_avx2(difference), half, _CMP_LT_OQ), x = _mm256_div_ps(one, difference);
-    _mm256_storeu_si256((__m256i *)(void *)parts->entry, _mm256_cvttps_epi32(value));
+    index = isogi_dvr__fast_classes_avx2(f, value);
+    close = isogi_dvr__close_avx2(f, difference, index), x = _mm256_div_ps(one, difference);
+    value = _mm256_sub_ps(_mm256_cvtepi32_ps(index), value), next = isogi_dvr__next_avx2(value);
+    _mm256_storeu_si256((__m256i *)(void *)parts->entry, index);
     _mm256_storeu_ps(parts->factor[0], _mm256_andnot_ps(close, x));
-    _mm256_storeu_ps(parts->factor[1], _mm256_blendv_ps(_mm256_mul_ps(_mm256_sub_ps(_mm256_floor_ps(value), value), x), half, close));
-    _mm256_storeu_ps(parts->factor[2], _mm256_blendv_ps(_mm256_mul_ps(_mm256_sub_ps(next, _mm256_floor_ps(next)), x), half, close));
+    _mm256_storeu_ps(parts->factor[1], _mm256_blendv_ps(_mm256_mul_ps(value, x), half, close));
+    _mm256_storeu_ps(parts->factor[2], _mm256_blendv_ps(_mm256_xor_ps(_mm256_mul_ps(next, x), _mm256_set1_ps(-0.0f)), half, close));
     if (!f->light) return;
+    index = _mm256_setzero_si256();
     x = _mm256_min_ps(_mm256_mul_ps(_mm256_loadu_ps(run->mean), _mm256_set1_ps(r->piece * f->reach)), _mm256_set1_ps(1e15f)), x = _mm256_mul_ps(x, x);
     x = _mm256_div_ps(_mm256_mul_ps(reach, x), _mm256_add_ps(x, _mm256_set1_ps(16)));
     at = _mm256_div_ps(half, _mm256_fmadd_ps(_mm256_loadu_ps(run->depth), _mm256_set1_ps(1.0f / 6), one));
@@ -5360,7 +5411,7 @@ static isogi_result isogi_dvr__begin_frame(isogi_dvr__render_job *job) {
     const isogi_dvr *d = job->dvr;
     const isogi_volume *v = &d->volume;
     isogi_dvr__frame *f = &job->fast.frame;
-    double eye[3], bytes, blocks;
+    double eye[3], bytes, blocks, low, scale;
     int a, kind = v->type == ISOGI_F32 ? 0 : v->type == ISOGI_U8 ? 1 : v->type == ISOGI_U16 ? 2 : -1;
     isogi_dvr__set_camera(&job->camera, job->view);
     for (a = 0; a < 3; a++) eye[a] = (double)job->view->eye[a];
@@ -5379,9 +5430,10 @@ static isogi_result isogi_dvr__begin_frame(isogi_dvr__render_job *job) {
     if (f->sample_kind >= 0 && isogi_dvr__machine() >= 3 && (!d->context.force_path || d->context.force_path > 2) && d->point_count < 0x7fffffff)
         f->look = isogi_dvr__fast_look_avx2, f->shade = isogi_dvr__fast_shade_avx2;
 #endif
-    f->classes = (isogi_dvr__class_entry *)isogi_allocate(&d->context, ISOGI_DVR__CLASSES + 1, sizeof *f->classes);
+    f->count = isogi_dvr__count_classes(d, &low, &scale);
+    f->classes = (isogi_dvr__class_entry *)isogi_allocate(&d->context, f->count, sizeof *f->classes);
     if (!f->classes) return ISOGI_NO_MEMORY;
-    isogi_dvr__frame_classes(f);
+    isogi_dvr__frame_classes(f, low, scale);
     if (d->desc.shading == ISOGI_DVR_UNLIT) {
         f->glow = 0;
         return ISOGI_OK;
@@ -5428,7 +5480,7 @@ ISOGI_API isogi_result isogi_dvr_render(const isogi_dvr *dvr, const isogi_view *
         job.work[i].texels = 0;
         isogi_dvr__add(counters, &job.work[i]);
     }
-    isogi_release(&dvr->context, job.fast.frame.classes, ISOGI_DVR__CLASSES + 1, sizeof *job.fast.frame.classes);
+    isogi_release(&dvr->context, job.fast.frame.classes, job.fast.frame.count, sizeof *job.fast.frame.classes);
     isogi_release(&dvr->context, job.fast.frame.light, dvr->point_count + 1, sizeof *job.fast.frame.light);
     isogi_release(&dvr->context, job.pixels, pixels, 5 * sizeof *job.pixels);
     isogi_release(&dvr->context, job.work, job.tiles, sizeof *job.work);
