@@ -107,9 +107,9 @@
    What it does not do
 
    - No light on tetrahedral meshes, no scattering beyond the first, no refraction, no glossy surfaces.
-   - Pictures of physical space are pre-integrated (ISOGI_DVR_EXACT is the same there), unless they have peaks, local shading, nearby
-     lights, jitter or depth: those are post-classified, and features narrower than the value's change from sample to sample need a smaller
-     step. Pre-classification (colours interpolated instead of values) is left out on purpose: in data
+   - Pictures of physical space are pre-integrated (ISOGI_DVR_EXACT is the same there), unless they have peaks among the values that occur,
+     local shading (ISOGI_DVR_LOCAL, isogi_view.local), nearby lights, anisotropy, jitter, or an axis of one voxel: those are post-classified,
+     and features narrower than the value's change from sample to sample need a smaller step. Pre-classification (colours interpolated instead of values) is left out on purpose: in data
      space it would depend on the view, and it blurs every surface to the width of a voxel.
    - The border of the volume is no surface: outside of the box is empty space.
    - It reads no files, opens no window, converts nothing to sRGB. Pixels are linear and premultiplied: put a background under
@@ -198,7 +198,8 @@ typedef enum isogi_dvr_space {
     ISOGI_DVR_DATA          /* scale-invariant: per unit of data along monotone pieces of the ray (Kraus 2005, eq. 4) */
 } isogi_dvr_space;
 
-/* How the integral along a ray is evaluated in data space. In physical space every value means ISOGI_DVR_POST_CLASSIFIED. */
+/* How the integral along a ray is evaluated in data space. In physical space the first two mean the same: pre-integrated by four
+   running integrals, where no peak or light stands in the way (see "What it does not do" above). */
 typedef enum isogi_dvr_classification {
     ISOGI_DVR_EXACT = 0,      /* cell by cell, cut at the extrema of the cubic that the field is along a ray: no step size */
     ISOGI_DVR_PRE_INTEGRATED, /* samples a step apart, each pair looked up in a table (Kraus 2005, eq. 5 to 7) */
@@ -475,6 +476,8 @@ typedef int32_t isogi_dvr__four_ints __attribute__((vector_size(16), aligned(4),
 /* A ray within the volume, in grid coordinates; sample i stands at origin + i * dir. */
 typedef struct isogi_dvr__fast_ray {
     float origin[3], dir[3], piece, last_piece; /* world length over unit from sample to sample */
+    float sought;                               /* optical depth whose place is looked for */
+    double enter;                               /* world length from the eye to the first sample */
     int count;                                  /* of samples */
 } isogi_dvr__fast_ray;
 
@@ -4865,7 +4868,7 @@ struct isogi_dvr__fast_run {
 };
 
 /* What a ray has gathered. */
-struct isogi_dvr__fast_state { float out[4], clear; };
+struct isogi_dvr__fast_state { float out[4], clear, depth, place; }; /* out[3]: opacity, while that is little; depth and place: of isogi_dvr__fast_probe */
 
 /* Classes of a run's samples. */
 static void isogi_dvr__fast_classes(const isogi_dvr__frame *f, const isogi_dvr__fast_ray *r, isogi_dvr__fast_run *run) {
@@ -4981,6 +4984,9 @@ static void isogi_dvr__fast_divide(const isogi_dvr__frame *f, const isogi_dvr__f
     f->shade(f, r, s, &part, work);
 }
 
+/* 1 - exp(-depth), also where that has no digits left. */
+static float isogi_dvr__lost(float depth, float clear) { return depth < 0.02f ? depth * (1 - depth * (0.5f - depth * (1.0f / 6))) : 1 - clear; }
+
 /* The pieces of a run, front to back. */
 static void isogi_dvr__fast_shade(const isogi_dvr__frame *f, const isogi_dvr__fast_ray *r, isogi_dvr__fast_state *s, const isogi_dvr__fast_run *run, isogi_counters *work) {
     int k, a;
@@ -4999,9 +5005,36 @@ static void isogi_dvr__fast_shade(const isogi_dvr__frame *f, const isogi_dvr__fa
         if (f->light) isogi_dvr__fast_light(f, r, isogi_dvr__fast_place(f, r, run, k), light);
         for (a = 0; a < 3; a++) { /* a truncated series may ring below 0 */
             colour[a] = colour[a] > 0 ? colour[a] : 0, light[a] = light[a] > 0 ? light[a] : 0;
-            s->out[a] += (light[a] + f->glow) * colour[a] * (s->clear * (1 - clear) / run->mean[k]);
+            s->out[a] += (light[a] + f->glow) * colour[a] * (s->clear * isogi_dvr__lost(run->depth[k], clear) / run->mean[k]);
         }
+        s->out[3] += s->clear * isogi_dvr__lost(run->depth[k], clear);
         s->clear *= clear;
+    }
+}
+
+/* As isogi_dvr__fast_shade without colours: sums up depth until what is sought, and finds its place by halving: between two samples the
+   value is linear, and its integral is monotone. */
+static void isogi_dvr__fast_probe(const isogi_dvr__frame *f, const isogi_dvr__fast_ray *r, isogi_dvr__fast_state *s, const isogi_dvr__fast_run *run, isogi_counters *work) {
+    int k, n;
+    for (k = 0; k < run->pieces && s->clear > f->end; k++) {
+        float from = run->classes[k], to = run->classes[k + 1], length = k + 1 < run->pieces ? run->length : run->last, low = 0, high = 1;
+        if (!(run->some >> k & 1)) continue;
+        if (run->change[k] * s->clear > run->tolerance) {
+            isogi_dvr__fast_divide(f, r, s, run, k, work);
+            continue;
+        }
+        if (s->depth + run->depth[k] >= r->sought) {
+            for (n = 0; n < 24; n++) {
+                const isogi_dvr__class_entry *e[2];
+                float u = 0.5f * (low + high), factor[3], mean;
+                isogi_dvr__fast_factors(f, from, from + u * (to - from), e, factor);
+                mean = (e[1]->before[3] - e[0]->before[3]) * factor[0] + e[0]->mean[3] * factor[1] + e[1]->mean[3] * factor[2];
+                if (s->depth + mean * length * u >= r->sought) high = u;
+                else low = u;
+            }
+            s->clear = 0;
+        } else s->depth += run->depth[k], s->clear *= isogi_dvr__exp(run->depth[k]);
+        s->place = run->first + run->stride * ((float)k + high * length / run->length);
     }
 }
 
@@ -5165,19 +5198,22 @@ ISOGI_DVR__AVX2 inline __m128 isogi_dvr__part_avx2(const isogi_dvr__frame *f, co
     light = _mm256_castps256_ps128(front);
     light = _mm_fmadd_ps(_mm_set1_ps(parts->u[0][k]), _mm_sub_ps(_mm256_extractf128_ps(front, 1), light), light);
     light = _mm_div_ps(light, _mm_shuffle_ps(light, light, 0xff));
-    return _mm_mul_ps(colour, _mm_add_ps(_mm_max_ps(light, _mm_setzero_ps()), _mm_set1_ps(f->glow))); /* a truncated series may ring below 0 */
+    return _mm_mul_ps(colour, _mm_add_ps(_mm_max_ps(light, _mm_setzero_ps()), _mm_setr_ps(f->glow, f->glow, f->glow, 0))); /* a truncated series may ring below 0 */
 }
 
 /* As isogi_dvr__fast_shade. */
 ISOGI_DVR__AVX2 void isogi_dvr__fast_shade_avx2(const isogi_dvr__frame *f, const isogi_dvr__fast_ray *r, isogi_dvr__fast_state *s, const isogi_dvr__fast_run *run, isogi_counters *work) {
     const __m256i lane = _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7);
-    __m256 passed = isogi_dvr__exp_avx2(_mm256_loadu_ps(run->depth));
+    const __m256 depth = _mm256_loadu_ps(run->depth), one = _mm256_set1_ps(1);
+    __m256 passed = isogi_dvr__exp_avx2(depth), lost = _mm256_fnmadd_ps(depth, _mm256_set1_ps(1.0f / 6), _mm256_set1_ps(0.5f));
     isogi_dvr__fast_parts parts;
     __m128 out = _mm_loadu_ps(s->out);
     unsigned some = run->some;
     isogi_dvr__parts_avx2(f, r, run, &parts);
+    lost = _mm256_mul_ps(depth, _mm256_fnmadd_ps(depth, lost, one)); /* as isogi_dvr__lost */
+    lost = _mm256_blendv_ps(_mm256_sub_ps(one, passed), lost, _mm256_cmp_ps(depth, _mm256_set1_ps(0.02f), _CMP_LT_OQ));
     for (;;) {
-        __m256 before = isogi_dvr__products_avx2(passed, s->clear), weight = _mm256_mul_ps(before, _mm256_sub_ps(_mm256_set1_ps(1), passed));
+        __m256 before = isogi_dvr__products_avx2(passed, s->clear), weight = _mm256_mul_ps(before, lost);
         __m256 change = _mm256_mul_ps(before, _mm256_loadu_ps(run->change));
         unsigned seen = (unsigned)_mm256_movemask_ps(_mm256_cmp_ps(before, _mm256_set1_ps(f->end), _CMP_GT_OQ)), bits = some & seen;
         unsigned divided = bits & (unsigned)_mm256_movemask_ps(_mm256_cmp_ps(change, _mm256_set1_ps(run->tolerance), _CMP_GT_OQ));
@@ -5196,7 +5232,7 @@ ISOGI_DVR__AVX2 void isogi_dvr__fast_shade_avx2(const isogi_dvr__frame *f, const
             _mm_storeu_ps(s->out, out);
             isogi_dvr__fast_divide(f, r, s, run, k, work);
             out = _mm_loadu_ps(s->out), some &= ~((2u << k) - 1);
-            passed = _mm256_blendv_ps(_mm256_set1_ps(1), passed, _mm256_castsi256_ps(_mm256_cmpgt_epi32(lane, _mm256_set1_epi32(k))));
+            passed = _mm256_blendv_ps(one, passed, _mm256_castsi256_ps(_mm256_cmpgt_epi32(lane, _mm256_set1_epi32(k))));
         }
     }
     _mm_storeu_ps(s->out, out);
@@ -5248,6 +5284,7 @@ static int isogi_dvr__fast_begin(const isogi_dvr__frame *f, const double origin[
     if (!(pieces < 1e7)) return 0;
     r->count = (int)pieces + 1;
     for (a = 0; a < 3; a++) r->origin[a] = (float)isogi_dvr__clamp(origin[a] + span[0] * dir[a], d->cells[a]), r->dir[a] = (float)(dir[a] * piece);
+    r->enter = span[0], r->sought = 3e38f;
     r->piece = (float)(piece / d->desc.unit), r->last_piece = (float)((span[1] - span[0] - (pieces - 1) * piece) / d->desc.unit);
     return 1;
 }
@@ -5368,10 +5405,30 @@ static void isogi_dvr__render_pixel(const isogi_dvr__render_job *job, int x, int
     out[4] = (float)((again.enter + ray.t) * speed);
 }
 
+/* Depth of a packet: once without a limit, for the depth in all, of which 1 - clear has no digits when it is little; and once more to the
+   place that is asked for. */
+static void isogi_dvr__depth_fast(const isogi_dvr__render_job *job, isogi_dvr__fast_ray ray[ISOGI_DVR__LANES], float depth[ISOGI_DVR__LANES], isogi_counters *work) {
+    isogi_dvr__frame probe = job->fast.frame;
+    isogi_dvr__fast_state state[ISOGI_DVR__LANES];
+    int k;
+    probe.shade = isogi_dvr__fast_probe;
+    isogi_dvr__fast_cast(&probe, ray, state, work);
+    for (k = 0; k < ISOGI_DVR__LANES; k++) {
+        double share = job->view->depth == ISOGI_DEPTH_FIRST ? 1.0 / 1099511627776.0 : 0.5;
+        depth[k] = HUGE_VALF;
+        if (!(state[k].depth > 0)) ray[k].count = 0;
+        ray[k].sought = (float)-log1p(share * expm1(-(double)state[k].depth));
+    }
+    isogi_dvr__fast_cast(&probe, ray, state, work);
+    for (k = 0; k < ISOGI_DVR__LANES; k++)
+        if (ray[k].count) depth[k] = (float)(ray[k].enter + (double)state[k].place * probe.step * job->dvr->spacing);
+}
+
 /* A packet: four by four pixels. */
 static void isogi_dvr__render_fast(const isogi_dvr__render_job *job, int x0, int y0, isogi_counters *work) {
     isogi_dvr__fast_ray ray[ISOGI_DVR__LANES];
     isogi_dvr__fast_state state[ISOGI_DVR__LANES];
+    float depth[ISOGI_DVR__LANES];
     int k, a;
     for (k = 0; k < ISOGI_DVR__LANES; k++) {
         int x = x0 + k % 4, y = y0 + k / 4;
@@ -5383,12 +5440,13 @@ static void isogi_dvr__render_fast(const isogi_dvr__render_job *job, int x0, int
         work->rays++;
     }
     isogi_dvr__fast_cast(&job->fast.frame, ray, state, work);
+    if (job->depth) isogi_dvr__depth_fast(job, ray, depth, work);
     for (k = 0; k < ISOGI_DVR__LANES; k++) {
         int x = x0 + k % 4, y = y0 + k / 4;
         float *out = job->pixels + 5 * ((size_t)y * (size_t)job->view->width + (size_t)x);
         if (x >= job->view->width || y >= job->view->height) continue;
         for (a = 0; a < 3; a++) out[a] = state[k].out[a];
-        out[3] = 1 - state[k].clear;
+        out[3] = state[k].clear < 0.999f ? 1 - state[k].clear : state[k].out[3], out[4] = job->depth ? depth[k] : HUGE_VALF;
     }
 }
 
@@ -5416,7 +5474,7 @@ static isogi_result isogi_dvr__begin_frame(isogi_dvr__render_job *job) {
     isogi_dvr__set_camera(&job->camera, job->view);
     for (a = 0; a < 3; a++) eye[a] = (double)job->view->eye[a];
     isogi_vol_to_grid(d->desc.pyramid, eye, job->eye);
-    if (!isogi_dvr__fast_space(d) || job->depth || job->lights.nearby.light_count || job->lights.local) return ISOGI_OK;
+    if (!isogi_dvr__fast_space(d) || job->lights.nearby.light_count || job->lights.local) return ISOGI_OK;
     f->dvr = d, f->step = d->piece, f->look = isogi_dvr__fast_look, f->shade = isogi_dvr__fast_shade, f->glow = (float)d->desc.emission;
     f->end = 1 - d->desc.opaque, f->dim = 0.125f;
     blocks = (double)d->level[0].size[0] * (double)d->level[0].size[1] * (double)d->level[0].size[2];

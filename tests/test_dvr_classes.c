@@ -17,10 +17,10 @@ static field radius_field(int n, double outlier) {
     return f;
 }
 
-__attribute__((unused)) static const isogi_view view_49 = {.width = SIDE, .height = SIDE, .eye = {90, 70, 100}, .target = {24, 24, 24}, .fov = 35};
+static const isogi_view view_49 = {.width = SIDE, .height = SIDE, .eye = {90, 70, 100}, .target = {24, 24, 24}, .fov = 35};
 static const isogi_transfer_point shell[] = {{0, {1, 0.5f, 0.2f}, 0}, {12, {0.2f, 0.5f, 1}, 0}, {13.5, {1, 1, 1}, 0.4f}, {15, {1, 1, 1}, 0}};
 
-__attribute__((unused)) static double opacity_difference(float (*a)[4], float (*b)[4], int count) {
+static double opacity_difference(float (*a)[4], float (*b)[4], int count) {
     double worst = 0;
     for (int i = 0; i < count; i++) worst = fmax(worst, fabs((double)a[i][3] - (double)b[i][3]));
     return worst;
@@ -85,6 +85,79 @@ TEST(suggestions_leave_out_outliers) {
         CHECK(fabs(threshold - first) < 1 && p[5].value < 84, "outlier %g: threshold %g, not %g; last point %g", outlier[k], threshold, first, p[5].value);
         field_free(&f);
     }
+}
+
+/* Pictures of the shell, against small steps in double. */
+TEST(an_outlier_takes_no_class_from_a_picture) {
+    const double outlier[] = {40, 400, 4e3, 1e5, 1e30, -1e30};
+    const isogi_transfer transfer = {shell, 4, NULL, 0};
+    static float image[2][SIDE * SIDE][4];
+    for (int k = 0; k < 6; k++) {
+        field f = radius_field(49, fabs(outlier[k]));
+        if (outlier[k] < 0) isogi_vol_free(f.pyramid), f.value[0] = outlier[k], field_build(&f);
+        for (int fine = 1; fine >= 0; fine--)
+            for (int path = 1; path <= (fine ? 1 : 4); path += 3) { /* plain and best */
+                const isogi_context context = {.threads = 1, .force_path = path == 1 ? 1 : 0};
+                const isogi_dvr_desc desc = {.pyramid = f.pyramid, .step = fine ? 0.05 : 0, .classification = fine ? ISOGI_DVR_POST_CLASSIFIED : ISOGI_DVR_EXACT};
+                isogi_dvr *dvr = dvr_new_with(&desc, &transfer, &context);
+                CHECK(isogi_dvr_render(dvr, &view_49, NULL, image[fine], NULL, NULL) == ISOGI_OK, "render");
+                isogi_dvr_free(dvr);
+                if (!fine) CHECK(opacity_difference(image[0], image[1], SIDE * SIDE) < 0.012, "outlier %g: opacity errs by %g", outlier[k],
+                                opacity_difference(image[0], image[1], SIDE * SIDE));
+            }
+        field_free(&f);
+    }
+}
+
+/* Shells down to a third of a voxel thick: pre-integrated pictures come nearer to what small steps see with every smaller step, down to a
+   thousandth: by its square, or, where a tangent's turn lies within one step, in proportion to it. */
+TEST(pictures_of_thin_shells_converge_with_the_step) {
+    enum { W = 48 };
+    static float image[2][W * W][4];
+    const isogi_view view = {.width = W, .height = W, .eye = {120, 90, 130}, .target = {32, 32, 32}, .fov = 35};
+    const double half[] = {0.15, 0.5, 1.5}, peak[] = {4, 1.2, 0.4}, step[] = {1, 0.5, 0.25, 0.1};
+    field f = radius_field(65, 0);
+    for (int w = 0; w < 3; w++) {
+        const isogi_transfer_point p[] = {{0, {1, 0.5f, 0.2f}, 0}, {20, {0.2f, 0.5f, 1}, 0}, {20 + half[w], {1, 1, 1}, (float)peak[w]}, {20 + 2 * half[w], {1, 1, 1}, 0}};
+        const isogi_transfer transfer = {p, 4, NULL, 0};
+        double error[4];
+        for (int n = -1; n < 4; n++) {
+            const isogi_dvr_desc desc = {.pyramid = f.pyramid, .opaque = 1, .step = n < 0 ? 0.01 : step[n], .classification = n < 0 ? ISOGI_DVR_POST_CLASSIFIED : ISOGI_DVR_EXACT};
+            isogi_dvr *dvr = dvr_new(&desc, &transfer);
+            CHECK(isogi_dvr_render(dvr, &view, NULL, image[n >= 0], NULL, NULL) == ISOGI_OK, "render");
+            isogi_dvr_free(dvr);
+            if (n >= 0) error[n] = opacity_difference(image[0], image[1], W * W);
+        }
+        printf("    tent of %g voxels: largest error of opacity %.4f %.4f %.4f %.5f for steps of 1, 1/2, 1/4, 1/10 voxel\n", 2 * half[w], error[0], error[1], error[2], error[3]);
+        CHECK(error[0] < 0.015 && error[1] < 0.6 * error[0] && error[2] < (w ? 0.12 : 0.35) * error[0] && error[3] < 1e-3, "width %g", 2 * half[w]);
+    }
+    field_free(&f);
+}
+
+/* Asking for depth, a peak that no value reaches or no limit of opacity: the integrator stays. */
+TEST(the_integrator_does_not_depend_on_what_else_is_asked_for) {
+    const isogi_transfer_point p[] = {{0, {1, 0.5f, 0.2f}, 0.3f}, {10, {1, 0.5f, 0.2f}, 0.3f}, {10.5, {0.2f, 0.5f, 1}, 0}, {18, {0.2f, 0.5f, 1}, 0},
+                                      {18.3, {1, 1, 1}, 1.5f}, {18.6, {1, 1, 1}, 0}};
+    const isogi_peak far_off = {500, {1, 1, 1}, 0.1f};
+    const isogi_light sun = {.vector = {1, 2, 1}, .rgb = {3, 3, 3}};
+    const isogi_lighting lighting = {.lights = &sun, .light_count = 1};
+    static float image[4][SIDE * SIDE][4], depth[SIDE * SIDE];
+    field f = radius_field(49, 0);
+    for (int lit = 0; lit < 2; lit++) {
+        for (int n = 0; n < 4; n++) {
+            const isogi_transfer transfer = {p, 6, &far_off, n == 2};
+            const isogi_dvr_desc desc = {.pyramid = f.pyramid, .shading = lit ? ISOGI_DVR_VISIBILITY : ISOGI_DVR_UNLIT, .method = ISOGI_DVR_BRUTE, .directions = 16, .grid = {5, 5, 5},
+                                         .opaque = n == 3 ? 1 : 0};
+            isogi_dvr *dvr = dvr_new(&desc, &transfer);
+            CHECK(isogi_dvr_render(dvr, &view_49, &lighting, image[n], n == 1 ? depth : NULL, NULL) == ISOGI_OK, "render");
+            isogi_dvr_free(dvr);
+        }
+        CHECK(!memcmp(image[0], image[1], sizeof image[0]), "depth changes the picture");
+        CHECK(!memcmp(image[0], image[2], sizeof image[0]), "a peak that no value reaches changes the picture");
+        CHECK(opacity_difference(image[0], image[3], SIDE * SIDE) < 1.001e-3, "beyond what is left at 0.999: %g", opacity_difference(image[0], image[3], SIDE * SIDE));
+        for (int i = 0; i < SIDE * SIDE; i++) CHECK((depth[i] < 1e30f) == (image[0][i][3] > 0) && depth[i] > 50, "pixel %d: opacity %g, depth %g", i, (double)image[0][i][3], (double)depth[i]);
+    }
+    field_free(&f);
 }
 
 TEST_MAIN("dvr_classes")
