@@ -294,7 +294,8 @@ typedef struct isogi_view {
     int width, height;              /* 1..32768 */
     float eye[3], target[3], up[3]; /* world; up 0 = +y */
     float fov;                      /* vertical angle of view in degrees, below 180; 0 = 45 */
-    int local;                      /* 1: shade by local visibility (the paper's method only): for cut planes, and lights within */
+    int local;                      /* 0, or 1: shade by local visibility, for cut planes, and lights within. ISOGI_INVALID where the paper's
+                                       method is not at work (another method, peaks, data space, unlit, tetrahedra) */
     isogi_depth_kind depth;         /* what is asked for where depth is */
 } isogi_view;
 
@@ -2212,7 +2213,7 @@ ISOGI_API isogi_result isogi_dvr_create(isogi_dvr **dvr, const isogi_dvr_desc *d
     isogi_result result = isogi_dvr__resolve(&resolved, desc);
     isogi_dvr *d;
     double longest = 0;
-    int a;
+    int a, sampled;
     if (!dvr) return ISOGI_INVALID;
     if (result != ISOGI_OK) return result;
     if (!context) context = isogi_vol_context(resolved.pyramid);
@@ -2241,7 +2242,8 @@ ISOGI_API isogi_result isogi_dvr_create(isogi_dvr **dvr, const isogi_dvr_desc *d
     d->method = isogi_dvr__method(d);
     d->kernels = isogi_dvr__choose_kernels(d->context.force_path);
     resolved.step = resolved.step < d->visibility_step ? resolved.step : d->visibility_step;
-    result = longest / resolved.step <= ISOGI_DVR__MAX_SAMPLES ? isogi_dvr__allocate_parts(d) : ISOGI_TOO_LARGE;
+    sampled = resolved.space == ISOGI_DVR_PHYSICAL || resolved.classification != ISOGI_DVR_EXACT; /* exact rays take no steps */
+    result = !sampled || longest / resolved.step <= ISOGI_DVR__MAX_SAMPLES ? isogi_dvr__allocate_parts(d) : ISOGI_TOO_LARGE;
     if (result != ISOGI_OK) {
         isogi_dvr_free(d);
         return result;
@@ -4200,7 +4202,7 @@ ISOGI_API isogi_result isogi_dvr_inspect(const isogi_dvr *dvr, isogi_dvr_report 
     for (a = 0; a < 3; a++) r.block_count[a] = dvr->level[1].size[a];
     r.blocks_classified = dvr->classified, r.blocks_computed = dvr->computed;
     r.global_bytes = dvr->point_count * dvr->coefficients * sizeof(float);
-    if (dvr->blocks.total) {
+    if (dvr->blocks.total && dvr->method == ISOGI_DVR_PAPER) {
         const isogi_dvr__blocks *b = &dvr->blocks;
         r.level = b->level;
         for (i = 0; i < b->total; i++) {
@@ -4220,7 +4222,7 @@ ISOGI_API isogi_result isogi_dvr_inspect(const isogi_dvr *dvr, isogi_dvr_report 
 ISOGI_API isogi_result isogi_dvr_sample_blocks(const isogi_dvr *dvr, const float (*points)[3], size_t count, float *values, float *visibility) {
     size_t i, block;
     int a;
-    if (!dvr || !dvr->blocks.total || (count && !points)) return ISOGI_INVALID;
+    if (!dvr || !dvr->blocks.total || dvr->method != ISOGI_DVR_PAPER || (count && !points)) return ISOGI_INVALID;
     for (i = 0; i < count; i++) {
         double world[3], grid[3];
         for (a = 0; a < 3; a++) world[a] = (double)points[i][a];
@@ -5346,7 +5348,7 @@ static isogi_result isogi_dvr__check_view(const isogi_view *view) {
     if (view->width > 32768 || view->height > 32768) return ISOGI_TOO_LARGE;
     if (!isogi_dvr__finite3(view->eye) || !isogi_dvr__finite3(view->target) || !isogi_dvr__finite3(view->up)) return ISOGI_INVALID;
     if (!isogi_dvr__finite32(view->fov) || !(view->fov >= 0 && view->fov < 180)) return ISOGI_INVALID;
-    if ((unsigned)view->depth > ISOGI_DEPTH_FIRST) return ISOGI_INVALID;
+    if ((unsigned)view->depth > ISOGI_DEPTH_FIRST || (unsigned)view->local > 1) return ISOGI_INVALID;
     for (a = 0; a < 3; a++) same = same && view->eye[a] >= view->target[a] && view->eye[a] <= view->target[a];
     return same ? ISOGI_INVALID : ISOGI_OK;
 }
@@ -5516,13 +5518,14 @@ ISOGI_API isogi_result isogi_dvr_render(const isogi_dvr *dvr, const isogi_view *
     size_t pixels, i;
     if (!dvr || !premultiplied) return ISOGI_INVALID;
     if (result != ISOGI_OK) return result;
+    if (view->local && !(dvr->blocks.total && dvr->method == ISOGI_DVR_PAPER)) return ISOGI_INVALID;
     memset(&job, 0, sizeof job);
     pixels = (size_t)view->width * (size_t)view->height;
     job.dvr = dvr, job.view = view, job.depth = depth != NULL;
     job.across = ((size_t)view->width + ISOGI_DVR__TILE - 1) / ISOGI_DVR__TILE;
     job.tiles = job.across * (((size_t)view->height + ISOGI_DVR__TILE - 1) / ISOGI_DVR__TILE);
     result = isogi_dvr__set_lights(&job.lights, dvr, lighting);
-    job.lights.local = view->local && dvr->blocks.total;
+    job.lights.local = view->local;
     if (result == ISOGI_OK) {
         job.pixels = (float *)isogi_allocate(&dvr->context, pixels, 5 * sizeof *job.pixels);
         job.work = (isogi_counters *)isogi_allocate(&dvr->context, job.tiles, sizeof *job.work);
@@ -6196,7 +6199,7 @@ ISOGI_API isogi_result isogi_dvr_tets_render(const isogi_tets *tets, const isogi
     isogi_dvr settings;
     isogi_result result = isogi_dvr__check_view(view);
     size_t tiles;
-    if (!tets || !premultiplied) return ISOGI_INVALID;
+    if (!tets || !premultiplied || (view && view->local)) return ISOGI_INVALID;
     if (result == ISOGI_OK) result = isogi_dvr__resolve_tets(&resolved, desc);
     if (result == ISOGI_OK) result = isogi_transfer_validate(transfer);
     if (result != ISOGI_OK) return result;

@@ -160,4 +160,92 @@ TEST(the_integrator_does_not_depend_on_what_else_is_asked_for) {
     field_free(&f);
 }
 
+/* Uniform matter: local rays are exp(-extinction radius) wherever they stay within. */
+TEST(local_visibility_of_uniform_matter_is_that_of_its_radius) {
+    field f = radius_field(97, 0);
+    const isogi_transfer_point point = {0, {1, 1, 1}, 0.02f};
+    const isogi_transfer transfer = {&point, 1, NULL, 0};
+    const float places[2][3] = {{48, 48, 48}, {50, 43, 40}};
+    for (double radius = 4; radius <= 32; radius *= 2) {
+        const isogi_dvr_desc desc = {.pyramid = f.pyramid, .shading = ISOGI_DVR_VISIBILITY, .method = ISOGI_DVR_PAPER, .directions = 32, .radius = radius, .order = 2, .grid = {2, 2, 2}};
+        isogi_dvr *dvr = dvr_new(&desc, &transfer);
+        float values[2], v[2][4];
+        CHECK(isogi_dvr_step(dvr, 0, NULL) == ISOGI_OK && isogi_dvr_sample_blocks(dvr, places, 2, values, v[0]) == ISOGI_OK, "step");
+        for (int i = 0; i < 2; i++) {
+            CHECK(fabs((double)v[i][0] / (sqrt(4 * PI) * exp(-0.02 * radius)) - 1) < 1e-3, "radius %g: %g", radius, (double)v[i][0]); /* half floats */
+            for (int c = 1; c < 4; c++) CHECK(fabs((double)v[i][c]) < 2e-3, "radius %g: coefficient %d is %g", radius, c, (double)v[i][c]);
+        }
+        isogi_dvr_free(dvr);
+    }
+    field_free(&f);
+}
+
+/* Global and local visibility are both held: changing between them computes nothing. Where there is none it is refused. */
+TEST(local_shading_is_the_papers_alone) {
+    field f = radius_field(49, 0);
+    const isogi_peak peak = {20, {1, 1, 1}, 0.5f};
+    const isogi_transfer transfer = {shell, 4, NULL, 0}, peaks = {shell, 4, &peak, 1};
+    const isogi_light sun = {.vector = {1, 2, 1}, .rgb = {30, 30, 30}};
+    const isogi_lighting lighting = {.lights = &sun, .light_count = 1};
+    static float image[3][SIDE * SIDE][4];
+    for (int method = ISOGI_DVR_METHOD_DEFAULT; method <= ISOGI_DVR_SWEEP; method++) {
+        const isogi_dvr_desc desc = {.pyramid = f.pyramid, .shading = ISOGI_DVR_VISIBILITY, .method = (isogi_dvr_method)method, .directions = 16, .grid = {5, 5, 5}};
+        isogi_dvr *dvr = dvr_new(&desc, &transfer);
+        isogi_view view = view_49;
+        isogi_counters count = {0}, again = {0};
+        isogi_dvr_report report;
+        double difference = 0;
+        CHECK(isogi_dvr_step(dvr, 0, NULL) == ISOGI_OK, "step");
+        isogi_dvr_counters(dvr, &count);
+        for (int n = 0; n < 3; n++) {
+            view.local = n == 1;
+            isogi_result result = isogi_dvr_render(dvr, &view, &lighting, image[n], NULL, NULL);
+            CHECK(result == (n == 1 && method != ISOGI_DVR_PAPER ? ISOGI_INVALID : ISOGI_OK), "method %d: %s", method, isogi_result_string(result));
+        }
+        isogi_dvr_counters(dvr, &again);
+        CHECK(!memcmp(&count, &again, sizeof count) && !memcmp(image[0], image[2], sizeof image[0]), "method %d: computed anew", method);
+        for (int i = 0; i < SIDE * SIDE; i++) difference = fmax(difference, fabs((double)image[0][i][0] - (double)image[1][i][0]));
+        if (method == ISOGI_DVR_PAPER) CHECK(difference > 0.01, "local and global light differ by %g", difference);
+        for (int local = -77; local <= 2; local += 79) {
+            view.local = local;
+            CHECK(isogi_dvr_render(dvr, &view, &lighting, image[0], NULL, NULL) == ISOGI_INVALID, "local = %d", local);
+        }
+        CHECK(isogi_dvr_inspect(dvr, &report) == ISOGI_OK && (method == ISOGI_DVR_PAPER) == (report.level != NULL), "levels");
+        if (method == ISOGI_DVR_PAPER) {
+            size_t blocks = report.block_count[0] * report.block_count[1] * report.block_count[2];
+            CHECK(report.global_bytes == 125 * 9 * sizeof(float) && report.local_bytes % (9 * 2) == 0 && report.local_bytes > 0, "coefficients");
+            CHECK(report.data_bytes >= report.points * sizeof(float) && report.index_bytes >= blocks && report.index_bytes < 100 * blocks, "data, index");
+            CHECK(isogi_dvr_set_transfer(dvr, &peaks) == ISOGI_OK && isogi_dvr_inspect(dvr, &report) == ISOGI_OK && !report.level && !report.data_bytes, "peaks: brute force has no levels");
+            view.local = 1;
+            CHECK(isogi_dvr_render(dvr, &view, &lighting, image[0], NULL, NULL) == ISOGI_INVALID, "peaks: no local visibility");
+        }
+        isogi_dvr_free(dvr);
+    }
+    field_free(&f);
+}
+
+/* Exact rays take no steps: no ray is too long for them. */
+TEST(exact_rays_know_no_longest_ray) {
+    field f = radius_field(9, 0);
+    isogi_vol_free(f.pyramid);
+    f.volume.spacing[0] = f.volume.spacing[1] = 1, f.volume.spacing[2] = 1e7;
+    field_build(&f);
+    const isogi_transfer_point p[] = {{1, {1, 1, 1}, 0.2f}, {4, {1, 1, 1}, 0.4f}};
+    const isogi_transfer transfer = {p, 2, NULL, 0};
+    for (int n = 0; n < 3; n++) {
+        const isogi_dvr_desc desc = {.pyramid = f.pyramid, .space = n == 2 ? ISOGI_DVR_PHYSICAL : ISOGI_DVR_DATA, .classification = n ? ISOGI_DVR_POST_CLASSIFIED : ISOGI_DVR_EXACT};
+        const double eye[3] = {4, 4, -1e7}, target[3] = {4, 4, 4e7};
+        isogi_dvr *dvr = NULL;
+        isogi_result result = isogi_dvr_create(&dvr, &desc, &serial);
+        CHECK(result == (n ? ISOGI_TOO_LARGE : ISOGI_OK), "%d: %s", n, isogi_result_string(result));
+        if (n || !dvr) continue;
+        CHECK(isogi_dvr_set_transfer(dvr, &transfer) == ISOGI_OK, "transfer function");
+        /* 4 down to 0 and up again; 0.2 below 1 */
+        pixel q = cast(dvr, eye, target, NULL);
+        CHECK(fabs((double)q.c[3] + expm1(-2 * (0.2 + 0.9))) < 1e-6, "opacity %g", (double)q.c[3]);
+        isogi_dvr_free(dvr);
+    }
+    field_free(&f);
+}
+
 TEST_MAIN("dvr_classes")
