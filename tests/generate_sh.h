@@ -58,6 +58,25 @@ static int generate_turns(quad *v) {
     return count;
 }
 
+/* The whole quarter turn, column by column: in column m the entries of even n, then those of odd n. */
+static int generate_turn_columns(quad *v) {
+    static quad half[1024];
+    int count = 0;
+    const quad *triangle = half;
+    generate_turns(half);
+    for (int l = 1; l <= GENERATE_TURNS; l++) {
+        for (int m = 0; m <= l; m++)
+            for (int odd = 0; odd < 2; odd++)
+                for (int n = odd; n <= l; n += 2) {
+                    int low = n < m ? n : m, high = n < m ? m : n;
+                    quad entry = triangle[low * (l + 1) - low * (low - 1) / 2 + high - low];
+                    v[count++] = n > m && ((m + n) & 1) ? -entry : entry;
+                }
+        triangle += (l + 1) * (l + 2) / 2;
+    }
+    return count;
+}
+
 /* Factors of the recursions for Wigner's d from degree l to l + 1, l = 1..14, as products of one for n and one for m: sixteen of d_l,
    then sixteen of d_{l-1}. Zero where n or m has not begun. */
 static int generate_wigner(quad *v) {
@@ -161,6 +180,8 @@ static void generate(FILE *out) {
     count = generate_polynomials(v);
     generate_table(out, "float", "isogi_sh__polynomials_f32", v, count, 0);
     generate_table(out, "double", "isogi_sh__polynomials_f64", v, count, 1);
+    count = generate_turn_columns(v);
+    generate_table(out, "double", "isogi_sh__turn_columns_f64", v, count, 1);
     count = generate_wigner(v);
     generate_table(out, "double", "isogi_sh__wigner_f64", v, count, 1);
     count = generate_latitudes(v);
