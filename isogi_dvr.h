@@ -129,7 +129,7 @@
    copied (not what they point to: the second field and its points are borrowed). Visibility takes grid points * order^2 floats; sweeps
    as many again, two floats for each node of their lattice, and during a step, for each of up to 16 directions, a float for each grid
    point and about 6 m (m + 24) of scratch for m nodes on the longest axis. Empty blocks take one byte for each block of the pyramid; a
-   picture in work 20 bytes a pixel; exact rays 150 bytes a point of the transfer function, pre-integrated ones 16 table^2. All of it
+   picture in work 20 bytes a pixel, and 32 kB to 512 kB of classes of values in physical space; exact rays 150 bytes a point of the transfer function, pre-integrated ones 16 table^2. All of it
    comes from the context's allocator; where that fails the call says so and changes nothing.
    isogi_dvr_set_transfer and isogi_dvr_step are writers: one at a time, and not during another call with the same renderer. All
    other calls only read and may run at the same time. Calls divide their own work among the context's threads. Results are the
