@@ -1,6 +1,9 @@
 /* Run time against error of isogi_trace.h on the lit scenes of the design.
 
-       build/bench/bench_trace [--quick | --tables] OUT.csv      (--tables: tables 1 and 2 alone, of engine-block and engine)
+       build/bench/bench_trace [--quick | --tables] [--only SCENE] OUT.csv
+
+   Scenes: engine-block, engine, bonsai and cthead; of the quick bench and of --tables the first two, unless --only names another. --tables:
+   the rows table1-, table2-, lattice- and figure5- alone. `--tables --only cavity`, `--tables --only figure5`: lattice-cavity, figure5- alone.
 
    Error: relative RMSE, sqrt(sum (E - R)^2 / sum R^2), of irradiance over pixels of the standard view (every k-th of 900x900), against
    paths of 4096 samples through the same texels (kept in build/bench/, by everything that defines them). Naive is the paper's way:
@@ -12,14 +15,25 @@
                             a smaller error e, method equal-error: at that one, for which naive's time is scaled by (converged / e)^2
      rays-SCENE             rays a second while baking, one thread
      lazy-SCENE             seconds from the request to usable; lazy-converged-SCENE: to converged
-     full-SCENE             the whole texture (full bench only)
+     threads-SCENE          work: seconds on one thread over seconds on two (full bench: of two runs each, in turn, the better); seconds: on two
+     full-SCENE             the whole texture to converged, with the fewest samples that reach it (full bench only)
      table1-SCENE           Wyman 2006, table 1: irradiance, transfer, and the path-traced picture (a path for every pixel that shows the
                             surface), with 100, 625, 2500 and 10,000 samples, whole paths. Lazily: the texels of the view; fully: all
                             texels. Time grows as the samples do: it is measured on as many of both as fit (texels: those of the
                             chosen pixels; samples: 625), and scaled to all, which the setting says; work: samples. Transfer's errors
                             are those of relighting by order 5
      table2-SCENE           Wyman 2006, table 2: seconds and frames/s of displaying the standard view, 512 x 512, two threads; extra memory in the
-                            setting. Lambert, shadowed Lambert, Phong with shadows, irradiance texture, transfer of order 5 */
+                            setting. Lambert, shadowed Lambert, Phong with shadows, irradiance texture, transfer of order 5
+     lattice-SCENE          all texels that the isovalue reads, 8 samples: the regular lattice, the hierarchical one by its tolerance, and a
+                            regular one of every second texel; work: megabytes; texels and rays in the setting. Of cavity (albedo 0.5), where
+                            light varies slowly, too: all isovalues within 4 voxels
+     figure5-...            Wyman 2006, figure 5, as numbers: gradient normals, smoothed normals, and smoothed normals with offset (the
+                            default), on shapes whose light is known in closed form, given as distances with noise of +-0.2 voxel: ball,
+                            direct light of a sun; hollow, four bounces of the light of a lamp within a hollow sphere. Light is gathered at
+                            the points themselves, or read from a texture whose texels are 5/4 of a voxel apart, so that both line up every
+                            five voxels. The error is split over patches 3 voxels wide: macroscopic, the RMS of patches' mean errors
+                            (bands, and bias); microscopic, that of what is left (noise); both over the RMS of the light. work: this error
+                            over the default's */
 #define ISOGI_IMPLEMENTATION
 #include "isogi_trace.h"
 #include "camera.h"
@@ -45,6 +59,7 @@ typedef struct bench_scene {
 
 static float points[SIZE * SIZE][3], chosen[MOST][3], reference[MOST][3], light[MOST][3];
 static size_t seen, picked;
+static const float white_sky[3] = {3.5449077f, 3.5449077f, 3.5449077f}; /* radiance 1 */
 static const isogi_context two = {.threads = 2}, one = {.threads = 1};
 
 static double seconds_now(void) {
@@ -62,11 +77,12 @@ static int scene_load(bench_scene *s, const char *name) {
     memset(s, 0, sizeof *s);
     s->name = name, s->up[1] = 1, s->toward[0] = 1.5, s->toward[1] = 1.2, s->toward[2] = 2;
     d->lazy = 1, d->bounces = -1, d->albedo[0] = d->albedo[1] = d->albedo[2] = 0.7f;
-    if (!strcmp(name, "engine-block")) {
+    if (!strcmp(name, "engine-block") || !strcmp(name, "cavity")) {
         const procedural_shape *shape = procedural_find(name);
         if (procedural_make(shape, 0, &s->volume, NULL) != ISOGI_OK) return 0;
         s->isovalue = shape->isovalue;
         daylight_make(&d->lighting, s->sky, &s->sun);
+        if (!strcmp(name, "cavity")) d->lighting.env.sh = white_sky, d->lighting.env.sh_order = 1, d->lighting.light_count = 0, d->albedo[0] = d->albedo[1] = d->albedo[2] = 0.5f;
     } else {
         if (!data) return fprintf(stderr, "  %s is left out: ISOGI_DATA is not set\n", name), 0;
         if (!strcmp(name, "bonsai")) {
@@ -84,6 +100,12 @@ static int scene_load(bench_scene *s, const char *name) {
     if (isogi_vol_build(&s->pyramid, &s->volume, NULL) != ISOGI_OK) return 0;
     d->pyramid = s->pyramid;
     return 1;
+}
+
+static void scene_unload(bench_scene *s) {
+    isogi_vol_free(s->pyramid);
+    if (s->image.rgb) volume_free(&s->volume), free(s->image.rgb);
+    else procedural_free(&s->volume);
 }
 
 /* Points of the isosurface that the standard view sees, and every so many of them to measure at. */
@@ -285,23 +307,22 @@ static double naive(const bench_scene *s, int samples, double *error, double *te
 
 /* ---- ours ------------------------------------------------------------------------------------------------------------------- */
 
-typedef struct outcome { double seconds, error, rays, texels; } outcome;
+typedef struct outcome { double seconds, error, rays, texels, bytes; } outcome;
 
 /* The whole view, lazily; or the whole texture. */
-static outcome ours(const bench_scene *s, const isogi_trace_desc *desc, const isogi_context *context) {
+static outcome ours(const isogi_trace_desc *desc, const isogi_context *context) {
     isogi_trace *t = NULL;
     isogi_counters counters = {0};
     outcome o = {0};
     double begin = seconds_now();
     isogi_result result = isogi_trace_create(&t, desc, context);
-    (void)s;
     if (result == ISOGI_OK) result = isogi_trace_request(t, (const float(*)[3])points, seen);
     if (result == ISOGI_OK) result = isogi_trace_step(t, 0, NULL);
     o.seconds = seconds_now() - begin;
     if (result != ISOGI_OK) exit(1);
     isogi_trace_sample(t, (const float(*)[3])chosen, picked, light, NULL);
     isogi_trace_counters(t, &counters);
-    o.error = error_of(light), o.rays = (double)counters.rays, o.texels = (double)counters.texels;
+    o.error = error_of(light), o.rays = (double)counters.rays, o.texels = (double)counters.texels, o.bytes = (double)isogi_trace_memory(t);
     isogi_trace_free(t);
     return o;
 }
@@ -396,7 +417,7 @@ static void table1(FILE *csv, const bench_scene *s) {
         row(csv, "table1-", s, "path-traced picture", setting, base * samples[k] / samples[0], error_of(e), samples[k], "samples");
     }
     d.method = ISOGI_TRACE_FEEDBACK, d.samples = 16;
-    o[0] = ours(s, &d, &two);
+    o[0] = ours(&d, &two);
     row(csv, "table1-", s, "default", "lazy samples=16 by feedback", o[0].seconds, o[0].error, 16, "samples");
 }
 
@@ -487,6 +508,140 @@ static void table2(FILE *csv, const bench_scene *s) {
     free(job.image);
 }
 
+/* ---- the hierarchical lattice against the regular one --------------------------------------------------------------------------- */
+
+static void lattice_table(FILE *csv, const bench_scene *s) {
+    static const char *const method[4] = {"default", "hierarchy", "hierarchy", "every second texel"};
+    static const float tolerance[4] = {0, 0.1f, 0.4f, 0};
+    const isogi_volume *v = isogi_vol_volume(s->pyramid);
+    double within = strcmp(s->name, "cavity") ? 0 : 4 * 2.0 / 127; /* its values are distances in halves of its 127 voxels */
+    for (int k = 0; k < 4; k++) {
+        isogi_trace_desc d = s->desc;
+        char setting[96];
+        outcome o;
+        d.lazy = 0, d.samples = 8, d.hierarchy = tolerance[k], d.isovalue_min = s->isovalue - within, d.isovalue_max = s->isovalue + within;
+        for (int a = 0; a < 3; a++) d.lattice[a] = k == 3 ? (v->size[a] + 1) / 2 : 0;
+        o = ours(&d, &two);
+        snprintf(setting, sizeof setting, "tolerance=%.1f texels=%.0f rays=%.0f", (double)tolerance[k], o.texels, o.rays);
+        row(csv, "lattice-", s, method[k], setting, o.seconds, o.error, o.bytes / 1e6, "MB");
+    }
+}
+
+static void lattice_cavity(FILE *csv) {
+    bench_scene s;
+    if (!scene_load(&s, "cavity")) exit(1);
+    view(&s, 400);
+    if (!reference_make(&s)) exit(1);
+    lattice_table(csv, &s), scene_unload(&s);
+}
+
+/* ---- figure 5 of Wyman 2006: normals and offset ------------------------------------------------------------------------------- */
+
+enum { PATCHES = 40, PATCH = 64, FIGURE5 = PATCHES * PATCH, FIGURE5_SIDE = 51, FIGURE5_LATTICE = 41 };
+static const double figure5_centre[3] = {25.1, 24.8, 25.3}, figure5_radius = 18;
+static float figure5_voxels[FIGURE5_SIDE][FIGURE5_SIDE][FIGURE5_SIDE];
+
+/* Isovalue 0: a ball, or all but that ball. */
+static isogi_pyramid *figure5_volume(int hollow) {
+    isogi_volume v = {.data = figure5_voxels, .type = ISOGI_F32, .size = {FIGURE5_SIDE, FIGURE5_SIDE, FIGURE5_SIDE}};
+    isogi_pyramid *pyramid = NULL;
+    for (size_t i = 0; i < sizeof figure5_voxels / sizeof(float); i++) {
+        double at[3] = {(double)(i % FIGURE5_SIDE), (double)(i / FIGURE5_SIDE % FIGURE5_SIDE), (double)(i / FIGURE5_SIDE / FIGURE5_SIDE)}, r[3], depth;
+        for (int a = 0; a < 3; a++) r[a] = at[a] - figure5_centre[a];
+        depth = figure5_radius - sqrt(vector_dot(r, r));
+        (&figure5_voxels[0][0][0])[i] = (float)((hollow ? -depth : depth) + 0.4 * isogi_trace__unit(isogi_trace__mix(i)) - 0.2);
+    }
+    if (isogi_vol_build(&pyramid, &v, NULL) != ISOGI_OK) exit(1);
+    return pyramid;
+}
+
+/* Patches 3 voxels wide of the sphere, none of whose middles is further than acos(least) from `toward`. */
+static void figure5_points(const isogi_pyramid *pyramid, const double toward[3], double least, float (*p)[3]) {
+    uint64_t number = 0;
+    for (int i = 0; i < FIGURE5;) {
+        double middle[3], u = isogi_trace__unit(isogi_trace__mix(++number)), v = isogi_trace__unit(isogi_trace__mix(++number));
+        middle[0] = sqrt(1 - pow(2 * u - 1, 2)) * cos(2 * PROCEDURAL_PI * v), middle[1] = 2 * u - 1, middle[2] = sqrt(1 - pow(2 * u - 1, 2)) * sin(2 * PROCEDURAL_PI * v);
+        if (vector_dot(middle, toward) < least) continue;
+        for (int end = i + PATCH; i < end;) {
+            isogi_ray ray = {0};
+            isogi_hit hit;
+            double d[3], off[3];
+            for (int a = 0; a < 3; a++) off[a] = 2 * isogi_trace__unit(isogi_trace__mix(++number)) - 1, d[a] = middle[a] + off[a] * 1.5 / figure5_radius;
+            if (vector_dot(off, off) > 1) continue;
+            vector_normalize(d);
+            for (int a = 0; a < 3; a++) ray.origin[a] = figure5_centre[a], ray.dir[a] = (float)d[a];
+            isogi_vol_intersect(pyramid, &ray, 1, &hit, NULL);
+            isogi_vol_positions(pyramid, &hit, 1, (float(*)[3])p[i++]);
+        }
+    }
+}
+
+/* error[0]: macroscopic, error[1]: microscopic. */
+static void figure5_split(float (*e)[3], const double *exact, double error[2]) {
+    double light2 = 0, sum[2] = {0, 0};
+    for (int k = 0; k < PATCHES; k++) {
+        double mean = 0;
+        for (int i = k * PATCH; i < (k + 1) * PATCH; i++) mean += ((double)e[i][0] - exact[i]) / PATCH, light2 += exact[i] * exact[i];
+        for (int i = k * PATCH; i < (k + 1) * PATCH; i++) sum[0] += mean * mean, sum[1] += pow((double)e[i][0] - exact[i] - mean, 2);
+    }
+    for (int j = 0; j < 2; j++) error[j] = sqrt(sum[j] / light2);
+}
+
+/* Light at the points themselves, or from a texture; seconds. */
+static double figure5_light(isogi_trace_desc *d, int texture, float (*p)[3], float (*e)[3]) {
+    double begin = seconds_now();
+    isogi_trace *t = NULL;
+    isogi_result result;
+    for (int a = 0; a < 3; a++) d->lattice[a] = FIGURE5_LATTICE;
+    if (texture) {
+        result = isogi_trace_create(&t, d, &two);
+        if (result == ISOGI_OK) result = isogi_trace_request(t, (const float(*)[3])p, FIGURE5);
+        if (result == ISOGI_OK) result = isogi_trace_step(t, 0, NULL);
+        if (result == ISOGI_OK) result = isogi_trace_sample(t, (const float(*)[3])p, FIGURE5, e, NULL);
+        isogi_trace_free(t);
+    } else result = isogi_trace_gather(d, (const float(*)[3])p, NULL, FIGURE5, e, NULL, &two);
+    if (result != ISOGI_OK) exit(1);
+    return seconds_now() - begin;
+}
+
+/* A lamp within a hollow sphere of albedo a: each part of a sphere lights all others alike, so that the light of one bounce is the same
+   everywhere, the flux over the area, and of the next a times as much. */
+static void figure5(FILE *csv, int hollow) {
+    static const char *const method[3] = {"default", "gradient normals", "smoothed normals"};
+    static const char *const name[2][2] = {{"figure5-ball-points-", "figure5-ball-texture-"}, {"figure5-hollow-points-", "figure5-hollow-texture-"}};
+    static const bench_scene scale[2] = {{.name = "macroscopic"}, {.name = "microscopic"}};
+    static float p[FIGURE5][3], e[FIGURE5][3];
+    static double exact[FIGURE5];
+    double toward[3] = {1, 2, 3}, base[2][2];
+    isogi_light sun = {.kind = ISOGI_LIGHT_DIRECTIONAL, .vector = {1, 2, 3}, .rgb = {1, 1, 1}}, lamp = {.kind = ISOGI_LIGHT_POINT, .rgb = {100, 100, 100}};
+    isogi_pyramid *pyramid = figure5_volume(hollow);
+    isogi_trace_desc d = {.pyramid = pyramid, .method = ISOGI_TRACE_PATHS, .samples = hollow ? 128 : 1, .bounces = hollow ? 4 : 0, .lazy = 1};
+    vector_normalize(toward), figure5_points(pyramid, toward, hollow ? -1 : 0.05, p);
+    for (int a = 0; a < 3; a++) lamp.vector[a] = (float)(figure5_centre[a] + 0.4 * figure5_radius * toward[a]);
+    for (int a = 0; a < 3 && hollow; a++) d.albedo[a] = 0.8f;
+    d.lighting.lights = hollow ? &lamp : &sun, d.lighting.light_count = 1;
+    for (int i = 0; i < FIGURE5; i++) {
+        double n[3], to[3], mean = 100 / (figure5_radius * figure5_radius), length;
+        for (int a = 0; a < 3; a++) n[a] = (double)p[i][a] - figure5_centre[a];
+        vector_normalize(n);
+        for (int a = 0; a < 3; a++) to[a] = figure5_radius * n[a] - 0.4 * figure5_radius * toward[a];
+        length = sqrt(vector_dot(to, to));
+        exact[i] = hollow ? 100 * vector_dot(to, n) / (length * length * length) + mean * 0.8 * (1 - pow(0.8, 4)) / (1 - 0.8) : fmax(0, vector_dot(n, toward));
+    }
+    for (int k = 0; k < 3; k++) {
+        d.normals = k == 1 ? ISOGI_NORMAL_TRILINEAR : ISOGI_NORMAL_SMOOTH, d.offset = k ? -1 : 0;
+        for (int texture = 0; texture < 2; texture++) {
+            double error[2], seconds = figure5_light(&d, texture, p, e);
+            figure5_split(e, exact, error);
+            for (int j = 0; j < 2; j++) {
+                if (!k) base[texture][j] = error[j];
+                row(csv, name[hollow][texture], &scale[j], method[k], hollow ? "four bounces" : "direct", seconds, error[j], error[j] / base[texture][j], "x");
+            }
+        }
+    }
+    isogi_vol_free(pyramid);
+}
+
 static void bench(FILE *csv, const char *name, int quick, int tables) {
     bench_scene s;
     double usable, converged, texels, seconds;
@@ -498,7 +653,7 @@ static void bench(FILE *csv, const char *name, int quick, int tables) {
     view(&s, quick ? 400 : 3000);
     if (!reference_make(&s)) exit(1);
     if (tables) {
-        table1(csv, &s), table2(csv, &s);
+        table1(csv, &s), table2(csv, &s), lattice_table(csv, &s), scene_unload(&s);
         return;
     }
     (void)naive(&s, 10, &usable, &texels);
@@ -506,19 +661,19 @@ static void bench(FILE *csv, const char *name, int quick, int tables) {
     d = s.desc;
     for (int i = 0; i < (quick ? 5 : 9); i++) { /* the curve, and the first point below the error of naive */
         const int sweep[2][9] = {{1, 4, 5, 6, 8, 16, 64, 128, 256}, {1, 4, 6, 8, 16}};
-        d.samples = sweep[quick][i], o = ours(&s, &d, &two);
+        d.samples = sweep[quick][i], o = ours(&d, &two);
         snprintf(setting, sizeof setting, "samples=%d", d.samples);
         row(csv, "", &s, d.samples == (quick ? 8 : 64) ? "default" : "feedback", setting, o.seconds, o.error, o.rays, "rays");
         if (!found && (o.error <= converged || i == (quick ? 4 : 8))) best = o, found = d.samples;
         if (quick || (d.samples & (d.samples - 1))) continue;
         d.method = ISOGI_TRACE_PATHS;
-        o = ours(&s, &d, &two), row(csv, "", &s, "paths", setting, o.seconds, o.error, o.rays, "rays");
+        o = ours(&d, &two), row(csv, "", &s, "paths", setting, o.seconds, o.error, o.rays, "rays");
         d.method = ISOGI_TRACE_FEEDBACK;
     }
     for (int i = 0; i < 2; i++) { /* the best of three, in turn with naive: other work on the machine is no part of either */
         double again = naive(&s, 100, &converged, &texels);
         seconds = again < seconds ? again : seconds;
-        d.samples = found, o = ours(&s, &d, &two);
+        d.samples = found, o = ours(&d, &two);
         best.seconds = o.seconds < best.seconds ? o.seconds : best.seconds;
     }
     seconds *= best.texels / texels; /* of all texels of the view */
@@ -531,28 +686,44 @@ static void bench(FILE *csv, const char *name, int quick, int tables) {
         row(csv, "speedup-", &s, "equal-error", setting, best.seconds, best.error, scaled / best.seconds, "x");
     }
     row(csv, "speedup-", &s, "naive", "samples=100", seconds, converged, 1, "x");
-    d.samples = 8, o = ours(&s, &d, &one);
+    d.samples = 8, o = ours(&d, &one);
     row(csv, "rays-", &s, "default", "samples=8", o.seconds, o.error, o.rays / o.seconds, "rays/s");
+    best = ours(&d, &two), seconds = o.seconds;
+    if (!quick) seconds = fmin(seconds, ours(&d, &one).seconds), best.seconds = fmin(best.seconds, ours(&d, &two).seconds);
+    row(csv, "threads-", &s, "default", "samples=8", best.seconds, best.error, seconds / best.seconds, "x");
     o = lazily(&s, usable);
     row(csv, "lazy-", &s, "default", "usable", o.seconds, o.error, o.rays, "rays");
     o = lazily(&s, converged);
     row(csv, "lazy-converged-", &s, "default", "converged", o.seconds, o.error, o.rays, "rays");
     if (!quick) {
-        d.lazy = 0, d.samples = 8, o = ours(&s, &d, &two);
-        row(csv, "full-", &s, "default", "samples=8", o.seconds, o.error, o.rays, "rays");
-        table1(csv, &s), table2(csv, &s);
+        d.lazy = 0;
+        for (d.samples = found; (o = ours(&d, &two)).error > converged && d.samples < 256;) d.samples *= 2;
+        snprintf(setting, sizeof setting, "samples=%d texels=%.0f MB=%.0f", d.samples, o.texels, o.bytes / 1e6);
+        row(csv, "full-", &s, "default", setting, o.seconds, o.error, o.rays, "rays");
+        table1(csv, &s), table2(csv, &s), lattice_table(csv, &s);
     }
-    isogi_vol_free(s.pyramid), free(s.image.rgb);
-    if (!strcmp(name, "engine-block")) procedural_free(&s.volume);
-    else volume_free(&s.volume);
+    scene_unload(&s);
 }
 
 int main(int argc, char **argv) {
-    int tables = argc > 1 && !strcmp(argv[1], "--tables"), quick = tables || (argc > 1 && !strcmp(argv[1], "--quick"));
-    FILE *csv = argc == 2 + quick ? fopen(argv[1 + quick], "w") : NULL;
-    if (!csv) return fprintf(stderr, "usage: bench_trace [--quick | --tables] OUT.csv\n"), 2;
+    static const char *const scenes[6] = {"engine-block", "engine", "bonsai", "cthead", "cavity", "figure5"};
+    const char *only = NULL;
+    int quick = 0, tables = 0, at = 1;
+    FILE *csv;
+    for (; at < argc - 1; at++) {
+        if (!strcmp(argv[at], "--quick")) quick = 1;
+        else if (!strcmp(argv[at], "--tables")) quick = tables = 1;
+        else if (!strcmp(argv[at], "--only") && at + 2 < argc) only = argv[++at];
+        else break;
+    }
+    for (int i = 0; only && strcmp(only, scenes[i]); i++)
+        if (i == 5) return fprintf(stderr, "bench_trace: there is no scene %s\n", only), 2;
+    csv = at == argc - 1 && argv[at][0] != '-' ? fopen(argv[at], "w") : NULL;
+    if (!csv) return fprintf(stderr, "usage: bench_trace [--quick | --tables] [--only SCENE] OUT.csv\n"), 2;
     fprintf(csv, "header,case,method,setting,seconds,error,work,unit\n");
-    bench(csv, "engine-block", quick, tables), bench(csv, "engine", quick, tables);
-    if (!quick) bench(csv, "bonsai", quick, tables), bench(csv, "cthead", quick, tables);
+    if ((tables || !quick) && (!only || !strcmp(only, "figure5"))) figure5(csv, 0), figure5(csv, 1);
+    if ((tables || !quick) && (!only || !strcmp(only, "cavity"))) lattice_cavity(csv);
+    for (int i = 0; i < 4; i++)
+        if (only ? !strcmp(only, scenes[i]) : !quick || i < 2) bench(csv, scenes[i], quick, tables);
     return fclose(csv) != 0;
 }
