@@ -160,7 +160,7 @@ variants() {
     # A variant runs what it can change: the address sanitizer most of them, the others those that stand for their kind.
     variant O0 "$CC" "-O0 $CONTRACT_OFF" '' $(only sh)
     variant O3 "$CC" "-O3 $CONTRACT_OFF" '' $(only 'sh|vol|dvr')
-    fast_math "$CC" $(only 'sh|sh_limits|sample|vol|trace|dvr|dvr_visibility')
+    fast_math "$CC" $(only 'sh|sh_limits|sample|vol|trace|dvr|dvr_visibility|dvr_classes')
     variant no-threads "$CC" "-O2 $CONTRACT_OFF -DISOGI_NO_THREADS" '' $(only 'vol|trace')
     variant no-simd "$CC" "-O2 $CONTRACT_OFF -DISOGI_NO_SIMD" '' $(only 'sh|sample|vol|dvr')
     variant sh-level-1 "$CC" "-O2 $CONTRACT_OFF -DISOGI_SH_LEVEL=1" '' $(only sh)
