@@ -2657,7 +2657,7 @@ typedef struct isogi_sh__turns_d8 {
     isogi_sh__multiples first, middle, last;
 } isogi_sh__turns_d8;
 
-ISOGI_SH__INLINE __attribute__((target("avx2,fma,avx512f,avx512vl,avx512dq"))) void isogi_sh__rotate_d8(void *out, const void *in, int is_double, int order, const isogi_sh__turns_d8 *t) {
+ISOGI_SH__AVX512 static void isogi_sh__rotate_d8(void *out, const void *in, int is_double, int order, const isogi_sh__turns_d8 *t) {
     const isogi_sh__d8 zero = {0};
     isogi_sh__d8 v[4], back = zero + 1;
     int l;
