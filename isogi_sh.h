@@ -57,7 +57,7 @@
 
    Memory       None allocated. Stack use stays below 32 KB.
    Threads      Every function is pure: call them from any thread.
-   Speed        Batches of 16 directions and more (8 of doubles) use all lanes, whatever the count. Results that stay in the first-level cache, such
+   Speed        Batches of 16 directions and more (8 of doubles) use all lanes of AVX2 and AVX-512, whatever the count. Results that stay in the first-level cache, such
                 as 64 directions at order 11, take half or a third of the time; rows of a structure of arrays that are a multiple of 4096
                 bytes long take twice as long again, since all functions of a direction compete for the same lines of the cache.
    Determinism  The same input on the same instruction path gives the same bits. Paths agree within the float errors below.
@@ -3959,9 +3959,9 @@ static void isogi_sh__row_sums(double sums[2][ISOGI_SH__GROUP][3], const isogi_s
    opposite ones and g, h their sums, m = 0 and 4 take g + h, m = 2 takes g - h, m = 1 and 3 take e and f. RGB stays interleaved: factors
    are repeated for each channel, and a period of 24 floats, 8 texels, is three vectors. Lanes sum a few dozen floats; rows are
    summed in double. */
-#define ISOGI_SH__QUARTER 256 /* columns whose factors are held */
+#define ISOGI_SH__QUARTER 256 /* columns whose factors are held, for all rows */
 #define ISOGI_SH__PITCH (3 * ISOGI_SH__QUARTER)
-#define ISOGI_SH__ROWS 8      /* rows that share them where an image is wider than four times that */
+#define ISOGI_SH__ROWS 8      /* whose weights are found together */
 
 /* factor[2 m - 2 + (sine)][3 column + channel], m = 1 .. 4, zero beyond `columns` */
 static void isogi_sh__image_factors(float (*factor)[ISOGI_SH__PITCH], int first, int columns, int width) {
@@ -4059,24 +4059,24 @@ ISOGI_SH__AVX2 static void isogi_sh__image_add(double (*total)[12], isogi_sh__f8
 ISOGI_SH__AVX2 static void isogi_sh__project_fast(float *rgb, const float *image, int width, int height) {
     float factor[8][ISOGI_SH__PITCH];
     double total[25][12], weight[ISOGI_SH__ROWS], z[ISOGI_SH__ROWS], sine[ISOGI_SH__ROWS], cosine[ISOGI_SH__ROWS];
-    isogi_sh__f8 sum[ISOGI_SH__ROWS][3][9];
+    isogi_sh__f8 sum[3][9];
     int row, first, j, i, k, quarter = width / 4;
     memset(total, 0, sizeof total);
-    for (row = 0; row < height; row += ISOGI_SH__ROWS) {
-        int some = height - row < ISOGI_SH__ROWS ? height - row : ISOGI_SH__ROWS;
-        memset(sum, 0, sizeof sum);
-        for (first = 0; first < quarter; first += ISOGI_SH__QUARTER) {
-            int columns = quarter - first < ISOGI_SH__QUARTER ? quarter - first : ISOGI_SH__QUARTER;
-            if (row == 0 || quarter > ISOGI_SH__QUARTER) isogi_sh__image_factors(factor, first, columns, width);
-            for (j = 0; j < some; j++)
-                isogi_sh__image_block(sum[j], image + 3 * ((size_t)width * (size_t)(row + j) + (size_t)first), 3 * (size_t)quarter, columns, factor[0]);
+    for (first = 0; first < quarter; first += ISOGI_SH__QUARTER) {
+        int columns = quarter - first < ISOGI_SH__QUARTER ? quarter - first : ISOGI_SH__QUARTER;
+        isogi_sh__image_factors(factor, first, columns, width);
+        for (row = 0; row < height; row += ISOGI_SH__ROWS) {
+            for (j = 0; j < ISOGI_SH__ROWS; j++) {
+                double t = ISOGI_SH__PI * ((double)(row + j) + 0.5) / (double)height;
+                z[j] = cos(t), sine[j] = sin(t), cosine[j] = (z[j] - sine[j]) * (z[j] + sine[j]);
+            }
+            isogi_sh__fejer_rows(weight, cosine, height);
+            for (j = 0; j < ISOGI_SH__ROWS && row + j < height; j++) {
+                memset(sum, 0, sizeof sum);
+                isogi_sh__image_block(sum, image + 3 * ((size_t)width * (size_t)(row + j) + (size_t)first), 3 * (size_t)quarter, columns, factor[0]);
+                isogi_sh__image_add(total, sum, z[j], sine[j], weight[j] * 2 * ISOGI_SH__PI / (double)width);
+            }
         }
-        for (j = 0; j < ISOGI_SH__ROWS; j++) {
-            double t = ISOGI_SH__PI * ((double)(row + j) + 0.5) / (double)height;
-            z[j] = cos(t), sine[j] = sin(t), cosine[j] = (z[j] - sine[j]) * (z[j] + sine[j]);
-        }
-        isogi_sh__fejer_rows(weight, cosine, height);
-        for (j = 0; j < some; j++) isogi_sh__image_add(total, sum[j], z[j], sine[j], weight[j] * 2 * ISOGI_SH__PI / (double)width);
     }
     for (i = 0; i < 25; i++)
         for (k = 0; k < 3; k++) rgb[3 * i + k] = (float)(total[i][k] + total[i][k + 3] + total[i][k + 6] + total[i][k + 9]);

@@ -275,9 +275,9 @@ typedef enum isogi_filter {
 /* At world points; values[count], gradients[count] (per world unit, in world axes); either may be NULL. Outside the box a point
    is moved to its nearest border point; a coordinate that is not finite leaves it somewhere in the box. Many points a call go
    several times faster than one, and fastest where neighbours follow each other: points far apart wait for memory. Points are located
-   in double, or to 2^-24 cell where floats can; the rest is float: values err by at most 2^-21 of the largest
-   number that enters them (a voxel, the bias), gradients by 2^-21 of the largest difference between voxels that enter them, per
-   spacing; doubles are sampled in double. The path of instructions may change results within that; the size of a call does not. */
+   in double, or to 2^-24 cell where floats can; the rest is float: values err by at most 2^-21 of the largest number that enters them
+   (a voxel, the bias), gradients by 2^-21 (those of cubic filters by 2^-20) of the largest difference between voxels that enter them,
+   per spacing; doubles are sampled in double. The path of instructions may change results within that; the size of a call does not. */
 ISOGI_API isogi_result isogi_vol_sample(const isogi_pyramid *pyramid, const float (*points)[3], size_t count, float *values,
                                         float (*gradients)[3]); /* trilinear */
 ISOGI_API isogi_result isogi_vol_sample_smooth(const isogi_pyramid *pyramid, const float (*points)[3], size_t count, float *values,
@@ -2461,9 +2461,11 @@ static int isogi_vol__blockwise(const isogi_pyramid *p, isogi_filter filter) {
     const isogi_volume *v = &p->volume;
     int32_t low[3], high[3];
     if (p->path == ISOGI_VOL__PATH_PLAIN || v->type == ISOGI_F64 || p->field.value) return 0;
+    if (filter == ISOGI_FILTER_LINEAR) return 1;
+    /* linear continuation at a corner, and gradients, may take floats of this size beyond their range */
+    if (v->type == ISOGI_F32 && !(isogi_vol__largest(p->range[0], p->range[1], v->bias) < 1e36 * fabs(v->scale))) return 0;
     isogi_vol__inner_cells(p, low, high);
-    return filter == ISOGI_FILTER_LINEAR ||
-           (v->stride[0] == (ptrdiff_t)isogi_vol__type_size(v->type) && low[0] < high[0] && low[1] < high[1] && low[2] < high[2]);
+    return (v->stride[0] == (ptrdiff_t)isogi_vol__type_size(v->type) && low[0] < high[0] && low[1] < high[1] && low[2] < high[2]);
 }
 
 static void isogi_vol__cubic_points(const isogi_pyramid *p, const isogi_vol__taps_at *taps, isogi_vol__block *b, int from, int n) {
@@ -3298,7 +3300,7 @@ ISOGI_VOL__TARGET("avx2") ISOGI_VOL__INLINE __m256d isogi_vol__corners4(const is
     }
     if (dx != 4) return ISOGI_VOL__FOUR(float);
 #undef ISOGI_VOL__FOUR
-    return _mm256_cvtps_pd(_mm_loadh_pi(_mm_castpd_ps(_mm_load_sd((const double *)(const void *)p)), (const __m64 *)(const void *)q));
+    return _mm256_cvtps_pd(_mm_loadh_pi(_mm_castsi128_ps(_mm_loadl_epi64((const __m128i *)(const void *)p)), (const __m64 *)(const void *)q));
 }
 
 /* Places in the cell, on its faces where they are within rounding of them. */

@@ -469,4 +469,26 @@ TEST(interpolating_filters_pass_through_the_voxels) {
             }
 }
 
+/* Voxels near the largest float: linear continuation beyond a corner makes them up to 27 times as large, differences twice. */
+TEST(huge_values_stay_finite_at_the_border) {
+    static float data[6 * 6 * 6];
+    const double points[3][3] = {{2.3, 2.4, 2.6}, {0.3, 0.4, 0.6}, {4.9, 0.1, 2.5}};
+    const float largest[4] = {9e35f, 2e36f, 4e37f, 3e38f};
+    isogi_volume v = {.data = data, .type = ISOGI_F32, .size = {6, 6, 6}};
+    for (int k = 0; k < 4; k++) {
+        for (int i = 0; i < 216; i++) data[i] = (i % 6 + i / 6 % 6 + i / 36) & 1 ? largest[k] : -largest[k];
+        for (int path = 1; path <= 4; path++) {
+            const isogi_context context = {.force_path = path};
+            isogi_pyramid *p = NULL;
+            float value[3];
+            CHECK(isogi_vol_build(&p, &v, &context) == ISOGI_OK, "%g", (double)largest[k]);
+            for (int f = ISOGI_FILTER_BSPLINE; f <= ISOGI_FILTER_CATMULL_ROM; f++) {
+                CHECK(isogi_vol_sample_grid(p, (isogi_filter)f, points, 3, value, NULL) == ISOGI_OK, "%g", (double)largest[k]);
+                for (int i = 0; i < 3; i++) CHECK(test_finite((double)value[i]) && fabs((double)value[i]) < 1.5 * (double)largest[k], "path %d, filter %d, point %d: %g of %g", path, f, i, (double)value[i], (double)largest[k]);
+            }
+            isogi_vol_free(p);
+        }
+    }
+}
+
 TEST_MAIN("sample")
