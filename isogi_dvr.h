@@ -686,6 +686,7 @@ typedef struct isogi_dvr__matter {
     double spacing[3];                  /* voxels from node to node */
     float *extinction[2];               /* [z][y][x] and [x][y][z], per desc.unit */
     double low, scale;                  /* class of a value: (value - low) * scale; see isogi_dvr__set_classes */
+    double kept[2], kept_scale;         /* some block may still have been classified as coarsely as this, between these values */
     float *table, *scratch;             /* while it is brought up to date: extinction of classes; rows of values */
     size_t scratch_row;
 } isogi_dvr__matter;
@@ -1359,12 +1360,23 @@ static size_t isogi_dvr__mark_changed(isogi_dvr *d, const uint32_t *marks) {
     return count;
 }
 
-/* Marks the blocks whose values were told apart too coarsely: those between the ends of the former function. */
-static size_t isogi_dvr__mark_coarse(isogi_dvr *d, const double span[2]) {
+/* Classes for the present function; how many blocks are marked because their values were told apart too coarsely: by the function before
+   or, where many small edits narrow the span, by any since they were last marked. */
+static size_t isogi_dvr__renew_classes(isogi_dvr *d) {
+    isogi_dvr__matter *m = &d->matter;
+    double span[2];
     size_t i, count = 0;
-    for (i = 0; i < d->changed_count; i++) {
-        const float *range = d->level[1].range[i];
-        if (!d->changed[i] && (double)range[1] > span[0] && (double)range[0] < span[1]) d->changed[i] = 1, count++;
+    isogi_dvr__transfer_span(&d->transfer, span);
+    isogi_dvr__set_classes(d, span, ISOGI_DVR__TABLE, &m->low, &m->scale);
+    if (m->scale > 2 * m->kept_scale) {
+        for (i = 0; i < d->changed_count && m->kept_scale > 0; i++) {
+            const float *range = d->level[1].range[i];
+            if (!d->changed[i] && (double)range[1] > m->kept[0] && (double)range[0] < m->kept[1]) d->changed[i] = 1, count++;
+        }
+        m->kept_scale = m->scale, m->kept[0] = span[0], m->kept[1] = span[1];
+    } else {
+        m->kept_scale = m->scale < m->kept_scale ? m->scale : m->kept_scale;
+        m->kept[0] = span[0] < m->kept[0] ? span[0] : m->kept[0], m->kept[1] = span[1] > m->kept[1] ? span[1] : m->kept[1];
     }
     return count;
 }
@@ -1380,7 +1392,6 @@ ISOGI_API isogi_result isogi_dvr_set_transfer(isogi_dvr *dvr, const isogi_transf
     isogi_dvr_method before;
     isogi_dvr__integral integral;
     isogi_result result;
-    double span[2], old[2], scale;
     uint32_t *marks;
     size_t changed;
     if (!dvr) return ISOGI_INVALID;
@@ -1397,15 +1408,13 @@ ISOGI_API isogi_result isogi_dvr_set_transfer(isogi_dvr *dvr, const isogi_transf
         isogi_dvr__transfer_free(&copy, &dvr->context);
         return ISOGI_NO_MEMORY;
     }
-    isogi_dvr__transfer_span(&dvr->transfer, old), scale = dvr->matter.scale;
     isogi_dvr__compare_transfers(dvr, &dvr->transfer, &copy, marks);
     isogi_dvr__integral_free(&dvr->integral, &dvr->context);
     isogi_dvr__transfer_free(&dvr->transfer, &dvr->context);
     dvr->transfer = copy, dvr->integral = integral;
     isogi_dvr__mark_empty(dvr);
     changed = isogi_dvr__mark_changed(dvr, marks);
-    isogi_dvr__transfer_span(&copy, span), isogi_dvr__set_classes(dvr, span, ISOGI_DVR__TABLE, &dvr->matter.low, &dvr->matter.scale);
-    if (dvr->matter.scale > 2 * scale) changed += isogi_dvr__mark_coarse(dvr, old);
+    changed += isogi_dvr__renew_classes(dvr);
     isogi_release(&dvr->context, marks, ISOGI_DVR__TABLE + 1, sizeof *marks);
     before = dvr->method, dvr->method = isogi_dvr__method(dvr);
     if (changed || dvr->method == ISOGI_DVR_BRUTE || dvr->method != before) dvr->next = 0;
@@ -4810,7 +4819,8 @@ static void isogi_dvr__frame_classes(isogi_dvr__frame *f, double low, double sca
             if (!(end < to)) break;
             x = end, next++;
         }
-        for (a = 0; a < 4; a++) e->before[a] = (float)sum[a], e->mean[a] = (float)isogi_dvr__clamp(mean[a], 1e30), sum[a] += mean[a];
+        x = mean[3] > 1e30 ? 1e30 / mean[3] : 1; /* sums must stay floats, colours what they are */
+        for (a = 0; a < 4; a++) mean[a] = isogi_dvr__clamp(mean[a] * x, 1e32), e->before[a] = (float)sum[a], e->mean[a] = (float)mean[a], sum[a] += mean[a];
     }
     f->low = (float)low, f->scale = (float)scale;
     f->top = (float)f->count - 0.01f, f->close = (float)f->count / (2 * ISOGI_DVR__CLASSES);
@@ -5287,7 +5297,9 @@ static int isogi_dvr__fast_begin(const isogi_dvr__frame *f, const double origin[
     r->count = (int)pieces + 1;
     for (a = 0; a < 3; a++) r->origin[a] = (float)isogi_dvr__clamp(origin[a] + span[0] * dir[a], d->cells[a]), r->dir[a] = (float)(dir[a] * piece);
     r->enter = span[0], r->sought = 3e38f;
-    r->piece = (float)(piece / d->desc.unit), r->last_piece = (float)((span[1] - span[0] - (pieces - 1) * piece) / d->desc.unit);
+    /* no infinity: that times no extinction would be no number */
+    r->piece = (float)isogi_dvr__clamp(piece / d->desc.unit, 1e30);
+    r->last_piece = (float)isogi_dvr__clamp((span[1] - span[0] - (pieces - 1) * piece) / d->desc.unit, 1e30);
     return 1;
 }
 

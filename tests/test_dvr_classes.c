@@ -248,4 +248,57 @@ TEST(exact_rays_know_no_longest_ray) {
     field_free(&f);
 }
 
+/* A point dragged bit by bit narrows the function a little at a time: what is seen in the end is what a renderer sees that knew no other. */
+TEST(many_small_edits_end_like_one) {
+    field f = radius_field(49, 1e5);
+    const float middle[3] = {24, 24, 24};
+    for (int method = ISOGI_DVR_BRUTE; method <= ISOGI_DVR_SWEEP; method++) {
+        const isogi_dvr_desc desc = {.pyramid = f.pyramid, .shading = ISOGI_DVR_VISIBILITY, .method = (isogi_dvr_method)method, .directions = 32, .grid = {7, 7, 7}};
+        float v[2][COUNT];
+        for (int fresh = 0; fresh < 2; fresh++) {
+            isogi_dvr *dvr = NULL;
+            for (double end = fresh ? 99 : 1e5;; end = fmax(0.55 * end, 99)) {
+                const isogi_transfer_point p[] = {{0, {1, 1, 1}, 0}, {14, {1, 1, 1}, 0}, {15, {1, 1, 1}, 0.6f}, {16, {1, 1, 1}, 0},
+                                                  {end - 1, {1, 1, 1}, 0}, {end, {1, 1, 1}, 0.5f}, {end + 1, {1, 1, 1}, 0.5f}};
+                const isogi_transfer transfer = {p, 7, NULL, 0};
+                if (!dvr) dvr = dvr_new(&desc, &transfer);
+                CHECK(isogi_dvr_set_transfer(dvr, &transfer) == ISOGI_OK && isogi_dvr_step(dvr, 0, NULL) == ISOGI_OK, "end at %g", end);
+                if (end <= 99) break;
+            }
+            CHECK(isogi_dvr_sample_visibility(dvr, &middle, 1, v[fresh]) == ISOGI_OK, "sample");
+            isogi_dvr_free(dvr);
+        }
+        CHECK(fabs((double)v[0][0] - (double)v[1][0]) < 0.002, "method %d: %g bit by bit, %g at once", method, (double)v[0][0], (double)v[1][0]);
+    }
+    field_free(&f);
+}
+
+/* Units and extinctions at the ends of what floats hold: opaque where there is matter, in its colour, and never no number. */
+TEST(lengths_and_extinctions_without_measure_are_opaque) {
+    static const struct { double unit; float extinction; } extreme[] = {{1e-45, 1}, {1e-40, 1e-3f}, {1e-12, 1e38f}, {1, 1e38f}};
+    field f = field_new(8, 8, 8);
+    for (size_t i = 0; i < field_count(&f); i++) f.value[i] = (double)(i % 8);
+    for (int k = 0; k < 8; k++)
+        for (int path = 1; path <= 4; path++) {
+            const isogi_context context = {.threads = 1, .force_path = path};
+            const float e = extreme[k / 2].extinction;
+            const isogi_transfer_point step[] = {{0, {1, 1, 1}, 0}, {3.5, {1, 1, 1}, 0}, {3.5, {1, 0.5f, 1}, e}, {7, {1, 0.5f, 1}, e}}, ramp[] = {{0, {1, 0.5f, 1}, 0}, {7, {1, 0.5f, 1}, e}};
+            const isogi_transfer transfer = {k & 1 ? step : ramp, k & 1 ? 4 : 2, NULL, 0};
+            const isogi_view view = {.width = 8, .height = 8, .fov = 30, .eye = {20, 18, 22}, .target = {3.5f, 3.5f, 3.5f}};
+            isogi_dvr *dvr = NULL;
+            float image[64][4];
+            field_build_with(&f, &context);
+            const isogi_dvr_desc desc = {.pyramid = f.pyramid, .shading = ISOGI_DVR_UNLIT, .unit = extreme[k / 2].unit};
+            CHECK(isogi_dvr_create(&dvr, &desc, &context) == ISOGI_OK && isogi_dvr_set_transfer(dvr, &transfer) == ISOGI_OK, "create");
+            CHECK(isogi_dvr_render(dvr, &view, NULL, image, NULL, NULL) == ISOGI_OK, "render");
+            for (int i = 0; i < 64; i++)
+                for (int a = 0; a < 4; a++) CHECK(test_finite((double)image[i][a]), "case %d, path %d: pixel %d is no number", k, path, i);
+            CHECK(fabs((double)image[27][3] - 1) < 1e-6 && fabs((double)image[27][0] - 1) < 1e-3 && fabs((double)image[27][1] - 0.5) < 1e-2, "case %d, path %d: %g %g, opacity %g", k, path,
+                  (double)image[27][0], (double)image[27][1], (double)image[27][3]);
+            isogi_dvr_free(dvr);
+            isogi_vol_free(f.pyramid), f.pyramid = NULL;
+        }
+    field_free(&f);
+}
+
 TEST_MAIN("dvr_classes")

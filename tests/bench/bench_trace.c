@@ -155,7 +155,7 @@ static int reference_make(const bench_scene *s) {
     FILE *file;
     for (size_t i = 0; i < picked; i++)
         for (int c = 0; c < 3; c++) key = isogi_trace__key(key, (uint64_t)isogi_trace__float_bits(chosen[i][c]));
-    for (size_t i = 0; i < 3 * d.lighting.light_count; i++) key = isogi_trace__key(key, (uint64_t)isogi_trace__float_bits(d.lighting.lights[i / 3].vector[i % 3]));
+    key = isogi_trace__hash_lighting(key, &d.lighting);
     snprintf(path, sizeof path, "build/bench/reference-%s-%d-%016llx", s->name, REFERENCE, (unsigned long long)key);
     file = fopen(path, "rb");
     if (file) {
