@@ -133,7 +133,7 @@
                 for each coefficient) and 4 for every hit, for each of 65536 texels at a time, for all that were asked for when
                 lazy, and for each probe.
                 Any allocation may fail: the call says ISOGI_NO_MEMORY, the texture stays as it was and can go on.
-                Stack use stays below 32 KB.
+                Stack use stays below 48 KB, a third of it its own, the rest that of rays.
    Threads      Rays run on the context's threads. isogi_trace_sample and the other readers may run in any number of threads at a
                 time; request, step and relight alone, without readers.
    Determinism  The same bits for any number of threads and any budget of steps. PATHS: a texel's light depends on the description
