@@ -4774,7 +4774,7 @@ static int isogi_dvr__any_peak(const isogi_dvr *d) {
 
 static int isogi_dvr__fast_space(const isogi_dvr *d) {
     return d->desc.space == ISOGI_DVR_PHYSICAL && d->desc.classification != ISOGI_DVR_POST_CLASSIFIED && !isogi_dvr__any_peak(d) && !d->desc.jitter &&
-           d->desc.shading != ISOGI_DVR_LOCAL && !(fabs(d->desc.anisotropy) > 0) && d->cells[0] && d->cells[1] && d->cells[2];
+           (d->desc.shading == ISOGI_DVR_UNLIT || d->desc.shading == ISOGI_DVR_VISIBILITY) && !(fabs(d->desc.anisotropy) > 0) && d->cells[0] && d->cells[1] && d->cells[2];
 }
 
 /* Four classes at least to the narrowest piece of the transfer function, as far as their number allows. */
