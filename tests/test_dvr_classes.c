@@ -301,4 +301,26 @@ TEST(lengths_and_extinctions_without_measure_are_opaque) {
     field_free(&f);
 }
 
+/* Light by the gradient is post-classified in physical space, whatever is asked for: it has no grid. */
+TEST(light_by_the_gradient_is_post_classified) {
+    field f = radius_field(49, 0);
+    const isogi_transfer transfer = {shell, 4, NULL, 0};
+    const isogi_light light = {.kind = ISOGI_LIGHT_DIRECTIONAL, .vector = {1, 1, 0.5f}, .rgb = {2, 3, 4}};
+    const isogi_lighting lighting = {.lights = &light, .light_count = 1};
+    for (int two_sided = 0; two_sided < 2; two_sided++) {
+        static float image[2][SIDE * SIDE][4];
+        float most = 0;
+        for (int n = 0; n < 2; n++) {
+            const isogi_dvr_desc desc = {.pyramid = f.pyramid, .shading = two_sided ? ISOGI_DVR_TWO_SIDED : ISOGI_DVR_LOCAL, .classification = n ? ISOGI_DVR_POST_CLASSIFIED : (isogi_dvr_classification)0,
+                                         .material = {{.diffuse = {1, 1, 1}}, {.diffuse = {1, 1, 1}}, {.diffuse = {0.5f, 0.5f, 0.5f}}}};
+            isogi_dvr *dvr = dvr_new(&desc, &transfer);
+            CHECK(isogi_dvr_render(dvr, &view_49, &lighting, image[n], NULL, NULL) == ISOGI_OK, "render");
+            isogi_dvr_free(dvr);
+        }
+        for (int i = 0; i < SIDE * SIDE; i++) most = fmaxf(most, image[0][i][1]);
+        CHECK(!memcmp(image[0], image[1], sizeof image[0]) && most > 0.1f && most < 10, "two-sided %d: brightest %g", two_sided, (double)most);
+    }
+    field_free(&f);
+}
+
 TEST_MAIN("dvr_classes")
