@@ -85,13 +85,14 @@
    Visibility is sampled in `directions` directions and projected to SH, by one of the methods of isogi_dvr_method. Brute force
    marches every ray from every grid point through the same transfer function (in the same space; peaks attenuate at every
    crossing). In data space its rays walk the cells as those of pictures do: against steps of a voxel 1.8 times the time, a relative error
-   of 3e-5 in place of 1e-2 for a steep transfer function. Where nothing absorbs no ray is cast at all. Sweeps, the default in physical space without peaks, follow a bundle of parallel rays for each direction through a
-   lattice of extinction and read it at all grid points on the way: 10 to 30 times faster at the same error, as a bundle's rays are
-   straight and nothing is interpolated twice. The paper's method (Kronander 2011) has local visibility on blocks of several levels,
-   which pictures may use on its own (isogi_view.local), and global visibility pieced together from it; relative errors on the same
-   grid and with the same number of rays, sweeps and paper: fuel 0.018 and 0.040, engine 0.077 and 0.086. The directions are a spherical Fibonacci lattice, and
-   its weights are corrected so that products of spherical harmonics are integrated exactly as far as the number of rays allows
-   (2 (degree + 1)^2 <= directions): with 64 rays, order 3 without shadows has V = sqrt(4 pi), 0, 0 ... to rounding. The largest
+   of 3e-5 in place of 1e-2 for a steep transfer function. Where nothing absorbs no ray is cast at all. Sweeps, the default in physical
+   space without peaks, follow a bundle of parallel rays for each direction through a lattice of extinction and read it at all grid
+   points on the way: 10 to 30 times faster at the same error, as a bundle's rays are straight and nothing is interpolated twice. The
+   paper's method (Kronander 2011) has local visibility on blocks of several levels, which pictures may use on its own
+   (isogi_view.local), and global visibility pieced together from it; relative errors on the same grid and with the same number of rays,
+   sweeps and paper: fuel 0.018 and 0.040, engine 0.077 and 0.086. The directions are a spherical Fibonacci lattice, and its weights are
+   corrected so that products of spherical harmonics are integrated exactly as far as the number of rays allows (2 (degree + 1)^2 <=
+   directions): with 64 rays, order 3 without shadows has V = sqrt(4 pi), 0, 0 ... to rounding. The largest
    error of a coefficient against the closed form of a half space, order 4, worst of 1000 orientations (sqrt(4 pi) is 3.5):
 
        rays        16     32     64    128    256    512   1024   2048
@@ -107,14 +108,16 @@
    What it does not do
 
    - No light on tetrahedral meshes, no scattering beyond the first, no refraction, no glossy surfaces.
-   - Pictures of physical space are pre-integrated (ISOGI_DVR_EXACT is the same there), unless they have peaks among the values that occur,
-     local shading (ISOGI_DVR_LOCAL, isogi_view.local), nearby lights, anisotropy, jitter, or an axis of one voxel: those are post-classified,
-     and features narrower than the value's change from sample to sample need a smaller step. Pre-classification (colours interpolated instead of values) is left out on purpose: in data
-     space it would depend on the view, and it blurs every surface to the width of a voxel.
+   - Pictures of physical space are pre-integrated (ISOGI_DVR_EXACT is the same there), unless they have peaks among the values that
+     occur, local shading (ISOGI_DVR_LOCAL, isogi_view.local), nearby lights, anisotropy, jitter, or an axis of one voxel: those are
+     post-classified, and features narrower than the value's change from sample to sample need a smaller step. Pre-classification
+     (colours interpolated instead of values) is left out on purpose: in data space it would depend on the view, and it blurs every
+     surface to the width of a voxel.
    - The border of the volume is no surface: outside of the box is empty space.
    - It reads no files, opens no window, converts nothing to sRGB. Pixels are linear and premultiplied: put a background under
-     them with  out = pixel + (1 - opacity) * background. For a display, what examples/common/picture.h does: multiply by an exposure, bend what
-     is above 0.7 by  x -> 0.7 + 0.3 (1 - exp((0.7 - x) / 0.3)), and code as sRGB:  12.92 x  up to 0.0031308, above it  1.055 x^(1/2.4) - 0.055.
+     them with  out = pixel + (1 - opacity) * background. For a display, what examples/common/picture.h does: multiply by an exposure,
+     bend what is above 0.7 by  x -> 0.7 + 0.3 (1 - exp((0.7 - x) / 0.3)), and code as sRGB:  12.92 x  up to 0.0031308, above it
+     1.055 x^(1/2.4) - 0.055.
 
    Options (macros, to be defined before the header is included)
 
@@ -129,8 +132,9 @@
    copied (not what they point to: the second field and its points are borrowed). Visibility takes grid points * order^2 floats; sweeps
    as many again, two floats for each node of their lattice, and during a step, for each of up to 16 directions, a float for each grid
    point and about 6 m (m + 24) of scratch for m nodes on the longest axis. Empty blocks take one byte for each block of the pyramid; a
-   picture in work 20 bytes a pixel, and 32 kB to 512 kB of classes of values in physical space; exact rays 150 bytes a point of the transfer function, pre-integrated ones 16 table^2. All of it
-   comes from the context's allocator; where that fails the call says so and changes nothing.
+   picture in work 20 bytes a pixel, and 32 kB to 512 kB of classes of values in physical space; exact rays 150 bytes a point of the
+   transfer function, pre-integrated ones 16 table^2 and 8 a point more. All of it comes from the context's allocator; where that fails the
+   call says so and changes nothing.
    isogi_dvr_set_transfer and isogi_dvr_step are writers: one at a time, and not during another call with the same renderer. All
    other calls only read and may run at the same time. Calls divide their own work among the context's threads. Results are the
    same bits for any number of threads and however visibility was cut into steps.
@@ -144,15 +148,16 @@
    Limits
 
    Values that are not finite: a cell with such a corner is transparent. An axis of one voxel makes a box without volume, which is
-   transparent (rays within its plane do sample it). Up to ISOGI_DVR_MAX_PEAKS peaks (in data space,
-   exact or pre-integrated, any number), 2^16 directions, and 2^24 samples on the longest ray. Errors: ISOGI_INVALID for anything outside of its documented range, ISOGI_TOO_LARGE where sizes overflow or pass
-   these limits, ISOGI_NO_MEMORY, ISOGI_CANCELLED.
+   transparent (rays within its plane do sample it). Up to ISOGI_DVR_MAX_PEAKS peaks (in data space, exact or pre-integrated, any
+   number), 2^16 directions, and 2^24 samples on the longest ray. Errors: ISOGI_INVALID for anything outside of its documented range,
+   ISOGI_TOO_LARGE where sizes overflow or pass these limits, ISOGI_NO_MEMORY, ISOGI_CANCELLED.
 
    How to choose. `step` 0.5 is right for smooth transfer functions, 0.25 for steep ones; each halving costs twice the time and
    leaves a quarter of the error. `order` 2 is ambient light with a direction, 3 soft shadows, 4 and more for a directional light.
    `grid`: shadows cannot be finer than its distances; time is proportional to its points. `directions`: at least 2 order^2.
 
-   History: exact rays in data space, pre-integration, silhouettes, two-sided light since. Version 1 - ray casting in both spaces, peaks, brute-force SH visibility.
+   History: exact rays in data space, pre-integration, silhouettes, two-sided light since. Version 1 - ray casting in both spaces, peaks,
+   brute-force SH visibility.
 */
 #ifndef ISOGI_DVR_H
 #define ISOGI_DVR_H
@@ -272,7 +277,8 @@ typedef struct isogi_dvr_desc {
     double reduction;       /* the paper's method: voxels of the volume to points of its blocks, at least 1; 0 = 4. A block that is not
                                transparent holds a point whatever the budget is; those that the border cuts thin come first for more */
     isogi_dvr_classification classification; /* in data space; visibility rays are exact there, unless this says post-classified */
-    int table;                               /* entries along a side of the pre-integrated table, 2..1024; 0 = 256 */
+    int table;                               /* entries along a side of the pre-integrated table, which stand where the transfer
+                                                function changes, half by value, half evenly among its pieces; 2..1024; 0 = 256 */
     isogi_dvr_silhouette silhouette;
     isogi_normal_kind normals;   /* of shading and of silhouettes of peaks; 0 = smooth */
     isogi_material material[3];  /* two-sided: seen from lower values, seen from higher values, light that comes through */
@@ -382,10 +388,11 @@ ISOGI_API isogi_result isogi_transfer_import(const float (*rgba)[4], size_t coun
 
 #define ISOGI_SUGGEST_POINTS 6
 
-/* A transfer function for a volume of which nothing is known: values in three classes of least variance (Otsu 1979; the largest bin
-   left out, which is air or padding; and up to a thousandth of the voxels at either end of the range where that halves it), the lowest transparent, the others ever denser and warmer. In physical space extinction is per voxel and
-   makes 1/30 of the box's diagonal half opaque at the top; in data space a passage through each upper class is about half opaque. A
-   volume of one value gets points that nothing meets. threshold (may be NULL): where the second class begins, for an isosurface. */
+/* A transfer function for a volume of which nothing is known: values in three classes of least variance (Otsu 1979; the largest bin left
+   out, which is air or padding; and up to a thousandth of the voxels at either end of the range where that halves it), the lowest
+   transparent, the others ever denser and warmer. In physical space extinction is per voxel and makes 1/30 of the box's diagonal half
+   opaque at the top; in data space a passage through each upper class is about half opaque. A volume of one value gets points that
+   nothing meets. threshold (may be NULL): where the second class begins, for an isosurface. */
 ISOGI_API isogi_result isogi_transfer_suggest(const isogi_pyramid *pyramid, isogi_dvr_space space, isogi_transfer_point points[ISOGI_SUGGEST_POINTS],
                                               double *threshold);
 
@@ -713,7 +720,10 @@ typedef struct isogi_dvr__integral {
     size_t quiet_count, quiet_capacity;
     float (*table)[4]; /* pre-integrated: [front][back]: mean colour, mean extinction */
     size_t side;
-    double low, scale; /* entry = (value - low) * scale */
+    double low, high;  /* values between which the table stands; the transfer function is constant before and beyond */
+    double *node;      /* [side]: its values */
+    double *place;     /* [count]: entries that the points below this one take beyond their share by value, `by_value` for half of a value */
+    double by_value;
 } isogi_dvr__integral;
 
 /* The paper's flat blocks: see "flat blocks of several levels" below. Block (i, j, k) is i + count[0] * (j + count[1] * k). */
@@ -1033,6 +1043,8 @@ static void isogi_dvr__integral_free(isogi_dvr__integral *g, const isogi_context
     isogi_release(context, g->rank, g->rank_count, sizeof *g->rank);
     isogi_release(context, g->quiet, g->quiet_capacity, sizeof *g->quiet);
     isogi_release(context, g->table, g->side * g->side, sizeof *g->table);
+    isogi_release(context, g->node, g->side, sizeof *g->node);
+    isogi_release(context, g->place, g->side ? g->count : 0, sizeof *g->place);
     memset(g, 0, sizeof *g);
 }
 
@@ -1127,15 +1139,60 @@ static int isogi_dvr__is_quiet(const isogi_dvr__integral *g, double low, double 
     return 1;
 }
 
+/* The pre-integrated table. Its entries divide the values among which the transfer function changes: half of them by value, half of them
+   evenly among its pieces, so that neither outliers nor a wide range of values take the entries of a narrow tent. */
+
+/* The entry, with a fraction, of a value from low to high. */
+static double isogi_dvr__entry(const isogi_dvr__integral *g, double value) {
+    size_t low, high;
+    double u = isogi_dvr__piece(g->points, g->count, value, &low, &high), at = g->place[low] + u * (g->place[high] - g->place[low]);
+    return isogi_dvr__clamp(g->by_value * (0.5 * value - 0.5 * g->low) + at, (double)(g->side - 1));
+}
+
+/* Places of the points, from the one below `low` on, and the values of the entries. */
+static void isogi_dvr__set_nodes(isogi_dvr__integral *g) {
+    double whole = 0, first, last = (double)(g->side - 1), from = g->low, entry = 0;
+    size_t pass, i, n;
+    for (pass = 0; pass < 2; pass++) { /* places in pieces; then in entries */
+        size_t below, above;
+        double u;
+        for (i = 0; i < g->count; i++) {
+            const isogi_transfer_point *p = &g->points[i];
+            int counts = i && p->value > p[-1].value && !isogi_dvr__alike(p, p - 1);
+            g->place[i] = (i ? g->place[i - 1] : 0) + (counts ? pass ? 0.5 * last / whole : 1 : 0);
+        }
+        u = isogi_dvr__piece(g->points, g->count, g->low, &below, &above);
+        first = g->place[below] + u * (g->place[above] - g->place[below]);
+        u = isogi_dvr__piece(g->points, g->count, g->high, &below, &above);
+        whole = g->place[below] + u * (g->place[above] - g->place[below]) - first;
+        if (pass || !(whole > 0)) break;
+    }
+    for (i = 0; i < g->count; i++) g->place[i] -= first;
+    g->by_value = (whole > 0 ? 0.5 : 1) * last / (0.5 * g->high - 0.5 * g->low);
+    for (i = n = 0; i < g->side; i++) {
+        double to = g->high, end = last, u;
+        for (; n < g->count && g->points[n].value < g->high; n++) {
+            if (!(g->points[n].value > from)) continue;
+            to = g->points[n].value, end = isogi_dvr__entry(g, to);
+            if (end >= (double)i) break;
+            from = to, entry = end, to = g->high, end = last;
+        }
+        u = end > entry ? isogi_dvr__clamp(((double)i - entry) / (end - entry), 1) : 0;
+        g->node[i] = (1 - u) * from + u * to;
+        if (i && !(g->node[i] > g->node[i - 1])) g->node[i] = g->node[i - 1];
+    }
+    g->node[g->side - 1] = g->high;
+}
+
 /* Eq. 6 and 7 of Kraus 2005 for all pairs of values, from pieces of one entry each that are put behind each other. Kept are mean colour
    and mean extinction, which go smoothly through front = back: interpolated between entries, equal values stay exactly transparent. */
 static void isogi_dvr__set_entry(isogi_dvr__integral *g, size_t front, size_t back, const isogi_dvr__layer *layer, double depth) {
     float *entry = g->table[front * g->side + back];
-    double x = g->low + (double)front / g->scale, y = g->low + (double)back / g->scale, value[4], opacity = -expm1(-depth);
+    double x = g->node[front], y = g->node[back], middle = 0.5 * x + 0.5 * y, value[4], opacity = -expm1(-depth);
     int a;
-    isogi_dvr__on_piece(g, isogi_dvr__points_below(g->points, g->count, 0.5 * (x + y)), 0.5 * (x + y), value);
+    isogi_dvr__on_piece(g, isogi_dvr__points_below(g->points, g->count, middle), middle, value);
     for (a = 0; a < 3; a++) entry[a] = (float)(depth > 0 ? layer->rgb[a] / opacity : value[a]);
-    entry[3] = (float)isogi_dvr__clamp(front == back ? value[3] : depth / fabs(y - x), 3e38);
+    entry[3] = (float)isogi_dvr__clamp(x < y || y < x ? depth / fabs(y - x) : value[3], 3e38);
 }
 
 static void isogi_dvr__set_pairs(isogi_dvr__integral *g) {
@@ -1147,27 +1204,26 @@ static void isogi_dvr__set_pairs(isogi_dvr__integral *g) {
         isogi_dvr__set_entry(g, j, j, &nothing, 0);
         for (i = j; i-- > 0;) {
             isogi_dvr__layer front = nothing;
-            isogi_dvr__add_values(g, g->low + (double)i / g->scale, g->low + (double)(i + 1) / g->scale, 1 / g->scale, &front);
+            isogi_dvr__add_values(g, g->node[i], g->node[i + 1], g->node[i + 1] - g->node[i], &front);
             isogi_dvr__behind(&front, &rising);
             rising = front;
-            depth += isogi_dvr__depth_between(g, g->low + (double)i / g->scale, g->low + (double)(i + 1) / g->scale);
+            depth += isogi_dvr__depth_between(g, g->node[i], g->node[i + 1]);
             isogi_dvr__set_entry(g, i, j, &rising, depth);
         }
         for (i = j + 1, depth = 0; i < g->side; i++) {
             isogi_dvr__layer front = nothing;
-            isogi_dvr__add_values(g, g->low + (double)i / g->scale, g->low + (double)(i - 1) / g->scale, 1 / g->scale, &front);
+            isogi_dvr__add_values(g, g->node[i], g->node[i - 1], g->node[i] - g->node[i - 1], &front);
             isogi_dvr__behind(&front, &falling);
             falling = front;
-            depth += isogi_dvr__depth_between(g, g->low + (double)(i - 1) / g->scale, g->low + (double)i / g->scale);
+            depth += isogi_dvr__depth_between(g, g->node[i - 1], g->node[i]);
             isogi_dvr__set_entry(g, i, j, &falling, depth);
         }
     }
 }
 
-/* For a pair of values: mean colour and opacity. */
-static double isogi_dvr__look_up(const isogi_dvr__integral *g, double front, double back, double length, double rgb[3]) {
-    double most = (double)(g->side - 1), x = isogi_dvr__clamp((front - g->low) * g->scale, most), y = isogi_dvr__clamp((back - g->low) * g->scale, most);
-    double value[4];
+/* Puts a pair of values from low to high behind a layer. */
+static void isogi_dvr__look_up(const isogi_dvr__integral *g, double front, double back, double length, isogi_dvr__layer *layer) {
+    double x = isogi_dvr__entry(g, front), y = isogi_dvr__entry(g, back), value[4], opacity;
     size_t i = (size_t)x, j = (size_t)y;
     const float *at;
     int a;
@@ -1179,27 +1235,45 @@ static double isogi_dvr__look_up(const isogi_dvr__integral *g, double front, dou
         double high = (double)at[4 * g->side + (size_t)a] + y * ((double)at[4 * g->side + 4 + (size_t)a] - (double)at[4 * g->side + (size_t)a]);
         value[a] = low + x * (high - low);
     }
-    for (a = 0; a < 3; a++) rgb[a] = value[a];
-    return -expm1(-isogi_dvr__clamp(value[3] * length, 1e30));
+    opacity = -expm1(-isogi_dvr__clamp(value[3] * length, 1e30));
+    for (a = 0; a < 3; a++) layer->rgb[a] += layer->clear * opacity * value[a];
+    layer->clear *= 1 - opacity;
+}
+
+/* The same for any pair: before and beyond the table the transfer function is constant, and integrated as it is. */
+static void isogi_dvr__add_pair(const isogi_dvr__integral *g, double x, double y, double length, isogi_dvr__layer *layer) {
+    double from = x < g->low ? g->low : x < g->high ? x : g->high, to = y < g->low ? g->low : y < g->high ? y : g->high;
+    double span = fabs(y - x), factor = span > 0 ? length / span : 1;
+    if (!g->side || (!(from < to || to < from) && (span > 0 || from < x || x < from))) { /* not in the table, or on its border */
+        isogi_dvr__add_values(g, x, y, length, layer);
+        return;
+    }
+    if (from < x || x < from) isogi_dvr__add_values(g, x, from, fabs(from - x) * factor, layer);
+    isogi_dvr__look_up(g, from, to, span > 0 ? fabs(to - from) * factor : length, layer);
+    if (to < y || y < to) isogi_dvr__add_values(g, to, y, fabs(y - to) * factor, layer);
 }
 
 static isogi_result isogi_dvr__integral_build(isogi_dvr__integral *g, const isogi_dvr__transfer *t, const isogi_dvr_desc *desc,
                                               const isogi_context *context) {
     size_t pieces = t->point_count ? t->point_count - 1 : 0, i;
-    double range[2];
     memset(g, 0, sizeof *g);
     g->points = t->points, g->count = t->point_count, g->rank_count = t->peak_count;
     for (i = 0; pieces >> i; i++) g->run_count += pieces >> i;
     g->quiet_capacity = t->point_count + t->peak_count + 1;
-    range[0] = range[1] = 0;
-    if (desc->classification == ISOGI_DVR_PRE_INTEGRATED) isogi_vol_range(desc->pyramid, range);
-    if (desc->classification == ISOGI_DVR_PRE_INTEGRATED && t->point_count && range[1] > range[0]) g->side = (size_t)desc->table;
+    if (desc->classification == ISOGI_DVR_PRE_INTEGRATED && t->point_count) {
+        double span[2], range[2];
+        isogi_dvr__transfer_span(t, span), isogi_vol_range(desc->pyramid, range);
+        g->low = span[0] > range[0] ? span[0] : range[0], g->high = span[1] < range[1] ? span[1] : range[1];
+        if (g->low < g->high) g->side = (size_t)desc->table;
+    }
     g->whole[0] = (isogi_dvr__layer *)isogi_allocate(context, g->run_count, sizeof *g->whole[0]);
     g->whole[1] = (isogi_dvr__layer *)isogi_allocate(context, g->run_count, sizeof *g->whole[1]);
     g->rank = (isogi_dvr__rank *)isogi_allocate(context, g->rank_count, sizeof *g->rank);
     g->quiet = (double(*)[2])isogi_allocate(context, g->quiet_capacity, sizeof *g->quiet);
     g->table = (float(*)[4])isogi_allocate(context, g->side * g->side, sizeof *g->table);
-    if ((g->run_count && (!g->whole[0] || !g->whole[1])) || (g->rank_count && !g->rank) || !g->quiet || (g->side && !g->table)) {
+    g->node = (double *)isogi_allocate(context, g->side, sizeof *g->node);
+    g->place = (double *)isogi_allocate(context, g->side ? g->count : 0, sizeof *g->place);
+    if ((g->run_count && (!g->whole[0] || !g->whole[1])) || (g->rank_count && !g->rank) || !g->quiet || (g->side && (!g->table || !g->node || !g->place))) {
         isogi_dvr__integral_free(g, context);
         return ISOGI_NO_MEMORY;
     }
@@ -1207,8 +1281,7 @@ static isogi_result isogi_dvr__integral_build(isogi_dvr__integral *g, const isog
     isogi_dvr__sort_ranks(g->rank, g->rank_count);
     isogi_dvr__set_quiet(g);
     isogi_dvr__set_whole(g);
-    g->low = range[0], g->scale = g->side ? (double)(g->side - 1) / (range[1] - range[0]) : 0;
-    if (g->side) isogi_dvr__set_pairs(g);
+    if (g->side) isogi_dvr__set_nodes(g), isogi_dvr__set_pairs(g);
     return ISOGI_OK;
 }
 
@@ -4594,12 +4667,8 @@ static void isogi_dvr__composite_values(isogi_dvr__pixel_ray *r, isogi_dvr__span
     if (!(length > 0)) length = s->piece.value[0] < s->piece.value[1] || s->piece.value[0] > s->piece.value[1] ? 0 : s->path;
     else if (!approximate) length *= s->factor;
     if (!(length > 0)) return;
-    if (s->sampled) {
-        if (!g->side) return;
-        opacity = isogi_dvr__look_up(g, x, y, length, layer.rgb);
-        for (a = 0; a < 3; a++) layer.rgb[a] *= opacity;
-        layer.clear = 1 - opacity;
-    } else isogi_dvr__add_values(g, x, y, length, &layer);
+    if (s->sampled) isogi_dvr__add_pair(g, x, y, length, &layer);
+    else isogi_dvr__add_values(g, x, y, length, &layer);
     opacity = 1 - layer.clear;
     if (!(opacity > 0)) return;
     if (approximate) {
@@ -4739,7 +4808,7 @@ static void isogi_dvr__cast(isogi_dvr__pixel_ray *r, isogi_dvr__march *m, isogi_
        mean extinction (K(b) - K(a)) / (b - a),   colour (C(b) - C(a)) / (K(b) - K(a)),   opacity 1 - exp(-mean * length)
    (Kraus 2005, eq. 6, 7 with the attenuation within a piece left to its opacity). Empty space is leapt over by the distance to the
    nearest block that is not empty. Light is linear between grid points, so that L . V is summed at the grid points, once for a
-   picture, and looked up as a colour every other sample. */
+   picture, and looked up as a colour once for each piece. */
 typedef struct isogi_dvr__class_entry { float before[4], mean[4]; } isogi_dvr__class_entry; /* integrals up to a class, and over it: rgb, extinction */
 
 struct isogi_dvr__frame {

@@ -109,6 +109,31 @@ TEST(an_outlier_takes_no_class_from_a_picture) {
     }
 }
 
+/* Pre-integrated tables of data space stand where the transfer function changes, however far outliers and its last points lie. */
+TEST(an_outlier_takes_no_entry_from_a_table_of_pairs) {
+    static const struct { double outlier; int far; } cases[] = {{0, 0}, {4e3, 0}, {1e30, 1}, {-1e30, 0}};
+    static float image[2][SIDE * SIDE][4];
+    const isogi_transfer_point narrow[] = {{0, {1, 0.5f, 0.2f}, 0}, {12, {0.2f, 0.5f, 1}, 0}, {13.5, {1, 1, 1}, 0.4f}, {15, {1, 1, 1}, 0}, {1e30, {1, 1, 1}, 1e-34f}};
+    for (size_t k = 0; k < sizeof cases / sizeof *cases; k++)
+        for (int silhouette = 0; silhouette < 2; silhouette++) {
+            field f = radius_field(49, fabs(cases[k].outlier));
+            const isogi_transfer transfer = {narrow, cases[k].far ? 5 : 4, NULL, 0};
+            if (cases[k].outlier < 0) isogi_vol_free(f.pyramid), f.value[0] = cases[k].outlier, field_build(&f);
+            for (int exact = 0; exact < 2; exact++) {
+                const isogi_dvr_desc desc = {.pyramid = f.pyramid, .space = ISOGI_DVR_DATA, .step = 0.25, .classification = exact ? ISOGI_DVR_EXACT : ISOGI_DVR_PRE_INTEGRATED,
+                                             .silhouette = silhouette ? ISOGI_DVR_SILHOUETTE_EXACT : ISOGI_DVR_SILHOUETTE_NONE};
+                isogi_dvr *dvr = dvr_new(&desc, &transfer);
+                CHECK(isogi_dvr_render(dvr, &view_49, NULL, image[exact], NULL, NULL) == ISOGI_OK, "render");
+                isogi_dvr_free(dvr);
+            }
+            float worst = 0;
+            for (int i = 0; i < SIDE * SIDE; i++)
+                for (int a = 0; a < 4; a++) worst = fmaxf(worst, fabsf(image[0][i][a] - image[1][i][a]));
+            CHECK(worst < (silhouette ? 0.015f : 0.006f), "outlier %g, silhouette %d, far %d: pixels err by %g", cases[k].outlier, silhouette, cases[k].far, (double)worst);
+            field_free(&f);
+        }
+}
+
 /* Shells down to a third of a voxel thick: pre-integrated pictures come nearer to what small steps see with every smaller step, down to a
    thousandth: by its square, or, where a tangent's turn lies within one step, in proportion to it. */
 TEST(pictures_of_thin_shells_converge_with_the_step) {
