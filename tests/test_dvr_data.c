@@ -345,13 +345,17 @@ TEST(scaling_space_by_a_million_either_way_changes_no_pixel) {
 /* Axes scaled each by its own factor, and the rays along with them: the same cells, the same cubics, the same pixels. */
 TEST(scaling_each_axis_along_with_the_rays_changes_nothing) {
     test_random r = {10};
+    uint64_t passed = 0;
     for (int n = 0; n < 60; n++) {
         field f = field_noise(8, (uint64_t)n);
         double scale[3], eye[2][3], target[2][3];
         const isogi_dvr_desc desc = {.pyramid = f.pyramid, .space = ISOGI_DVR_DATA, .opaque = 1};
         isogi_dvr *dvr = dvr_new(&desc, &landscape);
         random_line(&f, &r, eye[0], target[0]);
-        pixel p = cast(dvr, eye[0], target[0], NULL);
+        isogi_view view = line_of_sight(eye[0], target[0]);
+        isogi_counters count = {0};
+        pixel p;
+        CHECK(isogi_dvr_render(dvr, &view, NULL, (float(*)[4])p.c, NULL, &count) == ISOGI_OK, "render");
         isogi_dvr_free(dvr), isogi_vol_free(f.pyramid);
         for (int a = 0; a < 3; a++) {
             scale[a] = ldexp(1, (int)(random_bits(&r) % 40) - 20); /* powers of two: ends of the line stay floats */
@@ -368,10 +372,9 @@ TEST(scaling_each_axis_along_with_the_rays_changes_nothing) {
            the renderer does, not the view */
         double origin[3], dir[3], back[3];
         float at[3];
-        isogi_view view = line_of_sight(eye[0], target[0]);
         isogi_view_ray(&view, 0, 0, origin, at);
         for (int a = 0; a < 3; a++) dir[a] = (double)at[a];
-        isogi_dvr__march m;
+        isogi_dvr__march m = {0};
         isogi_dvr__pixel_ray ray = {.dvr = dvr, .clear = 1};
         memcpy(back, origin, sizeof back);
         if (isogi_dvr__begin(&m, dvr, back, dir, 1, 0.5)) isogi_dvr__cast_values(&ray, &m);
@@ -379,9 +382,15 @@ TEST(scaling_each_axis_along_with_the_rays_changes_nothing) {
             double got = a < 3 ? ray.rgb[a] : 1 - ray.clear;
             CHECK(fabs((double)p.c[a] - got) < 1e-7, "ray %d, channel %d: %.9g, not %.9g", n, a, got, (double)p.c[a]);
         }
+        /* the same way, cell by cell */
+        CHECK(m.work.cells == count.cells && m.work.cubics == count.cubics && m.work.blocks == count.blocks && m.work.blocks_skipped == count.blocks_skipped,
+              "ray %d: %d cells, %d cubics, %d blocks, %d skipped, not %d, %d, %d, %d", n, (int)m.work.cells, (int)m.work.cubics, (int)m.work.blocks, (int)m.work.blocks_skipped, (int)count.cells,
+              (int)count.cubics, (int)count.blocks, (int)count.blocks_skipped);
+        passed += count.cells;
         isogi_dvr_free(dvr);
         field_free(&f);
     }
+    CHECK(passed > 300, "%d cells", (int)passed);
 }
 
 TEST(constant_data_contributes_nothing_whatever_its_extinction) {

@@ -1,5 +1,8 @@
 /* The example programs as their users meet them: they run, and everything that is wrong is one clear line, an exit code other than 0 and
    no change to any file. The viewer has a file of its own. */
+#include "isogi_vol.h"
+#include "png.h"
+#include "procedural.h"
 #include "programs.h"
 
 TEST(programs_without_arguments_run) {
@@ -31,6 +34,45 @@ static void check_kept(const char *program, const char *format, int status, cons
     snprintf(arguments, sizeof arguments, format, kept);
     check_refusal(program, arguments, status, must_say);
     CHECK(read_text(kept, text, sizeof text) == 12 && !strcmp(text, "do not touch"), "%s %s changed its output", program, arguments);
+}
+
+/* Figure 1a of Kraus 2005: where the formula crosses a level between two pixels of a row there is ink, and ink is near a level. */
+TEST(isolines_lie_where_the_formula_has_their_values) {
+    enum { SIDE = 512, LINES = 12 };
+    const procedural_shape *shape = procedural_find("coulomb");
+    const double low = 0.3, high = 2.5, gap = (high - low) / (LINES - 1);
+    static unsigned char file[1 << 20];
+    static double value[SIDE][SIDE];
+    unsigned char *pixels = NULL;
+    char arguments[300], error[FILE_ERROR_SIZE];
+    int form[3], crossings = 0, bare = 0, inked = 0, stray = 0;
+    double furthest = 0;
+    snprintf(arguments, sizeof arguments, "coulomb %d %g %g '%s'", LINES, low, high, temporary("1a.png"));
+    run_result r = run_program("build/isolines", arguments);
+    FILE *f = fopen(temporary("1a.png"), "rb");
+    size_t size = f ? fread(file, 1, sizeof file, f) : 0;
+    if (f) fclose(f);
+    CHECK(r.status == 0 && png_decode(file, size, &pixels, form, error) && form[0] == SIDE && form[1] == SIDE && form[2] == 3, "status %d, %zu bytes", r.status, size);
+    if (!pixels) return;
+    for (int i = 0; i < SIDE * SIDE; i++) {
+        const double p[3] = {((i % SIDE + 0.5) / SIDE - 0.5) * 2, (0.5 - (i / SIDE + 0.5) / SIDE) * 2, 0};
+        value[i / SIDE][i % SIDE] = procedural_value(shape, p, 2 / 127.0);
+    }
+    for (int y = 1; y < SIDE - 1; y++)
+        for (int x = 1; x < SIDE - 1; x++) {
+            const unsigned char *at = pixels + 3 * (x + SIDE * y), *beside = at + 3;
+            double v = value[y][x], next = value[y][x + 1], level = fmin(fmax(floor((v - low) / gap + 0.5), 0), LINES - 1);
+            double slope = 0.5 * SIDE / 2 * sqrt(pow(next - value[y][x - 1], 2) + pow(value[y + 1][x] - value[y - 1][x], 2)); /* per unit, of a box of 2 */
+            if (floor((v - low) / gap) != floor((next - low) / gap) && fmax(v, next) > low && fmin(v, next) < high) {
+                crossings++, bare += at[1] > 200 && beside[1] > 200; /* paper is 0.9 in all channels, ink dark in green */
+            }
+            if (at[1] > 120) continue; /* at most a pixel off its line, here by the formula's slope */
+            double away = fabs(v - low - level * gap) / slope * SIDE / 2;
+            inked++, stray += away > 2, furthest = fmax(furthest, away);
+        }
+    printf("    %d crossings of levels, %d without ink; %d pixels of ink, the furthest %.2g pixels off\n", crossings, bare, inked, furthest);
+    CHECK(crossings > 2000 && inked > 5000 && !bare && !stray, "%d bare, %d stray", bare, stray);
+    free(pixels);
 }
 
 TEST(bad_isolines_get_one_line) {
