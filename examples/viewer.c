@@ -34,6 +34,8 @@ static const char *const shading_name[4] = {"unlit", "visibility", "local", "two
 static const char *const classification_name[3] = {"exact", "pre-integrated", "post-classified"};
 static const char *const silhouette_name[4] = {"none", "exact", "approximate", "gradient"};
 static const char *const transmission_name[3] = {"none", "diffuse", "specular"};
+static const char *const method_name[4] = {"default", "brute", "paper", "sweep"};
+static const char *const preset_name[4] = {"grey", "hot", "cool-warm", "spectrum"};
 static const char *const switch_name[2] = {"off", "on"};
 static const char *const ambient_name[2] = {"constant", "normal"};
 static const char *const normals_name[2] = {"smooth", "trilinear"};
@@ -78,14 +80,15 @@ static const scene scenes[] = {
 #define SCENE_COUNT (sizeof scenes / sizeof scenes[0])
 
 typedef struct options {
-    const char *volume, *env, *tf, *out, *compare;
+    const char *volume, *env, *tf, *out, *compare, *depth;
     const scene *scene;
-    int width, height, mode, raycast, bounces, samples, threads, stats, antialias, shading, classification, silhouette, transmission, order, directions, lookup, shadows, ambient, normals, storage;
-    int has_size, has_iso, has_mode, has_spacing, has_albedo, has_clip, has_camera, has_up, has_nan, has_shading, has_shadows, has_ambient, has_gloss;
-    double step, fog, gloss, offset, reach, isovalue, spacing[3], clip[4], azimuth, elevation, distance, up[3], exposure, nan_value;
+    int width, height, mode, raycast, bounces, samples, threads, stats, antialias, shading, classification, silhouette, transmission, order, directions;
+    int lookup, shadows, ambient, normals, storage, method, local, preset;
+    int has_size, has_iso, has_mode, has_spacing, has_albedo, has_preset, has_camera, has_up, has_nan, has_shading, has_shadows, has_ambient, has_gloss;
+    double step, fog, gloss, offset, reach, isovalue, spacing[3], clip[ISOGI_DVR_MAX_PLANES][4], azimuth, elevation, distance, up[3], exposure, nan_value;
     float albedo[3];
     isogi_light lights[MAX_LIGHTS];
-    size_t light_count, lattice[3], grid[3];
+    size_t light_count, clip_count, lattice[3], grid[3];
 } options;
 
 typedef struct viewer {
@@ -147,6 +150,8 @@ static int parse_shadows(viewer *v, const char *text) { return parse_name(text, 
 static int parse_ambient(viewer *v, const char *text) { return parse_name(text, ambient_name, 2, &v->o.ambient); }
 static int parse_normals(viewer *v, const char *text) { return parse_name(text, normals_name, 2, &v->o.normals); }
 static int parse_storage(viewer *v, const char *text) { return parse_name(text, storage_name, 5, &v->o.storage); }
+static int parse_method(viewer *v, const char *text) { return parse_name(text, method_name, 4, &v->o.method); }
+static int parse_preset(viewer *v, const char *text) { return parse_name(text, preset_name, 4, &v->o.preset); }
 static int parse_lookup(viewer *v, const char *text) { return parse_name(text, lookup_name, 4, &v->o.lookup); }
 
 static int parse_size(viewer *v, const char *text) {
@@ -172,8 +177,8 @@ static int parse_up(viewer *v, const char *text) {
 
 static int parse_clip(viewer *v, const char *text) {
     double x[4];
-    if (!numbers(text, ',', 4, -1e9, 1e9, x) || !(vector_dot(x, x) > 1e-18)) return 0;
-    memcpy(v->o.clip, x, sizeof x);
+    if (v->o.clip_count >= ISOGI_DVR_MAX_PLANES || !numbers(text, ',', 4, -1e9, 1e9, x) || !(vector_dot(x, x) > 1e-18)) return 0;
+    memcpy(v->o.clip[v->o.clip_count++], x, sizeof x);
     return 1;
 }
 
@@ -193,8 +198,8 @@ static const option option_list[] = {
     {"--size", "WxH", "pixels; default 900x900, 512x512 for dvr and scale-invariant", OTHER, 0, AT(has_size), 0, 0, 0, parse_size, "WxH, each 1 to 16384"},
     {"--iso", "V", "isovalue; default the shape's own, or a threshold found in the histogram", NUMBERS, AT(isovalue), AT(has_iso), 1, -1e300, 1e300, 0, "a number"},
     {"--raycast", 0, "exact rays instead of the rasterized mesh", FLAG, AT(raycast), 0, 0, 0, 0, 0, 0},
-    {"--clip", "A,B,C,D", "keep only a x + b y + c z + d >= 0 (world); what is cut shows the data", OTHER, 0, AT(has_clip), 0, 0, 0, parse_clip,
-     "four numbers, the first three not all zero"},
+    {"--clip", "A,B,C,D", "keep only a x + b y + c z + d >= 0 (world); what is cut shows the data; may be repeated", OTHER, 0, 0, 0, 0, 0, parse_clip,
+     "four numbers from -1e9 to 1e9, the first three not all zero (at least 1e-9 in length), at most 32 times"},
     {"--spacing", "X,Y,Z", "size of a voxel; default 1,1,1", NUMBERS, AT(spacing), AT(has_spacing), 3, 1e-9, 1e9, 0, "three numbers, 1e-9 to 1e9"},
     {"--nan", "V", "put this value in place of voxels that are not finite", NUMBERS, AT(nan_value), AT(has_nan), 1, -1e300, 1e300, 0, "a number"},
     {"--camera", "AZ,EL,DIST", "degrees about and above the horizon of --up; distance in radii of the box's sphere", OTHER, 0, AT(has_camera), 0, 0, 0,
@@ -228,7 +233,14 @@ static const option option_list[] = {
      "else one suggested by the histogram", TEXT, AT(tf), 0, 0, 0, 0, 0, ""},
     {"--shading", "NAME", "for dvr and scale-invariant: unlit, visibility, local, two-sided", OTHER, 0, AT(has_shading), 0, 0, 0, parse_shading,
      "unlit visibility local two-sided"},
-    {"--classification", "NAME", "for scale-invariant: exact, pre-integrated, post-classified", OTHER, 0, 0, 0, 0, 0, parse_classification,
+    {"--preset", "NAME", "transfer function of these colours, denser the larger the value, where the histogram has something: grey, hot, cool-warm, spectrum",
+     OTHER, 0, AT(has_preset), 0, 0, 0, parse_preset, "grey hot cool-warm spectrum"},
+    {"--method", "NAME", "for dvr with visibility: how that is computed: default, brute, paper, sweep", OTHER, 0, 0, 0, 0, 0, parse_method,
+     "default brute paper sweep"},
+    {"--local", 0, "light by local visibility, of --method paper: for clip planes and lights within", FLAG, AT(local), 0, 0, 0, 0, 0, 0},
+    {"--depth", "FILE.pfm", "as well, for dvr and scale-invariant: distance from the eye to half of a pixel's opacity, where nothing is seen infinity, as "
+     "floats (the nearest of a pixel's samples)", TEXT, AT(depth), 0, 0, 0, 0, 0, ""},
+    {"--classification", "NAME", "for scale-invariant: exact, pre-integrated, post-classified; dvr knows the last one and, for both others, its own", OTHER, 0, 0, 0, 0, 0, parse_classification,
      "exact pre-integrated post-classified"},
     {"--silhouette", "NAME", "surfaces seen aslant are more opaque: none, exact, approximate, gradient", OTHER, 0, 0, 0, 0, 0, parse_silhouette,
      "none exact approximate gradient"},
@@ -268,9 +280,37 @@ static void print_help(void) {
          "Examples\n"
          "  build/viewer procedural:engine-block --out engine.png\n"
          "  build/viewer head_256x256x99_uint8.raw --spacing 1,1,2 --iso 130 --env studio.hdr --out head.png\n"
-         "  build/viewer procedural:gyroid --mode vicinity --clip 1,0,0,-40 --size 600x600 --stats\n"
+         "  build/viewer procedural:gyroid --mode vicinity --clip 1,0,0,-40 --clip 0,-1,0,100 --size 600x600 --stats\n"
          "  build/viewer --scene engine --mode pathtrace --samples 256 --out reference.png\n"
          "  build/viewer procedural:skull --light directional:1,2,3:4,3.8,3.5:3 --camera 20,10,2.4");
+}
+
+/* Options that one kind of picture has no use for are refused, not ignored. */
+static const char *const of_volumes[] = {"--tf", "--preset", "--shading", "--classification", "--silhouette", "--transmission", "--step", "--method", "--local", "--depth", NULL};
+static const char *const of_surfaces[] = {"--raycast", "--albedo", "--bounces", "--samples", "--lattice", "--lookup", "--shadows", "--ambient", "--fog", "--gloss", "--normals", "--offset",
+                                          "--reach", "--storage", NULL};
+
+static int check_use(viewer *v, int argc, char **argv) {
+    const char *const *useless = v->o.mode >= DVR ? of_surfaces : of_volumes;
+    for (int i = 1; i < argc; i++) {
+        size_t k;
+        for (k = 0; useless[k] && strcmp(argv[i], useless[k]) != 0;) k++;
+        if (useless[k])
+            return file_fail(v->error, "%s: works with %s, not with --mode %s", argv[i], v->o.mode >= DVR ? "surfaces" : "--mode dvr and scale-invariant", mode_name[v->o.mode]);
+        for (k = 0; k < OPTION_COUNT && strcmp(argv[i], option_list[k].name) != 0;) k++;
+        i += k < OPTION_COUNT && option_list[k].kind != FLAG; /* its value may look like an option */
+    }
+    return 1;
+}
+
+/* What volume rendering cannot do together. */
+static int check_volume(viewer *v) {
+    const options *o = &v->o;
+    int lit = o->mode == DVR && (!o->has_shading || o->shading == ISOGI_DVR_VISIBILITY);
+    if (o->tf && o->has_preset) return file_fail(v->error, "give --tf or --preset, not both");
+    if (o->method && o->method != ISOGI_DVR_BRUTE && !lit) return file_fail(v->error, "--method: %s is for --mode dvr with --shading visibility", method_name[o->method]);
+    if (o->local && !(lit && o->method == ISOGI_DVR_PAPER)) return file_fail(v->error, "--local: needs --mode dvr, --shading visibility and --method paper");
+    return 1;
 }
 
 static int parse_value(viewer *v, const option *p, const char *text) {
@@ -312,9 +352,9 @@ static int parse_arguments(viewer *v, int argc, char **argv) {
     if (!o->volume == !o->scene) return file_fail(v->error, o->volume ? "give VOLUME or --scene, not both" : "no volume: build/viewer VOLUME [options], --help explains");
     if (!o->out) o->out = "isogi.png";
     if (o->scene && !o->has_mode) o->mode = o->scene->lit ? IRRADIANCE : DVR;
-    if (o->scene && o->mode >= DVR && !o->scene->rendered && !o->tf)
-        return file_fail(v->error, "--scene %s has no transfer function: give one by --tf, or another --mode", o->scene->name);
-    if (o->raycast && o->mode >= DVR) return file_fail(v->error, "--raycast: works with surfaces, not with --mode %s", mode_name[o->mode]);
+    if (o->scene && o->mode >= DVR && !o->scene->rendered && !o->tf && !o->has_preset)
+        return file_fail(v->error, "--scene %s has no transfer function: give one by --tf or --preset, or another --mode", o->scene->name);
+    if (!check_use(v, argc, argv) || !check_volume(v)) return 0;
     if (!o->has_size) o->width = o->height = o->mode >= DVR ? 512 : 900;
     if ((double)o->width * o->height > 100e6) return file_fail(v->error, "--size: %dx%d is too large; at most 100 million pixels", o->width, o->height);
     if (!o->samples) o->samples = 64;
@@ -610,10 +650,12 @@ static int visible_range(const view_job *job, const float dir[3], double *from, 
         near_t = (d > 0 ? -a[i] : end - a[i]) / d, far_t = (d > 0 ? end - a[i] : -a[i]) / d;
         *from = near_t > *from ? near_t : *from, *to = far_t < *to ? far_t : *to;
     }
-    if (v->o.has_clip) {
-        double rate = 0, start = vector_dot(v->o.clip, v->view.eye) + v->o.clip[3];
-        for (int i = 0; i < 3; i++) rate += v->o.clip[i] * (double)dir[i];
-        if (fabs(rate) < 1e-12) return start >= 0 && *from < *to;
+    for (size_t k = 0; k < v->o.clip_count; k++) {
+        const double *clip = v->o.clip[k];
+        double rate = 0, start = vector_dot(clip, v->view.eye) + clip[3];
+        for (int i = 0; i < 3; i++) rate += clip[i] * (double)dir[i];
+        if (fabs(rate) < 1e-12 && start < 0) return 0;
+        if (fabs(rate) < 1e-12) continue;
         if (rate > 0) *from = -start / rate > *from ? -start / rate : *from;
         else *to = -start / rate < *to ? -start / rate : *to;
     }
@@ -667,7 +709,7 @@ static int view_sample(viewer *v, int sample) {
     if (!job.row_counters) return fail(v, "the picture", ISOGI_NO_MEMORY);
     sample_offset(v, sample, &job.x_offset, &job.y_offset);
     if (!job.trace)
-        result = raster_draw(&v->mesh, &v->view, job.x_offset, job.y_offset, v->o.has_clip ? v->o.clip : NULL, job.near_plane,
+        result = raster_draw(&v->mesh, &v->view, job.x_offset, job.y_offset, (const double(*)[4])v->o.clip, v->o.clip_count, job.near_plane,
                              v->inverse[sample], v->seen[sample], &v->context);
     if (result == ISOGI_OK) result = isogi_parallel(&v->context, rows, view_row, &job, 0, 0);
     for (size_t i = 0; i < rows; i++) v->counters.rays += job.row_counters[i].rays;
@@ -797,13 +839,15 @@ static void mesh_normal(const viewer *v, uint32_t triangle, const float point[3]
     for (int i = 0; i < 3; i++) n[i] = (float)sum[i];
 }
 
-/* Normal of the plane through which the view entered: the clip plane or a side of the box. */
+/* Normal of the plane through which the view entered: a clip plane or a side of the box. */
 static void section_normal(const viewer *v, const float point[3], double n[3]) {
     double p[3] = {(double)point[0], (double)point[1], (double)point[2]}, grid[3], nearest = 1e30;
-    if (v->o.has_clip) {
-        double length = sqrt(vector_dot(v->o.clip, v->o.clip));
-        nearest = fabs(vector_dot(v->o.clip, p) + v->o.clip[3]) / length / v->radius * 100;
-        for (int i = 0; i < 3; i++) n[i] = -v->o.clip[i] / length;
+    for (size_t k = 0; k < v->o.clip_count; k++) {
+        const double *clip = v->o.clip[k];
+        double length = sqrt(vector_dot(clip, clip)), distance = fabs(vector_dot(clip, p) + clip[3]) / length / v->radius * 100;
+        if (!(distance < nearest)) continue;
+        nearest = distance;
+        for (int i = 0; i < 3; i++) n[i] = -clip[i] / length;
     }
     isogi_vol_to_grid(v->pyramid, p, grid);
     for (int i = 0; i < 3; i++) {
@@ -1070,12 +1114,47 @@ static int default_transfer(viewer *v) {
     return transfer_parse(text, &v->transfer, v->error);
 }
 
+/* A preset's colours from where the second class of values is suggested to begin; as dense as what is suggested. */
+static int preset_transfer(viewer *v) {
+    isogi_transfer_point points[ISOGI_SUGGEST_POINTS > ISOGI_PRESET_POINTS ? ISOGI_SUGGEST_POINTS : ISOGI_PRESET_POINTS];
+    char text[4096], *at = text, *end = text + sizeof text;
+    isogi_result result = isogi_transfer_suggest(v->pyramid, v->o.mode == DVR ? ISOGI_DVR_PHYSICAL : ISOGI_DVR_DATA, points, NULL);
+    if (result == ISOGI_OK) result = isogi_transfer_preset((isogi_preset)v->o.preset, points[1].value, points[5].value, (float)fmin((double)points[5].extinction, 1e30), points);
+    if (result != ISOGI_OK) return file_fail(v->error, "--preset: the volume has a single value");
+    for (int i = 0; i < ISOGI_PRESET_POINTS; i++)
+        at += snprintf(at, (size_t)(end - at), "%.17g %.9g %.6f %.6f %.6f\n", points[i].value, (double)points[i].extinction, (double)points[i].rgb[0], (double)points[i].rgb[1],
+                       (double)points[i].rgb[2]);
+    return transfer_parse(text, &v->transfer, v->error);
+}
+
 static int set_transfer(viewer *v) {
     const scene *s = v->o.scene;
     const char *text = s && s->transfer ? s->transfer : v->shape && (v->o.mode == DVR || !strncmp(v->shape->transfer, "peak", 4)) ? v->shape->transfer : NULL;
     if (v->o.tf) return transfer_read(v->o.tf, &v->transfer, v->error);
+    if (v->o.has_preset) return preset_transfer(v);
     if (text && (v->o.mode == DVR || !strncmp(text, "peak", 4))) return transfer_parse(text, &v->transfer, v->error);
     return default_transfer(v);
+}
+
+/* Portable float map: the lowest row first, little-endian. Of the factor * factor samples of a pixel the nearest. */
+static int write_depth(viewer *v, const float *depth, int factor) {
+    size_t width = (size_t)v->o.width, height = (size_t)v->o.height, f = (size_t)factor, size;
+    unsigned char *file = (unsigned char *)malloc(64 + 4 * width * height), *at;
+    int ok;
+    if (!file) return fail(v, "--depth", ISOGI_NO_MEMORY);
+    at = file + sprintf((char *)file, "Pf\n%zu %zu\n-1.0\n", width, height);
+    for (size_t y = height; y-- > 0;)
+        for (size_t x = 0; x < width; x++, at += 4) {
+            float nearest = INFINITY;
+            uint32_t bits;
+            for (size_t i = 0; i < f * f; i++) nearest = fminf(nearest, depth[(y * f + i / f) * width * f + x * f + i % f]);
+            memcpy(&bits, &nearest, sizeof bits);
+            for (int i = 0; i < 4; i++) at[i] = (unsigned char)(bits >> 8 * i);
+        }
+    size = (size_t)(at - file);
+    ok = file_write(v->o.depth, file, size, v->error);
+    free(file);
+    return ok;
 }
 
 static int render_volume(viewer *v) {
@@ -1083,14 +1162,16 @@ static int render_volume(viewer *v) {
     isogi_dvr_desc desc = {.pyramid = v->pyramid, .space = v->o.mode == DVR ? ISOGI_DVR_PHYSICAL : ISOGI_DVR_DATA,
                            .shading = v->o.mode == DVR ? ISOGI_DVR_VISIBILITY : ISOGI_DVR_LOCAL};
     int factor = (int)(sqrt((double)v->o.antialias) + 1e-9);
-    isogi_view view = {.width = v->o.width * factor, .height = v->o.height * factor};
+    isogi_view view = {.width = v->o.width * factor, .height = v->o.height * factor, .local = v->o.local};
     size_t pixels = (size_t)view.width * (size_t)view.height;
-    float(*large)[4] = NULL;
+    float(*large)[4] = NULL, *depth = NULL;
+    int ok = 1;
     isogi_dvr *dvr = NULL;
     double begun = seconds(), remaining = 1;
     isogi_result result;
     if (v->o.has_shading) desc.shading = (isogi_dvr_shading)v->o.shading;
     desc.classification = (isogi_dvr_classification)v->o.classification, desc.silhouette = (isogi_dvr_silhouette)v->o.silhouette, desc.step = v->o.step;
+    desc.method = (isogi_dvr_method)v->o.method;
     for (int i = 0; i < 3; i++) {
         desc.material[i].exponent = i < 2 || v->o.transmission == 2 ? 30 : 0;
         for (int c = 0; c < 3; c++) desc.material[i].specular[c] = 1, desc.material[i].diffuse[c] = i < 2 || v->o.transmission ? 1 : 1e-20f;
@@ -1100,7 +1181,7 @@ static int render_volume(viewer *v) {
     if (!set_transfer(v)) return 0;
     result = isogi_dvr_create(&dvr, &desc, &v->context);
     if (result == ISOGI_OK) result = isogi_dvr_set_transfer(dvr, &v->transfer.transfer);
-    if (result == ISOGI_OK && v->o.has_clip) result = isogi_dvr_set_clip(dvr, (const double(*)[4])&v->o.clip, 1);
+    if (result == ISOGI_OK) result = isogi_dvr_set_clip(dvr, (const double(*)[4])v->o.clip, v->o.clip_count);
     for (uint64_t budget = 20000; result == ISOGI_OK && remaining > 0 && desc.shading == ISOGI_DVR_VISIBILITY; budget += budget / 4) {
         result = isogi_dvr_step(dvr, budget, &remaining);
         say(v, "visibility", 1 - remaining, begun);
@@ -1109,14 +1190,18 @@ static int render_volume(viewer *v) {
     if (result == ISOGI_OK) isogi_dvr_counters(dvr, &v->counters);
     stat_line(v, "rays_light", "%llu", (unsigned long long)v->counters.rays);
     large = (float(*)[4])malloc(pixels * sizeof *large);
-    if (result == ISOGI_OK && !large) result = ISOGI_NO_MEMORY;
-    if (result == ISOGI_OK) result = isogi_dvr_render(dvr, &view, &v->lighting, large, NULL, &v->counters);
-    for (size_t i = 0; result == ISOGI_OK && i < pixels; i++) {
+    if (v->o.depth) depth = (float *)malloc(pixels * sizeof *depth);
+    if (result == ISOGI_OK && (!large || (v->o.depth && !depth))) result = ISOGI_NO_MEMORY;
+    if (result == ISOGI_OK && v->o.local && v->transfer.peak_count) ok = file_fail(v->error, "--local: knows no peaks, and the transfer function has some");
+    if (result == ISOGI_OK && ok) result = isogi_dvr_render(dvr, &view, &v->lighting, large, depth, &v->counters);
+    for (size_t i = 0; result == ISOGI_OK && ok && i < pixels; i++) {
         size_t x = i % (size_t)view.width / (size_t)factor, y = i / (size_t)view.width / (size_t)factor;
         for (int c = 0; c < 4; c++) v->picture[y * (size_t)v->o.width + x][c] += large[i][c] / (float)(factor * factor);
     }
-    free(large);
+    if (result == ISOGI_OK && ok && depth) ok = write_depth(v, depth, factor);
+    free(large), free(depth);
     isogi_dvr_free(dvr);
+    if (!ok) return 0;
     stat_seconds(v, "render", begun);
     stat_line(v, "samples_view", "%llu", (unsigned long long)v->counters.samples);
     return result == ISOGI_OK || fail(v, "volume rendering", result);
@@ -1195,7 +1280,7 @@ static int check_surface(viewer *v) {
 
 static int run(viewer *v, int argc, char **argv) {
     struct rusage usage;
-    if (!parse_arguments(v, argc, argv) || !file_writable(v->o.out, v->error)) return 0;
+    if (!parse_arguments(v, argc, argv) || !file_writable(v->o.out, v->error) || (v->o.depth && !file_writable(v->o.depth, v->error))) return 0;
     if (v->o.compare && !read_compared(v)) return 0;
     if (!v->o.antialias) v->o.antialias = v->o.mode == DVR ? 1 : 4;
     v->context.alloc = counted_alloc, v->context.release = counted_release, v->context.user = v, v->context.threads = v->o.threads;

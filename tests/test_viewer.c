@@ -191,6 +191,112 @@ TEST(gloss_of_transfer_adds_highlights) {
     for (int i = 0; i < 3; i++) free(picture[i]);
 }
 
+/* Several clip planes cut what each of them cuts, in any order, of surfaces (by mesh and by rays) and of volumes. */
+TEST(clip_planes_add_up) {
+    static const char *const ways[] = {"--mode vicinity --samples 4", "--mode lambert --raycast", "--mode dvr --exposure 1"};
+    static const char *const planes[] = {"--clip 1,0,0,-12", "--clip 0,-1,0,18", "--clip 1,0,0,-12 --clip 0,-1,0,18", "--clip 0,-1,0,18 --clip 1,0,0,-12", ""};
+    char command[512];
+    for (int w = 0; w < 3; w++) {
+        unsigned char *picture[5];
+        int shape[3] = {0}, kept[5] = {0};
+        double outliers;
+        for (int k = 0; k < 5; k++) {
+            snprintf(command, sizeof command, "procedural:gyroid:32 %s %s --size 48x48 --out '%s'", ways[w], planes[k], temporary("cut.png"));
+            run_result r = run_viewer(command);
+            CHECK(r.status == 0, "%s: %s", command, r.error);
+            picture[k] = read_picture(temporary("cut.png"), shape);
+            if (!picture[k]) return;
+        }
+        CHECK(!memcmp(picture[2], picture[3], 48 * 48 * 3), "%s: the order matters", ways[w]);
+        for (int k = 0; k < 3; k++)
+            for (int i = 0; i < k; i++) CHECK(picture_difference(picture[i], picture[k], 48, 48, &outliers) > 2, "%s: \"%s\" looks like \"%s\"", ways[w], planes[i], planes[k]);
+        /* where the backdrop is seen: at least as much of it as by either plane alone */
+        snprintf(command, sizeof command, "procedural:gyroid:32 %s --clip 1,0,0,-1e6 --size 48x48 --out '%s'", ways[w], temporary("cut.png"));
+        CHECK(run_viewer(command).status == 0, "%s", command);
+        unsigned char *nothing = read_picture(temporary("cut.png"), shape);
+        for (int i = 0; nothing && w && i < 48 * 48; i++)
+            for (int k = 0; k < 3; k++) kept[k] += memcmp(picture[k] + 3 * i, nothing + 3 * i, 3) != 0;
+        CHECK(!w || (kept[2] > 0 && kept[2] < kept[0] && kept[2] < kept[1]), "%s: %d, %d and %d pixels", ways[w], kept[0], kept[1], kept[2]);
+        for (int k = 0; k < 5; k++) free(picture[k]);
+        free(nothing);
+    }
+}
+
+/* What is said of volume rendering changes its picture as it should. */
+TEST(methods_local_light_and_presets_are_seen) {
+    static const char *const ways[] = {"", "--method sweep", "--method brute", "--method paper", "--method paper --local", "--preset grey", "--preset hot", "--preset cool-warm", "--preset spectrum"};
+    unsigned char *picture[9];
+    char command[512];
+    int shape[3];
+    double outliers;
+    for (int k = 0; k < 9; k++) {
+        snprintf(command, sizeof command, "procedural:engine-block:40 --mode dvr --size 48x48 --exposure 1 %s --out '%s'", ways[k], temporary("way.png"));
+        run_result r = run_viewer(command);
+        CHECK(r.status == 0, "%s: %s", command, r.error);
+        picture[k] = read_picture(temporary("way.png"), shape);
+        if (!picture[k]) return;
+    }
+    CHECK(!memcmp(picture[0], picture[1], 48 * 48 * 3), "the default is not sweeps");
+    for (int k = 2; k < 9; k++)
+        for (int i = k < 5 ? 1 : 0; i < k; i++) {
+            double difference = picture_difference(picture[i], picture[k], 48, 48, &outliers);
+            CHECK(difference > (k < 5 ? 0.1 : 1), "\"%s\" looks like \"%s\": %g", ways[i], ways[k], difference);
+            if (k < 4) CHECK(difference < 12, "\"%s\" differs from \"%s\" by %g", ways[i], ways[k], difference);
+        }
+    for (int k = 0; k < 9; k++) free(picture[k]);
+}
+
+/* Lines end as they do anywhere. */
+TEST(transfer_functions_end_their_lines_by_cr_or_lf) {
+    static const char *const text[] = {"-1 0 1 .5 .2\n0 .3 1 .5 .2\n# half\n\n1 1 .2 .5 1\n", "-1 0 1 .5 .2\r0 .3 1 .5 .2\r# half\r\r1 1 .2 .5 1\r", "-1 0 1 .5 .2\r\n0 .3 1 .5 .2\r\n# half\r\n\r\n1 1 .2 .5 1"};
+    char command[512];
+    unsigned char *picture[3];
+    int shape[3];
+    for (int k = 0; k < 3; k++) {
+        write_bytes(temporary("lines.tf"), text[k], strlen(text[k]));
+        snprintf(command, sizeof command, "procedural:gyroid:16 --mode dvr --shading unlit --size 32x32 --tf '%s' --out '%s'", temporary("lines.tf"), temporary("lines.png"));
+        run_result r = run_viewer(command);
+        CHECK(r.status == 0, "%d: %s", k, r.error);
+        picture[k] = read_picture(temporary("lines.png"), shape);
+        if (!picture[k]) return;
+    }
+    for (int k = 1; k < 3; k++) CHECK(!memcmp(picture[0], picture[k], 32 * 32 * 3), "case %d looks otherwise", k);
+    for (int k = 0; k < 3; k++) free(picture[k]);
+    write_bytes(temporary("lines.tf"), "1 0 0 0 0\r2 0 0 0 0\r\n3 0 0 0 0\n4 0 0 0 2\n", 41);
+    snprintf(command, sizeof command, "procedural:gyroid:8 --mode dvr --tf '%s' --out '%s'", temporary("lines.tf"), temporary("never.png"));
+    check_refused(command, "line 4: a colour");
+}
+
+/* An opaque box, seen from in front: depth is the distance to its face, from 3 radii to its middle, in the middle of a picture without a middle pixel. */
+TEST(depth_is_written_as_a_float_map) {
+    unsigned char box[8 * 8 * 8];
+    char path[256], command[1024];
+    static unsigned char map[1 << 15];
+    const float *depth = NULL;
+    static float rows[40 * 30];
+    memset(box, 9, sizeof box);
+    strcpy(path, temporary("box_8x8x8_uint8.raw"));
+    write_bytes(path, box, sizeof box);
+    write_bytes(temporary("box.tf"), "0 1e6 1 1 1\n", 11);
+    for (int aa = 1; aa <= 4; aa += 3) {
+        snprintf(command, sizeof command, "'%s' --mode dvr --shading unlit --size 40x30 --aa %d --camera 0,0,3 --tf '%s' --depth '%s' --out '%s'", path, aa, temporary("box.tf"), temporary("box.pfm"), temporary("box.png"));
+        run_result r = run_viewer(command);
+        FILE *file = fopen(temporary("box.pfm"), "rb");
+        size_t size = file ? fread(map, 1, sizeof map, file) : 0;
+        if (file) fclose(file);
+        CHECK(r.status == 0 && size == 14 + 4 * 40 * 30 && !memcmp(map, "Pf\n40 30\n-1.0\n", 14), "%s, %zu bytes", r.error, size);
+        if (size != 14 + 4 * 40 * 30) return;
+        for (int i = 0; i < 40 * 30; i++) {
+            uint32_t bits = map[14 + 4 * i] | (uint32_t)map[15 + 4 * i] << 8 | (uint32_t)map[16 + 4 * i] << 16 | (uint32_t)map[17 + 4 * i] << 24;
+            memcpy(&rows[i], &bits, sizeof bits);
+        }
+        depth = rows;
+        double expected = 3 * sqrt(3) * 3.5 - 3.5, got = (double)depth[15 * 40 + 20];
+        CHECK(fabs(got - expected) < 0.2, "--aa %d: depth %g, not %g", aa, got, expected);
+        CHECK(depth[0] > 1e30f && depth[39] > 1e30f && depth[29 * 40] > 1e30f, "nothing in the corners: %g", (double)depth[0]);
+    }
+}
+
 /* ---- what is refused --------------------------------------------------------------------------------------------------------------------- */
 
 TEST(silly_options_get_one_line_that_names_the_option) {
@@ -205,7 +311,14 @@ TEST(silly_options_get_one_line_that_names_the_option) {
         {"procedural:gyroid --albedo 2,0,0", "--albedo"}, {"procedural:gyroid --albedo 1", "--albedo"}, {"procedural:gyroid --bounces 1.5", "--bounces"},
         {"procedural:gyroid --bounces -2", "--bounces"}, {"procedural:gyroid --samples 0", "--samples"}, {"procedural:gyroid --samples 1e30", "--samples"},
         {"procedural:gyroid --lattice 0,4,4", "--lattice"}, {"procedural:gyroid --lattice 4,4", "--lattice"}, {"procedural:gyroid --lookup magic", "--lookup"},
-        {"procedural:gyroid --clip 0,0,0,1", "--clip"}, {"procedural:gyroid --clip 1,2,3", "--clip"},
+        {"procedural:gyroid --clip 0,0,0,1", "--clip"}, {"procedural:gyroid --clip 1,2,3", "--clip"}, {"procedural:gyroid --clip 1e30,0,0,1", "from -1e9 to 1e9"},
+        {"procedural:gyroid --tf x.tf", "--tf: works with --mode dvr"}, {"procedural:gyroid --mode phong --classification exact", "--classification: works with --mode dvr"},
+        {"procedural:gyroid --step 1", "--step: works"}, {"procedural:gyroid --mode dvr --samples 4", "--samples: works with surfaces"}, {"procedural:gyroid --mode dvr --raycast", "--raycast: works with surfaces"},
+        {"procedural:gyroid --mode scale-invariant --method paper", "--method: paper"}, {"procedural:gyroid --mode dvr --shading unlit --method sweep", "--method: sweep"},
+        {"procedural:gyroid --mode dvr --method fast", "default brute paper sweep"}, {"procedural:gyroid --mode dvr --local", "--local: needs"},
+        {"procedural:gyroid --mode dvr --preset rainbow", "grey hot cool-warm spectrum"}, {"procedural:gyroid --mode dvr --preset hot --tf x.tf", "not both"},
+        {"procedural:gyroid --depth a.pfm", "--depth: works"}, {"procedural:gyroid:8 --mode dvr --depth /nowhere/a.pfm", "/nowhere/a.pfm"},
+        {"procedural:coulomb:8 --mode dvr --method paper --local", "--local: knows no peaks"},
         {"procedural:gyroid --camera 1,2", "--camera"}, {"procedural:gyroid --camera 0,91,2", "--camera"}, {"procedural:gyroid --camera 0,0,0", "--camera"},
         {"procedural:gyroid --up 0,0,0", "--up"}, {"procedural:gyroid --threads -1", "--threads"}, {"procedural:gyroid --threads 1000", "--threads"},
         {"procedural:gyroid --light sun:1,1,1:1,1,1", "--light"}, {"procedural:gyroid --light directional:0,0,0:1,1,1", "--light"},
@@ -332,7 +445,7 @@ TEST(stats_are_key_value_lines_and_help_is_complete) {
     static const char *const keys[] = {"size 32x32x32", "range ", "isovalue ", "triangles ", "rays_light ", "rays_per_second ", "texels_computed ",
                                        "texels_requested ", "memory_bytes ", "seconds_bake ", "seconds_total ", "error_relative "};
     static const char *const named[] = {"--scene", "--size", "--iso", "--mode", "--raycast", "--spacing", "--env", "--light", "--albedo", "--bounces", "--samples",
-                                        "--lattice", "--lookup", "--shadows", "--ambient", "--fog", "--gloss", "--normals", "--offset", "--reach", "--storage", "--compare", "--tf", "--clip", "--camera", "--up", "--threads", "--out", "--stats", "procedural:", "Examples"};
+                                        "--lattice", "--lookup", "--shadows", "--ambient", "--fog", "--gloss", "--normals", "--offset", "--reach", "--storage", "--compare", "--tf", "--preset", "--method", "--local", "--depth", "--clip", "--camera", "--up", "--threads", "--out", "--stats", "procedural:", "Examples"};
     char command[512];
     run_result r;
     snprintf(command, sizeof command, "procedural:gyroid:32 --size 32x32 --samples 8 --stats --out '%s'", temporary("stats.png"));
@@ -539,7 +652,7 @@ TEST(rasterizer_leaves_no_crack) {
             }
         mesh.positions = positions, mesh.triangles = triangles, mesh.vertex_count = (n + 1) * (n + 1), mesh.triangle_count = count;
         camera_look(&view, 200, 150, eye, target, up, 45);
-        CHECK(raster_draw(&mesh, &view, 0.125, -0.375, NULL, 0.01, inverse, seen, NULL) == ISOGI_OK, "pass %d", pass);
+        CHECK(raster_draw(&mesh, &view, 0.125, -0.375, NULL, 0, 0.01, inverse, seen, NULL) == ISOGI_OK, "pass %d", pass);
         for (int i = 0; i < 200 * 150; i++) holes += seen[i] == RASTER_NONE, wrong += fabs(1 / (double)inverse[i] - 3) > 1e-5;
         CHECK(!holes && !wrong, "pass %d: %zu pixels are empty, %zu have a wrong depth", pass, holes, wrong);
     }
@@ -570,7 +683,7 @@ TEST(rasterizer_agrees_with_rays) {
         for (uint32_t i = 0; i < 60; i++) triangles[i / 3][i % 3] = i;
         mesh.positions = positions, mesh.triangles = triangles, mesh.vertex_count = 60, mesh.triangle_count = 20;
         camera_look(&view, 64, 48, eye, target, up, 60);
-        CHECK(raster_draw(&mesh, &view, 0, 0, NULL, 0.05, inverse, seen, NULL) == ISOGI_OK, "pass %d", pass);
+        CHECK(raster_draw(&mesh, &view, 0, 0, NULL, 0, 0.05, inverse, seen, NULL) == ISOGI_OK, "pass %d", pass);
         for (int i = 0; i < 64 * 48; i++) {
             double d[3], nearest = 1e30, closest = 1;
             camera_direction(&view, i % 64, i / 64, d);

@@ -25,7 +25,8 @@ typedef struct raster_job {
     const isogi_mesh *mesh;
     const camera *view;
     double x_offset, y_offset; /* of the sample within the pixel, -1/2 .. 1/2 */
-    const double *clip;        /* NULL, or a b c d: only a x + b y + c z + d >= 0 is drawn */
+    const double (*clip)[4];   /* a b c d: only a x + b y + c z + d >= 0 is drawn */
+    size_t clip_count;
     double near_plane;
     float *inverse;
     uint32_t *triangle;
@@ -125,10 +126,15 @@ static inline int64_t raster_bias(const raster_corner *a, const raster_corner *b
 
 static inline int raster_kept(const raster_job *job, double x, double y, double inverse) {
     double d[3];
-    const double *plane = job->clip, *eye = job->view->eye;
-    if (!plane) return 1;
+    const double *eye = job->view->eye;
+    size_t i;
+    if (!job->clip_count) return 1;
     camera_direction(job->view, x + job->x_offset, y + job->y_offset, d);
-    return plane[0] * (eye[0] + d[0] / inverse) + plane[1] * (eye[1] + d[1] / inverse) + plane[2] * (eye[2] + d[2] / inverse) + plane[3] >= 0;
+    for (i = 0; i < job->clip_count; i++) {
+        const double *plane = job->clip[i];
+        if (!(plane[0] * (eye[0] + d[0] / inverse) + plane[1] * (eye[1] + d[1] / inverse) + plane[2] * (eye[2] + d[2] / inverse) + plane[3] >= 0)) return 0;
+    }
+    return 1;
 }
 
 static inline void raster_triangle(const raster_job *job, raster_corner c[3], uint32_t id, int row0, int row1) {
@@ -216,13 +222,13 @@ static inline void raster_band_task(void *arg, size_t band) {
 }
 
 /* inverse[height*width]: 1 / depth of what is seen, 0 = nothing; triangle: its number, or RASTER_NONE. */
-static inline isogi_result raster_draw(const isogi_mesh *mesh, const camera *view, double x_offset, double y_offset, const double *clip,
-                                       double near_plane, float *inverse, uint32_t *triangle, const isogi_context *context) {
+static inline isogi_result raster_draw(const isogi_mesh *mesh, const camera *view, double x_offset, double y_offset, const double (*clip)[4],
+                                       size_t clip_count, double near_plane, float *inverse, uint32_t *triangle, const isogi_context *context) {
     raster_job job;
     isogi_result result = ISOGI_NO_MEMORY;
     size_t i, total = 0, cells;
     memset(&job, 0, sizeof job);
-    job.mesh = mesh, job.view = view, job.x_offset = x_offset, job.y_offset = y_offset, job.clip = clip;
+    job.mesh = mesh, job.view = view, job.x_offset = x_offset, job.y_offset = y_offset, job.clip = clip, job.clip_count = clip_count;
     job.near_plane = near_plane, job.inverse = inverse, job.triangle = triangle;
     job.bands = ((size_t)view->height + RASTER_BAND - 1) / RASTER_BAND;
     job.chunks = mesh->triangle_count / 8192 + 1;

@@ -75,7 +75,7 @@ static inline int transfer_parse(const char *text, transfer_file *t, char *error
     if (!parsed.points || !parsed.peaks) ok = file_fail(error, "out of memory");
     while (ok && *text) {
         char line[256];
-        size_t length = strcspn(text, "\n"), used = strcspn(text, "\r\n#");
+        size_t length = strcspn(text, "\r\n"), used = strcspn(text, "\r\n#");
         if (used >= sizeof line) ok = file_fail(error, "line %d is longer than %zu characters", number, sizeof line - 1);
         else {
             memcpy(line, text, used);
@@ -83,7 +83,8 @@ static inline int transfer_parse(const char *text, transfer_file *t, char *error
             while (used && (line[used - 1] == ' ' || line[used - 1] == '\t')) line[--used] = 0;
             ok = transfer_line(&parsed, line, number++, error);
         }
-        text += length + (text[length] == '\n');
+        text += length; /* a line ends with LF, CR LF, or a CR alone */
+        text += !strncmp(text, "\r\n", 2) ? 2 : *text != 0;
     }
     if (ok && !parsed.point_count && !parsed.peak_count) ok = file_fail(error, "holds no point and no peak");
     if (!ok) {
