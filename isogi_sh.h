@@ -1053,60 +1053,6 @@ static const double isogi_sh__turn_columns_f64[1495] = {
     -0.0038890459770688454, -0.00033430331878977424, 0.73603103219489319, 0.56763753573489439, 0.33455403583971705,
     0.14766124989354926, 0.047031736593168907, 0.010104037837881882, 0.0012729891122201056, 6.103515625e-05,
 };
-static const double isogi_sh__wigner_f64[448] = {
-    0.8660254037844386, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.70710678118654757, 0.0,
-    0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.52704627669472992, 0.55901699437494745,
-    0.70710678118654757, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.81649658092772603, 0.75, 0.0, 0.0,
-    0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.38188130791298669, 0.39440531887330771, 0.44095855184409843,
-    0.57735026918962573, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.8660254037844386, 0.84327404271156781,
-    0.7453559924999299, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.29999999999999999,
-    0.30618621784789724, 0.3273268353539886, 0.375, 0.5, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0,
-    0.89442719099991586, 0.88388347648318444, 0.84515425472851657, 0.73950997288745202, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0,
-    0.0, 0.0, 0.0, 0.0, 0.0, 0.2472066162365221, 0.25071326821120349, 0.26220221204253791, 0.2854496128592251,
-    0.33166247903553997, 0.44721359549995793, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.9128709291752769,
-    0.90711473522214536, 0.88741196746494244, 0.84327404271156781, 0.73484692283495345, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0,
-    0.0, 0.0, 0.0, 0.0, 0.2102800206268535, 0.21245914639969937, 0.21942686286812776, 0.23273733406281569,
-    0.25623537159526916, 0.30046260628866578, 0.40824829046386302, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0,
-    0.92582009977255142, 0.92233098421577731, 0.91084006808529761, 0.88741196746494244, 0.84087496518252169,
-    0.73124703228267685, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.18298126367784998, 0.18442777839082938,
-    0.18898223650461363, 0.19738550848793068, 0.21128856368212914, 0.23440361546924771, 0.27664166758624409,
-    0.37796447300922725, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.93541434669348533, 0.93313894963168686,
-    0.92582009977255142, 0.91168461167710357, 0.88640526042791834, 0.83862786937753464, 0.72843135908468359, 0.0, 0.0, 0.0,
-    0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.16197088596792503, 0.16298006013006622, 0.16612465981124716, 0.17179606773406919,
-    0.18081014266989476, 0.19479843061849489, 0.2173067468400883, 0.25769410160110379, 0.35355339059327379, 0.0, 0.0, 0.0,
-    0.0, 0.0, 0.0, 0.0, 0.94280904158206336, 0.94124252985083501, 0.93628167589853895, 0.92702481088695787,
-    0.91146543037529992, 0.88514526652812353, 0.83666002653407556, 0.72618437741389064, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0,
-    0.0, 0.1452966314513558, 0.14602860903839354, 0.14829275350043489, 0.15231225557722924, 0.15853162186855699,
-    0.16777409856157222, 0.18162078931419473, 0.20345597929769124, 0.2421610524189263, 0.33333333333333331, 0.0, 0.0, 0.0,
-    0.0, 0.0, 0.0, 0.94868329805051377, 0.94755873935826862, 0.94403585933146827, 0.93761446187699082, 0.92724773377364467,
-    0.91084006808529761, 0.88388347648318444, 0.83496572144686598, 0.72435582280029431, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0,
-    0.13173978860172217, 0.13228756555322954, 0.13397282541141672, 0.13693063937629152, 0.1414213562373095,
-    0.1479019945774904, 0.15718104959867515, 0.17078251276599329, 0.19194297398747862, 0.229128784747792, 0.31622776601683794,
-    0.0, 0.0, 0.0, 0.0, 0.0, 0.95346258924559235, 0.95262794416288255, 0.95003373759256704, 0.94538352005945181,
-    0.93808315196468595, 0.92702481088695787, 0.91007433439123375, 0.88270417845769067, 0.83350875346649067,
-    0.72284161474004804, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.12049980091353686, 0.12092039486566841, 0.12220910332321784,
-    0.12445165924251668, 0.12780933953638629, 0.1325543836675655, 0.13914118498945363, 0.14835622460143164,
-    0.16166744767071581, 0.18217857500000703, 0.21799234196875997, 0.30151134457776363, 0.0, 0.0, 0.0, 0.0,
-    0.9574271077563381, 0.95679056651675909, 0.95482370712520104, 0.95134142401690103, 0.94598433583033692,
-    0.93811572599292514, 0.9265990819042822, 0.90928227650889892, 0.88163072046788804, 0.83225037857647899,
-    0.72156853938125198, 0.0, 0.0, 0.0, 0.0, 0.0, 0.11102889792108188, 0.11135885079684349, 0.11236664374387369,
-    0.11410886614690961, 0.11669000700233415, 0.12028130608117203, 0.12515654358043971, 0.13176156917368248,
-    0.14085904245475275, 0.15386436372416593, 0.17376201171422898, 0.20833333333333334, 0.28867513459481287, 0.0, 0.0, 0.0,
-    0.96076892283052284, 0.96027236546357819, 0.95874497088220456, 0.9560661587986472, 0.95200739639388887,
-    0.94617896279172775, 0.93792283697556955, 0.92608794878720291, 0.90851352515899586, 0.88066348954534379,
-    0.83115657732983583, 0.72048401940794093, 0.0, 0.0, 0.0, 0.0, 0.10293952744612744, 0.10320313742306722,
-    0.10400628679223047, 0.10538757288364328, 0.10741723110591493, 0.11020775375559676, 0.11393317879691249,
-    0.1188643277625491, 0.12543630150106361, 0.13438824602209942, 0.14708710135363803, 0.16641005886756874,
-    0.19985201625794738, 0.27735009811261457, 0.0, 0.0, 0.96362411165943151, 0.96322928261529406, 0.96201911063698164,
-    0.95991224060681912, 0.95675734404529944, 0.95230383339201019, 0.94614602873568499, 0.93761446187699082,
-    0.92555029935890387, 0.90778866899655031, 0.87979455643829796, 0.83019923466043333, 0.71954949745652719, 0.0, 0.0, 0.0,
-    0.095949722283856592, 0.096163657270258995, 0.096814151657778083, 0.097928275232167183, 0.099554716061514933,
-    0.10177004891982148, 0.10468972982756285, 0.10848723666625729, 0.11342846191148866, 0.11993715285482075,
-    0.12873006086935782, 0.14112966526419035, 0.15991620380642765, 0.19232731454051799, 0.2672612419124244, 0.0,
-    0.96609178307929588, 0.96577266307071141, 0.96479732172635235, 0.96310921762766089, 0.96060473092590926,
-    0.9571162043197412, 0.95238095238095233, 0.94598433583033692, 0.9372504104317485, 0.92501608737619367,
-    0.90711473522214536, 0.87901355800967895, 0.82935558588019886, 0.71873613562493244, 0.0, 0.0,
-};
 static const float isogi_sh__latitudes_f32[240] = {
     0.282094806f, 0.282094806f, 0.282094806f, 0.282094806f, 0.282094806f, 0.282094806f, 0.282094806f, 0.0f, 0.463736504f,
     0.362313986f, 0.198296964f, 0.0f, -0.198296964f, -0.362313986f, -0.463736504f, 0.0f, 0.536928117f, 0.204880089f,
@@ -2575,38 +2521,29 @@ typedef struct isogi_sh__multiples {
     isogi_sh__d8 even_c, even_s, odd_c, odd_s; /* cosines and sines of 0, 2, .. 14 and of 1, 3, .. 15 times an angle */
 } isogi_sh__multiples;
 
-/* Length 1 again: see isogi_sh__powers. */
-#define ISOGI_SH__UNIT_LENGTH(c, s, correction) correction = 0.5 * (1 - (c * c + s * s)), c += correction * c, s += correction * s
-#define ISOGI_SH__WHERE(mask, a) (isogi_sh__d8)(((isogi_sh__l8)(zero + (a)) & (mask)) | ((isogi_sh__l8)none & ~(mask)))
+/* (c, s) times (x, y) as complex numbers; length 1 again: see isogi_sh__powers. */
 #define ISOGI_SH__TURN_BY(c, s, x, y) t = ISOGI_SH__FMA_D8(c, x, -(s * (y))), s = ISOGI_SH__FMA_D8(c, y, s * (x)), c = t
+#define ISOGI_SH__UNIT_LENGTH(c, s) t = ISOGI_SH__FMA_D8(-c, c, ISOGI_SH__FMA_D8(-s, s, one)) * 0.5, c = ISOGI_SH__FMA_D8(c, t, c), s = ISOGI_SH__FMA_D8(s, t, s)
 ISOGI_SH__INLINE __attribute__((target("avx2,fma,avx512f,avx512vl,avx512dq"))) void isogi_sh__multiples_start(isogi_sh__multiples *t8, double c1, double s1) {
     const isogi_sh__d8 zero = {0}, one = {1, 1, 1, 1, 1, 1, 1, 1};
-    const isogi_sh__l8 by_2 = {0, -1, 0, -1, 0, -1, 0, -1}, by_4 = {0, 0, -1, -1, 0, 0, -1, -1}, by_8 = {0, 0, 0, 0, -1, -1, -1, -1};
-    double c2, s2, c4, s4, c8, s8, correction;
-    isogi_sh__d8 none = one, c, s, t;
-    ISOGI_SH__UNIT_LENGTH(c1, s1, correction);
-    c2 = c1 * c1 - s1 * s1, s2 = 2 * c1 * s1;
-    ISOGI_SH__UNIT_LENGTH(c2, s2, correction);
-    c4 = c2 * c2 - s2 * s2, s4 = 2 * c2 * s2;
-    ISOGI_SH__UNIT_LENGTH(c4, s4, correction);
-    c8 = c4 * c4 - s4 * s4, s8 = 2 * c4 * s4;
-    ISOGI_SH__UNIT_LENGTH(c8, s8, correction);
-    c = ISOGI_SH__WHERE(by_2, c2), none = zero, s = ISOGI_SH__WHERE(by_2, s2);
-    {
-        isogi_sh__d8 s4s = ISOGI_SH__WHERE(by_4, s4), s8s = ISOGI_SH__WHERE(by_8, s8), c4s, c8s, u, v;
-        none = one, c4s = ISOGI_SH__WHERE(by_4, c4), c8s = ISOGI_SH__WHERE(by_8, c8);
-        ISOGI_SH__TURN_BY(c, s, c4s, s4s);
-        ISOGI_SH__TURN_BY(c, s, c8s, s8s);
-        u = c, v = s;
-        ISOGI_SH__TURN_BY(u, v, zero + c1, zero + s1);
-        ISOGI_SH__UNIT_LENGTH(c, s, t);
-        ISOGI_SH__UNIT_LENGTH(u, v, t);
-        t8->even_c = c, t8->even_s = s, t8->odd_c = u, t8->odd_s = v;
-    }
+    double c2 = c1 * c1 - s1 * s1, s2 = 2 * c1 * s1, c4 = c2 * c2 - s2 * s2, s4 = 2 * c2 * s2, c8 = c4 * c4 - s4 * s4, s8 = 2 * c4 * s4;
+    isogi_sh__d8 c = __builtin_shufflevector(one, zero + c2, 0, 9, 2, 11, 4, 13, 6, 15), s = __builtin_shufflevector(zero, zero + s2, 0, 9, 2, 11, 4, 13, 6, 15), t;
+    isogi_sh__d8 x = __builtin_shufflevector(one, zero + c4, 0, 1, 10, 11, 4, 5, 14, 15), y = __builtin_shufflevector(zero, zero + s4, 0, 1, 10, 11, 4, 5, 14, 15);
+    ISOGI_SH__TURN_BY(c, s, x, y);
+    x = __builtin_shufflevector(one, zero + c8, 0, 1, 2, 3, 12, 13, 14, 15), y = __builtin_shufflevector(zero, zero + s8, 0, 1, 2, 3, 12, 13, 14, 15);
+    ISOGI_SH__TURN_BY(c, s, x, y);
+    x = c, y = s;
+    ISOGI_SH__TURN_BY(x, y, zero + c1, zero + s1);
+    ISOGI_SH__UNIT_LENGTH(c, s);
+    ISOGI_SH__UNIT_LENGTH(x, y);
+    t8->even_c = c, t8->even_s = s, t8->odd_c = x, t8->odd_s = y;
 }
-#undef ISOGI_SH__UNIT_LENGTH
-#undef ISOGI_SH__WHERE
 #undef ISOGI_SH__TURN_BY
+#undef ISOGI_SH__UNIT_LENGTH
+
+/* 0, 1, .. 7, or 8, 9, .. 15, of even and of odd ones */
+#define ISOGI_SH__MERGE(even, odd, high) \
+    ((high) ? __builtin_shufflevector(even, odd, 4, 12, 5, 13, 6, 14, 7, 15) : __builtin_shufflevector(even, odd, 0, 8, 1, 9, 2, 10, 3, 11))
 
 ISOGI_SH__INLINE __attribute__((target("avx2,fma,avx512f,avx512vl,avx512dq"))) void isogi_sh__turn_z_d8(isogi_sh__d8 v[4], const isogi_sh__multiples *t) {
     isogi_sh__d8 even = ISOGI_SH__FMA_D8(v[0], t->even_c, -(v[2] * t->even_s)), odd = ISOGI_SH__FMA_D8(v[1], t->odd_c, -(v[3] * t->odd_s));
@@ -2825,28 +2762,20 @@ static double isogi_sh__product_rest(double x, double y, double high) {
     return ((a * c - high) + (a * d + b * c)) + b * d;
 }
 
-/* power[k] = x^k for 1 < count <= 2 ISOGI_SH__TURNS + 2, each rounded once only: by halving, in numbers of twice the length. `fused` where
-   the processor has fused products, whose rest costs nothing. */
-ISOGI_SH__INLINE void isogi_sh__exact_powers(double *power, int count, double x, int fused) {
+/* power[k] = x^k for 1 < count <= 2 ISOGI_SH__TURNS + 2, each rounded once only: by halving, in numbers of twice the length. */
+static void isogi_sh__exact_powers(double *power, int count, double x) {
     double low[2 * ISOGI_SH__TURNS + 2];
     int k;
     power[0] = 1, low[0] = 0, power[1] = x, low[1] = 0;
     for (k = 2; k < count; k++) {
         int i = k / 2, j = k - i;
-        double p = power[i] * power[j], rest;
-#ifdef ISOGI_SH__SIMD
-        rest = fused ? __builtin_fma(power[i], power[j], -p) : isogi_sh__product_rest(power[i], power[j], p);
-#else
-        (void)fused;
-        rest = isogi_sh__product_rest(power[i], power[j], p);
-#endif
-        rest += power[i] * low[j] + low[i] * power[j];
+        double p = power[i] * power[j], rest = isogi_sh__product_rest(power[i], power[j], p) + (power[i] * low[j] + low[i] * power[j]);
         power[k] = p + rest;
         low[k] = (p - power[k]) + rest;
     }
 }
 
-ISOGI_SH__INLINE void isogi_sh__wigner_start(isogi_sh__wigner *w, int order, const isogi_sh__euler *e, int fused) {
+static void isogi_sh__wigner_start(isogi_sh__wigner *w, int order, const isogi_sh__euler *e) {
     double half_c, half_s, cc, ss, before = 1;
     int l;
     if (e->b[0] > 0) half_c = sqrt(0.5 * (1 + e->b[0])), half_s = e->b[1] / (2 * half_c);
@@ -2859,11 +2788,10 @@ ISOGI_SH__INLINE void isogi_sh__wigner_start(isogi_sh__wigner *w, int order, con
     w->more_low = 2 * (w->more_low - cc * w->excess);
     isogi_sh__powers(w->a, order, e->a[0], e->a[1]);
     isogi_sh__powers(w->c, order, e->c[0], e->c[1]);
-    isogi_sh__exact_powers(w->cosine, 2 * order, half_c, fused);
-    isogi_sh__exact_powers(w->sine, 2 * order, -half_s, fused);
+    isogi_sh__exact_powers(w->cosine, 2 * order, half_c);
+    isogi_sh__exact_powers(w->sine, 2 * order, -half_s);
     w->less = 2 * ss;
     w->more = 2 * cc;
-    if (fused) return; /* its table has them */
     for (l = 1; l < order; l++) {
         double a = sqrt((double)(4 * l * l - 1)) / (double)l;
         w->zonal[l][0] = a;
@@ -2943,7 +2871,7 @@ static void isogi_sh__build_blocks(const isogi_sh__blocks *out, int order, const
     isogi_sh__wigner w;
     double p = 1, difference = 0;
     int l, m, n, at = 0;
-    isogi_sh__wigner_start(&w, order, e, 0);
+    isogi_sh__wigner_start(&w, order, e);
     for (l = 0; l < order; l++) {
         p = isogi_sh__zonal_entry(&w, l, &difference, p);
         isogi_sh__put(out, at + 2 * l * (l + 1), w.less < 1 || !(l & 1) ? p : -p);
@@ -2954,100 +2882,107 @@ static void isogi_sh__build_blocks(const isogi_sh__blocks *out, int order, const
 }
 
 #ifdef ISOGI_SH__SIMD
-/* The same with eight n in the lanes, whether n or m is the larger. With F and S for the two factors of the recursion from degree l to
-   l + 1 and k = F (l(l+1) cos b - n m) - 1 - S it is
-       d_{l+1} - d_l = S (d_l - d_{l-1}) + k d_l,
-   which keeps its digits where cos b is near 1: there, for n = m, k is -F l(l+1) (1 - cos b). For cos b near -1 the same holds of
-   (-1)^l b with 1 + cos b. F and S are products of one number for n and one for m, zero where n or m has not begun. */
-typedef double isogi_sh__rows[ISOGI_SH__TURNS + 1][ISOGI_SH__TURNS + 1];
-typedef struct isogi_sh__wigner_rows {
-    isogi_sh__rows a, b; /* [m][n]: where the recursions begin, at the degree that is the larger of both; b times (-1)^l */
-    double cosine[ISOGI_SH__TURNS + 1], sine[ISOGI_SH__TURNS + 1]; /* of n a */
-    isogi_sh__wigner w;
-} isogi_sh__wigner_rows;
+/* ---- matrices in lanes, degrees to ISOGI_SH__TURNS ----
+   R = Z(a) Y(b) Z(c) with Y(b) = Z(-90) Y(-90) Z(b) Y(90) Z(90), whose middle is one product of matrices: with the entries W of a quarter
+   turn, k = l, l-2, .. between cosines and k = l-1, l-3, .. between sines,
+       Y_nm = s_n s_m sum over k of W_nk W_mk t_k,   s = 1, -1, -1, 1, 1, ..
+   where t_k is cos kb, or sin kb for odd n and even m, or -sin kb for even n and odd m. Lanes are n; what is past l in them holds other
+   numbers of the table, and nothing reads what comes of it. */
+typedef double isogi_sh__square[ISOGI_SH__TURNS + 1][ISOGI_SH__TURNS + 1];
+typedef struct isogi_sh__build {
+    isogi_sh__d8 outer[ISOGI_SH__TURNS + 1][2][4]; /* [m][n / 8]: cos na cos mc, sin na cos mc, cos na sin mc, sin na sin mc, times s_n s_m */
+    isogi_sh__d8 middle[ISOGI_SH__TURNS + 1][2];   /* t_k for n = 0, 1, .. and even m, and for odd m */
+    isogi_sh__square even, odd;                    /* [k][n]: W_nk t_k for even and for odd m */
+} isogi_sh__build;
 
-ISOGI_SH__INLINE __attribute__((target("avx2,fma,avx512f,avx512vl,avx512dq"))) void isogi_sh__wigner_rows_start(isogi_sh__wigner_rows *r, int order, const isogi_sh__euler *e) {
-    int l, n;
-    r->a[0][0] = r->b[0][0] = 0; /* the zonal entries are not made from these */
-    isogi_sh__wigner_start(&r->w, order, e, 1);
-    for (l = 0; l < order; l++) {
-        const double *turn = isogi_sh__turn_f64 + l * (l + 1) * (l + 2) / 6 - 1 + l;
-        double scale = 0.5 * (double)((int32_t)1 << l) * (1 - (double)l * r->w.excess);
-        r->cosine[l] = r->w.a[l][0], r->sine[l] = r->w.a[l][1];
-        for (n = order; n & 7; n++) r->a[l][n] = r->b[l][n] = 0;
-        for (n = 0; n <= l && l; n++) {
-            double start = scale * fabs(*turn), a = start * r->w.cosine[l + n] * r->w.sine[l - n], b = start * r->w.cosine[l - n] * r->w.sine[l + n];
-            double flip = (l + n) & 1 ? -1 : 1;
-            r->a[n][l] = flip * a, r->a[l][n] = a;
-            r->b[n][l] = b, r->b[l][n] = flip * b; /* (-1)^n of the sines, and (-1)^l */
-            turn += l - n;
-        }
+ISOGI_SH__AVX512 static void isogi_sh__build_start(isogi_sh__build *t, int order, const isogi_sh__euler *e) {
+    const isogi_sh__d8 sign = {1, -1, -1, 1, 1, -1, -1, 1};
+    isogi_sh__multiples a, b, c;
+    int h, k, m;
+    isogi_sh__multiples_start(&b, e->b[0], e->b[1]);
+    isogi_sh__multiples_start(&c, e->c[0], e->c[1]);
+    isogi_sh__multiples_start(&a, e->a[0], e->a[1]);
+    for (k = 0; k < order; k++) {
+        double cosine = ((const double *)(k & 1 ? &b.odd_c : &b.even_c))[k / 2], sine = ((const double *)(k & 1 ? &b.odd_s : &b.even_s))[k / 2];
+        const isogi_sh__d8 zero = {0};
+        t->middle[k][0] = __builtin_shufflevector(zero + cosine, zero + sine, 0, 9, 2, 11, 4, 13, 6, 15);
+        t->middle[k][1] = __builtin_shufflevector(zero - sine, zero + cosine, 0, 9, 2, 11, 4, 13, 6, 15);
     }
-    for (n = order; n & 7; n++) r->cosine[n] = r->sine[n] = 0;
-}
-
-/* Columns m and -m of all degrees, rows n to n + 7 and -n to -n - 7. Row -0 is row 0, which comes last; n = 0 has no sine: its a and b
-   are halves of the cosine. */
-ISOGI_SH__INLINE __attribute__((target("avx2,fma,avx512f,avx512vl,avx512dq"))) void isogi_sh__wigner_group(void *out, int is_double, int order, int m, int n, const isogi_sh__wigner_rows *r) {
-    const isogi_sh__d8 zero = {0}, one = {1, 1, 1, 1, 1, 1, 1, 1};
-    const isogi_sh__d8 count = {0, 1, 2, 3, 4, 5, 6, 7}, lanes = count + (double)n;
-    isogi_sh__d8 ac = *(const isogi_sh__d8 *)(r->cosine + n), as = *(const isogi_sh__d8 *)(r->sine + n);
-    isogi_sh__d8 begin_a = *(const isogi_sh__d8 *)(r->a[m] + n), begin_b = *(const isogi_sh__d8 *)(r->b[m] + n), a, b, a_step = zero, b_step = zero;
-    isogi_sh__l8 not_diagonal = (isogi_sh__l8)(lanes != zero + (double)m), alike = (isogi_sh__l8)(lanes == zero) | (isogi_sh__l8)(m == 0 ? lanes == lanes : lanes != lanes);
-    double cc = r->w.c[m][0], cs = r->w.c[m][1], sign, degree, square;
-    isogi_sh__d8 p0 = ac * cc - as * cs, p1 = as * cc + ac * cs, q0 = ac * cc + as * cs, q1 = as * cc - ac * cs, products = lanes * (double)m;
-    int l = m > n ? m : n, at;
-    if (l == 0) l = 1;
-    at = l * (4 * l * l - 1) / 3;
-    sign = l & 1 ? -1 : 1, degree = (double)l, square = degree * (degree + 1);
-    a = (isogi_sh__d8)((isogi_sh__l8)begin_a & (isogi_sh__l8)(lanes <= zero + degree));
-    b = (isogi_sh__d8)((isogi_sh__l8)begin_b & (isogi_sh__l8)(lanes <= zero + degree));
-    for (;; l++) {
-        int width = 2 * l + 1, beyond = l - n < 7 ? 7 - l + n : 0, plus = at + width * (l + m) + l, minus = at + width * (l - m) + l;
-        unsigned up = 255u >> beyond, down = 255u << beyond;
-        isogi_sh__d8 sines = b * sign, v;
-        sines = (isogi_sh__d8)(((isogi_sh__l8)a & alike) | ((isogi_sh__l8)sines & ~alike));
-        v = ISOGI_SH__FMA_D8(a, p1, sines * q1);
-        isogi_sh__put_rows(out, is_double, plus - n - 7, __builtin_shufflevector(v, v, 7, 6, 5, 4, 3, 2, 1, 0), down);
-        isogi_sh__put_rows(out, is_double, plus + n, ISOGI_SH__FMA_D8(a, p0, sines * q0), up);
-        if (m) {
-            v = ISOGI_SH__FMA_D8(a, p0, -(sines * q0));
-            isogi_sh__put_rows(out, is_double, minus - n - 7, __builtin_shufflevector(v, v, 7, 6, 5, 4, 3, 2, 1, 0), down);
-            isogi_sh__put_rows(out, is_double, minus + n, ISOGI_SH__FMA_D8(sines, q1, -(a * p1)), up);
+    for (h = 0; 8 * h < order; h++) {
+        isogi_sh__d8 ca = sign * ISOGI_SH__MERGE(a.even_c, a.odd_c, h), sa = sign * ISOGI_SH__MERGE(a.even_s, a.odd_s, h);
+        for (m = 0; m < order; m++) {
+            double cosine = ((const double *)(m & 1 ? &c.odd_c : &c.even_c))[m / 2], sine = ((const double *)(m & 1 ? &c.odd_s : &c.even_s))[m / 2];
+            isogi_sh__d8 *o = t->outer[m][h];
+            if ((m + 1) & 2) cosine = -cosine, sine = -sine;
+            o[0] = ca * cosine, o[1] = sa * cosine, o[2] = ca * sine, o[3] = sa * sine;
         }
-        if (l + 1 == order) return;
-        {
-            const double *table = isogi_sh__wigner_f64 + 32 * (l - 1);
-            isogi_sh__d8 first = *(const isogi_sh__d8 *)(table + n) * table[m], second = *(const isogi_sh__d8 *)(table + 16 + n) * table[16 + m];
-            isogi_sh__d8 k = ISOGI_SH__FMA_D8(first, square - products, -(one + second)), by_square = first * -square;
-            isogi_sh__l8 begins;
-            degree += 1;
-            begins = (isogi_sh__l8)(lanes == zero + degree);
-            k = (isogi_sh__d8)((isogi_sh__l8)k & not_diagonal);
-            a_step = ISOGI_SH__FMA_D8(ISOGI_SH__FMA_D8(by_square, zero + r->w.less, ISOGI_SH__FMA_D8(by_square, zero + r->w.less_low, k)), a, second * a_step);
-            b_step = ISOGI_SH__FMA_D8(ISOGI_SH__FMA_D8(by_square, zero + r->w.more, ISOGI_SH__FMA_D8(by_square, zero + r->w.more_low, k)), b, second * b_step);
-            a += (isogi_sh__d8)((isogi_sh__l8)begin_a & begins), b += (isogi_sh__d8)((isogi_sh__l8)begin_b & begins);
-            a += a_step, b += b_step;
-            sign = -sign, square += 2 * degree;
-        }
-        at += width * width;
     }
 }
 
-ISOGI_SH__AVX512 static void isogi_sh__build_rows(void *out, int is_double, int order, const isogi_sh__euler *e) {
-    isogi_sh__wigner_rows r;
-    double p = 1, difference = 0;
-    int l, m, n, at = 0;
-    isogi_sh__wigner_rows_start(&r, order, e);
-    for (m = 0; m < order; m++)
-        for (n = 0; n < order; n += 8) isogi_sh__wigner_group(out, is_double, order, m, n, &r);
-    for (l = 0; l < order; l++) {
-        double value;
-        p = isogi_sh__zonal_entry(&r.w, l, &difference, p);
-        value = r.w.less < 1 || !(l & 1) ? p : -p;
-        if (is_double) ((double *)out)[at + 2 * l * (l + 1)] = value;
-        else ((float *)out)[at + 2 * l * (l + 1)] = (float)value;
-        at += (2 * l + 1) * (2 * l + 1);
+/* Columns m to m + 3 and -m to -m - 3 of degree l, rows -7 to 7 or (2 halves) -15 to 15. Row -0 is row 0, which comes last. */
+ISOGI_SH__INLINE __attribute__((target("avx2,fma,avx512f,avx512vl,avx512dq"))) void isogi_sh__build_columns(double *out, int l, int m, int halves, const isogi_sh__build *t) {
+    const double *table = isogi_sh__turn_columns_f64 + l * (l + 1) * (2 * l + 1) / 6 - 1 + m / 2, *w;
+    const isogi_sh__d8 zero = {0};
+    isogi_sh__d8 y[4][2][2], v;
+    int i, h, k, sines, beyond = l < 8 * halves - 1 ? 8 * halves - 1 - l : 0;
+    double *plus = out + (2 * l + 1) * (l + m) + l, *minus = out + (2 * l + 1) * (l - m) + l;
+    ISOGI_SH__UNROLL
+    for (sines = 0; sines < 2; sines++) {
+        ISOGI_SH__UNROLL
+        for (i = 0; i < 4; i++) y[i][sines][0] = y[i][sines][1] = zero;
+        for (k = (l + sines) & 1, w = table + k * (l + 1); k <= l; k += 2, w += 2 * (l + 1)) {
+            ISOGI_SH__UNROLL
+            for (i = 0; i < 4; i++) {
+                isogi_sh__d8 w_mk = w[(i & 1 ? l / 2 + 1 : 0) + i / 2] - zero;
+                ISOGI_SH__UNROLL
+                for (h = 0; h < halves; h++) y[i][sines][h] = ISOGI_SH__FMA_D8(*(const isogi_sh__d8 *)((i & 1 ? t->odd : t->even)[k] + 8 * h), w_mk, y[i][sines][h]);
+            }
+        }
+    }
+    ISOGI_SH__UNROLL
+    for (i = 0; i < 4; i++, plus += 2 * l + 1, minus -= 2 * l + 1) {
+        if (m + i > l) break;
+        ISOGI_SH__UNROLL
+        for (h = halves - 1; h >= 0; h--) {
+            unsigned char up = (unsigned char)(h == halves - 1 ? 255u >> beyond : 255u), down = (unsigned char)(h == halves - 1 ? 255u << beyond : 255u);
+            const isogi_sh__d8 *o = t->outer[m + i][h], c = y[i][0][h], s = y[i][1][h];
+            v = ISOGI_SH__FMA_D8(o[1], c, o[2] * s);
+            __builtin_ia32_storeupd512_mask(plus - 8 * h - 7, __builtin_shufflevector(v, v, 7, 6, 5, 4, 3, 2, 1, 0), down);
+            __builtin_ia32_storeupd512_mask(plus + 8 * h, ISOGI_SH__FMA_D8(o[0], c, -(o[3] * s)), up);
+            if (m + i == 0) continue;
+            v = ISOGI_SH__FMA_D8(o[0], s, -(o[3] * c));
+            __builtin_ia32_storeupd512_mask(minus - 8 * h - 7, __builtin_shufflevector(v, v, 7, 6, 5, 4, 3, 2, 1, 0), down);
+            __builtin_ia32_storeupd512_mask(minus + 8 * h, ISOGI_SH__FMA_D8(-o[2], c, -(o[1] * s)), up);
+        }
+    }
+}
+
+ISOGI_SH__AVX512 static void isogi_sh__build_degree(double *out, int l, isogi_sh__build *t) {
+    const double *w = isogi_sh__turn_columns_f64 + l * (l + 1) * (2 * l + 1) / 6 - 1;
+    int k, m, h;
+    for (k = 0; k <= l; k++, w += l + 1) {
+        isogi_sh__d8 even = *(const isogi_sh__d8 *)w, odd = *(const isogi_sh__d8 *)(w + l / 2 + 1);
+        for (h = 0; 8 * h <= l; h++) {
+            isogi_sh__d8 v = ISOGI_SH__MERGE(even, odd, h);
+            *(isogi_sh__d8 *)(t->even[k] + 8 * h) = v * t->middle[k][0], *(isogi_sh__d8 *)(t->odd[k] + 8 * h) = v * t->middle[k][1];
+        }
+    }
+    for (m = 0; m <= l; m += 4) {
+        if (l < 8) isogi_sh__build_columns(out, l, m, 1, t);
+        else isogi_sh__build_columns(out, l, m, 2, t);
+    }
+}
+
+ISOGI_SH__AVX512 static void isogi_sh__build_lanes(void *out, int is_double, int order, const isogi_sh__euler *e) {
+    double block[(2 * ISOGI_SH__TURNS + 1) * (2 * ISOGI_SH__TURNS + 1) + 7];
+    isogi_sh__build t;
+    int l, i, at = 0, count = 1;
+    isogi_sh__build_start(&t, order, e);
+    for (l = 0; l < order; l++, at += count, count += 8 * l) {
+        double *degree = is_double ? (double *)out + at : block;
+        if (l) isogi_sh__build_degree(degree, l, &t);
+        else degree[0] = 1;
+        for (i = 0; i < count && !is_double; i += 8) isogi_sh__put_rows(out, 0, at + i, *(const isogi_sh__d8 *)(block + i), count - i < 8 ? 255u >> (8 - count + i) : 255u);
     }
 }
 #endif
@@ -3062,7 +2997,7 @@ static void isogi_sh__rotation_build(void *rotation, int is_double, int order, c
     if (order <= ISOGI_SH__TURNS + 1) {
 #ifdef ISOGI_SH__SIMD
         if (order > 1 && isogi_sh__level() > 1) {
-            isogi_sh__build_rows(rotation, is_double, order, e);
+            isogi_sh__build_lanes(rotation, is_double, order, e);
             return;
         }
 #endif
@@ -4686,6 +4621,7 @@ ISOGI_API isogi_result isogi_sh_fit_directional(float direction[3], float rgb[3]
 #undef ISOGI_SH__MASKED_F8
 #undef ISOGI_SH__MASKED_CONST_F8
 #undef ISOGI_SH__APART
+#undef ISOGI_SH__MERGE
 #undef ISOGI_SH__INLINE
 #undef ISOGI_SH__FMA_F8
 #undef ISOGI_SH__FMA_F16

@@ -77,18 +77,6 @@ static int generate_turn_columns(quad *v) {
     return count;
 }
 
-/* Factors of the recursions for Wigner's d from degree l to l + 1, l = 1..14, as products of one for n and one for m: sixteen of d_l,
-   then sixteen of d_{l-1}. Zero where n or m has not begun. */
-static int generate_wigner(quad *v) {
-    int count = 0;
-    for (int l = 1; l < GENERATE_TURNS; l++) {
-        for (int n = 0; n <= GENERATE_TURNS; n++) v[count++] = n > l ? 0 : quad_sqrt((quad)(2 * l + 1) / (quad)(((l + 1) * (l + 1) - n * n) * l));
-        for (int n = 0; n <= GENERATE_TURNS; n++)
-            v[count++] = n >= l ? 0 : quad_sqrt((quad)((l * l - n * n) * (l + 1)) / (quad)(((l + 1) * (l + 1) - n * n) * l));
-    }
-    return count;
-}
-
 /* Y_l^m = q_l^m (c_m, s_m) for l < 11: coefficients of q in v = 2 z^2 - 1 for m = 1, in v + 1/4 for m > 1, the highest first, without the
    factor z of an odd q; m outer. */
 static int generate_polynomials(quad *v) {
@@ -182,8 +170,6 @@ static void generate(FILE *out) {
     generate_table(out, "double", "isogi_sh__polynomials_f64", v, count, 1);
     count = generate_turn_columns(v);
     generate_table(out, "double", "isogi_sh__turn_columns_f64", v, count, 1);
-    count = generate_wigner(v);
-    generate_table(out, "double", "isogi_sh__wigner_f64", v, count, 1);
     count = generate_latitudes(v);
     generate_table(out, "float", "isogi_sh__latitudes_f32", v, count, 0);
     fprintf(out, "#endif\n");

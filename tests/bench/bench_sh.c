@@ -1,6 +1,6 @@
 /* Run time against error of isogi_sh.h.
 
-       build/bench/bench_sh [--quick] OUT.csv
+       build/bench/bench_sh [--quick] [--only CASE] OUT.csv        --only: cases whose names begin so
 
    One thread, CPU seconds, data in cache, the shortest of many short runs, which is what the code takes where nothing else runs on the
    core; error is the largest absolute one against tests/reference_sh.h (128 bits). Errors are taken over poles, axes, directions 1e-8
@@ -24,6 +24,7 @@ enum { MAX_ORDER = 21, MAX_N = MAX_ORDER * MAX_ORDER, MAX_COUNT = 1024, HARD = 6
 
 static FILE *csv;
 static int quick;
+static const char *only = "";
 static uint64_t random_state = 1;
 static __attribute__((aligned(64))) float directions[MAX_COUNT][3], soa[3][MAX_COUNT], basis[MAX_N * MAX_COUNT], matrix[MATRICES][9], image[WIDTH * HEIGHT * 3];
 static __attribute__((aligned(64))) double directions64[MAX_COUNT][3], basis64[MAX_N * MAX_COUNT], matrix64[MATRICES][9];
@@ -373,23 +374,24 @@ int main(int argc, char **argv) {
     };
     const char *path = NULL;
     for (int i = 1; i < argc; i++) {
-        if (!strcmp(argv[i], "--quick")) quick = 1;
+        if (!strcmp(argv[i], "--quick")) quick = 1; else if (!strcmp(argv[i], "--only") && i + 1 < argc) only = argv[++i];
         else if (argv[i][0] != '-') path = argv[i];
         else { path = NULL; break; }
     }
     if (!path || !(csv = fopen(path, "w"))) {
-        fprintf(stderr, "usage: %s [--quick] OUT.csv\n", argv[0]);
+        fprintf(stderr, "usage: %s [--quick] [--only CASE] OUT.csv\n", argv[0]);
         return 1;
     }
     fprintf(csv, "header,case,method,setting,seconds,error,work,unit\n");
     prepare();
     head();
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        if (strncmp(cases[i].name, only, strlen(only))) continue;
         row(&cases[i], "default");
         if (quick) continue;
         for (bench_level = 0; bench_level < 2; bench_level++) row(&cases[i], bench_level ? "avx2" : "plain");
         bench_level = 99;
     }
-    truncation();
+    if (!*only) truncation();
     return fclose(csv) ? 1 : 0;
 }
