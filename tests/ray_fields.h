@@ -30,8 +30,8 @@ static void field_fill(field *f, int kind, test_random *r) {
         for (int j = 0; j < f->size[1]; j++)
             for (int i = 0; i < f->size[0]; i++) {
                 double v = 0;
-                for (int w = 0; w < 4; w++) v += sin(wave[w][0] * i + wave[w][1] * j + wave[w][2] * k + wave[w][3]);
                 if (kind == NOISE) v = random_range(r, -1, 1);
+                else for (int w = 0; w < 4; w++) v += sin(wave[w][0] * i + wave[w][1] * j + wave[w][2] * k + wave[w][3]);
                 if (kind == QUANTISED) v = floor(2 * v);
                 *field_at(f, i, j, k) = v;
             }
