@@ -887,30 +887,24 @@ static void isogi_dvr__behind(isogi_dvr__layer *front, const isogi_dvr__layer *b
     front->clear *= back->clear;
 }
 
-/* A and W for K(u) = p u + q u^2 of at most 1/2 in all. Gauss's rule with seven points (an error below 1e-12) and
-   1 - exp(-x) = x (1 - x/2 (1 - x/3 ...)); the loops are over eight lanes, for the compiler to turn into vectors. */
+/* A and W for K(u) = p u + q u^2 of at most 1/2 in all. Gauss's rule with seven points (an error below 1e-12); (1 - exp(-x)) / x by the
+   polynomial that interpolates it at Chebyshev's nodes of 0 .. 1/2 (1e-16). Eight lanes, for the compiler to turn into vectors. */
 static void isogi_dvr__weigh_linear(double p, double q, double *opacity, double *first) {
     static const double place[8] = {0.025446043828620737737, 0.12923440720030278007, 0.29707742431130141655, 0.5,
                                     0.70292257568869858345, 0.87076559279969721993, 0.97455395617137926226, 1};
     static const double weight[8] = {0.064742483084434846635, 0.13985269574463833395, 0.19091502525255947248, 0.20897959183673469388,
                                      0.19091502525255947248, 0.13985269574463833395, 0.064742483084434846635, 0};
-    double x[8], e[8], sum = 0;
+    double lost[8], sum = 0;
     int i;
-    for (i = 0; i < 8; i++) x[i] = place[i] * (p + q * place[i]), e[i] = 1 - x[i] * (1 / 14.0);
-    for (i = 0; i < 8; i++) e[i] = 1 - x[i] * (1 / 13.0) * e[i];
-    for (i = 0; i < 8; i++) e[i] = 1 - x[i] * (1 / 12.0) * e[i];
-    for (i = 0; i < 8; i++) e[i] = 1 - x[i] * (1 / 11.0) * e[i];
-    for (i = 0; i < 8; i++) e[i] = 1 - x[i] * (1 / 10.0) * e[i];
-    for (i = 0; i < 8; i++) e[i] = 1 - x[i] * (1 / 9.0) * e[i];
-    for (i = 0; i < 8; i++) e[i] = 1 - x[i] * (1 / 8.0) * e[i];
-    for (i = 0; i < 8; i++) e[i] = 1 - x[i] * (1 / 7.0) * e[i];
-    for (i = 0; i < 8; i++) e[i] = 1 - x[i] * (1 / 6.0) * e[i];
-    for (i = 0; i < 8; i++) e[i] = 1 - x[i] * 0.2 * e[i];
-    for (i = 0; i < 8; i++) e[i] = 1 - x[i] * 0.25 * e[i];
-    for (i = 0; i < 8; i++) e[i] = 1 - x[i] * (1 / 3.0) * e[i];
-    for (i = 0; i < 8; i++) e[i] = x[i] * (1 - x[i] * 0.5 * e[i]);
-    for (i = 0; i < 8; i++) sum += weight[i] * e[i];
-    *opacity = e[7], *first = sum;
+    for (i = 0; i < 8; i++) {
+        double x = place[i] * (p + q * place[i]), x2 = x * x, x4 = x2 * x2;
+        double low = (1 - 0.49999999999998485 * x) + (0.16666666666566382 - 0.041666666640941714 * x) * x2;
+        double middle = (0.008333332997835102 - 0.0013888863717021528 * x) + (0.0001984011727676172 - 2.4768788096264572e-05 * x) * x2;
+        double high = 2.6988592921217972e-06 - 2.1985703840083692e-07 * x;
+        lost[i] = x * (low + x4 * (middle + x4 * high));
+    }
+    for (i = 0; i < 8; i++) sum += weight[i] * lost[i];
+    *opacity = lost[7], *first = sum;
 }
 
 /* The place u at which the depth k0 u + (k1 - k0) u^2 / 2 is reached; the depth of the whole is at least that. */
@@ -1354,6 +1348,17 @@ static void isogi_dvr__mark_leaps(isogi_dvr *d) {
     }
 }
 
+/* A block of level 1 that is cut off, and those of level 0 in it. */
+static void isogi_dvr__mark_cut(isogi_dvr *d, size_t block) {
+    const size_t *size = d->level[1].size, *fine = d->level[0].size;
+    size_t c[3] = {4 * (block % size[0]), 4 * (block / size[0] % size[1]), 4 * (block / size[0] / size[1])}, i;
+    d->empty[1][block] = 1;
+    for (i = 0; i < 64; i++) {
+        size_t x = c[0] + i % 4, y = c[1] + i / 4 % 4, z = c[2] + i / 16;
+        if (x < fine[0] && y < fine[1] && z < fine[2]) d->empty[0][x + fine[0] * (y + fine[1] * z)] = 1;
+    }
+}
+
 static void isogi_dvr__mark_empty(isogi_dvr *d) {
     size_t i, count;
     int n;
@@ -1369,7 +1374,7 @@ static void isogi_dvr__mark_empty(isogi_dvr *d) {
         }
     }
     for (i = 0; i < d->changed_count; i++)
-        if (d->cut[i] == 2) d->empty[1][i] = 1;
+        if (d->cut[i] == 2) isogi_dvr__mark_cut(d, i);
     if (d->desc.space == ISOGI_DVR_PHYSICAL) isogi_dvr__mark_leaps(d);
 }
 
@@ -2451,18 +2456,42 @@ static void isogi_dvr__jitter(isogi_dvr__march *m, uint32_t seed, int x, int y) 
     m->count = (uint64_t)isogi_dvr__clamp(ceil(m->length / m->piece + m->shift), 2 * ISOGI_DVR__MAX_SAMPLES);
 }
 
+/* A row of two voxels; where the axis has one, twice that. */
+#define ISOGI_DVR__PAIR(T, offset, to)                                                                    \
+    (to)[0] = v->scale * (double)*(const T *)(const void *)(p + (offset)) + v->bias,                      \
+    (to)[1] = v->scale * (double)*(const T *)(const void *)(p + (offset) + stride[0]) + v->bias
+#define ISOGI_DVR__CORNERS(T)                                                                             \
+    ISOGI_DVR__PAIR(T, 0, m->corner), ISOGI_DVR__PAIR(T, stride[1], m->corner + 2),                       \
+    ISOGI_DVR__PAIR(T, stride[2], m->corner + 4), ISOGI_DVR__PAIR(T, stride[1] + stride[2], m->corner + 6)
+
 /* Corner x + 2y + 4z of the present cell. */
 static void isogi_dvr__fetch(isogi_dvr__march *m) {
-    uint32_t cell[3];
+    const isogi_volume *v = &m->dvr->volume;
+    const char *p = (const char *)v->data;
+    double low[4], high[4];
+    ptrdiff_t stride[3];
     int i;
-    for (i = 0; i < 3; i++) cell[i] = (uint32_t)m->cell[i];
-    m->finite = isogi_volume_corners(&m->dvr->volume, cell, m->corner);
-    m->low = m->high = m->corner[0];
-    for (i = 1; i < 8; i++) {
-        if (m->corner[i] < m->low) m->low = m->corner[i];
-        if (m->corner[i] > m->high) m->high = m->corner[i];
+    for (i = 0; i < 3; i++) p += m->cell[i] * v->stride[i], stride[i] = m->dvr->cells[i] ? v->stride[i] : 0;
+    m->finite = 1;
+    if (v->type == ISOGI_U8) ISOGI_DVR__CORNERS(uint8_t);
+    else if (v->type == ISOGI_U16) ISOGI_DVR__CORNERS(uint16_t);
+    else if (v->type == ISOGI_F32) {
+        ISOGI_DVR__CORNERS(float);
+        for (i = 0; i < 8; i++) m->finite &= isogi_dvr__finite64(m->corner[i]);
+    } else {
+        uint32_t cell[3];
+        for (i = 0; i < 3; i++) cell[i] = (uint32_t)m->cell[i];
+        m->finite = isogi_volume_corners(v, cell, m->corner);
     }
+    for (i = 0; i < 4; i++) {
+        const double *c = m->corner + 2 * i;
+        low[i] = c[0] < c[1] ? c[0] : c[1], high[i] = c[0] < c[1] ? c[1] : c[0];
+    }
+    for (i = 0; i < 2; i++) low[i] = low[i] < low[i + 2] ? low[i] : low[i + 2], high[i] = high[i] > high[i + 2] ? high[i] : high[i + 2];
+    m->low = low[0] < low[1] ? low[0] : low[1], m->high = high[0] > high[1] ? high[0] : high[1];
 }
+#undef ISOGI_DVR__PAIR
+#undef ISOGI_DVR__CORNERS
 
 /* The trilinear value, kept within the corners' range (rounding may not carry it into extinction that the range excludes), and
    its derivative along the ray, per t. */
@@ -2625,7 +2654,14 @@ static void isogi_dvr__begin_walk(isogi_dvr__walk *w, isogi_dvr__march *m) {
     isogi_dvr__walk_to(w);
 }
 
-/* Steps over the largest empty block around the cell: 1 if there is one. The cell it lands in follows from integers along the axis that
+static int isogi_dvr__block_empty(isogi_dvr__march *m, int n, const int c[3]) {
+    const size_t *size = m->dvr->level[n].size;
+    int shift = 2 + 2 * n;
+    m->work.blocks++;
+    return m->dvr->empty[n][(size_t)(c[0] >> shift) + size[0] * ((size_t)(c[1] >> shift) + size[1] * (size_t)(c[2] >> shift))];
+}
+
+/* Steps over the largest empty block around the cell: 1 if there is one; what is empty is so in every smaller block. The cell it lands in follows from integers along the axis that
    leads out, and lies within the block's reach along the others, so that rounding can neither turn the ray back nor lose it. */
 static int isogi_dvr__leave_block(isogi_dvr__walk *w) {
     isogi_dvr__march *m = w->m;
@@ -2633,13 +2669,12 @@ static int isogi_dvr__leave_block(isogi_dvr__walk *w) {
     const int *c = w->cell;
     int n, a;
     if (c[0] >> 2 == m->known[0] && c[1] >> 2 == m->known[1] && c[2] >> 2 == m->known[2]) return 0;
-    for (n = ISOGI_DVR__LEVELS - 1; n >= 0; n--) {
+    for (n = isogi_dvr__block_empty(m, 0, c) ? ISOGI_DVR__LEVELS - 1 : -1; n >= 0; n--) {
         const isogi_level *level = &d->level[n];
         int shift = 2 + 2 * n, axis = -1, first[3];
         double leave = m->length;
         size_t block = (size_t)(c[0] >> shift) + level->size[0] * ((size_t)(c[1] >> shift) + level->size[1] * (size_t)(c[2] >> shift));
-        m->work.blocks++;
-        if (!d->empty[n][block]) continue;
+        if (n && !isogi_dvr__block_empty(m, n, c)) continue;
         m->work.blocks_skipped++;
         if (level->range[block][0] > level->range[block][1]) w->chained = 0; /* no finite value */
         else isogi_dvr__is_quiet(&d->integral, (double)level->range[block][0], (double)level->range[block][1], w->quiet);
@@ -2672,19 +2707,27 @@ static int isogi_dvr__leave_block(isogi_dvr__walk *w) {
     return 0;
 }
 
-/* Exact at both ends, and between equal values: a face whose voxels all have the value of a peak is on it wherever the ray passes. */
-static double isogi_dvr__mix(double a, double b, double u) { return u < 0.5 ? a + u * (b - a) : b - (1 - u) * (b - a); }
-
-/* The cubic from `in` to `out` (places in the cell) as Bernstein coefficients: values at corners of the box between the two places. */
+/* The cubic from `in` to `out` (places in the cell) as Bernstein coefficients: values at corners of the box between the two places. Values are
+   mixed from the nearer side: exact at both ends, and between equal values, so that a face whose voxels all have the value of a peak is on it
+   wherever the ray passes. */
 static void isogi_dvr__cubic(const double c[8], const double in[3], const double out[3], double b[4]) {
-    double x[2][4], y[2][2][2], z[2][2][2];
-    int i, j, k;
-    for (i = 0; i < 4; i++) x[0][i] = isogi_dvr__mix(c[2 * i], c[2 * i + 1], in[0]), x[1][i] = isogi_dvr__mix(c[2 * i], c[2 * i + 1], out[0]);
+    double u[2][3], x[2][4], y[2][2][2], z[2][2][2];
+    int far_side[2][3], i, j, k, n;
+    for (n = 0; n < 2; n++)
+        for (k = 0; k < 3; k++) {
+            double at = n ? out[k] : in[k];
+            far_side[n][k] = at >= 0.5, u[n][k] = at < 0.5 ? at : 1 - at;
+        }
+#define ISOGI_DVR__MIX(p, n, k) ((p)[far_side[n][k]] + u[n][k] * ((p)[1 - far_side[n][k]] - (p)[far_side[n][k]]))
+    for (n = 0; n < 2; n++)
+        for (i = 0; i < 4; i++) x[n][i] = ISOGI_DVR__MIX(c + 2 * i, n, 0);
     for (i = 0; i < 2; i++)
-        for (k = 0; k < 2; k++)
-            y[i][0][k] = isogi_dvr__mix(x[i][2 * k], x[i][2 * k + 1], in[1]), y[i][1][k] = isogi_dvr__mix(x[i][2 * k], x[i][2 * k + 1], out[1]);
+        for (n = 0; n < 2; n++)
+            for (k = 0; k < 2; k++) y[i][n][k] = ISOGI_DVR__MIX(x[i] + 2 * k, n, 1);
     for (i = 0; i < 2; i++)
-        for (j = 0; j < 2; j++) z[i][j][0] = isogi_dvr__mix(y[i][j][0], y[i][j][1], in[2]), z[i][j][1] = isogi_dvr__mix(y[i][j][0], y[i][j][1], out[2]);
+        for (j = 0; j < 2; j++)
+            for (n = 0; n < 2; n++) z[i][j][n] = ISOGI_DVR__MIX(y[i][j], n, 2);
+#undef ISOGI_DVR__MIX
     b[0] = z[0][0][0], b[3] = z[1][1][1];
     b[1] = (z[1][0][0] + z[0][1][0] + z[0][0][1]) * (1 / 3.0), b[2] = (z[1][1][0] + z[1][0][1] + z[0][1][1]) * (1 / 3.0);
 }
