@@ -317,8 +317,8 @@ ISOGI_API void isogi_dvr_free(isogi_dvr *dvr); /* NULL is fine */
    turn comes it keeps what it had. */
 ISOGI_API isogi_result isogi_dvr_set_transfer(isogi_dvr *dvr, const isogi_transfer *transfer);
 
-/* Computes visibility within about max_rays rays, at least one grid point, block or direction (0 = to the end). *remaining (may be NULL): fraction
-   still to do, 0 = finished. When cancelled, what is finished stays and the next call goes on. Without ISOGI_DVR_VISIBILITY there
+/* Computes visibility within about max_rays rays, at least one grid point, block or direction (0 = to the end); voxels that have to be
+   read for it, after a change, count too. *remaining (may be NULL): fraction still to do, 0 = finished. When cancelled, what is finished stays and the next call goes on. Without ISOGI_DVR_VISIBILITY there
    is nothing to do. */
 ISOGI_API isogi_result isogi_dvr_step(isogi_dvr *dvr, uint64_t max_rays, double *remaining);
 
@@ -695,7 +695,8 @@ typedef struct isogi_dvr__matter {
     double low, scale;                  /* class of a value: (value - low) * scale; see isogi_dvr__set_classes */
     double kept[2], kept_scale;         /* some block may still have been classified as coarsely as this, between these values */
     float *table, *scratch;             /* while it is brought up to date: extinction of classes; rows of values */
-    size_t scratch_row;
+    size_t scratch_row, plane;          /* the first of the planes at hand */
+    size_t prepared;                    /* planes brought up to date since the last change, from the lowest on */
 } isogi_dvr__matter;
 /* Premultiplied colour and transmittance of a piece of ray. */
 typedef struct isogi_dvr__layer {
@@ -738,6 +739,9 @@ typedef struct isogi_dvr__blocks {
     uint8_t *level, *lit, *stale;  /* of each block: level of its data, of its local visibility; visibility has to be computed */
     size_t *first;                 /* [2][total]: its first node in `data` and in `sh` */
     size_t *order, due;           /* blocks to be computed */
+    size_t counted;               /* blocks whose histogram holds the present bins, from the first on */
+    double share;                 /* of a whole update that is left when the histograms are there */
+    int ready;                    /* levels, data and order are those of the last change */
     float *data;
     uint16_t *sh;                  /* [nodes][order * order], half floats */
     size_t data_count, sh_count, packing;
@@ -1495,7 +1499,7 @@ ISOGI_API isogi_result isogi_dvr_set_transfer(isogi_dvr *dvr, const isogi_transf
     changed += isogi_dvr__renew_classes(dvr);
     isogi_release(&dvr->context, marks, ISOGI_DVR__TABLE + 1, sizeof *marks);
     before = dvr->method, dvr->method = isogi_dvr__method(dvr);
-    if (changed || dvr->method == ISOGI_DVR_BRUTE || dvr->method != before) dvr->next = 0;
+    if (changed || dvr->method == ISOGI_DVR_BRUTE || dvr->method != before) dvr->next = dvr->matter.prepared = 0, dvr->blocks.ready = 0;
     return ISOGI_OK;
 }
 
@@ -2093,10 +2097,10 @@ static void isogi_dvr__set_bins(const isogi_dvr *d, uint8_t bin[ISOGI_DVR__TABLE
 }
 
 /* Which bins of values occur in a block: the piecewise constant histogram, of which the largest difference needs no counts. */
-static void isogi_dvr__histogram_task(void *arg, size_t block) {
+static void isogi_dvr__histogram_task(void *arg, size_t task) {
     isogi_dvr *d = (isogi_dvr *)arg;
     isogi_dvr__blocks *b = &d->blocks;
-    size_t at[3] = {block % b->count[0], block / b->count[0] % b->count[1], block / b->count[0] / b->count[1]}, count, x, y, z;
+    size_t block = b->counted + task, at[3] = {block % b->count[0], block / b->count[0] % b->count[1], block / b->count[0] / b->count[1]}, count, x, y, z;
     uint64_t classes = 0;
     float row[17];
     count = d->volume.size[0] - 16 * at[0] < 17 ? d->volume.size[0] - 16 * at[0] : 17;
@@ -3188,11 +3192,12 @@ static int isogi_dvr__row_state(const isogi_dvr *d, const size_t node[2], uint8_
     return any;
 }
 
-/* The nodes of one z. */
-static void isogi_dvr__matter_task(void *arg, size_t z) {
+/* The nodes of one z, the task-th of those at hand. */
+static void isogi_dvr__matter_task(void *arg, size_t task) {
     isogi_dvr *d = (isogi_dvr *)arg;
     isogi_dvr__matter *m = &d->matter;
-    float *scratch = m->scratch + z * m->scratch_row, *row = scratch + d->volume.size[0], *sum = row + d->volume.size[0];
+    size_t z = m->plane + task;
+    float *scratch = m->scratch + task * m->scratch_row, *row = scratch + d->volume.size[0], *sum = row + d->volume.size[0];
     uint8_t *state = (uint8_t *)(sum + m->size[0]);
     size_t node[2], i, n[3], s[3], last = d->volume.size[0] - 1;
     int a;
@@ -3238,11 +3243,28 @@ static void isogi_dvr__turn_task(void *arg, size_t y) {
         }
 }
 
-/* Brings the lattice up to date with the transfer function, in the blocks marked as changed. */
-static isogi_result isogi_dvr__update_matter(isogi_dvr *d) {
+/* What a plane of the lattice counts for, in rays: a quarter of the voxels that are read for it. */
+static double isogi_dvr__plane_rays(const isogi_dvr *d, size_t z) {
+    const isogi_level *level = &d->level[1];
+    double at = (double)z * d->matter.spacing[2], half = 0.5 * d->matter.spacing[2], last = (double)level->size[2] - 1;
+    size_t layer = level->size[0] * level->size[1], block = layer * (size_t)isogi_dvr__clamp((at - half) / 16 - 1e-9, last);
+    size_t end = layer * ((size_t)isogi_dvr__clamp((at + half) / 16, last) + 1), count = 0;
+    for (; block < end; block++) count += d->changed[block] && !d->empty[1][block];
+    return (double)count * 16 * 16 * d->matter.spacing[2] / 4;
+}
+
+/* Brings the lattice up to date with the transfer function, in the blocks marked as changed, plane by plane within a budget of rays (0 =
+   all); at least one plane. *used: what they count for. */
+static isogi_result isogi_dvr__update_matter(isogi_dvr *d, uint64_t max_rays, double *used) {
     isogi_dvr__matter *m = &d->matter;
     isogi_result result;
-    size_t rows = m->size[2], n;
+    size_t end, rows, n;
+    for (*used = 0, end = m->prepared; end < m->size[2]; end++) {
+        double rays = isogi_dvr__plane_rays(d, end);
+        if (max_rays && end > m->prepared && *used + rays > (double)max_rays) break;
+        *used += rays;
+    }
+    rows = end - m->prepared, m->plane = m->prepared;
     m->scratch_row = 2 * d->volume.size[0] + 2 * m->size[0] + ISOGI_DVR__LANES;
     if (rows > SIZE_MAX / 64 / m->scratch_row) return ISOGI_TOO_LARGE;
     m->table = (float *)isogi_allocate(&d->context, ISOGI_DVR__TABLE, sizeof *m->table);
@@ -3252,13 +3274,15 @@ static isogi_result isogi_dvr__update_matter(isogi_dvr *d) {
         isogi_dvr__set_table(d, m->table);
         result = isogi_parallel(&d->context, rows, isogi_dvr__matter_task, d, 0, 0);
     }
-    if (result == ISOGI_OK) result = isogi_parallel(&d->context, m->size[1], isogi_dvr__turn_task, d, 0, 0);
+    if (result == ISOGI_OK && end == m->size[2]) result = isogi_parallel(&d->context, m->size[1], isogi_dvr__turn_task, d, 0, 0);
     isogi_release(&d->context, m->table, ISOGI_DVR__TABLE, sizeof *m->table);
     isogi_release(&d->context, m->scratch, rows * m->scratch_row, sizeof *m->scratch);
     m->table = m->scratch = NULL;
-    for (n = 0; result == ISOGI_OK && n < d->changed_count; n++) d->classified += d->changed[n];
-    if (result == ISOGI_OK) memset(d->changed, 0, d->changed_count);
-    return result;
+    if (result == ISOGI_OK) m->prepared = end;
+    if (result != ISOGI_OK || end < m->size[2]) return result;
+    for (n = 0; n < d->changed_count; n++) d->classified += d->changed[n];
+    memset(d->changed, 0, d->changed_count);
+    return ISOGI_OK;
 }
 
 /* ==== half floats ==================================================================================================== */
@@ -3544,23 +3568,41 @@ static isogi_result isogi_dvr__lay_out(isogi_dvr *d, const uint8_t *level, const
     return ISOGI_OK;
 }
 
+/* Histograms for the present bins, within a budget of rays (0 = all), for which a block's voxels count as much as its local rays do: a block
+   at least. *used: what they count for; b->counted == b->total when they are all there. */
+static isogi_result isogi_dvr__count_blocks(isogi_dvr *d, uint64_t max_rays, double *used) {
+    isogi_dvr__blocks *b = &d->blocks;
+    const isogi_dvr__matter *m = &d->matter;
+    const uint64_t rays = 64 * (uint64_t)d->desc.directions;
+    isogi_context whole = d->context;
+    uint8_t bin[ISOGI_DVR__TABLE];
+    isogi_result result;
+    size_t count;
+    whole.progress = NULL;
+    *used = 0, b->share = 1;
+    isogi_dvr__set_table(d, m->table), isogi_dvr__set_bins(d, bin);
+    if (memcmp(b->bin, bin, sizeof bin) || b->low < m->low || b->low > m->low || b->scale < m->scale || b->scale > m->scale) {
+        memcpy(b->bin, bin, sizeof bin);
+        b->low = m->low, b->scale = m->scale, b->counted = 0;
+    }
+    if (b->counted == b->total) return ISOGI_OK;
+    b->share = (double)d->desc.directions / ((double)d->desc.directions + (double)b->total);
+    count = b->total - b->counted;
+    if (max_rays && max_rays / rays < count) count = max_rays / rays ? (size_t)(max_rays / rays) : 1;
+    result = isogi_parallel(&whole, count, isogi_dvr__histogram_task, d, 0, 0);
+    if (result == ISOGI_OK) *used = (double)count * (double)rays, b->counted += count;
+    return result;
+}
+
 /* New levels for a new classification, the data packed anew, and the list of blocks whose local visibility has to follow: those with a
    changed block within reach of a ray. */
 static isogi_result isogi_dvr__update_blocks(isogi_dvr *d) {
     isogi_dvr__blocks *b = &d->blocks;
     uint8_t *level = (uint8_t *)isogi_allocate(&d->context, 3 * b->total, 1), *lit = level + b->total, *changed = lit + b->total;
     isogi_result result = level ? ISOGI_OK : ISOGI_NO_MEMORY;
-    const isogi_dvr__matter *m = &d->matter;
     isogi_context whole = d->context;
-    uint8_t bin[ISOGI_DVR__TABLE];
     size_t i;
     whole.progress = NULL;
-    isogi_dvr__set_table(d, m->table), isogi_dvr__set_bins(d, bin);
-    if (result == ISOGI_OK && (memcmp(b->bin, bin, sizeof bin) || b->low < m->low || b->low > m->low || b->scale < m->scale || b->scale > m->scale)) {
-        memcpy(b->bin, bin, sizeof bin), b->scale = 0;
-        result = isogi_parallel(&whole, b->total, isogi_dvr__histogram_task, d, 0, 0);
-        if (result == ISOGI_OK) b->low = m->low, b->scale = m->scale;
-    }
     if (result == ISOGI_OK) result = isogi_dvr__select_levels(d, level);
     for (i = 0; result == ISOGI_OK && i < b->total; i++) {
         changed[i] = d->changed[i] || level[i] != b->level[i];
@@ -3578,6 +3620,7 @@ static isogi_result isogi_dvr__update_blocks(isogi_dvr *d) {
     memset(d->changed, 0, d->changed_count);
     for (i = 0, b->due = 0; i < b->total; i++)
         if (b->stale[i] && b->lit[i]) b->order[b->due++] = i;
+    b->ready = 1;
     return ISOGI_OK;
 }
 
@@ -4230,7 +4273,6 @@ static isogi_result isogi_dvr__step_sweeps(isogi_dvr *d, size_t end) {
     job.scratch = (float *)isogi_allocate(&d->context, batch * job.scratch_count, sizeof(float));
     job.transmittance = (float *)isogi_allocate(&d->context, batch * d->padded_count, sizeof(float));
     if (!job.scratch || !job.transmittance) result = ISOGI_NO_MEMORY;
-    if (result == ISOGI_OK && !d->next) result = isogi_dvr__update_matter(d);
     while (result == ISOGI_OK && d->next < end) {
         job.first = d->next, job.count = end - d->next < batch ? end - d->next : batch;
         if (d->next < d->turned && d->turned - d->next < job.count) job.count = d->turned - d->next;
@@ -4245,32 +4287,65 @@ static isogi_result isogi_dvr__step_sweeps(isogi_dvr *d, size_t end) {
     return result;
 }
 
+/* What has to be read before directions are swept, or blocks take rays: 1 in *go_on when it is done and budget is left, which *max_rays
+   then holds. */
+static isogi_result isogi_dvr__prepare(isogi_dvr *d, uint64_t *max_rays, double *remaining, int *go_on) {
+    isogi_dvr__blocks *b = &d->blocks;
+    isogi_result result = ISOGI_OK;
+    double used = 0, left = 0, directions = (double)d->desc.directions;
+    *go_on = 1;
+    if (d->method == ISOGI_DVR_PAPER && !b->ready) {
+        result = isogi_dvr__count_blocks(d, *max_rays, &used);
+        left = (double)(b->total - b->counted);
+        if (result == ISOGI_OK && !(left > 0)) result = isogi_dvr__update_blocks(d);
+        left = (left + directions) / ((double)b->total + directions);
+        *go_on = b->counted == b->total;
+    } else if (d->method == ISOGI_DVR_SWEEP && d->matter.prepared < d->matter.size[2]) {
+        const isogi_dvr__matter *m = &d->matter;
+        result = isogi_dvr__update_matter(d, *max_rays, &used);
+        left = ((double)(m->size[2] - m->prepared) + directions) / ((double)m->size[2] + directions);
+        *go_on = m->prepared == m->size[2];
+    }
+    if (*max_rays && used >= (double)*max_rays) *go_on = 0;
+    if (!*go_on && result == ISOGI_OK && remaining) *remaining = left;
+    if (*max_rays && *go_on) *max_rays -= (uint64_t)used;
+    return result;
+}
+
 /* Units of work and the rays of each: brute force goes on by grid points, sweeps by directions, the paper's method by blocks (whose
    rays are short: they are taken for 64 points') and then by directions. */
 ISOGI_API isogi_result isogi_dvr_step(isogi_dvr *dvr, uint64_t max_rays, double *remaining) {
     isogi_result result = ISOGI_OK;
     uint64_t units, rays;
     size_t count, end;
+    double share = 1; /* of all the work, that of what follows */
+    int go_on = 1;
     if (!dvr) return ISOGI_INVALID;
-    if (dvr->method == ISOGI_DVR_PAPER && dvr->point_count && !dvr->next) result = isogi_dvr__update_blocks(dvr);
-    if (result != ISOGI_OK) return result;
     if (dvr->transparent && dvr->point_count && (isogi_dvr__by_value(dvr) || !dvr->transfer.peak_count)) {
+        max_rays = 0;
+        if (dvr->method == ISOGI_DVR_PAPER) result = isogi_dvr__prepare(dvr, &max_rays, NULL, &go_on);
+        if (result != ISOGI_OK) return result;
         isogi_dvr__clear_visibility(dvr);
         if (remaining) *remaining = 0;
         return ISOGI_OK;
     }
+    if (dvr->point_count) result = isogi_dvr__prepare(dvr, &max_rays, remaining, &go_on);
+    if (result != ISOGI_OK || !go_on) return result;
     count = dvr->point_count, rays = (uint64_t)dvr->desc.directions;
-    if (count && dvr->method == ISOGI_DVR_SWEEP) count = (size_t)dvr->desc.directions, rays = dvr->point_count;
+    if (count && dvr->method == ISOGI_DVR_SWEEP) {
+        count = (size_t)dvr->desc.directions, rays = dvr->point_count;
+        share = (double)count / ((double)count + (double)dvr->matter.size[2]);
+    }
     if (count && dvr->method == ISOGI_DVR_PAPER) {
         rays = dvr->next < dvr->blocks.due ? 64 * rays : dvr->point_count;
-        count = dvr->blocks.due + (size_t)dvr->desc.directions;
+        count = dvr->blocks.due + (size_t)dvr->desc.directions, share = dvr->blocks.share;
     }
     units = max_rays / rays;
     units = units ? units : 1;
     end = max_rays && units < count - dvr->next ? dvr->next + (size_t)units : count;
     if (dvr->method == ISOGI_DVR_SWEEP) result = isogi_dvr__step_sweeps(dvr, end);
     else result = dvr->method == ISOGI_DVR_PAPER && count ? isogi_dvr__step_paper(dvr, end) : isogi_dvr__step_brute(dvr, end);
-    if (result == ISOGI_OK && remaining) *remaining = count ? (double)(count - dvr->next) / (double)count : 0;
+    if (result == ISOGI_OK && remaining) *remaining = count ? (double)(count - dvr->next) / (double)count * share : 0;
     return result;
 }
 
@@ -4314,7 +4389,7 @@ ISOGI_API isogi_result isogi_dvr_set_clip(isogi_dvr *dvr, const double (*planes)
         dvr->cut[i] = cut;
     }
     isogi_dvr__mark_empty(dvr);
-    dvr->next = 0;
+    dvr->next = dvr->matter.prepared = 0, dvr->blocks.ready = 0;
     return ISOGI_OK;
 }
 

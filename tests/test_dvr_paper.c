@@ -135,7 +135,7 @@ TEST(blocks_are_raised_in_the_order_of_their_significance) {
                                      .reduction = reduction};
         isogi_dvr *dvr = dvr_new(&desc, &transfer);
         isogi_dvr_report report;
-        CHECK(isogi_dvr_step(dvr, 1, NULL) == ISOGI_OK && isogi_dvr_inspect(dvr, &report) == ISOGI_OK, "step");
+        CHECK(isogi_dvr_step(dvr, 64 * 64 * 8, NULL) == ISOGI_OK && isogi_dvr_inspect(dvr, &report) == ISOGI_OK, "step");
         for (int a = 0; a < BLOCKS; a++)
             for (int b = 0; b < BLOCKS; b++) {
                 int from = report.level[a] / 2, to = report.level[b]; /* a was raised from there; b was not from here */
@@ -193,6 +193,49 @@ TEST(pictures_between_steps_lie_between_old_and_new) {
         CHECK(last < 1e-6 && frames > 3, "method %d: ends with an error of %g after %d frames", method, last, frames);
         if (method == ISOGI_DVR_BRUTE) CHECK(moved > 1, "brute force goes on point by point: %d", moved);
         isogi_dvr_free(dvr), isogi_dvr_free(fresh);
+    }
+    field_free(&f);
+}
+
+/* ---- budgets ---- */
+
+static size_t most_tasks; /* of one call of parallel_for */
+static void counted_for(void *user, size_t n, void (*task)(void *, size_t), void *arg) {
+    (void)user;
+    most_tasks = n > most_tasks ? n : most_tasks;
+    for (size_t i = 0; i < n; i++) task(arg, i);
+}
+
+/* Voxels that an edit makes sweeps and blocks read anew count as rays: a small budget reads a plane or a block at a time, what is left falls
+   with every step, and what is there in the end is what one step, or a renderer that knew no other function, has; bit for bit. */
+TEST(what_is_read_after_a_change_counts_against_the_budget) {
+    enum { N = 65, POINTS = 27 };
+    field f = field_noise(N, 4);
+    const isogi_context context = {.parallel_for = counted_for, .threads = 1};
+    const isogi_transfer_point a[] = {{-1, {1, 1, 1}, 0}, {1, {1, 1, 1}, 0.1f}}, b[] = {{-0.5, {1, 1, 1}, 0}, {0.7, {1, 1, 1}, 0.05f}, {0.8, {1, 1, 1}, 0.2f}};
+    const isogi_transfer first = {a, 2, NULL, 0}, second = {b, 3, NULL, 0};
+    static float v[3][POINTS][4], points[POINTS][3];
+    for (int i = 0; i < 3 * POINTS; i++) points[i / 3][i % 3] = (float)(i / 3 / (i % 3 == 0 ? 1 : i % 3 == 1 ? 3 : 9) % 3 * 32);
+    for (int method = ISOGI_DVR_PAPER; method <= ISOGI_DVR_SWEEP; method++) {
+        const isogi_dvr_desc desc = {.pyramid = f.pyramid, .shading = ISOGI_DVR_VISIBILITY, .method = (isogi_dvr_method)method, .order = 2, .directions = 16, .grid = {5, 5, 5}, .reduction = 20};
+        for (int n = 0; n < 3; n++) { /* at once; in small steps; changed while the first is being read */
+            isogi_dvr *dvr = dvr_new_with(&desc, n == 2 ? &first : &second, &context);
+            double remaining = 2, last = 2;
+            int steps = 0;
+            if (!n) CHECK(isogi_dvr_step(dvr, 0, &last) == ISOGI_OK && !(last > 0), "at once");
+            for (; n && remaining > 0; steps++) {
+                if (n == 2 && steps == 5) last = isogi_dvr_set_transfer(dvr, &second) == ISOGI_OK ? 2 : 0;
+                most_tasks = 0;
+                CHECK(isogi_dvr_step(dvr, 1, &remaining) == ISOGI_OK, "step");
+                CHECK(remaining < last && (remaining > 0 || steps > 30), "method %d: %g left after %g", method, remaining, last);
+                if (steps < 12) CHECK(most_tasks == 1, "method %d, step %d: %zu planes or blocks at once", method, steps, most_tasks);
+                last = remaining;
+            }
+            CHECK(isogi_dvr_sample_visibility(dvr, (const float(*)[3])points, POINTS, v[n][0]) == ISOGI_OK, "sample");
+            isogi_dvr_free(dvr);
+        }
+        CHECK(!memcmp(v[0], v[1], sizeof v[0]) && !memcmp(v[0], v[2], sizeof v[0]), "method %d: steps end elsewhere", method);
+        CHECK(v[0][13][0] > 0.1f && v[0][13][0] < 3.4f, "method %d: %g in the middle", method, (double)v[0][13][0]);
     }
     field_free(&f);
 }
