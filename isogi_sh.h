@@ -22,7 +22,8 @@
 
    - Evaluates real spherical harmonics to degree 100 in float and double, in both layouts, with gradients, and whole expansions.
    - Projects functions, samples, equirectangular and cube images, and lights onto them.
-   - Rotates expansions by matrix, quaternion, axis and angle, or Euler angles: once, or built once and applied many times.
+   - Rotates expansions by matrix, quaternion, axis and angle, or Euler angles, in float and double: once, or built once and applied
+     many times.
    - Multiplies, convolves, windows, de-rings, mirrors and converts expansions; fits "ambient + one directional light" to them.
    - Owns the description of lights that isogi_trace.h and isogi_dvr.h use.
 
@@ -57,13 +58,15 @@
 
    Memory       None allocated. Stack use stays below 32 KB.
    Threads      Every function is pure: call them from any thread.
-   Speed        Batches of 16 directions and more (8 of doubles) use all lanes of AVX2 and AVX-512, whatever the count. Results that stay in the first-level cache, such
-                as 64 directions at order 11, take half or a third of the time; rows of a structure of arrays that are a multiple of 4096
-                bytes long take twice as long again, since all functions of a direction compete for the same lines of the cache.
+   Speed        Batches of 16 directions and more (8 of doubles) use all lanes of AVX2 and AVX-512, whatever the count. Results that stay
+                in the first-level cache, such as 64 directions at order 11, take half or a third of the time; rows of a structure of
+                arrays that are a multiple of 4096 bytes long take twice as long again, since all functions of a direction compete for
+                the same lines of the cache.
    Determinism  The same input on the same instruction path gives the same bits. Paths agree within the float errors below.
    Accuracy     Largest absolute error against 128 bits, poles and all: double 1e-15 at degree 4, 5e-15 at 10, 1.5e-14 at 20, 6e-14 at 50,
                 2e-13 at 100; float 4.5e-7 at 4, 2.2e-6 at 10, 1e-5 at 20. tests/test_sh.c states and checks each.
-                All bounds assume IEEE arithmetic: -ffast-math may reorder what cancels, and costs up to four times as much, six at degree 100.
+                All bounds assume IEEE arithmetic: -ffast-math may reorder what cancels, and costs up to four times as much, six at
+                degree 100.
    Limits       Order 1..101 (degree 0..100), 1..16 channels. Counts times order^2 must be addressable.
 
    Conventions  Real, orthonormal, without the Condon-Shortley phase, index i = l (l + 1) + m (ACN). Y1..Y3 = sqrt(3 / 4 pi) (y, z, x).
@@ -231,6 +234,7 @@ ISOGI_API isogi_result isogi_sh_rotate_f64(double *out, const double *in, int or
 
 /* About z alone, by an angle in radians. */
 ISOGI_API isogi_result isogi_sh_rotate_z(float *out, const float *in, int order, int channels, double angle);
+ISOGI_API isogi_result isogi_sh_rotate_z_f64(double *out, const double *in, int order, int channels, double angle);
 
 /* Built once, applied many times: order (4 order^2 - 1) / 3 numbers, degree by degree a (2l+1)^2 matrix column by column: column j
    is the rotated basis function j, and entry (i, j) stands at (2l+1) j + i. out must not overlap in. */
@@ -241,10 +245,13 @@ ISOGI_API isogi_result isogi_sh_rotation_apply(float *out, const float *in, int 
 ISOGI_API isogi_result isogi_sh_rotation_apply_f64(double *out, const double *in, int order, int channels, const double *rotation);
 
 /* Rotation matrices: from a quaternion (w, x, y, z; any length > 0), an axis (any length > 0) and an angle (radians, right-handed),
-   and Euler angles Z(a) Y(b) Z(c), c applied first. */
+   and Euler angles Z(a) Y(b) Z(c), c applied first. Entries are right to 1e-15, and rounded to float. */
 ISOGI_API isogi_result isogi_sh_matrix_from_quaternion(float m[9], const float quaternion[4]);
 ISOGI_API isogi_result isogi_sh_matrix_from_axis_angle(float m[9], const float axis[3], double angle);
 ISOGI_API isogi_result isogi_sh_matrix_from_euler_zyz(float m[9], double a, double b, double c);
+ISOGI_API isogi_result isogi_sh_matrix_from_quaternion_f64(double m[9], const double quaternion[4]);
+ISOGI_API isogi_result isogi_sh_matrix_from_axis_angle_f64(double m[9], const double axis[3], double angle);
+ISOGI_API isogi_result isogi_sh_matrix_from_euler_zyz_f64(double m[9], double a, double b, double c);
 
 /* f with one coordinate negated: axis 0, 1, 2 = x, y, z. out may be in. */
 ISOGI_API isogi_result isogi_sh_mirror(float *out, const float *in, int order, int channels, int axis);
@@ -2403,7 +2410,7 @@ typedef struct isogi_sh__row_pairs {
 /* 0 unless the matrix is a rotation to 1e-6, as rotations rounded to float are: all products of rows are 0 or 1, and the last column
    is what the cross products of the rows say. */
 ISOGI_SH__INLINE __attribute__((target("avx2,fma"))) int isogi_sh__row_pairs_start(isogi_sh__row_pairs *r, const float m[9]) {
-    isogi_sh__f8 low = *(const isogi_sh__f8 *)m, high = *(const isogi_sh__f8 *)(m + 1), off, cross;
+    isogi_sh__f8 low = *(const isogi_sh__f8 *)m, high = *(const isogi_sh__f8 *)(m + 1), zero = {0}, off, cross;
     const isogi_sh__f8 same = {1, 1, 1, 0, 0, 1, 0, 1}, pair = {0, 0, 0, 1, 1, 0, 1, 0};
     r->ax = __builtin_shufflevector(low, low, 3, 6, 0, 0, 3, 6, 6, 0), r->bx = __builtin_shufflevector(low, low, 3, 6, 0, 3, 6, 6, 0, 0);
     r->ay = __builtin_shufflevector(low, low, 4, 7, 1, 1, 4, 7, 7, 1), r->by = __builtin_shufflevector(low, low, 4, 7, 1, 4, 7, 7, 1, 1);
@@ -2413,7 +2420,8 @@ ISOGI_SH__INLINE __attribute__((target("avx2,fma"))) int isogi_sh__row_pairs_sta
     r->zx = ISOGI_SH__FMA_F8(r->ax, r->bz, r->az * r->bx);
     off = (r->xx - same) + (r->yy + r->zz);
     cross = (ISOGI_SH__FMA_F8(r->ax, r->by, -(r->ay * r->bx)) - __builtin_shufflevector(high, high, 7, 7, 7, 7, 1, 7, 4, 7)) * pair;
-    return __builtin_ia32_movmskps256((isogi_sh__f8)(ISOGI_SH__FMA_F8(off, off, cross * cross) < 1e-12f)) == 0xff;
+    off = ISOGI_SH__FMA_F8(off, off, cross * cross); /* compared by bits, since -ffast-math lets NaN pass */
+    return ISOGI_SH__LESS_F8((isogi_sh__i8)off & 0x7fffffff, (isogi_sh__i8)(zero + 1e-12f));
 }
 
 /* Degrees 1 and 2, c[1] to c[8], without angles: degree 1 is a vector v, degree 2 a traceless symmetric tensor T, and R v and R T R^T
@@ -2506,10 +2514,6 @@ ISOGI_SH__INLINE __attribute__((target("avx2,fma"))) int isogi_sh__rotate_low_f8
     if (order > 3) *(isogi_sh__f8 *)(out + 8) = three;
     return 1;
 }
-
-ISOGI_SH__AVX2 static int isogi_sh__rotate_order3(float *out, const float *in, const float m[9]) { return isogi_sh__rotate_low_f8(out, in, 3, m); }
-ISOGI_SH__AVX2 static int isogi_sh__rotate_order4(float *out, const float *in, const float m[9]) { return isogi_sh__rotate_low_f8(out, in, 4, m); }
-ISOGI_SH__AVX2 static int isogi_sh__rotate_order5(float *out, const float *in, const float m[9]) { return isogi_sh__rotate_low_f8(out, in, 5, m); }
 
 #endif
 
@@ -2710,17 +2714,33 @@ ISOGI_SH__APART isogi_result isogi_sh__rotate_f32(float *out, const float *in, i
     return ISOGI_OK;
 }
 
+#ifdef ISOGI_SH__SIMD
+/* Each ends with the plain way where its own does not do, so that callers need not come back. */
+ISOGI_SH__AVX2 static isogi_result isogi_sh__rotate_order3(float *out, const float *in, const float m[9]) {
+    return isogi_sh__rotate_low_f8(out, in, 3, m) ? ISOGI_OK : isogi_sh__rotate_f32(out, in, 3, 1, m);
+}
+
+ISOGI_SH__AVX2 static isogi_result isogi_sh__rotate_order4(float *out, const float *in, const float m[9]) {
+    return isogi_sh__rotate_low_f8(out, in, 4, m) ? ISOGI_OK : isogi_sh__rotate_f32(out, in, 4, 1, m);
+}
+
+ISOGI_SH__AVX2 static isogi_result isogi_sh__rotate_order5(float *out, const float *in, const float m[9]) {
+    return isogi_sh__rotate_low_f8(out, in, 5, m) ? ISOGI_OK : isogi_sh__rotate_f32(out, in, 5, 1, m);
+}
+#endif
+
 ISOGI_API isogi_result isogi_sh_rotate(float *out, const float *in, int order, int channels, const float m[9]) {
 #ifdef ISOGI_SH__SIMD
-    if (order >= 3 && order <= 5 && channels == 1 && out && in && m && isogi_sh__avx2()) {
-        if (order == 3 ? isogi_sh__rotate_order3(out, in, m) : order == 4 ? isogi_sh__rotate_order4(out, in, m) : isogi_sh__rotate_order5(out, in, m))
-            return ISOGI_OK;
+    if (channels == 1 && out && in && m && isogi_sh__avx2()) {
+        if (order == 3) return isogi_sh__rotate_order3(out, in, m);
+        if (order == 4) return isogi_sh__rotate_order4(out, in, m);
+        if (order == 5) return isogi_sh__rotate_order5(out, in, m);
     }
 #endif
     return isogi_sh__rotate_f32(out, in, order, channels, m);
 }
 
-ISOGI_API isogi_result isogi_sh_rotate_z(float *out, const float *in, int order, int channels, double angle) {
+static isogi_result isogi_sh__rotate_z(void *out, const void *in, int is_double, int order, int channels, double angle) {
     double power[ISOGI_SH_MAX_ORDER][2];
     int l, m, k;
     if (!out || !in || !isogi_sh__shape_ok(order, channels) || !isogi_sh__finite_f64(angle)) return ISOGI_INVALID;
@@ -2729,11 +2749,22 @@ ISOGI_API isogi_result isogi_sh_rotate_z(float *out, const float *in, int order,
         for (m = 0; m <= l; m++)
             for (k = 0; k < channels; k++) {
                 int plus = channels * (l * (l + 1) + m) + k, minus = channels * (l * (l + 1) - m) + k;
-                double p = (double)in[plus], q = (double)in[minus];
-                out[plus] = (float)(p * power[m][0] - q * power[m][1]);
-                if (m) out[minus] = (float)(p * power[m][1] + q * power[m][0]);
+                double p = is_double ? ((const double *)in)[plus] : (double)((const float *)in)[plus];
+                double q = is_double ? ((const double *)in)[minus] : (double)((const float *)in)[minus];
+                double x = p * power[m][0] - q * power[m][1], y = p * power[m][1] + q * power[m][0];
+                if (m == 0) x = p, y = p;
+                if (is_double) ((double *)out)[plus] = x, ((double *)out)[minus] = y;
+                else ((float *)out)[plus] = (float)x, ((float *)out)[minus] = (float)y;
             }
     return ISOGI_OK;
+}
+
+ISOGI_API isogi_result isogi_sh_rotate_z(float *out, const float *in, int order, int channels, double angle) {
+    return isogi_sh__rotate_z(out, in, 0, order, channels, angle);
+}
+
+ISOGI_API isogi_result isogi_sh_rotate_z_f64(double *out, const double *in, int order, int channels, double angle) {
+    return isogi_sh__rotate_z(out, in, 1, order, channels, angle);
 }
 
 /* Where a matrix goes. */
@@ -3053,7 +3084,7 @@ ISOGI_API isogi_result isogi_sh_rotation_build(float *rotation, int order, const
     __asm__("" : "+x"(four))
 #define ISOGI_SH__OF_FOUR(i) x = __builtin_shufflevector(four, four, i, i, i, i, i + 4, i + 4, i + 4, i + 4)
 #define ISOGI_SH__BOTH(j) ISOGI_SH__COLUMN(d, 84 + 9 * (j), x), last = __builtin_fmaf(rotation[92 + 9 * (j)], x[0], last)
-ISOGI_SH__AVX2 static void isogi_sh__apply_order5(float *out, const float *in, const float *rotation) {
+ISOGI_SH__AVX2 static isogi_result isogi_sh__apply_order5(float *out, const float *in, const float *rotation) {
     isogi_sh__f8 zero = {0}, a = zero, b = zero, c = zero, d = zero, x = in[16] - zero, four;
     float last = 0;
     int j;
@@ -3080,6 +3111,7 @@ ISOGI_SH__AVX2 static void isogi_sh__apply_order5(float *out, const float *in, c
     *(isogi_sh__f8 *)(out + 9) = c;
     *(isogi_sh__f8 *)(out + 16) = d;
     out[24] = last;
+    return ISOGI_OK;
 }
 #undef ISOGI_SH__COLUMN
 #undef ISOGI_SH__OF_FOUR
@@ -3103,10 +3135,7 @@ ISOGI_SH__APART isogi_result isogi_sh__rotation_apply(float *out, const float *i
 
 ISOGI_API isogi_result isogi_sh_rotation_apply(float *out, const float *in, int order, int channels, const float *rotation) {
 #ifdef ISOGI_SH__SIMD
-    if (order == 5 && channels == 1 && out && in && rotation && isogi_sh__avx2()) {
-        isogi_sh__apply_order5(out, in, rotation);
-        return ISOGI_OK;
-    }
+    if (order == 5 && channels == 1 && out && in && rotation && isogi_sh__avx2()) return isogi_sh__apply_order5(out, in, rotation);
 #endif
     return isogi_sh__rotation_apply(out, in, order, channels, rotation);
 }
@@ -3124,49 +3153,79 @@ ISOGI_API isogi_result isogi_sh_rotation_apply_f64(double *out, const double *in
     return ISOGI_OK;
 }
 
-static void isogi_sh__quaternion_matrix(float m[9], double w, double x, double y, double z) {
-    m[0] = (float)(1 - 2 * (y * y + z * z)), m[1] = (float)(2 * (x * y - w * z)), m[2] = (float)(2 * (x * z + w * y));
-    m[3] = (float)(2 * (x * y + w * z)), m[4] = (float)(1 - 2 * (x * x + z * z)), m[5] = (float)(2 * (y * z - w * x));
-    m[6] = (float)(2 * (x * z - w * y)), m[7] = (float)(2 * (y * z + w * x)), m[8] = (float)(1 - 2 * (x * x + y * y));
+static void isogi_sh__quaternion_matrix(double m[9], double w, double x, double y, double z) {
+    m[0] = 1 - 2 * (y * y + z * z), m[1] = 2 * (x * y - w * z), m[2] = 2 * (x * z + w * y);
+    m[3] = 2 * (x * y + w * z), m[4] = 1 - 2 * (x * x + z * z), m[5] = 2 * (y * z - w * x);
+    m[6] = 2 * (x * z - w * y), m[7] = 2 * (y * z + w * x), m[8] = 1 - 2 * (x * x + y * y);
 }
 
-ISOGI_API isogi_result isogi_sh_matrix_from_quaternion(float m[9], const float quaternion[4]) {
-    double q[4], square = 0, length;
-    int i;
+ISOGI_API isogi_result isogi_sh_matrix_from_quaternion_f64(double m[9], const double quaternion[4]) {
+    double q[4], square = 0, largest = 0, length;
+    int i, exponent;
     if (!m || !quaternion) return ISOGI_INVALID;
     for (i = 0; i < 4; i++) {
-        if (!isogi_sh__finite_f32(quaternion[i])) return ISOGI_INVALID;
-        q[i] = (double)quaternion[i];
-        square += q[i] * q[i];
+        if (!isogi_sh__finite_f64(quaternion[i])) return ISOGI_INVALID;
+        if (fabs(quaternion[i]) > largest) largest = fabs(quaternion[i]);
     }
-    if (square <= 0) return ISOGI_INVALID;
+    if (largest <= 0) return ISOGI_INVALID;
+    frexp(largest, &exponent); /* squares of the numbers as they are might leave the range */
+    for (i = 0; i < 4; i++) q[i] = ldexp(quaternion[i], -exponent), square += q[i] * q[i];
     length = sqrt(square);
     isogi_sh__quaternion_matrix(m, q[0] / length, q[1] / length, q[2] / length, q[3] / length);
     return ISOGI_OK;
 }
 
-ISOGI_API isogi_result isogi_sh_matrix_from_axis_angle(float m[9], const float axis[3], double angle) {
+ISOGI_API isogi_result isogi_sh_matrix_from_axis_angle_f64(double m[9], const double axis[3], double angle) {
     isogi_sh__unit u;
     double s;
     int i;
     if (!m || !axis || !isogi_sh__finite_f64(angle)) return ISOGI_INVALID;
     for (i = 0; i < 3; i++)
-        if (!isogi_sh__finite_f32(axis[i])) return ISOGI_INVALID;
-    if (fabs((double)axis[0]) + fabs((double)axis[1]) + fabs((double)axis[2]) <= 0) return ISOGI_INVALID;
-    u = isogi_sh__normalise((double)axis[0], (double)axis[1], (double)axis[2]);
+        if (!isogi_sh__finite_f64(axis[i])) return ISOGI_INVALID;
+    if (!(axis[0] > 0 || axis[0] < 0 || axis[1] > 0 || axis[1] < 0 || axis[2] > 0 || axis[2] < 0)) return ISOGI_INVALID;
+    u = isogi_sh__normalise(axis[0], axis[1], axis[2]);
     s = sin(angle / 2);
     isogi_sh__quaternion_matrix(m, cos(angle / 2), s * u.x, s * u.y, s * u.z);
     return ISOGI_OK;
 }
 
-ISOGI_API isogi_result isogi_sh_matrix_from_euler_zyz(float m[9], double a, double b, double c) {
+ISOGI_API isogi_result isogi_sh_matrix_from_euler_zyz_f64(double m[9], double a, double b, double c) {
     double ca, sa, cb, sb, cc, sc;
     if (!m || !isogi_sh__finite_f64(a) || !isogi_sh__finite_f64(b) || !isogi_sh__finite_f64(c)) return ISOGI_INVALID;
     ca = cos(a), sa = sin(a), cb = cos(b), sb = sin(b), cc = cos(c), sc = sin(c);
-    m[0] = (float)(ca * cb * cc - sa * sc), m[1] = (float)(-ca * cb * sc - sa * cc), m[2] = (float)(ca * sb);
-    m[3] = (float)(sa * cb * cc + ca * sc), m[4] = (float)(-sa * cb * sc + ca * cc), m[5] = (float)(sa * sb);
-    m[6] = (float)(-sb * cc), m[7] = (float)(sb * sc), m[8] = (float)cb;
+    m[0] = ca * cb * cc - sa * sc, m[1] = -ca * cb * sc - sa * cc, m[2] = ca * sb;
+    m[3] = sa * cb * cc + ca * sc, m[4] = -sa * cb * sc + ca * cc, m[5] = sa * sb;
+    m[6] = -sb * cc, m[7] = sb * sc, m[8] = cb;
     return ISOGI_OK;
+}
+
+/* m as floats, if it was made */
+static isogi_result isogi_sh__rounded_matrix(float m[9], const double wide[9], isogi_result result) {
+    int i;
+    for (i = 0; i < 9 && result == ISOGI_OK; i++) m[i] = (float)wide[i];
+    return result;
+}
+
+ISOGI_API isogi_result isogi_sh_matrix_from_quaternion(float m[9], const float quaternion[4]) {
+    double wide[9], q[4];
+    int i;
+    if (!m || !quaternion) return ISOGI_INVALID;
+    for (i = 0; i < 4; i++) q[i] = (double)quaternion[i];
+    return isogi_sh__rounded_matrix(m, wide, isogi_sh_matrix_from_quaternion_f64(wide, q));
+}
+
+ISOGI_API isogi_result isogi_sh_matrix_from_axis_angle(float m[9], const float axis[3], double angle) {
+    double wide[9], v[3];
+    int i;
+    if (!m || !axis) return ISOGI_INVALID;
+    for (i = 0; i < 3; i++) v[i] = (double)axis[i];
+    return isogi_sh__rounded_matrix(m, wide, isogi_sh_matrix_from_axis_angle_f64(wide, v, angle));
+}
+
+ISOGI_API isogi_result isogi_sh_matrix_from_euler_zyz(float m[9], double a, double b, double c) {
+    double wide[9];
+    if (!m) return ISOGI_INVALID;
+    return isogi_sh__rounded_matrix(m, wide, isogi_sh_matrix_from_euler_zyz_f64(wide, a, b, c));
 }
 
 /* Y_lm is even or odd in each coordinate: in z as l + m, in y as m < 0, in x as the two together. */

@@ -1006,6 +1006,51 @@ TEST(matrices_are_what_they_say) {
     CHECK(isogi_sh_rotate_z(m, m, 3, 1, NAN) == ISOGI_INVALID, "%s", "angle");
 }
 
+/* In double, of vectors of any length: rotations orthonormal to 1e-15 each way, that agree with each other, with the float ones to their
+   rounding, and with rotations about z alone. What is wrong is reported, and leaves the matrix. */
+TEST(matrices_in_double) {
+    static const double lengths[] = {1, 3, 1e-320, 1e-160, 1e160, 1.5e308};
+    enum { ORDER = 20, N = ORDER * ORDER };
+    static double c[3 * N], once[3 * N], about[3 * N];
+    test_random r = {44};
+    for (int i = 0; i < 3 * N; i++) c[i] = random_range(&r, -1, 1);
+    for (int round = 0; round < 60; round++) {
+        double axis[3], angle = random_range(&r, -7, 7), length = lengths[round % 6], m[9], n[9], v[3], q[4], worst = 0, tolerance = length < 1e-300 ? 1e-3 : 2e-15;
+        float mf[9], nf[9], axis_f[3], q_f[4];
+        random_direction(&r, axis);
+        if (round % 12 < 6) axis[0] = axis[1] = 0, axis[2] = round % 12 < 3 ? 1 : -1;
+        for (int k = 0; k < 3; k++) v[k] = length * axis[k], q[k + 1] = length * sin(angle / 2) * axis[k], axis_f[k] = (float)axis[k], q_f[k + 1] = (float)(sin(angle / 2) * axis[k]);
+        q[0] = length * cos(angle / 2), q_f[0] = (float)cos(angle / 2);
+        CHECK(isogi_sh_matrix_from_axis_angle_f64(m, v, angle) == ISOGI_OK && isogi_sh_matrix_from_quaternion_f64(n, q) == ISOGI_OK, "length %g", length);
+        CHECK(isogi_sh_matrix_from_axis_angle(mf, axis_f, angle) == ISOGI_OK && isogi_sh_matrix_from_quaternion(nf, q_f) == ISOGI_OK, "length %g", length);
+        for (int i = 0; i < 9; i++) {
+            double dot = 0;
+            for (int k = 0; k < 3; k++) dot += m[3 * (i / 3) + k] * m[3 * (i % 3) + k];
+            worst = fmax(worst, fmax(fabs(m[i] - n[i]), fabs(dot - (i / 3 == i % 3))));
+            CHECK(fabs(m[i] - (double)mf[i]) < 4e-7 + tolerance && fabs(m[i] - (double)nf[i]) < 4e-7 + tolerance, "length %g, entry %d: %g %g %g", length, i, m[i], (double)mf[i], (double)nf[i]);
+        }
+        CHECK(worst <= tolerance * ROUNDING_FACTOR, "length %g: %g off", length, worst);
+        if (round % 12 >= 6) continue;
+        int order = 1 + round % ORDER, channels = 1 + round % 3, count = order * order * channels;
+        CHECK(isogi_sh_rotate_f64(once, c, order, channels, m) == ISOGI_OK && isogi_sh_rotate_z_f64(about, c, order, channels, axis[2] * angle) == ISOGI_OK, "order %d", order);
+        for (int i = 0; i < count; i++) CHECK(fabs(once[i] - about[i]) <= 2e-14 * ROUNDING_FACTOR, "order %d, %d about z: %g %g", order, i, once[i], about[i]);
+    }
+    for (int round = 0; round < 20; round++) {
+        double a = random_range(&r, -7, 7), b = random_range(&r, -7, 7), angle = random_range(&r, -7, 7), m[9], parts[3][9], z[3] = {0, 0, 1}, y[3] = {0, 1, 0}, product[9], all[9];
+        CHECK(isogi_sh_matrix_from_euler_zyz_f64(m, a, b, angle) == ISOGI_OK, "round %d", round);
+        isogi_sh_matrix_from_axis_angle_f64(parts[0], z, a), isogi_sh_matrix_from_axis_angle_f64(parts[1], y, b), isogi_sh_matrix_from_axis_angle_f64(parts[2], z, angle);
+        for (int i = 0; i < 9; i++) product[i] = parts[0][3 * (i / 3)] * parts[1][i % 3] + parts[0][3 * (i / 3) + 1] * parts[1][3 + i % 3] + parts[0][3 * (i / 3) + 2] * parts[1][6 + i % 3];
+        for (int i = 0; i < 9; i++) all[i] = product[3 * (i / 3)] * parts[2][i % 3] + product[3 * (i / 3) + 1] * parts[2][3 + i % 3] + product[3 * (i / 3) + 2] * parts[2][6 + i % 3];
+        for (int i = 0; i < 9; i++) CHECK(fabs(m[i] - all[i]) < 3e-15, "Euler angles, entry %d: %g %g", i, m[i], all[i]);
+    }
+    double m[9] = {7}, zero[4] = {0, 0, 0, 0}, bad[4] = {1, (double)NAN, 0, (double)INFINITY}, z[3] = {0, 0, 1};
+    CHECK(isogi_sh_matrix_from_quaternion_f64(m, zero) == ISOGI_INVALID && isogi_sh_matrix_from_quaternion_f64(m, bad) == ISOGI_INVALID && isogi_sh_matrix_from_quaternion_f64(m, NULL) == ISOGI_INVALID, "%s", "quaternion");
+    CHECK(isogi_sh_matrix_from_axis_angle_f64(m, zero, 1) == ISOGI_INVALID && isogi_sh_matrix_from_axis_angle_f64(m, bad, 1) == ISOGI_INVALID && isogi_sh_matrix_from_axis_angle_f64(m, z, (double)NAN) == ISOGI_INVALID, "%s", "axis");
+    CHECK(isogi_sh_matrix_from_euler_zyz_f64(m, 0, 0, (double)INFINITY) == ISOGI_INVALID && isogi_sh_matrix_from_euler_zyz_f64(NULL, 0, 0, 0) == ISOGI_INVALID, "%s", "angles");
+    CHECK(isogi_sh_rotate_z_f64(m, m, 1, 1, (double)NAN) == ISOGI_INVALID && isogi_sh_rotate_z_f64(m, NULL, 1, 1, 0) == ISOGI_INVALID && isogi_sh_rotate_z_f64(m, m, 102, 1, 0) == ISOGI_INVALID, "%s", "about z");
+    CHECK(m[0] == 7, "%s", "outputs untouched");
+}
+
 /* Mirrored in an axis and evaluated is evaluated at the mirrored direction, exactly. */
 TEST(mirrors) {
     enum { ORDER = 8, N = ORDER * ORDER };
@@ -1489,6 +1534,23 @@ TEST(instruction_levels_agree) {
 
 /* ---- what is not valid ---- */
 
+/* Every function that takes a matrix, at orders with ways of their own, reports it and writes nothing. */
+static void no_rotation(const float m[9]) {
+    static const int orders[] = {1, 2, 3, 4, 5, 6, 16, 17};
+    enum { N = ISOGI_SH_ROTATION_COUNT(17) };
+    static double out[N], in[N], wide[9];
+    static float out_f[N], in_f[N];
+    for (int k = 0; k < 9; k++) wide[k] = (double)m[k];
+    for (int o = 0; o < 8; o++) {
+        for (int i = 0; i < N; i++) out[i] = 5, out_f[i] = 5;
+        CHECK(isogi_sh_rotate(out_f, in_f, orders[o], 1, m) == ISOGI_INVALID, "order %d, float", orders[o]);
+        CHECK(isogi_sh_rotate_f64(out, in, orders[o], 1, wide) == ISOGI_INVALID, "order %d, double", orders[o]);
+        CHECK(isogi_sh_rotation_build(out_f, orders[o], m) == ISOGI_INVALID, "order %d, float matrix", orders[o]);
+        CHECK(isogi_sh_rotation_build_f64(out, orders[o], wide) == ISOGI_INVALID, "order %d, double matrix", orders[o]);
+        for (int i = 0; i < N; i++) CHECK(out[i] == 5 && out_f[i] == 5, "order %d writes", orders[o]);
+    }
+}
+
 TEST(bad_input_is_reported_and_changes_nothing) {
     float y[27] = {0}, before[27], d[1][3] = {{0, 0, 1}}, m[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1}, image[3 * 8] = {0};
     double c[9] = {0};
@@ -1509,10 +1571,14 @@ TEST(bad_input_is_reported_and_changes_nothing) {
             memcpy(bad, m, sizeof bad);
             bad[i] = wrong[k];
             CHECK(isogi_sh_rotate(y, y, 3, 3, bad) == ISOGI_INVALID, "entry %d %g", i, (double)wrong[k]);
+            no_rotation(bad);
         }
     }
     m[8] = -1;
     CHECK(isogi_sh_rotate(y, y, 3, 3, m) == ISOGI_INVALID, "%s", "a mirror is no rotation");
+    no_rotation(m);
+    m[0] = m[4] = -1; /* through the origin */
+    no_rotation(m);
     CHECK(isogi_sh_project_function(c, 3, 1, -1, one_function, NULL) == ISOGI_INVALID, "%s", "resolution");
     CHECK(isogi_sh_project_function(c, 3, 17, 0, one_function, NULL) == ISOGI_INVALID, "%s", "channels");
     CHECK(isogi_sh_project_function(c, 3, 1, 0, NULL, NULL) == ISOGI_INVALID, "%s", "function");
