@@ -4382,17 +4382,20 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE void isogi_vol__corners8(const isogi_pyramid
     for (k = 0; k < 8; k++) c[k] = ISOGI_VOL__SUB(ISOGI_VOL__ADD(ISOGI_VOL__MUL(c[k], scale), bias), isovalue);
 }
 
-ISOGI_VOL__AVX512 static unsigned isogi_vol__decide8(isogi_vol__batch *b, isogi_vol__pool *s, const uint8_t *slots, int count, unsigned *alone) {
-    const __mmask8 lanes = (__mmask8)((1u << count) - 1);
+ISOGI_VOL__AVX512 static unsigned isogi_vol__decide8(isogi_vol__batch *b, isogi_vol__pool *s, const uint8_t *slots, unsigned some, unsigned *alone) {
+    const __mmask8 lanes = (__mmask8)some;
+    const int row = slots[0] % 8 == 0 && slots[7] == slots[0] + 7; /* can be loaded at once */
     const __m512i slot = isogi_vol__slots8(slots);
-    const __m512i cell = _mm512_i64gather_epi64(slot, s->cell, 8), side = _mm512_i64gather_epi64(slot, s->side, 8), three = _mm512_set1_epi64(3);
+#define ISOGI_VOL__TAKE(member) (row ? _mm512_load_si512(&s->member[slots[0]]) : _mm512_i64gather_epi64(slot, s->member, 8))
+#define ISOGI_VOL__TAKE_REAL(member) _mm512_castsi512_pd(ISOGI_VOL__TAKE(member))
+    const __m512i cell = ISOGI_VOL__TAKE(cell), side = ISOGI_VOL__TAKE(side), three = _mm512_set1_epi64(3);
     const __m512i in = _mm512_and_si512(_mm512_srli_epi64(cell, 48), three), out = _mm512_and_si512(_mm512_srli_epi64(cell, 50), three);
-    const __m512d zero = _mm512_setzero_pd(), one = _mm512_set1_pd(1), stop = _mm512_i64gather_pd(slot, s->stop, 8);
+    const __m512d zero = _mm512_setzero_pd(), one = _mm512_set1_pd(1), stop = ISOGI_VOL__TAKE_REAL(stop);
     /* the cell in which a ray begins, or leaves a surface, is a matter for itself */
     __mmask8 odd = (__mmask8)(_mm512_cmpeq_epi64_mask(in, three) | _mm512_cmpeq_epi64_mask(side, _mm512_set1_epi64(-2))), low, high, b_low, b_high, inside, same, cross, slow;
     __m512d c[8], from[3], to[3], bezier[4], begin = zero, end = stop, root;
     *alone = 0;
-    isogi_vol__corners8(b->pyramid, cell, lanes, _mm512_i64gather_pd(slot, s->isovalue, 8), c);
+    isogi_vol__corners8(b->pyramid, cell, lanes, ISOGI_VOL__TAKE_REAL(isovalue), c);
     {
         __m512d origin[3], dir[3], at[3];
         __mmask8 fall[3];
@@ -4400,8 +4403,8 @@ ISOGI_VOL__AVX512 static unsigned isogi_vol__decide8(isogi_vol__batch *b, isogi_
 #pragma GCC unroll 8
         for (a = 0; a < 3; a++) {
             const __mmask8 enters = _mm512_cmpeq_epi64_mask(in, _mm512_set1_epi64(a)), leaves = _mm512_cmpeq_epi64_mask(out, _mm512_set1_epi64(a));
-            const __m512d inverse = _mm512_i64gather_pd(slot, s->inverse[a], 8);
-            origin[a] = _mm512_i64gather_pd(slot, s->origin[a], 8), dir[a] = _mm512_i64gather_pd(slot, s->dir[a], 8);
+            const __m512d inverse = ISOGI_VOL__TAKE_REAL(inverse[a]);
+            origin[a] = ISOGI_VOL__TAKE_REAL(origin[a]), dir[a] = ISOGI_VOL__TAKE_REAL(dir[a]);
             at[a] = _mm512_cvtepi64_pd(_mm512_and_si512(_mm512_srli_epi64(cell, (unsigned)(16 * a)), _mm512_set1_epi64(0xffff)));
             fall[a] = _mm512_movepi64_mask(_mm512_castpd_si512(inverse));
             begin = _mm512_mask_mul_pd(begin, enters, _mm512_sub_pd(_mm512_mask_add_pd(at[a], fall[a], at[a], one), origin[a]), inverse);
@@ -4411,7 +4414,7 @@ ISOGI_VOL__AVX512 static unsigned isogi_vol__decide8(isogi_vol__batch *b, isogi_
 #pragma GCC unroll 8
         for (a = 0; a < 3; a++) {
             const __mmask8 enters = _mm512_cmpeq_epi64_mask(in, _mm512_set1_epi64(a)), leaves = _mm512_cmpeq_epi64_mask(out, _mm512_set1_epi64(a));
-            const __m512d way = _mm512_abs_pd(ISOGI_VOL__MUL(_mm512_i64gather_pd(slot, s->base, 8), dir[a]));
+            const __m512d way = _mm512_abs_pd(ISOGI_VOL__MUL(ISOGI_VOL__TAKE_REAL(base), dir[a]));
             const __m512d slack = ISOGI_VOL__MUL(_mm512_set1_pd(ISOGI_VOL__ROUNDING), ISOGI_VOL__ADD(way, _mm512_set1_pd(b->pyramid->box[a])));
             from[a] = ISOGI_VOL__SUB(ISOGI_VOL__ADD(origin[a], ISOGI_VOL__MUL(begin, dir[a])), at[a]);
             to[a] = ISOGI_VOL__SUB(ISOGI_VOL__ADD(origin[a], ISOGI_VOL__MUL(end, dir[a])), at[a]);
@@ -4473,7 +4476,7 @@ ISOGI_VOL__AVX512 static unsigned isogi_vol__decide8(isogi_vol__batch *b, isogi_
         odd = (__mmask8)(odd | slow), cross = (__mmask8)(cross & ~slow);
         {
             const __m512d rest = _mm512_sub_pd(one, root);
-            _mm512_store_pd(t, ISOGI_VOL__ADD(_mm512_i64gather_pd(slot, s->base, 8), ISOGI_VOL__ADD(begin, ISOGI_VOL__MUL(root, ISOGI_VOL__SUB(end, begin)))));
+            _mm512_store_pd(t, ISOGI_VOL__ADD(ISOGI_VOL__TAKE_REAL(base), ISOGI_VOL__ADD(begin, ISOGI_VOL__MUL(root, ISOGI_VOL__SUB(end, begin)))));
             _mm512_store_pd(local[0], isogi_vol__lerp8(from[0], to[0], root, rest));
             _mm512_store_pd(local[1], isogi_vol__lerp8(from[1], to[1], root, rest));
             _mm512_store_pd(local[2], isogi_vol__lerp8(from[2], to[2], root, rest));
@@ -4487,6 +4490,8 @@ ISOGI_VOL__AVX512 static unsigned isogi_vol__decide8(isogi_vol__batch *b, isogi_
             hit->side = inside >> i & 1 ? -1 : 1;
         }
     }
+#undef ISOGI_VOL__TAKE
+#undef ISOGI_VOL__TAKE_REAL
     *alone = odd;
     return cross;
 }
@@ -4498,6 +4503,7 @@ ISOGI_VOL__AVX512 static unsigned isogi_vol__seat8(isogi_vol__batch *b, isogi_vo
     const isogi_pyramid *p = b->pyramid;
     const __mmask8 lanes = (__mmask8)((1u << count) - 1);
     const __m512i lane = _mm512_set_epi64(7, 6, 5, 4, 3, 2, 1, 0), slot = isogi_vol__slots8(slots), none = _mm512_setzero_si512();
+    const int whole = slots[0] % 8 == 0 && slots[count - 1] == slots[0] + count - 1; /* a row of slots is stored at once */
     const size_t element = b->rays ? sizeof *b->rays : sizeof *b->starts, dir_bytes = b->bundle || !b->rays ? sizeof *b->dirs : sizeof *b->rays;
     const char *from = b->rays ? (const char *)(b->rays + (b->bundle ? 0 : first)) : (const char *)(b->starts + (b->bundle ? 0 : first));
     const char *to = b->bundle || !b->rays ? (const char *)b->dirs[first] : (const char *)b->rays[first].dir;
@@ -4595,7 +4601,11 @@ ISOGI_VOL__AVX512 static unsigned isogi_vol__seat8(isogi_vol__batch *b, isogi_vo
     stop = _mm512_min_pd(stop, ISOGI_VOL__SUB(tmax, enter));
     good = (__mmask8)(good & (~meets | _mm512_mask_cmp_pd_mask(_mm512_cmp_pd_mask(stop, _mm512_set1_pd(1e-150), _CMP_GT_OQ), stop, _mm512_set1_pd(1e150), _CMP_LT_OQ)));
     meets = (__mmask8)(meets & good);
-#define ISOGI_VOL__PUT(member, value) _mm512_mask_i64scatter_epi64(s->member, meets, slot, value, 8)
+#define ISOGI_VOL__PUT(member, value)                                            \
+    do {                                                                         \
+        if (whole) _mm512_mask_store_epi64(&s->member[slots[0]], meets, value);   \
+        else _mm512_mask_i64scatter_epi64(s->member, meets, slot, value, 8);      \
+    } while (0)
 #define ISOGI_VOL__PUT_REAL(member, value) ISOGI_VOL__PUT(member, _mm512_castpd_si512(value))
 #pragma GCC unroll 8
     for (a = 0; a < 3; a++) {
@@ -4603,18 +4613,26 @@ ISOGI_VOL__AVX512 static unsigned isogi_vol__seat8(isogi_vol__batch *b, isogi_vo
         const __mmask8 upper = _mm512_mask_cmp_pd_mask(still[a], origin[a], _mm512_set1_pd(p->box[a]), _CMP_GE_OQ), fall = (__mmask8)(upper | ~(still[a] | rising[a]));
         inverse[a] = _mm512_mask_mov_pd(_mm512_mask_mov_pd(inverse[a], still[a], _mm512_set1_pd(1e200)), upper, _mm512_set1_pd(-1e200));
         flip = _mm512_mask_or_epi64(flip, fall, flip, _mm512_set1_epi64(3 << 2 * a));
-        ISOGI_VOL__PUT_REAL(origin[a], origin[a]), ISOGI_VOL__PUT_REAL(dir[a], d[a]), ISOGI_VOL__PUT_REAL(inverse[a], inverse[a]);
+        ISOGI_VOL__PUT_REAL(origin[a], origin[a]);
+        ISOGI_VOL__PUT_REAL(dir[a], d[a]);
+        ISOGI_VOL__PUT_REAL(inverse[a], inverse[a]);
     }
     q = ISOGI_VOL__MUL(ISOGI_VOL__SUB(isovalue, _mm512_set1_pd(p->range[0])), _mm512_set1_pd(p->node_scale)); /* as quantise_isovalue has it, up to the last code */
     ISOGI_VOL__PUT_REAL(level_units, _mm512_cvtps_pd(_mm512_cvtpd_ps(q)));
     ISOGI_VOL__PUT(low, _mm512_cvttpd_epi64(_mm512_max_pd(ISOGI_VOL__SUB(q, _mm512_set1_pd(0.01)), zero)));
     ISOGI_VOL__PUT(beyond, _mm512_add_epi64(_mm512_min_epi64(_mm512_cvttpd_epi64(ISOGI_VOL__ADD(q, _mm512_set1_pd(0.01))), _mm512_set1_epi64(253)), _mm512_set1_epi64(1)));
     ISOGI_VOL__PUT(end, _mm512_or_si512(_mm512_castpd_si512(stop), _mm512_set1_epi64(3)));
-    ISOGI_VOL__PUT(flip, flip), ISOGI_VOL__PUT(pending, none), ISOGI_VOL__PUT(cell, none);
+    ISOGI_VOL__PUT(flip, flip);
+    ISOGI_VOL__PUT(pending, none);
+    ISOGI_VOL__PUT(cell, none);
     ISOGI_VOL__PUT(level, _mm512_set1_epi64(p->node_levels - 1));
     ISOGI_VOL__PUT(address, _mm512_set1_epi64((int64_t)(uintptr_t)p->nodes[p->node_level[p->node_levels - 1].first]));
-    ISOGI_VOL__PUT(side, _mm512_set1_epi64(b->rays ? -1 : -2)), ISOGI_VOL__PUT(entry_axis, b->rays ? axis : _mm512_set1_epi64(-1));
-    ISOGI_VOL__PUT_REAL(base, enter), ISOGI_VOL__PUT_REAL(stop, stop), ISOGI_VOL__PUT_REAL(isovalue, isovalue), ISOGI_VOL__PUT(deflated, none);
+    ISOGI_VOL__PUT(side, _mm512_set1_epi64(b->rays ? -1 : -2));
+    ISOGI_VOL__PUT(entry_axis, b->rays ? axis : _mm512_set1_epi64(-1));
+    ISOGI_VOL__PUT_REAL(base, enter);
+    ISOGI_VOL__PUT_REAL(stop, stop);
+    ISOGI_VOL__PUT_REAL(isovalue, isovalue);
+    ISOGI_VOL__PUT(deflated, none);
     ISOGI_VOL__PUT(ray, _mm512_add_epi64(_mm512_set1_epi64((int64_t)first), lane));
 #undef ISOGI_VOL__PUT
 #undef ISOGI_VOL__PUT_REAL
@@ -4955,19 +4973,59 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE __m512 isogi_vol__halves(__m512d low, __m512
     return _mm512_insertf32x8(_mm512_castps256_ps512(_mm512_cvtpd_ps(low)), _mm512_cvtpd_ps(high), 1);
 }
 
-/* The layers of a node of level n; cell: its corner, counted backwards. */
-ISOGI_VOL__AVX512 static void isogi_vol__open_layers(isogi_vol__layers *l, isogi_vol__places *places, const isogi_vol__pool *s, int n, int64_t cell, int64_t backwards) {
+/* Where a node begins, in cells as they are, which is where rays enter it by each axis; corner: of the node, counted backwards. Returns 1 / size
+   with its sign for each axis. */
+ISOGI_VOL__INLINE void isogi_vol__node_begins(int n, int64_t corner, int64_t backwards, double from[3], double step[3]) {
     const double size = (double)((int64_t)1 << 2 * n);
+    int a;
+    for (a = 0; a < 3; a++) {
+        const int fall = (backwards >> 16 * a & 0xffff) != 0;
+        const int64_t at = corner >> 16 * a & 0xffff;
+        from[a] = (double)(fall ? (backwards >> 16 * a & 0xffff) + 1 - at : at), step[a] = fall ? -1 / size : 1 / size;
+    }
+}
+
+/* The rays in float, from where they begin. */
+typedef struct isogi_vol__rays16 {
+    __m512 origin[3], inverse[3], stop;
+    float padded; /* cells of the root */
+} isogi_vol__rays16;
+
+ISOGI_VOL__AVX512 ISOGI_VOL__INLINE void isogi_vol__set_rays16(isogi_vol__rays16 *r, const isogi_vol__pool *s, int levels) {
+    int a;
+#pragma GCC unroll 3
+    for (a = 0; a < 3; a++) {
+        r->origin[a] = isogi_vol__halves(_mm512_load_pd(&s->origin[a][0]), _mm512_load_pd(&s->origin[a][8]));
+        r->inverse[a] = isogi_vol__halves(_mm512_load_pd(&s->inverse[a][0]), _mm512_load_pd(&s->inverse[a][8]));
+    }
+    r->stop = _mm512_mul_ps(isogi_vol__halves(_mm512_load_pd(&s->stop[0]), _mm512_load_pd(&s->stop[8])), _mm512_set1_ps(1.000001f));
+    r->padded = (float)(1 << 2 * levels);
+}
+
+/* The layers of a node above the leaves. Times count from where the rays begin: these floats are off by less than 2^-21 of what the root
+   measures, by which children are widened. */
+ISOGI_VOL__AVX512 ISOGI_VOL__INLINE void isogi_vol__open_layers(isogi_vol__layers *l, const isogi_vol__rays16 *r, int n, int64_t cell, int64_t backwards) {
+    const __m512 most = _mm512_set1_ps(1e30f), reach = _mm512_set1_ps(1e-6f * r->padded / (float)(1 << 2 * n));
+    double from[3], step[3];
+    int a;
+    isogi_vol__node_begins(n, cell, backwards, from, step);
+#pragma GCC unroll 3
+    for (a = 0; a < 3; a++) {
+        const __m512 at = _mm512_mul_ps(_mm512_sub_ps(r->origin[a], _mm512_set1_ps((float)from[a])), _mm512_set1_ps((float)step[a]));
+        const __m512 per = _mm512_min_ps(_mm512_mul_ps(r->inverse[a], _mm512_set1_ps((float)(1 / step[a]))), most);
+        l->per[a] = per, l->first[a] = _mm512_mul_ps(_mm512_add_ps(at, reach), per), l->last[a] = _mm512_mul_ps(_mm512_sub_ps(at, reach), per);
+    }
+    l->stop = r->stop;
+}
+
+/* Those of a leaf, from where the rays come to it, so that their places in cells are exact. */
+ISOGI_VOL__AVX512 static void isogi_vol__open_cells(isogi_vol__layers *l, isogi_vol__places *places, const isogi_vol__pool *s, int64_t cell, int64_t backwards) {
     const __m512 most = _mm512_set1_ps(1e30f), reach = _mm512_set1_ps(ISOGI_VOL__REACH);
     double from[3], step[3];
     __m512d zero[2];
     __m512 stop;
     int a, h;
-    for (a = 0; a < 3; a++) { /* the corner in cells as they are, which rays enter by */
-        const int fall = (backwards >> 16 * a & 0xffff) != 0;
-        const int64_t corner = cell >> 16 * a & 0xffff;
-        from[a] = (double)(fall ? (backwards >> 16 * a & 0xffff) + 1 - corner : corner), step[a] = fall ? -1 / size : 1 / size;
-    }
+    isogi_vol__node_begins(0, cell, backwards, from, step);
 #pragma GCC unroll 2
     for (h = 0; h < 2; h++) {
         zero[h] = _mm512_setzero_pd();
@@ -4980,13 +5038,12 @@ ISOGI_VOL__AVX512 static void isogi_vol__open_layers(isogi_vol__layers *l, isogi
     stop = _mm512_mul_ps(stop, _mm512_set1_ps(1.000001f));
 #pragma GCC unroll 3
     for (a = 0; a < 3; a++) {
-        const __m512d corner = _mm512_set1_pd(from[a]), unit = _mm512_set1_pd(step[a]);
+        const __m512d corner = _mm512_set1_pd(from[a]), unit = _mm512_set1_pd(step[a]); /* 1 or -1 */
         const __m512d d0 = _mm512_load_pd(&s->dir[a][0]), d1 = _mm512_load_pd(&s->dir[a][8]);
         const __m512d p0 = _mm512_mul_pd(_mm512_sub_pd(_mm512_fmadd_pd(zero[0], d0, _mm512_load_pd(&s->origin[a][0])), corner), unit);
         const __m512d p1 = _mm512_mul_pd(_mm512_sub_pd(_mm512_fmadd_pd(zero[1], d1, _mm512_load_pd(&s->origin[a][8])), corner), unit);
-        const __m512d scale = _mm512_set1_pd(step[a] < 0 ? -size : size);
         const __m512 at = isogi_vol__halves(p0, p1);
-        const __m512 per = _mm512_min_ps(isogi_vol__halves(_mm512_mul_pd(_mm512_load_pd(&s->inverse[a][0]), scale), _mm512_mul_pd(_mm512_load_pd(&s->inverse[a][8]), scale)), most);
+        const __m512 per = _mm512_min_ps(isogi_vol__halves(_mm512_mul_pd(_mm512_load_pd(&s->inverse[a][0]), unit), _mm512_mul_pd(_mm512_load_pd(&s->inverse[a][8]), unit)), most);
         l->per[a] = per, l->first[a] = _mm512_mul_ps(_mm512_add_ps(at, reach), per), l->last[a] = _mm512_mul_ps(_mm512_sub_ps(at, reach), per);
         places->at[a] = at, places->dir[a] = isogi_vol__halves(_mm512_mul_pd(d0, unit), _mm512_mul_pd(d1, unit));
     }
@@ -5056,9 +5113,9 @@ ISOGI_VOL__AVX512 static unsigned isogi_vol__settle(isogi_vol__batch *b, isogi_v
         __m512d origin[3], inverse[3], dir[3];
         __m256 from[3], to[3];
         __mmask8 passed;
-        uint8_t slots[16];
+        uint8_t slots[8];
         unsigned alone, some;
-        int a, count;
+        int a;
         if (!(doubt >> h & 255)) continue;
 #pragma GCC unroll 3
         for (a = 0; a < 3; a++) origin[a] = _mm512_load_pd(&s->origin[a][h]), inverse[a] = _mm512_load_pd(&s->inverse[a][h]), dir[a] = _mm512_load_pd(&s->dir[a][h]);
@@ -5068,14 +5125,14 @@ ISOGI_VOL__AVX512 static unsigned isogi_vol__settle(isogi_vol__batch *b, isogi_v
         cell = _mm512_or_si512(cell, _mm512_or_si512(_mm512_slli_epi64(_mm512_and_si512(begin, three), 48), _mm512_slli_epi64(_mm512_and_si512(end, three), 50)));
         _mm512_mask_store_epi64(&s->cell[h], passed, cell);
         _mm512_store_si512(&s->side[h], _mm512_mask_mov_epi64(none, known, _mm512_maskz_set1_epi64(inside, 1)));
-        _mm_storeu_si128((__m128i *)(void *)slots, _mm_maskz_compress_epi8((__mmask16)passed, _mm_add_epi8(_mm_set1_epi8((char)h), _mm_set_epi64x(0, 0x0706050403020100))));
-        count = __builtin_popcount(passed);
-        some = isogi_vol__decide8(b, s, slots, count, &alone);
-        for (a = 0; a < count; a++) {
+        _mm_storel_epi64((__m128i *)(void *)slots, _mm_add_epi8(_mm_set1_epi8((char)h), _mm_set_epi64x(0, 0x0706050403020100)));
+        some = isogi_vol__decide8(b, s, slots, passed, &alone);
+        for (; alone; alone &= alone - 1) {
             isogi_hit any;
-            if (alone >> a & 1) some |= (unsigned)isogi_vol__decide(b, s, slots[a], b->hits ? &b->hits[s->ray[slots[a]]] : &any) << a;
-            hits |= (some >> a & 1) << slots[a];
+            a = __builtin_ctz(alone);
+            some |= (unsigned)isogi_vol__decide(b, s, h + a, b->hits ? &b->hits[s->ray[h + a]] : &any) << a;
         }
+        hits |= some << h;
         side = _mm512_load_si512(&s->side[h]);
         *in = (*in & ~(255u << h)) | (unsigned)_mm512_cmpgt_epi64_mask(side, zero) << h;
         *out = (*out & ~(255u << h)) | (unsigned)_mm512_cmpeq_epi64_mask(side, zero) << h;
@@ -5192,6 +5249,7 @@ ISOGI_VOL__AVX512 static void isogi_vol__trace_packet(isogi_vol__batch *b, isogi
     uint64_t left[ISOGI_VOL__NODE_LEVELS];
     unsigned met[ISOGI_VOL__NODE_LEVELS], active = rays, lanes = rays, in = 0, out = 0, seen_in = 0, seen_out = 0, hits = 0;
     isogi_vol__layers layers[ISOGI_VOL__NODE_LEVELS];
+    isogi_vol__rays16 floats;
     isogi_vol__places places;
     isogi_vol__beam beam;
     isogi_vol__leaf leaf;
@@ -5199,6 +5257,7 @@ ISOGI_VOL__AVX512 static void isogi_vol__trace_packet(isogi_vol__batch *b, isogi
     int64_t cell = 0; /* corner of the node, counted backwards */
     int n = p->node_levels - 1;
     isogi_vol__set_beam(&beam, s, rays, backwards);
+    isogi_vol__set_rays16(&floats, s, p->node_levels);
     for (;;) {
         /* a node is opened */
         b->work.blocks += (uint64_t)__builtin_popcount(lanes);
@@ -5209,7 +5268,8 @@ ISOGI_VOL__AVX512 static void isogi_vol__trace_packet(isogi_vol__batch *b, isogi
             left[0] &= isogi_vol__cut_order(&leaf, octant, held);
         }
         if (left[n]) {
-            isogi_vol__open_layers(&layers[n], &places, s, n, cell, backwards);
+            if (n) isogi_vol__open_layers(&layers[n], &floats, n, cell, backwards);
+            else isogi_vol__open_cells(&layers[0], &places, s, cell, backwards);
             if (n) {
                 const isogi_vol__node_level *below = &p->node_level[n - 1];
                 const int64_t at = cell ^ backwards;
@@ -5247,6 +5307,7 @@ ISOGI_VOL__AVX512 static void isogi_vol__trace_packet(isogi_vol__batch *b, isogi
                 /* what is certain to be a hit is worked out at the end, all at once */
                 if (!b->occluded || doubt)
                     for (child = 0; child < 2; child++) _mm512_mask_store_epi64(&s->cell[8 * child], (__mmask8)((hit | doubt) >> 8 * child), _mm512_set1_epi64(cell ^ backwards));
+                if (hit && b->hits) isogi_vol__send_for(&p->volume, cell ^ backwards);
                 hits |= hit, active &= ~hit;
                 if (doubt) active &= ~isogi_vol__settle(b, s, doubt, &in, &out);
             }
@@ -5349,7 +5410,7 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE uint64_t isogi_vol__decide_all(isogi_vol__ba
     for (first = 0; turn->doubts - first >= waits; first += n) {
         unsigned alone, hits;
         n = turn->doubts - first < 8 ? turn->doubts - first : 8;
-        hits = isogi_vol__decide8(b, s, turn->in_doubt + first, n, &alone);
+        hits = isogi_vol__decide8(b, s, turn->in_doubt + first, (1u << n) - 1, &alone);
         for (k = 0; k < n; k++) {
             const int slot = turn->in_doubt[first + k];
             isogi_hit any;
