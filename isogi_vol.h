@@ -4384,7 +4384,8 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE void isogi_vol__corners8(const isogi_pyramid
 
 ISOGI_VOL__AVX512 static unsigned isogi_vol__decide8(isogi_vol__batch *b, isogi_vol__pool *s, const uint8_t *slots, unsigned some, unsigned *alone) {
     const __mmask8 lanes = (__mmask8)some;
-    const int row = slots[0] % 8 == 0 && slots[7] == slots[0] + 7; /* can be loaded at once */
+    const __m128i list = _mm_loadl_epi64((const __m128i *)(const void *)slots);
+    const int row = slots[0] % 8 == 0 && _mm_cvtsi128_si64(list) == (int64_t)(0x0706050403020100u + slots[0] * 0x0101010101010101u); /* can be loaded at once */
     const __m512i slot = isogi_vol__slots8(slots);
 #define ISOGI_VOL__TAKE(member) (row ? _mm512_load_si512(&s->member[slots[0]]) : _mm512_i64gather_epi64(slot, s->member, 8))
 #define ISOGI_VOL__TAKE_REAL(member) _mm512_castsi512_pd(ISOGI_VOL__TAKE(member))
@@ -5173,21 +5174,21 @@ ISOGI_VOL__AVX512 static int isogi_vol__coincide(const isogi_vol__pool *s, unsig
 /* The beam that holds all rays of a packet: along the axis on which they are fastest, counted like their cells, bounds of their places on
    the next two axes, linear between its ends. (The least of linear functions lies above its chord.) */
 typedef struct __attribute__((aligned(64))) isogi_vol__beam {
-    double base[2][8], slope[2][8]; /* lower and upper bounds, of four layers each on both axes */
-    double from, to;                /* on the main axis */
+    float base[16], slope[16]; /* lower bounds, of four layers on each of both axes, then upper ones */
+    float from, to;            /* on the main axis */
     int axis, second, third;
 } isogi_vol__beam;
 
-ISOGI_VOL__AVX512 static void isogi_vol__set_beam(isogi_vol__beam *beam, const isogi_vol__pool *s, unsigned rays, int64_t backwards) {
+ISOGI_VOL__AVX512 static void isogi_vol__set_beam(isogi_vol__beam *beam, const isogi_vol__pool *s, unsigned rays, int64_t backwards, int levels) {
     static const int after[5] = {0, 1, 2, 0, 1};
     const int first = __builtin_ctz(rays);
     __m512d place[3][2], way[3][2];
-    double length;
+    const double slack = (double)(1 << 2 * levels) / 1048576; /* floats are off by an eighth of this */
+    double length, begin = 1e9, end = -1e9;
     int a, h, e;
     beam->axis = fabs(s->dir[1][first]) > fabs(s->dir[0][first]);
     if (fabs(s->dir[2][first]) > fabs(s->dir[beam->axis][first])) beam->axis = 2;
     beam->second = after[beam->axis + 1], beam->third = after[beam->axis + 2];
-    beam->from = 1e9, beam->to = -1e9;
     for (a = 0; a < 3; a++)
         for (h = 0; h < 2; h++) {
             const int64_t back = backwards >> 16 * after[beam->axis + a] & 0xffff;
@@ -5198,44 +5199,67 @@ ISOGI_VOL__AVX512 static void isogi_vol__set_beam(isogi_vol__beam *beam, const i
     for (h = 0; h < 2; h++) {
         const __mmask8 here = (__mmask8)(rays >> 8 * h);
         const __m512d to = _mm512_fmadd_pd(_mm512_load_pd(&s->stop[8 * h]), way[0][h], place[0][h]);
-        beam->from = isogi_vol__min(beam->from, _mm512_mask_reduce_min_pd(here, place[0][h])), beam->to = isogi_vol__max(beam->to, _mm512_mask_reduce_max_pd(here, to));
+        begin = isogi_vol__min(begin, _mm512_mask_reduce_min_pd(here, place[0][h])), end = isogi_vol__max(end, _mm512_mask_reduce_max_pd(here, to));
     }
-    length = isogi_vol__max(beam->to - beam->from, 1e-3);
+    length = isogi_vol__max(end - begin, 1e-3), beam->from = (float)begin, beam->to = (float)end;
     for (a = 1; a < 3; a++) {
         double least[2] = {1e9, 1e9}, most[2] = {-1e9, -1e9};
         for (h = 0; h < 2; h++)
             for (e = 0; e < 2; e++) {
                 const __mmask8 here = (__mmask8)(rays >> 8 * h);
-                const __m512d on = _mm512_sub_pd(_mm512_set1_pd(beam->from + (e ? length : 0)), place[0][h]);
+                const __m512d on = _mm512_sub_pd(_mm512_set1_pd(begin + (e ? length : 0)), place[0][h]);
                 const __m512d at = _mm512_fmadd_pd(_mm512_maskz_div_pd(here, way[a][h], way[0][h]), on, place[a][h]);
                 least[e] = isogi_vol__min(least[e], _mm512_mask_reduce_min_pd(here, at)), most[e] = isogi_vol__max(most[e], _mm512_mask_reduce_max_pd(here, at));
             }
         for (h = 4 * a - 4; h < 4 * a; h++) {
-            beam->base[0][h] = least[0] - 1e-6, beam->slope[0][h] = (least[1] - least[0]) / length;
-            beam->base[1][h] = most[0] + 1e-6, beam->slope[1][h] = (most[1] - most[0]) / length;
+            beam->base[h] = (float)(least[0] - slack), beam->slope[h] = (float)((least[1] - least[0]) / length);
+            beam->base[8 + h] = (float)(most[0] + slack), beam->slope[8 + h] = (float)((most[1] - most[0]) / length);
         }
     }
 }
 
+/* Children whose numbers on axis 0, 1, 2 are in a set of four. */
+#define ISOGI_VOL__SETS(f) f(0), f(1), f(2), f(3), f(4), f(5), f(6), f(7), f(8), f(9), f(10), f(11), f(12), f(13), f(14), f(15)
+#define ISOGI_VOL__SET(m, one, step) (((m) & 1 ? (one) : 0) | ((m) & 2 ? (one) << (step) : 0) | ((m) & 4 ? (one) << 2 * (step) : 0) | ((m) & 8 ? (one) << 3 * (step) : 0))
+#define ISOGI_VOL__SET_X(m) ISOGI_VOL__SET(m, (uint64_t)0x1111111111111111u, 1)
+#define ISOGI_VOL__SET_Y(m) ISOGI_VOL__SET(m, (uint64_t)0x000f000f000f000fu, 4)
+#define ISOGI_VOL__SET_Z(m) ISOGI_VOL__SET(m, (uint64_t)0xffffu, 16)
+static const uint64_t isogi_vol__sets[3][16] = {{ISOGI_VOL__SETS(ISOGI_VOL__SET_X)}, {ISOGI_VOL__SETS(ISOGI_VOL__SET_Y)}, {ISOGI_VOL__SETS(ISOGI_VOL__SET_Z)}};
+static const uint64_t isogi_vol__layer_sets[3][4] = {{ISOGI_VOL__SET_X(1), ISOGI_VOL__SET_X(2), ISOGI_VOL__SET_X(4), ISOGI_VOL__SET_X(8)},
+                                                     {ISOGI_VOL__SET_Y(1), ISOGI_VOL__SET_Y(2), ISOGI_VOL__SET_Y(4), ISOGI_VOL__SET_Y(8)},
+                                                     {ISOGI_VOL__SET_Z(1), ISOGI_VOL__SET_Z(2), ISOGI_VOL__SET_Z(4), ISOGI_VOL__SET_Z(8)}};
+#undef ISOGI_VOL__SETS
+#undef ISOGI_VOL__SET
+#undef ISOGI_VOL__SET_X
+#undef ISOGI_VOL__SET_Y
+#undef ISOGI_VOL__SET_Z
+
+/* Those of four sets, one a lane. */
+ISOGI_VOL__AVX512 ISOGI_VOL__INLINE __m512i isogi_vol__in_sets(int axis, __m128i sets) {
+    const uint64_t *all = isogi_vol__sets[axis];
+    return _mm512_permutex2var_epi64(_mm512_loadu_si512(all), _mm512_castsi256_si512(_mm256_cvtepu32_epi64(sets)), _mm512_loadu_si512(all + 8));
+}
+
 /* Children of a node of level n that the beam may meet; cell: its corner, counted backwards. */
 ISOGI_VOL__AVX512 ISOGI_VOL__INLINE uint64_t isogi_vol__in_beam(const isogi_vol__beam *beam, int n, int64_t cell) {
-    static const uint64_t rows[3] = {0xf, 0x1111, 0x0001000100010001u};
-    const double size = (double)((int64_t)1 << 2 * n), corner = (double)(cell >> 16 * beam->axis & 0xffff);
-    const __m512d unit = _mm512_set1_pd(1 / size), none = _mm512_setzero_pd(), four = _mm512_set1_pd(4), low = _mm512_set1_pd(beam->from), high = _mm512_set1_pd(beam->to);
-    const __m512d near_plane = _mm512_fmadd_pd(_mm512_setr_pd(0, 1, 2, 3, 0, 1, 2, 3), _mm512_set1_pd(size), _mm512_set1_pd(corner));
-    const __m512d far_plane = _mm512_add_pd(near_plane, _mm512_set1_pd(size));
-    const __m512d side = _mm512_mask_blend_pd(0xf0, _mm512_set1_pd((double)(cell >> 16 * beam->second & 0xffff)), _mm512_set1_pd((double)(cell >> 16 * beam->third & 0xffff)));
-    const __m512i one = _mm512_set1_epi64(1);
-    __m512d least = _mm512_sub_pd(_mm512_min_pd(_mm512_max_pd(near_plane, low), high), low), most = _mm512_sub_pd(_mm512_min_pd(_mm512_max_pd(far_plane, low), high), low);
-    __attribute__((aligned(64))) uint64_t layer[8];
-    least = _mm512_mul_pd(_mm512_sub_pd(_mm512_fmadd_pd(least, _mm512_load_pd(beam->slope[0]), _mm512_load_pd(beam->base[0])), side), unit);
-    most = _mm512_mul_pd(_mm512_sub_pd(_mm512_fmadd_pd(most, _mm512_load_pd(beam->slope[1]), _mm512_load_pd(beam->base[1])), side), unit);
-    least = _mm512_min_pd(_mm512_max_pd(least, none), four), most = _mm512_min_pd(_mm512_max_pd(_mm512_add_pd(most, _mm512_set1_pd(1)), none), four);
-    _mm512_store_si512(layer, _mm512_sub_epi64(_mm512_max_epi64(_mm512_sllv_epi64(one, _mm512_cvttpd_epi64(most)), _mm512_sllv_epi64(one, _mm512_cvttpd_epi64(least))),
-                                               _mm512_sllv_epi64(one, _mm512_cvttpd_epi64(least))));
-#define ISOGI_VOL__LAYER(k) (_pdep_u64(layer[k], rows[beam->second]) * _pdep_u64(layer[4 + (k)], rows[beam->third])) << ((k) << 2 * beam->axis)
-    return ISOGI_VOL__LAYER(0) | ISOGI_VOL__LAYER(1) | ISOGI_VOL__LAYER(2) | ISOGI_VOL__LAYER(3);
-#undef ISOGI_VOL__LAYER
+    const float size = (float)(1 << 2 * n);
+    const __m512 low = _mm512_set1_ps(beam->from), upper = _mm512_setr_ps(0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1);
+    const __m512 plane = _mm512_fmadd_ps(_mm512_setr_ps(0, 1, 2, 3, 0, 1, 2, 3, 1, 2, 3, 4, 1, 2, 3, 4), _mm512_set1_ps(size), _mm512_set1_ps((float)(cell >> 16 * beam->axis & 0xffff)));
+    const __m512 side = _mm512_mask_blend_ps(0xf0f0, _mm512_set1_ps((float)(cell >> 16 * beam->second & 0xffff)), _mm512_set1_ps((float)(cell >> 16 * beam->third & 0xffff)));
+    const __m512 way = _mm512_sub_ps(_mm512_min_ps(_mm512_max_ps(plane, low), _mm512_set1_ps(beam->to)), low);
+    __m512 bound = _mm512_sub_ps(_mm512_fmadd_ps(way, _mm512_load_ps(beam->slope), _mm512_load_ps(beam->base)), side);
+    __m512i bits, met;
+    __m256i first, rows, met4;
+    __m128i met2;
+    bound = _mm512_fmadd_ps(bound, _mm512_set1_ps(1 / size), upper);
+    bound = _mm512_min_ps(_mm512_max_ps(bound, _mm512_setzero_ps()), _mm512_set1_ps(4));
+    bits = _mm512_sllv_epi32(_mm512_set1_epi32(1), _mm512_cvttps_epi32(bound));
+    first = _mm512_castsi512_si256(bits);
+    rows = _mm256_sub_epi32(_mm256_max_epu32(_mm512_extracti64x4_epi64(bits, 1), first), first);
+    met = _mm512_and_si512(isogi_vol__in_sets(beam->second, _mm256_castsi256_si128(rows)), isogi_vol__in_sets(beam->third, _mm256_extracti128_si256(rows, 1)));
+    met4 = _mm256_and_si256(_mm512_castsi512_si256(met), _mm256_loadu_si256((const __m256i *)(const void *)isogi_vol__layer_sets[beam->axis]));
+    met2 = _mm_or_si128(_mm256_castsi256_si128(met4), _mm256_extracti128_si256(met4, 1));
+    return (uint64_t)_mm_cvtsi128_si64(_mm_or_si128(met2, _mm_unpackhi_epi64(met2, met2)));
 }
 
 /* Traces the rays in a pool's first slots, which coincide; the lowest level that has children left first, as walk_one does. */
@@ -5256,7 +5280,7 @@ ISOGI_VOL__AVX512 static void isogi_vol__trace_packet(isogi_vol__batch *b, isogi
     __m512i voxel[2] = {_mm512_setzero_si512(), _mm512_setzero_si512()};
     int64_t cell = 0; /* corner of the node, counted backwards */
     int n = p->node_levels - 1;
-    isogi_vol__set_beam(&beam, s, rays, backwards);
+    isogi_vol__set_beam(&beam, s, rays, backwards, p->node_levels);
     isogi_vol__set_rays16(&floats, s, p->node_levels);
     for (;;) {
         /* a node is opened */
