@@ -65,8 +65,9 @@
                             sky through everything), where a voxel is not finite, or where the gradient vanishes. With desc.capped the
                             border's texels, which face out of the box, are always valid.
      Lookup                 desc.lookup; trilinear unless told otherwise: among the eight texels around the point, those that are
-                            valid; their weights are made to sum to 1 again. So an invalid texel neither darkens nor brightens its neighbours. Where none of the eight is
-                            valid, the nearest valid one of the 4x4x4 around it is taken; a point without even that has zero light.
+                            valid; their weights are made to sum to 1 again. So an invalid texel neither darkens nor
+                            brightens its neighbours. Where none of the eight is valid, the nearest valid one of the 4x4x4
+                            around it is taken; a point without even that has zero light.
                             Trilinear is the one to use (as the paper found, too): the others are there to be compared with it.
                             Nearest shows the texels as blocks, closest isovalue breaks along their borders, the B-spline mixes
                             in light of isosurfaces two texels away.
@@ -307,9 +308,9 @@ ISOGI_API isogi_result isogi_trace_sample_transfer(const isogi_trace *trace, con
 ISOGI_API isogi_result isogi_trace_change(isogi_trace *trace, const isogi_trace_desc *desc);
 
 /* Voxels first..last (both ends included, cut to the volume) are going to change, or have changed. To be called twice, without
-   isogi_trace_step in between: before they do, and after isogi_vol_update. Computed again are texels at these voxels or within two of them, and those whose isosurface passes there, before
-   or after: no others can see the change. With desc.reach and n bounces, only those within n + 1 reaches. What a lazy texture was asked for at
-   places where there was no surface has to be requested again. */
+   isogi_trace_step in between: before they do, and after isogi_vol_update. Computed again are texels at these voxels or within two of
+   them, and those whose isosurface passes there, before or after: no others can see the change. With desc.reach and n bounces, only
+   those within n + 1 reaches. What a lazy texture was asked for at places where there was no surface has to be requested again. */
 ISOGI_API isogi_result isogi_trace_touch(isogi_trace *trace, const size_t first[3], const size_t last[3]);
 
 /* Texels along each axis, order (0 for IRRADIANCE), channels (3 for IRRADIANCE). Any of them may be NULL. Of no trace: zeros. */
@@ -356,17 +357,19 @@ ISOGI_API isogi_result isogi_trace_export_scales(const isogi_trace *trace, int f
 /* ---- save, load, merge ----
    A block of bytes holds the texels computed so far: the same bytes on every machine. Loading adds them to a texture that was created
    from the same description: so a bake is resumed, to the same bits as if it had never stopped (FEEDBACK: full bakes, of which whole
-   groups of some 65536 texels are saved), and boxes baked apart (desc.box_first) are merged by loading one after the other. Only desc.isovalue_min, isovalue_max, lazy, lookup and box may differ; else the answer is
-   ISOGI_INVALID (lighting, tables and the ranges of the volume's blocks are compared by hash; a material function cannot be). Any bytes may be
-   loaded: those that are damaged, cut off or of another version are ISOGI_CORRUPT and change nothing. ISOGI_NO_MEMORY: some of the
-   texels are loaded. isogi_trace_load counts as a writer. */
+   groups of some 65536 texels are saved), and boxes baked apart (desc.box_first) are merged by loading one after the other. Only
+   desc.isovalue_min, isovalue_max, lazy, lookup and box may differ; else the answer is ISOGI_INVALID (lighting, tables and the ranges of
+   the volume's blocks are compared by hash; a material function cannot be). Any bytes may be loaded: those that are damaged, cut off or
+   of another version are ISOGI_CORRUPT and change nothing. ISOGI_NO_MEMORY: some of the texels are loaded. isogi_trace_load counts as a
+   writer. */
 ISOGI_API size_t isogi_trace_save_size(const isogi_trace *trace);
 ISOGI_API isogi_result isogi_trace_save(const isogi_trace *trace, void *block, size_t bytes); /* bytes: isogi_trace_save_size or more */
 ISOGI_API isogi_result isogi_trace_load(isogi_trace *trace, const void *block, size_t bytes);
 
 /* No lattice: irradiance at a user's own world points, each on the isosurface through it, with a unit normal each (NULL = as
    desc.normals says; towards the low side, whichever side is asked for). Uses samples, bounces, seed, offset, normals, capped, side
-   (not BOTH), reach, shadows, material and lighting of the description; its mode must be IRRADIANCE. A point that is not finite or has no normal gets the zero vector and error = INFINITY. error may be NULL. */
+   (not BOTH), reach, shadows, material and lighting of the description; its mode must be IRRADIANCE. A point that is not finite or has
+   no normal gets the zero vector and error = INFINITY. error may be NULL. */
 ISOGI_API isogi_result isogi_trace_gather(const isogi_trace_desc *desc, const float (*points)[3], const float (*normals)[3], size_t count,
                                           float (*irradiance)[3], float *error, const isogi_context *context);
 
@@ -425,9 +428,7 @@ ISOGI_API size_t isogi_trace_memory(const isogi_trace *trace); /* bytes that the
 #define ISOGI_TRACE__FLUSH 64      /* rays in one call */
 #define ISOGI_TRACE__SWEEP 256     /* nodes in a task that traces no rays */
 #define ISOGI_TRACE__GROUP 65536   /* texels that are worked on together, about */
-#define ISOGI_TRACE__PROBE_SHARE 5   /* samples of a texel to those of a probe, */
-#define ISOGI_TRACE__PROBE_LEAST 2  /* which has at least so many (if the texel has), */
-#define ISOGI_TRACE__PROBE_MOST 8   /* and at most so many */
+#define ISOGI_TRACE__PROBE_MOST 8    /* samples of a probe: as many as there are hits that read it, but no more than this */
 #define ISOGI_TRACE__PROBE_ERROR 0.02 /* standard error of light from probes */
 #define ISOGI_TRACE__CELL 2.0       /* of probes that texels read, in voxels, */
 #define ISOGI_TRACE__CELL_FAR 8.0   /* and of those that only probes read */
@@ -2696,10 +2697,11 @@ static isogi_result isogi_trace__bake_batch(isogi_trace *t, size_t count) {
 
 /* ==== light at hits: probes ========================================================================================= */
 
-/* By default a ray that meets the surface takes the light there from a probe (the records of Ward, Rubinstein and Clear 1988): a point on the
-   surface near the hit whose own hemisphere is gathered in the same way, once. Probes are found by place and normal (Binder, Fricke
-   and Keller 2018), in cells that grow with the ray's length, since a far ray stands for much surface. Light at probes obeys E = D + R A E, with D from sky and lights and A the means over
-   hits: n - 1 passes over the probes are n reflections, and they cost no rays. */
+/* By default a ray that meets the surface takes the light there from a probe (the records of Ward, Rubinstein and Clear 1988): a point
+   on the surface near the hit whose own hemisphere is gathered in the same way, once. Probes are found by place and normal (Binder,
+   Fricke and Keller 2018), in cells that grow with the ray's length, since a far ray stands for much surface. Light at probes obeys
+   E = D + R A E, with D from sky and lights and A the means over hits: n - 1 passes over the probes are n reflections, and they cost no
+   rays. */
 
 /* What is gathered at one point: a texel (brick set) or a probe. Sums are over samples, in units of irradiance / pi but for light. */
 typedef struct isogi_trace__node {
@@ -2709,6 +2711,8 @@ typedef struct isogi_trace__node {
     isogi_trace__brick *brick;
     size_t texel[3];
     uint32_t slot, samples, light_samples, hits;
+    uint32_t readers; /* probe: hits that take their light from it, those that texels are still to make included */
+    uint32_t wanted;  /* probe: samples, once its generation has begun */
     float normal[3], albedo[3];
     signed char from;     /* side of the surface: 1 low, -1 high */
     signed char level;    /* blocks of samples that are complete */
@@ -2777,6 +2781,7 @@ struct isogi_trace__feedback {
     uint32_t *task;
     size_t span_count, sample_count, task_count;
     size_t cursor, probe_cursor; /* nodes before these have nothing to do at this level */
+    size_t probe_end;            /* of the generation of probes at work: later ones were made by its rays */
     int level;
     int on_probes; /* the batch is of probes */
     int diverges;   /* the last passes did not settle */
@@ -3015,15 +3020,9 @@ static isogi_result isogi_trace__probe_of(isogi_trace *t, const isogi_trace__cat
    sequence that the texels of a brick share, so that it is well spread for a texel as well as for its neighbourhood. */
 static int isogi_trace__in_blocks(const isogi_trace_desc *d) { return d->lazy || d->error > 0; }
 
-/* Samples of the blocks before number `level`. */
-static uint32_t isogi_trace__block(const isogi_trace *t, int is_probe, int level) {
+/* Samples of a texel's blocks before number `level`. */
+static uint32_t isogi_trace__block(const isogi_trace *t, int level) {
     uint32_t samples = (uint32_t)t->scene.desc.samples, sum;
-    if (is_probe) {
-        sum = samples / ISOGI_TRACE__PROBE_SHARE;
-        sum = sum > ISOGI_TRACE__PROBE_LEAST ? sum : ISOGI_TRACE__PROBE_LEAST;
-        sum = sum < samples ? sum : samples;
-        return level ? sum < ISOGI_TRACE__PROBE_MOST ? sum : ISOGI_TRACE__PROBE_MOST : 0;
-    }
     if (!isogi_trace__in_blocks(&t->scene.desc)) return level ? samples : 0;
     sum = level > 12 ? samples : (((uint32_t)1 << (2 * level + 2)) - 4) / 3;
     return sum < samples ? sum : samples;
@@ -3038,9 +3037,9 @@ static uint32_t isogi_trace__index(const isogi_trace *t, const isogi_trace__node
         while (size < (uint32_t)t->scene.desc.samples) size *= 2;
         return n->slot * size + sample;
     }
-    while (isogi_trace__block(t, 0, level + 1) <= sample) level++;
+    while (isogi_trace__block(t, level + 1) <= sample) level++;
     size = (uint32_t)4 << (2 * level);
-    return ISOGI_TRACE__TEXELS * size + n->slot * size + (sample - isogi_trace__block(t, 0, level));
+    return ISOGI_TRACE__TEXELS * size + n->slot * size + (sample - isogi_trace__block(t, level));
 }
 
 /* ---- rays of a task, gathered into batches ---- */
@@ -3331,7 +3330,7 @@ static void isogi_trace__cast_task(void *arg, size_t task) {
 static int isogi_trace__spans_add(isogi_trace *t, const isogi_trace__set *set, size_t node, uint64_t limit) {
     isogi_trace__feedback *f = t->feedback;
     const isogi_trace__node *n = &set->nodes[node];
-    uint32_t first = n->samples, end = isogi_trace__block(t, set == &f->probes, n->level + 1);
+    uint32_t first = n->samples, end = set == &f->probes ? n->wanted : isogi_trace__block(t, n->level + 1);
     while (first < end) {
         isogi_trace__span *s = &f->spans[f->span_count];
         uint32_t count = end - first < ISOGI_TRACE__SPAN ? end - first : ISOGI_TRACE__SPAN;
@@ -3352,7 +3351,25 @@ static int isogi_trace__spans_add(isogi_trace *t, const isogi_trace__set *set, s
     return 1;
 }
 
-/* Texels at the current level come first, then probes. */
+/* The probes that rays have met since are the next generation. A hit is worth one path that goes on from there, so each has as many
+   samples as there are hits that read it: few are read by more than two, and with more samples than readers in a room that is closed,
+   probes would breed probes until they fill it. Two at least where nearly all light is reflected: probes whose only rays meet one
+   another are a room without a way out. Counted once, between generations, so that slices of a bake do not matter. */
+static void isogi_trace__generation(isogi_trace *t) {
+    isogi_trace__feedback *f = t->feedback;
+    uint32_t most = (uint32_t)t->scene.desc.samples < ISOGI_TRACE__PROBE_MOST ? (uint32_t)t->scene.desc.samples : ISOGI_TRACE__PROBE_MOST;
+    for (; f->probe_end < f->probes.count; f->probe_end++) {
+        isogi_trace__node *n = &f->probes.nodes[f->probe_end];
+        uint32_t least = 1;
+        int a;
+        for (a = 0; a < 3; a++)
+            if (n->albedo[a] > 0.9f) least = 2;
+        n->wanted = n->readers > least ? n->readers : least;
+        if (n->wanted > most) n->wanted = most;
+    }
+}
+
+/* Texels at the current level come first, then probes, one generation after the other. */
 static void isogi_trace__spans_fill(isogi_trace *t, uint64_t limit) {
     isogi_trace__feedback *f = t->feedback;
     f->span_count = f->sample_count = 0;
@@ -3364,7 +3381,8 @@ static void isogi_trace__spans_fill(isogi_trace *t, uint64_t limit) {
     }
     if (!f->span_count) {
         f->on_probes = 1;
-        for (; f->probe_cursor < f->probes.count; f->probe_cursor++)
+        if (f->probe_cursor == f->probe_end) isogi_trace__generation(t);
+        for (; f->probe_cursor < f->probe_end; f->probe_cursor++)
             if (!f->probes.nodes[f->probe_cursor].level && !isogi_trace__spans_add(t, &f->probes, f->probe_cursor, limit)) break;
     }
     f->task[f->task_count] = (uint32_t)f->span_count;
@@ -3440,7 +3458,18 @@ static void isogi_trace__span_commit(isogi_trace *t, isogi_trace__set *set, cons
     if (!n->samples) t->counters.texels += n->brick != NULL;
     if (n->brick) t->feedback->partial += s->count;
     n->samples = s->first + s->count, n->light_samples = isogi_trace__light_samples(n->samples, n->brick != NULL), n->hits += hits;
-    if (n->samples == isogi_trace__block(t, !n->brick, n->level + 1)) n->level++;
+    if (n->samples == (n->brick ? isogi_trace__block(t, n->level + 1) : n->wanted)) n->level++;
+}
+
+/* Counts the batch's hits at their probes: one of a texel stands for those of the blocks of samples to come, too. */
+static void isogi_trace__readers_count(isogi_trace *t, const isogi_trace__segment *s) {
+    isogi_trace__feedback *f = t->feedback;
+    uint32_t weight = f->on_probes ? 1 : (uint32_t)t->scene.desc.samples / isogi_trace__block(t, f->level + 1);
+    size_t i;
+    for (i = 0; i < s->hits; i++) {
+        isogi_trace__node *n = &f->probes.nodes[s->probe[i]];
+        if (n->readers < ISOGI_TRACE__PROBE_MOST) n->readers += weight;
+    }
 }
 
 /* Traces the batch and takes it over; on failure nothing but probes without samples has been added. */
@@ -3454,6 +3483,7 @@ static isogi_result isogi_trace__spans_run(isogi_trace *t, double from, double t
     if (result == ISOGI_OK) result = isogi_trace__segment_new(t, &segment);
     if (result != ISOGI_OK) return result;
     set->segments[set->segment_count++] = segment;
+    isogi_trace__readers_count(t, &segment);
     for (i = 0; i < f->task_count; i++) isogi_trace__add(&t->counters, &t->task_counters[i]);
     for (i = 0; i < f->span_count; i++) {
         int first = f->spans[i].sum.brick && !set->nodes[f->spans[i].node].samples;
@@ -3879,7 +3909,7 @@ static void isogi_trace__level_end(isogi_trace *t) {
     isogi_trace__set_free(t, &f->texels);
     isogi_trace__set_free(t, &f->probes);
     memset(f->table, 0, f->table_size * sizeof *f->table);
-    f->probe_cursor = 0;
+    f->probe_cursor = f->probe_end = 0;
 }
 
 static isogi_result isogi_trace__feedback_step(isogi_trace *t, uint64_t max_rays) {
@@ -4709,7 +4739,7 @@ static void isogi_trace__feedback_reset(isogi_trace *t) {
         if (t->bricks[i]) isogi_trace__brick_forget(t, t->bricks[i]);
     isogi_trace__set_free(t, &f->texels), isogi_trace__set_free(t, &f->probes);
     memset(f->table, 0, f->table_size * sizeof *f->table);
-    f->cursor = f->probe_cursor = 0, f->span_count = 0, f->partial = 0;
+    f->cursor = f->probe_cursor = f->probe_end = 0, f->span_count = 0, f->partial = 0;
     f->level = f->unpublished = f->diverges = 0;
 }
 
@@ -5108,9 +5138,7 @@ ISOGI_API isogi_result isogi_trace_gather_field(const isogi_trace_desc *desc, is
 #undef ISOGI_TRACE__HALF
 #undef ISOGI_TRACE__CELL_FAR
 #undef ISOGI_TRACE__CELL
-#undef ISOGI_TRACE__PROBE_SHARE
 #undef ISOGI_TRACE__PROBE_ERROR
-#undef ISOGI_TRACE__PROBE_LEAST
 #undef ISOGI_TRACE__PROBE_MOST
 #undef ISOGI_TRACE__NEAR_RATIO
 #undef ISOGI_TRACE__GROUP

@@ -14,7 +14,7 @@ wanted() {
          done
          echo pyramid-256 trilinear-along-rays tricubic-along-rays tricubic-random mesh-gyroid256 mesh-normals-gyroid256 ;;
     trace) for scene in engine-block $(have engine_256x256x128_uint8.raw engine); do
-            echo speedup-$scene rays-$scene lazy-$scene lazy-converged-$scene
+            echo speedup-$scene rays-$scene threads-$scene lazy-$scene lazy-converged-$scene
            done ;;
     dvr) echo frame-ml256 frame-gyroid256 frame-scale-invariant-gyroid256 \
         $(have engine_256x256x128_uint8.raw frame-engine tf-update-engine tf-update-engine:paper tf-update-engine:sweep) \
