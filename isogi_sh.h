@@ -2898,7 +2898,7 @@ ISOGI_SH__INLINE double isogi_sh__zonal_entry(const isogi_sh__wigner *w, int l, 
     return before + *difference;
 }
 
-static void isogi_sh__build_blocks(const isogi_sh__blocks *out, int order, const isogi_sh__euler *e) {
+ISOGI_SH__APART void isogi_sh__build_blocks(const isogi_sh__blocks *out, int order, const isogi_sh__euler *e) {
     isogi_sh__wigner w;
     double p = 1, difference = 0;
     int l, m, n, at = 0;
@@ -3019,23 +3019,11 @@ ISOGI_SH__AVX512 static void isogi_sh__build_lanes(void *out, int is_double, int
 #endif
 
 /* Columns of the matrices are rotated unit vectors. */
-static void isogi_sh__rotation_build(void *rotation, int is_double, int order, const isogi_sh__euler *e) {
+ISOGI_SH__APART void isogi_sh__build_high(void *rotation, int is_double, int order, const isogi_sh__euler *e) {
     double band[2 * ISOGI_SH_MAX_ORDER * ISOGI_SH__TOGETHER], other[2 * ISOGI_SH_MAX_ORDER * ISOGI_SH__TOGETHER];
     isogi_sh__turns turns;
-    isogi_sh__blocks out;
     size_t at = 0;
     int l, i, k, first;
-    if (order <= ISOGI_SH__TURNS + 1) {
-#ifdef ISOGI_SH__SIMD
-        if (order > 1 && isogi_sh__level() > 1) {
-            isogi_sh__build_lanes(rotation, is_double, order, e);
-            return;
-        }
-#endif
-        out.data = rotation, out.is_double = is_double;
-        isogi_sh__build_blocks(&out, order, e);
-        return;
-    }
     isogi_sh__turns_start(&turns, order, e);
     for (l = 0; l < order; l++) {
         int width = 2 * l + 1;
@@ -3053,6 +3041,19 @@ static void isogi_sh__rotation_build(void *rotation, int is_double, int order, c
                 }
         }
         at += (size_t)(width * width);
+    }
+}
+
+/* Each way in a function of its own, so that their stacks do not add up. */
+static void isogi_sh__rotation_build(void *rotation, int is_double, int order, const isogi_sh__euler *e) {
+    if (order > ISOGI_SH__TURNS + 1) isogi_sh__build_high(rotation, is_double, order, e);
+#ifdef ISOGI_SH__SIMD
+    else if (order > 1 && isogi_sh__level() > 1) isogi_sh__build_lanes(rotation, is_double, order, e);
+#endif
+    else {
+        isogi_sh__blocks out;
+        out.data = rotation, out.is_double = is_double;
+        isogi_sh__build_blocks(&out, order, e);
     }
 }
 
