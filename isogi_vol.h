@@ -121,12 +121,12 @@ typedef struct isogi_context {
     int (*progress)(void *user, double fraction); /* 0..1; non-zero cancels; called on the caller's thread only */
     void *user;
     int threads;    /* 0 = all cores, 1 = serial; ignored where parallel_for is set */
-    int force_path; /* instruction path of what is built: 0 = best, 1 = plain reference, 2 = portable, 3 = AVX2, 4 = AVX-512 (Ice Lake, Zen 4), and
-                       single rays like batches;
-                       no more than the machine has */
+    int force_path; /* instruction path of what is built: 0 = best, 1 = plain reference, 2 = portable, 3 = AVX2, 4 = AVX-512 (Ice Lake,
+                       Zen 4), and single rays like batches; no more than the machine has */
 } isogi_context;
 
-/* What work was done, for tests and tuning: it depends on which rays go together, what they hit does not. Every call ADDS to the fields it knows; NULL is allowed wherever one is asked for. */
+/* What work was done, for tests and tuning: it depends on which rays go together, what they hit does not. Every call ADDS to the fields it
+   knows; NULL is allowed wherever one is asked for. */
 typedef struct isogi_counters {
     uint64_t rays;           /* rays traced */
     uint64_t blocks;         /* pyramid blocks looked at */
@@ -175,7 +175,8 @@ typedef struct isogi_volume {
     double origin[3];    /* world position of voxel (0,0,0), of that of the larger field for a chunk */
     double axes[9];      /* row-major 3x3, column a = world direction of grid axis a, invertible; all 0 = identity */
     double scale, bias;  /* scale 0 = 1 */
-    size_t first[3], halo_low[3], halo_high[3]; /* of a chunk: see above; first up to 2^53, halos up to 2^31-1, without use along an axis of one voxel */
+    /* of a chunk: see above; first up to 2^53, halos up to 2^31-1, without use along an axis of one voxel */
+    size_t first[3], halo_low[3], halo_high[3];
 } isogi_volume;
 
 ISOGI_API isogi_result isogi_volume_validate(const isogi_volume *volume);
@@ -246,11 +247,12 @@ ISOGI_API void isogi_vol_to_grid(const isogi_pyramid *pyramid, const double worl
    A function that is not as smooth as `hessian` claims loses hits, but nothing else.
    counters: blocks as for volumes, cubics = calls of the function. */
 typedef struct isogi_field {
-    double (*value)(void *user, const double point[3], double gradient[3]); /* gradient per world unit, never NULL; called from any thread; a result that is not finite:
-                                                                               no surface in the rest of that cell */
+    /* gradient per world unit, never NULL; called from any thread; a result that is not finite: no surface in the rest of that cell */
+    double (*value)(void *user, const double point[3], double gradient[3]);
     void *user;            /* must outlive the pyramid */
     double hessian;        /* > 0: |gradient f(p) - gradient f(q)| <= hessian |p - q| in the whole box: a bound of the Hessian's norm */
-    double (*hessian_in)(void *user, const double low[3], const double high[3]); /* the same for a smaller box, where that is less; NULL = hessian everywhere */
+    /* the same for a smaller box, where that is less; NULL = hessian everywhere */
+    double (*hessian_in)(void *user, const double low[3], const double high[3]);
     double low[3], high[3]; /* low < high */
     size_t cells[3];        /* of the lattice, along x, y, z; 0 = 64 */
 } isogi_field;
