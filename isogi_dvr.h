@@ -271,7 +271,9 @@ typedef struct isogi_dvr_desc {
     isogi_dvr_sphere sphere;
     double anisotropy;      /* of scattering, -1..1 (both excluded): g of Henyey and Greenstein; 0 = isotropic; with visibility only */
     double tolerance;       /* pre-integrated physical space: pieces of ray across which extinction times length, times the transparency
-                               before them, changes by more are sampled seven times as densely; 0 = 0.5 */
+                               before them, changes by more are sampled seven times as densely; 0 = 0.5. A criterion, no bound: what
+                               the blocks' ranges of values bound, the largest less the smallest extinction in them times length, does
+                               not become less in sum however densely a ray is sampled */
     double emission;        /* share of rgb that glows by itself, besides scattering light; 0..1e6; with visibility only */
     double radius;          /* the paper's method: of local visibility, in units of the smallest voxel spacing, 1..32; 0 = 16 */
     double reduction;       /* the paper's method: voxels of the volume to points of its blocks, at least 1; 0 = 4. A block that is not
