@@ -4384,6 +4384,25 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE void isogi_vol__corners8(const isogi_pyramid
     for (k = 0; k < 8; k++) c[k] = ISOGI_VOL__SUB(ISOGI_VOL__ADD(ISOGI_VOL__MUL(c[k], scale), bias), isovalue);
 }
 
+/* Rays that leave a surface and do not come back to it in the same cell: what leave_surface and cubic_deflated find. *inside: the side on
+   which they do. passes: those that do not end in the cell. */
+ISOGI_VOL__AVX512 ISOGI_VOL__INLINE __mmask8 isogi_vol__left8(const __m512d b[4], const __m512d from[3], const __m512d to[3], __m512d steepest, __mmask8 passes, __mmask8 *inside,
+                                                              __mmask8 lanes) {
+    const __m512d zero = _mm512_setzero_pd(), three = _mm512_set1_pd(3);
+    const __m512d c1 = ISOGI_VOL__MUL(three, ISOGI_VOL__SUB(b[1], b[0]));
+    const __m512d c2 = ISOGI_VOL__MUL(three, ISOGI_VOL__ADD(ISOGI_VOL__SUB(b[0], b[1]), ISOGI_VOL__SUB(b[2], b[1])));
+    const __m512d c3 = ISOGI_VOL__ADD(ISOGI_VOL__SUB(b[3], b[0]), ISOGI_VOL__MUL(three, ISOGI_VOL__SUB(b[1], b[2])));
+    const __m512d half = ISOGI_VOL__ADD(c1, ISOGI_VOL__MUL(_mm512_set1_pd(0.5), c2)), sum = ISOGI_VOL__ADD(ISOGI_VOL__ADD(c1, c2), c3);
+    const __m512d length = _mm512_max_pd(_mm512_max_pd(_mm512_abs_pd(ISOGI_VOL__SUB(to[0], from[0])), _mm512_abs_pd(ISOGI_VOL__SUB(to[1], from[1]))), _mm512_abs_pd(ISOGI_VOL__SUB(to[2], from[2])));
+    const __m512d reach = _mm512_max_pd(_mm512_max_pd(_mm512_abs_pd(ISOGI_VOL__SUB(b[1], b[0])), _mm512_abs_pd(ISOGI_VOL__SUB(b[2], b[0]))), _mm512_abs_pd(ISOGI_VOL__SUB(b[3], b[0])));
+    const __mmask8 stays = (__mmask8)(passes & (_mm512_cmp_pd_mask(length, _mm512_set1_pd(1e-9), _CMP_LT_OQ) |
+                                                _mm512_cmp_pd_mask(reach, ISOGI_VOL__MUL(_mm512_set1_pd(1e-12), steepest), _CMP_LT_OQ)));
+    const __mmask8 rises = _mm512_mask_cmp_pd_mask(_mm512_mask_cmp_pd_mask(_mm512_cmp_pd_mask(c1, zero, _CMP_GT_OQ), half, zero, _CMP_GT_OQ), sum, zero, _CMP_GT_OQ);
+    const __mmask8 falls = _mm512_mask_cmp_pd_mask(_mm512_mask_cmp_pd_mask(_mm512_cmp_pd_mask(c1, zero, _CMP_LT_OQ), half, zero, _CMP_LT_OQ), sum, zero, _CMP_LT_OQ);
+    *inside = (__mmask8)((*inside & ~lanes) | (rises & lanes));
+    return (__mmask8)(lanes & (rises | falls) & ~stays & _mm512_cmp_pd_mask(b[3], zero, _CMP_NEQ_OQ));
+}
+
 ISOGI_VOL__AVX512 static unsigned isogi_vol__decide8(isogi_vol__batch *b, isogi_vol__pool *s, const uint8_t *slots, unsigned some, unsigned *alone) {
     const __mmask8 lanes = (__mmask8)some;
     const __m128i list = _mm_loadl_epi64((const __m128i *)(const void *)slots);
@@ -4394,9 +4413,12 @@ ISOGI_VOL__AVX512 static unsigned isogi_vol__decide8(isogi_vol__batch *b, isogi_
     const __m512i cell = ISOGI_VOL__TAKE(cell), side = ISOGI_VOL__TAKE(side), three = _mm512_set1_epi64(3);
     const __m512i in = _mm512_and_si512(_mm512_srli_epi64(cell, 48), three), out = _mm512_and_si512(_mm512_srli_epi64(cell, 50), three);
     const __m512d zero = _mm512_setzero_pd(), one = _mm512_set1_pd(1), stop = ISOGI_VOL__TAKE_REAL(stop);
-    /* the cell in which a ray begins, or leaves a surface, is a matter for itself */
-    __mmask8 odd = (__mmask8)(_mm512_cmpeq_epi64_mask(in, three) | _mm512_cmpeq_epi64_mask(side, _mm512_set1_epi64(-2))), low, high, b_low, b_high, inside, same, cross, slow;
-    __m512d c[8], from[3], to[3], bezier[4], begin = zero, end = stop, root;
+    /* rays that leave a surface, which most do without coming back to it in the same cell; a ray's first cell behind a border of the
+       volume, and a second one next to the surface, are matters for themselves */
+    const __mmask8 first = _mm512_cmpeq_epi64_mask(in, three), starts = _mm512_cmpeq_epi64_mask(side, _mm512_set1_epi64(-2)), leaving = (__mmask8)(starts & first & lanes);
+    __mmask8 odd = (__mmask8)((starts & ~first) | _mm512_mask_cmpge_epi64_mask(first, ISOGI_VOL__TAKE(entry_axis), _mm512_setzero_si512())), low, high, b_low, b_high, inside, same, cross;
+    __mmask8 left = 0, slow;
+    __m512d c[8], from[3], to[3], bezier[4], begin = zero, end = stop, root, steepest = zero;
     *alone = 0;
     isogi_vol__corners8(b->pyramid, cell, lanes, ISOGI_VOL__TAKE_REAL(isovalue), c);
     {
@@ -4436,6 +4458,7 @@ ISOGI_VOL__AVX512 static unsigned isogi_vol__decide8(isogi_vol__batch *b, isogi_
         for (k = 0; k < 8; k++) {
             const __mmask8 least = _mm512_cmp_pd_mask(c[k], zero, _CMP_GE_OQ);
             high &= least, low = (__mmask8)(low & ~least);
+            steepest = _mm512_max_pd(steepest, _mm512_abs_pd(c[k]));
         }
         odd = (__mmask8)(odd | high | low);
 #pragma GCC unroll 8
@@ -4464,10 +4487,15 @@ ISOGI_VOL__AVX512 static unsigned isogi_vol__decide8(isogi_vol__batch *b, isogi_
         const __mmask8 last = _mm512_cmp_pd_mask(bezier[3], zero, _CMP_GE_OQ), known = _mm512_cmpge_epi64_mask(side, _mm512_setzero_si512());
         inside = _mm512_cmp_pd_mask(bezier[0], zero, _CMP_GE_OQ);
         odd = (__mmask8)(odd | ~plain | (known & (inside ^ _mm512_test_epi64_mask(side, side))));
+        if (leaving) {
+            left = (__mmask8)(isogi_vol__left8(bezier, from, to, steepest, _mm512_cmpneq_epi64_mask(out, three), &inside, leaving) & ~odd);
+            odd = (__mmask8)(odd | (leaving & ~left));
+        }
         same = (__mmask8) ~((inside ^ b_low) | (inside ^ b_high) | (inside ^ last));
         cross = (__mmask8)((inside ^ last) & (~(inside ^ b_low) | (inside ^ b_high)));
-        odd = (__mmask8)((odd | ~(same | cross)) & lanes);
-        cross = (__mmask8)(cross & lanes & ~odd), same = (__mmask8)(same & lanes & ~odd);
+        same = (__mmask8)(same & ~leaving), cross = (__mmask8)(cross & ~leaving);
+        odd = (__mmask8)((odd | ~(same | cross | left)) & lanes);
+        cross = (__mmask8)(cross & lanes & ~odd), same = (__mmask8)((same & lanes & ~odd) | left);
     }
     b->work.cubics += (uint64_t)__builtin_popcount((unsigned)(same | cross));
     _mm512_mask_i64scatter_epi64(s->side, same, slot, _mm512_maskz_set1_epi64(inside, 1), 8);
