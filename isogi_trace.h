@@ -361,7 +361,7 @@ ISOGI_API isogi_result isogi_trace_export_scales(const isogi_trace *trace, int f
    desc.isovalue_min, isovalue_max, lazy, lookup and box may differ; else the answer is ISOGI_INVALID (lighting, tables and the ranges of
    the volume's blocks are compared by hash; a material function cannot be). Any bytes may be loaded: those that are damaged, cut off or
    of another version are ISOGI_CORRUPT and change nothing. ISOGI_NO_MEMORY: some of the texels are loaded. isogi_trace_load counts as a
-   writer. */
+   writer. Hierarchical textures are not saved: their size is 0, and the calls answer ISOGI_INVALID. */
 ISOGI_API size_t isogi_trace_save_size(const isogi_trace *trace);
 ISOGI_API isogi_result isogi_trace_save(const isogi_trace *trace, void *block, size_t bytes); /* bytes: isogi_trace_save_size or more */
 ISOGI_API isogi_result isogi_trace_load(isogi_trace *trace, const void *block, size_t bytes);
@@ -4379,7 +4379,7 @@ static size_t isogi_trace__side_size(const isogi_trace *t, size_t *bricks) {
 
 ISOGI_API size_t isogi_trace_save_size(const isogi_trace *trace) {
     size_t bricks;
-    return trace ? isogi_trace__side_size(trace, &bricks) + isogi_trace_save_size(trace->high) : 0;
+    return trace && !trace->coarse ? isogi_trace__side_size(trace, &bricks) + isogi_trace_save_size(trace->high) : 0;
 }
 
 ISOGI_API isogi_result isogi_trace_save(const isogi_trace *trace, void *block, size_t bytes) {

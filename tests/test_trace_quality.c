@@ -49,7 +49,7 @@ TEST(hierarchical_lattice) {
     CHECK(isogi_trace_create(&t, &d, NULL) == ISOGI_INVALID, "lazy and hierarchical, %d", 1);
     d.lazy = 0, d.sides = ISOGI_TRACE_BOTH_SIDES, d.samples = 1, d.hierarchy = 0.3f, d.mode = ISOGI_TRACE_TRANSFER;
     CHECK(isogi_trace_create(&t, &d, NULL) == ISOGI_OK && isogi_trace_step(t, 0, NULL) == ISOGI_OK, "both sides %d", 1);
-    CHECK(isogi_trace_relight(t, &d.lighting) == ISOGI_OK && isogi_trace_export_size(t, 0) == 0, "both sides %d", 2);
+    CHECK(isogi_trace_relight(t, &d.lighting) == ISOGI_OK && isogi_trace_export_size(t, 0) == 0 && isogi_trace_save_size(t) == 0, "both sides %d", 2);
     CHECK(isogi_trace_sample(isogi_trace_high(t), (const float(*)[3])points, (size_t)count, reference, NULL) == ISOGI_OK && reference[0][0] >= 0, "both sides %d", 3);
     isogi_trace_free(t), scene_free(&s);
 }
