@@ -63,7 +63,8 @@
      Validity               A texel is left out of every lookup where no surface passes at its place: none of the voxels of the cells
                             around it is lower than v (constant air, local minima: there f >= v all around, such a texel would see the
                             sky through everything), where a voxel is not finite, or where the gradient vanishes. With desc.capped the
-                            border's texels, which face out of the box, are always valid.
+                            border's texels, which face out of the box, are always valid. On the high side a texel needs matter
+                            to look through: a quarter, half or a whole voxel along its normal must be inside (local maxima are not).
      Lookup                 desc.lookup; trilinear unless told otherwise: among the eight texels around the point, those that are
                             valid; their weights are made to sum to 1 again. So an invalid texel neither darkens nor
                             brightens its neighbours. Where none of the eight is valid, the nearest valid one of the 4x4x4
@@ -138,7 +139,7 @@
    Threads      Rays run on the context's threads. isogi_trace_sample and the other readers may run in any number of threads at a
                 time; request, step and relight alone, without readers.
    Determinism  The same bits for any number of threads and any budget of steps. PATHS: a texel's light depends on the description
-                and its place alone, lazily or fully, in parts (desc.box_first, isogi_trace_merge), in any order of requests.
+                and its place alone, lazily or fully, in parts (desc.box_first, isogi_trace_load), in any order of requests.
                 FEEDBACK: which probes there are depends on what was asked for and in which order: within 5 % (rms over points).
    Limits       Order 6; 2^24 samples; paths end after 10000 reflections. White surfaces that enclose a light truly have infinite
                 light: what is computed then is finite and has no meaning; its error says so, and isogi_trace_report.diverges.
@@ -344,8 +345,9 @@ ISOGI_API isogi_trace *isogi_trace_high(isogi_trace *trace);
    IRRADIANCE: texel (i,j,k) at i + lattice[0] (j + lattice[1] k), RGB: FLOAT 12 bytes (GL_RGB32F), HALF 6 (GL_RGB16F), RGB9E5 4
    (GL_RGB9_E5 from GL_UNSIGNED_INT_5_9_9_9_REV), BYTE 3 (GL_RGB8). TRANSFER: value v = coefficient * channels + channel stands in
    component v % 4 of plane v / 4, and every plane is a whole RGBA texture: FLOAT 16 bytes a texel, HALF 8, BYTE 4 (GL_RGBA8_SNORM).
-   Components are in the machine's byte order. Texels without light of their own (no surface, not computed) hold the mean of those
-   around them, three texels deep, and beyond that the mean of all: plain hardware interpolation then shows no dark seams.
+   Components are in the machine's byte order. Texels hold what lookups read there, drafts too. Those without light of their own (no
+   surface, not computed) hold the mean of those around them, three texels deep, and beyond that the mean of all: plain hardware
+   interpolation then shows no dark seams.
    Light is what the hardware reads times a scale: scales[3] of RGB, or scales[order^2 channels]; 1 for FLOAT, and for HALF and RGB9E5
    unless something is brighter than these hold; for BYTE the largest value.
    export_size: bytes that isogi_trace_export fills, 0 where the format is not for this mode. format 0 = that of the storage.
@@ -421,6 +423,7 @@ ISOGI_API size_t isogi_trace_memory(const isogi_trace *trace); /* bytes that the
 #define ISOGI_TRACE__MAX_DEPTH 10000 /* of a path, so that nothing hangs */
 #define ISOGI_TRACE__MAX_ORDER 6
 #define ISOGI_TRACE__NOT_READY HUGE_VALF
+#define ISOGI_TRACE__DEPTH 0.25 /* voxels that must be matter behind the surface of a texel of the high side, at once or up to a voxel on */
 #define ISOGI_TRACE__SAMPLES 16384 /* samples of a batch, */
 #define ISOGI_TRACE__SPANS 4096    /* in as many pieces, */
 #define ISOGI_TRACE__SPAN 512      /* of at most this many */
@@ -1019,12 +1022,13 @@ static int isogi_trace__site_normal(const isogi_trace__scene *scene, const float
     return length > 0;
 }
 
-/* Rays start `offset` voxels along the normal, twice and four times as far (up to one voxel) where that is still inside: the
-   trilinear surface has bumps that the smoothed normal does not know of (Wyman 2006, 4.1.1). Where even that ends in matter, they
-   start on the surface. */
-static void isogi_trace__site_start(const isogi_trace__scene *scene, isogi_trace__site *site) {
+/* Grid coordinates of the first place `offset` voxels along the normal, twice or four times as far (up to one voxel) that is on the
+   right side of the trilinear surface, which has bumps that the smoothed normal does not know of (Wyman 2006, 4.1.1). Beyond a border
+   is air where the border is capped, else whatever was asked for. 0: there is none. */
+static int isogi_trace__off_surface(const isogi_trace__scene *scene, const isogi_trace__site *site, double offset, double grid[3],
+                                    int *beyond) {
     const double *m = scene->to_grid;
-    double n[3], speed = 0, offset = (double)scene->desc.offset;
+    double n[3], speed = 0;
     int a, attempt;
     for (a = 0; a < 3; a++) {
         n[a] = m[3 * a] * (double)site->normal[0] + m[3 * a + 1] * (double)site->normal[1] +
@@ -1032,24 +1036,32 @@ static void isogi_trace__site_start(const isogi_trace__scene *scene, isogi_trace
         speed += n[a] * n[a];
     }
     speed = sqrt(speed);
-    site->on_surface = 1, site->open = 0;
     for (attempt = 0; attempt < 3 && offset > 0 && speed > 0; attempt++, offset *= 2) {
-        double grid[3];
         isogi_hit place;
-        int beyond = 0;
         if (attempt && offset > 1) break;
-        for (a = 0; a < 3; a++) {
+        for (*beyond = a = 0; a < 3; a++) {
             grid[a] = site->place.cell[a] + site->place.local[a] + n[a] * (offset / speed);
-            beyond |= grid[a] < 0 || grid[a] > (double)(scene->volume->size[a] - 1);
+            *beyond |= grid[a] < 0 || grid[a] > (double)(scene->volume->size[a] - 1);
         }
+        if (*beyond && scene->high && scene->desc.capped) continue;
         isogi_trace__locate(scene->volume, grid, &place);
-        if (!beyond && (isogi_trace__value(scene->volume, &place) < site->isovalue) == scene->high) continue;
+        if (*beyond || (isogi_trace__value(scene->volume, &place) < site->isovalue) != scene->high) return 1;
+    }
+    return 0;
+}
+
+/* Rays start off the surface; where that is in matter wherever it was tried, on the surface itself. */
+static void isogi_trace__site_start(const isogi_trace__scene *scene, isogi_trace__site *site) {
+    double grid[3];
+    int a, beyond;
+    site->on_surface = 1, site->open = 0;
+    if (isogi_trace__off_surface(scene, site, (double)scene->desc.offset, grid, &beyond)) {
         isogi_vol_to_world(scene->pyramid, grid, site->origin);
         site->on_surface = 0, site->open = beyond && !scene->desc.capped;
         return;
     }
-    for (a = 0; a < 3; a++) n[a] = site->place.cell[a] + site->place.local[a];
-    isogi_vol_to_world(scene->pyramid, n, site->origin);
+    for (a = 0; a < 3; a++) grid[a] = site->place.cell[a] + site->place.local[a];
+    isogi_vol_to_world(scene->pyramid, grid, site->origin);
     site->place.side = 1;
     isogi_vol_normals(scene->pyramid, &site->place, 1, ISOGI_NORMAL_TRILINEAR, &site->geometric);
     for (a = 0; a < 3 && scene->high; a++) site->geometric[a] = -site->geometric[a];
@@ -1508,10 +1520,21 @@ static isogi_result isogi_trace__scene_unit(isogi_trace__scene *scene) {
     return ISOGI_OK;
 }
 
-/* Luminance of the irradiance of an open texel at the middle of the volume, averaged over all orientations: pi times the mean
-   radiance, and Y_0 = 1 / sqrt(4 pi). */
+/* Luminance of the irradiance of an open surface at a point, averaged over all orientations: pi times the mean radiance, and
+   Y_0 = 1 / sqrt(4 pi). 0 where it cannot be told. */
+static isogi_result isogi_trace__open_at(const isogi_lighting *lighting, const float point[3], double *open) {
+    float light[3] = {0, 0, 0};
+    double rgb[3];
+    isogi_result result = isogi_sh_project(light, 1, lighting, point);
+    int a;
+    for (a = 0; a < 3; a++) rgb[a] = (double)light[a] * 0.28209479177387814 * ISOGI_TRACE__PI;
+    *open = result == ISOGI_OK ? isogi_trace__clamp(isogi_trace__luminance(rgb), 1e30) : 0;
+    return result;
+}
+
+/* The same of an open texel at the middle of the volume; and what a sample may bring, which may be a glow. */
 static isogi_result isogi_trace__open_light(isogi_trace__scene *scene) {
-    float light[3], centre[3];
+    float centre[3];
     double place[3], rgb[3];
     isogi_result result;
     size_t k;
@@ -1519,9 +1542,8 @@ static isogi_result isogi_trace__open_light(isogi_trace__scene *scene) {
     for (a = 0; a < 3; a++) place[a] = 0.5 * (double)(scene->volume->size[a] - 1);
     isogi_vol_to_world(scene->pyramid, place, place);
     for (a = 0; a < 3; a++) centre[a] = (float)place[a];
-    result = isogi_sh_project(light, 1, &scene->desc.lighting, centre);
-    for (a = 0; a < 3; a++) rgb[a] = (double)light[a] * 0.28209479177387814 * ISOGI_TRACE__PI;
-    scene->possible = scene->open_light = result == ISOGI_OK ? isogi_trace__clamp(isogi_trace__luminance(rgb), 1e30) : 0;
+    result = isogi_trace__open_at(&scene->desc.lighting, centre, &scene->open_light);
+    scene->possible = scene->open_light;
     for (k = 0; k < scene->desc.emission_count; k++) {
         double glow;
         for (a = 0; a < 3; a++) rgb[a] = ISOGI_TRACE__PI * (double)scene->desc.emission_points[k].rgb[a];
@@ -1818,9 +1840,12 @@ static int isogi_trace__texel_place(const isogi_trace *t, const size_t texel[3],
     return range[0] < site->isovalue || (border && t->scene.desc.capped);
 }
 
-/* Where texels lie, and their normals; up to TEXELS of them. valid: 0 where there is no surface, or no normal. */
+/* Where texels lie, and their normals; up to TEXELS of them. valid: 0 where there is no surface, or no normal; on the high side also
+   where no matter lies behind the surface: rays from there would see the sky from within closed solids. */
 static void isogi_trace__texel_sites(const isogi_trace *t, const size_t (*texels)[3], size_t count, isogi_trace__site *sites,
                                      uint8_t *valid) {
+    double grid[3];
+    int beyond;
     isogi_hit place[ISOGI_TRACE__TEXELS];
     float normal[ISOGI_TRACE__TEXELS][3];
     size_t i, n = 0;
@@ -1830,7 +1855,11 @@ static void isogi_trace__texel_sites(const isogi_trace *t, const size_t (*texels
     }
     if (n) isogi_vol_normals(t->scene.pyramid, place, n, t->scene.desc.normals, normal);
     for (i = n = 0; i < count; i++)
-        if (valid[i]) valid[i] = (uint8_t)isogi_trace__site_normal(&t->scene, normal[n++], &sites[i]);
+        if (valid[i]) {
+            valid[i] = (uint8_t)isogi_trace__site_normal(&t->scene, normal[n++], &sites[i]);
+            if (t->scene.high && valid[i])
+                valid[i] = (uint8_t)isogi_trace__off_surface(&t->scene, &sites[i], ISOGI_TRACE__DEPTH, grid, &beyond);
+        }
 }
 
 static int isogi_trace__texel_site(const isogi_trace *t, const size_t texel[3], isogi_trace__site *site) {
@@ -2113,6 +2142,13 @@ static isogi_result isogi_trace__coarse_create(isogi_trace *t, const isogi_conte
     return isogi_trace_create(&t->coarse, &desc, context);
 }
 
+/* The part of the progress that this texture's baking is; of a hierarchy, the coarse texels are the first half. */
+static void isogi_trace__share(isogi_trace *t, double from, double to) {
+    double middle = t->coarse ? (from + to) / 2 : from;
+    t->share[0] = middle, t->share[1] = to;
+    if (t->coarse) t->coarse->share[0] = from, t->coarse->share[1] = middle;
+}
+
 ISOGI_API isogi_result isogi_trace_create(isogi_trace **trace, const isogi_trace_desc *desc, const isogi_context *context) {
     isogi_trace *t;
     isogi_result result;
@@ -2121,14 +2157,15 @@ ISOGI_API isogi_result isogi_trace_create(isogi_trace **trace, const isogi_trace
     t = (isogi_trace *)isogi_allocate(context, 1, sizeof *t);
     if (!t) return ISOGI_NO_MEMORY;
     memset(t, 0, sizeof *t);
-    t->context = *context, t->share[1] = 1;
+    t->context = *context;
     result = isogi_trace__set_up(t, desc);
     if (result == ISOGI_OK && desc->hierarchy > 0) result = isogi_trace__coarse_create(t, context);
+    isogi_trace__share(t, 0, 1);
     if (result == ISOGI_OK && desc->sides == ISOGI_TRACE_BOTH_SIDES) {
         isogi_trace_desc other = *desc;
         other.sides = ISOGI_TRACE_HIGH_SIDE;
         result = isogi_trace_create(&t->high, &other, context);
-        if (result == ISOGI_OK) t->share[1] = t->high->share[0] = 0.5;
+        if (result == ISOGI_OK) isogi_trace__share(t, 0, 0.5), isogi_trace__share(t->high, 0.5, 1);
     }
     if (result == ISOGI_OK) *trace = t;
     else isogi_trace_free(t);
@@ -2787,6 +2824,7 @@ struct isogi_trace__feedback {
     int diverges;   /* the last passes did not settle */
     int unpublished; /* nodes have changed since the light was worked out last */
     uint64_t partial; /* samples of texels that are not finished */
+    uint64_t probes_before; /* of groups of texels that are finished */
     double least;   /* what isogi_trace_step reported last */
 };
 
@@ -3906,6 +3944,7 @@ static void isogi_trace__level_end(isogi_trace *t) {
     if (open || t->scene.desc.lazy) return;
     for (i = 0; i < f->texels.count; i++) isogi_trace__brick_forget(t, f->texels.nodes[i].brick);
     /* the next group begins anew, so that a bake that was saved in between goes on to the same bits */
+    f->probes_before += f->probes.count;
     isogi_trace__set_free(t, &f->texels);
     isogi_trace__set_free(t, &f->probes);
     memset(f->table, 0, f->table_size * sizeof *f->table);
@@ -4071,7 +4110,7 @@ static void isogi_trace__status_add(const isogi_trace *t, isogi_trace_report *r)
         }
     if (t->coarse) isogi_trace__status_add(t->coarse, r);
     if (!t->feedback) return;
-    r->probes += t->feedback->probes.count;
+    r->probes += t->feedback->probes_before + t->feedback->probes.count;
     r->diverges |= t->feedback->diverges;
 }
 
@@ -4099,7 +4138,7 @@ typedef struct isogi_trace__export {
     double mean[3 * ISOGI_TRACE__MAX_ORDER * ISOGI_TRACE__MAX_ORDER];
 } isogi_trace__export;
 
-/* Calls for every texel that is computed, in a fixed order. */
+/* Calls for every texel that can be read, drafts too, in a fixed order. */
 static void isogi_trace__each_texel(isogi_trace__export *e, void (*visit)(isogi_trace__export *e, size_t texel, const float *values)) {
     const isogi_trace *t = e->trace;
     float values[3 * ISOGI_TRACE__MAX_ORDER * ISOGI_TRACE__MAX_ORDER];
@@ -4108,7 +4147,7 @@ static void isogi_trace__each_texel(isogi_trace__export *e, void (*visit)(isogi_
     for (i = 0; i < t->brick_count; i++) {
         const isogi_trace__brick *brick = t->bricks[i];
         for (slot = 0; brick && slot < ISOGI_TRACE__TEXELS; slot++) {
-            if (brick->state[slot] != ISOGI_TRACE__DONE || !isogi_trace__texel_of(t, i, slot, at)) continue;
+            if (brick->state[slot] < ISOGI_TRACE__DRAFT || !isogi_trace__texel_of(t, i, slot, at)) continue;
             isogi_trace__record_read(t, isogi_trace__record(t, brick, slot), values);
             visit(e, at[0] + t->lattice[0] * (at[1] + t->lattice[1] * at[2]), values);
         }
@@ -4740,7 +4779,7 @@ static void isogi_trace__feedback_reset(isogi_trace *t) {
     isogi_trace__set_free(t, &f->texels), isogi_trace__set_free(t, &f->probes);
     memset(f->table, 0, f->table_size * sizeof *f->table);
     f->cursor = f->probe_cursor = f->probe_end = 0, f->span_count = 0, f->partial = 0;
-    f->level = f->unpublished = f->diverges = 0;
+    f->level = f->unpublished = f->diverges = 0, f->probes_before = 0;
 }
 
 /* Marks the texels and queues their bricks; needs no memory. */
@@ -5057,6 +5096,18 @@ static void isogi_trace__field_run(isogi_trace__walk *w, uint64_t key, int first
     }
 }
 
+/* What a sample at a point may bring: the sky on average, and the lights from there. What glows is known where it was met. */
+static double isogi_trace__field_open(const isogi_trace__field *f, const double place[3]) {
+    isogi_lighting lights = f->scene.desc.lighting;
+    float point[3];
+    double open = 0;
+    int c;
+    memset(&lights.env, 0, sizeof lights.env);
+    for (c = 0; c < 3; c++) point[c] = (float)place[c];
+    if (lights.light_count) isogi_trace__open_at(&lights, point, &open);
+    return open + f->scene.possible;
+}
+
 static void isogi_trace__field_point(const isogi_trace__field *f, size_t index) {
     const isogi_trace_desc *d = &f->scene.desc;
     isogi_trace__walk w;
@@ -5084,7 +5135,9 @@ static void isogi_trace__field_point(const isogi_trace__field *f, size_t index) 
         }
     }
     for (c = 0; c < 3; c++) f->irradiance[index][c] = (float)(ISOGI_TRACE__PI * sum[c] / d->samples);
-    if (d->samples > 1) f->error[index] = (float)(ISOGI_TRACE__PI * sqrt(square / ((double)d->samples * (d->samples - 1))));
+    if (d->samples < 2) return;
+    square *= ISOGI_TRACE__PI * ISOGI_TRACE__PI / ((double)d->samples * (d->samples - 1));
+    f->error[index] = (float)sqrt(square + isogi_trace__unseen(isogi_trace__field_open(f, place), ISOGI_TRACE__PI * mean, d->samples));
 }
 
 static void isogi_trace__field_task(void *arg, size_t task) {
@@ -5097,6 +5150,7 @@ ISOGI_API isogi_result isogi_trace_gather_field(const isogi_trace_desc *desc, is
                                                 const float (*points)[3], const float (*normals)[3], size_t count,
                                                 float (*irradiance)[3], float *error, const isogi_context *context) {
     isogi_trace__field f;
+    isogi_lighting sky;
     isogi_result result;
     int i;
     if (!desc || !intersect || (count && (!points || !normals || !irradiance)) || !isogi_trace__fields_valid(desc)) return ISOGI_INVALID;
@@ -5109,7 +5163,9 @@ ISOGI_API isogi_result isogi_trace_gather_field(const isogi_trace_desc *desc, is
     for (i = 0; i < ISOGI_TRACE__WAVE; i++) f.scene.reach[i] = (double)desc->reach;
     f.irradiance = (float(*)[3])isogi_allocate(context, count, sizeof *f.irradiance);
     f.error = (float *)isogi_allocate(context, count, sizeof *f.error);
-    result = isogi_trace__sky_build(&f.scene.sky, &f.scene.desc.lighting.env, context);
+    sky = f.scene.desc.lighting, sky.lights = NULL, sky.light_count = 0;
+    result = isogi_trace__open_at(&sky, NULL, &f.scene.possible);
+    if (result == ISOGI_OK) result = isogi_trace__sky_build(&f.scene.sky, &f.scene.desc.lighting.env, context);
     if (!f.irradiance || !f.error) result = ISOGI_NO_MEMORY;
     if (result == ISOGI_OK) result = isogi_parallel(context, (count - 1) / ISOGI_TRACE__TASK + 1, isogi_trace__field_task, &f, 0, 1);
     if (result == ISOGI_OK) memcpy(irradiance, f.irradiance, count * sizeof *irradiance);
@@ -5129,6 +5185,7 @@ ISOGI_API isogi_result isogi_trace_gather_field(const isogi_trace_desc *desc, is
 #undef ISOGI_TRACE__MAX_DEPTH
 #undef ISOGI_TRACE__MAX_ORDER
 #undef ISOGI_TRACE__NOT_READY
+#undef ISOGI_TRACE__DEPTH
 #undef ISOGI_TRACE__FILTER_WIDTH
 #undef ISOGI_TRACE__FILTER
 #undef ISOGI_TRACE__LIGHT_FIRST

@@ -112,6 +112,32 @@ TEST(closed_glowing_cavity_follows_its_closed_form) {
     scene_free(&s);
 }
 
+/* The report still knows of the probes when they are gone, with the groups of texels that they were made for. */
+TEST(probes_are_counted) {
+    double q[1] = {0.35};
+    scene s = scene_make(24, 24, 24, NULL, gyroid, q);
+    for (int lazy = 0; lazy < 2; lazy++) {
+        isogi_trace_desc d = feedback(&s, 0.5f, 2, 4);
+        isogi_trace *t = NULL;
+        double remaining = 1;
+        uint64_t most = 0;
+        float points[50][3];
+        int n = surface_points(&s, 0, 50, 3, points);
+        d.lazy = lazy;
+        if (isogi_trace_create(&t, &d, NULL) != ISOGI_OK) abort();
+        isogi_trace_request(t, (const float(*)[3])points, (size_t)n);
+        while (remaining > 0 && isogi_trace_step(t, 3000, &remaining) == ISOGI_OK) {
+            isogi_trace_report report;
+            isogi_trace_status(t, &report);
+            CHECK(report.probes >= most, "lazy %d: %d probes after %d", lazy, (int)report.probes, (int)most);
+            most = report.probes;
+        }
+        CHECK(most > 100, "lazy %d: %d probes", lazy, (int)most);
+        isogi_trace_free(t);
+    }
+    scene_free(&s);
+}
+
 /* Albedo 1 in a closed cavity with a light inside: true light is infinite. It ends, and says so; an open one is not accused. */
 TEST(endless_light_is_reported) {
     double q[5] = {15.5, 15.5, 15.5, 8, 13}, open[5] = {16, 15, 16, 22.3, 12};

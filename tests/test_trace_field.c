@@ -252,6 +252,26 @@ static void nonsense(void *user, const isogi_ray *rays, size_t count, isogi_trac
     }
 }
 
+static void empty(void *user, const isogi_ray *rays, size_t count, isogi_trace_surface *surfaces) { (void)user, (void)rays, (void)count, (void)surfaces; }
+/* One rule for errors: a ball that sees nothing but one sky has the same error from its voxels and as a field, and none is certain. */
+TEST(errors_where_all_samples_agree) {
+    double q[4] = {15.5, 15.5, 15.5, 9};
+    float point[2][3] = {{24.5f, 15.5f, 15.5f}, {15.5f, 24.5f, 15.5f}}, normal[2][3] = {{1, 0, 0}, {0, 1, 0}}, e[2][3], error[2][2];
+    isogi_light sun = light_make(ISOGI_LIGHT_DIRECTIONAL, 1, 1, 0, 0.5, 0);
+    scene s = scene_make(32, 32, 32, NULL, ball, q);
+    for (int samples = 4; samples < 1000; samples *= 8)
+        for (int lights = 0; lights < 2; lights++) {
+            isogi_trace_desc d = desc_make(&s, 0.5f, 2, samples);
+            d.lighting.lights = &sun, d.lighting.light_count = (size_t)lights;
+            isogi_trace_gather(&d, (const float(*)[3])point, NULL, 2, e, error[0], NULL);
+            isogi_trace_gather_field(&d, empty, NULL, (const float(*)[3])point, (const float(*)[3])normal, 2, e, error[1], NULL);
+            for (int i = 0; i < 2; i++)
+                CHECK(error[1][i] > 0.3f / (float)samples && fabs((double)error[1][i] / (double)error[0][i] - 1) < (lights ? 0.3 : 0.01), "%d samples: %g, of voxels %g",
+                      samples, (double)error[1][i], (double)error[0][i]);
+        }
+    scene_free(&s);
+}
+
 TEST(nonsense_is_survived_and_bad_arguments_refused) {
     test_random r = {5};
     isogi_trace_desc d = {.lighting.env = {.sh = white_sky, .sh_order = 1}, .samples = 16, .bounces = 5, .albedo = {0.5f, 0.5f, 0.5f}};

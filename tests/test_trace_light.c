@@ -240,6 +240,39 @@ TEST(high_side_is_the_low_side_of_the_negated_field) {
     scene_free(&s), scene_free(&t);
 }
 
+/* Within matter that is closed nobody sees the sky: at no texel of a noisy ball, whose voxels are full of maxima with nothing behind them,
+   and of capped volumes, whatever way their values fall at the border. Hardly a texel with matter behind it is left out. */
+static double noisy_ball(const double p[3], const double *q) {
+    double r = length3(p[0] - q[0], p[1] - q[1], p[2] - q[2]);
+    return r > q[3] ? 0 : 200 - 10 * r + 8 * roughness(p);
+}
+static double from_beyond(const double p[3], const double *q) { return 100 - length3(p[0] - q[0], p[1] - q[1], p[2] - 1.3 * q[3]); }
+TEST(high_side_of_closed_matter_is_dark) {
+    double q[4] = {9.6, 9.3, 9.5, 8.4}, waves[1] = {0.37}, below[4] = {7.7, 7.3, 0, 15};
+    field *f[3] = {noisy_ball, gyroid, from_beyond};
+    const double *parameter[3] = {q, waves, below};
+    for (int k = 0; k < 3; k++) {
+        int n = k ? 16 : 20, valid = 0, bright = 0, plain = 0;
+        scene s = scene_make(n, n, n, NULL, f[k], parameter[k]);
+        isogi_trace_desc d = desc_make(&s, 0.5f, 1, 8);
+        isogi_trace *t = NULL, *low = NULL;
+        d.capped = k > 0;
+        if (isogi_trace_create(&low, &d, NULL) != ISOGI_OK) abort();
+        d.sides = ISOGI_TRACE_HIGH_SIDE;
+        CHECK(isogi_trace_create(&t, &d, NULL) == ISOGI_OK && isogi_trace_step(t, 0, NULL) == ISOGI_OK, "field %d", k);
+        for (int i = 0; i < n * n * n; i++) {
+            size_t at[3] = {(size_t)(i % n), (size_t)(i / n % n), (size_t)(i / n / n)};
+            float point[1][3] = {{(float)at[0], (float)at[1], (float)at[2]}}, e[1][3] = {{1, 1, 1}};
+            plain += isogi_trace_valid(low, at);
+            if (!isogi_trace_valid(t, at)) continue;
+            isogi_trace_sample(t, (const float(*)[3])point, 1, e, NULL);
+            valid++, bright += e[0][1] > 1e-6f;
+        }
+        CHECK(!bright && valid > (k == 1 ? 7 : 9) * plain / 10, "field %d: %d of %d texels see the sky; %d on the low side", k, bright, valid, plain);
+        isogi_trace_free(t), isogi_trace_free(low), scene_free(&s);
+    }
+}
+
 /* BOTH_SIDES bakes what LOW and HIGH bake alone, bit by bit, full and lazy, and reports its progress once from 0 to 1. */
 static int rising(void *user, double fraction) {
     double *last = (double *)user;

@@ -138,4 +138,27 @@ TEST(normals_and_offset) {
     scene_free(&s);
 }
 
+/* Coarse texels and fine ones are one bake: its progress rises once from 0 to 1. */
+static int goes_on(void *user, double fraction) {
+    double *last = (double *)user;
+    if (fraction < last[0] || fraction > 1) last[1]++;
+    last[0] = fraction;
+    return 0;
+}
+TEST(progress_of_a_hierarchy_rises) {
+    double q[1] = {0.4};
+    scene s = scene_make(16, 16, 16, NULL, gyroid, q);
+    for (int k = 0; k < 4; k++) {
+        double last[2] = {0, 0};
+        isogi_context context = {.progress = goes_on, .user = last, .threads = 1};
+        isogi_trace_desc d = desc_make(&s, 0.5f, 1, 8);
+        isogi_trace *t = NULL;
+        d.hierarchy = 0.2f, d.method = k & 1 ? ISOGI_TRACE_FEEDBACK : ISOGI_TRACE_PATHS, d.sides = k & 2 ? ISOGI_TRACE_BOTH_SIDES : ISOGI_TRACE_LOW_SIDE;
+        CHECK(isogi_trace_create(&t, &d, &context) == ISOGI_OK && isogi_trace_step(t, 0, NULL) == ISOGI_OK, "case %d", k);
+        CHECK(last[0] > 0.9 && !(last[1] > 0), "case %d: progress fell %g times, ends at %g", k, last[1], last[0]);
+        isogi_trace_free(t);
+    }
+    scene_free(&s);
+}
+
 TEST_MAIN("trace_quality")

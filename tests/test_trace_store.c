@@ -237,6 +237,40 @@ TEST(export_holds_the_texels) {
     scene_free(&s);
 }
 
+/* What lookups read is exported as well: drafts, and light from before a change that is yet to be computed anew. */
+TEST(export_holds_drafts) {
+    double q[2] = {0.4, 6};
+    scene s = scene_make(16, 15, 14, NULL, gyroid_in_air, q);
+    for (int lazy = 0; lazy < 2; lazy++) {
+        isogi_trace_desc d = store_desc(&s, ISOGI_TRACE_IRRADIANCE, ISOGI_TRACE_FLOAT, 64);
+        isogi_trace *t = NULL;
+        isogi_trace_report report;
+        float points[100][3], scales[3], values[3], e[1][3];
+        uint8_t *bytes;
+        int n = surface_points(&s, 0, 100, 4, points), seen = 0;
+        d.method = ISOGI_TRACE_FEEDBACK, d.lazy = lazy;
+        if (isogi_trace_create(&t, &d, NULL) != ISOGI_OK) abort();
+        isogi_trace_request(t, (const float(*)[3])points, (size_t)n);
+        isogi_trace_step(t, lazy ? 500 : 0, NULL);
+        d.albedo[0] = d.albedo[1] = d.albedo[2] = 0.2f;
+        if (!lazy) CHECK(isogi_trace_change(t, &d) == ISOGI_OK, "change of albedo, lazy %d", lazy);
+        isogi_trace_status(t, &report);
+        CHECK(export_now(t, ISOGI_TRACE_FLOAT, &bytes, scales) == ISOGI_OK, "lazy %d", lazy);
+        for (size_t texel = 0; texel < 16 * 15 * 14; texel++) {
+            size_t at[3] = {texel % 16, texel / 16 % 15, texel / 240};
+            float point[1][3] = {{(float)at[0], (float)at[1], (float)at[2]}}, error;
+            if (!isogi_trace_valid(t, at)) continue;
+            isogi_trace_sample(t, (const float(*)[3])point, 1, e, &error);
+            if (!test_finite((double)error)) continue;
+            exported(t, ISOGI_TRACE_FLOAT, bytes, scales, texel, values);
+            seen += memcmp(values, e[0], sizeof values) == 0; /* other texels are not what a lookup finds in their place */
+        }
+        CHECK(report.drafts > 50 && seen >= (int)report.texels, "lazy %d: %d texels hold what is read there, of %d, %d drafts", lazy, seen, (int)report.texels, (int)report.drafts);
+        free(bytes), isogi_trace_free(t);
+    }
+    scene_free(&s);
+}
+
 /* Plain trilinear interpolation of the dense array next to surfaces, as hardware does it, against the library's lookup, which leaves
    invalid texels out. Left as zeros, invalid texels darken their neighbourhood by half and more: those are the seams. */
 TEST(exported_texture_has_no_seams) {
