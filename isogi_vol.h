@@ -298,7 +298,12 @@ ISOGI_API isogi_result isogi_vol_prefilter(const isogi_volume *volume, float *co
 
 /* ---- rays ---------------------------------------------------------------------------------------------------------------- */
 
-enum { ISOGI_RAY_CAPPED = 1 }; /* flag: outside of the volume's box counts as outside of the surface, so the border closes it */
+enum {
+    ISOGI_RAY_CAPPED = 1, /* flag: outside of the volume's box counts as outside of the surface, so the border closes it, but for cells that are
+                             not finite: no ray hits their border */
+    ISOGI_RAY_ONWARD = 2  /* of isogi_vol_continue: every ray goes on in the direction in which it met its start, so that start.side tells
+                             on which side of the surface it is now */
+};
 
 /* Inside is f >= isovalue. Points are origin + t * dir, t in [tmin, tmax], world units if dir is a unit vector (any length is
    fine). A hit is the smallest t at which inside changes; what the ray finds where it begins, or where it enters the box, is
@@ -328,8 +333,10 @@ ISOGI_API isogi_result isogi_vol_intersect(const isogi_pyramid *pyramid, const i
 ISOGI_API isogi_result isogi_vol_occluded(const isogi_pyramid *pyramid, const isogi_ray *rays, size_t count, uint8_t *occluded,
                                           isogi_counters *counters);
 /* Rays that leave from hits, or from any other place given as cell + local that lies ON the surface of this isovalue (its t is
-   not read; of its side, only whether it is a cap). The root they start from is divided out of the cell's cubic: no epsilon, no self-hit, no leak. t of the new
-   hit counts from the start. Where the surface has no thickness (a single layer of voxels that equal the isovalue) a ray touches
+   not read; of its side, only whether it is a cap, unless with ISOGI_RAY_ONWARD). The root they start from is divided out of the cell's
+   cubic: no epsilon, no self-hit, no leak. A start may be 1e-9 cell off the surface. So where the surface comes back within as much,
+   through the face of a cell that lies between, it is not told from the start, but for rays that go onward: they miss no crossing,
+   however close it follows. t of the new hit counts from the start. Where the surface has no thickness (a single layer of voxels that equal the isovalue) a ray touches
    it in one point: that is a hit with side +1, and the ray goes on outside. tmax[count], or NULL = unlimited. flags as in isogi_ray. hits may be starts. */
 ISOGI_API isogi_result isogi_vol_continue(const isogi_pyramid *pyramid, const isogi_hit *starts, const float (*dirs)[3],
                                           const double *tmax, double isovalue, uint32_t flags, size_t count, isogi_hit *hits,
@@ -337,7 +344,7 @@ ISOGI_API isogi_result isogi_vol_continue(const isogi_pyramid *pyramid, const is
 
 /* Every hit of each ray, in order: those of ray i are hits[i * capacity + n], n < counts[i]. counts[i] = capacity + 1 where there are
    more than fit; hits[i * capacity + capacity - 1] with isogi_vol_continue leads to them. The same as isogi_vol_intersect and then
-   isogi_vol_continue along the ray until it misses, with t from the ray's own origin throughout. hits may be NULL if capacity is 0.
+   isogi_vol_continue, with ISOGI_RAY_ONWARD, along the ray until it misses, with t from the ray's own origin throughout. hits may be NULL if capacity is 0.
    Sides alternate, but for touched layers without thickness, which leave the ray outside, and for cells that are not finite, after
    which the side is not known. ISOGI_TOO_LARGE if count * capacity hits cannot be addressed. */
 ISOGI_API isogi_result isogi_vol_intersect_all(const isogi_pyramid *pyramid, const isogi_ray *rays, size_t count, size_t capacity,
@@ -429,6 +436,7 @@ ISOGI_API void isogi_vol_mesh_free(const isogi_pyramid *pyramid, isogi_mesh *mes
 #endif
 #endif
 
+#define ISOGI_VOL__ON_SURFACE 1e-9 /* cell: how far off the surface a start may be */
 #define ISOGI_VOL__ROUNDING (1.0 / 562949953421312) /* 2^-49, 16 roundings: of places along rays, relative to the way there */
 #define ISOGI_VOL__UNLIMITED 1e300 /* stands for infinity, which -ffast-math does not promise to keep */
 #define ISOGI_VOL__LEVELS 3
@@ -3073,17 +3081,26 @@ static int isogi_vol__uniform_block(isogi_vol__walk *w, int top, int low[3], int
 
 /* A cell in which the ray leaves the surface that it starts from; 1 and the root if it comes back to it in the same cell. Still on
    the surface at the exit, because the start lies within rounding of it, or because the ray runs along the surface: the next cell
-   divides the root out. */
+   divides the root out. A ray that goes on as it came knows its side: where the field has another one, the ray has crossed the surface
+   again, too near to the start to be told from it; only a layer without thickness, where the field is 0, changes the side in silence. */
 static int isogi_vol__leave_surface(isogi_vol__walk *w, const isogi_vol__cubic *cubic, const double corner[8], const double from[3],
                                     const double to[3], int axis, double *root) {
     const double length = isogi_vol__largest(to[0] - from[0], to[1] - from[1], to[2] - from[2]);
     const double reach = isogi_vol__largest(cubic->b[1] - cubic->b[0], cubic->b[2] - cubic->b[0], cubic->b[3] - cubic->b[0]);
+    const int before = w->inside;
     double steepest = 0;
-    int i;
+    int i, found, layer, on_face = 0;
     for (i = 0; i < 8; i++) steepest = isogi_vol__max(steepest, fabs(corner[i]));
-    if (axis >= 0 && (length < 1e-9 || reach < 1e-12 * steepest)) return 0;
+    if (axis >= 0 && (length < ISOGI_VOL__ON_SURFACE || reach < 1e-12 * steepest)) return 0;
     w->deflate = 0;
-    return isogi_vol__cubic_deflated(cubic, &w->inside, root);
+    found = isogi_vol__cubic_deflated(cubic, &w->inside, root);
+    for (i = 0; i < 3; i++) on_face |= !(from[i] > 0) || !(from[i] < 1);
+    layer = before && !w->inside && on_face && !(w->t > 0) && !(cubic->b[0] > 0 || cubic->b[0] < 0);
+    if (before < 0 || before == w->inside || layer) return found;
+    w->inside = before;
+    if ((cubic->b[0] >= 0) == before) return isogi_vol__cubic_first(cubic, before, w->exact, root);
+    *root = 0;
+    return 1;
 }
 
 static int isogi_vol__visit_field(isogi_vol__walk *w, double t_out, isogi_hit *hit); /* see "fields given by a function" */
@@ -3124,17 +3141,33 @@ static int isogi_vol__visit_cell(isogi_vol__walk *w, double t_out, int axis, iso
     return 1;
 }
 
+/* Whether the present cell has a cap, hence a field: blocks on one side may hide cells that are not finite. */
+static int isogi_vol__has_cap(const isogi_vol__walk *w, const double local[3]) {
+    double corner[8], grid[3], gradient[3];
+    int a;
+    if (!w->pyramid->field.value) return w->pyramid->all_finite || isogi_vol__corners(w->pyramid, w->cell, 0, corner);
+    for (a = 0; a < 3; a++) grid[a] = w->cell[a] + local[a];
+    return isogi_vol__finite64(isogi_vol__field_at(w->pyramid, grid, gradient));
+}
+
 /* Where the ray leaves a capped volume while inside. */
-static void isogi_vol__cap_exit(isogi_vol__walk *w, isogi_hit *hit) {
+static int isogi_vol__cap_exit(isogi_vol__walk *w, isogi_hit *hit) {
     double local[3];
     int a;
     for (a = 0; a < 3; a++) w->cell[a] = isogi_vol__cell(w->origin[a] + w->end * w->dir[a], w->pyramid->volume.size[a], &local[a]);
+    if (!isogi_vol__has_cap(w, local)) return 0;
     isogi_vol__emit(w, w->end, local, -2, hit);
+    return 1;
 }
 
 /* Walks to the first hit; 0 if there is none. */
 static int isogi_vol__walk_on(isogi_vol__walk *w, uint32_t flags, isogi_hit *hit) {
     int top = ISOGI_VOL__LEVELS - 1, low[3], high[3], axis, inside, a;
+    double local[3];
+    if (w->cap == 2) {
+        isogi_vol__local(w, 0, local);
+        if (!isogi_vol__has_cap(w, local)) w->inside = -1, w->cap = 1;
+    }
     for (;;) {
         int before[3], changed = 0;
         double t;
@@ -3159,9 +3192,7 @@ static int isogi_vol__walk_on(isogi_vol__walk *w, uint32_t flags, isogi_hit *hit
         for (a = 0; a < 3; a++) changed |= before[a] ^ w->cell[a];
         top = changed >= 64 ? 2 : changed >= 16 ? 1 : changed >= 4 ? 0 : -1;
     }
-    if (!(flags & ISOGI_RAY_CAPPED) || !w->end_is_border || w->inside != 1) return 0;
-    isogi_vol__cap_exit(w, hit);
-    return 1;
+    return flags & ISOGI_RAY_CAPPED && w->end_is_border && w->inside == 1 && isogi_vol__cap_exit(w, hit);
 }
 
 /* ==== leaves ========================================================================================================= */
@@ -3619,6 +3650,7 @@ static int isogi_vol__begin_start(const isogi_vol__batch *b, size_t i, isogi_vol
     int a;
     /* the cap of a border lies where the field is not at the isovalue: nothing to divide out */
     w->deflate = start->side != 2 && start->side != -2;
+    if (b->flags & ISOGI_RAY_ONWARD && start->side) w->inside = start->side > 0;
     w->isovalue = b->isovalue;
     for (a = 0; a < 3; a++) {
         if (start->cell[a] >= (uint32_t)b->pyramid->cells[a] || !isogi_vol__finite64(start->local[a])) return 0;
@@ -3626,8 +3658,8 @@ static int isogi_vol__begin_start(const isogi_vol__batch *b, size_t i, isogi_vol
     }
     if (isogi_vol__is_nan(b->isovalue) || isogi_vol__is_nan(tmax) || !(tmax >= 0) || !isogi_vol__aim(w, b->dirs[i], 0, tmax)) return 0;
     w->entry_axis = -1;
-    /* a cap that is left outwards */
-    return w->deflate || !(w->end * isogi_vol__largest(w->dir[0], w->dir[1], w->dir[2]) < 1e-9);
+    /* not a cap that is left outwards */
+    return w->deflate || w->inside > 0 || (w->inside < 0 && !(w->end * isogi_vol__largest(w->dir[0], w->dir[1], w->dir[2]) < ISOGI_VOL__ON_SURFACE));
 }
 
 /* Sets a walk up; 0: there is nothing to walk. */
@@ -3895,7 +3927,7 @@ typedef struct __attribute__((aligned(64))) isogi_vol__pool {
     int64_t low[ISOGI_VOL__POOL], beyond[ISOGI_VOL__POOL]; /* what the isovalue can be in 8 bits: low .. beyond - 1 */
     double level_units[ISOGI_VOL__POOL]; /* and unrounded */
     double step[ISOGI_VOL__POOL];       /* the isovalue in steps of the leaf, for voxels of code + 0.5 */
-    int64_t side[ISOGI_VOL__POOL];      /* 1 inside, 0 outside, -1 not known, -2 leaving a surface, only to be looked at in double */
+    int64_t side[ISOGI_VOL__POOL];      /* 1 inside, 0 outside, -1 not known; of these 2 side - 4 while leaving a surface: only to be looked at in double */
     double base[ISOGI_VOL__POOL], stop[ISOGI_VOL__POOL], isovalue[ISOGI_VOL__POOL], deflated[ISOGI_VOL__POOL]; /* of the walk; stop: its end */
     uint64_t ray[ISOGI_VOL__POOL];
     int64_t entry_axis[ISOGI_VOL__POOL];
@@ -4276,7 +4308,7 @@ static int isogi_vol__seat(isogi_vol__pool *s, int i, const isogi_vol__walk *w) 
     s->flip[i] = flip, s->low[i] = low, s->beyond[i] = high + 1;
     s->level[i] = p->node_levels - 1, s->pending[i] = 0, s->cell[i] = 0;
     s->address[i] = (uint64_t)(uintptr_t)p->nodes[p->node_level[p->node_levels - 1].first];
-    s->side[i] = w->deflate ? -2 : w->inside;
+    s->side[i] = w->deflate ? 2 * w->inside - 4 : w->inside;
     s->base[i] = w->base, s->stop[i] = end, s->isovalue[i] = w->isovalue, s->deflated[i] = w->deflated, s->entry_axis[i] = w->entry_axis;
     return 1;
 }
@@ -4290,13 +4322,13 @@ ISOGI_VOL__TARGET("avx2") static int isogi_vol__decide(isogi_vol__batch *b, isog
     for (a = 0; a < 3; a++) w.origin[a] = s->origin[a][i], w.dir[a] = s->dir[a][i], w.inverse[a] = s->inverse[a][i];
     w.origin[3] = w.dir[3] = w.inverse[3] = 0;
     w.pyramid = b->pyramid, w.base = s->base[i], w.t = 0, w.end = s->stop[i], w.isovalue = s->isovalue[i];
-    w.deflate = s->side[i] == -2, w.inside = w.deflate ? -1 : (int)s->side[i], w.deflated = s->deflated[i];
+    w.deflate = s->side[i] < -1, w.inside = w.deflate ? (int)s->side[i] / 2 + 2 : (int)s->side[i], w.deflated = s->deflated[i];
     w.exact = b->hits != NULL, w.cap = 1, w.end_is_border = 0;
     w.count.cubics = w.count.cells = 0;
     found = isogi_vol__mixed_cell_avx2(&w, (int)(cell & 0xffff), (int)(cell >> 16 & 0xffff), (int)(cell >> 32 & 0xffff), in == 3 ? (int)s->entry_axis[i] : in,
                                        out == 3 ? -1 : out, hit);
     b->work.cubics += w.count.cubics;
-    s->side[i] = w.deflate ? -2 : w.inside, s->deflated[i] = w.deflated;
+    s->side[i] = w.deflate ? 2 * w.inside - 4 : w.inside, s->deflated[i] = w.deflated;
     return found;
 }
 
@@ -4395,7 +4427,7 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE __mmask8 isogi_vol__left8(const __m512d b[4]
     const __m512d half = ISOGI_VOL__ADD(c1, ISOGI_VOL__MUL(_mm512_set1_pd(0.5), c2)), sum = ISOGI_VOL__ADD(ISOGI_VOL__ADD(c1, c2), c3);
     const __m512d length = _mm512_max_pd(_mm512_max_pd(_mm512_abs_pd(ISOGI_VOL__SUB(to[0], from[0])), _mm512_abs_pd(ISOGI_VOL__SUB(to[1], from[1]))), _mm512_abs_pd(ISOGI_VOL__SUB(to[2], from[2])));
     const __m512d reach = _mm512_max_pd(_mm512_max_pd(_mm512_abs_pd(ISOGI_VOL__SUB(b[1], b[0])), _mm512_abs_pd(ISOGI_VOL__SUB(b[2], b[0]))), _mm512_abs_pd(ISOGI_VOL__SUB(b[3], b[0])));
-    const __mmask8 stays = (__mmask8)(passes & (_mm512_cmp_pd_mask(length, _mm512_set1_pd(1e-9), _CMP_LT_OQ) |
+    const __mmask8 stays = (__mmask8)(passes & (_mm512_cmp_pd_mask(length, _mm512_set1_pd(ISOGI_VOL__ON_SURFACE), _CMP_LT_OQ) |
                                                 _mm512_cmp_pd_mask(reach, ISOGI_VOL__MUL(_mm512_set1_pd(1e-12), steepest), _CMP_LT_OQ)));
     const __mmask8 rises = _mm512_mask_cmp_pd_mask(_mm512_mask_cmp_pd_mask(_mm512_cmp_pd_mask(c1, zero, _CMP_GT_OQ), half, zero, _CMP_GT_OQ), sum, zero, _CMP_GT_OQ);
     const __mmask8 falls = _mm512_mask_cmp_pd_mask(_mm512_mask_cmp_pd_mask(_mm512_cmp_pd_mask(c1, zero, _CMP_LT_OQ), half, zero, _CMP_LT_OQ), sum, zero, _CMP_LT_OQ);
@@ -4415,7 +4447,7 @@ ISOGI_VOL__AVX512 static unsigned isogi_vol__decide8(isogi_vol__batch *b, isogi_
     const __m512d zero = _mm512_setzero_pd(), one = _mm512_set1_pd(1), stop = ISOGI_VOL__TAKE_REAL(stop);
     /* rays that leave a surface, which most do without coming back to it in the same cell; a ray's first cell behind a border of the
        volume, and a second one next to the surface, are matters for themselves */
-    const __mmask8 first = _mm512_cmpeq_epi64_mask(in, three), starts = _mm512_cmpeq_epi64_mask(side, _mm512_set1_epi64(-2)), leaving = (__mmask8)(starts & first & lanes);
+    const __mmask8 first = _mm512_cmpeq_epi64_mask(in, three), starts = _mm512_cmplt_epi64_mask(side, _mm512_set1_epi64(-1)), leaving = (__mmask8)(starts & first & lanes);
     __mmask8 odd = (__mmask8)((starts & ~first) | _mm512_mask_cmpge_epi64_mask(first, ISOGI_VOL__TAKE(entry_axis), _mm512_setzero_si512())), low, high, b_low, b_high, inside, same, cross;
     __mmask8 left = 0, slow;
     __m512d c[8], from[3], to[3], bezier[4], begin = zero, end = stop, root, steepest = zero;
@@ -4489,6 +4521,8 @@ ISOGI_VOL__AVX512 static unsigned isogi_vol__decide8(isogi_vol__batch *b, isogi_
         odd = (__mmask8)(odd | ~plain | (known & (inside ^ _mm512_test_epi64_mask(side, side))));
         if (leaving) {
             left = (__mmask8)(isogi_vol__left8(bezier, from, to, steepest, _mm512_cmpneq_epi64_mask(out, three), &inside, leaving) & ~odd);
+            /* and not those that go onward and would have changed sides */
+            left = (__mmask8)(left & ~(_mm512_mask_cmpeq_epi64_mask(inside, side, _mm512_set1_epi64(-4)) | _mm512_mask_cmpeq_epi64_mask((__mmask8)~inside, side, _mm512_set1_epi64(-2))));
             odd = (__mmask8)(odd | (leaving & ~left));
         }
         same = (__mmask8) ~((inside ^ b_low) | (inside ^ b_high) | (inside ^ last));
@@ -4541,7 +4575,7 @@ ISOGI_VOL__AVX512 static unsigned isogi_vol__seat8(isogi_vol__batch *b, isogi_vo
     const __m512i at = b->bundle ? none : _mm512_mullo_epi64(lane, _mm512_set1_epi64((int64_t)element)), dir_at = _mm512_mullo_epi64(lane, _mm512_set1_epi64((int64_t)dir_bytes));
     const __m512d zero = _mm512_setzero_pd(), unlimited = _mm512_set1_pd(ISOGI_VOL__UNLIMITED), finite = _mm512_set1_pd(DBL_MAX);
     __m512d origin[3], d[3], inverse[3], tmin, tmax, isovalue, enter, leave, stop, q;
-    __m512i axis = _mm512_set1_epi64(-1), flip = none;
+    __m512i axis = _mm512_set1_epi64(-1), flip = none, inside = axis;
     __mmask8 good = lanes, meets, rising[3], still[3];
     int a;
 #define ISOGI_VOL__TAKE(member) _mm512_mask_i64gather_pd(zero, lanes, at, from + (member), 1)
@@ -4562,8 +4596,12 @@ ISOGI_VOL__AVX512 static unsigned isogi_vol__seat8(isogi_vol__batch *b, isogi_vo
         tmin = ISOGI_VOL__TAKE(offsetof(isogi_ray, tmin)), tmax = ISOGI_VOL__TAKE(offsetof(isogi_ray, tmax)), isovalue = ISOGI_VOL__TAKE(offsetof(isogi_ray, isovalue));
         good = _mm256_mask_testn_epi32_mask(good, _mm512_mask_i64gather_epi32(_mm256_setzero_si256(), lanes, at, from + offsetof(isogi_ray, flags), 1), _mm256_set1_epi32(-1));
     } else {
-        const __m256i side = _mm256_abs_epi32(_mm512_mask_i64gather_epi32(_mm256_setzero_si256(), lanes, at, from + offsetof(isogi_hit, side), 1));
-        good = b->flags ? 0 : _mm256_mask_cmpneq_epi32_mask(good, side, _mm256_set1_epi32(2));
+        const __m256i side = _mm512_mask_i64gather_epi32(_mm256_setzero_si256(), lanes, at, from + offsetof(isogi_hit, side), 1);
+        good = b->flags & ISOGI_RAY_CAPPED ? 0 : _mm256_mask_cmpneq_epi32_mask(good, _mm256_abs_epi32(side), _mm256_set1_epi32(2));
+        if (b->flags & ISOGI_RAY_ONWARD)
+            inside = _mm512_mask_set1_epi64(_mm512_mask_set1_epi64(inside, _mm256_cmpgt_epi32_mask(side, _mm256_setzero_si256()), 1),
+                                            _mm256_cmplt_epi32_mask(side, _mm256_setzero_si256()), 0);
+        inside = _mm512_sub_epi64(_mm512_add_epi64(inside, inside), _mm512_set1_epi64(4));
 #pragma GCC unroll 8
         for (a = 0; a < 3; a++) {
             const __m256i cell = _mm512_mask_i64gather_epi32(_mm256_setzero_si256(), lanes, at, from + offsetof(isogi_hit, cell) + 4 * (size_t)a, 1);
@@ -4658,7 +4696,7 @@ ISOGI_VOL__AVX512 static unsigned isogi_vol__seat8(isogi_vol__batch *b, isogi_vo
     ISOGI_VOL__PUT(cell, none);
     ISOGI_VOL__PUT(level, _mm512_set1_epi64(p->node_levels - 1));
     ISOGI_VOL__PUT(address, _mm512_set1_epi64((int64_t)(uintptr_t)p->nodes[p->node_level[p->node_levels - 1].first]));
-    ISOGI_VOL__PUT(side, _mm512_set1_epi64(b->rays ? -1 : -2));
+    ISOGI_VOL__PUT(side, inside);
     ISOGI_VOL__PUT(entry_axis, b->rays ? axis : _mm512_set1_epi64(-1));
     ISOGI_VOL__PUT_REAL(base, enter);
     ISOGI_VOL__PUT_REAL(stop, stop);
@@ -4931,15 +4969,19 @@ ISOGI_VOL__AVX512 static int isogi_vol__walk_one(isogi_vol__walk *w, isogi_hit *
 
 /* ==== rays =========================================================================================================== */
 
-/* Fast rays look only at cells that may hold the surface. So a capped ray asks first whether it enters the box inside. */
+/* Fast rays look only at cells that may hold the surface. So a capped ray asks first whether it enters the box inside, by the arithmetic
+   of visit_cell: what it says must not be taken back by a cell. */
 static int isogi_vol__enters_inside(isogi_vol__walk *w, isogi_hit *hit) {
-    double local[3];
+    double corner[8], local[3];
+    isogi_vol__cubic cubic;
     if (w->cap != 2) return 0;
     w->cap = 1;
-    if (!isogi_vol__inside_at(w, 0)) return 0;
     isogi_vol__first_cell(w);
     isogi_vol__local(w, 0, local);
     if (w->entry_axis >= 0) local[w->entry_axis] = w->dir[w->entry_axis] > 0 ? 0 : 1;
+    isogi_vol__corners(w->pyramid, w->cell, w->isovalue, corner);
+    isogi_vol__cubic_set(&cubic, corner, local, local);
+    if (!(cubic.b[0] >= 0)) return 0;
     isogi_vol__emit(w, 0, local, 2, hit);
     return 1;
 }
@@ -4948,9 +4990,7 @@ static int isogi_vol__enters_inside(isogi_vol__walk *w, isogi_hit *hit) {
 static int isogi_vol__leaves_inside(isogi_vol__walk *w, uint32_t flags, isogi_hit *hit) {
     if (!(flags & ISOGI_RAY_CAPPED) || !w->end_is_border) return 0;
     if (w->inside < 0 && !w->deflate) w->inside = isogi_vol__inside_at(w, w->end);
-    if (w->inside != 1) return 0;
-    isogi_vol__cap_exit(w, hit);
-    return 1;
+    return w->inside == 1 && isogi_vol__cap_exit(w, hit);
 }
 
 /* Walks a ray that is set up: fast where that is right, else plainly. */
@@ -5428,7 +5468,7 @@ static int isogi_vol__seat_odd(isogi_vol__batch *b, isogi_vol__pool *s, size_t i
     isogi_hit any, *hit = b->hits ? &b->hits[i] : &any;
     const uint32_t flags = isogi_vol__flags(b, i);
     if (!isogi_vol__begin(b, i, &w)) isogi_vol__finish(b, i, &w, 0);
-    else if (flags || !isogi_vol__seat(s, slot, &w)) isogi_vol__finish(b, i, &w, isogi_vol__walk_ray(&w, flags, hit));
+    else if (flags & ISOGI_RAY_CAPPED || !isogi_vol__seat(s, slot, &w)) isogi_vol__finish(b, i, &w, isogi_vol__walk_ray(&w, flags, hit));
     else {
         s->ray[slot] = i;
         return 1;
@@ -5662,7 +5702,7 @@ static void isogi_vol__follow_on(const isogi_pyramid *pyramid, isogi_vol__follow
             const isogi_ray *other = &rays[f->ray[end]];
             if (other->isovalue < ray->isovalue || other->isovalue > ray->isovalue || other->flags != ray->flags) break;
         }
-        isogi_vol_continue(pyramid, f->start + first, (const float(*)[3])f->dir + first, f->tmax + first, ray->isovalue, ray->flags, end - first,
+        isogi_vol_continue(pyramid, f->start + first, (const float(*)[3])f->dir + first, f->tmax + first, ray->isovalue, ray->flags | ISOGI_RAY_ONWARD, end - first,
                            f->hit + first, counters);
     }
     for (i = 0; i < f->count; i++) f->hit[i].t += f->start[i].t;
@@ -5959,7 +5999,18 @@ static int isogi_vol__visit_field(isogi_vol__walk *w, double t_out, isogi_hit *h
         return 0;
     }
     if (w->deflate) {
-        if (!isogi_vol__leave_field(w, &at, t_out, m, least)) return 0;
+        const int before = w->inside;
+        next = at;
+        if (!isogi_vol__leave_field(w, &at, t_out, m, least)) {
+            if (before >= 0 && w->inside >= 0) w->inside = before;
+            return 0;
+        }
+        if (before == !w->inside) { /* goes on as it came, and has crossed the surface again right behind the start */
+            const double t = (next.value >= 0) == before ? isogi_vol__field_root(w, &next, &at, before) : next.t;
+            isogi_vol__local(w, t, from);
+            isogi_vol__emit(w, t, from, before ? -1 : 1, hit);
+            return 1;
+        }
     } else if (isogi_vol__state(w, at.value >= 0, hit)) return 1;
     while (at.t < t_out) {
         double step = isogi_vol__safe_step(&at, w->inside, m);
@@ -7172,6 +7223,7 @@ ISOGI_API void isogi_vol_mesh_free(const isogi_pyramid *pyramid, isogi_mesh *mes
 #undef ISOGI_VOL__WALK_CELL
 #undef ISOGI_VOL__WALK_TOP
 #undef ISOGI_VOL__UNLIMITED
+#undef ISOGI_VOL__ON_SURFACE
 #undef ISOGI_VOL__ROUNDING
 #undef ISOGI_VOL__LOCK
 #undef ISOGI_VOL__UNLOCK

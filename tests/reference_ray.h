@@ -85,8 +85,8 @@ static int reference_segment(const reference_field *f, const real c[4], int insi
 }
 
 /* o, d in grid coordinates. */
-static reference_hit reference_intersect(const reference_field *f, const double origin[3], const double dir[3], double tmin, double tmax,
-                                         double isovalue) {
+__attribute__((unused)) static reference_hit reference_intersect(const reference_field *f, const double origin[3], const double dir[3],
+                                                                 double tmin, double tmax, double isovalue) {
     reference_hit hit = {0, 0, 1};
     real o[3], d[3], t0 = (real)tmin, t1 = tmax > 0 ? (real)tmax : 1e30L, t[4096];
     int near = 0, inside = -1;

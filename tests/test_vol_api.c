@@ -55,7 +55,8 @@ static size_t chain_of_hits(const isogi_pyramid *p, const isogi_ray *ray, isogi_
         double left = ray->tmax - next.t, t = next.t;
         hits[n++] = next;
         if (ray->tmax > 0 && !(left > 0)) break;
-        isogi_vol_continue(p, &hits[n - 1], (const float(*)[3])&ray->dir, ray->tmax > 0 ? &left : NULL, ray->isovalue, ray->flags, 1, &next, NULL);
+        isogi_vol_continue(p, &hits[n - 1], (const float(*)[3])&ray->dir, ray->tmax > 0 ? &left : NULL, ray->isovalue, ray->flags | ISOGI_RAY_ONWARD, 1, &next,
+                           NULL);
         next.t += t;
     }
     return n;
