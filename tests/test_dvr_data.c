@@ -373,7 +373,10 @@ TEST(scaling_each_axis_along_with_the_rays_changes_nothing) {
         double origin[3], dir[3], back[3];
         float at[3];
         isogi_view_ray(&view, 0, 0, origin, at);
-        for (int a = 0; a < 3; a++) dir[a] = (double)at[a];
+        for (int a = 0; a < 3; a++) {
+            const volatile float rounded = at[a]; /* gcc 12 at -O3 would drop the rounding */
+            dir[a] = (double)rounded;
+        }
         isogi_dvr__march m = {0};
         isogi_dvr__pixel_ray ray = {.dvr = dvr, .clear = 1};
         memcpy(back, origin, sizeof back);
