@@ -2951,8 +2951,8 @@ static void isogi_dvr__pass_crossing(isogi_dvr__crossings *c, size_t i) {
     memset(&hit, 0, sizeof hit);
     if (c->left) {
         c->left--;
-        isogi_vol_continue(c->dvr->desc.pyramid, &c->hit[i], (const float(*)[3])&c->dir, NULL, c->dvr->transfer.peaks[i].isovalue, 0, 1,
-                           &hit, &c->work);
+        isogi_vol_continue(c->dvr->desc.pyramid, &c->hit[i], (const float(*)[3])&c->dir, NULL, c->dvr->transfer.peaks[i].isovalue,
+                           ISOGI_RAY_ONWARD, 1, &hit, &c->work);
     }
     c->t[i] = hit.side && c->t[i] + hit.t <= c->end ? c->t[i] + hit.t : 1e300;
     c->hit[i] = hit;
