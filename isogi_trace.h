@@ -82,10 +82,11 @@
      that of the normal of desc.normals, its part below the trilinear surface mirrored up: no ray enters matter, and no energy is
      lost (a white surface under a white sky stays white). bounces = -1: Russian roulette from the third reflection on.
      So with ISOGI_TRACE_PATHS, the reference. By default (FEEDBACK) a path ends at its first hit and takes the light there from a
-     probe: a point of the surface near by, in cells of 2 voxels (of the smallest spacing, but half a voxel along every axis at least) or
-     an eighth of the ray's length, whose own hemisphere is gathered once in the same way; passes over the probes then bring all
-     reflections without rays. What cosine-distributed rays brought is averaged over neighbouring texels that face the same way, as far as
-     their noise could explain the difference. Probes cost accuracy: about 0.9 % of the mean and 1.8 % at a point in narrow channels of
+     probe: a point near by on the same isosurface or one that runs closely beside it (up to .15 voxels by the gradient), in cells of
+     2 voxels (of the smallest spacing, but half a voxel along every axis at least) or an eighth of the ray's length, whose own
+     hemisphere is gathered once in the same way; passes over the probes then bring all reflections without rays. What
+     cosine-distributed rays brought is averaged over neighbouring texels that face the same way, as far as their noise could explain
+     the difference. Probes cost accuracy: about 0.9 % of the mean and 1.8 % at a point in narrow channels of
      albedo 0.8 (test_trace_bake --long prints it). Lazy and adaptive bakes take samples in blocks of 4, 16, 64, ... and every other texel
      along each axis first: soon every lookup has a value.
      A hit from within (only through an open border can a ray get there) is a surface too, with its normal turned.
@@ -439,6 +440,8 @@ ISOGI_API size_t isogi_trace_memory(const isogi_trace *trace); /* bytes that the
 #define ISOGI_TRACE__CELL_RATIO 8   /* length of rays to size of cells, */
 #define ISOGI_TRACE__NEAR_RATIO 2   /* up to CELL_FAR */
 #define ISOGI_TRACE__PLANE 1.0      /* voxels between the planes of a hit and its probe */
+#define ISOGI_TRACE__ALIKE 0.15     /* voxels between the isosurfaces of a hit and its probe, by the gradient there */
+#define ISOGI_TRACE__CLASS 1.2      /* the same for isovalues that are looked for together, by the range of values around */
 #define ISOGI_TRACE__COLOURS 0.05   /* of albedo, or share of the glow, by which isosurfaces of the same probe may differ */
 #define ISOGI_TRACE__LIGHT_FIRST 4u /* samples of a texel with one of each light */
 
@@ -2742,15 +2745,17 @@ static isogi_result isogi_trace__bake_batch(isogi_trace *t, size_t count) {
 
 /* What is gathered at one point: a texel (brick set) or a probe. Sums are over samples, in units of irradiance / pi but for light. */
 typedef struct isogi_trace__node {
+    double isovalue; /* first what is read where a probe is looked for */
+    float alike;     /* probe: tells the light of isovalues that differ from its own by less than this */
+    float normal[3];
     isogi_hit place; /* where */
-    double isovalue;
     uint64_t key;    /* probe: of its cell */
     isogi_trace__brick *brick;
     size_t texel[3];
     uint32_t slot, samples, light_samples, hits;
     uint32_t readers; /* probe: hits that take their light from it, those that texels are still to make included */
     uint32_t wanted;  /* probe: samples, once its generation has begun */
-    float normal[3], albedo[3];
+    float albedo[3];
     signed char from;     /* side of the surface: 1 low, -1 high */
     signed char level;    /* blocks of samples that are complete */
     signed char finished; /* texel: no more samples are wanted */
@@ -2904,14 +2909,29 @@ static isogi_result isogi_trace__feedback_new(isogi_trace *t) {
 
 /* ---- the table of probes ---- */
 
+/* Isovalues that are many voxels apart have other keys, or there would be too many probes of one key: the number of such a class, out of
+   the range of values in a block about as large as the cell, at its middle. */
+static uint64_t isogi_trace__class(const isogi_trace__scene *scene, const double middle[3], double size, double isovalue) {
+    isogi_level level = isogi_vol_level(scene->pyramid, 0), coarser;
+    const float *range;
+    size_t block[3];
+    double width;
+    int a, n;
+    for (n = 1; level.cells < size && (coarser = isogi_vol_level(scene->pyramid, n)).cells; n++) level = coarser;
+    for (a = 0; a < 3; a++) block[a] = (size_t)isogi_trace__clamp(middle[a] / level.cells, (double)(level.size[a] - 1));
+    range = level.range[block[0] + level.size[0] * (block[1] + level.size[1] * block[2])];
+    width = ISOGI_TRACE__CLASS * ((double)range[1] - (double)range[0]) / level.cells;
+    return (uint64_t)isogi_trace__clamp(width > 0 ? (isovalue - (double)range[0]) / width : 0, 4e9);
+}
+
 /* Cells of 2 voxels, of 4 for rays longer than 16 voxels, and so on: an eighth of the length at most. Rays of probes, whose light
    matters less, take half of their length up to `cell` voxels; no more, or what stands beside a narrow gap would light it. In units of
    the smallest spacing, so that they are cubes in the world, but half a voxel along every axis at least: flat or long voxels would be
-   cut into very many. */
+   cut into very many. Isovalues are apart, see isogi_trace__alike. */
 static uint64_t isogi_trace__probe_key(const isogi_trace__scene *scene, const isogi_hit *hit, const float normal[3], double t,
-                                       double cell) {
+                                       double cell, double isovalue) {
     const double *spacing = scene->volume->spacing;
-    double least = spacing[0], size = ISOGI_TRACE__CELL;
+    double least = spacing[0], size = ISOGI_TRACE__CELL, middle[3];
     uint64_t key = 0;
     int a, axis = 0, level = 0;
     for (a = 1; a < 3; a++) {
@@ -2922,9 +2942,11 @@ static uint64_t isogi_trace__probe_key(const isogi_trace__scene *scene, const is
     for (; level < 8 && size * ISOGI_TRACE__CELL_RATIO < t / least; level++) size *= 2;
     for (a = 0; a < 3; a++) {
         double side = least * size, half = ISOGI_TRACE__HALF * spacing[a];
-        double x = (hit->cell[a] + hit->local[a]) * (spacing[a] / (side > half ? side : half)) + 1;
+        double along = (side > half ? side : half) / spacing[a], x = (hit->cell[a] + hit->local[a]) / along + 1;
         key = isogi_trace__key(key, (uint64_t)isogi_trace__clamp(x, 4e9));
+        middle[a] = (floor(x) - 0.5) * along;
     }
+    key = isogi_trace__key(key, isogi_trace__class(scene, middle, size, isovalue));
     return isogi_trace__key(key, (uint64_t)(16 * level + 2 * axis + (normal[axis] < 0))) | 1;
 }
 
@@ -2999,18 +3021,43 @@ static int isogi_trace__same_colours(const isogi_trace *t, const isogi_trace__ca
     return same;
 }
 
+/* How far isovalues may lie from that of a probe that tells their light: as much as the field changes in ALIKE voxels there. Where a
+   skin of some value shuts a hollow, isosurfaces next to each other are dark and bright. */
+static double isogi_trace__alike(const isogi_trace__scene *scene, const isogi_hit *hit) {
+    const double *spacing = scene->volume->spacing, *x = hit->local;
+    double corner[8], least = spacing[0], square = 0;
+    int a, i;
+    isogi_volume_corners(scene->volume, hit->cell, corner);
+    for (a = 0; a < 3; a++) {
+        int b = (a + 1) % 3, c = (a + 2) % 3;
+        double slope = 0;
+        for (i = 0; i < 8; i++)
+            slope += (i >> a & 1 ? corner[i] : -corner[i]) * (i >> b & 1 ? x[b] : 1 - x[b]) * (i >> c & 1 ? x[c] : 1 - x[c]);
+        square += slope / spacing[a] * (slope / spacing[a]);
+        if (spacing[a] < least) least = spacing[a];
+    }
+    return ISOGI_TRACE__ALIKE * least * sqrt(square);
+}
+
 /* The number + 1 of the probe of a hit; 0: there is none, and it would have *key. Probes are only ever added to the end of a chain,
-   so what was found once is found again. In a cell with more than 32 planes and colours the last of the chain stands for all others,
-   whatever its place and colour: else colours that differ at every point would need ever more probes, and time to search them. */
+   so what was found once is found again. Of more than 32 probes with a key none is added: the one in the hit's plane whose isovalue is
+   nearest stands for it, or the last, whatever its place and colour: else colours that differ at every point would need ever more
+   probes, and time to search them. */
 static uint32_t isogi_trace__probe_find(const isogi_trace *t, const isogi_trace__catch *c, double isovalue, uint64_t *key) {
     const isogi_trace__feedback *f = t->feedback;
     size_t i = isogi_trace__table_find(f, c->key);
+    double least = HUGE_VAL;
+    uint32_t nearest = 0;
     int tries;
     *key = c->key;
     for (tries = 0; f->table[i].probe; tries++) {
         const isogi_trace__node *n = &f->probes.nodes[f->table[i].probe - 1];
-        if (tries == 32) return f->table[i].probe;
-        if (isogi_trace__same_place(t, c, n) && isogi_trace__same_colours(t, c, n->isovalue, isovalue)) return f->table[i].probe;
+        double other = fabs(n->isovalue - isovalue);
+        if (other < least && isogi_trace__same_place(t, c, n) && isogi_trace__same_colours(t, c, n->isovalue, isovalue)) {
+            if (other < (double)n->alike || isogi_trace__zero(other)) return f->table[i].probe;
+            nearest = f->table[i].probe, least = other;
+        }
+        if (tries == 32) return nearest ? nearest : f->table[i].probe;
         *key = isogi_trace__key(*key, 1);
         i = isogi_trace__table_find(f, *key);
     }
@@ -3038,6 +3085,7 @@ static isogi_result isogi_trace__probe_of(isogi_trace *t, const isogi_trace__cat
     n->isovalue = isovalue;
     isogi_trace_albedo(&t->scene.desc, isovalue, n->albedo);
     n->place = c->hit, n->key = key, n->from = c->from;
+    n->alike = (float)isogi_trace__alike(&t->scene, &n->place);
     memcpy(n->normal, c->normal, sizeof n->normal);
     if (t->scene.desc.material) {
         double grid[3], point[3];
@@ -3162,7 +3210,7 @@ static void isogi_trace__cast_hit(isogi_trace__cast *c, int i) {
     if (t->scene.desc.emission_count || t->scene.desc.material) isogi_trace__cast_glow(c, span, to);
     if (!t->scene.desc.bounces) return;
     to->key = isogi_trace__probe_key(&t->scene, &to->hit, to->normal, length,
-                                     span->sum.brick ? ISOGI_TRACE__CELL : ISOGI_TRACE__CELL_FAR);
+                                     span->sum.brick ? ISOGI_TRACE__CELL : ISOGI_TRACE__CELL_FAR, span->sum.isovalue);
     to->probe = isogi_trace__probe_find(t, to, span->sum.isovalue, &made);
 }
 
@@ -3499,10 +3547,11 @@ static void isogi_trace__span_commit(isogi_trace *t, isogi_trace__set *set, cons
     if (n->samples == (n->brick ? isogi_trace__block(t, n->level + 1) : n->wanted)) n->level++;
 }
 
-/* Counts the batch's hits at their probes: one of a texel stands for those of the blocks of samples to come, too. */
+/* Counts the batch's hits at their probes. One of a texel counts twice while blocks of samples are to come, whose hits will read the
+   same probes. As often as there are samples to come costs more rays, at no smaller error. */
 static void isogi_trace__readers_count(isogi_trace *t, const isogi_trace__segment *s) {
     isogi_trace__feedback *f = t->feedback;
-    uint32_t weight = f->on_probes ? 1 : (uint32_t)t->scene.desc.samples / isogi_trace__block(t, f->level + 1);
+    uint32_t weight = !f->on_probes && isogi_trace__block(t, f->level + 1) < (uint32_t)t->scene.desc.samples ? 2 : 1;
     size_t i;
     for (i = 0; i < s->hits; i++) {
         isogi_trace__node *n = &f->probes.nodes[s->probe[i]];
@@ -5191,6 +5240,8 @@ ISOGI_API isogi_result isogi_trace_gather_field(const isogi_trace_desc *desc, is
 #undef ISOGI_TRACE__LIGHT_FIRST
 #undef ISOGI_TRACE__PLANE
 #undef ISOGI_TRACE__COLOURS
+#undef ISOGI_TRACE__ALIKE
+#undef ISOGI_TRACE__CLASS
 #undef ISOGI_TRACE__CELL_RATIO
 #undef ISOGI_TRACE__HALF
 #undef ISOGI_TRACE__CELL_FAR

@@ -486,6 +486,91 @@ TEST(isovalues_of_other_colours_do_not_light_each_other) {
     scene_free(&s);
 }
 
+/* A round hollow whose mouth is shut by a skin of value 128: below that isosurfaces in it are closed and black, above it they see the
+   sky, though they lie side by side. Neither may light the other. */
+static double hollow_behind_a_skin(const double p[3], const double *q) {
+    double r = sqrt((p[0] - q[0]) * (p[0] - q[0]) + (p[1] - q[0]) * (p[1] - q[0]));
+    double hollow = length3(r, 0, p[2] - 10) - 6, mouth = fmax(r - 4, 10 - p[2]), air = fmin(fmin(hollow, mouth), 21.5 - p[2]);
+    double f = 130 + 20 * fmax(-3.5, fmin(3.5, air));
+    return p[2] >= 18 && p[2] <= 19 && f < 128 ? 128 : f;
+}
+TEST(isovalues_beside_each_other_do_not_light_each_other) {
+    enum { N = 28 };
+    double q[1] = {13.5}, open[2] = {0, 0}, closed = 0, stated = 0;
+    int opens = 0, shut = 0;
+    scene s = scene_make(N, N, N, NULL, hollow_behind_a_skin, q);
+    for (int method = 0; method < 2; method++) {
+        isogi_trace_desc d = desc_make(&s, 0.8f, -1, 16);
+        isogi_trace *t = NULL;
+        d.method = (isogi_trace_method)method, d.lookup = ISOGI_TRACE_NEAREST;
+        if (isogi_trace_create(&t, &d, NULL) != ISOGI_OK || isogi_trace_step(t, 0, NULL) != ISOGI_OK) abort();
+        for (int i = 2 * N * N; i < 17 * N * N; i++) {
+            size_t at[3] = {(size_t)(i % N), (size_t)(i / N % N), (size_t)(i / N / N)};
+            float point[1][3] = {{(float)at[0], (float)at[1], (float)at[2]}}, e[1][3], error[1];
+            if (length3((double)at[0] - 13.5, (double)at[1] - 13.5, (double)at[2] - 10) > 8 || !isogi_trace_valid(t, at)) continue;
+            isogi_trace_sample(t, (const float(*)[3])point, 1, e, error);
+            if (s.data[i] > 128) open[method] += (double)e[0][1], opens++;
+            else if (!method) closed += (double)e[0][1], stated += (double)error[0], shut++;
+        }
+        isogi_trace_free(t);
+    }
+    CHECK(shut > 500 && opens > 1000, "%d closed texels, %d open ones", shut, opens);
+    CHECK(closed / shut < 0.02 && closed < stated, "E %g on closed isosurfaces, stated error %g", closed / shut, stated / shut);
+    CHECK(fabs(open[0] / open[1] - 1) < 0.05, "E %g on open isosurfaces, %g by paths", 2 * open[0] / opens, 2 * open[1] / opens);
+    scene_free(&s);
+}
+
+/* The same where it matters: texels of a scan, full of hollows, against paths. Errors cover what they say they do. */
+TEST(errors_are_honest_on_a_scan) {
+    enum { N = 32, POINTS = 160 };
+    char *path = test_data("cthead8_256x256x99_uint8.raw");
+    static uint8_t voxels[N][N][N];
+    static float points[POINTS][3], e[2][POINTS][3], error[2][POINTS];
+    isogi_volume v;
+    isogi_pyramid *pyramid;
+    double square = 0, all = 0;
+    int beyond = 0, count = 0;
+    test_random r = {7};
+    if (!path) SKIP("ISOGI_DATA is not set, or lacks cthead8");
+    FILE *file = fopen(path, "rb");
+    for (int z = 0; z < N; z++)
+        for (int y = 0; y < N; y++) {
+            long at = (128 - N / 2) + 256 * (128 - N / 2 + y + 256L * (49 - N / 2 + z));
+            if (fseek(file, at, SEEK_SET) || fread(voxels[z][y], 1, N, file) != N) abort();
+        }
+    fclose(file), free(path);
+    memset(&v, 0, sizeof v);
+    v.data = voxels, v.type = ISOGI_U8, v.size[0] = v.size[1] = v.size[2] = N;
+    if (isogi_vol_build(&pyramid, &v, NULL) != ISOGI_OK) abort();
+    while (count < POINTS) {
+        int x = (int)(N * random_unit(&r)), y = (int)(N * random_unit(&r)), z = (int)(N * random_unit(&r));
+        if (abs(voxels[z][y][x] - 130) > 3) continue;
+        points[count][0] = (float)x, points[count][1] = (float)y, points[count++][2] = (float)z;
+    }
+    for (int method = 0; method < 2; method++) {
+        isogi_trace_desc d;
+        isogi_trace *t = NULL;
+        memset(&d, 0, sizeof d);
+        d.pyramid = pyramid, d.lighting.env.sh = white_sky, d.lighting.env.sh_order = 1, d.bounces = -1, d.lookup = ISOGI_TRACE_NEAREST;
+        d.albedo[0] = d.albedo[1] = d.albedo[2] = 0.8f, d.method = (isogi_trace_method)method, d.samples = method ? 400 : 64;
+        if (method) d.lazy = 1;
+        else d.isovalue_min = 127, d.isovalue_max = 133;
+        if (isogi_trace_create(&t, &d, NULL) != ISOGI_OK) abort();
+        isogi_trace_request(t, (const float(*)[3])points, POINTS), isogi_trace_step(t, 0, NULL);
+        isogi_trace_sample(t, (const float(*)[3])points, POINTS, e[method], error[method]);
+        isogi_trace_free(t);
+    }
+    for (int i = count = 0; i < POINTS; i++) {
+        double apart = (double)e[0][i][1] - (double)e[1][i][1];
+        if (!test_finite((double)error[0][i]) || !test_finite((double)error[1][i])) continue;
+        beyond += fabs(apart) > 2 * sqrt((double)error[0][i] * (double)error[0][i] + (double)error[1][i] * (double)error[1][i]);
+        square += apart * apart, all += (double)e[1][i][1] * (double)e[1][i][1], count++;
+    }
+    printf("    %.1f %% of %d texels are beyond two standard errors; rms difference %.4f\n", 100.0 * beyond / count, count, sqrt(square / all));
+    CHECK(count > POINTS / 2 && beyond < 0.05 * count, "%d of %d texels are beyond two standard errors", beyond, count);
+    isogi_vol_free(pyramid);
+}
+
 /* More samples go where the error is above the target: it is met everywhere, with fewer rays than the same number for all. */
 TEST(adaptive_bakes_meet_their_target) {
     double q[5] = {32, 31, 32, 45, 20};
