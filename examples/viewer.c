@@ -84,7 +84,7 @@ typedef struct options {
     const scene *scene;
     int width, height, mode, raycast, bounces, samples, threads, stats, antialias, shading, classification, silhouette, transmission, order, directions;
     int lookup, shadows, ambient, normals, storage, method, local, preset;
-    int has_size, has_iso, has_mode, has_spacing, has_albedo, has_preset, has_camera, has_up, has_nan, has_shading, has_shadows, has_ambient, has_gloss;
+    int has_size, has_iso, has_mode, has_spacing, has_albedo, has_preset, has_camera, has_up, has_nan, has_shading, has_shadows, has_ambient, has_gloss, has_step, has_transmission;
     double step, fog, gloss, offset, reach, isovalue, spacing[3], clip[ISOGI_DVR_MAX_PLANES][4], azimuth, elevation, distance, up[3], exposure, nan_value;
     float albedo[3];
     isogi_light lights[MAX_LIGHTS];
@@ -112,7 +112,8 @@ typedef struct viewer {
     isogi_trace *trace;
     float (*picture)[4];
     isogi_counters counters;
-    double started, said, tracing_begun;
+    double started, said, tracing_begun, stage_begun;
+    const char *stage; /* what the library's own progress is told as; NULL = silently */
     uint64_t covered, traced; /* samples that show a surface, and those of them whose light is known */
     char saying;
     unsigned char *compared;  /* the picture to compare with */
@@ -196,7 +197,7 @@ static const option option_list[] = {
      "lambert phong vicinity irradiance transfer pathtrace dvr scale-invariant"},
     {"--out", "FILE.png", "the picture; default isogi.png", TEXT, AT(out), 0, 0, 0, 0, 0, ""},
     {"--size", "WxH", "pixels; default 900x900, 512x512 for dvr and scale-invariant", OTHER, 0, AT(has_size), 0, 0, 0, parse_size, "WxH, each 1 to 16384"},
-    {"--iso", "V", "isovalue; default the shape's own, or a threshold found in the histogram", NUMBERS, AT(isovalue), AT(has_iso), 1, -1e300, 1e300, 0, "a number"},
+    {"--iso", "V", "isovalue; default the shape's own, or a threshold found in the histogram; for scale-invariant, of the peak that is suggested", NUMBERS, AT(isovalue), AT(has_iso), 1, -1e300, 1e300, 0, "a number"},
     {"--raycast", 0, "exact rays instead of the rasterized mesh", FLAG, AT(raycast), 0, 0, 0, 0, 0, 0},
     {"--clip", "A,B,C,D", "keep only a x + b y + c z + d >= 0 (world); what is cut shows the data; may be repeated", OTHER, 0, 0, 0, 0, 0, parse_clip,
      "four numbers from -1e9 to 1e9, the first three not all zero (at least 1e-9 in length), at most 32 times"},
@@ -237,16 +238,22 @@ static const option option_list[] = {
      OTHER, 0, AT(has_preset), 0, 0, 0, parse_preset, "grey hot cool-warm spectrum"},
     {"--method", "NAME", "for dvr with visibility: how that is computed: default, brute, paper, sweep", OTHER, 0, 0, 0, 0, 0, parse_method,
      "default brute paper sweep"},
+    {"--order", "N", "for dvr with visibility, as the next two: spherical harmonics of shadows, 1 to 6: 2 the side light comes from, 3 soft shadows, more "
+     "for directional lights; default 4 (a scene: its own; without sweeps, for peaks or by --method, 3)", INTEGER, AT(order), 0, 1, 1, 6, 0, "a whole number, 1 to 6"},
+    {"--directions", "N", "rays from each grid point of visibility, at least 2 order^2; default 256 (a scene: its own; without sweeps 64)", INTEGER, AT(directions), 0, 1, 1, 65536, 0,
+     "a whole number, 1 to 65536"},
+    {"--grid", "X,Y,Z", "points of visibility: no shadow is finer; default half the voxels along each axis, at most 64 (a scene: its own; without sweeps a quarter)", SIZES, AT(grid), 0, 3, 1, 1024, 0,
+     "three whole numbers, 1 to 1024"},
     {"--local", 0, "light by local visibility, of --method paper: for clip planes and lights within", FLAG, AT(local), 0, 0, 0, 0, 0, 0},
     {"--depth", "FILE.pfm", "as well, for dvr and scale-invariant: distance from the eye to half of a pixel's opacity, where nothing is seen infinity, as "
      "floats (the nearest of a pixel's samples)", TEXT, AT(depth), 0, 0, 0, 0, 0, ""},
     {"--classification", "NAME", "for scale-invariant: exact, pre-integrated, post-classified; dvr knows the last one and, for both others, its own", OTHER, 0, 0, 0, 0, 0, parse_classification,
      "exact pre-integrated post-classified"},
-    {"--silhouette", "NAME", "surfaces seen aslant are more opaque: none, exact, approximate, gradient", OTHER, 0, 0, 0, 0, 0, parse_silhouette,
+    {"--silhouette", "NAME", "surfaces seen aslant are more opaque, in dvr those of peaks: none, exact, approximate, gradient", OTHER, 0, 0, 0, 0, 0, parse_silhouette,
      "none exact approximate gradient"},
-    {"--transmission", "NAME", "light that two-sided surfaces let through: none, diffuse, specular (both, the default)", OTHER, 0, 0, 0, 0, 0,
+    {"--transmission", "NAME", "light that --shading two-sided lets through: none, diffuse, specular (both, the default)", OTHER, 0, AT(has_transmission), 0, 0, 0,
      parse_transmission, "none diffuse specular"},
-    {"--step", "S", "for dvr and for sampled rays: distance of samples in voxels; default 0.5", NUMBERS, AT(step), 0, 1, 1e-3, 1e3, 0, "a number, 0.001 to 1000"},
+    {"--step", "S", "for dvr and for sampled rays (--classification): distance of samples in voxels; default 0.5", NUMBERS, AT(step), AT(has_step), 1, 1e-3, 1e3, 0, "a number, 0.001 to 1000"},
     {"--exposure", "X", "factor on the light, in place of the automatic exposure", NUMBERS, AT(exposure), 0, 1, 1e-12, 1e12, 0, "a number above 0"},
     {"--aa", "N", "samples per pixel; default 4 (1 for dvr, where it is rounded down to a square)", INTEGER, AT(antialias), 0, 1, 1, 64, 0, "a whole number, 1 to 64"},
     {"--threads", "N", "0 = one per core, the default", INTEGER, AT(threads), 0, 1, 0, 256, 0, "a whole number, 0 to 256"},
@@ -286,7 +293,8 @@ static void print_help(void) {
 }
 
 /* Options that one kind of picture has no use for are refused, not ignored. */
-static const char *const of_volumes[] = {"--tf", "--preset", "--shading", "--classification", "--silhouette", "--transmission", "--step", "--method", "--local", "--depth", NULL};
+static const char *const of_volumes[] = {"--tf", "--preset", "--shading", "--classification", "--silhouette", "--transmission", "--step", "--method", "--order", "--directions", "--grid", "--local",
+                                         "--depth", NULL};
 static const char *const of_surfaces[] = {"--raycast", "--albedo", "--bounces", "--samples", "--lattice", "--lookup", "--shadows", "--ambient", "--fog", "--gloss", "--normals", "--offset",
                                           "--reach", "--storage", NULL};
 
@@ -303,13 +311,54 @@ static int check_use(viewer *v, int argc, char **argv) {
     return 1;
 }
 
-/* What volume rendering cannot do together. */
+/* What volume rendering cannot do together: whatever would change nothing is refused. */
 static int check_volume(viewer *v) {
     const options *o = &v->o;
-    int lit = o->mode == DVR && (!o->has_shading || o->shading == ISOGI_DVR_VISIBILITY);
+    int shadowed = o->has_shading ? o->shading == ISOGI_DVR_VISIBILITY : o->mode == DVR, lit = o->mode == DVR && shadowed;
+    if (o->mode < DVR) return 1;
     if (o->tf && o->has_preset) return file_fail(v->error, "give --tf or --preset, not both");
-    if (o->method && o->method != ISOGI_DVR_BRUTE && !lit) return file_fail(v->error, "--method: %s is for --mode dvr with --shading visibility", method_name[o->method]);
+    if (o->has_iso && (o->mode == DVR || o->tf || o->has_preset))
+        return file_fail(v->error, "--iso: is for surfaces and for the transfer function that --mode scale-invariant is suggested; a transfer function has its own values");
+    if (o->method > ISOGI_DVR_BRUTE && !lit) return file_fail(v->error, "--method: %s is for --mode dvr with --shading visibility", method_name[o->method]);
+    if ((o->method || o->order || o->directions || o->grid[0]) && !shadowed)
+        return file_fail(v->error, "%s: needs --shading visibility", o->method ? "--method" : o->order ? "--order" : o->directions ? "--directions" : "--grid");
     if (o->local && !(lit && o->method == ISOGI_DVR_PAPER)) return file_fail(v->error, "--local: needs --mode dvr, --shading visibility and --method paper");
+    if (o->has_transmission && !(o->has_shading && o->shading == ISOGI_DVR_TWO_SIDED)) return file_fail(v->error, "--transmission: needs --shading two-sided");
+    if (o->has_shading && o->shading == ISOGI_DVR_UNLIT && (o->env || o->light_count))
+        return file_fail(v->error, "%s: --shading unlit has no light", o->env ? "--env" : "--light");
+    if (o->has_step && o->mode == SCALE_INVARIANT && o->classification == ISOGI_DVR_EXACT)
+        return file_fail(v->error, "--step: exact rays have none; --classification pre-integrated and post-classified have");
+    return 1;
+}
+
+/* What it cannot do with this transfer function. */
+static int check_transfer(viewer *v, int suggested) {
+    const options *o = &v->o;
+    size_t peaks = v->transfer.peak_count;
+    if (o->has_iso && !suggested) return file_fail(v->error, "--iso: the transfer function is not a suggested one and has values of its own");
+    if (o->local && peaks) return file_fail(v->error, "--local: knows no peaks, and the transfer function has some");
+    if (o->method > ISOGI_DVR_BRUTE && peaks) return file_fail(v->error, "--method: %s knows no peaks, and the transfer function has some", method_name[o->method]);
+    if (o->silhouette && o->mode == DVR && !peaks) return file_fail(v->error, "--silhouette: is for peaks in --mode dvr, and the transfer function has none");
+    return 1;
+}
+
+/* Two names of one file, be it there yet or not. Devices may be named twice. */
+static int same_file(const char *a, const char *b) {
+    struct stat x, y;
+    if (!a || !b) return 0;
+    if (stat(a, &x) != 0 || stat(b, &y) != 0) return !strcmp(a, b);
+    return S_ISREG(x.st_mode) && x.st_dev == y.st_dev && x.st_ino == y.st_ino;
+}
+
+/* No picture takes the place of another one, or of what it is made from. (That of --compare is read first, and may be replaced by --out.) */
+static int check_files(viewer *v) {
+    const options *o = &v->o;
+    const char *const names[] = {o->volume, o->tf, o->env}, *const options_of[] = {"VOLUME", "--tf", "--env"};
+    if (same_file(o->out, o->depth)) return file_fail(v->error, "--depth: %.200s is the file of --out", o->depth);
+    if (same_file(o->depth, o->compare)) return file_fail(v->error, "--depth: %.200s is the file of --compare", o->depth);
+    for (int i = 0; i < 3; i++)
+        if (same_file(o->out, names[i]) || same_file(o->depth, names[i]))
+            return file_fail(v->error, "%s: %.200s is the file of %s", same_file(o->out, names[i]) ? "--out" : "--depth", names[i], options_of[i]);
     return 1;
 }
 
@@ -354,7 +403,7 @@ static int parse_arguments(viewer *v, int argc, char **argv) {
     if (o->scene && !o->has_mode) o->mode = o->scene->lit ? IRRADIANCE : DVR;
     if (o->scene && o->mode >= DVR && !o->scene->rendered && !o->tf && !o->has_preset)
         return file_fail(v->error, "--scene %s has no transfer function: give one by --tf or --preset, or another --mode", o->scene->name);
-    if (!check_use(v, argc, argv) || !check_volume(v)) return 0;
+    if (!check_use(v, argc, argv) || !check_volume(v) || !check_files(v)) return 0;
     if (!o->has_size) o->width = o->height = o->mode >= DVR ? 512 : 900;
     if ((double)o->width * o->height > 100e6) return file_fail(v->error, "--size: %dx%d is too large; at most 100 million pixels", o->width, o->height);
     if (!o->samples) o->samples = 64;
@@ -1129,11 +1178,13 @@ static int preset_transfer(viewer *v) {
 
 static int set_transfer(viewer *v) {
     const scene *s = v->o.scene;
+    int ok, suggested = 0;
     const char *text = s && s->transfer ? s->transfer : v->shape && (v->o.mode == DVR || !strncmp(v->shape->transfer, "peak", 4)) ? v->shape->transfer : NULL;
-    if (v->o.tf) return transfer_read(v->o.tf, &v->transfer, v->error);
-    if (v->o.has_preset) return preset_transfer(v);
-    if (text && (v->o.mode == DVR || !strncmp(text, "peak", 4))) return transfer_parse(text, &v->transfer, v->error);
-    return default_transfer(v);
+    if (v->o.tf) ok = transfer_read(v->o.tf, &v->transfer, v->error);
+    else if (v->o.has_preset) ok = preset_transfer(v);
+    else if (text && (v->o.mode == DVR || !strncmp(text, "peak", 4))) ok = transfer_parse(text, &v->transfer, v->error);
+    else ok = default_transfer(v), suggested = 1;
+    return ok && check_transfer(v, suggested);
 }
 
 /* Portable float map: the lowest row first, little-endian. Of the factor * factor samples of a pixel the nearest. */
@@ -1157,8 +1208,25 @@ static int write_depth(viewer *v, const float *depth, int factor) {
     return ok;
 }
 
+/* Shadows of the sun want more than the header's defaults, which are for pictures in motion; sweeps have it in about a second. */
+static void set_visibility(const viewer *v, isogi_dvr_desc *desc) {
+    const scene *s = v->o.scene && v->o.scene->order ? v->o.scene : NULL;
+    int swept = v->o.mode == DVR && !v->transfer.peak_count && v->o.method != ISOGI_DVR_BRUTE && v->o.method != ISOGI_DVR_PAPER;
+    desc->order = v->o.order ? v->o.order : s ? s->order : swept ? 4 : 0;
+    desc->directions = v->o.directions ? v->o.directions : s ? s->directions : swept ? 256 : 0;
+    for (int a = 0; a < 3; a++) {
+        size_t half = (v->volume.size[a] + 1) / 2;
+        desc->grid[a] = v->o.grid[a] ? v->o.grid[a] : s ? s->grid[a] : !swept ? 0 : half < 64 ? half : 64;
+    }
+}
+
+static int tell_stage(void *user, double fraction) {
+    viewer *v = (viewer *)user;
+    if (v->stage) say(v, v->stage, fraction, v->stage_begun);
+    return 0;
+}
+
 static int render_volume(viewer *v) {
-    const scene *s = v->o.scene;
     isogi_dvr_desc desc = {.pyramid = v->pyramid, .space = v->o.mode == DVR ? ISOGI_DVR_PHYSICAL : ISOGI_DVR_DATA,
                            .shading = v->o.mode == DVR ? ISOGI_DVR_VISIBILITY : ISOGI_DVR_LOCAL};
     int factor = (int)(sqrt((double)v->o.antialias) + 1e-9);
@@ -1169,6 +1237,8 @@ static int render_volume(viewer *v) {
     isogi_dvr *dvr = NULL;
     double begun = seconds(), remaining = 1;
     isogi_result result;
+    isogi_context context = v->context;
+    context.progress = tell_stage;
     if (v->o.has_shading) desc.shading = (isogi_dvr_shading)v->o.shading;
     desc.classification = (isogi_dvr_classification)v->o.classification, desc.silhouette = (isogi_dvr_silhouette)v->o.silhouette, desc.step = v->o.step;
     desc.method = (isogi_dvr_method)v->o.method;
@@ -1176,10 +1246,10 @@ static int render_volume(viewer *v) {
         desc.material[i].exponent = i < 2 || v->o.transmission == 2 ? 30 : 0;
         for (int c = 0; c < 3; c++) desc.material[i].specular[c] = 1, desc.material[i].diffuse[c] = i < 2 || v->o.transmission ? 1 : 1e-20f;
     }
-    if (s && s->order) desc.order = s->order, desc.directions = s->directions, memcpy(desc.grid, s->grid, sizeof desc.grid);
     for (int i = 0; i < 3; i++) view.eye[i] = (float)v->view.eye[i], view.target[i] = (float)v->view.target[i], view.up[i] = (float)v->view.up[i];
     if (!set_transfer(v)) return 0;
-    result = isogi_dvr_create(&dvr, &desc, &v->context);
+    set_visibility(v, &desc);
+    result = isogi_dvr_create(&dvr, &desc, &context);
     if (result == ISOGI_OK) result = isogi_dvr_set_transfer(dvr, &v->transfer.transfer);
     if (result == ISOGI_OK) result = isogi_dvr_set_clip(dvr, (const double(*)[4])v->o.clip, v->o.clip_count);
     for (uint64_t budget = 20000; result == ISOGI_OK && remaining > 0 && desc.shading == ISOGI_DVR_VISIBILITY; budget += budget / 4) {
@@ -1192,13 +1262,13 @@ static int render_volume(viewer *v) {
     large = (float(*)[4])malloc(pixels * sizeof *large);
     if (v->o.depth) depth = (float *)malloc(pixels * sizeof *depth);
     if (result == ISOGI_OK && (!large || (v->o.depth && !depth))) result = ISOGI_NO_MEMORY;
-    if (result == ISOGI_OK && v->o.local && v->transfer.peak_count) ok = file_fail(v->error, "--local: knows no peaks, and the transfer function has some");
-    if (result == ISOGI_OK && ok) result = isogi_dvr_render(dvr, &view, &v->lighting, large, depth, &v->counters);
-    for (size_t i = 0; result == ISOGI_OK && ok && i < pixels; i++) {
+    v->stage = "picture", v->stage_begun = begun;
+    if (result == ISOGI_OK) result = isogi_dvr_render(dvr, &view, &v->lighting, large, depth, &v->counters);
+    for (size_t i = 0; result == ISOGI_OK && i < pixels; i++) {
         size_t x = i % (size_t)view.width / (size_t)factor, y = i / (size_t)view.width / (size_t)factor;
         for (int c = 0; c < 4; c++) v->picture[y * (size_t)v->o.width + x][c] += large[i][c] / (float)(factor * factor);
     }
-    if (result == ISOGI_OK && ok && depth) ok = write_depth(v, depth, factor);
+    if (result == ISOGI_OK && depth) ok = write_depth(v, depth, factor);
     free(large), free(depth);
     isogi_dvr_free(dvr);
     if (!ok) return 0;

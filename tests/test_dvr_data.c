@@ -644,6 +644,36 @@ TEST(classifications_converge_to_the_exact_integral) {
     field_free(&f);
 }
 
+/* Local light is looked up once for pieces that together show less than a 256th of a pixel. Against light at every sample of dense
+   post-classified rays: no worse than unlit pictures differ, plus half of 1/255. A fog of little steps is the hard case: all its pieces are weak. */
+TEST(light_of_weak_pieces_in_common_is_that_of_each) {
+    const isogi_light sun = {.kind = ISOGI_LIGHT_DIRECTIONAL, .vector = {1, 2, 3}, .rgb = {3, 2.5f, 2}};
+    const isogi_lighting lighting = {.lights = &sun, .light_count = 1};
+    field f = field_waves(20, 3);
+    for (int thin = 0; thin < 3; thin++) {
+        double error[2];
+        test_random r = {53};
+        isogi_view view = view_of(&f, 1, &r, 24);
+        const isogi_transfer_point fog = {0, {1, 1, 1}, thin == 1 ? 0.05f : 0.5f};
+        const isogi_transfer transfer = {thin ? &fog : hills, thin ? 1 : 3, NULL, 0};
+        for (int lit = 0; lit < 2; lit++) {
+            float(*image[2])[4];
+            for (int i = 0; i < 2; i++) {
+                const isogi_dvr_desc desc = {.pyramid = f.pyramid, .space = ISOGI_DVR_DATA, .shading = lit ? ISOGI_DVR_LOCAL : ISOGI_DVR_UNLIT, .opaque = 1, .step = 1.0 / 16,
+                                             .classification = i ? ISOGI_DVR_POST_CLASSIFIED : ISOGI_DVR_EXACT};
+                isogi_dvr *dvr = dvr_new(&desc, &transfer);
+                image[i] = picture(dvr, &view, lit ? &lighting : NULL, NULL, NULL);
+                isogi_dvr_free(dvr);
+            }
+            error[lit] = rms_difference(image[0], image[1], 24 * 24);
+            free(image[0]), free(image[1]);
+        }
+        printf("    %s: unlit %.2g, lit %.2g\n", thin ? thin < 2 ? "thin fog" : "fog" : "hills", error[0], error[1]);
+        CHECK(error[1] < error[0] + 0.5 / 255, "lit %g, unlit %g", error[1], error[0]);
+    }
+    field_free(&f);
+}
+
 /* ---- silhouettes (Kraus 2005, 5.1) ---- */
 
 static double tilt[3];

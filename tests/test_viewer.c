@@ -319,6 +319,20 @@ TEST(silly_options_get_one_line_that_names_the_option) {
         {"procedural:gyroid --mode dvr --preset rainbow", "grey hot cool-warm spectrum"}, {"procedural:gyroid --mode dvr --preset hot --tf x.tf", "not both"},
         {"procedural:gyroid --depth a.pfm", "--depth: works"}, {"procedural:gyroid:8 --mode dvr --depth /nowhere/a.pfm", "/nowhere/a.pfm"},
         {"procedural:coulomb:8 --mode dvr --method paper --local", "--local: knows no peaks"},
+        {"procedural:coulomb:8 --mode dvr --method paper", "--method: paper knows no peaks"}, {"procedural:coulomb:8 --mode scale-invariant --order 3", "--order: needs"},
+        {"procedural:gyroid --mode dvr --iso 1", "--iso: is for surfaces"}, {"procedural:gyroid --mode scale-invariant --preset hot --iso 1", "--iso: is for surfaces"},
+        {"procedural:coulomb:8 --mode scale-invariant --iso 1", "--iso: the transfer function"}, {"procedural:gyroid --mode dvr --transmission none", "--transmission: needs"},
+        {"procedural:gyroid --mode scale-invariant --transmission none", "--transmission: needs"}, {"procedural:engine-block:8 --mode dvr --silhouette exact", "--silhouette: is for peaks"},
+        {"procedural:gyroid --mode scale-invariant --step 1", "--step: exact rays"}, {"procedural:gyroid --mode scale-invariant --method brute", "--method: needs"},
+        {"procedural:gyroid --mode dvr --shading unlit --env sky", "--env: --shading unlit"}, {"procedural:gyroid --mode dvr --shading unlit --light directional:1,1,1:1,1,1", "--light: --shading unlit"},
+        {"procedural:gyroid --mode dvr --shading local --grid 8,8,8", "--grid: needs"}, {"procedural:gyroid --mode dvr --shading unlit --directions 8", "--directions: needs"},
+        {"procedural:gyroid --mode dvr --order 7", "1 to 6"}, {"procedural:gyroid --mode dvr --directions 0", "--directions"}, {"procedural:gyroid --mode dvr --grid 8,8", "--grid"},
+        {"procedural:gyroid --grid 8,8,8", "--grid: works with --mode dvr"},
+        {"procedural:gyroid --mode dvr --depth same.png --out same.png", "--depth: same.png is the file of --out"},
+        {"procedural:gyroid --mode dvr --out tests/golden/dvr.png --depth ./tests/golden/dvr.png", "is the file of --out"},
+        {"procedural:gyroid --mode dvr --out /tmp/never.png --depth tests/golden/dvr.png --compare tests/golden/dvr.png", "is the file of --compare"},
+        {"procedural:gyroid --mode dvr --tf tests/test_viewer.c --out tests/test_viewer.c", "--out: tests/test_viewer.c is the file of --tf"},
+        {"tests/test.h --out ./tests/test.h", "is the file of VOLUME"}, {"procedural:gyroid --env tests/test.h --out tests/test.h", "is the file of --env"},
         {"procedural:gyroid --camera 1,2", "--camera"}, {"procedural:gyroid --camera 0,91,2", "--camera"}, {"procedural:gyroid --camera 0,0,0", "--camera"},
         {"procedural:gyroid --up 0,0,0", "--up"}, {"procedural:gyroid --threads -1", "--threads"}, {"procedural:gyroid --threads 1000", "--threads"},
         {"procedural:gyroid --light sun:1,1,1:1,1,1", "--light"}, {"procedural:gyroid --light directional:0,0,0:1,1,1", "--light"},
@@ -445,7 +459,7 @@ TEST(stats_are_key_value_lines_and_help_is_complete) {
     static const char *const keys[] = {"size 32x32x32", "range ", "isovalue ", "triangles ", "rays_light ", "rays_per_second ", "texels_computed ",
                                        "texels_requested ", "memory_bytes ", "seconds_bake ", "seconds_total ", "error_relative "};
     static const char *const named[] = {"--scene", "--size", "--iso", "--mode", "--raycast", "--spacing", "--env", "--light", "--albedo", "--bounces", "--samples",
-                                        "--lattice", "--lookup", "--shadows", "--ambient", "--fog", "--gloss", "--normals", "--offset", "--reach", "--storage", "--compare", "--tf", "--preset", "--method", "--local", "--depth", "--clip", "--camera", "--up", "--threads", "--out", "--stats", "procedural:", "Examples"};
+                                        "--lattice", "--lookup", "--shadows", "--ambient", "--fog", "--gloss", "--normals", "--offset", "--reach", "--storage", "--compare", "--tf", "--preset", "--method", "--order", "--directions", "--grid", "--local", "--depth", "--clip", "--camera", "--up", "--threads", "--out", "--stats", "procedural:", "Examples"};
     char command[512];
     run_result r;
     snprintf(command, sizeof command, "procedural:gyroid:32 --size 32x32 --samples 8 --stats --out '%s'", temporary("stats.png"));
