@@ -398,7 +398,8 @@ ISOGI_API isogi_result isogi_transfer_import(const float (*rgba)[4], size_t coun
 /* A transfer function for a volume of which nothing is known: values in three classes of least variance (Otsu 1979; the largest bin left
    out, which is air or padding; and up to a thousandth of the voxels at either end of the range where that halves it), the lowest
    transparent, the others ever denser and warmer. In physical space extinction is per voxel and makes 1/30 of the box's diagonal half
-   opaque at the top; in data space a passage through each upper class is about half opaque. A volume of one value gets points that
+   opaque soon after the third class begins (the fifth point), twice as dense at the top, a fifth to a seventh of it in the second class: what
+   is dense is seen within what is not; in data space a passage through each upper class is about half opaque. A volume of one value gets points that
    nothing meets. threshold (may be NULL): where the second class begins, for an isosurface. */
 ISOGI_API isogi_result isogi_transfer_suggest(const isogi_pyramid *pyramid, isogi_dvr_space space, isogi_transfer_point points[ISOGI_SUGGEST_POINTS],
                                               double *threshold);
@@ -5892,7 +5893,7 @@ ISOGI_API isogi_result isogi_transfer_suggest(const isogi_pyramid *pyramid, isog
                                               double *threshold) {
     static const float colour[ISOGI_SUGGEST_POINTS][3] = {{0.4f, 0.55f, 0.8f}, {0.4f, 0.55f, 0.8f}, {0.75f, 0.7f, 0.65f},
                                                           {0.85f, 0.75f, 0.6f}, {1, 0.7f, 0.35f},    {1, 0.65f, 0.3f}};
-    static const double share[ISOGI_SUGGEST_POINTS] = {0, 0, 0.3, 0.4, 0.8, 1};
+    static const double share[2][ISOGI_SUGGEST_POINTS] = {{0, 0, 0.15, 0.2, 1, 2.2}, {0, 0, 0.3, 0.4, 0.8, 1}};
     double histogram[ISOGI_DVR__BINS], range[2], at[ISOGI_SUGGEST_POINTS], width, most = 0;
     const isogi_volume *v;
     int bin[2], i, a;
@@ -5909,7 +5910,7 @@ ISOGI_API isogi_result isogi_transfer_suggest(const isogi_pyramid *pyramid, isog
     most = space == ISOGI_DVR_PHYSICAL ? 0.69 * 30 / sqrt(most) : width > 0 ? 2 / width : 0;
     for (i = 0; i < ISOGI_SUGGEST_POINTS; i++) {
         points[i].value = i && !(at[i] > at[i - 1]) ? at[i] = at[i - 1] : at[i];
-        points[i].extinction = (float)isogi_dvr__clamp(share[i] * most, 3e38);
+        points[i].extinction = (float)isogi_dvr__clamp(share[space][i] * most, 3e38);
         for (a = 0; a < 3; a++) points[i].rgb[a] = colour[i][a];
     }
     if (threshold) *threshold = at[2];

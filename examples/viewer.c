@@ -1168,7 +1168,7 @@ static int preset_transfer(viewer *v) {
     isogi_transfer_point points[ISOGI_SUGGEST_POINTS > ISOGI_PRESET_POINTS ? ISOGI_SUGGEST_POINTS : ISOGI_PRESET_POINTS];
     char text[4096], *at = text, *end = text + sizeof text;
     isogi_result result = isogi_transfer_suggest(v->pyramid, v->o.mode == DVR ? ISOGI_DVR_PHYSICAL : ISOGI_DVR_DATA, points, NULL);
-    if (result == ISOGI_OK) result = isogi_transfer_preset((isogi_preset)v->o.preset, points[1].value, points[5].value, (float)fmin((double)points[5].extinction, 1e30), points);
+    if (result == ISOGI_OK) result = isogi_transfer_preset((isogi_preset)v->o.preset, points[1].value, points[5].value, (float)fmin((double)points[v->o.mode == DVR ? 4 : 5].extinction, 1e30), points);
     if (result != ISOGI_OK) return file_fail(v->error, "--preset: the volume has a single value");
     for (int i = 0; i < ISOGI_PRESET_POINTS; i++)
         at += snprintf(at, (size_t)(end - at), "%.17g %.9g %.6f %.6f %.6f\n", points[i].value, (double)points[i].extinction, (double)points[i].rgb[0], (double)points[i].rgb[1],
