@@ -2487,14 +2487,14 @@ static void isogi_dvr__fetch(isogi_dvr__march *m) {
     m->finite = 1;
     if (v->type == ISOGI_U8) ISOGI_DVR__CORNERS(uint8_t);
     else if (v->type == ISOGI_U16) ISOGI_DVR__CORNERS(uint16_t);
-    else if (v->type == ISOGI_F32) {
-        ISOGI_DVR__CORNERS(float);
-        for (i = 0; i < 8; i++) m->finite &= isogi_dvr__finite64(m->corner[i]);
-    } else {
+    else if (v->type == ISOGI_F32) ISOGI_DVR__CORNERS(float);
+    else {
         uint32_t cell[3];
         for (i = 0; i < 3; i++) cell[i] = (uint32_t)m->cell[i];
         m->finite = isogi_volume_corners(v, cell, m->corner);
     }
+    if (!isogi_vol_finite(m->dvr->desc.pyramid)) /* integers may not be: scale carries them beyond */
+        for (i = 0; i < 8; i++) m->finite &= isogi_dvr__finite64(m->corner[i]);
     for (i = 0; i < 4; i++) {
         const double *c = m->corner + 2 * i;
         low[i] = c[0] < c[1] ? c[0] : c[1], high[i] = c[0] < c[1] ? c[1] : c[0];
