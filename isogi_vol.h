@@ -174,7 +174,7 @@ typedef struct isogi_volume {
     double spacing[3];   /* > 0; 0 = 1 */
     double origin[3];    /* world position of voxel (0,0,0), of that of the larger field for a chunk */
     double axes[9];      /* row-major 3x3, column a = world direction of grid axis a, invertible; all 0 = identity */
-    double scale, bias;  /* scale 0 = 1 */
+    double scale, bias;  /* scale 0 = 1; every number that an integer type holds must become a finite one */
     /* of a chunk: see above; first up to 2^53, halos up to 2^31-1, without use along an axis of one voxel */
     size_t first[3], halo_low[3], halo_high[3];
 } isogi_volume;
@@ -336,16 +336,17 @@ ISOGI_API isogi_result isogi_vol_occluded(const isogi_pyramid *pyramid, const is
    not read; of its side, only whether it is a cap, unless with ISOGI_RAY_ONWARD). The root they start from is divided out of the cell's
    cubic: no epsilon, no self-hit, no leak. A start may be 1e-9 cell off the surface. So where the surface comes back within as much,
    through the face of a cell that lies between, it is not told from the start, but for rays that go onward: they miss no crossing,
-   however close it follows. t of the new hit counts from the start. Where the surface has no thickness (a single layer of voxels that equal the isovalue) a ray touches
-   it in one point: that is a hit with side +1, and the ray goes on outside. tmax[count], or NULL = unlimited. flags as in isogi_ray. hits may be starts. */
+   however close it follows. t of the new hit counts from the start. Where the surface has no thickness (a single layer of voxels that
+   equal the isovalue) a ray touches it in one point: that is a hit with side +1, and the ray goes on outside. tmax[count], or NULL =
+   unlimited. flags as in isogi_ray. hits may be starts. */
 ISOGI_API isogi_result isogi_vol_continue(const isogi_pyramid *pyramid, const isogi_hit *starts, const float (*dirs)[3],
                                           const double *tmax, double isovalue, uint32_t flags, size_t count, isogi_hit *hits,
                                           isogi_counters *counters);
 
 /* Every hit of each ray, in order: those of ray i are hits[i * capacity + n], n < counts[i]. counts[i] = capacity + 1 where there are
-   more than fit; hits[i * capacity + capacity - 1] with isogi_vol_continue leads to them. The same as isogi_vol_intersect and then
-   isogi_vol_continue, with ISOGI_RAY_ONWARD, along the ray until it misses, with t from the ray's own origin throughout. hits may be NULL if capacity is 0.
-   Sides alternate, but for touched layers without thickness, which leave the ray outside, and for cells that are not finite, after
+   more than fit; hits[i * capacity + capacity - 1] with isogi_vol_continue and ISOGI_RAY_ONWARD leads to them. The same as isogi_vol_intersect
+   and then isogi_vol_continue, with ISOGI_RAY_ONWARD, along the ray until it misses, with t from the ray's own origin throughout. hits
+   may be NULL if capacity is 0. Sides alternate, but for touched layers without thickness, which leave the ray outside, and for cells that are not finite, after
    which the side is not known. ISOGI_TOO_LARGE if count * capacity hits cannot be addressed. */
 ISOGI_API isogi_result isogi_vol_intersect_all(const isogi_pyramid *pyramid, const isogi_ray *rays, size_t count, size_t capacity,
                                                isogi_hit *hits, size_t *counts, isogi_counters *counters);
@@ -365,7 +366,7 @@ typedef struct isogi_bundle {
     double origin[3];
     double tmin, tmax; /* tmax 0 = unlimited */
     double isovalue;
-    uint32_t flags; /* as in isogi_ray */
+    uint32_t flags; /* as in isogi_ray; ISOGI_RAY_ONWARD for rays from a start, which all leave it on the side that its ray went to */
 } isogi_bundle;
 
 ISOGI_API isogi_result isogi_vol_bundle(const isogi_pyramid *pyramid, const isogi_bundle *bundle, const float (*dirs)[3], size_t count,
@@ -800,6 +801,7 @@ static isogi_result isogi_vol__check_layout(const isogi_volume *v, size_t type_s
 }
 
 ISOGI_API isogi_result isogi_volume_validate(const isogi_volume *volume) {
+    static const double largest[4] = {255, 128, 65535, 32768};
     size_t type_size;
     double length = 1, determinant;
     isogi_volume v;
@@ -815,6 +817,7 @@ ISOGI_API isogi_result isogi_volume_validate(const isogi_volume *volume) {
     if (!isogi_vol__finite64(volume->scale) || !isogi_vol__finite64(volume->bias)) return ISOGI_INVALID;
     if (!isogi_vol__finite3(volume->origin) || !isogi_vol__finite3(volume->spacing)) return ISOGI_INVALID;
     v = isogi_vol__resolve(volume);
+    if (v.type < ISOGI_F32 && !isogi_vol__finite64(fabs(v.scale) * largest[v.type] + fabs(v.bias))) return ISOGI_INVALID;
     for (a = 0; a < 3; a++) {
         double x = v.axes[a], y = v.axes[3 + a], z = v.axes[6 + a];
         if (!(v.spacing[a] > 0)) return ISOGI_INVALID;
@@ -2798,7 +2801,9 @@ ISOGI_API isogi_result isogi_vol_prefilter(const isogi_volume *volume, float *co
 
 /* Along a segment inside a cell the trilinear field is a cubic. It is kept as Bernstein coefficients, which are convex sums of the
    corners: the cubic lies in their hull, so equal signs mean no root, and rounding errors stay within a few ulp of the corners. */
-typedef struct isogi_vol__cubic { double b[4]; } isogi_vol__cubic;
+typedef struct isogi_vol__cubic {
+    double b[4], scale; /* what the coefficients were multiplied by */
+} isogi_vol__cubic;
 
 /* What code for AVX calls is inlined there: compiled for SSE it would cost hundreds of cycles at each change between the two, since
    compilers that see all of a function may call it without clearing the registers' upper halves. */
@@ -2808,8 +2813,10 @@ ISOGI_VOL__INLINE void isogi_vol__cubic_rescale(isogi_vol__cubic *cubic) {
     double most = 0;
     int i;
     for (i = 0; i < 4; i++) most = isogi_vol__max(most, fabs(cubic->b[i]));
+    cubic->scale = 1;
     if (most > 1e-100 && most < 1e100) return;
-    for (i = 0; i < 4; i++) cubic->b[i] *= most < 1 ? 1e150 : 1e-180;
+    cubic->scale = most < 1 ? 1e150 : 1e-180;
+    for (i = 0; i < 4; i++) cubic->b[i] *= cubic->scale;
 }
 
 /* Blossom of the trilinear form: b[1] and b[2] are means over the choices of which coordinate is taken at which end. */
@@ -3091,7 +3098,7 @@ static int isogi_vol__leave_surface(isogi_vol__walk *w, const isogi_vol__cubic *
     double steepest = 0;
     int i, found, layer, on_face = 0;
     for (i = 0; i < 8; i++) steepest = isogi_vol__max(steepest, fabs(corner[i]));
-    if (axis >= 0 && (length < ISOGI_VOL__ON_SURFACE || reach < 1e-12 * steepest)) return 0;
+    if (axis >= 0 && (length < ISOGI_VOL__ON_SURFACE || reach < 1e-12 * steepest * cubic->scale)) return 0;
     w->deflate = 0;
     found = isogi_vol__cubic_deflated(cubic, &w->inside, root);
     for (i = 0; i < 3; i++) on_face |= !(from[i] > 0) || !(from[i] < 1);
@@ -4594,7 +4601,7 @@ ISOGI_VOL__AVX512 static unsigned isogi_vol__seat8(isogi_vol__batch *b, isogi_vo
 #pragma GCC unroll 8
         for (a = 0; a < 3; a++) good = _mm512_mask_cmp_pd_mask(good, _mm512_abs_pd(origin[a]), finite, _CMP_LE_OQ);
         tmin = ISOGI_VOL__TAKE(offsetof(isogi_ray, tmin)), tmax = ISOGI_VOL__TAKE(offsetof(isogi_ray, tmax)), isovalue = ISOGI_VOL__TAKE(offsetof(isogi_ray, isovalue));
-        good = _mm256_mask_testn_epi32_mask(good, _mm512_mask_i64gather_epi32(_mm256_setzero_si256(), lanes, at, from + offsetof(isogi_ray, flags), 1), _mm256_set1_epi32(-1));
+        good = _mm256_mask_testn_epi32_mask(good, _mm512_mask_i64gather_epi32(_mm256_setzero_si256(), lanes, at, from + offsetof(isogi_ray, flags), 1), _mm256_set1_epi32(ISOGI_RAY_CAPPED));
     } else {
         const __m256i side = _mm512_mask_i64gather_epi32(_mm256_setzero_si256(), lanes, at, from + offsetof(isogi_hit, side), 1);
         good = b->flags & ISOGI_RAY_CAPPED ? 0 : _mm256_mask_cmpneq_epi32_mask(good, _mm256_abs_epi32(side), _mm256_set1_epi32(2));
@@ -5063,27 +5070,30 @@ typedef struct isogi_vol__rays16 {
 } isogi_vol__rays16;
 
 ISOGI_VOL__AVX512 ISOGI_VOL__INLINE void isogi_vol__set_rays16(isogi_vol__rays16 *r, const isogi_vol__pool *s, int levels) {
+    const __m512d most = _mm512_set1_pd(1e28); /* finite in float times all cells squared */
     int a;
 #pragma GCC unroll 3
     for (a = 0; a < 3; a++) {
         r->origin[a] = isogi_vol__halves(_mm512_load_pd(&s->origin[a][0]), _mm512_load_pd(&s->origin[a][8]));
-        r->inverse[a] = isogi_vol__halves(_mm512_load_pd(&s->inverse[a][0]), _mm512_load_pd(&s->inverse[a][8]));
+        const __m512d low = _mm512_min_pd(_mm512_max_pd(_mm512_load_pd(&s->inverse[a][0]), _mm512_sub_pd(_mm512_setzero_pd(), most)), most);
+        const __m512d high = _mm512_min_pd(_mm512_max_pd(_mm512_load_pd(&s->inverse[a][8]), _mm512_sub_pd(_mm512_setzero_pd(), most)), most);
+        r->inverse[a] = isogi_vol__halves(low, high);
     }
     r->stop = _mm512_mul_ps(isogi_vol__halves(_mm512_load_pd(&s->stop[0]), _mm512_load_pd(&s->stop[8])), _mm512_set1_ps(1.000001f));
     r->padded = (float)(1 << 2 * levels);
 }
 
 /* The layers of a node above the leaves. Times count from where the rays begin: these floats are off by less than 2^-21 of what the root
-   measures, by which children are widened. */
+   measures; children are widened by twice as much. */
 ISOGI_VOL__AVX512 ISOGI_VOL__INLINE void isogi_vol__open_layers(isogi_vol__layers *l, const isogi_vol__rays16 *r, int n, int64_t cell, int64_t backwards) {
-    const __m512 most = _mm512_set1_ps(1e30f), reach = _mm512_set1_ps(1e-6f * r->padded / (float)(1 << 2 * n));
+    const __m512 reach = _mm512_set1_ps(1e-6f * r->padded / (float)(1 << 2 * n));
     double from[3], step[3];
     int a;
     isogi_vol__node_begins(n, cell, backwards, from, step);
 #pragma GCC unroll 3
     for (a = 0; a < 3; a++) {
         const __m512 at = _mm512_mul_ps(_mm512_sub_ps(r->origin[a], _mm512_set1_ps((float)from[a])), _mm512_set1_ps((float)step[a]));
-        const __m512 per = _mm512_min_ps(_mm512_mul_ps(r->inverse[a], _mm512_set1_ps((float)(1 / step[a]))), most);
+        const __m512 per = _mm512_mul_ps(r->inverse[a], _mm512_set1_ps((float)(1 / step[a])));
         l->per[a] = per, l->first[a] = _mm512_mul_ps(_mm512_add_ps(at, reach), per), l->last[a] = _mm512_mul_ps(_mm512_sub_ps(at, reach), per);
     }
     l->stop = r->stop;
@@ -5253,7 +5263,7 @@ ISOGI_VOL__AVX512 static void isogi_vol__set_beam(isogi_vol__beam *beam, const i
     static const int after[5] = {0, 1, 2, 0, 1};
     const int first = __builtin_ctz(rays);
     __m512d place[3][2], way[3][2];
-    const double slack = (double)(1 << 2 * levels) / 1048576; /* floats are off by an eighth of this */
+    const double slack = (double)(1 << 2 * levels) / 1048576; /* floats are off by less than half of this */
     double length, begin = 1e9, end = -1e9;
     int a, h, e;
     beam->axis = fabs(s->dir[1][first]) > fabs(s->dir[0][first]);
@@ -6006,7 +6016,7 @@ static int isogi_vol__visit_field(isogi_vol__walk *w, double t_out, isogi_hit *h
             return 0;
         }
         if (before == !w->inside) { /* goes on as it came, and has crossed the surface again right behind the start */
-            const double t = (next.value >= 0) == before ? isogi_vol__field_root(w, &next, &at, before) : next.t;
+            const double t = w->exact && (next.value >= 0) == before ? isogi_vol__field_root(w, &next, &at, before) : next.t;
             isogi_vol__local(w, t, from);
             isogi_vol__emit(w, t, from, before ? -1 : 1, hit);
             return 1;
