@@ -4008,6 +4008,7 @@ static isogi_result isogi_trace__feedback_step(isogi_trace *t, uint64_t max_rays
     isogi_result result = isogi_trace__nodes_make(t);
     while (result == ISOGI_OK && (t->wanted || f->unpublished)) {
         uint64_t used = t->counters.rays - begin;
+        const size_t cursor = f->cursor, probe_cursor = f->probe_cursor;
         double all = (double)(t->wanted + t->done) * t->scene.desc.samples, left;
         if (max_rays && used >= max_rays) break;
         isogi_trace__spans_fill(t, max_rays ? (max_rays - used) / each + 1 : UINT64_MAX);
@@ -4017,6 +4018,7 @@ static isogi_result isogi_trace__feedback_step(isogi_trace *t, uint64_t max_rays
             result = isogi_trace__spans_run(t, isogi_trace__lerp(t->share[0], t->share[1], left),
                                             isogi_trace__lerp(t->share[0], t->share[1], left + (f->on_probes ? 0 : (double)f->sample_count / all)));
         else isogi_trace__level_end(t), result = isogi_trace__nodes_make(t);
+        if (result != ISOGI_OK && f->span_count) f->cursor = cursor, f->probe_cursor = probe_cursor; /* the batch is still to come */
     }
     return result;
 }

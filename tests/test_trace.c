@@ -873,11 +873,12 @@ TEST(every_allocation_may_fail) {
     float points[20][3];
     surface_points(&s, 0, 20, 22, points);
     for (int i = 0; i < 128; i++) image[i / 16][i % 16][0] = image[i / 16][i % 16][1] = image[i / 16][i % 16][2] = i == 37 ? 900 : 1;
-    for (int variant = 0; variant < 3; variant++) {
+    for (int variant = 0; variant < (LONG_SUITE ? 5 : 4); variant++) {
         isogi_trace_desc d = desc_make(&s, 0.5f, 1, 2);
         failing f = {0, 0, 0};
         long k;
-        d.lazy = variant == 1, d.mode = variant == 2 ? ISOGI_TRACE_TRANSFER : ISOGI_TRACE_IRRADIANCE, d.order = 2;
+        if (variant > 2) d.method = ISOGI_TRACE_FEEDBACK;
+        d.lazy = variant == 1 || variant == 4, d.mode = variant == 2 ? ISOGI_TRACE_TRANSFER : ISOGI_TRACE_IRRADIANCE, d.order = 2;
         if (variant < 2) memset(&d.lighting.env, 0, sizeof d.lighting.env), d.lighting.env.rgb = &image[0][0][0], d.lighting.env.width = 16, d.lighting.env.height = 8;
         for (k = 1; k < 5000; k++) {
             /* room for a brick's values that is lacking once is asked for again in the same step: that may end well */
@@ -905,20 +906,23 @@ TEST(cancelled_bakes_can_go_on) {
     float points[100][3], first[100][3], e[100][3];
     int n = surface_points(&s, 0, 100, 23, points);
     d.lighting.lights = &sun, d.lighting.light_count = 1;
-    bake_and_sample(&d, NULL, (const float(*)[3])points, n, first);
-    for (int threads = 1; threads < 4; threads += 2) {
+    for (int way = 0; way < 4; way++) { /* paths and feedback, by one thread and by three */
+        const int threads = way % 2 ? 3 : 1;
         isogi_context context;
         progress_log log = {0, 0, 0, 1};
         isogi_trace *t = NULL;
         double remaining = 1;
         int cancelled = 0;
+        d.method = way < 2 ? ISOGI_TRACE_PATHS : ISOGI_TRACE_FEEDBACK;
+        bake_and_sample(&d, NULL, (const float(*)[3])points, n, first);
         memset(&context, 0, sizeof context);
         context.progress = progress_count, context.user = &log, context.threads = threads;
         isogi_trace_create(&t, &d, &context);
         for (int i = 0; i < 1000; i++) {
             isogi_result result;
             double before = remaining;
-            log.calls = 0, log.cancel_at = i < 10 ? 1 : 0;
+            log.calls = 0, log.cancel_at = i < 10 ? 1 + (way < 2 ? 0 : i % 3) : 0;
+            if (way >= 2) log.last = 0; /* feedback begins a batch anew */
             result = isogi_trace_step(t, 0, &remaining);
             cancelled += result == ISOGI_CANCELLED;
             CHECK(result == ISOGI_OK || remaining >= before, "a cancelled step wrote %g", remaining);
