@@ -63,8 +63,9 @@
      Validity               A texel is left out of every lookup where no surface passes at its place: none of the voxels of the cells
                             around it is lower than v (constant air, local minima: there f >= v all around, such a texel would see the
                             sky through everything), where a voxel is not finite, or where the gradient vanishes. With desc.capped the
-                            border's texels, which face out of the box, are always valid. On the high side a texel needs matter
-                            to look through: a quarter, half or a whole voxel along its normal must be inside (local maxima are not).
+                            border's texels, which face out of the box, are always valid on the low side. On the high side a texel
+                            needs matter to look through: one of the places a quarter, half and a whole voxel into the matter must
+                            be inside (local maxima have none).
      Lookup                 desc.lookup; trilinear unless told otherwise: among the eight texels around the point, those that are
                             valid; their weights are made to sum to 1 again. So an invalid texel neither darkens nor
                             brightens its neighbours. Where none of the eight is valid, the nearest valid one of the 4x4x4
@@ -145,8 +146,8 @@
    Limits       Order 6; 2^24 samples; paths end after 10000 reflections. White surfaces that enclose a light truly have infinite
                 light: what is computed then is finite and has no meaning; its error says so, and isogi_trace_report.diverges.
    Cost         PATHS: samples * (1 + lights that have a size) rays for a texel, and as many for each reflection. FEEDBACK:
-                samples * (1 + half of these lights), each of the first four with all lights; for each probe as if by a
-                fifth of the samples, but 2 to 8.
+                samples * (1 + half of these lights), each of the first four with all lights; for each probe as if by as many
+                samples as hits read it, 1 (2 where the albedo is above .9) to 8.
 
    History  1.0  first release
 */
