@@ -1,5 +1,5 @@
 /* On which side of the surface rays of isogi_vol.h are: sides of all hits against what the field says at both ends of a ray, dips and
-   bumps as narrow as rounding allows, and the caps of borders, next to voxels that are not finite too. */
+   bumps as narrow as rounding allows, and the caps of borders, next to voxels that are not finite too. Huge values and long volumes. */
 #define ISOGI_IMPLEMENTATION
 #include "isogi_vol.h"
 #include "ray_fields.h"
@@ -320,6 +320,94 @@ TEST(a_function_has_no_cap_where_it_is_not_finite) {
             if (count == 2) CHECK(hits[0].side == 2 && hits[1].side == -2, "%d and %d", hits[0].side, hits[1].side);
         }
         isogi_vol_free(p);
+    }
+}
+
+/* Where values are so large or small that their squares leave the range of double, surfaces are left as elsewhere. */
+TEST(huge_and_tiny_values_change_no_hit) {
+    enum { N = 24, RAYS = 300 };
+    static const double scales[5] = {1, 1e110, 1e200, 1e-150, 1e-290};
+    static float value[N * N * N];
+    static isogi_ray rays[RAYS];
+    static isogi_hit hits[RAYS * MOST];
+    size_t counts[RAYS], first[RAYS];
+    test_random r = {77};
+    long all = 0;
+    for (int i = 0; i < N * N * N; i++) {
+        const double x = 0.5 * (i % N), y = 0.5 * (i / N % N), z = 0.5 * (i / N / N);
+        value[i] = (float)(sin(x) * cos(y) + sin(y) * cos(z) + sin(z) * cos(x));
+    }
+    for (int i = 0; i < RAYS; i++)
+        for (int a = 0; a < 3; a++) rays[i].dir[a] = (float)random_range(&r, -0.5, 0.5), rays[i].origin[a] = random_range(&r, 0, N - 1) - 80 * (double)rays[i].dir[a];
+    for (int path = 0; path < PATHS; path++)
+        for (int k = 0; k < 5; k++) {
+            const isogi_volume volume = {.data = value, .type = ISOGI_F32, .size = {N, N, N}, .scale = scales[k]};
+            isogi_pyramid *p = build_on(&volume, path);
+            isogi_vol_intersect_all(p, rays, RAYS, MOST, hits, counts, NULL);
+            for (int i = 0; i < RAYS; i++) {
+                if (!k && !path) first[i] = counts[i], all += (long)counts[i];
+                CHECK(counts[i] == first[i], "scale %g, path %d, ray %d: %d hits, not %d", scales[k], path, i, (int)counts[i], (int)first[i]);
+                isogi_hit hit = hits[(size_t)i * MOST];
+                size_t found = 0;
+                for (; counts[i] && hit.side && found < MOST; found++) isogi_vol_continue(p, &hit, (const float(*)[3])&rays[i].dir, NULL, 0, 0, 1, &hit, NULL);
+                CHECK(found == first[i], "scale %g, path %d, ray %d: %d continued, not %d", scales[k], path, i, (int)found, (int)first[i]);
+            }
+            isogi_vol_free(p);
+        }
+    CHECK(all > RAYS, "%ld hits", all);
+}
+
+TEST(integers_that_become_infinite_are_refused) {
+    static const isogi_type types[4] = {ISOGI_U8, ISOGI_I8, ISOGI_U16, ISOGI_I16};
+    static const double largest[4] = {255, -128, 65535, -32768};
+    static const uint16_t zeros[8] = {0};
+    for (int i = 0; i < 4; i++) {
+        isogi_volume v = {.data = zeros, .type = types[i], .size = {2, 2, 2}, .scale = 1.7e308 / largest[i]};
+        CHECK(isogi_volume_validate(&v) == ISOGI_OK, "type %d", i);
+        v.scale *= -1.1;
+        CHECK(isogi_volume_validate(&v) == ISOGI_INVALID, "type %d, scale", i);
+        v.scale = 1.7e308 / largest[i], v.bias = -1e308;
+        CHECK(isogi_volume_validate(&v) == ISOGI_INVALID, "type %d, bias", i);
+    }
+}
+
+/* Thousands of cells along one axis, as many levels of nodes as there may be: packets of neighbours on every path. */
+TEST(packets_of_long_volumes_agree) {
+    enum { LONG = 8192, SHORT = 9, RAYS = 64 * 16 };
+    static float value[LONG * SHORT * SHORT];
+    static isogi_ray rays[RAYS];
+    static isogi_hit hits[2][RAYS];
+    test_random r = {78};
+    for (int axis = 0; axis < 3; axis++) {
+        isogi_volume volume = {.data = value, .type = ISOGI_F32, .size = {SHORT, SHORT, SHORT}};
+        isogi_pyramid *p[2];
+        long found = 0;
+        volume.size[axis] = LONG;
+        for (size_t i = 0; i < sizeof value / sizeof *value; i++) {
+            const size_t at[3] = {i % volume.size[0], i / volume.size[0] % volume.size[1], i / volume.size[0] / volume.size[1]};
+            const size_t b = at[(axis + 1) % 3], c = at[(axis + 2) % 3];
+            value[i] = (float)((double)b + 0.3 * sin(0.01 * (double)at[axis]) - 0.001 * (double)at[axis] + 0.2 * (double)c);
+        }
+        p[0] = build_on(&volume, 1), p[1] = build_on(&volume, 4);
+        for (int i = 0; i < RAYS; i += 16) { /* nearly along the axis, up or down */
+            const int down = random_bits(&r) & 1;
+            double origin[3], dir[3];
+            for (int a = 0; a < 3; a++) origin[a] = random_range(&r, 0, SHORT - 1), dir[a] = random_range(&r, -0.0006, 0.0006);
+            origin[axis] = down ? LONG + 5 : -5, dir[axis] = down ? -1 : 1;
+            for (int k = i; k < i + 16; k++) {
+                memset(&rays[k], 0, sizeof rays[k]), rays[k].isovalue = 0.5;
+                for (int a = 0; a < 3; a++) rays[k].origin[a] = origin[a] + random_range(&r, -0.1, 0.1), rays[k].dir[a] = (float)(dir[a] + random_range(&r, -1e-5, 1e-5));
+            }
+        }
+        for (int way = 0; way < 2; way++)
+            for (int i = 0; i < RAYS; i += 16) isogi_vol_intersect(p[way], rays + i, 16, hits[way] + i, NULL);
+        for (int i = 0; i < RAYS; i++) {
+            found += hits[0][i].side != 0;
+            CHECK(hits[0][i].side == hits[1][i].side && fabs(hits[0][i].t - hits[1][i].t) < 1e-9, "axis %d, ray %d: side %d at %.12g, not %d at %.12g", axis, i, hits[1][i].side, hits[1][i].t,
+                  hits[0][i].side, hits[0][i].t);
+        }
+        CHECK(found > RAYS / 4, "axis %d: %ld hits", axis, found);
+        isogi_vol_free(p[0]), isogi_vol_free(p[1]);
     }
 }
 
