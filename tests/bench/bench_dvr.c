@@ -464,7 +464,7 @@ int main(int argc, char **argv) {
         else if (!strcmp(argv[i], "--only") && i + 1 < argc) only = argv[++i];
         else path = argv[i];
     }
-    if (!path || !(csv = fopen(path, "w"))) return fprintf(stderr, "usage: %s [--quick] [--only SCENE] OUT.csv\n", argv[0]), 2;
+    if (!path || path[0] == '-' || !(csv = fopen(path, "w"))) return fprintf(stderr, "usage: %s [--quick] [--only SCENE] OUT.csv\n", argv[0]), 2;
     fprintf(csv, "header,case,method,setting,seconds,error,work,unit\n");
     for (int f = only ? 2 : 0; f < 2; f++) {
         size_t n = (size_t)N, i;

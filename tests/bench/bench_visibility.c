@@ -311,7 +311,7 @@ int main(int argc, char **argv) {
         else if (!strcmp(argv[i], "--only") && i + 1 < argc) only = argv[++i];
         else path = argv[i];
     }
-    if (!path || !(csv = fopen(path, "w"))) return fprintf(stderr, "usage: %s [--quick] [--only SCENE] [--sweeps] OUT.csv\n", argv[0]), 2;
+    if (!path || path[0] == '-' || !(csv = fopen(path, "w"))) return fprintf(stderr, "usage: %s [--quick] [--only SCENE] [--sweeps] OUT.csv\n", argv[0]), 2;
     fprintf(csv, "header,case,method,setting,seconds,error,work,unit\n");
     if (!only || !strcmp(only, "torus-sphere-plane")) bench_procedural();
     for (int which = 0; which < 3 && !quick; which++)

@@ -304,7 +304,7 @@ int main(int argc, char **argv) {
         if (!strcmp(argv[i], "--quick")) quick = 1, runs = 3, sampled = 1000;
         else path = argv[i];
     }
-    csv = path ? fopen(path, "w") : NULL;
+    csv = path && path[0] != '-' ? fopen(path, "w") : NULL;
     if (!csv) return fprintf(stderr, "usage: bench_vol [--quick] OUT.csv\n"), 2;
     fprintf(csv, "header,case,method,setting,seconds,error,work,unit\n");
     for (int gyroid = 0; gyroid < 2; gyroid++) {
