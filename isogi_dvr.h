@@ -324,8 +324,9 @@ ISOGI_API void isogi_dvr_free(isogi_dvr *dvr); /* NULL is fine */
    classes of values), not to the bit; brute force does to the bit. */
 ISOGI_API isogi_result isogi_dvr_set_transfer(isogi_dvr *dvr, const isogi_transfer *transfer);
 
-/* Computes visibility within about max_rays rays, at least one grid point, block or direction (0 = to the end); voxels that have to be
-   read for it, after a change, count too. *remaining (may be NULL): fraction still to do, 0 = finished. When cancelled, what is
+/* Computes visibility within about max_rays rays (0 = to the end), at least one grid point (brute force), block or direction (the paper's
+   method), plane of the lattice or direction (sweeps). Voxels that have to be read for it, after a change, count too: four of a plane
+   as a ray, a block as 64 rays for each direction. *remaining (may be NULL): fraction still to do, 0 = finished. When cancelled, what is
    finished stays and the next call goes on. Without ISOGI_DVR_VISIBILITY there is nothing to do. */
 ISOGI_API isogi_result isogi_dvr_step(isogi_dvr *dvr, uint64_t max_rays, double *remaining);
 
@@ -1157,23 +1158,18 @@ static double isogi_dvr__entry(const isogi_dvr__integral *g, double value) {
 
 /* Places of the points, from the one below `low` on, and the values of the entries. */
 static void isogi_dvr__set_nodes(isogi_dvr__integral *g) {
-    double whole = 0, first, last = (double)(g->side - 1), from = g->low, entry = 0;
-    size_t pass, i, n;
-    for (pass = 0; pass < 2; pass++) { /* places in pieces; then in entries */
-        size_t below, above;
-        double u;
-        for (i = 0; i < g->count; i++) {
-            const isogi_transfer_point *p = &g->points[i];
-            int counts = i && p->value > p[-1].value && !isogi_dvr__alike(p, p - 1);
-            g->place[i] = (i ? g->place[i - 1] : 0) + (counts ? pass ? 0.5 * last / whole : 1 : 0);
-        }
-        u = isogi_dvr__piece(g->points, g->count, g->low, &below, &above);
-        first = g->place[below] + u * (g->place[above] - g->place[below]);
-        u = isogi_dvr__piece(g->points, g->count, g->high, &below, &above);
-        whole = g->place[below] + u * (g->place[above] - g->place[below]) - first;
-        if (pass || !(whole > 0)) break;
+    double whole, first, last = (double)(g->side - 1), from = g->low, entry = 0, share;
+    size_t i, n, below, above;
+    for (i = 0; i < g->count; i++) { /* in pieces that change and are seen */
+        const isogi_transfer_point *p = &g->points[i];
+        int counts = i && p->value > p[-1].value && !isogi_dvr__alike(p, p - 1) && (p->extinction > 0 || p[-1].extinction > 0);
+        g->place[i] = (i ? g->place[i - 1] : 0) + counts;
     }
-    for (i = 0; i < g->count; i++) g->place[i] -= first;
+    share = isogi_dvr__piece(g->points, g->count, g->low, &below, &above);
+    first = g->place[below] + share * (g->place[above] - g->place[below]);
+    share = isogi_dvr__piece(g->points, g->count, g->high, &below, &above);
+    whole = g->place[below] + share * (g->place[above] - g->place[below]) - first;
+    for (i = 0; i < g->count; i++) g->place[i] = whole > 0 ? 0.5 * last / whole * (g->place[i] - first) : 0; /* in entries */
     g->by_value = (whole > 0 ? 0.5 : 1) * last / (0.5 * g->high - 0.5 * g->low);
     for (i = n = 0; i < g->side; i++) {
         double to = g->high, end = last, u;
@@ -2545,6 +2541,13 @@ static double isogi_dvr__slope_depth(const isogi_dvr__march *m, double depth, do
     return opacity < 1 ? -log1p(-opacity) : 1e30;
 }
 
+/* The block of level n that holds the cell `c`. */
+static size_t isogi_dvr__block_at(const isogi_dvr *d, int n, const int c[3]) {
+    const size_t *size = d->level[n].size;
+    int shift = 2 + 2 * n;
+    return (size_t)(c[0] >> shift) + size[0] * ((size_t)(c[1] >> shift) + size[1] * (size_t)(c[2] >> shift));
+}
+
 /* Steps over the largest empty block around the cell `c`, in which the sample at t lies: 1 if there is one. The next sample is the
    first that may lie outside: a rounding error too early does no harm, since it is looked at like any other. 2 where the block has one
    extinction and one colour, and whole pieces of the ray lie in it: those make one. */
@@ -2556,7 +2559,7 @@ static int isogi_dvr__skip(isogi_dvr__march *m, const int c[3], double t) {
         const isogi_level *level = &d->level[n];
         int shift = 2 + 2 * n;
         double leave = m->length, first;
-        size_t block = (size_t)(c[0] >> shift) + level->size[0] * ((size_t)(c[1] >> shift) + level->size[1] * (size_t)(c[2] >> shift));
+        size_t block = isogi_dvr__block_at(d, n, c);
         int steady = m->unlit && d->steady[n] && d->steady[n][block];
         m->work.blocks++;
         if (!d->empty[n][block] && !steady) continue;
@@ -2667,14 +2670,14 @@ static void isogi_dvr__begin_walk(isogi_dvr__walk *w, isogi_dvr__march *m) {
 }
 
 static int isogi_dvr__block_empty(isogi_dvr__march *m, int n, const int c[3]) {
-    const size_t *size = m->dvr->level[n].size;
-    int shift = 2 + 2 * n;
     m->work.blocks++;
-    return m->dvr->empty[n][(size_t)(c[0] >> shift) + size[0] * ((size_t)(c[1] >> shift) + size[1] * (size_t)(c[2] >> shift))];
+    return m->dvr->empty[n][isogi_dvr__block_at(m->dvr, n, c)];
 }
 
-/* Steps over the largest empty block around the cell: 1 if there is one; what is empty is so in every smaller block. The cell it lands in follows from integers along the axis that
-   leads out, and lies within the block's reach along the others, so that rounding can neither turn the ray back nor lose it. */
+/* Steps over the largest empty block around the cell: 1 if there is one. Where the smallest block is not empty, no larger one is: ranges of
+   values contain those of their parts, and isogi_dvr__mark_cut marks with a block what it is made of. The cell it lands in follows
+   from integers along the axis that leads out, and lies within the block's reach along the others, so that rounding can neither turn the
+   ray back nor lose it. */
 static int isogi_dvr__leave_block(isogi_dvr__walk *w) {
     isogi_dvr__march *m = w->m;
     const isogi_dvr *d = m->dvr;
@@ -2685,7 +2688,7 @@ static int isogi_dvr__leave_block(isogi_dvr__walk *w) {
         const isogi_level *level = &d->level[n];
         int shift = 2 + 2 * n, axis = -1, first[3];
         double leave = m->length;
-        size_t block = (size_t)(c[0] >> shift) + level->size[0] * ((size_t)(c[1] >> shift) + level->size[1] * (size_t)(c[2] >> shift));
+        size_t block = isogi_dvr__block_at(d, n, c);
         if (n && !isogi_dvr__block_empty(m, n, c)) continue;
         m->work.blocks_skipped++;
         if (level->range[block][0] > level->range[block][1]) w->chained = 0; /* no finite value */
@@ -4320,8 +4323,9 @@ static isogi_result isogi_dvr__prepare(isogi_dvr *d, uint64_t *max_rays, double 
     return result;
 }
 
-/* Units of work and the rays of each: brute force goes on by grid points, sweeps by directions, the paper's method by blocks (whose
-   rays are short: they are taken for 64 points') and then by directions. */
+/* Units of work and the rays of each: brute force goes on by grid points, sweeps by planes of the lattice (four voxels are taken for a
+   ray) and then by directions, the paper's method by blocks (whose voxels, and then whose short rays, are taken for 64 points') and then
+   by directions. */
 ISOGI_API isogi_result isogi_dvr_step(isogi_dvr *dvr, uint64_t max_rays, double *remaining) {
     isogi_result result = ISOGI_OK;
     uint64_t units, rays;
@@ -4330,8 +4334,8 @@ ISOGI_API isogi_result isogi_dvr_step(isogi_dvr *dvr, uint64_t max_rays, double 
     int go_on = 1;
     if (!dvr) return ISOGI_INVALID;
     if (dvr->transparent && dvr->point_count && (isogi_dvr__by_value(dvr) || !dvr->transfer.peak_count)) {
-        max_rays = 0;
-        if (dvr->method == ISOGI_DVR_PAPER) result = isogi_dvr__prepare(dvr, &max_rays, NULL, &go_on);
+        /* all blocks are dropped, whatever values they hold: no voxel is read */
+        if (dvr->method == ISOGI_DVR_PAPER && !dvr->blocks.ready) result = isogi_dvr__update_blocks(dvr);
         if (result != ISOGI_OK) return result;
         isogi_dvr__clear_visibility(dvr);
         if (remaining) *remaining = 0;

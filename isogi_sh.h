@@ -391,6 +391,10 @@ static int isogi_sh__finite_f32(float x) {
     return (bits & 0x7f800000u) != 0x7f800000u;
 }
 
+ISOGI_SH__INLINE double isogi_sh__get(const void *in, int is_double, int i) {
+    return is_double ? ((const double *)in)[i] : (double)((const float *)in)[i];
+}
+
 /* |x| < limit; not for NaN */
 ISOGI_SH__INLINE int isogi_sh__below(float x, float limit) {
     uint32_t bits, most;
@@ -2109,8 +2113,7 @@ static void isogi_sh__sum(double *value, const void *c, int is_double, int order
         for (l = m; l < order; l++) {
             int plus = channels * (l * (l + 1) + m), minus = channels * (l * (l + 1) - m);
             for (k = 0; k < channels; k++) {
-                double a = is_double ? ((const double *)c)[plus + k] : (double)((const float *)c)[plus + k];
-                double b = is_double ? ((const double *)c)[minus + k] : (double)((const float *)c)[minus + k];
+                double a = isogi_sh__get(c, is_double, plus + k), b = isogi_sh__get(c, is_double, minus + k);
                 value[k] += q[l] * (cm * a + sm * b);
             }
         }
@@ -2665,7 +2668,7 @@ static void isogi_sh__rotate(void *out, const void *in, int is_double, int order
     isogi_sh__turns_start(&turns, order, e);
     if (channels == 1 && l == 0) {
         int low = order < 5 ? order * order : 25;
-        for (i = 0; i < low; i++) band[i] = is_double ? ((const double *)in)[i] : (double)((const float *)in)[i];
+        for (i = 0; i < low; i++) band[i] = isogi_sh__get(in, is_double, i);
         isogi_sh__rotate_low(band, order, &turns);
         for (i = 0; i < low; i++) {
             if (is_double) ((double *)out)[i] = band[i];
@@ -2679,10 +2682,7 @@ static void isogi_sh__rotate(void *out, const void *in, int is_double, int order
             int some = channels - first < ISOGI_SH__TOGETHER ? channels - first : ISOGI_SH__TOGETHER;
             int at = channels * l * l + first;
             for (i = 0; i <= 2 * l; i++)
-                for (k = 0; k < some; k++) {
-                    int j = at + channels * i + k;
-                    band[some * i + k] = is_double ? ((const double *)in)[j] : (double)((const float *)in)[j];
-                }
+                for (k = 0; k < some; k++) band[some * i + k] = isogi_sh__get(in, is_double, at + channels * i + k);
             isogi_sh__rotate_band(band, other, l, some, &turns);
             for (i = 0; i <= 2 * l; i++)
                 for (k = 0; k < some; k++) {
@@ -2740,21 +2740,32 @@ ISOGI_API isogi_result isogi_sh_rotate(float *out, const float *in, int order, i
     return isogi_sh__rotate_f32(out, in, order, channels, m);
 }
 
+/* Where coefficients or a matrix go. */
+typedef struct isogi_sh__blocks {
+    void *data;
+    int is_double;
+} isogi_sh__blocks;
+
+ISOGI_SH__INLINE void isogi_sh__put(const isogi_sh__blocks *out, int i, double value) {
+    if (out->is_double) ((double *)out->data)[i] = value;
+    else ((float *)out->data)[i] = (float)value;
+}
+
 static isogi_result isogi_sh__rotate_z(void *out, const void *in, int is_double, int order, int channels, double angle) {
     double power[ISOGI_SH_MAX_ORDER][2];
+    isogi_sh__blocks to;
     int l, m, k;
     if (!out || !in || !isogi_sh__shape_ok(order, channels) || !isogi_sh__finite_f64(angle)) return ISOGI_INVALID;
+    to.data = out, to.is_double = is_double;
     isogi_sh__powers(power, order, cos(angle), sin(angle));
     for (l = 0; l < order; l++)
         for (m = 0; m <= l; m++)
             for (k = 0; k < channels; k++) {
                 int plus = channels * (l * (l + 1) + m) + k, minus = channels * (l * (l + 1) - m) + k;
-                double p = is_double ? ((const double *)in)[plus] : (double)((const float *)in)[plus];
-                double q = is_double ? ((const double *)in)[minus] : (double)((const float *)in)[minus];
+                double p = isogi_sh__get(in, is_double, plus), q = isogi_sh__get(in, is_double, minus);
                 double x = p * power[m][0] - q * power[m][1], y = p * power[m][1] + q * power[m][0];
                 if (m == 0) x = p, y = p;
-                if (is_double) ((double *)out)[plus] = x, ((double *)out)[minus] = y;
-                else ((float *)out)[plus] = (float)x, ((float *)out)[minus] = (float)y;
+                isogi_sh__put(&to, plus, x), isogi_sh__put(&to, minus, y);
             }
     return ISOGI_OK;
 }
@@ -2765,17 +2776,6 @@ ISOGI_API isogi_result isogi_sh_rotate_z(float *out, const float *in, int order,
 
 ISOGI_API isogi_result isogi_sh_rotate_z_f64(double *out, const double *in, int order, int channels, double angle) {
     return isogi_sh__rotate_z(out, in, 1, order, channels, angle);
-}
-
-/* Where a matrix goes. */
-typedef struct isogi_sh__blocks {
-    void *data;
-    int is_double;
-} isogi_sh__blocks;
-
-ISOGI_SH__INLINE void isogi_sh__put(const isogi_sh__blocks *out, int i, double value) {
-    if (out->is_double) ((double *)out->data)[i] = value;
-    else ((float *)out->data)[i] = (float)value;
 }
 
 /* What Wigner's d of one angle b needs, for orders up to ISOGI_SH__TURNS + 1. */

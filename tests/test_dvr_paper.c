@@ -45,7 +45,10 @@ TEST(spherical_harmonics_are_orthonormal_on_divided_solids) {
 }
 
 /* A place beside an opaque half space sees exactly half of the sphere: pi under the square root for the mean, sqrt(3 pi) / 2 up. And a slab
-   of depth q above it lets exp(-q / cos) through: mean 2 E_2(q), by a fine midpoint rule. Each set of directions, by brute force and sweeps. */
+   of depth q above it lets exp(-q / cos) through, less where a ray leaves the box by a side before the slab's end: by a midpoint rule over
+   80,000 directions. Each set of directions, by brute force and sweeps: some 35 of 500 parts of the sphere lie on the slab's horizon and
+   count whole or not at all, wrong by .29 of a part each: sqrt(35) .29 / 500 = .34 % of 4 pi, times at most .49, is .021; 3.3 times that is
+   allowed, and less than half of it where the slab takes half of the light or less. */
 TEST(slabs_are_seen_by_every_set_of_directions) {
     enum { N = 49 };
     field f = field_of(half_height, N);
@@ -55,7 +58,6 @@ TEST(slabs_are_seen_by_every_set_of_directions) {
         const isogi_transfer_point p[] = {{low, {1, 1, 1}, 0}, {low, {1, 1, 1}, (float)(depth / 8)}, {high, {1, 1, 1}, (float)(depth / 8)}, {high, {1, 1, 1}, 0}};
         const isogi_transfer transfer = {p, 4, NULL, 0};
         double expected[4] = {0};
-        /* seen from below, over a box that is no wider than 49 voxels: where a ray leaves by a side it has less of the slab to pass */
         for (int i = 0; i < 200; i++)
             for (int j = 0; j < 400; j++) {
                 double z = (i + 0.5) / 100 - 1, phi = (j + 0.5) * 2 * PI / 400, r = sqrt(1 - z * z), t0 = 14 / z, t1 = 22 / z, side, clear = 1, d[3] = {r * cos(phi), r * sin(phi), z}, y[4];
@@ -142,8 +144,9 @@ TEST(blocks_are_raised_in_the_order_of_their_significance) {
                 if (!from || to == 16) continue;
                 double cost[2] = {7.0 * from * from * from, 7.0 * to * to * to}, gain[2] = {significance[a] / from / cost[0], significance[b] / to / cost[1]};
                 /* 64 bins of values stand for the values: a quarter; means are those of wider boxes than blocks */
-                CHECK(cost[1] > cost[0] || gain[1] < 1.25 * gain[0], "reduction %g: block %d raised from %d for %g, block %d not from %d for %g", reduction, a, from, gain[0], b, to, gain[1]);
-                raised += from && to < 16;
+                if (cost[1] > cost[0]) continue;
+                raised++;
+                CHECK(gain[1] < 1.25 * gain[0], "reduction %g: block %d raised from %d for %g, block %d not from %d for %g", reduction, a, from, gain[0], b, to, gain[1]);
             }
         isogi_dvr_free(dvr);
     }
@@ -236,6 +239,36 @@ TEST(what_is_read_after_a_change_counts_against_the_budget) {
         }
         CHECK(!memcmp(v[0], v[1], sizeof v[0]) && !memcmp(v[0], v[2], sizeof v[0]), "method %d: steps end elsewhere", method);
         CHECK(v[0][13][0] > 0.1f && v[0][13][0] < 3.4f, "method %d: %g in the middle", method, (double)v[0][13][0]);
+    }
+    field_free(&f);
+}
+
+static size_t all_tasks;
+static void summed_for(void *user, size_t n, void (*task)(void *, size_t), void *arg) { all_tasks += n, counted_for(user, n, task, arg); }
+
+/* Blocks that a transparent function drops are not read, between functions or at first; a function that shows them has them read. */
+TEST(what_is_transparent_is_not_read) {
+    field f = field_noise(65, 4);
+    const isogi_context context = {.parallel_for = summed_for, .threads = 1};
+    const isogi_transfer_point a[] = {{-1, {1, 1, 1}, 0}, {1, {1, 1, 1}, 0}}, b[] = {{-0.5, {1, 1, 1}, 0}, {0.8, {1, 1, 1}, 0.2f}}, c[] = {{-0.7, {1, 1, 1}, 0}, {0.6, {1, 1, 1}, 0.2f}};
+    const isogi_transfer clear = {a, 2, NULL, 0}, first = {b, 2, NULL, 0}, second = {c, 2, NULL, 0};
+    const isogi_dvr_desc desc = {.pyramid = f.pyramid, .shading = ISOGI_DVR_VISIBILITY, .method = ISOGI_DVR_PAPER, .order = 2, .directions = 16, .grid = {5, 5, 5}, .reduction = 20};
+    const float place[] = {32, 32, 32};
+    float v[2][4];
+    for (int before = 0; before < 3; before++) { /* nothing; a function whose voxels are read in part; one that is done */
+        isogi_dvr *dvr = dvr_new_with(&desc, before ? &first : &clear, &context), *fresh = dvr_new_with(&desc, &second, &context);
+        double remaining = 1;
+        CHECK(!before || isogi_dvr_step(dvr, before == 1, NULL) == ISOGI_OK, "step");
+        const size_t counted = dvr->blocks.counted;
+        CHECK(counted == (before == 0 ? 0u : before == 1 ? 1u : dvr->blocks.total) && isogi_dvr_set_transfer(dvr, &clear) == ISOGI_OK, "%zu blocks read", counted);
+        all_tasks = 0;
+        CHECK(isogi_dvr_step(dvr, 1, &remaining) == ISOGI_OK && !(remaining > 0), "transparent: %g left", remaining);
+        /* data laid out for five levels, of no block */
+        CHECK(dvr->blocks.counted == counted && all_tasks <= 5 * dvr->blocks.total && !dvr->blocks.data_count, "%zu tasks for %zu blocks", all_tasks, dvr->blocks.total);
+        CHECK(isogi_dvr_set_transfer(dvr, &second) == ISOGI_OK && isogi_dvr_step(dvr, 0, NULL) == ISOGI_OK && isogi_dvr_step(fresh, 0, NULL) == ISOGI_OK, "step");
+        CHECK(isogi_dvr_sample_visibility(dvr, &place, 1, v[0]) == ISOGI_OK && isogi_dvr_sample_visibility(fresh, &place, 1, v[1]) == ISOGI_OK, "sample");
+        CHECK(dvr->blocks.counted == dvr->blocks.total && !memcmp(v[0], v[1], sizeof v[0]) && v[0][0] < 3.4f, "%g, not %g", (double)v[0][0], (double)v[1][0]);
+        isogi_dvr_free(dvr), isogi_dvr_free(fresh);
     }
     field_free(&f);
 }

@@ -1006,7 +1006,15 @@ TEST(matrices_are_what_they_say) {
     CHECK(isogi_sh_rotate_z(m, m, 3, 1, NAN) == ISOGI_INVALID, "%s", "angle");
 }
 
-/* In double, of vectors of any length: rotations orthonormal to 1e-15 each way, that agree with each other, with the float ones to their
+/* Rodrigues' formula, for half the angle's sine along the axis and cosine, of any length: long double, from the vectors as they are rounded. */
+static void turn_of(long double m[9], long double w, const double axis[3], long double s) {
+    long double a[3] = {axis[0] * s, axis[1] * s, axis[2] * s}, norm = sqrtl(w * w + a[0] * a[0] + a[1] * a[1] + a[2] * a[2]);
+    w /= norm, a[0] /= norm, a[1] /= norm, a[2] /= norm;
+    for (int i = 0; i < 3; i++)
+        for (int k = 0; k < 3; k++) m[3 * i + k] = 2 * a[i] * a[k] + (i == k ? 2 * w * w - 1 : (k == (i + 1) % 3 ? -2 : 2) * w * a[3 - i - k]);
+}
+
+/* In double, of vectors of any length: rotations to 1e-15 each entry, orthonormal to 2e-15, that agree with the float ones to their
    rounding, and with rotations about z alone. What is wrong is reported, and leaves the matrix. */
 TEST(matrices_in_double) {
     static const double lengths[] = {1, 3, 1e-320, 1e-160, 1e160, 1.5e308};
@@ -1015,7 +1023,8 @@ TEST(matrices_in_double) {
     test_random r = {44};
     for (int i = 0; i < 3 * N; i++) c[i] = random_range(&r, -1, 1);
     for (int round = 0; round < 60; round++) {
-        double axis[3], angle = random_range(&r, -7, 7), length = lengths[round % 6], m[9], n[9], v[3], q[4], worst = 0, tolerance = length < 1e-300 ? 1e-3 : 2e-15;
+        double axis[3], angle = random_range(&r, -7, 7), length = lengths[round % 6], m[9], n[9], v[3], q[4], worst = 0, rounding = length < 1e-300 ? 1e-3 : 0, off = 0;
+        long double exact[2][9];
         float mf[9], nf[9], axis_f[3], q_f[4];
         random_direction(&r, axis);
         if (round % 12 < 6) axis[0] = axis[1] = 0, axis[2] = round % 12 < 3 ? 1 : -1;
@@ -1023,13 +1032,16 @@ TEST(matrices_in_double) {
         q[0] = length * cos(angle / 2), q_f[0] = (float)cos(angle / 2);
         CHECK(isogi_sh_matrix_from_axis_angle_f64(m, v, angle) == ISOGI_OK && isogi_sh_matrix_from_quaternion_f64(n, q) == ISOGI_OK, "length %g", length);
         CHECK(isogi_sh_matrix_from_axis_angle(mf, axis_f, angle) == ISOGI_OK && isogi_sh_matrix_from_quaternion(nf, q_f) == ISOGI_OK, "length %g", length);
+        turn_of(exact[0], cosl(angle / 2.0L), v, sinl(angle / 2.0L) / sqrtl((long double)v[0] * v[0] + (long double)v[1] * v[1] + (long double)v[2] * v[2]));
+        turn_of(exact[1], q[0], q + 1, 1);
         for (int i = 0; i < 9; i++) {
             double dot = 0;
             for (int k = 0; k < 3; k++) dot += m[3 * (i / 3) + k] * m[3 * (i % 3) + k];
-            worst = fmax(worst, fmax(fabs(m[i] - n[i]), fabs(dot - (i / 3 == i % 3))));
-            CHECK(fabs(m[i] - (double)mf[i]) < 4e-7 + tolerance && fabs(m[i] - (double)nf[i]) < 4e-7 + tolerance, "length %g, entry %d: %g %g %g", length, i, m[i], (double)mf[i], (double)nf[i]);
+            off = fmax(off, fmax(fabs((double)(m[i] - exact[0][i])), fabs((double)(n[i] - exact[1][i]))));
+            worst = fmax(worst, fabs(dot - (i / 3 == i % 3)));
+            CHECK(fabs(m[i] - (double)mf[i]) < 4e-7 + rounding && fabs(m[i] - (double)nf[i]) < 4e-7 + rounding, "length %g, entry %d: %g %g %g", length, i, m[i], (double)mf[i], (double)nf[i]);
         }
-        CHECK(worst <= tolerance * ROUNDING_FACTOR, "length %g: %g off", length, worst);
+        CHECK(off <= 1e-15 * ROUNDING_FACTOR && worst <= 2e-15 * ROUNDING_FACTOR, "length %g: %g off, orthonormal to %g", length, off, worst);
         if (round % 12 >= 6) continue;
         int order = 1 + round % ORDER, channels = 1 + round % 3, count = order * order * channels;
         CHECK(isogi_sh_rotate_f64(once, c, order, channels, m) == ISOGI_OK && isogi_sh_rotate_z_f64(about, c, order, channels, axis[2] * angle) == ISOGI_OK, "order %d", order);
@@ -1534,21 +1546,23 @@ TEST(instruction_levels_agree) {
 
 /* ---- what is not valid ---- */
 
-/* Every function that takes a matrix, at orders with ways of their own, reports it and writes nothing. */
+/* Every function that takes a matrix, at orders and instruction levels with ways of their own, reports it and writes nothing. */
 static void no_rotation(const float m[9]) {
     static const int orders[] = {1, 2, 3, 4, 5, 6, 16, 17};
     enum { N = ISOGI_SH_ROTATION_COUNT(17) };
     static double out[N], in[N], wide[9];
     static float out_f[N], in_f[N];
     for (int k = 0; k < 9; k++) wide[k] = (double)m[k];
-    for (int o = 0; o < 8; o++) {
-        for (int i = 0; i < N; i++) out[i] = 5, out_f[i] = 5;
-        CHECK(isogi_sh_rotate(out_f, in_f, orders[o], 1, m) == ISOGI_INVALID, "order %d, float", orders[o]);
-        CHECK(isogi_sh_rotate_f64(out, in, orders[o], 1, wide) == ISOGI_INVALID, "order %d, double", orders[o]);
-        CHECK(isogi_sh_rotation_build(out_f, orders[o], m) == ISOGI_INVALID, "order %d, float matrix", orders[o]);
-        CHECK(isogi_sh_rotation_build_f64(out, orders[o], wide) == ISOGI_INVALID, "order %d, double matrix", orders[o]);
-        for (int i = 0; i < N; i++) CHECK(out[i] == 5 && out_f[i] == 5, "order %d writes", orders[o]);
-    }
+    for (instruction_level = 0; instruction_level < 3 && instruction_level <= BEST_LEVEL; instruction_level++)
+        for (int o = 0; o < 8; o++) {
+            for (int i = 0; i < N; i++) out[i] = 5, out_f[i] = 5;
+            CHECK(isogi_sh_rotate(out_f, in_f, orders[o], 1, m) == ISOGI_INVALID, "order %d, level %d, float", orders[o], instruction_level);
+            CHECK(isogi_sh_rotate_f64(out, in, orders[o], 1, wide) == ISOGI_INVALID, "order %d, level %d, double", orders[o], instruction_level);
+            CHECK(isogi_sh_rotation_build(out_f, orders[o], m) == ISOGI_INVALID, "order %d, level %d, float matrix", orders[o], instruction_level);
+            CHECK(isogi_sh_rotation_build_f64(out, orders[o], wide) == ISOGI_INVALID, "order %d, level %d, double matrix", orders[o], instruction_level);
+            for (int i = 0; i < N; i++) CHECK(out[i] == 5 && out_f[i] == 5, "order %d, level %d writes", orders[o], instruction_level);
+        }
+    instruction_level = BEST_LEVEL;
 }
 
 TEST(bad_input_is_reported_and_changes_nothing) {

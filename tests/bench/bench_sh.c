@@ -378,7 +378,10 @@ int main(int argc, char **argv) {
         else if (argv[i][0] != '-') path = argv[i];
         else { path = NULL; break; }
     }
-    if (!path || !(csv = fopen(path, "w"))) {
+    size_t matching = 0;
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) matching += !strncmp(cases[i].name, only, strlen(only));
+    if (!matching) fprintf(stderr, "no case begins with %s\n", only);
+    if (!matching || !path || !(csv = fopen(path, "w"))) {
         fprintf(stderr, "usage: %s [--quick] [--only CASE] OUT.csv\n", argv[0]);
         return 1;
     }
