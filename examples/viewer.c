@@ -1146,19 +1146,26 @@ static int shade_surface(viewer *v) {
 
 /* ---- volume rendering --------------------------------------------------------------------------------------------------------------------------------- */
 
+/* As a transfer file has them. Returns the text's end. */
+static char *points_as_text(const isogi_transfer_point *points, int count, char *at, const char *end) {
+    for (int i = 0; i < count; i++)
+        at += snprintf(at, (size_t)(end - at), "%.17g %.9g %.6f %.6f %.6f\n", points[i].value, (double)points[i].extinction, (double)points[i].rgb[0], (double)points[i].rgb[1],
+                       (double)points[i].rgb[2]);
+    return at;
+}
+
 /* For a volume of which nothing is known: what its histogram suggests. In data space with the isosurface that is asked for, or the one that
    bounds the second class of values; what stands between surfaces is thin then. */
 static int default_transfer(viewer *v) {
     isogi_transfer_point points[ISOGI_SUGGEST_POINTS];
     isogi_dvr_space space = v->o.mode == DVR ? ISOGI_DVR_PHYSICAL : ISOGI_DVR_DATA;
-    char text[4096], *at = text, *end = text + sizeof text;
+    char text[4096], *at, *end = text + sizeof text;
     double threshold;
     isogi_result result = isogi_transfer_suggest(v->pyramid, space, points, &threshold);
     if (result != ISOGI_OK) return fail(v, "a transfer function", result);
     if (v->o.has_iso || v->shape) threshold = v->isovalue;
-    for (int i = 0; i < ISOGI_SUGGEST_POINTS; i++)
-        at += snprintf(at, (size_t)(end - at), "%.17g %.9g %.6f %.6f %.6f\n", points[i].value, fmin((double)points[i].extinction * (space ? 0.4 : 1), 1e30), (double)points[i].rgb[0],
-                       (double)points[i].rgb[1], (double)points[i].rgb[2]);
+    for (int i = 0; i < ISOGI_SUGGEST_POINTS; i++) points[i].extinction = (float)fmin((double)points[i].extinction * (space ? 0.4 : 1), 1e30);
+    at = points_as_text(points, ISOGI_SUGGEST_POINTS, text, end);
     if (space == ISOGI_DVR_DATA) snprintf(at, (size_t)(end - at), "peak %.17g .6 .95 .88 .75\n", threshold);
     return transfer_parse(text, &v->transfer, v->error);
 }
@@ -1166,13 +1173,12 @@ static int default_transfer(viewer *v) {
 /* A preset's colours from where the second class of values is suggested to begin; as dense as what is suggested. */
 static int preset_transfer(viewer *v) {
     isogi_transfer_point points[ISOGI_SUGGEST_POINTS > ISOGI_PRESET_POINTS ? ISOGI_SUGGEST_POINTS : ISOGI_PRESET_POINTS];
-    char text[4096], *at = text, *end = text + sizeof text;
+    char text[4096];
     isogi_result result = isogi_transfer_suggest(v->pyramid, v->o.mode == DVR ? ISOGI_DVR_PHYSICAL : ISOGI_DVR_DATA, points, NULL);
-    if (result == ISOGI_OK) result = isogi_transfer_preset((isogi_preset)v->o.preset, points[1].value, points[5].value, (float)fmin((double)points[v->o.mode == DVR ? 4 : 5].extinction, 1e30), points);
+    if (result != ISOGI_OK) return fail(v, "--preset: what the volume's values suggest", result);
+    result = isogi_transfer_preset((isogi_preset)v->o.preset, points[1].value, points[5].value, (float)fmin((double)points[v->o.mode == DVR ? 4 : 5].extinction, 1e30), points);
     if (result != ISOGI_OK) return file_fail(v->error, "--preset: the volume has a single value");
-    for (int i = 0; i < ISOGI_PRESET_POINTS; i++)
-        at += snprintf(at, (size_t)(end - at), "%.17g %.9g %.6f %.6f %.6f\n", points[i].value, (double)points[i].extinction, (double)points[i].rgb[0], (double)points[i].rgb[1],
-                       (double)points[i].rgb[2]);
+    points_as_text(points, ISOGI_PRESET_POINTS, text, text + sizeof text);
     return transfer_parse(text, &v->transfer, v->error);
 }
 

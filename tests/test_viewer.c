@@ -297,6 +297,42 @@ TEST(depth_is_written_as_a_float_map) {
     }
 }
 
+/* An opaque box of which a plane leaves the lower half: rows go from the bottom up, and of a pixel's samples the nearest is kept, so that
+   with more of them no pixel is lost and none is farther. */
+TEST(depth_goes_from_the_bottom_up_and_keeps_the_nearest_sample) {
+    enum { W = 40, H = 30 };
+    static float depth[2][W * H];
+    unsigned char box[8 * 8 * 8];
+    char path[256], command[1024];
+    memset(box, 9, sizeof box);
+    strcpy(path, temporary("half_8x8x8_uint8.raw"));
+    write_bytes(path, box, sizeof box);
+    write_bytes(temporary("half.tf"), "0 1e6 1 1 1\n", 11);
+    for (int n = 0; n < 2; n++) { /* one sample; sixteen */
+        static unsigned char map[14 + 4 * W * H + 1];
+        snprintf(command, sizeof command, "'%s' --mode dvr --shading unlit --size 40x30 --aa %d --camera 0,0,3 --clip 0,-1,0,3.1 --tf '%s' --depth '%s' --out '%s'", path, n ? 4 : 1, temporary("half.tf"),
+                 temporary("half.pfm"), temporary("half.png"));
+        run_result r = run_viewer(command);
+        FILE *file = fopen(temporary("half.pfm"), "rb");
+        size_t size = file ? fread(map, 1, sizeof map, file) : 0;
+        if (file) fclose(file);
+        CHECK(r.status == 0 && size == 14 + 4 * W * H, "%s, %zu bytes", r.error, size);
+        for (int i = 0; i < W * H; i++) {
+            uint32_t bits = map[14 + 4 * i] | (uint32_t)map[15 + 4 * i] << 8 | (uint32_t)map[16 + 4 * i] << 16 | (uint32_t)map[17 + 4 * i] << 24;
+            memcpy(&depth[n][i], &bits, sizeof bits);
+        }
+    }
+    int seen[2][2] = {{0}}, fewer = 0, farther = 0;
+    for (int i = 0; i < W * H; i++) {
+        for (int n = 0; n < 2; n++) seen[n][i >= W * H / 2] += depth[n][i] < 1e30f;
+        fewer += depth[0][i] < 1e30f && !(depth[1][i] < 1e30f);
+        farther += depth[0][i] < 1e30f && depth[1][i] > depth[0][i] + 0.05f;
+    }
+    printf("    pixels seen below and above: %d and %d of one sample, %d and %d of sixteen\n", seen[0][0], seen[0][1], seen[1][0], seen[1][1]);
+    CHECK(seen[0][0] > 40 && !seen[0][1] && seen[1][0] > seen[0][0] && !seen[1][1], "%d below, %d above", seen[0][0], seen[0][1]);
+    CHECK(!fewer && !farther, "%d pixels lost, %d farther", fewer, farther);
+}
+
 /* ---- what is refused --------------------------------------------------------------------------------------------------------------------- */
 
 TEST(silly_options_get_one_line_that_names_the_option) {
@@ -355,6 +391,11 @@ TEST(silly_options_get_one_line_that_names_the_option) {
         if (!*bad[i][0]) strcpy(command, "");
         check_refused(command, bad[i][1]);
     }
+    snprintf(command, sizeof command, "procedural:gyroid:8 --size 8x8 --out '%s'", temporary("planes.png"));
+    for (int i = 0; i < 32; i++) strcat(command, " --clip 1,0,0,9");
+    CHECK(run_viewer(command).status == 0, "%s", "32 planes");
+    strcat(command, " --clip 1,0,0,9");
+    check_refused(command, "--clip");
     CHECK(access(temporary("never.png"), F_OK) != 0, "a refused run wrote a picture: %s", temporary("never.png"));
 }
 
