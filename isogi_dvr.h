@@ -399,9 +399,9 @@ ISOGI_API isogi_result isogi_transfer_import(const float (*rgba)[4], size_t coun
 /* A transfer function for a volume of which nothing is known: values in three classes of least variance (Otsu 1979; the largest bin left
    out, which is air or padding; and up to a thousandth of the voxels at either end of the range where that halves it), the lowest
    transparent, the others ever denser and warmer. In physical space extinction is per voxel and makes 1/30 of the box's diagonal half
-   opaque soon after the third class begins (the fifth point), twice as dense at the top, a fifth to a seventh of it in the second class: what
-   is dense is seen within what is not; in data space a passage through each upper class is about half opaque. A volume of one value gets points that
-   nothing meets. threshold (may be NULL): where the second class begins, for an isosurface. */
+   opaque soon after the third class begins (the fifth point), twice as dense at the top, a fifth to a seventh of it in the second class:
+   what is dense is seen within what is not; in data space a passage through each upper class is about half opaque. A volume of one value
+   gets points that nothing meets. threshold (may be NULL): where the second class begins, for an isosurface. */
 ISOGI_API isogi_result isogi_transfer_suggest(const isogi_pyramid *pyramid, isogi_dvr_space space, isogi_transfer_point points[ISOGI_SUGGEST_POINTS],
                                               double *threshold);
 

@@ -44,8 +44,8 @@
    - ISOGI_NO_THREADS           everything runs on the calling thread
    - ISOGI_API                  linkage of public functions, if extern does not suit
 
-   Memory       Through isogi_context, or malloc. A pyramid takes about 2.2 bytes for every voxel: bounds of blocks, and all voxels in 8 bits of their block's
-                range; and 23 KB.
+   Memory       Through isogi_context, or malloc. A pyramid takes about 2.2 bytes for every voxel: bounds of blocks, and all voxels
+                in 8 bits of their block's range; and 23 KB.
                 A mesh keeps some 3/4 byte of scratch memory for every voxel until it is freed.
                 Stack use stays below 32 KB.
    Threads      A pyramid is const once built: any number of threads may read it. Building and meshing use the context's threads.
@@ -346,8 +346,8 @@ ISOGI_API isogi_result isogi_vol_continue(const isogi_pyramid *pyramid, const is
 /* Every hit of each ray, in order: those of ray i are hits[i * capacity + n], n < counts[i]. counts[i] = capacity + 1 where there are
    more than fit; hits[i * capacity + capacity - 1] with isogi_vol_continue and ISOGI_RAY_ONWARD leads to them. The same as isogi_vol_intersect
    and then isogi_vol_continue, with ISOGI_RAY_ONWARD, along the ray until it misses, with t from the ray's own origin throughout. hits
-   may be NULL if capacity is 0. Sides alternate, but for touched layers without thickness, which leave the ray outside, and for cells that are not finite, after
-   which the side is not known. ISOGI_TOO_LARGE if count * capacity hits cannot be addressed. */
+   may be NULL if capacity is 0. Sides alternate, but for touched layers without thickness, which leave the ray outside, and for cells
+   that are not finite, after which the side is not known. ISOGI_TOO_LARGE if count * capacity hits cannot be addressed. */
 ISOGI_API isogi_result isogi_vol_intersect_all(const isogi_pyramid *pyramid, const isogi_ray *rays, size_t count, size_t capacity,
                                                isogi_hit *hits, size_t *counts, isogi_counters *counters);
 
