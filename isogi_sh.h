@@ -218,8 +218,10 @@ ISOGI_API isogi_result isogi_sh_project_cube(float *c, int order, int channels, 
 
 /* Coefficients (RGB interleaved) of the radiance of everything in `lighting` as it arrives at `point` (world; NULL = origin):
    environment rotated, directional lights as deltas (or discs), point and sphere lights with their attenuation there. A point light
-   at the very point adds nothing; inside a spherical one its light comes evenly from everywhere. Rectangles by quadrature over
-   parts that are small as seen from the point: 1e-5 of the largest coefficient (a thousand evaluations and more next to one). */
+   at the very point adds nothing; inside a spherical one its light comes evenly from everywhere. Rectangles exactly, by integrals along
+   their edges: to the rounding of floats (1e-7 of the largest coefficient), as if the point were 1e-14 of the distance elsewhere; the
+   cost, like that of rotating four expansions, does not depend on how near, large or long they are.
+   Results are finite: a light that comes to more than 1e37 (next to a point light it would) is dimmed to that; sums end at FLT_MAX. */
 ISOGI_API isogi_result isogi_sh_project(float *rgb, int order, const isogi_lighting *lighting, const float point[3]);
 
 /* ---- rotation ---- */
@@ -320,8 +322,9 @@ ISOGI_API isogi_result isogi_sh_convert(float *out, const float *in, int order, 
 
 /* ---- simple environments and fits; RGB interleaved ---- */
 
-/* Radiance rgb from everywhere; from a cone of half_angle (radians, 0..pi) around `axis`; from a hemisphere `sky` around `up` and
-   `ground` below it; and from a sky that runs linearly in height from ground (at -up) to sky (at up). Axes of any length > 0. */
+/* Radiance rgb from everywhere; from a cone of half_angle (radians, 0..pi or pi as a float) around `axis`; from a hemisphere `sky`
+   around `up` and `ground` below it; and from a sky that runs linearly in height from ground (at -up) to sky (at up). Axes of any
+   length > 0. */
 ISOGI_API isogi_result isogi_sh_constant(float *c, int order, const float rgb[3]);
 ISOGI_API isogi_result isogi_sh_cone(float *c, int order, const float axis[3], double half_angle, const float rgb[3]);
 ISOGI_API isogi_result isogi_sh_hemisphere_sky(float *c, int order, const float up[3], const float sky[3], const float ground[3]);
@@ -4287,6 +4290,18 @@ static isogi_result isogi_sh__env_rotation(double m[9], const isogi_env *env) {
     return isogi_sh__euler_angles(&e, m);
 }
 
+/* What left the range of floats goes to its end. */
+static void isogi_sh__clamp(float *c, size_t count) {
+    size_t i;
+    for (i = 0; i < count; i++)
+        if (!isogi_sh__finite_f32(c[i])) {
+            uint32_t bits;
+            memcpy(&bits, &c[i], sizeof bits);
+            bits = (bits & 0x80000000u) | 0x7f7fffffu;
+            memcpy(&c[i], &bits, sizeof bits);
+        }
+}
+
 /* Two finite edges of some length, at right angles. */
 static int isogi_sh__edges_ok(const isogi_light *light) {
     double aa = 0, bb = 0, ab = 0;
@@ -4376,56 +4391,246 @@ ISOGI_API void isogi_env_radiance(const isogi_env *env, const float direction[3]
     for (k = 0; k < 3; k++) rgb[k] = (float)total[k];
 }
 
-/* A rectangle as seen from the point: corner, sides and normal (not of unit length). */
+/* Scales a colour so that `part` of it stays below 1e37, whence no coefficient leaves the range of floats. */
+static void isogi_sh__dim(double rgb[3], double part) {
+    double largest = fabs(rgb[0]) > fabs(rgb[1]) ? fabs(rgb[0]) : fabs(rgb[1]);
+    int k;
+    largest = part * (largest > fabs(rgb[2]) ? largest : fabs(rgb[2]));
+    if (largest > 1e37)
+        for (k = 0; k < 3; k++) rgb[k] *= 1e37 / largest;
+}
+
+/* ---- rectangles ----
+   A rectangle is a polygon of constant radiance on the sphere. For degrees l > 0 Green's theorem turns the integral of Y over it into
+   one along its edges: l (l+1) integral of Y = sum over edges of the integral of N . grad Y, N the inward pole of the edge's great
+   circle (to the same end as Wang and Ramamoorthi 2018). With z = N the edge is an arc of the equator, where Y is q(0) (cos m p, sin m p):
+   its integral is closed, and a rotation takes it to the world. Where the polygon is narrow the edges nearly cancel; one narrower than
+   ISOGI_SH__NARROW / order is integrated across in closed form instead, by the series of Y about the great circle along it. */
+#define ISOGI_SH__NARROW 0.01
+
+/* As seen from the point; the inside is to the left of each edge. No product of coordinates that are floats leaves the range of doubles. */
 typedef struct isogi_sh__rectangle {
-    double corner[3], side[2][3], normal[3], radiance[3];
-    double fineness; /* distance of a part over half its diagonal, at least */
+    double corner[4][3], edge[2][3];
+    double volume; /* of the box of a corner and the edges: distance to the plane times area, > 0 in front */
+    double radiance[3];
     int order;
 } isogi_sh__rectangle;
 
-/* Adds the part from (u, v) of that size, 0..1: four Gauss-Legendre nodes along each side where it is small as seen from the point,
-   else its quarters; no deeper than parts of 2^-16, which are next to nothing. */
-static void isogi_sh__add_part(float *c, const isogi_sh__rectangle *r, double u, double v, double size) {
+/* corners in steps of either edge from the first */
+static const int isogi_sh__corner_at[4][2] = {{0, 0}, {0, 1}, {1, 1}, {1, 0}};
+
+/* Integrals of cos m p and sin m p along the equator of a frame, and how that is turned to the world. */
+typedef struct isogi_sh__arc {
+    double cosine[ISOGI_SH_MAX_ORDER], sine[ISOGI_SH_MAX_ORDER];
+    isogi_sh__euler frame;
+} isogi_sh__arc;
+
+static double isogi_sh__dot3(const double *a, const double *b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+
+/* c = a x b; returns its length */
+static double isogi_sh__cross3(double *c, const double *a, const double *b) {
+    c[0] = a[1] * b[2] - a[2] * b[1], c[1] = a[2] * b[0] - a[0] * b[2], c[2] = a[0] * b[1] - a[1] * b[0];
+    return sqrt(isogi_sh__dot3(c, c));
+}
+
+/* corner j - corner i, without the roundings of corners far away */
+static void isogi_sh__between(double *d, const isogi_sh__rectangle *r, int i, int j) {
+    int a = isogi_sh__corner_at[j][0] - isogi_sh__corner_at[i][0], b = isogi_sh__corner_at[j][1] - isogi_sh__corner_at[i][1], k;
+    for (k = 0; k < 3; k++) d[k] = a * r->edge[0][k] + b * r->edge[1][k];
+}
+
+/* The rotation that takes x and z to these unit vectors at right angles */
+static void isogi_sh__frame(isogi_sh__euler *e, const double x[3], const double z[3]) {
+    double m[9], y[3];
+    int k;
+    isogi_sh__cross3(y, z, x);
+    for (k = 0; k < 3; k++) m[3 * k] = x[k], m[3 * k + 1] = y[k], m[3 * k + 2] = z[k];
+    memset(e, 0, sizeof *e);
+    isogi_sh__euler_angles(e, m);
+}
+
+/* Multiples of its angles are made anew for every degree, since those of four frames would take 20 KB of stack. */
+static void isogi_sh__turn_to_world(double *band, int l, const isogi_sh__euler *e) {
+    double other[2 * ISOGI_SH_MAX_ORDER];
+    isogi_sh__turns turns;
+    isogi_sh__turns_start(&turns, l + 1, e);
+    if (l > ISOGI_SH__TURNS) isogi_sh__quarter_turn_start(turns.step, turns.edge, l);
+    isogi_sh__rotate_band(band, other, l, 1, &turns);
+}
+
+/* At z = 0: q_l^m where l - m is even, else its derivative, from diagonal = q_l^l down. */
+static void isogi_sh__equator(double *q, int l, double diagonal) {
+    int m;
+    for (m = l; m >= 0; m--) {
+        double a = (double)((l - m) * (l + m + 1)), half = m > 0 ? 1 : 0.70710678118654752440;
+        if (m == l) q[m] = diagonal;
+        else if ((l - m) & 1) q[m] = half * sqrt(a) * q[m + 1];
+        else q[m] = -half * sqrt((double)((l - m - 1) * (l + m + 2)) / a) * q[m + 2];
+    }
+}
+
+/* Edge i as an arc that begins at x, and its N; 0 where nothing is seen of it. */
+static int isogi_sh__edge(isogi_sh__arc *arc, double pole[3], const isogi_sh__rectangle *r, int i) {
+    const double *from = r->corner[i], *to = r->corner[(i + 1) & 3];
+    double side[3], x[3], half[ISOGI_SH_MAX_ORDER][2], distance = sqrt(isogi_sh__dot3(from, from)), across, angle;
+    int k, m;
+    isogi_sh__between(side, r, i, (i + 1) & 3);
+    across = isogi_sh__cross3(pole, from, side);
+    if (!(across > 0) || !(distance > 0)) return 0;
+    for (k = 0; k < 3; k++) x[k] = from[k] / distance, pole[k] /= across;
+    isogi_sh__frame(&arc->frame, x, pole);
+    angle = atan2(across, isogi_sh__dot3(from, to));
+    isogi_sh__powers(half, r->order, cos(0.5 * angle), sin(0.5 * angle));
+    arc->cosine[0] = angle, arc->sine[0] = 0;
+    for (m = 1; m < r->order; m++) {
+        arc->cosine[m] = 2 * half[m][1] * half[m][0] / (double)m;
+        arc->sine[m] = 2 * half[m][1] * half[m][1] / (double)m;
+    }
+    return 1;
+}
+
+/* c += the radiance times degree l; degree 0 comes first */
+static void isogi_sh__add_degree(float *c, const double *band, int l, isogi_sh__rectangle *r) {
+    int i, k;
+    if (l == 0) isogi_sh__dim(r->radiance, fabs(band[0]));
+    for (i = 0; i <= 2 * l; i++)
+        for (k = 0; k < 3; k++) c[3 * (l * l + i) + k] = (float)((double)c[3 * (l * l + i) + k] + r->radiance[k] * band[i]);
+}
+
+/* The sum over edges. Degree 0 is the solid angle: what the outer angles leave of 2 pi. */
+ISOGI_SH__APART void isogi_sh__add_edges(float *c, isogi_sh__rectangle *r) {
+    isogi_sh__arc arc[4];
+    double pole[4][3], sum[2 * ISOGI_SH_MAX_ORDER], band[2 * ISOGI_SH_MAX_ORDER], q[ISOGI_SH_MAX_ORDER];
+    double diagonal = isogi_sh__next_diagonal(0, 0), angle = 2 * ISOGI_SH__PI;
+    int i, l, m;
+    for (i = 0; i < 4; i++)
+        if (!isogi_sh__edge(&arc[i], pole[i], r, i)) return;
+    for (i = 0; i < 4; i++) {
+        double across = isogi_sh__cross3(sum, pole[i], pole[(i + 1) & 3]);
+        angle -= atan2(across, isogi_sh__dot3(pole[i], pole[(i + 1) & 3]));
+    }
+    sum[0] = diagonal * (angle > 0 ? angle : 0);
+    isogi_sh__add_degree(c, sum, 0, r);
+    for (l = 1; l < r->order; l++) {
+        diagonal = isogi_sh__next_diagonal(diagonal, l);
+        isogi_sh__equator(q, l, diagonal);
+        for (i = 0; i < 4; i++) {
+            for (m = 0; m <= l; m++) {
+                double value = (l - m) & 1 ? q[m] / (double)(l * (l + 1)) : 0;
+                band[l - m] = value * arc[i].sine[m];
+                band[l + m] = value * arc[i].cosine[m];
+            }
+            isogi_sh__turn_to_world(band, l, &arc[i].frame);
+            for (m = 0; m <= 2 * l; m++) sum[m] = i ? sum[m] + band[m] : band[m];
+        }
+        isogi_sh__add_degree(c, sum, l, r);
+    }
+}
+
+/* A narrow polygon about the great circle through its two corners that are farthest apart. */
+typedef struct isogi_sh__strip {
+    double x[3], z[3];         /* the first of the two, and the circle's pole */
+    double along[4], slope[4]; /* of each corner: longitude from x, and the tangent of its latitude */
+} isogi_sh__strip;
+
+/* 0 unless it is narrow. A corner off the circle is as high above it as the volume is over the area that circle and pole leave. */
+static int isogi_sh__strip_start(isogi_sh__strip *strip, const isogi_sh__rectangle *r) {
+    double d[3], y[3], n[3], best = -1, distance, across = 0;
+    int i, j, a = 0, b = 1;
+    for (i = 0; i < 4; i++)
+        for (j = i + 1; j < 4; j++) {
+            const double *p = r->corner[i], *q = r->corner[j];
+            double length, tangent;
+            isogi_sh__between(d, r, i, j);
+            length = isogi_sh__cross3(n, p, d);
+            tangent = sqrt(isogi_sh__dot3(p, p) * isogi_sh__dot3(q, q)) + isogi_sh__dot3(p, q); /* length / this: of half the angle */
+            tangent = length / (tangent > 1e-300 ? tangent : 1e-300);
+            if (tangent > best) best = tangent, across = length, a = i, b = j;
+        }
+    distance = sqrt(isogi_sh__dot3(r->corner[a], r->corner[a]));
+    if (!(distance > 0) || !(across > 0)) return 0;
+    isogi_sh__between(d, r, a, b);
+    isogi_sh__cross3(strip->z, r->corner[a], d);
+    for (i = 0; i < 3; i++) strip->x[i] = r->corner[a][i] / distance, strip->z[i] /= across;
+    isogi_sh__cross3(y, strip->z, strip->x);
+    for (i = 0; i < 4; i++) {
+        double u, v;
+        isogi_sh__between(d, r, a, i);
+        u = distance + isogi_sh__dot3(strip->x, d), v = isogi_sh__dot3(y, d);
+        strip->along[i] = atan2(v, u);
+        strip->slope[i] = i == a || i == b ? 0 : (i > a && i < b ? -1 : 1) * r->volume / across / sqrt(u * u + v * v);
+    }
+    for (i = 0; i < 4; i++) {
+        double p = fabs(strip->slope[i]), q = fabs(strip->slope[(i + 1) & 3]);
+        if ((p > q ? p : q) * r->order > ISOGI_SH__NARROW * cos(0.5 * (strip->along[(i + 1) & 3] - strip->along[i]))) return 0;
+    }
+    return 1;
+}
+
+/* What lies between the circle and edge i, t the tangent of its latitude and s = t - t^3 / 2 the sine: moments 0, 1, 2 += the integrals
+   of s, s^2 / 2 and s^3 / 6 times cos m p and sin m p, by four Gauss-Legendre nodes for each radian of the highest m (1e-9). */
+static void isogi_sh__strip_edge(double (*moment)[2][ISOGI_SH_MAX_ORDER], const isogi_sh__strip *strip, int i, int order) {
     static const double node[4] = {0.069431844202973712, 0.330009478207571868, 0.669990521792428132, 0.930568155797026288};
     static const double weight[4] = {0.173927422568726929, 0.326072577431273071, 0.326072577431273071, 0.173927422568726929};
-    double scale[ISOGI_SH_MAX_ORDER], d[3], rgb[3], square = 0, diagonal = 0, along;
-    int i, k, l;
-    for (k = 0; k < 3; k++) {
-        d[k] = r->corner[k] + (u + 0.5 * size) * r->side[0][k] + (v + 0.5 * size) * r->side[1][k];
-        square += d[k] * d[k], diagonal += size * size * 0.25 * (r->side[0][k] * r->side[0][k] + r->side[1][k] * r->side[1][k]);
-    }
-    if (square < r->fineness * r->fineness * diagonal && size > 1.0 / 65536) {
-        for (i = 0; i < 4; i++) isogi_sh__add_part(c, r, u + 0.5 * size * (i & 1), v + 0.5 * size * (i >> 1), 0.5 * size);
-        return;
-    }
-    for (l = 0; l < r->order; l++) scale[l] = 1;
-    for (i = 0; i < 16; i++) {
-        double x = u + size * node[i & 3], y = v + size * node[i >> 2];
-        for (square = along = 0, k = 0; k < 3; k++) {
-            d[k] = r->corner[k] + x * r->side[0][k] + y * r->side[1][k];
-            square += d[k] * d[k], along -= d[k] * r->normal[k];
+    int j = (i + 1) & 3, k, m, parts;
+    double from = strip->along[i], angle = strip->along[j] - from, sine = sin(angle);
+    if (!(fabs(angle) > 0) || !(fabs(strip->slope[i]) + fabs(strip->slope[j]) > 0)) return;
+    parts = 1 + (int)(fabs(angle) * (double)(order + 2));
+    for (k = 0; k < 4 * parts; k++) {
+        double part = ((double)(k >> 2) + node[k & 3]) / (double)parts, x = cos(from + part * angle), y = sin(from + part * angle);
+        double t = (strip->slope[i] * sin((1 - part) * angle) + strip->slope[j] * sin(part * angle)) / sine;
+        double w = -weight[k & 3] * angle / (double)parts, cm = 1, sm = 0, c;
+        double w0 = w * t * (1 - 0.5 * t * t), w1 = 0.5 * w * t * t, w2 = w * t * t * t / 6;
+        for (m = 0; m < order; m++) {
+            moment[0][0][m] += w0 * cm, moment[0][1][m] += w0 * sm;
+            moment[1][0][m] += w1 * cm, moment[1][1][m] += w1 * sm;
+            moment[2][0][m] += w2 * cm, moment[2][1][m] += w2 * sm;
+            c = x * cm - y * sm;
+            sm = x * sm + y * cm;
+            cm = c;
         }
-        if (!(along > 0) || !(square > 0)) continue;
-        along *= size * size * weight[i & 3] * weight[i >> 2] / (square * sqrt(square)); /* the normal holds the area */
-        for (k = 0; k < 3; k++) rgb[k] = along * r->radiance[k];
-        isogi_sh__add_lobe(c, r->order, 3, scale, isogi_sh__normalise(d[0], d[1], d[2]), rgb);
+    }
+}
+
+/* About the equator f = q (1 - s^2)^(m/2) is f0 + f1 s + f2 s^2 / 2, f2 = (m^2 - l (l+1)) f0 by Legendre's equation. */
+ISOGI_SH__APART void isogi_sh__add_strip(float *c, isogi_sh__rectangle *r, const isogi_sh__strip *strip) {
+    double moment[3][2][ISOGI_SH_MAX_ORDER], band[2 * ISOGI_SH_MAX_ORDER], q[ISOGI_SH_MAX_ORDER], diagonal = 0;
+    isogi_sh__euler frame;
+    int i, l, m;
+    isogi_sh__frame(&frame, strip->x, strip->z);
+    memset(moment, 0, sizeof moment);
+    for (i = 0; i < 4; i++) isogi_sh__strip_edge(moment, strip, i, r->order);
+    for (l = 0; l < r->order; l++) {
+        diagonal = isogi_sh__next_diagonal(diagonal, l);
+        isogi_sh__equator(q, l, diagonal);
+        for (m = 0; m <= l; m++) {
+            double bend = (double)(m * m - l * (l + 1));
+            for (i = 1; i >= 0; i--) /* the cosine last, for m = 0 */
+                band[i ? l - m : l + m] = q[m] * ((l - m) & 1 ? moment[1][i][m] : moment[0][i][m] + bend * moment[2][i][m]);
+        }
+        isogi_sh__turn_to_world(band, l, &frame);
+        isogi_sh__add_degree(c, band, l, r);
     }
 }
 
 static void isogi_sh__add_rectangle(float *c, int order, const isogi_light *light, const float point[3]) {
     isogi_sh__rectangle r;
-    double area = 0;
-    int k;
+    isogi_sh__strip strip;
+    double centre[3], normal[3], area;
+    int i, k;
     for (k = 0; k < 3; k++) {
-        int a = (k + 1) % 3, b = (k + 2) % 3;
-        r.side[0][k] = (double)light->edge[0][k], r.side[1][k] = (double)light->edge[1][k];
-        r.corner[k] = (double)light->vector[k] - (point ? (double)point[k] : 0) - 0.5 * (r.side[0][k] + r.side[1][k]);
-        r.normal[k] = (double)light->edge[0][a] * (double)light->edge[1][b] - (double)light->edge[0][b] * (double)light->edge[1][a];
-        area += r.normal[k] * r.normal[k];
+        centre[k] = (double)light->vector[k] - (point ? (double)point[k] : 0);
+        for (i = 0; i < 2; i++) r.edge[i][k] = (double)light->edge[i][k];
+        for (i = 0; i < 4; i++)
+            r.corner[i][k] = centre[k] + ((isogi_sh__corner_at[i][0] - 0.5) * r.edge[0][k] + (isogi_sh__corner_at[i][1] - 0.5) * r.edge[1][k]);
     }
-    for (k = 0; k < 3; k++) r.radiance[k] = (double)light->rgb[k] / sqrt(area);
-    r.order = order, r.fineness = order > 12 ? order / 3.0 : 4;
-    isogi_sh__add_part(c, &r, 0, 0, 1);
+    area = isogi_sh__cross3(normal, r.edge[0], r.edge[1]);
+    r.volume = -isogi_sh__dot3(centre, normal);
+    if (!(r.volume > 0)) return;
+    for (k = 0; k < 3; k++) r.radiance[k] = (double)light->rgb[k] / area;
+    r.order = order;
+    if (isogi_sh__strip_start(&strip, &r)) isogi_sh__add_strip(c, &r, &strip);
+    else isogi_sh__add_edges(c, &r);
 }
 
 /* Adds a light as it arrives at a point. A point light at the point itself adds nothing; inside a spherical one its light comes
@@ -4460,6 +4665,7 @@ static void isogi_sh__add_light(float *c, int order, const isogi_light *light, c
         isogi_sh__disc(scale, order, cosine);
     }
     for (k = 0; k < 3; k++) rgb[k] = factor * (double)light->rgb[k];
+    isogi_sh__dim(rgb, 1);
     isogi_sh__add_lobe(c, order, 3, scale, isogi_sh__normalise(d[0], d[1], d[2]), rgb);
 }
 
@@ -4486,6 +4692,7 @@ ISOGI_API isogi_result isogi_sh_project(float *rgb, int order, const isogi_light
     if ((env->rgb || env->sh) && isogi_sh__env_rotation(m, env) == ISOGI_OK && isogi_sh__euler_angles(&e, m) == ISOGI_OK)
         isogi_sh__rotate(rgb, rgb, 0, order, 3, &e);
     for (i = 0; i < lighting->light_count; i++) isogi_sh__add_light(rgb, order, &lighting->lights[i], point);
+    isogi_sh__clamp(rgb, n);
     return ISOGI_OK;
 }
 
@@ -4525,7 +4732,8 @@ ISOGI_API isogi_result isogi_sh_cone(float *c, int order, const float axis[3], d
     double colour[3];
     int k;
     if (!c || !isogi_sh__order_ok(order) || !isogi_sh__direction_ok(axis) || !rgb || !isogi_sh__finite_array(rgb, 3)) return ISOGI_INVALID;
-    if (!isogi_sh__finite_f64(half_angle) || half_angle < 0 || half_angle > ISOGI_SH__PI) return ISOGI_INVALID;
+    if (!isogi_sh__finite_f64(half_angle) || half_angle < 0 || half_angle > ISOGI_SH__PI + 1e-7) return ISOGI_INVALID;
+    half_angle = half_angle < ISOGI_SH__PI ? half_angle : ISOGI_SH__PI;
     for (k = 0; k < 3; k++) colour[k] = (double)rgb[k];
     isogi_sh__clear(c, order);
     isogi_sh__add_cone(c, order, axis, half_angle, colour);
@@ -4703,6 +4911,7 @@ ISOGI_API isogi_result isogi_sh_fit_directional(float direction[3], float rgb[3]
 #undef ISOGI_SH__LANES
 #undef ISOGI_SH__CHANNELS
 #undef ISOGI_SH__GROUP
+#undef ISOGI_SH__NARROW
 #undef ISOGI_SH__DERING_ORDER
 #undef ISOGI_SH__TOGETHER
 #undef ISOGI_SH__TURNS
