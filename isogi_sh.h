@@ -4645,6 +4645,7 @@ static void isogi_sh__add_light(float *c, int order, const isogi_light *light, c
     for (k = 0; k < 3; k++) d[k] = (double)light->vector[k];
     if (light->kind == ISOGI_LIGHT_DIRECTIONAL) {
         cosine = cos((double)light->radius);
+        cosine = cosine > 0 ? cosine : 0; /* pi / 2 as a float is beyond it */
     } else {
         double square, radius = light->kind == ISOGI_LIGHT_SPHERE ? (double)light->radius : 0;
         for (k = 0; k < 3; k++) d[k] -= point ? (double)point[k] : 0;

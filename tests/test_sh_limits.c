@@ -240,7 +240,7 @@ static void add_slice(const aspect *s, int order, double y, double size) {
     for (int i = 0; i < columns; i++) {
         double at = y + size * gauss(columns)[i][0], r = sqrt(s->distance * s->distance + at * at), from = atan2(s->low[0], r);
         double range = atan2(r * (s->high[0] - s->low[0]), r * r + s->low[0] * s->high[0]);
-        int rows = 12 + (int)(order * range / 4);
+        int rows = 12 + (int)(order * (range + 0.5) / 4);
         for (int j = 0; j < rows; j++) {
             double a = from + range * gauss(rows)[j][0], weight = size * gauss(columns)[i][1] * s->distance / (r * r) * range * gauss(rows)[j][1] * cos(a), w[1][3];
             for (int k = 0; k < 3; k++) w[0][k] = sin(a) * s->axis[0][k] + cos(a) * (at * s->axis[1][k] + s->distance * s->axis[2][k]) / r;
@@ -408,6 +408,17 @@ TEST(lights_beyond_the_range_of_floats) {
     CHECK(isogi_sh_project(c, 11, &lighting, NULL) == ISOGI_OK, "%s", "sum");
     for (int k = 0; k < 3 * 11 * 11; k++) CHECK(test_finite((double)c[k]), "sum, coefficient %d: %g", k, (double)c[k]);
     CHECK(c[0] > 1e38f && c[1] < -1e38f && fabsf(c[2]) < 1e32f, "sum: %g %g %g", (double)c[0], (double)c[1], (double)c[2]);
+}
+
+/* Half the sky: irradiance 1, so radiance 1 / pi; the float next to pi / 2 is beyond it. */
+TEST(discs_to_half_pi_as_a_float) {
+    const float up[3] = {0, 0, 1}, one[3] = {(float)(1 / pi), (float)(1 / pi), (float)(1 / pi)};
+    isogi_light light = {.vector = {0, 0, 3}, .rgb = {1, 1, 1}, .radius = 1.5707964f};
+    isogi_lighting lighting = {.lights = &light, .light_count = 1};
+    for (int order = 1; order <= 101; order += 50) {
+        CHECK(isogi_sh_project(c, order, &lighting, NULL) == ISOGI_OK && isogi_sh_cone(d, order, up, pi / 2, one) == ISOGI_OK, "order %d", order);
+        for (int i = 0; i < 3 * order * order; i++) CHECK(fabsf(c[i] - d[i]) < 1e-6f, "order %d, coefficient %d: %g, expected %g", order, i, (double)c[i], (double)d[i]);
+    }
 }
 
 TEST(cones_to_pi_as_a_float) {
