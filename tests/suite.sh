@@ -151,7 +151,7 @@ only() { printf '%s\n' $units | grep -E "test_($1)\$"; }
 
 variants() {
     threaded='vol|mesh|trace_bake|dvr_visibility'
-    checked='sh|sh_limits|sample|vol|vol_api|vol_sides|vol_update|vol_field|mesh|trace|trace_bake|trace_light|trace_store|trace_change|dvr|dvr_data|dvr_tets|dvr_transfer|dvr_visibility|dvr_closed|dvr_medium|dvr_classes|dvr_paper'
+    checked='sh|sh_limits|sample|vol|vol_api|vol_sides|vol_update|vol_field|mesh|trace|trace_bake|trace_light|trace_store|trace_change|dvr|dvr_data|dvr_tets|dvr_transfer|dvr_visibility|dvr_closed|dvr_medium|dvr_classes'
     # Those that only start other programs have nothing to be built anew.
     units=
     for program; do
