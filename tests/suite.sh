@@ -204,8 +204,8 @@ memcheck() {
         case $base in viewer | bake | bake_mpi | bake_points | isolines | tets) continue ;; esac # below, in tests of their own, they want arguments, or they take minutes
         item check "valgrind/$base" "$grind build/$base > /dev/null"
     done
-    [ -f examples/viewer.c ] && for mode in irradiance transfer dvr scale-invariant; do
-        item check "valgrind/viewer-$mode" "$grind build/viewer procedural:engine-block:24 --size 32x32 --samples 2 --mode $mode --out \"\$OUT/x.png\""
+    [ -f examples/viewer.c ] && for mode in "irradiance --samples 2" "transfer --samples 2" "dvr --directions 32" scale-invariant; do
+        item check "valgrind/viewer-${mode%% *}" "$grind build/viewer procedural:engine-block:24 --size 32x32 --mode $mode --out \"\$OUT/x.png\""
     done
 }
 
