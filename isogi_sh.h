@@ -4407,6 +4407,7 @@ static void isogi_sh__dim(double rgb[3], double part) {
    its integral is closed, and a rotation takes it to the world. Where the polygon is narrow the edges nearly cancel; one narrower than
    ISOGI_SH__NARROW / order is integrated across in closed form instead, by the series of Y about the great circle along it. */
 #define ISOGI_SH__NARROW 0.01
+#define ISOGI_SH__LOW (ISOGI_SH__TURNS + 1) /* orders that are rotated whole, which is faster */
 
 /* As seen from the point; the inside is to the left of each edge. No product of coordinates that are floats leaves the range of doubles. */
 typedef struct isogi_sh__rectangle {
@@ -4449,7 +4450,23 @@ static void isogi_sh__frame(isogi_sh__euler *e, const double x[3], const double 
     isogi_sh__euler_angles(e, m);
 }
 
-/* Multiples of its angles are made anew for every degree, since those of four frames would take 20 KB of stack. */
+/* One channel of an order up to ISOGI_SH__LOW: as isogi_sh__rotate, on a third of its stack */
+static void isogi_sh__turn_all_to_world(double *c, int order, const isogi_sh__euler *e) {
+    double other[2 * ISOGI_SH__LOW];
+    isogi_sh__turns turns;
+    int l;
+#ifdef ISOGI_SH__SIMD
+    if (order > 5 && isogi_sh__level() > 1) {
+        isogi_sh__rotate_channels(c, c, 1, order, 1, e);
+        return;
+    }
+#endif
+    isogi_sh__turns_start(&turns, order, e);
+    isogi_sh__rotate_low(c, order, &turns);
+    for (l = 5; l < order; l++) isogi_sh__rotate_band(c + l * l, other, l, 1, &turns);
+}
+
+/* One degree of a high order. Multiples of the angles are made anew for each, since those of four frames would take 20 KB of stack. */
 static void isogi_sh__turn_to_world(double *band, int l, const isogi_sh__euler *e) {
     double other[2 * ISOGI_SH_MAX_ORDER];
     isogi_sh__turns turns;
@@ -4497,31 +4514,65 @@ static void isogi_sh__add_degree(float *c, const double *band, int l, isogi_sh__
         for (k = 0; k < 3; k++) c[3 * (l * l + i) + k] = (float)((double)c[3 * (l * l + i) + k] + r->radiance[k] * band[i]);
 }
 
-/* The sum over edges. Degree 0 is the solid angle: what the outer angles leave of 2 pi. */
+/* What the outer angles leave of 2 pi */
+static double isogi_sh__solid_angle(double (*pole)[3]) {
+    double angle = 2 * ISOGI_SH__PI, n[3];
+    int i;
+    for (i = 0; i < 4; i++) {
+        double across = isogi_sh__cross3(n, pole[i], pole[(i + 1) & 3]);
+        angle -= atan2(across, isogi_sh__dot3(pole[i], pole[(i + 1) & 3]));
+    }
+    return angle > 0 ? angle : 0;
+}
+
+/* Degree l > 0 of an edge in its frame; q: isogi_sh__equator */
+static void isogi_sh__edge_degree(double *band, int l, const double *q, const isogi_sh__arc *arc) {
+    int m;
+    for (m = 0; m <= l; m++) {
+        double value = (l - m) & 1 ? q[m] / (double)(l * (l + 1)) : 0;
+        band[l - m] = value * arc->sine[m];
+        band[l + m] = value * arc->cosine[m];
+    }
+}
+
+/* The sum over edges, whole expansions at a time. */
+ISOGI_SH__APART void isogi_sh__add_edges_low(float *c, isogi_sh__rectangle *r) {
+    isogi_sh__arc arc;
+    double pole[4][3], sum[ISOGI_SH__LOW * ISOGI_SH__LOW], part[ISOGI_SH__LOW * ISOGI_SH__LOW], q[ISOGI_SH__LOW][ISOGI_SH__LOW];
+    double diagonal = isogi_sh__next_diagonal(0, 0);
+    int i, k, l;
+    for (l = 1; l < r->order; l++) {
+        diagonal = isogi_sh__next_diagonal(diagonal, l);
+        isogi_sh__equator(q[l], l, diagonal);
+    }
+    for (i = 0; i < 4; i++) {
+        if (!isogi_sh__edge(&arc, pole[i], r, i)) return;
+        part[0] = 0;
+        for (l = 1; l < r->order; l++) isogi_sh__edge_degree(part + l * l, l, q[l], &arc);
+        isogi_sh__turn_all_to_world(part, r->order, &arc.frame);
+        for (k = 0; k < r->order * r->order; k++) sum[k] = i ? sum[k] + part[k] : part[k];
+    }
+    sum[0] = isogi_sh__next_diagonal(0, 0) * isogi_sh__solid_angle(pole);
+    for (l = 0; l < r->order; l++) isogi_sh__add_degree(c, sum + l * l, l, r);
+}
+
+/* The same degree by degree, since expansions of high orders do not fit on the stack. */
 ISOGI_SH__APART void isogi_sh__add_edges(float *c, isogi_sh__rectangle *r) {
     isogi_sh__arc arc[4];
     double pole[4][3], sum[2 * ISOGI_SH_MAX_ORDER], band[2 * ISOGI_SH_MAX_ORDER], q[ISOGI_SH_MAX_ORDER];
-    double diagonal = isogi_sh__next_diagonal(0, 0), angle = 2 * ISOGI_SH__PI;
-    int i, l, m;
+    double diagonal = isogi_sh__next_diagonal(0, 0);
+    int i, k, l;
     for (i = 0; i < 4; i++)
         if (!isogi_sh__edge(&arc[i], pole[i], r, i)) return;
-    for (i = 0; i < 4; i++) {
-        double across = isogi_sh__cross3(sum, pole[i], pole[(i + 1) & 3]);
-        angle -= atan2(across, isogi_sh__dot3(pole[i], pole[(i + 1) & 3]));
-    }
-    sum[0] = diagonal * (angle > 0 ? angle : 0);
+    sum[0] = diagonal * isogi_sh__solid_angle(pole);
     isogi_sh__add_degree(c, sum, 0, r);
     for (l = 1; l < r->order; l++) {
         diagonal = isogi_sh__next_diagonal(diagonal, l);
         isogi_sh__equator(q, l, diagonal);
         for (i = 0; i < 4; i++) {
-            for (m = 0; m <= l; m++) {
-                double value = (l - m) & 1 ? q[m] / (double)(l * (l + 1)) : 0;
-                band[l - m] = value * arc[i].sine[m];
-                band[l + m] = value * arc[i].cosine[m];
-            }
+            isogi_sh__edge_degree(band, l, q, &arc[i]);
             isogi_sh__turn_to_world(band, l, &arc[i].frame);
-            for (m = 0; m <= 2 * l; m++) sum[m] = i ? sum[m] + band[m] : band[m];
+            for (k = 0; k <= 2 * l; k++) sum[k] = i ? sum[k] + band[k] : band[k];
         }
         isogi_sh__add_degree(c, sum, l, r);
     }
@@ -4594,13 +4645,14 @@ static void isogi_sh__strip_edge(double (*moment)[2][ISOGI_SH_MAX_ORDER], const 
 
 /* About the equator f = q (1 - s^2)^(m/2) is f0 + f1 s + f2 s^2 / 2, f2 = (m^2 - l (l+1)) f0 by Legendre's equation. */
 ISOGI_SH__APART void isogi_sh__add_strip(float *c, isogi_sh__rectangle *r, const isogi_sh__strip *strip) {
-    double moment[3][2][ISOGI_SH_MAX_ORDER], band[2 * ISOGI_SH_MAX_ORDER], q[ISOGI_SH_MAX_ORDER], diagonal = 0;
+    double moment[3][2][ISOGI_SH_MAX_ORDER], all[ISOGI_SH__LOW * ISOGI_SH__LOW], q[ISOGI_SH_MAX_ORDER], diagonal = 0;
     isogi_sh__euler frame;
-    int i, l, m;
+    int i, l, m, low = r->order <= ISOGI_SH__LOW;
     isogi_sh__frame(&frame, strip->x, strip->z);
     memset(moment, 0, sizeof moment);
     for (i = 0; i < 4; i++) isogi_sh__strip_edge(moment, strip, i, r->order);
     for (l = 0; l < r->order; l++) {
+        double *band = all + (low ? l * l : 0);
         diagonal = isogi_sh__next_diagonal(diagonal, l);
         isogi_sh__equator(q, l, diagonal);
         for (m = 0; m <= l; m++) {
@@ -4608,9 +4660,13 @@ ISOGI_SH__APART void isogi_sh__add_strip(float *c, isogi_sh__rectangle *r, const
             for (i = 1; i >= 0; i--) /* the cosine last, for m = 0 */
                 band[i ? l - m : l + m] = q[m] * ((l - m) & 1 ? moment[1][i][m] : moment[0][i][m] + bend * moment[2][i][m]);
         }
+        if (low) continue;
         isogi_sh__turn_to_world(band, l, &frame);
         isogi_sh__add_degree(c, band, l, r);
     }
+    if (!low) return;
+    isogi_sh__turn_all_to_world(all, r->order, &frame);
+    for (l = 0; l < r->order; l++) isogi_sh__add_degree(c, all + l * l, l, r);
 }
 
 static void isogi_sh__add_rectangle(float *c, int order, const isogi_light *light, const float point[3]) {
@@ -4630,6 +4686,7 @@ static void isogi_sh__add_rectangle(float *c, int order, const isogi_light *ligh
     for (k = 0; k < 3; k++) r.radiance[k] = (double)light->rgb[k] / area;
     r.order = order;
     if (isogi_sh__strip_start(&strip, &r)) isogi_sh__add_strip(c, &r, &strip);
+    else if (order <= ISOGI_SH__LOW) isogi_sh__add_edges_low(c, &r);
     else isogi_sh__add_edges(c, &r);
 }
 
@@ -4912,6 +4969,7 @@ ISOGI_API isogi_result isogi_sh_fit_directional(float direction[3], float rgb[3]
 #undef ISOGI_SH__LANES
 #undef ISOGI_SH__CHANNELS
 #undef ISOGI_SH__GROUP
+#undef ISOGI_SH__LOW
 #undef ISOGI_SH__NARROW
 #undef ISOGI_SH__DERING_ORDER
 #undef ISOGI_SH__TOGETHER
