@@ -22,7 +22,11 @@ picture() {
     name=$1 caption=$2
     shift 2
     since=$(date +%s)
-    if stats=$(build/viewer --samples "$(samples 32)" "$@" --size "$size" --stats --out "$out/$name.png"); then
+    case " $* " in
+    *" --mode lambert "* | *" --mode phong "* | *" --samples "*) ;; # no paths; or their number is chosen
+    *) set -- "$@" --samples "$(samples 32)" ;;
+    esac
+    if stats=$(build/viewer "$@" --size "$size" --stats --out "$out/$name.png"); then
         number=$(echo "$stats" | sed -n 's/^difference_rms //p')
         echo "$stats" | sed -n 's/^exposure //p' > "$out/$name.exposure"
         echo "    $name   ${number:+difference $number   }$(($(date +%s) - since)) s"
@@ -40,11 +44,12 @@ compared() {
 }
 
 data() { [ -n "$ISOGI_DATA" ] && [ -f "$ISOGI_DATA/$1" ]; }
+few="--samples $(samples 16)"
 if data vismale_head_128x256x256_uint8.raw; then
-    skull="--samples $(samples 16) $ISOGI_DATA/vismale_head_128x256x256_uint8.raw --iso 100 --spacing 1.58,1,1.01 --up 0,0,-1 --camera 150,5,1.7"
+    skull="$ISOGI_DATA/vismale_head_128x256x256_uint8.raw --iso 100 --spacing 1.58,1,1.01 --up 0,0,-1 --camera 150,5,1.7"
     skull_sun="--env sky --light directional:1,-1,-1:3,2.8,2.4:0.5" skull_isos="88 100 112" head_grid="64,128,128 128,256,256 256,512,512"
 else
-    skull="--samples $(samples 16) procedural:skull --camera 30,8,2" skull_sun="--env sky --light directional:1,1,0.6:3,2.8,2.4:0.5" skull_isos="" head_grid="64,72,72 128,144,144 256,288,288"
+    skull="procedural:skull --camera 30,8,2" skull_sun="--env sky --light directional:1,1,0.6:3,2.8,2.4:0.5" skull_isos="" head_grid="64,72,72 128,144,144 256,288,288"
 fi
 if data engine_256x256x128_uint8.raw; then engine="--scene engine --camera 37,25,2"
 else engine="--scene engine-block --camera 37,25,2"
@@ -54,25 +59,25 @@ else field="procedural:hydrogen" close=30,25,1.4 whole=30,25,2.2
 fi
 
 head_of 1 "Global light beside Phong with shadows"
-picture 1a-global "a skull, global light" $skull $skull_sun
+picture 1a-global "a skull, global light" $skull $few $skull_sun
 picture 1a-phong "Phong with shadows" $skull --mode phong --shadows on $skull_sun
 picture 1b-global "a simulation, global light" $field --camera $whole
 picture 1b-phong "Phong with shadows" $field --camera $whole --mode phong --shadows on
 
 head_of 4 "Hard shadows as the isovalue rises: they fade in and out, since texels lie on isosurfaces of their own"
 if [ "$skull_isos" ]; then
-    for iso in $skull_isos; do picture "4-iso-$iso" "isovalue $iso" $(echo "$skull" | sed "s/--iso [0-9]*/--iso $iso/") $skull_sun --bounces 1; done
+    for iso in $skull_isos; do picture "4-iso-$iso" "isovalue $iso" $(echo "$skull" | sed "s/--iso [0-9]*/--iso $iso/") $few $skull_sun --bounces 1; done
 else
     for iso in 0.4 0.5 0.6; do picture "4-iso-$iso" "isovalue $iso" procedural:torus-sphere-plane --iso $iso --env sky --light point:64,250,64:90000,90000,90000 --bounces 1; done
 fi
 
 head_of 5 "Normals and offset: artefacts of voxels on the surface and along shadow borders; differences to smoothed + offset"
-direct="--mode pathtrace --bounces 0 --samples $(samples 16) $skull_sun"
+direct="--mode pathtrace --bounces 0 $few $skull_sun"
 picture 5-smoothed-offset "direct light, smoothed normals, offset" $skull $direct
 compared 5-smoothed-offset 5-gradient "gradient normals" $skull $direct --normals trilinear --offset -1
 compared 5-smoothed-offset 5-smoothed "smoothed normals" $skull $direct --offset -1
-picture 5-global-smoothed-offset "four bounces, smoothed normals, offset" $skull $skull_sun --bounces 4
-compared 5-global-smoothed-offset 5-global-gradient "four bounces, gradient normals" $skull $skull_sun --bounces 4 --normals trilinear --offset -1
+picture 5-global-smoothed-offset "four bounces, smoothed normals, offset" $skull $few $skull_sun --bounces 4
+compared 5-global-smoothed-offset 5-global-gradient "four bounces, gradient normals" $skull $few $skull_sun --bounces 4 --normals trilinear --offset -1
 
 head_of 6 "Lookups; differences to path tracing"
 picture 6-reference "path tracing" $engine --mode pathtrace --samples $(samples 128)
@@ -98,8 +103,8 @@ for view in 8 9; do
 done
 
 head_of 10 "Global light beside vicinity shading"
-picture 10-ours "global light" $skull
-picture 10-vicinity "vicinity shading" $skull --mode vicinity
+picture 10-ours "global light" $skull $few
+picture 10-vicinity "vicinity shading" $skull $few --mode vicinity
 
 head_of 11 "Textures beside path tracing; differences to it"
 compared 6-reference 11-irradiance "irradiance texture" $engine --samples $(samples 64)
@@ -110,7 +115,7 @@ picture 12-reference "path tracing" $skull $skull_sun --mode pathtrace --samples
 k=0
 for grid in $head_grid; do
     k=$((k + 1))
-    compared 12-reference "12-$k" "$grid texels" $skull $skull_sun --lattice $grid
+    compared 12-reference "12-$k" "$grid texels" $skull $few $skull_sun --lattice $grid
 done
 
 echo "$(($(date +%s) - begun)) s in all: $page"

@@ -80,6 +80,7 @@ static const scene scenes[] = {
 #define SCENE_COUNT (sizeof scenes / sizeof scenes[0])
 
 typedef struct options {
+    uint64_t given; /* a bit for each of option_list */
     const char *volume, *env, *tf, *out, *compare, *depth;
     const scene *scene;
     int width, height, mode, raycast, bounces, samples, threads, stats, antialias, shading, classification, silhouette, transmission, order, directions;
@@ -127,13 +128,16 @@ static int fail(viewer *v, const char *what, isogi_result result) {
 }
 
 typedef struct option {
-    const char *name, *argument, *help;
-    enum { FLAG, INTEGER, NUMBERS, FLOATS, SIZES, TEXT, OTHER } kind;
+    const char *name, *argument;
+    unsigned use; /* the modes that it changes something in, a bit each: in the others it is refused, not ignored */
+    const char *help;
+    enum { FLAG, INTEGER, NUMBERS, FLOATS, SIZES, NAME, TEXT, OTHER } kind;
     size_t offset, has; /* of the value and of its "was given" in options; has 0 = not asked */
-    int count;
+    int count;          /* of numbers, or of names */
     double low, high;
-    int (*other)(viewer *, const char *); /* 1 = understood */
-    const char *allowed;
+    int (*parse)(viewer *, const char *); /* OTHER: 1 = understood */
+    const char *const *names;
+    const char *allowed; /* in words; NAME: its names are */
 } option;
 
 static int parse_scene(viewer *v, const char *text) {
@@ -141,19 +145,6 @@ static int parse_scene(viewer *v, const char *text) {
         if (!strcmp(text, scenes[i].name)) v->o.scene = &scenes[i];
     return v->o.scene && !strcmp(text, v->o.scene->name);
 }
-
-static int parse_mode(viewer *v, const char *text) { return parse_name(text, mode_name, MODE_COUNT, &v->o.mode); }
-static int parse_shading(viewer *v, const char *text) { return parse_name(text, shading_name, 4, &v->o.shading); }
-static int parse_classification(viewer *v, const char *text) { return parse_name(text, classification_name, 3, &v->o.classification); }
-static int parse_silhouette(viewer *v, const char *text) { return parse_name(text, silhouette_name, 4, &v->o.silhouette); }
-static int parse_transmission(viewer *v, const char *text) { return parse_name(text, transmission_name, 3, &v->o.transmission); }
-static int parse_shadows(viewer *v, const char *text) { return parse_name(text, switch_name, 2, &v->o.shadows); }
-static int parse_ambient(viewer *v, const char *text) { return parse_name(text, ambient_name, 2, &v->o.ambient); }
-static int parse_normals(viewer *v, const char *text) { return parse_name(text, normals_name, 2, &v->o.normals); }
-static int parse_storage(viewer *v, const char *text) { return parse_name(text, storage_name, 5, &v->o.storage); }
-static int parse_method(viewer *v, const char *text) { return parse_name(text, method_name, 4, &v->o.method); }
-static int parse_preset(viewer *v, const char *text) { return parse_name(text, preset_name, 4, &v->o.preset); }
-static int parse_lookup(viewer *v, const char *text) { return parse_name(text, lookup_name, 4, &v->o.lookup); }
 
 static int parse_size(viewer *v, const char *text) {
     double x[2];
@@ -190,75 +181,106 @@ static int parse_light(viewer *v, const char *text) {
 }
 
 #define AT(field) offsetof(options, field)
+#define VALUE(field) AT(field), AT(has_##field)
+#define NAMED(names_of, field) NAME, AT(field), .names = names_of, .count = (int)(sizeof names_of / sizeof *names_of)
+#define PARSED(by, words) OTHER, .parse = by, .allowed = words
+enum {
+    VOLUMES = 1 << DVR | 1 << SCALE_INVARIANT,
+    REFLECTED = 1 << IRRADIANCE | 1 << TRANSFER | 1 << PATHTRACE,
+    GATHERED = REFLECTED | 1 << VICINITY,
+    BAKED = GATHERED & ~(1 << PATHTRACE),
+    BY_NORMAL = 1 << LAMBERT | 1 << PHONG,
+    SURFACES = GATHERED | BY_NORMAL,
+    ANY = SURFACES | VOLUMES,
+    LIT = ANY & ~(1 << VICINITY)
+};
 static const option option_list[] = {
-    {"--scene", "NAME", "a canonical scene in place of VOLUME: volume, isovalue, light and material belong to it", OTHER, 0, 0, 0, 0, 0, parse_scene,
-     "engine bonsai cthead engine-block cavity furnace ml256 gyroid256 fuel torus-sphere-plane"},
-    {"--mode", "NAME", "what light does (below); default irradiance", OTHER, 0, AT(has_mode), 0, 0, 0, parse_mode,
-     "lambert phong vicinity irradiance transfer pathtrace dvr scale-invariant"},
-    {"--out", "FILE.png", "the picture; default isogi.png", TEXT, AT(out), 0, 0, 0, 0, 0, ""},
-    {"--size", "WxH", "pixels; default 900x900, 512x512 for dvr and scale-invariant", OTHER, 0, AT(has_size), 0, 0, 0, parse_size, "WxH, each 1 to 16384"},
-    {"--iso", "V", "isovalue; default the shape's own, or a threshold found in the histogram; for scale-invariant, of the peak that is suggested", NUMBERS, AT(isovalue), AT(has_iso), 1, -1e300, 1e300, 0, "a number"},
-    {"--raycast", 0, "exact rays instead of the rasterized mesh", FLAG, AT(raycast), 0, 0, 0, 0, 0, 0},
-    {"--clip", "A,B,C,D", "keep only a x + b y + c z + d >= 0 (world); what is cut shows the data; may be repeated", OTHER, 0, 0, 0, 0, 0, parse_clip,
-     "four numbers from -1e9 to 1e9, the first three not all zero (at least 1e-9 in length), at most 32 times"},
-    {"--spacing", "X,Y,Z", "size of a voxel; default 1,1,1", NUMBERS, AT(spacing), AT(has_spacing), 3, 1e-9, 1e9, 0, "three numbers, 1e-9 to 1e9"},
-    {"--nan", "V", "put this value in place of voxels that are not finite", NUMBERS, AT(nan_value), AT(has_nan), 1, -1e300, 1e300, 0, "a number"},
-    {"--camera", "AZ,EL,DIST", "degrees about and above the horizon of --up; distance in radii of the box's sphere", OTHER, 0, AT(has_camera), 0, 0, 0,
-     parse_camera, "azimuth in degrees, elevation -90 to 90, distance above 0"},
-    {"--up", "X,Y,Z", "which way is up, for the camera and the environment; default 0,1,0", OTHER, 0, AT(has_up), 0, 0, 0, parse_up, "three numbers, not all zero"},
-    {"--env", "FILE.hdr", "environment: equirectangular Radiance picture; sky: the default's sky, to go with --light", TEXT, AT(env), 0, 0, 0, 0, 0, ""},
-    {"--light", "KIND:X,Y,Z:R,G,B[:RADIUS]", "directional (towards the light; irradiance; radius in degrees), point (place; intensity), sphere "
-     "(centre; intensity; radius), rectangle:X,Y,Z:R,G,B:UX,UY,UZ:VX,VY,VZ (centre; intensity; two sides at right angles; it "
-     "shines towards U x V); may be repeated", OTHER, 0, 0, 0, 0, 0, parse_light,
-     "directional|point|sphere:X,Y,Z:R,G,B with an optional :RADIUS (up to 90 degrees; needed for a sphere), or "
-     "rectangle:X,Y,Z:R,G,B:UX,UY,UZ:VX,VY,VZ, at most 64 times"},
-    {"--albedo", "R,G,B", "diffuse reflectance; default 0.7,0.7,0.7", FLOATS, AT(albedo), AT(has_albedo), 3, 0, 1, 0, "three numbers, 0 to 1"},
-    {"--bounces", "N", "reflections of light; -1 = all, the default", INTEGER, AT(bounces), 0, 1, -1, 1000, 0, "a whole number, -1 to 1000"},
-    {"--samples", "N", "paths per texel, or per pixel for pathtrace; default 64", INTEGER, AT(samples), 0, 1, 1, 1000000, 0, "a whole number, 1 to 1000000"},
-    {"--lattice", "X,Y,Z", "texels of the illumination texture; default one per voxel", SIZES, AT(lattice), 0, 3, 2, 4096, 0, "three whole numbers, 2 to 4096"},
-    {"--lookup", "NAME", "how the texture is read: trilinear, nearest, closest-isovalue, bspline", OTHER, 0, 0, 0, 0, 0, parse_lookup,
-     "trilinear, nearest, closest-isovalue or bspline"},
-    {"--shadows", "on|off", "shadows of lights and sky; for lambert and phong, where off is the default, those of lights, per pixel", OTHER, 0, AT(has_shadows), 0,
-     0, 0, parse_shadows, "on or off"},
-    {"--ambient", "constant|normal", "for lambert (default normal) and phong (default constant): the sky's light, the same for all or by normal", OTHER, 0,
-     AT(has_ambient), 0, 0, 0, parse_ambient, "constant or normal"},
-    {"--fog", "X", "fade to the sky's mean light with distance: by exp(-X) from the front of the box's sphere to its back", NUMBERS, AT(fog), 0, 1, 0, 100, 0, "a number, 0 to 100"},
-    {"--gloss", "EXPONENT", "for transfer: gloss as well, a Phong lobe that reflects a fifth; its highlights are as soft as the order of the texture, "
-     "which holds exponents up to about 25", NUMBERS, AT(gloss), AT(has_gloss), 1, 0, 1000, 0, "a number, 0 to 1000"},
-    {"--normals", "smooth|trilinear", "of the light that is gathered; default smooth", OTHER, 0, 0, 0, 0, 0, parse_normals, "smooth or trilinear"},
-    {"--offset", "X", "rays of light start this many voxels above the surface, negative: on it; default 0.25", NUMBERS, AT(offset), 0, 1, -1, 1, 0, "a number, -1 to 1"},
-    {"--reach", "R", "surfaces further away than this (world units) cast no shadow; default 0 = unlimited", NUMBERS, AT(reach), 0, 1, 0, 1e9, 0, "a number, 0 or more"},
-    {"--storage", "NAME", "how the texture is held: default, float, half, rgb9e5, byte", OTHER, 0, 0, 0, 0, 0, parse_storage, "default, float, half, rgb9e5 or byte"},
-    {"--compare", "FILE.png", "tell how far the picture is from this one: difference_rms, of what is seen, in sRGB values of 0 to 1", TEXT, AT(compare), 0, 0, 0, 0, 0, ""},
-    {"--tf", "FILE", "transfer function: lines \"value extinction r g b\" or \"peak value opacity r g b\"; default the scene's or shape's own, "
-     "else one suggested by the histogram", TEXT, AT(tf), 0, 0, 0, 0, 0, ""},
-    {"--shading", "NAME", "for dvr and scale-invariant: unlit, visibility, local, two-sided", OTHER, 0, AT(has_shading), 0, 0, 0, parse_shading,
-     "unlit visibility local two-sided"},
-    {"--preset", "NAME", "transfer function of these colours, denser the larger the value, where the histogram has something: grey, hot, cool-warm, spectrum",
-     OTHER, 0, AT(has_preset), 0, 0, 0, parse_preset, "grey hot cool-warm spectrum"},
-    {"--method", "NAME", "for dvr with visibility: how that is computed: default, brute, paper, sweep", OTHER, 0, 0, 0, 0, 0, parse_method,
-     "default brute paper sweep"},
-    {"--order", "N", "for dvr with visibility, as the next two: spherical harmonics of shadows, 1 to 6: 2 the side light comes from, 3 soft shadows, more "
-     "for directional lights; default 4 (a scene: its own; without sweeps, for peaks or by --method, 3)", INTEGER, AT(order), 0, 1, 1, 6, 0, "a whole number, 1 to 6"},
-    {"--directions", "N", "rays from each grid point of visibility, at least 2 order^2; default 256 (a scene: its own; without sweeps 64)", INTEGER, AT(directions), 0, 1, 1, 65536, 0,
-     "a whole number, 1 to 65536"},
-    {"--grid", "X,Y,Z", "points of visibility: no shadow is finer; default half the voxels along each axis, at most 64 (a scene: its own; without sweeps a quarter)", SIZES, AT(grid), 0, 3, 1, 1024, 0,
-     "three whole numbers, 1 to 1024"},
-    {"--local", 0, "light by local visibility, of --method paper: for clip planes and lights within", FLAG, AT(local), 0, 0, 0, 0, 0, 0},
-    {"--depth", "FILE.pfm", "as well, for dvr and scale-invariant: distance from the eye to half of a pixel's opacity, where nothing is seen infinity, as "
-     "floats (the nearest of a pixel's samples)", TEXT, AT(depth), 0, 0, 0, 0, 0, ""},
-    {"--classification", "NAME", "for scale-invariant: exact, pre-integrated, post-classified; dvr knows the last one and, for both others, its own", OTHER, 0, 0, 0, 0, 0, parse_classification,
-     "exact pre-integrated post-classified"},
-    {"--silhouette", "NAME", "surfaces seen aslant are more opaque, in dvr those of peaks: none, exact, approximate, gradient", OTHER, 0, 0, 0, 0, 0, parse_silhouette,
-     "none exact approximate gradient"},
-    {"--transmission", "NAME", "light that --shading two-sided lets through: none, diffuse, specular (both, the default)", OTHER, 0, AT(has_transmission), 0, 0, 0,
-     parse_transmission, "none diffuse specular"},
-    {"--step", "S", "for dvr and for sampled rays (--classification): distance of samples in voxels; default 0.5", NUMBERS, AT(step), AT(has_step), 1, 1e-3, 1e3, 0, "a number, 0.001 to 1000"},
-    {"--exposure", "X", "factor on the light, in place of the automatic exposure", NUMBERS, AT(exposure), 0, 1, 1e-12, 1e12, 0, "a number above 0"},
-    {"--aa", "N", "samples per pixel; default 4 (1 for dvr, where it is rounded down to a square)", INTEGER, AT(antialias), 0, 1, 1, 64, 0, "a whole number, 1 to 64"},
-    {"--threads", "N", "0 = one per core, the default", INTEGER, AT(threads), 0, 1, 0, 256, 0, "a whole number, 0 to 256"},
-    {"--stats", 0, "\"key value\" lines on the standard output", FLAG, AT(stats), 0, 0, 0, 0, 0, 0}};
+    {"--scene", "NAME", ANY, "a canonical scene in place of VOLUME: volume, isovalue, light and material belong to it",
+     PARSED(parse_scene, "engine bonsai cthead engine-block cavity furnace ml256 gyroid256 fuel torus-sphere-plane")},
+    {"--mode", "NAME", ANY, "what light does (below); default irradiance", NAMED(mode_name, mode), .has = AT(has_mode)},
+    {"--out", "FILE.png", ANY, "the picture; default isogi.png", TEXT, .offset = AT(out)},
+    {"--size", "WxH", ANY, "pixels; default 900x900, 512x512 for dvr and scale-invariant",
+     PARSED(parse_size, "WxH, each 1 to 16384"), .has = AT(has_size)},
+    {"--iso", "V", ANY, "isovalue; default the shape's own, or a threshold found in the histogram; for scale-invariant, of the peak that "
+     "is suggested", NUMBERS, AT(isovalue), AT(has_iso), 1, -1e300, 1e300, .allowed = "a number"},
+    {"--raycast", 0, SURFACES, "exact rays instead of the rasterized mesh", FLAG, .offset = AT(raycast)},
+    {"--clip", "A,B,C,D", ANY, "keep only a x + b y + c z + d >= 0 (world); what is cut shows the data; may be repeated",
+     PARSED(parse_clip, "four numbers from -1e9 to 1e9, the first three not all zero (at least 1e-9 in length), at most 32 times")},
+    {"--spacing", "X,Y,Z", ANY, "size of a voxel; default 1,1,1", NUMBERS, VALUE(spacing), 3, 1e-9, 1e9,
+     .allowed = "three numbers, 1e-9 to 1e9"},
+    {"--nan", "V", ANY, "put this value in place of voxels that are not finite", NUMBERS, AT(nan_value), AT(has_nan), 1, -1e300, 1e300,
+     .allowed = "a number"},
+    {"--camera", "AZ,EL,DIST", ANY, "degrees about and above the horizon of --up; distance in radii of the box's sphere",
+     PARSED(parse_camera, "azimuth in degrees, elevation -90 to 90, distance above 0"), .has = AT(has_camera)},
+    {"--up", "X,Y,Z", ANY, "which way is up, for the camera and the environment; default 0,1,0",
+     PARSED(parse_up, "three numbers, not all zero"), .has = AT(has_up)},
+    {"--env", "FILE.hdr", LIT, "environment: equirectangular Radiance picture; sky: the default's sky, to go with --light", TEXT,
+     .offset = AT(env)},
+    {"--light", "KIND:X,Y,Z:R,G,B[:RADIUS]", LIT, "directional (towards the light; irradiance; radius in degrees), point (place; "
+     "intensity), sphere (centre; intensity; radius), rectangle:X,Y,Z:R,G,B:UX,UY,UZ:VX,VY,VZ (centre; intensity; two sides at right "
+     "angles; it shines towards U x V); may be repeated",
+     PARSED(parse_light, "directional|point|sphere:X,Y,Z:R,G,B with an optional :RADIUS (up to 90 degrees; needed for a sphere), or "
+                         "rectangle:X,Y,Z:R,G,B:UX,UY,UZ:VX,VY,VZ, at most 64 times")},
+    {"--albedo", "R,G,B", SURFACES, "diffuse reflectance; default 0.7,0.7,0.7", FLOATS, VALUE(albedo), 3, 0, 1,
+     .allowed = "three numbers, 0 to 1"},
+    {"--bounces", "N", REFLECTED, "reflections of light; -1 = all, the default", INTEGER, AT(bounces), 0, 1, -1, 1000,
+     .allowed = "a whole number, -1 to 1000"},
+    {"--samples", "N", GATHERED, "paths per texel, or per pixel for pathtrace; default 64", INTEGER, AT(samples), 0, 1, 1, 1000000,
+     .allowed = "a whole number, 1 to 1000000"},
+    {"--lattice", "X,Y,Z", BAKED, "texels of the illumination texture; default one per voxel", SIZES, AT(lattice), 0, 3, 2, 4096,
+     .allowed = "three whole numbers, 2 to 4096"},
+    {"--lookup", "NAME", BAKED, "how the texture is read: trilinear, nearest, closest-isovalue, bspline", NAMED(lookup_name, lookup)},
+    {"--shadows", "on|off", SURFACES, "shadows of lights and sky; for lambert and phong, where off is the default, those of lights, per "
+     "pixel", NAMED(switch_name, shadows), .has = AT(has_shadows)},
+    {"--ambient", "constant|normal", BY_NORMAL, "for lambert (default normal) and phong (default constant): the sky's light, the same for "
+     "all or by normal", NAMED(ambient_name, ambient), .has = AT(has_ambient)},
+    {"--fog", "X", SURFACES, "fade to the sky's mean light with distance: by exp(-X) from the front of the box's sphere to its back",
+     NUMBERS, AT(fog), 0, 1, 0, 100, .allowed = "a number, 0 to 100"},
+    {"--gloss", "EXPONENT", 1 << TRANSFER, "for transfer: gloss as well, a Phong lobe that reflects a fifth; its highlights are as soft "
+     "as the order of the texture, which holds exponents up to about 25", NUMBERS, VALUE(gloss), 1, 0, 1000,
+     .allowed = "a number, 0 to 1000"},
+    {"--normals", "smooth|trilinear", GATHERED, "of the light that is gathered; default smooth", NAMED(normals_name, normals)},
+    {"--offset", "X", GATHERED, "rays of light start this many voxels above the surface, negative: on it; default 0.25", NUMBERS,
+     AT(offset), 0, 1, -1, 1, .allowed = "a number, -1 to 1"},
+    {"--reach", "R", GATHERED, "surfaces further away than this (world units) cast no shadow; default 0 = unlimited", NUMBERS, AT(reach),
+     0, 1, 0, 1e9, .allowed = "a number, 0 or more"},
+    {"--storage", "NAME", BAKED, "how the texture is held: default, float, half, rgb9e5, byte", NAMED(storage_name, storage)},
+    {"--compare", "FILE.png", ANY, "tell how far the picture is from this one: difference_rms, of what is seen, in sRGB values of 0 to 1",
+     TEXT, .offset = AT(compare)},
+    {"--tf", "FILE", VOLUMES, "transfer function: lines \"value extinction r g b\" or \"peak value opacity r g b\"; default the scene's or "
+     "shape's own, else one suggested by the histogram", TEXT, .offset = AT(tf)},
+    {"--shading", "NAME", VOLUMES, "for dvr and scale-invariant: unlit, visibility, local, two-sided", NAMED(shading_name, shading),
+     .has = AT(has_shading)},
+    {"--preset", "NAME", VOLUMES, "transfer function of these colours, denser the larger the value, where the histogram has something: "
+     "grey, hot, cool-warm, spectrum", NAMED(preset_name, preset), .has = AT(has_preset)},
+    {"--method", "NAME", VOLUMES, "for dvr with visibility: how that is computed: default, brute, paper, sweep",
+     NAMED(method_name, method)},
+    {"--order", "N", VOLUMES, "for dvr with visibility, as the next two: spherical harmonics of shadows, 1 to 6: 2 the side light comes "
+     "from, 3 soft shadows, more for directional lights; default 4 (a scene: its own; without sweeps, for peaks or by --method, 3)",
+     INTEGER, AT(order), 0, 1, 1, 6, .allowed = "a whole number, 1 to 6"},
+    {"--directions", "N", VOLUMES, "rays from each grid point of visibility, at least 2 order^2; default 256 (a scene: its own; without "
+     "sweeps 64)", INTEGER, AT(directions), 0, 1, 1, 65536, .allowed = "a whole number, 1 to 65536"},
+    {"--grid", "X,Y,Z", VOLUMES, "points of visibility: no shadow is finer; default half the voxels along each axis, at most 64 (a "
+     "scene: its own; without sweeps a quarter)", SIZES, AT(grid), 0, 3, 1, 1024, .allowed = "three whole numbers, 1 to 1024"},
+    {"--local", 0, VOLUMES, "light by local visibility, of --method paper: for clip planes and lights within", FLAG, .offset = AT(local)},
+    {"--depth", "FILE.pfm", VOLUMES, "as well, for dvr and scale-invariant: distance from the eye to half of a pixel's opacity, where "
+     "nothing is seen infinity, as floats (the nearest of a pixel's samples)", TEXT, .offset = AT(depth)},
+    {"--classification", "NAME", VOLUMES, "for scale-invariant: exact, pre-integrated, post-classified; dvr knows the last one and, for "
+     "both others, its own", NAMED(classification_name, classification)},
+    {"--silhouette", "NAME", VOLUMES, "surfaces seen aslant are more opaque, in dvr those of peaks: none, exact, approximate, gradient",
+     NAMED(silhouette_name, silhouette)},
+    {"--transmission", "NAME", VOLUMES, "light that --shading two-sided lets through: none, diffuse, specular (both, the default)",
+     NAMED(transmission_name, transmission), .has = AT(has_transmission)},
+    {"--step", "S", VOLUMES, "for dvr and for sampled rays (--classification): distance of samples in voxels; default 0.5", NUMBERS,
+     VALUE(step), 1, 1e-3, 1e3, .allowed = "a number, 0.001 to 1000"},
+    {"--exposure", "X", ANY, "factor on the light, in place of the automatic exposure", NUMBERS, AT(exposure), 0, 1, 1e-12, 1e12,
+     .allowed = "a number above 0"},
+    {"--aa", "N", ANY, "samples per pixel; default 4 (1 for dvr, where it is rounded down to a square)", INTEGER, AT(antialias), 0, 1, 1,
+     64, .allowed = "a whole number, 1 to 64"},
+    {"--threads", "N", ANY, "0 = one per core, the default", INTEGER, AT(threads), 0, 1, 0, 256, .allowed = "a whole number, 0 to 256"},
+    {"--stats", 0, ANY, "\"key value\" lines on the standard output", FLAG, .offset = AT(stats)}};
 #define OPTION_COUNT (sizeof option_list / sizeof option_list[0])
+typedef char a_bit_of_given_for_each[OPTION_COUNT <= 64 ? 1 : -1];
 
 static void print_help(void) {
     puts("build/viewer VOLUME [options]      volume in, globally lit picture out\n\n"
@@ -270,12 +292,12 @@ static void print_help(void) {
         char left[64];
         snprintf(left, sizeof left, "%s %s", option_list[i].name, option_list[i].argument ? option_list[i].argument : "");
         printf("  %-28s %s\n", left, option_list[i].help);
-        if (option_list[i].other == parse_scene) printf("  %-28s %s\n", "", option_list[i].allowed);
+        if (option_list[i].parse == parse_scene) printf("  %-28s %s\n", "", option_list[i].allowed);
     }
     puts("  --help                       this text\n\n"
          "Modes\n"
          "  lambert, phong               light by the normal alone, no shadows: the usual picture, to compare with\n"
-         "  vicinity                     a uniform sky, no reflections: how open each place is\n"
+         "  vicinity                     a uniform sky of its own, no reflections: how open each place is\n"
          "  irradiance                   global light baked into a texture, only where this view looks\n"
          "  transfer                     the same by spherical harmonics, which can be relit without new rays\n"
          "  pathtrace                    no texture: paths from every pixel, the reference\n"
@@ -292,21 +314,28 @@ static void print_help(void) {
          "  build/viewer procedural:skull --light directional:1,2,3:4,3.8,3.5:3 --camera 20,10,2.4");
 }
 
-/* Options that one kind of picture has no use for are refused, not ignored. */
-static const char *const of_volumes[] = {"--tf", "--preset", "--shading", "--classification", "--silhouette", "--transmission", "--step", "--method", "--order", "--directions", "--grid", "--local",
-                                         "--depth", NULL};
-static const char *const of_surfaces[] = {"--raycast", "--albedo", "--bounces", "--samples", "--lattice", "--lookup", "--shadows", "--ambient", "--fog", "--gloss", "--normals", "--offset",
-                                          "--reach", "--storage", NULL};
+/* The names joined: by spaces, or as in a sentence. */
+static void list_names(const char *const *names, int count, unsigned which, int sentence, char text[256]) {
+    const char *between = "";
+    for (int i = 0; i < count; i++) {
+        unsigned after = which >> 1 >> i & ((1u << (count - 1 - i)) - 1);
+        if (!(which >> i & 1)) continue;
+        strcat(strcat(text, between), names[i]);
+        between = !sentence ? " " : after & (after - 1) ? ", " : " and ";
+    }
+}
 
-static int check_use(viewer *v, int argc, char **argv) {
-    const char *const *useless = v->o.mode >= DVR ? of_surfaces : of_volumes;
-    for (int i = 1; i < argc; i++) {
-        size_t k;
-        for (k = 0; useless[k] && strcmp(argv[i], useless[k]) != 0;) k++;
-        if (useless[k])
-            return file_fail(v->error, "%s: works with %s, not with --mode %s", argv[i], v->o.mode >= DVR ? "surfaces" : "--mode dvr and scale-invariant", mode_name[v->o.mode]);
-        for (k = 0; k < OPTION_COUNT && strcmp(argv[i], option_list[k].name) != 0;) k++;
-        i += k < OPTION_COUNT && option_list[k].kind != FLAG; /* its value may look like an option */
+static int check_use(viewer *v) {
+    int mode = v->o.mode;
+    for (size_t k = 0; k < OPTION_COUNT; k++) {
+        const option *p = &option_list[k];
+        char modes[256] = "--mode ";
+        const char *with = modes;
+        if (!(v->o.given >> k & 1) || p->use >> mode & 1) continue;
+        if (mode >= DVR && !(p->use & VOLUMES)) with = "surfaces";
+        else if (p->use == LIT) with = "modes that have no light of their own";
+        else list_names(mode_name, MODE_COUNT, p->use, 1, modes);
+        return file_fail(v->error, "%s: works with %s, not with --mode %s", p->name, with, mode_name[mode]);
     }
     return 1;
 }
@@ -363,19 +392,22 @@ static int check_files(viewer *v) {
 }
 
 static int parse_value(viewer *v, const option *p, const char *text) {
-    char *at = (char *)&v->o + p->offset;
+    char *at = (char *)&v->o + p->offset, names[256] = "";
     double x[4];
     int ok = 0;
-    if (p->kind == TEXT) return *text ? (memcpy(at, &text, sizeof text), 1) : file_fail(v->error, "%s: the name of a file is missing", p->name);
-    if (p->kind == OTHER) ok = p->other(v, text);
+    if (p->kind == TEXT)
+        return *text ? (memcpy(at, &text, sizeof text), 1) : file_fail(v->error, "%s: the name of a file is missing", p->name);
+    if (p->kind == NAME) ok = parse_name(text, p->names, p->count, (int *)(void *)at);
+    else if (p->kind == OTHER) ok = p->parse(v, text);
     else ok = (p->kind == INTEGER || p->kind == SIZES ? whole_numbers : numbers)(text, ',', p->count, p->low, p->high, x);
-    for (int i = 0; ok && i < p->count; i++) {
+    for (int i = 0; ok && p->kind < NAME && i < p->count; i++) {
         if (p->kind == INTEGER) ((int *)(void *)at)[i] = (int)x[i];
         else if (p->kind == SIZES) ((size_t *)(void *)at)[i] = (size_t)x[i];
         else if (p->kind == FLOATS) ((float *)(void *)at)[i] = (float)x[i];
         else ((double *)(void *)at)[i] = x[i];
     }
-    return ok || file_fail(v->error, "%s: \"%.80s\" is not allowed; allowed: %s", p->name, text, p->allowed);
+    if (p->kind == NAME) list_names(p->names, p->count, ~0u, 0, names);
+    return ok || file_fail(v->error, "%s: \"%.80s\" is not allowed; allowed: %s", p->name, text, p->kind == NAME ? names : p->allowed);
 }
 
 static int parse_arguments(viewer *v, int argc, char **argv) {
@@ -397,19 +429,19 @@ static int parse_arguments(viewer *v, int argc, char **argv) {
         else if (i + 1 >= argc) return file_fail(v->error, "%s: needs a value: %s", p->name, p->argument);
         else if (!parse_value(v, p, argv[++i])) return 0;
         if (p->has) memcpy((char *)o + p->has, &one, sizeof one);
+        o->given |= (uint64_t)1 << (p - option_list);
     }
     if (!o->volume == !o->scene) return file_fail(v->error, o->volume ? "give VOLUME or --scene, not both" : "no volume: build/viewer VOLUME [options], --help explains");
     if (!o->out) o->out = "isogi.png";
     if (o->scene && !o->has_mode) o->mode = o->scene->lit ? IRRADIANCE : DVR;
     if (o->scene && o->mode >= DVR && !o->scene->rendered && !o->tf && !o->has_preset)
         return file_fail(v->error, "--scene %s has no transfer function: give one by --tf or --preset, or another --mode", o->scene->name);
-    if (!check_use(v, argc, argv) || !check_volume(v) || !check_files(v)) return 0;
+    if (!check_use(v) || !check_volume(v) || !check_files(v)) return 0;
     if (!o->has_size) o->width = o->height = o->mode >= DVR ? 512 : 900;
     if ((double)o->width * o->height > 100e6) return file_fail(v->error, "--size: %dx%d is too large; at most 100 million pixels", o->width, o->height);
     if (!o->samples) o->samples = 64;
     if (!o->has_shadows) o->shadows = o->mode > PHONG;
     if (!o->has_ambient) o->ambient = o->mode != PHONG;
-    if (o->has_gloss && o->mode != TRANSFER) return file_fail(v->error, "--gloss: needs --mode transfer, whose texture knows where light comes from");
     if (o->storage == ISOGI_TRACE_RGB9E5 && o->mode == TRANSFER) return file_fail(v->error, "--storage: rgb9e5 holds colours, not the coefficients of --mode transfer");
     return 1;
 }
@@ -632,7 +664,7 @@ static int summarize_light(viewer *v) {
 
 static int set_light(viewer *v) {
     const scene *s = v->o.scene;
-    const char *env = v->o.env, *scene_env = s ? (v->o.mode >= DVR ? s->dvr_env : s->env) : NULL;
+    const char *env = v->o.env, *scene_env = s && v->o.mode != VICINITY ? (v->o.mode >= DVR ? s->dvr_env : s->env) : NULL;
     isogi_env *e = &v->lighting.env;
     int sky = env && !strcmp(env, "sky");
     isogi_result result;
@@ -648,7 +680,6 @@ static int set_light(viewer *v) {
     for (int i = 0; i < 9; i++) e->rotation[i] = (float)v->rotation[i];
     if (v->o.mode == VICINITY) {
         static const float one[3] = {1, 1, 1};
-        e->rgb = NULL, e->width = e->height = 0, v->o.light_count = 0;
         set_sky(v, one, one);
     } else if (!env && !v->o.light_count) set_default_light(v);
     v->lighting.lights = v->o.lights, v->lighting.light_count = v->o.light_count;
