@@ -98,13 +98,22 @@ static int write_raw(program *p) {
     return 1;
 }
 
+/* The dense texture takes the place of nothing else that is named. */
+static int check_files(program *p) {
+    bake_scene *s = &p->scene;
+    if (file_same(p->raw, s->out)) return file_fail(s->error, "--raw: %.200s is the file of --out", p->raw);
+    if (file_same(p->raw, s->volume_name)) return file_fail(s->error, "--raw: %.200s is the file of VOLUME", p->raw);
+    for (int i = 0; i < p->merge_count; i++)
+        if (file_same(p->raw, p->merge[i])) return file_fail(s->error, "--raw: %.200s is the file of --merge", p->raw);
+    return 1;
+}
+
 static int run(program *p, int argc, char **argv) {
     bake_scene *s = &p->scene;
     isogi_result result;
     if (!parse(p, argc, argv)) return 0;
-    if (p->raw && s->out && !strcmp(p->raw, s->out)) return file_fail(s->error, "--raw: is the same file as --out");
     if (p->format && !p->raw) return file_fail(s->error, "--format: is that of --raw, which is missing");
-    if (!bake_scene_make(s) || !file_writable(s->out, s->error) || (p->raw && !file_writable(p->raw, s->error))) return 0;
+    if (!check_files(p) || !bake_scene_make(s) || !file_writable(s->out, s->error) || (p->raw && !file_writable(p->raw, s->error))) return 0;
     result = isogi_trace_create(&p->trace, &s->desc, &s->context);
     if (result != ISOGI_OK) return file_fail(s->error, "the texture: %s", isogi_result_string(result));
     if (p->raw && !isogi_trace_export_size(p->trace, p->format)) return file_fail(s->error, "--format: this one is not for this mode");
@@ -121,6 +130,7 @@ int main(int argc, char **argv) {
         if (!strcmp(argv[i], "--help") || !strcmp(argv[i], "-h")) return help(), 0;
     signal(SIGINT, interrupt), signal(SIGTERM, interrupt);
     ok = run(&p, argc, argv);
+    if (ok && (fflush(stdout) != 0 || ferror(stdout))) ok = file_fail(p.scene.error, "standard output: %s", strerror(errno));
     if (!ok) fprintf(stderr, "bake: %s\n", p.scene.error);
     isogi_trace_free(p.trace);
     bake_scene_free(&p.scene);

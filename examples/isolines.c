@@ -5,6 +5,7 @@
    volume rendering shows as the less opaque surface. */
 #define ISOGI_IMPLEMENTATION
 #include "isogi_vol.h"
+#include "option_text.h"
 #include "picture.h"
 #include "png.h"
 #include "procedural.h"
@@ -20,9 +21,9 @@ int main(int argc, char **argv) {
     isogi_pyramid *pyramid = NULL;
     char error[FILE_ERROR_SIZE];
     if (!shape) return fprintf(stderr, "usage: %s SHAPE LINES LOW HIGH OUT.png\n", argv[0]), 2;
-    char *end[3];
-    double lines = strtod(argv[2], &end[0]), low = strtod(argv[3], &end[1]), gap = (strtod(argv[4], &end[2]) - low) / (lines > 1 ? lines - 1 : 1);
-    if (*end[0] || *end[1] || *end[2] || !(lines >= 1 && lines <= 1000 && gap > 1e-9 && gap < 1e9))
+    double lines, low, high, gap;
+    if (!whole_numbers(argv[2], ',', 1, 1, 1000, &lines) || !numbers(argv[3], ',', 1, -1e9, 1e9, &low) ||
+        !numbers(argv[4], ',', 1, -1e9, 1e9, &high) || !(gap = (high - low) / (lines > 1 ? lines - 1 : 1), gap > 1e-9))
         return fprintf(stderr, "isolines: LINES is 1 to 1000, LOW is a number below HIGH\n"), 1;
     isogi_result result = procedural_make(shape, 0, &volume, NULL);
     if (result == ISOGI_OK) result = isogi_vol_build(&pyramid, &volume, NULL);

@@ -5,6 +5,7 @@
    SPACE is physical or data (with silhouettes). Isosurfaces of a third and two thirds of the range. */
 #define ISOGI_IMPLEMENTATION
 #include "isogi_dvr.h"
+#include "option_text.h"
 #include "picture.h"
 #include "png.h"
 #include "volume_file.h"
@@ -60,10 +61,13 @@ int main(int argc, char **argv) {
     isogi_volume volume = {.data = NULL};
     isogi_tet_report report;
     isogi_tets *built = NULL;
-    int data = argc > 2 && !strcmp(argv[2], "data"), side = argc > 4 ? atoi(argv[4]) : 512;
-    if (argc < 4 || argc > 5 || (!data && strcmp(argv[2], "physical")) || side < 1 || side > 8192)
+    double width = 512;
+    int data = argc > 2 && !strcmp(argv[2], "data");
+    if (argc < 4 || argc > 5 || (!data && strcmp(argv[2], "physical")) || (argc > 4 && !whole_numbers(argv[4], ',', 1, 1, 8192, &width)))
         return fprintf(stderr, "usage: %s MESH physical|data OUT.png [WIDTH], 1 to 8192 pixels wide\n", argv[0]), 2;
-    int raw = strstr(argv[1], ".raw") != NULL;
+    if (file_same(argv[1], argv[3])) return fprintf(stderr, "tets: %s is MESH and OUT.png\n", argv[3]), 1;
+    int raw = strstr(argv[1], ".raw") != NULL, side = (int)width;
+    if (!file_writable(argv[3], error)) return fprintf(stderr, "tets: %s\n", error), 1;
     if (raw ? !volume_read(argv[1], &volume, error) || !split(&volume) : !read_tets(argv[1], error)) return fprintf(stderr, "tets: %s\n", error), 1;
     mesh.points = (const float(*)[3])points, mesh.values = values, mesh.tets = (const uint32_t(*)[4])tets;
     isogi_result result = isogi_dvr_tets_build(&built, &mesh, &report, NULL);

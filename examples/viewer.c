@@ -371,23 +371,15 @@ static int check_transfer(viewer *v, int suggested) {
     return 1;
 }
 
-/* Two names of one file, be it there yet or not. Devices may be named twice. */
-static int same_file(const char *a, const char *b) {
-    struct stat x, y;
-    if (!a || !b) return 0;
-    if (stat(a, &x) != 0 || stat(b, &y) != 0) return !strcmp(a, b);
-    return S_ISREG(x.st_mode) && x.st_dev == y.st_dev && x.st_ino == y.st_ino;
-}
-
 /* No picture takes the place of another one, or of what it is made from. (That of --compare is read first, and may be replaced by --out.) */
 static int check_files(viewer *v) {
     const options *o = &v->o;
     const char *const names[] = {o->volume, o->tf, o->env}, *const options_of[] = {"VOLUME", "--tf", "--env"};
-    if (same_file(o->out, o->depth)) return file_fail(v->error, "--depth: %.200s is the file of --out", o->depth);
-    if (same_file(o->depth, o->compare)) return file_fail(v->error, "--depth: %.200s is the file of --compare", o->depth);
+    if (file_same(o->out, o->depth)) return file_fail(v->error, "--depth: %.200s is the file of --out", o->depth);
+    if (file_same(o->depth, o->compare)) return file_fail(v->error, "--depth: %.200s is the file of --compare", o->depth);
     for (int i = 0; i < 3; i++)
-        if (same_file(o->out, names[i]) || same_file(o->depth, names[i]))
-            return file_fail(v->error, "%s: %.200s is the file of %s", same_file(o->out, names[i]) ? "--out" : "--depth", names[i], options_of[i]);
+        if (file_same(o->out, names[i]) || file_same(o->depth, names[i]))
+            return file_fail(v->error, "%s: %.200s is the file of %s", file_same(o->out, names[i]) ? "--out" : "--depth", names[i], options_of[i]);
     return 1;
 }
 

@@ -76,7 +76,7 @@ TEST(isolines_lie_where_the_formula_has_their_values) {
 }
 
 TEST(bad_isolines_get_one_line) {
-    static const char *const bad[] = {"gyroid x 0 1 '%s'", "gyroid 3 1 0 '%s'", "gyroid 3 0 nan '%s'", "gyroid 1e30 0 1 '%s'", "gyroid 0 0 1 '%s'", "gyroid 3 0 1x '%s'"};
+    static const char *const bad[] = {"gyroid x 0 1 '%s'", "gyroid 3 1 0 '%s'", "gyroid 3 0 nan '%s'", "gyroid 1e30 0 1 '%s'", "gyroid 0 0 1 '%s'", "gyroid 3 0 1x '%s'", "gyroid 2.5 0 1 '%s'"};
     for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) check_kept("build/isolines", bad[i], 1, "LINES is 1 to 1000");
     check_kept("build/isolines", "", 2, "usage");
     check_kept("build/isolines", "teapot 3 0 1 '%s'", 2, "usage");
@@ -100,6 +100,9 @@ TEST(bad_meshes_of_tetrahedra_get_one_line) {
     check_kept("build/tets", "/nowhere.tet magic '%s'", 2, "usage");
     check_kept("build/tets", "/nowhere.tet data '%s' 0", 2, "usage");
     check_kept("build/tets", "/nowhere.tet data '%s' 100000", 2, "usage");
+    check_kept("build/tets", "/nowhere.tet data '%s' 16x", 2, "usage");
+    check_kept("build/tets", "/nowhere.tet data '%s' 1e999", 2, "usage");
+    check_kept("build/tets", "'%1$s' data '%1$s'", 1, "is MESH and OUT.png");
     check_kept("build/tets", "", 2, "usage");
 }
 
@@ -114,7 +117,9 @@ TEST(bad_bakes_get_one_line) {
         {"procedural:gyroid:8 --box 0,0,0,0,0,0 --out '%s'", "--box"}, {"procedural:gyroid:8 --raw /nowhere/a.rgb --samples 1 --out '%s'", "/nowhere/a.rgb: cannot be written"},
         {"procedural:gyroid:8 --mode transfer --light directional:1,1,1:1,1,1 --out '%s'", "--mode transfer bakes for any light"},
         {"/nowhere_4x4x4_uint8.raw --out '%s'", "No such file"}, {"procedural:gyroid:8 --samples 1 --out /nowhere/a.bake", "/nowhere/a.bake: cannot be written"},
-        {"procedural:gyroid:8 --nonsense --out '%s'", "no such option"}};
+        {"procedural:gyroid:8 --nonsense --out '%s'", "no such option"}, {"procedural:gyroid:8 --box 0,0,0,8,9,8 --out '%s'", "--box: reaches beyond the lattice along y"},
+        {"'%1$s' --raw '%1$s' --out a.bake", "is the file of VOLUME"}, {"procedural:gyroid:8 --raw '%1$s' --out '%1$s'", "is the file of --out"},
+        {"procedural:gyroid:8 --merge '%1$s' --raw '%1$s' --out a.bake", "is the file of --merge"}};
     for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) check_kept("build/bake", bad[i][0], 1, bad[i][1]);
 }
 

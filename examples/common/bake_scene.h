@@ -120,6 +120,9 @@ static inline int bake_scene_make(bake_scene *s) {
     memcpy(s->volume.spacing, s->spacing, sizeof s->spacing);
     if (result == ISOGI_OK) result = isogi_vol_build(&s->pyramid, &s->volume, &s->context);
     if (result != ISOGI_OK) return file_fail(s->error, "%s: %s", s->volume_name, isogi_result_string(result));
+    for (int a = 0; a < 3; a++)
+        if (s->desc.box_end[a] > (s->desc.lattice[a] ? s->desc.lattice[a] : s->volume.size[a]))
+            return file_fail(s->error, "--box: reaches beyond the lattice along %c", "xyz"[a]);
     if (s->env.rgb) l->env.rgb = s->env.rgb, l->env.width = s->env.width, l->env.height = s->env.height;
     if (!s->env.rgb && !l->light_count) daylight_make(l, s->sky, &s->lights[0]);
     l->lights = s->lights, s->desc.pyramid = s->pyramid;

@@ -127,6 +127,14 @@ static inline int file_temporary(const char *target, char name[PATH_MAX], const 
     return file;
 }
 
+/* Two names of one file, be it there yet or not. Devices may be named twice. */
+static inline int file_same(const char *a, const char *b) {
+    struct stat x, y;
+    if (!a || !b) return 0;
+    if (stat(a, &x) != 0 || stat(b, &y) != 0) return !strcmp(a, b);
+    return S_ISREG(x.st_mode) && x.st_dev == y.st_dev && x.st_ino == y.st_ino;
+}
+
 /* Whether file_write could succeed: asked before hours of work, not after. */
 static inline int file_writable(const char *path, char *error) {
     char target[PATH_MAX], name[PATH_MAX];
