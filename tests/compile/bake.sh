@@ -68,8 +68,8 @@ refused "format" $scene --mode transfer --raw "$OUT/x.rgb" --format rgb9e5 --out
 refused "format" $scene --format byte --out "$OUT/x.bake"
 refused "storage" $scene --mode transfer --storage rgb9e5 --out "$OUT/x.bake"
 refused "/nowhere/x.rgb: cannot be written" $scene --raw /nowhere/x.rgb --out "$OUT/x.bake"
-refused "same file" $scene --raw "$OUT/x.bake" --out "$OUT/x.bake"
-refused "invalid" $scene --box 0,0,0,99,99,99 --out "$OUT/x.bake"
+refused "is the file of --out" $scene --raw "$OUT/x.bake" --out "$OUT/x.bake"
+refused "beyond the lattice" $scene --box 0,0,0,99,99,99 --out "$OUT/x.bake"
 refused "needed" $scene
 refused "no such option" $scene --out "$OUT/x.bake" --nothing
 [ ! -e "$OUT/x.bake" ]
