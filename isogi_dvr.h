@@ -2464,33 +2464,11 @@ static void isogi_dvr__jitter(isogi_dvr__march *m, uint32_t seed, int x, int y) 
     m->count = (uint64_t)isogi_dvr__clamp(ceil(m->length / m->piece + m->shift), 2 * ISOGI_DVR__MAX_SAMPLES);
 }
 
-/* A row of two voxels; where the axis has one, twice that. */
-#define ISOGI_DVR__PAIR(T, offset, to)                                                                    \
-    (to)[0] = v->scale * (double)*(const T *)(const void *)(p + (offset)) + v->bias,                      \
-    (to)[1] = v->scale * (double)*(const T *)(const void *)(p + (offset) + stride[0]) + v->bias
-#define ISOGI_DVR__CORNERS(T)                                                                             \
-    ISOGI_DVR__PAIR(T, 0, m->corner), ISOGI_DVR__PAIR(T, stride[1], m->corner + 2),                       \
-    ISOGI_DVR__PAIR(T, stride[2], m->corner + 4), ISOGI_DVR__PAIR(T, stride[1] + stride[2], m->corner + 6)
-
 /* Corner x + 2y + 4z of the present cell. */
 static void isogi_dvr__fetch(isogi_dvr__march *m) {
-    const isogi_volume *v = &m->dvr->volume;
-    const char *p = (const char *)v->data;
     double low[4], high[4];
-    ptrdiff_t stride[3];
     int i;
-    for (i = 0; i < 3; i++) p += m->cell[i] * v->stride[i], stride[i] = m->dvr->cells[i] ? v->stride[i] : 0;
-    m->finite = 1;
-    if (v->type == ISOGI_U8) ISOGI_DVR__CORNERS(uint8_t);
-    else if (v->type == ISOGI_U16) ISOGI_DVR__CORNERS(uint16_t);
-    else if (v->type == ISOGI_F32) ISOGI_DVR__CORNERS(float);
-    else {
-        uint32_t cell[3];
-        for (i = 0; i < 3; i++) cell[i] = (uint32_t)m->cell[i];
-        m->finite = isogi_volume_corners(v, cell, m->corner);
-    }
-    if (!isogi_vol_finite(m->dvr->desc.pyramid)) /* integers may not be: scale carries them beyond */
-        for (i = 0; i < 8; i++) m->finite &= isogi_dvr__finite64(m->corner[i]);
+    m->finite = isogi_vol_corners(m->dvr->desc.pyramid, m->cell, m->corner);
     for (i = 0; i < 4; i++) {
         const double *c = m->corner + 2 * i;
         low[i] = c[0] < c[1] ? c[0] : c[1], high[i] = c[0] < c[1] ? c[1] : c[0];
@@ -2498,8 +2476,6 @@ static void isogi_dvr__fetch(isogi_dvr__march *m) {
     for (i = 0; i < 2; i++) low[i] = low[i] < low[i + 2] ? low[i] : low[i + 2], high[i] = high[i] > high[i + 2] ? high[i] : high[i + 2];
     m->low = low[0] < low[1] ? low[0] : low[1], m->high = high[0] > high[1] ? high[0] : high[1];
 }
-#undef ISOGI_DVR__PAIR
-#undef ISOGI_DVR__CORNERS
 
 /* The trilinear value, kept within the corners' range (rounding may not carry it into extinction that the range excludes), and
    its derivative along the ray, per t. */

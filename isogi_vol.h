@@ -217,6 +217,8 @@ ISOGI_API const isogi_volume *isogi_vol_volume(const isogi_pyramid *pyramid); /*
 ISOGI_API const isogi_context *isogi_vol_context(const isogi_pyramid *pyramid);
 ISOGI_API isogi_level isogi_vol_level(const isogi_pyramid *pyramid, int level); /* all zero beyond the last */
 ISOGI_API int isogi_vol_finite(const isogi_pyramid *pyramid); /* 1 if every voxel is a finite number */
+/* isogi_volume_corners for inner loops: nothing is checked; the cell must be one of the pyramid's volume, which must hold voxels. */
+ISOGI_API int isogi_vol_corners(const isogi_pyramid *pyramid, const int cell[3], double corner[8]);
 ISOGI_API void isogi_vol_range(const isogi_pyramid *pyramid, double range[2]);  /* of the finite values; {0,0} if there are none */
 /* What the field can be in the box of voxels first..last, both ends included and cut to the volume, and in all cells between them; by
    way of the pyramid, so that large boxes are no dearer than small ones but for their rim.
@@ -970,12 +972,17 @@ ISOGI_VOL__INLINE void isogi_vol__read_corners(const isogi_volume *v, const int 
 #undef ISOGI_VOL__READ
 }
 
-/* The same minus the isovalue (subtraction keeps the sign exact). 0 if one of them is not finite. */
-static int isogi_vol__corners(const isogi_pyramid *pyramid, const int cell[3], double isovalue, double corner[8]) {
+ISOGI_API int isogi_vol_corners(const isogi_pyramid *pyramid, const int cell[3], double corner[8]) {
     int i, finite = 1;
     isogi_vol__read_corners(&pyramid->volume, cell, corner);
     if (!pyramid->all_finite)
         for (i = 0; i < 8; i++) finite &= isogi_vol__finite64(corner[i]);
+    return finite;
+}
+
+/* The same minus the isovalue (subtraction keeps the sign exact). */
+static int isogi_vol__corners(const isogi_pyramid *pyramid, const int cell[3], double isovalue, double corner[8]) {
+    int i, finite = isogi_vol_corners(pyramid, cell, corner);
     for (i = 0; i < 8; i++) corner[i] -= isovalue;
     return finite;
 }

@@ -18,7 +18,9 @@ TEST(corners_and_ranges_are_those_of_the_voxels) {
     for (int i = 0; i < 2000; i++) {
         uint32_t cell[3] = {(uint32_t)(random_bits(&r) % 6), 0, (uint32_t)(random_bits(&r) % 69)};
         double corner[8];
-        int finite = 1, told = isogi_volume_corners(v, cell, corner);
+        int finite = 1, told = isogi_volume_corners(v, cell, corner), at[3] = {(int)cell[0], 0, (int)cell[2]};
+        double unchecked[8];
+        CHECK(isogi_vol_corners(f.pyramid, at, unchecked) == told && !memcmp(unchecked, corner, sizeof corner), "unchecked is otherwise");
         for (int c = 0; c < 8; c++) {
             double value = *field_at(&f, (int)cell[0] + (c & 1), 0, (int)cell[2] + (c >> 2));
             finite &= test_finite(value);
