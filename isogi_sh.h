@@ -1452,6 +1452,7 @@ typedef float isogi_sh__f8 __attribute__((vector_size(32), aligned(4), may_alias
 typedef float isogi_sh__f16 __attribute__((vector_size(64), aligned(4), may_alias));
 typedef float isogi_sh__plain_f8 __attribute__((vector_size(32)));
 typedef double isogi_sh__d4 __attribute__((vector_size(32), aligned(8), may_alias));
+typedef double isogi_sh__half __attribute__((vector_size(32), aligned(4), may_alias)); /* 8 floats: gcc 12 stores it from where it is */
 typedef double isogi_sh__d8 __attribute__((vector_size(64), aligned(8), may_alias));
 typedef int32_t isogi_sh__i8 __attribute__((vector_size(32), aligned(4), may_alias));
 typedef int32_t isogi_sh__i16 __attribute__((vector_size(64), aligned(4), may_alias));
@@ -1536,7 +1537,7 @@ ISOGI_SH__AVX512 ISOGI_SH__INLINE void isogi_sh__join_f16_turn(float *y, size_t 
 
 /* y[k][i] = row i of column k for 8 rows and as many columns as are lanes, from registers: 4 x 4 (or 2 x 2) transposed in each quarter
    of a vector, then quarters of both halves of the rows joined. Halves of 64 bytes are stored each by itself, which costs as much as the
-   last shuffle would. */
+   last shuffle would: stores that cross lines of the cache are what evaluation of rows waits for in the end. */
 ISOGI_SH__AVX2 ISOGI_SH__INLINE void isogi_sh__eval_f8_turn(float *y, size_t n, const isogi_sh__f8 *row) {
     int half;
     ISOGI_SH__UNROLL
@@ -1570,10 +1571,10 @@ ISOGI_SH__AVX512 ISOGI_SH__INLINE void isogi_sh__eval_f16_turn(float *y, size_t 
     for (k = 0; k < 4; k++) {
         isogi_sh__d8 p = __builtin_shufflevector(v[0][k], v[1][k], 0, 1, 8, 9, 2, 3, 10, 11);
         isogi_sh__d8 q = __builtin_shufflevector(v[0][k], v[1][k], 4, 5, 12, 13, 6, 7, 14, 15);
-        *(isogi_sh__f8 *)(y + n * k) = (isogi_sh__f8)ISOGI_SH__HALF_D8(p, 0);
-        *(isogi_sh__f8 *)(y + n * (k + 4)) = (isogi_sh__f8)ISOGI_SH__HALF_D8(p, 1);
-        *(isogi_sh__f8 *)(y + n * (k + 8)) = (isogi_sh__f8)ISOGI_SH__HALF_D8(q, 0);
-        *(isogi_sh__f8 *)(y + n * (k + 12)) = (isogi_sh__f8)ISOGI_SH__HALF_D8(q, 1);
+        *(isogi_sh__half *)(y + n * k) = ISOGI_SH__HALF_D8(p, 0);
+        *(isogi_sh__half *)(y + n * (k + 4)) = ISOGI_SH__HALF_D8(p, 1);
+        *(isogi_sh__half *)(y + n * (k + 8)) = ISOGI_SH__HALF_D8(q, 0);
+        *(isogi_sh__half *)(y + n * (k + 12)) = ISOGI_SH__HALF_D8(q, 1);
     }
 }
 
@@ -1838,6 +1839,7 @@ ISOGI_SH__AVX512 ISOGI_SH__INLINE void isogi_sh__eval_d8_split(isogi_sh__d8 *u, 
             if (i) {                                                                                                           \
                 T *row = out + 25 * at;                                                                                        \
                 NAME##_order5(basis, u);                                                                                       \
+                ISOGI_SH__UNROLL25                                                                                             \
                 for (k = 0; k < WIDTH; k++) row[25 * k] = (T)0.28209479177387814;                                              \
                 NAME##_turn(row + 1, 25, basis + 1);                                                                           \
                 NAME##_turn(row + 9, 25, basis + 9);                                                                           \
