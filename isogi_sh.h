@@ -4087,7 +4087,7 @@ ISOGI_SH__AVX2 static void isogi_sh__project_fast(float *rgb, const float *image
 #endif
 
 /* Their part of the projection, in the frame whose z is the image's pole. */
-static void isogi_sh__project_rows(float *c, int order, const isogi_sh__pixels *p) {
+ISOGI_SH__APART void isogi_sh__project_rows(float *c, int order, const isogi_sh__pixels *p) {
     double total[2][ISOGI_SH__GROUP][ISOGI_SH_MAX_ORDER][3], sums[2][ISOGI_SH__GROUP][3], q[ISOGI_SH_MAX_ORDER];
     int j, k, l, m;
     memset(total, 0, sizeof total);

@@ -1,5 +1,6 @@
 /* The least and the highest order, and vectors without length, as short and as long as floats are, for what isogi_sh.h does besides
    evaluation: cones, skies, lights, windows, conventions, algebra, rotations, projections, fits. The reference is tests/reference_sh.h: 128 bits, from the definition. */
+#define _GNU_SOURCE /* stacks of threads */
 #define ISOGI_SH_IMPLEMENTATION
 #include "isogi_sh.h"
 #include "reference_sh.h"
@@ -637,5 +638,129 @@ TEST(fits_of_any_order) {
             CHECK(off <= 1e-5 && fabs((double)rgb[0] - 3) <= 1e-4 && fabs((double)ambient[0]) <= 1e-4, "order %d, axis %d: %g off, %g %g", orders[o], a, off, (double)rgb[0], (double)ambient[0]);
         }
 }
+
+/* ---- the stack: what the header promises ---- */
+
+#if defined(__linux__) && defined(__OPTIMIZE__) && !TEST_SANITIZED
+#include <pthread.h>
+
+enum { STACK = 1 << 18, MANY = 67, WIDE = 48, HIGH = 24 };
+
+static float many[N * MANY], image[WIDE * HIGH * 3], directions[MANY][3], coordinates[3][MANY], turn[ISOGI_SH_ROTATION_COUNT(MOST)];
+static double many_f64[N * MANY], directions_f64[MANY][3], coordinates_f64[3][MANY], turn_f64[ISOGI_SH_ROTATION_COUNT(MOST)];
+static const float flat[9] = {0.36f, 0.48f, -0.8f, -0.8f, 0.6f, 0, 0.48f, 0.64f, 0.6f};
+static const double flat_f64[9] = {0.36, 0.48, -0.8, -0.8, 0.6, 0, 0.48, 0.64, 0.6};
+
+static void use_eval(int order) {
+    isogi_sh_eval(many, order, (const float(*)[3])directions, MANY);
+    isogi_sh_eval_soa(many, order, coordinates[0], coordinates[1], coordinates[2], MANY);
+}
+static void use_eval_f64(int order) {
+    isogi_sh_eval_f64(many_f64, order, (const double(*)[3])directions_f64, MANY);
+    isogi_sh_eval_soa_f64(many_f64, order, coordinates_f64[0], coordinates_f64[1], coordinates_f64[2], MANY);
+}
+static void use_gradient(int order) {
+    isogi_sh_eval_gradient((float(*)[3])many, order, (const float(*)[3])directions, 3);
+    isogi_sh_eval_gradient_f64((double(*)[3])many_f64, order, (const double(*)[3])directions_f64, 3);
+}
+static void use_sum(int order) {
+    isogi_sh_eval_sum(many, c, order, 3, (const float(*)[3])directions, MANY);
+    isogi_sh_eval_sum_f64(many_f64, many_f64 + MANY, order, 1, (const double(*)[3])directions_f64, MANY);
+}
+static void use_rotate(int order) {
+    isogi_sh_rotate(d, c, order, 1, flat), isogi_sh_rotate(d, c, order, 3, flat), isogi_sh_rotate_z(d, c, order, 3, 0.3);
+    isogi_sh_rotate_f64(many_f64, many_f64, order, 1, flat_f64), isogi_sh_rotate_f64(many_f64, many_f64, order, 2, flat_f64);
+}
+static void use_matrix(int order) {
+    if (order > 22) return; /* minutes and megabytes */
+    isogi_sh_rotation_build(turn, order, flat), isogi_sh_rotation_apply(d, c, order, 1, turn), isogi_sh_rotation_apply(d, c, order, 3, turn);
+    isogi_sh_rotation_build_f64(turn_f64, order, flat_f64), isogi_sh_rotation_apply_f64(many_f64, many_f64 + N, order, 1, turn_f64);
+    if (order <= 11) isogi_sh_product_matrix(many, c, order);
+}
+static void use_product(int order) {
+    if (order <= 22) isogi_sh_product(many, c, e, order, 1);
+    if (order <= 5) isogi_sh_product(many, c, c, order, 19);
+}
+static void use_algebra(int order) {
+    double energy[MOST], width;
+    isogi_sh_cosine_zonal(e, order), isogi_sh_convolve(d, c, order, 3, e), isogi_sh_convolve_cosine(d, c, order, 3), isogi_sh_mirror(d, c, order, 3, 1);
+    isogi_sh_zonal_to_direction(d, order, e, directions[0]), isogi_sh_window(d, c, order, 3, ISOGI_SH_HANN, order), isogi_sh_band_energy(energy, c, order, 3);
+    if (order <= 22) isogi_sh_dering(d, c, order, 1, ISOGI_SH_HANN, &width);
+}
+static void use_projection(int order) {
+    const float *faces[6] = {image, image, image, image, image, image};
+    isogi_sh_project_equirect(d, order, image, WIDE, HIGH), isogi_sh_project_image(d, order, 2, image, WIDE, HIGH), isogi_sh_project_cube(d, order, 3, faces, 4);
+    isogi_sh_project_function(many_f64, order, 2, 0, constant, NULL), isogi_sh_project_random(many_f64, order, 2, 9, 1, 3, constant, NULL);
+    isogi_sh_project_samples(many_f64, order, 3, (const float(*)[3])directions, image, NULL, MANY);
+}
+static void use_lights(int order) {
+    static const isogi_light lights[] = {{ISOGI_LIGHT_DIRECTIONAL, {1, 2, 3}, {1, 1, 1}, 0.1f, {{0}}}, {ISOGI_LIGHT_POINT, {1, 2, 3}, {1, 1, 1}, 0, {{0}}},
+                                         {ISOGI_LIGHT_SPHERE, {1, 2, 3}, {1, 1, 1}, 1, {{0}}}, {ISOGI_LIGHT_RECTANGLE, {0, 0, -2}, {1, 1, 1}, 0, {{1, 0, 0}, {0, 2, 0}}},
+                                         {ISOGI_LIGHT_RECTANGLE, {0, 0, -2}, {1, 1, 1}, 0, {{1e-4f, 0, 0}, {0, 2, 0}}}}; /* narrow */
+    const isogi_lighting lighting = {.env = {.rgb = image, .width = WIDE, .height = HIGH, .sh = c, .sh_order = order}, .lights = lights, .light_count = 5};
+    float v[3], rgb[3], ambient[3];
+    isogi_sh_project(d, order, &lighting, NULL), isogi_env_radiance(&lighting.env, directions[0], rgb);
+    isogi_sh_cone(d, order, directions[0], 0.4, rgb), isogi_sh_gradient_sky(d, order, directions[0], rgb, rgb), isogi_sh_hemisphere_sky(d, order, directions[0], rgb, rgb);
+    isogi_sh_dominant_direction(v, rgb, d, order), isogi_sh_fit_directional(v, rgb, ambient, d, order);
+}
+
+typedef struct stack_use {
+    void (*run)(int order);
+    int order;
+    uintptr_t top;
+} stack_use;
+
+static void *on_a_stack(void *user) {
+    stack_use *u = (stack_use *)user;
+    volatile unsigned char here = 0;
+    u->top = (uintptr_t)&here;
+    if (u->run) u->run(u->order);
+    return NULL;
+}
+
+/* Bytes below the caller's frame that a call wrote to; each is made once before, so that the linker's part of a first call does not count. */
+static size_t stack_of(void (*run)(int order), int order) {
+    static unsigned char memory[STACK] __attribute__((aligned(65536)));
+    stack_use u = {run, order, 0};
+    pthread_attr_t attributes;
+    pthread_t thread;
+    size_t lowest = 0;
+    int started;
+    run(order);
+    memset(memory, 0xa5, sizeof memory);
+    pthread_attr_init(&attributes);
+    started = !pthread_attr_setstack(&attributes, memory, sizeof memory) && !pthread_create(&thread, &attributes, on_a_stack, &u);
+    CHECK(started, "order %d: no thread", order);
+    if (started) pthread_join(thread, NULL);
+    pthread_attr_destroy(&attributes);
+    while (lowest < STACK && memory[lowest] == 0xa5) lowest++;
+    return u.top ? (size_t)(u.top - (uintptr_t)memory) - lowest : STACK;
+}
+
+TEST(stack_below_32_kilobytes) {
+    static const struct {
+        const char *name;
+        void (*run)(int order);
+    } uses[] = {{"evaluation", use_eval}, {"evaluation in double", use_eval_f64}, {"gradients", use_gradient}, {"sums", use_sum}, {"rotation", use_rotate}, {"matrices", use_matrix},
+                {"products", use_product}, {"algebra", use_algebra}, {"projection", use_projection}, {"lights", use_lights}};
+    static const int all[] = {1, 2, 3, 4, 5, 8, 11, 12, 16, 17, 21, 22, MOST};
+    for (int i = 0; i < MANY; i++)
+        for (int k = 0; k < 3; k++) {
+            directions[i][k] = coordinates[k][i] = sinf((float)(3 * i + k + 1));
+            directions_f64[i][k] = coordinates_f64[k][i] = (double)directions[i][k];
+        }
+    for (int i = 0; i < 3 * N; i++) c[i] = d[i] = e[i] = 1.0f / (float)(i + 1);
+    for (size_t u = 0; u < sizeof uses / sizeof *uses; u++) {
+        size_t most = 0;
+        int at = 0;
+        for (size_t o = 0; o < sizeof all / sizeof *all; o++) {
+            size_t bytes = stack_of(uses[u].run, all[o]);
+            if (bytes > most) most = bytes, at = all[o];
+        }
+        if (LONG_SUITE) printf("    %-22s %6zu bytes at order %d\n", uses[u].name, most, at);
+        CHECK(most < 32768, "%s of order %d: %zu bytes", uses[u].name, at, most);
+    }
+}
+#endif
 
 TEST_MAIN("sh_limits")
