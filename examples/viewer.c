@@ -35,6 +35,7 @@ static const char *const classification_name[3] = {"exact", "pre-integrated", "p
 static const char *const silhouette_name[4] = {"none", "exact", "approximate", "gradient"};
 static const char *const transmission_name[3] = {"none", "diffuse", "specular"};
 static const char *const method_name[4] = {"default", "brute", "paper", "sweep"};
+static const char *const coarsest_name[4] = {"1", "2", "4", "8"};
 static const char *const preset_name[4] = {"grey", "hot", "cool-warm", "spectrum"};
 static const char *const switch_name[2] = {"off", "on"};
 static const char *const ambient_name[2] = {"constant", "normal"};
@@ -84,7 +85,7 @@ typedef struct options {
     const char *volume, *env, *tf, *out, *compare, *depth;
     const scene *scene;
     int width, height, mode, raycast, bounces, samples, threads, stats, antialias, shading, classification, silhouette, transmission, order, directions;
-    int lookup, shadows, ambient, normals, storage, method, local, preset;
+    int lookup, shadows, ambient, normals, storage, method, coarsest, local, preset;
     int has_size, has_iso, has_mode, has_spacing, has_albedo, has_preset, has_camera, has_up, has_nan, has_shading, has_shadows, has_ambient, has_gloss, has_step, has_transmission;
     double step, fog, gloss, offset, reach, isovalue, spacing[3], clip[ISOGI_DVR_MAX_PLANES][4], azimuth, elevation, distance, up[3], exposure, nan_value;
     float albedo[3];
@@ -262,6 +263,8 @@ static const option option_list[] = {
      "sweeps 64)", INTEGER, AT(directions), 0, 1, 1, 65536, .allowed = "a whole number, 1 to 65536"},
     {"--grid", "X,Y,Z", VOLUMES, "points of visibility: no shadow is finer; default half the voxels along each axis, at most 64 (a "
      "scene: its own; without sweeps a quarter)", SIZES, AT(grid), 0, 3, 1, 1024, .allowed = "three whole numbers, 1 to 1024"},
+    {"--coarsest", "N", VOLUMES, "for dvr by sweeps: points of visibility stand up to N times as far apart where nothing is seen of them, "
+     "which saves memory for a finer --grid: 1, 2, 4, 8; default 1", NAMED(coarsest_name, coarsest)},
     {"--local", 0, VOLUMES, "light by local visibility, of --method paper: for clip planes and lights within", FLAG, .offset = AT(local)},
     {"--depth", "FILE.pfm", VOLUMES, "as well, for dvr and scale-invariant: distance from the eye to half of a pixel's opacity, where "
      "nothing is seen infinity, as floats (the nearest of a pixel's samples)", TEXT, .offset = AT(depth)},
@@ -351,6 +354,8 @@ static int check_volume(viewer *v) {
     if (o->method > ISOGI_DVR_BRUTE && !lit) return file_fail(v->error, "--method: %s is for --mode dvr with --shading visibility", method_name[o->method]);
     if ((o->method || o->order || o->directions || o->grid[0]) && !shadowed)
         return file_fail(v->error, "%s: needs --shading visibility", o->method ? "--method" : o->order ? "--order" : o->directions ? "--directions" : "--grid");
+    if (o->coarsest && (!lit || (o->method != ISOGI_DVR_METHOD_DEFAULT && o->method != ISOGI_DVR_SWEEP)))
+        return file_fail(v->error, "--coarsest: needs --mode dvr, --shading visibility and --method sweep, the default");
     if (o->local && !(lit && o->method == ISOGI_DVR_PAPER)) return file_fail(v->error, "--local: needs --mode dvr, --shading visibility and --method paper");
     if (o->has_transmission && !(o->has_shading && o->shading == ISOGI_DVR_TWO_SIDED)) return file_fail(v->error, "--transmission: needs --shading two-sided");
     if (o->has_shading && o->shading == ISOGI_DVR_UNLIT && (o->env || o->light_count))
@@ -366,6 +371,7 @@ static int check_transfer(viewer *v, int suggested) {
     size_t peaks = v->transfer.peak_count;
     if (o->has_iso && !suggested) return file_fail(v->error, "--iso: the transfer function is not a suggested one and has values of its own");
     if (o->local && peaks) return file_fail(v->error, "--local: knows no peaks, and the transfer function has some");
+    if (o->coarsest && peaks) return file_fail(v->error, "--coarsest: knows no peaks, and the transfer function has some");
     if (o->method > ISOGI_DVR_BRUTE && peaks) return file_fail(v->error, "--method: %s knows no peaks, and the transfer function has some", method_name[o->method]);
     if (o->silhouette && o->mode == DVR && !peaks) return file_fail(v->error, "--silhouette: is for peaks in --mode dvr, and the transfer function has none");
     return 1;
@@ -1243,6 +1249,7 @@ static void set_visibility(const viewer *v, isogi_dvr_desc *desc) {
     int swept = v->o.mode == DVR && !v->transfer.peak_count && v->o.method != ISOGI_DVR_BRUTE && v->o.method != ISOGI_DVR_PAPER;
     desc->order = v->o.order ? v->o.order : s ? s->order : swept ? 4 : 0;
     desc->directions = v->o.directions ? v->o.directions : s ? s->directions : swept ? 256 : 0;
+    desc->coarsest = 1 << v->o.coarsest;
     for (int a = 0; a < 3; a++) {
         size_t half = (v->volume.size[a] + 1) / 2;
         desc->grid[a] = v->o.grid[a] ? v->o.grid[a] : s ? s->grid[a] : !swept ? 0 : half < 64 ? half : 64;
@@ -1267,6 +1274,7 @@ static int render_volume(viewer *v) {
     double begun = seconds(), remaining = 1;
     isogi_result result;
     isogi_context context = v->context;
+    isogi_dvr_report report;
     context.progress = tell_stage;
     if (v->o.has_shading) desc.shading = (isogi_dvr_shading)v->o.shading;
     desc.classification = (isogi_dvr_classification)v->o.classification, desc.silhouette = (isogi_dvr_silhouette)v->o.silhouette, desc.step = v->o.step;
@@ -1288,6 +1296,7 @@ static int render_volume(viewer *v) {
     begun = stat_seconds(v, "visibility", begun);
     if (result == ISOGI_OK) isogi_dvr_counters(dvr, &v->counters);
     stat_line(v, "rays_light", "%llu", (unsigned long long)v->counters.rays);
+    if (result == ISOGI_OK && isogi_dvr_inspect(dvr, &report) == ISOGI_OK && report.grid_points) stat_line(v, "visibility_points", "%zu", report.grid_points);
     large = (float(*)[4])malloc(pixels * sizeof *large);
     if (v->o.depth) depth = (float *)malloc(pixels * sizeof *depth);
     if (result == ISOGI_OK && (!large || (v->o.depth && !depth))) result = ISOGI_NO_MEMORY;

@@ -364,6 +364,8 @@ TEST(silly_options_get_one_line_that_names_the_option) {
         {"procedural:gyroid --mode dvr --shading local --grid 8,8,8", "--grid: needs"}, {"procedural:gyroid --mode dvr --shading unlit --directions 8", "--directions: needs"},
         {"procedural:gyroid --mode dvr --order 7", "1 to 6"}, {"procedural:gyroid --mode dvr --directions 0", "--directions"}, {"procedural:gyroid --mode dvr --grid 8,8", "--grid"},
         {"procedural:gyroid --grid 8,8,8", "--grid: works with --mode dvr and scale-invariant, not with --mode irradiance"},
+        {"procedural:gyroid --coarsest 8", "--coarsest: works with --mode dvr"}, {"procedural:gyroid --mode dvr --coarsest 3", "--coarsest"},
+        {"procedural:gyroid --mode dvr --method paper --coarsest 2", "--coarsest: needs"}, {"procedural:coulomb:8 --mode dvr --coarsest 2", "--coarsest: knows no peaks"},
         {"procedural:gyroid --mode vicinity --env sky", "--env: works with modes that have no light of their own"},
         {"procedural:gyroid --light directional:1,1,1:1,1,1 --mode vicinity", "--light: works with modes that have no light of their own"},
         {"procedural:gyroid --mode vicinity --bounces 2", "--bounces: works with --mode irradiance, transfer and pathtrace, not with --mode vicinity"},
@@ -505,7 +507,7 @@ TEST(stats_are_key_value_lines_and_help_is_complete) {
     static const char *const keys[] = {"size 32x32x32", "range ", "isovalue ", "triangles ", "rays_light ", "rays_per_second ", "texels_computed ",
                                        "texels_requested ", "memory_bytes ", "seconds_bake ", "seconds_total ", "error_relative "};
     static const char *const named[] = {"--scene", "--size", "--iso", "--mode", "--raycast", "--spacing", "--env", "--light", "--albedo", "--bounces", "--samples",
-                                        "--lattice", "--lookup", "--shadows", "--ambient", "--fog", "--gloss", "--normals", "--offset", "--reach", "--storage", "--compare", "--tf", "--preset", "--method", "--order", "--directions", "--grid", "--local", "--depth", "--clip", "--camera", "--up", "--threads", "--out", "--stats", "procedural:", "Examples"};
+                                        "--lattice", "--lookup", "--shadows", "--ambient", "--fog", "--gloss", "--normals", "--offset", "--reach", "--storage", "--compare", "--tf", "--preset", "--method", "--order", "--directions", "--grid", "--coarsest", "--local", "--depth", "--clip", "--camera", "--up", "--threads", "--out", "--stats", "procedural:", "Examples"};
     char command[512];
     run_result r;
     snprintf(command, sizeof command, "procedural:gyroid:32 --size 32x32 --samples 8 --stats --out '%s'", temporary("stats.png"));
