@@ -85,7 +85,7 @@ figures: build/viewer build/isolines build/tets
 	@sh examples/figures.sh
 	@sh examples/figures_scale_invariant.sh
 
-pictures: build/viewer
+pictures: build/viewer build/strip
 	@sh examples/pictures.sh
 
 # ---- tests ----

@@ -201,7 +201,7 @@ memcheck() {
     grind='valgrind -q --error-exitcode=9 --leak-check=full --errors-for-leak-kinds=all'
     for source in examples/*.c; do
         base=$(basename "$source" .c)
-        case $base in viewer | bake | bake_mpi | bake_points | isolines | tets) continue ;; esac # below, in tests of their own, they want arguments, or they take minutes
+        case $base in viewer | bake | bake_mpi | bake_points | isolines | strip | tets) continue ;; esac # below, in tests of their own, they want arguments, or they take minutes
         item check "valgrind/$base" "$grind build/$base > /dev/null"
     done
     [ -f examples/viewer.c ] && for mode in "irradiance --samples 2" "transfer --samples 2" "dvr --directions 32" scale-invariant; do

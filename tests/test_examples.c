@@ -106,6 +106,27 @@ TEST(bad_meshes_of_tetrahedra_get_one_line) {
     check_kept("build/tets", "", 2, "usage");
 }
 
+TEST(strips_hold_their_pictures) {
+    unsigned char pixels[2][2 * 3 * 3], *got = NULL, *file;
+    char arguments[600], error[FILE_ERROR_SIZE];
+    int shape[3] = {0};
+    size_t size;
+    for (int i = 0; i < 18; i++) pixels[0][i] = (unsigned char)(9 * i), pixels[1][i] = (unsigned char)(255 - i);
+    for (int i = 0; i < 2; i++) CHECK(png_write(temporary(i ? "b.png" : "a.png"), pixels[i], 2, 3, 3, error), "%s", error);
+    snprintf(arguments, sizeof arguments, "'%s' '%s' '%s'", temporary("strip.png"), temporary("a.png"), temporary("b.png"));
+    run_result r = run_program("build/strip", arguments);
+    CHECK(r.status == 0 && file_read(temporary("strip.png"), 1 << 20, &file, &size, error), "status %d: %s", r.status, r.error);
+    if (r.status) return;
+    CHECK(png_decode(file, size, &got, shape, error) && shape[0] == 8 && shape[1] == 3, "%dx%d", shape[0], shape[1]);
+    for (int y = 0; got && y < 3; y++)
+        for (int i = 0; i < 2; i++) CHECK(!memcmp(got + 24 * y + 18 * i, pixels[i] + 6 * y, 6), "row %d of picture %d", y, i);
+    free(got), free(file);
+    check_kept("build/strip", "'%s'", 2, "usage");
+    check_kept("build/strip", "'%s' /nowhere.png", 1, "/nowhere.png: No such file");
+    check_kept("build/strip", "'%1$s' '%1$s'", 1, "is not a PNG file");
+    check_kept("build/strip", "'%s' examples/gyroid.png examples/figure-6.png", 1, "of another height");
+}
+
 TEST(bad_bakes_get_one_line) {
     static const char *const bad[][2] = {{"", "VOLUME and --out are needed"}, {"--out '%s'", "VOLUME and --out are needed"}, {"procedural:gyroid:8 --out", "--out: needs a value"},
         {"procedural:teapot --out '%s'", "no such volume"}, {"procedural:gyroid:8 --samples 1 --out '%s'", "corrupt"}, {"procedural:gyroid:8 --samples 0 --out '%s'", "--samples"},
