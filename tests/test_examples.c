@@ -107,10 +107,10 @@ TEST(bad_meshes_of_tetrahedra_get_one_line) {
 }
 
 TEST(strips_hold_their_pictures) {
-    unsigned char pixels[2][2 * 3 * 3], *got = NULL, *file;
+    unsigned char pixels[2][2 * 3 * 3], *got = NULL, *file = NULL;
     char arguments[600], error[FILE_ERROR_SIZE];
     int shape[3] = {0};
-    size_t size;
+    size_t size = 0;
     for (int i = 0; i < 18; i++) pixels[0][i] = (unsigned char)(9 * i), pixels[1][i] = (unsigned char)(255 - i);
     for (int i = 0; i < 2; i++) CHECK(png_write(temporary(i ? "b.png" : "a.png"), pixels[i], 2, 3, 3, error), "%s", error);
     snprintf(arguments, sizeof arguments, "'%s' '%s' '%s'", temporary("strip.png"), temporary("a.png"), temporary("b.png"));
