@@ -1,6 +1,6 @@
 # make           the viewer and the example programs, into build/
 # make demo      volume in, globally lit pictures out: build/demo/*.png    (VOLUME=FILE ISO=V for your own)
-# make figures   the figures of the paper, with our data, and how far they are from path tracing: build/figures/index.html
+# make figures   the figures of the papers, with our data, and how far they are from path tracing: build/figures/index.html
 # make pictures  the pictures of README.md anew: examples/*.png
 # make test      the quick tests, under two minutes; ends with "N passed, N failed, N skipped"
 # make check     the long suite: full sizes, every compiler, sanitizer and emulator that is installed
@@ -84,6 +84,7 @@ demo: build/viewer
 figures: build/viewer build/isolines build/tets
 	@sh examples/figures.sh
 	@sh examples/figures_scale_invariant.sh
+	@sh examples/figures_visibility.sh
 
 pictures: build/viewer build/strip
 	@sh examples/pictures.sh

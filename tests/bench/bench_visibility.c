@@ -8,7 +8,7 @@
    the standard view, once as RMSE of sRGB values (cases ...-rmse), once as the share of pixels that look different with a probability above
    75 % (cases ...-seen; Yee and Newman 2004, with Daly's psychometric function: tests/perceptual.h; 45 degrees wide, 100 cd/m^2), against sweeps with
    2048 rays on the same grid (rays, reduction, radius), 36 coefficients (coefficients), a grid of four times the points along each axis, twice
-   for torus-sphere-plane (grid). --quick: torus-sphere-plane at 48^3, 128x128 pixels, a few settings. */
+   for torus-sphere-plane (grid), a regular grid of 129 or 193 points along each axis (resolutions, ml256 too). --quick: torus-sphere-plane at 48^3, 128x128 pixels, a few settings. */
 #define ISOGI_IMPLEMENTATION
 #include "isogi_dvr.h"
 #include "hdr.h"
@@ -164,6 +164,25 @@ static void study_grids(const study *s) {
     free(reference.srgb);
 }
 
+/* Several resolutions beside the regular grid (coarsest 1): memory is in the setting. */
+static void study_resolutions(const study *s) {
+    const size_t points[] = {33, 65, 97, 129, 193};
+    const int last = quick ? 1 : s->pyramid && isogi_vol_volume(s->pyramid)->size[0] > 128 ? 4 : 3;
+    isogi_dvr_desc desc = s->base;
+    desc.grid[0] = desc.grid[1] = desc.grid[2] = points[last], desc.visibility_step = 1;
+    frame reference = frame_of(s, &desc, 0, &s->lighting);
+    for (int coarsest = 1; coarsest <= 8; coarsest *= 8)
+        for (int n = 0; n <= last - (coarsest == 1); n++) { /* the last regular grid is the reference */
+            char setting[80];
+            desc = s->base, desc.coarsest = coarsest, desc.grid[0] = desc.grid[1] = desc.grid[2] = points[n];
+            frame f = frame_of(s, &desc, 0, &s->lighting);
+            snprintf(setting, sizeof setting, "%zu^3: %.2f MB", points[n], (double)f.report.global_bytes / 1e6);
+            rows("resolutions", s, coarsest > 1 ? "coarsest-8" : n ? "regular" : "default", setting, &f, &reference, 0, (double)f.report.grid_points * desc.directions, "ray");
+            free(f.srgb);
+        }
+    free(reference.srgb);
+}
+
 /* Figure 13: a frame by the kind of light and the number of coefficients; no error but that of the light itself: 0. */
 static void study_frames(const study *s) {
     const isogi_volume *v = isogi_vol_volume(s->pyramid);
@@ -260,8 +279,32 @@ static void bench_procedural(void) {
     need(procedural_make(procedural_find("torus-sphere-plane"), quick ? 48 : 128, &volume, &two), "volume"), need(isogi_vol_build(&s.pyramid, &volume, &two), "build");
     if (quick) s.base.grid[0] = s.base.grid[1] = s.base.grid[2] = 24, s.base.directions = 64;
     look_at(&s, toward, up), expose(&s);
-    study_rays(&s), study_coefficients(&s), study_blocks(&s), study_grids(&s), study_frames(&s), study_shading(&s);
+    study_rays(&s), study_coefficients(&s), study_blocks(&s), study_grids(&s), study_resolutions(&s), study_frames(&s), study_shading(&s);
     isogi_vol_free(s.pyramid), procedural_free(&volume);
+}
+
+/* Marschner-Lobb as scenes.md has it, for several resolutions alone. */
+static void bench_marschner_lobb(void) {
+    static const float sky[3] = {3.5449077f, 3.5449077f, 3.5449077f};
+    const isogi_light sun = {.vector = {1, 1, 1}, .rgb = {2, 2, 2}};
+    const double toward[3] = {1.5, 1.2, 2}, spacing = 2.0 / 255;
+    const float up[3] = {0, 1, 0};
+    const size_t n = 256;
+    float *data = (float *)malloc(n * n * n * sizeof *data);
+    isogi_volume volume = {.data = data, .type = ISOGI_F32, .size = {n, n, n}, .spacing = {spacing, spacing, spacing}, .origin = {-1, -1, -1}};
+    double range[2], half;
+    study s = {.name = "ml256", .lighting = {.env = {.sh = sky, .sh_order = 1}, .lights = &sun, .light_count = 1}, .base = {.order = 3, .directions = 32, .grid = {64, 64, 64}}};
+    if (!data) exit(1);
+    for (size_t i = 0; i < n * n * n; i++) {
+        double x = -1 + spacing * (double)(i % n), y = -1 + spacing * (double)(i / n % n), z = -1 + spacing * (double)(i / n / n);
+        data[i] = (float)((1 - sin(pi * z / 2) + 0.25 * (1 + cos(2 * pi * 6 * cos(pi * sqrt(x * x + y * y) / 2)))) / 2.5);
+    }
+    need(isogi_vol_build(&s.pyramid, &volume, &two), "build"), isogi_vol_range(s.pyramid, range), half = 0.05 * (range[1] - range[0]);
+    const isogi_transfer_point p[] = {{range[0], {.2f, .3f, .9f}, 0}, {0.5 - half, {.83f, .75f, .63f}, 0}, {0.5, {.9f, .8f, .6f}, .357f},
+                                      {0.5 + half, {.9f, .74f, .56f}, 0}, {range[1], {.9f, .2f, .2f}, 0}};
+    s.transfer.points = p, s.transfer.point_count = 5;
+    look_at(&s, toward, up), expose(&s), study_resolutions(&s);
+    isogi_vol_free(s.pyramid), free(data);
 }
 
 /* The volumes of its tables that we have: bonsai, of another resolution than the paper's, engine, half of it, and fuel. */
@@ -298,7 +341,7 @@ static void bench_real(int which) {
     need(isogi_vol_build(&s[which].pyramid, &volume, &two), "build");
     look_at(&s[which], which ? upright : turned, up[!which]), expose(&s[which]);
     tables(&s[which]);
-    if (!which) study_rays(s), study_coefficients(s), study_blocks(s), study_grids(s), study_frames(s), study_shading(s);
+    if (!which) study_rays(s), study_coefficients(s), study_blocks(s), study_grids(s), study_resolutions(s), study_frames(s), study_shading(s);
     isogi_vol_free(s[which].pyramid), free(image.rgb), free(data);
 }
 
@@ -316,5 +359,6 @@ int main(int argc, char **argv) {
     if (!only || !strcmp(only, "torus-sphere-plane")) bench_procedural();
     for (int which = 0; which < 3 && !quick; which++)
         if (!only || !strcmp(only, names[which])) bench_real(which);
+    if (only ? !strcmp(only, "ml256") : !quick) bench_marschner_lobb();
     return fclose(csv) ? 1 : 0;
 }
