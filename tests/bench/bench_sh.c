@@ -1,15 +1,16 @@
 /* Run time against error of isogi_sh.h.
 
-       build/bench/bench_sh [--quick] [--only CASE] OUT.csv        --only: cases whose names begin so
+       build/bench/bench_sh [--quick] [--only CASE] OUT.csv        --only: cases whose names begin so, or light
 
    One thread, CPU seconds, data in cache, the shortest of many short runs, which is what the code takes where nothing else runs on the
    core; error is the largest absolute one against tests/reference_sh.h (128 bits). Errors are taken over poles, axes, directions 1e-8
    off them and random ones, times over random ones. Methods: default is what a caller gets; plain and avx2 are the same calls held to
-   a lower instruction level. A table on stderr sets ours beside the goal and the best other library known (measured on one core of an
+   a lower instruction level; fill, of evaluation, is memset of as many bytes: no evaluation on that core is faster. A table on stderr sets ours beside the goal and the best other library known (measured on one core of an
    AVX-512 server, data in cache, whose clock is not known: sphericart's float evaluation took 12, 73 and 276 ns at degrees 4, 10 and 20
    there). Cycles are ns times the clock that a chain of dependent operations shows beside the case, for comparing figures of different
    days. Cases truncation-*: what an order misses of three environments; build/bench/sh.svg shows them against the order. Cases ringing-*:
-   how far the projection falls below zero, as a share of its highest value, without a window and with one as wide as the order. */
+   how far the projection falls below zero, as a share of its highest value, without a window and with one as wide as the order.
+   Cases light-*: one light of isogi_sh_project, by order; error as a share of the largest coefficient, against quadrature. */
 static int bench_level = 99;
 #define ISOGI_SH_LEVEL bench_level
 #define ISOGI_SH_IMPLEMENTATION
@@ -56,12 +57,12 @@ typedef struct bench_case {
     double peer, goal, bound; /* ns an operation: of the best other library known (on another machine), and to reach; largest error allowed */
 } bench_case;
 
-static double seconds_of(const bench_case *c) {
+static double seconds_of(void (*run)(int order, size_t count), int order, size_t count) {
     double best = 1e9, begun, taken;
     int runs = quick ? 1000 : 5000, loops = 1;
     for (;;) {
         begun = cpu_seconds();
-        for (int i = 0; i < loops; i++) c->run(c->order, c->count);
+        for (int i = 0; i < loops; i++) run(order, count);
         taken = cpu_seconds() - begun;
         if (taken > 1e-4) break;
         loops *= 2;
@@ -69,7 +70,7 @@ static double seconds_of(const bench_case *c) {
     if (taken > 3e-4) runs = runs / 10;
     for (int r = 0; r < runs; r++) {
         begun = cpu_seconds();
-        for (int i = 0; i < loops; i++) c->run(c->order, c->count);
+        for (int i = 0; i < loops; i++) run(order, count);
         taken = (cpu_seconds() - begun) / loops;
         if (taken < best) best = taken;
     }
@@ -97,7 +98,7 @@ static void head(void) {
 }
 
 static void row(const bench_case *c, const char *method) {
-    double before = clock_ghz(), seconds = seconds_of(c), clock = fmax(before, clock_ghz()), error = c->error(c->order, c->count);
+    double before = clock_ghz(), seconds = seconds_of(c->run, c->order, c->count), clock = fmax(before, clock_ghz()), error = c->error(c->order, c->count);
     double ns = seconds / (double)c->count * 1e9;
     char status[64];
     fprintf(csv, "isogi_sh.h,%s,%s,,%.6g,%.6g,%zu,%s\n", c->name, method, seconds, error, c->count, c->unit);
@@ -135,6 +136,16 @@ static double error_of_basis(int order, size_t count, int is_double, int is_soa)
     }
     return worst;
 }
+static void run_fill_f32(int order, size_t count) { memset(basis, (int)count, (size_t)(order * order) * count * sizeof *basis); }
+static void run_fill_f64(int order, size_t count) { memset(basis64, (int)count, (size_t)(order * order) * count * sizeof *basis64); }
+
+/* beside a case of evaluation: how long its bytes take to be written at all */
+static void fill_row(const bench_case *c) {
+    double seconds = seconds_of(c->run == run_aos_f64 ? run_fill_f64 : run_fill_f32, c->order, c->count);
+    fprintf(csv, "isogi_sh.h,%s,fill,,%.6g,0,%zu,%s\n", c->name, seconds, c->count, c->unit);
+    fprintf(stderr, "  %-20s %-8s %11.2f\n", c->name, "fill", seconds / (double)c->count * 1e9);
+}
+
 static double error_aos_f32(int order, size_t count) { return error_of_basis(order, count, 0, 0); }
 static double error_soa_f32(int order, size_t count) { return error_of_basis(order, count, 0, 1); }
 static double error_aos_f64(int order, size_t count) { return error_of_basis(order, count, 1, 0); }
@@ -320,6 +331,134 @@ static void truncation(void) {
     }
 }
 
+/* ---- lights: 16 of a kind, somewhere around the point ---- */
+
+enum { LIGHTS = 16, NODES = 16, AROUND = 24 }; /* NODES: exact for degrees to 31; AROUND: to 23 */
+static isogi_light some_lights[LIGHTS];
+static const isogi_lighting some_lighting = {.lights = some_lights, .light_count = LIGHTS};
+static quad light_expected[MAX_N], light_basis[MAX_N];
+
+static void run_lights(int order, size_t count) { (void)count, isogi_sh_project(out, order, &some_lighting, NULL); }
+
+static void add_light(quad weight, const double direction[3]) {
+    quad d[3] = {(quad)direction[0], (quad)direction[1], (quad)direction[2]};
+    reference_eval(light_basis, MAX_ORDER, d);
+    for (int i = 0; i < MAX_N; i++) light_expected[i] += weight * light_basis[i];
+}
+
+/* nodes and weights of Gauss and Legendre on [-1, 1] */
+static void gauss(double *node, double *weight, int n) {
+    for (int i = 0; i < n; i++) {
+        double x = cos(3.14159265358979323846 * (i + 0.75) / (n + 0.5)), slope = 1;
+        for (int round = 0; round < 9; round++) {
+            double p = 1, before = 0;
+            for (int k = 0; k < n; k++) {
+                double next = ((2 * k + 1) * x * p - k * before) / (k + 1);
+                before = p, p = next;
+            }
+            slope = n * (before - x * p) / (1 - x * x);
+            x -= p / slope;
+        }
+        node[i] = x, weight[i] = 2 / ((1 - x * x) * slope * slope);
+    }
+}
+
+/* `radiance` within the angle whose half has the sine `half` of a direction */
+static void add_cap(double radiance, const double axis[3], double half) {
+    double node[NODES], weight[NODES], side[3], up[3], length;
+    int least = fabs(axis[0]) < fabs(axis[1]) ? fabs(axis[0]) < fabs(axis[2]) ? 0 : 2 : fabs(axis[1]) < fabs(axis[2]) ? 1 : 2;
+    for (int k = 0; k < 3; k++) side[k] = (k == least) - axis[least] * axis[k];
+    length = sqrt(side[0] * side[0] + side[1] * side[1] + side[2] * side[2]);
+    for (int k = 0; k < 3; k++) side[k] /= length;
+    for (int k = 0; k < 3; k++) up[k] = axis[(k + 1) % 3] * side[(k + 2) % 3] - axis[(k + 2) % 3] * side[(k + 1) % 3];
+    gauss(node, weight, NODES);
+    for (int i = 0; i < NODES; i++)
+        for (int j = 0; j < AROUND; j++) {
+            double below = half * half * (1 + node[i]), s = sqrt(below * (2 - below)), phi = 2 * 3.14159265358979323846 * j / AROUND, d[3];
+            for (int k = 0; k < 3; k++) d[k] = (1 - below) * axis[k] + s * (cos(phi) * side[k] + sin(phi) * up[k]);
+            add_light((quad)(radiance * half * half * weight[i] * 2 * 3.14159265358979323846 / AROUND), d);
+        }
+}
+
+static void add_rectangle(const isogi_light *l) {
+    double node[NODES], weight[NODES], normal[3], area = 0;
+    for (int k = 0; k < 3; k++) {
+        int a = (k + 1) % 3, b = (k + 2) % 3;
+        normal[k] = (double)l->edge[0][a] * (double)l->edge[1][b] - (double)l->edge[0][b] * (double)l->edge[1][a];
+        area += normal[k] * normal[k];
+    }
+    area = sqrt(area);
+    gauss(node, weight, NODES);
+    for (int i = 0; i < NODES; i++)
+        for (int j = 0; j < NODES; j++) {
+            double p[3], square = 0, facing = 0;
+            for (int k = 0; k < 3; k++) {
+                p[k] = (double)l->vector[k] + 0.5 * node[i] * (double)l->edge[0][k] + 0.5 * node[j] * (double)l->edge[1][k];
+                square += p[k] * p[k], facing -= p[k] * normal[k] / area;
+            }
+            if (facing > 0) add_light((quad)((double)l->rgb[0] * weight[i] * weight[j] / 4 * facing / (square * sqrt(square))), p);
+        }
+}
+
+/* kinds: 0 direction, 1 disc, 2 point, 3 sphere, 4 rectangle that faces the point */
+static void place_lights(int kind) {
+    static const isogi_light_kind kinds[] = {ISOGI_LIGHT_DIRECTIONAL, ISOGI_LIGHT_DIRECTIONAL, ISOGI_LIGHT_POINT, ISOGI_LIGHT_SPHERE, ISOGI_LIGHT_RECTANGLE};
+    for (int i = 0; i < LIGHTS; i++) {
+        const double *d = directions64[HARD + i];
+        isogi_light *l = &some_lights[i];
+        memset(l, 0, sizeof *l);
+        l->kind = kinds[kind];
+        l->radius = kind == 1 || kind == 3 ? (float)(0.05 + 0.4 * random_unit()) : 0;
+        for (int k = 0; k < 3; k++) l->vector[k] = (float)(d[k] * (1 + random_unit())), l->rgb[k] = (float)(1 + k);
+        if (kind < 4) continue;
+        const float *v = l->vector;
+        double a[3] = {(double)v[1], -(double)v[0], 0}, b[3], size = 0.2 + 0.8 * random_unit(), cross = 0, length = 0;
+        for (int k = 0; k < 3; k++) length += a[k] * a[k];
+        for (int k = 0; k < 3; k++) a[k] *= size / sqrt(length);
+        for (int k = 0; k < 3; k++) b[k] = (double)v[(k + 1) % 3] * a[(k + 2) % 3] - (double)v[(k + 2) % 3] * a[(k + 1) % 3], cross += b[k] * b[k];
+        for (int k = 0; k < 3; k++) l->edge[0][k] = (float)a[k], l->edge[1][k] = (float)(-b[k] * 0.5 * size / sqrt(cross));
+        for (int k = 0; k < 3; k++) l->vector[k] += 0.3f * (l->edge[0][k] + l->edge[1][k]); /* not quite opposite */
+    }
+}
+
+static void expect_lights(int kind) {
+    for (int i = 0; i < MAX_N; i++) light_expected[i] = 0;
+    for (int i = 0; i < LIGHTS; i++) {
+        const isogi_light *l = &some_lights[i];
+        double d[3], square = 0, sine;
+        for (int k = 0; k < 3; k++) square += (double)l->vector[k] * (double)l->vector[k];
+        for (int k = 0; k < 3; k++) d[k] = (double)l->vector[k] / sqrt(square);
+        sine = kind == 1 ? sin((double)l->radius) : (double)l->radius / sqrt(square); /* of the angular radius */
+        if (kind == 4) add_rectangle(l);
+        else if (kind == 1 || kind == 3)
+            add_cap(1 / (3.14159265358979323846 * (kind == 1 ? sine * sine : (double)l->radius * (double)l->radius)), d, sin(asin(sine) / 2));
+        else add_light((quad)(kind == 2 ? 1 / square : 1), d);
+    }
+}
+
+static double error_of_lights(int order) {
+    double worst = 0, largest = 0;
+    for (int i = 0; i < order * order; i++) largest = fmax(largest, fabs((double)light_expected[i]));
+    isogi_sh_project(out, order, &some_lighting, NULL);
+    for (int i = 0; i < order * order; i++) worst = fmax(worst, fabs((double)(light_expected[i] - (quad)out[3 * i])) / largest);
+    return worst;
+}
+
+static void lights(void) {
+    static const char *const names[] = {"light-directional", "light-disc", "light-point", "light-sphere", "light-rectangle"};
+    static const int orders[] = {2, 3, 5, 8, 11, 16, 21}; /* 2, 3, 5, 11 and 21 where it must be quick */
+    fprintf(stderr, "\n  lights: ns a light (RGB)\n");
+    for (int kind = 0; kind < 5; kind++) {
+        place_lights(kind), expect_lights(kind);
+        for (size_t o = 0; o < sizeof orders / sizeof *orders; o++) {
+            if (quick && o & 1 && orders[o] != 3) continue;
+            double seconds = seconds_of(run_lights, orders[o], LIGHTS), error = error_of_lights(orders[o]);
+            fprintf(csv, "isogi_sh.h,%s,%s,order %d,%.6g,%.6g,%d,light\n", names[kind], orders[o] == 5 ? "default" : "other orders", orders[o], seconds, error, LIGHTS);
+            fprintf(stderr, "  %-22s order %2d %10.1f ns   error %.2g\n", names[kind], orders[o], seconds / LIGHTS * 1e9, error);
+        }
+    }
+}
+
 static void prepare(void) {
     static const double off[] = {0, 1e-8, -1e-8};
     double pi = 3.14159265358979323846;
@@ -378,7 +517,7 @@ int main(int argc, char **argv) {
         else if (argv[i][0] != '-') path = argv[i];
         else { path = NULL; break; }
     }
-    size_t matching = 0;
+    size_t matching = !strcmp(only, "light");
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) matching += !strncmp(cases[i].name, only, strlen(only));
     if (!matching) fprintf(stderr, "no case begins with %s\n", only);
     if (!matching || !path || !(csv = fopen(path, "w"))) {
@@ -391,10 +530,12 @@ int main(int argc, char **argv) {
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
         if (strncmp(cases[i].name, only, strlen(only))) continue;
         row(&cases[i], "default");
+        if (!strncmp(cases[i].name, "eval", 4)) fill_row(&cases[i]);
         if (quick) continue;
         for (bench_level = 0; bench_level < 2; bench_level++) row(&cases[i], bench_level ? "avx2" : "plain");
         bench_level = 99;
     }
+    if (!*only || !strcmp(only, "light")) lights();
     if (!*only) truncation();
     return fclose(csv) ? 1 : 0;
 }
