@@ -5,17 +5,17 @@
 #     SIDE=512   pixels; default 320
 out=${1:-build/figures} side=${SIDE:-320}
 mkdir -p "$out" || exit 1
-scene=engine-block
-[ -z "$ISOGI_DATA" ] || [ ! -f "$ISOGI_DATA/engine_256x256x128_uint8.raw" ] || scene=engine
+scene=procedural:engine-block # with a transfer function from its histogram
+[ -z "$ISOGI_DATA" ] || [ ! -f "$ISOGI_DATA/engine_256x256x128_uint8.raw" ] || scene="--scene engine"
 light="--light directional:1,2,1:3,3,3 --env sky"
 failed=0
 
 echo "figure 14: shading by gradients, by local and by global visibility: $scene"
-# NAME CAPTION VIEWER_ARGUMENTS...
+# NAME CAPTION VIEWER_ARGUMENTS...; the first one gives the exposure of all
 picture() {
     name=$1 caption=$2
     shift 2
-    if stats=$(build/viewer --scene "$scene" --mode dvr --size "${side}x$side" $light "$@" --stats --out "$out/$name.png"); then
+    if stats=$(build/viewer $scene --mode dvr --size "${side}x$side" $light "$@" --stats --out "$out/$name.png"); then
         number=$(echo "$stats" | sed -n 's/^difference_rms //p')
         [ "$number" ] || exposure=$(echo "$stats" | sed -n 's/^exposure //p')
         echo "    $name   $caption${number:+   difference $number}"
