@@ -21,7 +21,8 @@ typedef struct program {
 static void help(void) {
     puts("build/bake VOLUME --out FILE [options]      volume in, illumination texture out\n\n"
          "VOLUME is a raw file named like engine_256x256x128_uint8.raw, or procedural:NAME[:N]. Where FILE exists and holds a part of\n"
-         "this very texture, baking goes on there. It is written at the end, every minute meanwhile, and when Ctrl-C or SIGTERM stops the work (status 3).\n"
+         "this very texture, baking goes on there. It is written at the end, every minute meanwhile, and when Ctrl-C or SIGTERM stops the "
+         "work (status 3).\n"
          "The result is the same bits in any case.\n\nOptions");
     fputs(bake_scene_help, stdout);
     puts("  --box X,Y,Z,X,Y,Z          only texels from the first three numbers to before the last three\n"
@@ -53,8 +54,10 @@ static int parse(program *p, int argc, char **argv) {
             for (int k = 0; k < 3; k++) s->desc.box_first[k] = (size_t)x[k], s->desc.box_end[k] = (size_t)x[k + 3];
         } else if (!strcmp(argv[i], "--raw") && i + 1 < argc) p->raw = argv[++i];
         else if (!strcmp(argv[i], "--format") && i + 1 < argc) {
-            if (!parse_name(argv[++i], bake_formats, 5, &p->format)) return file_fail(s->error, "--format: \"%.80s\" is not allowed", argv[i]);
-        } else if (argv[i][0] == '-') return file_fail(s->error, "%.80s: no such option, or its value is missing; --help lists them", argv[i]);
+            if (!parse_name(argv[++i], bake_formats, 5, &p->format))
+                return file_fail(s->error, "--format: \"%.80s\" is not allowed", argv[i]);
+        } else if (argv[i][0] == '-')
+            return file_fail(s->error, "%.80s: no such option, or its value is missing; --help lists them", argv[i]);
         else if (s->volume_name) return file_fail(s->error, "%.80s: a second volume", argv[i]);
         else s->volume_name = argv[i];
     }
@@ -113,7 +116,8 @@ static int run(program *p, int argc, char **argv) {
     isogi_result result;
     if (!parse(p, argc, argv)) return 0;
     if (p->format && !p->raw) return file_fail(s->error, "--format: is that of --raw, which is missing");
-    if (!check_files(p) || !bake_scene_make(s) || !file_writable(s->out, s->error) || (p->raw && !file_writable(p->raw, s->error))) return 0;
+    if (!check_files(p) || !bake_scene_make(s) || !file_writable(s->out, s->error) || (p->raw && !file_writable(p->raw, s->error)))
+        return 0;
     result = isogi_trace_create(&p->trace, &s->desc, &s->context);
     if (result != ISOGI_OK) return file_fail(s->error, "the texture: %s", isogi_result_string(result));
     if (p->raw && !isogi_trace_export_size(p->trace, p->format)) return file_fail(s->error, "--format: this one is not for this mode");

@@ -147,7 +147,8 @@ static int run(bake_scene *s, int argc, char **argv, int rank, int ranks) {
     for (int i = 1; i < argc && ok; i++) {
         int known = bake_scene_option(s, argc, argv, &i);
         if (known > 0) continue;
-        if (known == 0 && (argv[i][0] == '-' || s->volume_name)) ok = file_fail(s->error, "%.80s: no such option; --help lists them", argv[i]);
+        if (known == 0 && (argv[i][0] == '-' || s->volume_name))
+            ok = file_fail(s->error, "%.80s: no such option; --help lists them", argv[i]);
         else if (known == 0) s->volume_name = argv[i];
         else ok = 0;
     }

@@ -29,7 +29,8 @@ int main(void) {
     }
     isogi_light sun = {.vector = {1, 1, 1}, .rgb = {2, 2, 2}, .radius = 0.1f};
     float sky[12] = {1.6f, 1.6f, 1.6f, 0.8f, 0.8f, 0.8f}; /* brighter above */
-    isogi_trace_desc desc = {.pyramid = pyramid, .lighting = {{.sh = sky, .sh_order = 2}, &sun, 1}, .albedo = {0.7f, 0.7f, 0.7f}, .bounces = -1};
+    isogi_trace_desc desc = {
+        .pyramid = pyramid, .lighting = {{.sh = sky, .sh_order = 2}, &sun, 1}, .albedo = {0.7f, 0.7f, 0.7f}, .bounces = -1};
     isogi_result result = isogi_trace_gather(&desc, (const float (*)[3])points, NULL, count, light, NULL, NULL);
     for (int i = 0; i < WIDTH * HEIGHT && result == ISOGI_OK; i++) {
         int shade = pixel[i] ? (int)(3.2f * light[pixel[i] - 1][0]) : 0;

@@ -36,7 +36,8 @@ int main(int argc, char **argv) {
         }
         if (isogi_vol_sample(pyramid, (const float(*)[3])points, SIDE, values, gradients) != ISOGI_OK) return 1;
         for (int x = 0; x < SIDE; x++) {
-            double level = floor(((double)values[x] - low) / gap + 0.5), slope = sqrt((double)(gradients[x][0] * gradients[x][0] + gradients[x][1] * gradients[x][1]));
+            double level = floor(((double)values[x] - low) / gap + 0.5),
+                   slope = sqrt((double)(gradients[x][0] * gradients[x][0] + gradients[x][1] * gradients[x][1]));
             level = level > 0 ? level < lines - 1 ? level : lines - 1 : 0;
             double away = fabs((double)values[x] - low - level * gap) / (slope > 1e-12 ? slope : 1e-12) / pixel; /* in pixels */
             double ink = away < 0.5 ? 1 : away < 1.5 ? 1.5 - away : 0, warm = lines > 1 ? level / (lines - 1) : 0;

@@ -22,7 +22,8 @@ int main(int argc, char **argv) {
     if (!file) return perror(path), 1;
     for (size_t i = 0; i < mesh.vertex_count; i++) {
         const float *p = mesh.positions[i], *n = mesh.normals[i];
-        fprintf(file, "v %.7g %.7g %.7g\nvn %.4f %.4f %.4f\n", (double)p[0], (double)p[1], (double)p[2], (double)n[0], (double)n[1], (double)n[2]);
+        fprintf(file, "v %.7g %.7g %.7g\nvn %.4f %.4f %.4f\n", (double)p[0], (double)p[1], (double)p[2], (double)n[0], (double)n[1],
+                (double)n[2]);
     }
     for (size_t i = 0; i < mesh.triangle_count; i++) {
         const uint32_t *t = mesh.triangles[i];

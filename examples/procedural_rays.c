@@ -20,7 +20,8 @@ static double gyroid(void *user, const double p[3], double gradient[3]) {
 int main(void) {
     double k = 5;
     /* Second derivatives: 4 k^2 of the gyroid (2 on and 1 off the diagonal), 16 beyond + 32 |p|^2 of the rest, in |p|^2 <= 3 * 1.3^2. */
-    isogi_field field = {.value = gyroid, .user = &k, .hessian = 4 * 25 + 16 * 4.07 + 32 * 5.07, .low = {-1.3, -1.3, -1.3}, .high = {1.3, 1.3, 1.3}};
+    isogi_field field = {
+        .value = gyroid, .user = &k, .hessian = 4 * 25 + 16 * 4.07 + 32 * 5.07, .low = {-1.3, -1.3, -1.3}, .high = {1.3, 1.3, 1.3}};
     isogi_pyramid *pyramid = NULL;
     isogi_counters counters = {0};
     isogi_result result = isogi_vol_build_field(&pyramid, &field, NULL);

@@ -28,7 +28,8 @@ int main(void) {
                (double)direction[2], (double)rgb[0], (double)rgb[1], (double)rgb[2]);
         for (int row = 0; row < 22; row++, putchar('\n'))
             for (int column = 0; column < 48; column++) {
-                float x = ((float)column - 23.5f) / 22, y = (10.5f - (float)row) / 10.5f, z = 1 - x * x - y * y, normal[1][3] = {{x, y, sqrtf(z > 0 ? z : 0)}};
+                float x = ((float)column - 23.5f) / 22, y = (10.5f - (float)row) / 10.5f, z = 1 - x * x - y * y,
+                      normal[1][3] = {{x, y, sqrtf(z > 0 ? z : 0)}};
                 isogi_sh_eval_sum(rgb, light, 5, 3, (const float(*)[3])normal, 1);
                 putchar(z > 0 ? " .:-=+*#%@"[rgb[1] <= 0 ? 0 : rgb[1] >= 5 ? 9 : (int)(2 * rgb[1])] : ' ');
             }

@@ -12,7 +12,8 @@ int main(int argc, char **argv) {
         const char *path = argv[i + 2];
         if (!file_read(path, (size_t)1 << 28, &file, &size, error)) return fprintf(stderr, "strip: %s\n", error), 1;
         if (!png_decode(file, size, &pixels[i], shape[i], why)) return fprintf(stderr, "strip: %s: %s\n", path, why), 1;
-        if (shape[i][2] != 3 || shape[i][1] != shape[0][1]) return fprintf(stderr, "strip: %s: is not in colour, or of another height\n", path), 1;
+        if (shape[i][2] != 3 || shape[i][1] != shape[0][1])
+            return fprintf(stderr, "strip: %s: is not in colour, or of another height\n", path), 1;
         free(file), width += shape[i][0] + GAP;
     }
     strip = (unsigned char *)malloc((size_t)width * (size_t)shape[0][1] * 3);

@@ -1,6 +1,7 @@
 /* Tetrahedral meshes in both spaces: build/tets MESH SPACE OUT.png [WIDTH]
 
-   MESH is a .raw volume whose cells are split into tetrahedra, five to a cell (Kraus 2005, figure 8e and f, with buckyball_32x32x32_uint8.raw),
+   MESH is a .raw volume whose cells are split into tetrahedra, five to a cell (Kraus 2005, figure 8e and f, with
+   buckyball_32x32x32_uint8.raw),
    or a .tet file: 'TETS', numbers of points and tetrahedra (32 bits), points, values (floats), four points for each tetrahedron.
    SPACE is physical or data (with silhouettes). Isosurfaces of a third and two thirds of the range. */
 #define ISOGI_IMPLEMENTATION
@@ -68,12 +69,14 @@ int main(int argc, char **argv) {
     if (file_same(argv[1], argv[3])) return fprintf(stderr, "tets: %s is MESH and OUT.png\n", argv[3]), 1;
     int raw = strstr(argv[1], ".raw") != NULL, side = (int)width;
     if (!file_writable(argv[3], error)) return fprintf(stderr, "tets: %s\n", error), 1;
-    if (raw ? !volume_read(argv[1], &volume, error) || !split(&volume) : !read_tets(argv[1], error)) return fprintf(stderr, "tets: %s\n", error), 1;
+    if (raw ? !volume_read(argv[1], &volume, error) || !split(&volume) : !read_tets(argv[1], error))
+        return fprintf(stderr, "tets: %s\n", error), 1;
     mesh.points = (const float(*)[3])points, mesh.values = values, mesh.tets = (const uint32_t(*)[4])tets;
     isogi_result result = isogi_dvr_tets_build(&built, &mesh, &report, NULL);
     if (result == ISOGI_OK && !mesh.point_count) result = ISOGI_INVALID;
     if (result != ISOGI_OK) return fprintf(stderr, "tets: %s: %s\n", argv[1], isogi_result_string(result)), 1;
-    printf("%zu tetrahedra, %zu degenerate, %zu faces on the border, %zu crowded\n", mesh.tet_count, report.degenerate, report.border, report.crowded);
+    printf("%zu tetrahedra, %zu degenerate, %zu faces on the border, %zu crowded\n", mesh.tet_count, report.degenerate, report.border,
+           report.crowded);
 
     double low[3], high[3], least = 1e30, most = -1e30, radius = 0;
     for (int a = 0; a < 3; a++) low[a] = 1e30, high[a] = -1e30;
@@ -92,10 +95,13 @@ int main(int argc, char **argv) {
     double third = (most - least) / 3, half = 0.03 * (most - least);
     const isogi_peak peaks[] = {{least + third, {.2f, .45f, .9f}, 0.2f}, {least + 2 * third, {.9f, .5f, .15f}, 0.3f}};
     const float dense = (float)(20 / radius); /* the same surfaces as tents in physical space: their opacity follows the gradient */
-    const isogi_transfer_point tents[] = {{least + third - half, {.2f, .45f, .9f}, 0}, {least + third, {.2f, .45f, .9f}, dense}, {least + third + half, {.2f, .45f, .9f}, 0},
-                                          {least + 2 * third - half, {.9f, .5f, .15f}, 0}, {least + 2 * third, {.9f, .5f, .15f}, 3 * dense}, {least + 2 * third + half, {.9f, .5f, .15f}, 0}};
+    const isogi_transfer_point tents[] = {
+        {least + third - half, {.2f, .45f, .9f}, 0},      {least + third, {.2f, .45f, .9f}, dense},
+        {least + third + half, {.2f, .45f, .9f}, 0},      {least + 2 * third - half, {.9f, .5f, .15f}, 0},
+        {least + 2 * third, {.9f, .5f, .15f}, 3 * dense}, {least + 2 * third + half, {.9f, .5f, .15f}, 0}};
     const isogi_transfer surfaces = {NULL, 0, peaks, 2}, thick = {tents, 6, NULL, 0};
-    const isogi_tet_desc desc = {.space = data ? ISOGI_DVR_DATA : ISOGI_DVR_PHYSICAL, .silhouette = data ? ISOGI_DVR_SILHOUETTE_EXACT : ISOGI_DVR_SILHOUETTE_NONE};
+    const isogi_tet_desc desc = {.space = data ? ISOGI_DVR_DATA : ISOGI_DVR_PHYSICAL,
+                                 .silhouette = data ? ISOGI_DVR_SILHOUETTE_EXACT : ISOGI_DVR_SILHOUETTE_NONE};
     float(*image)[4] = (float(*)[4])malloc(4 * (size_t)side * (size_t)side * sizeof *image);
     unsigned char *bytes = (unsigned char *)malloc((size_t)side * (size_t)side * 3);
     if (!image || !bytes) return fprintf(stderr, "tets: out of memory\n"), 1;

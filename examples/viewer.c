@@ -28,7 +28,8 @@
 /* ---- what the command line says -------------------------------------------------------------------------------------------------- */
 
 enum { LAMBERT, PHONG, VICINITY, IRRADIANCE, TRANSFER, PATHTRACE, DVR, SCALE_INVARIANT, MODE_COUNT };
-static const char *const mode_name[MODE_COUNT] = {"lambert", "phong", "vicinity", "irradiance", "transfer", "pathtrace", "dvr", "scale-invariant"};
+static const char *const mode_name[MODE_COUNT] = {"lambert", "phong", "vicinity", "irradiance", "transfer", "pathtrace", "dvr",
+    "scale-invariant"};
 static const char *const lookup_name[] = {"trilinear", "nearest", "closest-isovalue", "bspline"};
 static const char *const shading_name[4] = {"unlit", "visibility", "local", "two-sided"};
 static const char *const classification_name[3] = {"exact", "pre-integrated", "post-classified"};
@@ -63,7 +64,8 @@ static const scene scenes[] = {
      .env = "hdr/grace_256x128.hdr", .dvr_env = "hdr/grace_256x128.hdr", .order = 3, .directions = 32, .grid = {32, 32, 32},
      .transfer = "0 0 .8 .8 .8\n70 0 .8 .8 .8\n100 .02 .8 .8 .8\n150 .05 .8 .8 .8\n180 .4 1 .7 .3\n255 .8 1 .6 .2\n"},
     {.name = "bonsai", .volume = "bonsai_256x256x256_uint8.raw", .lit = 1, .rendered = 1, .isovalue = 40, .albedo = {.6f, .7f, .5f},
-     .env = "hdr/uffizi_256x128.hdr", .dvr_env = "hdr/grace_256x128.hdr", .up = {0, 0, -1}, .order = 2, .directions = 64, .grid = {64, 64, 32},
+     .env = "hdr/uffizi_256x128.hdr", .dvr_env = "hdr/grace_256x128.hdr", .up = {0, 0, -1}, .order = 2, .directions = 64,
+     .grid = {64, 64, 32},
      .transfer = "0 0 .3 .7 .2\n25 0 .3 .7 .2\n40 .15 .3 .7 .2\n80 .2 .5 .35 .2\n160 .6 .6 .6 .6\n255 .9 .7 .7 .7\n"},
     {.name = "cthead", .volume = "cthead8_256x256x99_uint8.raw", .lit = 1, .spacing = {1, 1, 2}, .isovalue = 130, .albedo = {.8f, .8f, .8f},
      .env = "hdr/grace_256x128.hdr"},
@@ -84,10 +86,13 @@ typedef struct options {
     uint64_t given; /* a bit for each of option_list */
     const char *volume, *env, *tf, *out, *compare, *depth;
     const scene *scene;
-    int width, height, mode, raycast, bounces, samples, threads, stats, antialias, shading, classification, silhouette, transmission, order, directions;
+    int width, height, mode, raycast, bounces, samples, threads, stats, antialias, shading, classification, silhouette, transmission, order,
+        directions;
     int lookup, shadows, ambient, normals, storage, method, coarsest, local, preset;
-    int has_size, has_iso, has_mode, has_spacing, has_albedo, has_preset, has_camera, has_up, has_nan, has_shading, has_shadows, has_ambient, has_gloss, has_step, has_transmission;
-    double step, fog, gloss, offset, reach, isovalue, spacing[3], clip[ISOGI_DVR_MAX_PLANES][4], azimuth, elevation, distance, up[3], exposure, nan_value;
+    int has_size, has_iso, has_mode, has_spacing, has_albedo, has_preset, has_camera, has_up, has_nan, has_shading, has_shadows,
+        has_ambient, has_gloss, has_step, has_transmission;
+    double step, fog, gloss, offset, reach, isovalue, spacing[3], clip[ISOGI_DVR_MAX_PLANES][4], azimuth, elevation, distance, up[3],
+        exposure, nan_value;
     float albedo[3];
     isogi_light lights[MAX_LIGHTS];
     size_t light_count, clip_count, lattice[3], grid[3];
@@ -350,14 +355,19 @@ static int check_volume(viewer *v) {
     if (o->mode < DVR) return 1;
     if (o->tf && o->has_preset) return file_fail(v->error, "give --tf or --preset, not both");
     if (o->has_iso && (o->mode == DVR || o->tf || o->has_preset))
-        return file_fail(v->error, "--iso: is for surfaces and for the transfer function that --mode scale-invariant is suggested; a transfer function has its own values");
-    if (o->method > ISOGI_DVR_BRUTE && !lit) return file_fail(v->error, "--method: %s is for --mode dvr with --shading visibility", method_name[o->method]);
+        return file_fail(v->error, "--iso: is for surfaces and for the transfer function that --mode scale-invariant is suggested; a "
+                                   "transfer function has its own values");
+    if (o->method > ISOGI_DVR_BRUTE && !lit)
+        return file_fail(v->error, "--method: %s is for --mode dvr with --shading visibility", method_name[o->method]);
     if ((o->method || o->order || o->directions || o->grid[0]) && !shadowed)
-        return file_fail(v->error, "%s: needs --shading visibility", o->method ? "--method" : o->order ? "--order" : o->directions ? "--directions" : "--grid");
+        return file_fail(v->error, "%s: needs --shading visibility", o->method ? "--method" : o->order ? "--order" : o->directions
+            ? "--directions" : "--grid");
     if (o->coarsest && (!lit || (o->method != ISOGI_DVR_METHOD_DEFAULT && o->method != ISOGI_DVR_SWEEP)))
         return file_fail(v->error, "--coarsest: needs --mode dvr, --shading visibility and --method sweep, the default");
-    if (o->local && !(lit && o->method == ISOGI_DVR_PAPER)) return file_fail(v->error, "--local: needs --mode dvr, --shading visibility and --method paper");
-    if (o->has_transmission && !(o->has_shading && o->shading == ISOGI_DVR_TWO_SIDED)) return file_fail(v->error, "--transmission: needs --shading two-sided");
+    if (o->local && !(lit && o->method == ISOGI_DVR_PAPER))
+        return file_fail(v->error, "--local: needs --mode dvr, --shading visibility and --method paper");
+    if (o->has_transmission && !(o->has_shading && o->shading == ISOGI_DVR_TWO_SIDED))
+        return file_fail(v->error, "--transmission: needs --shading two-sided");
     if (o->has_shading && o->shading == ISOGI_DVR_UNLIT && (o->env || o->light_count))
         return file_fail(v->error, "%s: --shading unlit has no light", o->env ? "--env" : "--light");
     if (o->has_step && o->mode == SCALE_INVARIANT && o->classification == ISOGI_DVR_EXACT)
@@ -369,15 +379,19 @@ static int check_volume(viewer *v) {
 static int check_transfer(viewer *v, int suggested) {
     const options *o = &v->o;
     size_t peaks = v->transfer.peak_count;
-    if (o->has_iso && !suggested) return file_fail(v->error, "--iso: the transfer function is not a suggested one and has values of its own");
+    if (o->has_iso && !suggested)
+        return file_fail(v->error, "--iso: the transfer function is not a suggested one and has values of its own");
     if (o->local && peaks) return file_fail(v->error, "--local: knows no peaks, and the transfer function has some");
     if (o->coarsest && peaks) return file_fail(v->error, "--coarsest: knows no peaks, and the transfer function has some");
-    if (o->method > ISOGI_DVR_BRUTE && peaks) return file_fail(v->error, "--method: %s knows no peaks, and the transfer function has some", method_name[o->method]);
-    if (o->silhouette && o->mode == DVR && !peaks) return file_fail(v->error, "--silhouette: is for peaks in --mode dvr, and the transfer function has none");
+    if (o->method > ISOGI_DVR_BRUTE && peaks)
+        return file_fail(v->error, "--method: %s knows no peaks, and the transfer function has some", method_name[o->method]);
+    if (o->silhouette && o->mode == DVR && !peaks)
+        return file_fail(v->error, "--silhouette: is for peaks in --mode dvr, and the transfer function has none");
     return 1;
 }
 
-/* No picture takes the place of another one, or of what it is made from. (That of --compare is read first, and may be replaced by --out.) */
+/* No picture takes the place of another one, or of what it is made from. (That of --compare is read first, and
+   may be replaced by --out.) */
 static int check_files(viewer *v) {
     const options *o = &v->o;
     const char *const names[] = {o->volume, o->tf, o->env}, *const options_of[] = {"VOLUME", "--tf", "--env"};
@@ -385,7 +399,8 @@ static int check_files(viewer *v) {
     if (file_same(o->depth, o->compare)) return file_fail(v->error, "--depth: %.200s is the file of --compare", o->depth);
     for (int i = 0; i < 3; i++)
         if (file_same(o->out, names[i]) || file_same(o->depth, names[i]))
-            return file_fail(v->error, "%s: %.200s is the file of %s", file_same(o->out, names[i]) ? "--out" : "--depth", names[i], options_of[i]);
+            return file_fail(v->error, "%s: %.200s is the file of %s", file_same(o->out, names[i]) ? "--out" : "--depth", names[i],
+                             options_of[i]);
     return 1;
 }
 
@@ -429,18 +444,22 @@ static int parse_arguments(viewer *v, int argc, char **argv) {
         if (p->has) memcpy((char *)o + p->has, &one, sizeof one);
         o->given |= (uint64_t)1 << (p - option_list);
     }
-    if (!o->volume == !o->scene) return file_fail(v->error, o->volume ? "give VOLUME or --scene, not both" : "no volume: build/viewer VOLUME [options], --help explains");
+    if (!o->volume == !o->scene)
+        return file_fail(v->error,
+                         o->volume ? "give VOLUME or --scene, not both" : "no volume: build/viewer VOLUME [options], --help explains");
     if (!o->out) o->out = "isogi.png";
     if (o->scene && !o->has_mode) o->mode = o->scene->lit ? IRRADIANCE : DVR;
     if (o->scene && o->mode >= DVR && !o->scene->rendered && !o->tf && !o->has_preset)
         return file_fail(v->error, "--scene %s has no transfer function: give one by --tf or --preset, or another --mode", o->scene->name);
     if (!check_use(v) || !check_volume(v) || !check_files(v)) return 0;
     if (!o->has_size) o->width = o->height = o->mode >= DVR ? 512 : 900;
-    if ((double)o->width * o->height > 100e6) return file_fail(v->error, "--size: %dx%d is too large; at most 100 million pixels", o->width, o->height);
+    if ((double)o->width * o->height > 100e6)
+        return file_fail(v->error, "--size: %dx%d is too large; at most 100 million pixels", o->width, o->height);
     if (!o->samples) o->samples = 64;
     if (!o->has_shadows) o->shadows = o->mode > PHONG;
     if (!o->has_ambient) o->ambient = o->mode != PHONG;
-    if (o->storage == ISOGI_TRACE_RGB9E5 && o->mode == TRANSFER) return file_fail(v->error, "--storage: rgb9e5 holds colours, not the coefficients of --mode transfer");
+    if (o->storage == ISOGI_TRACE_RGB9E5 && o->mode == TRANSFER)
+        return file_fail(v->error, "--storage: rgb9e5 holds colours, not the coefficients of --mode transfer");
     return 1;
 }
 
@@ -496,7 +515,7 @@ static double stat_seconds(const viewer *v, const char *stage, double begun) {
     return now;
 }
 
-/* ---- the volume ------------------------------------------------------------------------------------------------------------------------ */
+/* ---- the volume -------------------------------------------------------------------------------------------------------------- */
 
 static int make_procedural(viewer *v, const char *text) {
     char name[64];
@@ -519,8 +538,10 @@ static int make_procedural(viewer *v, const char *text) {
 
 static int data_path(viewer *v, const char *name) {
     const char *folder = getenv("ISOGI_DATA");
-    if (!folder || !*folder) return file_fail(v->error, "--scene %s needs %s: set ISOGI_DATA to the folder it is in", v->o.scene->name, name);
-    if ((size_t)snprintf(v->path, sizeof v->path, "%s/%s", folder, name) >= sizeof v->path) return file_fail(v->error, "ISOGI_DATA: the name is too long");
+    if (!folder || !*folder)
+        return file_fail(v->error, "--scene %s needs %s: set ISOGI_DATA to the folder it is in", v->o.scene->name, name);
+    if ((size_t)snprintf(v->path, sizeof v->path, "%s/%s", folder, name) >= sizeof v->path)
+        return file_fail(v->error, "ISOGI_DATA: the name is too long");
     return 1;
 }
 
@@ -542,10 +563,12 @@ static int load_volume(viewer *v) {
     bad = volume_not_finite(&v->volume, v->o.has_nan ? &v->o.nan_value : NULL, &at);
     if (bad && !v->o.has_nan)
         return file_fail(v->error, "%s: voxel %zu,%zu,%zu and %zu others are not finite numbers; --nan V puts a value in their place", name,
-                         at % v->volume.size[0], at / v->volume.size[0] % v->volume.size[1], at / v->volume.size[0] / v->volume.size[1], bad - 1);
+                         at % v->volume.size[0], at / v->volume.size[0] % v->volume.size[1], at / v->volume.size[0] / v->volume.size[1],
+                         bad - 1);
     for (int a = 0; a < 3; a++) {
         v->volume.spacing[a] = v->o.has_spacing ? v->o.spacing[a] : s && s->spacing[a] > 0 ? s->spacing[a] : 1;
-        if (v->volume.size[a] < 2) return file_fail(v->error, "%s: has only one layer of voxels along %c: nothing to look at", name, "xyz"[a]);
+        if (v->volume.size[a] < 2)
+            return file_fail(v->error, "%s: has only one layer of voxels along %c: nothing to look at", name, "xyz"[a]);
     }
     begun = stat_seconds(v, "volume", begun);
     result = isogi_vol_build(&v->pyramid, &v->volume, &v->context);
@@ -573,7 +596,7 @@ static void choose_surface(viewer *v) {
     stat_line(v, "isovalue", "%.9g", v->isovalue);
 }
 
-/* ---- the camera and the lights ------------------------------------------------------------------------------------------------------------ */
+/* ---- the camera and the lights ----------------------------------------------------------------------------------------------- */
 
 static void place_camera(viewer *v) {
     const scene *s = v->o.scene;
@@ -684,11 +707,12 @@ static int set_light(viewer *v) {
     result = isogi_lighting_validate(&v->lighting);
     if (result != ISOGI_OK) return fail(v, env ? env : "--light", result);
     for (size_t i = 0; v->o.mode == TRANSFER && i < v->o.light_count; i++)
-        if (v->o.lights[i].kind != ISOGI_LIGHT_DIRECTIONAL) return file_fail(v->error, "--light: transfer knows distant light only: directional, or --env");
+        if (v->o.lights[i].kind != ISOGI_LIGHT_DIRECTIONAL)
+            return file_fail(v->error, "--light: transfer knows distant light only: directional, or --env");
     return summarize_light(v);
 }
 
-/* ---- what every sample sees ------------------------------------------------------------------------------------------------------------------ */
+/* ---- what every sample sees -------------------------------------------------------------------------------------------------- */
 
 /* Places of the samples within a pixel: stratified in x and, by reversed bits, in y. */
 static void sample_offset(const viewer *v, int sample, double *x, double *y) {
@@ -774,7 +798,8 @@ static void view_row(void *arg, size_t row) {
                 inverse[x0 + i] = hits[i].side ? (float)(1 / hits[i].t) : 0;
                 seen[x0 + i] = hits[i].side ? 0 : RASTER_NONE;
             }
-            if (from[i] > job->near_plane && (double)value[i] >= v->isovalue) inverse[x0 + i] = (float)(1 / from[i]), seen[x0 + i] = SECTION;
+            if (from[i] > job->near_plane && (double)value[i] >= v->isovalue)
+                inverse[x0 + i] = (float)(1 / from[i]), seen[x0 + i] = SECTION;
         }
     }
 }
@@ -800,8 +825,8 @@ static int view_surface(viewer *v) {
     double begun = seconds(), bytes = (double)pixels * v->o.antialias * (sizeof **v->inverse + sizeof **v->seen);
     double machine = (double)sysconf(_SC_PHYS_PAGES) * (double)sysconf(_SC_PAGESIZE);
     if (machine > 0 && bytes > machine / 2)
-        return file_fail(v->error, "--size %dx%d with --aa %d needs %.1f GiB of this machine's %.1f GiB", v->o.width, v->o.height, v->o.antialias,
-                         bytes / 0x1p30, machine / 0x1p30);
+        return file_fail(v->error, "--size %dx%d with --aa %d needs %.1f GiB of this machine's %.1f GiB", v->o.width, v->o.height,
+                         v->o.antialias, bytes / 0x1p30, machine / 0x1p30);
     if (!v->o.raycast) {
         isogi_mesh_desc desc = {.isovalue = v->isovalue, .normals = 1};
         isogi_result result = isogi_vol_mesh(v->pyramid, &desc, &v->mesh);
@@ -823,13 +848,14 @@ static int view_surface(viewer *v) {
     return 1;
 }
 
-/* ---- light baked into a texture, where the view looks --------------------------------------------------------------------------------------------- */
+/* ---- light baked into a texture, where the view looks ------------------------------------------------------------------------ */
 
 static isogi_trace_desc describe_trace(const viewer *v) {
     isogi_trace_desc desc = {.pyramid = v->pyramid, .lighting = v->lighting, .bounces = v->o.mode == VICINITY ? 0 : v->o.bounces,
                              .samples = v->o.samples, .lazy = 1};
     desc.lookup = (isogi_trace_lookup)v->o.lookup, desc.normals = (isogi_normal_kind)v->o.normals; /* names in the order of the enums */
-    desc.storage = (isogi_trace_format)v->o.storage, desc.offset = (float)v->o.offset, desc.reach = (float)v->o.reach, desc.no_shadows = !v->o.shadows;
+    desc.storage = (isogi_trace_format)v->o.storage, desc.offset = (float)v->o.offset, desc.reach = (float)v->o.reach,
+    desc.no_shadows = !v->o.shadows;
     desc.mode = v->o.mode == TRANSFER ? ISOGI_TRACE_TRANSFER : ISOGI_TRACE_IRRADIANCE;
     if (v->o.mode == TRANSFER) memset(&desc.lighting, 0, sizeof desc.lighting);
     memcpy(desc.albedo, v->albedo, sizeof desc.albedo);
@@ -867,7 +893,8 @@ static int bake(viewer *v) {
     double bytes = sizeof(void *) / 64.0, machine = (double)sysconf(_SC_PHYS_PAGES) * (double)sysconf(_SC_PAGESIZE);
     for (int a = 0; a < 3; a++) bytes *= (double)(desc.lattice[a] ? desc.lattice[a] : v->volume.size[a]);
     if (machine > 0 && bytes > machine / 4)
-        return file_fail(v->error, "--lattice: the table of its bricks alone needs %.1f GiB of this machine's %.1f GiB", bytes / 0x1p30, machine / 0x1p30);
+        return file_fail(v->error, "--lattice: the table of its bricks alone needs %.1f GiB of this machine's %.1f GiB", bytes / 0x1p30,
+                         machine / 0x1p30);
     result = isogi_trace_create(&v->trace, &desc, &v->context);
     if (result != ISOGI_OK) return fail(v, "the illumination texture", result);
     if (!request_seen(v)) return 0;
@@ -894,13 +921,14 @@ static int bake(viewer *v) {
     return 1;
 }
 
-/* ---- colours of what is seen --------------------------------------------------------------------------------------------------------------------------- */
+/* ---- colours of what is seen ------------------------------------------------------------------------------------------------- */
 
 enum { BATCH = 4096, BAND = 16 }; /* samples shaded at once; rows of a task: a batch for path tracing sets up the light anew */
 typedef struct shade_batch {
     size_t count, pixel[BATCH];
     uint32_t seen[BATCH];
-    float point[BATCH][3], normal[BATCH][3], dir[BATCH][3], irradiance[BATCH][3], error[BATCH], gloss[BATCH][3], view[BATCH][3]; /* view: unit, to the eye */
+    float point[BATCH][3], normal[BATCH][3], dir[BATCH][3], irradiance[BATCH][3], error[BATCH], gloss[BATCH][3],
+        view[BATCH][3]; /* view: unit, to the eye */
 } shade_batch;
 
 typedef struct shade_job {
@@ -970,7 +998,8 @@ static void toward_light(const isogi_light *light, const float point[3], double 
 }
 
 /* The same with the light's shadow on a surface of that normal, where shadows are asked for: one ray, half a voxel above the surface. */
-static void shadowed_light(const viewer *v, const isogi_light *light, const float point[3], const double n[3], double to[3], double *strength) {
+static void shadowed_light(const viewer *v, const isogi_light *light, const float point[3], const double n[3], double to[3],
+                           double *strength) {
     isogi_ray ray = {.isovalue = v->isovalue};
     double distance = 0, voxel = fmin(v->volume.spacing[0], fmin(v->volume.spacing[1], v->volume.spacing[2]));
     uint8_t blocked = 0;
@@ -1002,7 +1031,8 @@ static void lambert(const viewer *v, const float point[3], const double n[3], in
     }
 }
 
-/* Phong 1975: a constant ambient term (or one by normal), the lights (or where there are none, the direction most of the environment comes from),
+/* Phong 1975: a constant ambient term (or one by normal), the lights (or where there are none, the direction most of the environment comes
+   from),
    and a highlight of exponent 32 that reflects a fifth. Adds the highlight to specular. */
 static void phong(const viewer *v, const float point[3], const double n[3], const float dir[3], double irradiance[3], double specular[3]) {
     double view[3] = {-(double)dir[0], -(double)dir[1], -(double)dir[2]}, reflected[3], facing;
@@ -1071,7 +1101,8 @@ static isogi_result gloss_batch(const viewer *v, shade_batch *b) {
         vector_normalize(to);
         for (int c = 0; c < 3; c++) b->view[i][c] = (float)to[c];
     }
-    return isogi_trace_sample_gloss(v->trace, (const float(*)[3])b->point, (const float(*)[3])b->normal, (const float(*)[3])b->view, v->o.gloss, b->count, b->gloss);
+    return isogi_trace_sample_gloss(v->trace, (const float(*)[3])b->point, (const float(*)[3])b->normal, (const float(*)[3])b->view,
+                                    v->o.gloss, b->count, b->gloss);
 }
 
 static isogi_result light_batch(const shade_job *job, shade_batch *b) {
@@ -1125,7 +1156,8 @@ static void shade_band(void *arg, size_t band) {
     const uint32_t *seen = v->seen[job->view.sample];
     size_t width = (size_t)v->o.width, at = band * BAND * width, end = at + BAND * width;
     /* where a point takes long, fewer at a time, so that there is progress to tell of */
-    size_t most = ((size_t)1 << 20) / (size_t)(v->o.samples / v->o.antialias + 1), batch = v->o.mode != PATHTRACE || most > BATCH ? BATCH : most > 4 ? most : 4;
+    size_t most = ((size_t)1 << 20) / (size_t)(v->o.samples / v->o.antialias + 1), batch = v->o.mode != PATHTRACE || most > BATCH ? BATCH
+        : most > 4 ? most : 4;
     isogi_result result = ISOGI_OK;
     shade_batch *b = (shade_batch *)malloc(sizeof *b);
     if (!b) {
@@ -1173,13 +1205,13 @@ static int shade_surface(viewer *v) {
     return 1;
 }
 
-/* ---- volume rendering --------------------------------------------------------------------------------------------------------------------------------- */
+/* ---- volume rendering -------------------------------------------------------------------------------------------------------- */
 
 /* As a transfer file has them. Returns the text's end. */
 static char *points_as_text(const isogi_transfer_point *points, int count, char *at, const char *end) {
     for (int i = 0; i < count; i++)
-        at += snprintf(at, (size_t)(end - at), "%.17g %.9g %.6f %.6f %.6f\n", points[i].value, (double)points[i].extinction, (double)points[i].rgb[0], (double)points[i].rgb[1],
-                       (double)points[i].rgb[2]);
+        at += snprintf(at, (size_t)(end - at), "%.17g %.9g %.6f %.6f %.6f\n", points[i].value, (double)points[i].extinction,
+                       (double)points[i].rgb[0], (double)points[i].rgb[1], (double)points[i].rgb[2]);
     return at;
 }
 
@@ -1193,7 +1225,8 @@ static int default_transfer(viewer *v) {
     isogi_result result = isogi_transfer_suggest(v->pyramid, space, points, &threshold);
     if (result != ISOGI_OK) return fail(v, "a transfer function", result);
     if (v->o.has_iso || v->shape) threshold = v->isovalue;
-    for (int i = 0; i < ISOGI_SUGGEST_POINTS; i++) points[i].extinction = (float)fmin((double)points[i].extinction * (space ? 0.4 : 1), 1e30);
+    for (int i = 0; i < ISOGI_SUGGEST_POINTS; i++)
+        points[i].extinction = (float)fmin((double)points[i].extinction * (space ? 0.4 : 1), 1e30);
     at = points_as_text(points, ISOGI_SUGGEST_POINTS, text, end);
     if (space == ISOGI_DVR_DATA) snprintf(at, (size_t)(end - at), "peak %.17g .6 .95 .88 .75\n", threshold);
     return transfer_parse(text, &v->transfer, v->error);
@@ -1205,7 +1238,8 @@ static int preset_transfer(viewer *v) {
     char text[4096];
     isogi_result result = isogi_transfer_suggest(v->pyramid, v->o.mode == DVR ? ISOGI_DVR_PHYSICAL : ISOGI_DVR_DATA, points, NULL);
     if (result != ISOGI_OK) return fail(v, "--preset: what the volume's values suggest", result);
-    result = isogi_transfer_preset((isogi_preset)v->o.preset, points[1].value, points[5].value, (float)fmin((double)points[v->o.mode == DVR ? 4 : 5].extinction, 1e30), points);
+    result = isogi_transfer_preset((isogi_preset)v->o.preset, points[1].value, points[5].value,
+                                   (float)fmin((double)points[v->o.mode == DVR ? 4 : 5].extinction, 1e30), points);
     if (result != ISOGI_OK) return file_fail(v->error, "--preset: the volume has a single value");
     points_as_text(points, ISOGI_PRESET_POINTS, text, text + sizeof text);
     return transfer_parse(text, &v->transfer, v->error);
@@ -1214,7 +1248,8 @@ static int preset_transfer(viewer *v) {
 static int set_transfer(viewer *v) {
     const scene *s = v->o.scene;
     int ok, suggested = 0;
-    const char *text = s && s->transfer ? s->transfer : v->shape && (v->o.mode == DVR || !strncmp(v->shape->transfer, "peak", 4)) ? v->shape->transfer : NULL;
+    const char *text = s && s->transfer ? s->transfer : v->shape && (v->o.mode == DVR || !strncmp(v->shape->transfer, "peak", 4))
+        ? v->shape->transfer : NULL;
     if (v->o.tf) ok = transfer_read(v->o.tf, &v->transfer, v->error);
     else if (v->o.has_preset) ok = preset_transfer(v);
     else if (text && (v->o.mode == DVR || !strncmp(text, "peak", 4))) ok = transfer_parse(text, &v->transfer, v->error);
@@ -1277,13 +1312,15 @@ static int render_volume(viewer *v) {
     isogi_dvr_report report;
     context.progress = tell_stage;
     if (v->o.has_shading) desc.shading = (isogi_dvr_shading)v->o.shading;
-    desc.classification = (isogi_dvr_classification)v->o.classification, desc.silhouette = (isogi_dvr_silhouette)v->o.silhouette, desc.step = v->o.step;
+    desc.classification = (isogi_dvr_classification)v->o.classification, desc.silhouette = (isogi_dvr_silhouette)v->o.silhouette,
+    desc.step = v->o.step;
     desc.method = (isogi_dvr_method)v->o.method;
     for (int i = 0; i < 3; i++) {
         desc.material[i].exponent = i < 2 || v->o.transmission == 2 ? 30 : 0;
         for (int c = 0; c < 3; c++) desc.material[i].specular[c] = 1, desc.material[i].diffuse[c] = i < 2 || v->o.transmission ? 1 : 1e-20f;
     }
-    for (int i = 0; i < 3; i++) view.eye[i] = (float)v->view.eye[i], view.target[i] = (float)v->view.target[i], view.up[i] = (float)v->view.up[i];
+    for (int i = 0; i < 3; i++)
+        view.eye[i] = (float)v->view.eye[i], view.target[i] = (float)v->view.target[i], view.up[i] = (float)v->view.up[i];
     if (!set_transfer(v)) return 0;
     set_visibility(v, &desc);
     result = isogi_dvr_create(&dvr, &desc, &context);
@@ -1296,7 +1333,8 @@ static int render_volume(viewer *v) {
     begun = stat_seconds(v, "visibility", begun);
     if (result == ISOGI_OK) isogi_dvr_counters(dvr, &v->counters);
     stat_line(v, "rays_light", "%llu", (unsigned long long)v->counters.rays);
-    if (result == ISOGI_OK && isogi_dvr_inspect(dvr, &report) == ISOGI_OK && report.grid_points) stat_line(v, "visibility_points", "%zu", report.grid_points);
+    if (result == ISOGI_OK && isogi_dvr_inspect(dvr, &report) == ISOGI_OK && report.grid_points)
+        stat_line(v, "visibility_points", "%zu", report.grid_points);
     large = (float(*)[4])malloc(pixels * sizeof *large);
     if (v->o.depth) depth = (float *)malloc(pixels * sizeof *depth);
     if (result == ISOGI_OK && (!large || (v->o.depth && !depth))) result = ISOGI_NO_MEMORY;
@@ -1315,7 +1353,7 @@ static int render_volume(viewer *v) {
     return result == ISOGI_OK || fail(v, "volume rendering", result);
 }
 
-/* ---- the picture -------------------------------------------------------------------------------------------------------------------------------------------- */
+/* ---- the picture ------------------------------------------------------------------------------------------------------------- */
 
 /* A studio backdrop in display light: darker below, lighter behind the object, tinted by the environment. */
 static void backdrop(const viewer *v, int x, int y, double out[3]) {
@@ -1340,7 +1378,8 @@ static int read_compared(viewer *v) {
     ok = png_decode(file, size, &v->compared, shape, why) || file_fail(v->error, "%.200s: %.250s", v->o.compare, why);
     free(file);
     if (!ok) return v->compared = NULL, 0;
-    return (shape[0] == v->o.width && shape[1] == v->o.height && shape[2] == 3) || file_fail(v->error, "%s: is not %dx%d in colour", v->o.compare, v->o.width, v->o.height);
+    return (shape[0] == v->o.width && shape[1] == v->o.height && shape[2] == 3) ||
+           file_fail(v->error, "%s: is not %dx%d in colour", v->o.compare, v->o.width, v->o.height);
 }
 
 /* How far the picture is from it, over the pixels that show something. */
@@ -1382,13 +1421,16 @@ static int check_surface(viewer *v) {
         for (size_t i = 0; i < pixels; i++) covered += v->seen[s][i] != RASTER_NONE;
     v->covered = covered;
     stat_line(v, "coverage", "%.6f", (double)covered / (double)pixels / v->o.antialias);
-    if (!covered) fprintf(stderr, "note: no surface is in view at isovalue %.9g (the data range from %.9g to %.9g)\n", v->isovalue, v->range[0], v->range[1]);
+    if (!covered)
+        fprintf(stderr, "note: no surface is in view at isovalue %.9g (the data range from %.9g to %.9g)\n", v->isovalue, v->range[0],
+                v->range[1]);
     return 1;
 }
 
 static int run(viewer *v, int argc, char **argv) {
     struct rusage usage;
-    if (!parse_arguments(v, argc, argv) || !file_writable(v->o.out, v->error) || (v->o.depth && !file_writable(v->o.depth, v->error))) return 0;
+    if (!parse_arguments(v, argc, argv) || !file_writable(v->o.out, v->error) || (v->o.depth && !file_writable(v->o.depth, v->error)))
+        return 0;
     if (v->o.compare && !read_compared(v)) return 0;
     if (!v->o.antialias) v->o.antialias = v->o.mode == DVR ? 1 : 4;
     v->context.alloc = counted_alloc, v->context.release = counted_release, v->context.user = v, v->context.threads = v->o.threads;

@@ -1,4 +1,5 @@
-/* A ring of fog above a floor, as text (a character stands for 1x2 pixels), shaded in three ways: as it glows, by its gradient, and with shadows. */
+/* A ring of fog above a floor, as text (a character stands for 1x2 pixels), shaded in three ways: as it glows, by its gradient, and with
+   shadows. */
 #define ISOGI_IMPLEMENTATION
 #include "isogi_dvr.h"
 #include <math.h>

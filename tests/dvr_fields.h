@@ -34,7 +34,8 @@ __attribute__((unused)) static field field_waves(int n, uint64_t seed) {
     for (int wave = 0; wave < 6; wave++) {
         double d[3], phase = random_range(&r, 0, 6), length = random_range(&r, 0.1, 0.5);
         random_direction(&r, d);
-        for (int i = 0; i < n * n * n; i++) f.value[i] += 0.3 * sin(length * (d[0] * (i % n) + d[1] * (i / n % n) + d[2] * (i / n / n)) + phase);
+        for (int i = 0; i < n * n * n; i++)
+            f.value[i] += 0.3 * sin(length * (d[0] * (i % n) + d[1] * (i / n % n) + d[2] * (i / n / n)) + phase);
     }
     field_build(&f);
     return f;
@@ -61,7 +62,8 @@ static isogi_view line_of_sight(const double eye[3], const double target[3]) {
     return view;
 }
 
-__attribute__((unused)) static pixel cast(const isogi_dvr *dvr, const double eye[3], const double target[3], const isogi_lighting *lighting) {
+__attribute__((unused)) static pixel cast(const isogi_dvr *dvr, const double eye[3], const double target[3],
+                                          const isogi_lighting *lighting) {
     isogi_view view = line_of_sight(eye, target);
     pixel p;
     isogi_result result = isogi_dvr_render(dvr, &view, lighting, (float(*)[4])p.c, &p.depth, NULL);
@@ -91,7 +93,8 @@ __attribute__((unused)) static isogi_view view_of(const field *f, double scale, 
     return view;
 }
 
-__attribute__((unused)) static float (*picture(const isogi_dvr *dvr, const isogi_view *view, const isogi_lighting *lighting, float *depth, isogi_counters *count))[4] {
+__attribute__((unused)) static float (*picture(const isogi_dvr *dvr, const isogi_view *view, const isogi_lighting *lighting, float *depth,
+                                               isogi_counters *count))[4] {
     float(*pixels)[4] = (float(*)[4])calloc((size_t)view->width * (size_t)view->height, sizeof *pixels);
     isogi_result result = isogi_dvr_render(dvr, view, lighting, pixels, depth, count);
     CHECK(result == ISOGI_OK, "render: %s", isogi_result_string(result));

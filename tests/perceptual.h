@@ -2,7 +2,8 @@
 
    The metric of Yee and Newman 2004, "A perceptual metric for production testing": the threshold of luminance at a pixel's adaptation
    (Ward Larson 1997), raised by the eye's insensitivity to the frequencies that the pictures hold there (Barten 1989) and by masking
-   (Daly 1993), against the difference of luminance; and a difference of colour in CIE L*a*b*. It says where a difference is at its threshold;
+   (Daly 1993), against the difference of luminance; and a difference of colour in CIE L*a*b*. It says where a difference is at its
+   threshold;
    how likely one of r thresholds is detected, tells Daly's psychometric function, 1 - exp(-r^3.5). Kronander 2011 counts the pixels in
    which that is above 75 %. Frequencies are octaves, by a pyramid of Burt and Adelson's kernel that keeps all pixels. */
 #ifndef PERCEPTUAL_H
@@ -76,26 +77,31 @@ static void perceptual_blur(const float *from, float *to, float *scratch, int wi
    values, 0..1; degrees: that the picture is wide. -1 without memory. */
 static double perceptual_difference(const float (*a)[3], const float (*b)[3], int width, int height, double degrees, double detection) {
     size_t count = (size_t)width * (size_t)height, seen = 0, i;
-    float *level[2] = {(float *)malloc(count * sizeof(float) * (PERCEPTUAL_LEVELS + 1)), (float *)malloc(count * sizeof(float) * (PERCEPTUAL_LEVELS + 1))};
+    float *level[2] = {(float *)malloc(count * sizeof(float) * (PERCEPTUAL_LEVELS + 1)),
+                       (float *)malloc(count * sizeof(float) * (PERCEPTUAL_LEVELS + 1))};
     float(*ab[2])[2] = {(float(*)[2])malloc(count * sizeof(float[2])), (float(*)[2])malloc(count * sizeof(float[2]))};
-    double per_degree = width / (2 * tan(degrees * 3.14159265358979 / 360) * 180 / 3.14159265358979), frequency[PERCEPTUAL_LEVELS], most = perceptual_sensitivity(3.248, 100);
+    double per_degree = width / (2 * tan(degrees * 3.14159265358979 / 360) * 180 / 3.14159265358979), frequency[PERCEPTUAL_LEVELS],
+           most = perceptual_sensitivity(3.248, 100);
     double ratio = pow(-log(1 - detection), 1 / 3.5);
     int ok = level[0] && level[1] && ab[0] && ab[1], adapted = 0, n;
     for (n = 0; ok && n < 2; n++) {
         perceptual_colours(n ? b : a, count, level[n], ab[n]);
         for (int l = 1; l < PERCEPTUAL_LEVELS; l++)
-            perceptual_blur(level[n] + (size_t)(l - 1) * count, level[n] + (size_t)l * count, level[n] + PERCEPTUAL_LEVELS * count, width, height, l - 1);
+            perceptual_blur(level[n] + (size_t)(l - 1) * count, level[n] + (size_t)l * count, level[n] + PERCEPTUAL_LEVELS * count, width,
+                            height, l - 1);
     }
     for (n = 0; n < PERCEPTUAL_LEVELS; n++) frequency[n] = 0.5 * per_degree / (1 << n);
     while (adapted < PERCEPTUAL_LEVELS - 1 && (1 << adapted) < per_degree) adapted++; /* the eye adapts to about a degree */
     for (i = 0; ok && i < count; i++) {
-        double adaptation = fmax(0.5 * (double)(level[0][(size_t)adapted * count + i] + level[1][(size_t)adapted * count + i]), 1e-5), sum = 0, factor = 0, colour, delta, da, db;
+        double adaptation = fmax(0.5 * (double)(level[0][(size_t)adapted * count + i] + level[1][(size_t)adapted * count + i]), 1e-5),
+               sum = 0, factor = 0, colour, delta, da, db;
         for (n = 0; n < PERCEPTUAL_LEVELS - 2; n++) {
             size_t at = (size_t)n * count + i, next = at + count, beyond = next + count;
             double numerator = fmax(fabs((double)(level[0][at] - level[0][next])), fabs((double)(level[1][at] - level[1][next])));
             double contrast = numerator / fmax(fmax(fabs((double)level[0][beyond]), fabs((double)level[1][beyond])), 1e-5);
             sum += contrast;
-            factor += contrast * most / perceptual_sensitivity(frequency[n], 100) * perceptual_masking(contrast * perceptual_sensitivity(frequency[n], adaptation));
+            factor += contrast * most / perceptual_sensitivity(frequency[n], 100) *
+                      perceptual_masking(contrast * perceptual_sensitivity(frequency[n], adaptation));
         }
         factor = sum > 0 ? fmin(10, fmax(1, factor / sum)) : 1;
         delta = fabs((double)(level[0][i] - level[1][i])) / (factor * perceptual_threshold(adaptation));

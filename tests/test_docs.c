@@ -106,10 +106,13 @@ static void check_program(const char *name, const char *text) {
         const char *compiler = cxx ? variable("CXX", "c++") : variable("CC", "cc");
         snprintf(command, sizeof command, "%s --version", compiler);
         if (cxx && !succeeds(command, output, sizeof output)) continue; /* a C++ compiler is not needed */
-        snprintf(command, sizeof command, "{ %s %s %s -Wall -Wextra -Wpedantic -Werror %s -I. -c -o build/docs/%s.o %s && %s %s -o build/docs/%s build/docs/%s.o %s "
-                 "-lm -lpthread && build/docs/%s; } 2>&1", compiler, cxx ? "-x c++ -std=c++11" : "-std=c99", variable("CFLAGS", ""),
-                 LONG_SUITE ? "" : "-DISOGI_SH_IMPLEMENTED -DISOGI_VOL_IMPLEMENTED -DISOGI_TRACE_IMPLEMENTED -DISOGI_DVR_IMPLEMENTED", name, path,
-                 compiler, variable("CFLAGS", ""), name, name, LONG_SUITE ? "" : "build/isogi_sh.o build/isogi_vol.o build/isogi_trace.o build/isogi_dvr.o", name);
+        snprintf(command, sizeof command,
+                 "{ %s %s %s -Wall -Wextra -Wpedantic -Werror %s -I. -c -o build/docs/%s.o %s && %s %s -o build/docs/%s build/docs/%s.o %s "
+                 "-lm -lpthread && build/docs/%s; } 2>&1",
+                 compiler, cxx ? "-x c++ -std=c++11" : "-std=c99", variable("CFLAGS", ""),
+                 LONG_SUITE ? "" : "-DISOGI_SH_IMPLEMENTED -DISOGI_VOL_IMPLEMENTED -DISOGI_TRACE_IMPLEMENTED -DISOGI_DVR_IMPLEMENTED", name,
+                 path, compiler, variable("CFLAGS", ""), name, name,
+                 LONG_SUITE ? "" : "build/isogi_sh.o build/isogi_vol.o build/isogi_trace.o build/isogi_dvr.o", name);
         CHECK(succeeds(command, output, sizeof output), "%s as %s: %s", name, cxx ? "C++11" : "C99", output);
     }
     printf("    %s", output);

@@ -40,8 +40,8 @@ static long double reference_along(const field *f, const long double p[3], const
 
 /* Unlit radiance and opacity along a ray through a unit-spaced volume at the origin: the midpoint rule with `steps` equal pieces,
    no blocks, no early end. */
-static void reference_ray(const field *f, const isogi_transfer *t, int data_space, const double eye[3], const float dir[3], long double per_voxel,
-                          long double out[4]) {
+static void reference_ray(const field *f, const isogi_transfer *t, int data_space, const double eye[3], const float dir[3],
+                          long double per_voxel, long double out[4]) {
     long double enter = 0, leave = 1e30L, d[3], clear = 1;
     for (int a = 0; a < 4; a++) out[a] = 0;
     for (int a = 0; a < 3; a++) {
@@ -81,7 +81,8 @@ TEST(transfer_function_is_piecewise_linear_with_steps) {
         float rgb[3], extinction;
         isogi_transfer_at(&t, expected[i].x, rgb, &extinction);
         for (int a = 0; a < 3; a++)
-            CHECK(fabsf(rgb[a] - expected[i].rgb[a]) < 1e-6f, "x %g channel %d: %g, not %g", expected[i].x, a, (double)rgb[a], (double)expected[i].rgb[a]);
+            CHECK(fabsf(rgb[a] - expected[i].rgb[a]) < 1e-6f, "x %g channel %d: %g, not %g", expected[i].x, a, (double)rgb[a],
+                  (double)expected[i].rgb[a]);
         CHECK(fabsf(extinction - expected[i].extinction) < 1e-6f, "x %g: %g", expected[i].x, (double)extinction);
     }
 }
@@ -118,20 +119,22 @@ TEST(homogeneous_slab_has_the_transmittance_of_beer_and_lambert) {
         for (int e = 0; e < 6; e++) {
             const isogi_transfer_point point = {0, {0.2f, 0.5f, 1}, (float)extinctions[e]};
             const isogi_transfer transfer = {&point, 1, NULL, 0};
-            const isogi_dvr_desc desc = {.pyramid = f.pyramid, .step = steps[s % 6], .unit = unit, .opaque = 1, .classification = s < 6 ? ISOGI_DVR_POST_CLASSIFIED : ISOGI_DVR_EXACT};
+            const isogi_dvr_desc desc = {.pyramid = f.pyramid, .step = steps[s % 6], .unit = unit, .opaque = 1, .classification = s < 6
+                ? ISOGI_DVR_POST_CLASSIFIED : ISOGI_DVR_EXACT};
             isogi_dvr *dvr = dvr_new(&desc, &transfer);
             const double eye[3] = {-30, 3, 5}, target[3] = {50, 12, 9}; /* in at x = 0, out at x = 19 */
             double along = sqrt(80 * 80 + 9 * 9 + 4 * 4) / 80, depth = (double)(float)extinctions[e] * 19 * along / unit;
             pixel p = cast(dvr, eye, target, NULL);
             /* float output; the direction is float too: 1e-6 of the depth. Pre-integrated: products of up to 200 floats */
-            CHECK(fabs((double)p.c[3] - -expm1(-depth)) < (s < 6 ? 2e-7 : 5e-6) + 2e-6 * -expm1(-depth), "step %g extinction %g: opacity %.9g, not %.9g", steps[s % 6],
-                  extinctions[e], (double)p.c[3], -expm1(-depth));
+            CHECK(fabs((double)p.c[3] - -expm1(-depth)) < (s < 6 ? 2e-7 : 5e-6) + 2e-6 * -expm1(-depth),
+                  "step %g extinction %g: opacity %.9g, not %.9g", steps[s % 6], extinctions[e], (double)p.c[3], -expm1(-depth));
             if (depth < 1e-6) CHECK(fabs((double)p.c[3] / depth - 1) < 1e-4, "thin medium: %g of %g", (double)p.c[3], depth);
             for (int a = 0; a < 3; a++)
                 CHECK(fabsf(p.c[a] - p.c[3] * point.rgb[a]) < (s < 6 ? 2e-7f : 5e-6f), "premultiplied channel %d: %g", a, (double)p.c[a]);
             /* half of the final opacity */
             double half = -log(1 + 0.5 * expm1(-depth)) / depth * 19 * along + 30 * along;
-            CHECK(fabs((double)p.depth - half) < 1e-4, "step %g extinction %g: depth %g, not %g", steps[s % 6], extinctions[e], (double)p.depth, half);
+            CHECK(fabs((double)p.depth - half) < 1e-4, "step %g extinction %g: depth %g, not %g", steps[s % 6], extinctions[e],
+                  (double)p.depth, half);
             isogi_dvr_free(dvr);
         }
     field_free(&f);
@@ -162,12 +165,14 @@ TEST(an_eye_at_its_target_looks_along_minus_z) {
     const isogi_transfer_point point = {0, {1, 1, 1}, 0.3f};
     const isogi_transfer transfer = {&point, 1, NULL, 0};
     const isogi_dvr_desc descs[2] = {{.pyramid = f.pyramid, .opaque = 1}, {.pyramid = f.pyramid, .space = ISOGI_DVR_DATA}};
-    const isogi_view view[2] = {{.width = 3, .height = 2, .eye = {3, 4, 6}, .target = {3, 4, 6}}, {.width = 3, .height = 2, .eye = {3, 4, 6}, .target = {3, 4, 5}}};
+    const isogi_view view[2] = {{.width = 3, .height = 2, .eye = {3, 4, 6}, .target = {3, 4, 6}},
+                                {.width = 3, .height = 2, .eye = {3, 4, 6}, .target = {3, 4, 5}}};
     for (int space = 0; space < 2; space++) {
         isogi_dvr *dvr = dvr_new(&descs[space], &transfer);
         float image[2][6][4], depth[2][6];
         for (int i = 0; i < 2; i++) CHECK(isogi_dvr_render(dvr, &view[i], NULL, image[i], depth[i], NULL) == ISOGI_OK, "view %d", i);
-        CHECK(!memcmp(image[0], image[1], sizeof image[0]) && !memcmp(depth[0], depth[1], sizeof depth[0]), "space %d: not along -z", space);
+        CHECK(!memcmp(image[0], image[1], sizeof image[0]) && !memcmp(depth[0], depth[1], sizeof depth[0]), "space %d: not along -z",
+              space);
         CHECK(space || fabs((double)image[0][1][3] - -expm1(-0.3 * 6)) < 0.02, "opacity %g", (double)image[0][1][3]);
         isogi_dvr_free(dvr);
     }
@@ -213,9 +218,10 @@ TEST(casting_converges_to_the_integral_in_both_spaces) {
         for (int s = 0; s < 4; s++) error[s] = sqrt(error[s] / pixels / 4);
         CHECK(error[1] < 4e-3, "space %d, default step: RMSE %g, largest %g", space, error[1], largest[1]);
         CHECK(error[3] < (space ? 1e-3 : 2e-4), "space %d, step 1/8: RMSE %g, largest %g", space, error[3], largest[3]);
-        CHECK(error[3] < error[0] / (space ? 5 : 32), "space %d: RMSE %g %g %g %g for steps 1 to 1/8", space, error[0], error[1], error[2], error[3]);
-        printf("    %s space: RMSE %.2g %.2g %.2g %.2g for steps of 1, 1/2, 1/4, 1/8 voxel\n", space ? "data" : "physical", error[0], error[1],
-               error[2], error[3]);
+        CHECK(error[3] < error[0] / (space ? 5 : 32), "space %d: RMSE %g %g %g %g for steps 1 to 1/8", space, error[0], error[1], error[2],
+              error[3]);
+        printf("    %s space: RMSE %.2g %.2g %.2g %.2g for steps of 1, 1/2, 1/4, 1/8 voxel\n", space ? "data" : "physical", error[0],
+               error[1], error[2], error[3]);
     }
 }
 
@@ -279,7 +285,8 @@ TEST(linear_data_has_the_opacity_of_the_values_passed) {
 }
 
 TEST(scaling_space_changes_no_pixel_in_data_space) {
-    const isogi_transfer_point points[] = {{-1, {1, 0.2f, 0.1f}, 0}, {-0.2, {0.3f, 1, 0.1f}, 2}, {0.4, {0.1f, 0.4f, 1}, 0.3f}, {1, {1, 1, 0}, 3}};
+    const isogi_transfer_point points[] = {
+        {-1, {1, 0.2f, 0.1f}, 0}, {-0.2, {0.3f, 1, 0.1f}, 2}, {0.4, {0.1f, 0.4f, 1}, 0.3f}, {1, {1, 1, 0}, 3}};
     const isogi_peak peaks[] = {{0.3, {1, 1, 1}, 0.4f}, {-0.4, {0, 1, 0}, 0.2f}};
     const isogi_transfer transfer = {points, 4, peaks, 2};
     float(*image[3])[4];
@@ -326,7 +333,8 @@ static int reference_crossings(const field *f, double isovalue, const double eye
         long double v = reference_along(f, p, d, NULL) - (long double)isovalue;
         if (!begun && fabsl(v) < 0.01L) *unsure = 1;
         if (begun && (v >= 0) != (last >= 0)) count++;
-        if (begun > 1 && (v > last) != rising) closest = fminl(closest, fminl(fabsl(v), fabsl(last))); /* an extremum next to the isovalue */
+        if (begun > 1 && (v > last) != rising)
+            closest = fminl(closest, fminl(fabsl(v), fabsl(last))); /* an extremum next to the isovalue */
         rising = v > last, last = v, begun++;
     }
     if (closest < 1e-3L) *unsure = 1;
@@ -357,8 +365,8 @@ TEST(every_crossing_of_a_peak_has_its_opacity_whatever_the_gradient) {
                     count = reference_crossings(&f, peak.isovalue, eye, dir, &unsure);
                     if (unsure) continue;
                     double expected = 1 - pow(1 - (double)opacity, count);
-                    CHECK(fabs((double)image[i][3] - expected) < 1e-6, "field %d space %d ray %d: %d crossings, opacity %g, not %g", n, space, i,
-                          count, (double)image[i][3], expected);
+                    CHECK(fabs((double)image[i][3] - expected) < 1e-6, "field %d space %d ray %d: %d crossings, opacity %g, not %g", n,
+                          space, i, count, (double)image[i][3], expected);
                     for (int a = 0; a < 3; a++)
                         CHECK(fabs((double)image[i][a] - expected * (double)peak.rgb[a]) < 1e-6, "colour %d: %g", a, (double)image[i][a]);
                     seen[count < 11 ? count : 11]++;
@@ -370,8 +378,10 @@ TEST(every_crossing_of_a_peak_has_its_opacity_whatever_the_gradient) {
         }
         field_free(&f);
     }
-    printf("    rays by crossings 0.. : %d %d %d %d %d %d %d+; up to %d\n", seen[0], seen[1], seen[2], seen[3], seen[4], seen[5], seen[6], most);
-    CHECK(seen[0] > 20 && seen[2] > 20 && seen[4] > 20 && most >= 6, "the rays cover %d %d %d, up to %d crossings", seen[0], seen[2], seen[4], most);
+    printf("    rays by crossings 0.. : %d %d %d %d %d %d %d+; up to %d\n", seen[0], seen[1], seen[2], seen[3], seen[4], seen[5], seen[6],
+           most);
+    CHECK(seen[0] > 20 && seen[2] > 20 && seen[4] > 20 && most >= 6, "the rays cover %d %d %d, up to %d crossings", seen[0], seen[2],
+          seen[4], most);
 }
 
 /* The second crossing within one cell: a saddle whose value rises and falls along a diagonal. */
@@ -462,7 +472,8 @@ static void zonal(const double *z, int order, const double axis[3], double *out)
 TEST(visibility_of_a_half_space_agrees_with_its_closed_form) {
     const double z[4] = {sqrt(PI), sqrt(3 * PI) / 2, 0, -sqrt(7 * PI) / 8};
     /* the border of the half space passes between rays: the error of the lattice, about 6 / rays^(3/4), with a margin */
-    const struct { int rays; double tolerance; } cases[] = {{16, 1}, {32, 0.7}, {64, 0.36}, {128, 0.2}, {256, 0.12}, {512, 0.075}, {1024, 0.045}, {2048, 0.03}};
+    const struct { int rays; double tolerance; } cases[] = {{16, 1}, {32, 0.7}, {64, 0.36}, {128, 0.2}, {256, 0.12}, {512, 0.075},
+        {1024, 0.045}, {2048, 0.03}};
     printf("    largest error by rays:");
     for (int c = 0; c < 8; c++) {
         test_random r = {3};
@@ -473,7 +484,8 @@ TEST(visibility_of_a_half_space_agrees_with_its_closed_form) {
             double middle = 0.5 * (slope_direction[0] + slope_direction[1] + slope_direction[2]) - 1e-7, expected[16];
             const isogi_transfer_point points[] = {{middle, {1, 1, 1}, 1e6f}, {middle, {1, 1, 1}, 0}};
             const isogi_transfer transfer = {points, 2, NULL, 0};
-            const isogi_dvr_desc desc = {.pyramid = f.pyramid, .shading = ISOGI_DVR_VISIBILITY, .order = 4, .directions = cases[c].rays, .grid = {1, 1, 1},
+            const isogi_dvr_desc desc = {.pyramid = f.pyramid, .shading = ISOGI_DVR_VISIBILITY, .order = 4, .directions = cases[c].rays,
+                .grid = {1, 1, 1},
                                          .method = ISOGI_DVR_BRUTE};
             isogi_dvr *dvr = dvr_new(&desc, &transfer);
             const float centre[3] = {1.5f, 1.5f, 1.5f};
@@ -508,7 +520,8 @@ TEST(visibility_past_a_sphere_agrees_with_its_cone) {
             /* zonal coefficients of 1 minus `blocked` on the cone */
             double z[3] = {sqrt(4 * PI) - blocked * sqrt(PI) * (1 - cosine), -blocked * sqrt(3 * PI) / 2 * sine * sine,
                            -blocked * sqrt(5 * PI) / 2 * cosine * sine * sine};
-            const isogi_dvr_desc desc = {.pyramid = f.pyramid, .space = (isogi_dvr_space)space, .shading = ISOGI_DVR_VISIBILITY, .directions = 4096,
+            const isogi_dvr_desc desc = {.pyramid = f.pyramid, .space = (isogi_dvr_space)space, .shading = ISOGI_DVR_VISIBILITY,
+                .directions = 4096,
                                          .grid = {2, 1, 1}, .method = ISOGI_DVR_BRUTE};
             isogi_dvr *dvr = dvr_new(&desc, &transfers[n]);
             const float point[3] = {0, 11.5f, 11.5f};
@@ -517,7 +530,8 @@ TEST(visibility_past_a_sphere_agrees_with_its_cone) {
             zonal(z, 3, axis, expected);
             /* the trilinear sphere is 0.2 % small, and 4096 rays count its rim to 0.004 */
             for (int i = 0; i < 9; i++)
-                CHECK(fabs((double)v[i] - expected[i]) < 0.02, "space %d case %d coefficient %d: %g, not %g", space, n, i, (double)v[i], expected[i]);
+                CHECK(fabs((double)v[i] - expected[i]) < 0.02, "space %d case %d coefficient %d: %g, not %g", space, n, i, (double)v[i],
+                      expected[i]);
             isogi_dvr_free(dvr);
         }
     field_free(&f);
@@ -539,14 +553,16 @@ TEST(visibility_within_a_homogeneous_box_agrees_with_quadrature) {
         isogi_dvr_sample_visibility(dvr, &places[p], 1, v);
         for (int i = 0; i < 400; i++)
             for (int j = 0; j < 400; j++) {
-                double z = (i + 0.5) / 200 - 1, phi = (j + 0.5) * PI / 200, d[3] = {sqrt(1 - z * z) * cos(phi), sqrt(1 - z * z) * sin(phi), z}, y[9];
+                double z = (i + 0.5) / 200 - 1, phi = (j + 0.5) * PI / 200,
+                       d[3] = {sqrt(1 - z * z) * cos(phi), sqrt(1 - z * z) * sin(phi), z}, y[9];
                 double leave = 1e9;
                 for (int a = 0; a < 3; a++) leave = fmin(leave, ((d[a] > 0 ? 8 : 0) - (double)places[p][a]) / d[a]);
                 isogi_sh_eval_f64(y, 3, (const double(*)[3])d, 1);
                 for (int k = 0; k < 9; k++) expected[k] += y[k] * exp(-(double)point.extinction * leave) * 4 * PI / 160000;
             }
         /* jumps at the box's faces for points on them: the error of 1024 rays at a half space */
-        for (int k = 0; k < 9; k++) CHECK(fabs((double)v[k] - expected[k]) < 0.04, "place %d coefficient %d: %g, not %g", p, k, (double)v[k], expected[k]);
+        for (int k = 0; k < 9; k++)
+            CHECK(fabs((double)v[k] - expected[k]) < 0.04, "place %d coefficient %d: %g, not %g", p, k, (double)v[k], expected[k]);
     }
     isogi_dvr_free(dvr);
     field_free(&f);
@@ -595,7 +611,8 @@ TEST(interpolated_visibility_is_trilinear_between_grid_points) {
             for (int i = 0; i < 4; i++) expected[i] += w * (double)corner[i];
         }
         isogi_dvr_sample_visibility(dvr, (const float(*)[3])&p, 1, v);
-        for (int i = 0; i < 4; i++) CHECK(fabs((double)v[i] - expected[i]) < 1e-5, "coefficient %d: %g, not %g", i, (double)v[i], expected[i]);
+        for (int i = 0; i < 4; i++)
+            CHECK(fabs((double)v[i] - expected[i]) < 1e-5, "coefficient %d: %g, not %g", i, (double)v[i], expected[i]);
     }
     isogi_dvr_free(dvr);
     field_free(&f);
@@ -614,15 +631,15 @@ TEST(a_medium_without_shadows_shows_its_albedo_under_a_uniform_sky) {
     for (int order = 1; order <= 6; order++)
         for (int directions = 1; directions <= 4096; directions *= 4)
             for (int stepped = 0; stepped < 2; stepped++) {
-                const isogi_dvr_desc desc = {.pyramid = f.pyramid, .shading = ISOGI_DVR_VISIBILITY, .order = order, .directions = directions,
-                                             .grid = {2, 2, 1}};
+                const isogi_dvr_desc desc = {
+                    .pyramid = f.pyramid, .shading = ISOGI_DVR_VISIBILITY, .order = order, .directions = directions, .grid = {2, 2, 1}};
                 isogi_dvr *dvr = dvr_new(&desc, &transfer);
                 if (stepped) isogi_dvr_step(dvr, 0, NULL);
                 pixel p = cast(dvr, eye, target, &sky);
                 /* a medium of optical depth 1e-6, float coefficients */
                 for (int a = 0; a < 3; a++)
-                    CHECK(fabs((double)(p.c[a] / p.c[3] - point.rgb[a])) < 1e-5, "order %d, %d rays, channel %d: %g, not %g", order, directions, a,
-                          (double)(p.c[a] / p.c[3]), (double)point.rgb[a]);
+                    CHECK(fabs((double)(p.c[a] / p.c[3] - point.rgb[a])) < 1e-5, "order %d, %d rays, channel %d: %g, not %g", order,
+                          directions, a, (double)(p.c[a] / p.c[3]), (double)point.rgb[a]);
                 isogi_dvr_free(dvr);
             }
     field_free(&f);
@@ -633,8 +650,8 @@ TEST(weights_of_visibility_rays_are_exact_and_positive) {
     field f = field_of(constant, 3);
     const struct { int order, rays; } cases[] = {{2, 32}, {3, 64}, {4, 98}, {4, 128}, {5, 256}, {6, 242}, {6, 2048}, {3, 32}, {6, 72}};
     for (int c = 0; c < 9; c++) {
-        const isogi_dvr_desc desc = {.pyramid = f.pyramid, .shading = ISOGI_DVR_VISIBILITY, .order = cases[c].order, .directions = cases[c].rays,
-                                     .grid = {1, 1, 1}};
+        const isogi_dvr_desc desc = {
+            .pyramid = f.pyramid, .shading = ISOGI_DVR_VISIBILITY, .order = cases[c].order, .directions = cases[c].rays, .grid = {1, 1, 1}};
         isogi_dvr *dvr = NULL;
         CHECK(isogi_dvr_create(&dvr, &desc, &serial) == ISOGI_OK, "create");
         size_t n = dvr->coefficients;
@@ -663,9 +680,12 @@ TEST(lights_add_up) {
     const isogi_transfer_point points[] = {{-1, {1, 0.2f, 0.1f}, 0}, {1, {0.3f, 1, 0.1f}, 0.05f}};
     const isogi_peak peak = {0.2, {1, 1, 1}, 0.1f};
     const isogi_transfer transfer = {points, 2, &peak, 1};
-    const isogi_light lights[] = {{.vector = {1, 1, 1}, .rgb = {2, 1, 0.5f}}, {.kind = ISOGI_LIGHT_POINT, .vector = {40, 5, 6}, .rgb = {300, 900, 100}}};
-    const isogi_lighting parts[4] = {{.env = {.sh = sky_one, .sh_order = 1}}, {.lights = &lights[0], .light_count = 1},
-                                     {.lights = &lights[1], .light_count = 1}, {.env = {.sh = sky_one, .sh_order = 1}, .lights = lights, .light_count = 2}};
+    const isogi_light lights[] = {{.vector = {1, 1, 1}, .rgb = {2, 1, 0.5f}},
+                                  {.kind = ISOGI_LIGHT_POINT, .vector = {40, 5, 6}, .rgb = {300, 900, 100}}};
+    const isogi_lighting parts[4] = {{.env = {.sh = sky_one, .sh_order = 1}},
+                                     {.lights = &lights[0], .light_count = 1},
+                                     {.lights = &lights[1], .light_count = 1},
+                                     {.env = {.sh = sky_one, .sh_order = 1}, .lights = lights, .light_count = 2}};
     for (int shading = 1; shading < 3; shading++) {
         const isogi_dvr_desc desc = {.pyramid = f.pyramid, .shading = (isogi_dvr_shading)shading, .grid = {4, 4, 4}};
         isogi_dvr *dvr = dvr_new(&desc, &transfer);
@@ -678,7 +698,8 @@ TEST(lights_add_up) {
         for (int p = 0; p < 256; p++)
             for (int a = 0; a < 3; a++) {
                 double sum = (double)image[0][p][a] + (double)image[1][p][a] + (double)image[2][p][a];
-                CHECK(fabs(sum - (double)image[3][p][a]) < 1e-6, "shading %d pixel %d: %g, not %g", shading, p, (double)image[3][p][a], sum);
+                CHECK(fabs(sum - (double)image[3][p][a]) < 1e-6, "shading %d pixel %d: %g, not %g", shading, p, (double)image[3][p][a],
+                      sum);
                 for (int i = 0; i < 3; i++) bright[i] = fmax(bright[i], (double)image[i][p][a]);
             }
         for (int i = 0; i < 3; i++) CHECK(bright[i] > 0.01, "shading %d: light %d is seen: %g", shading, i, bright[i]);
@@ -692,7 +713,8 @@ TEST(scattered_light_has_the_stated_units) {
     field f = field_of(constant, 5);
     const isogi_transfer_point point = {0, {0.8f, 0.5f, 0.3f}, 1e-7f};
     const isogi_transfer transfer = {&point, 1, NULL, 0};
-    const isogi_light lights[] = {{.vector = {1, 2, -1}, .rgb = {2, 2, 2}}, {.kind = ISOGI_LIGHT_POINT, .vector = {2, 300, 2}, .rgb = {5e4f, 5e4f, 5e4f}}};
+    const isogi_light lights[] = {{.vector = {1, 2, -1}, .rgb = {2, 2, 2}},
+                                  {.kind = ISOGI_LIGHT_POINT, .vector = {2, 300, 2}, .rgb = {5e4f, 5e4f, 5e4f}}};
     const isogi_dvr_desc desc = {.pyramid = f.pyramid, .shading = ISOGI_DVR_VISIBILITY};
     const double eye[3] = {-30, 2, 2}, target[3] = {5, 2, 2}, expected[2] = {2 / (4 * PI), 5e4 / (298.0 * 298.0) / (4 * PI)};
     isogi_dvr *dvr = dvr_new(&desc, &transfer);
@@ -700,8 +722,8 @@ TEST(scattered_light_has_the_stated_units) {
         const isogi_lighting lighting = {.lights = &lights[i], .light_count = 1};
         pixel p = cast(dvr, eye, target, &lighting);
         for (int a = 0; a < 3; a++)
-            CHECK(fabs((double)(p.c[a] / p.c[3] / point.rgb[a]) / expected[i] - 1) < 1e-4, "light %d: %g, not %g", i, (double)(p.c[a] / p.c[3] / point.rgb[a]),
-                  expected[i]);
+            CHECK(fabs((double)(p.c[a] / p.c[3] / point.rgb[a]) / expected[i] - 1) < 1e-4, "light %d: %g, not %g", i,
+                  (double)(p.c[a] / p.c[3] / point.rgb[a]), expected[i]);
     }
     isogi_dvr_free(dvr);
     field_free(&f);
@@ -719,13 +741,14 @@ TEST(local_shading_faces_the_eye_on_both_sides) {
         const double eye[3] = {4, 4, 4 + 30 * side}, target[3] = {4, 4, 4};
         const isogi_light towards = {.vector = {0, 3, 4.0f * (float)side}, .rgb = {2, 2, 2}};
         const isogi_light behind = {.vector = {0, 3, -4.0f * (float)side}, .rgb = {2, 2, 2}};
-        const isogi_lighting lit[3] = {{.env = {.sh = sky_one, .sh_order = 1}}, {.lights = &towards, .light_count = 1}, {.lights = &behind, .light_count = 1}};
+        const isogi_lighting lit[3] = {
+            {.env = {.sh = sky_one, .sh_order = 1}}, {.lights = &towards, .light_count = 1}, {.lights = &behind, .light_count = 1}};
         const double expected[3] = {1, 2 * 0.8 / PI, 0};
         for (int i = 0; i < 3; i++) {
             pixel p = cast(dvr, eye, target, &lit[i]);
             for (int a = 0; a < 3; a++)
-                CHECK(fabs((double)p.c[a] - expected[i] * (double)peak.rgb[a]) < 1e-5, "side %d light %d: %g, not %g", side, i, (double)p.c[a],
-                      expected[i] * (double)peak.rgb[a]);
+                CHECK(fabs((double)p.c[a] - expected[i] * (double)peak.rgb[a]) < 1e-5, "side %d light %d: %g, not %g", side, i,
+                      (double)p.c[a], expected[i] * (double)peak.rgb[a]);
         }
     }
     isogi_dvr_free(dvr);
@@ -763,7 +786,8 @@ TEST(stepping_over_empty_blocks_changes_no_bit) {
         for (uint64_t seed = 1; seed <= 6; seed++) {
             field f = field_waves(40, seed);
             const double steps[] = {0.5, 0.31, 1.7, 0.5, 9, 0.77};
-            const isogi_dvr_desc desc = {.pyramid = f.pyramid, .space = (isogi_dvr_space)space, .shading = ISOGI_DVR_VISIBILITY, .step = steps[seed - 1],
+            const isogi_dvr_desc desc = {.pyramid = f.pyramid, .space = (isogi_dvr_space)space, .shading = ISOGI_DVR_VISIBILITY,
+                .step = steps[seed - 1],
                                          .directions = 20, .grid = {3, 3, 3}};
             const isogi_lighting sky = {.env = {.sh = sky_one, .sh_order = 1}};
             isogi_dvr *dvr = dvr_new(&desc, &sparse);
@@ -782,7 +806,8 @@ TEST(stepping_over_empty_blocks_changes_no_bit) {
                   largest_difference(image[0], image[1], 48 * 48));
             CHECK(!memcmp(depth, depth + 48 * 48, 48 * 48 * sizeof *depth), "space %d seed %d: depths differ", space, (int)seed);
             CHECK(!memcmp(v[0], v[1], sizeof v[0]), "space %d seed %d: visibility differs", space, (int)seed);
-            CHECK(count[0].blocks_skipped > 0 && count[1].blocks_skipped == 0 && (count[0].samples + count[0].cells < count[1].samples + count[1].cells || steps[seed - 1] > 4),
+            CHECK(count[0].blocks_skipped > 0 && count[1].blocks_skipped == 0 &&
+                      (count[0].samples + count[0].cells < count[1].samples + count[1].cells || steps[seed - 1] > 4),
                   "skipped %d, samples %d of %d", (int)count[0].blocks_skipped, (int)count[0].samples, (int)count[1].samples);
             CHECK(image[0][48 * 24 + 24][3] >= 0, "opacity");
             for (int i = 0; i < 2; i++) free(image[i]);
@@ -895,7 +920,8 @@ TEST(ending_early_errs_by_no_more_than_what_is_left) {
         if (i) {
             double most = largest_difference(whole, image, 1024), bound = 1 - (opaque[i] > 0 ? (double)opaque[i] : 0.999);
             CHECK(most <= bound + 1e-6, "opaque %g: largest difference %g", (double)opaque[i], most);
-            CHECK(samples[i] < samples[i - 1], "opaque %g: %d samples, not fewer than %d", (double)opaque[i], (int)samples[i], (int)samples[i - 1]);
+            CHECK(samples[i] < samples[i - 1], "opaque %g: %d samples, not fewer than %d", (double)opaque[i], (int)samples[i],
+                  (int)samples[i - 1]);
             free(image);
         } else whole = image;
         isogi_dvr_free(dvr);
@@ -933,7 +959,8 @@ TEST(any_number_of_threads_and_any_slicing_gives_the_same_bits) {
         isogi_dvr_counters(dvr, &work[i]);
         size_t bytes = dvr->point_count * dvr->coefficients * sizeof(float);
         if (i) {
-            CHECK(!memcmp(image, first, 1600 * sizeof *image), "%d threads: pixels differ by %g", threads[i], largest_difference(image, first, 1600));
+            CHECK(!memcmp(image, first, 1600 * sizeof *image), "%d threads: pixels differ by %g", threads[i],
+                  largest_difference(image, first, 1600));
             CHECK(!memcmp(dvr->visibility, visibility, bytes), "%d threads: visibility differs", threads[i]);
             CHECK(!memcmp(&work[i], &work[0], sizeof work[0]), "%d threads: other counts", threads[i]);
             free(image);
@@ -982,7 +1009,8 @@ TEST(cancelling_leaves_outputs_alone_and_stepping_goes_on) {
         cancelled += result == ISOGI_CANCELLED;
         if (result == ISOGI_CANCELLED) CHECK(remaining >= 7, "remaining is written: %g", remaining);
     } while (result == ISOGI_CANCELLED && ++calls < 100);
-    CHECK(result == ISOGI_OK && remaining <= 0 && cancelled > 0, "%s, remaining %g, cancelled %d times", isogi_result_string(result), remaining, cancelled);
+    CHECK(result == ISOGI_OK && remaining <= 0 && cancelled > 0, "%s, remaining %g, cancelled %d times", isogi_result_string(result),
+          remaining, cancelled);
     isogi_dvr_step(whole, 0, NULL);
     CHECK(cancelled > 4, "cancelled %d times", cancelled);
     CHECK(!memcmp(dvr->visibility, whole->visibility, dvr->point_count * sizeof(float)), "resumed visibility differs");
@@ -1136,12 +1164,14 @@ TEST(cells_that_are_not_finite_are_transparent) {
             field_build(&f);
             const isogi_transfer_point point = {0, {1, 1, 1}, 1};
             const isogi_transfer transfer = {&point, 1, NULL, 0};
-            const isogi_dvr_desc desc = {.pyramid = f.pyramid, .opaque = 1, .space = (isogi_dvr_space)space, .classification = space ? ISOGI_DVR_EXACT : ISOGI_DVR_POST_CLASSIFIED};
+            const isogi_dvr_desc desc = {.pyramid = f.pyramid, .opaque = 1, .space = (isogi_dvr_space)space, .classification = space
+                ? ISOGI_DVR_EXACT : ISOGI_DVR_POST_CLASSIFIED};
             isogi_dvr *dvr = dvr_new(&desc, &transfer);
             const double eye[3] = {-5, 5.5, 4.5}, target[3] = {5, 5.5, 4.5};
             pixel p = cast(dvr, eye, target, NULL);
             double expected = -expm1(space ? -0.8 : -8); /* two cells of ten are left out */
-            CHECK(fabs((double)p.c[3] - expected) < 1e-6 && fabs((double)p.c[0] - expected) < 1e-6, "space %d: %g, not %g", space, (double)p.c[3], expected);
+            CHECK(fabs((double)p.c[3] - expected) < 1e-6 && fabs((double)p.c[0] - expected) < 1e-6, "space %d: %g, not %g", space,
+                  (double)p.c[3], expected);
             isogi_dvr_free(dvr);
             field_free(&f);
         }
@@ -1158,12 +1188,15 @@ TEST(odd_volumes_and_extinctions_are_defined) {
                 field f = field_new(sizes[s][0], sizes[s][1], sizes[s][2]);
                 for (int i = 0; i < sizes[s][0] * sizes[s][1] * sizes[s][2]; i++) f.value[i] = i % 3 ? values[v] : -values[v];
                 field_build(&f);
-                const isogi_transfer_point points[] = {{-1e308, {1, 1, 1}, extinctions[e]}, {0, {1, 1, 1}, 0}, {1e308, {0, 1, 1}, extinctions[e]}};
+                const isogi_transfer_point points[] = {
+                    {-1e308, {1, 1, 1}, extinctions[e]}, {0, {1, 1, 1}, 0}, {1e308, {0, 1, 1}, extinctions[e]}};
                 const isogi_peak peak = {0.25 * values[v], {1, 1, 1}, 0.5f};
                 const isogi_transfer transfer = {points, 3, &peak, 1};
                 const isogi_lighting sky = {.env = {.sh = sky_one, .sh_order = 1}};
                 for (int shading = 0; shading < 3; shading++) {
-                    const isogi_dvr_desc desc = {.pyramid = f.pyramid, .space = (isogi_dvr_space)((s + e) % 2), .shading = (isogi_dvr_shading)shading,
+                    const isogi_dvr_desc desc = {.pyramid = f.pyramid,
+                                                 .space = (isogi_dvr_space)((s + e) % 2),
+                                                 .shading = (isogi_dvr_shading)shading,
                                                  .directions = 9};
                     isogi_dvr *dvr = dvr_new(&desc, &transfer);
                     isogi_view view = {.width = 6, .height = 6, .eye = {20, 30, 40}, .target = {0.5f, 0.5f, 0.5f}, .fov = 20};
@@ -1172,8 +1205,10 @@ TEST(odd_volumes_and_extinctions_are_defined) {
                     isogi_dvr_step(dvr, 0, NULL);
                     image = picture(dvr, &view, &sky, depth, NULL);
                     for (int i = 0; i < 36; i++) {
-                        for (int a = 0; a < 4; a++) CHECK(image[i][a] >= 0 && image[i][a] < 1.5f, "size %d value %g: pixel %g", s, values[v], (double)image[i][a]);
-                        CHECK(image[i][3] > 0 ? depth[i] > 0 && depth[i] < 100 : depth[i] > 1e30f, "opacity %g, depth %g", (double)image[i][3], (double)depth[i]);
+                        for (int a = 0; a < 4; a++)
+                            CHECK(image[i][a] >= 0 && image[i][a] < 1.5f, "size %d value %g: pixel %g", s, values[v], (double)image[i][a]);
+                        CHECK(image[i][3] > 0 ? depth[i] > 0 && depth[i] < 100 : depth[i] > 1e30f, "opacity %g, depth %g",
+                              (double)image[i][3], (double)depth[i]);
                         if (s < 5) CHECK(image[i][3] <= 0, "a box without volume has opacity %g", (double)image[i][3]);
                     }
                     free(image);
@@ -1206,17 +1241,20 @@ TEST(a_view_covers_its_angle_with_up_on_top) {
     double origin[3];
     float dir[3];
     isogi_view_ray(&view, 19.5, 9.5, origin, dir);
-    CHECK(fabsf(dir[0]) < 1e-6f && fabsf(dir[1]) < 1e-6f && fabsf(dir[2] + 1) < 1e-6f, "centre %g %g %g", (double)dir[0], (double)dir[1], (double)dir[2]);
+    CHECK(fabsf(dir[0]) < 1e-6f && fabsf(dir[1]) < 1e-6f && fabsf(dir[2] + 1) < 1e-6f, "centre %g %g %g", (double)dir[0], (double)dir[1],
+          (double)dir[2]);
     CHECK(fabs(origin[0] - 1) + fabs(origin[1] - 2) + fabs(origin[2] - 3) < 1e-12, "origin");
     isogi_view_ray(&view, 19.5, -0.5, origin, dir);
-    CHECK(fabs(atan2((double)dir[1], -(double)dir[2]) - PI / 6) < 1e-6, "top border at %g", atan2((double)dir[1], -(double)dir[2]) * 180 / PI);
+    CHECK(fabs(atan2((double)dir[1], -(double)dir[2]) - PI / 6) < 1e-6, "top border at %g",
+          atan2((double)dir[1], -(double)dir[2]) * 180 / PI);
     isogi_view_ray(&view, 39.5, 9.5, origin, dir);
     CHECK(fabs((double)dir[0] / -(double)dir[2] - 2 * tan(PI / 6)) < 1e-6, "right border at %g", (double)dir[0] / -(double)dir[2]);
     isogi_view odd = view; /* up along the line of sight, and no line of sight: still a unit vector */
     odd.target[0] = 1, odd.target[1] = -9, odd.target[2] = 3;
     for (int i = 0; i < 2; i++) {
         isogi_view_ray(&odd, 3, 4, origin, dir);
-        CHECK(fabsf(dir[0] * dir[0] + dir[1] * dir[1] + dir[2] * dir[2] - 1) < 1e-5f, "length of %g %g %g", (double)dir[0], (double)dir[1], (double)dir[2]);
+        CHECK(fabsf(dir[0] * dir[0] + dir[1] * dir[1] + dir[2] * dir[2] - 1) < 1e-5f, "length of %g %g %g", (double)dir[0], (double)dir[1],
+              (double)dir[2]);
         memcpy(odd.target, odd.eye, sizeof odd.eye);
     }
 }
@@ -1251,10 +1289,13 @@ TEST(engine_under_its_transfer_function_is_lit_and_shadowed) {
     for (int i = 0; i < 64 * 64; i++) {
         bright += (double)unshadowed[i][1], dark += (double)shadowed[i][1], opacity += (double)shadowed[i][3];
         /* V exceeds 1 nowhere, but the weights' overshoot at rims */
-        CHECK(shadowed[i][1] <= unshadowed[i][1] + 1e-4f, "pixel %d: %g brighter than without shadows, %g", i, (double)shadowed[i][1], (double)unshadowed[i][1]);
+        CHECK(shadowed[i][1] <= unshadowed[i][1] + 1e-4f, "pixel %d: %g brighter than without shadows, %g", i, (double)shadowed[i][1],
+              (double)unshadowed[i][1]);
     }
-    CHECK(dark > 0.2 * bright && dark < 0.9 * bright && opacity > 400, "sums: %g without, %g with shadows, opacity %g", bright, dark, opacity);
-    CHECK(count.blocks_skipped > 4000 && count.samples < 500000, "%d samples, %d blocks skipped", (int)count.samples, (int)count.blocks_skipped);
+    CHECK(dark > 0.2 * bright && dark < 0.9 * bright && opacity > 400, "sums: %g without, %g with shadows, opacity %g", bright, dark,
+          opacity);
+    CHECK(count.blocks_skipped > 4000 && count.samples < 500000, "%d samples, %d blocks skipped", (int)count.samples,
+          (int)count.blocks_skipped);
     free(unshadowed), free(shadowed);
     isogi_dvr_free(dvr);
     isogi_vol_free(pyramid);

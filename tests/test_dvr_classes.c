@@ -9,7 +9,8 @@ enum { SIDE = 32, COUNT = 9 };
 static field radius_field(int n, double outlier) {
     field f = field_new(n, n, n);
     for (size_t i = 0; i < field_count(&f); i++) {
-        double x = (double)(i % (size_t)n) - n / 2, y = (double)(i / (size_t)n % (size_t)n) - n / 2, z = (double)(i / (size_t)n / (size_t)n) - n / 2;
+        double x = (double)(i % (size_t)n) - n / 2, y = (double)(i / (size_t)n % (size_t)n) - n / 2,
+               z = (double)(i / (size_t)n / (size_t)n) - n / 2;
         f.value[i] = sqrt(x * x + y * y + z * z);
     }
     if (outlier > 0) f.value[0] = outlier;
@@ -18,7 +19,8 @@ static field radius_field(int n, double outlier) {
 }
 
 static const isogi_view view_49 = {.width = SIDE, .height = SIDE, .eye = {90, 70, 100}, .target = {24, 24, 24}, .fov = 35};
-static const isogi_transfer_point shell[] = {{0, {1, 0.5f, 0.2f}, 0}, {12, {0.2f, 0.5f, 1}, 0}, {13.5, {1, 1, 1}, 0.4f}, {15, {1, 1, 1}, 0}};
+static const isogi_transfer_point shell[] = {
+    {0, {1, 0.5f, 0.2f}, 0}, {12, {0.2f, 0.5f, 1}, 0}, {13.5, {1, 1, 1}, 0.4f}, {15, {1, 1, 1}, 0}};
 
 static double opacity_difference(float (*a)[4], float (*b)[4], int count) {
     double worst = 0;
@@ -35,13 +37,14 @@ TEST(an_outlier_takes_no_shadow_from_any_method) {
         float v[4][COUNT];
         const float middle[3] = {24, 24, 24};
         for (int method = ISOGI_DVR_BRUTE; method <= ISOGI_DVR_SWEEP; method++) {
-            const isogi_dvr_desc desc = {.pyramid = f.pyramid, .shading = ISOGI_DVR_VISIBILITY, .method = (isogi_dvr_method)method, .directions = 32, .grid = {7, 7, 7}};
+            const isogi_dvr_desc desc = {.pyramid = f.pyramid, .shading = ISOGI_DVR_VISIBILITY, .method = (isogi_dvr_method)method,
+                .directions = 32, .grid = {7, 7, 7}};
             isogi_dvr *dvr = dvr_new(&desc, &transfer);
             CHECK(isogi_dvr_step(dvr, 0, NULL) == ISOGI_OK && isogi_dvr_sample_visibility(dvr, &middle, 1, v[method]) == ISOGI_OK, "step");
             /* behind the shell, of depth 0.6; the two other methods see it a little blurred */
             CHECK(fabs((double)v[method][0] - 1.94) < 0.15, "outlier %g, method %d: %g", outlier[k], method, (double)v[method][0]);
-            CHECK(fabs((double)v[method][0] / (double)v[ISOGI_DVR_BRUTE][0] - 1) < 0.1, "outlier %g, method %d: %g of %g", outlier[k], method,
-                  (double)v[method][0], (double)v[ISOGI_DVR_BRUTE][0]);
+            CHECK(fabs((double)v[method][0] / (double)v[ISOGI_DVR_BRUTE][0] - 1) < 0.1, "outlier %g, method %d: %g of %g", outlier[k],
+                  method, (double)v[method][0], (double)v[ISOGI_DVR_BRUTE][0]);
             isogi_dvr_free(dvr);
         }
         field_free(&f);
@@ -53,23 +56,26 @@ TEST(narrow_tents_in_a_wide_range_cast_shadows) {
     float v[2][4][COUNT];
     for (int wide = 0; wide < 2; wide++) {
         field f = radius_field(49, wide ? 4000 : 0);
-        const isogi_transfer_point p[] = {{0, {1, 1, 1}, 0}, {14, {1, 1, 1}, 0}, {16, {1, 1, 1}, 0.3f}, {18, {1, 1, 1}, 0}, {4000, {1, 1, 1}, 0.001f}};
+        const isogi_transfer_point p[] = {
+            {0, {1, 1, 1}, 0}, {14, {1, 1, 1}, 0}, {16, {1, 1, 1}, 0.3f}, {18, {1, 1, 1}, 0}, {4000, {1, 1, 1}, 0.001f}};
         const isogi_transfer transfer = {p, wide ? 5 : 4, NULL, 0};
         const float middle[3] = {24, 24, 24};
         for (int method = ISOGI_DVR_BRUTE; method <= ISOGI_DVR_SWEEP; method++) {
-            const isogi_dvr_desc desc = {.pyramid = f.pyramid, .shading = ISOGI_DVR_VISIBILITY, .method = (isogi_dvr_method)method, .directions = 32, .grid = {7, 7, 7},
+            const isogi_dvr_desc desc = {.pyramid = f.pyramid, .shading = ISOGI_DVR_VISIBILITY, .method = (isogi_dvr_method)method,
+                .directions = 32, .grid = {7, 7, 7},
                                          .visibility_step = 0.5};
             isogi_dvr *dvr = dvr_new(&desc, &transfer);
             float *at = v[wide][method];
             CHECK(isogi_dvr_step(dvr, 0, NULL) == ISOGI_OK && isogi_dvr_sample_visibility(dvr, &middle, 1, at) == ISOGI_OK, "step");
-            if (method != ISOGI_DVR_PAPER) CHECK(fabs((double)at[0] / (sqrt(4 * PI) * exp(-0.6)) - 1) < 0.02, "method %d: %g", method, (double)at[0]);
+            if (method != ISOGI_DVR_PAPER)
+                CHECK(fabs((double)at[0] / (sqrt(4 * PI) * exp(-0.6)) - 1) < 0.02, "method %d: %g", method, (double)at[0]);
             isogi_dvr_free(dvr);
         }
         field_free(&f);
     }
     /* local rays take steps of a voxel between nodes: what they blur of a tent, they blur in either range */
-    CHECK(fabs((double)v[1][ISOGI_DVR_PAPER][0] / (double)v[0][ISOGI_DVR_PAPER][0] - 1) < 0.04, "the paper's method: %g, and %g in a wide range",
-          (double)v[0][ISOGI_DVR_PAPER][0], (double)v[1][ISOGI_DVR_PAPER][0]);
+    CHECK(fabs((double)v[1][ISOGI_DVR_PAPER][0] / (double)v[0][ISOGI_DVR_PAPER][0] - 1) < 0.04,
+          "the paper's method: %g, and %g in a wide range", (double)v[0][ISOGI_DVR_PAPER][0], (double)v[1][ISOGI_DVR_PAPER][0]);
 }
 
 /* Outliers leave the suggested points where they were. */
@@ -82,7 +88,8 @@ TEST(suggestions_leave_out_outliers) {
         double threshold;
         CHECK(isogi_transfer_suggest(f.pyramid, ISOGI_DVR_PHYSICAL, p, &threshold) == ISOGI_OK, "suggest");
         if (!k) first = threshold;
-        CHECK(fabs(threshold - first) < 1 && p[5].value < 84, "outlier %g: threshold %g, not %g; last point %g", outlier[k], threshold, first, p[5].value);
+        CHECK(fabs(threshold - first) < 1 && p[5].value < 84, "outlier %g: threshold %g, not %g; last point %g", outlier[k], threshold,
+              first, p[5].value);
         field_free(&f);
     }
 }
@@ -98,7 +105,8 @@ TEST(an_outlier_takes_no_class_from_a_picture) {
         for (int fine = 1; fine >= 0; fine--)
             for (int path = 1; path <= (fine ? 1 : 4); path += 3) { /* plain and best */
                 const isogi_context context = {.threads = 1, .force_path = path == 1 ? 1 : 0};
-                const isogi_dvr_desc desc = {.pyramid = f.pyramid, .step = fine ? 0.05 : 0, .classification = fine ? ISOGI_DVR_POST_CLASSIFIED : ISOGI_DVR_EXACT};
+                const isogi_dvr_desc desc = {
+                    .pyramid = f.pyramid, .step = fine ? 0.05 : 0, .classification = fine ? ISOGI_DVR_POST_CLASSIFIED : ISOGI_DVR_EXACT};
                 isogi_dvr *dvr = dvr_new_with(&desc, &transfer, &context);
                 CHECK(isogi_dvr_render(dvr, &view_49, NULL, image[fine], NULL, NULL) == ISOGI_OK, "render");
                 isogi_dvr_free(dvr);
@@ -113,14 +121,16 @@ TEST(an_outlier_takes_no_class_from_a_picture) {
 TEST(an_outlier_takes_no_entry_from_a_table_of_pairs) {
     static const struct { double outlier; int far; } cases[] = {{0, 0}, {4e3, 0}, {1e30, 1}, {-1e30, 0}};
     static float image[2][SIDE * SIDE][4];
-    const isogi_transfer_point narrow[] = {{0, {1, 0.5f, 0.2f}, 0}, {12, {0.2f, 0.5f, 1}, 0}, {13.5, {1, 1, 1}, 0.4f}, {15, {1, 1, 1}, 0}, {1e30, {1, 1, 1}, 1e-34f}};
+    const isogi_transfer_point narrow[] = {
+        {0, {1, 0.5f, 0.2f}, 0}, {12, {0.2f, 0.5f, 1}, 0}, {13.5, {1, 1, 1}, 0.4f}, {15, {1, 1, 1}, 0}, {1e30, {1, 1, 1}, 1e-34f}};
     for (size_t k = 0; k < sizeof cases / sizeof *cases; k++)
         for (int silhouette = 0; silhouette < 2; silhouette++) {
             field f = radius_field(49, fabs(cases[k].outlier));
             const isogi_transfer transfer = {narrow, cases[k].far ? 5 : 4, NULL, 0};
             if (cases[k].outlier < 0) isogi_vol_free(f.pyramid), f.value[0] = cases[k].outlier, field_build(&f);
             for (int exact = 0; exact < 2; exact++) {
-                const isogi_dvr_desc desc = {.pyramid = f.pyramid, .space = ISOGI_DVR_DATA, .step = 0.25, .classification = exact ? ISOGI_DVR_EXACT : ISOGI_DVR_PRE_INTEGRATED,
+                const isogi_dvr_desc desc = {.pyramid = f.pyramid, .space = ISOGI_DVR_DATA, .step = 0.25, .classification = exact
+                    ? ISOGI_DVR_EXACT : ISOGI_DVR_PRE_INTEGRATED,
                                              .silhouette = silhouette ? ISOGI_DVR_SILHOUETTE_EXACT : ISOGI_DVR_SILHOUETTE_NONE};
                 isogi_dvr *dvr = dvr_new(&desc, &transfer);
                 CHECK(isogi_dvr_render(dvr, &view_49, NULL, image[exact], NULL, NULL) == ISOGI_OK, "render");
@@ -129,7 +139,8 @@ TEST(an_outlier_takes_no_entry_from_a_table_of_pairs) {
             float worst = 0;
             for (int i = 0; i < SIDE * SIDE; i++)
                 for (int a = 0; a < 4; a++) worst = fmaxf(worst, fabsf(image[0][i][a] - image[1][i][a]));
-            CHECK(worst < (silhouette ? 0.015f : 0.006f), "outlier %g, silhouette %d, far %d: pixels err by %g", cases[k].outlier, silhouette, cases[k].far, (double)worst);
+            CHECK(worst < (silhouette ? 0.015f : 0.006f), "outlier %g, silhouette %d, far %d: pixels err by %g", cases[k].outlier,
+                  silhouette, cases[k].far, (double)worst);
             field_free(&f);
         }
 }
@@ -143,26 +154,30 @@ TEST(pictures_of_thin_shells_converge_with_the_step) {
     const double half[] = {0.15, 0.5, 1.5}, peak[] = {4, 1.2, 0.4}, step[] = {1, 0.5, 0.25, 0.1};
     field f = radius_field(65, 0);
     for (int w = 0; w < 3; w++) {
-        const isogi_transfer_point p[] = {{0, {1, 0.5f, 0.2f}, 0}, {20, {0.2f, 0.5f, 1}, 0}, {20 + half[w], {1, 1, 1}, (float)peak[w]}, {20 + 2 * half[w], {1, 1, 1}, 0}};
+        const isogi_transfer_point p[] = {
+            {0, {1, 0.5f, 0.2f}, 0}, {20, {0.2f, 0.5f, 1}, 0}, {20 + half[w], {1, 1, 1}, (float)peak[w]}, {20 + 2 * half[w], {1, 1, 1}, 0}};
         const isogi_transfer transfer = {p, 4, NULL, 0};
         double error[4];
         for (int n = -1; n < 4; n++) {
-            const isogi_dvr_desc desc = {.pyramid = f.pyramid, .opaque = 1, .step = n < 0 ? 0.01 : step[n], .classification = n < 0 ? ISOGI_DVR_POST_CLASSIFIED : ISOGI_DVR_EXACT};
+            const isogi_dvr_desc desc = {.pyramid = f.pyramid, .opaque = 1, .step = n < 0 ? 0.01 : step[n], .classification = n < 0
+                ? ISOGI_DVR_POST_CLASSIFIED : ISOGI_DVR_EXACT};
             isogi_dvr *dvr = dvr_new(&desc, &transfer);
             CHECK(isogi_dvr_render(dvr, &view, NULL, image[n >= 0], NULL, NULL) == ISOGI_OK, "render");
             isogi_dvr_free(dvr);
             if (n >= 0) error[n] = opacity_difference(image[0], image[1], W * W);
         }
-        printf("    tent of %g voxels: largest error of opacity %.4f %.4f %.4f %.5f for steps of 1, 1/2, 1/4, 1/10 voxel\n", 2 * half[w], error[0], error[1], error[2], error[3]);
-        CHECK(error[0] < 0.015 && error[1] < 0.6 * error[0] && error[2] < (w ? 0.12 : 0.35) * error[0] && error[3] < 1e-3, "width %g", 2 * half[w]);
+        printf("    tent of %g voxels: largest error of opacity %.4f %.4f %.4f %.5f for steps of 1, 1/2, 1/4, 1/10 voxel\n", 2 * half[w],
+               error[0], error[1], error[2], error[3]);
+        CHECK(error[0] < 0.015 && error[1] < 0.6 * error[0] && error[2] < (w ? 0.12 : 0.35) * error[0] && error[3] < 1e-3, "width %g",
+              2 * half[w]);
     }
     field_free(&f);
 }
 
 /* Asking for depth, a peak that no value reaches or no limit of opacity: the integrator stays. */
 TEST(the_integrator_does_not_depend_on_what_else_is_asked_for) {
-    const isogi_transfer_point p[] = {{0, {1, 0.5f, 0.2f}, 0.3f}, {10, {1, 0.5f, 0.2f}, 0.3f}, {10.5, {0.2f, 0.5f, 1}, 0}, {18, {0.2f, 0.5f, 1}, 0},
-                                      {18.3, {1, 1, 1}, 1.5f}, {18.6, {1, 1, 1}, 0}};
+    const isogi_transfer_point p[] = {{0, {1, 0.5f, 0.2f}, 0.3f}, {10, {1, 0.5f, 0.2f}, 0.3f}, {10.5, {0.2f, 0.5f, 1}, 0},
+                                      {18, {0.2f, 0.5f, 1}, 0},   {18.3, {1, 1, 1}, 1.5f},     {18.6, {1, 1, 1}, 0}};
     const isogi_peak far_off = {500, {1, 1, 1}, 0.1f};
     const isogi_light sun = {.vector = {1, 2, 1}, .rgb = {3, 3, 3}};
     const isogi_lighting lighting = {.lights = &sun, .light_count = 1};
@@ -171,7 +186,8 @@ TEST(the_integrator_does_not_depend_on_what_else_is_asked_for) {
     for (int lit = 0; lit < 2; lit++) {
         for (int n = 0; n < 4; n++) {
             const isogi_transfer transfer = {p, 6, &far_off, n == 2};
-            const isogi_dvr_desc desc = {.pyramid = f.pyramid, .shading = lit ? ISOGI_DVR_VISIBILITY : ISOGI_DVR_UNLIT, .method = ISOGI_DVR_BRUTE, .directions = 16, .grid = {5, 5, 5},
+            const isogi_dvr_desc desc = {.pyramid = f.pyramid, .shading = lit ? ISOGI_DVR_VISIBILITY
+                : ISOGI_DVR_UNLIT, .method = ISOGI_DVR_BRUTE, .directions = 16, .grid = {5, 5, 5},
                                          .opaque = n == 3 ? 1 : 0};
             isogi_dvr *dvr = dvr_new(&desc, &transfer);
             CHECK(isogi_dvr_render(dvr, &view_49, &lighting, image[n], n == 1 ? depth : NULL, NULL) == ISOGI_OK, "render");
@@ -179,8 +195,11 @@ TEST(the_integrator_does_not_depend_on_what_else_is_asked_for) {
         }
         CHECK(!memcmp(image[0], image[1], sizeof image[0]), "depth changes the picture");
         CHECK(!memcmp(image[0], image[2], sizeof image[0]), "a peak that no value reaches changes the picture");
-        CHECK(opacity_difference(image[0], image[3], SIDE * SIDE) < 1.001e-3, "beyond what is left at 0.999: %g", opacity_difference(image[0], image[3], SIDE * SIDE));
-        for (int i = 0; i < SIDE * SIDE; i++) CHECK((depth[i] < 1e30f) == (image[0][i][3] > 0) && depth[i] > 50, "pixel %d: opacity %g, depth %g", i, (double)image[0][i][3], (double)depth[i]);
+        CHECK(opacity_difference(image[0], image[3], SIDE * SIDE) < 1.001e-3, "beyond what is left at 0.999: %g",
+              opacity_difference(image[0], image[3], SIDE * SIDE));
+        for (int i = 0; i < SIDE * SIDE; i++)
+            CHECK((depth[i] < 1e30f) == (image[0][i][3] > 0) && depth[i] > 50, "pixel %d: opacity %g, depth %g", i, (double)image[0][i][3],
+                  (double)depth[i]);
     }
     field_free(&f);
 }
@@ -192,12 +211,14 @@ TEST(local_visibility_of_uniform_matter_is_that_of_its_radius) {
     const isogi_transfer transfer = {&point, 1, NULL, 0};
     const float places[2][3] = {{48, 48, 48}, {50, 43, 40}};
     for (double radius = 4; radius <= 32; radius *= 2) {
-        const isogi_dvr_desc desc = {.pyramid = f.pyramid, .shading = ISOGI_DVR_VISIBILITY, .method = ISOGI_DVR_PAPER, .directions = 32, .radius = radius, .order = 2, .grid = {2, 2, 2}};
+        const isogi_dvr_desc desc = {.pyramid = f.pyramid, .shading = ISOGI_DVR_VISIBILITY, .method = ISOGI_DVR_PAPER, .directions = 32,
+            .radius = radius, .order = 2, .grid = {2, 2, 2}};
         isogi_dvr *dvr = dvr_new(&desc, &transfer);
         float values[2], v[2][4];
         CHECK(isogi_dvr_step(dvr, 0, NULL) == ISOGI_OK && isogi_dvr_sample_blocks(dvr, places, 2, values, v[0]) == ISOGI_OK, "step");
         for (int i = 0; i < 2; i++) {
-            CHECK(fabs((double)v[i][0] / (sqrt(4 * PI) * exp(-0.02 * radius)) - 1) < 1e-3, "radius %g: %g", radius, (double)v[i][0]); /* half floats */
+            CHECK(fabs((double)v[i][0] / (sqrt(4 * PI) * exp(-0.02 * radius)) - 1) < 1e-3, "radius %g: %g", radius,
+                  (double)v[i][0]); /* half floats */
             for (int c = 1; c < 4; c++) CHECK(fabs((double)v[i][c]) < 2e-3, "radius %g: coefficient %d is %g", radius, c, (double)v[i][c]);
         }
         isogi_dvr_free(dvr);
@@ -214,7 +235,8 @@ TEST(local_shading_is_the_papers_alone) {
     const isogi_lighting lighting = {.lights = &sun, .light_count = 1};
     static float image[3][SIDE * SIDE][4];
     for (int method = ISOGI_DVR_METHOD_DEFAULT; method <= ISOGI_DVR_SWEEP; method++) {
-        const isogi_dvr_desc desc = {.pyramid = f.pyramid, .shading = ISOGI_DVR_VISIBILITY, .method = (isogi_dvr_method)method, .directions = 16, .grid = {5, 5, 5}};
+        const isogi_dvr_desc desc = {
+            .pyramid = f.pyramid, .shading = ISOGI_DVR_VISIBILITY, .method = (isogi_dvr_method)method, .directions = 16, .grid = {5, 5, 5}};
         isogi_dvr *dvr = dvr_new(&desc, &transfer);
         isogi_view view = view_49;
         isogi_counters count = {0}, again = {0};
@@ -225,7 +247,8 @@ TEST(local_shading_is_the_papers_alone) {
         for (int n = 0; n < 3; n++) {
             view.local = n == 1;
             isogi_result result = isogi_dvr_render(dvr, &view, &lighting, image[n], NULL, NULL);
-            CHECK(result == (n == 1 && method != ISOGI_DVR_PAPER ? ISOGI_INVALID : ISOGI_OK), "method %d: %s", method, isogi_result_string(result));
+            CHECK(result == (n == 1 && method != ISOGI_DVR_PAPER ? ISOGI_INVALID : ISOGI_OK), "method %d: %s", method,
+                  isogi_result_string(result));
         }
         isogi_dvr_counters(dvr, &again);
         CHECK(!memcmp(&count, &again, sizeof count) && !memcmp(image[0], image[2], sizeof image[0]), "method %d: computed anew", method);
@@ -238,9 +261,13 @@ TEST(local_shading_is_the_papers_alone) {
         CHECK(isogi_dvr_inspect(dvr, &report) == ISOGI_OK && (method == ISOGI_DVR_PAPER) == (report.level != NULL), "levels");
         if (method == ISOGI_DVR_PAPER) {
             size_t blocks = report.block_count[0] * report.block_count[1] * report.block_count[2];
-            CHECK(report.global_bytes == 125 * 9 * sizeof(float) && report.local_bytes % (9 * 2) == 0 && report.local_bytes > 0, "coefficients");
-            CHECK(report.data_bytes >= report.points * sizeof(float) && report.index_bytes >= blocks && report.index_bytes < 100 * blocks, "data, index");
-            CHECK(isogi_dvr_set_transfer(dvr, &peaks) == ISOGI_OK && isogi_dvr_inspect(dvr, &report) == ISOGI_OK && !report.level && !report.data_bytes, "peaks: brute force has no levels");
+            CHECK(report.global_bytes == 125 * 9 * sizeof(float) && report.local_bytes % (9 * 2) == 0 && report.local_bytes > 0,
+                  "coefficients");
+            CHECK(report.data_bytes >= report.points * sizeof(float) && report.index_bytes >= blocks && report.index_bytes < 100 * blocks,
+                  "data, index");
+            CHECK(isogi_dvr_set_transfer(dvr, &peaks) == ISOGI_OK && isogi_dvr_inspect(dvr, &report) == ISOGI_OK && !report.level &&
+                      !report.data_bytes,
+                  "peaks: brute force has no levels");
             view.local = 1;
             CHECK(isogi_dvr_render(dvr, &view, &lighting, image[0], NULL, NULL) == ISOGI_INVALID, "peaks: no local visibility");
         }
@@ -258,7 +285,9 @@ TEST(exact_rays_know_no_longest_ray) {
     const isogi_transfer_point p[] = {{1, {1, 1, 1}, 0.2f}, {4, {1, 1, 1}, 0.4f}};
     const isogi_transfer transfer = {p, 2, NULL, 0};
     for (int n = 0; n < 3; n++) {
-        const isogi_dvr_desc desc = {.pyramid = f.pyramid, .space = n == 2 ? ISOGI_DVR_PHYSICAL : ISOGI_DVR_DATA, .classification = n ? ISOGI_DVR_POST_CLASSIFIED : ISOGI_DVR_EXACT};
+        const isogi_dvr_desc desc = {.pyramid = f.pyramid,
+                                     .space = n == 2 ? ISOGI_DVR_PHYSICAL : ISOGI_DVR_DATA,
+                                     .classification = n ? ISOGI_DVR_POST_CLASSIFIED : ISOGI_DVR_EXACT};
         const double eye[3] = {4, 4, -1e7}, target[3] = {4, 4, 4e7};
         isogi_dvr *dvr = NULL;
         isogi_result result = isogi_dvr_create(&dvr, &desc, &serial);
@@ -273,12 +302,14 @@ TEST(exact_rays_know_no_longest_ray) {
     field_free(&f);
 }
 
-/* A point dragged bit by bit narrows the function a little at a time: what is seen in the end is what a renderer sees that knew no other. */
+/* A point dragged bit by bit narrows the function a little at a time: what is seen in the end is what a renderer sees
+   that knew no other. */
 TEST(many_small_edits_end_like_one) {
     field f = radius_field(49, 1e5);
     const float middle[3] = {24, 24, 24};
     for (int method = ISOGI_DVR_BRUTE; method <= ISOGI_DVR_SWEEP; method++) {
-        const isogi_dvr_desc desc = {.pyramid = f.pyramid, .shading = ISOGI_DVR_VISIBILITY, .method = (isogi_dvr_method)method, .directions = 32, .grid = {7, 7, 7}};
+        const isogi_dvr_desc desc = {
+            .pyramid = f.pyramid, .shading = ISOGI_DVR_VISIBILITY, .method = (isogi_dvr_method)method, .directions = 32, .grid = {7, 7, 7}};
         float v[2][COUNT];
         for (int fresh = 0; fresh < 2; fresh++) {
             isogi_dvr *dvr = NULL;
@@ -293,7 +324,8 @@ TEST(many_small_edits_end_like_one) {
             CHECK(isogi_dvr_sample_visibility(dvr, &middle, 1, v[fresh]) == ISOGI_OK, "sample");
             isogi_dvr_free(dvr);
         }
-        CHECK(fabs((double)v[0][0] - (double)v[1][0]) < 0.002, "method %d: %g bit by bit, %g at once", method, (double)v[0][0], (double)v[1][0]);
+        CHECK(fabs((double)v[0][0] - (double)v[1][0]) < 0.002, "method %d: %g bit by bit, %g at once", method, (double)v[0][0],
+              (double)v[1][0]);
     }
     field_free(&f);
 }
@@ -307,7 +339,8 @@ TEST(lengths_and_extinctions_without_measure_are_opaque) {
         for (int path = 1; path <= 4; path++) {
             const isogi_context context = {.threads = 1, .force_path = path};
             const float e = extreme[k / 2].extinction;
-            const isogi_transfer_point step[] = {{0, {1, 1, 1}, 0}, {3.5, {1, 1, 1}, 0}, {3.5, {1, 0.5f, 1}, e}, {7, {1, 0.5f, 1}, e}}, ramp[] = {{0, {1, 0.5f, 1}, 0}, {7, {1, 0.5f, 1}, e}};
+            const isogi_transfer_point step[] = {{0, {1, 1, 1}, 0}, {3.5, {1, 1, 1}, 0}, {3.5, {1, 0.5f, 1}, e}, {7, {1, 0.5f, 1}, e}},
+                                       ramp[] = {{0, {1, 0.5f, 1}, 0}, {7, {1, 0.5f, 1}, e}};
             const isogi_transfer transfer = {k & 1 ? step : ramp, k & 1 ? 4 : 2, NULL, 0};
             const isogi_view view = {.width = 8, .height = 8, .fov = 30, .eye = {20, 18, 22}, .target = {3.5f, 3.5f, 3.5f}};
             isogi_dvr *dvr = NULL;
@@ -318,8 +351,8 @@ TEST(lengths_and_extinctions_without_measure_are_opaque) {
             CHECK(isogi_dvr_render(dvr, &view, NULL, image, NULL, NULL) == ISOGI_OK, "render");
             for (int i = 0; i < 64; i++)
                 for (int a = 0; a < 4; a++) CHECK(test_finite((double)image[i][a]), "case %d, path %d: pixel %d is no number", k, path, i);
-            CHECK(fabs((double)image[27][3] - 1) < 1e-6 && fabs((double)image[27][0] - 1) < 1e-3 && fabs((double)image[27][1] - 0.5) < 1e-2, "case %d, path %d: %g %g, opacity %g", k, path,
-                  (double)image[27][0], (double)image[27][1], (double)image[27][3]);
+            CHECK(fabs((double)image[27][3] - 1) < 1e-6 && fabs((double)image[27][0] - 1) < 1e-3 && fabs((double)image[27][1] - 0.5) < 1e-2,
+                  "case %d, path %d: %g %g, opacity %g", k, path, (double)image[27][0], (double)image[27][1], (double)image[27][3]);
             isogi_dvr_free(dvr);
             isogi_vol_free(f.pyramid), f.pyramid = NULL;
         }
@@ -336,14 +369,17 @@ TEST(light_by_the_gradient_is_post_classified) {
         static float image[2][SIDE * SIDE][4];
         float most = 0;
         for (int n = 0; n < 2; n++) {
-            const isogi_dvr_desc desc = {.pyramid = f.pyramid, .shading = two_sided ? ISOGI_DVR_TWO_SIDED : ISOGI_DVR_LOCAL, .classification = n ? ISOGI_DVR_POST_CLASSIFIED : (isogi_dvr_classification)0,
+            const isogi_dvr_desc desc = {.pyramid = f.pyramid,
+                                         .shading = two_sided ? ISOGI_DVR_TWO_SIDED : ISOGI_DVR_LOCAL,
+                                         .classification = n ? ISOGI_DVR_POST_CLASSIFIED : (isogi_dvr_classification)0,
                                          .material = {{.diffuse = {1, 1, 1}}, {.diffuse = {1, 1, 1}}, {.diffuse = {0.5f, 0.5f, 0.5f}}}};
             isogi_dvr *dvr = dvr_new(&desc, &transfer);
             CHECK(isogi_dvr_render(dvr, &view_49, &lighting, image[n], NULL, NULL) == ISOGI_OK, "render");
             isogi_dvr_free(dvr);
         }
         for (int i = 0; i < SIDE * SIDE; i++) most = fmaxf(most, image[0][i][1]);
-        CHECK(!memcmp(image[0], image[1], sizeof image[0]) && most > 0.1f && most < 10, "two-sided %d: brightest %g", two_sided, (double)most);
+        CHECK(!memcmp(image[0], image[1], sizeof image[0]) && most > 0.1f && most < 10, "two-sided %d: brightest %g", two_sided,
+              (double)most);
     }
     field_free(&f);
 }

@@ -29,7 +29,9 @@ static double length_between(const double place[3], const double dir[3], int axi
 
 static double through_box(const double place[3], const double dir[3]) { return exp(-extinction * length_between(place, dir, 0, 0, edge)); }
 static double through_slab(const double place[3], const double dir[3]) { return exp(-extinction * length_between(place, dir, 2, 20, 28)); }
-static double past_half_space(const double place[3], const double dir[3]) { return exp(-extinction * length_between(place, dir, 2, 0, 20)); }
+static double past_half_space(const double place[3], const double dir[3]) {
+    return exp(-extinction * length_between(place, dir, 2, 0, 20));
+}
 
 static double past_sphere(const double place[3], const double dir[3]) { /* of radius 10 */
     double to[3], along, across, half;
@@ -59,7 +61,9 @@ static void project(transmittance *t, const double place[3], double out[COUNT]) 
 }
 
 static double height(double x, double y, double z) { return (void)x, (void)y, 48 * z; }
-static double distance(double x, double y, double z) { return 48 * sqrt((x - 0.5) * (x - 0.5) + (y - 0.5) * (y - 0.5) + (z - 0.5) * (z - 0.5)); }
+static double distance(double x, double y, double z) {
+    return 48 * sqrt((x - 0.5) * (x - 0.5) + (y - 0.5) * (y - 0.5) + (z - 0.5) * (z - 0.5));
+}
 static double nothing_but_one(double x, double y, double z) { return (void)x, (void)y, (void)z, 1; }
 
 typedef struct closed_scene {
@@ -87,7 +91,8 @@ static const closed_scene closed_scenes[] = {
 };
 
 static isogi_dvr_desc lit_by(const isogi_pyramid *pyramid, int method) {
-    const isogi_dvr_desc desc = {.pyramid = pyramid, .shading = ISOGI_DVR_VISIBILITY, .method = (isogi_dvr_method)method, .order = ORDER, .directions = 256,
+    const isogi_dvr_desc desc = {.pyramid = pyramid, .shading = ISOGI_DVR_VISIBILITY, .method = (isogi_dvr_method)method, .order = ORDER,
+        .directions = 256,
                                  .grid = {5, 5, 5}, .visibility_step = 1, .reduction = 1};
     return desc;
 }
@@ -106,7 +111,9 @@ TEST(every_method_agrees_with_closed_forms_coefficient_by_coefficient) {
     for (size_t s = 0; s < sizeof closed_scenes / sizeof *closed_scenes; s++) {
         const closed_scene *scene = &closed_scenes[s];
         field f = field_of(scene->field, N);
-        const isogi_transfer_point p[] = {{scene->low, {1, 1, 1}, 0}, {scene->low, {1, 1, 1}, (float)scene->extinction}, {scene->high, {1, 1, 1}, (float)scene->extinction},
+        const isogi_transfer_point p[] = {{scene->low, {1, 1, 1}, 0},
+                                          {scene->low, {1, 1, 1}, (float)scene->extinction},
+                                          {scene->high, {1, 1, 1}, (float)scene->extinction},
                                           {scene->high, {1, 1, 1}, 0}};
         const isogi_transfer transfer = {.points = p, .point_count = 4};
         printf("%s %s", s ? ";" : "", scene->name);
@@ -125,7 +132,8 @@ TEST(every_method_agrees_with_closed_forms_coefficient_by_coefficient) {
                 float v[COUNT];
                 project(scene->exact, place, expected);
                 isogi_dvr_sample_visibility(dvr, &places[k], 1, v);
-                CHECK(largest_of(v, expected) < scene->tolerance[method], "%s, %s: error %g at place %zu", scene->name, method_name[method], largest_of(v, expected), k);
+                CHECK(largest_of(v, expected) < scene->tolerance[method], "%s, %s: error %g at place %zu", scene->name, method_name[method],
+                      largest_of(v, expected), k);
                 most = fmax(most, largest_of(v, expected));
             }
             printf(" %.2g", most);
@@ -155,14 +163,17 @@ TEST(volumes_thinner_than_a_block_are_seen_by_every_method) {
             float v[COUNT];
             CHECK(isogi_dvr_step(dvr, 0, NULL) == ISOGI_OK && isogi_dvr_sample_visibility(dvr, &centre, 1, v) == ISOGI_OK, "step");
             for (int i = 0; i < 4000; i++) { /* the mean over a Fibonacci lattice */
-                double z = (i + 0.5) / 2000 - 1, phi = i * 2.399963229728653, r = sqrt(1 - z * z), d[3] = {r * cos(phi), r * sin(phi), z}, leave = 1e9;
+                double z = (i + 0.5) / 2000 - 1, phi = i * 2.399963229728653, r = sqrt(1 - z * z), d[3] = {r * cos(phi), r * sin(phi), z},
+                       leave = 1e9;
                 for (int a = 0; a < 3; a++)
                     if (fabs(d[a]) > 1e-9) leave = fmin(leave, ((d[a] > 0 ? sizes[s][a] - 1 : 0) - place[a]) / d[a]);
                 sum += exp(-0.05 * leave) / 4000;
             }
             expected[0] = sum * sqrt(4 * PI);
-            /* steps of a voxel where the way is a voxel long; the paper's blocks are half a node too wide, with nodes as far apart as the volume is thick */
-            CHECK(fabs((double)v[0] - expected[0]) < (method == ISOGI_DVR_PAPER ? 0.4 : 0.06), "%d x %d x %d, %s: %g, not %g", sizes[s][0], sizes[s][1], sizes[s][2], method_name[method], (double)v[0], expected[0]);
+            /* steps of a voxel where the way is a voxel long; the paper's blocks are half a node too wide, with nodes as far apart as the
+               volume is thick */
+            CHECK(fabs((double)v[0] - expected[0]) < (method == ISOGI_DVR_PAPER ? 0.4 : 0.06), "%d x %d x %d, %s: %g, not %g", sizes[s][0],
+                  sizes[s][1], sizes[s][2], method_name[method], (double)v[0], expected[0]);
             isogi_dvr_free(dvr);
         }
         field_free(&f);
@@ -187,13 +198,19 @@ TEST(voxels_that_are_not_finite_let_light_through_by_every_method) {
                 isogi_dvr_desc desc = lit_by(f.pyramid, method);
                 desc.directions = 32;
                 isogi_dvr *dvr = dvr_new(&desc, &transfer);
-                CHECK(isogi_dvr_step(dvr, 0, NULL) == ISOGI_OK && isogi_dvr_sample_visibility(dvr, &place, 1, broken ? v : whole) == ISOGI_OK, "step");
+                CHECK(isogi_dvr_step(dvr, 0, NULL) == ISOGI_OK &&
+                          isogi_dvr_sample_visibility(dvr, &place, 1, broken ? v : whole) == ISOGI_OK,
+                      "step");
                 float(*image)[4] = picture(dvr, &view, &lighting, NULL, NULL);
                 for (int i = 0; i < 64; i++)
-                    for (int a = 0; a < 4; a++) CHECK(image[i][a] >= 0 && image[i][a] < 10, "%s: pixel %g", method_name[method], (double)image[i][a]);
+                    for (int a = 0; a < 4; a++)
+                        CHECK(image[i][a] >= 0 && image[i][a] < 10, "%s: pixel %g", method_name[method], (double)image[i][a]);
                 for (int c = 0; c < COUNT; c++) CHECK(fabsf(v[c]) < 4 || !broken, "%s: coefficient %g", method_name[method], (double)v[c]);
-                if (broken) CHECK(v[0] > whole[0] - 1e-3f, "%s: %g with holes, %g without", method_name[method], (double)v[0], (double)whole[0]);
-                if (broken && n == 3) CHECK(fabs((double)v[0] - sqrt(4 * PI)) < 2e-3 && image[27][3] <= 0, "%s: %g where nothing is finite", method_name[method], (double)v[0]);
+                if (broken)
+                    CHECK(v[0] > whole[0] - 1e-3f, "%s: %g with holes, %g without", method_name[method], (double)v[0], (double)whole[0]);
+                if (broken && n == 3)
+                    CHECK(fabs((double)v[0] - sqrt(4 * PI)) < 2e-3 && image[27][3] <= 0, "%s: %g where nothing is finite",
+                          method_name[method], (double)v[0]);
                 free(image), isogi_dvr_free(dvr);
             }
     }
@@ -227,16 +244,21 @@ TEST(empty_scenes_cost_no_ray_and_no_sample) {
                 CHECK(isogi_dvr_step(dvr, 1, &remaining) == ISOGI_OK && remaining <= 0, "remaining %g", remaining);
                 CHECK(counted(dvr).rays == 0 && counted(dvr).samples == 0, "%s: %d rays", method_name[method], (int)counted(dvr).rays);
                 float(*image)[4] = picture(dvr, &view, &sky, NULL, &count);
-                CHECK(!count.samples && !count.blocks && !count.cells, "%d samples, %d blocks, %d cells", (int)count.samples, (int)count.blocks, (int)count.cells);
+                CHECK(!count.samples && !count.blocks && !count.cells, "%d samples, %d blocks, %d cells", (int)count.samples,
+                      (int)count.blocks, (int)count.cells);
                 free(image);
                 isogi_dvr_sample_visibility(dvr, &place, 1, v);
-                for (int c = 0; c < COUNT; c++) CHECK(fabs((double)v[c] - (c ? 0 : sqrt(4 * PI))) < 1e-6, "coefficient %d: %g", c, (double)v[c]);
+                for (int c = 0; c < COUNT; c++)
+                    CHECK(fabs((double)v[c] - (c ? 0 : sqrt(4 * PI))) < 1e-6, "coefficient %d: %g", c, (double)v[c]);
                 if (!n) CHECK(isogi_dvr_set_transfer(dvr, &none) == ISOGI_OK, "set_transfer");
             }
             /* what was not computed is not forgotten: a full scene after it is that of a new renderer, and empty again it is clear */
-            CHECK(isogi_dvr_set_transfer(dvr, &full) == ISOGI_OK && isogi_dvr_step(dvr, 0, NULL) == ISOGI_OK && isogi_dvr_step(fresh, 0, NULL) == ISOGI_OK, "step");
+            CHECK(isogi_dvr_set_transfer(dvr, &full) == ISOGI_OK && isogi_dvr_step(dvr, 0, NULL) == ISOGI_OK &&
+                      isogi_dvr_step(fresh, 0, NULL) == ISOGI_OK,
+                  "step");
             isogi_dvr_sample_visibility(dvr, &place, 1, v), isogi_dvr_sample_visibility(fresh, &place, 1, again);
-            CHECK(!memcmp(v, again, sizeof v) && v[0] < 1.5f, "%s: %g after an empty scene, %g without one", method_name[method], (double)v[0], (double)again[0]);
+            CHECK(!memcmp(v, again, sizeof v) && v[0] < 1.5f, "%s: %g after an empty scene, %g without one", method_name[method],
+                  (double)v[0], (double)again[0]);
             CHECK(isogi_dvr_set_transfer(dvr, &empty) == ISOGI_OK && isogi_dvr_step(dvr, 0, NULL) == ISOGI_OK, "step");
             isogi_dvr_sample_visibility(dvr, &place, 1, v);
             CHECK(fabs((double)v[0] - sqrt(4 * PI)) < 1e-6, "%s: %g when empty again", method_name[method], (double)v[0]);
@@ -264,10 +286,13 @@ TEST(moving_any_light_recomputes_nothing) {
         isogi_counters count = counted(dvr);
         isogi_dvr_inspect(dvr, &before), isogi_dvr_sample_visibility(dvr, &place, 1, v[0]);
         for (int n = 0; n < 8; n++) {
-            const isogi_light lights[3] = {{.kind = ISOGI_LIGHT_DIRECTIONAL, .vector = {(float)n - 3, 1, 1}, .rgb = {1, 1, 1}},
-                                           {.kind = ISOGI_LIGHT_POINT, .vector = {60, 10 * (float)n, 20}, .rgb = {99, 99, 99}},
-                                           {.kind = ISOGI_LIGHT_SPHERE, .vector = {20, 60, 10 * (float)n}, .rgb = {99, 99, 99}, .radius = 3}};
-            const isogi_lighting lighting = {.env = {.rgb = sky, .width = 4, .height = 2, .rotation = {0, 0, 1, 1, 0, 0, 0, 1, 0}}, .lights = lights + n % 3, .light_count = n < 6 ? 1 : 2};
+            const isogi_light lights[3] = {
+                {.kind = ISOGI_LIGHT_DIRECTIONAL, .vector = {(float)n - 3, 1, 1}, .rgb = {1, 1, 1}},
+                {.kind = ISOGI_LIGHT_POINT, .vector = {60, 10 * (float)n, 20}, .rgb = {99, 99, 99}},
+                {.kind = ISOGI_LIGHT_SPHERE, .vector = {20, 60, 10 * (float)n}, .rgb = {99, 99, 99}, .radius = 3}};
+            const isogi_lighting lighting = {.env = {.rgb = sky, .width = 4, .height = 2, .rotation = {0, 0, 1, 1, 0, 0, 0, 1, 0}},
+                                             .lights = lights + n % 3,
+                                             .light_count = n < 6 ? 1 : 2};
             float(*image)[4] = picture(dvr, &view, &lighting, NULL, NULL);
             CHECK(image[27][0] < last || image[27][0] > last, "light %d changes the picture: %g", n, (double)image[27][0]);
             last = image[27][0];
@@ -276,8 +301,10 @@ TEST(moving_any_light_recomputes_nothing) {
         }
         isogi_counters again = counted(dvr);
         isogi_dvr_inspect(dvr, &after), isogi_dvr_sample_visibility(dvr, &place, 1, v[1]);
-        CHECK(!memcmp(&count, &again, sizeof count) && !memcmp(v[0], v[1], sizeof v[0]), "%s: %d rays more", method_name[method], (int)(again.rays - count.rays));
-        CHECK(before.blocks_classified == after.blocks_classified && before.blocks_computed == after.blocks_computed, "%s: blocks", method_name[method]);
+        CHECK(!memcmp(&count, &again, sizeof count) && !memcmp(v[0], v[1], sizeof v[0]), "%s: %d rays more", method_name[method],
+              (int)(again.rays - count.rays));
+        CHECK(before.blocks_classified == after.blocks_classified && before.blocks_computed == after.blocks_computed, "%s: blocks",
+              method_name[method]);
         isogi_dvr_free(dvr);
     }
     field_free(&f);
@@ -301,15 +328,17 @@ TEST(an_edit_of_the_transfer_function_recomputes_the_blocks_that_it_changes) {
         p[3].extinction = 0.5f; /* from value 130 on: the last of nine layers of blocks (128 to 144) */
         CHECK(isogi_dvr_set_transfer(dvr, &transfer) == ISOGI_OK && isogi_dvr_step(dvr, 0, NULL) == ISOGI_OK, "edit");
         isogi_dvr_inspect(dvr, &after);
-        CHECK(after.blocks_classified - before.blocks_classified == 9, "%s: %d of 81 blocks classified anew", method_name[method], (int)(after.blocks_classified - before.blocks_classified));
+        CHECK(after.blocks_classified - before.blocks_classified == 9, "%s: %d of 81 blocks classified anew", method_name[method],
+              (int)(after.blocks_classified - before.blocks_classified));
         if (method == ISOGI_DVR_PAPER)
-            CHECK(after.blocks_computed - before.blocks_computed <= 27 && after.blocks_computed > before.blocks_computed, "%d blocks computed anew, three layers hold 27",
-                  (int)(after.blocks_computed - before.blocks_computed));
+            CHECK(after.blocks_computed - before.blocks_computed <= 27 && after.blocks_computed > before.blocks_computed,
+                  "%d blocks computed anew, three layers hold 27", (int)(after.blocks_computed - before.blocks_computed));
         fresh = dvr_new(&desc, &transfer), isogi_dvr_step(fresh, 0, NULL);
         for (int i = 0; i < 9; i++) {
             const float place[3] = {18 * (float)i, 20, 30};
             isogi_dvr_sample_visibility(dvr, &place, 1, v[0]), isogi_dvr_sample_visibility(fresh, &place, 1, v[1]);
-            CHECK(!memcmp(v[0], v[1], sizeof v[0]), "%s at %d: %g, a new renderer %g", method_name[method], i, (double)v[0][0], (double)v[1][0]);
+            CHECK(!memcmp(v[0], v[1], sizeof v[0]), "%s at %d: %g, a new renderer %g", method_name[method], i, (double)v[0][0],
+                  (double)v[1][0]);
         }
         isogi_dvr_free(dvr), isogi_dvr_free(fresh);
     }
@@ -333,17 +362,22 @@ TEST(clip_planes_select_levels_anew_and_let_light_in) {
         CHECK(isogi_dvr_step(dvr, 0, NULL) == ISOGI_OK, "step");
         isogi_dvr_inspect(dvr, &whole), isogi_dvr_sample_visibility(dvr, &place, 1, v[0]);
         size_t before = whole.level_count[0], fine = whole.level_count[5], points = whole.points, budget = (size_t)(65 * 65 * 65 / 6);
-        CHECK(isogi_dvr_set_clip(dvr, plane, 1) == ISOGI_OK && isogi_dvr_step(dvr, 1, &remaining) == ISOGI_OK && remaining > 0, "a clip plane leaves work to do: %g", remaining);
+        CHECK(isogi_dvr_set_clip(dvr, plane, 1) == ISOGI_OK && isogi_dvr_step(dvr, 1, &remaining) == ISOGI_OK && remaining > 0,
+              "a clip plane leaves work to do: %g", remaining);
         CHECK(isogi_dvr_step(dvr, 0, NULL) == ISOGI_OK, "step");
         CHECK(isogi_dvr_set_clip(fresh, plane, 1) == ISOGI_OK && isogi_dvr_step(fresh, 0, NULL) == ISOGI_OK, "step");
-        isogi_dvr_inspect(dvr, &cut), isogi_dvr_sample_visibility(dvr, &place, 1, v[1]), isogi_dvr_sample_visibility(fresh, &place, 1, v[2]);
-        CHECK(!memcmp(v[1], v[2], sizeof(float[4])), "%s: %g, %g when cut from the beginning", method_name[method], (double)v[1][0], (double)v[2][0]);
+        isogi_dvr_inspect(dvr, &cut), isogi_dvr_sample_visibility(dvr, &place, 1, v[1]),
+            isogi_dvr_sample_visibility(fresh, &place, 1, v[2]);
+        CHECK(!memcmp(v[1], v[2], sizeof(float[4])), "%s: %g, %g when cut from the beginning", method_name[method], (double)v[1][0],
+              (double)v[2][0]);
         /* x is coefficient 3: on a face whose outside is clear, that of a half space is sqrt(3 pi) / 2 = 1.5 against +x */
-        CHECK(v[1][0] > v[0][0] + 0.8f && v[1][3] < -0.8f && fabsf(v[0][3]) < 0.4f, "%s: light %g and %g within, %g and %g on the cut", method_name[method], (double)v[0][0], (double)v[0][3],
-              (double)v[1][0], (double)v[1][3]);
+        CHECK(v[1][0] > v[0][0] + 0.8f && v[1][3] < -0.8f && fabsf(v[0][3]) < 0.4f, "%s: light %g and %g within, %g and %g on the cut",
+              method_name[method], (double)v[0][0], (double)v[0][3], (double)v[1][0], (double)v[1][3]);
         if (method != ISOGI_DVR_PAPER) CHECK(!cut.level, "levels by %s", method_name[method]);
-        else CHECK(before == 0 && cut.level_count[0] == 16 && cut.level_count[5] > fine && cut.points <= budget && points <= budget,
-                   "%zu dropped, then %zu; %zu at full resolution, then %zu; %zu points, then %zu", before, cut.level_count[0], fine, cut.level_count[5], points, cut.points);
+        else
+            CHECK(before == 0 && cut.level_count[0] == 16 && cut.level_count[5] > fine && cut.points <= budget && points <= budget,
+                  "%zu dropped, then %zu; %zu at full resolution, then %zu; %zu points, then %zu", before, cut.level_count[0], fine,
+                  cut.level_count[5], points, cut.points);
         isogi_dvr_free(dvr), isogi_dvr_free(fresh);
     }
     field_free(&f);
@@ -351,8 +385,10 @@ TEST(clip_planes_select_levels_anew_and_let_light_in) {
 
 /* ---- data space: visibility cell by cell ---- */
 
-static double through_values(const double place[3], const double dir[3]) { /* f = z: what counts is the height climbed, in or out of 10..30 */
-    double length = length_between(place, dir, 0, 0, edge), end = place[2] + length * dir[2], low = fmin(end, place[2]), high = fmax(end, place[2]);
+static double through_values(const double place[3],
+                             const double dir[3]) { /* f = z: what counts is the height climbed, in or out of 10..30 */
+    double length = length_between(place, dir, 0, 0, edge), end = place[2] + length * dir[2], low = fmin(end, place[2]),
+           high = fmax(end, place[2]);
     return exp(-extinction * fmax(0, fmin(high, 30) - fmax(low, 10)));
 }
 

@@ -1,4 +1,5 @@
-/* Properties of rendering in data space (Kraus 2005): exact per cell, pre-integrated and post-classified; peaks, silhouettes, two-sided light. */
+/* Properties of rendering in data space (Kraus 2005): exact per cell, pre-integrated and post-classified; peaks, silhouettes, two-sided
+   light. */
 #define ISOGI_IMPLEMENTATION
 #include "isogi_dvr.h"
 #include "dvr_fields.h"
@@ -26,9 +27,10 @@ static void reference_values(const isogi_transfer *t, long double x, long double
             if (x < y ? at > x && at <= next : at <= x && at > y && at >= next && at < x) next = at, peak = i;
         }
         for (int i = 0; i < 6; i++) { /* the last one only for the depth of the whole */
-            static const long double place[6] = {0.046910077030668003601L, 0.23076534494715845448L, 0.5L, 0.76923465505284154552L, 0.9530899229693319964L, 1};
-            static const long double weight[5] = {0.11846344252809454376L, 0.23931433524968323402L, 0.28444444444444444444L, 0.23931433524968323402L,
-                                                  0.11846344252809454376L};
+            static const long double place[6] = {0.046910077030668003601L, 0.23076534494715845448L, 0.5L,
+                                                 0.76923465505284154552L,  0.9530899229693319964L,  1};
+            static const long double weight[5] = {0.11846344252809454376L, 0.23931433524968323402L, 0.28444444444444444444L,
+                                                  0.23931433524968323402L, 0.11846344252809454376L};
             long double at = x + place[i] * (next - x), low[4], middle[4], depth;
             reference_transfer(t, x + 1e-9L * (at - x), low), reference_transfer(t, 0.5L * (x + at), middle);
             reference_transfer(t, x + (1 - 1e-9L) * (at - x), v);
@@ -137,8 +139,8 @@ TEST(exact_rays_agree_with_a_long_double_quadrature) {
                 for (int a = 0; a < 4; a++) {
                     double error = errors[a];
                     most = fmax(most, error);
-                    CHECK(error <= tolerance, "field %d extinction %g ray %d channel %d: %.9g, not %.9g", kind, extinctions[e], n, a, (double)p.c[a],
-                          (double)(a < 3 ? expected[a] : 1 - expected[3]));
+                    CHECK(error <= tolerance, "field %d extinction %g ray %d channel %d: %.9g, not %.9g", kind, extinctions[e], n, a,
+                          (double)p.c[a], (double)(a < 3 ? expected[a] : 1 - expected[3]));
                 }
                 long double clear[4];
                 if (expected[3] < 1) reference_ray(&f, &transfer, origin, dir, 600, 1 - 0.5L * (1 - expected[3]), clear, &stop, NULL);
@@ -146,7 +148,8 @@ TEST(exact_rays_agree_with_a_long_double_quadrature) {
                     /* float depth, and one short piece of the reference */
                     double error = fabs((double)p.depth - (double)stop);
                     deepest = fmax(deepest, error), half++;
-                    CHECK(error < 4e-3, "field %d extinction %g ray %d: half depth %.9g, not %.9g", kind, extinctions[e], n, (double)p.depth, (double)stop);
+                    CHECK(error < 4e-3, "field %d extinction %g ray %d: half depth %.9g, not %.9g", kind, extinctions[e], n,
+                          (double)p.depth, (double)stop);
                 } else CHECK(p.depth > 1e30f, "nothing is seen: depth %g", (double)p.depth);
                 isogi_dvr_free(dvr);
                 field_free(&f);
@@ -175,7 +178,8 @@ TEST(thin_and_opaque_media_keep_their_relative_accuracy) {
         }
         CHECK(fabs((double)p.c[3] / opacity - 1) < 3e-7, "extinction %g: opacity %.9g, not %.9g", k, (double)p.c[3], opacity);
         CHECK(fabs((double)p.c[1] / green - 1) < 3e-7, "extinction %g: green %.9g, not %.9g", k, (double)p.c[1], green);
-        CHECK(fabs((double)p.c[0] - (opacity - green)) < 3e-7 * opacity, "extinction %g: red %.9g, not %.9g", k, (double)p.c[0], opacity - green);
+        CHECK(fabs((double)p.c[0] - (opacity - green)) < 3e-7 * opacity, "extinction %g: red %.9g, not %.9g", k, (double)p.c[0],
+              opacity - green);
         CHECK(fabs((double)p.c[2] / opacity - 0.5) < 3e-7, "extinction %g: blue %.9g", k, (double)p.c[2]);
         /* half of the opacity: k s^2 / 2 = -log(1 - opacity / 2) */
         double half = 20 + 8 * sqrt(-2 * log1p(-opacity / 2) / k);
@@ -222,8 +226,10 @@ TEST(long_tables_are_composited_as_their_pieces_are) {
         long double rising[4] = {0, 0, 0, 1}, falling[4] = {0, 0, 0, 1};
         reference_table(&transfer, 0, rising), reference_table(&transfer, 1, falling);
         for (int a = 0; a < 4; a++) {
-            CHECK(fabs((double)up.c[a] - (double)(a < 3 ? rising[a] : 1 - rising[3])) < 2e-7, "%zu points rising %d: %g", count, a, (double)up.c[a]);
-            CHECK(fabs((double)down.c[a] - (double)(a < 3 ? falling[a] : 1 - falling[3])) < 2e-7, "%zu points falling %d: %g", count, a, (double)down.c[a]);
+            CHECK(fabs((double)up.c[a] - (double)(a < 3 ? rising[a] : 1 - rising[3])) < 2e-7, "%zu points rising %d: %g", count, a,
+                  (double)up.c[a]);
+            CHECK(fabs((double)down.c[a] - (double)(a < 3 ? falling[a] : 1 - falling[3])) < 2e-7, "%zu points falling %d: %g", count, a,
+                  (double)down.c[a]);
         }
         isogi_dvr_free(dvr);
     }
@@ -241,7 +247,8 @@ TEST(monotone_pieces_are_found_exactly) {
         for (int i = 0; i < 4; i++) b[i] = n % 3 ? random_range(&r, -1, 1) : (double)((int)(random_bits(&r) % 5) - 2);
         for (int i = 0; i < 4; i++) b[i] *= scale;
         int found = isogi_dvr__extrema(b, u), expected = 0;
-        long double d0 = (long double)b[1] - (long double)b[0], d1 = (long double)b[2] - (long double)b[1], d2 = (long double)b[3] - (long double)b[2];
+        long double d0 = (long double)b[1] - (long double)b[0], d1 = (long double)b[2] - (long double)b[1],
+                    d2 = (long double)b[3] - (long double)b[2];
         long double a = d0 - 2 * d1 + d2, h = d1 - d0, root = h * h - a * d0, at[2];
         if (fabsl(root) < 1e-12L * h * h) continue; /* an inflection with a level tangent: both answers are right */
         if (root > 0) { /* two roots of a u^2 + 2 h u + d0, each by the formula that does not cancel */
@@ -287,12 +294,16 @@ TEST(monotone_pieces_cover_the_ray_without_a_gap) {
             int pieces = 0;
             isogi_dvr__begin_walk(&w, &m);
             while (isogi_dvr__next_monotone(&w, &p)) {
-                CHECK(p.from >= at - 1e-15 * m.length && p.from <= at + 1e-12 * m.length, "piece %d begins at %.17g, not %.17g", pieces, p.from, at);
-                if (pieces) CHECK(!(p.value[0] < value) && !(p.value[0] > value), "piece %d begins with %.17g, not %.17g", pieces, p.value[0], value);
+                CHECK(p.from >= at - 1e-15 * m.length && p.from <= at + 1e-12 * m.length, "piece %d begins at %.17g, not %.17g", pieces,
+                      p.from, at);
+                if (pieces)
+                    CHECK(!(p.value[0] < value) && !(p.value[0] > value), "piece %d begins with %.17g, not %.17g", pieces, p.value[0],
+                          value);
                 for (int i = 0; i < 8; i++) {
                     double u0 = p.u0 + (p.u1 - p.u0) * i / 8, u1 = p.u0 + (p.u1 - p.u0) * (i + 1) / 8;
                     double step = isogi_dvr__bernstein(p.b, u1) - isogi_dvr__bernstein(p.b, u0);
-                    CHECK(step * (p.value[1] - p.value[0]) >= -1e-15, "piece %d goes from %g to %g, and once by %g", pieces, p.value[0], p.value[1], step);
+                    CHECK(step * (p.value[1] - p.value[0]) >= -1e-15, "piece %d goes from %g to %g, and once by %g", pieces, p.value[0],
+                          p.value[1], step);
                 }
                 at = p.to, value = p.value[1], pieces++;
             }
@@ -305,8 +316,8 @@ TEST(monotone_pieces_cover_the_ray_without_a_gap) {
 
 /* ---- invariance (Kraus 2005, 4.1) ---- */
 
-static const isogi_transfer_point hills[] = {
-    {-1, {1, 0.2f, 0.1f}, 0}, {-0.2, {0.3f, 1, 0.1f}, 2}, {0.1, {0.1f, 0.4f, 1}, 0}, {0.4, {0.1f, 0.4f, 1}, 0}, {0.4, {1, 1, 0}, 3}, {1, {1, 0, 1}, 1}};
+static const isogi_transfer_point hills[] = {{-1, {1, 0.2f, 0.1f}, 0},  {-0.2, {0.3f, 1, 0.1f}, 2}, {0.1, {0.1f, 0.4f, 1}, 0},
+                                             {0.4, {0.1f, 0.4f, 1}, 0}, {0.4, {1, 1, 0}, 3},        {1, {1, 0, 1}, 1}};
 static const isogi_peak sheets[] = {{0.3, {1, 1, 1}, 0.4f}, {-0.4, {0, 1, 0}, 0.2f}};
 static const isogi_transfer landscape = {hills, 6, sheets, 2};
 
@@ -321,7 +332,9 @@ TEST(scaling_space_by_a_million_either_way_changes_no_pixel) {
                 isogi_vol_free(f.pyramid);
                 for (int a = 0; a < 3; a++) f.volume.spacing[a] = scales[i];
                 field_build(&f);
-                const isogi_dvr_desc desc = {.pyramid = f.pyramid, .space = ISOGI_DVR_DATA, .classification = (isogi_dvr_classification)classification,
+                const isogi_dvr_desc desc = {.pyramid = f.pyramid,
+                                             .space = ISOGI_DVR_DATA,
+                                             .classification = (isogi_dvr_classification)classification,
                                              .silhouette = (isogi_dvr_silhouette)silhouette};
                 isogi_dvr *dvr = dvr_new(&desc, &landscape);
                 isogi_view view = view_of(&f, scales[i], &r, 24);
@@ -336,7 +349,8 @@ TEST(scaling_space_by_a_million_either_way_changes_no_pixel) {
                 /* the rays' origins and directions are floats: 1e-7 of a gradient of 0.1 per voxel over the distance; silhouettes of
                    surfaces seen edge on multiply it */
                 double most = largest_difference(image[0], image[i], 24 * 24), rms = rms_difference(image[0], image[i], 24 * 24);
-                CHECK(silhouette ? rms < 1e-3 : most < 2e-5, "classification %d scale %g: largest difference %g, RMS %g", classification, scales[i], most, rms);
+                CHECK(silhouette ? rms < 1e-3 : most < 2e-5, "classification %d scale %g: largest difference %g, RMS %g", classification,
+                      scales[i], most, rms);
             }
             for (int i = 0; i < 5; i++) free(image[i]);
         }
@@ -386,9 +400,11 @@ TEST(scaling_each_axis_along_with_the_rays_changes_nothing) {
             CHECK(fabs((double)p.c[a] - got) < 1e-7, "ray %d, channel %d: %.9g, not %.9g", n, a, got, (double)p.c[a]);
         }
         /* the same way, cell by cell */
-        CHECK(m.work.cells == count.cells && m.work.cubics == count.cubics && m.work.blocks == count.blocks && m.work.blocks_skipped == count.blocks_skipped,
-              "ray %d: %d cells, %d cubics, %d blocks, %d skipped, not %d, %d, %d, %d", n, (int)m.work.cells, (int)m.work.cubics, (int)m.work.blocks, (int)m.work.blocks_skipped, (int)count.cells,
-              (int)count.cubics, (int)count.blocks, (int)count.blocks_skipped);
+        CHECK(m.work.cells == count.cells && m.work.cubics == count.cubics && m.work.blocks == count.blocks &&
+                  m.work.blocks_skipped == count.blocks_skipped,
+              "ray %d: %d cells, %d cubics, %d blocks, %d skipped, not %d, %d, %d, %d", n, (int)m.work.cells, (int)m.work.cubics,
+              (int)m.work.blocks, (int)m.work.blocks_skipped, (int)count.cells, (int)count.cubics, (int)count.blocks,
+              (int)count.blocks_skipped);
         passed += count.cells;
         isogi_dvr_free(dvr);
         field_free(&f);
@@ -424,7 +440,8 @@ TEST(constant_data_contributes_nothing_whatever_its_extinction) {
 TEST(n_isosurfaces_converge_to_the_constant_transfer_function) {
     const int counts[] = {16, 64, 256, 1024, 4096};
     field f = field_waves(16, 4);
-    const isogi_transfer_point points[] = {{-1, {0.2f, 0.5f, 1}, 0}, {-1, {0.2f, 0.5f, 1}, 1}, {1, {0.2f, 0.5f, 1}, 1}, {1, {0.2f, 0.5f, 1}, 0}};
+    const isogi_transfer_point points[] = {
+        {-1, {0.2f, 0.5f, 1}, 0}, {-1, {0.2f, 0.5f, 1}, 1}, {1, {0.2f, 0.5f, 1}, 1}, {1, {0.2f, 0.5f, 1}, 0}};
     const isogi_transfer continuous = {.points = points, .point_count = 4};
     const isogi_dvr_desc desc = {.pyramid = f.pyramid, .space = ISOGI_DVR_DATA, .opaque = 1};
     isogi_dvr *dvr = dvr_new(&desc, &continuous);
@@ -434,7 +451,8 @@ TEST(n_isosurfaces_converge_to_the_constant_transfer_function) {
     isogi_peak *peaks = (isogi_peak *)malloc(4096 * sizeof *peaks);
     double error[5];
     for (int n = 0; n < 5; n++) {
-        for (int i = 0; i < counts[n]; i++) peaks[i] = (isogi_peak){-1 + 2 * (i + 0.5) / counts[n], {0.2f, 0.5f, 1}, (float)-expm1(-2.0 / counts[n])};
+        for (int i = 0; i < counts[n]; i++)
+            peaks[i] = (isogi_peak){-1 + 2 * (i + 0.5) / counts[n], {0.2f, 0.5f, 1}, (float)-expm1(-2.0 / counts[n])};
         const isogi_transfer surfaces = {.peaks = peaks, .peak_count = (size_t)counts[n]};
         CHECK(isogi_dvr_set_transfer(dvr, &surfaces) == ISOGI_OK, "%d peaks", counts[n]);
         float(*image)[4] = picture(dvr, &view, NULL, NULL, NULL);
@@ -442,8 +460,8 @@ TEST(n_isosurfaces_converge_to_the_constant_transfer_function) {
         free(image);
         if (n) CHECK(error[n] < error[n - 1] / 3, "RMSE %g with %d, %g with %d", error[n - 1], counts[n - 1], error[n], counts[n]);
     }
-    printf("    RMSE with 16, 64, 256, 1024, 4096 isosurfaces: %.2g %.2g %.2g %.2g %.2g: about N^%.2f\n", error[0], error[1], error[2], error[3], error[4],
-           log(error[4] / error[0]) / log(256));
+    printf("    RMSE with 16, 64, 256, 1024, 4096 isosurfaces: %.2g %.2g %.2g %.2g %.2g: about N^%.2f\n", error[0], error[1], error[2],
+           error[3], error[4], log(error[4] / error[0]) / log(256));
     CHECK(error[4] < 2e-4, "RMSE %g with 4096", error[4]);
     free(peaks), free(expected);
     isogi_dvr_free(dvr);
@@ -502,7 +520,8 @@ static int ends_on_surface(const field *f, const double origin[3], const float d
             p[a] = o[a] + ends[i] * d[a], c[a] = (int)floorl(p[a]);
             c[a] = c[a] < 0 ? 0 : c[a] > f->size[a] - 2 ? f->size[a] - 2 : c[a];
         }
-        if (fabsl(reference_value(f, c, p) - (long double)isovalue) < 1e-13L) return 1; /* a double's rounding of t, times the slope: 1e-14 */
+        if (fabsl(reference_value(f, c, p) - (long double)isovalue) < 1e-13L)
+            return 1; /* a double's rounding of t, times the slope: 1e-14 */
     }
     return 0;
 }
@@ -533,7 +552,8 @@ TEST(crossings_are_those_of_the_exact_intersector) {
                 open++;
                 continue;
             }
-            int count = intersector_crossings(f.pyramid, origin, dir, isovalue, expected), found = walk_crossings(dvr, origin, dir, isovalue, got);
+            int count = intersector_crossings(f.pyramid, origin, dir, isovalue, expected),
+                found = walk_crossings(dvr, origin, dir, isovalue, got);
             total += count;
             CHECK(count == found, "field %d ray %d: %d crossings, not %d", n, i, found, count);
             for (int k = 0; k < count && count == found; k++) {
@@ -544,13 +564,14 @@ TEST(crossings_are_those_of_the_exact_intersector) {
                 worst = fmax(worst, error), odd += error > 1e-11;
             }
             pixel p = cast(dvr, eye, target, NULL);
-            CHECK(fabs((double)p.c[3] - (1 - pow(0.75, count))) < 1e-6, "field %d ray %d: opacity %g of %d crossings", n, i, (double)p.c[3], count);
+            CHECK(fabs((double)p.c[3] - (1 - pow(0.75, count))) < 1e-6, "field %d ray %d: opacity %g of %d crossings", n, i, (double)p.c[3],
+                  count);
         }
         isogi_dvr_free(dvr);
         field_free(&f);
     }
-    printf("    %d crossings along %d rays: the same; largest difference of t %.2g, %d above 1e-11; %d rays end on the surface\n", total, rays - open,
-           worst, odd, open);
+    printf("    %d crossings along %d rays: the same; largest difference of t %.2g, %d above 1e-11; %d rays end on the surface\n", total,
+           rays - open, worst, odd, open);
     CHECK(total > 500 && open < rays / 100, "%d crossings, %d rays left out", total, open);
 }
 
@@ -576,8 +597,8 @@ TEST(crossings_along_lattice_lines_are_exact) {
             }
             clear = pow(0.75, one) * pow(0.5, two);
             pixel p = cast(dvr, eye, target, NULL);
-            CHECK(fabs((double)p.c[3] - (1 - clear)) < 1e-7, "volume %d line %d: opacity %.9g, not %.9g (%d and %d crossings)", n, line, (double)p.c[3],
-                  1 - clear, one, two);
+            CHECK(fabs((double)p.c[3] - (1 - clear)) < 1e-7, "volume %d line %d: opacity %.9g, not %.9g (%d and %d crossings)", n, line,
+                  (double)p.c[3], 1 - clear, one, two);
         }
         isogi_dvr_free(dvr);
         field_free(&f);
@@ -591,7 +612,8 @@ TEST(peaks_and_media_stand_in_exact_order) {
     const isogi_peak peaks[] = {{0.75, {0, 0, 1}, 0.5f}, {0.3, {1, 0, 0}, 0.5f}, {0.75, {1, 1, 1}, 0.25f}};
     const isogi_transfer transfer = {&medium, 1, peaks, 3};
     for (int c = 0; c < 2; c++) {
-        const isogi_dvr_desc desc = {.pyramid = f.pyramid, .space = ISOGI_DVR_DATA, .opaque = 1, .classification = (isogi_dvr_classification)c};
+        const isogi_dvr_desc desc = {
+            .pyramid = f.pyramid, .space = ISOGI_DVR_DATA, .opaque = 1, .classification = (isogi_dvr_classification)c};
         isogi_dvr *dvr = dvr_new(&desc, &transfer);
         const double left[3] = {-2, 2.3, 2.7}, right[3] = {9, 2.3, 2.7};
         pixel up = cast(dvr, left, right, NULL), down = cast(dvr, right, left, NULL);
@@ -601,9 +623,10 @@ TEST(peaks_and_media_stand_in_exact_order) {
         rising[1] = 1 - a + a * 0.5 * (1 - b) + a * 0.5 * b * (0.5 * 0.25 + 0.5 * 0.75 * (1 - e));
         falling[1] = 1 - e + e * (0.5 * 0.25 + 0.375 * (1 - b) + 0.375 * b * 0.5 * (1 - a));
         for (int i = 0; i < 3; i++) {
-            CHECK(fabs((double)up.c[i] - rising[i]) < (c ? 1e-5 : 1e-6), "classification %d rising, channel %d: %.9g, not %.9g", c, i, (double)up.c[i], rising[i]);
-            CHECK(fabs((double)down.c[i] - falling[i]) < (c ? 1e-5 : 1e-6), "classification %d falling, channel %d: %.9g, not %.9g", c, i, (double)down.c[i],
-                  falling[i]);
+            CHECK(fabs((double)up.c[i] - rising[i]) < (c ? 1e-5 : 1e-6), "classification %d rising, channel %d: %.9g, not %.9g", c, i,
+                  (double)up.c[i], rising[i]);
+            CHECK(fabs((double)down.c[i] - falling[i]) < (c ? 1e-5 : 1e-6), "classification %d falling, channel %d: %.9g, not %.9g", c, i,
+                  (double)down.c[i], falling[i]);
         }
         isogi_dvr_free(dvr);
     }
@@ -634,18 +657,20 @@ TEST(classifications_converge_to_the_exact_integral) {
             isogi_dvr_free(dvr);
         }
     for (int c = 1; c < 3; c++)
-        printf("    %s: RMSE %.2g %.2g %.2g %.2g %.2g for steps of 2, 1, 1/2, 1/4, 1/8 voxel\n", c == 1 ? "pre-integrated" : "post-classified", error[c][0],
-               error[c][1], error[c][2], error[c][3], error[c][4]);
+        printf("    %s: RMSE %.2g %.2g %.2g %.2g %.2g for steps of 2, 1, 1/2, 1/4, 1/8 voxel\n",
+               c == 1 ? "pre-integrated" : "post-classified", error[c][0], error[c][1], error[c][2], error[c][3], error[c][4]);
     CHECK(error[0][0] <= 0 && error[0][4] <= 0, "exact rays know no step: %g", error[0][0]);
-    CHECK(error[1][2] < 1.5e-3 && error[2][2] < 1e-2 && error[1][4] < error[1][0] / 15 && error[2][4] < error[2][0] / 8, "pre %g .. %g, post %g .. %g",
-          error[1][0], error[1][4], error[2][0], error[2][4]);
-    for (int s = 0; s < 5; s++) CHECK(error[1][s] < error[2][s], "step %g: pre-integrated %g, post-classified %g", steps[s], error[1][s], error[2][s]);
+    CHECK(error[1][2] < 1.5e-3 && error[2][2] < 1e-2 && error[1][4] < error[1][0] / 15 && error[2][4] < error[2][0] / 8,
+          "pre %g .. %g, post %g .. %g", error[1][0], error[1][4], error[2][0], error[2][4]);
+    for (int s = 0; s < 5; s++)
+        CHECK(error[1][s] < error[2][s], "step %g: pre-integrated %g, post-classified %g", steps[s], error[1][s], error[2][s]);
     free(expected);
     field_free(&f);
 }
 
 /* Local light is looked up once for pieces that together show less than a 256th of a pixel. Against light at every sample of dense
-   post-classified rays: no worse than unlit pictures differ, plus half of 1/255. A fog of little steps is the hard case: all its pieces are weak. */
+   post-classified rays: no worse than unlit pictures differ, plus half of 1/255. A fog of little steps is the hard case: all its pieces
+   are weak. */
 TEST(light_of_weak_pieces_in_common_is_that_of_each) {
     const isogi_light sun = {.kind = ISOGI_LIGHT_DIRECTIONAL, .vector = {1, 2, 3}, .rgb = {3, 2.5f, 2}};
     const isogi_lighting lighting = {.lights = &sun, .light_count = 1};
@@ -659,7 +684,8 @@ TEST(light_of_weak_pieces_in_common_is_that_of_each) {
         for (int lit = 0; lit < 2; lit++) {
             float(*image[2])[4];
             for (int i = 0; i < 2; i++) {
-                const isogi_dvr_desc desc = {.pyramid = f.pyramid, .space = ISOGI_DVR_DATA, .shading = lit ? ISOGI_DVR_LOCAL : ISOGI_DVR_UNLIT, .opaque = 1, .step = 1.0 / 16,
+                const isogi_dvr_desc desc = {.pyramid = f.pyramid, .space = ISOGI_DVR_DATA, .shading = lit ? ISOGI_DVR_LOCAL
+                    : ISOGI_DVR_UNLIT, .opaque = 1, .step = 1.0 / 16,
                                              .classification = i ? ISOGI_DVR_POST_CLASSIFIED : ISOGI_DVR_EXACT};
                 isogi_dvr *dvr = dvr_new(&desc, &transfer);
                 image[i] = picture(dvr, &view, lit ? &lighting : NULL, NULL, NULL);
@@ -685,7 +711,8 @@ TEST(silhouettes_follow_the_angle_between_surface_and_view) {
     for (int n = 0; n < 200; n++) {
         random_direction(&r, tilt);
         if (n % 4 == 0) tilt[0] *= 1e-3; /* nearly edge on */
-        double length = sqrt(tilt[0] * tilt[0] + tilt[1] * tilt[1] + tilt[2] * tilt[2]), aslant = length / fabs(tilt[0]), a0 = random_range(&r, 0.02, 0.9);
+        double length = sqrt(tilt[0] * tilt[0] + tilt[1] * tilt[1] + tilt[2] * tilt[2]), aslant = length / fabs(tilt[0]),
+               a0 = random_range(&r, 0.02, 0.9);
         field f = field_of(tilted, 12);
         double middle = (tilt[1] * 5.2 + tilt[2] * 5.4 + tilt[0] * 5.5) / 11;
         const isogi_peak peak = {middle, {1, 0.5f, 0.25f}, (float)a0};
@@ -694,16 +721,18 @@ TEST(silhouettes_follow_the_angle_between_surface_and_view) {
         for (int kind = 0; kind < 4; kind++)
             for (int space = 0; space < 2; space++)
                 for (int normals = 0; normals < 2; normals++) {
-                    const isogi_dvr_desc desc = {.pyramid = f.pyramid, .space = (isogi_dvr_space)space, .opaque = 1, .silhouette = (isogi_dvr_silhouette)kind,
+                    const isogi_dvr_desc desc = {.pyramid = f.pyramid, .space = (isogi_dvr_space)space, .opaque = 1,
+                        .silhouette = (isogi_dvr_silhouette)kind,
                                                  .normals = (isogi_normal_kind)normals};
                     isogi_dvr *dvr = dvr_new(&desc, &transfer);
                     pixel p = cast(dvr, eye, target, NULL);
                     /* normals are floats */
                     double tolerance = 1e-6 + 4e-6 * aslant * (kind ? 1 - expected[kind] + 1e-3 : 0);
-                    CHECK(fabs((double)p.c[3] - expected[kind]) < tolerance, "kind %d space %d angle 1/%g: opacity %.9g, not %.9g", kind, space, aslant,
-                          (double)p.c[3], expected[kind]);
+                    CHECK(fabs((double)p.c[3] - expected[kind]) < tolerance, "kind %d space %d angle 1/%g: opacity %.9g, not %.9g", kind,
+                          space, aslant, (double)p.c[3], expected[kind]);
                     for (int a = 0; a < 3; a++)
-                        CHECK(fabsf(p.c[a] - p.c[3] * peak.rgb[a]) < 2e-7f, "colour scales with opacity: %g of %g", (double)p.c[a], (double)p.c[3]);
+                        CHECK(fabsf(p.c[a] - p.c[3] * peak.rgb[a]) < 2e-7f, "colour scales with opacity: %g of %g", (double)p.c[a],
+                              (double)p.c[3]);
                     isogi_dvr_free(dvr);
                 }
         /* samples: the whole ray passes a change of value of tilt[0]; silhouettes make it the length of the gradient (eq. 17, 18) */
@@ -712,17 +741,18 @@ TEST(silhouettes_follow_the_angle_between_surface_and_view) {
         double change = (double)0.7f * fabs(tilt[0]), plain = -expm1(-change), whole = -expm1(-change * aslant);
         for (int kind = 0; kind < 4; kind++)
             for (int c = 0; c < 3; c++) {
-                const isogi_dvr_desc desc = {.pyramid = f.pyramid, .space = ISOGI_DVR_DATA, .opaque = 1, .silhouette = (isogi_dvr_silhouette)kind,
+                const isogi_dvr_desc desc = {.pyramid = f.pyramid, .space = ISOGI_DVR_DATA, .opaque = 1,
+                    .silhouette = (isogi_dvr_silhouette)kind,
                                              .classification = (isogi_dvr_classification)c, .table = 16}; /* of a constant */
                 isogi_dvr *dvr = dvr_new(&desc, &everywhere);
                 pixel p = cast(dvr, eye, target, NULL);
                 /* the approximation depends on how the ray is cut: each small opacity times the factor; between the two */
                 if (kind == ISOGI_DVR_SILHOUETTE_APPROXIMATE)
-                    CHECK((double)p.c[3] > plain - 1e-6 && (double)p.c[3] < fmin(1, fmax(whole * 1.3, whole + 0.05)), "classification %d: %g for %g", c,
-                          (double)p.c[3], whole);
+                    CHECK((double)p.c[3] > plain - 1e-6 && (double)p.c[3] < fmin(1, fmax(whole * 1.3, whole + 0.05)),
+                          "classification %d: %g for %g", c, (double)p.c[3], whole);
                 else
-                    CHECK(fabs((double)p.c[3] - (kind ? whole : plain)) < 2e-6 + 2e-4 * (c == 1), "kind %d classification %d: opacity %.9g, not %.9g", kind, c,
-                          (double)p.c[3], kind ? whole : plain);
+                    CHECK(fabs((double)p.c[3] - (kind ? whole : plain)) < 2e-6 + 2e-4 * (c == 1),
+                          "kind %d classification %d: opacity %.9g, not %.9g", kind, c, (double)p.c[3], kind ? whole : plain);
                 isogi_dvr_free(dvr);
             }
         field_free(&f);
@@ -750,7 +780,8 @@ TEST(surfaces_seen_edge_on_have_the_limit) {
 /* ---- light from both sides (Kraus 2005, 5.2) ---- */
 
 /* Eq. 19 as it is printed, for unit vectors and any orientation of n. */
-static void printed_equation(const double l[3], const double v[3], const double n[3], double a, const double cd[3], const isogi_material *m, double out[3]) {
+static void printed_equation(const double l[3], const double v[3], const double n[3], double a, const double cd[3], const isogi_material *m,
+                             double out[3]) {
     double ln = isogi_dvr__dot(l, n), vn = isogi_dvr__dot(v, n), r[3], rv = 0, lv = 0;
     for (int i = 0; i < 3; i++) r[i] = 2 * n[i] * ln - l[i], rv += r[i] * v[i], lv -= l[i] * v[i];
     for (int i = 0; i < 3; i++) {
@@ -762,13 +793,15 @@ static void printed_equation(const double l[3], const double v[3], const double 
 
 TEST(two_sided_light_is_that_of_the_equation) {
     test_random r = {42};
-    const isogi_material front = {{0.9f, 0.8f, 0.7f}, {1, 1, 0.5f}, 20}, back = {{0.2f, 0.8f, 0.3f}, {0.5f, 0.25f, 0}, 5}, through = {{0.5f, 1, 1}, {1, 0.5f, 1}, 8};
+    const isogi_material front = {{0.9f, 0.8f, 0.7f}, {1, 1, 0.5f}, 20}, back = {{0.2f, 0.8f, 0.3f}, {0.5f, 0.25f, 0}, 5},
+                         through = {{0.5f, 1, 1}, {1, 0.5f, 1}, 8};
     for (int n = 0; n < 120; n++) {
         random_direction(&r, tilt);
         field f = field_of(tilted, 12);
         double eye[3], target[3], v[3], normal[3], expected[3] = {0, 0, 0}, a0 = random_range(&r, 0.1, 0.95), middle = 0;
         isogi_light lights[5];
-        for (int a = 0; a < 3; a++) target[a] = random_range(&r, 4, 7), target[a] = (double)(float)target[a], middle += tilt[a] * target[a] / 11;
+        for (int a = 0; a < 3; a++)
+            target[a] = random_range(&r, 4, 7), target[a] = (double)(float)target[a], middle += tilt[a] * target[a] / 11;
         random_direction(&r, v);
         for (int a = 0; a < 3; a++) eye[a] = (double)(float)(target[a] + 40 * v[a]);
         isogi_view view = line_of_sight(eye, target);
@@ -785,7 +818,8 @@ TEST(two_sided_light_is_that_of_the_equation) {
         for (int i = 0; i < 5; i++) {
             double l[3], scale = 1, reach = 0;
             random_direction(&r, l);
-            lights[i] = (isogi_light){.kind = i < 3 ? ISOGI_LIGHT_DIRECTIONAL : ISOGI_LIGHT_POINT, .rgb = {(float)(1 + i), 1, (float)(2 - 0.3 * i)}};
+            lights[i] = (isogi_light){.kind = i < 3 ? ISOGI_LIGHT_DIRECTIONAL : ISOGI_LIGHT_POINT,
+                                      .rgb = {(float)(1 + i), 1, (float)(2 - 0.3 * i)}};
             for (int a = 0; a < 3; a++) lights[i].vector[a] = (float)(i < 3 ? l[a] : target[a] + 9 * l[a]);
             for (int a = 0; a < 3; a++) l[a] = (double)lights[i].vector[a] - (i < 3 ? 0 : target[a]), reach += l[a] * l[a];
             if (i >= 3) scale = 1 / reach;
@@ -797,7 +831,8 @@ TEST(two_sided_light_is_that_of_the_equation) {
         const float sky[3] = {3.5449077f, 3.5449077f, 3.5449077f};
         for (int a = 0; a < 3; a++) expected[a] += (double)(float)a0 * cd[a] * (double)seen[0].diffuse[a];
         const isogi_lighting lighting = {.env = {.sh = sky, .sh_order = 1}, .lights = lights, .light_count = 5};
-        const isogi_dvr_desc desc = {.pyramid = f.pyramid, .space = (isogi_dvr_space)(n / 2 % 2), .shading = ISOGI_DVR_TWO_SIDED, .opaque = 1,
+        const isogi_dvr_desc desc = {.pyramid = f.pyramid, .space = (isogi_dvr_space)(n / 2 % 2), .shading = ISOGI_DVR_TWO_SIDED,
+            .opaque = 1,
                                      .material = {front, back, through}};
         isogi_dvr *dvr = dvr_new(&desc, &transfer);
         pixel p = cast(dvr, eye, target, &lighting);
@@ -817,7 +852,8 @@ TEST(light_that_grazes_neither_returns_nor_passes) {
     const isogi_light light = {.kind = ISOGI_LIGHT_DIRECTIONAL, .vector = {0, 1, 0}, .rgb = {100, 100, 100}};
     const isogi_lighting lighting = {.lights = &light, .light_count = 1};
     const double eye[3] = {-20, 2.5, 2.5}, target[3] = {5, 2.5, 2.5};
-    isogi_dvr_desc desc = {.pyramid = f.pyramid, .space = ISOGI_DVR_DATA, .shading = ISOGI_DVR_TWO_SIDED, .material = {{.exponent = 0}, {.exponent = 0}, {.exponent = 0}}};
+    isogi_dvr_desc desc = {.pyramid = f.pyramid, .space = ISOGI_DVR_DATA, .shading = ISOGI_DVR_TWO_SIDED,
+        .material = {{.exponent = 0}, {.exponent = 0}, {.exponent = 0}}};
     isogi_dvr *dvr = dvr_new(&desc, &surface);
     pixel p = cast(dvr, eye, target, &lighting);
     CHECK(fabsf(p.c[3] - 0.5f) < 1e-7f && p.c[0] < 1e-6f, "H(0) = 0: %g", (double)p.c[0]);
@@ -872,7 +908,8 @@ TEST(a_second_field_colours_peaks) {
     const isogi_peak peak = {0.4, {1, 0.5f, 1}, 0.6f};
     const isogi_transfer transfer = {NULL, 0, &peak, 1};
     for (int c = 0; c < 3; c++) {
-        const isogi_dvr_desc desc = {.pyramid = f.pyramid, .space = ISOGI_DVR_DATA, .classification = (isogi_dvr_classification)c, .second = second.pyramid,
+        const isogi_dvr_desc desc = {.pyramid = f.pyramid, .space = ISOGI_DVR_DATA, .classification = (isogi_dvr_classification)c,
+            .second = second.pyramid,
                                      .second_points = colours, .second_count = 2};
         isogi_dvr *dvr = dvr_new(&desc, &transfer);
         for (int i = 0; i < 8; i++) {
@@ -902,12 +939,14 @@ TEST(cells_that_are_not_finite_break_the_ray) {
                 f.value[5 + 11 * (1 + 4 * 1)] = bad[b]; /* cells x 4..6 of the middle lines */
                 field_build(&f);
                 const isogi_transfer transfer = {&medium, kind ? 0 : 1, &peak, kind ? 1 : 0};
-                const isogi_dvr_desc desc = {.pyramid = f.pyramid, .space = ISOGI_DVR_DATA, .opaque = 1, .classification = (isogi_dvr_classification)c, .step = 0.25};
+                const isogi_dvr_desc desc = {.pyramid = f.pyramid, .space = ISOGI_DVR_DATA, .opaque = 1,
+                    .classification = (isogi_dvr_classification)c, .step = 0.25};
                 isogi_dvr *dvr = dvr_new(&desc, &transfer);
                 const double eye[3] = {-5, 1.5, 1.5}, target[3] = {5, 1.5, 1.5};
                 pixel p = cast(dvr, eye, target, NULL);
                 double expected = kind ? 0 : -expm1(-(double)0.9f * 0.8); /* 0..0.4 and 0.6..1; the peak is in the gap */
-                CHECK(fabs((double)p.c[3] - expected) < (c == 1 ? 0.025 : 1e-6), "value %g classification %d: opacity %g, not %g", bad[b], c, (double)p.c[3], expected);
+                CHECK(fabs((double)p.c[3] - expected) < (c == 1 ? 0.025 : 1e-6), "value %g classification %d: opacity %g, not %g", bad[b],
+                      c, (double)p.c[3], expected);
                 isogi_dvr_free(dvr);
                 field_free(&f);
             }
@@ -927,7 +966,8 @@ TEST(every_allocation_of_a_transfer_function_may_fail) {
     field f = field_waves(8, 2);
     const isogi_context context = {.alloc = failing_alloc, .release = counting_release, .threads = 1};
     for (int c = 0; c < 3; c++) {
-        const isogi_dvr_desc desc = {.pyramid = f.pyramid, .space = ISOGI_DVR_DATA, .classification = (isogi_dvr_classification)c, .table = 16};
+        const isogi_dvr_desc desc = {
+            .pyramid = f.pyramid, .space = ISOGI_DVR_DATA, .classification = (isogi_dvr_classification)c, .table = 16};
         isogi_dvr *dvr = NULL;
         calls_left = 1 << 30, blocks_out = 0;
         CHECK(isogi_dvr_create(&dvr, &desc, &context) == ISOGI_OK && isogi_dvr_set_transfer(dvr, &landscape) == ISOGI_OK, "create");
@@ -980,11 +1020,12 @@ TEST(odd_transfer_functions_are_defined) {
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++)
         for (int c = 0; c < 2; c++) {
             const isogi_transfer transfer = {cases[i].points, cases[i].count, NULL, 0};
-            const isogi_dvr_desc desc = {.pyramid = f.pyramid, .space = ISOGI_DVR_DATA, .opaque = 1, .classification = (isogi_dvr_classification)c, .table = 1024};
+            const isogi_dvr_desc desc = {
+                .pyramid = f.pyramid, .space = ISOGI_DVR_DATA, .opaque = 1, .classification = (isogi_dvr_classification)c, .table = 1024};
             isogi_dvr *dvr = dvr_new(&desc, &transfer);
             pixel p = cast(dvr, eye, target, NULL);
-            CHECK(fabs((double)p.c[3] + expm1(-cases[i].depth)) < (c ? 2e-3 : 2e-7), "case %zu classification %d: opacity %.9g, not %.9g", i, c,
-                  (double)p.c[3], -expm1(-cases[i].depth));
+            CHECK(fabs((double)p.c[3] + expm1(-cases[i].depth)) < (c ? 2e-3 : 2e-7), "case %zu classification %d: opacity %.9g, not %.9g",
+                  i, c, (double)p.c[3], -expm1(-cases[i].depth));
             isogi_dvr_free(dvr);
         }
     field_free(&f);
@@ -1000,7 +1041,8 @@ TEST(extreme_values_give_numbers) {
         isogi_peak peaks[3];
         for (size_t i = 0; i < field_count(&f); i++) f.value[i] = scale * random_range(&r, -1, 1);
         field_build(&f);
-        for (int i = 0; i < 5; i++) points[i] = (isogi_transfer_point){scale * (-1 + 0.5 * i), {1, 0.5f, 0}, i % 2 ? 0 : (float)pow(10, random_range(&r, -38, 38))};
+        for (int i = 0; i < 5; i++)
+            points[i] = (isogi_transfer_point){scale * (-1 + 0.5 * i), {1, 0.5f, 0}, i % 2 ? 0 : (float)pow(10, random_range(&r, -38, 38))};
         for (int i = 0; i < 3; i++) peaks[i] = (isogi_peak){scale * random_range(&r, -1, 1), {0, 1, 1}, (float)random_unit(&r)};
         const isogi_transfer transfer = {points, 5, peaks, 3};
         for (int c = 0; c < 3; c++)
@@ -1011,7 +1053,9 @@ TEST(extreme_values_give_numbers) {
                 double eye[3], target[3];
                 random_line(&f, &r, eye, target);
                 pixel p = cast(dvr, eye, target, NULL);
-                for (int a = 0; a < 4; a++) CHECK(p.c[a] >= 0 && p.c[a] <= 1.00001f, "scale %g classification %d silhouette %d: channel %d %g", scale, c, s, a, (double)p.c[a]);
+                for (int a = 0; a < 4; a++)
+                    CHECK(p.c[a] >= 0 && p.c[a] <= 1.00001f, "scale %g classification %d silhouette %d: channel %d %g", scale, c, s, a,
+                          (double)p.c[a]);
                 CHECK(p.depth > 0, "depth %g", (double)p.depth);
                 isogi_dvr_free(dvr);
             }
@@ -1027,13 +1071,15 @@ TEST(pictures_are_the_same_bits_for_any_number_of_threads) {
         float(*image[2])[4];
         for (int i = 0; i < 2; i++) {
             const isogi_context context = {.threads = i ? 3 : 1};
-            const isogi_dvr_desc desc = {.pyramid = f.pyramid, .space = ISOGI_DVR_DATA, .classification = (isogi_dvr_classification)c, .silhouette = ISOGI_DVR_SILHOUETTE_EXACT};
+            const isogi_dvr_desc desc = {.pyramid = f.pyramid, .space = ISOGI_DVR_DATA, .classification = (isogi_dvr_classification)c,
+                .silhouette = ISOGI_DVR_SILHOUETTE_EXACT};
             isogi_dvr *dvr = NULL;
             CHECK(isogi_dvr_create(&dvr, &desc, &context) == ISOGI_OK && isogi_dvr_set_transfer(dvr, &landscape) == ISOGI_OK, "create");
             image[i] = picture(dvr, &view, NULL, NULL, NULL);
             isogi_dvr_free(dvr);
         }
-        CHECK(!memcmp(image[0], image[1], 1600 * sizeof *image[0]), "classification %d: pixels differ by %g", c, largest_difference(image[0], image[1], 1600));
+        CHECK(!memcmp(image[0], image[1], 1600 * sizeof *image[0]), "classification %d: pixels differ by %g", c,
+              largest_difference(image[0], image[1], 1600));
         free(image[0]), free(image[1]);
     }
     field_free(&f);
@@ -1070,19 +1116,22 @@ typedef struct figure { const char *name, *shape; double isovalue, half; } figur
 /* Figures 1, 8a to 8d: rays that cross the surface exactly twice. With a peak all have one opacity, with a narrow tent in physical space
    opacity follows the gradient. Figures 1d, 5: with silhouettes opacity is never less. */
 TEST(isosurfaces_are_uniform_where_standard_rendering_follows_the_gradient) {
-    const figure figures[] = {{"1b, 1c", "coulomb", 0.72, 0.02}, {"8a, 8b", "marschner-lobb", 0.5, 0.03}, {"8c, 8d", "hydrogen", 0.06, 0.015}};
+    const figure figures[] = {
+        {"1b, 1c", "coulomb", 0.72, 0.02}, {"8a, 8b", "marschner-lobb", 0.5, 0.03}, {"8c, 8d", "hydrogen", 0.06, 0.015}};
     for (int n = 0; n < 3; n++) {
         const procedural_shape *shape = procedural_find(figures[n].shape);
         isogi_volume volume = {.data = NULL};
         isogi_pyramid *pyramid = NULL;
         double sum[2] = {0, 0}, square[2] = {0, 0}, spread[2];
         int count = 0, enhanced = 0;
-        CHECK(procedural_make(shape, 48, &volume, &serial) == ISOGI_OK && isogi_vol_build(&pyramid, &volume, &serial) == ISOGI_OK, "volume");
+        CHECK(procedural_make(shape, 48, &volume, &serial) == ISOGI_OK && isogi_vol_build(&pyramid, &volume, &serial) == ISOGI_OK,
+              "volume");
         double v = figures[n].isovalue, h = figures[n].half;
         const isogi_peak peak = {v, {1, 1, 1}, 0.3f};
         const isogi_transfer_point tent[] = {{v - h, {1, 1, 1}, 0}, {v, {1, 1, 1}, 0.6f}, {v + h, {1, 1, 1}, 0}};
         const isogi_transfer surface = {NULL, 0, &peak, 1}, narrow = {tent, 3, NULL, 0};
-        const isogi_dvr_desc data = {.pyramid = pyramid, .space = ISOGI_DVR_DATA, .opaque = 1}, physical = {.pyramid = pyramid, .step = 0.05, .opaque = 1};
+        const isogi_dvr_desc data = {.pyramid = pyramid, .space = ISOGI_DVR_DATA, .opaque = 1},
+                             physical = {.pyramid = pyramid, .step = 0.05, .opaque = 1};
         isogi_dvr_desc lines = data;
         lines.silhouette = ISOGI_DVR_SILHOUETTE_EXACT;
         isogi_dvr *dvr[3] = {dvr_new(&data, &surface), dvr_new(&physical, &narrow), dvr_new(&lines, &surface)};
@@ -1095,8 +1144,8 @@ TEST(isosurfaces_are_uniform_where_standard_rendering_follows_the_gradient) {
             crossing at[64];
             isogi_view_ray(&view, i % 28, i / 28, origin, dir);
             int crossings = intersector_crossings(pyramid, origin, dir, v, at);
-            CHECK(fabs((double)image[0][i][3] - (1 - pow((double)(1 - 0.3f), crossings))) < 1e-6, "figure %s: %d crossings, opacity %g", figures[n].name, crossings,
-                  (double)image[0][i][3]);
+            CHECK(fabs((double)image[0][i][3] - (1 - pow((double)(1 - 0.3f), crossings))) < 1e-6, "figure %s: %d crossings, opacity %g",
+                  figures[n].name, crossings, (double)image[0][i][3]);
             CHECK(image[2][i][3] > image[0][i][3] - 1e-6f, "silhouettes only add: %g, %g", (double)image[2][i][3], (double)image[0][i][3]);
             enhanced += image[2][i][3] > image[0][i][3] + 0.1f;
             if (crossings != 2) continue;
@@ -1104,10 +1153,10 @@ TEST(isosurfaces_are_uniform_where_standard_rendering_follows_the_gradient) {
             count++;
         }
         for (int k = 0; k < 2; k++) spread[k] = sqrt(fmax(0, square[k] / count - pow(sum[k] / count, 2))) / (sum[k] / count);
-        printf("    figure %s: %d rays with two crossings, spread of opacity %.2g scale-invariant, %.2g standard; %d pixels enhanced\n", figures[n].name, count,
-               spread[0], spread[1], enhanced);
-        CHECK(count > 5 && spread[0] < 1e-6 && spread[1] > 0.15 && enhanced > 10, "figure %s: %d rays, %g, %g, %d", figures[n].name, count, spread[0], spread[1],
-              enhanced);
+        printf("    figure %s: %d rays with two crossings, spread of opacity %.2g scale-invariant, %.2g standard; %d pixels enhanced\n",
+               figures[n].name, count, spread[0], spread[1], enhanced);
+        CHECK(count > 5 && spread[0] < 1e-6 && spread[1] > 0.15 && enhanced > 10, "figure %s: %d rays, %g, %g, %d", figures[n].name, count,
+              spread[0], spread[1], enhanced);
         for (int i = 0; i < 3; i++) free(image[i]), isogi_dvr_free(dvr[i]);
         isogi_vol_free(pyramid), procedural_free(&volume);
     }
@@ -1118,7 +1167,9 @@ TEST(backlight_comes_through_translucent_surfaces) {
     isogi_volume volume = {.data = NULL};
     isogi_pyramid *pyramid = NULL;
     double light[3] = {0, 0, 0};
-    CHECK(procedural_make(procedural_find("coulomb"), 32, &volume, &serial) == ISOGI_OK && isogi_vol_build(&pyramid, &volume, &serial) == ISOGI_OK, "volume");
+    CHECK(procedural_make(procedural_find("coulomb"), 32, &volume, &serial) == ISOGI_OK &&
+              isogi_vol_build(&pyramid, &volume, &serial) == ISOGI_OK,
+          "volume");
     const isogi_peak peaks[] = {{0.72, {.15f, .3f, .9f}, 0.35f}, {1.5, {.9f, .15f, .1f}, 0.7f}};
     const isogi_transfer sheets_of_figure = {NULL, 0, peaks, 2};
     const isogi_light lamp = {.kind = ISOGI_LIGHT_DIRECTIONAL, .vector = {-0.05f, 0, -1}, .rgb = {6, 6, 6}};

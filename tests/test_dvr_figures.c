@@ -11,9 +11,12 @@ typedef struct coulomb { isogi_volume volume; isogi_pyramid *pyramid; isogi_view
 
 static coulomb three_potentials(size_t n) {
     coulomb c = {.volume = {.data = NULL}};
-    CHECK(procedural_make(procedural_find("coulomb"), n, &c.volume, &serial) == ISOGI_OK && isogi_vol_build(&c.pyramid, &c.volume, &serial) == ISOGI_OK, "volume");
+    CHECK(procedural_make(procedural_find("coulomb"), n, &c.volume, &serial) == ISOGI_OK &&
+              isogi_vol_build(&c.pyramid, &c.volume, &serial) == ISOGI_OK,
+          "volume");
     c.view = (isogi_view){.width = SIDE, .height = SIDE, .fov = 40};
-    for (int a = 0; a < 3; a++) c.view.target[a] = 0.5f * (float)(n - 1), c.view.eye[a] = c.view.target[a] + (float)n * (a == 2 ? 1.5f : 0.2f);
+    for (int a = 0; a < 3; a++)
+        c.view.target[a] = 0.5f * (float)(n - 1), c.view.eye[a] = c.view.target[a] + (float)n * (a == 2 ? 1.5f : 0.2f);
     return c;
 }
 
@@ -36,7 +39,8 @@ TEST(figure_2_shading_gives_shape_to_surfaces_of_uniform_opacity) {
         image[lit] = picture(dvr, &c.view, &lighting, NULL, NULL), isogi_dvr_free(dvr);
     }
     for (int i = 0; i < PIXELS; i++) {
-        CHECK(fabsf(image[0][i][3] - image[1][i][3]) < 1e-6f, "pixel %d: opacity %g, with light %g", i, (double)image[0][i][3], (double)image[1][i][3]);
+        CHECK(fabsf(image[0][i][3] - image[1][i][3]) < 1e-6f, "pixel %d: opacity %g, with light %g", i, (double)image[0][i][3],
+              (double)image[1][i][3]);
         if (fabs((double)image[0][i][3] - (1 - 0.65 * 0.65)) > 1e-4) continue; /* through the blue sheet twice and nothing else */
         for (int k = 0; k < 2; k++) sum[k] += (double)image[k][i][2], square[k] += pow((double)image[k][i][2], 2);
         count++;
@@ -70,7 +74,8 @@ TEST(figure_3_sheets_approach_the_constant_transfer_function) {
         error[n] = rms_difference(image, limit, PIXELS), free(image);
     }
     for (int i = 0; i < PIXELS; i++) darkest = fmin(darkest, (double)limit[i][3]), brightest = fmax(brightest, (double)limit[i][3]);
-    printf("    RMSE of 48, 480, 4800 sheets: %.2g %.2g %.2g; opacity of the limit %.2g to %.2g\n", error[0], error[1], error[2], darkest, brightest);
+    printf("    RMSE of 48, 480, 4800 sheets: %.2g %.2g %.2g; opacity of the limit %.2g to %.2g\n", error[0], error[1], error[2], darkest,
+           brightest);
     CHECK(error[1] < 0.2 * error[0] && error[2] < 0.2 * error[1] && error[2] < 4e-3, "%g %g %g", error[0], error[1], error[2]);
     CHECK(brightest > darkest + 0.5, "opacity from %g to %g", darkest, brightest);
     free(peaks), free(limit), isogi_dvr_free(dvr), free_potentials(&c);
@@ -104,7 +109,8 @@ TEST(figure_5_the_approximation_is_too_opaque_near_silhouettes_only) {
 
 /* Cells split into five tetrahedra, parity alternating, so that neighbours share their faces. */
 static isogi_tets *split(const isogi_volume *v, float (*points)[3], float *values, uint32_t (*tets)[4], size_t *count) {
-    static const uint8_t corner[2][5][4] = {{{0, 1, 2, 4}, {3, 1, 2, 7}, {5, 1, 4, 7}, {6, 2, 4, 7}, {1, 2, 4, 7}}, {{1, 0, 3, 5}, {2, 0, 3, 6}, {4, 0, 5, 6}, {7, 3, 5, 6}, {0, 3, 5, 6}}};
+    static const uint8_t corner[2][5][4] = {{{0, 1, 2, 4}, {3, 1, 2, 7}, {5, 1, 4, 7}, {6, 2, 4, 7}, {1, 2, 4, 7}},
+                                            {{1, 0, 3, 5}, {2, 0, 3, 6}, {4, 0, 5, 6}, {7, 3, 5, 6}, {0, 3, 5, 6}}};
     const size_t n = v->size[0];
     isogi_tets *built = NULL;
     *count = 0;
@@ -134,12 +140,15 @@ TEST(figures_8e_8f_surfaces_in_tetrahedra_are_uniform_in_data_space_alone) {
     const isogi_peak peak = {0.72, {1, 1, 1}, 0.3f};
     const isogi_transfer_point tent[] = {{0.7, {1, 1, 1}, 0}, {0.72, {1, 1, 1}, 2}, {0.74, {1, 1, 1}, 0}};
     const isogi_transfer surface = {NULL, 0, &peak, 1}, narrow = {tent, 3, NULL, 0};
-    const isogi_tet_desc data = {.space = ISOGI_DVR_DATA, .opaque = 1}, lines = {.space = ISOGI_DVR_DATA, .silhouette = ISOGI_DVR_SILHOUETTE_EXACT, .opaque = 1}, physical = {.opaque = 1};
+    const isogi_tet_desc data = {.space = ISOGI_DVR_DATA, .opaque = 1},
+                         lines = {.space = ISOGI_DVR_DATA, .silhouette = ISOGI_DVR_SILHOUETTE_EXACT, .opaque = 1}, physical = {.opaque = 1};
     static float image[3][PIXELS][4];
     double sum = 0, square = 0;
     int uniform = 0, hit = 0, enhanced = 0;
-    CHECK(isogi_dvr_tets_render(built, &data, &surface, &c.view, image[0], NULL, NULL) == ISOGI_OK && isogi_dvr_tets_render(built, &physical, &narrow, &c.view, image[1], NULL, NULL) == ISOGI_OK &&
-              isogi_dvr_tets_render(built, &lines, &surface, &c.view, image[2], NULL, NULL) == ISOGI_OK, "render");
+    CHECK(isogi_dvr_tets_render(built, &data, &surface, &c.view, image[0], NULL, NULL) == ISOGI_OK &&
+              isogi_dvr_tets_render(built, &physical, &narrow, &c.view, image[1], NULL, NULL) == ISOGI_OK &&
+              isogi_dvr_tets_render(built, &lines, &surface, &c.view, image[2], NULL, NULL) == ISOGI_OK,
+          "render");
     for (int i = 0; i < PIXELS; i++) {
         double crossings = log1p(-(double)image[0][i][3]) / log1p(-(double)0.3f);
         CHECK(fabs(crossings - floor(crossings + 0.5)) < 1e-4, "pixel %d: %g crossings", i, crossings);
@@ -149,7 +158,8 @@ TEST(figures_8e_8f_surfaces_in_tetrahedra_are_uniform_in_data_space_alone) {
         sum += (double)image[1][i][3], square += pow((double)image[1][i][3], 2), uniform++;
     }
     double spread = sqrt(fmax(0, square / uniform - pow(sum / uniform, 2))) / (sum / uniform);
-    printf("    %zu tetrahedra: %d of %d pixels with two crossings; spread of opacity in physical space %.2g; %d pixels enhanced\n", count, uniform, hit, spread, enhanced);
+    printf("    %zu tetrahedra: %d of %d pixels with two crossings; spread of opacity in physical space %.2g; %d pixels enhanced\n", count,
+           uniform, hit, spread, enhanced);
     CHECK(uniform > 100 && spread > 0.15 && enhanced > 10, "%d pixels, spread %g, %d enhanced", uniform, spread, enhanced);
     isogi_dvr_tets_free(built), free(points), free(values), free(tets), free_potentials(&c);
 }

@@ -12,7 +12,8 @@ static double ball(double x, double y, double z) {
     double inside = 1 - r / 0.1, floor = 0.12 - y;
     return fmax(fmax(inside, 8 * floor), x > 0.8 ? 0.05 : 0);
 }
-static const isogi_transfer_point solid[] = {{0, {1, 1, 1}, 0}, {0.02, {1, 1, 1}, 0}, {0.03, {1, 1, 1}, 0.006f}, {0.1, {1, 1, 1}, 0.006f}, {0.25, {0.8f, 0.5f, 0.3f}, 2}};
+static const isogi_transfer_point solid[] = {
+    {0, {1, 1, 1}, 0}, {0.02, {1, 1, 1}, 0}, {0.03, {1, 1, 1}, 0.006f}, {0.1, {1, 1, 1}, 0.006f}, {0.25, {0.8f, 0.5f, 0.3f}, 2}};
 static const isogi_transfer scenery = {solid, 5, NULL, 0};
 
 static isogi_dvr *stepped(const isogi_dvr_desc *desc, const isogi_transfer *transfer, const isogi_context *context) {
@@ -22,7 +23,8 @@ static isogi_dvr *stepped(const isogi_dvr_desc *desc, const isogi_transfer *tran
 }
 
 static isogi_dvr_desc several(const field *f, size_t grid, int coarsest) {
-    const isogi_dvr_desc desc = {.pyramid = f->pyramid, .shading = ISOGI_DVR_VISIBILITY, .directions = 24, .grid = {grid, grid, grid}, .coarsest = coarsest};
+    const isogi_dvr_desc desc = {
+        .pyramid = f->pyramid, .shading = ISOGI_DVR_VISIBILITY, .directions = 24, .grid = {grid, grid, grid}, .coarsest = coarsest};
     return desc;
 }
 
@@ -62,7 +64,8 @@ TEST(blocks_of_different_steps_meet_without_a_seam) {
 
 static double height(double x, double y, double z) { return (void)x, (void)y, 48 * z; }
 
-/* A slab of 8 voxels whose optical depth across is 0.65, its upper face just below a border of blocks: within it and up to two distances of the grid beside it, coefficient by coefficient. the
+/* A slab of 8 voxels whose optical depth across is 0.65, its upper face just below a border of blocks: within it and up to two distances
+   of the grid beside it, coefficient by coefficient. the
    transmittance of a ray is known, its projection is by quadrature over directions. */
 TEST(a_slab_is_seen_as_its_closed_form_says) {
     enum { PLACES = 40 };
@@ -87,7 +90,8 @@ TEST(a_slab_is_seen_as_its_closed_form_says) {
         double exact[4] = {0, 0, 0, 0};
         enum { RAYS = 4000 };
         for (int k = 0; k < RAYS; k++) {
-            double z = 1 - (2 * k + 1.0) / RAYS, s = sqrt(1 - z * z), phi = 2 * PI * fmod(k * 0.6180339887498949, 1), dir[3] = {s * cos(phi), s * sin(phi), z}, leave = 1e9, t0, t1, clear;
+            double z = 1 - (2 * k + 1.0) / RAYS, s = sqrt(1 - z * z), phi = 2 * PI * fmod(k * 0.6180339887498949, 1),
+                   dir[3] = {s * cos(phi), s * sin(phi), z}, leave = 1e9, t0, t1, clear;
             for (int a = 0; a < 3; a++) leave = fmin(leave, ((dir[a] > 0 ? 48 : 0) - (double)at[i][a]) / dir[a]);
             t0 = fmax(0, fmin((17 - (double)at[i][2]) / dir[2], (23.5 - (double)at[i][2]) / dir[2]));
             t1 = fmin(leave, fmax((17 - (double)at[i][2]) / dir[2], (23.5 - (double)at[i][2]) / dir[2]));
@@ -98,9 +102,11 @@ TEST(a_slab_is_seen_as_its_closed_form_says) {
         for (int n = 0; n < 2; n++)
             for (int c = 0; c < 4; c++) worst[n] = fmax(worst[n], fabs((double)v[n][i][c] - exact[c] * 4 * PI / RAYS));
     }
-    /* 0.149 for both: at its faces a slab is blurred by a node of the lattice, 0.1 of depth along rays that graze it. Nothing is lost by the
+    /* 0.149 for both: at its faces a slab is blurred by a node of the lattice, 0.1 of depth along rays that graze it. Nothing is lost by
+       the
        points that are left out */
-    CHECK(worst[1] < 0.2 && worst[1] < worst[0] + 1e-3 && points[1] < 0.7 * points[0], "worst error %g, of the regular grid %g; %g of %g points", worst[1], worst[0], points[1], points[0]);
+    CHECK(worst[1] < 0.2 && worst[1] < worst[0] + 1e-3 && points[1] < 0.7 * points[0],
+          "worst error %g, of the regular grid %g; %g of %g points", worst[1], worst[0], points[1], points[0]);
     field_free(&f);
 }
 
@@ -113,7 +119,8 @@ static void draw(const isogi_dvr *dvr, const isogi_lighting *lighting, float (*i
     CHECK(isogi_dvr_render(dvr, &slanting, lighting, image, NULL, NULL) == ISOGI_OK, "render");
 }
 
-/* A picture by blocks is that of the regular grid of as many points to an axis, at half the memory, and nearer to a finer grid's than that of
+/* A picture by blocks is that of the regular grid of as many points to an axis, at half the memory, and nearer to a finer grid's than that
+   of
    the regular grid that takes as much memory. */
 TEST(several_resolutions_err_as_the_fine_grid_at_the_memory_of_a_coarse_one) {
     static float image[4][SIDE * SIDE][4];
@@ -128,8 +135,10 @@ TEST(several_resolutions_err_as_the_fine_grid_at_the_memory_of_a_coarse_one) {
         draw(dvr, &outdoors, image[n]), error[n] = rms_difference(image[n], image[0], SIDE * SIDE);
         isogi_dvr_free(dvr);
     }
-    printf("    33^3: %.3g of %.2g MB; in several resolutions %.3g of %.2g MB; 25^3: %.3g of %.2g MB\n", error[1], bytes[1] * 1e-6, error[2], bytes[2] * 1e-6, error[3], bytes[3] * 1e-6);
-    CHECK(bytes[2] < 0.75 * bytes[1] && error[2] < 1.05 * error[1] && error[2] < error[3] && error[3] > 0, "errors %g %g %g", error[1], error[2], error[3]);
+    printf("    33^3: %.3g of %.2g MB; in several resolutions %.3g of %.2g MB; 25^3: %.3g of %.2g MB\n", error[1], bytes[1] * 1e-6,
+           error[2], bytes[2] * 1e-6, error[3], bytes[3] * 1e-6);
+    CHECK(bytes[2] < 0.75 * bytes[1] && error[2] < 1.05 * error[1] && error[2] < error[3] && error[3] > 0, "errors %g %g %g", error[1],
+          error[2], error[3]);
     field_free(&f);
 }
 
@@ -146,18 +155,21 @@ TEST(every_path_reads_the_blocks) {
             isogi_dvr *dvr = stepped(&desc, &scenery, &context);
             draw(dvr, kind ? &near_by : &outdoors, image[path]);
             isogi_dvr_free(dvr);
-            CHECK(largest_difference(image[path], image[1], SIDE * SIDE) < 2e-3, "path %d: differs by %g", path, largest_difference(image[path], image[1], SIDE * SIDE));
+            CHECK(largest_difference(image[path], image[1], SIDE * SIDE) < 2e-3, "path %d: differs by %g", path,
+                  largest_difference(image[path], image[1], SIDE * SIDE));
         }
         isogi_dvr_desc desc = several(&f, 33, 1);
         isogi_dvr *dvr = stepped(&desc, &scenery, &serial);
         draw(dvr, kind ? &near_by : &outdoors, image[0]);
-        CHECK(rms_difference(image[0], image[1], SIDE * SIDE) < 4e-3, "light %d: rms %g from the regular grid", kind, rms_difference(image[0], image[1], SIDE * SIDE));
+        CHECK(rms_difference(image[0], image[1], SIDE * SIDE) < 4e-3, "light %d: rms %g from the regular grid", kind,
+              rms_difference(image[0], image[1], SIDE * SIDE));
         isogi_dvr_free(dvr);
     }
     field_free(&f);
 }
 
-/* Threads, slices, edits and back again: the same bits, as no block that an edit changes is classified with other classes here. Until an edit's last
+/* Threads, slices, edits and back again: the same bits, as no block that an edit changes is classified with other classes here. Until an
+   edit's last
    direction is swept, what is seen is what was. */
 TEST(slices_threads_and_edits_of_several_resolutions_give_the_same_bits) {
     static float v[4][500][9], at[500][3];
@@ -179,20 +191,27 @@ TEST(slices_threads_and_edits_of_several_resolutions_give_the_same_bits) {
     }
     for (int n = 0; n < 2; n++) isogi_dvr_sample_visibility(dvr[n], (const float(*)[3])at, 500, v[n][0]);
     CHECK(!memcmp(v[0], v[1], sizeof v[0]), "threads or slices");
-    CHECK(isogi_dvr_set_transfer(dvr[0], &other) == ISOGI_OK && isogi_dvr_step(dvr[0], 40000, &remaining) == ISOGI_OK && remaining > 0, "edit: %g left", remaining);
+    CHECK(isogi_dvr_set_transfer(dvr[0], &other) == ISOGI_OK && isogi_dvr_step(dvr[0], 40000, &remaining) == ISOGI_OK && remaining > 0,
+          "edit: %g left", remaining);
     isogi_dvr_sample_visibility(dvr[0], (const float(*)[3])at, 500, v[2][0]);
     CHECK(!memcmp(v[0], v[2], sizeof v[0]), "half of an edit shows");
-    CHECK(isogi_dvr_step(dvr[0], 0, NULL) == ISOGI_OK && isogi_dvr_inspect(dvr[0], &report[0]) == ISOGI_OK && isogi_dvr_inspect(dvr[1], &report[1]) == ISOGI_OK, "step");
+    CHECK(isogi_dvr_step(dvr[0], 0, NULL) == ISOGI_OK && isogi_dvr_inspect(dvr[0], &report[0]) == ISOGI_OK &&
+              isogi_dvr_inspect(dvr[1], &report[1]) == ISOGI_OK,
+          "step");
     isogi_dvr_sample_visibility(dvr[0], (const float(*)[3])at, 500, v[2][0]);
     CHECK(memcmp(v[0], v[2], sizeof v[0]) && report[0].grid_points > report[1].grid_points, "the edit changes nothing");
-    CHECK(isogi_dvr_set_transfer(dvr[0], &scenery) == ISOGI_OK && isogi_dvr_step(dvr[0], 0, NULL) == ISOGI_OK && isogi_dvr_inspect(dvr[0], &report[0]) == ISOGI_OK, "back");
+    CHECK(isogi_dvr_set_transfer(dvr[0], &scenery) == ISOGI_OK && isogi_dvr_step(dvr[0], 0, NULL) == ISOGI_OK &&
+              isogi_dvr_inspect(dvr[0], &report[0]) == ISOGI_OK,
+          "back");
     isogi_dvr_sample_visibility(dvr[0], (const float(*)[3])at, 500, v[3][0]);
-    CHECK(report[0].grid_points == report[1].grid_points && !memcmp(v[0], v[3], sizeof v[0]), "an edit and back: %zu points, were %zu", report[0].grid_points, report[1].grid_points);
+    CHECK(report[0].grid_points == report[1].grid_points && !memcmp(v[0], v[3], sizeof v[0]), "an edit and back: %zu points, were %zu",
+          report[0].grid_points, report[1].grid_points);
     isogi_dvr_free(dvr[0]), isogi_dvr_free(dvr[1]);
     field_free(&f);
 }
 
-/* Peaks are for brute force, which holds the regular grid; the blocks come back with the sweeps. A function that is transparent clears what is held. */
+/* Peaks are for brute force, which holds the regular grid; the blocks come back with the sweeps. A function that is transparent clears
+   what is held. */
 TEST(peaks_take_the_regular_grid_and_sweeps_the_blocks_again) {
     field f = field_of(ball, 17);
     const isogi_peak peak = {0.3, {1, 1, 1}, 0.5f};
@@ -208,10 +227,12 @@ TEST(peaks_take_the_regular_grid_and_sweeps_the_blocks_again) {
     desc.coarsest = 1, desc.method = ISOGI_DVR_BRUTE;
     isogi_dvr *brute = stepped(&desc, &peaked, &serial);
     isogi_dvr_sample_visibility(brute, at, 1, v[4]), isogi_dvr_free(brute);
-    CHECK(report[1].grid_points == 9 * 9 * 9 && !memcmp(v[1], v[4], sizeof v[1]), "%zu points, %g by brute force %g", report[1].grid_points, (double)v[1][0], (double)v[4][0]);
+    CHECK(report[1].grid_points == 9 * 9 * 9 && !memcmp(v[1], v[4], sizeof v[1]), "%zu points, %g by brute force %g", report[1].grid_points,
+          (double)v[1][0], (double)v[4][0]);
     CHECK(isogi_dvr_set_transfer(dvr, &scenery) == ISOGI_OK && isogi_dvr_step(dvr, 0, NULL) == ISOGI_OK, "back");
     isogi_dvr_inspect(dvr, &report[2]), isogi_dvr_sample_visibility(dvr, at, 1, v[2]);
-    CHECK(report[2].grid_points == report[0].grid_points && !memcmp(v[0], v[2], sizeof v[0]), "%zu points, were %zu", report[2].grid_points, report[0].grid_points);
+    CHECK(report[2].grid_points == report[0].grid_points && !memcmp(v[0], v[2], sizeof v[0]), "%zu points, were %zu", report[2].grid_points,
+          report[0].grid_points);
     CHECK(isogi_dvr_set_transfer(dvr, &nothing) == ISOGI_OK && isogi_dvr_step(dvr, 0, NULL) == ISOGI_OK, "nothing");
     isogi_dvr_sample_visibility(dvr, at, 1, v[3]);
     CHECK(fabs((double)v[3][0] - 2 * sqrt(PI)) < 1e-6 && fabs((double)v[3][2]) < 1e-6, "%g", (double)v[3][0]);
@@ -267,8 +288,9 @@ TEST(a_step_that_is_no_power_of_two_up_to_8_is_refused) {
         isogi_dvr_desc desc = several(&f, 5, coarsest);
         isogi_dvr *dvr = NULL;
         isogi_result result = isogi_dvr_create(&dvr, &desc, &serial);
-        CHECK((result == ISOGI_OK) == (coarsest == 0 || coarsest == 1 || coarsest == 2 || coarsest == 4 || coarsest == 8) && (result == ISOGI_OK) == (dvr != NULL), "%d: %s", coarsest,
-              isogi_result_string(result));
+        CHECK((result == ISOGI_OK) == (coarsest == 0 || coarsest == 1 || coarsest == 2 || coarsest == 4 || coarsest == 8) &&
+                  (result == ISOGI_OK) == (dvr != NULL),
+              "%d: %s", coarsest, isogi_result_string(result));
         isogi_dvr_free(dvr);
     }
     field_free(&f);

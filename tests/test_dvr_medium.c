@@ -10,7 +10,8 @@ static double even(double x, double y, double z) { return (void)x, (void)y, (voi
 static double along_x(double x, double y, double z) { return (void)y, (void)z, 48 * x; }
 
 /* One pixel without depth: physical space is pre-integrated then. */
-static void colour_of(const isogi_dvr *dvr, const double eye[3], const double target[3], const isogi_lighting *lighting, float out[4], isogi_counters *count) {
+static void colour_of(const isogi_dvr *dvr, const double eye[3], const double target[3], const isogi_lighting *lighting, float out[4],
+                      isogi_counters *count) {
     const isogi_view view = line_of_sight(eye, target);
     isogi_result result = isogi_dvr_render(dvr, &view, lighting, (float(*)[4])out, NULL, count);
     CHECK(result == ISOGI_OK, "render: %s", isogi_result_string(result));
@@ -43,15 +44,19 @@ TEST(homogeneous_media_follow_beer_and_lambert_without_depth_too) {
             for (int lit = 0; lit < 2; lit++) {
                 const isogi_transfer_point point = {0, {0.2f, 0.5f, 1}, (float)extinctions[e]};
                 const isogi_transfer transfer = {&point, 1, NULL, 0};
-                const isogi_dvr_desc desc = {.pyramid = f.pyramid, .step = steps[s], .shading = lit ? ISOGI_DVR_VISIBILITY : ISOGI_DVR_UNLIT, .grid = {2, 2, 2}};
+                const isogi_dvr_desc desc = {
+                    .pyramid = f.pyramid, .step = steps[s], .shading = lit ? ISOGI_DVR_VISIBILITY : ISOGI_DVR_UNLIT, .grid = {2, 2, 2}};
                 isogi_dvr *dvr = dvr_new(&desc, &transfer);
                 double expected = -expm1(-length * (double)point.extinction);
                 float c[4];
                 colour_of(dvr, eye, target, &sky, c, NULL);
                 /* floats, and rays end at 0.999; a thin medium keeps its relative accuracy but for 1 - T in float */
-                CHECK(fabs((double)c[3] - expected) < 2e-6 + (expected > 0.99 ? 1e-3 : 0), "step %g extinction %g: %g, not %g", steps[s], extinctions[e], (double)c[3], expected);
+                CHECK(fabs((double)c[3] - expected) < 2e-6 + (expected > 0.99 ? 1e-3 : 0), "step %g extinction %g: %g, not %g", steps[s],
+                      extinctions[e], (double)c[3], expected);
                 for (int a = 0; a < 3; a++) /* no shadows yet: under a sky of 1 lit looks as unlit */
-                    CHECK(fabs((double)(c[a] - c[3] * point.rgb[a])) < 1e-6 + 1e-4 * expected, "step %g extinction %g lit %d channel %d: %g of %g", steps[s], extinctions[e], lit, a, (double)c[a], (double)c[3]);
+                    CHECK(fabs((double)(c[a] - c[3] * point.rgb[a])) < 1e-6 + 1e-4 * expected,
+                          "step %g extinction %g lit %d channel %d: %g of %g", steps[s], extinctions[e], lit, a, (double)c[a],
+                          (double)c[3]);
                 isogi_dvr_free(dvr);
             }
     field_free(&f);
@@ -76,8 +81,10 @@ TEST(odd_transfer_functions_are_integrated_as_they_say) {
         const isogi_transfer transfer = {cases[n], counts[n], NULL, 0};
         long double expected[4];
         for (int way = 0; way < 4; way++) { /* pre-integrated, post-classified; data space exactly, pre-integrated */
-            const isogi_dvr_desc desc = {.pyramid = f.pyramid, .space = way < 2 ? ISOGI_DVR_PHYSICAL : ISOGI_DVR_DATA, .opaque = way ? 1 : 0, .step = way == 1 ? 0.05 : 0,
-                                         .classification = way == 1 ? ISOGI_DVR_POST_CLASSIFIED : way == 3 ? ISOGI_DVR_PRE_INTEGRATED : ISOGI_DVR_EXACT};
+            const isogi_dvr_desc desc = {.pyramid = f.pyramid, .space = way < 2 ? ISOGI_DVR_PHYSICAL : ISOGI_DVR_DATA, .opaque = way ? 1
+                : 0, .step = way == 1 ? 0.05 : 0,
+                                         .classification = way == 1 ? ISOGI_DVR_POST_CLASSIFIED : way == 3 ? ISOGI_DVR_PRE_INTEGRATED
+                                         : ISOGI_DVR_EXACT};
             /* a thousand classes of value; steps of a 20th of a voxel at jumps; exact; 256 entries a side, blurred over two of them */
             const double tolerance[4] = {0.004, 0.01, 1e-5, 0.05};
             isogi_dvr *dvr = dvr_new(&desc, &transfer);
@@ -85,7 +92,8 @@ TEST(odd_transfer_functions_are_integrated_as_they_say) {
             if (way % 2 == 0) along_values(&transfer, 0, 48, way < 2 ? per : 1, expected);
             colour_of(dvr, eye, target, NULL, c, NULL);
             for (int a = 0; a < 4; a++)
-                CHECK(fabs((double)c[a] - (double)expected[a]) < tolerance[way], "case %zu way %d channel %d: %.6g, not %.6g", n, way, a, (double)c[a], (double)expected[a]);
+                CHECK(fabs((double)c[a] - (double)expected[a]) < tolerance[way], "case %zu way %d channel %d: %.6g, not %.6g", n, way, a,
+                      (double)c[a], (double)expected[a]);
             isogi_dvr_free(dvr);
         }
     }
@@ -94,7 +102,8 @@ TEST(odd_transfer_functions_are_integrated_as_they_say) {
 
 TEST(opaque_matter_hides_what_is_behind_it) {
     field f = field_of(along_x, 49);
-    const isogi_transfer_point p[] = {{16, {1, 1, 1}, 0}, {16, {0.9f, 0.2f, 0.1f}, 1e6f}, {17, {0.9f, 0.2f, 0.1f}, 1e6f}, {17, {0.1f, 0.2f, 0.9f}, 1e6f}};
+    const isogi_transfer_point p[] = {
+        {16, {1, 1, 1}, 0}, {16, {0.9f, 0.2f, 0.1f}, 1e6f}, {17, {0.9f, 0.2f, 0.1f}, 1e6f}, {17, {0.1f, 0.2f, 0.9f}, 1e6f}};
     const isogi_transfer transfer = {p, 4, NULL, 0};
     for (int space = 0; space < 2; space++)
         for (int back = 0; back < 2; back++) {
@@ -105,10 +114,11 @@ TEST(opaque_matter_hides_what_is_behind_it) {
             float c[4];
             colour_of(dvr, ends[back], ends[!back], NULL, c, NULL);
             for (int a = 0; a < 3; a++)
-                CHECK(fabsf(c[a] - p[back ? 3 : 1].rgb[a]) < 2e-3f && fabsf(seen.c[a] - p[back ? 3 : 1].rgb[a]) < 2e-3f, "space %d side %d channel %d: %g, with depth %g", space, back, a,
-                      (double)c[a], (double)seen.c[a]);
+                CHECK(fabsf(c[a] - p[back ? 3 : 1].rgb[a]) < 2e-3f && fabsf(seen.c[a] - p[back ? 3 : 1].rgb[a]) < 2e-3f,
+                      "space %d side %d channel %d: %g, with depth %g", space, back, a, (double)c[a], (double)seen.c[a]);
             double surface = back ? 70 - 48 : 16 + 20; /* along x; the line leans by a tenth of a percent */
-            CHECK(fabs((double)seen.depth - surface) < (space ? 0.03 : 0.3), "space %d side %d: depth %g, not %g", space, back, (double)seen.depth, surface);
+            CHECK(fabs((double)seen.depth - surface) < (space ? 0.03 : 0.3), "space %d side %d: depth %g, not %g", space, back,
+                  (double)seen.depth, surface);
             isogi_dvr_free(dvr);
         }
     field_free(&f);
@@ -149,7 +159,8 @@ TEST(scattering_follows_henyey_and_greenstein) {
     const double g[] = {0, 0.3, 0.7, -0.5, 0.99}, eye[3] = {-30, 3, 5}, target[3] = {5, 7, 6};
     test_random r = {3};
     for (int n = 0; n < 5; n++) {
-        const isogi_dvr_desc desc = {.pyramid = f.pyramid, .shading = ISOGI_DVR_VISIBILITY, .anisotropy = g[n], .order = L, .grid = {2, 2, 2}};
+        const isogi_dvr_desc desc = {
+            .pyramid = f.pyramid, .shading = ISOGI_DVR_VISIBILITY, .anisotropy = g[n], .order = L, .grid = {2, 2, 2}};
         isogi_dvr *dvr = dvr_new(&desc, &transfer);
         double view[3], length = 0;
         float c[4];
@@ -161,7 +172,8 @@ TEST(scattering_follows_henyey_and_greenstein) {
             random_direction(&r, to);
             const isogi_light sun = {.vector = {(float)to[0], (float)to[1], (float)to[2]}, .rgb = {2, 2, 2}};
             const isogi_lighting lighting = {.lights = &sun, .light_count = 1};
-            for (int a = 0; a < 3; a++) cosine += to[a] * view[a] / sqrt(length); /* light that comes from where the ray goes goes straight on */
+            for (int a = 0; a < 3; a++)
+                cosine += to[a] * view[a] / sqrt(length); /* light that comes from where the ray goes goes straight on */
             p1 = cosine;
             for (int l = 0; l < L; l++) {
                 double p2 = ((2 * l + 3) * cosine * p1 - (l + 1) * p0) / (l + 2);
@@ -169,7 +181,8 @@ TEST(scattering_follows_henyey_and_greenstein) {
             }
             colour_of(dvr, eye, target, &lighting, c, NULL);
             double expected = fmax(0, 2 / (4 * PI) * series); /* what rings below zero is cut */
-            CHECK(fabs((double)(c[0] / c[3]) - expected) < 2e-4 * (1 + expected), "g %g cosine %g: %g, not %g", g[n], cosine, (double)(c[0] / c[3]), expected);
+            CHECK(fabs((double)(c[0] / c[3]) - expected) < 2e-4 * (1 + expected), "g %g cosine %g: %g, not %g", g[n], cosine,
+                  (double)(c[0] / c[3]), expected);
         }
         isogi_dvr_free(dvr);
     }
@@ -199,8 +212,10 @@ TEST(depth_is_that_of_first_or_of_half_opacity_as_asked) {
                 double whole = 24 * (space ? 1 : per) * k, half = peaks ? 30 : 16 + 24 * -log1p(0.5 * expm1(-whole)) / whole;
                 CHECK(!memcmp(c[0], c[1], sizeof c[0]), "the picture does not depend on what depth means");
                 /* steps of a quarter: half of one */
-                CHECK(fabs((double)depth[1] - (20 + (peaks ? 30 : 16)) * per) < 0.15, "space %d extinction %g peaks %d: first %g, not %g", space, k, peaks, (double)depth[1], (20 + (peaks ? 30 : 16)) * per);
-                CHECK(fabs((double)depth[0] - (20 + half) * per) < 0.15, "space %d extinction %g peaks %d: half %g, not %g", space, k, peaks, (double)depth[0], (20 + half) * per);
+                CHECK(fabs((double)depth[1] - (20 + (peaks ? 30 : 16)) * per) < 0.15, "space %d extinction %g peaks %d: first %g, not %g",
+                      space, k, peaks, (double)depth[1], (20 + (peaks ? 30 : 16)) * per);
+                CHECK(fabs((double)depth[0] - (20 + half) * per) < 0.15, "space %d extinction %g peaks %d: half %g, not %g", space, k,
+                      peaks, (double)depth[0], (20 + half) * per);
                 view.depth = (isogi_depth_kind)2;
                 CHECK(isogi_dvr_render(dvr, &view, NULL, &c[0], NULL, NULL) == ISOGI_INVALID, "a kind of depth that does not exist");
                 isogi_dvr_free(dvr);
@@ -234,13 +249,15 @@ TEST(depth_through_tetrahedra_is_as_on_the_lattice) {
 
 TEST(jitter_is_off_by_default_repeats_itself_and_is_right_on_average) {
     field f = field_waves(24, 6);
-    const isogi_transfer_point p[] = {{-1, {1, 0.2f, 0.1f}, 0}, {0.2, {0.3f, 1, 0.1f}, 0.3f}, {0.3, {0.3f, 1, 0.1f}, 0}, {1, {0, 0, 1}, 0.2f}};
+    const isogi_transfer_point p[] = {
+        {-1, {1, 0.2f, 0.1f}, 0}, {0.2, {0.3f, 1, 0.1f}, 0.3f}, {0.3, {0.3f, 1, 0.1f}, 0}, {1, {0, 0, 1}, 0.2f}};
     const isogi_transfer transfer = {p, 4, NULL, 0};
     const isogi_context two = {.threads = 2};
     test_random r = {7};
     isogi_view view = view_of(&f, 1, &r, 24);
     for (int space = 0; space < 2; space++) {
-        isogi_dvr_desc desc = {.pyramid = f.pyramid, .space = (isogi_dvr_space)space, .classification = ISOGI_DVR_POST_CLASSIFIED, .step = 0.02, .opaque = 1};
+        isogi_dvr_desc desc = {
+            .pyramid = f.pyramid, .space = (isogi_dvr_space)space, .classification = ISOGI_DVR_POST_CLASSIFIED, .step = 0.02, .opaque = 1};
         isogi_dvr *dvr = dvr_new(&desc, &transfer);
         float(*fine)[4] = picture(dvr, &view, NULL, NULL, NULL), (*plain)[4], mean[576][4] = {{0}};
         isogi_dvr_free(dvr);
@@ -261,7 +278,8 @@ TEST(jitter_is_off_by_default_repeats_itself_and_is_right_on_average) {
         }
         /* of many shifts the mean is that of steps as many times as fine, but for chance and what products of opacities lose */
         double error[2] = {rms_difference(plain, fine, 576), rms_difference(mean, fine, 576)};
-        CHECK(error[1] < (LONG_SUITE ? 0.35 : 0.5) * error[0] && error[0] > 0.002, "space %d: RMSE %g of the mean, %g without jitter", space, error[1], error[0]);
+        CHECK(error[1] < (LONG_SUITE ? 0.35 : 0.5) * error[0] && error[0] > 0.002, "space %d: RMSE %g of the mean, %g without jitter",
+              space, error[1], error[0]);
         free(fine), free(plain);
     }
     field_free(&f);
@@ -273,12 +291,15 @@ TEST(jitter_changes_no_homogeneous_medium_and_no_exact_ray) {
     const isogi_transfer transfer = {&point, 1, NULL, 0};
     const double eye[3] = {-30, 3, 5}, target[3] = {50, 12, 9}, length = 19 * sqrt(80 * 80 + 9 * 9 + 4 * 4) / 80;
     for (uint32_t seed = 1; seed < 50; seed++) {
-        isogi_dvr_desc desc = {.pyramid = f.pyramid, .jitter = seed, .step = 0.1 * seed, .shading = seed % 2 ? ISOGI_DVR_UNLIT : ISOGI_DVR_VISIBILITY, .grid = {2, 2, 2}};
+        isogi_dvr_desc desc = {.pyramid = f.pyramid, .jitter = seed, .step = 0.1 * seed, .shading = seed % 2 ? ISOGI_DVR_UNLIT
+            : ISOGI_DVR_VISIBILITY, .grid = {2, 2, 2}};
         isogi_dvr *dvr = dvr_new(&desc, &transfer);
         pixel c = cast(dvr, eye, target, &sky);
-        CHECK(fabs((double)c.c[3] - -expm1(-0.1 * length)) < 1e-6, "seed %u: %g, not %g", (unsigned)seed, (double)c.c[3], -expm1(-0.1 * length));
+        CHECK(fabs((double)c.c[3] - -expm1(-0.1 * length)) < 1e-6, "seed %u: %g, not %g", (unsigned)seed, (double)c.c[3],
+              -expm1(-0.1 * length));
         isogi_dvr_free(dvr);
-        const isogi_dvr_desc exact = {.pyramid = waves.pyramid, .space = ISOGI_DVR_DATA, .jitter = seed}, without = {.pyramid = waves.pyramid, .space = ISOGI_DVR_DATA};
+        const isogi_dvr_desc exact = {.pyramid = waves.pyramid, .space = ISOGI_DVR_DATA, .jitter = seed},
+                             without = {.pyramid = waves.pyramid, .space = ISOGI_DVR_DATA};
         isogi_dvr *a = dvr_new(&exact, &transfer), *b = dvr_new(&without, &transfer);
         pixel x = cast(a, eye, target, NULL), y = cast(b, eye, target, NULL);
         CHECK(!memcmp(x.c, y.c, sizeof x.c), "exact rays have no samples to move: %g, %g", (double)x.c[3], (double)y.c[3]);
@@ -293,7 +314,8 @@ static double waves_and_steps(double x, double y, double z) { return x < 0.3 ? 1
 
 TEST(blocks_of_one_classification_take_one_sample) {
     field f = field_of(even, 65), g = field_of(waves_and_steps, 65), broken = field_of(even, 65);
-    const isogi_transfer_point point = {0, {0.2f, 0.5f, 1}, 0.01f}, p[] = {{1.5, {1, 0, 0}, 0.01f}, {1.6, {0, 1, 0}, 0.05f}, {4, {0, 0, 1}, 0.02f}};
+    const isogi_transfer_point point = {0, {0.2f, 0.5f, 1}, 0.01f},
+                               p[] = {{1.5, {1, 0, 0}, 0.01f}, {1.6, {0, 1, 0}, 0.05f}, {4, {0, 0, 1}, 0.02f}};
     const isogi_transfer one = {&point, 1, NULL, 0}, three = {p, 3, NULL, 0};
     const double eye[3] = {-30, 3, 5}, target[3] = {90, 42, 30}, length = 64 * sqrt(120 * 120 + 39 * 39 + 25 * 25) / 120;
     isogi_dvr_desc desc = {.pyramid = f.pyramid, .classification = ISOGI_DVR_POST_CLASSIFIED, .step = 0.5};
@@ -301,7 +323,8 @@ TEST(blocks_of_one_classification_take_one_sample) {
     isogi_counters count = {0};
     float c[4];
     colour_of(dvr, eye, target, NULL, c, &count);
-    CHECK(fabs((double)c[3] - -expm1(-0.01 * length)) < 1e-6 && count.samples <= 2, "opacity %g, not %g; %d samples of 139", (double)c[3], -expm1(-0.01 * length), (int)count.samples);
+    CHECK(fabs((double)c[3] - -expm1(-0.01 * length)) < 1e-6 && count.samples <= 2, "opacity %g, not %g; %d samples of 139", (double)c[3],
+          -expm1(-0.01 * length), (int)count.samples);
     isogi_dvr_free(dvr);
     /* a voxel that is not finite: nothing is passed unseen */
     *(broken.value + 32 + 65 * (20 + 65 * 20)) = (double)NAN, isogi_vol_free(broken.pyramid), field_build(&broken);
@@ -314,14 +337,17 @@ TEST(blocks_of_one_classification_take_one_sample) {
     uint64_t samples[2];
     float(*image[2])[4], depth[2][400];
     for (int lit = 0; lit < 2; lit++) {
-        desc.pyramid = g.pyramid, desc.shading = lit ? ISOGI_DVR_VISIBILITY : ISOGI_DVR_UNLIT, desc.grid[0] = desc.grid[1] = desc.grid[2] = 2;
+        desc.pyramid = g.pyramid, desc.shading = lit ? ISOGI_DVR_VISIBILITY : ISOGI_DVR_UNLIT,
+        desc.grid[0] = desc.grid[1] = desc.grid[2] = 2;
         dvr = dvr_new(&desc, &three), memset(&count, 0, sizeof count);
         image[lit] = picture(dvr, &view, &sky, depth[lit], &count), samples[lit] = count.samples;
         isogi_dvr_free(dvr);
     }
     CHECK(samples[0] < 0.85 * (double)samples[1], "%d samples, %d with light", (int)samples[0], (int)samples[1]);
     CHECK(largest_difference(image[0], image[1], 400) < 2e-5, "the pictures differ by %g", largest_difference(image[0], image[1], 400));
-    for (int i = 0; i < 400; i++) CHECK(fabsf(depth[0][i] - depth[1][i]) < 1e-3f || depth[0][i] > 1e30f, "pixel %d: depth %g, %g", i, (double)depth[0][i], (double)depth[1][i]);
+    for (int i = 0; i < 400; i++)
+        CHECK(fabsf(depth[0][i] - depth[1][i]) < 1e-3f || depth[0][i] > 1e30f, "pixel %d: depth %g, %g", i, (double)depth[0][i],
+              (double)depth[1][i]);
     free(image[0]), free(image[1]);
     field_free(&f), field_free(&g), field_free(&broken);
 }

@@ -20,7 +20,8 @@ TEST(spherical_harmonics_are_orthonormal_on_divided_solids) {
         printf("    %s:", sphere_name[spheres[s]]);
         for (int parts = 1; parts <= 10; parts = parts < 4 ? parts + 1 : parts + 3) {
             const int n = faces[spheres[s]] * parts * parts;
-            const isogi_dvr_desc desc = {.pyramid = f.pyramid, .shading = ISOGI_DVR_VISIBILITY, .order = 4, .directions = n, .sphere = spheres[s], .grid = {1, 1, 1}};
+            const isogi_dvr_desc desc = {.pyramid = f.pyramid, .shading = ISOGI_DVR_VISIBILITY, .order = 4, .directions = n,
+                .sphere = spheres[s], .grid = {1, 1, 1}};
             isogi_dvr *dvr = NULL;
             double sum[16][16] = {{0}}, worst = 0, area = 0;
             CHECK(isogi_dvr_create(&dvr, &desc, &serial) == ISOGI_OK && dvr->desc.directions == n, "create");
@@ -55,12 +56,14 @@ TEST(slabs_are_seen_by_every_set_of_directions) {
     const float place[] = {24, 24, 6};
     for (int opaque = 0; opaque < 2; opaque++) {
         const double low = 20 / 48.0, high = 28 / 48.0, depth = opaque ? 1e6 : 0.8;
-        const isogi_transfer_point p[] = {{low, {1, 1, 1}, 0}, {low, {1, 1, 1}, (float)(depth / 8)}, {high, {1, 1, 1}, (float)(depth / 8)}, {high, {1, 1, 1}, 0}};
+        const isogi_transfer_point p[] = {
+            {low, {1, 1, 1}, 0}, {low, {1, 1, 1}, (float)(depth / 8)}, {high, {1, 1, 1}, (float)(depth / 8)}, {high, {1, 1, 1}, 0}};
         const isogi_transfer transfer = {p, 4, NULL, 0};
         double expected[4] = {0};
         for (int i = 0; i < 200; i++)
             for (int j = 0; j < 400; j++) {
-                double z = (i + 0.5) / 100 - 1, phi = (j + 0.5) * 2 * PI / 400, r = sqrt(1 - z * z), t0 = 14 / z, t1 = 22 / z, side, clear = 1, d[3] = {r * cos(phi), r * sin(phi), z}, y[4];
+                double z = (i + 0.5) / 100 - 1, phi = (j + 0.5) * 2 * PI / 400, r = sqrt(1 - z * z), t0 = 14 / z, t1 = 22 / z, side,
+                       clear = 1, d[3] = {r * cos(phi), r * sin(phi), z}, y[4];
                 side = 24 / fmax(fabs(d[0]), fabs(d[1]));
                 if (z > 0 && side > t0) clear = exp(-depth / 8 * (fmin(t1, side) - t0));
                 isogi_sh_eval_f64(y, 2, (const double(*)[3])d, 1);
@@ -69,7 +72,8 @@ TEST(slabs_are_seen_by_every_set_of_directions) {
         printf("    %s slab:", opaque ? "opaque" : "translucent");
         for (int s = 0; s <= 3; s++)
             for (int method = ISOGI_DVR_BRUTE; method <= ISOGI_DVR_SWEEP; method += 2) {
-                const isogi_dvr_desc desc = {.pyramid = f.pyramid, .shading = ISOGI_DVR_VISIBILITY, .method = (isogi_dvr_method)method, .order = 2, .directions = 500, .sphere = (isogi_dvr_sphere)s,
+                const isogi_dvr_desc desc = {.pyramid = f.pyramid, .shading = ISOGI_DVR_VISIBILITY, .method = (isogi_dvr_method)method,
+                    .order = 2, .directions = 500, .sphere = (isogi_dvr_sphere)s,
                                              .grid = {3, 3, 9}, .visibility_step = 1};
                 isogi_dvr *dvr = dvr_new(&desc, &transfer);
                 float v[4];
@@ -77,8 +81,9 @@ TEST(slabs_are_seen_by_every_set_of_directions) {
                 CHECK(isogi_dvr_step(dvr, 0, NULL) == ISOGI_OK && isogi_dvr_sample_visibility(dvr, &place, 1, v) == ISOGI_OK, "step");
                 for (int k = 0; k < 4; k++) worst = fmax(worst, fabs((double)v[k] - expected[k]));
                 printf(" %s %.2g", sphere_name[s], worst);
-                CHECK(worst < (opaque ? 0.07 : 0.03), "%s, %d rays, method %d: %g %g %g %g, not %g %g %g %g", sphere_name[s], dvr->desc.directions, method, (double)v[0], (double)v[1], (double)v[2],
-                      (double)v[3], expected[0], expected[1], expected[2], expected[3]);
+                CHECK(worst < (opaque ? 0.07 : 0.03), "%s, %d rays, method %d: %g %g %g %g, not %g %g %g %g", sphere_name[s],
+                      dvr->desc.directions, method, (double)v[0], (double)v[1], (double)v[2], (double)v[3], expected[0], expected[1],
+                      expected[2], expected[3]);
                 isogi_dvr_free(dvr);
             }
         printf("\n");
@@ -133,7 +138,8 @@ TEST(blocks_are_raised_in_the_order_of_their_significance) {
     }
     field_build(&f);
     for (double reduction = 1.5; reduction < 3000; reduction *= 1.9) {
-        const isogi_dvr_desc desc = {.pyramid = f.pyramid, .shading = ISOGI_DVR_VISIBILITY, .method = ISOGI_DVR_PAPER, .directions = 8, .sphere = ISOGI_DVR_OCTAHEDRON, .order = 1, .grid = {2, 2, 2},
+        const isogi_dvr_desc desc = {.pyramid = f.pyramid, .shading = ISOGI_DVR_VISIBILITY, .method = ISOGI_DVR_PAPER, .directions = 8,
+            .sphere = ISOGI_DVR_OCTAHEDRON, .order = 1, .grid = {2, 2, 2},
                                      .reduction = reduction};
         isogi_dvr *dvr = dvr_new(&desc, &transfer);
         isogi_dvr_report report;
@@ -142,11 +148,13 @@ TEST(blocks_are_raised_in_the_order_of_their_significance) {
             for (int b = 0; b < BLOCKS; b++) {
                 int from = report.level[a] / 2, to = report.level[b]; /* a was raised from there; b was not from here */
                 if (!from || to == 16) continue;
-                double cost[2] = {7.0 * from * from * from, 7.0 * to * to * to}, gain[2] = {significance[a] / from / cost[0], significance[b] / to / cost[1]};
+                double cost[2] = {7.0 * from * from * from, 7.0 * to * to * to},
+                       gain[2] = {significance[a] / from / cost[0], significance[b] / to / cost[1]};
                 /* 64 bins of values stand for the values: a quarter; means are those of wider boxes than blocks */
                 if (cost[1] > cost[0]) continue;
                 raised++;
-                CHECK(gain[1] < 1.25 * gain[0], "reduction %g: block %d raised from %d for %g, block %d not from %d for %g", reduction, a, from, gain[0], b, to, gain[1]);
+                CHECK(gain[1] < 1.25 * gain[0], "reduction %g: block %d raised from %d for %g, block %d not from %d for %g", reduction, a,
+                      from, gain[0], b, to, gain[1]);
             }
         isogi_dvr_free(dvr);
     }
@@ -157,7 +165,8 @@ TEST(blocks_are_raised_in_the_order_of_their_significance) {
 /* ---- pictures between steps ---- */
 
 /* More matter in an edit darkens every place: whatever has been stepped so far, pixels lie between the picture before and that after, and
-   the picture comes nearer to it. Order 1, which does not ring. A hundredth, since light is interpolated with the weight of what grid points
+   the picture comes nearer to it. Order 1, which does not ring. A hundredth, since light is interpolated with the weight of what grid
+   points
    see: those that have grown dark weigh less against those whose turn has not come. */
 TEST(pictures_between_steps_lie_between_old_and_new) {
     enum { N = 49, SIDE = 24 };
@@ -175,19 +184,27 @@ TEST(pictures_between_steps_lie_between_old_and_new) {
     const isogi_view view = {.width = SIDE, .height = SIDE, .eye = {90, 70, 100}, .target = {24, 24, 24}, .fov = 35};
     static float image[3][SIDE * SIDE][4];
     for (int method = ISOGI_DVR_BRUTE; method <= ISOGI_DVR_SWEEP; method++) {
-        const isogi_dvr_desc desc = {.pyramid = f.pyramid, .shading = ISOGI_DVR_VISIBILITY, .method = (isogi_dvr_method)method, .order = 1, .directions = 48, .grid = {9, 9, 9}, .reduction = 2};
+        const isogi_dvr_desc desc = {.pyramid = f.pyramid, .shading = ISOGI_DVR_VISIBILITY, .method = (isogi_dvr_method)method, .order = 1,
+            .directions = 48, .grid = {9, 9, 9}, .reduction = 2};
         isogi_dvr *dvr = dvr_new(&desc, &old), *fresh = dvr_new(&desc, &now);
         double remaining = 1, last = 1e30;
         int frames = 0, moved = 0;
-        CHECK(isogi_dvr_step(dvr, 0, NULL) == ISOGI_OK && isogi_dvr_step(fresh, 0, NULL) == ISOGI_OK && isogi_dvr_set_transfer(dvr, &now) == ISOGI_OK, "edit");
-        CHECK(isogi_dvr_render(dvr, &view, &lighting, image[0], NULL, NULL) == ISOGI_OK && isogi_dvr_render(fresh, &view, &lighting, image[1], NULL, NULL) == ISOGI_OK, "render");
+        CHECK(isogi_dvr_step(dvr, 0, NULL) == ISOGI_OK && isogi_dvr_step(fresh, 0, NULL) == ISOGI_OK &&
+                  isogi_dvr_set_transfer(dvr, &now) == ISOGI_OK,
+              "edit");
+        CHECK(isogi_dvr_render(dvr, &view, &lighting, image[0], NULL, NULL) == ISOGI_OK &&
+                  isogi_dvr_render(fresh, &view, &lighting, image[1], NULL, NULL) == ISOGI_OK,
+              "render");
         CHECK(rms_difference(image[0], image[1], SIDE * SIDE) > 0.02, "method %d: the edit changes little", method);
         while (remaining > 0) {
             double error;
-            CHECK(isogi_dvr_step(dvr, 9000, &remaining) == ISOGI_OK && isogi_dvr_render(dvr, &view, &lighting, image[2], NULL, NULL) == ISOGI_OK, "step");
+            CHECK(isogi_dvr_step(dvr, 9000, &remaining) == ISOGI_OK &&
+                      isogi_dvr_render(dvr, &view, &lighting, image[2], NULL, NULL) == ISOGI_OK,
+                  "step");
             for (int i = 0; i < 4 * SIDE * SIDE; i++) {
                 float a = image[0][i / 4][i % 4], b = image[1][i / 4][i % 4], x = image[2][i / 4][i % 4];
-                CHECK(x >= fminf(a, b) - 0.01f && x <= fmaxf(a, b) + 0.01f, "method %d, %g left: pixel %d is %g, between %g and %g", method, remaining, i / 4, (double)x, (double)a, (double)b);
+                CHECK(x >= fminf(a, b) - 0.01f && x <= fmaxf(a, b) + 0.01f, "method %d, %g left: pixel %d is %g, between %g and %g", method,
+                      remaining, i / 4, (double)x, (double)a, (double)b);
             }
             error = rms_difference(image[1], image[2], SIDE * SIDE);
             CHECK(error <= last + 1e-6, "method %d, %g left: error %g after %g", method, remaining, error, last);
@@ -209,18 +226,21 @@ static void counted_for(void *user, size_t n, void (*task)(void *, size_t), void
     for (size_t i = 0; i < n; i++) task(arg, i);
 }
 
-/* Voxels that an edit makes sweeps and blocks read anew count as rays: a small budget reads a plane or a block at a time, what is left falls
+/* Voxels that an edit makes sweeps and blocks read anew count as rays: a small budget reads a plane or a block at a time, what is left
+   falls
    with every step, and what is there in the end is what one step, or a renderer that knew no other function, has; bit for bit. */
 TEST(what_is_read_after_a_change_counts_against_the_budget) {
     enum { N = 65, POINTS = 27 };
     field f = field_noise(N, 4);
     const isogi_context context = {.parallel_for = counted_for, .threads = 1};
-    const isogi_transfer_point a[] = {{-1, {1, 1, 1}, 0}, {1, {1, 1, 1}, 0.1f}}, b[] = {{-0.5, {1, 1, 1}, 0}, {0.7, {1, 1, 1}, 0.05f}, {0.8, {1, 1, 1}, 0.2f}};
+    const isogi_transfer_point a[] = {{-1, {1, 1, 1}, 0}, {1, {1, 1, 1}, 0.1f}},
+                               b[] = {{-0.5, {1, 1, 1}, 0}, {0.7, {1, 1, 1}, 0.05f}, {0.8, {1, 1, 1}, 0.2f}};
     const isogi_transfer first = {a, 2, NULL, 0}, second = {b, 3, NULL, 0};
     static float v[3][POINTS][4], points[POINTS][3];
     for (int i = 0; i < 3 * POINTS; i++) points[i / 3][i % 3] = (float)(i / 3 / (i % 3 == 0 ? 1 : i % 3 == 1 ? 3 : 9) % 3 * 32);
     for (int method = ISOGI_DVR_PAPER; method <= ISOGI_DVR_SWEEP; method++) {
-        const isogi_dvr_desc desc = {.pyramid = f.pyramid, .shading = ISOGI_DVR_VISIBILITY, .method = (isogi_dvr_method)method, .order = 2, .directions = 16, .grid = {5, 5, 5}, .reduction = 20};
+        const isogi_dvr_desc desc = {.pyramid = f.pyramid, .shading = ISOGI_DVR_VISIBILITY, .method = (isogi_dvr_method)method, .order = 2,
+            .directions = 16, .grid = {5, 5, 5}, .reduction = 20};
         for (int n = 0; n < 3; n++) { /* at once; in small steps; changed while the first is being read */
             isogi_dvr *dvr = dvr_new_with(&desc, n == 2 ? &first : &second, &context);
             double remaining = 2, last = 2;
@@ -250,9 +270,11 @@ static void summed_for(void *user, size_t n, void (*task)(void *, size_t), void 
 TEST(what_is_transparent_is_not_read) {
     field f = field_noise(65, 4);
     const isogi_context context = {.parallel_for = summed_for, .threads = 1};
-    const isogi_transfer_point a[] = {{-1, {1, 1, 1}, 0}, {1, {1, 1, 1}, 0}}, b[] = {{-0.5, {1, 1, 1}, 0}, {0.8, {1, 1, 1}, 0.2f}}, c[] = {{-0.7, {1, 1, 1}, 0}, {0.6, {1, 1, 1}, 0.2f}};
+    const isogi_transfer_point a[] = {{-1, {1, 1, 1}, 0}, {1, {1, 1, 1}, 0}}, b[] = {{-0.5, {1, 1, 1}, 0}, {0.8, {1, 1, 1}, 0.2f}},
+                               c[] = {{-0.7, {1, 1, 1}, 0}, {0.6, {1, 1, 1}, 0.2f}};
     const isogi_transfer clear = {a, 2, NULL, 0}, first = {b, 2, NULL, 0}, second = {c, 2, NULL, 0};
-    const isogi_dvr_desc desc = {.pyramid = f.pyramid, .shading = ISOGI_DVR_VISIBILITY, .method = ISOGI_DVR_PAPER, .order = 2, .directions = 16, .grid = {5, 5, 5}, .reduction = 20};
+    const isogi_dvr_desc desc = {.pyramid = f.pyramid, .shading = ISOGI_DVR_VISIBILITY, .method = ISOGI_DVR_PAPER, .order = 2,
+        .directions = 16, .grid = {5, 5, 5}, .reduction = 20};
     const float place[] = {32, 32, 32};
     float v[2][4];
     for (int before = 0; before < 3; before++) { /* nothing; a function whose voxels are read in part; one that is done */
@@ -260,14 +282,21 @@ TEST(what_is_transparent_is_not_read) {
         double remaining = 1;
         CHECK(!before || isogi_dvr_step(dvr, before == 1, NULL) == ISOGI_OK, "step");
         const size_t counted = dvr->blocks.counted;
-        CHECK(counted == (before == 0 ? 0u : before == 1 ? 1u : dvr->blocks.total) && isogi_dvr_set_transfer(dvr, &clear) == ISOGI_OK, "%zu blocks read", counted);
+        CHECK(counted == (before == 0 ? 0u : before == 1 ? 1u : dvr->blocks.total) &&
+            isogi_dvr_set_transfer(dvr, &clear) == ISOGI_OK, "%zu blocks read", counted);
         all_tasks = 0;
         CHECK(isogi_dvr_step(dvr, 1, &remaining) == ISOGI_OK && !(remaining > 0), "transparent: %g left", remaining);
         /* data laid out for five levels, of no block */
-        CHECK(dvr->blocks.counted == counted && all_tasks <= 5 * dvr->blocks.total && !dvr->blocks.data_count, "%zu tasks for %zu blocks", all_tasks, dvr->blocks.total);
-        CHECK(isogi_dvr_set_transfer(dvr, &second) == ISOGI_OK && isogi_dvr_step(dvr, 0, NULL) == ISOGI_OK && isogi_dvr_step(fresh, 0, NULL) == ISOGI_OK, "step");
-        CHECK(isogi_dvr_sample_visibility(dvr, &place, 1, v[0]) == ISOGI_OK && isogi_dvr_sample_visibility(fresh, &place, 1, v[1]) == ISOGI_OK, "sample");
-        CHECK(dvr->blocks.counted == dvr->blocks.total && !memcmp(v[0], v[1], sizeof v[0]) && v[0][0] < 3.4f, "%g, not %g", (double)v[0][0], (double)v[1][0]);
+        CHECK(dvr->blocks.counted == counted && all_tasks <= 5 * dvr->blocks.total && !dvr->blocks.data_count, "%zu tasks for %zu blocks",
+              all_tasks, dvr->blocks.total);
+        CHECK(isogi_dvr_set_transfer(dvr, &second) == ISOGI_OK && isogi_dvr_step(dvr, 0, NULL) == ISOGI_OK &&
+                  isogi_dvr_step(fresh, 0, NULL) == ISOGI_OK,
+              "step");
+        CHECK(isogi_dvr_sample_visibility(dvr, &place, 1, v[0]) == ISOGI_OK &&
+                  isogi_dvr_sample_visibility(fresh, &place, 1, v[1]) == ISOGI_OK,
+              "sample");
+        CHECK(dvr->blocks.counted == dvr->blocks.total && !memcmp(v[0], v[1], sizeof v[0]) && v[0][0] < 3.4f, "%g, not %g", (double)v[0][0],
+              (double)v[1][0]);
         isogi_dvr_free(dvr), isogi_dvr_free(fresh);
     }
     field_free(&f);
@@ -298,7 +327,8 @@ static double bucky_ball(double x, double y, double z) {
    tetrahedron, in double. */
 TEST(a_bucky_ball_of_tetrahedra_shows_every_crossing) {
     enum { N = 25, CELLS = (N - 1) * (N - 1) * (N - 1), SIDE = 20 };
-    static const uint8_t corner[2][5][4] = {{{0, 1, 2, 4}, {3, 1, 2, 7}, {5, 1, 4, 7}, {6, 2, 4, 7}, {1, 2, 4, 7}}, {{1, 0, 3, 5}, {2, 0, 3, 6}, {4, 0, 5, 6}, {7, 3, 5, 6}, {0, 3, 5, 6}}};
+    static const uint8_t corner[2][5][4] = {{{0, 1, 2, 4}, {3, 1, 2, 7}, {5, 1, 4, 7}, {6, 2, 4, 7}, {1, 2, 4, 7}},
+                                            {{1, 0, 3, 5}, {2, 0, 3, 6}, {4, 0, 5, 6}, {7, 3, 5, 6}, {0, 3, 5, 6}}};
     static float points[N * N * N][3], values[N * N * N], image[SIDE * SIDE][4];
     static uint32_t tets[5 * CELLS][4];
     const isogi_peak peak = {0.4, {1, 0.5f, 0.25f}, 0.3f};
@@ -321,7 +351,9 @@ TEST(a_bucky_ball_of_tetrahedra_shows_every_crossing) {
                 tets[count][k] = (uint32_t)(i + (b & 1) + N * ((b >> 1 & 1) + N * (b >> 2)));
             }
     }
-    CHECK(isogi_dvr_tets_build(&built, &mesh, &report, &serial) == ISOGI_OK && !report.degenerate && !report.crowded && report.border == 12 * (N - 1) * (N - 1), "build: %zu border", report.border);
+    CHECK(isogi_dvr_tets_build(&built, &mesh, &report, &serial) == ISOGI_OK && !report.degenerate && !report.crowded &&
+              report.border == 12 * (N - 1) * (N - 1),
+          "build: %zu border", report.border);
     CHECK(isogi_dvr_tets_render(built, &desc, &transfer, &view, image, NULL, NULL) == ISOGI_OK, "render");
     for (int y = 0; y < SIDE; y++)
         for (int x = 0; x < SIDE; x++) {
@@ -333,16 +365,22 @@ TEST(a_bucky_ball_of_tetrahedra_shows_every_crossing) {
                 double e[3][3], g[3], o[3], det, w[2][3], enter = -1e30, leave = 1e30, low, high;
                 const float *p0 = points[tets[t][0]];
                 double apart[3], along = 0, across = 0;
-                for (int a = 0; a < 3; a++) apart[a] = floor((double)p0[a] + 0.5 * ((double)points[tets[t][1]][a] + (double)points[tets[t][2]][a] - 2 * (double)p0[a])) + 0.5 - origin[a];
+                for (int a = 0; a < 3; a++) {
+                    double turn = (double)points[tets[t][1]][a] + (double)points[tets[t][2]][a] - 2 * (double)p0[a];
+                    apart[a] = floor((double)p0[a] + 0.5 * turn) + 0.5 - origin[a];
+                }
                 for (int a = 0; a < 3; a++) along += apart[a] * (double)dir[a], across += apart[a] * apart[a];
                 if (across - along * along > 4) continue; /* far off */
                 for (int k = 0; k < 3; k++)
                     for (int a = 0; a < 3; a++) e[k][a] = (double)points[tets[t][k + 1]][a] - (double)p0[a];
-                det = e[0][0] * (e[1][1] * e[2][2] - e[1][2] * e[2][1]) - e[0][1] * (e[1][0] * e[2][2] - e[1][2] * e[2][0]) + e[0][2] * (e[1][0] * e[2][1] - e[1][1] * e[2][0]);
+                det = e[0][0] * (e[1][1] * e[2][2] - e[1][2] * e[2][1]) - e[0][1] * (e[1][0] * e[2][2] - e[1][2] * e[2][0]) +
+                      e[0][2] * (e[1][0] * e[2][1] - e[1][1] * e[2][0]);
                 for (int a = 0; a < 3; a++) o[a] = origin[a] - (double)p0[a];
                 for (int k = 0; k < 3; k++) { /* barycentric coordinates along the ray: w[0] + t w[1] */
-                    const double *u = e[(k + 1) % 3], *v = e[(k + 2) % 3], n[3] = {u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]};
-                    w[0][k] = (o[0] * n[0] + o[1] * n[1] + o[2] * n[2]) / det, w[1][k] = ((double)dir[0] * n[0] + (double)dir[1] * n[1] + (double)dir[2] * n[2]) / det;
+                    const double *u = e[(k + 1) % 3], *v = e[(k + 2) % 3],
+                                 n[3] = {u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]};
+                    w[0][k] = (o[0] * n[0] + o[1] * n[1] + o[2] * n[2]) / det,
+                    w[1][k] = ((double)dir[0] * n[0] + (double)dir[1] * n[1] + (double)dir[2] * n[2]) / det;
                 }
                 for (int k = 0; k < 4; k++) {
                     double at = k < 3 ? w[0][k] : 1 - w[0][0] - w[0][1] - w[0][2], by = k < 3 ? w[1][k] : -w[1][0] - w[1][1] - w[1][2];

@@ -46,7 +46,8 @@ static void mesh_build(mesh *m) {
 
 static void mesh_free(mesh *m) { isogi_dvr_tets_free(m->built), free(m->points), free(m->values), free(m->tets); }
 
-static pixel cast_tets(const isogi_tets *tets, const isogi_tet_desc *desc, const isogi_transfer *transfer, const double eye[3], const double target[3]) {
+static pixel cast_tets(const isogi_tets *tets, const isogi_tet_desc *desc, const isogi_transfer *transfer, const double eye[3],
+                       const double target[3]) {
     isogi_view view = line_of_sight(eye, target);
     pixel p;
     isogi_result result = isogi_dvr_tets_render(tets, desc, transfer, &view, (float(*)[4])p.c, &p.depth, NULL);
@@ -57,7 +58,8 @@ static pixel cast_tets(const isogi_tets *tets, const isogi_tet_desc *desc, const
 static double slope[3];
 static double linear(double x, double y, double z) { return slope[0] * x + slope[1] * y + slope[2] * z; }
 
-static const isogi_transfer_point ramp[] = {{-2, {1, 0.2f, 0.1f}, 0}, {-0.5, {0.3f, 1, 0.1f}, 2}, {0.1, {0.1f, 0.4f, 1}, 0}, {0.2, {0.1f, 0.4f, 1}, 1}, {2, {1, 0, 1}, 3}};
+static const isogi_transfer_point ramp[] = {
+    {-2, {1, 0.2f, 0.1f}, 0}, {-0.5, {0.3f, 1, 0.1f}, 2}, {0.1, {0.1f, 0.4f, 1}, 0}, {0.2, {0.1f, 0.4f, 1}, 1}, {2, {1, 0, 1}, 3}};
 static const isogi_peak sheets[] = {{0.3, {1, 1, 1}, 0.4f}, {-0.4, {0, 1, 0}, 0.2f}};
 static const isogi_transfer both = {ramp, 5, sheets, 2};
 
@@ -72,22 +74,26 @@ TEST(linear_fields_look_as_on_the_lattice) {
         field f = field_of(linear, N);
         mesh m = lattice_mesh(N, linear, NULL);
         mesh_build(&m);
-        CHECK(m.report.degenerate == 0 && m.report.crowded == 0 && m.report.border == 12 * (N - 1) * (N - 1), "border %zu", m.report.border);
+        CHECK(m.report.degenerate == 0 && m.report.crowded == 0 && m.report.border == 12 * (N - 1) * (N - 1), "border %zu",
+              m.report.border);
         isogi_view view = view_of(&f, 1, &r, SIDE);
         for (int space = 0; space < 2; space++)
             for (int s = 0; s < (space ? 2 : 1); s++) {
-                const isogi_dvr_desc desc = {.pyramid = f.pyramid, .space = (isogi_dvr_space)space, .step = 0.01, .opaque = 1, .silhouette = (isogi_dvr_silhouette)s};
+                const isogi_dvr_desc desc = {.pyramid = f.pyramid, .space = (isogi_dvr_space)space, .step = 0.01, .opaque = 1,
+                    .silhouette = (isogi_dvr_silhouette)s};
                 const isogi_tet_desc tet_desc = {.space = (isogi_dvr_space)space, .opaque = 1, .silhouette = (isogi_dvr_silhouette)s};
                 isogi_dvr *dvr = dvr_new(&desc, &both);
                 float depth[2][SIDE * SIDE], image[SIDE * SIDE][4];
                 float(*expected)[4] = picture(dvr, &view, NULL, depth[0], NULL);
                 isogi_counters count = {0};
                 isogi_result result = isogi_dvr_tets_render(m.built, &tet_desc, &both, &view, image, depth[1], &count);
-                CHECK(result == ISOGI_OK && count.rays >= SIDE * SIDE && count.cells > 0, "%s, %d cells", isogi_result_string(result), (int)count.cells);
+                CHECK(result == ISOGI_OK && count.rays >= SIDE * SIDE && count.cells > 0, "%s, %d cells", isogi_result_string(result),
+                      (int)count.cells);
                 /* values of points are floats: 1e-7; steps of physical space */
                 double most = largest_difference(expected, image, SIDE * SIDE), deepest = 0;
                 for (int i = 0; i < SIDE * SIDE; i++)
-                    if (expected[i][3] > 0.01f && depth[0][i] < 1e30f) deepest = fmax(deepest, fabs((double)depth[0][i] - (double)depth[1][i]));
+                    if (expected[i][3] > 0.01f && depth[0][i] < 1e30f)
+                        deepest = fmax(deepest, fabs((double)depth[0][i] - (double)depth[1][i]));
                 CHECK(most < (space ? 4e-6 : 2e-4), "space %d silhouette %d: largest difference %g", space, s, most);
                 CHECK(deepest < 0.02, "depth differs by %g", deepest);
                 free(expected), isogi_dvr_free(dvr);
@@ -143,7 +149,8 @@ static void brute_integral(const stretch *s, int count, const isogi_transfer *t,
     for (int i = 0; i < count; i++)
         for (int k = 0; k < 100; k++) {
             long double v[4], length = (long double)(data ? fabs(s[i].value[1] - s[i].value[0]) : s[i].t[1] - s[i].t[0]) / 100;
-            reference_transfer(t, (long double)s[i].value[0] + (k + 0.5L) / 100 * ((long double)s[i].value[1] - (long double)s[i].value[0]), v);
+            reference_transfer(t, (long double)s[i].value[0] + (k + 0.5L) / 100 * ((long double)s[i].value[1] - (long double)s[i].value[0]),
+                               v);
             for (int a = 0; a < 3; a++) out[a] += out[3] * -expm1l(-v[3] * length) * v[a];
             out[3] *= expl(-v[3] * length);
         }
@@ -202,8 +209,9 @@ TEST(rays_through_edges_and_points_find_their_way) {
     mesh m = lattice_mesh(6, bumpy, NULL);
     mesh_build(&m);
     const isogi_transfer media = {ramp, 5, NULL, 0};
-    const double lines[][2][3] = {{{-5, 2, 2}, {5, 2, 2}}, {{-5, -5, -5}, {5, 5, 5}}, {{2, 2, -9}, {2, 2, 3}}, {{-4, -4, 2}, {5, 5, 2}}, {{2, 9, 2}, {2, 3, 2}},
-                                  {{12, 10, 8}, {3, 3, 3}}, {{-3, 2.5, 3}, {3, 2.5, 3}}, {{3, 3, 3}, {5, 3, 3}}, {{0, 0, 0}, {5, 4, 3}}, {{2, 2, 2}, {2, 2, 9}}};
+    const double lines[][2][3] = {{{-5, 2, 2}, {5, 2, 2}}, {{-5, -5, -5}, {5, 5, 5}}, {{2, 2, -9}, {2, 2, 3}},     {{-4, -4, 2}, {5, 5, 2}},
+                                  {{2, 9, 2}, {2, 3, 2}},  {{12, 10, 8}, {3, 3, 3}},  {{-3, 2.5, 3}, {3, 2.5, 3}}, {{3, 3, 3}, {5, 3, 3}},
+                                  {{0, 0, 0}, {5, 4, 3}},  {{2, 2, 2}, {2, 2, 9}}};
     for (size_t i = 0; i < sizeof lines / sizeof *lines; i++)
         for (int space = 0; space < 2; space++) {
             const isogi_tet_desc desc = {.space = (isogi_dvr_space)space, .opaque = 1};
@@ -211,7 +219,9 @@ TEST(rays_through_edges_and_points_find_their_way) {
             for (int a = 0; a < 3; a++) eye[a] = lines[i][0][a] + 1e-4 * (a + 1), target[a] = lines[i][1][a] + 1e-4 * (a + 1.5);
             pixel p = cast_tets(m.built, &desc, &media, lines[i][0], lines[i][1]), q = cast_tets(m.built, &desc, &media, eye, target);
             CHECK(q.c[3] > 0.05f, "line %zu sees something: %g", i, (double)q.c[3]);
-            for (int a = 0; a < 4; a++) CHECK(fabs((double)p.c[a] - (double)q.c[a]) < 3e-3, "line %zu space %d channel %d: %g, beside it %g", i, space, a, (double)p.c[a], (double)q.c[a]);
+            for (int a = 0; a < 4; a++)
+                CHECK(fabs((double)p.c[a] - (double)q.c[a]) < 3e-3, "line %zu space %d channel %d: %g, beside it %g", i, space, a,
+                      (double)p.c[a], (double)q.c[a]);
         }
     mesh_free(&m);
 }
@@ -239,7 +249,8 @@ TEST(peaks_in_tetrahedra_are_crossed_exactly) {
         for (int space = 0; space < 2; space++) {
             const isogi_tet_desc desc = {.space = (isogi_dvr_space)space, .opaque = 1};
             pixel p = cast_tets(m.built, &desc, &surface, eye, target);
-            CHECK(fabs((double)p.c[3] - (1 - pow(1 - (double)0.3f, crossings))) < 1e-6, "ray %d space %d: opacity %g of %d crossings", i, space, (double)p.c[3], crossings);
+            CHECK(fabs((double)p.c[3] - (1 - pow(1 - (double)0.3f, crossings))) < 1e-6, "ray %d space %d: opacity %g of %d crossings", i,
+                  space, (double)p.c[3], crossings);
         }
     }
     CHECK(total > 150, "%d crossings", total);
@@ -298,7 +309,8 @@ TEST(blocks_that_touch_look_as_one) {
         const isogi_transfer fog = {&medium, 1, NULL, 0}, surface = {NULL, 0, &peak, 1};
         const isogi_tet_desc desc = {.space = ISOGI_DVR_DATA, .opaque = 1};
         pixel p = cast_tets(m.built, &desc, &fog, eye, target), q = cast_tets(m.built, &desc, &surface, eye, target);
-        CHECK(fabs((double)p.c[3] + expm1(-0.5 * change)) < 1e-6, "ray %d: opacity %.9g, not %.9g", i, (double)p.c[3], -expm1(-0.5 * change));
+        CHECK(fabs((double)p.c[3] + expm1(-0.5 * change)) < 1e-6, "ray %d: opacity %.9g, not %.9g", i, (double)p.c[3],
+              -expm1(-0.5 * change));
         CHECK(fabs((double)q.c[3] - 0.5) < 1e-6, "ray %d: the peak in the seam has opacity %g", i, (double)q.c[3]);
     }
     mesh_free(&m);
@@ -326,7 +338,9 @@ TEST(bad_meshes_are_refused_and_no_memory_is_survived) {
     REFUSED(tets = NULL, ISOGI_INVALID);
     REFUSED(point_count = 20, ISOGI_INVALID); /* tetrahedra name points beyond */
     REFUSED(tet_count = SIZE_MAX / 2, ISOGI_TOO_LARGE);
-    CHECK(isogi_dvr_tets_build(NULL, &m.view, NULL, NULL) == ISOGI_INVALID && isogi_dvr_tets_build(&tets, NULL, NULL, NULL) == ISOGI_INVALID, "NULL");
+    CHECK(isogi_dvr_tets_build(NULL, &m.view, NULL, NULL) == ISOGI_INVALID &&
+              isogi_dvr_tets_build(&tets, NULL, NULL, NULL) == ISOGI_INVALID,
+          "NULL");
     for (int i = 0; i < 3; i++) {
         float *at = i ? &m.points[13][i] : &m.values[7], was = *at;
         *at = i == 2 ? INFINITY : NAN;
@@ -363,7 +377,8 @@ TEST(bad_meshes_are_refused_and_no_memory_is_survived) {
     /* nothing at all */
     const isogi_tet_mesh empty = {NULL, NULL, 0, NULL, 0};
     CHECK(isogi_dvr_tets_build(&tets, &empty, NULL, &serial) == ISOGI_OK, "an empty mesh");
-    CHECK(isogi_dvr_tets_render(tets, NULL, &both, &view, image, &depth, NULL) == ISOGI_OK && image[0][3] <= 0 && depth > 1e30f, "an empty picture");
+    CHECK(isogi_dvr_tets_render(tets, NULL, &both, &view, image, &depth, NULL) == ISOGI_OK && image[0][3] <= 0 && depth > 1e30f,
+          "an empty picture");
     isogi_dvr_tets_free(tets);
     mesh_free(&m);
 }
@@ -420,8 +435,8 @@ TEST(simulations_on_tetrahedra_are_drawn) {
                 rays += found > 0;
             }
         }
-        printf("    %s: %zu degenerate, %zu crowded, %zu border faces; largest difference from brute force %.2g in %d rays\n", names[n], m.report.degenerate,
-               m.report.crowded, m.report.border, most, rays);
+        printf("    %s: %zu degenerate, %zu crowded, %zu border faces; largest difference from brute force %.2g in %d rays\n", names[n],
+               m.report.degenerate, m.report.crowded, m.report.border, most, rays);
         CHECK(most < 2e-4 && rays > 1, "largest difference %g in %d rays", most, rays);
         mesh_free(&m);
     }

@@ -11,15 +11,23 @@ TEST(presets_are_valid_and_span_their_range) {
         const isogi_transfer t = {p, ISOGI_PRESET_POINTS, NULL, 0};
         float rgb[3], extinction;
         CHECK(isogi_transfer_validate(&t) == ISOGI_OK, "preset %d is valid", preset);
-        CHECK(fabs(p[0].value + 3) < 1e-12 && fabs(p[8].value - 1e6) < 1e-6 && p[0].extinction <= 0 && fabsf(p[8].extinction - 0.5f) < 1e-7f, "ends of %d", preset);
+        CHECK(fabs(p[0].value + 3) < 1e-12 && fabs(p[8].value - 1e6) < 1e-6 && p[0].extinction <= 0 &&
+                  fabsf(p[8].extinction - 0.5f) < 1e-7f,
+              "ends of %d", preset);
         isogi_transfer_at(&t, (1e6 - 3) / 2, rgb, &extinction);
         CHECK(fabsf(extinction - 0.25f) < 1e-6f, "extinction %g in the middle", (double)extinction);
         for (int i = 0; i < 9; i++)
             for (int a = 0; a < 3; a++) CHECK(p[i].rgb[a] >= 0 && p[i].rgb[a] <= 1, "colour %g", (double)p[i].rgb[a]);
     }
-    CHECK(isogi_transfer_preset(ISOGI_PRESET_HOT, 1, 1, 1, p) == ISOGI_INVALID && isogi_transfer_preset(ISOGI_PRESET_HOT, 2, 1, 1, p) == ISOGI_INVALID, "range");
-    CHECK(isogi_transfer_preset(ISOGI_PRESET_HOT, 0, 1, -1, p) == ISOGI_INVALID && isogi_transfer_preset((isogi_preset)4, 0, 1, 1, p) == ISOGI_INVALID, "values");
-    CHECK(isogi_transfer_preset(ISOGI_PRESET_HOT, 0, (double)NAN, 1, p) == ISOGI_INVALID && isogi_transfer_preset(ISOGI_PRESET_HOT, 0, 1, 1, NULL) == ISOGI_INVALID, "NaN");
+    CHECK(isogi_transfer_preset(ISOGI_PRESET_HOT, 1, 1, 1, p) == ISOGI_INVALID &&
+              isogi_transfer_preset(ISOGI_PRESET_HOT, 2, 1, 1, p) == ISOGI_INVALID,
+          "range");
+    CHECK(isogi_transfer_preset(ISOGI_PRESET_HOT, 0, 1, -1, p) == ISOGI_INVALID &&
+              isogi_transfer_preset((isogi_preset)4, 0, 1, 1, p) == ISOGI_INVALID,
+          "values");
+    CHECK(isogi_transfer_preset(ISOGI_PRESET_HOT, 0, (double)NAN, 1, p) == ISOGI_INVALID &&
+              isogi_transfer_preset(ISOGI_PRESET_HOT, 0, 1, 1, NULL) == ISOGI_INVALID,
+          "NaN");
 }
 
 TEST(imported_tables_keep_opacity_and_colour) {
@@ -35,7 +43,8 @@ TEST(imported_tables_keep_opacity_and_colour) {
                 double x = (double)table[i][a];
                 if (flags & ISOGI_TABLE_SRGB) x = x <= 0.04045 ? x / 12.92 : pow((x + 0.055) / 1.055, 2.4);
                 if (flags & ISOGI_TABLE_PREMULTIPLIED) x = table[i][3] > 0 ? fmin(1, x / (double)table[i][3]) : 0;
-                CHECK(fabs((double)p[i].rgb[a] - x) < 1e-6, "flags %d entry %d channel %d: %g, not %g", flags, i, a, (double)p[i].rgb[a], x);
+                CHECK(fabs((double)p[i].rgb[a] - x) < 1e-6, "flags %d entry %d channel %d: %g, not %g", flags, i, a, (double)p[i].rgb[a],
+                      x);
             }
         }
     }
@@ -43,9 +52,15 @@ TEST(imported_tables_keep_opacity_and_colour) {
     CHECK(isogi_transfer_import((const float(*)[4])bad, 2, 0, 1, 1, 0, p) == ISOGI_INVALID, "opacity 2");
     bad[1][3] = NAN;
     CHECK(isogi_transfer_import((const float(*)[4])bad, 2, 0, 1, 1, 0, p) == ISOGI_INVALID, "NaN");
-    CHECK(isogi_transfer_import(table, 1, 0, 1, 1, 0, p) == ISOGI_INVALID && isogi_transfer_import(table, 4, 1, 1, 1, 0, p) == ISOGI_INVALID, "sizes");
-    CHECK(isogi_transfer_import(table, 4, 0, 1, 0, 0, p) == ISOGI_INVALID && isogi_transfer_import(table, 4, 0, 1, 1, 4, p) == ISOGI_INVALID, "length, flags");
-    CHECK(isogi_transfer_import(NULL, 4, 0, 1, 1, 0, p) == ISOGI_INVALID && isogi_transfer_import(table, 4, 0, 1, 1, 0, NULL) == ISOGI_INVALID, "NULL");
+    CHECK(isogi_transfer_import(table, 1, 0, 1, 1, 0, p) == ISOGI_INVALID &&
+              isogi_transfer_import(table, 4, 1, 1, 1, 0, p) == ISOGI_INVALID,
+          "sizes");
+    CHECK(isogi_transfer_import(table, 4, 0, 1, 0, 0, p) == ISOGI_INVALID &&
+              isogi_transfer_import(table, 4, 0, 1, 1, 4, p) == ISOGI_INVALID,
+          "length, flags");
+    CHECK(isogi_transfer_import(NULL, 4, 0, 1, 1, 0, p) == ISOGI_INVALID &&
+              isogi_transfer_import(table, 4, 0, 1, 1, 0, NULL) == ISOGI_INVALID,
+          "NULL");
 }
 
 /* Three materials with noise: the thresholds part them. */
@@ -62,11 +77,14 @@ TEST(suggestions_part_what_the_histogram_parts) {
         for (int space = 0; space < 2; space++) {
             isogi_transfer_point p[ISOGI_SUGGEST_POINTS];
             const isogi_transfer t = {p, ISOGI_SUGGEST_POINTS, NULL, 0};
-            CHECK(isogi_transfer_suggest(f.pyramid, (isogi_dvr_space)space, p, &threshold) == ISOGI_OK && isogi_transfer_validate(&t) == ISOGI_OK, "suggest");
+            CHECK(isogi_transfer_suggest(f.pyramid, (isogi_dvr_space)space, p, &threshold) == ISOGI_OK &&
+                      isogi_transfer_validate(&t) == ISOGI_OK,
+                  "suggest");
             double first = (threshold - bias) / scale, second = (p[3].value - bias) / scale;
             CHECK(first > 0.14 && first < 0.87 && second > 1.13 && second < 2.07, "thresholds %g %g", first, second);
             float rgb[3], air, middle, top;
-            isogi_transfer_at(&t, bias, rgb, &air), isogi_transfer_at(&t, bias + scale, rgb, &middle), isogi_transfer_at(&t, bias + 2.2 * scale, rgb, &top);
+            isogi_transfer_at(&t, bias, rgb, &air), isogi_transfer_at(&t, bias + scale, rgb, &middle),
+                isogi_transfer_at(&t, bias + 2.2 * scale, rgb, &top);
             CHECK(air <= 0 && middle > 0 && top > middle, "air %g, then %g, %g", (double)air, (double)middle, (double)top);
         }
         field_free(&f);
@@ -83,7 +101,9 @@ TEST(suggestions_for_odd_volumes_are_valid) {
             for (size_t i = 0; i < field_count(&f); i++) f.value[i] = values[n][i % 2];
             field_build(&f);
             for (int space = 0; space < 2; space++)
-                CHECK(isogi_transfer_suggest(f.pyramid, (isogi_dvr_space)space, p, NULL) == ISOGI_OK && isogi_transfer_validate(&t) == ISOGI_OK, "case %zu", n);
+                CHECK(isogi_transfer_suggest(f.pyramid, (isogi_dvr_space)space, p, NULL) == ISOGI_OK &&
+                          isogi_transfer_validate(&t) == ISOGI_OK,
+                      "case %zu", n);
             field_free(&f);
         }
     CHECK(isogi_transfer_suggest(NULL, ISOGI_DVR_DATA, p, NULL) == ISOGI_INVALID, "NULL");
@@ -93,7 +113,9 @@ TEST(a_suggestion_shows_the_engine_block) {
     isogi_volume volume = {.data = NULL};
     isogi_pyramid *pyramid = NULL;
     isogi_transfer_point p[ISOGI_SUGGEST_POINTS];
-    CHECK(procedural_make(procedural_find("engine-block"), 48, &volume, &serial) == ISOGI_OK && isogi_vol_build(&pyramid, &volume, &serial) == ISOGI_OK, "volume");
+    CHECK(procedural_make(procedural_find("engine-block"), 48, &volume, &serial) == ISOGI_OK &&
+              isogi_vol_build(&pyramid, &volume, &serial) == ISOGI_OK,
+          "volume");
     for (int space = 0; space < 2; space++) {
         CHECK(isogi_transfer_suggest(pyramid, (isogi_dvr_space)space, p, NULL) == ISOGI_OK, "suggest");
         const isogi_transfer t = {p, ISOGI_SUGGEST_POINTS, NULL, 0};

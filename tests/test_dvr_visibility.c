@@ -9,7 +9,8 @@ static const isogi_context serial = {.threads = 1};
 
 static isogi_pyramid *linear_field(void) {
     isogi_pyramid *pyramid = NULL;
-    for (int i = 0; i < N * N * N; i++) data[i / N / N][i / N % N][i % N] = (float)(i % N) + 0.37f * (float)(i / N % N) - 0.2f * (float)(i / N / N);
+    for (int i = 0; i < N * N * N; i++)
+        data[i / N / N][i / N % N][i % N] = (float)(i % N) + 0.37f * (float)(i / N % N) - 0.2f * (float)(i / N / N);
     const isogi_volume volume = {.data = data, .type = ISOGI_F32, .size = {N, N, N}};
     CHECK(isogi_vol_build(&pyramid, &volume, &serial) == ISOGI_OK, "build");
     return pyramid;
@@ -41,7 +42,8 @@ TEST(blocks_of_all_levels_hold_a_linear_field_without_a_seam) {
             for (int a = 0; a < 3; a++) p[a] = i % 4 == a ? 16 * (float)(1 + i % 2) : (float)random_range(&r, 0, N - 1);
             isogi_dvr_sample_blocks(dvr, (const float(*)[3])p, 1, &value, NULL);
             double expected = (double)p[0] + 0.37 * (double)p[1] - 0.2 * (double)p[2];
-            CHECK(fabs((double)value - expected) < 1e-4, "reduction %g: %g, not %g", reduction, (double)value, expected); /* float rounding of 70 */
+            CHECK(fabs((double)value - expected) < 1e-4, "reduction %g: %g, not %g", reduction, (double)value,
+                  expected); /* float rounding of 70 */
         }
         isogi_dvr_free(dvr);
     }
@@ -49,7 +51,8 @@ TEST(blocks_of_all_levels_hold_a_linear_field_without_a_seam) {
     isogi_vol_free(pyramid);
 }
 
-/* One cell is left over beyond whole blocks on every axis: blocks of one cell hold what they have of it, and all keep to the budget. Visibility
+/* One cell is left over beyond whole blocks on every axis: blocks of one cell hold what they have of it, and all keep to the budget.
+   Visibility
    is that of brute force up to what a coarse level cannot hold. */
 TEST(blocks_that_the_border_cuts_thin_keep_to_the_budget) {
     enum { CUT = 34, POINTS = 125 };
@@ -58,25 +61,32 @@ TEST(blocks_that_the_border_cuts_thin_keep_to_the_budget) {
     const double tolerance[] = {0.05, 0.05, 0.25, 0.25}; /* twice what is measured: where the budget ends, blocks hold a point or two */
     isogi_pyramid *pyramid = NULL;
     double reduction = 1;
-    for (int i = 0; i < CUT * CUT * CUT; i++) cut[i / CUT / CUT][i / CUT % CUT][i % CUT] = (float)(i % CUT) + 0.37f * (float)(i / CUT % CUT) - 0.2f * (float)(i / CUT / CUT);
+    for (int i = 0; i < CUT * CUT * CUT; i++)
+        cut[i / CUT / CUT][i / CUT % CUT][i % CUT] = (float)(i % CUT) + 0.37f * (float)(i / CUT % CUT) - 0.2f * (float)(i / CUT / CUT);
     for (int i = 0; i < POINTS; i++)
         for (int a = 0, k = i; a < 3; a++, k /= 5) points[i][a] = (float)(k % 5 * (CUT - 1)) / 4;
     CHECK(isogi_vol_build(&pyramid, &volume, &serial) == ISOGI_OK, "build");
     for (int n = 0; n < 4; n++, reduction *= 5) {
         double error = 0, norm = 0;
         for (int m = 0; m < 2; m++) {
-            const isogi_dvr_desc desc = {.pyramid = pyramid, .shading = ISOGI_DVR_VISIBILITY, .method = m ? ISOGI_DVR_PAPER : ISOGI_DVR_BRUTE, .directions = 32,
+            const isogi_dvr_desc desc = {.pyramid = pyramid, .shading = ISOGI_DVR_VISIBILITY, .method = m ? ISOGI_DVR_PAPER
+                : ISOGI_DVR_BRUTE, .directions = 32,
                                          .sphere = ISOGI_DVR_OCTAHEDRON, .order = 2, .grid = {5, 5, 5}, .reduction = reduction};
             isogi_dvr *dvr = renderer(desc, &ramp_transfer, &serial);
             isogi_dvr_report report;
             CHECK(isogi_dvr_step(dvr, 0, NULL) == ISOGI_OK && isogi_dvr_inspect(dvr, &report) == ISOGI_OK, "step");
             CHECK(isogi_dvr_sample_visibility(dvr, (const float(*)[3])points, POINTS, v[m][0]) == ISOGI_OK, "sample");
-            if (m) CHECK(report.points && (double)report.points <= CUT * CUT * CUT / reduction, "%d points of %g", (int)report.points, CUT * CUT * CUT / reduction);
+            if (m)
+                CHECK(report.points && (double)report.points <= CUT * CUT * CUT / reduction, "%d points of %g", (int)report.points,
+                      CUT * CUT * CUT / reduction);
             /* 17 + 17 + 2 nodes along an axis: those on faces between blocks are held twice */
-            if (m && !n) CHECK(report.points == 33 * 33 * 33 && report.data_bytes == 36 * 36 * 36 * sizeof(float), "%zu points, %zu bytes", report.points, report.data_bytes);
+            if (m && !n)
+                CHECK(report.points == 33 * 33 * 33 && report.data_bytes == 36 * 36 * 36 * sizeof(float), "%zu points, %zu bytes",
+                      report.points, report.data_bytes);
             isogi_dvr_free(dvr);
         }
-        for (int i = 0; i < 4 * POINTS; i++) error += pow((double)v[1][i / 4][i % 4] - (double)v[0][i / 4][i % 4], 2), norm += pow((double)v[0][i / 4][i % 4], 2);
+        for (int i = 0; i < 4 * POINTS; i++)
+            error += pow((double)v[1][i / 4][i % 4] - (double)v[0][i / 4][i % 4], 2), norm += pow((double)v[0][i / 4][i % 4], 2);
         CHECK(sqrt(error / norm) < tolerance[n], "reduction %g: relative error %g", reduction, sqrt(error / norm));
     }
     isogi_vol_free(pyramid);
@@ -92,7 +102,8 @@ TEST(sweeps_do_not_blur_light_across_the_surface_of_an_opaque_floor) {
     const isogi_transfer transfer = {p, 4, NULL, 0};
     float at[2 * POINTS][3], v[5][2 * POINTS]; /* by brute force, by sweeps of each path */
     memset(at, 0, sizeof at);
-    for (int i = 0; i < 2 * POINTS; i++) at[i][i / POINTS ? 2 : 0] = (float)(2 * (i % POINTS)), at[i][1] = 16, at[i][i / POINTS ? 0 : 2] = 16;
+    for (int i = 0; i < 2 * POINTS; i++)
+        at[i][i / POINTS ? 2 : 0] = (float)(2 * (i % POINTS)), at[i][1] = 16, at[i][i / POINTS ? 0 : 2] = 16;
     for (int every = 1; every <= 2; every++) {
         isogi_pyramid *pyramid = NULL;
         /* the floor ends where a node's box does: 1.5 voxels below the points, then 0.5 */
@@ -100,11 +111,14 @@ TEST(sweeps_do_not_blur_light_across_the_surface_of_an_opaque_floor) {
         CHECK(isogi_vol_build(&pyramid, &volume, &serial) == ISOGI_OK, "build");
         for (int path = 0; path <= 4; path++) {
             const isogi_context context = {.threads = 1, .force_path = path};
-            const isogi_dvr_desc desc = {.pyramid = pyramid, .shading = ISOGI_DVR_VISIBILITY, .method = path ? ISOGI_DVR_SWEEP : ISOGI_DVR_BRUTE, .order = 1,
+            const isogi_dvr_desc desc = {.pyramid = pyramid, .shading = ISOGI_DVR_VISIBILITY, .method = path ? ISOGI_DVR_SWEEP
+                : ISOGI_DVR_BRUTE, .order = 1,
                                          .grid = {POINTS, POINTS, POINTS}, .visibility_step = path ? 2.0 / every : 0.25};
             isogi_dvr *dvr = renderer(desc, &transfer, &context);
             double error = 0;
-            CHECK(isogi_dvr_step(dvr, 0, NULL) == ISOGI_OK && isogi_dvr_sample_visibility(dvr, (const float(*)[3])at, 2 * POINTS, v[path]) == ISOGI_OK, "step");
+            CHECK(isogi_dvr_step(dvr, 0, NULL) == ISOGI_OK &&
+                      isogi_dvr_sample_visibility(dvr, (const float(*)[3])at, 2 * POINTS, v[path]) == ISOGI_OK,
+                  "step");
             isogi_dvr_free(dvr);
             for (int i = 0; i < 2 * POINTS; i++) error = fmax(error, fabs((double)v[path][i] - (double)v[0][i]));
             /* 0.19 and 0.18, of a lattice as coarse as this; without weights 0.61 and 0.53 */
@@ -114,7 +128,8 @@ TEST(sweeps_do_not_blur_light_across_the_surface_of_an_opaque_floor) {
     }
 }
 
-/* Matter up to the border, grid points at every node of a lattice and at every other: what lies between them has no part in what arrives, and
+/* Matter up to the border, grid points at every node of a lattice and at every other: what lies between them has no part in what arrives,
+   and
    a ray that stands outside counts in full in both. Nor does matter overflow that no light gets through. */
 TEST(sweeps_of_two_grids_agree_on_the_faces_of_a_full_box) {
     enum { SIDE = 33, POINTS = 6 * 17 * 17 };
@@ -125,7 +140,8 @@ TEST(sweeps_of_two_grids_agree_on_the_faces_of_a_full_box) {
     for (int i = 0; i < SIDE * SIDE * SIDE; i++) full[i / SIDE / SIDE][i / SIDE % SIDE][i % SIDE] = 1;
     for (int i = 0; i < POINTS; i++) {
         int face = i / 17 / 17, a = face / 2;
-        at[i][a] = (float)(face % 2 * (SIDE - 1)), at[i][(a + 1) % 3] = (float)(2 * (i % 17)), at[i][(a + 2) % 3] = (float)(2 * (i / 17 % 17));
+        at[i][a] = (float)(face % 2 * (SIDE - 1)), at[i][(a + 1) % 3] = (float)(2 * (i % 17)),
+        at[i][(a + 2) % 3] = (float)(2 * (i / 17 % 17));
     }
     CHECK(isogi_vol_build(&pyramid, &volume, &serial) == ISOGI_OK, "build");
     for (int n = 0; n < 4 * 5; n++) {
@@ -136,10 +152,13 @@ TEST(sweeps_of_two_grids_agree_on_the_faces_of_a_full_box) {
         int bad = 0;
         for (size_t every = 1; every <= 2; every++) {
             const size_t grid = (SIDE - 1) / every + 1;
-            const isogi_dvr_desc desc = {.pyramid = pyramid, .shading = ISOGI_DVR_VISIBILITY, .method = ISOGI_DVR_SWEEP, .order = 1, .directions = 24,
+            const isogi_dvr_desc desc = {.pyramid = pyramid, .shading = ISOGI_DVR_VISIBILITY, .method = ISOGI_DVR_SWEEP, .order = 1,
+                .directions = 24,
                                          .grid = {grid, grid, grid}, .visibility_step = 1};
             isogi_dvr *dvr = renderer(desc, &transfer, &context);
-            CHECK(isogi_dvr_step(dvr, 0, NULL) == ISOGI_OK && isogi_dvr_sample_visibility(dvr, (const float(*)[3])at, POINTS, v[every - 1]) == ISOGI_OK, "step");
+            CHECK(isogi_dvr_step(dvr, 0, NULL) == ISOGI_OK &&
+                      isogi_dvr_sample_visibility(dvr, (const float(*)[3])at, POINTS, v[every - 1]) == ISOGI_OK,
+                  "step");
             isogi_dvr_free(dvr);
         }
         for (int i = 0; i < POINTS; i++) {
@@ -149,7 +168,8 @@ TEST(sweeps_of_two_grids_agree_on_the_faces_of_a_full_box) {
             error = fmax(error, fabs((double)v[0][i] - (double)v[1][i]));
         }
         CHECK(!bad, "extinction %g, path %d: %d of %d are not finite", (double)extinction[n / 4], 1 + n % 4, bad, POINTS);
-        CHECK(error < 1e-5, "extinction %g, path %d: differ by %g", (double)extinction[n / 4], 1 + n % 4, error); /* float sums of 24 of up to 0.15 */
+        CHECK(error < 1e-5, "extinction %g, path %d: differ by %g", (double)extinction[n / 4], 1 + n % 4,
+              error); /* float sums of 24 of up to 0.15 */
     }
     isogi_vol_free(pyramid);
 }
@@ -158,10 +178,12 @@ TEST(visibility_is_the_same_bits_for_any_threads_and_slicing) {
     isogi_pyramid *pyramid = linear_field();
     for (int method = ISOGI_DVR_PAPER; method <= ISOGI_DVR_SWEEP; method++) {
         float v[2][27 * 9], points[27][3];
-        for (int i = 0; i < 27; i++) points[i][0] = (float)(24 * (i % 3)), points[i][1] = (float)(24 * (i / 3 % 3)), points[i][2] = (float)(24 * (i / 9));
+        for (int i = 0; i < 27; i++)
+            points[i][0] = (float)(24 * (i % 3)), points[i][1] = (float)(24 * (i / 3 % 3)), points[i][2] = (float)(24 * (i / 9));
         for (int n = 0; n < 2; n++) {
             const isogi_context two = {.threads = 2};
-            const isogi_dvr_desc desc = {.pyramid = pyramid, .shading = ISOGI_DVR_VISIBILITY, .method = (isogi_dvr_method)method, .directions = 20, .grid = {5, 3, 4}};
+            const isogi_dvr_desc desc = {.pyramid = pyramid, .shading = ISOGI_DVR_VISIBILITY, .method = (isogi_dvr_method)method,
+                .directions = 20, .grid = {5, 3, 4}};
             isogi_dvr *dvr = renderer(desc, &ramp_transfer, n ? &two : &serial);
             double remaining = 1;
             while (remaining > 0) CHECK(isogi_dvr_step(dvr, n ? 100 : 0, &remaining) == ISOGI_OK, "step");
@@ -176,7 +198,8 @@ TEST(visibility_is_the_same_bits_for_any_threads_and_slicing) {
 TEST(an_edit_computes_only_what_it_changes_and_light_computes_nothing) {
     isogi_pyramid *pyramid = linear_field();
     for (int method = ISOGI_DVR_PAPER; method <= ISOGI_DVR_SWEEP; method++) {
-        const isogi_dvr_desc desc = {.pyramid = pyramid, .shading = ISOGI_DVR_VISIBILITY, .method = (isogi_dvr_method)method, .directions = 8, .grid = {3, 3, 3}, .reduction = 1};
+        const isogi_dvr_desc desc = {.pyramid = pyramid, .shading = ISOGI_DVR_VISIBILITY, .method = (isogi_dvr_method)method,
+            .directions = 8, .grid = {3, 3, 3}, .reduction = 1};
         isogi_transfer_point high[] = {{50, {1, 1, 1}, 0}, {60, {1, 1, 1}, 0.3f}};
         const isogi_transfer edited = {high, 2, NULL, 0};
         isogi_dvr *dvr = renderer(desc, &edited, &serial);
@@ -193,7 +216,8 @@ TEST(an_edit_computes_only_what_it_changes_and_light_computes_nothing) {
         isogi_dvr_set_transfer(dvr, &edited), isogi_dvr_step(dvr, 0, NULL);
         CHECK(isogi_dvr_render(dvr, &view, &lighting, image, NULL, NULL) == ISOGI_OK, "render");
         isogi_dvr_step(dvr, 0, NULL), isogi_dvr_counters(dvr, &again), isogi_dvr_inspect(dvr, &after);
-        CHECK(again.rays == count.rays && after.blocks_classified == before.blocks_classified, "method %d: %d rays more", method, (int)(again.rays - count.rays));
+        CHECK(again.rays == count.rays && after.blocks_classified == before.blocks_classified, "method %d: %d rays more", method,
+              (int)(again.rays - count.rays));
         isogi_dvr_free(dvr);
     }
     isogi_vol_free(pyramid);
@@ -209,7 +233,8 @@ TEST(opacity_does_not_depend_on_the_step) {
         const isogi_dvr_desc desc = {.pyramid = pyramid, .step = step};
         isogi_dvr *dvr = renderer(desc, &ramp_transfer, &serial);
         CHECK(isogi_dvr_render(dvr, &view, NULL, pixel, NULL, NULL) == ISOGI_OK, "render");
-        CHECK(fabs((double)pixel[0][3] - (1 - exp(-expected))) < 1e-4, "step %g: %g", step, (double)pixel[0][3]); /* 1024 classes, float sums */
+        CHECK(fabs((double)pixel[0][3] - (1 - exp(-expected))) < 1e-4, "step %g: %g", step,
+              (double)pixel[0][3]); /* 1024 classes, float sums */
         isogi_dvr_free(dvr);
     }
     isogi_vol_free(pyramid);

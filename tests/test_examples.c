@@ -52,7 +52,8 @@ TEST(isolines_lie_where_the_formula_has_their_values) {
     FILE *f = fopen(temporary("1a.png"), "rb");
     size_t size = f ? fread(file, 1, sizeof file, f) : 0;
     if (f) fclose(f);
-    CHECK(r.status == 0 && png_decode(file, size, &pixels, form, error) && form[0] == SIDE && form[1] == SIDE && form[2] == 3, "status %d, %zu bytes", r.status, size);
+    CHECK(r.status == 0 && png_decode(file, size, &pixels, form, error) && form[0] == SIDE && form[1] == SIDE && form[2] == 3,
+          "status %d, %zu bytes", r.status, size);
     if (!pixels) return;
     for (int i = 0; i < SIDE * SIDE; i++) {
         const double p[3] = {((i % SIDE + 0.5) / SIDE - 0.5) * 2, (0.5 - (i / SIDE + 0.5) / SIDE) * 2, 0};
@@ -62,7 +63,8 @@ TEST(isolines_lie_where_the_formula_has_their_values) {
         for (int x = 1; x < SIDE - 1; x++) {
             const unsigned char *at = pixels + 3 * (x + SIDE * y), *beside = at + 3;
             double v = value[y][x], next = value[y][x + 1], level = fmin(fmax(floor((v - low) / gap + 0.5), 0), LINES - 1);
-            double slope = 0.5 * SIDE / 2 * sqrt(pow(next - value[y][x - 1], 2) + pow(value[y + 1][x] - value[y - 1][x], 2)); /* per unit, of a box of 2 */
+            double slope = 0.5 * SIDE / 2 *
+                           sqrt(pow(next - value[y][x - 1], 2) + pow(value[y + 1][x] - value[y - 1][x], 2)); /* per unit, of a box of 2 */
             if (floor((v - low) / gap) != floor((next - low) / gap) && fmax(v, next) > low && fmin(v, next) < high) {
                 crossings++, bare += at[1] > 200 && beside[1] > 200; /* paper is 0.9 in all channels, ink dark in green */
             }
@@ -70,13 +72,15 @@ TEST(isolines_lie_where_the_formula_has_their_values) {
             double away = fabs(v - low - level * gap) / slope * SIDE / 2;
             inked++, stray += away > 2, furthest = fmax(furthest, away);
         }
-    printf("    %d crossings of levels, %d without ink; %d pixels of ink, the furthest %.2g pixels off\n", crossings, bare, inked, furthest);
+    printf("    %d crossings of levels, %d without ink; %d pixels of ink, the furthest %.2g pixels off\n", crossings, bare, inked,
+           furthest);
     CHECK(crossings > 2000 && inked > 5000 && !bare && !stray, "%d bare, %d stray", bare, stray);
     free(pixels);
 }
 
 TEST(bad_isolines_get_one_line) {
-    static const char *const bad[] = {"gyroid x 0 1 '%s'", "gyroid 3 1 0 '%s'", "gyroid 3 0 nan '%s'", "gyroid 1e30 0 1 '%s'", "gyroid 0 0 1 '%s'", "gyroid 3 0 1x '%s'", "gyroid 2.5 0 1 '%s'"};
+    static const char *const bad[] = {"gyroid x 0 1 '%s'", "gyroid 3 1 0 '%s'", "gyroid 3 0 nan '%s'", "gyroid 1e30 0 1 '%s'",
+        "gyroid 0 0 1 '%s'", "gyroid 3 0 1x '%s'", "gyroid 2.5 0 1 '%s'"};
     for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) check_kept("build/isolines", bad[i], 1, "LINES is 1 to 1000");
     check_kept("build/isolines", "", 2, "usage");
     check_kept("build/isolines", "teapot 3 0 1 '%s'", 2, "usage");
@@ -84,12 +88,14 @@ TEST(bad_isolines_get_one_line) {
 }
 
 TEST(bad_meshes_of_tetrahedra_get_one_line) {
-    const struct { const char *name; size_t size; unsigned char bytes[64]; const char *say; } files[] = {
-        {"empty.tet", 0, {0}, "is not a .tet file"}, {"other.tet", 16, {"RIFFxxxxxxxxxxx"}, "is not a .tet file"},
-        {"cut.tet", 20, {'T', 'E', 'T', 'S', 4, 0, 0, 0, 1}, "is cut off"}, {"vast.tet", 20, {'T', 'E', 'T', 'S', 255, 255, 255, 255, 255, 255, 255, 255}, "is cut off"},
-        {"none.tet", 12, {'T', 'E', 'T', 'S'}, "invalid"}, /* no point */
-        {"beyond.tet", 44, {'T', 'E', 'T', 'S', 1, 0, 0, 0, 1, 0, 0, 0, [28] = 9}, "invalid"}, /* a corner that is no point */
-        {"short_4x4x4_uint8.raw", 63, {0}, "63 bytes"}};
+    const struct { const char *name; size_t size; unsigned char bytes[64]; const char *say;
+    } files[] = {{"empty.tet", 0, {0}, "is not a .tet file"},
+                 {"other.tet", 16, {"RIFFxxxxxxxxxxx"}, "is not a .tet file"},
+                 {"cut.tet", 20, {'T', 'E', 'T', 'S', 4, 0, 0, 0, 1}, "is cut off"},
+                 {"vast.tet", 20, {'T', 'E', 'T', 'S', 255, 255, 255, 255, 255, 255, 255, 255}, "is cut off"},
+                 {"none.tet", 12, {'T', 'E', 'T', 'S'}, "invalid"},                                     /* no point */
+                 {"beyond.tet", 44, {'T', 'E', 'T', 'S', 1, 0, 0, 0, 1, 0, 0, 0, [28] = 9}, "invalid"}, /* a corner that is no point */
+                 {"short_4x4x4_uint8.raw", 63, {0}, "63 bytes"}};
     char arguments[600];
     for (size_t i = 0; i < sizeof files / sizeof *files; i++) {
         write_bytes(temporary(files[i].name), files[i].bytes, files[i].size);
@@ -128,18 +134,26 @@ TEST(strips_hold_their_pictures) {
 }
 
 TEST(bad_bakes_get_one_line) {
-    static const char *const bad[][2] = {{"", "VOLUME and --out are needed"}, {"--out '%s'", "VOLUME and --out are needed"}, {"procedural:gyroid:8 --out", "--out: needs a value"},
-        {"procedural:teapot --out '%s'", "no such volume"}, {"procedural:gyroid:8 --samples 1 --out '%s'", "corrupt"}, {"procedural:gyroid:8 --samples 0 --out '%s'", "--samples"},
+    static const char *const bad[][2] = {{"", "VOLUME and --out are needed"}, {"--out '%s'", "VOLUME and --out are needed"},
+        {"procedural:gyroid:8 --out", "--out: needs a value"},
+        {"procedural:teapot --out '%s'", "no such volume"}, {"procedural:gyroid:8 --samples 1 --out '%s'", "corrupt"},
+        {"procedural:gyroid:8 --samples 0 --out '%s'", "--samples"},
         {"procedural:gyroid:8 --samples nan --out '%s'", "--samples"}, {"procedural:gyroid:8 --lattice 0,0,0 --out '%s'", "--lattice"},
         {"procedural:gyroid:8 --spacing 0,1,1 --out '%s'", "--spacing"}, {"procedural:gyroid:8 --format best --out '%s'", "--format"},
-        {"procedural:gyroid:8 --storage best --out '%s'", "--storage"}, {"procedural:gyroid:8 --env /nowhere.hdr --out '%s'", "/nowhere.hdr"},
+        {"procedural:gyroid:8 --storage best --out '%s'", "--storage"},
+        {"procedural:gyroid:8 --env /nowhere.hdr --out '%s'", "/nowhere.hdr"},
         {"procedural:gyroid:8 --merge /nowhere.bake --out '%s'", "/nowhere.bake"}, {"procedural:gyroid:8 --box 1,2,3 --out '%s'", "--box"},
-        {"procedural:gyroid:8.5 --out '%s'", "whole number"}, {"procedural:gyroid:8 --lattice 8,8,8.5 --out '%s'", "--lattice"}, {"procedural:gyroid:8 --box 0,0,0,8,8,4.5 --out '%s'", "--box"},
-        {"procedural:gyroid:8 --box 0,0,0,0,0,0 --out '%s'", "--box"}, {"procedural:gyroid:8 --raw /nowhere/a.rgb --samples 1 --out '%s'", "/nowhere/a.rgb: cannot be written"},
+        {"procedural:gyroid:8.5 --out '%s'", "whole number"}, {"procedural:gyroid:8 --lattice 8,8,8.5 --out '%s'", "--lattice"},
+        {"procedural:gyroid:8 --box 0,0,0,8,8,4.5 --out '%s'", "--box"},
+        {"procedural:gyroid:8 --box 0,0,0,0,0,0 --out '%s'", "--box"}, {"procedural:gyroid:8 --raw /nowhere/a.rgb --samples 1 --out '%s'",
+        "/nowhere/a.rgb: cannot be written"},
         {"procedural:gyroid:8 --mode transfer --light directional:1,1,1:1,1,1 --out '%s'", "--mode transfer bakes for any light"},
-        {"/nowhere_4x4x4_uint8.raw --out '%s'", "No such file"}, {"procedural:gyroid:8 --samples 1 --out /nowhere/a.bake", "/nowhere/a.bake: cannot be written"},
-        {"procedural:gyroid:8 --nonsense --out '%s'", "no such option"}, {"procedural:gyroid:8 --box 0,0,0,8,9,8 --out '%s'", "--box: reaches beyond the lattice along y"},
-        {"'%1$s' --raw '%1$s' --out a.bake", "is the file of VOLUME"}, {"procedural:gyroid:8 --raw '%1$s' --out '%1$s'", "is the file of --out"},
+        {"/nowhere_4x4x4_uint8.raw --out '%s'", "No such file"},
+        {"procedural:gyroid:8 --samples 1 --out /nowhere/a.bake", "/nowhere/a.bake: cannot be written"},
+        {"procedural:gyroid:8 --nonsense --out '%s'", "no such option"},
+        {"procedural:gyroid:8 --box 0,0,0,8,9,8 --out '%s'", "--box: reaches beyond the lattice along y"},
+        {"'%1$s' --raw '%1$s' --out a.bake", "is the file of VOLUME"},
+        {"procedural:gyroid:8 --raw '%1$s' --out '%1$s'", "is the file of --out"},
         {"procedural:gyroid:8 --merge '%1$s' --raw '%1$s' --out a.bake", "is the file of --merge"}};
     for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) check_kept("build/bake", bad[i][0], 1, bad[i][1]);
 }

@@ -39,7 +39,7 @@ static int find_root(int *parent, int i) {
 
 typedef struct shape {
     long vertices, edges, triangles, components, euler; /* euler = vertices - edges + triangles */
-    long open_edges, bad_edges, bad_vertices;           /* one triangle only; more than two, or the same direction twice; no disk around it */
+    long open_edges, bad_edges, bad_vertices; /* one triangle only; more than two, or the same direction twice; no disk around it */
     int *component;                                     /* of each vertex, if asked for */
 } shape;
 
@@ -65,7 +65,8 @@ static int single_fan(const uint32_t *links, int n) {
 }
 
 /* open(a, b) says whether an edge may have one triangle; NULL: no edge may. */
-static shape mesh_shape(const isogi_mesh *mesh, int (*open)(const float a[3], const float b[3], const void *), const void *arg, int **component) {
+static shape mesh_shape(const isogi_mesh *mesh, int (*open)(const float a[3], const float b[3], const void *), const void *arg,
+                        int **component) {
     shape s = {0};
     size_t n = mesh->vertex_count, t = mesh->triangle_count;
     size_t *first = (size_t *)calloc(n + 2, sizeof *first), *fan = (size_t *)calloc(n + 2, sizeof *fan);
@@ -296,7 +297,8 @@ static void field_topology(const field *f, double isovalue, long double nudge, l
             for (int i = 0; i < n[0] - 1; i++) {
                 long double v[8];
                 int edge[12], pair[12], count = 0, at[3] = {i, j, k};
-                for (int c = 0; c < 8; c++) v[c] = (long double)*field_at(f, i + (c & 1), j + (c >> 1 & 1), k + (c >> 2)) - (long double)isovalue;
+                for (int c = 0; c < 8; c++)
+                    v[c] = (long double)*field_at(f, i + (c & 1), j + (c >> 1 & 1), k + (c >> 2)) - (long double)isovalue;
                 for (int c = 0; c < 8; c++) v[c] += nudge;
                 cell_topology t = sweep_cell(v);
                 *euler += t.euler;
@@ -390,10 +392,10 @@ static void check_topology(isogi_mesh *mesh, const field *f, double isovalue, in
     shape s = mesh_shape(mesh, on_border, f, &component);
     /* half-open: the surface a little below, where small whole numbers have ties */
     field_topology(f, isovalue, kind == LEVELS ? 1e-6L : 0, &components, &euler, label);
-    CHECK(s.bad_edges == 0 && s.bad_vertices == 0, "kind %d seed %llu: %ld edges, %ld vertices", kind, (unsigned long long)seed, s.bad_edges,
-          s.bad_vertices);
-    CHECK(s.components == components && s.euler == euler, "kind %d seed %llu size %d %d %d: components %ld, not %ld; Euler %ld, not %ld", kind,
-          (unsigned long long)seed, f->size[0], f->size[1], f->size[2], s.components, components, s.euler, euler);
+    CHECK(s.bad_edges == 0 && s.bad_vertices == 0, "kind %d seed %llu: %ld edges, %ld vertices", kind, (unsigned long long)seed,
+          s.bad_edges, s.bad_vertices);
+    CHECK(s.components == components && s.euler == euler, "kind %d seed %llu size %d %d %d: components %ld, not %ld; Euler %ld, not %ld",
+          kind, (unsigned long long)seed, f->size[0], f->size[1], f->size[2], s.components, components, s.euler, euler);
     /* the same edges are connected, not only as many */
     for (size_t v = 0; v < mesh->vertex_count; v++) partner[v] = -1;
     for (size_t v = 0; v < mesh->vertex_count; v++) {
@@ -463,10 +465,10 @@ TEST(known_shapes_have_their_euler_characteristic) {
         field_build_with(&f, NULL);
         isogi_mesh mesh = mesh_of(&f, 0, 0, 0);
         shape s = mesh_shape(&mesh, NULL, NULL, NULL);
-        CHECK(s.bad_edges == 0 && s.open_edges == 0 && s.bad_vertices == 0, "shape %d: %ld bad edges, %ld open, %ld bad vertices", shape_kind,
-              s.bad_edges, s.open_edges, s.bad_vertices);
-        CHECK(s.euler == euler[shape_kind] && s.components == components[shape_kind], "shape %d: Euler %ld, components %ld", shape_kind, s.euler,
-              s.components);
+        CHECK(s.bad_edges == 0 && s.open_edges == 0 && s.bad_vertices == 0, "shape %d: %ld bad edges, %ld open, %ld bad vertices",
+              shape_kind, s.bad_edges, s.open_edges, s.bad_vertices);
+        CHECK(s.euler == euler[shape_kind] && s.components == components[shape_kind], "shape %d: Euler %ld, components %ld", shape_kind,
+              s.euler, s.components);
         isogi_vol_mesh_free(f.pyramid, &mesh);
         field_free(&f);
     }
@@ -623,8 +625,8 @@ TEST(closed_meshes_have_no_border) {
         field_build_with(&f, &serial);
         isogi_mesh mesh = mesh_of(&f, 0, 1, 1), open = mesh_of(&f, 0, 0, 0);
         shape s = mesh_shape(&mesh, NULL, NULL, NULL);
-        CHECK(s.bad_edges == 0 && s.open_edges == 0 && s.bad_vertices == 0, "volume %d: %ld bad edges, %ld open, %ld bad vertices", i, s.bad_edges,
-              s.open_edges, s.bad_vertices);
+        CHECK(s.bad_edges == 0 && s.open_edges == 0 && s.bad_vertices == 0, "volume %d: %ld bad edges, %ld open, %ld bad vertices", i,
+              s.bad_edges, s.open_edges, s.bad_vertices);
         for (int v = 0; v < n[0] * n[1] * n[2]; v++) inside += f.value[v] >= 0;
         CHECK((mesh.triangle_count > 0) == (inside > 0), "volume %d: %zu triangles, %d voxels inside", i, mesh.triangle_count, inside);
         /* what it holds and what its negative holds fill the box; half-open makes no difference to volumes */
@@ -649,13 +651,16 @@ TEST(a_closed_box_is_a_box) {
     isogi_mesh mesh = mesh_of(&f, 0, 1, 1), full = mesh_of(&f, 1, 0, 1), none = mesh_of(&f, 1.5, 1, 1), open = mesh_of(&f, 0, 0, 0);
     shape s = mesh_shape(&mesh, NULL, NULL, NULL);
     CHECK(s.euler == 2 && s.components == 1 && s.open_edges == 0 && s.bad_edges == 0, "Euler %ld, components %ld", s.euler, s.components);
-    CHECK(fabs(mesh_volume(&mesh) - 24) < 1e-9 && fabs(mesh_volume(&full) - 24) < 1e-9, "volume %g %g", mesh_volume(&mesh), mesh_volume(&full));
+    CHECK(fabs(mesh_volume(&mesh) - 24) < 1e-9 && fabs(mesh_volume(&full) - 24) < 1e-9, "volume %g %g", mesh_volume(&mesh),
+          mesh_volume(&full));
     CHECK(mesh.triangle_count == 2 * 2 * (4 * 3 + 3 * 2 + 4 * 2), "%zu", mesh.triangle_count);
-    CHECK(none.triangle_count == 0 && none.vertex_count == 0 && open.triangle_count == 0, "%zu %zu", none.triangle_count, open.triangle_count);
+    CHECK(none.triangle_count == 0 && none.vertex_count == 0 && open.triangle_count == 0, "%zu %zu", none.triangle_count,
+          open.triangle_count);
     for (size_t v = 0; v < mesh.vertex_count; v++)
         for (int a = 0; a < 3; a++) {
             float at = mesh.positions[v][a], last = (float)f.size[a] - 1, n = mesh.normals[v][a];
-            CHECK(at <= 0 ? n < 0 : at >= last ? n > 0 : fabsf(n) <= 0, "vertex %zu axis %d: at %g, normal %g", v, a, (double)at, (double)n);
+            CHECK(at <= 0 ? n < 0 : at >= last ? n > 0 : fabsf(n) <= 0, "vertex %zu axis %d: at %g, normal %g", v, a, (double)at,
+                (double)n);
         }
     isogi_vol_mesh_free(f.pyramid, &mesh), isogi_vol_mesh_free(f.pyramid, &full);
     isogi_vol_mesh_free(f.pyramid, &none), isogi_vol_mesh_free(f.pyramid, &open);
@@ -685,7 +690,8 @@ TEST(cells_with_a_voxel_that_is_not_finite_are_left_out) {
         long kept = 0, unused = 0;
         field_fill(&f, i & 1 ? SMOOTH : NOISE, &r);
         if (i % 5 == 0)
-            for (int v = 0; v < 7 * 6 * 8; v++) f.value[v] = fabs(f.value[v]) * (v % 7 < 3 ? 1 : -1); /* sides that meet in a bad plane only */
+            for (int v = 0; v < 7 * 6 * 8; v++)
+                f.value[v] = fabs(f.value[v]) * (v % 7 < 3 ? 1 : -1); /* sides that meet in a bad plane only */
         field_build_with(&f, &serial);
         isogi_mesh whole = mesh_of(&f, 0, 0, i & 2);
         isogi_vol_free(f.pyramid);
@@ -728,8 +734,8 @@ TEST(blocks_without_surface_are_not_read) {
     for (int v = 0; v < 38 * 33 * 31; v++)
         if (fabs(f.value[v]) > 7) f.value[v] = -f.value[v], changed++;
     isogi_mesh after = mesh_of(&f, 0, 0, 0);
-    CHECK(mesh_same(&before, &after) && changed > 1000, "%zu triangles, %zu; %ld voxels changed", before.triangle_count, after.triangle_count,
-          changed);
+    CHECK(mesh_same(&before, &after) && changed > 1000, "%zu triangles, %zu; %ld voxels changed", before.triangle_count,
+          after.triangle_count, changed);
     isogi_vol_mesh_free(f.pyramid, &before), isogi_vol_mesh_free(f.pyramid, &after);
     field_free(&f);
 }
@@ -746,8 +752,8 @@ TEST(rows_of_any_length) {
         check_topology(&open, &f, 0, NOISE, (uint64_t)i);
         isogi_mesh mesh = mesh_of(&f, 0, 0, 1);
         shape s = mesh_shape(&mesh, NULL, NULL, NULL);
-        CHECK(s.bad_edges == 0 && s.open_edges == 0 && s.bad_vertices == 0, "%d voxels: %ld bad edges, %ld open, %ld bad vertices", lengths[i],
-              s.bad_edges, s.open_edges, s.bad_vertices);
+        CHECK(s.bad_edges == 0 && s.open_edges == 0 && s.bad_vertices == 0, "%d voxels: %ld bad edges, %ld open, %ld bad vertices",
+              lengths[i], s.bad_edges, s.open_edges, s.bad_vertices);
         isogi_vol_mesh_free(f.pyramid, &mesh);
         field_free(&f);
     }
@@ -787,7 +793,8 @@ TEST(bytes_at_the_isovalue_are_inside) {
             int same = at.vertex_count == below.vertex_count && at.triangle_count == below.triangle_count;
             CHECK(same, "volume %d: %zu %zu, %zu %zu", i, at.vertex_count, below.vertex_count, at.triangle_count, below.triangle_count);
             shape t = mesh_shape(&below, on_border, &f, NULL);
-            CHECK(s.components == t.components && s.euler == t.euler, "volume %d: %ld, %ld; %ld, %ld", i, s.components, t.components, s.euler, t.euler);
+            CHECK(s.components == t.components && s.euler == t.euler, "volume %d: %ld, %ld; %ld, %ld", i, s.components, t.components,
+                  s.euler, t.euler);
             isogi_vol_mesh_free(f.pyramid, &below);
         }
         isogi_vol_mesh_free(f.pyramid, &at);
@@ -816,7 +823,8 @@ TEST(every_type_and_stride_gives_the_same_mesh) {
         field f = field_new(X, Y, Z);
         for (int k = 0; k < Z; k++)
             for (int j = 0; j < Y; j++)
-                for (int n = 0; n < X; n++) *field_at(&f, n, j, k) = floor(50 + 40 * sin(0.3 * n + 0.1 * j) * cos(0.5 * k) + 8 * random_unit(&r));
+                for (int n = 0; n < X; n++)
+                    *field_at(&f, n, j, k) = floor(50 + 40 * sin(0.3 * n + 0.1 * j) * cos(0.5 * k) + 8 * random_unit(&r));
         field_build_with(&f, &serial);
         isogi_mesh expected = mesh_of(&f, 50, 1, 1);
         isogi_vol_free(f.pyramid);
@@ -845,7 +853,8 @@ TEST(extreme_values_still_give_a_manifold) {
     for (int i = 0; i < 500; i++) {
         test_random r = {(uint64_t)i};
         field f = field_new(5, 5, 5);
-        for (int v = 0; v < 125; v++) f.value[v] = random_range(&r, -1, 1) * (i % 6 < 5 ? sizes[i % 6] : pow(10, random_range(&r, -300, 300)));
+        for (int v = 0; v < 125; v++)
+            f.value[v] = random_range(&r, -1, 1) * (i % 6 < 5 ? sizes[i % 6] : pow(10, random_range(&r, -300, 300)));
         field_build_with(&f, &serial);
         isogi_mesh mesh = mesh_of(&f, 0, 1, i & 1);
         shape s = mesh_shape(&mesh, i & 1 ? NULL : on_border, &f, NULL);
@@ -973,10 +982,12 @@ static void check_failure(int cancel) {
             else {
                 failures++;
                 CHECK(result == (cancel ? ISOGI_CANCELLED : ISOGI_NO_MEMORY), "%s", isogi_result_string(result));
-                CHECK(mesh.positions == before.positions && mesh.normals == before.normals && mesh.triangles == before.triangles, "step %d", k);
+                CHECK(mesh.positions == before.positions && mesh.normals == before.normals && mesh.triangles == before.triangles, "step %d",
+                      k);
                 CHECK(mesh.vertex_capacity == before.vertex_capacity && mesh.triangle_capacity == before.triangle_capacity, "step %d", k);
                 CHECK(kept ? mesh_same(&mesh, &small_mesh) : !mesh.vertex_count, "step %d", k);
-                CHECK(isogi_vol_mesh(f.pyramid, &large, &mesh) == ISOGI_OK && mesh.triangle_count > 100, "step %d: %zu", k, mesh.triangle_count);
+                CHECK(isogi_vol_mesh(f.pyramid, &large, &mesh) == ISOGI_OK && mesh.triangle_count > 100, "step %d: %zu", k,
+                      mesh.triangle_count);
             }
             isogi_vol_mesh_free(f.pyramid, &mesh);
         }
@@ -1023,11 +1034,11 @@ static void check_scan(const char *name, int x, int y, int z, double isovalue) {
     field_build_with(&f, NULL);
     isogi_mesh open = mesh_of(&f, isovalue, 0, 0), closed = mesh_of(&f, isovalue, 1, 1);
     shape s = mesh_shape(&open, on_box, &f, NULL), c = mesh_shape(&closed, NULL, NULL, NULL);
-    printf("    %s at %g: %ld triangles, %ld components, Euler %ld; closed: %ld, %ld, %ld\n", name, isovalue, s.triangles, s.components, s.euler,
-           c.triangles, c.components, c.euler);
+    printf("    %s at %g: %ld triangles, %ld components, Euler %ld; closed: %ld, %ld, %ld\n", name, isovalue, s.triangles, s.components,
+           s.euler, c.triangles, c.components, c.euler);
     CHECK(s.bad_edges == 0 && s.bad_vertices == 0 && s.triangles > 100000, "%ld edges, %ld vertices", s.bad_edges, s.bad_vertices);
-    CHECK(c.bad_edges == 0 && c.bad_vertices == 0 && c.open_edges == 0 && c.euler % 2 == 0, "%ld edges, %ld open, %ld vertices", c.bad_edges,
-          c.open_edges, c.bad_vertices);
+    CHECK(c.bad_edges == 0 && c.bad_vertices == 0 && c.open_edges == 0 && c.euler % 2 == 0, "%ld edges, %ld open, %ld vertices",
+          c.bad_edges, c.open_edges, c.bad_vertices);
     isogi_vol_mesh_free(f.pyramid, &open), isogi_vol_mesh_free(f.pyramid, &closed);
     field_free(&f);
     free(data), free(path);

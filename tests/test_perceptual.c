@@ -37,7 +37,8 @@ TEST(a_uniform_difference_is_seen_from_its_threshold_on) {
         }
         for (int n = 0; n < 2; n++) linear[n] = x + n * high <= 0.04045 ? (x + n * high) / 12.92 : pow((x + n * high + 0.055) / 1.055, 2.4);
         double share = linear[1] / linear[0] - 1;
-        CHECK(share > 0.05 && share < 0.9 && (!last || share < 1.3 * last), "at %g: %g of the luminance is seen, darker %g", x, share, last);
+        CHECK(share > 0.05 && share < 0.9 && (!last || share < 1.3 * last), "at %g: %g of the luminance is seen, darker %g", x, share,
+              last);
         last = share;
     }
     rows = H;

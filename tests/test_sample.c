@@ -202,9 +202,11 @@ static void every_volume_on_path(int path) {
                 free(l.memory);
             }
     for (int f = 0; f < 3; f++) {
-        printf("    path %d, %-11s: value %.2f, gradient %.2f in 2^-24 of the largest number, of the range\n", path, filter_names[f], worst[f][0], worst[f][1]);
+        printf("    path %d, %-11s: value %.2f, gradient %.2f in 2^-24 of the largest number, of the range\n", path, filter_names[f],
+               worst[f][0], worst[f][1]);
         /* what the header states */
-        CHECK(worst[f][0] < 8 * ROUNDING_FACTOR && worst[f][1] < 8 * ROUNDING_FACTOR, "path %d, %s: %g, %g", path, filter_names[f], worst[f][0], worst[f][1]);
+        CHECK(worst[f][0] < 8 * ROUNDING_FACTOR && worst[f][1] < 8 * ROUNDING_FACTOR, "path %d, %s: %g, %g", path, filter_names[f],
+              worst[f][0], worst[f][1]);
     }
 }
 
@@ -238,21 +240,27 @@ static void compare_places(const lattice *l, const char *name, test_random *r) {
         CHECK(isogi_vol_build(&p[1], &l->volume, &context) == ISOGI_OK, "built");
         for (int f = 0; f < 3; f++) {
             for (int k = 0; k < 2; k++)
-                CHECK(isogi_vol_sample_filtered(p[k], filters[f], (const float(*)[3])points, COUNT, values[k], gradients[k]) == ISOGI_OK, "sampled");
+                CHECK(isogi_vol_sample_filtered(p[k], filters[f], (const float(*)[3])points, COUNT, values[k], gradients[k]) == ISOGI_OK,
+                      "sampled");
             for (int i = 0; i < COUNT; i++) {
                 double jump = 0;
                 const float *g = gradients[1][i];
-                if (!(test_finite((double)values[1][i]) && test_finite((double)g[0]) && test_finite((double)g[1]) && test_finite((double)g[2]))) worst[0] = 1;
+                if (!(test_finite((double)values[1][i]) && test_finite((double)g[0]) && test_finite((double)g[1]) &&
+                      test_finite((double)g[2])))
+                    worst[0] = 1;
                 worst[0] = fmax(worst[0], fabs((double)values[0][i] - (double)values[1][i]) / size);
-                for (int a = 0; a < 3; a++) jump = fmax(jump, fabs((double)gradients[0][i][a] - (double)gradients[1][i][a]) / (range * steepest));
+                for (int a = 0; a < 3; a++)
+                    jump = fmax(jump, fabs((double)gradients[0][i][a] - (double)gradients[1][i][a]) / (range * steepest));
                 /* on a lattice plane either cell has its trilinear gradient */
                 if (f || i % 5) worst[1] = fmax(worst[1], jump);
             }
         }
         isogi_vol_free(p[1]);
     }
-    printf("    %-9s: value %.2f, gradient %.2f in 2^-24 of the largest number, of the range\n", name, worst[0] * 0x1p24, worst[1] * 0x1p24);
-    CHECK(worst[0] * 0x1p24 < 8 * ROUNDING_FACTOR && worst[1] * 0x1p24 < 8 * ROUNDING_FACTOR, "%s: %g, %g", name, worst[0] * 0x1p24, worst[1] * 0x1p24);
+    printf("    %-9s: value %.2f, gradient %.2f in 2^-24 of the largest number, of the range\n", name, worst[0] * 0x1p24,
+           worst[1] * 0x1p24);
+    CHECK(worst[0] * 0x1p24 < 8 * ROUNDING_FACTOR && worst[1] * 0x1p24 < 8 * ROUNDING_FACTOR, "%s: %g, %g", name, worst[0] * 0x1p24,
+          worst[1] * 0x1p24);
     isogi_vol_free(p[0]);
 }
 
@@ -294,8 +302,8 @@ TEST(the_size_of_a_call_changes_no_bit) {
                     if (n > COUNT - i) n = COUNT - i;
                     isogi_vol_sample_filtered(p, filters[f], (const float(*)[3])points + i, (size_t)n, parts + i, part_gradients + i);
                 }
-                CHECK(!memcmp(whole, parts, sizeof whole) && !memcmp(whole_gradients, part_gradients, sizeof whole_gradients), "type %d path %d %s",
-                      type, path, filter_names[f]);
+                CHECK(!memcmp(whole, parts, sizeof whole) && !memcmp(whole_gradients, part_gradients, sizeof whole_gradients),
+                      "type %d path %d %s", type, path, filter_names[f]);
                 isogi_vol_sample_filtered(p, filters[f], (const float(*)[3])points, COUNT, parts, NULL);
                 CHECK(!memcmp(whole, parts, sizeof whole), "type %d path %d %s: values without gradients", type, path, filter_names[f]);
             }
@@ -336,9 +344,11 @@ TEST(wrong_calls_are_refused) {
     CHECK(isogi_vol_sample(p, NULL, 1, &value, NULL) == ISOGI_INVALID, "no points");
     CHECK(isogi_vol_sample_grid(p, ISOGI_FILTER_LINEAR, NULL, 1, &value, NULL) == ISOGI_INVALID, "no points");
     CHECK(isogi_vol_sample_grid(p, (isogi_filter)7, (const double(*)[3])grid, 1, &value, NULL) == ISOGI_INVALID, "no filter");
-    CHECK(isogi_vol_sample(p, NULL, 0, NULL, NULL) == ISOGI_OK && isogi_vol_sample(p, (const float(*)[3])point, 1, NULL, NULL) == ISOGI_OK, "nothing to do");
+    CHECK(isogi_vol_sample(p, NULL, 0, NULL, NULL) == ISOGI_OK && isogi_vol_sample(p, (const float(*)[3])point, 1, NULL, NULL) == ISOGI_OK,
+          "nothing to do");
     CHECK(value == 5, "a refused call wrote");
-    CHECK(isogi_vol_prefilter(NULL, coefficients, NULL) == ISOGI_INVALID && isogi_vol_prefilter(&l.volume, NULL, NULL) == ISOGI_INVALID, "prefilter");
+    CHECK(isogi_vol_prefilter(NULL, coefficients, NULL) == ISOGI_INVALID && isogi_vol_prefilter(&l.volume, NULL, NULL) == ISOGI_INVALID,
+          "prefilter");
     isogi_vol_free(p);
     free(l.memory);
 }
@@ -361,7 +371,8 @@ TEST(nothing_is_read_beyond_the_volume) {
                     for (int k = 0; k < 14; k++)
                         for (int j = 0; j < 12; j++) {
                             float points[10][3], values[10], gradients[10][3];
-                            for (int i = 0; i < 10; i++) points[i][0] = 0.5f * (float)i, points[i][1] = 0.5f * (float)j, points[i][2] = 0.5f * (float)k;
+                            for (int i = 0; i < 10; i++)
+                                points[i][0] = 0.5f * (float)i, points[i][1] = 0.5f * (float)j, points[i][2] = 0.5f * (float)k;
                             isogi_vol_sample_filtered(p, filters[f], (const float(*)[3])points, 10, values, gradients);
                             CHECK(values[3] == 0 && gradients[3][1] == 0, "%g", (double)values[3]);
                         }
@@ -384,7 +395,8 @@ static double marschner_lobb(double x, double y, double z, double gradient[3]) {
     return (1 - sin(pi * z / 2) + 0.25 * (1 + cos(phase))) / 2.5;
 }
 
-/* The signal that such filters are tested by, at N voxels a side: root mean square error of values, mean angle between gradients, and how far samples
+/* The signal that such filters are tested by, at N voxels a side: root mean square error of values, mean angle between gradients, and how
+   far samples
    leave the range of their 64 voxels, relative to the range of the field. */
 TEST(interpolation_of_marschner_lobb_errs_as_stated) {
     enum { SIZES = 2, COUNT = 20000, METHODS = 4 };
@@ -400,7 +412,8 @@ TEST(interpolation_of_marschner_lobb_errs_as_stated) {
         float *values = (float *)malloc(COUNT * sizeof *values);
         double unused[3], h = 2.0 / (n - 1);
         for (size_t i = 0; i < voxels; i++)
-            data[i] = (float)marschner_lobb(-1 + h * (double)(i % (size_t)n), -1 + h * (double)(i / (size_t)n % (size_t)n), -1 + h * (double)(i / (size_t)n / (size_t)n), unused);
+            data[i] = (float)marschner_lobb(-1 + h * (double)(i % (size_t)n), -1 + h * (double)(i / (size_t)n % (size_t)n),
+                                            -1 + h * (double)(i / (size_t)n / (size_t)n), unused);
         isogi_volume v = {.data = data, .type = ISOGI_F32, .size = {(size_t)n, (size_t)n, (size_t)n}};
         for (int a = 0; a < 3; a++) v.spacing[a] = h, v.origin[a] = -1;
         isogi_volume c = v;
@@ -412,12 +425,15 @@ TEST(interpolation_of_marschner_lobb_errs_as_stated) {
             for (int a = 0; a < 3; a++) points[i][a] = (float)random_range(&r, -0.9, 0.9);
         for (int m = 0; m < METHODS; m++) {
             double sum = 0, angles = 0, most = 0;
-            isogi_vol_sample_filtered(p[m == 3], m == 3 ? ISOGI_FILTER_BSPLINE : filters[m], (const float(*)[3])points, COUNT, values, gradients);
+            isogi_vol_sample_filtered(p[m == 3], m == 3 ? ISOGI_FILTER_BSPLINE : filters[m], (const float(*)[3])points, COUNT, values,
+                                      gradients);
             for (int i = 0; i < COUNT; i++) {
-                double g[3], dot = 0, l0 = 0, l1 = 0, low = 1e300, high = -1e300, at[3] = {(double)points[i][0], (double)points[i][1], (double)points[i][2]};
+                double g[3], dot = 0, l0 = 0, l1 = 0, low = 1e300, high = -1e300,
+                             at[3] = {(double)points[i][0], (double)points[i][1], (double)points[i][2]};
                 double truth = marschner_lobb(at[0], at[1], at[2], g), value = (double)values[i];
                 sum += (value - truth) * (value - truth);
-                for (int a = 0; a < 3; a++) dot += g[a] * (double)gradients[i][a], l0 += g[a] * g[a], l1 += (double)gradients[i][a] * (double)gradients[i][a];
+                for (int a = 0; a < 3; a++)
+                    dot += g[a] * (double)gradients[i][a], l0 += g[a] * g[a], l1 += (double)gradients[i][a] * (double)gradients[i][a];
                 angles += l1 > 0 ? acos(fmax(-1, fmin(1, dot / sqrt(l0 * l1)))) : 0;
                 for (int t = 0; t < 64; t++) {
                     int cell[3], tap[3] = {t & 3, t >> 2 & 3, t >> 4};
@@ -428,14 +444,16 @@ TEST(interpolation_of_marschner_lobb_errs_as_stated) {
                 most = fmax(most, fmax(low - value, value - high));
             }
             rms[s][m] = sqrt(sum / COUNT), angle[s][m] = angles / COUNT * 180 / 3.14159265358979323846, over[s][m] = fmax(most, 0);
-            printf("    %d^3 %-11s: value RMS %.4f, gradient %.1f degrees, overshoot %.4f\n", n, names[m], rms[s][m], angle[s][m], over[s][m]);
+            printf("    %d^3 %-11s: value RMS %.4f, gradient %.1f degrees, overshoot %.4f\n", n, names[m], rms[s][m], angle[s][m],
+                   over[s][m]);
         }
         isogi_vol_free(p[0]), isogi_vol_free(p[1]);
         free(data), free(coefficients), free(points), free(gradients), free(values);
     }
     CHECK(rms[0][2] < rms[0][0] && rms[0][3] < rms[0][2] && rms[0][0] < rms[0][1], "order of errors at 41^3");
     /* fourth and third order against second, where the signal is resolved */
-    CHECK(rms[1][3] < 0.2 * rms[1][0] && rms[1][2] < 0.5 * rms[1][0], "prefiltered %g, Catmull-Rom %g, trilinear %g", rms[1][3], rms[1][2], rms[1][0]);
+    CHECK(rms[1][3] < 0.2 * rms[1][0] && rms[1][2] < 0.5 * rms[1][0], "prefiltered %g, Catmull-Rom %g, trilinear %g", rms[1][3], rms[1][2],
+          rms[1][0]);
     CHECK(angle[1][3] < angle[1][2] && angle[1][2] < angle[1][0], "gradients");
     /* weights that are not negative, and sum to 1, stay within the voxels up to rounding */
     CHECK(over[0][0] < 1e-6 && over[0][1] < 1e-6, "overshoot without negative weights: %g, %g", over[0][0], over[0][1]);
@@ -457,7 +475,8 @@ TEST(interpolating_filters_pass_through_the_voxels) {
                 isogi_vol_build(&p[0], &l.volume, NULL), isogi_vol_build(&p[1], &c, NULL);
                 for (size_t i = 0; i < voxels; i++) {
                     int at[3] = {(int)(i % c.size[0]), (int)(i / c.size[0] % c.size[1]), (int)(i / c.size[0] / c.size[1])};
-                    double grid[1][3] = {{at[0], at[1], at[2]}}, truth = voxel(&l, at[0], at[1], at[2]), size = fmax(fabs(l.least), fabs(l.most));
+                    double grid[1][3] = {{at[0], at[1], at[2]}}, truth = voxel(&l, at[0], at[1], at[2]),
+                           size = fmax(fabs(l.least), fabs(l.most));
                     isogi_vol_sample_grid(p[0], ISOGI_FILTER_CATMULL_ROM, (const double(*)[3])grid, 1, &value[0], NULL);
                     isogi_vol_sample_grid(p[1], ISOGI_FILTER_BSPLINE, (const double(*)[3])grid, 1, &value[1], NULL);
                     /* coefficients grow by 3 for each axis at most, and are floats */
@@ -484,7 +503,9 @@ TEST(huge_values_stay_finite_at_the_border) {
             CHECK(isogi_vol_build(&p, &v, &context) == ISOGI_OK, "%g", (double)largest[k]);
             for (int f = ISOGI_FILTER_BSPLINE; f <= ISOGI_FILTER_CATMULL_ROM; f++) {
                 CHECK(isogi_vol_sample_grid(p, (isogi_filter)f, points, 3, value, NULL) == ISOGI_OK, "%g", (double)largest[k]);
-                for (int i = 0; i < 3; i++) CHECK(test_finite((double)value[i]) && fabs((double)value[i]) < 1.5 * (double)largest[k], "path %d, filter %d, point %d: %g of %g", path, f, i, (double)value[i], (double)largest[k]);
+                for (int i = 0; i < 3; i++)
+                    CHECK(test_finite((double)value[i]) && fabs((double)value[i]) < 1.5 * (double)largest[k],
+                          "path %d, filter %d, point %d: %g of %g", path, f, i, (double)value[i], (double)largest[k]);
             }
             isogi_vol_free(p);
         }

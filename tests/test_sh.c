@@ -28,8 +28,8 @@ static void random_rotation(test_random *r, double m[9]) {
     } while (n > 1 || n < 0.1);
     n = sqrt(n);
     double w = q[0] / n, x = q[1] / n, y = q[2] / n, z = q[3] / n;
-    double t[9] = {1 - 2 * (y * y + z * z), 2 * (x * y - w * z),     2 * (x * z + w * y),    2 * (x * y + w * z),    1 - 2 * (x * x + z * z),
-                   2 * (y * z - w * x),     2 * (x * z - w * y),     2 * (y * z + w * x),    1 - 2 * (x * x + y * y)};
+    double t[9] = {1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y), 2 * (x * y + w * z),    1 - 2 * (x * x + z * z),
+                   2 * (y * z - w * x),     2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)};
     memcpy(m, t, sizeof t);
 }
 
@@ -111,8 +111,9 @@ TEST(convention) {
         random_direction(&r, d[0]);
         isogi_sh_eval_f64(y, 3, (const double(*)[3])d, 1);
         double X = d[0][0], Y = d[0][1], Z = d[0][2], a = sqrt(3 / (4 * pi)), b = sqrt(15 / (4 * pi));
-        double expected[9] = {sqrt(1 / (4 * pi)), a * Y, a * Z, a * X, b * X * Y, b * Y * Z, sqrt(5 / (16 * pi)) * (3 * Z * Z - 1), b * X * Z,
-                              b / 2 * (X * X - Y * Y)};
+        double expected[9] = {
+            sqrt(1 / (4 * pi)),     a * Y, a * Z, a * X, b * X * Y, b * Y * Z, sqrt(5 / (16 * pi)) * (3 * Z * Z - 1), b * X * Z,
+            b / 2 * (X * X - Y * Y)};
         for (int k = 0; k < 9; k++) CHECK(fabs(y[k] - expected[k]) < 2e-15, "Y%d = %.17g, expected %.17g", k, y[k], expected[k]);
     }
 }
@@ -136,8 +137,8 @@ TEST(double_evaluation_is_exact) {
             }
         }
         printf("    degree %d: largest error %.3g\n", cases[c].degree, worst);
-        CHECK(worst <= cases[c].bound * (ROUNDING_FACTOR > 1 && cases[c].degree == 100 ? 6 : ROUNDING_FACTOR), "degree %d: error %g at (%g %g %g), bound %g", cases[c].degree, worst, at[0], at[1], at[2],
-              cases[c].bound);
+        CHECK(worst <= cases[c].bound * (ROUNDING_FACTOR > 1 && cases[c].degree == 100 ? 6 : ROUNDING_FACTOR),
+              "degree %d: error %g at (%g %g %g), bound %g", cases[c].degree, worst, at[0], at[1], at[2], cases[c].bound);
     }
 }
 
@@ -174,7 +175,8 @@ TEST(float_evaluation_is_exact) {
 /* Batches, in both types and at every instruction level, which go other ways than single directions: within the same bounds. More
    directions close to the poles and the equator, where polynomials and recursions cancel most. */
 TEST(batches_are_exact_at_every_level) {
-    static const struct { int order; double bound, bound64; } cases[] = {{3, 4.5e-7, 1e-15}, {4, 4.5e-7, 1e-15}, {5, 4.5e-7, 1e-15}, {8, 2.2e-6, 5e-15}, {11, 2.2e-6, 5e-15}, {21, 1e-5, 1.5e-14}};
+    static const struct { int order; double bound, bound64; } cases[] = {{3, 4.5e-7, 1e-15}, {4, 4.5e-7, 1e-15}, {5, 4.5e-7, 1e-15},
+        {8, 2.2e-6, 5e-15}, {11, 2.2e-6, 5e-15}, {21, 1e-5, 1.5e-14}};
     enum { MOST = 2400 };
     static float d[MOST][3], y[MOST * 441];
     static double wide[MOST][3], y64[MOST * 441];
@@ -185,7 +187,8 @@ TEST(batches_are_exact_at_every_level) {
         for (int i = 0; i < count; i++) {
             if (!hard_direction(wide[i], i, &r)) random_direction(&r, wide[i]);
             if (i >= 294 && i % 3 < 2) { /* within 0.2 of a pole, or 0.05 of the equator */
-                double z = i % 3 ? 0.05 * random_range(&r, -1, 1) : (i & 1 ? -1 : 1) * (1 - 0.02 * random_unit(&r)), phi = random_range(&r, 0, 2 * pi), s = sqrt(1 - z * z);
+                double z = i % 3 ? 0.05 * random_range(&r, -1, 1) : (i & 1 ? -1 : 1) * (1 - 0.02 * random_unit(&r)),
+                       phi = random_range(&r, 0, 2 * pi), s = sqrt(1 - z * z);
                 wide[i][0] = s * cos(phi), wide[i][1] = s * sin(phi), wide[i][2] = z;
             }
             for (int k = 0; k < 3; k++) d[i][k] = rounded(wide[i][k]);
@@ -212,7 +215,8 @@ TEST(batches_are_exact_at_every_level) {
 /* Floats against doubles of the plain code, which the tests above compare with 128 bits: cheap, so that many directions are seen.
    Bounds are those of the next degree that the header names. */
 TEST(floats_are_exact_at_many_directions) {
-    static const struct { int order; double bound; } cases[] = {{3, 4.5e-7}, {5, 4.5e-7}, {6, 2.2e-6}, {8, 2.2e-6}, {10, 2.2e-6}, {11, 2.2e-6}, {12, 1e-5}, {15, 1e-5}, {16, 1e-5}, {21, 1e-5}};
+    static const struct { int order; double bound; } cases[] = {{3, 4.5e-7}, {5, 4.5e-7}, {6, 2.2e-6}, {8, 2.2e-6}, {10, 2.2e-6},
+        {11, 2.2e-6}, {12, 1e-5}, {15, 1e-5}, {16, 1e-5}, {21, 1e-5}};
     enum { BLOCK = 64 };
     static float d[BLOCK][3], y[BLOCK * 441];
     static double wide[BLOCK][3], expected[BLOCK * 441];
@@ -241,14 +245,16 @@ TEST(floats_are_exact_at_many_directions) {
         }
         instruction_level = BEST_LEVEL;
         printf("    order %2d: %.3g, %.3g, %.3g at levels 0, 1, 2\n", cases[c].order, worst[0], worst[1], worst[2]);
-        for (int k = 0; k < 3; k++) CHECK(worst[k] <= cases[c].bound * ROUNDING_FACTOR, "order %d, level %d: %g", cases[c].order, k, worst[k]);
+        for (int k = 0; k < 3; k++)
+            CHECK(worst[k] <= cases[c].bound * ROUNDING_FACTOR, "order %d, level %d: %g", cases[c].order, k, worst[k]);
     }
 }
 
 /* Length does not matter, from denormal to huge; the zero vector and what is not finite count as +z. */
 TEST(any_length_and_no_length) {
     static const float scales[] = {1, 1e-44f, 1e-38f, 1e-20f, 3e20f, 3e38f};
-    float y[25], up[25], d[1][3] = {{0, 0, 1}}, bad[][3] = {{0, 0, 0}, {NAN, 0, 1}, {0, INFINITY, 0}, {-INFINITY, NAN, 2}, {-0.0f, 0, -0.0f}};
+    float y[25], up[25], d[1][3] = {{0, 0, 1}},
+                         bad[][3] = {{0, 0, 0}, {NAN, 0, 1}, {0, INFINITY, 0}, {-INFINITY, NAN, 2}, {-0.0f, 0, -0.0f}};
     isogi_sh_eval(up, 5, (const float(*)[3])d, 1);
     for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
         isogi_sh_eval(y, 5, (const float(*)[3]) & bad[i], 1);
@@ -291,8 +297,12 @@ TEST(any_vector_at_any_order) {
         int order = orders[o], n = order * order, bad = 0;
         double worst = 0, worst64 = 0;
         for (int k = 0; k < n; k++) c[k] = (float)random_range(&r, -1, 1) / (float)order;
-        CHECK(isogi_sh_eval(y, order, (const float(*)[3])d, COUNT) == ISOGI_OK && isogi_sh_eval_f64(y64, order, (const double(*)[3])wide, COUNT) == ISOGI_OK, "order %d", order);
-        CHECK(isogi_sh_eval_soa(columns, order, x[0], x[1], x[2], COUNT) == ISOGI_OK && isogi_sh_eval_soa_f64(columns64, order, x64[0], x64[1], x64[2], COUNT) == ISOGI_OK, "order %d", order);
+        CHECK(isogi_sh_eval(y, order, (const float(*)[3])d, COUNT) == ISOGI_OK &&
+                  isogi_sh_eval_f64(y64, order, (const double(*)[3])wide, COUNT) == ISOGI_OK,
+              "order %d", order);
+        CHECK(isogi_sh_eval_soa(columns, order, x[0], x[1], x[2], COUNT) == ISOGI_OK &&
+                  isogi_sh_eval_soa_f64(columns64, order, x64[0], x64[1], x64[2], COUNT) == ISOGI_OK,
+              "order %d", order);
         for (int i = 0; i < COUNT; i++) {
             isogi_sh_eval(one, order, (const float(*)[3])d + i, 1);
             for (int k = 0; k < n; k++) {
@@ -483,7 +493,8 @@ TEST(environment_lookup_has_the_stated_orientation) {
                 float direction[3] = {(float)(7 * w[0]), (float)(7 * w[1]), (float)(7 * w[2])};
                 isogi_env_radiance(&env, direction, rgb);
                 for (int k = 0; k < 3; k++)
-                    CHECK(fabsf(rgb[k] - image[j][i][k]) < 1e-5f, "texel %d %d: %g, expected %g", i, j, (double)rgb[k], (double)image[j][i][k]);
+                    CHECK(fabsf(rgb[k] - image[j][i][k]) < 1e-5f, "texel %d %d: %g, expected %g", i, j, (double)rgb[k],
+                          (double)image[j][i][k]);
             }
     }
     isogi_env plain = {.rgb = &image[0][0][0], .width = W, .height = H};
@@ -500,12 +511,14 @@ TEST(environment_lookup_survives_anything) {
     float one[1][3] = {{5, 6, 7}}, wide[3][3] = {{1, 1, 1}, {1, 1, 1}, {1, 1, 1}}, rgb[3];
     const float odd[] = {0, -0.0f, 1, -1, 1e-45f, 1e38f, -3e38f, INFINITY, -INFINITY, NAN, 1e-8f};
     int n = (int)(sizeof odd / sizeof *odd);
-    isogi_env a = {.rgb = one[0], .width = 1, .height = 1}, b = {.rgb = wide[0], .width = 3, .height = 1}, c = {.rgb = wide[0], .width = 1, .height = 3};
+    isogi_env a = {.rgb = one[0], .width = 1, .height = 1}, b = {.rgb = wide[0], .width = 3, .height = 1},
+              c = {.rgb = wide[0], .width = 1, .height = 3};
     isogi_env black = {.rgb = NULL};
     for (int i = 0; i < n * n * n; i++) {
         float d[3] = {odd[i % n], odd[i / n % n], odd[i / n / n]};
         isogi_env_radiance(&a, d, rgb);
-        CHECK(fabsf(rgb[0] - 5) < 1e-5f && fabsf(rgb[2] - 7) < 1e-5f, "direction %g %g %g: %g", (double)d[0], (double)d[1], (double)d[2], (double)rgb[0]);
+        CHECK(fabsf(rgb[0] - 5) < 1e-5f && fabsf(rgb[2] - 7) < 1e-5f, "direction %g %g %g: %g", (double)d[0], (double)d[1], (double)d[2],
+              (double)rgb[0]);
         isogi_env_radiance(&b, d, rgb);
         CHECK(fabsf(rgb[0] - 1) < 1e-6f, "direction %g %g %g: %g", (double)d[0], (double)d[1], (double)d[2], (double)rgb[0]);
         isogi_env_radiance(&c, d, rgb);
@@ -575,7 +588,8 @@ TEST(lights_have_the_irradiance_they_state) {
         isogi_sh_eval(y, ORDER, (const float(*)[3])d, 1);
         double e[3] = {0, 0, 0};
         for (int k = 0; k < 3 * ORDER * ORDER; k++) e[k % 3] += (double)c[k] * (double)y[k / 3];
-        CHECK(fabs(e[0] - 3) < 3e-3 && fabs(e[1] - 1) < 1e-3 && fabs(e[2] - 2) < 2e-3, "light %d: irradiance %g %g %g", (int)i, e[0], e[1], e[2]);
+        CHECK(fabs(e[0] - 3) < 3e-3 && fabs(e[1] - 1) < 1e-3 && fabs(e[2] - 2) < 2e-3, "light %d: irradiance %g %g %g", (int)i, e[0], e[1],
+              e[2]);
     }
 }
 
@@ -749,7 +763,8 @@ TEST(random_projection_converges) {
     isogi_sh_project_function(exact, 4, 2, 512, smooth_function, NULL);
     CHECK(isogi_sh_project_random(plain, 4, 2, n, 0, 1, smooth_function, NULL) == ISOGI_OK, "%d", 0);
     CHECK(isogi_sh_project_random(strata, 4, 2, n, 1, 1, smooth_function, NULL) == ISOGI_OK, "%d", 1);
-    CHECK(isogi_sh_project_random(again, 4, 2, n, 1, 1, smooth_function, NULL) == ISOGI_OK && !memcmp(again, strata, sizeof again), "%d", 2);
+    CHECK(isogi_sh_project_random(again, 4, 2, n, 1, 1, smooth_function, NULL) == ISOGI_OK && !memcmp(again, strata, sizeof again), "%d",
+          2);
     for (int i = 0; i < 32; i++) {
         rms[0] += (plain[i] - exact[i]) * (plain[i] - exact[i]) / 32;
         rms[1] += (strata[i] - exact[i]) * (strata[i] - exact[i]) / 32;
@@ -815,7 +830,8 @@ TEST(cube_maps_have_exact_solid_angles_and_the_stated_orientation) {
             }
         }
         CHECK(isogi_sh_project_cube(c, ORDER, 2, face, SIZE) == ISOGI_OK, "Y%d", i);
-        for (int k = 0; k < N; k++) CHECK(fabs((double)c[2 * k] - (k == i)) < 3.0 / (SIZE * SIZE), "Y%d on Y%d: %g", i, k, (double)c[2 * k]);
+        for (int k = 0; k < N; k++)
+            CHECK(fabs((double)c[2 * k] - (k == i)) < 3.0 / (SIZE * SIZE), "Y%d on Y%d: %g", i, k, (double)c[2 * k]);
         CHECK(fabs((double)c[1] - sqrt(4 * pi)) < 1e-6, "constant: %.9g", (double)c[1]);
     }
     memset(pixels, 0, sizeof pixels);
@@ -851,7 +867,8 @@ static void ivanic(double *rotation, int order, const double m[9]) {
         for (int s = -i; s <= i; s++)
             for (int t = -i; t <= i; t++) {
                 double d = s == 0, as = abs(s), denominator = abs(t) < i ? (i + t) * (i - t) : 2 * i * (2 * i - 1);
-                double u = sqrt((i + s) * (i - s) / denominator), v = 0.5 * sqrt((1 + d) * (i + as - 1) * (i + as) / denominator) * (1 - 2 * d);
+                double u = sqrt((i + s) * (i - s) / denominator),
+                       v = 0.5 * sqrt((1 + d) * (i + as - 1) * (i + as) / denominator) * (1 - 2 * d);
                 double w = -0.5 * sqrt(fmax(0, (i - as - 1) * (i - as) / denominator)) * (1 - d), sum = 0;
                 const double(*q)[3] = (const double(*)[3])r;
                 if (i == 1) { now[(s + 1) * 3 + t + 1] = r[s + 1][t + 1]; continue; }
@@ -886,7 +903,8 @@ TEST(rotation_matrices_are_those_of_ivanic_and_ruedenberg) {
         ivanic(theirs, ORDER, m);
         for (int l = 0, at = 0; l < ORDER; at += (2 * l + 1) * (2 * l + 1), l++)
             for (int i = 0; i <= 2 * l; i++)
-                for (int j = 0; j <= 2 * l; j++) worst = fmax(worst, fabs(ours[at + (2 * l + 1) * j + i] - theirs[at + (2 * l + 1) * i + j]));
+                for (int j = 0; j <= 2 * l; j++)
+                    worst = fmax(worst, fabs(ours[at + (2 * l + 1) * j + i] - theirs[at + (2 * l + 1) * i + j]));
     }
     printf("    largest difference %.3g\n", worst);
     CHECK(worst < 3e-14, "largest difference %g", worst);
@@ -895,7 +913,8 @@ TEST(rotation_matrices_are_those_of_ivanic_and_ruedenberg) {
 /* R R^T = 1 by degree, at degrees 10, 30 and 100: the bounds the header's users may rely on; special angles among them. */
 TEST(rotation_matrices_are_orthogonal) {
     static const struct { int degree; double bound; } cases[] = {{10, 4e-15}, {30, 1e-14}, {100, 2e-14}};
-    static const double special[][3] = {{0, 0, 0}, {0, 1e-9, 0}, {1, 1e-9, 2}, {0, 3.14159265358979323846, 0}, {0.3, 1.5707963267948966, 0}, {1, 3.1415926, 2}};
+    static const double special[][3] = {
+        {0, 0, 0}, {0, 1e-9, 0}, {1, 1e-9, 2}, {0, 3.14159265358979323846, 0}, {0.3, 1.5707963267948966, 0}, {1, 3.1415926, 2}};
     double *rotation = (double *)malloc(ISOGI_SH_ROTATION_COUNT(101) * sizeof(double));
     test_random r = {25};
     for (size_t c = 0; c < 3; c++) {
@@ -907,7 +926,8 @@ TEST(rotation_matrices_are_orthogonal) {
             if (round % 2 && round / 2 < 6) {
                 const double *a = special[round / 2 % 6];
                 double ca = cos(a[0]), sa = sin(a[0]), cb = cos(a[1]), sb = sin(a[1]), cc = cos(a[2]), sc = sin(a[2]);
-                double t[9] = {ca * cb * cc - sa * sc, -ca * cb * sc - sa * cc, ca * sb, sa * cb * cc + ca * sc, -sa * cb * sc + ca * cc, sa * sb, -sb * cc, sb * sc, cb};
+                double t[9] = {ca * cb * cc - sa * sc, -ca * cb * sc - sa * cc, ca * sb, sa * cb * cc + ca * sc, -sa * cb * sc + ca * cc,
+                    sa * sb, -sb * cc, sb * sc, cb};
                 memcpy(m, t, sizeof m);
             }
             isogi_sh_rotation_build_f64(rotation, degree + 1, m);
@@ -987,7 +1007,8 @@ TEST(rotations_by_inexact_matrices_keep_the_norm) {
 
 /* The makers of matrices agree with what they say: where the axes go. */
 TEST(matrices_are_what_they_say) {
-    float m[9], n[9], half = 0.70710678f, q[4] = {3 * half, 0, 0, 3 * half}, z[3] = {0, 0, 2}, axis[3] = {1, -2, 0.5f}, zero[4] = {0, 0, 0, 0};
+    float m[9], n[9], half = 0.70710678f, q[4] = {3 * half, 0, 0, 3 * half}, z[3] = {0, 0, 2}, axis[3] = {1, -2, 0.5f},
+                      zero[4] = {0, 0, 0, 0};
     CHECK(isogi_sh_matrix_from_quaternion(m, q) == ISOGI_OK, "%s", "a quarter turn about z");
     CHECK(isogi_sh_matrix_from_axis_angle(n, z, pi / 2) == ISOGI_OK, "%s", "the same");
     const float quarter[9] = {0, -1, 0, 1, 0, 0, 0, 0, 1}; /* x to y */
@@ -1001,17 +1022,22 @@ TEST(matrices_are_what_they_say) {
         for (int k = 0; k < 3; k++) sum += (double)m[3 * i + k] * (double)axis[k];
         CHECK(fabs(sum - (double)axis[i]) < 1e-6, "the axis stays: %g", sum);
     }
-    CHECK(isogi_sh_matrix_from_quaternion(m, zero) == ISOGI_INVALID && isogi_sh_matrix_from_axis_angle(m, zero, 1) == ISOGI_INVALID, "%s", "zero");
-    CHECK(isogi_sh_matrix_from_axis_angle(m, axis, NAN) == ISOGI_INVALID && isogi_sh_matrix_from_euler_zyz(m, 0, INFINITY, 0) == ISOGI_INVALID, "%s", "not finite");
+    CHECK(isogi_sh_matrix_from_quaternion(m, zero) == ISOGI_INVALID && isogi_sh_matrix_from_axis_angle(m, zero, 1) == ISOGI_INVALID, "%s",
+          "zero");
+    CHECK(isogi_sh_matrix_from_axis_angle(m, axis, NAN) == ISOGI_INVALID &&
+              isogi_sh_matrix_from_euler_zyz(m, 0, INFINITY, 0) == ISOGI_INVALID,
+          "%s", "not finite");
     CHECK(isogi_sh_rotate_z(m, m, 3, 1, NAN) == ISOGI_INVALID, "%s", "angle");
 }
 
-/* Rodrigues' formula, for half the angle's sine along the axis and cosine, of any length: long double, from the vectors as they are rounded. */
+/* Rodrigues' formula, for half the angle's sine along the axis and cosine, of any length: long double, from the vectors as they are
+   rounded. */
 static void turn_of(long double m[9], long double w, const double axis[3], long double s) {
     long double a[3] = {axis[0] * s, axis[1] * s, axis[2] * s}, norm = sqrtl(w * w + a[0] * a[0] + a[1] * a[1] + a[2] * a[2]);
     w /= norm, a[0] /= norm, a[1] /= norm, a[2] /= norm;
     for (int i = 0; i < 3; i++)
-        for (int k = 0; k < 3; k++) m[3 * i + k] = 2 * a[i] * a[k] + (i == k ? 2 * w * w - 1 : (k == (i + 1) % 3 ? -2 : 2) * w * a[3 - i - k]);
+        for (int k = 0; k < 3; k++)
+            m[3 * i + k] = 2 * a[i] * a[k] + (i == k ? 2 * w * w - 1 : (k == (i + 1) % 3 ? -2 : 2) * w * a[3 - i - k]);
 }
 
 /* In double, of vectors of any length: rotations to 1e-15 each entry, orthonormal to 2e-15, that agree with the float ones to their
@@ -1023,43 +1049,65 @@ TEST(matrices_in_double) {
     test_random r = {44};
     for (int i = 0; i < 3 * N; i++) c[i] = random_range(&r, -1, 1);
     for (int round = 0; round < 60; round++) {
-        double axis[3], angle = random_range(&r, -7, 7), length = lengths[round % 6], m[9], n[9], v[3], q[4], worst = 0, rounding = length < 1e-300 ? 1e-3 : 0, off = 0;
+        double axis[3], angle = random_range(&r, -7, 7), length = lengths[round % 6], m[9], n[9], v[3], q[4], worst = 0,
+                        rounding = length < 1e-300 ? 1e-3 : 0, off = 0;
         long double exact[2][9];
         float mf[9], nf[9], axis_f[3], q_f[4];
         random_direction(&r, axis);
         if (round % 12 < 6) axis[0] = axis[1] = 0, axis[2] = round % 12 < 3 ? 1 : -1;
-        for (int k = 0; k < 3; k++) v[k] = length * axis[k], q[k + 1] = length * sin(angle / 2) * axis[k], axis_f[k] = (float)axis[k], q_f[k + 1] = (float)(sin(angle / 2) * axis[k]);
+        for (int k = 0; k < 3; k++)
+            v[k] = length * axis[k], q[k + 1] = length * sin(angle / 2) * axis[k], axis_f[k] = (float)axis[k],
+            q_f[k + 1] = (float)(sin(angle / 2) * axis[k]);
         q[0] = length * cos(angle / 2), q_f[0] = (float)cos(angle / 2);
-        CHECK(isogi_sh_matrix_from_axis_angle_f64(m, v, angle) == ISOGI_OK && isogi_sh_matrix_from_quaternion_f64(n, q) == ISOGI_OK, "length %g", length);
-        CHECK(isogi_sh_matrix_from_axis_angle(mf, axis_f, angle) == ISOGI_OK && isogi_sh_matrix_from_quaternion(nf, q_f) == ISOGI_OK, "length %g", length);
-        turn_of(exact[0], cosl(angle / 2.0L), v, sinl(angle / 2.0L) / sqrtl((long double)v[0] * v[0] + (long double)v[1] * v[1] + (long double)v[2] * v[2]));
+        CHECK(isogi_sh_matrix_from_axis_angle_f64(m, v, angle) == ISOGI_OK && isogi_sh_matrix_from_quaternion_f64(n, q) == ISOGI_OK,
+              "length %g", length);
+        CHECK(isogi_sh_matrix_from_axis_angle(mf, axis_f, angle) == ISOGI_OK && isogi_sh_matrix_from_quaternion(nf, q_f) == ISOGI_OK,
+              "length %g", length);
+        turn_of(exact[0], cosl(angle / 2.0L), v,
+                sinl(angle / 2.0L) / sqrtl((long double)v[0] * v[0] + (long double)v[1] * v[1] + (long double)v[2] * v[2]));
         turn_of(exact[1], q[0], q + 1, 1);
         for (int i = 0; i < 9; i++) {
             double dot = 0;
             for (int k = 0; k < 3; k++) dot += m[3 * (i / 3) + k] * m[3 * (i % 3) + k];
             off = fmax(off, fmax(fabs((double)(m[i] - exact[0][i])), fabs((double)(n[i] - exact[1][i]))));
             worst = fmax(worst, fabs(dot - (i / 3 == i % 3)));
-            CHECK(fabs(m[i] - (double)mf[i]) < 4e-7 + rounding && fabs(m[i] - (double)nf[i]) < 4e-7 + rounding, "length %g, entry %d: %g %g %g", length, i, m[i], (double)mf[i], (double)nf[i]);
+            CHECK(fabs(m[i] - (double)mf[i]) < 4e-7 + rounding && fabs(m[i] - (double)nf[i]) < 4e-7 + rounding,
+                  "length %g, entry %d: %g %g %g", length, i, m[i], (double)mf[i], (double)nf[i]);
         }
-        CHECK(off <= 1e-15 * ROUNDING_FACTOR && worst <= 2e-15 * ROUNDING_FACTOR, "length %g: %g off, orthonormal to %g", length, off, worst);
+        CHECK(off <= 1e-15 * ROUNDING_FACTOR && worst <= 2e-15 * ROUNDING_FACTOR, "length %g: %g off, orthonormal to %g", length, off,
+              worst);
         if (round % 12 >= 6) continue;
         int order = 1 + round % ORDER, channels = 1 + round % 3, count = order * order * channels;
-        CHECK(isogi_sh_rotate_f64(once, c, order, channels, m) == ISOGI_OK && isogi_sh_rotate_z_f64(about, c, order, channels, axis[2] * angle) == ISOGI_OK, "order %d", order);
-        for (int i = 0; i < count; i++) CHECK(fabs(once[i] - about[i]) <= 2e-14 * ROUNDING_FACTOR, "order %d, %d about z: %g %g", order, i, once[i], about[i]);
+        CHECK(isogi_sh_rotate_f64(once, c, order, channels, m) == ISOGI_OK &&
+                  isogi_sh_rotate_z_f64(about, c, order, channels, axis[2] * angle) == ISOGI_OK,
+              "order %d", order);
+        for (int i = 0; i < count; i++)
+            CHECK(fabs(once[i] - about[i]) <= 2e-14 * ROUNDING_FACTOR, "order %d, %d about z: %g %g", order, i, once[i], about[i]);
     }
     for (int round = 0; round < 20; round++) {
-        double a = random_range(&r, -7, 7), b = random_range(&r, -7, 7), angle = random_range(&r, -7, 7), m[9], parts[3][9], z[3] = {0, 0, 1}, y[3] = {0, 1, 0}, product[9], all[9];
+        double a = random_range(&r, -7, 7), b = random_range(&r, -7, 7), angle = random_range(&r, -7, 7), m[9], parts[3][9],
+               z[3] = {0, 0, 1}, y[3] = {0, 1, 0}, product[9], all[9];
         CHECK(isogi_sh_matrix_from_euler_zyz_f64(m, a, b, angle) == ISOGI_OK, "round %d", round);
-        isogi_sh_matrix_from_axis_angle_f64(parts[0], z, a), isogi_sh_matrix_from_axis_angle_f64(parts[1], y, b), isogi_sh_matrix_from_axis_angle_f64(parts[2], z, angle);
-        for (int i = 0; i < 9; i++) product[i] = parts[0][3 * (i / 3)] * parts[1][i % 3] + parts[0][3 * (i / 3) + 1] * parts[1][3 + i % 3] + parts[0][3 * (i / 3) + 2] * parts[1][6 + i % 3];
-        for (int i = 0; i < 9; i++) all[i] = product[3 * (i / 3)] * parts[2][i % 3] + product[3 * (i / 3) + 1] * parts[2][3 + i % 3] + product[3 * (i / 3) + 2] * parts[2][6 + i % 3];
+        isogi_sh_matrix_from_axis_angle_f64(parts[0], z, a), isogi_sh_matrix_from_axis_angle_f64(parts[1], y, b),
+            isogi_sh_matrix_from_axis_angle_f64(parts[2], z, angle);
+        for (int i = 0; i < 9; i++)
+            product[i] = parts[0][3 * (i / 3)] * parts[1][i % 3] + parts[0][3 * (i / 3) + 1] * parts[1][3 + i % 3] +
+                         parts[0][3 * (i / 3) + 2] * parts[1][6 + i % 3];
+        for (int i = 0; i < 9; i++)
+            all[i] = product[3 * (i / 3)] * parts[2][i % 3] + product[3 * (i / 3) + 1] * parts[2][3 + i % 3] +
+                     product[3 * (i / 3) + 2] * parts[2][6 + i % 3];
         for (int i = 0; i < 9; i++) CHECK(fabs(m[i] - all[i]) < 3e-15, "Euler angles, entry %d: %g %g", i, m[i], all[i]);
     }
     double m[9] = {7}, zero[4] = {0, 0, 0, 0}, bad[4] = {1, (double)NAN, 0, (double)INFINITY}, z[3] = {0, 0, 1};
-    CHECK(isogi_sh_matrix_from_quaternion_f64(m, zero) == ISOGI_INVALID && isogi_sh_matrix_from_quaternion_f64(m, bad) == ISOGI_INVALID && isogi_sh_matrix_from_quaternion_f64(m, NULL) == ISOGI_INVALID, "%s", "quaternion");
-    CHECK(isogi_sh_matrix_from_axis_angle_f64(m, zero, 1) == ISOGI_INVALID && isogi_sh_matrix_from_axis_angle_f64(m, bad, 1) == ISOGI_INVALID && isogi_sh_matrix_from_axis_angle_f64(m, z, (double)NAN) == ISOGI_INVALID, "%s", "axis");
-    CHECK(isogi_sh_matrix_from_euler_zyz_f64(m, 0, 0, (double)INFINITY) == ISOGI_INVALID && isogi_sh_matrix_from_euler_zyz_f64(NULL, 0, 0, 0) == ISOGI_INVALID, "%s", "angles");
-    CHECK(isogi_sh_rotate_z_f64(m, m, 1, 1, (double)NAN) == ISOGI_INVALID && isogi_sh_rotate_z_f64(m, NULL, 1, 1, 0) == ISOGI_INVALID && isogi_sh_rotate_z_f64(m, m, 102, 1, 0) == ISOGI_INVALID, "%s", "about z");
+    CHECK(isogi_sh_matrix_from_quaternion_f64(m, zero) == ISOGI_INVALID && isogi_sh_matrix_from_quaternion_f64(m, bad) == ISOGI_INVALID &&
+        isogi_sh_matrix_from_quaternion_f64(m, NULL) == ISOGI_INVALID, "%s", "quaternion");
+    CHECK(isogi_sh_matrix_from_axis_angle_f64(m, zero, 1) == ISOGI_INVALID &&
+        isogi_sh_matrix_from_axis_angle_f64(m, bad, 1) == ISOGI_INVALID &&
+            isogi_sh_matrix_from_axis_angle_f64(m, z, (double)NAN) == ISOGI_INVALID, "%s", "axis");
+    CHECK(isogi_sh_matrix_from_euler_zyz_f64(m, 0, 0, (double)INFINITY) == ISOGI_INVALID &&
+        isogi_sh_matrix_from_euler_zyz_f64(NULL, 0, 0, 0) == ISOGI_INVALID, "%s", "angles");
+    CHECK(isogi_sh_rotate_z_f64(m, m, 1, 1, (double)NAN) == ISOGI_INVALID && isogi_sh_rotate_z_f64(m, NULL, 1, 1, 0) == ISOGI_INVALID &&
+        isogi_sh_rotate_z_f64(m, m, 102, 1, 0) == ISOGI_INVALID, "%s", "about z");
     CHECK(m[0] == 7, "%s", "outputs untouched");
 }
 
@@ -1091,14 +1139,16 @@ TEST(mirrors) {
    rotation does; in float by less than 2e-5. Rotations by 0, pi and 1e-9 do what they should. */
 TEST(composed_rotations_do_not_drift) {
     enum { ORDER = 6, N = ORDER * ORDER, TURNS = 10000 };
-    double c[N], start[N], before = 0, after = 0, after_float = 0, angle = 2 * pi / TURNS, m[9] = {cos(angle), 0, sin(angle), 0, 1, 0, -sin(angle), 0, cos(angle)};
+    double c[N], start[N], before = 0, after = 0, after_float = 0, angle = 2 * pi / TURNS,
+                           m[9] = {cos(angle), 0, sin(angle), 0, 1, 0, -sin(angle), 0, cos(angle)};
     float f[N], mf[9];
     test_random r = {28};
     for (int i = 0; i < N; i++) f[i] = (float)random_range(&r, -1, 1), start[i] = c[i] = (double)f[i], before += c[i] * c[i];
     for (int i = 0; i < 9; i++) mf[i] = (float)m[i];
     for (int i = 0; i < TURNS; i++) isogi_sh_rotate_f64(c, c, ORDER, 1, m), isogi_sh_rotate(f, f, ORDER, 1, mf);
     double worst = 0;
-    for (int i = 0; i < N; i++) after += c[i] * c[i], after_float += (double)f[i] * (double)f[i], worst = fmax(worst, fabs(c[i] - start[i]));
+    for (int i = 0; i < N; i++)
+        after += c[i] * c[i], after_float += (double)f[i] * (double)f[i], worst = fmax(worst, fabs(c[i] - start[i]));
     printf("    norm drift %.3g, float %.3g; distance after a full circle %.3g\n", after / before - 1, after_float / before - 1, worst);
     CHECK(fabs(after / before - 1) < 2e-12, "drift %g", after / before - 1);
     CHECK(fabs(after_float / before - 1) < 2e-5, "drift %g", after_float / before - 1);
@@ -1115,10 +1165,12 @@ TEST(composed_rotations_do_not_drift) {
                 isogi_sh_rotate(f, f, order, 1, mf);
             }
             for (int i = 1; i < order * order; i++) before += start[i] * start[i], after_float += (double)f[i] * (double)f[i];
-            printf("    order %d in float, %s: norm drift %.3g\n", order, random ? "random rotations" : "the same rotation", sqrt(after_float / before) - 1);
+            printf("    order %d in float, %s: norm drift %.3g\n", order, random ? "random rotations" : "the same rotation",
+                   sqrt(after_float / before) - 1);
             CHECK(fabs(sqrt(after_float / before) - 1) < 5e-4, "order %d: drift %g", order, sqrt(after_float / before) - 1);
         }
-    double identity[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1}, half[9] = {-1, 0, 0, 0, 1, 0, 0, 0, -1}, tiny[9] = {1, 0, 1e-9, 0, 1, 0, -1e-9, 0, 1}, out[N];
+    double identity[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1}, half[9] = {-1, 0, 0, 0, 1, 0, 0, 0, -1}, tiny[9] = {1, 0, 1e-9, 0, 1, 0, -1e-9, 0, 1},
+           out[N];
     isogi_sh_rotate_f64(out, start, ORDER, 1, identity);
     for (int i = 0; i < N; i++) CHECK(fabs(out[i] - start[i]) < 2e-15, "identity: %g %g", out[i], start[i]);
     isogi_sh_rotate_f64(out, start, ORDER, 1, tiny);
@@ -1153,7 +1205,8 @@ TEST(products_are_exact) {
                 for (int k = 0; k < n; k++) expected[k] += (double)weight[i / longitudes] * 2 * pi / longitudes * f * g * y[k];
             }
             for (int k = 0; k < n; k++)
-                CHECK(fabs((double)out[e * n + k] - expected[k]) < 3e-6 * order, "order %d, %d of %d: %.9g, expected %.9g", order, k, e, (double)out[e * n + k], expected[k]);
+                CHECK(fabs((double)out[e * n + k] - expected[k]) < 3e-6 * order, "order %d, %d of %d: %.9g, expected %.9g", order, k, e,
+                      (double)out[e * n + k], expected[k]);
         }
         if (order > 7) continue;
         CHECK(isogi_sh_product_matrix(matrix, a, order) == ISOGI_OK, "order %d", order);
@@ -1161,7 +1214,8 @@ TEST(products_are_exact) {
             double sum = 0;
             for (int k = 0; k < n; k++) {
                 sum += (double)matrix[i * n + k] * (double)b[k];
-                CHECK(fabsf(matrix[i * n + k] - matrix[k * n + i]) < 1e-6f, "order %d: %g %g", order, (double)matrix[i * n + k], (double)matrix[k * n + i]);
+                CHECK(fabsf(matrix[i * n + k] - matrix[k * n + i]) < 1e-6f, "order %d: %g %g", order, (double)matrix[i * n + k],
+                      (double)matrix[k * n + i]);
             }
             CHECK(fabs(sum - (double)out[i]) < 1e-5, "order %d, row %d: %g, expected %g", order, i, sum, (double)out[i]);
         }
@@ -1224,7 +1278,8 @@ TEST(windows_and_deringing) {
             CHECK(isogi_sh_window(out, c, ORDER, 3, (isogi_sh_window_kind)kind, ORDER) == ISOGI_OK, "%s", names[kind]);
             CHECK(out[0] == c[0], "%s: degree 0 %g", names[kind], (double)out[0]);
             int i = 3 * (4 * 5 + 1);
-            CHECK(fabs((double)out[i] - at_half[kind] * (double)c[i]) < 1e-6, "%s at half width: %g of %g", names[kind], (double)out[i], (double)c[i]);
+            CHECK(fabs((double)out[i] - at_half[kind] * (double)c[i]) < 1e-6, "%s at half width: %g of %g", names[kind], (double)out[i],
+                  (double)c[i]);
             for (int step = 0; step < 3; step++) { /* none, width = order, de-ringed */
                 if (step == 0) memcpy(out, c, sizeof out);
                 if (step == 1) isogi_sh_window(out, c, ORDER, 3, (isogi_sh_window_kind)kind, ORDER);
@@ -1240,7 +1295,8 @@ TEST(windows_and_deringing) {
                 }
                 low[step] /= high;
             }
-            printf("    %s, %s: lowest value / highest %.4f, windowed %.4f, de-ringed %.6f at width %.3f\n", which ? "hemisphere" : "delta", names[kind], low[0], low[1], low[2], width);
+            printf("    %s, %s: lowest value / highest %.4f, windowed %.4f, de-ringed %.6f at width %.3f\n", which ? "hemisphere" : "delta",
+                   names[kind], low[0], low[1], low[2], width);
             CHECK(low[0] < -0.02, "there are rings to begin with: %g", low[0]);
             CHECK(low[2] > -1e-5, "de-ringed: %g", low[2]);
             isogi_sh_window(out, c, ORDER, 3, (isogi_sh_window_kind)kind, width * 1.1);
@@ -1260,7 +1316,9 @@ TEST(windows_and_deringing) {
     CHECK(isogi_sh_dering(out, out, ORDER, 3, ISOGI_SH_HANN, &width) == ISOGI_OK && width == 0, "nothing to do: width %g", width);
     out[1] = -1;
     CHECK(isogi_sh_dering(out, out, ORDER, 3, ISOGI_SH_HANN, &width) == ISOGI_INVALID, "%s", "a negative mean");
-    CHECK(isogi_sh_window(out, out, ORDER, 3, ISOGI_SH_HANN, 0) == ISOGI_INVALID && isogi_sh_window(out, out, ORDER, 3, ISOGI_SH_HANN, NAN) == ISOGI_INVALID, "%s", "width");
+    CHECK(isogi_sh_window(out, out, ORDER, 3, ISOGI_SH_HANN, 0) == ISOGI_INVALID &&
+              isogi_sh_window(out, out, ORDER, 3, ISOGI_SH_HANN, NAN) == ISOGI_INVALID,
+          "%s", "width");
 }
 
 /* Converted back and forth nothing changes, and written-out values of degree 1 and 2 are where other software has them. */
@@ -1273,10 +1331,13 @@ TEST(conventions_convert) {
         for (int b = 0; b < 18; b++) {
             isogi_sh_convention from = {(isogi_sh_normalisation)(a % 3), (isogi_sh_ordering)(a / 3 % 3), a / 9};
             isogi_sh_convention to = {(isogi_sh_normalisation)(b % 3), (isogi_sh_ordering)(b / 3 % 3), b / 9};
-            CHECK(isogi_sh_convert(there, c, ORDER, 2, from, to) == ISOGI_OK && isogi_sh_convert(back, there, ORDER, 2, to, from) == ISOGI_OK, "%d to %d", a, b);
+            CHECK(isogi_sh_convert(there, c, ORDER, 2, from, to) == ISOGI_OK &&
+                      isogi_sh_convert(back, there, ORDER, 2, to, from) == ISOGI_OK,
+                  "%d to %d", a, b);
             for (int i = 0; i < 2 * N; i++) CHECK(fabsf(back[i] - c[i]) < 2e-7f, "%d to %d: %g %g", a, b, (double)back[i], (double)c[i]);
         }
-    isogi_sh_convention ours = {ISOGI_SH_ORTHONORMAL, ISOGI_SH_ACN, 0}, sid = {ISOGI_SH_SN3D, ISOGI_SH_SID, 0}, pairs = {ISOGI_SH_ORTHONORMAL, ISOGI_SH_PAIRS, 1};
+    isogi_sh_convention ours = {ISOGI_SH_ORTHONORMAL, ISOGI_SH_ACN, 0}, sid = {ISOGI_SH_SN3D, ISOGI_SH_SID, 0},
+                        pairs = {ISOGI_SH_ORTHONORMAL, ISOGI_SH_PAIRS, 1};
     float one[9] = {0, 1, 2, 3, 4, 5, 6, 7, 8}, out[9];
     isogi_sh_convert(out, one, 3, 1, ours, sid); /* 1 -1 0; 2 -2 1 -1 0: of l(l+1)+m: 3 1 2 8 4 7 5 6 */
     static const int sid_order[9] = {0, 3, 1, 2, 8, 4, 7, 5, 6}, pair_order[9] = {0, 2, 3, 1, 6, 7, 5, 8, 4};
@@ -1350,19 +1411,22 @@ TEST(fits_find_one_light) {
         isogi_sh_project(c, ORDER, &lighting, NULL);
         CHECK(isogi_sh_dominant_direction(direction, rgb, c, ORDER) == ISOGI_OK, "%d", round);
         for (int k = 0; k < 3; k++)
-            CHECK(fabs((double)direction[k] - d[k]) < 1e-5 && fabsf(rgb[k] - sun.rgb[k]) < 1e-4f, "alone: %g %g, expected %g %g", (double)direction[k], (double)rgb[k], d[k], (double)sun.rgb[k]);
+            CHECK(fabs((double)direction[k] - d[k]) < 1e-5 && fabsf(rgb[k] - sun.rgb[k]) < 1e-4f, "alone: %g %g, expected %g %g",
+                  (double)direction[k], (double)rgb[k], d[k], (double)sun.rgb[k]);
         isogi_sh_constant(e, ORDER, base);
         isogi_sh_add(c, c, e, ORDER, 3);
         CHECK(isogi_sh_fit_directional(direction, rgb, ambient, c, ORDER) == ISOGI_OK, "%d", round);
         for (int k = 0; k < 3; k++)
             CHECK(fabs((double)direction[k] - d[k]) < 1e-5 && fabsf(rgb[k] - sun.rgb[k]) < 1e-4f && fabsf(ambient[k] - base[k]) < 1e-4f,
-                  "with ambient: %g %g %g, expected %g %g %g", (double)direction[k], (double)rgb[k], (double)ambient[k], d[k], (double)sun.rgb[k], (double)base[k]);
+                  "with ambient: %g %g %g, expected %g %g %g", (double)direction[k], (double)rgb[k], (double)ambient[k], d[k],
+                  (double)sun.rgb[k], (double)base[k]);
         for (int i = 0; i < 3 * N; i++) c[i] = (float)random_range(&r, -1, 1);
         CHECK(isogi_sh_fit_directional(direction, rgb, ambient, c, ORDER) == ISOGI_OK, "%d", round);
         for (int k = 0; k < 3; k++) CHECK(rgb[k] >= 0 && ambient[k] >= 0, "%g %g", (double)rgb[k], (double)ambient[k]);
     }
     float c[3 * N] = {0}, direction[3], rgb[3];
-    CHECK(isogi_sh_dominant_direction(direction, rgb, c, ORDER) == ISOGI_OK && direction[2] == 1 && rgb[0] == 0, "darkness: %g %g", (double)direction[2], (double)rgb[0]);
+    CHECK(isogi_sh_dominant_direction(direction, rgb, c, ORDER) == ISOGI_OK && direction[2] == 1 && rgb[0] == 0, "darkness: %g %g",
+          (double)direction[2], (double)rgb[0]);
     CHECK(isogi_sh_dominant_direction(direction, rgb, c, 1) == ISOGI_INVALID, "%s", "order 1");
 }
 
@@ -1381,7 +1445,8 @@ TEST(truncation_error_falls_with_order) {
     for (int l = 0; l < ORDER; l++) zonal[l] = (float)exp(-0.05 * l * (l + 1));
     isogi_sh_zonal_to_direction(single, ORDER, zonal, up);
     for (int i = 0; i < 3 * N; i++) lobe[i] = single[i / 3];
-    isogi_sh_band_energy(energy[0], delta, ORDER, 3), isogi_sh_band_energy(energy[1], sky, ORDER, 3), isogi_sh_band_energy(energy[2], lobe, ORDER, 3);
+    isogi_sh_band_energy(energy[0], delta, ORDER, 3), isogi_sh_band_energy(energy[1], sky, ORDER, 3),
+        isogi_sh_band_energy(energy[2], lobe, ORDER, 3);
     for (int e = 0; e < 3; e++)
         for (int l = 0; l < ORDER; l++) total[e] += energy[e][l];
     printf("    order   sun of 0.1 rad   hemisphere   soft lobe    (share of the energy of order %d that is missed)\n", ORDER);
@@ -1392,7 +1457,8 @@ TEST(truncation_error_falls_with_order) {
             for (int l = order; l < ORDER; l++) missed[e] += energy[e][l] / total[e];
         }
         printf("    %5d   %14.4f   %10.6f   %.3g\n", order, missed[0], missed[1], missed[2]);
-        if (order == 16) CHECK(missed[0] > 0.4 && missed[1] < 0.02 && missed[2] < 1e-9, "order 16: %g %g %g", missed[0], missed[1], missed[2]);
+        if (order == 16)
+            CHECK(missed[0] > 0.4 && missed[1] < 0.02 && missed[2] < 1e-9, "order 16: %g %g %g", missed[0], missed[1], missed[2]);
     }
 }
 
@@ -1434,7 +1500,8 @@ TEST(rotations_agree_at_every_level) {
             float mf[9];
             random_rotation(&r, m);
             for (int k = 0; k < 9; k++) mf[k] = (float)m[k];
-            for (int i = 0; i < 3 * N + 1; i++) f[i] = (float)(c[i] = random_range(&r, -1, 1)), plain[i] = other[i] = 5, plain_f[i] = other_f[i] = 5;
+            for (int i = 0; i < 3 * N + 1; i++)
+                f[i] = (float)(c[i] = random_range(&r, -1, 1)), plain[i] = other[i] = 5, plain_f[i] = other_f[i] = 5;
             instruction_level = 0;
             isogi_sh_rotate_f64(plain, c, order, channels, m);
             isogi_sh_rotate(plain_f, f, order, channels, mf);
@@ -1442,8 +1509,10 @@ TEST(rotations_agree_at_every_level) {
             if (round & 2) memcpy(other, c, sizeof(double) * (size_t)n), memcpy(other_f, f, sizeof(float) * (size_t)n);
             isogi_sh_rotate_f64(other, round & 2 ? other : c, order, channels, m);
             isogi_sh_rotate(other_f, round & 2 ? other_f : f, order, channels, mf);
-            for (int i = 0; i < n; i++) worst = fmax(worst, fabs(plain[i] - other[i])), worst_f = fmax(worst_f, fabs((double)plain_f[i] - (double)other_f[i]));
-            for (int i = n; i < 3 * N + 1; i++) CHECK(other[i] == 5 && other_f[i] == 5, "order %d: number %d of %d is written", order, i, n);
+            for (int i = 0; i < n; i++)
+                worst = fmax(worst, fabs(plain[i] - other[i])), worst_f = fmax(worst_f, fabs((double)plain_f[i] - (double)other_f[i]));
+            for (int i = n; i < 3 * N + 1; i++)
+                CHECK(other[i] == 5 && other_f[i] == 5, "order %d: number %d of %d is written", order, i, n);
         }
     instruction_level = BEST_LEVEL;
     CHECK(worst <= 1e-14 && worst_f <= 1e-6, "%g in double, %g in float", worst, worst_f);
@@ -1455,7 +1524,8 @@ TEST(matrices_agree_at_every_level) {
     enum { MOST = 18, N = ISOGI_SH_ROTATION_COUNT(MOST) };
     static double plain[N + 1], other[N + 1];
     static float plain_f[N + 1], other_f[N + 1];
-    static const double special[][3] = {{0, 0, 0}, {0, 1e-9, 0}, {1, 1e-9, 2}, {0, 3.14159265358979323846, 0}, {0.3, 1.5707963267948966, 0}, {1, 3.1415926, 2}};
+    static const double special[][3] = {
+        {0, 0, 0}, {0, 1e-9, 0}, {1, 1e-9, 2}, {0, 3.14159265358979323846, 0}, {0.3, 1.5707963267948966, 0}, {1, 3.1415926, 2}};
     test_random r = {42};
     double worst = 0, worst_f = 0;
     for (int order = 1; order <= MOST; order++)
@@ -1465,8 +1535,10 @@ TEST(matrices_agree_at_every_level) {
             float mf[9];
             random_rotation(&r, m);
             if (round < 6) {
-                double ca = cos(special[round][0]), sa = sin(special[round][0]), cb = cos(special[round][1]), sb = sin(special[round][1]), cc = cos(special[round][2]), sc = sin(special[round][2]);
-                double t[9] = {ca * cb * cc - sa * sc, -ca * cb * sc - sa * cc, ca * sb, sa * cb * cc + ca * sc, -sa * cb * sc + ca * cc, sa * sb, -sb * cc, sb * sc, cb};
+                double ca = cos(special[round][0]), sa = sin(special[round][0]), cb = cos(special[round][1]), sb = sin(special[round][1]),
+                    cc = cos(special[round][2]), sc = sin(special[round][2]);
+                double t[9] = {ca * cb * cc - sa * sc, -ca * cb * sc - sa * cc, ca * sb, sa * cb * cc + ca * sc, -sa * cb * sc + ca * cc,
+                    sa * sb, -sb * cc, sb * sc, cb};
                 memcpy(m, t, sizeof m);
             }
             for (int k = 0; k < 9; k++) mf[k] = (float)m[k];
@@ -1477,7 +1549,8 @@ TEST(matrices_agree_at_every_level) {
             instruction_level = BEST_LEVEL > 2 - round % 2 ? 2 - round % 2 : BEST_LEVEL;
             isogi_sh_rotation_build_f64(other, order, m);
             isogi_sh_rotation_build(other_f, order, mf);
-            for (int i = 0; i < n; i++) worst = fmax(worst, fabs(plain[i] - other[i])), worst_f = fmax(worst_f, fabs((double)plain_f[i] - (double)other_f[i]));
+            for (int i = 0; i < n; i++)
+                worst = fmax(worst, fabs(plain[i] - other[i])), worst_f = fmax(worst_f, fabs((double)plain_f[i] - (double)other_f[i]));
             for (int i = n; i <= N; i++) CHECK(other[i] == 5 && other_f[i] == 5, "order %d: number %d of %d is written", order, i, n);
         }
     instruction_level = BEST_LEVEL;
@@ -1489,7 +1562,8 @@ TEST(matrices_agree_at_every_level) {
    blocks with a zero or huge vector among good ones included. */
 TEST(instruction_levels_agree) {
     enum { ORDER = 21, N = ORDER * ORDER, COUNT = 43 };
-    static float d[COUNT][3], x[3][COUNT], base[COUNT * N], other[COUNT * N], c[3 * N], sum[COUNT * 3], sum2[COUNT * 3], p[2 * 25], p2[2 * 25], image[48 * 17 * 3], q[75], q2[75];
+    static float d[COUNT][3], x[3][COUNT], base[COUNT * N], other[COUNT * N], c[3 * N], sum[COUNT * 3], sum2[COUNT * 3], p[2 * 25],
+        p2[2 * 25], image[48 * 17 * 3], q[75], q2[75];
     static double D[COUNT][3], X[3][COUNT], wide[COUNT * N], wide2[COUNT * N];
     test_random r = {40};
     double worst = 0, worst_wide = 0, worst_sum = 0, worst_product = 0, worst_image = 0; /* worst: as a share of the bound */
@@ -1514,10 +1588,12 @@ TEST(instruction_levels_agree) {
             for (instruction_level = 1; instruction_level < 3; instruction_level++) {
                 isogi_sh_eval(other, order, (const float(*)[3])d, COUNT);
                 for (size_t i = 0; i < COUNT * n; i++)
-                    CHECK(fabs((double)base[i] - (double)other[i]) < bound * ROUNDING_FACTOR, "order %d, lengths %d, direction %d: %.9g %.9g", order, odd, (int)(i / n), (double)base[i], (double)other[i]);
+                    CHECK(fabs((double)base[i] - (double)other[i]) < bound * ROUNDING_FACTOR,
+                          "order %d, lengths %d, direction %d: %.9g %.9g", order, odd, (int)(i / n), (double)base[i], (double)other[i]);
                 for (size_t i = 0; i < COUNT * n; i++) worst = fmax(worst, fabs((double)base[i] - (double)other[i]) / bound);
                 isogi_sh_eval_soa(other, order, x[0], x[1], x[2], COUNT);
-                for (size_t i = 0; i < COUNT * n; i++) worst = fmax(worst, fabs((double)base[i] - (double)other[i % n * COUNT + i / n]) / bound);
+                for (size_t i = 0; i < COUNT * n; i++)
+                    worst = fmax(worst, fabs((double)base[i] - (double)other[i % n * COUNT + i / n]) / bound);
                 isogi_sh_eval_f64(wide2, order, (const double(*)[3])D, COUNT);
                 for (size_t i = 0; i < COUNT * n; i++) worst_wide = fmax(worst_wide, fabs(wide[i] - wide2[i]));
                 isogi_sh_eval_soa_f64(wide2, order, X[0], X[1], X[2], COUNT);
@@ -1536,7 +1612,8 @@ TEST(instruction_levels_agree) {
         for (int i = 0; i < 50; i++) worst_product = fmax(worst_product, fabs((double)p[i] - (double)p2[i]));
         for (int i = 0; i < 75; i++) worst_image = fmax(worst_image, fabs((double)q[i] - (double)q2[i]));
     }
-    printf("    evaluation %.3g of the bound, double %.3g, sums %.3g, products %.3g, images %.3g\n", worst, worst_wide, worst_sum, worst_product, worst_image);
+    printf("    evaluation %.3g of the bound, double %.3g, sums %.3g, products %.3g, images %.3g\n", worst, worst_wide, worst_sum,
+           worst_product, worst_image);
     CHECK(worst < ROUNDING_FACTOR, "evaluation differs by %g of its bound", worst);
     CHECK(worst_wide < 2e-14 * ROUNDING_FACTOR, "evaluation in double differs by %g", worst_wide);
     CHECK(worst_sum < 5e-5, "sums differ by %g", worst_sum);
@@ -1556,10 +1633,14 @@ static void no_rotation(const float m[9]) {
     for (instruction_level = 0; instruction_level < 3 && instruction_level <= BEST_LEVEL; instruction_level++)
         for (int o = 0; o < 8; o++) {
             for (int i = 0; i < N; i++) out[i] = 5, out_f[i] = 5;
-            CHECK(isogi_sh_rotate(out_f, in_f, orders[o], 1, m) == ISOGI_INVALID, "order %d, level %d, float", orders[o], instruction_level);
-            CHECK(isogi_sh_rotate_f64(out, in, orders[o], 1, wide) == ISOGI_INVALID, "order %d, level %d, double", orders[o], instruction_level);
-            CHECK(isogi_sh_rotation_build(out_f, orders[o], m) == ISOGI_INVALID, "order %d, level %d, float matrix", orders[o], instruction_level);
-            CHECK(isogi_sh_rotation_build_f64(out, orders[o], wide) == ISOGI_INVALID, "order %d, level %d, double matrix", orders[o], instruction_level);
+            CHECK(isogi_sh_rotate(out_f, in_f, orders[o], 1, m) == ISOGI_INVALID, "order %d, level %d, float", orders[o],
+                  instruction_level);
+            CHECK(isogi_sh_rotate_f64(out, in, orders[o], 1, wide) == ISOGI_INVALID, "order %d, level %d, double", orders[o],
+                  instruction_level);
+            CHECK(isogi_sh_rotation_build(out_f, orders[o], m) == ISOGI_INVALID, "order %d, level %d, float matrix", orders[o],
+                  instruction_level);
+            CHECK(isogi_sh_rotation_build_f64(out, orders[o], wide) == ISOGI_INVALID, "order %d, level %d, double matrix", orders[o],
+                  instruction_level);
             for (int i = 0; i < N; i++) CHECK(out[i] == 5 && out_f[i] == 5, "order %d, level %d writes", orders[o], instruction_level);
         }
     instruction_level = BEST_LEVEL;
@@ -1596,7 +1677,8 @@ TEST(bad_input_is_reported_and_changes_nothing) {
     CHECK(isogi_sh_project_function(c, 3, 1, -1, one_function, NULL) == ISOGI_INVALID, "%s", "resolution");
     CHECK(isogi_sh_project_function(c, 3, 17, 0, one_function, NULL) == ISOGI_INVALID, "%s", "channels");
     CHECK(isogi_sh_project_function(c, 3, 1, 0, NULL, NULL) == ISOGI_INVALID, "%s", "function");
-    CHECK(isogi_sh_project_equirect(y, 3, image, 0, 2) == ISOGI_INVALID && isogi_sh_project_equirect(y, 3, NULL, 4, 2) == ISOGI_INVALID, "%s", "image");
+    CHECK(isogi_sh_project_equirect(y, 3, image, 0, 2) == ISOGI_INVALID && isogi_sh_project_equirect(y, 3, NULL, 4, 2) == ISOGI_INVALID,
+          "%s", "image");
     CHECK(isogi_sh_convolve_cosine(y, NULL, 3, 3) == ISOGI_INVALID, "%s", "NULL");
     CHECK(!memcmp(y, before, sizeof y), "%s", "outputs untouched");
 }
@@ -1604,7 +1686,8 @@ TEST(bad_input_is_reported_and_changes_nothing) {
 TEST(lighting_is_validated) {
     float image[2 * 4 * 3] = {0}, sh[27] = {0};
     isogi_light lights[2] = {{.vector = {0, 1, 0}, .rgb = {1, 1, 1}}, {.kind = ISOGI_LIGHT_POINT, .vector = {0, 0, 0}, .rgb = {1, 1, 1}}};
-    const isogi_lighting good = {.env = {.rgb = image, .width = 4, .height = 2, .sh = sh, .sh_order = 3}, .lights = lights, .light_count = 2};
+    const isogi_lighting good = {
+        .env = {.rgb = image, .width = 4, .height = 2, .sh = sh, .sh_order = 3}, .lights = lights, .light_count = 2};
     isogi_lighting bad;
     isogi_lighting zero = {.lights = NULL};
     float out[27];

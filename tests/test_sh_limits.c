@@ -1,5 +1,6 @@
 /* The least and the highest order, and vectors without length, as short and as long as floats are, for what isogi_sh.h does besides
-   evaluation: cones, skies, lights, windows, conventions, algebra, rotations, projections, fits. The reference is tests/reference_sh.h: 128 bits, from the definition. */
+   evaluation: cones, skies, lights, windows, conventions, algebra, rotations, projections, fits. The reference is tests/reference_sh.h:
+   128 bits, from the definition. */
 #define _GNU_SOURCE /* stacks of threads */
 #define ISOGI_SH_IMPLEMENTATION
 #include "isogi_sh.h"
@@ -14,7 +15,8 @@ static const int orders[] = {1, 2, 101};
 enum { ORDERS = sizeof orders / sizeof *orders };
 
 /* axes of every length: poles, beside them, denormal (the least float too), huge (the sum of squares overflows floats) */
-static const float axes[][3] = {{0, 0, 1},         {0, 0, -1},  {1, 0, 0},           {0, -1, 0},           {1, 2, -2}, {1e-8f, 0, 1}, {0, 1e-30f, -1},
+static const float axes[][3] = {{0, 0, 1},         {0, 0, -1},  {1, 0, 0},           {0, -1, 0},           {1, 2, -2}, {1e-8f, 0, 1},
+    {0, 1e-30f, -1},
                                 {1e-40f, 2e-40f, -2e-40f}, {1e-45f, 0, 0}, {3e38f, -3e38f, 1e38f}, {0, 0, 3.4e38f}, {1e-40f, 0, 1e38f}};
 enum { AXES = sizeof axes / sizeof *axes };
 
@@ -54,7 +56,8 @@ static void cone_zonal(int order, double angle) {
         p = 1, before = 0;
         for (int l = 0; l < order; l++) {
             long double next = ((long double)(2 * l + 1) * z * p - (long double)l * before) / (long double)(l + 1);
-            zonal[l] += (double)(2 * 3.14159265358979323846264L * weight * sqrtl((long double)(2 * l + 1) / (4 * 3.14159265358979323846264L)) * p);
+            zonal[l] +=
+                (double)(2 * 3.14159265358979323846264L * weight * sqrtl((long double)(2 * l + 1) / (4 * 3.14159265358979323846264L)) * p);
             before = p, p = next;
         }
     }
@@ -120,7 +123,8 @@ TEST(skies_of_any_axis_and_order) {
 
 /* What has no direction is refused where it is an axis, and changes nothing; to evaluation it is +z. */
 TEST(axes_without_direction) {
-    const float bad[][3] = {{0, 0, 0}, {NAN, 0, 1}, {0, INFINITY, 0}, {1, 0, -INFINITY}}, rgb[3] = {1, 1, 1}, wrong[3] = {1, NAN, 1}, up[3] = {0, 0, 1};
+    const float bad[][3] = {{0, 0, 0}, {NAN, 0, 1}, {0, INFINITY, 0}, {1, 0, -INFINITY}}, rgb[3] = {1, 1, 1}, wrong[3] = {1, NAN, 1},
+                up[3] = {0, 0, 1};
     float z[MOST];
     for (int o = 0; o < ORDERS; o++) {
         int order = orders[o];
@@ -129,12 +133,18 @@ TEST(axes_without_direction) {
             isogi_light light = {.vector = {bad[i][0], bad[i][1], bad[i][2]}, .rgb = {1, 1, 1}};
             isogi_lighting lighting = {.lights = &light, .light_count = 1};
             CHECK(isogi_sh_cone(c, order, bad[i], 1, rgb) == ISOGI_INVALID, "cone %d", i);
-            CHECK(isogi_sh_hemisphere_sky(c, order, bad[i], rgb, rgb) == ISOGI_INVALID && isogi_sh_gradient_sky(c, order, bad[i], rgb, rgb) == ISOGI_INVALID, "sky %d", i);
+            CHECK(isogi_sh_hemisphere_sky(c, order, bad[i], rgb, rgb) == ISOGI_INVALID &&
+                      isogi_sh_gradient_sky(c, order, bad[i], rgb, rgb) == ISOGI_INVALID,
+                  "sky %d", i);
             CHECK(isogi_sh_project(c, order, &lighting, NULL) == ISOGI_INVALID, "light %d", i);
         }
-        CHECK(isogi_sh_cone(c, order, up, 1, wrong) == ISOGI_INVALID && isogi_sh_constant(c, order, wrong) == ISOGI_INVALID, "%s", "radiance");
-        CHECK(isogi_sh_cone(c, order, up, (double)NAN, rgb) == ISOGI_INVALID && isogi_sh_cone(c, order, up, HUGE_VAL, rgb) == ISOGI_INVALID, "%s", "angle");
-        CHECK(isogi_sh_gradient_sky(c, order, up, wrong, rgb) == ISOGI_INVALID && isogi_sh_hemisphere_sky(c, order, up, rgb, wrong) == ISOGI_INVALID, "%s", "sky");
+        CHECK(isogi_sh_cone(c, order, up, 1, wrong) == ISOGI_INVALID && isogi_sh_constant(c, order, wrong) == ISOGI_INVALID, "%s",
+              "radiance");
+        CHECK(isogi_sh_cone(c, order, up, (double)NAN, rgb) == ISOGI_INVALID && isogi_sh_cone(c, order, up, HUGE_VAL, rgb) == ISOGI_INVALID,
+              "%s", "angle");
+        CHECK(isogi_sh_gradient_sky(c, order, up, wrong, rgb) == ISOGI_INVALID &&
+                  isogi_sh_hemisphere_sky(c, order, up, rgb, wrong) == ISOGI_INVALID,
+              "%s", "sky");
         CHECK(!memcmp(c, d, 3 * ISOGI_SH_COUNT(order) * sizeof *c), "order %d: outputs untouched", order);
         for (int l = 0; l < order; l++) z[l] = 1 / (float)(1 + l);
         for (int l = 0; l < order; l++) zonal[l] = (double)z[l];
@@ -177,11 +187,13 @@ TEST(lights_of_any_length_and_order) {
         for (int i = 0; i < order * order; i++) expected[i] = i ? 0 : sqrt(4 * pi) / (pi * 100);
         for (int k = 0; k < 3; k++) check_channel("inside a spherical light", order, k, (double)rgb[k]);
         light.kind = ISOGI_LIGHT_RECTANGLE, light.edge[0][0] = 4, light.edge[1][2] = 2; /* shines to -y, where the point is not: dark */
-        CHECK(isogi_sh_project(c, order, &lighting, point) == ISOGI_OK && c[0] == 0 && c[3 * order * order - 1] == 0, "behind: %g", (double)c[0]);
+        CHECK(isogi_sh_project(c, order, &lighting, point) == ISOGI_OK && c[0] == 0 && c[3 * order * order - 1] == 0, "behind: %g",
+              (double)c[0]);
         light.edge[1][2] = -2;
         CHECK(isogi_sh_project(c, order, &lighting, point) == ISOGI_OK && c[0] > 0, "before: %g", (double)c[0]);
         isogi_sh_project(d, 5, &lighting, point);
-        for (int i = 0; i < 3 * order * order && i < 75; i++) CHECK(fabsf(c[i] - d[i]) <= 2e-7f * d[0], "rectangle, order %d: %g, at order 5 %g", order, (double)c[i], (double)d[i]);
+        for (int i = 0; i < 3 * order * order && i < 75; i++)
+            CHECK(fabsf(c[i] - d[i]) <= 2e-7f * d[0], "rectangle, order %d: %g, at order 5 %g", order, (double)c[i], (double)d[i]);
     }
 }
 
@@ -220,7 +232,8 @@ static aspect aspect_of(const isogi_light *light, const float point[3]) {
     aspect s = {.scale = 0};
     long double v[3][3], to[3], along[3], length[3];
     for (int k = 0; k < 3; k++) {
-        v[0][k] = (long double)light->edge[0][k], v[1][k] = (long double)light->edge[1][k], to[k] = (long double)light->vector[k] - (long double)point[k];
+        v[0][k] = (long double)light->edge[0][k], v[1][k] = (long double)light->edge[1][k],
+        to[k] = (long double)light->vector[k] - (long double)point[k];
         s.scale = fmax(s.scale, fabs((double)to[k]) + fabs((double)v[0][k]) + fabs((double)v[1][k]));
     }
     for (int k = 0; k < 3; k++) v[2][k] = v[0][(k + 2) % 3] * v[1][(k + 1) % 3] - v[0][(k + 1) % 3] * v[1][(k + 2) % 3];
@@ -243,7 +256,8 @@ static void add_slice(const aspect *s, int order, double y, double size) {
         double range = atan2(r * (s->high[0] - s->low[0]), r * r + s->low[0] * s->high[0]);
         int rows = 12 + (int)(order * (range + 0.5) / 4);
         for (int j = 0; j < rows; j++) {
-            double a = from + range * gauss(rows)[j][0], weight = size * gauss(columns)[i][1] * s->distance / (r * r) * range * gauss(rows)[j][1] * cos(a), w[1][3];
+            double a = from + range * gauss(rows)[j][0],
+                   weight = size * gauss(columns)[i][1] * s->distance / (r * r) * range * gauss(rows)[j][1] * cos(a), w[1][3];
             for (int k = 0; k < 3; k++) w[0][k] = sin(a) * s->axis[0][k] + cos(a) * (at * s->axis[1][k] + s->distance * s->axis[2][k]) / r;
             isogi_sh_eval_f64(all, order, (const double(*)[3])w, 1);
             for (int k = 0; k < order * order; k++) expected[k] += weight * all[k];
@@ -290,7 +304,8 @@ static double rectangle_error(const isogi_light *light, const float point[3], in
 /* From above, on an edge, a corner, beside and far from squares and strips of 1 : 1e6, a billion sides away to 1e-12 of a side (of 1e-18,
    where edges are along axes; turned, the distance to the plane is a difference, of which the header promises 1e-14 of the extent). */
 TEST(rectangles_near_large_and_long) {
-    static const double sides[][2] = {{1, 1}, {1, 0x1p-20}, {0x1p-10, 1}, {0x1p20, 0x1p20}, {0x1p-10, 0x1p10}, {0x1p-40, 0x1p-42}, {0x1p-20, 1}, {1, 0x1p-10}};
+    static const double sides[][2] = {{1, 1}, {1, 0x1p-20}, {0x1p-10, 1}, {0x1p20, 0x1p20}, {0x1p-10, 0x1p10}, {0x1p-40, 0x1p-42},
+        {0x1p-20, 1}, {1, 0x1p-10}};
     static const double places[][2] = {{0, 0}, {0.25, -0.375}, {0.5, 0.5}, {0.75, 0.25}, {0.5, 0}, {0.499, 0.4999}, {4, 3}, {0, 100}};
     double worst[2] = {0, 0};
     int count = 0, number = 0;
@@ -307,7 +322,8 @@ TEST(rectangles_near_large_and_long) {
                     for (int order = 6; order > 0; order -= order == 6 ? 3 : 2) {
                         error = rectangle_error(&light, point, order, &from);
                         worst[turned] = fmax(worst[turned], error);
-                        CHECK(error <= allowed, "%g x %g, turned %d, foot at %g %g, distance %g, order %d: %g", sides[s][0], sides[s][1], turned, places[p][0], places[p][1], from.distance, order, error);
+                        CHECK(error <= allowed, "%g x %g, turned %d, foot at %g %g, distance %g, order %d: %g", sides[s][0], sides[s][1],
+                              turned, places[p][0], places[p][1], from.distance, order, error);
                     }
                     count++;
                 }
@@ -321,14 +337,16 @@ TEST(rectangles_of_any_size) {
         const int some[] = {2, 4, 11};
         float point[3];
         int order = some[i % 3];
-        double narrow = 0.01 / order, side[2] = {pow(10, random_range(&r, -2, 3)), pow(10, random_range(&r, -2, 3))}, distance = pow(10, random_range(&r, -4, 2));
+        double narrow = 0.01 / order, side[2] = {pow(10, random_range(&r, -2, 3)), pow(10, random_range(&r, -2, 3))},
+               distance = pow(10, random_range(&r, -4, 2));
         double place[2] = {random_range(&r, -1.5, 1.5), random_range(&r, -1.5, 1.5)};
         if (i & 1) side[1] = distance * narrow * random_range(&r, 0.3, 4);
         isogi_light light = rectangle_at(point, 0, side, place, distance);
         aspect from = aspect_of(&light, point);
         rectangle_by_quadrature(&from, order);
         double error = rectangle_error(&light, point, order, &from);
-        CHECK(error <= ROUNDING_FACTOR * 1e-7, "%g x %g, foot at %g %g, distance %g, order %d: %g", side[0], side[1], place[0], place[1], distance, order, error);
+        CHECK(error <= ROUNDING_FACTOR * 1e-7, "%g x %g, foot at %g %g, distance %g, order %d: %g", side[0], side[1], place[0], place[1],
+              distance, order, error);
     }
 }
 
@@ -343,12 +361,16 @@ TEST(rectangles_in_any_unit) {
                 isogi_light light = rectangle_at(point, turned, sides[s], above, 0.75);
                 isogi_lighting lighting = {.lights = &light, .light_count = 1};
                 CHECK(isogi_sh_project(d, 6, &lighting, point) == ISOGI_OK, "%d", s);
-                for (int k = 0; k < 3; k++) light.vector[k] *= unit, light.edge[0][k] *= unit, light.edge[1][k] *= unit, point[k] *= unit, light.rgb[k] = ldexpf(light.rgb[k], exponent);
+                for (int k = 0; k < 3; k++)
+                    light.vector[k] *= unit, light.edge[0][k] *= unit, light.edge[1][k] *= unit, point[k] *= unit,
+                        light.rgb[k] = ldexpf(light.rgb[k], exponent);
                 CHECK(isogi_sh_project(c, 6, &lighting, point) == ISOGI_OK, "%d", s);
-                for (int i = 0; i < 108; i++) CHECK(fabs(ldexp((double)c[i], exponent) - (double)d[i]) <= 1e-6 * (double)d[1], "rectangle %d, unit 2^%d, coefficient %d: %g, not %g", s, exponent, i, ldexp((double)c[i], exponent), (double)d[i]);
+                for (int i = 0; i < 108; i++) CHECK(fabs(ldexp((double)c[i], exponent) - (double)d[i]) <= 1e-6 * (double)d[1],
+                    "rectangle %d, unit 2^%d, coefficient %d: %g, not %g", s, exponent, i, ldexp((double)c[i], exponent), (double)d[i]);
             }
     for (int i = 0; i < 625; i++) {
-        isogi_light light = {.kind = ISOGI_LIGHT_RECTANGLE, .vector = {ends[i / 5 % 5], 0, -ends[i % 5]}, .rgb = {3e38f, 1, 1e-45f}, .edge = {{ends[i / 25 % 5], 0, 0}, {0, ends[i / 125], 0}}};
+        isogi_light light = {.kind = ISOGI_LIGHT_RECTANGLE, .vector = {ends[i / 5 % 5], 0, -ends[i % 5]}, .rgb = {3e38f, 1, 1e-45f},
+            .edge = {{ends[i / 25 % 5], 0, 0}, {0, ends[i / 125], 0}}};
         isogi_lighting lighting = {.lights = &light, .light_count = 1};
         CHECK(isogi_sh_project(c, 3, &lighting, NULL) == ISOGI_OK && c[0] >= 0, "rectangle %d: %g", i, (double)c[0]);
         for (int k = 0; k < 27; k++) CHECK(test_finite((double)c[k]), "rectangle %d, coefficient %d: %g", i, k, (double)c[k]);
@@ -393,16 +415,24 @@ TEST(lights_beyond_the_range_of_floats) {
             const float *v = places[i % 4];
             double w[1][3] = {{(double)v[0], (double)v[1], (double)v[2]}}, y[9] = {0};
             memset(lights, 0, sizeof lights);
-            lights[0] = (isogi_light){.kind = i < 8 ? i < 4 ? ISOGI_LIGHT_POINT : ISOGI_LIGHT_SPHERE : ISOGI_LIGHT_RECTANGLE, .vector = {v[0], v[1], v[2]}, .rgb = {1, 0.5f, -0.25f}};
+            lights[0] = (isogi_light){.kind = i < 8 ? i < 4 ? ISOGI_LIGHT_POINT : ISOGI_LIGHT_SPHERE : ISOGI_LIGHT_RECTANGLE,
+                                      .vector = {v[0], v[1], v[2]},
+                                      .rgb = {1, 0.5f, -0.25f}};
             if (i < 8) lights[0].radius = i < 4 ? 0 : 1e-45f;
-            else lights[0].vector[0] = 0, lights[0].vector[1] = 0, lights[0].vector[2] = -1e-25f, lights[0].edge[0][0] = 1e-25f, lights[0].edge[1][1] = 2e-25f;
-            CHECK(isogi_sh_project(c, order, &lighting, NULL) == ISOGI_OK && c[0] > 1e36f, "light %d, order %d: %g", i, order, (double)c[0]);
-            CHECK(fabs((double)c[1] / (double)c[0] - 0.5) < 1e-6 && fabs((double)c[2] / (double)c[0] + 0.25) < 1e-6, "colour of light %d: %g %g %g", i, (double)c[0], (double)c[1], (double)c[2]);
+            else
+                lights[0].vector[0] = 0, lights[0].vector[1] = 0, lights[0].vector[2] = -1e-25f, lights[0].edge[0][0] = 1e-25f,
+                lights[0].edge[1][1] = 2e-25f;
+            CHECK(isogi_sh_project(c, order, &lighting, NULL) == ISOGI_OK && c[0] > 1e36f, "light %d, order %d: %g", i, order,
+                  (double)c[0]);
+            CHECK(fabs((double)c[1] / (double)c[0] - 0.5) < 1e-6 && fabs((double)c[2] / (double)c[0] + 0.25) < 1e-6,
+                  "colour of light %d: %g %g %g", i, (double)c[0], (double)c[1], (double)c[2]);
             if (order > 1 && i < 4) {
                 isogi_sh_eval_f64(y, 2, (const double(*)[3])w, 1);
-                for (int k = 1; k < 4; k++) CHECK(fabs((double)c[3 * k] / (double)c[0] - y[k] / y[0]) < 1e-6, "direction of light %d: %g", i, (double)c[3 * k]);
+                for (int k = 1; k < 4; k++)
+                    CHECK(fabs((double)c[3 * k] / (double)c[0] - y[k] / y[0]) < 1e-6, "direction of light %d: %g", i, (double)c[3 * k]);
             }
-            for (int k = 0; k < n; k++) CHECK(test_finite((double)c[k]), "light %d, order %d, coefficient %d: %g", i, order, k, (double)c[k]);
+            for (int k = 0; k < n; k++)
+                CHECK(test_finite((double)c[k]), "light %d, order %d, coefficient %d: %g", i, order, k, (double)c[k]);
         }
     for (int i = 0; i < 64; i++) lights[i] = (isogi_light){.vector = {0, i < 32, i >= 32}, .rgb = {3e38f, -3e38f, i & 1 ? 3e38f : -3e38f}};
     lighting.light_count = 64;
@@ -417,15 +447,18 @@ TEST(discs_to_half_pi_as_a_float) {
     isogi_light light = {.vector = {0, 0, 3}, .rgb = {1, 1, 1}, .radius = 1.5707964f};
     isogi_lighting lighting = {.lights = &light, .light_count = 1};
     for (int order = 1; order <= 101; order += 50) {
-        CHECK(isogi_sh_project(c, order, &lighting, NULL) == ISOGI_OK && isogi_sh_cone(d, order, up, pi / 2, one) == ISOGI_OK, "order %d", order);
-        for (int i = 0; i < 3 * order * order; i++) CHECK(fabsf(c[i] - d[i]) < 1e-6f, "order %d, coefficient %d: %g, expected %g", order, i, (double)c[i], (double)d[i]);
+        CHECK(isogi_sh_project(c, order, &lighting, NULL) == ISOGI_OK && isogi_sh_cone(d, order, up, pi / 2, one) == ISOGI_OK, "order %d",
+              order);
+        for (int i = 0; i < 3 * order * order; i++)
+            CHECK(fabsf(c[i] - d[i]) < 1e-6f, "order %d, coefficient %d: %g, expected %g", order, i, (double)c[i], (double)d[i]);
     }
 }
 
 TEST(cones_to_pi_as_a_float) {
     const float up[3] = {0, 0, 1}, one[3] = {1, 1, 1};
     for (int order = 1; order <= 101; order += 50) {
-        CHECK(isogi_sh_cone(c, order, up, (double)3.14159265358979323846f, one) == ISOGI_OK && fabs((double)c[0] - sqrt(4 * pi)) < 1e-6, "order %d: %g", order, (double)c[0]);
+        CHECK(isogi_sh_cone(c, order, up, (double)3.14159265358979323846f, one) == ISOGI_OK && fabs((double)c[0] - sqrt(4 * pi)) < 1e-6,
+              "order %d: %g", order, (double)c[0]);
         for (int i = 3; i < 3 * order * order; i++) CHECK(fabsf(c[i]) < 1e-6f, "order %d, coefficient %d: %g", order, i, (double)c[i]);
         CHECK(isogi_sh_cone(c, order, up, 3.1416, one) == ISOGI_INVALID, "order %d: 3.1416", order);
     }
@@ -439,17 +472,21 @@ TEST(windows_of_any_order) {
             for (int w = 0; w < 6; w++) {
                 int order = orders[o], n = order * order;
                 for (int i = 0; i < 3 * n; i++) c[i] = d[i] = (float)(1 + i % 7);
-                CHECK(isogi_sh_window(d, d, order, 3, (isogi_sh_window_kind)kind, widths[w]) == ISOGI_OK, "kind %d, width %g", kind, widths[w]);
+                CHECK(isogi_sh_window(d, d, order, 3, (isogi_sh_window_kind)kind, widths[w]) == ISOGI_OK, "kind %d, width %g", kind,
+                      widths[w]);
                 for (int l = 0; l < order; l++) {
-                    double t = l / widths[w], factor = kind == ISOGI_SH_HANN ? (1 + cos(pi * t)) / 2 : kind == ISOGI_SH_GAUSS ? exp2(-4 * t * t) : l ? sin(pi * t) / (pi * t) : 1;
+                    double t = l / widths[w], factor = kind == ISOGI_SH_HANN ? (1 + cos(pi * t)) / 2 : kind == ISOGI_SH_GAUSS
+                        ? exp2(-4 * t * t) : l ? sin(pi * t) / (pi * t) : 1;
                     if (kind != ISOGI_SH_GAUSS && t >= 1) factor = 0;
                     for (int i = 3 * l * l; i < 3 * (l + 1) * (l + 1); i++)
-                        CHECK(fabs((double)d[i] - factor * (double)c[i]) <= 1.2e-7 * (double)c[i], "kind %d, width %g, degree %d: %g, expected %g", kind, widths[w], l, (double)d[i], factor * (double)c[i]);
+                        CHECK(fabs((double)d[i] - factor * (double)c[i]) <= 1.2e-7 * (double)c[i],
+                              "kind %d, width %g, degree %d: %g, expected %g", kind, widths[w], l, (double)d[i], factor * (double)c[i]);
                 }
             }
     double width = -1;
     c[0] = 1;
-    CHECK(isogi_sh_dering(d, c, 1, 1, ISOGI_SH_HANN, &width) == ISOGI_OK && d[0] == 1 && width == 0, "order 1: %g, width %g", (double)d[0], width);
+    CHECK(isogi_sh_dering(d, c, 1, 1, ISOGI_SH_HANN, &width) == ISOGI_OK && d[0] == 1 && width == 0, "order 1: %g, width %g", (double)d[0],
+          width);
     CHECK(isogi_sh_dering(d, c, 101, 1, ISOGI_SH_HANN, &width) == ISOGI_TOO_LARGE && width == 0, "order 101: width %g", width);
     const double wrong[] = {0, -1, (double)NAN};
     for (int i = 0; i < 3; i++) CHECK(isogi_sh_window(d, c, 1, 1, ISOGI_SH_HANN, wrong[i]) == ISOGI_INVALID, "width %g", wrong[i]);
@@ -460,7 +497,8 @@ TEST(conventions_of_any_order) {
     for (int o = 0; o < ORDERS; o++)
         for (int i = 0; i < 18; i++) {
             int order = orders[o], n = order * order;
-            isogi_sh_convention ours = {ISOGI_SH_ORTHONORMAL, ISOGI_SH_ACN, 0}, theirs = {(isogi_sh_normalisation)(i % 3), (isogi_sh_ordering)(i / 3 % 3), i / 9};
+            isogi_sh_convention ours = {ISOGI_SH_ORTHONORMAL, ISOGI_SH_ACN, 0},
+                                theirs = {(isogi_sh_normalisation)(i % 3), (isogi_sh_ordering)(i / 3 % 3), i / 9};
             for (int k = 0; k < n; k++) c[k] = (float)(1 + k % 1000);
             CHECK(isogi_sh_convert(d, c, order, 1, ours, theirs) == ISOGI_OK, "%d", i);
             for (int l = 0; l < order; l++)
@@ -471,11 +509,14 @@ TEST(conventions_of_any_order) {
                     if (theirs.normalisation == ISOGI_SH_SN3D) factor *= sqrt(2 * l + 1);
                     if (theirs.condon_shortley && m % 2) factor = -factor;
                     double value = factor * (double)c[l * (l + 1) + m];
-                    CHECK(fabs((double)d[at] - value) <= 1.2e-7 * fabs(value), "convention %d, Y_%d^%d: %g, expected %g", i, l, m, (double)d[at], value);
+                    CHECK(fabs((double)d[at] - value) <= 1.2e-7 * fabs(value), "convention %d, Y_%d^%d: %g, expected %g", i, l, m,
+                          (double)d[at], value);
                 }
             isogi_sh_convention third = {(isogi_sh_normalisation)((i + 1) % 3), (isogi_sh_ordering)((i / 3 + 1) % 3), !(i / 9)};
-            CHECK(isogi_sh_convert(e, d, order, 1, theirs, third) == ISOGI_OK && isogi_sh_convert(d, e, order, 1, third, ours) == ISOGI_OK, "%d", i);
-            for (int k = 0; k < n; k++) CHECK(fabsf(d[k] - c[k]) <= 3e-7f * c[k], "there and back by %d: Y%d %g, was %g", i, k, (double)d[k], (double)c[k]);
+            CHECK(isogi_sh_convert(e, d, order, 1, theirs, third) == ISOGI_OK && isogi_sh_convert(d, e, order, 1, third, ours) == ISOGI_OK,
+                  "%d", i);
+            for (int k = 0; k < n; k++)
+                CHECK(fabsf(d[k] - c[k]) <= 3e-7f * c[k], "there and back by %d: Y%d %g, was %g", i, k, (double)d[k], (double)c[k]);
         }
 }
 
@@ -498,9 +539,14 @@ TEST(algebra_of_any_order) {
         for (int i = 0; i < 3 * n; i++) c[i] = (float)random_range(&r, -1, 1), d[i] = (float)random_range(&r, -1, 1);
         for (int i = 0; i < n; i++) single[0][i] = c[i], single[1][i] = d[i], dot += (double)c[i] * (double)d[i];
         CHECK(fabs(isogi_sh_dot(c, d, order) - dot) <= 1e-12, "order %d: dot %.17g, expected %.17g", order, isogi_sh_dot(c, d, order), dot);
-        CHECK(isogi_sh_add(e, c, d, order, 3) == ISOGI_OK && close_to((double)e[3 * n - 1], (double)c[3 * n - 1] + (double)d[3 * n - 1], 1e-6), "order %d: add", order);
-        CHECK(isogi_sh_scale(e, c, 0.5f, order, 3) == ISOGI_OK && e[0] == 0.5f * c[0] && e[3 * n - 1] == 0.5f * c[3 * n - 1], "order %d: scale", order);
-        CHECK(isogi_sh_lerp(e, c, d, 0.25f, order, 3) == ISOGI_OK && fabs((double)e[3 * n - 1] - 0.75 * (double)c[3 * n - 1] - 0.25 * (double)d[3 * n - 1]) <= 1.2e-7, "order %d: lerp", order);
+        CHECK(isogi_sh_add(e, c, d, order, 3) == ISOGI_OK &&
+                  close_to((double)e[3 * n - 1], (double)c[3 * n - 1] + (double)d[3 * n - 1], 1e-6),
+              "order %d: add", order);
+        CHECK(isogi_sh_scale(e, c, 0.5f, order, 3) == ISOGI_OK && e[0] == 0.5f * c[0] && e[3 * n - 1] == 0.5f * c[3 * n - 1],
+              "order %d: scale", order);
+        CHECK(isogi_sh_lerp(e, c, d, 0.25f, order, 3) == ISOGI_OK &&
+                  fabs((double)e[3 * n - 1] - 0.75 * (double)c[3 * n - 1] - 0.25 * (double)d[3 * n - 1]) <= 1.2e-7,
+              "order %d: lerp", order);
         CHECK(isogi_sh_band_energy(energy, c, order, 3) == ISOGI_OK, "order %d", order);
         for (int l = 0; l < order; l++) {
             for (int i = 3 * l * l; i < 3 * (l + 1) * (l + 1); i++) squares[l] += (double)c[i] * (double)c[i];
@@ -511,21 +557,28 @@ TEST(algebra_of_any_order) {
             CHECK(isogi_sh_mirror(e, c, order, 3, axis) == ISOGI_OK, "axis %d", axis);
             double mirrored = value_at(order, e, v);
             v[axis] = -v[axis];
-            CHECK(fabs(mirrored - value_at(order, c, v)) <= 1e-11, "order %d, axis %d: %g, expected %g", order, axis, mirrored, value_at(order, c, v));
+            CHECK(fabs(mirrored - value_at(order, c, v)) <= 1e-11, "order %d, axis %d: %g, expected %g", order, axis, mirrored,
+                  value_at(order, c, v));
         }
         /* a product with a constant scales; its mean is the dot product */
         for (int i = 0; i < n; i++) e[i] = i ? 0 : sqrtf(4 * (float)pi), e[n + i] = 9;
         if (order <= 2 || LONG_SUITE) CHECK(isogi_sh_product(e + n, single[0], e, order, 1) == ISOGI_OK, "order %d", order);
-        for (int i = 0; i < n && (order <= 2 || LONG_SUITE); i++) CHECK(fabsf(e[n + i] - c[i]) <= 3e-7f, "order %d: %g times 1 is %g", order, (double)c[i], (double)e[n + i]);
-        CHECK(isogi_sh_product(e, single[0], single[1], order, 1) == ISOGI_OK && close_to((double)e[0], 0.28209479177387814 * dot, 1e-6), "order %d: mean %g, expected %g", order, (double)e[0], 0.28209479177387814 * dot);
+        for (int i = 0; i < n && (order <= 2 || LONG_SUITE); i++)
+            CHECK(fabsf(e[n + i] - c[i]) <= 3e-7f, "order %d: %g times 1 is %g", order, (double)c[i], (double)e[n + i]);
+        CHECK(isogi_sh_product(e, single[0], single[1], order, 1) == ISOGI_OK && close_to((double)e[0], 0.28209479177387814 * dot, 1e-6),
+              "order %d: mean %g, expected %g", order, (double)e[0], 0.28209479177387814 * dot);
         /* clamped cosine: Ramamoorthi and Hanrahan 2001, eq. 19 */
-        CHECK(isogi_sh_cosine_zonal(one, order) == ISOGI_OK && isogi_sh_convolve_cosine(d, c, order, 3) == ISOGI_OK && isogi_sh_convolve(e, c, order, 3, one) == ISOGI_OK, "order %d", order);
+        CHECK(isogi_sh_cosine_zonal(one, order) == ISOGI_OK && isogi_sh_convolve_cosine(d, c, order, 3) == ISOGI_OK &&
+                  isogi_sh_convolve(e, c, order, 3, one) == ISOGI_OK,
+              "order %d", order);
         for (int l = 0; l < order; l++) {
             double factor = l == 1 ? 2 * pi / 3 : l & 1 ? 0 : 2 * pi * a / ((l + 2) * (1 - l)) * (l & 2 ? -1 : 1);
             if (!(l & 1)) a *= (l + 1) / (double)(l + 2); /* l! / (2^l (l/2)!^2) */
-            CHECK(fabs((double)one[l] - factor * sqrt((2 * l + 1) / (4 * pi))) <= 1.2e-7, "degree %d: %g, expected %g", l, (double)one[l], factor * sqrt((2 * l + 1) / (4 * pi)));
+            CHECK(fabs((double)one[l] - factor * sqrt((2 * l + 1) / (4 * pi))) <= 1.2e-7, "degree %d: %g, expected %g", l, (double)one[l],
+                  factor * sqrt((2 * l + 1) / (4 * pi)));
             for (int i = 3 * l * l; i < 3 * (l + 1) * (l + 1); i++)
-                CHECK(fabs((double)d[i] - factor * (double)c[i]) <= 4e-7 && fabs((double)e[i] - factor * (double)c[i]) <= 6e-7, "degree %d: %g and %g, expected %g", l, (double)d[i], (double)e[i], factor * (double)c[i]);
+                CHECK(fabs((double)d[i] - factor * (double)c[i]) <= 4e-7 && fabs((double)e[i] - factor * (double)c[i]) <= 6e-7,
+                      "degree %d: %g and %g, expected %g", l, (double)d[i], (double)e[i], factor * (double)c[i]);
         }
     }
 }
@@ -547,14 +600,22 @@ TEST(rotations_of_any_order) {
             CHECK(isogi_sh_matrix_from_euler_zyz(m, angles[a][0], angles[a][1], angles[a][2]) == ISOGI_OK, "%d", a);
             for (int k = 0; k < 9; k++) m64[k] = (double)m[k];
             for (int k = 0; k < 3; k++) back[k] = m[k] * v[0] + m[3 + k] * v[1] + m[6 + k] * v[2];
-            CHECK(isogi_sh_rotate(d, c, order, 3, m) == ISOGI_OK && isogi_sh_rotate_f64(turned, wide, order, 1, m64) == ISOGI_OK, "order %d", order);
-            CHECK(isogi_sh_rotation_build(rotation, order, m) == ISOGI_OK && isogi_sh_rotation_apply(e, c, order, 3, rotation) == ISOGI_OK, "order %d", order);
-            for (int i = 0; i < n; i++) worst = fmax(worst, fabs((double)d[3 * i] - turned[i])), worst_applied = fmax(worst_applied, fabs((double)e[3 * i] - turned[i]));
+            CHECK(isogi_sh_rotate(d, c, order, 3, m) == ISOGI_OK && isogi_sh_rotate_f64(turned, wide, order, 1, m64) == ISOGI_OK,
+                  "order %d", order);
+            CHECK(isogi_sh_rotation_build(rotation, order, m) == ISOGI_OK && isogi_sh_rotation_apply(e, c, order, 3, rotation) == ISOGI_OK,
+                  "order %d", order);
+            for (int i = 0; i < n; i++)
+                worst = fmax(worst, fabs((double)d[3 * i] - turned[i])),
+                worst_applied = fmax(worst_applied, fabs((double)e[3 * i] - turned[i]));
             /* roundings of the result; of 2 l + 1 entries of a matrix and their products besides */
-            CHECK(worst <= 3e-7 && worst_applied <= 3e-7 * sqrt(order), "order %d, rotation %d: %g in float, %g applied", order, a, worst, worst_applied);
+            CHECK(worst <= 3e-7 && worst_applied <= 3e-7 * sqrt(order), "order %d, rotation %d: %g in float, %g applied", order, a, worst,
+                  worst_applied);
             /* the derivative of a sum is `order` times the sum, and a float matrix is off by 1e-7 */
-            CHECK(fabs(value_at(order, d, v) - value_at(order, c, back)) <= 2e-6 * order * sqrt(n), "order %d, rotation %d: %g, expected %g", order, a, value_at(order, d, v), value_at(order, c, back));
-            CHECK(isogi_sh_matrix_from_euler_zyz(z, angles[a][0], 0, 0) == ISOGI_OK && isogi_sh_rotate(e, c, order, 3, z) == ISOGI_OK && isogi_sh_rotate_z(d, c, order, 3, angles[a][0]) == ISOGI_OK, "%d", a);
+            CHECK(fabs(value_at(order, d, v) - value_at(order, c, back)) <= 2e-6 * order * sqrt(n),
+                  "order %d, rotation %d: %g, expected %g", order, a, value_at(order, d, v), value_at(order, c, back));
+            CHECK(isogi_sh_matrix_from_euler_zyz(z, angles[a][0], 0, 0) == ISOGI_OK && isogi_sh_rotate(e, c, order, 3, z) == ISOGI_OK &&
+                      isogi_sh_rotate_z(d, c, order, 3, angles[a][0]) == ISOGI_OK,
+                  "%d", a);
             for (int i = 0; i < 3 * n; i++) worst_z = fmax(worst_z, fabs((double)d[i] - (double)e[i]));
             CHECK(worst_z <= 3e-7 * (order + 1), "order %d, about z: %g", order, worst_z);
         }
@@ -564,7 +625,8 @@ TEST(rotations_of_any_order) {
         float q[4] = {0, axes[a][0], axes[a][1], axes[a][2]};
         for (int kind = 0; kind < 2; kind++) {
             double off = 0;
-            CHECK((kind ? isogi_sh_matrix_from_quaternion(m, q) : isogi_sh_matrix_from_axis_angle(m, axes[a], 1e9)) == ISOGI_OK, "axis %d, kind %d", a, kind);
+            CHECK((kind ? isogi_sh_matrix_from_quaternion(m, q) : isogi_sh_matrix_from_axis_angle(m, axes[a], 1e9)) == ISOGI_OK,
+                  "axis %d, kind %d", a, kind);
             for (int i = 0; i < 3; i++)
                 for (int j = 0; j < 3; j++) {
                     double dot = 0;
@@ -591,19 +653,27 @@ TEST(projections_of_any_order) {
     for (int o = 0; o < ORDERS; o++) {
         int order = orders[o], n = order * order, sizes[] = {1, 2, 5};
         double worst = 0;
-        CHECK(isogi_sh_project_function(wide, order, 2, 0, constant, NULL) == ISOGI_OK && close_to(wide[0], 2 * mean, 1e-13) && close_to(wide[1], -mean, 1e-13), "order %d: %g %g", order, wide[0], wide[1]);
+        CHECK(isogi_sh_project_function(wide, order, 2, 0, constant, NULL) == ISOGI_OK && close_to(wide[0], 2 * mean, 1e-13) &&
+                  close_to(wide[1], -mean, 1e-13),
+              "order %d: %g %g", order, wide[0], wide[1]);
         for (int i = 2; i < 2 * n; i++) worst = fmax(worst, fabs(wide[i]));
         CHECK(worst <= 1e-12, "order %d: a constant has %g", order, worst);
         for (int stratified = 0; stratified < 2; stratified++)
-            CHECK(isogi_sh_project_random(wide, order, 2, 3, stratified, 7, constant, NULL) == ISOGI_OK && close_to(wide[0], 2 * mean, 1e-13) && test_finite(wide[2 * n - 1]), "order %d: %g", order, wide[0]);
+            CHECK(isogi_sh_project_random(wide, order, 2, 3, stratified, 7, constant, NULL) == ISOGI_OK &&
+                      close_to(wide[0], 2 * mean, 1e-13) && test_finite(wide[2 * n - 1]),
+                  "order %d: %g", order, wide[0]);
         CHECK(isogi_sh_project_equirect(c, order, image, WIDTH, HEIGHT) == ISOGI_OK, "order %d", order);
         worst = 0;
         for (int i = 3; i < 3 * n; i++) worst = fmax(worst, fabs((double)c[i]));
         CHECK(close_to((double)c[0], 2 * mean, 3e-7) && worst <= 2e-6, "order %d: %g, and %g", order, (double)c[0], worst);
         for (int k = 0; k < 3; k++) {
             const float *faces[6] = {image, image, image, image, image, image};
-            CHECK(isogi_sh_project_image(c, order, 1, image, sizes[k], sizes[2 - k]) == ISOGI_OK && close_to((double)c[0], 2 * mean, 3e-7) && test_finite((double)c[n - 1]), "order %d, size %d: %g", order, sizes[k], (double)c[0]);
-            CHECK(isogi_sh_project_cube(c, order, 3, faces, sizes[k]) == ISOGI_OK && close_to((double)c[0], 2 * mean, 3e-7) && test_finite((double)c[3 * n - 1]), "order %d, cube of %d: %g", order, sizes[k], (double)c[0]);
+            CHECK(isogi_sh_project_image(c, order, 1, image, sizes[k], sizes[2 - k]) == ISOGI_OK &&
+                      close_to((double)c[0], 2 * mean, 3e-7) && test_finite((double)c[n - 1]),
+                  "order %d, size %d: %g", order, sizes[k], (double)c[0]);
+            CHECK(isogi_sh_project_cube(c, order, 3, faces, sizes[k]) == ISOGI_OK && close_to((double)c[0], 2 * mean, 3e-7) &&
+                      test_finite((double)c[3 * n - 1]),
+                  "order %d, cube of %d: %g", order, sizes[k], (double)c[0]);
         }
         for (int i = 0; i < 3 * n; i++) c[i] = (float)(i % 5) / (float)n;
         for (int a = 0; a < AXES; a++) { /* an environment of coefficients, and derivatives, in any direction */
@@ -612,7 +682,8 @@ TEST(projections_of_any_order) {
             const isogi_env env = {.sh = c, .sh_order = order};
             float rgb[3];
             isogi_env_radiance(&env, axes[a], rgb);
-            CHECK(fabs((double)rgb[0] - value_at(order, c, axes[a])) <= 1e-6, "order %d, axis %d: %g, expected %g", order, a, (double)rgb[0], value_at(order, c, axes[a]));
+            CHECK(fabs((double)rgb[0] - value_at(order, c, axes[a])) <= 1e-6, "order %d, axis %d: %g, expected %g", order, a,
+                  (double)rgb[0], value_at(order, c, axes[a]));
             CHECK(isogi_sh_eval_gradient_f64(gradient, order, direction, 1) == ISOGI_OK, "axis %d", a);
             double length = sqrt(direction[0][0] * direction[0][0] + direction[0][1] * direction[0][1] + direction[0][2] * direction[0][2]);
             for (int i = 0; i < n; i++) {
@@ -631,11 +702,14 @@ TEST(fits_of_any_order) {
             isogi_light sun = {.vector = {axes[a][0], axes[a][1], axes[a][2]}, .rgb = {3, 2, 1}};
             isogi_lighting lighting = {.lights = &sun, .light_count = 1};
             float direction[3], rgb[3], ambient[3];
-            double length = sqrt((double)axes[a][0] * (double)axes[a][0] + (double)axes[a][1] * (double)axes[a][1] + (double)axes[a][2] * (double)axes[a][2]), off = 0;
+            double length = sqrt((double)axes[a][0] * (double)axes[a][0] + (double)axes[a][1] * (double)axes[a][1] +
+                                 (double)axes[a][2] * (double)axes[a][2]),
+                   off = 0;
             isogi_sh_project(c, orders[o], &lighting, NULL);
             CHECK(isogi_sh_fit_directional(direction, rgb, ambient, c, orders[o]) == ISOGI_OK, "axis %d", a);
             for (int k = 0; k < 3; k++) off = fmax(off, fabs((double)direction[k] - (double)axes[a][k] / length));
-            CHECK(off <= 1e-5 && fabs((double)rgb[0] - 3) <= 1e-4 && fabs((double)ambient[0]) <= 1e-4, "order %d, axis %d: %g off, %g %g", orders[o], a, off, (double)rgb[0], (double)ambient[0]);
+            CHECK(off <= 1e-5 && fabs((double)rgb[0] - 3) <= 1e-4 && fabs((double)ambient[0]) <= 1e-4, "order %d, axis %d: %g off, %g %g",
+                  orders[o], a, off, (double)rgb[0], (double)ambient[0]);
         }
 }
 
@@ -673,7 +747,8 @@ static void use_rotate(int order) {
 }
 static void use_matrix(int order) {
     if (order > 22) return; /* minutes and megabytes */
-    isogi_sh_rotation_build(turn, order, flat), isogi_sh_rotation_apply(d, c, order, 1, turn), isogi_sh_rotation_apply(d, c, order, 3, turn);
+    isogi_sh_rotation_build(turn, order, flat), isogi_sh_rotation_apply(d, c, order, 1, turn),
+        isogi_sh_rotation_apply(d, c, order, 3, turn);
     isogi_sh_rotation_build_f64(turn_f64, order, flat_f64), isogi_sh_rotation_apply_f64(many_f64, many_f64 + N, order, 1, turn_f64);
     if (order <= 11) isogi_sh_product_matrix(many, c, order);
 }
@@ -683,24 +758,31 @@ static void use_product(int order) {
 }
 static void use_algebra(int order) {
     double energy[MOST], width;
-    isogi_sh_cosine_zonal(e, order), isogi_sh_convolve(d, c, order, 3, e), isogi_sh_convolve_cosine(d, c, order, 3), isogi_sh_mirror(d, c, order, 3, 1);
-    isogi_sh_zonal_to_direction(d, order, e, directions[0]), isogi_sh_window(d, c, order, 3, ISOGI_SH_HANN, order), isogi_sh_band_energy(energy, c, order, 3);
+    isogi_sh_cosine_zonal(e, order), isogi_sh_convolve(d, c, order, 3, e), isogi_sh_convolve_cosine(d, c, order, 3),
+        isogi_sh_mirror(d, c, order, 3, 1);
+    isogi_sh_zonal_to_direction(d, order, e, directions[0]), isogi_sh_window(d, c, order, 3, ISOGI_SH_HANN, order),
+        isogi_sh_band_energy(energy, c, order, 3);
     if (order <= 22) isogi_sh_dering(d, c, order, 1, ISOGI_SH_HANN, &width);
 }
 static void use_projection(int order) {
     const float *faces[6] = {image, image, image, image, image, image};
-    isogi_sh_project_equirect(d, order, image, WIDE, HIGH), isogi_sh_project_image(d, order, 2, image, WIDE, HIGH), isogi_sh_project_cube(d, order, 3, faces, 4);
+    isogi_sh_project_equirect(d, order, image, WIDE, HIGH), isogi_sh_project_image(d, order, 2, image, WIDE, HIGH),
+        isogi_sh_project_cube(d, order, 3, faces, 4);
     isogi_sh_project_function(many_f64, order, 2, 0, constant, NULL), isogi_sh_project_random(many_f64, order, 2, 9, 1, 3, constant, NULL);
     isogi_sh_project_samples(many_f64, order, 3, (const float(*)[3])directions, image, NULL, MANY);
 }
 static void use_lights(int order) {
-    static const isogi_light lights[] = {{ISOGI_LIGHT_DIRECTIONAL, {1, 2, 3}, {1, 1, 1}, 0.1f, {{0}}}, {ISOGI_LIGHT_POINT, {1, 2, 3}, {1, 1, 1}, 0, {{0}}},
-                                         {ISOGI_LIGHT_SPHERE, {1, 2, 3}, {1, 1, 1}, 1, {{0}}}, {ISOGI_LIGHT_RECTANGLE, {0, 0, -2}, {1, 1, 1}, 0, {{1, 0, 0}, {0, 2, 0}}},
+    static const isogi_light lights[] = {{ISOGI_LIGHT_DIRECTIONAL, {1, 2, 3}, {1, 1, 1}, 0.1f, {{0}}},
+                                         {ISOGI_LIGHT_POINT, {1, 2, 3}, {1, 1, 1}, 0, {{0}}},
+                                         {ISOGI_LIGHT_SPHERE, {1, 2, 3}, {1, 1, 1}, 1, {{0}}},
+                                         {ISOGI_LIGHT_RECTANGLE, {0, 0, -2}, {1, 1, 1}, 0, {{1, 0, 0}, {0, 2, 0}}},
                                          {ISOGI_LIGHT_RECTANGLE, {0, 0, -2}, {1, 1, 1}, 0, {{1e-4f, 0, 0}, {0, 2, 0}}}}; /* narrow */
-    const isogi_lighting lighting = {.env = {.rgb = image, .width = WIDE, .height = HIGH, .sh = c, .sh_order = order}, .lights = lights, .light_count = 5};
+    const isogi_lighting lighting = {
+        .env = {.rgb = image, .width = WIDE, .height = HIGH, .sh = c, .sh_order = order}, .lights = lights, .light_count = 5};
     float v[3], rgb[3], ambient[3];
     isogi_sh_project(d, order, &lighting, NULL), isogi_env_radiance(&lighting.env, directions[0], rgb);
-    isogi_sh_cone(d, order, directions[0], 0.4, rgb), isogi_sh_gradient_sky(d, order, directions[0], rgb, rgb), isogi_sh_hemisphere_sky(d, order, directions[0], rgb, rgb);
+    isogi_sh_cone(d, order, directions[0], 0.4, rgb), isogi_sh_gradient_sky(d, order, directions[0], rgb, rgb),
+        isogi_sh_hemisphere_sky(d, order, directions[0], rgb, rgb);
     isogi_sh_dominant_direction(v, rgb, d, order), isogi_sh_fit_directional(v, rgb, ambient, d, order);
 }
 
@@ -718,7 +800,8 @@ static void *on_a_stack(void *user) {
     return NULL;
 }
 
-/* Bytes below the caller's frame that a call wrote to; each is made once before, so that the linker's part of a first call does not count. */
+/* Bytes below the caller's frame that a call wrote to; each is made once before, so that the linker's part of a first
+   call does not count. */
 static size_t stack_of(void (*run)(int order), int order) {
     static unsigned char memory[STACK] __attribute__((aligned(65536)));
     stack_use u = {run, order, 0};
@@ -741,7 +824,8 @@ TEST(stack_below_32_kilobytes) {
     static const struct {
         const char *name;
         void (*run)(int order);
-    } uses[] = {{"evaluation", use_eval}, {"evaluation in double", use_eval_f64}, {"gradients", use_gradient}, {"sums", use_sum}, {"rotation", use_rotate}, {"matrices", use_matrix},
+    } uses[] = {{"evaluation", use_eval}, {"evaluation in double", use_eval_f64}, {"gradients", use_gradient}, {"sums", use_sum},
+        {"rotation", use_rotate}, {"matrices", use_matrix},
                 {"products", use_product}, {"algebra", use_algebra}, {"projection", use_projection}, {"lights", use_lights}};
     static const int all[] = {1, 2, 3, 4, 5, 8, 11, 12, 16, 17, 21, 22, MOST};
     for (int i = 0; i < MANY; i++)

@@ -41,20 +41,23 @@ TEST(white_furnace) {
             int n = surface_points(&s, 0, LONG_SUITE ? 64 : 16, 2, points);
             d.normals = kind ? ISOGI_NORMAL_TRILINEAR : ISOGI_NORMAL_SMOOTH;
             mean = mean_irradiance(&d, (const float(*)[3])points, n, &worst);
-            CHECK(fabs(mean - PI) < 0.002 * PI && worst < 0.01 * PI, "%s, normals %d: mean E %.5f, largest deviation %.5f", name[i], kind, mean, worst);
+            CHECK(fabs(mean - PI) < 0.002 * PI && worst < 0.01 * PI, "%s, normals %d: mean E %.5f, largest deviation %.5f", name[i], kind,
+                  mean, worst);
             if (kind) {
                 scene_free(&s);
                 continue;
             }
             /* The same sky as two lights that fill it: now all light comes by shadow rays, whose noise is larger: 0.3 %
                on rough surfaces, where paths are long. */
-            d.lighting.lights = domes, d.lighting.light_count = 2, d.lighting.env.sh = NULL, d.lighting.env.sh_order = 0, d.samples = i < 4 ? 2048 : 4096;
+            d.lighting.lights = domes, d.lighting.light_count = 2, d.lighting.env.sh = NULL, d.lighting.env.sh_order = 0,
+            d.samples = i < 4 ? 2048 : 4096;
             mean = mean_irradiance(&d, (const float(*)[3])points, n, NULL);
             CHECK(fabs(mean - PI) < 0.012 * PI, "%s, by shadow rays: mean E %.5f", name[i], mean);
             d = desc_make(&s, 1, 64, 64);
             d.offset = -1; /* paths that begin on the surface, some of them into matter */
             mean = mean_irradiance(&d, (const float(*)[3])points, n, &worst);
-            CHECK(fabs(mean - PI) < 0.002 * PI && worst < 0.01 * PI, "%s, no offset: mean E %.5f, largest deviation %.5f", name[i], mean, worst);
+            CHECK(fabs(mean - PI) < 0.002 * PI && worst < 0.01 * PI, "%s, no offset: mean E %.5f, largest deviation %.5f", name[i], mean,
+                  worst);
             d.bounces = -1; /* Russian roulette weighs each path by 1 / 0.98 per reflection: noise, mean unchanged */
             mean = mean_irradiance(&d, (const float(*)[3])points, n, &worst);
             CHECK(fabs(mean - PI) < 0.01 * PI, "%s, roulette: mean E %.5f, largest deviation %.5f", name[i], mean, worst);
@@ -169,8 +172,10 @@ TEST(lights_with_a_size_match_analytic_values) {
     double q[1] = {8};
     scene s = scene_make(33, 33, 33, NULL, ground, q);
     float p[3] = {16, 8, 16};
-    isogi_light disc = light_make(ISOGI_LIGHT_DIRECTIONAL, 0.6, 0.8, 0, 1, 0.4), ball_light = light_make(ISOGI_LIGHT_SPHERE, 20, 14, 18, 50, 3);
-    isogi_light dome = light_make(ISOGI_LIGHT_DIRECTIONAL, 0, 1, 0, 1, PI / 2), rising = light_make(ISOGI_LIGHT_DIRECTIONAL, 1, 0, 0, 1, 0.1);
+    isogi_light disc = light_make(ISOGI_LIGHT_DIRECTIONAL, 0.6, 0.8, 0, 1, 0.4),
+                ball_light = light_make(ISOGI_LIGHT_SPHERE, 20, 14, 18, 50, 3);
+    isogi_light dome = light_make(ISOGI_LIGHT_DIRECTIONAL, 0, 1, 0, 1, PI / 2),
+                rising = light_make(ISOGI_LIGHT_DIRECTIONAL, 1, 0, 0, 1, 0.1);
     double d = length3(4, 6, 2), e;
     e = lit(&s, &disc, p, 0, 4096);
     CHECK(fabs(e - 0.8) < 0.003 * 0.8 * 3, "disc E %.5f, expected 0.8", e);
@@ -247,7 +252,9 @@ TEST(bright_spot_of_an_image_is_found) {
             for (int x = 0; x < 8 * W; x++) {
                 double theta = (y + 0.5) * PI / (8 * H), phi = 2 * PI * ((x + 0.5) / (8 * W) - 0.5), cosine;
                 float dir[3] = {(float)(sin(theta) * sin(phi)), (float)cos(theta), (float)(-sin(theta) * cos(phi))}, rgb[3];
-                cosine = -((double)dir[0] * (double)normals[i][0] + (double)dir[1] * (double)normals[i][1] + (double)dir[2] * (double)normals[i][2]) / length;
+                cosine = -((double)dir[0] * (double)normals[i][0] + (double)dir[1] * (double)normals[i][1] +
+                           (double)dir[2] * (double)normals[i][2]) /
+                         length;
                 if (cosine <= 0) continue;
                 isogi_env_radiance(&d.lighting.env, dir, rgb);
                 expected += (double)rgb[0] * cosine * sin(theta) * (PI / (8 * H)) * (2 * PI / (8 * W));
@@ -255,7 +262,8 @@ TEST(bright_spot_of_an_image_is_found) {
         worst = fmax(worst, fabs((double)e[i][0] - expected) / (0.02 * expected + 4 * (double)error[i]));
     }
     CHECK(worst < 1, "largest error in units of 2 %% and 4 standard errors: %g", worst);
-    for (int i = 0; i < n; i++) CHECK(error[i] < 0.1f * e[i][0] + 0.02f, "E %g with a standard error of %g", (double)e[i][0], (double)error[i]);
+    for (int i = 0; i < n; i++)
+        CHECK(error[i] < 0.1f * e[i][0] + 0.02f, "E %g with a standard error of %g", (double)e[i][0], (double)error[i]);
     scene_free(&s);
 }
 
@@ -337,13 +345,15 @@ TEST(relit_by_sh_equals_baked_directly) {
             CHECK(found == order && channels == (colour ? 3 : 1), "order %d, channels %d", found, channels);
             for (int i = 0; i < n; i++)
                 for (int c = 0; c < 3; c++)
-                    CHECK(fabsf(relit[i][c] - direct[i][c]) < 1e-4f, "point %d channel %d: relit %g, direct %g", i, c, (double)relit[i][c], (double)direct[i][c]);
+                    CHECK(fabsf(relit[i][c] - direct[i][c]) < 1e-4f, "point %d channel %d: relit %g, direct %g", i, c, (double)relit[i][c],
+                          (double)direct[i][c]);
             isogi_trace_free(t);
             d.mode = ISOGI_TRACE_IRRADIANCE, d.seed = 99, d.lighting.env.sh = sh;
             bake_and_sample(&d, NULL, (const float(*)[3])points, n, direct);
             for (int i = 0; i < n; i++) {
                 double difference = fabs((double)relit[i][1] - (double)direct[i][1]);
-                CHECK(difference < 5 * 1.41421 * (double)error[i] + 0.05, "other seed, point %d: relit %g, direct %g, error %g", i, (double)relit[i][1], (double)direct[i][1], (double)error[i]);
+                CHECK(difference < 5 * 1.41421 * (double)error[i] + 0.05, "other seed, point %d: relit %g, direct %g, error %g", i,
+                      (double)relit[i][1], (double)direct[i][1], (double)error[i]);
             }
         }
     scene_free(&s);
@@ -359,7 +369,8 @@ TEST(relit_by_a_rotated_environment) {
     isogi_trace *t = NULL;
     int n = surface_points(&s, 0, 50, 12, points);
     random_sky(sh, 3, 13);
-    d.lazy = 1, d.mode = ISOGI_TRACE_TRANSFER, d.order = 3, d.storage = ISOGI_TRACE_FLOAT, d.lighting.env.sh = sh, d.lighting.env.sh_order = 3;
+    d.lazy = 1, d.mode = ISOGI_TRACE_TRANSFER, d.order = 3, d.storage = ISOGI_TRACE_FLOAT, d.lighting.env.sh = sh,
+    d.lighting.env.sh_order = 3;
     isogi_trace_create(&t, &d, NULL);
     isogi_trace_request(t, (const float(*)[3])points, (size_t)n), isogi_trace_step(t, 0, NULL);
     memcpy(d.lighting.env.rotation, rotation, sizeof rotation);
@@ -627,7 +638,8 @@ TEST(texels_without_a_surface_are_left_out) {
         float point[1][3] = {{(float)(0.07 * i), (float)(7.001 + 0.998 * i / 200), (float)(14 - 0.06 * i)}}, e[1][3], error[1];
         isogi_trace_sample(t, (const float(*)[3])point, 1, e, error);
         /* four samples a texel that agree may have missed something, but not much */
-        CHECK(fabs((double)e[0][0] - PI) < 1e-4 && error[0] > 0 && error[0] < 0.2f, "at y = %g: E %g, error %g", (double)point[0][1], (double)e[0][0], (double)error[0]);
+        CHECK(fabs((double)e[0][0] - PI) < 1e-4 && error[0] > 0 && error[0] < 0.2f, "at y = %g: E %g, error %g", (double)point[0][1],
+              (double)e[0][0], (double)error[0]);
     }
     {
         float point[1][3] = {{5, 12, 5}}, e[1][3] = {{1, 1, 1}}, error[1] = {0}; /* in the air no lookup is possible, and it says so */
@@ -668,10 +680,12 @@ TEST(lattice_of_its_own_resolution) {
         float points[100][3], e[100][3];
         size_t lattice[3];
         test_random r = {17};
-        for (int a = 0; a < 3; a++) d.lattice[a] = (size_t)(i == 0 ? 9 : 0), d.lattice_min[a] = i == 2 ? 4 : 0, d.lattice_max[a] = i == 2 ? 14 : 0;
+        for (int a = 0; a < 3; a++)
+            d.lattice[a] = (size_t)(i == 0 ? 9 : 0), d.lattice_min[a] = i == 2 ? 4 : 0, d.lattice_max[a] = i == 2 ? 14 : 0;
         if (i == 1) d.lattice[1] = 61;
         isogi_trace_create(&t, &d, NULL), isogi_trace_step(t, 0, NULL), isogi_trace_shape(t, lattice, NULL, NULL);
-        CHECK(lattice[0] == (i == 0 ? 9u : i == 1 ? 24u : 11u) && lattice[1] == (i == 0 ? 9u : i == 1 ? 61u : 11u), "lattice %d x %d", (int)lattice[0], (int)lattice[1]);
+        CHECK(lattice[0] == (i == 0 ? 9u : i == 1 ? 24u : 11u) && lattice[1] == (i == 0 ? 9u : i == 1 ? 61u : 11u), "lattice %d x %d",
+            (int)lattice[0], (int)lattice[1]);
         for (int k = 0; k < 100; k++)
             for (int a = 0; a < 3; a++) points[k][a] = a == 1 ? 9.37f : (float)random_range(&r, 4, 14);
         isogi_trace_sample(t, (const float(*)[3])points, 100, e, NULL);
@@ -793,7 +807,8 @@ TEST(albedo_by_isovalue) {
     memset(&d, 0, sizeof d);
     d.albedo_points = points, d.albedo_count = 2;
     isogi_trace_albedo(&d, 15, rgb);
-    CHECK(fabsf(rgb[0] - 0.3f) < 1e-6f && fabsf(rgb[1] - 0.4f) < 1e-6f && fabsf(rgb[2] - 0.3f) < 1e-6f, "%g %g %g", (double)rgb[0], (double)rgb[1], (double)rgb[2]);
+    CHECK(fabsf(rgb[0] - 0.3f) < 1e-6f && fabsf(rgb[1] - 0.4f) < 1e-6f && fabsf(rgb[2] - 0.3f) < 1e-6f, "%g %g %g", (double)rgb[0],
+          (double)rgb[1], (double)rgb[2]);
     isogi_trace_albedo(&d, -5, rgb);
     CHECK(fabsf(rgb[0] - 0.2f) < 1e-6f, "below: %g", (double)rgb[0]);
     isogi_trace_albedo(&d, 1e9, rgb);
@@ -879,7 +894,9 @@ TEST(every_allocation_may_fail) {
         long k;
         if (variant > 2) d.method = ISOGI_TRACE_FEEDBACK;
         d.lazy = variant == 1 || variant == 4, d.mode = variant == 2 ? ISOGI_TRACE_TRANSFER : ISOGI_TRACE_IRRADIANCE, d.order = 2;
-        if (variant < 2) memset(&d.lighting.env, 0, sizeof d.lighting.env), d.lighting.env.rgb = &image[0][0][0], d.lighting.env.width = 16, d.lighting.env.height = 8;
+        if (variant < 2)
+            memset(&d.lighting.env, 0, sizeof d.lighting.env), d.lighting.env.rgb = &image[0][0][0],
+            d.lighting.env.width = 16, d.lighting.env.height = 8;
         for (k = 1; k < 5000; k++) {
             /* room for a brick's values that is lacking once is asked for again in the same step: that may end well */
             f.calls = 0, f.fail_at = k;
@@ -989,10 +1006,13 @@ TEST(bad_input_is_refused) {
     CHECK(isogi_trace_create(&t, &good, NULL) == ISOGI_OK, "good");
     CHECK(isogi_trace_relight(t, &(isogi_lighting){.light_count = 1}) == ISOGI_INVALID, "lights that are not there");
     CHECK(isogi_trace_sample_transfer(t, (const float(*)[3])p, 1, e[0]) == ISOGI_INVALID, "transfer of irradiance");
-    CHECK(isogi_trace_sample(t, NULL, 1, e, NULL) == ISOGI_INVALID && isogi_trace_sample(t, (const float(*)[3])p, 1, NULL, NULL) == ISOGI_INVALID, "NULL points");
+    CHECK(isogi_trace_sample(t, NULL, 1, e, NULL) == ISOGI_INVALID &&
+              isogi_trace_sample(t, (const float(*)[3])p, 1, NULL, NULL) == ISOGI_INVALID,
+          "NULL points");
     CHECK(isogi_trace_sample(t, (const float(*)[3])p, 1, e, error) == ISOGI_OK, "NaN point: a lookup that is not ready, no crash");
     isogi_trace_free(t);
-    CHECK(isogi_trace_gather(&good, (const float(*)[3])p, NULL, 1, e, error, NULL) == ISOGI_OK && e[0][0] <= 0 && error[0] > 1e30f, "NaN point: E %g", (double)e[0][0]);
+    CHECK(isogi_trace_gather(&good, (const float(*)[3])p, NULL, 1, e, error, NULL) == ISOGI_OK && e[0][0] <= 0 && error[0] > 1e30f,
+          "NaN point: E %g", (double)e[0][0]);
     p[0][0] = 1e30f;
     CHECK(isogi_trace_gather(&good, (const float(*)[3])p, NULL, 1, e, error, NULL) == ISOGI_OK, "far point");
     good.mode = ISOGI_TRACE_TRANSFER;
@@ -1041,7 +1061,8 @@ static int view_points(const isogi_pyramid *p, double isovalue, int size, float 
     for (int a = 0; a < 3; a++) forward[a] /= n, eye[a] = centre[a] - forward[a] * sqrt(radius) / sin(PI / 8);
     right[0] = -forward[2], right[1] = 0, right[2] = forward[0], n = length3(right[0], 0, right[2]);
     for (int a = 0; a < 3; a++) right[a] /= n;
-    up[0] = right[1] * forward[2] - right[2] * forward[1], up[1] = right[2] * forward[0] - right[0] * forward[2], up[2] = right[0] * forward[1] - right[1] * forward[0];
+    up[0] = right[1] * forward[2] - right[2] * forward[1], up[1] = right[2] * forward[0] - right[0] * forward[2],
+    up[2] = right[0] * forward[1] - right[1] * forward[0];
     for (int i = 0; i < size * size; i++) {
         isogi_ray ray;
         isogi_hit hit = {0};
@@ -1088,8 +1109,8 @@ static void real_volume(const char *name, size_t x, size_t y, size_t z, double i
     CHECK(isogi_trace_gather(&d, (const float(*)[3])points, NULL, (size_t)dark, e, NULL, NULL) == ISOGI_OK, "gather");
     for (int i = 0; i < dark; i++) wrong += e[i][1] > 0.5f;
     printf("    %d points, %d dark, of which %d should not be; mean E %.3f\n", n, dark, wrong, sum);
-    CHECK(n > size * size / 10 && unready == 0 && bright == 0 && wrong == 0, "%d points: %d not ready, %d dark of which %d should not be, %d too bright",
-          n, unready, dark, wrong, bright);
+    CHECK(n > size * size / 10 && unready == 0 && bright == 0 && wrong == 0,
+          "%d points: %d not ready, %d dark of which %d should not be, %d too bright", n, unready, dark, wrong, bright);
     CHECK(dark * 100 <= n, "%d of %d points are dark", dark, n);
     isogi_trace_free(t), isogi_vol_free(p), free(data);
 }

@@ -15,7 +15,8 @@ static isogi_trace_desc feedback(const scene *s, float albedo, int bounces, int 
 /* White surfaces under a white sky vanish: E = D + A E has the solution pi whatever the hits. The passes end when the largest change is
    below 1e-4; cavities that let a tenth of the light out leave ten times that. */
 TEST(white_furnace) {
-    double q_ball[4] = {15.5, 15.5, 15.5, 9.3}, q_torus[5] = {15.5, 15.5, 15.5, 9, 4}, q_gyroid[1] = {0.35}, q_pit[5] = {16, 15, 16, 22.3, 12};
+    double q_ball[4] = {15.5, 15.5, 15.5, 9.3}, q_torus[5] = {15.5, 15.5, 15.5, 9, 4}, q_gyroid[1] = {0.35},
+           q_pit[5] = {16, 15, 16, 22.3, 12};
     field *f[6] = {ball, torus, gyroid, pit, rough_pit, rough_ball};
     const double *q[6] = {q_ball, q_torus, q_gyroid, q_pit, q_pit, q_ball};
     const char *name[6] = {"ball", "torus", "gyroid", "pit", "rough pit", "rough ball"};
@@ -77,7 +78,8 @@ TEST(profile_of_a_plane_below_a_black_sphere) {
         for (int i = 0; i < 32; i++) {
             double h = 18, distance = length3((double)point[i][0] - 32, h, (double)point[i][2] - 32);
             double expected = PI * (1 - 64 / (distance * distance) * h / distance);
-            CHECK(fabs((double)e[method][i][0] - expected) < 0.02 * expected, "method %d, at %d: E %.4f, expected %.4f", method, i, (double)e[method][i][0], expected);
+            CHECK(fabs((double)e[method][i][0] - expected) < 0.02 * expected, "method %d, at %d: E %.4f, expected %.4f", method, i,
+                  (double)e[method][i][0], expected);
         }
     }
     scene_free(&s);
@@ -107,7 +109,8 @@ TEST(closed_glowing_cavity_follows_its_closed_form) {
         d.lazy = 1, d.emission_points = glow, d.emission_count = 1, d.lighting.env.sh = NULL, d.lighting.env.sh_order = 0;
         bake_and_sample(&d, NULL, (const float(*)[3])points, 50, e);
         for (int i = 0; i < 50; i++) worst = fmax(worst, fabs((double)e[i][1] - expected));
-        CHECK(worst < 1e-3 * expected, "%d reflections: E %.5f, expected %.5f, largest deviation %g", bounces, (double)e[0][1], expected, worst);
+        CHECK(worst < 1e-3 * expected, "%d reflections: E %.5f, expected %.5f, largest deviation %g", bounces, (double)e[0][1], expected,
+              worst);
     }
     scene_free(&s);
 }
@@ -151,11 +154,14 @@ TEST(endless_light_is_reported) {
         if (variant < 2) d.emission_points = glow, d.emission_count = 1, d.lighting.env.sh = NULL, d.lighting.env.sh_order = 0;
         if (variant == 2) point[0][0] = 16, point[0][1] = 3.1f, point[0][2] = 16;
         d.lazy = 1;
-        CHECK(isogi_trace_create(&t, &d, NULL) == ISOGI_OK && isogi_trace_request(t, (const float(*)[3])point, 1) == ISOGI_OK && isogi_trace_step(t, 0, NULL) == ISOGI_OK, "variant %d", variant);
+        CHECK(isogi_trace_create(&t, &d, NULL) == ISOGI_OK && isogi_trace_request(t, (const float(*)[3])point, 1) == ISOGI_OK &&
+                  isogi_trace_step(t, 0, NULL) == ISOGI_OK,
+              "variant %d", variant);
         isogi_trace_sample(t, (const float(*)[3])point, 1, e, error);
         isogi_trace_status(t, &report);
         CHECK(report.diverges == (variant == 0), "variant %d: diverges %d, E %g", variant, report.diverges, (double)e[0][1]);
-        CHECK((error[0] > 1e30f) == (variant == 0) && e[0][1] > 0 && e[0][1] < 1e30f, "variant %d: E %g, error %g", variant, (double)e[0][1], (double)error[0]);
+        CHECK((error[0] > 1e30f) == (variant == 0) && e[0][1] > 0 && e[0][1] < 1e30f, "variant %d: E %g, error %g", variant,
+              (double)e[0][1], (double)error[0]);
         if (variant == 1) CHECK(fabs((double)e[0][1] - 100 * PI) < 0.02 * 100 * PI, "R 0.99: E %g", (double)e[0][1]);
         isogi_trace_free(t), scene_free(&s);
     }
@@ -173,7 +179,9 @@ TEST(probes_do_not_breed) {
     isogi_trace_report report = {0};
     float point[1][3] = {{7.6f, 31.5f, 31.5f}};
     d.lazy = 1;
-    CHECK(isogi_trace_create(&t, &d, NULL) == ISOGI_OK && isogi_trace_request(t, (const float(*)[3])point, 1) == ISOGI_OK && isogi_trace_step(t, 0, NULL) == ISOGI_OK, "bake");
+    CHECK(isogi_trace_create(&t, &d, NULL) == ISOGI_OK && isogi_trace_request(t, (const float(*)[3])point, 1) == ISOGI_OK &&
+              isogi_trace_step(t, 0, NULL) == ISOGI_OK,
+          "bake");
     isogi_trace_status(t, &report);
     printf("    %llu texels, %llu probes\n", (unsigned long long)report.texels, (unsigned long long)report.probes);
     CHECK(report.texels > 0 && report.probes < 1000, "%llu probes", (unsigned long long)report.probes);
@@ -200,7 +208,8 @@ TEST(bias_against_paths_is_small) {
         bias += apart / n, square += apart * apart / n, mean += (double)e[1][i][1] / n;
     }
     printf("    bias %.4f of the mean, root mean square difference %.4f\n", bias / mean, sqrt(square) / mean);
-    CHECK(fabs(bias) < (LONG_SUITE ? 0.01 : 0.025) * mean && sqrt(square) < (LONG_SUITE ? 0.03 : 0.06) * mean, "bias %g, rms %g of %g", bias, sqrt(square), mean);
+    CHECK(fabs(bias) < (LONG_SUITE ? 0.01 : 0.025) * mean && sqrt(square) < (LONG_SUITE ? 0.03 : 0.06) * mean, "bias %g, rms %g of %g",
+          bias, sqrt(square), mean);
     scene_free(&s);
 }
 
@@ -224,7 +233,8 @@ TEST(flat_and_long_voxels_need_few_probes) {
             isogi_trace_desc d = desc_make(&s, 0.7f, -1, LONG_SUITE ? 64 : 16);
             isogi_trace *t = NULL;
             d.method = (isogi_trace_method)method, d.lazy = 1;
-            CHECK(isogi_trace_create(&t, &d, NULL) == ISOGI_OK && isogi_trace_request(t, (const float(*)[3])points, (size_t)n) == ISOGI_OK, "spacing %d", k);
+            CHECK(isogi_trace_create(&t, &d, NULL) == ISOGI_OK && isogi_trace_request(t, (const float(*)[3])points, (size_t)n) == ISOGI_OK,
+                  "spacing %d", k);
             remaining = 1;
             for (int step = 0; step < (LONG_SUITE ? 40 : 10) && remaining > 0; step++) isogi_trace_step(t, 50000, &remaining);
             CHECK(remaining <= 0, "spacing %d, method %d: does not end, %g remain", k, method, remaining);
@@ -234,8 +244,10 @@ TEST(flat_and_long_voxels_need_few_probes) {
             isogi_trace_free(t);
         }
         if (!k) cubes = report.probes;
-        printf("    spacing %g %g %g: %llu probes, E %.4f, of paths %.4f\n", spacings[k][0], spacings[k][1], spacings[k][2], (unsigned long long)report.probes, mean[0], mean[1]);
-        CHECK(report.probes < 10 * cubes, "spacing %d: %llu probes, %llu in cubes", k, (unsigned long long)report.probes, (unsigned long long)cubes);
+        printf("    spacing %g %g %g: %llu probes, E %.4f, of paths %.4f\n", spacings[k][0], spacings[k][1], spacings[k][2],
+               (unsigned long long)report.probes, mean[0], mean[1]);
+        CHECK(report.probes < 10 * cubes, "spacing %d: %llu probes, %llu in cubes", k, (unsigned long long)report.probes,
+              (unsigned long long)cubes);
         CHECK(fabs(mean[0] - mean[1]) < 0.03 * mean[1], "spacing %d: E %.4f, of paths %.4f", k, mean[0], mean[1]);
     }
     scene_free(&s);
@@ -336,10 +348,12 @@ TEST(lazy_bakes_are_usable_at_once) {
         memcpy(last, e, sizeof e);
     }
     isogi_trace_status(t, &report);
-    printf("    usable after %.3f of the rays; largest step of a value %.3f, of the picture %.3f (rms); %d steps, %g texels, %g probes\n", (double)usable / (double)c.rays, jump, whole, steps, (double)report.texels, (double)report.probes);
+    printf("    usable after %.3f of the rays; largest step of a value %.3f, of the picture %.3f (rms); %d steps, %g texels, %g probes\n",
+           (double)usable / (double)c.rays, jump, whole, steps, (double)report.texels, (double)report.probes);
     CHECK(whole < 0.2 && jump < 0.4 * PI, "a step changes the picture by %.3f, a point by %.3f", whole, jump);
     CHECK(missing == 0 && usable > 0 && usable * 8 < c.rays, "usable after %g of %g rays", (double)usable, (double)c.rays);
-    CHECK(report.texels == c.texels && report.drafts == 0 && report.error < 0.05 * report.light, "%g texels, error %g of %g", (double)report.texels, report.error, report.light);
+    CHECK(report.texels == c.texels && report.drafts == 0 && report.error < 0.05 * report.light, "%g texels, error %g of %g",
+          (double)report.texels, report.error, report.light);
     /* what has been asked for before costs nothing; another isovalue only its own texels */
     isogi_trace_request(t, (const float(*)[3])points, (size_t)n), isogi_trace_step(t, 0, NULL);
     {
@@ -349,7 +363,8 @@ TEST(lazy_bakes_are_usable_at_once) {
         CHECK(again.rays == c.rays, "%g rays for nothing new", (double)(again.rays - c.rays));
         isogi_trace_request(t, (const float(*)[3])points, (size_t)k), isogi_trace_step(t, 0, NULL);
         isogi_trace_counters(t, &other);
-        CHECK(other.texels > again.texels && other.texels - again.texels < again.texels, "%g texels, then %g", (double)again.texels, (double)other.texels);
+        CHECK(other.texels > again.texels && other.texels - again.texels < again.texels, "%g texels, then %g", (double)again.texels,
+              (double)other.texels);
     }
     isogi_trace_free(t), scene_free(&s);
 }
@@ -367,11 +382,14 @@ static void covered(const char *name, const isogi_trace_desc *d, const float (*p
     isogi_trace_sample(t, points, (size_t)n, e, error);
     for (int i = 0; i < n; i++) {
         double apart = fabs((double)e[i][1] - (double)expected[i]);
-        within += apart <= 2 * (double)error[i] + 5e-4 * (double)expected[i], square += apart * apart / n, claimed += (double)error[i] * (double)error[i] / n;
+        within += apart <= 2 * (double)error[i] + 5e-4 * (double)expected[i], square += apart * apart / n,
+            claimed += (double)error[i] * (double)error[i] / n;
         CHECK(error[i] > 0, "%s: no error at %d", name, i);
     }
-    printf("    %-14s %-8s %4d samples: %5.1f %% within 2 standard errors, rms %.4f, reported %.4f\n", name, d->method ? "paths" : "feedback", d->samples, 100.0 * within / n, sqrt(square), sqrt(claimed));
-    CHECK(within >= least * n && sqrt(claimed) < 6 * sqrt(square) + 0.1 * (double)expected[0], "%s: %d of %d, reported %g, rms %g", name, within, n, sqrt(claimed), sqrt(square));
+    printf("    %-14s %-8s %4d samples: %5.1f %% within 2 standard errors, rms %.4f, reported %.4f\n", name,
+           d->method ? "paths" : "feedback", d->samples, 100.0 * within / n, sqrt(square), sqrt(claimed));
+    CHECK(within >= least * n && sqrt(claimed) < 6 * sqrt(square) + 0.1 * (double)expected[0], "%s: %d of %d, reported %g, rms %g", name,
+          within, n, sqrt(claimed), sqrt(square));
     isogi_trace_free(t);
 }
 
@@ -384,7 +402,8 @@ TEST(errors_are_honest) {
     static float points[3][60][3], expected[3][60], e[60][3];
     isogi_trace_desc d[3];
     int n = 60;
-    s[0] = scene_make(64, 64, 64, NULL, ball_over_plane, q_plane), s[1] = scene_make(32, 32, 32, NULL, shell, q_shell), s[2] = scene_make(32, 32, 32, NULL, pit, q_pit);
+    s[0] = scene_make(64, 64, 64, NULL, ball_over_plane, q_plane), s[1] = scene_make(32, 32, 32, NULL, shell, q_shell),
+    s[2] = scene_make(32, 32, 32, NULL, pit, q_pit);
     d[0] = feedback(&s[0], 0, 0, 0), d[1] = feedback(&s[1], 0.6f, -1, 0), d[2] = feedback(&s[2], 0.5f, -1, LONG_SUITE ? 4096 : 512);
     d[1].emission_points = glow, d[1].emission_count = 1, d[1].lighting.env.sh = NULL, d[1].lighting.env.sh_order = 0;
     for (int i = 0; i < n; i++) {
@@ -443,13 +462,15 @@ TEST(error_falls_with_the_samples) {
 }
 
 /* Texels of a glowing or pale range of isovalues lie beside those of a dark one, on other isosurfaces: its light is no part of theirs,
-   however noisy. Neither probes nor the filter may mix them (mixed: 60 % and 20 % too much for the dark). Texels of a pit within a voxel of the border
+   however noisy. Neither probes nor the filter may mix them (mixed: 60 % and 20 % too much for the dark). Texels of a pit within a voxel
+   of the border
    between two ranges, against paths. What the filter averages lies on one side of the border then, where the pit is half a voxel
    deeper: 8 %; noise of 4 samples at 100 texels: 3 %. */
 TEST(isovalues_of_other_colours_do_not_light_each_other) {
     double q[5] = {16, 15, 16, 22.3, 12};
     scene s = scene_make(32, 32, 32, NULL, pit, q);
-    isogi_albedo_point glow[2] = {{0, {0, 0, 0}}, {0.001, {3, 3, 3}}}, albedo[2] = {{0, {0.05f, 0.05f, 0.05f}}, {0.001, {0.9f, 0.9f, 0.9f}}};
+    isogi_albedo_point glow[2] = {{0, {0, 0, 0}}, {0.001, {3, 3, 3}}},
+                       albedo[2] = {{0, {0.05f, 0.05f, 0.05f}}, {0.001, {0.9f, 0.9f, 0.9f}}};
     static float points[2][400][3], e[400][3];
     int n[2] = {0, 0};
     for (int x = 4; x < 28; x++)
@@ -479,8 +500,10 @@ TEST(isovalues_of_other_colours_do_not_light_each_other) {
         }
         for (int side = 0; side < 2; side++) {
             double by_paths = mean[side][1];
-            printf("    %s, %s: %d texels, E %.3f, by paths %.3f\n", kind ? "albedo" : "glow", side ? "bright" : "dark", n[side], mean[side][0], by_paths);
-            CHECK(n[side] > 100 && fabs(mean[side][0] - by_paths) < 0.12 * by_paths, "%s %d: E %.4f, by paths %.4f", kind ? "albedo" : "glow", side, mean[side][0], by_paths);
+            printf("    %s, %s: %d texels, E %.3f, by paths %.3f\n", kind ? "albedo" : "glow", side ? "bright" : "dark", n[side],
+                   mean[side][0], by_paths);
+            CHECK(n[side] > 100 && fabs(mean[side][0] - by_paths) < 0.12 * by_paths, "%s %d: E %.4f, by paths %.4f",
+                  kind ? "albedo" : "glow", side, mean[side][0], by_paths);
         }
     }
     scene_free(&s);
@@ -566,7 +589,8 @@ TEST(errors_are_honest_on_a_scan) {
         beyond += fabs(apart) > 2 * sqrt((double)error[0][i] * (double)error[0][i] + (double)error[1][i] * (double)error[1][i]);
         square += apart * apart, all += (double)e[1][i][1] * (double)e[1][i][1], count++;
     }
-    printf("    %.1f %% of %d texels are beyond two standard errors; rms difference %.4f\n", 100.0 * beyond / count, count, sqrt(square / all));
+    printf("    %.1f %% of %d texels are beyond two standard errors; rms difference %.4f\n", 100.0 * beyond / count, count,
+           sqrt(square / all));
     CHECK(count > POINTS / 2 && beyond < 0.05 * count, "%d of %d texels are beyond two standard errors", beyond, count);
     isogi_vol_free(pyramid);
 }
@@ -605,7 +629,9 @@ TEST(what_is_wanted_is_what_is_missing) {
     isogi_trace_report report;
     size_t beyond[3] = {0, 12, 0};
     double remaining = 1;
-    CHECK(isogi_trace_create(&t, &d, NULL) == ISOGI_OK && !isogi_trace_wanted(NULL, beyond) && !isogi_trace_wanted(t, NULL) && !isogi_trace_wanted(t, beyond), "arguments");
+    CHECK(isogi_trace_create(&t, &d, NULL) == ISOGI_OK && !isogi_trace_wanted(NULL, beyond) && !isogi_trace_wanted(t, NULL) &&
+              !isogi_trace_wanted(t, beyond),
+          "arguments");
     for (int phase = 0; phase < 3; phase++) {
         size_t wanted = 0, valid = 0, odd = 0;
         if (phase) CHECK(isogi_trace_step(t, phase == 1 ? 1000 : 0, &remaining) == ISOGI_OK, "phase %d", phase);
@@ -615,7 +641,8 @@ TEST(what_is_wanted_is_what_is_missing) {
             odd += isogi_trace_wanted(t, texel) && !isogi_trace_valid(t, texel);
         }
         isogi_trace_status(t, &report);
-        CHECK(!odd && wanted + report.texels == valid && (wanted == 0) == (phase == 2), "phase %d: %zu wanted, %zu valid, %llu there", phase, wanted, valid, (unsigned long long)report.texels);
+        CHECK(!odd && wanted + report.texels == valid && (wanted == 0) == (phase == 2), "phase %d: %zu wanted, %zu valid, %llu there",
+              phase, wanted, valid, (unsigned long long)report.texels);
     }
     isogi_trace_free(t), scene_free(&s);
 }

@@ -41,7 +41,8 @@ static isogi_counters finished(isogi_trace *t, const isogi_trace_desc *d, const 
     return after;
 }
 
-/* A new lighting, thousands of times as bright, too: irradiance is baked anew at its first price, and the old light can be read until the new
+/* A new lighting, thousands of times as bright, too: irradiance is baked anew at its first price, and the old light can be read until the
+   new
    one is there. Short formats then have another unit. */
 TEST(irradiance_is_relit_at_the_price_of_a_bake) {
     double q[1] = {0.5};
@@ -54,7 +55,8 @@ TEST(irradiance_is_relit_at_the_price_of_a_bake) {
         isogi_counters counters, first;
         isogi_trace_report report;
         double remaining = 0;
-        d.storage = other.storage = (isogi_trace_format)format, d.sides = other.sides = format & 1 ? ISOGI_TRACE_BOTH_SIDES : ISOGI_TRACE_LOW_SIDE;
+        d.storage = other.storage = (isogi_trace_format)format,
+        d.sides = other.sides = format & 1 ? ISOGI_TRACE_BOTH_SIDES : ISOGI_TRACE_LOW_SIDE;
         other.lighting.lights = &sun, other.lighting.light_count = 1;
         isogi_trace *t = baked(&d), *fresh = baked(&other);
         first = counted(fresh);
@@ -63,7 +65,9 @@ TEST(irradiance_is_relit_at_the_price_of_a_bake) {
         isogi_trace_sample(t, (const float(*)[3])points, (size_t)n, e[1], NULL);
         /* the error of the other unit: it is 2^11 larger */
         double rounding = format == ISOGI_TRACE_FLOAT ? 0 : format == ISOGI_TRACE_HALF ? 0.02 : 4;
-        for (int i = 0; i < n; i++) CHECK(fabs((double)e[0][i][1] - (double)e[1][i][1]) <= rounding * PI, "format %d: %g before, %g after", format, (double)e[0][i][1], (double)e[1][i][1]);
+        for (int i = 0; i < n; i++)
+            CHECK(fabs((double)e[0][i][1] - (double)e[1][i][1]) <= rounding * PI, "format %d: %g before, %g after", format,
+                  (double)e[0][i][1], (double)e[1][i][1]);
         isogi_trace_status(t, &report);
         CHECK(report.drafts == report.texels && report.texels > 50, "%d drafts of %d texels", (int)report.drafts, (int)report.texels);
         CHECK(isogi_trace_step(t, 200, &remaining) == ISOGI_OK && remaining > 0 && remaining < 1, "remaining %g", remaining);
@@ -73,7 +77,8 @@ TEST(irradiance_is_relit_at_the_price_of_a_bake) {
         CHECK(isogi_trace_relight(t, &other.lighting) == ISOGI_OK, "the same again, format %d", format);
         CHECK(finished(t, &other, "the same lighting").rays == 0, "the same lighting costs rays, format %d", format);
         sun.rgb[0] *= 2; /* in place */
-        CHECK(isogi_trace_relight(t, &other.lighting) == ISOGI_OK && finished(t, &other, "changed in place").rays == first.rays, "changed in place, format %d", format);
+        CHECK(isogi_trace_relight(t, &other.lighting) == ISOGI_OK && finished(t, &other, "changed in place").rays == first.rays,
+              "changed in place, format %d", format);
         isogi_trace_free(t), isogi_trace_free(fresh);
     }
     scene_free(&s);
@@ -95,7 +100,8 @@ static int texels_between(const isogi_trace *t, const scene *s, double low, doub
 TEST(colours_concern_their_isovalues) {
     double q[1] = {0.5};
     scene s = scene_make(11, 10, 12, NULL, gyroid, q);
-    isogi_albedo_point table[3][4] = {{{-1, {0.5f, 0.5f, 0.5f}}, {0, {0.5f, 0.5f, 0.5f}}, {0.4, {0.5f, 0.5f, 0.5f}}, {0.8, {0.5f, 0.5f, 0.5f}}}};
+    isogi_albedo_point table[3][4] = {
+        {{-1, {0.5f, 0.5f, 0.5f}}, {0, {0.5f, 0.5f, 0.5f}}, {0.4, {0.5f, 0.5f, 0.5f}}, {0.8, {0.5f, 0.5f, 0.5f}}}};
     memcpy(table[1], table[0], sizeof table[0]), memcpy(table[2], table[0], sizeof table[0]);
     table[1][2].rgb[1] = 0.9f; /* changes between 0 and 0.8 */
     for (int mode = 0; mode < 2; mode++) {
@@ -106,24 +112,28 @@ TEST(colours_concern_their_isovalues) {
         d.albedo_points = table[1];
         CHECK(isogi_trace_change(t, &d) == ISOGI_OK, "mode %d", mode);
         counters = finished(t, &d, "colours between 0 and 0.8");
-        CHECK((int)counters.texels == texels_between(t, &s, 0, 0.8) && counters.texels > 50, "%d texels, %d expected", (int)counters.texels, texels_between(t, &s, 0, 0.8));
+        CHECK((int)counters.texels == texels_between(t, &s, 0, 0.8) && counters.texels > 50, "%d texels, %d expected", (int)counters.texels,
+              texels_between(t, &s, 0, 0.8));
         d.albedo_points = table[2];
         CHECK(isogi_trace_change(t, &d) == ISOGI_OK && finished(t, &d, "back").texels == counters.texels, "back, mode %d", mode);
         d.albedo_points = table[0];
         CHECK(isogi_trace_change(t, &d) == ISOGI_OK && finished(t, &d, "equal").texels == 0, "an equal table, mode %d", mode);
         table[0][0].rgb[0] = 0.6f;
-        CHECK(isogi_trace_change(t, &d) == ISOGI_OK && finished(t, &d, "in place").texels == (uint64_t)texels_between(t, &s, -9, 9), "in place, mode %d", mode);
+        CHECK(isogi_trace_change(t, &d) == ISOGI_OK && finished(t, &d, "in place").texels == (uint64_t)texels_between(t, &s, -9, 9),
+              "in place, mode %d", mode);
         table[0][0].rgb[0] = 0.5f;
         d.bounces = 0;
         CHECK(isogi_trace_change(t, &d) == ISOGI_OK, "mode %d", mode);
         finished(t, &d, "no reflections");
         d.albedo_points = table[1];
-        CHECK(isogi_trace_change(t, &d) == ISOGI_OK && finished(t, &d, "colours without reflections").texels == 0, "without reflections, mode %d", mode);
+        CHECK(isogi_trace_change(t, &d) == ISOGI_OK && finished(t, &d, "colours without reflections").texels == 0,
+              "without reflections, mode %d", mode);
         if (!mode) { /* what glows is seen without reflections */
             d.emission_points = table[1], d.emission_count = 4;
             isogi_trace *glowing = baked(&d);
             d.emission_points = table[2];
-            CHECK(isogi_trace_change(glowing, &d) == ISOGI_OK && finished(glowing, &d, "emission").texels == counters.texels, "emission, mode %d", mode);
+            CHECK(isogi_trace_change(glowing, &d) == ISOGI_OK && finished(glowing, &d, "emission").texels == counters.texels,
+                  "emission, mode %d", mode);
             isogi_trace_free(glowing);
         }
         isogi_trace_free(t);
@@ -145,9 +155,11 @@ TEST(isovalues_add_texels) {
     wide = counted(fresh);
     CHECK(isogi_trace_change(t, &d) == ISOGI_OK, "wider %d", 1);
     more = finished(t, &d, "a wider interval");
-    CHECK(more.texels == wide.texels - narrow.texels && more.texels > 100 && narrow.texels > 50, "%d and %d more texels, %d in all", (int)narrow.texels, (int)more.texels, (int)wide.texels);
+    CHECK(more.texels == wide.texels - narrow.texels && more.texels > 100 && narrow.texels > 50, "%d and %d more texels, %d in all",
+          (int)narrow.texels, (int)more.texels, (int)wide.texels);
     d.isovalue_min = 0.9;
-    CHECK(isogi_trace_change(t, &d) == ISOGI_OK && isogi_trace_step(t, 0, NULL) == ISOGI_OK && counted(t).texels == wide.texels, "narrower %d", 1);
+    CHECK(isogi_trace_change(t, &d) == ISOGI_OK && isogi_trace_step(t, 0, NULL) == ISOGI_OK && counted(t).texels == wide.texels,
+          "narrower %d", 1);
     d.isovalue_min = 0;
     CHECK(isogi_trace_change(t, &d) == ISOGI_OK && finished(t, &d, "wider again").texels == 0, "wider again %d", 1);
     d.lookup = ISOGI_TRACE_BSPLINE; /* reads further */
@@ -173,7 +185,9 @@ TEST(moving_the_isovalue_lazily) {
         isogi_trace_request(t, (const float(*)[3])points, (size_t)n), isogi_trace_step(t, 0, NULL);
         texels[k] = counted(t).texels - before;
     }
-    CHECK(texels[0] > 100 && texels[1] < texels[0] / 4 && texels[2] > 100 && texels[3] == 0, "texels: %d at first, %d a little further, %d elsewhere, %d back", (int)texels[0], (int)texels[1], (int)texels[2], (int)texels[3]);
+    CHECK(texels[0] > 100 && texels[1] < texels[0] / 4 && texels[2] > 100 && texels[3] == 0,
+          "texels: %d at first, %d a little further, %d elsewhere, %d back", (int)texels[0], (int)texels[1], (int)texels[2],
+          (int)texels[3]);
     isogi_trace_free(t), scene_free(&s);
 }
 
@@ -190,7 +204,8 @@ static void change_box(scene *s, isogi_trace *t, test_random *r, int large) {
     for (size_t z = first[2]; z <= last[2]; z++)
         for (size_t y = first[1]; y <= last[1]; y++)
             for (size_t x = first[0]; x <= last[0]; x++)
-                s->data[x + s->volume.size[0] * (y + s->volume.size[1] * z)] = random_bits(r) % 40 ? (float)random_range(r, low, high) : (float)nan_value();
+                s->data[x + s->volume.size[0] * (y + s->volume.size[1] * z)] =
+                    random_bits(r) % 40 ? (float)random_range(r, low, high) : (float)nan_value();
     CHECK(isogi_vol_update(s->pyramid, first, last, NULL) == ISOGI_OK && isogi_trace_touch(t, first, last) == ISOGI_OK, "after %d", 1);
 }
 TEST(changed_voxels_give_the_bits_of_a_new_bake) {
@@ -222,7 +237,8 @@ TEST(changed_voxels_give_the_bits_of_a_new_bake) {
 }
 
 /* On layers y = const, each an isosurface of its own, voxels of layers 10 and 11 change within the values of these: layers 8 to 13 are what
-   texels and normals there read, and no other surface passes there. With a reach of 3 and one reflection, only texels within 6 of the box. */
+   texels and normals there read, and no other surface passes there. With a reach of 3 and one reflection, only
+   texels within 6 of the box. */
 TEST(only_surfaces_at_changed_voxels_are_computed_again) {
     double q[1] = {8};
     size_t first[3] = {15, 10, 15}, last[3] = {16, 11, 16};
@@ -243,7 +259,8 @@ TEST(only_surfaces_at_changed_voxels_are_computed_again) {
     }
 }
 
-/* A lattice of every eighth voxel, an interval of isovalues: a lump in the air brings texels in that are far from it, and its end does away with
+/* A lattice of every eighth voxel, an interval of isovalues: a lump in the air brings texels in that are far from it, and its end does
+   away with
    what is to be done. */
 TEST(changed_voxels_bring_texels_into_the_interval) {
     double q[1] = {6.5};
@@ -282,23 +299,30 @@ TEST(feedback_follows_changes) {
         isogi_trace_step(t, lazy ? 3000 : 0, &remaining); /* lazily in the middle of its work */
         uint64_t whole = counted(t).rays;
         d.lighting.lights = &sun, d.lighting.light_count = 1;
-        CHECK(isogi_trace_change(t, &d) == ISOGI_OK && isogi_trace_step(t, 0, &remaining) == ISOGI_OK && remaining <= 0, "lighting, remaining %g", remaining);
+        CHECK(isogi_trace_change(t, &d) == ISOGI_OK && isogi_trace_step(t, 0, &remaining) == ISOGI_OK && remaining <= 0,
+              "lighting, remaining %g", remaining);
         isogi_trace_sample(t, (const float(*)[3])points, (size_t)n, e[0], NULL);
         CHECK(isogi_trace_touch(t, first, last) == ISOGI_OK, "before %d", lazy);
         for (size_t z = first[2]; z <= last[2]; z++)
             for (size_t y = first[1]; y <= last[1]; y++)
-                for (size_t x = first[0]; x <= last[0]; x++) s.data[x + 33 * (y + 33 * z)] = 3 + 0.1f * (float)(x + y + z); /* a block in the pit */
+                for (size_t x = first[0]; x <= last[0]; x++)
+                    s.data[x + 33 * (y + 33 * z)] = 3 + 0.1f * (float)(x + y + z); /* a block in the pit */
         isogi_vol_update(s.pyramid, first, last, NULL);
         CHECK(isogi_trace_touch(t, first, last) == ISOGI_OK, "after %d", lazy);
         n = surface_points(&s, 0, 200, 8, points);
         isogi_trace_request(t, (const float(*)[3])points, (size_t)n);
-        CHECK(isogi_trace_step(t, 0, &remaining) == ISOGI_OK && remaining <= 0 && counted(t).rays > whole, "voxels, remaining %g", remaining);
+        CHECK(isogi_trace_step(t, 0, &remaining) == ISOGI_OK && remaining <= 0 && counted(t).rays > whole, "voxels, remaining %g",
+              remaining);
         isogi_trace_sample(t, (const float(*)[3])points, (size_t)n, e[0], NULL);
-        isogi_trace_create(&fresh, &d, NULL), isogi_trace_request(fresh, (const float(*)[3])points, (size_t)n), isogi_trace_step(fresh, 0, NULL);
+        isogi_trace_create(&fresh, &d, NULL), isogi_trace_request(fresh, (const float(*)[3])points, (size_t)n),
+            isogi_trace_step(fresh, 0, NULL);
         isogi_trace_sample(fresh, (const float(*)[3])points, (size_t)n, e[1], NULL);
-        for (int i = 0; i < n; i++) sum += pow((double)e[0][i][1] - (double)e[1][i][1], 2) / n, mean += (double)e[1][i][1] / n, moved += (double)e[0][i][1] / n;
-        printf("    %s: after changes of light and voxels %.3f rms from a new bake, means %.4f and %.4f\n", lazy ? "lazy" : "full", sqrt(sum) / mean, moved / mean, 1.0);
-        CHECK(sqrt(sum) / mean < 0.08 && fabs(moved / mean - 1) < 0.02, "lazy %d: %.4f rms, mean %.4f", lazy, sqrt(sum) / mean, moved / mean);
+        for (int i = 0; i < n; i++)
+            sum += pow((double)e[0][i][1] - (double)e[1][i][1], 2) / n, mean += (double)e[1][i][1] / n, moved += (double)e[0][i][1] / n;
+        printf("    %s: after changes of light and voxels %.3f rms from a new bake, means %.4f and %.4f\n", lazy ? "lazy" : "full",
+               sqrt(sum) / mean, moved / mean, 1.0);
+        CHECK(sqrt(sum) / mean < 0.08 && fabs(moved / mean - 1) < 0.02, "lazy %d: %.4f rms, mean %.4f", lazy, sqrt(sum) / mean,
+              moved / mean);
         isogi_trace_free(t), isogi_trace_free(fresh), scene_free(&s);
     }
 }
@@ -320,11 +344,13 @@ TEST(hierarchies_follow_changes) {
         for (size_t y = first[1]; y <= last[1]; y++)
             for (size_t x = first[0]; x <= last[0]; x++) s.data[x + 25 * (y + 25 * z)] = 1.5f;
     isogi_vol_update(s.pyramid, first, last, NULL);
-    CHECK(isogi_trace_touch(t, first, last) == ISOGI_OK && isogi_trace_step(t, 0, &remaining) == ISOGI_OK && remaining <= 0, "after: remaining %g", remaining);
+    CHECK(isogi_trace_touch(t, first, last) == ISOGI_OK && isogi_trace_step(t, 0, &remaining) == ISOGI_OK && remaining <= 0,
+          "after: remaining %g", remaining);
     memset(&d.lighting, 0, sizeof d.lighting), d.lighting.lights = &sun, d.lighting.light_count = 1;
     fresh = baked(&d);
     int n = surface_points(&s, 0, 100, 4, points);
-    isogi_trace_sample(t, (const float(*)[3])points, (size_t)n, e[0], NULL), isogi_trace_sample(fresh, (const float(*)[3])points, (size_t)n, e[1], NULL);
+    isogi_trace_sample(t, (const float(*)[3])points, (size_t)n, e[0], NULL),
+        isogi_trace_sample(fresh, (const float(*)[3])points, (size_t)n, e[1], NULL);
     for (int i = 0; i < n; i++) worst = fmax(worst, fabs((double)e[0][i][1] - (double)e[1][i][1]));
     /* cells that were fine before stay so: where they need not be, the fine texels' noise is seen instead of the coarse ones' */
     CHECK(worst < 0.35 * PI, "largest difference %.4f", worst);
@@ -362,8 +388,12 @@ TEST(other_textures_are_refused) {
         }
         CHECK(isogi_trace_change(t, &d) == ISOGI_INVALID, "change %d", i);
     }
-    CHECK(isogi_trace_change(NULL, &good) == ISOGI_INVALID && isogi_trace_change(t, NULL) == ISOGI_INVALID && isogi_trace_relight(t, NULL) == ISOGI_INVALID, "nothing %d", 1);
-    CHECK(isogi_trace_touch(t, first, last) == ISOGI_INVALID && isogi_trace_touch(t, beyond, beyond) == ISOGI_INVALID && isogi_trace_touch(t, NULL, last) == ISOGI_INVALID, "an empty box %d", 1);
+    CHECK(isogi_trace_change(NULL, &good) == ISOGI_INVALID && isogi_trace_change(t, NULL) == ISOGI_INVALID &&
+              isogi_trace_relight(t, NULL) == ISOGI_INVALID,
+          "nothing %d", 1);
+    CHECK(isogi_trace_touch(t, first, last) == ISOGI_INVALID && isogi_trace_touch(t, beyond, beyond) == ISOGI_INVALID &&
+              isogi_trace_touch(t, NULL, last) == ISOGI_INVALID,
+          "an empty box %d", 1);
     CHECK(counted(t).rays == finished(t, &good, "nothing changed").rays + counted(t).rays, "rays %d", 0);
     CHECK(isogi_trace_touch(t, first, far_off) == ISOGI_OK, "cut to the volume %d", 1);
     finished(t, &good, "touched, not changed");
@@ -387,7 +417,8 @@ TEST(every_allocation_may_fail) {
             isogi_trace *t = NULL, *same;
             d.sides = kind & 1 ? ISOGI_TRACE_BOTH_SIDES : ISOGI_TRACE_LOW_SIDE, d.isovalue_min = 0.6, d.isovalue_max = 0.7;
             d.method = kind < 2 ? ISOGI_TRACE_PATHS : ISOGI_TRACE_FEEDBACK;
-            d.lighting.env.sh = NULL, d.lighting.env.sh_order = 0, d.lighting.env.rgb = &image[0][0][0][0], d.lighting.env.width = W, d.lighting.env.height = H;
+            d.lighting.env.sh = NULL, d.lighting.env.sh_order = 0, d.lighting.env.rgb = &image[0][0][0][0], d.lighting.env.width = W,
+            d.lighting.env.height = H;
             isogi_trace_create(&t, &d, &context), isogi_trace_step(t, 0, NULL);
             same = baked(&d), other = d;
             other.lighting.env.rgb = &image[1][0][0][0], other.isovalue_min = -0.5, other.albedo[0] = 0.9f;
@@ -398,7 +429,8 @@ TEST(every_allocation_may_fail) {
             CHECK(result == (finished_once ? ISOGI_OK : ISOGI_NO_MEMORY), "kind %d, allocation %ld: %d", kind, k, result);
             if (result != ISOGI_OK) {
                 CHECK(isogi_trace_step(t, 0, NULL) == ISOGI_OK && same_bits(t, same), "kind %d: changed after allocation %ld", kind, k);
-                CHECK((kind == 3 ? isogi_trace_touch(t, first, last) : isogi_trace_change(t, &other)) == ISOGI_OK, "kind %d: again after allocation %ld", kind, k);
+                CHECK((kind == 3 ? isogi_trace_touch(t, first, last) : isogi_trace_change(t, &other)) == ISOGI_OK,
+                      "kind %d: again after allocation %ld", kind, k);
             }
             if (kind < 2) finished(t, &other, "after a failure");
             else CHECK(isogi_trace_step(t, 0, NULL) == ISOGI_OK, "kind %d: step after allocation %ld", kind, k);

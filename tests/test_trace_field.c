@@ -60,7 +60,8 @@ static int analytic_points(const analytic *a, int count, uint64_t seed, float (*
         analytic_intersect((void *)(uintptr_t)a, &ray, 1, &s);
         if (!(s.t > 0)) continue;
         length = -length3((double)s.normal[0], (double)s.normal[1], (double)s.normal[2]);
-        for (int k = 0; k < 3; k++) points[found][k] = (float)(ray.origin[k] + s.t * (double)ray.dir[k]), normals[found][k] = (float)((double)s.normal[k] / length);
+        for (int k = 0; k < 3; k++)
+            points[found][k] = (float)(ray.origin[k] + s.t * (double)ray.dir[k]), normals[found][k] = (float)((double)s.normal[k] / length);
         found++;
     }
     return found;
@@ -76,10 +77,14 @@ TEST(analytic_sphere_and_plane) {
         points[i][0] = (float)(16 + 0.8 * i), points[i][1] = 6, points[i][2] = (float)(16 - 0.5 * i);
         up[i][0] = up[i][2] = 0, up[i][1] = 1;
     }
-    CHECK(isogi_trace_gather_field(&d, analytic_intersect, &a, (const float(*)[3])points, (const float(*)[3])up, 8, e, error, NULL) == ISOGI_OK, "plane %d", 8);
+    CHECK(isogi_trace_gather_field(&d, analytic_intersect, &a, (const float(*)[3])points, (const float(*)[3])up, 8, e, error, NULL) ==
+              ISOGI_OK,
+          "plane %d", 8);
     for (int i = 0; i < 8; i++) {
-        double distance = length3((double)points[i][0] - 16, 10, (double)points[i][2] - 16), expected = PI * (1 - 16 / (distance * distance) * 10 / distance);
-        CHECK(fabs((double)e[i][0] - expected) < 0.02 * expected && error[i] < 0.03f * (float)PI, "at %d: E %.4f, expected %.4f, error %g", i, (double)e[i][0], expected, (double)error[i]);
+        double distance = length3((double)points[i][0] - 16, 10, (double)points[i][2] - 16),
+               expected = PI * (1 - 16 / (distance * distance) * 10 / distance);
+        CHECK(fabs((double)e[i][0] - expected) < 0.02 * expected && error[i] < 0.03f * (float)PI, "at %d: E %.4f, expected %.4f, error %g",
+              i, (double)e[i][0], expected, (double)error[i]);
     }
     d.albedo[0] = d.albedo[1] = d.albedo[2] = 1, d.bounces = 100, d.samples = 64;
     isogi_trace_gather_field(&d, analytic_intersect, &a, (const float(*)[3])points, (const float(*)[3])up, 8, e, error, NULL);
@@ -137,7 +142,8 @@ static void tets_surface(tets *m, double isovalue) {
         }
         memcpy(m->triangle[m->triangle_count++], cut, 3 * sizeof cut[0]);
         if (n * k < 4) continue;
-        memcpy(m->triangle[m->triangle_count][0], cut[0], sizeof cut[0]), memcpy(m->triangle[m->triangle_count++][1], cut[2], 2 * sizeof cut[0]);
+        memcpy(m->triangle[m->triangle_count][0], cut[0], sizeof cut[0]),
+            memcpy(m->triangle[m->triangle_count++][1], cut[2], 2 * sizeof cut[0]);
     }
 }
 
@@ -148,7 +154,8 @@ static void tets_intersect(void *user, const isogi_ray *rays, size_t count, isog
         for (int k = 0; k < m->triangle_count; k++) {
             double u[3], v[3], o[3], p[3], w[3], n[3], det, b, c, t;
             for (int a = 0; a < 3; a++) {
-                u[a] = (double)m->triangle[k][1][a] - (double)m->triangle[k][0][a], v[a] = (double)m->triangle[k][2][a] - (double)m->triangle[k][0][a];
+                u[a] = (double)m->triangle[k][1][a] - (double)m->triangle[k][0][a],
+                v[a] = (double)m->triangle[k][2][a] - (double)m->triangle[k][0][a];
                 o[a] = rays[i].origin[a] - (double)m->triangle[k][0][a], w[a] = (double)rays[i].dir[a];
             }
             for (int a = 0; a < 3; a++) n[a] = u[(a + 1) % 3] * v[(a + 2) % 3] - u[(a + 2) % 3] * v[(a + 1) % 3];
@@ -157,7 +164,9 @@ static void tets_intersect(void *user, const isogi_ray *rays, size_t count, isog
             if (fabs(det) < 1e-300) continue;
             t = (n[0] * o[0] + n[1] * o[1] + n[2] * o[2]) / det;
             b = (v[0] * p[0] + v[1] * p[1] + v[2] * p[2]) / det, c = -(u[0] * p[0] + u[1] * p[1] + u[2] * p[2]) / det;
-            if (b < 0 || c < 0 || b + c > 1 || !(t > 0) || (rays[i].tmax > 0 && t > rays[i].tmax) || (surfaces[i].t > 0 && t >= surfaces[i].t)) continue;
+            if (b < 0 || c < 0 || b + c > 1 || !(t > 0) || (rays[i].tmax > 0 && t > rays[i].tmax) ||
+                (surfaces[i].t > 0 && t >= surfaces[i].t))
+                continue;
             surfaces[i].t = t;
             for (int a = 0; a < 3; a++) surfaces[i].normal[a] = (float)(n[a] / length3(n[0], n[1], n[2]));
         }
@@ -180,7 +189,8 @@ static tets tets_make(int n, field *f, const double *parameter) {
         for (int k = 0; k < 6; k++, m.count++)
             for (int c = 0; c < 4; c++) {
                 int corner = c == 0 ? 0 : c == 3 ? 7 : order[k][c - 1];
-                m.tet[m.count][c] = (i % cubes + (corner & 1)) + n * ((i / cubes % cubes + (corner >> 1 & 1)) + n * (i / cubes / cubes + (corner >> 2)));
+                m.tet[m.count][c] =
+                    (i % cubes + (corner & 1)) + n * ((i / cubes % cubes + (corner >> 1 & 1)) + n * (i / cubes / cubes + (corner >> 2)));
             }
     return m;
 }
@@ -193,13 +203,15 @@ static int tets_points(const tets *m, field *f, const double *parameter, int cou
     for (int k = 0; k < m->triangle_count && found < count; k += stride ? stride : 1) {
         double u[3], v[3], n[3], p[3], q[3], size;
         for (int a = 0; a < 3; a++) {
-            u[a] = (double)m->triangle[k][1][a] - (double)m->triangle[k][0][a], v[a] = (double)m->triangle[k][2][a] - (double)m->triangle[k][0][a];
+            u[a] = (double)m->triangle[k][1][a] - (double)m->triangle[k][0][a],
+            v[a] = (double)m->triangle[k][2][a] - (double)m->triangle[k][0][a];
             points[found][a] = (m->triangle[k][0][a] + m->triangle[k][1][a] + m->triangle[k][2][a]) / 3;
         }
         for (int a = 0; a < 3; a++) n[a] = u[(a + 1) % 3] * v[(a + 2) % 3] - u[(a + 2) % 3] * v[(a + 1) % 3];
         size = length3(n[0], n[1], n[2]);
         if (!(size > 1e-3)) continue;
-        for (int a = 0; a < 3; a++) p[a] = (double)points[found][a] + 0.3 * n[a] / size, q[a] = (double)points[found][a] - 0.3 * n[a] / size;
+        for (int a = 0; a < 3; a++)
+            p[a] = (double)points[found][a] + 0.3 * n[a] / size, q[a] = (double)points[found][a] - 0.3 * n[a] / size;
         if (f(p, parameter) > f(q, parameter)) size = -size;
         for (int a = 0; a < 3; a++) normals[found][a] = (float)(n[a] / size);
         found++;
@@ -207,7 +219,8 @@ static int tets_points(const tets *m, field *f, const double *parameter, int cou
     return found;
 }
 
-/* The isosurface of a tetrahedral ball is nearly convex: E = pi to the sky, less what its dents take (3 %). A pit in a mesh: with R = 0.5 the
+/* The isosurface of a tetrahedral ball is nearly convex: E = pi to the sky, less what its dents take (3 %). A pit in a mesh: with R = 0.5
+   the
    mean is that of the closed form for the opening that the black run measures (3 %); white, everything is pi. */
 TEST(tetrahedral_mesh) {
     double q_ball[4] = {6, 6, 6, 4}, q_pit[5] = {7, 6, 7, 7, 4}, mean[3] = {0, 0, 0};
@@ -216,7 +229,9 @@ TEST(tetrahedral_mesh) {
     float points[40][3], normals[40][3], e[40][3];
     tets_surface(&m, 0);
     int n = tets_points(&m, ball, q_ball, 40, points, normals);
-    CHECK(isogi_trace_gather_field(&d, tets_intersect, &m, (const float(*)[3])points, (const float(*)[3])normals, (size_t)n, e, NULL, NULL) == ISOGI_OK, "%d points", n);
+    CHECK(isogi_trace_gather_field(&d, tets_intersect, &m, (const float(*)[3])points, (const float(*)[3])normals, (size_t)n, e, NULL,
+                                   NULL) == ISOGI_OK,
+          "%d points", n);
     for (int i = 0; i < n; i++) mean[0] += (double)e[i][0] / n;
     CHECK(n > 20 && fabs(mean[0] - PI) < 0.03 * PI, "ball of %d triangles: mean E %.4f", m.triangle_count, mean[0]);
     tets_free(&m);
@@ -225,21 +240,24 @@ TEST(tetrahedral_mesh) {
     n = tets_points(&m, pit, q_pit, 40, points, normals);
     int inside = 0;
     for (int i = 0; i < n; i++) /* of the wall, well below the rim */
-        if (points[i][1] < 5 && length3((double)points[i][0] - 7, (double)points[i][1] - 6, (double)points[i][2] - 7) < 4.4) memcpy(points[inside], points[i], 12), memcpy(normals[inside++], normals[i], 12);
+        if (points[i][1] < 5 && length3((double)points[i][0] - 7, (double)points[i][1] - 6, (double)points[i][2] - 7) < 4.4)
+            memcpy(points[inside], points[i], 12), memcpy(normals[inside++], normals[i], 12);
     CHECK(inside > 8, "%d points in the pit", inside);
     for (int k = 0; k < 3; k++) {
         d.albedo[0] = d.albedo[1] = d.albedo[2] = 0.5f * (float)k, d.bounces = 30, mean[k] = 0, d.samples = 128;
-        isogi_trace_gather_field(&d, tets_intersect, &m, (const float(*)[3])points, (const float(*)[3])normals, (size_t)inside, e, NULL, NULL);
+        isogi_trace_gather_field(&d, tets_intersect, &m, (const float(*)[3])points, (const float(*)[3])normals, (size_t)inside, e, NULL,
+                                 NULL);
         for (int i = 0; i < inside; i++) mean[k] += (double)e[i][0] / inside;
     }
     double opening = mean[0] / PI;
-    printf("    pit in %d tetrahedra: opening %.3f, E %.4f with albedo 0.5, closed form %.4f\n", m.count, opening, mean[1], PI * opening / (1 - 0.5 * (1 - opening)));
+    printf("    pit in %d tetrahedra: opening %.3f, E %.4f with albedo 0.5, closed form %.4f\n", m.count, opening, mean[1],
+           PI * opening / (1 - 0.5 * (1 - opening)));
     CHECK(fabs(mean[1] - PI * opening / (1 - 0.5 * (1 - opening))) < 0.03 * mean[1], "albedo 0.5: E %.4f", mean[1]);
     CHECK(fabs(mean[2] - PI) < 2e-3 * PI, "white furnace: E %.5f", mean[2]);
     tets_free(&m);
 }
 
-/* ---- arguments ------------------------------------------------------------------------------------------------------------------------- */
+/* ---- arguments --------------------------------------------------------------------------------------------------------------- */
 
 /* A function that answers nonsense must not break anything: NaN normals, negative t, t beyond tmax, wild colours. */
 static void nonsense(void *user, const isogi_ray *rays, size_t count, isogi_trace_surface *surfaces) {
@@ -248,11 +266,15 @@ static void nonsense(void *user, const isogi_ray *rays, size_t count, isogi_trac
     for (size_t i = 0; i < count; i++) {
         const float odd[6] = {(float)nan_value(), -1, 0, 1e30f, 5, 0.5f};
         surfaces[i].t = (double)odd[random_bits(&mine) % 6];
-        for (int a = 0; a < 3; a++) surfaces[i].normal[a] = odd[random_bits(&mine) % 6], surfaces[i].albedo[a] = odd[random_bits(&mine) % 6], surfaces[i].emission[a] = odd[random_bits(&mine) % 3];
+        for (int a = 0; a < 3; a++)
+            surfaces[i].normal[a] = odd[random_bits(&mine) % 6], surfaces[i].albedo[a] = odd[random_bits(&mine) % 6],
+            surfaces[i].emission[a] = odd[random_bits(&mine) % 3];
     }
 }
 
-static void empty(void *user, const isogi_ray *rays, size_t count, isogi_trace_surface *surfaces) { (void)user, (void)rays, (void)count, (void)surfaces; }
+static void empty(void *user, const isogi_ray *rays, size_t count, isogi_trace_surface *surfaces) {
+    (void)user, (void)rays, (void)count, (void)surfaces;
+}
 /* One rule for errors: a ball that sees nothing but one sky has the same error from its voxels and as a field, and none is certain. */
 TEST(errors_where_all_samples_agree) {
     double q[4] = {15.5, 15.5, 15.5, 9};
@@ -266,8 +288,8 @@ TEST(errors_where_all_samples_agree) {
             isogi_trace_gather(&d, (const float(*)[3])point, NULL, 2, e, error[0], NULL);
             isogi_trace_gather_field(&d, empty, NULL, (const float(*)[3])point, (const float(*)[3])normal, 2, e, error[1], NULL);
             for (int i = 0; i < 2; i++)
-                CHECK(error[1][i] > 0.3f / (float)samples && fabs((double)error[1][i] / (double)error[0][i] - 1) < (lights ? 0.3 : 0.01), "%d samples: %g, of voxels %g",
-                      samples, (double)error[1][i], (double)error[0][i]);
+                CHECK(error[1][i] > 0.3f / (float)samples && fabs((double)error[1][i] / (double)error[0][i] - 1) < (lights ? 0.3 : 0.01),
+                      "%d samples: %g, of voxels %g", samples, (double)error[1][i], (double)error[0][i]);
         }
     scene_free(&s);
 }
@@ -276,15 +298,24 @@ TEST(nonsense_is_survived_and_bad_arguments_refused) {
     test_random r = {5};
     isogi_trace_desc d = {.lighting.env = {.sh = white_sky, .sh_order = 1}, .samples = 16, .bounces = 5, .albedo = {0.5f, 0.5f, 0.5f}};
     float points[20][3], normals[20][3], e[20][3], error[20];
-    for (int i = 0; i < 60; i++) points[i / 3][i % 3] = (float)random_range(&r, -3, 3), normals[i / 3][i % 3] = i < 3 ? 0 : (float)random_range(&r, -1, 1);
+    for (int i = 0; i < 60; i++)
+        points[i / 3][i % 3] = (float)random_range(&r, -3, 3), normals[i / 3][i % 3] = i < 3 ? 0 : (float)random_range(&r, -1, 1);
     points[1][0] = (float)nan_value();
-    CHECK(isogi_trace_gather_field(&d, nonsense, &r, (const float(*)[3])points, (const float(*)[3])normals, 20, e, error, NULL) == ISOGI_OK, "points %d", 20);
+    CHECK(isogi_trace_gather_field(&d, nonsense, &r, (const float(*)[3])points, (const float(*)[3])normals, 20, e, error, NULL) == ISOGI_OK,
+          "points %d", 20);
     for (int i = 0; i < 20; i++) CHECK(e[i][0] >= 0 && e[i][0] < 1e9f && (i > 1 || error[i] > 1e30f), "E %g", (double)e[i][0]);
-    CHECK(isogi_trace_gather_field(&d, NULL, &r, (const float(*)[3])points, (const float(*)[3])normals, 20, e, error, NULL) == ISOGI_INVALID, "no function, %d", 0);
-    CHECK(isogi_trace_gather_field(&d, nonsense, &r, (const float(*)[3])points, NULL, 20, e, error, NULL) == ISOGI_INVALID, "no normals, %d", 0);
-    CHECK(isogi_trace_gather_field(NULL, nonsense, &r, (const float(*)[3])points, (const float(*)[3])normals, 20, e, error, NULL) == ISOGI_INVALID, "no description, %d", 0);
+    CHECK(isogi_trace_gather_field(&d, NULL, &r, (const float(*)[3])points, (const float(*)[3])normals, 20, e, error, NULL) ==
+              ISOGI_INVALID,
+          "no function, %d", 0);
+    CHECK(isogi_trace_gather_field(&d, nonsense, &r, (const float(*)[3])points, NULL, 20, e, error, NULL) == ISOGI_INVALID,
+          "no normals, %d", 0);
+    CHECK(isogi_trace_gather_field(NULL, nonsense, &r, (const float(*)[3])points, (const float(*)[3])normals, 20, e, error, NULL) ==
+              ISOGI_INVALID,
+          "no description, %d", 0);
     d.offset = -1;
-    CHECK(isogi_trace_gather_field(&d, nonsense, &r, (const float(*)[3])points, (const float(*)[3])normals, 20, e, error, NULL) == ISOGI_INVALID, "offset %d", -1);
+    CHECK(isogi_trace_gather_field(&d, nonsense, &r, (const float(*)[3])points, (const float(*)[3])normals, 20, e, error, NULL) ==
+              ISOGI_INVALID,
+          "offset %d", -1);
 }
 
 TEST_MAIN("trace_field")

@@ -26,7 +26,8 @@ static int sees(const double p[3], const double to[3], const double q[4]) {
 static double irradiance_by_parts(const isogi_light *l, const double p[3], const double q[4], int n) {
     double sum = 0, axis[3], a1[3], a2[3], length = 0;
     double r = (double)l->radius;
-    for (int a = 0; a < 3; a++) axis[a] = (double)l->vector[a] - (l->kind == ISOGI_LIGHT_DIRECTIONAL ? 0 : p[a]), length += axis[a] * axis[a];
+    for (int a = 0; a < 3; a++)
+        axis[a] = (double)l->vector[a] - (l->kind == ISOGI_LIGHT_DIRECTIONAL ? 0 : p[a]), length += axis[a] * axis[a];
     length = sqrt(length);
     for (int a = 0; a < 3; a++) axis[a] /= length;
     int k = fabs(axis[0]) < 0.6 ? 0 : 1; /* any two directions at right angles */
@@ -54,7 +55,8 @@ static double irradiance_by_parts(const isogi_light *l, const double p[3], const
                 double sine = l->kind == ISOGI_LIGHT_SPHERE ? r / length : sin(r), opening, c, az = 2 * PI * t, across;
                 opening = 1 - sqrt(1 - sine * sine), c = 1 - opening * s, across = sqrt(1 - c * c);
                 double far_off = l->kind == ISOGI_LIGHT_SPHERE ? length - r : 1000, d[3];
-                for (int a = 0; a < 3; a++) d[a] = c * axis[a] + across * (cos(az) * a1[a] + sin(az) * a2[a]), to[a] = p[a] + far_off * d[a];
+                for (int a = 0; a < 3; a++)
+                    d[a] = c * axis[a] + across * (cos(az) * a1[a] + sin(az) * a2[a]), to[a] = p[a] + far_off * d[a];
                 double radiance = l->kind == ISOGI_LIGHT_SPHERE ? 1 / (PI * r * r) : 1 / (PI * sine * sine);
                 weight = d[1] > 0 ? radiance * 2 * PI * opening / n / n * d[1] : 0;
             }
@@ -76,9 +78,11 @@ TEST(every_light_against_a_sum_over_its_parts) {
     for (int i = 0; i < 5; i++)
         for (int k = 0; k < 6; k++) {
             double p[3] = {(double)points[k][0], (double)points[k][1], (double)points[k][2]}, nowhere[4] = {0, -100, 0, 1};
-            double e = lit(&s, &lights[i], points[k], 0, LONG_SUITE ? 16384 : 1024), open = irradiance_by_parts(&lights[i], p, nowhere, 100);
+            double e = lit(&s, &lights[i], points[k], 0, LONG_SUITE ? 16384 : 1024),
+                   open = irradiance_by_parts(&lights[i], p, nowhere, 100);
             double expected = irradiance_by_parts(&lights[i], p, q, i == 3 ? (LONG_SUITE ? 2000 : 500) : LONG_SUITE ? 400 : 200);
-            CHECK(fabs(e - expected) < (LONG_SUITE ? 0.015 : 0.03) * open + 1e-6, "light %d, point %d: E %.5f, expected %.5f, unshadowed %.5f", i, k, e, expected, open);
+            CHECK(fabs(e - expected) < (LONG_SUITE ? 0.015 : 0.03) * open + 1e-6,
+                  "light %d, point %d: E %.5f, expected %.5f, unshadowed %.5f", i, k, e, expected, open);
         }
     scene_free(&s);
 }
@@ -128,11 +132,14 @@ TEST(closed_glowing_cavity) {
         for (int i = 0; i < 24; i++)
             for (int c = 0; c < 3; c++) mean[c] += (double)e[i][c] / 24;
         /* the path's length is random: 24 * 256 of them, 2 % at albedo 0.9 */
-        for (int c = 0; c < 3; c++) CHECK(fabs(mean[c] - (c + 1) * expected) < 0.04 * (c + 1) * expected, "albedo %g, channel %d: E %.4f, expected %.4f", (double)albedo[k], c, mean[c], (c + 1) * expected);
+        for (int c = 0; c < 3; c++)
+            CHECK(fabs(mean[c] - (c + 1) * expected) < 0.04 * (c + 1) * expected, "albedo %g, channel %d: E %.4f, expected %.4f",
+                  (double)albedo[k], c, mean[c], (c + 1) * expected);
     }
     d.bounces = 3, d.albedo[0] = d.albedo[1] = d.albedo[2] = 1; /* every path adds 2 at each of four hits: no noise at all */
     isogi_trace_gather(&d, (const float(*)[3])points, NULL, 24, e, error, NULL);
-    for (int i = 0; i < 24; i++) CHECK(fabs((double)e[i][0] - 8 * PI) < 1e-3, "three bounces: E %.5f, expected %.5f", (double)e[i][0], 8 * PI);
+    for (int i = 0; i < 24; i++)
+        CHECK(fabs((double)e[i][0] - 8 * PI) < 1e-3, "three bounces: E %.5f, expected %.5f", (double)e[i][0], 8 * PI);
     d.bounces = -1, d.samples = 8;
     CHECK(isogi_trace_gather(&d, (const float(*)[3])points, NULL, 4, e, error, NULL) == ISOGI_OK, "albedo %d", 1);
     CHECK(e[0][0] > 50 && e[0][0] < 1e6f, "diverging: %g", (double)e[0][0]);
@@ -179,14 +186,16 @@ TEST(colours_are_asked_for_once) {
         calls = 0;
         isogi_trace_request(t, (const float(*)[3])points, (size_t)n), isogi_trace_step(t, 0, NULL), isogi_trace_status(t, &report);
         printf("    mode %d: %ld questions, %g texels, %g probes\n", mode, calls, (double)report.texels, (double)report.probes);
-        CHECK(report.texels > 50 && calls <= (long)report.probes + (mode ? 0 : (long)report.texels), "%ld questions, %g texels, %g probes", calls, (double)report.texels, (double)report.probes);
+        CHECK(report.texels > 50 && calls <= (long)report.probes + (mode ? 0 : (long)report.texels), "%ld questions, %g texels, %g probes",
+              calls, (double)report.texels, (double)report.probes);
         isogi_trace_free(t);
     }
     scene_free(&s);
 }
 
 /* The pit's light takes the colour of the wall opposite: near the red wall more green arrives by reflection, and the other way
-   round (a little: from the wall of a sphere all its parts look equally large, only their light differs); the mean of both walls is the same by symmetry. The colours of tables and callback are those of isogi_trace_material. */
+   round (a little: from the wall of a sphere all its parts look equally large, only their light differs); the mean of both walls is the
+   same by symmetry. The colours of tables and callback are those of isogi_trace_material. */
 TEST(colour_bleeds) {
     double q[5] = {16, 15, 16, 22, 10}, e[2][3];
     paint colours = {16, 0};
@@ -200,12 +209,15 @@ TEST(colour_bleeds) {
     isogi_trace_gather(&d, (const float(*)[3])points, NULL, 2, direct, NULL, NULL);
     for (int i = 0; i < 2; i++)
         for (int c = 0; c < 3; c++) e[i][c] = (double)light[i][c] - (double)direct[i][c];
-    CHECK(e[0][1] > 1.1 * e[0][0] && e[1][0] > 1.1 * e[1][1], "reflected: %.3f %.3f at the red wall, %.3f %.3f at the green one", e[0][0], e[0][1], e[1][0], e[1][1]);
-    CHECK(fabs(e[0][0] + e[1][0] - e[0][1] - e[1][1]) < 0.03 * (e[0][0] + e[1][0]), "red %.4f, green %.4f in all", e[0][0] + e[1][0], e[0][1] + e[1][1]);
+    CHECK(e[0][1] > 1.1 * e[0][0] && e[1][0] > 1.1 * e[1][1], "reflected: %.3f %.3f at the red wall, %.3f %.3f at the green one", e[0][0],
+          e[0][1], e[1][0], e[1][1]);
+    CHECK(fabs(e[0][0] + e[1][0] - e[0][1] - e[1][1]) < 0.03 * (e[0][0] + e[1][0]), "red %.4f, green %.4f in all", e[0][0] + e[1][0],
+          e[0][1] + e[1][1]);
     CHECK(e[0][2] <= 1e-6 && e[1][2] <= 1e-6, "blue %g", e[0][2]);
     colours.wild = 1;
     isogi_trace_material(&d, 0, place, albedo, emission);
-    CHECK(albedo[0] >= 1 && albedo[0] <= 1 && albedo[2] <= 0 && emission[1] >= 0 && emission[2] >= 0 && emission[2] <= 0, "%g %g %g", (double)albedo[0], (double)albedo[2], (double)emission[2]);
+    CHECK(albedo[0] >= 1 && albedo[0] <= 1 && albedo[2] <= 0 && emission[1] >= 0 && emission[2] >= 0 && emission[2] <= 0, "%g %g %g",
+          (double)albedo[0], (double)albedo[2], (double)emission[2]);
     isogi_trace_material(&d, 0, NULL, albedo, NULL);
     CHECK(fabsf(albedo[2] - 0.8f) < 1e-6f, "without a place: %g", (double)albedo[2]);
     isogi_trace_gather(&d, (const float(*)[3])points, NULL, 2, light, NULL, NULL);
@@ -233,8 +245,11 @@ TEST(high_side_is_the_low_side_of_the_negated_field) {
         isogi_trace_gather(&d, (const float(*)[3])points, NULL, (size_t)n, e, NULL, NULL);
         isogi_trace_gather(&other, (const float(*)[3])points, NULL, (size_t)n, f, NULL, NULL);
         /* capped, matter is shut off from the sky, and the air beside it is not */
-        for (int i = 0; i < n; i++) a += (double)e[i][0] / n, b += (double)f[i][0] / n, worst = fmax(worst, fabs((double)e[i][0] - (double)f[i][0]));
-        if (k != 1) CHECK(fabs(a - b) < 1e-3 * b && worst < 0.05 * b, "case %d: high side %.5f, negated field %.5f, largest difference %.5f", k, a, b, worst);
+        for (int i = 0; i < n; i++)
+            a += (double)e[i][0] / n, b += (double)f[i][0] / n, worst = fmax(worst, fabs((double)e[i][0] - (double)f[i][0]));
+        if (k != 1)
+            CHECK(fabs(a - b) < 1e-3 * b && worst < 0.05 * b, "case %d: high side %.5f, negated field %.5f, largest difference %.5f", k, a,
+                  b, worst);
         else CHECK(a <= 1e-6 && b > 1, "capped: matter shuts the high side off, %.5f of %.5f", a, b);
     }
     scene_free(&s), scene_free(&t);
@@ -268,7 +283,8 @@ TEST(high_side_of_closed_matter_is_dark) {
             isogi_trace_sample(t, (const float(*)[3])point, 1, e, NULL);
             valid++, bright += e[0][1] > 1e-6f;
         }
-        CHECK(!bright && valid > (k == 1 ? 7 : 9) * plain / 10, "field %d: %d of %d texels see the sky; %d on the low side", k, bright, valid, plain);
+        CHECK(!bright && valid > (k == 1 ? 7 : 9) * plain / 10, "field %d: %d of %d texels see the sky; %d on the low side", k, bright,
+              valid, plain);
         isogi_trace_free(t), isogi_trace_free(low), scene_free(&s);
     }
 }
@@ -364,7 +380,8 @@ TEST(occlusion_has_a_radius) {
 
 /* A lighting of order 5 with a broad sun; the lobe's integral over the sphere of directions, those below the surface and those that
    hit something dark. */
-static double gloss_by_rays(const scene *s, const float *light, const float p[3], const float n[3], const float r[3], double exponent, int count) {
+static double gloss_by_rays(const scene *s, const float *light, const float p[3], const float n[3], const float r[3], double exponent,
+                            int count) {
     double sum = 0;
     test_random random = {77};
     for (int i = 0; i < count; i++) {
@@ -414,7 +431,9 @@ TEST(gloss_against_its_integral) {
             double length = length3((double)normals[i][0], (double)normals[i][1], (double)normals[i][2]);
             for (int a = 0; a < 3; a++) normals[i][a] = (float)(-(double)normals[i][a] / length), views[i][a] = normals[i][a];
         }
-        CHECK(isogi_trace_sample_gloss(t, (const float(*)[3])points, (const float(*)[3])normals, (const float(*)[3])views, 12, (size_t)n, rgb) == ISOGI_OK, "points %d", n);
+        CHECK(isogi_trace_sample_gloss(t, (const float(*)[3])points, (const float(*)[3])normals, (const float(*)[3])views, 12, (size_t)n,
+                                       rgb) == ISOGI_OK,
+              "points %d", n);
         for (int i = 0; i < n; i++) {
             double expected = gloss_by_rays(&s, light, points[i], normals[i], normals[i], 12, LONG_SUITE ? 20000 : 5000), open = 0;
             float y[25];
@@ -423,17 +442,23 @@ TEST(gloss_against_its_integral) {
             for (int k = 0; k < 25; k++) open += g[(int)sqrt(k + 0.5)] * (double)light[3 * k] * (double)y[k];
             error[kind] += pow((double)rgb[i][0] - expected, 2) / n;
             if (kind) unshadowed += pow(open - expected, 2) / n, size += expected * expected / n;
-            else CHECK(fabs((double)rgb[i][0] - expected) < (LONG_SUITE ? 0.08 : 0.12) * expected, "ball: %.4f, expected %.4f", (double)rgb[i][0], expected);
+            else
+                CHECK(fabs((double)rgb[i][0] - expected) < (LONG_SUITE ? 0.08 : 0.12) * expected, "ball: %.4f, expected %.4f",
+                      (double)rgb[i][0], expected);
         }
-        CHECK(isogi_trace_sample_gloss(t, (const float(*)[3])points, (const float(*)[3])normals, (const float(*)[3])views, -1, 1, rgb) == ISOGI_INVALID, "exponent %d", -1);
+        CHECK(isogi_trace_sample_gloss(t, (const float(*)[3])points, (const float(*)[3])normals, (const float(*)[3])views, -1, 1, rgb) ==
+                  ISOGI_INVALID,
+              "exponent %d", -1);
         isogi_trace_free(t), scene_free(&s);
         q[3] = 22;
     }
-    printf("    gloss of exponent 12 in a pit: relative error %.3f, without occlusion %.3f\n", sqrt(error[1] / size), sqrt(unshadowed / size));
-    CHECK(sqrt(error[1] / size) < 0.25 && error[1] < 0.25 * unshadowed, "pit: relative error %.3f, without occlusion %.3f", sqrt(error[1] / size), sqrt(unshadowed / size));
+    printf("    gloss of exponent 12 in a pit: relative error %.3f, without occlusion %.3f\n", sqrt(error[1] / size),
+           sqrt(unshadowed / size));
+    CHECK(sqrt(error[1] / size) < 0.25 && error[1] < 0.25 * unshadowed, "pit: relative error %.3f, without occlusion %.3f",
+          sqrt(error[1] / size), sqrt(unshadowed / size));
 }
 
-/* ---- SH projection of a rectangle ----------------------------------------------------------------------------------------------------- */
+/* ---- SH projection of a rectangle -------------------------------------------------------------------------------------------- */
 
 TEST(rectangle_in_spherical_harmonics) {
     test_random r = {31};
@@ -465,7 +490,9 @@ TEST(rectangle_in_spherical_harmonics) {
         CHECK(isogi_sh_project(c, 3, &lighting, p) == ISOGI_OK, "rectangle %d", i);
         for (int j = 0; j < 9; j++) scale = fmax(scale, fabs(sum[3 * j]));
         /* the midpoint rule is right to 3e-5 here */
-        for (int j = 0; j < 9; j++) CHECK(fabs((double)c[3 * j] - sum[3 * j]) < 1e-4 * scale, "rectangle %d, coefficient %d: %.6f, expected %.6f", i, j, (double)c[3 * j], sum[3 * j]);
+        for (int j = 0; j < 9; j++)
+            CHECK(fabs((double)c[3 * j] - sum[3 * j]) < 1e-4 * scale, "rectangle %d, coefficient %d: %.6f, expected %.6f", i, j,
+                  (double)c[3 * j], sum[3 * j]);
         for (int a = 0; a < 3; a++) light.edge[1][a] = -light.edge[1][a];
         isogi_sh_project(c, 3, &lighting, p);
         for (int j = 0; j < 27; j++) CHECK(c[j] >= 0 && c[j] <= 0, "from behind: %g", (double)c[j]);

@@ -5,7 +5,8 @@
 #include "trace_scenes.h"
 
 /* Relative RMSE over points of a texture's light, and what the texture cost. */
-static double texture_error(const isogi_trace_desc *d, const float (*points)[3], const float (*reference)[3], int n, isogi_counters *counters, size_t *memory) {
+static double texture_error(const isogi_trace_desc *d, const float (*points)[3], const float (*reference)[3], int n,
+                            isogi_counters *counters, size_t *memory) {
     float e[400][3];
     isogi_trace *t = NULL;
     double sum = 0, mean = 0, remaining = 1;
@@ -40,17 +41,23 @@ TEST(hierarchical_lattice) {
         static const float hierarchy[3] = {0, 0.1f, 0.4f};
         d.hierarchy = hierarchy[k];
         error[k] = texture_error(&d, (const float(*)[3])points, (const float(*)[3])reference, count, &counters[k], &memory[k]);
-        printf("    tolerance %.1f: %7d texels, %8d rays, %7d bytes, error %.4f\n", (double)hierarchy[k], (int)counters[k].texels, (int)counters[k].rays, (int)memory[k], error[k]);
+        printf("    tolerance %.1f: %7d texels, %8d rays, %7d bytes, error %.4f\n", (double)hierarchy[k], (int)counters[k].texels,
+               (int)counters[k].rays, (int)memory[k], error[k]);
     }
-    CHECK(counters[1].rays < 0.8 * (double)counters[0].rays && counters[2].rays <= counters[1].rays, "rays %d, %d, %d", (int)counters[0].rays, (int)counters[1].rays, (int)counters[2].rays);
-    CHECK(memory[1] < memory[0] && error[1] < error[0] + 0.02 && error[2] < error[0] + 0.05, "errors %.4f, %.4f, %.4f", error[0], error[1], error[2]);
+    CHECK(counters[1].rays < 0.8 * (double)counters[0].rays && counters[2].rays <= counters[1].rays, "rays %d, %d, %d",
+          (int)counters[0].rays, (int)counters[1].rays, (int)counters[2].rays);
+    CHECK(memory[1] < memory[0] && error[1] < error[0] + 0.02 && error[2] < error[0] + 0.05, "errors %.4f, %.4f, %.4f", error[0], error[1],
+          error[2]);
     d.lazy = 1;
     isogi_trace *t = NULL;
     CHECK(isogi_trace_create(&t, &d, NULL) == ISOGI_INVALID, "lazy and hierarchical, %d", 1);
     d.lazy = 0, d.sides = ISOGI_TRACE_BOTH_SIDES, d.samples = 1, d.hierarchy = 0.3f, d.mode = ISOGI_TRACE_TRANSFER;
     CHECK(isogi_trace_create(&t, &d, NULL) == ISOGI_OK && isogi_trace_step(t, 0, NULL) == ISOGI_OK, "both sides %d", 1);
-    CHECK(isogi_trace_relight(t, &d.lighting) == ISOGI_OK && isogi_trace_export_size(t, 0) == 0 && isogi_trace_save_size(t) == 0, "both sides %d", 2);
-    CHECK(isogi_trace_sample(isogi_trace_high(t), (const float(*)[3])points, (size_t)count, reference, NULL) == ISOGI_OK && reference[0][0] >= 0, "both sides %d", 3);
+    CHECK(isogi_trace_relight(t, &d.lighting) == ISOGI_OK && isogi_trace_export_size(t, 0) == 0 && isogi_trace_save_size(t) == 0,
+          "both sides %d", 2);
+    CHECK(isogi_trace_sample(isogi_trace_high(t), (const float(*)[3])points, (size_t)count, reference, NULL) == ISOGI_OK &&
+              reference[0][0] >= 0,
+          "both sides %d", 3);
     isogi_trace_free(t), scene_free(&s);
 }
 
@@ -73,7 +80,8 @@ TEST(resolution_of_the_texture) {
         error[k] = texture_error(&d, (const float(*)[3])points, (const float(*)[3])reference, n, &counters, &memory);
         printf("    %2d^3 texels for 33^3 voxels: error %.4f\n", (int)size, error[k]);
     }
-    CHECK(error[0] > (LONG_SUITE ? 1.4 : 1.1) * error[1] && error[1] > (LONG_SUITE ? 1 : 0.8) * error[2] && error[2] < 0.06, "errors %.4f %.4f %.4f", error[0], error[1], error[2]);
+    CHECK(error[0] > (LONG_SUITE ? 1.4 : 1.1) * error[1] && error[1] > (LONG_SUITE ? 1 : 0.8) * error[2] && error[2] < 0.06,
+          "errors %.4f %.4f %.4f", error[0], error[1], error[2]);
     scene_free(&s);
 }
 
@@ -100,7 +108,8 @@ TEST(hard_shadows_blur_by_little_more_than_a_texel) {
             if (e[i][0] < 0.9f) to = (double)points[i][0];
         }
         printf("    texels of %.1f voxels: the border of a hard shadow is %.2f voxels wide\n", texel, to - from);
-        CHECK(to - from > 0.3 * texel && to - from < 1.7 * texel && e[0][0] < 0.01f && e[399][0] > 0.99f, "width %.2f of texels of %.1f, from %g to %g", to - from, texel, (double)e[0][0], (double)e[399][0]);
+        CHECK(to - from > 0.3 * texel && to - from < 1.7 * texel && e[0][0] < 0.01f && e[399][0] > 0.99f,
+              "width %.2f of texels of %.1f, from %g to %g", to - from, texel, (double)e[0][0], (double)e[399][0]);
         isogi_trace_free(t);
     }
     scene_free(&s);
@@ -133,7 +142,8 @@ TEST(normals_and_offset) {
         error[k] = sqrt(error[k]);
         printf("    %-28s error %.4f of the sun, %d of %d points wrongly dark\n", name[k], error[k], specks[k], n);
     }
-    CHECK(error[0] > 2 * error[2] && error[1] <= error[0] && error[2] <= error[1] * 1.01 && error[2] < 0.01, "errors %.4f %.4f %.4f", error[0], error[1], error[2]);
+    CHECK(error[0] > 2 * error[2] && error[1] <= error[0] && error[2] <= error[1] * 1.01 && error[2] < 0.01, "errors %.4f %.4f %.4f",
+          error[0], error[1], error[2]);
     CHECK(specks[2] == 0, "%d wrongly dark points", specks[2]);
     scene_free(&s);
 }
@@ -153,7 +163,8 @@ TEST(progress_of_a_hierarchy_rises) {
         isogi_context context = {.progress = goes_on, .user = last, .threads = 1};
         isogi_trace_desc d = desc_make(&s, 0.5f, 1, 8);
         isogi_trace *t = NULL;
-        d.hierarchy = 0.2f, d.method = k & 1 ? ISOGI_TRACE_FEEDBACK : ISOGI_TRACE_PATHS, d.sides = k & 2 ? ISOGI_TRACE_BOTH_SIDES : ISOGI_TRACE_LOW_SIDE;
+        d.hierarchy = 0.2f, d.method = k & 1 ? ISOGI_TRACE_FEEDBACK : ISOGI_TRACE_PATHS,
+        d.sides = k & 2 ? ISOGI_TRACE_BOTH_SIDES : ISOGI_TRACE_LOW_SIDE;
         CHECK(isogi_trace_create(&t, &d, &context) == ISOGI_OK && isogi_trace_step(t, 0, NULL) == ISOGI_OK, "case %d", k);
         CHECK(last[0] > 0.9 && !(last[1] > 0), "case %d: progress fell %g times, ends at %g", k, last[1], last[0]);
         isogi_trace_free(t);

@@ -36,7 +36,8 @@ TEST(half_is_to_nearest_even) {
         double exact = h < 1024 ? ldexp(h, -24) : ldexp(1024 + h % 1024, (int)(h >> 10) - 25);
         float middle = (float)(0.5 * ((double)x + (double)next)), above = nextafterf(middle, 1e9f), below = nextafterf(middle, 0);
         CHECK((double)x >= exact && (double)x <= exact, "half %x: %g, expected %g", h, (double)x, exact);
-        CHECK(isogi_trace__to_half(x) == h && (h == 0 || isogi_trace__to_half(-x) == (h | 0x8000)), "half %x is %x", h, isogi_trace__to_half(x));
+        CHECK(isogi_trace__to_half(x) == h && (h == 0 || isogi_trace__to_half(-x) == (h | 0x8000)), "half %x is %x", h,
+              isogi_trace__to_half(x));
         if (h + 1 == 0x7c00) continue;
         CHECK(isogi_trace__to_half(middle) == (h & 1 ? h + 1 : h), "middle above %x: %x", h, isogi_trace__to_half(middle));
         CHECK(isogi_trace__to_half(above) == h + 1 && isogi_trace__to_half(below) == h, "beside the middle above %x", h);
@@ -53,7 +54,8 @@ TEST(rgb9e5_is_within_half_a_step) {
     for (int i = 0; i < (LONG_SUITE ? 1000000 : 100000); i++) {
         float rgb[3], back[3], again[3];
         double most = 0;
-        for (int c = 0; c < 3; c++) rgb[c] = (float)(ldexp(random_unit(&r), (int)random_range(&r, -30, 17))), most = fmax(most, (double)rgb[c]);
+        for (int c = 0; c < 3; c++)
+            rgb[c] = (float)(ldexp(random_unit(&r), (int)random_range(&r, -30, 17))), most = fmax(most, (double)rgb[c]);
         if (i % 100 == 0) rgb[0] = i % 200 ? (float)nan_value() : -1, most = fmax((double)rgb[1], (double)rgb[2]);
         uint32_t packed = isogi_trace__to_rgb9e5(rgb);
         isogi_trace__from_rgb9e5(packed, back);
@@ -61,7 +63,8 @@ TEST(rgb9e5_is_within_half_a_step) {
         for (int c = 0; c < 3; c++) {
             double x = rgb[c] > 0 ? fmin((double)rgb[c], 65408) : 0;
             if (c == 0 && i % 100 == 0) x = 0;
-            CHECK(back[c] >= 0 && (double)back[c] <= 65408 && fabs((double)back[c] - x) <= 0.5 * step * 1.0000001, "%g of %g: %g", x, most, (double)back[c]);
+            CHECK(back[c] >= 0 && (double)back[c] <= 65408 && fabs((double)back[c] - x) <= 0.5 * step * 1.0000001, "%g of %g: %g", x, most,
+                  (double)back[c]);
         }
         isogi_trace__from_rgb9e5(isogi_trace__to_rgb9e5(back), again);
         CHECK(!memcmp(back, again, sizeof back), "%g becomes %g", (double)back[0], (double)again[0]);
@@ -71,10 +74,12 @@ TEST(rgb9e5_is_within_half_a_step) {
 TEST(errors_are_kept_rounded_up) {
     test_random r = {4};
     for (int i = 0; i < 10000; i++) {
-        float x = (float)ldexp(random_unit(&r), (int)random_range(&r, -40, 40)), y = isogi_trace__bits_float(isogi_trace__to_short(x) << 16);
+        float x = (float)ldexp(random_unit(&r), (int)random_range(&r, -40, 40)),
+              y = isogi_trace__bits_float(isogi_trace__to_short(x) << 16);
         CHECK(y >= x && (double)y <= (double)x * (1 + 1.0 / 127), "%g is kept as %g", (double)x, (double)y);
     }
-    CHECK(isogi_trace__to_short(0) == 0 && isogi_trace__to_short(HUGE_VALF) == 0x7f80 && isogi_trace__to_short(3.4e38f) == 0x7f80, "ends, %d", 0);
+    CHECK(isogi_trace__to_short(0) == 0 && isogi_trace__to_short(HUGE_VALF) == 0x7f80 && isogi_trace__to_short(3.4e38f) == 0x7f80,
+          "ends, %d", 0);
 }
 
 /* ---- memory -------------------------------------------------------------------------------------------------------------------- */
@@ -105,7 +110,8 @@ TEST(bytes_per_texel_against_error) {
             for (int i = 0; i < n; i++)
                 for (int c = 0; c < 3; c++) sum += pow((double)e[i][c] - (double)exact[i][c], 2) / n / 3;
             double bytes = (double)isogi_trace_memory(t) / (double)counters.texels, relative = sqrt(sum) / mean;
-            printf("    %-10s %-8s %6.1f bytes a texel, error %.2e (noise of 64 samples %.1e)\n", mode ? "transfer" : "irradiance", format_name[format % 5], bytes, relative, noise / mean);
+            printf("    %-10s %-8s %6.1f bytes a texel, error %.2e (noise of 64 samples %.1e)\n", mode ? "transfer" : "irradiance",
+                   format_name[format % 5], bytes, relative, noise / mean);
             CHECK(relative <= bound[mode][format % 5], "%s: error %.2e", format_name[format % 5], relative);
             CHECK(bytes < (mode ? 4.0 * 25 + 12 : 12 + 12), "%s: %.1f bytes", format_name[format % 5], bytes);
             isogi_trace_free(t);
@@ -130,7 +136,8 @@ TEST(transfer_of_256_cubed_stays_below_a_gigabyte) {
     d.isovalue_min = d.isovalue_max = 0, d.bounces = 0;
     t = baked(&d);
     after = isogi_trace_memory(t);
-    printf("    all texels: %.0f MB at 256^3; not yet computed, values within 0.2: %.0f MB\n", (double)after * 64 / 1e6, (double)before * 64 / 1e6);
+    printf("    all texels: %.0f MB at 256^3; not yet computed, values within 0.2: %.0f MB\n", (double)after * 64 / 1e6,
+           (double)before * 64 / 1e6);
     CHECK((double)after * 64 < 1e9 && (double)before * 64 < 64e6, "%.0f MB, %.0f MB", (double)after * 64 / 1e6, (double)before * 64 / 1e6);
     isogi_trace_free(t), scene_free(&s);
 }
@@ -153,7 +160,8 @@ TEST(short_formats_follow_the_brightness) {
             bake_and_sample(&d, NULL, (const float(*)[3])points, n, format == 1 ? exact : e);
             for (int i = 0; i < n; i++) most = fmax(most, (double)exact[i][0]);
             for (int i = 0; i < n && format > 1; i++)
-                CHECK(fabs((double)e[i][0] - (double)exact[i][0]) <= 0.01 * most, "%s: %g, exact %g", format_name[format], (double)e[i][0], (double)exact[i][0]);
+                CHECK(fabs((double)e[i][0] - (double)exact[i][0]) <= 0.01 * most, "%s: %g, exact %g", format_name[format], (double)e[i][0],
+                      (double)exact[i][0]);
         }
     }
     scene_free(&s);
@@ -174,7 +182,8 @@ static void exported(const isogi_trace *t, int format, const uint8_t *bytes, con
             uint16_t h;
             memcpy(&h, bytes + 2 * at, 2);
             values[v] = (float)(h < 1024 ? ldexp(h, -24) : ldexp(1024 + h % 1024, (int)(h >> 10 & 31) - 25));
-            if (h & 0x8000) values[v] = -(float)(h % 0x8000 < 1024 ? ldexp(h % 0x8000, -24) : ldexp(1024 + h % 1024, (int)(h >> 10 & 31) - 25));
+            if (h & 0x8000)
+                values[v] = -(float)(h % 0x8000 < 1024 ? ldexp(h % 0x8000, -24) : ldexp(1024 + h % 1024, (int)(h >> 10 & 31) - 25));
         }
         if (format == ISOGI_TRACE_RGB9E5) {
             uint32_t p;
@@ -210,7 +219,8 @@ TEST(export_holds_the_texels) {
             int count = mode ? 25 : 3, seen = 0;
             isogi_trace *t = baked(&d);
             if (mode == 1 && format == ISOGI_TRACE_RGB9E5) {
-                CHECK(isogi_trace_export_size(t, format) == 0 && isogi_trace_export(t, format, scales, sizeof scales) == ISOGI_INVALID, "format %d", format);
+                CHECK(isogi_trace_export_size(t, format) == 0 && isogi_trace_export(t, format, scales, sizeof scales) == ISOGI_INVALID,
+                      "format %d", format);
                 isogi_trace_free(t);
                 continue;
             }
@@ -219,7 +229,8 @@ TEST(export_holds_the_texels) {
                 size_t at[3] = {texel % 16, texel / 16 % 15, texel / 240};
                 float point[1][3] = {{(float)at[0], (float)at[1], (float)at[2]}};
                 exported(t, format, bytes, scales, texel, values);
-                for (int v = 0; v < count; v++) CHECK(values[v] > -1e6f && values[v] < 1e6f, "texel %d holds %g", (int)texel, (double)values[v]);
+                for (int v = 0; v < count; v++)
+                    CHECK(values[v] > -1e6f && values[v] < 1e6f, "texel %d holds %g", (int)texel, (double)values[v]);
                 if (!isogi_trace_valid(t, at)) continue;
                 seen++;
                 if (mode) isogi_trace_sample_transfer(t, (const float(*)[3])point, 1, expected);
@@ -227,8 +238,11 @@ TEST(export_holds_the_texels) {
                 double most = 0;
                 for (int v = 0; v < count; v++) most = fmax(most, fabs((double)expected[v]));
                 for (int v = 0; v < count; v++) {
-                    double step = format == ISOGI_TRACE_FLOAT ? 1e-6 * most : format == ISOGI_TRACE_HALF ? fabs((double)expected[v]) / 2048 + 1e-6 : format == ISOGI_TRACE_RGB9E5 ? most / 512 : (double)scales[v] / (mode ? 254 : 510);
-                    CHECK(fabs((double)values[v] - (double)expected[v]) <= step * 1.001 + 1e-6, "%s, texel %d value %d: %g, expected %g", format_name[format], (int)texel, v, (double)values[v], (double)expected[v]);
+                    double step = format == ISOGI_TRACE_FLOAT ? 1e-6 * most : format == ISOGI_TRACE_HALF
+                        ? fabs((double)expected[v]) / 2048 + 1e-6 : format == ISOGI_TRACE_RGB9E5 ? most / 512
+                            : (double)scales[v] / (mode ? 254 : 510);
+                    CHECK(fabs((double)values[v] - (double)expected[v]) <= step * 1.001 + 1e-6, "%s, texel %d value %d: %g, expected %g",
+                        format_name[format], (int)texel, v, (double)values[v], (double)expected[v]);
                 }
             }
             CHECK(seen > 500 && seen < 3000, "%d valid texels", seen);
@@ -265,7 +279,8 @@ TEST(export_holds_drafts) {
             exported(t, ISOGI_TRACE_FLOAT, bytes, scales, texel, values);
             seen += memcmp(values, e[0], sizeof values) == 0; /* other texels are not what a lookup finds in their place */
         }
-        CHECK(report.drafts > 50 && seen >= (int)report.texels, "lazy %d: %d texels hold what is read there, of %d, %d drafts", lazy, seen, (int)report.texels, (int)report.drafts);
+        CHECK(report.drafts > 50 && seen >= (int)report.texels, "lazy %d: %d texels hold what is read there, of %d, %d drafts", lazy, seen,
+              (int)report.texels, (int)report.drafts);
         free(bytes), isogi_trace_free(t);
     }
     scene_free(&s);
@@ -307,11 +322,15 @@ TEST(exported_texture_has_no_seams) {
             CHECK(fabs(value - (double)e[i][0]) < 1e-5 * PI, "among valid texels: %g, library %g", value, (double)e[i][0]);
             continue;
         }
-        beside++, sum += pow(value - (double)e[i][0], 2), worst = fmax(worst, fabs(value - (double)e[i][0])), dark += pow(zeros - (double)e[i][0], 2);
+        beside++, sum += pow(value - (double)e[i][0], 2), worst = fmax(worst, fabs(value - (double)e[i][0])),
+                                                          dark += pow(zeros - (double)e[i][0], 2);
     }
     sum = sqrt(sum / beside) / mean, dark = sqrt(dark / beside) / mean;
-    printf("    %d of %d points read invalid texels: plain interpolation differs by %.3f of the mean (largest %.3f); without extension by %.3f\n", beside, n, sum, worst / mean, dark);
-    CHECK(beside > 50 && sum < 0.05 && worst < 0.3 * mean && dark > 5 * sum, "RMS %.4f, largest %.4f, without %.4f", sum, worst / mean, dark);
+    printf("    %d of %d points read invalid texels: plain interpolation differs by %.3f of the mean (largest %.3f); without extension by "
+           "%.3f\n",
+           beside, n, sum, worst / mean, dark);
+    CHECK(beside > 50 && sum < 0.05 && worst < 0.3 * mean && dark > 5 * sum, "RMS %.4f, largest %.4f, without %.4f", sum, worst / mean,
+          dark);
     free(bytes), isogi_trace_free(t), scene_free(&s);
 }
 
@@ -339,7 +358,9 @@ TEST(bake_resumes_to_the_same_bits) {
         size_t size_a, size_b, size_c;
         double remaining = 1;
         d.sides = k >= 8 ? ISOGI_TRACE_BOTH_SIDES : ISOGI_TRACE_LOW_SIDE, d.lazy = k >= 4 && k < 8;
-        CHECK(isogi_trace_create(&whole, &d, NULL) == ISOGI_OK && isogi_trace_create(&part, &d, NULL) == ISOGI_OK && isogi_trace_create(&rest, &d, NULL) == ISOGI_OK, "case %d", k);
+        CHECK(isogi_trace_create(&whole, &d, NULL) == ISOGI_OK && isogi_trace_create(&part, &d, NULL) == ISOGI_OK &&
+                  isogi_trace_create(&rest, &d, NULL) == ISOGI_OK,
+              "case %d", k);
         isogi_trace_request(whole, (const float(*)[3])points, (size_t)n), isogi_trace_request(part, (const float(*)[3])points, (size_t)n);
         isogi_trace_step(whole, 0, NULL);
         isogi_trace_step(part, d.lazy ? 500 : 4000, &remaining);
@@ -395,7 +416,8 @@ TEST(feedback_resumes_to_the_same_bits) {
         double remaining = 1;
         d.method = ISOGI_TRACE_FEEDBACK, d.bounces = 2, d.error = k ? 0.1f : 0;
         CHECK(isogi_trace_create(&part, &d, NULL) == ISOGI_OK && isogi_trace_create(&rest, &d, NULL) == ISOGI_OK, "case %d", k);
-        for (int step = 0; remaining > (k ? 0.15 : 0.1); step++) CHECK(isogi_trace_step(part, 20000, &remaining) == ISOGI_OK && step < 1000, "case %d", k);
+        for (int step = 0; remaining > (k ? 0.15 : 0.1); step++)
+            CHECK(isogi_trace_step(part, 20000, &remaining) == ISOGI_OK && step < 1000, "case %d", k);
         block[0] = save_now(part, &bytes[0]);
         isogi_trace_status(part, &report);
         CHECK(remaining > 0 && isogi_trace_load(rest, block[0], bytes[0]) == ISOGI_OK, "case %d: remaining %g", k, remaining);
@@ -468,7 +490,8 @@ TEST(damaged_blocks_are_refused) {
         }
         for (int i = 0; i < (LONG_SUITE ? 3000 : 250); i++) { /* the hash is right: sizes, numbers, order, texels and values are checked */
             memcpy(copy, block, size);
-            for (int k = 0; k < 1 + i % 3; k++) copy[random_bits(&r) % 2 ? 8 + random_bits(&r) % 80 : random_bits(&r) % (size - 8)] = (uint8_t)random_bits(&r);
+            for (int k = 0; k < 1 + i % 3; k++)
+                copy[random_bits(&r) % 2 ? 8 + random_bits(&r) % 80 : random_bits(&r) % (size - 8)] = (uint8_t)random_bits(&r);
             isogi_trace__put(copy + size - 8, isogi_trace__hash(0xcbf29ce484222325u, copy, size - 8), 8);
             isogi_trace_free(again), again = NULL;
             isogi_trace_create(&again, &d, NULL);
@@ -487,23 +510,29 @@ TEST(damaged_blocks_are_refused) {
         d.seed++, isogi_trace_free(other), other = NULL;
         isogi_trace_create(&other, &d, NULL);
         CHECK(isogi_trace_load(other, block, size) == ISOGI_INVALID, "another seed, format %d", format);
-        CHECK(isogi_trace_load(NULL, block, size) == ISOGI_INVALID && isogi_trace_load(other, NULL, size) == ISOGI_INVALID, "nothing, format %d", format);
+        CHECK(isogi_trace_load(NULL, block, size) == ISOGI_INVALID && isogi_trace_load(other, NULL, size) == ISOGI_INVALID,
+              "nothing, format %d", format);
         isogi_trace_free(t), isogi_trace_free(other), isogi_trace_free(again), free(block), free(copy), free(after);
     }
     scene_free(&s);
 }
 
 /* Every field that the light depends on makes the block another one; those that choose texels, and those that mean nothing here, do not. */
-static void no_paint(void *user, double isovalue, const double point[3], float albedo[3], float emission[3]) { (void)user, (void)isovalue, (void)point, (void)albedo, (void)emission; }
+static void no_paint(void *user, double isovalue, const double point[3], float albedo[3], float emission[3]) {
+    (void)user, (void)isovalue, (void)point, (void)albedo, (void)emission;
+}
 TEST(blocks_belong_to_their_description) {
     double q[2] = {0.5, 4}, wide[3] = {1, 1.5, 1};
     scene s = scene_make(12, 13, 11, NULL, gyroid_in_air, q), s2 = scene_make(12, 13, 11, wide, gyroid_in_air, q);
     static float image[4][8][3], image2[8][4][3], voxels[12 * 13 * 11];
     isogi_pyramid *other_pyramid = NULL, *shifted = NULL;
     isogi_volume volume = s.volume;
-    isogi_light lamp = {.kind = ISOGI_LIGHT_POINT, .vector = {1, 2, 3}, .rgb = {1, 1, 1}}, lamps[2], sphere = lamp, moved = lamp, red = lamp;
-    isogi_light rectangle = {.kind = ISOGI_LIGHT_RECTANGLE, .vector = {1, 2, 3}, .rgb = {1, 1, 1}, .edge = {{1, 0, 0}, {0, 1, 0}}}, turned = rectangle;
-    const isogi_albedo_point table[1] = {{0, {0.5f, 0.5f, 0.5f}}}, longer[2] = {{0, {0.5f, 0.5f, 0.5f}}, {1, {0.5f, 0.5f, 0.5f}}}, elsewhere[1] = {{0.1, {0.5f, 0.5f, 0.5f}}};
+    isogi_light lamp = {.kind = ISOGI_LIGHT_POINT, .vector = {1, 2, 3}, .rgb = {1, 1, 1}}, lamps[2], sphere = lamp, moved = lamp,
+                red = lamp;
+    isogi_light rectangle = {.kind = ISOGI_LIGHT_RECTANGLE, .vector = {1, 2, 3}, .rgb = {1, 1, 1}, .edge = {{1, 0, 0}, {0, 1, 0}}},
+                turned = rectangle;
+    const isogi_albedo_point table[1] = {{0, {0.5f, 0.5f, 0.5f}}}, longer[2] = {{0, {0.5f, 0.5f, 0.5f}}, {1, {0.5f, 0.5f, 0.5f}}},
+                             elsewhere[1] = {{0.1, {0.5f, 0.5f, 0.5f}}};
     const float sky[12] = {1, 1, 1, 0.1f}, other_sky[3] = {1, 2, 3};
     memset(lamps, 0, sizeof lamps), lamps[0] = lamp;
     sphere.kind = ISOGI_LIGHT_SPHERE, sphere.radius = 0.5f, moved.vector[2] = 4, red.rgb[1] = 0.5f, turned.edge[1][1] = 2;
@@ -521,8 +550,12 @@ TEST(blocks_belong_to_their_description) {
         size_t size;
         int refused = 0;
         if (base == 1) good.method = ISOGI_TRACE_FEEDBACK;
-        if (base == 2) good.lighting.lights = &lamp, good.lighting.light_count = 1, good.albedo_points = table, good.albedo_count = 1, good.emission_points = table, good.emission_count = 1;
-        if (base == 3) good.lighting.lights = &rectangle, good.lighting.light_count = 1, good.lighting.env.rgb = &image[0][0][0], good.lighting.env.width = 8, good.lighting.env.height = 4;
+        if (base == 2)
+            good.lighting.lights = &lamp, good.lighting.light_count = 1, good.albedo_points = table, good.albedo_count = 1,
+            good.emission_points = table, good.emission_count = 1;
+        if (base == 3)
+            good.lighting.lights = &rectangle, good.lighting.light_count = 1, good.lighting.env.rgb = &image[0][0][0],
+            good.lighting.env.width = 8, good.lighting.env.height = 4;
         good.sides = ISOGI_TRACE_LOW_SIDE;
         t = baked(&good), block = save_now(t, &size);
         for (int i = 0; i < FIELDS + SAME; i++) {
@@ -552,7 +585,8 @@ TEST(blocks_belong_to_their_description) {
             case 19: d.method = d.method ? ISOGI_TRACE_FEEDBACK : ISOGI_TRACE_PATHS; break;
             case 20: if (base != 1) continue; d.error = 0.1f; break;
             case 21: d.material = no_paint; break;
-            case 22: d.lighting.env.rgb = &image[0][0][0], d.lighting.env.width = 8, d.lighting.env.height = 4, d.lighting.env.rotation[0] = d.lighting.env.rotation[5] = -1, d.lighting.env.rotation[7] = -1; break;
+            case 22: d.lighting.env.rgb = &image[0][0][0], d.lighting.env.width = 8, d.lighting.env.height = 4,
+                d.lighting.env.rotation[0] = d.lighting.env.rotation[5] = -1, d.lighting.env.rotation[7] = -1; break;
             case 23: d.lighting.env.rgb = &image2[0][0][0], d.lighting.env.width = 4, d.lighting.env.height = 8; break;
             case 24: d.lighting.env.sh = other_sky, d.lighting.env.sh_order = 1; break;
             case 25: d.lighting.env.sh = sky, d.lighting.env.sh_order = 2; break;
@@ -575,7 +609,8 @@ TEST(blocks_belong_to_their_description) {
             case 42: d.storage = ISOGI_TRACE_BYTE; break;
             case 43: d.storage = base == 4 ? ISOGI_TRACE_BYTE : ISOGI_TRACE_RGB9E5; break;
             case 44: d.seed += (uint64_t)1 << 40; break;
-            case 45: d.lighting.lights = NULL, d.lighting.light_count = 0, d.lighting.env.sh = NULL, d.lighting.env.sh_order = 0, d.lighting.env.rgb = NULL, d.lighting.env.width = d.lighting.env.height = 0; break;
+            case 45: d.lighting.lights = NULL, d.lighting.light_count = 0, d.lighting.env.sh = NULL, d.lighting.env.sh_order = 0,
+                d.lighting.env.rgb = NULL, d.lighting.env.width = d.lighting.env.height = 0; break;
             case FIELDS: d.lazy = 1; break;
             case FIELDS + 1: d.lookup = ISOGI_TRACE_BSPLINE; break;
             case FIELDS + 2: d.isovalue_min = -0.1, d.isovalue_max = 0.1; break;
@@ -601,7 +636,7 @@ TEST(blocks_belong_to_their_description) {
     isogi_vol_free(other_pyramid), isogi_vol_free(shifted), scene_free(&s), scene_free(&s2);
 }
 
-/* ---- memory that runs out --------------------------------------------------------------------------------------------------------------- */
+/* ---- memory that runs out ---------------------------------------------------------------------------------------------------- */
 
 /* The k-th allocation fails, for every k: an error or success, nothing leaks, and after a failed step or load the rest still works. */
 TEST(every_allocation_may_fail) {
@@ -625,10 +660,12 @@ TEST(every_allocation_may_fail) {
             if (result == ISOGI_OK && !kind) loaded = isogi_trace_load(t, block, size);
             if (result == ISOGI_OK) result = isogi_trace_step(t, 0, NULL);
             CHECK(result == ISOGI_OK || result == ISOGI_NO_MEMORY, "allocation %ld: %d", k, result);
-            if (t && result == ISOGI_OK && loaded == ISOGI_OK && !kind) result = isogi_trace_export(t, ISOGI_TRACE_FLOAT, bytes, 9 * 8 * 7 * 12);
+            if (t && result == ISOGI_OK && loaded == ISOGI_OK && !kind)
+                result = isogi_trace_export(t, ISOGI_TRACE_FLOAT, bytes, 9 * 8 * 7 * 12);
             finished = memory.left >= 0;
             memory.left = -1;
-            if (t && !kind) CHECK(isogi_trace_load(t, block, size) == ISOGI_OK && isogi_trace_export(t, ISOGI_TRACE_FLOAT, bytes, 9 * 8 * 7 * 12) == ISOGI_OK, "after allocation %ld", k);
+            if (t && !kind) CHECK(isogi_trace_load(t, block, size) == ISOGI_OK &&
+                isogi_trace_export(t, ISOGI_TRACE_FLOAT, bytes, 9 * 8 * 7 * 12) == ISOGI_OK, "after allocation %ld", k);
             if (t) CHECK(isogi_trace_step(t, 0, NULL) == ISOGI_OK, "after allocation %ld", k);
             isogi_trace_free(t);
             CHECK(memory.blocks == 0, "allocation %ld: %ld blocks leak", k, memory.blocks);

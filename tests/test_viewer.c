@@ -78,7 +78,8 @@ static void check_golden(const char *name, const char *arguments) {
     picture = read_picture(out, shape), golden = read_picture(path, golden_shape);
     if (picture && golden) {
         double outliers, difference;
-        CHECK(shape[0] == 96 && shape[1] == 72 && shape[2] == 3 && !memcmp(shape, golden_shape, sizeof shape), "%s: %dx%dx%d", name, shape[0], shape[1], shape[2]);
+        CHECK(shape[0] == 96 && shape[1] == 72 && shape[2] == 3 && !memcmp(shape, golden_shape, sizeof shape), "%s: %dx%dx%d", name,
+              shape[0], shape[1], shape[2]);
         difference = picture_difference(picture, golden, 96, 72, &outliers);
         CHECK(difference < 0.5, "%s: differs by %.3f of 255 (root mean square)", name, difference);
         CHECK(outliers < 0.005, "%s: %.2f %% of the pixels differ by more than 32", name, 100 * outliers);
@@ -90,11 +91,17 @@ TEST(picture_of_the_mesh_by_lambert_stays_the_same) { check_golden("lambert", "p
 TEST(picture_of_exact_rays_by_phong_stays_the_same) { check_golden("phong", "procedural:torus-sphere-plane:64 --mode phong --raycast"); }
 TEST(picture_of_vicinity_shading_stays_the_same) { check_golden("vicinity", "procedural:skull:64 --mode vicinity --samples 32"); }
 TEST(picture_of_baked_light_stays_the_same) { check_golden("irradiance", "procedural:engine-block:80 --mode irradiance --samples 32"); }
-TEST(picture_of_transferred_light_stays_the_same) { check_golden("transfer", "procedural:skull:64 --mode transfer --samples 32 --bounces 2"); }
+TEST(picture_of_transferred_light_stays_the_same) {
+    check_golden("transfer", "procedural:skull:64 --mode transfer --samples 32 --bounces 2");
+}
 TEST(picture_of_traced_paths_stays_the_same) { check_golden("pathtrace", "procedural:cavity:64 --mode pathtrace --samples 64 --aa 1"); }
-TEST(picture_of_a_clipped_volume_stays_the_same) { check_golden("clip", "procedural:gyroid:64 --mode irradiance --samples 16 --clip 0,0,-1,40"); }
+TEST(picture_of_a_clipped_volume_stays_the_same) {
+    check_golden("clip", "procedural:gyroid:64 --mode irradiance --samples 16 --clip 0,0,-1,40");
+}
 TEST(picture_of_volume_rendering_stays_the_same) { check_golden("dvr", "procedural:engine-block:64 --mode dvr"); }
-TEST(picture_of_scale_invariant_rendering_stays_the_same) { check_golden("scale-invariant", "procedural:marschner-lobb:64 --mode scale-invariant"); }
+TEST(picture_of_scale_invariant_rendering_stays_the_same) {
+    check_golden("scale-invariant", "procedural:marschner-lobb:64 --mode scale-invariant");
+}
 
 /* A volume of which nothing is known: what its histogram suggests shows the ball and not the air around it, in both spaces. */
 TEST(a_transfer_function_is_suggested_where_none_is_given) {
@@ -165,7 +172,8 @@ TEST(every_lookup_draws_a_picture_of_its_own) {
     for (int i = 0; i < 5; i++)
         for (int k = i + 1; k < 5; k++) {
             int same = size[i] == size[k] && !memcmp(text[i], text[k], size[i]);
-            CHECK(size[i] > 100 && same == (i == 0 && k == 1), "\"%s\" and \"%s\": %s", names[i], names[k], same ? "the same" : "different");
+            CHECK(size[i] > 100 && same == (i == 0 && k == 1), "\"%s\" and \"%s\": %s", names[i], names[k],
+                  same ? "the same" : "different");
         }
 }
 
@@ -177,7 +185,8 @@ TEST(gloss_of_transfer_adds_highlights) {
     for (int i = 0; i < 3; i++) {
         const char *out = temporary("gloss.png");
         int shape[3];
-        snprintf(command, sizeof command, "procedural:gyroid:32 --mode transfer --samples 8 --size 64x48 --exposure 0.3 %s --out '%s'", names[i], out);
+        snprintf(command, sizeof command, "procedural:gyroid:32 --mode transfer --samples 8 --size 64x48 --exposure 0.3 %s --out '%s'",
+                 names[i], out);
         CHECK(run_viewer(command).status == 0, "%s", command);
         picture[i] = read_picture(out, shape);
     }
@@ -194,14 +203,16 @@ TEST(gloss_of_transfer_adds_highlights) {
 /* Several clip planes cut what each of them cuts, in any order, of surfaces (by mesh and by rays) and of volumes. */
 TEST(clip_planes_add_up) {
     static const char *const ways[] = {"--mode vicinity --samples 4", "--mode lambert --raycast", "--mode dvr --exposure 1"};
-    static const char *const planes[] = {"--clip 1,0,0,-12", "--clip 0,-1,0,18", "--clip 1,0,0,-12 --clip 0,-1,0,18", "--clip 0,-1,0,18 --clip 1,0,0,-12", ""};
+    static const char *const planes[] = {"--clip 1,0,0,-12", "--clip 0,-1,0,18", "--clip 1,0,0,-12 --clip 0,-1,0,18",
+                                         "--clip 0,-1,0,18 --clip 1,0,0,-12", ""};
     char command[512];
     for (int w = 0; w < 3; w++) {
         unsigned char *picture[5];
         int shape[3] = {0}, kept[5] = {0};
         double outliers;
         for (int k = 0; k < 5; k++) {
-            snprintf(command, sizeof command, "procedural:gyroid:32 %s %s --size 48x48 --out '%s'", ways[w], planes[k], temporary("cut.png"));
+            snprintf(command, sizeof command, "procedural:gyroid:32 %s %s --size 48x48 --out '%s'", ways[w], planes[k],
+                     temporary("cut.png"));
             run_result r = run_viewer(command);
             CHECK(r.status == 0, "%s: %s", command, r.error);
             picture[k] = read_picture(temporary("cut.png"), shape);
@@ -209,14 +220,18 @@ TEST(clip_planes_add_up) {
         }
         CHECK(!memcmp(picture[2], picture[3], 48 * 48 * 3), "%s: the order matters", ways[w]);
         for (int k = 0; k < 3; k++)
-            for (int i = 0; i < k; i++) CHECK(picture_difference(picture[i], picture[k], 48, 48, &outliers) > 2, "%s: \"%s\" looks like \"%s\"", ways[w], planes[i], planes[k]);
+            for (int i = 0; i < k; i++)
+                CHECK(picture_difference(picture[i], picture[k], 48, 48, &outliers) > 2, "%s: \"%s\" looks like \"%s\"", ways[w], planes[i],
+                      planes[k]);
         /* where the backdrop is seen: at least as much of it as by either plane alone */
-        snprintf(command, sizeof command, "procedural:gyroid:32 %s --clip 1,0,0,-1e6 --size 48x48 --out '%s'", ways[w], temporary("cut.png"));
+        snprintf(command, sizeof command, "procedural:gyroid:32 %s --clip 1,0,0,-1e6 --size 48x48 --out '%s'", ways[w],
+                 temporary("cut.png"));
         CHECK(run_viewer(command).status == 0, "%s", command);
         unsigned char *nothing = read_picture(temporary("cut.png"), shape);
         for (int i = 0; nothing && w && i < 48 * 48; i++)
             for (int k = 0; k < 3; k++) kept[k] += memcmp(picture[k] + 3 * i, nothing + 3 * i, 3) != 0;
-        CHECK(!w || (kept[2] > 0 && kept[2] < kept[0] && kept[2] < kept[1]), "%s: %d, %d and %d pixels", ways[w], kept[0], kept[1], kept[2]);
+        CHECK(!w || (kept[2] > 0 && kept[2] < kept[0] && kept[2] < kept[1]), "%s: %d, %d and %d pixels", ways[w], kept[0], kept[1],
+              kept[2]);
         for (int k = 0; k < 5; k++) free(picture[k]);
         free(nothing);
     }
@@ -224,13 +239,15 @@ TEST(clip_planes_add_up) {
 
 /* What is said of volume rendering changes its picture as it should. */
 TEST(methods_local_light_and_presets_are_seen) {
-    static const char *const ways[] = {"", "--method sweep", "--method brute", "--method paper", "--method paper --local", "--preset grey", "--preset hot", "--preset cool-warm", "--preset spectrum"};
+    static const char *const ways[] = {"", "--method sweep", "--method brute", "--method paper", "--method paper --local", "--preset grey",
+        "--preset hot", "--preset cool-warm", "--preset spectrum"};
     unsigned char *picture[9];
     char command[512];
     int shape[3];
     double outliers;
     for (int k = 0; k < 9; k++) {
-        snprintf(command, sizeof command, "procedural:engine-block:40 --mode dvr --size 48x48 --exposure 1 %s --out '%s'", ways[k], temporary("way.png"));
+        snprintf(command, sizeof command, "procedural:engine-block:40 --mode dvr --size 48x48 --exposure 1 %s --out '%s'", ways[k],
+                 temporary("way.png"));
         run_result r = run_viewer(command);
         CHECK(r.status == 0, "%s: %s", command, r.error);
         picture[k] = read_picture(temporary("way.png"), shape);
@@ -248,13 +265,16 @@ TEST(methods_local_light_and_presets_are_seen) {
 
 /* Lines end as they do anywhere. */
 TEST(transfer_functions_end_their_lines_by_cr_or_lf) {
-    static const char *const text[] = {"-1 0 1 .5 .2\n0 .3 1 .5 .2\n# half\n\n1 1 .2 .5 1\n", "-1 0 1 .5 .2\r0 .3 1 .5 .2\r# half\r\r1 1 .2 .5 1\r", "-1 0 1 .5 .2\r\n0 .3 1 .5 .2\r\n# half\r\n\r\n1 1 .2 .5 1"};
+    static const char *const text[] = {"-1 0 1 .5 .2\n0 .3 1 .5 .2\n# half\n\n1 1 .2 .5 1\n",
+                                       "-1 0 1 .5 .2\r0 .3 1 .5 .2\r# half\r\r1 1 .2 .5 1\r",
+                                       "-1 0 1 .5 .2\r\n0 .3 1 .5 .2\r\n# half\r\n\r\n1 1 .2 .5 1"};
     char command[512];
     unsigned char *picture[3];
     int shape[3];
     for (int k = 0; k < 3; k++) {
         write_bytes(temporary("lines.tf"), text[k], strlen(text[k]));
-        snprintf(command, sizeof command, "procedural:gyroid:16 --mode dvr --shading unlit --size 32x32 --tf '%s' --out '%s'", temporary("lines.tf"), temporary("lines.png"));
+        snprintf(command, sizeof command, "procedural:gyroid:16 --mode dvr --shading unlit --size 32x32 --tf '%s' --out '%s'",
+                 temporary("lines.tf"), temporary("lines.png"));
         run_result r = run_viewer(command);
         CHECK(r.status == 0, "%d: %s", k, r.error);
         picture[k] = read_picture(temporary("lines.png"), shape);
@@ -267,7 +287,8 @@ TEST(transfer_functions_end_their_lines_by_cr_or_lf) {
     check_refused(command, "line 4: a colour");
 }
 
-/* An opaque box, seen from in front: depth is the distance to its face, from 3 radii to its middle, in the middle of a picture without a middle pixel. */
+/* An opaque box, seen from in front: depth is the distance to its face, from 3 radii to its middle, in the middle of a picture without a
+   middle pixel. */
 TEST(depth_is_written_as_a_float_map) {
     unsigned char box[8 * 8 * 8];
     char path[256], command[1024];
@@ -279,7 +300,9 @@ TEST(depth_is_written_as_a_float_map) {
     write_bytes(path, box, sizeof box);
     write_bytes(temporary("box.tf"), "0 1e6 1 1 1\n", 11);
     for (int aa = 1; aa <= 4; aa += 3) {
-        snprintf(command, sizeof command, "'%s' --mode dvr --shading unlit --size 40x30 --aa %d --camera 0,0,3 --tf '%s' --depth '%s' --out '%s'", path, aa, temporary("box.tf"), temporary("box.pfm"), temporary("box.png"));
+        snprintf(command, sizeof command,
+                 "'%s' --mode dvr --shading unlit --size 40x30 --aa %d --camera 0,0,3 --tf '%s' --depth '%s' --out '%s'", path, aa,
+                 temporary("box.tf"), temporary("box.pfm"), temporary("box.png"));
         run_result r = run_viewer(command);
         FILE *file = fopen(temporary("box.pfm"), "rb");
         size_t size = file ? fread(map, 1, sizeof map, file) : 0;
@@ -287,7 +310,8 @@ TEST(depth_is_written_as_a_float_map) {
         CHECK(r.status == 0 && size == 14 + 4 * 40 * 30 && !memcmp(map, "Pf\n40 30\n-1.0\n", 14), "%s, %zu bytes", r.error, size);
         if (size != 14 + 4 * 40 * 30) return;
         for (int i = 0; i < 40 * 30; i++) {
-            uint32_t bits = map[14 + 4 * i] | (uint32_t)map[15 + 4 * i] << 8 | (uint32_t)map[16 + 4 * i] << 16 | (uint32_t)map[17 + 4 * i] << 24;
+            uint32_t bits =
+                map[14 + 4 * i] | (uint32_t)map[15 + 4 * i] << 8 | (uint32_t)map[16 + 4 * i] << 16 | (uint32_t)map[17 + 4 * i] << 24;
             memcpy(&rows[i], &bits, sizeof bits);
         }
         depth = rows;
@@ -310,15 +334,17 @@ TEST(depth_goes_from_the_bottom_up_and_keeps_the_nearest_sample) {
     write_bytes(temporary("half.tf"), "0 1e6 1 1 1\n", 11);
     for (int n = 0; n < 2; n++) { /* one sample; sixteen */
         static unsigned char map[14 + 4 * W * H + 1];
-        snprintf(command, sizeof command, "'%s' --mode dvr --shading unlit --size 40x30 --aa %d --camera 0,0,3 --clip 0,-1,0,3.1 --tf '%s' --depth '%s' --out '%s'", path, n ? 4 : 1, temporary("half.tf"),
-                 temporary("half.pfm"), temporary("half.png"));
+        snprintf(command, sizeof command,
+                 "'%s' --mode dvr --shading unlit --size 40x30 --aa %d --camera 0,0,3 --clip 0,-1,0,3.1 --tf '%s' --depth '%s' --out '%s'",
+                 path, n ? 4 : 1, temporary("half.tf"), temporary("half.pfm"), temporary("half.png"));
         run_result r = run_viewer(command);
         FILE *file = fopen(temporary("half.pfm"), "rb");
         size_t size = file ? fread(map, 1, sizeof map, file) : 0;
         if (file) fclose(file);
         CHECK(r.status == 0 && size == 14 + 4 * W * H, "%s, %zu bytes", r.error, size);
         for (int i = 0; i < W * H; i++) {
-            uint32_t bits = map[14 + 4 * i] | (uint32_t)map[15 + 4 * i] << 8 | (uint32_t)map[16 + 4 * i] << 16 | (uint32_t)map[17 + 4 * i] << 24;
+            uint32_t bits =
+                map[14 + 4 * i] | (uint32_t)map[15 + 4 * i] << 8 | (uint32_t)map[16 + 4 * i] << 16 | (uint32_t)map[17 + 4 * i] << 24;
             memcpy(&depth[n][i], &bits, sizeof bits);
         }
     }
@@ -328,68 +354,109 @@ TEST(depth_goes_from_the_bottom_up_and_keeps_the_nearest_sample) {
         fewer += depth[0][i] < 1e30f && !(depth[1][i] < 1e30f);
         farther += depth[0][i] < 1e30f && depth[1][i] > depth[0][i] + 0.05f;
     }
-    printf("    pixels seen below and above: %d and %d of one sample, %d and %d of sixteen\n", seen[0][0], seen[0][1], seen[1][0], seen[1][1]);
+    printf("    pixels seen below and above: %d and %d of one sample, %d and %d of sixteen\n", seen[0][0], seen[0][1], seen[1][0],
+           seen[1][1]);
     CHECK(seen[0][0] > 40 && !seen[0][1] && seen[1][0] > seen[0][0] && !seen[1][1], "%d below, %d above", seen[0][0], seen[0][1]);
     CHECK(!fewer && !farther, "%d pixels lost, %d farther", fewer, farther);
 }
 
-/* ---- what is refused --------------------------------------------------------------------------------------------------------------------- */
+/* ---- what is refused --------------------------------------------------------------------------------------------------------- */
 
 TEST(silly_options_get_one_line_that_names_the_option) {
     static const char *const bad[][2] = {
         {"", "VOLUME"}, {"procedural:gyroid --nonsense", "--nonsense"}, {"procedural:gyroid --size", "--size"},
-        {"procedural:gyroid --size 0x10", "--size"}, {"procedural:gyroid --size 10", "--size"}, {"procedural:gyroid --size 10x10x10", "--size"},
-        {"procedural:gyroid --size 1e9x1e9", "--size"}, {"procedural:gyroid --size 16384x16384", "--size"}, {"procedural:gyroid --size 10.5x10", "--size"},
-        {"procedural:gyroid --size nanx10", "--size"}, {"procedural:gyroid --size -5x10", "--size"}, {"procedural:gyroid --iso nan", "--iso"},
+        {"procedural:gyroid --size 0x10", "--size"}, {"procedural:gyroid --size 10", "--size"},
+        {"procedural:gyroid --size 10x10x10", "--size"},
+        {"procedural:gyroid --size 1e9x1e9", "--size"}, {"procedural:gyroid --size 16384x16384", "--size"},
+        {"procedural:gyroid --size 10.5x10", "--size"},
+        {"procedural:gyroid --size nanx10", "--size"}, {"procedural:gyroid --size -5x10", "--size"},
+        {"procedural:gyroid --iso nan", "--iso"},
         {"procedural:gyroid --iso inf", "--iso"}, {"procedural:gyroid --iso 1,2", "--iso"}, {"procedural:gyroid --iso ''", "--iso"},
         {"procedural:gyroid --mode nice", "lambert phong vicinity"}, {"procedural:gyroid --spacing 1,1", "--spacing"},
-        {"procedural:gyroid --spacing 0,1,1", "--spacing"}, {"procedural:gyroid --spacing 1,-1,1", "--spacing"}, {"procedural:gyroid --spacing 1,1,1,1", "--spacing"},
-        {"procedural:gyroid --albedo 2,0,0", "--albedo"}, {"procedural:gyroid --albedo 1", "--albedo"}, {"procedural:gyroid --bounces 1.5", "--bounces"},
-        {"procedural:gyroid --bounces -2", "--bounces"}, {"procedural:gyroid --samples 0", "--samples"}, {"procedural:gyroid --samples 1e30", "--samples"},
-        {"procedural:gyroid --lattice 0,4,4", "--lattice"}, {"procedural:gyroid --lattice 4,4", "--lattice"}, {"procedural:gyroid --lookup magic", "--lookup"},
-        {"procedural:gyroid --clip 0,0,0,1", "--clip"}, {"procedural:gyroid --clip 1,2,3", "--clip"}, {"procedural:gyroid --clip 1e30,0,0,1", "from -1e9 to 1e9"},
-        {"procedural:gyroid --tf x.tf", "--tf: works with --mode dvr"}, {"procedural:gyroid --mode phong --classification exact", "--classification: works with --mode dvr"},
-        {"procedural:gyroid --step 1", "--step: works"}, {"procedural:gyroid --mode dvr --samples 4", "--samples: works with surfaces"}, {"procedural:gyroid --mode dvr --raycast", "--raycast: works with surfaces"},
-        {"procedural:gyroid --mode scale-invariant --method paper", "--method: paper"}, {"procedural:gyroid --mode dvr --shading unlit --method sweep", "--method: sweep"},
-        {"procedural:gyroid --mode dvr --method fast", "default brute paper sweep"}, {"procedural:gyroid --mode dvr --local", "--local: needs"},
-        {"procedural:gyroid --mode dvr --preset rainbow", "grey hot cool-warm spectrum"}, {"procedural:gyroid --mode dvr --preset hot --tf x.tf", "not both"},
+        {"procedural:gyroid --spacing 0,1,1", "--spacing"}, {"procedural:gyroid --spacing 1,-1,1", "--spacing"},
+        {"procedural:gyroid --spacing 1,1,1,1", "--spacing"},
+        {"procedural:gyroid --albedo 2,0,0", "--albedo"}, {"procedural:gyroid --albedo 1", "--albedo"},
+        {"procedural:gyroid --bounces 1.5", "--bounces"},
+        {"procedural:gyroid --bounces -2", "--bounces"}, {"procedural:gyroid --samples 0", "--samples"},
+        {"procedural:gyroid --samples 1e30", "--samples"},
+        {"procedural:gyroid --lattice 0,4,4", "--lattice"}, {"procedural:gyroid --lattice 4,4", "--lattice"},
+        {"procedural:gyroid --lookup magic", "--lookup"},
+        {"procedural:gyroid --clip 0,0,0,1", "--clip"}, {"procedural:gyroid --clip 1,2,3", "--clip"},
+        {"procedural:gyroid --clip 1e30,0,0,1", "from -1e9 to 1e9"},
+        {"procedural:gyroid --tf x.tf", "--tf: works with --mode dvr"},
+        {"procedural:gyroid --mode phong --classification exact", "--classification: works with --mode dvr"},
+        {"procedural:gyroid --step 1", "--step: works"}, {"procedural:gyroid --mode dvr --samples 4", "--samples: works with surfaces"},
+        {"procedural:gyroid --mode dvr --raycast", "--raycast: works with surfaces"},
+        {"procedural:gyroid --mode scale-invariant --method paper", "--method: paper"},
+        {"procedural:gyroid --mode dvr --shading unlit --method sweep", "--method: sweep"},
+        {"procedural:gyroid --mode dvr --method fast", "default brute paper sweep"},
+        {"procedural:gyroid --mode dvr --local", "--local: needs"},
+        {"procedural:gyroid --mode dvr --preset rainbow", "grey hot cool-warm spectrum"},
+        {"procedural:gyroid --mode dvr --preset hot --tf x.tf", "not both"},
         {"procedural:gyroid --depth a.pfm", "--depth: works"}, {"procedural:gyroid:8 --mode dvr --depth /nowhere/a.pfm", "/nowhere/a.pfm"},
         {"procedural:coulomb:8 --mode dvr --method paper --local", "--local: knows no peaks"},
-        {"procedural:coulomb:8 --mode dvr --method paper", "--method: paper knows no peaks"}, {"procedural:coulomb:8 --mode scale-invariant --order 3", "--order: needs"},
-        {"procedural:gyroid --mode dvr --iso 1", "--iso: is for surfaces"}, {"procedural:gyroid --mode scale-invariant --preset hot --iso 1", "--iso: is for surfaces"},
-        {"procedural:coulomb:8 --mode scale-invariant --iso 1", "--iso: the transfer function"}, {"procedural:gyroid --mode dvr --transmission none", "--transmission: needs"},
-        {"procedural:gyroid --mode scale-invariant --transmission none", "--transmission: needs"}, {"procedural:engine-block:8 --mode dvr --silhouette exact", "--silhouette: is for peaks"},
-        {"procedural:gyroid --mode scale-invariant --step 1", "--step: exact rays"}, {"procedural:gyroid --mode scale-invariant --method brute", "--method: needs"},
-        {"procedural:gyroid --mode dvr --shading unlit --env sky", "--env: --shading unlit"}, {"procedural:gyroid --mode dvr --shading unlit --light directional:1,1,1:1,1,1", "--light: --shading unlit"},
-        {"procedural:gyroid --mode dvr --shading local --grid 8,8,8", "--grid: needs"}, {"procedural:gyroid --mode dvr --shading unlit --directions 8", "--directions: needs"},
-        {"procedural:gyroid --mode dvr --order 7", "1 to 6"}, {"procedural:gyroid --mode dvr --directions 0", "--directions"}, {"procedural:gyroid --mode dvr --grid 8,8", "--grid"},
+        {"procedural:coulomb:8 --mode dvr --method paper", "--method: paper knows no peaks"},
+        {"procedural:coulomb:8 --mode scale-invariant --order 3", "--order: needs"},
+        {"procedural:gyroid --mode dvr --iso 1", "--iso: is for surfaces"},
+        {"procedural:gyroid --mode scale-invariant --preset hot --iso 1", "--iso: is for surfaces"},
+        {"procedural:coulomb:8 --mode scale-invariant --iso 1", "--iso: the transfer function"},
+        {"procedural:gyroid --mode dvr --transmission none", "--transmission: needs"},
+        {"procedural:gyroid --mode scale-invariant --transmission none", "--transmission: needs"},
+        {"procedural:engine-block:8 --mode dvr --silhouette exact", "--silhouette: is for peaks"},
+        {"procedural:gyroid --mode scale-invariant --step 1", "--step: exact rays"},
+        {"procedural:gyroid --mode scale-invariant --method brute", "--method: needs"},
+        {"procedural:gyroid --mode dvr --shading unlit --env sky", "--env: --shading unlit"},
+        {"procedural:gyroid --mode dvr --shading unlit --light directional:1,1,1:1,1,1", "--light: --shading unlit"},
+        {"procedural:gyroid --mode dvr --shading local --grid 8,8,8", "--grid: needs"},
+        {"procedural:gyroid --mode dvr --shading unlit --directions 8", "--directions: needs"},
+        {"procedural:gyroid --mode dvr --order 7", "1 to 6"},
+        {"procedural:gyroid --mode dvr --directions 0", "--directions"},
+        {"procedural:gyroid --mode dvr --grid 8,8", "--grid"},
         {"procedural:gyroid --grid 8,8,8", "--grid: works with --mode dvr and scale-invariant, not with --mode irradiance"},
-        {"procedural:gyroid --coarsest 8", "--coarsest: works with --mode dvr"}, {"procedural:gyroid --mode dvr --coarsest 3", "--coarsest"},
-        {"procedural:gyroid --mode dvr --method paper --coarsest 2", "--coarsest: needs"}, {"procedural:coulomb:8 --mode dvr --coarsest 2", "--coarsest: knows no peaks"},
+        {"procedural:gyroid --coarsest 8", "--coarsest: works with --mode dvr"},
+        {"procedural:gyroid --mode dvr --coarsest 3", "--coarsest"},
+        {"procedural:gyroid --mode dvr --method paper --coarsest 2", "--coarsest: needs"},
+        {"procedural:coulomb:8 --mode dvr --coarsest 2", "--coarsest: knows no peaks"},
         {"procedural:gyroid --mode vicinity --env sky", "--env: works with modes that have no light of their own"},
         {"procedural:gyroid --light directional:1,1,1:1,1,1 --mode vicinity", "--light: works with modes that have no light of their own"},
-        {"procedural:gyroid --mode vicinity --bounces 2", "--bounces: works with --mode irradiance, transfer and pathtrace, not with --mode vicinity"},
-        {"procedural:gyroid --mode lambert --samples 4", "--samples: works"}, {"procedural:gyroid --mode pathtrace --lattice 8,8,8", "--lattice: works"},
-        {"procedural:gyroid --ambient normal", "--ambient: works with --mode lambert and phong, not"}, {"procedural:gyroid --lookup x", "allowed: trilinear nearest"},
+        {"procedural:gyroid --mode vicinity --bounces 2",
+         "--bounces: works with --mode irradiance, transfer and pathtrace, not with --mode vicinity"},
+        {"procedural:gyroid --mode lambert --samples 4", "--samples: works"},
+        {"procedural:gyroid --mode pathtrace --lattice 8,8,8", "--lattice: works"},
+        {"procedural:gyroid --ambient normal", "--ambient: works with --mode lambert and phong, not"},
+        {"procedural:gyroid --lookup x", "allowed: trilinear nearest"},
         {"procedural:gyroid --mode dvr --depth same.png --out same.png", "--depth: same.png is the file of --out"},
         {"procedural:gyroid --mode dvr --out tests/golden/dvr.png --depth ./tests/golden/dvr.png", "is the file of --out"},
-        {"procedural:gyroid --mode dvr --out /tmp/never.png --depth tests/golden/dvr.png --compare tests/golden/dvr.png", "is the file of --compare"},
-        {"procedural:gyroid --mode dvr --tf tests/test_viewer.c --out tests/test_viewer.c", "--out: tests/test_viewer.c is the file of --tf"},
-        {"tests/test.h --out ./tests/test.h", "is the file of VOLUME"}, {"procedural:gyroid --env tests/test.h --out tests/test.h", "is the file of --env"},
-        {"procedural:gyroid --camera 1,2", "--camera"}, {"procedural:gyroid --camera 0,91,2", "--camera"}, {"procedural:gyroid --camera 0,0,0", "--camera"},
-        {"procedural:gyroid --up 0,0,0", "--up"}, {"procedural:gyroid --threads -1", "--threads"}, {"procedural:gyroid --threads 1000", "--threads"},
+        {"procedural:gyroid --mode dvr --out /tmp/never.png --depth tests/golden/dvr.png --compare tests/golden/dvr.png",
+        "is the file of --compare"},
+        {"procedural:gyroid --mode dvr --tf tests/test_viewer.c --out tests/test_viewer.c",
+        "--out: tests/test_viewer.c is the file of --tf"},
+        {"tests/test.h --out ./tests/test.h", "is the file of VOLUME"},
+        {"procedural:gyroid --env tests/test.h --out tests/test.h", "is the file of --env"},
+        {"procedural:gyroid --camera 1,2", "--camera"}, {"procedural:gyroid --camera 0,91,2", "--camera"},
+        {"procedural:gyroid --camera 0,0,0", "--camera"},
+        {"procedural:gyroid --up 0,0,0", "--up"}, {"procedural:gyroid --threads -1", "--threads"},
+        {"procedural:gyroid --threads 1000", "--threads"},
         {"procedural:gyroid --light sun:1,1,1:1,1,1", "--light"}, {"procedural:gyroid --light directional:0,0,0:1,1,1", "--light"},
         {"procedural:gyroid --light directional:1,1,1", "--light"}, {"procedural:gyroid --light point:1,1,1:-1,0,0", "--light"},
         {"procedural:gyroid --light sphere:1,1,1:1,1,1", "--light"}, {"procedural:gyroid --light rectangle:1,1,1:1,1,1:1,0,0", "--light"},
-        {"procedural:gyroid --light rectangle:1,1,1:1,1,1:1,0,0:1,1,0", "--light"}, {"procedural:gyroid --light point:1,1,1:1,1,1:1,0,0:0,1,0", "--light"}, {"procedural:gyroid --light point:1,1,1:1,1,1:1:1", "--light"},
+        {"procedural:gyroid --light rectangle:1,1,1:1,1,1:1,0,0:1,1,0", "--light"},
+        {"procedural:gyroid --light point:1,1,1:1,1,1:1,0,0:0,1,0", "--light"},
+        {"procedural:gyroid --light point:1,1,1:1,1,1:1:1", "--light"},
         {"procedural:gyroid --mode transfer --light point:1,1,1:1,1,1", "--light"}, {"procedural:gyroid --exposure 0", "--exposure"},
-        {"procedural:gyroid --lattice 4096,4096,4096", "--lattice: the table of its bricks alone needs 8.0 GiB"}, {"procedural:gyroid --shadows maybe", "--shadows"},
-        {"procedural:gyroid --mode transfer --storage rgb9e5", "--storage"}, {"procedural:gyroid:16 --size 32x32 --compare /dev/null", "/dev/null"},
-        {"procedural:gyroid:2048 --compare /nowhere.png", "/nowhere.png"}, {"procedural:gyroid:2048 --compare tests/golden/dvr.png", "is not 900x900"},
-        {"procedural:gyroid --gloss 10", "--gloss: works with --mode transfer, not"}, {"procedural:gyroid --mode transfer --gloss -1", "--gloss"},
+        {"procedural:gyroid --lattice 4096,4096,4096", "--lattice: the table of its bricks alone needs 8.0 GiB"},
+        {"procedural:gyroid --shadows maybe", "--shadows"},
+        {"procedural:gyroid --mode transfer --storage rgb9e5", "--storage"},
+        {"procedural:gyroid:16 --size 32x32 --compare /dev/null", "/dev/null"},
+        {"procedural:gyroid:2048 --compare /nowhere.png", "/nowhere.png"},
+        {"procedural:gyroid:2048 --compare tests/golden/dvr.png", "is not 900x900"},
+        {"procedural:gyroid --gloss 10", "--gloss: works with --mode transfer, not"},
+        {"procedural:gyroid --mode transfer --gloss -1", "--gloss"},
         {"procedural:gyroid --aa 1000", "--aa"}, {"procedural:gyroid --shading flat", "--shading"}, {"procedural:gyroid --out ''", "--out"},
-        {"procedural:gyroid procedural:skull", "second volume"}, {"procedural:gyroid --scene engine", "not both"}, {"--scene nowhere", "engine bonsai"},
-        {"procedural:teapot", "marschner-lobb"}, {"procedural:", "marschner-lobb"}, {"procedural:gyroid:1", "2 to 2048"}, {"procedural:gyroid:", "2 to 2048"},
+        {"procedural:gyroid procedural:skull", "second volume"}, {"procedural:gyroid --scene engine", "not both"},
+        {"--scene nowhere", "engine bonsai"},
+        {"procedural:teapot", "marschner-lobb"}, {"procedural:", "marschner-lobb"}, {"procedural:gyroid:1", "2 to 2048"},
+        {"procedural:gyroid:", "2 to 2048"},
         {"procedural:gyroid:99999", "2 to 2048"}, {"procedural:gyroid:nan", "2 to 2048"}, {"--scene cthead --mode dvr", "--tf"}};
     char command[1024];
     for (size_t i = 0; i < sizeof bad / sizeof bad[0]; i++) {
@@ -413,10 +480,12 @@ TEST(bad_volumes_get_one_line) {
     static const struct { const char *name; size_t size; const char *say; } files[] = {
         {"short_4x4x4_uint8.raw", 63, "63 bytes"}, {"long_4x4x4_uint8.raw", 65, "65 bytes"}, {"empty_4x4x4_uint8.raw", 0, "0 bytes"},
         {"zero_0x4x4_uint8.raw", 0, "size of 0"}, {"nosize_uint8.raw", 64, "name must end"}, {"notype_4x4x4.raw", 64, "name must end"},
-        {"two_8x8_uint8.raw", 64, "name must end"}, {"four_2x2x4x4_uint8.raw", 64, "name must end"}, {"odd_4x4x4_uint24.raw", 64, "name must end"},
+        {"two_8x8_uint8.raw", 64, "name must end"}, {"four_2x2x4x4_uint8.raw", 64, "name must end"},
+        {"odd_4x4x4_uint24.raw", 64, "name must end"},
         {"minus_-4x4x4_uint8.raw", 64, "name must end"}, {"huge_99999999999x4x4_uint8.raw", 64, "name must end"},
         {"vast_999999999x999999999x999999999_float64.raw", 64, "too large"}, {"big_2000000000x20x2_uint8.raw", 64, "64 bytes"},
-        {"flat_64x1x1_uint8.raw", 64, "only one layer"}, {"other_4x4x4_uint8.nrrd", 64, "only raw volumes"}, {"nothing", 4, "only raw volumes"},
+        {"flat_64x1x1_uint8.raw", 64, "only one layer"}, {"other_4x4x4_uint8.nrrd", 64, "only raw volumes"},
+        {"nothing", 4, "only raw volumes"},
         {"4x4x4_uint8.raw", 63, "63 bytes"}, {"x_4x4x4_UINT8.raw", 64, "name must end"}};
     for (size_t i = 0; i < sizeof files / sizeof files[0]; i++) {
         const char *path = temporary(files[i].name);
@@ -444,12 +513,16 @@ TEST(bad_volumes_get_one_line) {
 
 TEST(bad_environments_and_transfer_functions_get_one_line) {
     static const char *const hdr[][2] = {
-        {"", "does not begin"}, {"hello", "does not begin"}, {"#?RADIANCE\n", "within its header"}, {"#?RADIANCE\n\n", "header"}, {"#?RADIANCE\n\n-Y 4 +X 4\n", "row 0"},
-        {"#?RADIANCE\n\n+X 4 -Y 4\n", "columns"}, {"#?RADIANCE\n\n-Y 0 +X 4\nabcd", "claims"}, {"#?RADIANCE\n\n-Y 99999999 +X 99999999\nabcd", "claims"},
+        {"", "does not begin"}, {"hello", "does not begin"}, {"#?RADIANCE\n", "within its header"}, {"#?RADIANCE\n\n", "header"},
+        {"#?RADIANCE\n\n-Y 4 +X 4\n", "row 0"},
+        {"#?RADIANCE\n\n+X 4 -Y 4\n", "columns"}, {"#?RADIANCE\n\n-Y 0 +X 4\nabcd", "claims"},
+        {"#?RADIANCE\n\n-Y 99999999 +X 99999999\nabcd", "claims"},
         {"#?RADIANCE\n\n-Y 32768 +X 32768\nabcd", "claims"}, {"#?RADIANCE\nFORMAT=32-bit_rle_xyze\n\n-Y 1 +X 1\nabcd", "FORMAT"},
         {"#?RADIANCE\nEXPOSURE=0\n\n-Y 1 +X 1\nabcd", "exposure"}, {"#?RADIANCE\n\n-Y 2 +X 2\nabcdabcd", "row 1"}};
-    static const char *const tf[][2] = {{"", "no point"}, {"# only words\n", "no point"}, {"1 2 3\n", "line 1"}, {"1 0 0 0 0\n0 0 0 0 0\n", "ascend"},
-        {"1 -1 0 0 0\n", "line 1"}, {"1 0 2 0 0\n", "colour"}, {"\n\nnan 0 0 0 0\n", "line 3"}, {"peak 1 2 1 1 1\n", "opacity"}, {"peak 1\n", "line 1"}, {"1 0 0 0 0 0\n", "line 1"}};
+    static const char *const tf[][2] = {{"", "no point"}, {"# only words\n", "no point"}, {"1 2 3\n", "line 1"},
+        {"1 0 0 0 0\n0 0 0 0 0\n", "ascend"},
+        {"1 -1 0 0 0\n", "line 1"}, {"1 0 2 0 0\n", "colour"}, {"\n\nnan 0 0 0 0\n", "line 3"}, {"peak 1 2 1 1 1\n", "opacity"},
+        {"peak 1\n", "line 1"}, {"1 0 0 0 0 0\n", "line 1"}};
     char command[512];
     for (size_t i = 0; i < sizeof hdr / sizeof hdr[0]; i++) {
         const char *path = temporary("bad.hdr");
@@ -467,7 +540,8 @@ TEST(bad_environments_and_transfer_functions_get_one_line) {
         FILE *file = fopen(temporary("bad.txt"), "w");
         for (int i = 0; i < 257; i++) fprintf(file, "peak %d .1 1 1 1\n", i);
         fclose(file);
-        snprintf(command, sizeof command, "procedural:gyroid:8 --mode dvr --size 8x8 --tf '%s' --out '%s'", temporary("bad.txt"), temporary("never.png"));
+        snprintf(command, sizeof command, "procedural:gyroid:8 --mode dvr --size 8x8 --tf '%s' --out '%s'", temporary("bad.txt"),
+                 temporary("never.png"));
         check_refused(command, "line 257");
     }
     check_refused("procedural:gyroid:8 --env /nowhere/at/all.hdr", "/nowhere/at/all.hdr");
@@ -476,7 +550,8 @@ TEST(bad_environments_and_transfer_functions_get_one_line) {
 
 TEST(an_existing_file_survives_every_failure) {
     char command[512], text[64], precious[256];
-    static const char *const failing[] = {"procedural:gyroid:8 --size 0x0", "procedural:teapot", "/nowhere_4x4x4_uint8.raw", "procedural:gyroid:8 --env /nowhere.hdr"};
+    static const char *const failing[] = {"procedural:gyroid:8 --size 0x0", "procedural:teapot", "/nowhere_4x4x4_uint8.raw",
+                                          "procedural:gyroid:8 --env /nowhere.hdr"};
     strcpy(precious, temporary("precious.png"));
     write_bytes(precious, "do not touch", 12);
     for (size_t i = 0; i < sizeof failing / sizeof failing[0]; i++) {
@@ -490,7 +565,8 @@ TEST(an_existing_file_survives_every_failure) {
     {
         char shell[1024];
         const char *viewer = getenv("ISOGI_VIEWER");
-        snprintf(shell, sizeof shell, "trap '' XFSZ; ulimit -f 8; '%s' %s 2>/dev/null", viewer && *viewer ? viewer : "build/viewer", command);
+        snprintf(shell, sizeof shell, "trap '' XFSZ; ulimit -f 8; '%s' %s 2>/dev/null", viewer && *viewer ? viewer : "build/viewer",
+                 command);
         CHECK(system(shell) != 0, "a write beyond the limit was not noticed");
     }
     read_text(precious, text, sizeof text);
@@ -504,10 +580,15 @@ TEST(an_existing_file_survives_every_failure) {
 }
 
 TEST(stats_are_key_value_lines_and_help_is_complete) {
-    static const char *const keys[] = {"size 32x32x32", "range ", "isovalue ", "triangles ", "rays_light ", "rays_per_second ", "texels_computed ",
-                                       "texels_requested ", "memory_bytes ", "seconds_bake ", "seconds_total ", "error_relative "};
-    static const char *const named[] = {"--scene", "--size", "--iso", "--mode", "--raycast", "--spacing", "--env", "--light", "--albedo", "--bounces", "--samples",
-                                        "--lattice", "--lookup", "--shadows", "--ambient", "--fog", "--gloss", "--normals", "--offset", "--reach", "--storage", "--compare", "--tf", "--preset", "--method", "--order", "--directions", "--grid", "--coarsest", "--local", "--depth", "--clip", "--camera", "--up", "--threads", "--out", "--stats", "procedural:", "Examples"};
+    static const char *const keys[] = {"size 32x32x32", "range ",           "isovalue ",        "triangles ",
+                                       "rays_light ",   "rays_per_second ", "texels_computed ", "texels_requested ",
+                                       "memory_bytes ", "seconds_bake ",    "seconds_total ",   "error_relative "};
+    static const char *const named[] = {"--scene",    "--size",   "--iso",       "--mode",    "--raycast", "--spacing",    "--env",
+                                        "--light",    "--albedo", "--bounces",   "--samples", "--lattice", "--lookup",     "--shadows",
+                                        "--ambient",  "--fog",    "--gloss",     "--normals", "--offset",  "--reach",      "--storage",
+                                        "--compare",  "--tf",     "--preset",    "--method",  "--order",   "--directions", "--grid",
+                                        "--coarsest", "--local",  "--depth",     "--clip",    "--camera",  "--up",         "--threads",
+                                        "--out",      "--stats",  "procedural:", "Examples"};
     char command[512];
     run_result r;
     snprintf(command, sizeof command, "procedural:gyroid:32 --size 32x32 --samples 8 --stats --out '%s'", temporary("stats.png"));
@@ -527,20 +608,24 @@ TEST(stats_are_key_value_lines_and_help_is_complete) {
     }
 }
 
-/* ---- the parts ---------------------------------------------------------------------------------------------------------------------------------- */
+/* ---- the parts --------------------------------------------------------------------------------------------------------------- */
 
 TEST(png_round_trip_is_exact) {
     test_random random = {1};
     for (int pass = 0; pass < 60; pass++) {
-        int width = 1 + (int)(random_bits(&random) % (pass < 50 ? 40 : 700)), height = 1 + (int)(random_bits(&random) % 60), channels = pass % 2 ? 3 : 4, shape[3];
+        int width = 1 + (int)(random_bits(&random) % (pass < 50 ? 40 : 700)), height = 1 + (int)(random_bits(&random) % 60),
+            channels = pass % 2 ? 3 : 4, shape[3];
         size_t n = (size_t)width * (size_t)height * (size_t)channels, size;
         unsigned char *pixels = (unsigned char *)malloc(n), *file, *back = NULL;
         char error[FILE_ERROR_SIZE];
         for (size_t i = 0; i < n; i++) /* constant, smooth, noise, and noise of few values */
-            pixels[i] = (unsigned char)(pass % 4 == 0 ? 7 : pass % 4 == 1 ? i / 9 : pass % 4 == 2 ? random_bits(&random) : random_bits(&random) % 3 * 100);
+            pixels[i] = (unsigned char)(pass % 4 == 0 ? 7 : pass % 4 == 1 ? i / 9 : pass % 4 == 2 ? random_bits(&random)
+                : random_bits(&random) % 3 * 100);
         CHECK(png_encode(pixels, width, height, channels, &file, &size), "%dx%dx%d", width, height, channels);
         CHECK(png_decode(file, size, &back, shape, error), "%dx%dx%d: %s", width, height, channels, error);
-        if (back) CHECK(shape[0] == width && shape[1] == height && shape[2] == channels && !memcmp(pixels, back, n), "%dx%dx%d came back as %dx%dx%d", width, height, channels, shape[0], shape[1], shape[2]);
+        if (back)
+            CHECK(shape[0] == width && shape[1] == height && shape[2] == channels && !memcmp(pixels, back, n),
+                  "%dx%dx%d came back as %dx%dx%d", width, height, channels, shape[0], shape[1], shape[2]);
         free(pixels), free(file), free(back);
     }
 }
@@ -549,14 +634,16 @@ TEST(png_round_trip_is_exact) {
    encoder and decoder share cannot hide here. */
 TEST(png_of_another_encoder_is_read) {
     static const unsigned char file[] = {
-        137, 80, 78, 71, 13, 10, 26, 10, 0, 0, 0, 13, 73, 72, 68, 82, 0, 0, 0, 8, 0, 0, 0, 8, 8, 2, 0, 0, 0, 75, 109, 41,
-        220, 0, 0, 0, 182, 73, 68, 65, 84, 120, 1, 99, 96, 152, 198, 96, 180, 133, 33, 197, 6, 72, 131, 128, 145, 13, 67, 202, 22, 134, 105, 211,
-        24, 24, 167, 85, 48, 100, 201, 85, 24, 117, 108, 48, 154, 86, 97, 196, 176, 33, 43, 107, 131, 81, 69, 133, 209, 163, 13, 76, 231, 30, 49, 76,
-        123, 180, 225, 220, 35, 141, 115, 143, 110, 156, 123, 20, 48, 237, 17, 195, 57, 48, 151, 153, 129, 31, 104, 64, 79, 74, 59, 195, 156, 203, 55, 24,
-        62, 110, 96, 168, 120, 147, 114, 164, 103, 206, 35, 6, 22, 160, 14, 6, 134, 13, 12, 32, 181, 27, 178, 24, 2, 24, 30, 117, 48, 60, 218, 48,
-        237, 81, 0, 11, 80, 111, 22, 72, 2, 136, 128, 246, 119, 100, 1, 213, 129, 216, 27, 88, 206, 1, 221, 224, 83, 145, 5, 226, 84, 0, 181, 130,
-        244, 1, 25, 91, 54, 128, 141, 218, 178, 97, 90, 135, 70, 214, 163, 27, 12, 32, 163, 54, 76, 219, 2, 148, 211, 0, 0, 219, 22, 87, 55, 37,
-        163, 196, 211, 0, 0, 0, 0, 73, 69, 78, 68, 174, 66, 96, 130};
+        137, 80,  78,  71,  13,  10,  26,  10,  0,   0,   0,   13,  73,  72,  68,  82,  0,   0,   0,   8,   0,   0,   0,   8,
+        8,   2,   0,   0,   0,   75,  109, 41,  220, 0,   0,   0,   182, 73,  68,  65,  84,  120, 1,   99,  96,  152, 198, 96,
+        180, 133, 33,  197, 6,   72,  131, 128, 145, 13,  67,  202, 22,  134, 105, 211, 24,  24,  167, 85,  48,  100, 201, 85,
+        24,  117, 108, 48,  154, 86,  97,  196, 176, 33,  43,  107, 131, 81,  69,  133, 209, 163, 13,  76,  231, 30,  49,  76,
+        123, 180, 225, 220, 35,  141, 115, 143, 110, 156, 123, 20,  48,  237, 17,  195, 57,  48,  151, 153, 129, 31,  104, 64,
+        79,  74,  59,  195, 156, 203, 55,  24,  62,  110, 96,  168, 120, 147, 114, 164, 103, 206, 35,  6,   22,  160, 14,  6,
+        134, 13,  12,  32,  181, 27,  178, 24,  2,   24,  30,  117, 48,  60,  218, 48,  237, 81,  0,   11,  80,  111, 22,  72,
+        2,   136, 128, 246, 119, 100, 1,   213, 129, 216, 27,  88,  206, 1,   221, 224, 83,  145, 5,   226, 84,  0,   181, 130,
+        244, 1,   25,  91,  54,  128, 141, 218, 178, 97,  90,  135, 70,  214, 163, 27,  12,  32,  163, 54,  76,  219, 2,   148,
+        211, 0,   0,   219, 22,  87,  55,  37,  163, 196, 211, 0,   0,   0,   0,   73,  69,  78,  68,  174, 66,  96,  130};
     unsigned char *pixels = NULL;
     char error[FILE_ERROR_SIZE] = "";
     int shape[3] = {0, 0, 0};
@@ -564,7 +651,8 @@ TEST(png_of_another_encoder_is_read) {
     for (int j = 0; pixels && j < 8; j++)
         for (int i = 0; i < 8; i++) {
             const unsigned char *p = pixels + 3 * (8 * j + i);
-            CHECK(p[0] == (i * 37 + j * 59) % 4 * 50 && p[1] == (i * i + j * 83 + 5) % 7 * 30 && p[2] == i * j * 3 % 5 * 40, "pixel %d,%d: %d %d %d", i, j, p[0], p[1], p[2]);
+            CHECK(p[0] == (i * 37 + j * 59) % 4 * 50 && p[1] == (i * i + j * 83 + 5) % 7 * 30 && p[2] == i * j * 3 % 5 * 40,
+                  "pixel %d,%d: %d %d %d", i, j, p[0], p[1], p[2]);
         }
     free(pixels);
 }
@@ -619,8 +707,10 @@ TEST(hdr_pixels_are_right) {
     if (!image.rgb) return;
     CHECK(image.width == 16 && image.height == 4, "%dx%d", image.width, image.height);
     /* mantissa m, exponent e: m * 2^(e - 136); these are exact in float */
-    CHECK(image.rgb[0] == 100.0f / 128 && image.rgb[3 * 16 * 3] == 103.0f / 128, "%g %g", (double)image.rgb[0], (double)image.rgb[3 * 16 * 3]);
-    CHECK(image.rgb[3 * 11 + 1] == 11.0f / 128 && image.rgb[3 * 12 + 2] == 22.0f / 256, "%g %g", (double)image.rgb[3 * 11 + 1], (double)image.rgb[3 * 12 + 2]);
+    CHECK(image.rgb[0] == 100.0f / 128 && image.rgb[3 * 16 * 3] == 103.0f / 128, "%g %g", (double)image.rgb[0],
+          (double)image.rgb[3 * 16 * 3]);
+    CHECK(image.rgb[3 * 11 + 1] == 11.0f / 128 && image.rgb[3 * 12 + 2] == 22.0f / 256, "%g %g", (double)image.rgb[3 * 11 + 1],
+          (double)image.rgb[3 * 12 + 2]);
     free(image.rgb);
     {
         /* flat pixels, mirrored and upside down, exposure 2 */
@@ -666,11 +756,17 @@ TEST(raw_names_are_read) {
     size_t size[3];
     isogi_type type;
     char error[FILE_ERROR_SIZE];
-    CHECK(volume_parse_name("/some/where/engine_256x255x128_uint8.raw", size, &type, error) && size[0] == 256 && size[1] == 255 && size[2] == 128 && type == ISOGI_U8, "%s", error);
-    CHECK(volume_parse_name("a_b_c_1x2x3_float64.raw", size, &type, error) && size[0] == 1 && size[1] == 2 && size[2] == 3 && type == ISOGI_F64, "%s", error);
+    CHECK(volume_parse_name("/some/where/engine_256x255x128_uint8.raw", size, &type, error) && size[0] == 256 && size[1] == 255 &&
+              size[2] == 128 && type == ISOGI_U8,
+          "%s", error);
+    CHECK(volume_parse_name("a_b_c_1x2x3_float64.raw", size, &type, error) && size[0] == 1 && size[1] == 2 && size[2] == 3 &&
+              type == ISOGI_F64,
+          "%s", error);
     CHECK(volume_parse_name("4x5x6_int16.raw", size, &type, error) && size[2] == 6 && type == ISOGI_I16, "%s", error);
     CHECK(!volume_parse_name("x_4x5x6_int16.raw.gz", size, &type, error), "a packed file passed");
-    CHECK(!volume_parse_name(".raw", size, &type, error) && !volume_parse_name("_.raw", size, &type, error) && !volume_parse_name("", size, &type, error), "nothing passed");
+    CHECK(!volume_parse_name(".raw", size, &type, error) && !volume_parse_name("_.raw", size, &type, error) &&
+              !volume_parse_name("", size, &type, error),
+          "nothing passed");
 }
 
 TEST(guessed_isovalue_parts_two_materials) {
@@ -776,7 +872,8 @@ TEST(camera_up_follows_the_standard_view_of_the_scenes) {
         rotation_from_up(other[k], m);
         rotation_apply(m, x, x), rotation_apply(m, y, y), rotation_apply(m, z, z);
         vector_cross(x, y, cross);
-        for (int i = 0; i < 3; i++) CHECK(fabs(y[i] - other[k][i]) < 1e-12 && fabs(cross[i] - z[i]) < 1e-12, "up %d: %g %g", k, y[i], cross[i]);
+        for (int i = 0; i < 3; i++)
+            CHECK(fabs(y[i] - other[k][i]) < 1e-12 && fabs(cross[i] - z[i]) < 1e-12, "up %d: %g %g", k, y[i], cross[i]);
     }
 }
 
@@ -792,7 +889,8 @@ TEST(procedural_volumes_hold_their_formulas) {
             double x = volume_voxel(&v, i);
             least = x < least ? x : least, most = x > most ? x : most;
         }
-        CHECK(least < shape->isovalue && most > shape->isovalue, "%s: range %g to %g, isovalue %g", shape->name, least, most, shape->isovalue);
+        CHECK(least < shape->isovalue && most > shape->isovalue, "%s: range %g to %g, isovalue %g", shape->name, least, most,
+              shape->isovalue);
         procedural_free(&v);
     }
     {

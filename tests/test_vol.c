@@ -231,7 +231,8 @@ static void compare_batches(int path, int kind) {
         rays[i] = any_ray(&f, wide_isovalue(kind, &r), &r);
         rays[i].flags = i % 3 == 0 ? ISOGI_RAY_CAPPED : 0;
         if (i % 7 == 0) /* along lattice planes, edges and diagonals */
-            for (int x = 0; x < 3; x++) rays[i].dir[x] = (float)((int)(random_bits(&r) % 3) - 1), rays[i].origin[x] = floor(rays[i].origin[x]);
+            for (int x = 0; x < 3; x++)
+                rays[i].dir[x] = (float)((int)(random_bits(&r) % 3) - 1), rays[i].origin[x] = floor(rays[i].origin[x]);
         if (i % 101 == 0) rays[i].dir[0] = (float)NAN;
         random_direction(&r, d);
         for (int x = 0; x < 3; x++) dirs[i][x] = (float)d[x];
@@ -318,7 +319,8 @@ TEST(rays_from_inside_a_closed_surface_never_escape) {
                 isogi_vol_continue(f.pyramid, &start, (const float(*)[3])dir, NULL, 0, 0, 1, &next, NULL);
                 escaped += next.side != -1;
                 done++;
-                if (next.side == -1) start = next, isogi_vol_continue(f.pyramid, &start, (const float(*)[3])dir, NULL, 0, 0, 1, &next, NULL);
+                if (next.side == -1)
+                    start = next, isogi_vol_continue(f.pyramid, &start, (const float(*)[3])dir, NULL, 0, 0, 1, &next, NULL);
             }
         }
         field_free(&f);
@@ -513,7 +515,8 @@ TEST(cells_that_touch_a_nan_hold_no_surface) {
             int inner = 1, touches = 0;
             for (int a = 0; a < 3; a++) inner &= hit.local[a] > 1e-9 && hit.local[a] < 1 - 1e-9;
             for (int c = 0; c < 8; c++)
-                touches |= !isfinite(*field_at(&f, (int)hit.cell[0] + (c & 1), (int)hit.cell[1] + (c >> 1 & 1), (int)hit.cell[2] + (c >> 2)));
+                touches |=
+                    !isfinite(*field_at(&f, (int)hit.cell[0] + (c & 1), (int)hit.cell[1] + (c >> 1 & 1), (int)hit.cell[2] + (c >> 2)));
             CHECK(!(inner && touches), "a hit in cell %u %u %u", hit.cell[0], hit.cell[1], hit.cell[2]);
         }
         field_free(&f);
@@ -576,7 +579,8 @@ TEST(every_type_stride_and_placement_reads_the_same_values) {
         for (int i = 0; i < N * N * N; i++) {
             float point[1][3] = {{(float)(i % N), (float)(i / N % N), (float)(i / N / N)}}, value;
             isogi_vol_sample(p, (const float(*)[3])point, 1, &value, NULL);
-            CHECK((double)value == 2 * (base[i] - shift) + 1, "type %d voxel %d: %g, not %g", type, i, (double)value, 2 * (base[i] - shift) + 1);
+            CHECK((double)value == 2 * (base[i] - shift) + 1, "type %d voxel %d: %g, not %g", type, i, (double)value,
+                  2 * (base[i] - shift) + 1);
         }
         isogi_vol_free(p);
         free(data);
@@ -613,7 +617,8 @@ TEST(oriented_axes_map_both_ways_and_turn_gradients) {
         for (int m = 0; m < 2; m++) {
             /* float points and results: a few ulp of the largest coordinate */
             CHECK(fabs((double)value[m] - truth) < 1e-5, "value %g, not %g", (double)value[m], truth);
-            for (int a = 0; a < 3; a++) CHECK(fabs((double)gradient[m][a] - g[a]) < 1e-6, "gradient %g, not %g", (double)gradient[m][a], g[a]);
+            for (int a = 0; a < 3; a++)
+                CHECK(fabs((double)gradient[m][a] - g[a]) < 1e-6, "gradient %g, not %g", (double)gradient[m][a], g[a]);
         }
         isogi_ray ray = {.origin = {world[0], world[1], world[2]}, .dir = {0.2f, 1, 0.3f}, .isovalue = truth - 1};
         isogi_hit hit = {0};
@@ -684,7 +689,8 @@ TEST(bspline_agrees_with_its_definition) {
             for (int a = 0; a < 3; a++) {
                 real truth = want[a + 1] / (real)f.volume.spacing[a];
                 /* issue: 1e-5 of (largest sample / spacing) */
-                CHECK(fabsl((real)gradient[0][a] - truth) < 1e-5L / (real)f.volume.spacing[a], "gradient %g, not %Lg", (double)gradient[0][a], truth);
+                CHECK(fabsl((real)gradient[0][a] - truth) < 1e-5L / (real)f.volume.spacing[a], "gradient %g, not %Lg",
+                      (double)gradient[0][a], truth);
             }
         }
         field_free(&f);
@@ -701,12 +707,13 @@ TEST(bspline_reproduces_constant_linear_and_quadratic_derivatives) {
         for (int k = 0; k < 10; k++)
             for (int j = 0; j < 8; j++)
                 for (int i = 0; i < 9; i++)
-                    *field_at(&f, i, j, k) = q[0] + q[1] * i + q[2] * j + q[3] * k + q[4] * i * i + q[5] * j * j + q[6] * k * k + q[7] * i * j +
-                                             q[8] * j * k + q[9] * k * i;
+                    *field_at(&f, i, j, k) = q[0] + q[1] * i + q[2] * j + q[3] * k + q[4] * i * i + q[5] * j * j + q[6] * k * k +
+                                             q[7] * i * j + q[8] * j * k + q[9] * k * i;
         field_build(&f);
         for (int i = 0; i < 2000; i++) {
             double margin = degree == 2 ? 1 : 0; /* beyond the border the field is continued linearly */
-            double x = random_range(&r, margin, 8 - margin), y = random_range(&r, margin, 7 - margin), z = random_range(&r, margin, 9 - margin);
+            double x = random_range(&r, margin, 8 - margin), y = random_range(&r, margin, 7 - margin),
+                   z = random_range(&r, margin, 9 - margin);
             float point[1][3] = {{(float)x, (float)y, (float)z}}, gradient[1][3];
             x = (double)point[0][0], y = (double)point[0][1], z = (double)point[0][2];
             double truth[3] = {q[1] + 2 * q[4] * x + q[7] * y + q[9] * z, q[2] + 2 * q[5] * y + q[7] * x + q[8] * z,
@@ -762,9 +769,11 @@ TEST(every_block_bounds_its_voxels_and_no_more) {
                             double x = *field_at(&f, i, j, k);
                             low = x < low ? x : low, high = x > high ? x : high;
                         }
-                CHECK((double)level.range[b][0] <= low && (double)level.range[b][1] >= high, "level %d block %zu: [%g, %g] does not hold [%g, %g]", n,
-                      b, (double)level.range[b][0], (double)level.range[b][1], low, high);
-                CHECK((double)level.range[b][0] > low - 1e-6 && (double)level.range[b][1] < high + 1e-6, "level %d block %zu is loose", n, b);
+                CHECK((double)level.range[b][0] <= low && (double)level.range[b][1] >= high,
+                      "level %d block %zu: [%g, %g] does not hold [%g, %g]", n, b, (double)level.range[b][0], (double)level.range[b][1],
+                      low, high);
+                CHECK((double)level.range[b][0] > low - 1e-6 && (double)level.range[b][1] < high + 1e-6, "level %d block %zu is loose", n,
+                      b);
             }
         }
         field_free(&f);
@@ -776,7 +785,8 @@ TEST(skipping_proves_itself_by_counters) {
     field f = field_new(n, n, n);
     for (int k = 0; k < n; k++)
         for (int j = 0; j < n; j++)
-            for (int i = 0; i < n; i++) *field_at(&f, i, j, k) = 40 - sqrt((i - 64.) * (i - 64.) + (j - 64.) * (j - 64.) + (k - 64.) * (k - 64.));
+            for (int i = 0; i < n; i++)
+                *field_at(&f, i, j, k) = 40 - sqrt((i - 64.) * (i - 64.) + (j - 64.) * (j - 64.) + (k - 64.) * (k - 64.));
     field_build(&f);
     test_random r = {18};
     isogi_counters count = {0};
@@ -787,11 +797,12 @@ TEST(skipping_proves_itself_by_counters) {
         isogi_vol_intersect(f.pyramid, &ray, 1, &hit, &count);
     }
     double rays = (double)count.rays;
-    printf("    per ray: %.2f blocks, %.2f cells, %.2f cubics\n", (double)count.blocks / rays, (double)count.cells / rays, (double)count.cubics / rays);
+    printf("    per ray: %.2f blocks, %.2f cells, %.2f cubics\n", (double)count.blocks / rays, (double)count.cells / rays,
+           (double)count.cubics / rays);
     CHECK(count.rays == 20000, "%g rays", rays);
     /* a ray through 128 cells a side would cross about 130 of them */
-    CHECK((double)count.cells / rays < 6 && (double)count.cubics / rays < 2 && (double)count.blocks / rays < 20, "per ray: %g blocks, %g cells, %g cubics",
-          (double)count.blocks / rays, (double)count.cells / rays, (double)count.cubics / rays);
+    CHECK((double)count.cells / rays < 6 && (double)count.cubics / rays < 2 && (double)count.blocks / rays < 20,
+          "per ray: %g blocks, %g cells, %g cubics", (double)count.blocks / rays, (double)count.cells / rays, (double)count.cubics / rays);
     field_free(&f);
 }
 
@@ -862,7 +873,8 @@ TEST(parallel_runs_every_task_once_and_can_be_cancelled) {
         isogi_context cancels = {.progress = cancel, .user = &calls, .threads = 1 + own};
         CHECK(isogi_parallel(&cancels, 1000, square_task, &s, 0, 1) == ISOGI_CANCELLED, "calls %d", calls);
     }
-    CHECK(isogi_parallel(NULL, 0, square_task, &s, 0, 1) == ISOGI_OK && isogi_parallel(NULL, 5, NULL, &s, 0, 1) == ISOGI_INVALID, "edge cases");
+    CHECK(isogi_parallel(NULL, 0, square_task, &s, 0, 1) == ISOGI_OK && isogi_parallel(NULL, 5, NULL, &s, 0, 1) == ISOGI_INVALID,
+          "edge cases");
 }
 
 TEST_MAIN("vol")

@@ -31,7 +31,8 @@ TEST(corners_and_ranges_are_those_of_the_voxels) {
     for (int i = 0; i < 2000; i++) {
         size_t first[3], last[3];
         double range[2], least = DBL_MAX, largest = -DBL_MAX;
-        for (int a = 0; a < 3; a++) first[a] = random_bits(&r) % v->size[a], last[a] = first[a] + random_bits(&r) % (v->size[a] + 1 - first[a]);
+        for (int a = 0; a < 3; a++)
+            first[a] = random_bits(&r) % v->size[a], last[a] = first[a] + random_bits(&r) % (v->size[a] + 1 - first[a]);
         for (size_t z = first[2]; z <= last[2] && z < 70; z++)
             for (size_t x = first[0]; x <= last[0] && x < 7; x++) {
                 double value = *field_at(&f, (int)x, 0, (int)z);
@@ -57,8 +58,8 @@ static size_t chain_of_hits(const isogi_pyramid *p, const isogi_ray *ray, isogi_
         double left = ray->tmax - next.t, t = next.t;
         hits[n++] = next;
         if (ray->tmax > 0 && !(left > 0)) break;
-        isogi_vol_continue(p, &hits[n - 1], (const float(*)[3])&ray->dir, ray->tmax > 0 ? &left : NULL, ray->isovalue, ray->flags | ISOGI_RAY_ONWARD, 1, &next,
-                           NULL);
+        isogi_vol_continue(p, &hits[n - 1], (const float(*)[3]) & ray->dir, ray->tmax > 0 ? &left : NULL, ray->isovalue,
+                           ray->flags | ISOGI_RAY_ONWARD, 1, &next, NULL);
         next.t += t;
     }
     return n;
@@ -78,7 +79,8 @@ TEST(all_hits_are_the_first_and_those_that_follow) {
             for (int i = 0; i < 5; i++) f.value[random_bits(&r) % 990] = (double)NAN;
         field_build(&f);
         for (int i = 0; i < RAYS; i++) {
-            rays[i] = random_ray(&f, v % KINDS == QUANTISED ? floor(random_range(&r, -3, 3)) : v % 2 ? 0.1 : random_range(&r, -0.5, 0.5), &r);
+            rays[i] = random_ray(&f, v % KINDS == QUANTISED ? floor(random_range(&r, -3, 3)) : v % 2 ? 0.1
+                : random_range(&r, -0.5, 0.5), &r);
             rays[i].flags = v % 2 ? (uint32_t)(i & 1) : 0;
             if (i % 4 == 0) rays[i].tmin = random_range(&r, 0, 10), rays[i].tmax = rays[i].tmin + random_range(&r, 0, 10);
         }
@@ -89,7 +91,8 @@ TEST(all_hits_are_the_first_and_those_that_follow) {
         for (int i = 0; i < RAYS; i++) {
             size_t n = chain_of_hits(f.pyramid, &rays[i], chain, MOST);
             CHECK(n == counts[i] || n == MOST, "%d hits, %d one by one", (int)counts[i], (int)n);
-            for (size_t k = 0; k < n; k++) CHECK(same_hit(&chain[k], &all[i][k]), "ray %d, hit %d: t %.17g, %.17g", i, (int)k, chain[k].t, all[i][k].t);
+            for (size_t k = 0; k < n; k++)
+                CHECK(same_hit(&chain[k], &all[i][k]), "ray %d, hit %d: t %.17g, %.17g", i, (int)k, chain[k].t, all[i][k].t);
             CHECK(few_counts[i] == (n < 3 ? n : 3) && none[i] == (n ? 1 : 0), "%d and %d of %d", (int)few_counts[i], (int)none[i], (int)n);
             for (size_t k = 0; k < n && k < 2; k++) CHECK(same_hit(&few[i][k], &all[i][k]), "ray %d, hit %d", i, (int)k);
             for (size_t k = n; k < MOST; k++) CHECK(all[i][k].side == 0, "written behind the last hit of ray %d", i);
@@ -206,7 +209,8 @@ TEST(bundles_have_the_bits_of_single_rays) {
             CHECK(isogi_vol_bundle_occluded(f.pyramid, &bundle, (const float(*)[3])dirs, count, occluded, NULL) == ISOGI_OK, "any hits");
             for (size_t i = 0; i < count; i++) {
                 if (bundle.start) {
-                    isogi_vol_continue(f.pyramid, &start, (const float(*)[3])dirs + i, &bundle.tmax, bundle.isovalue, bundle.flags, 1, &alone, NULL);
+                    isogi_vol_continue(f.pyramid, &start, (const float(*)[3])dirs + i, &bundle.tmax, bundle.isovalue, bundle.flags, 1,
+                                       &alone, NULL);
                 } else {
                     isogi_ray one = {.flags = bundle.flags, .tmin = bundle.tmin, .tmax = bundle.tmax, .isovalue = bundle.isovalue};
                     memcpy(one.origin, bundle.origin, sizeof one.origin), memcpy(one.dir, dirs[i], sizeof one.dir);
@@ -357,7 +361,8 @@ static isogi_volume part_of(const field *whole, const int cut[3], int part, doub
     for (int k = 0; k < n[2]; k++)
         for (int j = 0; j < n[1]; j++)
             for (int i = 0; i < n[0]; i++)
-                (*copy)[i + n[0] * (j + n[1] * k)] = *field_at(whole, low[0] - halo[0][0] + i, low[1] - halo[0][1] + j, low[2] - halo[0][2] + k);
+                (*copy)[i + n[0] * (j + n[1] * k)] =
+                    *field_at(whole, low[0] - halo[0][0] + i, low[1] - halo[0][1] + j, low[2] - halo[0][2] + k);
     v.data = *copy + halo[0][0] + n[0] * (halo[0][1] + n[1] * halo[0][2]);
     return v;
 }
@@ -365,7 +370,8 @@ static isogi_volume part_of(const field *whole, const int cut[3], int part, doub
 static void place_obliquely(field *f) {
     const double axes[9] = {0.8, -0.6, 0.1, 0.6, 0.8, 0, 0, 0.2, 1.1};
     memcpy(f->volume.axes, axes, sizeof axes);
-    for (int a = 0; a < 3; a++) f->volume.spacing[a] = 0.1 * (a + 1.3), f->volume.origin[a] = 7.7 - 3.1 * a, f->volume.first[a] = (size_t)(1000 * a);
+    for (int a = 0; a < 3; a++)
+        f->volume.spacing[a] = 0.1 * (a + 1.3), f->volume.origin[a] = 7.7 - 3.1 * a, f->volume.first[a] = (size_t)(1000 * a);
 }
 
 static int compare_rows(const void *a, const void *b) { return memcmp(a, b, MESH_ROW * sizeof(float)); }
@@ -460,7 +466,8 @@ TEST(hits_and_samples_of_chunks_are_those_of_the_whole) {
                         isogi_vol_normals(p, &theirs[i][k], 1, ISOGI_NORMAL_SMOOTH, other);
                         normals++;
                         /* the place is right to some 1e-13 of a cell, the gradient here no less than 1e-3 of its rate of change */
-                        for (int a = 0; a < 3; a++) CHECK(fabsf(ours[0][a] - other[0][a]) < 1e-6f, "normal %g, %g", (double)ours[0][a], (double)other[0][a]);
+                        for (int a = 0; a < 3; a++)
+                            CHECK(fabsf(ours[0][a] - other[0][a]) < 1e-6f, "normal %g, %g", (double)ours[0][a], (double)other[0][a]);
                     }
                 }
             for (int i = 0; i < 200; i++) {
@@ -472,7 +479,9 @@ TEST(hits_and_samples_of_chunks_are_those_of_the_whole) {
                 isogi_vol_sample_smooth(whole.pyramid, (const float(*)[3])point, 1, ours, (float(*)[3])(ours + 1));
                 isogi_vol_sample_smooth(p, (const float(*)[3])point, 1, other, (float(*)[3])(other + 1));
                 /* a point on the chunk's border may be rounded out of it: by 1e-6 of the origin, in cells of 0.1 and more */
-                for (int a = 0; a < 4; a++) CHECK(fabsf(ours[a] - other[a]) < (v % 4 > 1 ? 2e-3f : 1e-5f), "sample %d: %g, %g", a, (double)ours[a], (double)other[a]);
+                for (int a = 0; a < 4; a++)
+                    CHECK(fabsf(ours[a] - other[a]) < (v % 4 > 1 ? 2e-3f : 1e-5f), "sample %d: %g, %g", a, (double)ours[a],
+                          (double)other[a]);
             }
             isogi_vol_free(p), free(copy);
         }
@@ -545,7 +554,8 @@ TEST(memory_is_aligned_counted_and_never_wraps_around) {
     const isogi_context *const contexts[2] = {NULL, &context};
     for (int c = 0; c < 2; c++) {
         CHECK(!isogi_allocate(contexts[c], 0, 8) && !isogi_allocate(contexts[c], 8, 0), "nothing is NULL, %d", c);
-        CHECK(!isogi_allocate(contexts[c], SIZE_MAX / 2, 3) && !isogi_allocate(contexts[c], SIZE_MAX, SIZE_MAX), "a product that overflows, %d", c);
+        CHECK(!isogi_allocate(contexts[c], SIZE_MAX / 2, 3) && !isogi_allocate(contexts[c], SIZE_MAX, SIZE_MAX),
+              "a product that overflows, %d", c);
         char *p = (char *)isogi_allocate(contexts[c], 7, 9);
         CHECK(p != NULL && (c || (uintptr_t)p % 64 == 0), "block %p", (void *)p);
         if (p) memset(p, 1, 63);

@@ -27,7 +27,8 @@ static double gyroid(void *user, const double p[3], double g[3]) {
     function *f = (function *)user;
     double k = f->wave, x = k * p[0], y = k * p[1], z = k * p[2];
     f->calls++;
-    g[0] = k * (cos(x) * cos(y) - sin(z) * sin(x)), g[1] = k * (cos(y) * cos(z) - sin(x) * sin(y)), g[2] = k * (cos(z) * cos(x) - sin(y) * sin(z));
+    g[0] = k * (cos(x) * cos(y) - sin(z) * sin(x)), g[1] = k * (cos(y) * cos(z) - sin(x) * sin(y)),
+    g[2] = k * (cos(z) * cos(x) - sin(y) * sin(z));
     return sin(x) * cos(y) + sin(y) * cos(z) + sin(z) * cos(x);
 }
 
@@ -119,8 +120,10 @@ TEST(rays_hit_a_ball_where_its_equation_says) {
                 worst = fmax(worst, fabs(hits[n].t - t[n]) * sqrt(disc));
                 isogi_vol_normals(p, &hits[n], 1, ISOGI_NORMAL_TRILINEAR, normals);
                 double length = 0;
-                for (int k = 0; k < 3; k++) normal[k] = ray.origin[k] + t[n] * (double)ray.dir[k] - f.centre[k], length += normal[k] * normal[k];
-                for (int k = 0; k < 3; k++) CHECK(fabs((double)normals[0][k] - normal[k] / sqrt(length)) < 1e-6, "normal %g", (double)normals[0][k]);
+                for (int k = 0; k < 3; k++)
+                    normal[k] = ray.origin[k] + t[n] * (double)ray.dir[k] - f.centre[k], length += normal[k] * normal[k];
+                for (int k = 0; k < 3; k++)
+                    CHECK(fabs((double)normals[0][k] - normal[k] / sqrt(length)) < 1e-6, "normal %g", (double)normals[0][k]);
                 found++;
             }
         }
@@ -188,7 +191,8 @@ TEST(rays_hit_a_gyroid_wherever_it_crosses) {
             calls += f.calls;
             CHECK((int)count == expected, "%d crossings, not %d", (int)count, expected);
             for (int n = 0; n < expected && n < (int)count; n++)
-                CHECK(hits[n].side == side[n] && fabs(hits[n].t - t[n]) < 1e-8, "hit %d: side %d t %.12g, not %d %.12g", n, hits[n].side, hits[n].t, side[n], t[n]);
+                CHECK(hits[n].side == side[n] && fabs(hits[n].t - t[n]) < 1e-8, "hit %d: side %d t %.12g, not %d %.12g", n, hits[n].side,
+                      hits[n].t, side[n], t[n]);
             crossings += expected;
         }
         isogi_vol_free(p);

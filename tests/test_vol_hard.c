@@ -52,10 +52,10 @@ static void compare_rays(const scene *s, const isogi_ray *rays, int n, int all_f
             if (h->side != truth.side || occluded[p][i] != (truth.side != 0)) {
                 if (!count->wrong[p]++)
                     printf("    path %d: side %d at %.17g, occluded %d, reference %d at %.17g; origin %.17g %.17g %.17g dir %.9g %.9g %.9g "
-                           "t %.17g %.17g isovalue %.17g size %d %d %d type %d\n", p, h->side, h->t, occluded[p][i], truth.side, (double)truth.t,
-                           rays[i].origin[0], rays[i].origin[1], rays[i].origin[2], (double)rays[i].dir[0], (double)rays[i].dir[1],
-                           (double)rays[i].dir[2], rays[i].tmin, rays[i].tmax, rays[i].isovalue, s->size[0], s->size[1], s->size[2],
-                           (int)s->volume.type);
+                           "t %.17g %.17g isovalue %.17g size %d %d %d type %d\n",
+                           p, h->side, h->t, occluded[p][i], truth.side, (double)truth.t, rays[i].origin[0], rays[i].origin[1],
+                           rays[i].origin[2], (double)rays[i].dir[0], (double)rays[i].dir[1], (double)rays[i].dir[2], rays[i].tmin,
+                           rays[i].tmax, rays[i].isovalue, s->size[0], s->size[1], s->size[2], (int)s->volume.type);
                 continue;
             }
             if (!h->side) continue;
@@ -69,8 +69,8 @@ static void compare_rays(const scene *s, const isogi_ray *rays, int n, int all_f
 /* residual: bound of |value - isovalue| at a hit in units of what rounding explains. The solver ends its Newton steps at 1e-13 of a
    segment, which is up to 3e-13 of the values, a hundred times what rounding alone explains in small volumes. */
 static void tally_check(const char *what, const tally *t, int undecided_percent) {
-    printf("    %s: %ld rays, %ld hits, %ld looked at in %d bits, %ld undecided; residual %.2g roundings\n", what, t->rays, t->hits, t->wide,
-           WIDE_BITS, t->undecided, t->worst);
+    printf("    %s: %ld rays, %ld hits, %ld looked at in %d bits, %ld undecided; residual %.2g roundings\n", what, t->rays, t->hits,
+           t->wide, WIDE_BITS, t->undecided, t->worst);
     for (int p = 0; p < PATHS; p++) CHECK(t->wrong[p] == 0, "%s: path %d is wrong for %ld of %ld rays", what, p, t->wrong[p], t->rays);
     CHECK(t->undecided * 100 <= t->rays * undecided_percent, "%ld of %ld undecided", t->undecided, t->rays);
     CHECK(t->worst < 100, "residual %g roundings", t->worst);
@@ -120,8 +120,8 @@ static void run_rays(const scene *s, int lattice, int n, double low, double high
 /* ---- shapes and sizes ---- */
 
 TEST(odd_sizes_hit_like_the_reference) {
-    const int size[][3] = {{2, 2, 2}, {2, 5, 9}, {9, 2, 17}, {4, 5, 3}, {63, 3, 2}, {64, 2, 5}, {65, 4, 2}, {66, 3, 3}, {2, 65, 17}, {5, 16, 64},
-                           {16, 17, 15}, {3, 2, 129}, {63, 17, 66}, {64, 65, 16}, {65, 33, 64}, {66, 63, 9}};
+    const int size[][3] = {{2, 2, 2},   {2, 5, 9},   {9, 2, 17},   {4, 5, 3},   {63, 3, 2},   {64, 2, 5},   {65, 4, 2},   {66, 3, 3},
+                           {2, 65, 17}, {5, 16, 64}, {16, 17, 15}, {3, 2, 129}, {63, 17, 66}, {64, 65, 16}, {65, 33, 64}, {66, 63, 9}};
     test_random r = {1};
     tally t = {0};
     for (int i = 0; i < 32; i++) {
@@ -265,7 +265,8 @@ TEST(one_voxel_is_touched_by_every_ray_through_it) {
         }
     }
     for (int path = 1; path < 5; path++) {
-        CHECK(!missed[path] && !apart[path], "path %d: %ld of %ld rays miss the voxel, %ld together", path, missed[path], rays, apart[path]);
+        CHECK(!missed[path] && !apart[path], "path %d: %ld of %ld rays miss the voxel, %ld together", path, missed[path], rays,
+              apart[path]);
         isogi_vol_free(p[path]);
     }
 }
@@ -312,8 +313,8 @@ TEST(behind_a_touched_corner_the_next_surface_is_met) {
                         starts[i].cell[axis] = dx > 0 ? 0 : 5, starts[i].local[axis] = dx > 0 ? 1 : 0, dirs[i][axis] = (float)dx;
                     }
                     isogi_vol_continue(s.pyramid[p], starts, (const float(*)[3])dirs, NULL, 0, 0, (size_t)many, hits, NULL);
-                    CHECK(hits[many - 1].side == -1 && fabs(hits[many - 1].t - 4.2) < 1e-12, "path %d axis %d: side %d at %.17g, not 4.2", p, axis,
-                          hits[many - 1].side, hits[many - 1].t);
+                    CHECK(hits[many - 1].side == -1 && fabs(hits[many - 1].t - 4.2) < 1e-12, "path %d axis %d: side %d at %.17g, not 4.2",
+                          p, axis, hits[many - 1].side, hits[many - 1].t);
                 }
             scene_free(&s);
         }
@@ -331,14 +332,15 @@ TEST(values_of_any_size_have_the_same_hits) {
         scene_noise(&a, 0, &r);
         for (size_t i = 0; i < scene_voxels(&a); i++) b.value[i] = a.value[i] * unit[k];
         scene_build(&a), scene_build(&b);
-        for (int i = 0; i < BATCH; i++) rays[i] = scaled[i] = ray_through(&a, random_range(&r, -0.7, 0.7), 20, &r), scaled[i].isovalue *= unit[k];
+        for (int i = 0; i < BATCH; i++)
+            rays[i] = scaled[i] = ray_through(&a, random_range(&r, -0.7, 0.7), 20, &r), scaled[i].isovalue *= unit[k];
         for (int p = 0; p < PATHS; p++) {
             isogi_vol_intersect(a.pyramid[p], rays, BATCH, ha, NULL);
             isogi_vol_intersect(b.pyramid[p], scaled, BATCH, hb, NULL);
             for (int i = 0; i < BATCH; i++) {
                 hits += ha[i].side != 0;
-                CHECK(ha[i].side == hb[i].side && fabs(ha[i].t - hb[i].t) < 1e-7, "path %d: side %d at %.17g, times 2^%d side %d at %.17g", p, ha[i].side,
-                      ha[i].t, (int)log2(unit[k]), hb[i].side, hb[i].t);
+                CHECK(ha[i].side == hb[i].side && fabs(ha[i].t - hb[i].t) < 1e-7, "path %d: side %d at %.17g, times 2^%d side %d at %.17g",
+                      p, ha[i].side, ha[i].t, (int)log2(unit[k]), hb[i].side, hb[i].t);
             }
         }
         CHECK(hits > BATCH, "%ld hits", hits);
@@ -427,7 +429,8 @@ TEST(surfaces_in_border_faces_have_no_speckle) {
     static double value[SIZE * SIZE * SIZE];
     test_random r = {31};
     for (int solid = 0; solid < 2; solid++) {
-        isogi_volume volume = {.data = value, .type = ISOGI_F64, .size = {SIZE, SIZE, SIZE}, .spacing = {0.3, 0.7, 1.1}, .origin = {0.1, -3.3, 7.7}};
+        isogi_volume volume = {
+            .data = value, .type = ISOGI_F64, .size = {SIZE, SIZE, SIZE}, .spacing = {0.3, 0.7, 1.1}, .origin = {0.1, -3.3, 7.7}};
         for (int i = 0; i < SIZE * SIZE * SIZE; i++) {
             const int x = i % SIZE, y = i / SIZE % SIZE, z = i / SIZE / SIZE;
             value[i] = !x || !y || !z || x == SIZE - 1 || y == SIZE - 1 || z == SIZE - 1 ? 0.125 : solid ? 1 : -1;
@@ -473,7 +476,8 @@ TEST(cells_without_a_surface_hit_like_the_reference) {
     for (int v = 0; v < (LONG_SUITE ? 200 : 10); v++) {
         scene s = scene_new(9, 18, 7);
         scene_noise(&s, 0, &r);
-        for (int k = 0; k < 12; k++) s.value[random_bits(&r) % scene_voxels(&s)] = k % 3 == 0 ? (double)NAN : k % 3 == 1 ? (double)INFINITY : -(double)INFINITY;
+        for (int k = 0; k < 12; k++)
+            s.value[random_bits(&r) % scene_voxels(&s)] = k % 3 == 0 ? (double)NAN : k % 3 == 1 ? (double)INFINITY : -(double)INFINITY;
         scene_build(&s);
         run_rays(&s, 0, BATCH, -0.7, 0.7, 0, 0, &t, &r);
         scene_free(&s);

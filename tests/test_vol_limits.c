@@ -16,7 +16,8 @@
 /* A crop of an array of pixels with channels, mirrored, thinned out, or the same plane again and again: any of these is a view. */
 static isogi_volume random_view(void *array, const int size[3], int channels, isogi_type type, test_random *r) {
     isogi_volume v = {.type = type};
-    ptrdiff_t bytes = (ptrdiff_t)type_bytes(type), stride = bytes * channels, offset = (ptrdiff_t)(random_bits(r) % (unsigned)channels) * bytes;
+    ptrdiff_t bytes = (ptrdiff_t)type_bytes(type), stride = bytes * channels,
+              offset = (ptrdiff_t)(random_bits(r) % (unsigned)channels) * bytes;
     for (int a = 0; a < 3; a++) {
         int kind = (int)(random_bits(r) % 8), step = kind == 0 ? 0 : kind == 1 ? 2 : 1;
         int most = step == 2 ? (size[a] + 1) / 2 : size[a], n = kind == 2 ? 1 : 1 + (int)(random_bits(r) % (unsigned)most), first = 0;
@@ -86,26 +87,31 @@ TEST(any_view_is_as_good_as_a_packed_copy) {
         for (int i = 0; i < RAYS; i++) rays[i] = ray_in_view(&view, desc.isovalue, &r);
         isogi_vol_intersect(p, rays, RAYS, ours, NULL), isogi_vol_intersect(q, rays, RAYS, theirs, NULL);
         for (int i = 0; i < RAYS; i++) {
-            CHECK(same_hit(&ours[i], &theirs[i]), "type %d: side %d and %d, t %.17g and %.17g", (int)type, ours[i].side, theirs[i].side, ours[i].t, theirs[i].t);
+            CHECK(same_hit(&ours[i], &theirs[i]), "type %d: side %d and %d, t %.17g and %.17g", (int)type, ours[i].side, theirs[i].side,
+                  ours[i].t, theirs[i].t);
             found += ours[i].side != 0;
         }
         CHECK(isogi_vol_mesh(p, &desc, &mesh) == ISOGI_OK && isogi_vol_mesh(q, &desc, &other) == ISOGI_OK, "mesh");
-        CHECK(mesh.vertex_count == other.vertex_count && mesh.triangle_count == other.triangle_count, "%d and %d triangles", (int)mesh.triangle_count, (int)other.triangle_count);
+        CHECK(mesh.vertex_count == other.vertex_count && mesh.triangle_count == other.triangle_count, "%d and %d triangles",
+              (int)mesh.triangle_count, (int)other.triangle_count);
         if (mesh.vertex_count == other.vertex_count && mesh.vertex_count)
             CHECK(!memcmp(mesh.positions, other.positions, mesh.vertex_count * 12), "vertices differ");
         solid += mesh.triangle_count > 0;
         for (int i = 0; i < 20; i++) {
             float point[1][3], value[2], gradient[2][3];
             double most = 200 + fabs(view.bias);
-            for (int a = 0; a < 3; a++) point[0][a] = (float)(view.origin[a] + view.spacing[a] * random_range(&r, -1, (double)view.size[a]));
+            for (int a = 0; a < 3; a++)
+                point[0][a] = (float)(view.origin[a] + view.spacing[a] * random_range(&r, -1, (double)view.size[a]));
             for (int filter = ISOGI_FILTER_LINEAR; filter <= ISOGI_FILTER_CATMULL_ROM; filter++) {
                 isogi_vol_sample_filtered(p, (isogi_filter)filter, (const float(*)[3])point, 1, &value[0], &gradient[0]);
                 isogi_vol_sample_filtered(q, (isogi_filter)filter, (const float(*)[3])point, 1, &value[1], &gradient[1]);
                 /* the documented error of either, 2^-21 of the largest number */
-                CHECK(fabs((double)value[0] - (double)value[1]) <= 0x1p-19 * most, "filter %d: %g and %g", filter, (double)value[0], (double)value[1]);
+                CHECK(fabs((double)value[0] - (double)value[1]) <= 0x1p-19 * most, "filter %d: %g and %g", filter, (double)value[0],
+                      (double)value[1]);
                 for (int a = 0; a < 3; a++) {
                     CHECK(test_finite((double)gradient[0][a]), "gradient %g", (double)gradient[0][a]);
-                    CHECK(view.size[a] > 1 || fabsf(gradient[0][a]) <= 0, "a gradient of %g along an axis of one voxel", (double)gradient[0][a]);
+                    CHECK(view.size[a] > 1 || fabsf(gradient[0][a]) <= 0, "a gradient of %g along an axis of one voxel",
+                          (double)gradient[0][a]);
                 }
             }
         }
@@ -176,13 +182,16 @@ TEST(voxels_beyond_two_to_the_31_are_found) {
         size_t count;
         ray.origin[a] = -10, ray.dir[a] = 1;
         isogi_vol_intersect_all(p, &ray, 1, 4, hits, &count, NULL);
-        CHECK(count == 2 && hits[0].side == 1 && fabs(hits[0].t - ((double)at[a] + 9.25)) < 1e-9 && fabs(hits[1].t - ((double)at[a] + 10.75)) < 1e-9,
+        CHECK(count == 2 && hits[0].side == 1 && fabs(hits[0].t - ((double)at[a] + 9.25)) < 1e-9 &&
+                  fabs(hits[1].t - ((double)at[a] + 10.75)) < 1e-9,
               "axis %d: %d hits", a, (int)count);
         CHECK(isogi_vol_next_interval(p, &ray, (const double(*)[2])wanted, 1, 0, piece, NULL) && piece[0] <= (double)at[a] + 9.5 &&
                   piece[1] >= (double)at[a] + 10.5 && piece[1] - piece[0] < 13, "axis %d: piece %g..%g", a, piece[0], piece[1]);
         first[a] = at[a] - 5, last[a] = at[a] - 1;
     }
-    CHECK(!isogi_vol_may_hold(p, first, last, (const double(*)[2])wanted, 1) && isogi_vol_may_hold(p, at, at, (const double(*)[2])wanted, 1), "boxes");
+    CHECK(!isogi_vol_may_hold(p, first, last, (const double(*)[2])wanted, 1) &&
+              isogi_vol_may_hold(p, at, at, (const double(*)[2])wanted, 1),
+          "boxes");
     float point[1][3] = {{(float)at[0] + 0.5f, (float)at[1], (float)at[2]}}, value;
     isogi_vol_sample(p, (const float(*)[3])point, 1, &value, NULL);
     CHECK(value == 100, "value %g", (double)value);
@@ -200,7 +209,8 @@ TEST(voxels_beyond_two_to_the_31_are_found) {
 /* ---- numbers and pointers that no caller should send ---- */
 
 static double odd_number(test_random *r) {
-    const double odd[] = {0, -0.0, 1, -1, (double)NAN, (double)INFINITY, -(double)INFINITY, 1e300, -1e300, DBL_MAX, 1e-300, 5e-324, 0.5, 3, 7, 1e10, -2.5, 1e-6};
+    const double odd[] = {0, -0.0, 1, -1, (double)NAN, (double)INFINITY, -(double)INFINITY, 1e300, -1e300, DBL_MAX, 1e-300, 5e-324, 0.5, 3,
+        7, 1e10, -2.5, 1e-6};
     return random_bits(r) % 3 ? random_range(r, -2, 9) : odd[random_bits(r) % (sizeof odd / sizeof *odd)];
 }
 
@@ -224,8 +234,8 @@ static void check_odd_hit(const isogi_pyramid *p, const isogi_hit *hit, const ch
     CHECK(hit->side >= -2 && hit->side <= 2, "%s: side %d", what, hit->side);
     CHECK(test_finite(hit->t), "%s: t %g", what, hit->t);
     for (int a = 0; a < 3; a++)
-        CHECK(hit->side ? hit->local[a] >= 0 && hit->local[a] <= 1 && hit->cell[a] + 1 < v->size[a] : hit->cell[a] == 0, "%s: cell %u + %g", what,
-              (unsigned)hit->cell[a], hit->local[a]);
+        CHECK(hit->side ? hit->local[a] >= 0 && hit->local[a] <= 1 && hit->cell[a] + 1 < v->size[a] : hit->cell[a] == 0, "%s: cell %u + %g",
+              what, (unsigned)hit->cell[a], hit->local[a]);
 }
 
 static double cubic_function(void *user, const double p[3], double g[3]) {
@@ -243,7 +253,8 @@ static void odd_calls(const isogi_pyramid *p, test_random *r) {
     uint8_t occluded[N];
     size_t counts[N], first[3], last[3];
     for (int i = 0; i < N; i++) {
-        rays[i].flags = (uint32_t)(random_bits(r) % 4), rays[i].tmin = odd_number(r), rays[i].tmax = odd_number(r), rays[i].isovalue = odd_number(r);
+        rays[i].flags = (uint32_t)(random_bits(r) % 4), rays[i].tmin = odd_number(r), rays[i].tmax = odd_number(r),
+        rays[i].isovalue = odd_number(r);
         tmax[i] = odd_number(r), starts[i] = odd_hit(r);
         for (int a = 0; a < 3; a++) {
             rays[i].origin[a] = odd_number(r), rays[i].dir[a] = odd_float(r), dirs[i][a] = odd_float(r), points[i][a] = odd_float(r);
@@ -252,17 +263,20 @@ static void odd_calls(const isogi_pyramid *p, test_random *r) {
     }
     for (int a = 0; a < 3; a++) first[a] = random_bits(r) % 12, last[a] = random_bits(r) % 12;
     for (int n = 0; n < 4; n++) ranges[n / 2][n % 2] = odd_number(r);
-    isogi_bundle bundle = {.start = random_bits(r) & 1 ? starts : NULL, .tmin = odd_number(r), .tmax = odd_number(r), .isovalue = odd_number(r), .flags = 1};
+    isogi_bundle bundle = {
+        .start = random_bits(r) & 1 ? starts : NULL, .tmin = odd_number(r), .tmax = odd_number(r), .isovalue = odd_number(r), .flags = 1};
     memcpy(bundle.origin, rays[0].origin, sizeof bundle.origin);
     CHECK(isogi_vol_intersect(p, rays, N, hits, NULL) == ISOGI_OK, "rays");
     for (int i = 0; i < N; i++) check_odd_hit(p, &hits[i], "intersect");
     CHECK(isogi_vol_occluded(p, rays, N, occluded, NULL) == ISOGI_OK, "any hits");
     CHECK(isogi_vol_intersect_all(p, rays, N, MANY, all, counts, NULL) == ISOGI_OK, "all hits");
     for (int i = 0; i < N; i++) {
-        CHECK(counts[i] <= MANY + 1 && (counts[i] > 0) == (hits[i].side != 0) && occluded[i] == (hits[i].side != 0), "%d hits", (int)counts[i]);
+        CHECK(counts[i] <= MANY + 1 && (counts[i] > 0) == (hits[i].side != 0) && occluded[i] == (hits[i].side != 0), "%d hits",
+              (int)counts[i]);
         for (size_t n = 0; n < counts[i] && n < MANY; n++) check_odd_hit(p, &all[(size_t)i * MANY + n], "all");
     }
-    CHECK(isogi_vol_continue(p, starts, (const float(*)[3])dirs, tmax, rays[1].isovalue, rays[1].flags, N, hits, NULL) == ISOGI_OK, "continue");
+    CHECK(isogi_vol_continue(p, starts, (const float(*)[3])dirs, tmax, rays[1].isovalue, rays[1].flags, N, hits, NULL) == ISOGI_OK,
+          "continue");
     for (int i = 0; i < N; i++) check_odd_hit(p, &hits[i], "continue");
     CHECK(isogi_vol_bundle(p, &bundle, (const float(*)[3])dirs, N, hits, NULL) == ISOGI_OK, "bundle");
     for (int i = 0; i < N; i++) check_odd_hit(p, &hits[i], "bundle");
@@ -355,25 +369,42 @@ TEST(calls_without_arguments_are_refused) {
     uint8_t any;
     CHECK(isogi_vol_build(NULL, &v, NULL) == ISOGI_INVALID && isogi_vol_build(&p, NULL, NULL) == ISOGI_INVALID, "build");
     CHECK(isogi_vol_build(&p, &v, NULL) == ISOGI_OK, "build");
-    CHECK(isogi_vol_intersect(p, NULL, 1, &hit, NULL) == ISOGI_INVALID && isogi_vol_intersect(p, &ray, 1, NULL, NULL) == ISOGI_INVALID, "intersect");
-    CHECK(isogi_vol_occluded(NULL, &ray, 1, &any, NULL) == ISOGI_INVALID && isogi_vol_occluded(p, &ray, 1, NULL, NULL) == ISOGI_INVALID, "occluded");
+    CHECK(isogi_vol_intersect(p, NULL, 1, &hit, NULL) == ISOGI_INVALID && isogi_vol_intersect(p, &ray, 1, NULL, NULL) == ISOGI_INVALID,
+          "intersect");
+    CHECK(isogi_vol_occluded(NULL, &ray, 1, &any, NULL) == ISOGI_INVALID && isogi_vol_occluded(p, &ray, 1, NULL, NULL) == ISOGI_INVALID,
+          "occluded");
     CHECK(isogi_vol_intersect_all(NULL, &ray, 1, 1, &hit, &count, NULL) == ISOGI_INVALID, "all");
-    CHECK(isogi_vol_intersect_all(p, &ray, 1, 1, NULL, &count, NULL) == ISOGI_INVALID && isogi_vol_intersect_all(p, &ray, 1, 0, NULL, NULL, NULL) == ISOGI_INVALID, "all");
+    CHECK(isogi_vol_intersect_all(p, &ray, 1, 1, NULL, &count, NULL) == ISOGI_INVALID &&
+              isogi_vol_intersect_all(p, &ray, 1, 0, NULL, NULL, NULL) == ISOGI_INVALID,
+          "all");
     CHECK(isogi_vol_intersect_all(p, &ray, 2, SIZE_MAX / 2, &hit, &count, NULL) == ISOGI_TOO_LARGE && count == 7, "all: too many");
     CHECK(isogi_vol_continue(p, NULL, (const float(*)[3])vector, NULL, 0, 0, 1, &hit, NULL) == ISOGI_INVALID, "continue");
-    CHECK(isogi_vol_continue(p, &hit, NULL, NULL, 0, 0, 1, &hit, NULL) == ISOGI_INVALID && isogi_vol_continue(p, NULL, NULL, NULL, 0, 0, 0, NULL, NULL) == ISOGI_OK, "continue");
-    CHECK(isogi_vol_bundle(p, NULL, (const float(*)[3])vector, 1, &hit, NULL) == ISOGI_INVALID && isogi_vol_bundle(p, &bundle, NULL, 1, &hit, NULL) == ISOGI_INVALID, "bundle");
+    CHECK(isogi_vol_continue(p, &hit, NULL, NULL, 0, 0, 1, &hit, NULL) == ISOGI_INVALID &&
+              isogi_vol_continue(p, NULL, NULL, NULL, 0, 0, 0, NULL, NULL) == ISOGI_OK,
+          "continue");
+    CHECK(isogi_vol_bundle(p, NULL, (const float(*)[3])vector, 1, &hit, NULL) == ISOGI_INVALID &&
+              isogi_vol_bundle(p, &bundle, NULL, 1, &hit, NULL) == ISOGI_INVALID,
+          "bundle");
     CHECK(isogi_vol_bundle(p, &bundle, (const float(*)[3])vector, 1, NULL, NULL) == ISOGI_INVALID, "bundle");
     CHECK(isogi_vol_bundle_occluded(p, &bundle, (const float(*)[3])vector, 1, NULL, NULL) == ISOGI_INVALID, "bundle");
     CHECK(isogi_vol_bundle_occluded(NULL, &bundle, (const float(*)[3])vector, 1, &any, NULL) == ISOGI_INVALID, "bundle");
     CHECK(isogi_vol_positions(p, NULL, 1, vector) == ISOGI_INVALID && isogi_vol_positions(p, &hit, 1, NULL) == ISOGI_INVALID, "positions");
-    CHECK(isogi_vol_normals(p, &hit, 1, (isogi_normal_kind)9, vector) == ISOGI_INVALID && isogi_vol_normals(NULL, &hit, 1, ISOGI_NORMAL_SMOOTH, vector) == ISOGI_INVALID, "normals");
-    CHECK(isogi_vol_sample(p, NULL, 1, NULL, NULL) == ISOGI_INVALID && isogi_vol_sample_smooth(NULL, (const float(*)[3])vector, 1, NULL, NULL) == ISOGI_INVALID, "sample");
+    CHECK(isogi_vol_normals(p, &hit, 1, (isogi_normal_kind)9, vector) == ISOGI_INVALID &&
+              isogi_vol_normals(NULL, &hit, 1, ISOGI_NORMAL_SMOOTH, vector) == ISOGI_INVALID,
+          "normals");
+    CHECK(isogi_vol_sample(p, NULL, 1, NULL, NULL) == ISOGI_INVALID &&
+              isogi_vol_sample_smooth(NULL, (const float(*)[3])vector, 1, NULL, NULL) == ISOGI_INVALID,
+          "sample");
     CHECK(isogi_vol_sample(p, (const float(*)[3])vector, 1, NULL, NULL) == ISOGI_OK, "nothing asked for");
-    CHECK(isogi_vol_box_range(NULL, at, at, range[0]) == ISOGI_INVALID && isogi_vol_box_range(p, NULL, at, range[0]) == ISOGI_INVALID, "box");
+    CHECK(isogi_vol_box_range(NULL, at, at, range[0]) == ISOGI_INVALID && isogi_vol_box_range(p, NULL, at, range[0]) == ISOGI_INVALID,
+          "box");
     CHECK(!isogi_vol_may_hold(NULL, at, at, (const double(*)[2])range, 1) && !isogi_vol_may_hold(p, at, at, NULL, 1), "box");
-    CHECK(!isogi_vol_next_interval(NULL, &ray, (const double(*)[2])range, 1, 0, range[0], NULL) && !isogi_vol_next_interval(p, NULL, NULL, 1, 0, NULL, NULL), "interval");
-    CHECK(isogi_vol_mesh(p, NULL, &mesh) == ISOGI_INVALID && isogi_vol_mesh(p, &desc, NULL) == ISOGI_INVALID && isogi_vol_mesh(NULL, &desc, &mesh) == ISOGI_INVALID, "mesh");
+    CHECK(!isogi_vol_next_interval(NULL, &ray, (const double(*)[2])range, 1, 0, range[0], NULL) &&
+              !isogi_vol_next_interval(p, NULL, NULL, 1, 0, NULL, NULL),
+          "interval");
+    CHECK(isogi_vol_mesh(p, NULL, &mesh) == ISOGI_INVALID && isogi_vol_mesh(p, &desc, NULL) == ISOGI_INVALID &&
+              isogi_vol_mesh(NULL, &desc, &mesh) == ISOGI_INVALID,
+          "mesh");
     isogi_vol_mesh_free(NULL, NULL), isogi_vol_free(NULL);
     isogi_vol_free(p);
 }

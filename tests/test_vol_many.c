@@ -13,7 +13,8 @@ enum { SOME = 2048, KINDS = 6, TURNS = 8 };
 /* Paths in turn, the fast ones more often. */
 static const int paths[TURNS] = {0, 2, 4, 0, 3, 4, 1, 4};
 
-static const char *const kinds[KINDS] = {"noise", "waves", "bytes between levels", "bytes at levels", "smooth bytes at levels", "smooth bytes between levels"};
+static const char *const kinds[KINDS] = {
+    "noise", "waves", "bytes between levels", "bytes at levels", "smooth bytes at levels", "smooth bytes between levels"};
 
 static double number_from(const char *name, double otherwise) {
     const char *text = getenv(name);
@@ -43,7 +44,8 @@ typedef struct crowd {
 /* A scene of one kind with a pyramid on one path; *isovalue: one to start from, *step: distance of levels, 0 if there are none. */
 static scene crowd_scene(int kind, int closed, int path, isogi_pyramid **pyramid, test_random *r) {
     const int large = kind == 1 || kind >= 4, n = large ? 24 : 9;
-    scene s = scene_new(3 + (int)(random_bits(r) % (uint64_t)n), 3 + (int)(random_bits(r) % (uint64_t)n), 3 + (int)(random_bits(r) % (uint64_t)n));
+    scene s = scene_new(3 + (int)(random_bits(r) % (uint64_t)n), 3 + (int)(random_bits(r) % (uint64_t)n),
+                        3 + (int)(random_bits(r) % (uint64_t)n));
     const isogi_context context = {.threads = 1, .force_path = path};
     double wave[3][4];
     for (int w = 0; w < 3; w++)
@@ -155,7 +157,8 @@ static quick_truth quick_intersect(const scene *s, const isogi_ray *ray, double 
             inside = below == 0;
         } else {
             for (int a = 0; a < 3; a++) {
-                from[a] = fmin(fmax(ray->origin[a] + t * d[a] - cell[a], 0), 1), to[a] = fmin(fmax(ray->origin[a] + out * d[a] - cell[a], 0), 1);
+                from[a] = fmin(fmax(ray->origin[a] + t * d[a] - cell[a], 0), 1),
+                to[a] = fmin(fmax(ray->origin[a] + out * d[a] - cell[a], 0), 1);
             }
             changed = quick_cell(c, from, to, axis < 0 ? -1 : face_side(c, axis, d[axis] > 0), tolerance, &inside);
             if (changed < 0) truth.decided = 0;
@@ -172,9 +175,10 @@ static quick_truth quick_intersect(const scene *s, const isogi_ray *ray, double 
 
 static void note(account *a, const char *what, const scene *s, int kind, int path, const isogi_ray *ray, const isogi_hit *hit, int truth) {
     if (a->first[0]) return;
-    snprintf(a->first, sizeof a->first, "%s: %s, path %d, size %d %d %d, origin %.17g %.17g %.17g dir %.9g %.9g %.9g isovalue %.17g: side %d at %.17g, reference %d",
-             what, kinds[kind], path, s->size[0], s->size[1], s->size[2], ray->origin[0], ray->origin[1], ray->origin[2], (double)ray->dir[0],
-             (double)ray->dir[1], (double)ray->dir[2], ray->isovalue, hit->side, hit->t, truth);
+    snprintf(a->first, sizeof a->first,
+             "%s: %s, path %d, size %d %d %d, origin %.17g %.17g %.17g dir %.9g %.9g %.9g isovalue %.17g: side %d at %.17g, reference %d",
+             what, kinds[kind], path, s->size[0], s->size[1], s->size[2], ray->origin[0], ray->origin[1], ray->origin[2],
+             (double)ray->dir[0], (double)ray->dir[1], (double)ray->dir[2], ray->isovalue, hit->side, hit->t, truth);
 }
 
 static void compare_task(void *arg, size_t i) {
@@ -216,8 +220,8 @@ static void compare_task(void *arg, size_t i) {
                 const int cell[3] = {(int)hits[k].cell[0], (int)hits[k].cell[1], (int)hits[k].cell[2]};
                 for (int n = 0; n < 8; n++) {
                     corner[n] = s.value[cell[0] + (n & 1) + s.size[0] * (cell[1] + (n >> 1 & 1) + s.size[1] * (cell[2] + (n >> 2)))];
-                    value += corner[n] * (n & 1 ? hits[k].local[0] : 1 - hits[k].local[0]) * (n & 2 ? hits[k].local[1] : 1 - hits[k].local[1]) *
-                             (n & 4 ? hits[k].local[2] : 1 - hits[k].local[2]);
+                    value += corner[n] * (n & 1 ? hits[k].local[0] : 1 - hits[k].local[0]) *
+                             (n & 2 ? hits[k].local[1] : 1 - hits[k].local[1]) * (n & 4 ? hits[k].local[2] : 1 - hits[k].local[2]);
                 }
                 if (fabs(value) > 100 * tolerance) a->misplaced++, note(a, "place", &s, kind, path, &rays[k], &hits[k], truth.side);
             }
@@ -256,7 +260,8 @@ static void escape_task(void *arg, size_t i) {
         for (int k = 0; k < SOME; k++) {
             const int at = inside[random_bits(&r) % (uint64_t)count];
             memset(&rays[k], 0, sizeof rays[k]);
-            rays[k].origin[0] = at % s.size[0], rays[k].origin[1] = at / s.size[0] % s.size[1], rays[k].origin[2] = at / s.size[0] / s.size[1];
+            rays[k].origin[0] = at % s.size[0], rays[k].origin[1] = at / s.size[0] % s.size[1],
+            rays[k].origin[2] = at / s.size[0] / s.size[1];
             memcpy(rays[k].dir, dirs[k], sizeof dirs[k]);
             rays[k].isovalue = isovalue;
         }
@@ -271,7 +276,8 @@ static void escape_task(void *arg, size_t i) {
             for (int k = 0; k < SOME; k++) {
                 const int before = starts[k].side, now = hits[k].side;
                 a->rays += before != 0;
-                if ((before == 1 && now != -1) || (before == -1 && now != 1 && now != 0)) a->wrong++, note(a, "escaped", &s, kind, path, &rays[k], &hits[k], -before);
+                if ((before == 1 && now != -1) || (before == -1 && now != 1 && now != 0))
+                    a->wrong++, note(a, "escaped", &s, kind, path, &rays[k], &hits[k], -before);
                 if (before == 0) hits[k].side = 0;
             }
         }
@@ -292,7 +298,8 @@ static account crowd_run(void (*task)(void *, size_t), double quick, double rays
     isogi_parallel(NULL, tasks, task, &c, 0, 1);
     for (size_t i = 0; i < tasks; i++) {
         const account *a = &c.task[i];
-        sum.rays += a->rays, sum.hits += a->hits, sum.wide += a->wide, sum.undecided += a->undecided, sum.wrong += a->wrong, sum.misplaced += a->misplaced;
+        sum.rays += a->rays, sum.hits += a->hits, sum.wide += a->wide, sum.undecided += a->undecided, sum.wrong += a->wrong,
+            sum.misplaced += a->misplaced;
         if (a->first[0] && !sum.first[0]) memcpy(sum.first, a->first, sizeof sum.first);
     }
     free(c.task);
@@ -331,7 +338,9 @@ TEST(very_many_rays_hit_like_the_reference) {
     const account sum = crowd_run(compare_task, 150000, 1e8, 12.0 * SOME);
     printf("    %ld hits, %ld looked at in %d bits, %ld undecided\n", sum.hits, sum.wide, WIDE_BITS, sum.undecided);
     CHECK(sum.wrong == 0 && sum.misplaced == 0, "%ld wrong, %ld misplaced; %s", sum.wrong, sum.misplaced, sum.first);
-    CHECK(sum.undecided * 50 < sum.rays && sum.hits * 4 > sum.rays && sum.rays > (LONG_SUITE && !getenv("ISOGI_TEST_RAYS") ? 1000000 : 100000), "%ld undecided, %ld hits of %ld rays", sum.undecided, sum.hits, sum.rays);
+    CHECK(sum.undecided * 50 < sum.rays && sum.hits * 4 > sum.rays &&
+              sum.rays > (LONG_SUITE && !getenv("ISOGI_TEST_RAYS") ? 1000000 : 100000),
+          "%ld undecided, %ld hits of %ld rays", sum.undecided, sum.hits, sum.rays);
 }
 
 TEST(nothing_escapes_from_very_many_closed_surfaces) {

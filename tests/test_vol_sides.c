@@ -237,7 +237,8 @@ TEST(caps_are_where_closed_meshes_have_a_border) {
                     const float *at = mesh.positions[mesh.triangles[k][c]];
                     on &= (double)at[0] > nx - 1 - 1e-3, q[c][0] = (double)at[1] - y, q[c][1] = (double)at[2] - z;
                 }
-                for (int c = 0, next = 1; c < 3 && on; c++, next = (c + 1) % 3) turn += q[c][0] * q[next][1] - q[c][1] * q[next][0] > 0 ? 1 : -1;
+                for (int c = 0, next = 1; c < 3 && on; c++, next = (c + 1) % 3)
+                    turn += q[c][0] * q[next][1] - q[c][1] * q[next][0] > 0 ? 1 : -1;
                 cover += turn == 3 || turn == -3;
             }
             const int capped = hit.side == (inwards ? 2 : -2) && hit.cell[0] == (uint32_t)nx - 2;
@@ -338,7 +339,9 @@ TEST(huge_and_tiny_values_change_no_hit) {
         value[i] = (float)(sin(x) * cos(y) + sin(y) * cos(z) + sin(z) * cos(x));
     }
     for (int i = 0; i < RAYS; i++)
-        for (int a = 0; a < 3; a++) rays[i].dir[a] = (float)random_range(&r, -0.5, 0.5), rays[i].origin[a] = random_range(&r, 0, N - 1) - 80 * (double)rays[i].dir[a];
+        for (int a = 0; a < 3; a++)
+            rays[i].dir[a] = (float)random_range(&r, -0.5, 0.5),
+            rays[i].origin[a] = random_range(&r, 0, N - 1) - 80 * (double)rays[i].dir[a];
     for (int path = 0; path < PATHS; path++)
         for (int k = 0; k < 5; k++) {
             const isogi_volume volume = {.data = value, .type = ISOGI_F32, .size = {N, N, N}, .scale = scales[k]};
@@ -346,10 +349,12 @@ TEST(huge_and_tiny_values_change_no_hit) {
             isogi_vol_intersect_all(p, rays, RAYS, MOST, hits, counts, NULL);
             for (int i = 0; i < RAYS; i++) {
                 if (!k && !path) first[i] = counts[i], all += (long)counts[i];
-                CHECK(counts[i] == first[i], "scale %g, path %d, ray %d: %d hits, not %d", scales[k], path, i, (int)counts[i], (int)first[i]);
+                CHECK(counts[i] == first[i], "scale %g, path %d, ray %d: %d hits, not %d", scales[k], path, i, (int)counts[i],
+                      (int)first[i]);
                 isogi_hit hit = hits[(size_t)i * MOST];
                 size_t found = 0;
-                for (; counts[i] && hit.side && found < MOST; found++) isogi_vol_continue(p, &hit, (const float(*)[3])&rays[i].dir, NULL, 0, 0, 1, &hit, NULL);
+                for (; counts[i] && hit.side && found < MOST; found++)
+                    isogi_vol_continue(p, &hit, (const float(*)[3]) & rays[i].dir, NULL, 0, 0, 1, &hit, NULL);
                 CHECK(found == first[i], "scale %g, path %d, ray %d: %d continued, not %d", scales[k], path, i, (int)found, (int)first[i]);
             }
             isogi_vol_free(p);
@@ -396,15 +401,18 @@ TEST(packets_of_long_volumes_agree) {
             origin[axis] = down ? LONG + 5 : -5, dir[axis] = down ? -1 : 1;
             for (int k = i; k < i + 16; k++) {
                 memset(&rays[k], 0, sizeof rays[k]), rays[k].isovalue = 0.5;
-                for (int a = 0; a < 3; a++) rays[k].origin[a] = origin[a] + random_range(&r, -0.1, 0.1), rays[k].dir[a] = (float)(dir[a] + random_range(&r, -1e-5, 1e-5));
+                for (int a = 0; a < 3; a++)
+                    rays[k].origin[a] = origin[a] + random_range(&r, -0.1, 0.1),
+                    rays[k].dir[a] = (float)(dir[a] + random_range(&r, -1e-5, 1e-5));
             }
         }
         for (int way = 0; way < 2; way++)
             for (int i = 0; i < RAYS; i += 16) isogi_vol_intersect(p[way], rays + i, 16, hits[way] + i, NULL);
         for (int i = 0; i < RAYS; i++) {
             found += hits[0][i].side != 0;
-            CHECK(hits[0][i].side == hits[1][i].side && fabs(hits[0][i].t - hits[1][i].t) < 1e-9, "axis %d, ray %d: side %d at %.12g, not %d at %.12g", axis, i, hits[1][i].side, hits[1][i].t,
-                  hits[0][i].side, hits[0][i].t);
+            CHECK(hits[0][i].side == hits[1][i].side && fabs(hits[0][i].t - hits[1][i].t) < 1e-9,
+                  "axis %d, ray %d: side %d at %.12g, not %d at %.12g", axis, i, hits[1][i].side, hits[1][i].t, hits[0][i].side,
+                  hits[0][i].t);
         }
         CHECK(found > RAYS / 4, "axis %d: %ld hits", axis, found);
         isogi_vol_free(p[0]), isogi_vol_free(p[1]);

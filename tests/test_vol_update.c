@@ -48,9 +48,12 @@ TEST(all_paths_build_the_same_bits) {
             const size_t *size = sizes[n % 4], voxels = size[0] * size[1] * size[2], step = n < 4 ? 1 : 2;
             const ptrdiff_t bytes = (ptrdiff_t)(step * type_bytes((isogi_type)type)), x = (ptrdiff_t)size[0], y = (ptrdiff_t)size[1];
             void *raw = calloc(voxels * step, 8);
-            isogi_volume v = {.data = raw, .type = (isogi_type)type, .size = {size[0], size[1], size[2]}, .stride = {bytes, bytes * x, bytes * x * y}, .scale = 0.3, .bias = -5};
+            isogi_volume v = {.data = raw, .type = (isogi_type)type, .size = {size[0], size[1], size[2]},
+                .stride = {bytes, bytes * x, bytes * x * y}, .scale = 0.3, .bias = -5};
             isogi_pyramid *p[2] = {NULL, NULL};
-            for (size_t i = 0; i < voxels * step; i++) store(raw, (isogi_type)type, i, n % 4 == 3 && type >= ISOGI_F32 && !(random_bits(&r) % 400) ? (double)NAN : floor(random_range(&r, -120, 250)));
+            for (size_t i = 0; i < voxels * step; i++)
+                store(raw, (isogi_type)type, i,
+                      n % 4 == 3 && type >= ISOGI_F32 && !(random_bits(&r) % 400) ? (double)NAN : floor(random_range(&r, -120, 250)));
             for (int path = 2; path < 6; path++) {
                 const isogi_context context = {.threads = 1, .force_path = path % 5};
                 CHECK(isogi_vol_build(&p[path > 2], &v, &context) == ISOGI_OK, "build");
@@ -93,7 +96,8 @@ static void check_updates(isogi_type type, double scale, double bias, int shape,
                 for (size_t x = first[0]; x <= last[0] && x < size[0]; x++) {
                     size_t i = x + size[0] * (y + size[1] * z), bytes = type_bytes(type);
                     if (kind == 0) store(raw, type, i, floor(random_range(r, 30, 90)));
-                    else if (kind == 5 || (kind == 4 && type < ISOGI_F32 && type != ISOGI_U16)) memcpy((char *)raw + bytes * i, (char *)base + bytes * i, bytes);
+                    else if (kind == 5 || (kind == 4 && type < ISOGI_F32 && type != ISOGI_U16))
+                        memcpy((char *)raw + bytes * i, (char *)base + bytes * i, bytes);
                     else if (kind != 4 || random_bits(r) % 4 == 0) store(raw, type, i, level);
                 }
         CHECK(isogi_vol_update(updated, first, last, &counters) == ISOGI_OK, "update");
@@ -101,8 +105,10 @@ static void check_updates(isogi_type type, double scale, double bias, int shape,
         CHECK(same_pyramid(updated, fresh), "type %d, shape %d, turn %d, kind %d: not as built anew", (int)type, shape, turn, kind);
         /* where an extreme was painted over and is found again elsewhere, it takes a look at one block for each; but values that are
            one number as a float and many as a double are all looked at */
-        int stays = range[0] <= fresh->range[0] && range[0] >= fresh->range[0] && range[1] <= fresh->range[1] && range[1] >= fresh->range[1];
-        CHECK(counters.blocks >= 1 && (counters.blocks <= blocks + 2 || !stays || type == ISOGI_F64), "%d blocks read for a box of %d", (int)counters.blocks, (int)blocks);
+        int stays =
+            range[0] <= fresh->range[0] && range[0] >= fresh->range[0] && range[1] <= fresh->range[1] && range[1] >= fresh->range[1];
+        CHECK(counters.blocks >= 1 && (counters.blocks <= blocks + 2 || !stays || type == ISOGI_F64), "%d blocks read for a box of %d",
+              (int)counters.blocks, (int)blocks);
         isogi_vol_free(fresh);
     }
     isogi_vol_free(updated);

@@ -96,10 +96,12 @@ TEST(rays_look_at_few_nodes_and_cells_and_solve_hardly_more_cubics_than_hits) {
                 long different = 0, found = 0;
                 const int filtered = path == 4 && done[4].cubics < done[3].cubics; /* AVX-512 is there */
                 for (int i = 0; i < RAYS; i++) different += hits[path][i].side != hits[2][i].side, found += hits[path][i].side != 0;
-                printf("    %s, %s, path %d: %.2f hits, %.2f blocks, %.2f cells, %.3f cubics per ray\n", gyroid ? "gyroid" : "Marschner-Lobb",
-                       surface ? "surface" : "primary", path, (double)found / RAYS, done[path].blocks, done[path].cells, done[path].cubics);
+                printf("    %s, %s, path %d: %.2f hits, %.2f blocks, %.2f cells, %.3f cubics per ray\n",
+                       gyroid ? "gyroid" : "Marschner-Lobb", surface ? "surface" : "primary", path, (double)found / RAYS, done[path].blocks,
+                       done[path].cells, done[path].cubics);
                 CHECK(!different, "path %d: %ld hits differ", path, different);
-                CHECK(done[path].blocks < bound->blocks && done[path].cells < bound->cells, "path %d: %g blocks, %g cells", path, done[path].blocks, done[path].cells);
+                CHECK(done[path].blocks < bound->blocks && done[path].cells < bound->cells, "path %d: %g blocks, %g cells", path,
+                      done[path].blocks, done[path].cells);
                 CHECK(done[path].cubics < (filtered ? bound->cubics : bound->cells), "path %d: %g cubics", path, done[path].cubics);
             }
         }
@@ -131,8 +133,10 @@ TEST(batches_of_any_size_give_the_same_bits) {
     for (size_t k = 0; k < sizeof sizes / sizeof *sizes; k++) {
         work done = count_work(p, rays, sizes[k], parts);
         long wrong = 0, wrong_any = 0;
-        for (size_t i = 0; i < RAYS; i += sizes[k]) isogi_vol_occluded(p, rays + i, RAYS - i < sizes[k] ? RAYS - i : sizes[k], occluded + i, NULL);
-        for (int i = 0; i < RAYS; i++) wrong += memcmp(&whole[i], &parts[i], sizeof *whole) != 0, wrong_any += occluded[i] != (whole[i].side != 0);
+        for (size_t i = 0; i < RAYS; i += sizes[k])
+            isogi_vol_occluded(p, rays + i, RAYS - i < sizes[k] ? RAYS - i : sizes[k], occluded + i, NULL);
+        for (int i = 0; i < RAYS; i++)
+            wrong += memcmp(&whole[i], &parts[i], sizeof *whole) != 0, wrong_any += occluded[i] != (whole[i].side != 0);
         CHECK(!wrong && !wrong_any, "batches of %zu: %ld hits differ, %ld occlusions", sizes[k], wrong, wrong_any);
         CHECK(fabs(done.blocks - all.blocks) < 1e-9 && fabs(done.cells - all.cells) < 1e-9 && fabs(done.cubics - all.cubics) < 1e-9,
               "batches of %zu: %g, %g blocks", sizes[k], done.blocks, all.blocks);
@@ -167,8 +171,10 @@ TEST(rays_side_by_side_hit_what_they_hit_alone) {
         }
         float *data = (float *)malloc(voxels * sizeof *data);
         for (size_t i = 0; i < voxels; i++) {
-            const double x = (double)(i % volume.size[0]), y = (double)(i / volume.size[0] % volume.size[1]), z = (double)(i / volume.size[0] / volume.size[1]);
-            const double v = smooth ? sin(0.4 * smooth * x + 1) + cos(0.37 * smooth * y + turn) * sin(0.3 * smooth * z) : random_range(&r, -1, 1);
+            const double x = (double)(i % volume.size[0]), y = (double)(i / volume.size[0] % volume.size[1]),
+                         z = (double)(i / volume.size[0] / volume.size[1]);
+            const double v =
+                smooth ? sin(0.4 * smooth * x + 1) + cos(0.37 * smooth * y + turn) * sin(0.3 * smooth * z) : random_range(&r, -1, 1);
             data[i] = (float)(levels ? floor(4 * v) / 4 : v);
         }
         volume.data = data;
@@ -180,9 +186,12 @@ TEST(rays_side_by_side_hit_what_they_hit_alone) {
             isogi_hit together[MOST], alone[MOST], other[MOST];
             uint8_t any[MOST];
             const int count = pack % 3 ? 16 : 8 + (int)(random_bits(&r) % (MOST - 8)), grid = pack % 6 == 1, axial = pack % 8 == 2;
-            const double spread = pow(10, random_range(&r, -6, -1.2)), isovalue = levels ? floor(random_range(&r, -3, 3)) / 4 : random_range(&r, -0.7, 0.7);
+            const double spread = pow(10, random_range(&r, -6, -1.2)),
+                         isovalue = levels ? floor(random_range(&r, -3, 3)) / 4 : random_range(&r, -0.7, 0.7);
             double target[3], way[3];
-            for (int a = 0; a < 3; a++) target[a] = random_range(&r, 0, 1) * (double)(volume.size[a] - 1), way[a] = axial && a != pack % 3 ? 0 : random_range(&r, -1, 1);
+            for (int a = 0; a < 3; a++)
+                target[a] = random_range(&r, 0, 1) * (double)(volume.size[a] - 1),
+                way[a] = axial && a != pack % 3 ? 0 : random_range(&r, -1, 1);
             if (grid)
                 for (int a = 0; a < 3; a++) target[a] = floor(target[a]), way[a] = floor(3 * way[a]);
             if (fabs(way[0]) + fabs(way[1]) + fabs(way[2]) < 0.1) way[1] = 1;
@@ -191,9 +200,11 @@ TEST(rays_side_by_side_hit_what_they_hit_alone) {
                 for (int a = 0; a < 3; a++) {
                     const double d = way[a] + (axial || grid ? 0 : spread * random_range(&r, -1, 1)), back = pack % 4 == 3 ? 0.5 : 60;
                     rays[i].dir[a] = (float)(d * volume.spacing[a]);
-                    rays[i].origin[a] = (target[a] + (grid && i % 2 ? 0 : spread * random_range(&r, -1, 1)) - back * way[a]) * volume.spacing[a];
+                    rays[i].origin[a] =
+                        (target[a] + (grid && i % 2 ? 0 : spread * random_range(&r, -1, 1)) - back * way[a]) * volume.spacing[a];
                 }
-                rays[i].isovalue = pack % 11 == 7 && i == 9 ? isovalue + 0.125 : isovalue, rays[i].tmax = pack % 5 == 4 ? random_range(&r, 50, 70) : 0;
+                rays[i].isovalue = pack % 11 == 7 && i == 9 ? isovalue + 0.125 : isovalue,
+                rays[i].tmax = pack % 5 == 4 ? random_range(&r, 50, 70) : 0;
                 rays[i].flags = pack % 7 == 6 && i % 5 == 2 ? ISOGI_RAY_CAPPED : 0;
             }
             memset(together, 0, sizeof together), memset(alone, 0, sizeof alone), memset(other, 0, sizeof other);
@@ -211,7 +222,8 @@ TEST(rays_side_by_side_hit_what_they_hit_alone) {
     }
     CHECK(hits > 1000 && spread_out, "%ld hits", hits);
     /* a ray that begins in a face, within rounding, in matter that is the isovalue all over, may be seen on either side */
-    CHECK(!wrong && !wrong_any && wrong_plain * 2000000 <= hits, "%ld of %ld hits differ, %ld occlusions, %ld from the plain path", wrong, hits, wrong_any, wrong_plain);
+    CHECK(!wrong && !wrong_any && wrong_plain * 2000000 <= hits, "%ld of %ld hits differ, %ld occlusions, %ld from the plain path", wrong,
+          hits, wrong_any, wrong_plain);
 }
 
 TEST_MAIN("vol_work")

@@ -62,8 +62,8 @@ static inline int bake_integer(const char *text, double low, double high, int *o
 
 /* The option at argv[*i], if it is one of those above: 1, and *i on its value. 0: it is not. -1: its value is not allowed. */
 static inline int bake_scene_option(bake_scene *s, int argc, char **argv, int *i) {
-    static const char *const names[13] = {"--out", "--mode", "--isovalues", "--spacing", "--env", "--light", "--albedo", "--bounces", "--samples",
-                                          "--lattice", "--storage", "--save-every", "--threads"};
+    static const char *const names[13] = {"--out",     "--mode",    "--isovalues", "--spacing", "--env",        "--light",  "--albedo",
+                                          "--bounces", "--samples", "--lattice",   "--storage", "--save-every", "--threads"};
     static const char *const modes[2] = {"irradiance", "transfer"};
     isogi_trace_desc *d = &s->desc;
     const char *text;
@@ -83,7 +83,8 @@ static inline int bake_scene_option(bake_scene *s, int argc, char **argv, int *i
         break;
     case 3: ok = numbers(text, ',', 3, 1e-9, 1e9, s->spacing); break;
     case 4: ok = hdr_read(text, &s->env, s->error); if (!ok) return -1; break;
-    case 5: ok = d->lighting.light_count < BAKE_LIGHTS && light_parse(text, &s->lights[d->lighting.light_count]), d->lighting.light_count += (size_t)ok; break;
+    case 5: ok = d->lighting.light_count < BAKE_LIGHTS && light_parse(text, &s->lights[d->lighting.light_count]),
+        d->lighting.light_count += (size_t)ok; break;
     case 6: ok = numbers(text, ',', 3, 0, 1, x); for (k = 0; ok && k < 3; k++) d->albedo[k] = (float)x[k]; break;
     case 7: ok = bake_integer(text, -1, 1000, &d->bounces); break;
     case 8: ok = bake_integer(text, 1, 1 << 24, &d->samples); break;
@@ -105,7 +106,8 @@ static inline int bake_scene_make(bake_scene *s) {
     size_t length;
     if (!s->volume_name || !s->out) return file_fail(s->error, "VOLUME and --out are needed; --help explains");
     if (s->desc.mode == ISOGI_TRACE_TRANSFER && (s->env.rgb || l->light_count))
-        return file_fail(s->error, "%s: --mode transfer bakes for any light, which is given when the texture is relit", s->env.rgb ? "--env" : "--light");
+        return file_fail(s->error, "%s: --mode transfer bakes for any light, which is given when the texture is relit",
+                         s->env.rgb ? "--env" : "--light");
     if (s->desc.mode == ISOGI_TRACE_TRANSFER && s->desc.storage == ISOGI_TRACE_RGB9E5)
         return file_fail(s->error, "--storage: rgb9e5 holds colours, not the coefficients of --mode transfer");
     if (!strncmp(s->volume_name, "procedural:", 11)) {
@@ -163,7 +165,9 @@ static inline void bake_say(bake_clock *c, double done) {
     double now = bake_seconds(), left = done > 0 ? (now - c->begun) * (1 - done) / done : 0;
     if (now - c->said < (terminal ? 0.1 : 5)) return;
     c->said = now;
-    if (terminal) fprintf(stderr, "\r[%.*s%.*s] %3.0f %%, %.0f s left \033[K", filled, "##############################", 30 - filled, "..............................", 100 * done, left);
+    if (terminal)
+        fprintf(stderr, "\r[%.*s%.*s] %3.0f %%, %.0f s left \033[K", filled, "##############################", 30 - filled,
+                "..............................", 100 * done, left);
     else fprintf(stderr, "%.0f %%, %.0f s left\n", 100 * done, left);
 }
 

@@ -48,7 +48,8 @@ static inline void rotation_apply(const double m[9], const double v[3], double o
 }
 
 /* fov: vertical, in degrees. An eye straight above or below gets an arbitrary but valid right hand. */
-static inline void camera_look(camera *c, int width, int height, const double eye[3], const double target[3], const double up[3], double fov) {
+static inline void camera_look(camera *c, int width, int height, const double eye[3], const double target[3], const double up[3],
+                               double fov) {
     int i;
     c->width = width, c->height = height;
     for (i = 0; i < 3; i++) c->eye[i] = eye[i], c->target[i] = target[i], c->forward[i] = target[i] - eye[i];

@@ -179,7 +179,8 @@ static double procedural_engine_case(double x, double y, double z) {
     d = procedural_carve(d, procedural_cylinder(radial, x, 13, 90, 0), 2);
     {
         double angle = atan2(y + 34, z + 10), step = PROCEDURAL_PI / 3, a = angle - step * floor(angle / step + 0.5);
-        d = procedural_carve(d, procedural_cylinder(procedural_length(radial * cos(a) - 17, radial * sin(a)), fabs(x) - 73, 1.7, 7, 0), 0.7);
+        d = procedural_carve(d, procedural_cylinder(procedural_length(radial * cos(a) - 17, radial * sin(a)), fabs(x) - 73, 1.7, 7, 0),
+                             0.7);
     }
     {
         double pitch = 22, row = x - pitch * floor(x / pitch + 0.5);
@@ -285,7 +286,8 @@ static double procedural_skull_face(double x, double y, double z, double cranium
     d = procedural_carve(d, hollows, 0.04);
     d = procedural_blend(d, procedural_capsule(p, bridge, tip, 0.06, 0.035), 0.06);
     d = procedural_blend(d, procedural_capsule(p, process, foot, 0.045, 0.055), 0.06); /* the nose's walls, between the sockets */
-    nose = procedural_blend(procedural_ellipsoid(side - 0.045, y + 0.25, z - 0.75, 0.05, 0.07, 0.25), procedural_ellipsoid(x, y + 0.16, z - 0.72, 0.04, 0.11, 0.2), 0.06);
+    nose = procedural_blend(procedural_ellipsoid(side - 0.045, y + 0.25, z - 0.75, 0.05, 0.07, 0.25),
+                            procedural_ellipsoid(x, y + 0.16, z - 0.72, 0.04, 0.11, 0.2), 0.06);
     d = procedural_carve(d, nose, 0.03);
     d = procedural_carve(d, procedural_ellipsoid(x, y + 0.58, z - 0.36, 0.15, 0.14, 0.22), 0.04); /* palate */
     return procedural_blend(d, procedural_skull_teeth(x, y, z, -0.525), 0.012);

@@ -132,7 +132,8 @@ static inline int raster_kept(const raster_job *job, double x, double y, double 
     camera_direction(job->view, x + job->x_offset, y + job->y_offset, d);
     for (i = 0; i < job->clip_count; i++) {
         const double *plane = job->clip[i];
-        if (!(plane[0] * (eye[0] + d[0] / inverse) + plane[1] * (eye[1] + d[1] / inverse) + plane[2] * (eye[2] + d[2] / inverse) + plane[3] >= 0)) return 0;
+        double side = plane[0] * (eye[0] + d[0] / inverse) + plane[1] * (eye[1] + d[1] / inverse) + plane[2] * (eye[2] + d[2] / inverse);
+        if (!(side + plane[3] >= 0)) return 0;
     }
     return 1;
 }
@@ -203,7 +204,8 @@ static inline void raster_band_task(void *arg, size_t band) {
     size_t chunk, i, pixel, width = (size_t)job->view->width;
     int row0 = (int)band * RASTER_BAND, row1 = row0 + RASTER_BAND - 1, k;
     if (row1 >= job->view->height) row1 = job->view->height - 1;
-    for (pixel = (size_t)row0 * width; pixel < ((size_t)row1 + 1) * width; pixel++) job->inverse[pixel] = 0, job->triangle[pixel] = RASTER_NONE;
+    for (pixel = (size_t)row0 * width; pixel < ((size_t)row1 + 1) * width; pixel++)
+        job->inverse[pixel] = 0, job->triangle[pixel] = RASTER_NONE;
     for (chunk = 0; chunk < job->chunks; chunk++) {
         size_t cell = chunk * job->bands + band, begin = cell ? job->start[cell - 1] : 0;
         for (i = begin; i < job->start[cell]; i++) {
@@ -222,8 +224,9 @@ static inline void raster_band_task(void *arg, size_t band) {
 }
 
 /* inverse[height*width]: 1 / depth of what is seen, 0 = nothing; triangle: its number, or RASTER_NONE. */
-static inline isogi_result raster_draw(const isogi_mesh *mesh, const camera *view, double x_offset, double y_offset, const double (*clip)[4],
-                                       size_t clip_count, double near_plane, float *inverse, uint32_t *triangle, const isogi_context *context) {
+static inline isogi_result raster_draw(const isogi_mesh *mesh, const camera *view, double x_offset, double y_offset,
+                                       const double (*clip)[4], size_t clip_count, double near_plane, float *inverse, uint32_t *triangle,
+                                       const isogi_context *context) {
     raster_job job;
     isogi_result result = ISOGI_NO_MEMORY;
     size_t i, total = 0, cells;

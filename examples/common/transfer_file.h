@@ -47,11 +47,14 @@ static inline int transfer_line(transfer_file *t, const char *line, int number, 
     peak = !strncmp(line, "peak", 4) && (line[4] == ' ' || line[4] == '\t');
     if (!transfer_numbers(peak ? line + 5 : line, x))
         return file_fail(error, "line %d is not \"value extinction r g b\" or \"peak value opacity r g b\"", number);
-    if (x[1] < 0 || x[1] > 1e30 || (peak && x[1] > 1)) return file_fail(error, "line %d: %s", number, peak ? "an opacity is 0 to 1" : "an extinction is 0 to 1e30");
+    if (x[1] < 0 || x[1] > 1e30 || (peak && x[1] > 1))
+        return file_fail(error, "line %d: %s", number, peak ? "an opacity is 0 to 1" : "an extinction is 0 to 1e30");
     for (i = 2; i < 5; i++)
         if (x[i] < 0 || x[i] > 1) return file_fail(error, "line %d: a colour is 0 to 1", number);
-    if (!peak && t->point_count && x[0] < t->points[t->point_count - 1].value) return file_fail(error, "line %d: values must ascend", number);
-    if (t->point_count >= TRANSFER_FILE_LIMIT && !peak) return file_fail(error, "line %d: more than %d points", number, TRANSFER_FILE_LIMIT);
+    if (!peak && t->point_count && x[0] < t->points[t->point_count - 1].value)
+        return file_fail(error, "line %d: values must ascend", number);
+    if (t->point_count >= TRANSFER_FILE_LIMIT && !peak)
+        return file_fail(error, "line %d: more than %d points", number, TRANSFER_FILE_LIMIT);
     if (t->peak_count >= ISOGI_DVR_MAX_PEAKS && peak) return file_fail(error, "line %d: more than %d peaks", number, ISOGI_DVR_MAX_PEAKS);
     if (peak) {
         isogi_peak *p = &t->peaks[t->peak_count++];
