@@ -86,8 +86,8 @@
      probe: a point near by on the same isosurface or one that runs closely beside it (up to .15 voxels by the gradient), in cells of
      2 voxels (of the smallest spacing, but half a voxel along every axis at least) or an eighth of the ray's length, whose own
      hemisphere is gathered once in the same way; passes over the probes then bring all reflections without rays. What
-     cosine-distributed rays brought is averaged over neighbouring texels that face the same way, as far as their noise could explain
-     the difference. Probes cost accuracy: less than 0.1 % of the mean and 1.5 % at a point in narrow channels of
+     the sky and reflections bring is averaged over neighbouring texels that face the same way, as far as their noise could explain the
+     difference; lights are not, so that their shadows stay sharp. Probes cost accuracy: less than 0.1 % of the mean and 1.5 % at a point in narrow channels of
      albedo 0.8 (test_trace_bake --long prints it). Lazy and adaptive bakes take samples in blocks of 4, 16, 64, ... and every other texel
      along each axis first: soon every lookup has a value.
      A hit from within (only through an open border can a ray get there) is a surface too, with its normal turned.
@@ -446,6 +446,7 @@ ISOGI_API size_t isogi_trace_memory(const isogi_trace *trace); /* bytes that the
 #define ISOGI_TRACE__ALIKE 0.15     /* voxels between the isosurfaces of a hit and its probe, by the gradient there */
 #define ISOGI_TRACE__CLASS 1.2      /* the same for isovalues that are looked for together, by the range of values around */
 #define ISOGI_TRACE__COLOURS 0.05   /* of albedo, or share of the glow, by which isosurfaces of the same probe may differ */
+#define ISOGI_TRACE__NOISE 1.25     /* variances of the difference of two texels' light that the filter takes for noise */
 #define ISOGI_TRACE__LIGHT_FIRST 4u /* samples of a texel with one of each light */
 
 /* ==== numbers that survive -ffast-math =============================================================================== */
@@ -3751,11 +3752,12 @@ static void isogi_trace__guide_colours(const isogi_trace *t, const isogi_trace__
 
 /* Variance of the light that is not filtered. */
 static double isogi_trace__light_variance(const isogi_trace__node *n) {
-    double k = (double)n->samples, l = (double)n->light_samples;
-    return (k > 1 ? ISOGI_TRACE__PI * ISOGI_TRACE__PI * n->bright_spread / (k * (k - 1)) : 0) + (l > 1 ? n->light_spread / (l * (l - 1)) : 0);
+    double l = (double)n->light_samples;
+    return l > 1 ? n->light_spread / (l * (l - 1)) : 0;
 }
 
-/* The part of a texel's irradiance that neighbours may share, and its variance: what cosine-distributed rays brought. */
+/* The part of a texel's irradiance that neighbours may share, and its variance: what comes from the sky, by both kinds of rays, and by
+   reflection. Lights keep sharp shadows: they are not filtered. */
 static void isogi_trace__guide_task(void *arg, size_t task) {
     isogi_trace *t = (isogi_trace *)arg;
     isogi_trace__set *set = &t->feedback->texels;
@@ -3763,7 +3765,7 @@ static void isogi_trace__guide_task(void *arg, size_t task) {
     for (; i < end; i++) {
         const isogi_trace__node *n = &set->nodes[i];
         isogi_trace__guide *g = &set->guide[i];
-        double scale = n->samples ? 1.0 / n->samples : 0, rgb[3] = {0, 0, 0};
+        double scale = n->samples ? 1.0 / n->samples : 0, rgb[3] = {0, 0, 0}, spread;
         int a;
         memcpy(g->normal, n->normal, sizeof g->normal);
         g->samples = n->samples, g->lights = (float)isogi_trace__light_variance(n);
@@ -3772,12 +3774,13 @@ static void isogi_trace__guide_task(void *arg, size_t task) {
                                                       scale * (double)set->bounce[i * v + (size_t)a]);
         for (a = 0; a < 3 && t->scene.desc.mode == ISOGI_TRACE_IRRADIANCE; a++) {
             rgb[a] = (double)set->direct[i * v + (size_t)a] + (double)set->bounce[i * v + (size_t)a] / ISOGI_TRACE__PI;
-            g->mean[a] = set->out[0][i * v + (size_t)a];
+            g->mean[a] = set->out[0][i * v + (size_t)a] + (float)(ISOGI_TRACE__PI * scale * n->bright[a]);
         }
         if (t->scene.desc.mode == ISOGI_TRACE_TRANSFER) continue;
-        g->luminance = (float)(ISOGI_TRACE__PI * scale * isogi_trace__luminance(rgb));
-        g->variance = (float)(ISOGI_TRACE__PI * ISOGI_TRACE__PI *
-                              isogi_trace__mean_variance(isogi_trace__luminance(rgb), n->square + n->bounce_square, (double)n->samples));
+        g->luminance = (float)(ISOGI_TRACE__PI * scale * (isogi_trace__luminance(rgb) + isogi_trace__luminance(n->bright)));
+        spread = isogi_trace__mean_variance(isogi_trace__luminance(rgb), n->square + n->bounce_square, (double)n->samples);
+        if (n->samples > 1) spread += n->bright_spread * scale / (n->samples - 1);
+        g->variance = (float)(ISOGI_TRACE__PI * ISOGI_TRACE__PI * spread);
         for (a = 0; a < 3; a++) rgb[a] = scale * (double)set->bounce[i * v + (size_t)a];
         g->hidden = (float)(scale * (t->scene.desc.bounces ? n->hits : n->samples)); /* hits are counted if they reflect */
         g->reflected = (float)isogi_trace__luminance(rgb);
@@ -3839,11 +3842,11 @@ static double isogi_trace__filter(const isogi_trace *t, size_t node, double rgb[
         if (!(facing > 0.5)) continue;
         facing *= facing, facing *= facing, facing *= facing;
         apart = (double)g->luminance - (double)q->luminance, noise = (double)g->variance + (double)q->variance;
-        apart = apart * apart - noise;
+        apart = apart * apart - ISOGI_TRACE__NOISE * noise;
         colours = isogi_trace__other_colours(t, g, q);
         if (colours > 0) apart = (apart > 0 ? apart : 0) + 4 * colours * colours;
         w = facing * facing * by_distance[square[i]];
-        if (apart > 0) w *= noise > 0 ? exp(-apart / noise) : 0;
+        if (apart > 0) w *= noise > 0 ? exp(-apart / (ISOGI_TRACE__NOISE * noise)) : 0;
         squares += w * w * q->samples;
         w *= q->samples;
         total += w;
@@ -3873,8 +3876,7 @@ static void isogi_trace__publish_task(void *arg, size_t task) {
         } else {
             double alike = isogi_trace__filter(t, i, rgb, variance), bounce[3];
             for (a = 0; a < 3; a++) {
-                double e = rgb[a] + n->steady[a] + ISOGI_TRACE__PI / n->samples * n->bright[a];
-                to[a] = (float)(e + (n->light_samples ? n->light[a] / n->light_samples : 0));
+                to[a] = (float)(rgb[a] + n->steady[a] + (n->light_samples ? n->light[a] / n->light_samples : 0));
                 bounce[a] = (double)set->bounce[i * v + (size_t)a] / n->samples;
             }
             variance[0] += 0.25 * (double)set->guide[i].variance; /* for what the filter blurs */
