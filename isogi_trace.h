@@ -1413,7 +1413,8 @@ static void isogi_trace__gather_site(const isogi_trace__scene *scene, const isog
         }
     }
     square *= ISOGI_TRACE__PI * ISOGI_TRACE__PI / ((double)desc->samples * (desc->samples > 1 ? desc->samples - 1 : 1));
-    *error = desc->samples > 1 ? (float)sqrt(square + isogi_trace__unseen(scene->possible, ISOGI_TRACE__PI * mean, desc->samples)) : ISOGI_TRACE__NOT_READY;
+    *error = desc->samples > 1 ? (float)sqrt(square + isogi_trace__unseen(scene->possible, ISOGI_TRACE__PI * mean, desc->samples))
+        : ISOGI_TRACE__NOT_READY;
     if (desc->samples > 1 && desc->mode == ISOGI_TRACE_TRANSFER) *error = (float)(1 / sqrt((double)desc->samples));
     if (desc->mode == ISOGI_TRACE_TRANSFER) {
         for (i = 0; i < coefficients; i++) values[i] = (float)(ISOGI_TRACE__PI * transfer[i] / desc->samples);
@@ -1755,7 +1756,9 @@ static size_t isogi_trace__record_size(const isogi_trace *t) {
     }
 }
 
-static float isogi_trace__record_error(const uint8_t *record) { return isogi_trace__bits_float((uint32_t)isogi_trace__get(record, 2) << 16); }
+static float isogi_trace__record_error(const uint8_t *record) {
+    return isogi_trace__bits_float((uint32_t)isogi_trace__get(record, 2) << 16);
+}
 
 /* BYTE: irradiance by its square root, since eyes judge ratios; transfer in 127ths of the texel's largest coefficient. */
 static void isogi_trace__bytes_write(const isogi_trace *t, uint8_t *to, const float *values) {
@@ -2573,7 +2576,8 @@ static int isogi_trace__seen(const size_t cell[3], const double local[3], const 
 static void isogi_trace__learn_task(void *arg, size_t task) {
     const isogi_trace__job *job = (const isogi_trace__job *)arg;
     isogi_trace__ref *ref = job->trace->batch + task * ISOGI_TRACE__TEXELS;
-    size_t i, left = job->count - task * ISOGI_TRACE__TEXELS, count = left < ISOGI_TRACE__TEXELS ? left : ISOGI_TRACE__TEXELS, texel[ISOGI_TRACE__TEXELS][3];
+    size_t i, left = job->count - task * ISOGI_TRACE__TEXELS, count = left < ISOGI_TRACE__TEXELS ? left : ISOGI_TRACE__TEXELS,
+              texel[ISOGI_TRACE__TEXELS][3];
     uint8_t state[ISOGI_TRACE__TEXELS];
     for (i = 0; i < count; i++) memcpy(texel[i], ref[i].texel, sizeof texel[i]);
     isogi_trace__classify_texels(job->trace, (const size_t(*)[3])texel, count, state);
@@ -2604,7 +2608,8 @@ static isogi_result isogi_trace__learn_points(isogi_trace *t, const float (*poin
             if (!t->bricks[index]) t->bricks[index] = isogi_trace__brick_new(t);
             ref->brick = t->bricks[index];
             if (!ref->brick) result = ISOGI_NO_MEMORY;
-            else if (ref->brick->state[ref->slot] == ISOGI_TRACE__UNKNOWN) ref->brick->state[ref->slot] = ISOGI_TRACE__NOT_ASKED, job.count++;
+            else if (ref->brick->state[ref->slot] == ISOGI_TRACE__UNKNOWN)
+                ref->brick->state[ref->slot] = ISOGI_TRACE__NOT_ASKED, job.count++;
         }
         if (all) memcpy(known, cell, sizeof known);
     }
@@ -3364,7 +3369,8 @@ static int isogi_trace__span_site(isogi_trace__cast *c, uint32_t k) {
         memset(site, 0, sizeof *site);
         site->place = n->place, site->isovalue = n->isovalue;
         memcpy(site->normal, n->normal, sizeof site->normal);
-        site->key = isogi_trace__key(isogi_trace__key(seed, 2), (uint64_t)x[0] + (uint64_t)l[0] * ((uint64_t)x[1] + (uint64_t)l[1] * (uint64_t)x[2]));
+        site->key = isogi_trace__key(isogi_trace__key(seed, 2),
+                                     (uint64_t)x[0] + (uint64_t)l[0] * ((uint64_t)x[1] + (uint64_t)l[1] * (uint64_t)x[2]));
         c->sequence[k] = isogi_trace__key(isogi_trace__key(seed, 3), (uint64_t)isogi_trace__brick_of(t, x, &n->slot));
     } else {
         float geometric[1][3];
@@ -4018,8 +4024,9 @@ static isogi_result isogi_trace__feedback_step(isogi_trace *t, uint64_t max_rays
         f->unpublished |= f->span_count != 0;
         left = ((double)t->done * t->scene.desc.samples + (double)f->partial) / all;
         if (f->span_count)
-            result = isogi_trace__spans_run(t, isogi_trace__lerp(t->share[0], t->share[1], left),
-                                            isogi_trace__lerp(t->share[0], t->share[1], left + (f->on_probes ? 0 : (double)f->sample_count / all)));
+            result = isogi_trace__spans_run(
+                t, isogi_trace__lerp(t->share[0], t->share[1], left),
+                isogi_trace__lerp(t->share[0], t->share[1], left + (f->on_probes ? 0 : (double)f->sample_count / all)));
         else isogi_trace__level_end(t), result = isogi_trace__nodes_make(t);
         if (result != ISOGI_OK && f->span_count) f->cursor = cursor, f->probe_cursor = probe_cursor; /* the batch is still to come */
     }
@@ -4438,8 +4445,9 @@ static uint64_t isogi_trace__hash_volume(uint64_t hash, const isogi_pyramid *pyr
 static uint64_t isogi_trace__hash_trace(const isogi_trace *t) {
     const isogi_trace_desc *d = &t->scene.desc;
     const int transfer = d->mode == ISOGI_TRACE_TRANSFER;
-    const int numbers[13] = {(int)d->mode,  transfer ? d->order : 0, d->bounces, d->samples, (int)d->normals,  d->capped != 0, t->scene.high,
-                             !!d->no_shadows, transfer ? d->transfer_channels : 0, t->format, d->material != 0, t->values, (int)d->method};
+    const int numbers[13] = {(int)d->mode, transfer ? d->order : 0, d->bounces, d->samples, (int)d->normals, d->capped != 0,
+                             t->scene.high, !!d->no_shadows, transfer ? d->transfer_channels : 0, t->format, d->material != 0,
+                             t->values, (int)d->method};
     uint64_t hash = 0xcbf29ce484222325u;
     int i;
     for (i = 0; i < 13; i++) hash = isogi_trace__hash_number(hash, (uint64_t)(int64_t)numbers[i]);
@@ -4623,7 +4631,8 @@ static int isogi_trace__same_texels(const isogi_trace *t, const isogi_trace_desc
     isogi_trace_format storage = d->storage ? d->storage : d->mode == ISOGI_TRACE_TRANSFER ? ISOGI_TRACE_HALF : ISOGI_TRACE_FLOAT;
     for (a = 0; a < 3; a++) {
         if (d->lattice[a] != b->lattice[a] || d->box_first[a] != b->box_first[a] || d->box_end[a] != b->box_end[a]) return 0;
-        if (!isogi_trace__zero(d->lattice_min[a] - b->lattice_min[a]) || !isogi_trace__zero(d->lattice_max[a] - b->lattice_max[a])) return 0;
+        if (!isogi_trace__zero(d->lattice_min[a] - b->lattice_min[a]) || !isogi_trace__zero(d->lattice_max[a] - b->lattice_max[a]))
+            return 0;
     }
     return d->pyramid == b->pyramid && d->mode == b->mode && order == b->order && d->method == b->method && d->normals == b->normals &&
            lazy == (b->lazy != 0) && !d->capped == !b->capped && d->sides == b->sides && storage == b->storage &&
@@ -5063,7 +5072,8 @@ static void isogi_trace__field_lights(isogi_trace__walk *w, int depth) {
             uint64_t key = isogi_trace__key(w->key[i], (uint64_t)depth * ISOGI_TRACE__DIMENSIONS + ISOGI_TRACE__LIGHT);
             double u, v, cosine, density;
             isogi_trace__beam beam;
-            key = isogi_trace__key(key, l), u = isogi_trace__unit(isogi_trace__key(key, 0)), v = isogi_trace__unit(isogi_trace__key(key, 1));
+            key = isogi_trace__key(key, l), u = isogi_trace__unit(isogi_trace__key(key, 0)),
+            v = isogi_trace__unit(isogi_trace__key(key, 1));
             beam.tmax = 0;
             if (l < lighting->light_count) {
                 if (!isogi_trace__light_beam(&lighting->lights[l], w->place[i], u, v, &beam)) continue;

@@ -346,10 +346,10 @@ ISOGI_API isogi_result isogi_vol_continue(const isogi_pyramid *pyramid, const is
                                           isogi_counters *counters);
 
 /* Every hit of each ray, in order: those of ray i are hits[i * capacity + n], n < counts[i]. counts[i] = capacity + 1 where there are
-   more than fit; hits[i * capacity + capacity - 1] with isogi_vol_continue and ISOGI_RAY_ONWARD leads to them. The same as isogi_vol_intersect
-   and then isogi_vol_continue, with ISOGI_RAY_ONWARD, along the ray until it misses, with t from the ray's own origin throughout. hits
-   may be NULL if capacity is 0. Sides alternate, but for touched layers without thickness, which leave the ray outside, and for cells
-   that are not finite, after which the side is not known. ISOGI_TOO_LARGE if count * capacity hits cannot be addressed. */
+   more than fit; hits[i * capacity + capacity - 1] with isogi_vol_continue and ISOGI_RAY_ONWARD leads to them. The same as
+   isogi_vol_intersect and then isogi_vol_continue, with ISOGI_RAY_ONWARD, along the ray until it misses, with t from the ray's own origin
+   throughout. hits may be NULL if capacity is 0. Sides alternate, but for touched layers without thickness, which leave the ray outside,
+   and for cells that are not finite, after which the side is not known. ISOGI_TOO_LARGE if count * capacity hits cannot be addressed. */
 ISOGI_API isogi_result isogi_vol_intersect_all(const isogi_pyramid *pyramid, const isogi_ray *rays, size_t count, size_t capacity,
                                                isogi_hit *hits, size_t *counts, isogi_counters *counters);
 
@@ -869,7 +869,8 @@ static void isogi_vol__plan_float_grid(isogi_pyramid *p) {
     for (a = 0; a < 3; a++) {
         const double m = p->to_grid[4 * a], at = -p->origin[a] * m;
         reach += fabs((double)(v->stride[a] / size)) * p->cells[a];
-        if (!(fabs(m) > 1e-7 && fabs(m) < 1e7 && fabs(at) < ISOGI_VOL__FAST_SIZE) || p->cells[a] >= ISOGI_VOL__FAST_SIZE || !(reach < 2e9)) {
+        if (!(fabs(m) > 1e-7 && fabs(m) < 1e7 && fabs(at) < ISOGI_VOL__FAST_SIZE) || p->cells[a] >= ISOGI_VOL__FAST_SIZE ||
+            !(reach < 2e9)) {
             g->usable = 0;
             return;
         }
@@ -1077,7 +1078,8 @@ static const float *isogi_vol__raw_row(const isogi_pyramid *pyramid, size_t x, s
     int i = 0;
     if (v->type == ISOGI_F32 && step == 4) return (const float *)(const void *)p;
 #ifdef ISOGI_VOL__AVX
-    if (pyramid->path >= ISOGI_VOL__PATH_AVX2 && step == (ptrdiff_t)isogi_vol__type_size(v->type)) i = isogi_vol__raw_eights(v->type, p, count, buffer), p += i * step;
+    if (pyramid->path >= ISOGI_VOL__PATH_AVX2 && step == (ptrdiff_t)isogi_vol__type_size(v->type))
+        i = isogi_vol__raw_eights(v->type, p, count, buffer), p += i * step;
 #endif
 #define ISOGI_VOL__READ(T)                                                                                                       \
     for (; i < count; i++, p += step) buffer[i] = (float)*(const T *)(const void *)p;                                       \
@@ -1194,7 +1196,8 @@ static void isogi_vol__build_task(void *arg, size_t task) {
                 size_t rest = isogi_vol__min_size(v->size[0], 4 * job->last[0] + 5) - 4 * bx;
                 first = 4 * bx;
                 by_rows = v->type != ISOGI_F64 &&
-                          isogi_vol__bound_strip(job->pyramid, first, rest < ISOGI_VOL__STRIP + 1 ? (int)rest : ISOGI_VOL__STRIP + 1, by, bz, least, largest);
+                          isogi_vol__bound_strip(job->pyramid, first, rest < ISOGI_VOL__STRIP + 1 ? (int)rest : ISOGI_VOL__STRIP + 1, by,
+                                                 bz, least, largest);
             }
             if (by_rows) {
                 size_t x = 4 * bx - first, last = (size_t)isogi_vol__last_voxel(bx, 4, v->size[0]) - first;
@@ -1314,7 +1317,8 @@ static float isogi_vol__quantise_isovalue(const isogi_pyramid *p, double isovalu
 /* Siblings are stored together, since a ray that looks at one soon looks at the next. */
 ISOGI_VOL__INLINE size_t isogi_vol__node_at(const isogi_pyramid *p, int n, size_t x, size_t y, size_t z) {
     const isogi_vol__node_level *level = &p->node_level[n];
-    return level->first + 64 * ((x >> 2) + level->parents[0] * ((y >> 2) + level->parents[1] * (z >> 2))) + (x & 3) + 4 * (y & 3) + 16 * (z & 3);
+    return level->first + 64 * ((x >> 2) + level->parents[0] * ((y >> 2) + level->parents[1] * (z >> 2))) + (x & 3) + 4 * (y & 3) +
+           16 * (z & 3);
 }
 
 /* A node over nodes of the level below. */
@@ -1390,7 +1394,8 @@ enum { ISOGI_VOL__LEAF_LOW = 125, ISOGI_VOL__LEAF_HIGH, ISOGI_VOL__LEAF_CUT }; /
 #define ISOGI_VOL__DOUBT 0.625f /* error of a value made of codes + 0.5, in steps */
 
 /* Five voxels of a row for each of a strip's leaves; eight bytes are written, of which later rows overwrite three. */
-ISOGI_VOL__INLINE void isogi_vol__code_row(const float *row, int leaves, const float *low, const float *scale, uint8_t *const *out, int at) {
+ISOGI_VOL__INLINE void isogi_vol__code_row(const float *row, int leaves, const float *low, const float *scale, uint8_t *const *out,
+                                           int at) {
     int i;
     for (i = 0; i < leaves; i++, row += 4) {
 #ifdef ISOGI_VOL__SSE2
@@ -1644,11 +1649,14 @@ ISOGI_VOL__COLD static double isogi_vol__find_extreme(const isogi_pyramid *p, in
                 const size_t at = x + level[0].size[0] * (y + level[0].size[1] * z);
                 double bound[2], beyond;
                 if (!(x & 15)) i = x / 16 + level[2].size[0] * (y / 16 + level[2].size[1] * (z / 16));
-                if (level[2].range[i][0] > level[2].range[i][1] || (end ? level[2].range[i][1] < extreme : level[2].range[i][0] > extreme)) {
+                if (level[2].range[i][0] > level[2].range[i][1] ||
+                    (end ? level[2].range[i][1] < extreme : level[2].range[i][0] > extreme)) {
                     x |= 15;
                     continue;
                 }
-                if (level[0].range[at][0] > level[0].range[at][1] || (end ? level[0].range[at][1] < extreme : level[0].range[at][0] > extreme)) continue;
+                if (level[0].range[at][0] > level[0].range[at][1] ||
+                    (end ? level[0].range[at][1] < extreme : level[0].range[at][0] > extreme))
+                    continue;
                 isogi_vol__bound_block(&p->volume, x, y, z, bound), ++*blocks;
                 found = end ? isogi_vol__max(found, bound[1]) : isogi_vol__min(found, bound[0]);
                 beyond = fabs(found - (double)extreme);
@@ -1680,7 +1688,8 @@ static isogi_vol__before isogi_vol__look_before(const isogi_pyramid *p, const is
 }
 
 /* The volume's range, from what it was, what the changed blocks have now, and a look elsewhere where an extreme may be gone. */
-static void isogi_vol__renew_range(isogi_pyramid *p, const isogi_vol__before *before, const double changed[2], int was_empty, uint64_t *blocks) {
+static void isogi_vol__renew_range(isogi_pyramid *p, const isogi_vol__before *before, const double changed[2], int was_empty,
+                                   uint64_t *blocks) {
     double low = isogi_vol__min(p->range[0], changed[0]), high = isogi_vol__max(p->range[1], changed[1]);
     if (was_empty) low = changed[0], high = changed[1];
     else {
@@ -1802,9 +1811,11 @@ static int isogi_vol__query_block(isogi_vol__box_query *q, int n, const size_t b
     int a, within = 1;
     range[0] = (double)bound[0], range[1] = (double)bound[1];
     if (range[0] > range[1]) return 0;
-    if (q->ranges ? !isogi_vol__any_overlaps(q->ranges, q->count, range[0], range[1]) : range[0] >= q->range[0] && range[1] <= q->range[1]) return 0;
+    if (q->ranges ? !isogi_vol__any_overlaps(q->ranges, q->count, range[0], range[1]) : range[0] >= q->range[0] && range[1] <= q->range[1])
+        return 0;
     for (a = 0; a < 3; a++) {
-        low[a] = block[a] * (size_t)level->cells, high[a] = (size_t)isogi_vol__last_voxel(block[a], level->cells, q->pyramid->volume.size[a]);
+        low[a] = block[a] * (size_t)level->cells,
+        high[a] = (size_t)isogi_vol__last_voxel(block[a], level->cells, q->pyramid->volume.size[a]);
         within = within && low[a] >= q->first[a] && high[a] <= q->last[a];
         low[a] = low[a] > q->first[a] ? low[a] : q->first[a], high[a] = isogi_vol__min_size(high[a], q->last[a]);
     }
@@ -1890,7 +1901,8 @@ static const double isogi_vol__taps[2][4][4] = {
 
 /* The weights and their derivatives, with linear continuation past the border folded into the weights of the voxels that exist:
    f(-1) = 2 f(0) - f(1). A halo moves the border outwards. */
-static void isogi_vol__tap_weights(isogi_filter filter, const isogi_volume *volume, int axis, int i, double u, double w[4], double d[4], int tap[4]) {
+static void isogi_vol__tap_weights(isogi_filter filter, const isogi_volume *volume, int axis, int i, double u, double w[4], double d[4],
+                                   int tap[4]) {
     const double(*c)[4] = isogi_vol__taps[filter == ISOGI_FILTER_CATMULL_ROM];
     const int n = (int)volume->size[axis], low = volume->halo_low[axis] ? -1 : 0, high = volume->halo_high[axis] ? n : n - 1;
     int k;
@@ -1923,7 +1935,8 @@ ISOGI_VOL__TARGET("avx2") ISOGI_VOL__INLINE double isogi_vol__dot4(__m256d a, __
 
 /* The four weights of an axis, and their derivatives, at once. */
 ISOGI_VOL__TARGET("avx2") ISOGI_VOL__INLINE __m256d isogi_vol__weights4(const double c[4][4], double at, __m256d *slopes) {
-    const __m256d u = _mm256_set1_pd(at), c0 = _mm256_loadu_pd(c[0]), c1 = _mm256_loadu_pd(c[1]), c2 = _mm256_loadu_pd(c[2]), c3 = _mm256_loadu_pd(c[3]);
+    const __m256d u = _mm256_set1_pd(at), c0 = _mm256_loadu_pd(c[0]), c1 = _mm256_loadu_pd(c[1]), c2 = _mm256_loadu_pd(c[2]),
+                  c3 = _mm256_loadu_pd(c[3]);
     const __m256d two = _mm256_set1_pd(2), three = _mm256_set1_pd(3);
     *slopes = _mm256_add_pd(_mm256_mul_pd(_mm256_add_pd(_mm256_mul_pd(_mm256_mul_pd(three, c3), u), _mm256_mul_pd(two, c2)), u), c1);
     return _mm256_add_pd(_mm256_mul_pd(_mm256_add_pd(_mm256_mul_pd(_mm256_add_pd(_mm256_mul_pd(c3, u), c2), u), c1), u), c0);
@@ -1941,8 +1954,9 @@ ISOGI_VOL__TARGET("avx2") ISOGI_VOL__INLINE __m256d isogi_vol__raw4(isogi_type t
 }
 
 /* The sums below where all taps exist, a row at a time: rows are weighted along y and z first, x comes last. Packed voxels. */
-ISOGI_VOL__TARGET("avx2") static double isogi_vol__cubic_sum_avx2(const isogi_volume *v, const double powers[4][4], const int cell[3], const double local[3],
-                                                                  double gradient[3]) {
+ISOGI_VOL__TARGET("avx2")
+static double isogi_vol__cubic_sum_avx2(const isogi_volume *v, const double powers[4][4], const int cell[3], const double local[3],
+                                        double gradient[3]) {
     __m256d dx, dy, dz;
     const __m256d wx = isogi_vol__weights4(powers, local[0], &dx), wy = isogi_vol__weights4(powers, local[1], &dy);
     const __m256d wz = isogi_vol__weights4(powers, local[2], &dz);
@@ -1965,8 +1979,10 @@ ISOGI_VOL__TARGET("avx2") static double isogi_vol__cubic_sum_avx2(const isogi_vo
         p += v->stride[2];                                                                                                                 \
     } while (0)
     {
-        const __m256d wy0 = ISOGI_VOL__LANE(wy, 0), wy1 = ISOGI_VOL__LANE(wy, 1), wy2 = ISOGI_VOL__LANE(wy, 2), wy3 = ISOGI_VOL__LANE(wy, 3);
-        const __m256d dy0 = ISOGI_VOL__LANE(dy, 0), dy1 = ISOGI_VOL__LANE(dy, 1), dy2 = ISOGI_VOL__LANE(dy, 2), dy3 = ISOGI_VOL__LANE(dy, 3);
+        const __m256d wy0 = ISOGI_VOL__LANE(wy, 0), wy1 = ISOGI_VOL__LANE(wy, 1), wy2 = ISOGI_VOL__LANE(wy, 2),
+                      wy3 = ISOGI_VOL__LANE(wy, 3);
+        const __m256d dy0 = ISOGI_VOL__LANE(dy, 0), dy1 = ISOGI_VOL__LANE(dy, 1), dy2 = ISOGI_VOL__LANE(dy, 2),
+                      dy3 = ISOGI_VOL__LANE(dy, 3);
         ISOGI_VOL__SLICE(0);
         ISOGI_VOL__SLICE(1);
         ISOGI_VOL__SLICE(2);
@@ -1983,14 +1999,16 @@ ISOGI_VOL__TARGET("avx2") static double isogi_vol__cubic_sum_avx2(const isogi_vo
 #endif
 
 /* Value and gradient (per grid unit) at a cell and a place in it: 64 taps in one pass, row by row. The plain reference. */
-static double isogi_vol__cubic_sum(const isogi_pyramid *p, isogi_filter filter, const int cell[3], const double local[3], double gradient[3]) {
+static double isogi_vol__cubic_sum(const isogi_pyramid *p, isogi_filter filter, const int cell[3], const double local[3],
+                                   double gradient[3]) {
     const isogi_volume *v = &p->volume;
     double w[3][4], d[3][4], value = 0, gx = 0, gy = 0, gz = 0;
     int tap[3][4], a, j, k;
 #ifdef ISOGI_VOL__AVX
     if (p->path >= ISOGI_VOL__PATH_AVX2 && v->stride[0] == (ptrdiff_t)isogi_vol__type_size(v->type)) {
         int inner = 1;
-        for (a = 0; a < 3; a++) inner &= (cell[a] > 0 || v->halo_low[a]) && (size_t)cell[a] + 2 < v->size[a] + v->halo_high[a] && v->size[a] > 1;
+        for (a = 0; a < 3; a++)
+            inner &= (cell[a] > 0 || v->halo_low[a]) && (size_t)cell[a] + 2 < v->size[a] + v->halo_high[a] && v->size[a] > 1;
         if (inner) return isogi_vol__cubic_sum_avx2(v, isogi_vol__taps[filter == ISOGI_FILTER_CATMULL_ROM], cell, local, gradient);
     }
 #endif
@@ -2080,7 +2098,8 @@ static void isogi_vol__copy_points(const isogi_vol__points *at, size_t first, in
 }
 
 /* The same for four points at a time. Coordinates x, y, z are parted from the numbers a, b, c; then axis by axis. */
-ISOGI_VOL__AVX2 static void isogi_vol__locate_avx2(const isogi_pyramid *p, const isogi_vol__points *at, size_t first, int n, isogi_vol__block *b) {
+ISOGI_VOL__AVX2 static void isogi_vol__locate_avx2(const isogi_pyramid *p, const isogi_vol__points *at, size_t first, int n,
+                                                   isogi_vol__block *b) {
     const double *m = p->to_grid, *o = p->origin;
     const __m256d magic = _mm256_set1_pd(6755399441055744.0); /* 1.5 * 2^52: added to a number, it leaves it as an integer in the low bits */
     int i, r;
@@ -2114,7 +2133,8 @@ ISOGI_VOL__AVX2 static void isogi_vol__locate_avx2(const isogi_pyramid *p, const
             _mm_storeu_ps(&b->local[r][i], _mm256_cvtpd_ps(_mm256_sub_pd(g[r], whole)));
             offset = _mm256_fmadd_pd(whole, _mm256_set1_pd((double)p->volume.stride[r]), offset);
         }
-        _mm256_storeu_si256((__m256i *)(void *)&b->offset[i], _mm256_sub_epi64(_mm256_castpd_si256(_mm256_add_pd(offset, magic)), _mm256_castpd_si256(magic)));
+        _mm256_storeu_si256((__m256i *)(void *)&b->offset[i],
+                            _mm256_sub_epi64(_mm256_castpd_si256(_mm256_add_pd(offset, magic)), _mm256_castpd_si256(magic)));
     }
 }
 
@@ -2129,7 +2149,8 @@ ISOGI_VOL__AVX512 static void isogi_vol__locate_avx512(const isogi_pyramid *p, c
     for (i = 0; i < n; i += 16) {
         const uint64_t there = n - i >= 16 ? ~(uint64_t)0 : ((uint64_t)1 << 3 * (n - i)) - 1;
         const float *points = (const float *)world + 3 * (size_t)i;
-        const __m512 k0 = _mm512_maskz_loadu_ps((__mmask16)there, points), k1 = _mm512_maskz_loadu_ps((__mmask16)(there >> 16), points + 16);
+        const __m512 k0 = _mm512_maskz_loadu_ps((__mmask16)there, points),
+                     k1 = _mm512_maskz_loadu_ps((__mmask16)(there >> 16), points + 16);
         const __m512 k2 = _mm512_maskz_loadu_ps((__mmask16)(there >> 32), points + 32);
         __m512i voxel = _mm512_setzero_si512();
         for (r = 0; r < 3; r++) {
@@ -2221,7 +2242,8 @@ static void isogi_vol__fetch(const isogi_volume *v, int n, const isogi_vol__bloc
 
 /* ---- cubic filters ---- */
 
-/* Taps of points as floats: point n's begin offset[n] bytes from `first`, rows and slices follow at y and z; powers: of the filter, and {1, 0, 0, 0}. */
+/* Taps of points as floats: point n's begin offset[n] bytes from `first`, rows and slices follow at y and z; powers: of the filter, and
+   {1, 0, 0, 0}. */
 typedef struct isogi_vol__taps_at {
     const char *first;
     const ptrdiff_t *offset;
@@ -2234,11 +2256,12 @@ ISOGI_VOL__INLINE const char *isogi_vol__first_tap(const isogi_volume *v, ptrdif
     return (const char *)v->data + offset - v->stride[0] - v->stride[1] - v->stride[2];
 }
 
-/* Cubic filters for n points all of whose taps exist. Every four lanes are a point of their own and hold four taps of a row; rows are summed
-   along y, then z, and x comes last. Taps count relative to the cell's first voxel, so that rounding is relative to the variation among
-   them: hence the slices go 1, 2, 3, 0. What a width has to offer: SPREAD, a number for each point; TILE, four numbers for every point; LANE, the
-   number of one lane of four in all of them; TURN, lanes moved down by one of four; ROW, a row of each point, q[...] bytes from p; SUMS, the sums
-   of four vectors over lanes, side by side. sum is a parameter of its own since gcc 12 forgets calls that only write into b. */
+/* Cubic filters for n points all of whose taps exist. Every four lanes are a point of their own and hold four taps of a row; rows are
+   summed along y, then z, and x comes last. Taps count relative to the cell's first voxel, so that rounding is relative to the variation
+   among them: hence the slices go 1, 2, 3, 0. What a width has to offer: SPREAD, a number for each point; TILE, four numbers for every
+   point; LANE, the number of one lane of four in all of them; TURN, lanes moved down by one of four; ROW, a row of each point, q[...]
+   bytes from p; SUMS, the sums of four vectors over lanes, side by side. sum is a parameter of its own since gcc 12 forgets calls that
+   only write into b. */
 #define ISOGI_VOL__WEIGHTS(NAME, L, axis, w, d)                                                                                  \
     u = ISOGI_VOL__SPREAD_##NAME(&b->local[axis][i]), half = ISOGI_VOL__MADD_##NAME(c3, u, c2);                                  \
     w = ISOGI_VOL__MADD_##NAME(ISOGI_VOL__MADD_##NAME(half, u, c1), u, c0);                                                      \
@@ -2367,7 +2390,8 @@ ISOGI_VOL__CUBIC(avx512, ISOGI_VOL__AVX512, __m512, _mm512_, 16)
 /* The 64 taps of a point, eight rows to a gather. */
 ISOGI_VOL__AVX512 static void isogi_vol__widen_avx512(const isogi_volume *v, const char *p, float *out) {
     const __m512i up = _mm512_setr_epi64(0, 1, 2, 3, 0, 1, 2, 3), behind = _mm512_setr_epi64(0, 0, 0, 0, 1, 1, 1, 1);
-    const __m512i rows = _mm512_add_epi64(_mm512_mullo_epi64(up, _mm512_set1_epi64(v->stride[1])), _mm512_mullo_epi64(behind, _mm512_set1_epi64(v->stride[2])));
+    const __m512i rows = _mm512_add_epi64(_mm512_mullo_epi64(up, _mm512_set1_epi64(v->stride[1])),
+                                          _mm512_mullo_epi64(behind, _mm512_set1_epi64(v->stride[2])));
     int k;
 #define ISOGI_VOL__SLICES(T, GATHER, HALF, WIDEN, FIRST)                                                                                 \
     do {                                                                                                                                   \
@@ -2376,23 +2400,32 @@ ISOGI_VOL__AVX512 static void isogi_vol__widen_avx512(const isogi_volume *v, con
     } while (0)
     for (k = 0; k < 2; k++, p += 2 * v->stride[2], out += 32)
         switch (v->type) {
-        case ISOGI_U8: ISOGI_VOL__SLICES(__m256i, _mm512_i64gather_epi32, _mm256_extracti128_si256, _mm512_cvtepu8_epi32, _mm256_castsi256_si128); break;
-        case ISOGI_I8: ISOGI_VOL__SLICES(__m256i, _mm512_i64gather_epi32, _mm256_extracti128_si256, _mm512_cvtepi8_epi32, _mm256_castsi256_si128); break;
-        case ISOGI_U16: ISOGI_VOL__SLICES(__m512i, _mm512_i64gather_epi64, _mm512_extracti64x4_epi64, _mm512_cvtepu16_epi32, _mm512_castsi512_si256); break;
-        case ISOGI_I16: ISOGI_VOL__SLICES(__m512i, _mm512_i64gather_epi64, _mm512_extracti64x4_epi64, _mm512_cvtepi16_epi32, _mm512_castsi512_si256); break;
+        case ISOGI_U8:
+            ISOGI_VOL__SLICES(__m256i, _mm512_i64gather_epi32, _mm256_extracti128_si256, _mm512_cvtepu8_epi32, _mm256_castsi256_si128);
+            break;
+        case ISOGI_I8:
+            ISOGI_VOL__SLICES(__m256i, _mm512_i64gather_epi32, _mm256_extracti128_si256, _mm512_cvtepi8_epi32, _mm256_castsi256_si128);
+            break;
+        case ISOGI_U16:
+            ISOGI_VOL__SLICES(__m512i, _mm512_i64gather_epi64, _mm512_extracti64x4_epi64, _mm512_cvtepu16_epi32, _mm512_castsi512_si256);
+            break;
+        case ISOGI_I16:
+            ISOGI_VOL__SLICES(__m512i, _mm512_i64gather_epi64, _mm512_extracti64x4_epi64, _mm512_cvtepi16_epi32, _mm512_castsi512_si256);
+            break;
         case ISOGI_F32:
         case ISOGI_F64: break;
         }
 #undef ISOGI_VOL__SLICES
 }
 
-/* Corners by gathers, which are quick where AVX-512 is: neighbours along x come as one number. Of bytes, two more come with them; where these would
-   lie behind the volume, what comes begins earlier and is shifted. */
+/* Corners by gathers, which are quick where AVX-512 is: neighbours along x come as one number. Of bytes, two more come with them; where
+   these would lie behind the volume, what comes begins earlier and is shifted. */
 ISOGI_VOL__AVX512 static void isogi_vol__trilinear_block_avx512(const isogi_volume *v, isogi_vol__block *b, int n, int gradients) {
     const int width = (int)isogi_vol__type_size(v->type), is_signed = v->type == ISOGI_I8 || v->type == ISOGI_I16;
     const ptrdiff_t dy = v->size[1] > 1 ? v->stride[1] : 0, dz = v->size[2] > 1 ? v->stride[2] : 0;
     const __m128i unused = _mm_cvtsi32_si128(32 - 8 * width);
-    const __m512i even = _mm512_setr_epi32(0, 2, 4, 6, 8, 10, 12, 14, 16, 18, 20, 22, 24, 26, 28, 30), odd = _mm512_or_si512(even, _mm512_set1_epi32(1));
+    const __m512i even = _mm512_setr_epi32(0, 2, 4, 6, 8, 10, 12, 14, 16, 18, 20, 22, 24, 26, 28, 30),
+                  odd = _mm512_or_si512(even, _mm512_set1_epi32(1));
     ptrdiff_t last = -4;
     int i, r;
     for (r = 0; r < 3; r++) last += v->stride[r] > 0 ? v->stride[r] * (ptrdiff_t)(v->size[r] - 1) : 0;
@@ -2403,7 +2436,8 @@ ISOGI_VOL__AVX512 static void isogi_vol__trilinear_block_avx512(const isogi_volu
         if (width == 4)
             for (r = 0; r < 4; r++) {
                 const char *row = (const char *)v->data + (r & 1 ? dy : 0) + (r & 2 ? dz : 0);
-                const __m512i pair0 = _mm512_i64gather_epi64(at0, (const void *)row, 1), pair1 = _mm512_i64gather_epi64(at1, (const void *)row, 1);
+                const __m512i pair0 = _mm512_i64gather_epi64(at0, (const void *)row, 1),
+                              pair1 = _mm512_i64gather_epi64(at1, (const void *)row, 1);
                 c[2 * r] = _mm512_castsi512_ps(_mm512_permutex2var_epi32(pair0, even, pair1));
                 c[2 * r + 1] = _mm512_castsi512_ps(_mm512_permutex2var_epi32(pair0, odd, pair1));
             }
@@ -2503,9 +2537,10 @@ static void isogi_vol__cubic_points(const isogi_pyramid *p, const isogi_vol__tap
     (void)p;
 }
 
-/* The 64 taps of point i side by side. At the border they are those of the nearest inner cell, moved by one along each axis concerned; what is
-   missing then continues linearly. */
-static void isogi_vol__copy_taps(const isogi_pyramid *p, const isogi_vol__block *b, int i, const int32_t low[3], const int32_t high[3], float taps[64]) {
+/* The 64 taps of point i side by side. At the border they are those of the nearest inner cell, moved by one along each axis concerned;
+   what is missing then continues linearly. */
+static void isogi_vol__copy_taps(const isogi_pyramid *p, const isogi_vol__block *b, int i, const int32_t low[3], const int32_t high[3],
+                                 float taps[64]) {
     const isogi_volume *v = &p->volume;
     ptrdiff_t offset = b->offset[i];
     int move[3], a, k;
@@ -2566,8 +2601,8 @@ static void isogi_vol__cubic_block(const isogi_pyramid *p, isogi_filter filter, 
             b->offset[k] = b->offset[end - 1];
         }
         for (k = 0; k < 16; k++) /* no difference is negative */
-            beyond |= (b->cell[0][i + k] - low[0]) | (b->cell[1][i + k] - low[1]) | (b->cell[2][i + k] - low[2]) | (high[0] - 1 - b->cell[0][i + k]) |
-                      (high[1] - 1 - b->cell[1][i + k]) | (high[2] - 1 - b->cell[2][i + k]);
+            beyond |= (b->cell[0][i + k] - low[0]) | (b->cell[1][i + k] - low[1]) | (b->cell[2][i + k] - low[2]) |
+                      (high[0] - 1 - b->cell[0][i + k]) | (high[1] - 1 - b->cell[1][i + k]) | (high[2] - 1 - b->cell[2][i + k]);
         taps.first = isogi_vol__first_tap(v, 0), taps.offset = b->offset + i, taps.y = v->stride[1], taps.z = v->stride[2];
         if (beyond < 0) {
             for (k = i; k < whole; k++) isogi_vol__copy_taps(p, b, k, low, high, some + 64 * (k - i));
@@ -2619,7 +2654,8 @@ ISOGI_VOL__INLINE void isogi_vol__gradient_out(const double m[9], float gx, floa
 
 #ifdef ISOGI_VOL__AVX
 /* Values and gradients from sums of raw voxels: {value, x, y, z} of n points. */
-ISOGI_VOL__AVX2 static void isogi_vol__sums_out_avx2(const isogi_pyramid *p, const double m[9], const float *sum, int n, float *values, float (*gradients)[3]) {
+ISOGI_VOL__AVX2 static void isogi_vol__sums_out_avx2(const isogi_pyramid *p, const double m[9], const float *sum, int n, float *values,
+                                                     float (*gradients)[3]) {
     const __m256d scale = _mm256_setr_pd(p->volume.scale, m[0], m[4], m[8]), bias = _mm256_setr_pd(p->volume.bias, 0, 0, 0);
     const __m256d x = _mm256_setr_pd(0, m[0], m[1], m[2]), y = _mm256_setr_pd(0, m[3], m[4], m[5]), z = _mm256_setr_pd(0, m[6], m[7], m[8]);
     const int straight = isogi_vol__all_zero(m + 1, 3) && isogi_vol__all_zero(m + 5, 3);
@@ -2629,8 +2665,10 @@ ISOGI_VOL__AVX2 static void isogi_vol__sums_out_avx2(const isogi_pyramid *p, con
         __m256d all = _mm256_fmadd_pd(raw, scale, bias);
         __m128 out;
         if (!straight)
-            all = _mm256_blend_pd(_mm256_fmadd_pd(_mm256_permute4x64_pd(raw, 0xff), z,
-                                                  _mm256_fmadd_pd(_mm256_permute4x64_pd(raw, 0xaa), y, _mm256_mul_pd(_mm256_permute4x64_pd(raw, 0x55), x))), all, 1);
+            all = _mm256_blend_pd(
+                _mm256_fmadd_pd(_mm256_permute4x64_pd(raw, 0xff), z,
+                                _mm256_fmadd_pd(_mm256_permute4x64_pd(raw, 0xaa), y, _mm256_mul_pd(_mm256_permute4x64_pd(raw, 0x55), x))),
+                all, 1);
         out = _mm256_cvtpd_ps(all);
         if (values) _mm_store_ss(values + i, out);
         if (!gradients) continue;
@@ -2666,8 +2704,8 @@ static void isogi_vol__sample_one(const isogi_pyramid *p, isogi_filter filter, c
 }
 
 #if defined(ISOGI_VOL__SSE2) || defined(ISOGI_VOL__NEON)
-static void isogi_vol__sample_block(const isogi_pyramid *p, isogi_filter filter, const isogi_vol__points *at, size_t first, int n, float *values,
-                                    float (*gradients)[3]) {
+static void isogi_vol__sample_block(const isogi_pyramid *p, isogi_filter filter, const isogi_vol__points *at, size_t first, int n,
+                                    float *values, float (*gradients)[3]) {
     const double scale = p->volume.scale, bias = p->volume.bias;
     isogi_vol__block b;
     double m[9];
@@ -2693,8 +2731,8 @@ static void isogi_vol__sample_block(const isogi_pyramid *p, isogi_filter filter,
 }
 #endif
 
-static void isogi_vol__sample_some(const isogi_pyramid *p, isogi_filter filter, const isogi_vol__points *at, size_t first, int n, float *values,
-                                   float (*gradients)[3]) {
+static void isogi_vol__sample_some(const isogi_pyramid *p, isogi_filter filter, const isogi_vol__points *at, size_t first, int n,
+                                   float *values, float (*gradients)[3]) {
     int i;
 #if defined(ISOGI_VOL__SSE2) || defined(ISOGI_VOL__NEON)
     if (isogi_vol__blockwise(p, filter)) {
@@ -2709,15 +2747,15 @@ static void isogi_vol__sample_some(const isogi_pyramid *p, isogi_filter filter, 
     }
 }
 
-static isogi_result isogi_vol__sample(const isogi_pyramid *p, isogi_filter filter, const float (*world)[3], const double (*grid)[3], size_t count,
-                                      float *values, float (*gradients)[3]) {
+static isogi_result isogi_vol__sample(const isogi_pyramid *p, isogi_filter filter, const float (*world)[3], const double (*grid)[3],
+                                      size_t count, float *values, float (*gradients)[3]) {
     isogi_vol__points at;
     size_t i;
     at.world = world, at.grid = grid;
     if (!p || (count && !world && !grid) || filter < ISOGI_FILTER_LINEAR || filter > ISOGI_FILTER_CATMULL_ROM) return ISOGI_INVALID;
     for (i = 0; i < count; i += ISOGI_VOL__BLOCK)
-        isogi_vol__sample_some(p, filter, &at, i, count - i < ISOGI_VOL__BLOCK ? (int)(count - i) : ISOGI_VOL__BLOCK, values ? values + i : NULL,
-                                 gradients ? gradients + i : NULL);
+        isogi_vol__sample_some(p, filter, &at, i, count - i < ISOGI_VOL__BLOCK ? (int)(count - i) : ISOGI_VOL__BLOCK,
+                               values ? values + i : NULL, gradients ? gradients + i : NULL);
     return ISOGI_OK;
 }
 
@@ -2906,7 +2944,8 @@ ISOGI_VOL__INLINE int isogi_vol__quadratic_roots(double a, double b, double c, d
 /* The root in [low, high], the only one there, with different sides at its ends: Newton from the secant's root, kept inside a shrinking
    bracket; every third step bisects once Newton has had its chance. The first steps go without the bracket and end when the error
    left, at most |f''| step^2 / (2 |f'|) (Taylor), is below 1e-13; not where the cubic is 0 at an end, which is another root. */
-ISOGI_VOL__INLINE double isogi_vol__cubic_refine(const isogi_vol__cubic *cubic, double low, double high, double at_low, double at_high, int rising) {
+ISOGI_VOL__INLINE double isogi_vol__cubic_refine(const isogi_vol__cubic *cubic, double low, double high, double at_low, double at_high,
+                                                 int rising) {
     const double *b = cubic->b;
     const double c1 = 3 * (b[1] - b[0]), c2 = 3 * ((b[0] - b[1]) + (b[2] - b[1])), c3 = (b[3] - b[0]) + 3 * (b[1] - b[2]);
     const double bend = 1e13 * (fabs(c2) + 3 * fabs(c3));
@@ -3258,7 +3297,8 @@ ISOGI_VOL__INLINE uint64_t isogi_vol__cut_cells(const isogi_vol__leaf *leaf, uin
 }
 
 /* Which of the 64 cells (x + 4y + 16z) can hold the surface, from the voxels that are certainly inside and outside. */
-ISOGI_VOL__INLINE uint64_t isogi_vol__mixed_cells(const isogi_vol__leaf *leaf, uint64_t in_low, uint64_t in_high, uint64_t out_low, uint64_t out_high) {
+ISOGI_VOL__INLINE uint64_t isogi_vol__mixed_cells(const isogi_vol__leaf *leaf, uint64_t in_low, uint64_t in_high, uint64_t out_low,
+                                                  uint64_t out_high) {
     isogi_vol__all_corners(&in_low, &in_high);
     isogi_vol__all_corners(&out_low, &out_high);
     return isogi_vol__cut_cells(leaf, ~isogi_vol__pack_cells(in_low | out_low, in_high | out_high));
@@ -3278,7 +3318,8 @@ ISOGI_VOL__INLINE uint64_t isogi_vol__leaf_mask(const uint8_t node[128], float l
         }
     }
 #else
-    for (i = 0; i < 125; i++) in[i / 64] |= (uint64_t)(node[i] >= leaf->inside) << i % 64, out[i / 64] |= (uint64_t)(node[i] < leaf->outside) << i % 64;
+    for (i = 0; i < 125; i++)
+        in[i / 64] |= (uint64_t)(node[i] >= leaf->inside) << i % 64, out[i / 64] |= (uint64_t)(node[i] < leaf->outside) << i % 64;
 #endif
     return isogi_vol__mixed_cells(leaf, in[0], in[1], out[0], out[1]);
 }
@@ -3292,9 +3333,8 @@ static int isogi_vol__machine(void) {
     __builtin_cpu_init();
     if (!__builtin_cpu_supports("avx2") || !__builtin_cpu_supports("fma")) return ISOGI_VOL__PATH_BASE;
     return __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512bw") && __builtin_cpu_supports("avx512dq") &&
-                   __builtin_cpu_supports("avx512vl") && __builtin_cpu_supports("avx512bitalg") &&
-                   __builtin_cpu_supports("avx512vbmi") && __builtin_cpu_supports("avx512vbmi2") && __builtin_cpu_supports("avx512vpopcntdq") &&
-                   __builtin_cpu_supports("gfni") &&
+                   __builtin_cpu_supports("avx512vl") && __builtin_cpu_supports("avx512bitalg") && __builtin_cpu_supports("avx512vbmi") &&
+                   __builtin_cpu_supports("avx512vbmi2") && __builtin_cpu_supports("avx512vpopcntdq") && __builtin_cpu_supports("gfni") &&
                    __builtin_cpu_supports("bmi") && __builtin_cpu_supports("bmi2")
                ? ISOGI_VOL__PATH_AVX512
                : ISOGI_VOL__PATH_AVX2;
@@ -3309,7 +3349,8 @@ ISOGI_VOL__TARGET("avx2") ISOGI_VOL__INLINE uint64_t isogi_vol__node_mask_avx2(c
     return (uint64_t)(uint32_t)_mm256_movemask_epi8(in0) | (uint64_t)(uint32_t)_mm256_movemask_epi8(in1) << 32;
 }
 
-ISOGI_VOL__TARGET("avx2") ISOGI_VOL__INLINE uint64_t isogi_vol__leaf_mask_avx2(const uint8_t node[128], float level, isogi_vol__leaf *leaf) {
+ISOGI_VOL__TARGET("avx2")
+ISOGI_VOL__INLINE uint64_t isogi_vol__leaf_mask_avx2(const uint8_t node[128], float level, isogi_vol__leaf *leaf) {
     const __m256i *v = (const __m256i *)(const void *)node;
     __m256i inside, outside;
     isogi_vol__open_leaf(leaf, node, level);
@@ -3327,7 +3368,8 @@ ISOGI_VOL__TARGET("avx2") ISOGI_VOL__INLINE __m256d isogi_vol__lerp4(__m256d a, 
 
 /* All bits of one of four lanes set; -1: of none. */
 ISOGI_VOL__TARGET("avx2") ISOGI_VOL__INLINE __m256d isogi_vol__lane(int i) {
-    static const uint64_t lane[5][4] = {{0, 0, 0, 0}, {~(uint64_t)0, 0, 0, 0}, {0, ~(uint64_t)0, 0, 0}, {0, 0, ~(uint64_t)0, 0}, {0, 0, 0, ~(uint64_t)0}};
+    static const uint64_t lane[5][4] = {
+        {0, 0, 0, 0}, {~(uint64_t)0, 0, 0, 0}, {0, ~(uint64_t)0, 0, 0}, {0, 0, ~(uint64_t)0, 0}, {0, 0, 0, ~(uint64_t)0}};
     return _mm256_castsi256_pd(_mm256_loadu_si256((const __m256i *)(const void *)lane[i + 1]));
 }
 
@@ -3347,7 +3389,8 @@ ISOGI_VOL__TARGET("avx2") ISOGI_VOL__INLINE __m256d isogi_vol__corners4(const is
     }
     if (dx != 4) return ISOGI_VOL__FOUR(float);
 #undef ISOGI_VOL__FOUR
-    return _mm256_cvtps_pd(_mm_loadh_pi(_mm_castsi128_ps(_mm_loadl_epi64((const __m128i *)(const void *)p)), (const __m64 *)(const void *)q));
+    return _mm256_cvtps_pd(
+        _mm_loadh_pi(_mm_castsi128_ps(_mm_loadl_epi64((const __m128i *)(const void *)p)), (const __m64 *)(const void *)q));
 }
 
 /* Places in the cell, on its faces where they are within rounding of them. */
@@ -3368,8 +3411,10 @@ ISOGI_VOL__TARGET("avx2") static int isogi_vol__mixed_cell_avx2(isogi_vol__walk 
     const __m256d origin = _mm256_loadu_pd(w->origin), dir = _mm256_loadu_pd(w->dir), inverse = _mm256_loadu_pd(w->inverse);
     const __m256d in_lane = isogi_vol__lane(in), out_lane = isogi_vol__lane(axis < 0 ? 3 : axis);
     const __m256d cell = _mm256_cvtepi32_pd(_mm_setr_epi32(x, y, z, 0));
-    const __m256d enter = _mm256_and_pd(_mm256_cmp_pd(dir, zero, _CMP_LT_OQ), one), leave = _mm256_and_pd(_mm256_cmp_pd(dir, zero, _CMP_GT_OQ), one);
-    const __m256d segment_end = _mm256_set1_pd(w->end), way = _mm256_andnot_pd(_mm256_set1_pd(-0.0), _mm256_mul_pd(_mm256_set1_pd(w->base), dir));
+    const __m256d enter = _mm256_and_pd(_mm256_cmp_pd(dir, zero, _CMP_LT_OQ), one),
+                  leave = _mm256_and_pd(_mm256_cmp_pd(dir, zero, _CMP_GT_OQ), one);
+    const __m256d segment_end = _mm256_set1_pd(w->end),
+                  way = _mm256_andnot_pd(_mm256_set1_pd(-0.0), _mm256_mul_pd(_mm256_set1_pd(w->base), dir));
     const __m256d slack = _mm256_mul_pd(_mm256_set1_pd(ISOGI_VOL__ROUNDING), _mm256_add_pd(way, _mm256_loadu_pd(w->pyramid->box)));
     __m256d c0 = isogi_vol__corners4(v, p, dx, dy), c1 = isogi_vol__corners4(v, p + dz, dx, dy), begin, end, from, to, rest0, rest1;
     __m256d even, odd, low, high, near_x, far_x, near_y, far_y, f0, f1, b;
@@ -5058,8 +5103,8 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE __m512 isogi_vol__halves(__m512d low, __m512
     return _mm512_insertf32x8(_mm512_castps256_ps512(_mm512_cvtpd_ps(low)), _mm512_cvtpd_ps(high), 1);
 }
 
-/* Where a node begins, in cells as they are, which is where rays enter it by each axis; corner: of the node, counted backwards. Returns 1 / size
-   with its sign for each axis. */
+/* Where a node begins, in cells as they are, which is where rays enter it by each axis; corner: of the node, counted backwards. Returns 1
+   / size with its sign for each axis. */
 ISOGI_VOL__INLINE void isogi_vol__node_begins(int n, int64_t corner, int64_t backwards, double from[3], double step[3]) {
     const double size = (double)((int64_t)1 << 2 * n);
     int a;
@@ -5092,7 +5137,8 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE void isogi_vol__set_rays16(isogi_vol__rays16
 
 /* The layers of a node above the leaves. Times count from where the rays begin: these floats are off by less than 2^-21 of what the root
    measures; children are widened by twice as much. */
-ISOGI_VOL__AVX512 ISOGI_VOL__INLINE void isogi_vol__open_layers(isogi_vol__layers *l, const isogi_vol__rays16 *r, int n, int64_t cell, int64_t backwards) {
+ISOGI_VOL__AVX512 ISOGI_VOL__INLINE void isogi_vol__open_layers(isogi_vol__layers *l, const isogi_vol__rays16 *r, int n, int64_t cell,
+                                                                int64_t backwards) {
     const __m512 reach = _mm512_set1_ps(1e-6f * r->padded / (float)(1 << 2 * n));
     double from[3], step[3];
     int a;
@@ -5101,13 +5147,15 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE void isogi_vol__open_layers(isogi_vol__layer
     for (a = 0; a < 3; a++) {
         const __m512 at = _mm512_mul_ps(_mm512_sub_ps(r->origin[a], _mm512_set1_ps((float)from[a])), _mm512_set1_ps((float)step[a]));
         const __m512 per = _mm512_mul_ps(r->inverse[a], _mm512_set1_ps((float)(1 / step[a])));
-        l->per[a] = per, l->first[a] = _mm512_mul_ps(_mm512_add_ps(at, reach), per), l->last[a] = _mm512_mul_ps(_mm512_sub_ps(at, reach), per);
+        l->per[a] = per, l->first[a] = _mm512_mul_ps(_mm512_add_ps(at, reach), per),
+        l->last[a] = _mm512_mul_ps(_mm512_sub_ps(at, reach), per);
     }
     l->stop = r->stop;
 }
 
 /* Those of a leaf, from where the rays come to it, so that their places in cells are exact. */
-ISOGI_VOL__AVX512 static void isogi_vol__open_cells(isogi_vol__layers *l, isogi_vol__places *places, const isogi_vol__pool *s, int64_t cell, int64_t backwards) {
+ISOGI_VOL__AVX512 static void isogi_vol__open_cells(isogi_vol__layers *l, isogi_vol__places *places, const isogi_vol__pool *s, int64_t cell,
+                                                    int64_t backwards) {
     const __m512 most = _mm512_set1_ps(1e30f), reach = _mm512_set1_ps(ISOGI_VOL__REACH);
     double from[3], step[3];
     __m512d zero[2];
@@ -5119,7 +5167,8 @@ ISOGI_VOL__AVX512 static void isogi_vol__open_cells(isogi_vol__layers *l, isogi_
         zero[h] = _mm512_setzero_pd();
 #pragma GCC unroll 3
         for (a = 0; a < 3; a++)
-            zero[h] = _mm512_max_pd(zero[h], _mm512_mul_pd(_mm512_sub_pd(_mm512_set1_pd(from[a]), _mm512_load_pd(&s->origin[a][8 * h])), _mm512_load_pd(&s->inverse[a][8 * h])));
+            zero[h] = _mm512_max_pd(zero[h], _mm512_mul_pd(_mm512_sub_pd(_mm512_set1_pd(from[a]), _mm512_load_pd(&s->origin[a][8 * h])),
+                                                           _mm512_load_pd(&s->inverse[a][8 * h])));
         zero[h] = _mm512_min_pd(zero[h], _mm512_load_pd(&s->stop[8 * h]));
     }
     stop = isogi_vol__halves(_mm512_sub_pd(_mm512_load_pd(&s->stop[0]), zero[0]), _mm512_sub_pd(_mm512_load_pd(&s->stop[8]), zero[1]));
@@ -5131,8 +5180,11 @@ ISOGI_VOL__AVX512 static void isogi_vol__open_cells(isogi_vol__layers *l, isogi_
         const __m512d p0 = _mm512_mul_pd(_mm512_sub_pd(_mm512_fmadd_pd(zero[0], d0, _mm512_load_pd(&s->origin[a][0])), corner), unit);
         const __m512d p1 = _mm512_mul_pd(_mm512_sub_pd(_mm512_fmadd_pd(zero[1], d1, _mm512_load_pd(&s->origin[a][8])), corner), unit);
         const __m512 at = isogi_vol__halves(p0, p1);
-        const __m512 per = _mm512_min_ps(isogi_vol__halves(_mm512_mul_pd(_mm512_load_pd(&s->inverse[a][0]), unit), _mm512_mul_pd(_mm512_load_pd(&s->inverse[a][8]), unit)), most);
-        l->per[a] = per, l->first[a] = _mm512_mul_ps(_mm512_add_ps(at, reach), per), l->last[a] = _mm512_mul_ps(_mm512_sub_ps(at, reach), per);
+        const __m512 per = _mm512_min_ps(isogi_vol__halves(_mm512_mul_pd(_mm512_load_pd(&s->inverse[a][0]), unit),
+                                                           _mm512_mul_pd(_mm512_load_pd(&s->inverse[a][8]), unit)),
+                                         most);
+        l->per[a] = per, l->first[a] = _mm512_mul_ps(_mm512_add_ps(at, reach), per),
+        l->last[a] = _mm512_mul_ps(_mm512_sub_ps(at, reach), per);
         places->at[a] = at, places->dir[a] = isogi_vol__halves(_mm512_mul_pd(d0, unit), _mm512_mul_pd(d1, unit));
     }
     l->stop = stop;
@@ -5149,12 +5201,16 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE __m512 isogi_vol__leave16(const isogi_vol__l
     return _mm512_fmsub_ps(_mm512_set1_ps(isogi_vol__layer_numbers[layer + 1]), l->per[axis], l->last[axis]);
 }
 
-/* Cells of a leaf, for isovalue `step`: for which rays it is certain that they stay on one side. Like sides8, for one cell and many rays. */
-ISOGI_VOL__AVX512 ISOGI_VOL__INLINE __m512 isogi_vol__mix16(__m512 a, __m512 b, __m512 u) { return _mm512_fmadd_ps(u, _mm512_sub_ps(b, a), a); }
+/* Cells of a leaf, for isovalue `step`: for which rays it is certain that they stay on one side. Like sides8, for one cell and many rays.
+   */
+ISOGI_VOL__AVX512 ISOGI_VOL__INLINE __m512 isogi_vol__mix16(__m512 a, __m512 b, __m512 u) {
+    return _mm512_fmadd_ps(u, _mm512_sub_ps(b, a), a);
+}
 
 typedef struct isogi_vol__sides16 { unsigned in, out, in0, out0, in1, out1; } isogi_vol__sides16;
 
-ISOGI_VOL__AVX512 ISOGI_VOL__INLINE void isogi_vol__look16(isogi_vol__sides16 *sides, const isogi_vol__places *places, __m512 enter, __m512 leave, int child, const __m512i voxel[2], float step) {
+ISOGI_VOL__AVX512 ISOGI_VOL__INLINE void isogi_vol__look16(isogi_vol__sides16 *sides, const isogi_vol__places *places, __m512 enter,
+                                                           __m512 leave, int child, const __m512i voxel[2], float step) {
     static const uint8_t corners[16] = {0, 1, 5, 6, 25, 26, 30, 31};
     const __m512 zero = _mm512_setzero_ps(), one = _mm512_set1_ps(1);
     const __m512 low = _mm512_set1_ps(step - ISOGI_VOL__DOUBT), high = _mm512_set1_ps(step + ISOGI_VOL__DOUBT);
@@ -5164,7 +5220,8 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE void isogi_vol__look16(isogi_vol__sides16 *s
     __attribute__((aligned(32))) float corner[8];
     __m512 from[3], to[3], c[2][4], f[2][2][2], sum1, sum2;
     int k, e;
-    _mm256_store_ps(corner, _mm256_cvtepi32_ps(_mm256_cvtepu8_epi32(_mm512_castsi512_si128(_mm512_permutex2var_epi8(voxel[0], _mm512_castsi128_si512(index), voxel[1])))));
+    _mm256_store_ps(corner, _mm256_cvtepi32_ps(_mm256_cvtepu8_epi32(
+                                _mm512_castsi512_si128(_mm512_permutex2var_epi8(voxel[0], _mm512_castsi128_si512(index), voxel[1])))));
 #pragma GCC unroll 3
     for (k = 0; k < 3; k++) {
         const __m512 base = _mm512_sub_ps(places->at[k], _mm512_set1_ps((float)(k == 0 ? x : k == 1 ? y : z)));
@@ -5183,14 +5240,16 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE void isogi_vol__look16(isogi_vol__sides16 *s
         f[e][0][0] = isogi_vol__mix16(near0, near1, from[2]), f[e][0][1] = isogi_vol__mix16(near0, near1, to[2]);
         f[e][1][0] = isogi_vol__mix16(far0, far1, from[2]), f[e][1][1] = isogi_vol__mix16(far0, far1, to[2]);
     }
-    sum1 = _mm512_add_ps(f[1][0][0], _mm512_add_ps(f[0][1][0], f[0][0][1])), sum2 = _mm512_add_ps(f[0][1][1], _mm512_add_ps(f[1][0][1], f[1][1][0]));
+    sum1 = _mm512_add_ps(f[1][0][0], _mm512_add_ps(f[0][1][0], f[0][0][1])),
+    sum2 = _mm512_add_ps(f[0][1][1], _mm512_add_ps(f[1][0][1], f[1][1][0]));
     sides->in0 = _mm512_cmp_ps_mask(f[0][0][0], high, _CMP_GT_OQ), sides->out0 = _mm512_cmp_ps_mask(f[0][0][0], low, _CMP_LT_OQ);
     sides->in1 = _mm512_cmp_ps_mask(f[1][1][1], high, _CMP_GT_OQ), sides->out1 = _mm512_cmp_ps_mask(f[1][1][1], low, _CMP_LT_OQ);
     sides->in = sides->in0 & sides->in1 & _mm512_cmp_ps_mask(_mm512_min_ps(sum1, sum2), third_high, _CMP_GT_OQ);
     sides->out = sides->out0 & sides->out1 & _mm512_cmp_ps_mask(_mm512_max_ps(sum1, sum2), third_low, _CMP_LT_OQ);
 }
 
-/* Rays in doubt, each of its slot's cell: those that pass it are decided in double. Returns hits; in, out: the sides on which rays are known to be. */
+/* Rays in doubt, each of its slot's cell: those that pass it are decided in double. Returns hits; in, out: the sides on which rays are
+   known to be. */
 ISOGI_VOL__AVX512 static unsigned isogi_vol__settle(isogi_vol__batch *b, isogi_vol__pool *s, unsigned doubt, unsigned *in, unsigned *out) {
     const __m512i three = _mm512_set1_epi64(3), none = _mm512_set1_epi64(-1), zero = _mm512_setzero_si512();
     unsigned hits = 0;
@@ -5206,11 +5265,14 @@ ISOGI_VOL__AVX512 static unsigned isogi_vol__settle(isogi_vol__batch *b, isogi_v
         int a;
         if (!(doubt >> h & 255)) continue;
 #pragma GCC unroll 3
-        for (a = 0; a < 3; a++) origin[a] = _mm512_load_pd(&s->origin[a][h]), inverse[a] = _mm512_load_pd(&s->inverse[a][h]), dir[a] = _mm512_load_pd(&s->dir[a][h]);
+        for (a = 0; a < 3; a++)
+            origin[a] = _mm512_load_pd(&s->origin[a][h]), inverse[a] = _mm512_load_pd(&s->inverse[a][h]),
+            dir[a] = _mm512_load_pd(&s->dir[a][h]);
         isogi_vol__way8(cell, origin, inverse, dir, &begin, &end, from, to);
         passed = _mm512_mask_cmplt_epi64_mask((__mmask8)(doubt >> h), begin, end);
         if (!passed) continue;
-        cell = _mm512_or_si512(cell, _mm512_or_si512(_mm512_slli_epi64(_mm512_and_si512(begin, three), 48), _mm512_slli_epi64(_mm512_and_si512(end, three), 50)));
+        cell = _mm512_or_si512(cell, _mm512_or_si512(_mm512_slli_epi64(_mm512_and_si512(begin, three), 48),
+                                                     _mm512_slli_epi64(_mm512_and_si512(end, three), 50)));
         _mm512_mask_store_epi64(&s->cell[h], passed, cell);
         _mm512_store_si512(&s->side[h], _mm512_mask_mov_epi64(none, known, _mm512_maskz_set1_epi64(inside, 1)));
         _mm_storel_epi64((__m128i *)(void *)slots, _mm_add_epi8(_mm_set1_epi8((char)h), _mm_set_epi64x(0, 0x0706050403020100)));
@@ -5250,8 +5312,12 @@ ISOGI_VOL__AVX512 static int isogi_vol__coincide(const isogi_vol__pool *s, unsig
         __mmask8 off = _mm512_mask_cmp_pd_mask(here, isovalue, _mm512_setzero_pd(), _CMP_NEQ_UQ);
         off |= _mm512_mask_cmpneq_epi64_mask(here, _mm512_load_si512(&s->flip[8 * h]), _mm512_set1_epi64(s->flip[first]));
         for (a = 0; a < 3; a++) {
-            off |= _mm512_mask_cmp_pd_mask(here, _mm512_abs_pd(_mm512_sub_pd(_mm512_load_pd(&s->dir[a][8 * h]), _mm512_set1_pd(s->dir[a][first]))), _mm512_set1_pd(0.06 * most), _CMP_GT_OQ);
-            off |= _mm512_mask_cmp_pd_mask(here, _mm512_abs_pd(_mm512_sub_pd(_mm512_load_pd(&s->origin[a][8 * h]), _mm512_set1_pd(s->origin[a][first]))), _mm512_set1_pd(8), _CMP_GT_OQ);
+            off |= _mm512_mask_cmp_pd_mask(
+                here, _mm512_abs_pd(_mm512_sub_pd(_mm512_load_pd(&s->dir[a][8 * h]), _mm512_set1_pd(s->dir[a][first]))),
+                _mm512_set1_pd(0.06 * most), _CMP_GT_OQ);
+            off |= _mm512_mask_cmp_pd_mask(
+                here, _mm512_abs_pd(_mm512_sub_pd(_mm512_load_pd(&s->origin[a][8 * h]), _mm512_set1_pd(s->origin[a][first]))),
+                _mm512_set1_pd(8), _CMP_GT_OQ);
         }
         if (off) return 0;
     }
@@ -5266,7 +5332,8 @@ typedef struct __attribute__((aligned(64))) isogi_vol__beam {
     int axis, second, third;
 } isogi_vol__beam;
 
-ISOGI_VOL__AVX512 static void isogi_vol__set_beam(isogi_vol__beam *beam, const isogi_vol__pool *s, unsigned rays, int64_t backwards, int levels) {
+ISOGI_VOL__AVX512 static void isogi_vol__set_beam(isogi_vol__beam *beam, const isogi_vol__pool *s, unsigned rays, int64_t backwards,
+                                                  int levels) {
     static const int after[5] = {0, 1, 2, 0, 1};
     const int first = __builtin_ctz(rays);
     __m512d place[3][2], way[3][2];
@@ -5286,7 +5353,8 @@ ISOGI_VOL__AVX512 static void isogi_vol__set_beam(isogi_vol__beam *beam, const i
     for (h = 0; h < 2; h++) {
         const __mmask8 here = (__mmask8)(rays >> 8 * h);
         const __m512d to = _mm512_fmadd_pd(_mm512_load_pd(&s->stop[8 * h]), way[0][h], place[0][h]);
-        begin = isogi_vol__min(begin, _mm512_mask_reduce_min_pd(here, place[0][h])), end = isogi_vol__max(end, _mm512_mask_reduce_max_pd(here, to));
+        begin = isogi_vol__min(begin, _mm512_mask_reduce_min_pd(here, place[0][h])),
+        end = isogi_vol__max(end, _mm512_mask_reduce_max_pd(here, to));
     }
     length = isogi_vol__max(end - begin, 1e-3), beam->from = (float)begin, beam->to = (float)end;
     for (a = 1; a < 3; a++) {
@@ -5296,7 +5364,8 @@ ISOGI_VOL__AVX512 static void isogi_vol__set_beam(isogi_vol__beam *beam, const i
                 const __mmask8 here = (__mmask8)(rays >> 8 * h);
                 const __m512d on = _mm512_sub_pd(_mm512_set1_pd(begin + (e ? length : 0)), place[0][h]);
                 const __m512d at = _mm512_fmadd_pd(_mm512_maskz_div_pd(here, way[a][h], way[0][h]), on, place[a][h]);
-                least[e] = isogi_vol__min(least[e], _mm512_mask_reduce_min_pd(here, at)), most[e] = isogi_vol__max(most[e], _mm512_mask_reduce_max_pd(here, at));
+                least[e] = isogi_vol__min(least[e], _mm512_mask_reduce_min_pd(here, at)),
+                most[e] = isogi_vol__max(most[e], _mm512_mask_reduce_max_pd(here, at));
             }
         for (h = 4 * a - 4; h < 4 * a; h++) {
             beam->base[h] = (float)(least[0] - slack), beam->slope[h] = (float)((least[1] - least[0]) / length);
@@ -5311,7 +5380,8 @@ ISOGI_VOL__AVX512 static void isogi_vol__set_beam(isogi_vol__beam *beam, const i
 #define ISOGI_VOL__SET_X(m) ISOGI_VOL__SET(m, (uint64_t)0x1111111111111111u, 1)
 #define ISOGI_VOL__SET_Y(m) ISOGI_VOL__SET(m, (uint64_t)0x000f000f000f000fu, 4)
 #define ISOGI_VOL__SET_Z(m) ISOGI_VOL__SET(m, (uint64_t)0xffffu, 16)
-static const uint64_t isogi_vol__sets[3][16] = {{ISOGI_VOL__SETS(ISOGI_VOL__SET_X)}, {ISOGI_VOL__SETS(ISOGI_VOL__SET_Y)}, {ISOGI_VOL__SETS(ISOGI_VOL__SET_Z)}};
+static const uint64_t isogi_vol__sets[3][16] = {
+    {ISOGI_VOL__SETS(ISOGI_VOL__SET_X)}, {ISOGI_VOL__SETS(ISOGI_VOL__SET_Y)}, {ISOGI_VOL__SETS(ISOGI_VOL__SET_Z)}};
 static const uint64_t isogi_vol__layer_sets[3][4] = {{ISOGI_VOL__SET_X(1), ISOGI_VOL__SET_X(2), ISOGI_VOL__SET_X(4), ISOGI_VOL__SET_X(8)},
                                                      {ISOGI_VOL__SET_Y(1), ISOGI_VOL__SET_Y(2), ISOGI_VOL__SET_Y(4), ISOGI_VOL__SET_Y(8)},
                                                      {ISOGI_VOL__SET_Z(1), ISOGI_VOL__SET_Z(2), ISOGI_VOL__SET_Z(4), ISOGI_VOL__SET_Z(8)}};
@@ -5324,15 +5394,18 @@ static const uint64_t isogi_vol__layer_sets[3][4] = {{ISOGI_VOL__SET_X(1), ISOGI
 /* Those of four sets, one a lane. */
 ISOGI_VOL__AVX512 ISOGI_VOL__INLINE __m512i isogi_vol__in_sets(int axis, __m128i sets) {
     const uint64_t *all = isogi_vol__sets[axis];
-    return _mm512_permutex2var_epi64(_mm512_loadu_si512(all), _mm512_castsi256_si512(_mm256_cvtepu32_epi64(sets)), _mm512_loadu_si512(all + 8));
+    return _mm512_permutex2var_epi64(_mm512_loadu_si512(all), _mm512_castsi256_si512(_mm256_cvtepu32_epi64(sets)),
+                                     _mm512_loadu_si512(all + 8));
 }
 
 /* Children of a node of level n that the beam may meet; cell: its corner, counted backwards. */
 ISOGI_VOL__AVX512 ISOGI_VOL__INLINE uint64_t isogi_vol__in_beam(const isogi_vol__beam *beam, int n, int64_t cell) {
     const float size = (float)(1 << 2 * n);
     const __m512 low = _mm512_set1_ps(beam->from), upper = _mm512_setr_ps(0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1);
-    const __m512 plane = _mm512_fmadd_ps(_mm512_setr_ps(0, 1, 2, 3, 0, 1, 2, 3, 1, 2, 3, 4, 1, 2, 3, 4), _mm512_set1_ps(size), _mm512_set1_ps((float)(cell >> 16 * beam->axis & 0xffff)));
-    const __m512 side = _mm512_mask_blend_ps(0xf0f0, _mm512_set1_ps((float)(cell >> 16 * beam->second & 0xffff)), _mm512_set1_ps((float)(cell >> 16 * beam->third & 0xffff)));
+    const __m512 plane = _mm512_fmadd_ps(_mm512_setr_ps(0, 1, 2, 3, 0, 1, 2, 3, 1, 2, 3, 4, 1, 2, 3, 4), _mm512_set1_ps(size),
+                                         _mm512_set1_ps((float)(cell >> 16 * beam->axis & 0xffff)));
+    const __m512 side = _mm512_mask_blend_ps(0xf0f0, _mm512_set1_ps((float)(cell >> 16 * beam->second & 0xffff)),
+                                             _mm512_set1_ps((float)(cell >> 16 * beam->third & 0xffff)));
     const __m512 way = _mm512_sub_ps(_mm512_min_ps(_mm512_max_ps(plane, low), _mm512_set1_ps(beam->to)), low);
     __m512 bound = _mm512_sub_ps(_mm512_fmadd_ps(way, _mm512_load_ps(beam->slope), _mm512_load_ps(beam->base)), side);
     __m512i bits, met;
@@ -5353,7 +5426,8 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE uint64_t isogi_vol__in_beam(const isogi_vol_
 ISOGI_VOL__AVX512 static void isogi_vol__trace_packet(isogi_vol__batch *b, isogi_vol__pool *s, unsigned rays) {
     const isogi_pyramid *p = b->pyramid;
     const struct isogi_vol__ways *ways = p->ways;
-    const int first = __builtin_ctz(rays), flip = (int)s->flip[first], octant = (int)_pext_u32((unsigned)flip, 0x15), low = (int)s->low[first], high = (int)s->beyond[first] - 1;
+    const int first = __builtin_ctz(rays), flip = (int)s->flip[first], octant = (int)_pext_u32((unsigned)flip, 0x15),
+              low = (int)s->low[first], high = (int)s->beyond[first] - 1;
     const float level = (float)s->level_units[first];
     const int64_t backwards = (int64_t)((_pdep_u64((uint64_t)octant, 0x000100010001u)) * (((uint64_t)1 << 2 * p->node_levels) - 1));
     const uint8_t *children[ISOGI_VOL__NODE_LEVELS], *node = p->nodes[p->node_level[p->node_levels - 1].first];
@@ -5386,7 +5460,8 @@ ISOGI_VOL__AVX512 static void isogi_vol__trace_packet(isogi_vol__batch *b, isogi
                 const int64_t at = cell ^ backwards;
                 const int shift = 2 * n + 2;
                 children[n] = p->nodes[below->first + 64 * ((size_t)(at & 0xffff) >> shift) +
-                                       64 * below->parents[0] * (((size_t)(at >> 16 & 0xffff) >> shift) + below->parents[1] * ((size_t)(at >> 32) >> shift))];
+                                       64 * below->parents[0] *
+                                           (((size_t)(at >> 16 & 0xffff) >> shift) + below->parents[1] * ((size_t)(at >> 32) >> shift))];
             }
         }
         /* on to the next child that some rays meet */
@@ -5398,12 +5473,14 @@ ISOGI_VOL__AVX512 static void isogi_vol__trace_packet(isogi_vol__batch *b, isogi
                 if (++n == p->node_levels) goto out;
             l = &layers[n];
             child = __builtin_ctzll(left[n]), left[n] &= left[n] - 1;
-            enter = _mm512_max_ps(isogi_vol__enter16(l, 0, child & 3), _mm512_setzero_ps()), leave = _mm512_min_ps(isogi_vol__leave16(l, 0, child & 3), l->stop);
+            enter = _mm512_max_ps(isogi_vol__enter16(l, 0, child & 3), _mm512_setzero_ps()),
+            leave = _mm512_min_ps(isogi_vol__leave16(l, 0, child & 3), l->stop);
             enter = _mm512_max_ps(enter, _mm512_max_ps(isogi_vol__enter16(l, 1, child >> 2 & 3), isogi_vol__enter16(l, 2, child >> 4)));
             leave = _mm512_min_ps(leave, _mm512_min_ps(isogi_vol__leave16(l, 1, child >> 2 & 3), isogi_vol__leave16(l, 2, child >> 4)));
             lanes &= _mm512_cmp_ps_mask(enter, leave, _CMP_LE_OQ);
             if (!lanes) continue;
-            cell = (int64_t)(((uint64_t)cell & 0x0000ffffffffffffu & ~(0x000100010001u * ((4u << 2 * n) - 1))) | _pdep_u64((uint64_t)child, 0x000300030003u) << 2 * n);
+            cell = (int64_t)(((uint64_t)cell & 0x0000ffffffffffffu & ~(0x000100010001u * ((4u << 2 * n) - 1))) |
+                             _pdep_u64((uint64_t)child, 0x000300030003u) << 2 * n);
             if (n) {
                 node = children[n] + 128 * (child ^ flip);
                 break;
@@ -5417,7 +5494,9 @@ ISOGI_VOL__AVX512 static void isogi_vol__trace_packet(isogi_vol__batch *b, isogi
                 b->work.cells += (uint64_t)__builtin_popcount(lanes);
                 /* what is certain to be a hit is worked out at the end, all at once */
                 if (!b->occluded || doubt)
-                    for (child = 0; child < 2; child++) _mm512_mask_store_epi64(&s->cell[8 * child], (__mmask8)((hit | doubt) >> 8 * child), _mm512_set1_epi64(cell ^ backwards));
+                    for (child = 0; child < 2; child++)
+                        _mm512_mask_store_epi64(&s->cell[8 * child], (__mmask8)((hit | doubt) >> 8 * child),
+                                                _mm512_set1_epi64(cell ^ backwards));
                 if (hit && b->hits) isogi_vol__send_for(&p->volume, cell ^ backwards);
                 hits |= hit, active &= ~hit;
                 if (doubt) active &= ~isogi_vol__settle(b, s, doubt, &in, &out);
@@ -5447,7 +5526,8 @@ ISOGI_VOL__AVX512 static void isogi_vol__move(isogi_vol__pool *s, isogi_vol__tur
     unsigned l = leave, t = take;
     int i;
     for (i = 0; i < (int)(sizeof *s / sizeof s->ray); i++, row += sizeof s->ray)
-        _mm512_store_si512(row + 64 * to, _mm512_mask_expand_epi64(_mm512_load_si512(row + 64 * to), take, _mm512_maskz_compress_epi64(leave, _mm512_load_si512(row + 64 * from))));
+        _mm512_store_si512(row + 64 * to, _mm512_mask_expand_epi64(_mm512_load_si512(row + 64 * to), take,
+                                                                   _mm512_maskz_compress_epi64(leave, _mm512_load_si512(row + 64 * from))));
     _mm512_mask_store_epi64(&s->level[8 * from], leave, _mm512_set1_epi64(-1));
     _mm512_store_si512(place, _mm512_load_si512(turn->p->ways->child[0]));
     for (; l; l &= l - 1, t &= t - 1) place[8 * from + __builtin_ctz(l)] = (uint8_t)(8 * to + __builtin_ctz(t));
@@ -5494,7 +5574,8 @@ static int isogi_vol__seat_odd(isogi_vol__batch *b, isogi_vol__pool *s, size_t i
 }
 
 /* Takes rays into open slots until there are none of either, but not for the sake of a few slots. */
-ISOGI_VOL__AVX512 ISOGI_VOL__INLINE uint64_t isogi_vol__fill_pool(isogi_vol__batch *b, isogi_vol__pool *s, uint64_t slots, uint64_t open, size_t *next, size_t count) {
+ISOGI_VOL__AVX512 ISOGI_VOL__INLINE uint64_t isogi_vol__fill_pool(isogi_vol__batch *b, isogi_vol__pool *s, uint64_t slots, uint64_t open,
+                                                                  size_t *next, size_t count) {
     while (open && *next < count) {
         const size_t rays = count - *next;
         const int room = __builtin_popcountll(open), n = rays < 8 ? room < (int)rays ? room : (int)rays : room < 8 ? room : 8;
@@ -5502,7 +5583,8 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE uint64_t isogi_vol__fill_pool(isogi_vol__bat
         unsigned odd, seated;
         int k;
         if (room < 6 && open != slots && rays > (size_t)room) break;
-        _mm_storeu_si128((__m128i *)(void *)list, _mm512_castsi512_si128(_mm512_maskz_compress_epi8(open, _mm512_load_si512(b->pyramid->ways->child[0]))));
+        _mm_storeu_si128((__m128i *)(void *)list,
+                         _mm512_castsi512_si128(_mm512_maskz_compress_epi8(open, _mm512_load_si512(b->pyramid->ways->child[0]))));
         seated = isogi_vol__seat8(b, s, *next, n, list, &odd);
         for (k = 0; k < n; k++, ++*next) {
             if (seated >> k & 1 || (odd >> k & 1 && isogi_vol__seat_odd(b, s, *next, list[k]))) open &= ~((uint64_t)1 << list[k]);
@@ -5515,7 +5597,8 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE uint64_t isogi_vol__fill_pool(isogi_vol__bat
 }
 
 /* The stage in double, for `waits` rays or more at a time; returns the slots that it leaves open. */
-ISOGI_VOL__AVX512 ISOGI_VOL__INLINE uint64_t isogi_vol__decide_all(isogi_vol__batch *b, isogi_vol__turn *turn, isogi_vol__pool *s, int waits) {
+ISOGI_VOL__AVX512 ISOGI_VOL__INLINE uint64_t isogi_vol__decide_all(isogi_vol__batch *b, isogi_vol__turn *turn, isogi_vol__pool *s,
+                                                                   int waits) {
     uint64_t open = 0;
     int first, n, k;
     for (first = 0; turn->doubts - first >= waits; first += n) {
@@ -5539,7 +5622,8 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE uint64_t isogi_vol__decide_all(isogi_vol__ba
 }
 
 /* The stage in float, likewise. */
-ISOGI_VOL__AVX512 ISOGI_VOL__INLINE uint64_t isogi_vol__look_all(isogi_vol__batch *b, isogi_vol__turn *turn, isogi_vol__pool *s, int waits) {
+ISOGI_VOL__AVX512 ISOGI_VOL__INLINE uint64_t isogi_vol__look_all(isogi_vol__batch *b, isogi_vol__turn *turn, isogi_vol__pool *s,
+                                                                 int waits) {
     const int before = turn->doubts;
     uint64_t open = 0;
     int first, n, again;
@@ -5641,7 +5725,8 @@ ISOGI_VOL__AVX512 static void isogi_vol__trace_pool(isogi_vol__batch *b, size_t 
 static isogi_result isogi_vol__trace(isogi_vol__batch *b, size_t count, isogi_counters *counters) {
     size_t i = 0;
 #ifdef ISOGI_VOL__AVX
-    if (b->pyramid->fast && b->pyramid->path == ISOGI_VOL__PATH_AVX512 && (count > 3 || b->pyramid->context.force_path == ISOGI_VOL__PATH_AVX512))
+    if (b->pyramid->fast && b->pyramid->path == ISOGI_VOL__PATH_AVX512 &&
+        (count > 3 || b->pyramid->context.force_path == ISOGI_VOL__PATH_AVX512))
         isogi_vol__trace_pool(b, count), i = count;
 #endif
     for (; i < count; i++) isogi_vol__trace_one(b, i);
@@ -5719,8 +5804,8 @@ static void isogi_vol__follow_on(const isogi_pyramid *pyramid, isogi_vol__follow
             const isogi_ray *other = &rays[f->ray[end]];
             if (other->isovalue < ray->isovalue || other->isovalue > ray->isovalue || other->flags != ray->flags) break;
         }
-        isogi_vol_continue(pyramid, f->start + first, (const float(*)[3])f->dir + first, f->tmax + first, ray->isovalue, ray->flags | ISOGI_RAY_ONWARD, end - first,
-                           f->hit + first, counters);
+        isogi_vol_continue(pyramid, f->start + first, (const float(*)[3])f->dir + first, f->tmax + first, ray->isovalue,
+                           ray->flags | ISOGI_RAY_ONWARD, end - first, f->hit + first, counters);
     }
     for (i = 0; i < f->count; i++) f->hit[i].t += f->start[i].t;
 }
@@ -5911,7 +5996,8 @@ static double isogi_vol__hessian(const isogi_field *f, const double low[3], cons
 }
 
 /* The box of cells low..high in the world. */
-ISOGI_VOL__COLD static void isogi_vol__world_box(const isogi_pyramid *p, const int low[3], const int high[3], double from[3], double to[3]) {
+ISOGI_VOL__COLD static void isogi_vol__world_box(const isogi_pyramid *p, const int low[3], const int high[3], double from[3],
+                                                 double to[3]) {
     int a;
     for (a = 0; a < 3; a++) {
         from[a] = p->volume.origin[a] + p->volume.spacing[a] * low[a];
@@ -5965,7 +6051,8 @@ static int isogi_vol__probe_at(isogi_vol__walk *w, double t, isogi_vol__probe *p
 
 /* The only root between two probes of different sides: Newton within a bracket that shrinks. */
 static double isogi_vol__field_root(isogi_vol__walk *w, const isogi_vol__probe *from, const isogi_vol__probe *to, int inside) {
-    double low = from->t, high = to->t, least = 1e-16 * (fabs(low) + fabs(high)), t = low + (high - low) * (from->value / (from->value - to->value)), next;
+    double low = from->t, high = to->t, least = 1e-16 * (fabs(low) + fabs(high)),
+           t = low + (high - low) * (from->value / (from->value - to->value)), next;
     isogi_vol__probe at;
     int i;
     if (!(t > low && t < high)) t = 0.5 * (low + high);
@@ -6270,8 +6357,8 @@ static int isogi_vol__find_passage(const double f[8], isogi_vol__passage *passag
 }
 
 /* The two loops that a passage connects: each separates one of the regions it joins from the region it cuts. */
-static int isogi_vol__passage_loops(const double f[8], unsigned code, const isogi_vol__passage *passage, const isogi_vol__loop *loop, int loops,
-                                    int ends[2]) {
+static int isogi_vol__passage_loops(const double f[8], unsigned code, const isogi_vol__passage *passage, const isogi_vol__loop *loop,
+                                    int loops, int ends[2]) {
     int next[12], region[8], n, i, cut = passage->cut;
     isogi_vol__trace_faces(f, code, next, region);
     if ((int)(code >> cut & 1) == passage->inside) cut += 4;
@@ -6715,7 +6802,8 @@ static void isogi_vol__walk_corners(const isogi_vol__mesher *m, const isogi_vol_
 }
 
 /* The border faces of a cell on which something is inside, as bits. */
-ISOGI_VOL__COLD static unsigned isogi_vol__capped_faces(const isogi_vol__mesher *m, const isogi_vol__cell_walk *walk, int i, unsigned code) {
+ISOGI_VOL__COLD static unsigned isogi_vol__capped_faces(const isogi_vol__mesher *m, const isogi_vol__cell_walk *walk, int i,
+                                                        unsigned code) {
     unsigned faces = (i == 0 ? 1u : 0u) | (i == m->nx - 2 ? 2u : 0u) | (walk->j == 0 ? 4u : 0u) | (walk->j == m->ny - 2 ? 8u : 0u) |
                      (walk->k == 0 ? 16u : 0u) | (walk->k == m->nz - 2 ? 32u : 0u);
     static const uint8_t corners[6] = {0x55, 0xaa, 0x33, 0xcc, 0x0f, 0xf0};
@@ -6856,7 +6944,8 @@ static void isogi_vol__edge_normal(const isogi_vol__mesher *m, size_t at, int ax
     double n[3], gradient[3];
     int a, whole = 1;
     for (a = 0; a < 3; a++) {
-        whole = whole && (voxel[a] >= 1 || v->halo_low[a]) && voxel[a] + (a == axis ? 2 : 1) <= m->pyramid->cells[a] + (v->halo_high[a] ? 1 : 0);
+        whole = whole && (voxel[a] >= 1 || v->halo_low[a]) &&
+                voxel[a] + (a == axis ? 2 : 1) <= m->pyramid->cells[a] + (v->halo_high[a] ? 1 : 0);
         stride[a] = v->stride[(axis + a) % 3];
     }
     if (whole) {
@@ -6900,7 +6989,8 @@ static void isogi_vol__emit_vertices(const isogi_vol__mesher *m, int j, int k) {
                     double from = isogi_vol__voxel(v, p), to = isogi_vol__voxel(v, p + v->stride[axis]);
                     u = isogi_vol__clamp((m->isovalue - from) / (to - from), 1);
                 }
-                for (a = 0; a < 3; a++) m->positions[at][a] = (float)(begin[a] + (((double)v->first[0] + i) * t[3 * a] + u * t[3 * a + axis]));
+                for (a = 0; a < 3; a++)
+                    m->positions[at][a] = (float)(begin[a] + (((double)v->first[0] + i) * t[3 * a] + u * t[3 * a + axis]));
                 if (!m->normals) continue;
                 voxel[0] = i, voxel[1] = j, voxel[2] = k;
                 if (kind < 3) isogi_vol__edge_normal(m, at, kind, voxel, u, p);
@@ -6934,7 +7024,8 @@ static void isogi_vol__emit_undecided(const isogi_vol__mesher *m, isogi_vol__cel
         for (n = 0; n < patch.triangles; n++) isogi_vol__emit_triangle(m, at, id, patch.triangle[n]);
     }
     if (!caps) return;
-    for (n = 0; n < 4; n++) id[12 + 2 * n] = walk->vertex[8 + n], id[13 + 2 * n] = walk->vertex[8 + n] + (uint32_t)(walk->carries[8 + n] >> bit & 1);
+    for (n = 0; n < 4; n++)
+        id[12 + 2 * n] = walk->vertex[8 + n], id[13 + 2 * n] = walk->vertex[8 + n] + (uint32_t)(walk->carries[8 + n] >> bit & 1);
     for (f = 0; f < 6; f++) {
         if (!(caps >> f & 1)) continue;
         isogi_vol__patch_cap(&patch, corner, code, f);
@@ -7075,7 +7166,8 @@ ISOGI_VOL__COLD static void *isogi_vol__mesh_room(const isogi_context *context, 
 }
 
 /* All or nothing: the old buffers go when all of the new ones are there. */
-ISOGI_VOL__COLD static isogi_result isogi_vol__mesh_reserve(const isogi_context *context, isogi_mesh *mesh, size_t vertices, size_t triangles, int normals) {
+ISOGI_VOL__COLD static isogi_result isogi_vol__mesh_reserve(const isogi_context *context, isogi_mesh *mesh, size_t vertices,
+                                                            size_t triangles, int normals) {
     size_t room[3], need[3];
     void *old[3], *got[3];
     int n, complete = 1;
