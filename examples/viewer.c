@@ -394,10 +394,17 @@ static int check_transfer(viewer *v, int suggested) {
    may be replaced by --out.) */
 static int check_files(viewer *v) {
     const options *o = &v->o;
-    const char *const names[] = {o->volume, o->tf, o->env}, *const options_of[] = {"VOLUME", "--tf", "--env"};
+    const scene *s = o->scene;
+    const char *const folder = getenv("ISOGI_DATA"), *const of_scene[] = {s ? s->volume : NULL, s ? s->env : NULL, s ? s->dvr_env : NULL};
+    const char *names[] = {o->volume, o->tf, o->env, NULL, NULL, NULL},
+               *const options_of[] = {"VOLUME", "--tf", "--env", "--scene", "--scene", "--scene"};
+    char paths[3][PATH_MAX];
+    for (int i = 0; i < 3 && folder; i++)
+        if (of_scene[i] && (size_t)snprintf(paths[i], sizeof paths[i], "%s/%s", folder, of_scene[i]) < sizeof paths[i])
+            names[3 + i] = paths[i];
     if (file_same(o->out, o->depth)) return file_fail(v->error, "--depth: %.200s is the file of --out", o->depth);
     if (file_same(o->depth, o->compare)) return file_fail(v->error, "--depth: %.200s is the file of --compare", o->depth);
-    for (int i = 0; i < 3; i++)
+    for (int i = 0; i < 6; i++)
         if (file_same(o->out, names[i]) || file_same(o->depth, names[i]))
             return file_fail(v->error, "%s: %.200s is the file of %s", file_same(o->out, names[i]) ? "--out" : "--depth", names[i],
                              options_of[i]);

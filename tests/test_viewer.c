@@ -916,4 +916,30 @@ TEST(real_volumes_are_shown) {
     free(path);
 }
 
+/* What a scene is made of is kept, too: its volume, and its environment. */
+TEST(data_of_scenes_is_not_overwritten) {
+    static const char *const bad[][2] = {{"--scene fuel --out '%s/fuel_64x64x64_uint8.raw'", "--out: %s/fuel_64x64x64_uint8.raw"},
+                                         {"--scene fuel --out '%s/never.png' --depth '%s/./fuel_64x64x64_uint8.raw'", "--depth: "},
+                                         {"--scene engine --out '%s/grace_256x128.hdr'", "is the file of --scene"}};
+    static unsigned char zero[64 * 64 * 64];
+    const char *volume = temporary("fuel_64x64x64_uint8.raw"), *given = getenv("ISOGI_DATA");
+    char command[1024], say[512], path[512], *kept = given ? strdup(given) : NULL;
+    struct stat status;
+    write_bytes(volume, zero, sizeof zero);
+    snprintf(path, sizeof path, "%s/hdr", folder), mkdir(path, 0777);
+    write_bytes(temporary("grace_256x128.hdr"), zero, 100);
+    snprintf(path, sizeof path, "%s/hdr/grace_256x128.hdr", folder);
+    CHECK(symlink("../grace_256x128.hdr", path) == 0, "%s", path);
+    setenv("ISOGI_DATA", folder, 1);
+    for (size_t i = 0; i < 3; i++) {
+        snprintf(command, sizeof command, bad[i][0], folder, folder), snprintf(say, sizeof say, bad[i][1], folder);
+        check_refused(command, say);
+    }
+    if (kept) setenv("ISOGI_DATA", kept, 1);
+    else unsetenv("ISOGI_DATA");
+    free(kept);
+    CHECK(stat(volume, &status) == 0 && status.st_size == (off_t)sizeof zero, "%s was overwritten", volume);
+    CHECK(stat(path, &status) == 0 && status.st_size == 100, "%s was overwritten", path);
+}
+
 TEST_MAIN("viewer")
