@@ -276,18 +276,8 @@ TEST(nothing_leaks_into_a_closed_cavity) {
         scene s = scene_make(32, 32, 32, NULL, variant < 2 ? shell : rough_shell, q);
         isogi_trace_desc d = desc_make(&s, 0.9f, 20, LONG_SUITE ? 256 : 32);
         float points[100][3], e[100][3];
-        test_random r = {8};
         d.lighting.lights = &sun, d.lighting.light_count = 1, d.offset = variant & 1 ? -1 : 0;
-        for (int i = 0; i < 100; i++) {
-            isogi_ray ray;
-            isogi_hit hit = {0, {0, 0, 0}, {0, 0, 0}, 0};
-            double w[3];
-            random_direction(&r, w);
-            memset(&ray, 0, sizeof ray);
-            for (int a = 0; a < 3; a++) ray.origin[a] = 15.5, ray.dir[a] = (float)w[a];
-            isogi_vol_intersect(s.pyramid, &ray, 1, &hit, NULL);
-            isogi_vol_positions(s.pyramid, &hit, 1, (float(*)[3])points[i]);
-        }
+        points_seen_from(&s, 15.5, 8, 100, points);
         isogi_trace_gather(&d, (const float(*)[3])points, NULL, 100, e, NULL, NULL);
         for (int i = 0; i < 100; i++) CHECK(e[i][0] <= 0 && e[i][1] <= 0, "variant %d, point %d: E %g", variant, i, (double)e[i][0]);
         scene_free(&s);

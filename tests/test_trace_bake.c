@@ -91,17 +91,7 @@ TEST(closed_glowing_cavity_follows_its_closed_form) {
     scene s = scene_make(32, 32, 32, NULL, shell, q);
     isogi_albedo_point glow[1] = {{0, {0.5f, 1, 2}}};
     float points[50][3], e[50][3];
-    test_random r = {4};
-    for (int i = 0; i < 50; i++) {
-        isogi_ray ray;
-        isogi_hit hit = {0};
-        double w[3];
-        random_direction(&r, w);
-        memset(&ray, 0, sizeof ray);
-        for (int a = 0; a < 3; a++) ray.origin[a] = 15.5, ray.dir[a] = (float)w[a];
-        isogi_vol_intersect(s.pyramid, &ray, 1, &hit, NULL);
-        isogi_vol_positions(s.pyramid, &hit, 1, (float(*)[3])points[i]);
-    }
+    points_seen_from(&s, 15.5, 4, 50, points);
     for (int bounces = -1; bounces < 3; bounces++) {
         isogi_trace_desc d = feedback(&s, 0.6f, bounces, 16);
         double expected = PI / (1 - 0.6), worst = 0;

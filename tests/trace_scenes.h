@@ -52,6 +52,21 @@ SHARED scene scene_make(int nx, int ny, int nz, const double spacing[3], field *
     return s;
 }
 
+/* Points of the surface that are seen from (p, p, p), each in a random direction. */
+SHARED void points_seen_from(const scene *s, double p, uint64_t seed, size_t count, float (*points)[3]) {
+    test_random r = {seed};
+    for (size_t i = 0; i < count; i++) {
+        isogi_ray ray;
+        isogi_hit hit;
+        double w[3];
+        random_direction(&r, w);
+        memset(&ray, 0, sizeof ray), memset(&hit, 0, sizeof hit);
+        for (int a = 0; a < 3; a++) ray.origin[a] = p, ray.dir[a] = (float)w[a];
+        isogi_vol_intersect(s->pyramid, &ray, 1, &hit, NULL);
+        isogi_vol_positions(s->pyramid, &hit, 1, points + i);
+    }
+}
+
 SHARED double nan_value(void) {
     uint64_t bits = 0x7ff8000000000000u;
     double x;
