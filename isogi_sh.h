@@ -4537,39 +4537,38 @@ static void isogi_sh__edge_degree(double *band, int l, const double *q, const is
     }
 }
 
-/* The sum over edges, whole expansions at a time. */
+/* The sum over edges, whole expansions at a time: degrees to ISOGI_SH__LOW - 1. */
 ISOGI_SH__APART void isogi_sh__add_edges_low(float *c, isogi_sh__rectangle *r) {
     isogi_sh__arc arc;
     double pole[4][3], sum[ISOGI_SH__LOW * ISOGI_SH__LOW], part[ISOGI_SH__LOW * ISOGI_SH__LOW], q[ISOGI_SH__LOW][ISOGI_SH__LOW];
     double diagonal = isogi_sh__next_diagonal(0, 0);
-    int i, k, l;
-    for (l = 1; l < r->order; l++) {
+    int i, k, l, order = r->order < ISOGI_SH__LOW ? r->order : ISOGI_SH__LOW;
+    for (l = 1; l < order; l++) {
         diagonal = isogi_sh__next_diagonal(diagonal, l);
         isogi_sh__equator(q[l], l, diagonal);
     }
     for (i = 0; i < 4; i++) {
         if (!isogi_sh__edge(&arc, pole[i], r, i)) return;
         part[0] = 0;
-        for (l = 1; l < r->order; l++) isogi_sh__edge_degree(part + l * l, l, q[l], &arc);
-        isogi_sh__turn_all_to_world(part, r->order, &arc.frame);
-        for (k = 0; k < r->order * r->order; k++) sum[k] = i ? sum[k] + part[k] : part[k];
+        for (l = 1; l < order; l++) isogi_sh__edge_degree(part + l * l, l, q[l], &arc);
+        isogi_sh__turn_all_to_world(part, order, &arc.frame);
+        for (k = 0; k < order * order; k++) sum[k] = i ? sum[k] + part[k] : part[k];
     }
     sum[0] = isogi_sh__next_diagonal(0, 0) * isogi_sh__solid_angle(pole);
-    for (l = 0; l < r->order; l++) isogi_sh__add_degree(c, sum + l * l, l, r);
+    for (l = 0; l < order; l++) isogi_sh__add_degree(c, sum + l * l, l, r);
 }
 
-/* The same degree by degree, since expansions of high orders do not fit on the stack. */
-ISOGI_SH__APART void isogi_sh__add_edges(float *c, isogi_sh__rectangle *r) {
+/* Those from there on degree by degree, since expansions of high orders do not fit on the stack. */
+ISOGI_SH__APART void isogi_sh__add_edges_high(float *c, isogi_sh__rectangle *r) {
     isogi_sh__arc arc[4];
     double pole[4][3], sum[2 * ISOGI_SH_MAX_ORDER], band[2 * ISOGI_SH_MAX_ORDER], q[ISOGI_SH_MAX_ORDER];
     double diagonal = isogi_sh__next_diagonal(0, 0);
     int i, k, l;
     for (i = 0; i < 4; i++)
         if (!isogi_sh__edge(&arc[i], pole[i], r, i)) return;
-    sum[0] = diagonal * isogi_sh__solid_angle(pole);
-    isogi_sh__add_degree(c, sum, 0, r);
     for (l = 1; l < r->order; l++) {
         diagonal = isogi_sh__next_diagonal(diagonal, l);
+        if (l < ISOGI_SH__LOW) continue;
         isogi_sh__equator(q, l, diagonal);
         for (i = 0; i < 4; i++) {
             isogi_sh__edge_degree(band, l, q, &arc[i]);
@@ -4688,8 +4687,10 @@ static void isogi_sh__add_rectangle(float *c, int order, const isogi_light *ligh
     for (k = 0; k < 3; k++) r.radiance[k] = (double)light->rgb[k] / area;
     r.order = order;
     if (isogi_sh__strip_start(&strip, &r)) isogi_sh__add_strip(c, &r, &strip);
-    else if (order <= ISOGI_SH__LOW) isogi_sh__add_edges_low(c, &r);
-    else isogi_sh__add_edges(c, &r);
+    else {
+        isogi_sh__add_edges_low(c, &r);
+        if (order > ISOGI_SH__LOW) isogi_sh__add_edges_high(c, &r);
+    }
 }
 
 /* Adds a light as it arrives at a point. A point light at the point itself adds nothing; inside a spherical one its light comes
