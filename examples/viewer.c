@@ -91,7 +91,7 @@ typedef struct options {
     int lookup, shadows, ambient, normals, storage, method, coarsest, local, preset;
     int has_size, has_iso, has_mode, has_spacing, has_albedo, has_preset, has_camera, has_up, has_nan, has_shading, has_shadows,
         has_ambient, has_gloss, has_step, has_transmission;
-    double step, fog, gloss, offset, reach, isovalue, spacing[3], clip[ISOGI_DVR_MAX_PLANES][4], azimuth, elevation, distance, up[3],
+    double step, bound, fog, gloss, offset, reach, isovalue, spacing[3], clip[ISOGI_DVR_MAX_PLANES][4], azimuth, elevation, distance, up[3],
         exposure, nan_value;
     float albedo[3];
     isogi_light lights[MAX_LIGHTS];
@@ -281,6 +281,8 @@ static const option option_list[] = {
      NAMED(transmission_name, transmission), .has = AT(has_transmission)},
     {"--step", "S", VOLUMES, "for dvr and for sampled rays (--classification): distance of samples in voxels; default 0.5", NUMBERS,
      VALUE(step), 1, 1e-3, 1e3, .allowed = "a number, 0.001 to 1000"},
+    {"--bound", "X", VOLUMES, "for dvr: exact opacity, and unlit colours that err by less than this, in place of samples; 0.0001 to 1", NUMBERS,
+     AT(bound), 0, 1, 1e-4, 1, .allowed = "a number, 0.0001 to 1"},
     {"--exposure", "X", ANY, "factor on the light, in place of the automatic exposure", NUMBERS, AT(exposure), 0, 1, 1e-12, 1e12,
      .allowed = "a number above 0"},
     {"--aa", "N", ANY, "samples per pixel; default 4 (1 for dvr, where it is rounded down to a square)", INTEGER, AT(antialias), 0, 1, 1,
@@ -370,6 +372,9 @@ static int check_volume(viewer *v) {
         return file_fail(v->error, "--transmission: needs --shading two-sided");
     if (o->has_shading && o->shading == ISOGI_DVR_UNLIT && (o->env || o->light_count))
         return file_fail(v->error, "%s: --shading unlit has no light", o->env ? "--env" : "--light");
+    if (o->bound > 0 && o->mode != DVR) return file_fail(v->error, "--bound: is for --mode dvr; scale-invariant rays are exact without");
+    if (o->bound > 0 && o->has_step) return file_fail(v->error, "--step: rays with --bound have none");
+    if (o->bound > 0 && o->classification) return file_fail(v->error, "--classification: rays with --bound are exact");
     if (o->has_step && o->mode == SCALE_INVARIANT && o->classification == ISOGI_DVR_EXACT)
         return file_fail(v->error, "--step: exact rays have none; --classification pre-integrated and post-classified have");
     return 1;
@@ -1320,7 +1325,7 @@ static int render_volume(viewer *v) {
     context.progress = tell_stage;
     if (v->o.has_shading) desc.shading = (isogi_dvr_shading)v->o.shading;
     desc.classification = (isogi_dvr_classification)v->o.classification, desc.silhouette = (isogi_dvr_silhouette)v->o.silhouette,
-    desc.step = v->o.step;
+    desc.step = v->o.step, desc.bound = v->o.bound;
     desc.method = (isogi_dvr_method)v->o.method;
     for (int i = 0; i < 3; i++) {
         desc.material[i].exponent = i < 2 || v->o.transmission == 2 ? 30 : 0;

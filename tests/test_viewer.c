@@ -413,6 +413,10 @@ TEST(silly_options_get_one_line_that_names_the_option) {
         {"procedural:gyroid --mode dvr --directions 0", "--directions"},
         {"procedural:gyroid --mode dvr --grid 8,8", "--grid"},
         {"procedural:gyroid --grid 8,8,8", "--grid: works with --mode dvr and scale-invariant, not with --mode irradiance"},
+        {"procedural:gyroid --mode scale-invariant --bound .1", "--bound: is for --mode dvr"},
+        {"procedural:gyroid --mode dvr --bound .1 --step 1", "--step: rays with --bound"},
+        {"procedural:gyroid --mode dvr --bound .1 --classification post-classified", "--classification: rays with --bound"},
+        {"procedural:gyroid --mode dvr --bound 2", "--bound"},
         {"procedural:gyroid --coarsest 8", "--coarsest: works with --mode dvr"},
         {"procedural:gyroid --mode dvr --coarsest 3", "--coarsest"},
         {"procedural:gyroid --mode dvr --method paper --coarsest 2", "--coarsest: needs"},
@@ -587,7 +591,7 @@ TEST(stats_are_key_value_lines_and_help_is_complete) {
                                         "--light",    "--albedo", "--bounces",   "--samples", "--lattice", "--lookup",     "--shadows",
                                         "--ambient",  "--fog",    "--gloss",     "--normals", "--offset",  "--reach",      "--storage",
                                         "--compare",  "--tf",     "--preset",    "--method",  "--order",   "--directions", "--grid",
-                                        "--coarsest", "--local",  "--depth",     "--clip",    "--camera",  "--up",         "--threads",
+                                        "--coarsest", "--bound", "--local",  "--depth",     "--clip",    "--camera",  "--up",         "--threads",
                                         "--out",      "--stats",  "procedural:", "Examples"};
     char command[512];
     run_result r;
