@@ -87,9 +87,9 @@
      2 voxels (of the smallest spacing, but half a voxel along every axis at least) or an eighth of the ray's length, whose own
      hemisphere is gathered once in the same way; passes over the probes then bring all reflections without rays. What
      the sky and reflections bring is averaged over neighbouring texels that face the same way, as far as their noise could explain the
-     difference; lights are not, so that their shadows stay sharp. Probes cost accuracy: less than 0.1 % of the mean and 1.5 % at a point in narrow channels of
-     albedo 0.8 (test_trace_bake --long prints it). Lazy and adaptive bakes take samples in blocks of 4, 16, 64, ... and every other texel
-     along each axis first: soon every lookup has a value.
+     difference; lights are not, so that their shadows stay sharp. Probes cost accuracy: less than 0.1 % of the mean and 1.5 % at a
+     point in narrow channels of albedo 0.8 (test_trace_bake --long prints it). Lazy and adaptive bakes take samples in blocks of 4,
+     16, 64, ... and every other texel along each axis first: soon every lookup has a value.
      A hit from within (only through an open border can a ray get there) is a surface too, with its normal turned.
 
    GLSL that lights a surface by an exported irradiance texture (GL_LINEAR, GL_CLAMP_TO_EDGE); grid: voxel coordinates
@@ -268,11 +268,11 @@ ISOGI_API void isogi_trace_free(isogi_trace *trace);
    the points have been asked for. */
 ISOGI_API isogi_result isogi_trace_request(isogi_trace *trace, const float (*points)[3], size_t count);
 
-/* Works until about max_rays rays are traced (0 = to the end), whole texels, at least one. *remaining (may be NULL): fraction of the
-   texels asked for that are still to do, 0 = finished; it never rises but by a request. ISOGI_CANCELLED and ISOGI_NO_MEMORY leave a
-   texture that can be read and stepped on. Not at the same time as any other call on this texture.
-   FEEDBACK: a step that ends a block of samples also carries the light over all probes to all texels at work, by passes that trace no
-   rays and are not cut into pieces: it takes as long as 10 to 16 others of 20000 rays (a lattice of 64^3). */
+/* Works until about max_rays rays are traced (0 = to the end), whole texels, or as long as that takes in other work. *remaining (may be
+   NULL): fraction of the texels asked for that are still to do, 0 = finished; it never rises but by a request. ISOGI_CANCELLED and
+   ISOGI_NO_MEMORY leave a texture that can be read and stepped on. Not at the same time as any other call on this texture.
+   FEEDBACK: when a block of samples is complete passes without rays carry the light over all probes to all texels at work; they are cut
+   into pieces, too, and counted as the rays that take about as long. */
 ISOGI_API isogi_result isogi_trace_step(isogi_trace *trace, uint64_t max_rays, double *remaining);
 
 /* Lookup (desc.lookup) among the texels that are valid and computed. irradiance[count] (RGB); error[count]: standard error of its
@@ -2837,6 +2837,11 @@ struct isogi_trace__feedback {
     int on_probes; /* the batch is of probes */
     int diverges;   /* the last passes did not settle */
     int unpublished; /* nodes have changed since the light was worked out last */
+    int phase;       /* of carrying the light over, */
+    size_t carried;  /* tasks of it that are done, */
+    size_t segment, pass; /* texels' segment, pass over the probes */
+    double before, middle; /* largest change by the pass before, and 500 passes before */
+    size_t placed;   /* texels before this one know where they lie */
     uint64_t partial; /* samples of texels that are not finished */
     uint64_t probes_before; /* of groups of texels that are finished */
     double least;   /* what isogi_trace_step reported last */
@@ -3592,10 +3597,11 @@ static isogi_result isogi_trace__spans_run(isogi_trace *t, double from, double t
 
 /* ---- passes over probes ---- */
 
-typedef struct isogi_trace__sweep {
-    isogi_trace *trace;
-    const isogi_trace__segment *segment;
-} isogi_trace__sweep;
+/* Where a task's nodes begin and end. */
+static size_t isogi_trace__sweep(const isogi_trace *t, size_t task, size_t count, size_t *begin) {
+    *begin = (t->feedback->carried + task) * ISOGI_TRACE__SWEEP;
+    return *begin + ISOGI_TRACE__SWEEP < count ? *begin + ISOGI_TRACE__SWEEP : count;
+}
 
 /* What comes from sky and lights, as irradiance or transfer. */
 static double isogi_trace__node_direct(const isogi_trace *t, const isogi_trace__set *set, size_t node, int value) {
@@ -3624,7 +3630,7 @@ static double isogi_trace__hit_albedo(const isogi_trace *t, const isogi_trace__n
 static void isogi_trace__direct_task(void *arg, size_t task) {
     const isogi_trace *t = (const isogi_trace *)arg;
     isogi_trace__set *set = &t->feedback->probes;
-    size_t v = (size_t)t->values, i = task * ISOGI_TRACE__SWEEP, end = i + ISOGI_TRACE__SWEEP < set->count ? i + ISOGI_TRACE__SWEEP : set->count;
+    size_t v = (size_t)t->values, i, end = isogi_trace__sweep(t, task, set->count, &i);
     int a;
     for (; i < end; i++) {
         const isogi_trace__node *n = &set->nodes[i];
@@ -3669,60 +3675,54 @@ static void isogi_trace__pass_segment(isogi_trace__set *set, isogi_trace__segmen
 static void isogi_trace__pass_task(void *arg, size_t segment) {
     const isogi_trace *t = (const isogi_trace *)arg;
     isogi_trace__set *set = &t->feedback->probes;
-    isogi_trace__segment *s = &set->segments[segment];
+    isogi_trace__segment *s = &set->segments[t->feedback->carried + segment];
     size_t channels = t->scene.desc.mode == ISOGI_TRACE_TRANSFER ? (size_t)t->scene.desc.transfer_channels : 3;
     if (t->values == 3 && channels == 3 && !t->scene.desc.material) isogi_trace__pass_segment(set, s, 3, 3, 0); /* the compiler unrolls it */
     else isogi_trace__pass_segment(set, s, (size_t)t->values, channels, t->scene.desc.material != NULL);
 }
 
-/* One pass over all probes; the largest change and the largest value. */
-static void isogi_trace__pass(isogi_trace *t, double change[2]) {
-    isogi_trace__set *set = &t->feedback->probes;
-    isogi_context silent = t->context;
-    float *out;
-    size_t i;
-    silent.progress = NULL;
-    isogi_parallel(&silent, set->segment_count, isogi_trace__pass_task, t, 0, 1);
-    change[0] = change[1] = 0;
-    for (i = 0; i < set->segment_count; i++) {
-        if (set->segments[i].change > change[0]) change[0] = set->segments[i].change;
-        if (set->segments[i].largest > change[1]) change[1] = set->segments[i].largest;
-    }
-    out = set->out[0], set->out[0] = set->out[1], set->out[1] = out;
-}
-
-/* As many passes as reflections (the first brings what comes from sky and lights alone), or until all that later ones would add, by
-   the ratio of the last two changes, is below 1/1000. Where albedo 1 meets a closed cavity the light grows by the same step for
-   ever: said so when 500 passes have not made the step smaller by a third. */
-static void isogi_trace__solve(isogi_trace *t) {
+/* A pass over all probes has ended: whether it was the last. There are as many as reflections (the first brings what comes from sky and
+   lights alone), or until all that later ones would add, by the ratio of the last two changes, is below 1/1000. Where albedo 1 meets a
+   closed cavity the light grows by the same step for ever: said so when 500 passes have not made the step smaller by a third. */
+static int isogi_trace__pass_end(isogi_trace *t) {
     isogi_trace__feedback *f = t->feedback;
-    int bounces = t->scene.desc.bounces, pass;
-    double change[2] = {0, 0}, before = 0, middle = 0;
-    isogi_context silent = t->context;
-    silent.progress = NULL, f->diverges = 0;
-    isogi_parallel(&silent, (f->probes.count + ISOGI_TRACE__SWEEP - 1) / ISOGI_TRACE__SWEEP, isogi_trace__direct_task, t, 0, 1);
-    for (pass = 0; bounces < 0 || pass < bounces; pass++) {
-        isogi_trace__pass(t, change);
-        if (change[0] <= 1e-7 * change[1]) break;
-        if (pass > 1 && change[0] < before && change[0] * change[0] < 1e-3 * change[1] * (before - change[0])) break;
-        before = change[0];
-        if (pass % 500 == 499) {
-            f->diverges = pass > 500 && change[0] > 0.67 * middle;
-            middle = change[0];
-            if (f->diverges || pass > ISOGI_TRACE__MAX_DEPTH) break;
-        }
+    isogi_trace__set *set = &f->probes;
+    double change = 0, largest = 0;
+    float *out = set->out[0];
+    size_t i;
+    for (i = 0; i < set->segment_count; i++) {
+        if (set->segments[i].change > change) change = set->segments[i].change;
+        if (set->segments[i].largest > largest) largest = set->segments[i].largest;
     }
+    set->out[0] = set->out[1], set->out[1] = out;
+    if (change <= 1e-7 * largest) return 1;
+    if (f->pass > 1 && change < f->before && change * change < 1e-3 * largest * (f->before - change)) return 1;
+    f->before = change;
+    if (f->pass % 500 == 499) {
+        f->diverges = f->pass > 500 && change > 0.67 * f->middle;
+        f->middle = change;
+        if (f->diverges || f->pass > ISOGI_TRACE__MAX_DEPTH) return 1;
+    }
+    return ++f->pass == (size_t)t->scene.desc.bounces; /* never for all */
 }
 
 /* ---- what a texel ends up with ---- */
 
-/* Sums over the texels' hits. */
+/* Sums over the texels' hits: none yet, */
+static void isogi_trace__clear_task(void *arg, size_t task) {
+    const isogi_trace *t = (const isogi_trace *)arg;
+    isogi_trace__set *set = &t->feedback->texels;
+    size_t v = (size_t)t->values, i, end = isogi_trace__sweep(t, task, set->count, &i);
+    memset(set->bounce + i * v, 0, (end - i) * v * sizeof(float));
+    for (; i < end; i++) set->nodes[i].bounce_square = 0;
+}
+
+/* and those of a segment. */
 static void isogi_trace__bounce_task(void *arg, size_t task) {
-    const isogi_trace__sweep *sweep = (const isogi_trace__sweep *)arg;
-    const isogi_trace *t = sweep->trace;
-    const isogi_trace__segment *s = sweep->segment;
+    const isogi_trace *t = (const isogi_trace *)arg;
+    const isogi_trace__segment *s = &t->feedback->texels.segments[t->feedback->segment];
     const float *light = t->feedback->probes.out[0];
-    size_t i = task * ISOGI_TRACE__SWEEP, end = i + ISOGI_TRACE__SWEEP < s->entries ? i + ISOGI_TRACE__SWEEP : s->entries, v = (size_t)t->values, k;
+    size_t i, end = isogi_trace__sweep(t, task, s->entries, &i), v = (size_t)t->values, k;
     for (; i < end; i++) {
         isogi_trace__node *n = &t->feedback->texels.nodes[s->node[i]];
         float *bounce = t->feedback->texels.bounce + s->node[i] * v;
@@ -3767,7 +3767,7 @@ static double isogi_trace__light_variance(const isogi_trace__node *n) {
 static void isogi_trace__guide_task(void *arg, size_t task) {
     isogi_trace *t = (isogi_trace *)arg;
     isogi_trace__set *set = &t->feedback->texels;
-    size_t i = task * ISOGI_TRACE__SWEEP, end = i + ISOGI_TRACE__SWEEP < set->count ? i + ISOGI_TRACE__SWEEP : set->count, v = (size_t)t->values;
+    size_t i, end = isogi_trace__sweep(t, task, set->count, &i), v = (size_t)t->values;
     for (; i < end; i++) {
         const isogi_trace__node *n = &set->nodes[i];
         isogi_trace__guide *g = &set->guide[i];
@@ -3869,7 +3869,7 @@ static double isogi_trace__filter(const isogi_trace *t, size_t node, double rgb[
 static void isogi_trace__publish_task(void *arg, size_t task) {
     isogi_trace *t = (isogi_trace *)arg;
     isogi_trace__set *set = &t->feedback->texels;
-    size_t i = task * ISOGI_TRACE__SWEEP, end = i + ISOGI_TRACE__SWEEP < set->count ? i + ISOGI_TRACE__SWEEP : set->count, v = (size_t)t->values;
+    size_t i, end = isogi_trace__sweep(t, task, set->count, &i), v = (size_t)t->values;
     for (; i < end; i++) {
         isogi_trace__node *n = &set->nodes[i];
         float to[3], error;
@@ -3895,23 +3895,81 @@ static void isogi_trace__publish_task(void *arg, size_t task) {
     }
 }
 
-/* No rays: the light at probes, then that of the texels. */
-static void isogi_trace__publish(isogi_trace *t) {
+/* ---- carrying the light over ---- */
+
+/* When a block of samples is complete the light at probes is worked out, then that of the texels. That takes no rays, but as long as many:
+   it is cut into tasks, each of which counts as the rays that take about as long. */
+enum {
+    ISOGI_TRACE__AT_REST = 0,
+    ISOGI_TRACE__DIRECT,
+    ISOGI_TRACE__PASS,
+    ISOGI_TRACE__CLEAR,
+    ISOGI_TRACE__BOUNCE,
+    ISOGI_TRACE__GUIDE,
+    ISOGI_TRACE__PUBLISH
+};
+
+/* Tasks of the phase at work. */
+static size_t isogi_trace__phase_tasks(const isogi_trace__feedback *f) {
+    size_t nodes = f->texels.count;
+    if (f->phase == ISOGI_TRACE__PASS) return f->probes.segment_count;
+    if (f->phase == ISOGI_TRACE__DIRECT) nodes = f->probes.count;
+    if (f->phase == ISOGI_TRACE__BOUNCE) nodes = f->segment < f->texels.segment_count ? f->texels.segments[f->segment].entries : 0;
+    return (nodes + ISOGI_TRACE__SWEEP - 1) / ISOGI_TRACE__SWEEP;
+}
+
+/* Rays that take as long as one of them: one for 64 hits, for 8 nodes that are read in passing, for 2 that are filtered. */
+static uint64_t isogi_trace__phase_cost(const isogi_trace__feedback *f, size_t task) {
+    const isogi_trace__segment *s = f->phase == ISOGI_TRACE__PASS ? f->probes.segments + task : f->texels.segments + f->segment;
+    if (f->phase == ISOGI_TRACE__PASS) return s->entries / 8 + s->hits / 64 + 1;
+    if (f->phase == ISOGI_TRACE__BOUNCE) return ISOGI_TRACE__SWEEP / 8 + s->hits * ISOGI_TRACE__SWEEP / s->entries / 64;
+    return f->phase == ISOGI_TRACE__PUBLISH ? ISOGI_TRACE__SWEEP / 2 : ISOGI_TRACE__SWEEP / 8;
+}
+
+static void isogi_trace__phase_task(void *arg, size_t task) {
+    switch (((const isogi_trace *)arg)->feedback->phase) {
+    case ISOGI_TRACE__DIRECT: isogi_trace__direct_task(arg, task); break;
+    case ISOGI_TRACE__PASS: isogi_trace__pass_task(arg, task); break;
+    case ISOGI_TRACE__CLEAR: isogi_trace__clear_task(arg, task); break;
+    case ISOGI_TRACE__BOUNCE: isogi_trace__bounce_task(arg, task); break;
+    case ISOGI_TRACE__GUIDE: isogi_trace__guide_task(arg, task); break;
+    default: isogi_trace__publish_task(arg, task);
+    }
+}
+
+/* All tasks of the phase are done. */
+static void isogi_trace__phase_end(isogi_trace *t) {
     isogi_trace__feedback *f = t->feedback;
-    isogi_trace__set *set = &f->texels;
+    f->carried = 0;
+    switch (f->phase) {
+    case ISOGI_TRACE__DIRECT:
+        f->phase = t->scene.desc.bounces ? ISOGI_TRACE__PASS : ISOGI_TRACE__CLEAR;
+        f->pass = 0, f->before = f->middle = 0, f->diverges = 0;
+        break;
+    case ISOGI_TRACE__PASS:
+        if (isogi_trace__pass_end(t)) f->phase = ISOGI_TRACE__CLEAR;
+        break;
+    case ISOGI_TRACE__CLEAR: f->phase = ISOGI_TRACE__BOUNCE, f->segment = 0; break;
+    case ISOGI_TRACE__BOUNCE:
+        if (++f->segment >= f->texels.segment_count) f->phase = ISOGI_TRACE__GUIDE;
+        break;
+    case ISOGI_TRACE__GUIDE: f->phase = ISOGI_TRACE__PUBLISH; break;
+    default: f->phase = ISOGI_TRACE__AT_REST, f->unpublished = 0;
+    }
+}
+
+/* The next tasks of the phase at work, about as long as `limit` rays, at least one. Returns what they count as. */
+static uint64_t isogi_trace__carry(isogi_trace *t, uint64_t limit) {
+    isogi_trace__feedback *f = t->feedback;
+    size_t tasks = isogi_trace__phase_tasks(f), count = 0;
+    uint64_t cost = 0;
     isogi_context silent = t->context;
-    isogi_trace__sweep sweep;
-    size_t tasks = (set->count + ISOGI_TRACE__SWEEP - 1) / ISOGI_TRACE__SWEEP, i;
     silent.progress = NULL;
-    isogi_trace__solve(t);
-    memset(set->bounce, 0, set->count * (size_t)t->values * sizeof(float));
-    for (i = 0; i < set->count; i++) set->nodes[i].bounce_square = 0;
-    sweep.trace = t;
-    for (sweep.segment = set->segments; sweep.segment < set->segments + set->segment_count; sweep.segment++)
-        isogi_parallel(&silent, (sweep.segment->entries + ISOGI_TRACE__SWEEP - 1) / ISOGI_TRACE__SWEEP, isogi_trace__bounce_task, &sweep, 0, 1);
-    isogi_parallel(&silent, tasks, isogi_trace__guide_task, t, 0, 1);
-    isogi_parallel(&silent, tasks, isogi_trace__publish_task, t, 0, 1);
-    f->unpublished = 0;
+    while (f->carried + count < tasks && cost < limit) cost += isogi_trace__phase_cost(f, f->carried + count++);
+    if (count) isogi_parallel(&silent, count, isogi_trace__phase_task, t, 0, 1);
+    f->carried += count;
+    if (f->carried >= tasks) isogi_trace__phase_end(t);
+    return cost;
 }
 
 /* ---- stepping ---- */
@@ -3942,12 +4000,24 @@ static void isogi_trace__place_task(void *arg, size_t task) {
     }
 }
 
+/* Of the next nodes; returns the rays that take as long, about `limit`. */
+static uint64_t isogi_trace__place(isogi_trace *t, uint64_t limit) {
+    isogi_trace__feedback *f = t->feedback;
+    size_t left = f->texels.count - f->placed;
+    isogi_context silent = t->context;
+    isogi_trace__job fresh;
+    fresh.trace = t, fresh.first = f->placed, fresh.count = left / 2 <= limit ? left : (size_t)(2 * limit);
+    silent.progress = NULL;
+    isogi_parallel(&silent, (fresh.count + ISOGI_TRACE__SWEEP - 1) / ISOGI_TRACE__SWEEP, isogi_trace__place_task, &fresh, 0, 1);
+    f->placed += fresh.count;
+    return fresh.count / 2 + 1;
+}
+
 /* Nodes for the wanted texels: of all bricks in the queue when lazy, every other texel along each axis first; else of a group. */
 static isogi_result isogi_trace__nodes_make(isogi_trace *t) {
     isogi_trace__feedback *f = t->feedback;
-    size_t end = t->queue_first, i, slot, texels = 0, half, before = f->texels.count;
-    isogi_context silent = t->context;
-    isogi_trace__job fresh;
+    size_t end = t->queue_first, i, slot, texels = 0, half;
+    if (f->phase != ISOGI_TRACE__AT_REST) return ISOGI_OK; /* when what is at work is done */
     if (t->queue_first == t->queue_count || (f->texels.count && !t->scene.desc.lazy)) return ISOGI_OK;
     for (; end < t->queue_count && (t->scene.desc.lazy || texels < ISOGI_TRACE__GROUP); end++) {
         isogi_trace__brick *brick = t->bricks[t->queue[end]];
@@ -3981,18 +4051,15 @@ static isogi_result isogi_trace__nodes_make(isogi_trace *t) {
         }
     t->queue_first = end;
     if (t->queue_first == t->queue_count) t->queue_first = t->queue_count = 0;
-    silent.progress = NULL, fresh.trace = t, fresh.count = f->texels.count - before, fresh.first = before;
-    isogi_parallel(&silent, (fresh.count + ISOGI_TRACE__SWEEP - 1) / ISOGI_TRACE__SWEEP, isogi_trace__place_task, &fresh, 0, 1);
     f->level = 0, f->cursor = 0;
     return ISOGI_OK;
 }
 
-/* Nothing is left to trace at this level: texels that are good enough are finished, the others go on. */
+/* Nothing is left to trace at this level, and its light is carried over: texels that are good enough are finished, the others go on. */
 static void isogi_trace__level_end(isogi_trace *t) {
     isogi_trace__feedback *f = t->feedback;
     double target = (double)t->scene.desc.error * t->scene.open_light;
     size_t i, open = 0;
-    isogi_trace__publish(t);
     for (i = 0; i < f->texels.count; i++) {
         isogi_trace__node *n = &f->texels.nodes[i];
         if (n->finished) continue;
@@ -4008,27 +4075,41 @@ static void isogi_trace__level_end(isogi_trace *t) {
     isogi_trace__set_free(t, &f->texels);
     isogi_trace__set_free(t, &f->probes);
     memset(f->table, 0, f->table_size * sizeof *f->table);
-    f->probe_cursor = f->probe_end = 0;
+    f->probe_cursor = f->probe_end = f->placed = 0;
+}
+
+/* Traces the next batch; where nothing is left to trace at this level its light is to be carried over. */
+static isogi_result isogi_trace__trace_batch(isogi_trace *t, uint64_t limit) {
+    isogi_trace__feedback *f = t->feedback;
+    const size_t cursor = f->cursor, probe_cursor = f->probe_cursor;
+    double all = (double)(t->wanted + t->done) * t->scene.desc.samples, left, after;
+    isogi_result result;
+    isogi_trace__spans_fill(t, limit);
+    f->unpublished |= f->span_count != 0;
+    if (!f->span_count) {
+        f->phase = ISOGI_TRACE__DIRECT;
+        return ISOGI_OK;
+    }
+    left = ((double)t->done * t->scene.desc.samples + (double)f->partial) / all;
+    after = left + (f->on_probes ? 0 : (double)f->sample_count / all);
+    result = isogi_trace__spans_run(t, isogi_trace__lerp(t->share[0], t->share[1], left), isogi_trace__lerp(t->share[0], t->share[1], after));
+    if (result != ISOGI_OK) f->cursor = cursor, f->probe_cursor = probe_cursor; /* it is still to come */
+    return result;
 }
 
 static isogi_result isogi_trace__feedback_step(isogi_trace *t, uint64_t max_rays) {
     isogi_trace__feedback *f = t->feedback;
-    uint64_t begin = t->counters.rays, each = 1 + (uint64_t)t->scene.sky.on + (uint64_t)t->scene.desc.lighting.light_count;
+    uint64_t begin = t->counters.rays, each = 1 + (uint64_t)t->scene.sky.on + (uint64_t)t->scene.desc.lighting.light_count, other = 0;
     isogi_result result = isogi_trace__nodes_make(t);
     while (result == ISOGI_OK && (t->wanted || f->unpublished)) {
-        uint64_t used = t->counters.rays - begin;
-        const size_t cursor = f->cursor, probe_cursor = f->probe_cursor;
-        double all = (double)(t->wanted + t->done) * t->scene.desc.samples, left;
+        uint64_t used = t->counters.rays - begin + other, left = max_rays ? max_rays - used : SIZE_MAX / 4;
         if (max_rays && used >= max_rays) break;
-        isogi_trace__spans_fill(t, max_rays ? (max_rays - used) / each + 1 : UINT64_MAX);
-        f->unpublished |= f->span_count != 0;
-        left = ((double)t->done * t->scene.desc.samples + (double)f->partial) / all;
-        if (f->span_count)
-            result = isogi_trace__spans_run(
-                t, isogi_trace__lerp(t->share[0], t->share[1], left),
-                isogi_trace__lerp(t->share[0], t->share[1], left + (f->on_probes ? 0 : (double)f->sample_count / all)));
-        else isogi_trace__level_end(t), result = isogi_trace__nodes_make(t);
-        if (result != ISOGI_OK && f->span_count) f->cursor = cursor, f->probe_cursor = probe_cursor; /* the batch is still to come */
+        if (f->placed < f->texels.count) other += isogi_trace__place(t, left);
+        else if (f->phase == ISOGI_TRACE__AT_REST) result = isogi_trace__trace_batch(t, max_rays ? left / each + 1 : UINT64_MAX);
+        else {
+            other += isogi_trace__carry(t, left);
+            if (f->phase == ISOGI_TRACE__AT_REST) isogi_trace__level_end(t), result = isogi_trace__nodes_make(t);
+        }
     }
     return result;
 }
@@ -4845,6 +4926,7 @@ static void isogi_trace__feedback_reset(isogi_trace *t) {
     memset(f->table, 0, f->table_size * sizeof *f->table);
     f->cursor = f->probe_cursor = f->probe_end = 0, f->span_count = 0, f->partial = 0;
     f->level = f->unpublished = f->diverges = 0, f->probes_before = 0;
+    f->phase = ISOGI_TRACE__AT_REST, f->placed = f->carried = 0;
 }
 
 /* Marks the texels and queues their bricks; needs no memory. */

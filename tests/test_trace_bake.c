@@ -157,6 +157,47 @@ TEST(endless_light_is_reported) {
     }
 }
 
+/* Tasks that a context was asked to run. */
+static void count_tasks(void *user, size_t n, void (*task)(void *arg, size_t i), void *arg) {
+    *(size_t *)user += n;
+    for (size_t i = 0; i < n; i++) task(arg, i);
+}
+
+/* What carries light over to the texels traces no rays, but counts as much: no step does more than its budget's share of it. A task is
+   256 nodes or a batch of hits; with 500 rays a step runs 4 tasks that publish, 16 that look at nodes, or as many that trace. In one
+   piece it was 1175 tasks. The light is the same bits as in one step. */
+TEST(steps_stay_near_their_budget) {
+    double q[5] = {31.5, 30, 31.5, 36.2, 24};
+    scene s = scene_make(64, 64, 64, NULL, pit, q);
+    isogi_trace_desc d = feedback(&s, 0.7f, -1, 4);
+    static float points[300][3], e[2][300][3];
+    size_t tasks = 0, most = 0, whole = 0, steps = 0;
+    int n = surface_points(&s, 0, 300, 5, points);
+    d.isovalue_min = -0.5, d.isovalue_max = 0.5;
+    for (int sliced = 0; sliced < 2; sliced++) {
+        isogi_context counting = {.parallel_for = count_tasks, .user = &tasks};
+        isogi_trace *t = NULL;
+        isogi_counters counters = {0};
+        double remaining = 1;
+        uint64_t rays = 0;
+        CHECK(isogi_trace_create(&t, &d, &counting) == ISOGI_OK, "create");
+        for (whole = 0; remaining > 0; steps++) {
+            tasks = 0;
+            CHECK(isogi_trace_step(t, sliced ? 500 : 0, &remaining) == ISOGI_OK, "step");
+            memset(&counters, 0, sizeof counters), isogi_trace_counters(t, &counters);
+            if (sliced) CHECK(counters.rays - rays < 1000, "%llu rays", (unsigned long long)(counters.rays - rays));
+            if (sliced && tasks > most) most = tasks;
+            whole += tasks, rays = counters.rays;
+        }
+        isogi_trace_sample(t, (const float(*)[3])points, (size_t)n, e[sliced], NULL);
+        isogi_trace_free(t);
+    }
+    printf("    %zu steps, at most %zu tasks in one of them, %zu in all\n", steps, most, whole);
+    CHECK(most <= 40 && steps > 100, "%zu tasks, %zu steps", most, steps);
+    CHECK(!memcmp(e[0], e[1], (size_t)n * sizeof e[0][0]), "other light in slices");
+    scene_free(&s);
+}
+
 /* ---- against paths ------------------------------------------------------------------------------------------------------- */
 
 /* A hit is worth one path that goes on: probes do not fill a closed room for the light of one place in it. With two
