@@ -4092,7 +4092,8 @@ static isogi_result isogi_trace__trace_batch(isogi_trace *t, uint64_t limit) {
     }
     left = ((double)t->done * t->scene.desc.samples + (double)f->partial) / all;
     after = left + (f->on_probes ? 0 : (double)f->sample_count / all);
-    result = isogi_trace__spans_run(t, isogi_trace__lerp(t->share[0], t->share[1], left), isogi_trace__lerp(t->share[0], t->share[1], after));
+    result = isogi_trace__spans_run(t, isogi_trace__lerp(t->share[0], t->share[1], left),
+                                    isogi_trace__lerp(t->share[0], t->share[1], after));
     if (result != ISOGI_OK) f->cursor = cursor, f->probe_cursor = probe_cursor; /* it is still to come */
     return result;
 }
