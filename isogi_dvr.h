@@ -110,8 +110,8 @@
        rays        16     32     64    128    256    512   1024   2048
        error     0.77   0.57   0.28   0.15  0.092  0.057  0.033  0.022
 
-   Several resolutions (isogi_dvr_desc.coarsest, sweeps). Visibility is looked up in matter and just before it. Blocks of 8^3 distances of the
-   grid in which there is none of it, or which are buried in what is opaque, hold every 8th point along each axis, others those that
+   Several resolutions (isogi_dvr_desc.coarsest, sweeps). Visibility is looked up in matter and just before it. Blocks of 8^3 distances of
+   the grid in which there is none of it, or which are buried in what is opaque, hold every 8th point along each axis, others those that
    their optical depth asks for, without a seam where blocks meet. Pictures are those of the regular grid of as many points, from less
    memory and in no more time; coefficients that are sampled far from matter are coarse, which is why the regular grid is the default.
    Megabytes of visibility and RMSE of a frame against a regular grid of 129, 193, 193 points an axis (make bench ONLY=visibility):
@@ -134,7 +134,8 @@
    What it does not do
 
    - No light on tetrahedral meshes, no scattering beyond the first, no refraction, no glossy surfaces.
-   - Pictures of physical space without a bound are pre-integrated (ISOGI_DVR_EXACT is the same there), unless they have peaks among the values that
+   - Pictures of physical space without a bound are pre-integrated (ISOGI_DVR_EXACT is the same there), unless they have peaks among the
+   values that
      occur, local shading (ISOGI_DVR_LOCAL, isogi_view.local), nearby lights, anisotropy, jitter, or an axis of one voxel: those are
      post-classified, and features narrower than the value's change from sample to sample need a smaller step. Pre-classification
      (colours interpolated instead of values) is left out on purpose: in data space it would depend on the view, and it blurs every
@@ -157,11 +158,11 @@
    The pyramid (and the voxels below it) is borrowed and must outlive the renderer; description, context and transfer function are
    copied (not what they point to: the second field and its points are borrowed). Visibility takes grid points * order^2 floats (in several
    resolutions those that are held, a third of them to nearly all), with light 4 more during a picture; sweeps as many again (then only
-   until they are done), two floats for each node of their lattice, and during a step, for each of up to 16 directions, a float for each grid
-   point and about 6 m (m + 24) of scratch for m nodes on the longest axis. Empty blocks take one byte for each block of the pyramid; a
+   until they are done), two floats for each node of their lattice, and during a step, for each of up to 16 directions, a float for each
+   grid point and about 6 m (m + 24) of scratch for m nodes on the longest axis. Empty blocks take one byte for each block of the pyramid; a
    picture in work 20 bytes a pixel, and 32 kB to 512 kB of classes of values in physical space; exact rays, and those with a
-   bound, 150 bytes a point of the transfer function, pre-integrated ones 16 table^2 and 8 a point more. All of it comes from the context's allocator; where that fails the
-   call says so and changes nothing.
+   bound, 150 bytes a point of the transfer function, pre-integrated ones 16 table^2 and 8 a point more. All of it comes from the context's
+   allocator; where that fails the call says so and changes nothing.
    isogi_dvr_set_transfer and isogi_dvr_step are writers: one at a time, and not during another call with the same renderer. All
    other calls only read and may run at the same time. Calls divide their own work among the context's threads. Results are the
    same bits for any number of threads and however visibility was cut into steps.
@@ -388,7 +389,8 @@ ISOGI_API isogi_result isogi_dvr_inspect(const isogi_dvr *dvr, isogi_dvr_report 
 
 /* The data as the blocks of the paper's method hold it, and the local visibility, at world points; values[count],
    visibility[count][order*order]; where a block is dropped the lowest value, and no shadow. ISOGI_INVALID with another method. */
-ISOGI_API isogi_result isogi_dvr_sample_blocks(const isogi_dvr *dvr, const float (*points)[3], size_t count, float *values, float *visibility);
+ISOGI_API isogi_result isogi_dvr_sample_blocks(const isogi_dvr *dvr, const float (*points)[3], size_t count, float *values,
+                                               float *visibility);
 
 /* premultiplied[height*width]: linear RGB premultiplied by opacity, opacity. depth[height*width] (NULL = not wanted): distance from the
    eye along the ray to the place that view->depth names, INFINITY where the ray meets nothing.
@@ -409,7 +411,8 @@ typedef enum isogi_preset {
 
 #define ISOGI_PRESET_POINTS 9
 
-/* Points at equal distances from low to high, extinction growing linearly from 0 to `extinction`. ISOGI_INVALID unless low < high, all finite. */
+/* Points at equal distances from low to high, extinction growing linearly from 0 to `extinction`. ISOGI_INVALID unless low < high, all
+   finite. */
 ISOGI_API isogi_result isogi_transfer_preset(isogi_preset preset, double low, double high, float extinction,
                                              isogi_transfer_point points[ISOGI_PRESET_POINTS]);
 
@@ -418,8 +421,8 @@ enum {
     ISOGI_TABLE_PREMULTIPLIED = 2 /* colours are multiplied by opacity (before coding), to be divided by it */
 };
 
-/* A colour table of another program: rgba[count], 0..1, entry i for the value low + (high - low) i / (count - 1). Opacity is that of a path of
-   `length`, in units of isogi_dvr_desc.unit or, in data space, of data: extinction = -ln(1 - a) / length; an opacity of 1 counts as
+/* A colour table of another program: rgba[count], 0..1, entry i for the value low + (high - low) i / (count - 1). Opacity is that of a path
+   of `length`, in units of isogi_dvr_desc.unit or, in data space, of data: extinction = -ln(1 - a) / length; an opacity of 1 counts as
    1 - 2^-24. Where opacity is 0, premultiplied tables have no colour: black. ISOGI_INVALID: fewer than 2 entries, low >= high,
    length <= 0, anything not finite or outside 0..1; points[] is written on success alone. */
 ISOGI_API isogi_result isogi_transfer_import(const float (*rgba)[4], size_t count, double low, double high, double length, int flags,
@@ -465,9 +468,10 @@ typedef struct isogi_tet_desc {
 
 typedef struct isogi_tets isogi_tets; /* const once built: any number of threads may render it */
 
-/* Finds which tetrahedra share faces; some 40 bytes for each, 100 while it works. report may be NULL. ISOGI_INVALID for a point that does not
-   exist, and for anything that is not finite. */
-ISOGI_API isogi_result isogi_dvr_tets_build(isogi_tets **tets, const isogi_tet_mesh *mesh, isogi_tet_report *report, const isogi_context *context);
+/* Finds which tetrahedra share faces; some 40 bytes for each, 100 while it works. report may be NULL. ISOGI_INVALID for a point that does
+   not exist, and for anything that is not finite. */
+ISOGI_API isogi_result isogi_dvr_tets_build(isogi_tets **tets, const isogi_tet_mesh *mesh, isogi_tet_report *report,
+                                            const isogi_context *context);
 ISOGI_API void isogi_dvr_tets_free(isogi_tets *tets); /* NULL is fine */
 
 /* As isogi_dvr_render, by rays that go from face to face; any number of peaks. counters->cells: tetrahedra passed. */
@@ -1318,7 +1322,8 @@ static isogi_result isogi_dvr__integral_build(isogi_dvr__integral *g, const isog
     g->table = (float(*)[4])isogi_allocate(context, g->side * g->side, sizeof *g->table);
     g->node = (double *)isogi_allocate(context, g->side, sizeof *g->node);
     g->place = (double *)isogi_allocate(context, g->side ? g->count : 0, sizeof *g->place);
-    if ((g->run_count && (!g->whole[0] || !g->whole[1])) || (g->rank_count && !g->rank) || !g->quiet || (g->side && (!g->table || !g->node || !g->place))) {
+    if ((g->run_count && (!g->whole[0] || !g->whole[1])) || (g->rank_count && !g->rank) || !g->quiet || (g->side && (!g->table ||
+        !g->node || !g->place))) {
         isogi_dvr__integral_free(g, context);
         return ISOGI_NO_MEMORY;
     }
@@ -1515,7 +1520,8 @@ static size_t isogi_dvr__renew_classes(isogi_dvr *d) {
 static void isogi_dvr__begin_anew(isogi_dvr *d);
 
 static isogi_dvr_method isogi_dvr__method(const isogi_dvr *d) {
-    if (d->desc.space != ISOGI_DVR_PHYSICAL || d->transfer.peak_count || !d->cells[0] || !d->cells[1] || !d->cells[2]) return ISOGI_DVR_BRUTE;
+    if (d->desc.space != ISOGI_DVR_PHYSICAL || d->transfer.peak_count || !d->cells[0] || !d->cells[1] ||
+        !d->cells[2]) return ISOGI_DVR_BRUTE;
     return d->desc.method;
 }
 
@@ -2331,7 +2337,8 @@ static isogi_result isogi_dvr__plan_coming(isogi_dvr *d) {
     return result;
 }
 
-/* The eight points around a place of the grid (in its distances): floats from the first one to the others along each axis, places between. */
+/* The eight points around a place of the grid (in its distances): floats from the first one to the others along each axis, and where
+   between them. */
 static size_t isogi_dvr__held_cell(const isogi_dvr__held *h, const size_t cell[3], const double within[3], size_t to[3], double u[3]) {
     const isogi_dvr__held_block *b = &h->block[(cell[0] >> 3) + h->count[0] * ((cell[1] >> 3) + h->count[1] * (cell[2] >> 3))];
     size_t point = b->first, stride = 1;
@@ -2344,7 +2351,8 @@ static size_t isogi_dvr__held_cell(const isogi_dvr__held *h, const size_t cell[3
     return point;
 }
 
-/* Points on the border of blocks take what the coarsest of the blocks there has: of blocks of one step, those of larger steps being finished. */
+/* Points on the border of blocks take what the coarsest of the blocks there has: of blocks of one step, those of larger steps being
+   finished. */
 typedef struct isogi_dvr__join_job {
     const isogi_dvr__held *held;
     float *value; /* [points][channels] */
@@ -2438,7 +2446,8 @@ static int isogi_dvr__resolve_material(isogi_material *m, int transmission) {
         if (!(m->diffuse[a] >= 0 && m->specular[a] >= 0)) return 0;
     if (!(m->exponent >= 0 && m->exponent <= 1e6f)) return 0;
     if (!(m->diffuse[0] > 0 || m->diffuse[1] > 0 || m->diffuse[2] > 0)) m->diffuse[0] = m->diffuse[1] = m->diffuse[2] = 1;
-    if (transmission && !(m->specular[0] > 0 || m->specular[1] > 0 || m->specular[2] > 0)) m->specular[0] = m->specular[1] = m->specular[2] = 1;
+    if (transmission && !(m->specular[0] > 0 || m->specular[1] > 0 ||
+        m->specular[2] > 0)) m->specular[0] = m->specular[1] = m->specular[2] = 1;
     return 1;
 }
 
@@ -2450,9 +2459,11 @@ static isogi_result isogi_dvr__resolve(isogi_dvr_desc *desc, const isogi_dvr_des
     volume = isogi_vol_volume(desc->pyramid);
     if (!volume->data) return ISOGI_INVALID; /* a field given by a function */
     if (desc->space != ISOGI_DVR_PHYSICAL && desc->space != ISOGI_DVR_DATA) return ISOGI_INVALID;
-    if (desc->shading != ISOGI_DVR_UNLIT && desc->shading != ISOGI_DVR_VISIBILITY && desc->shading != ISOGI_DVR_LOCAL && desc->shading != ISOGI_DVR_TWO_SIDED)
+    if (desc->shading != ISOGI_DVR_UNLIT && desc->shading != ISOGI_DVR_VISIBILITY && desc->shading != ISOGI_DVR_LOCAL &&
+        desc->shading != ISOGI_DVR_TWO_SIDED)
         return ISOGI_INVALID;
-    if ((unsigned)desc->classification > ISOGI_DVR_POST_CLASSIFIED || (unsigned)desc->silhouette > ISOGI_DVR_SILHOUETTE_GRADIENT) return ISOGI_INVALID;
+    if ((unsigned)desc->classification > ISOGI_DVR_POST_CLASSIFIED ||
+        (unsigned)desc->silhouette > ISOGI_DVR_SILHOUETTE_GRADIENT) return ISOGI_INVALID;
     if ((unsigned)desc->normals > ISOGI_NORMAL_TRILINEAR || desc->table < 0 || desc->table == 1 || desc->table > 1024) return ISOGI_INVALID;
     for (a = 0; a < 3; a++)
         if (!isogi_dvr__resolve_material(&desc->material[a], a == 2)) return ISOGI_INVALID;
@@ -2465,14 +2476,16 @@ static isogi_result isogi_dvr__resolve(isogi_dvr_desc *desc, const isogi_dvr_des
     if (!(desc->unit >= 0) || !(desc->step >= 0) || !(desc->visibility_step >= 0)) return ISOGI_INVALID;
     if (!(desc->opaque >= 0 && desc->opaque <= 1)) return ISOGI_INVALID;
     if (desc->order < 0 || desc->order > ISOGI_DVR__MAX_ORDER || desc->directions < 0 || desc->directions > 65536) return ISOGI_INVALID;
-    if ((int)desc->method < 0 || desc->method > ISOGI_DVR_SWEEP || (int)desc->sphere < 0 || desc->sphere > ISOGI_DVR_ICOSAHEDRON) return ISOGI_INVALID;
+    if ((int)desc->method < 0 || desc->method > ISOGI_DVR_SWEEP || (int)desc->sphere < 0 ||
+        desc->sphere > ISOGI_DVR_ICOSAHEDRON) return ISOGI_INVALID;
     if (!(desc->step > 0)) desc->step = 0.5;
     if (desc->visibility_step > 0 && !(desc->visibility_step >= 1e-4 && desc->visibility_step <= 2e4)) return ISOGI_INVALID;
     if (!(desc->step >= 1e-4 && desc->step <= 1e4)) return ISOGI_INVALID;
     if (!desc->method) desc->method = ISOGI_DVR_SWEEP;
     if (!isogi_dvr__finite64(desc->anisotropy) || !(desc->anisotropy > -1 && desc->anisotropy < 1)) return ISOGI_INVALID;
     if (!isogi_dvr__finite64(desc->tolerance) || !(desc->tolerance >= 0)) return ISOGI_INVALID;
-    if (!isogi_dvr__finite64(desc->bound) || (desc->bound > 0 && !(desc->bound >= 1e-4)) || !(desc->bound >= 0 && desc->bound <= 1)) return ISOGI_INVALID;
+    if (!isogi_dvr__finite64(desc->bound) || (desc->bound > 0 && !(desc->bound >= 1e-4)) || !(desc->bound >= 0 &&
+        desc->bound <= 1)) return ISOGI_INVALID;
     if (!isogi_dvr__finite64(desc->emission) || !(desc->emission >= 0 && desc->emission <= 1e6)) return ISOGI_INVALID;
     if (!isogi_dvr__finite64(desc->radius) || !isogi_dvr__finite64(desc->reduction)) return ISOGI_INVALID;
     if (!(desc->radius >= 0) || !(desc->reduction >= 0)) return ISOGI_INVALID;
@@ -2692,7 +2705,8 @@ static int isogi_dvr__inside(const isogi_dvr *d, const double origin[3], const d
 }
 
 /* 0 if the ray misses the box. `origin` and `dir` in grid space, `world` = length of dir in the world, `step` in voxels. */
-static int isogi_dvr__begin(isogi_dvr__march *m, const isogi_dvr *d, const double origin[3], const double dir[3], double world, double step) {
+static int isogi_dvr__begin(isogi_dvr__march *m, const isogi_dvr *d, const double origin[3], const double dir[3], double world,
+                            double step) {
     double span[2], pieces;
     int a;
     memset(m, 0, sizeof *m);
@@ -2959,9 +2973,9 @@ static int isogi_dvr__leave_block(isogi_dvr__walk *w) {
     return 0;
 }
 
-/* The cubic from `in` to `out` (places in the cell) as Bernstein coefficients: values at corners of the box between the two places. Values are
-   mixed from the nearer side: exact at both ends, and between equal values, so that a face whose voxels all have the value of a peak is on it
-   wherever the ray passes. */
+/* The cubic from `in` to `out` (places in the cell) as Bernstein coefficients: values at corners of the box between the two places. Values
+   are mixed from the nearer side: exact at both ends, and between equal values, so that a face whose voxels all have the value of a peak is
+   on it wherever the ray passes. */
 static void isogi_dvr__cubic(const double c[8], const double in[3], const double out[3], double b[4]) {
     double u[2][3], x[2][4], y[2][2][2], z[2][2][2];
     int far_side[2][3], i, j, k, n;
@@ -3401,7 +3415,8 @@ static void isogi_dvr__mix_rows(const isogi_volume *v, size_t first, size_t coun
 }
 
 /* sum[i] += extinction at lattice positions from + i * distance (voxels) of a row of voxels that begins at `first`. */
-static void isogi_dvr__classify_row(const isogi_dvr *d, const float *row, size_t first, size_t last, double from, double distance, size_t count, float *sum) {
+static void isogi_dvr__classify_row(const isogi_dvr *d, const float *row, size_t first, size_t last, double from, double distance,
+                                    size_t count, float *sum) {
     float low = (float)d->matter.low, scale = (float)d->matter.scale;
     size_t i;
     for (i = 0; i < count; i++) {
@@ -3823,8 +3838,8 @@ static isogi_result isogi_dvr__lay_out(isogi_dvr *d, const uint8_t *level, const
     return ISOGI_OK;
 }
 
-/* Histograms for the present bins, within a budget of rays (0 = all), for which a block's voxels count as much as its local rays do: a block
-   at least. *used: what they count for; b->counted == b->total when they are all there. */
+/* Histograms for the present bins, within a budget of rays (0 = all), for which a block's voxels count as much as its local rays do: a
+   block at least. *used: what they count for; b->counted == b->total when they are all there. */
 static isogi_result isogi_dvr__count_blocks(isogi_dvr *d, uint64_t max_rays, double *used) {
     isogi_dvr__blocks *b = &d->blocks;
     const isogi_dvr__matter *m = &d->matter;
@@ -3999,7 +4014,8 @@ static size_t isogi_dvr__make_window(const isogi_dvr *d, size_t block, float *wi
 }
 
 /* SH coefficients of a row of nodes: sum[c][0 .. count - 1] at the window's nodes from `at` on, as many as a vector or two hold. */
-static void isogi_dvr__local_row(const isogi_dvr__local_job *job, size_t n, const float *at, size_t count, float (*sum)[2 * ISOGI_DVR__LANES]) {
+static void isogi_dvr__local_row(const isogi_dvr__local_job *job, size_t n, const float *at, size_t count,
+                                 float (*sum)[2 * ISOGI_DVR__LANES]) {
     const isogi_dvr *d = job->dvr;
     const isogi_dvr__local_step *step = job->step + isogi_dvr__steps_before(d, n);
     size_t steps = isogi_dvr__local_steps(d, n), row = isogi_dvr__window_row(&d->blocks, n), plane = row * isogi_dvr__window_side(&d->blocks, n), k, c;
@@ -4132,7 +4148,8 @@ static void isogi_dvr__global_at(const isogi_dvr__blocks *b, int axis, double po
 }
 
 /* Local visibility at a place, already evaluated towards one direction. */
-static float isogi_dvr__global_piece(const isogi_dvr__blocks *b, const float *toward, double x, const isogi_dvr__global_axis *y, const isogi_dvr__global_axis *z) {
+static float isogi_dvr__global_piece(const isogi_dvr__blocks *b, const float *toward, double x, const isogi_dvr__global_axis *y,
+                                     const isogi_dvr__global_axis *z) {
     size_t at, block, n, node, last, row, plane;
     const float *p;
     float u, v[4];
@@ -4154,7 +4171,8 @@ static float isogi_dvr__global_piece(const isogi_dvr__blocks *b, const float *to
 
 /* Piecewise integration: local visibility stands for the ray's next r_s voxels; the last piece, cut by the border, is no shorter in
    what it blocks since there is nothing outside (eq. 9). A row of grid points at once: it shares places along y and z. */
-static void isogi_dvr__global_row(const isogi_dvr *d, const float *toward, const double from[3], double apart, size_t count, const double direction[6], float *clear) {
+static void isogi_dvr__global_row(const isogi_dvr *d, const float *toward, const double from[3], double apart, size_t count,
+                                  const double direction[6], float *clear) {
     double step = d->desc.radius * d->spacing, t, limit = 1e300, across = fabs(direction[0]) > 1e-300 ? 1 / direction[0] : 0;
     isogi_dvr__global_axis y, z;
     size_t i, left = count;
@@ -4168,7 +4186,8 @@ static void isogi_dvr__global_row(const isogi_dvr *d, const float *toward, const
         isogi_dvr__global_at(&d->blocks, 1, from[1] + t * direction[1], &y), isogi_dvr__global_at(&d->blocks, 2, from[2] + t * direction[2], &z);
         for (i = 0, left = 0; i < count; i++) {
             double x = from[0] + (double)i * apart;
-            if (!(clear[i] > (float)ISOGI_DVR__NEGLIGIBLE) || (fabs(across) > 0 && !(t < ((across > 0 ? d->cells[0] : 0) - x) * across))) continue;
+            if (!(clear[i] > (float)ISOGI_DVR__NEGLIGIBLE) ||
+                (fabs(across) > 0 && !(t < ((across > 0 ? d->cells[0] : 0) - x) * across))) continue;
             clear[i] *= isogi_dvr__global_piece(&d->blocks, toward, x + t * direction[0], &y, &z), left++;
         }
     }
@@ -4272,7 +4291,8 @@ static void isogi_dvr__sweep_add(const isogi_dvr__sweep *s, size_t slice, const 
 }
 
 /* Transmittance between the two rays beside every grid point of a row of rays, weighed, and its weight. */
-static void isogi_dvr__sweep_row_out(const isogi_dvr__sweep *s, size_t slice, const isogi_dvr__slip *at, size_t c, float *out, float *weight) {
+static void isogi_dvr__sweep_row_out(const isogi_dvr__sweep *s, size_t slice, const isogi_dvr__slip *at, size_t c, float *out,
+                                     float *weight) {
     const float *depth = s->depth + (at->row + c) * s->depth_row + at->lane, *from = s->extinction + slice * s->slice_stride;
     const float *low = from + (c ? c - 1 : 0) * s->row_stride, *high = from + (c < s->size[1] ? c : 0) * s->row_stride; /* the nodes beside */
     float *e = s->row, part = at->part[1], share[2];
@@ -4335,7 +4355,8 @@ static void isogi_dvr__sweep_run(isogi_dvr__sweep *s, float *out) {
         isogi_dvr__slip at = isogi_dvr__slip_at(s, k);
         size_t slice = s->backwards ? s->size[0] - 1 - k : k, point = (slice - s->first[0]) / s->every[0];
         float *plane;
-        if (slice < s->first[0] || (slice - s->first[0]) % s->every[0] || point >= s->points[0] || (s->held && !isogi_dvr__hold_plane(s, point, NULL))) {
+        if (slice < s->first[0] || (slice - s->first[0]) % s->every[0] || point >= s->points[0] ||
+            (s->held && !isogi_dvr__hold_plane(s, point, NULL))) {
             isogi_dvr__sweep_add(s, k, &at, k ? 2 * s->piece : s->piece, 0);
             continue;
         }
@@ -4748,7 +4769,8 @@ ISOGI_API isogi_result isogi_dvr_inspect(const isogi_dvr *dvr, isogi_dvr_report 
     return ISOGI_OK;
 }
 
-ISOGI_API isogi_result isogi_dvr_sample_blocks(const isogi_dvr *dvr, const float (*points)[3], size_t count, float *values, float *visibility) {
+ISOGI_API isogi_result isogi_dvr_sample_blocks(const isogi_dvr *dvr, const float (*points)[3], size_t count, float *values,
+                                               float *visibility) {
     size_t i, block;
     int a;
     if (!dvr || !dvr->blocks.total || dvr->method != ISOGI_DVR_PAPER || (count && !points)) return ISOGI_INVALID;
@@ -4960,7 +4982,8 @@ typedef struct isogi_dvr__pixel_ray {
 
 /* Colour as it leaves a place towards the eye: rgb is the transfer function's and is multiplied by light, highlights come on top.
    side: +1 where values rise along the ray, else -1. */
-static void isogi_dvr__shade(const isogi_dvr__pixel_ray *r, const int cell[3], const double local[3], int side, double opacity, double rgb[3]) {
+static void isogi_dvr__shade(const isogi_dvr__pixel_ray *r, const int cell[3], const double local[3], int side, double opacity,
+                             double rgb[3]) {
     double light[3], grid[3], add[3] = {0, 0, 0};
     int a;
     if (r->dvr->desc.shading == ISOGI_DVR_UNLIT) return;
@@ -5014,7 +5037,8 @@ static void isogi_dvr__peak_colour(const isogi_dvr *d, const isogi_peak *peak, c
     for (a = 0; a < 3; a++) rgb[a] = (double)peak->rgb[a];
     if (!d->desc.second || !d->desc.second_count) return;
     isogi_vol_positions(d->desc.pyramid, hit, 1, &point);
-    if (isogi_vol_sample(d->desc.second, (const float(*)[3])&point, 1, &value, NULL) != ISOGI_OK || isogi_dvr__is_nan((double)value)) return;
+    if (isogi_vol_sample(d->desc.second, (const float(*)[3])&point, 1, &value, NULL) != ISOGI_OK ||
+        isogi_dvr__is_nan((double)value)) return;
     isogi_dvr__colour(d->desc.second_points, d->desc.second_count, (double)value, factor);
     for (a = 0; a < 3; a++) rgb[a] *= factor[a];
 }
@@ -5188,8 +5212,8 @@ static double isogi_dvr__bounded_depth(const isogi_dvr__span *s, const isogi_dvr
     return isogi_dvr__clamp(sum * (end - u) * p->dt * s->walk.m->scale, 1e30);
 }
 
-/* A part so short that colours at its ends differ by less than the limit: opacity is exact, and the colour that arrives is a mean of colours
-   between those. */
+/* A part so short that colours at its ends differ by less than the limit: opacity is exact, and the colour that arrives is a mean of
+   colours between those. */
 static void isogi_dvr__bounded_part(isogi_dvr__pixel_ray *r, isogi_dvr__span *s, size_t n, const double value[2], double u, double end) {
     const isogi_dvr__integral *g = &r->dvr->integral;
     const isogi_dvr__march *m = s->walk.m;
@@ -5431,7 +5455,8 @@ static int isogi_dvr__any_peak(const isogi_dvr *d) {
 }
 
 static int isogi_dvr__fast_space(const isogi_dvr *d) {
-    return d->desc.space == ISOGI_DVR_PHYSICAL && !isogi_dvr__bounded(d) && d->desc.classification != ISOGI_DVR_POST_CLASSIFIED && !isogi_dvr__any_peak(d) && !d->desc.jitter &&
+    return d->desc.space == ISOGI_DVR_PHYSICAL && !isogi_dvr__bounded(d) && d->desc.classification != ISOGI_DVR_POST_CLASSIFIED &&
+        !isogi_dvr__any_peak(d) && !d->desc.jitter &&
            (d->desc.shading == ISOGI_DVR_UNLIT || d->desc.shading == ISOGI_DVR_VISIBILITY) && !(fabs(d->desc.anisotropy) > 0) && d->cells[0] && d->cells[1] && d->cells[2];
 }
 
@@ -5650,7 +5675,8 @@ static float isogi_dvr__fast_place(const isogi_dvr__frame *f, const isogi_dvr__f
 
 /* A piece across which extinction changes much is looked at again in seven: the field between the samples is not quite linear, and
    where in the piece its surface lies decides about light. */
-static void isogi_dvr__fast_divide(const isogi_dvr__frame *f, const isogi_dvr__fast_ray *r, isogi_dvr__fast_state *s, const isogi_dvr__fast_run *run, int k, isogi_counters *work) {
+static void isogi_dvr__fast_divide(const isogi_dvr__frame *f, const isogi_dvr__fast_ray *r, isogi_dvr__fast_state *s,
+                                   const isogi_dvr__fast_run *run, int k, isogi_counters *work) {
     isogi_dvr__fast_run part;
     memset(&part, 0, sizeof part);
     part.pieces = ISOGI_DVR__NODES - 1, part.first = run->first + run->stride * (float)k, part.stride = run->stride / (float)part.pieces;
@@ -5665,7 +5691,8 @@ static void isogi_dvr__fast_divide(const isogi_dvr__frame *f, const isogi_dvr__f
 static float isogi_dvr__lost(float depth, float clear) { return depth < 0.02f ? depth * (1 - depth * (0.5f - depth * (1.0f / 6))) : 1 - clear; }
 
 /* The pieces of a run, front to back. */
-static void isogi_dvr__fast_shade(const isogi_dvr__frame *f, const isogi_dvr__fast_ray *r, isogi_dvr__fast_state *s, const isogi_dvr__fast_run *run, isogi_counters *work) {
+static void isogi_dvr__fast_shade(const isogi_dvr__frame *f, const isogi_dvr__fast_ray *r, isogi_dvr__fast_state *s,
+                                  const isogi_dvr__fast_run *run, isogi_counters *work) {
     int k, a;
     for (k = 0; k < run->pieces && s->clear > f->end; k++) {
         float light[4] = {1, 1, 1, 1}, colour[4] = {0, 0, 0, 0}, factor[3], clear;
@@ -5691,7 +5718,8 @@ static void isogi_dvr__fast_shade(const isogi_dvr__frame *f, const isogi_dvr__fa
 
 /* As isogi_dvr__fast_shade without colours: sums up depth until what is sought, and finds its place by halving: between two samples the
    value is linear, and its integral is monotone. */
-static void isogi_dvr__fast_probe(const isogi_dvr__frame *f, const isogi_dvr__fast_ray *r, isogi_dvr__fast_state *s, const isogi_dvr__fast_run *run, isogi_counters *work) {
+static void isogi_dvr__fast_probe(const isogi_dvr__frame *f, const isogi_dvr__fast_ray *r, isogi_dvr__fast_state *s,
+                                  const isogi_dvr__fast_run *run, isogi_counters *work) {
     int k, n;
     for (k = 0; k < run->pieces && s->clear > f->end; k++) {
         float from = run->classes[k], to = run->classes[k + 1], length = k + 1 < run->pieces ? run->length : run->last, low = 0, high = 1;
@@ -5718,7 +5746,8 @@ static void isogi_dvr__fast_probe(const isogi_dvr__frame *f, const isogi_dvr__fa
 #ifdef ISOGI_DVR__AVX
 #define ISOGI_DVR__AVX2 __attribute__((target("avx2,fma"))) static
 /* Values of a run's samples, not yet scaled. */
-ISOGI_DVR__AVX2 inline __m256 isogi_dvr__samples_avx2(const isogi_dvr__frame *f, const isogi_dvr__fast_ray *r, const isogi_dvr__fast_run *run) {
+ISOGI_DVR__AVX2 inline __m256 isogi_dvr__samples_avx2(const isogi_dvr__frame *f, const isogi_dvr__fast_ray *r,
+                                                      const isogi_dvr__fast_run *run) {
     const isogi_volume *v = &f->dvr->volume;
     const __m256 lane = _mm256_fmadd_ps(_mm256_set1_ps(run->stride), _mm256_setr_ps(0, 1, 2, 3, 4, 5, 6, 7), _mm256_set1_ps(run->first));
     __m256i offset = _mm256_setzero_si256();
@@ -5829,7 +5858,8 @@ typedef struct isogi_dvr__fast_parts {
 } isogi_dvr__fast_parts;
 
 /* As isogi_dvr__held_cell: points, places within cells, points to the next rows and planes. */
-ISOGI_DVR__AVX2 inline __m256i isogi_dvr__held_cells_avx2(const isogi_dvr__held *h, const __m256i cell[3], __m256 u[3], __m256i *row, __m256i *plane) {
+ISOGI_DVR__AVX2 inline __m256i isogi_dvr__held_cells_avx2(const isogi_dvr__held *h, const __m256i cell[3], __m256 u[3], __m256i *row,
+                                                          __m256i *plane) {
     const __m256i seven = _mm256_set1_epi32(7), one = _mm256_set1_epi32(1);
     __m256i block = _mm256_setzero_si256(), log, point;
     __m256 part;
@@ -5847,7 +5877,8 @@ ISOGI_DVR__AVX2 inline __m256i isogi_dvr__held_cells_avx2(const isogi_dvr__held 
     return point;
 }
 
-ISOGI_DVR__AVX2 inline void isogi_dvr__parts_avx2(const isogi_dvr__frame *f, const isogi_dvr__fast_ray *r, const isogi_dvr__fast_run *run, isogi_dvr__fast_parts *parts) {
+ISOGI_DVR__AVX2 inline void isogi_dvr__parts_avx2(const isogi_dvr__frame *f, const isogi_dvr__fast_ray *r, const isogi_dvr__fast_run *run,
+                                                  isogi_dvr__fast_parts *parts) {
     const __m256 zero = _mm256_setzero_ps(), one = _mm256_set1_ps(1), half = _mm256_set1_ps(0.5f), reach = _mm256_set1_ps(f->reach);
     __m256 value = _mm256_loadu_ps(run->classes), next = isogi_dvr__next_avx2(value), difference = _mm256_sub_ps(next, value), x, at, close, u[3];
     __m256i index, c[3], to, plane;
@@ -5901,7 +5932,8 @@ ISOGI_DVR__AVX2 inline __m128 isogi_dvr__part_avx2(const isogi_dvr__frame *f, co
 }
 
 /* As isogi_dvr__fast_shade. */
-ISOGI_DVR__AVX2 void isogi_dvr__fast_shade_avx2(const isogi_dvr__frame *f, const isogi_dvr__fast_ray *r, isogi_dvr__fast_state *s, const isogi_dvr__fast_run *run, isogi_counters *work) {
+ISOGI_DVR__AVX2 void isogi_dvr__fast_shade_avx2(const isogi_dvr__frame *f, const isogi_dvr__fast_ray *r, isogi_dvr__fast_state *s,
+                                                const isogi_dvr__fast_run *run, isogi_counters *work) {
     const __m256i lane = _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7);
     const __m256 depth = _mm256_loadu_ps(run->depth), one = _mm256_set1_ps(1);
     __m256 passed = isogi_dvr__exp_avx2(depth), lost = _mm256_fnmadd_ps(depth, _mm256_set1_ps(1.0f / 6), _mm256_set1_ps(0.5f));
@@ -5940,7 +5972,8 @@ ISOGI_DVR__AVX2 void isogi_dvr__fast_shade_avx2(const isogi_dvr__frame *f, const
 #endif
 
 /* Front to back: all rays of a packet go to where the next matter may be, then each passes some of it. */
-static void isogi_dvr__fast_cast(const isogi_dvr__frame *f, const isogi_dvr__fast_ray r[ISOGI_DVR__LANES], isogi_dvr__fast_state s[ISOGI_DVR__LANES], isogi_counters *work) {
+static void isogi_dvr__fast_cast(const isogi_dvr__frame *f, const isogi_dvr__fast_ray r[ISOGI_DVR__LANES],
+                                 isogi_dvr__fast_state s[ISOGI_DVR__LANES], isogi_counters *work) {
     isogi_dvr__packet p;
     isogi_dvr__fast_run run[ISOGI_DVR__LANES];
     int k, a, any = 1;
@@ -6105,7 +6138,8 @@ static void isogi_dvr__render_pixel(const isogi_dvr__render_job *job, int x, int
 
 /* Depth of a packet: once without a limit, for the depth in all, of which 1 - clear has no digits when it is little; and once more to the
    place that is asked for. */
-static void isogi_dvr__depth_fast(const isogi_dvr__render_job *job, isogi_dvr__fast_ray ray[ISOGI_DVR__LANES], float depth[ISOGI_DVR__LANES], isogi_counters *work) {
+static void isogi_dvr__depth_fast(const isogi_dvr__render_job *job, isogi_dvr__fast_ray ray[ISOGI_DVR__LANES],
+                                  float depth[ISOGI_DVR__LANES], isogi_counters *work) {
     isogi_dvr__frame probe = job->fast.frame;
     isogi_dvr__fast_state state[ISOGI_DVR__LANES];
     int k;
@@ -6185,7 +6219,8 @@ static isogi_result isogi_dvr__begin_frame(isogi_dvr__render_job *job) {
     f->sample_kind = kind >= 0 && v->stride[0] == (kind == 0 ? 4 : kind) && v->stride[1] > 0 && v->stride[2] > 0 && bytes > 8 && bytes < 2e9 ? kind : -1;
     if (f->sample_kind >= 0) f->last_word = (uint32_t)bytes + (uint32_t)v->stride[0] - 4;
 #ifdef ISOGI_DVR__AVX
-    if (f->sample_kind >= 0 && isogi_dvr__machine() >= 3 && (!d->context.force_path || d->context.force_path > 2) && points < 0x7fffffff && d->held.total < 0x0fffffff)
+    if (f->sample_kind >= 0 && isogi_dvr__machine() >= 3 && (!d->context.force_path || d->context.force_path > 2) &&
+        points < 0x7fffffff && d->held.total < 0x0fffffff)
         f->look = isogi_dvr__fast_look_avx2, f->shade = isogi_dvr__fast_shade_avx2;
 #endif
     f->count = isogi_dvr__count_classes(d, &low, &scale);
@@ -6258,7 +6293,8 @@ ISOGI_API isogi_result isogi_transfer_preset(isogi_preset preset, double low, do
                                           {{0.05f, 0.08f, 0.55f}, {0.25f, 0.42f, 0.9f}, {0.75f, 0.75f, 0.75f}, {0.85f, 0.3f, 0.18f}, {0.45f, 0.01f, 0.02f}},
                                           {{0.2f, 0.03f, 0.5f}, {0.03f, 0.2f, 0.85f}, {0.05f, 0.6f, 0.25f}, {0.9f, 0.7f, 0.05f}, {0.75f, 0.05f, 0.03f}}};
     int i, a;
-    if (!points || (unsigned)preset > ISOGI_PRESET_SPECTRUM || !isogi_dvr__finite64(low) || !isogi_dvr__finite64(high) || !(low < high)) return ISOGI_INVALID;
+    if (!points || (unsigned)preset > ISOGI_PRESET_SPECTRUM || !isogi_dvr__finite64(low) || !isogi_dvr__finite64(high) ||
+        !(low < high)) return ISOGI_INVALID;
     if (!isogi_dvr__finite32(extinction) || !(extinction >= 0)) return ISOGI_INVALID;
     for (i = 0; i < ISOGI_PRESET_POINTS; i++) {
         double u = (double)i / (ISOGI_PRESET_POINTS - 1);
@@ -6519,7 +6555,8 @@ static void isogi_dvr__bound_faces(const isogi_tets *m, isogi_dvr__node *n) {
     }
 }
 
-/* A tree of boxes over the border's faces, cut in the middle of the longest axis; leaves that cannot be cut, or lie too deep, stay large. */
+/* A tree of boxes over the border's faces, cut in the middle of the longest axis; leaves that cannot be cut, or lie too
+   deep, stay large. */
 static void isogi_dvr__build_tree(isogi_tets *m) {
     uint32_t stack[2 * ISOGI_DVR__DEEP][2];
     int top = 0;
@@ -6586,7 +6623,8 @@ static isogi_result isogi_dvr__build_tets(isogi_tets *m, isogi_tet_report *repor
     return ISOGI_OK;
 }
 
-ISOGI_API isogi_result isogi_dvr_tets_build(isogi_tets **tets, const isogi_tet_mesh *mesh, isogi_tet_report *report, const isogi_context *context) {
+ISOGI_API isogi_result isogi_dvr_tets_build(isogi_tets **tets, const isogi_tet_mesh *mesh, isogi_tet_report *report,
+                                            const isogi_context *context) {
     isogi_tet_report found;
     isogi_result result;
     isogi_tets *m;
@@ -6630,8 +6668,8 @@ static double isogi_dvr__face_t(const isogi_dvr__tet_ray *r, const uint32_t p[3]
     return isogi_dvr__dot(n, a) / *rate;
 }
 
-/* Which side of the line from point p to point q the ray passes. Both faces of an edge ask with the same numbers, and "upon it" is answered as
-   for a ray turned by a little towards x, by less towards y, by yet less towards z: it hits exactly one face of a closed border. */
+/* Which side of the line from point p to point q the ray passes. Both faces of an edge ask with the same numbers, and "upon it" is answered
+   as for a ray turned by a little towards x, by less towards y, by yet less towards z: it hits exactly one face of a closed border. */
 static int isogi_dvr__left_of(const isogi_dvr__tet_ray *r, uint32_t p, uint32_t q) {
     double a[3], b[3], n[3], side;
     int turned = p > q, axis;
@@ -6717,8 +6755,8 @@ static void isogi_dvr__tet_gradient(const isogi_tets *m, uint32_t tet, double g[
     for (a = 0; a < 3; a++) g[a] = (value[0] * n[0][a] + value[1] * n[1][a] + value[2] * n[2][a]) / volume;
 }
 
-/* The value at t, kept within the values of the points of the face that the ray is on (a flat tetrahedron's gradient means little), or of all
-   four points where it is within. */
+/* The value at t, kept within the values of the points of the face that the ray is on (a flat tetrahedron's gradient means little), or of
+   all four points where it is within. */
 static double isogi_dvr__tet_value(const isogi_dvr__tet_ray *r, uint32_t face, int within, const double g[3], double t) {
     const isogi_tets *m = r->mesh;
     uint32_t p[3];
@@ -6741,7 +6779,8 @@ static double isogi_dvr__tet_value(const isogi_dvr__tet_ray *r, uint32_t face, i
 }
 
 /* From t to the exit of a tetrahedron: one linear piece, exact in both spaces. */
-static void isogi_dvr__pass_tet(isogi_dvr__pixel_ray *pixel, isogi_dvr__tet_ray *r, isogi_dvr__span *s, uint32_t tet, uint32_t in, uint32_t out, double t) {
+static void isogi_dvr__pass_tet(isogi_dvr__pixel_ray *pixel, isogi_dvr__tet_ray *r, isogi_dvr__span *s, uint32_t tet, uint32_t in,
+                                uint32_t out, double t) {
     isogi_dvr__stretch *p = &s->piece;
     double g[3], change, slope, steep;
     int i;
