@@ -308,7 +308,7 @@ int main(int argc, char **argv) {
     if (!csv) return fprintf(stderr, "usage: bench_vol [--quick] OUT.csv\n"), 2;
     fprintf(csv, "header,case,method,setting,seconds,error,work,unit\n");
     for (int gyroid = 0; gyroid < 2; gyroid++) {
-        scene s = scene_new(gyroid, N);
+        scene s = scene_new(gyroid, N, 1);
         bench_rays(&s, "primary1", s.primary, 1, FIRST, 0);
         bench_rays(&s, "primary16", s.primary, 16, FIRST, 1);
         bench_rays(&s, "surface", s.surface, RAYS, FIRST, 1);
@@ -331,8 +331,9 @@ int main(int argc, char **argv) {
     /* how cost grows with resolution */
     for (int n = 64; n <= (quick ? 128 : LARGEST); n *= 2)
         for (int gyroid = 0; gyroid < 2 && n != N; gyroid++) {
-            scene s = scene_new(gyroid, n);
+            scene s = scene_new(gyroid, n, !quick);
             bench_rays(&s, "primary16", s.primary, 16, FIRST, 1);
+            if (!quick) bench_rays(&s, "surface", s.surface, RAYS, FIRST, 0), bench_rays(&s, "bundle64", s.bundles, BUNDLE, SHARED, 0);
             scene_free(&s);
         }
     print_table();

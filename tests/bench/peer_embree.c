@@ -179,7 +179,7 @@ int main(int argc, char **argv) {
     printf("%-10s %-10s %7s %7s %6s %6s   %-14s %6s %7s\n", "Mray/s", "", "ours", "Embree", "ratio", "goal", "Embree by", "wrong", "t99");
     for (int gyroid = 0; gyroid < 2; gyroid++) {
         if (only >= 0 && gyroid != only) continue;
-        scene s = scene_new(gyroid, N);
+        scene s = scene_new(gyroid, N, 1);
         peer p = peer_new(&s, quality);
         for (size_t i = 0; i < sizeof works / sizeof *works; i++)
             compare(&s, &p, &works[i], i < 2 ? s.primary : i < 4 ? s.surface : s.bundles, works[i].ratios[gyroid], runs);

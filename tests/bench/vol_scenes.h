@@ -128,7 +128,8 @@ static void surface_rays(scene *s) {
     free(hits);
 }
 
-static scene scene_new(int gyroid, int n) {
+/* surfaces: with the rays that leave them. */
+static scene scene_new(int gyroid, int n, int surfaces) {
     scene s = {.n = n, .isovalue = gyroid ? 0 : 0.5};
     size_t voxels = (size_t)n * (size_t)n * (size_t)n;
     snprintf(s.name, sizeof s.name, "%s%d", gyroid ? "gyroid" : "ml", n);
@@ -142,7 +143,7 @@ static scene scene_new(int gyroid, int n) {
     s.surface = (isogi_ray *)malloc(RAYS * sizeof(isogi_ray));
     s.bundles = (isogi_ray *)malloc(RAYS * sizeof(isogi_ray));
     primary_rays(s.primary, s.isovalue);
-    if (n == N) surface_rays(&s);
+    if (surfaces) surface_rays(&s);
     return s;
 }
 
