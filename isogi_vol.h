@@ -4030,9 +4030,9 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE __m512i isogi_vol__when(__m512d plane, __m51
     return _mm512_ternarylogic_epi64(_mm512_castpd_si512(t), ISOGI_VOL__ALL64(~(uint64_t)3), _mm512_set1_epi64(axis), 0xea);
 }
 
-/* Which children of their nodes the rays from slot i on pass, in their own order. */
-ISOGI_VOL__AVX512 ISOGI_VOL__INLINE __m512i isogi_vol__passed(const isogi_vol__pool *s, int i) {
-    const __m512i level = _mm512_load_si512(&s->level[i]), shift = _mm512_add_epi64(level, level), cell = _mm512_load_si512(&s->cell[i]);
+/* Which children of their nodes the rays from slot i on pass, in their own order; cell: the nodes' corners. */
+ISOGI_VOL__AVX512 static __m512i isogi_vol__passed(const isogi_vol__pool *s, int i, __m512i level, __m512i cell) {
+    const __m512i shift = _mm512_add_epi64(level, level);
     const __m512i child = _mm512_sllv_epi64(_mm512_set1_epi64(1), shift), whole = _mm512_slli_epi64(child, 2);
     const __m512i field = _mm512_set1_epi64(0xffff);
     __m512i in, out;
@@ -4167,7 +4167,7 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE void isogi_vol__answer(isogi_vol__turn *turn
     const __mmask8 lives = _mm512_cmpge_epi64_mask(level, zero), leaf = _mm512_cmpeq_epi64_mask(level, zero);
     __attribute__((aligned(64))) uint64_t mask[4][8];
     const __m256i tail = isogi_vol__compare(s, i, leaf, mask);
-    const __m512i passed = isogi_vol__passed(s, i); /* meanwhile the masks get to where they can be read as vectors */
+    const __m512i passed = isogi_vol__passed(s, i, level, _mm512_load_si512(&s->cell[i])); /* meanwhile the masks get to where they can be read as vectors */
     const __m512i marked = _mm512_maskz_and_epi64(lives, passed, isogi_vol__marked(s, i, leaf, (const uint64_t(*)[8])mask, tail));
     const __mmask8 some = _mm512_test_epi64_mask(marked, marked);
     const unsigned cells = (unsigned)(some & leaf);
@@ -5518,6 +5518,72 @@ out:
 
 /* ---- a pool of rays ---- */
 
+/* The rays of a bundle that begin where its first one does: they come from the root to the leaf there on one way, whose nodes are looked at once. */
+typedef struct isogi_vol__descent {
+    double origin[3], step;
+    int64_t cell; /* in which they begin; -1: not prepared */
+    const uint8_t *leaf;
+    uint64_t held[ISOGI_VOL__NODE_LEVELS]; /* children on the way that can hold the surface */
+} isogi_vol__descent;
+
+/* slot: of a ray that has been set up. */
+ISOGI_VOL__AVX512 static void isogi_vol__prepare_descent(isogi_vol__descent *d, const isogi_pyramid *p, const isogi_vol__pool *s, int slot) {
+    size_t at[3];
+    int a, n;
+    for (a = 0; a < 3; a++) {
+        const int cell = (int)s->origin[a][slot]; /* within the box */
+        d->origin[a] = s->origin[a][slot], at[a] = (size_t)(cell < p->cells[a] ? cell : p->cells[a] - 1);
+    }
+    d->cell = (int64_t)(at[0] | (uint64_t)at[1] << 16 | (uint64_t)at[2] << 32);
+    for (n = p->node_levels - 1; n >= 0; n--) {
+        const uint8_t *node = p->nodes[isogi_vol__node_at(p, n, at[0] >> (2 * n + 2), at[1] >> (2 * n + 2), at[2] >> (2 * n + 2))];
+        if (n) {
+            const size_t child = (at[0] >> 2 * n & 3) | (at[1] >> 2 * n & 3) << 2 | (at[2] >> 2 * n & 3) << 4;
+            d->held[n] = isogi_vol__held(p->ways, 0, (int)s->low[slot], (int)s->beyond[slot] - 1, node);
+            if (!(d->held[n] >> child & 1)) break; /* none goes on: this node's mask is its last one */
+        } else {
+            isogi_vol__leaf leaf;
+            __m512i voxel[2];
+            const uint64_t held = isogi_vol__held_cells(p->ways, 0, &leaf, node, (float)s->level_units[slot], voxel);
+            d->held[0] = isogi_vol__cut_order(&leaf, 0, held), d->leaf = node, d->step = (double)leaf.isovalue;
+        }
+    }
+}
+
+/* Takes rays of a group of eight from the root to the leaf in which they begin, or as far as children can hold the surface. */
+ISOGI_VOL__AVX512 static void isogi_vol__descend8(isogi_vol__turn *turn, isogi_vol__pool *s, const isogi_vol__descent *d, int i, unsigned fresh) {
+    const __m512i one = _mm512_set1_epi64(1), flip = _mm512_load_si512(&s->flip[i]), cell = _mm512_set1_epi64(d->cell), zero = _mm512_setzero_si512();
+    __m512i pending = zero, mask = zero;
+    __mmask8 lanes = (__mmask8)fresh, going;
+    unsigned cells;
+    int a, n;
+    for (a = 0; a < 3; a++) lanes = _mm512_mask_cmp_pd_mask(lanes, _mm512_load_pd(&s->origin[a][i]), _mm512_set1_pd(d->origin[a]), _CMP_EQ_OQ);
+    if (!lanes) return;
+    for (going = lanes, n = turn->levels - 1; going && n >= 0; n--) {
+        const uint64_t digits = 0x000100010001u * (((uint64_t)4 << 2 * n) - 1);
+        const __m512i held = isogi_vol__mirror8(_mm512_set1_epi64((int64_t)d->held[n]), flip);
+        const __m512i child = _mm512_set1_epi64((int64_t)_pext_u64((uint64_t)d->cell >> 2 * n, 0x000300030003u));
+        mask = _mm512_and_si512(isogi_vol__passed(s, i, _mm512_set1_epi64(n), _mm512_set1_epi64((int64_t)((uint64_t)d->cell & ~digits))), held);
+        if (n) {
+            const __m512i bit = _mm512_sllv_epi64(one, _mm512_xor_si512(child, flip)), rest = _mm512_andnot_si512(bit, mask);
+            _mm512_mask_store_epi64(s->mask[n] + i, going, rest);
+            pending = _mm512_mask_or_epi64(pending, _mm512_mask_test_epi64_mask(going, rest, rest), pending, _mm512_set1_epi64(1 << n));
+            going = _mm512_mask_test_epi64_mask(going, mask, bit);
+        }
+    }
+    cells = _mm512_mask_test_epi64_mask(going, mask, mask);
+    _mm512_mask_store_epi64(s->mask[0] + i, going, mask);
+    _mm512_mask_store_epi64(&s->pending[i], lanes, pending);
+    _mm512_mask_store_epi64(&s->cell[i], lanes, cell);
+    _mm512_mask_store_epi64(&s->level[i], lanes, _mm512_set1_epi64(-1));
+    _mm512_mask_store_epi64(&s->address[i], going, _mm512_set1_epi64((int64_t)(uintptr_t)d->leaf));
+    _mm512_mask_store_pd(&s->step[i], going, _mm512_set1_pd(d->step));
+    turn->choosing |= (uint64_t)(lanes & ~cells) << i;
+    _mm_storel_epi64((__m128i *)(void *)(turn->at_leaf + turn->leaves),
+                     _mm_maskz_compress_epi8((__mmask16)cells, _mm_add_epi8(_mm_set1_epi8((char)i), _mm_set_epi64x(0, 0x0706050403020100))));
+    turn->leaves += __builtin_popcount(cells);
+}
+
 /* Moves up to eight rays from one group of slots to another; the masks have as many bits. All members of a pool are rows of numbers of
    eight bytes. */
 ISOGI_VOL__AVX512 static void isogi_vol__move(isogi_vol__pool *s, isogi_vol__turn *turn, int from, __mmask8 leave, int to, __mmask8 take) {
@@ -5658,13 +5724,21 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE void isogi_vol__clear_pool(isogi_vol__pool *
 /* The rays from *next on, up to `end`, through the slots of a pool, each taken again as soon as it is free; `open`: those without a ray. */
 ISOGI_VOL__AVX512 static void isogi_vol__run_pool(isogi_vol__batch *b, isogi_vol__turn *turn, isogi_vol__pool *s, int groups, uint64_t open, size_t *next, size_t end) {
     const uint64_t slots = ~(uint64_t)0 >> (64 - 8 * groups);
+    uint64_t fresh = ~open; /* rays that stand at the root */
+    isogi_vol__descent descent;
     int i;
+    descent.cell = -1;
     for (;;) {
         int answered = 0, waits;
-        open = isogi_vol__fill_pool(b, s, slots, open, next, end);
+        fresh |= open, open = isogi_vol__fill_pool(b, s, slots, open, next, end), fresh &= ~open;
         if (open == slots) return;
-        if (open && groups > 1 && *next == end) open = isogi_vol__close_ranks(s, turn, groups, open);
         turn->choosing = 0;
+        if (b->bundle && fresh) {
+            if (descent.cell < 0) isogi_vol__prepare_descent(&descent, b->pyramid, s, __builtin_ctzll(fresh));
+            for (i = 0; i < groups; i++)
+                if (__builtin_popcountll(fresh >> 8 * i & 255) > 3) isogi_vol__descend8(turn, s, &descent, 8 * i, (unsigned)(fresh >> 8 * i & 255));
+            fresh = 0;
+        } else if (open && groups > 1 && *next == end) open = isogi_vol__close_ranks(s, turn, groups, open);
         for (i = 0; i < groups; i++) {
             const __mmask8 lives = _mm512_cmpge_epi64_mask(_mm512_load_si512(&s->level[8 * i]), _mm512_setzero_si512());
             answered += __builtin_popcount(lives);
