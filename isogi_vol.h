@@ -1121,18 +1121,24 @@ static int isogi_vol__bound_row(const float *row, int count, float *least, float
 }
 
 #ifdef ISOGI_VOL__AVX
-/* The same for the first numbers of a row, eight at a time; returns how many. */
-ISOGI_VOL__TARGET("avx2") static int isogi_vol__bound_eights(const float *row, int count, float *least, float *largest, int *finite) {
-    const __m256i exponent = _mm256_set1_epi32(0x7f800000);
-    __m256i bad = _mm256_setzero_si256();
-    int i;
+/* The same for the first numbers of up to five rows, eight columns at a time; returns how many. The rows after these, `ahead` bytes further
+   on, are sent for: mostly this waits for memory. */
+ISOGI_VOL__TARGET("avx2") static int isogi_vol__bound_eights(const float *const *row, int rows, int count, ptrdiff_t ahead, float *least, float *largest,
+                                                             int *finite) {
+    const __m256i unsign = _mm256_set1_epi32(0x7fffffff);
+    __m256i most = _mm256_setzero_si256(); /* as integers, what is not finite is at least as large as infinity */
+    int i, k;
     for (i = 0; i + 8 <= count; i += 8) {
-        const __m256 x = _mm256_loadu_ps(row + i);
-        bad = _mm256_or_si256(bad, _mm256_cmpeq_epi32(_mm256_and_si256(_mm256_castps_si256(x), exponent), exponent));
-        _mm256_storeu_ps(least + i, _mm256_min_ps(x, _mm256_loadu_ps(least + i)));
-        _mm256_storeu_ps(largest + i, _mm256_max_ps(x, _mm256_loadu_ps(largest + i)));
+        __m256 low = _mm256_loadu_ps(least + i), high = _mm256_loadu_ps(largest + i);
+        for (k = 0; k < rows; k++) {
+            const __m256 x = _mm256_loadu_ps(row[k] + i);
+            _mm_prefetch((const char *)((uintptr_t)(row[k] + i) + (uintptr_t)ahead), _MM_HINT_T0);
+            most = _mm256_max_epi32(most, _mm256_and_si256(_mm256_castps_si256(x), unsign));
+            low = _mm256_min_ps(x, low), high = _mm256_max_ps(x, high);
+        }
+        _mm256_storeu_ps(least + i, low), _mm256_storeu_ps(largest + i, high);
     }
-    *finite &= _mm256_testz_si256(bad, bad);
+    *finite &= !_mm256_movemask_epi8(_mm256_cmpgt_epi32(most, _mm256_set1_epi32(0x7f7fffff)));
     return i;
 }
 #endif
@@ -1160,18 +1166,18 @@ static int isogi_vol__bound_block(const isogi_volume *v, size_t bx, size_t by, s
 /* Columns of a strip of blocks, for all types but double; 0 if a number is not finite. */
 static int isogi_vol__bound_strip(const isogi_pyramid *p, size_t x, int count, size_t by, size_t bz, float *least, float *largest) {
     const isogi_volume *v = &p->volume;
-    float buffer[ISOGI_VOL__STRIP_VOXELS];
-    int y1 = isogi_vol__last_voxel(by, 4, v->size[1]), z1 = isogi_vol__last_voxel(bz, 4, v->size[2]), y, z, i, finite = 1;
+    const float *row[5];
+    float buffer[5][ISOGI_VOL__STRIP_VOXELS];
+    int rows = isogi_vol__last_voxel(by, 4, v->size[1]) - (int)(4 * by) + 1, z1 = isogi_vol__last_voxel(bz, 4, v->size[2]), z, i, finite = 1;
     for (i = 0; i < count; i++) least[i] = FLT_MAX, largest[i] = -FLT_MAX;
-    for (z = (int)(4 * bz); z <= z1; z++)
-        for (y = (int)(4 * by); y <= y1; y++) {
-            const float *row = isogi_vol__raw_row(p, x, (size_t)y, (size_t)z, count, buffer);
-            int done = 0;
+    for (z = (int)(4 * bz); z <= z1; z++) {
+        int done = 0;
+        for (i = 0; i < rows; i++) row[i] = isogi_vol__raw_row(p, x, 4 * by + (size_t)i, (size_t)z, count, buffer[i]);
 #ifdef ISOGI_VOL__AVX
-            if (p->path >= ISOGI_VOL__PATH_AVX2) done = isogi_vol__bound_eights(row, count, least, largest, &finite);
+        if (p->path >= ISOGI_VOL__PATH_AVX2) done = isogi_vol__bound_eights(row, rows, count, row[0] == buffer[0] ? 0 : 4 * v->stride[1], least, largest, &finite);
 #endif
-            finite &= isogi_vol__bound_row(row + done, count - done, least + done, largest + done);
-        }
+        for (i = 0; i < rows; i++) finite &= isogi_vol__bound_row(row[i] + done, count - done, least + done, largest + done);
+    }
     return finite;
 }
 
@@ -1344,26 +1350,6 @@ static void isogi_vol__build_node(const isogi_pyramid *p, int n, const size_t no
     }
 }
 
-#ifdef ISOGI_VOL__AVX
-/* Some of what the next two do, eight at a time and bit by bit the same. Numbers in units; returns how many. */
-ISOGI_VOL__TARGET("avx2") static int isogi_vol__unit_eights(const float *row, int count, float low, float scale, float *out) {
-    const __m256 l = _mm256_set1_ps(low), k = _mm256_set1_ps(scale);
-    int i;
-    for (i = 0; i + 8 <= count; i += 8) _mm256_storeu_ps(out + i, _mm256_mul_ps(_mm256_sub_ps(_mm256_loadu_ps(row + i), l), k));
-    return i;
-}
-
-/* Codes of a row for each of a strip's leaves. */
-ISOGI_VOL__TARGET("avx2") static void isogi_vol__code_eights(const float *row, int leaves, const float *low, const float *scale, uint8_t *const *out, int at) {
-    int i;
-    for (i = 0; i < leaves; i++, row += 4) {
-        const __m256i codes = _mm256_cvttps_epi32(_mm256_mul_ps(_mm256_sub_ps(_mm256_loadu_ps(row), _mm256_broadcast_ss(low + i)), _mm256_broadcast_ss(scale + i)));
-        const __m128i words = _mm_packs_epi32(_mm256_castsi256_si128(codes), _mm256_extracti128_si256(codes, 1));
-        _mm_storel_epi64((__m128i *)(void *)(out[i] + at), _mm_packus_epi16(words, words));
-    }
-}
-#endif
-
 /* A row of voxels in units of the 8-bit values of nodes, not rounded; the last one is repeated to fill the vectors. */
 static void isogi_vol__unit_row(const isogi_vol__build_job *job, size_t x, size_t y, size_t z, int count, float *out) {
     const isogi_pyramid *p = job->pyramid;
@@ -1374,9 +1360,6 @@ static void isogi_vol__unit_row(const isogi_vol__build_job *job, size_t x, size_
         for (; i < count; i++) isogi_vol__row(v, (int)x + i, (int)y, (int)z, 1, value), out[i] = (float)((value[0] - p->range[0]) * p->node_scale);
     } else {
         const float *row = isogi_vol__raw_row(p, x, y, z, count, out);
-#ifdef ISOGI_VOL__AVX
-        if (p->path >= ISOGI_VOL__PATH_AVX2) i = isogi_vol__unit_eights(row, count, job->raw_low, job->raw_scale, out);
-#endif
 #ifdef ISOGI_VOL__SSE2
         const __m128 low = _mm_set1_ps(job->raw_low), scale = _mm_set1_ps(job->raw_scale);
         for (; i + 4 <= count; i += 4) _mm_storeu_ps(out + i, _mm_mul_ps(_mm_sub_ps(_mm_loadu_ps(row + i), low), scale));
@@ -1415,6 +1398,21 @@ ISOGI_VOL__INLINE void isogi_vol__code_row(const float *row, int leaves, const f
     }
 }
 
+#ifdef ISOGI_VOL__AVX
+/* unit_row and code_row in one, bit by bit the same, for leaves whose vectors end within the row of raw numbers. */
+ISOGI_VOL__TARGET("avx2") static void isogi_vol__code_eights(const isogi_vol__build_job *job, const float *row, int leaves, const float *low, const float *scale,
+                                                             uint8_t *const *out, int at) {
+    const __m256 raw_low = _mm256_set1_ps(job->raw_low), raw_scale = _mm256_set1_ps(job->raw_scale);
+    int i;
+    for (i = 0; i < leaves; i++, row += 4) {
+        const __m256 unit = _mm256_mul_ps(_mm256_sub_ps(_mm256_loadu_ps(row), raw_low), raw_scale);
+        const __m256i codes = _mm256_cvttps_epi32(_mm256_mul_ps(_mm256_sub_ps(unit, _mm256_broadcast_ss(low + i)), _mm256_broadcast_ss(scale + i)));
+        const __m128i words = _mm_packs_epi32(_mm256_castsi256_si128(codes), _mm256_extracti128_si256(codes, 1));
+        _mm_storel_epi64((__m128i *)(void *)(out[i] + at), _mm_packus_epi16(words, words));
+    }
+}
+#endif
+
 /* One row of leaves, a strip of it; `end`: cells along x up to which the job goes. */
 static void isogi_vol__build_strip(const isogi_vol__build_job *job, size_t x0, size_t end, size_t by, size_t bz) {
     const isogi_pyramid *p = job->pyramid;
@@ -1433,16 +1431,16 @@ static void isogi_vol__build_strip(const isogi_vol__build_job *job, size_t x0, s
     }
     for (z = 0; z < 5; z++)
         for (y = 0; y < 5; y++) {
-            const size_t at_y = 4 * by + (size_t)y, at_z = 4 * bz + (size_t)z;
-            isogi_vol__unit_row(job, x0, at_y < p->volume.size[1] ? at_y : p->volume.size[1] - 1, at_z < p->volume.size[2] ? at_z : p->volume.size[2] - 1,
-                                count, row);
+            const size_t at_y = isogi_vol__min_size(4 * by + (size_t)y, p->volume.size[1] - 1), at_z = isogi_vol__min_size(4 * bz + (size_t)z, p->volume.size[2] - 1);
+            int done = 0;
 #ifdef ISOGI_VOL__AVX
-            if (p->path >= ISOGI_VOL__PATH_AVX2) {
-                isogi_vol__code_eights(row, leaves, low, scale, out, 5 * y + 25 * z);
-                continue;
+            if (p->path >= ISOGI_VOL__PATH_AVX2 && p->volume.type != ISOGI_F64) {
+                done = (count - 4) / 4;
+                isogi_vol__code_eights(job, isogi_vol__raw_row(p, x0, at_y, at_z, count, row), done, low, scale, out, 5 * y + 25 * z);
             }
 #endif
-            isogi_vol__code_row(row, leaves, low, scale, out, 5 * y + 25 * z);
+            isogi_vol__unit_row(job, x0 + 4 * (size_t)done, at_y, at_z, count - 4 * done, row);
+            isogi_vol__code_row(row, leaves - done, low + done, scale + done, out + done, 5 * y + 25 * z);
         }
     for (i = 0; i < leaves; i++) {
         size_t block[3];
