@@ -5732,7 +5732,10 @@ ISOGI_VOL__AVX512 static void isogi_vol__run_pool(isogi_vol__batch *b, isogi_vol
         if (open == slots) return;
         turn->choosing = 0;
         if (b->bundle && fresh) {
-            if (descent.cell < 0) isogi_vol__prepare_descent(&descent, b->pyramid, s, __builtin_ctzll(fresh));
+            if (descent.cell < 0) {
+                isogi_vol__prepare_descent(&descent, b->pyramid, s, __builtin_ctzll(fresh));
+                b->work.blocks += (uint64_t)b->pyramid->node_levels;
+            }
             for (i = 0; i < groups; i++)
                 if (__builtin_popcountll(fresh >> 8 * i & 255) > 3) isogi_vol__descend8(turn, s, &descent, 8 * i, (unsigned)(fresh >> 8 * i & 255));
             fresh = 0;

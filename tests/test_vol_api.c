@@ -226,6 +226,52 @@ TEST(bundles_have_the_bits_of_single_rays) {
     CHECK(found > 5000, "only %ld hits", found);
 }
 
+/* Rays of a bundle that begin inside the volume share the way to their first leaf, unless they leave it at once: where they begin on planes
+   between blocks, or on the border, some of them do. */
+TEST(bundles_that_begin_on_planes_between_blocks_have_the_bits_of_single_rays) {
+    enum { RAYS = 150 };
+    static float dirs[RAYS][3];
+    static isogi_hit hits[RAYS];
+    static uint8_t occluded[RAYS];
+    test_random r = {41};
+    long found = 0, missed = 0, wrong = 0;
+    field f = field_new(70, 67, 21);
+    isogi_counters shared = {0}, single = {0};
+    for (int kind = 0; kind < KINDS; kind++) {
+        field_fill(&f, kind, &r);
+        field_build(&f);
+        for (int turn = 0; turn < 60; turn++) {
+            isogi_bundle bundle = {.isovalue = random_ray(&f, kind == QUANTISED ? 0 : random_range(&r, -0.5, 0.5), &r).isovalue};
+            const size_t count = turn % 3 ? 64 : 1 + random_bits(&r) % RAYS;
+            for (int a = 0; a < 3; a++) {
+                const double most = f.size[a] - 1, step = (double)(1 << 2 * (random_bits(&r) % 4)), at = random_range(&r, 0, most);
+                bundle.origin[a] = turn % 5 == 4 ? at : fmin(step * floor(at / step + 0.5), most);
+            }
+            for (size_t i = 0; i < count; i++) {
+                double d[3];
+                random_direction(&r, d);
+                for (int a = 0; a < 3; a++) dirs[i][a] = (float)d[a];
+            }
+            isogi_vol_bundle(f.pyramid, &bundle, (const float(*)[3])dirs, count, hits, &shared);
+            isogi_vol_bundle_occluded(f.pyramid, &bundle, (const float(*)[3])dirs, count, occluded, NULL);
+            for (size_t i = 0; i < count; i++) {
+                isogi_ray one = {.isovalue = bundle.isovalue};
+                isogi_hit alone;
+                memcpy(one.origin, bundle.origin, sizeof one.origin), memcpy(one.dir, dirs[i], sizeof one.dir);
+                isogi_vol_intersect(f.pyramid, &one, 1, &alone, &single);
+                wrong += !same_hit(&alone, &hits[i]) || occluded[i] != (alone.side != 0);
+                found += alone.side != 0, missed += !alone.side;
+            }
+        }
+    }
+    field_free(&f);
+    printf("    %ld hits, %ld misses, %ld wrong; blocks a ray %.2f shared, %.2f alone\n", found, missed, wrong, (double)shared.blocks / (double)shared.rays,
+           (double)single.blocks / (double)single.rays);
+    CHECK(wrong == 0, "%ld of %ld differ", wrong, found + missed);
+    CHECK(found > 5000 && missed > 500, "%ld hits, %ld misses: the test says little", found, missed);
+    CHECK(shared.rays == single.rays, "rays are counted otherwise");
+}
+
 /* ---- value ranges ---- */
 
 /* Whether a cell of the box first..last has a value in one of the ranges. */
