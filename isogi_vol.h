@@ -1940,11 +1940,11 @@ ISOGI_VOL__TARGET("avx2") ISOGI_VOL__INLINE __m256d isogi_vol__weights4(const do
     return _mm256_add_pd(_mm256_mul_pd(_mm256_add_pd(_mm256_mul_pd(_mm256_add_pd(_mm256_mul_pd(c3, u), c2), u), c1), u), c0);
 }
 
-/* Four packed voxels, as they are stored. */
+/* Four packed voxels as they are stored; of doubles a quarter. */
 ISOGI_VOL__TARGET("avx2") ISOGI_VOL__INLINE __m256d isogi_vol__raw4(isogi_type type, const char *p) {
     int32_t bytes;
     if (type == ISOGI_F32) return _mm256_cvtps_pd(_mm_loadu_ps((const float *)(const void *)p));
-    if (type == ISOGI_F64) return _mm256_loadu_pd((const double *)(const void *)p);
+    if (type == ISOGI_F64) return _mm256_mul_pd(_mm256_set1_pd(0.25), _mm256_loadu_pd((const double *)(const void *)p));
     if (type == ISOGI_U16) return _mm256_cvtepi32_pd(_mm_cvtepu16_epi32(_mm_loadl_epi64((const __m128i *)(const void *)p)));
     if (type == ISOGI_I16) return _mm256_cvtepi32_pd(_mm_cvtepi16_epi32(_mm_loadl_epi64((const __m128i *)(const void *)p)));
     memcpy(&bytes, p, sizeof bytes);
@@ -1959,11 +1959,11 @@ static double isogi_vol__cubic_sum_avx2(const isogi_volume *v, const double powe
     const __m256d wx = isogi_vol__weights4(powers, local[0], &dx), wy = isogi_vol__weights4(powers, local[1], &dy);
     const __m256d wz = isogi_vol__weights4(powers, local[2], &dz);
     const isogi_type type = v->type;
-    const __m256d scale = _mm256_set1_pd(v->scale), bias = _mm256_set1_pd(v->bias);
-    __m256d all = _mm256_setzero_pd(), by_y = all, by_z = all;
+    const double scale = type == ISOGI_F64 ? 4 * v->scale : v->scale;
+    __m256d all = _mm256_setzero_pd(), by_y = all, by_z = all, base;
     const char *p = (const char *)v->data + (cell[0] - 1) * v->stride[0] + (cell[1] - 1) * v->stride[1] + (cell[2] - 1) * v->stride[2];
 #define ISOGI_VOL__LANE(m, i) _mm256_permute4x64_pd(m, 0x55 * (i))
-#define ISOGI_VOL__ROW(j) isogi_vol__raw4(type, p + (j) * v->stride[1])
+#define ISOGI_VOL__ROW(j) _mm256_sub_pd(isogi_vol__raw4(type, p + (j) * v->stride[1]), base)
 #define ISOGI_VOL__SLICE(k)                                                                                                                \
     do {                                                                                                                                   \
         const __m256d row0 = ISOGI_VOL__ROW(0), row1 = ISOGI_VOL__ROW(1), row2 = ISOGI_VOL__ROW(2), row3 = ISOGI_VOL__ROW(3);              \
@@ -1976,6 +1976,7 @@ static double isogi_vol__cubic_sum_avx2(const isogi_volume *v, const double powe
         by_z = _mm256_add_pd(by_z, _mm256_mul_pd(ISOGI_VOL__LANE(dz, k), slice));                                                          \
         p += v->stride[2];                                                                                                                 \
     } while (0)
+    base = ISOGI_VOL__LANE(isogi_vol__raw4(type, p + v->stride[1] + v->stride[2]), 1);
     {
         const __m256d wy0 = ISOGI_VOL__LANE(wy, 0), wy1 = ISOGI_VOL__LANE(wy, 1), wy2 = ISOGI_VOL__LANE(wy, 2),
                       wy3 = ISOGI_VOL__LANE(wy, 3);
@@ -1989,18 +1990,21 @@ static double isogi_vol__cubic_sum_avx2(const isogi_volume *v, const double powe
 #undef ISOGI_VOL__LANE
 #undef ISOGI_VOL__ROW
 #undef ISOGI_VOL__SLICE
-    /* weights sum to 1 and slopes to 0: the bias enters the value only */
-    gradient[0] = isogi_vol__dot4(_mm256_mul_pd(all, scale), dx), gradient[1] = isogi_vol__dot4(_mm256_mul_pd(by_y, scale), wx);
-    gradient[2] = isogi_vol__dot4(_mm256_mul_pd(by_z, scale), wx);
-    return isogi_vol__dot4(_mm256_add_pd(_mm256_mul_pd(all, scale), bias), wx);
+    gradient[0] = scale * isogi_vol__dot4(all, dx), gradient[1] = scale * isogi_vol__dot4(by_y, wx);
+    gradient[2] = scale * isogi_vol__dot4(by_z, wx);
+    return scale * (_mm256_cvtsd_f64(base) + isogi_vol__dot4(all, wx)) + v->bias;
 }
 #endif
 
-/* Value and gradient (per grid unit) at a cell and a place in it: 64 taps in one pass, row by row. The plain reference. */
+/* Value and gradient (per grid unit) at a cell and a place in it: 64 taps in one pass, row by row. The plain reference. Slopes sum to
+   0 but for rounding, so taps count relative to the cell's first voxel: nothing is left of what all of them share, and constant voxels
+   have no gradient. Scale and bias come last; a quarter of each voxel is exact and its differences do not overflow. */
 static double isogi_vol__cubic_sum(const isogi_pyramid *p, isogi_filter filter, const int cell[3], const double local[3],
                                    double gradient[3]) {
     const isogi_volume *v = &p->volume;
-    double w[3][4], d[3][4], value = 0, gx = 0, gy = 0, gz = 0;
+    isogi_volume quarter;
+    const double scale = 4 * v->scale;
+    double w[3][4], d[3][4], base, value = 0, gx = 0, gy = 0, gz = 0;
     int tap[3][4], a, j, k;
 #ifdef ISOGI_VOL__AVX
     if (p->path >= ISOGI_VOL__PATH_AVX2 && v->stride[0] == (ptrdiff_t)isogi_vol__type_size(v->type)) {
@@ -2011,12 +2015,15 @@ static double isogi_vol__cubic_sum(const isogi_pyramid *p, isogi_filter filter, 
     }
 #endif
     for (a = 0; a < 3; a++) isogi_vol__tap_weights(filter, v, a, cell[a], local[a], w[a], d[a], tap[a]);
+    quarter = *v, quarter.scale = 0.25, quarter.bias = 0;
+    isogi_vol__row(&quarter, tap[0][1], tap[1][1], tap[2][1], 1, &base);
     for (k = 0; k < 4; k++) {
         double slice = 0, slice_x = 0, slice_y = 0;
         for (j = 0; j < 4; j++) {
             double f[4], row, row_x;
             int x0 = tap[0][0], count = tap[0][3] - x0 + 1;
-            isogi_vol__row(v, x0, tap[1][j], tap[2][k], count, f);
+            isogi_vol__row(&quarter, x0, tap[1][j], tap[2][k], count, f);
+            for (a = 0; a < count; a++) f[a] -= base;
             /* taps past a border have weight 0: any finite voxel of the row stands in for them */
             row = w[0][0] * f[0] + w[0][1] * f[tap[0][1] - x0] + w[0][2] * f[tap[0][2] - x0] + w[0][3] * f[count - 1];
             row_x = d[0][0] * f[0] + d[0][1] * f[tap[0][1] - x0] + d[0][2] * f[tap[0][2] - x0] + d[0][3] * f[count - 1];
@@ -2024,8 +2031,8 @@ static double isogi_vol__cubic_sum(const isogi_pyramid *p, isogi_filter filter, 
         }
         value += w[2][k] * slice, gx += w[2][k] * slice_x, gy += w[2][k] * slice_y, gz += d[2][k] * slice;
     }
-    gradient[0] = gx, gradient[1] = gy, gradient[2] = gz;
-    return value;
+    gradient[0] = scale * gx, gradient[1] = scale * gy, gradient[2] = scale * gz;
+    return scale * (base + value) + v->bias;
 }
 
 /* ---- many points at once ----
@@ -2536,11 +2543,13 @@ static void isogi_vol__cubic_points(const isogi_pyramid *p, const isogi_vol__tap
 }
 
 /* The 64 taps of point i side by side. At the border they are those of the nearest inner cell, moved by one along each axis concerned;
-   what is missing then continues linearly. */
-static void isogi_vol__copy_taps(const isogi_pyramid *p, const isogi_vol__block *b, int i, const int32_t low[3], const int32_t high[3],
-                                 float taps[64]) {
+   what is missing then continues linearly. Floats are less one of the voxels there, which is returned: rounding goes with their
+   differences. */
+static float isogi_vol__copy_taps(const isogi_pyramid *p, const isogi_vol__block *b, int i, const int32_t low[3], const int32_t high[3],
+                                  float taps[64]) {
     const isogi_volume *v = &p->volume;
     ptrdiff_t offset = b->offset[i];
+    float base = 0;
     int move[3], a, k;
     for (a = 0; a < 3; a++) {
         move[a] = (b->cell[a][i] >= high[a]) - (b->cell[a][i] < low[a]);
@@ -2552,6 +2561,8 @@ static void isogi_vol__copy_taps(const isogi_pyramid *p, const isogi_vol__block 
     else
 #endif
         isogi_vol__widen_base(v, isogi_vol__first_tap(v, offset), taps);
+    if (v->type == ISOGI_F32 && (move[0] || move[1] || move[2]))
+        for (base = taps[21], k = 0; k < 64; k++) taps[k] -= base;
     for (a = 0; a < 3; a++) {
         const int step = move[a] * (1 << 2 * a); /* from tap to tap, away from the border for those that move down */
         for (k = 0; k < 16 && step; k++) {
@@ -2560,6 +2571,7 @@ static void isogi_vol__copy_taps(const isogi_pyramid *p, const isogi_vol__block 
             t[3 * step] = t[2 * step] + (t[2 * step] - t[step]);
         }
     }
+    return base;
 }
 
 /* Asks for the taps of a few of the next sixteen points: along a ray their neighbours need little else. */
@@ -2584,6 +2596,7 @@ static void isogi_vol__cubic_block(const isogi_pyramid *p, isogi_filter filter, 
     const double(*c)[4] = isogi_vol__taps[filter == ISOGI_FILTER_CATMULL_ROM];
     isogi_vol__taps_at taps;
     float room[17 * 64], *some = room + (64 - (uintptr_t)room % 64) % 64 / sizeof *room; /* aligned for what is stored into it */
+    float base[16] = {0};
     ptrdiff_t offset[16];
     int32_t low[3], high[3];
     int i, k, a;
@@ -2603,11 +2616,12 @@ static void isogi_vol__cubic_block(const isogi_pyramid *p, isogi_filter filter, 
                       (high[0] - 1 - b->cell[0][i + k]) | (high[1] - 1 - b->cell[1][i + k]) | (high[2] - 1 - b->cell[2][i + k]);
         taps.first = isogi_vol__first_tap(v, 0), taps.offset = b->offset + i, taps.y = v->stride[1], taps.z = v->stride[2];
         if (beyond < 0) {
-            for (k = i; k < whole; k++) isogi_vol__copy_taps(p, b, k, low, high, some + 64 * (k - i));
+            for (k = i; k < whole; k++) base[k - i] = isogi_vol__copy_taps(p, b, k, low, high, some + 64 * (k - i));
             taps.first = (const char *)(const void *)some, taps.offset = offset, taps.y = 4 * sizeof(float), taps.z = 16 * sizeof(float);
         }
         isogi_vol__fetch_ahead(v, b, i + 16, n);
         isogi_vol__cubic_points(p, &taps, b, i, end);
+        for (k = i; k < end && beyond < 0 && v->type == ISOGI_F32; k++) b->sum[4 * k] += base[k - i];
     }
 }
 

@@ -216,6 +216,127 @@ TEST(samples_agree_with_their_definition_in_portable_code) { every_volume_on_pat
 TEST(samples_agree_with_their_definition_in_avx2) { every_volume_on_path(3); }
 TEST(samples_agree_with_their_definition_in_avx512) { every_volume_on_path(4); }
 
+/* ---- what voxels share ---- */
+
+/* Stores the nearest number of the lattice's type to `raw`. */
+static void raw_set(const lattice *l, int i, int j, int k, double raw) {
+    char *p = raw_at(l, i, j, k);
+    const float f = (float)raw;
+    const uint16_t u = (uint16_t)raw;
+    const int16_t s = (int16_t)raw;
+    switch (l->volume.type) {
+    case ISOGI_U8: *(uint8_t *)p = (uint8_t)raw; break;
+    case ISOGI_I8: *(int8_t *)p = (int8_t)raw; break;
+    case ISOGI_U16: memcpy(p, &u, 2); break;
+    case ISOGI_I16: memcpy(p, &s, 2); break;
+    case ISOGI_F32: memcpy(p, &f, 4); break;
+    case ISOGI_F64: memcpy(p, &raw, 8); break;
+    }
+}
+
+/* A lattice whose voxels are offset + step * n for n of 0 .. most; differences: the same voxels less the offset, decoded without bias. */
+static void steps_on_offset(lattice *l, lattice *differences, double offset, double step, int most, test_random *r) {
+    double scale = l->volume.scale == 0 ? 1 : l->volume.scale;
+    differences->volume.scale = 1, differences->volume.bias = 0;
+    for (int k = -l->halo[0]; k < l->size[2] + l->halo[1]; k++)
+        for (int j = -l->halo[0]; j < l->size[1] + l->halo[1]; j++)
+            for (int i = -l->halo[0]; i < l->size[0] + l->halo[1]; i++) {
+                const double above = step * (double)(random_bits(r) % (uint64_t)(most + 1));
+                raw_set(l, i, j, k, offset + above), raw_set(differences, i, j, k, scale * above);
+            }
+}
+
+static void random_points(const lattice *l, int count, float (*points)[3], double (*grid)[3], test_random *r) {
+    for (int i = 0; i < count; i++)
+        for (int a = 0; a < 3; a++) {
+            double at = random_range(r, -0.1, 1.1) * (l->size[a] - 1);
+            if (!(random_bits(r) % 5)) at = floor(at);
+            points[i][a] = (float)at, grid[i][a] = (double)points[i][a];
+        }
+}
+
+/* Constant voxels have no gradient, and hits among them no normal, whatever the value, the type, the layout and the path. */
+TEST(constant_voxels_have_no_gradient) {
+    enum { COUNT = 60 };
+    static float points[COUNT][3], values[COUNT], gradients[COUNT][3], normals[COUNT][3];
+    static double grid[COUNT][3];
+    static isogi_hit hits[COUNT];
+    test_random r = {9};
+    for (int n = 0; n < 6 * LAYOUTS * 4; n++) {
+        const int path = 1 + n % 4, layout = n / 4 % LAYOUTS, type = n / 4 / LAYOUTS;
+        lattice l = lattice_new((isogi_type)type, layout, 7, 6, 5, &r), ignored = lattice_new(ISOGI_F64, layout, 7, 6, 5, &r);
+        const isogi_context context = {.threads = 1, .force_path = path};
+        isogi_pyramid *p = NULL;
+        if (n & 1) l.volume.scale = 0.37, l.volume.bias = 0.1;
+        steps_on_offset(&l, &ignored, type == ISOGI_F64 ? 1.0 / 3 : type == ISOGI_F32 ? 0.7 : 101, 0, 0, &r);
+        CHECK(isogi_vol_build(&p, &l.volume, &context) == ISOGI_OK, "built");
+        random_points(&l, COUNT, points, grid, &r);
+        const double constant = voxel(&l, 0, 0, 0), size = fmax(fabs(constant), fabs(l.volume.bias));
+        for (int f = 0; f < 6; f++) {
+            if (f < 3) isogi_vol_sample_grid(p, filters[f], (const double(*)[3])grid, COUNT, values, gradients);
+            else isogi_vol_sample_filtered(p, filters[f - 3], (const float(*)[3])points, COUNT, values, gradients);
+            for (int i = 0; i < COUNT; i++) {
+                CHECK(fabs((double)values[i] - constant) <= 0x1p-21 * size * ROUNDING_FACTOR, "%.9g of %.9g", (double)values[i], constant);
+                for (int a = 0; a < 3; a++)
+                    CHECK(!(fabs((double)gradients[i][a]) > 0), "type %d, layout %d, path %d, %s: %g", type, layout, path,
+                          filter_names[f % 3], (double)gradients[i][a]);
+            }
+        }
+        for (int i = 0; i < COUNT; i++) {
+            hits[i].side = 1;
+            for (int a = 0; a < 3; a++)
+                hits[i].cell[a] = (uint32_t)(random_bits(&r) % (uint64_t)(l.size[a] - 1)), hits[i].local[a] = random_unit(&r);
+        }
+        for (int kind = ISOGI_NORMAL_SMOOTH; kind <= ISOGI_NORMAL_TRILINEAR; kind++) {
+            CHECK(isogi_vol_normals(p, hits, COUNT, (isogi_normal_kind)kind, normals) == ISOGI_OK, "normals");
+            for (int i = 0; i < COUNT; i++)
+                CHECK(!(fabs((double)normals[i][0]) + fabs((double)normals[i][1]) + fabs((double)normals[i][2]) > 0),
+                      "type %d, layout %d, path %d, kind %d: %g %g %g", type, layout, path, kind, (double)normals[i][0],
+                      (double)normals[i][1], (double)normals[i][2]);
+        }
+        isogi_vol_free(p);
+        free(l.memory), free(ignored.memory);
+    }
+}
+
+/* The error of a gradient goes with the differences between voxels, whatever they have in common. */
+TEST(gradients_do_not_suffer_from_an_offset) {
+    enum { COUNT = 80, CASES = 6 };
+    static const struct { isogi_type type; double offset, step; int most; double scale, bias; } cases[CASES] = {
+        {ISOGI_F32, 1e6, 0.25, 40, 0, 0},     /* 1e6 and a small slope */
+        {ISOGI_F32, 1048575, 0.0625, 15, 0, 0}, /* all but at a power of two: beyond the border steps of this size are no floats */
+        {ISOGI_F64, 1e6, 0x1p-13, 40, 0, 0},    {ISOGI_F64, 1e12, 0.25, 7, -2, 1e9},
+        {ISOGI_U8, 200, 1, 3, 1e-3, 1e7},       {ISOGI_I16, -30000, 1, 5, 1, 1e12}};
+    static float points[COUNT][3], gradients[COUNT][3];
+    static double grid[COUNT][3];
+    test_random r = {10};
+    for (int n = 0; n < CASES * LAYOUTS * 4; n++) {
+        const int path = 1 + n % 4, layout = n / 4 % LAYOUTS, c = n / 4 / LAYOUTS;
+        lattice l = lattice_new(cases[c].type, layout, 7, 6, 5, &r), differences = lattice_new(ISOGI_F64, layout, 7, 6, 5, &r);
+        const isogi_context context = {.threads = 1, .force_path = path};
+        isogi_pyramid *p = NULL;
+        l.volume.scale = cases[c].scale, l.volume.bias = cases[c].bias;
+        steps_on_offset(&l, &differences, cases[c].offset, cases[c].step, cases[c].most, &r);
+        const double range = fabs(cases[c].step * cases[c].most * (cases[c].scale == 0 ? 1 : cases[c].scale));
+        CHECK(isogi_vol_build(&p, &l.volume, &context) == ISOGI_OK, "built");
+        random_points(&l, COUNT, points, grid, &r);
+        for (int f = 1; f < 3; f++) {
+            isogi_vol_sample_filtered(p, filters[f], (const float(*)[3])points, COUNT, NULL, gradients);
+            for (int i = 0; i < COUNT; i++) {
+                real g[3], want[4];
+                for (int a = 0; a < 3; a++) g[a] = fmin(fmax(grid[i][a], 0), l.size[a] - 1);
+                definition(&differences, filters[f], g, want);
+                for (int a = 0; a < 3; a++)
+                    CHECK(fabs((double)gradients[i][a] - want[a + 1]) <= 0x1p-20 * range * ROUNDING_FACTOR,
+                          "case %d, layout %d, path %d, %s at %g %g %g: %.9g, not %.9g", c, layout, path, filter_names[f], grid[i][0],
+                          grid[i][1], grid[i][2], (double)gradients[i][a], want[a + 1]);
+            }
+        }
+        isogi_vol_free(p);
+        free(l.memory), free(differences.memory);
+    }
+}
+
 /* Places are found in double, or in floats that are as good where the volume lets them: long rows of random voxels, whose samples change by
    all of the range from cell to cell, tell errors of places by 2^-24 cell. Against the plain code, which locates in double. */
 static void compare_places(const lattice *l, const char *name, test_random *r) {
@@ -509,6 +630,30 @@ TEST(huge_values_stay_finite_at_the_border) {
             }
             isogi_vol_free(p);
         }
+    }
+}
+
+/* The same of the largest doubles, whose differences are no doubles. */
+TEST(huge_doubles_stay_finite) {
+    static double data[6 * 6 * 6];
+    const double points[3][3] = {{2.3, 2.4, 2.6}, {0.3, 0.4, 0.6}, {4.9, 0.1, 2.5}};
+    const isogi_volume v = {.data = data, .type = ISOGI_F64, .size = {6, 6, 6}, .scale = 1e-300};
+    for (int i = 0; i < 216; i++) data[i] = (i % 6 + i / 6 % 6 + i / 36) & 1 ? 1.7e308 : -1.7e308;
+    for (int path = 1; path <= 4; path++) {
+        const isogi_context context = {.force_path = path};
+        isogi_pyramid *p = NULL;
+        float value[3], gradient[3][3];
+        CHECK(isogi_vol_build(&p, &v, &context) == ISOGI_OK, "built");
+        for (int f = ISOGI_FILTER_BSPLINE; f <= ISOGI_FILTER_CATMULL_ROM; f++) {
+            CHECK(isogi_vol_sample_grid(p, (isogi_filter)f, points, 3, value, gradient) == ISOGI_OK, "sampled");
+            for (int i = 0; i < 3; i++) {
+                double most = 0;
+                for (int a = 0; a < 3; a++) most = test_finite((double)gradient[i][a]) ? fmax(most, fabs((double)gradient[i][a])) : 1e300;
+                CHECK(test_finite((double)value[i]) && fabs((double)value[i]) < 1.5 * 1.7e8 && most < 6 * 1.7e8,
+                      "path %d, filter %d, point %d: %g, gradient to %g", path, f, i, (double)value[i], most);
+            }
+        }
+        isogi_vol_free(p);
     }
 }
 
