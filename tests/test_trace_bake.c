@@ -219,6 +219,31 @@ TEST(probes_do_not_breed) {
     isogi_trace_free(t), scene_free(&s);
 }
 
+/* The light of bright spots in an image is averaged over neighbours as that of the other sky is: on the sides of a pit, with 4 samples,
+   .57 of the error that paths of 4 samples have (unfiltered: .69, by better numbers alone). */
+TEST(bright_spots_of_the_sky_are_filtered) {
+    enum { WIDTH = 64, HEIGHT = 32 };
+    static float image[HEIGHT][WIDTH][3], points[200][3], e[3][200][3];
+    double q[5] = {24, 22, 24, 26, 16}, rms[2] = {0, 0};
+    scene s = scene_make(48, 48, 48, NULL, pit, q);
+    int n = surface_points(&s, 0, 200, 7, points);
+    for (int y = 0; y < HEIGHT; y++)
+        for (int x = 0; x < WIDTH; x++)
+            for (int c = 0; c < 3; c++) image[y][x][c] = y > 4 && y < 9 && x % 16 < 4 ? 40.0f : 0.2f;
+    for (int kind = 0; kind < 3; kind++) {
+        isogi_trace_desc d = desc_make(&s, 0, 0, kind == 2 ? 256 : 4);
+        d.method = kind ? ISOGI_TRACE_PATHS : ISOGI_TRACE_FEEDBACK, d.lazy = 1;
+        memset(&d.lighting, 0, sizeof d.lighting);
+        d.lighting.env.rgb = &image[0][0][0], d.lighting.env.width = WIDTH, d.lighting.env.height = HEIGHT;
+        bake_and_sample(&d, NULL, (const float(*)[3])points, n, e[kind]);
+    }
+    for (int kind = 0; kind < 2; kind++)
+        for (int i = 0; i < n; i++) rms[kind] += pow((double)e[kind][i][1] - (double)e[2][i][1], 2) / n;
+    printf("    error %.4f, by paths %.4f\n", sqrt(rms[0]), sqrt(rms[1]));
+    CHECK(n > 100 && sqrt(rms[0]) < 0.61 * sqrt(rms[1]), "error %.4f, by paths %.4f", sqrt(rms[0]), sqrt(rms[1]));
+    scene_free(&s);
+}
+
 /* Light from probes is not exactly that at the hit: its bias against paths, measured where it matters most (a gyroid's narrow
    channels, albedo 0.8), printed, and bounded. Long: 1364 samples, noise 0.2 %; quick: 84 samples at 60
    points, noise 1 % of the mean and 5 % at a point. */
