@@ -1960,6 +1960,11 @@ static size_t isogi_sh__eval_columns_f64(double *out, size_t stride, int order, 
 /* count * order^2 elements of `size` bytes are addressable */
 static int isogi_sh__fits(size_t count, int order, size_t size) { return count <= (size_t)-1 / 2 / size / ISOGI_SH_COUNT(order); }
 
+/* count directions, and as many values of every channel, of `size` bytes a number are */
+static int isogi_sh__samples_fit(size_t count, int channels, size_t size) {
+    return count <= (size_t)-1 / 2 / size / (size_t)(channels > 3 ? channels : 3);
+}
+
 ISOGI_API isogi_result isogi_sh_eval(float *y, int order, const float (*direction)[3], size_t count) {
     isogi_sh__output out = {NULL, 0, 1, 0};
     size_t i = 0;
@@ -2136,6 +2141,7 @@ ISOGI_API isogi_result isogi_sh_eval_sum(float *value, const float *c, int order
     int level = order >= 3 && order <= ISOGI_SH__TABLE_ORDER && count >= 8 ? isogi_sh__level() : 0;
 #endif
     if (!isogi_sh__shape_ok(order, channels) || !c || (count && (!value || !direction))) return ISOGI_INVALID;
+    if (!isogi_sh__samples_fit(count, channels, sizeof *value)) return ISOGI_TOO_LARGE;
     for (i = 0; i < count; i++) {
         const float *d = direction[i];
 #ifdef ISOGI_SH__SIMD
@@ -2156,6 +2162,7 @@ ISOGI_API isogi_result isogi_sh_eval_sum_f64(double *value, const double *c, int
     size_t i;
     int k;
     if (!isogi_sh__shape_ok(order, channels) || !c || (count && (!value || !direction))) return ISOGI_INVALID;
+    if (!isogi_sh__samples_fit(count, channels, sizeof *value)) return ISOGI_TOO_LARGE;
     for (i = 0; i < count; i++) {
         isogi_sh__sum(sum, c, 1, order, channels, isogi_sh__normalise(direction[i][0], direction[i][1], direction[i][2]));
         for (k = 0; k < channels; k++) value[i * (size_t)channels + (size_t)k] = sum[k];
@@ -3714,6 +3721,7 @@ ISOGI_API isogi_result isogi_sh_product(float *out, const float *a, const float 
     size_t i, n;
     int first;
     if (!isogi_sh__order_ok(order) || (count && (!out || !a || !b))) return ISOGI_INVALID;
+    if (!isogi_sh__fits(count, order, sizeof *out)) return ISOGI_TOO_LARGE;
     n = ISOGI_SH_COUNT(order);
 #ifdef ISOGI_SH__SIMD
     if (order == 5 && isogi_sh__level()) {
@@ -3747,8 +3755,8 @@ static double isogi_sh__square_integral(const float *f, int order) {
     return total;
 }
 
-/* Row j is the product of f and the j-th unit vector, which stands in row j + 1 meanwhile. The matrix is symmetric: of the last row
-   only the corner is new. */
+/* Row j is the product of f and the j-th unit vector, which stands in row j + 1 meanwhile. The matrix is symmetric: what lies below
+   the diagonal is copied from above, since rounding would make it differ, and of the last row only the corner is new. */
 ISOGI_API isogi_result isogi_sh_product_matrix(float *matrix, const float *f, int order) {
     size_t i, j, n;
     if (!matrix || !f || !isogi_sh__order_ok(order)) return ISOGI_INVALID;
@@ -3759,7 +3767,8 @@ ISOGI_API isogi_result isogi_sh_product_matrix(float *matrix, const float *f, in
         for (i = 0; i < n; i++) unit[i] = i == j ? 1.0f : 0.0f;
         isogi_sh_product(matrix + n * j, f, unit, order, 1);
     }
-    for (i = 0; i + 1 < n; i++) matrix[n * (n - 1) + i] = matrix[n * i + n - 1];
+    for (j = 1; j < n; j++)
+        for (i = 0; i < j; i++) matrix[n * j + i] = matrix[n * i + j];
     matrix[n * n - 1] = (float)isogi_sh__square_integral(f, order);
     return ISOGI_OK;
 }
@@ -4174,6 +4183,7 @@ ISOGI_API isogi_result isogi_sh_project_samples(double *c, int order, int channe
     size_t i;
     int k;
     if (!c || !isogi_sh__shape_ok(order, channels) || (count && (!direction || !value))) return ISOGI_INVALID;
+    if (!isogi_sh__samples_fit(count, channels, sizeof *value)) return ISOGI_TOO_LARGE;
     for (k = 0; k < channels * order * order; k++) c[k] = 0;
     for (i = 0; i < count; i++) {
         const float *d = direction[i];
