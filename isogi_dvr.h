@@ -6988,6 +6988,8 @@ ISOGI_API isogi_result isogi_dvr_tets_render(const isogi_tets *tets, const isogi
 #undef ISOGI_DVR__C4I
 #undef ISOGI_DVR__COUNTS
 #undef ISOGI_DVR__MOST_DEPTH
+#undef ISOGI_DVR__SOFT
+#undef ISOGI_DVR__BURIED
 #undef ISOGI_DVR__AVX
 #endif /* implementation */
 

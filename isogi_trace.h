@@ -5337,6 +5337,7 @@ ISOGI_API isogi_result isogi_trace_gather_field(const isogi_trace_desc *desc, is
 #undef ISOGI_TRACE__DEPTH
 #undef ISOGI_TRACE__FILTER_WIDTH
 #undef ISOGI_TRACE__FILTER
+#undef ISOGI_TRACE__NOISE
 #undef ISOGI_TRACE__LIGHT_FIRST
 #undef ISOGI_TRACE__PLANE
 #undef ISOGI_TRACE__COLOURS
