@@ -101,10 +101,11 @@ static int write_raw(program *p) {
     return 1;
 }
 
-/* The dense texture takes the place of nothing else that is named. */
+/* Neither texture takes the place of what it is made from, nor the dense one that of the other. */
 static int check_files(program *p) {
     bake_scene *s = &p->scene;
     if (file_same(p->raw, s->out)) return file_fail(s->error, "--raw: %.200s is the file of --out", p->raw);
+    if (file_same(s->out, s->volume_name)) return file_fail(s->error, "--out: %.200s is the file of VOLUME", s->out);
     if (file_same(p->raw, s->volume_name)) return file_fail(s->error, "--raw: %.200s is the file of VOLUME", p->raw);
     for (int i = 0; i < p->merge_count; i++)
         if (file_same(p->raw, p->merge[i])) return file_fail(s->error, "--raw: %.200s is the file of --merge", p->raw);

@@ -832,13 +832,19 @@ static int view_sample(viewer *v, int sample) {
     return result == ISOGI_OK || fail(v, "the picture", result);
 }
 
+/* What a picture needs must leave half of the machine's memory. */
+static int check_memory(viewer *v, double bytes_a_sample) {
+    double bytes = (double)v->o.width * v->o.height * v->o.antialias * bytes_a_sample;
+    double machine = (double)sysconf(_SC_PHYS_PAGES) * (double)sysconf(_SC_PAGESIZE);
+    return !(machine > 0 && bytes > machine / 2) ||
+           file_fail(v->error, "--size %dx%d with --aa %d needs %.1f GiB of this machine's %.1f GiB", v->o.width, v->o.height,
+                     v->o.antialias, bytes / 0x1p30, machine / 0x1p30);
+}
+
 static int view_surface(viewer *v) {
     size_t pixels = (size_t)v->o.width * (size_t)v->o.height;
-    double begun = seconds(), bytes = (double)pixels * v->o.antialias * (sizeof **v->inverse + sizeof **v->seen);
-    double machine = (double)sysconf(_SC_PHYS_PAGES) * (double)sysconf(_SC_PAGESIZE);
-    if (machine > 0 && bytes > machine / 2)
-        return file_fail(v->error, "--size %dx%d with --aa %d needs %.1f GiB of this machine's %.1f GiB", v->o.width, v->o.height,
-                         v->o.antialias, bytes / 0x1p30, machine / 0x1p30);
+    double begun = seconds();
+    if (!check_memory(v, sizeof **v->inverse + sizeof **v->seen)) return 0;
     if (!v->o.raycast) {
         isogi_mesh_desc desc = {.isovalue = v->isovalue, .normals = 1};
         isogi_result result = isogi_vol_mesh(v->pyramid, &desc, &v->mesh);
@@ -1096,6 +1102,7 @@ static void shade_sample(const viewer *v, shade_batch *b, size_t i, float rgb[3]
     double n[3] = {(double)b->normal[i][0], (double)b->normal[i][1], (double)b->normal[i][2]}, light[3], specular[3] = {0, 0, 0};
     if (b->seen[i] == SECTION) {
         section_colour(v, b->point[i], rgb);
+        if (v->o.fog > 0) fog(v, b->point[i], rgb);
         return;
     }
     if (v->o.mode == LAMBERT) lambert(v, b->point[i], n, v->o.ambient, v->o.shadows, light);
@@ -1322,6 +1329,11 @@ static int render_volume(viewer *v) {
     isogi_result result;
     isogi_context context = v->context;
     isogi_dvr_report report;
+    if (view.width > 32768 || view.height > 32768)
+        return file_fail(v->error, "--size %dx%d with --aa %d is %dx%d samples; at most 32768 along a side", v->o.width, v->o.height,
+                         v->o.antialias, view.width, view.height);
+    /* our pixels and those of the library, with depth */
+    if (!check_memory(v, (double)(factor * factor) / v->o.antialias * (sizeof *large + sizeof *depth + 20))) return 0;
     context.progress = tell_stage;
     if (v->o.has_shading) desc.shading = (isogi_dvr_shading)v->o.shading;
     desc.classification = (isogi_dvr_classification)v->o.classification, desc.silhouette = (isogi_dvr_silhouette)v->o.silhouette,

@@ -153,6 +153,7 @@ TEST(bad_bakes_get_one_line) {
         {"procedural:gyroid:8 --nonsense --out '%s'", "no such option"},
         {"procedural:gyroid:8 --box 0,0,0,8,9,8 --out '%s'", "--box: reaches beyond the lattice along y"},
         {"'%1$s' --raw '%1$s' --out a.bake", "is the file of VOLUME"},
+        {"'%1$s' --merge a.bake --out '%1$s'", "--out: "},
         {"procedural:gyroid:8 --raw '%1$s' --out '%1$s'", "is the file of --out"},
         {"procedural:gyroid:8 --merge '%1$s' --raw '%1$s' --out a.bake", "is the file of --merge"}};
     for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) check_kept("build/bake", bad[i][0], 1, bad[i][1]);

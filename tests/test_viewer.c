@@ -448,6 +448,7 @@ TEST(silly_options_get_one_line_that_names_the_option) {
         {"procedural:gyroid --light point:1,1,1:1,1,1:1,0,0:0,1,0", "--light"},
         {"procedural:gyroid --light point:1,1,1:1,1,1:1:1", "--light"},
         {"procedural:gyroid --mode transfer --light point:1,1,1:1,1,1", "--light"}, {"procedural:gyroid --exposure 0", "--exposure"},
+        {"procedural:gyroid:8 --mode dvr --size 16384x2 --aa 9", "--size 16384x2 with --aa 9 is 49152x6 samples; at most 32768"},
         {"procedural:gyroid --lattice 4096,4096,4096", "--lattice: the table of its bricks alone needs 8.0 GiB"},
         {"procedural:gyroid --shadows maybe", "--shadows"},
         {"procedural:gyroid --mode transfer --storage rgb9e5", "--storage"},
@@ -918,6 +919,26 @@ TEST(real_volumes_are_shown) {
     r = run_viewer(command);
     CHECK(r.status == 0, "%d: %s", r.status, r.error);
     free(path);
+}
+
+/* A block of matter that fills its box is seen by its sections alone. */
+TEST(fog_lies_over_sections_too) {
+    unsigned char bytes[8 * 8 * 8];
+    char command[1024], clear[256];
+    run_result r;
+    double difference = 0;
+    const char *path = temporary("block_8x8x8_uint8.raw");
+    memset(bytes, 200, sizeof bytes), bytes[0] = 0;
+    write_bytes(path, bytes, sizeof bytes);
+    strcpy(clear, temporary("clear.png"));
+    snprintf(command, sizeof command, "'%s' --mode lambert --iso 100 --exposure 1 --size 32x32 --out '%s'", path, clear);
+    r = run_viewer(command);
+    CHECK(r.status == 0, "%d: %s", r.status, r.error);
+    snprintf(command, sizeof command, "'%s' --mode lambert --iso 100 --exposure 1 --size 32x32 --fog 3 --compare '%s' --out '%s'", path,
+             clear, temporary("fog.png"));
+    r = run_viewer(command);
+    CHECK(r.status == 0 && sscanf(r.output, "difference_rms %lf", &difference) == 1 && difference > 0.03, "%d: %s: %g", r.status, r.error,
+          difference);
 }
 
 /* What a scene is made of is kept, too: its volume, and its environment. */
