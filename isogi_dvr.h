@@ -73,8 +73,6 @@
    Shading. ISOGI_DVR_UNLIT shows the transfer function's colour. ISOGI_DVR_LOCAL is diffuse shading by the smoothed gradient,
    with the normal turned towards the eye: radiance = rgb / pi * irradiance (environment convolved with the cosine at SH order 5,
    directional lights, point lights), no shadows; where the gradient vanishes, light is scattered as below but unshadowed.
-   Exact and pre-integrated rays look it up once for neighbouring pieces that together show less than a 256th of a pixel, at the one
-   that shows most: pictures change by up to 1/255.
    ISOGI_DVR_TWO_SIDED adds light that comes through, and highlights (Kraus 2005, eq. 19), for n of either orientation:
 
        ambient Cd a + sum_i I_i ( a Cd |l.n| + a Cs max(0, r.v)^e                     where l and v are on one side of the surface
@@ -82,6 +80,7 @@
 
    with I_i = irradiance / pi, ambient = mean radiance of the environment, opacity a of the peak or piece of ray, and materials for
    the two sides and for transmission. H(0) = 0: light along the surface does nothing; where there is no normal only ambient light is.
+   Matter whose value does not change along the ray has no side: its ambient term is the mean of both.
    ISOGI_DVR_VISIBILITY scatters light isotropically and shadows it (Kronander 2011):
 
        g_s = rgb / (4 pi) * max(0, sum_i L_i V_i)         per channel
@@ -92,7 +91,8 @@
    everywhere gives g_s = rgb / (4 pi) * 4 pi = rgb: colour is the albedo, and under a uniform sky of 1 a medium without shadows
    looks as it does unlit. A directional light of irradiance E gives g_s = rgb E V / (4 pi). The truncated series can be
    negative: it is clamped at zero. Matter that is dense for the grid is lit as what is in front of it: in physical space V is looked up
-   off = r x^2 / (x^2 + 16) nearer to the eye, where r is 1.5 grid distances and x the optical depth of r in the matter of the sample.
+   off = r x^2 / (x^2 + 16) nearer to the eye, where r is 1.5 grid distances, as they are along the ray, and x the optical depth of r
+   in the matter of the sample.
 
    Visibility is sampled in `directions` directions and projected to SH, by one of the methods of isogi_dvr_method. Brute force
    marches every ray from every grid point through the same transfer function (in the same space; peaks attenuate at every
@@ -177,7 +177,9 @@
 
    Values that are not finite: a cell with such a corner is transparent. An axis of one voxel makes a box without volume, which is
    transparent (rays within its plane do sample it). Up to ISOGI_DVR_MAX_PEAKS peaks (in data space, exact or pre-integrated, any
-   number), 2^16 directions, and 2^24 samples on the longest ray. Errors: ISOGI_INVALID for anything outside of its documented range,
+   number), 2^16 directions, and 2^24 samples on the longest ray. Pre-integrated pictures of physical space know up to 16384 classes of
+   values between the first and the last point of the transfer function: what is narrower than four of them is blurred to their
+   width. Errors: ISOGI_INVALID for anything outside of its documented range,
    ISOGI_TOO_LARGE where sizes overflow or pass these limits, ISOGI_NO_MEMORY, ISOGI_CANCELLED.
 
    How to choose. `step` 0.5 is right for smooth transfer functions, 0.25 for steep ones; each halving costs twice the time and
@@ -199,14 +201,14 @@
    side holds at the value itself. No points at all: nothing absorbs. */
 typedef struct isogi_transfer_point {
     double value;     /* data value; finite */
-    float rgb[3];     /* linear colour (albedo for scattered light), not premultiplied, 0..1; larger values glow, >= 0 is asked for */
+    float rgb[3];     /* linear colour (albedo for scattered light), not premultiplied, 0..1; larger values, up to 1e30, glow */
     float extinction; /* >= 0: per isogi_dvr_desc.unit of length in physical space, per unit of data value in data space */
 } isogi_transfer_point;
 
 /* An isosurface of uniform opacity and colour: every crossing composites exactly `opacity`, whatever the gradient (Kraus 2005, 4.2). */
 typedef struct isogi_peak {
     double isovalue;       /* finite */
-    float rgb[3], opacity; /* 0..1; rgb >= 0 */
+    float rgb[3], opacity; /* 0..1; rgb 0..1e30 */
 } isogi_peak;
 
 #define ISOGI_DVR_MAX_PEAKS 256 /* but any number in data space, exact or pre-integrated */
@@ -529,6 +531,7 @@ typedef int32_t isogi_dvr__four_ints __attribute__((vector_size(16), aligned(4),
 typedef struct isogi_dvr__fast_ray {
     float origin[3], dir[3], piece, last_piece; /* world length over unit from sample to sample */
     float sought;                               /* optical depth whose place is looked for */
+    float reach;                                /* as isogi_dvr__reach_along, in samples */
     double enter;                               /* world length from the eye to the first sample */
     int count;                                  /* of samples */
 } isogi_dvr__fast_ray;
@@ -647,7 +650,7 @@ static int isogi_dvr__points_valid(const isogi_transfer_point *points, size_t co
         if (!isogi_dvr__finite64(p->value) || !isogi_dvr__finite3(p->rgb) || !isogi_dvr__finite32(p->extinction)) return 0;
         if (!(p->extinction >= 0) || (i && !(p->value >= p[-1].value))) return 0;
         for (a = 0; a < 3; a++)
-            if (!(p->rgb[a] >= 0)) return 0;
+            if (!(p->rgb[a] >= 0 && p->rgb[a] <= 1e30f)) return 0;
     }
     return 1;
 }
@@ -662,7 +665,7 @@ ISOGI_API isogi_result isogi_transfer_validate(const isogi_transfer *transfer) {
         if (!isogi_dvr__finite64(p->isovalue) || !isogi_dvr__finite3(p->rgb) || !isogi_dvr__finite32(p->opacity)) return ISOGI_INVALID;
         if (!(p->opacity >= 0 && p->opacity <= 1)) return ISOGI_INVALID;
         for (a = 0; a < 3; a++)
-            if (!(p->rgb[a] >= 0)) return ISOGI_INVALID;
+            if (!(p->rgb[a] >= 0 && p->rgb[a] <= 1e30f)) return ISOGI_INVALID;
     }
     return ISOGI_OK;
 }
@@ -830,7 +833,7 @@ struct isogi_dvr {
     size_t changed_count;
     uint8_t *leap;               /* one byte a block of level 0: how many blocks around it are empty, itself first; 0 = it is not */
     float grid_scale[3];         /* grid points of visibility to a voxel */
-    double reach;                /* how far visibility may be looked up in front of dense matter: units of `spacing` */
+    double distance[2];          /* of grid points of visibility, the smallest and the largest: units of `spacing` */
     size_t classified, computed; /* blocks classified anew so far; blocks whose local visibility was computed */
     isogi_dvr__blocks blocks;
     float *basis;                /* the paper's method: [directions][order * order] */
@@ -2283,7 +2286,8 @@ static void isogi_dvr__choose_step_task(void *arg, size_t block) {
     isogi_dvr *d = (isogi_dvr *)arg;
     const isogi_dvr__matter *m = &d->matter;
     isogi_dvr__held_block *b = &d->coming.block[block];
-    float least = 1e30f, most = 0, distance = (float)(d->reach / 1.5 * d->spacing / d->desc.unit);
+    float least = 1e30f, most = 0, near_by = (float)(d->distance[0] * d->spacing / d->desc.unit),
+          distance = (float)(d->distance[1] * d->spacing / d->desc.unit);
     size_t at[3], low[3], high[3], x, y, z;
     uint32_t coarsest = b->log;
     int a;
@@ -2297,7 +2301,7 @@ static void isogi_dvr__choose_step_task(void *arg, size_t block) {
             const float *row = m->extinction[0] + (z * m->size[1] + y) * m->row[0];
             for (x = low[0]; x <= high[0]; x++) least = row[x] < least ? row[x] : least, most = row[x] > most ? row[x] : most;
         }
-    if (!(most > 0) || least * distance >= ISOGI_DVR__BURIED) return;
+    if (!(most > 0) || least * near_by >= ISOGI_DVR__BURIED) return;
     b->first = 1, b->log = 0;
     while (b->log < coarsest && most * distance * (float)(2u << b->log) <= ISOGI_DVR__SOFT) b->log++;
 }
@@ -2599,8 +2603,10 @@ ISOGI_API isogi_result isogi_dvr_create(isogi_dvr **dvr, const isogi_dvr_desc *d
         const double *m = d->volume.axes + a;
         double distance = d->volume.spacing[a] / d->spacing * sqrt(m[0] * m[0] + m[3] * m[3] + m[6] * m[6]);
         d->grid_scale[a] = d->cells[a] ? (float)(((double)d->desc.grid[a] - 1) / d->cells[a]) : 0;
-        distance = d->grid_scale[a] > 0 ? 1.5 * distance / (double)d->grid_scale[a] : 0;
-        d->reach = distance > d->reach ? distance : d->reach;
+        if (!(d->grid_scale[a] > 0)) continue;
+        distance /= (double)d->grid_scale[a];
+        d->distance[0] = d->distance[0] > 0 && d->distance[0] < distance ? d->distance[0] : distance;
+        d->distance[1] = d->distance[1] > distance ? d->distance[1] : distance;
     }
     d->piece = desc->step > 0 ? resolved.step : 1;
     d->visibility_step = resolved.visibility_step > 0 ? resolved.visibility_step : 2 * resolved.step;
@@ -2860,7 +2866,7 @@ static int isogi_dvr__next(isogi_dvr__march *m, isogi_dvr__sample *s) {
         for (a = 0; a < 3; a++) moved |= m->cell[a] ^ s->cell[a], m->cell[a] = s->cell[a];
         if (moved) isogi_dvr__fetch(m);
         if (!m->finite) continue;
-        s->value = isogi_dvr__field(m, s->local, &slope), s->side = slope > 0 ? 1 : -1;
+        s->value = isogi_dvr__field(m, s->local, &slope), s->side = slope > 0 ? 1 : slope < 0 ? -1 : 0;
         extinction = isogi_dvr__extinction(d->transfer.points, d->transfer.point_count, s->value);
         if (!(extinction > 0)) continue;
         s->depth = extinction * (s->to - s->from) * m->scale;
@@ -3235,10 +3241,22 @@ static float isogi_dvr__openness(float v0) {
     return share < 1 ? share * share : 1;
 }
 
-/* How far in front of a sample visibility is looked up, towards the eye; in units of the smallest spacing. Where much of the light is lost
+/* How far along a ray visibility may be looked up in front of dense matter: one and a half distances of the grid, as it stands along this
+   ray. dir: voxels for each unit of what is returned. */
+static double isogi_dvr__reach_along(const isogi_dvr *d, const double dir[3]) {
+    double sum = 0;
+    int a;
+    for (a = 0; a < 3; a++) sum += dir[a] * (double)d->grid_scale[a] * (dir[a] * (double)d->grid_scale[a]);
+    return sum > 1e-280 ? 1.5 / sqrt(sum) : 0;
+}
+
+/* How far in front of a sample visibility is looked up, towards the eye; in units of the reach. Where much of the light is lost
    from one grid point to the next, what lies between two of them is not visibility but how deep each is buried: rings and blotches.
    The skin of dense matter is therefore lit as the points in front of it are. depth: optical, of the reach. */
-static double isogi_dvr__stand_off(double reach, double depth) { return reach * depth * depth / (depth * depth + 16); }
+static double isogi_dvr__stand_off(double reach, double depth) {
+    depth = depth < 1e9 ? depth : 1e9;
+    return reach * (depth * depth / (depth * depth + 16));
+}
 
 /* Trilinear in the grid of visibility: the eight points around a position given in the volume's grid coordinates; `open`: each weighed by
    what it counts for. */
@@ -4799,6 +4817,7 @@ typedef struct isogi_dvr__lights {
     size_t count;
     float sh[3 * ISOGI_DVR__MAX_ORDER * ISOGI_DVR__MAX_ORDER]; /* visibility: of all distant lights; local: irradiance of the environment */
     double mean[3];                                            /* of the environment's radiance */
+    int dark;                                                  /* the environment is black */
     int local;                                                 /* shade by local visibility */
 } isogi_dvr__lights;
 
@@ -4826,6 +4845,7 @@ static isogi_result isogi_dvr__set_lights(isogi_dvr__lights *l, const isogi_dvr 
     environment.env = lighting->env;
     result = isogi_sh_project(l->sh, ISOGI_DVR__LOCAL_ORDER, &environment, NULL);
     for (a = 0; a < 3; a++) l->mean[a] = (double)l->sh[a] / (2 * sqrt(ISOGI_DVR__PI));
+    for (i = 0, l->dark = 1; i < 3 * ISOGI_SH_COUNT(ISOGI_DVR__LOCAL_ORDER); i++) l->dark = l->dark && !(fabsf(l->sh[i]) > 0);
     if (result == ISOGI_OK) result = isogi_sh_convolve_cosine(l->sh, l->sh, ISOGI_DVR__LOCAL_ORDER, 3);
     return result;
 }
@@ -4912,14 +4932,15 @@ static void isogi_dvr__shade_local(const isogi_dvr *d, const isogi_dvr__lights *
     hit.side = 1;
     for (a = 0; a < 3; a++) hit.cell[a] = (uint32_t)cell[a], hit.local[a] = local[a], grid[a] = cell[a] + local[a];
     isogi_vol_normals(d->desc.pyramid, &hit, 1, d->desc.normals, &normal);
-    isogi_vol_to_world(d->desc.pyramid, grid, world);
+    world[0] = world[1] = world[2] = 0;
+    if (l->nearby.light_count) isogi_vol_to_world(d->desc.pyramid, grid, world);
     for (a = 0; a < 3; a++) n[a] = (double)normal[a], facing += n[a] * (double)dir[a];
     flat = !(isogi_dvr__dot(n, n) > 0.5);
     for (a = 0; a < 3; a++) {
         if (facing > 0) n[a] = -n[a], normal[a] = -normal[a];
         out[a] = flat ? l->mean[a] : 0;
     }
-    if (!flat) {
+    if (!flat && !l->dark) {
         isogi_sh_eval(y, ISOGI_DVR__LOCAL_ORDER, (const float(*)[3])&normal, 1);
         for (i = 0; i < ISOGI_SH_COUNT(ISOGI_DVR__LOCAL_ORDER); i++)
             for (a = 0; a < 3; a++) out[a] += (double)(l->sh[3 * i + (size_t)a] * y[i]) / ISOGI_DVR__PI;
@@ -4949,7 +4970,10 @@ static void isogi_dvr__shade_two_sided(const isogi_dvr *d, const isogi_dvr__ligh
     for (a = 0; a < 3; a++) hit.cell[a] = (uint32_t)cell[a], hit.local[a] = local[a], grid[a] = cell[a] + local[a];
     isogi_vol_normals(d->desc.pyramid, &hit, 1, d->desc.normals, &normal);
     isogi_vol_to_world(d->desc.pyramid, grid, world);
-    for (a = 0; a < 3; a++) n[a] = (double)normal[a] * side, out[a] = l->mean[a] * (double)front->diffuse[a], add[a] = 0;
+    for (a = 0; a < 3; a++) {
+        float ambient = side ? front->diffuse[a] : 0.5f * d->desc.material[0].diffuse[a] + 0.5f * d->desc.material[1].diffuse[a];
+        n[a] = (double)normal[a] * (side ? side : -1), out[a] = l->mean[a] * (double)ambient, add[a] = 0;
+    }
     for (i = 0; i < l->count; i++) {
         double to[3], irradiance = isogi_dvr__reach(&l->list[i], world, to) / ISOGI_DVR__PI, cosine = isogi_dvr__dot(to, n), gloss = 0;
         const isogi_material *m = cosine > 0 ? front : through;
@@ -5076,9 +5100,6 @@ typedef struct isogi_dvr__span {
     double touched, touched_t; /* the last peak that rose, and where: falling off it at once is no second crossing */
     int bounded;               /* in physical space, with colours of this limit: */
     double limit;
-    double waiting[3], share, most; /* local light: colour that waits for light; how much it shows, and the most of it at one place: */
-    double most_local[3];
-    int most_cell[3];
 } isogi_dvr__span;
 
 static void isogi_dvr__span_place(const isogi_dvr__span *s, double u, double local[3]) {
@@ -5107,38 +5128,11 @@ static double isogi_dvr__span_factor(isogi_dvr__span *s) {
     return sum > change ? change > 0 && sum < 1e300 * change ? sum / change : 1e300 : 1;
 }
 
-/* Light of pieces that show little is looked up once for all, at the one that shows most: a group ends when it makes up this share of
-   a pixel (opacity or colour as the eye gets it). */
-#define ISOGI_DVR__GROUP (1.0 / 256)
-
-static void isogi_dvr__span_flush(isogi_dvr__pixel_ray *r, isogi_dvr__span *s) {
-    int a;
-    if (!(s->most > 0)) return;
-    isogi_dvr__shade(r, s->most_cell, s->most_local, 1, 0, s->waiting); /* local light knows neither side nor opacity */
-    for (a = 0; a < 3; a++) r->rgb[a] += s->waiting[a], s->waiting[a] = 0;
-    s->most = s->share = 0;
-}
-
-/* A part of a piece whose light is local joins its group. */
-static void isogi_dvr__span_wait(isogi_dvr__pixel_ray *r, isogi_dvr__span *s, double opacity, const double rgb[3]) {
-    double show = opacity;
-    int a;
-    for (a = 0; a < 3; a++) show = rgb[a] > show ? rgb[a] : show, s->waiting[a] += r->clear * rgb[a];
-    show *= r->clear, s->share += show;
-    if (show > s->most) {
-        const isogi_dvr__stretch *p = &s->piece;
-        s->most = show;
-        if (s->sampled) isogi_dvr__locate(s->walk.m, p->t0 + 0.5 * (p->u0 + p->u1) * p->dt, s->most_cell, s->most_local);
-        else isogi_dvr__span_place(s, 0.5 * (p->u0 + p->u1), s->most_local), memcpy(s->most_cell, p->cell, sizeof p->cell);
-    }
-    if (s->share > ISOGI_DVR__GROUP) isogi_dvr__span_flush(r, s);
-}
-
 /* Light is looked up once for a piece, at its middle. */
 static void isogi_dvr__span_light(const isogi_dvr__pixel_ray *r, isogi_dvr__span *s, double opacity) {
     const isogi_dvr__stretch *p = &s->piece;
     double local[3], t = p->t0 + 0.5 * (p->u0 + p->u1) * p->dt, dark[3] = {0, 0, 0};
-    int side = p->value[1] > p->value[0] ? 1 : -1, cell[3], a;
+    int side = p->value[1] > p->value[0] ? 1 : p->value[1] < p->value[0] ? -1 : 0, cell[3], a;
     for (a = 0; a < 3; a++) s->light[a] = 1, s->add[a] = 0;
     s->lit = 1;
     if (r->dvr->desc.shading == ISOGI_DVR_UNLIT) return;
@@ -5187,8 +5181,7 @@ static void isogi_dvr__composite_values(isogi_dvr__pixel_ray *r, isogi_dvr__span
     }
     clear = r->clear * layer.clear;
     if (r->probe && r->clear > r->end && clear <= r->end) r->t = isogi_dvr__span_probe(r, s, x, y, clear);
-    if (!r->probe && r->dvr->desc.shading == ISOGI_DVR_LOCAL && !s->flat) isogi_dvr__span_wait(r, s, opacity, layer.rgb);
-    else if (!r->probe) {
+    if (!r->probe) {
         if (!s->lit) isogi_dvr__span_light(r, s, opacity);
         for (a = 0; a < 3; a++) r->rgb[a] += r->clear * (layer.rgb[a] * s->light[a] + opacity * s->add[a]);
     }
@@ -5236,16 +5229,14 @@ static void isogi_dvr__bounded_part(isogi_dvr__pixel_ray *r, isogi_dvr__span *s,
     isogi_dvr__add_linear(&layer, from, to, (end - u) * s->piece.dt * m->scale);
     share = layer.clear < 1 ? opacity / (1 - layer.clear) : 0; /* the field is no straight line, nor is its depth that of one */
     for (a = 0; a < 3; a++) layer.rgb[a] = layer.clear < 1 ? layer.rgb[a] * share : 0.5 * (from[a] + to[a]) * opacity;
-    if (r->dvr->desc.shading == ISOGI_DVR_LOCAL) isogi_dvr__span_wait(r, s, opacity, layer.rgb);
-    else {
-        if (!s->lit && r->dvr->desc.shading == ISOGI_DVR_VISIBILITY) {
-            double reach = r->dvr->reach * r->dvr->spacing / m->speed, off = isogi_dvr__stand_off(reach, 0.5 * (from[3] + to[3]) * m->scale * reach);
-            off = isogi_dvr__clamp(off, 0.5 * (s->piece.from + s->piece.to));
-            for (a = 0; a < 3; a++) r->front[a] = -off * m->dir[a];
-        }
-        if (!s->lit) isogi_dvr__span_light(r, s, opacity);
-        for (a = 0; a < 3; a++) r->front[a] = 0, r->rgb[a] += r->clear * (layer.rgb[a] * s->light[a] + opacity * s->add[a]);
+    if (!s->lit && r->dvr->desc.shading == ISOGI_DVR_VISIBILITY) {
+        double reach = isogi_dvr__reach_along(r->dvr, m->dir);
+        double off = isogi_dvr__stand_off(reach, 0.5 * (from[3] + to[3]) * m->scale * reach);
+        off = isogi_dvr__clamp(off, 0.5 * (s->piece.from + s->piece.to));
+        for (a = 0; a < 3; a++) r->front[a] = -off * m->dir[a];
     }
+    if (!s->lit) isogi_dvr__span_light(r, s, opacity);
+    for (a = 0; a < 3; a++) r->front[a] = 0, r->rgb[a] += r->clear * (layer.rgb[a] * s->light[a] + opacity * s->add[a]);
     r->clear = clear;
 }
 
@@ -5368,10 +5359,9 @@ static void isogi_dvr__cast_values(isogi_dvr__pixel_ray *r, isogi_dvr__march *m)
     s.sampled = r->dvr->desc.classification == ISOGI_DVR_PRE_INTEGRATED, s.touched = 0, s.touched_t = -1;
     s.bounded = isogi_dvr__bounded(r->dvr), s.limit = s.bounded ? isogi_dvr__bounded_limit(r->dvr) : 1;
     if (s.bounded) s.sampled = 0;
-    s.silhouette = s.bounded ? ISOGI_DVR_SILHOUETTE_NONE : m->silhouette, s.flat = 0, s.aslant = 1, s.most = s.share = s.waiting[0] = s.waiting[1] = s.waiting[2] = 0;
+    s.silhouette = s.bounded ? ISOGI_DVR_SILHOUETTE_NONE : m->silhouette, s.flat = 0, s.aslant = 1;
     while (r->clear > r->end && (s.sampled ? isogi_dvr__next_sampled(&s.walk, &s.piece) : isogi_dvr__next_monotone(&s.walk, &s.piece)))
         isogi_dvr__composite_piece(r, &s);
-    isogi_dvr__span_flush(r, &s);
 }
 
 /* ---- samples and crossings ---- */
@@ -5392,7 +5382,7 @@ static void isogi_dvr__cast(isogi_dvr__pixel_ray *r, isogi_dvr__march *m, isogi_
         if (!r->probe) {
             isogi_dvr__colour(r->dvr->transfer.points, r->dvr->transfer.point_count, s.value, rgb);
             if (r->dvr->desc.space == ISOGI_DVR_PHYSICAL && r->dvr->desc.shading == ISOGI_DVR_VISIBILITY) {
-                double reach = r->dvr->reach * r->dvr->spacing / m->speed, off = isogi_dvr__stand_off(reach, s.depth / (s.to - s.from) * reach);
+                double reach = isogi_dvr__reach_along(r->dvr, m->dir), off = isogi_dvr__stand_off(reach, s.depth / (s.to - s.from) * reach);
                 off = isogi_dvr__clamp(off, 0.5 * (s.from + s.to)); /* not before the ray begins */
                 for (a = 0; a < 3; a++) r->front[a] = -off * m->dir[a];
             }
@@ -5421,7 +5411,10 @@ static void isogi_dvr__cast(isogi_dvr__pixel_ray *r, isogi_dvr__march *m, isogi_
    (Kraus 2005, eq. 6, 7 with the attenuation within a piece left to its opacity). Empty space is leapt over by the distance to the
    nearest block that is not empty. Light is linear between grid points, so that L . V is summed at the grid points, once for a
    picture, and looked up as a colour once for each piece. */
-typedef struct isogi_dvr__class_entry { float before[4], mean[4]; } isogi_dvr__class_entry; /* integrals up to a class, and over it: rgb, extinction */
+typedef struct isogi_dvr__class_entry {
+    int32_t before[4];      /* integrals up to a class, rgb and extinction: so many quanta, whose differences lose no digits, */
+    float rest[4], mean[4]; /* and what remains, below a quantum; integrals over it */
+} isogi_dvr__class_entry;
 
 struct isogi_dvr__frame {
     const isogi_dvr *dvr;
@@ -5433,9 +5426,9 @@ struct isogi_dvr__frame {
     isogi_dvr__held held; /* where light stands, if held.block */
     size_t count;       /* of classes */
     float low, scale;   /* place of a value among them, which goes on before the first and beyond the last, both of one extinction and colour */
-    float top, close;   /* of the last class; places so close that their classes' mean is taken, as the difference of two sums has no digits left */
+    float top;          /* of the last class */
+    float quantum[4];   /* of their integrals */
     double step;        /* voxels between samples */
-    float reach;        /* as isogi_dvr.reach, in samples */
     float end, dim;     /* transmittance at which a ray ends; at which its samples stand twice as far apart */
     void (*leap)(const isogi_dvr *d, isogi_dvr__packet *p, isogi_counters *work);
     float tolerance;    /* change of extinction times length, and of what is seen of it, from which on a piece is divided */
@@ -5476,10 +5469,25 @@ static size_t isogi_dvr__count_classes(const isogi_dvr *d, double *low, double *
     }
 }
 
+/* Integrals up to each class. */
+static void isogi_dvr__sum_classes(isogi_dvr__frame *f) {
+    size_t i;
+    int a;
+    for (a = 0; a < 4; a++) {
+        double sum = 0, quanta;
+        for (i = 0; i < f->count; i++) sum += (double)f->classes[i].mean[a];
+        f->quantum[a] = (float)(sum / 1073741824);
+        for (i = 0, sum = 0; i < f->count; sum += (double)f->classes[i].mean[a], i++) {
+            quanta = f->quantum[a] > 0 ? sum / (double)f->quantum[a] : 0;
+            f->classes[i].before[a] = (int32_t)isogi_dvr__clamp(quanta, 2e9);
+            f->classes[i].rest[a] = (float)(sum - f->classes[i].before[a] * (double)f->quantum[a]);
+        }
+    }
+}
+
 static void isogi_dvr__frame_classes(isogi_dvr__frame *f, double low, double scale) {
     const isogi_dvr *d = f->dvr;
     const isogi_dvr__transfer *t = &d->transfer;
-    double sum[4] = {0, 0, 0, 0};
     size_t i, next;
     int a, half;
     for (i = 0; i < f->count; i++) {
@@ -5503,10 +5511,11 @@ static void isogi_dvr__frame_classes(isogi_dvr__frame *f, double low, double sca
             x = end, next++;
         }
         x = mean[3] > 1e30 ? 1e30 / mean[3] : 1; /* sums must stay floats, colours what they are */
-        for (a = 0; a < 4; a++) mean[a] = isogi_dvr__clamp(mean[a] * x, 1e32), e->before[a] = (float)sum[a], e->mean[a] = (float)mean[a], sum[a] += mean[a];
+        for (a = 0; a < 4; a++) e->mean[a] = (float)isogi_dvr__clamp(mean[a] * x, 1e32);
     }
+    isogi_dvr__sum_classes(f);
     f->low = (float)low, f->scale = (float)scale;
-    f->top = (float)f->count - 0.01f, f->close = (float)f->count / (2 * ISOGI_DVR__CLASSES);
+    f->top = (float)f->count - 0.01f;
 }
 
 /* out += factor * from, four numbers at once. */
@@ -5609,14 +5618,21 @@ static int isogi_dvr__fast_class(const isogi_dvr__frame *f, float at) {
     return (int)(at < f->top ? at : f->top);
 }
 
-/* Factors of before[] and mean[] of the two ends of a piece whose sum is what lies between them, over the difference of their places;
-   within a class, and where they are close, the mean of both. */
+/* Factors of before[] with rest[], and of mean[], of the two ends of a piece whose sum is what lies between them, over the difference of
+   their places; within a class, and where places are so close that their own last digits show, the mean of both. */
+#define ISOGI_DVR__CLOSE 0.125f /* classes */
 static void isogi_dvr__fast_factors(const isogi_dvr__frame *f, float from, float to, const isogi_dvr__class_entry *e[2], float factor[3]) {
     float difference = to - from;
     int first = isogi_dvr__fast_class(f, from), last = isogi_dvr__fast_class(f, to);
     e[0] = &f->classes[first], e[1] = &f->classes[last];
-    if (first == last || (difference < f->close && difference > -f->close)) factor[0] = 0, factor[1] = factor[2] = 0.5f;
+    if (first == last || (difference < ISOGI_DVR__CLOSE && difference > -ISOGI_DVR__CLOSE)) factor[0] = 0, factor[1] = factor[2] = 0.5f;
     else factor[0] = 1 / difference, factor[1] = -(from - (float)first) * factor[0], factor[2] = (to - (float)last) * factor[0];
+}
+
+/* The mean between them of extinction (a = 3), or of it times colour. */
+static float isogi_dvr__fast_mean(const isogi_dvr__frame *f, const isogi_dvr__class_entry *const e[2], const float factor[3], int a) {
+    float between = (float)(e[1]->before[a] - e[0]->before[a]) * f->quantum[a] + (e[1]->rest[a] - e[0]->rest[a]);
+    return between * factor[0] + e[0]->mean[a] * factor[1] + e[1]->mean[a] * factor[2];
 }
 
 /* Takes a run's samples, and looks up what lies between them. */
@@ -5628,7 +5644,7 @@ static void isogi_dvr__fast_look(const isogi_dvr__frame *f, const isogi_dvr__fas
         const isogi_dvr__class_entry *e[2];
         if (from > 1e20f || to > 1e20f) continue;
         isogi_dvr__fast_factors(f, from, to, e, factor);
-        mean = (e[1]->before[3] - e[0]->before[3]) * factor[0] + e[0]->mean[3] * factor[1] + e[1]->mean[3] * factor[2];
+        mean = isogi_dvr__fast_mean(f, e, factor, 3);
         if (!(mean > 0)) continue;
         run->some |= 1u << k, run->mean[k] = mean;
         run->depth[k] = mean * length < 1e30f ? mean * length : 1e30f, run->change[k] = fabsf(e[1]->mean[3] - e[0]->mean[3]) * length;
@@ -5667,8 +5683,8 @@ static void isogi_dvr__fast_light(const isogi_dvr__frame *f, const isogi_dvr__fa
 
 /* Where along the ray light is looked up for a piece: where it is seen on average, its middle when it is clear, its beginning when it is
    dense; and off dense matter. */
-static float isogi_dvr__fast_place(const isogi_dvr__frame *f, const isogi_dvr__fast_ray *r, const isogi_dvr__fast_run *run, int k) {
-    float off = (float)isogi_dvr__stand_off((double)f->reach, (double)(run->mean[k] * (r->piece * f->reach)));
+static float isogi_dvr__fast_place(const isogi_dvr__fast_ray *r, const isogi_dvr__fast_run *run, int k) {
+    float off = (float)isogi_dvr__stand_off((double)r->reach, (double)(run->mean[k] * (r->piece * r->reach)));
     off = run->first + run->stride * ((float)k + 0.5f / (1 + run->depth[k] * (1.0f / 6))) - off;
     return off > 0 ? off : 0;
 }
@@ -5695,7 +5711,7 @@ static void isogi_dvr__fast_shade(const isogi_dvr__frame *f, const isogi_dvr__fa
                                   const isogi_dvr__fast_run *run, isogi_counters *work) {
     int k, a;
     for (k = 0; k < run->pieces && s->clear > f->end; k++) {
-        float light[4] = {1, 1, 1, 1}, colour[4] = {0, 0, 0, 0}, factor[3], clear;
+        float light[4] = {1, 1, 1, 1}, factor[3], clear;
         const isogi_dvr__class_entry *e[2];
         if (!(run->some >> k & 1)) continue;
         if (run->change[k] * s->clear > run->tolerance) {
@@ -5704,12 +5720,11 @@ static void isogi_dvr__fast_shade(const isogi_dvr__frame *f, const isogi_dvr__fa
         }
         clear = isogi_dvr__exp(run->depth[k]);
         isogi_dvr__fast_factors(f, run->classes[k], run->classes[k + 1], e, factor);
-        isogi_dvr__add4(colour, e[1]->before, factor[0]), isogi_dvr__add4(colour, e[0]->before, -factor[0]);
-        isogi_dvr__add4(colour, e[0]->mean, factor[1]), isogi_dvr__add4(colour, e[1]->mean, factor[2]);
-        if (f->light) isogi_dvr__fast_light(f, r, isogi_dvr__fast_place(f, r, run, k), light);
+        if (f->light) isogi_dvr__fast_light(f, r, isogi_dvr__fast_place(r, run, k), light);
         for (a = 0; a < 3; a++) { /* a truncated series may ring below 0 */
-            colour[a] = colour[a] > 0 ? colour[a] : 0, light[a] = light[a] > 0 ? light[a] : 0;
-            s->out[a] += (light[a] + f->glow) * colour[a] * (s->clear * isogi_dvr__lost(run->depth[k], clear) / run->mean[k]);
+            float colour = isogi_dvr__fast_mean(f, e, factor, a);
+            colour = colour > 0 ? colour : 0, light[a] = light[a] > 0 ? light[a] : 0;
+            s->out[a] += (light[a] + f->glow) * colour * (s->clear * isogi_dvr__lost(run->depth[k], clear) / run->mean[k]);
         }
         s->out[3] += s->clear * isogi_dvr__lost(run->depth[k], clear);
         s->clear *= clear;
@@ -5733,7 +5748,7 @@ static void isogi_dvr__fast_probe(const isogi_dvr__frame *f, const isogi_dvr__fa
                 const isogi_dvr__class_entry *e[2];
                 float u = 0.5f * (low + high), factor[3], mean;
                 isogi_dvr__fast_factors(f, from, from + u * (to - from), e, factor);
-                mean = (e[1]->before[3] - e[0]->before[3]) * factor[0] + e[0]->mean[3] * factor[1] + e[1]->mean[3] * factor[2];
+                mean = isogi_dvr__fast_mean(f, e, factor, 3);
                 if (s->depth + mean * length * u >= r->sought) high = u;
                 else low = u;
             }
@@ -5796,9 +5811,9 @@ ISOGI_DVR__AVX2 inline __m256i isogi_dvr__fast_classes_avx2(const isogi_dvr__fra
 }
 
 /* Where isogi_dvr__fast_factors takes the mean. */
-ISOGI_DVR__AVX2 inline __m256 isogi_dvr__close_avx2(const isogi_dvr__frame *f, __m256 difference, __m256i index) {
+ISOGI_DVR__AVX2 inline __m256 isogi_dvr__close_avx2(__m256 difference, __m256i index) {
     __m256i next = _mm256_castps_si256(isogi_dvr__next_avx2(_mm256_castsi256_ps(index)));
-    __m256 close = _mm256_cmp_ps(isogi_dvr__magnitude_avx2(difference), _mm256_set1_ps(f->close), _CMP_LT_OQ);
+    __m256 close = _mm256_cmp_ps(isogi_dvr__magnitude_avx2(difference), _mm256_set1_ps(ISOGI_DVR__CLOSE), _CMP_LT_OQ);
     return _mm256_or_ps(close, _mm256_castsi256_ps(_mm256_cmpeq_epi32(index, next)));
 }
 
@@ -5806,18 +5821,21 @@ ISOGI_DVR__AVX2 inline __m256 isogi_dvr__close_avx2(const isogi_dvr__frame *f, _
 ISOGI_DVR__AVX2 void isogi_dvr__fast_look_avx2(const isogi_dvr__frame *f, const isogi_dvr__fast_ray *r, isogi_dvr__fast_run *run) {
     const __m256 zero = _mm256_setzero_ps();
     const __m256i lane = _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7), infinite = _mm256_set1_epi32(0x7f800000);
-    __m256 value = isogi_dvr__samples_avx2(f, r, run), before, node, sum, change, difference, mean, length, in, close;
-    __m256i index, entry, bad = _mm256_cmpeq_epi32(_mm256_and_si256(_mm256_castps_si256(value), infinite), infinite);
+    __m256 value = isogi_dvr__samples_avx2(f, r, run), rest, node, sum, change, difference, mean, length, in, close;
+    __m256i index, entry, before, bad = _mm256_cmpeq_epi32(_mm256_and_si256(_mm256_castps_si256(value), infinite), infinite);
     value = _mm256_fmadd_ps(value, _mm256_set1_ps((float)f->dvr->volume.scale), _mm256_set1_ps((float)f->dvr->volume.bias - f->low));
     value = _mm256_min_ps(_mm256_max_ps(_mm256_mul_ps(value, _mm256_set1_ps(f->scale)), _mm256_set1_ps(-1e15f)), _mm256_set1_ps(1e15f));
     value = _mm256_andnot_ps(_mm256_castsi256_ps(bad), value);
     index = isogi_dvr__fast_classes_avx2(f, value);
-    entry = _mm256_slli_epi32(index, 5); /* bytes */
-    before = _mm256_i32gather_ps(&f->classes[0].before[3], entry, 1), node = _mm256_i32gather_ps(&f->classes[0].mean[3], entry, 1);
+    entry = _mm256_slli_epi32(_mm256_add_epi32(index, _mm256_add_epi32(index, index)), 4); /* bytes */
+    before = _mm256_i32gather_epi32((const int *)(const void *)&f->classes[0].before[3], entry, 1);
+    rest = _mm256_i32gather_ps(&f->classes[0].rest[3], entry, 1), node = _mm256_i32gather_ps(&f->classes[0].mean[3], entry, 1);
+    before = _mm256_sub_epi32(_mm256_castps_si256(isogi_dvr__next_avx2(_mm256_castsi256_ps(before))), before);
     sum = _mm256_mul_ps(_mm256_sub_ps(value, _mm256_cvtepi32_ps(index)), node);
     difference = _mm256_sub_ps(isogi_dvr__next_avx2(value), value), change = isogi_dvr__next_avx2(node);
-    close = isogi_dvr__close_avx2(f, difference, index);
-    mean = _mm256_add_ps(_mm256_sub_ps(isogi_dvr__next_avx2(before), before), _mm256_sub_ps(isogi_dvr__next_avx2(sum), sum));
+    close = isogi_dvr__close_avx2(difference, index);
+    mean = _mm256_add_ps(_mm256_sub_ps(isogi_dvr__next_avx2(rest), rest), _mm256_sub_ps(isogi_dvr__next_avx2(sum), sum));
+    mean = _mm256_fmadd_ps(_mm256_cvtepi32_ps(before), _mm256_set1_ps(f->quantum[3]), mean);
     mean = _mm256_blendv_ps(_mm256_div_ps(mean, difference), _mm256_mul_ps(_mm256_set1_ps(0.5f), _mm256_add_ps(node, change)), close);
     in = _mm256_castsi256_ps(_mm256_or_si256(bad, _mm256_castps_si256(isogi_dvr__next_avx2(_mm256_castsi256_ps(bad)))));
     in = _mm256_andnot_ps(in, _mm256_castsi256_ps(_mm256_cmpgt_epi32(_mm256_set1_epi32(run->pieces), lane)));
@@ -5879,12 +5897,12 @@ ISOGI_DVR__AVX2 inline __m256i isogi_dvr__held_cells_avx2(const isogi_dvr__held 
 
 ISOGI_DVR__AVX2 inline void isogi_dvr__parts_avx2(const isogi_dvr__frame *f, const isogi_dvr__fast_ray *r, const isogi_dvr__fast_run *run,
                                                   isogi_dvr__fast_parts *parts) {
-    const __m256 zero = _mm256_setzero_ps(), one = _mm256_set1_ps(1), half = _mm256_set1_ps(0.5f), reach = _mm256_set1_ps(f->reach);
+    const __m256 zero = _mm256_setzero_ps(), one = _mm256_set1_ps(1), half = _mm256_set1_ps(0.5f), reach = _mm256_set1_ps(r->reach);
     __m256 value = _mm256_loadu_ps(run->classes), next = isogi_dvr__next_avx2(value), difference = _mm256_sub_ps(next, value), x, at, close, u[3];
     __m256i index, c[3], to, plane;
     int a;
     index = isogi_dvr__fast_classes_avx2(f, value);
-    close = isogi_dvr__close_avx2(f, difference, index), x = _mm256_div_ps(one, difference);
+    close = isogi_dvr__close_avx2(difference, index), x = _mm256_div_ps(one, difference);
     value = _mm256_sub_ps(_mm256_cvtepi32_ps(index), value), next = isogi_dvr__next_avx2(value);
     _mm256_storeu_si256((__m256i *)(void *)parts->entry, index);
     _mm256_storeu_ps(parts->factor[0], _mm256_andnot_ps(close, x));
@@ -5892,7 +5910,7 @@ ISOGI_DVR__AVX2 inline void isogi_dvr__parts_avx2(const isogi_dvr__frame *f, con
     _mm256_storeu_ps(parts->factor[2], _mm256_blendv_ps(_mm256_xor_ps(_mm256_mul_ps(next, x), _mm256_set1_ps(-0.0f)), half, close));
     if (!f->light) return;
     index = _mm256_setzero_si256();
-    x = _mm256_min_ps(_mm256_mul_ps(_mm256_loadu_ps(run->mean), _mm256_set1_ps(r->piece * f->reach)), _mm256_set1_ps(1e15f)), x = _mm256_mul_ps(x, x);
+    x = _mm256_min_ps(_mm256_mul_ps(_mm256_loadu_ps(run->mean), _mm256_set1_ps(r->piece * r->reach)), _mm256_set1_ps(1e15f)), x = _mm256_mul_ps(x, x);
     x = _mm256_div_ps(_mm256_mul_ps(reach, x), _mm256_add_ps(x, _mm256_set1_ps(16)));
     at = _mm256_div_ps(half, _mm256_fmadd_ps(_mm256_loadu_ps(run->depth), _mm256_set1_ps(1.0f / 6), one));
     at = _mm256_add_ps(at, _mm256_setr_ps(0, 1, 2, 3, 4, 5, 6, 7));
@@ -5915,9 +5933,12 @@ ISOGI_DVR__AVX2 inline __m128 isogi_dvr__part_avx2(const isogi_dvr__frame *f, co
     const isogi_dvr__class_entry *e0 = &f->classes[parts->entry[k]], *e1 = &f->classes[parts->entry[k + 1]];
     const float *p, *q;
     size_t row;
-    __m128 colour = _mm_mul_ps(_mm_sub_ps(_mm_loadu_ps(e1->before), _mm_loadu_ps(e0->before)), _mm_set1_ps(parts->factor[0][k])), light;
+    const __m128i quanta = _mm_sub_epi32(_mm_loadu_si128((const __m128i *)(const void *)e1->before),
+                                         _mm_loadu_si128((const __m128i *)(const void *)e0->before));
+    __m128 colour = _mm_sub_ps(_mm_loadu_ps(e1->rest), _mm_loadu_ps(e0->rest)), light;
     __m256 u, front, back;
-    colour = _mm_fmadd_ps(_mm_loadu_ps(e0->mean), _mm_set1_ps(parts->factor[1][k]), colour);
+    colour = _mm_fmadd_ps(_mm_cvtepi32_ps(quanta), _mm_loadu_ps(f->quantum), colour);
+    colour = _mm_fmadd_ps(_mm_loadu_ps(e0->mean), _mm_set1_ps(parts->factor[1][k]), _mm_mul_ps(colour, _mm_set1_ps(parts->factor[0][k])));
     colour = _mm_max_ps(_mm_fmadd_ps(_mm_loadu_ps(e1->mean), _mm_set1_ps(parts->factor[2][k]), colour), _mm_setzero_ps());
     if (!f->light) return colour;
     p = (const float *)f->light + 4 * (size_t)parts->place[k], q = p + 4 * (size_t)parts->to[1][k], row = 4 * (size_t)parts->to[0][k];
@@ -6016,7 +6037,8 @@ static int isogi_dvr__fast_begin(const isogi_dvr__frame *f, const double origin[
     if (!(pieces < 1e7)) return 0;
     r->count = (int)pieces + 1;
     for (a = 0; a < 3; a++) r->origin[a] = (float)isogi_dvr__clamp(origin[a] + span[0] * dir[a], d->cells[a]), r->dir[a] = (float)(dir[a] * piece);
-    r->enter = span[0], r->sought = 3e38f;
+    for (a = 0; a < 3; a++) dir[a] *= piece;
+    r->enter = span[0], r->sought = 3e38f, r->reach = (float)isogi_dvr__clamp(isogi_dvr__reach_along(d, dir), 1e9);
     /* no infinity: that times no extinction would be no number */
     r->piece = (float)isogi_dvr__clamp(piece / d->desc.unit, 1e30);
     r->last_piece = (float)isogi_dvr__clamp((span[1] - span[0] - (pieces - 1) * piece) / d->desc.unit, 1e30);
@@ -6124,7 +6146,7 @@ static void isogi_dvr__render_pixel(const isogi_dvr__render_job *job, int x, int
     ray.dvr = d, ray.lights = &job->lights, ray.clear = 1, ray.end = 1 - (double)d->desc.opaque;
     if (crossed) isogi_dvr__begin_crossings(crossings, d, origin, ray.dir, march.enter, march.length);
     isogi_dvr__cast(&ray, &march, crossings);
-    for (a = 0; a < 3; a++) out[a] = (float)ray.rgb[a];
+    for (a = 0; a < 3; a++) out[a] = (float)isogi_dvr__clamp(ray.rgb[a], 3e38);
     out[3] = (float)(1 - ray.clear);
     isogi_dvr__add(work, &march.work);
     if (crossed) isogi_dvr__add(work, &crossings->work);
@@ -6177,7 +6199,7 @@ static void isogi_dvr__render_fast(const isogi_dvr__render_job *job, int x0, int
         int x = x0 + k % 4, y = y0 + k / 4;
         float *out = job->pixels + 5 * ((size_t)y * (size_t)job->view->width + (size_t)x);
         if (x >= job->view->width || y >= job->view->height) continue;
-        for (a = 0; a < 3; a++) out[a] = state[k].out[a];
+        for (a = 0; a < 3; a++) out[a] = state[k].out[a] < 3e38f ? state[k].out[a] : 3e38f;
         out[3] = state[k].clear < 0.999f ? 1 - state[k].clear : state[k].out[3], out[4] = job->depth ? depth[k] : HUGE_VALF;
     }
 }
@@ -6212,7 +6234,6 @@ static isogi_result isogi_dvr__begin_frame(isogi_dvr__render_job *job) {
     f->dvr = d, f->step = d->piece, f->look = isogi_dvr__fast_look, f->shade = isogi_dvr__fast_shade, f->glow = (float)d->desc.emission;
     f->end = 1 - d->desc.opaque, f->dim = 0.125f;
     blocks = (double)d->level[0].size[0] * (double)d->level[0].size[1] * (double)d->level[0].size[2];
-    f->reach = (float)(d->reach / f->step);
     f->leap = blocks < 2e9 ? d->kernels.leap : isogi_dvr__leap;
     f->tolerance = d->desc.tolerance > 0 ? (float)d->desc.tolerance : 0.5f;
     bytes = (double)v->stride[0] * (double)d->cells[0] + (double)v->stride[1] * (double)d->cells[1] + (double)v->stride[2] * (double)d->cells[2];
@@ -6372,9 +6393,15 @@ static void isogi_dvr__histogram(const isogi_pyramid *pyramid, const double rang
             }
 }
 
+/* low + u (high - low) for 0 <= u <= 1, also where the difference is no finite number. */
+static double isogi_dvr__part_way(double low, double high, double u) {
+    double half = (0.5 * high - 0.5 * low) * u;
+    return low + half + half;
+}
+
 /* Leaves out up to a thousandth of the voxels at either end of the range where that halves it. */
 static void isogi_dvr__leave_outliers(const isogi_pyramid *pyramid, double range[2]) {
-    double histogram[ISOGI_DVR__BINS], share, width;
+    double histogram[ISOGI_DVR__BINS], share, first;
     int low, high, pass;
     for (pass = 0; pass < 32 && range[0] < range[1]; pass++) {
         double total = 0, below = 0, above = 0;
@@ -6384,8 +6411,8 @@ static void isogi_dvr__leave_outliers(const isogi_pyramid *pyramid, double range
         for (low = 0; low < ISOGI_DVR__BINS - 1 && below + histogram[low] <= share; low++) below += histogram[low];
         for (high = ISOGI_DVR__BINS; high > low + 1 && above + histogram[high - 1] <= share; high--) above += histogram[high - 1];
         if (2 * (high - low) > ISOGI_DVR__BINS) return;
-        width = (0.5 * range[1] - 0.5 * range[0]) / (0.5 * ISOGI_DVR__BINS);
-        range[1] = high < ISOGI_DVR__BINS ? range[0] + high * width : range[1], range[0] += low * width;
+        first = range[0], range[0] = isogi_dvr__part_way(first, range[1], (double)low / ISOGI_DVR__BINS);
+        if (high < ISOGI_DVR__BINS) range[1] = isogi_dvr__part_way(first, range[1], (double)high / ISOGI_DVR__BINS);
     }
 }
 
@@ -6404,8 +6431,8 @@ ISOGI_API isogi_result isogi_transfer_suggest(const isogi_pyramid *pyramid, isog
     else isogi_dvr__histogram(pyramid, range, histogram), isogi_dvr__three_classes(histogram, bin);
     width = 0.5 * range[1] - 0.5 * range[0];
     at[0] = range[0], at[5] = range[1];
-    at[2] = range[0] + 2 * width * bin[0] / ISOGI_DVR__BINS, at[3] = range[0] + 2 * width * bin[1] / ISOGI_DVR__BINS;
-    at[1] = at[2] - 0.3 * (at[2] - at[0]), at[4] = at[3] + 0.15 * (at[5] - at[3]);
+    for (i = 0; i < 2; i++) at[2 + i] = isogi_dvr__part_way(range[0], range[1], (double)bin[i] / ISOGI_DVR__BINS);
+    at[1] = isogi_dvr__part_way(at[0], at[2], 0.7), at[4] = isogi_dvr__part_way(at[3], at[5], 0.15);
     for (a = 0; a < 3; a++) most += (double)v->size[a] * (double)v->size[a];
     most = space == ISOGI_DVR_PHYSICAL ? 0.69 * 30 / sqrt(most) : width > 0 ? 2 / width : 0;
     for (i = 0; i < ISOGI_SUGGEST_POINTS; i++) {
@@ -6975,9 +7002,9 @@ ISOGI_API isogi_result isogi_dvr_tets_render(const isogi_tets *tets, const isogi
 #undef ISOGI_DVR__TABLE
 #undef ISOGI_DVR__BATCH
 #undef ISOGI_DVR__GAIN
-#undef ISOGI_DVR__GROUP
 #undef ISOGI_DVR__TOWARD
 #undef ISOGI_DVR__CLASSES
+#undef ISOGI_DVR__CLOSE
 #undef ISOGI_DVR__NODES
 #undef ISOGI_DVR__LEAP
 #undef ISOGI_DVR__VECTORS

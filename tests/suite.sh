@@ -151,7 +151,7 @@ only() { printf '%s\n' $units | grep -E "test_($1)\$"; }
 
 variants() {
     threaded='vol|mesh|trace_bake|dvr_visibility'
-    checked='sh|sh_limits|sample|vol|vol_api|vol_sides|vol_update|vol_field|mesh|trace|trace_bake|trace_light|trace_store|trace_change|dvr|dvr_data|dvr_tets|dvr_transfer|dvr_visibility|dvr_levels|dvr_bound|dvr_closed|dvr_medium|dvr_classes'
+    checked='sh|sh_limits|sample|vol|vol_api|vol_sides|vol_update|vol_field|mesh|trace|trace_bake|trace_light|trace_store|trace_change|dvr|dvr_data|dvr_tets|dvr_transfer|dvr_visibility|dvr_levels|dvr_bound|dvr_hard|dvr_closed|dvr_medium|dvr_classes'
     # Those that only start other programs have nothing to be built anew.
     units=
     for program; do
@@ -160,7 +160,7 @@ variants() {
     # A variant runs what it can change: the address sanitizer most of them, the others those that stand for their kind.
     variant O0 "$CC" "-O0 $CONTRACT_OFF" '' $(only sh)
     variant O3 "$CC" "-O3 $CONTRACT_OFF" '' $(only 'sh|vol|vol_update|trace_store|dvr|dvr_data')
-    fast_math "$CC" $(only 'sh|sh_limits|sample|vol|vol_sides|trace|dvr|dvr_visibility|dvr_levels|dvr_bound|dvr_classes')
+    fast_math "$CC" $(only 'sh|sh_limits|sample|vol|vol_sides|trace|dvr|dvr_visibility|dvr_levels|dvr_bound|dvr_hard|dvr_classes')
     variant no-threads "$CC" "-O2 $CONTRACT_OFF -DISOGI_NO_THREADS" '' $(only 'vol|trace')
     variant no-simd "$CC" "-O2 $CONTRACT_OFF -DISOGI_NO_SIMD" '' $(only 'sh|sample|vol|dvr')
     variant sh-level-1 "$CC" "-O2 $CONTRACT_OFF -DISOGI_SH_LEVEL=1" '' $(only sh)
