@@ -2767,7 +2767,7 @@ typedef struct isogi_trace__node {
     float albedo[3];
     signed char from;     /* side of the surface: 1 low, -1 high */
     signed char level;    /* blocks of samples that are complete */
-    signed char finished; /* texel: no more samples are wanted */
+    signed char finished; /* texel: 1: no more samples are wanted; 2: its light was loaded */
     double steady[3];     /* irradiance by lights without extent */
     double light[3], light_spread;   /* by other lights; sum of squared deviations of its luminance */
     double bright[3], bright_spread; /* by directions drawn by brightness */
@@ -3875,7 +3875,7 @@ static void isogi_trace__publish_task(void *arg, size_t task) {
         float to[3], error;
         double rgb[3], variance[2], probes = 0;
         int a;
-        if (!n->samples) continue;
+        if (!n->samples || n->finished == 2) continue;
         if (t->scene.desc.mode == ISOGI_TRACE_TRANSFER) {
             error = n->samples > 1 && !t->feedback->diverges ? (float)(1 / sqrt((double)n->samples)) : ISOGI_TRACE__NOT_READY;
             isogi_trace__record_write(t, isogi_trace__record(t, n->brick, n->slot), set->out[0] + i * v, error);
@@ -4055,6 +4055,27 @@ static isogi_result isogi_trace__nodes_make(isogi_trace *t) {
     return ISOGI_OK;
 }
 
+/* The next group begins anew, so that a bake that was saved in between goes on to the same bits. */
+static void isogi_trace__group_free(isogi_trace *t) {
+    isogi_trace__feedback *f = t->feedback;
+    size_t i;
+    for (i = 0; i < f->texels.count; i++) isogi_trace__brick_forget(t, f->texels.nodes[i].brick);
+    f->probes_before += f->probes.count;
+    isogi_trace__set_free(t, &f->texels);
+    isogi_trace__set_free(t, &f->probes);
+    memset(f->table, 0, f->table_size * sizeof *f->table);
+    f->cursor = f->probe_cursor = f->probe_end = f->placed = f->carried = f->span_count = 0;
+    f->phase = ISOGI_TRACE__AT_REST, f->unpublished = 0, f->partial = 0;
+}
+
+/* Also where the memory for a group's nodes ran out half way. */
+static void isogi_trace__feedback_rest(isogi_trace *t) {
+    size_t i;
+    for (i = 0; i < t->brick_count; i++)
+        if (t->bricks[i]) isogi_trace__brick_forget(t, t->bricks[i]);
+    isogi_trace__group_free(t);
+}
+
 /* Nothing is left to trace at this level, and its light is carried over: texels that are good enough are finished, the others go on. */
 static void isogi_trace__level_end(isogi_trace *t) {
     isogi_trace__feedback *f = t->feedback;
@@ -4068,14 +4089,7 @@ static void isogi_trace__level_end(isogi_trace *t) {
         } else open++;
     }
     f->level++, f->cursor = 0;
-    if (open || t->scene.desc.lazy) return;
-    for (i = 0; i < f->texels.count; i++) isogi_trace__brick_forget(t, f->texels.nodes[i].brick);
-    /* the next group begins anew, so that a bake that was saved in between goes on to the same bits */
-    f->probes_before += f->probes.count;
-    isogi_trace__set_free(t, &f->texels);
-    isogi_trace__set_free(t, &f->probes);
-    memset(f->table, 0, f->table_size * sizeof *f->table);
-    f->probe_cursor = f->probe_end = f->placed = 0;
+    if (!open && !t->scene.desc.lazy) isogi_trace__group_free(t);
 }
 
 /* Traces the next batch; where nothing is left to trace at this level its light is to be carried over. */
@@ -4640,6 +4654,15 @@ static isogi_result isogi_trace__block_check(const isogi_trace *t, const uint8_t
     return ISOGI_OK;
 }
 
+/* The texel's light came with a block: what is gathered for it is not wanted any more. */
+static void isogi_trace__node_loaded(isogi_trace *t, const isogi_trace__brick *brick, uint32_t slot) {
+    isogi_trace__node *n;
+    if (!brick->node || !brick->node[slot]) return;
+    n = &t->feedback->texels.nodes[brick->node[slot] - 1];
+    if (!n->finished) t->feedback->partial -= n->samples;
+    n->finished = 2;
+}
+
 /* A block that was checked. */
 static isogi_result isogi_trace__block_load(isogi_trace *t, const uint8_t *block) {
     uint64_t bricks = isogi_trace__get(block + 48, 8), k;
@@ -4664,8 +4687,10 @@ static isogi_result isogi_trace__block_load(isogi_trace *t, const uint8_t *block
             t->wanted -= brick->state[slot] >= ISOGI_TRACE__WANTED && brick->state[slot] < ISOGI_TRACE__DONE;
             t->done += brick->state[slot] != ISOGI_TRACE__DONE;
             brick->state[slot] = ISOGI_TRACE__DONE;
+            isogi_trace__node_loaded(t, brick, slot);
         }
     }
+    if (t->feedback && !t->scene.desc.lazy && !t->wanted) isogi_trace__feedback_rest(t);
     return ISOGI_OK;
 }
 
@@ -4919,15 +4944,9 @@ static void isogi_trace__change_unit(const isogi_trace__change *c, const isogi_t
 /* All nodes are forgotten: what was gathered belongs to another scene. */
 static void isogi_trace__feedback_reset(isogi_trace *t) {
     isogi_trace__feedback *f = t->feedback;
-    size_t i;
     if (!f) return;
-    for (i = 0; i < t->brick_count; i++)
-        if (t->bricks[i]) isogi_trace__brick_forget(t, t->bricks[i]);
-    isogi_trace__set_free(t, &f->texels), isogi_trace__set_free(t, &f->probes);
-    memset(f->table, 0, f->table_size * sizeof *f->table);
-    f->cursor = f->probe_cursor = f->probe_end = 0, f->span_count = 0, f->partial = 0;
-    f->level = f->unpublished = f->diverges = 0, f->probes_before = 0;
-    f->phase = ISOGI_TRACE__AT_REST, f->placed = f->carried = 0;
+    isogi_trace__feedback_rest(t);
+    f->level = f->diverges = 0, f->probes_before = 0;
 }
 
 /* Marks the texels and queues their bricks; needs no memory. */

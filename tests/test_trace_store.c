@@ -432,6 +432,45 @@ TEST(feedback_resumes_to_the_same_bits) {
     scene_free(&s);
 }
 
+/* Feedback at work, whose texels get a block that holds them all: each counts once, they keep the block's light, and nothing is left to do,
+   be it loaded before the first block of samples, within one or after one; what is asked for later is baked as ever. */
+TEST(feedback_at_work_takes_a_block) {
+    double q[2] = {0.5, 4};
+    scene s = scene_make(17, 16, 15, NULL, gyroid_in_air, q);
+    float points[40][3];
+    int n = surface_points(&s, 0, 40, 1, points);
+    for (int k = 0; k < 10; k++) {
+        static const uint64_t before[5] = {1, 600, 2500, 6000, 9000};
+        isogi_trace_desc d = store_desc(&s, ISOGI_TRACE_IRRADIANCE, 0, 64);
+        isogi_trace *whole = NULL, *part = NULL;
+        isogi_trace_report report;
+        uint8_t *a, *b, *c;
+        size_t size_a, size_b, size_c;
+        double remaining = 1;
+        d.method = ISOGI_TRACE_FEEDBACK, d.lazy = k & 1;
+        CHECK(isogi_trace_create(&whole, &d, NULL) == ISOGI_OK && isogi_trace_create(&part, &d, NULL) == ISOGI_OK, "case %d", k);
+        isogi_trace_request(whole, (const float(*)[3])points, (size_t)n / 2);
+        isogi_trace_request(part, (const float(*)[3])points, (size_t)n / 2);
+        isogi_trace_step(whole, 0, NULL), isogi_trace_step(part, before[k / 2], &remaining);
+        a = save_now(whole, &size_a);
+        CHECK(remaining > 0 && isogi_trace_load(part, a, size_a) == ISOGI_OK, "case %d: remaining %g", k, remaining);
+        b = save_now(part, &size_b);
+        CHECK(size_a == size_b && !memcmp(a, b, size_a), "case %d: %d and %d bytes", k, (int)size_a, (int)size_b);
+        isogi_trace_request(part, (const float(*)[3])points, (size_t)n / 2);
+        for (int step = 0; step < 20 && remaining > 0; step++) isogi_trace_step(part, 20000, &remaining);
+        c = save_now(part, &size_c);
+        CHECK(remaining <= 0 && size_a == size_c && !memcmp(a, c, size_a), "case %d: remaining %g, %d and %d bytes", k, remaining,
+              (int)size_a, (int)size_c);
+        isogi_trace_request(part, (const float(*)[3])points, (size_t)n);
+        for (int step = 0; step < 40 && (!step || remaining > 0); step++) isogi_trace_step(part, 20000, &remaining);
+        isogi_trace_status(part, &report);
+        CHECK(remaining <= 0 && !report.drafts && report.texels >= (size_t)n, "case %d: remaining %g, %d drafts", k, remaining,
+              (int)report.drafts);
+        isogi_trace_free(whole), isogi_trace_free(part), free(a), free(b), free(c);
+    }
+    scene_free(&s);
+}
+
 /* Boxes baked apart, one of them reaching past a brick, and loaded in any order: the same bytes as the whole, at once. */
 TEST(boxes_merge_to_the_same_bits) {
     double q[2] = {0.5, 4};
