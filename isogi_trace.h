@@ -4867,10 +4867,14 @@ static int isogi_trace__depends(const isogi_trace__change *c, const double grid[
     return isovalue >= c->range[0] && isovalue <= c->range[1] && isogi_trace__in_reach(c, grid);
 }
 
-/* How far from changed voxels the choice of texels by an interval of isovalues depends on them. */
+/* How far from changed voxels the choice of texels by an interval of isovalues depends on them: the lattice's outermost texels serve
+   lookups up to the volume's border. */
 static void isogi_trace__choice_margin(const isogi_trace *t, double margin[3]) {
     int a, chosen = !isogi_trace__zero(t->scene.desc.isovalue_min) || !isogi_trace__zero(t->scene.desc.isovalue_max);
-    for (a = 0; a < 3; a++) margin[a] = chosen ? 2 * t->step[a] + 1 : 0;
+    for (a = 0; a < 3; a++) {
+        double below = t->first[a], above = (double)(t->scene.volume->size[a] - 1) - (t->lattice[a] > 1 ? t->last[a] : t->first[a]);
+        margin[a] = chosen ? 2 * t->step[a] + 1 + (below > above ? below : above) : 0;
+    }
 }
 
 /* Whether a brick without texels may get some. */
@@ -4898,7 +4902,7 @@ static isogi_result isogi_trace__change_reserve(isogi_trace__change *c) {
         if (!t->bricks[i] && !t->scene.desc.lazy && isogi_trace__may_hold(c, i)) {
             t->bricks[i] = isogi_trace__brick_new(t);
             if (!t->bricks[i]) return ISOGI_NO_MEMORY;
-            memset(t->bricks[i]->state, c->desc ? ISOGI_TRACE__NOT_ASKED : ISOGI_TRACE__NO_SURFACE, sizeof t->bricks[i]->state);
+            memset(t->bricks[i]->state, c->desc ? ISOGI_TRACE__NOT_ASKED : ISOGI_TRACE__UNKNOWN, sizeof t->bricks[i]->state);
         }
         c->capacity += t->bricks[i] != NULL;
     }
@@ -4923,6 +4927,7 @@ static uint8_t isogi_trace__changed_state(const isogi_trace__change *c, const si
     isogi_trace__choice_margin(t, margin);
     if (c->desc) again = c->choice && (state == ISOGI_TRACE__NOT_ASKED || (state == ISOGI_TRACE__WANTED && !lazy));
     else again = isogi_trace__in_change(c, grid, none) || (state == ISOGI_TRACE__NOT_ASKED && isogi_trace__in_change(c, grid, margin));
+    again |= !lazy && state == ISOGI_TRACE__UNKNOWN; /* its brick has just come */
     if (!again) return (uint8_t)(state == ISOGI_TRACE__DONE && isogi_trace__depends(c, grid) ? ISOGI_TRACE__DRAFT : state);
     if (lazy && state < ISOGI_TRACE__WANTED) return ISOGI_TRACE__UNKNOWN;
     now = isogi_trace__classify(t, texel);

@@ -282,6 +282,33 @@ TEST(changed_voxels_bring_texels_into_the_interval) {
     isogi_trace_free(t), scene_free(&s);
 }
 
+static double ramp(const double p[3], const double *q) { return q[0] * p[0]; }
+
+/* Where no surface of the interval was, an object of it comes: within the lattice, whose bricks there are new, and beyond it, whose
+   outermost texels serve lookups up to the volume's border; with a single texel, too. */
+TEST(objects_that_come_have_light) {
+    const double q[1] = {0.3}, low[5] = {0, 0, 12, 12, 16}, high[5] = {0, 0, 20, 20, 20};
+    const size_t lattice[5] = {33, 17, 9, 1, 1}, at[5] = {15, 15, 29, 28, 29};
+    for (int k = 0; k < 10; k++) {
+        const int c = k % 5, high_side = k >= 5;
+        scene s = scene_make(33, 33, 33, NULL, ramp, q);
+        const size_t first[3] = {at[c], at[c] - 1, at[c]}, last[3] = {at[c] + 2, at[c] + 2, at[c] + 2};
+        isogi_trace_desc d = desc_make(&s, 0.5f, 1, 2);
+        d.isovalue_min = 50, d.isovalue_max = 100, d.sides = high_side ? ISOGI_TRACE_BOTH_SIDES : ISOGI_TRACE_LOW_SIDE;
+        for (int a = 0; a < 3; a++) d.lattice[a] = lattice[c], d.lattice_min[a] = low[c], d.lattice_max[a] = high[c];
+        if (c >= 3) d.lattice[1] = d.lattice[2] = 4, d.lattice_min[0] = d.lattice_max[0] = 16;
+        isogi_trace *t = baked(&d);
+        CHECK(isogi_trace_touch(t, first, last) == ISOGI_OK, "before, case %d", k);
+        for (size_t z = first[2]; z <= last[2]; z++)
+            for (size_t y = first[1]; y <= last[1]; y++)
+                for (size_t x = first[0]; x <= last[0]; x++) s.data[x + 33 * (y + 33 * z)] = 200;
+        isogi_vol_update(s.pyramid, first, last, NULL);
+        CHECK(isogi_trace_touch(t, first, last) == ISOGI_OK, "after, case %d", k);
+        CHECK(finished(t, &d, "an object").texels > 0, "case %d: no texels", k);
+        isogi_trace_free(t), scene_free(&s);
+    }
+}
+
 /* Without feedback's exactness: light after a change agrees with a new bake as two seeds do; lazily what was asked for stays asked for. */
 TEST(feedback_follows_changes) {
     double q[5] = {16, 15, 16, 20, 9};
