@@ -201,8 +201,8 @@ typedef void isogi_trace_material_function(void *user, double isovalue, const do
    HALF     6 / 2   5e-4 of the value
    RGB9E5   4 / -   2e-3 of the largest of the three channels; irradiance alone
    BYTE     3 / 1   irradiance: square roots, 4e-3 of sqrt(value * largest); transfer: 4e-3 of the texel's largest coefficient
-   `make test` prints the measured table. HALF and RGB9E5 hold up to 65000 times the irradiance of an open surface,
-   BYTE twice as much (four times with reflections); brighter texels are cut off there. */
+   `make test` prints the measured table. HALF and RGB9E5 hold up to 65000 times the irradiance of an open surface
+   (measured as isogi_trace_report.unit is), BYTE twice as much (four times with reflections); brighter texels are cut off there. */
 typedef enum isogi_trace_format {
     ISOGI_TRACE_DEFAULT = 0, /* FLOAT for irradiance: with nothing kept for texels without light that is small enough; HALF for
                                 transfer, where it halves by far the largest part of the memory and costs nothing that can be seen */
@@ -329,7 +329,8 @@ typedef struct isogi_trace_report {
     double light;     /* IRRADIANCE: root mean square of luminance over these texels, */
     double error;     /* of their standard errors (TRANSFER: under a uniform sky of radiance 1; without what is not known) */
     double worst;     /* the largest of these errors; INFINITY where one is not known */
-    double unit;      /* IRRADIANCE: light that an open texel gets, averaged over orientations: what desc.error is a fraction of */
+    double unit;      /* IRRADIANCE: light that an open texel gets, averaged over orientations: what desc.error is a fraction of. Measured
+                         at the volume's middle, but at least a quarter of its diagonal from a lamp, and before a rectangle */
     int diverges;     /* FEEDBACK: reflections add the same light for ever (albedo 1, closed, with a light inside): no value means anything */
 } isogi_trace_report;
 ISOGI_API void isogi_trace_status(const isogi_trace *trace, isogi_trace_report *report);
@@ -1498,18 +1499,68 @@ static int isogi_trace__grey(const isogi_trace_desc *d) {
     return grey && !d->material;
 }
 
-/* Twice the irradiance of an open surface in the middle of the volume, that faces most light, as the next power of two: the unit of
-   short formats. */
-static isogi_result isogi_trace__scene_unit(isogi_trace__scene *scene) {
-    float sky[3 * 9], centre[3], glow[3];
-    double most = 0, grid[3], world[3];
+/* The middle of the volume, in world space. Returns a quarter of its diagonal. */
+static double isogi_trace__middle(const isogi_trace__scene *scene, double middle[3]) {
+    double corner[3], end[3], zero[3] = {0, 0, 0}, square = 0;
+    int a, b;
+    isogi_vol_to_world(scene->pyramid, zero, corner);
+    for (a = 0; a < 3; a++) {
+        for (b = 0; b < 3; b++) end[b] = a == b ? (double)(scene->volume->size[b] - 1) : 0;
+        middle[a] = 0.5 * (double)(scene->volume->size[a] - 1);
+        isogi_vol_to_world(scene->pyramid, end, end);
+        for (b = 0; b < 3; b++) square += (end[b] - corner[b]) * (end[b] - corner[b]);
+    }
+    isogi_vol_to_world(scene->pyramid, middle, middle);
+    return 0.25 * sqrt(square);
+}
+
+/* Where a lamp is measured: from the middle, but no closer than `least`, since a lamp there would be all that counts, and from before a
+   rectangle, which has a dark side. */
+static void isogi_trace__measure_from(const isogi_light *light, const double middle[3], double least, float point[3]) {
+    double away[3], front[3] = {1, 0, 0}, apart, length;
+    int a, rectangle = light->kind == ISOGI_LIGHT_RECTANGLE, moved;
+    const float *u = light->edge[0], *v = light->edge[1];
+    for (a = 0; a < 3; a++) away[a] = middle[a] - (double)light->vector[a], point[a] = (float)middle[a];
+    for (a = 0; a < 3 && rectangle; a++)
+        front[a] = (double)u[(a + 1) % 3] * (double)v[(a + 2) % 3] - (double)u[(a + 2) % 3] * (double)v[(a + 1) % 3];
+    apart = sqrt(isogi_trace__dot_wide(away, away)), length = sqrt(isogi_trace__dot_wide(front, front));
+    moved = apart < least || (rectangle && !(isogi_trace__dot_wide(away, front) > 0));
+    if (light->kind == ISOGI_LIGHT_DIRECTIONAL || !moved || !(length > 0)) return;
+    if (light->kind == ISOGI_LIGHT_SPHERE && (double)light->radius >= least) return; /* all around, or none of it is close */
+    for (a = 0; a < 3; a++) {
+        double dir = rectangle || !(apart > 0) ? front[a] / length : away[a] / apart;
+        point[a] = (float)((double)light->vector[a] + (apart > least ? apart : least) * dir);
+    }
+}
+
+/* The lighting of an open place, lamps as far off as they are from the middle of the volume: sh[3 * order^2], order up to 3. */
+static isogi_result isogi_trace__middle_light(const isogi_trace__scene *scene, int order, float *sh) {
+    const isogi_lighting *all = &scene->desc.lighting;
+    isogi_lighting part = *all;
+    float point[3], lamp[3 * 9];
+    double middle[3], least = isogi_trace__middle(scene, middle);
     isogi_result result;
     size_t k;
+    int i;
+    part.light_count = 0;
+    result = isogi_sh_project(sh, order, &part, NULL);
+    memset(&part.env, 0, sizeof part.env), part.light_count = 1;
+    for (k = 0; k < all->light_count && result == ISOGI_OK; k++) {
+        part.lights = &all->lights[k];
+        isogi_trace__measure_from(part.lights, middle, least, point);
+        result = isogi_sh_project(lamp, order, &part, point);
+        for (i = 0; i < 3 * order * order && result == ISOGI_OK; i++) sh[i] += lamp[i];
+    }
+    return result;
+}
+
+/* Twice the irradiance of an open surface that faces most light, as the next power of two: the unit of short formats. */
+static isogi_result isogi_trace__scene_unit(isogi_trace__scene *scene) {
+    float sky[3 * 9], glow[3];
+    double most = 0;
+    isogi_result result = isogi_trace__middle_light(scene, 3, sky);
+    size_t k;
     int i, a, e;
-    for (a = 0; a < 3; a++) grid[a] = 0.5 * (double)(scene->volume->size[a] - 1);
-    isogi_vol_to_world(scene->pyramid, grid, world);
-    for (a = 0; a < 3; a++) centre[a] = (float)world[a];
-    result = isogi_sh_project(sky, 3, &scene->desc.lighting, centre);
     if (result == ISOGI_OK) result = isogi_sh_convolve_cosine(sky, sky, 3, 3);
     if (result != ISOGI_OK) return result;
     for (i = 0; i < 27; i++) {
@@ -1528,29 +1579,31 @@ static isogi_result isogi_trace__scene_unit(isogi_trace__scene *scene) {
     return ISOGI_OK;
 }
 
-/* Luminance of the irradiance of an open surface at a point, averaged over all orientations: pi times the mean radiance, and
-   Y_0 = 1 / sqrt(4 pi). 0 where it cannot be told. */
-static isogi_result isogi_trace__open_at(const isogi_lighting *lighting, const float point[3], double *open) {
-    float light[3] = {0, 0, 0};
+/* Luminance of the irradiance of an open surface, averaged over all orientations: pi times the mean radiance, and
+   Y_0 = 1 / sqrt(4 pi). */
+static double isogi_trace__open_luminance(const float light[3]) {
     double rgb[3];
-    isogi_result result = isogi_sh_project(light, 1, lighting, point);
     int a;
     for (a = 0; a < 3; a++) rgb[a] = (double)light[a] * 0.28209479177387814 * ISOGI_TRACE__PI;
-    *open = result == ISOGI_OK ? isogi_trace__clamp(isogi_trace__luminance(rgb), 1e30) : 0;
+    return isogi_trace__clamp(isogi_trace__luminance(rgb), 1e30);
+}
+
+/* The same at a point. 0 where it cannot be told. */
+static isogi_result isogi_trace__open_at(const isogi_lighting *lighting, const float point[3], double *open) {
+    float light[3] = {0, 0, 0};
+    isogi_result result = isogi_sh_project(light, 1, lighting, point);
+    *open = result == ISOGI_OK ? isogi_trace__open_luminance(light) : 0;
     return result;
 }
 
-/* The same of an open texel at the middle of the volume; and what a sample may bring, which may be a glow. */
+/* The same of an open texel; and what a sample may bring, which may be a glow. */
 static isogi_result isogi_trace__open_light(isogi_trace__scene *scene) {
-    float centre[3];
-    double place[3], rgb[3];
-    isogi_result result;
+    float light[3] = {0, 0, 0};
+    double rgb[3];
+    isogi_result result = isogi_trace__middle_light(scene, 1, light);
     size_t k;
     int a;
-    for (a = 0; a < 3; a++) place[a] = 0.5 * (double)(scene->volume->size[a] - 1);
-    isogi_vol_to_world(scene->pyramid, place, place);
-    for (a = 0; a < 3; a++) centre[a] = (float)place[a];
-    result = isogi_trace__open_at(&scene->desc.lighting, centre, &scene->open_light);
+    scene->open_light = isogi_trace__open_luminance(light);
     scene->possible = scene->open_light;
     for (k = 0; k < scene->desc.emission_count; k++) {
         double glow;
