@@ -703,4 +703,30 @@ TEST(what_is_wanted_is_what_is_missing) {
     isogi_trace_free(t), scene_free(&s);
 }
 
+/* A lazy bake's first answers, of one channel: their errors know of it. */
+TEST(drafts_of_any_colour_have_errors) {
+    double q[5] = {12, 11, 12, 15, 7};
+    scene s = scene_make(25, 25, 25, NULL, pit, q);
+    float points[40][3], e[40][3], error[40];
+    int n = surface_points(&s, 0, 40, 5, points);
+    for (int c = 0; c < 3; c++) {
+        isogi_light sun = light_make(ISOGI_LIGHT_DIRECTIONAL, 0.2f, 1, 0.1f, 0, 0.3);
+        isogi_trace_desc d = desc_make(&s, 0.5f, 1, 64);
+        isogi_trace *t = NULL;
+        int lit = 0;
+        sun.rgb[c] = 3, d.lighting.env.sh = NULL, d.lighting.env.sh_order = 0, d.lighting.lights = &sun, d.lighting.light_count = 1;
+        d.method = ISOGI_TRACE_FEEDBACK, d.lazy = 1;
+        CHECK(isogi_trace_create(&t, &d, NULL) == ISOGI_OK, "%d", c);
+        CHECK(isogi_trace_request(t, (const float(*)[3])points, (size_t)n) == ISOGI_OK, "%d", c);
+        isogi_trace_step(t, 300, NULL), isogi_trace_sample(t, (const float(*)[3])points, (size_t)n, e, error);
+        for (int i = 0; i < n; i++) {
+            lit += e[i][c] > 0;
+            CHECK(!(e[i][c] > 0) || error[i] >= 0.5f * e[i][c], "channel %d: %g with error %g", c, (double)e[i][c], (double)error[i]);
+        }
+        CHECK(lit > 3, "channel %d: %d points are lit", c, lit);
+        isogi_trace_free(t);
+    }
+    scene_free(&s);
+}
+
 TEST_MAIN("trace_bake")

@@ -501,4 +501,48 @@ TEST(rectangle_in_spherical_harmonics) {
     }
 }
 
+/* A lamp near the middle of a hollow ball, on it, and a rectangle whose back is there: what errors and formats refer to is what it is for
+   a lamp that is further off, so bytes hold the light, errors are as small, and the target of an adaptive bake means the same. */
+TEST(lamps_in_the_middle_are_lamps_like_others) {
+    const double q[4] = {16, 16, 16, 14}, off[5] = {5, 0, 0.1, 1, 1};
+    scene s = scene_make(33, 33, 33, NULL, ball, q);
+    float points[14][3], e[3][14][3], error[14];
+    double unit = 0, stated = 0, rays = 0;
+    for (size_t i = 0; i < 33 * 33 * 33; i++) s.data[i] = -s.data[i];
+    isogi_vol_update(s.pyramid, (const size_t[3]){0, 0, 0}, (const size_t[3]){32, 32, 32}, NULL);
+    points_seen_from(&s, 16, 7, 14, points);
+    for (int k = 0; k < 5; k++) {
+        isogi_light lamp = light_make(ISOGI_LIGHT_POINT, (float)(16 + off[k]), 16, 16, 100, 0);
+        isogi_trace_desc d = desc_make(&s, 0.5f, 2, 128);
+        isogi_trace_report report = {0};
+        isogi_counters counters = {0};
+        double mean = 0, apart = 0;
+        if (k == 4) lamp.kind = ISOGI_LIGHT_RECTANGLE, lamp.edge[0][1] = lamp.edge[1][2] = 1; /* shines along x */
+        d.method = ISOGI_TRACE_FEEDBACK, d.lazy = 1, d.lighting.env.sh = NULL, d.lighting.env.sh_order = 0;
+        d.lighting.lights = &lamp, d.lighting.light_count = 1;
+        for (int way = 0; way < 3; way++) {
+            isogi_trace *t = NULL;
+            d.storage = way == 1 ? ISOGI_TRACE_BYTE : ISOGI_TRACE_FLOAT, d.error = way == 2 ? 0.05f : 0;
+            CHECK(isogi_trace_create(&t, &d, NULL) == ISOGI_OK && isogi_trace_request(t, (const float(*)[3])points, 14) == ISOGI_OK &&
+                      isogi_trace_step(t, 0, NULL) == ISOGI_OK,
+                  "lamp %d", k);
+            isogi_trace_sample(t, (const float(*)[3])points, 14, e[way], error);
+            isogi_trace_status(t, &report);
+            for (int i = 0; i < 14 && !way; i++) mean += (double)error[i] / 14;
+            if (way == 2) isogi_trace_counters(t, &counters);
+            isogi_trace_free(t);
+        }
+        for (int i = 0; i < 14; i++)
+            for (int c = 0; c < 3; c++) apart = fmax(apart, fabs((double)e[1][i][c] - (double)e[0][i][c]) / (double)e[0][i][c]);
+        printf("    lamp %d: unit %.4f, error %.4f, %.0f rays a texel, bytes err by %.4f\n", k, report.unit, mean,
+               (double)counters.rays / (double)counters.texels, apart);
+        if (!k) unit = report.unit, stated = mean, rays = (double)counters.rays / (double)counters.texels;
+        CHECK(report.unit > 0.8 * unit && report.unit < 1.25 * unit, "lamp %d: unit %g, further off %g", k, report.unit, unit);
+        CHECK(k == 4 || (mean > 0.5 * stated && mean < 2 * stated), "lamp %d: error %g, further off %g", k, mean, stated);
+        CHECK(k == 4 || (double)counters.rays > 0.5 * rays * (double)counters.texels, "lamp %d: %g rays a texel", k, rays);
+        CHECK(k == 4 || apart < 0.02, "lamp %d: bytes err by %g", k, apart);
+    }
+    scene_free(&s);
+}
+
 TEST_MAIN("trace_light")

@@ -172,4 +172,32 @@ TEST(progress_of_a_hierarchy_rises) {
     scene_free(&s);
 }
 
+static double sheet(const double p[3], const double *q) { return -fabs(p[0] - q[0]); }
+
+/* A sheet, red light on one side and green of the same luminance on the other; and transfer, whose first coefficient is the same on both.
+   Neither is smooth: a hierarchy tells the sides as a regular lattice does. */
+TEST(hierarchies_tell_colours_and_directions) {
+    const double q[1] = {15.25};
+    const float point[2][3] = {{14.65f, 16, 16}, {15.85f, 16, 16}};
+    isogi_light sun[2] = {{.vector = {1}, .rgb = {1 / 0.2126f}}, {.vector = {-1}, .rgb = {0, 1 / 0.7152f}}};
+    scene s = scene_make(33, 33, 33, NULL, sheet, q);
+    for (int mode = 0; mode < 2; mode++) {
+        isogi_trace_desc d = desc_make(&s, 0, 0, 32);
+        float e[2][2][3];
+        d.mode = (isogi_trace_mode)mode, d.method = ISOGI_TRACE_FEEDBACK, d.order = 3;
+        d.lighting.env.sh = NULL, d.lighting.env.sh_order = 0, d.lighting.lights = sun, d.lighting.light_count = mode ? 1 : 2;
+        for (int k = 0; k < 2; k++) {
+            isogi_trace *t = NULL;
+            d.hierarchy = k ? 0.2f : 0;
+            CHECK(isogi_trace_create(&t, &d, NULL) == ISOGI_OK && isogi_trace_step(t, 0, NULL) == ISOGI_OK, "mode %d", mode);
+            isogi_trace_sample(t, point, 2, e[k], NULL), isogi_trace_free(t);
+        }
+        for (int i = 0; i < 2; i++)
+            for (int c = 0; c < 3; c++)
+                CHECK(fabs((double)e[0][i][c] - (double)e[1][i][c]) < 0.1, "mode %d, side %d, channel %d: %g regular, %g in levels", mode, i,
+                      c, (double)e[0][i][c], (double)e[1][i][c]);
+    }
+    scene_free(&s);
+}
+
 TEST_MAIN("trace_quality")

@@ -471,6 +471,23 @@ TEST(feedback_at_work_takes_a_block) {
     scene_free(&s);
 }
 
+/* A block of one part of a volume is none of another part, though its voxels are the same. */
+TEST(blocks_of_other_chunks_are_refused) {
+    double q[4] = {4, 4, 4, 3};
+    scene s = scene_make(9, 9, 9, NULL, ball, q);
+    isogi_trace_desc d = store_desc(&s, ISOGI_TRACE_IRRADIANCE, 0, 1), other = d;
+    isogi_volume volume = s.volume;
+    isogi_pyramid *pyramid = NULL;
+    isogi_trace *a = baked(&d), *b = NULL;
+    size_t size;
+    uint8_t *block = save_now(a, &size);
+    volume.first[0] = 100;
+    CHECK(isogi_vol_build(&pyramid, &volume, NULL) == ISOGI_OK, "%d", 1);
+    other.pyramid = pyramid;
+    CHECK(isogi_trace_create(&b, &other, NULL) == ISOGI_OK && isogi_trace_load(b, block, size) == ISOGI_INVALID, "%d", 2);
+    isogi_trace_free(a), isogi_trace_free(b), isogi_vol_free(pyramid), free(block), scene_free(&s);
+}
+
 /* Boxes baked apart, one of them reaching past a brick, and loaded in any order: the same bytes as the whole, at once. */
 TEST(boxes_merge_to_the_same_bits) {
     double q[2] = {0.5, 4};
