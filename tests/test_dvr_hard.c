@@ -1,5 +1,6 @@
 /* Scenes made to be hard: grids that are fine along one axis only, matter whose normals alternate, transfer functions with narrow peaks,
    numbers at the ends of their ranges. */
+#define ISOGI_IMPLEMENTATION
 #include "isogi_dvr.h"
 #include "dvr_fields.h"
 #include "test.h"
