@@ -160,7 +160,7 @@
    resolutions those that are held, a third of them to nearly all), with light 4 more during a picture; sweeps as many again (then only
    until they are done), two floats for each node of their lattice, and during a step, for each of up to 16 directions, a float for each
    grid point and about 6 m (m + 24) of scratch for m nodes on the longest axis. Empty blocks take one byte for each block of the pyramid; a
-   picture in work 20 bytes a pixel, and 32 kB to 512 kB of classes of values in physical space; exact rays, and those with a
+   picture in work 20 bytes a pixel, and 48 kB to 768 kB of classes of values in physical space; exact rays, and those with a
    bound, 150 bytes a point of the transfer function, pre-integrated ones 16 table^2 and 8 a point more. All of it comes from the context's
    allocator; where that fails the call says so and changes nothing.
    isogi_dvr_set_transfer and isogi_dvr_step are writers: one at a time, and not during another call with the same renderer. All
@@ -177,10 +177,10 @@
 
    Values that are not finite: a cell with such a corner is transparent. An axis of one voxel makes a box without volume, which is
    transparent (rays within its plane do sample it). Up to ISOGI_DVR_MAX_PEAKS peaks (in data space, exact or pre-integrated, any
-   number), 2^16 directions, and 2^24 samples on the longest ray. Pre-integrated pictures of physical space know up to 16384 classes of
-   values between the first and the last point of the transfer function: what is narrower than four of them is blurred to their
-   width. Errors: ISOGI_INVALID for anything outside of its documented range,
-   ISOGI_TOO_LARGE where sizes overflow or pass these limits, ISOGI_NO_MEMORY, ISOGI_CANCELLED.
+   number), 2^16 directions, and 2^24 samples on the longest ray. Pre-integrated pictures of physical space tell up to 16384 classes of
+   values apart, of those that occur and on which the transfer function depends: a piece of it that is narrower than four of them keeps
+   its opacity, blurred over a class. Errors: ISOGI_INVALID for anything outside of its documented range, ISOGI_TOO_LARGE where sizes
+   overflow or pass these limits, ISOGI_NO_MEMORY, ISOGI_CANCELLED.
 
    How to choose. `step` 0.5 is right for smooth transfer functions, 0.25 for steep ones; each halving costs twice the time and
    leaves a quarter of the error. `order` 2 is ambient light with a direction, 3 soft shadows, 4 and more for a directional light.
