@@ -2702,16 +2702,31 @@ static double isogi_vol__field_at(const isogi_pyramid *p, const double grid[3], 
     return p->field.value(p->field.user, world, gradient);
 }
 
+/* Value and gradient (per grid unit) of the trilinear filter, by corners relative to the first as in isogi_vol__cubic_sum. */
+static double isogi_vol__linear_sum(const isogi_pyramid *p, const int cell[3], const double local[3], double gradient[3]) {
+    const double scale = 4 * p->volume.scale;
+    isogi_volume quarter = p->volume;
+    double corner[8] = {0}, base, value;
+    int i;
+    quarter.scale = 0.25, quarter.bias = 0;
+    isogi_vol__read_corners(&quarter, cell, corner);
+    base = corner[0];
+    for (i = 0; i < 8; i++) corner[i] -= base;
+    value = isogi_vol__trilinear(corner, local, gradient);
+    for (i = 0; i < 3; i++) gradient[i] *= scale;
+    return scale * (base + value) + p->volume.bias;
+}
+
 /* One point by the plain code. */
 static void isogi_vol__sample_one(const isogi_pyramid *p, isogi_filter filter, const double grid[3], float *value, float *gradient) {
-    double local[3], slope[3], corner[8], result;
+    double local[3], slope[3], result;
     int cell[3], a;
     for (a = 0; a < 3; a++) cell[a] = isogi_vol__cell(grid[a], p->volume.size[a], &local[a]);
     if (p->field.value) {
         for (a = 0; a < 3; a++) local[a] += cell[a];
         result = isogi_vol__field_at(p, local, slope);
     } else if (filter != ISOGI_FILTER_LINEAR) result = isogi_vol__cubic_sum(p, filter, cell, local, slope);
-    else isogi_vol__corners(p, cell, 0, corner), result = isogi_vol__trilinear(corner, local, slope);
+    else result = isogi_vol__linear_sum(p, cell, local, slope);
     if (value) *value = (float)result;
     if (!gradient) return;
     if (!p->field.value) isogi_vol__gradient_to_world(p, slope, slope);
