@@ -56,13 +56,16 @@
 
      Place and isovalue     texel (i,j,k) lies at lattice_min + (lattice_max - lattice_min) * i / (lattice - 1), in grid coordinates;
                             its isovalue v is the trilinear value there: it lies on its own isosurface.
-     Normal                 of the smoothed (B-spline) or the trilinear field there, desc.normals, towards lower values.
+     Normal                 of the smoothed (B-spline) or the trilinear field there, desc.normals, towards lower values. In a plane of
+                            the voxels' lattice, the mean of the trilinear ones of all cells that touch the place; this, or that of
+                            one of the cells, also where the smoothed gradient vanishes (sheets and rods one voxel thick, whose
+                            texels then have the light of one side).
      Start of rays          desc.offset voxels along the normal; where the trilinear field is still inside there, twice and four times
                             as far, up to one voxel; where that fails, on the surface itself, directions mirrored as at hits. A ray that
                             goes into matter all the same counts as reflected where it starts.
      Validity               A texel is left out of every lookup where no surface passes at its place: none of the voxels of the cells
                             around it is lower than v (constant air, local minima: there f >= v all around, such a texel would see the
-                            sky through everything), where a voxel is not finite, or where the gradient vanishes. With desc.capped the
+                            sky through everything), where a voxel is not finite, or where all of these gradients vanish. With desc.capped the
                             border's texels, which face out of the box, are always valid on the low side. On the high side a texel
                             needs matter to look through: one of the places a quarter, half and a whole voxel into the matter must
                             be inside (local maxima have none).
@@ -583,6 +586,65 @@ static double isogi_trace__kernel(const float s[3], const float g[3], const floa
     return (cosine > 0 ? cosine : 0) + (mirrored > 0 ? mirrored : 0);
 }
 
+/* Whether all voxels are finite that the smoothed gradient reads. */
+static int isogi_trace__smooth_exists(const isogi_volume *v, const isogi_hit *place) {
+    double corner[8];
+    uint32_t cell[3];
+    int i, a, inside;
+    for (i = 0; i < 27; i++) {
+        for (inside = 1, a = 0; a < 3; a++) {
+            const int apart = (a == 0 ? i : a == 1 ? i / 3 : i / 9) % 3 - 1;
+            cell[a] = place->cell[a] + (uint32_t)apart; /* wraps */
+            inside &= apart < 0 ? place->cell[a] > 0 : !apart || (size_t)place->cell[a] + 2 < v->size[a];
+        }
+        if (inside && !isogi_volume_corners(v, cell, corner)) return 0;
+    }
+    return 1;
+}
+
+/* A normal where there is no single one: in a plane of the voxels' lattice the trilinear gradient is another on either side, and one of
+   them is zero where a mask begins. The mean over the cells that touch the place; where these cancel (a sheet or rod one voxel thick), the
+   smoothed one, or that of the first cell that has one. */
+static void isogi_trace__normal_beside(const isogi_pyramid *pyramid, const isogi_hit *place, float normal[3]) {
+    const isogi_volume *v = isogi_vol_volume(pyramid);
+    isogi_hit cells[8];
+    float of[8][3];
+    double sum[3] = {0, 0, 0}, length;
+    int count = 0, i, a;
+    for (i = 0; i < 8; i++) {
+        isogi_hit *c = &cells[count];
+        int exists = 1;
+        for (*c = *place, a = 0; a < 3; a++) {
+            if (!(i >> a & 1)) continue;
+            if (c->local[a] <= 0 && c->cell[a] > 0) c->cell[a]--, c->local[a] = 1;
+            else if (c->local[a] >= 1 && (size_t)c->cell[a] + 2 < v->size[a]) c->cell[a]++, c->local[a] = 0;
+            else exists = 0;
+        }
+        count += exists;
+    }
+    isogi_vol_normals(pyramid, cells, (size_t)count, ISOGI_NORMAL_TRILINEAR, of);
+    for (i = 0; i < count; i++)
+        for (a = 0; a < 3; a++) sum[a] += (double)of[i][a];
+    length = sqrt(isogi_trace__dot_wide(sum, sum));
+    for (a = 0; a < 3; a++) normal[a] = length > 1e-3 ? (float)(sum[a] / length) : 0;
+    if (!(length > 1e-3)) isogi_vol_normals(pyramid, place, 1, ISOGI_NORMAL_SMOOTH, (float(*)[3])normal);
+    for (i = 0; i < count && !(isogi_trace__dot(normal, normal) > 0); i++) memcpy(normal, of[i], sizeof of[i]);
+}
+
+/* Normals of the wanted kind, or what comes closest to them. */
+static void isogi_trace__place_normals(const isogi_pyramid *pyramid, isogi_normal_kind kind, const isogi_hit *places, size_t count,
+                                       float (*normals)[3]) {
+    size_t i;
+    int a, plane;
+    isogi_vol_normals(pyramid, places, count, kind, normals);
+    for (i = 0; i < count; i++) {
+        for (plane = a = 0; a < 3; a++) plane |= places[i].local[a] <= 0 || places[i].local[a] >= 1;
+        if (kind == ISOGI_NORMAL_TRILINEAR ? !plane : isogi_trace__dot(normals[i], normals[i]) > 0) continue;
+        if (kind == ISOGI_NORMAL_SMOOTH && !isogi_trace__smooth_exists(isogi_vol_volume(pyramid), &places[i])) continue;
+        isogi_trace__normal_beside(pyramid, &places[i], normals[i]);
+    }
+}
+
 /* Geometric and shading normals at hits, on the side that the path came from (+1: the low side). */
 static void isogi_trace__normals(const isogi_pyramid *pyramid, isogi_normal_kind kind, const isogi_hit *hits,
                                  const signed char *from, size_t count, float (*s)[3], float (*g)[3]) {
@@ -594,6 +656,7 @@ static void isogi_trace__normals(const isogi_pyramid *pyramid, isogi_normal_kind
         if (!(isogi_trace__dot(g[i], g[i]) > 0)) {
             /* no gradient: any plane serves, the smoothed one if there is one */
             if (kind == ISOGI_NORMAL_SMOOTH) memcpy(g[i], s[i], sizeof g[i]);
+            if (!(isogi_trace__dot(g[i], g[i]) > 0)) isogi_trace__normal_beside(pyramid, &hits[i], g[i]);
             if (!(isogi_trace__dot(g[i], g[i]) > 0)) g[i][0] = 0, g[i][1] = 1, g[i][2] = 0;
         }
         if (kind != ISOGI_NORMAL_SMOOTH || !(isogi_trace__dot(s[i], g[i]) > 0)) memcpy(s[i], g[i], sizeof s[i]);
@@ -1919,7 +1982,7 @@ static void isogi_trace__texel_sites(const isogi_trace *t, const size_t (*texels
         valid[i] = (uint8_t)isogi_trace__texel_place(t, texels[i], &sites[i]);
         if (valid[i]) place[n++] = sites[i].place;
     }
-    if (n) isogi_vol_normals(t->scene.pyramid, place, n, t->scene.desc.normals, normal);
+    if (n) isogi_trace__place_normals(t->scene.pyramid, t->scene.desc.normals, place, n, normal);
     for (i = n = 0; i < count; i++)
         if (valid[i]) {
             valid[i] = (uint8_t)isogi_trace__site_normal(&t->scene, normal[n++], &sites[i]);
@@ -5158,7 +5221,7 @@ static void isogi_trace__gather_task(void *arg, size_t task) {
             for (a = 0; a < 3; a++) site.normal[a] = (float)((double)job->normals[i][a] / length);
         } else {
             float gradient[1][3];
-            isogi_vol_normals(job->scene.pyramid, &site.place, 1, job->scene.desc.normals, gradient);
+            isogi_trace__place_normals(job->scene.pyramid, job->scene.desc.normals, &site.place, 1, gradient);
             if (!isogi_trace__site_normal(&job->scene, gradient[0], &site)) continue;
         }
         site.key = isogi_trace__key(isogi_trace__key(job->scene.desc.seed, 1), (uint64_t)i);
