@@ -626,7 +626,8 @@ static void isogi_trace__normal_beside(const isogi_pyramid *pyramid, const isogi
     for (i = 0; i < count; i++)
         for (a = 0; a < 3; a++) sum[a] += (double)of[i][a];
     length = sqrt(isogi_trace__dot_wide(sum, sum));
-    for (a = 0; a < 3; a++) normal[a] = length > 1e-3 ? (float)(sum[a] / length) : 0;
+    for (a = 0; a < 3; a++) /* what rounding leaves of components that cancel would leave the plane */
+        normal[a] = length > 1e-3 && fabs(sum[a]) > 1e-6 * length ? (float)(sum[a] / length) : 0;
     if (!(length > 1e-3)) isogi_vol_normals(pyramid, place, 1, ISOGI_NORMAL_SMOOTH, (float(*)[3])normal);
     for (i = 0; i < count && !(isogi_trace__dot(normal, normal) > 0); i++) memcpy(normal, of[i], sizeof of[i]);
 }

@@ -194,10 +194,74 @@ TEST(hierarchies_tell_colours_and_directions) {
         }
         for (int i = 0; i < 2; i++)
             for (int c = 0; c < 3; c++)
-                CHECK(fabs((double)e[0][i][c] - (double)e[1][i][c]) < 0.1, "mode %d, side %d, channel %d: %g regular, %g in levels", mode, i,
-                      c, (double)e[0][i][c], (double)e[1][i][c]);
+                CHECK(fabs((double)e[0][i][c] - (double)e[1][i][c]) < 0.1, "mode %d, side %d, channel %d: %g regular, %g in levels",
+                      mode, i, c, (double)e[0][i][c], (double)e[1][i][c]);
     }
     scene_free(&s);
+}
+
+/* a box with a ball on it; q[0]: the volume's last voxel, for its mirror image, else 0; q[1]: +1 or -1 */
+static double mask(const double p[3], const double *q) {
+    double x = q[0] > 0 ? q[0] - p[0] : p[0], y = q[0] > 0 ? q[0] - p[1] : p[1], z = q[0] > 0 ? q[0] - p[2] : p[2];
+    int inside = (x >= 6 && x <= 13 && y >= 5 && y <= 10 && z >= 7 && z <= 14) || length3(x - 9, y - 12, z - 10) < 4.2;
+    return inside ? q[1] : -q[1];
+}
+
+/* The light of a mirrored mask is the mirrored light, on the low side and on the high one (of the mask's negative, whose matter reaches
+   the open border), for both kinds of normals: nothing depends on which side of a voxel's cell a texel lies. */
+TEST(mirrored_masks_have_mirrored_light) {
+    for (int k = 0; k < 4; k++) {
+        double q[2][2] = {{0, k / 2 ? -1 : 1}, {19, k / 2 ? -1 : 1}}, apart = 0, noise = 0, mean = 0, worst = 0;
+        float points[2][200][3], e[2][200][3], error[2][200];
+        int n = 0, dark = 0;
+        for (int m = 0; m < 2; m++) {
+            scene s = scene_make(20, 20, 20, NULL, mask, q[m]);
+            isogi_trace_desc d = desc_make(&s, 0.5f, 1, 128);
+            isogi_trace *t = NULL;
+            d.normals = (isogi_normal_kind)(k & 1), d.sides = k / 2 ? ISOGI_TRACE_HIGH_SIDE : ISOGI_TRACE_LOW_SIDE;
+            if (!m) n = surface_points(&s, 0, 200, 5, points[0]);
+            for (int i = 0; i < n; i++)
+                for (int a = 0; a < 3 && m; a++) points[1][i][a] = 19 - points[0][i][a];
+            CHECK(isogi_trace_create(&t, &d, NULL) == ISOGI_OK && isogi_trace_step(t, 0, NULL) == ISOGI_OK, "case %d", k);
+            isogi_trace_sample(t, (const float(*)[3])points[m], (size_t)n, e[m], error[m]);
+            isogi_trace_free(t), scene_free(&s);
+        }
+        for (int i = 0; i < n; i++) {
+            double difference = (double)e[1][i][1] - (double)e[0][i][1], stated = hypot((double)error[0][i], (double)error[1][i]);
+            dark += !(error[0][i] < 100 && error[1][i] < 100);
+            apart += difference * difference / n, noise += stated * stated / n, mean += (double)e[0][i][1] / n;
+            worst = fmax(worst, fabs(difference));
+        }
+        printf("    normals %d, side %d: mean %.3f, apart by %.4f (rms, noise %.4f), %.4f at most\n", k & 1, k / 2, mean, sqrt(apart),
+               sqrt(noise), worst);
+        CHECK(n == 200 && !dark, "case %d: %d points, %d without light", k, n, dark);
+        CHECK(apart < 1.5 * noise && worst < 0.3, "case %d: %g apart, noise %g, worst %g", k, sqrt(apart), sqrt(noise), worst);
+    }
+}
+
+static double thin(const double p[3], const double *q) {
+    double in = p[0] > 3 && p[0] < 28 && p[1] > 3 && p[1] < 28 && p[2] > 3 && p[2] < 28, sum = p[0] + p[1];
+    int flat = p[0] >= 16 && p[0] <= 16, line = flat && p[1] >= 16 && p[1] <= 16;
+    return in > 0 && (q[0] < 1 ? flat : q[0] < 2 ? sum >= 31 && sum <= 31 : line) ? 1 : -1;
+}
+
+/* Sheets and rods one voxel thick, straight and slanted: the smoothed gradient vanishes in all of their voxels, and the trilinear ones of
+   both sides cancel. Every point that is seen from outside has light: pi, since nothing hides the sky. */
+TEST(sheets_and_rods_of_one_voxel_have_light) {
+    for (int k = 0; k < 6; k++) {
+        const double q[1] = {k / 2};
+        scene s = scene_make(32, 32, 32, NULL, thin, q);
+        isogi_trace_desc d = desc_make(&s, 0, 0, 32);
+        isogi_trace *t = NULL;
+        float points[100][3], e[100][3], error[100], worst = 0;
+        int n = surface_points(&s, 0, 100, 3, points), dark = 0;
+        d.normals = (isogi_normal_kind)(k & 1);
+        CHECK(isogi_trace_create(&t, &d, NULL) == ISOGI_OK && isogi_trace_step(t, 0, NULL) == ISOGI_OK, "case %d", k);
+        isogi_trace_sample(t, (const float(*)[3])points, (size_t)n, e, error);
+        for (int i = 0; i < n; i++) dark += !(error[i] < 100), worst = fmaxf(worst, fabsf(e[i][1] - (float)PI));
+        CHECK(n > 20 && !dark && worst < 0.4f, "case %d: %d of %d without light, %g off pi", k, dark, n, (double)worst);
+        isogi_trace_free(t), scene_free(&s);
+    }
 }
 
 TEST_MAIN("trace_quality")
