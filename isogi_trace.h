@@ -3498,7 +3498,7 @@ static int isogi_trace__span_site(isogi_trace__cast *c, uint32_t k) {
                                      (uint64_t)x[0] + (uint64_t)l[0] * ((uint64_t)x[1] + (uint64_t)l[1] * (uint64_t)x[2]));
         c->sequence[k] = isogi_trace__key(isogi_trace__key(seed, 3), (uint64_t)isogi_trace__brick_of(t, x, &n->slot));
     } else {
-        float geometric[1][3];
+        float geometric[1][3] = {{0, 0, 0}};
         site->place = n->place, site->isovalue = n->isovalue;
         memcpy(site->normal, n->normal, sizeof site->normal); /* of a cap */
         if (n->place.side == 1 || n->place.side == -1)
