@@ -184,7 +184,7 @@ TEST(hierarchies_tell_colours_and_directions) {
     for (int mode = 0; mode < 2; mode++) {
         isogi_trace_desc d = desc_make(&s, 0, 0, 32);
         float e[2][2][3];
-        d.mode = (isogi_trace_mode)mode, d.method = ISOGI_TRACE_FEEDBACK, d.order = 3;
+        d.mode = (isogi_trace_mode)mode, d.method = ISOGI_TRACE_FEEDBACK, d.order = 3, d.isovalue_min = -1, d.isovalue_max = -0.4;
         d.lighting.env.sh = NULL, d.lighting.env.sh_order = 0, d.lighting.lights = sun, d.lighting.light_count = mode ? 1 : 2;
         for (int k = 0; k < 2; k++) {
             isogi_trace *t = NULL;
@@ -216,7 +216,7 @@ TEST(mirrored_masks_have_mirrored_light) {
         int n = 0, dark = 0;
         for (int m = 0; m < 2; m++) {
             scene s = scene_make(20, 20, 20, NULL, mask, q[m]);
-            isogi_trace_desc d = desc_make(&s, 0.5f, 1, 128);
+            isogi_trace_desc d = desc_make(&s, 0.5f, 1, 48);
             isogi_trace *t = NULL;
             d.normals = (isogi_normal_kind)(k & 1), d.sides = k / 2 ? ISOGI_TRACE_HIGH_SIDE : ISOGI_TRACE_LOW_SIDE;
             if (!m) n = surface_points(&s, 0, 200, 5, points[0]);
@@ -235,7 +235,7 @@ TEST(mirrored_masks_have_mirrored_light) {
         printf("    normals %d, side %d: mean %.3f, apart by %.4f (rms, noise %.4f), %.4f at most\n", k & 1, k / 2, mean, sqrt(apart),
                sqrt(noise), worst);
         CHECK(n == 200 && !dark, "case %d: %d points, %d without light", k, n, dark);
-        CHECK(apart < 1.5 * noise && worst < 0.3, "case %d: %g apart, noise %g, worst %g", k, sqrt(apart), sqrt(noise), worst);
+        CHECK(apart < 1.5 * noise && worst < 0.7, "case %d: %g apart, noise %g, worst %g", k, sqrt(apart), sqrt(noise), worst);
     }
 }
 
