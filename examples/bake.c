@@ -107,6 +107,8 @@ static int check_files(program *p) {
     if (file_same(p->raw, s->out)) return file_fail(s->error, "--raw: %.200s is the file of --out", p->raw);
     if (file_same(s->out, s->volume_name)) return file_fail(s->error, "--out: %.200s is the file of VOLUME", s->out);
     if (file_same(p->raw, s->volume_name)) return file_fail(s->error, "--raw: %.200s is the file of VOLUME", p->raw);
+    if (file_same(s->out, s->env_name)) return file_fail(s->error, "--out: %.200s is the file of --env", s->out);
+    if (file_same(p->raw, s->env_name)) return file_fail(s->error, "--raw: %.200s is the file of --env", p->raw);
     for (int i = 0; i < p->merge_count; i++)
         if (file_same(p->raw, p->merge[i])) return file_fail(s->error, "--raw: %.200s is the file of --merge", p->raw);
     return 1;

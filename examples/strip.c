@@ -10,6 +10,7 @@ int main(int argc, char **argv) {
     if (count < 1 || count > MOST) return fprintf(stderr, "usage: %s OUT.png A.png B.png ..., at most %d\n", argv[0], MOST), 2;
     for (int i = 0; i < count; i++) {
         const char *path = argv[i + 2];
+        if (file_same(argv[1], path)) return fprintf(stderr, "strip: %s is both a picture and the strip\n", path), 1;
         if (!file_read(path, (size_t)1 << 28, &file, &size, error)) return fprintf(stderr, "strip: %s\n", error), 1;
         if (!png_decode(file, size, &pixels[i], shape[i], why)) return fprintf(stderr, "strip: %s: %s\n", path, why), 1;
         if (shape[i][2] != 3 || shape[i][1] != shape[0][1])

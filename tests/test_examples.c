@@ -129,7 +129,7 @@ TEST(strips_hold_their_pictures) {
     free(got), free(file);
     check_kept("build/strip", "'%s'", 2, "usage");
     check_kept("build/strip", "'%s' /nowhere.png", 1, "/nowhere.png: No such file");
-    check_kept("build/strip", "'%1$s' '%1$s'", 1, "is not a PNG file");
+    check_kept("build/strip", "'%s' tests/test.h", 1, "tests/test.h: is not a PNG file");
     check_kept("build/strip", "'%s' examples/gyroid.png examples/figure-6.png", 1, "of another height");
 }
 
@@ -152,11 +152,29 @@ TEST(bad_bakes_get_one_line) {
         {"procedural:gyroid:8 --samples 1 --out /nowhere/a.bake", "/nowhere/a.bake: cannot be written"},
         {"procedural:gyroid:8 --nonsense --out '%s'", "no such option"},
         {"procedural:gyroid:8 --box 0,0,0,8,9,8 --out '%s'", "--box: reaches beyond the lattice along y"},
-        {"'%1$s' --raw '%1$s' --out a.bake", "is the file of VOLUME"},
-        {"'%1$s' --merge a.bake --out '%1$s'", "--out: "},
+        {"'%1$s' --raw '%1$s' --out '%1$s.a'", "is the file of VOLUME"},
+        {"'%1$s' --merge '%1$s.a' --out '%1$s'", "--out: "},
         {"procedural:gyroid:8 --raw '%1$s' --out '%1$s'", "is the file of --out"},
-        {"procedural:gyroid:8 --merge '%1$s' --raw '%1$s' --out a.bake", "is the file of --merge"}};
+        {"procedural:gyroid:8 --raw ./neither.a --out neither.a", "is the file of --out"},
+        {"procedural:gyroid:8 --merge '%1$s' --raw '%1$s' --out '%1$s.a'", "is the file of --merge"}};
     for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) check_kept("build/bake", bad[i][0], 1, bad[i][1]);
+}
+
+/* A file is known by what it is, not by how it is called. */
+TEST(what_is_read_is_not_overwritten) {
+    static const unsigned char pixel[3] = {1, 2, 3};
+    static const char sky[] = "#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 1 +X 2\n\x80\x40\x20\x81\x80\x40\x20\x81";
+    char picture[256], environment[256], arguments[1024], error[FILE_ERROR_SIZE];
+    strcpy(picture, temporary("one.png")), strcpy(environment, temporary("env.hdr"));
+    CHECK(png_write(picture, pixel, 1, 1, 3, error), "%s", error);
+    snprintf(arguments, sizeof arguments, "'%s/./one.png' '%s' '%s'", folder, picture, picture);
+    check_refusal("build/strip", arguments, 1, "is both a picture and the strip");
+    write_bytes(environment, sky, sizeof sky - 1);
+    for (int out = 0; out < 2; out++) {
+        snprintf(arguments, sizeof arguments, "procedural:gyroid:8 --samples 1 --env '%s' --%s '%s' --%s '%s'", environment,
+                 out ? "out" : "raw", environment, out ? "raw" : "out", temporary("other"));
+        check_refusal("build/bake", arguments, 1, "is the file of --env");
+    }
 }
 
 TEST_MAIN("examples")

@@ -17,7 +17,7 @@
 #define BAKE_LIGHTS 16
 
 typedef struct bake_scene {
-    const char *volume_name, *out;
+    const char *volume_name, *env_name, *out;
     isogi_volume volume;
     isogi_pyramid *pyramid;
     isogi_context context;
@@ -82,7 +82,7 @@ static inline int bake_scene_option(bake_scene *s, int argc, char **argv, int *i
         d->isovalue_min = x[0] < 0 || x[1] > 0 ? x[0] : -DBL_MIN, d->isovalue_max = x[1];
         break;
     case 3: ok = numbers(text, ',', 3, 1e-9, 1e9, s->spacing); break;
-    case 4: ok = hdr_read(text, &s->env, s->error); if (!ok) return -1; break;
+    case 4: s->env_name = text, ok = hdr_read(text, &s->env, s->error); if (!ok) return -1; break;
     case 5: ok = d->lighting.light_count < BAKE_LIGHTS && light_parse(text, &s->lights[d->lighting.light_count]),
         d->lighting.light_count += (size_t)ok; break;
     case 6: ok = numbers(text, ',', 3, 0, 1, x); for (k = 0; ok && k < 3; k++) d->albedo[k] = (float)x[k]; break;

@@ -127,11 +127,27 @@ static inline int file_temporary(const char *target, char name[PATH_MAX], const 
     return file;
 }
 
+/* The folder of a file that need not be there; returns the file's name within it. */
+static inline const char *file_folder(const char *path, struct stat *folder, int *found) {
+    const char *slash = strrchr(path, '/');
+    char name[PATH_MAX] = ".";
+    size_t length = slash ? (size_t)(slash - path) + 1 : 0;
+    if (length && length < sizeof name) memcpy(name, path, length), name[length] = 0;
+    *found = length < sizeof name && stat(name, folder) == 0;
+    return path + length;
+}
+
 /* Two names of one file, be it there yet or not. Devices may be named twice. */
 static inline int file_same(const char *a, const char *b) {
     struct stat x, y;
+    int a_there, b_there;
     if (!a || !b) return 0;
-    if (stat(a, &x) != 0 || stat(b, &y) != 0) return !strcmp(a, b);
+    a_there = stat(a, &x) == 0, b_there = stat(b, &y) == 0;
+    if (a_there != b_there) return 0;
+    if (!a_there) {
+        const char *name_a = file_folder(a, &x, &a_there), *name_b = file_folder(b, &y, &b_there);
+        return !strcmp(a, b) || (a_there && b_there && !strcmp(name_a, name_b) && x.st_dev == y.st_dev && x.st_ino == y.st_ino);
+    }
     return S_ISREG(x.st_mode) && x.st_dev == y.st_dev && x.st_ino == y.st_ino;
 }
 
