@@ -308,7 +308,7 @@ typedef struct isogi_dvr_desc {
                                before them, changes by more are sampled seven times as densely; 0 = 0.5. A criterion; a bound is: */
     double bound;           /* physical space, 1e-4..1; 0 = none: how far colours may err, in units of the largest of the transfer function's, or of 1.
                                See "Error bounds" above: rays walk cells as they do in data space, and step, tolerance, classification
-                               and jitter mean nothing to pictures */
+                               and jitter mean nothing to pictures; rays of visibility have their distance from step all the same */
     double emission;        /* share of rgb that glows by itself, besides scattering light; 0..1e6; with visibility only */
     double radius;          /* the paper's method: of local visibility, in units of the smallest voxel spacing, 1..32; 0 = 16 */
     double reduction;       /* the paper's method: voxels of the volume to points of its blocks, at least 1; 0 = 4. A block that is not

@@ -90,7 +90,7 @@ typedef struct options {
         directions;
     int lookup, shadows, ambient, normals, storage, method, coarsest, local, preset;
     int has_size, has_iso, has_mode, has_spacing, has_albedo, has_preset, has_camera, has_up, has_nan, has_shading, has_shadows,
-        has_ambient, has_gloss, has_step, has_transmission;
+        has_ambient, has_gloss, has_step, has_transmission, has_method, has_coarsest, has_silhouette, has_classification;
     double step, bound, fog, gloss, offset, reach, isovalue, spacing[3], clip[ISOGI_DVR_MAX_PLANES][4], azimuth, elevation, distance, up[3],
         exposure, nan_value;
     float albedo[3];
@@ -207,8 +207,8 @@ static const option option_list[] = {
     {"--out", "FILE.png", ANY, "the picture; default isogi.png", TEXT, .offset = AT(out)},
     {"--size", "WxH", ANY, "pixels; default 900x900, 512x512 for dvr and scale-invariant",
      PARSED(parse_size, "WxH, each 1 to 16384"), .has = AT(has_size)},
-    {"--iso", "V", ANY, "isovalue; default the shape's own, or a threshold found in the histogram; for scale-invariant, of the peak that "
-     "is suggested", NUMBERS, AT(isovalue), AT(has_iso), 1, -1e300, 1e300, .allowed = "a number"},
+    {"--iso", "V", ANY & ~(1 << DVR), "isovalue; default the shape's own, or a threshold found in the histogram; for scale-invariant, of the "
+     "peak that is suggested", NUMBERS, AT(isovalue), AT(has_iso), 1, -1e300, 1e300, .allowed = "a number"},
     {"--raycast", 0, SURFACES, "exact rays instead of the rasterized mesh", FLAG, .offset = AT(raycast)},
     {"--clip", "A,B,C,D", ANY, "keep only a x + b y + c z + d >= 0 (world); what is cut shows the data; may be repeated",
      PARSED(parse_clip, "four numbers from -1e9 to 1e9, the first three not all zero (at least 1e-9 in length), at most 32 times")},
@@ -231,18 +231,19 @@ static const option option_list[] = {
      .allowed = "three numbers, 0 to 1"},
     {"--bounces", "N", REFLECTED, "reflections of light; -1 = all, the default", INTEGER, AT(bounces), 0, 1, -1, 1000,
      .allowed = "a whole number, -1 to 1000"},
-    {"--samples", "N", GATHERED, "paths per texel, or per pixel for pathtrace; default 64", INTEGER, AT(samples), 0, 1, 1, 1000000,
+    {"--samples", "N", GATHERED, "paths per texel, or per pixel for pathtrace, there rounded up to a multiple of --aa; default "
+     "64", INTEGER, AT(samples), 0, 1, 1, 1000000,
      .allowed = "a whole number, 1 to 1000000"},
     {"--lattice", "X,Y,Z", BAKED, "texels of the illumination texture; default one per voxel", SIZES, AT(lattice), 0, 3, 2, 4096,
      .allowed = "three whole numbers, 2 to 4096"},
     {"--lookup", "NAME", BAKED, "how the texture is read: trilinear, nearest, closest-isovalue, bspline", NAMED(lookup_name, lookup)},
     {"--shadows", "on|off", SURFACES, "shadows of lights and sky; for lambert and phong, where off is the default, those of lights, per "
      "pixel", NAMED(switch_name, shadows), .has = AT(has_shadows)},
-    {"--ambient", "constant|normal", BY_NORMAL, "for lambert (default normal) and phong (default constant): the sky's light, the same for "
-     "all or by normal", NAMED(ambient_name, ambient), .has = AT(has_ambient)},
+    {"--ambient", "constant|normal", BY_NORMAL, "the sky's light, the same for all or by normal; default normal, constant for phong",
+     NAMED(ambient_name, ambient), .has = AT(has_ambient)},
     {"--fog", "X", SURFACES, "fade to the sky's mean light with distance: by exp(-X) from the front of the box's sphere to its back",
      NUMBERS, AT(fog), 0, 1, 0, 100, .allowed = "a number, 0 to 100"},
-    {"--gloss", "EXPONENT", 1 << TRANSFER, "for transfer: gloss as well, a Phong lobe that reflects a fifth; its highlights are as soft "
+    {"--gloss", "EXPONENT", 1 << TRANSFER, "gloss as well, a Phong lobe that reflects a fifth; its highlights are as soft "
      "as the order of the texture, which holds exponents up to about 25", NUMBERS, VALUE(gloss), 1, 0, 1000,
      .allowed = "a number, 0 to 1000"},
     {"--normals", "smooth|trilinear", GATHERED, "of the light that is gathered; default smooth", NAMED(normals_name, normals)},
@@ -255,42 +256,66 @@ static const option option_list[] = {
      TEXT, .offset = AT(compare)},
     {"--tf", "FILE", VOLUMES, "transfer function: lines \"value extinction r g b\" or \"peak value opacity r g b\"; default the scene's or "
      "shape's own, else one suggested by the histogram", TEXT, .offset = AT(tf)},
-    {"--shading", "NAME", VOLUMES, "for dvr and scale-invariant: unlit, visibility, local, two-sided", NAMED(shading_name, shading),
-     .has = AT(has_shading)},
+    {"--shading", "NAME", VOLUMES, "unlit, visibility, local, two-sided; default visibility, for scale-invariant local",
+     NAMED(shading_name, shading), .has = AT(has_shading)},
     {"--preset", "NAME", VOLUMES, "transfer function of these colours, denser the larger the value, where the histogram has something: "
      "grey, hot, cool-warm, spectrum", NAMED(preset_name, preset), .has = AT(has_preset)},
-    {"--method", "NAME", VOLUMES, "for dvr with visibility: how that is computed: default, brute, paper, sweep",
-     NAMED(method_name, method)},
-    {"--order", "N", VOLUMES, "for dvr with visibility, as the next two: spherical harmonics of shadows, 1 to 6: 2 the side light comes "
+    {"--method", "NAME", 1 << DVR, "how visibility is computed: default, brute, paper, sweep", NAMED(method_name, method),
+     .has = AT(has_method)},
+    {"--order", "N", VOLUMES, "with visibility, as the next two: spherical harmonics of shadows, 1 to 6: 2 the side light comes "
      "from, 3 soft shadows, more for directional lights; default 4 (a scene: its own; without sweeps, for peaks or by --method, 3)",
      INTEGER, AT(order), 0, 1, 1, 6, .allowed = "a whole number, 1 to 6"},
     {"--directions", "N", VOLUMES, "rays from each grid point of visibility, at least 2 order^2; default 256 (a scene: its own; without "
      "sweeps 64)", INTEGER, AT(directions), 0, 1, 1, 65536, .allowed = "a whole number, 1 to 65536"},
     {"--grid", "X,Y,Z", VOLUMES, "points of visibility: no shadow is finer; default half the voxels along each axis, at most 64 (a "
      "scene: its own; without sweeps a quarter)", SIZES, AT(grid), 0, 3, 1, 1024, .allowed = "three whole numbers, 1 to 1024"},
-    {"--coarsest", "N", VOLUMES, "for dvr by sweeps: points of visibility stand up to N times as far apart where nothing is seen of them, "
-     "which saves memory for a finer --grid: 1, 2, 4, 8; default 1", NAMED(coarsest_name, coarsest)},
-    {"--local", 0, VOLUMES, "light by local visibility, of --method paper: for clip planes and lights within", FLAG, .offset = AT(local)},
-    {"--depth", "FILE.pfm", VOLUMES, "as well, for dvr and scale-invariant: distance from the eye to half of a pixel's opacity, where "
+    {"--coarsest", "N", 1 << DVR, "by sweeps: points of visibility stand up to N times as far apart where nothing is seen of them, "
+     "which saves memory for a finer --grid: 1, 2, 4, 8; default 1", NAMED(coarsest_name, coarsest), .has = AT(has_coarsest)},
+    {"--local", 0, 1 << DVR, "light by local visibility, of --method paper: for clip planes and lights within", FLAG, .offset = AT(local)},
+    {"--depth", "FILE.pfm", VOLUMES, "as well: distance from the eye to half of a pixel's opacity, where "
      "nothing is seen infinity, as floats (the nearest of a pixel's samples)", TEXT, .offset = AT(depth)},
-    {"--classification", "NAME", VOLUMES, "for scale-invariant: exact, pre-integrated, post-classified; dvr knows the last one and, for "
-     "both others, its own", NAMED(classification_name, classification)},
+    {"--classification", "NAME", VOLUMES, "exact, pre-integrated, post-classified; dvr knows the last one and, for both others, its own",
+     NAMED(classification_name, classification), .has = AT(has_classification)},
     {"--silhouette", "NAME", VOLUMES, "surfaces seen aslant are more opaque, in dvr those of peaks: none, exact, approximate, gradient",
-     NAMED(silhouette_name, silhouette)},
+     NAMED(silhouette_name, silhouette), .has = AT(has_silhouette)},
     {"--transmission", "NAME", VOLUMES, "light that --shading two-sided lets through: none, diffuse, specular (both, the default)",
      NAMED(transmission_name, transmission), .has = AT(has_transmission)},
-    {"--step", "S", VOLUMES, "for dvr and for sampled rays (--classification): distance of samples in voxels; default 0.5", NUMBERS,
+    {"--step", "S", VOLUMES, "of sampled rays (all of dvr but those of --bound, and by --classification): distance of samples in voxels; "
+     "default 0.5", NUMBERS,
      VALUE(step), 1, 1e-3, 1e3, .allowed = "a number, 0.001 to 1000"},
-    {"--bound", "X", VOLUMES, "for dvr: exact opacity, and unlit colours that err by less than this, in place of samples; 0.0001 to 1", NUMBERS,
+    {"--bound", "X", 1 << DVR, "exact opacity, and unlit colours that err by less than this, in place of samples; 0.0001 to 1", NUMBERS,
      AT(bound), 0, 1, 1e-4, 1, .allowed = "a number, 0.0001 to 1"},
     {"--exposure", "X", ANY, "factor on the light, in place of the automatic exposure", NUMBERS, AT(exposure), 0, 1, 1e-12, 1e12,
      .allowed = "a number above 0"},
-    {"--aa", "N", ANY, "samples per pixel; default 4 (1 for dvr, where it is rounded down to a square)", INTEGER, AT(antialias), 0, 1, 1,
+    {"--aa", "N", ANY, "samples per pixel; default 4, for pathtrace at most --samples, for dvr 1; for dvr and scale-invariant rounded "
+     "down to a square", INTEGER, AT(antialias), 0, 1, 1,
      64, .allowed = "a whole number, 1 to 64"},
     {"--threads", "N", ANY, "0 = one per core, the default", INTEGER, AT(threads), 0, 1, 0, 256, .allowed = "a whole number, 0 to 256"},
     {"--stats", 0, ANY, "\"key value\" lines on the standard output", FLAG, .offset = AT(stats)}};
 #define OPTION_COUNT (sizeof option_list / sizeof option_list[0])
 typedef char a_bit_of_given_for_each[OPTION_COUNT <= 64 ? 1 : -1];
+
+/* The names joined: by spaces, or as in a sentence. */
+static void list_names(const char *const *names, int count, unsigned which, int sentence, char text[256]) {
+    const char *between = "";
+    for (int i = 0; i < count; i++) {
+        unsigned after = which >> 1 >> i & ((1u << (count - 1 - i)) - 1);
+        if (!(which >> i & 1)) continue;
+        strcat(strcat(text, between), names[i]);
+        between = !sentence ? " " : after & (after - 1) ? ", " : " and ";
+    }
+}
+
+/* The modes that an option is for, in words. */
+static void list_modes(unsigned use, char text[256]) {
+    *text = 0;
+    if (use == LIT) {
+        strcpy(text, "modes that have no light of their own");
+        return;
+    }
+    if ((use & SURFACES) == SURFACES) strcpy(text, "surfaces"), use &= ~(unsigned)SURFACES, strcat(text, use ? " and " : "");
+    if (use) strcat(text, "--mode "), list_names(mode_name, MODE_COUNT, use, 1, text + strlen(text));
+}
 
 static void print_help(void) {
     puts("build/viewer VOLUME [options]      volume in, globally lit picture out\n\n"
@@ -299,9 +324,11 @@ static void print_help(void) {
     for (size_t i = 0; i < PROCEDURAL_SHAPE_COUNT; i++) printf("  %-20s %s\n", procedural_shapes[i].name, procedural_shapes[i].summary);
     puts("\nOptions");
     for (size_t i = 0; i < OPTION_COUNT; i++) {
-        char left[64];
+        char left[64], modes[256];
         snprintf(left, sizeof left, "%s %s", option_list[i].name, option_list[i].argument ? option_list[i].argument : "");
-        printf("  %-28s %s\n", left, option_list[i].help);
+        list_modes(option_list[i].use, modes);
+        if (option_list[i].use == ANY) printf("  %-28s %s\n", left, option_list[i].help);
+        else printf("  %-28s %s (%s)\n", left, option_list[i].help, modes);
         if (option_list[i].parse == parse_scene) printf("  %-28s %s\n", "", option_list[i].allowed);
     }
     puts("  --help                       this text\n\n"
@@ -324,57 +351,43 @@ static void print_help(void) {
          "  build/viewer procedural:skull --light directional:1,2,3:4,3.8,3.5:3 --camera 20,10,2.4");
 }
 
-/* The names joined: by spaces, or as in a sentence. */
-static void list_names(const char *const *names, int count, unsigned which, int sentence, char text[256]) {
-    const char *between = "";
-    for (int i = 0; i < count; i++) {
-        unsigned after = which >> 1 >> i & ((1u << (count - 1 - i)) - 1);
-        if (!(which >> i & 1)) continue;
-        strcat(strcat(text, between), names[i]);
-        between = !sentence ? " " : after & (after - 1) ? ", " : " and ";
-    }
-}
-
 static int check_use(viewer *v) {
     int mode = v->o.mode;
+    char modes[256];
     for (size_t k = 0; k < OPTION_COUNT; k++) {
         const option *p = &option_list[k];
-        char modes[256] = "--mode ";
-        const char *with = modes;
         if (!(v->o.given >> k & 1) || p->use >> mode & 1) continue;
-        if (mode >= DVR && !(p->use & VOLUMES)) with = "surfaces";
-        else if (p->use == LIT) with = "modes that have no light of their own";
-        else list_names(mode_name, MODE_COUNT, p->use, 1, modes);
-        return file_fail(v->error, "%s: works with %s, not with --mode %s", p->name, with, mode_name[mode]);
+        list_modes(p->use, modes);
+        return file_fail(v->error, "%s: works with %s, not with --mode %s", p->name, modes, mode_name[mode]);
     }
     return 1;
 }
 
+static const char without_step[] = "--step: rays with --bound have none, but those of visibility by --method brute";
+static int is_shadowed(const options *o) { return o->has_shading ? o->shading == ISOGI_DVR_VISIBILITY : o->mode == DVR; }
+
 /* What volume rendering cannot do together: whatever would change nothing is refused. */
 static int check_volume(viewer *v) {
     const options *o = &v->o;
-    int shadowed = o->has_shading ? o->shading == ISOGI_DVR_VISIBILITY : o->mode == DVR, lit = o->mode == DVR && shadowed;
+    int shadowed = is_shadowed(o);
     if (o->mode < DVR) return 1;
     if (o->tf && o->has_preset) return file_fail(v->error, "give --tf or --preset, not both");
-    if (o->has_iso && (o->mode == DVR || o->tf || o->has_preset))
+    if (o->has_iso && (o->tf || o->has_preset))
         return file_fail(v->error, "--iso: is for surfaces and for the transfer function that --mode scale-invariant is suggested; a "
                                    "transfer function has its own values");
-    if (o->method > ISOGI_DVR_BRUTE && !lit)
-        return file_fail(v->error, "--method: %s is for --mode dvr with --shading visibility", method_name[o->method]);
-    if ((o->method || o->order || o->directions || o->grid[0]) && !shadowed)
-        return file_fail(v->error, "%s: needs --shading visibility", o->method ? "--method" : o->order ? "--order" : o->directions
+    if ((o->has_method || o->order || o->directions || o->grid[0]) && !shadowed)
+        return file_fail(v->error, "%s: needs --shading visibility", o->has_method ? "--method" : o->order ? "--order" : o->directions
             ? "--directions" : "--grid");
-    if (o->coarsest && (!lit || (o->method != ISOGI_DVR_METHOD_DEFAULT && o->method != ISOGI_DVR_SWEEP)))
-        return file_fail(v->error, "--coarsest: needs --mode dvr, --shading visibility and --method sweep, the default");
-    if (o->local && !(lit && o->method == ISOGI_DVR_PAPER))
-        return file_fail(v->error, "--local: needs --mode dvr, --shading visibility and --method paper");
+    if (o->has_coarsest && (!shadowed || (o->method != ISOGI_DVR_METHOD_DEFAULT && o->method != ISOGI_DVR_SWEEP)))
+        return file_fail(v->error, "--coarsest: needs --shading visibility and --method sweep, the default");
+    if (o->local && !(shadowed && o->method == ISOGI_DVR_PAPER))
+        return file_fail(v->error, "--local: needs --shading visibility and --method paper");
     if (o->has_transmission && !(o->has_shading && o->shading == ISOGI_DVR_TWO_SIDED))
         return file_fail(v->error, "--transmission: needs --shading two-sided");
     if (o->has_shading && o->shading == ISOGI_DVR_UNLIT && (o->env || o->light_count))
         return file_fail(v->error, "%s: --shading unlit has no light", o->env ? "--env" : "--light");
-    if (o->bound > 0 && o->mode != DVR) return file_fail(v->error, "--bound: is for --mode dvr; scale-invariant rays are exact without");
-    if (o->bound > 0 && o->has_step) return file_fail(v->error, "--step: rays with --bound have none");
-    if (o->bound > 0 && o->classification) return file_fail(v->error, "--classification: rays with --bound are exact");
+    if (o->bound > 0 && o->has_step && (!shadowed || o->method > ISOGI_DVR_BRUTE)) return file_fail(v->error, "%s", without_step);
+    if (o->bound > 0 && o->has_classification) return file_fail(v->error, "--classification: rays with --bound are exact");
     if (o->has_step && o->mode == SCALE_INVARIANT && o->classification == ISOGI_DVR_EXACT)
         return file_fail(v->error, "--step: exact rays have none; --classification pre-integrated and post-classified have");
     return 1;
@@ -387,10 +400,11 @@ static int check_transfer(viewer *v, int suggested) {
     if (o->has_iso && !suggested)
         return file_fail(v->error, "--iso: the transfer function is not a suggested one and has values of its own");
     if (o->local && peaks) return file_fail(v->error, "--local: knows no peaks, and the transfer function has some");
-    if (o->coarsest && peaks) return file_fail(v->error, "--coarsest: knows no peaks, and the transfer function has some");
+    if (o->has_coarsest && peaks) return file_fail(v->error, "--coarsest: knows no peaks, and the transfer function has some");
     if (o->method > ISOGI_DVR_BRUTE && peaks)
         return file_fail(v->error, "--method: %s knows no peaks, and the transfer function has some", method_name[o->method]);
-    if (o->silhouette && o->mode == DVR && !peaks)
+    if (o->bound > 0 && o->has_step && !o->method && !peaks) return file_fail(v->error, "%s", without_step);
+    if (o->has_silhouette && o->mode == DVR && !peaks)
         return file_fail(v->error, "--silhouette: is for peaks in --mode dvr, and the transfer function has none");
     return 1;
 }
@@ -1456,7 +1470,7 @@ static int run(viewer *v, int argc, char **argv) {
     if (!parse_arguments(v, argc, argv) || !file_writable(v->o.out, v->error) || (v->o.depth && !file_writable(v->o.depth, v->error)))
         return 0;
     if (v->o.compare && !read_compared(v)) return 0;
-    if (!v->o.antialias) v->o.antialias = v->o.mode == DVR ? 1 : 4;
+    if (!v->o.antialias) v->o.antialias = v->o.mode == DVR ? 1 : v->o.mode == PATHTRACE && v->o.samples < 4 ? v->o.samples : 4;
     v->context.alloc = counted_alloc, v->context.release = counted_release, v->context.user = v, v->context.threads = v->o.threads;
     stat_line(v, "mode", "%s", mode_name[v->o.mode]);
     if (!load_volume(v)) return 0;

@@ -287,8 +287,8 @@ TEST(transfer_functions_end_their_lines_by_cr_or_lf) {
     check_refused(command, "line 4: a colour");
 }
 
-/* An opaque box, seen from in front: depth is the distance to its face, from 3 radii to its middle, in the middle of a picture without a
-   middle pixel. */
+/* An opaque box, seen from in front: depth is the distance to its face, from 3 radii to its middle, in the middle of a picture,
+   which has no pixel there. */
 TEST(depth_is_written_as_a_float_map) {
     unsigned char box[8 * 8 * 8];
     char path[256], command[1024];
@@ -360,6 +360,96 @@ TEST(depth_goes_from_the_bottom_up_and_keeps_the_nearest_sample) {
     CHECK(!fewer && !farther, "%d pixels lost, %d farther", fewer, farther);
 }
 
+/* Nothing is ignored: in every mode every option is refused, or the picture is another one. WITH is what the option needs beside it; modes
+   where the option is the default, so that it is taken and changes nothing, are named. What --help lists is here, or in `apart`. */
+#define ALL_MODES "lambert phong vicinity irradiance transfer pathtrace dvr scale-invariant"
+static const struct { const char *with, *option, *same; } tried[] = {
+    {"", "--raycast", ""}, {"", "--env ENV", ""}, {"", "--light directional:1,1,0:3,1,1:2", ""}, {"", "--albedo 0.9,0.3,0.1", ""},
+    {"", "--bounces 0", ""}, {"", "--samples 9", ""}, {"", "--lattice 12,12,12", ""}, {"", "--lookup nearest", ""},
+    {"", "--shadows on", "vicinity irradiance transfer pathtrace"}, {"", "--shadows off", "lambert phong"},
+    {"", "--ambient constant", "phong"}, {"", "--ambient normal", "lambert"}, {"", "--fog 2", ""}, {"", "--gloss 10", ""},
+    {"", "--normals trilinear", ""}, {"", "--offset -1", ""}, {"", "--reach 2", ""}, {"", "--storage byte", ""},
+    {"", "--storage float", "vicinity irradiance"}, {"", "--storage half", "transfer"}, {"", "--tf TF", ""}, {"", "--preset hot", ""},
+    {"", "--shading unlit", ""}, {"", "--shading visibility", "dvr"}, {"", "--shading local", "scale-invariant"},
+    {"", "--shading two-sided", ""}, {"", "--method brute", ""}, {"", "--method paper", ""}, {"", "--order 2", ""},
+    {"", "--directions 40", ""}, {"", "--grid 4,4,4", ""}, {"", "--coarsest 8", ""}, {"", "--coarsest 1", "dvr"}, {"", "--local", ""},
+    {"--method paper", "--local", ""}, {"--shading visibility", "--order 2", ""}, {"--shading visibility", "--grid 4,4,4", ""},
+    {"", "--classification post-classified", ""}, {"", "--classification pre-integrated", "dvr"}, {"", "--silhouette exact", ""},
+    {"--tf PEAK", "--silhouette exact", ""}, {"", "--transmission none", ""}, {"--shading two-sided", "--transmission none", ""},
+    {"", "--step 2", ""}, {"--classification post-classified", "--step 2", ""}, {"", "--bound .01", ""}, {"--bound .01", "--step 2", ""},
+    {"--bound .01 --method brute", "--step 3", ""}, {"", "--iso 0.3", ""}, {"", "--clip 1,0,0,-12", ""}, {"", "--exposure 0.4", ""},
+    {"", "--aa 9", ""}, {"", "--up 1,0,0", ""}, {"", "--camera 10,20,3", ""}, {"", "--spacing 1,2,1", ""}};
+static const char apart[] = "--scene --mode --out --size --nan --compare --depth --threads --stats --help";
+
+/* The bytes of the picture; 0 where the words are refused, in one line. */
+static size_t picture_of(const char *mode, const char *words, unsigned char *bytes, size_t most) {
+    char command[1024] = "procedural:torus-sphere-plane:24 --size 32x32 --threads 1 --mode ", *at = command + strlen(command);
+    run_result r;
+    at += sprintf(at, "%s --out '%s' %s ", mode, temporary("option.png"), strstr("lambert phong dvr scale-invariant", mode) ||
+        strstr(words, "--samples") ? "" : "--samples 4");
+    for (const char *c = words; *c; c++) /* files by their names here */
+        if (!strncmp(c, "ENV", 3)) at += sprintf(at, "'%s'", temporary("o.hdr")), c += 2;
+        else if (!strncmp(c, "TF", 2)) at += sprintf(at, "'%s'", temporary("o.tf")), c += 1;
+        else if (!strncmp(c, "PEAK", 4)) at += sprintf(at, "'%s'", temporary("peak.tf")), c += 3;
+        else *at++ = *c;
+    *at = 0;
+    r = run_viewer(command);
+    CHECK(r.status == 0 || (r.status == 1 && r.lines == 1), "%s: status %d, %zu lines: %s", command, r.status, r.lines, r.error);
+    return r.status ? 0 : read_text(temporary("option.png"), (char *)bytes, most);
+}
+
+TEST(every_option_is_refused_or_changes_the_picture) {
+    enum { MOST = 1 << 16 };
+    static unsigned char plain[MOST], bytes[MOST];
+    static char help[16384];
+    char modes[] = ALL_MODES, command[512], with[512], name[64], hdr[600] = "#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 4 +X 8\n";
+    size_t changed = 0, refused = 0, length = strlen(hdr);
+    snprintf(command, sizeof command, "'%s' --help >'%s'", viewer_path(), temporary("help"));
+    CHECK(system(command) == 0, "--help fails");
+    read_text(temporary("help"), help, sizeof help);
+    for (const char *line = help; (line = strstr(line, "\n  --")) && sscanf(line += 3, "%63s", name) == 1;) {
+        int found = strstr(apart, name) != NULL;
+        for (size_t i = 0; i < sizeof tried / sizeof *tried; i++) found |= !strncmp(tried[i].option, name, strlen(name));
+        CHECK(found, "%s is not tried", name);
+    }
+    if (!LONG_SUITE) return;
+    for (int i = 0; i < 32; i++, length += 4)
+        hdr[length] = (char)(40 + 5 * i), hdr[length + 1] = 60, hdr[length + 2] = (char)(200 - 5 * i), hdr[length + 3] = (char)129;
+    write_bytes(temporary("o.hdr"), hdr, length);
+    write_bytes(temporary("o.tf"), "0 0 .2 .2 .2\n1 .9 1 .5 .2\n", 26);
+    write_bytes(temporary("peak.tf"), "peak .4 .5 1 .5 .2\n", 19);
+    for (const char *mode = strtok(modes, " "); mode; mode = strtok(NULL, " ")) {
+        size_t base = 0;
+        for (size_t i = 0; i < sizeof tried / sizeof *tried; i++) {
+            if (!i || strcmp(tried[i].with, tried[i - 1].with)) base = picture_of(mode, tried[i].with, plain, MOST);
+            if (!base) continue;
+            snprintf(with, sizeof with, "%s %s", tried[i].with, tried[i].option);
+            size_t size = picture_of(mode, with, bytes, MOST);
+            int same = size == base && !memcmp(plain, bytes, size);
+            CHECK(same == (strstr(tried[i].same, mode) != NULL), "--mode %s %s: %s", mode, with, same ? "changes nothing" : size ?
+                "is not the default" : "is refused");
+            changed += size && !same, refused += !size;
+        }
+    }
+    printf("    %zu pictures changed, %zu refused\n", changed, refused);
+    CHECK(changed > 150 && refused > 100, "%zu and %zu", changed, refused);
+}
+
+/* One, two and four paths for each pixel are what they say. */
+TEST(few_paths_are_not_rounded_up_in_silence) {
+    static char text[3][1 << 15];
+    size_t size[3];
+    char command[512];
+    for (int i = 0; i < 3; i++) {
+        snprintf(command, sizeof command, "procedural:gyroid:16 --mode pathtrace --samples %d --size 32x24 --out '%s'", 1 << i,
+                 temporary("few.png"));
+        CHECK(run_viewer(command).status == 0, "%s", command);
+        size[i] = read_text(temporary("few.png"), text[i], sizeof text[i]);
+        for (int k = 0; k < i; k++)
+            CHECK(size[k] != size[i] || memcmp(text[k], text[i], size[i]), "%d and %d paths are the same picture", 1 << k, 1 << i);
+    }
+}
+
 /* ---- what is refused --------------------------------------------------------------------------------------------------------- */
 
 TEST(silly_options_get_one_line_that_names_the_option) {
@@ -385,10 +475,13 @@ TEST(silly_options_get_one_line_that_names_the_option) {
         {"procedural:gyroid --clip 1e30,0,0,1", "from -1e9 to 1e9"},
         {"procedural:gyroid --tf x.tf", "--tf: works with --mode dvr"},
         {"procedural:gyroid --mode phong --classification exact", "--classification: works with --mode dvr"},
-        {"procedural:gyroid --step 1", "--step: works"}, {"procedural:gyroid --mode dvr --samples 4", "--samples: works with surfaces"},
+        {"procedural:gyroid --step 1", "--step: works"},
+        {"procedural:gyroid --mode dvr --samples 4",
+         "--samples: works with --mode vicinity, irradiance, transfer and pathtrace"},
         {"procedural:gyroid --mode dvr --raycast", "--raycast: works with surfaces"},
-        {"procedural:gyroid --mode scale-invariant --method paper", "--method: paper"},
-        {"procedural:gyroid --mode dvr --shading unlit --method sweep", "--method: sweep"},
+        {"procedural:gyroid --mode scale-invariant --method paper", "--method: works with --mode dvr, not"},
+        {"procedural:gyroid --mode dvr --shading unlit --method sweep", "--method: needs"},
+        {"procedural:gyroid --mode dvr --shading unlit --method default", "--method: needs"},
         {"procedural:gyroid --mode dvr --method fast", "default brute paper sweep"},
         {"procedural:gyroid --mode dvr --local", "--local: needs"},
         {"procedural:gyroid --mode dvr --preset rainbow", "grey hot cool-warm spectrum"},
@@ -397,14 +490,15 @@ TEST(silly_options_get_one_line_that_names_the_option) {
         {"procedural:coulomb:8 --mode dvr --method paper --local", "--local: knows no peaks"},
         {"procedural:coulomb:8 --mode dvr --method paper", "--method: paper knows no peaks"},
         {"procedural:coulomb:8 --mode scale-invariant --order 3", "--order: needs"},
-        {"procedural:gyroid --mode dvr --iso 1", "--iso: is for surfaces"},
+        {"procedural:gyroid --mode dvr --iso 1", "--iso: works with surfaces and --mode scale-invariant, not with --mode dvr"},
         {"procedural:gyroid --mode scale-invariant --preset hot --iso 1", "--iso: is for surfaces"},
         {"procedural:coulomb:8 --mode scale-invariant --iso 1", "--iso: the transfer function"},
         {"procedural:gyroid --mode dvr --transmission none", "--transmission: needs"},
         {"procedural:gyroid --mode scale-invariant --transmission none", "--transmission: needs"},
         {"procedural:engine-block:8 --mode dvr --silhouette exact", "--silhouette: is for peaks"},
+        {"procedural:engine-block:8 --mode dvr --silhouette none", "--silhouette: is for peaks"},
         {"procedural:gyroid --mode scale-invariant --step 1", "--step: exact rays"},
-        {"procedural:gyroid --mode scale-invariant --method brute", "--method: needs"},
+        {"procedural:gyroid --mode scale-invariant --method brute", "--method: works"},
         {"procedural:gyroid --mode dvr --shading unlit --env sky", "--env: --shading unlit"},
         {"procedural:gyroid --mode dvr --shading unlit --light directional:1,1,1:1,1,1", "--light: --shading unlit"},
         {"procedural:gyroid --mode dvr --shading local --grid 8,8,8", "--grid: needs"},
@@ -413,12 +507,16 @@ TEST(silly_options_get_one_line_that_names_the_option) {
         {"procedural:gyroid --mode dvr --directions 0", "--directions"},
         {"procedural:gyroid --mode dvr --grid 8,8", "--grid"},
         {"procedural:gyroid --grid 8,8,8", "--grid: works with --mode dvr and scale-invariant, not with --mode irradiance"},
-        {"procedural:gyroid --mode scale-invariant --bound .1", "--bound: is for --mode dvr"},
-        {"procedural:gyroid --mode dvr --bound .1 --step 1", "--step: rays with --bound"},
+        {"procedural:gyroid --mode scale-invariant --bound .1", "--bound: works with --mode dvr, not"},
+        {"procedural:gyroid:8 --mode dvr --bound .1 --step 1", "--step: rays with --bound"},
+        {"procedural:gyroid --mode dvr --bound .1 --step 1 --method paper", "--step: rays with --bound"},
+        {"procedural:gyroid --mode dvr --bound .1 --step 1 --shading local --method brute", "--method: needs"},
+        {"procedural:gyroid --mode dvr --bound .1 --step 1 --shading local", "--step: rays with --bound"},
         {"procedural:gyroid --mode dvr --bound .1 --classification post-classified", "--classification: rays with --bound"},
         {"procedural:gyroid --mode dvr --bound 2", "--bound"},
         {"procedural:gyroid --coarsest 8", "--coarsest: works with --mode dvr"},
         {"procedural:gyroid --mode dvr --coarsest 3", "--coarsest"},
+        {"procedural:gyroid --mode dvr --shading unlit --coarsest 1", "--coarsest: needs"},
         {"procedural:gyroid --mode dvr --method paper --coarsest 2", "--coarsest: needs"},
         {"procedural:coulomb:8 --mode dvr --coarsest 2", "--coarsest: knows no peaks"},
         {"procedural:gyroid --mode vicinity --env sky", "--env: works with modes that have no light of their own"},
@@ -430,6 +528,7 @@ TEST(silly_options_get_one_line_that_names_the_option) {
         {"procedural:gyroid --ambient normal", "--ambient: works with --mode lambert and phong, not"},
         {"procedural:gyroid --lookup x", "allowed: trilinear nearest"},
         {"procedural:gyroid --mode dvr --depth same.png --out same.png", "--depth: same.png is the file of --out"},
+        {"procedural:gyroid --mode dvr --depth ./same.png --out same.png", "--depth: ./same.png is the file of --out"},
         {"procedural:gyroid --mode dvr --out tests/golden/dvr.png --depth ./tests/golden/dvr.png", "is the file of --out"},
         {"procedural:gyroid --mode dvr --out /tmp/never.png --depth tests/golden/dvr.png --compare tests/golden/dvr.png",
         "is the file of --compare"},
@@ -592,8 +691,8 @@ TEST(stats_are_key_value_lines_and_help_is_complete) {
                                         "--light",    "--albedo", "--bounces",   "--samples", "--lattice", "--lookup",     "--shadows",
                                         "--ambient",  "--fog",    "--gloss",     "--normals", "--offset",  "--reach",      "--storage",
                                         "--compare",  "--tf",     "--preset",    "--method",  "--order",   "--directions", "--grid",
-                                        "--coarsest", "--bound", "--local",  "--depth",     "--clip",    "--camera",  "--up",         "--threads",
-                                        "--out",      "--stats",  "procedural:", "Examples"};
+                                        "--coarsest", "--bound",  "--local",     "--depth",   "--clip",    "--camera",     "--up",
+                                        "--threads",  "--out",    "--stats",  "procedural:", "Examples"};
     char command[512];
     run_result r;
     snprintf(command, sizeof command, "procedural:gyroid:32 --size 32x32 --samples 8 --stats --out '%s'", temporary("stats.png"));
