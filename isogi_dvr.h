@@ -809,7 +809,8 @@ struct isogi_dvr {
     isogi_context context;
     isogi_volume volume;
     isogi_dvr__transfer transfer;
-    isogi_dvr__integral integral; /* where isogi_dvr__by_value or isogi_dvr__bounded */
+    isogi_dvr__integral integral; /* where isogi_dvr__by_piece */
+    double limit;                 /* with a bound: how far colours may change in a part of a piece */
     double to_grid[9]; /* world directions to grid directions */
     double spacing;    /* the smallest distance of two voxels, world */
     double range[2];   /* of values */
@@ -921,7 +922,7 @@ static void isogi_dvr__set_classes(const isogi_dvr *d, const double span[2], siz
     if (!(from < to)) to = from + (d->range[1] > d->range[0] ? 0.5 * d->range[1] - 0.5 * d->range[0] : 0);
     width = (0.5 * to - 0.5 * from) / (0.5 * (double)(count - 2));
     if (!(width > 1e-7 * fabs(from) / (double)count)) width = 1e-7 * fabs(from) / (double)count;
-    if (!(width > 1e-300)) width = 1e-300;
+    if (!(width > 1e-300)) width = 1e-30; /* all zero: classes that floats tell apart */
     *low = from - 1.001 * width, *scale = 1 / width;
 }
 
@@ -1167,7 +1168,9 @@ static void isogi_dvr__add_quiet(isogi_dvr__integral *g, double low, double high
     g->quiet[g->quiet_count][0] = low, g->quiet[g->quiet_count++][1] = high;
 }
 
-static void isogi_dvr__set_quiet(isogi_dvr__integral *g) {
+/* Along a ray in physical space (`lengths`) a value counts that it keeps to: what is quiet ends below a step up, whose upper side holds at the
+   value itself. */
+static void isogi_dvr__set_quiet(isogi_dvr__integral *g, int lengths) {
     double start = 0;
     size_t n;
     int open = 0;
@@ -1176,7 +1179,7 @@ static void isogi_dvr__set_quiet(isogi_dvr__integral *g) {
         int loud = (n && g->points[n - 1].extinction > 0) || (n < g->count && g->points[n].extinction > 0);
         if (!(low < high)) continue;
         if (!loud && !open) start = low;
-        if (loud && open) isogi_dvr__add_quiet(g, start, low);
+        if (loud && open) isogi_dvr__add_quiet(g, start, lengths && g->points[n - 1].extinction > 0 ? nextafter(low, -1.7e308) : low);
         open = !loud;
     }
     if (open) isogi_dvr__add_quiet(g, start, 1.7e308);
@@ -1332,7 +1335,7 @@ static isogi_result isogi_dvr__integral_build(isogi_dvr__integral *g, const isog
     }
     for (i = 0; i < g->rank_count; i++) g->rank[i].isovalue = t->peaks[i].isovalue, g->rank[i].peak = i;
     isogi_dvr__sort_ranks(g->rank, g->rank_count);
-    isogi_dvr__set_quiet(g);
+    isogi_dvr__set_quiet(g, desc->space == ISOGI_DVR_PHYSICAL);
     isogi_dvr__set_whole(g);
     if (g->side) isogi_dvr__set_nodes(g), isogi_dvr__set_pairs(g);
     return ISOGI_OK;
@@ -1341,6 +1344,20 @@ static isogi_result isogi_dvr__integral_build(isogi_dvr__integral *g, const isog
 /* Whether rays are integrated over values, piece by monotone piece. */
 static int isogi_dvr__by_value(const isogi_dvr *d) {
     return d->desc.space == ISOGI_DVR_DATA && d->desc.classification != ISOGI_DVR_POST_CLASSIFIED;
+}
+
+/* Whether rays of pictures are integrated piece by monotone piece, over values or lengths. */
+static int isogi_dvr__by_piece(const isogi_dvr *d) { return isogi_dvr__by_value(d) || isogi_dvr__bounded(d); }
+
+/* The largest colour of the transfer function, at least 1, times the bound. */
+static double isogi_dvr__bounded_limit(const isogi_dvr__transfer *t, double bound) {
+    double most = 1;
+    size_t i;
+    for (i = 0; i < 3 * t->point_count; i++) {
+        double c = (double)t->points[i / 3].rgb[i % 3];
+        most = c > most ? c : most;
+    }
+    return most * bound;
 }
 
 /* Nothing in a range of values counts for anything. */
@@ -1541,7 +1558,7 @@ ISOGI_API isogi_result isogi_dvr_set_transfer(isogi_dvr *dvr, const isogi_transf
     if (result == ISOGI_OK) result = isogi_dvr__transfer_copy(&copy, transfer, &dvr->context);
     if (result != ISOGI_OK) return result;
     memset(&integral, 0, sizeof integral);
-    if (isogi_dvr__by_value(dvr) || isogi_dvr__bounded(dvr)) result = isogi_dvr__integral_build(&integral, &copy, &dvr->desc, &dvr->context);
+    if (isogi_dvr__by_piece(dvr)) result = isogi_dvr__integral_build(&integral, &copy, &dvr->desc, &dvr->context);
     marks = (uint32_t *)isogi_allocate(&dvr->context, ISOGI_DVR__TABLE + 1, sizeof *marks);
     if (!marks || result != ISOGI_OK) {
         isogi_dvr__integral_free(&integral, &dvr->context);
@@ -1552,7 +1569,7 @@ ISOGI_API isogi_result isogi_dvr_set_transfer(isogi_dvr *dvr, const isogi_transf
     isogi_dvr__compare_transfers(dvr, &dvr->transfer, &copy, marks);
     isogi_dvr__integral_free(&dvr->integral, &dvr->context);
     isogi_dvr__transfer_free(&dvr->transfer, &dvr->context);
-    dvr->transfer = copy, dvr->integral = integral;
+    dvr->transfer = copy, dvr->integral = integral, dvr->limit = isogi_dvr__bounded_limit(&copy, dvr->desc.bound);
     isogi_dvr__mark_empty(dvr);
     changed = isogi_dvr__mark_changed(dvr, marks);
     changed += isogi_dvr__renew_classes(dvr);
@@ -3001,19 +3018,22 @@ static void isogi_dvr__cubic(const double c[8], const double in[3], const double
             for (n = 0; n < 2; n++) z[i][j][n] = ISOGI_DVR__MIX(y[i][j], n, 2);
 #undef ISOGI_DVR__MIX
     b[0] = z[0][0][0], b[3] = z[1][1][1];
-    b[1] = (z[1][0][0] + z[0][1][0] + z[0][0][1]) * (1 / 3.0), b[2] = (z[1][1][0] + z[1][0][1] + z[0][1][1]) * (1 / 3.0);
+    b[1] = (0.25 * z[1][0][0] + 0.25 * z[0][1][0] + 0.25 * z[0][0][1]) * (4 / 3.0); /* quarters: three of the largest doubles are no double */
+    b[2] = (0.25 * z[1][1][0] + 0.25 * z[1][0][1] + 0.25 * z[0][1][1]) * (4 / 3.0);
 }
 
 static double isogi_dvr__bernstein(const double b[4], double u) {
-    double v = 1 - u;
-    return v * v * (v * b[0] + 3 * u * b[1]) + u * u * (3 * v * b[2] + u * b[3]);
+    double v = 1 - u, v2 = v * v, u2 = u * u; /* factors first: their sum is 1, and nothing overflows */
+    return (v2 * v * b[0] + 3 * u * v2 * b[1]) + (3 * v * u2 * b[2] + u2 * u * b[3]);
 }
 
 /* The extrema within 0..1, in order: where the derivative, a quadratic, changes its sign. */
 static int isogi_dvr__extrema(const double b[4], double u[2]) {
-    double d0 = b[1] - b[0], d1 = b[2] - b[1], d2 = b[3] - b[2], a, half, root, q;
+    double d0 = b[1] - b[0], d1 = b[2] - b[1], d2 = b[3] - b[2], a, half, root, q, most;
     int count = 0;
     if ((d0 >= 0 && d1 >= 0 && d2 >= 0) || (d0 <= 0 && d1 <= 0 && d2 <= 0)) return 0;
+    most = fabs(d0) > fabs(d1) ? fabs(d0) : fabs(d1), most = fabs(d2) > most ? fabs(d2) : most;
+    if (most > 1e140 || most < 1e-140) d0 /= most, d1 /= most, d2 /= most; /* squares stay numbers */
     a = d0 - 2 * d1 + d2, half = d1 - d0, root = half * half - a * d0;
     if (!(root > 0)) return 0;
     q = half > 0 ? -(half + sqrt(root)) : sqrt(root) - half;
@@ -3155,7 +3175,7 @@ static double isogi_dvr__place_of(const isogi_dvr__stretch *p, double value) {
     const double *b = p->b;
     double low = p->u0, high = p->u1, rising = p->value[1] > p->value[0] ? 1 : -1, u;
     int n;
-    u = low + (high - low) * isogi_dvr__clamp((value - p->value[0]) / (p->value[1] - p->value[0]), 1);
+    u = low + (high - low) * isogi_dvr__clamp((0.5 * value - 0.5 * p->value[0]) / (0.5 * p->value[1] - 0.5 * p->value[0]), 1);
     for (n = 0; n < 80; n++) {
         double v = 1 - u, f = rising * (isogi_dvr__bernstein(b, u) - value), next;
         double slope = 3 * rising * (v * v * (b[1] - b[0]) + 2 * u * v * (b[2] - b[1]) + u * u * (b[3] - b[2]));
@@ -5263,8 +5283,9 @@ static void isogi_dvr__composite_bounded(isogi_dvr__pixel_ray *r, isogi_dvr__spa
         for (a = 0; a < 3; a++) change = fabs(ends[1][a] - ends[0][a]) > change ? fabs(ends[1][a] - ends[0][a]) : change;
         parts = ends[0][3] > 0 || ends[1][3] > 0 ? 1 + (size_t)isogi_dvr__clamp(change / s->limit, 16384) : 0;
         for (k = 0; k < parts && r->clear > r->end; k++) {
-            double value[2], end;
-            value[0] = x + (to - x) * ((double)k / (double)parts), value[1] = k + 1 < parts ? x + (to - x) * ((double)(k + 1) / (double)parts) : to;
+            double share[2], value[2], end;
+            share[0] = (double)k / (double)parts, share[1] = (double)(k + 1) / (double)parts;
+            value[0] = (1 - share[0]) * x + share[0] * to, value[1] = k + 1 < parts ? (1 - share[1]) * x + share[1] * to : to;
             end = isogi_dvr__bounded_place(&s->piece, value[1]);
             if (end > u) isogi_dvr__bounded_part(r, s, n, value, u, end), u = end;
         }
@@ -5272,17 +5293,6 @@ static void isogi_dvr__composite_bounded(isogi_dvr__pixel_ray *r, isogi_dvr__spa
         if (!parts) u = isogi_dvr__bounded_place(&s->piece, to);
         x = to;
     }
-}
-
-/* The largest colour of the transfer function, at least 1, times the bound. */
-static double isogi_dvr__bounded_limit(const isogi_dvr *d) {
-    double most = 1;
-    size_t i;
-    for (i = 0; i < 3 * d->transfer.point_count; i++) {
-        double c = (double)d->transfer.points[i / 3].rgb[i % 3];
-        most = c > most ? c : most;
-    }
-    return most * d->desc.bound;
 }
 
 /* A peak in a tetrahedron: unlit. */
@@ -5357,7 +5367,7 @@ static void isogi_dvr__cast_values(isogi_dvr__pixel_ray *r, isogi_dvr__march *m)
     if (r->dvr->transparent) return;
     isogi_dvr__begin_walk(&s.walk, m);
     s.sampled = r->dvr->desc.classification == ISOGI_DVR_PRE_INTEGRATED, s.touched = 0, s.touched_t = -1;
-    s.bounded = isogi_dvr__bounded(r->dvr), s.limit = s.bounded ? isogi_dvr__bounded_limit(r->dvr) : 1;
+    s.bounded = isogi_dvr__bounded(r->dvr), s.limit = r->dvr->limit;
     if (s.bounded) s.sampled = 0;
     s.silhouette = s.bounded ? ISOGI_DVR_SILHOUETTE_NONE : m->silhouette, s.flat = 0, s.aslant = 1;
     while (r->clear > r->end && (s.sampled ? isogi_dvr__next_sampled(&s.walk, &s.piece) : isogi_dvr__next_monotone(&s.walk, &s.piece)))
@@ -5371,7 +5381,7 @@ static void isogi_dvr__cast(isogi_dvr__pixel_ray *r, isogi_dvr__march *m, isogi_
     isogi_dvr__sample s;
     size_t i;
     int a;
-    if (isogi_dvr__by_value(r->dvr) || isogi_dvr__bounded(r->dvr)) {
+    if (isogi_dvr__by_piece(r->dvr)) {
         isogi_dvr__cast_values(r, m);
         return;
     }
@@ -5515,6 +5525,7 @@ static void isogi_dvr__frame_classes(isogi_dvr__frame *f, double low, double sca
     }
     isogi_dvr__sum_classes(f);
     f->low = (float)low, f->scale = (float)scale;
+    if ((double)f->low > low) f->low = nextafterf(f->low, -3e38f); /* the least value that occurs may stand on a step: on its upper side */
     f->top = (float)f->count - 0.01f;
 }
 
@@ -5663,13 +5674,14 @@ static void isogi_dvr__fast_light(const isogi_dvr__frame *f, const isogi_dvr__fa
         x = x > 0 ? x : 0;
         c = (int)x, c = c < f->light_last[a] ? c : f->light_last[a];
         u[a] = x - (float)c, u[a] = u[a] < 1 ? u[a] : 1;
-        p += (a ? f->light_row[a - 1] : 4) * (size_t)c;
         cell[a] = (size_t)c, to[a] = f->light_stride[a];
     }
-    if (f->held.block) {
+    if (!f->held.block)
+        for (a = 0; a < 3; a++) p += (a ? f->light_row[a - 1] : 4) * cell[a];
+    else {
         double within[3], place[3];
         for (a = 0; a < 3; a++) within[a] = (double)u[a];
-        p = (const float *)f->light + 4 * isogi_dvr__held_cell(&f->held, cell, within, to, place);
+        p += 4 * isogi_dvr__held_cell(&f->held, cell, within, to, place);
         for (a = 0; a < 3; a++) u[a] = (float)place[a], to[a] *= 4;
     }
     for (a = 0; a < 4; a++) {
@@ -6129,7 +6141,7 @@ static void isogi_dvr__render_pixel(const isogi_dvr__render_job *job, int x, int
     double origin[3], world[3], grid[3], dir[3], speed;
     isogi_dvr__pixel_ray ray;
     isogi_dvr__march march, again;
-    int a, crossed = !isogi_dvr__by_value(d) && !isogi_dvr__bounded(d); /* peaks are found by the intersector */
+    int a, crossed = !isogi_dvr__by_piece(d); /* peaks are found by the intersector */
     for (a = 0; a < 4; a++) out[a] = 0;
     out[4] = HUGE_VALF;
     work->rays++;

@@ -147,6 +147,71 @@ TEST(pictures_with_a_bound_are_those_of_small_steps) {
     field_free(&f);
 }
 
+/* The opacity along z of layers of values, by quadrature: what lies between two layers is linear. */
+static double layered_opacity(const double *layer, const isogi_transfer *t) {
+    enum { STEPS = 4000 };
+    double depth = 0;
+    for (int i = 0; i < (N - 1) * STEPS; i++) {
+        double u = (i % STEPS + 0.5) / STEPS, a = layer[i / STEPS], b = layer[i / STEPS + 1];
+        float rgb[3], extinction;
+        isogi_transfer_at(t, a < b || b < a ? a + u * (b - a) : a, rgb, &extinction);
+        depth += (double)extinction / STEPS;
+    }
+    return 1 - exp(-depth);
+}
+
+/* The upper side of a step holds at the value itself, for volumes and layers of it: at any value, whatever its digits, and where it is
+   the least, the largest or the only one that occurs. */
+TEST(constant_regions_on_a_step_absorb_as_its_upper_side_says) {
+    const double kinds[][3] = {{5, 5, 5}, {0, 5, 7}, {5, 7, 6}, {0, 3, 5}, {0, 0, 0}, {-5000.7, -5000.7, -5000.7}, {5000, 5001, 5000}, {1e6 + 0.25, 1e6 + 0.25, 1e6 + 0.25}};
+    const double at[] = {5, 5, 5, 5, 0, -5000.7, 5000, 1e6 + 0.25}, eye[3] = {5.4, 5.4, -30}, target[3] = {5.4, 5.4, 3};
+    for (int kind = 0; kind < 8; kind++) {
+        double layer[N], s = (double)(float)at[kind];
+        field f = field_new(N, N, N);
+        for (int z = 0; z < N; z++) layer[z] = (double)(float)kinds[kind][z / 4];
+        for (size_t i = 0; i < field_count(&f); i++) f.value[i] = layer[i / (N * N)];
+        field_build(&f);
+        const isogi_transfer_point up[] = {{s - 5, {1, 1, 1}, 0}, {s, {1, 1, 1}, 0}, {s, {1, 1, 1}, 0.2f}, {s + 4, {1, 1, 1}, 0.2f}};
+        const isogi_transfer_point down[] = {{s - 5, {1, 1, 1}, 0.2f}, {s, {1, 1, 1}, 0.2f}, {s, {1, 1, 1}, 0}, {s + 4, {1, 1, 1}, 0}};
+        const isogi_transfer_point tent[] = {{s - 5, {1, 1, 1}, 0}, {s - 1, {1, 1, 1}, 0}, {s, {1, 1, 1}, 0.2f}, {s, {1, 1, 1}, 0}, {s + 1, {1, 1, 1}, 0}};
+        const isogi_transfer transfers[] = {{up, 4, NULL, 0}, {down, 4, NULL, 0}, {up, 3, NULL, 0}, {up + 2, 1, NULL, 0}, {tent, 5, NULL, 0}};
+        for (int k = 0; k < 5; k++)
+            for (int path = 0; path <= 4; path++) { /* 0: with a bound */
+                const isogi_context context = {.threads = 1, .force_path = path};
+                const isogi_dvr_desc desc = {.pyramid = f.pyramid, .opaque = 1, .bound = path ? 0 : 0.01, .step = 0.1};
+                isogi_dvr *dvr = dvr_new_with(&desc, &transfers[k], &context);
+                double expected = layered_opacity(layer, &transfers[k]), opacity = (double)cast(dvr, eye, target, NULL).c[3];
+                double tolerance = path ? 0.01 : 2e-4; /* samples; classes of values for the steps between */
+                CHECK(fabs(opacity - expected) < tolerance, "layers %d, function %d, %s %d: opacity %g, not %g", kind, k, path ? "path" : "bound", path, opacity, expected);
+                isogi_dvr_free(dvr);
+            }
+        field_free(&f);
+    }
+}
+
+/* Double data up to the largest numbers there are: the picture of the same data divided by 2^1000. */
+TEST(the_largest_doubles_give_the_picture_of_small_ones) {
+    static double data[N][N][N];
+    float c[2][4], depth[2];
+    for (int n = 0; n < 2; n++) {
+        double most = n ? 1.7e308 : ldexp(1.7e308, -1000);
+        isogi_volume volume = {.data = data, .type = ISOGI_F64, .size = {N, N, N}};
+        isogi_pyramid *pyramid = NULL;
+        for (int i = 0; i < N * N * N; i++) data[i / N / N][i / N % N][i % N] = most * cos(0.5 * (i / N / N) + 0.1 * (i % N));
+        CHECK(isogi_vol_build(&pyramid, &volume, &serial) == ISOGI_OK, "build");
+        const isogi_transfer_point p[] = {{-most, {1, 0, 0}, 0.3f}, {-0.5 * most, {0, 1, 0}, 0}, {0.9 * most, {0.2f, 0, 1}, 0.2f}, {most, {0, 1, 0}, 0.6f}};
+        const isogi_transfer transfer = {p, 4, NULL, 0};
+        const isogi_dvr_desc desc = {.pyramid = pyramid, .opaque = 1, .bound = 0.001};
+        const double eye[3] = {4.1, 5.4, -30}, target[3] = {5.4, 5.7, 3};
+        isogi_dvr *dvr = dvr_new(&desc, &transfer);
+        pixel got = cast(dvr, eye, target, NULL);
+        memcpy(c[n], got.c, sizeof c[n]), depth[n] = got.depth;
+        isogi_dvr_free(dvr), isogi_vol_free(pyramid);
+    }
+    for (int a = 0; a < 4; a++) CHECK(fabs((double)c[0][a] - (double)c[1][a]) < 1e-6 && c[0][3] > 0.3f, "channel %d: %g, not %g", a, (double)c[1][a], (double)c[0][a]);
+    CHECK(fabs((double)depth[0] - (double)depth[1]) < 1e-4, "depth %g, not %g", (double)depth[1], (double)depth[0]);
+}
+
 TEST(bounds_out_of_range_are_refused) {
     field f = field_waves(N, 5);
     const double bad[] = {-1, 1e-5, 1.5, NAN, INFINITY};
