@@ -277,7 +277,8 @@ ISOGI_API isogi_result isogi_trace_request(isogi_trace *trace, const float (*poi
    NULL): fraction of the texels asked for that are still to do, 0 = finished; it never rises but by a request. ISOGI_CANCELLED and
    ISOGI_NO_MEMORY leave a texture that can be read and stepped on. Not at the same time as any other call on this texture.
    FEEDBACK: when a block of samples is complete passes without rays carry the light over all probes to all texels at work; they are cut
-   into pieces, too, and counted as the rays that take about as long. */
+   into pieces, too, and counted as the rays that take about as long. Meanwhile *remaining hardly falls, and what a request adds has to
+   wait. */
 ISOGI_API isogi_result isogi_trace_step(isogi_trace *trace, uint64_t max_rays, double *remaining);
 
 /* Lookup (desc.lookup) among the texels that are valid and computed. irradiance[count] (RGB); error[count]: standard error of its
@@ -4234,7 +4235,7 @@ static isogi_result isogi_trace__trace_batch(isogi_trace *t, uint64_t limit) {
     return result;
 }
 
-static isogi_result isogi_trace__feedback_step(isogi_trace *t, uint64_t max_rays) {
+static isogi_result isogi_trace__feedback_step(isogi_trace *t, uint64_t max_rays, uint64_t *spent) {
     isogi_trace__feedback *f = t->feedback;
     uint64_t begin = t->counters.rays, each = 1 + (uint64_t)t->scene.sky.on + (uint64_t)t->scene.desc.lighting.light_count, other = 0;
     isogi_result result = isogi_trace__nodes_make(t);
@@ -4248,15 +4249,17 @@ static isogi_result isogi_trace__feedback_step(isogi_trace *t, uint64_t max_rays
             if (f->phase == ISOGI_TRACE__AT_REST) isogi_trace__level_end(t), result = isogi_trace__nodes_make(t);
         }
     }
+    *spent += t->counters.rays - begin + other;
     return result;
 }
 
 /* ==== stepping ======================================================================================================= */
 
-static isogi_result isogi_trace__step_side(isogi_trace *trace, uint64_t max_rays) {
+/* Adds to *spent what has been done of the budget: rays, and other work in as many rays as take so long. */
+static isogi_result isogi_trace__step_side(isogi_trace *trace, uint64_t max_rays, uint64_t *spent) {
     isogi_result result = ISOGI_OK;
     uint64_t begin = trace->counters.rays;
-    if (trace->feedback) return isogi_trace__feedback_step(trace, max_rays);
+    if (trace->feedback) return isogi_trace__feedback_step(trace, max_rays, spent);
     while (trace->wanted && result == ISOGI_OK) {
         uint64_t used = trace->counters.rays - begin, each = (uint64_t)trace->scene.desc.samples * 2,
                  limit = ISOGI_TRACE__BATCH;
@@ -4268,6 +4271,7 @@ static isogi_result isogi_trace__step_side(isogi_trace *trace, uint64_t max_rays
         if (result == ISOGI_OK) result = isogi_trace__bake_batch(trace, count);
         isogi_trace__queue_advance(trace);
     }
+    *spent += trace->counters.rays - begin;
     return result;
 }
 
@@ -4346,18 +4350,17 @@ static isogi_result isogi_trace__refine(isogi_trace *t) {
 }
 
 /* One side, its coarse texels first. */
-static isogi_result isogi_trace__step_levels(isogi_trace *trace, uint64_t max_rays) {
+static isogi_result isogi_trace__step_levels(isogi_trace *trace, uint64_t max_rays, uint64_t *spent) {
     isogi_result result = ISOGI_OK;
     uint64_t used = 0;
     if (trace->coarse) {
-        uint64_t begin = trace->coarse->counters.rays;
-        result = isogi_trace__step_side(trace->coarse, max_rays);
-        used = trace->coarse->counters.rays - begin;
+        result = isogi_trace__step_side(trace->coarse, max_rays, &used);
+        *spent += used;
         if (result != ISOGI_OK || trace->coarse->wanted) return result;
         if (!trace->refined) result = isogi_trace__refine(trace);
     }
     if (result != ISOGI_OK || (max_rays && used >= max_rays)) return result;
-    return isogi_trace__step_side(trace, max_rays ? max_rays - used : 0);
+    return isogi_trace__step_side(trace, max_rays ? max_rays - used : 0, spent);
 }
 
 /* Texels to do, less the parts of them that are done, and done; what a hierarchy may still want while it is not refined is taken to be
@@ -4376,14 +4379,12 @@ static void isogi_trace__progress(const isogi_trace *t, double *wanted, double *
 /* The high side has its turn with the rays that the low side leaves, or when that has none to trace. */
 ISOGI_API isogi_result isogi_trace_step(isogi_trace *trace, uint64_t max_rays, double *remaining) {
     isogi_result result;
-    uint64_t begin, used;
+    uint64_t used = 0;
     double wanted = 0, done = 0;
     if (!trace) return ISOGI_INVALID;
-    begin = trace->counters.rays + (trace->coarse ? trace->coarse->counters.rays : 0);
-    result = isogi_trace__step_levels(trace, max_rays);
-    used = trace->counters.rays + (trace->coarse ? trace->coarse->counters.rays : 0) - begin;
+    result = isogi_trace__step_levels(trace, max_rays, &used);
     if (result == ISOGI_OK && trace->high && (!max_rays || used < max_rays))
-        result = isogi_trace__step_levels(trace->high, max_rays ? max_rays - used : 0);
+        result = isogi_trace__step_levels(trace->high, max_rays ? max_rays - used : 0, &used);
     isogi_trace__progress(trace, &wanted, &done);
     if (trace->high) isogi_trace__progress(trace->high, &wanted, &done);
     if (remaining && result == ISOGI_OK) *remaining = wanted > 0 ? wanted / (wanted + done) : 0;

@@ -365,7 +365,8 @@ ISOGI_API isogi_result isogi_vol_intersect_all(const isogi_pyramid *pyramid, con
 ISOGI_API int isogi_vol_next_interval(const isogi_pyramid *pyramid, const isogi_ray *ray, const double (*ranges)[2], size_t range_count,
                                       double from, double interval[2], isogi_counters *counters);
 
-/* Rays that share everything but the direction: what gathering light at a point needs. The same bits as rays of their own. */
+/* Rays that share everything but the direction: what gathering light at a point needs. The same bits as rays of their own, but for rays
+   that begin or end in a voxel which has the isovalue itself, as they do in batches: what is decided there by rounding may differ. */
 typedef struct isogi_bundle {
     const isogi_hit *start; /* the rays leave from this hit as in isogi_vol_continue, and origin and tmin are not read; NULL: from origin */
     double origin[3];
@@ -1402,15 +1403,19 @@ ISOGI_VOL__INLINE void isogi_vol__code_row(const float *row, int leaves, const f
 }
 
 #ifdef ISOGI_VOL__AVX
-/* unit_row and code_row in one, bit by bit the same, for leaves whose vectors end within the row of raw numbers. */
+/* unit_row and code_row in one, bit by bit the same, for leaves whose vectors end within the row of raw numbers: a compiler that may
+   contract must not join the two. */
 ISOGI_VOL__TARGET("avx2") static void isogi_vol__code_eights(const isogi_vol__build_job *job, const float *row, int leaves, const float *low, const float *scale,
                                                              uint8_t *const *out, int at) {
     const __m256 raw_low = _mm256_set1_ps(job->raw_low), raw_scale = _mm256_set1_ps(job->raw_scale);
     int i;
     for (i = 0; i < leaves; i++, row += 4) {
-        const __m256 unit = _mm256_mul_ps(_mm256_sub_ps(_mm256_loadu_ps(row), raw_low), raw_scale);
-        const __m256i codes = _mm256_cvttps_epi32(_mm256_mul_ps(_mm256_sub_ps(unit, _mm256_broadcast_ss(low + i)), _mm256_broadcast_ss(scale + i)));
-        const __m128i words = _mm_packs_epi32(_mm256_castsi256_si128(codes), _mm256_extracti128_si256(codes, 1));
+        __m256 unit = _mm256_mul_ps(_mm256_sub_ps(_mm256_loadu_ps(row), raw_low), raw_scale);
+        __m256i codes;
+        __m128i words;
+        __asm__("" : "+x"(unit));
+        codes = _mm256_cvttps_epi32(_mm256_mul_ps(_mm256_sub_ps(unit, _mm256_broadcast_ss(low + i)), _mm256_broadcast_ss(scale + i)));
+        words = _mm_packs_epi32(_mm256_castsi256_si128(codes), _mm256_extracti128_si256(codes, 1));
         _mm_storel_epi64((__m128i *)(void *)(out[i] + at), _mm_packus_epi16(words, words));
     }
 }
@@ -5754,7 +5759,7 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE void isogi_vol__clear_pool(isogi_vol__pool *
 /* The rays from *next on, up to `end`, through the slots of a pool, each taken again as soon as it is free; `open`: those without a ray. */
 ISOGI_VOL__AVX512 static void isogi_vol__run_pool(isogi_vol__batch *b, isogi_vol__turn *turn, isogi_vol__pool *s, int groups, uint64_t open, size_t *next, size_t end) {
     const uint64_t slots = ~(uint64_t)0 >> (64 - 8 * groups);
-    uint64_t fresh = ~open; /* rays that stand at the root */
+    uint64_t fresh = slots & ~open; /* rays that stand at the root */
     isogi_vol__descent descent;
     int i;
     descent.cell = -1;
@@ -5766,7 +5771,7 @@ ISOGI_VOL__AVX512 static void isogi_vol__run_pool(isogi_vol__batch *b, isogi_vol
         if (b->bundle && fresh) {
             if (descent.cell < 0) {
                 isogi_vol__prepare_descent(&descent, b->pyramid, s, __builtin_ctzll(fresh));
-                b->work.blocks += (uint64_t)b->pyramid->node_levels;
+                b->work.blocks += (uint64_t)b->pyramid->node_levels; /* at most */
             }
             for (i = 0; i < groups; i++)
                 if (__builtin_popcountll(fresh >> 8 * i & 255) > 3) isogi_vol__descend8(turn, s, &descent, 8 * i, (unsigned)(fresh >> 8 * i & 255));

@@ -161,6 +161,10 @@ variants() {
     variant O0 "$CC" "-O0 $CONTRACT_OFF" '' $(only sh)
     variant O3 "$CC" "-O3 $CONTRACT_OFF" '' $(only 'sh|vol|vol_update|trace_store|dvr|dvr_data')
     fast_math "$CC" $(only 'sh|sh_limits|sample|vol|vol_sides|trace|dvr|dvr_visibility|dvr_levels|dvr_bound|dvr_hard|dvr_classes')
+    # With products and sums joined as a user's compiler may, all paths still build the same pyramid.
+    if grep -qsw fma /proc/cpuinfo; then
+        item suite contracted/test_vol_update "$CC -std=gnu99 -O2 -march=x86-64-v3 -I. -Iexamples/common -Itests -o \"\$OUT/test\" tests/test_vol_update.c -lm -lpthread && \"\$OUT/test\" --long"
+    fi
     variant no-threads "$CC" "-O2 $CONTRACT_OFF -DISOGI_NO_THREADS" '' $(only 'vol|trace')
     variant no-simd "$CC" "-O2 $CONTRACT_OFF -DISOGI_NO_SIMD" '' $(only 'sh|sample|vol|dvr')
     variant sh-level-1 "$CC" "-O2 $CONTRACT_OFF -DISOGI_SH_LEVEL=1" '' $(only sh)
