@@ -1,32 +1,37 @@
 #!/bin/sh
-# The pictures of README.md, from shapes that need no file, into examples/.
+# The pictures of README.md, from shapes that need no file, into examples/ or the folder that PICTURES_OUT names; a few minutes.
+# PICTURES_DIVIDE=16: small, of small volumes and with few paths, for a look whether all of it works.
 set -e
-mkdir -p build/pictures
-skull="procedural:skull --camera 30,8,1.8 --env sky --light directional:1,1,0.6:3,2.8,2.4:0.5 --size 280x280"
-baked="$skull --samples 32"
-build/viewer procedural:engine-block --size 640x640 --out examples/engine-block.png
-build/viewer procedural:gyroid --size 640x640 --out examples/gyroid.png
-build/viewer $baked --out examples/skull-global.png
-build/viewer $skull --mode phong --shadows on --out examples/skull-phong.png
-build/viewer $baked --lattice 64,72,72 --compare examples/skull-global.png --out examples/skull-coarse.png
+out=${PICTURES_OUT:-examples} pieces=${PICTURES_OUT:-build/pictures} divide=${PICTURES_DIVIDE:-1}
+coarse=$([ $divide = 1 ] || echo :32)
+mkdir -p "$out" "$pieces"
+part() { n=$(($1 / divide)) && echo $((n > 0 ? n : 1)); }
+side() { echo "--size $(part $1)x$(part $1)"; }
+skull="procedural:skull$coarse --camera 30,8,1.8 --env sky --light directional:1,1,0.6:3,2.8,2.4:0.5 $(side 280)"
+baked="$skull --samples $(part 32)"
+build/viewer procedural:engine-block$coarse $(side 640) --samples $(part 64) --out "$out/engine-block.png"
+build/viewer procedural:gyroid$coarse $(side 640) --samples $(part 64) --out "$out/gyroid.png"
+build/viewer $baked --out "$out/skull-global.png"
+build/viewer $skull --mode phong --shadows on --out "$out/skull-phong.png"
+build/viewer $baked --lattice 64,72,72 --compare "$out/skull-global.png" --out "$out/skull-coarse.png"
 
 # The paper's figures 5, 6, 7 and 12: a picture for each argument, which is added to $same, at the exposure of the last one.
 strip() { # NAME ARGUMENTS...
     name=$1 parts= n=0
     shift
     for last; do :; done
-    exposure=$(build/viewer $same $last --stats --out build/pictures/last.png | sed -n 's/^exposure //p')
+    exposure=$(build/viewer $same $last --stats --out "$pieces/$name-$#.png" | sed -n 's/^exposure //p')
     for each; do
-        n=$((n + 1)) parts="$parts build/pictures/$name-$n.png"
-        build/viewer $same $each --exposure "$exposure" --out "build/pictures/$name-$n.png"
+        n=$((n + 1)) parts="$parts $pieces/$name-$n.png"
+        [ $n = $# ] || build/viewer $same $each --exposure "$exposure" --out "$pieces/$name-$n.png"
     done
-    build/strip "examples/$name.png" $parts
+    build/strip "$out/$name.png" $parts
 }
-close="procedural:skull --camera 30,8,1.2 --env sky --light directional:1,1,0.6:3,2.8,2.4:0.5"
-same="$close --size 216x216 --mode pathtrace --bounces 0 --samples 16"
+reference="--mode pathtrace --samples $(part 256)"
+same="procedural:skull:72 --camera 35,30,0.8 --light directional:-1,0.9,0.8:4,3.8,3.4 $(side 216) --mode pathtrace --bounces 0 --samples $(part 64)"
 strip figure-5 "--normals trilinear --offset -1" "--offset -1" ""
-same="procedural:engine-block --camera 37,25,0.9 --size 161x161"
-strip figure-6 "--lookup closest-isovalue" "--lookup nearest" "--lookup trilinear" "--mode pathtrace --samples 64"
+same="procedural:engine-block$coarse --camera 37,25,0.9 $(side 161) --samples $(part 64)"
+strip figure-6 "--lookup closest-isovalue" "--lookup nearest" "--lookup trilinear" "$reference"
 strip figure-7 "--mode pathtrace --samples 2" "--samples 2" "--samples 8" "--samples 32"
-same="$close --size 161x161"
-strip figure-12 "--lattice 64,72,72" "" "--lattice 256,288,288" "--mode pathtrace"
+same="procedural:skull$coarse --camera 30,8,1.2 --env sky --light directional:1,1,0.6:3,2.8,2.4:0.5 $(side 161) --samples $(part 64)"
+strip figure-12 "--lattice 64,72,72" "" "--lattice 256,288,288" "$reference"

@@ -1,8 +1,8 @@
 /* Tetrahedral meshes in both spaces: build/tets MESH SPACE OUT.png [WIDTH]
 
    MESH is a .raw volume whose cells are split into tetrahedra, five to a cell (Kraus 2005, figure 8e and f, with
-   buckyball_32x32x32_uint8.raw),
-   or a .tet file: 'TETS', numbers of points and tetrahedra (32 bits), points, values (floats), four points for each tetrahedron.
+   buckyball_32x32x32_uint8.raw), or a .tet file: 'TETS', numbers of points and tetrahedra (32 bits), points, values (floats), four
+   points for each tetrahedron.
    SPACE is physical or data (with silhouettes). Isosurfaces of a third and two thirds of the range. */
 #define ISOGI_IMPLEMENTATION
 #include "isogi_dvr.h"

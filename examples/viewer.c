@@ -1063,9 +1063,8 @@ static void lambert(const viewer *v, const float point[3], const double n[3], in
     }
 }
 
-/* Phong 1975: a constant ambient term (or one by normal), the lights (or where there are none, the direction most of the environment comes
-   from),
-   and a highlight of exponent 32 that reflects a fifth. Adds the highlight to specular. */
+/* Phong 1975: a constant ambient term (or one by normal), the lights (or where there are none, the direction most of the environment
+   comes from), and a highlight of exponent 32 that reflects a fifth. Adds the highlight to specular. */
 static void phong(const viewer *v, const float point[3], const double n[3], const float dir[3], double irradiance[3], double specular[3]) {
     double view[3] = {-(double)dir[0], -(double)dir[1], -(double)dir[2]}, reflected[3], facing;
     size_t count = v->o.light_count ? v->o.light_count : 1;

@@ -248,6 +248,7 @@ long)
     memcheck
     fuzzers
     item check figures/all "ISOGI_DATA= FIGURES_OUT=\"\$OUT\" FIGURES_DIVIDE=64 FIGURES_SIZE=48x48 sh examples/figures.sh"
+    item check figures/pictures "PICTURES_OUT=\"\$OUT\" PICTURES_DIVIDE=16 sh examples/pictures.sh"
     item check figures/scale-invariant "ISOGI_DATA= SIDE=48 sh examples/figures_scale_invariant.sh \"\$OUT\""
     item check figures/visibility "ISOGI_DATA= SIDE=48 sh examples/figures_visibility.sh \"\$OUT\""
     if have glslangValidator; then item check glsl/shaders "sh tests/compile/glsl.sh"

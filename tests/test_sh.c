@@ -254,7 +254,7 @@ TEST(floats_are_exact_at_many_directions) {
 TEST(any_length_and_no_length) {
     static const float scales[] = {1, 1e-44f, 1e-38f, 1e-20f, 3e20f, 3e38f};
     float y[25], up[25], d[1][3] = {{0, 0, 1}},
-                         bad[][3] = {{0, 0, 0}, {NAN, 0, 1}, {0, INFINITY, 0}, {-INFINITY, NAN, 2}, {-0.0f, 0, -0.0f}};
+          bad[][3] = {{0, 0, 0}, {NAN, 0, 1}, {0, INFINITY, 0}, {-INFINITY, NAN, 2}, {-0.0f, 0, -0.0f}};
     isogi_sh_eval(up, 5, (const float(*)[3])d, 1);
     for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
         isogi_sh_eval(y, 5, (const float(*)[3]) & bad[i], 1);
@@ -1008,7 +1008,7 @@ TEST(rotations_by_inexact_matrices_keep_the_norm) {
 /* The makers of matrices agree with what they say: where the axes go. */
 TEST(matrices_are_what_they_say) {
     float m[9], n[9], half = 0.70710678f, q[4] = {3 * half, 0, 0, 3 * half}, z[3] = {0, 0, 2}, axis[3] = {1, -2, 0.5f},
-                      zero[4] = {0, 0, 0, 0};
+          zero[4] = {0, 0, 0, 0};
     CHECK(isogi_sh_matrix_from_quaternion(m, q) == ISOGI_OK, "%s", "a quarter turn about z");
     CHECK(isogi_sh_matrix_from_axis_angle(n, z, pi / 2) == ISOGI_OK, "%s", "the same");
     const float quarter[9] = {0, -1, 0, 1, 0, 0, 0, 0, 1}; /* x to y */
@@ -1140,7 +1140,7 @@ TEST(mirrors) {
 TEST(composed_rotations_do_not_drift) {
     enum { ORDER = 6, N = ORDER * ORDER, TURNS = 10000 };
     double c[N], start[N], before = 0, after = 0, after_float = 0, angle = 2 * pi / TURNS,
-                           m[9] = {cos(angle), 0, sin(angle), 0, 1, 0, -sin(angle), 0, cos(angle)};
+           m[9] = {cos(angle), 0, sin(angle), 0, 1, 0, -sin(angle), 0, cos(angle)};
     float f[N], mf[9];
     test_random r = {28};
     for (int i = 0; i < N; i++) f[i] = (float)random_range(&r, -1, 1), start[i] = c[i] = (double)f[i], before += c[i] * c[i];

@@ -15,9 +15,8 @@ static const int orders[] = {1, 2, 101};
 enum { ORDERS = sizeof orders / sizeof *orders };
 
 /* axes of every length: poles, beside them, denormal (the least float too), huge (the sum of squares overflows floats) */
-static const float axes[][3] = {{0, 0, 1},         {0, 0, -1},  {1, 0, 0},           {0, -1, 0},           {1, 2, -2}, {1e-8f, 0, 1},
-    {0, 1e-30f, -1},
-                                {1e-40f, 2e-40f, -2e-40f}, {1e-45f, 0, 0}, {3e38f, -3e38f, 1e38f}, {0, 0, 3.4e38f}, {1e-40f, 0, 1e38f}};
+static const float axes[][3] = {{0, 0, 1}, {0, 0, -1}, {1, 0, 0}, {0, -1, 0}, {1, 2, -2}, {1e-8f, 0, 1}, {0, 1e-30f, -1},
+    {1e-40f, 2e-40f, -2e-40f}, {1e-45f, 0, 0}, {3e38f, -3e38f, 1e38f}, {0, 0, 3.4e38f}, {1e-40f, 0, 1e38f}};
 enum { AXES = sizeof axes / sizeof *axes };
 
 static quad basis[N];
@@ -718,10 +717,10 @@ TEST(fits_of_any_order) {
 #if defined(__linux__) && defined(__OPTIMIZE__) && !TEST_SANITIZED
 #include <pthread.h>
 
-enum { STACK = 1 << 18, MANY = 67, WIDE = 48, HIGH = 24 };
+enum { STACK = 1 << 18, MANY = 67, WIDE = 48, HIGH = 24, TURNED = 22 }; /* matrices of more take minutes and megabytes */
 
-static float many[N * MANY], image[WIDE * HIGH * 3], directions[MANY][3], coordinates[3][MANY], turn[ISOGI_SH_ROTATION_COUNT(MOST)];
-static double many_f64[N * MANY], directions_f64[MANY][3], coordinates_f64[3][MANY], turn_f64[ISOGI_SH_ROTATION_COUNT(MOST)];
+static float many[N * MANY], image[WIDE * HIGH * 3], directions[MANY][3], coordinates[3][MANY], turn[ISOGI_SH_ROTATION_COUNT(TURNED)];
+static double many_f64[N * MANY], directions_f64[MANY][3], coordinates_f64[3][MANY], turn_f64[ISOGI_SH_ROTATION_COUNT(TURNED)];
 static const float flat[9] = {0.36f, 0.48f, -0.8f, -0.8f, 0.6f, 0, 0.48f, 0.64f, 0.6f};
 static const double flat_f64[9] = {0.36, 0.48, -0.8, -0.8, 0.6, 0, 0.48, 0.64, 0.6};
 
@@ -746,7 +745,7 @@ static void use_rotate(int order) {
     isogi_sh_rotate_f64(many_f64, many_f64, order, 1, flat_f64), isogi_sh_rotate_f64(many_f64, many_f64, order, 2, flat_f64);
 }
 static void use_matrix(int order) {
-    if (order > 22) return; /* minutes and megabytes */
+    if (order > TURNED) return;
     isogi_sh_rotation_build(turn, order, flat), isogi_sh_rotation_apply(d, c, order, 1, turn),
         isogi_sh_rotation_apply(d, c, order, 3, turn);
     isogi_sh_rotation_build_f64(turn_f64, order, flat_f64), isogi_sh_rotation_apply_f64(many_f64, many_f64 + N, order, 1, turn_f64);

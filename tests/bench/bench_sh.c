@@ -1,6 +1,6 @@
 /* Run time against error of isogi_sh.h.
 
-       build/bench/bench_sh [--quick] [--only CASE] OUT.csv        --only: cases whose names begin so, or light
+       build/bench/bench_sh [--quick] [--only CASE] OUT.csv        --only: cases whose names begin so
 
    One thread, CPU seconds, data in cache, the shortest of many short runs, which is what the code takes where nothing else runs on the
    core; error is the largest absolute one against tests/reference_sh.h (128 bits). Errors are taken over poles, axes, directions 1e-8
@@ -444,17 +444,21 @@ static double error_of_lights(int order) {
     return worst;
 }
 
+static const char *const light_name[5] = {"light-directional", "light-disc", "light-point", "light-sphere", "light-rectangle"};
+
+static int chosen(const char *name) { return !strncmp(name, only, strlen(only)); }
+
 static void lights(void) {
-    static const char *const names[] = {"light-directional", "light-disc", "light-point", "light-sphere", "light-rectangle"};
     static const int orders[] = {2, 3, 5, 8, 11, 16, 21}; /* 2, 3, 5, 11 and 21 where it must be quick */
     fprintf(stderr, "\n  lights: ns a light (RGB)\n");
     for (int kind = 0; kind < 5; kind++) {
+        if (!chosen(light_name[kind])) continue;
         place_lights(kind), expect_lights(kind);
         for (size_t o = 0; o < sizeof orders / sizeof *orders; o++) {
             if (quick && o & 1 && orders[o] != 3) continue;
             double seconds = seconds_of(run_lights, orders[o], LIGHTS), error = error_of_lights(orders[o]);
-            fprintf(csv, "isogi_sh.h,%s,%s,order %d,%.6g,%.6g,%d,light\n", names[kind], orders[o] == 5 ? "default" : "other orders", orders[o], seconds, error, LIGHTS);
-            fprintf(stderr, "  %-22s order %2d %10.1f ns   error %.2g\n", names[kind], orders[o], seconds / LIGHTS * 1e9, error);
+            fprintf(csv, "isogi_sh.h,%s,%s,order %d,%.6g,%.6g,%d,light\n", light_name[kind], orders[o] == 5 ? "default" : "other orders", orders[o], seconds, error, LIGHTS);
+            fprintf(stderr, "  %-22s order %2d %10.1f ns   error %.2g\n", light_name[kind], orders[o], seconds / LIGHTS * 1e9, error);
         }
     }
 }
@@ -517,8 +521,10 @@ int main(int argc, char **argv) {
         else if (argv[i][0] != '-') path = argv[i];
         else { path = NULL; break; }
     }
-    size_t matching = !strcmp(only, "light");
-    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) matching += !strncmp(cases[i].name, only, strlen(only));
+    size_t matching = 0, lit = 0;
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) matching += (size_t)chosen(cases[i].name);
+    for (int kind = 0; kind < 5; kind++) lit += (size_t)chosen(light_name[kind]);
+    matching += lit;
     if (!matching) fprintf(stderr, "no case begins with %s\n", only);
     if (!matching || !path || !(csv = fopen(path, "w"))) {
         fprintf(stderr, "usage: %s [--quick] [--only CASE] OUT.csv\n", argv[0]);
@@ -528,14 +534,14 @@ int main(int argc, char **argv) {
     prepare();
     head();
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
-        if (strncmp(cases[i].name, only, strlen(only))) continue;
+        if (!chosen(cases[i].name)) continue;
         row(&cases[i], "default");
         if (!strncmp(cases[i].name, "eval", 4)) fill_row(&cases[i]);
         if (quick) continue;
         for (bench_level = 0; bench_level < 2; bench_level++) row(&cases[i], bench_level ? "avx2" : "plain");
         bench_level = 99;
     }
-    if (!*only || !strcmp(only, "light")) lights();
+    if (lit) lights();
     if (!*only) truncation();
     return fclose(csv) ? 1 : 0;
 }

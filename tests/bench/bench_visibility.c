@@ -283,7 +283,7 @@ static void bench_procedural(void) {
     isogi_vol_free(s.pyramid), procedural_free(&volume);
 }
 
-/* Marschner-Lobb as scenes.md has it, for several resolutions alone. */
+/* Marschner-Lobb in a box of side 2 under a sun and a sky, for several resolutions alone. */
 static void bench_marschner_lobb(void) {
     static const float sky[3] = {3.5449077f, 3.5449077f, 3.5449077f};
     const isogi_light sun = {.vector = {1, 1, 1}, .rgb = {2, 2, 2}};
