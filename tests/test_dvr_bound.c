@@ -7,7 +7,8 @@
 enum { N = 12, POINTS = 6 };
 
 /* Colour and opacity of a ray by many small steps, each homogeneous, whose value is that of its middle. */
-static void reference_ray(const field *f, const isogi_transfer *t, const double eye[3], const float dir[3], long double out[4], double *half) {
+static void reference_ray(const field *f, const isogi_transfer *t, const double eye[3], const float dir[3], long double out[4],
+                          double *half) {
     enum { STEPS = 20000 };
     long double enter = 0, leave = 1e9L, depth = 0, length;
     static long double passed[STEPS];
@@ -46,8 +47,8 @@ static void random_function(test_random *r, isogi_transfer_point points[POINTS],
     }
 }
 
-/* Opacity to the rounding of floats, whatever the bound; colours within it; depth. Where the function has steps, quadrature errs by a step's
-   length of its own at each crossing. */
+/* Opacity to the rounding of floats, whatever the bound; colours within it; depth. Where the function has steps, quadrature errs by a
+   step's length of its own at each crossing. */
 TEST(errors_stay_below_the_bound_on_random_fields_and_functions) {
     const double bounds[] = {1, 0.1, 0.01, 1e-3};
     double most[4] = {0, 0, 0, 0}, sampled = 0, deepest = 0;
@@ -73,7 +74,7 @@ TEST(errors_stay_below_the_bound_on_random_fields_and_functions) {
                 isogi_dvr_desc desc = {.pyramid = f.pyramid, .opaque = 1, .bound = k < 4 ? bounds[k] : 0};
                 isogi_dvr *dvr = dvr_new(&desc, &transfer);
                 float c[1][4], depth;
-                double tolerance = steps ? 4e-3 : 2e-5, error = 0; /* 20000 steps of some 15 voxels, errors of the second order but at steps */
+                double tolerance = steps ? 4e-3 : 2e-5, error = 0; /* 20000 steps over some 15 voxels: of second order but at steps */
                 CHECK(isogi_dvr_render(dvr, &view, NULL, c, &depth, NULL) == ISOGI_OK, "render");
                 isogi_dvr_free(dvr);
                 for (int a = 0; a < 3; a++) error = fmax(error, fabs((double)c[0][a] - (double)expected[a]));
@@ -82,14 +83,17 @@ TEST(errors_stay_below_the_bound_on_random_fields_and_functions) {
                     continue;
                 }
                 most[k] = fmax(most[k], error);
-                CHECK(fabs((double)c[0][3] - (double)expected[3]) < tolerance, "field %d ray %d: opacity %g, not %g", n, ray, (double)c[0][3], (double)expected[3]);
+                CHECK(fabs((double)c[0][3] - (double)expected[3]) < tolerance, "field %d ray %d: opacity %g, not %g", n, ray,
+                      (double)c[0][3], (double)expected[3]);
                 CHECK(error < bounds[k] + tolerance, "field %d ray %d, bound %g: error %g", n, ray, bounds[k], error);
-                if (half < 1e9 && expected[3] > 1e-3L && !steps) deepest = fmax(deepest, fabs((double)depth - half));
+                if (half < 1e9 && expected[3] > 1e-3L && !steps)
+                    deepest = fmax(deepest, fabs((double)depth - half));
             }
         }
         field_free(&f);
     }
-    printf("    bounds 1 .1 .01 .001: largest errors of colours %.2g %.2g %.2g %.2g; of opacity by samples half a voxel apart %.2g\n", most[0], most[1], most[2], most[3], sampled);
+    printf("    bounds 1 .1 .01 .001: largest errors of colours %.2g %.2g %.2g %.2g; of opacity by samples half a voxel apart %.2g\n",
+           most[0], most[1], most[2], most[3], sampled);
     CHECK(most[3] < 4e-3 + 1e-3 && most[0] > most[3] && sampled > 0.01, "errors %g %g, of samples %g", most[0], most[3], sampled);
     CHECK(deepest < 5e-3, "depth of half opacity errs by %g", deepest); /* some steps of quadrature, where it stands still */
 }
@@ -100,7 +104,8 @@ TEST(homogeneous_media_and_steps_are_exact) {
         field f = field_new(N, N, N);
         for (size_t i = 0; i < field_count(&f); i++) f.value[i] = kind ? (double)(i % N) : 0.5;
         field_build(&f);
-        const isogi_transfer_point p[] = {{0, {1, 0.5f, 0}, 0.1f}, {4.3, {1, 0.5f, 0}, 0.1f}, {4.3, {0, 0, 1}, 0.3f}, {11, {0, 0, 1}, 0.3f}};
+        const isogi_transfer_point p[] = {{0, {1, 0.5f, 0}, 0.1f}, {4.3, {1, 0.5f, 0}, 0.1f},
+                                           {4.3, {0, 0, 1}, 0.3f}, {11, {0, 0, 1}, 0.3f}};
         const isogi_transfer transfer = {p, 4, NULL, 0};
         const isogi_dvr_desc desc = {.pyramid = f.pyramid, .opaque = 1, .bound = 1};
         const double eye[3] = {-20, 4.2, 5.7}, target[3] = {5, 4.2, 5.7};
@@ -109,8 +114,10 @@ TEST(homogeneous_media_and_steps_are_exact) {
         double front = exp(-0.1 * (kind ? 4.3 : 11)), back = kind ? exp(-0.3 * (11 - 4.3)) : 1;
         float c[1][4];
         CHECK(isogi_dvr_render(dvr, &view, NULL, c, NULL, NULL) == ISOGI_OK, "render");
-        CHECK(fabs((double)c[0][3] - (1 - front * back)) < 1e-6 && fabs((double)c[0][0] - (1 - front)) < 1e-6 && fabs((double)c[0][2] - front * (1 - back)) < 1e-6,
-              "kind %d: %g %g %g, not %g %g %g", kind, (double)c[0][3], (double)c[0][0], (double)c[0][2], 1 - front * back, 1 - front, front * (1 - back));
+        CHECK(fabs((double)c[0][3] - (1 - front * back)) < 1e-6 && fabs((double)c[0][0] - (1 - front)) < 1e-6 &&
+                  fabs((double)c[0][2] - front * (1 - back)) < 1e-6,
+              "kind %d: %g %g %g, not %g %g %g", kind, (double)c[0][3], (double)c[0][0], (double)c[0][2],
+              1 - front * back, 1 - front, front * (1 - back));
         isogi_dvr_free(dvr);
         field_free(&f);
     }
@@ -132,17 +139,20 @@ TEST(pictures_with_a_bound_are_those_of_small_steps) {
         for (int shading = ISOGI_DVR_UNLIT; shading <= ISOGI_DVR_TWO_SIDED; shading++) {
             const isogi_transfer transfer = {p, 4, &peak, (size_t)peaks};
             for (int n = 0; n < 2; n++) {
-                isogi_dvr_desc desc = {.pyramid = f.pyramid, .shading = (isogi_dvr_shading)shading, .opaque = 1, .bound = n ? 0.01 : 0, .step = n ? 50 : 0.02, .directions = 16,
-                                       .grid = {4, 4, 4}, .visibility_step = 1, .classification = n ? ISOGI_DVR_EXACT : ISOGI_DVR_POST_CLASSIFIED};
+                isogi_dvr_desc desc = {.pyramid = f.pyramid, .shading = (isogi_dvr_shading)shading, .opaque = 1, .bound = n ? 0.01 : 0,
+                                       .step = n ? 50 : 0.02, .directions = 16, .grid = {4, 4, 4}, .visibility_step = 1,
+                                       .classification = n ? ISOGI_DVR_EXACT : ISOGI_DVR_POST_CLASSIFIED};
                 isogi_dvr *dvr = dvr_new(&desc, &transfer);
                 CHECK(isogi_dvr_set_clip(dvr, plane, 1) == ISOGI_OK && isogi_dvr_step(dvr, 0, NULL) == ISOGI_OK, "step");
                 CHECK(isogi_dvr_render(dvr, &view, &lighting, image[n], depth[n], NULL) == ISOGI_OK, "render");
                 isogi_dvr_free(dvr);
             }
             double rms = rms_difference(image[0], image[1], SIDE * SIDE);
-            CHECK(rms < (shading ? 0.02 : 1e-3), "peaks %d, shading %d: rms %g", peaks, shading, rms); /* light is looked up once for a cell */
+            CHECK(rms < (shading ? 0.02 : 1e-3), "peaks %d, shading %d: rms %g", peaks, shading, rms); /* light once for a cell */
             for (int i = 0; i < SIDE * SIDE; i++)
-                if (!shading && image[0][i][3] > 0.1f) CHECK(fabs((double)depth[0][i] - (double)depth[1][i]) < 0.05, "depth %g, not %g", (double)depth[1][i], (double)depth[0][i]);
+                if (!shading && image[0][i][3] > 0.1f)
+                    CHECK(fabs((double)depth[0][i] - (double)depth[1][i]) < 0.05, "depth %g, not %g", (double)depth[1][i],
+                          (double)depth[0][i]);
         }
     field_free(&f);
 }
@@ -163,7 +173,8 @@ static double layered_opacity(const double *layer, const isogi_transfer *t) {
 /* The upper side of a step holds at the value itself, for volumes and layers of it: at any value, whatever its digits, and where it is
    the least, the largest or the only one that occurs. */
 TEST(constant_regions_on_a_step_absorb_as_its_upper_side_says) {
-    const double kinds[][3] = {{5, 5, 5}, {0, 5, 7}, {5, 7, 6}, {0, 3, 5}, {0, 0, 0}, {-5000.7, -5000.7, -5000.7}, {5000, 5001, 5000}, {1e6 + 0.25, 1e6 + 0.25, 1e6 + 0.25}};
+    const double kinds[][3] = {{5, 5, 5}, {0, 5, 7}, {5, 7, 6}, {0, 3, 5}, {0, 0, 0}, {-5000.7, -5000.7, -5000.7},
+                               {5000, 5001, 5000}, {1e6 + 0.25, 1e6 + 0.25, 1e6 + 0.25}};
     const double at[] = {5, 5, 5, 5, 0, -5000.7, 5000, 1e6 + 0.25}, eye[3] = {5.4, 5.4, -30}, target[3] = {5.4, 5.4, 3};
     for (int kind = 0; kind < 8; kind++) {
         double layer[N], s = (double)(float)at[kind];
@@ -171,10 +182,14 @@ TEST(constant_regions_on_a_step_absorb_as_its_upper_side_says) {
         for (int z = 0; z < N; z++) layer[z] = (double)(float)kinds[kind][z / 4];
         for (size_t i = 0; i < field_count(&f); i++) f.value[i] = layer[i / (N * N)];
         field_build(&f);
-        const isogi_transfer_point up[] = {{s - 5, {1, 1, 1}, 0}, {s, {1, 1, 1}, 0}, {s, {1, 1, 1}, 0.2f}, {s + 4, {1, 1, 1}, 0.2f}};
-        const isogi_transfer_point down[] = {{s - 5, {1, 1, 1}, 0.2f}, {s, {1, 1, 1}, 0.2f}, {s, {1, 1, 1}, 0}, {s + 4, {1, 1, 1}, 0}};
-        const isogi_transfer_point tent[] = {{s - 5, {1, 1, 1}, 0}, {s - 1, {1, 1, 1}, 0}, {s, {1, 1, 1}, 0.2f}, {s, {1, 1, 1}, 0}, {s + 1, {1, 1, 1}, 0}};
-        const isogi_transfer transfers[] = {{up, 4, NULL, 0}, {down, 4, NULL, 0}, {up, 3, NULL, 0}, {up + 2, 1, NULL, 0}, {tent, 5, NULL, 0}};
+        const isogi_transfer_point up[] = {{s - 5, {1, 1, 1}, 0}, {s, {1, 1, 1}, 0}, {s, {1, 1, 1}, 0.2f},
+                                           {s + 4, {1, 1, 1}, 0.2f}};
+        const isogi_transfer_point down[] = {{s - 5, {1, 1, 1}, 0.2f}, {s, {1, 1, 1}, 0.2f},
+                                             {s, {1, 1, 1}, 0}, {s + 4, {1, 1, 1}, 0}};
+        const isogi_transfer_point tent[] = {{s - 5, {1, 1, 1}, 0}, {s - 1, {1, 1, 1}, 0}, {s, {1, 1, 1}, 0.2f},
+                                             {s, {1, 1, 1}, 0}, {s + 1, {1, 1, 1}, 0}};
+        const isogi_transfer transfers[] = {{up, 4, NULL, 0}, {down, 4, NULL, 0}, {up, 3, NULL, 0},
+                                            {up + 2, 1, NULL, 0}, {tent, 5, NULL, 0}};
         for (int k = 0; k < 5; k++)
             for (int path = 0; path <= 4; path++) { /* 0: with a bound */
                 const isogi_context context = {.threads = 1, .force_path = path};
@@ -182,7 +197,8 @@ TEST(constant_regions_on_a_step_absorb_as_its_upper_side_says) {
                 isogi_dvr *dvr = dvr_new_with(&desc, &transfers[k], &context);
                 double expected = layered_opacity(layer, &transfers[k]), opacity = (double)cast(dvr, eye, target, NULL).c[3];
                 double tolerance = path ? 0.01 : 2e-4; /* samples; classes of values for the steps between */
-                CHECK(fabs(opacity - expected) < tolerance, "layers %d, function %d, %s %d: opacity %g, not %g", kind, k, path ? "path" : "bound", path, opacity, expected);
+                CHECK(fabs(opacity - expected) < tolerance, "layers %d, function %d, %s %d: opacity %g, not %g", kind, k,
+                      path ? "path" : "bound", path, opacity, expected);
                 isogi_dvr_free(dvr);
             }
         field_free(&f);
@@ -199,7 +215,8 @@ TEST(the_largest_doubles_give_the_picture_of_small_ones) {
         isogi_pyramid *pyramid = NULL;
         for (int i = 0; i < N * N * N; i++) data[i / N / N][i / N % N][i % N] = most * cos(0.5 * (i / N / N) + 0.1 * (i % N));
         CHECK(isogi_vol_build(&pyramid, &volume, &serial) == ISOGI_OK, "build");
-        const isogi_transfer_point p[] = {{-most, {1, 0, 0}, 0.3f}, {-0.5 * most, {0, 1, 0}, 0}, {0.9 * most, {0.2f, 0, 1}, 0.2f}, {most, {0, 1, 0}, 0.6f}};
+        const isogi_transfer_point p[] = {{-most, {1, 0, 0}, 0.3f}, {-0.5 * most, {0, 1, 0}, 0},
+                                          {0.9 * most, {0.2f, 0, 1}, 0.2f}, {most, {0, 1, 0}, 0.6f}};
         const isogi_transfer transfer = {p, 4, NULL, 0};
         const isogi_dvr_desc desc = {.pyramid = pyramid, .opaque = 1, .bound = 0.001};
         const double eye[3] = {4.1, 5.4, -30}, target[3] = {5.4, 5.7, 3};
@@ -208,7 +225,9 @@ TEST(the_largest_doubles_give_the_picture_of_small_ones) {
         memcpy(c[n], got.c, sizeof c[n]), depth[n] = got.depth;
         isogi_dvr_free(dvr), isogi_vol_free(pyramid);
     }
-    for (int a = 0; a < 4; a++) CHECK(fabs((double)c[0][a] - (double)c[1][a]) < 1e-6 && c[0][3] > 0.3f, "channel %d: %g, not %g", a, (double)c[1][a], (double)c[0][a]);
+    for (int a = 0; a < 4; a++)
+        CHECK(fabs((double)c[0][a] - (double)c[1][a]) < 1e-6 && c[0][3] > 0.3f, "channel %d: %g, not %g", a, (double)c[1][a],
+              (double)c[0][a]);
     CHECK(fabs((double)depth[0] - (double)depth[1]) < 1e-4, "depth %g, not %g", (double)depth[1], (double)depth[0]);
 }
 
