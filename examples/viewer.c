@@ -403,7 +403,8 @@ static int check_transfer(viewer *v, int suggested) {
     if (o->has_coarsest && peaks) return file_fail(v->error, "--coarsest: knows no peaks, and the transfer function has some");
     if (o->method > ISOGI_DVR_BRUTE && peaks)
         return file_fail(v->error, "--method: %s knows no peaks, and the transfer function has some", method_name[o->method]);
-    if (o->bound > 0 && o->has_step && !o->method && !peaks) return file_fail(v->error, "%s", without_step);
+    if (o->bound > 0 && o->has_step && ((!o->method && !peaks) || !v->transfer.point_count)) /* crossings of peaks are exact */
+        return file_fail(v->error, "%s", without_step);
     if (o->has_silhouette && o->mode == DVR && !peaks)
         return file_fail(v->error, "--silhouette: is for peaks in --mode dvr, and the transfer function has none");
     return 1;

@@ -509,6 +509,7 @@ TEST(silly_options_get_one_line_that_names_the_option) {
         {"procedural:gyroid --grid 8,8,8", "--grid: works with --mode dvr and scale-invariant, not with --mode irradiance"},
         {"procedural:gyroid --mode scale-invariant --bound .1", "--bound: works with --mode dvr, not"},
         {"procedural:gyroid:8 --mode dvr --bound .1 --step 1", "--step: rays with --bound"},
+        {"procedural:coulomb:8 --mode dvr --bound .1 --step 1", "--step: rays with --bound"},
         {"procedural:gyroid --mode dvr --bound .1 --step 1 --method paper", "--step: rays with --bound"},
         {"procedural:gyroid --mode dvr --bound .1 --step 1 --shading local --method brute", "--method: needs"},
         {"procedural:gyroid --mode dvr --bound .1 --step 1 --shading local", "--step: rays with --bound"},
