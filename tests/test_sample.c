@@ -221,15 +221,12 @@ TEST(samples_agree_with_their_definition_in_avx512) { every_volume_on_path(4); }
 /* Stores the nearest number of the lattice's type to `raw`. */
 static void raw_set(const lattice *l, int i, int j, int k, double raw) {
     char *p = raw_at(l, i, j, k);
-    const float f = (float)raw;
-    const uint16_t u = (uint16_t)raw;
-    const int16_t s = (int16_t)raw;
     switch (l->volume.type) {
     case ISOGI_U8: *(uint8_t *)p = (uint8_t)raw; break;
     case ISOGI_I8: *(int8_t *)p = (int8_t)raw; break;
-    case ISOGI_U16: memcpy(p, &u, 2); break;
-    case ISOGI_I16: memcpy(p, &s, 2); break;
-    case ISOGI_F32: memcpy(p, &f, 4); break;
+    case ISOGI_U16: memcpy(p, &(uint16_t){(uint16_t)raw}, 2); break;
+    case ISOGI_I16: memcpy(p, &(int16_t){(int16_t)raw}, 2); break;
+    case ISOGI_F32: memcpy(p, &(float){(float)raw}, 4); break;
     case ISOGI_F64: memcpy(p, &raw, 8); break;
     }
 }
