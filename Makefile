@@ -5,8 +5,9 @@
 # make test      the quick tests, under two minutes; ends with "N passed, N failed, N skipped"
 # make check     the long suite: full sizes, every compiler, sanitizer and emulator that is installed
 # make bench     run time against error: build/bench/*.csv and *.svg      (ONLY=sh|vol|trace|dvr|visibility QUICK=1)
-# make bench-peers   rays beside Embree 3, on this machine, where <embree3/rtcore.h> is (libembree-dev), and evaluation of harmonics
-#                    beside sphericart's, where SPHERICART names a folder with its include/ and lib/libsphericart.so
+# make bench-peers   rays beside Embree 3, on this machine, where <embree3/rtcore.h> is (libembree-dev), frames and meshes beside VTK 9
+#                    where its headers are (libvtk9-dev), and harmonics beside generated code, and beside sphericart and SHTns where
+#                    SPHERICART names a folder with include/ and lib/libsphericart.so, SHTNS one with shtns.h and libshtns.a
 # make clean
 # CC, CXX and CFLAGS may be set; nothing but a C compiler and make is needed.
 
@@ -28,7 +29,7 @@ PROCESSORS := $(shell getconf _NPROCESSORS_ONLN 2>/dev/null || echo 2)
 PARALLEL    = $(if $(findstring -j,$(MAKEFLAGS)),,-j$(PROCESSORS))
 QUIET_MAKE  = $(MAKE) --no-print-directory $(PARALLEL)
 
-export CC CXX CFLAGS SPHERICART
+export CC CXX CFLAGS SPHERICART SHTNS
 
 comma := ,
 
@@ -37,16 +38,18 @@ all: $(EXAMPLES)
 # The implementation of each header is compiled once, and switched off in the programs that are linked with it: it takes most of the
 # time. A test that looks at what is private to a header (isogi_vol__name), or sets what it is compiled with, holds that header's
 # implementation itself. Test programs are compiled at -O1, in half the time: what they test is in those objects, as its users compile it.
-HEADERS := sh vol trace dvr
+# The headers that take longest come first. Tests that look inside, or run programs, do little themselves and are compiled at -O0.
+HEADERS := dvr vol sh trace
 OBJECTS := $(HEADERS:%=build/isogi_%.o)
 
 # What a source file includes is found by the compiler (the .d files). A line "LIBS: -lname" in a test's first comment names
-# libraries of its own. What does not compile must not leave an older program behind.
+# libraries of its own, "FLAGS: -O0" options. What does not compile must not leave an older program behind.
 COMPILE = @rm -f $@; echo "$(CC) $<"; \
 	libs=$$(sed -n '1,20s|.*LIBS: \([^*]*\).*|\1|p' $<); \
+	flags=$$(sed -n '1,20s|.*FLAGS: \([^*]*\).*|\1|p' $<); \
 	shared=$$(for h in $(2); do H=ISOGI_$$(echo $$h | tr a-z A-Z); \
 		grep -q "isogi_$${h}__\|looks inside.*isogi_$$h\|define $${H}_LEVEL" $< || echo "-D$${H}_IMPLEMENTED build/isogi_$$h.o"; done); \
-	$(CC) $(C99) $(CFLAGS) -MMD -MP -MF $@.d -MT $@ $(1) -o $@ $< $$shared $(LIBS) $$libs
+	$(CC) $(C99) $(CFLAGS) -MMD -MP -MF $@.d -MT $@ $(1) $$flags -o $@ $< $$shared $(LIBS) $$libs
 
 # As strict C99; what the compiler said is kept for the tests, which want silence.
 $(OBJECTS): build/%.o: %.h tests/compile/one.c build/flags
@@ -66,8 +69,18 @@ build/tests/%: tests/%.c build/flags $(OBJECTS)
 build/bench/%: tests/bench/%.c build/flags $(OBJECTS)
 	$(call COMPILE,-Itests,$(HEADERS))
 
-build/bench/peer_sphericart: tests/bench/peer_sphericart.c build/flags $(OBJECTS)
-	$(call COMPILE,-isystem "$(SPHERICART)/include" "-L$(SPHERICART)/lib" "-Wl$(comma)-rpath$(comma)$(SPHERICART)/lib",$(HEADERS))
+# with the peers whose folders are named
+HARMONICS := $(if $(SPHERICART),-DPEER_SPHERICART -isystem "$(SPHERICART)/include" "-L$(SPHERICART)/lib" "-Wl$(comma)-rpath$(comma)$(SPHERICART)/lib") \
+	$(if $(SHTNS),-DPEER_SHTNS -isystem "$(SHTNS)" "-L$(SHTNS)")
+build/bench/peer_harmonics: tests/bench/peer_harmonics.c build/flags $(OBJECTS) FORCE
+	$(call COMPILE,$(HARMONICS),$(HEADERS)) $(if $(SPHERICART),-lsphericart) $(if $(SHTNS),-lshtns -lfftw3)
+
+# VTK 9, as Debian's libvtk9-dev installs it.
+VTK      := $(notdir $(lastword $(sort $(wildcard /usr/include/vtk-9*))))
+VTK_LIBS := RenderingVolumeOpenGL2 RenderingVolume RenderingCore FiltersCore CommonExecutionModel CommonDataModel CommonMisc CommonCore
+build/bench/peer_vtk: tests/bench/peer_vtk.cpp build/flags $(OBJECTS)
+	@rm -f $@; echo "$(CXX) $<"; $(CXX) -std=c++17 -Wall -Wextra $(CFLAGS) -I. -isystem /usr/include/$(VTK) -MMD -MP -MF $@.d -MT $@ -o $@ $< \
+		build/isogi_sh.o build/isogi_vol.o build/isogi_dvr.o $(VTK_LIBS:%=-lvtk%-$(VTK:vtk-%=%)) $(LIBS)
 
 # Changes only when the compiler or its flags do, so that another CC builds everything anew.
 build/flags: FORCE
@@ -91,7 +104,7 @@ pictures: build/viewer build/strip
 
 # ---- tests ----
 
-programs: $(TESTS) $(EXAMPLES)
+programs: $(EXAMPLES) $(TESTS)
 
 test:
 	@$(QUIET_MAKE) -k programs || true
@@ -115,9 +128,9 @@ bench-peers: build/flags
 	@if echo '#include <embree3/rtcore.h>' | $(CC) -E - > build/bench/peers.log 2>&1; then \
 		$(QUIET_MAKE) build/bench/peer_embree && build/bench/peer_embree; \
 	else echo "bench-peers: <embree3/rtcore.h> is not there (libembree-dev): nothing to compare with"; fi
-	@if [ -f "$(SPHERICART)/include/sphericart.h" ]; then \
-		$(QUIET_MAKE) build/bench/peer_sphericart && OMP_NUM_THREADS=1 build/bench/peer_sphericart; \
-	else echo "bench-peers: SPHERICART names no folder with include/sphericart.h: nothing to compare with"; fi
+	@if [ -n "$(VTK)" ]; then $(QUIET_MAKE) build/bench/peer_vtk && build/bench/peer_vtk; \
+	else echo "bench-peers: VTK 9's headers are not there (libvtk9-dev): nothing to compare with"; fi
+	@$(QUIET_MAKE) build/bench/peer_harmonics && OMP_NUM_THREADS=1 build/bench/peer_harmonics
 
 clean:
 	rm -rf build

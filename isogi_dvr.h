@@ -9,14 +9,14 @@
        int main(void) {
            static const isogi_transfer_point points[] = {{0, {1, 1, 1}, 0}, {31, {1, 0.5f, 0.2f}, 0.2f}}; // value, colour, extinction
            static float data[32][32][32], image[32][32][4];
-           static isogi_volume volume; static isogi_transfer transfer; static isogi_view view; static isogi_dvr_desc desc; // static: all zero
+           static isogi_volume volume; static isogi_transfer transfer; static isogi_view view; static isogi_dvr_desc desc; // static: zeros
            isogi_pyramid *pyramid; isogi_dvr *dvr;
            for (int i = 0; i < 32768; i++) data[i / 1024][i / 32 % 32][i % 32] = (float)(i % 32); // f = x
            volume.data = data, volume.type = ISOGI_F32, volume.size[0] = volume.size[1] = volume.size[2] = 32;
            transfer.points = points, transfer.point_count = 2, view.width = view.height = 32;
            view.eye[0] = view.eye[1] = view.target[0] = view.target[1] = 15.5f, view.eye[2] = 100;
            if (isogi_vol_build(&pyramid, &volume, NULL)) return 1; else desc.pyramid = pyramid;
-           if (isogi_dvr_create(&dvr, &desc, NULL) || isogi_dvr_set_transfer(dvr, &transfer)) return 1; // then isogi_dvr_free, isogi_vol_free
+           if (isogi_dvr_create(&dvr, &desc, NULL) || isogi_dvr_set_transfer(dvr, &transfer)) return 1; // then isogi_dvr_free, _vol_free
            if (!isogi_dvr_render(dvr, &view, NULL, image[0], NULL, NULL)) printf("opacity of the centre: %g\n", (double)image[16][16][3]); }
 
    What it does
@@ -35,9 +35,9 @@
    weights that the field's course decides; any other such mean differs by less than the bound. Parts are seen with weights that
    sum up to the opacity: what an unlit pixel's colour errs by is at most the bound times its opacity. (`opaque` below 1 ends rays
    early and adds 1 - opaque. Light is looked up once for a piece within a cell, by its first part: the opacity of that is what two-sided
-   light takes, its extinction what says how far off dense matter visibility is looked up.) Errors measured on random fields and functions with
-   bounds 1, .1, .01, .001: .046, .006, .0006, .0001 (test_dvr_bound); samples know no bound, as a cell may hold what they miss. A frame
-   of the gyroid takes some 10, 15 and 60 times that of samples with bounds 1, .1 and .01: the time of what is cut by colour goes as
+   light takes, its extinction what says how far off dense matter visibility is looked up.) Errors measured on random fields and functions
+   with bounds 1, .1, .01, .001: .046, .006, .0006, .0001 (test_dvr_bound); samples know no bound, as a cell may hold what they miss. A
+   frame of the gyroid takes some 10, 15 and 60 times that of samples with bounds 1, .1 and .01: the time of what is cut by colour goes as
    1 / bound, and every point of the function between the values at a cell's two ends is one more part.
 
    Data space. The scale-invariant integral (Kraus 2005, eq. 4): extinction is per unit of the data, a piece of ray over which
@@ -49,6 +49,8 @@
                        there, and each monotone piece is integrated in closed form over the linear pieces of the transfer
                        function, colours and all, in double. There is no step size: `step` means nothing. Against long-double
                        quadrature pixels are right to the rounding of a float, from extinctions of 1e-9 to opaque, in depth too.
+                       Unlit and without peaks or silhouettes, pieces of neighbouring cells are joined as long as the value goes one
+                       way, and eight rays go side by side where the machine has AVX-512: a fifth of the time.
        pre-integrated  Samples a step apart; every pair is looked up in a table (eq. 5 to 7).
        post-classified Samples a step apart, each weighted by the slope grad s . dir of the trilinear field (eq. 10, 11).
 
@@ -89,8 +91,10 @@
 
    where L are the SH coefficients of the light that arrives (environment, directional lights as deltas; point and sphere lights
    are added at every sample with their inverse square) and V those of the transmittance from the sample to the border of the box
-   in all directions, interpolated from a regular grid. Where nothing casts shadows, V(w) = 1, and a sky of radiance 1 from
-   everywhere gives g_s = rgb / (4 pi) * 4 pi = rgb: colour is the albedo, and under a uniform sky of 1 a medium without shadows
+   in all directions, interpolated between the eight nearest points of a regular grid, of which the more open count more: the
+   trilinear weight of each times min(1, 2 m)^2, where m >= 0.005 is the mean of its V over all directions. So the light on a surface is
+   that of the points in front of it, without the darkness of those below. Where nothing casts shadows, V(w) = 1, and a sky of radiance
+   1 from everywhere gives g_s = rgb / (4 pi) * 4 pi = rgb: colour is the albedo, and under a uniform sky of 1 a medium without shadows
    looks as it does unlit. A directional light of irradiance E gives g_s = rgb E V / (4 pi). The truncated series can be
    negative: it is clamped at zero. Matter that is dense for the grid is lit as what is in front of it: in physical space V is looked up
    off = r x^2 / (x^2 + 16) nearer to the eye, where r is 1.5 grid distances, as they are along the ray, and x the optical depth of r
@@ -141,9 +145,9 @@
    - No light on tetrahedral meshes, no scattering beyond the first, no refraction, no glossy surfaces.
    - Pictures of physical space without a bound are pre-integrated (ISOGI_DVR_EXACT is the same there), unless they have peaks among
      the values that occur, local shading (ISOGI_DVR_LOCAL, isogi_view.local), nearby lights, anisotropy, jitter, or an axis of one
-     voxel: those are post-classified, and features narrower than the value's change from sample to sample need a smaller step. Pre-classification
-     (colours interpolated instead of values) is left out on purpose: in data space it would depend on the view, and it blurs every
-     surface to the width of a voxel.
+     voxel: those are post-classified, and features narrower than the value's change from sample to sample need a smaller step.
+     Pre-classification (colours interpolated instead of values) is left out on purpose: in data space it would depend on the view, and it
+     blurs every surface to the width of a voxel.
    - The border of the volume is no surface: outside of the box is empty space.
    - It reads no files, opens no window, converts nothing to sRGB. Pixels are linear and premultiplied: put a background under
      them with  out = pixel + (1 - opacity) * background. For a display, what examples/common/picture.h does: multiply by an exposure,
@@ -293,17 +297,18 @@ typedef struct isogi_dvr_desc {
     isogi_dvr_shading shading;
     double unit;            /* world length that extinction is per; 0 = the smallest voxel spacing: here and below, the smallest world
                                distance of two neighbouring voxels, isogi_volume.spacing times the length of the axis's column of axes */
-    double step;            /* sampling distance along a ray in units of the smallest voxel spacing, 0.0001..10000; 0 = 0.5 */
+    double step;            /* sampling distance along a ray in units of the smallest voxel spacing, 0.0001..10000; 0 = 0.5, and 1 where
+                               pieces of ray are pre-integrated in physical space without peaks, the default, which errs less */
     int order;              /* SH order of visibility, 1..6; 0 = 3 */
     int directions;         /* visibility rays per grid point, 1..65536; 0 = 64 */
     size_t grid[3];         /* visibility grid points along x, y, z (first and last on the border; a single one at the middle);
                                0 = about a quarter of the voxels along that axis, at least 2 (1 where there is one voxel) */
-    int coarsest;           /* 1, 2, 4 or 8; 0 = 1: the regular grid. Above 1 sweeps hold visibility in several resolutions (see above): grid points
-                               stand up to this many times as far apart, and the grid is rounded up to multiples of 8 distances.
+    int coarsest;           /* 1, 2, 4 or 8; 0 = 1: the regular grid. Above 1 sweeps hold visibility in several resolutions (see above):
+                               grid points stand up to this many times as far apart, and the grid is rounded up to multiples of 8 distances.
                                The other methods hold the regular grid */
-    float opaque;           /* a ray ends at this opacity, 0..1; 0 = 0.999; 1 = never */
-    uint32_t jitter;        /* not 0: every pixel's samples are moved by a part of a step of its own, which turns rings of large steps into noise.
-                               The same number gives the same picture. Sampled rays only; physical space is post-classified then */
+    float opaque;           /* a ray ends at the first piece at which it has this opacity, 0..1; 0 = 0.999; 1 = never */
+    uint32_t jitter;        /* not 0: every pixel's samples are moved by a part of a step of its own, which turns rings of large steps into
+                               noise. The same number gives the same picture. Sampled rays only; physical space is post-classified then */
     double visibility_step; /* sampling distance along visibility rays, as `step`; 0 = twice `step`. Sweeps: distance of the lattice
                                of extinction, rounded so that grid points are on it; 0 = 2 */
     isogi_dvr_method method;
@@ -312,9 +317,10 @@ typedef struct isogi_dvr_desc {
     double tolerance;       /* pre-integrated physical space: pieces of ray across which extinction times length, times the transparency
                                before them, changes by more are sampled seven times as densely; 0 = 0.5. It limits
                                no error: `bound` does */
-    double bound;           /* physical space, 1e-4..1; 0 = none: how far colours may err, in units of the largest of the transfer function's, or of 1.
-                               See "Error bounds" above: rays walk cells as they do in data space, and step, tolerance, classification
-                               and jitter mean nothing to pictures; rays of visibility have their distance from step all the same */
+    double bound;           /* physical space, 1e-4..1; 0 = none: how far colours may err, in units of the largest of the transfer
+                               function's, or of 1. See "Error bounds" above: rays walk cells as they do in data space, and step, tolerance,
+                               classification and jitter mean nothing to pictures;
+                               rays of visibility have their distance from step all the same */
     double emission;        /* share of rgb that glows by itself, besides scattering light; 0..1e6; with visibility only */
     double radius;          /* the paper's method: of local visibility, in units of the smallest voxel spacing, 1..32; 0 = 16 */
     double reduction;       /* the paper's method: voxels of the volume to points of its blocks, at least 1; 0 = 4. A block that is not
@@ -325,7 +331,8 @@ typedef struct isogi_dvr_desc {
     isogi_dvr_silhouette silhouette;
     isogi_normal_kind normals;   /* of shading and of silhouettes of peaks; 0 = smooth */
     isogi_material material[3];  /* two-sided: seen from lower values, seen from higher values, light that comes through */
-    const isogi_pyramid *second; /* borrowed: a field that colours peaks; NULL = none. Its value at a crossing, through these points, gives a */
+    const isogi_pyramid *second; /* borrowed: a field that colours peaks; NULL = none. Its value at a crossing, through these points,
+                                    gives a */
     const isogi_transfer_point *second_points; /* factor on the peak's colour; borrowed; their extinction means nothing */
     size_t second_count;
 } isogi_dvr_desc;
@@ -343,8 +350,8 @@ typedef struct isogi_view {
     int width, height;              /* 1..32768 */
     float eye[3], target[3], up[3]; /* world; up 0 = +y */
     float fov;                      /* vertical angle of view in degrees, below 180; 0 = 45 */
-    int local;                      /* 0, or 1: shade by local visibility, for cut planes, and lights within. ISOGI_INVALID where the paper's
-                                       method is not at work (another method, peaks, data space, unlit, tetrahedra) */
+    int local;                      /* 0, or 1: shade by local visibility, for cut planes, and lights within. ISOGI_INVALID where the
+                                       paper's method is not at work (another method, peaks, data space, unlit, tetrahedra) */
     isogi_depth_kind depth;         /* what is asked for where depth is */
 } isogi_view;
 
@@ -383,7 +390,8 @@ ISOGI_API isogi_result isogi_dvr_set_clip(isogi_dvr *dvr, const double (*planes)
    one level, and only the global part is counted. */
 typedef struct isogi_dvr_report {
     size_t block_count[3];
-    const uint8_t *level;      /* [blocks], valid until the next writer: 16, 8, 4, 2, 1, or 0 for dropped; NULL without the paper's method */
+    const uint8_t *level;      /* [blocks], valid until the next writer: 16, 8, 4, 2, 1, or 0 for dropped;
+                                  NULL without the paper's method */
     size_t level_count[6];     /* blocks that are dropped, or of level 1, 2, 4, 8, 16 */
     size_t points;             /* of all blocks, not counting those repeated on their upper faces */
     double reduction;          /* voxels to points */
@@ -391,7 +399,8 @@ typedef struct isogi_dvr_report {
     size_t blocks_classified;  /* so far: blocks whose classification a new transfer function or clip plane changed */
     size_t blocks_computed;    /* so far: blocks whose local visibility was computed */
     size_t grid_points;        /* of global visibility; in several resolutions those that are held, with the repeated ones */
-    size_t step_count[4];      /* in several resolutions: blocks of 8^3 grid distances that hold every point, every 2nd, 4th, 8th along an axis */
+    size_t step_count[4];      /* in several resolutions: blocks of 8^3 grid distances that hold every point, every 2nd, 4th,
+                                  8th along an axis */
 } isogi_dvr_report;
 ISOGI_API isogi_result isogi_dvr_inspect(const isogi_dvr *dvr, isogi_dvr_report *report);
 
@@ -444,8 +453,8 @@ ISOGI_API isogi_result isogi_transfer_import(const float (*rgba)[4], size_t coun
    opaque soon after the third class begins (the fifth point), twice as dense at the top, a fifth to a seventh of it in the second class:
    what is dense is seen within what is not; in data space a passage through each upper class is about half opaque. A volume of one value
    gets points that nothing meets. threshold (may be NULL): where the second class begins, for an isosurface. */
-ISOGI_API isogi_result isogi_transfer_suggest(const isogi_pyramid *pyramid, isogi_dvr_space space, isogi_transfer_point points[ISOGI_SUGGEST_POINTS],
-                                              double *threshold);
+ISOGI_API isogi_result isogi_transfer_suggest(const isogi_pyramid *pyramid, isogi_dvr_space space,
+                                              isogi_transfer_point points[ISOGI_SUGGEST_POINTS], double *threshold);
 
 /* ---- tetrahedral meshes ------------------------------------------------------------------------------------------------------ */
 
@@ -462,7 +471,8 @@ typedef struct isogi_tet_mesh {
 /* What was found while the mesh was built: nothing of it is an error. */
 typedef struct isogi_tet_report {
     size_t degenerate; /* tetrahedra without volume, left out: det <= 1e-13 (longest edge)^3. Rays pass where they were */
-    size_t crowded;    /* faces of more than two tetrahedra: beyond the second they are border */
+    size_t crowded;    /* faces with a tetrahedron before them on the same side of the same points: of one listed twice, which is drawn
+                          once, or of two that overlap: the second is joined to what is still alone across the face, else border */
     size_t border;     /* faces of one tetrahedron */
 } isogi_tet_report;
 
@@ -483,8 +493,8 @@ ISOGI_API isogi_result isogi_dvr_tets_build(isogi_tets **tets, const isogi_tet_m
 ISOGI_API void isogi_dvr_tets_free(isogi_tets *tets); /* NULL is fine */
 
 /* As isogi_dvr_render, by rays that go from face to face; any number of peaks. counters->cells: tetrahedra passed. */
-ISOGI_API isogi_result isogi_dvr_tets_render(const isogi_tets *tets, const isogi_tet_desc *desc, const isogi_transfer *transfer, const isogi_view *view,
-                                             float (*premultiplied)[4], float *depth, isogi_counters *counters);
+ISOGI_API isogi_result isogi_dvr_tets_render(const isogi_tets *tets, const isogi_tet_desc *desc, const isogi_transfer *transfer,
+                                             const isogi_view *view, float (*premultiplied)[4], float *depth, isogi_counters *counters);
 
 #endif /* ISOGI_DVR_H */
 
@@ -515,7 +525,8 @@ ISOGI_API isogi_result isogi_dvr_tets_render(const isogi_tets *tets, const isogi
 #define ISOGI_DVR__LEAP 6                  /* blocks of 4^3 that a ray steps over at once, to each side */
 
 /* One vector type of 16 floats: the compiler divides it into what the machine has. */
-#if (defined(__clang__) || (defined(__GNUC__) && __GNUC__ >= 9)) && !defined(__TINYC__) && !defined(ISOGI_NO_SIMD) && !(defined(_WIN32) && !defined(__clang__)) && \
+#if (defined(__clang__) || (defined(__GNUC__) && __GNUC__ >= 9)) && !defined(__TINYC__) && !defined(ISOGI_NO_SIMD) && \
+    !(defined(_WIN32) && !defined(__clang__)) && \
     (!defined(__FLT_EVAL_METHOD__) || __FLT_EVAL_METHOD__ == 0)
 #define ISOGI_DVR__VECTORS
 typedef float isogi_dvr__floats __attribute__((vector_size(64), aligned(4), may_alias));
@@ -557,7 +568,8 @@ typedef struct isogi_dvr__rows {
     float *depth, *out;
     const float *from;
     size_t depth_row, out_row, from_row, rows, count, beside; /* beside: from a row of `from` to the other one that is read with it */
-    size_t weight;                                            /* from transmittance to its weight, in what pass_out writes and between reads */
+    size_t weight;                                            /* from transmittance to its weight,
+                                                                 in what pass_out writes and between reads */
 } isogi_dvr__rows;
 
 /* A step of local visibility's rays: see "local and global visibility" below. */
@@ -776,7 +788,8 @@ typedef struct isogi_dvr__integral {
     size_t side;
     double low, high;  /* values between which the table stands; the transfer function is constant before and beyond */
     double *node;      /* [side]: its values */
-    double *place;     /* [count]: entries that the points below this one take beyond their share by value, `by_value` for half of a value */
+    double *place;     /* [count]: entries that the points below this one take beyond their share by value,
+                          `by_value` for half of a value */
     double by_value;
 } isogi_dvr__integral;
 
@@ -802,7 +815,8 @@ typedef struct isogi_dvr__blocks {
 
 /* The grid of visibility in several resolutions: see "visibility of several resolutions" below. Block (i, j, k) of 8^3 grid distances is
    i + count[0] * (j + count[1] * k). */
-typedef struct isogi_dvr__held_block { uint32_t first, log; } isogi_dvr__held_block; /* its first point; holds every 2^log-th along an axis */
+typedef struct isogi_dvr__held_block { uint32_t first, log; } isogi_dvr__held_block; /* its first point; holds every
+                                                                                        2^log-th along an axis */
 typedef struct isogi_dvr__held {
     isogi_dvr__held_block *block; /* NULL: the regular grid */
     size_t count[3], total, points;
@@ -824,8 +838,9 @@ struct isogi_dvr {
     int cells[3];
     int transparent; /* no value that occurs has any extinction */
     isogi_level level[ISOGI_DVR__LEVELS];
-    uint8_t *empty[ISOGI_DVR__LEVELS]; /* one byte a block: nothing in it has any extinction */
-    uint8_t *steady[ISOGI_DVR__LEVELS]; /* all of it has one extinction and one colour; NULL in data space, and where voxels are not finite */
+    uint8_t *empty[ISOGI_DVR__LEVELS]; /* one byte a block: nothing in it has any extinction; of level 0: see isogi_dvr__mark_around */
+    uint8_t *steady[ISOGI_DVR__LEVELS]; /* all of it has one extinction and one colour; NULL in data space,
+                                           and where voxels are not finite */
     uint8_t *empty_blocks;             /* of both */
     size_t block_count;
 
@@ -848,7 +863,8 @@ struct isogi_dvr {
     size_t clip_count;
     uint8_t *cut;                /* one byte a block of level 1: 0 within all planes, 1 cut, 2 outside */
     size_t turned;               /* sweeps: how many of the first directions are along x */
-    float *gathered;             /* sweeps and the paper's method: [order * order][padded_count], sums so far; points z fastest up to there */
+    float *gathered;             /* sweeps and the paper's method: [order * order][padded_count], sums so far;
+                                    points z fastest up to there */
     size_t padded_count;         /* points of `gathered`, rounded up to whole vectors */
     isogi_counters counters;
 };
@@ -1076,7 +1092,8 @@ static void isogi_dvr__add_values(const isogi_dvr__integral *g, double x, double
 
 /* The value between x and y up to which the piece from x has this depth: K inverted, piece by piece. */
 static double isogi_dvr__value_at_depth(const isogi_dvr__integral *g, double x, double y, double factor, double depth) {
-    size_t n = g->count ? isogi_dvr__points_below(g->points, g->count, x) : 0, to = g->count ? isogi_dvr__points_below(g->points, g->count, y) : 0;
+    size_t n = g->count ? isogi_dvr__points_below(g->points, g->count, x) : 0,
+           to = g->count ? isogi_dvr__points_below(g->points, g->count, y) : 0;
     while (g->count) {
         double end = n < to ? g->points[n].value : n > to ? g->points[n - 1].value : y, from[4], at[4], k0, k1;
         isogi_dvr__on_piece(g, n, x, from), isogi_dvr__on_piece(g, n, end, at);
@@ -1174,8 +1191,8 @@ static void isogi_dvr__add_quiet(isogi_dvr__integral *g, double low, double high
     g->quiet[g->quiet_count][0] = low, g->quiet[g->quiet_count++][1] = high;
 }
 
-/* Along a ray in physical space (`lengths`) a value counts that it keeps to: what is quiet ends below a step up, whose upper side holds at the
-   value itself. */
+/* Along a ray in physical space (`lengths`) a value counts that it keeps to: what is quiet ends below a step up, whose upper side holds at
+   the value itself. */
 static void isogi_dvr__set_quiet(isogi_dvr__integral *g, int lengths) {
     double start = 0;
     size_t n;
@@ -1293,7 +1310,8 @@ static void isogi_dvr__look_up(const isogi_dvr__integral *g, double front, doubl
     x -= (double)i, y -= (double)j, at = g->table[i * g->side + j];
     for (a = 0; a < 4; a++) {
         double low = (double)at[a] + y * ((double)at[4 + a] - (double)at[a]);
-        double high = (double)at[4 * g->side + (size_t)a] + y * ((double)at[4 * g->side + 4 + (size_t)a] - (double)at[4 * g->side + (size_t)a]);
+        double high =
+            (double)at[4 * g->side + (size_t)a] + y * ((double)at[4 * g->side + 4 + (size_t)a] - (double)at[4 * g->side + (size_t)a]);
         value[a] = low + x * (high - low);
     }
     opacity = -expm1(-isogi_dvr__clamp(value[3] * length, 1e30));
@@ -1382,8 +1400,9 @@ static int isogi_dvr__range_steady(const isogi_dvr__transfer *t, const float ran
     n = isogi_dvr__points_below(t->points, t->point_count, (double)range[0]);
     if (!(range[0] < range[1])) return 1;
     if (n != isogi_dvr__points_below(t->points, t->point_count, (double)range[1])) return 0;
-    return !n || n == t->point_count || (!memcmp(t->points[n].rgb, t->points[n - 1].rgb, sizeof t->points[n].rgb) &&
-                                         !(t->points[n].extinction < t->points[n - 1].extinction) && !(t->points[n].extinction > t->points[n - 1].extinction));
+    return !n || n == t->point_count ||
+           (!memcmp(t->points[n].rgb, t->points[n - 1].rgb, sizeof t->points[n].rgb) &&
+            !(t->points[n].extinction < t->points[n - 1].extinction) && !(t->points[n].extinction > t->points[n - 1].extinction));
 }
 
 static int isogi_dvr__kept(const isogi_dvr *d, const double grid[3]) {
@@ -1442,6 +1461,23 @@ static void isogi_dvr__mark_cut(isogi_dvr *d, size_t block) {
     }
 }
 
+/* Empty blocks of level 0: how many levels are empty there, plus 4 if the largest such block holds no finite value. Where the smallest
+   block is not empty, no larger one is: ranges of values contain those of their parts,
+   and isogi_dvr__mark_cut marks with a block what it is made of. */
+static void isogi_dvr__mark_around(isogi_dvr *d) {
+    const size_t *size = d->level[0].size;
+    size_t x, y, z, i = 0;
+    int n;
+    for (z = 0; z < size[2]; z++)
+        for (y = 0; y < size[1]; y++)
+            for (x = 0; x < size[0]; x++, i++)
+                for (n = 0; n < ISOGI_DVR__LEVELS && d->empty[0][i]; n++) {
+                    const isogi_level *around = &d->level[n];
+                    size_t block = (x >> 2 * n) + around->size[0] * ((y >> 2 * n) + around->size[1] * (z >> 2 * n));
+                    if (d->empty[n][block]) d->empty[0][i] = (uint8_t)(n + 1 + (around->range[block][0] > around->range[block][1] ? 4 : 0));
+                }
+}
+
 static void isogi_dvr__mark_empty(isogi_dvr *d) {
     size_t i, count;
     int n;
@@ -1458,6 +1494,7 @@ static void isogi_dvr__mark_empty(isogi_dvr *d) {
     }
     for (i = 0; i < d->changed_count; i++)
         if (d->cut[i] == 2) isogi_dvr__mark_cut(d, i);
+    isogi_dvr__mark_around(d);
     if (d->desc.space == ISOGI_DVR_PHYSICAL) isogi_dvr__mark_leaps(d);
 }
 
@@ -1515,7 +1552,8 @@ static size_t isogi_dvr__mark_changed(isogi_dvr *d, const uint32_t *marks) {
     size_t i, count = 0;
     for (i = 0; i < d->changed_count; i++) {
         const float *range = d->level[1].range[i];
-        if (range[0] > range[1] || marks[isogi_dvr__class(d, (double)range[1]) + 1] == marks[isogi_dvr__class(d, (double)range[0])]) continue;
+        if (range[0] > range[1] || marks[isogi_dvr__class(d, (double)range[1]) + 1] == marks[isogi_dvr__class(d, (double)range[0])])
+            continue;
         d->changed[i] = 1, count++;
     }
     return count;
@@ -1827,7 +1865,8 @@ static void isogi_dvr__leap(const isogi_dvr *d, isogi_dvr__packet *p, isogi_coun
             if (!free) break;
             work->blocks_skipped++;
             for (a = 0; a < 3; a++) {
-                float border = (float)(4 * (p->inverse[a][k] > 0 ? c[a] + free : c[a] - free + 1)), t = (border - p->origin[a][k]) * p->inverse[a][k];
+                float border = (float)(4 * (p->inverse[a][k] > 0 ? c[a] + free : c[a] - free + 1)),
+                      t = (border - p->origin[a][k]) * p->inverse[a][k];
                 exit = t < exit ? t : exit;
             }
             i = ((int)exit > i ? (int)exit : i) + 1;
@@ -1850,7 +1889,8 @@ static void isogi_dvr__local(const isogi_dvr__local_rays *a, float *clear) {
         float depth = 0;
         for (j = 0; j < a->steps; j++) {
             const float *p = a->at + a->step[j].offset + i, *q = p + a->plane, *w = a->step[j].weight;
-            depth += ((w[0] * p[0] + w[1] * p[1]) + (w[2] * p[a->row] + w[3] * p[a->row + 1])) + ((w[4] * q[0] + w[5] * q[1]) + (w[6] * q[a->row] + w[7] * q[a->row + 1]));
+            depth += ((w[0] * p[0] + w[1] * p[1]) + (w[2] * p[a->row] + w[3] * p[a->row + 1])) +
+                     ((w[4] * q[0] + w[5] * q[1]) + (w[6] * q[a->row] + w[7] * q[a->row + 1]));
         }
         clear[i] = isogi_dvr__exp(depth);
     }
@@ -1967,9 +2007,12 @@ static void isogi_dvr__local(const isogi_dvr__local_rays *a, float *clear) {
         for (i = 0; i < a->count; i += ISOGI_DVR__LANES) {                                                                          \
             isogi_dvr__floats depth = {0};                                                                                          \
             for (j = 0; j < a->steps; j++) {                                                                                        \
-                const float *p = a->at + a->step[j].offset + i, *q = p + a->plane, *p1 = p + a->row, *q1 = q + a->row, *w = a->step[j].weight; \
-                depth += ((w[0] * ISOGI_DVR__C(p) + w[1] * ISOGI_DVR__C(p + 1)) + (w[2] * ISOGI_DVR__C(p1) + w[3] * ISOGI_DVR__C(p1 + 1))) + \
-                         ((w[4] * ISOGI_DVR__C(q) + w[5] * ISOGI_DVR__C(q + 1)) + (w[6] * ISOGI_DVR__C(q1) + w[7] * ISOGI_DVR__C(q1 + 1)));  \
+                const float *p = a->at + a->step[j].offset + i, *q = p + a->plane, *p1 = p + a->row, *q1 = q + a->row, \
+                    *w = a->step[j].weight; \
+                depth += ((w[0] * ISOGI_DVR__C(p) + w[1] * ISOGI_DVR__C(p + 1)) + \
+                    (w[2] * ISOGI_DVR__C(p1) + w[3] * ISOGI_DVR__C(p1 + 1))) + \
+                         ((w[4] * ISOGI_DVR__C(q) + w[5] * ISOGI_DVR__C(q + 1)) + \
+                             (w[6] * ISOGI_DVR__C(q1) + w[7] * ISOGI_DVR__C(q1 + 1))); \
             }                                                                                                                       \
             ISOGI_DVR__EXP(ISOGI_DVR__V(clear + i), depth)                                                                          \
         }                                                                                                                           \
@@ -1983,12 +2026,15 @@ static void isogi_dvr__local(const isogi_dvr__local_rays *a, float *clear) {
     TARGET static void isogi_dvr__leap##SUFFIX(const isogi_dvr *d, isogi_dvr__packet *p, isogi_counters *work) {                    \
         const isogi_level *level = &d->level[0];                                                                                    \
         int lane;                                                                                                                   \
-        isogi_dvr__ints first = ISOGI_DVR__CI(p->next), count = ISOGI_DVR__CI(p->count), i = first, active = i < count, zero = {0}, blocks = {0}, \
+        isogi_dvr__ints first = ISOGI_DVR__CI(p->next), count = ISOGI_DVR__CI(p->count), i = first, active = i < count, zero = {0}, \
+            blocks = {0}, \
                         skipped = {0}, row = zero + (int)level->size[0], plane = zero + (int)(level->size[0] * level->size[1]), to;  \
-        isogi_dvr__floats inverse0 = ISOGI_DVR__C(p->inverse[0]), inverse1 = ISOGI_DVR__C(p->inverse[1]), inverse2 = ISOGI_DVR__C(p->inverse[2]); \
+        isogi_dvr__floats inverse0 = ISOGI_DVR__C(p->inverse[0]), inverse1 = ISOGI_DVR__C(p->inverse[1]), \
+            inverse2 = ISOGI_DVR__C(p->inverse[2]); \
         isogi_dvr__ints up0 = inverse0 > 0.0f, up1 = inverse1 > 0.0f, up2 = inverse2 > 0.0f;                                        \
         for (;;) {                                                                                                                  \
-            isogi_dvr__floats at = __builtin_convertvector(i, isogi_dvr__floats), exit = __builtin_convertvector(count, isogi_dvr__floats); \
+            isogi_dvr__floats at = __builtin_convertvector(i, isogi_dvr__floats), \
+                exit = __builtin_convertvector(count, isogi_dvr__floats); \
             isogi_dvr__ints free, move, c0, c1, c2;                                                                                 \
             int32_t number[ISOGI_DVR__LANES];                                                                                       \
             uint64_t any[ISOGI_DVR__LANES / 2];                                                                                     \
@@ -2028,7 +2074,8 @@ ISOGI_DVR__LEAP_KERNEL(_avx512, __attribute__((target("avx512f,avx512vl,avx512dq
 #endif
 
 static isogi_dvr__kernels isogi_dvr__choose_kernels(int force_path) {
-    isogi_dvr__kernels k = {isogi_dvr__pass, isogi_dvr__pass_out, isogi_dvr__between, isogi_dvr__exp_row, isogi_dvr__leap, isogi_dvr__gather, isogi_dvr__local};
+    isogi_dvr__kernels k = {isogi_dvr__pass, isogi_dvr__pass_out, isogi_dvr__between, isogi_dvr__exp_row,
+                            isogi_dvr__leap, isogi_dvr__gather,   isogi_dvr__local};
 #ifdef ISOGI_DVR__VECTORS
     if (force_path == 1) return k;
     isogi_dvr__set_kernels_base(&k);
@@ -2079,7 +2126,8 @@ static isogi_result isogi_dvr__plan_matter(isogi_dvr *d) {
 }
 
 #define ISOGI_DVR__READ_ROW(T)                                                                                                   \
-    for (i = 0; i < count; i++) out[i] = (float)(v->scale * (double)*(const T *)(const void *)(p + (ptrdiff_t)i * v->stride[0]) + v->bias); \
+    for (i = 0; i < count; i++) out[i] = (float)(v->scale * (double)*(const T *)(const void *)(p + (ptrdiff_t)i * v->stride[0]) + \
+        v->bias); \
     break;
 
 /* Voxels first .. first + count - 1 of a row, as floats; what is not finite becomes a NaN. */
@@ -2173,7 +2221,9 @@ static void isogi_dvr__set_bins(const isogi_dvr *d, uint8_t bin[ISOGI_DVR__TABLE
             double opacity = -expm1(-(double)d->matter.table[i] * d->spacing / d->desc.unit);
             sum += i ? fabs(opacity - last) : 0, last = opacity;
             if (!pass) total = sum;
-            else bin[i] = (uint8_t)isogi_dvr__clamp(1 + 62 * (total > 0 ? 0.5 * (double)i / ISOGI_DVR__TABLE + 0.5 * sum / total : (double)i / ISOGI_DVR__TABLE), 62);
+            else
+                bin[i] = (uint8_t)isogi_dvr__clamp(
+                    1 + 62 * (total > 0 ? 0.5 * (double)i / ISOGI_DVR__TABLE + 0.5 * sum / total : (double)i / ISOGI_DVR__TABLE), 62);
         }
     bin[0] = 0, bin[ISOGI_DVR__TABLE - 1] = 63; /* what lies outside of the function's span is all alike */
 }
@@ -2182,7 +2232,8 @@ static void isogi_dvr__set_bins(const isogi_dvr *d, uint8_t bin[ISOGI_DVR__TABLE
 static void isogi_dvr__histogram_task(void *arg, size_t task) {
     isogi_dvr *d = (isogi_dvr *)arg;
     isogi_dvr__blocks *b = &d->blocks;
-    size_t block = b->counted + task, at[3] = {block % b->count[0], block / b->count[0] % b->count[1], block / b->count[0] / b->count[1]}, count, x, y, z;
+    size_t block = b->counted + task, at[3] = {block % b->count[0], block / b->count[0] % b->count[1], block / b->count[0] / b->count[1]},
+           count, x, y, z;
     uint64_t classes = 0;
     float row[17];
     count = d->volume.size[0] - 16 * at[0] < 17 ? d->volume.size[0] - 16 * at[0] : 17;
@@ -2198,7 +2249,8 @@ static void isogi_dvr__histogram_task(void *arg, size_t task) {
 static void isogi_dvr__free_blocks(isogi_dvr *d) {
     isogi_dvr__blocks *b = &d->blocks;
     int n;
-    for (n = 1; n < 5; n++) isogi_release(&d->context, b->lattice[n], b->lattice_size[n][0] * b->lattice_size[n][1] * b->lattice_size[n][2], sizeof(float));
+    for (n = 1; n < 5; n++)
+        isogi_release(&d->context, b->lattice[n], b->lattice_size[n][0] * b->lattice_size[n][1] * b->lattice_size[n][2], sizeof(float));
     isogi_release(&d->context, b->histogram, b->total, sizeof *b->histogram);
     isogi_release(&d->context, b->level, 3 * b->total, 1);
     isogi_release(&d->context, b->first, 2 * b->total, sizeof *b->first);
@@ -2432,7 +2484,8 @@ static void isogi_dvr__join_task(void *arg, size_t block) {
     isogi_dvr__held_at(job->held, block, at);
     for (c[2] = 0; c[2] <= last; c[2]++)
         for (c[1] = 0; c[1] <= last; c[1]++)
-            for (c[0] = 0; c[0] <= last; c[0] += (!c[1] || !c[2] || c[1] == last || c[2] == last) ? 1 : last) isogi_dvr__join_point(job, block, at, c);
+            for (c[0] = 0; c[0] <= last; c[0] += (!c[1] || !c[2] || c[1] == last || c[2] == last) ? 1 : last)
+                isogi_dvr__join_point(job, block, at, c);
 }
 
 /* No seams in value[points][channels]. */
@@ -2537,7 +2590,8 @@ static isogi_result isogi_dvr__resolve(isogi_dvr_desc *desc, const isogi_dvr_des
 /* Nothing casts a shadow: V = 1 everywhere. */
 static void isogi_dvr__clear_visibility(isogi_dvr *d) {
     size_t i;
-    for (i = 0; i < isogi_dvr__held_points(d) * d->coefficients; i++) d->visibility[i] = i % d->coefficients ? 0 : (float)(2 * sqrt(ISOGI_DVR__PI));
+    for (i = 0; i < isogi_dvr__held_points(d) * d->coefficients; i++)
+        d->visibility[i] = i % d->coefficients ? 0 : (float)(2 * sqrt(ISOGI_DVR__PI));
 }
 
 /* Everything whose size is known by now. */
@@ -2949,27 +3003,21 @@ static void isogi_dvr__begin_walk(isogi_dvr__walk *w, isogi_dvr__march *m) {
     isogi_dvr__walk_to(w);
 }
 
-static int isogi_dvr__block_empty(isogi_dvr__march *m, int n, const int c[3]) {
-    m->work.blocks++;
-    return m->dvr->empty[n][isogi_dvr__block_at(m->dvr, n, c)];
-}
-
-/* Steps over the largest empty block around the cell: 1 if there is one. Where the smallest block is not empty, no larger one is: ranges of
-   values contain those of their parts, and isogi_dvr__mark_cut marks with a block what it is made of. The cell it lands in follows
-   from integers along the axis that leads out, and lies within the block's reach along the others, so that rounding can neither turn the
-   ray back nor lose it. */
+/* Steps over the largest empty block around the cell: 1 if there is one. The cell it lands in follows from integers along the axis that
+   leads out, and lies within the block's reach along the others, so that rounding can neither turn the ray back nor lose it. */
 static int isogi_dvr__leave_block(isogi_dvr__walk *w) {
     isogi_dvr__march *m = w->m;
     const isogi_dvr *d = m->dvr;
     const int *c = w->cell;
     int n, a;
     if (c[0] >> 2 == m->known[0] && c[1] >> 2 == m->known[1] && c[2] >> 2 == m->known[2]) return 0;
-    for (n = isogi_dvr__block_empty(m, 0, c) ? ISOGI_DVR__LEVELS - 1 : -1; n >= 0; n--) {
+    m->work.blocks++;
+    n = (d->empty[0][isogi_dvr__block_at(d, 0, c)] & 3) - 1;
+    if (n >= 0) {
         const isogi_level *level = &d->level[n];
         int shift = 2 + 2 * n, axis = -1, first[3];
         double leave = m->length;
         size_t block = isogi_dvr__block_at(d, n, c);
-        if (n && !isogi_dvr__block_empty(m, n, c)) continue;
         m->work.blocks_skipped++;
         if (level->range[block][0] > level->range[block][1]) w->chained = 0; /* no finite value */
         else isogi_dvr__is_quiet(&d->integral, (double)level->range[block][0], (double)level->range[block][1], w->quiet);
@@ -3024,7 +3072,8 @@ static void isogi_dvr__cubic(const double c[8], const double in[3], const double
             for (n = 0; n < 2; n++) z[i][j][n] = ISOGI_DVR__MIX(y[i][j], n, 2);
 #undef ISOGI_DVR__MIX
     b[0] = z[0][0][0], b[3] = z[1][1][1];
-    b[1] = (0.25 * z[1][0][0] + 0.25 * z[0][1][0] + 0.25 * z[0][0][1]) * (4 / 3.0); /* quarters: three of the largest doubles are no double */
+    b[1] = (0.25 * z[1][0][0] + 0.25 * z[0][1][0] + 0.25 * z[0][0][1]) * (4 / 3.0); /* quarters: three of the largest
+                                                                                       doubles are no double */
     b[2] = (0.25 * z[1][1][0] + 0.25 * z[1][0][1] + 0.25 * z[0][1][1]) * (4 / 3.0);
 }
 
@@ -3119,7 +3168,8 @@ static int isogi_dvr__next_monotone(isogi_dvr__walk *w, isogi_dvr__stretch *p) {
         if (!isogi_dvr__next_cell(w)) return 0;
     i = w->piece++;
     p->t0 = w->t0, p->dt = w->dt, p->u0 = w->cut[i], p->u1 = w->cut[i + 1];
-    p->from = w->t0 + w->cut[i] * w->dt, p->to = w->cut[i + 1] < 1 ? w->t0 + w->cut[i + 1] * w->dt : w->t1; /* one cell ends where the next begins */
+    /* one cell ends where the next begins */
+    p->from = w->t0 + w->cut[i] * w->dt, p->to = w->cut[i + 1] < 1 ? w->t0 + w->cut[i + 1] * w->dt : w->t1;
     p->value[0] = w->cut_value[i], p->value[1] = w->cut_value[i + 1];
     memcpy(p->b, w->b, sizeof p->b), memcpy(p->cell, w->owner, sizeof p->cell);
     return 1;
@@ -3210,8 +3260,8 @@ typedef struct isogi_dvr__crossings {
     isogi_counters work;
 } isogi_dvr__crossings;
 
-static void isogi_dvr__begin_crossings(isogi_dvr__crossings *c, const isogi_dvr *d, const double origin[3], const float dir[3], double enter,
-                                       double length) {
+static void isogi_dvr__begin_crossings(isogi_dvr__crossings *c, const isogi_dvr *d, const double origin[3], const float dir[3],
+                                       double enter, double length) {
     isogi_ray ray;
     size_t i;
     int a;
@@ -3427,7 +3477,8 @@ static void isogi_dvr__set_table(const isogi_dvr *d, float table[ISOGI_DVR__TABL
         if (t->point_count && !(to > from)) mean = isogi_dvr__extinction(t->points, t->point_count, from);
         else if (t->point_count) {
             at = isogi_dvr__extinction(t->points, t->point_count, x);
-            for (next = isogi_dvr__points_below(t->points, t->point_count, x); next < t->point_count && t->points[next].value < to; next++) {
+            for (next = isogi_dvr__points_below(t->points, t->point_count, x); next < t->point_count && t->points[next].value < to;
+                 next++) {
                 mean += 0.5 * (at + (double)t->points[next].extinction) * (t->points[next].value - x);
                 x = t->points[next].value, at = (double)t->points[next].extinction;
             }
@@ -3652,7 +3703,8 @@ static double isogi_dvr__significance(const isogi_dvr *d, size_t block, double (
     double mean = 0, at[3], most = 0;
     size_t c[3], k, i;
     for (k = 0; k < 8; k++) {
-        c[0] = block % b->count[0] + (k & 1), c[1] = block / b->count[0] % b->count[1] + (k >> 1 & 1), c[2] = block / b->count[0] / b->count[1] + (k >> 2);
+        c[0] = block % b->count[0] + (k & 1), c[1] = block / b->count[0] % b->count[1] + (k >> 1 & 1),
+        c[2] = block / b->count[0] / b->count[1] + (k >> 2);
         mean += 0.125 * (double)isogi_dvr__lattice_at(d, 4, c);
     }
     isogi_dvr__luv_of(d, mean, at);
@@ -3729,7 +3781,8 @@ static isogi_result isogi_dvr__select_levels(isogi_dvr *d, uint8_t *level) {
     while (count && budget > 0 && heap[0].gain > 0) {
         size_t n = level[heap[0].block];
         double cost = (double)(isogi_dvr__level_points(b, heap[0].block, 2 * n) - isogi_dvr__level_points(b, heap[0].block, n));
-        if (cost <= budget) budget -= cost, level[heap[0].block] = (uint8_t)(2 * n), heap[0].gain /= 16; /* half for eight times the points */
+        /* half for eight times the points */
+        if (cost <= budget) budget -= cost, level[heap[0].block] = (uint8_t)(2 * n), heap[0].gain /= 16;
         else heap[0].gain = 0;
         if (2 * n >= 16 || !(heap[0].gain > 0)) heap[0] = heap[--count];
         isogi_dvr__sift(heap, count, 0);
@@ -3742,7 +3795,8 @@ static isogi_result isogi_dvr__select_levels(isogi_dvr *d, uint8_t *level) {
 static int isogi_dvr__any_near(const isogi_dvr__blocks *b, size_t block, size_t reach, const uint8_t *mark) {
     size_t at[3] = {block % b->count[0], block / b->count[0] % b->count[1], block / b->count[0] / b->count[1]}, low[3], high[3], c[3];
     int a;
-    for (a = 0; a < 3; a++) low[a] = at[a] > reach ? at[a] - reach : 0, high[a] = b->count[a] - at[a] > reach ? at[a] + reach : b->count[a] - 1;
+    for (a = 0; a < 3; a++)
+        low[a] = at[a] > reach ? at[a] - reach : 0, high[a] = b->count[a] - at[a] > reach ? at[a] + reach : b->count[a] - 1;
     for (c[2] = low[2]; c[2] <= high[2]; c[2]++)
         for (c[1] = low[1]; c[1] <= high[1]; c[1]++)
             for (c[0] = low[0]; c[0] <= high[0]; c[0]++)
@@ -3825,7 +3879,8 @@ static float isogi_dvr__block_value(const isogi_dvr *d, size_t block, const doub
 static void isogi_dvr__pack_task(void *arg, size_t block) {
     isogi_dvr *d = (isogi_dvr *)arg;
     isogi_dvr__blocks *b = &d->blocks;
-    size_t n = b->level[block], at[3] = {block % b->count[0], block / b->count[0] % b->count[1], block / b->count[0] / b->count[1]}, node[3], side[3], c[3];
+    size_t n = b->level[block], at[3] = {block % b->count[0], block / b->count[0] % b->count[1], block / b->count[0] / b->count[1]},
+           node[3], side[3], c[3];
     float *out;
     int step = 0, a;
     if (n != b->packing) return;
@@ -3972,7 +4027,8 @@ static void isogi_dvr__set_local_steps(const isogi_dvr *d, isogi_dvr__local_step
         for (k = 0; k < (size_t)d->desc.directions; k++)
             for (j = 0; j < isogi_dvr__local_steps(d, n); j++, step++) {
                 double size = 16.0 / (double)n, from = (double)j * size, to = from + size < d->desc.radius ? from + size : d->desc.radius;
-                ptrdiff_t row = (ptrdiff_t)isogi_dvr__window_row(&d->blocks, n), side = (ptrdiff_t)isogi_dvr__window_side(&d->blocks, n), c[3];
+                ptrdiff_t row = (ptrdiff_t)isogi_dvr__window_row(&d->blocks, n), side = (ptrdiff_t)isogi_dvr__window_side(&d->blocks, n),
+                          c[3];
                 double u[3], depth = (to - from) * d->spacing / d->desc.unit;
                 int a;
                 for (a = 0; a < 3; a++) {
@@ -3988,7 +4044,8 @@ static void isogi_dvr__set_local_steps(const isogi_dvr *d, isogi_dvr__local_step
 /* Where the nodes of level n lie among those that a block holds, along an axis: the node before, and how far past it. Returns how many. */
 static size_t isogi_dvr__along(const isogi_dvr *d, size_t block, size_t n, int axis, size_t before[17], float u[17]) {
     const isogi_dvr__blocks *b = &d->blocks;
-    size_t at[3] = {block % b->count[0], block / b->count[0] % b->count[1], block / b->count[0] / b->count[1]}, held = b->level[block], side[3], i;
+    size_t at[3] = {block % b->count[0], block / b->count[0] % b->count[1], block / b->count[0] / b->count[1]}, held = b->level[block],
+           side[3], i;
     isogi_dvr__sides(b, block, held, side);
     for (i = 0; i <= n && 16 * at[axis] + 16 * i / n <= (size_t)d->cells[axis]; i++) {
         before[i] = i * held / n < side[axis] ? i * held / n : side[axis] - 1;
@@ -4041,13 +4098,15 @@ static size_t isogi_dvr__make_window(const isogi_dvr *d, size_t block, float *wi
     size_t at[3] = {block % b->count[0], block / b->count[0] % b->count[1], block / b->count[0] / b->count[1]}, n = b->lit[block], o[3], i;
     int any = 0, pass, a;
     for (pass = 0; pass < 2; pass++) { /* first the level, then the nodes */
-        if (pass) memset(window, 0, isogi_dvr__window_row(b, n) * isogi_dvr__window_side(b, n) * isogi_dvr__window_side(b, n) * sizeof *window);
+        if (pass)
+            memset(window, 0, isogi_dvr__window_row(b, n) * isogi_dvr__window_side(b, n) * isogi_dvr__window_side(b, n) * sizeof *window);
         for (o[2] = 0; o[2] <= 2 * b->reach; o[2]++)
             for (o[1] = 0; o[1] <= 2 * b->reach; o[1]++)
                 for (o[0] = 0; o[0] <= 2 * b->reach; o[0]++) {
                     size_t corner[3];
                     int within = 1;
-                    for (a = 0; a < 3; a++) within = within && at[a] + o[a] >= b->reach && at[a] + o[a] - b->reach < b->count[a], corner[a] = o[a] * n;
+                    for (a = 0; a < 3; a++)
+                        within = within && at[a] + o[a] >= b->reach && at[a] + o[a] - b->reach < b->count[a], corner[a] = o[a] * n;
                     if (!within) continue;
                     i = at[0] + o[0] - b->reach + b->count[0] * (at[1] + o[1] - b->reach + b->count[1] * (at[2] + o[2] - b->reach));
                     if (!pass) n = b->level[i] > n ? b->level[i] : n;
@@ -4062,7 +4121,8 @@ static void isogi_dvr__local_row(const isogi_dvr__local_job *job, size_t n, cons
                                  float (*sum)[2 * ISOGI_DVR__LANES]) {
     const isogi_dvr *d = job->dvr;
     const isogi_dvr__local_step *step = job->step + isogi_dvr__steps_before(d, n);
-    size_t steps = isogi_dvr__local_steps(d, n), row = isogi_dvr__window_row(&d->blocks, n), plane = row * isogi_dvr__window_side(&d->blocks, n), k, c;
+    size_t steps = isogi_dvr__local_steps(d, n), row = isogi_dvr__window_row(&d->blocks, n),
+           plane = row * isogi_dvr__window_side(&d->blocks, n), k, c;
     float clear[2 * ISOGI_DVR__LANES];
     isogi_dvr__local_rays rays = {at, step, steps, row, plane, count};
     isogi_dvr__sums sums = {sum[0], clear, NULL, 2 * ISOGI_DVR__LANES, 0, d->coefficients, 1, count};
@@ -4081,7 +4141,8 @@ static void isogi_dvr__local_task(void *arg, size_t i) {
     isogi_dvr *d = job->dvr;
     isogi_dvr__blocks *b = &d->blocks;
     float *window = job->window + i * job->window_count, sum[ISOGI_DVR__MAX_ORDER * ISOGI_DVR__MAX_ORDER][2 * ISOGI_DVR__LANES];
-    size_t block = b->order[job->first + i], n = b->lit[block], fine = isogi_dvr__make_window(d, block, window), every = fine / n, node[3], side[3], c;
+    size_t block = b->order[job->first + i], n = b->lit[block], fine = isogi_dvr__make_window(d, block, window), every = fine / n, node[3],
+           side[3], c;
     size_t at[3] = {block % b->count[0], block / b->count[0] % b->count[1], block / b->count[0] / b->count[1]};
     uint16_t *out = b->sh + b->first[b->total + block] * d->coefficients, clear = isogi_dvr__to_half((float)(2 * sqrt(ISOGI_DVR__PI)));
     memset(&job->work[i], 0, sizeof *job->work);
@@ -4090,7 +4151,8 @@ static void isogi_dvr__local_task(void *arg, size_t i) {
     for (node[2] = 0; node[2] <= side[2]; node[2]++)
         for (node[1] = 0; node[1] <= side[1]; node[1]++) {
             size_t row = b->reach * fine + isogi_dvr__window_row(b, fine ? fine : 1) *
-                                               (b->reach * fine + node[1] * every + isogi_dvr__window_side(b, fine ? fine : 1) * (b->reach * fine + node[2] * every));
+                                               (b->reach * fine + node[1] * every +
+                                                isogi_dvr__window_side(b, fine ? fine : 1) * (b->reach * fine + node[2] * every));
             size_t coarsest, owner, count = side[0] * every;
             node[0] = side[0];
             isogi_dvr__touching(b, b->lit, at, node, n, &coarsest, &owner);
@@ -4127,7 +4189,8 @@ static void isogi_dvr__finish_task(void *arg, size_t block) {
     const isogi_dvr__local_job *job = (const isogi_dvr__local_job *)arg;
     isogi_dvr *d = job->dvr;
     isogi_dvr__blocks *b = &d->blocks;
-    size_t n = b->lit[block], node[3], side[3], c, at[3] = {block % b->count[0], block / b->count[0] % b->count[1], block / b->count[0] / b->count[1]};
+    size_t n = b->lit[block], node[3], side[3], c,
+           at[3] = {block % b->count[0], block / b->count[0] % b->count[1], block / b->count[0] / b->count[1]};
     uint16_t *out = b->sh + b->first[b->total + block] * d->coefficients;
     if (n != job->packing) return;
     isogi_dvr__sides(b, block, n, side);
@@ -4227,7 +4290,8 @@ static void isogi_dvr__global_row(const isogi_dvr *d, const float *toward, const
     }
     for (i = 0; i < count; i++) clear[i] = 1;
     for (t = 0; t < limit && left; t += step) {
-        isogi_dvr__global_at(&d->blocks, 1, from[1] + t * direction[1], &y), isogi_dvr__global_at(&d->blocks, 2, from[2] + t * direction[2], &z);
+        isogi_dvr__global_at(&d->blocks, 1, from[1] + t * direction[1], &y),
+            isogi_dvr__global_at(&d->blocks, 2, from[2] + t * direction[2], &z);
         for (i = 0, left = 0; i < count; i++) {
             double x = from[0] + (double)i * apart;
             if (!(clear[i] > (float)ISOGI_DVR__NEGLIGIBLE) ||
@@ -4338,7 +4402,8 @@ static void isogi_dvr__sweep_add(const isogi_dvr__sweep *s, size_t slice, const 
 static void isogi_dvr__sweep_row_out(const isogi_dvr__sweep *s, size_t slice, const isogi_dvr__slip *at, size_t c, float *out,
                                      float *weight) {
     const float *depth = s->depth + (at->row + c) * s->depth_row + at->lane, *from = s->extinction + slice * s->slice_stride;
-    const float *low = from + (c ? c - 1 : 0) * s->row_stride, *high = from + (c < s->size[1] ? c : 0) * s->row_stride; /* the nodes beside */
+    /* the nodes beside */
+    const float *low = from + (c ? c - 1 : 0) * s->row_stride, *high = from + (c < s->size[1] ? c : 0) * s->row_stride;
     float *e = s->row, part = at->part[1], share[2];
     size_t n = s->points[2], i;
     int within = c && (c < s->size[1] || !(at->part[0] > 0)); /* rays outside count in full, as in sweep_add */
@@ -4351,7 +4416,8 @@ static void isogi_dvr__sweep_row_out(const isogi_dvr__sweep *s, size_t slice, co
         float x0 = h ? share[0] * low[h - 1] + share[1] * high[h - 1] : 0, e0 = e[2 * i], e1 = e[2 * i + 1];
         weight[i] = 1, out[i] = e1 + part * (e0 - e1);
         if (!within || !(x0 + x1 + x2 > 0)) continue; /* no matter beside it */
-        x0 = h ? isogi_dvr__counts(x0 + part * (x1 - x0)) : 1, x1 = h + 1 < s->size[2] || !(part > 0) ? isogi_dvr__counts(x1 + part * (x2 - x1)) : 1;
+        x0 = h ? isogi_dvr__counts(x0 + part * (x1 - x0)) : 1,
+        x1 = h + 1 < s->size[2] || !(part > 0) ? isogi_dvr__counts(x1 + part * (x2 - x1)) : 1;
         e0 *= x0, e1 *= x1, weight[i] = x1 + part * (x0 - x1), out[i] = e1 + part * (e0 - e1);
     }
 }
@@ -4364,7 +4430,8 @@ static void isogi_dvr__sweep_points(const isogi_dvr__sweep *s, size_t slice, con
         size_t c = s->first[1] + j * s->every[1];
         isogi_dvr__sweep_row_out(s, slice, at, c, r0, w0);
         isogi_dvr__sweep_row_out(s, slice, at, c + 1, r1, w1);
-        for (i = 0; i < n; i++) out[j * s->out_stride[1] + i] = (r1[i] + at->part[0] * (r0[i] - r1[i])) / (w1[i] + at->part[0] * (w0[i] - w1[i]));
+        for (i = 0; i < n; i++)
+            out[j * s->out_stride[1] + i] = (r1[i] + at->part[0] * (r0[i] - r1[i])) / (w1[i] + at->part[0] * (w0[i] - w1[i]));
     }
 }
 
@@ -4385,7 +4452,8 @@ static int isogi_dvr__hold_plane(const isogi_dvr__sweep *s, size_t point, float 
                 if (!out) return any;
                 stride[1] = n, stride[2] = n * n, to = out + b->first + slice / step * stride[s->axis[0]];
                 for (j = 0; j < n; j++)
-                    for (i = 0; i < n; i++) to[j * stride[s->axis[1]] + i * stride[s->axis[2]]] = from[j * step * s->out_stride[1] + i * step];
+                    for (i = 0; i < n; i++)
+                        to[j * stride[s->axis[1]] + i * stride[s->axis[2]]] = from[j * step * s->out_stride[1] + i * step];
             }
     return any;
 }
@@ -4452,7 +4520,8 @@ static void isogi_dvr__set_sweep(isogi_dvr__sweep *s, const isogi_dvr *d, const 
     stride[1] = m->row[turned], stride[turned ? 2 : 0] = 1, stride[turned ? 0 : 2] = m->row[turned] * m->size[1];
     out[turned ? 2 : 0] = 1, out[1] = d->desc.grid[turned ? 2 : 0], out[turned ? 0 : 2] = out[1] * d->desc.grid[1];
     for (a = 0; a < 3; a++) {
-        s->size[a] = m->size[axis[a]], s->points[a] = d->desc.grid[axis[a]], s->first[a] = m->first[axis[a]], s->every[a] = m->every[axis[a]];
+        s->size[a] = m->size[axis[a]], s->points[a] = d->desc.grid[axis[a]], s->first[a] = m->first[axis[a]],
+        s->every[a] = m->every[axis[a]];
         s->out_stride[a] = out[axis[a]], s->axis[a] = axis[a];
     }
     s->extinction = m->extinction[turned], s->slice_stride = stride[axis[0]], s->row_stride = stride[axis[1]];
@@ -4460,10 +4529,12 @@ static void isogi_dvr__set_sweep(isogi_dvr__sweep *s, const isogi_dvr *d, const 
     s->slip[0] = -w[axis[1]] / most, s->slip[1] = -w[axis[2]] / most;
     s->piece = (float)(0.5 / (most * d->desc.unit));
     s->kernels = d->kernels;
-    s->depth_row = s->size[2] + s->size[0] + 2 + 2 * ISOGI_DVR__LANES, s->weight = s->size[2] + 1 + 2 * ISOGI_DVR__LANES, s->out_row = 2 * s->weight;
+    s->depth_row = s->size[2] + s->size[0] + 2 + 2 * ISOGI_DVR__LANES, s->weight = s->size[2] + 1 + 2 * ISOGI_DVR__LANES,
+    s->out_row = 2 * s->weight;
     s->depth = scratch, s->row = scratch + (s->size[1] + s->size[0] + 2) * s->depth_row;
     if (d->coming.block) s->out_stride[1] = s->points[2]; /* within s->plane */
-    s->held = d->coming.block ? &d->coming : NULL, s->plane = scratch + isogi_dvr__sweep_scratch(d) - (s->held ? isogi_dvr__plane_points(d) : 0);
+    s->held = d->coming.block ? &d->coming : NULL,
+    s->plane = scratch + isogi_dvr__sweep_scratch(d) - (s->held ? isogi_dvr__plane_points(d) : 0);
 }
 
 static void isogi_dvr__sweep_task(void *arg, size_t i) {
@@ -4602,8 +4673,8 @@ static isogi_result isogi_dvr__step_global(isogi_dvr *d, size_t end) {
         result = isogi_parallel(&d->context, (b->sh_count + ISOGI_DVR__GAIN - 1) / ISOGI_DVR__GAIN, isogi_dvr__toward_task, &job,
                                 (double)(job.first - start) / span, (double)(job.first - start) / span);
         if (result == ISOGI_OK)
-            result = isogi_parallel(&d->context, job.count * d->desc.grid[2], isogi_dvr__global_task, &job, (double)(job.first - start) / span,
-                                    (double)(job.first + job.count - start) / span);
+            result = isogi_parallel(&d->context, job.count * d->desc.grid[2], isogi_dvr__global_task, &job,
+                                    (double)(job.first - start) / span, (double)(job.first + job.count - start) / span);
         if (result == ISOGI_OK) result = isogi_dvr__gain(&job, batch);
         if (result == ISOGI_OK) d->next += job.count, d->counters.rays += job.count * d->point_count;
     }
@@ -4805,7 +4876,8 @@ ISOGI_API isogi_result isogi_dvr_inspect(const isogi_dvr *dvr, isogi_dvr_report 
             r.level_count[a]++;
             r.points += isogi_dvr__level_points(b, i, b->level[i]);
         }
-        if (r.points) r.reduction = (double)dvr->volume.size[0] * (double)dvr->volume.size[1] * (double)dvr->volume.size[2] / (double)r.points;
+        if (r.points)
+            r.reduction = (double)dvr->volume.size[0] * (double)dvr->volume.size[1] * (double)dvr->volume.size[2] / (double)r.points;
         r.data_bytes = b->data_count * sizeof *b->data, r.local_bytes = b->sh_count * dvr->coefficients * sizeof *b->sh;
         r.index_bytes = b->total * (2 * sizeof *b->first + sizeof *b->order + 3);
     }
@@ -4890,8 +4962,8 @@ static double isogi_dvr__scatter(const isogi_dvr *d, const float *light, const f
 }
 
 /* 1/(4 pi) L . V at a place (Kronander 2011, section 4.4). */
-static void isogi_dvr__shade_visibility(const isogi_dvr *d, const isogi_dvr__lights *l, const double grid[3], const double front[3], const float dir[3],
-                                        double out[3]) {
+static void isogi_dvr__shade_visibility(const isogi_dvr *d, const isogi_dvr__lights *l, const double grid[3], const double front[3],
+                                        const float dir[3], double out[3]) {
     float v[ISOGI_DVR__MAX_ORDER * ISOGI_DVR__MAX_ORDER], nearby[3 * ISOGI_DVR__MAX_ORDER * ISOGI_DVR__MAX_ORDER];
     size_t i;
     int a, here = 0;
@@ -5005,7 +5077,8 @@ static void isogi_dvr__shade_two_sided(const isogi_dvr *d, const isogi_dvr__ligh
         const isogi_material *m = cosine > 0 ? front : through;
         double share = cosine > 0 ? 1 : 1 - opacity;
         if (!(cosine > 0 || cosine < 0)) continue;
-        for (a = 0; a < 3; a++) gloss += (cosine > 0 ? to[a] - 2 * n[a] * cosine : to[a]) * (double)dir[a]; /* r.v and -l.v, with v = -dir */
+        /* r.v and -l.v, with v = -dir */
+        for (a = 0; a < 3; a++) gloss += (cosine > 0 ? to[a] - 2 * n[a] * cosine : to[a]) * (double)dir[a];
         gloss = m->exponent > 0 ? pow(isogi_dvr__clamp(gloss, 1), (double)m->exponent) : 0;
         for (a = 0; a < 3; a++) {
             double intensity = (double)l->list[i].rgb[a] * irradiance * share;
@@ -5220,7 +5293,8 @@ static void isogi_dvr__composite_values(isogi_dvr__pixel_ray *r, isogi_dvr__span
    Gauss's rule with two points integrates exactly. */
 static double isogi_dvr__bounded_depth(const isogi_dvr__span *s, const isogi_dvr__integral *g, size_t n, double u, double end) {
     const isogi_dvr__stretch *p = &s->piece;
-    double low = p->value[0] < p->value[1] ? p->value[0] : p->value[1], high = p->value[0] < p->value[1] ? p->value[1] : p->value[0], sum = 0, node[4];
+    double low = p->value[0] < p->value[1] ? p->value[0] : p->value[1], high = p->value[0] < p->value[1] ? p->value[1] : p->value[0],
+           sum = 0, node[4];
     int i;
     for (i = 0; i < 2; i++) {
         double value = isogi_dvr__bernstein(p->b, u + (i ? 0.78867513459481288225 : 0.21132486540518711775) * (end - u));
@@ -5236,7 +5310,8 @@ static double isogi_dvr__bounded_depth(const isogi_dvr__span *s, const isogi_dvr
 static void isogi_dvr__bounded_part(isogi_dvr__pixel_ray *r, isogi_dvr__span *s, size_t n, const double value[2], double u, double end) {
     const isogi_dvr__integral *g = &r->dvr->integral;
     const isogi_dvr__march *m = s->walk.m;
-    double depth = isogi_dvr__bounded_depth(s, g, n, u, end), opacity = -expm1(-depth), clear = r->clear * exp(-depth), from[4], to[4], share;
+    double depth = isogi_dvr__bounded_depth(s, g, n, u, end), opacity = -expm1(-depth), clear = r->clear * exp(-depth), from[4], to[4],
+           share;
     isogi_dvr__layer layer = {{0, 0, 0}, 1};
     int a;
     if (!(depth > 0)) return;
@@ -5368,9 +5443,278 @@ static void isogi_dvr__composite_piece(isogi_dvr__pixel_ray *r, isogi_dvr__span 
     isogi_dvr__divide_piece(r, s);
 }
 
+/* Whether pieces of rays count by the values at their ends alone, and may be joined as long as the value goes one way. */
+static int isogi_dvr__joined(const isogi_dvr *d) {
+    return d->desc.space == ISOGI_DVR_DATA && d->desc.classification == ISOGI_DVR_EXACT && d->desc.shading == ISOGI_DVR_UNLIT &&
+           d->desc.silhouette == ISOGI_DVR_SILHOUETTE_NONE && !d->transfer.peak_count;
+}
+
+/* Light that arrives so far, and the values between which the ray has gone one way since. */
+typedef struct isogi_dvr__run { isogi_dvr__layer layer; double from, to; } isogi_dvr__run;
+
+/* The ray goes on to a value. */
+static void isogi_dvr__run_to(const isogi_dvr__integral *g, isogi_dvr__run *run, double value) {
+    if (run->from < run->to ? value < run->to : run->from > run->to && value > run->to) {
+        isogi_dvr__add_values(g, run->from, run->to, fabs(run->to - run->from), &run->layer);
+        run->from = run->to;
+    }
+    run->to = value;
+}
+
+static void isogi_dvr__end_run(const isogi_dvr__integral *g, isogi_dvr__run *run) {
+    if (run->from < run->to || run->to < run->from) isogi_dvr__add_values(g, run->from, run->to, fabs(run->to - run->from), &run->layer);
+    run->from = run->to;
+}
+
+static void isogi_dvr__cast_joined(isogi_dvr__pixel_ray *r, isogi_dvr__march *m) {
+    const isogi_dvr__integral *g = &r->dvr->integral;
+    isogi_dvr__walk w;
+    isogi_dvr__stretch p;
+    isogi_dvr__run run;
+    int begun = 0;
+    memset(&run, 0, sizeof run);
+    run.layer.clear = 1;
+    isogi_dvr__begin_walk(&w, m);
+    while (run.layer.clear > r->end && isogi_dvr__next_monotone(&w, &p)) {
+        if (!begun || p.value[0] < run.to || p.value[0] > run.to) isogi_dvr__end_run(g, &run), run.from = run.to = p.value[0], begun = 1;
+        isogi_dvr__run_to(g, &run, p.value[1]);
+    }
+    if (run.layer.clear > r->end) isogi_dvr__end_run(g, &run);
+    memcpy(r->rgb, run.layer.rgb, sizeof r->rgb), r->clear = run.layer.clear;
+}
+
+#ifdef ISOGI_DVR__AVX
+/* ---- eight rays at once ---- */
+
+/* Rays whose pieces are joined, side by side, in doubles: each goes its own way through the cells as isogi_dvr__walk does. Places are mixed
+   in another order than there, to a rounding, and what a cell begins with after a gap is joined to what was before the gap, between
+   which nothing counts. */
+typedef struct isogi_dvr__eight {
+    double origin[3][8], dir[3][8], inverse[3][8], length[8]; /* of marches; inverse: 0 where there is no movement along an axis */
+    double t[8], at[3][8];                                    /* where they are, in `cell` */
+    int32_t cell[3][8];
+    double from[8], to[8]; /* as isogi_dvr__run */
+    isogi_dvr__layer layer[8];
+    unsigned going;        /* a bit for each ray that is not yet done */
+    double end;            /* transmittance at which they are */
+} isogi_dvr__eight;
+
+static void isogi_dvr__begin_eight(isogi_dvr__eight *e, int k, isogi_dvr__march *m) {
+    isogi_dvr__walk w;
+    int a;
+    isogi_dvr__begin_walk(&w, m);
+    for (a = 0; a < 3; a++) {
+        e->origin[a][k] = m->origin[a], e->dir[a][k] = m->dir[a], e->inverse[a][k] = w.inverse[a];
+        e->at[a][k] = w.at[a], e->cell[a][k] = w.cell[a];
+    }
+    e->length[k] = m->length, e->layer[k].clear = 1, e->going |= 1u << k;
+}
+
+#ifndef __clang__
+#pragma GCC diagnostic push
+#pragma GCC diagnostic ignored "-Wmaybe-uninitialized" /* gcc 12 says so of its own undefined vectors */
+#pragma GCC diagnostic ignored "-Wuninitialized"
+#pragma GCC diagnostic ignored "-Wsign-conversion" /* and of masks in its own macros, at -O0 */
+#endif
+#define ISOGI_DVR__AVX512 __attribute__((target("avx512f,avx512vl,avx512dq,avx512bw,fma"))) static
+/* Corners x + 2y + 4z of cells; kind and last_word: of isogi_dvr__sample_kind. */
+ISOGI_DVR__AVX512 inline void isogi_dvr__corners_eight(const isogi_volume *v, const __m256i cell[3], __mmask8 lanes, int kind,
+                                                       uint32_t last_word, __m512d c[8]) {
+    const __m512d scale = _mm512_set1_pd(v->scale), bias = _mm512_set1_pd(v->bias);
+    const __m256i mask = _mm256_set1_epi32(kind == 1 ? 0xff : 0xffff);
+    __m256i offset = _mm256_setzero_si256();
+    int a, k;
+    for (a = 0; a < 3; a++) offset = _mm256_add_epi32(offset, _mm256_mullo_epi32(cell[a], _mm256_set1_epi32((int)v->stride[a])));
+    for (k = 0; k < 4; k++) {
+        __m256i at = _mm256_add_epi32(offset, _mm256_set1_epi32((int)((k & 1 ? v->stride[1] : 0) + (k & 2 ? v->stride[2] : 0))));
+        __m512d x0, x1;
+        if (!kind) { /* two floats in one word of eight bytes */
+            __m512i pair = _mm512_mask_i32gather_epi64(_mm512_setzero_si512(), lanes, at, (const long long *)v->data, 1);
+            x0 = _mm512_cvtps_pd(_mm256_castsi256_ps(_mm512_cvtepi64_epi32(pair)));
+            x1 = _mm512_cvtps_pd(_mm256_castsi256_ps(_mm512_cvtepi64_epi32(_mm512_srli_epi64(pair, 32))));
+        } else { /* two voxels in one word, which must not reach beyond the data */
+            __m256i word = _mm256_min_epi32(at, _mm256_set1_epi32((int)last_word)),
+                    shift = _mm256_slli_epi32(_mm256_sub_epi32(at, word), 3);
+            word = _mm256_srlv_epi32(_mm256_mmask_i32gather_epi32(word, lanes, word, (const int *)v->data, 1), shift);
+            x0 = _mm512_cvtepi32_pd(_mm256_and_si256(word, mask));
+            x1 = _mm512_cvtepi32_pd(_mm256_and_si256(_mm256_srli_epi32(word, kind == 1 ? 8 : 16), mask));
+        }
+        c[2 * k] = _mm512_fmadd_pd(scale, x0, bias), c[2 * k + 1] = _mm512_fmadd_pd(scale, x1, bias);
+    }
+}
+
+ISOGI_DVR__AVX512 inline __m512d isogi_dvr__mix_eight(__m512d from, __m512d to, __m512d u) {
+    return _mm512_fmadd_pd(u, _mm512_sub_pd(to, from), from);
+}
+
+/* As isogi_dvr__cubic. */
+ISOGI_DVR__AVX512 inline void isogi_dvr__cubic_eight(const __m512d c[8], const __m512d in[3], const __m512d out[3], __m512d b[4]) {
+    const __m512d third = _mm512_set1_pd(1 / 3.0);
+    __m512d x[2][4], y[2][2][2], z[2][2][2];
+    int i, j, k, n;
+    for (i = 0; i < 4; i++)
+        x[0][i] = isogi_dvr__mix_eight(c[2 * i], c[2 * i + 1], in[0]), x[1][i] = isogi_dvr__mix_eight(c[2 * i], c[2 * i + 1], out[0]);
+    for (i = 0; i < 2; i++)
+        for (n = 0; n < 2; n++)
+            for (k = 0; k < 2; k++) y[i][n][k] = isogi_dvr__mix_eight(x[i][2 * k], x[i][2 * k + 1], n ? out[1] : in[1]);
+    for (i = 0; i < 2; i++)
+        for (j = 0; j < 2; j++)
+            for (n = 0; n < 2; n++) z[i][j][n] = isogi_dvr__mix_eight(y[i][j][0], y[i][j][1], n ? out[2] : in[2]);
+    b[0] = z[0][0][0], b[3] = z[1][1][1];
+    b[1] = _mm512_mul_pd(third, _mm512_add_pd(_mm512_add_pd(z[1][0][0], z[0][1][0]), z[0][0][1]));
+    b[2] = _mm512_mul_pd(third, _mm512_add_pd(_mm512_add_pd(z[1][1][0], z[1][0][1]), z[0][1][1]));
+}
+
+/* Lanes in which all values low .. high are quiet; where there are many ranges, only the outermost are looked at. */
+ISOGI_DVR__AVX512 inline __mmask8 isogi_dvr__quiet_eight(const isogi_dvr__integral *g, __m512d low, __m512d high) {
+    size_t i, step = g->quiet_count > 6 ? g->quiet_count - 1 : 1;
+    __mmask8 quiet = 0;
+    for (i = 0; i < g->quiet_count; i += step) {
+        __mmask8 above = _mm512_cmp_pd_mask(low, _mm512_set1_pd(g->quiet[i][0]), _CMP_GE_OQ);
+        quiet = (__mmask8)(quiet | _mm512_mask_cmp_pd_mask(above, high, _mm512_set1_pd(g->quiet[i][1]), _CMP_LE_OQ));
+    }
+    return quiet;
+}
+
+/* As isogi_dvr__run_to, for some lanes; those that begin anew do so here. */
+ISOGI_DVR__AVX512 inline void isogi_dvr__run_eight(const isogi_dvr__integral *g, isogi_dvr__eight *e, __mmask8 lanes, __mmask8 begins,
+                                                   __m512d value) {
+    __m512d from = _mm512_loadu_pd(e->from), to = _mm512_loadu_pd(e->to);
+    __mmask8 up = _mm512_cmp_pd_mask(from, to, _CMP_LT_OQ), down = _mm512_cmp_pd_mask(from, to, _CMP_GT_OQ);
+    __mmask8 turns =
+        (up & (begins | _mm512_cmp_pd_mask(value, to, _CMP_LT_OQ))) | (down & (begins | _mm512_cmp_pd_mask(value, to, _CMP_GT_OQ)));
+    unsigned bits = turns & lanes;
+    _mm512_mask_storeu_pd(e->to, lanes, value);
+    _mm512_mask_storeu_pd(e->from, (__mmask8)bits, to);
+    _mm512_mask_storeu_pd(e->from, begins, value);
+    bits &= (unsigned)~isogi_dvr__quiet_eight(g, _mm512_min_pd(from, to), _mm512_max_pd(from, to));
+    for (; bits; bits &= bits - 1) {
+        int k = __builtin_ctz(bits);
+        double ends[2][8];
+        _mm512_storeu_pd(ends[0], from), _mm512_storeu_pd(ends[1], to);
+        isogi_dvr__add_values(g, ends[0][k], ends[1][k], fabs(ends[1][k] - ends[0][k]), &e->layer[k]);
+        if (!(e->layer[k].clear > e->end)) e->going &= ~(1u << k);
+    }
+}
+
+/* Values along cells that count: as isogi_dvr__cut_cell. */
+ISOGI_DVR__AVX512 inline void isogi_dvr__cut_eight(const isogi_dvr__integral *g, isogi_dvr__eight *e, __mmask8 lanes, __mmask8 begins,
+                                                   __mmask8 skipped, const __m512d c[8], const __m512d in[3], const __m512d out[3],
+                                                   __m512d low, __m512d high) {
+    const __m512d zero = _mm512_setzero_pd();
+    __m512d b[4], d[3];
+    __mmask8 up = lanes, down = lanes;
+    unsigned bits;
+    int i;
+    isogi_dvr__cubic_eight(c, in, out, b);
+    if (lanes & (begins | skipped)) isogi_dvr__run_eight(g, e, lanes & (begins | skipped), lanes & begins, b[0]);
+    for (i = 0; i < 3; i++) {
+        d[i] = _mm512_sub_pd(b[i + 1], b[i]);
+        up = _mm512_mask_cmp_pd_mask(up, d[i], zero, _CMP_GE_OQ), down = _mm512_mask_cmp_pd_mask(down, d[i], zero, _CMP_LE_OQ);
+    }
+    for (bits = lanes & (unsigned)~(up | down); bits; bits &= bits - 1) {
+        double at[4][8], own[4], u[2], bounds[2][8];
+        isogi_dvr__run run;
+        int k = __builtin_ctz(bits), extrema;
+        for (i = 0; i < 4; i++) _mm512_storeu_pd(at[i], b[i]), own[i] = at[i][k];
+        _mm512_storeu_pd(bounds[0], low), _mm512_storeu_pd(bounds[1], high);
+        extrema = isogi_dvr__extrema(own, u);
+        run.layer = e->layer[k], run.from = e->from[k], run.to = e->to[k];
+        for (i = 0; i < extrema; i++) {
+            double value = isogi_dvr__bernstein(own, u[i]);
+            value = value > bounds[0][k] ? value : bounds[0][k];
+            isogi_dvr__run_to(g, &run, value < bounds[1][k] ? value : bounds[1][k]);
+        }
+        e->layer[k] = run.layer, e->from[k] = run.from, e->to[k] = run.to;
+    }
+    isogi_dvr__run_eight(g, e, lanes, 0, _mm512_min_pd(_mm512_max_pd(b[3], low), high));
+}
+
+/* Front to back, until all rays are done. Each time around rays in empty blocks go on to the next block, others to the next cell: these
+   wait while those are many, as a cell costs more. */
+ISOGI_DVR__AVX512 void isogi_dvr__cast_eight(const isogi_dvr *d, int kind, uint32_t last_word, isogi_dvr__eight *e, isogi_counters *work) {
+    const isogi_dvr__integral *g = &d->integral;
+    const __m512d length = _mm512_loadu_pd(e->length), zero = _mm512_setzero_pd(), one = _mm512_set1_pd(1);
+    const __m256i ones = _mm256_set1_epi32(1), none = _mm256_setzero_si256();
+    __m512d t = zero, at[3], origin[3], dir[3], inverse[3];
+    __m256i cell[3];
+    __mmask8 ahead[3], moves[3], begins = 0xff, skipped = 0;
+    int a, k;
+    for (a = 0; a < 3; a++) {
+        at[a] = _mm512_loadu_pd(e->at[a]), origin[a] = _mm512_loadu_pd(e->origin[a]), dir[a] = _mm512_loadu_pd(e->dir[a]);
+        inverse[a] = _mm512_loadu_pd(e->inverse[a]), cell[a] = _mm256_loadu_si256((const __m256i *)(const void *)e->cell[a]);
+        ahead[a] = _mm512_cmp_pd_mask(dir[a], zero, _CMP_GT_OQ), moves[a] = _mm512_cmp_pd_mask(inverse[a], zero, _CMP_NEQ_OQ);
+    }
+    while (e->going) {
+        __m512d leave = _mm512_set1_pd(1e300), next[3], t1, out[3], then[3], c[8], low, high, sum;
+        __m256i block = none, shift, first[3], to[3];
+        __mmask8 going = (__mmask8)e->going, empty, past = 0, cells, quiet, hollow;
+        for (a = 3; a-- > 0;)
+            block = _mm256_add_epi32(_mm256_mullo_epi32(block, _mm256_set1_epi32((int)d->level[0].size[a])), _mm256_srli_epi32(cell[a], 2));
+        block = _mm256_mmask_i32gather_epi32(none, going, block, (const int *)(const void *)d->empty[0], 1);
+        shift = _mm256_slli_epi32(_mm256_and_si256(block, _mm256_set1_epi32(3)), 1);
+        empty = _mm256_mask_test_epi32_mask(going, shift, shift);
+        work->blocks += (uint64_t)__builtin_popcount(going), work->blocks_skipped += (uint64_t)__builtin_popcount(empty);
+        if (__builtin_popcount(empty) > 3) going = empty;
+        for (a = 0; a < 3; a++) {
+            __m256i border;
+            first[a] = _mm256_sllv_epi32(_mm256_srlv_epi32(cell[a], shift), shift);
+            border = _mm256_mask_add_epi32(first[a], ahead[a], first[a], _mm256_sllv_epi32(ones, shift));
+            next[a] = _mm512_mask_mul_pd(leave, moves[a], _mm512_sub_pd(_mm512_cvtepi32_pd(border), origin[a]), inverse[a]);
+        }
+        leave = _mm512_min_pd(_mm512_min_pd(next[0], next[1]), next[2]);
+        t1 = _mm512_max_pd(t, _mm512_min_pd(leave, length));
+        for (a = 0; a < 3; a++) {
+            const __m256i last = _mm256_set1_epi32(d->cells[a] - 1);
+            __mmask8 through = _mm512_cmp_pd_mask(next[a], leave, _CMP_LE_OQ) & _mm512_cmp_pd_mask(next[a], t1, _CMP_LE_OQ);
+            __m512d x = _mm512_min_pd(_mm512_max_pd(_mm512_fmadd_pd(t1, dir[a], origin[a]), zero), _mm512_set1_pd(d->cells[a]));
+            __m256i beyond = _mm256_add_epi32(first[a], _mm256_sllv_epi32(ones, shift));
+            to[a] = _mm512_cvttpd_epi32(x);
+            to[a] = _mm256_mask_max_epi32(_mm256_min_epi32(to[a], cell[a]), ahead[a], to[a], cell[a]);
+            to[a] = _mm256_max_epi32(_mm256_min_epi32(to[a], _mm256_min_epi32(_mm256_sub_epi32(beyond, ones), last)), first[a]);
+            out[a] = _mm512_min_pd(_mm512_max_pd(_mm512_sub_pd(x, _mm512_cvtepi32_pd(to[a])), zero), one);
+            then[a] = _mm512_mask_blend_pd(through, out[a], _mm512_maskz_mov_pd((__mmask8)~ahead[a], one));
+            out[a] = _mm512_mask_blend_pd(through, out[a], _mm512_maskz_mov_pd(ahead[a], one));
+            to[a] = _mm256_mask_sub_epi32(to[a], through, first[a], ones), to[a] = _mm256_mask_mov_epi32(to[a], through & ahead[a], beyond);
+            past = (__mmask8)(past | _mm256_cmplt_epi32_mask(to[a], none) | _mm256_cmpgt_epi32_mask(to[a], last));
+        }
+        skipped |= empty, begins |= _mm256_mask_test_epi32_mask(empty, block, _mm256_set1_epi32(4));
+        cells = _mm512_mask_cmp_pd_mask(going & (__mmask8)~empty, t1, t, _CMP_GT_OQ);
+        if (cells) {
+            isogi_dvr__corners_eight(&d->volume, cell, cells, kind, last_word, c);
+            for (k = 1, low = high = sum = c[0]; k < 8; k++)
+                low = _mm512_min_pd(low, c[k]), high = _mm512_max_pd(high, c[k]), sum = _mm512_add_pd(sum, c[k]);
+            hollow = cells & (__mmask8)~_mm512_cmp_pd_mask(_mm512_abs_pd(sum), _mm512_set1_pd(1e300), _CMP_LE_OQ);
+            quiet = cells & (hollow | isogi_dvr__quiet_eight(g, low, high));
+            work->cells += (uint64_t)__builtin_popcount(cells);
+            cells &= (__mmask8)~quiet, begins |= hollow, skipped |= quiet;
+            work->cubics += (uint64_t)__builtin_popcount(cells), work->samples += (uint64_t)__builtin_popcount(cells);
+            if (cells) isogi_dvr__cut_eight(g, e, cells, begins, skipped, c, at, out, low, high);
+            begins &= (__mmask8)~cells, skipped &= (__mmask8)~cells;
+        }
+        t = _mm512_mask_mov_pd(t, going, t1);
+        for (a = 0; a < 3; a++) at[a] = _mm512_mask_mov_pd(at[a], going, then[a]), cell[a] = _mm256_mask_mov_epi32(cell[a], going, to[a]);
+        e->going &= (unsigned)~(going & (past | _mm512_cmp_pd_mask(t, length, _CMP_GE_OQ)));
+    }
+    for (k = 0; k < 8; k++) {
+        double from = e->from[k], last = e->to[k];
+        if ((from < last || last < from) && e->layer[k].clear > e->end)
+            isogi_dvr__add_values(g, from, last, fabs(last - from), &e->layer[k]);
+    }
+}
+#undef ISOGI_DVR__AVX512
+#ifndef __clang__
+#pragma GCC diagnostic pop
+#endif
+#endif
+
 static void isogi_dvr__cast_values(isogi_dvr__pixel_ray *r, isogi_dvr__march *m) {
     isogi_dvr__span s;
     if (r->dvr->transparent) return;
+    if (!r->probe && isogi_dvr__joined(r->dvr)) {
+        isogi_dvr__cast_joined(r, m);
+        return;
+    }
     isogi_dvr__begin_walk(&s.walk, m);
     s.sampled = r->dvr->desc.classification == ISOGI_DVR_PRE_INTEGRATED, s.touched = 0, s.touched_t = -1;
     s.bounded = isogi_dvr__bounded(r->dvr), s.limit = r->dvr->limit;
@@ -5441,7 +5785,8 @@ struct isogi_dvr__frame {
     size_t light_stride[3], light_row[2]; /* floats to the neighbours (0 where there is one point); rows, planes */
     isogi_dvr__held held; /* where light stands, if held.block */
     size_t count;       /* of classes */
-    float low, scale;   /* place of a value among them, which goes on before the first and beyond the last, both of one extinction and colour */
+    float low, scale;   /* place of a value among them, which goes on before the first and beyond the last,
+                           both of one extinction and colour */
     float top;          /* of the last class */
     float quantum[4];   /* of their integrals */
     double step;        /* voxels between samples */
@@ -5450,9 +5795,10 @@ struct isogi_dvr__frame {
     float tolerance;    /* change of extinction times length, and of what is seen of it, from which on a piece is divided */
     float glow;         /* share of the colour that is emitted */
     void (*look)(const isogi_dvr__frame *f, const isogi_dvr__fast_ray *r, isogi_dvr__fast_run *run);
-    void (*shade)(const isogi_dvr__frame *f, const isogi_dvr__fast_ray *r, isogi_dvr__fast_state *s, const isogi_dvr__fast_run *run, isogi_counters *work);
-    int sample_kind;    /* voxels that vectors can read: 0 float, 1 uint8, 2 uint16; -1 another type or layout */
-    uint32_t last_word; /* byte offset of the last four bytes of the data */
+    void (*shade)(const isogi_dvr__frame *f, const isogi_dvr__fast_ray *r, isogi_dvr__fast_state *s, const isogi_dvr__fast_run *run,
+                  isogi_counters *work);
+    int sample_kind;    /* of isogi_dvr__sample_kind */
+    uint32_t last_word;
 };
 
 /* Whether any peak lies within the range of values. */
@@ -5465,8 +5811,8 @@ static int isogi_dvr__any_peak(const isogi_dvr *d) {
 
 static int isogi_dvr__fast_space(const isogi_dvr *d) {
     return d->desc.space == ISOGI_DVR_PHYSICAL && !isogi_dvr__bounded(d) && d->desc.classification != ISOGI_DVR_POST_CLASSIFIED &&
-        !isogi_dvr__any_peak(d) && !d->desc.jitter &&
-           (d->desc.shading == ISOGI_DVR_UNLIT || d->desc.shading == ISOGI_DVR_VISIBILITY) && !(fabs(d->desc.anisotropy) > 0) && d->cells[0] && d->cells[1] && d->cells[2];
+           !isogi_dvr__any_peak(d) && !d->desc.jitter && (d->desc.shading == ISOGI_DVR_UNLIT || d->desc.shading == ISOGI_DVR_VISIBILITY) &&
+           !(fabs(d->desc.anisotropy) > 0) && d->cells[0] && d->cells[1] && d->cells[2];
 }
 
 /* Four classes at least to the narrowest piece of the transfer function, as far as their number allows. */
@@ -5513,7 +5859,8 @@ static void isogi_dvr__frame_classes(isogi_dvr__frame *f, double low, double sca
         from = x = ends[0], to = ends[1];
         next = t->point_count ? isogi_dvr__points_below(t->points, t->point_count, from) : 0;
         while (t->point_count) { /* pieces between the function's points: the product of two linear functions, by Simpson's rule exactly */
-            double end = next < t->point_count && t->points[next].value < to ? t->points[next].value : to, weight = to > from ? (end - x) / (to - from) : 1;
+            double end = next < t->point_count && t->points[next].value < to ? t->points[next].value : to,
+                   weight = to > from ? (end - x) / (to - from) : 1;
             for (half = 0; half < 3; half++) {
                 double at = x + 0.5 * half * (end - x), rgb[3], extinction;
                 if (half == 2 && end > x) { /* just below the end: the upper side of a step is not yet reached */
@@ -5554,7 +5901,8 @@ typedef struct isogi_dvr__frame_job {
 static void isogi_dvr__frame_light(void *arg, size_t task) {
     isogi_dvr__frame_job *job = (isogi_dvr__frame_job *)arg;
     const isogi_dvr *d = job->frame.dvr;
-    size_t points = isogi_dvr__held_points(d), point = task * ISOGI_DVR__GAIN, end = point + ISOGI_DVR__GAIN < points ? point + ISOGI_DVR__GAIN : points, c;
+    size_t points = isogi_dvr__held_points(d), point = task * ISOGI_DVR__GAIN,
+           end = point + ISOGI_DVR__GAIN < points ? point + ISOGI_DVR__GAIN : points, c;
     float sh[ISOGI_DVR__MAX_ORDER * ISOGI_DVR__MAX_ORDER][4];
     memset(sh, 0, sizeof sh);
     for (c = 0; c < 3 * d->coefficients; c++) sh[c / 3][c % 3] = job->lights->sh[c] * (float)(1 / (4 * ISOGI_DVR__PI));
@@ -5585,11 +5933,13 @@ struct isogi_dvr__fast_run {
     int pieces;                               /* up to ISOGI_DVR__NODES - 1 */
     unsigned some;                            /* a bit for each piece that absorbs */
     float classes[ISOGI_DVR__NODES];          /* of samples: places among the frame's classes */
-    float mean[ISOGI_DVR__NODES], depth[ISOGI_DVR__NODES], change[ISOGI_DVR__NODES]; /* of pieces: extinction, optical depth, and its change across them */
+    float mean[ISOGI_DVR__NODES], depth[ISOGI_DVR__NODES], change[ISOGI_DVR__NODES]; /* of pieces: extinction, optical depth,
+                                                                                        and its change across them */
 };
 
 /* What a ray has gathered. */
-struct isogi_dvr__fast_state { float out[4], clear, depth, place; }; /* out[3]: opacity, while that is little; depth and place: of isogi_dvr__fast_probe */
+struct isogi_dvr__fast_state { float out[4], clear, depth, place; }; /* out[3]: opacity, while that is little; depth and place: of
+                                                                        isogi_dvr__fast_probe */
 
 /* Classes of a run's samples. */
 static void isogi_dvr__fast_classes(const isogi_dvr__frame *f, const isogi_dvr__fast_ray *r, isogi_dvr__fast_run *run) {
@@ -5722,7 +6072,9 @@ static void isogi_dvr__fast_divide(const isogi_dvr__frame *f, const isogi_dvr__f
 }
 
 /* 1 - exp(-depth), also where that has no digits left. */
-static float isogi_dvr__lost(float depth, float clear) { return depth < 0.02f ? depth * (1 - depth * (0.5f - depth * (1.0f / 6))) : 1 - clear; }
+static float isogi_dvr__lost(float depth, float clear) {
+    return depth < 0.02f ? depth * (1 - depth * (0.5f - depth * (1.0f / 6))) : 1 - clear;
+}
 
 /* The pieces of a run, front to back. */
 static void isogi_dvr__fast_shade(const isogi_dvr__frame *f, const isogi_dvr__fast_ray *r, isogi_dvr__fast_state *s,
@@ -5799,14 +6151,16 @@ ISOGI_DVR__AVX2 inline __m256 isogi_dvr__samples_avx2(const isogi_dvr__frame *f,
         __m256i at = _mm256_add_epi32(offset, _mm256_set1_epi32((int)((k & 1 ? v->stride[1] : 0) + (k & 2 ? v->stride[2] : 0))));
         __m256 x0, x1;
         if (f->sample_kind == 0) { /* two floats in one word of eight bytes */
-            __m256d zero = _mm256_setzero_pd(), all = _mm256_castsi256_pd(_mm256_set1_epi64x(-1)), low, high; /* or g++ misses what is undefined */
+            /* or g++ misses what is undefined */
+            __m256d zero = _mm256_setzero_pd(), all = _mm256_castsi256_pd(_mm256_set1_epi64x(-1)), low, high;
             at = _mm256_permute4x64_epi64(at, 0xd8); /* so that the halves come together again in order */
             low = _mm256_mask_i32gather_pd(zero, (const double *)(const void *)data, _mm256_castsi256_si128(at), all, 1);
             high = _mm256_mask_i32gather_pd(zero, (const double *)(const void *)data, _mm256_extracti128_si256(at, 1), all, 1);
             x0 = _mm256_shuffle_ps(_mm256_castpd_ps(low), _mm256_castpd_ps(high), 0x88);
             x1 = _mm256_shuffle_ps(_mm256_castpd_ps(low), _mm256_castpd_ps(high), 0xdd);
         } else { /* two voxels in one word, which must not reach beyond the data */
-            __m256i word = _mm256_min_epi32(at, _mm256_set1_epi32((int)f->last_word)), shift = _mm256_slli_epi32(_mm256_sub_epi32(at, word), 3), mask;
+            __m256i word = _mm256_min_epi32(at, _mm256_set1_epi32((int)f->last_word)),
+                    shift = _mm256_slli_epi32(_mm256_sub_epi32(at, word), 3), mask;
             word = _mm256_srlv_epi32(_mm256_i32gather_epi32((const int *)(const void *)data, word, 1), shift);
             mask = _mm256_set1_epi32(f->sample_kind == 1 ? 0xff : 0xffff);
             x0 = _mm256_cvtepi32_ps(_mm256_and_si256(word, mask));
@@ -5820,7 +6174,9 @@ ISOGI_DVR__AVX2 inline __m256 isogi_dvr__samples_avx2(const isogi_dvr__frame *f,
 }
 
 /* Lane k + 1 at lane k. */
-ISOGI_DVR__AVX2 inline __m256 isogi_dvr__next_avx2(__m256 x) { return _mm256_permutevar8x32_ps(x, _mm256_setr_epi32(1, 2, 3, 4, 5, 6, 7, 7)); }
+ISOGI_DVR__AVX2 inline __m256 isogi_dvr__next_avx2(__m256 x) {
+    return _mm256_permutevar8x32_ps(x, _mm256_setr_epi32(1, 2, 3, 4, 5, 6, 7, 7));
+}
 
 ISOGI_DVR__AVX2 inline __m256 isogi_dvr__magnitude_avx2(__m256 x) { return _mm256_andnot_ps(_mm256_set1_ps(-0.0f), x); }
 
@@ -5900,7 +6256,8 @@ ISOGI_DVR__AVX2 inline __m256i isogi_dvr__held_cells_avx2(const isogi_dvr__held 
     __m256i block = _mm256_setzero_si256(), log, point;
     __m256 part;
     int a;
-    for (a = 3; a-- > 0;) block = _mm256_add_epi32(_mm256_mullo_epi32(block, _mm256_set1_epi32((int)h->count[a])), _mm256_srli_epi32(cell[a], 3));
+    for (a = 3; a-- > 0;)
+        block = _mm256_add_epi32(_mm256_mullo_epi32(block, _mm256_set1_epi32((int)h->count[a])), _mm256_srli_epi32(cell[a], 3));
     point = _mm256_i32gather_epi32((const int *)(const void *)&h->block[0].first, block, 8);
     log = _mm256_i32gather_epi32((const int *)(const void *)&h->block[0].log, block, 8);
     part = _mm256_castsi256_ps(_mm256_slli_epi32(_mm256_sub_epi32(_mm256_set1_epi32(127), log), 23)); /* 2^-log */
@@ -5916,7 +6273,8 @@ ISOGI_DVR__AVX2 inline __m256i isogi_dvr__held_cells_avx2(const isogi_dvr__held 
 ISOGI_DVR__AVX2 inline void isogi_dvr__parts_avx2(const isogi_dvr__frame *f, const isogi_dvr__fast_ray *r, const isogi_dvr__fast_run *run,
                                                   isogi_dvr__fast_parts *parts) {
     const __m256 zero = _mm256_setzero_ps(), one = _mm256_set1_ps(1), half = _mm256_set1_ps(0.5f), reach = _mm256_set1_ps(r->reach);
-    __m256 value = _mm256_loadu_ps(run->classes), next = isogi_dvr__next_avx2(value), difference = _mm256_sub_ps(next, value), x, at, close, u[3];
+    __m256 value = _mm256_loadu_ps(run->classes), next = isogi_dvr__next_avx2(value), difference = _mm256_sub_ps(next, value), x, at, close,
+           u[3];
     __m256i index, c[3], to, plane;
     int a;
     index = isogi_dvr__fast_classes_avx2(f, value);
@@ -5928,7 +6286,8 @@ ISOGI_DVR__AVX2 inline void isogi_dvr__parts_avx2(const isogi_dvr__frame *f, con
     _mm256_storeu_ps(parts->factor[2], _mm256_blendv_ps(_mm256_xor_ps(_mm256_mul_ps(next, x), _mm256_set1_ps(-0.0f)), half, close));
     if (!f->light) return;
     index = _mm256_setzero_si256();
-    x = _mm256_min_ps(_mm256_mul_ps(_mm256_loadu_ps(run->mean), _mm256_set1_ps(r->piece * r->reach)), _mm256_set1_ps(1e15f)), x = _mm256_mul_ps(x, x);
+    x = _mm256_min_ps(_mm256_mul_ps(_mm256_loadu_ps(run->mean), _mm256_set1_ps(r->piece * r->reach)), _mm256_set1_ps(1e15f)),
+    x = _mm256_mul_ps(x, x);
     x = _mm256_div_ps(_mm256_mul_ps(reach, x), _mm256_add_ps(x, _mm256_set1_ps(16)));
     at = _mm256_div_ps(half, _mm256_fmadd_ps(_mm256_loadu_ps(run->depth), _mm256_set1_ps(1.0f / 6), one));
     at = _mm256_add_ps(at, _mm256_setr_ps(0, 1, 2, 3, 4, 5, 6, 7));
@@ -5936,8 +6295,10 @@ ISOGI_DVR__AVX2 inline void isogi_dvr__parts_avx2(const isogi_dvr__frame *f, con
     for (a = 0; a < 3; a++) {
         x = _mm256_mul_ps(_mm256_fmadd_ps(at, _mm256_set1_ps(r->dir[a]), _mm256_set1_ps(r->origin[a])), _mm256_set1_ps(f->light_scale[a]));
         x = _mm256_max_ps(x, zero);
-        c[a] = _mm256_min_epi32(_mm256_cvttps_epi32(x), _mm256_set1_epi32(f->light_last[a])), u[a] = _mm256_min_ps(_mm256_sub_ps(x, _mm256_cvtepi32_ps(c[a])), one);
-        if (!f->held.block) index = _mm256_add_epi32(index, a ? _mm256_mullo_epi32(c[a], _mm256_set1_epi32((int)(f->light_row[a - 1] / 4))) : c[a]);
+        c[a] = _mm256_min_epi32(_mm256_cvttps_epi32(x), _mm256_set1_epi32(f->light_last[a])),
+        u[a] = _mm256_min_ps(_mm256_sub_ps(x, _mm256_cvtepi32_ps(c[a])), one);
+        if (!f->held.block)
+            index = _mm256_add_epi32(index, a ? _mm256_mullo_epi32(c[a], _mm256_set1_epi32((int)(f->light_row[a - 1] / 4))) : c[a]);
     }
     to = _mm256_set1_epi32((int)(f->light_stride[1] / 4)), plane = _mm256_set1_epi32((int)(f->light_stride[2] / 4));
     if (f->held.block) index = isogi_dvr__held_cells_avx2(&f->held, c, u, &to, &plane);
@@ -5967,7 +6328,8 @@ ISOGI_DVR__AVX2 inline __m128 isogi_dvr__part_avx2(const isogi_dvr__frame *f, co
     light = _mm256_castps256_ps128(front);
     light = _mm_fmadd_ps(_mm_set1_ps(parts->u[0][k]), _mm_sub_ps(_mm256_extractf128_ps(front, 1), light), light);
     light = _mm_div_ps(light, _mm_shuffle_ps(light, light, 0xff));
-    return _mm_mul_ps(colour, _mm_add_ps(_mm_max_ps(light, _mm_setzero_ps()), _mm_setr_ps(f->glow, f->glow, f->glow, 0))); /* a truncated series may ring below 0 */
+    /* a truncated series may ring below 0 */
+    return _mm_mul_ps(colour, _mm_add_ps(_mm_max_ps(light, _mm_setzero_ps()), _mm_setr_ps(f->glow, f->glow, f->glow, 0)));
 }
 
 /* As isogi_dvr__fast_shade. */
@@ -6031,7 +6393,8 @@ static void isogi_dvr__fast_cast(const isogi_dvr__frame *f, const isogi_dvr__fas
             int left = p.count[k] - 1 - p.next[k], stride = s[k].clear < f->dim && left > 2 * (ISOGI_DVR__NODES - 1) ? 2 : 1;
             run[k].some = 0;
             if (left <= 0) continue;
-            run[k].first = (float)p.next[k], run[k].stride = (float)stride, run[k].pieces = left < ISOGI_DVR__NODES ? left : ISOGI_DVR__NODES - 1;
+            run[k].first = (float)p.next[k], run[k].stride = (float)stride,
+            run[k].pieces = left < ISOGI_DVR__NODES ? left : ISOGI_DVR__NODES - 1;
             run[k].length = r[k].piece * run[k].stride, run[k].last = left < ISOGI_DVR__NODES ? r[k].last_piece : run[k].length;
             f->look(f, &r[k], &run[k]);
             work->samples += ISOGI_DVR__NODES, any = 1;
@@ -6054,7 +6417,8 @@ static int isogi_dvr__fast_begin(const isogi_dvr__frame *f, const double origin[
     pieces = ceil((span[1] - span[0]) / piece - 1e-6);
     if (!(pieces < 1e7)) return 0;
     r->count = (int)pieces + 1;
-    for (a = 0; a < 3; a++) r->origin[a] = (float)isogi_dvr__clamp(origin[a] + span[0] * dir[a], d->cells[a]), r->dir[a] = (float)(dir[a] * piece);
+    for (a = 0; a < 3; a++)
+        r->origin[a] = (float)isogi_dvr__clamp(origin[a] + span[0] * dir[a], d->cells[a]), r->dir[a] = (float)(dir[a] * piece);
     for (a = 0; a < 3; a++) dir[a] *= piece;
     r->enter = span[0], r->sought = 3e38f, r->reach = (float)isogi_dvr__clamp(isogi_dvr__reach_along(d, dir), 1e9);
     /* no infinity: that times no extinction would be no number */
@@ -6132,6 +6496,7 @@ typedef struct isogi_dvr__render_job {
     const isogi_dvr *dvr;
     const isogi_view *view;
     isogi_dvr__lights lights;
+    int eight;                  /* rays go eight at once */
     isogi_dvr__frame_job fast;  /* where frame.classes */
     isogi_dvr__camera camera;
     double eye[3]; /* grid */
@@ -6141,40 +6506,88 @@ typedef struct isogi_dvr__render_job {
     isogi_counters *work;
 } isogi_dvr__render_job;
 
-static void isogi_dvr__render_pixel(const isogi_dvr__render_job *job, int x, int y, isogi_dvr__crossings *crossings, isogi_counters *work) {
+/* A pixel and its ray; 0 if it misses the volume. */
+static int isogi_dvr__begin_pixel(const isogi_dvr__render_job *job, int x, int y, isogi_dvr__pixel_ray *ray, isogi_dvr__march *march,
+                                  isogi_counters *work) {
     const isogi_dvr *d = job->dvr;
     float *out = job->pixels + 5 * ((size_t)y * (size_t)job->view->width + (size_t)x);
-    double origin[3], world[3], grid[3], dir[3], speed;
-    isogi_dvr__pixel_ray ray;
-    isogi_dvr__march march, again;
-    int a, crossed = !isogi_dvr__by_piece(d); /* peaks are found by the intersector */
+    double world[3], dir[3];
+    int a;
     for (a = 0; a < 4; a++) out[a] = 0;
     out[4] = HUGE_VALF;
     work->rays++;
-    memset(&ray, 0, sizeof ray);
-    isogi_view_ray(job->view, x, y, origin, ray.dir);
-    for (a = 0; a < 3; a++) world[a] = (double)ray.dir[a];
-    speed = sqrt(isogi_dvr__dot(world, world));
+    memset(ray, 0, sizeof *ray);
+    isogi_dvr__camera_ray(&job->camera, job->view, x, y, world);
+    for (a = 0; a < 3; a++) { /* the ray of isogi_view_ray; gcc 12 widens again what it has not rounded, where it makes vectors of it */
+        volatile float rounded = (float)world[a];
+        ray->dir[a] = rounded, world[a] = (double)ray->dir[a];
+    }
     isogi_dvr__transform(d->to_grid, world, dir);
-    isogi_vol_to_grid(d->desc.pyramid, origin, grid);
-    if (!isogi_dvr__begin(&march, d, grid, dir, speed, d->desc.step)) return;
-    march.silhouette = d->desc.silhouette, march.unlit = d->desc.shading == ISOGI_DVR_UNLIT;
-    isogi_dvr__jitter(&march, d->desc.jitter, x, y);
-    again = march;
-    ray.dvr = d, ray.lights = &job->lights, ray.clear = 1, ray.end = 1 - (double)d->desc.opaque;
-    if (crossed) isogi_dvr__begin_crossings(crossings, d, origin, ray.dir, march.enter, march.length);
-    isogi_dvr__cast(&ray, &march, crossings);
-    for (a = 0; a < 3; a++) out[a] = (float)isogi_dvr__clamp(ray.rgb[a], 3e38);
-    out[3] = (float)(1 - ray.clear);
-    isogi_dvr__add(work, &march.work);
-    if (crossed) isogi_dvr__add(work, &crossings->work);
-    if (!job->depth || !(ray.clear < 1)) return;
-    /* once more, without colours, to the place that is asked for */
-    ray.probe = 1, ray.end = isogi_dvr__depth_end(job->view, ray.clear), ray.clear = 1;
-    if (crossed) isogi_dvr__begin_crossings(crossings, d, origin, ray.dir, march.enter, march.length);
-    isogi_dvr__cast(&ray, &again, crossings);
-    out[4] = (float)((again.enter + ray.t) * speed);
+    if (!isogi_dvr__begin(march, d, job->eye, dir, sqrt(isogi_dvr__dot(world, world)), d->desc.step)) return 0;
+    march->silhouette = d->desc.silhouette, march->unlit = d->desc.shading == ISOGI_DVR_UNLIT;
+    isogi_dvr__jitter(march, d->desc.jitter, x, y);
+    ray->dvr = d, ray->lights = &job->lights, ray->clear = 1, ray->end = 1 - (double)d->desc.opaque;
+    return 1;
 }
+
+static void isogi_dvr__cast_pixel(const isogi_dvr__render_job *job, isogi_dvr__pixel_ray *ray, isogi_dvr__march *march,
+                                  isogi_dvr__crossings *crossings) {
+    double eye[3];
+    int a;
+    for (a = 0; a < 3; a++) eye[a] = (double)job->view->eye[a];
+    if (!isogi_dvr__by_piece(job->dvr)) isogi_dvr__begin_crossings(crossings, job->dvr, eye, ray->dir, march->enter, march->length);
+    isogi_dvr__cast(ray, march, crossings);
+}
+
+/* What a ray has brought; for its depth it goes once more, without colours, to the place that is asked for. */
+static void isogi_dvr__end_pixel(const isogi_dvr__render_job *job, int x, int y, isogi_dvr__pixel_ray *ray, isogi_dvr__march *again,
+                                 isogi_dvr__crossings *crossings) {
+    float *out = job->pixels + 5 * ((size_t)y * (size_t)job->view->width + (size_t)x);
+    int a;
+    for (a = 0; a < 3; a++) out[a] = (float)isogi_dvr__clamp(ray->rgb[a], 3e38);
+    out[3] = (float)(1 - ray->clear);
+    if (!job->depth || !(ray->clear < 1)) return;
+    ray->probe = 1, ray->end = isogi_dvr__depth_end(job->view, ray->clear), ray->clear = 1;
+    isogi_dvr__cast_pixel(job, ray, again, crossings);
+    out[4] = (float)((again->enter + ray->t) * again->speed);
+}
+
+static void isogi_dvr__render_pixel(const isogi_dvr__render_job *job, int x, int y, isogi_dvr__crossings *crossings, isogi_counters *work) {
+    isogi_dvr__pixel_ray ray;
+    isogi_dvr__march march, again;
+    if (!isogi_dvr__begin_pixel(job, x, y, &ray, &march, work)) return;
+    again = march;
+    isogi_dvr__cast_pixel(job, &ray, &march, crossings);
+    isogi_dvr__add(work, &march.work);
+    if (!isogi_dvr__by_piece(job->dvr)) isogi_dvr__add(work, &crossings->work);
+    isogi_dvr__end_pixel(job, x, y, &ray, &again, crossings);
+}
+
+#ifdef ISOGI_DVR__AVX
+/* Four pixels by two. */
+static void isogi_dvr__render_eight(const isogi_dvr__render_job *job, int x0, int y0, isogi_dvr__crossings *crossings,
+                                    isogi_counters *work) {
+    isogi_dvr__pixel_ray ray[8];
+    isogi_dvr__march march[8];
+    isogi_dvr__eight e;
+    unsigned hit;
+    int k;
+    memset(&e, 0, sizeof e);
+    e.end = 1 - (double)job->dvr->desc.opaque;
+    for (k = 0; k < 8; k++) {
+        int x = x0 + k % 4, y = y0 + k / 4;
+        if (x < job->view->width && y < job->view->height && isogi_dvr__begin_pixel(job, x, y, &ray[k], &march[k], work))
+            isogi_dvr__begin_eight(&e, k, &march[k]);
+    }
+    hit = job->dvr->transparent ? 0 : e.going, e.going = hit;
+    isogi_dvr__cast_eight(job->dvr, job->fast.frame.sample_kind, job->fast.frame.last_word, &e, work);
+    for (k = 0; k < 8; k++) {
+        if (!(hit >> k & 1)) continue;
+        memcpy(ray[k].rgb, e.layer[k].rgb, sizeof ray[k].rgb), ray[k].clear = e.layer[k].clear;
+        isogi_dvr__end_pixel(job, x0 + k % 4, y0 + k / 4, &ray[k], &march[k], crossings);
+    }
+}
+#endif
 
 /* Depth of a packet: once without a limit, for the depth in all, of which 1 - clear has no digits when it is little; and once more to the
    place that is asked for. */
@@ -6227,13 +6640,27 @@ static void isogi_dvr__render_task(void *arg, size_t tile) {
     int x0 = (int)(tile % job->across) * ISOGI_DVR__TILE, y0 = (int)(tile / job->across) * ISOGI_DVR__TILE, x, y;
     isogi_dvr__crossings crossings;
     isogi_counters work;
-    int side = job->fast.frame.classes ? 4 : 1; /* of a packet */
+    int wide = job->fast.frame.classes || job->eight ? 4 : 1, high = job->eight ? 2 : wide; /* a packet */
     memset(&work, 0, sizeof work);
-    for (y = y0; y < y0 + ISOGI_DVR__TILE && y < job->view->height; y += side)
-        for (x = x0; x < x0 + ISOGI_DVR__TILE && x < job->view->width; x += side)
-            if (side > 1) isogi_dvr__render_fast(job, x, y, &work);
+    for (y = y0; y < y0 + ISOGI_DVR__TILE && y < job->view->height; y += high)
+        for (x = x0; x < x0 + ISOGI_DVR__TILE && x < job->view->width; x += wide) {
+            if (job->fast.frame.classes) isogi_dvr__render_fast(job, x, y, &work);
+#ifdef ISOGI_DVR__AVX
+            else if (job->eight) isogi_dvr__render_eight(job, x, y, &crossings, &work);
+#endif
             else isogi_dvr__render_pixel(job, x, y, &crossings, &work);
+        }
     job->work[tile] = work;
+}
+
+/* Voxels that vectors can read: 0 float, 1 uint8, 2 uint16; -1 another type or layout. last_word: byte offset of the last four bytes. */
+static int isogi_dvr__sample_kind(const isogi_volume *v, const int cells[3], uint32_t *last_word) {
+    int kind = v->type == ISOGI_F32 ? 0 : v->type == ISOGI_U8 ? 1 : v->type == ISOGI_U16 ? 2 : -1;
+    double bytes =
+        (double)v->stride[0] * (double)cells[0] + (double)v->stride[1] * (double)cells[1] + (double)v->stride[2] * (double)cells[2];
+    if (kind < 0 || v->stride[0] != (kind ? kind : 4) || v->stride[1] <= 0 || v->stride[2] <= 0 || !(bytes > 8 && bytes < 2e9)) return -1;
+    *last_word = (uint32_t)bytes + (uint32_t)v->stride[0] - 4;
+    return kind;
 }
 
 /* Tables of a picture on the path of physical space; nothing where another path is asked for. */
@@ -6241,22 +6668,24 @@ static isogi_result isogi_dvr__begin_frame(isogi_dvr__render_job *job) {
     const isogi_dvr *d = job->dvr;
     const isogi_volume *v = &d->volume;
     isogi_dvr__frame *f = &job->fast.frame;
-    double eye[3], bytes, blocks, low, scale;
+    double eye[3], blocks, low, scale;
     size_t points = isogi_dvr__held_points(d);
     isogi_result result;
-    int a, kind = v->type == ISOGI_F32 ? 0 : v->type == ISOGI_U8 ? 1 : v->type == ISOGI_U16 ? 2 : -1;
+    int a;
     isogi_dvr__set_camera(&job->camera, job->view);
     for (a = 0; a < 3; a++) eye[a] = (double)job->view->eye[a];
     isogi_vol_to_grid(d->desc.pyramid, eye, job->eye);
+    blocks = (double)d->level[0].size[0] * (double)d->level[0].size[1] * (double)d->level[0].size[2];
+    f->sample_kind = isogi_dvr__sample_kind(v, d->cells, &f->last_word);
+#ifdef ISOGI_DVR__AVX
+    if (f->sample_kind >= 0 && isogi_dvr__joined(d) && isogi_dvr__machine() >= 4 && (!d->context.force_path || d->context.force_path > 3))
+        job->eight = blocks < 2e9 && d->cells[0] && d->cells[1] && d->cells[2] && fabs(v->scale) < 1e200 && fabs(v->bias) < 1e200;
+#endif
     if (!isogi_dvr__fast_space(d) || job->lights.nearby.light_count || job->lights.local) return ISOGI_OK;
     f->dvr = d, f->step = d->piece, f->look = isogi_dvr__fast_look, f->shade = isogi_dvr__fast_shade, f->glow = (float)d->desc.emission;
     f->end = 1 - d->desc.opaque, f->dim = 0.125f;
-    blocks = (double)d->level[0].size[0] * (double)d->level[0].size[1] * (double)d->level[0].size[2];
     f->leap = blocks < 2e9 ? d->kernels.leap : isogi_dvr__leap;
     f->tolerance = d->desc.tolerance > 0 ? (float)d->desc.tolerance : 0.5f;
-    bytes = (double)v->stride[0] * (double)d->cells[0] + (double)v->stride[1] * (double)d->cells[1] + (double)v->stride[2] * (double)d->cells[2];
-    f->sample_kind = kind >= 0 && v->stride[0] == (kind == 0 ? 4 : kind) && v->stride[1] > 0 && v->stride[2] > 0 && bytes > 8 && bytes < 2e9 ? kind : -1;
-    if (f->sample_kind >= 0) f->last_word = (uint32_t)bytes + (uint32_t)v->stride[0] - 4;
 #ifdef ISOGI_DVR__AVX
     if (f->sample_kind >= 0 && isogi_dvr__machine() >= 3 && (!d->context.force_path || d->context.force_path > 2) &&
         points < 0x7fffffff && d->held.total < 0x0fffffff)
@@ -6327,10 +6756,11 @@ ISOGI_API isogi_result isogi_dvr_render(const isogi_dvr *dvr, const isogi_view *
 
 ISOGI_API isogi_result isogi_transfer_preset(isogi_preset preset, double low, double high, float extinction,
                                              isogi_transfer_point points[ISOGI_PRESET_POINTS]) {
-    static const float colour[4][5][3] = {{{1, 1, 1}, {1, 1, 1}, {1, 1, 1}, {1, 1, 1}, {1, 1, 1}},
-                                          {{0, 0, 0}, {0.4f, 0.01f, 0}, {0.9f, 0.12f, 0.01f}, {1, 0.6f, 0.08f}, {1, 1, 0.9f}},
-                                          {{0.05f, 0.08f, 0.55f}, {0.25f, 0.42f, 0.9f}, {0.75f, 0.75f, 0.75f}, {0.85f, 0.3f, 0.18f}, {0.45f, 0.01f, 0.02f}},
-                                          {{0.2f, 0.03f, 0.5f}, {0.03f, 0.2f, 0.85f}, {0.05f, 0.6f, 0.25f}, {0.9f, 0.7f, 0.05f}, {0.75f, 0.05f, 0.03f}}};
+    static const float colour[4][5][3] = {
+        {{1, 1, 1}, {1, 1, 1}, {1, 1, 1}, {1, 1, 1}, {1, 1, 1}},
+        {{0, 0, 0}, {0.4f, 0.01f, 0}, {0.9f, 0.12f, 0.01f}, {1, 0.6f, 0.08f}, {1, 1, 0.9f}},
+        {{0.05f, 0.08f, 0.55f}, {0.25f, 0.42f, 0.9f}, {0.75f, 0.75f, 0.75f}, {0.85f, 0.3f, 0.18f}, {0.45f, 0.01f, 0.02f}},
+        {{0.2f, 0.03f, 0.5f}, {0.03f, 0.2f, 0.85f}, {0.05f, 0.6f, 0.25f}, {0.9f, 0.7f, 0.05f}, {0.75f, 0.05f, 0.03f}}};
     int i, a;
     if (!points || (unsigned)preset > ISOGI_PRESET_SPECTRUM || !isogi_dvr__finite64(low) || !isogi_dvr__finite64(high) ||
         !(low < high)) return ISOGI_INVALID;
@@ -6434,8 +6864,8 @@ static void isogi_dvr__leave_outliers(const isogi_pyramid *pyramid, double range
     }
 }
 
-ISOGI_API isogi_result isogi_transfer_suggest(const isogi_pyramid *pyramid, isogi_dvr_space space, isogi_transfer_point points[ISOGI_SUGGEST_POINTS],
-                                              double *threshold) {
+ISOGI_API isogi_result isogi_transfer_suggest(const isogi_pyramid *pyramid, isogi_dvr_space space,
+                                              isogi_transfer_point points[ISOGI_SUGGEST_POINTS], double *threshold) {
     static const float colour[ISOGI_SUGGEST_POINTS][3] = {{0.4f, 0.55f, 0.8f}, {0.4f, 0.55f, 0.8f}, {0.75f, 0.7f, 0.65f},
                                                           {0.85f, 0.75f, 0.6f}, {1, 0.7f, 0.35f},    {1, 0.65f, 0.3f}};
     static const double share[2][ISOGI_SUGGEST_POINTS] = {{0, 0, 0.15, 0.2, 1, 2.2}, {0, 0, 0.3, 0.4, 0.8, 1}};
@@ -6545,14 +6975,20 @@ static isogi_result isogi_dvr__take_tets(isogi_tets *m, isogi_tet_report *report
     return ISOGI_OK;
 }
 
-static void isogi_dvr__sort3(uint32_t v[3]) {
+/* The points of a face in rising order; returns on which side of them the tetrahedron lies:
+   whether an odd number of exchanges were made. */
+static int isogi_dvr__face_key(const isogi_tets *m, uint32_t face, uint32_t v[3]) {
     uint32_t swap;
-    if (v[0] > v[1]) swap = v[0], v[0] = v[1], v[1] = swap;
-    if (v[1] > v[2]) swap = v[1], v[1] = v[2], v[2] = swap;
-    if (v[0] > v[1]) swap = v[0], v[0] = v[1], v[1] = swap;
+    int odd = 0;
+    isogi_dvr__face_points(m, face, v);
+    if (v[0] > v[1]) swap = v[0], v[0] = v[1], v[1] = swap, odd = !odd;
+    if (v[1] > v[2]) swap = v[1], v[1] = v[2], v[2] = swap, odd = !odd;
+    if (v[0] > v[1]) swap = v[0], v[0] = v[1], v[1] = swap, odd = !odd;
+    return odd;
 }
 
-/* Pairs of faces with the same three points, through a hash table of faces. */
+/* Pairs of faces with the same three points and tetrahedra on either side, through a hash table of faces that are, or once were, alone. A
+   tetrahedron that was there before is cut off: its faces lead to themselves. Where others overlap, eight chances are enough. */
 static isogi_result isogi_dvr__join_faces(isogi_tets *m, isogi_tet_report *report) {
     size_t slots = 16, faces = 4 * m->count, i;
     uint32_t *table;
@@ -6561,19 +6997,24 @@ static isogi_result isogi_dvr__join_faces(isogi_tets *m, isogi_tet_report *repor
     if (!table) return ISOGI_NO_MEMORY;
     memset(table, 0xff, slots * sizeof *table);
     for (i = 0; i < faces; i++) {
-        uint32_t mine[3], other[3];
-        size_t at;
-        isogi_dvr__face_points(m, (uint32_t)i, mine), isogi_dvr__sort3(mine);
-        at = (size_t)((mine[0] * 0x9e3779b97f4a7c15u ^ mine[1] * 0xbf58476d1ce4e5b9u ^ mine[2] * 0x94d049bb133111ebu) >> 20) & (slots - 1);
-        m->across[i] = ISOGI_DVR__NO_FACE;
-        for (; table[at] != ISOGI_DVR__NO_FACE; at = (at + 1) & (slots - 1)) {
-            isogi_dvr__face_points(m, table[at], other), isogi_dvr__sort3(other);
+        uint32_t mine[3], other[3], apex = m->tet[i >> 2][i & 3], across = ISOGI_DVR__NO_FACE;
+        int side = isogi_dvr__face_key(m, (uint32_t)i, mine), crowd = 0, again = 0;
+        size_t at =
+            (size_t)((mine[0] * 0x9e3779b97f4a7c15u ^ mine[1] * 0xbf58476d1ce4e5b9u ^ mine[2] * 0x94d049bb133111ebu) >> 20) & (slots - 1);
+        for (; table[at] != ISOGI_DVR__NO_FACE && crowd < 8; at = (at + 1) & (slots - 1)) {
+            uint32_t face = table[at], same = face;
+            if (isogi_dvr__face_key(m, face, other) != side) same = m->across[face];
             if (memcmp(mine, other, sizeof mine)) continue;
-            if (m->across[table[at]] == ISOGI_DVR__NO_FACE) m->across[table[at]] = (uint32_t)i, m->across[i] = table[at];
-            else report->crowded++;
-            break;
+            if (same != ISOGI_DVR__NO_FACE) crowd++, again |= m->tet[same >> 2][same & 3] == apex;
+            else if (across == ISOGI_DVR__NO_FACE) across = face;
         }
-        if (table[at] == ISOGI_DVR__NO_FACE) table[at] = (uint32_t)i;
+        m->across[i] = across;
+        report->crowded += crowd > 0;
+        if (again && !(i & 3)) {
+            for (report->crowded += 3, again = 0; again < 4; again++) m->across[i + (size_t)again] = (uint32_t)i + (uint32_t)again;
+            i += 3;
+        } else if (across != ISOGI_DVR__NO_FACE) m->across[across] = (uint32_t)i;
+        else if (table[at] == ISOGI_DVR__NO_FACE) table[at] = (uint32_t)i;
     }
     isogi_release(&m->context, table, slots, sizeof *table);
     for (i = 0; i < faces; i++) report->border += m->across[i] == ISOGI_DVR__NO_FACE;
@@ -6728,7 +7169,8 @@ static int isogi_dvr__left_of(const isogi_dvr__tet_ray *r, uint32_t p, uint32_t 
 static int isogi_dvr__hits_box(const isogi_dvr__tet_ray *r, const isogi_dvr__node *n, double from, double to) {
     int a;
     for (a = 0; a < 3; a++) {
-        double low = (double)n->low[a] - r->origin[a], high = (double)n->high[a] - r->origin[a], slack = 1e-9 * (fabs(low) + fabs(high)), t0, t1;
+        double low = (double)n->low[a] - r->origin[a], high = (double)n->high[a] - r->origin[a], slack = 1e-9 * (fabs(low) + fabs(high)),
+               t0, t1;
         if (!(fabs(r->dir[a]) > 1e-300)) {
             if (low > slack || high < -slack) return 0;
             continue;
@@ -6740,9 +7182,8 @@ static int isogi_dvr__hits_box(const isogi_dvr__tet_ray *r, const isogi_dvr__nod
     return from <= to;
 }
 
-/* The next border face at or behind `from` that comes after (t, face) in the order of t, then of faces: so no face is met twice. Only those
-   that lead in, or all. */
-static uint32_t isogi_dvr__next_border(const isogi_dvr__tet_ray *r, double from, double last_t, uint32_t last, int all, double *found_t) {
+/* The next border face that leads in (way -1) or out (+1) after (t, face), in the order of t, then of faces: so none is met twice. */
+static uint32_t isogi_dvr__next_border(const isogi_dvr__tet_ray *r, double last_t, uint32_t last, int way, double *found_t) {
     const isogi_tets *m = r->mesh;
     uint32_t stack[2 * ISOGI_DVR__DEEP], best = ISOGI_DVR__NO_FACE, i;
     int top = 0;
@@ -6750,7 +7191,7 @@ static uint32_t isogi_dvr__next_border(const isogi_dvr__tet_ray *r, double from,
     if (m->border_count) stack[top++] = 0;
     while (top) {
         const isogi_dvr__node *n = &m->node[stack[--top]];
-        if (!isogi_dvr__hits_box(r, n, from, nearest)) continue;
+        if (!isogi_dvr__hits_box(r, n, last_t, nearest)) continue;
         if (!n->count) {
             stack[top++] = n->first, stack[top++] = n->first + 1;
             continue;
@@ -6763,8 +7204,8 @@ static uint32_t isogi_dvr__next_border(const isogi_dvr__tet_ray *r, double from,
             side = isogi_dvr__left_of(r, p[0], p[1]);
             if (side != isogi_dvr__left_of(r, p[1], p[2]) || side != isogi_dvr__left_of(r, p[2], p[0])) continue;
             t = isogi_dvr__face_t(r, p, &rate);
-            if (!(rate < 0) && !(all && rate > 0)) continue;
-            if (t < from || t < last_t || (!(t > last_t) && m->border[i] <= last && last != ISOGI_DVR__NO_FACE)) continue;
+            if (!(rate * way > 0)) continue;
+            if (t < last_t || (!(t > last_t) && m->border[i] <= last && last != ISOGI_DVR__NO_FACE)) continue;
             if (t < nearest || (!(t > nearest) && m->border[i] < best)) nearest = t, best = m->border[i];
         }
     }
@@ -6794,7 +7235,8 @@ static void isogi_dvr__tet_gradient(const isogi_tets *m, uint32_t tet, double g[
     double origin[3], e[3][3], n[3][3], volume, value[3];
     int a, k;
     for (a = 0; a < 3; a++) origin[a] = (double)m->mesh.points[p[0]][a];
-    for (k = 0; k < 3; k++) isogi_dvr__sub(m->mesh.points[p[k + 1]], origin, e[k]), value[k] = (double)m->mesh.values[p[k + 1]] - (double)m->mesh.values[p[0]];
+    for (k = 0; k < 3; k++)
+        isogi_dvr__sub(m->mesh.points[p[k + 1]], origin, e[k]), value[k] = (double)m->mesh.values[p[k + 1]] - (double)m->mesh.values[p[0]];
     for (k = 0; k < 3; k++) isogi_dvr__cross(e[(k + 1) % 3], e[(k + 2) % 3], n[k]);
     volume = isogi_dvr__dot(e[0], n[0]);
     for (a = 0; a < 3; a++) g[a] = (value[0] * n[0][a] + value[1] * n[1][a] + value[2] * n[2][a]) / volume;
@@ -6844,52 +7286,64 @@ static void isogi_dvr__pass_tet(isogi_dvr__pixel_ray *pixel, isogi_dvr__tet_ray 
     s->aslant = s->aslant > 1 ? s->aslant : 1;
     s->factor = 1, s->path = 0;
     if (r->desc->space == ISOGI_DVR_PHYSICAL) s->path = p->dt * r->speed / r->desc->unit;
-    else if (r->desc->silhouette == ISOGI_DVR_SILHOUETTE_EXACT || r->desc->silhouette == ISOGI_DVR_SILHOUETTE_GRADIENT) s->path = steep * p->dt;
+    else if (r->desc->silhouette == ISOGI_DVR_SILHOUETTE_EXACT || r->desc->silhouette == ISOGI_DVR_SILHOUETTE_GRADIENT)
+        s->path = steep * p->dt;
     else if (r->desc->silhouette == ISOGI_DVR_SILHOUETTE_APPROXIMATE) s->factor = s->aslant;
     if (s->path > 0) s->factor = change > 0 && s->path < 1e300 * change ? s->path / change : 1e300;
     isogi_dvr__divide_piece(pixel, s);
 }
 
-/* The tetrahedron that holds the ray's origin: back from where the ray first leaves the mesh, if it leaves before it enters. */
-static uint32_t isogi_dvr__tet_around(isogi_dvr__tet_ray *r) {
-    double t;
-    uint32_t face = isogi_dvr__next_border(r, 0, 0, ISOGI_DVR__NO_FACE, 1, &t), p[3];
-    size_t steps;
-    if (face == ISOGI_DVR__NO_FACE) return ISOGI_DVR__NO_FACE;
-    isogi_dvr__face_points(r->mesh, face, p);
-    if (isogi_dvr__face_t(r, p, &t), !(t > 0)) return ISOGI_DVR__NO_FACE;
-    for (steps = 0; steps < r->mesh->count; steps++) {
-        uint32_t tet = face >> 2, back = isogi_dvr__exit_face(r, tet, face, -1, &t);
-        if (back == ISOGI_DVR__NO_FACE || t <= 0) return tet;
-        face = r->mesh->across[back];
-        if (face == ISOGI_DVR__NO_FACE) return ISOGI_DVR__NO_FACE;
+/* The tetrahedron that holds the ray's origin: the first that is found on the way back from where the ray leaves the mesh. Border within
+   `slack` of the origin counts as behind it, for an eye on a face, an edge or a point. */
+static uint32_t isogi_dvr__tet_around(const isogi_dvr__tet_ray *r, double slack) {
+    const isogi_dvr__node *box = r->mesh->node;
+    uint32_t face = ISOGI_DVR__NO_FACE;
+    double leave = slack;
+    int a;
+    if (!r->mesh->border_count) return ISOGI_DVR__NO_FACE;
+    for (a = 0; a < 3; a++)
+        if (!(r->origin[a] >= (double)box->low[a] && r->origin[a] <= (double)box->high[a])) return ISOGI_DVR__NO_FACE;
+    while ((face = isogi_dvr__next_border(r, leave, face, 1, &leave)) != ISOGI_DVR__NO_FACE) {
+        uint32_t at = face;
+        size_t steps;
+        for (steps = 0; steps < r->mesh->count && at != ISOGI_DVR__NO_FACE; steps++) {
+            double t;
+            uint32_t tet = at >> 2, back = isogi_dvr__exit_face(r, tet, at, -1, &t);
+            if (back == ISOGI_DVR__NO_FACE) break;
+            at = r->mesh->across[back];
+            if (t <= (at == ISOGI_DVR__NO_FACE ? slack : 0)) return tet;
+        }
     }
     return ISOGI_DVR__NO_FACE;
 }
 
-/* 0 if the ray runs in circles, which rounding may bring about next to an edge or a point. */
+/* Through one part of the mesh after the other, in the order in which they are entered; what lies before the end of those passed, where
+   parts overlap, is walked through without being drawn. 0 if the ray runs in circles, which rounding may bring about next to an edge or a
+   point. */
 static int isogi_dvr__cast_tets(isogi_dvr__pixel_ray *pixel, isogi_dvr__tet_ray *r, isogi_dvr__span *s) {
-    uint32_t tet = isogi_dvr__tet_around(r), in = ISOGI_DVR__NO_FACE, last = ISOGI_DVR__NO_FACE;
     double last_t = 0, slack = 1e-7 * r->mesh->size / r->speed;
+    uint32_t tet = isogi_dvr__tet_around(r, slack), in = ISOGI_DVR__NO_FACE, last = ISOGI_DVR__NO_FACE;
     r->t = 0, r->chained = 0;
     for (;;) {
-        int still = 0;
+        double walked = last_t;
+        int still = 0, overlaps = last_t < r->t - slack;
+        r->t = last_t > r->t ? last_t : r->t;
         while (tet != ISOGI_DVR__NO_FACE && pixel->clear > pixel->end) {
             double t;
             uint32_t out = isogi_dvr__exit_face(r, tet, in, 1, &t);
             if (out == ISOGI_DVR__NO_FACE) break;
-            still = t > r->t ? 0 : still + 1;
+            still = t > walked ? 0 : still + 1;
             if (still > 200) return 0;
-            isogi_dvr__pass_tet(pixel, r, s, tet, in, out, t);
+            walked = t > walked ? t : walked;
+            if (t > r->t) isogi_dvr__pass_tet(pixel, r, s, tet, overlaps ? ISOGI_DVR__NO_FACE : in, out, t);
             in = r->mesh->across[out];
             tet = in == ISOGI_DVR__NO_FACE ? in : in >> 2;
         }
         if (!(pixel->clear > pixel->end)) return 1;
-        in = isogi_dvr__next_border(r, r->t > slack ? r->t - slack : 0, last_t, last, 0, &last_t);
+        last = in = isogi_dvr__next_border(r, last_t, last, -1, &last_t);
         if (in == ISOGI_DVR__NO_FACE) return 1;
         /* over the seam of two parts that touch, the value goes on if it is the same on both sides */
-        last = in, tet = in >> 2, r->chained = r->chained && last_t <= r->t + slack;
-        r->t = last_t > r->t ? last_t : r->t;
+        tet = in >> 2, r->chained = r->chained && last_t <= r->t + slack;
     }
 }
 
@@ -6916,8 +7370,9 @@ static void isogi_dvr__try_tets(isogi_dvr__pixel_ray *pixel, const isogi_dvr__te
         ray.mesh = job->mesh, ray.desc = job->desc;
         for (a = 0; a < 3; a++) ray.origin[a] = origin[a], ray.dir[a] = (double)pixel->dir[a] + attempt * (a + 1) * 1e-9;
         ray.speed = sqrt(isogi_dvr__dot(ray.dir, ray.dir));
-        span.silhouette = job->desc->space == ISOGI_DVR_DATA || job->desc->silhouette != ISOGI_DVR_SILHOUETTE_APPROXIMATE ? job->desc->silhouette
-                                                                                                                      : ISOGI_DVR_SILHOUETTE_NONE;
+        span.silhouette = job->desc->space == ISOGI_DVR_DATA || job->desc->silhouette != ISOGI_DVR_SILHOUETTE_APPROXIMATE
+                              ? job->desc->silhouette
+                              : ISOGI_DVR_SILHOUETTE_NONE;
         span.flat = 1, span.touched_t = -1, span.walk.quiet[0] = 1;
         if (isogi_dvr__cast_tets(pixel, &ray, &span)) break;
     }
@@ -6958,8 +7413,8 @@ static isogi_result isogi_dvr__resolve_tets(isogi_tet_desc *resolved, const isog
     return ISOGI_OK;
 }
 
-static isogi_result isogi_dvr__run_tets(isogi_dvr__tet_job *job, const isogi_context *context, size_t tiles, float (*premultiplied)[4], float *depth,
-                                        isogi_counters *counters) {
+static isogi_result isogi_dvr__run_tets(isogi_dvr__tet_job *job, const isogi_context *context, size_t tiles, float (*premultiplied)[4],
+                                        float *depth, isogi_counters *counters) {
     size_t pixels = (size_t)job->view->width * (size_t)job->view->height, i;
     isogi_result result = ISOGI_OK;
     job->pixels = (float *)isogi_allocate(context, pixels, 5 * sizeof *job->pixels);
@@ -6976,8 +7431,8 @@ static isogi_result isogi_dvr__run_tets(isogi_dvr__tet_job *job, const isogi_con
     return result;
 }
 
-ISOGI_API isogi_result isogi_dvr_tets_render(const isogi_tets *tets, const isogi_tet_desc *desc, const isogi_transfer *transfer, const isogi_view *view,
-                                             float (*premultiplied)[4], float *depth, isogi_counters *counters) {
+ISOGI_API isogi_result isogi_dvr_tets_render(const isogi_tets *tets, const isogi_tet_desc *desc, const isogi_transfer *transfer,
+                                             const isogi_view *view, float (*premultiplied)[4], float *depth, isogi_counters *counters) {
     isogi_tet_desc resolved;
     isogi_dvr__tet_job job;
     isogi_dvr settings;

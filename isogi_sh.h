@@ -207,7 +207,8 @@ ISOGI_API isogi_result isogi_sh_project_samples(double *c, int order, int channe
                                                 const float *weight, size_t count);
 
 /* Coefficients (RGB interleaved) of an equirectangular RGB image laid out and oriented as in isogi_env. Fejer weights in
-   latitude: exact for the band limit of the image. The second takes any number of channels, 1..16. */
+   latitude: exact for the band limit of the image; what rows and columns cannot tell apart (degrees l >= height, orders m > 0 with
+   2 m >= width) is zero. The second takes any number of channels, 1..16. */
 ISOGI_API isogi_result isogi_sh_project_equirect(float *rgb, int order, const float *image, int width, int height);
 ISOGI_API isogi_result isogi_sh_project_image(float *c, int order, int channels, const float *image, int width, int height);
 
@@ -318,7 +319,8 @@ typedef struct isogi_sh_convention {
     int condon_shortley; /* not 0: basis functions carry (-1)^m */
 } isogi_sh_convention;
 /* Coefficients of a function under `from` into those of the same function under `to`. out must not overlap in. */
-ISOGI_API isogi_result isogi_sh_convert(float *out, const float *in, int order, int channels, isogi_sh_convention from, isogi_sh_convention to);
+ISOGI_API isogi_result isogi_sh_convert(float *out, const float *in, int order, int channels, isogi_sh_convention from,
+                                        isogi_sh_convention to);
 
 /* ---- simple environments and fits; RGB interleaved ---- */
 
@@ -356,7 +358,8 @@ ISOGI_API isogi_result isogi_sh_fit_directional(float direction[3], float rgb[3]
 
 /* 16-byte vectors where the compiler's target has them; 32 and 64 bytes by the processor that runs. gcc for Windows does not align its
    stack for those. Not where floats are computed in x87 registers, whose scalars do not mix with vectors. */
-#if !defined(ISOGI_NO_SIMD) && (defined(__SSE2__) || defined(__ARM_NEON)) && (defined(__clang__) || (defined(__GNUC__) && __GNUC__ >= 12)) && \
+#if !defined(ISOGI_NO_SIMD) && (defined(__SSE2__) || defined(__ARM_NEON)) && \
+    (defined(__clang__) || (defined(__GNUC__) && __GNUC__ >= 12)) && \
     !(defined(__FLT_EVAL_METHOD__) && __FLT_EVAL_METHOD__ == 2)
 #define ISOGI_SH__VECTORS 1
 #endif
@@ -1100,7 +1103,9 @@ static const float isogi_sh__latitudes_f32[240] = {
 /* generated: end */
 
 /* where m > 0 starts in the table */
-static const double *isogi_sh__table(int m) { return isogi_sh__table_f64 + 3 * ISOGI_SH__TABLE_ORDER + (m - 1) * (2 * ISOGI_SH__TABLE_ORDER - 1 - m); }
+static const double *isogi_sh__table(int m) {
+    return isogi_sh__table_f64 + 3 * ISOGI_SH__TABLE_ORDER + (m - 1) * (2 * ISOGI_SH__TABLE_ORDER - 1 - m);
+}
 
 static double isogi_sh__a(int l, int m) { return sqrt((double)(4 * l * l - 1) / (double)((l - m) * (l + m))); }
 
@@ -1279,10 +1284,13 @@ typedef int32_t isogi_sh__i4 __attribute__((vector_size(16), aligned(4), may_ali
         I top = (I)(zero - 1) ^ (I)(zero + 1);                                                                                 \
         return (V)((I)x & (I)((V)((I)x & ~top) > (T)TINY));                                                                    \
     }                                                                                                                          \
-    /* degrees `from` to `to` - 1 of columns m and m + 1, whose (x + i y)^m are c[0] + i s[0] and c[1] + i s[1]; centre: where Y_l^0 of the \
+    /* degrees `from` to `to` - 1 of columns m and m + 1, whose (x + i y)^m are c[0] + i s[0] and c[1] + i s[1]; \
+        centre: where Y_l^0 of the \
        first of them goes, not before m. In `state` stands where the recursion was left off, and will be, where it is not NULL. */ \
-    TARGET ISOGI_SH__INLINE void NAME##_columns(T *centre, size_t stride, int from, int to, int m, V z, V low, const V *c, const V *s, V *state) { \
-        const T *a = TABLE + 3 * ISOGI_SH__TABLE_ORDER + (m - 1) * (2 * ISOGI_SH__TABLE_ORDER - 1 - m), *b = a + 2 * (ISOGI_SH__TABLE_ORDER - m) - 1; \
+    TARGET ISOGI_SH__INLINE void NAME##_columns(T *centre, size_t stride, int from, int to, int m, V z, V low, const V *c, const V *s, \
+        V *state) { \
+        const T *a = TABLE + 3 * ISOGI_SH__TABLE_ORDER + (m - 1) * (2 * ISOGI_SH__TABLE_ORDER - 1 - m), \
+            *b = a + 2 * (ISOGI_SH__TABLE_ORDER - m) - 1; \
         size_t first = stride * (size_t)m, second = first + stride, step = 2 * stride * (size_t)from;                          \
         V zero = {0}, p, q, p_before, q_before, d;                                                                             \
         int l = from;                                                                                                          \
@@ -1362,7 +1370,8 @@ typedef int32_t isogi_sh__i4 __attribute__((vector_size(16), aligned(4), may_ali
 /* y[k][i] = row i + .. of column k, for 4 rows (or vectors of 4 x 4 tiles) a, b, c, d */
 #define ISOGI_SH__TURN(V, SUFFIX)                                                                                              \
     {                                                                                                                          \
-        V e = ISOGI_SH__LOW_##SUFFIX(a, b), f = ISOGI_SH__HIGH_##SUFFIX(a, b), g = ISOGI_SH__LOW_##SUFFIX(c, d), h = ISOGI_SH__HIGH_##SUFFIX(c, d); \
+        V e = ISOGI_SH__LOW_##SUFFIX(a, b), f = ISOGI_SH__HIGH_##SUFFIX(a, b), g = ISOGI_SH__LOW_##SUFFIX(c, d), \
+            h = ISOGI_SH__HIGH_##SUFFIX(c, d); \
         *(V *)(y + i) = ISOGI_SH__EVEN_##SUFFIX(e, g);                                                                         \
         *(V *)(y + i + n) = ISOGI_SH__ODD_##SUFFIX(e, g);                                                                      \
         *(V *)(y + i + 2 * n) = ISOGI_SH__EVEN_##SUFFIX(f, h);                                                                 \
@@ -1387,8 +1396,10 @@ ISOGI_SH__INLINE void isogi_sh__eval_f4_turn(float *y, size_t n, const float *in
 
 ISOGI_SH__INLINE void isogi_sh__eval_f4_split(isogi_sh__f4 *u, const float *from) {
     isogi_sh__f4 a = *(const isogi_sh__f4 *)from, b = *(const isogi_sh__f4 *)(from + 4), c = *(const isogi_sh__f4 *)(from + 8);
-    isogi_sh__f4 x = __builtin_shufflevector(a, b, 0, 3, 6, 6), y = __builtin_shufflevector(a, b, 1, 4, 7, 7), z = __builtin_shufflevector(a, b, 2, 5, 5, 5);
-    u[0] = __builtin_shufflevector(x, c, 0, 1, 2, 5), u[1] = __builtin_shufflevector(y, c, 0, 1, 2, 6), u[2] = __builtin_shufflevector(z, c, 0, 1, 4, 7);
+    isogi_sh__f4 x = __builtin_shufflevector(a, b, 0, 3, 6, 6), y = __builtin_shufflevector(a, b, 1, 4, 7, 7),
+                 z = __builtin_shufflevector(a, b, 2, 5, 5, 5);
+    u[0] = __builtin_shufflevector(x, c, 0, 1, 2, 5), u[1] = __builtin_shufflevector(y, c, 0, 1, 2, 6),
+    u[2] = __builtin_shufflevector(z, c, 0, 1, 4, 7);
 }
 
 /* a < b in all lanes, for the bits of numbers that are not negative: NaN is greater than all others, with -ffast-math too */
@@ -1408,7 +1419,8 @@ ISOGI_SH__DEFINE_EVAL(isogi_sh__eval_f4, , float, isogi_sh__f4, isogi_sh__i4, 4,
 static size_t isogi_sh__eval_f4(float *out, size_t stride, int order, const float *x, const float *y, const float *z, size_t count) {
     isogi_sh__f4 u[4];
     size_t i;
-    for (i = 0; i + 4 <= count && isogi_sh__eval_f4_load(u, x + i, y + i, z + i); i += 4) isogi_sh__eval_f4_any(out + i, stride, 0, order, u, NULL);
+    for (i = 0; i + 4 <= count && isogi_sh__eval_f4_load(u, x + i, y + i, z + i); i += 4)
+        isogi_sh__eval_f4_any(out + i, stride, 0, order, u, NULL);
     return i;
 }
 
@@ -1485,11 +1497,13 @@ typedef double isogi_sh__d2 __attribute__((vector_size(16), aligned(8), may_alia
 #define ISOGI_SH__HALF_D8(v, k) __builtin_shufflevector(v, v, 4 * k, 4 * k + 1, 4 * k + 2, 4 * k + 3)
 #define ISOGI_SH__JOIN_F8(a, b) __builtin_shufflevector(a, b, 0, 1, 2, 3, 4, 5, 6, 7)
 #define ISOGI_SH__JOIN_HALVES(a, b) __builtin_shufflevector(a, b, 0, 1, 2, 3, 4, 5, 6, 7)
-#define ISOGI_SH__JOIN_F16(a, b, c, d) __builtin_shufflevector(ISOGI_SH__JOIN_F8(a, b), ISOGI_SH__JOIN_F8(c, d), 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15)
+#define ISOGI_SH__JOIN_F16(a, b, c, d) __builtin_shufflevector(ISOGI_SH__JOIN_F8(a, b), ISOGI_SH__JOIN_F8(c, d), 0, 1, 2, 3, 4, 5, 6, 7, \
+    8, 9, 10, 11, 12, 13, 14, 15)
 #else
 #define ISOGI_SH__JOIN_F8(a, b) ((isogi_sh__f8)__builtin_ia32_vinsertf128_ps256(__builtin_ia32_ps256_ps(a), b, 1))
 #define ISOGI_SH__HALF_D8(v, k) ((isogi_sh__d4)__builtin_ia32_extractf64x4_mask(v, k, none, ISOGI_SH__ALL8))
-#define ISOGI_SH__JOIN_HALVES(a, b) ((isogi_sh__d8)__builtin_ia32_insertf64x4_mask(__builtin_ia32_pd512_256pd(a), b, 1, __builtin_ia32_pd512_256pd(a), ISOGI_SH__ALL8))
+#define ISOGI_SH__JOIN_HALVES(a, b) ((isogi_sh__d8)__builtin_ia32_insertf64x4_mask(__builtin_ia32_pd512_256pd(a), b, 1, \
+    __builtin_ia32_pd512_256pd(a), ISOGI_SH__ALL8))
 #define ISOGI_SH__PUT_F16(v, a, k) __builtin_ia32_insertf32x4_mask(v, a, k, v, 0xffff)
 #define ISOGI_SH__JOIN_F16(a, b, c, d)                                                                                        \
     ISOGI_SH__PUT_F16(ISOGI_SH__PUT_F16(ISOGI_SH__PUT_F16(__builtin_ia32_ps512_ps(a), b, 1), c, 2), d, 3)
@@ -1505,9 +1519,11 @@ typedef double isogi_sh__d2 __attribute__((vector_size(16), aligned(8), may_alia
 #define ISOGI_SH__HIGH_F16(a, b) __builtin_shufflevector(a, b, 2, 18, 3, 19, 6, 22, 7, 23, 10, 26, 11, 27, 14, 30, 15, 31)
 #define ISOGI_SH__EVEN_F16(a, b) __builtin_shufflevector(a, b, 0, 1, 16, 17, 4, 5, 20, 21, 8, 9, 24, 25, 12, 13, 28, 29)
 #define ISOGI_SH__ODD_F16(a, b) __builtin_shufflevector(a, b, 2, 3, 18, 19, 6, 7, 22, 23, 10, 11, 26, 27, 14, 15, 30, 31)
-#define ISOGI_SH__JOIN_D8(i, j) ISOGI_SH__JOIN_HALVES(*(const isogi_sh__d4 *)(const void *)(in + pitch * (i)), *(const isogi_sh__d4 *)(const void *)(in + pitch * (j)))
+#define ISOGI_SH__JOIN_D8(i, j) ISOGI_SH__JOIN_HALVES(*(const isogi_sh__d4 *)(const void *)(in + pitch * (i)), \
+    *(const isogi_sh__d4 *)(const void *)(in + pitch * (j)))
 #define ISOGI_SH__ROWS_F8(j) ISOGI_SH__JOIN_F8(ISOGI_SH__ROW_F4(j), ISOGI_SH__ROW_F4((j) + 4))
-#define ISOGI_SH__ROWS_F16(j) ISOGI_SH__JOIN_F16(ISOGI_SH__ROW_F4(j), ISOGI_SH__ROW_F4((j) + 4), ISOGI_SH__ROW_F4((j) + 8), ISOGI_SH__ROW_F4((j) + 12))
+#define ISOGI_SH__ROWS_F16(j) ISOGI_SH__JOIN_F16(ISOGI_SH__ROW_F4(j), ISOGI_SH__ROW_F4((j) + 4), ISOGI_SH__ROW_F4((j) + 8), \
+    ISOGI_SH__ROW_F4((j) + 12))
 ISOGI_SH__AVX2 ISOGI_SH__INLINE void isogi_sh__join_f8_turn(float *y, size_t n, const float *in, size_t pitch, size_t i) {
     size_t k;
     for (; i + 8 <= n; i += 8) {
@@ -1529,7 +1545,8 @@ ISOGI_SH__AVX2 ISOGI_SH__INLINE void isogi_sh__transpose_f8(float *y, size_t n, 
 
 ISOGI_SH__AVX512 ISOGI_SH__INLINE void isogi_sh__join_f16_turn(float *y, size_t n, const float *in, size_t pitch, size_t i) {
     for (; i + 16 <= n; i += 16) {
-        isogi_sh__f16 a = ISOGI_SH__ROWS_F16(i), b = ISOGI_SH__ROWS_F16(i + 1), c = ISOGI_SH__ROWS_F16(i + 2), d = ISOGI_SH__ROWS_F16(i + 3);
+        isogi_sh__f16 a = ISOGI_SH__ROWS_F16(i), b = ISOGI_SH__ROWS_F16(i + 1), c = ISOGI_SH__ROWS_F16(i + 2),
+                      d = ISOGI_SH__ROWS_F16(i + 3);
         ISOGI_SH__TURN(isogi_sh__f16, F16)
     }
     isogi_sh__join_f8_turn(y, n, in, pitch, i);
@@ -1598,9 +1615,12 @@ ISOGI_SH__AVX512 ISOGI_SH__INLINE void isogi_sh__eval_d8_turn(double *y, size_t 
     for (half = 0; half < 2; half++, row += 4, y += 4) {
         ISOGI_SH__UNROLL
         for (odd = 0; odd < 2; odd++) {
-            isogi_sh__d8 a = odd ? __builtin_shufflevector(row[0], row[1], 1, 9, 3, 11, 5, 13, 7, 15) : __builtin_shufflevector(row[0], row[1], 0, 8, 2, 10, 4, 12, 6, 14);
-            isogi_sh__d8 b = odd ? __builtin_shufflevector(row[2], row[3], 1, 9, 3, 11, 5, 13, 7, 15) : __builtin_shufflevector(row[2], row[3], 0, 8, 2, 10, 4, 12, 6, 14);
-            isogi_sh__d8 p = __builtin_shufflevector(a, b, 0, 1, 8, 9, 2, 3, 10, 11), q = __builtin_shufflevector(a, b, 4, 5, 12, 13, 6, 7, 14, 15);
+            isogi_sh__d8 a = odd ? __builtin_shufflevector(row[0], row[1], 1, 9, 3, 11, 5, 13, 7, 15)
+                                 : __builtin_shufflevector(row[0], row[1], 0, 8, 2, 10, 4, 12, 6, 14);
+            isogi_sh__d8 b = odd ? __builtin_shufflevector(row[2], row[3], 1, 9, 3, 11, 5, 13, 7, 15)
+                                 : __builtin_shufflevector(row[2], row[3], 0, 8, 2, 10, 4, 12, 6, 14);
+            isogi_sh__d8 p = __builtin_shufflevector(a, b, 0, 1, 8, 9, 2, 3, 10, 11),
+                         q = __builtin_shufflevector(a, b, 4, 5, 12, 13, 6, 7, 14, 15);
             double *to = y + (odd ? n : 0);
             *(isogi_sh__d4 *)to = ISOGI_SH__HALF_D8(p, 0);
             *(isogi_sh__d4 *)(to + 2 * n) = ISOGI_SH__HALF_D8(p, 1);
@@ -1620,10 +1640,14 @@ ISOGI_SH__AVX512 ISOGI_SH__INLINE void isogi_sh__transpose_f16(float *y, size_t 
         isogi_sh__f16 v[2][4];
         ISOGI_SH__UNROLL
         for (k = 0; k < 2; k++) {
-            const isogi_sh__f16 a = (isogi_sh__f16)ISOGI_SH__JOIN_D8(8 * k, 8 * k + 4), b = (isogi_sh__f16)ISOGI_SH__JOIN_D8(8 * k + 1, 8 * k + 5);
-            const isogi_sh__f16 c = (isogi_sh__f16)ISOGI_SH__JOIN_D8(8 * k + 2, 8 * k + 6), d = (isogi_sh__f16)ISOGI_SH__JOIN_D8(8 * k + 3, 8 * k + 7);
-            isogi_sh__f16 e = ISOGI_SH__LOW_F16(a, b), f = ISOGI_SH__HIGH_F16(a, b), g = ISOGI_SH__LOW_F16(c, d), h = ISOGI_SH__HIGH_F16(c, d);
-            v[k][0] = ISOGI_SH__EVEN_F16(e, g), v[k][1] = ISOGI_SH__ODD_F16(e, g), v[k][2] = ISOGI_SH__EVEN_F16(f, h), v[k][3] = ISOGI_SH__ODD_F16(f, h);
+            const isogi_sh__f16 a = (isogi_sh__f16)ISOGI_SH__JOIN_D8(8 * k, 8 * k + 4),
+                                b = (isogi_sh__f16)ISOGI_SH__JOIN_D8(8 * k + 1, 8 * k + 5);
+            const isogi_sh__f16 c = (isogi_sh__f16)ISOGI_SH__JOIN_D8(8 * k + 2, 8 * k + 6),
+                                d = (isogi_sh__f16)ISOGI_SH__JOIN_D8(8 * k + 3, 8 * k + 7);
+            isogi_sh__f16 e = ISOGI_SH__LOW_F16(a, b), f = ISOGI_SH__HIGH_F16(a, b), g = ISOGI_SH__LOW_F16(c, d),
+                          h = ISOGI_SH__HIGH_F16(c, d);
+            v[k][0] = ISOGI_SH__EVEN_F16(e, g), v[k][1] = ISOGI_SH__ODD_F16(e, g), v[k][2] = ISOGI_SH__EVEN_F16(f, h),
+            v[k][3] = ISOGI_SH__ODD_F16(f, h);
         }
         ISOGI_SH__UNROLL
         for (k = 0; k < 4; k++) {
@@ -1638,9 +1662,12 @@ ISOGI_SH__AVX512 ISOGI_SH__INLINE void isogi_sh__transpose_d8(double *y, size_t 
     const double *in = (const double *)row;
     size_t half, pitch = 8;
     for (half = 0; half < 2; half++, y += 4 * n, in += 4) {
-        const isogi_sh__d8 a = ISOGI_SH__JOIN_D8(0, 2), b = ISOGI_SH__JOIN_D8(1, 3), c = ISOGI_SH__JOIN_D8(4, 6), d = ISOGI_SH__JOIN_D8(5, 7);
-        isogi_sh__d8 e = __builtin_shufflevector(a, b, 0, 8, 2, 10, 4, 12, 6, 14), f = __builtin_shufflevector(a, b, 1, 9, 3, 11, 5, 13, 7, 15);
-        isogi_sh__d8 g = __builtin_shufflevector(c, d, 0, 8, 2, 10, 4, 12, 6, 14), h = __builtin_shufflevector(c, d, 1, 9, 3, 11, 5, 13, 7, 15);
+        const isogi_sh__d8 a = ISOGI_SH__JOIN_D8(0, 2), b = ISOGI_SH__JOIN_D8(1, 3), c = ISOGI_SH__JOIN_D8(4, 6),
+                           d = ISOGI_SH__JOIN_D8(5, 7);
+        isogi_sh__d8 e = __builtin_shufflevector(a, b, 0, 8, 2, 10, 4, 12, 6, 14),
+                     f = __builtin_shufflevector(a, b, 1, 9, 3, 11, 5, 13, 7, 15);
+        isogi_sh__d8 g = __builtin_shufflevector(c, d, 0, 8, 2, 10, 4, 12, 6, 14),
+                     h = __builtin_shufflevector(c, d, 1, 9, 3, 11, 5, 13, 7, 15);
         *(isogi_sh__d8 *)y = __builtin_shufflevector(e, g, 0, 1, 4, 5, 8, 9, 12, 13);
         *(isogi_sh__d8 *)(y + n) = __builtin_shufflevector(f, h, 0, 1, 4, 5, 8, 9, 12, 13);
         *(isogi_sh__d8 *)(y + 2 * n) = __builtin_shufflevector(e, g, 2, 3, 6, 7, 10, 11, 14, 15);
@@ -1707,7 +1734,8 @@ ISOGI_SH__AVX512 ISOGI_SH__INLINE void isogi_sh__eval_d8_split(isogi_sh__d8 *u, 
 #define ISOGI_SH__P4(FMA, t) FMA(ISOGI_SH__P3(FMA, t), v, (t)[4] - zero)
 #define ISOGI_SH__P5(FMA, t) FMA(ISOGI_SH__P4(FMA, t), v, (t)[5] - zero)
 #define ISOGI_SH__PUT_ONE(V, value) *(V *)centre = value, centre -= step, step -= 2 * stride
-#define ISOGI_SH__PUT_PAIR(V, value) p = value, *(V *)(centre + first) = p * c, *(V *)(centre - first) = p * s, centre -= step, step -= 2 * stride
+#define ISOGI_SH__PUT_PAIR(V, value) p = value, *(V *)(centre + first) = p * c, *(V *)(centre - first) = p * s, centre -= step, \
+    step -= 2 * stride
 #define ISOGI_SH__POLYNOMIALS(V, FMA, PUT)                                                                                     \
     switch (order - m) {                                                                                                       \
     case 11: PUT(V, ISOGI_SH__P5(FMA, t + 30)); __attribute__((fallthrough));                                                  \
@@ -1813,7 +1841,8 @@ ISOGI_SH__AVX512 ISOGI_SH__INLINE void isogi_sh__eval_d8_split(isogi_sh__d8 *u, 
         }                                                                                                                      \
         return count;                                                                                                          \
     }                                                                                                                          \
-    /* `count` rows, 9 or more, for as many directions as are lanes: by 8 or TILE, after one alone, or the last with some that come again */ \
+    /* `count` rows, 9 or more, for as many directions as are lanes: by 8 or TILE, after one alone, \
+        or the last with some that come again */ \
     TARGET ISOGI_SH__INLINE void NAME##_turn_all(T *out, size_t n, const V *rows, size_t count) {                              \
         size_t k, at, alone = count % TILE == 1 || count == 9;                                                                 \
         if (alone)                                                                                                             \
@@ -1876,11 +1905,13 @@ ISOGI_SH__AVX512 ISOGI_SH__INLINE void isogi_sh__eval_d8_split(isogi_sh__d8 *u, 
 #define ISOGI_SH__DEFINE_F32(NAME, TARGET, V, I, WIDTH, SUFFIX, TURN, TILE)                                                              \
     ISOGI_SH__DEFINE_EVAL(NAME, TARGET, float, V, I, WIDTH, ISOGI_SH__FMA_##SUFFIX, ISOGI_SH__REST_##SUFFIX, ISOGI_SH__LESS_##SUFFIX, \
                           isogi_sh__table_f32, 1e-6, 1e-3, 1e-19, sqrtf)                                                           \
-    ISOGI_SH__DEFINE_FUSED(NAME, TARGET, float, V, I, WIDTH, ISOGI_SH__FMA_##SUFFIX, ISOGI_SH__LESS_##SUFFIX, isogi_sh__polynomials_f32, 1e-3, TURN, TILE)
+    ISOGI_SH__DEFINE_FUSED(NAME, TARGET, float, V, I, WIDTH, ISOGI_SH__FMA_##SUFFIX, ISOGI_SH__LESS_##SUFFIX, isogi_sh__polynomials_f32, \
+        1e-3, TURN, TILE)
 #define ISOGI_SH__DEFINE_F64(NAME, TARGET, V, I, WIDTH, SUFFIX, TURN, TILE)                                                              \
     ISOGI_SH__DEFINE_EVAL(NAME, TARGET, double, V, I, WIDTH, ISOGI_SH__FMA_##SUFFIX, ISOGI_SH__REST_##SUFFIX, ISOGI_SH__LESS_##SUFFIX, \
                           isogi_sh__table_f64, 1e-12, 1e-25, 1e-200, sqrt)                                                         \
-    ISOGI_SH__DEFINE_FUSED(NAME, TARGET, double, V, I, WIDTH, ISOGI_SH__FMA_##SUFFIX, ISOGI_SH__LESS_##SUFFIX, isogi_sh__polynomials_f64, 1e-25, TURN, TILE)
+    ISOGI_SH__DEFINE_FUSED(NAME, TARGET, double, V, I, WIDTH, ISOGI_SH__FMA_##SUFFIX, ISOGI_SH__LESS_##SUFFIX, isogi_sh__polynomials_f64, \
+        1e-25, TURN, TILE)
 ISOGI_SH__DEFINE_F32(isogi_sh__eval_f8, ISOGI_SH__AVX2, isogi_sh__f8, isogi_sh__i8, 8, F8, isogi_sh__transpose_f8, 8)
 ISOGI_SH__DEFINE_F64(isogi_sh__eval_d4, ISOGI_SH__AVX2, isogi_sh__d4, isogi_sh__l4, 4, D4, isogi_sh__eval_d4_turn, 8)
 ISOGI_SH__DEFINE_F32(isogi_sh__eval_f16, ISOGI_SH__AVX512, isogi_sh__f16, isogi_sh__i16, 16, F16, isogi_sh__transpose_f16, 16)
@@ -1926,7 +1957,8 @@ static size_t isogi_sh__eval_rows_f32(float *y, int order, const float (*directi
 }
 
 /* The same for structures of arrays, whose functions stand `stride` apart. */
-static size_t isogi_sh__eval_columns_f32(float *out, size_t stride, int order, const float *x, const float *y, const float *z, size_t count) {
+static size_t isogi_sh__eval_columns_f32(float *out, size_t stride, int order, const float *x, const float *y, const float *z,
+                                         size_t count) {
     size_t done = 0;
     int level = 0;
     if (order < 3 || order > ISOGI_SH__TABLE_ORDER || count < 4) return 0;
@@ -1948,7 +1980,8 @@ static size_t isogi_sh__eval_rows_f64(double *y, int order, const double (*direc
     return done;
 }
 
-static size_t isogi_sh__eval_columns_f64(double *out, size_t stride, int order, const double *x, const double *y, const double *z, size_t count) {
+static size_t isogi_sh__eval_columns_f64(double *out, size_t stride, int order, const double *x, const double *y, const double *z,
+                                         size_t count) {
     size_t done = 0;
     int level = order >= 3 && order <= ISOGI_SH__TABLE_ORDER && count >= 4 ? isogi_sh__level() : 0;
     if (level > 1) done = isogi_sh__eval_d8(out, stride, order, x, y, z, count);
@@ -2025,10 +2058,14 @@ static isogi_result isogi_sh__eval_soa(void *basis, int is_double, int order, co
         isogi_sh__unit u[ISOGI_SH__LANES];
         int k, lanes;
 #ifdef ISOGI_SH__VECTORS
-        if (!is_double) i += isogi_sh__eval_columns_f32((float *)basis + i, count, order, (const float *)x + i, (const float *)y + i, (const float *)z + i, count - i);
+        if (!is_double)
+            i += isogi_sh__eval_columns_f32((float *)basis + i, count, order, (const float *)x + i, (const float *)y + i,
+                                            (const float *)z + i, count - i);
 #endif
 #ifdef ISOGI_SH__SIMD
-        if (is_double) i += isogi_sh__eval_columns_f64((double *)basis + i, count, order, (const double *)x + i, (const double *)y + i, (const double *)z + i, count - i);
+        if (is_double)
+            i += isogi_sh__eval_columns_f64((double *)basis + i, count, order, (const double *)x + i, (const double *)y + i,
+                                            (const double *)z + i, count - i);
 #endif
         lanes = count - i < ISOGI_SH__LANES ? (int)(count - i) : ISOGI_SH__LANES;
         for (k = 0; k < lanes; k++) {
@@ -2171,7 +2208,7 @@ ISOGI_API isogi_result isogi_sh_eval_sum_f64(double *value, const double *c, int
 }
 
 /* c += colour sum over l of scale[l] Y_lm(u): a lobe around u */
-static void isogi_sh__add_lobe(float *c, int order, int channels, const double *scale, isogi_sh__unit u, const double *colour) {
+ISOGI_SH__INLINE void isogi_sh__add_lobe(float *c, int order, int channels, const double *scale, isogi_sh__unit u, const double *colour) {
     double q[ISOGI_SH_MAX_ORDER], cm = 1, sm = 0, diagonal = 0, x;
     int l, m, k;
     for (m = 0; m < order; m++) {
@@ -2179,16 +2216,18 @@ static void isogi_sh__add_lobe(float *c, int order, int channels, const double *
         isogi_sh__column(q, order, m, diagonal, u.z, u.z_low);
         for (l = m; l < order; l++) {
             float *plus = c + channels * (l * (l + 1) + m), *minus = c + channels * (l * (l + 1) - m);
-            double lobe = scale[l] * q[l];
-            for (k = 0; k < channels; k++) {
-                plus[k] = (float)((double)plus[k] + colour[k] * lobe * cm);
-                if (m > 0) minus[k] = (float)((double)minus[k] + colour[k] * lobe * sm);
-            }
+            double cosine = scale[l] * q[l] * cm, sine = scale[l] * q[l] * sm; /* 0 where m is */
+            for (k = 0; k < channels; k++) plus[k] += (float)(colour[k] * cosine);
+            for (k = 0; k < channels; k++) minus[k] += (float)(colour[k] * sine);
         }
         x = u.x * cm - u.y * sm;
         sm = u.x * sm + u.y * cm;
         cm = x;
     }
+}
+
+static void isogi_sh__add_rgb_lobe(float *c, int order, const double *scale, isogi_sh__unit u, const double *rgb) {
+    isogi_sh__add_lobe(c, order, 3, scale, u, rgb);
 }
 
 /* Zonal factors of a disc of angular radius a (cos a given) and irradiance 1 on a surface that faces it: radiance 1 / (pi sin^2 a).
@@ -2197,6 +2236,10 @@ static void isogi_sh__add_lobe(float *c, int order, int channels, const double *
 static void isogi_sh__disc(double *scale, int order, double cosine) {
     double before = 0, derivative = 1; /* P_{l-1}', P_l' */
     int l;
+    if (cosine >= 1) {
+        for (l = 0; l < order; l++) scale[l] = 1;
+        return;
+    }
     scale[0] = cosine > -1 ? 2 / (1 + cosine) : 0;
     for (l = 1; l < order; l++) {
         double next = ((double)(2 * l + 1) * cosine * derivative - (double)(l + 1) * before) / (double)l;
@@ -2276,26 +2319,34 @@ ISOGI_SH__INLINE void isogi_sh__turn_z(double *band, int l, int channels, double
     }
 }
 
-/* For degree l: step[m] = sqrt((l-m)(l+m+1)), edge[m] = d_{m,l}(pi/2) without its sign = 2^-l sqrt(binomial(2l, l+m)). */
-static void isogi_sh__quarter_turn_start(double *step, double *edge, int l) {
-    double square = 1;
+/* What quarter turns of degree l need: edge[m] = d_{m,l}(pi/2) without its sign = 2^-l sqrt(binomial(2l, l+m)), and of the recursion,
+   with step_m = sqrt((l-m)(l+m+1)), gain[m] = 2 / step_{m-1} and ratio[m] = step_m / step_{m-1}. */
+typedef struct isogi_sh__quarter_turn {
+    double edge[ISOGI_SH_MAX_ORDER], gain[ISOGI_SH_MAX_ORDER], ratio[ISOGI_SH_MAX_ORDER];
+} isogi_sh__quarter_turn;
+
+static void isogi_sh__quarter_turn_start(isogi_sh__quarter_turn *t, int l) {
+    double square = 1, inverse = 0;
     int m;
+    t->gain[0] = t->ratio[0] = 0;
     for (m = 1; m <= l; m++) square *= (double)(2 * m - 1) / (double)(2 * m);
     for (m = 0; m <= l; m++) {
-        step[m] = sqrt((double)((l - m) * (l + m + 1)));
-        edge[m] = sqrt(square);
+        double step = sqrt((double)((l - m) * (l + m + 1)));
+        t->edge[m] = sqrt(square);
         square *= (double)(l - m) / (double)(l + m + 1);
+        if (m) t->gain[m] = 2 * inverse, t->ratio[m] = step * inverse;
+        inverse = m < l ? 1 / step : 0;
     }
 }
 
 /* out = Y(90) in, or its transpose: a quarter turn about y. Entry (n, m), n <= m, is 2 e_nm (sqrt 2 e where n = 0 < m, e where both
    are 0) between cosines where l+m+n is even, between sines where it is odd; entry (m, n) is (-1)^(m+n) of it, where
-   e_{n,m-1} step[m-1] = 2 n e_{n,m} - step[m] e_{n,m+1}. */
-static void isogi_sh__turn_y(double *out, const double *in, int l, int channels, int transposed, const double *step, const double *edge) {
+   e_{n,m-1} step_{m-1} = 2 n e_{n,m} - step_m e_{n,m+1}. */
+static void isogi_sh__turn_y_plain(double *out, const double *in, int l, int channels, int transposed, const isogi_sh__quarter_turn *t) {
     int m, n, k;
     for (m = 0; m < channels * (2 * l + 1); m++) out[m] = 0;
     for (n = 0; n <= l; n++) {
-        double after = 0, e = (l + n) & 1 ? -edge[n] : edge[n];
+        double after = 0, e = (l + n) & 1 ? -t->edge[n] : t->edge[n];
         for (m = l; m >= n; m--) {
             double w = e * (n > 0 ? 2 : m > 0 ? 1.41421356237309504880 : 1), mirrored = (m + n) & 1 ? -w : w, before;
             int sign = (l + m + n) & 1 ? -1 : 1, at_m = channels * (l + sign * m), at_n = channels * (l + sign * n);
@@ -2306,7 +2357,7 @@ static void isogi_sh__turn_y(double *out, const double *in, int l, int channels,
                     if (m != n) out[at_m + k] += to_m * in[at_n + k];
                 }
             if (m > n) {
-                before = (2 * (double)n * e - step[m] * after) / step[m - 1];
+                before = (double)n * t->gain[m] * e - t->ratio[m] * after;
                 after = e;
                 e = before;
             }
@@ -2314,12 +2365,66 @@ static void isogi_sh__turn_y(double *out, const double *in, int l, int channels,
     }
 }
 
+#ifdef ISOGI_SH__SIMD
+/* The same for one of the channels, with a row n in each lane, even ones beside odd ones. The recursion goes on to m = 0, so that each row
+   is whole and none is mirrored; it stays stable, since rows only oscillate where they are no longer growing. */
+#define ISOGI_SH__DEFINE_TURN_Y(NAME, TARGET, V, WIDTH, FMA)                                                                   \
+    TARGET static void NAME(double *out, const double *in, int l, int channels, int transposed, const isogi_sh__quarter_turn *t) { \
+        double cosines[ISOGI_SH_MAX_ORDER], sines[ISOGI_SH_MAX_ORDER], lane[4][WIDTH]; /* of m = l, l - 1, .. 0 */             \
+        double sign = transposed && (l & 1) ? -1 : 1, sine_sign = transposed ? -sign : 1;                                      \
+        int first, i, j;                                                                                                       \
+        for (i = 0; i <= l; i++) cosines[i] = in[channels * (2 * l - i)], sines[i] = in[channels * i];                         \
+        cosines[l] *= 0.70710678118654752440, sines[l] = 0;                                                                    \
+        for (first = 0; first <= l; first += 2 * WIDTH) {                                                                      \
+            V zero = {0}, even, odd, even_n, odd_n, even_after = zero, odd_after = zero, even_c = zero, even_s = zero, odd_c = zero, \
+                odd_s = zero, d; \
+            for (j = 0; j < 2 * WIDTH; j++) {                                                                                  \
+                double e = first + j > l ? 0 : t->edge[first + j] * (first + j ? 2 : 1.41421356237309504880);                  \
+                lane[j & 1][j / 2] = (l + first + j) & 1 ? -e : e, lane[2 + (j & 1)][j / 2] = first + j;                       \
+            }                                                                                                                  \
+            memcpy(&even, lane[0], sizeof even), memcpy(&odd, lane[1], sizeof odd);                                            \
+            memcpy(&even_n, lane[2], sizeof even), memcpy(&odd_n, lane[3], sizeof odd);                                        \
+            for (i = 0; i < l; i += 2) {                                                                                       \
+                even_c = FMA(even, zero + cosines[i], even_c), odd_s = FMA(odd, zero + sines[i], odd_s);                       \
+                d = even, even = FMA(even_n * t->gain[l - i], even, -(even_after * t->ratio[l - i])), even_after = d;          \
+                d = odd, odd = FMA(odd_n * t->gain[l - i], odd, -(odd_after * t->ratio[l - i])), odd_after = d;                \
+                even_s = FMA(even, zero + sines[i + 1], even_s), odd_c = FMA(odd, zero + cosines[i + 1], odd_c);               \
+                d = even, even = FMA(even_n * t->gain[l - i - 1], even, -(even_after * t->ratio[l - i - 1])), even_after = d;  \
+                d = odd, odd = FMA(odd_n * t->gain[l - i - 1], odd, -(odd_after * t->ratio[l - i - 1])), odd_after = d;        \
+            }                                                                                                                  \
+            if (i == l) even_c = FMA(even, zero + cosines[l], even_c);                                                         \
+            memcpy(lane[0], &even_c, sizeof even), memcpy(lane[1], &odd_c, sizeof odd);                                        \
+            memcpy(lane[2], &even_s, sizeof even), memcpy(lane[3], &odd_s, sizeof odd);                                        \
+            for (j = 0; j < 2 * WIDTH && first + j <= l; j++) {                                                                \
+                if (first + j) out[channels * (l - first - j)] = sine_sign * lane[2 + (j & 1)][j / 2];                         \
+                out[channels * (l + first + j)] = sign * lane[j & 1][j / 2];                                                   \
+            }                                                                                                                  \
+        }                                                                                                                      \
+    }
+ISOGI_SH__DEFINE_TURN_Y(isogi_sh__turn_y_rows4, ISOGI_SH__AVX2, isogi_sh__d4, 4, ISOGI_SH__FMA_D4)
+ISOGI_SH__DEFINE_TURN_Y(isogi_sh__turn_y_rows8, ISOGI_SH__AVX512, isogi_sh__d8, 8, ISOGI_SH__FMA_D8)
+#undef ISOGI_SH__DEFINE_TURN_Y
+#endif
+
+static void isogi_sh__turn_y(double *out, const double *in, int l, int channels, int transposed, const isogi_sh__quarter_turn *t) {
+#ifdef ISOGI_SH__SIMD
+    int level = l > 4 ? isogi_sh__level() : 0, k;
+    if (level) {
+        for (k = 0; k < channels; k++)
+            (level > 1 ? isogi_sh__turn_y_rows8 : isogi_sh__turn_y_rows4)(out + k, in + k, l, channels, transposed, t);
+        return;
+    }
+#endif
+    isogi_sh__turn_y_plain(out, in, l, channels, transposed, t);
+}
+
 /* The same for one channel and l <= ISOGI_SH__TURNS, from the table. Cosines (index l + m) and sines (l - m) do not mix, and where
    row n meets cosines of m it does not meet sines: m runs in steps of two. */
 static void isogi_sh__turn_y_tabled(double *out, const double *in, int l, int transposed) {
     const double *w = isogi_sh__turn_f64 + l * (l + 1) * (l + 2) / 6 - 1;
     double sign = l & 1 ? -1 : 1; /* entry (m, n) is this times entry (n, m) between cosines, its negative between sines */
-    double cosine_n = transposed ? sign : 1, cosine_m = transposed ? 1 : sign, sine_n = transposed ? -sign : 1, sine_m = transposed ? 1 : -sign;
+    double cosine_n = transposed ? sign : 1, cosine_m = transposed ? 1 : sign, sine_n = transposed ? -sign : 1,
+           sine_m = transposed ? 1 : -sign;
     int m, n;
     for (m = 0; m <= 2 * l; m++) out[m] = 0;
     for (n = 0; n <= l; n++) {
@@ -2345,7 +2450,7 @@ static void isogi_sh__turn_y_tabled(double *out, const double *in, int l, int tr
 /* What the degrees of one rotation share. */
 typedef struct isogi_sh__turns {
     double first[ISOGI_SH_MAX_ORDER][2], middle[ISOGI_SH_MAX_ORDER][2], last[ISOGI_SH_MAX_ORDER][2];
-    double step[ISOGI_SH_MAX_ORDER], edge[ISOGI_SH_MAX_ORDER];
+    isogi_sh__quarter_turn quarter;
 } isogi_sh__turns;
 
 static void isogi_sh__turns_start(isogi_sh__turns *t, int order, const isogi_sh__euler *e) {
@@ -2365,9 +2470,9 @@ static void isogi_sh__rotate_band(double *band, double *other, int l, int channe
         isogi_sh__turn_z(band, l, 1, t->last);
         return;
     }
-    isogi_sh__turn_y(other, band, l, channels, 0, t->step, t->edge);
+    isogi_sh__turn_y(other, band, l, channels, 0, &t->quarter);
     isogi_sh__turn_z(other, l, channels, t->middle);
-    isogi_sh__turn_y(band, other, l, channels, 1, t->step, t->edge);
+    isogi_sh__turn_y(band, other, l, channels, 1, &t->quarter);
     isogi_sh__turn_z(band, l, channels, t->last);
 }
 
@@ -2429,7 +2534,8 @@ ISOGI_SH__INLINE __attribute__((target("avx2,fma"))) int isogi_sh__row_pairs_sta
     const isogi_sh__f8 same = {1, 1, 1, 0, 0, 1, 0, 1}, pair = {0, 0, 0, 1, 1, 0, 1, 0};
     r->ax = __builtin_shufflevector(low, low, 3, 6, 0, 0, 3, 6, 6, 0), r->bx = __builtin_shufflevector(low, low, 3, 6, 0, 3, 6, 6, 0, 0);
     r->ay = __builtin_shufflevector(low, low, 4, 7, 1, 1, 4, 7, 7, 1), r->by = __builtin_shufflevector(low, low, 4, 7, 1, 4, 7, 7, 1, 1);
-    r->az = __builtin_shufflevector(high, high, 4, 7, 1, 1, 4, 7, 7, 1), r->bz = __builtin_shufflevector(high, high, 4, 7, 1, 4, 7, 7, 1, 1);
+    r->az = __builtin_shufflevector(high, high, 4, 7, 1, 1, 4, 7, 7, 1),
+    r->bz = __builtin_shufflevector(high, high, 4, 7, 1, 4, 7, 7, 1, 1);
     r->xx = r->ax * r->bx, r->yy = r->ay * r->by, r->zz = r->az * r->bz;
     r->xy = ISOGI_SH__FMA_F8(r->ax, r->by, r->ay * r->bx), r->yz = ISOGI_SH__FMA_F8(r->ay, r->bz, r->az * r->by);
     r->zx = ISOGI_SH__FMA_F8(r->ax, r->bz, r->az * r->bx);
@@ -2441,7 +2547,8 @@ ISOGI_SH__INLINE __attribute__((target("avx2,fma"))) int isogi_sh__row_pairs_sta
 
 /* Degrees 1 and 2, c[1] to c[8], without angles: degree 1 is a vector v, degree 2 a traceless symmetric tensor T, and R v and R T R^T
    need the products above; the last lane becomes xx - yy = 2 xx + zz. */
-ISOGI_SH__INLINE __attribute__((target("avx2,fma"))) isogi_sh__f8 isogi_sh__rotate_degrees12(const float *in, const isogi_sh__row_pairs *r) {
+ISOGI_SH__INLINE __attribute__((target("avx2,fma"))) isogi_sh__f8 isogi_sh__rotate_degrees12(const float *in,
+                                                                                             const isogi_sh__row_pairs *r) {
     const isogi_sh__f8 zero = {0}, trace = {0, 0, 0, 0, 0, -0.57735026919f, 0, -0.57735026919f};
     const isogi_sh__f8 scale = {0, 0, 0, 1, 1, 0.86602540378f, 1, 1}, half = {0, 0, 0, 0, 0, 0, 0, 0.5f};
     isogi_sh__f8 q, v;
@@ -2456,7 +2563,8 @@ ISOGI_SH__INLINE __attribute__((target("avx2,fma"))) isogi_sh__f8 isogi_sh__rota
 
 /* Degree 3, c[8] to c[15] of which the first is not looked at, as a traceless symmetric tensor of rank 3. Its entries that are asked for
    are 222, 333, 111, 123, 233, 331, 311, one a lane: sums over i, j, k of T_ijk A_i B_j C_k with the pairs of rows and a third one. */
-ISOGI_SH__INLINE __attribute__((target("avx2,fma"))) isogi_sh__f8 isogi_sh__rotate_degree3(const float *in, const float m[9], const isogi_sh__row_pairs *r) {
+ISOGI_SH__INLINE __attribute__((target("avx2,fma"))) isogi_sh__f8 isogi_sh__rotate_degree3(const float *in, const float m[9],
+                                                                                           const isogi_sh__row_pairs *r) {
     isogi_sh__f8 low = *(const isogi_sh__f8 *)m, high = *(const isogi_sh__f8 *)(m + 1), c = *(const isogi_sh__f8 *)in, zero = {0}, p, v;
     const isogi_sh__f8 scale = {-1.69479004f, 1.33984917f, 1.69479004f, 2.07568541f, 1.6409734f, 1.6409734f, 2.07568541f, 0};
     const isogi_sh__f8 rest = {-1.27109253f, 0, 1.27109253f, 0, 0, 0, 1.03784271f, 0};
@@ -2465,7 +2573,8 @@ ISOGI_SH__INLINE __attribute__((target("avx2,fma"))) isogi_sh__f8 isogi_sh__rota
     const isogi_sh__f8 k2 = {-0.457045799f, -0.1523486f, -0.1523486f, -0.457045799f, -0.373176333f, -0.373176333f, 0, 0};
     const isogi_sh__f8 k3 = {0.609394399f, 0.609394399f, 0, 0, 0, 0, 0, 0};
     float t[16];
-    *(isogi_sh__f8 *)t = ISOGI_SH__FMA_F8(k2, __builtin_shufflevector(c, c, 5, 5, 3, 3, 4, 4, 4, 4), k1 * __builtin_shufflevector(c, c, 7, 7, 1, 1, 6, 6, 4, 2));
+    *(isogi_sh__f8 *)t = ISOGI_SH__FMA_F8(k2, __builtin_shufflevector(c, c, 5, 5, 3, 3, 4, 4, 4, 4),
+                                          k1 * __builtin_shufflevector(c, c, 7, 7, 1, 1, 6, 6, 4, 2));
     *(isogi_sh__f8 *)(t + 8) = k3 * __builtin_shufflevector(c, c, 5, 3, 5, 3, 5, 3, 5, 3);
     __asm__("" : "+m"(t)); /* spread from memory: shuffles are what this waits for */
 #define ISOGI_SH__ROWS(i0, i1, i2, i3, i4, i5)                                                                                  \
@@ -2482,19 +2591,28 @@ ISOGI_SH__INLINE __attribute__((target("avx2,fma"))) isogi_sh__f8 isogi_sh__rota
 }
 
 /* Degree 4, c[0] to c[8], as a traceless symmetric tensor of rank 4, whose entries with two equal pairs of indices are a symmetric matrix T
-   over the pairs xx, yy, xy, yz, zx; zz is what the trace leaves, so that pairs of rows count as Q: xx - zz, yy - zz, xy, yz, zx. Lanes of M
-   are Q T; those times Q of the rows zz and xx are the entries asked for: yyzz, zzzz, xxzz, xyzz, yzzz, -, zxzz, -, and xxyy, xxzz, -,
+   over the pairs xx, yy, xy, yz, zx; zz is what the trace leaves, so that pairs of rows count as Q: xx - zz, yy - zz, xy, yz, zx. Lanes of
+   M are Q T; those times Q of the rows zz and xx are the entries asked for: yyzz, zzzz, xxzz, xyzz, yzzz, -, zxzz, -, and xxyy, xxzz, -,
    xxxy, xxyz, -, xxzx, -. An entry is a coefficient of the polynomial in x, y, z by the number of orders its factors can stand in;
    constants: 3/16 sqrt(35/pi), 3/8 sqrt(70/pi), 3/8 sqrt(5/pi), 3/8 sqrt(10/pi), 3/16 sqrt(1/pi) of m = 4, 3, 2, 1, 0 in them. */
-ISOGI_SH__INLINE __attribute__((target("avx2,fma"))) void isogi_sh__rotate_degree4(float *out, const float *in, const isogi_sh__row_pairs *r) {
+ISOGI_SH__INLINE __attribute__((target("avx2,fma"))) void isogi_sh__rotate_degree4(float *out, const float *in,
+                                                                                   const isogi_sh__row_pairs *r) {
     isogi_sh__f8 c = *(const isogi_sh__f8 *)in, zero = {0}, q0 = r->xx - r->zz, q1 = r->yy - r->zz, m, zz, xx;
     /* T: xxxx, xxyy, yyyy, xxxy, yyxy, xxyz, xxzx, yyyz; yyzx, yyzz, xyzz, xxzz */
-    const isogi_sh__f8 k1 = {-0.473087348f, 0, 0.473087348f, 0.625835735f, -0.625835735f, 0.442532692f, 0.442532692f, -0.442532692f}, k2 = {0.317356641f, 0.105785547f, 0.317356641f, -0.236543674f, -0.236543674f, -0.167261636f, -0.501784908f, -0.501784908f};
-    const isogi_sh__f8 k3 = {0.625835735f, -0.625835735f, 0.625835735f, 0, 0, 0, 0, 0}, k4 = {-0.442532692f, -0.473087348f, 0.473087348f, 0.473087348f, 0, 0, 0, 0}, k5 = {-0.167261636f, -0.423142188f, 0, -0.423142188f, 0, 0, 0, 0};
-    const isogi_sh__f8 s1 = {0.798931687f, 0.564930014f, 2.11377456f, 1.49466432f, 1.1816359f, 1.49466432f, -1.05688728f, 1.69479004f}, s2 = {1.59786337f, 2.25972005f, 0, 0, 0, 0, 1.05688728f, 2.25972005f};
+    const isogi_sh__f8 k1 = {-0.473087348f, 0, 0.473087348f, 0.625835735f, -0.625835735f, 0.442532692f, 0.442532692f, -0.442532692f},
+                       k2 = {0.317356641f,  0.105785547f,  0.317356641f,  -0.236543674f,
+                             -0.236543674f, -0.167261636f, -0.501784908f, -0.501784908f};
+    const isogi_sh__f8 k3 = {0.625835735f, -0.625835735f, 0.625835735f, 0, 0, 0, 0, 0},
+                       k4 = {-0.442532692f, -0.473087348f, 0.473087348f, 0.473087348f, 0, 0, 0, 0},
+                       k5 = {-0.167261636f, -0.423142188f, 0, -0.423142188f, 0, 0, 0, 0};
+    const isogi_sh__f8 s1 = {0.798931687f, 0.564930014f, 2.11377456f, 1.49466432f, 1.1816359f, 1.49466432f, -1.05688728f, 1.69479004f},
+                       s2 = {1.59786337f, 2.25972005f, 0, 0, 0, 0, 1.05688728f, 2.25972005f};
     float t[16], last = in[8];
-    *(isogi_sh__f8 *)t = ISOGI_SH__FMA_F8(k3, last - zero, ISOGI_SH__FMA_F8(k2, __builtin_shufflevector(c, c, 4, 4, 4, 2, 2, 3, 5, 3), k1 * __builtin_shufflevector(c, c, 6, 6, 6, 0, 0, 1, 7, 1)));
-    *(isogi_sh__f8 *)(t + 8) = ISOGI_SH__FMA_F8(k5, __builtin_shufflevector(c, c, 5, 4, 4, 4, 5, 4, 4, 4), k4 * __builtin_shufflevector(c, c, 7, 6, 2, 6, 7, 6, 2, 6));
+    *(isogi_sh__f8 *)t = ISOGI_SH__FMA_F8(k3, last - zero,
+                                          ISOGI_SH__FMA_F8(k2, __builtin_shufflevector(c, c, 4, 4, 4, 2, 2, 3, 5, 3),
+                                                           k1 * __builtin_shufflevector(c, c, 6, 6, 6, 0, 0, 1, 7, 1)));
+    *(isogi_sh__f8 *)(t + 8) = ISOGI_SH__FMA_F8(k5, __builtin_shufflevector(c, c, 5, 4, 4, 4, 5, 4, 4, 4),
+                                                k4 * __builtin_shufflevector(c, c, 7, 6, 2, 6, 7, 6, 2, 6));
     __asm__("" : "+m"(t)); /* spread from memory, as in degree 3 */
 #define ISOGI_SH__ENTRIES(q, i0, i1, i2, i3, i4)                                                                                 \
     m = ISOGI_SH__FMA_F8(q0, t[i0] - zero, q1 * t[i1]);                                                                         \
@@ -2542,14 +2660,19 @@ typedef struct isogi_sh__multiples {
 
 /* (c, s) times (x, y) as complex numbers; length 1 again: see isogi_sh__powers. */
 #define ISOGI_SH__TURN_BY(c, s, x, y) t = ISOGI_SH__FMA_D8(c, x, -(s * (y))), s = ISOGI_SH__FMA_D8(c, y, s * (x)), c = t
-#define ISOGI_SH__UNIT_LENGTH(c, s) t = ISOGI_SH__FMA_D8(-c, c, ISOGI_SH__FMA_D8(-s, s, one)) * 0.5, c = ISOGI_SH__FMA_D8(c, t, c), s = ISOGI_SH__FMA_D8(s, t, s)
-ISOGI_SH__INLINE __attribute__((target("avx2,fma,avx512f,avx512vl,avx512dq"))) void isogi_sh__multiples_start(isogi_sh__multiples *t8, double c1, double s1) {
+#define ISOGI_SH__UNIT_LENGTH(c, s) t = ISOGI_SH__FMA_D8(-c, c, ISOGI_SH__FMA_D8(-s, s, one)) * 0.5, c = ISOGI_SH__FMA_D8(c, t, c), \
+    s = ISOGI_SH__FMA_D8(s, t, s)
+ISOGI_SH__INLINE __attribute__((target("avx2,fma,avx512f,avx512vl,avx512dq"))) void isogi_sh__multiples_start(isogi_sh__multiples *t8,
+                                                                                                              double c1, double s1) {
     const isogi_sh__d8 zero = {0}, one = {1, 1, 1, 1, 1, 1, 1, 1};
     double c2 = c1 * c1 - s1 * s1, s2 = 2 * c1 * s1, c4 = c2 * c2 - s2 * s2, s4 = 2 * c2 * s2, c8 = c4 * c4 - s4 * s4, s8 = 2 * c4 * s4;
-    isogi_sh__d8 c = __builtin_shufflevector(one, zero + c2, 0, 9, 2, 11, 4, 13, 6, 15), s = __builtin_shufflevector(zero, zero + s2, 0, 9, 2, 11, 4, 13, 6, 15), t;
-    isogi_sh__d8 x = __builtin_shufflevector(one, zero + c4, 0, 1, 10, 11, 4, 5, 14, 15), y = __builtin_shufflevector(zero, zero + s4, 0, 1, 10, 11, 4, 5, 14, 15);
+    isogi_sh__d8 c = __builtin_shufflevector(one, zero + c2, 0, 9, 2, 11, 4, 13, 6, 15),
+                 s = __builtin_shufflevector(zero, zero + s2, 0, 9, 2, 11, 4, 13, 6, 15), t;
+    isogi_sh__d8 x = __builtin_shufflevector(one, zero + c4, 0, 1, 10, 11, 4, 5, 14, 15),
+                 y = __builtin_shufflevector(zero, zero + s4, 0, 1, 10, 11, 4, 5, 14, 15);
     ISOGI_SH__TURN_BY(c, s, x, y);
-    x = __builtin_shufflevector(one, zero + c8, 0, 1, 2, 3, 12, 13, 14, 15), y = __builtin_shufflevector(zero, zero + s8, 0, 1, 2, 3, 12, 13, 14, 15);
+    x = __builtin_shufflevector(one, zero + c8, 0, 1, 2, 3, 12, 13, 14, 15),
+    y = __builtin_shufflevector(zero, zero + s8, 0, 1, 2, 3, 12, 13, 14, 15);
     ISOGI_SH__TURN_BY(c, s, x, y);
     x = c, y = s;
     ISOGI_SH__TURN_BY(x, y, zero + c1, zero + s1);
@@ -2564,7 +2687,8 @@ ISOGI_SH__INLINE __attribute__((target("avx2,fma,avx512f,avx512vl,avx512dq"))) v
 #define ISOGI_SH__MERGE(even, odd, high) \
     ((high) ? __builtin_shufflevector(even, odd, 4, 12, 5, 13, 6, 14, 7, 15) : __builtin_shufflevector(even, odd, 0, 8, 1, 9, 2, 10, 3, 11))
 
-ISOGI_SH__INLINE __attribute__((target("avx2,fma,avx512f,avx512vl,avx512dq"))) void isogi_sh__turn_z_d8(isogi_sh__d8 v[4], const isogi_sh__multiples *t) {
+ISOGI_SH__INLINE __attribute__((target("avx2,fma,avx512f,avx512vl,avx512dq"))) void isogi_sh__turn_z_d8(isogi_sh__d8 v[4],
+                                                                                                        const isogi_sh__multiples *t) {
     isogi_sh__d8 even = ISOGI_SH__FMA_D8(v[0], t->even_c, -(v[2] * t->even_s)), odd = ISOGI_SH__FMA_D8(v[1], t->odd_c, -(v[3] * t->odd_s));
     v[2] = ISOGI_SH__FMA_D8(v[0], t->even_s, v[2] * t->even_c), v[3] = ISOGI_SH__FMA_D8(v[1], t->odd_s, v[3] * t->odd_c);
     v[0] = even, v[1] = odd;
@@ -2593,18 +2717,23 @@ ISOGI_SH__INLINE __attribute__((target("avx2,fma,avx512f,avx512vl,avx512dq"))) v
 }
 
 /* Eight numbers of float or double at index i, those of the mask; zero elsewhere. */
-ISOGI_SH__INLINE __attribute__((target("avx2,fma,avx512f,avx512vl,avx512dq"))) isogi_sh__d8 isogi_sh__get_rows(const void *in, int is_double, int i, unsigned mask) {
+ISOGI_SH__INLINE __attribute__((target("avx2,fma,avx512f,avx512vl,avx512dq"))) isogi_sh__d8
+isogi_sh__get_rows(const void *in, int is_double, int i, unsigned mask) {
     const isogi_sh__d8 none = {0};
     const isogi_sh__f8 none_f32 = {0};
     if (is_double) return __builtin_ia32_loadupd512_mask((const double *)in + i, none, (unsigned char)mask);
-    return __builtin_convertvector((isogi_sh__f8)__builtin_ia32_loadups256_mask(ISOGI_SH__MASKED_CONST_F8((const float *)in + i), none_f32, (unsigned char)mask), isogi_sh__d8);
+    return __builtin_convertvector(
+        (isogi_sh__f8)__builtin_ia32_loadups256_mask(ISOGI_SH__MASKED_CONST_F8((const float *)in + i), none_f32, (unsigned char)mask),
+        isogi_sh__d8);
 }
 
-ISOGI_SH__INLINE __attribute__((target("avx2,fma,avx512f,avx512vl,avx512dq"))) void isogi_sh__put_rows(void *out, int is_double, int i, isogi_sh__d8 v, unsigned mask) {
+ISOGI_SH__INLINE __attribute__((target("avx2,fma,avx512f,avx512vl,avx512dq"))) void isogi_sh__put_rows(void *out, int is_double, int i,
+                                                                                                       isogi_sh__d8 v, unsigned mask) {
     if (is_double) __builtin_ia32_storeupd512_mask((double *)out + i, v, (unsigned char)mask);
     else {
         const isogi_sh__f8 none = {0};
-        __builtin_ia32_storeups256_mask(ISOGI_SH__MASKED_F8((float *)out + i), __builtin_ia32_cvtpd2ps512_mask(v, none, (ISOGI_SH__MASK8)-1, 4), (unsigned char)mask);
+        __builtin_ia32_storeups256_mask(ISOGI_SH__MASKED_F8((float *)out + i),
+                                        __builtin_ia32_cvtpd2ps512_mask(v, none, (ISOGI_SH__MASK8)-1, 4), (unsigned char)mask);
     }
 }
 
@@ -2619,11 +2748,16 @@ ISOGI_SH__AVX512 static void isogi_sh__rotate_d8(void *out, const void *in, int 
     int l;
     isogi_sh__put_rows(out, is_double, 0, isogi_sh__get_rows(in, is_double, 0, 1), 1);
     for (l = 1; l < order; l++) {
-        int at = l * (l + 1), bits = (2 << l) - 1, sine_bits = (0xffff << (15 - l)) & 0x7fff; /* what there is of l, l+1, .. and of l-15, .. l-1 */
-        isogi_sh__d8 low = isogi_sh__get_rows(in, is_double, at, (unsigned)bits), low_s = isogi_sh__get_rows(in, is_double, at - 7, (unsigned)(sine_bits >> 8));
-        isogi_sh__d8 high = isogi_sh__get_rows(in, is_double, at + 8, (unsigned)(bits >> 8)), high_s = isogi_sh__get_rows(in, is_double, at - 15, (unsigned)sine_bits);
-        v[0] = __builtin_shufflevector(low, high, 0, 2, 4, 6, 8, 10, 12, 14), v[1] = __builtin_shufflevector(low, high, 1, 3, 5, 7, 9, 11, 13, 15);
-        v[2] = __builtin_shufflevector(low_s, high_s, 7, 5, 3, 1, 15, 13, 11, 9), v[3] = __builtin_shufflevector(low_s, high_s, 6, 4, 2, 0, 14, 12, 10, 8);
+        /* what there is of l, l+1, .. and of l-15, .. l-1 */
+        int at = l * (l + 1), bits = (2 << l) - 1, sine_bits = (0xffff << (15 - l)) & 0x7fff;
+        isogi_sh__d8 low = isogi_sh__get_rows(in, is_double, at, (unsigned)bits),
+                     low_s = isogi_sh__get_rows(in, is_double, at - 7, (unsigned)(sine_bits >> 8));
+        isogi_sh__d8 high = isogi_sh__get_rows(in, is_double, at + 8, (unsigned)(bits >> 8)),
+                     high_s = isogi_sh__get_rows(in, is_double, at - 15, (unsigned)sine_bits);
+        v[0] = __builtin_shufflevector(low, high, 0, 2, 4, 6, 8, 10, 12, 14),
+        v[1] = __builtin_shufflevector(low, high, 1, 3, 5, 7, 9, 11, 13, 15);
+        v[2] = __builtin_shufflevector(low_s, high_s, 7, 5, 3, 1, 15, 13, 11, 9),
+        v[3] = __builtin_shufflevector(low_s, high_s, 6, 4, 2, 0, 14, 12, 10, 8);
         isogi_sh__turn_z_d8(v, &t->first);
         isogi_sh__turn_y_d8(v, l);
         isogi_sh__turn_z_d8(v, &t->middle);
@@ -2632,7 +2766,8 @@ ISOGI_SH__AVX512 static void isogi_sh__rotate_d8(void *out, const void *in, int 
         v[0] *= back, v[1] *= back, v[2] *= -back, v[3] *= -back;
         isogi_sh__turn_z_d8(v, &t->last);
         isogi_sh__put_rows(out, is_double, at, __builtin_shufflevector(v[0], v[1], 0, 8, 1, 9, 2, 10, 3, 11), (unsigned)bits);
-        isogi_sh__put_rows(out, is_double, at - 7, __builtin_shufflevector(v[2], v[3], 11, 3, 10, 2, 9, 1, 8, 0), (unsigned)(sine_bits >> 8));
+        isogi_sh__put_rows(out, is_double, at - 7, __builtin_shufflevector(v[2], v[3], 11, 3, 10, 2, 9, 1, 8, 0),
+                           (unsigned)(sine_bits >> 8));
         if (l < 8) continue;
         isogi_sh__put_rows(out, is_double, at + 8, __builtin_shufflevector(v[0], v[1], 4, 12, 5, 13, 6, 14, 7, 15), (unsigned)(bits >> 8));
         isogi_sh__put_rows(out, is_double, at - 15, __builtin_shufflevector(v[2], v[3], 15, 7, 14, 6, 13, 5, 12, 4), (unsigned)sine_bits);
@@ -2640,7 +2775,8 @@ ISOGI_SH__AVX512 static void isogi_sh__rotate_d8(void *out, const void *in, int 
 }
 
 /* Orders to ISOGI_SH__TURNS + 1; of several channels each by itself. */
-ISOGI_SH__AVX512 static void isogi_sh__rotate_channels(void *out, const void *in, int is_double, int order, int channels, const isogi_sh__euler *e) {
+ISOGI_SH__AVX512 static void isogi_sh__rotate_channels(void *out, const void *in, int is_double, int order, int channels,
+                                                       const isogi_sh__euler *e) {
     double c[(ISOGI_SH__TURNS + 1) * (ISOGI_SH__TURNS + 1)];
     isogi_sh__turns_d8 t;
     int i, k, n = order * order;
@@ -2689,7 +2825,7 @@ static void isogi_sh__rotate(void *out, const void *in, int is_double, int order
         l = 5;
     }
     for (; l < order; l++) {
-        if (channels > 1 || l > ISOGI_SH__TURNS) isogi_sh__quarter_turn_start(turns.step, turns.edge, l);
+        if (channels > 1 || l > ISOGI_SH__TURNS) isogi_sh__quarter_turn_start(&turns.quarter, l);
         for (first = 0; first < channels; first += ISOGI_SH__TOGETHER) {
             int some = channels - first < ISOGI_SH__TOGETHER ? channels - first : ISOGI_SH__TOGETHER;
             int at = channels * l * l + first;
@@ -2845,7 +2981,8 @@ static void isogi_sh__wigner_start(isogi_sh__wigner *w, int order, const isogi_s
 
 /* The 2x2 block of rows (cos, sin) n and columns (cos, sin) m of degree l, from A = d and B = (-1)^m' d of the other sign:
    Z(a) diag(A + B, A - B) Z(c) with p = n a + m c, q = n a - m c. */
-ISOGI_SH__INLINE void isogi_sh__put_block(const isogi_sh__blocks *out, int at, int l, int n, int m, double a, double b, const double p[2], const double q[2]) {
+ISOGI_SH__INLINE void isogi_sh__put_block(const isogi_sh__blocks *out, int at, int l, int n, int m, double a, double b, const double p[2],
+                                          const double q[2]) {
     int width = 2 * l + 1, plus = at + width * (l + m) + l, minus = at + width * (l - m) + l;
     isogi_sh__put(out, plus + n, a * p[0] + b * q[0]);
     isogi_sh__put(out, minus + n, b * q[1] - a * p[1]);
@@ -2865,7 +3002,8 @@ ISOGI_SH__INLINE void isogi_sh__turn_product(double p[2], const double a[2], con
    near -1 the same holds of (-1)^l d with 1 + cos b. */
 ISOGI_SH__INLINE void isogi_sh__wigner_pair(const isogi_sh__blocks *out, int order, int n, int m, const isogi_sh__wigner *w) {
     const double *fm = isogi_sh__table(m) + 1, *fn = n ? isogi_sh__table(n) + 1 + 2 * (m - n) : w->zonal[m + 1];
-    double start = fabs(isogi_sh__turn_f64[m * (m + 1) * (m + 2) / 6 - 1 + n * (m + 1) - n * (n - 1) / 2 + m - n]) * (n ? 0.5 : 0.70710678118654752440);
+    double start = fabs(isogi_sh__turn_f64[m * (m + 1) * (m + 2) / 6 - 1 + n * (m + 1) - n * (n - 1) / 2 + m - n]) *
+                   (n ? 0.5 : 0.70710678118654752440);
     double p[2], q[2], p_across[2], q_across[2], a_step = 0, b_step = 0, a, b, sign = n & 1 ? -1 : 1, flip = (m + n) & 1 ? -1 : 1;
     int l, at = m * (4 * m * m - 1) / 3;
     start *= (double)((int32_t)1 << m) * (1 - (double)m * w->excess);
@@ -2933,7 +3071,8 @@ ISOGI_SH__APART void isogi_sh__build_blocks(const isogi_sh__blocks *out, int ord
    numbers of the table, and nothing reads what comes of it. */
 typedef double isogi_sh__square[ISOGI_SH__TURNS + 1][ISOGI_SH__TURNS + 1];
 typedef struct isogi_sh__build {
-    isogi_sh__d8 outer[ISOGI_SH__TURNS + 1][2][4]; /* [m][n / 8]: cos na cos mc, sin na cos mc, cos na sin mc, sin na sin mc, times s_n s_m */
+    isogi_sh__d8 outer[ISOGI_SH__TURNS + 1][2][4]; /* [m][n / 8]: cos na cos mc, sin na cos mc, cos na sin mc, sin na sin mc,
+                                                      times s_n s_m */
     isogi_sh__d8 middle[ISOGI_SH__TURNS + 1][2];   /* t_k for n = 0, 1, .. and even m, and for odd m */
     isogi_sh__square even, odd;                    /* [k][n]: W_nk t_k for even and for odd m */
 } isogi_sh__build;
@@ -2946,7 +3085,8 @@ ISOGI_SH__AVX512 static void isogi_sh__build_start(isogi_sh__build *t, int order
     isogi_sh__multiples_start(&c, e->c[0], e->c[1]);
     isogi_sh__multiples_start(&a, e->a[0], e->a[1]);
     for (k = 0; k < order; k++) {
-        double cosine = ((const double *)(k & 1 ? &b.odd_c : &b.even_c))[k / 2], sine = ((const double *)(k & 1 ? &b.odd_s : &b.even_s))[k / 2];
+        double cosine = ((const double *)(k & 1 ? &b.odd_c : &b.even_c))[k / 2],
+               sine = ((const double *)(k & 1 ? &b.odd_s : &b.even_s))[k / 2];
         const isogi_sh__d8 zero = {0};
         t->middle[k][0] = __builtin_shufflevector(zero + cosine, zero + sine, 0, 9, 2, 11, 4, 13, 6, 15);
         t->middle[k][1] = __builtin_shufflevector(zero - sine, zero + cosine, 0, 9, 2, 11, 4, 13, 6, 15);
@@ -2954,7 +3094,8 @@ ISOGI_SH__AVX512 static void isogi_sh__build_start(isogi_sh__build *t, int order
     for (h = 0; 8 * h < order; h++) {
         isogi_sh__d8 ca = sign * ISOGI_SH__MERGE(a.even_c, a.odd_c, h), sa = sign * ISOGI_SH__MERGE(a.even_s, a.odd_s, h);
         for (m = 0; m < order; m++) {
-            double cosine = ((const double *)(m & 1 ? &c.odd_c : &c.even_c))[m / 2], sine = ((const double *)(m & 1 ? &c.odd_s : &c.even_s))[m / 2];
+            double cosine = ((const double *)(m & 1 ? &c.odd_c : &c.even_c))[m / 2],
+                   sine = ((const double *)(m & 1 ? &c.odd_s : &c.even_s))[m / 2];
             isogi_sh__d8 *o = t->outer[m][h];
             if ((m + 1) & 2) cosine = -cosine, sine = -sine;
             o[0] = ca * cosine, o[1] = sa * cosine, o[2] = ca * sine, o[3] = sa * sine;
@@ -2963,7 +3104,8 @@ ISOGI_SH__AVX512 static void isogi_sh__build_start(isogi_sh__build *t, int order
 }
 
 /* Columns m to m + 3 and -m to -m - 3 of degree l, rows -7 to 7 or (2 halves) -15 to 15. Row -0 is row 0, which comes last. */
-ISOGI_SH__INLINE __attribute__((target("avx2,fma,avx512f,avx512vl,avx512dq"))) void isogi_sh__build_columns(double *out, int l, int m, int halves, const isogi_sh__build *t) {
+ISOGI_SH__INLINE __attribute__((target("avx2,fma,avx512f,avx512vl,avx512dq"))) void
+isogi_sh__build_columns(double *out, int l, int m, int halves, const isogi_sh__build *t) {
     const double *table = isogi_sh__turn_columns_f64 + l * (l + 1) * (2 * l + 1) / 6 - 1 + m / 2, *w;
     const isogi_sh__d8 zero = {0};
     isogi_sh__d8 y[4][2][2], v;
@@ -2978,7 +3120,8 @@ ISOGI_SH__INLINE __attribute__((target("avx2,fma,avx512f,avx512vl,avx512dq"))) v
             for (i = 0; i < 4; i++) {
                 isogi_sh__d8 w_mk = w[(i & 1 ? l / 2 + 1 : 0) + i / 2] - zero;
                 ISOGI_SH__UNROLL
-                for (h = 0; h < halves; h++) y[i][sines][h] = ISOGI_SH__FMA_D8(*(const isogi_sh__d8 *)((i & 1 ? t->odd : t->even)[k] + 8 * h), w_mk, y[i][sines][h]);
+                for (h = 0; h < halves; h++)
+                    y[i][sines][h] = ISOGI_SH__FMA_D8(*(const isogi_sh__d8 *)((i & 1 ? t->odd : t->even)[k] + 8 * h), w_mk, y[i][sines][h]);
             }
         }
     }
@@ -2987,7 +3130,8 @@ ISOGI_SH__INLINE __attribute__((target("avx2,fma,avx512f,avx512vl,avx512dq"))) v
         if (m + i > l) break;
         ISOGI_SH__UNROLL
         for (h = halves - 1; h >= 0; h--) {
-            unsigned char up = (unsigned char)(h == halves - 1 ? 255u >> beyond : 255u), down = (unsigned char)(h == halves - 1 ? 255u << beyond : 255u);
+            unsigned char up = (unsigned char)(h == halves - 1 ? 255u >> beyond : 255u),
+                          down = (unsigned char)(h == halves - 1 ? 255u << beyond : 255u);
             const isogi_sh__d8 *o = t->outer[m + i][h], c = y[i][0][h], s = y[i][1][h];
             v = ISOGI_SH__FMA_D8(o[1], c, o[2] * s);
             __builtin_ia32_storeupd512_mask(plus - 8 * h - 7, __builtin_shufflevector(v, v, 7, 6, 5, 4, 3, 2, 1, 0), down);
@@ -3025,7 +3169,8 @@ ISOGI_SH__AVX512 static void isogi_sh__build_lanes(void *out, int is_double, int
         double *degree = is_double ? (double *)out + at : block;
         if (l) isogi_sh__build_degree(degree, l, &t);
         else degree[0] = 1;
-        for (i = 0; i < count && !is_double; i += 8) isogi_sh__put_rows(out, 0, at + i, *(const isogi_sh__d8 *)(block + i), count - i < 8 ? 255u >> (8 - count + i) : 255u);
+        for (i = 0; i < count && !is_double; i += 8)
+            isogi_sh__put_rows(out, 0, at + i, *(const isogi_sh__d8 *)(block + i), count - i < 8 ? 255u >> (8 - count + i) : 255u);
     }
 }
 #endif
@@ -3039,7 +3184,7 @@ ISOGI_SH__APART void isogi_sh__build_high(void *rotation, int is_double, int ord
     isogi_sh__turns_start(&turns, order, e);
     for (l = 0; l < order; l++) {
         int width = 2 * l + 1;
-        isogi_sh__quarter_turn_start(turns.step, turns.edge, l);
+        isogi_sh__quarter_turn_start(&turns.quarter, l);
         for (first = 0; first < width; first += ISOGI_SH__TOGETHER) {
             int some = width - first < ISOGI_SH__TOGETHER ? width - first : ISOGI_SH__TOGETHER;
             for (i = 0; i < some * width; i++) band[i] = 0;
@@ -3390,11 +3535,14 @@ ISOGI_SH__AVX2 static int isogi_sh__zonal_order5_f8(float *c, const float *zonal
     scale = ISOGI_SH__FMA_F8(e, ISOGI_SH__FMA_F8(e, one * 0.375f, one * 0.5f), one);
     x *= scale, y *= scale, z *= scale, zz = z * z;
     c2 = (x - y) * (x + y), s2 = (x + x) * y;
-    c3 = ISOGI_SH__FMA_F8(x, c2, -(y * s2)), s3 = ISOGI_SH__FMA_F8(x, s2, y * c2), c4 = ISOGI_SH__FMA_F8(c2, c2, -(s2 * s2)), s4 = (c2 + c2) * s2;
+    c3 = ISOGI_SH__FMA_F8(x, c2, -(y * s2)), s3 = ISOGI_SH__FMA_F8(x, s2, y * c2), c4 = ISOGI_SH__FMA_F8(c2, c2, -(s2 * s2)),
+    s4 = (c2 + c2) * s2;
     /* degrees 0, 1 and 2 but for its last: 1; y 1 x; s2 y 1 x */
     w = __builtin_shufflevector(one, x, 0, 1, 2, 11, 4, 5, 6, 15), w = __builtin_shufflevector(w, y, 0, 9, 2, 3, 4, 13, 6, 7);
-    w = __builtin_shufflevector(w, s2, 0, 1, 2, 3, 12, 5, 6, 7) * ISOGI_SH__FMA_F8(a1, zz, a0) * __builtin_shufflevector(one, z, 0, 1, 10, 3, 4, 13, 6, 15);
-    v = __builtin_shufflevector(zonal[1] - zero, l2, 0, 1, 2, 3, 12, 13, 14, 15), v = __builtin_shufflevector(v, zonal[0] - zero, 8, 1, 2, 3, 4, 5, 6, 7);
+    w = __builtin_shufflevector(w, s2, 0, 1, 2, 3, 12, 5, 6, 7) * ISOGI_SH__FMA_F8(a1, zz, a0) *
+        __builtin_shufflevector(one, z, 0, 1, 10, 3, 4, 13, 6, 15);
+    v = __builtin_shufflevector(zonal[1] - zero, l2, 0, 1, 2, 3, 12, 13, 14, 15),
+    v = __builtin_shufflevector(v, zonal[0] - zero, 8, 1, 2, 3, 4, 5, 6, 7);
     *(isogi_sh__f8 *)c = w * v;
     /* c2; s3 s2 y 1 x c2 c3, and from s4 on */
     v = __builtin_shufflevector(one, x, 0, 1, 2, 3, 4, 13, 6, 7), v = __builtin_shufflevector(v, y, 0, 1, 2, 11, 4, 5, 6, 7);
@@ -3477,11 +3625,14 @@ static int isogi_sh__position(isogi_sh_ordering ordering, int l, int m) {
 
 /* its basis function over ours */
 static double isogi_sh__relative(isogi_sh_convention v, int l, int m) {
-    double factor = v.normalisation == ISOGI_SH_ORTHONORMAL ? 1 : v.normalisation == ISOGI_SH_N3D ? sqrt(4 * ISOGI_SH__PI) : isogi_sh__zonal_factor(l);
+    double factor = v.normalisation == ISOGI_SH_ORTHONORMAL ? 1
+                    : v.normalisation == ISOGI_SH_N3D       ? sqrt(4 * ISOGI_SH__PI)
+                                                            : isogi_sh__zonal_factor(l);
     return v.condon_shortley && (m & 1) ? -factor : factor;
 }
 
-ISOGI_API isogi_result isogi_sh_convert(float *out, const float *in, int order, int channels, isogi_sh_convention from, isogi_sh_convention to) {
+ISOGI_API isogi_result isogi_sh_convert(float *out, const float *in, int order, int channels, isogi_sh_convention from,
+                                        isogi_sh_convention to) {
     int l, m, k;
     if (!out || !in || !isogi_sh__shape_ok(order, channels)) return ISOGI_INVALID;
     if (!isogi_sh__convention_ok(from) || !isogi_sh__convention_ok(to)) return ISOGI_INVALID;
@@ -3534,7 +3685,8 @@ static void isogi_sh__latitude(double *c, double *s, const float *f, int order, 
 }
 
 /* Term m of the product of two Fourier series of `order` terms: cosine in p[0], sine in p[1]. */
-static void isogi_sh__fourier_product(double p[2], int m, const double a[2][ISOGI_SH_MAX_ORDER], const double b[2][ISOGI_SH_MAX_ORDER], int order) {
+static void isogi_sh__fourier_product(double p[2], int m, const double a[2][ISOGI_SH_MAX_ORDER], const double b[2][ISOGI_SH_MAX_ORDER],
+                                      int order) {
     int i;
     double c = 0, s = 0;
     for (i = 0; i <= m; i++) { /* i + (m-i) */
@@ -3645,12 +3797,14 @@ ISOGI_SH__AVX2 static void isogi_sh__product_order5(float *out, const float *f, 
         isogi_sh__transpose_f8((float *)turned, 8, scratch + i);
         *(isogi_sh__f8 *)(out + i) = ((turned[0] + turned[1]) + (turned[2] + turned[3])) + ((turned[4] + turned[5]) + turned[6]);
     }
-    out[24] = ((scratch[24][0] + scratch[24][1]) + (scratch[24][2] + scratch[24][3])) + ((scratch[24][4] + scratch[24][5]) + scratch[24][6]);
+    out[24] =
+        ((scratch[24][0] + scratch[24][1]) + (scratch[24][2] + scratch[24][3])) + ((scratch[24][4] + scratch[24][5]) + scratch[24][6]);
 }
 
 /* Sixteen products of order 5 with one in each lane. Latitudes z and -z share the parts of a series that are even and odd in z:
    latitude 3 is the equator. */
-ISOGI_SH__AVX512 ISOGI_SH__INLINE void isogi_sh__parities_f16(isogi_sh__f16 (*even)[5], isogi_sh__f16 (*odd)[5], const isogi_sh__f16 *f, int latitude) {
+ISOGI_SH__AVX512 ISOGI_SH__INLINE void isogi_sh__parities_f16(isogi_sh__f16 (*even)[5], isogi_sh__f16 (*odd)[5], const isogi_sh__f16 *f,
+                                                              int latitude) {
     const float *q = isogi_sh__latitudes_f32 + latitude;
     isogi_sh__f16 zero = {0};
     int l, m;
@@ -3668,8 +3822,10 @@ ISOGI_SH__AVX512 ISOGI_SH__INLINE void isogi_sh__parities_f16(isogi_sh__f16 (*ev
     }
 }
 
-ISOGI_SH__AVX512 ISOGI_SH__INLINE void isogi_sh__product_latitude_f16(isogi_sh__f16 *out, const isogi_sh__f16 *f, const isogi_sh__f16 *g, int latitude) {
-    isogi_sh__f16 f_even[2][5], f_odd[2][5], g_even[2][5], g_odd[2][5], ac[5], as[5], bc[5], bs[5], c[5], s[5], a0, b0, sum[2][2][5], zero = {0};
+ISOGI_SH__AVX512 ISOGI_SH__INLINE void isogi_sh__product_latitude_f16(isogi_sh__f16 *out, const isogi_sh__f16 *f, const isogi_sh__f16 *g,
+                                                                      int latitude) {
+    isogi_sh__f16 f_even[2][5], f_odd[2][5], g_even[2][5], g_odd[2][5], ac[5], as[5], bc[5], bs[5], c[5], s[5], a0, b0, sum[2][2][5],
+        zero = {0};
     const float *q = isogi_sh__latitudes_f32 + 8 * 15 + latitude;
     int i, l, m, side;
     isogi_sh__parities_f16(f_even, f_odd, f, latitude);
@@ -3732,7 +3888,8 @@ ISOGI_API isogi_result isogi_sh_product(float *out, const float *a, const float 
 #endif
     for (i = 0; i < count; i++)
         for (first = 0; first < order; first += ISOGI_SH__GROUP)
-            isogi_sh__product(out + n * i, a + n * i, b + n * i, order, first, first + ISOGI_SH__GROUP < order ? first + ISOGI_SH__GROUP : order);
+            isogi_sh__product(out + n * i, a + n * i, b + n * i, order, first,
+                              first + ISOGI_SH__GROUP < order ? first + ISOGI_SH__GROUP : order);
     return ISOGI_OK;
 }
 
@@ -3798,7 +3955,8 @@ static double isogi_sh__descend(const float *c, int order, int channels, const d
         int axis, moved = 0;
         for (axis = 0; axis < 6; axis++) {
             double s = axis & 1 ? -step : step, other;
-            isogi_sh__unit v = isogi_sh__normalise(u.x + (axis / 2 == 0 ? s : 0), u.y + (axis / 2 == 1 ? s : 0), u.z + (axis / 2 == 2 ? s : 0));
+            isogi_sh__unit v =
+                isogi_sh__normalise(u.x + (axis / 2 == 0 ? s : 0), u.y + (axis / 2 == 1 ? s : 0), u.z + (axis / 2 == 2 ? s : 0));
             other = isogi_sh__windowed(c, order, channels, factor, v);
             if (other < value - 1e-15 * fabs(value)) value = other, u = v, moved = 1;
         }
@@ -3968,7 +4126,7 @@ static void isogi_sh__row_sums(double sums[2][ISOGI_SH__GROUP][3], const isogi_s
    opposite ones and g, h their sums, m = 0 and 4 take g + h, m = 2 takes g - h, m = 1 and 3 take e and f. RGB stays interleaved: factors
    are repeated for each channel, and a period of 24 floats, 8 texels, is three vectors. Lanes sum a few dozen floats; rows are
    summed in double. */
-#define ISOGI_SH__QUARTER 256 /* columns whose factors are held, for all rows */
+#define ISOGI_SH__QUARTER 192 /* columns whose factors are held, for all rows */
 #define ISOGI_SH__PITCH (3 * ISOGI_SH__QUARTER)
 #define ISOGI_SH__ROWS 8      /* whose weights are found together */
 
@@ -4006,17 +4164,20 @@ ISOGI_SH__AVX2 static void isogi_sh__image_row(isogi_sh__f8 *sum, const float *r
         a += all;
         c1 = ISOGI_SH__FMA_F8(e, c, ISOGI_SH__FMA_F8(f, s, c1)), s1 = ISOGI_SH__FMA_F8(e, s, ISOGI_SH__FMA_F8(-f, c, s1));
         g -= h;
-        c2 = ISOGI_SH__FMA_F8(g, *(const isogi_sh__f8 *)(by + 2 * ISOGI_SH__PITCH), c2), s2 = ISOGI_SH__FMA_F8(g, *(const isogi_sh__f8 *)(by + 3 * ISOGI_SH__PITCH), s2);
+        c2 = ISOGI_SH__FMA_F8(g, *(const isogi_sh__f8 *)(by + 2 * ISOGI_SH__PITCH), c2),
+        s2 = ISOGI_SH__FMA_F8(g, *(const isogi_sh__f8 *)(by + 3 * ISOGI_SH__PITCH), s2);
         c = *(const isogi_sh__f8 *)(by + 4 * ISOGI_SH__PITCH), s = *(const isogi_sh__f8 *)(by + 5 * ISOGI_SH__PITCH);
         c3 = ISOGI_SH__FMA_F8(e, c, ISOGI_SH__FMA_F8(-f, s, c3)), s3 = ISOGI_SH__FMA_F8(e, s, ISOGI_SH__FMA_F8(f, c, s3));
-        c4 = ISOGI_SH__FMA_F8(all, *(const isogi_sh__f8 *)(by + 6 * ISOGI_SH__PITCH), c4), s4 = ISOGI_SH__FMA_F8(all, *(const isogi_sh__f8 *)(by + 7 * ISOGI_SH__PITCH), s4);
+        c4 = ISOGI_SH__FMA_F8(all, *(const isogi_sh__f8 *)(by + 6 * ISOGI_SH__PITCH), c4),
+        s4 = ISOGI_SH__FMA_F8(all, *(const isogi_sh__f8 *)(by + 7 * ISOGI_SH__PITCH), s4);
     }
     sum[0] = a, sum[1] = c1, sum[2] = s1, sum[3] = c2, sum[4] = s2, sum[5] = c3, sum[6] = s3, sum[7] = c4, sum[8] = s4;
 }
 
 /* All lanes of a row over one block of columns: what is no multiple of 8 columns goes through a copy, since nothing may be read behind
    the image. */
-ISOGI_SH__AVX2 static void isogi_sh__image_block(isogi_sh__f8 (*sum)[9], const float *row, size_t quarter, int columns, const float *factor) {
+ISOGI_SH__AVX2 static void isogi_sh__image_block(isogi_sh__f8 (*sum)[9], const float *row, size_t quarter, int columns,
+                                                 const float *factor) {
     float rest[4][24];
     int j, k, whole = columns / 8 * 24;
     for (j = 0; j < 3; j++) isogi_sh__image_row(sum[j], row + 8 * j, quarter, whole, factor + 8 * j);
@@ -4051,9 +4212,12 @@ ISOGI_SH__AVX2 static void isogi_sh__image_add(double (*total)[12], isogi_sh__f8
     int j, k, l, m;
     for (k = 0; k < 9; k++) {
         isogi_sh__f8 a = sum[0][k], b = sum[1][k], c = sum[2][k];
-        part[k][0] = __builtin_convertvector(__builtin_shufflevector(a, a, 0, 1, 2, 3) + __builtin_shufflevector(b, b, 4, 5, 6, 7), isogi_sh__d4);
-        part[k][1] = __builtin_convertvector(__builtin_shufflevector(a, a, 4, 5, 6, 7) + __builtin_shufflevector(c, c, 0, 1, 2, 3), isogi_sh__d4);
-        part[k][2] = __builtin_convertvector(__builtin_shufflevector(b, b, 0, 1, 2, 3) + __builtin_shufflevector(c, c, 4, 5, 6, 7), isogi_sh__d4);
+        part[k][0] =
+            __builtin_convertvector(__builtin_shufflevector(a, a, 0, 1, 2, 3) + __builtin_shufflevector(b, b, 4, 5, 6, 7), isogi_sh__d4);
+        part[k][1] =
+            __builtin_convertvector(__builtin_shufflevector(a, a, 4, 5, 6, 7) + __builtin_shufflevector(c, c, 0, 1, 2, 3), isogi_sh__d4);
+        part[k][2] =
+            __builtin_convertvector(__builtin_shufflevector(b, b, 0, 1, 2, 3) + __builtin_shufflevector(c, c, 4, 5, 6, 7), isogi_sh__d4);
     }
     for (m = 0; m < 5; m++, power *= sine) {
         isogi_sh__column(q, 5, m, isogi_sh__next_diagonal(0, m), z, 0);
@@ -4082,7 +4246,8 @@ ISOGI_SH__AVX2 static void isogi_sh__project_fast(float *rgb, const float *image
             isogi_sh__fejer_rows(weight, cosine, height);
             for (j = 0; j < ISOGI_SH__ROWS && row + j < height; j++) {
                 memset(sum, 0, sizeof sum);
-                isogi_sh__image_block(sum, image + 3 * ((size_t)width * (size_t)(row + j) + (size_t)first), 3 * (size_t)quarter, columns, factor[0]);
+                isogi_sh__image_block(sum, image + 3 * ((size_t)width * (size_t)(row + j) + (size_t)first), 3 * (size_t)quarter, columns,
+                                      factor[0]);
                 isogi_sh__image_add(total, sum, z[j], sine[j], weight[j] * 2 * ISOGI_SH__PI / (double)width);
             }
         }
@@ -4098,7 +4263,7 @@ ISOGI_SH__AVX2 static void isogi_sh__project_fast(float *rgb, const float *image
 /* Their part of the projection, in the frame whose z is the image's pole. */
 ISOGI_SH__APART void isogi_sh__project_rows(float *c, int order, const isogi_sh__pixels *p) {
     double total[2][ISOGI_SH__GROUP][ISOGI_SH_MAX_ORDER][3], sums[2][ISOGI_SH__GROUP][3], q[ISOGI_SH_MAX_ORDER];
-    int j, k, l, m;
+    int j, k, l, m, limit = order < p->height ? order : p->height; /* degrees that rows can tell apart */
     memset(total, 0, sizeof total);
     for (j = 0; j < p->height; j++) {
         double t = ISOGI_SH__PI * ((double)j + 0.5) / (double)p->height, z = cos(t), sine = sin(t), power = 1, diagonal = 0;
@@ -4106,9 +4271,9 @@ ISOGI_SH__APART void isogi_sh__project_rows(float *c, int order, const isogi_sh_
         isogi_sh__row_sums(sums, p, j);
         for (m = 0; m < p->end; m++) {
             diagonal = isogi_sh__next_diagonal(diagonal, m);
-            if (m >= p->first) {
+            if (m >= p->first && (m == 0 || 2 * m < p->width)) {
                 isogi_sh__column(q, order, m, diagonal, z, 0);
-                for (l = m; l < order; l++)
+                for (l = m; l < limit; l++)
                     for (k = 0; k < p->group; k++) {
                         total[0][m - p->first][l][k] += weight * power * q[l] * sums[0][m - p->first][k];
                         total[1][m - p->first][l][k] += weight * power * q[l] * sums[1][m - p->first][k];
@@ -4139,7 +4304,7 @@ ISOGI_API isogi_result isogi_sh_project_image(float *c, int order, int channels,
     if (!isogi_sh__image_fits(width, height, channels)) return ISOGI_TOO_LARGE;
     p.image = image, p.width = width, p.height = height, p.channels = channels;
 #ifdef ISOGI_SH__SIMD
-    if (order == 5 && channels == 3 && !(width & 3) && width >= 32 && isogi_sh__level()) {
+    if (order == 5 && channels == 3 && !(width & 3) && width >= 32 && height >= 5 && isogi_sh__level()) {
         isogi_sh__project_fast(c, image, width, height);
         if (isogi_sh__euler_angles(&e, isogi_sh__image_to_world) == ISOGI_OK) isogi_sh__rotate(c, c, 0, order, channels, &e);
         return ISOGI_OK;
@@ -4244,7 +4409,8 @@ static isogi_sh__unit isogi_sh__cube_direction(int face, double s, double t) {
 }
 
 /* Orders first <= m < end of one channel, over all texels. */
-static void isogi_sh__project_cube(float *c, int order, int channels, int channel, int first, int end, const float *const face[6], int size) {
+static void isogi_sh__project_cube(float *c, int order, int channels, int channel, int first, int end, const float *const face[6],
+                                   int size) {
     double total[2][ISOGI_SH__GROUP][ISOGI_SH_MAX_ORDER], q[ISOGI_SH_MAX_ORDER];
     int f, i, j, l, m;
     memset(total, 0, sizeof total);
@@ -4260,7 +4426,8 @@ static void isogi_sh__project_cube(float *c, int order, int channels, int channe
                     diagonal = isogi_sh__next_diagonal(diagonal, m);
                     if (m >= first) {
                         isogi_sh__column(q, order, m, diagonal, u.z, u.z_low);
-                        for (l = m; l < order; l++) total[0][m - first][l] += value * q[l] * cm, total[1][m - first][l] += value * q[l] * sm;
+                        for (l = m; l < order; l++)
+                            total[0][m - first][l] += value * q[l] * cm, total[1][m - first][l] += value * q[l] * sm;
                     }
                     x = u.x * cm - u.y * sm;
                     sm = u.x * sm + u.y * cm;
@@ -4282,8 +4449,8 @@ ISOGI_API isogi_result isogi_sh_project_cube(float *c, int order, int channels, 
     if (!isogi_sh__image_fits(size, size, channels)) return ISOGI_TOO_LARGE;
     for (channel = 0; channel < channels; channel++)
         for (first = 0; first < order; first += ISOGI_SH__GROUP)
-            isogi_sh__project_cube(c, order, channels, channel, first, first + ISOGI_SH__GROUP < order ? first + ISOGI_SH__GROUP : order, face,
-                                   size);
+            isogi_sh__project_cube(c, order, channels, channel, first, first + ISOGI_SH__GROUP < order ? first + ISOGI_SH__GROUP : order,
+                                   face, size);
     return ISOGI_OK;
 }
 
@@ -4299,12 +4466,20 @@ static isogi_result isogi_sh__env_rotation(double m[9], const isogi_env *env) {
         zero = zero && m[i] >= 0 && m[i] <= 0;
     }
     if (zero) m[0] = m[4] = m[8] = 1;
-    return isogi_sh__euler_angles(&e, m);
+    return zero ? ISOGI_OK : isogi_sh__euler_angles(&e, m);
 }
 
-/* What left the range of floats goes to its end. */
+/* What left the range of floats goes to its end. First a look whether anything did: an exponent of ones and one more is carried into the
+   highest bit. */
 static void isogi_sh__clamp(float *c, size_t count) {
+    uint32_t any = 0;
     size_t i;
+    for (i = 0; i < count; i++) {
+        uint32_t bits;
+        memcpy(&bits, &c[i], sizeof bits);
+        any |= (bits & 0x7fffffffu) + 0x00800000u;
+    }
+    if (!(any >> 31)) return;
     for (i = 0; i < count; i++)
         if (!isogi_sh__finite_f32(c[i])) {
             uint32_t bits;
@@ -4335,7 +4510,8 @@ static int isogi_sh__light_ok(const isogi_light *light) {
     if (kind == (int)ISOGI_LIGHT_POINT) return 1;
     if (kind == (int)ISOGI_LIGHT_RECTANGLE) return isogi_sh__edges_ok(light);
     if (!isogi_sh__finite_f32(light->radius) || light->radius < 0) return 0;
-    return kind == (int)ISOGI_LIGHT_SPHERE || (fabs((double)v[0]) + fabs((double)v[1]) + fabs((double)v[2]) > 0 && light->radius <= 1.5707964f);
+    return kind == (int)ISOGI_LIGHT_SPHERE ||
+           (fabs((double)v[0]) + fabs((double)v[1]) + fabs((double)v[2]) > 0 && light->radius <= 1.5707964f);
 }
 
 ISOGI_API isogi_result isogi_lighting_validate(const isogi_lighting *lighting) {
@@ -4478,13 +4654,22 @@ static void isogi_sh__turn_all_to_world(double *c, int order, const isogi_sh__eu
     for (l = 5; l < order; l++) isogi_sh__rotate_band(c + l * l, other, l, 1, &turns);
 }
 
-/* One degree of a high order. Multiples of the angles are made anew for each, since those of four frames would take 20 KB of stack. */
-static void isogi_sh__turn_to_world(double *band, int l, const isogi_sh__euler *e) {
-    double other[2 * ISOGI_SH_MAX_ORDER];
-    isogi_sh__turns turns;
-    isogi_sh__turns_start(&turns, l + 1, e);
-    if (l > ISOGI_SH__TURNS) isogi_sh__quarter_turn_start(turns.step, turns.edge, l);
-    isogi_sh__rotate_band(band, other, l, 1, &turns);
+/* A turn about z of degree l of four expansions, interleaved, whose angles are given:
+   multiples of four angles would not fit on the stack. */
+static void isogi_sh__turn_z_four(double *band, int l, double (*angle)[2]) {
+    double c[4], s[4];
+    int i, m;
+    for (i = 0; i < 4; i++) c[i] = 1, s[i] = 0;
+    for (m = 1; m <= l; m++) {
+        double *plus = band + 4 * (l + m), *minus = band + 4 * (l - m);
+        for (i = 0; i < 4; i++) {
+            double x = c[i], p = plus[i], q = minus[i];
+            c[i] = x * angle[i][0] - s[i] * angle[i][1];
+            s[i] = x * angle[i][1] + s[i] * angle[i][0];
+            plus[i] = p * c[i] - q * s[i];
+            minus[i] = p * s[i] + q * c[i];
+        }
+    }
 }
 
 /* At z = 0: q_l^m where l - m is even, else its derivative, from diagonal = q_l^l down. */
@@ -4568,24 +4753,36 @@ ISOGI_SH__APART void isogi_sh__add_edges_low(float *c, isogi_sh__rectangle *r) {
     for (l = 0; l < order; l++) isogi_sh__add_degree(c, sum + l * l, l, r);
 }
 
-/* Those from there on degree by degree, since expansions of high orders do not fit on the stack. */
+/* Those from there on degree by degree, since expansions of high orders do not fit on the stack; as isogi_sh__rotate_band, of all edges. */
 ISOGI_SH__APART void isogi_sh__add_edges_high(float *c, isogi_sh__rectangle *r) {
     isogi_sh__arc arc[4];
-    double pole[4][3], sum[2 * ISOGI_SH_MAX_ORDER], band[2 * ISOGI_SH_MAX_ORDER], q[ISOGI_SH_MAX_ORDER];
+    isogi_sh__quarter_turn quarter;
+    double pole[4][3], band[8 * ISOGI_SH_MAX_ORDER], other[8 * ISOGI_SH_MAX_ORDER], q[ISOGI_SH_MAX_ORDER], turn[3][4][2];
     double diagonal = isogi_sh__next_diagonal(0, 0);
-    int i, k, l;
-    for (i = 0; i < 4; i++)
+    int i, k, l, m;
+    for (i = 0; i < 4; i++) {
+        const isogi_sh__euler *e = &arc[i].frame;
         if (!isogi_sh__edge(&arc[i], pole[i], r, i)) return;
+        turn[0][i][0] = -e->c[1], turn[0][i][1] = e->c[0];
+        turn[1][i][0] = e->b[0], turn[1][i][1] = e->b[1];
+        turn[2][i][0] = e->a[1], turn[2][i][1] = -e->a[0];
+    }
     for (l = 1; l < r->order; l++) {
         diagonal = isogi_sh__next_diagonal(diagonal, l);
         if (l < ISOGI_SH__LOW) continue;
         isogi_sh__equator(q, l, diagonal);
-        for (i = 0; i < 4; i++) {
-            isogi_sh__edge_degree(band, l, q, &arc[i]);
-            isogi_sh__turn_to_world(band, l, &arc[i].frame);
-            for (k = 0; k <= 2 * l; k++) sum[k] = i ? sum[k] + band[k] : band[k];
+        for (m = 0; m <= l; m++) {
+            double value = (l - m) & 1 ? q[m] / (double)(l * (l + 1)) : 0;
+            for (i = 0; i < 4; i++) band[4 * (l - m) + i] = value * arc[i].sine[m], band[4 * (l + m) + i] = value * arc[i].cosine[m];
         }
-        isogi_sh__add_degree(c, sum, l, r);
+        isogi_sh__quarter_turn_start(&quarter, l);
+        isogi_sh__turn_z_four(band, l, turn[0]);
+        isogi_sh__turn_y(other, band, l, 4, 0, &quarter);
+        isogi_sh__turn_z_four(other, l, turn[1]);
+        isogi_sh__turn_y(band, other, l, 4, 1, &quarter);
+        isogi_sh__turn_z_four(band, l, turn[2]);
+        for (k = 0; k <= 2 * l; k++) band[k] = (band[4 * k] + band[4 * k + 1]) + (band[4 * k + 2] + band[4 * k + 3]);
+        isogi_sh__add_degree(c, band, l, r);
     }
 }
 
@@ -4656,10 +4853,13 @@ static void isogi_sh__strip_edge(double (*moment)[2][ISOGI_SH_MAX_ORDER], const 
 
 /* About the equator f = q (1 - s^2)^(m/2) is f0 + f1 s + f2 s^2 / 2, f2 = (m^2 - l (l+1)) f0 by Legendre's equation. */
 ISOGI_SH__APART void isogi_sh__add_strip(float *c, isogi_sh__rectangle *r, const isogi_sh__strip *strip) {
-    double moment[3][2][ISOGI_SH_MAX_ORDER], all[ISOGI_SH__LOW * ISOGI_SH__LOW], q[ISOGI_SH_MAX_ORDER], diagonal = 0;
+    double moment[3][2][ISOGI_SH_MAX_ORDER], all[ISOGI_SH__LOW * ISOGI_SH__LOW], other[2 * ISOGI_SH_MAX_ORDER], q[ISOGI_SH_MAX_ORDER],
+        diagonal = 0;
+    isogi_sh__turns turns;
     isogi_sh__euler frame;
     int i, l, m, low = r->order <= ISOGI_SH__LOW;
     isogi_sh__frame(&frame, strip->x, strip->z);
+    if (!low) isogi_sh__turns_start(&turns, r->order, &frame);
     memset(moment, 0, sizeof moment);
     for (i = 0; i < 4; i++) isogi_sh__strip_edge(moment, strip, i, r->order);
     for (l = 0; l < r->order; l++) {
@@ -4672,7 +4872,8 @@ ISOGI_SH__APART void isogi_sh__add_strip(float *c, isogi_sh__rectangle *r, const
                 band[i ? l - m : l + m] = q[m] * ((l - m) & 1 ? moment[1][i][m] : moment[0][i][m] + bend * moment[2][i][m]);
         }
         if (low) continue;
-        isogi_sh__turn_to_world(band, l, &frame);
+        if (l > ISOGI_SH__TURNS) isogi_sh__quarter_turn_start(&turns.quarter, l);
+        isogi_sh__rotate_band(band, other, l, 1, &turns);
         isogi_sh__add_degree(c, band, l, r);
     }
     if (!low) return;
@@ -4689,7 +4890,8 @@ static void isogi_sh__add_rectangle(float *c, int order, const isogi_light *ligh
         centre[k] = (double)light->vector[k] - (point ? (double)point[k] : 0);
         for (i = 0; i < 2; i++) r.edge[i][k] = (double)light->edge[i][k];
         for (i = 0; i < 4; i++)
-            r.corner[i][k] = centre[k] + ((isogi_sh__corner_at[i][0] - 0.5) * r.edge[0][k] + (isogi_sh__corner_at[i][1] - 0.5) * r.edge[1][k]);
+            r.corner[i][k] =
+                centre[k] + ((isogi_sh__corner_at[i][0] - 0.5) * r.edge[0][k] + (isogi_sh__corner_at[i][1] - 0.5) * r.edge[1][k]);
     }
     area = isogi_sh__cross3(normal, r.edge[0], r.edge[1]);
     r.volume = -isogi_sh__dot3(centre, normal);
@@ -4737,7 +4939,7 @@ static void isogi_sh__add_light(float *c, int order, const isogi_light *light, c
     }
     for (k = 0; k < 3; k++) rgb[k] = factor * (double)light->rgb[k];
     isogi_sh__dim(rgb, 1);
-    isogi_sh__add_lobe(c, order, 3, scale, isogi_sh__normalise(d[0], d[1], d[2]), rgb);
+    isogi_sh__add_rgb_lobe(c, order, scale, isogi_sh__normalise(d[0], d[1], d[2]), rgb);
 }
 
 ISOGI_API isogi_result isogi_sh_project(float *rgb, int order, const isogi_lighting *lighting, const float point[3]) {
@@ -4796,7 +4998,7 @@ static void isogi_sh__add_cone(float *c, int order, const float axis[3], double 
     isogi_sh__disc(scale, order, cosine);
     for (l = 1; l < order; l++) scale[l] *= ISOGI_SH__PI * sine * sine;
     scale[0] = 4 * ISOGI_SH__PI * half * half;
-    isogi_sh__add_lobe(c, order, 3, scale, isogi_sh__unit_f32(axis), rgb);
+    isogi_sh__add_rgb_lobe(c, order, scale, isogi_sh__unit_f32(axis), rgb);
 }
 
 ISOGI_API isogi_result isogi_sh_cone(float *c, int order, const float axis[3], double half_angle, const float rgb[3]) {
@@ -4837,7 +5039,7 @@ ISOGI_API isogi_result isogi_sh_gradient_sky(float *c, int order, const float up
         colour[k] = 0.5 * ((double)sky[k] - (double)ground[k]);
         c[k] = (float)(sqrt(4 * ISOGI_SH__PI) * 0.5 * ((double)sky[k] + (double)ground[k]));
     }
-    isogi_sh__add_lobe(c, order, 3, scale, isogi_sh__unit_f32(up), colour);
+    isogi_sh__add_rgb_lobe(c, order, scale, isogi_sh__unit_f32(up), colour);
     return ISOGI_OK;
 }
 
@@ -4890,7 +5092,8 @@ static isogi_result isogi_sh__fit_to(float direction[3], float rgb[3], float amb
     double light[3], rest[3];
     isogi_sh__unit u;
     int k;
-    if (!direction || !c || !isogi_sh__order_ok(order) || order < 2 || !isogi_sh__finite_array(c, 3 * ISOGI_SH_COUNT(order))) return ISOGI_INVALID;
+    if (!direction || !c || !isogi_sh__order_ok(order) || order < 2 || !isogi_sh__finite_array(c, 3 * ISOGI_SH_COUNT(order)))
+        return ISOGI_INVALID;
     u = isogi_sh__brightest(c);
     isogi_sh__fit(light, rest, c, order, u, ambient != NULL);
     direction[0] = (float)u.x, direction[1] = (float)u.y, direction[2] = (float)(u.z + u.z_low);

@@ -10,7 +10,7 @@
            static float data[32][32][32], light[1][3];
            static isogi_volume volume; static isogi_trace_desc desc; // static: all zero, which is the default everywhere
            isogi_pyramid *pyramid; isogi_trace *trace;
-           for (int i = 0; i < 32768; i++) data[i / 1024][i / 32 % 32][i % 32] = -(float)((i / 32 % 32 - 16) * (i / 32 % 32 - 16)); // -(y - 16)^2
+           for (int i = 0; i < 32768; i++) data[i / 1024][i / 32 % 32][i % 32] = -(float)((i / 32 % 32 - 16) * (i / 32 % 32 - 16));
            volume.data = data, volume.type = ISOGI_F32, volume.size[0] = volume.size[1] = volume.size[2] = 32;
            if (isogi_vol_build(&pyramid, &volume, NULL)) return 1; else desc.pyramid = pyramid;
            desc.lighting.env.sh = sky, desc.lighting.env.sh_order = 1, desc.albedo[0] = desc.albedo[1] = desc.albedo[2] = 0.7f;
@@ -65,8 +65,8 @@
                             goes into matter all the same counts as reflected where it starts.
      Validity               A texel is left out of every lookup where no surface passes at its place: none of the voxels of the cells
                             around it is lower than v (constant air, local minima: there f >= v all around, such a texel would see the
-                            sky through everything), where a voxel is not finite, or where all of these gradients vanish. With desc.capped the
-                            border's texels, which face out of the box, are always valid on the low side. On the high side a texel
+                            sky through everything), where a voxel is not finite, or where all of these gradients vanish. With desc.capped
+                            the border's texels, which face out of the box, are always valid on the low side. On the high side a texel
                             needs matter to look through: one of the places a quarter, half and a whole voxel into the matter must
                             be inside (local maxima have none).
      Lookup                 desc.lookup; trilinear unless told otherwise: among the eight texels around the point, those that are
@@ -87,12 +87,12 @@
      lost (a white surface under a white sky stays white). bounces = -1: Russian roulette from the third reflection on.
      So with ISOGI_TRACE_PATHS, the reference. By default (FEEDBACK) a path ends at its first hit and takes the light there from a
      probe: a point near by on the same isosurface or one that runs closely beside it (up to .15 voxels by the gradient), in cells of
-     2 voxels (of the smallest spacing, but half a voxel along every axis at least) or an eighth of the ray's length, whose own
+     2 voxels (of the shortest edge, but half a voxel along every axis at least) or an eighth of the ray's length, whose own
      hemisphere is gathered once in the same way; passes over the probes then bring all reflections without rays. What
      the sky and reflections bring is averaged over neighbouring texels that face the same way, as far as their noise could explain the
-     difference; lights are not, so that their shadows stay sharp. Probes cost accuracy: less than 0.1 % of the mean and 1.5 % at a
-     point in narrow channels of albedo 0.8 (test_trace_bake --long prints it). Lazy and adaptive bakes take samples in blocks of 4,
-     16, 64, ... and every other texel along each axis first: soon every lookup has a value.
+     difference; lights are not, so that their shadows stay sharp (desc.unfiltered: nothing is). Probes cost accuracy: less than 0.1 % of
+     the mean and 1.5 % at a point in narrow channels of albedo 0.8 (test_trace_bake --long prints it). Lazy and adaptive bakes take samples
+     in blocks of 4, 16, 64, ... and every other texel along each axis first: soon every lookup has a value.
      A hit from within (only through an open border can a ray get there) is a surface too, with its normal turned.
 
    GLSL that lights a surface by an exported irradiance texture (GL_LINEAR, GL_CLAMP_TO_EDGE); grid: voxel coordinates
@@ -136,16 +136,18 @@
 
    Memory       Through the context. Bricks of 4x4x4 texels: 8 bytes for each, 112 where one of its texels is wanted, and for every
                 wanted texel alone 2 + 12 bytes of irradiance, 2 + 2 order^2 channels of transfer, less in other formats; and
-                250 KB. isogi_trace_memory tells. FEEDBACK needs another 4 MB, and while it works some 500 bytes (TRANSFER: 16 more
-                for each coefficient) and 4 for every hit, for each of 65536 texels at a time, for all that were asked for when
-                lazy, and for each probe.
+                250 KB. isogi_trace_memory tells. PATHS needs another 4 MB, FEEDBACK 7, and while it works some 400 bytes (TRANSFER: 16
+                more for each coefficient), 2048 times that at once, and 4 for every hit, for each of 65536 texels at a time, for all
+                that were asked for when lazy, and for each probe.
                 Any allocation may fail: the call says ISOGI_NO_MEMORY, the texture stays as it was and can go on.
-                Stack use stays below 48 KB, a third of it its own, the rest that of rays.
+                Stack use stays below 32 KB (compiled by clang, below 35), nearly all of it that of rays.
    Threads      Rays run on the context's threads. isogi_trace_sample and the other readers may run in any number of threads at a
                 time; request, step and relight alone, without readers.
    Determinism  The same bits for any number of threads and any budget of steps. PATHS: a texel's light depends on the description
                 and its place alone, lazily or fully, in parts (desc.box_first, isogi_trace_load), in any order of requests.
                 FEEDBACK: which probes there are depends on what was asked for and in which order: within 5 % (rms over points).
+                Instruction paths (isogi_context.force_path) give the same hits and the same bits; but a ray that grazes the surface
+                within rounding, one in 100,000, may be seen either way: light then differs by what that one sample brings.
    Limits       Order 6; 2^24 samples; paths end after 10000 reflections. White surfaces that enclose a light truly have infinite
                 light: what is computed then is finite and has no meaning; its error says so, and isogi_trace_report.diverges.
                 Voxels of 1e-150 to 1e150 world units: squares of lengths must neither vanish nor overflow. Where matter is
@@ -201,7 +203,7 @@ typedef enum isogi_trace_sides {
 typedef void isogi_trace_material_function(void *user, double isovalue, const double point[3], float albedo[3], float emission[3]);
 
 /* How a texel's light is held, and exported. Bytes for a texel of RGB / of a coefficient; error of what was computed, which itself
-   has an error of about 1.5 % with 16 samples (an engine block; README.md):
+   has an error of about 1.3 % with 16 samples (an engine block; README.md):
    FLOAT   12 / 4   6e-8 of the value
    HALF     6 / 2   5e-4 of the value
    RGB9E5   4 / -   2e-3 of the largest of the three channels; irradiance alone
@@ -245,10 +247,15 @@ typedef struct isogi_trace_desc {
     float error;               /* FEEDBACK: a texel is good enough once its standard error is below this fraction of the light that an
                                   open texel gets, averaged over all orientations, or once more samples would hardly lower it: light
                                   from probes is itself uncertain by 2 %; 0 = every texel gets all its samples */
+    int unfiltered;            /* non-zero: FEEDBACK averages no light over neighbouring texels, to see what that is worth: the same error
+                                  takes two to four times the samples (make bench, rows filter-) */
     uint64_t seed;
-    float offset;              /* rays start this many voxels along the normal, up to 1 (a wall may be that thin); 0 = 0.25; negative = on the surface */
+    float offset;              /* rays start this many voxels along the normal, up to 1 (a wall may be that thin); 0 = 0.25;
+                                  negative = on the surface */
     isogi_normal_kind normals; /* of the hemisphere that is integrated over */
-    double isovalue_min, isovalue_max; /* only texels that a surface within this interval reads; both 0 = all */
+    double isovalue_min, isovalue_max; /* only texels that a surface within this interval reads; both 0 = all. Where none of a lookup's
+                                          eight
+                                  texels is valid, the nearest one of the 4x4x4 may be missing, unless lazy: it is then dark there */
     int lazy;                  /* non-zero: only texels that were requested (and that the interval, if there is one, reads) */
     int capped;                /* non-zero: the volume's border closes the surface (ISOGI_RAY_CAPPED) */
     int transfer_channels;     /* TRANSFER: sets of coefficients: 1 = grey (mean albedo), 3 = RGB; 0 = 3 if albedo is coloured, else 1 */
@@ -258,7 +265,9 @@ typedef struct isogi_trace_desc {
                                   in cells where light differs by more than this share of its mean (beyond three standard errors), or
                                   where a texel has no surface. Saves rays and memory where light varies slowly; 0.1 to 0.5 is
                                   sensible. Not with lazy or a box; such a texture cannot be exported or saved */
-    size_t box_first[3], box_end[3]; /* only texels box_first <= i < box_end: a part of the bake, in the same bits; all 0 = all */
+    size_t box_first[3], box_end[3]; /* only texels box_first <= i < box_end: a part of the bake; all 0 = all. PATHS: in the bits of the
+                                  whole. FEEDBACK: each part has probes and passes of its own, reads nothing of the others, and differs
+                                  from the whole by what probes are uncertain by: 0.5 to 2 % (rms) where reflections matter */
 } isogi_trace_desc;
 
 typedef struct isogi_trace isogi_trace;
@@ -277,8 +286,8 @@ ISOGI_API isogi_result isogi_trace_request(isogi_trace *trace, const float (*poi
    NULL): fraction of the texels asked for that are still to do, 0 = finished; it never rises but by a request. ISOGI_CANCELLED and
    ISOGI_NO_MEMORY leave a texture that can be read and stepped on. Not at the same time as any other call on this texture.
    FEEDBACK: when a block of samples is complete passes without rays carry the light over all probes to all texels at work; they are cut
-   into pieces, too, and counted as the rays that take about as long. Meanwhile *remaining hardly falls, and what a request adds has to
-   wait. */
+   into pieces, too, as is what comes before the first ray and after the last one, and counted as the rays that take about as long.
+   Meanwhile *remaining hardly falls, and what a request adds has to wait. */
 ISOGI_API isogi_result isogi_trace_step(isogi_trace *trace, uint64_t max_rays, double *remaining);
 
 /* Lookup (desc.lookup) among the texels that are valid and computed. irradiance[count] (RGB); error[count]: standard error of its
@@ -337,8 +346,10 @@ typedef struct isogi_trace_report {
     double error;     /* of their standard errors (TRANSFER: under a uniform sky of radiance 1; without what is not known) */
     double worst;     /* the largest of these errors; INFINITY where one is not known */
     double unit;      /* IRRADIANCE: light that an open texel gets, averaged over orientations: what desc.error is a fraction of. Measured
-                         at the volume's middle, but at least a quarter of its diagonal from a lamp, and before a rectangle */
-    int diverges;     /* FEEDBACK: reflections add the same light for ever (albedo 1, closed, with a light inside): no value means anything */
+                         at the volume's middle, but at least a quarter of its diagonal from a lamp, and before a rectangle. Where
+                         emission_points are the only light: that of a surface which sees the brightest of them alone */
+    int diverges;     /* FEEDBACK: reflections add the same light for ever (albedo 1, closed, with a light inside):
+                         no value means anything */
 } isogi_trace_report;
 ISOGI_API void isogi_trace_status(const isogi_trace *trace, isogi_trace_report *report);
 
@@ -360,8 +371,8 @@ ISOGI_API isogi_trace *isogi_trace_high(isogi_trace *trace);
    Components are in the machine's byte order. Texels hold what lookups read there, drafts too. Those without light of their own (no
    surface, not computed) hold the mean of those around them, three texels deep, and beyond that the mean of all: plain hardware
    interpolation then shows no dark seams.
-   Light is what the hardware reads times a scale: scales[3] of RGB, or scales[order^2 channels]; 1 for FLOAT, and for HALF and RGB9E5
-   unless something is brighter than these hold; for BYTE the largest value.
+   Light is what the hardware reads times a scale: scales[3] of RGB, or scales[order^2 channels]; 1 for FLOAT; for HALF and RGB9E5
+   another power of two where something is brighter than these hold, or nothing as bright as 0.5; for BYTE the largest value.
    export_size: bytes that isogi_trace_export fills, 0 where the format is not for this mode. format 0 = that of the storage.
    ISOGI_INVALID where `bytes` are too few; takes a byte a texel of scratch memory. Readers: any number of threads may export. */
 ISOGI_API size_t isogi_trace_export_size(const isogi_trace *trace, int format);
@@ -371,10 +382,11 @@ ISOGI_API isogi_result isogi_trace_export_scales(const isogi_trace *trace, int f
 /* ---- save, load, merge ----
    A block of bytes holds the texels computed so far: the same bytes on every machine. Loading adds them to a texture that was created
    from the same description: so a bake is resumed, to the same bits as if it had never stopped (FEEDBACK: full bakes, of which whole
-   groups of some 65536 texels are saved), and boxes baked apart (desc.box_first) are merged by loading one after the other. Only
-   desc.isovalue_min, isovalue_max, lazy, lookup and box may differ; else the answer is ISOGI_INVALID (lighting, tables and the ranges of
-   the volume's blocks are compared by hash; a material function cannot be). Any bytes may be loaded: those that are damaged, cut off or
-   of another version are ISOGI_CORRUPT and change nothing. ISOGI_NO_MEMORY: some of the texels are loaded. isogi_trace_load counts as a
+   groups of some 65536 texels are saved), and boxes baked apart (desc.box_first) are merged by loading one after the other: PATHS to
+   the bits of the whole, FEEDBACK to what each box came to by itself. Only desc.isovalue_min, isovalue_max, lazy, lookup and box may
+   differ; else the answer is ISOGI_INVALID (lighting, tables and the ranges of the volume's blocks are compared by hash; a material
+   function cannot be). Any bytes may be loaded: those that are damaged, cut off or of another version are ISOGI_CORRUPT and change
+   nothing. ISOGI_NO_MEMORY: some of the texels are loaded. isogi_trace_load counts as a
    writer. Hierarchical textures are not saved: their size is 0, and the calls answer ISOGI_INVALID. */
 ISOGI_API size_t isogi_trace_save_size(const isogi_trace *trace);
 ISOGI_API isogi_result isogi_trace_save(const isogi_trace *trace, void *block, size_t bytes); /* bytes: isogi_trace_save_size or more */
@@ -383,7 +395,8 @@ ISOGI_API isogi_result isogi_trace_load(isogi_trace *trace, const void *block, s
 /* No lattice: irradiance at a user's own world points, each on the isosurface through it, with a unit normal each (NULL = as
    desc.normals says; towards the low side, whichever side is asked for). Uses samples, bounces, seed, offset, normals, capped, side
    (not BOTH), reach, shadows, material and lighting of the description; its mode must be IRRADIANCE. A point that is not finite or has
-   no normal gets the zero vector and error = INFINITY. error may be NULL. */
+   no normal, or on the high side no matter to look through (as texels need it: see Validity), gets the zero vector and error = INFINITY.
+   error may be NULL. */
 ISOGI_API isogi_result isogi_trace_gather(const isogi_trace_desc *desc, const float (*points)[3], const float (*normals)[3], size_t count,
                                           float (*irradiance)[3], float *error, const isogi_context *context);
 
@@ -430,8 +443,9 @@ ISOGI_API size_t isogi_trace_memory(const isogi_trace *trace); /* bytes that the
 #define ISOGI_TRACE__SIDE 4          /* texels along a brick */
 #define ISOGI_TRACE__TEXELS 64       /* in a brick */
 #define ISOGI_TRACE__WAVE 32         /* paths that are traced together */
-#define ISOGI_TRACE__TASK 4          /* texels in a task */
-#define ISOGI_TRACE__BATCH 4096      /* texels in one parallel run */
+#define ISOGI_TRACE__BATCH 4096      /* texels in one parallel run, */
+#define ISOGI_TRACE__TASKS 256       /* in at most so many tasks */
+#define ISOGI_TRACE__TASK 4          /* points of the caller's own in a task */
 #define ISOGI_TRACE__MAX_DEPTH 10000 /* of a path, so that nothing hangs */
 #define ISOGI_TRACE__MAX_ORDER 6
 #define ISOGI_TRACE__NOT_READY HUGE_VALF
@@ -443,6 +457,7 @@ ISOGI_API size_t isogi_trace_memory(const isogi_trace *trace); /* bytes that the
 #define ISOGI_TRACE__FLUSH 64      /* rays in one call */
 #define ISOGI_TRACE__SWEEP 256     /* nodes in a task that traces no rays */
 #define ISOGI_TRACE__GROUP 65536   /* texels that are worked on together, about */
+#define ISOGI_TRACE__CHUNK 2048    /* nodes that are allocated together; a power of two, and a multiple of SWEEP */
 #define ISOGI_TRACE__PROBE_MOST 8    /* samples of a probe: as many as there are hits that read it, but no more than this */
 #define ISOGI_TRACE__PROBE_ERROR 0.02 /* standard error of light from probes */
 #define ISOGI_TRACE__CELL 2.0       /* of probes that texels read, in voxels, */
@@ -1039,6 +1054,7 @@ typedef struct isogi_trace__scene {
     const isogi_volume *volume;
     uint32_t flags;
     double to_grid[9]; /* rotation and scale from world to grid */
+    double voxel[3], axis[3][3]; /* how long a voxel is along each grid axis in the world, and that axis' direction */
     isogi_trace__sky sky;
     int has_env;
     double unit; /* RGB9E5, HALF and BYTE hold irradiance in units of this power of two, about that of an open surface */
@@ -1066,6 +1082,11 @@ static void isogi_trace__scene_matrix(isogi_trace__scene *scene) {
     double reach = 0, origin[3] = {0, 0, 0};
     int a, c;
     isogi_vol_to_world(scene->pyramid, origin, origin);
+    for (a = 0; a < 3; a++) {
+        double length = sqrt(v->axes[a] * v->axes[a] + v->axes[3 + a] * v->axes[3 + a] + v->axes[6 + a] * v->axes[6 + a]);
+        scene->voxel[a] = v->spacing[a] * length;
+        for (c = 0; c < 3; c++) scene->axis[a][c] = v->axes[3 * c + a] / length;
+    }
     /* one long step along each world axis, so that a far origin costs no precision */
     for (a = 0; a < 3; a++) reach += fabs(origin[a]) + v->spacing[a];
     for (c = 0; c < 3; c++) {
@@ -1154,27 +1175,6 @@ static double isogi_trace__site_kernel(const isogi_trace__site *site, const floa
 
 /* ==== paths ========================================================================================================== */
 
-/* Paths of one site, kept in step so that their rays are traced together. Radiances are those that reach the site. */
-typedef struct isogi_trace__wave {
-    const isogi_trace__scene *scene;
-    const isogi_trace__site *site;
-    isogi_counters *counters;
-    float albedo[3], emission[3];       /* at the site's isovalue */
-    double light[ISOGI_TRACE__WAVE][3]; /* of each sample: what its path brought */
-    float *basis;                       /* TRANSFER: scratch for SH values */
-    double *transfer;                   /* TRANSFER: sum over samples, coefficients x channels */
-    int count;                          /* paths alive; the arrays below are of these */
-    int slot[ISOGI_TRACE__WAVE];
-    uint64_t key[ISOGI_TRACE__WAVE];
-    double through[ISOGI_TRACE__WAVE][3];
-    double density[ISOGI_TRACE__WAVE];   /* with which dir was drawn, times pi */
-    signed char from[ISOGI_TRACE__WAVE]; /* side on which the ray travels: 1 low, -1 high, 0 not known */
-    float dir[ISOGI_TRACE__WAVE][3];
-    isogi_hit start[ISOGI_TRACE__WAVE];
-    float shading[ISOGI_TRACE__WAVE][3], geometric[ISOGI_TRACE__WAVE][3];
-    isogi_hit hit[ISOGI_TRACE__WAVE];
-} isogi_trace__wave;
-
 /* Shadow rays of one round, gathered and traced together. */
 typedef struct isogi_trace__shadows {
     int count;
@@ -1185,15 +1185,38 @@ typedef struct isogi_trace__shadows {
     isogi_hit start[ISOGI_TRACE__WAVE], hit[ISOGI_TRACE__WAVE];
 } isogi_trace__shadows;
 
-/* Rays from the site itself; a miss has side 0. */
+/* Paths of one site, kept in step so that their rays are traced together. Radiances are those that reach the site. Too large for a
+   stack: each task has its own. */
+typedef struct isogi_trace__wave {
+    const isogi_trace__scene *scene;
+    const isogi_trace__site *site;
+    isogi_counters *counters;
+    float albedo[3], emission[3];       /* at the site's isovalue */
+    double light[ISOGI_TRACE__WAVE][3]; /* of each sample: what its path brought */
+    float basis[ISOGI_TRACE__MAX_ORDER * ISOGI_TRACE__MAX_ORDER];          /* TRANSFER: scratch for SH values */
+    double transfer[3 * ISOGI_TRACE__MAX_ORDER * ISOGI_TRACE__MAX_ORDER]; /* TRANSFER: sum over samples, coefficients x channels */
+    int count;                          /* paths alive; the arrays below are of these */
+    int slot[ISOGI_TRACE__WAVE];
+    uint64_t key[ISOGI_TRACE__WAVE];
+    double through[ISOGI_TRACE__WAVE][3];
+    double density[ISOGI_TRACE__WAVE];   /* with which dir was drawn, times pi */
+    signed char from[ISOGI_TRACE__WAVE]; /* side on which the ray travels: 1 low, -1 high, 0 not known */
+    float dir[ISOGI_TRACE__WAVE][3];
+    isogi_hit start[ISOGI_TRACE__WAVE];
+    float shading[ISOGI_TRACE__WAVE][3], geometric[ISOGI_TRACE__WAVE][3];
+    isogi_hit hit[ISOGI_TRACE__WAVE];
+    isogi_trace__shadows shadows;
+    isogi_ray ray[ISOGI_TRACE__WAVE]; /* scratch */
+} isogi_trace__wave;
+
+
+/* Rays from the site itself; a miss has side 0. rays: scratch, as many. */
 static void isogi_trace__site_rays(const isogi_trace__scene *scene, const isogi_trace__site *site, const float (*dirs)[3],
-                                   const double *tmax, size_t count, isogi_hit *hits, isogi_counters *counters) {
-    isogi_hit starts[ISOGI_TRACE__WAVE];
-    isogi_ray rays[ISOGI_TRACE__WAVE];
+                                   const double *tmax, size_t count, isogi_ray *rays, isogi_hit *hits, isogi_counters *counters) {
     size_t i;
     if (site->on_surface) {
-        for (i = 0; i < count; i++) starts[i] = site->place;
-        isogi_vol_continue(scene->pyramid, starts, dirs, tmax, site->isovalue, scene->flags, count, hits, counters);
+        for (i = 0; i < count; i++) hits[i] = site->place;
+        isogi_vol_continue(scene->pyramid, hits, dirs, tmax, site->isovalue, scene->flags, count, hits, counters);
         return;
     }
     for (i = 0; i < count; i++) {
@@ -1213,7 +1236,8 @@ static void isogi_trace__shadows_flush(isogi_trace__wave *w, isogi_trace__shadow
     if (w->scene->desc.no_shadows) {
         for (i = 0; i < s->count; i++) s->hit[i].side = 0;
     } else if (!depth) {
-        isogi_trace__site_rays(w->scene, w->site, (const float(*)[3])s->dir, s->tmax, (size_t)s->count, s->hit, w->counters);
+        isogi_trace__site_rays(w->scene, w->site, (const float(*)[3])s->dir, s->tmax, (size_t)s->count, w->ray, s->hit,
+                                w->counters);
     } else {
         for (i = 0; i < s->count; i++) s->start[i] = w->start[s->path[i]];
         isogi_vol_continue(w->scene->pyramid, s->start, (const float(*)[3])s->dir, s->tmax, w->site->isovalue, w->scene->flags,
@@ -1393,8 +1417,7 @@ static void isogi_trace__wave_run(isogi_trace__wave *w, int first, int count) {
     const isogi_trace__scene *scene = w->scene;
     int lit = scene->desc.mode == ISOGI_TRACE_IRRADIANCE, depth, i;
     float positions[ISOGI_TRACE__WAVE][3];
-    isogi_trace__shadows shadows;
-    shadows.count = 0;
+    w->shadows.count = 0;
     isogi_trace__wave_begin(w, first, count);
     for (depth = 0; w->count; depth++) {
         int alive = 0;
@@ -1405,10 +1428,10 @@ static void isogi_trace__wave_run(isogi_trace__wave *w, int first, int count) {
                 isogi_vol_positions(scene->pyramid, w->start, (size_t)w->count, positions);
             isogi_trace__wave_scatter(w, depth);
         }
-        if (lit) isogi_trace__wave_lights(w, &shadows, depth, positions);
-        if (lit) isogi_trace__wave_sky(w, &shadows, depth);
+        if (lit) isogi_trace__wave_lights(w, &w->shadows, depth, positions);
+        if (lit) isogi_trace__wave_sky(w, &w->shadows, depth);
         if (!depth)
-            isogi_trace__site_rays(scene, w->site, (const float(*)[3])w->dir, scene->reach, (size_t)w->count, w->hit, w->counters);
+            isogi_trace__site_rays(scene, w->site, (const float(*)[3])w->dir, scene->reach, (size_t)w->count, w->ray, w->hit, w->counters);
         else
             isogi_vol_continue(scene->pyramid, w->start, (const float(*)[3])w->dir, scene->reach, w->site->isovalue, scene->flags,
                                (size_t)w->count, w->hit, w->counters);
@@ -1430,6 +1453,7 @@ static void isogi_trace__site_lights(const isogi_trace__scene *scene, const isog
     int c;
     for (l = 0; l < lighting->light_count; l++) {
         isogi_trace__beam beam;
+        isogi_ray ray;
         isogi_hit hit;
         double cosine;
         if (!isogi_trace__is_delta(&lighting->lights[l])) continue;
@@ -1438,7 +1462,7 @@ static void isogi_trace__site_lights(const isogi_trace__scene *scene, const isog
         if (!(cosine > 0)) continue;
         beam.tmax = isogi_trace__within(scene, beam.tmax), hit.side = 0;
         if (!scene->desc.no_shadows)
-            isogi_trace__site_rays(scene, site, (const float(*)[3]) & beam.dir, &beam.tmax, 1, &hit, counters);
+            isogi_trace__site_rays(scene, site, (const float(*)[3]) & beam.dir, &beam.tmax, 1, &ray, &hit, counters);
         for (c = 0; c < 3 && !hit.side; c++) rgb[c] += beam.rgb[c] * cosine;
     }
 }
@@ -1459,26 +1483,23 @@ static double isogi_trace__unseen(double possible, double met, double n) {
 
 /* Computes one site: values[3] (RGB irradiance) or values[order*order*channels], and the standard error of the luminance (TRANSFER:
    1 / sqrt(samples), from which isogi_trace__variance works it out under the lighting). */
-static void isogi_trace__gather_site(const isogi_trace__scene *scene, const isogi_trace__site *site, float *values,
-                                     float *error, isogi_counters *counters) {
+static void isogi_trace__gather_site(const isogi_trace__scene *scene, const isogi_trace__site *site, isogi_trace__wave *wave,
+                                     float *values, float *error, isogi_counters *counters) {
     const isogi_trace_desc *desc = &scene->desc;
-    isogi_trace__wave wave;
-    float basis[ISOGI_TRACE__MAX_ORDER * ISOGI_TRACE__MAX_ORDER];
-    double transfer[3 * ISOGI_TRACE__MAX_ORDER * ISOGI_TRACE__MAX_ORDER], sum[3] = {0, 0, 0}, mean = 0, square = 0,
-                                                                          direct[3] = {0, 0, 0};
+    double sum[3] = {0, 0, 0}, mean = 0, square = 0, direct[3] = {0, 0, 0};
     int coefficients = desc->order * desc->order * desc->transfer_channels, first, i, c;
-    wave.scene = scene, wave.site = site, wave.counters = counters, wave.basis = basis, wave.transfer = transfer;
-    memset(transfer, 0, sizeof transfer);
-    isogi_trace_material(desc, site->isovalue, NULL, wave.albedo, wave.emission);
+    wave->scene = scene, wave->site = site, wave->counters = counters;
+    memset(wave->transfer, 0, sizeof wave->transfer);
+    isogi_trace_material(desc, site->isovalue, NULL, wave->albedo, wave->emission);
     for (first = 0; first < desc->samples && !isogi_trace__dark(scene); first += ISOGI_TRACE__WAVE) {
         int count = desc->samples - first < ISOGI_TRACE__WAVE ? desc->samples - first : ISOGI_TRACE__WAVE;
-        isogi_trace__wave_run(&wave, first, count);
+        isogi_trace__wave_run(wave, first, count);
         for (i = 0; i < count; i++) {
             /* Welford's running variance: no cancellation */
-            double luminance = isogi_trace__luminance(wave.light[i]), before = luminance - mean;
+            double luminance = isogi_trace__luminance(wave->light[i]), before = luminance - mean;
             mean += before / (first + i + 1);
             square += before * (luminance - mean);
-            for (c = 0; c < 3; c++) sum[c] += wave.light[i][c];
+            for (c = 0; c < 3; c++) sum[c] += wave->light[i][c];
         }
     }
     square *= ISOGI_TRACE__PI * ISOGI_TRACE__PI / ((double)desc->samples * (desc->samples > 1 ? desc->samples - 1 : 1));
@@ -1486,7 +1507,7 @@ static void isogi_trace__gather_site(const isogi_trace__scene *scene, const isog
         : ISOGI_TRACE__NOT_READY;
     if (desc->samples > 1 && desc->mode == ISOGI_TRACE_TRANSFER) *error = (float)(1 / sqrt((double)desc->samples));
     if (desc->mode == ISOGI_TRACE_TRANSFER) {
-        for (i = 0; i < coefficients; i++) values[i] = (float)(ISOGI_TRACE__PI * transfer[i] / desc->samples);
+        for (i = 0; i < coefficients; i++) values[i] = (float)(ISOGI_TRACE__PI * wave->transfer[i] / desc->samples);
         return;
     }
     isogi_trace__site_lights(scene, site, direct, counters);
@@ -1679,6 +1700,7 @@ static isogi_result isogi_trace__open_light(isogi_trace__scene *scene) {
         glow = isogi_trace__luminance(rgb);
         if (glow > scene->possible) scene->possible = glow;
     }
+    if (!(scene->open_light > 0)) scene->open_light = scene->possible; /* glows are all the light that there is */
     return result;
 }
 
@@ -1759,13 +1781,15 @@ struct isogi_trace {
     size_t queue_first, queue_count, queue_capacity;
     uint64_t wanted, done;
     isogi_trace__ref *batch;
+    isogi_trace__wave *waves; /* PATHS: of tasks */
     isogi_counters *task_counters;
     isogi_counters counters;
     float light[3 * ISOGI_TRACE__MAX_ORDER * ISOGI_TRACE__MAX_ORDER]; /* TRANSFER: of the lighting, RGB interleaved */
     float square[3 * ISOGI_TRACE__MAX_ORDER * ISOGI_TRACE__MAX_ORDER]; /* TRANSFER: of the lighting's square, for the error */
     isogi_trace *high; /* BOTH_SIDES: the other side's texture, owned */
     isogi_trace *coarse; /* hierarchy: the texture of every second texel, owned */
-    int refined;         /* the cells in which it is not enough are wanted */
+    int refined;         /* the cells in which it is not enough are wanted, */
+    size_t refine_next;  /* as far as to this one */
     struct isogi_trace__feedback *feedback; /* NULL: paths are traced */
     double share[2];   /* of the progress that baking reports, from and to */
     uint64_t lighting_hash, colours_hash; /* of what the light was gathered under: borrowed arrays may change in place */
@@ -1850,7 +1874,8 @@ static void isogi_trace__from_rgb9e5(uint32_t packed, float rgb[3]) {
 /* The upper half of a float that is no less: errors are not understated. */
 static uint32_t isogi_trace__to_short(float x) {
     uint32_t bits = isogi_trace__float_bits(x);
-    return bits >= 0x7f800000u ? 0x7f80u : (bits + 0xffffu) >> 16; /* neither NaN nor negative occur; the largest float rounds to infinity */
+    return bits >= 0x7f800000u ? 0x7f80u : (bits + 0xffffu) >> 16; /* neither NaN nor negative occur;
+                                                                      the largest float rounds to infinity */
 }
 
 static size_t isogi_trace__bits(uint64_t x) {
@@ -2032,14 +2057,14 @@ static int isogi_trace__in_box(const isogi_trace *t, const size_t texel[3]) {
     return 1;
 }
 
-/* Up to TEXELS texels: not asked for, without a surface, or wanted. */
-static void isogi_trace__classify_texels(const isogi_trace *t, const size_t (*texels)[3], size_t count, uint8_t *state) {
+/* Up to TEXELS texels: not asked for, without a surface, or wanted. any: whatever the interval of isovalues. */
+static void isogi_trace__classify_texels(const isogi_trace *t, const size_t (*texels)[3], size_t count, int any, uint8_t *state) {
     size_t asked[ISOGI_TRACE__TEXELS][3], i, n = 0;
     isogi_trace__site site[ISOGI_TRACE__TEXELS];
     uint8_t valid[ISOGI_TRACE__TEXELS];
     for (i = 0; i < count; i++) {
         state[i] = ISOGI_TRACE__NOT_ASKED;
-        if (!isogi_trace__in_box(t, texels[i]) || !isogi_trace__in_range(t, texels[i], texels[i])) continue;
+        if (!isogi_trace__in_box(t, texels[i]) || !(any || isogi_trace__in_range(t, texels[i], texels[i]))) continue;
         state[i] = ISOGI_TRACE__UNKNOWN;
         memcpy(asked[n++], texels[i], sizeof asked[0]);
     }
@@ -2048,9 +2073,9 @@ static void isogi_trace__classify_texels(const isogi_trace *t, const size_t (*te
         if (state[i] == ISOGI_TRACE__UNKNOWN) state[i] = valid[n++] ? ISOGI_TRACE__WANTED : ISOGI_TRACE__NO_SURFACE;
 }
 
-static int isogi_trace__classify(const isogi_trace *t, const size_t texel[3]) {
+static int isogi_trace__classify(const isogi_trace *t, const size_t texel[3], int any) {
     uint8_t state;
-    isogi_trace__classify_texels(t, (const size_t(*)[3])texel, 1, &state);
+    isogi_trace__classify_texels(t, (const size_t(*)[3])texel, 1, any, &state);
     return state;
 }
 
@@ -2134,7 +2159,7 @@ static void isogi_trace__classify_task(void *arg, size_t i) {
         brick->state[slot] = (uint8_t)(inside ? ISOGI_TRACE__UNKNOWN : ISOGI_TRACE__NOT_ASKED);
         n += inside ? 1 : 0;
     }
-    isogi_trace__classify_texels(t, (const size_t(*)[3])texel, n, state);
+    isogi_trace__classify_texels(t, (const size_t(*)[3])texel, n, 0, state);
     for (slot = n = 0; slot < ISOGI_TRACE__TEXELS; slot++)
         if (brick->state[slot] == ISOGI_TRACE__UNKNOWN) brick->state[slot] = state[n++];
 }
@@ -2241,10 +2266,11 @@ static isogi_result isogi_trace__set_up(isogi_trace *t, const isogi_trace_desc *
     t->format = (int)t->scene.desc.storage, t->record = isogi_trace__record_size(t);
     t->bricks = (isogi_trace__brick **)isogi_allocate(&t->context, t->brick_count, sizeof *t->bricks);
     t->batch = (isogi_trace__ref *)isogi_allocate(&t->context, ISOGI_TRACE__BATCH, sizeof *t->batch);
-    t->task_counters =
-        (isogi_counters *)isogi_allocate(&t->context, ISOGI_TRACE__BATCH / ISOGI_TRACE__TASK, sizeof *t->task_counters);
+    t->task_counters = (isogi_counters *)isogi_allocate(&t->context, ISOGI_TRACE__TASKS, sizeof *t->task_counters);
+    if (desc->method == ISOGI_TRACE_PATHS)
+        t->waves = (isogi_trace__wave *)isogi_allocate(&t->context, ISOGI_TRACE__TASKS, sizeof *t->waves);
     if (t->bricks) memset(t->bricks, 0, t->brick_count * sizeof *t->bricks);
-    if (!t->bricks || !t->batch || !t->task_counters) return ISOGI_NO_MEMORY;
+    if (!t->bricks || !t->batch || !t->task_counters || (desc->method == ISOGI_TRACE_PATHS && !t->waves)) return ISOGI_NO_MEMORY;
     if (desc->mode == ISOGI_TRACE_TRANSFER) {
         result = isogi_sh_project(light, t->scene.desc.order, &t->scene.desc.lighting, NULL);
         if (result != ISOGI_OK) return result;
@@ -2318,7 +2344,8 @@ ISOGI_API void isogi_trace_free(isogi_trace *trace) {
     isogi_release(&context, trace->bricks, trace->brick_count, sizeof *trace->bricks);
     isogi_release(&context, trace->queue, trace->queue_capacity, sizeof *trace->queue);
     isogi_release(&context, trace->batch, ISOGI_TRACE__BATCH, sizeof *trace->batch);
-    isogi_release(&context, trace->task_counters, ISOGI_TRACE__BATCH / ISOGI_TRACE__TASK, sizeof *trace->task_counters);
+    isogi_release(&context, trace->task_counters, ISOGI_TRACE__TASKS, sizeof *trace->task_counters);
+    isogi_release(&context, trace->waves, ISOGI_TRACE__TASKS, sizeof *trace->waves);
     isogi_trace__feedback_free(trace);
     isogi_trace__sky_free(&trace->scene.sky, &context);
     isogi_release(&context, trace, 1, sizeof *trace);
@@ -2445,11 +2472,13 @@ static int isogi_trace__taps(const isogi_trace *t, const float point[3], isogi_t
         const isogi_trace__brick *brick;
         uint32_t slot;
         double w = 1;
+        int state;
         if (i < taps) {
             w = isogi_trace__tap(t, cell, local, i, texel);
             if (!(w > 0)) continue;
-            if (isogi_trace__state(t, texel) < ISOGI_TRACE__DRAFT) {
-                pending |= isogi_trace__state(t, texel) != ISOGI_TRACE__NO_SURFACE;
+            state = isogi_trace__state(t, texel);
+            if (state < ISOGI_TRACE__DRAFT) { /* nobody will ask for what lies beyond the box of a bake that is not lazy */
+                pending |= state != ISOGI_TRACE__NO_SURFACE && (state != ISOGI_TRACE__NOT_ASKED || t->scene.desc.lazy);
                 continue;
             }
         } else if (t->coarse && pending) return isogi_trace__taps(t->coarse, point, r); /* not a cell of the fine level */
@@ -2646,8 +2675,9 @@ static void isogi_trace__learn(isogi_trace *t, isogi_trace__brick *brick, uint32
     t->counters.texels_skipped += state == ISOGI_TRACE__NO_SURFACE;
 }
 
-/* Classifies a texel and puts it on the list if it is to be computed. */
-static isogi_result isogi_trace__want(isogi_trace *t, const size_t texel[3], int classify_only) {
+/* Classifies a texel and puts it on the list if it is to be computed. nearest: it is only looked at, whatever the interval of
+   isovalues. */
+static isogi_result isogi_trace__want(isogi_trace *t, const size_t texel[3], int nearest) {
     uint32_t slot;
     size_t index = isogi_trace__brick_of(t, texel, &slot);
     isogi_trace__brick *brick = t->bricks[index];
@@ -2655,8 +2685,9 @@ static isogi_result isogi_trace__want(isogi_trace *t, const size_t texel[3], int
     if (result != ISOGI_OK) return result;
     if (!brick) brick = t->bricks[index] = isogi_trace__brick_new(t);
     if (!brick) return ISOGI_NO_MEMORY;
-    if (brick->state[slot] == ISOGI_TRACE__UNKNOWN) isogi_trace__learn(t, brick, slot, isogi_trace__classify(t, texel));
-    if (classify_only || brick->state[slot] != ISOGI_TRACE__READABLE) return ISOGI_OK;
+    if (brick->state[slot] == ISOGI_TRACE__UNKNOWN || (nearest && brick->state[slot] == ISOGI_TRACE__NOT_ASKED))
+        isogi_trace__learn(t, brick, slot, isogi_trace__classify(t, texel, nearest));
+    if (nearest || brick->state[slot] != ISOGI_TRACE__READABLE) return ISOGI_OK;
     brick->state[slot] = ISOGI_TRACE__WANTED;
     t->wanted++;
     if (!brick->queued) t->queue[t->queue_count++] = index, brick->queued = 1;
@@ -2684,7 +2715,7 @@ static isogi_result isogi_trace__want_nearest(isogi_trace *t, const size_t cell[
 
 typedef struct isogi_trace__job {
     isogi_trace *trace;
-    size_t first, count;
+    size_t first, count, each; /* each: texels of a task */
 } isogi_trace__job;
 
 /* What the next pixel will mostly ask for again: a cell all of whose texels have been seen to. Not on its faces, where a lookup reads
@@ -2701,7 +2732,7 @@ static void isogi_trace__learn_task(void *arg, size_t task) {
               texel[ISOGI_TRACE__TEXELS][3];
     uint8_t state[ISOGI_TRACE__TEXELS];
     for (i = 0; i < count; i++) memcpy(texel[i], ref[i].texel, sizeof texel[i]);
-    isogi_trace__classify_texels(job->trace, (const size_t(*)[3])texel, count, state);
+    isogi_trace__classify_texels(job->trace, (const size_t(*)[3])texel, count, 0, state);
     for (i = 0; i < count; i++) ref[i].brick->state[ref[i].slot] = state[i]; /* each by one task alone */
 }
 
@@ -2787,7 +2818,7 @@ static void isogi_trace__bake_task(void *arg, size_t task) {
     const isogi_trace__job *job = (const isogi_trace__job *)arg;
     isogi_trace *t = job->trace;
     isogi_counters *counters = &t->task_counters[task];
-    size_t i = task * ISOGI_TRACE__TASK, end = i + ISOGI_TRACE__TASK < job->count ? i + ISOGI_TRACE__TASK : job->count;
+    size_t i = task * job->each, end = i + job->each < job->count ? i + job->each : job->count;
     memset(counters, 0, sizeof *counters);
     for (; i < end; i++) {
         const isogi_trace__ref *ref = &t->batch[i];
@@ -2804,7 +2835,7 @@ static void isogi_trace__bake_task(void *arg, size_t task) {
                                     (uint64_t)x[0] +
                                         (uint64_t)t->lattice[0] * ((uint64_t)x[1] + (uint64_t)t->lattice[1] * (uint64_t)x[2]));
         isogi_trace__site_start(&t->scene, &site);
-        isogi_trace__gather_site(&t->scene, &site, values, &error, counters);
+        isogi_trace__gather_site(&t->scene, &site, &t->waves[task], values, &error, counters);
         isogi_trace__record_write(t, isogi_trace__record(t, ref->brick, ref->slot), values, error);
         ref->brick->state[ref->slot] = ISOGI_TRACE__DONE;
         counters->texels++;
@@ -2853,9 +2884,9 @@ static void isogi_trace__queue_advance(isogi_trace *t) {
 static isogi_result isogi_trace__bake_batch(isogi_trace *t, size_t count) {
     isogi_trace__job job;
     uint64_t total = t->wanted + t->done, before = t->counters.texels;
-    size_t tasks = (count + ISOGI_TRACE__TASK - 1) / ISOGI_TRACE__TASK, i;
+    size_t each = (count + ISOGI_TRACE__TASKS - 1) / ISOGI_TRACE__TASKS, tasks = (count + each - 1) / each, i;
     isogi_result result;
-    job.trace = t, job.first = 0, job.count = count;
+    job.trace = t, job.first = 0, job.count = count, job.each = each;
     memset(t->task_counters, 0, tasks * sizeof *t->task_counters);
     result = isogi_parallel(&t->context, tasks, isogi_trace__bake_task, &job,
                             isogi_trace__lerp(t->share[0], t->share[1], (double)t->done / (double)total),
@@ -2875,11 +2906,13 @@ static isogi_result isogi_trace__bake_batch(isogi_trace *t, size_t count) {
 
 /* What is gathered at one point: a texel (brick set) or a probe. Sums are over samples, in units of irradiance / pi but for light. */
 typedef struct isogi_trace__node {
-    double isovalue; /* first what is read where a probe is looked for */
+    uint64_t cell;   /* probe: key of its cell; first what is read where a probe is looked for */
+    uint32_t next;   /* probe: number + 1 of the next one in its chain */
     float alike;     /* probe: tells the light of isovalues that differ from its own by less than this */
+    double isovalue;
     float normal[3];
     isogi_hit place; /* where */
-    uint64_t key;    /* probe: of its cell */
+    uint64_t key;    /* probe: of its random numbers */
     isogi_trace__brick *brick;
     size_t texel[3];
     uint32_t slot, samples, light_samples, hits;
@@ -2912,13 +2945,29 @@ typedef struct isogi_trace__guide {
     float hidden, reflected; /* share of rays that hit, and luminance of what was reflected there */
 } isogi_trace__guide;
 
-/* Texels, or probes. direct: sums over rays that escaped; bounce: of texels over rays that hit, of probes what comes from sky and lights;
-   out: irradiance or transfer. */
-typedef struct isogi_trace__set {
+/* Nodes that stay where they are once they are made. values: their four kinds (below), one after the other. heads: where chains of probes
+   begin, number + 1, 0 = nowhere; NULL of texels. */
+typedef struct isogi_trace__chunk {
+    float *values;
     isogi_trace__node *nodes;
-    float *direct, *bounce, *out[2];
-    isogi_trace__guide *guide;
-    size_t count, capacity;
+    isogi_trace__guide *guides;
+    uint32_t *heads;
+} isogi_trace__chunk;
+
+/* What a node's values are. DIRECT: sums over rays that escaped; BOUNCE: of texels over rays that hit, of probes what comes from sky and
+   lights; OUT, and the one after it: irradiance or transfer. */
+enum {
+    ISOGI_TRACE__DIRECT_VALUES = 0,
+    ISOGI_TRACE__BOUNCE_VALUES,
+    ISOGI_TRACE__OUT_VALUES,
+    ISOGI_TRACE__KINDS = 4
+};
+
+/* Texels, or probes. */
+typedef struct isogi_trace__set {
+    isogi_trace__chunk *chunks;
+    size_t count, chunk_count, chunk_capacity;
+    int out; /* 0 or 1: where the light is that was worked out last */
     isogi_trace__segment *segments;
     size_t segment_count, segment_capacity;
 } isogi_trace__set;
@@ -2938,22 +2987,17 @@ typedef struct isogi_trace__catch {
     signed char from;
 } isogi_trace__catch;
 
-typedef struct isogi_trace__slot {
-    uint64_t key;
-    uint32_t probe; /* number + 1; 0 = empty */
-} isogi_trace__slot;
-
 struct isogi_trace__feedback {
     isogi_trace__set texels, probes;
-    isogi_trace__slot *table;
-    size_t table_size; /* a power of two */
     isogi_trace__span *spans;
     isogi_trace__catch *catches;
+    struct isogi_trace__cast *casts; /* of tasks */
     float *direct; /* of spans */
     uint32_t *task;
     size_t span_count, sample_count, task_count;
     size_t cursor, probe_cursor; /* nodes before these have nothing to do at this level */
-    size_t probe_end;            /* of the generation of probes at work: later ones were made by its rays */
+    size_t probe_end;            /* of the generation of probes at work: later ones were made by its rays, */
+    size_t probe_counted;        /* of which those before this one know how many samples they want */
     int level;
     int on_probes; /* the batch is of probes */
     int diverges;   /* the last passes did not settle */
@@ -2962,55 +3006,121 @@ struct isogi_trace__feedback {
     size_t carried;  /* tasks of it that are done, */
     size_t segment, pass; /* texels' segment, pass over the probes */
     double before, middle; /* largest change by the pass before, and 500 passes before */
+    int making;      /* nodes: 1 of every other texel along each axis, 2 of the others; 0 when they are made */
+    size_t made, made_bricks, made_texels; /* of the queue: bricks that are done, bricks and texels to do */
     size_t placed;   /* texels before this one know where they lie */
+    size_t open;     /* texels that want more samples than they have at the end of a level */
     uint64_t partial; /* samples of texels that are not finished */
     uint64_t probes_before; /* of groups of texels that are finished */
     double least;   /* what isogi_trace_step reported last */
 };
 
+/* When a block of samples is complete the light at probes is worked out, then that of the texels. That takes no rays, but as long as many:
+   it is cut into tasks, each of which counts as the rays that take about as long. */
+enum {
+    ISOGI_TRACE__AT_REST = 0,
+    ISOGI_TRACE__DIRECT,
+    ISOGI_TRACE__PASS,
+    ISOGI_TRACE__CLEAR,
+    ISOGI_TRACE__BOUNCE,
+    ISOGI_TRACE__GUIDE,
+    ISOGI_TRACE__PUBLISH,
+    ISOGI_TRACE__FINISH,
+    ISOGI_TRACE__FORGET /* only when all texels are finished */
+};
+
+/* Rays of a task, gathered so that they are traced together. Too large for a stack: each task has its own. */
+typedef struct isogi_trace__cast {
+    isogi_trace *trace;
+    isogi_counters *counters;
+    isogi_trace__span *span; /* of this task */
+    isogi_trace__site site[ISOGI_TRACE__TASK_SPANS];
+    uint64_t sequence[ISOGI_TRACE__TASK_SPANS];
+    double sum[ISOGI_TRACE__TASK_SPANS], square[ISOGI_TRACE__TASK_SPANS]; /* of luminance by one light */
+    int shadow; /* rays towards lights; else cosine-distributed ones */
+    int bright; /* the light is the sky */
+    int count;
+    isogi_ray ray[ISOGI_TRACE__FLUSH];
+    isogi_hit hit[ISOGI_TRACE__FLUSH];
+    uint8_t blocked[ISOGI_TRACE__FLUSH]; /* shadow: in place of the hits */
+    float normal[ISOGI_TRACE__FLUSH][3];
+    uint32_t owner[ISOGI_TRACE__FLUSH], sample[ISOGI_TRACE__FLUSH];
+    double weight[ISOGI_TRACE__FLUSH]; /* pi times the density of cosine-distributed rays; of the sky's radiance, for those drawn by it */
+    double rgb[ISOGI_TRACE__FLUSH][3]; /* shadow: what arrives if nothing is in the way */
+} isogi_trace__cast;
+
 /* ---- memory ---- */
 
+static isogi_trace__node *isogi_trace__node_at(const isogi_trace__set *s, size_t i) {
+    return &s->chunks[i / ISOGI_TRACE__CHUNK].nodes[i % ISOGI_TRACE__CHUNK];
+}
+
+static isogi_trace__guide *isogi_trace__guide_at(const isogi_trace__set *s, size_t i) {
+    return &s->chunks[i / ISOGI_TRACE__CHUNK].guides[i % ISOGI_TRACE__CHUNK];
+}
+
+/* v: values of a node. */
+static float *isogi_trace__values_at(const isogi_trace__set *s, size_t i, int kind, size_t v) {
+    return s->chunks[i / ISOGI_TRACE__CHUNK].values + ((size_t)kind * ISOGI_TRACE__CHUNK + i % ISOGI_TRACE__CHUNK) * v;
+}
+
+/* The light that was worked out last. */
+static float *isogi_trace__light_at(const isogi_trace__set *s, size_t i, size_t v) {
+    return isogi_trace__values_at(s, i, ISOGI_TRACE__OUT_VALUES + s->out, v);
+}
+
+static void isogi_trace__chunk_free(const isogi_trace *t, isogi_trace__chunk *c) {
+    isogi_release(&t->context, c->nodes, ISOGI_TRACE__CHUNK, sizeof *c->nodes);
+    isogi_release(&t->context, c->guides, ISOGI_TRACE__CHUNK, sizeof *c->guides);
+    isogi_release(&t->context, c->values, (size_t)ISOGI_TRACE__KINDS * ISOGI_TRACE__CHUNK, (size_t)t->values * sizeof(float));
+    isogi_release(&t->context, c->heads, ISOGI_TRACE__CHUNK, sizeof *c->heads);
+}
+
+static void isogi_trace__segment_free(const isogi_trace *t, isogi_trace__segment *s) {
+    isogi_release(&t->context, s->node, 2 * s->entries + 1 + s->hits, sizeof(uint32_t));
+}
+
 static void isogi_trace__set_free(const isogi_trace *t, isogi_trace__set *s) {
-    size_t v = (size_t)t->values;
     size_t i;
-    for (i = 0; i < s->segment_count; i++)
-        isogi_release(&t->context, s->segments[i].node, 2 * s->segments[i].entries + 1 + s->segments[i].hits, sizeof(uint32_t));
+    for (i = 0; i < s->segment_count; i++) isogi_trace__segment_free(t, &s->segments[i]);
     isogi_release(&t->context, s->segments, s->segment_capacity, sizeof *s->segments);
-    isogi_release(&t->context, s->nodes, s->capacity, sizeof *s->nodes);
-    isogi_release(&t->context, s->direct, s->capacity * v, 4 * sizeof(float));
-    isogi_release(&t->context, s->guide, s->capacity, sizeof *s->guide);
+    for (i = 0; i < s->chunk_count; i++) isogi_trace__chunk_free(t, &s->chunks[i]);
+    isogi_release(&t->context, s->chunks, s->chunk_capacity, sizeof *s->chunks);
     memset(s, 0, sizeof *s);
 }
 
-/* Room for `more` nodes. The four arrays of values are one block. */
-static isogi_result isogi_trace__set_reserve(const isogi_trace *t, isogi_trace__set *s, size_t more) {
-    isogi_trace__set n = *s;
-    size_t v = (size_t)t->values, k;
-    if (s->count + more <= s->capacity) return ISOGI_OK;
-    n.capacity = s->count + more > 2 * s->capacity ? s->count + more : 2 * s->capacity;
-    if (n.capacity < 1024) n.capacity = 1024;
-    if (n.capacity > 0xfffffffeu) return ISOGI_TOO_LARGE;
-    n.nodes = (isogi_trace__node *)isogi_allocate(&t->context, n.capacity, sizeof *n.nodes);
-    n.direct = (float *)isogi_allocate(&t->context, n.capacity * v, 4 * sizeof(float));
-    n.guide = (isogi_trace__guide *)isogi_allocate(&t->context, n.capacity, sizeof *n.guide);
-    if (!n.nodes || !n.direct || !n.guide) {
-        isogi_release(&t->context, n.nodes, n.capacity, sizeof *n.nodes);
-        isogi_release(&t->context, n.direct, n.capacity * v, 4 * sizeof(float));
-        isogi_release(&t->context, n.guide, n.capacity, sizeof *n.guide);
-        return ISOGI_NO_MEMORY;
+/* Room for one more chunk in the list. */
+static isogi_result isogi_trace__chunks_reserve(const isogi_trace *t, isogi_trace__set *s) {
+    size_t capacity = s->chunk_capacity ? 2 * s->chunk_capacity : 16;
+    isogi_trace__chunk *chunks;
+    if (s->chunk_count < s->chunk_capacity) return ISOGI_OK;
+    chunks = (isogi_trace__chunk *)isogi_allocate(&t->context, capacity, sizeof *chunks);
+    if (!chunks) return ISOGI_NO_MEMORY;
+    if (s->chunk_count) memcpy(chunks, s->chunks, s->chunk_count * sizeof *chunks);
+    isogi_release(&t->context, s->chunks, s->chunk_capacity, sizeof *chunks);
+    s->chunks = chunks, s->chunk_capacity = capacity;
+    return ISOGI_OK;
+}
+
+static void isogi_trace__heads_new(isogi_trace__set *s);
+
+/* Room for `more` nodes; those that there are stay in their places. chains: they are probes. */
+static isogi_result isogi_trace__set_reserve(const isogi_trace *t, isogi_trace__set *s, size_t more, int chains) {
+    while (s->count + more > s->chunk_count * ISOGI_TRACE__CHUNK) {
+        isogi_trace__chunk c;
+        if (s->chunk_count >= 0xffffffffu / ISOGI_TRACE__CHUNK) return ISOGI_TOO_LARGE;
+        if (isogi_trace__chunks_reserve(t, s) != ISOGI_OK) return ISOGI_NO_MEMORY;
+        c.nodes = (isogi_trace__node *)isogi_allocate(&t->context, ISOGI_TRACE__CHUNK, sizeof *c.nodes);
+        c.guides = (isogi_trace__guide *)isogi_allocate(&t->context, ISOGI_TRACE__CHUNK, sizeof *c.guides);
+        c.values = (float *)isogi_allocate(&t->context, (size_t)ISOGI_TRACE__KINDS * ISOGI_TRACE__CHUNK, (size_t)t->values * sizeof(float));
+        c.heads = chains ? (uint32_t *)isogi_allocate(&t->context, ISOGI_TRACE__CHUNK, sizeof *c.heads) : NULL;
+        if (!c.nodes || !c.guides || !c.values || (chains && !c.heads)) {
+            isogi_trace__chunk_free(t, &c);
+            return ISOGI_NO_MEMORY;
+        }
+        s->chunks[s->chunk_count++] = c;
+        if (chains) isogi_trace__heads_new(s);
     }
-    n.bounce = n.direct + n.capacity * v, n.out[0] = n.bounce + n.capacity * v, n.out[1] = n.out[0] + n.capacity * v;
-    if (s->count) {
-        memcpy(n.nodes, s->nodes, s->count * sizeof *n.nodes);
-        memcpy(n.guide, s->guide, s->count * sizeof *n.guide);
-        memcpy(n.direct, s->direct, s->count * v * sizeof(float));
-        memcpy(n.bounce, s->bounce, s->count * v * sizeof(float));
-        for (k = 0; k < 2; k++) memcpy(n.out[k], s->out[k], s->count * v * sizeof(float));
-    }
-    isogi_release(&t->context, s->nodes, s->capacity, sizeof *s->nodes);
-    isogi_release(&t->context, s->direct, s->capacity * v, 4 * sizeof(float));
-    isogi_release(&t->context, s->guide, s->capacity, sizeof *s->guide);
-    *s = n;
     return ISOGI_OK;
 }
 
@@ -3019,9 +3129,9 @@ static void isogi_trace__feedback_free(const isogi_trace *t) {
     if (!f) return;
     isogi_trace__set_free(t, &f->texels);
     isogi_trace__set_free(t, &f->probes);
-    isogi_release(&t->context, f->table, f->table_size, sizeof *f->table);
     isogi_release(&t->context, f->spans, ISOGI_TRACE__SPANS, sizeof *f->spans);
     isogi_release(&t->context, f->catches, ISOGI_TRACE__SAMPLES, sizeof *f->catches);
+    isogi_release(&t->context, f->casts, ISOGI_TRACE__TASKS, sizeof *f->casts);
     isogi_release(&t->context, f->direct, ISOGI_TRACE__SPANS, (size_t)t->values * sizeof(float));
     isogi_release(&t->context, f->task, ISOGI_TRACE__SPANS + 1, sizeof *f->task);
     isogi_release(&t->context, f, 1, sizeof *f);
@@ -3032,14 +3142,12 @@ static isogi_result isogi_trace__feedback_new(isogi_trace *t) {
     t->feedback = f;
     if (!f) return ISOGI_NO_MEMORY;
     memset(f, 0, sizeof *f);
-    f->table_size = 4096;
-    f->table = (isogi_trace__slot *)isogi_allocate(&t->context, f->table_size, sizeof *f->table);
     f->spans = (isogi_trace__span *)isogi_allocate(&t->context, ISOGI_TRACE__SPANS, sizeof *f->spans);
     f->catches = (isogi_trace__catch *)isogi_allocate(&t->context, ISOGI_TRACE__SAMPLES, sizeof *f->catches);
+    f->casts = (isogi_trace__cast *)isogi_allocate(&t->context, ISOGI_TRACE__TASKS, sizeof *f->casts);
     f->direct = (float *)isogi_allocate(&t->context, ISOGI_TRACE__SPANS, (size_t)t->values * sizeof(float));
     f->task = (uint32_t *)isogi_allocate(&t->context, ISOGI_TRACE__SPANS + 1, sizeof *f->task);
-    if (f->table) memset(f->table, 0, f->table_size * sizeof *f->table);
-    return f->table && f->spans && f->catches && f->direct && f->task ? ISOGI_OK : ISOGI_NO_MEMORY;
+    return f->spans && f->catches && f->casts && f->direct && f->task ? ISOGI_OK : ISOGI_NO_MEMORY;
 }
 
 /* ---- the table of probes ---- */
@@ -3061,23 +3169,23 @@ static uint64_t isogi_trace__class(const isogi_trace__scene *scene, const double
 
 /* Cells of 2 voxels, of 4 for rays longer than 16 voxels, and so on: an eighth of the length at most. Rays of probes, whose light
    matters less, take half of their length up to `cell` voxels; no more, or what stands beside a narrow gap would light it. In units of
-   the smallest spacing, so that they are cubes in the world, but half a voxel along every axis at least: flat or long voxels would be
+   the shortest voxel edge, so that they are cubes in the world, but half a voxel along every axis at least: flat or long voxels would be
    cut into very many. Isovalues are apart, see isogi_trace__alike. */
 static uint64_t isogi_trace__probe_key(const isogi_trace__scene *scene, const isogi_hit *hit, const float normal[3], double t,
                                        double cell, double isovalue) {
-    const double *spacing = scene->volume->spacing;
-    double least = spacing[0], size = ISOGI_TRACE__CELL, middle[3];
+    const double *voxel = scene->voxel;
+    double least = voxel[0], size = ISOGI_TRACE__CELL, middle[3];
     uint64_t key = 0;
     int a, axis = 0, level = 0;
     for (a = 1; a < 3; a++) {
-        if (spacing[a] < least) least = spacing[a];
+        if (voxel[a] < least) least = voxel[a];
         if (fabsf(normal[a]) > fabsf(normal[axis])) axis = a;
     }
     for (; size < cell && size * ISOGI_TRACE__NEAR_RATIO < t / least; level++) size *= 2;
     for (; level < 8 && size * ISOGI_TRACE__CELL_RATIO < t / least; level++) size *= 2;
     for (a = 0; a < 3; a++) {
-        double side = least * size, half = ISOGI_TRACE__HALF * spacing[a];
-        double along = (side > half ? side : half) / spacing[a], x = (hit->cell[a] + hit->local[a]) / along + 1;
+        double side = least * size, half = ISOGI_TRACE__HALF * voxel[a];
+        double along = (side > half ? side : half) / voxel[a], x = (hit->cell[a] + hit->local[a]) / along + 1;
         key = isogi_trace__key(key, (uint64_t)isogi_trace__clamp(x, 4e9));
         middle[a] = (floor(x) - 0.5) * along;
     }
@@ -3085,52 +3193,58 @@ static uint64_t isogi_trace__probe_key(const isogi_trace__scene *scene, const is
     return isogi_trace__key(key, (uint64_t)(16 * level + 2 * axis + (normal[axis] < 0))) | 1;
 }
 
-/* The place in the table where a key is or belongs. */
-static size_t isogi_trace__table_find(const isogi_trace__feedback *f, uint64_t key) {
-    size_t i = (size_t)(key >> 20) & (f->table_size - 1);
-    while (f->table[i].probe && f->table[i].key != key) i = (i + 1) & (f->table_size - 1);
-    return i;
+/* Where the chain of a cell begins: as many chains as there is room for probes, numbered by the low bits of the key; those beyond the end
+   by one bit less (linear hashing, Litwin 1980). */
+static uint32_t *isogi_trace__head(const isogi_trace__set *s, uint64_t cell) {
+    size_t heads = s->chunk_count * ISOGI_TRACE__CHUNK, bit = ISOGI_TRACE__CHUNK, i;
+    while (2 * bit <= heads) bit *= 2;
+    i = (size_t)(cell >> 20) & (2 * bit - 1);
+    if (i >= heads) i -= bit;
+    return &s->chunks[i / ISOGI_TRACE__CHUNK].heads[i % ISOGI_TRACE__CHUNK];
 }
 
-static isogi_result isogi_trace__table_grow(isogi_trace *t) {
-    isogi_trace__feedback *f = t->feedback;
-    isogi_trace__slot *before = f->table;
-    size_t size = f->table_size, i;
-    if (2 * (f->probes.count + 1) <= size) return ISOGI_OK;
-    f->table = (isogi_trace__slot *)isogi_allocate(&t->context, 2 * size, sizeof *f->table);
-    if (!f->table) {
-        f->table = before;
-        return ISOGI_NO_MEMORY;
+/* The last chunk is new: its chains take over, in their order, what is theirs by the next bit of the key. So no step has to find a new
+   place for all. */
+static void isogi_trace__heads_new(isogi_trace__set *s) {
+    size_t last = s->chunk_count - 1, from = 1, i;
+    uint32_t *heads = s->chunks[last].heads;
+    memset(heads, 0, ISOGI_TRACE__CHUNK * sizeof *heads);
+    while (2 * from <= last) from *= 2;
+    for (i = 0; i < ISOGI_TRACE__CHUNK && last; i++) {
+        uint32_t *stay = &s->chunks[last - from].heads[i], *go = &heads[i], probe = *stay;
+        while (probe) {
+            isogi_trace__node *n = isogi_trace__node_at(s, probe - 1);
+            if ((n->cell >> 20) / ISOGI_TRACE__CHUNK & from) *go = probe, go = &n->next;
+            else *stay = probe, stay = &n->next;
+            probe = n->next;
+        }
+        *stay = *go = 0;
     }
-    f->table_size = 2 * size;
-    memset(f->table, 0, f->table_size * sizeof *f->table);
-    for (i = 0; i < size; i++)
-        if (before[i].probe) f->table[isogi_trace__table_find(f, before[i].key)] = before[i];
-    isogi_release(&t->context, before, size, sizeof *before);
-    return ISOGI_OK;
 }
 
 /* A node without samples. */
 static void isogi_trace__node_begin(const isogi_trace *t, isogi_trace__set *s) {
-    isogi_trace__node *n = &s->nodes[s->count];
+    isogi_trace__node *n = isogi_trace__node_at(s, s->count);
     size_t v = (size_t)t->values;
     memset(n, 0, sizeof *n);
     n->from = (signed char)(t->scene.high ? -1 : 1);
-    memset(s->direct + s->count * v, 0, v * sizeof(float));
-    memset(s->out[0] + s->count * v, 0, v * sizeof(float));
+    memset(isogi_trace__values_at(s, s->count, ISOGI_TRACE__DIRECT_VALUES, v), 0, v * sizeof(float));
+    memset(isogi_trace__light_at(s, s->count, v), 0, v * sizeof(float));
 }
 
 /* Whether a probe may stand for a hit: it faces the same way and lies in the hit's plane, or nearly so: half as far from it as the
    smallest cells reach along the normal. */
 static int isogi_trace__same_place(const isogi_trace *t, const isogi_trace__catch *c, const isogi_trace__node *n) {
-    const double *spacing = t->scene.volume->spacing;
-    double apart = 0, least = spacing[0], reach = 0;
+    const double *voxel = t->scene.voxel;
+    double apart = 0, least = voxel[0], reach = 0;
     int a;
     for (a = 0; a < 3; a++) {
-        double d = ((double)c->hit.cell[a] - (double)n->place.cell[a] + c->hit.local[a] - n->place.local[a]) * spacing[a];
-        double along = 0.5 * ISOGI_TRACE__HALF * spacing[a] * fabs((double)n->normal[a]);
-        apart += d * (double)n->normal[a];
-        if (spacing[a] < least) least = spacing[a];
+        const double *axis = t->scene.axis[a];
+        double facing = axis[0] * (double)n->normal[0] + axis[1] * (double)n->normal[1] + axis[2] * (double)n->normal[2];
+        double d = ((double)c->hit.cell[a] - (double)n->place.cell[a] + c->hit.local[a] - n->place.local[a]) * voxel[a];
+        double along = 0.5 * ISOGI_TRACE__HALF * voxel[a] * fabs(facing);
+        apart += d * facing;
+        if (voxel[a] < least) least = voxel[a];
         if (along > reach) reach = along;
     }
     if (ISOGI_TRACE__PLANE * least > reach) reach = ISOGI_TRACE__PLANE * least;
@@ -3159,8 +3273,8 @@ static int isogi_trace__same_colours(const isogi_trace *t, const isogi_trace__ca
 /* How far isovalues may lie from that of a probe that tells their light: as much as the field changes in ALIKE voxels there. Where a
    skin of some value shuts a hollow, isosurfaces next to each other are dark and bright. */
 static double isogi_trace__alike(const isogi_trace__scene *scene, const isogi_hit *hit) {
-    const double *spacing = scene->volume->spacing, *x = hit->local;
-    double corner[8], least = spacing[0], square = 0;
+    const double *voxel = scene->voxel, *x = hit->local;
+    double corner[8], least = voxel[0], square = 0;
     int a, i;
     isogi_volume_corners(scene->volume, hit->cell, corner);
     for (a = 0; a < 3; a++) {
@@ -3168,58 +3282,61 @@ static double isogi_trace__alike(const isogi_trace__scene *scene, const isogi_hi
         double slope = 0;
         for (i = 0; i < 8; i++)
             slope += (i >> a & 1 ? corner[i] : -corner[i]) * (i >> b & 1 ? x[b] : 1 - x[b]) * (i >> c & 1 ? x[c] : 1 - x[c]);
-        square += slope / spacing[a] * (slope / spacing[a]);
-        if (spacing[a] < least) least = spacing[a];
+        square += slope / voxel[a] * (slope / voxel[a]);
+        if (voxel[a] < least) least = voxel[a];
     }
     return ISOGI_TRACE__ALIKE * least * sqrt(square);
 }
 
-/* The number + 1 of the probe of a hit; 0: there is none, and it would have *key. Probes are only ever added to the end of a chain,
-   so what was found once is found again. Of more than 32 probes with a key none is added: the one in the hit's plane whose isovalue is
-   nearest stands for it, or the last, whatever its place and colour: else colours that differ at every point would need ever more
-   probes, and time to search them. */
-static uint32_t isogi_trace__probe_find(const isogi_trace *t, const isogi_trace__catch *c, double isovalue, uint64_t *key) {
-    const isogi_trace__feedback *f = t->feedback;
-    size_t i = isogi_trace__table_find(f, c->key);
+/* The number + 1 of the probe of a hit; 0: there is none, and it would have *key, and stand at *end of its chain. Probes are only ever
+   added to the end of a chain, so what was found once is found again. Of more than 32 probes of a cell none is added: the one in the
+   hit's plane whose isovalue is nearest stands for it, or the last, whatever its place and colour: else colours that differ at every
+   point would need ever more probes, and time to search them. */
+static uint32_t isogi_trace__probe_find(const isogi_trace *t, const isogi_trace__catch *c, double isovalue, uint64_t *key, uint32_t **end) {
+    const isogi_trace__set *set = &t->feedback->probes;
     double least = HUGE_VAL;
-    uint32_t nearest = 0;
-    int tries;
-    *key = c->key;
-    for (tries = 0; f->table[i].probe; tries++) {
-        const isogi_trace__node *n = &f->probes.nodes[f->table[i].probe - 1];
-        double other = fabs(n->isovalue - isovalue);
-        if (other < least && isogi_trace__same_place(t, c, n) && isogi_trace__same_colours(t, c, n->isovalue, isovalue)) {
-            if (other < (double)n->alike || isogi_trace__zero(other)) return f->table[i].probe;
-            nearest = f->table[i].probe, least = other;
+    uint32_t nearest = 0, *at;
+    int tries = 0;
+    *key = c->key, *end = NULL;
+    if (!set->chunk_count) return 0;
+    for (at = isogi_trace__head(set, c->key); *at;) {
+        isogi_trace__node *n = isogi_trace__node_at(set, *at - 1);
+        if (n->cell == c->key) {
+            double other = fabs(n->isovalue - isovalue);
+            if (other < least && isogi_trace__same_place(t, c, n) && isogi_trace__same_colours(t, c, n->isovalue, isovalue)) {
+                if (other < (double)n->alike || isogi_trace__zero(other)) return *at;
+                nearest = *at, least = other;
+            }
+            if (tries++ == 32) return nearest ? nearest : *at;
+            *key = isogi_trace__key(*key, 1);
         }
-        if (tries == 32) return nearest ? nearest : f->table[i].probe;
-        *key = isogi_trace__key(*key, 1);
-        i = isogi_trace__table_find(f, *key);
+        at = &n->next;
     }
+    *end = at;
     return 0;
 }
 
 /* The number of the probe of a hit, which is made if there is none. */
 static isogi_result isogi_trace__probe_of(isogi_trace *t, const isogi_trace__catch *c, double isovalue, uint32_t *probe) {
-    isogi_trace__feedback *f = t->feedback;
-    size_t i;
+    isogi_trace__set *set = &t->feedback->probes;
     isogi_trace__node *n;
     isogi_result result;
     uint64_t key;
-    uint32_t known = c->probe ? c->probe : isogi_trace__probe_find(t, c, isovalue, &key);
+    uint32_t *end, known = c->probe ? c->probe : isogi_trace__probe_find(t, c, isovalue, &key, &end);
+    size_t chunks = set->chunk_count;
     int a;
     if (known) {
         *probe = known - 1;
         return ISOGI_OK;
     }
-    result = isogi_trace__table_grow(t);
-    if (result == ISOGI_OK) result = isogi_trace__set_reserve(t, &f->probes, 1);
+    result = isogi_trace__set_reserve(t, set, 1, 1);
     if (result != ISOGI_OK) return result;
-    isogi_trace__node_begin(t, &f->probes);
-    n = &f->probes.nodes[f->probes.count];
+    if (set->chunk_count > chunks) (void)isogi_trace__probe_find(t, c, isovalue, &key, &end); /* chains have been split */
+    isogi_trace__node_begin(t, set);
+    n = isogi_trace__node_at(set, set->count);
     n->isovalue = isovalue;
     isogi_trace_albedo(&t->scene.desc, isovalue, n->albedo);
-    n->place = c->hit, n->key = key, n->from = c->from;
+    n->place = c->hit, n->cell = c->key, n->key = key, n->from = c->from;
     n->alike = (float)isogi_trace__alike(&t->scene, &n->place);
     memcpy(n->normal, c->normal, sizeof n->normal);
     if (t->scene.desc.material) {
@@ -3229,9 +3346,7 @@ static isogi_result isogi_trace__probe_of(isogi_trace *t, const isogi_trace__cat
         isogi_vol_to_world(t->scene.pyramid, grid, point);
         isogi_trace_material(&t->scene.desc, isovalue, point, n->albedo, emission);
     }
-    i = isogi_trace__table_find(f, key);
-    *probe = (uint32_t)f->probes.count++;
-    f->table[i].key = key, f->table[i].probe = *probe + 1;
+    *probe = (uint32_t)set->count++, *end = *probe + 1;
     return ISOGI_OK;
 }
 
@@ -3264,25 +3379,6 @@ static uint32_t isogi_trace__index(const isogi_trace *t, const isogi_trace__node
 }
 
 /* ---- rays of a task, gathered into batches ---- */
-
-typedef struct isogi_trace__cast {
-    isogi_trace *trace;
-    isogi_counters *counters;
-    isogi_trace__span *span; /* of this task */
-    isogi_trace__site site[ISOGI_TRACE__TASK_SPANS];
-    uint64_t sequence[ISOGI_TRACE__TASK_SPANS];
-    double sum[ISOGI_TRACE__TASK_SPANS], square[ISOGI_TRACE__TASK_SPANS]; /* of luminance by one light */
-    int shadow; /* rays towards lights; else cosine-distributed ones */
-    int bright; /* the light is the sky */
-    int count;
-    isogi_ray ray[ISOGI_TRACE__FLUSH];
-    isogi_hit hit[ISOGI_TRACE__FLUSH];
-    uint8_t blocked[ISOGI_TRACE__FLUSH]; /* shadow: in place of the hits */
-    float normal[ISOGI_TRACE__FLUSH][3];
-    uint32_t owner[ISOGI_TRACE__FLUSH], sample[ISOGI_TRACE__FLUSH];
-    double weight[ISOGI_TRACE__FLUSH]; /* pi times the density of cosine-distributed rays; of the sky's radiance, for those drawn by it */
-    double rgb[ISOGI_TRACE__FLUSH][3]; /* shadow: what arrives if nothing is in the way */
-} isogi_trace__cast;
 
 /* A cosine-distributed ray of span k left the volume. */
 static void isogi_trace__cast_escape(isogi_trace__cast *c, int i) {
@@ -3333,6 +3429,7 @@ static void isogi_trace__cast_hit(isogi_trace__cast *c, int i) {
     int side = c->hit[i].side > 0 ? 1 : -1, a;
     double length = c->hit[i].t;
     uint64_t made;
+    uint32_t *end;
     to->from = (signed char)side;
     to->hit = c->hit[i];
     memcpy(to->normal, c->normal[i], sizeof to->normal);
@@ -3346,7 +3443,7 @@ static void isogi_trace__cast_hit(isogi_trace__cast *c, int i) {
     if (!t->scene.desc.bounces) return;
     to->key = isogi_trace__probe_key(&t->scene, &to->hit, to->normal, length,
                                      span->sum.brick ? ISOGI_TRACE__CELL : ISOGI_TRACE__CELL_FAR, span->sum.isovalue);
-    to->probe = isogi_trace__probe_find(t, to, span->sum.isovalue, &made);
+    to->probe = isogi_trace__probe_find(t, to, span->sum.isovalue, &made, &end);
 }
 
 /* Takes in the results of rays first .. first + count - 1. */
@@ -3397,7 +3494,7 @@ static void isogi_trace__cast_add(isogi_trace__cast *c, const float dir[3], doub
     tmax = isogi_trace__within(scene, tmax);
     if (site->on_surface) {
         if (c->shadow && scene->desc.no_shadows) memset(&c->hit[i], 0, sizeof c->hit[i]);
-        else isogi_trace__site_rays(scene, site, (const float(*)[3])dir, &tmax, 1, &c->hit[i], c->counters);
+        else isogi_trace__site_rays(scene, site, (const float(*)[3])dir, &tmax, 1, ray, &c->hit[i], c->counters);
         c->blocked[i] = c->hit[i].side != 0;
         if (!c->shadow) isogi_vol_normals(scene->pyramid, &c->hit[i], 1, ISOGI_NORMAL_TRILINEAR, &c->normal[i]);
         isogi_trace__cast_land(c, i, 1);
@@ -3475,7 +3572,8 @@ static void isogi_trace__cast_round(isogi_trace__cast *c, uint32_t spans) {
     for (k = 0; k < spans && c->shadow; k++) {
         const isogi_trace__span *s = &c->span[k];
         int texel = s->sum.brick != NULL;
-        uint32_t n = c->bright ? s->count : isogi_trace__light_samples(s->first + s->count, texel) - isogi_trace__light_samples(s->first, texel);
+        uint32_t n =
+            c->bright ? s->count : isogi_trace__light_samples(s->first + s->count, texel) - isogi_trace__light_samples(s->first, texel);
         double spread = n ? c->square[k] - c->sum[k] * c->sum[k] / n : 0;
         *(c->bright ? &c->span[k].sum.bright_spread : &c->span[k].sum.light_spread) += spread > 0 ? spread : 0;
     }
@@ -3516,34 +3614,34 @@ static void isogi_trace__cast_task(void *arg, size_t task) {
     isogi_trace__feedback *f = t->feedback;
     const isogi_lighting *lighting = &t->scene.desc.lighting;
     uint32_t k, spans = f->task[task + 1] - f->task[task];
-    isogi_trace__cast c;
+    isogi_trace__cast *c = &f->casts[task];
     size_t l;
-    c.trace = t, c.counters = &t->task_counters[task], c.span = f->spans + f->task[task], c.count = 0, c.shadow = 0, c.bright = 0;
-    memset(c.counters, 0, sizeof *c.counters);
+    c->trace = t, c->counters = &t->task_counters[task], c->span = f->spans + f->task[task], c->count = 0, c->shadow = 0, c->bright = 0;
+    memset(c->counters, 0, sizeof *c->counters);
     memset(f->direct + f->task[task] * (size_t)t->values, 0, spans * (size_t)t->values * sizeof(float));
     for (k = 0; k < spans; k++) {
-        isogi_trace__span *s = &c.span[k];
+        isogi_trace__span *s = &c->span[k];
         uint32_t i;
         for (i = 0; i < s->count; i++) f->catches[s->offset + i].key = 0;
-        if (!isogi_trace__span_site(&c, k) || isogi_trace__dark(&t->scene)) s->sum.hits = 1, c.site[k].isovalue = 0;
+        if (!isogi_trace__span_site(c, k) || isogi_trace__dark(&t->scene)) s->sum.hits = 1, c->site[k].isovalue = 0;
     }
     for (k = 0; k < spans; k++)
-        if (!c.span[k].sum.hits) isogi_trace__span_hemisphere(&c, k);
-    isogi_trace__cast_round(&c, spans);
+        if (!c->span[k].sum.hits) isogi_trace__span_hemisphere(c, k);
+    isogi_trace__cast_round(c, spans);
     if (t->scene.desc.mode == ISOGI_TRACE_TRANSFER) return;
-    c.shadow = c.bright = 1;
+    c->shadow = c->bright = 1;
     for (k = 0; k < spans && t->scene.sky.on; k++)
-        if (!c.span[k].sum.hits) isogi_trace__span_sky(&c, k);
-    isogi_trace__cast_round(&c, spans);
-    c.bright = 0;
+        if (!c->span[k].sum.hits) isogi_trace__span_sky(c, k);
+    isogi_trace__cast_round(c, spans);
+    c->bright = 0;
     for (l = 0; l < lighting->light_count; l++) {
         if (isogi_trace__is_delta(&lighting->lights[l])) continue;
         for (k = 0; k < spans; k++)
-            if (!c.span[k].sum.hits) isogi_trace__span_light(&c, k, l);
-        isogi_trace__cast_round(&c, spans);
+            if (!c->span[k].sum.hits) isogi_trace__span_light(c, k, l);
+        isogi_trace__cast_round(c, spans);
     }
     for (k = 0; k < spans; k++)
-        if (!c.span[k].sum.hits && !c.span[k].first) isogi_trace__site_lights(&t->scene, &c.site[k], c.span[k].sum.steady, c.counters);
+        if (!c->span[k].sum.hits && !c->span[k].first) isogi_trace__site_lights(&t->scene, &c->site[k], c->span[k].sum.steady, c->counters);
 }
 
 /* ---- a batch: filled, traced, taken over ---- */
@@ -3551,7 +3649,7 @@ static void isogi_trace__cast_task(void *arg, size_t task) {
 /* Spans of the node's current block, as many as fit. 0: full. */
 static int isogi_trace__spans_add(isogi_trace *t, const isogi_trace__set *set, size_t node, uint64_t limit) {
     isogi_trace__feedback *f = t->feedback;
-    const isogi_trace__node *n = &set->nodes[node];
+    const isogi_trace__node *n = isogi_trace__node_at(set, node);
     uint32_t first = n->samples, end = set == &f->probes ? n->wanted : isogi_trace__block(t, n->level + 1);
     while (first < end) {
         isogi_trace__span *s = &f->spans[f->span_count];
@@ -3576,12 +3674,13 @@ static int isogi_trace__spans_add(isogi_trace *t, const isogi_trace__set *set, s
 /* The probes that rays have met since are the next generation. A hit is worth one path that goes on from there, so each has as many
    samples as there are hits that read it: few are read by more than two, and with more samples than readers in a room that is closed,
    probes would breed probes until they fill it. Two at least where nearly all light is reflected: probes whose only rays meet one
-   another are a room without a way out. Counted once, between generations, so that slices of a bake do not matter. */
-static void isogi_trace__generation(isogi_trace *t) {
+   another are a room without a way out. Counted once, between generations, so that slices of a bake do not matter. Returns how many of
+   `limit` probes were left. */
+static uint64_t isogi_trace__generation(isogi_trace *t, uint64_t limit) {
     isogi_trace__feedback *f = t->feedback;
     uint32_t most = (uint32_t)t->scene.desc.samples < ISOGI_TRACE__PROBE_MOST ? (uint32_t)t->scene.desc.samples : ISOGI_TRACE__PROBE_MOST;
-    for (; f->probe_end < f->probes.count; f->probe_end++) {
-        isogi_trace__node *n = &f->probes.nodes[f->probe_end];
+    for (; f->probe_counted < f->probes.count && limit; f->probe_counted++, limit--) {
+        isogi_trace__node *n = isogi_trace__node_at(&f->probes, f->probe_counted);
         uint32_t least = 1;
         int a;
         for (a = 0; a < 3; a++)
@@ -3589,26 +3688,34 @@ static void isogi_trace__generation(isogi_trace *t) {
         n->wanted = n->readers > least ? n->readers : least;
         if (n->wanted > most) n->wanted = most;
     }
+    if (f->probe_counted == f->probes.count) f->probe_end = f->probes.count;
+    return limit;
 }
 
-/* Texels at the current level come first, then probes, one generation after the other. */
-static void isogi_trace__spans_fill(isogi_trace *t, uint64_t limit) {
+/* Texels at the current level come first, then probes, one generation after the other. limit: samples, about; as many nodes are looked
+   at as take that long, which is added to *spent. 1: none at this level is left. */
+static int isogi_trace__spans_fill(isogi_trace *t, uint64_t limit, uint64_t *spent) {
     isogi_trace__feedback *f = t->feedback;
+    const uint64_t most = limit < UINT64_MAX / 8 ? 8 * limit : limit;
+    uint64_t look = most;
     f->span_count = f->sample_count = 0;
     f->task_count = 1, f->task[0] = 0, f->on_probes = 0;
-    for (; f->cursor < f->texels.count; f->cursor++) {
-        const isogi_trace__node *n = &f->texels.nodes[f->cursor];
+    for (; f->cursor < f->texels.count && look; f->cursor++, look--) {
+        const isogi_trace__node *n = isogi_trace__node_at(&f->texels, f->cursor);
         if (n->finished || n->level != f->level) continue;
         if (!isogi_trace__spans_add(t, &f->texels, f->cursor, limit)) break;
     }
-    if (!f->span_count) {
+    if (!f->span_count && f->cursor == f->texels.count) {
         f->on_probes = 1;
-        if (f->probe_cursor == f->probe_end) isogi_trace__generation(t);
+        if (f->probe_cursor == f->probe_end) look = isogi_trace__generation(t, look);
         for (; f->probe_cursor < f->probe_end; f->probe_cursor++)
-            if (!f->probes.nodes[f->probe_cursor].level && !isogi_trace__spans_add(t, &f->probes, f->probe_cursor, limit)) break;
+            if (!isogi_trace__node_at(&f->probes, f->probe_cursor)->level && !isogi_trace__spans_add(t, &f->probes, f->probe_cursor, limit))
+                break;
     }
-    f->task[f->task_count] = (uint32_t)f->span_count;
-    if (!f->span_count) f->task_count = 0;
+    f->task[f->task_count] = (uint32_t)f->span_count, *spent += (most - look) / 8;
+    if (f->span_count) return 0;
+    f->task_count = 0;
+    return look && f->cursor == f->texels.count;
 }
 
 /* Room for one more segment. */
@@ -3652,9 +3759,9 @@ static isogi_result isogi_trace__segment_new(isogi_trace *t, isogi_trace__segmen
 /* A first answer, before any probe is known: the surroundings that its rays met are taken to be as bright as the texel itself. */
 static void isogi_trace__texel_guess(isogi_trace *t, size_t node) {
     isogi_trace__feedback *f = t->feedback;
-    isogi_trace__node *n = &f->texels.nodes[node];
+    isogi_trace__node *n = isogi_trace__node_at(&f->texels, node);
     float to[3 * ISOGI_TRACE__MAX_ORDER * ISOGI_TRACE__MAX_ORDER], error = (float)(1 / sqrt((double)n->samples));
-    const float *direct = f->texels.direct + node * (size_t)t->values;
+    const float *direct = isogi_trace__values_at(&f->texels, node, ISOGI_TRACE__DIRECT_VALUES, (size_t)t->values);
     double hidden = (double)n->hits / n->samples, most = 0;
     int i, channels = t->scene.desc.mode == ISOGI_TRACE_TRANSFER ? t->scene.desc.transfer_channels : 3;
     for (i = 0; i < t->values; i++) {
@@ -3671,8 +3778,8 @@ static void isogi_trace__texel_guess(isogi_trace *t, size_t node) {
 }
 
 static void isogi_trace__span_commit(isogi_trace *t, isogi_trace__set *set, const isogi_trace__span *s, uint32_t hits) {
-    isogi_trace__node *n = &set->nodes[s->node];
-    float *direct = set->direct + s->node * (size_t)t->values;
+    isogi_trace__node *n = isogi_trace__node_at(set, s->node);
+    float *direct = isogi_trace__values_at(set, s->node, ISOGI_TRACE__DIRECT_VALUES, (size_t)t->values);
     const float *from = t->feedback->direct + (size_t)(s - t->feedback->spans) * (size_t)t->values;
     int a;
     for (a = 0; a < t->values; a++) direct[a] += from[a];
@@ -3692,7 +3799,7 @@ static void isogi_trace__readers_count(isogi_trace *t, const isogi_trace__segmen
     uint32_t weight = !f->on_probes && isogi_trace__block(t, f->level + 1) < (uint32_t)t->scene.desc.samples ? 2 : 1;
     size_t i;
     for (i = 0; i < s->hits; i++) {
-        isogi_trace__node *n = &f->probes.nodes[s->probe[i]];
+        isogi_trace__node *n = isogi_trace__node_at(&f->probes, s->probe[i]);
         if (n->readers < ISOGI_TRACE__PROBE_MOST) n->readers += weight;
     }
 }
@@ -3711,7 +3818,7 @@ static isogi_result isogi_trace__spans_run(isogi_trace *t, double from, double t
     isogi_trace__readers_count(t, &segment);
     for (i = 0; i < f->task_count; i++) isogi_trace__add(&t->counters, &t->task_counters[i]);
     for (i = 0; i < f->span_count; i++) {
-        int first = f->spans[i].sum.brick && !set->nodes[f->spans[i].node].samples;
+        int first = f->spans[i].sum.brick && !isogi_trace__node_at(set, f->spans[i].node)->samples;
         isogi_trace__span_commit(t, set, &f->spans[i], segment.begin[i + 1] - segment.begin[i]);
         if (first) isogi_trace__texel_guess(t, f->spans[i].node);
     }
@@ -3728,8 +3835,9 @@ static size_t isogi_trace__sweep(const isogi_trace *t, size_t task, size_t count
 
 /* What comes from sky and lights, as irradiance or transfer. */
 static double isogi_trace__node_direct(const isogi_trace *t, const isogi_trace__set *set, size_t node, int value) {
-    const isogi_trace__node *n = &set->nodes[node];
-    double e = n->samples ? ISOGI_TRACE__PI / n->samples * (double)set->direct[node * (size_t)t->values + (size_t)value] : 0;
+    const isogi_trace__node *n = isogi_trace__node_at(set, node);
+    const float *direct = isogi_trace__values_at(set, node, ISOGI_TRACE__DIRECT_VALUES, (size_t)t->values);
+    double e = n->samples ? ISOGI_TRACE__PI / n->samples * (double)direct[value] : 0;
     if (t->scene.desc.mode == ISOGI_TRACE_TRANSFER) return e;
     if (n->samples) e += ISOGI_TRACE__PI / n->samples * n->bright[value];
     return e + n->steady[value] + (n->light_samples ? n->light[value] / n->light_samples : 0);
@@ -3742,7 +3850,7 @@ static int isogi_trace__channel(const isogi_trace *t, int value) {
 /* Albedo where a node's rays hit a probe: at the node's isovalue; where colours go by place, that of the probe. Grey transfer has one
    channel, of the mean. */
 static double isogi_trace__hit_albedo(const isogi_trace *t, const isogi_trace__node *n, uint32_t probe, int value) {
-    if (t->scene.desc.material) n = &t->feedback->probes.nodes[probe];
+    if (t->scene.desc.material) n = isogi_trace__node_at(&t->feedback->probes, probe);
     if (t->scene.desc.mode == ISOGI_TRACE_TRANSFER && t->scene.desc.transfer_channels == 1)
         return ((double)n->albedo[0] + (double)n->albedo[1] + (double)n->albedo[2]) / 3;
     return (double)n->albedo[isogi_trace__channel(t, value)];
@@ -3756,39 +3864,44 @@ static void isogi_trace__direct_task(void *arg, size_t task) {
     size_t v = (size_t)t->values, i, end = isogi_trace__sweep(t, task, set->count, &i);
     int a;
     for (; i < end; i++) {
-        const isogi_trace__node *n = &set->nodes[i];
-        isogi_trace__guide *g = &set->guide[i];
+        const isogi_trace__node *n = isogi_trace__node_at(set, i);
+        isogi_trace__guide *g = isogi_trace__guide_at(set, i);
+        float *bounce = isogi_trace__values_at(set, i, ISOGI_TRACE__BOUNCE_VALUES, v), *out = isogi_trace__light_at(set, i, v);
         for (a = 0; a < t->values; a++) {
-            set->bounce[i * v + (size_t)a] = (float)isogi_trace__node_direct(t, set, i, a);
-            set->out[0][i * v + (size_t)a] = 0;
+            bounce[a] = (float)isogi_trace__node_direct(t, set, i, a);
+            out[a] = 0;
             if (a < 3) g->albedo[a] = (float)isogi_trace__hit_albedo(t, n, (uint32_t)i, a);
         }
         g->mean[0] = n->samples ? 1.0f / (float)n->samples : 0;
     }
 }
 
-/* One pass over the probes of a segment, each of which has one entry: from out[0] to out[1]. by_place: hits have the albedo of the
-   probe that they meet, else that of the probe that they come from. */
+/* One pass over the probes of a segment, each of which has one entry: from one kind of OUT_VALUES to the other. by_place: hits have the
+   albedo of the probe that they meet, else that of the probe that they come from. */
 static void isogi_trace__pass_segment(isogi_trace__set *set, isogi_trace__segment *s, size_t values, size_t channels, int by_place) {
-    const float *out = set->out[0];
+    const int from = ISOGI_TRACE__OUT_VALUES + set->out, to = ISOGI_TRACE__OUT_VALUES + 1 - set->out;
     size_t i, k, a;
     double largest = 0, most = 0;
     for (i = 0; i < s->entries; i++) {
         size_t node = s->node[i];
-        const isogi_trace__guide *g = &set->guide[node];
+        const isogi_trace__guide *g = isogi_trace__guide_at(set, node);
+        const float *bounce = isogi_trace__values_at(set, node, ISOGI_TRACE__BOUNCE_VALUES, values),
+                    *before = isogi_trace__values_at(set, node, from, values);
+        float *after = isogi_trace__values_at(set, node, to, values);
         double sum[3 * ISOGI_TRACE__MAX_ORDER * ISOGI_TRACE__MAX_ORDER];
         for (a = 0; a < values; a++) sum[a] = 0;
         for (k = s->begin[i]; k < s->begin[i + 1]; k++) {
-            const float *e = out + s->probe[k] * values;
+            const float *e = isogi_trace__values_at(set, s->probe[k], from, values);
             if (by_place)
-                for (a = 0; a < values; a++) sum[a] += (double)set->guide[s->probe[k]].albedo[a % channels] * (double)e[a];
+                for (a = 0; a < values; a++)
+                    sum[a] += (double)isogi_trace__guide_at(set, s->probe[k])->albedo[a % channels] * (double)e[a];
             else
                 for (a = 0; a < values; a++) sum[a] += (double)e[a];
         }
         for (a = 0; a < values; a++) {
             double share = (double)g->mean[0] * (by_place ? 1 : (double)g->albedo[a % channels]);
-            double e = (double)set->bounce[node * values + a] + share * sum[a], change = fabs(e - (double)out[node * values + a]);
-            set->out[1][node * values + a] = (float)e;
+            double e = (double)bounce[a] + share * sum[a], change = fabs(e - (double)before[a]);
+            after[a] = (float)e;
             most = change > most ? change : most, largest = fabs(e) > largest ? fabs(e) : largest;
         }
     }
@@ -3800,7 +3913,8 @@ static void isogi_trace__pass_task(void *arg, size_t segment) {
     isogi_trace__set *set = &t->feedback->probes;
     isogi_trace__segment *s = &set->segments[t->feedback->carried + segment];
     size_t channels = t->scene.desc.mode == ISOGI_TRACE_TRANSFER ? (size_t)t->scene.desc.transfer_channels : 3;
-    if (t->values == 3 && channels == 3 && !t->scene.desc.material) isogi_trace__pass_segment(set, s, 3, 3, 0); /* the compiler unrolls it */
+    /* the compiler unrolls it */
+    if (t->values == 3 && channels == 3 && !t->scene.desc.material) isogi_trace__pass_segment(set, s, 3, 3, 0);
     else isogi_trace__pass_segment(set, s, (size_t)t->values, channels, t->scene.desc.material != NULL);
 }
 
@@ -3811,13 +3925,12 @@ static int isogi_trace__pass_end(isogi_trace *t) {
     isogi_trace__feedback *f = t->feedback;
     isogi_trace__set *set = &f->probes;
     double change = 0, largest = 0;
-    float *out = set->out[0];
     size_t i;
     for (i = 0; i < set->segment_count; i++) {
         if (set->segments[i].change > change) change = set->segments[i].change;
         if (set->segments[i].largest > largest) largest = set->segments[i].largest;
     }
-    set->out[0] = set->out[1], set->out[1] = out;
+    set->out = 1 - set->out;
     if (change <= 1e-7 * largest) return 1;
     if (f->pass > 1 && change < f->before && change * change < 1e-3 * largest * (f->before - change)) return 1;
     f->before = change;
@@ -3836,22 +3949,24 @@ static void isogi_trace__clear_task(void *arg, size_t task) {
     const isogi_trace *t = (const isogi_trace *)arg;
     isogi_trace__set *set = &t->feedback->texels;
     size_t v = (size_t)t->values, i, end = isogi_trace__sweep(t, task, set->count, &i);
-    memset(set->bounce + i * v, 0, (end - i) * v * sizeof(float));
-    for (; i < end; i++) set->nodes[i].bounce_square = 0;
+    for (; i < end; i++) {
+        memset(isogi_trace__values_at(set, i, ISOGI_TRACE__BOUNCE_VALUES, v), 0, v * sizeof(float));
+        isogi_trace__node_at(set, i)->bounce_square = 0;
+    }
 }
 
 /* and those of a segment. */
 static void isogi_trace__bounce_task(void *arg, size_t task) {
     const isogi_trace *t = (const isogi_trace *)arg;
     const isogi_trace__segment *s = &t->feedback->texels.segments[t->feedback->segment];
-    const float *light = t->feedback->probes.out[0];
+    const isogi_trace__set *probes = &t->feedback->probes, *texels = &t->feedback->texels;
     size_t i, end = isogi_trace__sweep(t, task, s->entries, &i), v = (size_t)t->values, k;
     for (; i < end; i++) {
-        isogi_trace__node *n = &t->feedback->texels.nodes[s->node[i]];
-        float *bounce = t->feedback->texels.bounce + s->node[i] * v;
+        isogi_trace__node *n = isogi_trace__node_at(texels, s->node[i]);
+        float *bounce = isogi_trace__values_at(texels, s->node[i], ISOGI_TRACE__BOUNCE_VALUES, v);
         int a;
         for (k = s->begin[i]; k < s->begin[i + 1]; k++) {
-            const float *e = light + s->probe[k] * v;
+            const float *e = isogi_trace__light_at(probes, s->probe[k], v);
             double rgb[3], luminance;
             for (a = 0; a < t->values; a++) bounce[a] += (float)(isogi_trace__hit_albedo(t, n, s->probe[k], a) * (double)e[a]);
             if (t->scene.desc.mode == ISOGI_TRACE_TRANSFER) continue;
@@ -3892,25 +4007,27 @@ static void isogi_trace__guide_task(void *arg, size_t task) {
     isogi_trace__set *set = &t->feedback->texels;
     size_t i, end = isogi_trace__sweep(t, task, set->count, &i), v = (size_t)t->values;
     for (; i < end; i++) {
-        const isogi_trace__node *n = &set->nodes[i];
-        isogi_trace__guide *g = &set->guide[i];
+        const isogi_trace__node *n = isogi_trace__node_at(set, i);
+        isogi_trace__guide *g = isogi_trace__guide_at(set, i);
+        const float *direct = isogi_trace__values_at(set, i, ISOGI_TRACE__DIRECT_VALUES, v),
+                    *bounce = isogi_trace__values_at(set, i, ISOGI_TRACE__BOUNCE_VALUES, v);
+        float *out = isogi_trace__light_at(set, i, v);
         double scale = n->samples ? 1.0 / n->samples : 0, rgb[3] = {0, 0, 0}, spread;
         int a;
         memcpy(g->normal, n->normal, sizeof g->normal);
         g->samples = n->samples, g->lights = (float)isogi_trace__light_variance(n);
         for (a = 0; a < t->values; a++)
-            set->out[0][i * v + (size_t)a] = (float)(ISOGI_TRACE__PI * scale * (double)set->direct[i * v + (size_t)a] +
-                                                      scale * (double)set->bounce[i * v + (size_t)a]);
+            out[a] = (float)(ISOGI_TRACE__PI * scale * (double)direct[a] + scale * (double)bounce[a]);
         for (a = 0; a < 3 && t->scene.desc.mode == ISOGI_TRACE_IRRADIANCE; a++) {
-            rgb[a] = (double)set->direct[i * v + (size_t)a] + (double)set->bounce[i * v + (size_t)a] / ISOGI_TRACE__PI;
-            g->mean[a] = set->out[0][i * v + (size_t)a] + (float)(ISOGI_TRACE__PI * scale * n->bright[a]);
+            rgb[a] = (double)direct[a] + (double)bounce[a] / ISOGI_TRACE__PI;
+            g->mean[a] = out[a] + (float)(ISOGI_TRACE__PI * scale * n->bright[a]);
         }
         if (t->scene.desc.mode == ISOGI_TRACE_TRANSFER) continue;
         g->luminance = (float)(ISOGI_TRACE__PI * scale * (isogi_trace__luminance(rgb) + isogi_trace__luminance(n->bright)));
         spread = isogi_trace__mean_variance(isogi_trace__luminance(rgb), n->square + n->bounce_square, (double)n->samples);
         if (n->samples > 1) spread += n->bright_spread * scale / (n->samples - 1);
         g->variance = (float)(ISOGI_TRACE__PI * ISOGI_TRACE__PI * spread);
-        for (a = 0; a < 3; a++) rgb[a] = scale * (double)set->bounce[i * v + (size_t)a];
+        for (a = 0; a < 3; a++) rgb[a] = scale * (double)bounce[a];
         g->hidden = (float)(scale * (t->scene.desc.bounces ? n->hits : n->samples)); /* hits are counted if they reflect */
         g->reflected = (float)isogi_trace__luminance(rgb);
     }
@@ -3951,8 +4068,8 @@ static int isogi_trace__around_texel(const isogi_trace *t, const size_t texel[3]
                 const isogi_trace__brick *b = t->bricks[brick[0][d[0] + 1] + brick[1][d[1] + 1] + brick[2][d[2] + 1]];
                 if (!b || !b->node) continue;
                 node = b->node[slot[0][d[0] + 1] + slot[1][d[1] + 1] + slot[2][d[2] + 1]];
-                if (!node || !set->guide[node - 1].samples) continue;
-                guide[count] = &set->guide[node - 1], apart[count++] = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
+                if (!node || !isogi_trace__guide_at(set, node - 1)->samples) continue;
+                guide[count] = isogi_trace__guide_at(set, node - 1), apart[count++] = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
             }
     return count;
 }
@@ -3961,9 +4078,10 @@ static int isogi_trace__around_texel(const isogi_trace *t, const size_t texel[3]
    variance, and the variance of other light, averaged over the same texels. Returns the number of samples that this is as good as. */
 static double isogi_trace__filter(const isogi_trace *t, size_t node, double rgb[3], double variance[2]) {
     static const double by_distance[4] = {1, 0.77880078307140488, 0.60653065971263342, 0.47236655274101469}; /* exp(-square / 4) */
-    const isogi_trace__guide *g = &t->feedback->texels.guide[node], *around[27];
+    const isogi_trace__set *set = &t->feedback->texels;
+    const isogi_trace__guide *g = isogi_trace__guide_at(set, node), *around[27];
     double total = 0, squares = 0;
-    int square[27], count = isogi_trace__around_texel(t, t->feedback->texels.nodes[node].texel, around, square), i, a;
+    int square[27], count = isogi_trace__around_texel(t, isogi_trace__node_at(set, node)->texel, around, square), i, a;
     rgb[0] = rgb[1] = rgb[2] = variance[0] = variance[1] = 0;
     for (i = 0; i < count; i++) {
         const isogi_trace__guide *q = around[i];
@@ -3988,28 +4106,43 @@ static double isogi_trace__filter(const isogi_trace *t, size_t node, double rgb[
     return total * total / squares;
 }
 
+/* The same, with the variance of what the filter blurs; or the texel's own. */
+static double isogi_trace__shared(const isogi_trace *t, size_t node, double rgb[3], double variance[2]) {
+    const isogi_trace__guide *g = isogi_trace__guide_at(&t->feedback->texels, node);
+    double alike = (double)g->samples;
+    int a;
+    if (!t->scene.desc.unfiltered) {
+        alike = isogi_trace__filter(t, node, rgb, variance), variance[0] += 0.25 * (double)g->variance;
+        return alike;
+    }
+    for (a = 0; a < 3; a++) rgb[a] = (double)g->mean[a];
+    variance[0] = (double)g->variance, variance[1] = (double)g->lights;
+    return alike;
+}
+
 /* Light and error of every texel into its brick. */
 static void isogi_trace__publish_task(void *arg, size_t task) {
     isogi_trace *t = (isogi_trace *)arg;
     isogi_trace__set *set = &t->feedback->texels;
     size_t i, end = isogi_trace__sweep(t, task, set->count, &i), v = (size_t)t->values;
     for (; i < end; i++) {
-        isogi_trace__node *n = &set->nodes[i];
+        isogi_trace__node *n = isogi_trace__node_at(set, i);
+        const isogi_trace__guide *g = isogi_trace__guide_at(set, i);
+        const float *reflected = isogi_trace__values_at(set, i, ISOGI_TRACE__BOUNCE_VALUES, v);
         float to[3], error;
         double rgb[3], variance[2], probes = 0;
         int a;
         if (!n->samples || n->finished == 2) continue;
         if (t->scene.desc.mode == ISOGI_TRACE_TRANSFER) {
             error = n->samples > 1 && !t->feedback->diverges ? (float)(1 / sqrt((double)n->samples)) : ISOGI_TRACE__NOT_READY;
-            isogi_trace__record_write(t, isogi_trace__record(t, n->brick, n->slot), set->out[0] + i * v, error);
+            isogi_trace__record_write(t, isogi_trace__record(t, n->brick, n->slot), isogi_trace__light_at(set, i, v), error);
         } else {
-            double alike = isogi_trace__filter(t, i, rgb, variance), bounce[3];
+            double alike = isogi_trace__shared(t, i, rgb, variance), bounce[3];
             for (a = 0; a < 3; a++) {
                 to[a] = (float)(rgb[a] + n->steady[a] + (n->light_samples ? n->light[a] / n->light_samples : 0));
-                bounce[a] = (double)set->bounce[i * v + (size_t)a] / n->samples;
+                bounce[a] = (double)reflected[a] / n->samples;
             }
-            variance[0] += 0.25 * (double)set->guide[i].variance; /* for what the filter blurs */
-            variance[0] += isogi_trace__unseen(t->scene.possible, (double)set->guide[i].luminance, alike) + variance[1];
+            variance[0] += isogi_trace__unseen(t->scene.possible, (double)g->luminance, alike) + variance[1];
             probes = ISOGI_TRACE__PROBE_ERROR * isogi_trace__luminance(bounce);
             error = n->samples > 1 && !t->feedback->diverges ? (float)sqrt(variance[0] + probes * probes) : ISOGI_TRACE__NOT_READY;
             isogi_trace__record_write(t, isogi_trace__record(t, n->brick, n->slot), to, error);
@@ -4018,19 +4151,48 @@ static void isogi_trace__publish_task(void *arg, size_t task) {
     }
 }
 
-/* ---- carrying the light over ---- */
+/* ---- the end of a level ---- */
 
-/* When a block of samples is complete the light at probes is worked out, then that of the texels. That takes no rays, but as long as many:
-   it is cut into tasks, each of which counts as the rays that take about as long. */
-enum {
-    ISOGI_TRACE__AT_REST = 0,
-    ISOGI_TRACE__DIRECT,
-    ISOGI_TRACE__PASS,
-    ISOGI_TRACE__CLEAR,
-    ISOGI_TRACE__BOUNCE,
-    ISOGI_TRACE__GUIDE,
-    ISOGI_TRACE__PUBLISH
-};
+/* Its light is carried over: texels that are good enough are finished, the others go on. */
+static void isogi_trace__finish_task(isogi_trace *t, size_t task) {
+    isogi_trace__feedback *f = t->feedback;
+    double target = (double)t->scene.desc.error * t->scene.open_light;
+    size_t i, end = isogi_trace__sweep(t, task, f->texels.count, &i);
+    for (; i < end; i++) {
+        isogi_trace__node *n = isogi_trace__node_at(&f->texels, i);
+        if (n->finished) continue;
+        if (n->samples >= (uint32_t)t->scene.desc.samples || (target > 0 && (double)n->error <= target)) {
+            n->finished = 1, n->brick->state[n->slot] = ISOGI_TRACE__DONE, f->partial -= n->samples, t->wanted--, t->done++;
+        } else f->open++;
+    }
+}
+
+/* The last chunks and segments of a set, its share of what is left when `tasks` are. */
+static void isogi_trace__set_shrink(const isogi_trace *t, isogi_trace__set *s, size_t tasks, int chunks) {
+    size_t n = chunks ? (s->chunk_count + tasks - 1) / tasks : 0;
+    for (; n; n--) isogi_trace__chunk_free(t, &s->chunks[--s->chunk_count]);
+    for (n = (s->segment_count + tasks - 1) / tasks; n; n--) isogi_trace__segment_free(t, &s->segments[--s->segment_count]);
+}
+
+/* Where all texels of a group are finished their nodes, and the probes, are given back. */
+static void isogi_trace__forget_task(isogi_trace *t, size_t task) {
+    isogi_trace__feedback *f = t->feedback;
+    size_t i, end = isogi_trace__sweep(t, task, f->texels.count, &i), left = (f->texels.count - i - 1) / ISOGI_TRACE__SWEEP + 1;
+    isogi_trace__set_shrink(t, &f->probes, left, 1), isogi_trace__set_shrink(t, &f->texels, left, 0);
+    for (; i < end; i++) isogi_trace__brick_forget(t, isogi_trace__node_at(&f->texels, i)->brick);
+}
+
+/* The next group begins anew, so that a bake that was saved in between goes on to the same bits. */
+static void isogi_trace__group_free(isogi_trace *t) {
+    isogi_trace__feedback *f = t->feedback;
+    f->probes_before += f->probes.count;
+    isogi_trace__set_free(t, &f->texels);
+    isogi_trace__set_free(t, &f->probes);
+    f->cursor = f->probe_cursor = f->probe_end = f->probe_counted = f->placed = f->carried = f->span_count = 0;
+    f->phase = ISOGI_TRACE__AT_REST, f->unpublished = f->making = 0, f->partial = 0;
+}
+
+/* ---- carrying the light over ---- */
 
 /* Tasks of the phase at work. */
 static size_t isogi_trace__phase_tasks(const isogi_trace__feedback *f) {
@@ -4046,7 +4208,7 @@ static uint64_t isogi_trace__phase_cost(const isogi_trace__feedback *f, size_t t
     const isogi_trace__segment *s = f->phase == ISOGI_TRACE__PASS ? f->probes.segments + task : f->texels.segments + f->segment;
     if (f->phase == ISOGI_TRACE__PASS) return s->entries / 8 + s->hits / 64 + 1;
     if (f->phase == ISOGI_TRACE__BOUNCE) return ISOGI_TRACE__SWEEP / 8 + s->hits * ISOGI_TRACE__SWEEP / s->entries / 64;
-    return f->phase == ISOGI_TRACE__PUBLISH ? ISOGI_TRACE__SWEEP / 2 : ISOGI_TRACE__SWEEP / 8;
+    return f->phase == ISOGI_TRACE__PUBLISH || f->phase == ISOGI_TRACE__FORGET ? ISOGI_TRACE__SWEEP / 2 : ISOGI_TRACE__SWEEP / 8;
 }
 
 static void isogi_trace__phase_task(void *arg, size_t task) {
@@ -4056,7 +4218,9 @@ static void isogi_trace__phase_task(void *arg, size_t task) {
     case ISOGI_TRACE__CLEAR: isogi_trace__clear_task(arg, task); break;
     case ISOGI_TRACE__BOUNCE: isogi_trace__bounce_task(arg, task); break;
     case ISOGI_TRACE__GUIDE: isogi_trace__guide_task(arg, task); break;
-    default: isogi_trace__publish_task(arg, task);
+    case ISOGI_TRACE__PUBLISH: isogi_trace__publish_task(arg, task); break;
+    case ISOGI_TRACE__FINISH: isogi_trace__finish_task((isogi_trace *)arg, task); break;
+    default: isogi_trace__forget_task((isogi_trace *)arg, task);
     }
 }
 
@@ -4077,19 +4241,26 @@ static void isogi_trace__phase_end(isogi_trace *t) {
         if (++f->segment >= f->texels.segment_count) f->phase = ISOGI_TRACE__GUIDE;
         break;
     case ISOGI_TRACE__GUIDE: f->phase = ISOGI_TRACE__PUBLISH; break;
-    default: f->phase = ISOGI_TRACE__AT_REST, f->unpublished = 0;
+    case ISOGI_TRACE__PUBLISH: f->phase = ISOGI_TRACE__FINISH, f->open = 0; break;
+    case ISOGI_TRACE__FINISH:
+        f->phase = f->open || t->scene.desc.lazy ? ISOGI_TRACE__AT_REST : ISOGI_TRACE__FORGET;
+        f->level++, f->cursor = 0, f->unpublished = f->phase == ISOGI_TRACE__FORGET;
+        break;
+    default: isogi_trace__group_free(t);
     }
 }
 
 /* The next tasks of the phase at work, about as long as `limit` rays, at least one. Returns what they count as. */
 static uint64_t isogi_trace__carry(isogi_trace *t, uint64_t limit) {
     isogi_trace__feedback *f = t->feedback;
-    size_t tasks = isogi_trace__phase_tasks(f), count = 0;
+    size_t tasks = isogi_trace__phase_tasks(f), count = 0, i;
     uint64_t cost = 0;
     isogi_context silent = t->context;
     silent.progress = NULL;
     while (f->carried + count < tasks && cost < limit) cost += isogi_trace__phase_cost(f, f->carried + count++);
-    if (count) isogi_parallel(&silent, count, isogi_trace__phase_task, t, 0, 1);
+    if (f->phase >= ISOGI_TRACE__FINISH) /* they count what is done, and give memory back: one by one */
+        for (i = 0; i < count; i++) isogi_trace__phase_task(t, i);
+    else if (count) isogi_parallel(&silent, count, isogi_trace__phase_task, t, 0, 1);
     f->carried += count;
     if (f->carried >= tasks) isogi_trace__phase_end(t);
     return cost;
@@ -4104,20 +4275,21 @@ static void isogi_trace__place_task(void *arg, size_t task) {
     const isogi_trace *t = job->trace;
     size_t i = task * ISOGI_TRACE__SWEEP, end = i + ISOGI_TRACE__SWEEP < job->count ? i + ISOGI_TRACE__SWEEP : job->count;
     while (i < end) {
-        isogi_trace__node *n = &t->feedback->texels.nodes[job->first + i];
-        isogi_trace__guide *g = &t->feedback->texels.guide[job->first + i];
+        const isogi_trace__set *set = &t->feedback->texels;
         size_t count = end - i < ISOGI_TRACE__TEXELS ? end - i : ISOGI_TRACE__TEXELS, texel[ISOGI_TRACE__TEXELS][3], k;
         isogi_trace__site site[ISOGI_TRACE__TEXELS];
         uint8_t valid[ISOGI_TRACE__TEXELS];
-        for (k = 0; k < count; k++) memcpy(texel[k], n[k].texel, sizeof texel[k]);
+        for (k = 0; k < count; k++) memcpy(texel[k], isogi_trace__node_at(set, job->first + i + k)->texel, sizeof texel[k]);
         isogi_trace__texel_sites(t, (const size_t(*)[3])texel, count, site, valid);
         for (k = 0; k < count; k++) {
+            isogi_trace__node *n = isogi_trace__node_at(set, job->first + i + k);
             if (valid[k]) {
-                n[k].place = site[k].place, n[k].isovalue = site[k].isovalue;
-                memcpy(n[k].normal, site[k].normal, sizeof n->normal);
+                n->place = site[k].place, n->isovalue = site[k].isovalue;
+                memcpy(n->normal, site[k].normal, sizeof n->normal);
             }
-            isogi_trace_albedo(&t->scene.desc, n[k].isovalue, n[k].albedo);
-            if (t->scene.desc.mode == ISOGI_TRACE_IRRADIANCE) isogi_trace__guide_colours(t, &n[k], &g[k]);
+            isogi_trace_albedo(&t->scene.desc, n->isovalue, n->albedo);
+            if (t->scene.desc.mode == ISOGI_TRACE_IRRADIANCE)
+                isogi_trace__guide_colours(t, n, isogi_trace__guide_at(set, job->first + i + k));
         }
         i += count;
     }
@@ -4136,62 +4308,70 @@ static uint64_t isogi_trace__place(isogi_trace *t, uint64_t limit) {
     return fresh.count / 2 + 1;
 }
 
-/* Nodes for the wanted texels: of all bricks in the queue when lazy, every other texel along each axis first; else of a group. */
-static isogi_result isogi_trace__nodes_make(isogi_trace *t) {
-    isogi_trace__feedback *f = t->feedback;
-    size_t end = t->queue_first, i, slot, texels = 0, half;
-    if (f->phase != ISOGI_TRACE__AT_REST) return ISOGI_OK; /* when what is at work is done */
-    if (t->queue_first == t->queue_count || (f->texels.count && !t->scene.desc.lazy)) return ISOGI_OK;
-    for (; end < t->queue_count && (t->scene.desc.lazy || texels < ISOGI_TRACE__GROUP); end++) {
-        isogi_trace__brick *brick = t->bricks[t->queue[end]];
-        uint64_t wanted = 0;
-        for (slot = 0; slot < ISOGI_TRACE__TEXELS; slot++) wanted |= (uint64_t)isogi_trace__to_do(brick, slot) << slot;
-        if (isogi_trace__brick_hold(t, brick, wanted) != ISOGI_OK) return ISOGI_NO_MEMORY;
-        if (!brick->node && wanted) {
-            brick->node = (uint32_t *)isogi_allocate(&t->context, ISOGI_TRACE__TEXELS, sizeof(uint32_t));
-            if (!brick->node) return ISOGI_NO_MEMORY;
-            memset(brick->node, 0, ISOGI_TRACE__TEXELS * sizeof(uint32_t));
-        }
-        texels += isogi_trace__bits(wanted);
+/* Nodes for the wanted texels of a brick; even: of those that are even along all axes. */
+static isogi_result isogi_trace__nodes_of(isogi_trace *t, size_t index, int even) {
+    isogi_trace__set *set = &t->feedback->texels;
+    isogi_trace__brick *brick = t->bricks[index];
+    uint64_t wanted = 0;
+    uint32_t slot;
+    for (slot = 0; slot < ISOGI_TRACE__TEXELS; slot++) wanted |= (uint64_t)isogi_trace__to_do(brick, slot) << slot;
+    if (isogi_trace__brick_hold(t, brick, wanted) != ISOGI_OK) return ISOGI_NO_MEMORY;
+    if (!brick->node && wanted) {
+        brick->node = (uint32_t *)isogi_allocate(&t->context, ISOGI_TRACE__TEXELS, sizeof(uint32_t));
+        if (!brick->node) return ISOGI_NO_MEMORY;
+        memset(brick->node, 0, ISOGI_TRACE__TEXELS * sizeof(uint32_t));
     }
-    if (isogi_trace__set_reserve(t, &f->texels, texels) != ISOGI_OK) return ISOGI_NO_MEMORY;
-    for (half = 0; half < 2; half++)
-        for (i = t->queue_first; i < end; i++) {
-            isogi_trace__brick *brick = t->bricks[t->queue[i]];
-            for (slot = 0; slot < ISOGI_TRACE__TEXELS; slot++) {
-                isogi_trace__node *n = &f->texels.nodes[f->texels.count];
-                size_t x[3];
-                if (!isogi_trace__to_do(brick, slot)) continue;
-                if (!half && (slot & 0x15)) continue; /* odd along some axis */
-                isogi_trace__texel_of(t, t->queue[i], slot, x);
-                isogi_trace__node_begin(t, &f->texels);
-                n->brick = brick, n->slot = (uint32_t)slot;
-                memcpy(n->texel, x, sizeof x);
-                brick->node[slot] = (uint32_t)++f->texels.count;
-                if (brick->state[slot] == ISOGI_TRACE__WANTED) brick->state[slot] = ISOGI_TRACE__QUEUED;
-            }
-            if (half) brick->queued = 0;
-        }
-    t->queue_first = end;
-    if (t->queue_first == t->queue_count) t->queue_first = t->queue_count = 0;
-    f->level = 0, f->cursor = 0;
+    if (even) t->feedback->made_texels += isogi_trace__bits(wanted);
+    if (isogi_trace__set_reserve(t, set, isogi_trace__bits(wanted), 0) != ISOGI_OK) return ISOGI_NO_MEMORY;
+    for (slot = 0; slot < ISOGI_TRACE__TEXELS; slot++) {
+        isogi_trace__node *n;
+        if (!(wanted >> slot & 1) || (even && (slot & 0x15))) continue;
+        isogi_trace__node_begin(t, set);
+        n = isogi_trace__node_at(set, set->count);
+        n->brick = brick, n->slot = slot;
+        isogi_trace__texel_of(t, index, slot, n->texel);
+        brick->node[slot] = (uint32_t)++set->count;
+        if (brick->state[slot] == ISOGI_TRACE__WANTED) brick->state[slot] = ISOGI_TRACE__QUEUED;
+    }
     return ISOGI_OK;
 }
 
-/* The next group begins anew, so that a bake that was saved in between goes on to the same bits. */
-static void isogi_trace__group_free(isogi_trace *t) {
-    isogi_trace__feedback *f = t->feedback;
-    size_t i;
-    for (i = 0; i < f->texels.count; i++) isogi_trace__brick_forget(t, f->texels.nodes[i].brick);
-    f->probes_before += f->probes.count;
-    isogi_trace__set_free(t, &f->texels);
-    isogi_trace__set_free(t, &f->probes);
-    memset(f->table, 0, f->table_size * sizeof *f->table);
-    f->cursor = f->probe_cursor = f->probe_end = f->placed = f->carried = f->span_count = 0;
-    f->phase = ISOGI_TRACE__AT_REST, f->unpublished = 0, f->partial = 0;
+/* Whether wanted texels are to get nodes: when lazy at once, else when the group before is done; but not while light is carried over. */
+static int isogi_trace__nodes_wanted(const isogi_trace *t) {
+    const isogi_trace__feedback *f = t->feedback;
+    if (f->phase != ISOGI_TRACE__AT_REST) return 0;
+    return f->making || (t->queue_first < t->queue_count && (!f->texels.count || t->scene.desc.lazy));
 }
 
-/* Also where the memory for a group's nodes ran out half way. */
+/* Rays that take as long. */
+static uint64_t isogi_trace__made_cost(size_t bricks, size_t nodes) { return bricks / 2 + nodes / 4; }
+
+/* Makes them: of all bricks in the queue when lazy, else of a group; every other texel along each axis first. As many as take about as
+   long as `limit` rays, which are added to *spent. */
+static isogi_result isogi_trace__nodes_make(isogi_trace *t, uint64_t limit, uint64_t *spent) {
+    isogi_trace__feedback *f = t->feedback;
+    isogi_result result = ISOGI_OK;
+    size_t before = f->texels.count, bricks = 0;
+    if (!f->making) f->making = 1, f->made = f->made_texels = 0, f->made_bricks = t->queue_count - t->queue_first;
+    for (; f->making == 1 && isogi_trace__made_cost(bricks, f->texels.count - before) < limit; bricks++) {
+        result = isogi_trace__nodes_of(t, t->queue[t->queue_first + f->made], 1);
+        if (result != ISOGI_OK) break;
+        if (++f->made < f->made_bricks && (t->scene.desc.lazy || f->made_texels < ISOGI_TRACE__GROUP)) continue;
+        f->making = 2;
+    }
+    for (; f->making == 2 && result == ISOGI_OK && isogi_trace__made_cost(bricks, f->texels.count - before) < limit; bricks++) {
+        result = isogi_trace__nodes_of(t, t->queue[t->queue_first], 0);
+        if (result != ISOGI_OK) break;
+        t->bricks[t->queue[t->queue_first++]]->queued = 0;
+        if (--f->made) continue;
+        f->making = f->level = 0, f->cursor = 0;
+        if (t->queue_first == t->queue_count) t->queue_first = t->queue_count = 0;
+    }
+    *spent += isogi_trace__made_cost(bricks, f->texels.count - before);
+    return result;
+}
+
+/* All nodes are forgotten, also where the memory for a group's ran out half way. */
 static void isogi_trace__feedback_rest(isogi_trace *t) {
     size_t i;
     for (i = 0; i < t->brick_count; i++)
@@ -4199,34 +4379,16 @@ static void isogi_trace__feedback_rest(isogi_trace *t) {
     isogi_trace__group_free(t);
 }
 
-/* Nothing is left to trace at this level, and its light is carried over: texels that are good enough are finished, the others go on. */
-static void isogi_trace__level_end(isogi_trace *t) {
-    isogi_trace__feedback *f = t->feedback;
-    double target = (double)t->scene.desc.error * t->scene.open_light;
-    size_t i, open = 0;
-    for (i = 0; i < f->texels.count; i++) {
-        isogi_trace__node *n = &f->texels.nodes[i];
-        if (n->finished) continue;
-        if (n->samples >= (uint32_t)t->scene.desc.samples || (target > 0 && (double)n->error <= target)) {
-            n->finished = 1, n->brick->state[n->slot] = ISOGI_TRACE__DONE, f->partial -= n->samples, t->wanted--, t->done++;
-        } else open++;
-    }
-    f->level++, f->cursor = 0;
-    if (!open && !t->scene.desc.lazy) isogi_trace__group_free(t);
-}
-
 /* Traces the next batch; where nothing is left to trace at this level its light is to be carried over. */
-static isogi_result isogi_trace__trace_batch(isogi_trace *t, uint64_t limit) {
+static isogi_result isogi_trace__trace_batch(isogi_trace *t, uint64_t limit, uint64_t *spent) {
     isogi_trace__feedback *f = t->feedback;
     const size_t cursor = f->cursor, probe_cursor = f->probe_cursor;
     double all = (double)(t->wanted + t->done) * t->scene.desc.samples, left, after;
     isogi_result result;
-    isogi_trace__spans_fill(t, limit);
+    int none = isogi_trace__spans_fill(t, limit, spent);
     f->unpublished |= f->span_count != 0;
-    if (!f->span_count) {
-        f->phase = ISOGI_TRACE__DIRECT;
-        return ISOGI_OK;
-    }
+    if (none) f->phase = ISOGI_TRACE__DIRECT;
+    if (!f->span_count) return ISOGI_OK;
     left = ((double)t->done * t->scene.desc.samples + (double)f->partial) / all;
     after = left + (f->on_probes ? 0 : (double)f->sample_count / all);
     result = isogi_trace__spans_run(t, isogi_trace__lerp(t->share[0], t->share[1], left),
@@ -4238,16 +4400,14 @@ static isogi_result isogi_trace__trace_batch(isogi_trace *t, uint64_t limit) {
 static isogi_result isogi_trace__feedback_step(isogi_trace *t, uint64_t max_rays, uint64_t *spent) {
     isogi_trace__feedback *f = t->feedback;
     uint64_t begin = t->counters.rays, each = 1 + (uint64_t)t->scene.sky.on + (uint64_t)t->scene.desc.lighting.light_count, other = 0;
-    isogi_result result = isogi_trace__nodes_make(t);
+    isogi_result result = ISOGI_OK;
     while (result == ISOGI_OK && (t->wanted || f->unpublished)) {
         uint64_t used = t->counters.rays - begin + other, left = max_rays ? max_rays - used : SIZE_MAX / 4;
         if (max_rays && used >= max_rays) break;
-        if (f->placed < f->texels.count) other += isogi_trace__place(t, left);
-        else if (f->phase == ISOGI_TRACE__AT_REST) result = isogi_trace__trace_batch(t, max_rays ? left / each + 1 : UINT64_MAX);
-        else {
-            other += isogi_trace__carry(t, left);
-            if (f->phase == ISOGI_TRACE__AT_REST) isogi_trace__level_end(t), result = isogi_trace__nodes_make(t);
-        }
+        if (isogi_trace__nodes_wanted(t)) result = isogi_trace__nodes_make(t, left, &other);
+        else if (f->placed < f->texels.count) other += isogi_trace__place(t, left);
+        else if (f->phase == ISOGI_TRACE__AT_REST) result = isogi_trace__trace_batch(t, max_rays ? left / each + 1 : UINT64_MAX, &other);
+        else other += isogi_trace__carry(t, left);
     }
     *spent += t->counters.rays - begin + other;
     return result;
@@ -4323,29 +4483,43 @@ static int isogi_trace__cell_varies(const isogi_trace *c, const size_t cell[3], 
     return sqrt(apart) > tolerance * size + 3 * error;
 }
 
-/* Wants the fine texels of the coarse cells that vary. Lattice cells are marked by wanting all texels that a lookup in them reads. */
-static isogi_result isogi_trace__refine(isogi_trace *t) {
+/* Wants the fine texels of a coarse cell if it varies: all that a lookup in it reads. Adds to *spent the rays that take as long. */
+static isogi_result isogi_trace__refine_cell(isogi_trace *t, const size_t cell[3], uint64_t *spent) {
     const isogi_trace *c = t->coarse;
-    size_t cell[3], texel[3], low[3], high[3], count[3];
+    size_t texel[3], low[3], high[3];
+    isogi_result result = ISOGI_OK;
+    int a;
+    *spent += 1;
+    if (!isogi_trace__cell_varies(c, cell, (double)t->scene.desc.hierarchy)) return ISOGI_OK;
+    for (a = 0; a < 3; a++) {
+        double scale = t->step[a] > 0 ? c->step[a] / t->step[a] : 0;
+        low[a] = (size_t)(scale * (double)cell[a] + 1e-9);
+        high[a] = (size_t)isogi_trace__clamp(ceil(scale * (double)(cell[a] + 1) - 1e-9), (double)(t->lattice[a] - 1));
+    }
+    if (!isogi_trace__in_range(t, low, high)) return ISOGI_OK;
+    *spent += 8;
+    for (texel[2] = low[2]; texel[2] <= high[2]; texel[2]++)
+        for (texel[1] = low[1]; texel[1] <= high[1]; texel[1]++)
+            for (texel[0] = low[0]; texel[0] <= high[0] && result == ISOGI_OK; texel[0]++)
+                result = isogi_trace__want(t, texel, 0);
+    return result;
+}
+
+/* The next coarse cells, about as long as `limit` rays (0: all). */
+static isogi_result isogi_trace__refine(isogi_trace *t, uint64_t limit, uint64_t *spent) {
+    const isogi_trace *c = t->coarse;
+    size_t cell[3], count[3];
+    uint64_t cost = 0;
     isogi_result result = ISOGI_OK;
     int a;
     for (a = 0; a < 3; a++) count[a] = c->lattice[a] > 1 ? c->lattice[a] - 1 : 1;
-    for (cell[2] = 0; cell[2] < count[2]; cell[2]++)
-        for (cell[1] = 0; cell[1] < count[1]; cell[1]++)
-            for (cell[0] = 0; cell[0] < count[0]; cell[0]++) {
-                if (!isogi_trace__cell_varies(c, cell, (double)t->scene.desc.hierarchy)) continue;
-                for (a = 0; a < 3; a++) {
-                    double scale = t->step[a] > 0 ? c->step[a] / t->step[a] : 0;
-                    low[a] = (size_t)(scale * (double)cell[a] + 1e-9);
-                    high[a] = (size_t)isogi_trace__clamp(ceil(scale * (double)(cell[a] + 1) - 1e-9), (double)(t->lattice[a] - 1));
-                }
-                if (!isogi_trace__in_range(t, low, high)) continue;
-                for (texel[2] = low[2]; texel[2] <= high[2]; texel[2]++)
-                    for (texel[1] = low[1]; texel[1] <= high[1]; texel[1]++)
-                        for (texel[0] = low[0]; texel[0] <= high[0] && result == ISOGI_OK; texel[0]++)
-                            result = isogi_trace__want(t, texel, 0);
-            }
-    t->refined = result == ISOGI_OK;
+    while (t->refine_next < count[0] * count[1] * count[2] && result == ISOGI_OK && (!limit || cost < limit)) {
+        cell[0] = t->refine_next % count[0], cell[1] = t->refine_next / count[0] % count[1], cell[2] = t->refine_next / count[0] / count[1];
+        result = isogi_trace__refine_cell(t, cell, &cost);
+        t->refine_next += result == ISOGI_OK;
+    }
+    t->refined = t->refine_next == count[0] * count[1] * count[2];
+    *spent += cost;
     return result;
 }
 
@@ -4356,8 +4530,13 @@ static isogi_result isogi_trace__step_levels(isogi_trace *trace, uint64_t max_ra
     if (trace->coarse) {
         result = isogi_trace__step_side(trace->coarse, max_rays, &used);
         *spent += used;
-        if (result != ISOGI_OK || trace->coarse->wanted) return result;
-        if (!trace->refined) result = isogi_trace__refine(trace);
+        if (result != ISOGI_OK || trace->coarse->wanted || (max_rays && used >= max_rays)) return result;
+        if (!trace->refined) {
+            uint64_t cells = 0;
+            result = isogi_trace__refine(trace, max_rays ? max_rays - used : 0, &cells);
+            used += cells, *spent += cells;
+        }
+        if (!trace->refined) return result;
     }
     if (result != ISOGI_OK || (max_rays && used >= max_rays)) return result;
     return isogi_trace__step_side(trace, max_rays ? max_rays - used : 0, spent);
@@ -4467,13 +4646,14 @@ static void isogi_trace__export_most(isogi_trace__export *e, size_t texel, const
 /* Out of the largest values: BYTE has one scale for all colours, so that white stays white. */
 static void isogi_trace__export_set_scales(isogi_trace__export *e) {
     float most = 0;
-    int v, exponent;
+    int v, exponent, shift;
     memset(e->scale, 0, sizeof e->scale);
     if (e->format != ISOGI_TRACE_FLOAT) isogi_trace__each_texel(e, isogi_trace__export_most);
     for (v = 0; v < e->values; v++) most = e->scale[v] > most ? e->scale[v] : most;
     frexp((double)most, &exponent);
+    shift = exponent > 15 ? exponent - 15 : exponent > 0 ? 0 : exponent > -120 ? exponent : -120; /* dim light is brought up to 0.5..1 */
     for (v = 0; v < e->values; v++) {
-        if (e->format != ISOGI_TRACE_BYTE) e->scale[v] = exponent > 15 ? (float)ldexp(1, exponent - 15) : 1;
+        if (e->format != ISOGI_TRACE_BYTE) e->scale[v] = (float)ldexp(1, shift);
         else if (!e->transfer) e->scale[v] = most;
         e->scale[v] = e->scale[v] > 0 ? e->scale[v] : 1;
     }
@@ -4699,8 +4879,10 @@ static uint64_t isogi_trace__hash_trace(const isogi_trace *t) {
     hash = isogi_trace__hash_number(hash, d->seed);
     hash = isogi_trace__hash_floats(isogi_trace__hash_floats(isogi_trace__hash_floats(hash, d->albedo, 3), &d->offset, 1), &d->reach, 1);
     if (d->method == ISOGI_TRACE_FEEDBACK) hash = isogi_trace__hash_floats(hash, &d->error, 1);
+    if (d->method == ISOGI_TRACE_FEEDBACK && d->unfiltered) hash = isogi_trace__hash_number(hash, 1);
     hash = isogi_trace__hash_table(isogi_trace__hash_table(hash, d->albedo_points, d->albedo_count), d->emission_points, d->emission_count);
-    hash = isogi_trace__hash_doubles(isogi_trace__hash_doubles(isogi_trace__hash_doubles(hash, t->first, 3), t->last, 3), &t->scene.unit, 1);
+    hash =
+        isogi_trace__hash_doubles(isogi_trace__hash_doubles(isogi_trace__hash_doubles(hash, t->first, 3), t->last, 3), &t->scene.unit, 1);
     if (d->mode == ISOGI_TRACE_IRRADIANCE) hash = isogi_trace__hash_lighting(hash, &d->lighting);
     return isogi_trace__hash_volume(hash, t->scene.pyramid);
 }
@@ -4709,7 +4891,7 @@ static uint64_t isogi_trace__hash_trace(const isogi_trace *t) {
 static uint64_t isogi_trace__done_texels(const isogi_trace *t, const isogi_trace__brick *brick) {
     uint64_t done = 0;
     uint32_t slot;
-    if (brick && brick->node && !t->scene.desc.lazy) return 0;
+    if (brick && brick->node && !t->scene.desc.lazy && t->feedback->phase != ISOGI_TRACE__FORGET) return 0;
     for (slot = 0; brick && slot < ISOGI_TRACE__TEXELS; slot++)
         done |= (uint64_t)(brick->state[slot] == ISOGI_TRACE__DONE) << slot;
     return done;
@@ -4807,7 +4989,7 @@ static isogi_result isogi_trace__block_check(const isogi_trace *t, const uint8_t
 static void isogi_trace__node_loaded(isogi_trace *t, const isogi_trace__brick *brick, uint32_t slot) {
     isogi_trace__node *n;
     if (!brick->node || !brick->node[slot]) return;
-    n = &t->feedback->texels.nodes[brick->node[slot] - 1];
+    n = isogi_trace__node_at(&t->feedback->texels, brick->node[slot] - 1);
     if (!n->finished) t->feedback->partial -= n->samples;
     n->finished = 2;
 }
@@ -4891,8 +5073,8 @@ static int isogi_trace__same_texels(const isogi_trace *t, const isogi_trace_desc
             return 0;
     }
     return d->pyramid == b->pyramid && d->mode == b->mode && order == b->order && d->method == b->method && d->normals == b->normals &&
-           lazy == (b->lazy != 0) && !d->capped == !b->capped && d->sides == b->sides && storage == b->storage &&
-           isogi_trace__zero((double)d->hierarchy - (double)b->hierarchy) &&
+           lazy == (b->lazy != 0) && !d->capped == !b->capped && !d->unfiltered == !b->unfiltered && d->sides == b->sides &&
+           storage == b->storage && isogi_trace__zero((double)d->hierarchy - (double)b->hierarchy) &&
            (!d->transfer_channels || d->transfer_channels == b->transfer_channels);
 }
 
@@ -4948,14 +5130,17 @@ static isogi_result isogi_trace__change_scene(isogi_trace__change *c) {
 static isogi_result isogi_trace__change_box(isogi_trace__change *c, const size_t first[3], const size_t last[3]) {
     const isogi_volume *v = c->trace->scene.volume;
     size_t low[3], high[3];
-    int a;
+    int a, border = 0;
     for (a = 0; a < 3; a++) {
         if (first[a] > last[a] || first[a] >= v->size[a]) return ISOGI_INVALID;
         low[a] = first[a] > 2 ? first[a] - 2 : 0;
         high[a] = v->size[a] - 1 - first[a] > 2 && last[a] < v->size[a] - 3 ? last[a] + 2 : v->size[a] - 1;
         c->low[a] = (double)low[a], c->high[a] = (double)high[a];
+        border |= low[a] == 0 || high[a] == v->size[a] - 1;
     }
     isogi_volume_range(v, low, high, c->range);
+    /* the cap is open at voxels that are not finite, which the range leaves out: for every isovalue that it is drawn for */
+    if (border && c->trace->scene.desc.capped && !isogi_vol_finite(c->trace->scene.pyramid)) c->range[0] = -DBL_MAX;
     return ISOGI_OK;
 }
 
@@ -5079,7 +5264,7 @@ static uint8_t isogi_trace__changed_state(const isogi_trace__change *c, const si
     again |= !lazy && state == ISOGI_TRACE__UNKNOWN; /* its brick has just come */
     if (!again) return (uint8_t)(state == ISOGI_TRACE__DONE && isogi_trace__depends(c, grid) ? ISOGI_TRACE__DRAFT : state);
     if (lazy && state < ISOGI_TRACE__WANTED) return ISOGI_TRACE__UNKNOWN;
-    now = isogi_trace__classify(t, texel);
+    now = isogi_trace__classify(t, texel, 0);
     return (uint8_t)(now == ISOGI_TRACE__WANTED && state >= ISOGI_TRACE__DRAFT ? ISOGI_TRACE__DRAFT : now);
 }
 
@@ -5128,7 +5313,7 @@ static void isogi_trace__change_commit(isogi_trace__change *c) {
     }
     isogi_release(&t->context, t->queue, t->queue_capacity, sizeof *t->queue);
     t->queue = c->queue, t->queue_capacity = c->capacity, t->queue_first = 0, t->queue_count = count;
-    t->refined = 0;
+    t->refined = 0, t->refine_next = 0;
     if (!c->desc) return;
     isogi_trace__sky_free(&c->scene.sky, &t->context);
     t->lighting_hash = c->lighting_hash, t->colours_hash = c->colours_hash;
@@ -5137,11 +5322,13 @@ static void isogi_trace__change_commit(isogi_trace__change *c) {
 
 /* The same change to both sides and both levels: all of them or none. */
 static isogi_result isogi_trace__apply(isogi_trace *trace, const isogi_trace_desc *desc, const size_t *first, const size_t *last) {
-    isogi_trace__change change[4];
+    const isogi_context context = trace->context;
+    isogi_trace__change *change = (isogi_trace__change *)isogi_allocate(&context, 4, sizeof *change); /* large for a stack */
     isogi_trace *side;
     isogi_result result = ISOGI_OK;
     int count = 0, ready = 0, i;
-    memset(change, 0, sizeof change);
+    if (!change) return ISOGI_NO_MEMORY;
+    memset(change, 0, 4 * sizeof *change);
     for (side = trace; side; side = side->high) {
         change[count++].trace = side;
         if (side->coarse) change[count++].trace = side->coarse;
@@ -5158,6 +5345,7 @@ static isogi_result isogi_trace__apply(isogi_trace *trace, const isogi_trace_des
         if (result == ISOGI_OK) isogi_trace__change_commit(&change[i]);
         else isogi_trace__change_undo(&change[i]);
     }
+    isogi_release(&context, change, 4, sizeof *change);
     return result;
 }
 
@@ -5195,18 +5383,19 @@ ISOGI_API isogi_result isogi_trace_relight(isogi_trace *trace, const isogi_light
 typedef struct isogi_trace__points {
     isogi_trace__scene scene;
     const float (*points)[3], (*normals)[3];
-    size_t count;
+    size_t first, count; /* of the points that are at work */
     float (*irradiance)[3], *error; /* scratch, so that cancelling leaves the caller's arrays alone */
+    isogi_trace__wave *waves;
 } isogi_trace__points;
 
 static void isogi_trace__gather_task(void *arg, size_t task) {
     isogi_trace__points *job = (isogi_trace__points *)arg;
-    size_t i = task * ISOGI_TRACE__TASK, end = i + ISOGI_TRACE__TASK < job->count ? i + ISOGI_TRACE__TASK : job->count;
+    size_t i = job->first + task * ISOGI_TRACE__TASK, end = i + ISOGI_TRACE__TASK < job->count ? i + ISOGI_TRACE__TASK : job->count;
     for (; i < end; i++) {
         double world[3], grid[3], length;
         isogi_trace__site site;
         isogi_counters counters;
-        int a, usable;
+        int a, usable, beyond;
         memset(&counters, 0, sizeof counters);
         memset(job->irradiance[i], 0, sizeof job->irradiance[i]);
         job->error[i] = ISOGI_TRACE__NOT_READY;
@@ -5226,9 +5415,10 @@ static void isogi_trace__gather_task(void *arg, size_t task) {
             isogi_trace__place_normals(job->scene.pyramid, job->scene.desc.normals, &site.place, 1, gradient);
             if (!isogi_trace__site_normal(&job->scene, gradient[0], &site)) continue;
         }
+        if (job->scene.high && !isogi_trace__off_surface(&job->scene, &site, ISOGI_TRACE__DEPTH, grid, &beyond)) continue;
         site.key = isogi_trace__key(isogi_trace__key(job->scene.desc.seed, 1), (uint64_t)i);
         isogi_trace__site_start(&job->scene, &site);
-        isogi_trace__gather_site(&job->scene, &site, job->irradiance[i], &job->error[i], &counters);
+        isogi_trace__gather_site(&job->scene, &site, &job->waves[task], job->irradiance[i], &job->error[i], &counters);
     }
 }
 
@@ -5236,6 +5426,7 @@ ISOGI_API isogi_result isogi_trace_gather(const isogi_trace_desc *desc, const fl
                                           size_t count, float (*irradiance)[3], float *error, const isogi_context *context) {
     isogi_trace__points job;
     isogi_result result;
+    size_t tasks;
     if (!isogi_trace__desc_valid(desc) || desc->mode != ISOGI_TRACE_IRRADIANCE || (count && (!points || !irradiance)))
         return ISOGI_INVALID;
     if (desc->sides == ISOGI_TRACE_BOTH_SIDES) return ISOGI_INVALID;
@@ -5243,15 +5434,21 @@ ISOGI_API isogi_result isogi_trace_gather(const isogi_trace_desc *desc, const fl
     if (!context) context = isogi_vol_context(desc->pyramid);
     memset(&job, 0, sizeof job);
     job.points = points, job.normals = normals, job.count = count;
+    job.waves = (isogi_trace__wave *)isogi_allocate(context, ISOGI_TRACE__TASKS, sizeof *job.waves);
     job.irradiance = (float(*)[3])isogi_allocate(context, count, sizeof *job.irradiance);
     job.error = (float *)isogi_allocate(context, count, sizeof *job.error);
     result = isogi_trace__scene_set(&job.scene, desc, context);
-    if (!job.irradiance || !job.error) result = ISOGI_NO_MEMORY;
-    if (result == ISOGI_OK)
-        result = isogi_parallel(context, (count - 1) / ISOGI_TRACE__TASK + 1, isogi_trace__gather_task, &job, 0, 1);
+    if (!job.irradiance || !job.error || !job.waves) result = ISOGI_NO_MEMORY;
+    for (; job.first < count && result == ISOGI_OK; job.first += tasks * ISOGI_TRACE__TASK) {
+        double from = (double)job.first / (double)count, to;
+        tasks = (count - job.first - 1) / ISOGI_TRACE__TASK + 1, tasks = tasks < ISOGI_TRACE__TASKS ? tasks : ISOGI_TRACE__TASKS;
+        to = (double)(job.first + tasks * ISOGI_TRACE__TASK) / (double)count;
+        result = isogi_parallel(context, tasks, isogi_trace__gather_task, &job, from, to < 1 ? to : 1);
+    }
     if (result == ISOGI_OK) memcpy(irradiance, job.irradiance, count * sizeof *irradiance);
     if (result == ISOGI_OK && error) memcpy(error, job.error, count * sizeof *error);
     isogi_trace__sky_free(&job.scene.sky, context);
+    isogi_release(context, job.waves, ISOGI_TRACE__TASKS, sizeof *job.waves);
     isogi_release(context, job.irradiance, count, sizeof *job.irradiance);
     isogi_release(context, job.error, count, sizeof *job.error);
     return result;
@@ -5503,6 +5700,7 @@ ISOGI_API isogi_result isogi_trace_gather_field(const isogi_trace_desc *desc, is
 #undef ISOGI_TRACE__TEXELS
 #undef ISOGI_TRACE__WAVE
 #undef ISOGI_TRACE__TASK
+#undef ISOGI_TRACE__TASKS
 #undef ISOGI_TRACE__BATCH
 #undef ISOGI_TRACE__MAX_DEPTH
 #undef ISOGI_TRACE__MAX_ORDER
@@ -5524,6 +5722,7 @@ ISOGI_API isogi_result isogi_trace_gather_field(const isogi_trace_desc *desc, is
 #undef ISOGI_TRACE__PROBE_MOST
 #undef ISOGI_TRACE__NEAR_RATIO
 #undef ISOGI_TRACE__GROUP
+#undef ISOGI_TRACE__CHUNK
 #undef ISOGI_TRACE__SWEEP
 #undef ISOGI_TRACE__FLUSH
 #undef ISOGI_TRACE__TASK_SPANS

@@ -170,7 +170,8 @@ typedef struct isogi_volume {
     const void *data;    /* voxel (0,0,0), aligned for its type */
     isogi_type type;
     size_t size[3];      /* voxels along x, y, z; each 1 .. 2^31-1 */
-    ptrdiff_t stride[3]; /* bytes from voxel to voxel along x, y, z, multiples of the type's size; all 0 = packed, x fastest, halo included */
+    ptrdiff_t stride[3]; /* bytes from voxel to voxel along x, y, z, multiples of the type's size; all 0 = packed, x fastest,
+                            halo included */
     double spacing[3];   /* > 0; 0 = 1 */
     double origin[3];    /* world position of voxel (0,0,0), of that of the larger field for a chunk */
     double axes[9];      /* row-major 3x3, column a = world direction of grid axis a, invertible; all 0 = identity */
@@ -234,8 +235,8 @@ ISOGI_API void isogi_vol_to_grid(const isogi_pyramid *pyramid, const double worl
 /* ---- fields given by a function -------------------------------------------------------------------------------------------- */
 
 /* A field that nobody has sampled: f(point) and its gradient in the world's box low..high. Its pyramid serves rays as any other does
-   (intersect, intersect_all, occluded, continue, bundle, next_interval, positions, normals, sample), for every isovalue at once.
-   Hits carry cells of a lattice that only serves skipping: 2, 64 or 1000 cells a side give the same hits. Both kinds of normals, and
+   (intersect, intersect_all, occluded, continue, bundle, bundle_all, next_interval, positions, normals, sample), for every isovalue at
+   once. Hits carry cells of a lattice that only serves skipping: 2, 64 or 1000 cells a side give the same hits. Both kinds of normals, and
    both kinds of samples, are those of the function. isogi_vol_volume tells the lattice, with data = NULL; there is nothing to be meshed,
    updated, baked or volume-rendered: ISOGI_INVALID.
 
@@ -301,8 +302,8 @@ ISOGI_API isogi_result isogi_vol_prefilter(const isogi_volume *volume, float *co
 /* ---- rays ---------------------------------------------------------------------------------------------------------------- */
 
 enum {
-    ISOGI_RAY_CAPPED = 1, /* flag: outside of the volume's box counts as outside of the surface, so the border closes it, but for cells that are
-                             not finite: no ray hits their border */
+    ISOGI_RAY_CAPPED = 1, /* flag: outside of the volume's box counts as outside of the surface, so the border closes it, but for cells that
+                             are not finite: no ray hits their border */
     ISOGI_RAY_ONWARD = 2  /* of isogi_vol_continue: every ray goes on in the direction in which it met its start, so that start.side tells
                              on which side of the surface it is now */
 };
@@ -379,6 +380,9 @@ ISOGI_API isogi_result isogi_vol_bundle(const isogi_pyramid *pyramid, const isog
                                         isogi_hit *hits, isogi_counters *counters);
 ISOGI_API isogi_result isogi_vol_bundle_occluded(const isogi_pyramid *pyramid, const isogi_bundle *bundle, const float (*dirs)[3],
                                                  size_t count, uint8_t *occluded, isogi_counters *counters);
+/* Every hit of each ray, in order, as isogi_vol_intersect_all gives them. */
+ISOGI_API isogi_result isogi_vol_bundle_all(const isogi_pyramid *pyramid, const isogi_bundle *bundle, const float (*dirs)[3], size_t count,
+                                            size_t capacity, isogi_hit *hits, size_t *counts, isogi_counters *counters);
 
 typedef enum isogi_normal_kind {
     ISOGI_NORMAL_SMOOTH = 0, /* gradient of the cubic B-spline: what to shade with */
@@ -466,10 +470,12 @@ ISOGI_API void isogi_vol_mesh_free(const isogi_pyramid *pyramid, isogi_mesh *mes
 #include <emmintrin.h>
 #endif
 /* gcc for Windows does not align its stack for 32-byte vectors: no wide paths there */
-#if defined(ISOGI_VOL__SSE2) && defined(__x86_64__) && (defined(__clang__) || (defined(__GNUC__) && !defined(_WIN32))) && !defined(__TINYC__)
+#if defined(ISOGI_VOL__SSE2) && defined(__x86_64__) && (defined(__clang__) || (defined(__GNUC__) && !defined(_WIN32))) && \
+    !defined(__TINYC__)
 #define ISOGI_VOL__AVX
 #define ISOGI_VOL__TARGET(features) __attribute__((target(features)))
-#define ISOGI_VOL__AVX512 ISOGI_VOL__TARGET("avx512f,avx512bw,avx512dq,avx512vl,avx512bitalg,avx512vbmi,avx512vbmi2,avx512vpopcntdq,gfni,fma,bmi,bmi2")
+#define ISOGI_VOL__AVX512 \
+    ISOGI_VOL__TARGET("avx512f,avx512bw,avx512dq,avx512vl,avx512bitalg,avx512vbmi,avx512vbmi2,avx512vpopcntdq,gfni,fma,bmi,bmi2")
 #include <immintrin.h>
 #endif
 #if defined(__aarch64__) && defined(__ARM_NEON) && !defined(__ARM_BIG_ENDIAN) && !defined(ISOGI_NO_SIMD) && !defined(__TINYC__)
@@ -686,6 +692,19 @@ static int isogi_vol__finite3(const double v[3]) {
 static double isogi_vol__min(double a, double b) { return a < b ? a : b; }
 static double isogi_vol__max(double a, double b) { return a > b ? a : b; }
 static double isogi_vol__largest(double a, double b, double c) { return isogi_vol__max(isogi_vol__max(fabs(a), fabs(b)), fabs(c)); }
+
+/* The length of a vector, 0 if it has none or is not finite. One whose squares are out of a double's range is brought near 1 first. */
+static double isogi_vol__length(double v[3]) {
+    double square = v[0] * v[0] + v[1] * v[1] + v[2] * v[2], largest;
+    int a;
+    if (!(square > 1e-280 && square < 1e300)) {
+        largest = isogi_vol__largest(v[0], v[1], v[2]);
+        if (!isogi_vol__finite3(v) || !(largest > 0)) return 0;
+        for (a = 0; a < 3; a++) v[a] /= largest;
+        square = v[0] * v[0] + v[1] * v[1] + v[2] * v[2];
+    }
+    return isogi_vol__finite64(square) ? sqrt(square) : 0;
+}
 
 /* Into [0, high]; NaN gives 0. */
 static double isogi_vol__clamp(double x, double high) {
@@ -1059,7 +1078,8 @@ static int isogi_vol__last_voxel(size_t block, int cells, size_t voxels) {
 ISOGI_VOL__TARGET("avx2") static int isogi_vol__raw_eights(isogi_type type, const char *p, int count, float *out) {
     int i = 0;
 #define ISOGI_VOL__CONVERT(CONVERT, LOAD, BYTES)                                                                                 \
-    for (; i + 8 <= count; i += 8) _mm256_storeu_ps(out + i, _mm256_cvtepi32_ps(CONVERT(LOAD((const __m128i *)(const void *)(p + i * (BYTES)))))); \
+    for (; i + 8 <= count; i += 8) _mm256_storeu_ps(out + i, _mm256_cvtepi32_ps(CONVERT(LOAD((const __m128i *)(const void *)(p + \
+        i * (BYTES)))))); \
     break;
     switch (type) {
     case ISOGI_U8: ISOGI_VOL__CONVERT(_mm256_cvtepu8_epi32, _mm_loadl_epi64, 1)
@@ -1127,8 +1147,9 @@ static int isogi_vol__bound_row(const float *row, int count, float *least, float
 #ifdef ISOGI_VOL__AVX
 /* The same for the first numbers of up to five rows, eight columns at a time; returns how many. The rows after these, `ahead` bytes further
    on, are sent for: mostly this waits for memory. */
-ISOGI_VOL__TARGET("avx2") static int isogi_vol__bound_eights(const float *const *row, int rows, int count, ptrdiff_t ahead, float *least, float *largest,
-                                                             int *finite) {
+ISOGI_VOL__TARGET("avx2")
+static int isogi_vol__bound_eights(const float *const *row, int rows, int count, ptrdiff_t ahead, float *least, float *largest,
+                                   int *finite) {
     const __m256i unsign = _mm256_set1_epi32(0x7fffffff);
     __m256i most = _mm256_setzero_si256(); /* as integers, what is not finite is at least as large as infinity */
     int i, k;
@@ -1172,13 +1193,15 @@ static int isogi_vol__bound_strip(const isogi_pyramid *p, size_t x, int count, s
     const isogi_volume *v = &p->volume;
     const float *row[5];
     float buffer[5][ISOGI_VOL__STRIP_VOXELS];
-    int rows = isogi_vol__last_voxel(by, 4, v->size[1]) - (int)(4 * by) + 1, z1 = isogi_vol__last_voxel(bz, 4, v->size[2]), z, i, finite = 1;
+    int rows = isogi_vol__last_voxel(by, 4, v->size[1]) - (int)(4 * by) + 1, z1 = isogi_vol__last_voxel(bz, 4, v->size[2]), z, i,
+        finite = 1;
     for (i = 0; i < count; i++) least[i] = FLT_MAX, largest[i] = -FLT_MAX;
     for (z = (int)(4 * bz); z <= z1; z++) {
         int done = 0;
         for (i = 0; i < rows; i++) row[i] = isogi_vol__raw_row(p, x, 4 * by + (size_t)i, (size_t)z, count, buffer[i]);
 #ifdef ISOGI_VOL__AVX
-        if (p->path >= ISOGI_VOL__PATH_AVX2) done = isogi_vol__bound_eights(row, rows, count, row[0] == buffer[0] ? 0 : 4 * v->stride[1], least, largest, &finite);
+        if (p->path >= ISOGI_VOL__PATH_AVX2)
+            done = isogi_vol__bound_eights(row, rows, count, row[0] == buffer[0] ? 0 : 4 * v->stride[1], least, largest, &finite);
 #endif
         for (i = 0; i < rows; i++) finite &= isogi_vol__bound_row(row[i] + done, count - done, least + done, largest + done);
     }
@@ -1361,7 +1384,8 @@ static void isogi_vol__unit_row(const isogi_vol__build_job *job, size_t x, size_
     int i = 0;
     if (v->type == ISOGI_F64) {
         double value[1];
-        for (; i < count; i++) isogi_vol__row(v, (int)x + i, (int)y, (int)z, 1, value), out[i] = (float)((value[0] - p->range[0]) * p->node_scale);
+        for (; i < count; i++)
+            isogi_vol__row(v, (int)x + i, (int)y, (int)z, 1, value), out[i] = (float)((value[0] - p->range[0]) * p->node_scale);
     } else {
         const float *row = isogi_vol__raw_row(p, x, y, z, count, out);
 #ifdef ISOGI_VOL__SSE2
@@ -1405,8 +1429,9 @@ ISOGI_VOL__INLINE void isogi_vol__code_row(const float *row, int leaves, const f
 #ifdef ISOGI_VOL__AVX
 /* unit_row and code_row in one, bit by bit the same, for leaves whose vectors end within the row of raw numbers: a compiler that may
    contract must not join the two. */
-ISOGI_VOL__TARGET("avx2") static void isogi_vol__code_eights(const isogi_vol__build_job *job, const float *row, int leaves, const float *low, const float *scale,
-                                                             uint8_t *const *out, int at) {
+ISOGI_VOL__TARGET("avx2")
+static void isogi_vol__code_eights(const isogi_vol__build_job *job, const float *row, int leaves, const float *low, const float *scale,
+                                   uint8_t *const *out, int at) {
     const __m256 raw_low = _mm256_set1_ps(job->raw_low), raw_scale = _mm256_set1_ps(job->raw_scale);
     int i;
     for (i = 0; i < leaves; i++, row += 4) {
@@ -1439,7 +1464,8 @@ static void isogi_vol__build_strip(const isogi_vol__build_job *job, size_t x0, s
     }
     for (z = 0; z < 5; z++)
         for (y = 0; y < 5; y++) {
-            const size_t at_y = isogi_vol__min_size(4 * by + (size_t)y, p->volume.size[1] - 1), at_z = isogi_vol__min_size(4 * bz + (size_t)z, p->volume.size[2] - 1);
+            const size_t at_y = isogi_vol__min_size(4 * by + (size_t)y, p->volume.size[1] - 1),
+                         at_z = isogi_vol__min_size(4 * bz + (size_t)z, p->volume.size[2] - 1);
             int done = 0;
 #ifdef ISOGI_VOL__AVX
             if (p->path >= ISOGI_VOL__PATH_AVX2 && p->volume.type != ISOGI_F64) {
@@ -1531,42 +1557,57 @@ static isogi_result isogi_vol__fill_nodes(isogi_vol__build_job *job, const isogi
     return ISOGI_OK;
 }
 
-/* What single rays look up, see walk_one. Which of 64 children a ray meets, as far as the order of two axes' planes says: bit 3(a-1) + b-1
-   stands for plane a of axis f before plane b of the next axis (x y, y z, z x). And as far as entry and exit say: bit 3f + a-1 stands for
-   plane a of axis f before it. */
-#define ISOGI_VOL__ORDERS 512
+/* What single rays look up, see walk_one. Planes 1 to 3 of x and y and 1 and 2 of z stand in eight lanes, in this order; in eight more
+   plane 3 of z, planes 0 of x y z, planes 4 of them, and one lane more. A bit for each of eight comparisons says which of 64 children a
+   ray can meet: orders[f], f < 3: planes a = 1 1 1 2 2 2 3 3 of axis f before planes b = 1 2 3 1 2 3 1 2 of the next axis (x y, y z, z x);
+   orders[3]: the first eight planes before the entry; orders[4]: behind the exit; orders[5]: planes 3 of the three pairs of axes, plane 3
+   of z before the entry, and behind the exit. */
 struct isogi_vol__ways {
-    uint64_t before[3][ISOGI_VOL__ORDERS], entered[ISOGI_VOL__ORDERS], left[ISOGI_VOL__ORDERS];
+    uint64_t orders[6][256];
+    int64_t plane[ISOGI_VOL__NODE_LEVELS][2][8]; /* number of a lane's plane, in cells */
     uint8_t child[8][64], voxel[8][128]; /* children of nodes and voxels of leaves with axes counted backwards: bit a of the index */
     float scale[256];                    /* steps of a leaf in a unit of nodes, by how far its bounds are apart */
+    uint64_t above[ISOGI_VOL__NODE_LEVELS], digit[ISOGI_VOL__NODE_LEVELS]; /* digits of packed cells above children of a level;
+                                                                              where those have theirs */
 };
 
-/* What is left of 64 children for every choice of nine bits, each of which leaves some if it is 0, others if it is 1. */
-static void isogi_vol__set_orders(uint64_t table[ISOGI_VOL__ORDERS], uint64_t (*leaves)[2]) {
+/* What is left of 64 children for every choice of eight bits, each of which leaves some if it is 0, others if it is 1. */
+static void isogi_vol__set_orders(uint64_t table[256], uint64_t (*leaves)[2]) {
     int bit, i;
     table[0] = ~(uint64_t)0;
-    for (bit = 0; bit < 9; bit++)
+    for (bit = 0; bit < 8; bit++)
         for (i = 0; i < 1 << bit; i++) table[i + (1 << bit)] = table[i] & leaves[bit][1], table[i] &= leaves[bit][0];
 }
 
 static void isogi_vol__set_ways(struct isogi_vol__ways *ways) {
-    uint64_t below[3][4], leaves[9][2];
+    static const int plane[2][8] = {{1, 2, 3, 1, 2, 3, 1, 2}, {3, 0, 0, 0, 4, 4, 4, 4}};
+    const uint64_t all = ~(uint64_t)0;
+    uint64_t below[3][4], leaves[9][2], rest[8][2];
     int i, f, a, b;
     for (a = 1; a < 4; a++) {
         below[0][a] = 0x1111111111111111u * (uint64_t)((1 << a) - 1), below[1][a] = 0x0001000100010001u * (uint64_t)((1 << 4 * a) - 1);
         below[2][a] = ((uint64_t)1 << 16 * a) - 1;
     }
+    for (i = 0; i < 8; i++) rest[i][0] = rest[i][1] = all;
     for (f = 0; f < 3; f++) {
         const uint64_t *first = below[f], *second = below[(f + 1) % 3];
         /* not on the near side of the plane that comes first and on the far side of the other */
         for (a = 1; a < 4; a++)
             for (b = 1; b < 4; b++) leaves[3 * a + b - 4][0] = first[a] | ~second[b], leaves[3 * a + b - 4][1] = ~first[a] | second[b];
-        isogi_vol__set_orders(ways->before[f], leaves);
+        isogi_vol__set_orders(ways->orders[f], leaves);
+        rest[f][0] = leaves[8][0], rest[f][1] = leaves[8][1];
     }
-    for (i = 0; i < 9; i++) leaves[i][0] = ~(uint64_t)0, leaves[i][1] = ~below[i / 3][i % 3 + 1];
-    isogi_vol__set_orders(ways->entered, leaves);
-    for (i = 0; i < 9; i++) leaves[i][0] = below[i / 3][i % 3 + 1], leaves[i][1] = ~(uint64_t)0;
-    isogi_vol__set_orders(ways->left, leaves);
+    for (i = 0; i < 8; i++) leaves[i][0] = all, leaves[i][1] = ~below[i / 3][i % 3 + 1];
+    isogi_vol__set_orders(ways->orders[3], leaves);
+    for (i = 0; i < 8; i++) leaves[i][1] = below[i / 3][i % 3 + 1];
+    isogi_vol__set_orders(ways->orders[4], leaves);
+    rest[3][1] = ~below[2][3], rest[4][1] = below[2][3];
+    isogi_vol__set_orders(ways->orders[5], rest);
+    for (i = 0; i < ISOGI_VOL__NODE_LEVELS; i++) {
+        for (a = 0; a < 16; a++) ways->plane[i][a / 8][a % 8] = (int64_t)plane[a / 8][a % 8] << 2 * i;
+        ways->above[i] = 0x0000ffffffffffffu & ~(0x000100010001u * (((uint64_t)4 << 2 * i) - 1)),
+        ways->digit[i] = (uint64_t)0x000300030003u << 2 * i;
+    }
     memset(ways->voxel, 0, sizeof ways->voxel);
     for (i = 0; i < 256; i++) ways->scale[i] = ISOGI_VOL__CODES / (float)(i + 1);
     for (f = 0; f < 8; f++) {
@@ -2114,7 +2155,8 @@ static void isogi_vol__copy_points(const isogi_vol__points *at, size_t first, in
 ISOGI_VOL__AVX2 static void isogi_vol__locate_avx2(const isogi_pyramid *p, const isogi_vol__points *at, size_t first, int n,
                                                    isogi_vol__block *b) {
     const double *m = p->to_grid, *o = p->origin;
-    const __m256d magic = _mm256_set1_pd(6755399441055744.0); /* 1.5 * 2^52: added to a number, it leaves it as an integer in the low bits */
+    const __m256d magic = _mm256_set1_pd(6755399441055744.0); /* 1.5 * 2^52: added to a number,
+                                                                 it leaves it as an integer in the low bits */
     int i, r;
     for (i = 0; i < ((n + 15) & ~15); i += 4) {
         __m256d k0, k1, k2, g[3], offset = _mm256_setzero_pd();
@@ -2140,7 +2182,8 @@ ISOGI_VOL__AVX2 static void isogi_vol__locate_avx2(const isogi_pyramid *p, const
             __m256d whole;
             __m128i cell;
             g[r] = _mm256_min_pd(_mm256_max_pd(g[r], _mm256_setzero_pd()), _mm256_set1_pd(p->box[r])); /* NaN gives 0 */
-            cell = _mm_max_epi32(_mm_min_epi32(_mm256_cvttpd_epi32(g[r]), _mm_set1_epi32(p->cells[r] - 1)), _mm_setzero_si128()); /* in any case */
+            /* in any case */
+            cell = _mm_max_epi32(_mm_min_epi32(_mm256_cvttpd_epi32(g[r]), _mm_set1_epi32(p->cells[r] - 1)), _mm_setzero_si128());
             whole = _mm256_cvtepi32_pd(cell);
             _mm_storeu_si128((__m128i *)(void *)&b->cell[r][i], cell);
             _mm_storeu_ps(&b->local[r][i], _mm256_cvtpd_ps(_mm256_sub_pd(g[r], whole)));
@@ -2168,7 +2211,8 @@ ISOGI_VOL__AVX512 static void isogi_vol__locate_avx512(const isogi_pyramid *p, c
         __m512i voxel = _mm512_setzero_si512();
         for (r = 0; r < 3; r++) {
             const __m512i from = _mm512_add_epi32(threes, _mm512_set1_epi32(r)), end = _mm512_set1_epi32(p->cells[r] - 1);
-            const __m512 w = _mm512_mask_permutexvar_ps(_mm512_permutex2var_ps(k0, from, k1), (__mmask16)(r < 2 ? 0xf800 : 0xfc00), from, k2);
+            const __m512 w =
+                _mm512_mask_permutexvar_ps(_mm512_permutex2var_ps(k0, from, k1), (__mmask16)(r < 2 ? 0xf800 : 0xfc00), from, k2);
             const __m512 high = _mm512_set1_ps(g->high[r]), guess = _mm512_fmadd_ps(high, w, _mm512_set1_ps(g->at_high[r] - 1.0f / 512));
             const __m512 clamped = _mm512_min_ps(_mm512_max_ps(guess, zero), _mm512_set1_ps((float)(p->cells[r] - 1))); /* NaN gives 0 */
             __m512i cell = _mm512_max_epi32(_mm512_min_epi32(_mm512_cvttps_epi32(clamped), end), _mm512_setzero_si512()); /* in any case */
@@ -2282,7 +2326,8 @@ ISOGI_VOL__INLINE const char *isogi_vol__first_tap(const isogi_volume *v, ptrdif
 #define ISOGI_VOL__ALONG_Y(NAME, L, w)                                                                                           \
     ISOGI_VOL__MADD_##NAME(w##3, row3, ISOGI_VOL__MADD_##NAME(w##2, row2, ISOGI_VOL__MADD_##NAME(w##1, row1, L##mul_ps(w##0, row0))))
 #define ISOGI_VOL__CUBIC(NAME, ATTRIBUTES, V, L, WIDTH)                                                                          \
-    ATTRIBUTES static void isogi_vol__cubic_##NAME(const isogi_vol__taps_at *taps, const isogi_vol__block *b, int from, int n, float *sum) { \
+    ATTRIBUTES static void isogi_vol__cubic_##NAME(const isogi_vol__taps_at *taps, const isogi_vol__block *b, int from, int n, \
+        float *sum) { \
         const float(*powers)[4] = taps->powers;                                                                                  \
         const V c0 = ISOGI_VOL__TILE_##NAME(powers[0]), c1 = ISOGI_VOL__TILE_##NAME(powers[1]), c2 = ISOGI_VOL__TILE_##NAME(powers[2]); \
         const V c3 = ISOGI_VOL__TILE_##NAME(powers[3]), to_value = ISOGI_VOL__TILE_##NAME(powers[4]);                            \
@@ -2464,9 +2509,12 @@ ISOGI_VOL__AVX512 static void isogi_vol__trilinear_block_avx512(const isogi_volu
             }
             for (r = 0; r < 4; r++) {
                 const char *row = (const char *)v->data + (r & 1 ? dy : 0) + (r & 2 ? dz : 0);
-                const __m512i all = _mm512_srlv_epi32(_mm512_inserti64x4(_mm512_castsi256_si512(_mm512_i64gather_epi32(at0, (const void *)row, 1)),
-                                                                         _mm512_i64gather_epi32(at1, (const void *)row, 1), 1), shift);
-                const __m512i first = _mm512_sll_epi32(all, unused), second = _mm512_sll_epi32(width == 1 ? _mm512_srli_epi32(all, 8) : _mm512_srli_epi32(all, 16), unused);
+                const __m512i all =
+                    _mm512_srlv_epi32(_mm512_inserti64x4(_mm512_castsi256_si512(_mm512_i64gather_epi32(at0, (const void *)row, 1)),
+                                                         _mm512_i64gather_epi32(at1, (const void *)row, 1), 1),
+                                      shift);
+                const __m512i first = _mm512_sll_epi32(all, unused),
+                              second = _mm512_sll_epi32(width == 1 ? _mm512_srli_epi32(all, 8) : _mm512_srli_epi32(all, 16), unused);
                 c[2 * r] = _mm512_cvtepi32_ps(is_signed ? _mm512_sra_epi32(first, unused) : _mm512_srl_epi32(first, unused));
                 c[2 * r + 1] = _mm512_cvtepi32_ps(is_signed ? _mm512_sra_epi32(second, unused) : _mm512_srl_epi32(second, unused));
             }
@@ -3315,7 +3363,8 @@ ISOGI_VOL__INLINE void isogi_vol__all_corners(uint64_t *low, uint64_t *high) {
 ISOGI_VOL__INLINE uint64_t isogi_vol__pack_cells(uint64_t low, uint64_t high) {
     const uint64_t slices = 0x0007ffff0007ffffu; /* of 4x4 bits each in 5x5, two at a time */
     uint64_t a = ((low & 0x1ffffff) | low >> 25 << 32) & slices, b = ((low >> 50 | (high << 14 & 0x1ffffff)) | high >> 11 << 32) & slices;
-#define ISOGI_VOL__ROWS(v) (((v) & 0x0000000f0000000fu) | ((v) >> 1 & 0x000000f0000000f0u) | ((v) >> 2 & 0x00000f0000000f00u) | ((v) >> 3 & 0x0000f0000000f000u))
+#define ISOGI_VOL__ROWS(v) (((v) & 0x0000000f0000000fu) | ((v) >> 1 & 0x000000f0000000f0u) | ((v) >> 2 & 0x00000f0000000f00u) | \
+    ((v) >> 3 & 0x0000f0000000f000u))
     a = ISOGI_VOL__ROWS(a), b = ISOGI_VOL__ROWS(b);
     return (a & 0xffff) | a >> 16 | (b & 0xffff) << 32 | b >> 32 << 48;
 }
@@ -3349,7 +3398,8 @@ ISOGI_VOL__INLINE uint64_t isogi_vol__leaf_mask(const uint8_t node[128], float l
         for (i = 0; i < 8; i++) {
             const __m128i code = _mm_load_si128((const __m128i *)(const void *)(node + 16 * i));
             in[i / 4] |= (uint64_t)(uint32_t)_mm_movemask_epi8(_mm_cmpeq_epi8(_mm_max_epu8(code, inside), code)) << 16 * (i % 4);
-            out[i / 4] |= (uint64_t)(uint32_t)(0xffff ^ _mm_movemask_epi8(_mm_cmpeq_epi8(_mm_max_epu8(code, outside), code))) << 16 * (i % 4);
+            out[i / 4] |= (uint64_t)(uint32_t)(0xffff ^ _mm_movemask_epi8(_mm_cmpeq_epi8(_mm_max_epu8(code, outside), code)))
+                          << 16 * (i % 4);
         }
     }
 #else
@@ -3378,9 +3428,12 @@ static int isogi_vol__machine(void) {
 ISOGI_VOL__TARGET("avx2") ISOGI_VOL__INLINE uint64_t isogi_vol__node_mask_avx2(const uint8_t node[128], int low, int high) {
     __m256i l = _mm256_set1_epi8((char)low), h = _mm256_set1_epi8((char)high);
     const __m256i *v = (const __m256i *)(const void *)node;
-    __m256i least0 = _mm256_load_si256(v), least1 = _mm256_load_si256(v + 1), most0 = _mm256_load_si256(v + 2), most1 = _mm256_load_si256(v + 3);
-    __m256i in0 = _mm256_and_si256(_mm256_cmpeq_epi8(_mm256_min_epu8(least0, h), least0), _mm256_cmpeq_epi8(_mm256_max_epu8(most0, l), most0));
-    __m256i in1 = _mm256_and_si256(_mm256_cmpeq_epi8(_mm256_min_epu8(least1, h), least1), _mm256_cmpeq_epi8(_mm256_max_epu8(most1, l), most1));
+    __m256i least0 = _mm256_load_si256(v), least1 = _mm256_load_si256(v + 1), most0 = _mm256_load_si256(v + 2),
+            most1 = _mm256_load_si256(v + 3);
+    __m256i in0 =
+        _mm256_and_si256(_mm256_cmpeq_epi8(_mm256_min_epu8(least0, h), least0), _mm256_cmpeq_epi8(_mm256_max_epu8(most0, l), most0));
+    __m256i in1 =
+        _mm256_and_si256(_mm256_cmpeq_epi8(_mm256_min_epu8(least1, h), least1), _mm256_cmpeq_epi8(_mm256_max_epu8(most1, l), most1));
     return (uint64_t)(uint32_t)_mm256_movemask_epi8(in0) | (uint64_t)(uint32_t)_mm256_movemask_epi8(in1) << 32;
 }
 
@@ -3390,8 +3443,10 @@ ISOGI_VOL__INLINE uint64_t isogi_vol__leaf_mask_avx2(const uint8_t node[128], fl
     __m256i inside, outside;
     isogi_vol__open_leaf(leaf, node, level);
     inside = _mm256_set1_epi8((char)leaf->inside), outside = _mm256_set1_epi8((char)leaf->outside);
-#define ISOGI_VOL__LEAST(i, a) (uint64_t)(uint32_t)_mm256_movemask_epi8(_mm256_cmpeq_epi8(_mm256_max_epu8(_mm256_load_si256(v + (i)), a), _mm256_load_si256(v + (i))))
-    return isogi_vol__mixed_cells(leaf, ISOGI_VOL__LEAST(0, inside) | ISOGI_VOL__LEAST(1, inside) << 32, ISOGI_VOL__LEAST(2, inside) | ISOGI_VOL__LEAST(3, inside) << 32,
+#define ISOGI_VOL__LEAST(i, a) (uint64_t)(uint32_t)_mm256_movemask_epi8(_mm256_cmpeq_epi8(_mm256_max_epu8(_mm256_load_si256(v + (i)), a), \
+    _mm256_load_si256(v + (i))))
+    return isogi_vol__mixed_cells(leaf, ISOGI_VOL__LEAST(0, inside) | ISOGI_VOL__LEAST(1, inside) << 32,
+                                  ISOGI_VOL__LEAST(2, inside) | ISOGI_VOL__LEAST(3, inside) << 32,
                                   ~(ISOGI_VOL__LEAST(0, outside) | ISOGI_VOL__LEAST(1, outside) << 32),
                                   ~(ISOGI_VOL__LEAST(2, outside) | ISOGI_VOL__LEAST(3, outside) << 32));
 #undef ISOGI_VOL__LEAST
@@ -3411,8 +3466,9 @@ ISOGI_VOL__TARGET("avx2") ISOGI_VOL__INLINE __m256d isogi_vol__lane(int i) {
 /* The corners x + 2y of one z, raw. */
 ISOGI_VOL__TARGET("avx2") ISOGI_VOL__INLINE __m256d isogi_vol__corners4(const isogi_volume *v, const char *p, ptrdiff_t dx, ptrdiff_t dy) {
     const char *q = p + dy;
-#define ISOGI_VOL__FOUR(T)                                                                                                                   \
-    _mm256_set_pd((double)*(const T *)(const void *)(q + dx), (double)*(const T *)(const void *)q, (double)*(const T *)(const void *)(p + dx), \
+#define ISOGI_VOL__FOUR(T) \
+    _mm256_set_pd((double)*(const T *)(const void *)(q + dx), (double)*(const T *)(const void *)q, \
+        (double)*(const T *)(const void *)(p + dx), \
                   (double)*(const T *)(const void *)p)
     switch (v->type) {
     case ISOGI_U8: return ISOGI_VOL__FOUR(uint8_t);
@@ -3493,9 +3549,11 @@ ISOGI_VOL__TARGET("avx2") static int isogi_vol__mixed_cell_avx2(isogi_vol__walk 
     f0 = isogi_vol__lerp4(low, high, ISOGI_VOL__LANE(from, 2), ISOGI_VOL__LANE(rest0, 2)); /* what is taken at its end: {none, y, x, xy} */
     f1 = isogi_vol__lerp4(low, high, ISOGI_VOL__LANE(to, 2), ISOGI_VOL__LANE(rest1, 2));   /* {z, yz, xz, xyz} */
 #undef ISOGI_VOL__LANE
-    b = _mm256_blend_pd(_mm256_permute4x64_pd(f0, 0x08), _mm256_permute4x64_pd(f1, 0xd0), 12);                             /* none, x, yz, xyz */
+    /* none, x, yz, xyz */
+    b = _mm256_blend_pd(_mm256_permute4x64_pd(f0, 0x08), _mm256_permute4x64_pd(f1, 0xd0), 12);
     b = _mm256_add_pd(b, _mm256_blend_pd(_mm256_blend_pd(f0, f1, 4), zero, 9));                                            /* y, xz */
-    b = _mm256_add_pd(b, _mm256_blend_pd(_mm256_blend_pd(_mm256_permute4x64_pd(f1, 0), _mm256_permute4x64_pd(f0, 0xff), 4), zero, 9)); /* z, xy */
+    /* z, xy */
+    b = _mm256_add_pd(b, _mm256_blend_pd(_mm256_blend_pd(_mm256_permute4x64_pd(f1, 0), _mm256_permute4x64_pd(f0, 0xff), 4), zero, 9));
     b = _mm256_mul_pd(b, _mm256_setr_pd(1, 1.0 / 3, 1.0 / 3, 1));
     _mm256_storeu_pd(cubic.b, b);
     if (w->deflate) {
@@ -3586,7 +3644,8 @@ static int isogi_vol__clip(isogi_vol__walk *w, double tmin, double tmax) {
     }
     if (!(enter <= leave)) return 0;
     for (a = 0; a < 3; a++) w->origin[a] = isogi_vol__clamp(w->origin[a] + enter * w->dir[a], (double)w->pyramid->cells[a]);
-    if (w->entry_axis >= 0) w->origin[w->entry_axis] = w->dir[w->entry_axis] > 0 ? 0 : w->pyramid->cells[w->entry_axis]; /* on the face, whatever rounding says */
+    /* on the face, whatever rounding says */
+    if (w->entry_axis >= 0) w->origin[w->entry_axis] = w->dir[w->entry_axis] > 0 ? 0 : w->pyramid->cells[w->entry_axis];
     w->base = enter, w->t = 0, w->end = ISOGI_VOL__UNLIMITED;
     for (a = 0; a < 3; a++)
         if (w->dir[a] > 0 || w->dir[a] < 0)
@@ -3753,7 +3812,8 @@ static int isogi_vol__begin_start(const isogi_vol__batch *b, size_t i, isogi_vol
     if (isogi_vol__is_nan(b->isovalue) || isogi_vol__is_nan(tmax) || !(tmax >= 0) || !isogi_vol__aim(w, b->dirs[i], 0, tmax)) return 0;
     w->entry_axis = -1;
     /* not a cap that is left outwards */
-    return w->deflate || w->inside > 0 || (w->inside < 0 && !(w->end * isogi_vol__largest(w->dir[0], w->dir[1], w->dir[2]) < ISOGI_VOL__ON_SURFACE));
+    return w->deflate || w->inside > 0 ||
+           (w->inside < 0 && !(w->end * isogi_vol__largest(w->dir[0], w->dir[1], w->dir[2]) < ISOGI_VOL__ON_SURFACE));
 }
 
 /* Sets a walk up; 0: there is nothing to walk. */
@@ -3902,7 +3962,7 @@ typedef struct isogi_vol__stride {
 
 /* Walks the children of node (x, y, z) of a level: cells of level 0, nodes of the level below else. `from` stands on the node.
    1: hit; 2: the segment has ended; 0: go on. */
-#define ISOGI_VOL__WALK(NAME, TARGET, LEVEL, MASK, CHILD)                                                                                        \
+#define ISOGI_VOL__WALK(NAME, TARGET, LEVEL, MASK, CHILD) \
     TARGET ISOGI_VOL__INLINE int NAME(isogi_vol__stride *s, const isogi_vol__place *from, int x, int y, int z) {                          \
         const isogi_pyramid *p = s->w->pyramid;                                                                                    \
         const size_t node = isogi_vol__node_at(p, LEVEL, (size_t)x, (size_t)y, (size_t)z);                                         \
@@ -3919,7 +3979,8 @@ typedef struct isogi_vol__stride {
         do {                                                                                                                       \
             const uint32_t child = place.state ^ flip;                                                                             \
             if (mask >> (child & 63) & 1) {                                                                                        \
-                const int result = CHILD(s, &place, 4 * x + (int)(child & 3), 4 * y + (int)(child >> 2 & 3), 4 * z + (int)(child >> 4 & 3)); \
+                const int result = CHILD(s, &place, 4 * x + (int)(child & 3), 4 * y + (int)(child >> 2 & 3), \
+                    4 * z + (int)(child >> 4 & 3)); \
                 if (result) return result;                                                                                         \
             } else s->w->deflate = 0;                                                                                              \
             s->now = isogi_vol__step(&place, &s->axis);                                                                            \
@@ -3951,7 +4012,8 @@ typedef struct isogi_vol__stride {
             if (next[2] < next[axis]) axis = 2;                                                                                    \
             place.x = next[0], place.y = next[1], place.z = next[2];                                                               \
             result = LARGE(&s, &place, k->mirror[0] ? (k->mirror[0] >> 6) - base[0] : base[0],                                     \
-                           k->mirror[1] ? (k->mirror[1] >> 6) - base[1] : base[1], k->mirror[2] ? (k->mirror[2] >> 6) - base[2] : base[2]); \
+                           k->mirror[1] ? (k->mirror[1] >> 6) - base[1] : base[1], \
+                               k->mirror[2] ? (k->mirror[2] >> 6) - base[2] : base[2]); \
             if (result) return result == 1;                                                                                        \
             s.now = next[axis], s.axis = axis;                                                                                     \
             if (s.now >= k->end) return 0;                                                                                         \
@@ -4007,23 +4069,28 @@ static int isogi_vol__walk_fast(isogi_vol__walk *w, const isogi_vol__ticks *k, i
 #endif
 #define ISOGI_VOL__POOL 64
 
-/* One number for each ray of the pool. */
+/* One number for each ray of the pool. What stays the same all along comes last, behind the levels that are not needed. */
 typedef struct __attribute__((aligned(64))) isogi_vol__pool {
-    double origin[3][ISOGI_VOL__POOL], dir[3][ISOGI_VOL__POOL];
-    double inverse[3][ISOGI_VOL__POOL]; /* of dir; huge on axes on which the ray stands still; its sign bit: children are counted backwards */
+    double dir[3][ISOGI_VOL__POOL];
+    double inverse[3][ISOGI_VOL__POOL]; /* of dir; huge on axes on which the ray stands still; its sign bit:
+                                           children are counted backwards */
     int64_t end[ISOGI_VOL__POOL];       /* of the segment, as a time of a plane, axis 3 */
-    uint64_t mask[ISOGI_VOL__NODE_LEVELS][ISOGI_VOL__POOL]; /* children still to come of the node of each level, counted backwards on falling axes */
     uint64_t pending[ISOGI_VOL__POOL];  /* levels above the leaves that have any */
     int64_t level[ISOGI_VOL__POOL];     /* of the node to be answered next; -1: none */
     uint64_t address[ISOGI_VOL__POOL];  /* of that node, or of the leaf whose cells are being looked at */
     int64_t cell[ISOGI_VOL__POOL];      /* x | y << 16 | z << 32 of the last cell of the way; nodes are what its leading digits say */
     int64_t flip[ISOGI_VOL__POOL];      /* child = child counted backwards ^ flip */
+    double step[ISOGI_VOL__POOL];       /* the isovalue in steps of the leaf, for voxels of code + 0.5 */
+    int64_t side[ISOGI_VOL__POOL];      /* 1 inside, 0 outside, -1 not known; of these 2 side - 4 while leaving a surface:
+                                           only to be looked at in double */
+    double stop[ISOGI_VOL__POOL], deflated[ISOGI_VOL__POOL]; /* of the walk; stop: its end */
+    uint64_t ray[ISOGI_VOL__POOL];
+    uint64_t mask[ISOGI_VOL__NODE_LEVELS][ISOGI_VOL__POOL]; /* children still to come of the node of each level,
+                                                               counted backwards on falling axes */
+    /* the same for all rays of a bundle that begins within the box */
+    double origin[3][ISOGI_VOL__POOL], base[ISOGI_VOL__POOL], isovalue[ISOGI_VOL__POOL]; /* of the walk */
     int64_t low[ISOGI_VOL__POOL], beyond[ISOGI_VOL__POOL]; /* what the isovalue can be in 8 bits: low .. beyond - 1 */
     double level_units[ISOGI_VOL__POOL]; /* and unrounded */
-    double step[ISOGI_VOL__POOL];       /* the isovalue in steps of the leaf, for voxels of code + 0.5 */
-    int64_t side[ISOGI_VOL__POOL];      /* 1 inside, 0 outside, -1 not known; of these 2 side - 4 while leaving a surface: only to be looked at in double */
-    double base[ISOGI_VOL__POOL], stop[ISOGI_VOL__POOL], isovalue[ISOGI_VOL__POOL], deflated[ISOGI_VOL__POOL]; /* of the walk; stop: its end */
-    uint64_t ray[ISOGI_VOL__POOL];
     int64_t entry_axis[ISOGI_VOL__POOL];
 } isogi_vol__pool;
 
@@ -4032,6 +4099,7 @@ typedef struct isogi_vol__turn {
     const isogi_pyramid *p;
     __m512i first, parents0, parents1; /* of node level n - 1 at n */
     int levels, any;
+    int shared;                        /* the rays are a bundle that begins within the box */
     uint64_t choosing;                 /* rays that need their next node, a bit each */
     int leaves, doubts;
     uint8_t at_leaf[ISOGI_VOL__POOL + 8], in_doubt[ISOGI_VOL__POOL + 8];
@@ -4046,15 +4114,17 @@ typedef struct isogi_vol__turn {
 #define ISOGI_VOL__FIRST(f, a, s, b) ~(ISOGI_VOL__BELOW_##f(a) & ~ISOGI_VOL__BELOW_##s(b))
 #define ISOGI_VOL__LATER(f, a, s, b) ~(~ISOGI_VOL__BELOW_##f(a) & ISOGI_VOL__BELOW_##s(b))
 #define ISOGI_VOL__ALL64(x) _mm512_set1_epi64((int64_t)(x))
-#define ISOGI_VOL__PAIR(f, a, g, b) ISOGI_VOL__FIRST(f, a, g, b), ISOGI_VOL__LATER(f, a, g, b)
+#define ISOGI_VOL__PAIR(f, a, g, b) ISOGI_VOL__FIRST(f, a, g, b) ^ ISOGI_VOL__LATER(f, a, g, b), ISOGI_VOL__LATER(f, a, g, b)
 #define ISOGI_VOL__ROW(f, a, g) ISOGI_VOL__PAIR(f, a, g, 1), ISOGI_VOL__PAIR(f, a, g, 2), ISOGI_VOL__PAIR(f, a, g, 3)
 #define ISOGI_VOL__ENDS(f) \
-    ~ISOGI_VOL__BELOW_##f(1), ISOGI_VOL__BELOW_##f(1), ~ISOGI_VOL__BELOW_##f(2), ISOGI_VOL__BELOW_##f(2), ~ISOGI_VOL__BELOW_##f(3), ISOGI_VOL__BELOW_##f(3)
-/* For axes f, g = (x, y), (y, z), (z, x) and planes a, b = 1..3: if a of f comes before b of g, and if it comes later. Then for each
-   plane: if it lies before the entry, and if it lies behind the exit. */
-static const uint64_t isogi_vol__orders[72] = {
-    ISOGI_VOL__ROW(0, 1, 1), ISOGI_VOL__ROW(0, 2, 1), ISOGI_VOL__ROW(0, 3, 1), ISOGI_VOL__ROW(1, 1, 2), ISOGI_VOL__ROW(1, 2, 2), ISOGI_VOL__ROW(1, 3, 2),
-    ISOGI_VOL__ROW(2, 1, 0), ISOGI_VOL__ROW(2, 2, 0), ISOGI_VOL__ROW(2, 3, 0), ISOGI_VOL__ENDS(0),       ISOGI_VOL__ENDS(1),       ISOGI_VOL__ENDS(2)};
+    ~ISOGI_VOL__BELOW_##f(1), ISOGI_VOL__BELOW_##f(1), ~ISOGI_VOL__BELOW_##f(2), ISOGI_VOL__BELOW_##f(2), ~ISOGI_VOL__BELOW_##f(3), \
+        ISOGI_VOL__BELOW_##f(3)
+/* For axes f, g = (x, y), (y, z), (z, x) and planes a, b = 1..3: what it changes if a of f comes before b of g, and what is left if it
+   comes later. Then for each plane: if it lies before the entry, and if it lies behind the exit. */
+static const uint64_t isogi_vol__orders[72] = {ISOGI_VOL__ROW(0, 1, 1), ISOGI_VOL__ROW(0, 2, 1), ISOGI_VOL__ROW(0, 3, 1),
+                                               ISOGI_VOL__ROW(1, 1, 2), ISOGI_VOL__ROW(1, 2, 2), ISOGI_VOL__ROW(1, 3, 2),
+                                               ISOGI_VOL__ROW(2, 1, 0), ISOGI_VOL__ROW(2, 2, 0), ISOGI_VOL__ROW(2, 3, 0),
+                                               ISOGI_VOL__ENDS(0),      ISOGI_VOL__ENDS(1),      ISOGI_VOL__ENDS(2)};
 #undef ISOGI_VOL__PAIR
 #undef ISOGI_VOL__ROW
 #undef ISOGI_VOL__ENDS
@@ -4065,41 +4135,51 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE __m512i isogi_vol__when(__m512d plane, __m51
     return _mm512_ternarylogic_epi64(_mm512_castpd_si512(t), ISOGI_VOL__ALL64(~(uint64_t)3), _mm512_set1_epi64(axis), 0xea);
 }
 
+/* Where planes that lie before the ray begins are cut off anyway, their times may be negative, and in whatever order. */
+ISOGI_VOL__AVX512 ISOGI_VOL__INLINE __m512i isogi_vol__time_of(__m512d plane, __m512d origin, __m512d inverse, int axis) {
+    const __m512i t = _mm512_castpd_si512(_mm512_mul_pd(_mm512_sub_pd(plane, origin), inverse));
+    return _mm512_ternarylogic_epi64(t, ISOGI_VOL__ALL64(~(uint64_t)3), _mm512_set1_epi64(axis), 0xea);
+}
+
 /* Which children of their nodes the rays from slot i on pass, in their own order; cell: the nodes' corners. */
 ISOGI_VOL__AVX512 static __m512i isogi_vol__passed(const isogi_vol__pool *s, int i, __m512i level, __m512i cell) {
     const __m512i shift = _mm512_add_epi64(level, level);
     const __m512i child = _mm512_sllv_epi64(_mm512_set1_epi64(1), shift), whole = _mm512_slli_epi64(child, 2);
     const __m512i field = _mm512_set1_epi64(0xffff);
     __m512i in, out;
-#define ISOGI_VOL__AXIS(a)                                                                                                                      \
-    const __m512d origin##a = _mm512_load_pd(&s->origin[a][i]), inverse##a = _mm512_load_pd(&s->inverse[a][i]);                                 \
-    const __m512i fall##a = _mm512_srai_epi64(_mm512_castpd_si512(inverse##a), 63);                                                             \
-    const __m512d step##a = _mm512_cvtepi64_pd(_mm512_sub_epi64(_mm512_xor_si512(child, fall##a), fall##a));                                    \
-    const __m512d plane##a##0 = _mm512_cvtepi64_pd(_mm512_add_epi64(_mm512_and_si512(_mm512_srli_epi64(cell, 16 * a), field), _mm512_and_si512(whole, fall##a))); \
-    const __m512d plane##a##1 = _mm512_add_pd(plane##a##0, step##a), plane##a##2 = _mm512_add_pd(plane##a##1, step##a);                         \
-    const __m512d plane##a##3 = _mm512_add_pd(plane##a##2, step##a), plane##a##4 = _mm512_add_pd(plane##a##3, step##a);                         \
-    const __m512i t##a##0 = isogi_vol__when(plane##a##0, origin##a, inverse##a, a), t##a##1 = isogi_vol__when(plane##a##1, origin##a, inverse##a, a); \
-    const __m512i t##a##2 = isogi_vol__when(plane##a##2, origin##a, inverse##a, a), t##a##3 = isogi_vol__when(plane##a##3, origin##a, inverse##a, a); \
-    const __m512i t##a##4 = isogi_vol__when(plane##a##4, origin##a, inverse##a, a);
+#define ISOGI_VOL__AXIS(a) \
+    const __m512d origin##a = _mm512_load_pd(&s->origin[a][i]), inverse##a = _mm512_load_pd(&s->inverse[a][i]); \
+    const __m512i fall##a = _mm512_srai_epi64(_mm512_castpd_si512(inverse##a), 63); \
+    const __m512d step##a = _mm512_cvtepi64_pd(_mm512_sub_epi64(_mm512_xor_si512(child, fall##a), fall##a)); \
+    const __m512d plane##a##0 = _mm512_cvtepi64_pd(_mm512_add_epi64(_mm512_and_si512(_mm512_srli_epi64(cell, 16 * a), field), \
+        _mm512_and_si512(whole, fall##a))); \
+    const __m512d plane##a##1 = _mm512_add_pd(plane##a##0, step##a), plane##a##2 = _mm512_add_pd(plane##a##1, step##a); \
+    const __m512d plane##a##3 = _mm512_add_pd(plane##a##2, step##a), plane##a##4 = _mm512_add_pd(plane##a##3, step##a); \
+    const __m512i t##a##0 = isogi_vol__time_of(plane##a##0, origin##a, inverse##a, a), \
+        t##a##1 = isogi_vol__time_of(plane##a##1, origin##a, inverse##a, a); \
+    const __m512i t##a##2 = isogi_vol__time_of(plane##a##2, origin##a, inverse##a, a), \
+        t##a##3 = isogi_vol__time_of(plane##a##3, origin##a, inverse##a, a); \
+    const __m512i t##a##4 = isogi_vol__time_of(plane##a##4, origin##a, inverse##a, a);
     ISOGI_VOL__AXIS(0)
     ISOGI_VOL__AXIS(1)
     ISOGI_VOL__AXIS(2)
 #undef ISOGI_VOL__AXIS
-    in = _mm512_max_epi64(_mm512_max_epi64(t00, t10), _mm512_max_epi64(t20, _mm512_set1_epi64(3))); /* planes behind the origin come before */
+    /* planes behind the origin come before */
+    in = _mm512_max_epi64(_mm512_max_epi64(t00, t10), _mm512_max_epi64(t20, _mm512_set1_epi64(3)));
     out = _mm512_min_epi64(_mm512_min_epi64(t04, t14), _mm512_min_epi64(t24, _mm512_load_si512(&s->end[i])));
     {
         const uint64_t *order = isogi_vol__orders;
         __m512i all = ISOGI_VOL__ALL64(~(uint64_t)0), other = all;
         __asm__("" : "+r"(order)); /* constants come from memory: put together in registers they would cost as much as all comparisons */
-#define ISOGI_VOL__PAIR(f, a, g, b)                                                                                                              \
-    _mm512_mask_blend_epi64(_mm512_cmplt_epi64_mask(t##f##a, t##g##b), ISOGI_VOL__ALL64(order[18 * f + 6 * (a - 1) + 2 * (b - 1) + 1]),           \
-                            ISOGI_VOL__ALL64(order[18 * f + 6 * (a - 1) + 2 * (b - 1)]))
-#define ISOGI_VOL__ROW(f, a, g)                                                                              \
-    all = _mm512_ternarylogic_epi64(all, ISOGI_VOL__PAIR(f, a, g, 1), ISOGI_VOL__PAIR(f, a, g, 2), 0x80);    \
-    other = _mm512_and_si512(other, ISOGI_VOL__PAIR(f, a, g, 3));
+#define ISOGI_VOL__PAIR(to, f, a, g, b) \
+    to = _mm512_ternarylogic_epi64(to, _mm512_maskz_set1_epi64(_mm512_cmplt_epi64_mask(t##f##a, t##g##b), \
+        (int64_t)order[18 * f + 6 * (a - 1) + 2 * (b - 1)]), \
+                                   ISOGI_VOL__ALL64(order[18 * f + 6 * (a - 1) + 2 * (b - 1) + 1]), 0x60);
+#define ISOGI_VOL__ROW(f, a, g) ISOGI_VOL__PAIR(all, f, a, g, 1) ISOGI_VOL__PAIR(other, f, a, g, 2) ISOGI_VOL__PAIR(all, f, a, g, 3)
 #define ISOGI_VOL__ENDS(f, a)                                                                                                            \
     all = _mm512_mask_and_epi64(all, _mm512_cmplt_epi64_mask(t##f##a, in), all, ISOGI_VOL__ALL64(order[54 + 6 * f + 2 * (a - 1)]));      \
-    other = _mm512_mask_and_epi64(other, _mm512_cmplt_epi64_mask(out, t##f##a), other, ISOGI_VOL__ALL64(order[54 + 6 * f + 2 * (a - 1) + 1]));
+    other = _mm512_mask_and_epi64(other, _mm512_cmplt_epi64_mask(out, t##f##a), other, \
+        ISOGI_VOL__ALL64(order[54 + 6 * f + 2 * (a - 1) + 1]));
         ISOGI_VOL__ROW(0, 1, 1) ISOGI_VOL__ROW(0, 2, 1) ISOGI_VOL__ROW(0, 3, 1)
         ISOGI_VOL__ROW(1, 1, 2) ISOGI_VOL__ROW(1, 2, 2) ISOGI_VOL__ROW(1, 3, 2)
         ISOGI_VOL__ROW(2, 1, 0) ISOGI_VOL__ROW(2, 2, 0) ISOGI_VOL__ROW(2, 3, 0)
@@ -4132,11 +4212,12 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE __m512i isogi_vol__pack_cells8(__m512i low, 
 
 /* Numbers of children with the axes in `flip` counted backwards. */
 ISOGI_VOL__AVX512 ISOGI_VOL__INLINE __m512i isogi_vol__mirror8(__m512i mask, __m512i flip) {
-    const __m512i words = _mm512_set_epi64(0x0e0f0c0d0a0b0809, 0x0607040502030001, 0x0e0f0c0d0a0b0809, 0x0607040502030001, 0x0e0f0c0d0a0b0809, 0x0607040502030001,
-                                           0x0e0f0c0d0a0b0809, 0x0607040502030001);
-    const __m512i quads = _mm512_set_epi64(0x09080b0a0d0c0f0e, 0x0100030205040706, 0x09080b0a0d0c0f0e, 0x0100030205040706, 0x09080b0a0d0c0f0e, 0x0100030205040706,
-                                           0x09080b0a0d0c0f0e, 0x0100030205040706);
-    mask = _mm512_mask_mov_epi64(mask, _mm512_test_epi64_mask(flip, _mm512_set1_epi64(3)), _mm512_gf2p8affine_epi64_epi8(mask, ISOGI_VOL__ALL64(0x0804020180402010), 0));
+    const __m512i words = _mm512_set_epi64(0x0e0f0c0d0a0b0809, 0x0607040502030001, 0x0e0f0c0d0a0b0809, 0x0607040502030001,
+                                           0x0e0f0c0d0a0b0809, 0x0607040502030001, 0x0e0f0c0d0a0b0809, 0x0607040502030001);
+    const __m512i quads = _mm512_set_epi64(0x09080b0a0d0c0f0e, 0x0100030205040706, 0x09080b0a0d0c0f0e, 0x0100030205040706,
+                                           0x09080b0a0d0c0f0e, 0x0100030205040706, 0x09080b0a0d0c0f0e, 0x0100030205040706);
+    mask = _mm512_mask_mov_epi64(mask, _mm512_test_epi64_mask(flip, _mm512_set1_epi64(3)),
+                                 _mm512_gf2p8affine_epi64_epi8(mask, ISOGI_VOL__ALL64(0x0804020180402010), 0));
     mask = _mm512_mask_mov_epi64(mask, _mm512_test_epi64_mask(flip, _mm512_set1_epi64(12)),
                                  _mm512_shuffle_epi8(_mm512_gf2p8affine_epi64_epi8(mask, ISOGI_VOL__ALL64(0x1020408001020408), 0), words));
     return _mm512_mask_mov_epi64(mask, _mm512_test_epi64_mask(flip, _mm512_set1_epi64(48)), _mm512_shuffle_epi8(mask, quads));
@@ -4146,7 +4227,8 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE __m512i isogi_vol__mirror8(__m512i mask, __m
    are at least `low` (0, 1), and below `beyond` (2, 3), of eight rays. Returns the last four bytes of leaves. */
 ISOGI_VOL__AVX512 ISOGI_VOL__INLINE __m256i isogi_vol__compare(isogi_vol__pool *s, int i, __mmask8 leaf, uint64_t mask[4][8]) {
     const __m512i address = _mm512_load_si512(&s->address[i]);
-    const __m256i tail = _mm512_mask_i64gather_epi32(_mm256_setzero_si256(), leaf, _mm512_add_epi64(address, _mm512_set1_epi64(124)), (const int *)0, 1);
+    const __m256i tail =
+        _mm512_mask_i64gather_epi32(_mm256_setzero_si256(), leaf, _mm512_add_epi64(address, _mm512_set1_epi64(124)), (const int *)0, 1);
     const __m256 low = _mm256_cvtepi32_ps(_mm256_and_si256(_mm256_srli_epi32(tail, 8), _mm256_set1_epi32(255)));
     const __m256 high = _mm256_cvtepi32_ps(_mm256_and_si256(_mm256_srli_epi32(tail, 16), _mm256_set1_epi32(255)));
     const __m256 scale = _mm256_div_ps(_mm256_set1_ps(ISOGI_VOL__CODES), _mm256_sub_ps(_mm256_add_ps(high, _mm256_set1_ps(1)), low));
@@ -4176,9 +4258,11 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE __m256i isogi_vol__compare(isogi_vol__pool *
 }
 
 /* Which children can hold the surface. */
-ISOGI_VOL__AVX512 ISOGI_VOL__INLINE __m512i isogi_vol__marked(const isogi_vol__pool *s, int i, __mmask8 leaf, const uint64_t mask[4][8], __m256i tail) {
+ISOGI_VOL__AVX512 ISOGI_VOL__INLINE __m512i isogi_vol__marked(const isogi_vol__pool *s, int i, __mmask8 leaf, const uint64_t mask[4][8],
+                                                              __m256i tail) {
     __m512i in0, in1, out0, out1, inner;
-    in0 = _mm512_load_si512(mask[0]), in1 = _mm512_load_si512(mask[1]), out0 = _mm512_load_si512(mask[2]), out1 = _mm512_load_si512(mask[3]);
+    in0 = _mm512_load_si512(mask[0]), in1 = _mm512_load_si512(mask[1]), out0 = _mm512_load_si512(mask[2]),
+    out1 = _mm512_load_si512(mask[3]);
     inner = _mm512_and_si512(in1, out0); /* largest >= low, least < beyond */
     isogi_vol__all_corners8(&in0, &in1);
     isogi_vol__all_corners8(&out0, &out1);
@@ -4187,7 +4271,8 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE __m512i isogi_vol__marked(const isogi_vol__p
     if (ISOGI_VOL__UNLIKELY(_mm256_movemask_epi8(_mm256_cmpgt_epi32(_mm256_srli_epi32(tail, 24), _mm256_setzero_si256())))) {
         /* leaves that reach beyond the volume */
         const __m512i cut = _mm512_cvtepu32_epi64(_mm256_srli_epi32(tail, 24)), three = _mm512_set1_epi64(3);
-#define ISOGI_VOL__CUT(a) _mm512_setr_epi64(-1, (int64_t)ISOGI_VOL__BELOW_##a(3), (int64_t)ISOGI_VOL__BELOW_##a(2), (int64_t)ISOGI_VOL__BELOW_##a(1), -1, -1, -1, -1)
+#define ISOGI_VOL__CUT(a) _mm512_setr_epi64(-1, (int64_t)ISOGI_VOL__BELOW_##a(3), (int64_t)ISOGI_VOL__BELOW_##a(2), \
+    (int64_t)ISOGI_VOL__BELOW_##a(1), -1, -1, -1, -1)
         inner = _mm512_and_si512(inner, _mm512_permutexvar_epi64(_mm512_and_si512(cut, three), ISOGI_VOL__CUT(0)));
         inner = _mm512_and_si512(inner, _mm512_permutexvar_epi64(_mm512_and_si512(_mm512_srli_epi64(cut, 2), three), ISOGI_VOL__CUT(1)));
         inner = _mm512_and_si512(inner, _mm512_permutexvar_epi64(_mm512_and_si512(_mm512_srli_epi64(cut, 4), three), ISOGI_VOL__CUT(2)));
@@ -4202,19 +4287,23 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE void isogi_vol__answer(isogi_vol__turn *turn
     const __mmask8 lives = _mm512_cmpge_epi64_mask(level, zero), leaf = _mm512_cmpeq_epi64_mask(level, zero);
     __attribute__((aligned(64))) uint64_t mask[4][8];
     const __m256i tail = isogi_vol__compare(s, i, leaf, mask);
-    const __m512i passed = isogi_vol__passed(s, i, level, _mm512_load_si512(&s->cell[i])); /* meanwhile the masks get to where they can be read as vectors */
+    /* meanwhile the masks get to where they can be read as vectors */
+    const __m512i passed = isogi_vol__passed(s, i, level, _mm512_load_si512(&s->cell[i]));
     const __m512i marked = _mm512_maskz_and_epi64(lives, passed, isogi_vol__marked(s, i, leaf, (const uint64_t(*)[8])mask, tail));
     const __mmask8 some = _mm512_test_epi64_mask(marked, marked);
     const unsigned cells = (unsigned)(some & leaf);
     int n;
 #pragma GCC unroll 8
-    for (n = 0; n < turn->levels; n++) _mm512_mask_store_epi64(s->mask[n] + i, _mm512_cmpeq_epi64_mask(level, _mm512_set1_epi64(n)), marked);
-    _mm512_store_si512(&s->pending[i], _mm512_mask_or_epi64(_mm512_load_si512(&s->pending[i]), (__mmask8)(some & ~leaf), _mm512_load_si512(&s->pending[i]),
-                                                            _mm512_sllv_epi64(_mm512_set1_epi64(1), level)));
+    for (n = 0; n < turn->levels; n++)
+        _mm512_mask_store_epi64(s->mask[n] + i, _mm512_cmpeq_epi64_mask(level, _mm512_set1_epi64(n)), marked);
+    _mm512_store_si512(&s->pending[i],
+                       _mm512_mask_or_epi64(_mm512_load_si512(&s->pending[i]), (__mmask8)(some & ~leaf), _mm512_load_si512(&s->pending[i]),
+                                            _mm512_sllv_epi64(_mm512_set1_epi64(1), level)));
     turn->choosing |= (uint64_t)(lives & ~cells) << i;
     _mm512_store_si512(&s->level[i], _mm512_set1_epi64(-1));
-    _mm_storel_epi64((__m128i *)(void *)(turn->at_leaf + turn->leaves),
-                     _mm_maskz_compress_epi8((__mmask16)cells, _mm_add_epi8(_mm_set1_epi8((char)i), _mm_set_epi64x(0, 0x0706050403020100))));
+    _mm_storel_epi64(
+        (__m128i *)(void *)(turn->at_leaf + turn->leaves),
+        _mm_maskz_compress_epi8((__mmask16)cells, _mm_add_epi8(_mm_set1_epi8((char)i), _mm_set_epi64x(0, 0x0706050403020100))));
     turn->leaves += __builtin_popcount(cells);
 }
 
@@ -4227,17 +4316,21 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE unsigned isogi_vol__choose(const isogi_vol__
     __m512i rest, child, x, y, z, address;
     int k;
 #pragma GCC unroll 8
-    for (k = 1; k < turn->levels; k++) mask = _mm512_mask_load_epi64(mask, _mm512_cmpeq_epi64_mask(n, _mm512_set1_epi64(k)), s->mask[k] + i);
+    for (k = 1; k < turn->levels; k++)
+        mask = _mm512_mask_load_epi64(mask, _mm512_cmpeq_epi64_mask(n, _mm512_set1_epi64(k)), s->mask[k] + i);
     rest = _mm512_and_si512(mask, _mm512_sub_epi64(mask, one));
 #pragma GCC unroll 8
-    for (k = 1; k < turn->levels; k++) _mm512_mask_store_epi64(s->mask[k] + i, _mm512_mask_cmpeq_epi64_mask(some, n, _mm512_set1_epi64(k)), rest);
+    for (k = 1; k < turn->levels; k++)
+        _mm512_mask_store_epi64(s->mask[k] + i, _mm512_mask_cmpeq_epi64_mask(some, n, _mm512_set1_epi64(k)), rest);
     child = _mm512_xor_si512(_mm512_popcnt_epi64(_mm512_andnot_si512(mask, _mm512_sub_epi64(mask, one))), _mm512_load_si512(&s->flip[i]));
-    pending = _mm512_mask_and_epi64(pending, (__mmask8)(some & _mm512_testn_epi64_mask(rest, rest)), pending, _mm512_sub_epi64(pending, one));
+    pending =
+        _mm512_mask_and_epi64(pending, (__mmask8)(some & _mm512_testn_epi64_mask(rest, rest)), pending, _mm512_sub_epi64(pending, one));
     _mm512_store_si512(&s->pending[i], pending);
     /* the cell's digits above the child's, then the child's */
     {
         const __m512i ffff = _mm512_set1_epi64(0xffff), parent = _mm512_add_epi64(shift, _mm512_set1_epi64(2));
-        const __m512i px = _mm512_srlv_epi64(_mm512_and_si512(cell, ffff), parent), py = _mm512_srlv_epi64(_mm512_and_si512(_mm512_srli_epi64(cell, 16), ffff), parent);
+        const __m512i px = _mm512_srlv_epi64(_mm512_and_si512(cell, ffff), parent),
+                      py = _mm512_srlv_epi64(_mm512_and_si512(_mm512_srli_epi64(cell, 16), ffff), parent);
         const __m512i pz = _mm512_srlv_epi64(_mm512_and_si512(_mm512_srli_epi64(cell, 32), ffff), parent);
         x = _mm512_sllv_epi64(_mm512_or_si512(_mm512_slli_epi64(px, 2), _mm512_and_si512(child, three)), shift);
         y = _mm512_sllv_epi64(_mm512_or_si512(_mm512_slli_epi64(py, 2), _mm512_and_si512(_mm512_srli_epi64(child, 2), three)), shift);
@@ -4250,7 +4343,8 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE unsigned isogi_vol__choose(const isogi_vol__
     cell = _mm512_or_si512(x, _mm512_or_si512(_mm512_slli_epi64(y, 16), _mm512_slli_epi64(z, 32)));
     _mm512_mask_store_epi64(&s->cell[i], some, cell);
     _mm512_mask_store_epi64(&s->level[i], some, _mm512_sub_epi64(n, one));
-    _mm512_store_si512(&s->address[i], _mm512_mask_mov_epi64(_mm512_load_si512(&s->address[i]), some, address)); /* whole, so that it can be read at once */
+    /* whole, so that it can be read at once */
+    _mm512_store_si512(&s->address[i], _mm512_mask_mov_epi64(_mm512_load_si512(&s->address[i]), some, address));
 #pragma GCC unroll 8
     for (k = 0; k < 8; k++) {
         const char *node = (const char *)(uintptr_t)s->address[i + k];
@@ -4265,12 +4359,14 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE __m512i isogi_vol__slots8(const uint8_t *slo
 }
 
 /* One lane of eight corners after the other, of x, then y, then z, at the begin and end of the way through the cell. */
-ISOGI_VOL__AVX512 ISOGI_VOL__INLINE __m256 isogi_vol__mix8(__m256 a, __m256 b, __m256 u) { return _mm256_fmadd_ps(u, _mm256_sub_ps(b, a), a); }
+ISOGI_VOL__AVX512 ISOGI_VOL__INLINE __m256 isogi_vol__mix8(__m256 a, __m256 b, __m256 u) {
+    return _mm256_fmadd_ps(u, _mm256_sub_ps(b, a), a);
+}
 
 /* Cells as x | y << 16 | z << 32, the times at which rays enter and leave them (rounded down to the axis, whose number they carry), and
    where in the cell that is. */
-ISOGI_VOL__AVX512 ISOGI_VOL__INLINE void isogi_vol__way8(__m512i cell, const __m512d origin[3], const __m512d inverse[3], const __m512d dir[3], __m512i *begin, __m512i *end,
-                                                         __m256 from[3], __m256 to[3]) {
+ISOGI_VOL__AVX512 ISOGI_VOL__INLINE void isogi_vol__way8(__m512i cell, const __m512d origin[3], const __m512d inverse[3],
+                                                         const __m512d dir[3], __m512i *begin, __m512i *end, __m256 from[3], __m256 to[3]) {
     const __m256 zero = _mm256_setzero_ps(), one = _mm256_set1_ps(1);
     __m512d local[3], t0, t1;
     int a;
@@ -4296,7 +4392,8 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE void isogi_vol__way8(__m512i cell, const __m
 typedef struct isogi_vol__sides { __mmask8 in, out, in0, out0, in1, out1; } isogi_vol__sides;
 
 /* By the hull of Bernstein coefficients in float. code: the leaf's byte at the lowest corner, as an address; step: the isovalue. */
-ISOGI_VOL__AVX512 ISOGI_VOL__INLINE isogi_vol__sides isogi_vol__sides8(__m512i code, __mmask8 lanes, __m256 step, const __m256 from[3], const __m256 to[3]) {
+ISOGI_VOL__AVX512 ISOGI_VOL__INLINE isogi_vol__sides isogi_vol__sides8(__m512i code, __mmask8 lanes, __m256 step, const __m256 from[3],
+                                                                       const __m256 to[3]) {
     const __m256i byte = _mm256_set1_epi32(255);
     const __m256 low = _mm256_sub_ps(step, _mm256_set1_ps(ISOGI_VOL__DOUBT)), high = _mm256_add_ps(step, _mm256_set1_ps(ISOGI_VOL__DOUBT));
     const __m256 third_low = _mm256_mul_ps(low, _mm256_set1_ps(3)), third_high = _mm256_mul_ps(high, _mm256_set1_ps(3));
@@ -4305,8 +4402,10 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE isogi_vol__sides isogi_vol__sides8(__m512i c
     int k, e;
 #pragma GCC unroll 8
     for (k = 0; k < 4; k++) {
-        const __m256i pair = _mm512_mask_i64gather_epi32(_mm256_setzero_si256(), lanes, _mm512_add_epi64(code, _mm512_set1_epi64((k & 1) * 5 + (k >> 1) * 25)), (const int *)0, 1);
-        const __m256 a = _mm256_cvtepi32_ps(_mm256_and_si256(pair, byte)), b = _mm256_cvtepi32_ps(_mm256_and_si256(_mm256_srli_epi32(pair, 8), byte));
+        const __m256i pair = _mm512_mask_i64gather_epi32(
+            _mm256_setzero_si256(), lanes, _mm512_add_epi64(code, _mm512_set1_epi64((k & 1) * 5 + (k >> 1) * 25)), (const int *)0, 1);
+        const __m256 a = _mm256_cvtepi32_ps(_mm256_and_si256(pair, byte)),
+                     b = _mm256_cvtepi32_ps(_mm256_and_si256(_mm256_srli_epi32(pair, 8), byte));
         x[0][k] = isogi_vol__mix8(a, b, from[0]), x[1][k] = isogi_vol__mix8(a, b, to[0]);
     }
 #pragma GCC unroll 8
@@ -4316,7 +4415,8 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE isogi_vol__sides isogi_vol__sides8(__m512i c
         f[e][0][0] = isogi_vol__mix8(near0, near1, from[2]), f[e][0][1] = isogi_vol__mix8(near0, near1, to[2]);
         f[e][1][0] = isogi_vol__mix8(far0, far1, from[2]), f[e][1][1] = isogi_vol__mix8(far0, far1, to[2]);
     }
-    sum1 = _mm256_add_ps(f[1][0][0], _mm256_add_ps(f[0][1][0], f[0][0][1])), sum2 = _mm256_add_ps(f[0][1][1], _mm256_add_ps(f[1][0][1], f[1][1][0]));
+    sum1 = _mm256_add_ps(f[1][0][0], _mm256_add_ps(f[0][1][0], f[0][0][1])),
+    sum2 = _mm256_add_ps(f[0][1][1], _mm256_add_ps(f[1][0][1], f[1][1][0]));
     sides.in0 = _mm256_cmp_ps_mask(f[0][0][0], high, _CMP_GT_OQ), sides.out0 = _mm256_cmp_ps_mask(f[0][0][0], low, _CMP_LT_OQ);
     sides.in1 = _mm256_cmp_ps_mask(f[1][1][1], high, _CMP_GT_OQ), sides.out1 = _mm256_cmp_ps_mask(f[1][1][1], low, _CMP_LT_OQ);
     sides.in = _mm256_mask_cmp_ps_mask((__mmask8)(sides.in0 & sides.in1), _mm256_min_ps(sum1, sum2), third_high, _CMP_GT_OQ);
@@ -4327,21 +4427,26 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE isogi_vol__sides isogi_vol__sides8(__m512i c
 /* Cells of leaves by their children's numbers: their own numbers, given any cell of the leaf, and their lowest corners' bytes. */
 ISOGI_VOL__AVX512 ISOGI_VOL__INLINE __m512i isogi_vol__cells8(__m512i child, __m512i corner, __m512i *code) {
     const __m512i three = _mm512_set1_epi64(3);
-    const __m512i dx = _mm512_and_si512(child, three), dy = _mm512_and_si512(_mm512_srli_epi64(child, 2), three), dz = _mm512_srli_epi64(child, 4);
-    *code = _mm512_add_epi64(_mm512_add_epi64(*code, dx), _mm512_add_epi64(_mm512_mul_epu32(dy, _mm512_set1_epi64(5)), _mm512_mul_epu32(dz, _mm512_set1_epi64(25))));
+    const __m512i dx = _mm512_and_si512(child, three), dy = _mm512_and_si512(_mm512_srli_epi64(child, 2), three),
+                  dz = _mm512_srli_epi64(child, 4);
+    *code = _mm512_add_epi64(_mm512_add_epi64(*code, dx),
+                             _mm512_add_epi64(_mm512_mul_epu32(dy, _mm512_set1_epi64(5)), _mm512_mul_epu32(dz, _mm512_set1_epi64(25))));
     return _mm512_or_si512(_mm512_and_si512(corner, _mm512_set1_epi64(0xfffcfffcfffc)),
                            _mm512_or_si512(dx, _mm512_or_si512(_mm512_slli_epi64(dy, 16), _mm512_slli_epi64(dz, 32))));
 }
 
 /* The next cells of up to eight rays, in float. Rays that are certainly on one side all along are done with theirs; the others are in
    doubt, and hits are among them. `any`: certain hits are reported at once instead; returns them. */
-ISOGI_VOL__AVX512 ISOGI_VOL__INLINE unsigned isogi_vol__look(isogi_vol__turn *turn, isogi_vol__pool *s, const uint8_t *slots, int count, int *again) {
+ISOGI_VOL__AVX512 ISOGI_VOL__INLINE unsigned isogi_vol__look(isogi_vol__turn *turn, isogi_vol__pool *s, const uint8_t *slots, int count,
+                                                             int *again) {
     const __mmask8 lanes = (__mmask8)((1u << count) - 1);
     const __m512i slot = isogi_vol__slots8(slots);
-    const __m512i mask = _mm512_i64gather_epi64(slot, s->mask[0], 8), below = _mm512_sub_epi64(mask, _mm512_set1_epi64(1)), rest = _mm512_and_si512(mask, below);
+    const __m512i mask = _mm512_i64gather_epi64(slot, s->mask[0], 8), below = _mm512_sub_epi64(mask, _mm512_set1_epi64(1)),
+                  rest = _mm512_and_si512(mask, below);
     const __m512i child = _mm512_xor_si512(_mm512_popcnt_epi64(_mm512_andnot_si512(mask, below)), _mm512_i64gather_epi64(slot, s->flip, 8));
     const __m512i side = _mm512_i64gather_epi64(slot, s->side, 8);
-    __m512i code = _mm512_i64gather_epi64(slot, s->address, 8), cell = isogi_vol__cells8(child, _mm512_i64gather_epi64(slot, s->cell, 8), &code);
+    __m512i code = _mm512_i64gather_epi64(slot, s->address, 8),
+            cell = isogi_vol__cells8(child, _mm512_i64gather_epi64(slot, s->cell, 8), &code);
     __m512i begin = _mm512_set1_epi64(3), end = _mm512_i64gather_epi64(slot, s->end, 8);
     __m512d origin[3], inverse[3], dir[3];
     __m256 from[3], to[3];
@@ -4351,14 +4456,17 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE unsigned isogi_vol__look(isogi_vol__turn *tu
     _mm512_mask_i64scatter_epi64(s->mask[0], lanes, slot, rest, 8);
 #pragma GCC unroll 8
     for (a = 0; a < 3; a++)
-        origin[a] = _mm512_i64gather_pd(slot, s->origin[a], 8), inverse[a] = _mm512_i64gather_pd(slot, s->inverse[a], 8), dir[a] = _mm512_i64gather_pd(slot, s->dir[a], 8);
+        inverse[a] = _mm512_i64gather_pd(slot, s->inverse[a], 8), dir[a] = _mm512_i64gather_pd(slot, s->dir[a], 8),
+        origin[a] = turn->shared ? _mm512_set1_pd(s->origin[a][slots[0]]) : _mm512_i64gather_pd(slot, s->origin[a], 8);
     isogi_vol__way8(cell, origin, inverse, dir, &begin, &end, from, to);
     sides = isogi_vol__sides8(code, lanes, _mm512_cvtpd_ps(_mm512_i64gather_pd(slot, s->step, 8)), from, to);
     sides.in = (__mmask8)(sides.in & _mm512_test_epi64_mask(_mm512_set1_epi64(1), side));                  /* 1 or -1 */
-    sides.out = (__mmask8)(sides.out & _mm512_testn_epi64_mask(_mm512_add_epi64(side, _mm512_set1_epi64(1)), _mm512_set1_epi64(~1))); /* 0 or -1 */
+    /* 0 or -1 */
+    sides.out = (__mmask8)(sides.out & _mm512_testn_epi64_mask(_mm512_add_epi64(side, _mm512_set1_epi64(1)), _mm512_set1_epi64(~1)));
     sure = (__mmask8)((sides.in | sides.out) & lanes);
     if (turn->any) {
-        const __mmask8 unknown = _mm512_cmpeq_epi64_mask(side, _mm512_set1_epi64(-1)), was_in = _mm512_cmpeq_epi64_mask(side, _mm512_set1_epi64(1));
+        const __mmask8 unknown = _mm512_cmpeq_epi64_mask(side, _mm512_set1_epi64(-1)),
+                       was_in = _mm512_cmpeq_epi64_mask(side, _mm512_set1_epi64(1));
         const __mmask8 was_out = _mm512_testn_epi64_mask(side, side);
         hit = (__mmask8)(lanes & ((sides.out1 & (was_in | (unknown & sides.in0))) | (sides.in1 & (was_out | (unknown & sides.out0)))));
         sure = (__mmask8)(sure & ~hit);
@@ -4371,7 +4479,8 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE unsigned isogi_vol__look(isogi_vol__turn *tu
         __m512i bit = _mm512_sllv_epi64(_mm512_set1_epi64(1), slot);
         turn->cells += (uint64_t)count;
         /* which axes it enters and leaves by goes along */
-        cell = _mm512_or_si512(cell, _mm512_or_si512(_mm512_slli_epi64(_mm512_and_si512(begin, three), 48), _mm512_slli_epi64(_mm512_and_si512(end, three), 50)));
+        cell = _mm512_or_si512(cell, _mm512_or_si512(_mm512_slli_epi64(_mm512_and_si512(begin, three), 48),
+                                                     _mm512_slli_epi64(_mm512_and_si512(end, three), 50)));
         _mm512_mask_i64scatter_epi64(s->cell, doubt, slot, cell, 8);
         _mm_storel_epi64((__m128i *)(void *)(turn->at_leaf + *again), _mm_maskz_compress_epi8((__mmask16)(sure & more), list));
         *again += __builtin_popcount((unsigned)(sure & more));
@@ -4419,8 +4528,8 @@ ISOGI_VOL__TARGET("avx2") static int isogi_vol__decide(isogi_vol__batch *b, isog
     w.deflate = s->side[i] < -1, w.inside = w.deflate ? (int)s->side[i] / 2 + 2 : (int)s->side[i], w.deflated = s->deflated[i];
     w.exact = b->hits != NULL, w.cap = 1, w.end_is_border = 0;
     w.count.cubics = w.count.cells = 0;
-    found = isogi_vol__mixed_cell_avx2(&w, (int)(cell & 0xffff), (int)(cell >> 16 & 0xffff), (int)(cell >> 32 & 0xffff), in == 3 ? (int)s->entry_axis[i] : in,
-                                       out == 3 ? -1 : out, hit);
+    found = isogi_vol__mixed_cell_avx2(&w, (int)(cell & 0xffff), (int)(cell >> 16 & 0xffff), (int)(cell >> 32 & 0xffff),
+                                       in == 3 ? (int)s->entry_axis[i] : in, out == 3 ? -1 : out, hit);
     b->work.cubics += w.count.cubics;
     s->side[i] = w.deflate ? 2 * w.inside - 4 : w.inside, s->deflated[i] = w.deflated;
     return found;
@@ -4456,8 +4565,10 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE __m512d isogi_vol__refine8(const __m512d b[4
     due = (__mmask8)(due & ~*slow);
     for (i = 0; i < 4 && due; i++) {
         const __m512d ss = ISOGI_VOL__MUL(s, s);
-        const __m512d value = ISOGI_VOL__ADD(ISOGI_VOL__ADD(b[0], ISOGI_VOL__MUL(s, c1)), ISOGI_VOL__MUL(ss, ISOGI_VOL__ADD(c2, ISOGI_VOL__MUL(s, c3))));
-        const __m512d slope = ISOGI_VOL__ADD(ISOGI_VOL__ADD(c1, ISOGI_VOL__MUL(ISOGI_VOL__MUL(two, s), c2)), ISOGI_VOL__MUL(ss, ISOGI_VOL__MUL(three, c3)));
+        const __m512d value =
+            ISOGI_VOL__ADD(ISOGI_VOL__ADD(b[0], ISOGI_VOL__MUL(s, c1)), ISOGI_VOL__MUL(ss, ISOGI_VOL__ADD(c2, ISOGI_VOL__MUL(s, c3))));
+        const __m512d slope =
+            ISOGI_VOL__ADD(ISOGI_VOL__ADD(c1, ISOGI_VOL__MUL(ISOGI_VOL__MUL(two, s), c2)), ISOGI_VOL__MUL(ss, ISOGI_VOL__MUL(three, c3)));
         const __m512d step = _mm512_div_pd(value, slope), at = ISOGI_VOL__SUB(s, step);
         const __mmask8 kept = _mm512_mask_cmp_pd_mask(_mm512_cmp_pd_mask(at, zero, _CMP_GE_OQ), at, one, _CMP_LE_OQ);
         const __mmask8 done = _mm512_cmp_pd_mask(ISOGI_VOL__MUL(ISOGI_VOL__MUL(bend, step), step), _mm512_abs_pd(slope), _CMP_LE_OQ);
@@ -4472,19 +4583,23 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE __m512d isogi_vol__refine8(const __m512d b[4
 }
 
 /* Corner x + 2y + 4z of eight cells, minus the isovalue. */
-ISOGI_VOL__AVX512 ISOGI_VOL__INLINE void isogi_vol__corners8(const isogi_pyramid *p, __m512i cell, __mmask8 lanes, __m512d isovalue, __m512d c[8]) {
+ISOGI_VOL__AVX512 ISOGI_VOL__INLINE void isogi_vol__corners8(const isogi_pyramid *p, __m512i cell, __mmask8 lanes, __m512d isovalue,
+                                                             __m512d c[8]) {
     const isogi_volume *v = &p->volume;
     const __m512i field = _mm512_set1_epi64(0xffff);
-    const __m512i x = _mm512_and_si512(cell, field), y = _mm512_and_si512(_mm512_srli_epi64(cell, 16), field), z = _mm512_and_si512(_mm512_srli_epi64(cell, 32), field);
+    const __m512i x = _mm512_and_si512(cell, field), y = _mm512_and_si512(_mm512_srli_epi64(cell, 16), field),
+                  z = _mm512_and_si512(_mm512_srli_epi64(cell, 32), field);
     int k;
     const __m512d scale = _mm512_set1_pd(v->scale), bias = _mm512_set1_pd(v->bias);
     if (v->type == ISOGI_F32 && v->stride[0] == 4) {
         __m512i at = _mm512_add_epi64(_mm512_slli_epi64(x, 2), _mm512_set1_epi64((int64_t)(intptr_t)v->data));
-        at = _mm512_add_epi64(at, _mm512_add_epi64(_mm512_mullo_epi64(y, _mm512_set1_epi64(v->stride[1])), _mm512_mullo_epi64(z, _mm512_set1_epi64(v->stride[2]))));
+        at = _mm512_add_epi64(at, _mm512_add_epi64(_mm512_mullo_epi64(y, _mm512_set1_epi64(v->stride[1])),
+                                                   _mm512_mullo_epi64(z, _mm512_set1_epi64(v->stride[2]))));
 #pragma GCC unroll 8
         for (k = 0; k < 4; k++) {
             const __m512i offset = _mm512_set1_epi64((k & 1 ? v->stride[1] : 0) + (k & 2 ? v->stride[2] : 0));
-            const __m512i pair = _mm512_mask_i64gather_epi64(_mm512_setzero_si512(), lanes, _mm512_add_epi64(at, offset), (const void *)0, 1);
+            const __m512i pair =
+                _mm512_mask_i64gather_epi64(_mm512_setzero_si512(), lanes, _mm512_add_epi64(at, offset), (const void *)0, 1);
             c[2 * k] = _mm512_cvtps_pd(_mm256_castsi256_ps(_mm512_cvtepi64_epi32(pair)));
             c[2 * k + 1] = _mm512_cvtps_pd(_mm256_castsi256_ps(_mm512_cvtepi64_epi32(_mm512_srli_epi64(pair, 32))));
         }
@@ -4496,7 +4611,8 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE void isogi_vol__corners8(const isogi_pyramid
         _mm512_store_si512(at, cell);
         for (left = lanes; left; left &= left - 1) {
             const int i = __builtin_ctz(left);
-            const char *q = (const char *)v->data + (at[i] & 0xffff) * v->stride[0] + (at[i] >> 16 & 0xffff) * v->stride[1] + (at[i] >> 32 & 0xffff) * v->stride[2];
+            const char *q = (const char *)v->data + (at[i] & 0xffff) * v->stride[0] + (at[i] >> 16 & 0xffff) * v->stride[1] +
+                            (at[i] >> 32 & 0xffff) * v->stride[2];
             double one[8];
             _mm256_storeu_pd(one, isogi_vol__corners4(v, q, v->stride[0], v->stride[1]));
             _mm256_storeu_pd(one + 4, isogi_vol__corners4(v, q + v->stride[2], v->stride[0], v->stride[1]));
@@ -4512,27 +4628,34 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE void isogi_vol__corners8(const isogi_pyramid
 
 /* Rays that leave a surface and do not come back to it in the same cell: what leave_surface and cubic_deflated find. *inside: the side on
    which they do. passes: those that do not end in the cell. */
-ISOGI_VOL__AVX512 ISOGI_VOL__INLINE __mmask8 isogi_vol__left8(const __m512d b[4], const __m512d from[3], const __m512d to[3], __m512d steepest, __mmask8 passes, __mmask8 *inside,
-                                                              __mmask8 lanes) {
+ISOGI_VOL__AVX512 ISOGI_VOL__INLINE __mmask8 isogi_vol__left8(const __m512d b[4], const __m512d from[3], const __m512d to[3],
+                                                              __m512d steepest, __mmask8 passes, __mmask8 *inside, __mmask8 lanes) {
     const __m512d zero = _mm512_setzero_pd(), three = _mm512_set1_pd(3);
     const __m512d c1 = ISOGI_VOL__MUL(three, ISOGI_VOL__SUB(b[1], b[0]));
     const __m512d c2 = ISOGI_VOL__MUL(three, ISOGI_VOL__ADD(ISOGI_VOL__SUB(b[0], b[1]), ISOGI_VOL__SUB(b[2], b[1])));
     const __m512d c3 = ISOGI_VOL__ADD(ISOGI_VOL__SUB(b[3], b[0]), ISOGI_VOL__MUL(three, ISOGI_VOL__SUB(b[1], b[2])));
     const __m512d half = ISOGI_VOL__ADD(c1, ISOGI_VOL__MUL(_mm512_set1_pd(0.5), c2)), sum = ISOGI_VOL__ADD(ISOGI_VOL__ADD(c1, c2), c3);
-    const __m512d length = _mm512_max_pd(_mm512_max_pd(_mm512_abs_pd(ISOGI_VOL__SUB(to[0], from[0])), _mm512_abs_pd(ISOGI_VOL__SUB(to[1], from[1]))), _mm512_abs_pd(ISOGI_VOL__SUB(to[2], from[2])));
-    const __m512d reach = _mm512_max_pd(_mm512_max_pd(_mm512_abs_pd(ISOGI_VOL__SUB(b[1], b[0])), _mm512_abs_pd(ISOGI_VOL__SUB(b[2], b[0]))), _mm512_abs_pd(ISOGI_VOL__SUB(b[3], b[0])));
+    const __m512d length =
+        _mm512_max_pd(_mm512_max_pd(_mm512_abs_pd(ISOGI_VOL__SUB(to[0], from[0])), _mm512_abs_pd(ISOGI_VOL__SUB(to[1], from[1]))),
+                      _mm512_abs_pd(ISOGI_VOL__SUB(to[2], from[2])));
+    const __m512d reach = _mm512_max_pd(_mm512_max_pd(_mm512_abs_pd(ISOGI_VOL__SUB(b[1], b[0])), _mm512_abs_pd(ISOGI_VOL__SUB(b[2], b[0]))),
+                                        _mm512_abs_pd(ISOGI_VOL__SUB(b[3], b[0])));
     const __mmask8 stays = (__mmask8)(passes & (_mm512_cmp_pd_mask(length, _mm512_set1_pd(ISOGI_VOL__ON_SURFACE), _CMP_LT_OQ) |
                                                 _mm512_cmp_pd_mask(reach, ISOGI_VOL__MUL(_mm512_set1_pd(1e-12), steepest), _CMP_LT_OQ)));
-    const __mmask8 rises = _mm512_mask_cmp_pd_mask(_mm512_mask_cmp_pd_mask(_mm512_cmp_pd_mask(c1, zero, _CMP_GT_OQ), half, zero, _CMP_GT_OQ), sum, zero, _CMP_GT_OQ);
-    const __mmask8 falls = _mm512_mask_cmp_pd_mask(_mm512_mask_cmp_pd_mask(_mm512_cmp_pd_mask(c1, zero, _CMP_LT_OQ), half, zero, _CMP_LT_OQ), sum, zero, _CMP_LT_OQ);
+    const __mmask8 rises = _mm512_mask_cmp_pd_mask(
+        _mm512_mask_cmp_pd_mask(_mm512_cmp_pd_mask(c1, zero, _CMP_GT_OQ), half, zero, _CMP_GT_OQ), sum, zero, _CMP_GT_OQ);
+    const __mmask8 falls = _mm512_mask_cmp_pd_mask(
+        _mm512_mask_cmp_pd_mask(_mm512_cmp_pd_mask(c1, zero, _CMP_LT_OQ), half, zero, _CMP_LT_OQ), sum, zero, _CMP_LT_OQ);
     *inside = (__mmask8)((*inside & ~lanes) | (rises & lanes));
     return (__mmask8)(lanes & (rises | falls) & ~stays & _mm512_cmp_pd_mask(b[3], zero, _CMP_NEQ_OQ));
 }
 
-ISOGI_VOL__AVX512 static unsigned isogi_vol__decide8(isogi_vol__batch *b, isogi_vol__pool *s, const uint8_t *slots, unsigned some, unsigned *alone) {
+ISOGI_VOL__AVX512 static unsigned isogi_vol__decide8(isogi_vol__batch *b, isogi_vol__pool *s, const uint8_t *slots, unsigned some,
+                                                     unsigned *alone) {
     const __mmask8 lanes = (__mmask8)some;
     const __m128i list = _mm_loadl_epi64((const __m128i *)(const void *)slots);
-    const int row = slots[0] % 8 == 0 && _mm_cvtsi128_si64(list) == (int64_t)(0x0706050403020100u + slots[0] * 0x0101010101010101u); /* can be loaded at once */
+    /* can be loaded at once */
+    const int row = slots[0] % 8 == 0 && _mm_cvtsi128_si64(list) == (int64_t)(0x0706050403020100u + slots[0] * 0x0101010101010101u);
     const __m512i slot = isogi_vol__slots8(slots);
 #define ISOGI_VOL__TAKE(member) (row ? _mm512_load_si512(&s->member[slots[0]]) : _mm512_i64gather_epi64(slot, s->member, 8))
 #define ISOGI_VOL__TAKE_REAL(member) _mm512_castsi512_pd(ISOGI_VOL__TAKE(member))
@@ -4541,8 +4664,10 @@ ISOGI_VOL__AVX512 static unsigned isogi_vol__decide8(isogi_vol__batch *b, isogi_
     const __m512d zero = _mm512_setzero_pd(), one = _mm512_set1_pd(1), stop = ISOGI_VOL__TAKE_REAL(stop);
     /* rays that leave a surface, which most do without coming back to it in the same cell; a ray's first cell behind a border of the
        volume, and a second one next to the surface, are matters for themselves */
-    const __mmask8 first = _mm512_cmpeq_epi64_mask(in, three), starts = _mm512_cmplt_epi64_mask(side, _mm512_set1_epi64(-1)), leaving = (__mmask8)(starts & first & lanes);
-    __mmask8 odd = (__mmask8)((starts & ~first) | _mm512_mask_cmpge_epi64_mask(first, ISOGI_VOL__TAKE(entry_axis), _mm512_setzero_si512())), low, high, b_low, b_high, inside, same, cross;
+    const __mmask8 first = _mm512_cmpeq_epi64_mask(in, three), starts = _mm512_cmplt_epi64_mask(side, _mm512_set1_epi64(-1)),
+                   leaving = (__mmask8)(starts & first & lanes);
+    __mmask8 odd = (__mmask8)((starts & ~first) | _mm512_mask_cmpge_epi64_mask(first, ISOGI_VOL__TAKE(entry_axis), _mm512_setzero_si512())),
+             low, high, b_low, b_high, inside, same, cross;
     __mmask8 left = 0, slow;
     __m512d c[8], from[3], to[3], bezier[4], begin = zero, end = stop, root, steepest = zero;
     *alone = 0;
@@ -4553,20 +4678,24 @@ ISOGI_VOL__AVX512 static unsigned isogi_vol__decide8(isogi_vol__batch *b, isogi_
         int a;
 #pragma GCC unroll 8
         for (a = 0; a < 3; a++) {
-            const __mmask8 enters = _mm512_cmpeq_epi64_mask(in, _mm512_set1_epi64(a)), leaves = _mm512_cmpeq_epi64_mask(out, _mm512_set1_epi64(a));
+            const __mmask8 enters = _mm512_cmpeq_epi64_mask(in, _mm512_set1_epi64(a)),
+                           leaves = _mm512_cmpeq_epi64_mask(out, _mm512_set1_epi64(a));
             const __m512d inverse = ISOGI_VOL__TAKE_REAL(inverse[a]);
             origin[a] = ISOGI_VOL__TAKE_REAL(origin[a]), dir[a] = ISOGI_VOL__TAKE_REAL(dir[a]);
             at[a] = _mm512_cvtepi64_pd(_mm512_and_si512(_mm512_srli_epi64(cell, (unsigned)(16 * a)), _mm512_set1_epi64(0xffff)));
             fall[a] = _mm512_movepi64_mask(_mm512_castpd_si512(inverse));
             begin = _mm512_mask_mul_pd(begin, enters, _mm512_sub_pd(_mm512_mask_add_pd(at[a], fall[a], at[a], one), origin[a]), inverse);
-            end = _mm512_mask_mul_pd(end, leaves, _mm512_sub_pd(_mm512_mask_add_pd(at[a], (__mmask8)~fall[a], at[a], one), origin[a]), inverse);
+            end = _mm512_mask_mul_pd(end, leaves, _mm512_sub_pd(_mm512_mask_add_pd(at[a], (__mmask8)~fall[a], at[a], one), origin[a]),
+                                     inverse);
         }
         begin = _mm512_max_pd(begin, zero), end = _mm512_max_pd(_mm512_min_pd(end, stop), begin);
 #pragma GCC unroll 8
         for (a = 0; a < 3; a++) {
-            const __mmask8 enters = _mm512_cmpeq_epi64_mask(in, _mm512_set1_epi64(a)), leaves = _mm512_cmpeq_epi64_mask(out, _mm512_set1_epi64(a));
+            const __mmask8 enters = _mm512_cmpeq_epi64_mask(in, _mm512_set1_epi64(a)),
+                           leaves = _mm512_cmpeq_epi64_mask(out, _mm512_set1_epi64(a));
             const __m512d way = _mm512_abs_pd(ISOGI_VOL__MUL(ISOGI_VOL__TAKE_REAL(base), dir[a]));
-            const __m512d slack = ISOGI_VOL__MUL(_mm512_set1_pd(ISOGI_VOL__ROUNDING), ISOGI_VOL__ADD(way, _mm512_set1_pd(b->pyramid->box[a])));
+            const __m512d slack =
+                ISOGI_VOL__MUL(_mm512_set1_pd(ISOGI_VOL__ROUNDING), ISOGI_VOL__ADD(way, _mm512_set1_pd(b->pyramid->box[a])));
             from[a] = ISOGI_VOL__SUB(ISOGI_VOL__ADD(origin[a], ISOGI_VOL__MUL(begin, dir[a])), at[a]);
             to[a] = ISOGI_VOL__SUB(ISOGI_VOL__ADD(origin[a], ISOGI_VOL__MUL(end, dir[a])), at[a]);
             from[a] = isogi_vol__snap8(from[a], slack), to[a] = isogi_vol__snap8(to[a], slack);
@@ -4576,7 +4705,8 @@ ISOGI_VOL__AVX512 static unsigned isogi_vol__decide8(isogi_vol__batch *b, isogi_
     }
     {
         const __m512d rest0[3] = {_mm512_sub_pd(one, from[0]), _mm512_sub_pd(one, from[1]), _mm512_sub_pd(one, from[2])};
-        const __m512d rest1[3] = {_mm512_sub_pd(one, to[0]), _mm512_sub_pd(one, to[1]), _mm512_sub_pd(one, to[2])}, third = _mm512_set1_pd(1.0 / 3);
+        const __m512d rest1[3] = {_mm512_sub_pd(one, to[0]), _mm512_sub_pd(one, to[1]), _mm512_sub_pd(one, to[2])},
+                      third = _mm512_set1_pd(1.0 / 3);
         __m512d x[2][4], f[2][2][2]; /* [x][y][z] taken at its end */
         int k;
         low = high = 0xff;
@@ -4589,11 +4719,14 @@ ISOGI_VOL__AVX512 static unsigned isogi_vol__decide8(isogi_vol__batch *b, isogi_
         odd = (__mmask8)(odd | high | low);
 #pragma GCC unroll 8
         for (k = 0; k < 4; k++)
-            x[0][k] = isogi_vol__lerp8(c[2 * k], c[2 * k + 1], from[0], rest0[0]), x[1][k] = isogi_vol__lerp8(c[2 * k], c[2 * k + 1], to[0], rest1[0]);
+            x[0][k] = isogi_vol__lerp8(c[2 * k], c[2 * k + 1], from[0], rest0[0]),
+            x[1][k] = isogi_vol__lerp8(c[2 * k], c[2 * k + 1], to[0], rest1[0]);
 #pragma GCC unroll 8
         for (k = 0; k < 2; k++) {
-            const __m512d near0 = isogi_vol__lerp8(x[k][0], x[k][1], from[1], rest0[1]), near1 = isogi_vol__lerp8(x[k][2], x[k][3], from[1], rest0[1]);
-            const __m512d far0 = isogi_vol__lerp8(x[k][0], x[k][1], to[1], rest1[1]), far1 = isogi_vol__lerp8(x[k][2], x[k][3], to[1], rest1[1]);
+            const __m512d near0 = isogi_vol__lerp8(x[k][0], x[k][1], from[1], rest0[1]),
+                          near1 = isogi_vol__lerp8(x[k][2], x[k][3], from[1], rest0[1]);
+            const __m512d far0 = isogi_vol__lerp8(x[k][0], x[k][1], to[1], rest1[1]),
+                          far1 = isogi_vol__lerp8(x[k][2], x[k][3], to[1], rest1[1]);
             f[k][0][0] = isogi_vol__lerp8(near0, near1, from[2], rest0[2]), f[k][0][1] = isogi_vol__lerp8(near0, near1, to[2], rest1[2]);
             f[k][1][0] = isogi_vol__lerp8(far0, far1, from[2], rest0[2]), f[k][1][1] = isogi_vol__lerp8(far0, far1, to[2], rest1[2]);
         }
@@ -4608,15 +4741,19 @@ ISOGI_VOL__AVX512 static unsigned isogi_vol__decide8(isogi_vol__batch *b, isogi_
         }
     }
     {
-        const __m512d most = _mm512_max_pd(_mm512_max_pd(_mm512_abs_pd(bezier[0]), _mm512_abs_pd(bezier[1])), _mm512_max_pd(_mm512_abs_pd(bezier[2]), _mm512_abs_pd(bezier[3])));
-        const __mmask8 plain = _mm512_mask_cmp_pd_mask(_mm512_cmp_pd_mask(most, _mm512_set1_pd(1e-100), _CMP_GT_OQ), most, _mm512_set1_pd(1e100), _CMP_LT_OQ);
-        const __mmask8 last = _mm512_cmp_pd_mask(bezier[3], zero, _CMP_GE_OQ), known = _mm512_cmpge_epi64_mask(side, _mm512_setzero_si512());
+        const __m512d most = _mm512_max_pd(_mm512_max_pd(_mm512_abs_pd(bezier[0]), _mm512_abs_pd(bezier[1])),
+                                           _mm512_max_pd(_mm512_abs_pd(bezier[2]), _mm512_abs_pd(bezier[3])));
+        const __mmask8 plain =
+            _mm512_mask_cmp_pd_mask(_mm512_cmp_pd_mask(most, _mm512_set1_pd(1e-100), _CMP_GT_OQ), most, _mm512_set1_pd(1e100), _CMP_LT_OQ);
+        const __mmask8 last = _mm512_cmp_pd_mask(bezier[3], zero, _CMP_GE_OQ),
+                       known = _mm512_cmpge_epi64_mask(side, _mm512_setzero_si512());
         inside = _mm512_cmp_pd_mask(bezier[0], zero, _CMP_GE_OQ);
         odd = (__mmask8)(odd | ~plain | (known & (inside ^ _mm512_test_epi64_mask(side, side))));
         if (leaving) {
             left = (__mmask8)(isogi_vol__left8(bezier, from, to, steepest, _mm512_cmpneq_epi64_mask(out, three), &inside, leaving) & ~odd);
             /* and not those that go onward and would have changed sides */
-            left = (__mmask8)(left & ~(_mm512_mask_cmpeq_epi64_mask(inside, side, _mm512_set1_epi64(-4)) | _mm512_mask_cmpeq_epi64_mask((__mmask8)~inside, side, _mm512_set1_epi64(-2))));
+            left = (__mmask8)(left & ~(_mm512_mask_cmpeq_epi64_mask(inside, side, _mm512_set1_epi64(-4)) |
+                                       _mm512_mask_cmpeq_epi64_mask((__mmask8)~inside, side, _mm512_set1_epi64(-2))));
             odd = (__mmask8)(odd | (leaving & ~left));
         }
         same = (__mmask8) ~((inside ^ b_low) | (inside ^ b_high) | (inside ^ last));
@@ -4635,7 +4772,8 @@ ISOGI_VOL__AVX512 static unsigned isogi_vol__decide8(isogi_vol__batch *b, isogi_
         odd = (__mmask8)(odd | slow), cross = (__mmask8)(cross & ~slow);
         {
             const __m512d rest = _mm512_sub_pd(one, root);
-            _mm512_store_pd(t, ISOGI_VOL__ADD(ISOGI_VOL__TAKE_REAL(base), ISOGI_VOL__ADD(begin, ISOGI_VOL__MUL(root, ISOGI_VOL__SUB(end, begin)))));
+            _mm512_store_pd(
+                t, ISOGI_VOL__ADD(ISOGI_VOL__TAKE_REAL(base), ISOGI_VOL__ADD(begin, ISOGI_VOL__MUL(root, ISOGI_VOL__SUB(end, begin)))));
             _mm512_store_pd(local[0], isogi_vol__lerp8(from[0], to[0], root, rest));
             _mm512_store_pd(local[1], isogi_vol__lerp8(from[1], to[1], root, rest));
             _mm512_store_pd(local[2], isogi_vol__lerp8(from[2], to[2], root, rest));
@@ -4645,7 +4783,8 @@ ISOGI_VOL__AVX512 static unsigned isogi_vol__decide8(isogi_vol__batch *b, isogi_
             const int64_t xyz = s->cell[place];
             isogi_hit *hit = &b->hits[s->ray[place]];
             hit->t = t[i], hit->local[0] = local[0][i], hit->local[1] = local[1][i], hit->local[2] = local[2][i];
-            hit->cell[0] = (uint32_t)(xyz & 0xffff), hit->cell[1] = (uint32_t)(xyz >> 16 & 0xffff), hit->cell[2] = (uint32_t)(xyz >> 32 & 0xffff);
+            hit->cell[0] = (uint32_t)(xyz & 0xffff), hit->cell[1] = (uint32_t)(xyz >> 16 & 0xffff),
+            hit->cell[2] = (uint32_t)(xyz >> 32 & 0xffff);
             hit->side = inside >> i & 1 ? -1 : 1;
         }
     }
@@ -4658,15 +4797,18 @@ ISOGI_VOL__AVX512 static unsigned isogi_vol__decide8(isogi_vol__batch *b, isogi_
 /* Sets up to eight rays up at once and puts them into slots: the operations of begin and aim, in their order and without contraction.
    Returns the rays that have a slot now; *odd: those that are left to the code for one. The others miss the box. A kernel, longer than a
    screen: nothing in it is worth a name of its own. */
-ISOGI_VOL__AVX512 static unsigned isogi_vol__seat8(isogi_vol__batch *b, isogi_vol__pool *s, size_t first, int count, const uint8_t *slots, unsigned *odd) {
+ISOGI_VOL__AVX512 static unsigned isogi_vol__seat8(isogi_vol__batch *b, isogi_vol__pool *s, size_t first, int count, const uint8_t *slots,
+                                                   unsigned *odd) {
     const isogi_pyramid *p = b->pyramid;
     const __mmask8 lanes = (__mmask8)((1u << count) - 1);
     const __m512i lane = _mm512_set_epi64(7, 6, 5, 4, 3, 2, 1, 0), slot = isogi_vol__slots8(slots), none = _mm512_setzero_si512();
     const int whole = slots[0] % 8 == 0 && slots[count - 1] == slots[0] + count - 1; /* a row of slots is stored at once */
-    const size_t element = b->rays ? sizeof *b->rays : sizeof *b->starts, dir_bytes = b->bundle || !b->rays ? sizeof *b->dirs : sizeof *b->rays;
+    const size_t element = b->rays ? sizeof *b->rays : sizeof *b->starts,
+                 dir_bytes = b->bundle || !b->rays ? sizeof *b->dirs : sizeof *b->rays;
     const char *from = b->rays ? (const char *)(b->rays + (b->bundle ? 0 : first)) : (const char *)(b->starts + (b->bundle ? 0 : first));
     const char *to = b->bundle || !b->rays ? (const char *)b->dirs[first] : (const char *)b->rays[first].dir;
-    const __m512i at = b->bundle ? none : _mm512_mullo_epi64(lane, _mm512_set1_epi64((int64_t)element)), dir_at = _mm512_mullo_epi64(lane, _mm512_set1_epi64((int64_t)dir_bytes));
+    const __m512i at = b->bundle ? none : _mm512_mullo_epi64(lane, _mm512_set1_epi64((int64_t)element)),
+                  dir_at = _mm512_mullo_epi64(lane, _mm512_set1_epi64((int64_t)dir_bytes));
     const __m512d zero = _mm512_setzero_pd(), unlimited = _mm512_set1_pd(ISOGI_VOL__UNLIMITED), finite = _mm512_set1_pd(DBL_MAX);
     __m512d origin[3], d[3], inverse[3], tmin, tmax, isovalue, enter, leave, stop, q;
     __m512i axis = _mm512_set1_epi64(-1), flip = none, inside = axis;
@@ -4683,12 +4825,16 @@ ISOGI_VOL__AVX512 static unsigned isogi_vol__seat8(isogi_vol__batch *b, isogi_vo
         }
 #pragma GCC unroll 8
         for (a = 0; a < 3; a++)
-            origin[a] = ISOGI_VOL__ADD(ISOGI_VOL__ADD(ISOGI_VOL__MUL(_mm512_set1_pd(p->to_grid[3 * a]), relative[0]), ISOGI_VOL__MUL(_mm512_set1_pd(p->to_grid[3 * a + 1]), relative[1])),
+            origin[a] = ISOGI_VOL__ADD(ISOGI_VOL__ADD(ISOGI_VOL__MUL(_mm512_set1_pd(p->to_grid[3 * a]), relative[0]),
+                                                      ISOGI_VOL__MUL(_mm512_set1_pd(p->to_grid[3 * a + 1]), relative[1])),
                                        ISOGI_VOL__MUL(_mm512_set1_pd(p->to_grid[3 * a + 2]), relative[2]));
 #pragma GCC unroll 8
         for (a = 0; a < 3; a++) good = _mm512_mask_cmp_pd_mask(good, _mm512_abs_pd(origin[a]), finite, _CMP_LE_OQ);
-        tmin = ISOGI_VOL__TAKE(offsetof(isogi_ray, tmin)), tmax = ISOGI_VOL__TAKE(offsetof(isogi_ray, tmax)), isovalue = ISOGI_VOL__TAKE(offsetof(isogi_ray, isovalue));
-        good = _mm256_mask_testn_epi32_mask(good, _mm512_mask_i64gather_epi32(_mm256_setzero_si256(), lanes, at, from + offsetof(isogi_ray, flags), 1), _mm256_set1_epi32(ISOGI_RAY_CAPPED));
+        tmin = ISOGI_VOL__TAKE(offsetof(isogi_ray, tmin)), tmax = ISOGI_VOL__TAKE(offsetof(isogi_ray, tmax)),
+        isovalue = ISOGI_VOL__TAKE(offsetof(isogi_ray, isovalue));
+        good = _mm256_mask_testn_epi32_mask(
+            good, _mm512_mask_i64gather_epi32(_mm256_setzero_si256(), lanes, at, from + offsetof(isogi_ray, flags), 1),
+            _mm256_set1_epi32(ISOGI_RAY_CAPPED));
     } else {
         const __m256i side = _mm512_mask_i64gather_epi32(_mm256_setzero_si256(), lanes, at, from + offsetof(isogi_hit, side), 1);
         good = b->flags & ISOGI_RAY_CAPPED ? 0 : _mm256_mask_cmpneq_epi32_mask(good, _mm256_abs_epi32(side), _mm256_set1_epi32(2));
@@ -4698,7 +4844,8 @@ ISOGI_VOL__AVX512 static unsigned isogi_vol__seat8(isogi_vol__batch *b, isogi_vo
         inside = _mm512_sub_epi64(_mm512_add_epi64(inside, inside), _mm512_set1_epi64(4));
 #pragma GCC unroll 8
         for (a = 0; a < 3; a++) {
-            const __m256i cell = _mm512_mask_i64gather_epi32(_mm256_setzero_si256(), lanes, at, from + offsetof(isogi_hit, cell) + 4 * (size_t)a, 1);
+            const __m256i cell =
+                _mm512_mask_i64gather_epi32(_mm256_setzero_si256(), lanes, at, from + offsetof(isogi_hit, cell) + 4 * (size_t)a, 1);
             const __m512d local = ISOGI_VOL__TAKE(offsetof(isogi_hit, local) + 8 * (size_t)a);
             good = _mm256_mask_cmplt_epu32_mask(good, cell, _mm256_set1_epi32(p->cells[a]));
             good = _mm512_mask_cmp_pd_mask(good, _mm512_abs_pd(local), finite, _CMP_LE_OQ);
@@ -4706,14 +4853,16 @@ ISOGI_VOL__AVX512 static unsigned isogi_vol__seat8(isogi_vol__batch *b, isogi_vo
         }
         isovalue = _mm512_set1_pd(b->isovalue), tmin = tmax = zero;
         if (b->tmax)
-            tmax = _mm512_mask_i64gather_pd(zero, lanes, b->bundle ? none : _mm512_slli_epi64(lane, 3), b->tmax + (b->bundle ? 0 : first), 1);
+            tmax =
+                _mm512_mask_i64gather_pd(zero, lanes, b->bundle ? none : _mm512_slli_epi64(lane, 3), b->tmax + (b->bundle ? 0 : first), 1);
     }
 #undef ISOGI_VOL__TAKE
     good = _mm512_mask_cmp_pd_mask(_mm512_mask_cmp_pd_mask(good, tmax, tmax, _CMP_ORD_Q), tmin, tmin, _CMP_ORD_Q);
     tmax = _mm512_min_pd(_mm512_mask_mov_pd(tmax, _mm512_cmp_pd_mask(tmax, zero, _CMP_EQ_OQ), unlimited), unlimited);
     good = _mm512_mask_cmp_pd_mask(good, tmin, tmax, _CMP_LE_OQ);
     tmin = _mm512_max_pd(tmin, ISOGI_VOL__SUB(zero, unlimited));
-    good = _mm512_mask_cmp_pd_mask(_mm512_mask_cmp_pd_mask(good, isovalue, _mm512_set1_pd(p->range[0]), _CMP_GE_OQ), isovalue, _mm512_set1_pd(p->range[1]), _CMP_LE_OQ);
+    good = _mm512_mask_cmp_pd_mask(_mm512_mask_cmp_pd_mask(good, isovalue, _mm512_set1_pd(p->range[0]), _CMP_GE_OQ), isovalue,
+                                   _mm512_set1_pd(p->range[1]), _CMP_LE_OQ);
     {
         __m512d world[3], most;
 #pragma GCC unroll 8
@@ -4723,7 +4872,8 @@ ISOGI_VOL__AVX512 static unsigned isogi_vol__seat8(isogi_vol__batch *b, isogi_vo
         }
 #pragma GCC unroll 8
         for (a = 0; a < 3; a++) {
-            d[a] = ISOGI_VOL__ADD(ISOGI_VOL__ADD(ISOGI_VOL__MUL(_mm512_set1_pd(p->to_grid[3 * a]), world[0]), ISOGI_VOL__MUL(_mm512_set1_pd(p->to_grid[3 * a + 1]), world[1])),
+            d[a] = ISOGI_VOL__ADD(ISOGI_VOL__ADD(ISOGI_VOL__MUL(_mm512_set1_pd(p->to_grid[3 * a]), world[0]),
+                                                 ISOGI_VOL__MUL(_mm512_set1_pd(p->to_grid[3 * a + 1]), world[1])),
                                   ISOGI_VOL__MUL(_mm512_set1_pd(p->to_grid[3 * a + 2]), world[2]));
             good = _mm512_mask_cmp_pd_mask(good, _mm512_abs_pd(d[a]), finite, _CMP_LE_OQ);
         }
@@ -4758,11 +4908,14 @@ ISOGI_VOL__AVX512 static unsigned isogi_vol__seat8(isogi_vol__batch *b, isogi_vo
     for (a = 0; a < 3; a++) {
         const __m512d box = _mm512_set1_pd(p->box[a]);
         origin[a] = _mm512_min_pd(_mm512_max_pd(ISOGI_VOL__ADD(origin[a], ISOGI_VOL__MUL(enter, d[a])), zero), box);
-        origin[a] = _mm512_mask_mov_pd(origin[a], _mm512_cmpeq_epi64_mask(axis, _mm512_set1_epi64(a)), _mm512_mask_mov_pd(box, rising[a], zero));
-        stop = _mm512_mask_min_pd(stop, (__mmask8)~still[a], stop, ISOGI_VOL__MUL(ISOGI_VOL__SUB(_mm512_maskz_mov_pd(rising[a], box), origin[a]), inverse[a]));
+        origin[a] =
+            _mm512_mask_mov_pd(origin[a], _mm512_cmpeq_epi64_mask(axis, _mm512_set1_epi64(a)), _mm512_mask_mov_pd(box, rising[a], zero));
+        stop = _mm512_mask_min_pd(stop, (__mmask8)~still[a], stop,
+                                  ISOGI_VOL__MUL(ISOGI_VOL__SUB(_mm512_maskz_mov_pd(rising[a], box), origin[a]), inverse[a]));
     }
     stop = _mm512_min_pd(stop, ISOGI_VOL__SUB(tmax, enter));
-    good = (__mmask8)(good & (~meets | _mm512_mask_cmp_pd_mask(_mm512_cmp_pd_mask(stop, _mm512_set1_pd(1e-150), _CMP_GT_OQ), stop, _mm512_set1_pd(1e150), _CMP_LT_OQ)));
+    good = (__mmask8)(good & (~meets | _mm512_mask_cmp_pd_mask(_mm512_cmp_pd_mask(stop, _mm512_set1_pd(1e-150), _CMP_GT_OQ), stop,
+                                                               _mm512_set1_pd(1e150), _CMP_LT_OQ)));
     meets = (__mmask8)(meets & good);
 #define ISOGI_VOL__PUT(member, value)                                            \
     do {                                                                         \
@@ -4773,17 +4926,21 @@ ISOGI_VOL__AVX512 static unsigned isogi_vol__seat8(isogi_vol__batch *b, isogi_vo
 #pragma GCC unroll 8
     for (a = 0; a < 3; a++) {
         /* a ray that stands still on an axis keeps below the volume's upper border */
-        const __mmask8 upper = _mm512_mask_cmp_pd_mask(still[a], origin[a], _mm512_set1_pd(p->box[a]), _CMP_GE_OQ), fall = (__mmask8)(upper | ~(still[a] | rising[a]));
+        const __mmask8 upper = _mm512_mask_cmp_pd_mask(still[a], origin[a], _mm512_set1_pd(p->box[a]), _CMP_GE_OQ),
+                       fall = (__mmask8)(upper | ~(still[a] | rising[a]));
         inverse[a] = _mm512_mask_mov_pd(_mm512_mask_mov_pd(inverse[a], still[a], _mm512_set1_pd(1e200)), upper, _mm512_set1_pd(-1e200));
         flip = _mm512_mask_or_epi64(flip, fall, flip, _mm512_set1_epi64(3 << 2 * a));
         ISOGI_VOL__PUT_REAL(origin[a], origin[a]);
         ISOGI_VOL__PUT_REAL(dir[a], d[a]);
         ISOGI_VOL__PUT_REAL(inverse[a], inverse[a]);
     }
-    q = ISOGI_VOL__MUL(ISOGI_VOL__SUB(isovalue, _mm512_set1_pd(p->range[0])), _mm512_set1_pd(p->node_scale)); /* as quantise_isovalue has it, up to the last code */
+    /* as quantise_isovalue has it, up to the last code */
+    q = ISOGI_VOL__MUL(ISOGI_VOL__SUB(isovalue, _mm512_set1_pd(p->range[0])), _mm512_set1_pd(p->node_scale));
     ISOGI_VOL__PUT_REAL(level_units, _mm512_cvtps_pd(_mm512_cvtpd_ps(q)));
     ISOGI_VOL__PUT(low, _mm512_cvttpd_epi64(_mm512_max_pd(ISOGI_VOL__SUB(q, _mm512_set1_pd(0.01)), zero)));
-    ISOGI_VOL__PUT(beyond, _mm512_add_epi64(_mm512_min_epi64(_mm512_cvttpd_epi64(ISOGI_VOL__ADD(q, _mm512_set1_pd(0.01))), _mm512_set1_epi64(253)), _mm512_set1_epi64(1)));
+    ISOGI_VOL__PUT(beyond,
+                   _mm512_add_epi64(_mm512_min_epi64(_mm512_cvttpd_epi64(ISOGI_VOL__ADD(q, _mm512_set1_pd(0.01))), _mm512_set1_epi64(253)),
+                                    _mm512_set1_epi64(1)));
     ISOGI_VOL__PUT(end, _mm512_or_si512(_mm512_castpd_si512(stop), _mm512_set1_epi64(3)));
     ISOGI_VOL__PUT(flip, flip);
     ISOGI_VOL__PUT(pending, none);
@@ -4809,7 +4966,8 @@ ISOGI_VOL__INLINE void isogi_vol__send_for(const isogi_volume *v, int64_t cell) 
     const char *p = (const char *)v->data + (ptrdiff_t)(cell & 0xffff) * v->stride[0] + (ptrdiff_t)(cell >> 16 & 0xffff) * v->stride[1] +
                     (ptrdiff_t)(cell >> 32 & 0xffff) * v->stride[2];
     const ptrdiff_t dy = v->stride[1], dz = v->stride[2];
-    _mm_prefetch(p, _MM_HINT_T0), _mm_prefetch(p + dy, _MM_HINT_T0), _mm_prefetch(p + dz, _MM_HINT_T0), _mm_prefetch(p + dy + dz, _MM_HINT_T0);
+    _mm_prefetch(p, _MM_HINT_T0), _mm_prefetch(p + dy, _MM_HINT_T0), _mm_prefetch(p + dz, _MM_HINT_T0),
+        _mm_prefetch(p + dy + dz, _MM_HINT_T0);
 }
 
 ISOGI_VOL__AVX512 ISOGI_VOL__INLINE void isogi_vol__open_turn(isogi_vol__turn *turn, const isogi_pyramid *p) {
@@ -4827,16 +4985,15 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE void isogi_vol__open_turn(isogi_vol__turn *t
 
 /* A ray alone has nothing to do while it waits, so what counts are waits and branches that are foretold wrongly. The way through a
    node's children is not walked but looked up: the planes between them are met in an order that 27 comparisons tell, nine for every
-   two axes, all at once, and where the ray enters and leaves the node cuts the way at its ends. Times are integers as in the walk
-   above, exact sums, hence the same on all levels. All cells of a leaf are looked at together, in float. */
+   two axes, all at once, and where the ray enters and leaves the node cuts the way at its ends. Times are those that a pool goes by. All
+   cells of a leaf are looked at together, in float. */
 typedef struct __attribute__((aligned(64))) isogi_vol__course {
-    int64_t pair[3][8];      /* plane a of an axis less plane b of the next, for units of a cell, a = 1 1 1 2 2 2 3 3, b = 1 2 3 1 2 3 1 2 */
-    int64_t plane[8];        /* planes 1 2 3 of x and y, 1 2 of z */
-    int64_t last_pair[3];    /* a = b = 3 */
-    int64_t at[3], per[3], end; /* plane k of axis a, counted from the border that rays enter by, is met at at + k per */
-    double origin[3], inverse[3], dir[3], stop; /* as in a pool */
+    double sign[2][8], from[2][8], per[2][8]; /* lane's plane k, counted from the border that rays enter by,
+                                                 is met at (sign k + from) per */
+    double origin[4], inverse[4], dir[4], stop; /* as in a pool */
+    int64_t end;
     int64_t backwards;       /* cell = cell counted backwards ^ this, packed as in a pool */
-    int first[3];            /* cell in which the walk begins */
+    int first[4];            /* cell in which the walk begins, nearly */
     int flip, octant;        /* children; axes */
     int low, high;           /* what the isovalue can be in 8 bits */
     float level;             /* and unrounded */
@@ -4844,89 +5001,96 @@ typedef struct __attribute__((aligned(64))) isogi_vol__course {
     uint64_t cells;
 } isogi_vol__course;
 
-/* One axis; whatever lies beyond the segment is put behind its end, so that no sum overflows. */
-ISOGI_VOL__INLINE void isogi_vol__set_course_axis(isogi_vol__course *c, const isogi_vol__walk *w, int a, double ticks) {
-    const isogi_pyramid *p = w->pyramid;
-    const double beyond = 1.25 * ticks, unlimited = 1e200;
-    const int padded = 1 << 2 * p->node_levels, still = !(w->dir[a] < 0 || w->dir[a] > 0);
-    const int fall = still ? w->origin[a] >= p->cells[a] : w->dir[a] < 0; /* a ray that stands still keeps below the upper border */
-    const int least = fall ? padded - p->cells[a] : 0, most = (fall ? padded : p->cells[a]) - 1;
-    const double origin = fall ? padded - w->origin[a] : w->origin[a], per = fabs(w->inverse[a]) * (ticks / w->end);
-    double ahead;
-    int64_t border;
-    int cell = (int)origin;
-    cell = cell > most ? most : cell < least ? least : cell;
-    ahead = (cell + 1 - origin) * per;
-    c->per[a] = still || !(per < beyond) ? (int64_t)beyond : (int64_t)per;
-    c->at[a] = (still || !(ahead < beyond) ? (int64_t)beyond : (int64_t)ahead) - (cell + 1) * c->per[a];
-    border = c->at[a] + (most + 1) * c->per[a];
-    c->end = border < c->end ? border : c->end;
-    c->origin[a] = w->origin[a], c->dir[a] = w->dir[a];
-    c->inverse[a] = still ? fall ? -unlimited : unlimited : w->inverse[a];
-    c->backwards |= fall ? (int64_t)(padded - 1) << 16 * a : 0, c->first[a] = fall ? padded - 1 - cell : cell;
-    c->flip |= fall ? 3 << 2 * a : 0, c->octant |= fall << a;
-}
-
-/* One, two and three times a number: twice and thrice where the masks say. */
-ISOGI_VOL__AVX512 ISOGI_VOL__INLINE __m512i isogi_vol__multiples(__m512i per, __mmask8 twice, __mmask8 thrice) {
-    const __m512i two = _mm512_mask_add_epi64(per, twice, per, per);
-    return _mm512_mask_add_epi64(two, thrice, two, per);
-}
-
 /* Sets up the course of a walk that is ready to go; 0 if it has to be walked plainly. */
 ISOGI_VOL__AVX512 ISOGI_VOL__INLINE int isogi_vol__set_course(isogi_vol__course *c, const isogi_vol__walk *w) {
-    const int levels = w->pyramid->node_levels;
-    const double ticks = (double)((int64_t)1 << (61 - 2 * levels)); /* times 4^levels planes, times 1.25, times 2 for differences: below 2^63 */
-    int a;
+    const isogi_pyramid *p = w->pyramid;
+    const int padded = 1 << 2 * p->node_levels;
+    const __m512i lanes[2] = {_mm512_setr_epi64(0, 0, 0, 1, 1, 1, 2, 2), _mm512_setr_epi64(2, 0, 1, 2, 0, 1, 2, 2)};
+    const __m256d origin = _mm256_loadu_pd(w->origin), dir = _mm256_loadu_pd(w->dir), box = _mm256_loadu_pd(p->box);
+    const __mmask8 still = _mm256_cmp_pd_mask(dir, _mm256_setzero_pd(), _CMP_EQ_OQ);
+    /* a ray that stands still keeps below the upper border */
+    const __mmask8 fall =
+        (__mmask8)((_mm256_cmp_pd_mask(dir, _mm256_setzero_pd(), _CMP_LT_OQ) | _mm256_mask_cmp_pd_mask(still, origin, box, _CMP_GE_OQ)) &
+                   7);
+    const __m256d sign = _mm256_mask_mov_pd(_mm256_set1_pd(1), fall, _mm256_set1_pd(-1));
+    const __m256d inverse = _mm256_mask_mul_pd(_mm256_loadu_pd(w->inverse), still, sign, _mm256_set1_pd(1e200));
+    const __m256d from = _mm256_sub_pd(_mm256_maskz_mov_pd(fall, _mm256_set1_pd(padded)), origin);
+    int i;
     if (!(w->end > 1e-150) || !(w->end < 1e150)) return 0;
-    c->end = (int64_t)ticks, c->backwards = 0, c->flip = c->octant = 0, c->stop = w->end, c->entry_axis = w->entry_axis, c->cells = 0;
-    c->level = isogi_vol__quantise_isovalue(w->pyramid, w->isovalue, &c->low, &c->high);
-    isogi_vol__set_course_axis(c, w, 0, ticks);
-    isogi_vol__set_course_axis(c, w, 1, ticks);
-    isogi_vol__set_course_axis(c, w, 2, ticks);
-#pragma GCC unroll 8
-    for (a = 0; a < 3; a++) {
-        const int64_t f = c->per[a], g = c->per[a < 2 ? a + 1 : 0];
-        _mm512_store_si512(c->pair[a], _mm512_sub_epi64(isogi_vol__multiples(_mm512_set1_epi64(f), 0xf8, 0xc0), isogi_vol__multiples(_mm512_set1_epi64(g), 0xb6, 0x24)));
-        c->last_pair[a] = 3 * (f - g);
+    c->level = isogi_vol__quantise_isovalue(p, w->isovalue, &c->low, &c->high);
+    c->octant = fall, c->flip = (int)(3 * _pdep_u32(fall, 0x15));
+    c->backwards = (int64_t)(_pdep_u64(fall, 0x000100010001u) * (uint64_t)(padded - 1));
+    c->stop = w->end, c->entry_axis = w->entry_axis, c->cells = 0;
+    memcpy(&c->end, &w->end, sizeof c->end), c->end |= 3;
+    _mm256_store_pd(c->origin, origin), _mm256_store_pd(c->inverse, inverse), _mm256_store_pd(c->dir, dir);
+    _mm_storeu_si128((__m128i *)(void *)c->first, _mm256_cvttpd_epi32(_mm256_min_pd(origin, _mm256_sub_pd(box, _mm256_set1_pd(1)))));
+#pragma GCC unroll 2
+    for (i = 0; i < 2; i++) {
+        _mm512_store_pd(c->sign[i], _mm512_permutexvar_pd(lanes[i], _mm512_castpd256_pd512(sign)));
+        _mm512_store_pd(c->from[i], _mm512_permutexvar_pd(lanes[i], _mm512_castpd256_pd512(from)));
+        _mm512_store_pd(c->per[i], _mm512_permutexvar_pd(lanes[i], _mm512_castpd256_pd512(inverse)));
     }
-    {
-        const __m512i x = _mm512_set1_epi64(c->per[0]), xy = _mm512_mask_set1_epi64(x, 0x38, c->per[1]);
-        _mm512_store_si512(c->plane, isogi_vol__multiples(_mm512_mask_set1_epi64(xy, 0xc0, c->per[2]), 0xb6, 0x24));
-    }
-    return c->end > 0;
+    return 1;
 }
 
-/* Which children of a node the ray passes, in its own order; cell: the node's corner, counted backwards where the ray falls. */
-ISOGI_VOL__AVX512 ISOGI_VOL__INLINE uint64_t isogi_vol__way(const isogi_vol__course *c, const struct isogi_vol__ways *ways, int64_t cell, int level) {
-    const int shift = 2 * level;
-    const __m512i shifts = _mm512_set1_epi64(shift);
-    const int64_t x = c->at[0] + (cell & 0xffff) * c->per[0], y = c->at[1] + (cell >> 16 & 0xffff) * c->per[1], z = c->at[2] + (cell >> 32) * c->per[2];
-    const int64_t xy = x - y - 1, yz = y - z - 1, zx = z - x; /* at the same time, x comes before y, and y before z */
-    const int64_t x4 = x + (c->per[0] << 2 << shift), y4 = y + (c->per[1] << 2 << shift), z4 = z + (c->per[2] << 2 << shift), z3 = z4 - (c->per[2] << shift);
-    int64_t in = x > y ? x : y, out = x4 < y4 ? x4 : y4;
-    __m512i planes = _mm512_mask_set1_epi64(_mm512_mask_set1_epi64(_mm512_set1_epi64(x), 0x38, y), 0xc0, z);
-    uint64_t met;
-    in = in > z ? in : z, in = in > 0 ? in : 0, out = out < z4 ? out : z4, out = out < c->end ? out : c->end;
-    planes = _mm512_add_epi64(planes, _mm512_sllv_epi64(_mm512_load_si512(c->plane), shifts));
-#define ISOGI_VOL__ORDER(f, base)                                                                                                          \
-    ways->before[f][(unsigned)_mm512_movepi64_mask(_mm512_add_epi64(_mm512_sllv_epi64(_mm512_load_si512(c->pair[f]), shifts), _mm512_set1_epi64(base))) | \
-                    (unsigned)((uint64_t)((base) + (int64_t)((uint64_t)c->last_pair[f] << shift)) >> 63) << 8]
-    met = ISOGI_VOL__ORDER(0, xy) & ISOGI_VOL__ORDER(1, yz) & ISOGI_VOL__ORDER(2, zx);
-#undef ISOGI_VOL__ORDER
-    met &= ways->entered[(unsigned)_mm512_cmple_epi64_mask(planes, _mm512_set1_epi64(in)) | (unsigned)(z3 <= in) << 8];
-    return met & ways->left[(unsigned)_mm512_cmplt_epi64_mask(planes, _mm512_set1_epi64(out)) | (unsigned)(z3 < out) << 8];
+/* Times of a lane's planes in a node, axis in the lowest two bits; cell: the node's corner in all lanes. */
+ISOGI_VOL__AVX512 ISOGI_VOL__INLINE __m512i isogi_vol__plane_times(const isogi_vol__course *c, __m512i cell, __m512i digits,
+                                                                   const int64_t plane[8], __m512i axis, int i) {
+    const __m512i at =
+        _mm512_add_epi64(_mm512_and_si512(_mm512_srlv_epi64(cell, digits), _mm512_set1_epi64(0xffff)), _mm512_load_si512(plane));
+    const __m512d way = _mm512_fmadd_pd(_mm512_cvtepi64_pd(at), _mm512_load_pd(c->sign[i]), _mm512_load_pd(c->from[i]));
+    return _mm512_ternarylogic_epi64(_mm512_castpd_si512(_mm512_mul_pd(way, _mm512_load_pd(c->per[i]))), ISOGI_VOL__ALL64(~(uint64_t)3),
+                                     axis, 0xea);
+}
+
+/* Which children of a node the ray passes, in its own order; cell: the node's corner, counted backwards where the ray falls. Times before
+   the ray begins are negative, and in whatever order: such planes are cut off as lying before the entry. */
+ISOGI_VOL__AVX512 ISOGI_VOL__INLINE uint64_t isogi_vol__way(const isogi_vol__course *c, const struct isogi_vol__ways *ways, int64_t cell,
+                                                            int level) {
+    const __m512i corner = _mm512_set1_epi64(cell);
+    const __m512i t = isogi_vol__plane_times(c, corner, _mm512_setr_epi64(0, 0, 0, 16, 16, 16, 32, 32), ways->plane[level][0],
+                                             _mm512_setr_epi64(0, 0, 0, 1, 1, 1, 2, 2), 0);
+    const __m512i u = isogi_vol__plane_times(c, corner, _mm512_setr_epi64(32, 0, 16, 32, 0, 16, 32, 32), ways->plane[level][1],
+                                             _mm512_setr_epi64(2, 0, 1, 2, 0, 1, 2, 2), 1);
+    const __m512d border = _mm512_castsi512_pd(u);
+#define ISOGI_VOL__SPREAD(i) _mm512_permutexvar_pd(_mm512_set1_epi64(i), border)
+    /* no earlier than the ray begins: a number next to 0, not a denormal one */
+    const __m512i in =
+        _mm512_castpd_si512(_mm512_max_pd(_mm512_max_pd(ISOGI_VOL__SPREAD(1), ISOGI_VOL__SPREAD(2)),
+                                          _mm512_max_pd(ISOGI_VOL__SPREAD(3), _mm512_castsi512_pd(_mm512_set1_epi64(0x0010000000000003)))));
+    const __m512i out =
+        _mm512_castpd_si512(_mm512_min_pd(_mm512_min_pd(ISOGI_VOL__SPREAD(4), ISOGI_VOL__SPREAD(5)),
+                                          _mm512_min_pd(ISOGI_VOL__SPREAD(6), _mm512_castsi512_pd(_mm512_set1_epi64(c->end)))));
+#undef ISOGI_VOL__SPREAD
+#define ISOGI_VOL__MET(i, a, b) ways->orders[i][(unsigned)_mm512_cmplt_epi64_mask(a, b)]
+#define ISOGI_VOL__ONES(f) _mm512_permutexvar_epi64(_mm512_setr_epi64(3 * (f), 3 * (f), 3 * (f), 3 * (f) + 1, 3 * (f) + 1, 3 * (f) + 1, \
+    3 * (f) + 2, 3 * (f) + 2), t)
+    const __m512i x = ISOGI_VOL__ONES(0), y = ISOGI_VOL__ONES(1),
+                  z = _mm512_permutex2var_epi64(t, _mm512_setr_epi64(6, 6, 6, 7, 7, 7, 8, 8), u);
+    const __m512i next_x = _mm512_permutexvar_epi64(_mm512_setr_epi64(0, 1, 2, 0, 1, 2, 0, 1), t),
+                  next_y = _mm512_permutexvar_epi64(_mm512_setr_epi64(3, 4, 5, 3, 4, 5, 3, 4), t);
+    const __m512i next_z = _mm512_permutex2var_epi64(t, _mm512_setr_epi64(6, 7, 8, 6, 7, 8, 6, 7), u);
+    const __m512i last = _mm512_mask_mov_epi64(_mm512_permutex2var_epi64(t, _mm512_setr_epi64(2, 5, 8, 8, 8, 8, 8, 8), u), 16, out);
+    const __m512i next_last = _mm512_mask_mov_epi64(_mm512_permutex2var_epi64(t, _mm512_setr_epi64(5, 8, 2, 8, 8, 8, 8, 8), u), 8, in);
+    return ISOGI_VOL__MET(0, x, next_y) & ISOGI_VOL__MET(1, y, next_z) & ISOGI_VOL__MET(2, z, next_x) & ISOGI_VOL__MET(3, t, in) &
+           ISOGI_VOL__MET(4, out, t) & ISOGI_VOL__MET(5, last, next_last);
+#undef ISOGI_VOL__MET
+#undef ISOGI_VOL__ONES
 }
 
 /* Which children of a node can hold the surface, in the ray's order. */
-ISOGI_VOL__AVX512 ISOGI_VOL__INLINE uint64_t isogi_vol__held(const struct isogi_vol__ways *ways, int octant, int isovalue_low, int isovalue_high, const uint8_t *node) {
+ISOGI_VOL__AVX512 ISOGI_VOL__INLINE uint64_t isogi_vol__held(const struct isogi_vol__ways *ways, int octant, int isovalue_low,
+                                                             int isovalue_high, const uint8_t *node) {
     const __m512i order = _mm512_load_si512(ways->child[octant]);
-    const __m512i least = _mm512_permutexvar_epi8(order, _mm512_load_si512(node)), most = _mm512_permutexvar_epi8(order, _mm512_load_si512(node + 64));
-    return _mm512_mask_cmpge_epu8_mask(_mm512_cmple_epu8_mask(least, _mm512_set1_epi8((char)isovalue_high)), most, _mm512_set1_epi8((char)isovalue_low));
+    const __m512i least = _mm512_permutexvar_epi8(order, _mm512_load_si512(node)),
+                  most = _mm512_permutexvar_epi8(order, _mm512_load_si512(node + 64));
+    return _mm512_mask_cmpge_epu8_mask(_mm512_cmple_epu8_mask(least, _mm512_set1_epi8((char)isovalue_high)), most,
+                                       _mm512_set1_epi8((char)isovalue_low));
 }
 
 /* open_leaf without leaving the vector registers; the leaf's bounds hold the isovalue, since its parent's did. */
-ISOGI_VOL__AVX512 ISOGI_VOL__INLINE void isogi_vol__unlock_leaf(const struct isogi_vol__ways *ways, isogi_vol__leaf *leaf, const uint8_t *node, float level, __m512i *inside, __m512i *outside) {
+ISOGI_VOL__AVX512 ISOGI_VOL__INLINE void isogi_vol__unlock_leaf(const struct isogi_vol__ways *ways, isogi_vol__leaf *leaf,
+                                                                const uint8_t *node, float level, __m512i *inside, __m512i *outside) {
     const int low = node[ISOGI_VOL__LEAF_LOW], high = node[ISOGI_VOL__LEAF_HIGH];
     const float x = (level - (float)low) * ways->scale[(high - low) & 255];
     __m128i bound = _mm_cvttps_epi32(_mm_add_ps(_mm_set1_ps(x), _mm_setr_ps(3.0625f, 2.9375f, 0, 0)));
@@ -4936,9 +5100,9 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE void isogi_vol__unlock_leaf(const struct iso
     leaf->code = node, leaf->isovalue = x - 0.5f;
 }
 
-/* The same for the cells of a leaf; voxel: its bytes in the ray's order. Cells beyond the volume are not left out: no ray passes them. */
-ISOGI_VOL__AVX512 ISOGI_VOL__INLINE uint64_t isogi_vol__held_cells(const struct isogi_vol__ways *ways, int octant, isogi_vol__leaf *leaf, const uint8_t *node, float level,
-                                                                   __m512i voxel[2]) {
+/* The same for the cells of a leaf, with those beyond the volume; voxel: its bytes in the ray's order. */
+ISOGI_VOL__AVX512 ISOGI_VOL__INLINE uint64_t isogi_vol__held_cells(const struct isogi_vol__ways *ways, int octant, isogi_vol__leaf *leaf,
+                                                                   const uint8_t *node, float level, __m512i voxel[2]) {
     const uint64_t low_rows = 0xf7bc0f7bde07bdefu, high_rows = 0x3def781eu; /* bits x + 5y + 25z of cells */
     const __m512i code0 = _mm512_load_si512(node), code1 = _mm512_load_si512(node + 64);
     const __m512i low = _mm512_permutex2var_epi8(code0, _mm512_load_si512(ways->voxel[octant]), code1);
@@ -4954,11 +5118,21 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE uint64_t isogi_vol__held_cells(const struct 
     return ~(_pext_u64(in_low | out_low, low_rows) | _pext_u64(in_high | out_high, high_rows) << 44);
 }
 
+/* Without the cells of a leaf that lie beyond the volume; they are counted backwards along the axes of `octant`. */
+static uint64_t isogi_vol__cut_order(const isogi_vol__leaf *leaf, int octant, uint64_t mask) {
+    const int cut = leaf->code[ISOGI_VOL__LEAF_CUT], x = cut & 3, y = cut >> 2 & 3, z = cut >> 4;
+    if (!cut) return mask;
+    mask &= 0x1111111111111111u * (octant & 1 ? 15u << x & 15 : 15u >> x);
+    mask &= 0x0001000100010001u * (octant & 2 ? 0xffffu << 4 * y & 0xffff : 0xffffu >> 4 * y);
+    return mask & (octant & 4 ? ~(uint64_t)0 << 16 * z : ~(uint64_t)0 >> 16 * z);
+}
+
 /* Goes through up to eight cells of a leaf, numbered backwards where the ray falls; corner: any cell of the leaf. 1: hit. */
-ISOGI_VOL__AVX512 ISOGI_VOL__INLINE int isogi_vol__walk_cells(isogi_vol__walk *w, isogi_vol__course *c, const isogi_vol__leaf *leaf, __m128i list, int count, int64_t corner,
-                                                              isogi_hit *hit) {
+ISOGI_VOL__AVX512 ISOGI_VOL__INLINE int isogi_vol__walk_cells(isogi_vol__walk *w, isogi_vol__course *c, const isogi_vol__leaf *leaf,
+                                                              __m128i list, int count, int64_t corner, isogi_hit *hit) {
     const __m512i child = _mm512_xor_si512(_mm512_cvtepu8_epi64(list), _mm512_set1_epi64(c->flip)), three = _mm512_set1_epi64(3);
-    __m512i code = _mm512_set1_epi64((int64_t)(uintptr_t)leaf->code), cell = isogi_vol__cells8(child, _mm512_set1_epi64(corner), &code), begin = three, end;
+    __m512i code = _mm512_set1_epi64((int64_t)(uintptr_t)leaf->code), cell = isogi_vol__cells8(child, _mm512_set1_epi64(corner), &code),
+            begin = three, end;
     __m512d origin[3], inverse[3], dir[3];
     __m256 from[3], to[3];
     __attribute__((aligned(64))) int64_t at[8];
@@ -4967,11 +5141,13 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE int isogi_vol__walk_cells(isogi_vol__walk *w
     int a;
     isogi_vol__send_for(&w->pyramid->volume, _mm_cvtsi128_si64(_mm512_castsi512_si128(cell)));
 #pragma GCC unroll 8
-    for (a = 0; a < 3; a++) origin[a] = _mm512_set1_pd(c->origin[a]), inverse[a] = _mm512_set1_pd(c->inverse[a]), dir[a] = _mm512_set1_pd(c->dir[a]);
+    for (a = 0; a < 3; a++)
+        origin[a] = _mm512_set1_pd(c->origin[a]), inverse[a] = _mm512_set1_pd(c->inverse[a]), dir[a] = _mm512_set1_pd(c->dir[a]);
     end = _mm512_or_si512(_mm512_castpd_si512(_mm512_set1_pd(c->stop)), three);
     isogi_vol__way8(cell, origin, inverse, dir, &begin, &end, from, to);
     sides = isogi_vol__sides8(code, (__mmask8)lanes, _mm256_set1_ps(leaf->isovalue), from, to);
-    _mm512_store_si512(at, _mm512_or_si512(cell, _mm512_or_si512(_mm512_slli_epi64(_mm512_and_si512(begin, three), 48), _mm512_slli_epi64(_mm512_and_si512(end, three), 50))));
+    _mm512_store_si512(at, _mm512_or_si512(cell, _mm512_or_si512(_mm512_slli_epi64(_mm512_and_si512(begin, three), 48),
+                                                                 _mm512_slli_epi64(_mm512_and_si512(end, three), 50))));
     c->cells += (uint64_t)count;
     while (lanes) {
         const unsigned first = lanes & (0 - lanes);
@@ -4982,12 +5158,16 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE int isogi_vol__walk_cells(isogi_vol__walk *w
             if (!doubt) break;
             doubt &= 0 - doubt;
             /* any hit will do, and this one is certain */
-            if (!w->exact && doubt & (w->inside > 0 ? sides.out1 : w->inside == 0 ? sides.in1 : (sides.in0 & sides.out1) | (sides.out0 & sides.in1))) return 1;
+            if (!w->exact && doubt & (w->inside > 0    ? sides.out1
+                                      : w->inside == 0 ? sides.in1
+                                                       : (sides.in0 & sides.out1) | (sides.out0 & sides.in1)))
+                return 1;
         } else doubt = first;
         {
             const int64_t one = at[__builtin_ctz(doubt)];
             const int in = (int)(one >> 48 & 3), out = (int)(one >> 50 & 3);
-            if (isogi_vol__mixed_cell_avx2(w, (int)(one & 0xffff), (int)(one >> 16 & 0xffff), (int)(one >> 32 & 0xffff), in == 3 ? c->entry_axis : in, out == 3 ? -1 : out, hit))
+            if (isogi_vol__mixed_cell_avx2(w, (int)(one & 0xffff), (int)(one >> 16 & 0xffff), (int)(one >> 32 & 0xffff),
+                                           in == 3 ? c->entry_axis : in, out == 3 ? -1 : out, hit))
                 return 1;
         }
         lanes &= ~(doubt | (doubt - 1));
@@ -5023,6 +5203,7 @@ ISOGI_VOL__AVX512 static int isogi_vol__walk_one(isogi_vol__walk *w, isogi_hit *
             isogi_vol__leaf leaf;
             __m512i voxel[2];
             mask &= isogi_vol__held_cells(ways, c.octant, &leaf, node, c.level, voxel);
+            if (ISOGI_VOL__UNLIKELY(node[ISOGI_VOL__LEAF_CUT])) mask = isogi_vol__cut_order(&leaf, c.octant, mask);
             if (mask) {
                 const int count = __builtin_popcountll(mask);
                 const __m128i list = _mm512_castsi512_si128(_mm512_maskz_compress_epi8(mask, _mm512_load_si512(ways->child[0])));
@@ -5039,7 +5220,8 @@ ISOGI_VOL__AVX512 static int isogi_vol__walk_one(isogi_vol__walk *w, isogi_hit *
             const int64_t at = cell ^ c.backwards;
             const int shift = 2 * n + 2;
             children[n] = p->nodes[level->first + 64 * ((size_t)(at & 0xffff) >> shift) +
-                                   64 * level->parents[0] * (((size_t)(at >> 16 & 0xffff) >> shift) + level->parents[1] * ((size_t)(at >> 32) >> shift))];
+                                   64 * level->parents[0] *
+                                       (((size_t)(at >> 16 & 0xffff) >> shift) + level->parents[1] * ((size_t)(at >> 32) >> shift))];
             pending |= 1u << n;
         } else {
             if (!pending) break;
@@ -5050,7 +5232,7 @@ ISOGI_VOL__AVX512 static int isogi_vol__walk_one(isogi_vol__walk *w, isogi_hit *
         if (!left[n]) pending &= pending - 1;
         node = children[n] + 128 * (child ^ c.flip);
         isogi_vol__fetch_node(children[n] + 128 * (__builtin_ctzll(left[n] ? left[n] : mask) ^ c.flip)); /* its successor */
-        cell = (int64_t)(((uint64_t)cell & 0x0000ffffffffffffu & ~(0x000100010001u * ((4u << 2 * n) - 1))) | _pdep_u64((uint64_t)child, 0x000300030003u) << 2 * n);
+        cell = (int64_t)(((uint64_t)cell & ways->above[n]) | _pdep_u64((uint64_t)child, ways->digit[n]));
         n--;
     }
     w->count.cells = c.cells;
@@ -5128,7 +5310,8 @@ static void isogi_vol__trace_one(isogi_vol__batch *b, size_t i) {
 #define ISOGI_VOL__REACH 4e-6f /* times below are sums of a few numbers up to 4 children, with errors below 1e-6 */
 
 typedef struct __attribute__((aligned(64))) isogi_vol__layers {
-    __m512 per[3], first[3], last[3], stop; /* from `zero` on, the rays enter layer i of children at i per - first, leave it at (i + 1) per - last */
+    __m512 per[3], first[3], last[3], stop; /* from `zero` on, the rays enter layer i of children at i per - first,
+                                               leave it at (i + 1) per - last */
 } isogi_vol__layers;
 
 /* Where the rays are at `zero`, in children from the node's corner, and their way per time: of the node that was opened last. */
@@ -5163,7 +5346,8 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE void isogi_vol__set_rays16(isogi_vol__rays16
     for (a = 0; a < 3; a++) {
         r->origin[a] = isogi_vol__halves(_mm512_load_pd(&s->origin[a][0]), _mm512_load_pd(&s->origin[a][8]));
         const __m512d low = _mm512_min_pd(_mm512_max_pd(_mm512_load_pd(&s->inverse[a][0]), _mm512_sub_pd(_mm512_setzero_pd(), most)), most);
-        const __m512d high = _mm512_min_pd(_mm512_max_pd(_mm512_load_pd(&s->inverse[a][8]), _mm512_sub_pd(_mm512_setzero_pd(), most)), most);
+        const __m512d high =
+            _mm512_min_pd(_mm512_max_pd(_mm512_load_pd(&s->inverse[a][8]), _mm512_sub_pd(_mm512_setzero_pd(), most)), most);
         r->inverse[a] = isogi_vol__halves(low, high);
     }
     r->stop = _mm512_mul_ps(isogi_vol__halves(_mm512_load_pd(&s->stop[0]), _mm512_load_pd(&s->stop[8])), _mm512_set1_ps(1.000001f));
@@ -5325,15 +5509,6 @@ ISOGI_VOL__AVX512 static unsigned isogi_vol__settle(isogi_vol__batch *b, isogi_v
     return hits;
 }
 
-/* Without the cells of a leaf that lie beyond the volume; they are counted backwards along the axes of `octant`. */
-static uint64_t isogi_vol__cut_order(const isogi_vol__leaf *leaf, int octant, uint64_t mask) {
-    const int cut = leaf->code[ISOGI_VOL__LEAF_CUT], x = cut & 3, y = cut >> 2 & 3, z = cut >> 4;
-    if (!cut) return mask;
-    mask &= 0x1111111111111111u * (octant & 1 ? 15u << x & 15 : 15u >> x);
-    mask &= 0x0001000100010001u * (octant & 2 ? 0xffffu << 4 * y & 0xffff : 0xffffu >> 4 * y);
-    return mask & (octant & 4 ? ~(uint64_t)0 << 16 * z : ~(uint64_t)0 >> 16 * z);
-}
-
 /* Whether the rays in a pool's first slots nearly coincide. */
 ISOGI_VOL__AVX512 static int isogi_vol__coincide(const isogi_vol__pool *s, unsigned rays) {
     const int first = __builtin_ctz(rays);
@@ -5411,7 +5586,8 @@ ISOGI_VOL__AVX512 static void isogi_vol__set_beam(isogi_vol__beam *beam, const i
 
 /* Children whose numbers on axis 0, 1, 2 are in a set of four. */
 #define ISOGI_VOL__SETS(f) f(0), f(1), f(2), f(3), f(4), f(5), f(6), f(7), f(8), f(9), f(10), f(11), f(12), f(13), f(14), f(15)
-#define ISOGI_VOL__SET(m, one, step) (((m) & 1 ? (one) : 0) | ((m) & 2 ? (one) << (step) : 0) | ((m) & 4 ? (one) << 2 * (step) : 0) | ((m) & 8 ? (one) << 3 * (step) : 0))
+#define ISOGI_VOL__SET(m, one, step) (((m) & 1 ? (one) : 0) | ((m) & 2 ? (one) << (step) : 0) | ((m) & 4 ? (one) << 2 * (step) : 0) | \
+    ((m) & 8 ? (one) << 3 * (step) : 0))
 #define ISOGI_VOL__SET_X(m) ISOGI_VOL__SET(m, (uint64_t)0x1111111111111111u, 1)
 #define ISOGI_VOL__SET_Y(m) ISOGI_VOL__SET(m, (uint64_t)0x000f000f000f000fu, 4)
 #define ISOGI_VOL__SET_Z(m) ISOGI_VOL__SET(m, (uint64_t)0xffffu, 16)
@@ -5451,8 +5627,10 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE uint64_t isogi_vol__in_beam(const isogi_vol_
     bits = _mm512_sllv_epi32(_mm512_set1_epi32(1), _mm512_cvttps_epi32(bound));
     first = _mm512_castsi512_si256(bits);
     rows = _mm256_sub_epi32(_mm256_max_epu32(_mm512_extracti64x4_epi64(bits, 1), first), first);
-    met = _mm512_and_si512(isogi_vol__in_sets(beam->second, _mm256_castsi256_si128(rows)), isogi_vol__in_sets(beam->third, _mm256_extracti128_si256(rows, 1)));
-    met4 = _mm256_and_si256(_mm512_castsi512_si256(met), _mm256_loadu_si256((const __m256i *)(const void *)isogi_vol__layer_sets[beam->axis]));
+    met = _mm512_and_si512(isogi_vol__in_sets(beam->second, _mm256_castsi256_si128(rows)),
+                           isogi_vol__in_sets(beam->third, _mm256_extracti128_si256(rows, 1)));
+    met4 =
+        _mm256_and_si256(_mm512_castsi512_si256(met), _mm256_loadu_si256((const __m256i *)(const void *)isogi_vol__layer_sets[beam->axis]));
     met2 = _mm_or_si128(_mm256_castsi256_si128(met4), _mm256_extracti128_si256(met4, 1));
     return (uint64_t)_mm_cvtsi128_si64(_mm_or_si128(met2, _mm_unpackhi_epi64(met2, met2)));
 }
@@ -5553,7 +5731,8 @@ out:
 
 /* ---- a pool of rays ---- */
 
-/* The rays of a bundle that begin where its first one does: they come from the root to the leaf there on one way, whose nodes are looked at once. */
+/* The rays of a bundle that begin where its first one does: they come from the root to the leaf there on one way,
+   whose nodes are looked at once. */
 typedef struct isogi_vol__descent {
     double origin[3], step;
     int64_t cell; /* in which they begin; -1: not prepared */
@@ -5562,7 +5741,8 @@ typedef struct isogi_vol__descent {
 } isogi_vol__descent;
 
 /* slot: of a ray that has been set up. */
-ISOGI_VOL__AVX512 static void isogi_vol__prepare_descent(isogi_vol__descent *d, const isogi_pyramid *p, const isogi_vol__pool *s, int slot) {
+ISOGI_VOL__AVX512 static void isogi_vol__prepare_descent(isogi_vol__descent *d, const isogi_pyramid *p, const isogi_vol__pool *s,
+                                                         int slot) {
     size_t at[3];
     int a, n;
     for (a = 0; a < 3; a++) {
@@ -5586,19 +5766,23 @@ ISOGI_VOL__AVX512 static void isogi_vol__prepare_descent(isogi_vol__descent *d, 
 }
 
 /* Takes rays of a group of eight from the root to the leaf in which they begin, or as far as children can hold the surface. */
-ISOGI_VOL__AVX512 static void isogi_vol__descend8(isogi_vol__turn *turn, isogi_vol__pool *s, const isogi_vol__descent *d, int i, unsigned fresh) {
-    const __m512i one = _mm512_set1_epi64(1), flip = _mm512_load_si512(&s->flip[i]), cell = _mm512_set1_epi64(d->cell), zero = _mm512_setzero_si512();
+ISOGI_VOL__AVX512 static void isogi_vol__descend8(isogi_vol__turn *turn, isogi_vol__pool *s, const isogi_vol__descent *d, int i,
+                                                  unsigned fresh) {
+    const __m512i one = _mm512_set1_epi64(1), flip = _mm512_load_si512(&s->flip[i]), cell = _mm512_set1_epi64(d->cell),
+                  zero = _mm512_setzero_si512();
     __m512i pending = zero, mask = zero;
     __mmask8 lanes = (__mmask8)fresh, going;
     unsigned cells;
     int a, n;
-    for (a = 0; a < 3; a++) lanes = _mm512_mask_cmp_pd_mask(lanes, _mm512_load_pd(&s->origin[a][i]), _mm512_set1_pd(d->origin[a]), _CMP_EQ_OQ);
+    for (a = 0; a < 3; a++)
+        lanes = _mm512_mask_cmp_pd_mask(lanes, _mm512_load_pd(&s->origin[a][i]), _mm512_set1_pd(d->origin[a]), _CMP_EQ_OQ);
     if (!lanes) return;
     for (going = lanes, n = turn->levels - 1; going && n >= 0; n--) {
         const uint64_t digits = 0x000100010001u * (((uint64_t)4 << 2 * n) - 1);
         const __m512i held = isogi_vol__mirror8(_mm512_set1_epi64((int64_t)d->held[n]), flip);
         const __m512i child = _mm512_set1_epi64((int64_t)_pext_u64((uint64_t)d->cell >> 2 * n, 0x000300030003u));
-        mask = _mm512_and_si512(isogi_vol__passed(s, i, _mm512_set1_epi64(n), _mm512_set1_epi64((int64_t)((uint64_t)d->cell & ~digits))), held);
+        mask = _mm512_and_si512(isogi_vol__passed(s, i, _mm512_set1_epi64(n), _mm512_set1_epi64((int64_t)((uint64_t)d->cell & ~digits))),
+                                held);
         if (n) {
             const __m512i bit = _mm512_sllv_epi64(one, _mm512_xor_si512(child, flip)), rest = _mm512_andnot_si512(bit, mask);
             _mm512_mask_store_epi64(s->mask[n] + i, going, rest);
@@ -5614,21 +5798,43 @@ ISOGI_VOL__AVX512 static void isogi_vol__descend8(isogi_vol__turn *turn, isogi_v
     _mm512_mask_store_epi64(&s->address[i], going, _mm512_set1_epi64((int64_t)(uintptr_t)d->leaf));
     _mm512_mask_store_pd(&s->step[i], going, _mm512_set1_pd(d->step));
     turn->choosing |= (uint64_t)(lanes & ~cells) << i;
-    _mm_storel_epi64((__m128i *)(void *)(turn->at_leaf + turn->leaves),
-                     _mm_maskz_compress_epi8((__mmask16)cells, _mm_add_epi8(_mm_set1_epi8((char)i), _mm_set_epi64x(0, 0x0706050403020100))));
+    _mm_storel_epi64(
+        (__m128i *)(void *)(turn->at_leaf + turn->leaves),
+        _mm_maskz_compress_epi8((__mmask16)cells, _mm_add_epi8(_mm_set1_epi8((char)i), _mm_set_epi64x(0, 0x0706050403020100))));
     turn->leaves += __builtin_popcount(cells);
+}
+
+/* If the ray in a slot begins where its bundle does, all others do: what they have in common is given to all slots, and need not move. */
+ISOGI_VOL__AVX512 static void isogi_vol__share(isogi_vol__turn *turn, isogi_vol__pool *s, int groups, int slot) {
+    char *row = (char *)s->origin;
+    int i, k;
+    turn->shared = s->entry_axis[slot] < 0 && !(s->base[slot] > 0 || s->base[slot] < 0);
+    if (!turn->shared) return;
+    for (i = (int)(offsetof(isogi_vol__pool, origin) / sizeof s->ray); i < (int)(sizeof *s / sizeof s->ray); i++, row += sizeof s->ray) {
+        int64_t value;
+        memcpy(&value, row + 8 * slot, sizeof value);
+        for (k = 0; k < groups; k++) _mm512_store_si512(row + 64 * k, _mm512_set1_epi64(value));
+    }
 }
 
 /* Moves up to eight rays from one group of slots to another; the masks have as many bits. All members of a pool are rows of numbers of
    eight bytes. */
 ISOGI_VOL__AVX512 static void isogi_vol__move(isogi_vol__pool *s, isogi_vol__turn *turn, int from, __mmask8 leave, int to, __mmask8 take) {
     __attribute__((aligned(64))) uint8_t place[64];
+    const int last = (int)(offsetof(isogi_vol__pool, mask) / sizeof s->ray) + turn->levels,
+              rest = (int)(offsetof(isogi_vol__pool, origin) / sizeof s->ray);
     char *row = (char *)s;
     unsigned l = leave, t = take;
     int i;
-    for (i = 0; i < (int)(sizeof *s / sizeof s->ray); i++, row += sizeof s->ray)
-        _mm512_store_si512(row + 64 * to, _mm512_mask_expand_epi64(_mm512_load_si512(row + 64 * to), take,
-                                                                   _mm512_maskz_compress_epi64(leave, _mm512_load_si512(row + 64 * from))));
+#define ISOGI_VOL__MOVE_ROW(i)                                                                                                    \
+    _mm512_store_si512(row + sizeof s->ray * (size_t)(i) + 64 * to,                                                               \
+                       _mm512_mask_expand_epi64(_mm512_load_si512(row + sizeof s->ray * (size_t)(i) + 64 * to), take,             \
+                                                _mm512_maskz_compress_epi64(leave, \
+                                                    _mm512_load_si512(row + sizeof s->ray * (size_t)(i) + 64 * from))))
+    for (i = 0; i < last; i++) ISOGI_VOL__MOVE_ROW(i);
+    if (!turn->shared)
+        for (i = rest; i < (int)(sizeof *s / sizeof s->ray); i++) ISOGI_VOL__MOVE_ROW(i);
+#undef ISOGI_VOL__MOVE_ROW
     _mm512_mask_store_epi64(&s->level[8 * from], leave, _mm512_set1_epi64(-1));
     _mm512_store_si512(place, _mm512_load_si512(turn->p->ways->child[0]));
     for (; l; l &= l - 1, t &= t - 1) place[8 * from + __builtin_ctz(l)] = (uint8_t)(8 * to + __builtin_ctz(t));
@@ -5757,7 +5963,8 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE void isogi_vol__clear_pool(isogi_vol__pool *
 }
 
 /* The rays from *next on, up to `end`, through the slots of a pool, each taken again as soon as it is free; `open`: those without a ray. */
-ISOGI_VOL__AVX512 static void isogi_vol__run_pool(isogi_vol__batch *b, isogi_vol__turn *turn, isogi_vol__pool *s, int groups, uint64_t open, size_t *next, size_t end) {
+ISOGI_VOL__AVX512 static void isogi_vol__run_pool(isogi_vol__batch *b, isogi_vol__turn *turn, isogi_vol__pool *s, int groups, uint64_t open,
+                                                  size_t *next, size_t end) {
     const uint64_t slots = ~(uint64_t)0 >> (64 - 8 * groups);
     uint64_t fresh = slots & ~open; /* rays that stand at the root */
     isogi_vol__descent descent;
@@ -5771,10 +5978,12 @@ ISOGI_VOL__AVX512 static void isogi_vol__run_pool(isogi_vol__batch *b, isogi_vol
         if (b->bundle && fresh) {
             if (descent.cell < 0) {
                 isogi_vol__prepare_descent(&descent, b->pyramid, s, __builtin_ctzll(fresh));
+                isogi_vol__share(turn, s, groups, __builtin_ctzll(fresh));
                 b->work.blocks += (uint64_t)b->pyramid->node_levels; /* at most */
             }
             for (i = 0; i < groups; i++)
-                if (__builtin_popcountll(fresh >> 8 * i & 255) > 3) isogi_vol__descend8(turn, s, &descent, 8 * i, (unsigned)(fresh >> 8 * i & 255));
+                if (__builtin_popcountll(fresh >> 8 * i & 255) > 3)
+                    isogi_vol__descend8(turn, s, &descent, 8 * i, (unsigned)(fresh >> 8 * i & 255));
             fresh = 0;
         } else if (open && groups > 1 && *next == end) open = isogi_vol__close_ranks(s, turn, groups, open);
         for (i = 0; i < groups; i++) {
@@ -5783,8 +5992,8 @@ ISOGI_VOL__AVX512 static void isogi_vol__run_pool(isogi_vol__batch *b, isogi_vol
             if (lives) isogi_vol__answer(turn, s, 8 * i);
         }
         b->work.blocks += (uint64_t)answered;
-        /* the other stages wait for eight rays to work on, unless most rays wait already */
-        waits = answered < turn->leaves + turn->doubts ? 1 : 8;
+        /* the other stages wait for eight rays to work on, unless hardly any is to come */
+        waits = answered < 8 ? 1 : 8;
         open |= isogi_vol__decide_all(b, turn, s, waits);
         open |= isogi_vol__look_all(b, turn, s, waits);
         for (i = 0; i < groups; i++) {
@@ -5885,8 +6094,8 @@ typedef struct isogi_vol__followers {
     isogi_hit start[ISOGI_VOL__GROUP], hit[ISOGI_VOL__GROUP];
     float dir[ISOGI_VOL__GROUP][3];
     double tmax[ISOGI_VOL__GROUP];
-    size_t ray[ISOGI_VOL__GROUP]; /* which rays are under way */
-    size_t count;
+    size_t ray[ISOGI_VOL__GROUP]; /* which rays of the group are under way */
+    size_t count, size;           /* their number; of the group */
 } isogi_vol__followers;
 
 /* Notes what the rays under way have found, and sets those up that go on. */
@@ -5922,18 +6131,43 @@ static void isogi_vol__follow_on(const isogi_pyramid *pyramid, isogi_vol__follow
     for (i = 0; i < f->count; i++) f->hit[i].t += f->start[i].t;
 }
 
+/* All further hits of a group that has its first ones. */
+static void isogi_vol__follow_all(const isogi_pyramid *pyramid, isogi_vol__followers *f, const isogi_ray *rays, size_t capacity,
+                                  isogi_hit *hits, size_t *counts, isogi_counters *counters) {
+    size_t i;
+    for (i = 0; i < f->count; i++) f->ray[i] = i, counts[i] = 0;
+    for (isogi_vol__follow(f, rays, capacity, hits, counts); f->count; isogi_vol__follow(f, rays, capacity, hits, counts))
+        isogi_vol__follow_on(pyramid, f, rays, counters);
+}
+
 ISOGI_API isogi_result isogi_vol_intersect_all(const isogi_pyramid *pyramid, const isogi_ray *rays, size_t count, size_t capacity,
                                                isogi_hit *hits, size_t *counts, isogi_counters *counters) {
     isogi_vol__followers f;
-    size_t first, i;
+    size_t first;
     if (!pyramid || (count && (!rays || !counts || (capacity && !hits)))) return ISOGI_INVALID;
     if (count && capacity > SIZE_MAX / sizeof *hits / count) return ISOGI_TOO_LARGE;
-    for (first = 0; first < count; first += ISOGI_VOL__GROUP) {
-        f.count = count - first < ISOGI_VOL__GROUP ? count - first : ISOGI_VOL__GROUP;
-        for (i = 0; i < f.count; i++) f.ray[i] = first + i, counts[first + i] = 0;
+    for (first = 0; first < count; first += f.size) {
+        f.size = f.count = count - first < ISOGI_VOL__GROUP ? count - first : ISOGI_VOL__GROUP;
         isogi_vol_intersect(pyramid, rays + first, f.count, f.hit, counters);
-        for (isogi_vol__follow(&f, rays, capacity, hits, counts); f.count; isogi_vol__follow(&f, rays, capacity, hits, counts))
-            isogi_vol__follow_on(pyramid, &f, rays, counters);
+        isogi_vol__follow_all(pyramid, &f, rays + first, capacity, capacity ? hits + first * capacity : NULL, counts + first, counters);
+    }
+    return ISOGI_OK;
+}
+
+ISOGI_API isogi_result isogi_vol_bundle_all(const isogi_pyramid *pyramid, const isogi_bundle *bundle, const float (*dirs)[3], size_t count,
+                                            size_t capacity, isogi_hit *hits, size_t *counts, isogi_counters *counters) {
+    isogi_ray rays[ISOGI_VOL__GROUP];
+    isogi_vol__followers f;
+    size_t first, i;
+    if (!pyramid || !bundle || (count && (!dirs || !counts || (capacity && !hits)))) return ISOGI_INVALID;
+    if (count && capacity > SIZE_MAX / sizeof *hits / count) return ISOGI_TOO_LARGE;
+    memset(rays, 0, sizeof rays);
+    for (i = 0; i < ISOGI_VOL__GROUP; i++) rays[i].tmax = bundle->tmax, rays[i].isovalue = bundle->isovalue, rays[i].flags = bundle->flags;
+    for (first = 0; first < count; first += f.size) {
+        f.size = f.count = count - first < ISOGI_VOL__GROUP ? count - first : ISOGI_VOL__GROUP;
+        for (i = 0; i < f.count; i++) memcpy(rays[i].dir, dirs[first + i], sizeof rays[i].dir);
+        isogi_vol_bundle(pyramid, bundle, dirs + first, f.count, f.hit, counters);
+        isogi_vol__follow_all(pyramid, &f, rays, capacity, capacity ? hits + first * capacity : NULL, counts + first, counters);
     }
     return ISOGI_OK;
 }
@@ -6081,16 +6315,15 @@ ISOGI_API isogi_result isogi_vol_normals(const isogi_pyramid *pyramid, const iso
     int a;
     if (!pyramid || (count && (!hits || !normals)) || (kind != ISOGI_NORMAL_SMOOTH && kind != ISOGI_NORMAL_TRILINEAR)) return ISOGI_INVALID;
     for (i = 0; i < count; i++) {
-        double n[3] = {0, 0, 0}, length;
+        double n[3] = {0, 0, 0}, length = 0;
         int usable = hits[i].side != 0;
         for (a = 0; a < 3; a++) usable = usable && hits[i].cell[a] < (uint32_t)pyramid->cells[a];
         if (usable) {
             isogi_vol__outward(pyramid, &hits[i], kind, n);
             isogi_vol__gradient_to_world(pyramid, n, n);
+            length = isogi_vol__length(n);
         }
-        length = sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
-        usable = usable && isogi_vol__finite64(length) && length > 0;
-        for (a = 0; a < 3; a++) normals[i][a] = usable ? (float)(n[a] / length) : 0;
+        for (a = 0; a < 3; a++) normals[i][a] = length > 0 ? (float)(n[a] / length) : 0;
     }
     return ISOGI_OK;
 }
@@ -6987,7 +7220,8 @@ static void isogi_vol__mesh_count(const isogi_vol__mesher *m, int j, int k) {
 /* ---- last pass: vertices ---- */
 
 /* On a lattice edge two of the B-spline's coordinates are whole, where its weights are (1 4 1)/6 and (-1 0 1)/2: 36 taps instead of
-   64. p: the voxel where the edge begins, stride[0] its direction; every tap must exist. Gradient in the order of the strides. */
+   64. p: the voxel where the edge begins, stride[0] its direction; every tap must exist. Gradient in the order of the strides. The
+   sums of doubles are of differences to one of them, which would drown in the rounding of values far from zero. */
 static void isogi_vol__edge_gradient(const isogi_volume *v, const char *p, const ptrdiff_t stride[3], double u, double gradient[3]) {
     const ptrdiff_t y = stride[1], z = stride[2];
     double w[4], d[4], gx = 0, gy = 0, gz = 0, c = 1 - u;
@@ -6995,8 +7229,9 @@ static void isogi_vol__edge_gradient(const isogi_volume *v, const char *p, const
     w[0] = c * c * c, w[1] = (3 * u - 6) * u * u + 4, w[2] = (3 * c - 6) * c * c + 4, w[3] = u * u * u;
     d[0] = -c * c, d[1] = (3 * u - 4) * u, d[2] = -(3 * c - 4) * c, d[3] = u * u;
     p -= stride[0] + y + z;
-#define ISOGI_VOL__AT(T, offset) ((double)*(const T *)(const void *)(p + (offset)))
-#define ISOGI_VOL__TAPS(T)                                                                                                       \
+#define ISOGI_VOL__AT(T, offset) ((double)*(const T *)(const void *)(p + (offset)) - base)
+#define ISOGI_VOL__TAPS(T, BASE)                                                                                                 \
+    const double base = BASE;                                                                                                    \
     for (q = 0; q < 4; q++, p += stride[0]) {                                                                                    \
         const double a0 = ISOGI_VOL__AT(T, 0), a1 = ISOGI_VOL__AT(T, y), a2 = ISOGI_VOL__AT(T, 2 * y);                           \
         const double b0 = ISOGI_VOL__AT(T, z), b1 = ISOGI_VOL__AT(T, y + z), b2 = ISOGI_VOL__AT(T, 2 * y + z);                   \
@@ -7008,12 +7243,12 @@ static void isogi_vol__edge_gradient(const isogi_volume *v, const char *p, const
     }                                                                                                                            \
     break;
     switch (v->type) {
-    case ISOGI_U8: ISOGI_VOL__TAPS(uint8_t)
-    case ISOGI_I8: ISOGI_VOL__TAPS(int8_t)
-    case ISOGI_U16: ISOGI_VOL__TAPS(uint16_t)
-    case ISOGI_I16: ISOGI_VOL__TAPS(int16_t)
-    case ISOGI_F32: ISOGI_VOL__TAPS(float)
-    case ISOGI_F64: ISOGI_VOL__TAPS(double)
+    case ISOGI_U8: { ISOGI_VOL__TAPS(uint8_t, 0) }
+    case ISOGI_I8: { ISOGI_VOL__TAPS(int8_t, 0) }
+    case ISOGI_U16: { ISOGI_VOL__TAPS(uint16_t, 0) }
+    case ISOGI_I16: { ISOGI_VOL__TAPS(int16_t, 0) }
+    case ISOGI_F32: { ISOGI_VOL__TAPS(float, 0) }
+    case ISOGI_F64: { ISOGI_VOL__TAPS(double, *(const double *)(const void *)(p + y + z)) }
     }
 #undef ISOGI_VOL__TAPS
 #undef ISOGI_VOL__AT
@@ -7025,8 +7260,7 @@ static void isogi_vol__mesh_normal(const isogi_vol__mesher *m, size_t at, double
     double length;
     int a, usable;
     isogi_vol__gradient_to_world(m->pyramid, n, n);
-    length = sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
-    usable = isogi_vol__finite64(length) && length > 0;
+    length = isogi_vol__length(n), usable = length > 0;
     length = usable ? 1 / length : 0;
     for (a = 0; a < 3; a++) m->normals[at][a] = usable ? (float)(n[a] * length) : 0;
 }
@@ -7359,7 +7593,6 @@ ISOGI_API void isogi_vol_mesh_free(const isogi_pyramid *pyramid, isogi_mesh *mes
 #undef ISOGI_VOL__NODE_AVX2
 #undef ISOGI_VOL__NODE_BASE
 #undef ISOGI_VOL__POOL
-#undef ISOGI_VOL__ORDERS
 #undef ISOGI_VOL__SUB
 #undef ISOGI_VOL__GROUP
 #undef ISOGI_VOL__BLOCK

@@ -5,14 +5,19 @@
 #include <stdio.h>
 
 enum { N = 64, WIDTH = 76, HEIGHT = 38 };
-static float data[N][N][N], points[WIDTH * HEIGHT][3], light[WIDTH * HEIGHT][3];
+static float data[N][N][N], knot[315][3], points[WIDTH * HEIGHT][3], light[WIDTH * HEIGHT][3];
 
-int main(void) {
-    for (int i = 0; i < N * N * N; i++) { /* minus the squared distance to a trefoil knot */
+int main(int argc, char **argv) {
+    if (argc > 1) return fprintf(stderr, "usage: %s, without arguments\n", argv[0]), 2;
+    for (int k = 0; k < 315; k++) { /* a trefoil knot */
+        float t = 0.02f * (float)k;
+        knot[k][0] = 9 * (sinf(t) + 2 * sinf(2 * t)), knot[k][1] = 9 * (cosf(t) - 2 * cosf(2 * t)), knot[k][2] = -9 * sinf(3 * t);
+    }
+    for (int i = 0; i < N * N * N; i++) { /* minus the squared distance to it */
         float nearest = 1e9f, x = (float)(i % N) - 31.5f, y = (float)(i / N % N) - 31.5f, z = (float)(i / N / N) - 31.5f;
-        for (float t = 0; t < 6.2832f; t += 0.02f) {
-            float dx = x - 9 * (sinf(t) + 2 * sinf(2 * t)), dy = y - 9 * (cosf(t) - 2 * cosf(2 * t)), dz = z + 9 * sinf(3 * t);
-            nearest = fminf(nearest, dx * dx + dy * dy + dz * dz);
+        for (int k = 0; k < 315; k++) {
+            float dx = x - knot[k][0], dy = y - knot[k][1], dz = z - knot[k][2], d = dx * dx + dy * dy + dz * dz;
+            nearest = d < nearest ? d : nearest;
         }
         data[i / N / N][i / N % N][i % N] = -nearest;
     }

@@ -6,7 +6,8 @@
 enum { N = 48, WIDTH = 48, HEIGHT = 24 };
 static float data[N][N][N];
 
-int main(void) {
+int main(int argc, char **argv) {
+    if (argc > 1) return fprintf(stderr, "usage: %s, without arguments\n", argv[0]), 2;
     /* two metaballs */
     for (int z = 0; z < N; z++)
         for (int y = 0; y < N; y++)

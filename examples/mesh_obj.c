@@ -2,6 +2,7 @@
 
        build/mesh_obj [OUT.obj]        default: build/mesh_obj.obj */
 #define ISOGI_IMPLEMENTATION
+#include "files.h"
 #include "procedural.h"
 #include <stdio.h>
 
@@ -18,7 +19,9 @@ int main(int argc, char **argv) {
     if (result == ISOGI_OK) result = isogi_vol_mesh(pyramid, &desc, &mesh);
     if (result != ISOGI_OK) return fprintf(stderr, "%s\n", isogi_result_string(result)), 1;
 
-    FILE *file = fopen(path, "w");
+    char *text = NULL, error[FILE_ERROR_SIZE];
+    size_t size = 0;
+    FILE *file = open_memstream(&text, &size);
     if (!file) return perror(path), 1;
     for (size_t i = 0; i < mesh.vertex_count; i++) {
         const float *p = mesh.positions[i], *n = mesh.normals[i];
@@ -30,9 +33,10 @@ int main(int argc, char **argv) {
         fprintf(file, "f %u//%u %u//%u %u//%u\n", t[0] + 1, t[0] + 1, t[1] + 1, t[1] + 1, t[2] + 1, t[2] + 1);
     }
     if (ferror(file) | fclose(file)) return perror(path), 1;
+    if (!file_write(path, text, size, error)) return fprintf(stderr, "%s\n", error), 1;
     /* a closed surface has 3/2 edges for every triangle: V - E + F counts its handles, two for each */
     long euler = (long)mesh.vertex_count - (long)mesh.triangle_count / 2;
     printf("%s: %zu vertices, %zu triangles, closed, Euler characteristic %ld\n", path, mesh.vertex_count, mesh.triangle_count, euler);
-    isogi_vol_mesh_free(pyramid, &mesh), isogi_vol_free(pyramid), procedural_free(&volume);
+    isogi_vol_mesh_free(pyramid, &mesh), isogi_vol_free(pyramid), procedural_free(&volume), free(text);
     return 0;
 }

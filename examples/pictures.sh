@@ -15,6 +15,11 @@ build/viewer $baked --out "$out/skull-global.png"
 build/viewer $skull --mode phong --shadows on --out "$out/skull-phong.png"
 build/viewer $baked --lattice 64,72,72 --compare "$out/skull-global.png" --out "$out/skull-coarse.png"
 
+hydrogen="procedural:hydrogen$coarse --camera 35,25,1.8 $(side 280) --aa 4"
+build/viewer $hydrogen --mode dvr --out "$pieces/volume-1.png"
+build/viewer $hydrogen --mode scale-invariant --out "$pieces/volume-2.png"
+build/strip "$out/volume.png" "$pieces/volume-1.png" "$pieces/volume-2.png"
+
 # The paper's figures 5, 6, 7 and 12: a picture for each argument, which is added to $same, at the exposure of the last one.
 strip() { # NAME ARGUMENTS...
     name=$1 parts= n=0

@@ -17,7 +17,8 @@ static double gyroid(void *user, const double p[3], double gradient[3]) {
     return sin(x) * cos(y) + sin(y) * cos(z) + sin(z) * cos(x) - 4 * beyond * beyond;
 }
 
-int main(void) {
+int main(int argc, char **argv) {
+    if (argc > 1) return fprintf(stderr, "usage: %s, without arguments\n", argv[0]), 2;
     double k = 5;
     /* Second derivatives: 4 k^2 of the gyroid (2 on and 1 off the diagonal), 16 beyond + 32 |p|^2 of the rest, in |p|^2 <= 3 * 1.3^2. */
     isogi_field field = {

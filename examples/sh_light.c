@@ -4,7 +4,8 @@
 #include <math.h>
 #include <stdio.h>
 
-int main(void) {
+int main(int argc, char **argv) {
+    if (argc > 1) return fprintf(stderr, "usage: %s, without arguments\n", argv[0]), 2;
     static float sky[64 * 128 * 3];
     for (int i = 0; i < 64 * 128; i++) { /* rows of an equirectangular image, zenith first: blue sky, brown ground */
         float up = cosf(3.14159265f * ((float)(i / 128) + 0.5f) / 64);

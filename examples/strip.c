@@ -13,8 +13,9 @@ int main(int argc, char **argv) {
         if (file_same(argv[1], path)) return fprintf(stderr, "strip: %s is both a picture and the strip\n", path), 1;
         if (!file_read(path, (size_t)1 << 28, &file, &size, error)) return fprintf(stderr, "strip: %s\n", error), 1;
         if (!png_decode(file, size, &pixels[i], shape[i], why)) return fprintf(stderr, "strip: %s: %s\n", path, why), 1;
-        if (shape[i][2] != 3 || shape[i][1] != shape[0][1])
-            return fprintf(stderr, "strip: %s: is not in colour, or of another height\n", path), 1;
+        if (shape[i][2] != 3) return fprintf(stderr, "strip: %s: has an alpha channel; RGB is needed\n", path), 1;
+        if (shape[i][1] != shape[0][1])
+            return fprintf(stderr, "strip: %s: is %d pixels high, the first %d\n", path, shape[i][1], shape[0][1]), 1;
         free(file), width += shape[i][0] + GAP;
     }
     strip = (unsigned char *)malloc((size_t)width * (size_t)shape[0][1] * 3);

@@ -205,10 +205,12 @@ static const option option_list[] = {
      PARSED(parse_scene, "engine bonsai cthead engine-block cavity furnace ml256 gyroid256 fuel torus-sphere-plane")},
     {"--mode", "NAME", ANY, "what light does (below); default irradiance", NAMED(mode_name, mode), .has = AT(has_mode)},
     {"--out", "FILE.png", ANY, "the picture; default isogi.png", TEXT, .offset = AT(out)},
-    {"--size", "WxH", ANY, "pixels; default 900x900, 512x512 for dvr and scale-invariant",
-     PARSED(parse_size, "WxH, each 1 to 16384"), .has = AT(has_size)},
-    {"--iso", "V", ANY & ~(1 << DVR), "isovalue; default the shape's own, or a threshold found in the histogram; for scale-invariant, of the "
-     "peak that is suggested", NUMBERS, AT(isovalue), AT(has_iso), 1, -1e300, 1e300, .allowed = "a number"},
+    {"--size", "WxH", ANY, "pixels; default 900x900, 512x512 for dvr and scale-invariant", PARSED(parse_size, "WxH, each 1 to 16384"),
+     .has = AT(has_size)},
+    {"--iso", "V", ANY & ~(1 << DVR),
+     "isovalue; default the shape's own, or a threshold found in the histogram; for scale-invariant, of the "
+     "peak that is suggested",
+     NUMBERS, AT(isovalue), AT(has_iso), 1, -1e300, 1e300, .allowed = "a number"},
     {"--raycast", 0, SURFACES, "exact rays instead of the rasterized mesh", FLAG, .offset = AT(raycast)},
     {"--clip", "A,B,C,D", ANY, "keep only a x + b y + c z + d >= 0 (world); what is cut shows the data; may be repeated",
      PARSED(parse_clip, "four numbers from -1e9 to 1e9, the first three not all zero (at least 1e-9 in length), at most 32 times")},
@@ -222,7 +224,8 @@ static const option option_list[] = {
      PARSED(parse_up, "three numbers, not all zero"), .has = AT(has_up)},
     {"--env", "FILE.hdr", LIT, "environment: equirectangular Radiance picture; sky: the default's sky, to go with --light", TEXT,
      .offset = AT(env)},
-    {"--light", "KIND:X,Y,Z:R,G,B[:RADIUS]", LIT, "directional (towards the light; irradiance; radius in degrees), point (place; "
+    {"--light", "KIND:X,Y,Z:R,G,B[:RADIUS]", LIT,
+     "directional (towards the light; irradiance; radius in degrees), point (place; "
      "intensity), sphere (centre; intensity; radius), rectangle:X,Y,Z:R,G,B:UX,UY,UZ:VX,VY,VZ (centre; intensity; two sides at right "
      "angles; it shines towards U x V); may be repeated",
      PARSED(parse_light, "directional|point|sphere:X,Y,Z:R,G,B with an optional :RADIUS (up to 90 degrees; needed for a sphere), or "
@@ -231,65 +234,84 @@ static const option option_list[] = {
      .allowed = "three numbers, 0 to 1"},
     {"--bounces", "N", REFLECTED, "reflections of light; -1 = all, the default", INTEGER, AT(bounces), 0, 1, -1, 1000,
      .allowed = "a whole number, -1 to 1000"},
-    {"--samples", "N", GATHERED, "paths per texel, or per pixel for pathtrace, there rounded up to a multiple of --aa; default "
-     "64", INTEGER, AT(samples), 0, 1, 1, 1000000,
-     .allowed = "a whole number, 1 to 1000000"},
+    {"--samples", "N", GATHERED,
+     "paths per texel, or per pixel for pathtrace, there rounded up to a multiple of --aa; default "
+     "64",
+     INTEGER, AT(samples), 0, 1, 1, 1000000, .allowed = "a whole number, 1 to 1000000"},
     {"--lattice", "X,Y,Z", BAKED, "texels of the illumination texture; default one per voxel", SIZES, AT(lattice), 0, 3, 2, 4096,
      .allowed = "three whole numbers, 2 to 4096"},
     {"--lookup", "NAME", BAKED, "how the texture is read: trilinear, nearest, closest-isovalue, bspline", NAMED(lookup_name, lookup)},
-    {"--shadows", "on|off", SURFACES, "shadows of lights and sky; for lambert and phong, where off is the default, those of lights, per "
-     "pixel", NAMED(switch_name, shadows), .has = AT(has_shadows)},
+    {"--shadows", "on|off", SURFACES,
+     "shadows of lights and sky; for lambert and phong, where off is the default, those of lights, per "
+     "pixel",
+     NAMED(switch_name, shadows), .has = AT(has_shadows)},
     {"--ambient", "constant|normal", BY_NORMAL, "the sky's light, the same for all or by normal; default normal, constant for phong",
      NAMED(ambient_name, ambient), .has = AT(has_ambient)},
     {"--fog", "X", SURFACES, "fade to the sky's mean light with distance: by exp(-X) from the front of the box's sphere to its back",
      NUMBERS, AT(fog), 0, 1, 0, 100, .allowed = "a number, 0 to 100"},
-    {"--gloss", "EXPONENT", 1 << TRANSFER, "gloss as well, a Phong lobe that reflects a fifth; its highlights are as soft "
-     "as the order of the texture, which holds exponents up to about 25", NUMBERS, VALUE(gloss), 1, 0, 1000,
-     .allowed = "a number, 0 to 1000"},
+    {"--gloss", "EXPONENT", 1 << TRANSFER,
+     "gloss as well, a Phong lobe that reflects a fifth; its highlights are as soft "
+     "as the order of the texture, which holds exponents up to about 25",
+     NUMBERS, VALUE(gloss), 1, 0, 1000, .allowed = "a number, 0 to 1000"},
     {"--normals", "smooth|trilinear", GATHERED, "of the light that is gathered; default smooth", NAMED(normals_name, normals)},
     {"--offset", "X", GATHERED, "rays of light start this many voxels above the surface, negative: on it; default 0.25", NUMBERS,
      AT(offset), 0, 1, -1, 1, .allowed = "a number, -1 to 1"},
-    {"--reach", "R", GATHERED, "surfaces further away than this (world units) cast no shadow; default 0 = unlimited", NUMBERS, AT(reach),
-     0, 1, 0, 1e9, .allowed = "a number, 0 or more"},
+    {"--reach", "R", GATHERED, "surfaces further away than this (world units) cast no shadow; default 0 = unlimited", NUMBERS, AT(reach), 0,
+     1, 0, 1e9, .allowed = "a number, 0 or more"},
     {"--storage", "NAME", BAKED, "how the texture is held: default, float, half, rgb9e5, byte", NAMED(storage_name, storage)},
     {"--compare", "FILE.png", ANY, "tell how far the picture is from this one: difference_rms, of what is seen, in sRGB values of 0 to 1",
      TEXT, .offset = AT(compare)},
-    {"--tf", "FILE", VOLUMES, "transfer function: lines \"value extinction r g b\" or \"peak value opacity r g b\"; default the scene's or "
-     "shape's own, else one suggested by the histogram", TEXT, .offset = AT(tf)},
+    {"--tf", "FILE", VOLUMES,
+     "transfer function: lines \"value extinction r g b\" or \"peak value opacity r g b\"; default the scene's or "
+     "shape's own, else one suggested by the histogram",
+     TEXT, .offset = AT(tf)},
     {"--shading", "NAME", VOLUMES, "unlit, visibility, local, two-sided; default visibility, for scale-invariant local",
      NAMED(shading_name, shading), .has = AT(has_shading)},
-    {"--preset", "NAME", VOLUMES, "transfer function of these colours, denser the larger the value, where the histogram has something: "
-     "grey, hot, cool-warm, spectrum", NAMED(preset_name, preset), .has = AT(has_preset)},
+    {"--preset", "NAME", VOLUMES,
+     "transfer function of these colours, denser the larger the value, where the histogram has something: "
+     "grey, hot, cool-warm, spectrum",
+     NAMED(preset_name, preset), .has = AT(has_preset)},
     {"--method", "NAME", 1 << DVR, "how visibility is computed: default, brute, paper, sweep", NAMED(method_name, method),
      .has = AT(has_method)},
-    {"--order", "N", VOLUMES, "with visibility, as the next two: spherical harmonics of shadows, 1 to 6: 2 the side light comes "
+    {"--order", "N", VOLUMES,
+     "with visibility, as the next two: spherical harmonics of shadows, 1 to 6: 2 the side light comes "
      "from, 3 soft shadows, more for directional lights; default 4 (a scene: its own; without sweeps, for peaks or by --method, 3)",
      INTEGER, AT(order), 0, 1, 1, 6, .allowed = "a whole number, 1 to 6"},
-    {"--directions", "N", VOLUMES, "rays from each grid point of visibility, at least 2 order^2; default 256 (a scene: its own; without "
-     "sweeps 64)", INTEGER, AT(directions), 0, 1, 1, 65536, .allowed = "a whole number, 1 to 65536"},
-    {"--grid", "X,Y,Z", VOLUMES, "points of visibility: no shadow is finer; default half the voxels along each axis, at most 64 (a "
-     "scene: its own; without sweeps a quarter)", SIZES, AT(grid), 0, 3, 1, 1024, .allowed = "three whole numbers, 1 to 1024"},
-    {"--coarsest", "N", 1 << DVR, "by sweeps: points of visibility stand up to N times as far apart where nothing is seen of them, "
-     "which saves memory for a finer --grid: 1, 2, 4, 8; default 1", NAMED(coarsest_name, coarsest), .has = AT(has_coarsest)},
+    {"--directions", "N", VOLUMES,
+     "rays from each grid point of visibility, at least 2 order^2; default 256 (a scene: its own; without "
+     "sweeps 64)",
+     INTEGER, AT(directions), 0, 1, 1, 65536, .allowed = "a whole number, 1 to 65536"},
+    {"--grid", "X,Y,Z", VOLUMES,
+     "points of visibility: no shadow is finer; default half the voxels along each axis, at most 64 (a "
+     "scene: its own; without sweeps a quarter)",
+     SIZES, AT(grid), 0, 3, 1, 1024, .allowed = "three whole numbers, 1 to 1024"},
+    {"--coarsest", "N", 1 << DVR,
+     "by sweeps: points of visibility stand up to N times as far apart where nothing is seen of them, "
+     "which saves memory for a finer --grid: 1, 2, 4, 8; default 1",
+     NAMED(coarsest_name, coarsest), .has = AT(has_coarsest)},
     {"--local", 0, 1 << DVR, "light by local visibility, of --method paper: for clip planes and lights within", FLAG, .offset = AT(local)},
-    {"--depth", "FILE.pfm", VOLUMES, "as well: distance from the eye to half of a pixel's opacity, where "
-     "nothing is seen infinity, as floats (the nearest of a pixel's samples)", TEXT, .offset = AT(depth)},
+    {"--depth", "FILE.pfm", VOLUMES,
+     "as well: distance from the eye to half of a pixel's opacity, where "
+     "nothing is seen infinity, as floats (the nearest of a pixel's samples)",
+     TEXT, .offset = AT(depth)},
     {"--classification", "NAME", VOLUMES, "exact, pre-integrated, post-classified; dvr knows the last one and, for both others, its own",
      NAMED(classification_name, classification), .has = AT(has_classification)},
     {"--silhouette", "NAME", VOLUMES, "surfaces seen aslant are more opaque, in dvr those of peaks: none, exact, approximate, gradient",
      NAMED(silhouette_name, silhouette), .has = AT(has_silhouette)},
     {"--transmission", "NAME", VOLUMES, "light that --shading two-sided lets through: none, diffuse, specular (both, the default)",
      NAMED(transmission_name, transmission), .has = AT(has_transmission)},
-    {"--step", "S", VOLUMES, "of sampled rays (all of dvr but those of --bound, and by --classification): distance of samples in voxels; "
-     "default 0.5", NUMBERS,
-     VALUE(step), 1, 1e-3, 1e3, .allowed = "a number, 0.001 to 1000"},
+    {"--step", "S", VOLUMES,
+     "of sampled rays (all of dvr but those of --bound, and by --classification): distance of samples in voxels; "
+     "default 0.5, 1 for dvr without peaks",
+     NUMBERS, VALUE(step), 1, 1e-3, 1e3, .allowed = "a number, 0.001 to 1000"},
     {"--bound", "X", 1 << DVR, "exact opacity, and unlit colours that err by less than this, in place of samples; 0.0001 to 1", NUMBERS,
      AT(bound), 0, 1, 1e-4, 1, .allowed = "a number, 0.0001 to 1"},
     {"--exposure", "X", ANY, "factor on the light, in place of the automatic exposure", NUMBERS, AT(exposure), 0, 1, 1e-12, 1e12,
      .allowed = "a number above 0"},
-    {"--aa", "N", ANY, "samples per pixel; default 4, for pathtrace at most --samples, for dvr 1; for dvr and scale-invariant rounded "
-     "down to a square", INTEGER, AT(antialias), 0, 1, 1,
-     64, .allowed = "a whole number, 1 to 64"},
+    {"--aa", "N", ANY,
+     "samples per pixel; default 4, for pathtrace at most --samples, for dvr 1; for dvr and scale-invariant rounded "
+     "down to a square",
+     INTEGER, AT(antialias), 0, 1, 1, 64, .allowed = "a whole number, 1 to 64"},
     {"--threads", "N", ANY, "0 = one per core, the default", INTEGER, AT(threads), 0, 1, 0, 256, .allowed = "a whole number, 0 to 256"},
     {"--stats", 0, ANY, "\"key value\" lines on the standard output", FLAG, .offset = AT(stats)}};
 #define OPTION_COUNT (sizeof option_list / sizeof option_list[0])
@@ -1100,7 +1122,7 @@ static void section_colour(const viewer *v, const float point[3], float rgb[3]) 
     for (int c = 0; c < 3; c++) {
         /* half of the light's colour and of the surface's colour: a section is drawn, not photographed */
         double grey = (light[0] + light[1] + light[2]) / 3, mean = (double)(v->albedo[0] + v->albedo[1] + v->albedo[2]) / 3;
-        rgb[c] = (float)((0.5 * light[c] + 0.5 * grey) / PI * (0.5 * (double)v->albedo[c] + 0.5 * mean) * (0.15 + 0.6 * s));
+        rgb[c] = (float)((0.5 * light[c] + 0.5 * grey) / PI * (0.5 * (double)v->albedo[c] + 0.5 * mean) * (0.4 + 0.5 * s));
     }
 }
 
@@ -1343,6 +1365,7 @@ static int render_volume(viewer *v) {
     isogi_result result;
     isogi_context context = v->context;
     isogi_dvr_report report;
+    const char *at_fault = "volume rendering";
     if (view.width > 32768 || view.height > 32768)
         return file_fail(v->error, "--size %dx%d with --aa %d is %dx%d samples; at most 32768 along a side", v->o.width, v->o.height,
                          v->o.antialias, view.width, view.height);
@@ -1362,12 +1385,14 @@ static int render_volume(viewer *v) {
     if (!set_transfer(v)) return 0;
     set_visibility(v, &desc);
     result = isogi_dvr_create(&dvr, &desc, &context);
+    if (v->o.has_step && result == ISOGI_TOO_LARGE) at_fault = v->o.grid[0] ? "--step or --grid" : "--step: samples on a ray";
     if (result == ISOGI_OK) result = isogi_dvr_set_transfer(dvr, &v->transfer.transfer);
     if (result == ISOGI_OK) result = isogi_dvr_set_clip(dvr, (const double(*)[4])v->o.clip, v->o.clip_count);
     for (uint64_t budget = 20000; result == ISOGI_OK && remaining > 0 && desc.shading == ISOGI_DVR_VISIBILITY; budget += budget / 4) {
         result = isogi_dvr_step(dvr, budget, &remaining);
         say(v, "visibility", 1 - remaining, begun);
     }
+    if (v->o.grid[0] && (result == ISOGI_NO_MEMORY || (result == ISOGI_TOO_LARGE && !v->o.has_step))) at_fault = "--grid";
     begun = stat_seconds(v, "visibility", begun);
     if (result == ISOGI_OK) isogi_dvr_counters(dvr, &v->counters);
     stat_line(v, "rays_light", "%llu", (unsigned long long)v->counters.rays);
@@ -1388,7 +1413,7 @@ static int render_volume(viewer *v) {
     if (!ok) return 0;
     stat_seconds(v, "render", begun);
     stat_line(v, "samples_view", "%llu", (unsigned long long)v->counters.samples);
-    return result == ISOGI_OK || fail(v, "volume rendering", result);
+    return result == ISOGI_OK || fail(v, at_fault, result);
 }
 
 /* ---- the picture ------------------------------------------------------------------------------------------------------------- */

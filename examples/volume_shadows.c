@@ -8,7 +8,8 @@
 enum { N = 48, WIDTH = 52, HEIGHT = 44 };
 static float data[N][N][N], image[3][HEIGHT][WIDTH][4];
 
-int main(void) {
+int main(int argc, char **argv) {
+    if (argc > 1) return fprintf(stderr, "usage: %s, without arguments\n", argv[0]), 2;
     for (int z = 0; z < N; z++)
         for (int y = 0; y < N; y++)
             for (int x = 0; x < N; x++) {

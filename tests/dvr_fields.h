@@ -7,6 +7,22 @@
 
 #define PI 3.14159265358979323846
 
+/* ---- transfer functions and light that several programs use ---- */
+
+static const float sky_one[3] = {3.5449077f, 3.5449077f, 3.5449077f}; /* radiance 1: sqrt(4 pi) */
+
+static const isogi_transfer_point sparse_points[] = {
+    {0.5, {1, 0.5f, 0.2f}, 0}, {0.9, {0.4f, 1, 0.2f}, 0.8f}, {0.9, {0.4f, 1, 0.2f}, 0}};
+static const isogi_peak sparse_peaks[] = {{0.4, {1, 1, 1}, 0.2f}, {-0.8, {0, 0, 1}, 0.5f}};
+static const isogi_transfer sparse = {sparse_points, 3, sparse_peaks, 2};
+
+static const isogi_transfer_point hills[] = {{-1, {1, 0.2f, 0.1f}, 0},  {-0.2, {0.3f, 1, 0.1f}, 2}, {0.1, {0.1f, 0.4f, 1}, 0},
+                                             {0.4, {0.1f, 0.4f, 1}, 0}, {0.4, {1, 1, 0}, 3},        {1, {1, 0, 1}, 1}};
+static const isogi_peak sheets[] = {{0.3, {1, 1, 1}, 0.4f}, {-0.4, {0, 1, 0}, 0.2f}};
+static const isogi_transfer landscape = {hills, 6, sheets, 2};
+
+/* ---- fields, renderers, rays ---- */
+
 static void field_build(field *f) { field_build_with(f, &serial); }
 
 typedef double field_function(double x, double y, double z); /* of grid coordinates over (size - 1): 0..1 */
@@ -136,6 +152,36 @@ __attribute__((unused)) static long double reference_value(const field *f, const
         value += w * (long double)f->value[c[0] + (n & 1) + f->size[0] * (c[1] + (n >> 1 & 1) + f->size[1] * (c[2] + (n >> 2)))];
     }
     return value;
+}
+
+/* Where the ray o + t d enters and leaves the box. */
+__attribute__((unused)) static void reference_ends(const field *f, const long double o[3], const long double d[3], long double ends[2]) {
+    ends[0] = 0, ends[1] = 1e30L;
+    for (int a = 0; a < 3; a++) {
+        long double t0 = -o[a] / d[a], t1 = (f->size[a] - 1 - o[a]) / d[a];
+        ends[0] = fmaxl(ends[0], fminl(t0, t1)), ends[1] = fminl(ends[1], fmaxl(t0, t1));
+    }
+}
+
+typedef struct crossing { double t; int side; } crossing;
+
+/* What the exact intersector of isogi_vol.h finds along the same ray. */
+__attribute__((unused)) static int intersector_crossings(const isogi_pyramid *pyramid, const double origin[3], const float dir[3],
+                                                         double isovalue, crossing *out) {
+    isogi_ray ray = {.dir = {dir[0], dir[1], dir[2]}, .isovalue = isovalue};
+    isogi_hit hit;
+    int count = 0;
+    double t = 0;
+    for (int a = 0; a < 3; a++) ray.origin[a] = origin[a];
+    isogi_vol_intersect(pyramid, &ray, 1, &hit, NULL);
+    while (hit.side && count < 60) {
+        isogi_hit next;
+        t += hit.t;
+        out[count].t = t, out[count++].side = hit.side;
+        isogi_vol_continue(pyramid, &hit, (const float(*)[3])dir, NULL, isovalue, 0, 1, &next, NULL);
+        hit = next;
+    }
+    return count;
 }
 
 #endif

@@ -52,7 +52,8 @@ static int generate_turns(quad *v) {
             for (int k = 0; k < l; k++) square /= 4;
             row[l] = ((l + n) & 1 ? -1 : 1) * quad_sqrt(square);
             for (int m = l; m > n; m--)
-                row[m - 1] = (2 * (quad)n * row[m] - quad_sqrt((quad)((l - m) * (l + m + 1))) * row[m + 1]) / quad_sqrt((quad)((l - m + 1) * (l + m)));
+                row[m - 1] = (2 * (quad)n * row[m] - quad_sqrt((quad)((l - m) * (l + m + 1))) * row[m + 1]) /
+                             quad_sqrt((quad)((l - m + 1) * (l + m)));
             for (int m = n; m <= l; m++) v[count++] = row[m] * (n ? 2 : m ? quad_sqrt(2) : 1);
         }
     return count;

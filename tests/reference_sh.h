@@ -1,5 +1,5 @@
 /* Spherical harmonics in 128 bits, straight from the definition: the reference of test_sh.c and bench_sh.c.
-   Only additions, multiplications, divisions and one Newton square root, so that no library is needed. */
+   Only additions, multiplications, divisions and one Newton square root, so that no library is needed; and nodes for quadrature. */
 #ifndef REFERENCE_SH_H
 #define REFERENCE_SH_H
 
@@ -46,6 +46,23 @@ static void reference_eval(quad *y, int order, const quad direction[3]) {
         double_factorial *= (quad)(2 * m + 1);
         quad t = x * c - yy * s;
         s = x * s + yy * c, c = t;
+    }
+}
+
+/* The n nodes and weights of Gauss and Legendre on [-1, 1], from 1 down: Newton's method on P_n, apart from what the header does. */
+__attribute__((unused)) static void reference_nodes(long double *node, long double *weight, int n) {
+    for (int i = 0; i < n; i++) {
+        long double x = cosl(3.14159265358979323846264L * ((long double)i + 0.75L) / ((long double)n + 0.5L)), slope = 1;
+        for (int round = 0; round < 12; round++) {
+            long double p = 1, before = 0;
+            for (int k = 0; k < n; k++) {
+                long double next = ((long double)(2 * k + 1) * x * p - (long double)k * before) / (long double)(k + 1);
+                before = p, p = next;
+            }
+            slope = (long double)n * (before - x * p) / (1 - x * x);
+            x -= p / slope;
+        }
+        node[i] = x, weight[i] = 2 / ((1 - x * x) * slope * slope);
     }
 }
 

@@ -1,5 +1,6 @@
 #!/bin/sh
-# Lists the items of the quick or of the long suite, one per line, for tests/run.sh; cheap ones first.
+# Lists the items of the quick or of the long suite, one per line, for tests/run.sh: the quick one's longest first, so that none is left
+# alone at the end; the long one's cheap ones first.
 #
 #     sh tests/suite.sh quick|long TEST_PROGRAMS...
 
@@ -20,7 +21,7 @@ for h in $ALL; do [ -f $h.h ] && headers="$headers $h"; done
 # ---- what the sources look like ------------------------------------------------------------------------------------------
 
 sources() {
-    for rule in shared-block includes unfinished-words private-macros top-level function-length; do
+    for rule in shared-block includes unfinished-words private-macros top-level line-length function-length; do
         item check "source/$rule" "bash tests/compile/source.sh $rule"
     done
     for h in $headers; do
@@ -41,14 +42,13 @@ compile() {
 c_flags() { echo "-std=$1 $WARN_C"; }
 cxx_flags() { echo "-x c++ -std=$1 $WARN"; }
 
-# The least: this compiler, strict C99 and C++11, interfaces alone and everything with its implementation. What make has compiled
+# The least: this compiler, strict C99 and C++11, interfaces alone, everything with its implementation in C++. What make has compiled
 # already, as strict C99, is not compiled again.
 matrix_quick() {
     for h in $headers; do
         compile "c99-interface-$h" "$CC" "$(c_flags c99) -fsyntax-only -DHEADER='\"$h.h\"'" one.c
         item check "compile/c99-$h" "[ -f build/$h.o ] && [ ! -s build/$h.o.said ]"
     done
-    compile c99-all "$CC" "$(c_flags c99) -fsyntax-only -DISOGI_IMPLEMENTATION" all.c
     if have "$CXX"; then compile c++11-all "$CXX" "$(cxx_flags c++11) -fsyntax-only -DISOGI_IMPLEMENTATION" all.c
     else item skip compile/c++11-all "$CXX is not installed"
     fi
@@ -151,7 +151,7 @@ only() { printf '%s\n' $units | grep -E "test_($1)\$"; }
 
 variants() {
     threaded='vol|mesh|trace_bake|dvr_visibility'
-    checked='sh|sh_limits|sample|vol|vol_api|vol_sides|vol_update|vol_field|mesh|trace|trace_bake|trace_light|trace_store|trace_change|dvr|dvr_data|dvr_tets|dvr_transfer|dvr_visibility|dvr_bound|dvr_hard|dvr_closed|dvr_medium'
+    checked='sh|sh_limits|sample|vol|vol_api|vol_sides|vol_update|vol_field|mesh|trace|trace_bake|trace_light|trace_store|trace_inside|trace_change|dvr|dvr_data|dvr_inside|dvr_tets|dvr_transfer|dvr_visibility|dvr_bound|dvr_hard|dvr_closed|dvr_medium'
     # Those that only start other programs have nothing to be built anew.
     units=
     for program; do
@@ -159,7 +159,7 @@ variants() {
     done
     # A variant runs what it can change: the address sanitizer most of them, the others those that stand for their kind.
     variant O0 "$CC" "-O0 $CONTRACT_OFF" '' $(only sh)
-    variant O3 "$CC" "-O3 $CONTRACT_OFF" '' $(only 'sh|vol|vol_update|trace_store|dvr|dvr_data')
+    variant O3 "$CC" "-O3 $CONTRACT_OFF" '' $(only 'sh|vol|vol_update|trace_inside|dvr|dvr_inside|dvr_data')
     fast_math "$CC" $(only 'sh|sh_limits|sample|vol|vol_sides|trace|dvr|dvr_visibility|dvr_bound|dvr_hard|dvr_classes')
     # With products and sums joined as a user's compiler may, all paths still build the same pyramid.
     if grep -qsw fma /proc/cpuinfo; then
@@ -205,7 +205,7 @@ memcheck() {
     grind='valgrind -q --error-exitcode=9 --leak-check=full --errors-for-leak-kinds=all'
     for source in examples/*.c; do
         base=$(basename "$source" .c)
-        case $base in viewer | bake | bake_mpi | bake_points | isolines | strip | tets) continue ;; esac # below, in tests of their own, they want arguments, or they take minutes
+        case $base in viewer | bake | bake_mpi | bake_points | gather_* | isolines | strip | tets) continue ;; esac # below, in tests of their own, they want arguments, or they take minutes
         item check "valgrind/$base" "$grind build/$base > /dev/null"
     done
     [ -f examples/viewer.c ] && for mode in "irradiance --samples 2" "transfer --samples 2" "dvr --directions 32" scale-invariant; do
@@ -235,9 +235,15 @@ analysers() {
 
 case $suite in
 quick)
-    for program; do item live "${program##*/}" "$program"; done
-    sources
+    first=' viewer trace trace_bake vol_many mesh vol_hard sh vol trace_store '
+    for name in $first; do
+        for program; do [ "${program##*/}" != test_$name ] || item live test_$name "$program"; done
+    done
     matrix_quick
+    for program; do
+        case $first in *" ${program##*/test_} "*) ;; *) item live "${program##*/}" "$program" ;; esac
+    done
+    sources
     item check bake/parts-and-pauses "sh tests/compile/bake.sh quick"
     ;;
 long)
@@ -257,7 +263,8 @@ long)
     if have mpirun && have mpicc; then item check mpi/same-bits "sh tests/compile/mpi.sh"
     else item skip mpi/same-bits "mpicc and mpirun are not installed"
     fi
-    item check bench/tables "sh tests/bench/contract.sh sh vol" # trace and dvr take too long beside other work
+    item check bench/tables "sh tests/bench/contract.sh sh vol"
+    item check bench/dry-tables "sh tests/bench/contract.sh --dry trace dvr" # in full they take too long beside other work
     analysers
     variants "$@"
     emulators "$@"

@@ -1,4 +1,5 @@
-/* The programs in the documentation are programs: each quick start in a header and each in the README compiles and runs. */
+/* The programs in the documentation are programs: each quick start in a header and each in the README compiles and runs.
+   FLAGS: -O0 */
 #define _DEFAULT_SOURCE
 #include "test.h"
 #include <sys/stat.h>
@@ -94,7 +95,8 @@ static const char *variable(const char *name, const char *otherwise) {
 static char program[8192], other[8192], output[4096];
 
 /* Compiles and runs a program in build/docs, pasted into a file of its own: as C99 and as C++11, without a warning. Quick: linked with the
-   implementations that were compiled before, which must not change what the program needs to include; --long: by itself, as users do. */
+   implementations that were compiled before, which must not change what the program needs to include, and run once; --long: by itself, as
+   users do, and run as both. */
 static void check_program(const char *name, const char *text) {
     char command[2048], path[64];
     FILE *file;
@@ -108,14 +110,15 @@ static void check_program(const char *name, const char *text) {
         if (cxx && !succeeds(command, output, sizeof output)) continue; /* a C++ compiler is not needed */
         snprintf(command, sizeof command,
                  "{ %s %s %s -Wall -Wextra -Wpedantic -Werror %s -I. -c -o build/docs/%s.o %s && %s %s -o build/docs/%s build/docs/%s.o %s "
-                 "-lm -lpthread && build/docs/%s; } 2>&1",
+                 "-lm -lpthread && %s build/docs/%s; } 2>&1",
                  compiler, cxx ? "-x c++ -std=c++11" : "-std=c99", variable("CFLAGS", ""),
                  LONG_SUITE ? "" : "-DISOGI_SH_IMPLEMENTED -DISOGI_VOL_IMPLEMENTED -DISOGI_TRACE_IMPLEMENTED -DISOGI_DVR_IMPLEMENTED", name,
                  path, compiler, variable("CFLAGS", ""), name, name,
-                 LONG_SUITE ? "" : "build/isogi_sh.o build/isogi_vol.o build/isogi_trace.o build/isogi_dvr.o", name);
+                 LONG_SUITE ? "" : "build/isogi_sh.o build/isogi_vol.o build/isogi_trace.o build/isogi_dvr.o",
+                 cxx && !LONG_SUITE ? "echo linked:" : "", name);
         CHECK(succeeds(command, output, sizeof output), "%s as %s: %s", name, cxx ? "C++11" : "C99", output);
+        if (!cxx) printf("    %s", output);
     }
-    printf("    %s", output);
 }
 
 static void check_header(const char *header) {

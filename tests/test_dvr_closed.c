@@ -5,7 +5,6 @@
 
 enum { N = 49, ORDER = 4, COUNT = ORDER * ORDER };
 static const char *const method_name[4] = {"default", "brute force", "paper", "sweeps"};
-static const float sky_one[3] = {3.5449077f, 3.5449077f, 3.5449077f}; /* radiance 1: sqrt(4 pi) */
 
 /* ---- scenes with a closed form: transmittance from a place towards a direction, in voxels ---- */
 

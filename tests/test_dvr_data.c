@@ -47,15 +47,6 @@ static void reference_values(const isogi_transfer *t, long double x, long double
     }
 }
 
-/* Where the ray o + t d enters and leaves the box. */
-static void reference_ends(const field *f, const long double o[3], const long double d[3], long double ends[2]) {
-    ends[0] = 0, ends[1] = 1e30L;
-    for (int a = 0; a < 3; a++) {
-        long double t0 = -o[a] / d[a], t1 = (f->size[a] - 1 - o[a]) / d[a];
-        ends[0] = fmaxl(ends[0], fminl(t0, t1)), ends[1] = fminl(ends[1], fmaxl(t0, t1));
-    }
-}
-
 /* Premultiplied colour and transmittance up to where the transmittance falls below `end` (at *t, if so); unit-spaced volume at 0. */
 static void reference_ray(const field *f, const isogi_transfer *t, const double eye[3], const float dir[3], int pieces, long double end,
                           long double out[4], long double *stop, int *crossings) {
@@ -101,7 +92,7 @@ static void random_transfer(test_random *r, isogi_transfer_point *p, size_t coun
 TEST(exact_rays_agree_with_a_long_double_quadrature) {
     const double extinctions[] = {0.3, 3, 60};
     double most = 0, deepest = 0;
-    int rays = LONG_SUITE ? 60 : 3, half = 0;
+    int rays = LONG_SUITE ? 60 : 2, half = 0;
     test_random r = {101};
     for (int kind = 0; kind < 2; kind++)
         for (int e = 0; e < 3; e++)
@@ -236,90 +227,7 @@ TEST(long_tables_are_composited_as_their_pieces_are) {
     field_free(&f);
 }
 
-/* ---- monotone pieces ---- */
-
-TEST(monotone_pieces_are_found_exactly) {
-    test_random r = {15};
-    int by_count[3] = {0, 0, 0};
-    double worst = 0;
-    for (int n = 0; n < (LONG_SUITE ? 2000000 : 40000); n++) {
-        double b[4], u[2], scale = pow(10, random_range(&r, -30, 30));
-        for (int i = 0; i < 4; i++) b[i] = n % 3 ? random_range(&r, -1, 1) : (double)((int)(random_bits(&r) % 5) - 2);
-        for (int i = 0; i < 4; i++) b[i] *= scale;
-        int found = isogi_dvr__extrema(b, u), expected = 0;
-        long double d0 = (long double)b[1] - (long double)b[0], d1 = (long double)b[2] - (long double)b[1],
-                    d2 = (long double)b[3] - (long double)b[2];
-        long double a = d0 - 2 * d1 + d2, h = d1 - d0, root = h * h - a * d0, at[2];
-        if (fabsl(root) < 1e-12L * h * h) continue; /* an inflection with a level tangent: both answers are right */
-        if (root > 0) { /* two roots of a u^2 + 2 h u + d0, each by the formula that does not cancel */
-            long double q = h > 0 ? -h - sqrtl(root) : sqrtl(root) - h, x[2] = {a < 0 || a > 0 ? q / a : 2, q < 0 || q > 0 ? d0 / q : 2};
-            for (int i = 0; i < 2; i++)
-                if (x[i] > 1e-12L && x[i] < 1 - 1e-12L) at[expected++] = x[i];
-            if (expected == 2 && at[0] > at[1]) root = at[0], at[0] = at[1], at[1] = root;
-        }
-        /* on an end itself rounding decides: then the piece beyond it has no length */
-        for (int i = found; i-- > 0;)
-            if (!(u[i] > 1e-12 && u[i] < 1 - 1e-12)) u[0] = u[1 - i], found--;
-        by_count[expected]++;
-        CHECK(found == expected, "%g %g %g %g: %d extrema, not %d", b[0], b[1], b[2], b[3], found, expected);
-        for (int i = 0; i < found && found == expected; i++) {
-            double error = fabs(u[i] - (double)at[i]);
-            worst = fmax(worst, error);
-            CHECK(error < 1e-8, "extremum at %.17g, not %.17Lg", u[i], at[i]); /* a double root: the square root of a rounding error */
-        }
-    }
-    printf("    cubics with 0, 1, 2 extrema: %d %d %d; worst place %.2g\n", by_count[0], by_count[1], by_count[2], worst);
-    CHECK(by_count[1] > 1000 && by_count[2] > 1000, "%d %d", by_count[1], by_count[2]);
-}
-
-/* Pieces join: each begins at the place and the value with which the last one ends, from the entry of the box to its exit; within each the
-   value goes one way. */
-TEST(monotone_pieces_cover_the_ray_without_a_gap) {
-    test_random r = {16};
-    for (int n = 0; n < 300; n++) {
-        field f = field_noise(n % 2 ? 6 : 3, (uint64_t)n);
-        const isogi_transfer_point everywhere = {0, {1, 1, 1}, 1};
-        const isogi_transfer transfer = {.points = &everywhere, .point_count = 1};
-        const isogi_dvr_desc desc = {.pyramid = f.pyramid, .space = ISOGI_DVR_DATA};
-        isogi_dvr *dvr = dvr_new(&desc, &transfer);
-        double eye[3], target[3], dir[3], at = 0, value = 0;
-        random_line(&f, &r, eye, target);
-        if (n % 5 == 0) eye[0] = target[0], eye[1] = target[1] = floor(target[1]); /* along faces */
-        if (n % 7 == 0) for (int a = 0; a < 3; a++) eye[a] = -2, target[a] = 1;      /* through voxels, corner to corner */
-        for (int a = 0; a < 3; a++) dir[a] = target[a] - eye[a];
-        isogi_dvr__march m;
-        isogi_dvr__walk w;
-        isogi_dvr__stretch p;
-        if (isogi_dvr__begin(&m, dvr, eye, dir, sqrt(isogi_dvr__dot(dir, dir)), 0.5)) {
-            int pieces = 0;
-            isogi_dvr__begin_walk(&w, &m);
-            while (isogi_dvr__next_monotone(&w, &p)) {
-                CHECK(p.from >= at - 1e-15 * m.length && p.from <= at + 1e-12 * m.length, "piece %d begins at %.17g, not %.17g", pieces,
-                      p.from, at);
-                if (pieces)
-                    CHECK(!(p.value[0] < value) && !(p.value[0] > value), "piece %d begins with %.17g, not %.17g", pieces, p.value[0],
-                          value);
-                for (int i = 0; i < 8; i++) {
-                    double u0 = p.u0 + (p.u1 - p.u0) * i / 8, u1 = p.u0 + (p.u1 - p.u0) * (i + 1) / 8;
-                    double step = isogi_dvr__bernstein(p.b, u1) - isogi_dvr__bernstein(p.b, u0);
-                    CHECK(step * (p.value[1] - p.value[0]) >= -1e-15, "piece %d goes from %g to %g, and once by %g", pieces, p.value[0],
-                          p.value[1], step);
-                }
-                at = p.to, value = p.value[1], pieces++;
-            }
-            CHECK(fabs(at - m.length) < 1e-12 * m.length, "pieces end at %.17g of %.17g", at, m.length);
-        }
-        isogi_dvr_free(dvr);
-        field_free(&f);
-    }
-}
-
 /* ---- invariance (Kraus 2005, 4.1) ---- */
-
-static const isogi_transfer_point hills[] = {{-1, {1, 0.2f, 0.1f}, 0},  {-0.2, {0.3f, 1, 0.1f}, 2}, {0.1, {0.1f, 0.4f, 1}, 0},
-                                             {0.4, {0.1f, 0.4f, 1}, 0}, {0.4, {1, 1, 0}, 3},        {1, {1, 0, 1}, 1}};
-static const isogi_peak sheets[] = {{0.3, {1, 1, 1}, 0.4f}, {-0.4, {0, 1, 0}, 0.2f}};
-static const isogi_transfer landscape = {hills, 6, sheets, 2};
 
 TEST(scaling_space_by_a_million_either_way_changes_no_pixel) {
     const double scales[] = {1, 1e-6, 1e-3, 37, 1e6};
@@ -354,62 +262,6 @@ TEST(scaling_space_by_a_million_either_way_changes_no_pixel) {
             }
             for (int i = 0; i < 5; i++) free(image[i]);
         }
-}
-
-/* Axes scaled each by its own factor, and the rays along with them: the same cells, the same cubics, the same pixels. */
-TEST(scaling_each_axis_along_with_the_rays_changes_nothing) {
-    test_random r = {10};
-    uint64_t passed = 0;
-    for (int n = 0; n < 60; n++) {
-        field f = field_noise(8, (uint64_t)n);
-        double scale[3], eye[2][3], target[2][3];
-        const isogi_dvr_desc desc = {.pyramid = f.pyramid, .space = ISOGI_DVR_DATA, .opaque = 1};
-        isogi_dvr *dvr = dvr_new(&desc, &landscape);
-        random_line(&f, &r, eye[0], target[0]);
-        isogi_view view = line_of_sight(eye[0], target[0]);
-        isogi_counters count = {0};
-        pixel p;
-        CHECK(isogi_dvr_render(dvr, &view, NULL, (float(*)[4])p.c, NULL, &count) == ISOGI_OK, "render");
-        isogi_dvr_free(dvr), isogi_vol_free(f.pyramid);
-        for (int a = 0; a < 3; a++) {
-            scale[a] = ldexp(1, (int)(random_bits(&r) % 40) - 20); /* powers of two: ends of the line stay floats */
-            f.volume.spacing[a] = scale[a], eye[1][a] = eye[0][a] * scale[a], target[1][a] = target[0][a] * scale[a];
-        }
-        field_build(&f);
-        const isogi_dvr_desc scaled = {.pyramid = f.pyramid, .space = ISOGI_DVR_DATA, .opaque = 1};
-        if (isogi_dvr_create(&dvr, &scaled, &serial) == ISOGI_TOO_LARGE) { /* more samples than the other methods take */
-            field_free(&f);
-            continue;
-        }
-        CHECK(isogi_dvr_set_transfer(dvr, &landscape) == ISOGI_OK, "set_transfer");
-        /* directions are floats: errors of 1e-7 relative in an axis of 1e6 times the others' length would lead elsewhere; so scale what
-           the renderer does, not the view */
-        double origin[3], dir[3], back[3];
-        float at[3];
-        isogi_view_ray(&view, 0, 0, origin, at);
-        for (int a = 0; a < 3; a++) {
-            const volatile float rounded = at[a]; /* gcc 12 at -O3 would drop the rounding */
-            dir[a] = (double)rounded;
-        }
-        isogi_dvr__march m = {0};
-        isogi_dvr__pixel_ray ray = {.dvr = dvr, .clear = 1};
-        memcpy(back, origin, sizeof back);
-        if (isogi_dvr__begin(&m, dvr, back, dir, 1, 0.5)) isogi_dvr__cast_values(&ray, &m);
-        for (int a = 0; a < 4; a++) {
-            double got = a < 3 ? ray.rgb[a] : 1 - ray.clear;
-            CHECK(fabs((double)p.c[a] - got) < 1e-7, "ray %d, channel %d: %.9g, not %.9g", n, a, got, (double)p.c[a]);
-        }
-        /* the same way, cell by cell */
-        CHECK(m.work.cells == count.cells && m.work.cubics == count.cubics && m.work.blocks == count.blocks &&
-                  m.work.blocks_skipped == count.blocks_skipped,
-              "ray %d: %d cells, %d cubics, %d blocks, %d skipped, not %d, %d, %d, %d", n, (int)m.work.cells, (int)m.work.cubics,
-              (int)m.work.blocks, (int)m.work.blocks_skipped, (int)count.cells, (int)count.cubics, (int)count.blocks,
-              (int)count.blocks_skipped);
-        passed += count.cells;
-        isogi_dvr_free(dvr);
-        field_free(&f);
-    }
-    CHECK(passed > 300, "%d cells", (int)passed);
 }
 
 TEST(constant_data_contributes_nothing_whatever_its_extinction) {
@@ -466,113 +318,6 @@ TEST(n_isosurfaces_converge_to_the_constant_transfer_function) {
     free(peaks), free(expected);
     isogi_dvr_free(dvr);
     field_free(&f);
-}
-
-typedef struct crossing { double t; int side; } crossing;
-
-/* What the exact intersector of isogi_vol.h finds along the same ray. */
-static int intersector_crossings(const isogi_pyramid *pyramid, const double origin[3], const float dir[3], double isovalue, crossing *out) {
-    isogi_ray ray = {.dir = {dir[0], dir[1], dir[2]}, .isovalue = isovalue};
-    isogi_hit hit;
-    int count = 0;
-    double t = 0;
-    for (int a = 0; a < 3; a++) ray.origin[a] = origin[a];
-    isogi_vol_intersect(pyramid, &ray, 1, &hit, NULL);
-    while (hit.side && count < 60) {
-        isogi_hit next;
-        t += hit.t;
-        out[count].t = t, out[count++].side = hit.side;
-        isogi_vol_continue(pyramid, &hit, (const float(*)[3])dir, NULL, isovalue, 0, 1, &next, NULL);
-        hit = next;
-    }
-    return count;
-}
-
-/* As the renderer finds them: of one opaque probe after the other. */
-static int walk_crossings(const isogi_dvr *dvr, const double origin[3], const float dir[3], double isovalue, crossing *out) {
-    isogi_dvr__march m;
-    isogi_dvr__span s;
-    double d[3] = {(double)dir[0], (double)dir[1], (double)dir[2]};
-    double touched = -1; /* t at which the last piece ended with the isovalue itself */
-    int count = 0;
-    if (!isogi_dvr__begin(&m, dvr, origin, d, 1, 0.5)) return 0;
-    isogi_dvr__begin_walk(&s.walk, &m);
-    while (isogi_dvr__next_monotone(&s.walk, &s.piece) && count < 60)
-        if ((s.piece.value[0] >= isovalue) != (s.piece.value[1] >= isovalue)) {
-            double t = m.enter + s.piece.t0 + isogi_dvr__place_of(&s.piece, isovalue) * s.piece.dt;
-            if (s.piece.value[1] < isovalue && !(s.piece.value[0] > isovalue) && s.piece.from <= touched) continue; /* in one point: once */
-            touched = s.piece.value[1] > isovalue || s.piece.value[1] < isovalue ? -1 : s.piece.to;
-            out[count].t = t, out[count++].side = s.piece.value[1] >= isovalue ? 1 : -1;
-        }
-    return count;
-}
-
-/* The ray enters or leaves the box where the field is the isovalue, as on a face of voxels that all have it: then the rounding of that
-   place decides whether the surface is passed. */
-static int ends_on_surface(const field *f, const double origin[3], const float dir[3], double isovalue) {
-    long double o[3], d[3], ends[2];
-    for (int a = 0; a < 3; a++) o[a] = (long double)origin[a], d[a] = (long double)dir[a];
-    reference_ends(f, o, d, ends);
-    for (int i = 0; i < 2; i++) {
-        long double p[3];
-        int c[3];
-        for (int a = 0; a < 3; a++) {
-            p[a] = o[a] + ends[i] * d[a], c[a] = (int)floorl(p[a]);
-            c[a] = c[a] < 0 ? 0 : c[a] > f->size[a] - 2 ? f->size[a] - 2 : c[a];
-        }
-        if (fabsl(reference_value(f, c, p) - (long double)isovalue) < 1e-13L)
-            return 1; /* a double's rounding of t, times the slope: 1e-14 */
-    }
-    return 0;
-}
-
-TEST(crossings_are_those_of_the_exact_intersector) {
-    test_random r = {77};
-    int total = 0, rays = LONG_SUITE ? 40000 : 1500, odd = 0, open = 0;
-    double worst = 0;
-    for (int n = 0; n < 12; n++) {
-        field f = n < 4 ? field_noise(9, (uint64_t)n) : n < 8 ? field_waves(12, (uint64_t)n) : field_new(8, 8, 8);
-        if (n >= 8) { /* small whole numbers, and isovalues that voxels have */
-            for (size_t i = 0; i < field_count(&f); i++) f.value[i] = (double)(random_bits(&r) % 4);
-            field_build(&f);
-        }
-        double isovalue = n < 8 ? random_range(&r, -0.5, 0.5) : n % 2 ? 2 : 1.5;
-        const isogi_peak peak = {isovalue, {1, 1, 1}, 0.25f};
-        const isogi_transfer transfer = {.peaks = &peak, .peak_count = 1};
-        const isogi_dvr_desc desc = {.pyramid = f.pyramid, .space = ISOGI_DVR_DATA, .opaque = 1};
-        isogi_dvr *dvr = dvr_new(&desc, &transfer);
-        for (int i = 0; i < rays / 12; i++) {
-            double eye[3], target[3], origin[3];
-            float dir[3];
-            crossing expected[64], got[64];
-            random_line(&f, &r, eye, target);
-            isogi_view view = line_of_sight(eye, target);
-            isogi_view_ray(&view, 0, 0, origin, dir);
-            if (ends_on_surface(&f, origin, dir, isovalue)) {
-                open++;
-                continue;
-            }
-            int count = intersector_crossings(f.pyramid, origin, dir, isovalue, expected),
-                found = walk_crossings(dvr, origin, dir, isovalue, got);
-            total += count;
-            CHECK(count == found, "field %d ray %d: %d crossings, not %d", n, i, found, count);
-            for (int k = 0; k < count && count == found; k++) {
-                double error = fabs(got[k].t - expected[k].t);
-                CHECK(got[k].side == expected[k].side, "field %d ray %d crossing %d: side %d", n, i, k, got[k].side);
-                /* next to an extremum the place is ill-conditioned: the square root of a rounding error */
-                CHECK(error < 1e-6, "field %d ray %d crossing %d: t %.17g, not %.17g", n, i, k, got[k].t, expected[k].t);
-                worst = fmax(worst, error), odd += error > 1e-11;
-            }
-            pixel p = cast(dvr, eye, target, NULL);
-            CHECK(fabs((double)p.c[3] - (1 - pow(0.75, count))) < 1e-6, "field %d ray %d: opacity %g of %d crossings", n, i, (double)p.c[3],
-                  count);
-        }
-        isogi_dvr_free(dvr);
-        field_free(&f);
-    }
-    printf("    %d crossings along %d rays: the same; largest difference of t %.2g, %d above 1e-11; %d rays end on the surface\n", total,
-           rays - open, worst, odd, open);
-    CHECK(total > 500 && open < rays / 100, "%d crossings, %d rays left out", total, open);
 }
 
 /* Along lattice lines every value that counts is a voxel's: whole numbers, exact. */
@@ -778,10 +523,12 @@ TEST(surfaces_seen_edge_on_have_the_limit) {
 
 /* ---- light from both sides (Kraus 2005, 5.2) ---- */
 
+static double dot(const double a[3], const double b[3]) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+
 /* Eq. 19 as it is printed, for unit vectors and any orientation of n. */
 static void printed_equation(const double l[3], const double v[3], const double n[3], double a, const double cd[3], const isogi_material *m,
                              double out[3]) {
-    double ln = isogi_dvr__dot(l, n), vn = isogi_dvr__dot(v, n), r[3], rv = 0, lv = 0;
+    double ln = dot(l, n), vn = dot(v, n), r[3], rv = 0, lv = 0;
     for (int i = 0; i < 3; i++) r[i] = 2 * n[i] * ln - l[i], rv += r[i] * v[i], lv -= l[i] * v[i];
     for (int i = 0; i < 3; i++) {
         double front = cd[i] * (double)m[0].diffuse[i], through = cd[i] * (double)m[2].diffuse[i], gloss = cd[i] * (double)m[2].specular[i];
@@ -812,7 +559,7 @@ TEST(two_sided_light_is_that_of_the_equation) {
         const double cd[3] = {(double)0.9f, (double)0.6f, (double)0.3f};
         const isogi_transfer transfer = {NULL, 0, &peak, 1};
         /* values rise along the ray where the eye is on the low side */
-        int low = isogi_dvr__dot(v, tilt) < 0;
+        int low = dot(v, tilt) < 0;
         const isogi_material seen[3] = {low ? front : back, low ? back : front, through};
         for (int i = 0; i < 5; i++) {
             double l[3], scale = 1, reach = 0;
@@ -949,6 +696,74 @@ TEST(cells_that_are_not_finite_break_the_ray) {
                 isogi_dvr_free(dvr);
                 field_free(&f);
             }
+}
+
+/* Unlit pictures without peaks follow several rays at once where the machine can: they agree with those of plain code, and see as much. */
+TEST(rays_side_by_side_agree_with_plain_code) {
+    enum { WIDTH = 33, HEIGHT = 21 };
+    static float image[2][WIDTH * HEIGHT][4], depth[2][WIDTH * HEIGHT];
+    static const size_t sizes[3][3] = {{70, 19, 34}, {9, 66, 5}, {2, 3, 2}};
+    /* within; along an axis; along lattice lines */
+    static const float eyes[4][3] = {{80, 50, 90}, {20.3f, 7.1f, 3.2f}, {-30, 2, 2}, {4, 4, 60}};
+    test_random r = {77};
+    double most = 0, farthest = 0;
+    for (int n = 0; n < (LONG_SUITE ? 3 * 3 * 4 * 8 : 3 * 3 * 4); n++) {
+        const size_t *size = sizes[n % 3], count = size[0] * size[1] * size[2];
+        const isogi_type type = n / 3 % 3 == 0 ? ISOGI_F32 : n / 3 % 3 == 1 ? ISOGI_U8 : ISOGI_U16;
+        const float *eye = eyes[n / 9 % 4];
+        const double plane[4] = {0.3, -0.2, 1, -0.4 * (double)size[2]};
+        const size_t bytes = type == ISOGI_F32 ? 4 : type == ISOGI_U8 ? 1 : 2;
+        char *data = (char *)malloc(count * bytes); /* to the byte: a vector that reads beyond is seen by the sanitizer */
+        for (size_t i = 0; i < count; i++) {
+            size_t x = i % size[0], y = i / size[0] % size[1], z = i / size[0] / size[1];
+            double value = 0.5 + 0.45 * sin(0.21 * (double)x) * cos(0.17 * (double)y + 0.1) * cos(0.3 * (double)z) + 0.04 * random_unit(&r);
+            float narrow = x / 24 == 1 ? 0.11f : (float)value; /* blocks in which nothing changes */
+            if (random_unit(&r) < (n % 2 ? 0.003 : 0)) narrow = n % 4 > 1 ? HUGE_VALF : -HUGE_VALF;
+            if (n % 4 == 1 && x / 16 == 3) narrow = (float)NAN; /* whole blocks */
+            if (type == ISOGI_F32) memcpy(data + 4 * i, &narrow, 4);
+            else if (type == ISOGI_U8) data[i] = (char)(uint8_t)(255 * value);
+            else memcpy(data + 2 * i, &(uint16_t){(uint16_t)(65535 * value)}, 2);
+        }
+        const isogi_volume volume = {.data = data, .type = type, .size = {size[0], size[1], size[2]}, .spacing = {1, 1.25, 0.75},
+                                     .scale = type == ISOGI_F32 ? 1 : type == ISOGI_U8 ? 1 / 255.0 : 1 / 65535.0};
+        isogi_transfer_point points[12];
+        random_transfer(&r, points, 12, n % 5 == 4 ? 40 : 4);
+        for (int i = 0; i < 12; i++) points[i].value = 0.5 + 0.6 * points[i].value;
+        if (n % 3) for (int i = 0; i < 5; i++) points[i].extinction = 0; /* quiet below */
+        const isogi_transfer transfer = {.points = points, .point_count = 12};
+        const isogi_view view = {
+            .width = WIDTH,
+            .height = HEIGHT,
+            .eye = {eye[0], eye[1], eye[2]},
+            .target = {n / 9 % 4 == 3 ? 4.f : 0.4f * (float)size[0], n / 9 % 4 > 1 ? eye[1] : 0.6f * (float)size[1], 2}};
+        uint64_t cells[2];
+        for (int path = 0; path < 2; path++) {
+            const isogi_context context = {.threads = 1, .force_path = path};
+            const isogi_dvr_desc desc = {.pyramid = NULL, .space = ISOGI_DVR_DATA, .opaque = 1};
+            isogi_dvr_desc own = desc;
+            isogi_pyramid *pyramid = NULL;
+            isogi_dvr *dvr = NULL;
+            isogi_counters work = {0};
+            CHECK(isogi_vol_build(&pyramid, &volume, &context) == ISOGI_OK, "build");
+            own.pyramid = pyramid;
+            CHECK(isogi_dvr_create(&dvr, &own, &context) == ISOGI_OK && isogi_dvr_set_transfer(dvr, &transfer) == ISOGI_OK, "create");
+            if (n % 7 > 4) CHECK(isogi_dvr_set_clip(dvr, &plane, 1) == ISOGI_OK, "clip");
+            CHECK(isogi_dvr_render(dvr, &view, NULL, image[path], depth[path], &work) == ISOGI_OK, "render");
+            cells[path] = work.cells;
+            isogi_dvr_free(dvr), isogi_vol_free(pyramid);
+        }
+        CHECK(cells[0] + cells[0] / 50 + 20 >= cells[1] && cells[1] + cells[1] / 50 + 20 >= cells[0], "case %d: %g cells, not %g", n,
+              (double)cells[0], (double)cells[1]);
+        for (int i = 0; i < WIDTH * HEIGHT; i++) {
+            /* float pixels; a ray along faces may take the cells on either side, whose values agree to a rounding */
+            for (int a = 0; a < 4; a++) most = fmax(most, fabs((double)image[0][i][a] - (double)image[1][i][a]));
+            if (depth[0][i] < 1e30f && depth[1][i] < 1e30f && image[0][i][3] > 1e-3f)
+                farthest = fmax(farthest, fabs((double)depth[0][i] - (double)depth[1][i]));
+        }
+        CHECK(most < 1e-6 && farthest < 1e-3, "case %d: pixels differ by %g, depths by %g", n, most, farthest);
+        free(data);
+    }
+    printf("    largest difference of pixels %.2g, of depth %.2g\n", most, farthest);
 }
 
 static int calls_left, blocks_out;

@@ -22,8 +22,8 @@ static coulomb three_potentials(size_t n) {
 
 static void free_potentials(coulomb *c) { isogi_vol_free(c->pyramid), procedural_free(&c->volume); }
 
-static const isogi_peak sheets[2] = {{0.72, {.15f, .3f, .9f}, 0.35f}, {1.5, {.9f, .15f, .1f}, 0.7f}};
-static const isogi_transfer both_sheets = {NULL, 0, sheets, 2};
+static const isogi_peak figure_sheets[2] = {{0.72, {.15f, .3f, .9f}, 0.35f}, {1.5, {.9f, .15f, .1f}, 0.7f}};
+static const isogi_transfer both_sheets = {NULL, 0, figure_sheets, 2};
 
 /* Uniform colour becomes shape: the same opacity in every pixel, and light that varies where there was none of that. */
 TEST(figure_2_shading_gives_shape_to_surfaces_of_uniform_opacity) {

@@ -141,49 +141,6 @@ TEST(several_resolutions_err_as_the_fine_grid_at_the_memory_of_a_coarse_one) {
     field_free(&f);
 }
 
-/* A shell with a hole, haze in it: dark, buried and open points side by side. */
-static double cave(double x, double y, double z) {
-    double u = x - 0.5, v = y - 0.5, w = z - 0.5, r = sqrt(u * u + v * v + w * w), shell = 1 - fabs(r - 0.45) / 0.03;
-    if (v > 0.25 && u * u + w * w < 0.04) shell = 0;
-    return r < 0.36 ? fmax(shell, 0.05) : fmax(shell, 0);
-}
-
-/* Light of a picture, openness and all, is the same on both sides of every face between blocks: beside buried points it changes
-   by a thousandth within 2e-5 voxels. */
-TEST(the_table_of_light_has_no_seams) {
-    field f = field_of(cave, N);
-    isogi_dvr_desc desc = several(&f, 65, 8);
-    isogi_dvr *dvr = stepped(&desc, &scenery, NULL);
-    isogi_dvr__render_job job;
-    isogi_dvr__fast_ray ray;
-    test_random r = {3};
-    double most = 0, brightest = 0;
-    memset(&job, 0, sizeof job), memset(&ray, 0, sizeof ray);
-    job.dvr = dvr, job.view = &slanting;
-    CHECK(isogi_dvr__set_lights(&job.lights, dvr, &outdoors) == ISOGI_OK && isogi_dvr__begin_frame(&job) == ISOGI_OK, "begin");
-    CHECK(job.fast.frame.light && job.fast.frame.held.block, "no table of light in several resolutions");
-    for (int i = 0; i < 50000; i++) {
-        float light[2][4], p[3];
-        for (int a = 0; a < 3; a++) p[a] = (float)random_range(&r, 0, N - 1);
-        p[i % 3] = 8 * (float)(1 + random_bits(&r) % 7);
-        for (int n = 0; n < 2; n++) {
-            for (int a = 0; a < 3; a++) ray.origin[a] = p[a] + (a == i % 3 ? n ? 1e-5f : -1e-5f : 0);
-            isogi_dvr__fast_light(&job.fast.frame, &ray, 0, light[n]);
-        }
-        for (int a = 0; a < 3; a++) {
-            most = fmax(most, fabs((double)light[0][a] - (double)light[1][a]));
-            brightest = fmax(brightest, (double)light[0][a]);
-        }
-    }
-    printf("    brightest light %.3g, largest step %.2g\n", brightest, most);
-    CHECK(most < 2e-3 * brightest && brightest > 0.1, "a step of %g in light of up to %g", most, brightest);
-    isogi_release(&serial, job.fast.frame.classes, job.fast.frame.count, sizeof *job.fast.frame.classes);
-    isogi_release(&serial, job.fast.frame.light, isogi_dvr__held_points(dvr) + 1, sizeof *job.fast.frame.light);
-    isogi_release(&serial, job.lights.list, job.lights.count, sizeof *job.lights.list);
-    isogi_dvr_free(dvr);
-    field_free(&f);
-}
-
 /* Vectors of every path read the blocks as the plain code does; so do lights nearby, which are looked up without a table of light. */
 TEST(every_path_reads_the_blocks) {
     static float image[5][SIDE * SIDE][4];

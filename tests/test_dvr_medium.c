@@ -3,7 +3,6 @@
 #include "isogi_dvr.h"
 #include "dvr_fields.h"
 
-static const float sky_one[3] = {3.5449077f, 3.5449077f, 3.5449077f}; /* radiance 1: sqrt(4 pi) */
 static const isogi_lighting sky = {.env = {.sh = sky_one, .sh_order = 1}};
 
 static double even(double x, double y, double z) { return (void)x, (void)y, (void)z, 2; }

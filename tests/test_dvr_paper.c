@@ -1,49 +1,12 @@
 /* What Kronander 2011 and Kraus 2005 describe step by step: sphere sets, the order in which blocks are raised, pictures between steps,
-   a bucky ball of tetrahedra. Looks inside: isogi_dvr__ */
+   a bucky ball of tetrahedra. */
 #define ISOGI_IMPLEMENTATION
 #include "isogi_dvr.h"
 #include "dvr_fields.h"
 
 static double half_height(double x, double y, double z) { return (void)x, (void)y, z; }
-static double nothing_but_one(double x, double y, double z) { return (void)x, (void)y, (void)z, 1; }
 
-static const isogi_dvr_sphere spheres[] = {ISOGI_DVR_TETRAHEDRON, ISOGI_DVR_OCTAHEDRON, ISOGI_DVR_ICOSAHEDRON};
 static const char *const sphere_name[] = {"Fibonacci", "tetrahedron", "octahedron", "icosahedron"};
-static const int faces[] = {0, 4, 8, 20};
-
-/* Directions of divided solids, weighed by their area: basis functions are orthonormal on them up to an error that falls with their
-   number as a midpoint rule's does, like 1 / n. The tetrahedron's faces are the most distorted by projection. */
-TEST(spherical_harmonics_are_orthonormal_on_divided_solids) {
-    static const double c[] = {0, 44, 14, 3.5}; /* twice what is measured, for order 4; in the end 6.8, 6.8, 1.7 */
-    field f = field_of(nothing_but_one, 3);
-    for (int s = 0; s < 3; s++) {
-        printf("    %s:", sphere_name[spheres[s]]);
-        for (int parts = 1; parts <= 10; parts = parts < 4 ? parts + 1 : parts + 3) {
-            const int n = faces[spheres[s]] * parts * parts;
-            const isogi_dvr_desc desc = {.pyramid = f.pyramid, .shading = ISOGI_DVR_VISIBILITY, .order = 4, .directions = n,
-                .sphere = spheres[s], .grid = {1, 1, 1}};
-            isogi_dvr *dvr = NULL;
-            double sum[16][16] = {{0}}, worst = 0, area = 0;
-            CHECK(isogi_dvr_create(&dvr, &desc, &serial) == ISOGI_OK && dvr->desc.directions == n, "create");
-            for (int k = 0; k < n; k++) {
-                double d[3] = {dvr->direction[k][3], dvr->direction[k][4], dvr->direction[k][5]}, y[16];
-                isogi_sh_eval_f64(y, 4, (const double(*)[3])d, 1);
-                CHECK(fabs(d[0] * d[0] + d[1] * d[1] + d[2] * d[2] - 1) < 1e-6 && dvr->kernel[16 * k] > 0, "direction %d", k);
-                for (int i = 0; i < 16; i++)
-                    for (int j = 0; j < 16; j++) sum[i][j] += y[i] * (double)dvr->kernel[16 * k + j];
-                area += (double)dvr->kernel[16 * k] * sqrt(4 * PI);
-            }
-            CHECK(fabs(area / (4 * PI) - 1) < 1e-6, "%d directions: area %g", n, area);
-            for (int i = 0; i < 16; i++)
-                for (int j = 0; j < 16; j++) worst = fmax(worst, fabs(sum[i][j] - (i == j)));
-            printf(" %d: %.2g", n, worst);
-            if (n >= 64) CHECK(worst < c[spheres[s]] / n, "%s, %d directions: %g", sphere_name[spheres[s]], n, worst);
-            isogi_dvr_free(dvr);
-        }
-        printf("\n");
-    }
-    field_free(&f);
-}
 
 /* A place beside an opaque half space sees exactly half of the sphere: pi under the square root for the mean, sqrt(3 pi) / 2 up. And a slab
    of depth q above it lets exp(-q / cos) through, less where a ray leaves the box by a side before the slab's end: by a midpoint rule over
@@ -82,7 +45,7 @@ TEST(slabs_are_seen_by_every_set_of_directions) {
                 for (int k = 0; k < 4; k++) worst = fmax(worst, fabs((double)v[k] - expected[k]));
                 printf(" %s %.2g", sphere_name[s], worst);
                 CHECK(worst < (opaque ? 0.07 : 0.03), "%s, %d rays, method %d: %g %g %g %g, not %g %g %g %g", sphere_name[s],
-                      dvr->desc.directions, method, (double)v[0], (double)v[1], (double)v[2], (double)v[3], expected[0], expected[1],
+                      desc.directions, method, (double)v[0], (double)v[1], (double)v[2], (double)v[3], expected[0], expected[1],
                       expected[2], expected[3]);
                 isogi_dvr_free(dvr);
             }
@@ -259,45 +222,6 @@ TEST(what_is_read_after_a_change_counts_against_the_budget) {
         }
         CHECK(!memcmp(v[0], v[1], sizeof v[0]) && !memcmp(v[0], v[2], sizeof v[0]), "method %d: steps end elsewhere", method);
         CHECK(v[0][13][0] > 0.1f && v[0][13][0] < 3.4f, "method %d: %g in the middle", method, (double)v[0][13][0]);
-    }
-    field_free(&f);
-}
-
-static size_t all_tasks;
-static void summed_for(void *user, size_t n, void (*task)(void *, size_t), void *arg) { all_tasks += n, counted_for(user, n, task, arg); }
-
-/* Blocks that a transparent function drops are not read, between functions or at first; a function that shows them has them read. */
-TEST(what_is_transparent_is_not_read) {
-    field f = field_noise(65, 4);
-    const isogi_context context = {.parallel_for = summed_for, .threads = 1};
-    const isogi_transfer_point a[] = {{-1, {1, 1, 1}, 0}, {1, {1, 1, 1}, 0}}, b[] = {{-0.5, {1, 1, 1}, 0}, {0.8, {1, 1, 1}, 0.2f}},
-                               c[] = {{-0.7, {1, 1, 1}, 0}, {0.6, {1, 1, 1}, 0.2f}};
-    const isogi_transfer clear = {a, 2, NULL, 0}, first = {b, 2, NULL, 0}, second = {c, 2, NULL, 0};
-    const isogi_dvr_desc desc = {.pyramid = f.pyramid, .shading = ISOGI_DVR_VISIBILITY, .method = ISOGI_DVR_PAPER, .order = 2,
-        .directions = 16, .grid = {5, 5, 5}, .reduction = 20};
-    const float place[] = {32, 32, 32};
-    float v[2][4];
-    for (int before = 0; before < 3; before++) { /* nothing; a function whose voxels are read in part; one that is done */
-        isogi_dvr *dvr = dvr_new_with(&desc, before ? &first : &clear, &context), *fresh = dvr_new_with(&desc, &second, &context);
-        double remaining = 1;
-        CHECK(!before || isogi_dvr_step(dvr, before == 1, NULL) == ISOGI_OK, "step");
-        const size_t counted = dvr->blocks.counted;
-        CHECK(counted == (before == 0 ? 0u : before == 1 ? 1u : dvr->blocks.total) &&
-            isogi_dvr_set_transfer(dvr, &clear) == ISOGI_OK, "%zu blocks read", counted);
-        all_tasks = 0;
-        CHECK(isogi_dvr_step(dvr, 1, &remaining) == ISOGI_OK && !(remaining > 0), "transparent: %g left", remaining);
-        /* data laid out for five levels, of no block */
-        CHECK(dvr->blocks.counted == counted && all_tasks <= 5 * dvr->blocks.total && !dvr->blocks.data_count, "%zu tasks for %zu blocks",
-              all_tasks, dvr->blocks.total);
-        CHECK(isogi_dvr_set_transfer(dvr, &second) == ISOGI_OK && isogi_dvr_step(dvr, 0, NULL) == ISOGI_OK &&
-                  isogi_dvr_step(fresh, 0, NULL) == ISOGI_OK,
-              "step");
-        CHECK(isogi_dvr_sample_visibility(dvr, &place, 1, v[0]) == ISOGI_OK &&
-                  isogi_dvr_sample_visibility(fresh, &place, 1, v[1]) == ISOGI_OK,
-              "sample");
-        CHECK(dvr->blocks.counted == dvr->blocks.total && !memcmp(v[0], v[1], sizeof v[0]) && v[0][0] < 3.4f, "%g, not %g", (double)v[0][0],
-              (double)v[1][0]);
-        isogi_dvr_free(dvr), isogi_dvr_free(fresh);
     }
     field_free(&f);
 }

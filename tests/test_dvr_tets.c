@@ -60,7 +60,6 @@ static double linear(double x, double y, double z) { return slope[0] * x + slope
 
 static const isogi_transfer_point ramp[] = {
     {-2, {1, 0.2f, 0.1f}, 0}, {-0.5, {0.3f, 1, 0.1f}, 2}, {0.1, {0.1f, 0.4f, 1}, 0}, {0.2, {0.1f, 0.4f, 1}, 1}, {2, {1, 0, 1}, 3}};
-static const isogi_peak sheets[] = {{0.3, {1, 1, 1}, 0.4f}, {-0.4, {0, 1, 0}, 0.2f}};
 static const isogi_transfer both = {ramp, 5, sheets, 2};
 
 /* A linear field is the same in tetrahedra and in the cells that they were cut from: pictures of the lattice, exact in data space, and
@@ -283,22 +282,115 @@ TEST(degenerate_and_crowded_tetrahedra_are_reported) {
     mesh_free(&m);
 }
 
+/* The mesh, and once more with points of its own, `shift` along x. */
+static mesh twice(mesh m, double shift) {
+    size_t n = m.view.point_count, count = m.view.tet_count;
+    mesh two = {(float(*)[3])malloc(2 * n * sizeof(float[3])), (float *)malloc(2 * n * sizeof(float)),
+                (uint32_t(*)[4])malloc(2 * count * sizeof(uint32_t[4])), {0}, NULL, {0}};
+    for (size_t i = 0; i < 2 * n; i++) {
+        for (int a = 0; a < 3; a++) two.points[i][a] = (float)((double)m.points[i % n][a] + (i >= n && a == 0 ? shift : 0));
+        two.values[i] = m.values[i % n];
+    }
+    for (size_t i = 0; i < 2 * count; i++)
+        for (int k = 0; k < 4; k++) two.tets[i][k] = m.tets[i % count][k] + (i >= count ? (uint32_t)n : 0);
+    mesh_free(&m);
+    two.view = (isogi_tet_mesh){(const float(*)[3])two.points, two.values, 2 * n, (const uint32_t(*)[4])two.tets, 2 * count};
+    return two;
+}
+
+/* Grey of extinction 1/2 everywhere, physical space: along every ray of a picture, opacity is that of its length in the box `high`; returns
+   how many pixels differ by more than `error`. */
+static int wrong_in_fog(const isogi_tets *tets, const float eye[3], const float target[3], const double high[3], double error) {
+    enum { SIDE = 12 };
+    const isogi_transfer_point medium = {0, {1, 1, 1}, 0.5f};
+    const isogi_transfer fog = {&medium, 1, NULL, 0};
+    const isogi_tet_desc desc = {.opaque = 1};
+    const isogi_view view = {.width = SIDE, .height = SIDE, .fov = 40, .eye = {eye[0], eye[1], eye[2]},
+                             .target = {target[0], target[1], target[2]}};
+    float image[SIDE * SIDE][4];
+    int wrong = 0;
+    CHECK(isogi_dvr_tets_render(tets, &desc, &fog, &view, image, NULL, NULL) == ISOGI_OK, "render");
+    for (int i = 0; i < SIDE * SIDE; i++) {
+        double o[3], from = 0, to = 1e30;
+        float d[3];
+        isogi_view_ray(&view, i % SIDE, i / SIDE, o, d);
+        for (int a = 0; a < 3; a++) {
+            double t0 = -o[a] / (double)d[a], t1 = (high[a] - o[a]) / (double)d[a];
+            from = fmax(from, fmin(t0, t1)), to = fmin(to, fmax(t0, t1));
+        }
+        wrong += fabs((double)image[i][3] + (to > from ? expm1(-0.5 * (to - from)) : 0)) > error;
+    }
+    return wrong;
+}
+
+static const float outside[3] = {-5.1f, 4.9f, 6.07f}, within[3] = {0.33f, 1.91f, 1.07f}, corner[3] = {1, 2, 1};
+static const float ahead[3] = {4.1f, 1.45f, 1.55f};
+
+/* Nothing is lost between blocks with points of their own that touch, leave a gap or overlap by a rounding, whichever the eye is in; nor
+   where every tetrahedron has points of its own and the eye is on one of them. */
+TEST(parts_that_touch_or_overlap_are_seen_to_the_end) {
+    const double overlaps[] = {0, -1e-6, 1e-7, 1e-6, 1e-5, 1e-3};
+    slope[0] = slope[1] = slope[2] = 0;
+    for (int i = 0; i < 12; i++) {
+        double overlap = overlaps[i / 2];
+        mesh m = twice(lattice_mesh(4, linear, NULL), i % 2 ? 3 - overlap : overlap - 3);
+        for (size_t k = 0; k < m.view.point_count; k++) m.points[k][0] += i % 2 ? 0 : (float)(3 - overlap); /* in either order */
+        mesh_build(&m);
+        const double high[3] = {6 - overlap, 3, 3};
+        const float *eyes[3] = {outside, within, corner};
+        for (int e = 0; e < 3; e++) {
+            int wrong = wrong_in_fog(m.built, eyes[e], ahead, high, 1e-5);
+            CHECK(wrong == 0, "overlap %g, order %d, eye %d: %d pixels wrong", overlap, i % 2, e, wrong);
+        }
+        mesh_free(&m);
+    }
+    mesh m = lattice_mesh(4, linear, NULL);
+    size_t n = m.view.tet_count;
+    mesh apart = {(float(*)[3])malloc(4 * n * sizeof(float[3])), (float *)calloc(4 * n, sizeof(float)),
+                  (uint32_t(*)[4])malloc(n * sizeof(uint32_t[4])), {0}, NULL, {0}};
+    for (size_t i = 0; i < 4 * n; i++)
+        memcpy(apart.points[i], m.points[m.tets[i / 4][i % 4]], sizeof *apart.points), apart.tets[i / 4][i % 4] = (uint32_t)i;
+    apart.view = (isogi_tet_mesh){(const float(*)[3])apart.points, apart.values, 4 * n, (const uint32_t(*)[4])apart.tets, n};
+    mesh_free(&m), mesh_build(&apart);
+    const double high[3] = {3, 3, 3};
+    int wrong[3] = {wrong_in_fog(apart.built, outside, ahead, high, 1e-5), wrong_in_fog(apart.built, within, ahead, high, 1e-5),
+                    wrong_in_fog(apart.built, corner, ahead, high, 1e-5)};
+    CHECK(wrong[0] + wrong[1] + wrong[2] == 0, "all apart: %d, %d, %d pixels wrong", wrong[0], wrong[1], wrong[2]);
+    mesh_free(&apart);
+}
+
+/* Tetrahedra that occur twice, turned or not, are seen once; a thousand copies of one take no longer than a thousand tetrahedra. */
+TEST(tetrahedra_listed_twice_are_seen_once) {
+    const char *what[] = {"next to each other", "all, then all again", "every tenth", "one", "a thousand of one"};
+    slope[0] = slope[1] = slope[2] = 0;
+    for (int c = 0; c < 5; c++) {
+        mesh m = lattice_mesh(4, linear, NULL);
+        size_t count = m.view.tet_count, n = 0;
+        uint32_t(*tets)[4] = (uint32_t(*)[4])malloc((2 * count + 1000) * sizeof *tets);
+        for (size_t i = 0; i < (c == 1 ? 2 : 1) * count; i++) {
+            size_t copies = c == 0 || (c == 2 && i % 10 == 0) || (c == 3 && i == 77) ? 2 : c == 4 && i == 77 ? 1000 : 1;
+            for (size_t k = 0; k < copies; k++, n++) {
+                memcpy(tets[n], m.tets[i % count], sizeof *tets);
+                if (k % 2) tets[n][0] = m.tets[i][1], tets[n][1] = m.tets[i][0]; /* turned inside out */
+            }
+        }
+        free(m.tets), m.tets = tets, m.view.tets = (const uint32_t(*)[4])tets, m.view.tet_count = n;
+        mesh_build(&m);
+        const double high[3] = {3, 3, 3};
+        int wrong[2] = {wrong_in_fog(m.built, outside, ahead, high, 1e-5), wrong_in_fog(m.built, within, ahead, high, 1e-5)};
+        CHECK(m.report.crowded == 4 * (n - count), "%s: %zu faces crowded", what[c], m.report.crowded);
+        CHECK(wrong[0] + wrong[1] == 0, "%s: %d and %d pixels wrong", what[c], wrong[0], wrong[1]);
+        mesh_free(&m);
+    }
+}
+
 /* Two blocks whose points coincide without being the same: the seam shows nothing, and a peak that lies in it is crossed once. */
 TEST(blocks_that_touch_look_as_one) {
     slope[0] = 1, slope[1] = 0.2, slope[2] = 0.1;
     mesh m = lattice_mesh(4, linear, NULL);
-    size_t n = m.view.point_count, count = m.view.tet_count;
-    float(*points)[3] = (float(*)[3])malloc(2 * n * sizeof *points), *values = (float *)malloc(2 * n * sizeof *values);
-    uint32_t(*tets)[4] = (uint32_t(*)[4])malloc(2 * count * sizeof *tets);
-    for (size_t i = 0; i < 2 * n; i++) {
-        for (int a = 0; a < 3; a++) points[i][a] = m.points[i % n][a] + (i >= n && a == 0 ? 3.0f : 0.0f);
-        values[i] = points[i][0] / 3 + 0.1f * points[i][1] + (i >= n ? 5e-7f : 0.0f); /* a step in the seam, of rounding's size */
-    }
-    for (size_t i = 0; i < 2 * count; i++)
-        for (int k = 0; k < 4; k++) tets[i][k] = m.tets[i % count][k] + (i >= count ? (uint32_t)n : 0);
-    free(m.points), free(m.values), free(m.tets);
-    m.points = points, m.values = values, m.tets = tets;
-    m.view = (isogi_tet_mesh){(const float(*)[3])points, values, 2 * n, (const uint32_t(*)[4])tets, 2 * count};
+    m = twice(m, 3);
+    for (size_t i = 0; i < m.view.point_count; i++) /* with a step in the seam, of rounding's size */
+        m.values[i] = m.points[i][0] / 3 + 0.1f * m.points[i][1] + (i >= m.view.point_count / 2 ? 5e-7f : 0.0f);
     mesh_build(&m);
     test_random r = {4};
     for (int i = 0; i < 100; i++) {

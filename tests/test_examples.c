@@ -1,29 +1,60 @@
 /* The example programs as their users meet them: they run, and everything that is wrong is one clear line, an exit code other than 0 and
-   no change to any file. The viewer has a file of its own. */
+   no change to any file. The viewer has a file of its own. FLAGS: -O0 */
 #include "isogi_vol.h"
 #include "png.h"
 #include "procedural.h"
 #include "programs.h"
 
 TEST(programs_without_arguments_run) {
-    static const char *const names[] = {"bake_points", "isosurface_rays", "procedural_rays", "sh_light", "volume_shadows"};
-    for (size_t i = 0; i < sizeof names / sizeof *names; i++) {
+    static const char *const names[] = {
+        "bake_points", "isosurface_rays", "procedural_rays", "sh_light", "volume_shadows", "gather_field", "gather_tets"};
+    for (size_t i = 0; i < (LONG_SUITE ? 7 : 5); i++) { /* the last two take seconds */
         char path[64];
         snprintf(path, sizeof path, "build/%s", names[i]);
         run_result r = run_program(path, "");
         CHECK(r.status == 0 && !*r.error && strlen(r.output) > 20, "%s: status %d, %s", names[i], r.status, r.error);
     }
+    for (size_t i = 0; i < 7; i++) {
+        char path[64];
+        snprintf(path, sizeof path, "build/%s", names[i]);
+        check_refusal(path, i % 2 ? "--help" : "volume.raw", 2, "usage");
+    }
 }
 
 TEST(meshes_are_written) {
-    char arguments[300], text[64];
+    char arguments[300], text[64], old[256];
+    strcpy(old, temporary("old.obj"));
+    write_bytes(old, "do not touch", 12);
+    CHECK(link(old, temporary("a.obj")) == 0, "link"); /* a second name: the file is replaced as a whole, not written over */
     snprintf(arguments, sizeof arguments, "'%s'", temporary("a.obj"));
     run_result r = run_program("build/mesh_obj", arguments);
     CHECK(r.status == 0 && strstr(r.output, "closed"), "status %d: %s", r.status, r.error);
     CHECK(read_text(temporary("a.obj"), text, sizeof text) && !strncmp(text, "v ", 2), "begins with %s", text);
+    CHECK(read_text(old, text, sizeof text) == 12 && !strcmp(text, "do not touch"), "the file that was there is written over: %s", text);
     check_refusal("build/mesh_obj", "--help", 2, "usage");
     check_refusal("build/mesh_obj", "a.obj b.obj", 2, "usage");
-    check_refusal("build/mesh_obj", "/nowhere/a.obj", 1, "/nowhere/a.obj: No such file");
+    check_refusal("build/mesh_obj", "/nowhere/a.obj", 1, "/nowhere/a.obj: cannot be written: No such file");
+}
+
+/* A link that leads nowhere yet stays a link: the file is made where it leads. One that leads to itself is an error. */
+TEST(links_to_files_yet_to_come_are_followed) {
+    static const unsigned char pixel[3] = {1, 2, 3};
+    char arguments[600], text[64], error[FILE_ERROR_SIZE], picture[256];
+    struct stat status;
+    strcpy(picture, temporary("pixel.png"));
+    CHECK(png_write(picture, pixel, 1, 1, 3, error), "%s", error);
+    CHECK(symlink("link2", temporary("link1")) == 0 && symlink("target", temporary("link2")) == 0, "symlink");
+    snprintf(arguments, sizeof arguments, "'%s' '%s'", temporary("link1"), picture);
+    run_result r = run_program("build/strip", arguments);
+    CHECK(r.status == 0, "status %d: %s", r.status, r.error);
+    CHECK(readlink(temporary("link1"), text, sizeof text) == 5 && readlink(temporary("link2"), text, sizeof text) == 6, "links are gone");
+    CHECK(lstat(temporary("target"), &status) == 0 && S_ISREG(status.st_mode) && status.st_size > 50, "nothing is where they led");
+    CHECK(symlink("ring", temporary("ring")) == 0, "symlink");
+    snprintf(arguments, sizeof arguments, "'%s' '%s'", temporary("ring"), picture);
+    check_refusal("build/strip", arguments, 1, "ring: Too many levels");
+    CHECK(symlink("to_be", temporary("link3")) == 0, "symlink");
+    snprintf(arguments, sizeof arguments, "procedural:gyroid:8 --samples 1 --raw '%s' --out '%s'", temporary("to_be"), temporary("link3"));
+    check_refusal("build/bake", arguments, 1, "is the file of --out");
 }
 
 /* Every refusal leaves the file named as output as it was. */
@@ -130,7 +161,10 @@ TEST(strips_hold_their_pictures) {
     check_kept("build/strip", "'%s'", 2, "usage");
     check_kept("build/strip", "'%s' /nowhere.png", 1, "/nowhere.png: No such file");
     check_kept("build/strip", "'%s' tests/test.h", 1, "tests/test.h: is not a PNG file");
-    check_kept("build/strip", "'%s' examples/gyroid.png examples/figure-6.png", 1, "of another height");
+    check_kept("build/strip", "'%s' examples/gyroid.png examples/figure-6.png", 1, "pixels high, the first");
+    CHECK(png_write(temporary("alpha.png"), pixels[0], 2, 2, 4, error), "%s", error);
+    snprintf(arguments, sizeof arguments, "'%%s' '%s'", temporary("alpha.png"));
+    check_kept("build/strip", arguments, 1, "has an alpha channel");
 }
 
 TEST(bad_bakes_get_one_line) {

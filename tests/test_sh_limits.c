@@ -5,6 +5,7 @@
 #define ISOGI_SH_IMPLEMENTATION
 #include "isogi_sh.h"
 #include "reference_sh.h"
+#include "stack.h"
 #include "test.h"
 
 static const double pi = 3.14159265358979323846;
@@ -39,20 +40,11 @@ static void turn_zonal(int order, const float v[3]) {
 /* zonal = that of 1 within `angle` of the axis: Y_l^0 integrated over z by 64 Gauss-Legendre nodes, exact to degree 127 */
 static void cone_zonal(int order, double angle) {
     double below = 2 * sin(angle / 2) * sin(angle / 2); /* the part of z from 1 down */
+    long double node[64], share[64];
     for (int l = 0; l < order; l++) zonal[l] = 0;
+    reference_nodes(node, share, 64);
     for (int i = 0; i < 64; i++) {
-        long double x = cosl(3.14159265358979323846264L * ((long double)i + 0.75L) / 64.5L), slope = 1, p, before;
-        for (int round = 0; round < 12; round++) {
-            p = 1, before = 0;
-            for (int k = 0; k < 64; k++) {
-                long double next = ((long double)(2 * k + 1) * x * p - (long double)k * before) / (long double)(k + 1);
-                before = p, p = next;
-            }
-            slope = 64 * (before - x * p) / (1 - x * x);
-            x -= p / slope;
-        }
-        long double z = 1 - (long double)below * (1 - x) / 2, weight = (long double)below / ((1 - x * x) * slope * slope);
-        p = 1, before = 0;
+        long double z = 1 - (long double)below * (1 - node[i]) / 2, weight = (long double)below * share[i] / 2, p = 1, before = 0;
         for (int l = 0; l < order; l++) {
             long double next = ((long double)(2 * l + 1) * z * p - (long double)l * before) / (long double)(l + 1);
             zonal[l] +=
@@ -206,19 +198,10 @@ enum { NODES = 160 };
 /* nodes and weights on [0,1] */
 static const double (*gauss(int n))[2] {
     static double rules[NODES][NODES][2];
-    for (int i = 0; i < n && !(rules[n][n - 1][1] > 0); i++) {
-        double x = cos(pi * (i + 0.75) / (n + 0.5)), slope = 1;
-        for (int round = 0; round < 12; round++) {
-            double p = 1, before = 0;
-            for (int k = 0; k < n; k++) {
-                double next = ((2 * k + 1) * x * p - k * before) / (k + 1);
-                before = p, p = next;
-            }
-            slope = n * (before - x * p) / (1 - x * x);
-            x -= p / slope;
-        }
-        rules[n][i][0] = 0.5 * (1 - x), rules[n][i][1] = 1 / ((1 - x * x) * slope * slope);
-    }
+    long double node[NODES], weight[NODES];
+    if (rules[n][n - 1][1] > 0) return (const double(*)[2])rules[n];
+    reference_nodes(node, weight, n);
+    for (int i = 0; i < n; i++) rules[n][i][0] = (double)(0.5L * (1 - node[i])), rules[n][i][1] = (double)(0.5L * weight[i]);
     return (const double(*)[2])rules[n];
 }
 
@@ -714,10 +697,8 @@ TEST(fits_of_any_order) {
 
 /* ---- the stack: what the header promises ---- */
 
-#if defined(__linux__) && defined(__OPTIMIZE__) && !TEST_SANITIZED
-#include <pthread.h>
-
-enum { STACK = 1 << 18, MANY = 67, WIDE = 48, HIGH = 24, TURNED = 22 }; /* matrices of more take minutes and megabytes */
+#if STACK_MEASURED
+enum { MANY = 67, WIDE = 48, HIGH = 24, TURNED = 22 }; /* matrices of more take minutes and megabytes */
 
 static float many[N * MANY], image[WIDE * HIGH * 3], directions[MANY][3], coordinates[3][MANY], turn[ISOGI_SH_ROTATION_COUNT(TURNED)];
 static double many_f64[N * MANY], directions_f64[MANY][3], coordinates_f64[3][MANY], turn_f64[ISOGI_SH_ROTATION_COUNT(TURNED)];
@@ -783,40 +764,6 @@ static void use_lights(int order) {
     isogi_sh_cone(d, order, directions[0], 0.4, rgb), isogi_sh_gradient_sky(d, order, directions[0], rgb, rgb),
         isogi_sh_hemisphere_sky(d, order, directions[0], rgb, rgb);
     isogi_sh_dominant_direction(v, rgb, d, order), isogi_sh_fit_directional(v, rgb, ambient, d, order);
-}
-
-typedef struct stack_use {
-    void (*run)(int order);
-    int order;
-    uintptr_t top;
-} stack_use;
-
-static void *on_a_stack(void *user) {
-    stack_use *u = (stack_use *)user;
-    volatile unsigned char here = 0;
-    u->top = (uintptr_t)&here;
-    if (u->run) u->run(u->order);
-    return NULL;
-}
-
-/* Bytes below the caller's frame that a call wrote to; each is made once before, so that the linker's part of a first
-   call does not count. */
-static size_t stack_of(void (*run)(int order), int order) {
-    static unsigned char memory[STACK] __attribute__((aligned(65536)));
-    stack_use u = {run, order, 0};
-    pthread_attr_t attributes;
-    pthread_t thread;
-    size_t lowest = 0;
-    int started;
-    run(order);
-    memset(memory, 0xa5, sizeof memory);
-    pthread_attr_init(&attributes);
-    started = !pthread_attr_setstack(&attributes, memory, sizeof memory) && !pthread_create(&thread, &attributes, on_a_stack, &u);
-    CHECK(started, "order %d: no thread", order);
-    if (started) pthread_join(thread, NULL);
-    pthread_attr_destroy(&attributes);
-    while (lowest < STACK && memory[lowest] == 0xa5) lowest++;
-    return u.top ? (size_t)(u.top - (uintptr_t)memory) - lowest : STACK;
 }
 
 TEST(stack_below_32_kilobytes) {

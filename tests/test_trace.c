@@ -887,7 +887,7 @@ TEST(every_allocation_may_fail) {
         if (variant < 2)
             memset(&d.lighting.env, 0, sizeof d.lighting.env), d.lighting.env.rgb = &image[0][0][0],
             d.lighting.env.width = 16, d.lighting.env.height = 8;
-        for (k = 1; k < 5000; k += LONG_SUITE ? 1 : 3) {
+        for (k = 1; k < 5000; k += LONG_SUITE ? 1 : 5) {
             /* room for a brick's values that is lacking once is asked for again in the same step: that may end well */
             f.calls = 0, f.fail_at = k;
             if (survives(&s, &d, &f, (const float(*)[3])points, 20) && f.calls < k) break;

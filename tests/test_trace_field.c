@@ -318,4 +318,30 @@ TEST(nonsense_is_survived_and_bad_arguments_refused) {
           "offset %d", -1);
 }
 
+/* The k-th allocation fails, for every k, those of an environment's image among them: nothing is written, nothing leaks. */
+TEST(every_allocation_may_fail) {
+    static float image[8][16][3];
+    double q[5] = {16, 16, 16, 4, 6};
+    analytic a = {ball_over_plane, q, 32, 0.25};
+    float points[8][3], normals[8][3];
+    int done = 0, n = analytic_points(&a, 8, 6, points, normals);
+    for (int i = 0; i < 128; i++) image[i / 16][i % 16][0] = image[i / 16][i % 16][1] = image[i / 16][i % 16][2] = i == 37 ? 900 : 1;
+    for (long k = 0; !done && k < 1000; k++) {
+        scarce memory = {k, 0};
+        isogi_context context = {.alloc = scarce_alloc, .release = scarce_release, .user = &memory, .threads = 1};
+        isogi_trace_desc d = {.lighting.env = {.rgb = &image[0][0][0], .width = 16, .height = 8},
+            .samples = 4, .bounces = 1, .offset = 1e-4f};
+        float e[8][3], error[8], before[8][3];
+        memset(e, 0x5a, sizeof e), memset(error, 0x5a, sizeof error), memcpy(before, e, sizeof e);
+        isogi_result result = isogi_trace_gather_field(&d, analytic_intersect, &a, (const float(*)[3])points, (const float(*)[3])normals,
+                                                       (size_t)n, e, error, &context);
+        done = result == ISOGI_OK;
+        if (done) CHECK(n == 8 && k > 1 && memory.left >= 0 && e[0][0] > 0.1f, "%ld allocations, E %g", k, (double)e[0][0]);
+        else CHECK(result == ISOGI_NO_MEMORY && !memcmp(e, before, sizeof e) && !memcmp(error, before, sizeof error),
+                   "allocation %ld: %s, or something was written", k, isogi_result_string(result));
+        CHECK(memory.blocks == 0, "allocation %ld: %ld blocks leak", k, memory.blocks);
+    }
+    CHECK(done, "there are more allocations, %d", done);
+}
+
 TEST_MAIN("trace_field")

@@ -245,6 +245,23 @@ static double thin(const double p[3], const double *q) {
     return in > 0 && (q[0] < 1 ? flat : q[0] < 2 ? sum >= 31 && sum <= 31 : line) ? 1 : -1;
 }
 
+/* Seen from within, a maximum one voxel thick has nothing to be looked at through: as texels there, points of the caller's own are without
+   light, whether normals are theirs or not. In front of it, on a surface of lower value, there is some. */
+TEST(no_light_within_a_sheet_of_one_voxel) {
+    const double q[1] = {0};
+    const float points[2][3] = {{16, 10.3f, 12.7f}, {15.5f, 10.3f, 12.7f}}, normals[2][3] = {{-1, 0, 0}, {-1, 0, 0}};
+    scene s = scene_make(32, 32, 32, NULL, thin, q);
+    for (int given = 0; given < 2; given++) {
+        isogi_trace_desc d = desc_make(&s, 0, 0, 32);
+        float e[2][3], error[2];
+        d.sides = ISOGI_TRACE_HIGH_SIDE;
+        CHECK(isogi_trace_gather(&d, points, given ? normals : NULL, 2, e, error, NULL) == ISOGI_OK, "gather");
+        CHECK(!test_finite((double)error[0]) && e[0][1] <= 0, "given %d: light %g with error %g", given, (double)e[0][1], (double)error[0]);
+        CHECK(error[1] < 10, "given %d: in front, light %g with error %g", given, (double)e[1][1], (double)error[1]);
+    }
+    scene_free(&s);
+}
+
 /* Sheets and rods one voxel thick, straight and slanted: the smoothed gradient vanishes in all of their voxels, and the trilinear ones of
    both sides cancel. Every point that is seen from outside has light: pi, since nothing hides the sky. */
 TEST(sheets_and_rods_of_one_voxel_have_light) {

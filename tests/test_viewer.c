@@ -1,7 +1,8 @@
 /* The viewer as its users meet it: pictures that stay the same, and one clear line for everything that is wrong.
 
    The program is run as a process: build/viewer, or what ISOGI_VIEWER names. Files are made in a folder of their own below /tmp.
-   ISOGI_GOLDEN=write makes the pictures in tests/golden anew instead of comparing with them: look at them before committing. */
+   ISOGI_GOLDEN=write makes the pictures in tests/golden anew instead of comparing with them: look at them before committing.
+   FLAGS: -O0 */
 #define ISOGI_VOL_IMPLEMENTATION
 #include "isogi_vol.h"
 #include "test.h"
@@ -165,7 +166,7 @@ TEST(every_lookup_draws_a_picture_of_its_own) {
     size_t size[5];
     for (int i = 0; i < 5; i++) {
         const char *out = temporary("lookup.png");
-        snprintf(command, sizeof command, "procedural:gyroid:32 --samples 8 --size 64x48 %s --out '%s'", names[i], out);
+        snprintf(command, sizeof command, "procedural:gyroid:20 --samples 4 --size 64x48 %s --out '%s'", names[i], out);
         CHECK(run_viewer(command).status == 0, "%s", command);
         size[i] = read_text(out, text[i], sizeof text[i]);
     }
@@ -185,7 +186,7 @@ TEST(gloss_of_transfer_adds_highlights) {
     for (int i = 0; i < 3; i++) {
         const char *out = temporary("gloss.png");
         int shape[3];
-        snprintf(command, sizeof command, "procedural:gyroid:32 --mode transfer --samples 8 --size 64x48 --exposure 0.3 %s --out '%s'",
+        snprintf(command, sizeof command, "procedural:gyroid:24 --mode transfer --samples 4 --size 64x48 --exposure 0.3 %s --out '%s'",
                  names[i], out);
         CHECK(run_viewer(command).status == 0, "%s", command);
         picture[i] = read_picture(out, shape);
@@ -651,6 +652,10 @@ TEST(bad_environments_and_transfer_functions_get_one_line) {
     }
     check_refused("procedural:gyroid:8 --env /nowhere/at/all.hdr", "/nowhere/at/all.hdr");
     check_refused("procedural:gyroid:8 --mode dvr --tf /nowhere.txt", "/nowhere.txt");
+    static const unsigned char dark[80000];
+    write_bytes(temporary("long_20000x2x2_uint8.raw"), dark, sizeof dark);
+    snprintf(command, sizeof command, "'%s' --mode dvr --step 0.001 --size 8x8", temporary("long_20000x2x2_uint8.raw"));
+    check_refused(command, "--step: samples on a ray: too large");
 }
 
 TEST(an_existing_file_survives_every_failure) {

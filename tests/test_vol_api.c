@@ -226,6 +226,66 @@ TEST(bundles_have_the_bits_of_single_rays) {
     CHECK(found > 5000, "only %ld hits", found);
 }
 
+/* All hits of a bundle: those of rays of their own, and from a start those of a chain of continued rays;
+   and more than there is room for. */
+TEST(bundles_have_all_hits_of_single_rays) {
+    enum { RAYS = 75, MOST = 12 };
+    static float dirs[RAYS][3];
+    static isogi_hit hits[RAYS][MOST];
+    static size_t counts[RAYS];
+    test_random r = {44};
+    long found = 0, wrong = 0, cut = 0;
+    for (int v = 0; v < 12; v++) {
+        field f = field_new(20, 21, 22);
+        field_fill(&f, v % KINDS, &r);
+        field_build(&f);
+        for (int turn = 0; turn < 8; turn++) {
+            isogi_ray ray = random_ray(&f, v % KINDS == QUANTISED ? 0 : random_range(&r, -0.5, 0.5), &r);
+            isogi_hit start = {0};
+            isogi_bundle bundle = {.isovalue = ray.isovalue, .flags = (uint32_t)(turn & 1), .tmax = turn % 3 ? 0 : 7};
+            const size_t count = turn % 4 ? RAYS : (size_t)v % 40, room = turn & 4 ? MOST : 2;
+            memcpy(bundle.origin, ray.origin, sizeof bundle.origin);
+            isogi_vol_intersect(f.pyramid, &ray, 1, &start, NULL);
+            if (turn & 2 && start.side) bundle.start = &start;
+            else bundle.tmin = turn & 4 ? 1.5 : 0;
+            for (int i = 0; i < RAYS; i++) {
+                double d[3];
+                random_direction(&r, d);
+                for (int a = 0; a < 3; a++) dirs[i][a] = bundle.start || i % 2 ? (float)d[a] : ray.dir[a] + 0.2f * (float)d[a];
+            }
+            CHECK(isogi_vol_bundle_all(f.pyramid, &bundle, (const float(*)[3])dirs, count, room, hits[0], counts, NULL) == ISOGI_OK,
+                  "all hits");
+            for (size_t i = 0; i < count; i++) {
+                const isogi_hit *own = hits[0] + i * room;
+                isogi_hit expected[MOST];
+                size_t n = 0;
+                if (bundle.start) {
+                    isogi_hit next = start;
+                    double left = bundle.tmax > 0 ? bundle.tmax : HUGE_VAL, t = 0;
+                    while (n <= room && left > 0) {
+                        const isogi_hit from = next;
+                        isogi_vol_continue(f.pyramid, &from, (const float(*)[3])dirs + i, &left, bundle.isovalue,
+                                           bundle.flags | (n ? (uint32_t)ISOGI_RAY_ONWARD : 0), 1, &next, NULL);
+                        if (!next.side) break;
+                        t += next.t, next.t = t, left = bundle.tmax > 0 ? bundle.tmax - t : HUGE_VAL;
+                        if (n < room) expected[n] = next;
+                        n++;
+                    }
+                } else {
+                    isogi_ray one = {.flags = bundle.flags, .tmin = bundle.tmin, .tmax = bundle.tmax, .isovalue = bundle.isovalue};
+                    memcpy(one.origin, bundle.origin, sizeof one.origin), memcpy(one.dir, dirs[i], sizeof one.dir);
+                    isogi_vol_intersect_all(f.pyramid, &one, 1, room, expected, &n, NULL);
+                }
+                wrong += counts[i] != n, cut += n > room;
+                for (size_t k = 0; k < n && k < room && counts[i] == n; k++) wrong += !same_hit(&expected[k], &own[k]), found++;
+            }
+        }
+        field_free(&f);
+    }
+    CHECK(wrong == 0, "%ld differ, of %ld hits", wrong, found);
+    CHECK(found > 5000 && cut > 100, "%ld hits, %ld rays with more than there is room for: the test says little", found, cut);
+}
+
 /* Rays of a bundle that begin inside the volume share the way to their first leaf, unless they leave it at once: where they begin on planes
    between blocks, or on the border, some of them do. */
 TEST(bundles_that_begin_on_planes_between_blocks_have_the_bits_of_single_rays) {
@@ -266,8 +326,8 @@ TEST(bundles_that_begin_on_planes_between_blocks_have_the_bits_of_single_rays) {
         }
         field_free(&f);
     }
-    printf("    %ld hits, %ld misses, %ld wrong; blocks a ray %.2f shared, %.2f alone\n", found, missed, wrong, (double)shared.blocks / (double)shared.rays,
-           (double)single.blocks / (double)single.rays);
+    printf("    %ld hits, %ld misses, %ld wrong; blocks a ray %.2f shared, %.2f alone\n", found, missed, wrong,
+           (double)shared.blocks / (double)shared.rays, (double)single.blocks / (double)single.rays);
     CHECK(wrong == 0, "%ld of %ld differ", wrong, found + missed);
     CHECK(found > 5000 && missed > 500, "%ld hits, %ld misses: the test says little", found, missed);
     CHECK(shared.rays == single.rays, "rays are counted otherwise");

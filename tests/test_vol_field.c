@@ -311,4 +311,34 @@ TEST(what_needs_voxels_refuses_a_function) {
     CHECK(isogi_vol_build_field(&none, &bad, NULL) == ISOGI_TOO_LARGE && !none, "too many cells");
 }
 
+/* ---- memory ---- */
+
+typedef struct scarce { long left, blocks; } scarce; /* allocation number `left` fails */
+static void *scarce_alloc(void *user, size_t size, size_t align) {
+    scarce *m = (scarce *)user;
+    void *p = NULL;
+    if (m->left-- == 0 || posix_memalign(&p, align < sizeof(void *) ? sizeof(void *) : align, size)) return NULL;
+    m->blocks++;
+    return p;
+}
+static void scarce_release(void *user, void *p, size_t size) { (void)size, ((scarce *)user)->blocks--, free(p); }
+
+TEST(building_survives_every_failing_allocation) {
+    function f = {.radius = 1};
+    isogi_field field = {.value = ball, .user = &f, .hessian = 2, .low = {-1, -1, -1}, .high = {1, 1, 1}, .cells = {9, 9, 9}};
+    int done = 0;
+    for (long k = 0; !done && k < 100; k++) {
+        scarce memory = {k, 0};
+        isogi_context context = {.alloc = scarce_alloc, .release = scarce_release, .user = &memory, .threads = 1};
+        isogi_pyramid *p = NULL;
+        isogi_result result = isogi_vol_build_field(&p, &field, &context);
+        done = result == ISOGI_OK;
+        CHECK(done ? p && k >= 2 && memory.left >= 0 : result == ISOGI_NO_MEMORY && !p, "allocation %ld: %s", k,
+              isogi_result_string(result));
+        isogi_vol_free(p);
+        CHECK(memory.blocks == 0, "allocation %ld: %ld blocks leak", k, memory.blocks);
+    }
+    CHECK(done, "there are more allocations, %d", done);
+}
+
 TEST_MAIN("vol_field")

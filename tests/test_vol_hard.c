@@ -130,8 +130,8 @@ TEST(odd_sizes_hit_like_the_reference) {
         if (i & 1) scene_waves(&s, &r);
         else scene_noise(&s, 0, &r);
         scene_build(&s);
-        run_rays(&s, 0, LONG_SUITE ? 20000 : 500, -0.8, 0.8, 0, 1, &t, &r);
-        run_rays(&s, 1, LONG_SUITE ? 20000 : 500, -0.8, 0.8, 0, 1, &t, &r);
+        run_rays(&s, 0, LONG_SUITE ? 20000 : 300, -0.8, 0.8, 0, 1, &t, &r);
+        run_rays(&s, 1, LONG_SUITE ? 20000 : 300, -0.8, 0.8, 0, 1, &t, &r);
         scene_free(&s);
     }
     tally_check("sizes", &t, 1);
@@ -152,8 +152,8 @@ TEST(every_type_and_scale_hits_like_the_reference) {
                 scene_encode(&s, (isogi_type)type, scale[k], bias[k]);
                 for (size_t i = 0; i < scene_voxels(&s); i++) low = fmin(low, s.value[i]), high = fmax(high, s.value[i]);
                 scene_build(&s);
-                run_rays(&s, 0, LONG_SUITE ? 20000 : 500, low, high, at_levels ? 1 / 8.0 : 0, 1, &t, &r);
-                if (!at_levels) run_rays(&s, 1, LONG_SUITE ? 20000 : 500, low, high, 0, 1, &t, &r);
+                run_rays(&s, 0, LONG_SUITE ? 20000 : 300, low, high, at_levels ? 1 / 8.0 : 0, 1, &t, &r);
+                if (!at_levels) run_rays(&s, 1, LONG_SUITE ? 20000 : 300, low, high, 0, 1, &t, &r);
                 scene_free(&s);
             }
         tally_check(at_levels ? "at levels" : "between levels", &t, 5);
@@ -174,7 +174,7 @@ TEST(extreme_values_spacings_and_origins_hit_like_the_reference) {
             for (size_t i = 0; i < scene_voxels(&s); i++) s.value[i] *= unit[k];
             for (int a = 0; a < 3; a++) s.volume.spacing[a] = spacing[k][a], s.volume.origin[a] = origin[k] * spacing[k][a];
             scene_build(&s);
-            run_rays(&s, 0, LONG_SUITE ? 20000 : 500, -0.7 * unit[k], 0.7 * unit[k], 0, 0, &t, &r);
+            run_rays(&s, 0, LONG_SUITE ? 20000 : 250, -0.7 * unit[k], 0.7 * unit[k], 0, 0, &t, &r);
             scene_free(&s);
         }
         tally_check("units", &t, 1);
@@ -356,7 +356,7 @@ TEST(nearly_constant_cells_hit_like_the_reference) {
         scene_noise(&s, 0, &r);
         for (size_t i = 0; i < scene_voxels(&s); i++) s.value[i] = 1 + s.value[i] * pow(10, -1 - v);
         scene_build(&s);
-        run_rays(&s, 0, LONG_SUITE ? 10000 : 500, 1 - 0.7 * pow(10, -1 - v), 1 + 0.7 * pow(10, -1 - v), 0, 0, &t, &r);
+        run_rays(&s, 0, LONG_SUITE ? 10000 : 300, 1 - 0.7 * pow(10, -1 - v), 1 + 0.7 * pow(10, -1 - v), 0, 0, &t, &r);
         scene_free(&s);
     }
     tally_check("nearly constant", &t, 5);
@@ -524,7 +524,7 @@ TEST(nothing_escapes_from_closed_surfaces_on_any_path) {
     static isogi_hit hits[COUNT];
     static float dirs[COUNT][3];
     test_random r = {10};
-    long wanted = LONG_SUITE ? 60000000 : 1000000, done = 0, escaped[PATHS] = {0};
+    long wanted = LONG_SUITE ? 60000000 : 400000, done = 0, escaped[PATHS] = {0};
     while (done < wanted) {
         scene s = scene_new(18 + (int)(random_bits(&r) % 50), 18, 20);
         scene_noise(&s, 0, &r);

@@ -1,5 +1,5 @@
 /* How the pyramid of isogi_vol.h is built and updated: every path and every update gives the same bits, for the price of the box that
-   changed. This program looks inside isogi_vol.h. */
+   changed. This program looks inside isogi_vol.h. FLAGS: -O0 */
 #define ISOGI_IMPLEMENTATION
 #include "isogi_vol.h"
 #include "fields.h"
@@ -152,6 +152,56 @@ TEST(an_update_costs_what_its_box_costs) {
     first[0] = 128, last[0] = 130, last[1] = first[1];
     CHECK(isogi_vol_update(f.pyramid, first, last, NULL) == ISOGI_INVALID, "beyond the volume");
     field_free(&f);
+}
+
+/* Memory whose allocation number `left` fails. */
+typedef struct scarce { long left, blocks; } scarce;
+static void *scarce_alloc(void *user, size_t size, size_t align) {
+    scarce *m = (scarce *)user;
+    void *p = NULL;
+    if (m->left-- == 0 || posix_memalign(&p, align < sizeof(void *) ? sizeof(void *) : align, size)) return NULL;
+    m->blocks++;
+    return p;
+}
+static void scarce_release(void *user, void *p, size_t size) { (void)size, ((scarce *)user)->blocks--, free(p); }
+
+/* The k-th allocation of an update fails, for every k: the pyramid is as it was, and the same update succeeds afterwards. The volume's last
+   voxel that is not finite goes, for which an update needs most: the 8-bit bounds, which were not there. Another comes, and moves. */
+TEST(an_update_survives_every_failing_allocation) {
+    enum { N = 21 };
+    test_random r = {41};
+    for (int kind = 0; kind < 3; kind++) {
+        int failures = 0, done = 0;
+        for (long k = 0; !done && k < 100; k++) {
+            scarce memory = {-1, 0};
+            isogi_context context = {.alloc = scarce_alloc, .release = scarce_release, .user = &memory, .threads = 1};
+            field f = field_new(N, N, N);
+            isogi_pyramid *updated = NULL, *before = NULL, *after = NULL;
+            isogi_counters counters = {0};
+            const size_t first[3] = {3, 4, 5}, last[3] = {8, 9, 20};
+            for (int i = 0; i < N * N * N; i++) f.value[i] = random_range(&r, -1, 1);
+            if (kind != 1) *field_at(&f, 5, 6, 7) = (double)NAN;
+            CHECK(isogi_vol_build(&updated, &f.volume, &context) == ISOGI_OK, "build");
+            CHECK(isogi_vol_build(&before, &f.volume, NULL) == ISOGI_OK, "build");
+            *field_at(&f, 5, 6, 7) = 0.5;
+            if (kind) *field_at(&f, 6, 6, 17) = (double)NAN;
+            CHECK(isogi_vol_build(&after, &f.volume, NULL) == ISOGI_OK, "build");
+            memory.left = k;
+            isogi_result result = isogi_vol_update(updated, first, last, &counters);
+            done = memory.left >= 0, memory.left = -1;
+            CHECK(result == (done ? ISOGI_OK : ISOGI_NO_MEMORY), "kind %d, allocation %ld: %s", kind, k, isogi_result_string(result));
+            if (result != ISOGI_OK) {
+                CHECK(same_pyramid(updated, before) && !counters.blocks, "kind %d: an update whose allocation %ld failed changed it",
+                      kind, k);
+                CHECK(isogi_vol_update(updated, first, last, NULL) == ISOGI_OK, "kind %d: again after allocation %ld", kind, k);
+                failures++;
+            }
+            CHECK(same_pyramid(updated, after), "kind %d, allocation %ld: not as built anew", kind, k);
+            isogi_vol_free(updated), isogi_vol_free(before), isogi_vol_free(after), field_free(&f);
+            CHECK(memory.blocks == 0, "kind %d, allocation %ld: %ld blocks leak", kind, k, memory.blocks);
+        }
+        CHECK(done && failures >= (kind ? 2 : 4), "kind %d: %d allocations were tried", kind, failures);
+    }
 }
 
 /* ---- too many vertices ---- */

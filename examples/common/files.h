@@ -90,6 +90,20 @@ static inline int file_read(const char *path, size_t limit, unsigned char **data
     return 1;
 }
 
+/* Where symbolic links that lead to nothing lead: the file will be written there. */
+static inline int file_end_of_links(const char *path, char target[PATH_MAX], char *error) {
+    char link[PATH_MAX];
+    ssize_t length = 0;
+    for (int steps = 0; steps < 40 && (length = readlink(target, link, PATH_MAX - 32)) >= 0; steps++) {
+        char *slash = strrchr(target, '/');
+        size_t folder = *link == '/' || !slash ? 0 : (size_t)(slash - target) + 1; /* what a relative link begins from */
+        if (folder + (size_t)length + 32 > PATH_MAX) return file_fail(error, "%s: leads to a name that is too long", path);
+        memcpy(target + folder, link, (size_t)length);
+        target[folder + (size_t)length] = 0;
+    }
+    return length < 0 || file_fail(error, "%s: %s", path, strerror(ELOOP));
+}
+
 /* The file that a path really names: links are followed, so that a link is not replaced by what it points to. */
 static inline int file_target(const char *path, char target[PATH_MAX], mode_t *mode, int *special, char *error) {
     struct stat status;
@@ -98,7 +112,8 @@ static inline int file_target(const char *path, char target[PATH_MAX], mode_t *m
     if (!*path) return file_fail(error, "the name of the file to write is empty");
     if (strlen(path) + 32 > PATH_MAX) return file_fail(error, "%.100s...: the name is too long", path);
     strcpy(target, path);
-    if (stat(path, &status) != 0) return errno == ENOENT || file_fail(error, "%s: %s", path, strerror(errno));
+    if (stat(path, &status) != 0)
+        return errno == ENOENT ? file_end_of_links(path, target, error) : file_fail(error, "%s: %s", path, strerror(errno));
     if (S_ISDIR(status.st_mode)) return file_fail(error, "%s: is a folder", path);
     *special = !S_ISREG(status.st_mode);
     *mode = status.st_mode & 0777;
@@ -145,8 +160,13 @@ static inline int file_same(const char *a, const char *b) {
     a_there = stat(a, &x) == 0, b_there = stat(b, &y) == 0;
     if (a_there != b_there) return 0;
     if (!a_there) {
-        const char *name_a = file_folder(a, &x, &a_there), *name_b = file_folder(b, &y, &b_there);
-        return !strcmp(a, b) || (a_there && b_there && !strcmp(name_a, name_b) && x.st_dev == y.st_dev && x.st_ino == y.st_ino);
+        char end_a[PATH_MAX], end_b[PATH_MAX], error[FILE_ERROR_SIZE];
+        const char *name_a, *name_b;
+        mode_t mode;
+        int special;
+        if (!file_target(a, end_a, &mode, &special, error) || !file_target(b, end_b, &mode, &special, error)) return !strcmp(a, b);
+        name_a = file_folder(end_a, &x, &a_there), name_b = file_folder(end_b, &y, &b_there);
+        return a_there && b_there && !strcmp(name_a, name_b) && x.st_dev == y.st_dev && x.st_ino == y.st_ino;
     }
     return S_ISREG(x.st_mode) && x.st_dev == y.st_dev && x.st_ino == y.st_ino;
 }

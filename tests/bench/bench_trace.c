@@ -1,32 +1,41 @@
 /* Run time against error of isogi_trace.h on the lit scenes of the design.
 
-       build/bench/bench_trace [--quick | --tables] [--only SCENE] OUT.csv
+       build/bench/bench_trace [--quick | --tables | --dry] [--only SCENE] OUT.csv
 
    Scenes: engine-block, engine, bonsai and cthead; of the quick bench and of --tables the first two, unless --only names another. --tables:
-   the rows table1-, table2-, lattice- and figure5- alone. `--tables --only cavity`, `--tables --only figure5`: lattice-cavity, figure5- alone.
+   the rows table1-, table2-, lattice- and figure5- alone. `--tables --only cavity`, `--tables --only figure5`: lattice-cavity, figure5-
+   alone. --dry: all rows in seconds, to look at the table's form: every scene is the engine block on 24 voxels, lit by daylight, and all
+   but the first have the rows of --quick; no figure means anything.
 
    Error: relative RMSE, sqrt(sum (E - R)^2 / sum R^2), of irradiance over pixels of the standard view (every k-th of 900x900), against
-   paths of 4096 samples through the same texels (kept in build/bench/, by everything that defines them). Naive is the paper's way:
+   paths of 8192 samples through the same texels (kept in build/bench/, by everything that defines them but the library's own code).
+   Where the standard error of that reference is more than a tenth of the error of a row, its setting says so; `usable` and `converged`
+   must be larger than ten of it. Naive is the paper's way:
    uniform hemisphere, independent numbers, whole paths with shadow rays, every texel of the view; `converged` is its error with 100
    samples, `usable` with 10. Its time is that of its texels behind the measured pixels, scaled to all of the view. Wall seconds, two
    threads, but for the rows rays-SCENE.
 
      speedup-SCENE          work: time of naive over time of the default at the error converged. Where even one sample of the default has
                             a smaller error e, method equal-error: at that one, for which naive's time is scaled by (converged / e)^2
-     rays-SCENE             rays a second while baking, one thread
-     lazy-SCENE             seconds from the request to usable; lazy-converged-SCENE: to converged
-     threads-SCENE          work: seconds on one thread over seconds on two (full bench: of two runs each, in turn, the better); seconds: on two
+     filter-SCENE           the filter over texels at equal error: seconds of the default with the samples of speedup-, and (method
+                            filter-off) of as many samples more as reach its error without; work: seconds over the default's, times the
+                            square of the errors' ratio where the most samples tried (32 times) do not suffice
+     rays-SCENE             one thread; work: rays while baking (over the seconds: rays a second)
+     lazy-SCENE             seconds to usable from a volume that was just read: the pyramid, request, and steps, on two threads;
+                            lazy-converged-SCENE: to converged. The pyramid's share, and a bound that was not reached, in the setting
+     threads-SCENE          work: seconds on one thread over seconds on two (full bench: of two runs each, in turn, the better); seconds: on
+                            two
      full-SCENE             the whole texture to converged, with the fewest samples that reach it (full bench only)
      table1-SCENE           Wyman 2006, table 1: irradiance, transfer, and the path-traced picture (a path for every pixel that shows the
                             surface), with 100, 625, 2500 and 10,000 samples, whole paths. Lazily: the texels of the view; fully: all
                             texels. Time grows as the samples do: it is measured on as many of both as fit (texels: those of the
                             chosen pixels; samples: 625), and scaled to all, which the setting says; work: samples. Transfer's errors
                             are those of relighting by order 5
-     table2-SCENE           Wyman 2006, table 2: seconds and frames/s of displaying the standard view, 512 x 512, two threads; extra memory in the
-                            setting. Lambert, shadowed Lambert, Phong with shadows, irradiance texture, transfer of order 5
+     table2-SCENE           Wyman 2006, table 2: seconds and frames/s of displaying the standard view, 512 x 512, two threads; extra memory
+                            in the setting. Lambert, shadowed Lambert, Phong with shadows, irradiance texture, transfer of order 5
      lattice-SCENE          all texels that the isovalue reads, 8 samples: the regular lattice, the hierarchical one by its tolerance, and a
-                            regular one of every second texel; work: megabytes; texels and rays in the setting. Of cavity (albedo 0.5), where
-                            light varies slowly, too: all isovalues within 4 voxels
+                            regular one of every second texel; work: megabytes; texels and rays in the setting. Of cavity (albedo 0.5),
+                            where light varies slowly, too: all isovalues within 4 voxels
      figure5-...            Wyman 2006, figure 5, as numbers: gradient normals, smoothed normals, and smoothed normals with offset (the
                             default), on shapes whose light is known in closed form, given as distances with noise of +-0.2 voxel: ball,
                             direct light of a sun; hollow, four bounces of the light of a lamp within a hollow sphere. Light is gathered at
@@ -44,7 +53,8 @@
 #include <stdio.h>
 #include <time.h>
 
-enum { SIZE = 900, MOST = 6000, REFERENCE = 4096 };
+enum { SIZE = 900, MOST = 6000 };
+static int dry, view_side = SIZE, reference_samples = 8192;
 
 typedef struct bench_scene {
     const char *name, *file, *image_file;
@@ -54,10 +64,12 @@ typedef struct bench_scene {
     hdr_image image;
     float sky[4][3];
     isogi_light sun;
-    double isovalue, up[3], toward[3];
+    double isovalue, up[3], toward[3], pyramid_seconds;
 } bench_scene;
 
 static float points[SIZE * SIZE][3], chosen[MOST][3], reference[MOST][3], light[MOST][3];
+static float reference_errors[MOST]; /* standard errors of luminance, */
+static double reference_error;       /* and as error_of has it: their RMS over that of luminance */
 static size_t seen, picked;
 static const float white_sky[3] = {3.5449077f, 3.5449077f, 3.5449077f}; /* radiance 1 */
 static const isogi_context two = {.threads = 2}, one = {.threads = 1};
@@ -77,12 +89,14 @@ static int scene_load(bench_scene *s, const char *name) {
     memset(s, 0, sizeof *s);
     s->name = name, s->up[1] = 1, s->toward[0] = 1.5, s->toward[1] = 1.2, s->toward[2] = 2;
     d->lazy = 1, d->bounces = -1, d->albedo[0] = d->albedo[1] = d->albedo[2] = 0.7f;
-    if (!strcmp(name, "engine-block") || !strcmp(name, "cavity")) {
-        const procedural_shape *shape = procedural_find(name);
-        if (procedural_make(shape, 0, &s->volume, NULL) != ISOGI_OK) return 0;
+    if (dry || !strcmp(name, "engine-block") || !strcmp(name, "cavity")) {
+        const procedural_shape *shape = procedural_find(strcmp(name, "cavity") ? "engine-block" : name);
+        if (procedural_make(shape, dry ? 24 : 0, &s->volume, NULL) != ISOGI_OK) return 0;
         s->isovalue = shape->isovalue;
         daylight_make(&d->lighting, s->sky, &s->sun);
-        if (!strcmp(name, "cavity")) d->lighting.env.sh = white_sky, d->lighting.env.sh_order = 1, d->lighting.light_count = 0, d->albedo[0] = d->albedo[1] = d->albedo[2] = 0.5f;
+        if (!strcmp(name, "cavity"))
+            d->lighting.env.sh = white_sky, d->lighting.env.sh_order = 1, d->lighting.light_count = 0,
+            d->albedo[0] = d->albedo[1] = d->albedo[2] = 0.5f;
     } else {
         if (!data) return fprintf(stderr, "  %s is left out: ISOGI_DATA is not set\n", name), 0;
         if (!strcmp(name, "bonsai")) {
@@ -90,14 +104,19 @@ static int scene_load(bench_scene *s, const char *name) {
             s->up[1] = 0, s->up[2] = -1, s->toward[1] = 2, s->toward[2] = -1.2;
         } else if (!strcmp(name, "cthead")) d->albedo[0] = d->albedo[1] = d->albedo[2] = 0.8f, s->isovalue = 130;
         else s->isovalue = 80;
-        snprintf(path, sizeof path, "%s/%s", data, !strcmp(name, "bonsai") ? "bonsai_256x256x256_uint8.raw" : !strcmp(name, "cthead") ? "cthead8_256x256x99_uint8.raw" : "engine_256x256x128_uint8.raw");
+        snprintf(path, sizeof path, "%s/%s", data,
+                 !strcmp(name, "bonsai")   ? "bonsai_256x256x256_uint8.raw"
+                 : !strcmp(name, "cthead") ? "cthead8_256x256x99_uint8.raw"
+                                           : "engine_256x256x128_uint8.raw");
         if (!volume_read(path, &s->volume, error)) return fprintf(stderr, "  %s is left out: %s\n", name, error), 0;
         if (!strcmp(name, "cthead")) s->volume.spacing[0] = s->volume.spacing[1] = 1, s->volume.spacing[2] = 2;
         snprintf(path, sizeof path, "%s/hdr/%s_256x128.hdr", data, hdr);
         if (!hdr_read(path, &s->image, error)) return fprintf(stderr, "  %s is left out: %s\n", name, error), 0;
         d->lighting.env.rgb = s->image.rgb, d->lighting.env.width = s->image.width, d->lighting.env.height = s->image.height;
     }
-    if (isogi_vol_build(&s->pyramid, &s->volume, NULL) != ISOGI_OK) return 0;
+    s->pyramid_seconds = seconds_now();
+    if (isogi_vol_build(&s->pyramid, &s->volume, &two) != ISOGI_OK) return 0;
+    s->pyramid_seconds = seconds_now() - s->pyramid_seconds;
     d->pyramid = s->pyramid;
     return 1;
 }
@@ -113,25 +132,27 @@ static void view(const bench_scene *s, size_t pixels) {
     const isogi_volume *v = isogi_vol_volume(s->pyramid);
     static isogi_ray ray[SIZE];
     static isogi_hit hit[SIZE];
+    const int n = view_side;
     double centre[3], eye[3], t[3], radius;
     camera c;
     for (int a = 0; a < 3; a++) centre[a] = 0.5 * v->spacing[a] * (double)(v->size[a] - 1), t[a] = s->toward[a];
     radius = sqrt(vector_dot(centre, centre)), vector_normalize(t), seen = picked = 0;
     for (int a = 0; a < 3; a++) eye[a] = centre[a] + t[a] * radius / sin(PROCEDURAL_PI / 8);
-    camera_look(&c, SIZE, SIZE, eye, centre, s->up, 45);
-    for (int y = 0; y < SIZE; y++) {
-        for (int x = 0; x < SIZE; x++) {
+    camera_look(&c, n, n, eye, centre, s->up, 45);
+    for (int y = 0; y < n; y++) {
+        for (int x = 0; x < n; x++) {
             double d[3];
             memset(&ray[x], 0, sizeof ray[x]);
             camera_direction(&c, x, y, d);
             for (int a = 0; a < 3; a++) ray[x].origin[a] = eye[a], ray[x].dir[a] = (float)d[a];
             ray[x].isovalue = s->isovalue;
         }
-        isogi_vol_intersect(s->pyramid, ray, SIZE, hit, NULL);
-        for (int x = 0; x < SIZE; x++)
+        isogi_vol_intersect(s->pyramid, ray, (size_t)n, hit, NULL);
+        for (int x = 0; x < n; x++)
             if (hit[x].side) isogi_vol_positions(s->pyramid, &hit[x], 1, (float(*)[3])points[seen++]);
     }
-    for (size_t i = 0; i < pixels && pixels < seen; i++) memcpy(chosen[picked++], points[i * (seen / pixels) + isogi_trace__mix(i + 1) % (seen / pixels)], sizeof chosen[0]);
+    for (size_t i = 0; i < pixels && pixels < seen; i++)
+        memcpy(chosen[picked++], points[i * (seen / pixels) + isogi_trace__mix(i + 1) % (seen / pixels)], sizeof chosen[0]);
 }
 
 static double error_of(float (*e)[3]) {
@@ -146,34 +167,47 @@ static double error_of(float (*e)[3]) {
 
 /* ---- the reference, kept ---------------------------------------------------------------------------------------------------- */
 
+/* Reads what was kept, or writes what is to be kept. */
+static int reference_keep(const char *path, const char *mode) {
+    FILE *file = fopen(path, mode);
+    size_t values = 0, errors = 0;
+    if (!file) return 0;
+    if (mode[0] == 'r')
+        values = fread(reference, sizeof reference[0], picked, file), errors = fread(reference_errors, sizeof(float), picked, file);
+    else values = fwrite(reference, sizeof reference[0], picked, file), errors = fwrite(reference_errors, sizeof(float), picked, file);
+    return !fclose(file) && values == picked && errors == picked;
+}
+
 static int reference_make(const bench_scene *s) {
     isogi_trace_desc d = s->desc;
     isogi_trace *t = NULL;
     char path[256];
-    double remaining = 1, begin = seconds_now();
-    uint64_t key = 1;
-    FILE *file;
+    double remaining = 1, begin = seconds_now(), square = 0, all = 0;
+    uint64_t key;
+    d.samples = reference_samples, d.seed = 77, d.method = ISOGI_TRACE_PATHS;
+    if (isogi_trace_create(&t, &d, &two) != ISOGI_OK) return 0;
+    key = isogi_trace__hash_trace(t); /* the description with its lighting, and the volume */
     for (size_t i = 0; i < picked; i++)
         for (int c = 0; c < 3; c++) key = isogi_trace__key(key, (uint64_t)isogi_trace__float_bits(chosen[i][c]));
-    key = isogi_trace__hash_lighting(key, &d.lighting);
-    snprintf(path, sizeof path, "build/bench/reference-%s-%d-%016llx", s->name, REFERENCE, (unsigned long long)key);
-    file = fopen(path, "rb");
-    if (file) {
-        size_t n = fread(reference, sizeof reference[0], picked, file);
-        fclose(file);
-        if (n == picked) return 1;
+    snprintf(path, sizeof path, "build/bench/reference-%s-%d-%016llx", s->name, reference_samples, (unsigned long long)key);
+    if (!reference_keep(path, "rb")) {
+        if (isogi_trace_request(t, (const float(*)[3])chosen, picked) != ISOGI_OK) return 0;
+        while (remaining > 0) {
+            if (isogi_trace_step(t, 4000000, &remaining) != ISOGI_OK) return 0;
+            fprintf(stderr, "\r  reference of %s: %3.0f %%, %.0f s", s->name, 100 * (1 - remaining), seconds_now() - begin);
+        }
+        fprintf(stderr, "\n");
+        isogi_trace_sample(t, (const float(*)[3])chosen, picked, reference, reference_errors);
+        if (!reference_keep(path, "wb")) remove(path);
     }
-    d.samples = REFERENCE, d.seed = 77, d.method = ISOGI_TRACE_PATHS;
-    if (isogi_trace_create(&t, &d, &two) != ISOGI_OK || isogi_trace_request(t, (const float(*)[3])chosen, picked) != ISOGI_OK) return 0;
-    while (remaining > 0) {
-        if (isogi_trace_step(t, 4000000, &remaining) != ISOGI_OK) return 0;
-        fprintf(stderr, "\r  reference of %s: %3.0f %%, %.0f s", s->name, 100 * (1 - remaining), seconds_now() - begin);
-    }
-    fprintf(stderr, "\n");
-    isogi_trace_sample(t, (const float(*)[3])chosen, picked, reference, NULL);
     isogi_trace_free(t);
-    file = fopen(path, "wb");
-    if (file) fwrite(reference, sizeof reference[0], picked, file), fclose(file);
+    for (size_t i = 0; i < picked; i++) {
+        double rgb[3] = {(double)reference[i][0], (double)reference[i][1], (double)reference[i][2]},
+               luminance = isogi_trace__luminance(rgb);
+        square += (double)reference_errors[i] * (double)reference_errors[i], all += luminance * luminance;
+    }
+    reference_error = sqrt(square / all);
+    fprintf(stderr, "  reference of %s: %d samples, standard error %.5f of the light\n", s->name, reference_samples, reference_error);
     return 1;
 }
 
@@ -199,8 +233,11 @@ typedef struct naive_path {
 static double naive_number(naive_path *p) { return isogi_trace__unit(isogi_trace__key(p->key, p->number++)); }
 
 static void naive_ray(naive_path *p, int depth, const float dir[3], double tmax, isogi_hit *hit) {
-    if (!depth) isogi_trace__site_rays(p->scene, p->site, (const float(*)[3])dir, &tmax, 1, hit, &p->counters);
-    else isogi_vol_continue(p->scene->pyramid, &p->start, (const float(*)[3])dir, &tmax, p->site->isovalue, p->scene->flags, 1, hit, &p->counters);
+    isogi_ray ray;
+    if (!depth) isogi_trace__site_rays(p->scene, p->site, (const float(*)[3])dir, &tmax, 1, &ray, hit, &p->counters);
+    else
+        isogi_vol_continue(p->scene->pyramid, &p->start, (const float(*)[3])dir, &tmax, p->site->isovalue, p->scene->flags, 1, hit,
+                           &p->counters);
 }
 
 static double naive_cosine(const naive_path *p, int depth, const float dir[3]) {
@@ -245,7 +282,8 @@ static void naive_trace(naive_path *p, const float albedo[3]) {
         if (depth || p->site->on_surface) {
             double mirrored;
             isogi_trace__mirror(p->geometric, dir);
-            mirrored = isogi_trace__dot(p->shading, dir) - 2 * isogi_trace__dot(p->geometric, dir) * isogi_trace__dot(p->geometric, p->shading);
+            mirrored =
+                isogi_trace__dot(p->shading, dir) - 2 * isogi_trace__dot(p->geometric, dir) * isogi_trace__dot(p->geometric, p->shading);
             density = (isogi_trace__dot(p->shading, dir) > 0) + (mirrored > 0);
         }
         cosine = naive_cosine(p, depth, dir);
@@ -291,7 +329,9 @@ static double naive(const bench_scene *s, int samples, double *error, double *te
     isogi_trace_report report;
     double begin, spent;
     d.samples = 1, d.method = ISOGI_TRACE_PATHS, d.bounces = 0; /* to find the texels */
-    if (isogi_trace_create(&job.trace, &d, &two) != ISOGI_OK || isogi_trace_request(job.trace, (const float(*)[3])chosen, picked) != ISOGI_OK || isogi_trace_step(job.trace, 0, NULL) != ISOGI_OK) return 0;
+    if (isogi_trace_create(&job.trace, &d, &two) != ISOGI_OK ||
+        isogi_trace_request(job.trace, (const float(*)[3])chosen, picked) != ISOGI_OK || isogi_trace_step(job.trace, 0, NULL) != ISOGI_OK)
+        return 0;
     isogi_trace_status(job.trace, &report);
     job.brick = calloc(job.trace->brick_count, sizeof *job.brick), job.rays = calloc(job.trace->brick_count, sizeof *job.rays);
     for (size_t i = 0; i < job.trace->brick_count; i++)
@@ -327,7 +367,8 @@ static outcome ours(const isogi_trace_desc *desc, const isogi_context *context) 
     return o;
 }
 
-/* Seconds until the error is below the bound, in steps; the error then. */
+/* Seconds until the error is below the bound, in steps, from the volume on; the error then, which is that of all samples where these do
+   not reach the bound. */
 static outcome lazily(const bench_scene *s, double bound) {
     isogi_trace_desc d = s->desc;
     isogi_trace *t = NULL;
@@ -337,7 +378,7 @@ static outcome lazily(const bench_scene *s, double bound) {
     d.samples = 20; /* blocks of 4 and of 16 */
     double begin = seconds_now();
     if (isogi_trace_create(&t, &d, &two) != ISOGI_OK || isogi_trace_request(t, (const float(*)[3])points, seen) != ISOGI_OK) exit(1);
-    o.seconds = seconds_now() - begin;
+    o.seconds = s->pyramid_seconds + seconds_now() - begin;
     for (o.error = 1e9; remaining > 0 && o.error > bound;) {
         begin = seconds_now();
         if (isogi_trace_step(t, 100000, &remaining) != ISOGI_OK) exit(1);
@@ -351,9 +392,31 @@ static outcome lazily(const bench_scene *s, double bound) {
     return o;
 }
 
-static void row(FILE *csv, const char *name, const bench_scene *s, const char *method, const char *setting, double seconds, double error, double work, const char *unit) {
-    fprintf(csv, "isogi_trace.h,%s%s,%s,%s,%.6g,%.6g,%.6g,%s\n", name, s->name, method, setting, seconds, error, work, unit);
-    fprintf(stderr, "  %s%s %s %s: %.3g s, error %.4f, %.4g %s\n", name, s->name, method, setting, seconds, error, work, unit);
+/* Seconds: of scene engine, on two cores. */
+static const struct { const char *name; double seconds, work; } goals[] = {
+    {"lazy-", 1, 0}, {"lazy-converged-", 10, 0}, {"full-", 60, 0}, {"speedup-", 0, 50}};
+
+static void row(FILE *csv, const char *name, const bench_scene *s, const char *method, const char *setting, double seconds, double error,
+                double work, const char *unit) {
+    char uncertain[48] = "";
+    if (s->pyramid && error > 0 && error < 10 * reference_error)
+        snprintf(uncertain, sizeof uncertain, " (reference +-%.2g)", reference_error);
+    fprintf(csv, "isogi_trace.h,%s%s,%s,%s%s,%.6g,%.6g,%.6g,%s\n", name, s->name, method, setting, uncertain, seconds, error, work, unit);
+    fprintf(stderr, "  %s%s %s %s%s: %.3g s, error %.4f, %.4g %s", name, s->name, method, setting, uncertain, seconds, error, work, unit);
+    for (size_t i = 0; i < sizeof goals / sizeof *goals && !strcmp(method, "default"); i++) {
+        if (strcmp(name, goals[i].name) || (strcmp(s->name, "engine") && goals[i].seconds > 0)) continue;
+        if (goals[i].seconds > 0) fprintf(stderr, "; goal %.3g s: %.2f of it", goals[i].seconds, seconds / goals[i].seconds);
+        else fprintf(stderr, "; goal %.3g x: %.2f of it", goals[i].work, work / goals[i].work);
+    }
+    fprintf(stderr, "\n");
+}
+
+static void lazy_row(FILE *csv, const bench_scene *s, const char *name, const char *aim, double bound) {
+    outcome o = lazily(s, bound);
+    char setting[96], missed[48] = "";
+    if (o.error > bound) snprintf(missed, sizeof missed, " NOT reached: bound=%.4f", bound);
+    snprintf(setting, sizeof setting, "%s%s (pyramid %.2g s)", aim, missed, s->pyramid_seconds);
+    row(csv, name, s, "default", setting, o.seconds, o.error, o.rays, "rays");
 }
 
 /* ---- tables 1 and 2 of Wyman 2006 --------------------------------------------------------------------------------------------------- */
@@ -364,7 +427,9 @@ static outcome transferred(const bench_scene *s, const isogi_trace_desc *desc) {
     isogi_counters counters = {0};
     outcome o = {0};
     double begin = seconds_now();
-    if (isogi_trace_create(&t, desc, &two) != ISOGI_OK || isogi_trace_request(t, (const float(*)[3])chosen, picked) != ISOGI_OK || isogi_trace_step(t, 0, NULL) != ISOGI_OK) exit(1);
+    if (isogi_trace_create(&t, desc, &two) != ISOGI_OK || isogi_trace_request(t, (const float(*)[3])chosen, picked) != ISOGI_OK ||
+        isogi_trace_step(t, 0, NULL) != ISOGI_OK)
+        exit(1);
     o.seconds = seconds_now() - begin;
     if (desc->mode == ISOGI_TRACE_TRANSFER && isogi_trace_relight(t, &s->desc.lighting) != ISOGI_OK) exit(1);
     isogi_trace_sample(t, (const float(*)[3])chosen, picked, light, NULL);
@@ -403,7 +468,8 @@ static void table1(FILE *csv, const bench_scene *s) {
             double error = k == 0 ? o[mode].error : more.error;
             for (int lazy = 0; lazy < 2; lazy++) {
                 double seconds = (k ? more.seconds * samples[k] / samples[1] : o[mode].seconds) / o[mode].texels * all[lazy];
-                snprintf(setting, sizeof setting, "%s samples=%d (%s)", lazy ? "lazy" : "full", samples[k], k < 2 ? "texels scaled" : "texels and samples scaled; error of 625");
+                snprintf(setting, sizeof setting, "%s samples=%d (%s)", lazy ? "lazy" : "full", samples[k],
+                         k < 2 ? "texels scaled" : "texels and samples scaled; error of 625");
                 row(csv, "table1-", s, mode ? "transfer" : "irradiance", setting, seconds, error, samples[k], "samples");
             }
         }
@@ -462,7 +528,8 @@ static void frame_task(void *arg, size_t y) {
     isogi_vol_normals(s->pyramid, hit, n, ISOGI_NORMAL_SMOOTH, normal);
     for (size_t i = 0; i < n; i++) {
         memset(&shadow[i], 0, sizeof shadow[i]);
-        for (int a = 0; a < 3; a++) shadow[i].origin[a] = (double)position[i][a] + 0.5 * (double)normal[i][a], shadow[i].dir[a] = (float)lamp[a];
+        for (int a = 0; a < 3; a++)
+            shadow[i].origin[a] = (double)position[i][a] + 0.5 * (double)normal[i][a], shadow[i].dir[a] = (float)lamp[a];
         shadow[i].isovalue = s->isovalue, blocked[i] = 0;
     }
     if (job->shadows) isogi_vol_occluded(s->pyramid, shadow, n, blocked, NULL);
@@ -491,7 +558,9 @@ static void table2(FILE *csv, const bench_scene *s) {
         if (k > 2) {
             d.samples = 1, d.bounces = 0, d.method = ISOGI_TRACE_PATHS;
             if (k == 4) d.mode = ISOGI_TRACE_TRANSFER, memset(&d.lighting, 0, sizeof d.lighting);
-            if (isogi_trace_create(&t, &d, &two) != ISOGI_OK || isogi_trace_request(t, (const float(*)[3])points, seen) != ISOGI_OK || isogi_trace_step(t, 0, NULL) != ISOGI_OK) exit(1);
+            if (isogi_trace_create(&t, &d, &two) != ISOGI_OK || isogi_trace_request(t, (const float(*)[3])points, seen) != ISOGI_OK ||
+                isogi_trace_step(t, 0, NULL) != ISOGI_OK)
+                exit(1);
             if (k == 4 && isogi_trace_relight(t, &s->desc.lighting) != ISOGI_OK) exit(1);
         }
         job.texture = t, job.shadows = k == 1 || k == 2, job.phong = k == 2, best = 1e9;
@@ -530,7 +599,7 @@ static void lattice_table(FILE *csv, const bench_scene *s) {
 static void lattice_cavity(FILE *csv) {
     bench_scene s;
     if (!scene_load(&s, "cavity")) exit(1);
-    view(&s, 400);
+    view(&s, dry ? 20 : 400);
     if (!reference_make(&s)) exit(1);
     lattice_table(csv, &s), scene_unload(&s);
 }
@@ -546,7 +615,8 @@ static isogi_pyramid *figure5_volume(int hollow) {
     isogi_volume v = {.data = figure5_voxels, .type = ISOGI_F32, .size = {FIGURE5_SIDE, FIGURE5_SIDE, FIGURE5_SIDE}};
     isogi_pyramid *pyramid = NULL;
     for (size_t i = 0; i < sizeof figure5_voxels / sizeof(float); i++) {
-        double at[3] = {(double)(i % FIGURE5_SIDE), (double)(i / FIGURE5_SIDE % FIGURE5_SIDE), (double)(i / FIGURE5_SIDE / FIGURE5_SIDE)}, r[3], depth;
+        double at[3] = {(double)(i % FIGURE5_SIDE), (double)(i / FIGURE5_SIDE % FIGURE5_SIDE), (double)(i / FIGURE5_SIDE / FIGURE5_SIDE)},
+               r[3], depth;
         for (int a = 0; a < 3; a++) r[a] = at[a] - figure5_centre[a];
         depth = figure5_radius - sqrt(vector_dot(r, r));
         (&figure5_voxels[0][0][0])[i] = (float)((hollow ? -depth : depth) + 0.4 * isogi_trace__unit(isogi_trace__mix(i)) - 0.2);
@@ -560,13 +630,15 @@ static void figure5_points(const isogi_pyramid *pyramid, const double toward[3],
     uint64_t number = 0;
     for (int i = 0; i < FIGURE5;) {
         double middle[3], u = isogi_trace__unit(isogi_trace__mix(++number)), v = isogi_trace__unit(isogi_trace__mix(++number));
-        middle[0] = sqrt(1 - pow(2 * u - 1, 2)) * cos(2 * PROCEDURAL_PI * v), middle[1] = 2 * u - 1, middle[2] = sqrt(1 - pow(2 * u - 1, 2)) * sin(2 * PROCEDURAL_PI * v);
+        middle[0] = sqrt(1 - pow(2 * u - 1, 2)) * cos(2 * PROCEDURAL_PI * v), middle[1] = 2 * u - 1,
+        middle[2] = sqrt(1 - pow(2 * u - 1, 2)) * sin(2 * PROCEDURAL_PI * v);
         if (vector_dot(middle, toward) < least) continue;
         for (int end = i + PATCH; i < end;) {
             isogi_ray ray = {0};
             isogi_hit hit;
             double d[3], off[3];
-            for (int a = 0; a < 3; a++) off[a] = 2 * isogi_trace__unit(isogi_trace__mix(++number)) - 1, d[a] = middle[a] + off[a] * 1.5 / figure5_radius;
+            for (int a = 0; a < 3; a++)
+                off[a] = 2 * isogi_trace__unit(isogi_trace__mix(++number)) - 1, d[a] = middle[a] + off[a] * 1.5 / figure5_radius;
             if (vector_dot(off, off) > 1) continue;
             vector_normalize(d);
             for (int a = 0; a < 3; a++) ray.origin[a] = figure5_centre[a], ray.dir[a] = (float)d[a];
@@ -608,14 +680,17 @@ static double figure5_light(isogi_trace_desc *d, int texture, float (*p)[3], flo
    everywhere, the flux over the area, and of the next a times as much. */
 static void figure5(FILE *csv, int hollow) {
     static const char *const method[3] = {"default", "gradient normals", "smoothed normals"};
-    static const char *const name[2][2] = {{"figure5-ball-points-", "figure5-ball-texture-"}, {"figure5-hollow-points-", "figure5-hollow-texture-"}};
+    static const char *const name[2][2] = {{"figure5-ball-points-", "figure5-ball-texture-"},
+                                           {"figure5-hollow-points-", "figure5-hollow-texture-"}};
     static const bench_scene scale[2] = {{.name = "macroscopic"}, {.name = "microscopic"}};
     static float p[FIGURE5][3], e[FIGURE5][3];
     static double exact[FIGURE5];
     double toward[3] = {1, 2, 3}, base[2][2];
-    isogi_light sun = {.kind = ISOGI_LIGHT_DIRECTIONAL, .vector = {1, 2, 3}, .rgb = {1, 1, 1}}, lamp = {.kind = ISOGI_LIGHT_POINT, .rgb = {100, 100, 100}};
+    isogi_light sun = {.kind = ISOGI_LIGHT_DIRECTIONAL, .vector = {1, 2, 3}, .rgb = {1, 1, 1}},
+                lamp = {.kind = ISOGI_LIGHT_POINT, .rgb = {100, 100, 100}};
     isogi_pyramid *pyramid = figure5_volume(hollow);
-    isogi_trace_desc d = {.pyramid = pyramid, .method = ISOGI_TRACE_PATHS, .samples = hollow ? 128 : 1, .bounces = hollow ? 4 : 0, .lazy = 1};
+    isogi_trace_desc d = {
+        .pyramid = pyramid, .method = ISOGI_TRACE_PATHS, .samples = hollow ? 128 : 1, .bounces = hollow ? 4 : 0, .lazy = 1};
     vector_normalize(toward), figure5_points(pyramid, toward, hollow ? -1 : 0.05, p);
     for (int a = 0; a < 3; a++) lamp.vector[a] = (float)(figure5_centre[a] + 0.4 * figure5_radius * toward[a]);
     for (int a = 0; a < 3 && hollow; a++) d.albedo[a] = 0.8f;
@@ -626,7 +701,8 @@ static void figure5(FILE *csv, int hollow) {
         vector_normalize(n);
         for (int a = 0; a < 3; a++) to[a] = figure5_radius * n[a] - 0.4 * figure5_radius * toward[a];
         length = sqrt(vector_dot(to, to));
-        exact[i] = hollow ? 100 * vector_dot(to, n) / (length * length * length) + mean * 0.8 * (1 - pow(0.8, 4)) / (1 - 0.8) : fmax(0, vector_dot(n, toward));
+        exact[i] = hollow ? 100 * vector_dot(to, n) / (length * length * length) + mean * 0.8 * (1 - pow(0.8, 4)) / (1 - 0.8)
+                          : fmax(0, vector_dot(n, toward));
     }
     for (int k = 0; k < 3; k++) {
         d.normals = k == 1 ? ISOGI_NORMAL_TRILINEAR : ISOGI_NORMAL_SMOOTH, d.offset = k ? -1 : 0;
@@ -635,11 +711,27 @@ static void figure5(FILE *csv, int hollow) {
             figure5_split(e, exact, error);
             for (int j = 0; j < 2; j++) {
                 if (!k) base[texture][j] = error[j];
-                row(csv, name[hollow][texture], &scale[j], method[k], hollow ? "four bounces" : "direct", seconds, error[j], error[j] / base[texture][j], "x");
+                row(csv, name[hollow][texture], &scale[j], method[k], hollow ? "four bounces" : "direct", seconds, error[j],
+                    error[j] / base[texture][j], "x");
             }
         }
     }
     isogi_vol_free(pyramid);
+}
+
+/* on: what the filter reached, with these samples. */
+static void filter_rows(FILE *csv, const bench_scene *s, int samples, outcome on) {
+    isogi_trace_desc d = s->desc;
+    outcome off;
+    char setting[64];
+    double ratio;
+    d.samples = samples, d.unfiltered = 1;
+    snprintf(setting, sizeof setting, "samples=%d", samples);
+    row(csv, "filter-", s, "default", setting, on.seconds, on.error, 1, "x");
+    for (off = ours(&d, &two); off.error > on.error && d.samples < 32 * samples; off = ours(&d, &two)) d.samples *= 2;
+    snprintf(setting, sizeof setting, "samples=%d", d.samples);
+    ratio = off.error > on.error ? pow(off.error / on.error, 2) : 1;
+    row(csv, "filter-", s, "filter-off", setting, off.seconds, off.error, ratio * off.seconds / on.seconds, "x");
 }
 
 static void bench(FILE *csv, const char *name, int quick, int tables) {
@@ -650,7 +742,7 @@ static void bench(FILE *csv, const char *name, int quick, int tables) {
     char setting[64];
     isogi_trace_desc d;
     if (!scene_load(&s, name)) return;
-    view(&s, quick ? 400 : 3000);
+    view(&s, dry ? 20 : quick ? 400 : 3000);
     if (!reference_make(&s)) exit(1);
     if (tables) {
         table1(csv, &s), table2(csv, &s), lattice_table(csv, &s), scene_unload(&s);
@@ -658,6 +750,11 @@ static void bench(FILE *csv, const char *name, int quick, int tables) {
     }
     (void)naive(&s, 10, &usable, &texels);
     seconds = naive(&s, 100, &converged, &texels);
+    if (!dry && reference_error > 0.1 * fmin(usable, converged)) { /* no figure would mean anything */
+        fprintf(stderr, "bench_trace: %s: the reference's standard error %.5f is more than a tenth of naive's %.5f\n", name,
+                reference_error, fmin(usable, converged));
+        exit(1);
+    }
     d = s.desc;
     for (int i = 0; i < (quick ? 5 : 9); i++) { /* the curve, and the first point below the error of naive */
         const int sweep[2][9] = {{1, 4, 5, 6, 8, 16, 64, 128, 256}, {1, 4, 6, 8, 16}};
@@ -677,8 +774,12 @@ static void bench(FILE *csv, const char *name, int quick, int tables) {
         best.seconds = o.seconds < best.seconds ? o.seconds : best.seconds;
     }
     seconds *= best.texels / texels; /* of all texels of the view */
-    if (best.error > converged) best.seconds *= best.error * best.error / (converged * converged);
+    filter_rows(csv, &s, found, best);
     snprintf(setting, sizeof setting, "samples=%d", found);
+    if (best.error > converged) { /* all of the sweep is worse */
+        snprintf(setting, sizeof setting, "samples=%d (scaled from error %.4f)", found, best.error);
+        best.seconds *= best.error * best.error / (converged * converged);
+    }
     row(csv, "speedup-", &s, "default", setting, best.seconds, converged, seconds / best.seconds, "x");
     if (best.error < converged) {
         double scaled = seconds * converged * converged / (best.error * best.error);
@@ -687,14 +788,11 @@ static void bench(FILE *csv, const char *name, int quick, int tables) {
     }
     row(csv, "speedup-", &s, "naive", "samples=100", seconds, converged, 1, "x");
     d.samples = 8, o = ours(&d, &one);
-    row(csv, "rays-", &s, "default", "samples=8", o.seconds, o.error, o.rays / o.seconds, "rays/s");
+    row(csv, "rays-", &s, "default", "samples=8", o.seconds, o.error, o.rays, "rays");
     best = ours(&d, &two), seconds = o.seconds;
     if (!quick) seconds = fmin(seconds, ours(&d, &one).seconds), best.seconds = fmin(best.seconds, ours(&d, &two).seconds);
     row(csv, "threads-", &s, "default", "samples=8", best.seconds, best.error, seconds / best.seconds, "x");
-    o = lazily(&s, usable);
-    row(csv, "lazy-", &s, "default", "usable", o.seconds, o.error, o.rays, "rays");
-    o = lazily(&s, converged);
-    row(csv, "lazy-converged-", &s, "default", "converged", o.seconds, o.error, o.rays, "rays");
+    lazy_row(csv, &s, "lazy-", "usable", usable), lazy_row(csv, &s, "lazy-converged-", "converged", converged);
     if (!quick) {
         d.lazy = 0;
         for (d.samples = found; (o = ours(&d, &two)).error > converged && d.samples < 256;) d.samples *= 2;
@@ -713,17 +811,18 @@ int main(int argc, char **argv) {
     for (; at < argc - 1; at++) {
         if (!strcmp(argv[at], "--quick")) quick = 1;
         else if (!strcmp(argv[at], "--tables")) quick = tables = 1;
+        else if (!strcmp(argv[at], "--dry")) dry = 1, view_side = 90, reference_samples = 256;
         else if (!strcmp(argv[at], "--only") && at + 2 < argc) only = argv[++at];
         else break;
     }
     for (int i = 0; only && strcmp(only, scenes[i]); i++)
         if (i == 5) return fprintf(stderr, "bench_trace: there is no scene %s\n", only), 2;
     csv = at == argc - 1 && argv[at][0] != '-' ? fopen(argv[at], "w") : NULL;
-    if (!csv) return fprintf(stderr, "usage: bench_trace [--quick | --tables] [--only SCENE] OUT.csv\n"), 2;
+    if (!csv) return fprintf(stderr, "usage: bench_trace [--quick | --tables | --dry] [--only SCENE] OUT.csv\n"), 2;
     fprintf(csv, "header,case,method,setting,seconds,error,work,unit\n");
     if ((tables || !quick) && (!only || !strcmp(only, "figure5"))) figure5(csv, 0), figure5(csv, 1);
     if ((tables || !quick) && (!only || !strcmp(only, "cavity"))) lattice_cavity(csv);
     for (int i = 0; i < 4; i++)
-        if (only ? !strcmp(only, scenes[i]) : !quick || i < 2) bench(csv, scenes[i], quick, tables);
+        if (only ? !strcmp(only, scenes[i]) : !quick || i < 2) bench(csv, scenes[i], quick || (dry && i), tables);
     return fclose(csv) != 0;
 }

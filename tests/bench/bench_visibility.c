@@ -1,14 +1,16 @@
 /* The parameter study of Kronander 2011 (section 5), its tables 1 and 2 and the baseline of its figure 14, with our data.
 
-       build/bench/bench_visibility [--quick] [--only SCENE] [--sweeps] OUT.csv      --sweeps: without the paper's method, which takes most of the time
+       build/bench/bench_visibility [--quick] [--only SCENE] [--sweeps] OUT.csv      --sweeps: without the paper's method, which takes most
+       of the time
 
-   Two threads, wall seconds. torus-sphere-plane, the paper's worst case (9 coefficients, 128 rays, radius 16, 1:3, grid 64^3), and bonsai under Grace
-   (4 coefficients, 64 rays, radius 16, 1:6.7, grid 64x64x32); one parameter is varied at a time, by sweeps (the default) and by the paper's
-   method, which alone has a reduction and a radius. Time: of a whole update; in frames-*, of a frame. Errors are those of the frame of 512x512 in
-   the standard view, once as RMSE of sRGB values (cases ...-rmse), once as the share of pixels that look different with a probability above
-   75 % (cases ...-seen; Yee and Newman 2004, with Daly's psychometric function: tests/perceptual.h; 45 degrees wide, 100 cd/m^2), against sweeps with
-   2048 rays on the same grid (rays, reduction, radius), 36 coefficients (coefficients), a grid of four times the points along each axis, twice
-   for torus-sphere-plane (grid), a regular grid of 129 or 193 points along each axis (resolutions, ml256 too). --quick: torus-sphere-plane at 48^3, 128x128 pixels, a few settings. */
+   Two threads, wall seconds. torus-sphere-plane, the paper's worst case (9 coefficients, 128 rays, radius 16, 1:3, grid 64^3), and bonsai
+   under Grace (4 coefficients, 64 rays, radius 16, 1:6.7, grid 64x64x32); one parameter is varied at a time, by sweeps (the default) and by
+   the paper's method, which alone has a reduction and a radius. Time: of a whole update; in frames-*, of a frame. Errors are those of the
+   frame of 512x512 in the standard view, once as RMSE of sRGB values (cases ...-rmse), once as the share of pixels that look different with
+   a probability above 75 % (cases ...-seen; Yee and Newman 2004, with Daly's psychometric function: tests/perceptual.h; 45 degrees wide,
+   100 cd/m^2), against sweeps with 2048 rays on the same grid (rays, reduction, radius), 36 coefficients (coefficients), a grid of four
+   times the points along each axis, twice for torus-sphere-plane (grid), a regular grid of 129 or 193 points along each axis (resolutions,
+   ml256 too). --quick: torus-sphere-plane at 48^3, 128x128 pixels, a few settings. */
 #define ISOGI_IMPLEMENTATION
 #include "isogi_dvr.h"
 #include "hdr.h"
@@ -39,7 +41,8 @@ static double wall_seconds(void) {
     return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
 }
 
-static void row(const char *name, const char *scene, const char *kind, const char *method, const char *setting, double seconds, double error, double work, const char *unit) {
+static void row(const char *name, const char *scene, const char *kind, const char *method, const char *setting, double seconds,
+                double error, double work, const char *unit) {
     fprintf(csv, "isogi_dvr.h,%s-%s%s,%s,%s,%.6g,%.6g,%.6g,%s\n", name, scene, kind, method, setting, seconds, error, work, unit);
     fflush(csv);
     fprintf(stderr, "  %-12s %-20s %-6s %-8s %-22s %9.4f s  error %.4g\n", name, scene, kind, method, setting, seconds, error);
@@ -80,16 +83,23 @@ static frame frame_of(const study *s, const isogi_dvr_desc *desc, int local, con
 }
 
 /* Two rows, one for each error. `rendering`: of the frame's time instead of the update's. */
-static void rows(const char *name, const study *s, const char *method, const char *setting, const frame *f, const frame *reference, int rendering, double work, const char *unit) {
+static void rows(const char *name, const study *s, const char *method, const char *setting, const frame *f, const frame *reference,
+                 int rendering, double work, const char *unit) {
     double sum = 0, seconds = rendering ? f->render : f->update;
     for (int i = 0; i < 3 * SIDE * SIDE; i++) sum += pow((double)f->srgb[i / 3][i % 3] - (double)reference->srgb[i / 3][i % 3], 2);
     row(name, s->name, "-rmse", method, setting, seconds, sqrt(sum / (3.0 * SIDE * SIDE)), work, unit);
-    row(name, s->name, "-seen", method, setting, seconds, fmax(0, perceptual_difference((const float(*)[3])f->srgb, (const float(*)[3])reference->srgb, SIDE, SIDE, 45, 0.75)), work, unit);
+    row(name, s->name, "-seen", method, setting, seconds,
+        fmax(0, perceptual_difference((const float(*)[3])f->srgb, (const float(*)[3])reference->srgb, SIDE, SIDE, 45, 0.75)), work, unit);
 }
 
-static void measure(const char *name, const study *s, const isogi_dvr_desc *desc, int is_default, const char *setting, const frame *reference) {
+static void measure(const char *name, const study *s, const isogi_dvr_desc *desc, int is_default, const char *setting,
+                    const frame *reference) {
     frame f = frame_of(s, desc, 0, &s->lighting);
-    rows(name, s, is_default ? "default" : desc->method == ISOGI_DVR_PAPER ? "paper" : "sweep", setting, &f, reference, 0, (double)(desc->grid[0] * desc->grid[1] * desc->grid[2]) * desc->directions, "ray");
+    rows(name, s,
+         is_default                        ? "default"
+         : desc->method == ISOGI_DVR_PAPER ? "paper"
+                                           : "sweep",
+         setting, &f, reference, 0, (double)(desc->grid[0] * desc->grid[1] * desc->grid[2]) * desc->directions, "ray");
     free(f.srgb);
 }
 
@@ -177,7 +187,11 @@ static void study_resolutions(const study *s) {
             desc = s->base, desc.coarsest = coarsest, desc.grid[0] = desc.grid[1] = desc.grid[2] = points[n];
             frame f = frame_of(s, &desc, 0, &s->lighting);
             snprintf(setting, sizeof setting, "%zu^3: %.2f MB", points[n], (double)f.report.global_bytes / 1e6);
-            rows("resolutions", s, coarsest > 1 ? "coarsest-8" : n ? "regular" : "default", setting, &f, &reference, 0, (double)f.report.grid_points * desc.directions, "ray");
+            rows("resolutions", s,
+                 coarsest > 1 ? "coarsest-8"
+                 : n          ? "regular"
+                              : "default",
+                 setting, &f, &reference, 0, (double)f.report.grid_points * desc.directions, "ray");
             free(f.srgb);
         }
     free(reference.srgb);
@@ -192,7 +206,8 @@ static void study_frames(const study *s) {
     for (int a = 0; a < 3; a++) lights[1].vector[a] = (float)(v->origin[a] + 1.5 * far), lights[1].rgb[a] = (float)(9 * far * far);
     for (int order = 1; order <= 4; order++)
         for (int kind = 0; kind < 3; kind++) {
-            const isogi_lighting lighting = {.env = kind ? (isogi_env){.rgb = NULL} : s->lighting.env, .lights = lights + (kind == 2), .light_count = kind > 0};
+            const isogi_lighting lighting = {
+                .env = kind ? (isogi_env){.rgb = NULL} : s->lighting.env, .lights = lights + (kind == 2), .light_count = kind > 0};
             static const char *const kinds[3] = {"environment", "directional", "point"};
             char setting[64];
             isogi_dvr_desc desc = s->base;
@@ -211,11 +226,14 @@ static void study_shading(const study *s) {
     frame f, reference;
     desc.directions = quick ? 256 : 2048;
     reference = frame_of(s, &desc, 0, &s->lighting);
-    f = frame_of(s, &s->base, 0, &s->lighting), rows("shading", s, "default", "global visibility", &f, &reference, 1, 1, "frame"), free(f.srgb);
+    f = frame_of(s, &s->base, 0, &s->lighting), rows("shading", s, "default", "global visibility", &f, &reference, 1, 1, "frame"),
+    free(f.srgb);
     desc = s->base, desc.method = ISOGI_DVR_PAPER;
     for (int local = 0; local < 2 && !sweeps_alone; local++) {
         f = frame_of(s, &desc, local, &s->lighting);
-        rows("shading", s, local ? "paper-local" : "paper", local ? "local visibility" : "global visibility", &f, &reference, 1, 1, "frame"), free(f.srgb);
+        rows("shading", s, local ? "paper-local" : "paper", local ? "local visibility" : "global visibility", &f, &reference, 1, 1,
+             "frame"),
+            free(f.srgb);
     }
     desc = s->base, desc.shading = ISOGI_DVR_LOCAL;
     f = frame_of(s, &desc, 0, &s->lighting), rows("shading", s, "diffuse", "by the gradient", &f, &reference, 1, 1, "frame"), free(f.srgb);
@@ -229,17 +247,20 @@ static void tables(const study *s) {
     isogi_dvr_desc desc = s->base;
     frame f = frame_of(s, &desc, 0, &s->lighting);
     const double megabyte = 1 << 20;
-    row("table-1", s->name, "", "default", "update", f.update, 0, 1, "update"), row("table-1", s->name, "", "frame", "by sweeps", f.render, 0, 1, "frame");
+    row("table-1", s->name, "", "default", "update", f.update, 0, 1, "update"),
+        row("table-1", s->name, "", "frame", "by sweeps", f.render, 0, 1, "frame");
     row("table-2", s->name, "", "default", "megabytes: global", f.update, (double)f.report.global_bytes / megabyte, 1, "update");
     free(f.srgb);
     if (sweeps_alone) return;
     desc.method = ISOGI_DVR_PAPER, f = frame_of(s, &desc, 0, &s->lighting);
-    row("table-1", s->name, "", "paper", "update", f.update, 0, 1, "update"), row("table-1", s->name, "", "paper-frame", "by blocks", f.render, 0, 1, "frame");
+    row("table-1", s->name, "", "paper", "update", f.update, 0, 1, "update"),
+        row("table-1", s->name, "", "paper-frame", "by blocks", f.render, 0, 1, "frame");
     row("table-2", s->name, "", "paper", "megabytes: data", f.update, (double)f.report.data_bytes / megabyte, 1, "update");
     row("table-2", s->name, "", "paper", "megabytes: index", f.update, (double)f.report.index_bytes / megabyte, 1, "update");
     row("table-2", s->name, "", "paper", "megabytes: local", f.update, (double)f.report.local_bytes / megabyte, 1, "update");
     row("table-2", s->name, "", "paper", "megabytes: global", f.update, (double)f.report.global_bytes / megabyte, 1, "update");
-    row("table-2", s->name, "", "paper", "megabytes: all", f.update, (double)(f.report.data_bytes + f.report.index_bytes + f.report.local_bytes + f.report.global_bytes) / megabyte, 1, "update");
+    row("table-2", s->name, "", "paper", "megabytes: all", f.update,
+        (double)(f.report.data_bytes + f.report.index_bytes + f.report.local_bytes + f.report.global_bytes) / megabyte, 1, "update");
     free(f.srgb);
 }
 
@@ -262,21 +283,24 @@ static void expose(study *s) {
     isogi_dvr *dvr = NULL;
     view.width = view.height = 128;
     float(*image)[4] = (float(*)[4])malloc(128 * 128 * sizeof *image);
-    need(isogi_dvr_create(&dvr, &desc, &two), "create"), need(isogi_dvr_set_transfer(dvr, &s->transfer), "set_transfer"), need(isogi_dvr_step(dvr, 0, NULL), "step");
+    need(isogi_dvr_create(&dvr, &desc, &two), "create"), need(isogi_dvr_set_transfer(dvr, &s->transfer), "set_transfer"),
+        need(isogi_dvr_step(dvr, 0, NULL), "step");
     need(image ? isogi_dvr_render(dvr, &view, &s->lighting, image, NULL, NULL) : ISOGI_NO_MEMORY, "render");
     s->exposure = picture_exposure((const float(*)[4])image, 128 * 128, 0.9, 0.6);
     isogi_dvr_free(dvr), free(image);
 }
 
 static void bench_procedural(void) {
-    static const isogi_transfer_point p[] = {{0, {.85f, .8f, .75f}, 0}, {.5, {.85f, .8f, .75f}, 0}, {.5, {.85f, .8f, .75f}, 8}, {1, {.85f, .8f, .75f}, 8}};
+    static const isogi_transfer_point p[] = {
+        {0, {.85f, .8f, .75f}, 0}, {.5, {.85f, .8f, .75f}, 0}, {.5, {.85f, .8f, .75f}, 8}, {1, {.85f, .8f, .75f}, 8}};
     const isogi_light sun = {.vector = {1, 2, 1.5f}, .rgb = {9, 9, 9}};
     const double toward[3] = {1.5, 1.2, 2};
     const float up[3] = {0, 1, 0};
     study s = {.name = "torus-sphere-plane", .transfer = {.points = p, .point_count = 4}, .lighting = {.lights = &sun, .light_count = 1},
                .base = {.order = 3, .directions = 128, .reduction = 3, .grid = {64, 64, 64}}};
     isogi_volume volume;
-    need(procedural_make(procedural_find("torus-sphere-plane"), quick ? 48 : 128, &volume, &two), "volume"), need(isogi_vol_build(&s.pyramid, &volume, &two), "build");
+    need(procedural_make(procedural_find("torus-sphere-plane"), quick ? 48 : 128, &volume, &two), "volume"),
+        need(isogi_vol_build(&s.pyramid, &volume, &two), "build");
     if (quick) s.base.grid[0] = s.base.grid[1] = s.base.grid[2] = 24, s.base.directions = 64;
     look_at(&s, toward, up), expose(&s);
     study_rays(&s), study_coefficients(&s), study_blocks(&s), study_grids(&s), study_resolutions(&s), study_frames(&s), study_shading(&s);
@@ -291,9 +315,12 @@ static void bench_marschner_lobb(void) {
     const float up[3] = {0, 1, 0};
     const size_t n = 256;
     float *data = (float *)malloc(n * n * n * sizeof *data);
-    isogi_volume volume = {.data = data, .type = ISOGI_F32, .size = {n, n, n}, .spacing = {spacing, spacing, spacing}, .origin = {-1, -1, -1}};
+    isogi_volume volume = {
+        .data = data, .type = ISOGI_F32, .size = {n, n, n}, .spacing = {spacing, spacing, spacing}, .origin = {-1, -1, -1}};
     double range[2], half;
-    study s = {.name = "ml256", .lighting = {.env = {.sh = sky, .sh_order = 1}, .lights = &sun, .light_count = 1}, .base = {.order = 3, .directions = 32, .grid = {64, 64, 64}}};
+    study s = {.name = "ml256",
+               .lighting = {.env = {.sh = sky, .sh_order = 1}, .lights = &sun, .light_count = 1},
+               .base = {.order = 3, .directions = 32, .grid = {64, 64, 64}}};
     if (!data) exit(1);
     for (size_t i = 0; i < n * n * n; i++) {
         double x = -1 + spacing * (double)(i % n), y = -1 + spacing * (double)(i / n % n), z = -1 + spacing * (double)(i / n / n);
@@ -309,15 +336,25 @@ static void bench_marschner_lobb(void) {
 
 /* The volumes of its tables that we have: bonsai, of another resolution than the paper's, engine, half of it, and fuel. */
 static void bench_real(int which) {
-    static const isogi_transfer_point bonsai[] = {{0, {.3f, .7f, .2f}, 0}, {25, {.3f, .7f, .2f}, 0}, {40, {.3f, .7f, .2f}, .15f}, {80, {.5f, .35f, .2f}, .2f}, {160, {.6f, .6f, .6f}, .6f}, {255, {.7f, .7f, .7f}, .9f}};
-    static const isogi_transfer_point engine[] = {{0, {.8f, .8f, .8f}, 0}, {70, {.8f, .8f, .8f}, 0}, {100, {.8f, .8f, .8f}, .02f}, {150, {.8f, .8f, .8f}, .05f}, {180, {1, .7f, .3f}, .4f}, {255, {1, .6f, .2f}, .8f}};
-    static const isogi_transfer_point fuel[] = {{0, {.2f, .4f, 1}, 0}, {10, {.2f, .4f, 1}, 0}, {40, {.2f, .4f, 1}, .1f}, {120, {1, .8f, .2f}, .5f}, {255, {1, .2f, .1f}, 1}};
+    static const isogi_transfer_point bonsai[] = {{0, {.3f, .7f, .2f}, 0},     {25, {.3f, .7f, .2f}, 0},    {40, {.3f, .7f, .2f}, .15f},
+                                                  {80, {.5f, .35f, .2f}, .2f}, {160, {.6f, .6f, .6f}, .6f}, {255, {.7f, .7f, .7f}, .9f}};
+    static const isogi_transfer_point engine[] = {{0, {.8f, .8f, .8f}, 0},      {70, {.8f, .8f, .8f}, 0},  {100, {.8f, .8f, .8f}, .02f},
+                                                  {150, {.8f, .8f, .8f}, .05f}, {180, {1, .7f, .3f}, .4f}, {255, {1, .6f, .2f}, .8f}};
+    static const isogi_transfer_point fuel[] = {
+        {0, {.2f, .4f, 1}, 0}, {10, {.2f, .4f, 1}, 0}, {40, {.2f, .4f, 1}, .1f}, {120, {1, .8f, .2f}, .5f}, {255, {1, .2f, .1f}, 1}};
     static const isogi_light sun = {.vector = {1, 1, 1}, .rgb = {3, 3, 3}};
     static const char *const files[3] = {"bonsai_256x256x256_uint8.raw", "engine_256x256x128_uint8.raw", "fuel_64x64x64_uint8.raw"};
-    const size_t sizes[3][3] = {{256, 256, 256}, {256, 256, 128}, {64, 64, 64}}, count = sizes[which][0] * sizes[which][1] * sizes[which][2];
-    study s[3] = {{.name = "bonsai", .transfer = {.points = bonsai, .point_count = 6}, .base = {.order = 2, .directions = 64, .reduction = 6.7, .grid = {64, 64, 32}}},
-                  {.name = "engine", .transfer = {.points = engine, .point_count = 6}, .base = {.order = 3, .directions = 32, .reduction = 2.8, .grid = {32, 32, 32}}},
-                  {.name = "fuel", .transfer = {.points = fuel, .point_count = 5}, .lighting = {.lights = &sun, .light_count = 1},
+    const size_t sizes[3][3] = {{256, 256, 256}, {256, 256, 128}, {64, 64, 64}},
+                 count = sizes[which][0] * sizes[which][1] * sizes[which][2];
+    study s[3] = {{.name = "bonsai",
+                   .transfer = {.points = bonsai, .point_count = 6},
+                   .base = {.order = 2, .directions = 64, .reduction = 6.7, .grid = {64, 64, 32}}},
+                  {.name = "engine",
+                   .transfer = {.points = engine, .point_count = 6},
+                   .base = {.order = 3, .directions = 32, .reduction = 2.8, .grid = {32, 32, 32}}},
+                  {.name = "fuel",
+                   .transfer = {.points = fuel, .point_count = 5},
+                   .lighting = {.lights = &sun, .light_count = 1},
                    .base = {.order = 4, .directions = 128, .reduction = 4, .grid = {64, 64, 64}}}};
     const char *folder = getenv("ISOGI_DATA");
     char path[1024], error[512];
@@ -337,11 +374,13 @@ static void bench_real(int which) {
     }
     fclose(file);
     snprintf(path, sizeof path, "%s/hdr/grace_256x128.hdr", folder);
-    if (which < 2 && hdr_read(path, &image, error)) s[which].lighting.env.rgb = image.rgb, s[which].lighting.env.width = image.width, s[which].lighting.env.height = image.height;
+    if (which < 2 && hdr_read(path, &image, error))
+        s[which].lighting.env.rgb = image.rgb, s[which].lighting.env.width = image.width, s[which].lighting.env.height = image.height;
     need(isogi_vol_build(&s[which].pyramid, &volume, &two), "build");
     look_at(&s[which], which ? upright : turned, up[!which]), expose(&s[which]);
     tables(&s[which]);
-    if (!which) study_rays(s), study_coefficients(s), study_blocks(s), study_grids(s), study_resolutions(s), study_frames(s), study_shading(s);
+    if (!which)
+        study_rays(s), study_coefficients(s), study_blocks(s), study_grids(s), study_resolutions(s), study_frames(s), study_shading(s);
     isogi_vol_free(s[which].pyramid), free(image.rgb), free(data);
 }
 
@@ -354,7 +393,8 @@ int main(int argc, char **argv) {
         else if (!strcmp(argv[i], "--only") && i + 1 < argc) only = argv[++i];
         else path = argv[i];
     }
-    if (!path || path[0] == '-' || !(csv = fopen(path, "w"))) return fprintf(stderr, "usage: %s [--quick] [--only SCENE] [--sweeps] OUT.csv\n", argv[0]), 2;
+    if (!path || path[0] == '-' || !(csv = fopen(path, "w")))
+        return fprintf(stderr, "usage: %s [--quick] [--only SCENE] [--sweeps] OUT.csv\n", argv[0]), 2;
     fprintf(csv, "header,case,method,setting,seconds,error,work,unit\n");
     if (!only || !strcmp(only, "torus-sphere-plane")) bench_procedural();
     for (int which = 0; which < 3 && !quick; which++)

@@ -21,12 +21,13 @@ static int runs = 5, sampled = 4000;
 static struct { char name[48]; double speed; } result[128];
 static int results;
 
-static void row(const char *name, const char *scene_name, const char *method, const char *setting, double seconds, double error, double work,
-                const char *unit) {
+static void row(const char *name, const char *scene_name, const char *method, const char *setting, double seconds, double error,
+                double work, const char *unit) {
     fprintf(csv, "isogi_vol.h,%s%s%s,%s,%s,%.6g,%.6g,%.6g,%s\n", name, scene_name ? "-" : "", scene_name ? scene_name : "", method, setting,
             seconds, error, work, unit);
     fflush(csv);
-    fprintf(stderr, "  %-20s %-10s %-10s %9.3f M%s  error %.3g  %s\n", name, scene_name ? scene_name : "", method, work / seconds / 1e6, unit, error, setting);
+    fprintf(stderr, "  %-20s %-10s %-10s %9.3f M%s  error %.3g  %s\n", name, scene_name ? scene_name : "", method, work / seconds / 1e6,
+            unit, error, setting);
     if (!strcmp(method, "default") && results < 128) {
         snprintf(result[results].name, sizeof result->name, "%s%s%s", name, scene_name ? "-" : "", scene_name ? scene_name : "");
         result[results++].speed = work / seconds / 1e6;
@@ -93,7 +94,8 @@ static void bench_rays(const scene *s, const char *name, const isogi_ray *rays, 
         seconds[run] = cpu_seconds() - start;
     }
     error = wrong_hits(s, rays, kind == ANY ? NULL : hits, kind == ANY ? occluded : NULL, &t99);
-    snprintf(looked, sizeof looked, "per ray %.2f blocks %.2f cells %.2f cubics", (double)count.blocks / RAYS, (double)count.cells / RAYS, (double)count.cubics / RAYS);
+    snprintf(looked, sizeof looked, "per ray %.2f blocks %.2f cells %.2f cubics", (double)count.blocks / RAYS, (double)count.cells / RAYS,
+             (double)count.cubics / RAYS);
     if (kind == ANY) snprintf(setting, sizeof setting, "batch %zu; %s", batch, looked);
     else snprintf(setting, sizeof setting, "batch %zu; t99 %.2g voxels; %s", batch, t99, looked);
     row(name, s->name, "default", setting, median(seconds, runs), error, RAYS, "rays");
@@ -126,13 +128,15 @@ static real spline_at(const scene *s, const int cell[3], const real u[3], int al
             if (a == along) weight *= (x < 1 ? (9 * x - 12) * x / 6 : -y * y / 2) * (d < 0 ? -1 : 1);
             else weight *= x < 1 ? ((real)4 - 6 * x * x + 3 * x * x * x) / 6 : y * y * y / 6;
         }
-        sum += weight * (real)s->reference[(cell[0] + tap[0] - 1) + (ptrdiff_t)s->n * ((cell[1] + tap[1] - 1) + (ptrdiff_t)s->n * (cell[2] + tap[2] - 1))];
+        sum += weight * (real)s->reference[(cell[0] + tap[0] - 1) +
+                                           (ptrdiff_t)s->n * ((cell[1] + tap[1] - 1) + (ptrdiff_t)s->n * (cell[2] + tap[2] - 1))];
     }
     return sum;
 }
 
 /* Largest error of a sample of values, against long double. */
-static double worst_sample(const scene *s, const float (*points)[3], const float *values, size_t count, int smooth, double unit, double low) {
+static double worst_sample(const scene *s, const float (*points)[3], const float *values, size_t count, int smooth, double unit,
+                           double low) {
     double worst = 0, h = 2.0 / (s->n - 1);
     reference_field field = {s->reference, {s->n, s->n, s->n}, 0};
     for (size_t i = 0; i < count; i += 1009) {
@@ -172,7 +176,8 @@ static void bench_samples(const scene *s, const char *name, int smooth, int plac
     for (size_t i = 0; i < count; i++) {
         const isogi_ray *ray = &s->primary[places == NEIGHBOURS ? RAYS / 2 - WIDTH * 2 + i / 256 : i / 256 * 128];
         double t = 1.9 + 0.5 * h * (double)(i % 256);
-        for (int a = 0; a < 3; a++) points[i][a] = (float)(places == ANYWHERE ? 2 * random_unit() - 1 : ray->origin[a] + t * (double)ray->dir[a]);
+        for (int a = 0; a < 3; a++)
+            points[i][a] = (float)(places == ANYWHERE ? 2 * random_unit() - 1 : ray->origin[a] + t * (double)ray->dir[a]);
     }
     for (int run = -1; run < runs; run++) { /* the first run touches the memory */
         double start = cpu_seconds();
@@ -181,7 +186,8 @@ static void bench_samples(const scene *s, const char *name, int smooth, int plac
         if (run >= 0) seconds[run] = cpu_seconds() - start;
     }
     worst = worst_sample(s, (const float(*)[3])points, values, count, smooth, bytes ? 1 / 85.0 : 1, bytes ? -1.5 : 0);
-    row(name, NULL, "default", smooth ? "value and gradient; error: largest of value" : "error: largest of value", median(seconds, runs), worst, (double)count, "samples");
+    row(name, NULL, "default", smooth ? "value and gradient; error: largest of value" : "error: largest of value", median(seconds, runs),
+        worst, (double)count, "samples");
     if (bytes) {
         isogi_vol_free(pyramid);
         for (size_t i = 0; i < voxels; i++) s->reference[i] = (double)s->data[i];
@@ -264,7 +270,9 @@ static void bench_mesh(const scene *s, const char *name, int normals) {
     else worst = worst_vertex(s, &mesh, &middles);
     char setting[128];
     if (normals) snprintf(setting, sizeof setting, "%zu triangles; error: largest of normals in radians", mesh.triangle_count);
-    else snprintf(setting, sizeof setting, "%zu triangles; error: largest of vertices in voxels; 99 %% of triangles' middles within %.2g", mesh.triangle_count, middles);
+    else
+        snprintf(setting, sizeof setting, "%zu triangles; error: largest of vertices in voxels; 99 %% of triangles' middles within %.2g",
+                 mesh.triangle_count, middles);
     row(name, s->name, "default", setting, median(seconds, runs), worst, (double)N * N * N, "voxels");
     isogi_vol_mesh_free(s->pyramid, &mesh);
 }
@@ -293,7 +301,8 @@ static void print_table(void) {
     for (size_t i = 0; i < sizeof lines / sizeof *lines; i++)
         for (int k = 0; k < results; k++) {
             if (strcmp(result[k].name, lines[i].name)) continue;
-            printf("%-24s %9.2f %9.0f %7.0f%%   %s\n", lines[i].name, result[k].speed, lines[i].goal, 100 * result[k].speed / lines[i].goal, lines[i].peers);
+            printf("%-24s %9.2f %9.0f %7.0f%%   %s\n", lines[i].name, result[k].speed, lines[i].goal, 100 * result[k].speed / lines[i].goal,
+                   lines[i].peers);
         }
 }
 

@@ -1,7 +1,10 @@
 #!/bin/sh
 # Benchmarks write the table that is promised: the eight columns, finite positive numbers, for each case one row of the default, and every
-# case that is asked for. contract.sh [sh|vol|trace|dvr]...; cases of real volumes are wanted where ISOGI_DATA holds them.
+# case that is asked for. contract.sh [--dry] [sh|vol|trace|dvr]...; cases of real volumes are wanted where ISOGI_DATA holds them. --dry, of
+# trace and dvr: tiny stand-ins for all scenes, with the cases of the full benchmark; seconds instead of minutes.
 set -e
+dry=
+[ "$1" != --dry ] || { dry=1; shift; }
 [ $# -gt 0 ] || set -- sh vol trace dvr
 
 wanted() {
@@ -14,22 +17,33 @@ wanted() {
             for rays in primary1 primary16 surface anyhit bundle64; do echo $rays-$field; done
          done
          echo pyramid-256 trilinear-along-rays tricubic-along-rays tricubic-random mesh-gyroid256 mesh-normals-gyroid256 ;;
-    trace) for scene in engine-block $(have engine_256x256x128_uint8.raw engine); do
-            echo speedup-$scene rays-$scene threads-$scene lazy-$scene lazy-converged-$scene
-           done ;;
+    trace) for scene in engine-block $(have engine_256x256x128_uint8.raw engine) ${dry:+bonsai cthead}; do
+            echo speedup-$scene speedup-$scene:naive filter-$scene filter-$scene:filter-off rays-$scene threads-$scene lazy-$scene \
+                lazy-converged-$scene
+           done
+           [ -z "$dry" ] || echo full-engine-block table1-engine-block table1-engine-block:irradiance table1-engine-block:transfer \
+               table2-engine-block table2-engine-block:transfer lattice-engine-block lattice-cavity figure5-ball-points-macroscopic \
+               figure5-hollow-texture-microscopic ;;
     dvr) echo frame-ml256 frame-gyroid256 frame-scale-invariant-gyroid256 \
         $(have engine_256x256x128_uint8.raw frame-engine tf-update-engine tf-update-engine:paper tf-update-engine:sweep) \
         $(have bonsai_256x256x256_uint8.raw frame-bonsai tf-update-bonsai tf-update-bonsai:paper tf-update-bonsai:sweep) \
         $(have fuel_64x64x64_uint8.raw tf-update-fuel tf-update-fuel:paper tf-update-fuel:sweep) ;;
     esac
 }
-have() { [ -z "$ISOGI_DATA" ] || [ ! -f "$ISOGI_DATA/$1" ] || { shift; echo "$@"; }; }
+have() { [ -z "$dry" ] || { shift; echo "$@"; return; }
+    [ -z "$ISOGI_DATA" ] || [ ! -f "$ISOGI_DATA/$1" ] || { shift; echo "$@"; }; }
 
 lines=0
 for only; do
     begun=$(date +%s)
-    ${MAKE:-make} --no-print-directory bench QUICK=1 ONLY=$only
-    table=build/bench/$only.csv
+    table=build/bench/${dry:+dry-}$only.csv
+    if [ "$dry" ]; then
+        ${MAKE:-make} --no-print-directory build/bench/bench_$only build/bench/plot
+        build/bench/bench_$only --dry "$table"
+        build/bench/plot "$table" "${table%.csv}.svg"
+    else
+        ${MAKE:-make} --no-print-directory bench QUICK=1 ONLY=$only
+    fi
     [ "$(head -n 1 "$table")" = header,case,method,setting,seconds,error,work,unit ] || { echo "$table: other columns"; exit 1; }
     awk -F, -v file="$table" -v wanted="$(wanted $only | tr '\n' ' ')" '
         function number(x) { return x ~ /^[0-9]*\.?[0-9]+([eE][-+]?[0-9]+)?$/ }

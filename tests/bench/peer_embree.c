@@ -39,8 +39,10 @@ static peer peer_new(const scene *s, enum RTCBuildQuality quality) {
     }
     p.triangles = mesh.triangle_count;
     RTCGeometry g = rtcNewGeometry(p.device, RTC_GEOMETRY_TYPE_TRIANGLE);
-    memcpy(rtcSetNewGeometryBuffer(g, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, 12, mesh.vertex_count), mesh.positions, 12 * mesh.vertex_count);
-    memcpy(rtcSetNewGeometryBuffer(g, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, 12, mesh.triangle_count), mesh.triangles, 12 * mesh.triangle_count);
+    memcpy(rtcSetNewGeometryBuffer(g, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, 12, mesh.vertex_count), mesh.positions,
+           12 * mesh.vertex_count);
+    memcpy(rtcSetNewGeometryBuffer(g, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, 12, mesh.triangle_count), mesh.triangles,
+           12 * mesh.triangle_count);
     start = cpu_seconds();
     rtcSetGeometryBuildQuality(g, quality);
     rtcCommitGeometry(g);
@@ -98,7 +100,8 @@ static void trace_packets(const peer *p, struct RTCIntersectContext *context, co
 static void trace_streams(const peer *p, struct RTCIntersectContext *context, const isogi_ray *rays, size_t count, int any, float *t) {
     for (size_t i = 0; i < count; i += BUNDLE) {
         struct RTCRayHit r[BUNDLE];
-        for (size_t k = 0; k < BUNDLE; k++) fill(&r[k].ray, &rays[i + k]), r[k].ray.id = (unsigned)k, r[k].hit.geomID = RTC_INVALID_GEOMETRY_ID;
+        for (size_t k = 0; k < BUNDLE; k++)
+            fill(&r[k].ray, &rays[i + k]), r[k].ray.id = (unsigned)k, r[k].hit.geomID = RTC_INVALID_GEOMETRY_ID;
         if (any) rtcOccluded1M(p->scene, context, &r[0].ray, BUNDLE, sizeof r[0]);
         else rtcIntersect1M(p->scene, context, r, BUNDLE, sizeof r[0]);
         for (size_t k = 0; k < BUNDLE; k++) {
@@ -183,8 +186,8 @@ int main(int argc, char **argv) {
         peer p = peer_new(&s, quality);
         for (size_t i = 0; i < sizeof works / sizeof *works; i++)
             compare(&s, &p, &works[i], i < 2 ? s.primary : i < 4 ? s.surface : s.bundles, works[i].ratios[gyroid], runs);
-        printf("%-10s %-10s our pyramid serves every isovalue; Embree: %zu triangles in %.0f ms, hierarchy in %.0f ms\n", "isovalue", s.name, p.triangles,
-               1e3 * p.mesh_seconds, 1e3 * p.build_seconds);
+        printf("%-10s %-10s our pyramid serves every isovalue; Embree: %zu triangles in %.0f ms, hierarchy in %.0f ms\n", "isovalue",
+               s.name, p.triangles, 1e3 * p.mesh_seconds, 1e3 * p.build_seconds);
         peer_free(&p);
         scene_free(&s);
     }

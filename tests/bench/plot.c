@@ -160,7 +160,10 @@ static void label(double x, double y, const char *words, const char *colour, con
         box b = {tx - left - 1, ty - 9, tx - left + width + 1, ty + 2};
         if (b.x0 < frame->x0 || b.x1 > frame->x1 || b.y0 < frame->y0 || b.y1 > frame->y1 || overlaps(taken, *count, &b)) continue;
         taken[(*count)++] = b;
-        snprintf(style, sizeof style, "class=\"label\" fill=\"%s\" text-anchor=\"%s\"", colour, shift[k][0] > 0 ? "start" : shift[k][0] < 0 ? "end" : "middle");
+        snprintf(style, sizeof style, "class=\"label\" fill=\"%s\" text-anchor=\"%s\"", colour,
+                 shift[k][0] > 0   ? "start"
+                 : shift[k][0] < 0 ? "end"
+                                   : "middle");
         text(tx, ty, style, shown);
         return;
     }
@@ -222,7 +225,8 @@ static void panel(const char *name, double left, double top) {
     double legend = left + LEFT;
     axis x, y;
     panel_axes(name, &frame, &x, &y, &zeros);
-    fprintf(svg, "<rect class=\"card\" x=\"%.1f\" y=\"%.1f\" width=\"%d\" height=\"%d\" rx=\"8\"/>\n", left + 4, top + 4, PANEL_W - 8, PANEL_H - 8);
+    fprintf(svg, "<rect class=\"card\" x=\"%.1f\" y=\"%.1f\" width=\"%d\" height=\"%d\" rx=\"8\"/>\n", left + 4, top + 4, PANEL_W - 8,
+            PANEL_H - 8);
     text(left + LEFT, top + 30, "class=\"name\"", name);
     ticks(&x, 0, frame.y0, frame.y1);
     ticks(&y, 1, frame.x0, frame.x1);
@@ -232,8 +236,8 @@ static void panel(const char *name, double left, double top) {
     }
     fprintf(svg, "<path class=\"axis\" d=\"M%.1f %.1fV%.1fH%.1f\"/>\n", frame.x0, frame.y0, frame.y1, frame.x1);
     text((frame.x0 + frame.x1) / 2, frame.y1 + 34, "class=\"tick\" text-anchor=\"middle\"", "error");
-    fprintf(svg, "<text class=\"tick\" text-anchor=\"middle\" transform=\"translate(%.1f %.1f) rotate(-90)\">%s</text>\n", left + 18, (frame.y0 + frame.y1) / 2,
-            y.high > log10(2) && strstr(name, "truncation") ? "order" : "seconds");
+    fprintf(svg, "<text class=\"tick\" text-anchor=\"middle\" transform=\"translate(%.1f %.1f) rotate(-90)\">%s</text>\n", left + 18,
+            (frame.y0 + frame.y1) / 2, y.high > log10(2) && strstr(name, "truncation") ? "order" : "seconds");
     for (int m = 0; m < methods; m++) { /* every point keeps its own place free before any label is put */
         int n = pick(name, method[m], picked);
         for (int i = 0; i < n; i++) {
@@ -245,7 +249,8 @@ static void panel(const char *name, double left, double top) {
         int n = pick(name, method[m], picked), pen = 0;
         fprintf(svg, "<path class=\"curve\" stroke=\"%s\" stroke-width=\"%s\" d=\"", colours[m], m ? "1.5" : "2.5");
         for (int i = 0; i < n; i++)
-            if (picked[i]->error > 0) fprintf(svg, "%s%.1f %.1f", pen++ ? "L" : "M", place(&x, picked[i]->error), place(&y, height(picked[i])));
+            if (picked[i]->error > 0)
+                fprintf(svg, "%s%.1f %.1f", pen++ ? "L" : "M", place(&x, picked[i]->error), place(&y, height(picked[i])));
         fputs(pen ? "\"/>\n" : "M0 0\"/>\n", svg);
         for (int i = 0; i < n; i++) {
             double px = picked[i]->error > 0 ? place(&x, picked[i]->error) : frame.x0 + 15, py = place(&y, height(picked[i]));
@@ -253,15 +258,15 @@ static void panel(const char *name, double left, double top) {
             rate_text(picked[i], rate, sizeof rate);
             fputs("<g><title>", svg);
             put(method[m]), put(", "), put(picked[i]->setting), put(", "), put(rate);
-            fprintf(svg, ", %.4g s, error %.4g</title><circle cx=\"%.1f\" cy=\"%.1f\" r=\"%s\" fill=\"%s\"/></g>\n", picked[i]->seconds, picked[i]->error, px, py,
-                    m ? "3" : "4", colours[m]);
+            fprintf(svg, ", %.4g s, error %.4g</title><circle cx=\"%.1f\" cy=\"%.1f\" r=\"%s\" fill=\"%s\"/></g>\n", picked[i]->seconds,
+                    picked[i]->error, px, py, m ? "3" : "4", colours[m]);
         }
     }
     for (int m = 0; m < methods; m++) {
         int n = pick(name, method[m], picked);
         for (int i = 0; i < n; i++)
-            label(picked[i]->error > 0 ? place(&x, picked[i]->error) : frame.x0 + 15, place(&y, height(picked[i])), picked[i]->setting, colours[m], &frame,
-                  taken, &count);
+            label(picked[i]->error > 0 ? place(&x, picked[i]->error) : frame.x0 + 15, place(&y, height(picked[i])), picked[i]->setting,
+                  colours[m], &frame, taken, &count);
         fprintf(svg, "<circle cx=\"%.1f\" cy=\"%.1f\" r=\"4\" fill=\"%s\"/>\n", legend + 4, top + 45, colours[m]);
         text(legend + 13, top + 49, "class=\"key\"", method[m]);
         legend += 30 + 6.2 * (double)strlen(method[m]);
@@ -303,16 +308,23 @@ static void page(void) {
         }
     lines = (panels + COLUMNS - 1) / COLUMNS;
     height = 86 + lines * PANEL_H + (singles ? 30 + (singles + 1) * LINE_H : 0) + MARGIN;
-    fprintf(svg, "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"%d\" height=\"%d\" viewBox=\"0 0 %d %d\" font-family=\"system-ui,Helvetica,Arial,sans-serif\">\n",
+    fprintf(svg,
+            "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"%d\" height=\"%d\" viewBox=\"0 0 %d %d\" "
+            "font-family=\"system-ui,Helvetica,Arial,sans-serif\">\n",
             width, height, width, height);
-    fputs("<style>.card{fill:#fff;stroke:#dde1e6}.grid{stroke:#e3e6ea;fill:none}.fine{stroke:#f2f4f6;fill:none}.axis{stroke:#8b929a;fill:none}"
+    fputs("<style>.card{fill:#fff;stroke:#dde1e6}.grid{stroke:#e3e6ea;fill:none}.fine{stroke:#f2f4f6;fill:none}.axis{stroke:#8b929a;fill:"
+          "none}"
           ".tick{font-size:10.5px;fill:#5a6068}.name{font-size:15px;font-weight:600;fill:#1d2126}.key{font-size:11.5px;fill:#3a4048}"
-          ".label{font-size:10px}.curve{fill:none;stroke-linejoin:round;stroke-linecap:round}.title{font-size:22px;font-weight:700;fill:#1d2126}"
-          ".sub{font-size:13px;fill:#5a6068}.head{font-size:11.5px;font-weight:600;fill:#5a6068}.cell{font-size:12.5px;fill:#1d2126}</style>\n", svg);
+          ".label{font-size:10px}.curve{fill:none;stroke-linejoin:round;stroke-linecap:round}.title{font-size:22px;font-weight:700;fill:#"
+          "1d2126}"
+          ".sub{font-size:13px;fill:#5a6068}.head{font-size:11.5px;font-weight:600;fill:#5a6068}.cell{font-size:12.5px;fill:#1d2126}</"
+          "style>\n",
+          svg);
     fprintf(svg, "<rect width=\"%d\" height=\"%d\" fill=\"#f7f8fa\"/>\n", width, height);
     snprintf(title, sizeof title, "%s: run time against error", row_count ? rows[0].header : "nothing measured");
     text(MARGIN + 4, 40, "class=\"title\"", title);
-    text(MARGIN + 4, 64, "class=\"sub\"", "Left is more exact, down is faster; both axes logarithmic, one dot for each setting. Rates are work per second.");
+    text(MARGIN + 4, 64, "class=\"sub\"",
+         "Left is more exact, down is faster; both axes logarithmic, one dot for each setting. Rates are work per second.");
     for (int i = 0; i < row_count; i++) {
         if (!is_first(i) || points_of(rows[i].name) < 2) continue;
         panel(rows[i].name, MARGIN + drawn % COLUMNS * PANEL_W, 82 + drawn / COLUMNS * PANEL_H);

@@ -91,7 +91,8 @@ static int usual_cardano(const double k[4], double *root) {
     int n = 0;
     const double size = fabs(k[0]) + fabs(k[1]) + fabs(k[2]);
     if (fabs(k[3]) > 1e-12 * size) {
-        const double a = k[2] / k[3], b = k[1] / k[3], c = k[0] / k[3], q = (a * a - 3 * b) / 9, p = (2 * a * a * a - 9 * a * b + 27 * c) / 54;
+        const double a = k[2] / k[3], b = k[1] / k[3], c = k[0] / k[3], q = (a * a - 3 * b) / 9,
+                     p = (2 * a * a * a - 9 * a * b + 27 * c) / 54;
         if (p * p < q * q * q) {
             const double angle = acos(p / sqrt(q * q * q)), m = -2 * sqrt(q), third = 2.0943951023931953;
             for (int i = 0; i < 3; i++) r[n++] = m * cos(angle / 3 + third * (i - 1)) - a / 3;
@@ -174,8 +175,10 @@ static int usual_trace(const isogi_pyramid *p, usual_method method, const isogi_
         cell[a] = (int)x < cells ? (int)x : cells - 1;
     }
     while (t < end) {
-        const float *range = level.range[(size_t)(cell[0] >> 2) + level.size[0] * ((size_t)(cell[1] >> 2) + level.size[1] * (size_t)(cell[2] >> 2))];
-        const int active = (double)range[0] < ray->isovalue && (double)range[1] >= ray->isovalue, whole = !active || method == USUAL_MARCHING;
+        const float *range =
+            level.range[(size_t)(cell[0] >> 2) + level.size[0] * ((size_t)(cell[1] >> 2) + level.size[1] * (size_t)(cell[2] >> 2))];
+        const int active = (double)range[0] < ray->isovalue && (double)range[1] >= ray->isovalue,
+                  whole = !active || method == USUAL_MARCHING;
         double out = 1e300;
         int axis = 0;
         for (int a = 0; a < 3; a++) {

@@ -66,7 +66,8 @@ static void field_fill(float *data, int gyroid, int n) {
     }
     for (size_t i = 0; i < size * size * size; i++) {
         size_t x = i % size, y = i / size % size, z = i / size / size;
-        data[i] = (float)(gyroid ? s[x] * c[y] + s[y] * c[z] + s[z] * c[x] : (1 - s[z] + 0.25 * (1 + wave[i % (size * size)])) / (2 * (1 + 0.25)));
+        data[i] = (float)(gyroid ? s[x] * c[y] + s[y] * c[z] + s[z] * c[x]
+                                 : (1 - s[z] + 0.25 * (1 + wave[i % (size * size)])) / (2 * (1 + 0.25)));
     }
     free(wave);
 }
@@ -153,7 +154,8 @@ static void scene_free(scene *s) {
 }
 
 /* A call of the library over all rays, `batch` at a time. bundle: rays of a batch share their origin. */
-static void trace_all(const scene *s, const isogi_ray *rays, size_t batch, int bundle, isogi_hit *hits, uint8_t *occluded, isogi_counters *counters) {
+static void trace_all(const scene *s, const isogi_ray *rays, size_t batch, int bundle, isogi_hit *hits, uint8_t *occluded,
+                      isogi_counters *counters) {
     static float dirs[BUNDLE][3];
     for (size_t i = 0; i < RAYS; i += batch) {
         if (bundle) {

@@ -52,9 +52,10 @@ unfinished-words)
     ;;
 private-macros) # what the implementation defines for itself is gone after it
     for h in $headers; do
-        sed -n 's/^ *# *define *\(ISOGI_[A-Z]*__[A-Za-z0-9_]*\).*/\1/p' $h | sort -u | while read -r macro; do
-            grep -qE "^ *# *undef +$macro\b" $h || echo "$h: $macro is not undefined at the end"
-        done
+        awk -v h=$h '$1 ~ /^#/ {sub(/^ *# */, "#"); split($2, name, "(")}
+            $1 == "#define" && name[1] ~ /^ISOGI_[A-Z]*__/ {defined[name[1]] = 1}
+            $1 == "#undef" {gone[$2] = 1}
+            END {for (m in defined) if (!(m in gone)) print h ": " m " is not undefined at the end"}' $h
     done > "$OUT/left"
     [ ! -s "$OUT/left" ] || fail "$(cat "$OUT/left")"
     ;;
@@ -62,6 +63,12 @@ top-level)
     bad=$(git ls-files 2> /dev/null | cut -d/ -f1 | sort -u |
         grep -vxE 'isogi_(sh|vol|trace|dvr)\.h|examples|tests|Makefile|LICENSE|README\.md|\.ci|\.gitignore|\.clang-format')
     [ -z "$bad" ] || fail "not part of the layout: $bad"
+    ;;
+line-length) # of C, in characters
+    bad=$(for f in isogi_*.h examples/*.c examples/common/*.h tests/*.[ch] tests/*/*.[ch]; do
+        [ ! -f "$f" ] || awk -v f="$f" 'length > 140 {print f ":" FNR ": " length " columns, at most 140"}' "$f"
+    done)
+    [ -z "$bad" ] || fail "$bad"
     ;;
 function-length) # reported, not refused: unrolled kernels and tables are long by nature
     long=$(for f in isogi_*.h examples/*.c examples/common/*.h tests/*.c tests/bench/*.c; do

@@ -1,0 +1,60 @@
+/* How isogi_trace.h keeps numbers in few bits. This program looks inside isogi_trace.h. FLAGS: -O0 */
+#define ISOGI_IMPLEMENTATION
+#include "isogi_trace.h"
+#include "test.h"
+#include "trace_scenes.h"
+
+/* Every finite half is itself again; between neighbours the nearer one is taken, of equals the even one. */
+TEST(half_is_to_nearest_even) {
+    for (uint32_t h = 0; h < 0x7c00; h++) {
+        float x = isogi_trace__from_half(h), next = isogi_trace__from_half(h + 1 < 0x7c00 ? h + 1 : h);
+        double exact = h < 1024 ? ldexp(h, -24) : ldexp(1024 + h % 1024, (int)(h >> 10) - 25);
+        float middle = (float)(0.5 * ((double)x + (double)next)), above = nextafterf(middle, 1e9f), below = nextafterf(middle, 0);
+        CHECK((double)x >= exact && (double)x <= exact, "half %x: %g, expected %g", h, (double)x, exact);
+        CHECK(isogi_trace__to_half(x) == h && (h == 0 || isogi_trace__to_half(-x) == (h | 0x8000)), "half %x is %x", h,
+              isogi_trace__to_half(x));
+        if (h + 1 == 0x7c00) continue;
+        CHECK(isogi_trace__to_half(middle) == (h & 1 ? h + 1 : h), "middle above %x: %x", h, isogi_trace__to_half(middle));
+        CHECK(isogi_trace__to_half(above) == h + 1 && isogi_trace__to_half(below) == h, "beside the middle above %x", h);
+    }
+    const float odd[6] = {1e30f, 65504, 65519, 65520, 1e-30f, 3e-45f};
+    const uint32_t expected[6] = {0x7bff, 0x7bff, 0x7bff, 0x7bff, 0, 0};
+    for (int i = 0; i < 6; i++) CHECK(isogi_trace__to_half(odd[i]) == expected[i], "%g: %x", (double)odd[i], isogi_trace__to_half(odd[i]));
+    CHECK(isogi_trace__to_half((float)nan_value()) == 0, "NaN: %x", isogi_trace__to_half((float)nan_value()));
+}
+
+/* Within half a step of the largest channel, over all magnitudes; what was unpacked packs to itself; never NaN, never infinite. */
+TEST(rgb9e5_is_within_half_a_step) {
+    test_random r = {3};
+    for (int i = 0; i < (LONG_SUITE ? 1000000 : 100000); i++) {
+        float rgb[3], back[3], again[3];
+        double most = 0;
+        for (int c = 0; c < 3; c++)
+            rgb[c] = (float)(ldexp(random_unit(&r), (int)random_range(&r, -30, 17))), most = fmax(most, (double)rgb[c]);
+        if (i % 100 == 0) rgb[0] = i % 200 ? (float)nan_value() : -1, most = fmax((double)rgb[1], (double)rgb[2]);
+        uint32_t packed = isogi_trace__to_rgb9e5(rgb);
+        isogi_trace__from_rgb9e5(packed, back);
+        double step = fmax(most / 255.5, 1.0 / 16777216); /* 511.5 steps and more round up to the next exponent */
+        for (int c = 0; c < 3; c++) {
+            double x = rgb[c] > 0 ? fmin((double)rgb[c], 65408) : 0;
+            if (c == 0 && i % 100 == 0) x = 0;
+            CHECK(back[c] >= 0 && (double)back[c] <= 65408 && fabs((double)back[c] - x) <= 0.5 * step * 1.0000001, "%g of %g: %g", x, most,
+                  (double)back[c]);
+        }
+        isogi_trace__from_rgb9e5(isogi_trace__to_rgb9e5(back), again);
+        CHECK(!memcmp(back, again, sizeof back), "%g becomes %g", (double)back[0], (double)again[0]);
+    }
+}
+
+TEST(errors_are_kept_rounded_up) {
+    test_random r = {4};
+    for (int i = 0; i < 10000; i++) {
+        float x = (float)ldexp(random_unit(&r), (int)random_range(&r, -40, 40)),
+              y = isogi_trace__bits_float(isogi_trace__to_short(x) << 16);
+        CHECK(y >= x && (double)y <= (double)x * (1 + 1.0 / 127), "%g is kept as %g", (double)x, (double)y);
+    }
+    CHECK(isogi_trace__to_short(0) == 0 && isogi_trace__to_short(HUGE_VALF) == 0x7f80 && isogi_trace__to_short(3.4e38f) == 0x7f80,
+          "ends, %d", 0);
+}
+
+TEST_MAIN("trace_inside")
