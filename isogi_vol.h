@@ -4135,9 +4135,10 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE __m512i isogi_vol__when(__m512d plane, __m51
     return _mm512_ternarylogic_epi64(_mm512_castpd_si512(t), ISOGI_VOL__ALL64(~(uint64_t)3), _mm512_set1_epi64(axis), 0xea);
 }
 
-/* Where planes that lie before the ray begins are cut off anyway, their times may be negative, and in whatever order. */
+/* Where planes that lie before the ray begins are cut off anyway, their times may be negative, and in whatever order. 0 is added, so that
+   a plane in which the ray begins comes at 0, not at -0, which would be the earliest of all. */
 ISOGI_VOL__AVX512 ISOGI_VOL__INLINE __m512i isogi_vol__time_of(__m512d plane, __m512d origin, __m512d inverse, int axis) {
-    const __m512i t = _mm512_castpd_si512(_mm512_mul_pd(_mm512_sub_pd(plane, origin), inverse));
+    const __m512i t = _mm512_castpd_si512(_mm512_fmadd_pd(_mm512_sub_pd(plane, origin), inverse, _mm512_setzero_pd()));
     return _mm512_ternarylogic_epi64(t, ISOGI_VOL__ALL64(~(uint64_t)3), _mm512_set1_epi64(axis), 0xea);
 }
 
@@ -4988,8 +4989,8 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE void isogi_vol__open_turn(isogi_vol__turn *t
    two axes, all at once, and where the ray enters and leaves the node cuts the way at its ends. Times are those that a pool goes by. All
    cells of a leaf are looked at together, in float. */
 typedef struct __attribute__((aligned(64))) isogi_vol__course {
-    double sign[2][8], from[2][8], per[2][8]; /* lane's plane k, counted from the border that rays enter by,
-                                                 is met at (sign k + from) per */
+    double sign[2][8], border[2][8], start[2][8], per[2][8]; /* lane's plane k, counted from the border that rays enter by,
+                                                                is met at (sign k + border - start) per */
     double origin[4], inverse[4], dir[4], stop; /* as in a pool */
     int64_t end;
     int64_t backwards;       /* cell = cell counted backwards ^ this, packed as in a pool */
@@ -5014,7 +5015,7 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE int isogi_vol__set_course(isogi_vol__course 
                    7);
     const __m256d sign = _mm256_mask_mov_pd(_mm256_set1_pd(1), fall, _mm256_set1_pd(-1));
     const __m256d inverse = _mm256_mask_mul_pd(_mm256_loadu_pd(w->inverse), still, sign, _mm256_set1_pd(1e200));
-    const __m256d from = _mm256_sub_pd(_mm256_maskz_mov_pd(fall, _mm256_set1_pd(padded)), origin);
+    const __m256d border = _mm256_maskz_mov_pd(fall, _mm256_set1_pd(padded));
     int i;
     if (!(w->end > 1e-150) || !(w->end < 1e150)) return 0;
     c->level = isogi_vol__quantise_isovalue(p, w->isovalue, &c->low, &c->high);
@@ -5027,7 +5028,8 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE int isogi_vol__set_course(isogi_vol__course 
 #pragma GCC unroll 2
     for (i = 0; i < 2; i++) {
         _mm512_store_pd(c->sign[i], _mm512_permutexvar_pd(lanes[i], _mm512_castpd256_pd512(sign)));
-        _mm512_store_pd(c->from[i], _mm512_permutexvar_pd(lanes[i], _mm512_castpd256_pd512(from)));
+        _mm512_store_pd(c->border[i], _mm512_permutexvar_pd(lanes[i], _mm512_castpd256_pd512(border)));
+        _mm512_store_pd(c->start[i], _mm512_permutexvar_pd(lanes[i], _mm512_castpd256_pd512(origin)));
         _mm512_store_pd(c->per[i], _mm512_permutexvar_pd(lanes[i], _mm512_castpd256_pd512(inverse)));
     }
     return 1;
@@ -5038,9 +5040,10 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE __m512i isogi_vol__plane_times(const isogi_v
                                                                    const int64_t plane[8], __m512i axis, int i) {
     const __m512i at =
         _mm512_add_epi64(_mm512_and_si512(_mm512_srlv_epi64(cell, digits), _mm512_set1_epi64(0xffff)), _mm512_load_si512(plane));
-    const __m512d way = _mm512_fmadd_pd(_mm512_cvtepi64_pd(at), _mm512_load_pd(c->sign[i]), _mm512_load_pd(c->from[i]));
-    return _mm512_ternarylogic_epi64(_mm512_castpd_si512(_mm512_mul_pd(way, _mm512_load_pd(c->per[i]))), ISOGI_VOL__ALL64(~(uint64_t)3),
-                                     axis, 0xea);
+    const __m512d place = _mm512_fmadd_pd(_mm512_cvtepi64_pd(at), _mm512_load_pd(c->sign[i]), _mm512_load_pd(c->border[i]));
+    const __m512d way = _mm512_sub_pd(place, _mm512_load_pd(c->start[i]));
+    const __m512d time = _mm512_fmadd_pd(way, _mm512_load_pd(c->per[i]), _mm512_setzero_pd()); /* 0, not -0, as in isogi_vol__time_of */
+    return _mm512_ternarylogic_epi64(_mm512_castpd_si512(time), ISOGI_VOL__ALL64(~(uint64_t)3), axis, 0xea);
 }
 
 /* Which children of a node the ray passes, in its own order; cell: the node's corner, counted backwards where the ray falls. Times before
