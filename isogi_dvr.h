@@ -172,6 +172,7 @@
    classes of values in physical space; exact rays, and those with a bound, 150 bytes a point of the transfer function, pre-integrated
    ones 16 table^2 and 8 a point more. All of it comes from the context's allocator; where that fails the call says so and changes
    nothing.
+   Stack use stays below 32 KB.
    isogi_dvr_set_transfer and isogi_dvr_step are writers: one at a time, and not during another call with the same renderer. All
    other calls only read and may run at the same time. Calls divide their own work among the context's threads. Results are the
    same bits for any number of threads and however visibility was cut into steps.
@@ -523,6 +524,11 @@ ISOGI_API isogi_result isogi_dvr_tets_render(const isogi_tets *tets, const isogi
 #define ISOGI_DVR__CLASSES 1024            /* of values, for pictures; 16 times as many for a transfer function with narrow pieces */
 #define ISOGI_DVR__NODES 8                 /* samples of a ray taken at once */
 #define ISOGI_DVR__LEAP 6                  /* blocks of 4^3 that a ray steps over at once, to each side */
+#if defined(__GNUC__)
+#define ISOGI_DVR__APART static __attribute__((noinline)) /* so that the stacks of several ways do not add up */
+#else
+#define ISOGI_DVR__APART static
+#endif
 
 /* One vector type of 16 floats: the compiler divides it into what the machine has. */
 #if (defined(__clang__) || (defined(__GNUC__) && __GNUC__ >= 9)) && !defined(__TINYC__) && !defined(ISOGI_NO_SIMD) && \
@@ -6565,8 +6571,8 @@ static void isogi_dvr__render_pixel(const isogi_dvr__render_job *job, int x, int
 
 #ifdef ISOGI_DVR__AVX
 /* Four pixels by two. */
-static void isogi_dvr__render_eight(const isogi_dvr__render_job *job, int x0, int y0, isogi_dvr__crossings *crossings,
-                                    isogi_counters *work) {
+ISOGI_DVR__APART void isogi_dvr__render_eight(const isogi_dvr__render_job *job, int x0, int y0, isogi_dvr__crossings *crossings,
+                                              isogi_counters *work) {
     isogi_dvr__pixel_ray ray[8];
     isogi_dvr__march march[8];
     isogi_dvr__eight e;
@@ -6610,7 +6616,7 @@ static void isogi_dvr__depth_fast(const isogi_dvr__render_job *job, isogi_dvr__f
 }
 
 /* A packet: four by four pixels. */
-static void isogi_dvr__render_fast(const isogi_dvr__render_job *job, int x0, int y0, isogi_counters *work) {
+ISOGI_DVR__APART void isogi_dvr__render_fast(const isogi_dvr__render_job *job, int x0, int y0, isogi_counters *work) {
     isogi_dvr__fast_ray ray[ISOGI_DVR__LANES];
     isogi_dvr__fast_state state[ISOGI_DVR__LANES];
     float depth[ISOGI_DVR__LANES];
@@ -7479,6 +7485,7 @@ ISOGI_API isogi_result isogi_dvr_tets_render(const isogi_tets *tets, const isogi
 #undef ISOGI_DVR__CLASSES
 #undef ISOGI_DVR__CLOSE
 #undef ISOGI_DVR__NODES
+#undef ISOGI_DVR__APART
 #undef ISOGI_DVR__LEAP
 #undef ISOGI_DVR__VECTORS
 #undef ISOGI_DVR__V
