@@ -1741,6 +1741,8 @@ enum {
     ISOGI_TRACE__UNKNOWN = 0,
     ISOGI_TRACE__NO_SURFACE,
     ISOGI_TRACE__NOT_ASKED,
+    ISOGI_TRACE__BEYOND_EMPTY, /* lazy: not read by a surface within the interval of isovalues, and it has none itself */
+    ISOGI_TRACE__BEYOND,       /* so, too, but it has one: computed only where it is the nearest one that has */
     ISOGI_TRACE__READABLE,
     ISOGI_TRACE__WANTED,
     ISOGI_TRACE__QUEUED, /* wanted, and a node has been made for it */
@@ -1792,6 +1794,7 @@ struct isogi_trace {
     size_t refine_next;  /* as far as to this one */
     struct isogi_trace__feedback *feedback; /* NULL: paths are traced */
     double share[2];   /* of the progress that baking reports, from and to */
+    double least;      /* hierarchy: remainder that isogi_trace_step reported last; 1 before it has */
     uint64_t lighting_hash, colours_hash; /* of what the light was gathered under: borrowed arrays may change in place */
 };
 
@@ -2263,6 +2266,7 @@ static isogi_result isogi_trace__set_up(isogi_trace *t, const isogi_trace_desc *
     if (result != ISOGI_OK) return result;
     t->values =
         desc->mode == ISOGI_TRACE_TRANSFER ? t->scene.desc.order * t->scene.desc.order * t->scene.desc.transfer_channels : 3;
+    t->least = 1;
     t->format = (int)t->scene.desc.storage, t->record = isogi_trace__record_size(t);
     t->bricks = (isogi_trace__brick **)isogi_allocate(&t->context, t->brick_count, sizeof *t->bricks);
     t->batch = (isogi_trace__ref *)isogi_allocate(&t->context, ISOGI_TRACE__BATCH, sizeof *t->batch);
@@ -2675,19 +2679,25 @@ static void isogi_trace__learn(isogi_trace *t, isogi_trace__brick *brick, uint32
     t->counters.texels_skipped += state == ISOGI_TRACE__NO_SURFACE;
 }
 
-/* Classifies a texel and puts it on the list if it is to be computed. nearest: it is only looked at, whatever the interval of
-   isovalues. */
+/* Classifies a texel and puts it on the list if it is to be computed. Whatever the interval of isovalues, but so that no later lookup
+   finds another answer: nearest = 1: it is only looked at; 2: it has been found to be the nearest. */
 static isogi_result isogi_trace__want(isogi_trace *t, const size_t texel[3], int nearest) {
     uint32_t slot;
+    int state;
     size_t index = isogi_trace__brick_of(t, texel, &slot);
     isogi_trace__brick *brick = t->bricks[index];
     isogi_result result = isogi_trace__queue_reserve(t);
     if (result != ISOGI_OK) return result;
     if (!brick) brick = t->bricks[index] = isogi_trace__brick_new(t);
     if (!brick) return ISOGI_NO_MEMORY;
-    if (brick->state[slot] == ISOGI_TRACE__UNKNOWN || (nearest && brick->state[slot] == ISOGI_TRACE__NOT_ASKED))
-        isogi_trace__learn(t, brick, slot, isogi_trace__classify(t, texel, nearest));
-    if (nearest || brick->state[slot] != ISOGI_TRACE__READABLE) return ISOGI_OK;
+    if (brick->state[slot] == ISOGI_TRACE__UNKNOWN) isogi_trace__learn(t, brick, slot, isogi_trace__classify(t, texel, 0));
+    if (nearest && brick->state[slot] == ISOGI_TRACE__NOT_ASKED) {
+        state = isogi_trace__classify(t, texel, 1);
+        if (state == ISOGI_TRACE__WANTED) brick->state[slot] = ISOGI_TRACE__BEYOND;
+        if (state == ISOGI_TRACE__NO_SURFACE) brick->state[slot] = ISOGI_TRACE__BEYOND_EMPTY;
+    }
+    if (nearest == 1 || (brick->state[slot] != ISOGI_TRACE__READABLE && !(nearest && brick->state[slot] == ISOGI_TRACE__BEYOND)))
+        return ISOGI_OK;
     brick->state[slot] = ISOGI_TRACE__WANTED;
     t->wanted++;
     if (!brick->queued) t->queue[t->queue_count++] = index, brick->queued = 1;
@@ -2708,8 +2718,7 @@ static isogi_result isogi_trace__want_nearest(isogi_trace *t, const size_t cell[
         }
         if (!outside) result = isogi_trace__want(t, texel, 1);
     }
-    if (result == ISOGI_OK && isogi_trace__nearest(t, cell, local, ISOGI_TRACE__READABLE, texel))
-        result = isogi_trace__want(t, texel, 0);
+    if (result == ISOGI_OK && isogi_trace__nearest(t, cell, local, ISOGI_TRACE__BEYOND, texel)) result = isogi_trace__want(t, texel, 2);
     return result;
 }
 
@@ -3012,7 +3021,6 @@ struct isogi_trace__feedback {
     size_t open;     /* texels that want more samples than they have at the end of a level */
     uint64_t partial; /* samples of texels that are not finished */
     uint64_t probes_before; /* of groups of texels that are finished */
-    double least;   /* what isogi_trace_step reported last */
 };
 
 /* When a block of samples is complete the light at probes is worked out, then that of the texels. That takes no rays, but as long as many:
@@ -4321,8 +4329,8 @@ static isogi_result isogi_trace__nodes_of(isogi_trace *t, size_t index, int even
         if (!brick->node) return ISOGI_NO_MEMORY;
         memset(brick->node, 0, ISOGI_TRACE__TEXELS * sizeof(uint32_t));
     }
-    if (even) t->feedback->made_texels += isogi_trace__bits(wanted);
     if (isogi_trace__set_reserve(t, set, isogi_trace__bits(wanted), 0) != ISOGI_OK) return ISOGI_NO_MEMORY;
+    if (even) t->feedback->made_texels += isogi_trace__bits(wanted);
     for (slot = 0; slot < ISOGI_TRACE__TEXELS; slot++) {
         isogi_trace__node *n;
         if (!(wanted >> slot & 1) || (even && (slot & 0x15))) continue;
@@ -4542,17 +4550,20 @@ static isogi_result isogi_trace__step_levels(isogi_trace *trace, uint64_t max_ra
     return isogi_trace__step_side(trace, max_rays ? max_rays - used : 0, spent);
 }
 
-/* Texels to do, less the parts of them that are done, and done; what a hierarchy may still want while it is not refined is taken to be
-   as many as the coarse ones. */
+/* Texels to do, less the parts of them that are done, and done; what a hierarchy may want while it is not refined is taken to be eight
+   for each of the coarse ones. */
 static void isogi_trace__progress(const isogi_trace *t, double *wanted, double *done) {
     double left = (double)t->wanted, all = (double)t->wanted + (double)t->done;
     if (t->feedback && (t->wanted || t->feedback->unpublished)) {
         left -= (double)t->feedback->partial / t->scene.desc.samples;
         left = left > 1e-6 ? left : 1e-6;
     }
+    if (t->coarse && !t->refined) {
+        double guess = fmax(left, 8 * ((double)t->coarse->wanted + (double)t->coarse->done) + 1);
+        all += guess - left, left = guess;
+    }
     *wanted += left, *done += all - left;
     if (t->coarse) isogi_trace__progress(t->coarse, wanted, done);
-    if (t->coarse && !t->refined) *wanted += 8 * ((double)t->coarse->wanted + (double)t->coarse->done) + 1;
 }
 
 /* The high side has its turn with the rays that the low side leaves, or when that has none to trace. */
@@ -4566,7 +4577,9 @@ ISOGI_API isogi_result isogi_trace_step(isogi_trace *trace, uint64_t max_rays, d
         result = isogi_trace__step_levels(trace->high, max_rays ? max_rays - used : 0, &used);
     isogi_trace__progress(trace, &wanted, &done);
     if (trace->high) isogi_trace__progress(trace->high, &wanted, &done);
-    if (remaining && result == ISOGI_OK) *remaining = wanted > 0 ? wanted / (wanted + done) : 0;
+    if (!remaining || result != ISOGI_OK) return result;
+    *remaining = wanted > 0 ? wanted / (wanted + done) : 0;
+    if (trace->coarse) trace->least = *remaining = fmin(*remaining, trace->least); /* what a hierarchy may want was a guess */
     return result;
 }
 
@@ -5252,15 +5265,15 @@ static void isogi_trace__change_undo(isogi_trace__change *c) {
     isogi_trace__sky_free(&c->scene.sky, &c->trace->context);
 }
 
-/* The new state of a texel. What can be read stays readable, where it still has a surface. */
+/* The new state of a texel. What can be read stays readable, where it still has a surface. chosen: by the interval of isovalues, or not. */
 static uint8_t isogi_trace__changed_state(const isogi_trace__change *c, const size_t texel[3], int state) {
     const isogi_trace *t = c->trace;
     double grid[3], margin[3], none[3] = {0, 0, 0};
-    int again, lazy = t->scene.desc.lazy, now;
+    int again, lazy = t->scene.desc.lazy, now, chosen = state >= ISOGI_TRACE__NOT_ASKED && state <= ISOGI_TRACE__READABLE;
     isogi_trace__texel_grid(t, texel, grid);
     isogi_trace__choice_margin(t, margin);
-    if (c->desc) again = c->choice && (state == ISOGI_TRACE__NOT_ASKED || (state == ISOGI_TRACE__WANTED && !lazy));
-    else again = isogi_trace__in_change(c, grid, none) || (state == ISOGI_TRACE__NOT_ASKED && isogi_trace__in_change(c, grid, margin));
+    if (c->desc) again = c->choice && (chosen || (state == ISOGI_TRACE__WANTED && !lazy));
+    else again = isogi_trace__in_change(c, grid, none) || (chosen && isogi_trace__in_change(c, grid, margin));
     again |= !lazy && state == ISOGI_TRACE__UNKNOWN; /* its brick has just come */
     if (!again) return (uint8_t)(state == ISOGI_TRACE__DONE && isogi_trace__depends(c, grid) ? ISOGI_TRACE__DRAFT : state);
     if (lazy && state < ISOGI_TRACE__WANTED) return ISOGI_TRACE__UNKNOWN;
@@ -5288,6 +5301,13 @@ static void isogi_trace__feedback_reset(isogi_trace *t) {
     f->level = f->diverges = 0, f->probes_before = 0;
 }
 
+/* The queue has become another one, of `bricks` bricks: nodes that are being made go on with those it holds. */
+static void isogi_trace__making_anew(isogi_trace__feedback *f, size_t bricks) {
+    if (!f->making) return;
+    f->making = bricks > 0, f->made = f->made_texels = 0, f->made_bricks = bricks;
+    if (!bricks) f->level = 0, f->cursor = 0;
+}
+
 /* Marks the texels and queues their bricks; needs no memory. */
 static void isogi_trace__change_commit(isogi_trace__change *c) {
     isogi_trace *t = c->trace;
@@ -5313,7 +5333,8 @@ static void isogi_trace__change_commit(isogi_trace__change *c) {
     }
     isogi_release(&t->context, t->queue, t->queue_capacity, sizeof *t->queue);
     t->queue = c->queue, t->queue_capacity = c->capacity, t->queue_first = 0, t->queue_count = count;
-    t->refined = 0, t->refine_next = 0;
+    t->refined = 0, t->refine_next = 0, t->least = 1;
+    if (t->feedback) isogi_trace__making_anew(t->feedback, count);
     if (!c->desc) return;
     isogi_trace__sky_free(&c->scene.sky, &t->context);
     t->lighting_hash = c->lighting_hash, t->colours_hash = c->colours_hash;
@@ -5426,7 +5447,7 @@ ISOGI_API isogi_result isogi_trace_gather(const isogi_trace_desc *desc, const fl
                                           size_t count, float (*irradiance)[3], float *error, const isogi_context *context) {
     isogi_trace__points job;
     isogi_result result;
-    size_t tasks;
+    size_t tasks, waves = count ? (count - 1) / ISOGI_TRACE__TASK + 1 : 0;
     if (!isogi_trace__desc_valid(desc) || desc->mode != ISOGI_TRACE_IRRADIANCE || (count && (!points || !irradiance)))
         return ISOGI_INVALID;
     if (desc->sides == ISOGI_TRACE_BOTH_SIDES) return ISOGI_INVALID;
@@ -5434,21 +5455,22 @@ ISOGI_API isogi_result isogi_trace_gather(const isogi_trace_desc *desc, const fl
     if (!context) context = isogi_vol_context(desc->pyramid);
     memset(&job, 0, sizeof job);
     job.points = points, job.normals = normals, job.count = count;
-    job.waves = (isogi_trace__wave *)isogi_allocate(context, ISOGI_TRACE__TASKS, sizeof *job.waves);
+    waves = waves < ISOGI_TRACE__TASKS ? waves : ISOGI_TRACE__TASKS;
+    job.waves = (isogi_trace__wave *)isogi_allocate(context, waves, sizeof *job.waves);
     job.irradiance = (float(*)[3])isogi_allocate(context, count, sizeof *job.irradiance);
     job.error = (float *)isogi_allocate(context, count, sizeof *job.error);
     result = isogi_trace__scene_set(&job.scene, desc, context);
     if (!job.irradiance || !job.error || !job.waves) result = ISOGI_NO_MEMORY;
     for (; job.first < count && result == ISOGI_OK; job.first += tasks * ISOGI_TRACE__TASK) {
         double from = (double)job.first / (double)count, to;
-        tasks = (count - job.first - 1) / ISOGI_TRACE__TASK + 1, tasks = tasks < ISOGI_TRACE__TASKS ? tasks : ISOGI_TRACE__TASKS;
+        tasks = (count - job.first - 1) / ISOGI_TRACE__TASK + 1, tasks = tasks < waves ? tasks : waves;
         to = (double)(job.first + tasks * ISOGI_TRACE__TASK) / (double)count;
         result = isogi_parallel(context, tasks, isogi_trace__gather_task, &job, from, to < 1 ? to : 1);
     }
     if (result == ISOGI_OK) memcpy(irradiance, job.irradiance, count * sizeof *irradiance);
     if (result == ISOGI_OK && error) memcpy(error, job.error, count * sizeof *error);
     isogi_trace__sky_free(&job.scene.sky, context);
-    isogi_release(context, job.waves, ISOGI_TRACE__TASKS, sizeof *job.waves);
+    isogi_release(context, job.waves, waves, sizeof *job.waves);
     isogi_release(context, job.irradiance, count, sizeof *job.irradiance);
     isogi_release(context, job.error, count, sizeof *job.error);
     return result;

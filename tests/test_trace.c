@@ -897,6 +897,37 @@ TEST(every_allocation_may_fail) {
     scene_free(&s);
 }
 
+/* Scratch is in proportion to the points: for one of them less than 100 KB, for many no more than 256 tasks need. */
+typedef struct most_memory { size_t now, most; } most_memory;
+static void *most_alloc(void *user, size_t size, size_t align) {
+    most_memory *m = (most_memory *)user;
+    void *p = NULL;
+    m->now += size, m->most = m->now > m->most ? m->now : m->most;
+    return posix_memalign(&p, align < sizeof(void *) ? sizeof(void *) : align, size) ? NULL : p;
+}
+static void most_release(void *user, void *p, size_t size) { ((most_memory *)user)->now -= size, free(p); }
+TEST(few_points_take_little_memory) {
+    double q[4] = {8, 8, 8, 5};
+    scene s = scene_make(17, 17, 17, NULL, ball, q);
+    static float points[20000][3], e[2][20000][3];
+    size_t most[3];
+    int n = surface_points(&s, 0, 2000, 3, points);
+    for (int i = n; i < 20000; i++) memcpy(points[i], points[i % n], sizeof points[i]);
+    for (int k = 0; k < 3; k++) {
+        static const size_t count[3] = {1, 40, 20000};
+        most_memory memory = {0, 0};
+        isogi_context context = {.alloc = most_alloc, .release = most_release, .user = &memory, .threads = 1};
+        isogi_trace_desc d = desc_make(&s, 0.5f, 0, 1);
+        CHECK(isogi_trace_gather(&d, (const float(*)[3])points, NULL, count[k], e[k == 2], NULL, &context) == ISOGI_OK, "gather");
+        CHECK(!memory.now, "%zu bytes leak", memory.now);
+        most[k] = memory.most;
+    }
+    CHECK(!memcmp(e[0], e[1], 40 * sizeof e[0][0]), "other light with more points");
+    printf("    own points: %zu bytes for one, %zu for 40, %zu for 20000\n", most[0], most[1], most[2]);
+    CHECK(most[0] < 100000 && most[1] < 1000000 && most[2] < 10000000, "%zu, %zu, %zu bytes", most[0], most[1], most[2]);
+    scene_free(&s);
+}
+
 typedef struct progress_log { int calls, cancel_at; double last; int rising; } progress_log;
 static int progress_count(void *user, double fraction) {
     progress_log *log = (progress_log *)user;

@@ -426,6 +426,67 @@ TEST(same_bits_for_any_threads_and_budget) {
     scene_free(&s);
 }
 
+/* A hierarchy does not know how many texels it will want before its coarse ones are done; what it reports never rises all the same, comes
+   to 0 only at the end, and begins anew after a change. */
+TEST(hierarchies_report_what_falls) {
+    double q[5] = {15.5, 15, 15.5, 18, 12};
+    scene s = scene_make(32, 32, 32, NULL, pit, q);
+    for (int k = 0; k < 4; k++) {
+        isogi_trace_desc d = feedback(&s, 0.7f, 1, 2);
+        isogi_trace *t = NULL;
+        double remaining = 1, before = 1;
+        int rises = 0, begun = 0;
+        d.method = k & 1 ? ISOGI_TRACE_PATHS : ISOGI_TRACE_FEEDBACK, d.hierarchy = 0.1f;
+        d.sides = k & 2 ? ISOGI_TRACE_BOTH_SIDES : ISOGI_TRACE_LOW_SIDE, d.isovalue_min = -0.5, d.isovalue_max = 0.5;
+        CHECK(isogi_trace_create(&t, &d, NULL) == ISOGI_OK, "case %d", k);
+        for (int round = 0; round < 2; round++) {
+            for (remaining = before = 1; remaining > 0; before = remaining, begun++) {
+                CHECK(isogi_trace_step(t, 1000, &remaining) == ISOGI_OK, "case %d", k);
+                rises += remaining > before;
+                if (before >= 1 && remaining < 0.5) CHECK(0, "case %d: from 1 to %g in a step", k, remaining);
+            }
+            d.albedo[1] = 0.3f;
+            CHECK(isogi_trace_change(t, &d) == ISOGI_OK, "case %d", k);
+        }
+        CHECK(!rises && begun > 20, "case %d: rose %d times in %d steps", k, rises, begun);
+        isogi_trace_free(t);
+    }
+    scene_free(&s);
+}
+
+/* Nodes are made for a group of texels at a time. Where the memory for some of them fails the step can be repeated, and the group is the
+   same: so is the light. Of 110592 texels a first group takes 65536. */
+typedef struct chunk_failure { long large, fails; } chunk_failure;
+static void *chunk_alloc(void *user, size_t size, size_t align) {
+    chunk_failure *f = (chunk_failure *)user;
+    void *p = NULL;
+    if (size > 50000 && f->fails >= 0 && f->large++ == f->fails) return NULL;
+    return posix_memalign(&p, align < sizeof(void *) ? sizeof(void *) : align, size) ? NULL : p;
+}
+static void chunk_release(void *user, void *p, size_t size) { (void)user, (void)size, free(p); }
+TEST(groups_are_the_same_after_a_failure) {
+    double q[1] = {0.35};
+    scene s = scene_make(48, 48, 48, NULL, gyroid, q);
+    uint8_t *block[2];
+    size_t size[2];
+    for (int k = 0; k < 2; k++) {
+        chunk_failure failure = {0, -1};
+        isogi_context context = {.threads = 2, .alloc = chunk_alloc, .release = chunk_release, .user = &failure};
+        isogi_trace_desc d = feedback(&s, 0.7f, 1, 1);
+        isogi_trace *t = NULL;
+        int failed = 0;
+        CHECK(isogi_trace_create(&t, &d, &context) == ISOGI_OK, "create");
+        failure.fails = k ? 2 : -1;
+        while (isogi_trace_step(t, 0, NULL) == ISOGI_NO_MEMORY) failed++;
+        CHECK(failed == k, "%d failures", failed);
+        size[k] = isogi_trace_save_size(t), block[k] = (uint8_t *)malloc(size[k]);
+        CHECK(isogi_trace_save(t, block[k], size[k]) == ISOGI_OK, "save");
+        isogi_trace_free(t);
+    }
+    CHECK(size[0] == size[1] && !memcmp(block[0], block[1], size[0]), "other bits after a failure: %zu and %zu bytes", size[0], size[1]);
+    free(block[0]), free(block[1]), scene_free(&s);
+}
+
 /* Every instruction path of rays gives the same hits, hence the same light: to the last bit here, but a ray that grazes the surface within
    rounding may be seen either way, once in 100,000 (test_vol), and under -ffast-math or contraction t may differ in its last bits. So one
    point in a hundred may differ by more than float rounding (1e-5), none by more than two standard errors. */
@@ -503,6 +564,42 @@ TEST(lazily_the_nearest_is_whatever_the_interval) {
     }
     for (int i = 0; i < n; i++) dark += e[0][i][1] > 0 && e[1][i][1] <= 0;
     CHECK(e[0][0][1] > 0 && !memcmp(e[0], e[1], sizeof e[0]), "other light than of the whole texture, dark at %d of %d", dark, n);
+    scene_free(&s);
+}
+
+/* Texels beyond the interval are looked at where the nearest is sought, which is one of them: the others are not computed for whoever asks
+   there later, just as if he had asked before. */
+static double three_crumbs(const double p[3], const double *q) {
+    return length3(p[0] - 12, p[1] - 12, p[2] - 12) < 0.5 ? q[0] : two_crumbs(p, q);
+}
+TEST(lazily_the_order_of_requests_does_not_matter) {
+    double q[1] = {0.2};
+    scene s = scene_make(17, 17, 17, NULL, three_crumbs, q);
+    float places[2][1][3] = {{{6.2f, 6, 6}}, {{11.9f, 12, 12}}};
+    for (int method = 0; method < 2; method++) {
+        uint64_t texels[3], wanted[3] = {0, 0, 0};
+        for (int k = 0; k < 3; k++) {
+            isogi_trace_desc d = desc_make(&s, 0.5f, 0, 4);
+            isogi_trace *t = NULL;
+            isogi_trace_report report;
+            size_t x[3];
+            d.method = method ? ISOGI_TRACE_FEEDBACK : ISOGI_TRACE_PATHS;
+            d.lattice[0] = d.lattice[1] = d.lattice[2] = 5, d.lazy = 1;
+            if (k < 2) d.isovalue_min = 0.5, d.isovalue_max = 0.7;
+            CHECK(isogi_trace_create(&t, &d, NULL) == ISOGI_OK, "create");
+            for (int i = 0; i < 2; i++) isogi_trace_request(t, (const float(*)[3])places[i ^ (k & 1)], 1);
+            for (x[2] = 1; x[2] < 5; x[2]++)
+                for (x[1] = 1; x[1] < 5; x[1]++)
+                    for (x[0] = 1; x[0] < 5; x[0]++)
+                        wanted[k] |= (uint64_t)isogi_trace_wanted(t, x) << (x[0] - 1 + 4 * (x[1] - 1) + 16 * (x[2] - 1));
+            CHECK(isogi_trace_step(t, 0, NULL) == ISOGI_OK, "step");
+            isogi_trace_status(t, &report), texels[k] = report.texels;
+            isogi_trace_free(t);
+        }
+        CHECK(texels[0] == 1 && texels[1] == 1 && wanted[0] == wanted[1] && texels[2] == 2,
+              "method %d: %d texels, %d in the other order, %d without an interval", method, (int)texels[0],
+              (int)texels[1], (int)texels[2]);
+    }
     scene_free(&s);
 }
 

@@ -373,6 +373,60 @@ TEST(feedback_follows_changes) {
     }
 }
 
+/* Memory that holds no zeros, with more of the same behind it: an index that is read there leads nowhere. */
+static void *wild_alloc(void *user, size_t size, size_t align) {
+    void *p = NULL;
+    (void)user;
+    if (posix_memalign(&p, align < sizeof(void *) ? sizeof(void *) : align, size + 4096)) return NULL;
+    return memset(p, 0x7f, size + 4096);
+}
+static void wild_release(void *user, void *p, size_t size) { (void)user, (void)size, free(p); }
+
+static uint64_t wanted_texels(const isogi_trace *t) {
+    size_t x[3], size[3];
+    uint64_t n = 0;
+    isogi_trace_shape(t, size, NULL, NULL);
+    for (x[2] = 0; x[2] < size[2]; x[2]++)
+        for (x[1] = 0; x[1] < size[1]; x[1]++)
+            for (x[0] = 0; x[0] < size[0]; x[0]++) n += isogi_trace_wanted(t, x) != 0;
+    return n;
+}
+
+/* An interval that changes while steps make nodes, soon or late in that: the bake goes on with the bricks that are wanted now, fewer, more
+   or none, and comes to its end with all of them. Lazily only with texels that are even along all axes, whose bricks are made at once. */
+TEST(intervals_change_while_nodes_are_made) {
+    static const double interval[3][2] = {{1.35, 1.4}, {-1, 1}, {5, 6}};
+    static const int steps[3] = {1, 3, 50};
+    double q[1] = {0.35};
+    scene s = scene_make(32, 32, 32, NULL, gyroid, q);
+    isogi_context context = {.alloc = wild_alloc, .release = wild_release, .threads = 1};
+    static float points[512][3];
+    for (int i = 0; i < 512; i++)
+        points[i][0] = (float)(4 * (i & 7)), points[i][1] = (float)(4 * (i >> 3 & 7)), points[i][2] = (float)(4 * (i >> 6));
+    for (int k = 0; k < 18; k++) {
+        isogi_trace_desc d = desc_make(&s, 0.7f, 0, 1);
+        isogi_trace_report report;
+        isogi_trace *t = NULL, *fresh = NULL;
+        double remaining = 1;
+        d.method = ISOGI_TRACE_FEEDBACK, d.lazy = k / 9, d.isovalue_min = -0.9, d.isovalue_max = 0.9;
+        CHECK(isogi_trace_create(&t, &d, &context) == ISOGI_OK, "case %d", k);
+        isogi_trace_request(t, (const float(*)[3])points, 512);
+        for (int i = 0; i < steps[k / 3 % 3]; i++) isogi_trace_step(t, 20, &remaining);
+        CHECK(remaining > 0, "case %d: nothing is left to do", k);
+        d.isovalue_min = interval[k % 3][0], d.isovalue_max = interval[k % 3][1];
+        CHECK(isogi_trace_change(t, &d) == ISOGI_OK && isogi_trace_create(&fresh, &d, NULL) == ISOGI_OK, "case %d", k);
+        isogi_trace_request(t, (const float(*)[3])points, 512), isogi_trace_request(fresh, (const float(*)[3])points, 512);
+        for (int i = 0; i < 100; i++) isogi_trace_step(t, 20, NULL);
+        CHECK(isogi_trace_step(t, 0, &remaining) == ISOGI_OK && remaining <= 0, "case %d: remaining %g", k, remaining);
+        isogi_trace_status(t, &report);
+        CHECK(!report.drafts && !wanted_texels(t) && report.texels >= wanted_texels(fresh),
+              "case %d: %d drafts, %d wanted, %d of %d texels", k, (int)report.drafts, (int)wanted_texels(t), (int)report.texels,
+              (int)wanted_texels(fresh));
+        isogi_trace_free(t), isogi_trace_free(fresh);
+    }
+    scene_free(&s);
+}
+
 /* Two levels on both sides: the coarse one is computed again, and decides anew. */
 TEST(hierarchies_follow_changes) {
     double q[5] = {10, 12, 10, 4, 5};
