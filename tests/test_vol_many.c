@@ -6,6 +6,7 @@
 #define ISOGI_IMPLEMENTATION
 #include "isogi_vol.h"
 #include "test.h"
+#include "reference_quick.h"
 #include "reference_wide.h"
 
 enum { SOME = 2048, KINDS = 6, TURNS = 8 };
@@ -73,102 +74,10 @@ static double crowd_isovalue(const scene *s, int kind, test_random *r) {
     return kind == 3 || kind == 4 ? level : level + random_range(r, 0.01, 0.99);
 }
 
-/* ---- the cheap reference ---- */
-
-typedef struct quick_truth { int side, decided; } quick_truth;
-
-/* Side of a face of the cell as a whole: 1 inside, 0 outside, -1 both. axis < 0: none. */
-static int face_side(const double c[8], int axis, int upper) {
-    int inside = 0;
-    if (axis < 0) return -1;
-    for (int i = 0; i < 8; i++)
-        if ((i >> axis & 1) == upper) inside += c[i] >= 0;
-    return inside == 4 ? 1 : inside == 0 ? 0 : -1;
-}
-
-/* Change of side along one cell: 1 with *inside turned, 0, or -1: too near to say. Values are compared with the tolerance, except at
-   the exit through a face whose corners agree. */
-static int quick_cell(const double c[8], const double from[3], const double to[3], int exit_side, double tolerance, int *inside) {
-    double v[4], k1, k2, k3, disc, at[3];
-    int n = 0;
-    for (int j = 0; j < 4; j++) {
-        double p[3], f[4];
-        for (int a = 0; a < 3; a++) p[a] = from[a] + (to[a] - from[a]) * j / 3;
-        for (int i = 0; i < 4; i++) f[i] = (1 - p[0]) * c[2 * i] + p[0] * c[2 * i + 1];
-        v[j] = (1 - p[2]) * ((1 - p[1]) * f[0] + p[1] * f[1]) + p[2] * ((1 - p[1]) * f[2] + p[1] * f[3]);
-    }
-    if (*inside < 0) {
-        if (fabs(v[0]) <= tolerance) return -1;
-        *inside = v[0] >= 0;
-    }
-    k1 = (-11 * v[0] + 18 * v[1] - 9 * v[2] + 2 * v[3]) / 2, k2 = (18 * v[0] - 45 * v[1] + 36 * v[2] - 9 * v[3]) / 2;
-    k3 = (-9 * v[0] + 27 * v[1] - 27 * v[2] + 9 * v[3]) / 2;
-    disc = k2 * k2 - 3 * k1 * k3;
-    if (disc >= 0) {
-        const double q = -(k2 + (k2 < 0 ? -sqrt(disc) : sqrt(disc)));
-        const double r[2] = {k3 != 0 ? q / (3 * k3) : 2, q != 0 ? k1 / q : 2};
-        for (int i = 0; i < 2; i++) { /* in order */
-            const double x = (r[0] < r[1]) == (i == 0) ? r[0] : r[1];
-            if (x > 0 && x < 1) at[n++] = v[0] + x * (k1 + x * (k2 + x * k3));
-        }
-    }
-    at[n++] = exit_side < 0 ? v[3] : exit_side ? 2 * tolerance : -2 * tolerance;
-    for (int i = 0; i < n; i++) {
-        if (fabs(at[i]) <= tolerance) return -1;
-        if ((at[i] >= 0) != *inside) return *inside = !*inside, 1;
-    }
-    return 0;
-}
-
-/* From lattice plane to lattice plane in double; scenes without spacing and origin. */
-static quick_truth quick_intersect(const scene *s, const isogi_ray *ray, double tolerance) {
-    quick_truth truth = {0, 1};
-    double t = ray->tmin, end = ray->tmax > 0 ? ray->tmax : 1e300, d[3];
-    int cell[3], inside = -1, axis = -1;
-    for (int a = 0; a < 3; a++) {
-        d[a] = (double)ray->dir[a];
-        const double low = -ray->origin[a], high = s->size[a] - 1 - ray->origin[a];
-        if (fabs(d[a]) < 1e-30) return truth.decided = 0, truth;
-        t = fmax(t, (d[a] > 0 ? low : high) / d[a]), end = fmin(end, (d[a] > 0 ? high : low) / d[a]);
-    }
-    if (t > end) return truth.decided = end - t < -1e-9, truth;
-    for (int a = 0; a < 3; a++) {
-        const double x = ray->origin[a] + t * d[a], nearest = fabs(x - floor(x + 0.5));
-        /* begins at a lattice plane: which cell is first is not known; at the border of the box it is */
-        cell[a] = x > 0 ? x < s->size[a] - 1 ? (int)x : s->size[a] - 2 : 0;
-        if (nearest < 1e-12 && cell[a] > 0 && cell[a] < s->size[a] - 2) truth.decided = 0;
-    }
-    while (truth.decided) {
-        double c[8], out = end, from[3], to[3];
-        int below = 0, changed;
-        const double *corner = s->value + cell[0] + s->size[0] * (cell[1] + s->size[1] * cell[2]);
-        axis = -1;
-        for (int a = 0; a < 3; a++) {
-            const double at = (cell[a] + (d[a] > 0) - ray->origin[a]) / d[a];
-            if (at < out) out = at, axis = a;
-        }
-        out = fmax(out, t);
-        for (int i = 0; i < 8; i++) {
-            c[i] = corner[(i & 1) + s->size[0] * ((i >> 1 & 1) + s->size[1] * (i >> 2))] - ray->isovalue;
-            below += c[i] < 0;
-        }
-        if (below == 0 || below == 8) {
-            if (inside == (below == 8)) return truth.side = inside ? -1 : 1, truth;
-            inside = below == 0;
-        } else {
-            for (int a = 0; a < 3; a++) {
-                from[a] = fmin(fmax(ray->origin[a] + t * d[a] - cell[a], 0), 1),
-                to[a] = fmin(fmax(ray->origin[a] + out * d[a] - cell[a], 0), 1);
-            }
-            changed = quick_cell(c, from, to, axis < 0 ? -1 : face_side(c, axis, d[axis] > 0), tolerance, &inside);
-            if (changed < 0) truth.decided = 0;
-            if (changed > 0) return truth.side = inside ? 1 : -1, truth;
-        }
-        if (axis < 0) break;
-        cell[axis] += d[axis] > 0 ? 1 : -1, t = out;
-        if (cell[axis] < 0 || cell[axis] > s->size[axis] - 2) break;
-    }
-    return truth;
+static quick_truth crowd_truth(const scene *s, const isogi_ray *ray, double tolerance) {
+    const reference_field field = {s->value, {s->size[0], s->size[1], s->size[2]}, (real)tolerance};
+    const double dir[3] = {(double)ray->dir[0], (double)ray->dir[1], (double)ray->dir[2]};
+    return quick_intersect(&field, ray->origin, dir, ray->tmin, ray->tmax, ray->isovalue);
 }
 
 /* ---- against the reference ---- */
@@ -205,7 +114,7 @@ static void compare_task(void *arg, size_t i) {
         isogi_vol_intersect(pyramid, rays, SOME, hits, NULL);
         for (int k = 0; k < SOME; k++) {
             const double tolerance = rounding(&s, &rays[k]);
-            quick_truth truth = quick_intersect(&s, &rays[k], 64 * tolerance);
+            quick_truth truth = crowd_truth(&s, &rays[k], 64 * tolerance);
             a->rays++;
             if (!truth.decided) {
                 reference_hit wide_truth = wide_intersect(&s, &rays[k], (wide)tolerance);
@@ -323,7 +232,7 @@ TEST(the_cheap_reference_agrees_with_the_plain_one) {
                 ray.dir[x] = (float)d[x], dir[x] = (double)ray.dir[x];
                 ray.origin[x] = random_range(&r, 0, s.size[x] - 1) - (k & 1 ? 30 * dir[x] : 0);
             }
-            const quick_truth quick = quick_intersect(&s, &ray, 64 * rounding(&s, &ray));
+            const quick_truth quick = crowd_truth(&s, &ray, 64 * rounding(&s, &ray));
             const reference_hit plain = reference_intersect(&field, ray.origin, dir, 0, 0, ray.isovalue);
             rays++, decided += quick.decided && plain.decided;
             differs += quick.decided && plain.decided && quick.side != plain.side;
