@@ -7,11 +7,13 @@
    sRGB values against steps of a sixteenth of a voxel, same visibility. Visibility: order 3 on a grid of 8^3 (6^3); error =
    relative RMSE of all coefficients against 2048 rays. Methods: default; steps, rays = other settings of the same code.
    Data space: frames of 512x512 at 256^3 (--quick: without the finest steps); tables of pieces. Frames of the scenes: error against
-   visibility of 2048 directions (512 with --quick, by which the errors come out a hundredth larger:
-   computing it takes most of the time). --dry: all rows in seconds, to look at the table's form: scenes of 16 voxels, with made-up data in
-   place of files; no figure means anything. */
+   visibility of 2048 rays by brute force on the same grid, kept in build/bench/: computing it takes minutes, once, and goes on where it
+   was stopped. A table of goals is printed at the end. --dry: all rows in seconds, to look at the table's form: scenes of 16 voxels, with
+   made-up data in place of files; no figure means anything. */
 #define ISOGI_IMPLEMENTATION
 #include "isogi_dvr.h"
+#include "brute_reference.h"
+#include "goals.h"
 #include "hdr.h"
 #include <stdio.h>
 #include <time.h>
@@ -31,22 +33,29 @@ static double cpu_seconds(void) {
     return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
 }
 
-/* Of the default, on a machine that runs VTK's fixed-point caster in 0.54 s unlit, 0.78 s shaded (frames of ml256 and gyroid256: one core,
-   `make bench-peers` runs it here; others two). */
-static const struct { const char *name, *scene; double seconds; } goals[] = {
-    {"frame", "ml256", 0.1},        {"frame", "gyroid256", 0.1},     {"frame", "engine", 1 / 30.0},   {"frame", "bonsai", 1 / 30.0},
-    {"tf-update", "fuel", 0.15},    {"tf-update", "engine", 0.45},   {"tf-update", "bonsai", 0.75}};
+/* On a machine that runs VTK's fixed-point caster in 0.54 s unlit, 0.78 s shaded (frames of ml256 and gyroid256: one core, `make
+   bench-peers` runs it here; others two). */
+static const goal goals[] = {{"frame-ml256", 0.1, NULL, "VTK, by gradients: 0.78"},
+                             {"frame-gyroid256", 0.1, NULL, "VTK, by gradients: 0.92"},
+                             {"frame-engine", 1 / 30.0, NULL, "30 frames/s"},
+                             {"frame-bonsai", 1 / 30.0, NULL, "30 frames/s"},
+                             {"tf-update-fuel", 0.15, NULL, "Kronander 2011 on a GPU 0.15; error at most:"},
+                             {"tf-update-fuel:paper", 0.15, NULL, "that of the paper's method"},
+                             {"tf-update-engine", 0.45, NULL, "Kronander 2011 on a GPU 0.45, twice the data; error at most:"},
+                             {"tf-update-engine:paper", 0.45, NULL, "that of the paper's method"},
+                             {"tf-update-bonsai", 0.75, NULL, "Kronander 2011 on a GPU 1.48, three times the data; error at most:"},
+                             {"tf-update-bonsai:paper", 0.75, NULL, "that of the paper's method"}};
 
 static void row(const char *name, const char *scene, const char *method, const char *setting, double seconds, double error, double work,
                 const char *unit) {
+    char both[48];
     fprintf(csv, "isogi_dvr.h,%s-%s,%s,%s,%.6g,%.6g,%.6g,%s\n", name, scene, method, setting, seconds, error, work, unit);
     fflush(csv);
-    fprintf(stderr, "  %-20s %-8s %-8s %-10s %8.3f s %9.3f M%s/s  error %.3g", name, scene, method, setting, seconds,
+    fprintf(stderr, "  %-20s %-8s %-8s %-10s %8.3f s %9.3f M%s/s  error %.3g\n", name, scene, method, setting, seconds,
             work / seconds / 1e6, unit, error);
-    for (size_t i = 0; i < sizeof goals / sizeof *goals && !strcmp(method, "default"); i++)
-        if (!strcmp(name, goals[i].name) && !strcmp(scene, goals[i].scene))
-            fprintf(stderr, "  goal %.3g s: %.2f of it", goals[i].seconds, seconds / goals[i].seconds);
-    fprintf(stderr, "\n");
+    if (strcmp(method, "default") && strcmp(method, "paper")) return;
+    snprintf(both, sizeof both, "%s-%s%s", name, scene, strcmp(method, "default") ? ":paper" : "");
+    goals_note(both, seconds, error);
 }
 
 static double marschner_lobb(double x, double y, double z) {
@@ -448,8 +457,8 @@ static void bench_update(const bench_scene *s, const isogi_pyramid *pyramid, con
     free(reference);
 }
 
-/* The reference picture: visibility of many directions, post-classified steps of 1/8 voxel, kept in build/bench. Times are those of 512x512
-   pixels; with --quick the error is that of 128x128 pixels of the same view. */
+/* The reference picture: visibility of 2048 rays by brute force (brute_reference.h), post-classified steps of 1/8 voxel. Times are those of
+   512x512 pixels; with --quick the error is that of 64x64 pixels of the same view. */
 static void bench_frame(const bench_scene *s, const isogi_pyramid *pyramid, const isogi_transfer *transfer,
                         const isogi_lighting *lighting) {
     const isogi_volume *volume = isogi_vol_volume(pyramid);
@@ -460,30 +469,30 @@ static void bench_frame(const bench_scene *s, const isogi_pyramid *pyramid, cons
     size_t pixels = (size_t)PIXELS * (size_t)PIXELS;
     float(*image)[4] = (float(*)[4])malloc((size_t)FRAME * (size_t)FRAME * sizeof *image);
     float(*reference)[4] = (float(*)[4])malloc(pixels * sizeof *reference);
-    char path[64];
-    FILE *kept;
     if (s->flipped) view.up[2] = -1;
     for (int a = 0; a < 3; a++) radius += pow(0.5 * (double)(s->size[a] - 1) * volume->spacing[a], 2);
     for (int a = 0; a < 3; a++) {
         view.target[a] = (float)(volume->origin[a] + 0.5 * (double)(s->size[a] - 1) * volume->spacing[a]);
         view.eye[a] = (float)((double)view.target[a] + toward[a] / length * sqrt(radius) / sin(pi / 8));
     }
-    snprintf(path, sizeof path, "build/bench/frame-%s-%d-%d.bin", s->name, PIXELS, REFERENCE);
-    kept = fopen(path, "rb");
-    for (int i = kept && fread(reference, sizeof *reference, pixels, kept) == pixels ? 1 : 0; i < 4; i++) {
+    for (int i = 0; i < 4; i++) {
         isogi_dvr_desc desc = {.pyramid = pyramid,
                                .shading = ISOGI_DVR_VISIBILITY,
                                .order = s->order,
                                .directions = i ? s->rays : REFERENCE,
                                .grid = {s->grid[0], s->grid[1], s->grid[2]},
                                .step = steps[i],
+                               .method = i ? ISOGI_DVR_METHOD_DEFAULT : ISOGI_DVR_BRUTE,
+                               .visibility_step = i ? 0 : 0.25,
                                .classification = i ? ISOGI_DVR_EXACT : ISOGI_DVR_POST_CLASSIFIED};
         double seconds = 1e9, sum = 0;
         isogi_counters count;
         isogi_dvr *dvr = NULL;
         char setting[32];
         if (isogi_dvr_create(&dvr, &desc, i ? &threads : &all) != ISOGI_OK || isogi_dvr_set_transfer(dvr, transfer) != ISOGI_OK) exit(1);
-        if (isogi_dvr_step(dvr, 0, NULL) != ISOGI_OK) exit(1);
+        view.width = view.height = PIXELS;
+        if (!i) brute_visibility(dvr, &view, transfer, s->name, dry ? 0.1 : 0.01); /* dry: noise */
+        else if (isogi_dvr_step(dvr, 0, NULL) != ISOGI_OK) exit(1);
         for (int turn = 0; turn < (i ? 3 : 1); turn++) {
             double begun = s->threads == 1 ? cpu_seconds() : wall_seconds();
             view.width = view.height = i ? FRAME : PIXELS;
@@ -494,12 +503,7 @@ static void bench_frame(const bench_scene *s, const isogi_pyramid *pyramid, cons
         view.width = view.height = PIXELS;
         if (i && PIXELS < FRAME && isogi_dvr_render(dvr, &view, lighting, image, NULL, NULL) != ISOGI_OK) exit(1);
         isogi_dvr_free(dvr);
-        if (!i) {
-            FILE *out = fopen(path, "wb");
-            if (out && fwrite(reference, sizeof *reference, pixels, out) != pixels) fprintf(stderr, "%s: not written\n", path);
-            if (out) fclose(out);
-            continue;
-        }
+        if (!i) continue;
         for (size_t k = 0; k < 3 * pixels; k++) {
             double d = srgb((double)image[k / 3][k % 3]) - srgb((double)reference[k / 3][k % 3]);
             sum += d * d;
@@ -508,7 +512,6 @@ static void bench_frame(const bench_scene *s, const isogi_pyramid *pyramid, cons
         row("frame", s->name, i == 1 ? "default" : "steps", setting, seconds, sqrt(sum / (double)(3 * pixels)), (double)count.samples,
             "sample");
     }
-    if (kept) fclose(kept);
     free(image), free(reference);
 }
 
@@ -579,7 +582,7 @@ static void bench_scene_rows(const bench_scene *s) {
 int main(int argc, char **argv) {
     const char *path = NULL, *only = NULL;
     for (int i = 1; i < argc; i++) {
-        if (!strcmp(argv[i], "--quick")) N = 64, WIDTH = 128, points = 6, POINTS = 256, PIXELS = 128, REFERENCE = 512;
+        if (!strcmp(argv[i], "--quick")) N = 64, WIDTH = 128, points = 6, POINTS = 256, PIXELS = 64;
         else if (!strcmp(argv[i], "--dry")) dry = 1, N = 16, WIDTH = 16, points = 4, POINTS = 8, PIXELS = FRAME = 16, REFERENCE = 64;
         else if (!strcmp(argv[i], "--only") && i + 1 < argc) only = argv[++i];
         else path = argv[i];
@@ -627,5 +630,6 @@ int main(int argc, char **argv) {
         }
     if (!only || !strcmp(only, "scale-invariant")) bench_scale_invariant();
     if (!only) bench_tables();
+    goals_print(goals, sizeof goals / sizeof *goals);
     return fclose(csv) ? 1 : 0;
 }
