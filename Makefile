@@ -96,8 +96,8 @@ demo: build/viewer
 
 figures: build/viewer build/isolines build/tets
 	@sh examples/figures.sh
-	@sh examples/figures_scale_invariant.sh
-	@sh examples/figures_visibility.sh
+	@FIGURES_PAGE=build/figures/index.html sh examples/figures_scale_invariant.sh
+	@FIGURES_PAGE=build/figures/index.html sh examples/figures_visibility.sh
 
 pictures: build/viewer build/strip
 	@sh examples/pictures.sh

@@ -2,14 +2,17 @@
 # Figure 14 of Kronander et al. 2011 with our data, into build/figures (or $1): a volume under one light by local diffuse shading (the
 # baseline), by local visibility, and by global visibility, by the paper's method and by sweeps, in one and in several resolutions; numbers
 # are differences to global visibility by sweeps, at its exposure, RMS in sRGB values of 0 to 1. With ISOGI_DATA engine, else engine-block.
+# Pictures and captions are added to the HTML file FIGURES_PAGE in the folder, if that is set.
 #     SIDE=512   pixels; default 320
 out=${1:-build/figures} side=${SIDE:-320}
 mkdir -p "$out" || exit 1
+page=${FIGURES_PAGE:-/dev/null}
 scene=procedural:engine-block # with a transfer function from its histogram
 [ -z "$ISOGI_DATA" ] || [ ! -f "$ISOGI_DATA/engine_256x256x128_uint8.raw" ] || scene="--scene engine"
 light="--light directional:1,2,1:3,3,3 --env sky"
 failed=0
 
+echo "<h2>Kronander 2011, shading by gradients, by local and by global visibility (figure 14)</h2>" >> "$page"
 echo "figure 14: shading by gradients, by local and by global visibility: $scene"
 # NAME CAPTION VIEWER_ARGUMENTS...; the first one gives the exposure of all
 picture() {
@@ -19,6 +22,7 @@ picture() {
         number=$(echo "$stats" | sed -n 's/^difference_rms //p')
         [ "$number" ] || exposure=$(echo "$stats" | sed -n 's/^exposure //p')
         echo "    $name   $caption${number:+   difference $number}"
+        echo "<figure><img src=\"$name.png\" alt=\"$name\"><figcaption>$caption${number:+<br>difference $number}</figcaption></figure>" >> "$page"
     else failed=1
     fi
 }
