@@ -253,10 +253,10 @@ long)
     item check bake/parts-and-pauses "sh tests/compile/bake.sh"
     memcheck
     fuzzers
-    item check figures/all "ISOGI_DATA= FIGURES_OUT=\"\$OUT\" FIGURES_DIVIDE=64 FIGURES_SIZE=48x48 sh examples/figures.sh"
+    item check figures/all "ISOGI_DATA= FIGURES_OUT=\"\$OUT\" FIGURES_DIVIDE=64 FIGURES_SIZE=48x48 sh examples/figures.sh && sh tests/compile/page.sh \"\$OUT\""
     item check figures/pictures "PICTURES_OUT=\"\$OUT\" PICTURES_DIVIDE=16 sh examples/pictures.sh"
-    item check figures/scale-invariant "ISOGI_DATA= SIDE=48 sh examples/figures_scale_invariant.sh \"\$OUT\""
-    item check figures/visibility "ISOGI_DATA= SIDE=48 sh examples/figures_visibility.sh \"\$OUT\""
+    item check figures/scale-invariant "ISOGI_DATA= SIDE=48 FIGURES_PAGE=\"\$OUT/index.html\" sh examples/figures_scale_invariant.sh \"\$OUT\" && sh tests/compile/page.sh \"\$OUT\""
+    item check figures/visibility "ISOGI_DATA= SIDE=48 FIGURES_PAGE=\"\$OUT/index.html\" sh examples/figures_visibility.sh \"\$OUT\" && sh tests/compile/page.sh \"\$OUT\""
     if have glslangValidator; then item check glsl/shaders "sh tests/compile/glsl.sh"
     else item skip glsl/shaders "glslangValidator is not installed"
     fi
@@ -264,7 +264,7 @@ long)
     else item skip mpi/same-bits "mpicc and mpirun are not installed"
     fi
     item check bench/tables "sh tests/bench/contract.sh sh vol"
-    item check bench/dry-tables "sh tests/bench/contract.sh --dry trace dvr" # in full they take too long beside other work
+    item check bench/dry-tables "sh tests/bench/contract.sh --dry trace dvr visibility" # in full they take too long beside other work
     analysers
     variants "$@"
     emulators "$@"

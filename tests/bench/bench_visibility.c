@@ -1,16 +1,19 @@
 /* The parameter study of Kronander 2011 (section 5), its tables 1 and 2 and the baseline of its figure 14, with our data.
 
-       build/bench/bench_visibility [--quick] [--only SCENE] [--sweeps] OUT.csv      --sweeps: without the paper's method, which takes most
-       of the time
+       build/bench/bench_visibility [--quick] [--only SCENE] [--study NAME] [--sweeps] OUT.csv
+
+   --study: rays, coefficients, blocks, grid, resolutions, frames or shading alone; --sweeps: without the paper's method, which takes most
+   of the time.
 
    Two threads, wall seconds. torus-sphere-plane, the paper's worst case (9 coefficients, 128 rays, radius 16, 1:3, grid 64^3), and bonsai
    under Grace (4 coefficients, 64 rays, radius 16, 1:6.7, grid 64x64x32); one parameter is varied at a time, by sweeps (the default) and by
    the paper's method, which alone has a reduction and a radius. Time: of a whole update; in frames-*, of a frame. Errors are those of the
    frame of 512x512 in the standard view, once as RMSE of sRGB values (cases ...-rmse), once as the share of pixels that look different with
    a probability above 75 % (cases ...-seen; Yee and Newman 2004, with Daly's psychometric function: tests/perceptual.h; 45 degrees wide,
-   100 cd/m^2), against sweeps with 2048 rays on the same grid (rays, reduction, radius), 36 coefficients (coefficients), a grid of four
-   times the points along each axis, twice for torus-sphere-plane (grid), a regular grid of 129 or 193 points along each axis (resolutions,
-   ml256 too). --quick: torus-sphere-plane at 48^3, 128x128 pixels, a few settings. */
+   100 cd/m^2), against sweeps with 2048 rays on the same grid (rays, reduction, radius), 36 coefficients (coefficients), a grid of twice
+   the points along each axis of the finest one, which is 256x256x128 for bonsai and 128^3 for torus-sphere-plane (grid; takes 3 GB), a
+   regular grid of 129 or 193 points along each axis (resolutions, ml256 too). --quick: torus-sphere-plane at 48^3, 128x128 pixels, a few
+   settings. */
 #define ISOGI_IMPLEMENTATION
 #include "isogi_dvr.h"
 #include "hdr.h"
@@ -24,6 +27,7 @@ static const double pi = 3.14159265358979323846;
 static const isogi_context two = {.threads = 2};
 static FILE *csv;
 static int quick, sweeps_alone, SIDE = 512;
+static const char *only_study;
 
 typedef struct study {
     const char *name;
@@ -155,14 +159,14 @@ static void study_blocks(const study *s) {
     free(reference.srgb);
 }
 
-/* Figure 11: grids from half the base's points along each axis to twice or four times. */
+/* Figure 11: grids from half the base's points along each axis to twice or four times; the reference has twice as many as the last. */
 static void study_grids(const study *s) {
-    size_t most = quick ? 2 : s->base.order > 2 ? 2 : 4;
+    size_t most = quick ? 2 : s->base.order > 2 ? 4 : 8;
     isogi_dvr_desc desc = s->base;
     for (int a = 0; a < 3; a++) desc.grid[a] *= most;
     frame reference = frame_of(s, &desc, 0, &s->lighting);
     for (int paper = 0; paper < (quick || sweeps_alone ? 1 : 2); paper++)
-        for (size_t half = 1; half <= most; half *= 2) { /* in halves of the base; the reference itself has no error */
+        for (size_t half = 1; half <= most; half *= 2) { /* in halves of the base */
             char setting[80];
             desc = s->base;
             for (int a = 0; a < 3; a++) desc.grid[a] = desc.grid[a] * half / 2;
@@ -264,6 +268,14 @@ static void tables(const study *s) {
     free(f.srgb);
 }
 
+static void studies(const study *s) {
+    static const struct { const char *name; void (*run)(const study *); } list[] = {
+        {"rays", study_rays}, {"coefficients", study_coefficients}, {"blocks", study_blocks}, {"grid", study_grids},
+        {"resolutions", study_resolutions}, {"frames", study_frames}, {"shading", study_shading}};
+    for (size_t i = 0; i < sizeof list / sizeof *list; i++)
+        if (!only_study || !strcmp(only_study, list[i].name)) list[i].run(s);
+}
+
 static void look_at(study *s, const double toward[3], const float up[3]) {
     const isogi_volume *v = isogi_vol_volume(s->pyramid);
     double radius = 0, length = sqrt(toward[0] * toward[0] + toward[1] * toward[1] + toward[2] * toward[2]);
@@ -303,7 +315,7 @@ static void bench_procedural(void) {
         need(isogi_vol_build(&s.pyramid, &volume, &two), "build");
     if (quick) s.base.grid[0] = s.base.grid[1] = s.base.grid[2] = 24, s.base.directions = 64;
     look_at(&s, toward, up), expose(&s);
-    study_rays(&s), study_coefficients(&s), study_blocks(&s), study_grids(&s), study_resolutions(&s), study_frames(&s), study_shading(&s);
+    studies(&s);
     isogi_vol_free(s.pyramid), procedural_free(&volume);
 }
 
@@ -378,9 +390,8 @@ static void bench_real(int which) {
         s[which].lighting.env.rgb = image.rgb, s[which].lighting.env.width = image.width, s[which].lighting.env.height = image.height;
     need(isogi_vol_build(&s[which].pyramid, &volume, &two), "build");
     look_at(&s[which], which ? upright : turned, up[!which]), expose(&s[which]);
-    tables(&s[which]);
-    if (!which)
-        study_rays(s), study_coefficients(s), study_blocks(s), study_grids(s), study_resolutions(s), study_frames(s), study_shading(s);
+    if (!only_study) tables(&s[which]);
+    if (!which) studies(s);
     isogi_vol_free(s[which].pyramid), free(image.rgb), free(data);
 }
 
@@ -391,10 +402,11 @@ int main(int argc, char **argv) {
         if (!strcmp(argv[i], "--quick")) quick = 1, SIDE = 128;
         else if (!strcmp(argv[i], "--sweeps")) sweeps_alone = 1;
         else if (!strcmp(argv[i], "--only") && i + 1 < argc) only = argv[++i];
+        else if (!strcmp(argv[i], "--study") && i + 1 < argc) only_study = argv[++i];
         else path = argv[i];
     }
     if (!path || path[0] == '-' || !(csv = fopen(path, "w")))
-        return fprintf(stderr, "usage: %s [--quick] [--only SCENE] [--sweeps] OUT.csv\n", argv[0]), 2;
+        return fprintf(stderr, "usage: %s [--quick] [--only SCENE] [--study NAME] [--sweeps] OUT.csv\n", argv[0]), 2;
     fprintf(csv, "header,case,method,setting,seconds,error,work,unit\n");
     if (!only || !strcmp(only, "torus-sphere-plane")) bench_procedural();
     for (int which = 0; which < 3 && !quick; which++)
