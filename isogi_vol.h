@@ -2099,6 +2099,7 @@ typedef struct isogi_vol__block {
     /* results for raw voxels, per grid unit */
     float value[ISOGI_VOL__BLOCK], gradient[3][ISOGI_VOL__BLOCK]; /* of the trilinear filter */
     float sum[4 * ISOGI_VOL__BLOCK];                              /* of cubic filters: value and gradient of each point */
+    const struct isogi_vol__block *next; /* the whole block that follows, located already, or NULL: its voxels are asked for in time */
 } isogi_vol__block;
 
 /* Where the points of a call are: one of the two is NULL. */
@@ -2124,7 +2125,8 @@ static void isogi_vol__grid_point(const isogi_pyramid *p, const isogi_vol__point
 #pragma GCC diagnostic push
 #pragma GCC diagnostic ignored "-Wmaybe-uninitialized" /* gcc 12 says so of its own undefined vectors */
 #pragma GCC diagnostic ignored "-Wuninitialized"
-#pragma GCC diagnostic ignored "-Wsign-conversion" /* and of masks in its own macros, at -O0 */
+#pragma GCC diagnostic ignored "-Wsign-conversion" /* and of masks and shorts in its own macros, at -O0 */
+#pragma GCC diagnostic ignored "-Wconversion"
 #endif
 
 /* Cell and place in it of points first .. first + n - 1, moved to the border if outside; n up to a multiple of 16 are filled in. */
@@ -2194,42 +2196,63 @@ ISOGI_VOL__AVX2 static void isogi_vol__locate_avx2(const isogi_pyramid *p, const
     }
 }
 
-/* The same in floats, for sixteen world points at a time where isogi_vol__plan_float_grid allows it. A first guess of the cell is never too
+/* The same in floats, for eight world points at a time where isogi_vol__plan_float_grid allows it. A first guess of the cell is never too
    high and at most one too low, as 2^-9 is more than its error; from there the place in the cell is right to 2^-24. */
-ISOGI_VOL__AVX512 static void isogi_vol__locate_avx512(const isogi_pyramid *p, const float (*world)[3], int n, isogi_vol__block *b) {
+ISOGI_VOL__AVX2 static void isogi_vol__locate_floats(const isogi_pyramid *p, const float (*world)[3], int n, isogi_vol__block *b) {
     const isogi_vol__float_grid *g = &p->float_grid;
-    const __m512i threes = _mm512_setr_epi32(0, 3, 6, 9, 12, 15, 18, 21, 24, 27, 30, 33, 36, 39, 42, 45);
-    const __m512 zero = _mm512_setzero_ps(), one = _mm512_set1_ps(1);
+    const __m256 zero = _mm256_setzero_ps(), one = _mm256_set1_ps(1);
     const __m128i width = _mm_cvtsi32_si128(g->shift);
-    int i, r;
-    for (i = 0; i < n; i += 16) {
-        const uint64_t there = n - i >= 16 ? ~(uint64_t)0 : ((uint64_t)1 << 3 * (n - i)) - 1;
+    float some[24];
+    int i;
+    for (i = 0; i < ((n + 15) & ~15); i += 8) {
         const float *points = (const float *)world + 3 * (size_t)i;
-        const __m512 k0 = _mm512_maskz_loadu_ps((__mmask16)there, points),
-                     k1 = _mm512_maskz_loadu_ps((__mmask16)(there >> 16), points + 16);
-        const __m512 k2 = _mm512_maskz_loadu_ps((__mmask16)(there >> 32), points + 32);
-        __m512i voxel = _mm512_setzero_si512();
-        for (r = 0; r < 3; r++) {
-            const __m512i from = _mm512_add_epi32(threes, _mm512_set1_epi32(r)), end = _mm512_set1_epi32(p->cells[r] - 1);
-            const __m512 w =
-                _mm512_mask_permutexvar_ps(_mm512_permutex2var_ps(k0, from, k1), (__mmask16)(r < 2 ? 0xf800 : 0xfc00), from, k2);
-            const __m512 high = _mm512_set1_ps(g->high[r]), guess = _mm512_fmadd_ps(high, w, _mm512_set1_ps(g->at_high[r] - 1.0f / 512));
-            const __m512 clamped = _mm512_min_ps(_mm512_max_ps(guess, zero), _mm512_set1_ps((float)(p->cells[r] - 1))); /* NaN gives 0 */
-            __m512i cell = _mm512_max_epi32(_mm512_min_epi32(_mm512_cvttps_epi32(clamped), end), _mm512_setzero_si512()); /* in any case */
-            __m512 local = _mm512_fmadd_ps(high, w, _mm512_sub_ps(_mm512_set1_ps(g->at_high[r]), _mm512_cvtepi32_ps(cell)));
-            __mmask16 next;
-            local = _mm512_add_ps(local, _mm512_fmadd_ps(_mm512_set1_ps(g->low[r]), w, _mm512_set1_ps(g->at_low[r])));
-            next = _mm512_mask_cmp_ps_mask(_mm512_cmplt_epi32_mask(cell, end), local, one, _CMP_GE_OQ);
-            cell = _mm512_mask_add_epi32(cell, next, cell, _mm512_set1_epi32(1)), local = _mm512_mask_sub_ps(local, next, local, one);
-            _mm512_storeu_si512((void *)&b->cell[r][i], cell);
-            _mm512_storeu_ps(&b->local[r][i], _mm512_min_ps(_mm512_max_ps(local, zero), one)); /* of points outside; NaN gives 0 */
-            voxel = _mm512_add_epi32(voxel, _mm512_mullo_epi32(cell, _mm512_set1_epi32(g->stride[r])));
+        __m256 k0, k1, k2;
+        __m256i voxel = _mm256_setzero_si256();
+        if (n - i < 8) {
+            memset(some, 0, sizeof some);
+            if (n > i) memcpy(some, points, 3 * (size_t)(n - i) * sizeof *some);
+            points = some;
         }
-        _mm512_storeu_si512((void *)&b->offset[i], _mm512_sll_epi64(_mm512_cvtepi32_epi64(_mm512_castsi512_si256(voxel)), width));
-        _mm512_storeu_si512((void *)&b->offset[i + 8], _mm512_sll_epi64(_mm512_cvtepi32_epi64(_mm512_extracti64x4_epi64(voxel, 1)), width));
+        k0 = _mm256_loadu_ps(points), k1 = _mm256_loadu_ps(points + 8), k2 = _mm256_loadu_ps(points + 16);
+        /* coordinates r of all points, in lanes of k1 and k2, then in order; a NaN, and what is far below, becomes the least integer */
+#define ISOGI_VOL__AXIS(r, in1, in2)                                                                                             \
+    do {                                                                                                                         \
+        const __m256 mixed = _mm256_blend_ps(_mm256_blend_ps(k0, k1, in1), k2, in2);                                             \
+        const __m256 w = _mm256_permutevar8x32_ps(mixed, _mm256_setr_epi32(r, (3 + r) & 7, (6 + r) & 7, (1 + r) & 7, (4 + r) & 7, \
+                                                                           (7 + r) & 7, (2 + r) & 7, (5 + r) & 7));              \
+        const __m256i end = _mm256_set1_epi32(p->cells[r] - 1);                                                                  \
+        const __m256 high = _mm256_set1_ps(g->high[r]), at_high = _mm256_set1_ps(g->at_high[r]);                                 \
+        const __m256 guess = _mm256_fmadd_ps(high, w, _mm256_sub_ps(at_high, _mm256_set1_ps(1.0f / 512)));                       \
+        __m256i cell = _mm256_cvttps_epi32(_mm256_min_ps(guess, _mm256_cvtepi32_ps(end)));                                       \
+        __m256 local, next;                                                                                                      \
+        cell = _mm256_max_epi32(cell, _mm256_setzero_si256());                                                                   \
+        local = _mm256_add_ps(_mm256_fmadd_ps(high, w, _mm256_sub_ps(at_high, _mm256_cvtepi32_ps(cell))),                        \
+                              _mm256_fmadd_ps(_mm256_set1_ps(g->low[r]), w, _mm256_set1_ps(g->at_low[r])));                      \
+        next = _mm256_and_ps(_mm256_castsi256_ps(_mm256_cmpgt_epi32(end, cell)), _mm256_cmp_ps(local, one, _CMP_GE_OQ));         \
+        cell = _mm256_sub_epi32(cell, _mm256_castps_si256(next)), local = _mm256_sub_ps(local, _mm256_and_ps(next, one));        \
+        _mm256_storeu_si256((__m256i *)(void *)&b->cell[r][i], cell);                                                            \
+        _mm256_storeu_ps(&b->local[r][i], _mm256_min_ps(_mm256_max_ps(local, zero), one)); /* of points outside; NaN gives 0 */  \
+        voxel = _mm256_add_epi32(voxel, _mm256_mullo_epi32(cell, _mm256_set1_epi32(g->stride[r])));                              \
+    } while (0)
+        ISOGI_VOL__AXIS(0, 0x92, 0x24);
+        ISOGI_VOL__AXIS(1, 0x24, 0x49);
+        ISOGI_VOL__AXIS(2, 0x49, 0x92);
+#undef ISOGI_VOL__AXIS
+        _mm256_storeu_si256((__m256i *)(void *)&b->offset[i],
+                            _mm256_sll_epi64(_mm256_cvtepi32_epi64(_mm256_castsi256_si128(voxel)), width));
+        _mm256_storeu_si256((__m256i *)(void *)&b->offset[i + 4],
+                            _mm256_sll_epi64(_mm256_cvtepi32_epi64(_mm256_extracti128_si256(voxel, 1)), width));
     }
 }
 #endif
+
+/* Whether the points of a block, by the first of them, are more than a cell apart. */
+ISOGI_VOL__INLINE int isogi_vol__far_apart(const isogi_vol__block *b) {
+    int a, k, apart = 0;
+    for (a = 0; a < 3; a++)
+        for (k = 0; k < 3; k++) apart |= b->cell[a][k + 1] - b->cell[a][k] > 1 || b->cell[a][k + 1] - b->cell[a][k] < -1;
+    return apart;
+}
 
 /* ---- trilinear values of a block ---- */
 
@@ -2263,23 +2286,23 @@ static void isogi_vol__fetch(const isogi_volume *v, int n, const isogi_vol__bloc
 
 /* Trilinear values, and gradients if asked for, of the vector of points from i on with corners c; for any width: V and the operations
    L##mul_ps ... of the width. Differences of corners come first, so that the error of a gradient is relative to it. */
-#define ISOGI_VOL__BLEND(NAME, L, a, b, axis) ISOGI_VOL__MADD_##NAME(at[axis], b, L##mul_ps(rest[axis], a))
+#define ISOGI_VOL__BLEND(NAME, L, a, b, axis) ISOGI_VOL__MADD_##NAME(at##axis, b, L##mul_ps(rest##axis, a))
+#define ISOGI_VOL__SLOPE(NAME, L, k, a0, a1, b0, b1, c0, c1, d0, d1, e, f)                                                       \
+    z0 = ISOGI_VOL__BLEND(NAME, L, L##sub_ps(c[a1], c[a0]), L##sub_ps(c[b1], c[b0]), e);                                         \
+    z1 = ISOGI_VOL__BLEND(NAME, L, L##sub_ps(c[c1], c[c0]), L##sub_ps(c[d1], c[d0]), e);                                         \
+    L##storeu_ps(&b->gradient[k][i], ISOGI_VOL__BLEND(NAME, L, z0, z1, f))
 #define ISOGI_VOL__TRILINEAR(NAME, ATTRIBUTES, V, L)                                                                             \
     ATTRIBUTES ISOGI_VOL__INLINE void isogi_vol__trilinear_##NAME(isogi_vol__block *b, int i, const V c[8], int gradients) {     \
-        V at[3], rest[3], y0, y1, z0, z1;                                                                                        \
-        int k;                                                                                                                   \
-        for (k = 0; k < 3; k++) at[k] = L##loadu_ps(&b->local[k][i]), rest[k] = L##sub_ps(L##set1_ps(1), at[k]);                 \
-        y0 = ISOGI_VOL__BLEND(NAME, L, c[0], c[1], 0), y1 = ISOGI_VOL__BLEND(NAME, L, c[2], c[3], 0);                            \
-        z0 = ISOGI_VOL__BLEND(NAME, L, y0, y1, 1);                                                                               \
-        y0 = ISOGI_VOL__BLEND(NAME, L, c[4], c[5], 0), y1 = ISOGI_VOL__BLEND(NAME, L, c[6], c[7], 0);                            \
-        z1 = ISOGI_VOL__BLEND(NAME, L, y0, y1, 1);                                                                               \
+        const V at0 = L##loadu_ps(&b->local[0][i]), at1 = L##loadu_ps(&b->local[1][i]), at2 = L##loadu_ps(&b->local[2][i]);      \
+        const V one = L##set1_ps(1), rest0 = L##sub_ps(one, at0), rest1 = L##sub_ps(one, at1), rest2 = L##sub_ps(one, at2);      \
+        V z0, z1;                                                                                                                \
+        z0 = ISOGI_VOL__BLEND(NAME, L, ISOGI_VOL__BLEND(NAME, L, c[0], c[1], 0), ISOGI_VOL__BLEND(NAME, L, c[2], c[3], 0), 1);   \
+        z1 = ISOGI_VOL__BLEND(NAME, L, ISOGI_VOL__BLEND(NAME, L, c[4], c[5], 0), ISOGI_VOL__BLEND(NAME, L, c[6], c[7], 0), 1);   \
         L##storeu_ps(&b->value[i], ISOGI_VOL__BLEND(NAME, L, z0, z1, 2));                                                        \
-        for (k = 0; k < 3 && gradients; k++) {                                                                                   \
-            const int s = 1 << k, p = k == 0 ? 2 : 1, q = k == 2 ? 2 : 4, e = k == 0, f = k == 2 ? 1 : 2;                        \
-            z0 = ISOGI_VOL__BLEND(NAME, L, L##sub_ps(c[s], c[0]), L##sub_ps(c[s + p], c[p]), e);                                 \
-            z1 = ISOGI_VOL__BLEND(NAME, L, L##sub_ps(c[s + q], c[q]), L##sub_ps(c[s + p + q], c[p + q]), e);                     \
-            L##storeu_ps(&b->gradient[k][i], ISOGI_VOL__BLEND(NAME, L, z0, z1, f));                                              \
-        }                                                                                                                        \
+        if (!gradients) return;                                                                                                  \
+        ISOGI_VOL__SLOPE(NAME, L, 0, 0, 1, 2, 3, 4, 5, 6, 7, 1, 2);                                                              \
+        ISOGI_VOL__SLOPE(NAME, L, 1, 0, 2, 1, 3, 4, 6, 5, 7, 0, 2);                                                              \
+        ISOGI_VOL__SLOPE(NAME, L, 2, 0, 4, 1, 5, 2, 6, 3, 7, 0, 1);                                                              \
     }
 /* A whole block from fetched corners. */
 #define ISOGI_VOL__TRILINEAR_BLOCK(NAME, ATTRIBUTES, V, L, WIDTH)                                                                \
@@ -2432,6 +2455,97 @@ ISOGI_VOL__TRILINEAR_BLOCK(avx2, ISOGI_VOL__AVX2, __m256, _mm256_, 8)
 ISOGI_VOL__WIDEN(avx2, ISOGI_VOL__AVX2, _mm_)
 ISOGI_VOL__CUBIC(avx2, ISOGI_VOL__AVX2, __m256, _mm256_, 8)
 
+/* Corners of eight points in a row of voxels that follow each other, and their neighbours along x. Two neighbours are one load: gathers are
+   slower on many processors. */
+ISOGI_VOL__AVX2 ISOGI_VOL__INLINE void isogi_vol__float_pairs(const char *row, const ptrdiff_t *q, __m256 c[2]) {
+    __m256 even, odd;
+#define ISOGI_VOL__TWO(k) \
+    _mm_loadh_pi(_mm_castsi128_ps(ISOGI_VOL__EIGHT(row + q[k])), (const __m64 *)(const void *)(row + q[k + 1]))
+    even = _mm256_set_m128(ISOGI_VOL__TWO(4), ISOGI_VOL__TWO(0)), odd = _mm256_set_m128(ISOGI_VOL__TWO(6), ISOGI_VOL__TWO(2));
+#undef ISOGI_VOL__TWO
+    c[0] = _mm256_shuffle_ps(even, odd, 0x88), c[1] = _mm256_shuffle_ps(even, odd, 0xdd);
+}
+
+ISOGI_VOL__INLINE int32_t isogi_vol__two_bytes(const char *p) {
+    uint16_t x;
+    memcpy(&x, p, 2);
+    return x;
+}
+
+ISOGI_VOL__AVX2 ISOGI_VOL__INLINE void isogi_vol__byte_pairs(const char *row, const ptrdiff_t *q, int is_signed, __m256 c[2]) {
+    __m128i x = _mm_cvtsi32_si128(isogi_vol__two_bytes(row + q[0])), y = _mm_cvtsi32_si128(isogi_vol__two_bytes(row + q[4])), second;
+    x = _mm_insert_epi16(x, isogi_vol__two_bytes(row + q[1]), 1), y = _mm_insert_epi16(y, isogi_vol__two_bytes(row + q[5]), 1);
+    x = _mm_insert_epi16(x, isogi_vol__two_bytes(row + q[2]), 2), y = _mm_insert_epi16(y, isogi_vol__two_bytes(row + q[6]), 2);
+    x = _mm_insert_epi16(x, isogi_vol__two_bytes(row + q[3]), 3), y = _mm_insert_epi16(y, isogi_vol__two_bytes(row + q[7]), 3);
+    x = _mm_unpacklo_epi64(x, y);
+    second = is_signed ? _mm_srai_epi16(x, 8) : _mm_srli_epi16(x, 8);
+    x = _mm_slli_epi16(x, 8);
+    x = is_signed ? _mm_srai_epi16(x, 8) : _mm_srli_epi16(x, 8);
+    c[0] = _mm256_cvtepi32_ps(_mm256_cvtepi16_epi32(x)), c[1] = _mm256_cvtepi32_ps(_mm256_cvtepi16_epi32(second));
+}
+
+ISOGI_VOL__AVX2 ISOGI_VOL__INLINE void isogi_vol__short_pairs(const char *row, const ptrdiff_t *q, int is_signed, __m256 c[2]) {
+    __m128i x = isogi_vol__four_bytes(row + q[0]), y = isogi_vol__four_bytes(row + q[4]);
+    __m256i all, first;
+#define ISOGI_VOL__INSERT(v, i, k) v = _mm_insert_epi32(v, _mm_cvtsi128_si32(isogi_vol__four_bytes(row + q[i])), k)
+    ISOGI_VOL__INSERT(x, 1, 1), ISOGI_VOL__INSERT(x, 2, 2), ISOGI_VOL__INSERT(x, 3, 3);
+    ISOGI_VOL__INSERT(y, 5, 1), ISOGI_VOL__INSERT(y, 6, 2), ISOGI_VOL__INSERT(y, 7, 3);
+#undef ISOGI_VOL__INSERT
+    all = _mm256_set_m128i(y, x), first = _mm256_slli_epi32(all, 16);
+    c[0] = _mm256_cvtepi32_ps(is_signed ? _mm256_srai_epi32(first, 16) : _mm256_srli_epi32(first, 16));
+    c[1] = _mm256_cvtepi32_ps(is_signed ? _mm256_srai_epi32(all, 16) : _mm256_srli_epi32(all, 16));
+}
+
+/* Asks for the voxels of eight points of the block that follows: the memory of a whole block is to come while another is computed, as
+   processors do not look so far ahead themselves. Every second point serves its neighbour, unless points are further apart. Into the second
+   level, since a block may lie in few sets of the first. */
+ISOGI_VOL__AVX2 ISOGI_VOL__INLINE void isogi_vol__ask_for_eight(const char *const rows[4], const ptrdiff_t *q, int every) {
+    int k;
+#define ISOGI_VOL__ASK(k)                                                                                                        \
+    _mm_prefetch(rows[0] + q[k], _MM_HINT_T1), _mm_prefetch(rows[1] + q[k], _MM_HINT_T1), _mm_prefetch(rows[2] + q[k], _MM_HINT_T1), \
+        _mm_prefetch(rows[3] + q[k], _MM_HINT_T1)
+    ISOGI_VOL__ASK(0), ISOGI_VOL__ASK(2), ISOGI_VOL__ASK(4), ISOGI_VOL__ASK(6);
+    for (k = 1; k < 8 && every; k += 2) ISOGI_VOL__ASK(k);
+#undef ISOGI_VOL__ASK
+}
+
+/* A whole block where voxels follow each other along x, which has more than one. */
+ISOGI_VOL__AVX2 static void isogi_vol__trilinear_pairs(const isogi_volume *v, isogi_vol__block *b, int n, int gradients) {
+    const ptrdiff_t dy = v->size[1] > 1 ? v->stride[1] : 0, dz = v->size[2] > 1 ? v->stride[2] : 0;
+    const int every = b->next && isogi_vol__far_apart(b->next);
+    const char *rows[4];
+    __m256 c[8];
+    int i;
+    rows[0] = (const char *)v->data, rows[1] = rows[0] + dy, rows[2] = rows[0] + dz, rows[3] = rows[1] + dz;
+#define ISOGI_VOL__EIGHTS(PAIRS)                                                        \
+    for (i = 0; i < n; i += 8) {                                                        \
+        const ptrdiff_t *q = b->offset + i;                                             \
+        if (b->next) isogi_vol__ask_for_eight(rows, b->next->offset + i, every);        \
+        PAIRS(rows[0], 0), PAIRS(rows[1], 2), PAIRS(rows[2], 4), PAIRS(rows[3], 6);     \
+        isogi_vol__trilinear_avx2(b, i, c, gradients);                                  \
+    }                                                                                   \
+    break
+#define ISOGI_VOL__U8_PAIRS(row, k) isogi_vol__byte_pairs(row, q, 0, c + k)
+#define ISOGI_VOL__I8_PAIRS(row, k) isogi_vol__byte_pairs(row, q, 1, c + k)
+#define ISOGI_VOL__U16_PAIRS(row, k) isogi_vol__short_pairs(row, q, 0, c + k)
+#define ISOGI_VOL__I16_PAIRS(row, k) isogi_vol__short_pairs(row, q, 1, c + k)
+#define ISOGI_VOL__F32_PAIRS(row, k) isogi_vol__float_pairs(row, q, c + k)
+    switch (v->type) {
+    case ISOGI_U8: ISOGI_VOL__EIGHTS(ISOGI_VOL__U8_PAIRS);
+    case ISOGI_I8: ISOGI_VOL__EIGHTS(ISOGI_VOL__I8_PAIRS);
+    case ISOGI_U16: ISOGI_VOL__EIGHTS(ISOGI_VOL__U16_PAIRS);
+    case ISOGI_I16: ISOGI_VOL__EIGHTS(ISOGI_VOL__I16_PAIRS);
+    case ISOGI_F32: ISOGI_VOL__EIGHTS(ISOGI_VOL__F32_PAIRS);
+    case ISOGI_F64: break;
+    }
+#undef ISOGI_VOL__EIGHTS
+#undef ISOGI_VOL__U8_PAIRS
+#undef ISOGI_VOL__I8_PAIRS
+#undef ISOGI_VOL__U16_PAIRS
+#undef ISOGI_VOL__I16_PAIRS
+#undef ISOGI_VOL__F32_PAIRS
+}
+
 #define ISOGI_VOL__MADD_avx512 _mm512_fmadd_ps
 #define ISOGI_VOL__SPREAD_avx512(p) \
     _mm512_permutexvar_ps(_mm512_setr_epi32(0, 0, 0, 0, 1, 1, 1, 1, 2, 2, 2, 2, 3, 3, 3, 3), _mm512_castps128_ps512(_mm_loadu_ps(p)))
@@ -2442,7 +2556,6 @@ ISOGI_VOL__CUBIC(avx2, ISOGI_VOL__AVX2, __m256, _mm256_, 8)
 #define ISOGI_VOL__ROW_avx512(p)                                                                                                 \
     _mm512_insertf32x4(_mm512_insertf32x4(_mm512_insertf32x4(_mm512_castps128_ps512(ISOGI_VOL__FLOATS(p, 0)), ISOGI_VOL__FLOATS(p, 1), 1), \
                                           ISOGI_VOL__FLOATS(p, 2), 2), ISOGI_VOL__FLOATS(p, 3), 3)
-ISOGI_VOL__TRILINEAR(avx512, ISOGI_VOL__AVX512, __m512, _mm512_)
 ISOGI_VOL__CUBIC(avx512, ISOGI_VOL__AVX512, __m512, _mm512_, 16)
 
 /* The 64 taps of a point, eight rows to a gather. */
@@ -2474,53 +2587,6 @@ ISOGI_VOL__AVX512 static void isogi_vol__widen_avx512(const isogi_volume *v, con
         case ISOGI_F64: break;
         }
 #undef ISOGI_VOL__SLICES
-}
-
-/* Corners by gathers, which are quick where AVX-512 is: neighbours along x come as one number. Of bytes, two more come with them; where
-   these would lie behind the volume, what comes begins earlier and is shifted. */
-ISOGI_VOL__AVX512 static void isogi_vol__trilinear_block_avx512(const isogi_volume *v, isogi_vol__block *b, int n, int gradients) {
-    const int width = (int)isogi_vol__type_size(v->type), is_signed = v->type == ISOGI_I8 || v->type == ISOGI_I16;
-    const ptrdiff_t dy = v->size[1] > 1 ? v->stride[1] : 0, dz = v->size[2] > 1 ? v->stride[2] : 0;
-    const __m128i unused = _mm_cvtsi32_si128(32 - 8 * width);
-    const __m512i even = _mm512_setr_epi32(0, 2, 4, 6, 8, 10, 12, 14, 16, 18, 20, 22, 24, 26, 28, 30),
-                  odd = _mm512_or_si512(even, _mm512_set1_epi32(1));
-    ptrdiff_t last = -4;
-    int i, r;
-    for (r = 0; r < 3; r++) last += v->stride[r] > 0 ? v->stride[r] * (ptrdiff_t)(v->size[r] - 1) : 0;
-    last += 1 - (dy > 0 ? dy : 0) - (dz > 0 ? dz : 0); /* where four bytes of the first row may begin, so that those of the fourth exist */
-    for (i = 0; i < n; i += 16) {
-        __m512i at0 = _mm512_loadu_si512((const void *)&b->offset[i]), at1 = _mm512_loadu_si512((const void *)&b->offset[i + 8]);
-        __m512 c[8];
-        if (width == 4)
-            for (r = 0; r < 4; r++) {
-                const char *row = (const char *)v->data + (r & 1 ? dy : 0) + (r & 2 ? dz : 0);
-                const __m512i pair0 = _mm512_i64gather_epi64(at0, (const void *)row, 1),
-                              pair1 = _mm512_i64gather_epi64(at1, (const void *)row, 1);
-                c[2 * r] = _mm512_castsi512_ps(_mm512_permutex2var_epi32(pair0, even, pair1));
-                c[2 * r + 1] = _mm512_castsi512_ps(_mm512_permutex2var_epi32(pair0, odd, pair1));
-            }
-        else {
-            __m512i shift = _mm512_setzero_si512();
-            if (width == 1) {
-                const __m512i end = _mm512_set1_epi64(last), move0 = _mm512_max_epi64(_mm512_sub_epi64(at0, end), shift);
-                const __m512i move1 = _mm512_max_epi64(_mm512_sub_epi64(at1, end), shift);
-                at0 = _mm512_sub_epi64(at0, move0), at1 = _mm512_sub_epi64(at1, move1);
-                shift = _mm512_slli_epi32(_mm512_permutex2var_epi32(move0, even, move1), 3);
-            }
-            for (r = 0; r < 4; r++) {
-                const char *row = (const char *)v->data + (r & 1 ? dy : 0) + (r & 2 ? dz : 0);
-                const __m512i all =
-                    _mm512_srlv_epi32(_mm512_inserti64x4(_mm512_castsi256_si512(_mm512_i64gather_epi32(at0, (const void *)row, 1)),
-                                                         _mm512_i64gather_epi32(at1, (const void *)row, 1), 1),
-                                      shift);
-                const __m512i first = _mm512_sll_epi32(all, unused),
-                              second = _mm512_sll_epi32(width == 1 ? _mm512_srli_epi32(all, 8) : _mm512_srli_epi32(all, 16), unused);
-                c[2 * r] = _mm512_cvtepi32_ps(is_signed ? _mm512_sra_epi32(first, unused) : _mm512_srl_epi32(first, unused));
-                c[2 * r + 1] = _mm512_cvtepi32_ps(is_signed ? _mm512_sra_epi32(second, unused) : _mm512_srl_epi32(second, unused));
-            }
-        }
-        isogi_vol__trilinear_avx512(b, i, c, gradients);
-    }
 }
 #endif
 
@@ -2630,19 +2696,26 @@ static float isogi_vol__copy_taps(const isogi_pyramid *p, const isogi_vol__block
     return base;
 }
 
-/* Asks for the taps of a few of the next sixteen points: along a ray their neighbours need little else. */
-ISOGI_VOL__INLINE void isogi_vol__fetch_ahead(const isogi_volume *v, const isogi_vol__block *b, int first, int n) {
+/* Asks for the taps of points that follow points i .. i + 15 of n. Along a ray, neighbours of every second of the next sixteen need little
+   else; points further apart need all of theirs, into the second level and a block ahead, as they are many. */
+ISOGI_VOL__INLINE void isogi_vol__ask_for_taps(const isogi_volume *v, const isogi_vol__block *b, int i, int n, int apart) {
 #ifdef ISOGI_VOL__SSE2
-    int i, z;
-    for (i = first; i < first + 16 && i < n; i += 4) {
-        const char *p = isogi_vol__first_tap(v, b->offset[i]);
-        for (z = 0; z < 4; z++, p += v->stride[2]) {
-            _mm_prefetch(p, _MM_HINT_T0), _mm_prefetch(p + v->stride[1], _MM_HINT_T0);
-            _mm_prefetch(p + 2 * v->stride[1], _MM_HINT_T0), _mm_prefetch(p + 3 * v->stride[1], _MM_HINT_T0);
-        }
+    const ptrdiff_t *q = !apart && i + 16 < n ? b->offset + i + 16 : b->next ? b->next->offset + (apart ? i : 0) : NULL;
+    int k, z;
+#define ISOGI_VOL__ASK(STEP, LEVEL)                                                                                              \
+    for (k = 0; k < 16; k += STEP) {                                                                                             \
+        const char *p = isogi_vol__first_tap(v, q[k]);                                                                           \
+        for (z = 0; z < 4; z++, p += v->stride[2]) {                                                                             \
+            _mm_prefetch(p, LEVEL), _mm_prefetch(p + v->stride[1], LEVEL);                                                       \
+            _mm_prefetch(p + 2 * v->stride[1], LEVEL), _mm_prefetch(p + 3 * v->stride[1], LEVEL);                                \
+        }                                                                                                                        \
     }
+    if (!q) return;
+    if (apart) ISOGI_VOL__ASK(1, _MM_HINT_T1)
+    else ISOGI_VOL__ASK(2, _MM_HINT_T0)
+#undef ISOGI_VOL__ASK
 #else
-    (void)v, (void)b, (void)first, (void)n;
+    (void)v, (void)b, (void)i, (void)n, (void)apart;
 #endif
 }
 
@@ -2655,7 +2728,7 @@ static void isogi_vol__cubic_block(const isogi_pyramid *p, isogi_filter filter, 
     float base[16] = {0};
     ptrdiff_t offset[16];
     int32_t low[3], high[3];
-    int i, k, a;
+    int i, k, a, apart = b->next && isogi_vol__far_apart(b->next);
     memset(&taps, 0, sizeof taps);
     for (i = 0; i < 16; i++) taps.powers[i / 4][i % 4] = (float)c[i / 4][i % 4], offset[i] = i * 64 * (ptrdiff_t)sizeof *some;
     taps.powers[4][0] = 1;
@@ -2675,7 +2748,7 @@ static void isogi_vol__cubic_block(const isogi_pyramid *p, isogi_filter filter, 
             for (k = i; k < whole; k++) base[k - i] = isogi_vol__copy_taps(p, b, k, low, high, some + 64 * (k - i));
             taps.first = (const char *)(const void *)some, taps.offset = offset, taps.y = 4 * sizeof(float), taps.z = 16 * sizeof(float);
         }
-        isogi_vol__fetch_ahead(v, b, i + 16, n);
+        isogi_vol__ask_for_taps(v, b, i, n, apart);
         isogi_vol__cubic_points(p, &taps, b, i, end);
         for (k = i; k < end && beyond < 0 && v->type == ISOGI_F32; k++) b->sum[4 * k] += base[k - i];
     }
@@ -2685,8 +2758,8 @@ static void isogi_vol__trilinear_block(const isogi_pyramid *p, isogi_vol__block 
     const isogi_volume *v = &p->volume;
     n = (n + 15) & ~15;
 #ifdef ISOGI_VOL__AVX
-    if (p->path >= ISOGI_VOL__PATH_AVX512 && v->size[0] >= 4 && v->stride[0] == (ptrdiff_t)isogi_vol__type_size(v->type)) {
-        isogi_vol__trilinear_block_avx512(v, b, n, gradients);
+    if (p->path >= ISOGI_VOL__PATH_AVX2 && v->size[0] > 1 && v->stride[0] == (ptrdiff_t)isogi_vol__type_size(v->type)) {
+        isogi_vol__trilinear_pairs(v, b, n, gradients);
         return;
     }
     if (p->path >= ISOGI_VOL__PATH_AVX2) {
@@ -2699,8 +2772,8 @@ static void isogi_vol__trilinear_block(const isogi_pyramid *p, isogi_vol__block 
 
 static void isogi_vol__locate_block(const isogi_pyramid *p, const isogi_vol__points *at, size_t first, int n, isogi_vol__block *b) {
 #ifdef ISOGI_VOL__AVX
-    if (p->path >= ISOGI_VOL__PATH_AVX512 && at->world && p->float_grid.usable) {
-        isogi_vol__locate_avx512(p, at->world + first, n, b);
+    if (p->path >= ISOGI_VOL__PATH_AVX2 && at->world && p->float_grid.usable) {
+        isogi_vol__locate_floats(p, at->world + first, n, b);
         return;
     }
     if (p->path >= ISOGI_VOL__PATH_AVX2) {
@@ -2787,58 +2860,66 @@ static void isogi_vol__sample_one(const isogi_pyramid *p, isogi_filter filter, c
 }
 
 #if defined(ISOGI_VOL__SSE2) || defined(ISOGI_VOL__NEON)
-static void isogi_vol__sample_block(const isogi_pyramid *p, isogi_filter filter, const isogi_vol__points *at, size_t first, int n,
-                                    float *values, float (*gradients)[3]) {
+/* The n points of a block that has been located. */
+static void isogi_vol__sample_block(const isogi_pyramid *p, isogi_filter filter, isogi_vol__block *b, int n, float *values,
+                                    float (*gradients)[3]) {
     const double scale = p->volume.scale, bias = p->volume.bias;
-    isogi_vol__block b;
     double m[9];
     int i;
-    isogi_vol__locate_block(p, at, first, n, &b);
-    if (filter == ISOGI_FILTER_LINEAR) isogi_vol__trilinear_block(p, &b, n, gradients != NULL);
-    else isogi_vol__cubic_block(p, filter, &b, n);
+    if (filter == ISOGI_FILTER_LINEAR) isogi_vol__trilinear_block(p, b, n, gradients != NULL);
+    else isogi_vol__cubic_block(p, filter, b, n);
     for (i = 0; i < 9; i++) m[i] = scale * p->to_grid[i];
     if (filter == ISOGI_FILTER_LINEAR) {
-        if (values && scale >= 1 && scale <= 1 && bias >= 0 && bias <= 0) memcpy(values, b.value, (size_t)n * sizeof *values);
-        else for (i = 0; i < n && values; i++) values[i] = (float)(scale * (double)b.value[i] + bias);
-        for (i = 0; i < n && gradients; i++) isogi_vol__gradient_out(m, b.gradient[0][i], b.gradient[1][i], b.gradient[2][i], gradients[i]);
+        if (values && scale >= 1 && scale <= 1 && bias >= 0 && bias <= 0) memcpy(values, b->value, (size_t)n * sizeof *values);
+        else for (i = 0; i < n && values; i++) values[i] = (float)(scale * (double)b->value[i] + bias);
+        for (i = 0; i < n && gradients; i++)
+            isogi_vol__gradient_out(m, b->gradient[0][i], b->gradient[1][i], b->gradient[2][i], gradients[i]);
         return;
     }
 #ifdef ISOGI_VOL__AVX
-    if (p->path >= ISOGI_VOL__PATH_AVX2) isogi_vol__sums_out_avx2(p, m, b.sum, n, values, gradients);
+    if (p->path >= ISOGI_VOL__PATH_AVX2) isogi_vol__sums_out_avx2(p, m, b->sum, n, values, gradients);
     else
 #endif
         for (i = 0; i < n; i++) {
-            if (values) values[i] = (float)(scale * (double)b.sum[4 * i] + bias);
-            if (gradients) isogi_vol__gradient_out(m, b.sum[4 * i + 1], b.sum[4 * i + 2], b.sum[4 * i + 3], gradients[i]);
+            if (values) values[i] = (float)(scale * (double)b->sum[4 * i] + bias);
+            if (gradients) isogi_vol__gradient_out(m, b->sum[4 * i + 1], b->sum[4 * i + 2], b->sum[4 * i + 3], gradients[i]);
         }
 }
-#endif
 
-static void isogi_vol__sample_some(const isogi_pyramid *p, isogi_filter filter, const isogi_vol__points *at, size_t first, int n,
-                                   float *values, float (*gradients)[3]) {
-    int i;
-#if defined(ISOGI_VOL__SSE2) || defined(ISOGI_VOL__NEON)
-    if (isogi_vol__blockwise(p, filter)) {
-        isogi_vol__sample_block(p, filter, at, first, n, values, gradients);
-        return;
-    }
-#endif
-    for (i = 0; i < n; i++) {
-        double grid[3];
-        isogi_vol__grid_point(p, at, first + (size_t)i, grid);
-        isogi_vol__sample_one(p, filter, grid, values ? values + i : NULL, gradients ? gradients[i] : NULL);
+/* A block is located before the one in front of it is computed. */
+static void isogi_vol__sample_blocks(const isogi_pyramid *p, isogi_filter filter, const isogi_vol__points *at, size_t count, float *values,
+                                     float (*gradients)[3]) {
+    isogi_vol__block blocks[2], *b = blocks, *next = blocks + 1, *swap;
+    int n = count < ISOGI_VOL__BLOCK ? (int)count : ISOGI_VOL__BLOCK, m;
+    size_t i;
+    isogi_vol__locate_block(p, at, 0, n, b);
+    for (i = 0; i < count; i += ISOGI_VOL__BLOCK) {
+        const size_t rest = count - i - (size_t)n;
+        m = rest < ISOGI_VOL__BLOCK ? (int)rest : ISOGI_VOL__BLOCK, b->next = m == ISOGI_VOL__BLOCK ? next : NULL;
+        if (m) isogi_vol__locate_block(p, at, i + ISOGI_VOL__BLOCK, m, next);
+        isogi_vol__sample_block(p, filter, b, n, values ? values + i : NULL, gradients ? gradients + i : NULL);
+        swap = b, b = next, next = swap, n = m;
     }
 }
+#endif
 
 static isogi_result isogi_vol__sample(const isogi_pyramid *p, isogi_filter filter, const float (*world)[3], const double (*grid)[3],
                                       size_t count, float *values, float (*gradients)[3]) {
     isogi_vol__points at;
+    double point[3];
     size_t i;
     at.world = world, at.grid = grid;
     if (!p || (count && !world && !grid) || filter < ISOGI_FILTER_LINEAR || filter > ISOGI_FILTER_CATMULL_ROM) return ISOGI_INVALID;
-    for (i = 0; i < count; i += ISOGI_VOL__BLOCK)
-        isogi_vol__sample_some(p, filter, &at, i, count - i < ISOGI_VOL__BLOCK ? (int)(count - i) : ISOGI_VOL__BLOCK,
-                               values ? values + i : NULL, gradients ? gradients + i : NULL);
+#if defined(ISOGI_VOL__SSE2) || defined(ISOGI_VOL__NEON)
+    if (isogi_vol__blockwise(p, filter)) {
+        isogi_vol__sample_blocks(p, filter, &at, count, values, gradients);
+        return ISOGI_OK;
+    }
+#endif
+    for (i = 0; i < count; i++) {
+        isogi_vol__grid_point(p, &at, i, point);
+        isogi_vol__sample_one(p, filter, point, values ? values + i : NULL, gradients ? gradients[i] : NULL);
+    }
     return ISOGI_OK;
 }
 
