@@ -4761,8 +4761,9 @@ ISOGI_SH__APART void isogi_sh__add_edges_high(float *c, isogi_sh__rectangle *r) 
     double diagonal = isogi_sh__next_diagonal(0, 0);
     int i, k, l, m;
     for (i = 0; i < 4; i++) {
-        const isogi_sh__euler *e = &arc[i].frame;
+        const isogi_sh__euler *e;
         if (!isogi_sh__edge(&arc[i], pole[i], r, i)) return;
+        e = &arc[i].frame;
         turn[0][i][0] = -e->c[1], turn[0][i][1] = e->c[0];
         turn[1][i][0] = e->b[0], turn[1][i][1] = e->b[1];
         turn[2][i][0] = e->a[1], turn[2][i][1] = -e->a[0];
