@@ -207,8 +207,8 @@ ISOGI_API isogi_result isogi_sh_project_samples(double *c, int order, int channe
                                                 const float *weight, size_t count);
 
 /* Coefficients (RGB interleaved) of an equirectangular RGB image laid out and oriented as in isogi_env. Fejer weights in
-   latitude: exact for the band limit of the image; what rows and columns cannot tell apart (degrees l >= height, orders m > 0 with
-   2 m >= width) is zero. The second takes any number of channels, 1..16. */
+   latitude: exact for the band limit of the image; what rows and columns cannot tell apart (degrees l >= height; of orders about the
+   image's axis, which is y, those with 2 m >= width) is zero. Sums end at FLT_MAX. The second takes any number of channels, 1..16. */
 ISOGI_API isogi_result isogi_sh_project_equirect(float *rgb, int order, const float *image, int width, int height);
 ISOGI_API isogi_result isogi_sh_project_image(float *c, int order, int channels, const float *image, int width, int height);
 
@@ -4094,6 +4094,7 @@ static double isogi_sh__fejer(int row, int rows) {
 typedef struct isogi_sh__pixels {
     const float *image;
     int width, height, channels, channel, group, first, end;
+    double unit; /* what a radiance of 1 counts as */
 } isogi_sh__pixels;
 
 /* Azimuth sums of one row about the image's pole: sums[0 or 1][m - first][channel] = sum over texels of texel (cos, sin) m p. */
@@ -4267,7 +4268,7 @@ ISOGI_SH__APART void isogi_sh__project_rows(float *c, int order, const isogi_sh_
     memset(total, 0, sizeof total);
     for (j = 0; j < p->height; j++) {
         double t = ISOGI_SH__PI * ((double)j + 0.5) / (double)p->height, z = cos(t), sine = sin(t), power = 1, diagonal = 0;
-        double weight = isogi_sh__fejer(j, p->height) * 2 * ISOGI_SH__PI / (double)p->width;
+        double weight = p->unit * isogi_sh__fejer(j, p->height) * 2 * ISOGI_SH__PI / (double)p->width;
         isogi_sh__row_sums(sums, p, j);
         for (m = 0; m < p->end; m++) {
             diagonal = isogi_sh__next_diagonal(diagonal, m);
@@ -4297,17 +4298,28 @@ static int isogi_sh__image_fits(int width, int height, int channels) {
 /* The image's frame has its pole on z; the world's is y: x y z of the image are z x y of the world. */
 static const double isogi_sh__image_to_world[9] = {0, 1, 0, 0, 0, 1, 1, 0, 0};
 
-ISOGI_API isogi_result isogi_sh_project_image(float *c, int order, int channels, const float *image, int width, int height) {
+/* Where the sums would leave the range of floats, and to what end would depend on how they are added up, they are taken in this unit, and
+   so turned: coefficients are at most 700 times the largest radiance. */
+#define ISOGI_SH__DIM 5.421010862427522e-20 /* 2^-64 */
+
+/* Coefficients in that unit as they are, to the ends of the range of floats. */
+static void isogi_sh__undim(float *c, size_t count) {
+    size_t i;
+    for (i = 0; i < count; i++) {
+        double x = (double)c[i] / ISOGI_SH__DIM;
+        c[i] = x > 3.4028234663852886e38 ? 3.4028234663852886e38f : x < -3.4028234663852886e38 ? -3.4028234663852886e38f : (float)x;
+    }
+}
+
+static void isogi_sh__image(float *c, int order, int channels, const float *image, int width, int height, double unit) {
     isogi_sh__pixels p;
     isogi_sh__euler e;
-    if (!c || !isogi_sh__shape_ok(order, channels) || !image || width < 1 || height < 1) return ISOGI_INVALID;
-    if (!isogi_sh__image_fits(width, height, channels)) return ISOGI_TOO_LARGE;
-    p.image = image, p.width = width, p.height = height, p.channels = channels;
+    p.image = image, p.width = width, p.height = height, p.channels = channels, p.unit = unit;
 #ifdef ISOGI_SH__SIMD
-    if (order == 5 && channels == 3 && !(width & 3) && width >= 32 && height >= 5 && isogi_sh__level()) {
+    if (order == 5 && channels == 3 && !(width & 3) && width >= 32 && height >= 5 && unit >= 1 && isogi_sh__level()) {
         isogi_sh__project_fast(c, image, width, height);
         if (isogi_sh__euler_angles(&e, isogi_sh__image_to_world) == ISOGI_OK) isogi_sh__rotate(c, c, 0, order, channels, &e);
-        return ISOGI_OK;
+        return;
     }
 #endif
     for (p.first = 0; p.first < order; p.first += ISOGI_SH__GROUP)
@@ -4317,6 +4329,17 @@ ISOGI_API isogi_result isogi_sh_project_image(float *c, int order, int channels,
             isogi_sh__project_rows(c, order, &p);
         }
     if (isogi_sh__euler_angles(&e, isogi_sh__image_to_world) == ISOGI_OK) isogi_sh__rotate(c, c, 0, order, channels, &e);
+}
+
+ISOGI_API isogi_result isogi_sh_project_image(float *c, int order, int channels, const float *image, int width, int height) {
+    size_t count;
+    if (!c || !isogi_sh__shape_ok(order, channels) || !image || width < 1 || height < 1) return ISOGI_INVALID;
+    if (!isogi_sh__image_fits(width, height, channels)) return ISOGI_TOO_LARGE;
+    count = (size_t)channels * ISOGI_SH_COUNT(order);
+    isogi_sh__image(c, order, channels, image, width, height, 1);
+    if (isogi_sh__finite_array(c, count)) return ISOGI_OK;
+    isogi_sh__image(c, order, channels, image, width, height, ISOGI_SH__DIM);
+    isogi_sh__undim(c, count);
     return ISOGI_OK;
 }
 
@@ -4943,28 +4966,29 @@ static void isogi_sh__add_light(float *c, int order, const isogi_light *light, c
     isogi_sh__add_rgb_lobe(c, order, scale, isogi_sh__normalise(d[0], d[1], d[2]), rgb);
 }
 
-ISOGI_API isogi_result isogi_sh_project(float *rgb, int order, const isogi_lighting *lighting, const float point[3]) {
-    const isogi_env *env;
-    isogi_result result;
+/* The environment's image and coefficients, in a unit, and turned. */
+static void isogi_sh__add_env(float *rgb, int order, const isogi_env *env, double unit) {
     isogi_sh__euler e;
     double m[9];
+    size_t i, n = 3 * ISOGI_SH_COUNT(order), given = env->sh ? 3 * ISOGI_SH_COUNT(env->sh_order < order ? env->sh_order : order) : 0;
+    if (env->rgb) isogi_sh__image(rgb, order, 3, env->rgb, env->width, env->height, unit);
+    for (i = 0; i < n && !env->rgb; i++) rgb[i] = 0;
+    for (i = 0; i < given; i++) rgb[i] += (float)unit * env->sh[i];
+    if ((env->rgb || env->sh) && isogi_sh__env_rotation(m, env) == ISOGI_OK && isogi_sh__euler_angles(&e, m) == ISOGI_OK)
+        isogi_sh__rotate(rgb, rgb, 0, order, 3, &e);
+}
+
+ISOGI_API isogi_result isogi_sh_project(float *rgb, int order, const isogi_lighting *lighting, const float point[3]) {
+    isogi_result result;
     size_t i, n = 3 * (isogi_sh__order_ok(order) ? ISOGI_SH_COUNT(order) : 0);
     if (!rgb || !isogi_sh__order_ok(order) || (point && !isogi_sh__finite_array(point, 3))) return ISOGI_INVALID;
     result = isogi_lighting_validate(lighting);
     if (result != ISOGI_OK) return result;
-    env = &lighting->env;
-    if (env->rgb) {
-        result = isogi_sh_project_equirect(rgb, order, env->rgb, env->width, env->height);
-        if (result != ISOGI_OK) return result;
-    } else {
-        for (i = 0; i < n; i++) rgb[i] = 0;
+    isogi_sh__add_env(rgb, order, &lighting->env, 1);
+    if (!isogi_sh__finite_array(rgb, n)) {
+        isogi_sh__add_env(rgb, order, &lighting->env, ISOGI_SH__DIM);
+        isogi_sh__undim(rgb, n);
     }
-    if (env->sh) {
-        size_t m_count = 3 * ISOGI_SH_COUNT(env->sh_order < order ? env->sh_order : order);
-        for (i = 0; i < m_count; i++) rgb[i] += env->sh[i];
-    }
-    if ((env->rgb || env->sh) && isogi_sh__env_rotation(m, env) == ISOGI_OK && isogi_sh__euler_angles(&e, m) == ISOGI_OK)
-        isogi_sh__rotate(rgb, rgb, 0, order, 3, &e);
     for (i = 0; i < lighting->light_count; i++) isogi_sh__add_light(rgb, order, &lighting->lights[i], point);
     isogi_sh__clamp(rgb, n);
     return ISOGI_OK;
@@ -5190,6 +5214,7 @@ ISOGI_API isogi_result isogi_sh_fit_directional(float direction[3], float rgb[3]
 #undef ISOGI_SH__NARROW
 #undef ISOGI_SH__DERING_ORDER
 #undef ISOGI_SH__TOGETHER
+#undef ISOGI_SH__DIM
 #undef ISOGI_SH__TURNS
 #endif /* implementation */
 

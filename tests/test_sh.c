@@ -803,6 +803,49 @@ TEST(weighted_samples_project) {
     CHECK(fabs(c[0] - 4 * pi * (double)value[0] * sqrt(1 / (4 * pi))) < 1e-6, "%g", c[0]);
 }
 
+/* Images and coefficients next to the largest float, turned, with every set of instructions: what comes of them 2^64 times darker, times
+   2^64, as far as floats go. */
+TEST(environments_beyond_the_range_of_floats) {
+    static const int sizes[4][2] = {{2, 3}, {1, 7}, {32, 16}, {9, 20}}, orders[4] = {5, 17, 100, 5};
+    static float bright[3 * 32 * 16], dark[3 * 32 * 16], sh[2][3 * 25], out[3 * MAX_COUNT], expected[3 * MAX_COUNT];
+    const double most = 3.4028234663852886e38, unit = ldexp(1, -64);
+    test_random r = {9};
+    int beyond = 0, within = 0;
+    for (int k = 0; k < 40; k++) {
+        int width = sizes[k % 4][0], height = sizes[k % 4][1], order = orders[k / 4 % 4], sampled = k % 5 != 0;
+        isogi_lighting lighting = {.env = {.rgb = bright, .width = width, .height = height}};
+        double m[9], worst = 0;
+        for (int i = 0; i < 3 * 32 * 16; i++)
+            bright[i] = (float)random_range(&r, k & 1 ? 0 : -most, most), dark[i] = (float)((double)bright[i] * unit);
+        for (int i = 0; i < 3 * 25; i++) sh[0][i] = (float)random_range(&r, -most, most), sh[1][i] = (float)((double)sh[0][i] * unit);
+        random_rotation(&r, m);
+        for (int i = 0; i < 9; i++) lighting.env.rotation[i] = (float)m[i];
+        if (k % 3) lighting.env.sh = sh[0], lighting.env.sh_order = 5;
+        if (!sampled) memset(&lighting.env, 0, sizeof lighting.env), lighting.env.sh = sh[0], lighting.env.sh_order = 5;
+        for (instruction_level = 0; instruction_level < 3 && instruction_level <= BEST_LEVEL; instruction_level++) {
+            isogi_lighting dim = lighting;
+            if (dim.env.rgb) dim.env.rgb = dark;
+            if (dim.env.sh) dim.env.sh = sh[1];
+            for (int alone = 0; alone < 1 + sampled; alone++) { /* the image alone, too */
+                isogi_result result = alone ? isogi_sh_project_equirect(out, order, bright, width, height)
+                                            : isogi_sh_project(out, order, &lighting, NULL);
+                if (alone) isogi_sh_project_equirect(expected, order, dark, width, height);
+                else isogi_sh_project(expected, order, &dim, NULL);
+                CHECK(result == ISOGI_OK, "case %d", k);
+                for (int i = 0; i < 3 * order * order; i++) {
+                    double e = (double)expected[i] / unit, error;
+                    beyond += fabs(e) > most, within += fabs(e) < 0.9 * most && fabs(e) > 1e-3 * most;
+                    e = e > most ? most : e < -most ? -most : e, error = fabs((double)out[i] - e) / most;
+                    worst = fmax(worst, test_finite((double)out[i]) ? error : 1e9);
+                }
+            }
+        }
+        CHECK(worst < 2e-5, "case %d: %g of the largest float off", k, worst); /* floats' rounding of sums up to 50 times that */
+    }
+    instruction_level = BEST_LEVEL;
+    CHECK(beyond > 300 && within > 1000, "%d coefficients beyond the range, %d within it", beyond, within);
+}
+
 /* Any number of channels is the same as one after the other; RGB is three of them. */
 TEST(image_channels_are_independent) {
     enum { W = 24, H = 12, ORDER = 7, N = ORDER * ORDER };
