@@ -61,7 +61,8 @@ build/%: examples/%.c build/flags $(OBJECTS)
 
 # MPI's headers do not keep to our warnings.
 build/bake_mpi: examples/bake_mpi.c build/flags
-	@rm -f $@; echo "mpicc $<"; mpicc -std=gnu99 -Wall -Wextra -ffp-contract=off -I. -Iexamples/common $(CFLAGS) -MMD -MP -MF $@.d -MT $@ -o $@ $< $(LIBS)
+	@rm -f $@; echo "mpicc $<"; mpicc -std=gnu99 -Wall -Wextra -ffp-contract=off -I. -Iexamples/common $(CFLAGS) -MMD -MP \
+		-MF $@.d -MT $@ -o $@ $< $(LIBS)
 
 build/tests/%: tests/%.c build/flags $(OBJECTS)
 	$(call COMPILE,$(if $(filter -O2,$(CFLAGS)),-O1) -Itests,$(HEADERS))
@@ -70,7 +71,8 @@ build/bench/%: tests/bench/%.c build/flags $(OBJECTS)
 	$(call COMPILE,-Itests,$(HEADERS))
 
 # with the peers whose folders are named
-HARMONICS := $(if $(SPHERICART),-DPEER_SPHERICART -isystem "$(SPHERICART)/include" "-L$(SPHERICART)/lib" "-Wl$(comma)-rpath$(comma)$(SPHERICART)/lib") \
+HARMONICS := $(if $(SPHERICART),-DPEER_SPHERICART -isystem "$(SPHERICART)/include" \
+	"-L$(SPHERICART)/lib" "-Wl$(comma)-rpath$(comma)$(SPHERICART)/lib") \
 	$(if $(SHTNS),-DPEER_SHTNS -isystem "$(SHTNS)" "-L$(SHTNS)")
 build/bench/peer_harmonics: tests/bench/peer_harmonics.c build/flags $(OBJECTS) FORCE
 	$(call COMPILE,$(HARMONICS),$(HEADERS)) $(if $(SPHERICART),-lsphericart) $(if $(SHTNS),-lshtns -lfftw3)

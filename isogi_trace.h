@@ -254,8 +254,8 @@ typedef struct isogi_trace_desc {
                                   negative = on the surface */
     isogi_normal_kind normals; /* of the hemisphere that is integrated over */
     double isovalue_min, isovalue_max; /* only texels that a surface within this interval reads; both 0 = all. Where none of a lookup's
-                                          eight
-                                  texels is valid, the nearest one of the 4x4x4 may be missing, unless lazy: it is then dark there */
+                                          eight texels is valid, the nearest one of the 4x4x4 may be missing, unless lazy: it is then
+                                          dark there */
     int lazy;                  /* non-zero: only texels that were requested (and that the interval, if there is one, reads) */
     int capped;                /* non-zero: the volume's border closes the surface (ISOGI_RAY_CAPPED) */
     int transfer_channels;     /* TRANSFER: sets of coefficients: 1 = grey (mean albedo), 3 = RGB; 0 = 3 if albedo is coloured, else 1 */

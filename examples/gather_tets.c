@@ -96,10 +96,11 @@ int main(int argc, char **argv) {
     }
     isogi_result result =
         isogi_trace_gather_field(&desc, meet, NULL, (const float(*)[3])points, (const float(*)[3])normals, count, light, NULL, NULL);
-    for (int i = 0; i < WIDTH * HEIGHT && result == ISOGI_OK; i++) {
+    if (result != ISOGI_OK) return fprintf(stderr, "%s\n", isogi_result_string(result)), 1;
+    for (int i = 0; i < WIDTH * HEIGHT; i++) {
         int shade = pixel[i] ? (int)(2.8f * light[pixel[i] - 1][0]) : 0;
         printf("%c%s", pixel[i] ? ".,:;-=+*oO#%@"[shade < 12 ? shade : 12] : ' ', i % WIDTH == WIDTH - 1 ? "\n" : "");
     }
     printf("%zu triangles, %zu points lit\n", triangles, count);
-    return result != ISOGI_OK;
+    return 0;
 }

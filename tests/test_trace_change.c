@@ -42,8 +42,7 @@ static isogi_counters finished(isogi_trace *t, const isogi_trace_desc *d, const 
 }
 
 /* A new lighting, thousands of times as bright, too: irradiance is baked anew at its first price, and the old light can be read until the
-   new
-   one is there. Short formats then have another unit. */
+   new one is there. Short formats then have another unit. */
 TEST(irradiance_is_relit_at_the_price_of_a_bake) {
     double q[1] = {0.5};
     scene s = scene_make(8, 9, 7, NULL, gyroid, q);
@@ -260,8 +259,7 @@ TEST(only_surfaces_at_changed_voxels_are_computed_again) {
 }
 
 /* A lattice of every eighth voxel, an interval of isovalues: a lump in the air brings texels in that are far from it, and its end does
-   away with
-   what is to be done. */
+   away with what is to be done. */
 TEST(changed_voxels_bring_texels_into_the_interval) {
     double q[1] = {6.5};
     scene s = scene_make(33, 33, 33, NULL, ground, q);
