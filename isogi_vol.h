@@ -2557,37 +2557,6 @@ ISOGI_VOL__AVX2 static void isogi_vol__trilinear_pairs(const isogi_volume *v, is
     _mm512_insertf32x4(_mm512_insertf32x4(_mm512_insertf32x4(_mm512_castps128_ps512(ISOGI_VOL__FLOATS(p, 0)), ISOGI_VOL__FLOATS(p, 1), 1), \
                                           ISOGI_VOL__FLOATS(p, 2), 2), ISOGI_VOL__FLOATS(p, 3), 3)
 ISOGI_VOL__CUBIC(avx512, ISOGI_VOL__AVX512, __m512, _mm512_, 16)
-
-/* The 64 taps of a point, eight rows to a gather. */
-ISOGI_VOL__AVX512 static void isogi_vol__widen_avx512(const isogi_volume *v, const char *p, float *out) {
-    const __m512i up = _mm512_setr_epi64(0, 1, 2, 3, 0, 1, 2, 3), behind = _mm512_setr_epi64(0, 0, 0, 0, 1, 1, 1, 1);
-    const __m512i rows = _mm512_add_epi64(_mm512_mullo_epi64(up, _mm512_set1_epi64(v->stride[1])),
-                                          _mm512_mullo_epi64(behind, _mm512_set1_epi64(v->stride[2])));
-    int k;
-#define ISOGI_VOL__SLICES(T, GATHER, HALF, WIDEN, FIRST)                                                                                 \
-    do {                                                                                                                                   \
-        const T two = GATHER(rows, (const void *)p, 1);                                                                                    \
-        _mm512_storeu_ps(out, _mm512_cvtepi32_ps(WIDEN(FIRST(two)))), _mm512_storeu_ps(out + 16, _mm512_cvtepi32_ps(WIDEN(HALF(two, 1)))); \
-    } while (0)
-    for (k = 0; k < 2; k++, p += 2 * v->stride[2], out += 32)
-        switch (v->type) {
-        case ISOGI_U8:
-            ISOGI_VOL__SLICES(__m256i, _mm512_i64gather_epi32, _mm256_extracti128_si256, _mm512_cvtepu8_epi32, _mm256_castsi256_si128);
-            break;
-        case ISOGI_I8:
-            ISOGI_VOL__SLICES(__m256i, _mm512_i64gather_epi32, _mm256_extracti128_si256, _mm512_cvtepi8_epi32, _mm256_castsi256_si128);
-            break;
-        case ISOGI_U16:
-            ISOGI_VOL__SLICES(__m512i, _mm512_i64gather_epi64, _mm512_extracti64x4_epi64, _mm512_cvtepu16_epi32, _mm512_castsi512_si256);
-            break;
-        case ISOGI_I16:
-            ISOGI_VOL__SLICES(__m512i, _mm512_i64gather_epi64, _mm512_extracti64x4_epi64, _mm512_cvtepi16_epi32, _mm512_castsi512_si256);
-            break;
-        case ISOGI_F32:
-        case ISOGI_F64: break;
-        }
-#undef ISOGI_VOL__SLICES
-}
 #endif
 
 #ifdef ISOGI_VOL__NEON
@@ -2678,8 +2647,7 @@ static float isogi_vol__copy_taps(const isogi_pyramid *p, const isogi_vol__block
         offset -= move[a] * v->stride[a];
     }
 #ifdef ISOGI_VOL__AVX
-    if (p->path >= ISOGI_VOL__PATH_AVX512 && v->type != ISOGI_F32) isogi_vol__widen_avx512(v, isogi_vol__first_tap(v, offset), taps);
-    else if (p->path >= ISOGI_VOL__PATH_AVX2) isogi_vol__widen_avx2(v, isogi_vol__first_tap(v, offset), taps);
+    if (p->path >= ISOGI_VOL__PATH_AVX2) isogi_vol__widen_avx2(v, isogi_vol__first_tap(v, offset), taps);
     else
 #endif
         isogi_vol__widen_base(v, isogi_vol__first_tap(v, offset), taps);
