@@ -1244,7 +1244,7 @@ typedef int32_t isogi_sh__i4 __attribute__((vector_size(16), aligned(4), may_ali
    ulp of z near the poles is much for m < 3; t = 1 - |z| is exact there. Columns of the recursion go in pairs, so that two chains of
    operations hide each other's latency. Near the poles (x + i y)^m would become denormal numbers, which take a hundred times as
    long: what is too small to matter is cleared. */
-#define ISOGI_SH__DEFINE_EVAL(NAME, TARGET, T, V, I, WIDTH, FMA, REST, LESS, TABLE, SQUARED_ERROR, NEAR_POLE, TINY, ROOT)      \
+#define ISOGI_SH__DEFINE_EVAL(NAME, TARGET, T, V, I, WIDTH, FMA, REST, LESS, TABLE, LARGEST_ERROR, NEAR_POLE, TINY, ROOT)      \
     /* scales vectors to about length 1, in place; 0 if a squared length is out of range: by its bits, as -ffast-math wants it */  \
     TARGET ISOGI_SH__APART int NAME##_scale(V *u) {                                                                            \
         V zero = {0}, square = FMA(u[0], u[0], FMA(u[1], u[1], u[2] * u[2]));                                                  \
@@ -1260,19 +1260,26 @@ typedef int32_t isogi_sh__i4 __attribute__((vector_size(16), aligned(4), may_ali
         u[0] *= square, u[1] *= square, u[2] *= square;                                                                        \
         return 1;                                                                                                              \
     }                                                                                                                          \
+    /* 1 - its squared length, after scaling where that is not small */                                                        \
+    TARGET ISOGI_SH__INLINE int NAME##_error(V *u, V *error) {                                                                 \
+        V zero = {0}, one = zero + 1, e = FMA(-u[0], u[0], FMA(-u[1], u[1], REST(one, u[2])));                                 \
+        I sign = (I)(zero - 1) ^ (I)one;                                                                                       \
+        if (!LESS((I)e & ~sign, (I)(zero + (T)LARGEST_ERROR))) {                                                               \
+            V scaled[3];                                                                                                       \
+            scaled[0] = u[0], scaled[1] = u[1], scaled[2] = u[2];                                                              \
+            if (!NAME##_scale(scaled)) return 0;                                                                               \
+            u[0] = scaled[0], u[1] = scaled[1], u[2] = scaled[2];                                                              \
+            e = FMA(-u[0], u[0], FMA(-u[1], u[1], REST(one, u[2])));                                                           \
+        }                                                                                                                      \
+        *error = e;                                                                                                            \
+        return 1;                                                                                                              \
+    }                                                                                                                          \
     /* u[0..2] becomes a unit vector, u[3] the rest of its z */                                                                \
     TARGET ISOGI_SH__INLINE int NAME##_unit(V *u) {                                                                            \
-        V x = u[0], y = u[1], z = u[2], zero = {0}, one = zero + 1, e = FMA(-x, x, FMA(-y, y, REST(one, z)));                  \
-        I sign = (I)(zero - 1) ^ (I)one;                                                                                       \
-        if (!LESS((I)(e * e) & ~sign, (I)(zero + (T)SQUARED_ERROR))) {                                                         \
-            V scaled[3];                                                                                                       \
-            scaled[0] = x, scaled[1] = y, scaled[2] = z;                                                                       \
-            if (!NAME##_scale(scaled)) return 0;                                                                               \
-            x = scaled[0], y = scaled[1], z = scaled[2];                                                                       \
-            e = FMA(-x, x, FMA(-y, y, REST(one, z)));                                                                          \
-        }                                                                                                                      \
-        e *= FMA(e, zero + (T)0.375, zero + (T)0.5);                                                                           \
-        u[0] = FMA(x, e, x), u[1] = FMA(y, e, y), u[2] = FMA(z, e, z), u[3] = FMA(z, e, z - u[2]);                             \
+        V z, e, zero = {0};                                                                                                    \
+        if (!NAME##_error(u, &e)) return 0;                                                                                    \
+        z = u[2], e *= FMA(e, zero + (T)0.375, zero + (T)0.5);                                                                 \
+        u[0] = FMA(u[0], e, u[0]), u[1] = FMA(u[1], e, u[1]), u[2] = FMA(z, e, z), u[3] = FMA(z, e, z - u[2]);                 \
         return 1;                                                                                                              \
     }                                                                                                                          \
     TARGET ISOGI_SH__INLINE int NAME##_load(V *u, const T *x, const T *y, const T *z) {                                        \
@@ -1413,7 +1420,7 @@ ISOGI_SH__INLINE int isogi_sh__less_f4(isogi_sh__i4 a, isogi_sh__i4 b) {
 #define ISOGI_SH__FMA_F4(a, b, c) ((a) * (b) + (c))
 #define ISOGI_SH__REST_F4(one, z) (((one) - (z)) * ((one) + (z))) /* 1 - z^2, exact near the poles without fused operations too */
 ISOGI_SH__DEFINE_EVAL(isogi_sh__eval_f4, , float, isogi_sh__f4, isogi_sh__i4, 4, ISOGI_SH__FMA_F4, ISOGI_SH__REST_F4, ISOGI_SH__LESS_F4,
-                      isogi_sh__table_f32, 1e-6, 1e-3, 1e-19, sqrtf)
+                      isogi_sh__table_f32, 1e-3, 1e-3, 1e-19, sqrtf)
 
 /* Blocks of 4 from the first direction on: how many are done. */
 static size_t isogi_sh__eval_f4(float *out, size_t stride, int order, const float *x, const float *y, const float *z, size_t count) {
@@ -1608,27 +1615,27 @@ ISOGI_SH__AVX2 ISOGI_SH__INLINE void isogi_sh__eval_d4_turn(double *y, size_t n,
     }
 }
 
+/* y[pitch i] = quarter i of each of four vectors, in turn */
+ISOGI_SH__AVX512 ISOGI_SH__INLINE void isogi_sh__quarters(double *y, size_t pitch, isogi_sh__d8 a, isogi_sh__d8 b, isogi_sh__d8 c,
+                                                          isogi_sh__d8 d) {
+    isogi_sh__d8 p = __builtin_shufflevector(a, b, 0, 1, 2, 3, 8, 9, 10, 11), q = __builtin_shufflevector(c, d, 0, 1, 2, 3, 8, 9, 10, 11);
+    *(isogi_sh__d8 *)y = __builtin_shufflevector(p, q, 0, 1, 4, 5, 8, 9, 12, 13);
+    *(isogi_sh__d8 *)(y + pitch) = __builtin_shufflevector(p, q, 2, 3, 6, 7, 10, 11, 14, 15);
+    p = __builtin_shufflevector(a, b, 4, 5, 6, 7, 12, 13, 14, 15), q = __builtin_shufflevector(c, d, 4, 5, 6, 7, 12, 13, 14, 15);
+    *(isogi_sh__d8 *)(y + 2 * pitch) = __builtin_shufflevector(p, q, 0, 1, 4, 5, 8, 9, 12, 13);
+    *(isogi_sh__d8 *)(y + 3 * pitch) = __builtin_shufflevector(p, q, 2, 3, 6, 7, 10, 11, 14, 15);
+}
+
 ISOGI_SH__AVX512 ISOGI_SH__INLINE void isogi_sh__eval_d8_turn(double *y, size_t n, const isogi_sh__d8 *row) {
-    const isogi_sh__d4 none = {0};
-    int half, odd;
+    isogi_sh__d8 even[4], odd[4];
+    int i;
     ISOGI_SH__UNROLL
-    for (half = 0; half < 2; half++, row += 4, y += 4) {
-        ISOGI_SH__UNROLL
-        for (odd = 0; odd < 2; odd++) {
-            isogi_sh__d8 a = odd ? __builtin_shufflevector(row[0], row[1], 1, 9, 3, 11, 5, 13, 7, 15)
-                                 : __builtin_shufflevector(row[0], row[1], 0, 8, 2, 10, 4, 12, 6, 14);
-            isogi_sh__d8 b = odd ? __builtin_shufflevector(row[2], row[3], 1, 9, 3, 11, 5, 13, 7, 15)
-                                 : __builtin_shufflevector(row[2], row[3], 0, 8, 2, 10, 4, 12, 6, 14);
-            isogi_sh__d8 p = __builtin_shufflevector(a, b, 0, 1, 8, 9, 2, 3, 10, 11),
-                         q = __builtin_shufflevector(a, b, 4, 5, 12, 13, 6, 7, 14, 15);
-            double *to = y + (odd ? n : 0);
-            *(isogi_sh__d4 *)to = ISOGI_SH__HALF_D8(p, 0);
-            *(isogi_sh__d4 *)(to + 2 * n) = ISOGI_SH__HALF_D8(p, 1);
-            *(isogi_sh__d4 *)(to + 4 * n) = ISOGI_SH__HALF_D8(q, 0);
-            *(isogi_sh__d4 *)(to + 6 * n) = ISOGI_SH__HALF_D8(q, 1);
-        }
+    for (i = 0; i < 4; i++) {
+        even[i] = __builtin_shufflevector(row[2 * i], row[2 * i + 1], 0, 8, 2, 10, 4, 12, 6, 14);
+        odd[i] = __builtin_shufflevector(row[2 * i], row[2 * i + 1], 1, 9, 3, 11, 5, 13, 7, 15);
     }
-    (void)none; /* clang */
+    isogi_sh__quarters(y, 2 * n, even[0], even[1], even[2], even[3]);
+    isogi_sh__quarters(y + n, 2 * n, odd[0], odd[1], odd[2], odd[3]);
 }
 
 /* The same for 16 rows of floats and 8 of doubles from memory, where halves of two rows are joined by an insertion, so that one shuffle
@@ -1755,8 +1762,11 @@ ISOGI_SH__AVX512 ISOGI_SH__INLINE void isogi_sh__eval_d8_split(isogi_sh__d8 *u, 
    time. It returns how many directions are done, and stops before a block whose lengths are out of range. NAME_rows: the same with the
    functions of a direction together. */
 #define ISOGI_SH__DEFINE_FUSED(NAME, TARGET, T, V, I, WIDTH, FMA, LESS, POLYNOMIALS, NEAR_POLE, TURN, TILE)                          \
+    /* Order 5 with as few multiplications as there are, which is what takes the time here: from squares and their sums, and from \
+       functions of lower degree. */                                                                                           \
     TARGET ISOGI_SH__INLINE void NAME##_order5(V *out, const V *u) {                                                           \
-        V x = u[0], y = u[1], z = u[2], zero = {0}, v = FMA(z, z, -FMA(x, x, y * y)), c = (x - y) * (x + y), s = x * y, c3, s3, f; \
+        V x = u[0], y = u[1], z = u[2], zero = {0}, yy = y * y, r = FMA(x, x, yy), v = FMA(z, z, -r), twice = yy + yy;         \
+        V c = r - twice, s = x * y, f;                                                                                         \
         out[0] = zero + (T)0.28209479177387814;                                                                                \
         out[1] = y * (T)0.48860251190291992;                                                                                   \
         out[2] = z * (T)0.48860251190291992;                                                                                   \
@@ -1765,31 +1775,30 @@ ISOGI_SH__AVX512 ISOGI_SH__INLINE void isogi_sh__eval_d8_split(isogi_sh__d8 *u, 
         out[4] = s * (T)0.54627421529603959;                                                                                   \
         f = z * (T)1.0925484305920792;                                                                                         \
         out[5] = f * y;                                                                                                        \
-        out[6] = FMA(v, zero + (T)0.47308734787878, zero + (T)0.15769578262626);                                               \
         out[7] = f * x;                                                                                                        \
+        out[6] = FMA(v, zero + (T)0.47308734787878, zero + (T)0.15769578262626);                                               \
+        out[9] = (y * (T)0.59004358992664352) * (c + c + r);                                                                   \
+        out[15] = (x * (T)0.59004358992664352) * (c - twice);                                                                  \
         out[8] = c * (T)0.54627421529603959;                                                                                   \
-        c3 = FMA(x, c, -(y * s)), s3 = FMA(x, s, y * c);                                                                       \
-        out[9] = s3 * (T)0.59004358992664352;                                                                                  \
         f = z * (T)1.4453057213202769;                                                                                         \
         out[10] = f * s;                                                                                                       \
         out[14] = f * c;                                                                                                       \
         f = FMA(v, zero + (T)1.1426144986611644, zero + (T)0.6855686991966986);                                                \
         out[11] = f * y;                                                                                                       \
-        out[12] = z * FMA(v, zero + (T)0.9329408314752885, zero - (T)0.1865881662950577);                                      \
         out[13] = f * x;                                                                                                       \
-        out[15] = c3 * (T)0.59004358992664352;                                                                                 \
-        out[16] = (s * c) * (T)1.2516714708983523;                                                                             \
-        f = z * (T)1.7701307697799304;                                                                                         \
-        out[17] = f * s3;                                                                                                      \
-        out[23] = f * c3;                                                                                                      \
+        out[12] = z * FMA(v, zero + (T)0.9329408314752885, zero - (T)0.1865881662950577);                                      \
+        f = z + z + z;                                                                                                         \
+        out[17] = f * out[9];                                                                                                  \
+        out[23] = f * out[15];                                                                                                 \
         f = FMA(v, zero + (T)1.6558057175757301, zero + (T)1.18271836969695);                                                  \
         out[18] = f * s;                                                                                                       \
         out[22] = f * c;                                                                                                       \
         f = z * FMA(v, zero + (T)2.341662902450512, zero + (T)0.3345232717786446);                                             \
         out[19] = f * y;                                                                                                       \
-        out[20] = FMA(v, FMA(v, zero + (T)0.9256235355080377, zero + (T)0.26446386728801075), zero - (T)0.343803027474414);    \
         out[21] = f * x;                                                                                                       \
-        out[24] = FMA(c, c, -(s * s)) * (T)0.62583573544917614;                                                                \
+        out[20] = FMA(v, FMA(v, zero + (T)0.9256235355080377, zero + (T)0.26446386728801075), zero - (T)0.343803027474414);    \
+        out[16] = (s * c) * (T)1.2516714708983523;                                                                             \
+        out[24] = (c - s) * ((c + s) * (T)0.62583573544917614);                                                                \
     }                                                                                                                          \
     /* one column after the other, each from its last degree */                                                                \
     TARGET static void NAME##_low(T *out, size_t stride, int order, const V *u) {                                              \
@@ -1827,19 +1836,23 @@ ISOGI_SH__AVX512 ISOGI_SH__INLINE void isogi_sh__eval_d8_split(isogi_sh__d8 *u, 
         }                                                                                                                      \
     }                                                                                                                          \
     TARGET static size_t NAME(T *out, size_t stride, int order, const T *x, const T *y, const T *z, size_t count) {            \
-        V u[4], basis[25];                                                                                                     \
-        size_t i, at;                                                                                                          \
-        int k;                                                                                                                 \
+        V u[4], next[4], basis[25];                                                                                            \
+        size_t i, at = 0;                                                                                                      \
+        int k, more = 1;                                                                                                       \
         if (count < WIDTH) return 0;                                                                                           \
         if (order != 5) return NAME##_blocks(out, stride, order, x, y, z, count);                                              \
-        for (i = 0; i < count; i += WIDTH) {                                                                                   \
-            at = i < count - WIDTH ? i : count - WIDTH;                                                                        \
-            if (!NAME##_load(u, x + at, y + at, z + at)) return i;                                                             \
+        if (!NAME##_load(u, x, y, z)) return 0;                                                                                \
+        for (i = WIDTH; more; i += WIDTH) {                                                                                    \
+            T *to = out + at;                                                                                                  \
+            at = i < count - WIDTH ? i : count - WIDTH, more = i < count;                                                      \
+            if (more) more = NAME##_load(next, x + at, y + at, z + at);                                                        \
             NAME##_order5(basis, u);                                                                                           \
             ISOGI_SH__UNROLL25                                                                                                 \
-            for (k = 0; k < 25; k++) *(V *)(out + at + stride * (size_t)k) = basis[k];                                         \
+            for (k = 0; k < 25; k++) *(V *)(to + stride * (size_t)k) = basis[k];                                               \
+            u[0] = next[0], u[1] = next[1], u[2] = next[2];                                                                    \
         }                                                                                                                      \
-        return count;                                                                                                          \
+        i -= WIDTH;                                                                                                            \
+        return i < count ? i : count;                                                                                          \
     }                                                                                                                          \
     /* `count` rows, 9 or more, for as many directions as are lanes: by 8 or TILE, after one alone, \
         or the last with some that come again */ \
@@ -1904,12 +1917,12 @@ ISOGI_SH__AVX512 ISOGI_SH__INLINE void isogi_sh__eval_d8_split(isogi_sh__d8 *u, 
 
 #define ISOGI_SH__DEFINE_F32(NAME, TARGET, V, I, WIDTH, SUFFIX, TURN, TILE)                                                              \
     ISOGI_SH__DEFINE_EVAL(NAME, TARGET, float, V, I, WIDTH, ISOGI_SH__FMA_##SUFFIX, ISOGI_SH__REST_##SUFFIX, ISOGI_SH__LESS_##SUFFIX, \
-                          isogi_sh__table_f32, 1e-6, 1e-3, 1e-19, sqrtf)                                                           \
+                          isogi_sh__table_f32, 1e-3, 1e-3, 1e-19, sqrtf)                                                           \
     ISOGI_SH__DEFINE_FUSED(NAME, TARGET, float, V, I, WIDTH, ISOGI_SH__FMA_##SUFFIX, ISOGI_SH__LESS_##SUFFIX, isogi_sh__polynomials_f32, \
         1e-3, TURN, TILE)
 #define ISOGI_SH__DEFINE_F64(NAME, TARGET, V, I, WIDTH, SUFFIX, TURN, TILE)                                                              \
     ISOGI_SH__DEFINE_EVAL(NAME, TARGET, double, V, I, WIDTH, ISOGI_SH__FMA_##SUFFIX, ISOGI_SH__REST_##SUFFIX, ISOGI_SH__LESS_##SUFFIX, \
-                          isogi_sh__table_f64, 1e-12, 1e-25, 1e-200, sqrt)                                                         \
+                          isogi_sh__table_f64, 1e-6, 1e-25, 1e-200, sqrt)                                                         \
     ISOGI_SH__DEFINE_FUSED(NAME, TARGET, double, V, I, WIDTH, ISOGI_SH__FMA_##SUFFIX, ISOGI_SH__LESS_##SUFFIX, isogi_sh__polynomials_f64, \
         1e-25, TURN, TILE)
 ISOGI_SH__DEFINE_F32(isogi_sh__eval_f8, ISOGI_SH__AVX2, isogi_sh__f8, isogi_sh__i8, 8, F8, isogi_sh__transpose_f8, 8)
@@ -3234,7 +3247,7 @@ ISOGI_API isogi_result isogi_sh_rotation_build(float *rotation, int order, const
 
 #ifdef ISOGI_SH__SIMD
 /* One channel of order 5: columns times numbers. What is loaded and stored past a band is overwritten by the next one; the ninth
-   row of degree 4 is a sum of its own. Loads are what this waits for, so half of the numbers are spread from registers, four a
+   row of degree 4 is a sum of its own. Loads are what this waits for, so most of the numbers are spread from registers, four a
    load: the empty assembly keeps the compiler from fetching each by itself. */
 #define ISOGI_SH__COLUMN(sum, offset, x) sum = ISOGI_SH__FMA_F8(*(const isogi_sh__f8 *)(rotation + (offset)), x, sum)
 #define ISOGI_SH__FOUR(i)                                                                                                             \
@@ -3254,15 +3267,26 @@ ISOGI_SH__AVX2 static isogi_result isogi_sh__apply_order5(float *out, const floa
     ISOGI_SH__OF_FOUR(1), ISOGI_SH__BOTH(2);
     ISOGI_SH__OF_FOUR(2), ISOGI_SH__BOTH(3);
     ISOGI_SH__OF_FOUR(3), ISOGI_SH__BOTH(4);
-    ISOGI_SH__UNROLL9
-    for (j = 0; j < 5; j++) ISOGI_SH__COLUMN(b, 10 + 5 * j, in[4 + j] - zero);
+    ISOGI_SH__FOUR(4);
+    ISOGI_SH__OF_FOUR(0), ISOGI_SH__COLUMN(b, 10, x);
+    ISOGI_SH__OF_FOUR(1), ISOGI_SH__COLUMN(b, 15, x);
+    ISOGI_SH__OF_FOUR(2), ISOGI_SH__COLUMN(b, 20, x);
+    ISOGI_SH__OF_FOUR(3), ISOGI_SH__COLUMN(b, 25, x);
+    ISOGI_SH__COLUMN(b, 30, in[8] - zero);
+    ISOGI_SH__FOUR(9);
+    ISOGI_SH__OF_FOUR(0), ISOGI_SH__COLUMN(c, 35, x);
+    ISOGI_SH__OF_FOUR(1), ISOGI_SH__COLUMN(c, 42, x);
+    ISOGI_SH__OF_FOUR(2), ISOGI_SH__COLUMN(c, 49, x);
+    ISOGI_SH__OF_FOUR(3), ISOGI_SH__COLUMN(c, 56, x);
     ISOGI_SH__FOUR(21);
     ISOGI_SH__OF_FOUR(0), ISOGI_SH__BOTH(5);
     ISOGI_SH__OF_FOUR(1), ISOGI_SH__BOTH(6);
     ISOGI_SH__OF_FOUR(2), ISOGI_SH__BOTH(7);
     ISOGI_SH__OF_FOUR(3), ISOGI_SH__BOTH(8);
-    ISOGI_SH__UNROLL9
-    for (j = 0; j < 7; j++) ISOGI_SH__COLUMN(c, 35 + 7 * j, in[9 + j] - zero);
+    ISOGI_SH__FOUR(12);
+    ISOGI_SH__OF_FOUR(1), ISOGI_SH__COLUMN(c, 63, x);
+    ISOGI_SH__OF_FOUR(2), ISOGI_SH__COLUMN(c, 70, x);
+    ISOGI_SH__OF_FOUR(3), ISOGI_SH__COLUMN(c, 77, x);
     out[0] = rotation[0] * in[0];
     *(isogi_sh__f8 *)(out + 1) = a;
     *(isogi_sh__f8 *)(out + 4) = b;
