@@ -3826,9 +3826,13 @@ ISOGI_SH__AVX2 static void isogi_sh__product_order5(float *out, const float *f, 
 }
 
 /* Sixteen products of order 5 with one in each lane. Latitudes z and -z share the parts of a series that are even and odd in z:
-   latitude 3 is the equator. */
-ISOGI_SH__AVX512 ISOGI_SH__INLINE void isogi_sh__parities_f16(isogi_sh__f16 (*even)[5], isogi_sh__f16 (*odd)[5], const isogi_sh__f16 *f,
-                                                              int latitude) {
+   latitude 3 is the equator. What is wanted later goes to memory, so that a product of two series has all registers. */
+typedef struct isogi_sh__series_f16 {
+    isogi_sh__f16 c[5], s[5];
+} isogi_sh__series_f16;
+
+ISOGI_SH__AVX512 ISOGI_SH__INLINE void isogi_sh__series_of_f16(isogi_sh__series_f16 *above, isogi_sh__series_f16 *below,
+                                                               const isogi_sh__f16 *f, int latitude) {
     const float *q = isogi_sh__latitudes_f32 + latitude;
     isogi_sh__f16 zero = {0};
     int l, m;
@@ -3842,56 +3846,122 @@ ISOGI_SH__AVX512 ISOGI_SH__INLINE void isogi_sh__parities_f16(isogi_sh__f16 (*ev
             part[parity][0] = ISOGI_SH__FMA_F16(f[l * (l + 1) + m], *q - zero, part[parity][0]);
             if (m) part[parity][1] = ISOGI_SH__FMA_F16(f[l * (l + 1) - m], *q - zero, part[parity][1]);
         }
-        even[0][m] = part[0][0], even[1][m] = part[0][1], odd[0][m] = part[1][0], odd[1][m] = part[1][1];
+        above->c[m] = part[0][0], above->s[m] = part[0][1];
+        if (latitude == 3) continue;
+        below->c[m] = above->c[m], below->s[m] = above->s[m];
+        if (m == 4) continue; /* nothing is odd */
+        above->c[m] += part[1][0], above->s[m] += part[1][1], below->c[m] -= part[1][0], below->s[m] -= part[1][1];
     }
 }
 
-ISOGI_SH__AVX512 ISOGI_SH__INLINE void isogi_sh__product_latitude_f16(isogi_sh__f16 *out, const isogi_sh__f16 *f, const isogi_sh__f16 *g,
-                                                                      int latitude) {
-    isogi_sh__f16 f_even[2][5], f_odd[2][5], g_even[2][5], g_odd[2][5], ac[5], as[5], bc[5], bs[5], c[5], s[5], a0, b0, sum[2][2][5],
-        zero = {0};
-    const float *q = isogi_sh__latitudes_f32 + 8 * 15 + latitude;
-    int i, l, m, side;
-    isogi_sh__parities_f16(f_even, f_odd, f, latitude);
-    isogi_sh__parities_f16(g_even, g_odd, g, latitude);
-    for (side = 0; side < (latitude == 3 ? 1 : 2); side++) {
-        ISOGI_SH__UNROLL
-        for (m = 0; m < 5; m++) {
-            ac[m] = f_even[0][m], as[m] = f_even[1][m], bc[m] = g_even[0][m], bs[m] = g_even[1][m];
-            if (m == 4 || latitude == 3) continue; /* nothing is odd */
-            ac[m] = side ? ac[m] - f_odd[0][m] : ac[m] + f_odd[0][m], as[m] = side ? as[m] - f_odd[1][m] : as[m] + f_odd[1][m];
-            bc[m] = side ? bc[m] - g_odd[0][m] : bc[m] + g_odd[0][m], bs[m] = side ? bs[m] - g_odd[1][m] : bs[m] + g_odd[1][m];
-        }
-        ISOGI_SH__FOURIER(isogi_sh__f16, ISOGI_SH__FMA_F16)
-        ISOGI_SH__UNROLL
-        for (m = 0; m < 5; m++) {
-            if (side) sum[0][0][m] += c[m], sum[0][1][m] += s[m], sum[1][0][m] -= c[m], sum[1][1][m] -= s[m];
-            else sum[0][0][m] = c[m], sum[0][1][m] = s[m], sum[1][0][m] = c[m], sum[1][1][m] = s[m];
-        }
+/* Twice the product of two series, to degree 4. A product of two complex numbers takes three multiplications of real ones: from u, sums of
+   the products of cosines, w, of those of sines, and t, of cosines and sines at once. */
+ISOGI_SH__AVX512 ISOGI_SH__INLINE void isogi_sh__series_product_f16(isogi_sh__series_f16 *out, const isogi_sh__series_f16 *f,
+                                                                    const isogi_sh__series_f16 *g) {
+    isogi_sh__f16 zero = {0}, f0 = f->c[0] + f->c[0], g0 = g->c[0] + g->c[0], first = f0 * g->c[0];
+    isogi_sh__f16 f_sum[5], f_less[5], g_sum[5], g_less[5];
+    int i, m;
+    ISOGI_SH__UNROLL
+    for (m = 1; m < 5; m++) {
+        first = ISOGI_SH__FMA_F16(f->c[m], g->c[m], ISOGI_SH__FMA_F16(f->s[m], g->s[m], first));
+        f_sum[m] = f->c[m] + f->s[m], f_less[m] = f->c[m] - f->s[m], g_sum[m] = g->c[m] + g->s[m], g_less[m] = g->c[m] - g->s[m];
     }
+    out->c[0] = first, out->s[0] = zero;
+    ISOGI_SH__UNROLL
+    for (m = 1; m < 5; m++) {
+        isogi_sh__f16 u = zero, t = zero, w = zero;
+        ISOGI_SH__UNROLL
+        for (i = 1; i < m; i++) {
+            u = ISOGI_SH__FMA_F16(f->c[i], g->c[m - i], u);
+            w = ISOGI_SH__FMA_F16(-f->s[i], g->s[m - i], w);
+            t = ISOGI_SH__FMA_F16(f_sum[i], g_sum[m - i], t);
+        }
+        ISOGI_SH__UNROLL
+        for (i = m + 1; i < 5; i++) {
+            u = ISOGI_SH__FMA_F16(f->c[i], g->c[i - m], ISOGI_SH__FMA_F16(f->c[i - m], g->c[i], u));
+            w = ISOGI_SH__FMA_F16(f->s[i], g->s[i - m], ISOGI_SH__FMA_F16(f->s[i - m], g->s[i], w));
+            t = ISOGI_SH__FMA_F16(f_sum[i], g_less[i - m], ISOGI_SH__FMA_F16(f_less[i - m], g_sum[i], t));
+        }
+        out->c[m] = ISOGI_SH__FMA_F16(f0, g->c[m], ISOGI_SH__FMA_F16(f->c[m], g0, u + w));
+        out->s[m] = ISOGI_SH__FMA_F16(f0, g->s[m], ISOGI_SH__FMA_F16(f->s[m], g0, t - u + w));
+    }
+}
+
+/* The sum and the difference of the products at latitudes z and -z */
+ISOGI_SH__AVX512 static void isogi_sh__product_latitude_f16(isogi_sh__series_f16 *sum, const isogi_sh__f16 *f, const isogi_sh__f16 *g,
+                                                            int latitude) {
+    isogi_sh__series_f16 f_above, f_below, g_above, g_below, above, below;
+    int m;
+    isogi_sh__series_of_f16(&f_above, &f_below, f, latitude);
+    isogi_sh__series_of_f16(&g_above, &g_below, g, latitude);
+    isogi_sh__series_product_f16(&above, &f_above, &g_above);
+    isogi_sh__series_product_f16(&below, &f_below, &g_below);
     ISOGI_SH__UNROLL
     for (m = 0; m < 5; m++) {
+        sum[0].c[m] = above.c[m] + below.c[m], sum[1].c[m] = above.c[m] - below.c[m];
+        if (m) sum[0].s[m] = above.s[m] + below.s[m], sum[1].s[m] = above.s[m] - below.s[m];
+    }
+}
+
+ISOGI_SH__AVX512 static void isogi_sh__product_equator_f16(isogi_sh__series_f16 *sum, const isogi_sh__f16 *f, const isogi_sh__f16 *g) {
+    isogi_sh__series_f16 f_series, g_series;
+    isogi_sh__series_of_f16(&f_series, &f_series, f, 3);
+    isogi_sh__series_of_f16(&g_series, &g_series, g, 3);
+    isogi_sh__series_product_f16(sum, &f_series, &g_series);
+}
+
+/* column[i] = element i of each of 16 expansions of order 5, for 8 elements: rows 8 apart are joined, 4 x 4 turned in each quarter of a
+   vector, and quarters of two joined. */
+ISOGI_SH__AVX512 ISOGI_SH__INLINE void isogi_sh__columns_f16(isogi_sh__f16 *column, const float *in) {
+    const size_t pitch = 25;
+    isogi_sh__d8 v[2][4];
+    size_t half, k;
+    ISOGI_SH__UNROLL
+    for (half = 0; half < 2; half++, in += 4 * pitch) {
+        isogi_sh__f16 row[4], e, f, g, h;
         ISOGI_SH__UNROLL
-        for (l = m; l < 5; l++, q += 8) {
-            int parity = (l + m) & 1;
-            if (parity && latitude == 3) continue;
-            out[l * (l + 1) + m] = ISOGI_SH__FMA_F16(sum[parity][0][m], *q - zero, out[l * (l + 1) + m]);
-            if (m) out[l * (l + 1) - m] = ISOGI_SH__FMA_F16(sum[parity][1][m], *q - zero, out[l * (l + 1) - m]);
-        }
+        for (k = 0; k < 4; k++)
+            row[k] = (isogi_sh__f16)ISOGI_SH__JOIN_HALVES((isogi_sh__d4) * (const isogi_sh__half *)(const void *)(in + pitch * k),
+                                                          (isogi_sh__d4) * (const isogi_sh__half *)(const void *)(in + pitch * (k + 8)));
+        e = ISOGI_SH__LOW_F16(row[0], row[1]), f = ISOGI_SH__HIGH_F16(row[0], row[1]);
+        g = ISOGI_SH__LOW_F16(row[2], row[3]), h = ISOGI_SH__HIGH_F16(row[2], row[3]);
+        v[half][0] = (isogi_sh__d8)ISOGI_SH__EVEN_F16(e, g), v[half][1] = (isogi_sh__d8)ISOGI_SH__ODD_F16(e, g);
+        v[half][2] = (isogi_sh__d8)ISOGI_SH__EVEN_F16(f, h), v[half][3] = (isogi_sh__d8)ISOGI_SH__ODD_F16(f, h);
+    }
+    ISOGI_SH__UNROLL
+    for (k = 0; k < 4; k++) {
+        column[k] = (isogi_sh__f16)__builtin_shufflevector(v[0][k], v[1][k], 0, 1, 8, 9, 4, 5, 12, 13);
+        column[k + 4] = (isogi_sh__f16)__builtin_shufflevector(v[0][k], v[1][k], 2, 3, 10, 11, 6, 7, 14, 15);
     }
 }
 
 ISOGI_SH__AVX512 static void isogi_sh__product_order5_f16(float *out, const float *f, const float *g) {
-    static const int columns[7] = {0, 4, 8, 12, 16, 20, 21};
+    static const int columns[4] = {0, 8, 16, 17};
+    const float *q = isogi_sh__latitudes_f32 + 8 * 15;
+    isogi_sh__series_f16 sum[4][2]; /* [latitude][odd] */
     isogi_sh__f16 a[25], b[25], c[25], zero = {0};
-    int i;
-    for (i = 0; i < 7; i++) {
-        isogi_sh__join_f16_turn((float *)(a + columns[i]), 16, f + columns[i], 25, 0);
-        isogi_sh__join_f16_turn((float *)(b + columns[i]), 16, g + columns[i], 25, 0);
+    int i, l, m;
+    for (i = 0; i < 4; i++) {
+        isogi_sh__columns_f16(a + columns[i], f + columns[i]);
+        isogi_sh__columns_f16(b + columns[i], g + columns[i]);
     }
-    for (i = 0; i < 25; i++) c[i] = zero;
-    for (i = 0; i < 3; i++) isogi_sh__product_latitude_f16(c, a, b, i);
-    isogi_sh__product_latitude_f16(c, a, b, 3);
+    for (i = 0; i < 3; i++) isogi_sh__product_latitude_f16(sum[i], a, b, i);
+    isogi_sh__product_equator_f16(sum[3], a, b);
+    ISOGI_SH__UNROLL
+    for (m = 0; m < 5; m++) {
+        ISOGI_SH__UNROLL
+        for (l = m; l < 5; l++, q += 8) {
+            int odd = (l + m) & 1;
+            isogi_sh__f16 cosine = zero, sine = zero;
+            ISOGI_SH__UNROLL
+            for (i = 0; i < 4 - odd; i++) {
+                cosine = ISOGI_SH__FMA_F16(sum[i][odd].c[m], q[i] - zero, cosine);
+                if (m) sine = ISOGI_SH__FMA_F16(sum[i][odd].s[m], q[i] - zero, sine);
+            }
+            c[l * (l + 1) + m] = cosine;
+            if (m) c[l * (l + 1) - m] = sine;
+        }
+    }
     for (i = 0; i < 4; i++) isogi_sh__join_f16_turn(out + 100 * i, 25, (const float *)c + 4 * i, 16, 0);
 }
 #undef ISOGI_SH__FOURIER
