@@ -471,6 +471,11 @@ ISOGI_API size_t isogi_trace_memory(const isogi_trace *trace); /* bytes that the
 #define ISOGI_TRACE__COLOURS 0.05   /* of albedo, or share of the glow, by which isosurfaces of the same probe may differ */
 #define ISOGI_TRACE__NOISE 1.25     /* variances of the difference of two texels' light that the filter takes for noise */
 #define ISOGI_TRACE__LIGHT_FIRST 4u /* samples of a texel with one of each light */
+#if defined(__GNUC__) && !defined(__TINYC__)
+#define ISOGI_TRACE__AHEAD(p) __builtin_prefetch(p)
+#else
+#define ISOGI_TRACE__AHEAD(p) ((void)(p))
+#endif
 
 /* ==== numbers that survive -ffast-math =============================================================================== */
 
@@ -2922,13 +2927,13 @@ typedef struct isogi_trace__node {
     float normal[3];
     isogi_hit place; /* where */
     uint64_t key;    /* probe: of its random numbers */
-    isogi_trace__brick *brick;
+    signed char from;     /* side of the surface: 1 low, -1 high */
+    isogi_trace__brick *brick; /* from here on: what is gathered, see isogi_trace__node_clear */
     size_t texel[3];
     uint32_t slot, samples, light_samples, hits;
     uint32_t readers; /* probe: hits that take their light from it, those that texels are still to make included */
     uint32_t wanted;  /* probe: samples, once its generation has begun */
     float albedo[3];
-    signed char from;     /* side of the surface: 1 low, -1 high */
     signed char level;    /* blocks of samples that are complete */
     signed char finished; /* texel: 1: no more samples are wanted; 2: its light was loaded */
     double steady[3];     /* irradiance by lights without extent */
@@ -2992,7 +2997,8 @@ typedef struct isogi_trace__catch {
     uint64_t key;
     isogi_hit hit;
     float normal[3];
-    uint32_t probe; /* number + 1 of the probe of this hit; 0: none was there when the ray was traced */
+    uint32_t probe; /* number + 1 of the probe of this hit; 0: none was there when the ray was traced, */
+    float alike;    /* and one that is made has this */
     signed char from;
 } isogi_trace__catch;
 
@@ -3230,14 +3236,21 @@ static void isogi_trace__heads_new(isogi_trace__set *s) {
     }
 }
 
-/* A node without samples. */
-static void isogi_trace__node_begin(const isogi_trace *t, isogi_trace__set *s) {
+/* A node without samples: all but what and where it is. */
+static void isogi_trace__node_clear(const isogi_trace *t, isogi_trace__set *s, size_t i) {
+    isogi_trace__node *n = isogi_trace__node_at(s, i);
+    size_t v = (size_t)t->values, begin = offsetof(isogi_trace__node, brick);
+    memset((char *)n + begin, 0, sizeof *n - begin);
+    memset(isogi_trace__values_at(s, i, ISOGI_TRACE__DIRECT_VALUES, v), 0, v * sizeof(float));
+    memset(isogi_trace__light_at(s, i, v), 0, v * sizeof(float));
+}
+
+/* The next node of the set. */
+static isogi_trace__node *isogi_trace__node_begin(const isogi_trace *t, isogi_trace__set *s) {
     isogi_trace__node *n = isogi_trace__node_at(s, s->count);
-    size_t v = (size_t)t->values;
-    memset(n, 0, sizeof *n);
+    memset(n, 0, offsetof(isogi_trace__node, brick));
     n->from = (signed char)(t->scene.high ? -1 : 1);
-    memset(isogi_trace__values_at(s, s->count, ISOGI_TRACE__DIRECT_VALUES, v), 0, v * sizeof(float));
-    memset(isogi_trace__light_at(s, s->count, v), 0, v * sizeof(float));
+    return n;
 }
 
 /* Whether a probe may stand for a hit: it faces the same way and lies in the hit's plane, or nearly so: half as far from it as the
@@ -3324,7 +3337,16 @@ static uint32_t isogi_trace__probe_find(const isogi_trace *t, const isogi_trace_
     return 0;
 }
 
-/* The number of the probe of a hit, which is made if there is none. */
+/* Reads ahead of a search: where the chain begins, and its first probe. */
+static void isogi_trace__probe_ahead(const isogi_trace__set *set, const isogi_trace__catch *c, int what) {
+    const uint32_t *head;
+    if (!c->key || c->probe || !set->chunk_count) return;
+    head = isogi_trace__head(set, c->key);
+    if (what == 0) ISOGI_TRACE__AHEAD(head);
+    else if (*head) ISOGI_TRACE__AHEAD(isogi_trace__node_at(set, *head - 1));
+}
+
+/* The number of the probe of a hit, which is made if there is none: not yet by isogi_trace__probe_finish. */
 static isogi_result isogi_trace__probe_of(isogi_trace *t, const isogi_trace__catch *c, double isovalue, uint32_t *probe) {
     isogi_trace__set *set = &t->feedback->probes;
     isogi_trace__node *n;
@@ -3332,7 +3354,6 @@ static isogi_result isogi_trace__probe_of(isogi_trace *t, const isogi_trace__cat
     uint64_t key;
     uint32_t *end, known = c->probe ? c->probe : isogi_trace__probe_find(t, c, isovalue, &key, &end);
     size_t chunks = set->chunk_count;
-    int a;
     if (known) {
         *probe = known - 1;
         return ISOGI_OK;
@@ -3340,22 +3361,27 @@ static isogi_result isogi_trace__probe_of(isogi_trace *t, const isogi_trace__cat
     result = isogi_trace__set_reserve(t, set, 1, 1);
     if (result != ISOGI_OK) return result;
     if (set->chunk_count > chunks) (void)isogi_trace__probe_find(t, c, isovalue, &key, &end); /* chains have been split */
-    isogi_trace__node_begin(t, set);
-    n = isogi_trace__node_at(set, set->count);
+    n = isogi_trace__node_begin(t, set);
     n->isovalue = isovalue;
-    isogi_trace_albedo(&t->scene.desc, isovalue, n->albedo);
-    n->place = c->hit, n->cell = c->key, n->key = key, n->from = c->from;
-    n->alike = (float)isogi_trace__alike(&t->scene, &n->place);
+    n->place = c->hit, n->cell = c->key, n->key = key, n->from = c->from, n->alike = c->alike;
     memcpy(n->normal, c->normal, sizeof n->normal);
-    if (t->scene.desc.material) {
-        double grid[3], point[3];
-        float emission[3];
-        for (a = 0; a < 3; a++) grid[a] = n->place.cell[a] + n->place.local[a];
-        isogi_vol_to_world(t->scene.pyramid, grid, point);
-        isogi_trace_material(&t->scene.desc, isovalue, point, n->albedo, emission);
-    }
     *probe = (uint32_t)set->count++, *end = *probe + 1;
     return ISOGI_OK;
+}
+
+/* The rest of a new probe, apart: it can be done by many at a time. */
+static void isogi_trace__probe_finish(const isogi_trace *t, size_t i) {
+    isogi_trace__set *set = &t->feedback->probes;
+    isogi_trace__node *n = isogi_trace__node_at(set, i);
+    double grid[3], point[3];
+    float emission[3];
+    int a;
+    isogi_trace__node_clear(t, set, i);
+    isogi_trace_albedo(&t->scene.desc, n->isovalue, n->albedo);
+    if (!t->scene.desc.material) return;
+    for (a = 0; a < 3; a++) grid[a] = n->place.cell[a] + n->place.local[a];
+    isogi_vol_to_world(t->scene.pyramid, grid, point);
+    isogi_trace_material(&t->scene.desc, n->isovalue, point, n->albedo, emission);
 }
 
 /* ---- blocks of samples ---- */
@@ -3436,8 +3462,6 @@ static void isogi_trace__cast_hit(isogi_trace__cast *c, int i) {
     isogi_trace__catch *to = &t->feedback->catches[span->offset + (c->sample[i] - span->first)];
     int side = c->hit[i].side > 0 ? 1 : -1, a;
     double length = c->hit[i].t;
-    uint64_t made;
-    uint32_t *end;
     to->from = (signed char)side;
     to->hit = c->hit[i];
     memcpy(to->normal, c->normal[i], sizeof to->normal);
@@ -3451,7 +3475,27 @@ static void isogi_trace__cast_hit(isogi_trace__cast *c, int i) {
     if (!t->scene.desc.bounces) return;
     to->key = isogi_trace__probe_key(&t->scene, &to->hit, to->normal, length,
                                      span->sum.brick ? ISOGI_TRACE__CELL : ISOGI_TRACE__CELL_FAR, span->sum.isovalue);
-    to->probe = isogi_trace__probe_find(t, to, span->sum.isovalue, &made, &end);
+    to->probe = 0;
+}
+
+/* The probes of hits that rays first .. first + count - 1 have made, as far as they are known. */
+static void isogi_trace__cast_probes(isogi_trace__cast *c, int first, int count) {
+    const isogi_trace *t = c->trace;
+    isogi_trace__catch *hit[ISOGI_TRACE__FLUSH];
+    double isovalue[ISOGI_TRACE__FLUSH];
+    int i, n = 0;
+    for (i = first; i < first + count; i++) {
+        const isogi_trace__span *span = &c->span[c->owner[i]];
+        hit[n] = &t->feedback->catches[span->offset + (c->sample[i] - span->first)], isovalue[n] = span->sum.isovalue;
+        if (hit[n]->key) isogi_trace__probe_ahead(&t->feedback->probes, hit[n++], 0);
+    }
+    for (i = 0; i < n; i++) isogi_trace__probe_ahead(&t->feedback->probes, hit[i], 1);
+    for (i = 0; i < n; i++) {
+        uint64_t made;
+        uint32_t *end;
+        hit[i]->probe = isogi_trace__probe_find(t, hit[i], isovalue[i], &made, &end);
+        if (!hit[i]->probe) hit[i]->alike = (float)isogi_trace__alike(&t->scene, &hit[i]->hit);
+    }
 }
 
 /* Takes in the results of rays first .. first + count - 1. */
@@ -3475,6 +3519,7 @@ static void isogi_trace__cast_land(isogi_trace__cast *c, int first, int count) {
         if (!c->hit[i].side || c->trace->scene.desc.no_shadows) isogi_trace__cast_escape(c, i);
         if (c->hit[i].side) isogi_trace__cast_hit(c, i);
     }
+    if (!c->shadow) isogi_trace__cast_probes(c, first, count);
 }
 
 static void isogi_trace__cast_flush(isogi_trace__cast *c) {
@@ -3742,6 +3787,7 @@ static isogi_result isogi_trace__segments_reserve(const isogi_trace *t, isogi_tr
 /* The segment of the batch's hits; probes are made where there are none. */
 static isogi_result isogi_trace__segment_new(isogi_trace *t, isogi_trace__segment *s) {
     isogi_trace__feedback *f = t->feedback;
+    const size_t far = 8, near = 4; /* catches ahead; they stand in the order of their spans */
     size_t i, hits = 0, at = 0, k;
     for (i = 0; i < f->sample_count; i++) hits += f->catches[i].key != 0;
     memset(s, 0, sizeof *s);
@@ -3753,6 +3799,8 @@ static isogi_result isogi_trace__segment_new(isogi_trace *t, isogi_trace__segmen
         s->node[i] = f->spans[i].node, s->begin[i] = (uint32_t)at;
         for (k = f->spans[i].offset; k < f->spans[i].offset + f->spans[i].count; k++) {
             isogi_result result;
+            if (k + far < f->sample_count) isogi_trace__probe_ahead(&f->probes, &f->catches[k + far], 0);
+            if (k + near < f->sample_count) isogi_trace__probe_ahead(&f->probes, &f->catches[k + near], 1);
             if (!f->catches[k].key) continue;
             result = isogi_trace__probe_of(t, &f->catches[k], f->spans[i].sum.isovalue, &s->probe[at++]);
             if (result == ISOGI_OK) continue;
@@ -3785,19 +3833,19 @@ static void isogi_trace__texel_guess(isogi_trace *t, size_t node) {
     n->brick->state[n->slot] = ISOGI_TRACE__DRAFT;
 }
 
+/* Takes over what a span brought; a texel that had nothing is given a first answer. */
 static void isogi_trace__span_commit(isogi_trace *t, isogi_trace__set *set, const isogi_trace__span *s, uint32_t hits) {
     isogi_trace__node *n = isogi_trace__node_at(set, s->node);
     float *direct = isogi_trace__values_at(set, s->node, ISOGI_TRACE__DIRECT_VALUES, (size_t)t->values);
     const float *from = t->feedback->direct + (size_t)(s - t->feedback->spans) * (size_t)t->values;
-    int a;
+    int a, fresh = n->brick && !n->samples;
     for (a = 0; a < t->values; a++) direct[a] += from[a];
     for (a = 0; a < 3; a++)
         n->steady[a] += s->sum.steady[a], n->light[a] += s->sum.light[a], n->bright[a] += s->sum.bright[a];
     n->light_spread += s->sum.light_spread, n->bright_spread += s->sum.bright_spread, n->square += s->sum.square;
-    if (!n->samples) t->counters.texels += n->brick != NULL;
-    if (n->brick) t->feedback->partial += s->count;
     n->samples = s->first + s->count, n->light_samples = isogi_trace__light_samples(n->samples, n->brick != NULL), n->hits += hits;
     if (n->samples == (n->brick ? isogi_trace__block(t, n->level + 1) : n->wanted)) n->level++;
+    if (fresh) isogi_trace__texel_guess(t, s->node);
 }
 
 /* Counts the batch's hits at their probes. One of a texel counts twice while blocks of samples are to come, whose hits will read the
@@ -3808,8 +3856,35 @@ static void isogi_trace__readers_count(isogi_trace *t, const isogi_trace__segmen
     size_t i;
     for (i = 0; i < s->hits; i++) {
         isogi_trace__node *n = isogi_trace__node_at(&f->probes, s->probe[i]);
+        if (i + 16 < s->hits) ISOGI_TRACE__AHEAD(&isogi_trace__node_at(&f->probes, s->probe[i + 16])->readers);
         if (n->readers < ISOGI_TRACE__PROBE_MOST) n->readers += weight;
     }
+}
+
+typedef struct isogi_trace__taken {
+    isogi_trace *trace;
+    const isogi_trace__segment *segment; /* of the batch; NULL: there is none */
+    size_t probes;                       /* new ones begin here */
+} isogi_trace__taken;
+
+/* The spans of a task, those of its last node also where they go on in the next one, which leaves them out; then new probes. */
+static void isogi_trace__take_task(void *arg, size_t task) {
+    const isogi_trace__taken *taken = (const isogi_trace__taken *)arg;
+    isogi_trace *t = taken->trace;
+    isogi_trace__feedback *f = t->feedback;
+    size_t tasks = taken->segment ? f->task_count : 0, i, end;
+    if (task < tasks) {
+        isogi_trace__set *set = f->on_probes ? &f->probes : &f->texels;
+        const uint32_t *begin = taken->segment->begin;
+        for (i = f->task[task]; i && i < f->task[task + 1] && f->spans[i].node == f->spans[i - 1].node;) i++;
+        end = f->task[task + 1];
+        while (i < end && end < f->span_count && f->spans[end].node == f->spans[end - 1].node) end++;
+        for (; i < end; i++) isogi_trace__span_commit(t, set, &f->spans[i], begin[i + 1] - begin[i]);
+        return;
+    }
+    i = taken->probes + (task - tasks) * ISOGI_TRACE__SWEEP;
+    end = i + ISOGI_TRACE__SWEEP < f->probes.count ? i + ISOGI_TRACE__SWEEP : f->probes.count;
+    for (; i < end; i++) isogi_trace__probe_finish(t, i);
 }
 
 /* Traces the batch and takes it over; on failure nothing but probes without samples has been added. */
@@ -3817,19 +3892,25 @@ static isogi_result isogi_trace__spans_run(isogi_trace *t, double from, double t
     isogi_trace__feedback *f = t->feedback;
     isogi_trace__set *set = f->on_probes ? &f->probes : &f->texels;
     isogi_trace__segment segment;
+    isogi_context silent = t->context;
+    isogi_trace__taken taken;
     isogi_result result = isogi_parallel(&t->context, f->task_count, isogi_trace__cast_task, t, from, to);
-    size_t i;
+    size_t i, tasks;
+    taken.trace = t, taken.segment = NULL, taken.probes = f->probes.count, silent.progress = NULL;
     if (result == ISOGI_OK) result = isogi_trace__segments_reserve(t, set);
-    if (result == ISOGI_OK) result = isogi_trace__segment_new(t, &segment);
+    if (result == ISOGI_OK) {
+        result = isogi_trace__segment_new(t, &segment);
+        if (result == ISOGI_OK) taken.segment = &segment;
+        tasks = (taken.segment ? f->task_count : 0) + (f->probes.count - taken.probes + ISOGI_TRACE__SWEEP - 1) / ISOGI_TRACE__SWEEP;
+        if (tasks > 16) isogi_parallel(&silent, tasks, isogi_trace__take_task, &taken, 0, 1);
+        else for (i = 0; i < tasks; i++) isogi_trace__take_task(&taken, i); /* not worth a thread */
+    }
     if (result != ISOGI_OK) return result;
     set->segments[set->segment_count++] = segment;
     isogi_trace__readers_count(t, &segment);
     for (i = 0; i < f->task_count; i++) isogi_trace__add(&t->counters, &t->task_counters[i]);
-    for (i = 0; i < f->span_count; i++) {
-        int first = f->spans[i].sum.brick && !isogi_trace__node_at(set, f->spans[i].node)->samples;
-        isogi_trace__span_commit(t, set, &f->spans[i], segment.begin[i + 1] - segment.begin[i]);
-        if (first) isogi_trace__texel_guess(t, f->spans[i].node);
-    }
+    for (i = 0; i < f->span_count && !f->on_probes; i++) t->counters.texels += !f->spans[i].first;
+    if (!f->on_probes) f->partial += f->sample_count;
     return ISOGI_OK;
 }
 
@@ -4334,8 +4415,8 @@ static isogi_result isogi_trace__nodes_of(isogi_trace *t, size_t index, int even
     for (slot = 0; slot < ISOGI_TRACE__TEXELS; slot++) {
         isogi_trace__node *n;
         if (!(wanted >> slot & 1) || (even && (slot & 0x15))) continue;
-        isogi_trace__node_begin(t, set);
-        n = isogi_trace__node_at(set, set->count);
+        n = isogi_trace__node_begin(t, set);
+        isogi_trace__node_clear(t, set, set->count);
         n->brick = brick, n->slot = slot;
         isogi_trace__texel_of(t, index, slot, n->texel);
         brick->node[slot] = (uint32_t)++set->count;
@@ -5732,6 +5813,7 @@ ISOGI_API isogi_result isogi_trace_gather_field(const isogi_trace_desc *desc, is
 #undef ISOGI_TRACE__FILTER
 #undef ISOGI_TRACE__NOISE
 #undef ISOGI_TRACE__LIGHT_FIRST
+#undef ISOGI_TRACE__AHEAD
 #undef ISOGI_TRACE__PLANE
 #undef ISOGI_TRACE__COLOURS
 #undef ISOGI_TRACE__ALIKE
