@@ -1467,9 +1467,8 @@ static void isogi_dvr__mark_cut(isogi_dvr *d, size_t block) {
     }
 }
 
-/* Empty blocks of level 0: how many levels are empty there, plus 4 if the largest such block holds no finite value. Where the smallest
-   block is not empty, no larger one is: ranges of values contain those of their parts,
-   and isogi_dvr__mark_cut marks with a block what it is made of. */
+/* Empty blocks of level 0: how many levels are empty there. Where the smallest block is not empty, no larger one is: ranges of values
+   contain those of their parts, and isogi_dvr__mark_cut marks with a block what it is made of. */
 static void isogi_dvr__mark_around(isogi_dvr *d) {
     const size_t *size = d->level[0].size;
     size_t x, y, z, i = 0;
@@ -1480,7 +1479,7 @@ static void isogi_dvr__mark_around(isogi_dvr *d) {
                 for (n = 0; n < ISOGI_DVR__LEVELS && d->empty[0][i]; n++) {
                     const isogi_level *around = &d->level[n];
                     size_t block = (x >> 2 * n) + around->size[0] * ((y >> 2 * n) + around->size[1] * (z >> 2 * n));
-                    if (d->empty[n][block]) d->empty[0][i] = (uint8_t)(n + 1 + (around->range[block][0] > around->range[block][1] ? 4 : 0));
+                    if (d->empty[n][block]) d->empty[0][i] = (uint8_t)(n + 1);
                 }
 }
 
@@ -2976,13 +2975,14 @@ typedef struct isogi_dvr__walk {
     isogi_dvr__march *m;
     double t, next[3], inverse[3]; /* t at which the ray leaves its cell along each axis; 1 / dir */
     int cell[3], skipped;          /* some cells lie between the last value and the present cell, in which nothing counts */
+    int whole;                     /* every voxel has a value */
     double at[3];                  /* place in the cell */
     double value;                  /* the last one */
     int chained;                   /* there is one */
     double quiet[2];               /* the last range of values known to be quiet */
     double t0, t1, dt, b[4];       /* the cell whose pieces are given out */
-    int owner[3], piece, pieces;
-    double cut[5], cut_value[5];   /* u */
+    int owner[3], piece, pieces, gap; /* gap: there is one before the first of them, or the ray's begin */
+    double cut[5], cut_value[5];      /* u */
 } isogi_dvr__walk;
 
 static void isogi_dvr__walk_to(isogi_dvr__walk *w) {
@@ -2996,7 +2996,7 @@ static void isogi_dvr__walk_to(isogi_dvr__walk *w) {
 static void isogi_dvr__begin_walk(isogi_dvr__walk *w, isogi_dvr__march *m) {
     int a;
     w->m = m, w->t = 0, w->skipped = 0, w->value = 0, w->chained = 0, w->piece = w->pieces = 0;
-    w->quiet[0] = 1, w->quiet[1] = 0;
+    w->quiet[0] = 1, w->quiet[1] = 0, w->whole = isogi_vol_finite(m->dvr->desc.pyramid);
     for (a = 0; a < 3; a++) {
         int c = (int)m->origin[a], last = m->dvr->cells[a] - 1;
         /* on the face between two cells the ray belongs to the one that it goes into */
@@ -3018,15 +3018,17 @@ static int isogi_dvr__leave_block(isogi_dvr__walk *w) {
     int n, a;
     if (c[0] >> 2 == m->known[0] && c[1] >> 2 == m->known[1] && c[2] >> 2 == m->known[2]) return 0;
     m->work.blocks++;
-    n = (d->empty[0][isogi_dvr__block_at(d, 0, c)] & 3) - 1;
+    n = d->empty[0][isogi_dvr__block_at(d, 0, c)] - 1;
     if (n >= 0) {
         const isogi_level *level = &d->level[n];
         int shift = 2 + 2 * n, axis = -1, first[3];
         double leave = m->length;
         size_t block = isogi_dvr__block_at(d, n, c);
         m->work.blocks_skipped++;
-        if (level->range[block][0] > level->range[block][1]) w->chained = 0; /* no finite value */
-        else isogi_dvr__is_quiet(&d->integral, (double)level->range[block][0], (double)level->range[block][1], w->quiet);
+        /* Where voxels have no value, a block may hold some of them, and what lies behind it need not be near to what lies before it. */
+        if (!w->whole) w->chained = 0;
+        else if (!isogi_dvr__is_quiet(&d->integral, (double)level->range[block][0], (double)level->range[block][1], w->quiet))
+            w->quiet[0] = (double)level->range[block][0], w->quiet[1] = (double)level->range[block][1]; /* of one value */
         w->skipped = 1;
         for (a = 0; a < 3; a++) {
             double exit;
@@ -3105,7 +3107,7 @@ static int isogi_dvr__extrema(const double b[4], double u[2]) {
 }
 
 /* Cuts the cubic of the cell between t and t1. A value left behind before a gap joins on by a piece of no length, if it is in other
-   company than the value now: then rounding has led the ray past a sliver of a cell. */
+   company than the value now: then rounding has led the ray past a sliver of a cell, or to another side of a peak on a face. */
 static void isogi_dvr__cut_cell(isogi_dvr__walk *w, const double out[3], double t1) {
     isogi_dvr__march *m = w->m;
     double u[2];
@@ -3115,7 +3117,8 @@ static void isogi_dvr__cut_cell(isogi_dvr__walk *w, const double out[3], double 
     extrema = isogi_dvr__extrema(w->b, u);
     w->t0 = w->t, w->t1 = t1, w->dt = t1 - w->t;
     for (i = 0; i < 3; i++) w->owner[i] = w->cell[i];
-    if (w->chained && !w->skipped) w->b[0] = w->value;
+    w->gap = !w->chained || w->skipped;
+    if (!w->gap) w->b[0] = w->value;
     else if (w->chained && (w->value < w->quiet[0] || w->value > w->quiet[1] || w->b[0] < w->quiet[0] || w->b[0] > w->quiet[1]))
         w->cut[n] = 0, w->cut_value[n++] = w->value;
     w->cut[n] = 0, w->cut_value[n++] = w->b[0];
@@ -5455,7 +5458,8 @@ static int isogi_dvr__joined(const isogi_dvr *d) {
            d->desc.silhouette == ISOGI_DVR_SILHOUETTE_NONE && !d->transfer.peak_count;
 }
 
-/* Light that arrives so far, and the values between which the ray has gone one way since. */
+/* Light that arrives so far, and the values between which the ray has gone one way since, without a gap: a ray that has its opacity ends
+   with such a run, on every path. */
 typedef struct isogi_dvr__run { isogi_dvr__layer layer; double from, to; } isogi_dvr__run;
 
 /* The ray goes on to a value. */
@@ -5477,12 +5481,11 @@ static void isogi_dvr__cast_joined(isogi_dvr__pixel_ray *r, isogi_dvr__march *m)
     isogi_dvr__walk w;
     isogi_dvr__stretch p;
     isogi_dvr__run run;
-    int begun = 0;
     memset(&run, 0, sizeof run);
     run.layer.clear = 1;
     isogi_dvr__begin_walk(&w, m);
     while (run.layer.clear > r->end && isogi_dvr__next_monotone(&w, &p)) {
-        if (!begun || p.value[0] < run.to || p.value[0] > run.to) isogi_dvr__end_run(g, &run), run.from = run.to = p.value[0], begun = 1;
+        if (w.gap && w.piece == 1) isogi_dvr__end_run(g, &run), run.from = run.to = p.value[0];
         isogi_dvr__run_to(g, &run, p.value[1]);
     }
     if (run.layer.clear > r->end) isogi_dvr__end_run(g, &run);
@@ -5493,8 +5496,7 @@ static void isogi_dvr__cast_joined(isogi_dvr__pixel_ray *r, isogi_dvr__march *m)
 /* ---- eight rays at once ---- */
 
 /* Rays whose pieces are joined, side by side, in doubles: each goes its own way through the cells as isogi_dvr__walk does. Places are mixed
-   in another order than there, to a rounding, and what a cell begins with after a gap is joined to what was before the gap, between
-   which nothing counts. */
+   in another order than there, to a rounding. */
 typedef struct isogi_dvr__eight {
     double origin[3][8], dir[3][8], inverse[3][8], length[8]; /* of marches; inverse: 0 where there is no movement along an axis */
     double t[8], at[3][8];                                    /* where they are, in `cell` */
@@ -5582,6 +5584,18 @@ ISOGI_DVR__AVX512 inline __mmask8 isogi_dvr__quiet_eight(const isogi_dvr__integr
     return quiet;
 }
 
+/* Cells of some lanes that are quiet among many ranges. */
+ISOGI_DVR__AVX512 inline __mmask8 isogi_dvr__quiet_among_many(const isogi_dvr__integral *g, __mmask8 lanes, __m512d low, __m512d high) {
+    double ends[2][8], range[2] = {1, 0};
+    unsigned bits, quiet = 0;
+    _mm512_storeu_pd(ends[0], low), _mm512_storeu_pd(ends[1], high);
+    for (bits = lanes; bits; bits &= bits - 1) {
+        int k = __builtin_ctz(bits);
+        quiet |= (unsigned)isogi_dvr__is_quiet(g, ends[0][k], ends[1][k], range) << k;
+    }
+    return (__mmask8)quiet;
+}
+
 /* As isogi_dvr__run_to, for some lanes; those that begin anew do so here. */
 ISOGI_DVR__AVX512 inline void isogi_dvr__run_eight(const isogi_dvr__integral *g, isogi_dvr__eight *e, __mmask8 lanes, __mmask8 begins,
                                                    __m512d value) {
@@ -5593,7 +5607,7 @@ ISOGI_DVR__AVX512 inline void isogi_dvr__run_eight(const isogi_dvr__integral *g,
     _mm512_mask_storeu_pd(e->to, lanes, value);
     _mm512_mask_storeu_pd(e->from, (__mmask8)bits, to);
     _mm512_mask_storeu_pd(e->from, begins, value);
-    bits &= (unsigned)~isogi_dvr__quiet_eight(g, _mm512_min_pd(from, to), _mm512_max_pd(from, to));
+    bits &= e->going & (unsigned)~isogi_dvr__quiet_eight(g, _mm512_min_pd(from, to), _mm512_max_pd(from, to));
     for (; bits; bits &= bits - 1) {
         int k = __builtin_ctz(bits);
         double ends[2][8];
@@ -5605,15 +5619,15 @@ ISOGI_DVR__AVX512 inline void isogi_dvr__run_eight(const isogi_dvr__integral *g,
 
 /* Values along cells that count: as isogi_dvr__cut_cell. */
 ISOGI_DVR__AVX512 inline void isogi_dvr__cut_eight(const isogi_dvr__integral *g, isogi_dvr__eight *e, __mmask8 lanes, __mmask8 begins,
-                                                   __mmask8 skipped, const __m512d c[8], const __m512d in[3], const __m512d out[3],
-                                                   __m512d low, __m512d high) {
+                                                   const __m512d c[8], const __m512d in[3], const __m512d out[3], __m512d low,
+                                                   __m512d high) {
     const __m512d zero = _mm512_setzero_pd();
     __m512d b[4], d[3];
     __mmask8 up = lanes, down = lanes;
     unsigned bits;
     int i;
     isogi_dvr__cubic_eight(c, in, out, b);
-    if (lanes & (begins | skipped)) isogi_dvr__run_eight(g, e, lanes & (begins | skipped), lanes & begins, b[0]);
+    if (lanes & begins) isogi_dvr__run_eight(g, e, lanes & begins, lanes & begins, b[0]);
     for (i = 0; i < 3; i++) {
         d[i] = _mm512_sub_pd(b[i + 1], b[i]);
         up = _mm512_mask_cmp_pd_mask(up, d[i], zero, _CMP_GE_OQ), down = _mm512_mask_cmp_pd_mask(down, d[i], zero, _CMP_LE_OQ);
@@ -5626,11 +5640,12 @@ ISOGI_DVR__AVX512 inline void isogi_dvr__cut_eight(const isogi_dvr__integral *g,
         _mm512_storeu_pd(bounds[0], low), _mm512_storeu_pd(bounds[1], high);
         extrema = isogi_dvr__extrema(own, u);
         run.layer = e->layer[k], run.from = e->from[k], run.to = e->to[k];
-        for (i = 0; i < extrema; i++) {
+        for (i = 0; i < extrema && run.layer.clear > e->end; i++) {
             double value = isogi_dvr__bernstein(own, u[i]);
             value = value > bounds[0][k] ? value : bounds[0][k];
             isogi_dvr__run_to(g, &run, value < bounds[1][k] ? value : bounds[1][k]);
         }
+        if (!(run.layer.clear > e->end)) e->going &= ~(1u << k);
         e->layer[k] = run.layer, e->from[k] = run.from, e->to[k] = run.to;
     }
     isogi_dvr__run_eight(g, e, lanes, 0, _mm512_min_pd(_mm512_max_pd(b[3], low), high));
@@ -5644,7 +5659,7 @@ ISOGI_DVR__AVX512 void isogi_dvr__cast_eight(const isogi_dvr *d, int kind, uint3
     const __m256i ones = _mm256_set1_epi32(1), none = _mm256_setzero_si256();
     __m512d t = zero, at[3], origin[3], dir[3], inverse[3];
     __m256i cell[3];
-    __mmask8 ahead[3], moves[3], begins = 0xff, skipped = 0;
+    __mmask8 ahead[3], moves[3], begins = 0xff; /* begins: after a gap, too */
     int a, k;
     for (a = 0; a < 3; a++) {
         at[a] = _mm512_loadu_pd(e->at[a]), origin[a] = _mm512_loadu_pd(e->origin[a]), dir[a] = _mm512_loadu_pd(e->dir[a]);
@@ -5684,7 +5699,7 @@ ISOGI_DVR__AVX512 void isogi_dvr__cast_eight(const isogi_dvr *d, int kind, uint3
             to[a] = _mm256_mask_sub_epi32(to[a], through, first[a], ones), to[a] = _mm256_mask_mov_epi32(to[a], through & ahead[a], beyond);
             past = (__mmask8)(past | _mm256_cmplt_epi32_mask(to[a], none) | _mm256_cmpgt_epi32_mask(to[a], last));
         }
-        skipped |= empty, begins |= _mm256_mask_test_epi32_mask(empty, block, _mm256_set1_epi32(4));
+        begins |= empty;
         cells = _mm512_mask_cmp_pd_mask(going & (__mmask8)~empty, t1, t, _CMP_GT_OQ);
         if (cells) {
             isogi_dvr__corners_eight(&d->volume, cell, cells, kind, last_word, c);
@@ -5692,11 +5707,12 @@ ISOGI_DVR__AVX512 void isogi_dvr__cast_eight(const isogi_dvr *d, int kind, uint3
                 low = _mm512_min_pd(low, c[k]), high = _mm512_max_pd(high, c[k]), sum = _mm512_add_pd(sum, c[k]);
             hollow = cells & (__mmask8)~_mm512_cmp_pd_mask(_mm512_abs_pd(sum), _mm512_set1_pd(1e300), _CMP_LE_OQ);
             quiet = cells & (hollow | isogi_dvr__quiet_eight(g, low, high));
+            if (g->quiet_count > 6) quiet |= isogi_dvr__quiet_among_many(g, cells & (__mmask8)~quiet, low, high);
             work->cells += (uint64_t)__builtin_popcount(cells);
-            cells &= (__mmask8)~quiet, begins |= hollow, skipped |= quiet;
+            cells &= (__mmask8)~quiet, begins |= quiet;
             work->cubics += (uint64_t)__builtin_popcount(cells), work->samples += (uint64_t)__builtin_popcount(cells);
-            if (cells) isogi_dvr__cut_eight(g, e, cells, begins, skipped, c, at, out, low, high);
-            begins &= (__mmask8)~cells, skipped &= (__mmask8)~cells;
+            if (cells) isogi_dvr__cut_eight(g, e, cells, begins, c, at, out, low, high);
+            begins &= (__mmask8)~cells;
         }
         t = _mm512_mask_mov_pd(t, going, t1);
         for (a = 0; a < 3; a++) at[a] = _mm512_mask_mov_pd(at[a], going, then[a]), cell[a] = _mm256_mask_mov_epi32(cell[a], going, to[a]);

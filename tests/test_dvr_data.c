@@ -698,6 +698,77 @@ TEST(cells_that_are_not_finite_break_the_ray) {
             }
 }
 
+/* Planes of voxels without values part a volume: its picture is that of what is before them, over that of what is behind. On both sides of
+   the plane lie blocks in which nothing counts, of values apart: between those there is no passage. */
+TEST(walls_without_values_part_the_ray) {
+    enum { LONG = 24, WIDE = 9, PIXELS = 12 * 9 };
+    static const isogi_transfer_point points[] = {{0.2, {1, 0.5f, 0.2f}, 0},   {0.2, {1, 1, 0.3f}, 0.05f},  {0.4, {0.2f, 1, 1}, 0.05f},
+                                                  {0.4, {1, 0.1f, 1}, 5},      {0.6, {1, 0.3f, 0.7f}, 5},   {0.6, {0.3f, 0.2f, 1}, 0.05f},
+                                                  {0.8, {1, 0.6f, 0.1f}, 0.05f}, {0.8, {1, 1, 1}, 0}};
+    static const isogi_peak peak = {0.5, {1, 0.4f, 0.2f}, 0.7f};
+    static const int walls[] = {8, 10, 12, 13}; /* between blocks, and within one */
+    static float image[3][PIXELS][4], depth[PIXELS];
+    double most = 0, least = 1;
+    for (int n = 0; n < 4 * 3 * 2; n += LONG_SUITE ? 1 : 5) {
+        const int wall = walls[n % 4], axis = n / 4 % 3, back = n / 12;
+        size_t size[3] = {WIDE, WIDE, WIDE};
+        float *value[3];
+        isogi_pyramid *pyramid[3][2];
+        size[axis] = LONG;
+        for (int part = 0; part < 3; part++) {
+            isogi_volume volume = {.type = ISOGI_F32, .size = {size[0], size[1], size[2]}};
+            volume.data = value[part] = (float *)malloc(sizeof(float) * size[0] * size[1] * size[2]);
+            for (size_t i = 0; i < size[0] * size[1] * size[2]; i++) {
+                size_t at[3] = {i % size[0], i / size[0] % size[1], i / size[0] / size[1]};
+                int from = (int)at[axis] - wall, out = abs(from) - 5;
+                double away = (out > 0 ? 0.05 * out : 0) + 0.004 * (double)(at[0] + at[1] + at[2] - at[axis]);
+                value[part][i] = (float)(from < 0 ? 0.1 + away : 0.9 - away);
+                if (from == 0 || (part == 1 && from > 0) || (part == 2 && from < 0)) value[part][i] = NAN; /* 1: before, 2: behind */
+            }
+            /* a voxel of no cell, so that tables are of the same values in all three */
+            if (part == 1) value[part][size[0] * size[1] * size[2] - 1] = 0.9f;
+            if (part == 2) value[part][0] = 0.1f;
+            for (int plain = 0; plain < 2; plain++) {
+                const isogi_context context = {.threads = 1, .force_path = plain};
+                CHECK(isogi_vol_build(&pyramid[part][plain], &volume, &context) == ISOGI_OK, "build");
+            }
+        }
+        for (int way = 0; way < 2 * 2 * 3 * 2 * 2 * 2; way++) {
+            const int plain = way & 1, space = way >> 1 & 1, lit = way >> 2 & 1, with_peak = way >> 3 & 1, bound = way >> 4 & 1;
+            const int classification = way >> 5;
+            const isogi_context context = {.threads = 1, .force_path = plain};
+            const isogi_transfer transfer = {points, 8, &peak, (size_t)with_peak};
+            const isogi_lighting sky = {.env = {.sh = sky_one, .sh_order = 1}};
+            isogi_view view = {.width = 12, .height = 9, .fov = 5};
+            if (bound && (space == ISOGI_DVR_DATA || classification)) continue;
+            for (int a = 0; a < 3; a++) view.eye[a] = 1.3f + (float)a, view.target[a] = 4.4f, view.up[a] = a == (axis + 1) % 3;
+            view.eye[axis] = back ? 60 : -40, view.target[axis] = 10;
+            for (int part = 0; part < 3; part++) {
+                const isogi_dvr_desc desc = {.pyramid = pyramid[part][plain], .space = (isogi_dvr_space)space, .opaque = 1,
+                                             .classification = (isogi_dvr_classification)classification, .bound = bound ? 0.01 : 0,
+                                             .shading = lit ? ISOGI_DVR_VISIBILITY : ISOGI_DVR_UNLIT, .grid = {2, 2, 2}, .step = 0.7,
+                                             .table = 32, .tolerance = 1e6}; /* steps do not depend on what is before */
+                isogi_dvr *dvr = dvr_new_with(&desc, &transfer, &context); /* no step is done: nothing casts a shadow */
+                CHECK(isogi_dvr_render(dvr, &view, &sky, image[part], depth, NULL) == ISOGI_OK, "render");
+                isogi_dvr_free(dvr);
+            }
+            for (int i = 0; i < PIXELS; i++) {
+                const float *first = image[back ? 2 : 1][i], *second = image[back ? 1 : 2][i];
+                for (int a = 0; a < 4; a++) {
+                    double whole = (double)first[a] + (1 - (double)first[3]) * (double)second[a];
+                    most = fmax(most, fabs((double)image[0][i][a] - whole));
+                }
+                least = fmin(least, (double)image[0][i][3]);
+            }
+            CHECK(most < 2e-6, "wall %d, axis %d, %s, way %d: pixels differ by %g", wall, axis, back ? "from behind" : "from before", way,
+                  most);
+        }
+        for (int part = 0; part < 3; part++) isogi_vol_free(pyramid[part][0]), isogi_vol_free(pyramid[part][1]), free(value[part]);
+    }
+    printf("    largest difference %.2g; opacity at least %.2g\n", most, least);
+    CHECK(least > 1e-3, "a pixel has no opacity");
+}
+
 /* Unlit pictures without peaks follow several rays at once where the machine can: they agree with those of plain code, and see as much. */
 TEST(rays_side_by_side_agree_with_plain_code) {
     enum { WIDTH = 33, HEIGHT = 21 };
@@ -706,7 +777,9 @@ TEST(rays_side_by_side_agree_with_plain_code) {
     /* within; along an axis; along lattice lines */
     static const float eyes[4][3] = {{80, 50, 90}, {20.3f, 7.1f, 3.2f}, {-30, 2, 2}, {4, 4, 60}};
     test_random r = {77};
+    static const float opaque[] = {1, 0.5f, 0, 0.9f}; /* never; 0: the default */
     double most = 0, farthest = 0;
+    int ended = 0, together = 0;
     for (int n = 0; n < (LONG_SUITE ? 3 * 3 * 4 * 8 : 3 * 3 * 4); n++) {
         const size_t *size = sizes[n % 3], count = size[0] * size[1] * size[2];
         const isogi_type type = n / 3 % 3 == 0 ? ISOGI_F32 : n / 3 % 3 == 1 ? ISOGI_U8 : ISOGI_U16;
@@ -736,11 +809,11 @@ TEST(rays_side_by_side_agree_with_plain_code) {
             .height = HEIGHT,
             .eye = {eye[0], eye[1], eye[2]},
             .target = {n / 9 % 4 == 3 ? 4.f : 0.4f * (float)size[0], n / 9 % 4 > 1 ? eye[1] : 0.6f * (float)size[1], 2}};
-        uint64_t cells[2];
-        for (int path = 0; path < 2; path++) {
+        isogi_counters last = {0}, never = {0};
+        for (int way = 0; way < 2 * 4; way++) {
+            const int path = way & 1;
             const isogi_context context = {.threads = 1, .force_path = path};
-            const isogi_dvr_desc desc = {.pyramid = NULL, .space = ISOGI_DVR_DATA, .opaque = 1};
-            isogi_dvr_desc own = desc;
+            isogi_dvr_desc own = {.pyramid = NULL, .space = ISOGI_DVR_DATA, .opaque = opaque[way / 2]};
             isogi_pyramid *pyramid = NULL;
             isogi_dvr *dvr = NULL;
             isogi_counters work = {0};
@@ -749,21 +822,35 @@ TEST(rays_side_by_side_agree_with_plain_code) {
             CHECK(isogi_dvr_create(&dvr, &own, &context) == ISOGI_OK && isogi_dvr_set_transfer(dvr, &transfer) == ISOGI_OK, "create");
             if (n % 7 > 4) CHECK(isogi_dvr_set_clip(dvr, &plane, 1) == ISOGI_OK, "clip");
             CHECK(isogi_dvr_render(dvr, &view, NULL, image[path], depth[path], &work) == ISOGI_OK, "render");
-            cells[path] = work.cells;
             isogi_dvr_free(dvr), isogi_vol_free(pyramid);
+            if (!path) {
+                last = work;
+                continue;
+            }
+            /* several at once look for an empty block at every cell, one ray only where it comes to another block */
+            together += last.blocks > work.blocks;
+            ended += way == 3 && work.cells < never.cells;
+            if (way == 1) never = work;
+            CHECK(last.cells + last.cells / 50 + 20 >= work.cells && work.cells + work.cells / 50 + 20 >= last.cells,
+                  "case %d.%d: %g cells, not %g", n, way / 2, (double)last.cells, (double)work.cells);
+            for (int i = 0; i < WIDTH * HEIGHT; i++) {
+                /* float pixels; a ray along faces may take the cells on either side, whose values agree to a rounding */
+                for (int a = 0; a < 4; a++) most = fmax(most, fabs((double)image[0][i][a] - (double)image[1][i][a]));
+                if (depth[0][i] < 1e30f && depth[1][i] < 1e30f && image[0][i][3] > 1e-3f)
+                    farthest = fmax(farthest, fabs((double)depth[0][i] - (double)depth[1][i]));
+            }
+            CHECK(most < 1e-6 && farthest < 1e-3, "case %d, opaque %g: pixels differ by %g, depths by %g", n, (double)own.opaque, most,
+                  farthest);
         }
-        CHECK(cells[0] + cells[0] / 50 + 20 >= cells[1] && cells[1] + cells[1] / 50 + 20 >= cells[0], "case %d: %g cells, not %g", n,
-              (double)cells[0], (double)cells[1]);
-        for (int i = 0; i < WIDTH * HEIGHT; i++) {
-            /* float pixels; a ray along faces may take the cells on either side, whose values agree to a rounding */
-            for (int a = 0; a < 4; a++) most = fmax(most, fabs((double)image[0][i][a] - (double)image[1][i][a]));
-            if (depth[0][i] < 1e30f && depth[1][i] < 1e30f && image[0][i][3] > 1e-3f)
-                farthest = fmax(farthest, fabs((double)depth[0][i] - (double)depth[1][i]));
-        }
-        CHECK(most < 1e-6 && farthest < 1e-3, "case %d: pixels differ by %g, depths by %g", n, most, farthest);
         free(data);
     }
-    printf("    largest difference of pixels %.2g, of depth %.2g\n", most, farthest);
+    printf("    largest difference of pixels %.2g, of depth %.2g; %d pictures of several rays at once\n", most, farthest, together);
+    CHECK(ended, "no ray ends at its opacity");
+#if defined(__x86_64__) && (defined(__clang__) || (defined(__GNUC__) && __GNUC__ >= 9)) && !defined(__TINYC__) && \
+    !defined(ISOGI_NO_SIMD) && !defined(_WIN32)
+    if (__builtin_cpu_supports("avx512bw") && __builtin_cpu_supports("avx512dq") && __builtin_cpu_supports("avx512vl"))
+        CHECK(together, "no rays went side by side");
+#endif
 }
 
 static int calls_left, blocks_out;
