@@ -5459,7 +5459,7 @@ static int isogi_dvr__joined(const isogi_dvr *d) {
 }
 
 /* Light that arrives so far, and the values between which the ray has gone one way since, without a gap: a ray that has its opacity ends
-   with such a run, on every path. */
+   with such a run. */
 typedef struct isogi_dvr__run { isogi_dvr__layer layer; double from, to; } isogi_dvr__run;
 
 /* The ray goes on to a value. */
@@ -5573,7 +5573,8 @@ ISOGI_DVR__AVX512 inline void isogi_dvr__cubic_eight(const __m512d c[8], const _
     b[2] = _mm512_mul_pd(third, _mm512_add_pd(_mm512_add_pd(z[1][1][0], z[1][0][1]), z[0][1][1]));
 }
 
-/* Lanes in which all values low .. high are quiet; where there are many ranges, only the outermost are looked at. */
+/* Lanes in which all values low .. high are quiet; where there are many ranges, only the outermost are looked at: a cell within another one
+   adds nothing, but is no gap at which a run ends. */
 ISOGI_DVR__AVX512 inline __mmask8 isogi_dvr__quiet_eight(const isogi_dvr__integral *g, __m512d low, __m512d high) {
     size_t i, step = g->quiet_count > 6 ? g->quiet_count - 1 : 1;
     __mmask8 quiet = 0;
@@ -5582,18 +5583,6 @@ ISOGI_DVR__AVX512 inline __mmask8 isogi_dvr__quiet_eight(const isogi_dvr__integr
         quiet = (__mmask8)(quiet | _mm512_mask_cmp_pd_mask(above, high, _mm512_set1_pd(g->quiet[i][1]), _CMP_LE_OQ));
     }
     return quiet;
-}
-
-/* Cells of some lanes that are quiet among many ranges. */
-ISOGI_DVR__AVX512 inline __mmask8 isogi_dvr__quiet_among_many(const isogi_dvr__integral *g, __mmask8 lanes, __m512d low, __m512d high) {
-    double ends[2][8], range[2] = {1, 0};
-    unsigned bits, quiet = 0;
-    _mm512_storeu_pd(ends[0], low), _mm512_storeu_pd(ends[1], high);
-    for (bits = lanes; bits; bits &= bits - 1) {
-        int k = __builtin_ctz(bits);
-        quiet |= (unsigned)isogi_dvr__is_quiet(g, ends[0][k], ends[1][k], range) << k;
-    }
-    return (__mmask8)quiet;
 }
 
 /* As isogi_dvr__run_to, for some lanes; those that begin anew do so here. */
@@ -5707,7 +5696,6 @@ ISOGI_DVR__AVX512 void isogi_dvr__cast_eight(const isogi_dvr *d, int kind, uint3
                 low = _mm512_min_pd(low, c[k]), high = _mm512_max_pd(high, c[k]), sum = _mm512_add_pd(sum, c[k]);
             hollow = cells & (__mmask8)~_mm512_cmp_pd_mask(_mm512_abs_pd(sum), _mm512_set1_pd(1e300), _CMP_LE_OQ);
             quiet = cells & (hollow | isogi_dvr__quiet_eight(g, low, high));
-            if (g->quiet_count > 6) quiet |= isogi_dvr__quiet_among_many(g, cells & (__mmask8)~quiet, low, high);
             work->cells += (uint64_t)__builtin_popcount(cells);
             cells &= (__mmask8)~quiet, begins |= quiet;
             work->cubics += (uint64_t)__builtin_popcount(cells), work->samples += (uint64_t)__builtin_popcount(cells);
