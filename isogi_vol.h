@@ -4273,12 +4273,19 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE __m512i isogi_vol__mirror8(__m512i mask, __m
     return _mm512_mask_mov_epi64(mask, _mm512_test_epi64_mask(flip, _mm512_set1_epi64(48)), _mm512_shuffle_epi8(mask, quads));
 }
 
+/* The last four bytes of eight nodes. */
+ISOGI_VOL__AVX512 ISOGI_VOL__INLINE __m256i isogi_vol__tails8(const uint64_t address[8]) {
+    int32_t tail[8];
+    int k;
+#pragma GCC unroll 8
+    for (k = 0; k < 8; k++) memcpy(&tail[k], (const char *)(uintptr_t)address[k] + 124, sizeof tail[k]);
+    return _mm256_setr_epi32(tail[0], tail[1], tail[2], tail[3], tail[4], tail[5], tail[6], tail[7]);
+}
+
 /* Bounds of nodes and voxels of leaves are compared alike, byte by byte, and mean different things: whether the two halves of the node
    are at least `low` (0, 1), and below `beyond` (2, 3), of eight rays. Returns the last four bytes of leaves. */
 ISOGI_VOL__AVX512 ISOGI_VOL__INLINE __m256i isogi_vol__compare(isogi_vol__pool *s, int i, __mmask8 leaf, uint64_t mask[4][8]) {
-    const __m512i address = _mm512_load_si512(&s->address[i]);
-    const __m256i tail =
-        _mm512_mask_i64gather_epi32(_mm256_setzero_si256(), leaf, _mm512_add_epi64(address, _mm512_set1_epi64(124)), (const int *)0, 1);
+    const __m256i tail = _mm256_maskz_mov_epi32(leaf, isogi_vol__tails8(&s->address[i]));
     const __m256 low = _mm256_cvtepi32_ps(_mm256_and_si256(_mm256_srli_epi32(tail, 8), _mm256_set1_epi32(255)));
     const __m256 high = _mm256_cvtepi32_ps(_mm256_and_si256(_mm256_srli_epi32(tail, 16), _mm256_set1_epi32(255)));
     const __m256 scale = _mm256_div_ps(_mm256_set1_ps(ISOGI_VOL__CODES), _mm256_sub_ps(_mm256_add_ps(high, _mm256_set1_ps(1)), low));
@@ -4403,6 +4410,59 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE unsigned isogi_vol__choose(const isogi_vol__
     return (unsigned)(choosing & ~some);
 }
 
+/* Places of eight slots in a pool's first row, and eight numbers from there by plain loads, which take half the time of a gather on
+   processors that make many steps of one (Zen 4). */
+typedef struct isogi_vol__spots { char *at[8]; } isogi_vol__spots;
+
+ISOGI_VOL__INLINE isogi_vol__spots isogi_vol__spots8(isogi_vol__pool *s, const uint8_t *slots) {
+    isogi_vol__spots spots;
+    int k;
+#pragma GCC unroll 8
+    for (k = 0; k < 8; k++) spots.at[k] = (char *)s + 8 * (size_t)slots[k];
+    return spots;
+}
+
+ISOGI_VOL__AVX512 ISOGI_VOL__INLINE __m128i isogi_vol__load_two(const void *first, const void *second) {
+    int64_t low, high;
+    memcpy(&low, first, sizeof low), memcpy(&high, second, sizeof high);
+    return _mm_set_epi64x(high, low);
+}
+
+/* Numbers of eight bytes at eight places. */
+ISOGI_VOL__AVX512 ISOGI_VOL__INLINE __m512i isogi_vol__load_eight(const char *const at[8], size_t offset) {
+    const __m256i low = _mm256_setr_m128i(isogi_vol__load_two(at[0] + offset, at[1] + offset),
+                                          isogi_vol__load_two(at[2] + offset, at[3] + offset));
+    const __m256i high = _mm256_setr_m128i(isogi_vol__load_two(at[4] + offset, at[5] + offset),
+                                           isogi_vol__load_two(at[6] + offset, at[7] + offset));
+    return _mm512_inserti64x4(_mm512_castsi256_si512(low), high, 1);
+}
+
+ISOGI_VOL__AVX512 ISOGI_VOL__INLINE __m512i isogi_vol__load_one(const void *at) {
+    int64_t value;
+    memcpy(&value, at, sizeof value);
+    return _mm512_set1_epi64(value);
+}
+
+ISOGI_VOL__AVX512 ISOGI_VOL__INLINE __m512i isogi_vol__pick8(const isogi_vol__spots *spots, size_t row) {
+    return isogi_vol__load_eight((const char *const *)spots->at, row);
+}
+
+ISOGI_VOL__AVX512 ISOGI_VOL__INLINE void isogi_vol__put8(const isogi_vol__spots *spots, size_t row, __m512i value) {
+    int k;
+#pragma GCC unroll 4
+    for (k = 0; k < 4; k++) {
+        const __m128i two = k == 0   ? _mm512_castsi512_si128(value)
+                            : k == 1 ? _mm512_extracti64x2_epi64(value, 1)
+                            : k == 2 ? _mm512_extracti64x2_epi64(value, 2)
+                                     : _mm512_extracti64x2_epi64(value, 3);
+        _mm_storel_epi64((__m128i *)(void *)(spots->at[2 * k] + row), two);
+        _mm_storel_epi64((__m128i *)(void *)(spots->at[2 * k + 1] + row), _mm_unpackhi_epi64(two, two));
+    }
+}
+
+/* Where a row of the pool begins. */
+#define ISOGI_VOL__ROW_OF(member) ((size_t)((const char *)(s->member) - (const char *)s))
+
 /* The slots of a list as numbers; beyond its end there are others, or 0. */
 ISOGI_VOL__AVX512 ISOGI_VOL__INLINE __m512i isogi_vol__slots8(const uint8_t *slots) {
     return _mm512_cvtepu8_epi64(_mm_loadl_epi64((const __m128i *)(const void *)slots));
@@ -4441,10 +4501,10 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE void isogi_vol__way8(__m512i cell, const __m
 /* What is certain of cells: that the ray is inside all along, or outside; that it is so where the way begins, and where it ends. */
 typedef struct isogi_vol__sides { __mmask8 in, out, in0, out0, in1, out1; } isogi_vol__sides;
 
-/* By the hull of Bernstein coefficients in float. code: the leaf's byte at the lowest corner, as an address; step: the isovalue. */
-ISOGI_VOL__AVX512 ISOGI_VOL__INLINE isogi_vol__sides isogi_vol__sides8(__m512i code, __mmask8 lanes, __m256 step, const __m256 from[3],
+/* By the hull of Bernstein coefficients in float. corners: bytes of the leaf, eight cells' lowest ones, then those of corner 1, and so on;
+   step: the isovalue. */
+ISOGI_VOL__AVX512 ISOGI_VOL__INLINE isogi_vol__sides isogi_vol__sides8(__m512i corners, __m256 step, const __m256 from[3],
                                                                        const __m256 to[3]) {
-    const __m256i byte = _mm256_set1_epi32(255);
     const __m256 low = _mm256_sub_ps(step, _mm256_set1_ps(ISOGI_VOL__DOUBT)), high = _mm256_add_ps(step, _mm256_set1_ps(ISOGI_VOL__DOUBT));
     const __m256 third_low = _mm256_mul_ps(low, _mm256_set1_ps(3)), third_high = _mm256_mul_ps(high, _mm256_set1_ps(3));
     __m256 x[2][4], f[2][2][2], sum1, sum2;
@@ -4452,10 +4512,12 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE isogi_vol__sides isogi_vol__sides8(__m512i c
     int k, e;
 #pragma GCC unroll 8
     for (k = 0; k < 4; k++) {
-        const __m256i pair = _mm512_mask_i64gather_epi32(
-            _mm256_setzero_si256(), lanes, _mm512_add_epi64(code, _mm512_set1_epi64((k & 1) * 5 + (k >> 1) * 25)), (const int *)0, 1);
-        const __m256 a = _mm256_cvtepi32_ps(_mm256_and_si256(pair, byte)),
-                     b = _mm256_cvtepi32_ps(_mm256_and_si256(_mm256_srli_epi32(pair, 8), byte));
+        const __m512 pair =
+            _mm512_cvtepi32_ps(_mm512_cvtepu8_epi32(k == 0   ? _mm512_castsi512_si128(corners)
+                                                    : k == 1 ? _mm512_extracti32x4_epi32(corners, 1)
+                                                    : k == 2 ? _mm512_extracti32x4_epi32(corners, 2)
+                                                             : _mm512_extracti32x4_epi32(corners, 3)));
+        const __m256 a = _mm512_castps512_ps256(pair), b = _mm512_extractf32x8_ps(pair, 1);
         x[0][k] = isogi_vol__mix8(a, b, from[0]), x[1][k] = isogi_vol__mix8(a, b, to[0]);
     }
 #pragma GCC unroll 8
@@ -4474,15 +4536,32 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE isogi_vol__sides isogi_vol__sides8(__m512i c
     return sides;
 }
 
-/* Cells of leaves by their children's numbers: their own numbers, given any cell of the leaf, and their lowest corners' bytes. */
-ISOGI_VOL__AVX512 ISOGI_VOL__INLINE __m512i isogi_vol__cells8(__m512i child, __m512i corner, __m512i *code) {
+/* Cells of leaves by their children's numbers: their own numbers, given any cell of the leaf, and where in the leaf their lowest corners
+   are. */
+ISOGI_VOL__AVX512 ISOGI_VOL__INLINE __m512i isogi_vol__cells8(__m512i child, __m512i corner, __m512i *offset) {
     const __m512i three = _mm512_set1_epi64(3);
     const __m512i dx = _mm512_and_si512(child, three), dy = _mm512_and_si512(_mm512_srli_epi64(child, 2), three),
-                  dz = _mm512_srli_epi64(child, 4);
-    *code = _mm512_add_epi64(_mm512_add_epi64(*code, dx),
-                             _mm512_add_epi64(_mm512_mul_epu32(dy, _mm512_set1_epi64(5)), _mm512_mul_epu32(dz, _mm512_set1_epi64(25))));
+                  dz = _mm512_and_si512(_mm512_srli_epi64(child, 4), three);
+    *offset = _mm512_add_epi64(_mm512_mul_epu32(dy, _mm512_set1_epi64(5)), _mm512_mul_epu32(dz, _mm512_set1_epi64(25)));
+    *offset = _mm512_add_epi64(*offset, dx);
     return _mm512_or_si512(_mm512_and_si512(corner, _mm512_set1_epi64(0xfffcfffcfffc)),
                            _mm512_or_si512(dx, _mm512_or_si512(_mm512_slli_epi64(dy, 16), _mm512_slli_epi64(dz, 32))));
+}
+
+/* Bytes of the corners of one cell of each of eight leaves, as sides8 takes them; offset: of the cells' lowest corners in their leaves. */
+ISOGI_VOL__AVX512 ISOGI_VOL__INLINE __m512i isogi_vol__corners_of8(const isogi_vol__spots *spots, size_t row, __m512i offset) {
+    __attribute__((aligned(64))) uint64_t address[8];
+    const char *at[8];
+    int k;
+    _mm512_store_si512(address, _mm512_add_epi64(isogi_vol__pick8(spots, row), offset));
+#pragma GCC unroll 8
+    for (k = 0; k < 8; k++) at[k] = (const char *)(uintptr_t)address[k];
+    return _mm512_permutex2var_epi8(isogi_vol__load_eight(at, 0),
+                                    _mm512_add_epi8(_mm512_set1_epi64(0x3830282018100800),
+                                                    _mm512_setr_epi64(0, 0x0101010101010101, 0x0505050505050505, 0x0606060606060606,
+                                                                      0x4040404040404040, 0x4141414141414141, 0x4545454545454545,
+                                                                      0x4646464646464646)),
+                                    isogi_vol__load_eight(at, 25));
 }
 
 /* The next cells of up to eight rays, in float. Rays that are certainly on one side all along are done with theirs; the others are in
@@ -4491,25 +4570,29 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE unsigned isogi_vol__look(isogi_vol__turn *tu
                                                              int *again) {
     const __mmask8 lanes = (__mmask8)((1u << count) - 1);
     const __m512i slot = isogi_vol__slots8(slots);
-    const __m512i mask = _mm512_i64gather_epi64(slot, s->mask[0], 8), below = _mm512_sub_epi64(mask, _mm512_set1_epi64(1)),
+#define ISOGI_VOL__TAKE(member) isogi_vol__pick8(&spots, ISOGI_VOL__ROW_OF(member))
+#define ISOGI_VOL__TAKE_REAL(member) _mm512_castsi512_pd(ISOGI_VOL__TAKE(member))
+    const isogi_vol__spots spots = isogi_vol__spots8(s, slots);
+    const __m512i mask = ISOGI_VOL__TAKE(mask[0]), below = _mm512_sub_epi64(mask, _mm512_set1_epi64(1)),
                   rest = _mm512_and_si512(mask, below);
-    const __m512i child = _mm512_xor_si512(_mm512_popcnt_epi64(_mm512_andnot_si512(mask, below)), _mm512_i64gather_epi64(slot, s->flip, 8));
-    const __m512i side = _mm512_i64gather_epi64(slot, s->side, 8);
-    __m512i code = _mm512_i64gather_epi64(slot, s->address, 8),
-            cell = isogi_vol__cells8(child, _mm512_i64gather_epi64(slot, s->cell, 8), &code);
-    __m512i begin = _mm512_set1_epi64(3), end = _mm512_i64gather_epi64(slot, s->end, 8);
+    const __m512i child = _mm512_xor_si512(_mm512_popcnt_epi64(_mm512_andnot_si512(mask, below)), ISOGI_VOL__TAKE(flip));
+    const __m512i side = ISOGI_VOL__TAKE(side);
+    __m512i offset, cell = isogi_vol__cells8(child, ISOGI_VOL__TAKE(cell), &offset);
+    __m512i begin = _mm512_set1_epi64(3), end = ISOGI_VOL__TAKE(end);
     __m512d origin[3], inverse[3], dir[3];
     __m256 from[3], to[3];
     isogi_vol__sides sides;
     __mmask8 sure, hit = 0;
     int a;
-    _mm512_mask_i64scatter_epi64(s->mask[0], lanes, slot, rest, 8);
+    if (count == 8) isogi_vol__put8(&spots, ISOGI_VOL__ROW_OF(mask[0]), rest);
+    else _mm512_mask_i64scatter_epi64(s->mask[0], lanes, slot, rest, 8);
 #pragma GCC unroll 8
     for (a = 0; a < 3; a++)
-        inverse[a] = _mm512_i64gather_pd(slot, s->inverse[a], 8), dir[a] = _mm512_i64gather_pd(slot, s->dir[a], 8),
-        origin[a] = turn->shared ? _mm512_set1_pd(s->origin[a][slots[0]]) : _mm512_i64gather_pd(slot, s->origin[a], 8);
+        inverse[a] = ISOGI_VOL__TAKE_REAL(inverse[a]), dir[a] = ISOGI_VOL__TAKE_REAL(dir[a]),
+        origin[a] = turn->shared ? _mm512_set1_pd(s->origin[a][slots[0]]) : ISOGI_VOL__TAKE_REAL(origin[a]);
     isogi_vol__way8(cell, origin, inverse, dir, &begin, &end, from, to);
-    sides = isogi_vol__sides8(code, lanes, _mm512_cvtpd_ps(_mm512_i64gather_pd(slot, s->step, 8)), from, to);
+    sides = isogi_vol__sides8(isogi_vol__corners_of8(&spots, ISOGI_VOL__ROW_OF(address), offset),
+                              _mm512_cvtpd_ps(ISOGI_VOL__TAKE_REAL(step)), from, to);
     sides.in = (__mmask8)(sides.in & _mm512_test_epi64_mask(_mm512_set1_epi64(1), side));                  /* 1 or -1 */
     /* 0 or -1 */
     sides.out = (__mmask8)(sides.out & _mm512_testn_epi64_mask(_mm512_add_epi64(side, _mm512_set1_epi64(1)), _mm512_set1_epi64(~1)));
@@ -4521,7 +4604,9 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE unsigned isogi_vol__look(isogi_vol__turn *tu
         hit = (__mmask8)(lanes & ((sides.out1 & (was_in | (unknown & sides.in0))) | (sides.in1 & (was_out | (unknown & sides.out0)))));
         sure = (__mmask8)(sure & ~hit);
     }
-    _mm512_mask_i64scatter_epi64(s->side, sure, slot, _mm512_maskz_mov_epi64(sides.in, _mm512_set1_epi64(1)), 8);
+    if (count == 8)
+        isogi_vol__put8(&spots, ISOGI_VOL__ROW_OF(side), _mm512_mask_mov_epi64(side, sure, _mm512_maskz_set1_epi64(sides.in, 1)));
+    else _mm512_mask_i64scatter_epi64(s->side, sure, slot, _mm512_maskz_set1_epi64(sides.in, 1), 8);
     {
         const __m512i three = _mm512_set1_epi64(3);
         const __mmask8 more = _mm512_test_epi64_mask(rest, rest), doubt = (__mmask8)(lanes & ~sure & ~hit);
@@ -4531,13 +4616,16 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE unsigned isogi_vol__look(isogi_vol__turn *tu
         /* which axes it enters and leaves by goes along */
         cell = _mm512_or_si512(cell, _mm512_or_si512(_mm512_slli_epi64(_mm512_and_si512(begin, three), 48),
                                                      _mm512_slli_epi64(_mm512_and_si512(end, three), 50)));
-        _mm512_mask_i64scatter_epi64(s->cell, doubt, slot, cell, 8);
+        if (count == 8) isogi_vol__put8(&spots, ISOGI_VOL__ROW_OF(cell), cell);
+        else _mm512_mask_i64scatter_epi64(s->cell, doubt, slot, cell, 8);
         _mm_storel_epi64((__m128i *)(void *)(turn->at_leaf + *again), _mm_maskz_compress_epi8((__mmask16)(sure & more), list));
         *again += __builtin_popcount((unsigned)(sure & more));
         _mm_storel_epi64((__m128i *)(void *)(turn->in_doubt + turn->doubts), _mm_maskz_compress_epi8((__mmask16)doubt, list));
         turn->doubts += __builtin_popcount(doubt);
         turn->choosing |= (uint64_t)_mm512_mask_reduce_or_epi64((__mmask8)(sure & ~more), bit);
     }
+#undef ISOGI_VOL__TAKE
+#undef ISOGI_VOL__TAKE_REAL
     return hit;
 }
 
@@ -4645,11 +4733,15 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE void isogi_vol__corners8(const isogi_pyramid
         __m512i at = _mm512_add_epi64(_mm512_slli_epi64(x, 2), _mm512_set1_epi64((int64_t)(intptr_t)v->data));
         at = _mm512_add_epi64(at, _mm512_add_epi64(_mm512_mullo_epi64(y, _mm512_set1_epi64(v->stride[1])),
                                                    _mm512_mullo_epi64(z, _mm512_set1_epi64(v->stride[2]))));
+        __attribute__((aligned(64))) uint64_t place[8];
+        const char *from[8];
+        /* lanes without a cell read a voxel pair that there is */
+        _mm512_store_si512(place, _mm512_mask_mov_epi64(_mm512_set1_epi64((int64_t)(intptr_t)v->data), lanes, at));
+#pragma GCC unroll 8
+        for (k = 0; k < 8; k++) from[k] = (const char *)(uintptr_t)place[k];
 #pragma GCC unroll 8
         for (k = 0; k < 4; k++) {
-            const __m512i offset = _mm512_set1_epi64((k & 1 ? v->stride[1] : 0) + (k & 2 ? v->stride[2] : 0));
-            const __m512i pair =
-                _mm512_mask_i64gather_epi64(_mm512_setzero_si512(), lanes, _mm512_add_epi64(at, offset), (const void *)0, 1);
+            const __m512i pair = isogi_vol__load_eight(from, (size_t)((k & 1 ? v->stride[1] : 0) + (k & 2 ? v->stride[2] : 0)));
             c[2 * k] = _mm512_cvtps_pd(_mm256_castsi256_ps(_mm512_cvtepi64_epi32(pair)));
             c[2 * k + 1] = _mm512_cvtps_pd(_mm256_castsi256_ps(_mm512_cvtepi64_epi32(_mm512_srli_epi64(pair, 32))));
         }
@@ -4707,7 +4799,8 @@ ISOGI_VOL__AVX512 static unsigned isogi_vol__decide8(isogi_vol__batch *b, isogi_
     /* can be loaded at once */
     const int row = slots[0] % 8 == 0 && _mm_cvtsi128_si64(list) == (int64_t)(0x0706050403020100u + slots[0] * 0x0101010101010101u);
     const __m512i slot = isogi_vol__slots8(slots);
-#define ISOGI_VOL__TAKE(member) (row ? _mm512_load_si512(&s->member[slots[0]]) : _mm512_i64gather_epi64(slot, s->member, 8))
+    const isogi_vol__spots spots = isogi_vol__spots8(s, slots);
+#define ISOGI_VOL__TAKE(member) (row ? _mm512_load_si512(&s->member[slots[0]]) : isogi_vol__pick8(&spots, ISOGI_VOL__ROW_OF(member)))
 #define ISOGI_VOL__TAKE_REAL(member) _mm512_castsi512_pd(ISOGI_VOL__TAKE(member))
     const __m512i cell = ISOGI_VOL__TAKE(cell), side = ISOGI_VOL__TAKE(side), three = _mm512_set1_epi64(3);
     const __m512i in = _mm512_and_si512(_mm512_srli_epi64(cell, 48), three), out = _mm512_and_si512(_mm512_srli_epi64(cell, 50), three);
@@ -4719,6 +4812,7 @@ ISOGI_VOL__AVX512 static unsigned isogi_vol__decide8(isogi_vol__batch *b, isogi_
     __mmask8 odd = (__mmask8)((starts & ~first) | _mm512_mask_cmpge_epi64_mask(first, ISOGI_VOL__TAKE(entry_axis), _mm512_setzero_si512())),
              low, high, b_low, b_high, inside, same, cross;
     __mmask8 left = 0, slow;
+    const __m512d base = ISOGI_VOL__TAKE_REAL(base);
     __m512d c[8], from[3], to[3], bezier[4], begin = zero, end = stop, root, steepest = zero;
     *alone = 0;
     isogi_vol__corners8(b->pyramid, cell, lanes, ISOGI_VOL__TAKE_REAL(isovalue), c);
@@ -4743,7 +4837,7 @@ ISOGI_VOL__AVX512 static unsigned isogi_vol__decide8(isogi_vol__batch *b, isogi_
         for (a = 0; a < 3; a++) {
             const __mmask8 enters = _mm512_cmpeq_epi64_mask(in, _mm512_set1_epi64(a)),
                            leaves = _mm512_cmpeq_epi64_mask(out, _mm512_set1_epi64(a));
-            const __m512d way = _mm512_abs_pd(ISOGI_VOL__MUL(ISOGI_VOL__TAKE_REAL(base), dir[a]));
+            const __m512d way = _mm512_abs_pd(ISOGI_VOL__MUL(base, dir[a]));
             const __m512d slack =
                 ISOGI_VOL__MUL(_mm512_set1_pd(ISOGI_VOL__ROUNDING), ISOGI_VOL__ADD(way, _mm512_set1_pd(b->pyramid->box[a])));
             from[a] = ISOGI_VOL__SUB(ISOGI_VOL__ADD(origin[a], ISOGI_VOL__MUL(begin, dir[a])), at[a]);
@@ -4823,7 +4917,7 @@ ISOGI_VOL__AVX512 static unsigned isogi_vol__decide8(isogi_vol__batch *b, isogi_
         {
             const __m512d rest = _mm512_sub_pd(one, root);
             _mm512_store_pd(
-                t, ISOGI_VOL__ADD(ISOGI_VOL__TAKE_REAL(base), ISOGI_VOL__ADD(begin, ISOGI_VOL__MUL(root, ISOGI_VOL__SUB(end, begin)))));
+                t, ISOGI_VOL__ADD(base, ISOGI_VOL__ADD(begin, ISOGI_VOL__MUL(root, ISOGI_VOL__SUB(end, begin)))));
             _mm512_store_pd(local[0], isogi_vol__lerp8(from[0], to[0], root, rest));
             _mm512_store_pd(local[1], isogi_vol__lerp8(from[1], to[1], root, rest));
             _mm512_store_pd(local[2], isogi_vol__lerp8(from[2], to[2], root, rest));
@@ -4844,6 +4938,16 @@ ISOGI_VOL__AVX512 static unsigned isogi_vol__decide8(isogi_vol__batch *b, isogi_
     return cross;
 }
 
+/* Sends for rays that come after the next ones, and for where the hits of these will be written. */
+ISOGI_VOL__INLINE void isogi_vol__send_for_rays(const char *from, size_t element, char *hits) {
+    size_t k;
+#pragma GCC unroll 8
+    for (k = 0; k < 8; k++) __builtin_prefetch((const void *)((uintptr_t)from + (16 + k) * element), 0);
+    if (!hits) return;
+#pragma GCC unroll 6
+    for (k = 0; k < 6; k++) __builtin_prefetch((const void *)((uintptr_t)hits + 64 * k), 1);
+}
+
 /* Sets up to eight rays up at once and puts them into slots: the operations of begin and aim, in their order and without contraction.
    Returns the rays that have a slot now; *odd: those that are left to the code for one. The others miss the box. A kernel, longer than a
    screen: nothing in it is worth a name of its own. */
@@ -4853,18 +4957,26 @@ ISOGI_VOL__AVX512 static unsigned isogi_vol__seat8(isogi_vol__batch *b, isogi_vo
     const __mmask8 lanes = (__mmask8)((1u << count) - 1);
     const __m512i lane = _mm512_set_epi64(7, 6, 5, 4, 3, 2, 1, 0), slot = isogi_vol__slots8(slots), none = _mm512_setzero_si512();
     const int whole = slots[0] % 8 == 0 && slots[count - 1] == slots[0] + count - 1; /* a row of slots is stored at once */
+    const isogi_vol__spots spots = isogi_vol__spots8(s, slots);
     const size_t element = b->rays ? sizeof *b->rays : sizeof *b->starts,
                  dir_bytes = b->bundle || !b->rays ? sizeof *b->dirs : sizeof *b->rays;
     const char *from = b->rays ? (const char *)(b->rays + (b->bundle ? 0 : first)) : (const char *)(b->starts + (b->bundle ? 0 : first));
     const char *to = b->bundle || !b->rays ? (const char *)b->dirs[first] : (const char *)b->rays[first].dir;
-    const __m512i at = b->bundle ? none : _mm512_mullo_epi64(lane, _mm512_set1_epi64((int64_t)element)),
-                  dir_at = _mm512_mullo_epi64(lane, _mm512_set1_epi64((int64_t)dir_bytes));
     const __m512d zero = _mm512_setzero_pd(), unlimited = _mm512_set1_pd(ISOGI_VOL__UNLIMITED), finite = _mm512_set1_pd(DBL_MAX);
+    const char *at[8], *dir_at[8];
     __m512d origin[3], d[3], inverse[3], tmin, tmax, isovalue, enter, leave, stop, q;
     __m512i axis = _mm512_set1_epi64(-1), flip = none, inside = axis;
     __mmask8 good = lanes, meets, rising[3], still[3];
-    int a;
-#define ISOGI_VOL__TAKE(member) _mm512_mask_i64gather_pd(zero, lanes, at, from + (member), 1)
+    int a, k;
+/* a bundle has one ray or start */
+#define ISOGI_VOL__TAKE_BITS(member) (b->bundle ? isogi_vol__load_one(from + (member)) : isogi_vol__load_eight(at, member))
+#define ISOGI_VOL__TAKE(member) _mm512_castsi512_pd(ISOGI_VOL__TAKE_BITS(member))
+#pragma GCC unroll 8
+    for (k = 0; k < 8; k++) {
+        const size_t ray = k < count ? (size_t)k : 0;
+        at[k] = from + (b->bundle ? 0 : ray * element), dir_at[k] = to + ray * dir_bytes;
+    }
+    if (!b->bundle) isogi_vol__send_for_rays(from, element, b->hits ? (char *)(b->hits + first) : NULL);
     if (b->rays) {
         __m512d relative[3];
 #pragma GCC unroll 8
@@ -4882,11 +4994,12 @@ ISOGI_VOL__AVX512 static unsigned isogi_vol__seat8(isogi_vol__batch *b, isogi_vo
         for (a = 0; a < 3; a++) good = _mm512_mask_cmp_pd_mask(good, _mm512_abs_pd(origin[a]), finite, _CMP_LE_OQ);
         tmin = ISOGI_VOL__TAKE(offsetof(isogi_ray, tmin)), tmax = ISOGI_VOL__TAKE(offsetof(isogi_ray, tmax)),
         isovalue = ISOGI_VOL__TAKE(offsetof(isogi_ray, isovalue));
-        good = _mm256_mask_testn_epi32_mask(
-            good, _mm512_mask_i64gather_epi32(_mm256_setzero_si256(), lanes, at, from + offsetof(isogi_ray, flags), 1),
-            _mm256_set1_epi32(ISOGI_RAY_CAPPED));
+        good = _mm512_mask_testn_epi64_mask(good, ISOGI_VOL__TAKE_BITS(offsetof(isogi_ray, flags) - 4),
+                                            _mm512_set1_epi64((int64_t)ISOGI_RAY_CAPPED << 32));
     } else {
-        const __m256i side = _mm512_mask_i64gather_epi32(_mm256_setzero_si256(), lanes, at, from + offsetof(isogi_hit, side), 1);
+        const __m512i low_cells = ISOGI_VOL__TAKE_BITS(offsetof(isogi_hit, cell)),
+                      high_cell = ISOGI_VOL__TAKE_BITS(offsetof(isogi_hit, cell) + 8);
+        const __m256i side = _mm512_cvtepi64_epi32(_mm512_srli_epi64(high_cell, 32));
         good = b->flags & ISOGI_RAY_CAPPED ? 0 : _mm256_mask_cmpneq_epi32_mask(good, _mm256_abs_epi32(side), _mm256_set1_epi32(2));
         if (b->flags & ISOGI_RAY_ONWARD)
             inside = _mm512_mask_set1_epi64(_mm512_mask_set1_epi64(inside, _mm256_cmpgt_epi32_mask(side, _mm256_setzero_si256()), 1),
@@ -4894,8 +5007,7 @@ ISOGI_VOL__AVX512 static unsigned isogi_vol__seat8(isogi_vol__batch *b, isogi_vo
         inside = _mm512_sub_epi64(_mm512_add_epi64(inside, inside), _mm512_set1_epi64(4));
 #pragma GCC unroll 8
         for (a = 0; a < 3; a++) {
-            const __m256i cell =
-                _mm512_mask_i64gather_epi32(_mm256_setzero_si256(), lanes, at, from + offsetof(isogi_hit, cell) + 4 * (size_t)a, 1);
+            const __m256i cell = _mm512_cvtepi64_epi32(a == 0 ? low_cells : a == 1 ? _mm512_srli_epi64(low_cells, 32) : high_cell);
             const __m512d local = ISOGI_VOL__TAKE(offsetof(isogi_hit, local) + 8 * (size_t)a);
             good = _mm256_mask_cmplt_epu32_mask(good, cell, _mm256_set1_epi32(p->cells[a]));
             good = _mm512_mask_cmp_pd_mask(good, _mm512_abs_pd(local), finite, _CMP_LE_OQ);
@@ -4903,10 +5015,10 @@ ISOGI_VOL__AVX512 static unsigned isogi_vol__seat8(isogi_vol__batch *b, isogi_vo
         }
         isovalue = _mm512_set1_pd(b->isovalue), tmin = tmax = zero;
         if (b->tmax)
-            tmax =
-                _mm512_mask_i64gather_pd(zero, lanes, b->bundle ? none : _mm512_slli_epi64(lane, 3), b->tmax + (b->bundle ? 0 : first), 1);
+            tmax = b->bundle ? _mm512_set1_pd(*b->tmax) : _mm512_maskz_loadu_pd(lanes, b->tmax + first);
     }
 #undef ISOGI_VOL__TAKE
+#undef ISOGI_VOL__TAKE_BITS
     good = _mm512_mask_cmp_pd_mask(_mm512_mask_cmp_pd_mask(good, tmax, tmax, _CMP_ORD_Q), tmin, tmin, _CMP_ORD_Q);
     tmax = _mm512_min_pd(_mm512_mask_mov_pd(tmax, _mm512_cmp_pd_mask(tmax, zero, _CMP_EQ_OQ), unlimited), unlimited);
     good = _mm512_mask_cmp_pd_mask(good, tmin, tmax, _CMP_LE_OQ);
@@ -4914,10 +5026,12 @@ ISOGI_VOL__AVX512 static unsigned isogi_vol__seat8(isogi_vol__batch *b, isogi_vo
     good = _mm512_mask_cmp_pd_mask(_mm512_mask_cmp_pd_mask(good, isovalue, _mm512_set1_pd(p->range[0]), _CMP_GE_OQ), isovalue,
                                    _mm512_set1_pd(p->range[1]), _CMP_LE_OQ);
     {
+        const __m512i two = isogi_vol__load_eight(dir_at, 0), last = isogi_vol__load_eight(dir_at, 4);
         __m512d world[3], most;
 #pragma GCC unroll 8
         for (a = 0; a < 3; a++) {
-            world[a] = _mm512_cvtps_pd(_mm512_mask_i64gather_ps(_mm256_setzero_ps(), lanes, dir_at, to + 4 * a, 1));
+            world[a] = _mm512_cvtps_pd(_mm256_castsi256_ps(
+                _mm512_cvtepi64_epi32(a == 0 ? two : _mm512_srli_epi64(a == 1 ? two : last, 32))));
             good = _mm512_mask_cmp_pd_mask(good, _mm512_abs_pd(world[a]), finite, _CMP_LE_OQ);
         }
 #pragma GCC unroll 8
@@ -4967,10 +5081,11 @@ ISOGI_VOL__AVX512 static unsigned isogi_vol__seat8(isogi_vol__batch *b, isogi_vo
     good = (__mmask8)(good & (~meets | _mm512_mask_cmp_pd_mask(_mm512_cmp_pd_mask(stop, _mm512_set1_pd(1e-150), _CMP_GT_OQ), stop,
                                                                _mm512_set1_pd(1e150), _CMP_LT_OQ)));
     meets = (__mmask8)(meets & good);
-#define ISOGI_VOL__PUT(member, value)                                            \
-    do {                                                                         \
-        if (whole) _mm512_mask_store_epi64(&s->member[slots[0]], meets, value);   \
-        else _mm512_mask_i64scatter_epi64(s->member, meets, slot, value, 8);      \
+#define ISOGI_VOL__PUT(member, value)                                                           \
+    do {                                                                                        \
+        if (whole) _mm512_mask_store_epi64(&s->member[slots[0]], meets, value);                 \
+        else if (meets == 0xff) isogi_vol__put8(&spots, ISOGI_VOL__ROW_OF(member), value);      \
+        else _mm512_mask_i64scatter_epi64(s->member, meets, slot, value, 8);                    \
     } while (0)
 #define ISOGI_VOL__PUT_REAL(member, value) ISOGI_VOL__PUT(member, _mm512_castpd_si512(value))
 #pragma GCC unroll 8
@@ -5183,8 +5298,7 @@ static uint64_t isogi_vol__cut_order(const isogi_vol__leaf *leaf, int octant, ui
 ISOGI_VOL__AVX512 ISOGI_VOL__INLINE int isogi_vol__walk_cells(isogi_vol__walk *w, isogi_vol__course *c, const isogi_vol__leaf *leaf,
                                                               __m128i list, int count, int64_t corner, isogi_hit *hit) {
     const __m512i child = _mm512_xor_si512(_mm512_cvtepu8_epi64(list), _mm512_set1_epi64(c->flip)), three = _mm512_set1_epi64(3);
-    __m512i code = _mm512_set1_epi64((int64_t)(uintptr_t)leaf->code), cell = isogi_vol__cells8(child, _mm512_set1_epi64(corner), &code),
-            begin = three, end;
+    __m512i offset, cell = isogi_vol__cells8(child, _mm512_set1_epi64(corner), &offset), begin = three, end, corners;
     __m512d origin[3], inverse[3], dir[3];
     __m256 from[3], to[3];
     __attribute__((aligned(64))) int64_t at[8];
@@ -5197,7 +5311,11 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE int isogi_vol__walk_cells(isogi_vol__walk *w
         origin[a] = _mm512_set1_pd(c->origin[a]), inverse[a] = _mm512_set1_pd(c->inverse[a]), dir[a] = _mm512_set1_pd(c->dir[a]);
     end = _mm512_or_si512(_mm512_castpd_si512(_mm512_set1_pd(c->stop)), three);
     isogi_vol__way8(cell, origin, inverse, dir, &begin, &end, from, to);
-    sides = isogi_vol__sides8(code, (__mmask8)lanes, _mm256_set1_ps(leaf->isovalue), from, to);
+    corners = _mm512_add_epi8(_mm512_broadcastq_epi64(_mm512_cvtepi64_epi8(offset)),
+                              _mm512_setr_epi64(0, 0x0101010101010101, 0x0505050505050505, 0x0606060606060606, 0x1919191919191919,
+                                                0x1a1a1a1a1a1a1a1a, 0x1e1e1e1e1e1e1e1e, 0x1f1f1f1f1f1f1f1f));
+    corners = _mm512_permutex2var_epi8(_mm512_load_si512(leaf->code), corners, _mm512_load_si512(leaf->code + 64));
+    sides = isogi_vol__sides8(corners, _mm256_set1_ps(leaf->isovalue), from, to);
     _mm512_store_si512(at, _mm512_or_si512(cell, _mm512_or_si512(_mm512_slli_epi64(_mm512_and_si512(begin, three), 48),
                                                                  _mm512_slli_epi64(_mm512_and_si512(end, three), 50))));
     c->cells += (uint64_t)count;
