@@ -5499,7 +5499,7 @@ static void isogi_dvr__cast_joined(isogi_dvr__pixel_ray *r, isogi_dvr__march *m)
    in another order than there, to a rounding. */
 typedef struct isogi_dvr__eight {
     double origin[3][8], dir[3][8], inverse[3][8], length[8]; /* of marches; inverse: 0 where there is no movement along an axis */
-    double t[8], at[3][8];                                    /* where they are, in `cell` */
+    double at[3][8];                                          /* where they are, in `cell` */
     int32_t cell[3][8];
     double from[8], to[8]; /* as isogi_dvr__run */
     isogi_dvr__layer layer[8];

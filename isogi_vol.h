@@ -7763,6 +7763,8 @@ ISOGI_API void isogi_vol_mesh_free(const isogi_pyramid *pyramid, isogi_mesh *mes
 #undef ISOGI_VOL__NODE_AVX2
 #undef ISOGI_VOL__NODE_BASE
 #undef ISOGI_VOL__POOL
+#undef ISOGI_VOL__ROW_OF
+#undef ISOGI_VOL__SLOPE
 #undef ISOGI_VOL__SUB
 #undef ISOGI_VOL__GROUP
 #undef ISOGI_VOL__BLOCK
