@@ -5786,6 +5786,11 @@ typedef struct isogi_dvr__class_entry {
     float rest[4], mean[4]; /* and what remains, below a quantum; integrals over it */
 } isogi_dvr__class_entry;
 
+typedef struct isogi_dvr__matter_entry {
+    int32_t before;
+    float rest, mean, none;
+} isogi_dvr__matter_entry;
+
 struct isogi_dvr__frame {
     const isogi_dvr *dvr;
     isogi_dvr__class_entry *classes;
@@ -5799,6 +5804,9 @@ struct isogi_dvr__frame {
                            both of one extinction and colour */
     float top;          /* of the last class */
     float quantum[4];   /* of their integrals */
+    isogi_dvr__matter_entry *matter;  /* of the same classes, extinction alone */
+    float cells[3], value_scale, value_bias; /* of voxels' values, which count from low */
+    int32_t last_cell[3], stride[3];  /* bytes */
     double step;        /* voxels between samples */
     float end, dim;     /* transmittance at which a ray ends; at which its samples stand twice as far apart */
     void (*leap)(const isogi_dvr *d, isogi_dvr__packet *p, isogi_counters *work);
@@ -5808,7 +5816,7 @@ struct isogi_dvr__frame {
     void (*shade)(const isogi_dvr__frame *f, const isogi_dvr__fast_ray *r, isogi_dvr__fast_state *s, const isogi_dvr__fast_run *run,
                   isogi_counters *work);
     int sample_kind;    /* of isogi_dvr__sample_kind */
-    uint32_t last_word;
+    uint32_t last_word; /* of the same */
 };
 
 /* Whether any peak lies within the range of values. */
@@ -5854,6 +5862,10 @@ static void isogi_dvr__sum_classes(isogi_dvr__frame *f) {
             f->classes[i].before[a] = (int32_t)isogi_dvr__clamp(quanta, 2e9);
             f->classes[i].rest[a] = (float)(sum - f->classes[i].before[a] * (double)f->quantum[a]);
         }
+    }
+    for (i = 0; i < f->count; i++) {
+        const isogi_dvr__class_entry *e = &f->classes[i];
+        f->matter[i].before = e->before[3], f->matter[i].rest = e->rest[3], f->matter[i].mean = e->mean[3], f->matter[i].none = 0;
     }
 }
 
@@ -6140,47 +6152,90 @@ static void isogi_dvr__fast_probe(const isogi_dvr__frame *f, const isogi_dvr__fa
 
 #ifdef ISOGI_DVR__AVX
 #define ISOGI_DVR__AVX2 __attribute__((target("avx2,fma"))) static
+#define ISOGI_DVR__ALWAYS __attribute__((always_inline)) inline
+/* Words at any address. */
+typedef uint16_t isogi_dvr__two_bytes __attribute__((aligned(1), may_alias));
+typedef int32_t isogi_dvr__four_bytes __attribute__((aligned(1), may_alias));
+
+/* Eight numbers of 32 bits, none of them negative. */
+ISOGI_DVR__AVX2 inline void isogi_dvr__numbers_avx2(__m256i x, size_t out[8]) {
+    const __m128i low = _mm256_castsi256_si128(x), high = _mm256_extracti128_si256(x, 1);
+    const uint64_t a = (uint64_t)_mm_cvtsi128_si64(low), b = (uint64_t)_mm_extract_epi64(low, 1);
+    const uint64_t c = (uint64_t)_mm_cvtsi128_si64(high), d = (uint64_t)_mm_extract_epi64(high, 1);
+    out[0] = (uint32_t)a, out[1] = a >> 32, out[2] = (uint32_t)b, out[3] = b >> 32;
+    out[4] = (uint32_t)c, out[5] = c >> 32, out[6] = (uint32_t)d, out[7] = d >> 32;
+}
+
+/* The field along x between pairs of voxels of eight samples, by plain loads: gathers take longer, on some machines several times. */
+ISOGI_DVR__AVX2 inline __m256 isogi_dvr__row_f32_avx2(const char *row, const size_t at[8], __m256 u) {
+#define ISOGI_DVR__PAIR(k, l) /* two floats each of samples k and l */ \
+    _mm_loadh_pi(_mm_castsi128_ps(_mm_loadl_epi64((const __m128i *)(const void *)(row + at[k]))),          \
+                 (const __m64 *)(const void *)(row + at[l]))
+    const __m256 low = _mm256_insertf128_ps(_mm256_castps128_ps256(ISOGI_DVR__PAIR(0, 1)), ISOGI_DVR__PAIR(4, 5), 1),
+                 high = _mm256_insertf128_ps(_mm256_castps128_ps256(ISOGI_DVR__PAIR(2, 3)), ISOGI_DVR__PAIR(6, 7), 1),
+                 from = _mm256_shuffle_ps(low, high, 0x88), to = _mm256_shuffle_ps(low, high, 0xdd);
+#undef ISOGI_DVR__PAIR
+    return _mm256_fmadd_ps(u, _mm256_sub_ps(to, from), from);
+}
+
+ISOGI_DVR__AVX2 inline __m256 isogi_dvr__row_u8_avx2(const char *row, const size_t at[8], __m256 u) {
+#define ISOGI_DVR__PAIR(k) (*(const isogi_dvr__two_bytes *)(const void *)(row + at[k]))
+    __m128i low = _mm_cvtsi32_si128(ISOGI_DVR__PAIR(0)), high = _mm_cvtsi32_si128(ISOGI_DVR__PAIR(4));
+    __m256 from, to;
+    low = _mm_insert_epi16(low, ISOGI_DVR__PAIR(1), 1), high = _mm_insert_epi16(high, ISOGI_DVR__PAIR(5), 1);
+    low = _mm_insert_epi16(low, ISOGI_DVR__PAIR(2), 2), high = _mm_insert_epi16(high, ISOGI_DVR__PAIR(6), 2);
+    low = _mm_insert_epi16(low, ISOGI_DVR__PAIR(3), 3), high = _mm_insert_epi16(high, ISOGI_DVR__PAIR(7), 3);
+#undef ISOGI_DVR__PAIR
+    low = _mm_unpacklo_epi64(low, high);
+    from = _mm256_cvtepi32_ps(_mm256_cvtepu16_epi32(_mm_and_si128(low, _mm_set1_epi16(0xff))));
+    to = _mm256_cvtepi32_ps(_mm256_cvtepu16_epi32(_mm_srli_epi16(low, 8)));
+    return _mm256_fmadd_ps(u, _mm256_sub_ps(to, from), from);
+}
+
+ISOGI_DVR__AVX2 inline __m256 isogi_dvr__row_u16_avx2(const char *row, const size_t at[8], __m256 u) {
+#define ISOGI_DVR__PAIR(k) (*(const isogi_dvr__four_bytes *)(const void *)(row + at[k]))
+    __m128i low = _mm_cvtsi32_si128(ISOGI_DVR__PAIR(0)), high = _mm_cvtsi32_si128(ISOGI_DVR__PAIR(4));
+    __m256i pair;
+    __m256 from, to;
+    low = _mm_insert_epi32(low, ISOGI_DVR__PAIR(1), 1), high = _mm_insert_epi32(high, ISOGI_DVR__PAIR(5), 1);
+    low = _mm_insert_epi32(low, ISOGI_DVR__PAIR(2), 2), high = _mm_insert_epi32(high, ISOGI_DVR__PAIR(6), 2);
+    low = _mm_insert_epi32(low, ISOGI_DVR__PAIR(3), 3), high = _mm_insert_epi32(high, ISOGI_DVR__PAIR(7), 3);
+#undef ISOGI_DVR__PAIR
+    pair = _mm256_inserti128_si256(_mm256_castsi128_si256(low), high, 1);
+    from = _mm256_cvtepi32_ps(_mm256_and_si256(pair, _mm256_set1_epi32(0xffff))), to = _mm256_cvtepi32_ps(_mm256_srli_epi32(pair, 16));
+    return _mm256_fmadd_ps(u, _mm256_sub_ps(to, from), from);
+}
+
+/* Cells of samples along an axis, and places in them. */
+ISOGI_DVR__AVX2 inline __m256i isogi_dvr__cells_avx2(const isogi_dvr__frame *f, const isogi_dvr__fast_ray *r, __m256 at, int a, __m256 *u) {
+    __m256 x = _mm256_fmadd_ps(at, _mm256_set1_ps(r->dir[a]), _mm256_set1_ps(r->origin[a]));
+    __m256i c;
+    x = _mm256_min_ps(_mm256_max_ps(x, _mm256_setzero_ps()), _mm256_set1_ps(f->cells[a]));
+    c = _mm256_min_epi32(_mm256_cvttps_epi32(x), _mm256_set1_epi32(f->last_cell[a]));
+    *u = _mm256_sub_ps(x, _mm256_cvtepi32_ps(c));
+    return _mm256_mullo_epi32(c, _mm256_set1_epi32(f->stride[a]));
+}
+
 /* Values of a run's samples, not yet scaled. */
-ISOGI_DVR__AVX2 inline __m256 isogi_dvr__samples_avx2(const isogi_dvr__frame *f, const isogi_dvr__fast_ray *r,
-                                                      const isogi_dvr__fast_run *run) {
-    const isogi_volume *v = &f->dvr->volume;
+ISOGI_DVR__AVX2 ISOGI_DVR__ALWAYS __m256 isogi_dvr__samples_avx2(const isogi_dvr__frame *f, const isogi_dvr__fast_ray *r,
+                                                      const isogi_dvr__fast_run *run, int kind) {
     const __m256 lane = _mm256_fmadd_ps(_mm256_set1_ps(run->stride), _mm256_setr_ps(0, 1, 2, 3, 4, 5, 6, 7), _mm256_set1_ps(run->first));
-    __m256i offset = _mm256_setzero_si256();
-    __m256 u[3], corner[4], value;
-    const char *data = (const char *)v->data;
-    int a, k;
-    for (a = 0; a < 3; a++) {
-        __m256 x = _mm256_fmadd_ps(lane, _mm256_set1_ps(r->dir[a]), _mm256_set1_ps(r->origin[a]));
-        __m256i c;
-        x = _mm256_min_ps(_mm256_max_ps(x, _mm256_setzero_ps()), _mm256_set1_ps((float)f->dvr->cells[a]));
-        c = _mm256_min_epi32(_mm256_cvttps_epi32(x), _mm256_set1_epi32(f->dvr->cells[a] - 1));
-        u[a] = _mm256_sub_ps(x, _mm256_cvtepi32_ps(c));
-        offset = _mm256_add_epi32(offset, _mm256_mullo_epi32(c, _mm256_set1_epi32((int)v->stride[a])));
-    }
-    for (k = 0; k < 4; k++) {
-        __m256i at = _mm256_add_epi32(offset, _mm256_set1_epi32((int)((k & 1 ? v->stride[1] : 0) + (k & 2 ? v->stride[2] : 0))));
-        __m256 x0, x1;
-        if (f->sample_kind == 0) { /* two floats in one word of eight bytes */
-            /* or g++ misses what is undefined */
-            __m256d zero = _mm256_setzero_pd(), all = _mm256_castsi256_pd(_mm256_set1_epi64x(-1)), low, high;
-            at = _mm256_permute4x64_epi64(at, 0xd8); /* so that the halves come together again in order */
-            low = _mm256_mask_i32gather_pd(zero, (const double *)(const void *)data, _mm256_castsi256_si128(at), all, 1);
-            high = _mm256_mask_i32gather_pd(zero, (const double *)(const void *)data, _mm256_extracti128_si256(at, 1), all, 1);
-            x0 = _mm256_shuffle_ps(_mm256_castpd_ps(low), _mm256_castpd_ps(high), 0x88);
-            x1 = _mm256_shuffle_ps(_mm256_castpd_ps(low), _mm256_castpd_ps(high), 0xdd);
-        } else { /* two voxels in one word, which must not reach beyond the data */
-            __m256i word = _mm256_min_epi32(at, _mm256_set1_epi32((int)f->last_word)),
-                    shift = _mm256_slli_epi32(_mm256_sub_epi32(at, word), 3), mask;
-            word = _mm256_srlv_epi32(_mm256_i32gather_epi32((const int *)(const void *)data, word, 1), shift);
-            mask = _mm256_set1_epi32(f->sample_kind == 1 ? 0xff : 0xffff);
-            x0 = _mm256_cvtepi32_ps(_mm256_and_si256(word, mask));
-            x1 = _mm256_cvtepi32_ps(_mm256_and_si256(_mm256_srli_epi32(word, f->sample_kind == 1 ? 8 : 16), mask));
-        }
-        corner[k] = _mm256_fmadd_ps(u[0], _mm256_sub_ps(x1, x0), x0);
-    }
-    value = _mm256_fmadd_ps(u[1], _mm256_sub_ps(corner[1], corner[0]), corner[0]);
-    corner[2] = _mm256_fmadd_ps(u[1], _mm256_sub_ps(corner[3], corner[2]), corner[2]);
-    return _mm256_fmadd_ps(u[2], _mm256_sub_ps(corner[2], value), value);
+    const char *data = (const char *)f->dvr->volume.data, *next = data + f->stride[1], *behind = data + f->stride[2],
+               *last = behind + f->stride[1];
+    __m256 u, v, w, x0, x1, x2, x3;
+    __m256i offset = isogi_dvr__cells_avx2(f, r, lane, 0, &u);
+    size_t at[8];
+    offset = _mm256_add_epi32(offset, isogi_dvr__cells_avx2(f, r, lane, 1, &v));
+    offset = _mm256_add_epi32(offset, isogi_dvr__cells_avx2(f, r, lane, 2, &w));
+    isogi_dvr__numbers_avx2(offset, at);
+    if (kind == 0) x0 = isogi_dvr__row_f32_avx2(data, at, u), x1 = isogi_dvr__row_f32_avx2(next, at, u);
+    else if (kind == 1) x0 = isogi_dvr__row_u8_avx2(data, at, u), x1 = isogi_dvr__row_u8_avx2(next, at, u);
+    else x0 = isogi_dvr__row_u16_avx2(data, at, u), x1 = isogi_dvr__row_u16_avx2(next, at, u);
+    if (kind == 0) x2 = isogi_dvr__row_f32_avx2(behind, at, u), x3 = isogi_dvr__row_f32_avx2(last, at, u);
+    else if (kind == 1) x2 = isogi_dvr__row_u8_avx2(behind, at, u), x3 = isogi_dvr__row_u8_avx2(last, at, u);
+    else x2 = isogi_dvr__row_u16_avx2(behind, at, u), x3 = isogi_dvr__row_u16_avx2(last, at, u);
+    x0 = _mm256_fmadd_ps(v, _mm256_sub_ps(x1, x0), x0), x2 = _mm256_fmadd_ps(v, _mm256_sub_ps(x3, x2), x2);
+    return _mm256_fmadd_ps(w, _mm256_sub_ps(x2, x0), x0);
 }
 
 /* Lane k + 1 at lane k. */
@@ -6201,19 +6256,35 @@ ISOGI_DVR__AVX2 inline __m256 isogi_dvr__close_avx2(__m256 difference, __m256i i
     return _mm256_or_ps(close, _mm256_castsi256_ps(_mm256_cmpeq_epi32(index, next)));
 }
 
+/* The extinction of eight classes: integrals before them, so many quanta and the rest, and over them. */
+ISOGI_DVR__AVX2 inline void isogi_dvr__matter_avx2(const isogi_dvr__frame *f, __m256i index, __m256i *before, __m256 *rest, __m256 *mean) {
+#define ISOGI_DVR__TWO(k) /* classes k and k + 4 */ \
+    _mm256_insertf128_ps(_mm256_castps128_ps256(_mm_load_ps((const float *)(const void *)(from + at[k]))), \
+                         _mm_load_ps((const float *)(const void *)(from + at[(k) + 4])), 1)
+    const char *from = (const char *)f->matter;
+    __m256 x0, x1, x2, x3, low0, low1, high0, high1;
+    size_t at[8];
+    isogi_dvr__numbers_avx2(_mm256_slli_epi32(index, 4), at);
+    x0 = ISOGI_DVR__TWO(0), x1 = ISOGI_DVR__TWO(1), x2 = ISOGI_DVR__TWO(2), x3 = ISOGI_DVR__TWO(3);
+    low0 = _mm256_unpacklo_ps(x0, x1), low1 = _mm256_unpacklo_ps(x2, x3);
+    high0 = _mm256_unpackhi_ps(x0, x1), high1 = _mm256_unpackhi_ps(x2, x3);
+    *before = _mm256_castps_si256(_mm256_shuffle_ps(low0, low1, 0x44));
+    *rest = _mm256_shuffle_ps(low0, low1, 0xee), *mean = _mm256_shuffle_ps(high0, high1, 0x44);
+#undef ISOGI_DVR__TWO
+}
+
 /* As isogi_dvr__fast_look. */
-ISOGI_DVR__AVX2 void isogi_dvr__fast_look_avx2(const isogi_dvr__frame *f, const isogi_dvr__fast_ray *r, isogi_dvr__fast_run *run) {
+ISOGI_DVR__AVX2 ISOGI_DVR__ALWAYS void isogi_dvr__look_avx2(const isogi_dvr__frame *f, const isogi_dvr__fast_ray *r,
+                                                            isogi_dvr__fast_run *run, int kind) {
     const __m256 zero = _mm256_setzero_ps();
     const __m256i lane = _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7), infinite = _mm256_set1_epi32(0x7f800000);
-    __m256 value = isogi_dvr__samples_avx2(f, r, run), rest, node, sum, change, difference, mean, length, in, close;
-    __m256i index, entry, before, bad = _mm256_cmpeq_epi32(_mm256_and_si256(_mm256_castps_si256(value), infinite), infinite);
-    value = _mm256_fmadd_ps(value, _mm256_set1_ps((float)f->dvr->volume.scale), _mm256_set1_ps((float)f->dvr->volume.bias - f->low));
+    __m256 value = isogi_dvr__samples_avx2(f, r, run, kind), rest, node, sum, change, difference, mean, length, in, close;
+    __m256i index, before, bad = _mm256_cmpeq_epi32(_mm256_and_si256(_mm256_castps_si256(value), infinite), infinite);
+    value = _mm256_fmadd_ps(value, _mm256_set1_ps(f->value_scale), _mm256_set1_ps(f->value_bias));
     value = _mm256_min_ps(_mm256_max_ps(_mm256_mul_ps(value, _mm256_set1_ps(f->scale)), _mm256_set1_ps(-1e15f)), _mm256_set1_ps(1e15f));
     value = _mm256_andnot_ps(_mm256_castsi256_ps(bad), value);
     index = isogi_dvr__fast_classes_avx2(f, value);
-    entry = _mm256_slli_epi32(_mm256_add_epi32(index, _mm256_add_epi32(index, index)), 4); /* bytes */
-    before = _mm256_i32gather_epi32((const int *)(const void *)&f->classes[0].before[3], entry, 1);
-    rest = _mm256_i32gather_ps(&f->classes[0].rest[3], entry, 1), node = _mm256_i32gather_ps(&f->classes[0].mean[3], entry, 1);
+    isogi_dvr__matter_avx2(f, index, &before, &rest, &node);
     before = _mm256_sub_epi32(_mm256_castps_si256(isogi_dvr__next_avx2(_mm256_castsi256_ps(before))), before);
     sum = _mm256_mul_ps(_mm256_sub_ps(value, _mm256_cvtepi32_ps(index)), node);
     difference = _mm256_sub_ps(isogi_dvr__next_avx2(value), value), change = isogi_dvr__next_avx2(node);
@@ -6230,6 +6301,16 @@ ISOGI_DVR__AVX2 void isogi_dvr__fast_look_avx2(const isogi_dvr__frame *f, const 
     _mm256_storeu_ps(run->classes, value), _mm256_storeu_ps(run->mean, mean);
     _mm256_storeu_ps(run->depth, _mm256_min_ps(_mm256_mul_ps(mean, length), _mm256_set1_ps(1e30f)));
     _mm256_storeu_ps(run->change, _mm256_mul_ps(isogi_dvr__magnitude_avx2(_mm256_sub_ps(change, node)), length));
+}
+
+ISOGI_DVR__AVX2 void isogi_dvr__look_f32_avx2(const isogi_dvr__frame *f, const isogi_dvr__fast_ray *r, isogi_dvr__fast_run *run) {
+    isogi_dvr__look_avx2(f, r, run, 0);
+}
+ISOGI_DVR__AVX2 void isogi_dvr__look_u8_avx2(const isogi_dvr__frame *f, const isogi_dvr__fast_ray *r, isogi_dvr__fast_run *run) {
+    isogi_dvr__look_avx2(f, r, run, 1);
+}
+ISOGI_DVR__AVX2 void isogi_dvr__look_u16_avx2(const isogi_dvr__frame *f, const isogi_dvr__fast_ray *r, isogi_dvr__fast_run *run) {
+    isogi_dvr__look_avx2(f, r, run, 2);
 }
 
 /* As isogi_dvr__exp. */
@@ -6380,6 +6461,7 @@ ISOGI_DVR__AVX2 void isogi_dvr__fast_shade_avx2(const isogi_dvr__frame *f, const
     _mm_storeu_ps(s->out, out);
 }
 #undef ISOGI_DVR__AVX2
+#undef ISOGI_DVR__ALWAYS
 #endif
 
 /* Front to back: all rays of a packet go to where the next matter may be, then each passes some of it. */
@@ -6675,6 +6757,10 @@ static int isogi_dvr__sample_kind(const isogi_volume *v, const int cells[3], uin
 
 /* Tables of a picture on the path of physical space; nothing where another path is asked for. */
 static isogi_result isogi_dvr__begin_frame(isogi_dvr__render_job *job) {
+#ifdef ISOGI_DVR__AVX
+    static void (*const looks[3])(const isogi_dvr__frame *, const isogi_dvr__fast_ray *, isogi_dvr__fast_run *) = {
+        isogi_dvr__look_f32_avx2, isogi_dvr__look_u8_avx2, isogi_dvr__look_u16_avx2};
+#endif
     const isogi_dvr *d = job->dvr;
     const isogi_volume *v = &d->volume;
     isogi_dvr__frame *f = &job->fast.frame;
@@ -6699,12 +6785,16 @@ static isogi_result isogi_dvr__begin_frame(isogi_dvr__render_job *job) {
 #ifdef ISOGI_DVR__AVX
     if (f->sample_kind >= 0 && isogi_dvr__machine() >= 3 && (!d->context.force_path || d->context.force_path > 2) &&
         points < 0x7fffffff && d->held.total < 0x0fffffff)
-        f->look = isogi_dvr__fast_look_avx2, f->shade = isogi_dvr__fast_shade_avx2;
+        f->look = looks[f->sample_kind], f->shade = isogi_dvr__fast_shade_avx2;
 #endif
     f->count = isogi_dvr__count_classes(d, &low, &scale);
     f->classes = (isogi_dvr__class_entry *)isogi_allocate(&d->context, f->count, sizeof *f->classes);
-    if (!f->classes) return ISOGI_NO_MEMORY;
+    f->matter = (isogi_dvr__matter_entry *)isogi_allocate(&d->context, f->count, sizeof *f->matter);
+    if (!f->classes || !f->matter) return ISOGI_NO_MEMORY;
     isogi_dvr__frame_classes(f, low, scale);
+    f->value_scale = (float)v->scale, f->value_bias = (float)v->bias - f->low;
+    for (a = 0; a < 3; a++) f->cells[a] = (float)d->cells[a], f->last_cell[a] = d->cells[a] - 1;
+    for (a = 0; f->sample_kind >= 0 && a < 3; a++) f->stride[a] = (int32_t)v->stride[a];
     if (d->desc.shading == ISOGI_DVR_UNLIT) {
         f->glow = 0;
         return ISOGI_OK;
@@ -6755,6 +6845,7 @@ ISOGI_API isogi_result isogi_dvr_render(const isogi_dvr *dvr, const isogi_view *
         isogi_dvr__add(counters, &job.work[i]);
     }
     isogi_release(&dvr->context, job.fast.frame.classes, job.fast.frame.count, sizeof *job.fast.frame.classes);
+    isogi_release(&dvr->context, job.fast.frame.matter, job.fast.frame.count, sizeof *job.fast.frame.matter);
     isogi_release(&dvr->context, job.fast.frame.light, isogi_dvr__held_points(dvr) + 1, sizeof *job.fast.frame.light);
     isogi_release(&dvr->context, job.pixels, pixels, 5 * sizeof *job.pixels);
     isogi_release(&dvr->context, job.work, job.tiles, sizeof *job.work);
