@@ -2043,13 +2043,12 @@ static void isogi_dvr__local(const isogi_dvr__local_rays *a, float *clear) {
             isogi_dvr__ints free, move, c0, c1, c2;                                                                                 \
             int32_t number[ISOGI_DVR__LANES];                                                                                       \
             uint64_t any[ISOGI_DVR__LANES / 2];                                                                                     \
-            int k;                                                                                                                  \
             memcpy(any, &active, sizeof any);                                                                                       \
             if (!((any[0] | any[1] | any[2] | any[3]) | (any[4] | any[5] | any[6] | any[7]))) break;                                \
             ISOGI_DVR__BLOCK(0, c0) ISOGI_DVR__BLOCK(1, c1) ISOGI_DVR__BLOCK(2, c2)                                                 \
             ISOGI_DVR__VI(number) = c0 + row * c1 + plane * c2;                                                                     \
-            for (k = 0; k < ISOGI_DVR__LANES; k++) number[k] = d->leap[number[k]];                                                  \
-            free = ISOGI_DVR__CI(number), move = active & (free > 0);                                                               \
+            free = (isogi_dvr__ints)isogi_dvr__bytes(d->leap, number);                                                              \
+            move = active & (free > 0);                                                                                             \
             ISOGI_DVR__EXIT(0, c0, inverse0, up0) ISOGI_DVR__EXIT(1, c1, inverse1, up1) ISOGI_DVR__EXIT(2, c2, inverse2, up2)       \
             exit = (isogi_dvr__floats)((isogi_dvr__ints)exit & (exit > 0.0f)), to = __builtin_convertvector(exit, isogi_dvr__ints); \
             to = ((to & (to > i)) | (i & ~(to > i))) + 1;                                                           \
@@ -2065,6 +2064,19 @@ ISOGI_DVR__KERNELS(_base, )
 #ifdef ISOGI_DVR__AVX
 ISOGI_DVR__KERNELS(_avx2, __attribute__((target("avx2,fma"))))
 ISOGI_DVR__KERNELS(_avx512, __attribute__((target("avx512f,avx512vl,avx512dq,avx512bw,fma"))))
+/* Sixteen bytes, put together in registers: what is stored in parts is slow to load as a whole. */
+__attribute__((target("avx512f,avx512vl,avx512dq,avx512bw,fma"))) static inline __m512i isogi_dvr__bytes(const uint8_t *p,
+                                                                                                        const int32_t at[16]) {
+    __m128i low = _mm_cvtsi32_si128(p[at[0]]), high = _mm_cvtsi32_si128(p[at[8]]);
+    low = _mm_insert_epi8(low, p[at[1]], 1), high = _mm_insert_epi8(high, p[at[9]], 1);
+    low = _mm_insert_epi8(low, p[at[2]], 2), high = _mm_insert_epi8(high, p[at[10]], 2);
+    low = _mm_insert_epi8(low, p[at[3]], 3), high = _mm_insert_epi8(high, p[at[11]], 3);
+    low = _mm_insert_epi8(low, p[at[4]], 4), high = _mm_insert_epi8(high, p[at[12]], 4);
+    low = _mm_insert_epi8(low, p[at[5]], 5), high = _mm_insert_epi8(high, p[at[13]], 5);
+    low = _mm_insert_epi8(low, p[at[6]], 6), high = _mm_insert_epi8(high, p[at[14]], 6);
+    low = _mm_insert_epi8(low, p[at[7]], 7), high = _mm_insert_epi8(high, p[at[15]], 7);
+    return _mm512_cvtepu8_epi32(_mm_unpacklo_epi64(low, high));
+}
 ISOGI_DVR__LEAP_KERNEL(_avx512, __attribute__((target("avx512f,avx512vl,avx512dq,avx512bw,fma"))))
 #endif
 #undef ISOGI_DVR__KERNELS
@@ -2761,10 +2773,25 @@ typedef struct isogi_dvr__sample {
     int cell[3], side; /* side: +1 where the value rises along the ray */
 } isogi_dvr__sample;
 
+/* Cuts a part of a ray by the clip planes; 0 if nothing remains. */
+static int isogi_dvr__clipped(const isogi_dvr *d, const double origin[3], const double dir[3], double span[2]) {
+    size_t k;
+    for (k = 0; k < d->clip_count; k++) {
+        double rate = isogi_dvr__dot(d->clip[k], dir), at = isogi_dvr__dot(d->clip[k], origin) + d->clip[k][3];
+        if (!(fabs(rate) > 1e-300)) {
+            if (at < 0) return 0;
+            continue;
+        }
+        at = -at / rate;
+        if (rate > 0 && at > span[0]) span[0] = at;
+        if (rate < 0 && at < span[1]) span[1] = at;
+    }
+    return span[0] < span[1] && span[1] < 1e300;
+}
+
 /* The part of a ray within the box and the clip planes, in t; 0 if there is none. */
 static int isogi_dvr__inside(const isogi_dvr *d, const double origin[3], const double dir[3], double span[2]) {
     double enter = 0, leave = 1e300;
-    size_t k;
     int a;
     for (a = 0; a < 3; a++) {
         double size = d->cells[a], t0, t1, swap;
@@ -2778,18 +2805,8 @@ static int isogi_dvr__inside(const isogi_dvr *d, const double origin[3], const d
         if (t0 > enter) enter = t0;
         if (t1 < leave) leave = t1;
     }
-    for (k = 0; k < d->clip_count; k++) {
-        double rate = isogi_dvr__dot(d->clip[k], dir), at = isogi_dvr__dot(d->clip[k], origin) + d->clip[k][3];
-        if (!(fabs(rate) > 1e-300)) {
-            if (at < 0) return 0;
-            continue;
-        }
-        at = -at / rate;
-        if (rate > 0 && at > enter) enter = at;
-        if (rate < 0 && at < leave) leave = at;
-    }
     span[0] = enter, span[1] = leave;
-    return enter < leave && leave < 1e300;
+    return isogi_dvr__clipped(d, origin, dir, span);
 }
 
 /* 0 if the ray misses the box. `origin` and `dir` in grid space, `world` = length of dir in the world, `step` in voxels. */
@@ -5808,6 +5825,8 @@ struct isogi_dvr__frame {
     float cells[3], value_scale, value_bias; /* of voxels' values, which count from low */
     int32_t last_cell[3], stride[3];  /* bytes */
     double step;        /* voxels between samples */
+    double per_piece, per_unit; /* pieces, and units of extinction, to a world length */
+    float piece;        /* as isogi_dvr__fast_ray.piece */
     float end, dim;     /* transmittance at which a ray ends; at which its samples stand twice as far apart */
     void (*leap)(const isogi_dvr *d, isogi_dvr__packet *p, isogi_counters *work);
     float tolerance;    /* change of extinction times length, and of what is seen of it, from which on a piece is divided */
@@ -6472,13 +6491,15 @@ static void isogi_dvr__fast_cast(const isogi_dvr__frame *f, const isogi_dvr__fas
     int k, a, any = 1;
     for (k = 0; k < ISOGI_DVR__LANES; k++) {
         for (a = 0; a < 3; a++) {
-            p.origin[a][k] = r[k].origin[a], p.dir[a][k] = r[k].dir[a];
-            p.inverse[a][k] = fabsf(r[k].dir[a]) > 1e-20f ? 1 / r[k].dir[a] : r[k].dir[a] > 0 ? 1e20f : -1e20f;
+            float x = r[k].dir[a];
+            p.origin[a][k] = r[k].origin[a], p.dir[a][k] = x, p.inverse[a][k] = fabsf(x) > 1e-20f ? x : x > 0 ? 1e-20f : -1e-20f;
         }
         p.next[k] = 0, p.count[k] = r[k].count;
         memset(&s[k], 0, sizeof s[k]);
         s[k].clear = 1, run[k].tolerance = f->tolerance;
     }
+    for (a = 0; a < 3; a++)
+        for (k = 0; k < ISOGI_DVR__LANES; k++) p.inverse[a][k] = 1 / p.inverse[a][k];
     while (any) {
         f->leap(f->dvr, &p, work);
         for (k = 0, any = 0; k < ISOGI_DVR__LANES; k++) { /* waiting for memory together */
@@ -6499,23 +6520,32 @@ static void isogi_dvr__fast_cast(const isogi_dvr__frame *f, const isogi_dvr__fas
     }
 }
 
-/* 0 if the ray misses what is kept of the volume. */
-static int isogi_dvr__fast_begin(const isogi_dvr__frame *f, const double origin[3], const double world[3], isogi_dvr__fast_ray *r) {
+/* Of a ray from the eye (grid) along `dir` (grid, of world length 1); 0 if it misses what is kept of the volume. */
+static int isogi_dvr__fast_begin(const isogi_dvr__frame *f, const double origin[3], const double dir[3], isogi_dvr__fast_ray *r) {
     const isogi_dvr *d = f->dvr;
-    double dir[3], span[2], piece = f->step * d->spacing, pieces;
+    double span[2] = {0, 1e300}, piece = f->step * d->spacing, pieces, step, sum = 0;
     int a;
-    isogi_dvr__transform(d->to_grid, world, dir);
-    if (d->transparent || !isogi_dvr__inside(d, origin, dir, span)) return 0;
-    pieces = ceil((span[1] - span[0]) / piece - 1e-6);
+    for (a = 0; a < 3; a++) {
+        double inverse = 1 / dir[a], t0 = -origin[a] * inverse, t1 = (d->cells[a] - origin[a]) * inverse;
+        if (!(fabs(dir[a]) > 1e-300)) {
+            if (!(origin[a] >= 0 && origin[a] <= d->cells[a])) return 0;
+            continue;
+        }
+        if (t0 > t1) inverse = t0, t0 = t1, t1 = inverse;
+        if (t0 > span[0]) span[0] = t0;
+        if (t1 < span[1]) span[1] = t1;
+    }
+    if (!(span[0] < span[1]) || !isogi_dvr__clipped(d, origin, dir, span)) return 0;
+    pieces = ceil((span[1] - span[0]) * f->per_piece - 1e-6);
     if (!(pieces < 1e7)) return 0;
     r->count = (int)pieces + 1;
-    for (a = 0; a < 3; a++)
-        r->origin[a] = (float)isogi_dvr__clamp(origin[a] + span[0] * dir[a], d->cells[a]), r->dir[a] = (float)(dir[a] * piece);
-    for (a = 0; a < 3; a++) dir[a] *= piece;
-    r->enter = span[0], r->sought = 3e38f, r->reach = (float)isogi_dvr__clamp(isogi_dvr__reach_along(d, dir), 1e9);
-    /* no infinity: that times no extinction would be no number */
-    r->piece = (float)isogi_dvr__clamp(piece / d->desc.unit, 1e30);
-    r->last_piece = (float)isogi_dvr__clamp((span[1] - span[0] - (pieces - 1) * piece) / d->desc.unit, 1e30);
+    for (a = 0; a < 3; a++) {
+        r->origin[a] = (float)isogi_dvr__clamp(origin[a] + span[0] * dir[a], d->cells[a]);
+        step = dir[a] * piece, r->dir[a] = (float)step, step *= (double)d->grid_scale[a], sum += step * step;
+    }
+    r->enter = span[0], r->sought = 3e38f, r->reach = sum > 1e-30 ? 1.5f / sqrtf((float)sum) : 0;
+    r->piece = f->piece;
+    r->last_piece = (float)isogi_dvr__clamp((span[1] - span[0] - (pieces - 1) * piece) * f->per_unit, 1e30);
     return 1;
 }
 
@@ -6554,10 +6584,16 @@ static void isogi_dvr__set_camera(isogi_dvr__camera *c, const isogi_view *view) 
     c->half = tan(fov * (ISOGI_DVR__PI / 360));
 }
 
+/* Across and down from the middle of the picture, in units of forward. */
+static void isogi_dvr__camera_place(const isogi_dvr__camera *c, const isogi_view *view, double x, double y, double out[2]) {
+    out[0] = (2 * (x + 0.5) - view->width) / view->height * c->half, out[1] = (2 * (y + 0.5) / view->height - 1) * c->half;
+}
+
 static void isogi_dvr__camera_ray(const isogi_dvr__camera *c, const isogi_view *view, double x, double y, double d[3]) {
-    double across = (2 * (x + 0.5) - view->width) / view->height * c->half, down = (2 * (y + 0.5) / view->height - 1) * c->half;
+    double at[2];
     int a;
-    for (a = 0; a < 3; a++) d[a] = c->forward[a] + across * c->right[a] + down * c->under[a];
+    isogi_dvr__camera_place(c, view, x, y, at);
+    for (a = 0; a < 3; a++) d[a] = c->forward[a] + at[0] * c->right[a] + at[1] * c->under[a];
     if (!isogi_dvr__unit(d)) memcpy(d, c->forward, 3 * sizeof *d);
 }
 
@@ -6590,7 +6626,7 @@ typedef struct isogi_dvr__render_job {
     isogi_dvr__lights lights;
     int eight;                  /* rays go eight at once */
     isogi_dvr__frame_job fast;  /* where frame.classes */
-    isogi_dvr__camera camera;
+    isogi_dvr__camera camera, grid; /* grid: directions of the same rays there */
     double eye[3]; /* grid */
     size_t across, tiles;
     float *pixels; /* [height*width][5]: colour, opacity, depth */
@@ -6709,12 +6745,15 @@ ISOGI_DVR__APART void isogi_dvr__render_fast(const isogi_dvr__render_job *job, i
     int k, a;
     for (k = 0; k < ISOGI_DVR__LANES; k++) {
         int x = x0 + k % 4, y = y0 + k / 4;
-        double world[3];
+        double at[2], dir[3], inverse;
         memset(&ray[k], 0, sizeof ray[k]);
         if (x >= job->view->width || y >= job->view->height) continue;
-        isogi_dvr__camera_ray(&job->camera, job->view, x, y, world);
-        if (!isogi_dvr__fast_begin(&job->fast.frame, job->eye, world, &ray[k])) ray[k].count = 0;
         work->rays++;
+        if (job->dvr->transparent) continue;
+        isogi_dvr__camera_place(&job->camera, job->view, x, y, at);
+        inverse = 1 / sqrt(1 + at[0] * at[0] + at[1] * at[1]); /* the camera's directions are at right angles */
+        for (a = 0; a < 3; a++) dir[a] = (job->grid.forward[a] + at[0] * job->grid.right[a] + at[1] * job->grid.under[a]) * inverse;
+        if (!isogi_dvr__fast_begin(&job->fast.frame, job->eye, dir, &ray[k])) ray[k].count = 0;
     }
     isogi_dvr__fast_cast(&job->fast.frame, ray, state, work);
     if (job->depth) isogi_dvr__depth_fast(job, ray, depth, work);
@@ -6771,6 +6810,9 @@ static isogi_result isogi_dvr__begin_frame(isogi_dvr__render_job *job) {
     isogi_dvr__set_camera(&job->camera, job->view);
     for (a = 0; a < 3; a++) eye[a] = (double)job->view->eye[a];
     isogi_vol_to_grid(d->desc.pyramid, eye, job->eye);
+    isogi_dvr__transform(d->to_grid, job->camera.forward, job->grid.forward);
+    isogi_dvr__transform(d->to_grid, job->camera.right, job->grid.right);
+    isogi_dvr__transform(d->to_grid, job->camera.under, job->grid.under);
     blocks = (double)d->level[0].size[0] * (double)d->level[0].size[1] * (double)d->level[0].size[2];
     f->sample_kind = isogi_dvr__sample_kind(v, d->cells, &f->last_word);
 #ifdef ISOGI_DVR__AVX
@@ -6782,6 +6824,9 @@ static isogi_result isogi_dvr__begin_frame(isogi_dvr__render_job *job) {
     f->end = 1 - d->desc.opaque, f->dim = 0.125f;
     f->leap = blocks < 2e9 ? d->kernels.leap : isogi_dvr__leap;
     f->tolerance = d->desc.tolerance > 0 ? (float)d->desc.tolerance : 0.5f;
+    f->per_piece = 1 / (f->step * d->spacing);
+    /* no infinity: that times no extinction would be no number */
+    f->per_unit = isogi_dvr__clamp(1 / d->desc.unit, 1e300), f->piece = (float)isogi_dvr__clamp(f->step * d->spacing / d->desc.unit, 1e30);
 #ifdef ISOGI_DVR__AVX
     if (f->sample_kind >= 0 && isogi_dvr__machine() >= 3 && (!d->context.force_path || d->context.force_path > 2) &&
         points < 0x7fffffff && d->held.total < 0x0fffffff)
