@@ -2067,15 +2067,12 @@ ISOGI_DVR__KERNELS(_avx512, __attribute__((target("avx512f,avx512vl,avx512dq,avx
 /* Sixteen bytes, put together in registers: what is stored in parts is slow to load as a whole. */
 __attribute__((target("avx512f,avx512vl,avx512dq,avx512bw,fma"))) static inline __m512i isogi_dvr__bytes(const uint8_t *p,
                                                                                                         const int32_t at[16]) {
-    __m128i low = _mm_cvtsi32_si128(p[at[0]]), high = _mm_cvtsi32_si128(p[at[8]]);
-    low = _mm_insert_epi8(low, p[at[1]], 1), high = _mm_insert_epi8(high, p[at[9]], 1);
-    low = _mm_insert_epi8(low, p[at[2]], 2), high = _mm_insert_epi8(high, p[at[10]], 2);
-    low = _mm_insert_epi8(low, p[at[3]], 3), high = _mm_insert_epi8(high, p[at[11]], 3);
-    low = _mm_insert_epi8(low, p[at[4]], 4), high = _mm_insert_epi8(high, p[at[12]], 4);
-    low = _mm_insert_epi8(low, p[at[5]], 5), high = _mm_insert_epi8(high, p[at[13]], 5);
-    low = _mm_insert_epi8(low, p[at[6]], 6), high = _mm_insert_epi8(high, p[at[14]], 6);
-    low = _mm_insert_epi8(low, p[at[7]], 7), high = _mm_insert_epi8(high, p[at[15]], 7);
-    return _mm512_cvtepu8_epi32(_mm_unpacklo_epi64(low, high));
+#define ISOGI_DVR__BYTE(k) (char)p[at[k]]
+    return _mm512_cvtepu8_epi32(_mm_setr_epi8(
+        ISOGI_DVR__BYTE(0), ISOGI_DVR__BYTE(1), ISOGI_DVR__BYTE(2), ISOGI_DVR__BYTE(3), ISOGI_DVR__BYTE(4), ISOGI_DVR__BYTE(5),
+        ISOGI_DVR__BYTE(6), ISOGI_DVR__BYTE(7), ISOGI_DVR__BYTE(8), ISOGI_DVR__BYTE(9), ISOGI_DVR__BYTE(10), ISOGI_DVR__BYTE(11),
+        ISOGI_DVR__BYTE(12), ISOGI_DVR__BYTE(13), ISOGI_DVR__BYTE(14), ISOGI_DVR__BYTE(15)));
+#undef ISOGI_DVR__BYTE
 }
 ISOGI_DVR__LEAP_KERNEL(_avx512, __attribute__((target("avx512f,avx512vl,avx512dq,avx512bw,fma"))))
 #endif
@@ -6198,29 +6195,22 @@ ISOGI_DVR__AVX2 inline __m256 isogi_dvr__row_f32_avx2(const char *row, const siz
 }
 
 ISOGI_DVR__AVX2 inline __m256 isogi_dvr__row_u8_avx2(const char *row, const size_t at[8], __m256 u) {
-#define ISOGI_DVR__PAIR(k) (*(const isogi_dvr__two_bytes *)(const void *)(row + at[k]))
-    __m128i low = _mm_cvtsi32_si128(ISOGI_DVR__PAIR(0)), high = _mm_cvtsi32_si128(ISOGI_DVR__PAIR(4));
+#define ISOGI_DVR__PAIR(k) (short)*(const isogi_dvr__two_bytes *)(const void *)(row + at[k])
+    const __m128i pair = _mm_setr_epi16(ISOGI_DVR__PAIR(0), ISOGI_DVR__PAIR(1), ISOGI_DVR__PAIR(2), ISOGI_DVR__PAIR(3), ISOGI_DVR__PAIR(4),
+                                        ISOGI_DVR__PAIR(5), ISOGI_DVR__PAIR(6), ISOGI_DVR__PAIR(7));
     __m256 from, to;
-    low = _mm_insert_epi16(low, ISOGI_DVR__PAIR(1), 1), high = _mm_insert_epi16(high, ISOGI_DVR__PAIR(5), 1);
-    low = _mm_insert_epi16(low, ISOGI_DVR__PAIR(2), 2), high = _mm_insert_epi16(high, ISOGI_DVR__PAIR(6), 2);
-    low = _mm_insert_epi16(low, ISOGI_DVR__PAIR(3), 3), high = _mm_insert_epi16(high, ISOGI_DVR__PAIR(7), 3);
 #undef ISOGI_DVR__PAIR
-    low = _mm_unpacklo_epi64(low, high);
-    from = _mm256_cvtepi32_ps(_mm256_cvtepu16_epi32(_mm_and_si128(low, _mm_set1_epi16(0xff))));
-    to = _mm256_cvtepi32_ps(_mm256_cvtepu16_epi32(_mm_srli_epi16(low, 8)));
+    from = _mm256_cvtepi32_ps(_mm256_cvtepu16_epi32(_mm_and_si128(pair, _mm_set1_epi16(0xff))));
+    to = _mm256_cvtepi32_ps(_mm256_cvtepu16_epi32(_mm_srli_epi16(pair, 8)));
     return _mm256_fmadd_ps(u, _mm256_sub_ps(to, from), from);
 }
 
 ISOGI_DVR__AVX2 inline __m256 isogi_dvr__row_u16_avx2(const char *row, const size_t at[8], __m256 u) {
 #define ISOGI_DVR__PAIR(k) (*(const isogi_dvr__four_bytes *)(const void *)(row + at[k]))
-    __m128i low = _mm_cvtsi32_si128(ISOGI_DVR__PAIR(0)), high = _mm_cvtsi32_si128(ISOGI_DVR__PAIR(4));
-    __m256i pair;
+    const __m256i pair = _mm256_setr_epi32(ISOGI_DVR__PAIR(0), ISOGI_DVR__PAIR(1), ISOGI_DVR__PAIR(2), ISOGI_DVR__PAIR(3),
+                                           ISOGI_DVR__PAIR(4), ISOGI_DVR__PAIR(5), ISOGI_DVR__PAIR(6), ISOGI_DVR__PAIR(7));
     __m256 from, to;
-    low = _mm_insert_epi32(low, ISOGI_DVR__PAIR(1), 1), high = _mm_insert_epi32(high, ISOGI_DVR__PAIR(5), 1);
-    low = _mm_insert_epi32(low, ISOGI_DVR__PAIR(2), 2), high = _mm_insert_epi32(high, ISOGI_DVR__PAIR(6), 2);
-    low = _mm_insert_epi32(low, ISOGI_DVR__PAIR(3), 3), high = _mm_insert_epi32(high, ISOGI_DVR__PAIR(7), 3);
 #undef ISOGI_DVR__PAIR
-    pair = _mm256_inserti128_si256(_mm256_castsi128_si256(low), high, 1);
     from = _mm256_cvtepi32_ps(_mm256_and_si256(pair, _mm256_set1_epi32(0xffff))), to = _mm256_cvtepi32_ps(_mm256_srli_epi32(pair, 16));
     return _mm256_fmadd_ps(u, _mm256_sub_ps(to, from), from);
 }
