@@ -6848,6 +6848,14 @@ static isogi_result isogi_dvr__begin_frame(isogi_dvr__render_job *job) {
     return result == ISOGI_OK && f->held.block ? isogi_dvr__join(d, &f->held, f->light[0], 4) : result;
 }
 
+static void isogi_dvr__end_frame(isogi_dvr__render_job *job) {
+    const isogi_context *context = &job->dvr->context;
+    isogi_dvr__frame *f = &job->fast.frame;
+    isogi_release(context, f->classes, f->count, sizeof *f->classes);
+    isogi_release(context, f->matter, f->count, sizeof *f->matter);
+    isogi_release(context, f->light, isogi_dvr__held_points(job->dvr) + 1, sizeof *f->light);
+}
+
 /* The picture is finished in memory of its own: a cancelled call leaves its outputs as they were. */
 ISOGI_API isogi_result isogi_dvr_render(const isogi_dvr *dvr, const isogi_view *view, const isogi_lighting *lighting,
                                         float (*premultiplied)[4], float *depth, isogi_counters *counters) {
@@ -6879,9 +6887,7 @@ ISOGI_API isogi_result isogi_dvr_render(const isogi_dvr *dvr, const isogi_view *
         job.work[i].texels = 0;
         isogi_dvr__add(counters, &job.work[i]);
     }
-    isogi_release(&dvr->context, job.fast.frame.classes, job.fast.frame.count, sizeof *job.fast.frame.classes);
-    isogi_release(&dvr->context, job.fast.frame.matter, job.fast.frame.count, sizeof *job.fast.frame.matter);
-    isogi_release(&dvr->context, job.fast.frame.light, isogi_dvr__held_points(dvr) + 1, sizeof *job.fast.frame.light);
+    isogi_dvr__end_frame(&job);
     isogi_release(&dvr->context, job.pixels, pixels, 5 * sizeof *job.pixels);
     isogi_release(&dvr->context, job.work, job.tiles, sizeof *job.work);
     isogi_release(&dvr->context, job.lights.list, job.lights.count, sizeof *job.lights.list);

@@ -5806,7 +5806,7 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE uint64_t isogi_vol__in_beam(const isogi_vol_
 }
 
 /* Traces the rays in a pool's first slots, which coincide; the lowest level that has children left first, as walk_one does. */
-ISOGI_VOL__AVX512 static void isogi_vol__trace_packet(isogi_vol__batch *b, isogi_vol__pool *s, unsigned rays) {
+ISOGI_VOL__AVX512 ISOGI_VOL__NOINLINE static void isogi_vol__trace_packet(isogi_vol__batch *b, isogi_vol__pool *s, unsigned rays) {
     const isogi_pyramid *p = b->pyramid;
     const struct isogi_vol__ways *ways = p->ways;
     const int first = __builtin_ctz(rays), flip = (int)s->flip[first], octant = (int)_pext_u32((unsigned)flip, 0x15),
@@ -6132,9 +6132,10 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE void isogi_vol__clear_pool(isogi_vol__pool *
     for (i = 0; i < 8 * groups; i++) s->level[i] = -1, s->address[i] = (uint64_t)(uintptr_t)p->nodes;
 }
 
-/* The rays from *next on, up to `end`, through the slots of a pool, each taken again as soon as it is free; `open`: those without a ray. */
-ISOGI_VOL__AVX512 static void isogi_vol__run_pool(isogi_vol__batch *b, isogi_vol__turn *turn, isogi_vol__pool *s, int groups, uint64_t open,
-                                                  size_t *next, size_t end) {
+/* The rays from *next on, up to `end`, through the slots of a pool, each taken again as soon as it is free; `open`: those without a ray.
+   Not inlined, nor are packets, so that the stacks of the two do not add up. */
+ISOGI_VOL__AVX512 ISOGI_VOL__NOINLINE static void isogi_vol__run_pool(isogi_vol__batch *b, isogi_vol__turn *turn, isogi_vol__pool *s,
+                                                                      int groups, uint64_t open, size_t *next, size_t end) {
     const uint64_t slots = ~(uint64_t)0 >> (64 - 8 * groups);
     uint64_t fresh = slots & ~open; /* rays that stand at the root */
     isogi_vol__descent descent;

@@ -269,8 +269,7 @@ TEST(the_table_of_light_has_no_seams) {
     }
     printf("    brightest light %.3g, largest step %.2g\n", brightest, most);
     CHECK(most < 2e-3 * brightest && brightest > 0.1, "a step of %g in light of up to %g", most, brightest);
-    isogi_release(&serial, job.fast.frame.classes, job.fast.frame.count, sizeof *job.fast.frame.classes);
-    isogi_release(&serial, job.fast.frame.light, isogi_dvr__held_points(dvr) + 1, sizeof *job.fast.frame.light);
+    isogi_dvr__end_frame(&job);
     isogi_release(&serial, job.lights.list, job.lights.count, sizeof *job.lights.list);
     isogi_dvr_free(dvr);
     field_free(&f);
