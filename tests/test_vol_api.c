@@ -231,7 +231,7 @@ TEST(bundles_have_the_bits_of_single_rays) {
 TEST(bundles_have_all_hits_of_single_rays) {
     enum { RAYS = 75, MOST = 12 };
     static float dirs[RAYS][3];
-    static isogi_hit hits[RAYS][MOST];
+    static isogi_hit hits[RAYS * MOST];
     static size_t counts[RAYS];
     test_random r = {44};
     long found = 0, wrong = 0, cut = 0;
@@ -253,10 +253,10 @@ TEST(bundles_have_all_hits_of_single_rays) {
                 random_direction(&r, d);
                 for (int a = 0; a < 3; a++) dirs[i][a] = bundle.start || i % 2 ? (float)d[a] : ray.dir[a] + 0.2f * (float)d[a];
             }
-            CHECK(isogi_vol_bundle_all(f.pyramid, &bundle, (const float(*)[3])dirs, count, room, hits[0], counts, NULL) == ISOGI_OK,
+            CHECK(isogi_vol_bundle_all(f.pyramid, &bundle, (const float(*)[3])dirs, count, room, hits, counts, NULL) == ISOGI_OK,
                   "all hits");
             for (size_t i = 0; i < count; i++) {
-                const isogi_hit *own = hits[0] + i * room;
+                const isogi_hit *own = hits + i * room;
                 isogi_hit expected[MOST];
                 size_t n = 0;
                 if (bundle.start) {
