@@ -131,7 +131,7 @@ variant() {
     for program; do
         base=${program##*/} source=tests/${program##*/}.c
         libs=$(sed -n '1,20s|.*LIBS: \([^*]*\).*|\1|p' "$source")
-        item suite "$name/$base" "$compiler -std=gnu99 $flags -I. -Iexamples/common -Itests -o \"\$OUT/$base\" $source -lm -lpthread $libs && $prefix \"\$OUT/$base\""
+        item suite "$name/$base" "sh tests/compile/shared.sh '$compiler' '$flags' $source \"\$OUT/$base\" -lm -lpthread $libs && $prefix \"\$OUT/$base\""
     done
 }
 
@@ -170,8 +170,7 @@ variants() {
     variant no-simd "$CC" "-O2 $CONTRACT_OFF -DISOGI_NO_SIMD" '' $(only 'sh|sample|vol|dvr')
     variant sh-level-1 "$CC" "-O2 $CONTRACT_OFF -DISOGI_SH_LEVEL=1" '' $(only sh)
     if have clang; then
-        variant clang clang "-O2 $CONTRACT_OFF" '' $(only 'sh|sample|vol|mesh|trace|dvr')
-        variant clang clang "-O2 $CONTRACT_OFF -DISOGI_IMPLEMENTATION" '' $(only stack) # all others hold the implementation
+        variant clang clang "-O2 $CONTRACT_OFF" '' $(only 'sh|sample|vol|mesh|trace|dvr|stack')
         fast_math clang $(only 'sh|sh_limits')
         variant address+undefined clang "-O1 -g $CONTRACT_OFF -fsanitize=address,undefined,float-cast-overflow -fno-sanitize-recover=all" '' $(only "$checked")
         variant thread clang "-O1 -g $CONTRACT_OFF -fsanitize=thread" 'TSAN_OPTIONS=halt_on_error=1' $(only "$threaded")
