@@ -3787,7 +3787,7 @@ static isogi_result isogi_trace__segments_reserve(const isogi_trace *t, isogi_tr
 /* The segment of the batch's hits; probes are made where there are none. */
 static isogi_result isogi_trace__segment_new(isogi_trace *t, isogi_trace__segment *s) {
     isogi_trace__feedback *f = t->feedback;
-    const size_t far = 8, near = 4; /* catches ahead; they stand in the order of their spans */
+    const size_t early = 8, late = 4; /* catches ahead; they stand in the order of their spans */
     size_t i, hits = 0, at = 0, k;
     for (i = 0; i < f->sample_count; i++) hits += f->catches[i].key != 0;
     memset(s, 0, sizeof *s);
@@ -3799,8 +3799,8 @@ static isogi_result isogi_trace__segment_new(isogi_trace *t, isogi_trace__segmen
         s->node[i] = f->spans[i].node, s->begin[i] = (uint32_t)at;
         for (k = f->spans[i].offset; k < f->spans[i].offset + f->spans[i].count; k++) {
             isogi_result result;
-            if (k + far < f->sample_count) isogi_trace__probe_ahead(&f->probes, &f->catches[k + far], 0);
-            if (k + near < f->sample_count) isogi_trace__probe_ahead(&f->probes, &f->catches[k + near], 1);
+            if (k + early < f->sample_count) isogi_trace__probe_ahead(&f->probes, &f->catches[k + early], 0);
+            if (k + late < f->sample_count) isogi_trace__probe_ahead(&f->probes, &f->catches[k + late], 1);
             if (!f->catches[k].key) continue;
             result = isogi_trace__probe_of(t, &f->catches[k], f->spans[i].sum.isovalue, &s->probe[at++]);
             if (result == ISOGI_OK) continue;
