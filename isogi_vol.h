@@ -1557,54 +1557,22 @@ static isogi_result isogi_vol__fill_nodes(isogi_vol__build_job *job, const isogi
     return ISOGI_OK;
 }
 
-/* What single rays look up, see walk_one. Planes 1 to 3 of x and y and 1 and 2 of z stand in eight lanes, in this order; in eight more
-   plane 3 of z, planes 0 of x y z, planes 4 of them, and one lane more. A bit for each of eight comparisons says which of 64 children a
-   ray can meet: orders[f], f < 3: planes a = 1 1 1 2 2 2 3 3 of axis f before planes b = 1 2 3 1 2 3 1 2 of the next axis (x y, y z, z x);
-   orders[3]: the first eight planes before the entry; orders[4]: behind the exit; orders[5]: planes 3 of the three pairs of axes, plane 3
-   of z before the entry, and behind the exit. */
+/* What single rays look up, see walk_one. */
 struct isogi_vol__ways {
-    uint64_t orders[6][256];
-    int64_t plane[ISOGI_VOL__NODE_LEVELS][2][8]; /* number of a lane's plane, in cells */
+    int32_t lane[ISOGI_VOL__NODE_LEVELS][16], row[ISOGI_VOL__NODE_LEVELS][16]; /* 0 1 2 3 children of a level, in cells, along rows of four
+                                                                                  lanes, and down those rows */
     uint8_t child[8][64], voxel[8][128]; /* children of nodes and voxels of leaves with axes counted backwards: bit a of the index */
+    float size[ISOGI_VOL__NODE_LEVELS];  /* of a child, in cells */
     float scale[256];                    /* steps of a leaf in a unit of nodes, by how far its bounds are apart */
     uint64_t above[ISOGI_VOL__NODE_LEVELS], digit[ISOGI_VOL__NODE_LEVELS]; /* digits of packed cells above children of a level;
                                                                               where those have theirs */
 };
 
-/* What is left of 64 children for every choice of eight bits, each of which leaves some if it is 0, others if it is 1. */
-static void isogi_vol__set_orders(uint64_t table[256], uint64_t (*leaves)[2]) {
-    int bit, i;
-    table[0] = ~(uint64_t)0;
-    for (bit = 0; bit < 8; bit++)
-        for (i = 0; i < 1 << bit; i++) table[i + (1 << bit)] = table[i] & leaves[bit][1], table[i] &= leaves[bit][0];
-}
-
 static void isogi_vol__set_ways(struct isogi_vol__ways *ways) {
-    static const int plane[2][8] = {{1, 2, 3, 1, 2, 3, 1, 2}, {3, 0, 0, 0, 4, 4, 4, 4}};
-    const uint64_t all = ~(uint64_t)0;
-    uint64_t below[3][4], leaves[9][2], rest[8][2];
-    int i, f, a, b;
-    for (a = 1; a < 4; a++) {
-        below[0][a] = 0x1111111111111111u * (uint64_t)((1 << a) - 1), below[1][a] = 0x0001000100010001u * (uint64_t)((1 << 4 * a) - 1);
-        below[2][a] = ((uint64_t)1 << 16 * a) - 1;
-    }
-    for (i = 0; i < 8; i++) rest[i][0] = rest[i][1] = all;
-    for (f = 0; f < 3; f++) {
-        const uint64_t *first = below[f], *second = below[(f + 1) % 3];
-        /* not on the near side of the plane that comes first and on the far side of the other */
-        for (a = 1; a < 4; a++)
-            for (b = 1; b < 4; b++) leaves[3 * a + b - 4][0] = first[a] | ~second[b], leaves[3 * a + b - 4][1] = ~first[a] | second[b];
-        isogi_vol__set_orders(ways->orders[f], leaves);
-        rest[f][0] = leaves[8][0], rest[f][1] = leaves[8][1];
-    }
-    for (i = 0; i < 8; i++) leaves[i][0] = all, leaves[i][1] = ~below[i / 3][i % 3 + 1];
-    isogi_vol__set_orders(ways->orders[3], leaves);
-    for (i = 0; i < 8; i++) leaves[i][1] = below[i / 3][i % 3 + 1];
-    isogi_vol__set_orders(ways->orders[4], leaves);
-    rest[3][1] = ~below[2][3], rest[4][1] = below[2][3];
-    isogi_vol__set_orders(ways->orders[5], rest);
+    int i, f, a;
     for (i = 0; i < ISOGI_VOL__NODE_LEVELS; i++) {
-        for (a = 0; a < 16; a++) ways->plane[i][a / 8][a % 8] = (int64_t)plane[a / 8][a % 8] << 2 * i;
+        for (a = 0; a < 16; a++) ways->lane[i][a] = (a & 3) << 2 * i, ways->row[i][a] = a >> 2 << 2 * i;
+        ways->size[i] = (float)(1 << 2 * i);
         ways->above[i] = 0x0000ffffffffffffu & ~(0x000100010001u * (((uint64_t)4 << 2 * i) - 1)),
         ways->digit[i] = (uint64_t)0x000300030003u << 2 * i;
     }
@@ -5149,14 +5117,14 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE void isogi_vol__open_turn(isogi_vol__turn *t
 /* ---- one ray alone ---- */
 
 /* A ray alone has nothing to do while it waits, so what counts are waits and branches that are foretold wrongly. The way through a
-   node's children is not walked but looked up: the planes between them are met in an order that 27 comparisons tell, nine for every
-   two axes, all at once, and where the ray enters and leaves the node cuts the way at its ends. Times are those that a pool goes by. All
-   cells of a leaf are looked at together, in float. */
+   node's children is not walked but found all at once, in float: a ray passes a child if it enters it by no axis later than it leaves it
+   by another, sixteen pairs of layers for every two axes. Floats are off by less than 2^-21 of what the root measures; children are
+   widened by twice as much, so none is left out, and some are kept that the ray only comes near. Cells that it only comes near are told
+   by the times that a pool goes by. All cells of a leaf are looked at together. */
 typedef struct __attribute__((aligned(64))) isogi_vol__course {
-    double sign[2][8], border[2][8], start[2][8], per[2][8]; /* lane's plane k, counted from the border that rays enter by,
-                                                                is met at (sign k + border - start) per */
+    float per[4], enter[4], leave[4], last; /* in units in which the fastest axis takes 1 a cell: plane k of an axis, counted from the
+                                               border that rays enter by, is met from k per - enter to k per - leave; the end */
     double origin[4], inverse[4], dir[4], stop; /* as in a pool */
-    int64_t end;
     int64_t backwards;       /* cell = cell counted backwards ^ this, packed as in a pool */
     int first[4];            /* cell in which the walk begins, nearly */
     int flip, octant;        /* children; axes */
@@ -5170,7 +5138,6 @@ typedef struct __attribute__((aligned(64))) isogi_vol__course {
 ISOGI_VOL__AVX512 ISOGI_VOL__INLINE int isogi_vol__set_course(isogi_vol__course *c, const isogi_vol__walk *w) {
     const isogi_pyramid *p = w->pyramid;
     const int padded = 1 << 2 * p->node_levels;
-    const __m512i lanes[2] = {_mm512_setr_epi64(0, 0, 0, 1, 1, 1, 2, 2), _mm512_setr_epi64(2, 0, 1, 2, 0, 1, 2, 2)};
     const __m256d origin = _mm256_loadu_pd(w->origin), dir = _mm256_loadu_pd(w->dir), box = _mm256_loadu_pd(p->box);
     const __mmask8 still = _mm256_cmp_pd_mask(dir, _mm256_setzero_pd(), _CMP_EQ_OQ);
     /* a ray that stands still keeps below the upper border */
@@ -5179,70 +5146,57 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE int isogi_vol__set_course(isogi_vol__course 
                    7);
     const __m256d sign = _mm256_mask_mov_pd(_mm256_set1_pd(1), fall, _mm256_set1_pd(-1));
     const __m256d inverse = _mm256_mask_mul_pd(_mm256_loadu_pd(w->inverse), still, sign, _mm256_set1_pd(1e200));
-    const __m256d border = _mm256_maskz_mov_pd(fall, _mm256_set1_pd(padded));
-    int i;
+    const __m256d start = _mm256_mask_sub_pd(origin, fall, _mm256_set1_pd(padded), origin); /* counted like cells */
+    const __m256d size = _mm256_andnot_pd(_mm256_set1_pd(-0.0), dir), pairs = _mm256_max_pd(size, _mm256_permute2f128_pd(size, size, 1));
+    const __m256d most = _mm256_max_pd(pairs, _mm256_permute_pd(pairs, 5)), large = _mm256_set1_pd(1e30);
+    const __m128 per = _mm256_cvtpd_ps(_mm256_min_pd(_mm256_mul_pd(_mm256_mul_pd(inverse, sign), most), large));
+    const __m128 at = _mm256_cvtpd_ps(start), reach = _mm_set1_ps((float)padded * 0x1p-20f);
     if (!(w->end > 1e-150) || !(w->end < 1e150)) return 0;
     c->level = isogi_vol__quantise_isovalue(p, w->isovalue, &c->low, &c->high);
     c->octant = fall, c->flip = (int)(3 * _pdep_u32(fall, 0x15));
     c->backwards = (int64_t)(_pdep_u64(fall, 0x000100010001u) * (uint64_t)(padded - 1));
     c->stop = w->end, c->entry_axis = w->entry_axis, c->cells = 0;
-    memcpy(&c->end, &w->end, sizeof c->end), c->end |= 3;
     _mm256_store_pd(c->origin, origin), _mm256_store_pd(c->inverse, inverse), _mm256_store_pd(c->dir, dir);
     _mm_storeu_si128((__m128i *)(void *)c->first, _mm256_cvttpd_epi32(_mm256_min_pd(origin, _mm256_sub_pd(box, _mm256_set1_pd(1)))));
-#pragma GCC unroll 2
-    for (i = 0; i < 2; i++) {
-        _mm512_store_pd(c->sign[i], _mm512_permutexvar_pd(lanes[i], _mm512_castpd256_pd512(sign)));
-        _mm512_store_pd(c->border[i], _mm512_permutexvar_pd(lanes[i], _mm512_castpd256_pd512(border)));
-        _mm512_store_pd(c->start[i], _mm512_permutexvar_pd(lanes[i], _mm512_castpd256_pd512(origin)));
-        _mm512_store_pd(c->per[i], _mm512_permutexvar_pd(lanes[i], _mm512_castpd256_pd512(inverse)));
-    }
+    _mm_store_ps(c->per, per);
+    _mm_store_ps(c->enter, _mm_mul_ps(_mm_add_ps(at, reach), per)), _mm_store_ps(c->leave, _mm_mul_ps(_mm_sub_ps(at, reach), per));
+    c->last = (float)(isogi_vol__min(w->end * _mm256_cvtsd_f64(most), 1e30) * 1.000001);
     return 1;
 }
 
-/* Times of a lane's planes in a node, axis in the lowest two bits; cell: the node's corner in all lanes. */
-ISOGI_VOL__AVX512 ISOGI_VOL__INLINE __m512i isogi_vol__plane_times(const isogi_vol__course *c, __m512i cell, __m512i digits,
-                                                                   const int64_t plane[8], __m512i axis, int i) {
-    const __m512i at =
-        _mm512_add_epi64(_mm512_and_si512(_mm512_srlv_epi64(cell, digits), _mm512_set1_epi64(0xffff)), _mm512_load_si512(plane));
-    const __m512d place = _mm512_fmadd_pd(_mm512_cvtepi64_pd(at), _mm512_load_pd(c->sign[i]), _mm512_load_pd(c->border[i]));
-    const __m512d way = _mm512_sub_pd(place, _mm512_load_pd(c->start[i]));
-    const __m512d time = _mm512_fmadd_pd(way, _mm512_load_pd(c->per[i]), _mm512_setzero_pd()); /* 0, not -0, as in isogi_vol__time_of */
-    return _mm512_ternarylogic_epi64(_mm512_castpd_si512(time), ISOGI_VOL__ALL64(~(uint64_t)3), axis, 0xea);
+/* Where the layers of a node's children begin on an axis; layer: those of lanes. */
+ISOGI_VOL__AVX512 ISOGI_VOL__INLINE __m512 isogi_vol__layers16(__m512i corner, int axis, const int32_t layer[16]) {
+    const __m512i field = _mm512_set1_epi32(0x0100 + 0x0202 * axis); /* two bytes of a packed cell */
+    const __m512i first = _mm512_maskz_permutexvar_epi8(0x3333333333333333u, field, corner);
+    return _mm512_cvtepi32_ps(_mm512_add_epi32(first, _mm512_load_si512(layer)));
 }
 
-/* Which children of a node the ray passes, in its own order; cell: the node's corner, counted backwards where the ray falls. Times before
-   the ray begins are negative, and in whatever order: such planes are cut off as lying before the entry. */
+/* Which children of a node the ray passes or comes near, in its own order; cell: the node's corner, counted backwards where the ray
+   falls. Rows of four lanes stand for pairs of layers, of x and y, x and z, y and z. It enters no child before it begins, nor leaves one
+   after it ends: one bound on each side of every axis does. */
 ISOGI_VOL__AVX512 ISOGI_VOL__INLINE uint64_t isogi_vol__way(const isogi_vol__course *c, const struct isogi_vol__ways *ways, int64_t cell,
                                                             int level) {
-    const __m512i corner = _mm512_set1_epi64(cell);
-    const __m512i t = isogi_vol__plane_times(c, corner, _mm512_setr_epi64(0, 0, 0, 16, 16, 16, 32, 32), ways->plane[level][0],
-                                             _mm512_setr_epi64(0, 0, 0, 1, 1, 1, 2, 2), 0);
-    const __m512i u = isogi_vol__plane_times(c, corner, _mm512_setr_epi64(32, 0, 16, 32, 0, 16, 32, 32), ways->plane[level][1],
-                                             _mm512_setr_epi64(2, 0, 1, 2, 0, 1, 2, 2), 1);
-    const __m512d border = _mm512_castsi512_pd(u);
-#define ISOGI_VOL__SPREAD(i) _mm512_permutexvar_pd(_mm512_set1_epi64(i), border)
-    /* no earlier than the ray begins: a number next to 0, not a denormal one */
-    const __m512i in =
-        _mm512_castpd_si512(_mm512_max_pd(_mm512_max_pd(ISOGI_VOL__SPREAD(1), ISOGI_VOL__SPREAD(2)),
-                                          _mm512_max_pd(ISOGI_VOL__SPREAD(3), _mm512_castsi512_pd(_mm512_set1_epi64(0x0010000000000003)))));
-    const __m512i out =
-        _mm512_castpd_si512(_mm512_min_pd(_mm512_min_pd(ISOGI_VOL__SPREAD(4), ISOGI_VOL__SPREAD(5)),
-                                          _mm512_min_pd(ISOGI_VOL__SPREAD(6), _mm512_castsi512_pd(_mm512_set1_epi64(c->end)))));
-#undef ISOGI_VOL__SPREAD
-#define ISOGI_VOL__MET(i, a, b) ways->orders[i][(unsigned)_mm512_cmplt_epi64_mask(a, b)]
-#define ISOGI_VOL__ONES(f) _mm512_permutexvar_epi64(_mm512_setr_epi64(3 * (f), 3 * (f), 3 * (f), 3 * (f) + 1, 3 * (f) + 1, 3 * (f) + 1, \
-    3 * (f) + 2, 3 * (f) + 2), t)
-    const __m512i x = ISOGI_VOL__ONES(0), y = ISOGI_VOL__ONES(1),
-                  z = _mm512_permutex2var_epi64(t, _mm512_setr_epi64(6, 6, 6, 7, 7, 7, 8, 8), u);
-    const __m512i next_x = _mm512_permutexvar_epi64(_mm512_setr_epi64(0, 1, 2, 0, 1, 2, 0, 1), t),
-                  next_y = _mm512_permutexvar_epi64(_mm512_setr_epi64(3, 4, 5, 3, 4, 5, 3, 4), t);
-    const __m512i next_z = _mm512_permutex2var_epi64(t, _mm512_setr_epi64(6, 7, 8, 6, 7, 8, 6, 7), u);
-    const __m512i last = _mm512_mask_mov_epi64(_mm512_permutex2var_epi64(t, _mm512_setr_epi64(2, 5, 8, 8, 8, 8, 8, 8), u), 16, out);
-    const __m512i next_last = _mm512_mask_mov_epi64(_mm512_permutex2var_epi64(t, _mm512_setr_epi64(5, 8, 2, 8, 8, 8, 8, 8), u), 8, in);
-    return ISOGI_VOL__MET(0, x, next_y) & ISOGI_VOL__MET(1, y, next_z) & ISOGI_VOL__MET(2, z, next_x) & ISOGI_VOL__MET(3, t, in) &
-           ISOGI_VOL__MET(4, out, t) & ISOGI_VOL__MET(5, last, next_last);
-#undef ISOGI_VOL__MET
-#undef ISOGI_VOL__ONES
+    const __m512i corner = _mm512_castsi128_si512(_mm_cvtsi64_si128(cell));
+    const __m512 zero = _mm512_setzero_ps(), last = _mm512_set1_ps(c->last), size = _mm512_set1_ps(ways->size[level]);
+    const __m512 x = isogi_vol__layers16(corner, 0, ways->lane[level]), y = isogi_vol__layers16(corner, 1, ways->row[level]),
+                 y_lane = isogi_vol__layers16(corner, 1, ways->lane[level]), z = isogi_vol__layers16(corner, 2, ways->row[level]);
+#define ISOGI_VOL__PER(a) _mm512_set1_ps(c->per[a])
+#define ISOGI_VOL__ENTER(layer, a) _mm512_fmsub_ps(layer, ISOGI_VOL__PER(a), _mm512_set1_ps(c->enter[a]))
+#define ISOGI_VOL__LEAVE(layer, a) _mm512_fmsub_ps(layer, ISOGI_VOL__PER(a), end##a)
+    const __m512 end0 = _mm512_fnmadd_ps(size, ISOGI_VOL__PER(0), _mm512_set1_ps(c->leave[0])),
+                 end1 = _mm512_fnmadd_ps(size, ISOGI_VOL__PER(1), _mm512_set1_ps(c->leave[1])),
+                 end2 = _mm512_fnmadd_ps(size, ISOGI_VOL__PER(2), _mm512_set1_ps(c->leave[2]));
+    const __m512 x_in = _mm512_max_ps(ISOGI_VOL__ENTER(x, 0), zero), x_out = _mm512_min_ps(ISOGI_VOL__LEAVE(x, 0), last);
+    const __m512 y_in = _mm512_max_ps(ISOGI_VOL__ENTER(y, 1), zero), y_out = _mm512_min_ps(ISOGI_VOL__LEAVE(y, 1), last);
+    const __m512 z_in = ISOGI_VOL__ENTER(z, 2), z_out = ISOGI_VOL__LEAVE(z, 2);
+    const __mmask16 xy = _mm512_mask_cmp_ps_mask(_mm512_cmp_ps_mask(x_in, y_out, _CMP_LE_OQ), y_in, x_out, _CMP_LE_OQ),
+                    xz = _mm512_mask_cmp_ps_mask(_mm512_cmp_ps_mask(x_in, z_out, _CMP_LE_OQ), z_in, x_out, _CMP_LE_OQ),
+                    yz = _mm512_mask_cmp_ps_mask(_mm512_cmp_ps_mask(ISOGI_VOL__ENTER(y_lane, 1), z_out, _CMP_LE_OQ), z_in,
+                                                 ISOGI_VOL__LEAVE(y_lane, 1), _CMP_LE_OQ);
+#undef ISOGI_VOL__PER
+#undef ISOGI_VOL__ENTER
+#undef ISOGI_VOL__LEAVE
+    return xy * 0x0001000100010001u & _pdep_u64(xz, 0x000f000f000f000fu) * 0x1111u & _pdep_u64(yz, 0x1111111111111111u) * 0xfu;
 }
 
 /* Which children of a node can hold the surface, in the ray's order. */
@@ -5318,7 +5272,8 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE int isogi_vol__walk_cells(isogi_vol__walk *w
     sides = isogi_vol__sides8(corners, _mm256_set1_ps(leaf->isovalue), from, to);
     _mm512_store_si512(at, _mm512_or_si512(cell, _mm512_or_si512(_mm512_slli_epi64(_mm512_and_si512(begin, three), 48),
                                                                  _mm512_slli_epi64(_mm512_and_si512(end, three), 50))));
-    c->cells += (uint64_t)count;
+    lanes &= _mm512_cmplt_epi64_mask(begin, end); /* it only comes near the others */
+    c->cells += (uint64_t)__builtin_popcount(lanes);
     while (lanes) {
         const unsigned first = lanes & (0 - lanes);
         unsigned doubt = lanes;
@@ -5374,15 +5329,13 @@ ISOGI_VOL__AVX512 static int isogi_vol__walk_one(isogi_vol__walk *w, isogi_hit *
             __m512i voxel[2];
             mask &= isogi_vol__held_cells(ways, c.octant, &leaf, node, c.level, voxel);
             if (ISOGI_VOL__UNLIKELY(node[ISOGI_VOL__LEAF_CUT])) mask = isogi_vol__cut_order(&leaf, c.octant, mask);
-            if (mask) {
+            for (; mask; mask = _pdep_u64(~(uint64_t)255, mask)) { /* eight at a time */
                 const int count = __builtin_popcountll(mask);
                 const __m128i list = _mm512_castsi512_si128(_mm512_maskz_compress_epi8(mask, _mm512_load_si512(ways->child[0])));
-                if (isogi_vol__walk_cells(w, &c, &leaf, list, count < 8 ? count : 8, cell ^ c.backwards, hit) ||
-                    (count > 8 && isogi_vol__walk_cells(w, &c, &leaf, _mm_srli_si128(list, 8), count - 8, cell ^ c.backwards, hit))) {
+                if (isogi_vol__walk_cells(w, &c, &leaf, list, count < 8 ? count : 8, cell ^ c.backwards, hit)) {
                     w->count.cells = c.cells;
                     return 1;
                 }
-                mask = 0;
             }
         }
         if (mask) {
