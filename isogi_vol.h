@@ -5150,7 +5150,7 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE int isogi_vol__set_course(isogi_vol__course 
     const __m256d size = _mm256_andnot_pd(_mm256_set1_pd(-0.0), dir), pairs = _mm256_max_pd(size, _mm256_permute2f128_pd(size, size, 1));
     const __m256d most = _mm256_max_pd(pairs, _mm256_permute_pd(pairs, 5)), large = _mm256_set1_pd(1e30);
     const __m128 per = _mm256_cvtpd_ps(_mm256_min_pd(_mm256_mul_pd(_mm256_mul_pd(inverse, sign), most), large));
-    const __m128 at = _mm256_cvtpd_ps(start), reach = _mm_set1_ps((float)padded * 0x1p-20f);
+    const __m128 at = _mm256_cvtpd_ps(start), reach = _mm_set1_ps((float)padded * 1e-6f);
     if (!(w->end > 1e-150) || !(w->end < 1e150)) return 0;
     c->level = isogi_vol__quantise_isovalue(p, w->isovalue, &c->low, &c->high);
     c->octant = fall, c->flip = (int)(3 * _pdep_u32(fall, 0x15));
