@@ -106,6 +106,35 @@ static int generate_polynomials(quad *v) {
     return count;
 }
 
+/* For the recursions of columns on vector units: factors of m = 0 as above; for each m > 0 polynomials in w = z^2 for l = m .. m + 4, the
+   highest coefficient first, without the factor z of an odd one; then for each l up to the end of the table A, B, C of
+   q_l = (A w + B) q_{l-2} + C q_{l-4}. */
+static int generate_columns(quad *v) {
+    int count = 3 * GENERATE_ORDER;
+    quad q = quad_sqrt(1 / (4 * generate_pi()));
+    generate_factors(v);
+    for (int m = 1; m < GENERATE_ORDER; m++) {
+        quad a[GENERATE_ORDER + 5], p[5][3] = {{0}};
+        q *= quad_sqrt((quad)(2 * m + 1) / (quad)(m == 1 ? 1 : 2 * m));
+        for (int l = m + 1; l <= m + 4 || l < GENERATE_ORDER; l++) a[l - m] = quad_sqrt((quad)(4 * l * l - 1) / (quad)(l * l - m * m));
+        p[0][0] = q, p[1][0] = a[1] * q;
+        for (int d = 2; d < 5; d++)
+            for (int k = 0; k < 3; k++) {
+                int raised = k - (d % 2 == 0); /* z times z raises the power of w */
+                p[d][k] = (raised < 0 ? 0 : a[d] * p[d - 1][raised]) - a[d] / a[d - 1] * p[d - 2][k];
+            }
+        for (int d = 0; d < 5; d++)
+            for (int k = d / 2; k >= 0; k--) v[count++] = p[d][k];
+        for (int d = 5; m + d < GENERATE_ORDER; d++) {
+            quad slope = a[d] * a[d - 1];
+            v[count++] = slope;
+            v[count++] = -slope / (a[d - 2] * a[d - 2]) - a[d] / a[d - 1];
+            v[count++] = -slope / (a[d - 2] * a[d - 3]);
+        }
+    }
+    return count;
+}
+
 /* Legendre nodes by Newton; q_l^m sin^m at each, for l, m < 5 (m outer), and again times the weights and pi / 2, or pi where m = 0;
    lane 8 is empty. */
 static int generate_latitudes(quad *v) {
@@ -163,9 +192,10 @@ static void generate(FILE *out) {
     count = generate_turns(v);
     generate_table(out, "double", "isogi_sh__turn_f64", v, count, 1);
     fprintf(out, "#ifdef ISOGI_SH__VECTORS\n");
-    count = generate_factors(v);
-    generate_table(out, "float", "isogi_sh__table_f32", v, count, 0);
+    count = generate_columns(v);
+    generate_table(out, "float", "isogi_sh__columns_f32", v, count, 0);
     fprintf(out, "#endif\n#ifdef ISOGI_SH__SIMD\n");
+    generate_table(out, "double", "isogi_sh__columns_f64", v, count, 1);
     count = generate_polynomials(v);
     generate_table(out, "float", "isogi_sh__polynomials_f32", v, count, 0);
     generate_table(out, "double", "isogi_sh__polynomials_f64", v, count, 1);
