@@ -5829,7 +5829,7 @@ struct isogi_dvr__frame {
     void (*leap)(const isogi_dvr *d, isogi_dvr__packet *p, isogi_counters *work);
     float tolerance;    /* change of extinction times length, and of what is seen of it, from which on a piece is divided */
     float glow;         /* share of the colour that is emitted */
-    void (*look)(const isogi_dvr__frame *f, const isogi_dvr__fast_ray *r, isogi_dvr__fast_run *run);
+    void (*look)(const isogi_dvr__frame *f, const isogi_dvr__fast_ray *r, isogi_dvr__fast_run *run, unsigned lanes); /* a bit a ray */
     void (*shade)(const isogi_dvr__frame *f, const isogi_dvr__fast_ray *r, isogi_dvr__fast_state *s, const isogi_dvr__fast_run *run,
                   isogi_counters *work);
     int sample_kind;    /* of isogi_dvr__sample_kind */
@@ -6042,7 +6042,7 @@ static float isogi_dvr__fast_mean(const isogi_dvr__frame *f, const isogi_dvr__cl
 }
 
 /* Takes a run's samples, and looks up what lies between them. */
-static void isogi_dvr__fast_look(const isogi_dvr__frame *f, const isogi_dvr__fast_ray *r, isogi_dvr__fast_run *run) {
+static void isogi_dvr__fast_look_one(const isogi_dvr__frame *f, const isogi_dvr__fast_ray *r, isogi_dvr__fast_run *run) {
     int k;
     isogi_dvr__fast_classes(f, r, run);
     for (k = 0, run->some = 0; k < run->pieces; k++) {
@@ -6055,6 +6055,12 @@ static void isogi_dvr__fast_look(const isogi_dvr__frame *f, const isogi_dvr__fas
         run->some |= 1u << k, run->mean[k] = mean;
         run->depth[k] = mean * length < 1e30f ? mean * length : 1e30f, run->change[k] = fabsf(e[1]->mean[3] - e[0]->mean[3]) * length;
     }
+}
+
+static void isogi_dvr__fast_look(const isogi_dvr__frame *f, const isogi_dvr__fast_ray *r, isogi_dvr__fast_run *run, unsigned lanes) {
+    int k;
+    for (k = 0; lanes >> k; k++)
+        if (lanes >> k & 1) isogi_dvr__fast_look_one(f, &r[k], &run[k]);
 }
 
 /* Radiance of albedo 1 at a sample's place along the ray (four numbers, the last one means nothing). */
@@ -6106,7 +6112,7 @@ static void isogi_dvr__fast_divide(const isogi_dvr__frame *f, const isogi_dvr__f
     part.length = part.last = (k + 1 < run->pieces ? run->length : run->last) / (float)part.pieces;
     part.tolerance = 3e38f;
     work->samples += ISOGI_DVR__NODES - 2;
-    f->look(f, r, &part);
+    f->look(f, r, &part, 1);
     f->shade(f, r, s, &part, work);
 }
 
@@ -6174,17 +6180,8 @@ static void isogi_dvr__fast_probe(const isogi_dvr__frame *f, const isogi_dvr__fa
 typedef uint16_t isogi_dvr__two_bytes __attribute__((aligned(1), may_alias));
 typedef int32_t isogi_dvr__four_bytes __attribute__((aligned(1), may_alias));
 
-/* Eight numbers of 32 bits, none of them negative. */
-ISOGI_DVR__AVX2 inline void isogi_dvr__numbers_avx2(__m256i x, size_t out[8]) {
-    const __m128i low = _mm256_castsi256_si128(x), high = _mm256_extracti128_si256(x, 1);
-    const uint64_t a = (uint64_t)_mm_cvtsi128_si64(low), b = (uint64_t)_mm_extract_epi64(low, 1);
-    const uint64_t c = (uint64_t)_mm_cvtsi128_si64(high), d = (uint64_t)_mm_extract_epi64(high, 1);
-    out[0] = (uint32_t)a, out[1] = a >> 32, out[2] = (uint32_t)b, out[3] = b >> 32;
-    out[4] = (uint32_t)c, out[5] = c >> 32, out[6] = (uint32_t)d, out[7] = d >> 32;
-}
-
 /* The field along x between pairs of voxels of eight samples, by plain loads: gathers take longer, on some machines several times. */
-ISOGI_DVR__AVX2 inline __m256 isogi_dvr__row_f32_avx2(const char *row, const size_t at[8], __m256 u) {
+ISOGI_DVR__AVX2 inline __m256 isogi_dvr__row_f32_avx2(const char *row, const uint32_t at[8], __m256 u) {
 #define ISOGI_DVR__PAIR(k, l) /* two floats each of samples k and l */ \
     _mm_loadh_pi(_mm_castsi128_ps(_mm_loadl_epi64((const __m128i *)(const void *)(row + at[k]))),          \
                  (const __m64 *)(const void *)(row + at[l]))
@@ -6195,7 +6192,7 @@ ISOGI_DVR__AVX2 inline __m256 isogi_dvr__row_f32_avx2(const char *row, const siz
     return _mm256_fmadd_ps(u, _mm256_sub_ps(to, from), from);
 }
 
-ISOGI_DVR__AVX2 inline __m256 isogi_dvr__row_u8_avx2(const char *row, const size_t at[8], __m256 u) {
+ISOGI_DVR__AVX2 inline __m256 isogi_dvr__row_u8_avx2(const char *row, const uint32_t at[8], __m256 u) {
 #define ISOGI_DVR__PAIR(k) (short)*(const isogi_dvr__two_bytes *)(const void *)(row + at[k])
     const __m128i pair = _mm_setr_epi16(ISOGI_DVR__PAIR(0), ISOGI_DVR__PAIR(1), ISOGI_DVR__PAIR(2), ISOGI_DVR__PAIR(3), ISOGI_DVR__PAIR(4),
                                         ISOGI_DVR__PAIR(5), ISOGI_DVR__PAIR(6), ISOGI_DVR__PAIR(7));
@@ -6206,7 +6203,7 @@ ISOGI_DVR__AVX2 inline __m256 isogi_dvr__row_u8_avx2(const char *row, const size
     return _mm256_fmadd_ps(u, _mm256_sub_ps(to, from), from);
 }
 
-ISOGI_DVR__AVX2 inline __m256 isogi_dvr__row_u16_avx2(const char *row, const size_t at[8], __m256 u) {
+ISOGI_DVR__AVX2 inline __m256 isogi_dvr__row_u16_avx2(const char *row, const uint32_t at[8], __m256 u) {
 #define ISOGI_DVR__PAIR(k) (*(const isogi_dvr__four_bytes *)(const void *)(row + at[k]))
     const __m256i pair = _mm256_setr_epi32(ISOGI_DVR__PAIR(0), ISOGI_DVR__PAIR(1), ISOGI_DVR__PAIR(2), ISOGI_DVR__PAIR(3),
                                            ISOGI_DVR__PAIR(4), ISOGI_DVR__PAIR(5), ISOGI_DVR__PAIR(6), ISOGI_DVR__PAIR(7));
@@ -6217,27 +6214,38 @@ ISOGI_DVR__AVX2 inline __m256 isogi_dvr__row_u16_avx2(const char *row, const siz
 }
 
 /* Cells of samples along an axis, and places in them. */
-ISOGI_DVR__AVX2 inline __m256i isogi_dvr__cells_avx2(const isogi_dvr__frame *f, const isogi_dvr__fast_ray *r, __m256 at, int a, __m256 *u) {
+ISOGI_DVR__AVX2 inline __m256i isogi_dvr__cells_avx2(const isogi_dvr__frame *f, const isogi_dvr__fast_ray *r, __m256 at, int a, float *u) {
     __m256 x = _mm256_fmadd_ps(at, _mm256_set1_ps(r->dir[a]), _mm256_set1_ps(r->origin[a]));
     __m256i c;
     x = _mm256_min_ps(_mm256_max_ps(x, _mm256_setzero_ps()), _mm256_set1_ps(f->cells[a]));
     c = _mm256_min_epi32(_mm256_cvttps_epi32(x), _mm256_set1_epi32(f->last_cell[a]));
-    *u = _mm256_sub_ps(x, _mm256_cvtepi32_ps(c));
+    _mm256_storeu_ps(u, _mm256_sub_ps(x, _mm256_cvtepi32_ps(c)));
     return _mm256_mullo_epi32(c, _mm256_set1_epi32(f->stride[a]));
 }
 
-/* Values of a run's samples, not yet scaled. */
-ISOGI_DVR__AVX2 ISOGI_DVR__ALWAYS __m256 isogi_dvr__samples_avx2(const isogi_dvr__frame *f, const isogi_dvr__fast_ray *r,
-                                                      const isogi_dvr__fast_run *run, int kind) {
+/* Samples of a run: bytes from the first voxel to their cells, later their classes; places in cells; a bit for each that is not finite. */
+typedef struct isogi_dvr__fast_cells {
+    uint32_t at[8];
+    float u[3][8];
+    unsigned bad;
+} isogi_dvr__fast_cells;
+
+ISOGI_DVR__AVX2 inline void isogi_dvr__run_cells_avx2(const isogi_dvr__frame *f, const isogi_dvr__fast_ray *r,
+                                                      const isogi_dvr__fast_run *run, isogi_dvr__fast_cells *cells) {
     const __m256 lane = _mm256_fmadd_ps(_mm256_set1_ps(run->stride), _mm256_setr_ps(0, 1, 2, 3, 4, 5, 6, 7), _mm256_set1_ps(run->first));
+    __m256i offset = isogi_dvr__cells_avx2(f, r, lane, 0, cells->u[0]);
+    offset = _mm256_add_epi32(offset, isogi_dvr__cells_avx2(f, r, lane, 1, cells->u[1]));
+    offset = _mm256_add_epi32(offset, isogi_dvr__cells_avx2(f, r, lane, 2, cells->u[2]));
+    _mm256_storeu_si256((__m256i *)(void *)cells->at, offset);
+}
+
+/* Values of a run's samples, not yet scaled. */
+ISOGI_DVR__AVX2 ISOGI_DVR__ALWAYS __m256 isogi_dvr__samples_avx2(const isogi_dvr__frame *f, const isogi_dvr__fast_cells *cells, int kind) {
     const char *data = (const char *)f->dvr->volume.data, *next = data + f->stride[1], *behind = data + f->stride[2],
                *last = behind + f->stride[1];
-    __m256 u, v, w, x0, x1, x2, x3;
-    __m256i offset = isogi_dvr__cells_avx2(f, r, lane, 0, &u);
-    size_t at[8];
-    offset = _mm256_add_epi32(offset, isogi_dvr__cells_avx2(f, r, lane, 1, &v));
-    offset = _mm256_add_epi32(offset, isogi_dvr__cells_avx2(f, r, lane, 2, &w));
-    isogi_dvr__numbers_avx2(offset, at);
+    const __m256 u = _mm256_loadu_ps(cells->u[0]), v = _mm256_loadu_ps(cells->u[1]), w = _mm256_loadu_ps(cells->u[2]);
+    __m256 x0, x1, x2, x3;
+    const uint32_t *at = cells->at;
     if (kind == 0) x0 = isogi_dvr__row_f32_avx2(data, at, u), x1 = isogi_dvr__row_f32_avx2(next, at, u);
     else if (kind == 1) x0 = isogi_dvr__row_u8_avx2(data, at, u), x1 = isogi_dvr__row_u8_avx2(next, at, u);
     else x0 = isogi_dvr__row_u16_avx2(data, at, u), x1 = isogi_dvr__row_u16_avx2(next, at, u);
@@ -6267,34 +6275,41 @@ ISOGI_DVR__AVX2 inline __m256 isogi_dvr__close_avx2(__m256 difference, __m256i i
 }
 
 /* The extinction of eight classes: integrals before them, so many quanta and the rest, and over them. */
-ISOGI_DVR__AVX2 inline void isogi_dvr__matter_avx2(const isogi_dvr__frame *f, __m256i index, __m256i *before, __m256 *rest, __m256 *mean) {
+ISOGI_DVR__AVX2 inline void isogi_dvr__matter_avx2(const isogi_dvr__frame *f, const uint32_t at[8], __m256i *before, __m256 *rest,
+                                                   __m256 *mean) {
 #define ISOGI_DVR__TWO(k) /* classes k and k + 4 */ \
-    _mm256_insertf128_ps(_mm256_castps128_ps256(_mm_load_ps((const float *)(const void *)(from + at[k]))), \
-                         _mm_load_ps((const float *)(const void *)(from + at[(k) + 4])), 1)
-    const char *from = (const char *)f->matter;
-    __m256 x0, x1, x2, x3, low0, low1, high0, high1;
-    size_t at[8];
-    isogi_dvr__numbers_avx2(_mm256_slli_epi32(index, 4), at);
-    x0 = ISOGI_DVR__TWO(0), x1 = ISOGI_DVR__TWO(1), x2 = ISOGI_DVR__TWO(2), x3 = ISOGI_DVR__TWO(3);
-    low0 = _mm256_unpacklo_ps(x0, x1), low1 = _mm256_unpacklo_ps(x2, x3);
-    high0 = _mm256_unpackhi_ps(x0, x1), high1 = _mm256_unpackhi_ps(x2, x3);
+    _mm256_insertf128_ps(_mm256_castps128_ps256(_mm_load_ps((const float *)(const void *)&f->matter[at[k]])), \
+                         _mm_load_ps((const float *)(const void *)&f->matter[at[(k) + 4]]), 1)
+    __m256 x0 = ISOGI_DVR__TWO(0), x1 = ISOGI_DVR__TWO(1), x2 = ISOGI_DVR__TWO(2), x3 = ISOGI_DVR__TWO(3);
+    __m256 low0 = _mm256_unpacklo_ps(x0, x1), low1 = _mm256_unpacklo_ps(x2, x3);
+    __m256 high0 = _mm256_unpackhi_ps(x0, x1), high1 = _mm256_unpackhi_ps(x2, x3);
     *before = _mm256_castps_si256(_mm256_shuffle_ps(low0, low1, 0x44));
     *rest = _mm256_shuffle_ps(low0, low1, 0xee), *mean = _mm256_shuffle_ps(high0, high1, 0x44);
 #undef ISOGI_DVR__TWO
 }
 
-/* As isogi_dvr__fast_look. */
-ISOGI_DVR__AVX2 ISOGI_DVR__ALWAYS void isogi_dvr__look_avx2(const isogi_dvr__frame *f, const isogi_dvr__fast_ray *r,
-                                                            isogi_dvr__fast_run *run, int kind) {
-    const __m256 zero = _mm256_setzero_ps();
-    const __m256i lane = _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7), infinite = _mm256_set1_epi32(0x7f800000);
-    __m256 value = isogi_dvr__samples_avx2(f, r, run, kind), rest, node, sum, change, difference, mean, length, in, close;
-    __m256i index, before, bad = _mm256_cmpeq_epi32(_mm256_and_si256(_mm256_castps_si256(value), infinite), infinite);
+/* Places of samples among the classes, and their classes. */
+ISOGI_DVR__AVX2 ISOGI_DVR__ALWAYS void isogi_dvr__run_classes_avx2(const isogi_dvr__frame *f, isogi_dvr__fast_run *run,
+                                                                   isogi_dvr__fast_cells *cells, int kind) {
+    const __m256i infinite = _mm256_set1_epi32(0x7f800000);
+    __m256 value = isogi_dvr__samples_avx2(f, cells, kind);
+    __m256i bad = _mm256_cmpeq_epi32(_mm256_and_si256(_mm256_castps_si256(value), infinite), infinite);
     value = _mm256_fmadd_ps(value, _mm256_set1_ps(f->value_scale), _mm256_set1_ps(f->value_bias));
     value = _mm256_min_ps(_mm256_max_ps(_mm256_mul_ps(value, _mm256_set1_ps(f->scale)), _mm256_set1_ps(-1e15f)), _mm256_set1_ps(1e15f));
     value = _mm256_andnot_ps(_mm256_castsi256_ps(bad), value);
-    index = isogi_dvr__fast_classes_avx2(f, value);
-    isogi_dvr__matter_avx2(f, index, &before, &rest, &node);
+    cells->bad = (unsigned)_mm256_movemask_ps(_mm256_castsi256_ps(bad));
+    _mm256_storeu_ps(run->classes, value);
+    _mm256_storeu_si256((__m256i *)(void *)cells->at, isogi_dvr__fast_classes_avx2(f, value));
+}
+
+/* What lies between the samples of a run. */
+ISOGI_DVR__AVX2 inline void isogi_dvr__run_matter_avx2(const isogi_dvr__frame *f, isogi_dvr__fast_run *run,
+                                                       const isogi_dvr__fast_cells *cells) {
+    const __m256 value = _mm256_loadu_ps(run->classes);
+    const __m256i lane = _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7), index = _mm256_loadu_si256((const __m256i *)(const void *)cells->at);
+    __m256 rest, node, sum, change, difference, mean, length, close;
+    __m256i before;
+    isogi_dvr__matter_avx2(f, cells->at, &before, &rest, &node);
     before = _mm256_sub_epi32(_mm256_castps_si256(isogi_dvr__next_avx2(_mm256_castsi256_ps(before))), before);
     sum = _mm256_mul_ps(_mm256_sub_ps(value, _mm256_cvtepi32_ps(index)), node);
     difference = _mm256_sub_ps(isogi_dvr__next_avx2(value), value), change = isogi_dvr__next_avx2(node);
@@ -6302,25 +6317,36 @@ ISOGI_DVR__AVX2 ISOGI_DVR__ALWAYS void isogi_dvr__look_avx2(const isogi_dvr__fra
     mean = _mm256_add_ps(_mm256_sub_ps(isogi_dvr__next_avx2(rest), rest), _mm256_sub_ps(isogi_dvr__next_avx2(sum), sum));
     mean = _mm256_fmadd_ps(_mm256_cvtepi32_ps(before), _mm256_set1_ps(f->quantum[3]), mean);
     mean = _mm256_blendv_ps(_mm256_div_ps(mean, difference), _mm256_mul_ps(_mm256_set1_ps(0.5f), _mm256_add_ps(node, change)), close);
-    in = _mm256_castsi256_ps(_mm256_or_si256(bad, _mm256_castps_si256(isogi_dvr__next_avx2(_mm256_castsi256_ps(bad)))));
-    in = _mm256_andnot_ps(in, _mm256_castsi256_ps(_mm256_cmpgt_epi32(_mm256_set1_epi32(run->pieces), lane)));
-    in = _mm256_and_ps(in, _mm256_cmp_ps(mean, zero, _CMP_GT_OQ)), mean = _mm256_and_ps(in, mean);
+    mean = _mm256_and_ps(mean, _mm256_cmp_ps(mean, _mm256_setzero_ps(), _CMP_GT_OQ));
+    mean = _mm256_and_ps(mean, _mm256_castsi256_ps(_mm256_cmpgt_epi32(_mm256_set1_epi32(run->pieces), lane)));
+    if (cells->bad) {
+        const __m256i bit = _mm256_setr_epi32(1, 2, 4, 8, 16, 32, 64, 128), out = _mm256_set1_epi32((int)(cells->bad | cells->bad >> 1));
+        mean = _mm256_andnot_ps(_mm256_castsi256_ps(_mm256_cmpeq_epi32(_mm256_and_si256(out, bit), bit)), mean);
+    }
     length = _mm256_castsi256_ps(_mm256_cmpeq_epi32(_mm256_set1_epi32(run->pieces - 1), lane));
     length = _mm256_blendv_ps(_mm256_set1_ps(run->length), _mm256_set1_ps(run->last), length);
-    run->some = (unsigned)_mm256_movemask_ps(in);
-    _mm256_storeu_ps(run->classes, value), _mm256_storeu_ps(run->mean, mean);
+    run->some = (unsigned)_mm256_movemask_ps(_mm256_cmp_ps(mean, _mm256_setzero_ps(), _CMP_GT_OQ));
+    _mm256_storeu_ps(run->mean, mean);
     _mm256_storeu_ps(run->depth, _mm256_min_ps(_mm256_mul_ps(mean, length), _mm256_set1_ps(1e30f)));
     _mm256_storeu_ps(run->change, _mm256_mul_ps(isogi_dvr__magnitude_avx2(_mm256_sub_ps(change, node)), length));
 }
 
-ISOGI_DVR__AVX2 void isogi_dvr__look_f32_avx2(const isogi_dvr__frame *f, const isogi_dvr__fast_ray *r, isogi_dvr__fast_run *run) {
-    isogi_dvr__look_avx2(f, r, run, 0);
-}
-ISOGI_DVR__AVX2 void isogi_dvr__look_u8_avx2(const isogi_dvr__frame *f, const isogi_dvr__fast_ray *r, isogi_dvr__fast_run *run) {
-    isogi_dvr__look_avx2(f, r, run, 1);
-}
-ISOGI_DVR__AVX2 void isogi_dvr__look_u16_avx2(const isogi_dvr__frame *f, const isogi_dvr__fast_ray *r, isogi_dvr__fast_run *run) {
-    isogi_dvr__look_avx2(f, r, run, 2);
+/* As isogi_dvr__fast_look: cells of all runs, then values of all, then matter, since each waits long for what is before it. */
+ISOGI_DVR__AVX2 void isogi_dvr__look_avx2(const isogi_dvr__frame *f, const isogi_dvr__fast_ray *r, isogi_dvr__fast_run *run,
+                                          unsigned lanes) {
+#define ISOGI_DVR__EACH(what) \
+    for (left = lanes; left; left &= left - 1) { \
+        int k = __builtin_ctz(left); \
+        what; \
+    }
+    isogi_dvr__fast_cells cells[ISOGI_DVR__LANES];
+    unsigned left;
+    ISOGI_DVR__EACH(isogi_dvr__run_cells_avx2(f, &r[k], &run[k], &cells[k]))
+    if (f->sample_kind == 0) ISOGI_DVR__EACH(isogi_dvr__run_classes_avx2(f, &run[k], &cells[k], 0))
+    else if (f->sample_kind == 1) ISOGI_DVR__EACH(isogi_dvr__run_classes_avx2(f, &run[k], &cells[k], 1))
+    else ISOGI_DVR__EACH(isogi_dvr__run_classes_avx2(f, &run[k], &cells[k], 2))
+    ISOGI_DVR__EACH(isogi_dvr__run_matter_avx2(f, &run[k], &cells[k]))
+#undef ISOGI_DVR__EACH
 }
 
 /* As isogi_dvr__exp. */
@@ -6500,10 +6526,10 @@ static void isogi_dvr__fast_cast(const isogi_dvr__frame *f, const isogi_dvr__fas
             run[k].first = (float)p.next[k], run[k].stride = (float)stride,
             run[k].pieces = left < ISOGI_DVR__NODES ? left : ISOGI_DVR__NODES - 1;
             run[k].length = r[k].piece * run[k].stride, run[k].last = left < ISOGI_DVR__NODES ? r[k].last_piece : run[k].length;
-            f->look(f, &r[k], &run[k]);
-            work->samples += ISOGI_DVR__NODES, any = 1;
+            work->samples += ISOGI_DVR__NODES, any |= 1 << k;
             p.next[k] += stride * (ISOGI_DVR__NODES - 1);
         }
+        f->look(f, r, run, (unsigned)any);
         for (k = 0; k < ISOGI_DVR__LANES; k++) {
             if (run[k].some) f->shade(f, &r[k], &s[k], &run[k], work);
             if (!(s[k].clear > f->end)) p.next[k] = p.count[k];
@@ -6787,10 +6813,6 @@ static int isogi_dvr__sample_kind(const isogi_volume *v, const int cells[3], uin
 
 /* Tables of a picture on the path of physical space; nothing where another path is asked for. */
 static isogi_result isogi_dvr__begin_frame(isogi_dvr__render_job *job) {
-#ifdef ISOGI_DVR__AVX
-    static void (*const looks[3])(const isogi_dvr__frame *, const isogi_dvr__fast_ray *, isogi_dvr__fast_run *) = {
-        isogi_dvr__look_f32_avx2, isogi_dvr__look_u8_avx2, isogi_dvr__look_u16_avx2};
-#endif
     const isogi_dvr *d = job->dvr;
     const isogi_volume *v = &d->volume;
     isogi_dvr__frame *f = &job->fast.frame;
@@ -6821,7 +6843,7 @@ static isogi_result isogi_dvr__begin_frame(isogi_dvr__render_job *job) {
 #ifdef ISOGI_DVR__AVX
     if (f->sample_kind >= 0 && isogi_dvr__machine() >= 3 && (!d->context.force_path || d->context.force_path > 2) &&
         points < 0x7fffffff && d->held.total < 0x0fffffff)
-        f->look = looks[f->sample_kind], f->shade = isogi_dvr__fast_shade_avx2;
+        f->look = isogi_dvr__look_avx2, f->shade = isogi_dvr__fast_shade_avx2;
 #endif
     f->count = isogi_dvr__count_classes(d, &low, &scale);
     f->classes = (isogi_dvr__class_entry *)isogi_allocate(&d->context, f->count, sizeof *f->classes);
