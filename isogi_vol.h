@@ -175,7 +175,8 @@ typedef struct isogi_volume {
     double spacing[3];   /* > 0; 0 = 1 */
     double origin[3];    /* world position of voxel (0,0,0), of that of the larger field for a chunk */
     double axes[9];      /* row-major 3x3, column a = world direction of grid axis a, invertible; all 0 = identity */
-    double scale, bias;  /* scale 0 = 1; every number that an integer type holds must become a finite one */
+    double scale, bias;  /* scale 0 = 1; up to 1e300, and so is |scale raw| + |bias| for every finite number that the type holds; of
+                            ISOGI_F64, for those that are in data */
     /* of a chunk: see above; first up to 2^53, halos up to 2^31-1, without use along an axis of one voxel */
     size_t first[3], halo_low[3], halo_high[3];
 } isogi_volume;
@@ -826,7 +827,7 @@ static isogi_result isogi_vol__check_layout(const isogi_volume *v, size_t type_s
 }
 
 ISOGI_API isogi_result isogi_volume_validate(const isogi_volume *volume) {
-    static const double largest[4] = {255, 128, 65535, 32768};
+    static const double largest[6] = {255, 128, 65535, 32768, FLT_MAX, 1};
     size_t type_size;
     double length = 1, determinant;
     isogi_volume v;
@@ -842,7 +843,7 @@ ISOGI_API isogi_result isogi_volume_validate(const isogi_volume *volume) {
     if (!isogi_vol__finite64(volume->scale) || !isogi_vol__finite64(volume->bias)) return ISOGI_INVALID;
     if (!isogi_vol__finite3(volume->origin) || !isogi_vol__finite3(volume->spacing)) return ISOGI_INVALID;
     v = isogi_vol__resolve(volume);
-    if (v.type < ISOGI_F32 && !isogi_vol__finite64(fabs(v.scale) * largest[v.type] + fabs(v.bias))) return ISOGI_INVALID;
+    if (!(fabs(v.scale) <= 1e300 && fabs(v.bias) <= 1e300 && fabs(v.scale) * largest[v.type] + fabs(v.bias) <= 1e300)) return ISOGI_INVALID;
     for (a = 0; a < 3; a++) {
         double x = v.axes[a], y = v.axes[3 + a], z = v.axes[6 + a];
         if (!(v.spacing[a] > 0)) return ISOGI_INVALID;
@@ -6358,6 +6359,7 @@ ISOGI_API int isogi_vol_next_interval(const isogi_pyramid *pyramid, const isogi_
     /* what rounding may have moved */
     slack = 1e-12 * (fabs(w.base) + piece[1] + 1 / isogi_vol__largest(w.dir[0], w.dir[1], w.dir[2]));
     begin = isogi_vol__max(w.base + piece[0] - slack, w.base), end = isogi_vol__min(piece[1] + slack, w.end) + w.base;
+    begin = isogi_vol__max(begin, rest.tmin), end = isogi_vol__min(end, isogi_vol__tmax(rest.tmax));
     if (!found || !(end > begin) || !(w.end > slack)) return 0;
     interval[0] = begin, interval[1] = end;
     return 1;

@@ -386,6 +386,36 @@ TEST(odd_descriptions_are_refused_or_understood) {
     CHECK(built > 1000, "only %ld were built", built);
 }
 
+/* Values go up to 1e300: what scale and bias would take beyond is refused, just below it is built and has its range. */
+TEST(scales_beyond_the_largest_value_are_refused) {
+    static const double largest[6] = {255, 128, 65535, 32768, (double)FLT_MAX, 1};
+    static const double data[8] = {0};
+    for (int type = ISOGI_U8; type <= ISOGI_F64; type++)
+        for (int sign = -1; sign <= 1; sign += 2) {
+            isogi_volume v = {.data = data, .type = (isogi_type)type, .size = {2, 2, 2}};
+            v.scale = sign * 0.999e300 / largest[type];
+            CHECK(isogi_volume_validate(&v) == ISOGI_OK, "type %d, scale %g", type, v.scale);
+            v.scale = sign * 1.001e300 / largest[type];
+            CHECK(isogi_volume_validate(&v) == ISOGI_INVALID, "type %d, scale %g", type, v.scale);
+            v.scale = 0.6e300 / largest[type], v.bias = sign * 0.6e300;
+            CHECK(isogi_volume_validate(&v) == ISOGI_INVALID, "type %d, scale %g, bias %g", type, v.scale, v.bias);
+            v.scale = 1, v.bias = sign * 0.999e300;
+            CHECK(isogi_volume_validate(&v) == ISOGI_OK, "type %d, bias %g", type, v.bias);
+            v.bias = sign * 1.001e300;
+            CHECK(isogi_volume_validate(&v) == ISOGI_INVALID, "type %d, bias %g", type, v.bias);
+        }
+    float extreme[8] = {0, 1, 2, 3, 4, FLT_MAX, -FLT_MAX, 5};
+    isogi_volume v = {.data = extreme, .type = ISOGI_F32, .size = {2, 2, 2}, .scale = -2.9e261};
+    isogi_pyramid *p = NULL;
+    double range[2];
+    CHECK(isogi_vol_build(&p, &v, NULL) == ISOGI_OK, "build");
+    isogi_vol_range(p, range);
+    CHECK(range[0] <= -0.98e300 && range[0] >= -1e300 && range[1] >= 0.98e300 && range[1] <= 1e300, "%g..%g", range[0], range[1]);
+    isogi_vol_free(p), p = NULL;
+    v.scale = -1e300;
+    CHECK(isogi_vol_build(&p, &v, NULL) == ISOGI_INVALID && !p, "values of 3e338");
+}
+
 TEST(calls_without_arguments_are_refused) {
     static const double data[8] = {0, 1, 2, 3, 4, 5, 6, 7};
     isogi_volume v = {.data = data, .type = ISOGI_F64, .size = {2, 2, 2}};
