@@ -812,7 +812,7 @@ typedef struct isogi_dvr__blocks {
     size_t *first;                 /* [2][total]: its first node in `data` and in `sh` */
     size_t *order, due;           /* blocks to be computed */
     size_t counted;               /* blocks whose histogram holds the present bins, from the first on */
-    double share;                 /* of a whole update that is left when the histograms are there */
+    double share;                 /* of a whole update, what follows its histograms; 1 where it needs none */
     int ready;                    /* levels, data and order are those of the last change */
     float *data;
     uint16_t *sh;                  /* [nodes][order * order], half floats */
@@ -2367,7 +2367,7 @@ static void isogi_dvr__drop_coming(isogi_dvr *d) {
 
 /* Visibility has to be stepped again, from the beginning. */
 static void isogi_dvr__begin_anew(isogi_dvr *d) {
-    d->next = d->matter.prepared = 0, d->blocks.ready = 0;
+    d->next = d->matter.prepared = 0, d->blocks.ready = 0, d->blocks.share = 1;
     isogi_dvr__drop_coming(d);
 }
 
@@ -3972,7 +3972,7 @@ static isogi_result isogi_dvr__count_blocks(isogi_dvr *d, uint64_t max_rays, dou
     isogi_result result;
     size_t count;
     whole.progress = NULL;
-    *used = 0, b->share = 1;
+    *used = 0;
     isogi_dvr__set_table(d, m->table), isogi_dvr__set_bins(d, bin);
     if (memcmp(b->bin, bin, sizeof bin) || b->low < m->low || b->low > m->low || b->scale < m->scale || b->scale > m->scale) {
         memcpy(b->bin, bin, sizeof bin);

@@ -942,6 +942,40 @@ TEST(every_allocation_may_fail) {
     field_free(&f);
 }
 
+/* Steps that fail here and there, with each method, before and after edits of the function: what remains falls all the same. */
+TEST(what_remains_does_not_grow_when_memory_runs_out) {
+    field f = field_waves(40, 11);
+    for (int method = 0; method <= ISOGI_DVR_SWEEP; method++) {
+        scarce s = {-1, 0, 0, 0};
+        const isogi_context context = {.alloc = scarce_alloc, .release = scarce_release, .user = &s, .threads = 1};
+        const isogi_dvr_desc desc = {.pyramid = f.pyramid, .shading = ISOGI_DVR_VISIBILITY, .method = (isogi_dvr_method)method,
+            .grid = {4, 4, 4}, .directions = 20};
+        isogi_transfer_point p[2] = {{0, {1, 1, 1}, 0.1f}, {1, {1, 1, 1}, 0.2f}};
+        const isogi_transfer transfer = {p, 2, NULL, 0};
+        isogi_dvr *dvr = dvr_new_with(&desc, &transfer, &context);
+        int failed = 0;
+        for (int edit = 0; edit < 3; edit++) { /* the second keeps the classes of values, the third moves them */
+            double remaining = 1, last = 2;
+            p[1].extinction += 0.1f, p[0].value = edit == 2 ? 0.5 : 0;
+            CHECK(isogi_dvr_set_transfer(dvr, &transfer) == ISOGI_OK, "edit");
+            for (int i = 0; i < 3000 && remaining > 0; i++) {
+                s.until = i % 3 == 2 ? s.calls + i % 5 : -1;
+                isogi_result result = isogi_dvr_step(dvr, 1 + 100 * (uint64_t)(i % 7), &remaining);
+                failed += result == ISOGI_NO_MEMORY;
+                CHECK(result == ISOGI_NO_MEMORY || result == ISOGI_OK, "step: %s", isogi_result_string(result));
+                CHECK(remaining < last || (result != ISOGI_OK && remaining <= last), "method %d, edit %d, step %d: %g after %g (%d failed)",
+                      method, edit, i, remaining, last, failed);
+                last = remaining;
+            }
+            CHECK(!(remaining > 0), "method %d, edit %d: %g left", method, edit, remaining);
+        }
+        CHECK(failed > 0, "method %d: no step failed", method);
+        s.until = -1, isogi_dvr_free(dvr);
+        CHECK(s.live == 0 && s.bytes == 0, "%d blocks left", s.live);
+    }
+    field_free(&f);
+}
+
 TEST(bad_input_is_refused) {
     field f = field_waves(6, 1);
     isogi_dvr *dvr = NULL;

@@ -409,11 +409,14 @@ TEST(pieces_of_rays_are_those_whose_blocks_hold_the_ranges) {
             if (i % 4 == 0) ray.tmin = random_range(&r, 0, 20), ray.tmax = ray.tmin + random_range(&r, 0, 50);
             int more = isogi_vol_next_interval(f.pyramid, &ray, (const double(*)[2])ranges, count, ray.tmin, piece, &counters), n = 0;
             pieces += more;
+            CHECK(!more || (piece[0] >= ray.tmin && (!(ray.tmax > 0) || piece[1] <= ray.tmax)), "%.17g..%.17g of %.17g..%.17g", piece[0],
+                  piece[1], ray.tmin, ray.tmax);
             for (at = ray.tmin; at < (ray.tmax > 0 ? ray.tmax : 400); at += step) {
                 while (more && piece[1] < at && n++ < 1000) {
                     end = piece[1];
                     more = isogi_vol_next_interval(f.pyramid, &ray, (const double(*)[2])ranges, count, end, piece, &counters);
-                    CHECK(!more || (piece[0] >= end && piece[1] > piece[0]), "%g..%g after %g", piece[0], piece[1], end);
+                    CHECK(!more || (piece[0] >= end && piece[1] > piece[0] && (!(ray.tmax > 0) || piece[1] <= ray.tmax)),
+                          "%.17g..%.17g after %.17g, tmax %.17g", piece[0], piece[1], end, ray.tmax);
                     pieces += more, touching += more && piece[0] - end < 1e-9;
                 }
                 size_t first[3], last[3];
@@ -438,6 +441,26 @@ TEST(pieces_of_rays_are_those_whose_blocks_hold_the_ranges) {
     printf("    %ld pieces; %ld places within them, %ld between\n", pieces, within, between);
     CHECK(touching * 50 <= pieces, "%ld of %ld pieces begin where another ends", touching, pieces);
     CHECK(within > 10000 && between > 10000 && pieces > 300, "%ld and %ld places: the test says little", within, between);
+}
+
+TEST(pieces_end_with_their_ray_to_the_bit) {
+    test_random r = {12};
+    const double all[1][2] = {{-9, 9}};
+    field f = field_new(9, 9, 9);
+    long ends = 0, begins = 0;
+    field_fill(&f, 0, &r), field_build(&f);
+    for (int i = 0; i < 10000; i++) {
+        isogi_ray ray = {.tmin = i % 2 ? -1e6 : random_range(&r, 0, 1), .tmax = 1 + random_unit(&r)};
+        double piece[2];
+        for (int a = 0; a < 3; a++) ray.origin[a] = random_range(&r, 0, 8), ray.dir[a] = (float)random_range(&r, -0.5, 0.5);
+        for (double t = ray.tmin; t < ray.tmax && isogi_vol_next_interval(f.pyramid, &ray, all, 1, t, piece, NULL); t = piece[1]) {
+            CHECK(piece[0] >= ray.tmin && piece[1] <= ray.tmax && piece[0] < piece[1], "%.17g..%.17g of %.17g..%.17g", piece[0], piece[1],
+                  ray.tmin, ray.tmax);
+            ends += !(piece[1] < ray.tmax), begins += !(piece[0] > ray.tmin);
+        }
+    }
+    CHECK(ends > 3000 && begins > 3000, "%ld end and %ld begin with their ray", ends, begins);
+    field_free(&f);
 }
 
 /* ---- chunks with a halo ---- */
