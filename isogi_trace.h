@@ -315,8 +315,10 @@ ISOGI_API isogi_result isogi_trace_sample_transfer(const isogi_trace *trace, con
 /* ---- when something changes: only what depends on it is computed again ----
    Texels that are to be computed again keep their light until isogi_trace_step has come to them, can be read meanwhile, and count as
    drafts in isogi_trace_report. With PATHS the result is the same bits as a new bake; FEEDBACK begins with new probes, takes samples
-   of lazy texels that were not finished anew, and texels that are kept keep what a neighbour on another isosurface lent them. Both count
-   as writers; on failure nothing has changed. */
+   of lazy texels that were not finished anew, and texels that are kept keep what a neighbour on another isosurface lent them. With
+   desc.hierarchy a change that reaches all texels drops the fine ones, and decides anew where they are needed: until then the coarse ones
+   are read. After any other they stay where they were, also in cells for which a new bake would not have them: more texels than its, and
+   not its bits. Both count as writers; on failure nothing has changed. */
 
 /* A new description for the same texture. Texels computed again:
      lighting                        IRRADIANCE: all. TRANSFER: none, no rays
@@ -5389,6 +5391,16 @@ static void isogi_trace__making_anew(isogi_trace__feedback *f, size_t bricks) {
     if (!bricks) f->level = 0, f->cursor = 0;
 }
 
+/* Where all light changes, the coarse texels say anew which fine ones are needed. */
+static void isogi_trace__drop_fine(isogi_trace *t) {
+    size_t i;
+    if (!t->coarse) return;
+    for (i = 0; i < t->brick_count; i++) {
+        isogi_trace__brick_free(t, t->bricks[i]);
+        t->bricks[i] = NULL;
+    }
+}
+
 /* Marks the texels and queues their bricks; needs no memory. */
 static void isogi_trace__change_commit(isogi_trace__change *c) {
     isogi_trace *t = c->trace;
@@ -5396,6 +5408,7 @@ static void isogi_trace__change_commit(isogi_trace__change *c) {
     size_t i, texel[3], count = 0;
     uint32_t slot;
     if (begin) isogi_trace__feedback_reset(t);
+    if (c->desc && c->all) isogi_trace__drop_fine(t);
     t->wanted = t->done = 0;
     for (i = 0; i < t->brick_count; i++) {
         isogi_trace__brick *brick = t->bricks[i];

@@ -425,6 +425,36 @@ TEST(intervals_change_while_nodes_are_made) {
     scene_free(&s);
 }
 
+/* A change to all light decides anew which fine texels there are: the bits and the memory of a new bake. What was there before has a
+   sharp shadow, which needs many. */
+TEST(hierarchies_are_made_anew_where_all_light_changes) {
+    double q[5] = {10, 12, 10, 4, 5};
+    scene s = scene_make(25, 25, 25, NULL, ball_over_plane, q);
+    isogi_light sun = light_make(ISOGI_LIGHT_DIRECTIONAL, 1, 3, 1, 2, 0);
+    float points[100][3], e[2][100][3];
+    int n = surface_points(&s, 0, 100, 4, points);
+    for (int k = 2; k < 5; k++) {
+        isogi_trace_desc d = desc_make(&s, 0.5f, 1, 16), sunny;
+        isogi_trace_report report[3];
+        d.hierarchy = 0.2f, d.method = k & 1 ? ISOGI_TRACE_FEEDBACK : ISOGI_TRACE_PATHS, d.sides = ISOGI_TRACE_BOTH_SIDES;
+        sunny = d, memset(&sunny.lighting, 0, sizeof sunny.lighting);
+        sunny.lighting.lights = &sun, sunny.lighting.light_count = 1;
+        isogi_trace *t = NULL, *fresh = baked(&d);
+        CHECK(isogi_trace_create(&t, &sunny, NULL) == ISOGI_OK, "create");
+        isogi_trace_step(t, k / 2 == 1 ? 0 : 30000, NULL); /* to the end, or while it is under way */
+        isogi_trace_status(t, &report[0]);
+        CHECK(isogi_trace_change(t, &d) == ISOGI_OK && isogi_trace_step(t, 0, NULL) == ISOGI_OK, "change");
+        isogi_trace_status(t, &report[1]), isogi_trace_status(fresh, &report[2]);
+        isogi_trace_sample(t, (const float(*)[3])points, (size_t)n, e[0], NULL);
+        isogi_trace_sample(fresh, (const float(*)[3])points, (size_t)n, e[1], NULL);
+        CHECK(report[1].texels == report[2].texels && (k / 2 != 1 || 10 * report[0].texels > 13 * report[1].texels),
+              "case %d: %d texels, %d before, %d of a new bake", k, (int)report[1].texels, (int)report[0].texels, (int)report[2].texels);
+        CHECK(k & 1 || !memcmp(e[0], e[1], (size_t)n * sizeof *e[0]), "case %d: other bits", k);
+        isogi_trace_free(t), isogi_trace_free(fresh);
+    }
+    scene_free(&s);
+}
+
 /* Two levels on both sides: the coarse one is computed again, and decides anew. */
 TEST(hierarchies_follow_changes) {
     double q[5] = {10, 12, 10, 4, 5};
