@@ -226,6 +226,74 @@ TEST(bundles_have_the_bits_of_single_rays) {
     CHECK(found > 5000, "only %ld hits", found);
 }
 
+/* Bundles side by side: those of all kinds, some in one place but for different isovalues, some that begin nowhere or beyond the box;
+   and the same rays as a batch, in which those of a bundle follow each other. */
+TEST(many_bundles_have_the_bits_of_one_at_a_time) {
+    enum { BUNDLES = 40, EACH = 64 };
+    static const size_t sizes[] = {1, 5, 8, 20, 64};
+    static isogi_bundle bundles[BUNDLES];
+    static isogi_hit starts[BUNDLES], hits[BUNDLES * EACH], alone[BUNDLES * EACH];
+    static isogi_ray rays[BUNDLES * EACH];
+    static uint8_t occluded[BUNDLES * EACH];
+    static float dirs[BUNDLES * EACH][3];
+    test_random r = {43};
+    long found = 0, wrong = 0, wrong_any = 0, wrong_rays = 0;
+    isogi_counters many = {0}, one = {0};
+    for (int v = 0; v < 60; v++) {
+        const size_t each = sizes[v % 5], count = v % 7 ? BUNDLES : 1 + random_bits(&r) % 3;
+        isogi_context context = {.threads = 1, .force_path = v % 3 ? 0 : v / 3 % 4 + 1};
+        field f = field_new(40, 41, 22);
+        field_fill(&f, v % KINDS, &r);
+        field_build_with(&f, &context);
+        memset(bundles, 0, sizeof bundles);
+        for (size_t n = 0; n < count; n++) {
+            isogi_ray ray = random_ray(&f, v % KINDS == QUANTISED ? 0.25 : random_range(&r, -0.5, 0.5), &r);
+            isogi_bundle *b = &bundles[n];
+            memcpy(b->origin, ray.origin, sizeof b->origin);
+            for (int a = 0; a < 3; a++) /* most begin inside */
+                if (n % 4) b->origin[a] = random_range(&r, 0, f.size[a] - 1.0);
+            b->isovalue = ray.isovalue, b->flags = n % 6 == 1 ? ISOGI_RAY_CAPPED : 0, b->tmax = n % 5 ? 0 : 9, b->tmin = n % 9 == 8 ? 1 : 0;
+            if (n % 3 == 1) memcpy(b->origin, bundles[n - 1].origin, sizeof b->origin), b->isovalue += n % 2 ? 0.1 : 0;
+            if (n == 11) b->origin[1] = (double)NAN;
+            isogi_vol_intersect(f.pyramid, &ray, 1, &starts[n], NULL);
+            if (n % 4 == 2 && starts[n].side) b->start = &starts[n], b->isovalue = ray.isovalue;
+            for (size_t i = n * each; i < (n + 1) * each; i++) {
+                double d[3];
+                random_direction(&r, d);
+                for (int a = 0; a < 3; a++) dirs[i][a] = (float)d[a];
+                rays[i] = (isogi_ray){.flags = b->flags, .tmin = b->tmin, .tmax = b->tmax, .isovalue = b->isovalue};
+                memcpy(rays[i].origin, b->origin, sizeof b->origin), memcpy(rays[i].dir, dirs[i], sizeof dirs[i]);
+            }
+            isogi_vol_bundle(f.pyramid, b, (const float(*)[3])dirs + n * each, each, alone + n * each, &one);
+        }
+        memset(hits, 77, sizeof hits);
+        CHECK(isogi_vol_bundles(f.pyramid, bundles, count, (const float(*)[3])dirs, each, hits, &many) == ISOGI_OK, "hits");
+        CHECK(isogi_vol_bundles_occluded(f.pyramid, bundles, count, (const float(*)[3])dirs, each, occluded, NULL) == ISOGI_OK, "any");
+        for (size_t i = 0; i < count * each; i++) {
+            wrong += !same_hit(&alone[i], &hits[i]), wrong_any += occluded[i] != (alone[i].side != 0);
+            found += alone[i].side != 0;
+        }
+        isogi_vol_intersect(f.pyramid, rays, count * each, hits, NULL);
+        for (size_t i = 0; i < count * each; i++) wrong_rays += !bundles[i / each].start && !same_hit(&alone[i], &hits[i]);
+        field_free(&f);
+    }
+    printf("    %ld hits, %ld + %ld + %ld wrong\n", found, wrong, wrong_any, wrong_rays);
+    CHECK(wrong == 0 && wrong_any == 0 && wrong_rays == 0, "%ld hits, %ld any hits, %ld rays differ", wrong, wrong_any, wrong_rays);
+    CHECK(found > 5000, "only %ld hits", found);
+    CHECK(many.rays == one.rays, "rays are counted otherwise");
+    CHECK(isogi_vol_bundles(NULL, bundles, 1, (const float(*)[3])dirs, 1, hits, NULL) == ISOGI_INVALID, "no pyramid");
+    {
+        field f = field_new(4, 4, 4);
+        field_build(&f);
+        CHECK(isogi_vol_bundles(f.pyramid, NULL, 0, NULL, 0, NULL, NULL) == ISOGI_OK, "nothing");
+        CHECK(isogi_vol_bundles(f.pyramid, NULL, 1, (const float(*)[3])dirs, 1, hits, NULL) == ISOGI_INVALID, "no bundles");
+        CHECK(isogi_vol_bundles(f.pyramid, bundles, 1, NULL, 1, hits, NULL) == ISOGI_INVALID, "no directions");
+        CHECK(isogi_vol_bundles_occluded(f.pyramid, bundles, 1, (const float(*)[3])dirs, 1, NULL, NULL) == ISOGI_INVALID, "no results");
+        CHECK(isogi_vol_bundles(f.pyramid, bundles, SIZE_MAX / 2, (const float(*)[3])dirs, 3, hits, NULL) == ISOGI_TOO_LARGE, "too many");
+        field_free(&f);
+    }
+}
+
 /* All hits of a bundle: those of rays of their own, and from a start those of a chain of continued rays;
    and more than there is room for. */
 TEST(bundles_have_all_hits_of_single_rays) {

@@ -169,7 +169,7 @@ int main(int argc, char **argv) {
         {"primary16", 16, 0, 0, 1, 1u << PACKET, {18 / 18.0, 18 / 16.5}},
         {"surface", RAYS, 0, 0, 0, 7, {4 / 1.6, 4 / 1.9}},
         {"anyhit", RAYS, 1, 0, 0, 7, {5 / 1.7, 5 / 2.2}},
-        {"bundle64", BUNDLE, 0, 1, 0, 7, {8 / 1.4, 8 / 1.6}}};
+        {"bundle64", BUNDLES * BUNDLE, 0, 1, 0, 7, {8 / 1.4, 8 / 1.6}}};
     static const char *const fields[2] = {"ml", "gyroid"};
     enum RTCBuildQuality quality = RTC_BUILD_QUALITY_MEDIUM;
     int only = -1, runs = 5;

@@ -9,7 +9,7 @@
 #include <string.h>
 #include <time.h>
 
-enum { N = 256, WIDTH = 1024, RAYS = WIDTH * WIDTH, BUNDLE = 64, LARGEST = 512 };
+enum { N = 256, WIDTH = 1024, RAYS = WIDTH * WIDTH, BUNDLE = 64, BUNDLES = 64, LARGEST = 512 };
 
 typedef struct scene {
     char name[24];
@@ -153,16 +153,19 @@ static void scene_free(scene *s) {
     free(s->data), free(s->reference), free(s->primary), free(s->surface), free(s->bundles);
 }
 
-/* A call of the library over all rays, `batch` at a time. bundle: rays of a batch share their origin. */
+/* A call of the library over all rays, `batch` at a time. bundle: every BUNDLE rays share their origin. */
 static void trace_all(const scene *s, const isogi_ray *rays, size_t batch, int bundle, isogi_hit *hits, uint8_t *occluded,
                       isogi_counters *counters) {
-    static float dirs[BUNDLE][3];
+    static float dirs[BUNDLES * BUNDLE][3];
+    static isogi_bundle bundles[BUNDLES];
     for (size_t i = 0; i < RAYS; i += batch) {
         if (bundle) {
-            isogi_bundle b = {.isovalue = s->isovalue};
-            memcpy(b.origin, rays[i].origin, sizeof b.origin);
-            for (size_t k = 0; k < BUNDLE; k++) memcpy(dirs[k], rays[i + k].dir, sizeof dirs[k]);
-            isogi_vol_bundle(s->pyramid, &b, (const float(*)[3])dirs, BUNDLE, hits + i, counters);
+            for (size_t n = 0; n < batch / BUNDLE; n++) {
+                memcpy(bundles[n].origin, rays[i + n * BUNDLE].origin, sizeof bundles[n].origin);
+                bundles[n].isovalue = s->isovalue;
+            }
+            for (size_t k = 0; k < batch; k++) memcpy(dirs[k], rays[i + k].dir, sizeof dirs[k]);
+            isogi_vol_bundles(s->pyramid, bundles, batch / BUNDLE, (const float(*)[3])dirs, BUNDLE, hits + i, counters);
         } else if (occluded) isogi_vol_occluded(s->pyramid, rays + i, batch, occluded + i, counters);
         else isogi_vol_intersect(s->pyramid, rays + i, batch, hits + i, counters);
     }
