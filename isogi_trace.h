@@ -223,7 +223,8 @@ typedef enum isogi_trace_format {
    albedo points are borrowed and must outlive the texture; the description itself is copied. */
 typedef struct isogi_trace_desc {
     const isogi_pyramid *pyramid;
-    isogi_lighting lighting;   /* IRRADIANCE: what is baked. TRANSFER: unused while baking; see isogi_trace_relight */
+    isogi_lighting lighting;   /* IRRADIANCE: what is baked. TRANSFER: unused while baking; see isogi_trace_relight. Radiance, and what a
+                                  lamp brings to a place, are dimmed to 1e30 where they are more, and so is the lighting of TRANSFER */
     isogi_trace_mode mode;
     int order;                 /* TRANSFER: 1..6; 0 = 5 */
     size_t lattice[3];         /* texels along x, y, z; 0 = one per voxel along that axis */
@@ -690,6 +691,28 @@ static void isogi_trace__normals(const isogi_pyramid *pyramid, isogi_normal_kind
 
 /* ==== environment image: directions by brightness ==================================================================== */
 
+/* Light of any origin is dimmed to this: whatever is summed, and reflected on and on, stays within the range of floats. */
+#define ISOGI_TRACE__BRIGHTEST 1e30
+
+/* Keeps colour and direction. What is infinite comes first to the end of floats. */
+static void isogi_trace__dim(float *light, int count) {
+    float most = 0;
+    double factor;
+    int i;
+    for (i = 0; i < count; i++) {
+        light[i] = light[i] < FLT_MAX ? light[i] : FLT_MAX, light[i] = light[i] > -FLT_MAX ? light[i] : -FLT_MAX;
+        most = fabsf(light[i]) > most ? fabsf(light[i]) : most;
+    }
+    if (!((double)most > ISOGI_TRACE__BRIGHTEST)) return;
+    factor = ISOGI_TRACE__BRIGHTEST / (double)most;
+    for (i = 0; i < count; i++) light[i] = (float)(factor * (double)light[i]);
+}
+
+static void isogi_trace__env_light(const isogi_env *env, const float dir[3], float rgb[3]) {
+    isogi_env_radiance(env, dir, rgb);
+    isogi_trace__dim(rgb, 3);
+}
+
 /* Piecewise constant over the image's pixels: density = mean luminance of the pixel (of the bilinear radiance, hence the weights
    1/8 6/8 1/8) / total. Rows and pixels are found in cumulative sums. */
 typedef struct isogi_trace__sky {
@@ -915,6 +938,14 @@ static double isogi_trace__rectangle(const isogi_light *light, const double poin
     return factor;
 }
 
+static void isogi_trace__beam_light(isogi_trace__beam *beam, const isogi_light *light, double factor) {
+    double most = 0;
+    int a;
+    for (a = 0; a < 3; a++) most = fabs((double)light->rgb[a]) > most ? fabs((double)light->rgb[a]) : most;
+    if (factor * most > ISOGI_TRACE__BRIGHTEST) factor = ISOGI_TRACE__BRIGHTEST / most;
+    for (a = 0; a < 3; a++) beam->rgb[a] = factor * (double)light->rgb[a];
+}
+
 /* 0 where the light does not reach `point` by nature. */
 static int isogi_trace__light_beam(const isogi_light *light, const double point[3], double u, double v,
                                    isogi_trace__beam *beam) {
@@ -922,7 +953,7 @@ static int isogi_trace__light_beam(const isogi_light *light, const double point[
     int a;
     if (light->kind == ISOGI_LIGHT_RECTANGLE) {
         factor = isogi_trace__rectangle(light, point, u, v, beam);
-        for (a = 0; a < 3; a++) beam->rgb[a] = factor * (double)light->rgb[a];
+        isogi_trace__beam_light(beam, light, factor);
         return factor > 0 && isogi_trace__finite(factor);
     }
     for (a = 0; a < 3; a++) {
@@ -943,7 +974,7 @@ static int isogi_trace__light_beam(const isogi_light *light, const double point[
         for (a = 0; a < 3; a++) beam->dir[a] = (float)(to[a] / length);
         if (light->kind != ISOGI_LIGHT_DIRECTIONAL) beam->tmax = length, factor = 1 / (length * length);
     }
-    for (a = 0; a < 3; a++) beam->rgb[a] = factor * (double)light->rgb[a];
+    isogi_trace__beam_light(beam, light, factor);
     return beam->tmax >= 0 && isogi_trace__finite(factor);
 }
 
@@ -1039,7 +1070,7 @@ ISOGI_API void isogi_trace_albedo(const isogi_trace_desc *desc, double isovalue,
 static void isogi_trace__colours(const isogi_trace_desc *desc, double isovalue, const double point[3], float albedo[3],
                                  float emission[3]) {
     desc->material(desc->material_user, isovalue, point, albedo, emission);
-    isogi_trace__tame(albedo, 1), isogi_trace__tame(emission, 1e30);
+    isogi_trace__tame(albedo, 1), isogi_trace__tame(emission, ISOGI_TRACE__BRIGHTEST);
 }
 
 ISOGI_API void isogi_trace_material(const isogi_trace_desc *desc, double isovalue, const double point[3], float albedo[3],
@@ -1316,7 +1347,7 @@ static void isogi_trace__wave_sky(isogi_trace__wave *w, isogi_trace__shadows *s,
         density = isogi_trace__sky_direction(sky, u, v, dir);
         cosine = isogi_trace__cosine_at(w, i, depth, dir) / ISOGI_TRACE__PI;
         if (!(cosine > 0) || !(density > 0)) continue;
-        isogi_env_radiance(sky->env, dir, radiance);
+        isogi_trace__env_light(sky->env, dir, radiance);
         for (c = 0; c < 3; c++) rgb[c] = (double)radiance[c] * cosine / (density + cosine);
         isogi_trace__shadows_add(w, s, i, dir, 0, rgb);
     }
@@ -1343,7 +1374,7 @@ static void isogi_trace__wave_escape(isogi_trace__wave *w, int i) {
         double cosine = w->density[i] / ISOGI_TRACE__PI;
         weight = cosine / (cosine + isogi_trace__sky_density(&scene->sky, (const float *)w->dir[i]));
     }
-    isogi_env_radiance(&scene->desc.lighting.env, (const float *)w->dir[i], radiance);
+    isogi_trace__env_light(&scene->desc.lighting.env, (const float *)w->dir[i], radiance);
     for (c = 0; c < 3; c++) w->light[w->slot[i]][c] += weight * w->through[i][c] * (double)radiance[c];
 }
 
@@ -2258,9 +2289,10 @@ static void isogi_trace__set_light(isogi_trace *t, const float *light) {
     int order = t->scene.desc.order, k, c;
     float one[ISOGI_TRACE__MAX_ORDER * ISOGI_TRACE__MAX_ORDER], square[ISOGI_TRACE__MAX_ORDER * ISOGI_TRACE__MAX_ORDER];
     memcpy(t->light, light, 3 * (size_t)order * (size_t)order * sizeof(float));
+    isogi_trace__dim(t->light, 3 * order * order);
     memset(one, 0, sizeof one);
     for (c = 0; c < 3; c++) {
-        for (k = 0; k < order * order; k++) one[k] = light[3 * k + c];
+        for (k = 0; k < order * order; k++) one[k] = t->light[3 * k + c];
         isogi_sh_product(square, one, one, order, 1);
         for (k = 0; k < order * order; k++) t->square[3 * k + c] = square[k];
     }
@@ -3434,7 +3466,7 @@ static void isogi_trace__cast_escape(isogi_trace__cast *c, int i) {
     }
     if (!scene->has_env) return;
     if (scene->sky.on) weight = c->weight[i] / (c->weight[i] + ISOGI_TRACE__PI * isogi_trace__sky_density(&scene->sky, dir));
-    isogi_env_radiance(&scene->desc.lighting.env, dir, radiance);
+    isogi_trace__env_light(&scene->desc.lighting.env, dir, radiance);
     for (a = 0; a < 3; a++) rgb[a] = weight * (double)radiance[a], direct[a] += (float)rgb[a];
     luminance = isogi_trace__luminance(rgb);
     span->sum.square += luminance * luminance;
@@ -3510,7 +3542,7 @@ static void isogi_trace__cast_land(isogi_trace__cast *c, int first, int count) {
             float radiance[3];
             if (c->blocked[i]) continue;
             if (c->bright) {
-                isogi_env_radiance(&c->trace->scene.desc.lighting.env, c->ray[i].dir, radiance);
+                isogi_trace__env_light(&c->trace->scene.desc.lighting.env, c->ray[i].dir, radiance);
                 for (a = 0; a < 3; a++) c->rgb[i][a] = c->weight[i] * (double)radiance[a];
             }
             luminance = isogi_trace__luminance(c->rgb[i]);
@@ -5611,7 +5643,7 @@ static void isogi_trace__field_rays(isogi_trace__walk *w, int count) {
         if (!(length > 0) || !isogi_trace__finite(length))
             for (c = 0, facing = 1, length = 1; c < 3; c++) s->normal[c] = w->ray[i].dir[c];
         for (c = 0; c < 3; c++) s->normal[c] = (float)((double)s->normal[c] / (facing > 0 ? -length : length));
-        isogi_trace__tame(s->albedo, 1), isogi_trace__tame(s->emission, 1e30);
+        isogi_trace__tame(s->albedo, 1), isogi_trace__tame(s->emission, ISOGI_TRACE__BRIGHTEST);
     }
 }
 
@@ -5654,7 +5686,7 @@ static void isogi_trace__field_lights(isogi_trace__walk *w, int depth) {
                 density = isogi_trace__sky_direction(sky, u, v, beam.dir);
                 cosine = isogi_trace__dot(w->normal[i], beam.dir) / ISOGI_TRACE__PI;
                 density += cosine;
-                isogi_env_radiance(sky->env, beam.dir, radiance);
+                isogi_trace__env_light(sky->env, beam.dir, radiance);
                 for (c = 0; c < 3; c++) beam.rgb[c] = density > 0 ? (double)radiance[c] / density : 0;
             }
             if (!(cosine > 0)) continue;
@@ -5672,7 +5704,7 @@ static void isogi_trace__field_escape(isogi_trace__walk *w, int i, double cosine
     int c;
     if (!scene->has_env) return;
     if (scene->sky.on) weight = cosine / (cosine + isogi_trace__sky_density(&scene->sky, w->ray[i].dir));
-    isogi_env_radiance(&scene->desc.lighting.env, w->ray[i].dir, radiance);
+    isogi_trace__env_light(&scene->desc.lighting.env, w->ray[i].dir, radiance);
     for (c = 0; c < 3; c++) w->light[w->slot[i]][c] += weight * w->through[i][c] * (double)radiance[c];
 }
 
@@ -5821,6 +5853,7 @@ ISOGI_API isogi_result isogi_trace_gather_field(const isogi_trace_desc *desc, is
 #undef ISOGI_TRACE__MAX_DEPTH
 #undef ISOGI_TRACE__MAX_ORDER
 #undef ISOGI_TRACE__NOT_READY
+#undef ISOGI_TRACE__BRIGHTEST
 #undef ISOGI_TRACE__DEPTH
 #undef ISOGI_TRACE__FILTER_WIDTH
 #undef ISOGI_TRACE__FILTER

@@ -545,4 +545,49 @@ TEST(lamps_in_the_middle_are_lamps_like_others) {
     scene_free(&s);
 }
 
+/* Light at the end of what floats hold, by each way to bring it, comes to finite light and finite or endless errors; an even sky of any
+   such radiance counts as the brightest one. */
+TEST(light_of_any_brightness_stays_finite) {
+    static const float levels[2] = {1e30f, 3.4028234e38f};
+    double q[5] = {6, 8, 6, 3, 3};
+    scene s = scene_make(13, 13, 13, NULL, ball_over_plane, q);
+    float points[40][3], normals[40][3], e[2][40][3], error[40], image[96], sh[27];
+    int n = surface_points(&s, 0, 40, 4, points);
+    for (int i = 0; i < n; i++) normals[i][0] = normals[i][2] = 0, normals[i][1] = 1;
+    for (int way = 0; way < 6; way++) /* even, and a peak; one coefficient, all, with either sign; a directional light */
+        for (int mode = 0; mode < 4; mode++)
+            for (int k = 0; k < 2; k++) {
+                isogi_trace_desc d = desc_make(&s, 0.9f, 4, 8);
+                isogi_light sun = light_make(ISOGI_LIGHT_DIRECTIONAL, 1, 3, 1, (double)levels[k] / 4, 0);
+                isogi_trace *t = NULL;
+                long bad = 0;
+                for (int i = 0; i < 96; i++) image[i] = way == 0 || i / 3 == 5 ? levels[k] : 1;
+                for (int i = 0; i < 27; i++) sh[i] = way == 2 && i > 2 ? 0 : way == 4 && i % 2 ? -levels[k] : levels[k];
+                memset(&d.lighting, 0, sizeof d.lighting);
+                if (way < 2) d.lighting.env.rgb = image, d.lighting.env.width = 8, d.lighting.env.height = 4;
+                else if (way < 5) d.lighting.env.sh = sh, d.lighting.env.sh_order = 3;
+                else d.lighting.lights = &sun, d.lighting.light_count = 1;
+                d.method = mode == 1 ? ISOGI_TRACE_FEEDBACK : ISOGI_TRACE_PATHS;
+                d.mode = mode == 2 ? ISOGI_TRACE_TRANSFER : ISOGI_TRACE_IRRADIANCE;
+                CHECK(isogi_lighting_validate(&d.lighting) == ISOGI_OK, "lighting %d", way);
+                if (mode == 3)
+                    CHECK(isogi_trace_gather(&d, (const float(*)[3])points, (const float(*)[3])normals, (size_t)n, e[k], error, NULL) ==
+                              ISOGI_OK,
+                          "gather");
+                else {
+                    CHECK(isogi_trace_create(&t, &d, NULL) == ISOGI_OK && isogi_trace_step(t, 0, NULL) == ISOGI_OK, "bake");
+                    isogi_trace_sample(t, (const float(*)[3])points, (size_t)n, e[k], error), isogi_trace_free(t);
+                }
+                for (int i = 0; i < n; i++) {
+                    for (int c = 0; c < 3; c++) bad += !test_finite((double)e[k][i][c]);
+                    bad += !(error[i] >= 0);
+                }
+                CHECK(!bad, "way %d, mode %d, level %g: %ld numbers are not finite", way, mode, (double)levels[k], bad);
+                for (int i = 0; i < n && way == 0; i++)
+                    CHECK(e[k][i][0] > 1e29f && fabsf(e[k][i][0] - e[0][i][0]) < 1e-4f * e[0][i][0], "mode %d, level %g: %g, not %g", mode,
+                          (double)levels[k], (double)e[k][i][0], (double)e[0][i][0]);
+            }
+    scene_free(&s);
+}
+
 TEST_MAIN("trace_light")
