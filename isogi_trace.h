@@ -89,8 +89,9 @@
      probe: a point near by on the same isosurface or one that runs closely beside it (up to .15 voxels by the gradient), in cells of
      2 voxels (of the shortest edge, but half a voxel along every axis at least) or an eighth of the ray's length, whose own
      hemisphere is gathered once in the same way; passes over the probes then bring all reflections without rays. What
-     the sky and reflections bring is averaged over neighbouring texels that face the same way, as far as their noise could explain the
-     difference; lights are not, so that their shadows stay sharp (desc.unfiltered: nothing is). Probes cost accuracy: less than 0.1 % of
+     the sky and reflections bring is averaged over texels up to two away that face the same way and whose isosurfaces run close to each
+     other, as far as their noise could explain the difference; lights are not, so that their shadows stay sharp (desc.unfiltered:
+     nothing is). Probes cost accuracy: less than 0.1 % of
      the mean and 1.5 % at a point in narrow channels of albedo 0.8 (test_trace_bake --long prints it). Lazy and adaptive bakes take samples
      in blocks of 4, 16, 64, ... and every other texel along each axis first: soon every lookup has a value.
      A hit from within (only through an open border can a ray get there) is a surface too, with its normal turned.
@@ -472,7 +473,12 @@ ISOGI_API size_t isogi_trace_memory(const isogi_trace *trace); /* bytes that the
 #define ISOGI_TRACE__ALIKE 0.15     /* voxels between the isosurfaces of a hit and its probe, by the gradient there */
 #define ISOGI_TRACE__CLASS 1.2      /* the same for isovalues that are looked for together, by the range of values around */
 #define ISOGI_TRACE__COLOURS 0.05   /* of albedo, or share of the glow, by which isosurfaces of the same probe may differ */
-#define ISOGI_TRACE__NOISE 1.25     /* variances of the difference of two texels' light that the filter takes for noise */
+#define ISOGI_TRACE__NOISE 1.0      /* variances of the difference of two texels' light that the filter takes for noise, */
+#define ISOGI_TRACE__NOISE_FEW 4.0  /* and this many more over the number of samples, since those of few are uncertain */
+#define ISOGI_TRACE__SHEET 0.7      /* texels between two isosurfaces that the filter takes for one */
+#define ISOGI_TRACE__FILTER 6       /* squared distance of the farthest texels of the filter, of which there are so many: */
+#define ISOGI_TRACE__FILTERED 81
+#define ISOGI_TRACE__BLURRED 0.18   /* of a texel's own variance: that of what the filter blurs */
 #define ISOGI_TRACE__LIGHT_FIRST 4u /* samples of a texel with one of each light */
 #if defined(__GNUC__) && !defined(__TINYC__)
 #define ISOGI_TRACE__AHEAD(p) __builtin_prefetch(p)
@@ -2985,8 +2991,9 @@ typedef struct isogi_trace__segment {
 } isogi_trace__segment;
 
 /* What the filter compares. lights: variance of the light that is not filtered. albedo, glow: of the surface through the texel, which
-   is the one that its rays meet. */
+   is the one that its rays meet. steep: by how much the field changes from texel to texel, along its gradient. */
 typedef struct isogi_trace__guide {
+    double isovalue, steep;
     float normal[3], mean[3], luminance, variance, lights;
     uint32_t samples; /* 0: nothing was gathered */
     float albedo[3], glow[3];
@@ -3325,19 +3332,28 @@ static int isogi_trace__same_colours(const isogi_trace *t, const isogi_trace__ca
     return same;
 }
 
+/* How much the trilinear field changes over a voxel along each grid axis. */
+static void isogi_trace__slopes(const isogi_trace__scene *scene, const isogi_hit *place, double slope[3]) {
+    const double *x = place->local;
+    double corner[8];
+    int a, i;
+    isogi_volume_corners(scene->volume, place->cell, corner);
+    for (a = 0; a < 3; a++) {
+        int b = (a + 1) % 3, c = (a + 2) % 3;
+        for (slope[a] = 0, i = 0; i < 8; i++)
+            slope[a] += (i >> a & 1 ? corner[i] : -corner[i]) * (i >> b & 1 ? x[b] : 1 - x[b]) * (i >> c & 1 ? x[c] : 1 - x[c]);
+    }
+}
+
 /* How far isovalues may lie from that of a probe that tells their light: as much as the field changes in ALIKE voxels there. Where a
    skin of some value shuts a hollow, isosurfaces next to each other are dark and bright. */
 static double isogi_trace__alike(const isogi_trace__scene *scene, const isogi_hit *hit) {
-    const double *voxel = scene->voxel, *x = hit->local;
-    double corner[8], least = voxel[0], square = 0;
-    int a, i;
-    isogi_volume_corners(scene->volume, hit->cell, corner);
+    const double *voxel = scene->voxel;
+    double slope[3], least = voxel[0], square = 0;
+    int a;
+    isogi_trace__slopes(scene, hit, slope);
     for (a = 0; a < 3; a++) {
-        int b = (a + 1) % 3, c = (a + 2) % 3;
-        double slope = 0;
-        for (i = 0; i < 8; i++)
-            slope += (i >> a & 1 ? corner[i] : -corner[i]) * (i >> b & 1 ? x[b] : 1 - x[b]) * (i >> c & 1 ? x[c] : 1 - x[c]);
-        square += slope / voxel[a] * (slope / voxel[a]);
+        square += slope[a] / voxel[a] * (slope[a] / voxel[a]);
         if (voxel[a] < least) least = voxel[a];
     }
     return ISOGI_TRACE__ALIKE * least * sqrt(square);
@@ -4106,11 +4122,15 @@ static double isogi_trace__mean_variance(double sum, double square, double n) {
     return n > 1 && spread > 0 ? spread / (n * (n - 1)) : 0;
 }
 
-/* Colours by place are those at the texel: which of its own its rays will meet is not known. Once for all levels: other colours
-   begin with other nodes. */
-static void isogi_trace__guide_colours(const isogi_trace *t, const isogi_trace__node *n, isogi_trace__guide *g) {
+/* What stays the same for all levels: other colours begin with other nodes. Colours by place are those at the texel: which of its own
+   its rays will meet is not known. */
+static void isogi_trace__guide_begin(const isogi_trace *t, const isogi_trace__node *n, isogi_trace__guide *g) {
     const isogi_trace_desc *d = &t->scene.desc;
-    double point[3];
+    double point[3], slope[3], square = 0;
+    int a;
+    isogi_trace__slopes(&t->scene, &n->place, slope);
+    for (a = 0; a < 3; a++) square += slope[a] * t->step[a] * (slope[a] * t->step[a]);
+    g->isovalue = n->isovalue, g->steep = sqrt(square);
     if (!d->albedo_count && !d->emission_count && !d->material) return;
     isogi_trace__texel_grid(t, n->texel, point);
     isogi_vol_to_world(t->scene.pyramid, point, point);
@@ -4174,49 +4194,68 @@ static double isogi_trace__other_colours(const isogi_trace *t, const isogi_trace
 /* What lies around a texel, itself included: guides of those that have one, and squares of their distances. */
 static int isogi_trace__around_texel(const isogi_trace *t, const size_t texel[3], const isogi_trace__guide **guide, int *apart) {
     const isogi_trace__set *set = &t->feedback->texels;
-    size_t brick[3][3], pitch = 1;
-    uint32_t slot[3][3], node;
+    size_t brick[3][5], pitch = 1;
+    uint32_t slot[3][5], node;
     int first[3], last[3], d[3], a, count = 0;
     for (a = 0; a < 3; a++) {
-        first[a] = texel[a] ? -1 : 0, last[a] = texel[a] + 1 < t->lattice[a] ? 1 : 0;
+        size_t after = t->lattice[a] - 1 - texel[a];
+        first[a] = texel[a] < 2 ? -(int)texel[a] : -2, last[a] = after < 2 ? (int)after : 2;
         for (d[0] = first[a]; d[0] <= last[a]; d[0]++) {
             size_t x = texel[a] + (size_t)d[0]; /* wraps twice */
-            brick[a][d[0] + 1] = x / ISOGI_TRACE__SIDE * pitch, slot[a][d[0] + 1] = (uint32_t)(x % ISOGI_TRACE__SIDE) << (2 * a);
+            brick[a][d[0] + 2] = x / ISOGI_TRACE__SIDE * pitch, slot[a][d[0] + 2] = (uint32_t)(x % ISOGI_TRACE__SIDE) << (2 * a);
         }
         pitch *= t->size[a];
     }
     for (d[2] = first[2]; d[2] <= last[2]; d[2]++)
         for (d[1] = first[1]; d[1] <= last[1]; d[1]++)
             for (d[0] = first[0]; d[0] <= last[0]; d[0]++) {
-                const isogi_trace__brick *b = t->bricks[brick[0][d[0] + 1] + brick[1][d[1] + 1] + brick[2][d[2] + 1]];
+                const int square = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
+                const isogi_trace__brick *b;
+                if (square > ISOGI_TRACE__FILTER) continue;
+                b = t->bricks[brick[0][d[0] + 2] + brick[1][d[1] + 2] + brick[2][d[2] + 2]];
                 if (!b || !b->node) continue;
-                node = b->node[slot[0][d[0] + 1] + slot[1][d[1] + 1] + slot[2][d[2] + 1]];
+                node = b->node[slot[0][d[0] + 2] + slot[1][d[1] + 2] + slot[2][d[2] + 2]];
                 if (!node || !isogi_trace__guide_at(set, node - 1)->samples) continue;
-                guide[count] = isogi_trace__guide_at(set, node - 1), apart[count++] = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
+                guide[count] = isogi_trace__guide_at(set, node - 1), apart[count++] = square;
             }
     return count;
 }
 
-/* Mean over the texels around that face the same way and whose light may be the same within its noise. Writes the filtered rgb, its
-   variance, and the variance of other light, averaged over the same texels. Returns the number of samples that this is as good as. */
+/* How much the filter takes of a texel's light for another at a distance (its square, in texels), 0 to 1: less the farther it is, by
+   place and by what lies between their isosurfaces, the more it faces another way, and the more their light differs beyond its noise. */
+static double isogi_trace__filter_weight(const isogi_trace *t, const isogi_trace__guide *g, const isogi_trace__guide *q, int square) {
+    double facing, between = g->isovalue - q->isovalue, far = (double)square / 8, apart, noise, colours,
+           steep = ISOGI_TRACE__SHEET * (g->steep > q->steep ? g->steep : q->steep);
+    if (!isogi_trace__zero(between)) {
+        if (!(fabs(between) < 4 * steep)) return 0;
+        far += between / steep * (between / steep);
+    }
+    facing = isogi_trace__dot(g->normal, q->normal);
+    if (!(facing > 0.5)) return 0;
+    noise = (double)g->variance + (double)q->variance;
+    apart = (double)g->luminance - (double)q->luminance, colours = isogi_trace__other_colours(t, g, q);
+    noise *= ISOGI_TRACE__NOISE + ISOGI_TRACE__NOISE_FEW / 2 * (1.0 / g->samples + 1.0 / q->samples);
+    apart = apart * apart - noise;
+    if (colours > 0) apart = (apart > 0 ? apart : 0) + 4 * colours * colours;
+    if (apart > 0) {
+        if (!(noise > 0)) return 0;
+        far += apart / noise;
+    }
+    facing = facing * facing / (1 + far / 8), facing *= facing, facing *= facing; /* near exp(-far) */
+    return facing * facing;
+}
+
+/* Mean over the texels around. Writes the filtered rgb, its variance, and the variance of other light, averaged over the same texels.
+   Returns the number of samples that this is as good as. */
 static double isogi_trace__filter(const isogi_trace *t, size_t node, double rgb[3], double variance[2]) {
-    static const double by_distance[4] = {1, 0.77880078307140488, 0.60653065971263342, 0.47236655274101469}; /* exp(-square / 4) */
     const isogi_trace__set *set = &t->feedback->texels;
-    const isogi_trace__guide *g = isogi_trace__guide_at(set, node), *around[27];
+    const isogi_trace__guide *g = isogi_trace__guide_at(set, node), *around[ISOGI_TRACE__FILTERED];
     double total = 0, squares = 0;
-    int square[27], count = isogi_trace__around_texel(t, isogi_trace__node_at(set, node)->texel, around, square), i, a;
+    int square[ISOGI_TRACE__FILTERED], count = isogi_trace__around_texel(t, isogi_trace__node_at(set, node)->texel, around, square), i, a;
     rgb[0] = rgb[1] = rgb[2] = variance[0] = variance[1] = 0;
     for (i = 0; i < count; i++) {
         const isogi_trace__guide *q = around[i];
-        double w, facing = isogi_trace__dot(g->normal, q->normal), apart, noise, colours;
-        if (!(facing > 0.5)) continue;
-        facing *= facing, facing *= facing, facing *= facing;
-        apart = (double)g->luminance - (double)q->luminance, noise = (double)g->variance + (double)q->variance;
-        apart = apart * apart - ISOGI_TRACE__NOISE * noise;
-        colours = isogi_trace__other_colours(t, g, q);
-        if (colours > 0) apart = (apart > 0 ? apart : 0) + 4 * colours * colours;
-        w = facing * facing * by_distance[square[i]];
-        if (apart > 0) w *= noise > 0 ? exp(-apart / (ISOGI_TRACE__NOISE * noise)) : 0;
+        double w = isogi_trace__filter_weight(t, g, q, square[i]);
         squares += w * w * q->samples;
         w *= q->samples;
         total += w;
@@ -4235,7 +4274,7 @@ static double isogi_trace__shared(const isogi_trace *t, size_t node, double rgb[
     double alike = (double)g->samples;
     int a;
     if (!t->scene.desc.unfiltered) {
-        alike = isogi_trace__filter(t, node, rgb, variance), variance[0] += 0.25 * (double)g->variance;
+        alike = isogi_trace__filter(t, node, rgb, variance), variance[0] += ISOGI_TRACE__BLURRED * (double)g->variance;
         return alike;
     }
     for (a = 0; a < 3; a++) rgb[a] = (double)g->mean[a];
@@ -4326,12 +4365,14 @@ static size_t isogi_trace__phase_tasks(const isogi_trace__feedback *f) {
     return (nodes + ISOGI_TRACE__SWEEP - 1) / ISOGI_TRACE__SWEEP;
 }
 
-/* Rays that take as long as one of them: one for 64 hits, for 8 nodes that are read in passing, for 2 that are filtered. */
+/* Rays that take as long as one of them: one for 64 hits, for 8 nodes that are read in passing, for one that is filtered, for 2 that
+   are given back. */
 static uint64_t isogi_trace__phase_cost(const isogi_trace__feedback *f, size_t task) {
     const isogi_trace__segment *s = f->phase == ISOGI_TRACE__PASS ? f->probes.segments + task : f->texels.segments + f->segment;
     if (f->phase == ISOGI_TRACE__PASS) return s->entries / 8 + s->hits / 64 + 1;
     if (f->phase == ISOGI_TRACE__BOUNCE) return ISOGI_TRACE__SWEEP / 8 + s->hits * ISOGI_TRACE__SWEEP / s->entries / 64;
-    return f->phase == ISOGI_TRACE__PUBLISH || f->phase == ISOGI_TRACE__FORGET ? ISOGI_TRACE__SWEEP / 2 : ISOGI_TRACE__SWEEP / 8;
+    if (f->phase == ISOGI_TRACE__PUBLISH) return ISOGI_TRACE__SWEEP;
+    return f->phase == ISOGI_TRACE__FORGET ? ISOGI_TRACE__SWEEP / 2 : ISOGI_TRACE__SWEEP / 8;
 }
 
 static void isogi_trace__phase_task(void *arg, size_t task) {
@@ -4412,7 +4453,7 @@ static void isogi_trace__place_task(void *arg, size_t task) {
             }
             isogi_trace_albedo(&t->scene.desc, n->isovalue, n->albedo);
             if (t->scene.desc.mode == ISOGI_TRACE_IRRADIANCE)
-                isogi_trace__guide_colours(t, n, isogi_trace__guide_at(set, job->first + i + k));
+                isogi_trace__guide_begin(t, n, isogi_trace__guide_at(set, job->first + i + k));
         }
         i += count;
     }
@@ -5855,9 +5896,12 @@ ISOGI_API isogi_result isogi_trace_gather_field(const isogi_trace_desc *desc, is
 #undef ISOGI_TRACE__NOT_READY
 #undef ISOGI_TRACE__BRIGHTEST
 #undef ISOGI_TRACE__DEPTH
-#undef ISOGI_TRACE__FILTER_WIDTH
-#undef ISOGI_TRACE__FILTER
 #undef ISOGI_TRACE__NOISE
+#undef ISOGI_TRACE__NOISE_FEW
+#undef ISOGI_TRACE__SHEET
+#undef ISOGI_TRACE__FILTER
+#undef ISOGI_TRACE__FILTERED
+#undef ISOGI_TRACE__BLURRED
 #undef ISOGI_TRACE__LIGHT_FIRST
 #undef ISOGI_TRACE__AHEAD
 #undef ISOGI_TRACE__PLANE

@@ -242,7 +242,7 @@ TEST(probes_do_not_breed) {
 }
 
 /* The light of bright spots in an image is averaged over neighbours as that of the other sky is: on the sides of a pit, with 4 samples,
-   .57 of the error that paths of 4 samples have (unfiltered: .69, by better numbers alone). */
+   .47 of the error that paths of 4 samples have (a filter of the nearest 27 texels: .54; none: .69, by better numbers alone). */
 TEST(bright_spots_of_the_sky_are_filtered) {
     enum { WIDTH = 64, HEIGHT = 32 };
     static float image[HEIGHT][WIDTH][3], points[200][3], e[3][200][3];
@@ -262,7 +262,7 @@ TEST(bright_spots_of_the_sky_are_filtered) {
     for (int kind = 0; kind < 2; kind++)
         for (int i = 0; i < n; i++) rms[kind] += pow((double)e[kind][i][1] - (double)e[2][i][1], 2) / n;
     printf("    error %.4f, by paths %.4f\n", sqrt(rms[0]), sqrt(rms[1]));
-    CHECK(n > 100 && sqrt(rms[0]) < 0.61 * sqrt(rms[1]), "error %.4f, by paths %.4f", sqrt(rms[0]), sqrt(rms[1]));
+    CHECK(n > 100 && sqrt(rms[0]) < 0.51 * sqrt(rms[1]), "error %.4f, by paths %.4f", sqrt(rms[0]), sqrt(rms[1]));
     scene_free(&s);
 }
 
@@ -954,6 +954,7 @@ TEST(adaptive_bakes_meet_their_target) {
         if (adaptive) CHECK(report.worst <= 0.0202 * report.unit && report.drafts == 0, "worst %g of %g", report.worst, report.unit);
         isogi_trace_free(t);
     }
+    printf("    %g of %g rays\n", (double)c[1].rays, (double)c[0].rays);
     CHECK(c[1].rays * 4 < c[0].rays * 3, "%g rays, %g for all alike", (double)c[1].rays, (double)c[0].rays);
     scene_free(&s);
 }
