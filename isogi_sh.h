@@ -1389,8 +1389,13 @@ typedef int32_t isogi_sh__i4 __attribute__((vector_size(16), aligned(4), may_ali
    ulp of z near the poles is much for m = 0; t = 1 - |z| is exact there. Near the poles (x + i y)^m would become denormal numbers, which
    take a hundred times as long: what is too small to matter is cleared. */
 #define ISOGI_SH__DEFINE_EVAL(NAME, TARGET, T, V, I, WIDTH, FMA, REST, LESS, TABLE, LARGEST_ERROR, NEAR_POLE, TINY, ROOT)      \
-    /* scales vectors to about length 1, in place; 0 if a squared length is out of range: by its bits, as -ffast-math wants it */  \
-    TARGET ISOGI_SH__APART int NAME##_scale(V *u) {                                                                            \
+    /* x in every lane. Compilers take a variable once, a number in memory or an expression once for each lane. */             \
+    TARGET ISOGI_SH__INLINE V NAME##_splat(T x) {                                                                              \
+        V zero = {0};                                                                                                          \
+        return x - zero;                                                                                                       \
+    }                                                                                                                          \
+    /* scales vectors to about length 1, in place; 0 if a squared length is out of range: by its bits, as -ffast-math wants it */ \
+    TARGET static int NAME##_scale(V *u) {                                                                                     \
         V zero = {0}, square = FMA(u[0], u[0], FMA(u[1], u[1], u[2] * u[2]));                                                  \
         I good = ((I)square > (I)(zero + (T)1e-30)) & ((I)square < (I)(zero + (T)1e30));                                       \
         T lane[WIDTH];                                                                                                         \
@@ -1404,26 +1409,31 @@ typedef int32_t isogi_sh__i4 __attribute__((vector_size(16), aligned(4), may_ali
         u[0] *= square, u[1] *= square, u[2] *= square;                                                                        \
         return 1;                                                                                                              \
     }                                                                                                                          \
-    /* 1 - its squared length, after scaling where that is not small */                                                        \
-    TARGET ISOGI_SH__INLINE int NAME##_error(V *u, V *error) {                                                                 \
-        V zero = {0}, one = zero + 1, e = FMA(-u[0], u[0], FMA(-u[1], u[1], REST(one, u[2])));                                 \
-        I sign = (I)(zero - 1) ^ (I)one;                                                                                       \
-        if (!LESS((I)e & ~sign, (I)(zero + (T)LARGEST_ERROR))) {                                                               \
-            V scaled[3];                                                                                                       \
-            scaled[0] = u[0], scaled[1] = u[1], scaled[2] = u[2];                                                              \
-            if (!NAME##_scale(scaled)) return 0;                                                                               \
-            u[0] = scaled[0], u[1] = scaled[1], u[2] = scaled[2];                                                              \
-            e = FMA(-u[0], u[0], FMA(-u[1], u[1], REST(one, u[2])));                                                           \
-        }                                                                                                                      \
-        *error = e;                                                                                                            \
+    TARGET ISOGI_SH__INLINE V NAME##_error(const V *u) { /* 1 - its squared length */                                          \
+        V zero = {0}, one = zero + 1;                                                                                          \
+        return FMA(-u[0], u[0], FMA(-u[1], u[1], REST(one, u[2])));                                                            \
+    }                                                                                                                          \
+    TARGET ISOGI_SH__INLINE void NAME##_correct(V *u, V e) {                                                                   \
+        V z = u[2], zero = {0};                                                                                                \
+        e *= FMA(e, zero + (T)0.375, zero + (T)0.5);                                                                           \
+        u[0] = FMA(u[0], e, u[0]), u[1] = FMA(u[1], e, u[1]), u[2] = FMA(z, e, z), u[3] = FMA(z, e, z - u[2]);                 \
+    }                                                                                                                          \
+    TARGET ISOGI_SH__APART int NAME##_far(V *u) {                                                                              \
+        if (!NAME##_scale(u)) return 0;                                                                                        \
+        NAME##_correct(u, NAME##_error(u));                                                                                    \
         return 1;                                                                                                              \
     }                                                                                                                          \
     /* u[0..2] becomes a unit vector, u[3] the rest of its z */                                                                \
     TARGET ISOGI_SH__INLINE int NAME##_unit(V *u) {                                                                            \
-        V z, e, zero = {0};                                                                                                    \
-        if (!NAME##_error(u, &e)) return 0;                                                                                    \
-        z = u[2], e *= FMA(e, zero + (T)0.375, zero + (T)0.5);                                                                 \
-        u[0] = FMA(u[0], e, u[0]), u[1] = FMA(u[1], e, u[1]), u[2] = FMA(z, e, z), u[3] = FMA(z, e, z - u[2]);                 \
+        V zero = {0}, e = NAME##_error(u), apart[4];                                                                           \
+        I sign = (I)(zero - 1) ^ (I)(zero + 1);                                                                                \
+        if (LESS((I)e & ~sign, (I)(zero + (T)LARGEST_ERROR))) {                                                                \
+            NAME##_correct(u, e);                                                                                              \
+            return 1;                                                                                                          \
+        }                                                                                                                      \
+        apart[0] = u[0], apart[1] = u[1], apart[2] = u[2];                                                                     \
+        if (!NAME##_far(apart)) return 0;                                                                                      \
+        u[0] = apart[0], u[1] = apart[1], u[2] = apart[2], u[3] = apart[3];                                                    \
         return 1;                                                                                                              \
     }                                                                                                                          \
     TARGET ISOGI_SH__INLINE int NAME##_load(V *u, const T *x, const T *y, const T *z) {                                        \
@@ -1441,34 +1451,34 @@ typedef int32_t isogi_sh__i4 __attribute__((vector_size(16), aligned(4), may_ali
     TARGET ISOGI_SH__INLINE void NAME##_column(T *centre, size_t stride, int from, int to, int m, const T *t, V z, V w, V c, V s, \
                                                V *state) {                                                                     \
         size_t at = stride * (size_t)m, step = 2 * stride * (size_t)(m < from ? from : m);                                     \
-        V zero = {0}, a, a_before, b, b_before, p;                                                                             \
+        V a, a_before, b, b_before, p;                                                                                         \
         int l = m, last = to - 1;                                                                                              \
         if (from > m + 4) {                                                                                                    \
             b = state[0], a = state[1], b_before = state[2], a_before = state[3], l = from, t += 9 + 3 * (l - m - 5);          \
         } else {                                                                                                               \
-            p = t[0] - zero;                                                                                                   \
+            p = NAME##_splat(t[0]);                                                                                            \
             ISOGI_SH__PUT_DEGREE(V, p)                                                                                         \
-            a_before = z * t[1];                                                                                               \
+            a_before = z * NAME##_splat(t[1]);                                                                                 \
             ISOGI_SH__PUT_DEGREE(V, a_before)                                                                                  \
-            b_before = FMA(w, t[2] - zero, t[3] - zero);                                                                       \
+            b_before = FMA(w, NAME##_splat(t[2]), NAME##_splat(t[3]));                                                         \
             ISOGI_SH__PUT_DEGREE(V, b_before)                                                                                  \
-            a = z * FMA(w, t[4] - zero, t[5] - zero);                                                                          \
+            a = z * FMA(w, NAME##_splat(t[4]), NAME##_splat(t[5]));                                                            \
             ISOGI_SH__PUT_DEGREE(V, a)                                                                                         \
-            b = FMA(FMA(w, t[6] - zero, t[7] - zero), w, t[8] - zero);                                                         \
+            b = FMA(FMA(w, NAME##_splat(t[6]), NAME##_splat(t[7])), w, NAME##_splat(t[8]));                                    \
             if (l >= from) {                                                                                                   \
                 ISOGI_SH__PUT_BOTH(V, b)                                                                                       \
             }                                                                                                                  \
             l++, t += 9;                                                                                                       \
         }                                                                                                                      \
         for (; l < last; l += 2, t += 6) {                                                                                     \
-            p = FMA(FMA(w, t[0] - zero, t[1] - zero), a, a_before * t[2]), a_before = a, a = p;                                \
+            p = FMA(FMA(w, NAME##_splat(t[0]), NAME##_splat(t[1])), a, a_before * NAME##_splat(t[2])), a_before = a, a = p;    \
             ISOGI_SH__PUT_BOTH(V, a)                                                                                           \
-            p = FMA(FMA(w, t[3] - zero, t[4] - zero), b, b_before * t[5]), b_before = b, b = p;                                \
+            p = FMA(FMA(w, NAME##_splat(t[3]), NAME##_splat(t[4])), b, b_before * NAME##_splat(t[5])), b_before = b, b = p;    \
             ISOGI_SH__PUT_BOTH(V, b)                                                                                           \
         }                                                                                                                      \
         p = b;                                                                                                                 \
         if (l == last) {                                                                                                       \
-            p = FMA(FMA(w, t[0] - zero, t[1] - zero), a, a_before * t[2]);                                                     \
+            p = FMA(FMA(w, NAME##_splat(t[0]), NAME##_splat(t[1])), a, a_before * NAME##_splat(t[2]));                         \
             ISOGI_SH__PUT_BOTH(V, p)                                                                                           \
             if (state) a_before = b_before, b_before = a, a = b;                                                               \
         }                                                                                                                      \
@@ -1476,19 +1486,19 @@ typedef int32_t isogi_sh__i4 __attribute__((vector_size(16), aligned(4), may_ali
     }                                                                                                                          \
     /* Degrees `from`, which is SPLIT or 0, to `to` - 1; state: that of m = 0 and of columns that have five degrees and more below SPLIT, \
        or NULL where these are all. With each column goes one degree of m = 0, as in isogi_sh__zonal_column, each of which waits for the \
-       one before. Near the poles w is 1 - (x^2 + y^2), which has half the rounding of z^2. */                    \
+       one before. Near the poles w is 1 - (x^2 + y^2), which has half the rounding of z^2. */                                 \
     TARGET ISOGI_SH__INLINE void NAME##_degrees(T *out, size_t stride, int from, int to, const V *u, V *state) {               \
-        V x = u[0], y = u[1], z = u[2], c = x, s = y, zero = {0}, one = zero + 1, before;                                       \
+        V x = u[0], y = u[1], z = u[2], c = x, s = y, zero = {0}, one = zero + 1, before;                                      \
         V p = one, d = zero, height, r = FMA(x, x, y * y), w = z * z;                                                          \
         I sign = (I)z & ((I)(-one) ^ (I)one), high = w > r;                                                                    \
         const T *t = TABLE + 3 * ISOGI_SH__TABLE_ORDER, *factor = TABLE + 3 * (from ? from : 1);                               \
         T *centre = out + stride * (size_t)from;                                                                               \
         size_t base = (size_t)from * (size_t)from;                                                                             \
-        int l, m, clear = !LESS((I)(zero + (T)NEAR_POLE), (I)r);                                                                \
+        int l, m, clear = !LESS((I)(zero + (T)NEAR_POLE), (I)r);                                                               \
         w = (V)(((I)(one - r) & high) | ((I)w & ~high));                                                                       \
         height = (one - (V)((I)z ^ sign)) - (V)((I)u[3] ^ sign);                                                               \
         if (from) p = state[0], d = state[1];                                                                                  \
-        else *(V *)centre = p * TABLE[2], centre += 2 * stride;                                                                \
+        else *(V *)centre = p * NAME##_splat(TABLE[2]), centre += 2 * stride;                                                  \
         if (clear) c = NAME##_clear(c), s = NAME##_clear(s);                                                                   \
         for (m = 1; m < to; m++) {                                                                                             \
             l = m < from ? from : m;                                                                                           \
@@ -1498,8 +1508,8 @@ typedef int32_t isogi_sh__i4 __attribute__((vector_size(16), aligned(4), may_ali
             before = c, c = FMA(x, c, -(y * s)), s = FMA(x, s, y * before);                                                    \
             if (clear) c = NAME##_clear(c), s = NAME##_clear(s);                                                               \
             if (m < from) continue;                                                                                            \
-            d = FMA(height * factor[1], p, d * factor[0]);                                                                     \
-            p += d, before = p * factor[2], factor += 3;                                                                       \
+            d = FMA(height * NAME##_splat(factor[1]), p, d * NAME##_splat(factor[0]));                                         \
+            p += d, before = p * NAME##_splat(factor[2]), factor += 3;                                                         \
             if (m & 1) before = (V)((I)before ^ sign);                                                                         \
             *(V *)centre = before;                                                                                             \
             centre += 2 * stride * (size_t)(m + 1);                                                                            \
@@ -1615,6 +1625,8 @@ typedef double isogi_sh__d2 __attribute__((vector_size(16), aligned(8), may_alia
 
 #define ISOGI_SH__AVX2 __attribute__((target("avx2,fma")))
 #define ISOGI_SH__AVX512 __attribute__((target("avx2,fma,avx512f,avx512vl,avx512dq")))
+#define ISOGI_SH__SPLAT_F8(x) isogi_sh__eval_f8_splat(x)
+#define ISOGI_SH__ADD_F8(a, x, sum) ISOGI_SH__FMA_F8(a, ISOGI_SH__SPLAT_F8(x), sum) /* of a number x */
 #define ISOGI_SH__FMA_F8(a, b, c) ((isogi_sh__f8)__builtin_ia32_vfmaddps256(a, b, c))
 #define ISOGI_SH__FMA_D4(a, b, c) ((isogi_sh__d4)__builtin_ia32_vfmaddpd256(a, b, c))
 #define ISOGI_SH__ALL8 (unsigned char)0xff
@@ -1868,28 +1880,28 @@ ISOGI_SH__AVX512 ISOGI_SH__INLINE void isogi_sh__eval_d8_split(isogi_sh__d8 *u, 
    column m is (c, s) times a polynomial, times z where l - m is odd; t: the polynomials of that column. centre: where Y_l^0 goes. From
    m = 2 on they are in v + 1/4, which is smaller where sin^m t is not. */
 #define ISOGI_SH__LOW_ORDER 11
-#define ISOGI_SH__P0(FMA, t) ((t)[0] - zero)
-#define ISOGI_SH__P1(FMA, t) FMA(ISOGI_SH__P0(FMA, t), v, (t)[1] - zero)
-#define ISOGI_SH__P2(FMA, t) FMA(ISOGI_SH__P1(FMA, t), v, (t)[2] - zero)
-#define ISOGI_SH__P3(FMA, t) FMA(ISOGI_SH__P2(FMA, t), v, (t)[3] - zero)
-#define ISOGI_SH__P4(FMA, t) FMA(ISOGI_SH__P3(FMA, t), v, (t)[4] - zero)
-#define ISOGI_SH__P5(FMA, t) FMA(ISOGI_SH__P4(FMA, t), v, (t)[5] - zero)
+#define ISOGI_SH__P0(NAME, t) NAME##_splat((t)[0])
+#define ISOGI_SH__P1(NAME, t) NAME##_step(ISOGI_SH__P0(NAME, t), v, (t)[1])
+#define ISOGI_SH__P2(NAME, t) NAME##_step(ISOGI_SH__P1(NAME, t), v, (t)[2])
+#define ISOGI_SH__P3(NAME, t) NAME##_step(ISOGI_SH__P2(NAME, t), v, (t)[3])
+#define ISOGI_SH__P4(NAME, t) NAME##_step(ISOGI_SH__P3(NAME, t), v, (t)[4])
+#define ISOGI_SH__P5(NAME, t) NAME##_step(ISOGI_SH__P4(NAME, t), v, (t)[5])
 #define ISOGI_SH__PUT_ONE(V, value) *(V *)centre = value, centre -= step, step -= 2 * stride
 #define ISOGI_SH__PUT_PAIR(V, value) p = value, *(V *)(centre + first) = p * c, *(V *)(centre - first) = p * s, centre -= step, \
     step -= 2 * stride
-#define ISOGI_SH__POLYNOMIALS(V, FMA, PUT)                                                                                     \
+#define ISOGI_SH__POLYNOMIALS(NAME, V, PUT)                                                                                    \
     switch (order - m) {                                                                                                       \
-    case 11: PUT(V, ISOGI_SH__P5(FMA, t + 30)); __attribute__((fallthrough));                                                  \
-    case 10: PUT(V, ISOGI_SH__P4(FMA, t + 25) * z); __attribute__((fallthrough));                               \
-    case 9: PUT(V, ISOGI_SH__P4(FMA, t + 20)); __attribute__((fallthrough));                                    \
-    case 8: PUT(V, ISOGI_SH__P3(FMA, t + 16) * z); __attribute__((fallthrough));                                \
-    case 7: PUT(V, ISOGI_SH__P3(FMA, t + 12)); __attribute__((fallthrough));                                    \
-    case 6: PUT(V, ISOGI_SH__P2(FMA, t + 9) * z); __attribute__((fallthrough));                                 \
-    case 5: PUT(V, ISOGI_SH__P2(FMA, t + 6)); __attribute__((fallthrough));                                     \
-    case 4: PUT(V, ISOGI_SH__P1(FMA, t + 4) * z); __attribute__((fallthrough));                                 \
-    case 3: PUT(V, ISOGI_SH__P1(FMA, t + 2)); __attribute__((fallthrough));                                     \
-    case 2: PUT(V, ISOGI_SH__P0(FMA, t + 1) * z); __attribute__((fallthrough));                                 \
-    default: PUT(V, ISOGI_SH__P0(FMA, t));                                                                      \
+    case 11: PUT(V, ISOGI_SH__P5(NAME, t + 30)); __attribute__((fallthrough));                                                  \
+    case 10: PUT(V, ISOGI_SH__P4(NAME, t + 25) * z); __attribute__((fallthrough));                               \
+    case 9: PUT(V, ISOGI_SH__P4(NAME, t + 20)); __attribute__((fallthrough));                                    \
+    case 8: PUT(V, ISOGI_SH__P3(NAME, t + 16) * z); __attribute__((fallthrough));                                \
+    case 7: PUT(V, ISOGI_SH__P3(NAME, t + 12)); __attribute__((fallthrough));                                    \
+    case 6: PUT(V, ISOGI_SH__P2(NAME, t + 9) * z); __attribute__((fallthrough));                                 \
+    case 5: PUT(V, ISOGI_SH__P2(NAME, t + 6)); __attribute__((fallthrough));                                     \
+    case 4: PUT(V, ISOGI_SH__P1(NAME, t + 4) * z); __attribute__((fallthrough));                                 \
+    case 3: PUT(V, ISOGI_SH__P1(NAME, t + 2)); __attribute__((fallthrough));                                     \
+    case 2: PUT(V, ISOGI_SH__P0(NAME, t + 1) * z); __attribute__((fallthrough));                                 \
+    default: PUT(V, ISOGI_SH__P0(NAME, t));                                                                      \
     }
 
 /* Defines NAME(out, stride, order, x, y, z, count): all functions at the first directions, that of index i at out + stride i; WIDTH at a
@@ -1934,6 +1946,7 @@ ISOGI_SH__AVX512 ISOGI_SH__INLINE void isogi_sh__eval_d8_split(isogi_sh__d8 *u, 
         out[16] = (s * c) * (T)1.2516714708983523;                                                                             \
         out[24] = (c - s) * ((c + s) * (T)0.62583573544917614);                                                                \
     }                                                                                                                          \
+    TARGET ISOGI_SH__INLINE V NAME##_step(V p, V v, T next) { return FMA(p, v, NAME##_splat(next)); }                          \
     /* one column after the other, each from its last degree */                                                                \
     TARGET static void NAME##_low(T *out, size_t stride, int order, const V *u) {                                              \
         V x = u[0], y = u[1], z = u[2], zero = {0}, v = FMA(z, z, -FMA(x, x, y * y)), c = x, s = y, p, before;                 \
@@ -1941,14 +1954,14 @@ ISOGI_SH__AVX512 ISOGI_SH__INLINE void isogi_sh__eval_d8_split(isogi_sh__d8 *u, 
         size_t last = (size_t)order - 1, first = 0, step = 2 * stride * last;                                                  \
         T *centre = out + stride * last * (last + 1);                                                                          \
         int m = 0, clear = !LESS((I)(zero + (T)NEAR_POLE), (I)FMA(x, x, y * y));                                               \
-        ISOGI_SH__POLYNOMIALS(V, FMA, ISOGI_SH__PUT_ONE)                                                                       \
+        ISOGI_SH__POLYNOMIALS(NAME, V, ISOGI_SH__PUT_ONE)                                                                       \
         for (m = 1; m < order; m++) {                                                                                          \
             t += (ISOGI_SH__LOW_ORDER + 2 - m) * (ISOGI_SH__LOW_ORDER + 2 - m) / 4;                                            \
             if (m > 1) before = c, c = FMA(x, c, -(y * s)), s = FMA(x, s, y * before);                                         \
             if (m == 2) v = FMA(z + z, z, zero - (T)0.75);                                                                     \
             if (clear) c = NAME##_clear(c), s = NAME##_clear(s);                                                               \
             first += stride, step = 2 * stride * last, centre = out + stride * last * (last + 1);                              \
-            ISOGI_SH__POLYNOMIALS(V, FMA, ISOGI_SH__PUT_PAIR)                                                                  \
+            ISOGI_SH__POLYNOMIALS(NAME, V, ISOGI_SH__PUT_PAIR)                                                                  \
         }                                                                                                                      \
     }                                                                                                                          \
     /* degrees from SPLIT on */                                                                                                \
@@ -2082,8 +2095,8 @@ ISOGI_SH__AVX2 static int isogi_sh__sum_rows_f32(float *value, const float *c, i
     for (j = 0; j < channels; j++) {
         isogi_sh__f8 zero = {0}, even = zero, odd = zero;
         for (i = 0; i + 1 < n; i += 2) {
-            even = ISOGI_SH__FMA_F8(scratch[i], zero + c[channels * i + j], even);
-            odd = ISOGI_SH__FMA_F8(scratch[i + 1], zero + c[channels * (i + 1) + j], odd);
+            even = ISOGI_SH__ADD_F8(scratch[i], c[channels * i + j], even);
+            odd = ISOGI_SH__ADD_F8(scratch[i + 1], c[channels * (i + 1) + j], odd);
         }
         if (i < n) even += scratch[i] * c[channels * i + j];
         even += odd;
@@ -2520,7 +2533,7 @@ static void isogi_sh__turn_y_plain(double *out, const double *in, int l, int cha
 #ifdef ISOGI_SH__SIMD
 /* The same for one of the channels, with a row n in each lane, even ones beside odd ones. The recursion goes on to m = 0, so that each row
    is whole and none is mirrored; it stays stable, since rows only oscillate where they are no longer growing. */
-#define ISOGI_SH__DEFINE_TURN_Y(NAME, TARGET, V, WIDTH, FMA)                                                                   \
+#define ISOGI_SH__DEFINE_TURN_Y(NAME, TARGET, V, WIDTH, FMA, SPLAT)                                                            \
     TARGET static void NAME(double *out, const double *in, int l, int channels, int transposed, const isogi_sh__quarter_turn *t) { \
         double cosines[ISOGI_SH_MAX_ORDER], sines[ISOGI_SH_MAX_ORDER], lane[4][WIDTH]; /* of m = l, l - 1, .. 0 */             \
         double sign = transposed && (l & 1) ? -1 : 1, sine_sign = transposed ? -sign : 1;                                      \
@@ -2537,14 +2550,14 @@ static void isogi_sh__turn_y_plain(double *out, const double *in, int l, int cha
             memcpy(&even, lane[0], sizeof even), memcpy(&odd, lane[1], sizeof odd);                                            \
             memcpy(&even_n, lane[2], sizeof even), memcpy(&odd_n, lane[3], sizeof odd);                                        \
             for (i = 0; i < l; i += 2) {                                                                                       \
-                even_c = FMA(even, zero + cosines[i], even_c), odd_s = FMA(odd, zero + sines[i], odd_s);                       \
+                even_c = FMA(even, SPLAT(cosines[i]), even_c), odd_s = FMA(odd, SPLAT(sines[i]), odd_s);                       \
                 d = even, even = FMA(even_n * t->gain[l - i], even, -(even_after * t->ratio[l - i])), even_after = d;          \
                 d = odd, odd = FMA(odd_n * t->gain[l - i], odd, -(odd_after * t->ratio[l - i])), odd_after = d;                \
-                even_s = FMA(even, zero + sines[i + 1], even_s), odd_c = FMA(odd, zero + cosines[i + 1], odd_c);               \
+                even_s = FMA(even, SPLAT(sines[i + 1]), even_s), odd_c = FMA(odd, SPLAT(cosines[i + 1]), odd_c);               \
                 d = even, even = FMA(even_n * t->gain[l - i - 1], even, -(even_after * t->ratio[l - i - 1])), even_after = d;  \
                 d = odd, odd = FMA(odd_n * t->gain[l - i - 1], odd, -(odd_after * t->ratio[l - i - 1])), odd_after = d;        \
             }                                                                                                                  \
-            if (i == l) even_c = FMA(even, zero + cosines[l], even_c);                                                         \
+            if (i == l) even_c = FMA(even, SPLAT(cosines[l]), even_c);                                                         \
             memcpy(lane[0], &even_c, sizeof even), memcpy(lane[1], &odd_c, sizeof odd);                                        \
             memcpy(lane[2], &even_s, sizeof even), memcpy(lane[3], &odd_s, sizeof odd);                                        \
             for (j = 0; j < 2 * WIDTH && first + j <= l; j++) {                                                                \
@@ -2553,8 +2566,8 @@ static void isogi_sh__turn_y_plain(double *out, const double *in, int l, int cha
             }                                                                                                                  \
         }                                                                                                                      \
     }
-ISOGI_SH__DEFINE_TURN_Y(isogi_sh__turn_y_rows4, ISOGI_SH__AVX2, isogi_sh__d4, 4, ISOGI_SH__FMA_D4)
-ISOGI_SH__DEFINE_TURN_Y(isogi_sh__turn_y_rows8, ISOGI_SH__AVX512, isogi_sh__d8, 8, ISOGI_SH__FMA_D8)
+ISOGI_SH__DEFINE_TURN_Y(isogi_sh__turn_y_rows4, ISOGI_SH__AVX2, isogi_sh__d4, 4, ISOGI_SH__FMA_D4, isogi_sh__eval_d4_splat)
+ISOGI_SH__DEFINE_TURN_Y(isogi_sh__turn_y_rows8, ISOGI_SH__AVX512, isogi_sh__d8, 8, ISOGI_SH__FMA_D8, isogi_sh__eval_d8_splat)
 #undef ISOGI_SH__DEFINE_TURN_Y
 #endif
 
@@ -2704,11 +2717,11 @@ ISOGI_SH__INLINE __attribute__((target("avx2,fma"))) isogi_sh__f8 isogi_sh__rota
     const isogi_sh__f8 zero = {0}, trace = {0, 0, 0, 0, 0, -0.57735026919f, 0, -0.57735026919f};
     const isogi_sh__f8 scale = {0, 0, 0, 1, 1, 0.86602540378f, 1, 1}, half = {0, 0, 0, 0, 0, 0, 0, 0.5f};
     isogi_sh__f8 q, v;
-    v = ISOGI_SH__FMA_F8(r->ax, in[3] - zero, ISOGI_SH__FMA_F8(r->ay, in[1] - zero, r->az * in[2]));
-    q = ISOGI_SH__FMA_F8(ISOGI_SH__FMA_F8(r->zz, 1.73205080757f - zero, trace), in[6] - zero, (r->xx - r->yy) * in[8]);
-    q = ISOGI_SH__FMA_F8(r->xy, in[4] - zero, q);
-    q = ISOGI_SH__FMA_F8(r->yz, in[5] - zero, q);
-    q = ISOGI_SH__FMA_F8(r->zx, in[7] - zero, q);
+    v = ISOGI_SH__ADD_F8(r->ax, in[3], ISOGI_SH__ADD_F8(r->ay, in[1], r->az * ISOGI_SH__SPLAT_F8(in[2])));
+    q = ISOGI_SH__ADD_F8(ISOGI_SH__FMA_F8(r->zz, 1.73205080757f - zero, trace), in[6], (r->xx - r->yy) * ISOGI_SH__SPLAT_F8(in[8]));
+    q = ISOGI_SH__ADD_F8(r->xy, in[4], q);
+    q = ISOGI_SH__ADD_F8(r->yz, in[5], q);
+    q = ISOGI_SH__ADD_F8(r->zx, in[7], q);
     q = ISOGI_SH__FMA_F8(q, scale, __builtin_shufflevector(q, q, 5, 5, 5, 5, 5, 5, 5, 5) * half);
     return __builtin_shufflevector(v, q, 0, 1, 2, 11, 12, 13, 14, 15);
 }
@@ -2717,7 +2730,7 @@ ISOGI_SH__INLINE __attribute__((target("avx2,fma"))) isogi_sh__f8 isogi_sh__rota
    are 222, 333, 111, 123, 233, 331, 311, one a lane: sums over i, j, k of T_ijk A_i B_j C_k with the pairs of rows and a third one. */
 ISOGI_SH__INLINE __attribute__((target("avx2,fma"))) isogi_sh__f8 isogi_sh__rotate_degree3(const float *in, const float m[9],
                                                                                            const isogi_sh__row_pairs *r) {
-    isogi_sh__f8 low = *(const isogi_sh__f8 *)m, high = *(const isogi_sh__f8 *)(m + 1), c = *(const isogi_sh__f8 *)in, zero = {0}, p, v;
+    isogi_sh__f8 low = *(const isogi_sh__f8 *)m, high = *(const isogi_sh__f8 *)(m + 1), c = *(const isogi_sh__f8 *)in, p, v;
     const isogi_sh__f8 scale = {-1.69479004f, 1.33984917f, 1.69479004f, 2.07568541f, 1.6409734f, 1.6409734f, 2.07568541f, 0};
     const isogi_sh__f8 rest = {-1.27109253f, 0, 1.27109253f, 0, 0, 0, 1.03784271f, 0};
     /* T: 111, 122, 112, 222, 113, 223, 333, 123; and 133, 233 */
@@ -2730,8 +2743,8 @@ ISOGI_SH__INLINE __attribute__((target("avx2,fma"))) isogi_sh__f8 isogi_sh__rota
     *(isogi_sh__f8 *)(t + 8) = k3 * __builtin_shufflevector(c, c, 5, 3, 5, 3, 5, 3, 5, 3);
     __asm__("" : "+m"(t)); /* spread from memory: shuffles are what this waits for */
 #define ISOGI_SH__ROWS(i0, i1, i2, i3, i4, i5)                                                                                  \
-    p = ISOGI_SH__FMA_F8(r->xx, t[i0] - zero, ISOGI_SH__FMA_F8(r->yy, t[i1] - zero, r->zz * t[i2]));                            \
-    p = ISOGI_SH__FMA_F8(r->xy, t[i3] - zero, ISOGI_SH__FMA_F8(r->yz, t[i4] - zero, ISOGI_SH__FMA_F8(r->zx, t[i5] - zero, p)))
+    p = ISOGI_SH__ADD_F8(r->xx, t[i0], ISOGI_SH__ADD_F8(r->yy, t[i1], r->zz * ISOGI_SH__SPLAT_F8(t[i2]))); \
+    p = ISOGI_SH__ADD_F8(r->xy, t[i3], ISOGI_SH__ADD_F8(r->yz, t[i4], ISOGI_SH__ADD_F8(r->zx, t[i5], p)))
     ISOGI_SH__ROWS(0, 1, 8, 2, 7, 4);
     v = p * __builtin_shufflevector(low, low, 3, 6, 0, 6, 6, 0, 0, 0);
     ISOGI_SH__ROWS(2, 3, 9, 1, 5, 7);
@@ -2767,8 +2780,8 @@ ISOGI_SH__INLINE __attribute__((target("avx2,fma"))) void isogi_sh__rotate_degre
                                                 k4 * __builtin_shufflevector(c, c, 7, 6, 2, 6, 7, 6, 2, 6));
     __asm__("" : "+m"(t)); /* spread from memory, as in degree 3 */
 #define ISOGI_SH__ENTRIES(q, i0, i1, i2, i3, i4)                                                                                 \
-    m = ISOGI_SH__FMA_F8(q0, t[i0] - zero, q1 * t[i1]);                                                                         \
-    m = ISOGI_SH__FMA_F8(r->xy, t[i2] - zero, ISOGI_SH__FMA_F8(r->yz, t[i3] - zero, ISOGI_SH__FMA_F8(r->zx, t[i4] - zero, m))); \
+    m = ISOGI_SH__ADD_F8(q0, t[i0], q1 * ISOGI_SH__SPLAT_F8(t[i1]));                             \
+    m = ISOGI_SH__ADD_F8(r->xy, t[i2], ISOGI_SH__ADD_F8(r->yz, t[i3], ISOGI_SH__ADD_F8(r->zx, t[i4], m))); \
     zz = ISOGI_SH__FMA_F8(m, __builtin_shufflevector(q, q, 1, 1, 1, 1, 5, 5, 5, 5), zz);                                         \
     xx = ISOGI_SH__FMA_F8(m, __builtin_shufflevector(q, q, 2, 2, 2, 2, 7, 7, 7, 7), xx)
     zz = xx = zero;
@@ -2856,14 +2869,14 @@ ISOGI_SH__INLINE __attribute__((target("avx2,fma,avx512f,avx512vl,avx512dq"))) v
     for (i = 0; i < 4; i++) from[i] = v[i];
     x = (const double *)from + 8 * alike, y = (const double *)from + 8 * other;
     for (i = 0; 2 * i < l; i++, column += step, across += step) {
-        even_c = ISOGI_SH__FMA_D8(*(const isogi_sh__d8 *)column, zero + x[i], even_c);
-        odd_s = ISOGI_SH__FMA_D8(*(const isogi_sh__d8 *)(column + odd_n), zero + x[i + 16], odd_s);
-        odd_c = ISOGI_SH__FMA_D8(*(const isogi_sh__d8 *)(across + odd_n), zero + y[i], odd_c);
-        even_s = ISOGI_SH__FMA_D8(*(const isogi_sh__d8 *)across, zero + y[i + 16], even_s);
+        even_c = ISOGI_SH__FMA_D8(*(const isogi_sh__d8 *)column, isogi_sh__eval_d8_splat(x[i]), even_c);
+        odd_s = ISOGI_SH__FMA_D8(*(const isogi_sh__d8 *)(column + odd_n), isogi_sh__eval_d8_splat(x[i + 16]), odd_s);
+        odd_c = ISOGI_SH__FMA_D8(*(const isogi_sh__d8 *)(across + odd_n), isogi_sh__eval_d8_splat(y[i]), odd_c);
+        even_s = ISOGI_SH__FMA_D8(*(const isogi_sh__d8 *)across, isogi_sh__eval_d8_splat(y[i + 16]), even_s);
     }
     if (!alike) {
-        even_c = ISOGI_SH__FMA_D8(*(const isogi_sh__d8 *)column, zero + x[i], even_c);
-        odd_s = ISOGI_SH__FMA_D8(*(const isogi_sh__d8 *)(column + odd_n), zero + x[i + 16], odd_s);
+        even_c = ISOGI_SH__FMA_D8(*(const isogi_sh__d8 *)column, isogi_sh__eval_d8_splat(x[i]), even_c);
+        odd_s = ISOGI_SH__FMA_D8(*(const isogi_sh__d8 *)(column + odd_n), isogi_sh__eval_d8_splat(x[i + 16]), odd_s);
     }
     v[0] = even_c, v[1] = odd_c, v[2] = even_s, v[3] = odd_s;
 }
@@ -3270,7 +3283,7 @@ isogi_sh__build_columns(double *out, int l, int m, int halves, const isogi_sh__b
         for (k = (l + sines) & 1, w = table + k * (l + 1); k <= l; k += 2, w += 2 * (l + 1)) {
             ISOGI_SH__UNROLL
             for (i = 0; i < 4; i++) {
-                isogi_sh__d8 w_mk = w[(i & 1 ? l / 2 + 1 : 0) + i / 2] - zero;
+                isogi_sh__d8 w_mk = isogi_sh__eval_d8_splat(w[(i & 1 ? l / 2 + 1 : 0) + i / 2]);
                 ISOGI_SH__UNROLL
                 for (h = 0; h < halves; h++)
                     y[i][sines][h] = ISOGI_SH__FMA_D8(*(const isogi_sh__d8 *)((i & 1 ? t->odd : t->even)[k] + 8 * h), w_mk, y[i][sines][h]);
@@ -3395,12 +3408,12 @@ ISOGI_API isogi_result isogi_sh_rotation_build(float *rotation, int order, const
 #define ISOGI_SH__OF_FOUR(i) x = __builtin_shufflevector(four, four, i, i, i, i, i + 4, i + 4, i + 4, i + 4)
 #define ISOGI_SH__BOTH(j) ISOGI_SH__COLUMN(d, 84 + 9 * (j), x), last = __builtin_fmaf(rotation[92 + 9 * (j)], x[0], last)
 ISOGI_SH__AVX2 static isogi_result isogi_sh__apply_order5(float *out, const float *in, const float *rotation) {
-    isogi_sh__f8 zero = {0}, a = zero, b = zero, c = zero, d = zero, x = in[16] - zero, four;
+    isogi_sh__f8 zero = {0}, a = zero, b = zero, c = zero, d = zero, x = ISOGI_SH__SPLAT_F8(in[16]), four;
     float last = 0;
     int j;
     ISOGI_SH__BOTH(0);
     ISOGI_SH__UNROLL9
-    for (j = 0; j < 3; j++) ISOGI_SH__COLUMN(a, 1 + 3 * j, in[1 + j] - zero);
+    for (j = 0; j < 3; j++) ISOGI_SH__COLUMN(a, 1 + 3 * j, ISOGI_SH__SPLAT_F8(in[1 + j]));
     ISOGI_SH__FOUR(17);
     ISOGI_SH__OF_FOUR(0), ISOGI_SH__BOTH(1);
     ISOGI_SH__OF_FOUR(1), ISOGI_SH__BOTH(2);
@@ -3411,7 +3424,7 @@ ISOGI_SH__AVX2 static isogi_result isogi_sh__apply_order5(float *out, const floa
     ISOGI_SH__OF_FOUR(1), ISOGI_SH__COLUMN(b, 15, x);
     ISOGI_SH__OF_FOUR(2), ISOGI_SH__COLUMN(b, 20, x);
     ISOGI_SH__OF_FOUR(3), ISOGI_SH__COLUMN(b, 25, x);
-    ISOGI_SH__COLUMN(b, 30, in[8] - zero);
+    ISOGI_SH__COLUMN(b, 30, ISOGI_SH__SPLAT_F8(in[8]));
     ISOGI_SH__FOUR(9);
     ISOGI_SH__OF_FOUR(0), ISOGI_SH__COLUMN(c, 35, x);
     ISOGI_SH__OF_FOUR(1), ISOGI_SH__COLUMN(c, 42, x);
@@ -3692,8 +3705,10 @@ ISOGI_SH__AVX2 static int isogi_sh__zonal_order5_f8(float *c, const float *zonal
     const isogi_sh__f8 d0 = {0.739509973f, 2.09165007f, -0.559016994f, -2.37170825f, 0.375f, -2.37170825f, -0.559016994f, 2.09165007f};
     const isogi_sh__f8 d1 = {0, 0, 3.91311896f, 5.53398591f, -3.75f, 5.53398591f, 3.91311896f, 0};
     const isogi_sh__f8 d2 = {0, 0, 0, 0, 4.375f, 0, 0, 0};
-    isogi_sh__f8 x = d[0] - zero, y = d[1] - zero, z = d[2] - zero, e = one - ISOGI_SH__FMA_F8(x, x, ISOGI_SH__FMA_F8(y, y, z * z)), scale;
-    isogi_sh__f8 c2, s2, c3, s3, c4, s4, zz, l2 = zonal[2] - zero, l3 = zonal[3] - zero, l4 = zonal[4] - zero, v, w;
+    isogi_sh__f8 x = ISOGI_SH__SPLAT_F8(d[0]), y = ISOGI_SH__SPLAT_F8(d[1]), z = ISOGI_SH__SPLAT_F8(d[2]), scale;
+    isogi_sh__f8 e = one - ISOGI_SH__FMA_F8(x, x, ISOGI_SH__FMA_F8(y, y, z * z));
+    isogi_sh__f8 c2, s2, c3, s3, c4, s4, zz, v, w;
+    isogi_sh__f8 l2 = ISOGI_SH__SPLAT_F8(zonal[2]), l3 = ISOGI_SH__SPLAT_F8(zonal[3]), l4 = ISOGI_SH__SPLAT_F8(zonal[4]);
     if (!isogi_sh__below(e[0], 1e-3f)) return 0;
     scale = ISOGI_SH__FMA_F8(e, ISOGI_SH__FMA_F8(e, one * 0.375f, one * 0.5f), one);
     x *= scale, y *= scale, z *= scale, zz = z * z;
@@ -3910,8 +3925,8 @@ ISOGI_SH__AVX2 static void isogi_sh__latitudes_f8(isogi_sh__f8 *c, isogi_sh__f8 
         isogi_sh__f8 a = zero, b = zero;
         ISOGI_SH__UNROLL
         for (l = m; l < 5; l++, q++) {
-            a = ISOGI_SH__FMA_F8(*q, f[l * (l + 1) + m] - zero, a);
-            if (m) b = ISOGI_SH__FMA_F8(*q, f[l * (l + 1) - m] - zero, b);
+            a = ISOGI_SH__ADD_F8(*q, f[l * (l + 1) + m], a);
+            if (m) b = ISOGI_SH__ADD_F8(*q, f[l * (l + 1) - m], b);
         }
         c[m] = a, s[m] = b;
     }
@@ -3982,8 +3997,8 @@ ISOGI_SH__AVX512 ISOGI_SH__INLINE void isogi_sh__series_of_f16(isogi_sh__series_
         for (l = m; l < 5; l++, q += 8) {
             int parity = (l + m) & 1;
             if (parity && latitude == 3) continue;
-            part[parity][0] = ISOGI_SH__FMA_F16(f[l * (l + 1) + m], *q - zero, part[parity][0]);
-            if (m) part[parity][1] = ISOGI_SH__FMA_F16(f[l * (l + 1) - m], *q - zero, part[parity][1]);
+            part[parity][0] = ISOGI_SH__FMA_F16(f[l * (l + 1) + m], isogi_sh__eval_f16_splat(*q), part[parity][0]);
+            if (m) part[parity][1] = ISOGI_SH__FMA_F16(f[l * (l + 1) - m], isogi_sh__eval_f16_splat(*q), part[parity][1]);
         }
         above->c[m] = part[0][0], above->s[m] = part[0][1];
         if (latitude == 3) continue;
@@ -4029,16 +4044,16 @@ ISOGI_SH__AVX512 ISOGI_SH__INLINE void isogi_sh__series_product_f16(isogi_sh__se
 /* The sum and the difference of the products at latitudes z and -z */
 ISOGI_SH__AVX512 static void isogi_sh__product_latitude_f16(isogi_sh__series_f16 *sum, const isogi_sh__f16 *f, const isogi_sh__f16 *g,
                                                             int latitude) {
-    isogi_sh__series_f16 f_above, f_below, g_above, g_below, above, below;
+    isogi_sh__series_f16 series[2][2], product[2]; /* [below][of g] */
     int m;
-    isogi_sh__series_of_f16(&f_above, &f_below, f, latitude);
-    isogi_sh__series_of_f16(&g_above, &g_below, g, latitude);
-    isogi_sh__series_product_f16(&above, &f_above, &g_above);
-    isogi_sh__series_product_f16(&below, &f_below, &g_below);
+    isogi_sh__series_of_f16(&series[0][0], &series[1][0], f, latitude);
+    isogi_sh__series_of_f16(&series[0][1], &series[1][1], g, latitude);
+    isogi_sh__series_product_f16(&product[0], &series[0][0], &series[0][1]);
+    isogi_sh__series_product_f16(&product[1], &series[1][0], &series[1][1]);
     ISOGI_SH__UNROLL
     for (m = 0; m < 5; m++) {
-        sum[0].c[m] = above.c[m] + below.c[m], sum[1].c[m] = above.c[m] - below.c[m];
-        if (m) sum[0].s[m] = above.s[m] + below.s[m], sum[1].s[m] = above.s[m] - below.s[m];
+        sum[0].c[m] = product[0].c[m] + product[1].c[m], sum[1].c[m] = product[0].c[m] - product[1].c[m];
+        if (m) sum[0].s[m] = product[0].s[m] + product[1].s[m], sum[1].s[m] = product[0].s[m] - product[1].s[m];
     }
 }
 
@@ -4080,10 +4095,7 @@ ISOGI_SH__AVX512 static void isogi_sh__product_order5_f16(float *out, const floa
     isogi_sh__series_f16 sum[4][2]; /* [latitude][odd] */
     isogi_sh__f16 a[25], b[25], c[25], zero = {0};
     int i, l, m;
-    for (i = 0; i < 4; i++) {
-        isogi_sh__columns_f16(a + columns[i], f + columns[i]);
-        isogi_sh__columns_f16(b + columns[i], g + columns[i]);
-    }
+    for (i = 0; i < 8; i++) isogi_sh__columns_f16((i < 4 ? a : b) + columns[i % 4], (i < 4 ? f : g) + columns[i % 4]);
     for (i = 0; i < 3; i++) isogi_sh__product_latitude_f16(sum[i], a, b, i);
     isogi_sh__product_equator_f16(sum[3], a, b);
     ISOGI_SH__UNROLL
@@ -4094,8 +4106,8 @@ ISOGI_SH__AVX512 static void isogi_sh__product_order5_f16(float *out, const floa
             isogi_sh__f16 cosine = zero, sine = zero;
             ISOGI_SH__UNROLL
             for (i = 0; i < 4 - odd; i++) {
-                cosine = ISOGI_SH__FMA_F16(sum[i][odd].c[m], q[i] - zero, cosine);
-                if (m) sine = ISOGI_SH__FMA_F16(sum[i][odd].s[m], q[i] - zero, sine);
+                cosine = ISOGI_SH__FMA_F16(sum[i][odd].c[m], isogi_sh__eval_f16_splat(q[i]), cosine);
+                if (m) sine = ISOGI_SH__FMA_F16(sum[i][odd].s[m], isogi_sh__eval_f16_splat(q[i]), sine);
             }
             c[l * (l + 1) + m] = cosine;
             if (m) c[l * (l + 1) - m] = sine;
@@ -4441,7 +4453,7 @@ ISOGI_SH__AVX2 static void isogi_sh__fejer_rows(double *weight, const double *co
 
 /* total[25][12]: += what one row, at z = cos t with weight `power`, adds to each coefficient; 4 texels x 3 channels to be summed later */
 ISOGI_SH__AVX2 static void isogi_sh__image_add(double (*total)[12], isogi_sh__f8 (*sum)[9], double z, double sine, double power) {
-    isogi_sh__d4 part[9][3], zero = {0};
+    isogi_sh__d4 part[9][3];
     double q[5];
     int j, k, l, m;
     for (k = 0; k < 9; k++) {
@@ -4457,7 +4469,7 @@ ISOGI_SH__AVX2 static void isogi_sh__image_add(double (*total)[12], isogi_sh__f8
         isogi_sh__column(q, 5, m, isogi_sh__next_diagonal(0, m), z, 0);
         for (l = m; l < 5; l++)
             for (k = m ? 2 * m - 1 : 0; k <= 2 * m; k++) {
-                isogi_sh__d4 *to = (isogi_sh__d4 *)total[l * (l + 1) + (k == 2 * m ? -m : m)], by = power * q[l] - zero;
+                isogi_sh__d4 *to = (isogi_sh__d4 *)total[l * (l + 1) + (k == 2 * m ? -m : m)], by = isogi_sh__eval_d4_splat(power * q[l]);
                 for (j = 0; j < 3; j++) to[j] = ISOGI_SH__FMA_D4(part[k][j], by, to[j]);
             }
     }
