@@ -63,8 +63,9 @@
                 arrays that are a multiple of 4096 bytes long take twice as long again, since all functions of a direction compete for
                 the same lines of the cache.
    Determinism  The same input on the same instruction path gives the same bits. Paths agree within the float errors below.
-   Accuracy     Largest absolute error against 128 bits, poles and all: double 1e-15 at degree 4, 5e-15 at 10, 1.5e-14 at 20, 6e-14 at 50,
-                2e-13 at 100; float 4.5e-7 at 4, 2.2e-6 at 10, 1e-5 at 20. tests/test_sh.c states and checks each.
+   Accuracy     Largest absolute error against 128 bits, poles and all: double 1e-15 at degree 4, 5e-15 at 10, 2e-14 at 20, 1.5e-13 at 50,
+                7e-13 at 100 (all near poles, some .01 to .1 off them, for m = 0 and +-1; up to twice as much in x87 registers, as on
+                32-bit x86); float 4.5e-7 at 4, 2.2e-6 at 10, 1e-5 at 20. tests/test_sh.c states and checks each.
                 All bounds assume IEEE arithmetic: -ffast-math may reorder what cancels, and costs up to four times as much, six at
                 degree 100.
    Limits       Order 1..101 (degree 0..100), 1..16 channels. Counts times order^2 must be addressable.

@@ -24,15 +24,15 @@ static quad quad_sqrt(quad x) {
     return r;
 }
 
-/* y[order*order] for the direction as it is given, normalised in 128 bits. Not for the zero vector. */
-static void reference_eval(quad *y, int order, const quad direction[3]) {
+/* y[order*order] for the direction as it is given, normalised in 128 bits, of |m| < columns alone. Not for the zero vector. */
+static void reference_columns(quad *y, int order, int columns, const quad direction[3]) {
     static const char pi_digits[] = "314159265358979323846264338327950288";
     quad pi = 0, x = direction[0], z = direction[2], yy = direction[1], r = quad_sqrt(x * x + yy * yy + z * z);
     for (const char *p = pi_digits; *p; p++) pi = pi * 10 + (quad)(*p - '0');
     for (int i = 0; i < 35; i++) pi /= 10;
     x /= r, yy /= r, z /= r;
     quad c = 1, s = 0, double_factorial = 1;
-    for (int m = 0; m < order; m++) {
+    for (int m = 0; m < columns; m++) {
         quad before = 0, p = double_factorial, ratio = 1; /* ratio: (l-m)! / (l+m)! */
         for (int k = 2; k <= 2 * m; k++) ratio /= (quad)k;
         for (int l = m; l < order; l++) {
@@ -48,6 +48,8 @@ static void reference_eval(quad *y, int order, const quad direction[3]) {
         s = x * s + yy * c, c = t;
     }
 }
+
+static void reference_eval(quad *y, int order, const quad direction[3]) { reference_columns(y, order, order, direction); }
 
 /* The n nodes and weights of Gauss and Legendre on [-1, 1], from 1 down: Newton's method on P_n, apart from what the header does. */
 __attribute__((unused)) static void reference_nodes(long double *node, long double *weight, int n) {

@@ -11,6 +11,7 @@ static int instruction_level = BEST_LEVEL; /* a test may hold the header to less
 #define ISOGI_SH_IMPLEMENTATION
 #include "isogi_sh.h"
 #include "reference_sh.h"
+#include <float.h>
 #include "generate_sh.h"
 #include "test.h"
 
@@ -100,9 +101,12 @@ TEST(convention) {
     }
 }
 
+/* What the header allows -ffast-math, and x87 registers. */
+#define DOUBLE_FACTOR(degree) ((ROUNDING_FACTOR > 1 && (degree) == 100 ? 6 : ROUNDING_FACTOR) * (FLT_EVAL_METHOD == 2 ? 2 : 1))
+
 /* Largest absolute error in double over hard and random directions. The bounds are those that the header states. */
 TEST(double_evaluation_is_exact) {
-    static const struct { int degree; double bound; } cases[] = {{4, 1e-15}, {10, 5e-15}, {20, 1.5e-14}, {50, 6e-14}, {100, 2e-13}};
+    static const struct { int degree; double bound; } cases[] = {{4, 1e-15}, {10, 5e-15}, {20, 2e-14}, {50, 1.5e-13}, {100, 7e-13}};
     static double y[MAX_COUNT];
     static quad expected[MAX_COUNT];
     for (size_t c = 0; c < sizeof cases / sizeof *cases; c++) {
@@ -119,8 +123,52 @@ TEST(double_evaluation_is_exact) {
             }
         }
         printf("    degree %d: largest error %.3g\n", cases[c].degree, worst);
-        CHECK(worst <= cases[c].bound * (ROUNDING_FACTOR > 1 && cases[c].degree == 100 ? 6 : ROUNDING_FACTOR),
+        CHECK(worst <= cases[c].bound * DOUBLE_FACTOR(cases[c].degree),
               "degree %d: error %g at (%g %g %g), bound %g", cases[c].degree, worst, at[0], at[1], at[2], cases[c].bound);
+    }
+}
+
+/* Where the rounding of z moves polynomials most: angles from the poles of 1e-6 to 1, by their logarithm, one direction at a time and
+   sixteen at once, with every set of instructions. The worst is at m = 0 and +-1. */
+TEST(double_evaluation_is_exact_at_any_distance_from_poles) {
+    static const struct { int degree; double bound; } cases[] = {{4, 1e-15}, {10, 5e-15}, {20, 2e-14}, {50, 1.5e-13}, {100, 7e-13}};
+    enum { COLUMNS = 3 };
+    static double y[3][16 * MAX_COUNT], one[MAX_COUNT];
+    static quad expected[MAX_COUNT];
+    for (size_t c = 0; c < sizeof cases / sizeof *cases; c++) {
+        const int order = cases[c].degree + 1, count = order * order;
+        test_random r = {5};
+        double d[16][3], worst = 0, at = 0;
+        int level, set, levels = 0;
+        for (set = 0; set < (LONG_SUITE ? 300 : 12); set++) {
+            for (int i = 0; i < 16; i++) {
+                const double angle = pow(10, -(i % 4 ? 2.2 : 6) * random_unit(&r)), phi = random_range(&r, 0, 2 * pi);
+                d[i][0] = sin(angle) * cos(phi), d[i][1] = sin(angle) * sin(phi), d[i][2] = (i & 1 ? -1 : 1) * cos(angle);
+            }
+            for (level = 0; level < 3 && level <= BEST_LEVEL; level++) {
+                instruction_level = level;
+                isogi_sh_eval_f64(y[level], order, (const double(*)[3])d, 16);
+            }
+            for (int i = 0; i < 16; i++) {
+                quad e[3] = {(quad)d[i][0], (quad)d[i][1], (quad)d[i][2]};
+                reference_columns(expected, order, COLUMNS, e);
+                for (levels = level, level = 0; level < levels; level++) {
+                    instruction_level = level;
+                    isogi_sh_eval_f64(one, order, (const double(*)[3])d + i, 1);
+                    for (int l = 0; l < order; l++)
+                        for (int m = -(l < COLUMNS ? l : COLUMNS - 1); m < COLUMNS && m <= l; m++) {
+                            const int k = l * (l + 1) + m;
+                            const double error = fmax(fabs((double)(expected[k] - (quad)y[level][i * count + k])),
+                                                      fabs((double)(expected[k] - (quad)one[k])));
+                            if (!(error <= worst)) worst = error, at = fabs(d[i][2]) < 1 ? acos(fabs(d[i][2])) : 0;
+                        }
+                }
+            }
+        }
+        instruction_level = BEST_LEVEL;
+        printf("    degree %d: largest error %.3g, at %.2g from a pole\n", cases[c].degree, worst, at);
+        CHECK(worst <= cases[c].bound * DOUBLE_FACTOR(cases[c].degree), "degree %d: error %g, bound %g", cases[c].degree, worst,
+              cases[c].bound);
     }
 }
 
@@ -158,7 +206,7 @@ TEST(float_evaluation_is_exact) {
    directions close to the poles and the equator, where polynomials and recursions cancel most. */
 TEST(batches_are_exact_at_every_level) {
     static const struct { int order; double bound, bound64; } cases[] = {{3, 4.5e-7, 1e-15}, {4, 4.5e-7, 1e-15}, {5, 4.5e-7, 1e-15},
-        {8, 2.2e-6, 5e-15}, {11, 2.2e-6, 5e-15}, {21, 1e-5, 1.5e-14}};
+        {8, 2.2e-6, 5e-15}, {11, 2.2e-6, 5e-15}, {21, 1e-5, 2e-14}};
     enum { MOST = 2400 };
     static float d[MOST][3], y[3][MOST * 441];
     static double wide[MOST][3], y64[3][MOST * 441];
