@@ -76,7 +76,10 @@
 
    Shading. ISOGI_DVR_UNLIT shows the transfer function's colour. ISOGI_DVR_LOCAL is diffuse shading by the smoothed gradient,
    with the normal turned towards the eye: radiance = rgb / pi * irradiance (environment convolved with the cosine at SH order 5,
-   directional lights, point lights), no shadows; where the gradient vanishes, light is scattered as below but unshadowed.
+   directional lights, lamps), no shadows; where the gradient vanishes, light is scattered as below but unshadowed. Lamps are points
+   here, and in two-sided light: a sphere is its centre, which is never nearer than its radius, so that within it light comes
+   from the centre as at its surface; a rectangle is its centre, by the cosine to its normal and to the side it shines to alone; a
+   directional light has no angular radius.
    ISOGI_DVR_TWO_SIDED adds light that comes through, and highlights (Kraus 2005, eq. 19), for n of either orientation:
 
        ambient Cd a + sum_i I_i ( a Cd |l.n| + a Cs max(0, r.v)^e                     where l and v are on one side of the surface
@@ -89,16 +92,17 @@
 
        g_s = rgb / (4 pi) * max(0, sum_i L_i V_i)         per channel
 
-   where L are the SH coefficients of the light that arrives (environment, directional lights as deltas; point and sphere lights
-   are added at every sample with their inverse square) and V those of the transmittance from the sample to the border of the box
-   in all directions, interpolated between the eight nearest points of a regular grid, of which the more open count more: the
-   trilinear weight of each times min(1, 2 m)^2, where m >= 0.005 is the mean of its V over all directions. So the light on a surface is
-   that of the points in front of it, without the darkness of those below. Where nothing casts shadows, V(w) = 1, and a sky of radiance
-   1 from everywhere gives g_s = rgb / (4 pi) * 4 pi = rgb: colour is the albedo, and under a uniform sky of 1 a medium without shadows
-   looks as it does unlit. A directional light of irradiance E gives g_s = rgb E V / (4 pi). The truncated series can be
-   negative: it is clamped at zero. Matter that is dense for the grid is lit as what is in front of it: in physical space V is looked up
-   off = r x^2 / (x^2 + 16) nearer to the eye, where r is 1.5 grid distances, as they are along the ray, and x the optical depth of r
-   in the matter of the sample.
+   where L are the SH coefficients of the light that arrives (environment, directional lights as deltas or discs; lamps are added at
+   every sample as isogi_sh_project has them there: points and spheres with their inverse square, within a sphere evenly from
+   everywhere, rectangles exactly; matter behind a lamp shadows it as matter before it does) and V those of the transmittance from the
+   sample to the border of the box in all directions, interpolated between the eight nearest points of a regular grid, of which the more
+   open count more: the trilinear weight of each times min(1, 2 m)^2, where m >= 0.005 is the mean of its V over all directions. So the
+   light on a surface is that of the points in front of it, without the darkness of those below. Where nothing casts shadows, V(w) = 1,
+   and a sky of radiance 1 from everywhere gives g_s = rgb / (4 pi) * 4 pi = rgb: colour is the albedo, and under a uniform sky of 1 a
+   medium without shadows looks as it does unlit. A directional light of irradiance E gives g_s = rgb E V / (4 pi). The truncated series
+   can be negative: it is clamped at zero. Matter that is dense for the grid is lit as what is in front of it: in physical space V is
+   looked up off = r x^2 / (x^2 + 16) nearer to the eye, where r is 1.5 grid distances, as they are along the ray, and x the optical
+   depth of r in the matter of the sample.
 
    Visibility is sampled in `directions` directions and projected to SH, by one of the methods of isogi_dvr_method. Brute force
    marches every ray from every grid point through the same transfer function (in the same space; peaks attenuate at every
@@ -175,7 +179,8 @@
    Stack use stays below 32 KB.
    isogi_dvr_set_transfer and isogi_dvr_step are writers: one at a time, and not during another call with the same renderer. All
    other calls only read and may run at the same time. Calls divide their own work among the context's threads. Results are the
-   same bits for any number of threads and however visibility was cut into steps.
+   same bits for any number of threads and however visibility was cut into steps. All promises of equal bits are for IEEE arithmetic:
+   with -ffast-math pictures differ by roundings.
 
    Samples stand at the middle of pieces of equal length, counted from where the ray enters the box (or from the eye inside it);
    the last piece is what is left. Blocks of the pyramid in which the transfer function has no extinction are stepped over, largest

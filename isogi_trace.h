@@ -149,6 +149,7 @@
                 FEEDBACK: which probes there are depends on what was asked for and in which order: within 5 % (rms over points).
                 Instruction paths (isogi_context.force_path) give the same hits and the same bits; but a ray that grazes the surface
                 within rounding, one in 100,000, may be seen either way: light then differs by what that one sample brings.
+                All of this is for IEEE arithmetic: with -ffast-math light is right within its errors, and no bits are promised.
    Limits       Order 6; 2^24 samples; paths end after 10000 reflections. White surfaces that enclose a light truly have infinite
                 light: what is computed then is finite and has no meaning; its error says so, and isogi_trace_report.diverges.
                 Voxels of 1e-150 to 1e150 world units: squares of lengths must neither vanish nor overflow. Where matter is
@@ -207,10 +208,11 @@ typedef void isogi_trace_material_function(void *user, double isovalue, const do
    has an error of about 1.3 % with 16 samples (an engine block; README.md):
    FLOAT   12 / 4   6e-8 of the value
    HALF     6 / 2   5e-4 of the value
-   RGB9E5   4 / -   2e-3 of the largest of the three channels; irradiance alone
+   RGB9E5   4 / -   2e-3 of the largest of the three channels; irradiance alone, 0 or more
    BYTE     3 / 1   irradiance: square roots, 4e-3 of sqrt(value * largest); transfer: 4e-3 of the texel's largest coefficient
    `make test` prints the measured table. HALF and RGB9E5 hold up to 65000 times the irradiance of an open surface
-   (measured as isogi_trace_report.unit is), BYTE twice as much (four times with reflections); brighter texels are cut off there. */
+   (measured as isogi_trace_report.unit is), BYTE twice as much (four times with reflections); brighter texels are cut off there. Below
+   some 1e-4 of that irradiance HALF and RGB9E5 err by more than the share above: their steps are no finer than about 1e-7 of it. */
 typedef enum isogi_trace_format {
     ISOGI_TRACE_DEFAULT = 0, /* FLOAT for irradiance: with nothing kept for texels without light that is small enough; HALF for
                                 transfer, where it halves by far the largest part of the memory and costs nothing that can be seen */
@@ -296,6 +298,8 @@ ISOGI_API isogi_result isogi_trace_step(isogi_trace *trace, uint64_t max_rays, d
    luminance, NULL = not wanted; a point none of whose texels is ready gets the zero vector and error = INFINITY (so does the error
    of a single sample, which is not known, and endless light). Points beyond the lattice are moved to its border.
    TRANSFER: under the lighting last given to isogi_trace_relight (that of the description at first); its error is an upper bound.
+   Irradiance below 0 is handed out as it is, here and by isogi_trace_gather: a sky that SH coefficients make negative somewhere brings
+   it, and so do the truncated series of TRANSFER where nearly all light is hidden. Before it is shown:  e = e > 0 ? e : 0  a channel.
    Errors cover the true ones (twice the standard error in 95 % of points, tests/test_trace_bake.c; in 91 % with desc.error, of a scan):
    they allow for what samples that agree may all have missed, and for probes 2 % of reflected light. They know nothing of the lattice,
    and of glows only what emission_points tell: where desc.material alone makes something glow, give the brightest of it there. */
@@ -376,7 +380,8 @@ ISOGI_API isogi_trace *isogi_trace_high(isogi_trace *trace);
    surface, not computed) hold the mean of those around them, three texels deep, and beyond that the mean of all: plain hardware
    interpolation then shows no dark seams.
    Light is what the hardware reads times a scale: scales[3] of RGB, or scales[order^2 channels]; 1 for FLOAT; for HALF and RGB9E5
-   another power of two where something is brighter than these hold, or nothing as bright as 0.5; for BYTE the largest value.
+   another power of two where something is brighter than these hold, or nothing as bright as 0.5; for BYTE the largest value. HALF and
+   RGB9E5 keep to the errors above from 6e-5 times the scale on; what is darker has steps of 6e-8 times the scale.
    export_size: bytes that isogi_trace_export fills, 0 where the format is not for this mode. format 0 = that of the storage.
    ISOGI_INVALID where `bytes` are too few; takes a byte a texel of scratch memory. Readers: any number of threads may export. */
 ISOGI_API size_t isogi_trace_export_size(const isogi_trace *trace, int format);
