@@ -62,9 +62,10 @@
    why nothing leaks through the faces that cells share.
    Batches go through a pool of 64 rays, eight to an instruction where there is AVX-512, so hand over many at a time: from 64 on all
    rays are faster than alone (twice to four times), from 500 on nothing is left to gain. There, rays of one isovalue that nearly
-   coincide, up to sixteen in a row as in a tile of pixels, go as one and are faster still. Cells are looked at in float first, from
-   8-bit voxels that lie together in two cache lines for 4x4x4 cells, with an error bound: what is certain needs nothing else, and
-   only cells in doubt, the hits and one cell for every 25 rays besides, read your voxels and are solved in double.
+   coincide, up to sixteen in a row as in a tile of pixels, go as one and are faster still; rays that follow each other from one place
+   come down to its leaf together. Cells are looked at in float first, from 8-bit voxels that lie together in two cache lines for 4x4x4
+   cells, with an error bound: what is certain needs nothing else, and only cells in doubt, the hits and one cell for every 25 rays
+   besides, read your voxels and are solved in double.
 
    History  1.0  first release
 */
@@ -5820,14 +5821,20 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE void isogi_vol__take_down(isogi_vol__batch *
     isogi_vol__descend8(turn, s, slots, row, lanes, (const double(*)[8])per, end, flip);
 }
 
-/* Sends for rays that come after the next ones, and for where the hits of these will be written. */
-ISOGI_VOL__INLINE void isogi_vol__send_for_rays(const char *from, size_t element, char *hits) {
+/* Sends for rays that come after the next ones, and for where the hits of these will be written; soon: they are needed at once. */
+ISOGI_VOL__INLINE void isogi_vol__send_for_rays(const char *from, size_t element, char *hits, int soon) {
     size_t k;
 #pragma GCC unroll 8
-    for (k = 0; k < 8; k++) __builtin_prefetch((const void *)((uintptr_t)from + (16 + k) * element), 0, 2);
+    for (k = 0; k < 8; k++) {
+        if (soon) __builtin_prefetch((const void *)((uintptr_t)from + (16 + k) * element), 0);
+        else __builtin_prefetch((const void *)((uintptr_t)from + (16 + k) * element), 0, 2);
+    }
     if (!hits) return;
 #pragma GCC unroll 6
-    for (k = 0; k < 6; k++) __builtin_prefetch((const void *)((uintptr_t)hits + 64 * k), 1, 2);
+    for (k = 0; k < 6; k++) {
+        if (soon) __builtin_prefetch((const void *)((uintptr_t)hits + 64 * k), 1);
+        else __builtin_prefetch((const void *)((uintptr_t)hits + 64 * k), 1, 2);
+    }
 }
 
 /* Sets up to eight rays up at once and puts them into slots (beyond `count` the first one again; what is written of rays that get none does
@@ -5859,7 +5866,7 @@ ISOGI_VOL__AVX512 static unsigned isogi_vol__seat8(isogi_vol__batch *b, isogi_vo
         const size_t ray = k < count ? (size_t)k : 0;
         at[k] = from + (b->bundle ? 0 : ray * element), dir_at[k] = to + ray * dir_bytes;
     }
-    if (!b->bundle) isogi_vol__send_for_rays(from, element, b->hits ? (char *)(b->hits + first) : NULL);
+    if (!b->bundle) isogi_vol__send_for_rays(from, element, b->hits ? (char *)(b->hits + first) : NULL, !down);
     if (b->rays) {
         __m512d relative[3];
 #pragma GCC unroll 8
