@@ -5450,6 +5450,10 @@ ISOGI_API isogi_result isogi_sh_fit_directional(float direction[3], float rgb[3]
 #undef ISOGI_SH__P4
 #undef ISOGI_SH__POLYNOMIALS
 #undef ISOGI_SH__PUT_PAIR
+#undef ISOGI_SH__PUT_BOTH
+#undef ISOGI_SH__PUT_DEGREE
+#undef ISOGI_SH__SPLAT_F8
+#undef ISOGI_SH__ADD_F8
 #undef ISOGI_SH__PUT_ONE
 #undef ISOGI_SH__P5
 #undef ISOGI_SH__UNROLL25

@@ -4428,11 +4428,11 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE unsigned isogi_vol__choose(const isogi_vol__
    processors that make many steps of one (Zen 4). */
 typedef struct isogi_vol__spots { char *at[8]; } isogi_vol__spots;
 
-ISOGI_VOL__INLINE isogi_vol__spots isogi_vol__spots8(isogi_vol__pool *s, const uint8_t *slots) {
+ISOGI_VOL__INLINE isogi_vol__spots isogi_vol__spots8(isogi_vol__pool *s, const uint8_t *seats) {
     isogi_vol__spots spots;
     int k;
 #pragma GCC unroll 8
-    for (k = 0; k < 8; k++) spots.at[k] = (char *)s + 8 * (size_t)slots[k];
+    for (k = 0; k < 8; k++) spots.at[k] = (char *)s + 8 * (size_t)seats[k];
     return spots;
 }
 
@@ -4478,8 +4478,8 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE void isogi_vol__put8(const isogi_vol__spots 
 #define ISOGI_VOL__ROW_OF(member) ((size_t)((const char *)(s->member) - (const char *)s))
 
 /* The slots of a list as numbers; beyond its end there are others, or 0. */
-ISOGI_VOL__AVX512 ISOGI_VOL__INLINE __m512i isogi_vol__slots8(const uint8_t *slots) {
-    return _mm512_cvtepu8_epi64(_mm_loadl_epi64((const __m128i *)(const void *)slots));
+ISOGI_VOL__AVX512 ISOGI_VOL__INLINE __m512i isogi_vol__slots8(const uint8_t *seats) {
+    return _mm512_cvtepu8_epi64(_mm_loadl_epi64((const __m128i *)(const void *)seats));
 }
 
 /* One lane of eight corners after the other, of x, then y, then z, at the begin and end of the way through the cell. */
@@ -4580,13 +4580,13 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE __m512i isogi_vol__corners_of8(const isogi_v
 
 /* The next cells of up to eight rays, in float. Rays that are certainly on one side all along are done with theirs; the others are in
    doubt, and hits are among them. `any`: certain hits are reported at once instead; returns them. */
-ISOGI_VOL__AVX512 ISOGI_VOL__INLINE unsigned isogi_vol__look(isogi_vol__turn *turn, isogi_vol__pool *s, const uint8_t *slots, int count,
+ISOGI_VOL__AVX512 ISOGI_VOL__INLINE unsigned isogi_vol__look(isogi_vol__turn *turn, isogi_vol__pool *s, const uint8_t *seats, int count,
                                                              int *again) {
     const __mmask8 lanes = (__mmask8)((1u << count) - 1);
-    const __m512i slot = isogi_vol__slots8(slots);
+    const __m512i slot = isogi_vol__slots8(seats);
 #define ISOGI_VOL__TAKE(member) isogi_vol__pick8(&spots, ISOGI_VOL__ROW_OF(member))
 #define ISOGI_VOL__TAKE_REAL(member) _mm512_castsi512_pd(ISOGI_VOL__TAKE(member))
-    const isogi_vol__spots spots = isogi_vol__spots8(s, slots);
+    const isogi_vol__spots spots = isogi_vol__spots8(s, seats);
     const __m512i mask = ISOGI_VOL__TAKE(mask[0]), below = _mm512_sub_epi64(mask, _mm512_set1_epi64(1)),
                   rest = _mm512_and_si512(mask, below);
     const __m512i child = _mm512_xor_si512(_mm512_popcnt_epi64(_mm512_andnot_si512(mask, below)), ISOGI_VOL__TAKE(flip));
@@ -4603,7 +4603,7 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE unsigned isogi_vol__look(isogi_vol__turn *tu
 #pragma GCC unroll 8
     for (a = 0; a < 3; a++)
         inverse[a] = ISOGI_VOL__TAKE_REAL(inverse[a]), dir[a] = ISOGI_VOL__TAKE_REAL(dir[a]),
-        origin[a] = turn->shared ? _mm512_set1_pd(s->origin[a][slots[0]]) : ISOGI_VOL__TAKE_REAL(origin[a]);
+        origin[a] = turn->shared ? _mm512_set1_pd(s->origin[a][seats[0]]) : ISOGI_VOL__TAKE_REAL(origin[a]);
     isogi_vol__way8(cell, origin, inverse, dir, &begin, &end, from, to);
     sides = isogi_vol__sides8(isogi_vol__corners_of8(&spots, ISOGI_VOL__ROW_OF(address), offset),
                               _mm512_cvtpd_ps(ISOGI_VOL__TAKE_REAL(step)), from, to);
@@ -4624,7 +4624,7 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE unsigned isogi_vol__look(isogi_vol__turn *tu
     {
         const __m512i three = _mm512_set1_epi64(3);
         const __mmask8 more = _mm512_test_epi64_mask(rest, rest), doubt = (__mmask8)(lanes & ~sure & ~hit);
-        const __m128i list = _mm_loadl_epi64((const __m128i *)(const void *)slots);
+        const __m128i list = _mm_loadl_epi64((const __m128i *)(const void *)seats);
         __m512i bit = _mm512_sllv_epi64(_mm512_set1_epi64(1), slot);
         turn->cells += (uint64_t)count;
         /* which axes it enters and leaves by goes along */
@@ -4806,15 +4806,15 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE __mmask8 isogi_vol__left8(const __m512d b[4]
     return (__mmask8)(lanes & (rises | falls) & ~stays & _mm512_cmp_pd_mask(b[3], zero, _CMP_NEQ_OQ));
 }
 
-ISOGI_VOL__AVX512 static unsigned isogi_vol__decide8(isogi_vol__batch *b, isogi_vol__pool *s, const uint8_t *slots, unsigned some,
+ISOGI_VOL__AVX512 static unsigned isogi_vol__decide8(isogi_vol__batch *b, isogi_vol__pool *s, const uint8_t *seats, unsigned some,
                                                      unsigned *alone) {
     const __mmask8 lanes = (__mmask8)some;
-    const __m128i list = _mm_loadl_epi64((const __m128i *)(const void *)slots);
+    const __m128i list = _mm_loadl_epi64((const __m128i *)(const void *)seats);
     /* can be loaded at once */
-    const int row = slots[0] % 8 == 0 && _mm_cvtsi128_si64(list) == (int64_t)(0x0706050403020100u + slots[0] * 0x0101010101010101u);
-    const __m512i slot = isogi_vol__slots8(slots);
-    const isogi_vol__spots spots = isogi_vol__spots8(s, slots);
-#define ISOGI_VOL__TAKE(member) (row ? _mm512_load_si512(&s->member[slots[0]]) : isogi_vol__pick8(&spots, ISOGI_VOL__ROW_OF(member)))
+    const int row = seats[0] % 8 == 0 && _mm_cvtsi128_si64(list) == (int64_t)(0x0706050403020100u + seats[0] * 0x0101010101010101u);
+    const __m512i slot = isogi_vol__slots8(seats);
+    const isogi_vol__spots spots = isogi_vol__spots8(s, seats);
+#define ISOGI_VOL__TAKE(member) (row ? _mm512_load_si512(&s->member[seats[0]]) : isogi_vol__pick8(&spots, ISOGI_VOL__ROW_OF(member)))
 #define ISOGI_VOL__TAKE_REAL(member) _mm512_castsi512_pd(ISOGI_VOL__TAKE(member))
     const __m512i cell = ISOGI_VOL__TAKE(cell), side = ISOGI_VOL__TAKE(side), three = _mm512_set1_epi64(3);
     const __m512i in = _mm512_and_si512(_mm512_srli_epi64(cell, 48), three), out = _mm512_and_si512(_mm512_srli_epi64(cell, 50), three);
@@ -4937,7 +4937,7 @@ ISOGI_VOL__AVX512 static unsigned isogi_vol__decide8(isogi_vol__batch *b, isogi_
             _mm512_store_pd(local[2], isogi_vol__lerp8(from[2], to[2], root, rest));
         }
         for (k = cross; k; k &= k - 1) {
-            const int i = __builtin_ctz(k), place = slots[i];
+            const int i = __builtin_ctz(k), place = seats[i];
             const int64_t xyz = s->cell[place];
             isogi_hit *hit = &b->hits[s->ray[place]];
             hit->t = t[i], hit->local[0] = local[0][i], hit->local[1] = local[1][i], hit->local[2] = local[2][i];
@@ -5465,7 +5465,7 @@ ISOGI_VOL__AVX512 static unsigned isogi_vol__settle(isogi_vol__batch *b, isogi_v
         __m512d origin[3], inverse[3], dir[3];
         __m256 from[3], to[3];
         __mmask8 passed;
-        uint8_t slots[8];
+        uint8_t seats[8];
         unsigned alone, some;
         int a;
         if (!(doubt >> h & 255)) continue;
@@ -5480,8 +5480,8 @@ ISOGI_VOL__AVX512 static unsigned isogi_vol__settle(isogi_vol__batch *b, isogi_v
                                                      _mm512_slli_epi64(_mm512_and_si512(end, three), 50)));
         _mm512_mask_store_epi64(&s->cell[h], passed, cell);
         _mm512_store_si512(&s->side[h], _mm512_mask_mov_epi64(none, known, _mm512_maskz_set1_epi64(inside, 1)));
-        _mm_storel_epi64((__m128i *)(void *)slots, _mm_add_epi8(_mm_set1_epi8((char)h), _mm_set_epi64x(0, 0x0706050403020100)));
-        some = isogi_vol__decide8(b, s, slots, passed, &alone);
+        _mm_storel_epi64((__m128i *)(void *)seats, _mm_add_epi8(_mm_set1_epi8((char)h), _mm_set_epi64x(0, 0x0706050403020100)));
+        some = isogi_vol__decide8(b, s, seats, passed, &alone);
         for (; alone; alone &= alone - 1) {
             isogi_hit any;
             a = __builtin_ctz(alone);
@@ -5750,12 +5750,12 @@ ISOGI_VOL__AVX512 static void isogi_vol__prepare_descent(isogi_vol__descent *d, 
 
 /* Takes rays that stand at the root to the leaf in which they begin, or as far as children can hold the surface. row: the slots are eight
    in a row; else what is written of the others does no harm. */
-ISOGI_VOL__AVX512 static void isogi_vol__descend8(isogi_vol__turn *turn, isogi_vol__pool *s, const uint8_t *slots, int row, __mmask8 lanes,
+ISOGI_VOL__AVX512 static void isogi_vol__descend8(isogi_vol__turn *turn, isogi_vol__pool *s, const uint8_t *seats, int row, __mmask8 lanes,
                                                   const double inverse[3][8], __m512i end, __m512i flip) {
     const isogi_vol__descent *d = &turn->descent;
     const __m512i one = _mm512_set1_epi64(1), zero = _mm512_setzero_si512();
-    const __m128i list = _mm_loadl_epi64((const __m128i *)(const void *)slots);
-    const isogi_vol__spots spots = isogi_vol__spots8(s, slots);
+    const __m128i list = _mm_loadl_epi64((const __m128i *)(const void *)seats);
+    const isogi_vol__spots spots = isogi_vol__spots8(s, seats);
     __attribute__((aligned(64))) double origin[3][8];
     __m512i pending = zero, mask = zero;
     __mmask8 going = 0xff;
@@ -5763,7 +5763,7 @@ ISOGI_VOL__AVX512 static void isogi_vol__descend8(isogi_vol__turn *turn, isogi_v
     int a, n;
 #define ISOGI_VOL__PUT(member, value)                                                           \
     do {                                                                                        \
-        if (row) _mm512_mask_store_epi64(&s->member[slots[0]], lanes, value);                   \
+        if (row) _mm512_mask_store_epi64(&s->member[seats[0]], lanes, value);                   \
         else isogi_vol__put8(&spots, ISOGI_VOL__ROW_OF(member), value);                         \
     } while (0)
     for (a = 0; a < 3; a++) _mm512_store_pd(origin[a], _mm512_set1_pd(d->origin[a]));
@@ -5790,14 +5790,14 @@ ISOGI_VOL__AVX512 static void isogi_vol__descend8(isogi_vol__turn *turn, isogi_v
     ISOGI_VOL__PUT(step, _mm512_castpd_si512(_mm512_set1_pd(d->step)));
 #undef ISOGI_VOL__PUT
     turn->choosing |= (uint64_t)_mm512_mask_reduce_or_epi64((__mmask8)(lanes & ~cells),
-                                                            _mm512_sllv_epi64(one, isogi_vol__slots8(slots)));
+                                                            _mm512_sllv_epi64(one, isogi_vol__slots8(seats)));
     _mm_storel_epi64((__m128i *)(void *)(turn->at_leaf + turn->leaves), _mm_maskz_compress_epi8((__mmask16)cells, list));
     turn->leaves += __builtin_popcount(cells);
 }
 
 /* Rays of eight that stand at the root are taken down from there if they begin where the first of them does, and are not few. */
 ISOGI_VOL__AVX512 ISOGI_VOL__INLINE void isogi_vol__take_down(isogi_vol__batch *b, isogi_vol__turn *turn, isogi_vol__pool *s,
-                                                              const uint8_t *slots, int row, __mmask8 lanes, const __m512d origin[3],
+                                                              const uint8_t *seats, int row, __mmask8 lanes, const __m512d origin[3],
                                                               const __m512d inverse[3], __m512d isovalue, __m512i end, __m512i flip) {
     __attribute__((aligned(64))) double per[3][8];
     __m512i first;
@@ -5818,7 +5818,7 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE void isogi_vol__take_down(isogi_vol__batch *
         isogi_vol__prepare_descent(&turn->descent, b->pyramid, at, value);
         b->work.blocks += (uint64_t)turn->levels; /* at most */
     }
-    isogi_vol__descend8(turn, s, slots, row, lanes, (const double(*)[8])per, end, flip);
+    isogi_vol__descend8(turn, s, seats, row, lanes, (const double(*)[8])per, end, flip);
 }
 
 /* Sends for rays that come after the next ones, and for where the hits of these will be written; soon: they are needed at once. */
@@ -5842,12 +5842,12 @@ ISOGI_VOL__INLINE void isogi_vol__send_for_rays(const char *from, size_t element
    Returns the rays that have a slot now; *odd: those that are left to the code for one. The others miss the box. down: not to stay at the
    root if they begin in one place. A kernel, longer than a screen: nothing in it is worth a name of its own. */
 ISOGI_VOL__AVX512 static unsigned isogi_vol__seat8(isogi_vol__batch *b, isogi_vol__turn *turn, isogi_vol__pool *s, size_t first, int count,
-                                                   const uint8_t *slots, int down, unsigned *odd) {
+                                                   const uint8_t *seats, int down, unsigned *odd) {
     const isogi_pyramid *p = b->pyramid;
     const __mmask8 lanes = (__mmask8)((1u << count) - 1);
     const __m512i lane = _mm512_maskz_mov_epi64(lanes, _mm512_set_epi64(7, 6, 5, 4, 3, 2, 1, 0)), none = _mm512_setzero_si512();
-    const int whole = slots[0] % 8 == 0 && slots[count - 1] == slots[0] + count - 1; /* a row of slots is stored at once */
-    const isogi_vol__spots spots = isogi_vol__spots8(s, slots);
+    const int whole = seats[0] % 8 == 0 && seats[count - 1] == seats[0] + count - 1; /* a row of slots is stored at once */
+    const isogi_vol__spots spots = isogi_vol__spots8(s, seats);
     const size_t element = b->rays ? sizeof *b->rays : sizeof *b->starts,
                  dir_bytes = b->bundle || !b->rays ? sizeof *b->dirs : sizeof *b->rays;
     const char *from = b->rays ? (const char *)(b->rays + (b->bundle ? 0 : first)) : (const char *)(b->starts + (b->bundle ? 0 : first));
@@ -5973,7 +5973,7 @@ ISOGI_VOL__AVX512 static unsigned isogi_vol__seat8(isogi_vol__batch *b, isogi_vo
     meets = (__mmask8)(meets & good);
 #define ISOGI_VOL__PUT(member, value)                                                           \
     do {                                                                                        \
-        if (whole) _mm512_mask_store_epi64(&s->member[slots[0]], lanes, value);                 \
+        if (whole) _mm512_mask_store_epi64(&s->member[seats[0]], lanes, value);                 \
         else isogi_vol__put8(&spots, ISOGI_VOL__ROW_OF(member), value);                         \
     } while (0)
 #define ISOGI_VOL__PUT_REAL(member, value) ISOGI_VOL__PUT(member, _mm512_castpd_si512(value))
@@ -6012,7 +6012,7 @@ ISOGI_VOL__AVX512 static unsigned isogi_vol__seat8(isogi_vol__batch *b, isogi_vo
 #undef ISOGI_VOL__PUT_REAL
     *odd = (unsigned)(lanes & ~good), meets = (__mmask8)(meets & lanes);
     if (down)
-        isogi_vol__take_down(b, turn, s, slots, whole, meets, origin, inverse, isovalue,
+        isogi_vol__take_down(b, turn, s, seats, whole, meets, origin, inverse, isovalue,
                              _mm512_or_si512(_mm512_castpd_si512(stop), _mm512_set1_epi64(3)), flip);
     b->work.rays += (uint64_t)__builtin_popcount((unsigned)(lanes & good));
     return meets;
@@ -6112,7 +6112,7 @@ ISOGI_VOL__INLINE void isogi_vol__send_for_bundle(const isogi_pyramid *p, const 
 
 /* Takes rays into open slots until there are none of either, but not for the sake of a few slots. */
 ISOGI_VOL__AVX512 ISOGI_VOL__INLINE uint64_t isogi_vol__fill_pool(isogi_vol__batch *b, isogi_vol__turn *turn, isogi_vol__pool *s,
-                                                                  uint64_t slots, uint64_t open, size_t *next, size_t count, int down) {
+                                                                  uint64_t seats, uint64_t open, size_t *next, size_t count, int down) {
     while (open && *next < count) {
         const size_t rays = count - *next;
         const int room = __builtin_popcountll(open);
@@ -6120,7 +6120,7 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE uint64_t isogi_vol__fill_pool(isogi_vol__bat
         uint8_t list[16];
         unsigned odd, seated;
         int k;
-        if (room < 6 && open != slots && rays > (size_t)room) break;
+        if (room < 6 && open != seats && rays > (size_t)room) break;
         if (b->bundle_count > 1) {
             const size_t bundle = *next / b->each, left = (bundle + 1) * b->each - *next;
             if (bundle != b->opened) isogi_vol__open_bundle(b, bundle);
@@ -6175,12 +6175,12 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE uint64_t isogi_vol__look_all(isogi_vol__batc
     int first, n, again;
     while (turn->leaves >= waits) {
         for (first = again = 0; turn->leaves - first >= waits; first += n) {
-            uint64_t slots;
+            uint64_t seats;
             unsigned hits;
             n = turn->leaves - first < 8 ? turn->leaves - first : 8;
-            memcpy(&slots, turn->at_leaf + first, 8);
+            memcpy(&seats, turn->at_leaf + first, 8);
             for (hits = isogi_vol__look(turn, s, turn->at_leaf + first, n, &again); hits; hits &= hits - 1) {
-                const int slot = (int)(slots >> 8 * __builtin_ctz(hits) & 255);
+                const int slot = (int)(seats >> 8 * __builtin_ctz(hits) & 255);
                 b->occluded[s->ray[slot]] = 1;
                 open |= (uint64_t)1 << slot;
             }
@@ -6208,9 +6208,9 @@ ISOGI_VOL__AVX512 static void isogi_vol__take_rows_down(isogi_vol__batch *b, iso
         const __m512d origin[3] = {_mm512_load_pd(&s->origin[0][i]), _mm512_load_pd(&s->origin[1][i]), _mm512_load_pd(&s->origin[2][i])};
         const __m512d inverse[3] = {_mm512_load_pd(&s->inverse[0][i]), _mm512_load_pd(&s->inverse[1][i]),
                                     _mm512_load_pd(&s->inverse[2][i])};
-        uint8_t slots[16];
-        _mm_storeu_si128((__m128i *)(void *)slots, _mm_add_epi8(_mm_set1_epi8((char)i), _mm_set_epi64x(0, 0x0706050403020100)));
-        isogi_vol__take_down(b, turn, s, slots, 1, (__mmask8)(rays >> i), origin, inverse, _mm512_load_pd(&s->isovalue[i]),
+        uint8_t seats[16];
+        _mm_storeu_si128((__m128i *)(void *)seats, _mm_add_epi8(_mm_set1_epi8((char)i), _mm_set_epi64x(0, 0x0706050403020100)));
+        isogi_vol__take_down(b, turn, s, seats, 1, (__mmask8)(rays >> i), origin, inverse, _mm512_load_pd(&s->isovalue[i]),
                              _mm512_load_si512(&s->end[i]), _mm512_load_si512(&s->flip[i]));
     }
 }
@@ -6219,15 +6219,15 @@ ISOGI_VOL__AVX512 static void isogi_vol__take_rows_down(isogi_vol__batch *b, iso
    Not inlined, nor are packets, so that the stacks of the two do not add up. */
 ISOGI_VOL__AVX512 ISOGI_VOL__NOINLINE static void isogi_vol__run_pool(isogi_vol__batch *b, isogi_vol__turn *turn, isogi_vol__pool *s,
                                                                       int groups, uint64_t open, size_t *next, size_t end) {
-    const uint64_t slots = ~(uint64_t)0 >> (64 - 8 * groups);
+    const uint64_t seats = ~(uint64_t)0 >> (64 - 8 * groups);
     int i, share = b->bundle && b->bundle_count == 1;
     turn->choosing = 0;
-    isogi_vol__take_rows_down(b, turn, s, slots & ~open);
+    isogi_vol__take_rows_down(b, turn, s, seats & ~open);
     for (;;) {
         int answered = 0, waits;
-        open = isogi_vol__fill_pool(b, turn, s, slots, open, next, end, 1);
-        if (open == slots) return;
-        if (share) isogi_vol__share(turn, s, groups, __builtin_ctzll(slots & ~open)), share = 0;
+        open = isogi_vol__fill_pool(b, turn, s, seats, open, next, end, 1);
+        if (open == seats) return;
+        if (share) isogi_vol__share(turn, s, groups, __builtin_ctzll(seats & ~open)), share = 0;
         /* those that choose stay where they are */
         if (open && groups > 1 && *next == end && !turn->choosing) open = isogi_vol__close_ranks(s, turn, groups, open);
         for (i = 0; i < groups; i++) {
@@ -6257,7 +6257,7 @@ ISOGI_VOL__AVX512 ISOGI_VOL__NOINLINE static void isogi_vol__run_pool(isogi_vol_
 /* Sixteen rays at a time that nearly coincide; where they do not, a pool takes the next ones, and ever more of them each time. */
 ISOGI_VOL__AVX512 static void isogi_vol__trace_pool(isogi_vol__batch *b, size_t count) {
     const int groups = count < ISOGI_VOL__POOL ? (int)(count + 7) / 8 : ISOGI_VOL__POOL / 8;
-    const uint64_t slots = ~(uint64_t)0 >> (64 - 8 * groups), first = slots & (((uint64_t)1 << ISOGI_VOL__PACKET) - 1);
+    const uint64_t seats = ~(uint64_t)0 >> (64 - 8 * groups), first = seats & (((uint64_t)1 << ISOGI_VOL__PACKET) - 1);
     isogi_vol__pool s;
     isogi_vol__turn turn;
     size_t next = 0, run = ISOGI_VOL__POOL;
@@ -6265,14 +6265,14 @@ ISOGI_VOL__AVX512 static void isogi_vol__trace_pool(isogi_vol__batch *b, size_t 
     turn.any = b->occluded != NULL;
     isogi_vol__clear_pool(&s, groups, b->pyramid);
     while (next < count) {
-        uint64_t open = slots;
+        uint64_t open = seats;
         size_t end = count;
         if (b->rays && b->bundle_count <= 1 && count - next >= ISOGI_VOL__PACKET / 2) {
             end = count - next > ISOGI_VOL__PACKET ? next + ISOGI_VOL__PACKET : count;
             open ^= first ^ isogi_vol__fill_pool(b, &turn, &s, first, first, &next, end, 0);
-            if (open == slots) continue;
-            if (__builtin_popcountll(open ^ slots) >= ISOGI_VOL__PACKET / 4 && isogi_vol__coincide(&s, (unsigned)(open ^ slots))) {
-                isogi_vol__trace_packet(b, &s, (unsigned)(open ^ slots));
+            if (open == seats) continue;
+            if (__builtin_popcountll(open ^ seats) >= ISOGI_VOL__PACKET / 4 && isogi_vol__coincide(&s, (unsigned)(open ^ seats))) {
+                isogi_vol__trace_packet(b, &s, (unsigned)(open ^ seats));
                 run = ISOGI_VOL__POOL;
                 continue;
             }
