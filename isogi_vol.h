@@ -4985,9 +4985,11 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE void isogi_vol__open_turn(isogi_vol__turn *t
    widened by twice as much, so none is left out, and some are kept that the ray only comes near. Cells that it only comes near are told
    by the times that a pool goes by. All cells of a leaf are looked at together. */
 typedef struct __attribute__((aligned(64))) isogi_vol__course {
-    float per[4], enter[4], leave[4], last; /* in units in which the fastest axis takes 1 a cell: plane k of an axis, counted from the
-                                               border that rays enter by, is met from k per - enter to k per - leave; the end */
-    double origin[4], inverse[4], dir[4], stop; /* as in a pool */
+    double origin[4], inverse[4], dir[4]; /* as in a pool; each is stored as a vector, and so are the next three */
+    float per[4], enter[4], leave[4]; /* in units in which the fastest axis takes 1 a cell: plane k of an axis, counted from the
+                                         border that rays enter by, is met from k per - enter to k per - leave */
+    float last;              /* where the ray ends, in these units */
+    double stop;             /* and as in a pool */
     int64_t backwards;       /* cell = cell counted backwards ^ this, packed as in a pool */
     int first[4];            /* cell in which the walk begins, nearly */
     int flip, octant;        /* children; axes */
