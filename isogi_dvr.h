@@ -5486,7 +5486,8 @@ static int isogi_dvr__joined(const isogi_dvr *d) {
 typedef struct isogi_dvr__run { isogi_dvr__layer layer; double from, to; } isogi_dvr__run;
 
 #define ISOGI_DVR__ROUNDING 1e-14
-/* The ray goes on to a value. It turns where it goes back by more than a rounding: at the same place on all paths. */
+/* The ray goes on to a value. It turns where it goes back by more than a rounding of such values, so that all paths turn at the same
+   place, unless corners of a cell are far larger than what lies between them. */
 static void isogi_dvr__run_to(const isogi_dvr__integral *g, isogi_dvr__run *run, double value) {
     const int up = run->from < run->to, down = run->from > run->to;
     const double turn = ISOGI_DVR__ROUNDING * (fabs(run->to) + g->bias);

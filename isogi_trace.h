@@ -1108,6 +1108,7 @@ typedef struct isogi_trace__scene {
     int has_env;
     double unit; /* RGB9E5, HALF and BYTE hold irradiance in units of this power of two, about that of an open surface */
     double possible;   /* what a sample that has not been taken may bring: open_light, or the brightest glow */
+    double range;      /* of the volume's values, from the least to the largest; 1 if they are all the same */
     double open_light; /* luminance of the irradiance of an open texel, averaged over orientations: the unit of desc.error */
     int high;    /* light is gathered on the high side */
     double reach[ISOGI_TRACE__WAVE]; /* of rays, or all zero */
@@ -1758,6 +1759,7 @@ static isogi_result isogi_trace__scene_set(isogi_trace__scene *scene, const isog
                                            const isogi_context *context) {
     isogi_trace_desc *d = &scene->desc;
     isogi_result result;
+    double range[2] = {0, 0};
     int i;
     memset(scene, 0, sizeof *scene);
     *d = *desc;
@@ -1765,6 +1767,8 @@ static isogi_result isogi_trace__scene_set(isogi_trace__scene *scene, const isog
     for (i = 0; i < ISOGI_TRACE__WAVE; i++) scene->reach[i] = (double)d->reach;
     scene->pyramid = d->pyramid;
     scene->volume = isogi_vol_volume(d->pyramid);
+    if (d->pyramid) isogi_vol_range(d->pyramid, range);
+    scene->range = range[1] > range[0] ? range[1] - range[0] : 1;
     scene->flags = d->capped ? (uint32_t)ISOGI_RAY_CAPPED : 0;
     scene->has_env = d->lighting.env.rgb || d->lighting.env.sh;
     if (!d->order) d->order = 5;
@@ -2967,7 +2971,7 @@ static isogi_result isogi_trace__bake_batch(isogi_trace *t, size_t count) {
 typedef struct isogi_trace__node {
     uint64_t cell;   /* probe: key of its cell; first what is read where a probe is looked for */
     uint32_t next;   /* probe: number + 1 of the next one in its chain */
-    float alike;     /* probe: tells the light of isovalues that differ from its own by less than this */
+    float alike;     /* probe: tells the light of isovalues that differ from its own by less than this share of the volume's range */
     double isovalue;
     float normal[3];
     isogi_hit place; /* where */
@@ -3350,18 +3354,27 @@ static void isogi_trace__slopes(const isogi_trace__scene *scene, const isogi_hit
     }
 }
 
-/* How far isovalues may lie from that of a probe that tells their light: as much as the field changes in ALIKE voxels there. Where a
-   skin of some value shuts a hollow, isosurfaces next to each other are dark and bright. */
+/* Length of a vector whose squares need not be numbers: values may be of any size. */
+static double isogi_trace__magnitude(const double v[3]) {
+    double most = 0, square = 0;
+    int a;
+    for (a = 0; a < 3; a++) most = fabs(v[a]) > most ? fabs(v[a]) : most;
+    for (a = 0; a < 3 && most > 0; a++) square += v[a] / most * (v[a] / most);
+    return most * sqrt(square);
+}
+
+/* How far isovalues may lie from that of a probe that tells their light, as a share of the volume's range: as much as the field changes
+   in ALIKE voxels there. Where a skin of some value shuts a hollow, isosurfaces next to each other are dark and bright. */
 static double isogi_trace__alike(const isogi_trace__scene *scene, const isogi_hit *hit) {
     const double *voxel = scene->voxel;
-    double slope[3], least = voxel[0], square = 0;
+    double slope[3], least = voxel[0];
     int a;
     isogi_trace__slopes(scene, hit, slope);
     for (a = 0; a < 3; a++) {
-        square += slope[a] / voxel[a] * (slope[a] / voxel[a]);
+        slope[a] /= voxel[a];
         if (voxel[a] < least) least = voxel[a];
     }
-    return ISOGI_TRACE__ALIKE * least * sqrt(square);
+    return ISOGI_TRACE__ALIKE * least * (isogi_trace__magnitude(slope) / scene->range);
 }
 
 /* The number + 1 of the probe of a hit; 0: there is none, and it would have *key, and stand at *end of its chain. Probes are only ever
@@ -3378,7 +3391,7 @@ static uint32_t isogi_trace__probe_find(const isogi_trace *t, const isogi_trace_
     for (at = isogi_trace__head(set, c->key); *at;) {
         isogi_trace__node *n = isogi_trace__node_at(set, *at - 1);
         if (n->cell == c->key) {
-            double other = fabs(n->isovalue - isovalue);
+            double other = fabs(n->isovalue - isovalue) / t->scene.range;
             if (other < least && isogi_trace__same_place(t, c, n) && isogi_trace__same_colours(t, c, n->isovalue, isovalue)) {
                 if (other < (double)n->alike || isogi_trace__zero(other)) return *at;
                 nearest = *at, least = other;
@@ -4131,11 +4144,11 @@ static double isogi_trace__mean_variance(double sum, double square, double n) {
    its rays will meet is not known. */
 static void isogi_trace__guide_begin(const isogi_trace *t, const isogi_trace__node *n, isogi_trace__guide *g) {
     const isogi_trace_desc *d = &t->scene.desc;
-    double point[3], slope[3], square = 0;
+    double point[3], slope[3];
     int a;
     isogi_trace__slopes(&t->scene, &n->place, slope);
-    for (a = 0; a < 3; a++) square += slope[a] * t->step[a] * (slope[a] * t->step[a]);
-    g->isovalue = n->isovalue, g->steep = sqrt(square);
+    for (a = 0; a < 3; a++) slope[a] *= t->step[a];
+    g->isovalue = n->isovalue, g->steep = isogi_trace__magnitude(slope);
     if (!d->albedo_count && !d->emission_count && !d->material) return;
     isogi_trace__texel_grid(t, n->texel, point);
     isogi_vol_to_world(t->scene.pyramid, point, point);
@@ -4229,11 +4242,11 @@ static int isogi_trace__around_texel(const isogi_trace *t, const size_t texel[3]
 /* How much the filter takes of a texel's light for another at a distance (its square, in texels), 0 to 1: less the farther it is, by
    place and by what lies between their isosurfaces, the more it faces another way, and the more their light differs beyond its noise. */
 static double isogi_trace__filter_weight(const isogi_trace *t, const isogi_trace__guide *g, const isogi_trace__guide *q, int square) {
-    double facing, between = g->isovalue - q->isovalue, far = (double)square / 8, apart, noise, colours,
+    double facing, between = g->isovalue - q->isovalue, away = (double)square / 8, apart, noise, colours,
            steep = ISOGI_TRACE__SHEET * (g->steep > q->steep ? g->steep : q->steep);
     if (!isogi_trace__zero(between)) {
         if (!(fabs(between) < 4 * steep)) return 0;
-        far += between / steep * (between / steep);
+        away += between / steep * (between / steep);
     }
     facing = isogi_trace__dot(g->normal, q->normal);
     if (!(facing > 0.5)) return 0;
@@ -4244,9 +4257,9 @@ static double isogi_trace__filter_weight(const isogi_trace *t, const isogi_trace
     if (colours > 0) apart = (apart > 0 ? apart : 0) + 4 * colours * colours;
     if (apart > 0) {
         if (!(noise > 0)) return 0;
-        far += apart / noise;
+        away += apart / noise;
     }
-    facing = facing * facing / (1 + far / 8), facing *= facing, facing *= facing; /* near exp(-far) */
+    facing = facing * facing / (1 + away / 8), facing *= facing, facing *= facing; /* near exp(-away) */
     return facing * facing;
 }
 
@@ -4260,7 +4273,8 @@ static double isogi_trace__filter(const isogi_trace *t, size_t node, double rgb[
     rgb[0] = rgb[1] = rgb[2] = variance[0] = variance[1] = 0;
     for (i = 0; i < count; i++) {
         const isogi_trace__guide *q = around[i];
-        double w = isogi_trace__filter_weight(t, g, q, square[i]);
+        double w = q == g ? 1 : isogi_trace__filter_weight(t, g, q, square[i]);
+        if (!(w > 0)) continue;
         squares += w * w * q->samples;
         w *= q->samples;
         total += w;

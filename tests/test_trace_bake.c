@@ -266,6 +266,34 @@ TEST(bright_spots_of_the_sky_are_filtered) {
     scene_free(&s);
 }
 
+/* Which texels share light depends on no unit of values: not even where squares of them are no numbers. */
+TEST(light_is_the_same_whatever_the_unit_of_values) {
+    const double scales[3] = {1, 0x1p+560, 0x1p-560};
+    double q[5] = {16, 15, 16, 18, 10};
+    static float points[100][3], e[3][100][3], error[3][100];
+    scene s = scene_make(32, 32, 32, NULL, pit, q);
+    const int n = surface_points(&s, 0, 100, 7, points);
+    for (int i = 0; i < 3; i++) {
+        isogi_trace_desc d = feedback(&s, 0, 0, 4);
+        isogi_trace *t;
+        int same = 0;
+        isogi_vol_free(s.pyramid);
+        s.volume.scale = scales[i];
+        CHECK(isogi_vol_build(&s.pyramid, &s.volume, NULL) == ISOGI_OK, "scale %g", scales[i]);
+        d.pyramid = s.pyramid, d.lazy = 1;
+        CHECK(isogi_trace_create(&t, &d, NULL) == ISOGI_OK && isogi_trace_request(t, (const float(*)[3])points, (size_t)n) == ISOGI_OK &&
+                  isogi_trace_step(t, 0, NULL) == ISOGI_OK &&
+                  isogi_trace_sample(t, (const float(*)[3])points, (size_t)n, e[i], error[i]) == ISOGI_OK,
+              "scale %g", scales[i]);
+        for (int k = 0; k < n; k++)
+            same += fabs((double)(e[i][k][1] - e[0][k][1])) < 1e-4 * (double)e[0][k][1] &&
+                    fabs((double)(error[i][k] - error[0][k])) <= 0.01 * (double)error[0][k];
+        CHECK(n > 80 && same == n, "scale %g: %d of %d points have the same light and error", scales[i], same, n);
+        isogi_trace_free(t);
+    }
+    scene_free(&s);
+}
+
 /* Without the filter a texel's light is its own, whatever is baked beside it; with it, that of its neighbours goes into it. */
 TEST(unfiltered_texels_stand_alone) {
     double q[5] = {24, 22, 24, 26, 16};
