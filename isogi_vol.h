@@ -49,8 +49,9 @@
                 A mesh keeps some 3/4 byte of scratch memory for every voxel until it is freed.
                 Stack use stays below 32 KB.
    Threads      A pyramid is const once built: any number of threads may read it. Building and meshing use the context's threads.
-   Determinism  The same input gives the same bits for any number of threads. With -ffast-math hits are right but for more rounding, and
-                nothing that this header says to be the same bits on two ways need be so.
+   Determinism  The same input gives the same bits for any number of threads. With -ffast-math hits of ordinary numbers are right but for
+                more rounding, those of denormal or huge ones (1e300) may be NaN, and nothing that this header says to be the same
+                bits on two ways need be so.
    Accuracy     Rays are solved in double: against a long double reference no hit is missed or added, and t is right to 1e-12 cell but
                 for grazing rays, whose t is ill-conditioned by nature. `make test` and `make check` show it.
    Limits       2^31-1 voxels along an axis. Values up to 1e300. isogi_vol_sample takes float points: for volumes far from the
