@@ -7,6 +7,9 @@
    (usual_rays.h) against `default`, on one ray of METHOD_STRIDE. t99: 99th percentile of the error of t in voxels. Per ray: blocks, cells
    and cubics looked at. Other rows name their error in `setting`.
    bundle64: BUNDLES bundles a call; bundle64alone: one.
+   Samples along rays: at half-voxel steps inside the volume, along the primary rays in their order, as a renderer takes them: one tile of 4x4
+   rays after the other, four tiles a call, in every 16th row of tiles (--quick: every 64th); the gap between rows does the cache no good.
+   Along far rays: 256 steps of rays 32 pixels apart, which share no memory.
    A table of goals and peers' figures for the same work is printed at the end. */
 #define ISOGI_IMPLEMENTATION
 #include "isogi_vol.h"
@@ -19,7 +22,7 @@ enum { METHOD_STRIDE = 16 };
 
 static FILE *csv;
 static int runs = 5, sampled = 4000;
-static size_t judged = RAYS;
+static size_t judged = RAYS, every = 16; /* row of tiles is sampled */
 
 static void row(const char *name, const char *scene_name, const char *method, const char *setting, double seconds, double error,
                 double work, const char *unit) {
@@ -171,15 +174,44 @@ static double worst_sample(const scene *s, const float (*points)[3], const float
     return worst;
 }
 
-enum { FAR_RAYS, NEIGHBOURS, ANYWHERE };
+enum { ALONG_RAYS, FAR_RAYS, ANYWHERE };              /* where samples are */
+enum { TRILINEAR, TRILINEAR_GRADIENTS, TRICUBIC };    /* what is sampled */
+enum { TILES = 64, LONGEST = 1024, SPREAD = 1 << 21 };/* rays a call; points a ray at most; points that are not along all rays */
+static const char *const samplings[] = {"", "value and gradient; ", "value and gradient; "};
 
-/* Points along primary rays at half-voxel steps, 32 pixels apart or neighbours, or anywhere. bytes: the field in 8 bits. */
-static void bench_samples(const scene *s, const char *name, int smooth, int places, int bytes) {
-    const size_t count = 1 << 21, voxels = (size_t)N * N * N;
-    float(*points)[3] = (float(*)[3])malloc(count * sizeof *points), (*gradients)[3] = (float(*)[3])malloc(count * sizeof *gradients);
-    float *values = (float *)malloc(count * sizeof *values);
+/* Points at half-voxel steps from where a ray enters the volume to where it leaves it; their number. */
+static size_t points_along(const isogi_ray *ray, float (*points)[3]) {
+    double enter = 0, leave = 1e9;
+    size_t count = 0;
+    for (int a = 0; a < 3; a++) {
+        const double d = (double)ray->dir[a], low = (-1 - ray->origin[a]) / d, high = (1 - ray->origin[a]) / d;
+        enter = fmax(enter, fmin(low, high)), leave = fmin(leave, fmax(low, high));
+    }
+    for (double t = enter; t <= leave && count < LONGEST; t += 1.0 / (N - 1), count++)
+        for (int a = 0; a < 3; a++) points[count][a] = (float)(ray->origin[a] + t * (double)ray->dir[a]);
+    return count;
+}
+
+static void spread_points(const scene *s, int places, float (*points)[3]) {
+    random_state = 2;
+    for (size_t i = 0; i < SPREAD; i++) {
+        const isogi_ray *ray = &s->primary[i / 256 * 128];
+        const double t = 1.9 + (double)(i % 256) / (N - 1);
+        for (int a = 0; a < 3; a++)
+            points[i][a] = (float)(places == ANYWHERE ? 2 * random_unit() - 1 : ray->origin[a] + t * (double)ray->dir[a]);
+    }
+}
+
+/* Along all primary rays in their order, those of four tiles of pixels a call; or all points in one call, of rays 32 pixels apart or anywhere.
+   Making the points takes no time. bytes: the field in 8 bits. */
+static void bench_samples(const scene *s, const char *name, int what, int places, int bytes) {
+    const size_t most = places == ALONG_RAYS ? TILES * LONGEST : SPREAD, voxels = (size_t)N * N * N;
+    const size_t calls = places == ALONG_RAYS ? RAYS / TILES : 1, row_of_tiles = 4 * WIDTH / TILES;
+    float(*points)[3] = (float(*)[3])malloc(most * sizeof *points), (*gradients)[3] = (float(*)[3])malloc(most * sizeof *gradients);
+    float *values = (float *)malloc(most * sizeof *values);
     uint8_t *raw = (uint8_t *)malloc(bytes ? voxels : 1);
-    double seconds[16], worst, h = 2.0 / (N - 1);
+    double seconds[16], worst = 0, work = 0;
+    char setting[128];
     isogi_pyramid *pyramid = s->pyramid;
     if (bytes) { /* values from -1.5 to 1.5 */
         isogi_volume v = *isogi_vol_volume(s->pyramid);
@@ -187,22 +219,30 @@ static void bench_samples(const scene *s, const char *name, int smooth, int plac
         v.data = raw, v.type = ISOGI_U8, v.stride[0] = v.stride[1] = v.stride[2] = 0;
         if (isogi_vol_build(&pyramid, &v, &serial) != ISOGI_OK) exit(1);
     }
-    random_state = 2;
-    for (size_t i = 0; i < count; i++) {
-        const isogi_ray *ray = &s->primary[places == NEIGHBOURS ? RAYS / 2 - WIDTH * 2 + i / 256 : i / 256 * 128];
-        double t = 1.9 + 0.5 * h * (double)(i % 256);
-        for (int a = 0; a < 3; a++)
-            points[i][a] = (float)(places == ANYWHERE ? 2 * random_unit() - 1 : ray->origin[a] + t * (double)ray->dir[a]);
+    if (places != ALONG_RAYS) spread_points(s, places, points);
+    for (int run = -1; run < runs; run++) { /* the first run touches the memory, and tells the error */
+        double used = 0;
+        work = 0;
+        for (size_t call = 0; call < calls; call++) {
+            size_t count = 0;
+            if (call / row_of_tiles % every) continue;
+            for (size_t i = 0; i < TILES && places == ALONG_RAYS; i++) count += points_along(&s->primary[call * TILES + i], points + count);
+            if (places != ALONG_RAYS) count = SPREAD;
+            used -= cpu_seconds();
+            if (what == TRICUBIC) isogi_vol_sample_smooth(pyramid, (const float(*)[3])points, count, values, gradients);
+            else isogi_vol_sample(pyramid, (const float(*)[3])points, count, values, what == TRILINEAR ? NULL : gradients);
+            used += cpu_seconds(), work += (double)count;
+            if (run < 0)
+                worst = fmax(worst, worst_sample(s, (const float(*)[3])points, values, count, what == TRICUBIC, bytes ? 1 / 85.0 : 1,
+                                                 bytes ? -1.5 : 0));
+        }
+        if (run >= 0) seconds[run] = used;
     }
-    for (int run = -1; run < runs; run++) { /* the first run touches the memory */
-        double start = cpu_seconds();
-        if (smooth) isogi_vol_sample_smooth(pyramid, (const float(*)[3])points, count, values, gradients);
-        else isogi_vol_sample(pyramid, (const float(*)[3])points, count, values, NULL);
-        if (run >= 0) seconds[run] = cpu_seconds() - start;
-    }
-    worst = worst_sample(s, (const float(*)[3])points, values, count, smooth, bytes ? 1 / 85.0 : 1, bytes ? -1.5 : 0);
-    row(name, NULL, "default", smooth ? "value and gradient; error: largest of value" : "error: largest of value", median(seconds, runs),
-        worst, (double)count, "samples");
+    if (places == ALONG_RAYS)
+        snprintf(setting, sizeof setting, "%serror: largest of value; 1024x1024 rays in every %zuth row of tiles, %d a call",
+                 samplings[what], every, TILES);
+    else snprintf(setting, sizeof setting, "%serror: largest of value", samplings[what]);
+    row(name, NULL, "default", setting, median(seconds, runs), worst, work, "samples");
     if (bytes) {
         isogi_vol_free(pyramid);
         for (size_t i = 0; i < voxels; i++) s->reference[i] = (double)s->data[i];
@@ -316,7 +356,7 @@ int main(int argc, char **argv) {
     const char *path = NULL;
     int quick = 0;
     for (int i = 1; i < argc; i++) {
-        if (!strcmp(argv[i], "--quick")) quick = 1, runs = 3, sampled = 1000, judged = RAYS / 8;
+        if (!strcmp(argv[i], "--quick")) quick = 1, runs = 3, sampled = 1000, judged = RAYS / 8, every = 64;
         else path = argv[i];
     }
     csv = path && path[0] != '-' ? fopen(path, "w") : NULL;
@@ -332,13 +372,16 @@ int main(int argc, char **argv) {
         bench_rays(&s, "bundle64alone", s.bundles, BUNDLE, SHARED, 0);
         if (gyroid) {
             bench_build(&s);
-            bench_samples(&s, "trilinear-along-rays", 0, FAR_RAYS, 0);
-            bench_samples(&s, "trilinear-along-neighbours", 0, NEIGHBOURS, 0);
-            bench_samples(&s, "trilinear-bytes-along-rays", 0, FAR_RAYS, 1);
-            bench_samples(&s, "tricubic-along-rays", 1, FAR_RAYS, 0);
-            bench_samples(&s, "tricubic-along-neighbours", 1, NEIGHBOURS, 0);
-            bench_samples(&s, "tricubic-bytes-along-rays", 1, FAR_RAYS, 1);
-            bench_samples(&s, "tricubic-random", 1, ANYWHERE, 0);
+            bench_samples(&s, "trilinear-along-rays", TRILINEAR, ALONG_RAYS, 0);
+            bench_samples(&s, "trilinear-along-far-rays", TRILINEAR, FAR_RAYS, 0);
+            bench_samples(&s, "trilinear-gradients-along-rays", TRILINEAR_GRADIENTS, ALONG_RAYS, 0);
+            bench_samples(&s, "trilinear-bytes-along-rays", TRILINEAR, ALONG_RAYS, 1);
+            bench_samples(&s, "trilinear-bytes-along-far-rays", TRILINEAR, FAR_RAYS, 1);
+            bench_samples(&s, "tricubic-along-rays", TRICUBIC, ALONG_RAYS, 0);
+            bench_samples(&s, "tricubic-along-far-rays", TRICUBIC, FAR_RAYS, 0);
+            bench_samples(&s, "tricubic-bytes-along-rays", TRICUBIC, ALONG_RAYS, 1);
+            bench_samples(&s, "tricubic-bytes-along-far-rays", TRICUBIC, FAR_RAYS, 1);
+            bench_samples(&s, "tricubic-random", TRICUBIC, ANYWHERE, 0);
             bench_mesh(&s, "mesh", 0);
             bench_mesh(&s, "mesh-normals", 1);
         }
