@@ -5842,10 +5842,11 @@ ISOGI_VOL__INLINE void isogi_vol__send_for_rays(const char *from, size_t element
 
 /* Sets up to eight rays up at once and puts them into slots (beyond `count` the first one again; what is written of rays that get none does
    no harm): the operations of begin and aim, in their order and without contraction.
-   Returns the rays that have a slot now; *odd: those that are left to the code for one. The others miss the box. down: not to stay at the
-   root if they begin in one place. A kernel, longer than a screen: nothing in it is worth a name of its own. */
+   Returns the rays that have a slot now; *odd: those that are left to the code for one. The others miss the box. turn: of a pool, in
+   which rays do not stay at the root if they begin in one place, or NULL. alike: rays differ in nothing but direction, as in a bundle. A kernel, longer
+   than a screen: nothing in it is worth a name of its own. */
 ISOGI_VOL__AVX512 static unsigned isogi_vol__seat8(isogi_vol__batch *b, isogi_vol__turn *turn, isogi_vol__pool *s, size_t first, int count,
-                                                   const uint8_t *seats, int down, unsigned *odd) {
+                                                   const uint8_t *seats, int alike, unsigned *odd) {
     const isogi_pyramid *p = b->pyramid;
     const __mmask8 lanes = (__mmask8)((1u << count) - 1);
     const __m512i lane = _mm512_maskz_mov_epi64(lanes, _mm512_set_epi64(7, 6, 5, 4, 3, 2, 1, 0)), none = _mm512_setzero_si512();
@@ -5862,14 +5863,14 @@ ISOGI_VOL__AVX512 static unsigned isogi_vol__seat8(isogi_vol__batch *b, isogi_vo
     __mmask8 good = 0xff, meets, rising[3], still[3]; /* lanes beyond `count` are copies of the first one */
     int a, k;
 /* a bundle has one ray or start */
-#define ISOGI_VOL__TAKE_BITS(member) (b->bundle ? isogi_vol__load_one(from + (member)) : isogi_vol__load_eight(at, member))
+#define ISOGI_VOL__TAKE_BITS(member) (alike ? isogi_vol__load_one(from + (member)) : isogi_vol__load_eight(at, member))
 #define ISOGI_VOL__TAKE(member) _mm512_castsi512_pd(ISOGI_VOL__TAKE_BITS(member))
 #pragma GCC unroll 8
     for (k = 0; k < 8; k++) {
         const size_t ray = k < count ? (size_t)k : 0;
         at[k] = from + (b->bundle ? 0 : ray * element), dir_at[k] = to + ray * dir_bytes;
     }
-    if (!b->bundle) isogi_vol__send_for_rays(from, element, b->hits ? (char *)(b->hits + first) : NULL, !down);
+    if (!b->bundle) isogi_vol__send_for_rays(from, element, b->hits ? (char *)(b->hits + first) : NULL, !turn);
     if (b->rays) {
         __m512d relative[3];
 #pragma GCC unroll 8
@@ -6014,7 +6015,7 @@ ISOGI_VOL__AVX512 static unsigned isogi_vol__seat8(isogi_vol__batch *b, isogi_vo
 #undef ISOGI_VOL__PUT
 #undef ISOGI_VOL__PUT_REAL
     *odd = (unsigned)(lanes & ~good), meets = (__mmask8)(meets & lanes);
-    if (down)
+    if (turn)
         isogi_vol__take_down(b, turn, s, seats, whole, meets, origin, inverse, isovalue,
                              _mm512_or_si512(_mm512_castpd_si512(stop), _mm512_set1_epi64(3)), flip);
     b->work.rays += (uint64_t)__builtin_popcount((unsigned)(lanes & good));
@@ -6115,7 +6116,7 @@ ISOGI_VOL__INLINE void isogi_vol__send_for_bundle(const isogi_pyramid *p, const 
 
 /* Takes rays into open slots until there are none of either, but not for the sake of a few slots. */
 ISOGI_VOL__AVX512 ISOGI_VOL__INLINE uint64_t isogi_vol__fill_pool(isogi_vol__batch *b, isogi_vol__turn *turn, isogi_vol__pool *s,
-                                                                  uint64_t seats, uint64_t open, size_t *next, size_t count, int down) {
+                                                                  uint64_t seats, uint64_t open, size_t *next, size_t count) {
     while (open && *next < count) {
         const size_t rays = count - *next;
         const int room = __builtin_popcountll(open);
@@ -6134,7 +6135,7 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE uint64_t isogi_vol__fill_pool(isogi_vol__bat
             const __m128i all = _mm512_castsi512_si128(_mm512_maskz_compress_epi8(open, _mm512_load_si512(b->pyramid->ways->child[0])));
             _mm_storeu_si128((__m128i *)(void *)list, _mm_mask_mov_epi8(_mm_broadcastb_epi8(all), (__mmask16)((1u << n) - 1), all));
         }
-        seated = isogi_vol__seat8(b, turn, s, *next, n, list, down, &odd);
+        seated = isogi_vol__seat8(b, turn, s, *next, n, list, b->bundle, &odd);
         for (k = 0; k < n; k++, ++*next) {
             if (seated >> k & 1 || (odd >> k & 1 && isogi_vol__seat_odd(b, s, *next, list[k]))) open &= ~((uint64_t)1 << list[k]);
             else if (odd >> k & 1) continue;
@@ -6195,13 +6196,43 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE uint64_t isogi_vol__look_all(isogi_vol__batc
     return open;
 }
 
-/* Slots without a ray take part in all stages, with zeros, and are left out at their ends. */
-ISOGI_VOL__AVX512 ISOGI_VOL__INLINE void isogi_vol__clear_pool(isogi_vol__pool *s, int groups, const isogi_pyramid *p) {
+/* Slots without a ray take part in all stages, with zeros, and are left out at their ends. first: slots before have rays, to
+   which only what rays do not begin with is new. */
+ISOGI_VOL__AVX512 static void isogi_vol__clear_pool(isogi_vol__pool *s, int first, int groups, const isogi_pyramid *p) {
     char *row = (char *)s;
     int i, k;
     for (i = 0; i < (int)(sizeof *s / sizeof s->ray); i++, row += sizeof s->ray)
-        for (k = 0; k < groups; k++) _mm512_store_si512(row + 64 * k, _mm512_setzero_si512());
-    for (i = 0; i < 8 * groups; i++) s->level[i] = -1, s->address[i] = (uint64_t)(uintptr_t)p->nodes;
+        for (k = first; k < groups; k++) _mm512_store_si512(row + 64 * k, _mm512_setzero_si512());
+    for (k = 0; k < first; k++) {
+        _mm512_store_pd(s->step + 8 * k, _mm512_setzero_pd());
+        for (i = 0; i < ISOGI_VOL__NODE_LEVELS; i++) _mm512_store_si512(s->mask[i] + 8 * k, _mm512_setzero_si512());
+    }
+    for (i = 8 * first; i < 8 * groups; i++) s->level[i] = -1, s->address[i] = (uint64_t)(uintptr_t)p->nodes;
+}
+
+/* Whether rays differ in nothing but direction. */
+ISOGI_VOL__AVX512 static int isogi_vol__alike(const isogi_ray *rays, int count) {
+    const __m512i first = _mm512_loadu_si512(rays);
+    __m512i other = _mm512_setzero_si512();
+    int i;
+    if (sizeof *rays != 64 || offsetof(isogi_ray, dir) != 24) return 0;
+    for (i = 1; i < count; i++) other = _mm512_ternarylogic_epi64(other, first, _mm512_loadu_si512(rays + i), 0xf6);
+    return !(_mm512_test_epi32_mask(other, other) & ~0x01c0);
+}
+
+/* The next eight to sixteen rays into the first slots of a pool without rays; returns those that have one. */
+ISOGI_VOL__AVX512 ISOGI_VOL__INLINE unsigned isogi_vol__seat_packet(isogi_vol__batch *b, isogi_vol__pool *s, size_t next, int count) {
+    static const uint8_t list[16] = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15};
+    const int alike = b->bundle || isogi_vol__alike(b->rays + next, count);
+    unsigned odd[2] = {0, 0}, rays = isogi_vol__seat8(b, NULL, s, next, 8, list, alike, &odd[0]), rest;
+    if (count > 8) rays |= isogi_vol__seat8(b, NULL, s, next + 8, count - 8, list + 8, alike, &odd[1]) << 8;
+    for (rest = ~rays & ((1u << count) - 1); rest; rest &= rest - 1) {
+        const int k = __builtin_ctz(rest);
+        if ((odd[0] | odd[1] << 8) >> k & 1) rays |= (unsigned)isogi_vol__seat_odd(b, s, next + (size_t)k, k) << k;
+        else if (b->occluded) b->occluded[next + (size_t)k] = 0;
+        else memset(&b->hits[next + (size_t)k], 0, sizeof b->hits[0]);
+    }
+    return rays;
 }
 
 /* Rays that stand at the root are taken down from there, a row of eight at a time. */
@@ -6228,7 +6259,7 @@ ISOGI_VOL__AVX512 ISOGI_VOL__NOINLINE static void isogi_vol__run_pool(isogi_vol_
     isogi_vol__take_rows_down(b, turn, s, seats & ~open);
     for (;;) {
         int answered = 0, waits;
-        open = isogi_vol__fill_pool(b, turn, s, seats, open, next, end, 1);
+        open = isogi_vol__fill_pool(b, turn, s, seats, open, next, end);
         if (open == seats) return;
         if (share) isogi_vol__share(turn, s, groups, __builtin_ctzll(seats & ~open)), share = 0;
         /* those that choose stay where they are */
@@ -6260,31 +6291,39 @@ ISOGI_VOL__AVX512 ISOGI_VOL__NOINLINE static void isogi_vol__run_pool(isogi_vol_
 /* Sixteen rays at a time that nearly coincide; where they do not, a pool takes the next ones, and ever more of them each time. */
 ISOGI_VOL__AVX512 static void isogi_vol__trace_pool(isogi_vol__batch *b, size_t count) {
     const int groups = count < ISOGI_VOL__POOL ? (int)(count + 7) / 8 : ISOGI_VOL__POOL / 8;
-    const uint64_t seats = ~(uint64_t)0 >> (64 - 8 * groups), first = seats & (((uint64_t)1 << ISOGI_VOL__PACKET) - 1);
+    const uint64_t seats = ~(uint64_t)0 >> (64 - 8 * groups);
     isogi_vol__pool s;
     isogi_vol__turn turn;
     size_t next = 0, run = ISOGI_VOL__POOL;
-    isogi_vol__open_turn(&turn, b->pyramid);
-    turn.any = b->occluded != NULL;
-    isogi_vol__clear_pool(&s, groups, b->pyramid);
+    int opened = 0;
     while (next < count) {
         uint64_t open = seats;
         size_t end = count;
+        int taken = 0;
         if (b->rays && b->bundle_count <= 1 && count - next >= ISOGI_VOL__PACKET / 2) {
-            end = count - next > ISOGI_VOL__PACKET ? next + ISOGI_VOL__PACKET : count;
-            open ^= first ^ isogi_vol__fill_pool(b, &turn, &s, first, first, &next, end, 0);
-            if (open == seats) continue;
-            if (__builtin_popcountll(open ^ seats) >= ISOGI_VOL__PACKET / 4 && isogi_vol__coincide(&s, (unsigned)(open ^ seats))) {
-                isogi_vol__trace_packet(b, &s, (unsigned)(open ^ seats));
+            const int n = count - next < ISOGI_VOL__PACKET ? (int)(count - next) : ISOGI_VOL__PACKET;
+            unsigned rays;
+            if (!opened && n < ISOGI_VOL__PACKET) isogi_vol__clear_pool(&s, 0, ISOGI_VOL__PACKET / 8, b->pyramid);
+            rays = isogi_vol__seat_packet(b, &s, next, n);
+            next += (size_t)n;
+            if (!rays) continue;
+            if (__builtin_popcount(rays) >= ISOGI_VOL__PACKET / 4 && isogi_vol__coincide(&s, rays)) {
+                isogi_vol__trace_packet(b, &s, rays);
                 run = ISOGI_VOL__POOL;
                 continue;
             }
+            open ^= rays, taken = ISOGI_VOL__PACKET / 8;
             end = count - next > run ? next + run : count;
             run = count - next > run ? 4 * run : run;
         }
+        if (!opened) {
+            isogi_vol__open_turn(&turn, b->pyramid);
+            turn.any = b->occluded != NULL, opened = 1;
+            isogi_vol__clear_pool(&s, taken, groups, b->pyramid);
+        }
         isogi_vol__run_pool(b, &turn, &s, groups, open, &next, end);
     }
-    b->work.cells += turn.cells;
+    if (opened) b->work.cells += turn.cells;
 }
 #ifndef __clang__
 #pragma GCC diagnostic pop
