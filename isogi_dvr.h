@@ -527,6 +527,7 @@ ISOGI_API isogi_result isogi_dvr_tets_render(const isogi_tets *tets, const isogi
 #define ISOGI_DVR__BATCH 16                /* directions swept at once */
 #define ISOGI_DVR__GAIN 1024               /* grid points: one task of summing up */
 #define ISOGI_DVR__TOWARD 8                /* directions towards which local visibility is evaluated at once */
+#define ISOGI_DVR__RAYS 32                 /* of a packet: 8 by 4 pixels, two vectors */
 #define ISOGI_DVR__CLASSES 1024            /* of values, for pictures; 16 times as many for a transfer function with narrow pieces */
 #define ISOGI_DVR__NODES 8                 /* samples of a ray taken at once */
 #define ISOGI_DVR__LEAP 6                  /* blocks of 4^3 that a ray steps over at once, to each side */
@@ -567,8 +568,8 @@ typedef struct isogi_dvr__fast_ray {
 
 /* Rays side by side, which look for matter together. */
 typedef struct isogi_dvr__packet {
-    float origin[3][ISOGI_DVR__LANES], dir[3][ISOGI_DVR__LANES], inverse[3][ISOGI_DVR__LANES];
-    int32_t next[ISOGI_DVR__LANES], count[ISOGI_DVR__LANES]; /* next = count: done */
+    float origin[3][ISOGI_DVR__RAYS], dir[3][ISOGI_DVR__RAYS], inverse[3][ISOGI_DVR__RAYS];
+    int32_t next[ISOGI_DVR__RAYS], count[ISOGI_DVR__RAYS]; /* next = count: done */
 } isogi_dvr__packet;
 
 typedef struct isogi_dvr__frame isogi_dvr__frame;
@@ -1862,7 +1863,7 @@ static void isogi_dvr__between(const isogi_dvr__rows *a, const float part[2]) {
 static void isogi_dvr__leap(const isogi_dvr *d, isogi_dvr__packet *p, isogi_counters *work) {
     const isogi_level *level = &d->level[0];
     int k;
-    for (k = 0; k < ISOGI_DVR__LANES; k++) {
+    for (k = 0; k < ISOGI_DVR__RAYS; k++) {
         int first = p->next[k], i = first, count = p->count[k];
         while (i < count) {
             float exit = (float)count;
@@ -1934,19 +1935,6 @@ static void isogi_dvr__local(const isogi_dvr__local_rays *a, float *clear) {
     ((w[0] * ISOGI_DVR__C(r0 + i) + w[1] * ISOGI_DVR__C(r0 + i + 1)) +                   \
      (w[2] * ISOGI_DVR__C(r0 + a->beside + i) + w[3] * ISOGI_DVR__C(r0 + a->beside + i + 1)))
 /* The blocks of level 0 that samples lie in, along an axis; where they leave the empty ones around. */
-#define ISOGI_DVR__BLOCK(a, c)                                                                                          \
-    {                                                                                                                   \
-        isogi_dvr__floats x = ISOGI_DVR__C(p->origin[a]) + at * ISOGI_DVR__C(p->dir[a]);                                \
-        isogi_dvr__ints last = zero + (int)(level->size[a] - 1), more;                                                  \
-        x = (isogi_dvr__floats)((isogi_dvr__ints)x & (x > 0.0f)), c = __builtin_convertvector(x, isogi_dvr__ints) >> 2; \
-        more = c > last, c = (last & more) | (c & ~more);                                                               \
-    }
-#define ISOGI_DVR__EXIT(a, c, inverse, up)                                                                                           \
-    {                                                                                                                                \
-        isogi_dvr__ints border = (((c + free) & up) | ((c - free + 1) & ~up)) << 2, less;                                            \
-        isogi_dvr__floats t = (__builtin_convertvector(border, isogi_dvr__floats) - ISOGI_DVR__C(p->origin[a])) * inverse;           \
-        less = t < exit, exit = (isogi_dvr__floats)(((isogi_dvr__ints)t & less) | ((isogi_dvr__ints)exit & ~less));                  \
-    }
 #define ISOGI_DVR__VI(p) (*(isogi_dvr__ints *)(void *)(p))
 #define ISOGI_DVR__CI(p) (*(const isogi_dvr__ints *)(const void *)(p))
 #define ISOGI_DVR__KERNELS(SUFFIX, TARGET)                                                                                          \
@@ -2034,48 +2022,18 @@ static void isogi_dvr__local(const isogi_dvr__local_rays *a, float *clear) {
         k->pass = isogi_dvr__pass##SUFFIX, k->pass_out = isogi_dvr__pass_out##SUFFIX, k->between = isogi_dvr__between##SUFFIX;      \
         k->exp_row = isogi_dvr__exp_row##SUFFIX, k->gather = isogi_dvr__gather##SUFFIX, k->local = isogi_dvr__local##SUFFIX;         \
     }
-/* Of the wide path only: in narrower vectors conversions and comparisons go lane by lane, and are no faster than plain code. */
-#define ISOGI_DVR__LEAP_KERNEL(SUFFIX, TARGET)                                                                                      \
-    TARGET static void isogi_dvr__leap##SUFFIX(const isogi_dvr *d, isogi_dvr__packet *p, isogi_counters *work) {                    \
-        const isogi_level *level = &d->level[0];                                                                                    \
-        int lane;                                                                                                                   \
-        isogi_dvr__ints first = ISOGI_DVR__CI(p->next), count = ISOGI_DVR__CI(p->count), i = first, active = i < count, zero = {0}, \
-            blocks = {0}, \
-                        skipped = {0}, row = zero + (int)level->size[0], plane = zero + (int)(level->size[0] * level->size[1]), to;  \
-        isogi_dvr__floats inverse0 = ISOGI_DVR__C(p->inverse[0]), inverse1 = ISOGI_DVR__C(p->inverse[1]), \
-            inverse2 = ISOGI_DVR__C(p->inverse[2]); \
-        isogi_dvr__ints up0 = inverse0 > 0.0f, up1 = inverse1 > 0.0f, up2 = inverse2 > 0.0f;                                        \
-        for (;;) {                                                                                                                  \
-            isogi_dvr__floats at = __builtin_convertvector(i, isogi_dvr__floats), \
-                exit = __builtin_convertvector(count, isogi_dvr__floats); \
-            isogi_dvr__ints free, move, c0, c1, c2;                                                                                 \
-            int32_t number[ISOGI_DVR__LANES];                                                                                       \
-            uint64_t any[ISOGI_DVR__LANES / 2];                                                                                     \
-            memcpy(any, &active, sizeof any);                                                                                       \
-            if (!((any[0] | any[1] | any[2] | any[3]) | (any[4] | any[5] | any[6] | any[7]))) break;                                \
-            ISOGI_DVR__BLOCK(0, c0) ISOGI_DVR__BLOCK(1, c1) ISOGI_DVR__BLOCK(2, c2)                                                 \
-            ISOGI_DVR__VI(number) = c0 + row * c1 + plane * c2;                                                                     \
-            free = (isogi_dvr__ints)isogi_dvr__bytes(d->leap, number);                                                              \
-            move = active & (free > 0);                                                                                             \
-            ISOGI_DVR__EXIT(0, c0, inverse0, up0) ISOGI_DVR__EXIT(1, c1, inverse1, up1) ISOGI_DVR__EXIT(2, c2, inverse2, up2)       \
-            exit = (isogi_dvr__floats)((isogi_dvr__ints)exit & (exit > 0.0f)), to = __builtin_convertvector(exit, isogi_dvr__ints); \
-            to = ((to & (to > i)) | (i & ~(to > i))) + 1;                                                           \
-            blocks -= active, skipped -= move;                                                                                      \
-            i = (to & move) | (i & ~move), active = move & (i < count);                                                             \
-        }                                                                                                                           \
-        to = i - ((i > first) & 1), first = i < count;                                                                                \
-        ISOGI_DVR__VI(p->next) = (to & first) | (count & ~first);                                                                   \
-        for (lane = 0; lane < ISOGI_DVR__LANES; lane++)                                                                             \
-            work->blocks += (uint64_t)blocks[lane], work->blocks_skipped += (uint64_t)skipped[lane];                                \
-    }
 ISOGI_DVR__KERNELS(_base, )
 #ifdef ISOGI_DVR__AVX
 ISOGI_DVR__KERNELS(_avx2, __attribute__((target("avx2,fma"))))
 ISOGI_DVR__KERNELS(_avx512, __attribute__((target("avx512f,avx512vl,avx512dq,avx512bw,fma"))))
+#define ISOGI_DVR__AVX512 __attribute__((target("avx512f,avx512vl,avx512dq,avx512bw,fma"))) static
+#define ISOGI_DVR__ALWAYS __attribute__((always_inline)) inline
+
 /* Sixteen bytes, put together in registers: what is stored in parts is slow to load as a whole. */
-__attribute__((target("avx512f,avx512vl,avx512dq,avx512bw,fma"))) static inline __m512i isogi_dvr__bytes(const uint8_t *p,
-                                                                                                        const int32_t at[16]) {
+ISOGI_DVR__AVX512 inline __m512i isogi_dvr__bytes_avx512(const uint8_t *p, __m512i index) {
 #define ISOGI_DVR__BYTE(k) (char)p[at[k]]
+    int32_t at[16];
+    _mm512_storeu_si512(at, index);
     /* of all lanes: where it names none, gcc 12 warns of its own undefined vectors */
     return _mm512_maskz_cvtepu8_epi32(0xffff, _mm_setr_epi8(
         ISOGI_DVR__BYTE(0), ISOGI_DVR__BYTE(1), ISOGI_DVR__BYTE(2), ISOGI_DVR__BYTE(3), ISOGI_DVR__BYTE(4), ISOGI_DVR__BYTE(5),
@@ -2083,14 +2041,62 @@ __attribute__((target("avx512f,avx512vl,avx512dq,avx512bw,fma"))) static inline 
         ISOGI_DVR__BYTE(12), ISOGI_DVR__BYTE(13), ISOGI_DVR__BYTE(14), ISOGI_DVR__BYTE(15)));
 #undef ISOGI_DVR__BYTE
 }
-ISOGI_DVR__LEAP_KERNEL(_avx512, __attribute__((target("avx512f,avx512vl,avx512dq,avx512bw,fma"))))
+
+/* One leap of the rays k .. k + 15 of a packet that are still going: what of them has to leap again. */
+ISOGI_DVR__AVX512 ISOGI_DVR__ALWAYS __mmask16 isogi_dvr__leap_once_avx512(const isogi_dvr *d, const isogi_dvr__packet *p, int k,
+                                                                          __mmask16 going, __m512i *sample, isogi_counters *work) {
+    const isogi_level *level = &d->level[0];
+    const __m512i count = _mm512_loadu_si512(p->count + k), one = _mm512_set1_epi32(1);
+    const __m512 at = _mm512_maskz_cvtepi32_ps(0xffff, *sample);
+    __m512i c[3], number = _mm512_setzero_si512(), free, to;
+    __m512 exit = _mm512_maskz_cvtepi32_ps(0xffff, count);
+    __mmask16 move;
+    int a;
+    for (a = 2; a >= 0; a--) {
+        __m512 x = _mm512_add_ps(_mm512_loadu_ps(p->origin[a] + k), _mm512_mul_ps(at, _mm512_loadu_ps(p->dir[a] + k)));
+        c[a] = _mm512_maskz_cvttps_epi32(0xffff, _mm512_maskz_max_ps(0xffff, x, _mm512_setzero_ps()));
+        c[a] = _mm512_maskz_min_epi32(0xffff, _mm512_maskz_srli_epi32(0xffff, c[a], 2), _mm512_set1_epi32((int)(level->size[a] - 1)));
+        number = _mm512_add_epi32(c[a], _mm512_mullo_epi32(number, _mm512_set1_epi32((int)level->size[a])));
+    }
+    free = isogi_dvr__bytes_avx512(d->leap, number);
+    move = _mm512_mask_cmpgt_epi32_mask(going, free, _mm512_setzero_si512());
+    for (a = 0; a < 3; a++) {
+        const __m512 inverse = _mm512_loadu_ps(p->inverse[a] + k);
+        const __mmask16 up = _mm512_cmp_ps_mask(inverse, _mm512_setzero_ps(), _CMP_GT_OQ);
+        __m512i border = _mm512_mask_add_epi32(_mm512_add_epi32(_mm512_sub_epi32(c[a], free), one), up, c[a], free);
+        __m512 t = _mm512_maskz_cvtepi32_ps(0xffff, _mm512_maskz_slli_epi32(0xffff, border, 2));
+        exit = _mm512_maskz_min_ps(0xffff, _mm512_mul_ps(_mm512_sub_ps(t, _mm512_loadu_ps(p->origin[a] + k)), inverse), exit);
+    }
+    to = _mm512_add_epi32(_mm512_maskz_max_epi32(0xffff, _mm512_maskz_cvttps_epi32(0xffff, exit), *sample), one);
+    *sample = _mm512_mask_mov_epi32(*sample, move, to);
+    work->blocks += (uint64_t)__builtin_popcount(going), work->blocks_skipped += (uint64_t)__builtin_popcount(move);
+    return _mm512_mask_cmplt_epi32_mask(move, *sample, count);
+}
+
+/* As isogi_dvr__leap. Two vectors side by side: each waits long for its bytes. */
+ISOGI_DVR__AVX512 void isogi_dvr__leap_avx512(const isogi_dvr *d, isogi_dvr__packet *p, isogi_counters *work) {
+    __m512i sample[2];
+    __mmask16 going[2];
+    int k;
+    for (k = 0; k < 2; k++)
+        sample[k] = _mm512_loadu_si512(p->next + 16 * k),
+        going[k] = _mm512_cmplt_epi32_mask(sample[k], _mm512_loadu_si512(p->count + 16 * k));
+    while (going[0] | going[1]) {
+        going[0] = isogi_dvr__leap_once_avx512(d, p, 0, going[0], &sample[0], work);
+        going[1] = isogi_dvr__leap_once_avx512(d, p, 16, going[1], &sample[1], work);
+    }
+    for (k = 0; k < 2; k++) {
+        const __m512i first = _mm512_loadu_si512(p->next + 16 * k), count = _mm512_loadu_si512(p->count + 16 * k);
+        __m512i to = _mm512_mask_sub_epi32(sample[k], _mm512_cmpgt_epi32_mask(sample[k], first), sample[k], _mm512_set1_epi32(1));
+        _mm512_storeu_si512(p->next + 16 * k, _mm512_mask_mov_epi32(count, _mm512_cmplt_epi32_mask(sample[k], count), to));
+    }
+}
+#undef ISOGI_DVR__AVX512
+#undef ISOGI_DVR__ALWAYS
 #endif
 #undef ISOGI_DVR__KERNELS
-#undef ISOGI_DVR__LEAP_KERNEL
 #undef ISOGI_DVR__MORE
 #undef ISOGI_DVR__LESS
-#undef ISOGI_DVR__BLOCK
-#undef ISOGI_DVR__EXIT
 #undef ISOGI_DVR__VI
 #undef ISOGI_DVR__CI
 #undef ISOGI_DVR__EXP
@@ -6073,7 +6079,7 @@ static void isogi_dvr__fast_look_one(const isogi_dvr__frame *f, const isogi_dvr_
 
 static void isogi_dvr__fast_look(const isogi_dvr__frame *f, const isogi_dvr__fast_ray *r, isogi_dvr__fast_run *run, unsigned lanes) {
     int k;
-    for (k = 0; lanes >> k; k++)
+    for (k = 0; k < ISOGI_DVR__RAYS; k++)
         if (lanes >> k & 1) isogi_dvr__fast_look_one(f, &r[k], &run[k]);
 }
 
@@ -6345,7 +6351,8 @@ ISOGI_DVR__AVX2 inline void isogi_dvr__run_matter_avx2(const isogi_dvr__frame *f
     _mm256_storeu_ps(run->change, _mm256_mul_ps(isogi_dvr__magnitude_avx2(_mm256_sub_ps(change, node)), length));
 }
 
-/* As isogi_dvr__fast_look: cells of all runs, then values of all, then matter, since each waits long for what is before it. */
+/* As isogi_dvr__fast_look: cells of all runs, then values of all, then matter, since each waits long for what is before it, values for
+   memory. */
 ISOGI_DVR__AVX2 void isogi_dvr__look_avx2(const isogi_dvr__frame *f, const isogi_dvr__fast_ray *r, isogi_dvr__fast_run *run,
                                           unsigned lanes) {
 #define ISOGI_DVR__EACH(what) \
@@ -6353,9 +6360,14 @@ ISOGI_DVR__AVX2 void isogi_dvr__look_avx2(const isogi_dvr__frame *f, const isogi
         int k = __builtin_ctz(left); \
         what; \
     }
-    isogi_dvr__fast_cells cells[ISOGI_DVR__LANES];
+    isogi_dvr__fast_cells cells[ISOGI_DVR__RAYS];
     unsigned left;
-    ISOGI_DVR__EACH(isogi_dvr__run_cells_avx2(f, &r[k], &run[k], &cells[k]))
+    const char *data = (const char *)f->dvr->volume.data;
+    int i;
+    ISOGI_DVR__EACH({
+        isogi_dvr__run_cells_avx2(f, &r[k], &run[k], &cells[k]);
+        for (i = 0; i < 8; i++) __builtin_prefetch(data + cells[k].at[i]);
+    })
     if (f->sample_kind == 0) ISOGI_DVR__EACH(isogi_dvr__run_classes_avx2(f, &run[k], &cells[k], 0))
     else if (f->sample_kind == 1) ISOGI_DVR__EACH(isogi_dvr__run_classes_avx2(f, &run[k], &cells[k], 1))
     else ISOGI_DVR__EACH(isogi_dvr__run_classes_avx2(f, &run[k], &cells[k], 2))
@@ -6515,12 +6527,13 @@ ISOGI_DVR__AVX2 void isogi_dvr__fast_shade_avx2(const isogi_dvr__frame *f, const
 #endif
 
 /* Front to back: all rays of a packet go to where the next matter may be, then each passes some of it. */
-static void isogi_dvr__fast_cast(const isogi_dvr__frame *f, const isogi_dvr__fast_ray r[ISOGI_DVR__LANES],
-                                 isogi_dvr__fast_state s[ISOGI_DVR__LANES], isogi_counters *work) {
+static void isogi_dvr__fast_cast(const isogi_dvr__frame *f, const isogi_dvr__fast_ray r[ISOGI_DVR__RAYS],
+                                 isogi_dvr__fast_state s[ISOGI_DVR__RAYS], isogi_counters *work) {
     isogi_dvr__packet p;
-    isogi_dvr__fast_run run[ISOGI_DVR__LANES];
-    int k, a, any = 1;
-    for (k = 0; k < ISOGI_DVR__LANES; k++) {
+    isogi_dvr__fast_run run[ISOGI_DVR__RAYS];
+    int k, a;
+    unsigned any = 1;
+    for (k = 0; k < ISOGI_DVR__RAYS; k++) {
         for (a = 0; a < 3; a++) {
             float x = r[k].dir[a];
             p.origin[a][k] = r[k].origin[a], p.dir[a][k] = x, p.inverse[a][k] = fabsf(x) > 1e-20f ? x : x > 0 ? 1e-20f : -1e-20f;
@@ -6530,21 +6543,24 @@ static void isogi_dvr__fast_cast(const isogi_dvr__frame *f, const isogi_dvr__fas
         s[k].clear = 1, run[k].tolerance = f->tolerance;
     }
     for (a = 0; a < 3; a++)
-        for (k = 0; k < ISOGI_DVR__LANES; k++) p.inverse[a][k] = 1 / p.inverse[a][k];
+        for (k = 0; k < ISOGI_DVR__RAYS; k++) p.inverse[a][k] = 1 / p.inverse[a][k];
     while (any) {
         f->leap(f->dvr, &p, work);
-        for (k = 0, any = 0; k < ISOGI_DVR__LANES; k++) { /* waiting for memory together */
+        for (k = 0, any = 0; k < ISOGI_DVR__RAYS; k++) { /* waiting for memory together */
             int left = p.count[k] - 1 - p.next[k], stride = s[k].clear < f->dim && left > 2 * (ISOGI_DVR__NODES - 1) ? 2 : 1;
             run[k].some = 0;
-            if (left <= 0) continue;
+            if (left <= 0) {
+                p.next[k] = p.count[k];
+                continue;
+            }
             run[k].first = (float)p.next[k], run[k].stride = (float)stride,
             run[k].pieces = left < ISOGI_DVR__NODES ? left : ISOGI_DVR__NODES - 1;
             run[k].length = r[k].piece * run[k].stride, run[k].last = left < ISOGI_DVR__NODES ? r[k].last_piece : run[k].length;
-            work->samples += ISOGI_DVR__NODES, any |= 1 << k;
+            work->samples += ISOGI_DVR__NODES, any |= 1u << k;
             p.next[k] += stride * (ISOGI_DVR__NODES - 1);
         }
-        f->look(f, r, run, (unsigned)any);
-        for (k = 0; k < ISOGI_DVR__LANES; k++) {
+        f->look(f, r, run, any);
+        for (k = 0; k < ISOGI_DVR__RAYS; k++) {
             if (run[k].some) f->shade(f, &r[k], &s[k], &run[k], work);
             if (!(s[k].clear > f->end)) p.next[k] = p.count[k];
         }
@@ -6750,32 +6766,32 @@ ISOGI_DVR__APART void isogi_dvr__render_eight(const isogi_dvr__render_job *job, 
 
 /* Depth of a packet: once without a limit, for the depth in all, of which 1 - clear has no digits when it is little; and once more to the
    place that is asked for. */
-static void isogi_dvr__depth_fast(const isogi_dvr__render_job *job, isogi_dvr__fast_ray ray[ISOGI_DVR__LANES],
-                                  float depth[ISOGI_DVR__LANES], isogi_counters *work) {
+static void isogi_dvr__depth_fast(const isogi_dvr__render_job *job, isogi_dvr__fast_ray ray[ISOGI_DVR__RAYS],
+                                  float depth[ISOGI_DVR__RAYS], isogi_counters *work) {
     isogi_dvr__frame probe = job->fast.frame;
-    isogi_dvr__fast_state state[ISOGI_DVR__LANES];
+    isogi_dvr__fast_state state[ISOGI_DVR__RAYS];
     int k;
     probe.shade = isogi_dvr__fast_probe;
     isogi_dvr__fast_cast(&probe, ray, state, work);
-    for (k = 0; k < ISOGI_DVR__LANES; k++) {
+    for (k = 0; k < ISOGI_DVR__RAYS; k++) {
         double share = job->view->depth == ISOGI_DEPTH_FIRST ? 1.0 / 1099511627776.0 : 0.5;
         depth[k] = HUGE_VALF;
         if (!(state[k].depth > 0)) ray[k].count = 0;
         ray[k].sought = (float)-log1p(share * expm1(-(double)state[k].depth));
     }
     isogi_dvr__fast_cast(&probe, ray, state, work);
-    for (k = 0; k < ISOGI_DVR__LANES; k++)
+    for (k = 0; k < ISOGI_DVR__RAYS; k++)
         if (ray[k].count) depth[k] = (float)(ray[k].enter + (double)state[k].place * probe.step * job->dvr->spacing);
 }
 
-/* A packet: four by four pixels. */
+/* A packet: eight by four pixels. */
 ISOGI_DVR__APART void isogi_dvr__render_fast(const isogi_dvr__render_job *job, int x0, int y0, isogi_counters *work) {
-    isogi_dvr__fast_ray ray[ISOGI_DVR__LANES];
-    isogi_dvr__fast_state state[ISOGI_DVR__LANES];
-    float depth[ISOGI_DVR__LANES];
+    isogi_dvr__fast_ray ray[ISOGI_DVR__RAYS];
+    isogi_dvr__fast_state state[ISOGI_DVR__RAYS];
+    float depth[ISOGI_DVR__RAYS];
     int k, a;
-    for (k = 0; k < ISOGI_DVR__LANES; k++) {
-        int x = x0 + k % 4, y = y0 + k / 4;
+    for (k = 0; k < ISOGI_DVR__RAYS; k++) {
+        int x = x0 + k % 8, y = y0 + k / 8;
         double at[2], dir[3], inverse;
         memset(&ray[k], 0, sizeof ray[k]);
         if (x >= job->view->width || y >= job->view->height) continue;
@@ -6788,8 +6804,8 @@ ISOGI_DVR__APART void isogi_dvr__render_fast(const isogi_dvr__render_job *job, i
     }
     isogi_dvr__fast_cast(&job->fast.frame, ray, state, work);
     if (job->depth) isogi_dvr__depth_fast(job, ray, depth, work);
-    for (k = 0; k < ISOGI_DVR__LANES; k++) {
-        int x = x0 + k % 4, y = y0 + k / 4;
+    for (k = 0; k < ISOGI_DVR__RAYS; k++) {
+        int x = x0 + k % 8, y = y0 + k / 8;
         float *out = job->pixels + 5 * ((size_t)y * (size_t)job->view->width + (size_t)x);
         if (x >= job->view->width || y >= job->view->height) continue;
         for (a = 0; a < 3; a++) out[a] = state[k].out[a] < 3e38f ? state[k].out[a] : 3e38f;
@@ -6802,7 +6818,7 @@ static void isogi_dvr__render_task(void *arg, size_t tile) {
     int x0 = (int)(tile % job->across) * ISOGI_DVR__TILE, y0 = (int)(tile / job->across) * ISOGI_DVR__TILE, x, y;
     isogi_dvr__crossings crossings;
     isogi_counters work;
-    int wide = job->fast.frame.classes || job->eight ? 4 : 1, high = job->eight ? 2 : wide; /* a packet */
+    int wide = job->fast.frame.classes ? 8 : job->eight ? 4 : 1, high = job->fast.frame.classes ? 4 : job->eight ? 2 : 1; /* a packet */
     memset(&work, 0, sizeof work);
     for (y = y0; y < y0 + ISOGI_DVR__TILE && y < job->view->height; y += high)
         for (x = x0; x < x0 + ISOGI_DVR__TILE && x < job->view->width; x += wide) {
@@ -7651,6 +7667,7 @@ ISOGI_API isogi_result isogi_dvr_tets_render(const isogi_tets *tets, const isogi
 #undef ISOGI_DVR__CHUNK
 #undef ISOGI_DVR__SLAB
 #undef ISOGI_DVR__LANES
+#undef ISOGI_DVR__RAYS
 #undef ISOGI_DVR__TABLE
 #undef ISOGI_DVR__BATCH
 #undef ISOGI_DVR__GAIN
