@@ -5299,103 +5299,90 @@ static void isogi_vol__trace_one(isogi_vol__batch *b, size_t i) {
 #define ISOGI_VOL__REACH 4e-6f /* times below are sums of a few numbers up to 4 children, with errors below 1e-6 */
 
 typedef struct __attribute__((aligned(64))) isogi_vol__layers {
-    __m512 per[3], first[3], last[3], stop; /* from `zero` on, the rays enter layer i of children at i per - first,
+    __m512 per[3], first[3], last[3], stop; /* from somewhere on, the rays enter layer i of children at i per - first,
                                                leave it at (i + 1) per - last */
 } isogi_vol__layers;
-
-/* Where the rays are at `zero`, in children from the node's corner, and their way per time: of the node that was opened last. */
-typedef struct isogi_vol__places { __m512 at[3], dir[3]; } isogi_vol__places;
 
 ISOGI_VOL__AVX512 ISOGI_VOL__INLINE __m512 isogi_vol__halves(__m512d low, __m512d high) {
     return _mm512_insertf32x8(_mm512_castps256_ps512(_mm512_cvtpd_ps(low)), _mm512_cvtpd_ps(high), 1);
 }
 
-/* Where a node begins, in cells as they are, which is where rays enter it by each axis; corner: of the node, counted backwards. Returns 1
-   / size with its sign for each axis. */
-ISOGI_VOL__INLINE void isogi_vol__node_begins(int n, int64_t corner, int64_t backwards, double from[3], double step[3]) {
-    const double size = (double)((int64_t)1 << 2 * n);
-    int a;
-    for (a = 0; a < 3; a++) {
-        const int fall = (backwards >> 16 * a & 0xffff) != 0;
-        const int64_t at = corner >> 16 * a & 0xffff;
-        from[a] = (double)(fall ? (backwards >> 16 * a & 0xffff) + 1 - at : at), step[a] = fall ? -1 / size : 1 / size;
-    }
-}
+/* Rays of a packet as they go through cells that are counted backwards where they fall, hence upwards along all axes. */
+typedef struct __attribute__((aligned(64))) isogi_vol__packet {
+    double place[3][ISOGI_VOL__PACKET], way[3][ISOGI_VOL__PACKET];
+    __m512 at[3], dir[3], inverse[3], stop; /* the same in float; stop: a little more */
+    float padded;                           /* cells of the root */
+    int axis;                               /* on which they are fastest */
+} isogi_vol__packet;
 
-/* The rays in float, from where they begin. */
-typedef struct isogi_vol__rays16 {
-    __m512 origin[3], inverse[3], stop;
-    float padded; /* cells of the root */
-} isogi_vol__rays16;
-
-ISOGI_VOL__AVX512 ISOGI_VOL__INLINE void isogi_vol__set_rays16(isogi_vol__rays16 *r, const isogi_vol__pool *s, int levels) {
+ISOGI_VOL__AVX512 static void isogi_vol__set_packet(isogi_vol__packet *k, const isogi_vol__pool *s, int first, int64_t backwards,
+                                                    int levels) {
     const __m512d most = _mm512_set1_pd(1e28); /* finite in float times all cells squared */
-    int a;
+    int a, h;
 #pragma GCC unroll 3
     for (a = 0; a < 3; a++) {
-        r->origin[a] = isogi_vol__halves(_mm512_load_pd(&s->origin[a][0]), _mm512_load_pd(&s->origin[a][8]));
-        const __m512d low = _mm512_min_pd(_mm512_max_pd(_mm512_load_pd(&s->inverse[a][0]), _mm512_sub_pd(_mm512_setzero_pd(), most)), most);
-        const __m512d high =
-            _mm512_min_pd(_mm512_max_pd(_mm512_load_pd(&s->inverse[a][8]), _mm512_sub_pd(_mm512_setzero_pd(), most)), most);
-        r->inverse[a] = isogi_vol__halves(low, high);
+        const int64_t back = backwards >> 16 * a & 0xffff;
+        const __m512d unit = _mm512_set1_pd(back ? -1 : 1), corner = _mm512_set1_pd(back ? (double)(back + 1) : 0);
+        __m512d place[2], way[2], inverse[2];
+#pragma GCC unroll 2
+        for (h = 0; h < 2; h++) {
+            place[h] = _mm512_fmadd_pd(_mm512_load_pd(&s->origin[a][8 * h]), unit, corner);
+            way[h] = _mm512_abs_pd(_mm512_load_pd(&s->dir[a][8 * h]));
+            inverse[h] = _mm512_min_pd(_mm512_abs_pd(_mm512_load_pd(&s->inverse[a][8 * h])), most);
+            _mm512_store_pd(&k->place[a][8 * h], place[h]), _mm512_store_pd(&k->way[a][8 * h], way[h]);
+        }
+        k->at[a] = isogi_vol__halves(place[0], place[1]), k->dir[a] = isogi_vol__halves(way[0], way[1]);
+        k->inverse[a] = isogi_vol__halves(inverse[0], inverse[1]);
     }
-    r->stop = _mm512_mul_ps(isogi_vol__halves(_mm512_load_pd(&s->stop[0]), _mm512_load_pd(&s->stop[8])), _mm512_set1_ps(1.000001f));
-    r->padded = (float)(1 << 2 * levels);
+    k->stop = _mm512_mul_ps(isogi_vol__halves(_mm512_load_pd(&s->stop[0]), _mm512_load_pd(&s->stop[8])), _mm512_set1_ps(1.000001f));
+    k->padded = (float)(1 << 2 * levels);
+    k->axis = k->way[1][first] > k->way[0][first];
+    if (k->way[2][first] > k->way[k->axis][first]) k->axis = 2;
 }
 
-/* The layers of a node above the leaves. Times count from where the rays begin: these floats are off by less than 2^-21 of what the root
-   measures; children are widened by twice as much. */
-ISOGI_VOL__AVX512 ISOGI_VOL__INLINE void isogi_vol__open_layers(isogi_vol__layers *l, const isogi_vol__rays16 *r, int n, int64_t cell,
-                                                                int64_t backwards) {
-    const __m512 reach = _mm512_set1_ps(1e-6f * r->padded / (float)(1 << 2 * n));
-    double from[3], step[3];
+/* The layers of a node above the leaves; cell: its corner. Times count from where the rays begin: these floats are off by less than 2^-21
+   of what the root measures; children are widened by twice as much. */
+ISOGI_VOL__AVX512 ISOGI_VOL__INLINE void isogi_vol__open_layers(isogi_vol__layers *l, const isogi_vol__packet *k, int n, int64_t cell) {
+    const float size = (float)(1 << 2 * n);
+    const __m512 reach = _mm512_set1_ps(1e-6f * k->padded / size);
     int a;
-    isogi_vol__node_begins(n, cell, backwards, from, step);
 #pragma GCC unroll 3
     for (a = 0; a < 3; a++) {
-        const __m512 at = _mm512_mul_ps(_mm512_sub_ps(r->origin[a], _mm512_set1_ps((float)from[a])), _mm512_set1_ps((float)step[a]));
-        const __m512 per = _mm512_mul_ps(r->inverse[a], _mm512_set1_ps((float)(1 / step[a])));
+        const __m512 corner = _mm512_set1_ps((float)(cell >> 16 * a & 0xffff));
+        const __m512 at = _mm512_mul_ps(_mm512_sub_ps(k->at[a], corner), _mm512_set1_ps(1 / size));
+        const __m512 per = _mm512_mul_ps(k->inverse[a], _mm512_set1_ps(size));
         l->per[a] = per, l->first[a] = _mm512_mul_ps(_mm512_add_ps(at, reach), per),
         l->last[a] = _mm512_mul_ps(_mm512_sub_ps(at, reach), per);
     }
-    l->stop = r->stop;
+    l->stop = k->stop;
 }
 
-/* Those of a leaf, from where the rays come to it, so that their places in cells are exact. */
-ISOGI_VOL__AVX512 static void isogi_vol__open_cells(isogi_vol__layers *l, isogi_vol__places *places, const isogi_vol__pool *s, int64_t cell,
-                                                    int64_t backwards) {
-    const __m512 most = _mm512_set1_ps(1e30f), reach = _mm512_set1_ps(ISOGI_VOL__REACH);
-    double from[3], step[3];
-    __m512d zero[2];
-    __m512 stop;
+/* Those of a leaf, from where the rays come to its first plane on the axis on which they are fastest: rays that meet it are then next to
+   it, and their places in cells are exact. */
+ISOGI_VOL__AVX512 ISOGI_VOL__INLINE void isogi_vol__open_cells(isogi_vol__layers *l, __m512 place[3], const isogi_vol__packet *k,
+                                                               const isogi_vol__pool *s, int64_t cell) {
+    const __m512 reach = _mm512_set1_ps(ISOGI_VOL__REACH);
+    const __m512d plane = _mm512_set1_pd((double)(cell >> 16 * k->axis & 0xffff));
+    __m512d zero[2], left[2];
     int a, h;
-    isogi_vol__node_begins(0, cell, backwards, from, step);
 #pragma GCC unroll 2
     for (h = 0; h < 2; h++) {
-        zero[h] = _mm512_setzero_pd();
-#pragma GCC unroll 3
-        for (a = 0; a < 3; a++)
-            zero[h] = _mm512_max_pd(zero[h], _mm512_mul_pd(_mm512_sub_pd(_mm512_set1_pd(from[a]), _mm512_load_pd(&s->origin[a][8 * h])),
-                                                           _mm512_load_pd(&s->inverse[a][8 * h])));
-        zero[h] = _mm512_min_pd(zero[h], _mm512_load_pd(&s->stop[8 * h]));
+        const __m512d stop = _mm512_load_pd(&s->stop[8 * h]), inverse = _mm512_abs_pd(_mm512_load_pd(&s->inverse[k->axis][8 * h]));
+        zero[h] = _mm512_mul_pd(_mm512_sub_pd(plane, _mm512_load_pd(&k->place[k->axis][8 * h])), inverse);
+        zero[h] = _mm512_min_pd(_mm512_max_pd(zero[h], _mm512_setzero_pd()), stop);
+        left[h] = _mm512_sub_pd(stop, zero[h]);
     }
-    stop = isogi_vol__halves(_mm512_sub_pd(_mm512_load_pd(&s->stop[0]), zero[0]), _mm512_sub_pd(_mm512_load_pd(&s->stop[8]), zero[1]));
-    stop = _mm512_mul_ps(stop, _mm512_set1_ps(1.000001f));
 #pragma GCC unroll 3
     for (a = 0; a < 3; a++) {
-        const __m512d corner = _mm512_set1_pd(from[a]), unit = _mm512_set1_pd(step[a]); /* 1 or -1 */
-        const __m512d d0 = _mm512_load_pd(&s->dir[a][0]), d1 = _mm512_load_pd(&s->dir[a][8]);
-        const __m512d p0 = _mm512_mul_pd(_mm512_sub_pd(_mm512_fmadd_pd(zero[0], d0, _mm512_load_pd(&s->origin[a][0])), corner), unit);
-        const __m512d p1 = _mm512_mul_pd(_mm512_sub_pd(_mm512_fmadd_pd(zero[1], d1, _mm512_load_pd(&s->origin[a][8])), corner), unit);
-        const __m512 at = isogi_vol__halves(p0, p1);
-        const __m512 per = _mm512_min_ps(isogi_vol__halves(_mm512_mul_pd(_mm512_load_pd(&s->inverse[a][0]), unit),
-                                                           _mm512_mul_pd(_mm512_load_pd(&s->inverse[a][8]), unit)),
-                                         most);
+        const __m512d corner = _mm512_set1_pd((double)(cell >> 16 * a & 0xffff));
+        const __m512d p0 = _mm512_fmadd_pd(zero[0], _mm512_load_pd(&k->way[a][0]), _mm512_load_pd(&k->place[a][0]));
+        const __m512d p1 = _mm512_fmadd_pd(zero[1], _mm512_load_pd(&k->way[a][8]), _mm512_load_pd(&k->place[a][8]));
+        const __m512 at = isogi_vol__halves(_mm512_sub_pd(p0, corner), _mm512_sub_pd(p1, corner)), per = k->inverse[a];
         l->per[a] = per, l->first[a] = _mm512_mul_ps(_mm512_add_ps(at, reach), per),
         l->last[a] = _mm512_mul_ps(_mm512_sub_ps(at, reach), per);
-        places->at[a] = at, places->dir[a] = isogi_vol__halves(_mm512_mul_pd(d0, unit), _mm512_mul_pd(d1, unit));
+        place[a] = at;
     }
-    l->stop = stop;
+    l->stop = _mm512_mul_ps(isogi_vol__halves(left[0], left[1]), _mm512_set1_ps(1.000001f));
 }
 
 /* A layer's number comes from memory, which spreads it in passing. */
@@ -5409,6 +5396,17 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE __m512 isogi_vol__leave16(const isogi_vol__l
     return _mm512_fmsub_ps(_mm512_set1_ps(isogi_vol__layer_numbers[layer + 1]), l->per[axis], l->last[axis]);
 }
 
+/* When the rays enter a child, and when they leave it. */
+ISOGI_VOL__AVX512 ISOGI_VOL__INLINE __m512 isogi_vol__enter_child(const isogi_vol__layers *l, int child) {
+    return _mm512_max_ps(_mm512_max_ps(isogi_vol__enter16(l, 0, child & 3), _mm512_setzero_ps()),
+                         _mm512_max_ps(isogi_vol__enter16(l, 1, child >> 2 & 3), isogi_vol__enter16(l, 2, child >> 4)));
+}
+
+ISOGI_VOL__AVX512 ISOGI_VOL__INLINE __m512 isogi_vol__leave_child(const isogi_vol__layers *l, int child) {
+    return _mm512_min_ps(_mm512_min_ps(isogi_vol__leave16(l, 0, child & 3), l->stop),
+                         _mm512_min_ps(isogi_vol__leave16(l, 1, child >> 2 & 3), isogi_vol__leave16(l, 2, child >> 4)));
+}
+
 /* Cells of a leaf, for isovalue `step`: for which rays it is certain that they stay on one side. Like sides8, for one cell and many rays.
    */
 ISOGI_VOL__AVX512 ISOGI_VOL__INLINE __m512 isogi_vol__mix16(__m512 a, __m512 b, __m512 u) {
@@ -5417,8 +5415,8 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE __m512 isogi_vol__mix16(__m512 a, __m512 b, 
 
 typedef struct isogi_vol__sides16 { unsigned in, out, in0, out0, in1, out1; } isogi_vol__sides16;
 
-ISOGI_VOL__AVX512 ISOGI_VOL__INLINE void isogi_vol__look16(isogi_vol__sides16 *sides, const isogi_vol__places *places, __m512 enter,
-                                                           __m512 leave, int child, const __m512i voxel[2], float step) {
+ISOGI_VOL__AVX512 ISOGI_VOL__INLINE void isogi_vol__look16(isogi_vol__sides16 *sides, const __m512 place[3], const __m512 dir[3],
+                                                           __m512 enter, __m512 leave, int child, const __m512i voxel[2], float step) {
     static const uint8_t corners[16] = {0, 1, 5, 6, 25, 26, 30, 31};
     const __m512 zero = _mm512_setzero_ps(), one = _mm512_set1_ps(1);
     const __m512 low = _mm512_set1_ps(step - ISOGI_VOL__DOUBT), high = _mm512_set1_ps(step + ISOGI_VOL__DOUBT);
@@ -5432,9 +5430,9 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE void isogi_vol__look16(isogi_vol__sides16 *s
                                 _mm512_castsi512_si128(_mm512_permutex2var_epi8(voxel[0], _mm512_castsi128_si512(index), voxel[1])))));
 #pragma GCC unroll 3
     for (k = 0; k < 3; k++) {
-        const __m512 base = _mm512_sub_ps(places->at[k], _mm512_set1_ps((float)(k == 0 ? x : k == 1 ? y : z)));
-        from[k] = _mm512_min_ps(_mm512_max_ps(_mm512_fmadd_ps(enter, places->dir[k], base), zero), one);
-        to[k] = _mm512_min_ps(_mm512_max_ps(_mm512_fmadd_ps(leave, places->dir[k], base), zero), one);
+        const __m512 base = _mm512_sub_ps(place[k], _mm512_set1_ps((float)(k == 0 ? x : k == 1 ? y : z)));
+        from[k] = _mm512_min_ps(_mm512_max_ps(_mm512_fmadd_ps(enter, dir[k], base), zero), one);
+        to[k] = _mm512_min_ps(_mm512_max_ps(_mm512_fmadd_ps(leave, dir[k], base), zero), one);
     }
 #pragma GCC unroll 4
     for (k = 0; k < 4; k++) {
@@ -5523,105 +5521,148 @@ ISOGI_VOL__AVX512 static int isogi_vol__coincide(const isogi_vol__pool *s, unsig
     return 1;
 }
 
-/* The beam that holds all rays of a packet: along the axis on which they are fastest, counted like their cells, bounds of their places on
-   the next two axes, linear between its ends. (The least of linear functions lies above its chord.) */
+/* The beam that holds all rays of a packet: along the axis on which they are fastest, bounds of their places on the next two axes, linear
+   between its ends. (The least of linear functions lies above its chord.) */
 typedef struct __attribute__((aligned(64))) isogi_vol__beam {
-    float base[16], slope[16]; /* lower bounds, of four layers on each of both axes, then upper ones */
-    float from, to;            /* on the main axis */
-    int axis, second, third;
+    float base[16], slope[16];                 /* lower bounds on the next axis at 0, on the one after it at 4, then upper ones */
+    float from, to;                            /* on the main axis */
+    int axis, side[2];
+    const int32_t (*main[2])[16], (*other[2])[16]; /* layers of children in 16 lanes, of both pairs of axes */
+    uint64_t places[2], copies[2];             /* where children are whose two layers a lane stands for */
 } isogi_vol__beam;
 
-ISOGI_VOL__AVX512 static void isogi_vol__set_beam(isogi_vol__beam *beam, const isogi_vol__pool *s, unsigned rays, int64_t backwards,
-                                                  int levels) {
-    static const int after[5] = {0, 1, 2, 0, 1};
-    const int first = __builtin_ctz(rays);
-    __m512d place[3][2], way[3][2];
-    const double slack = (double)(1 << 2 * levels) / 1048576; /* floats are off by less than half of this */
-    double length, begin = 1e9, end = -1e9;
-    int a, h, e;
-    beam->axis = fabs(s->dir[1][first]) > fabs(s->dir[0][first]);
-    if (fabs(s->dir[2][first]) > fabs(s->dir[beam->axis][first])) beam->axis = 2;
-    beam->second = after[beam->axis + 1], beam->third = after[beam->axis + 2];
-    for (a = 0; a < 3; a++)
-        for (h = 0; h < 2; h++) {
-            const int64_t back = backwards >> 16 * after[beam->axis + a] & 0xffff;
-            const __m512d origin = _mm512_load_pd(&s->origin[after[beam->axis + a]][8 * h]);
-            place[a][h] = back ? _mm512_sub_pd(_mm512_set1_pd((double)(back + 1)), origin) : origin;
-            way[a][h] = _mm512_abs_pd(_mm512_load_pd(&s->dir[after[beam->axis + a]][8 * h]));
-        }
-    for (h = 0; h < 2; h++) {
-        const __mmask8 here = (__mmask8)(rays >> 8 * h);
-        const __m512d to = _mm512_fmadd_pd(_mm512_load_pd(&s->stop[8 * h]), way[0][h], place[0][h]);
-        begin = isogi_vol__min(begin, _mm512_mask_reduce_min_pd(here, place[0][h])),
-        end = isogi_vol__max(end, _mm512_mask_reduce_max_pd(here, to));
-    }
-    length = isogi_vol__max(end - begin, 1e-3), beam->from = (float)begin, beam->to = (float)end;
-    for (a = 1; a < 3; a++) {
-        double least[2] = {1e9, 1e9}, most[2] = {-1e9, -1e9};
-        for (h = 0; h < 2; h++)
-            for (e = 0; e < 2; e++) {
-                const __mmask8 here = (__mmask8)(rays >> 8 * h);
-                const __m512d on = _mm512_sub_pd(_mm512_set1_pd(begin + (e ? length : 0)), place[0][h]);
-                const __m512d at = _mm512_fmadd_pd(_mm512_maskz_div_pd(here, way[a][h], way[0][h]), on, place[a][h]);
-                least[e] = isogi_vol__min(least[e], _mm512_mask_reduce_min_pd(here, at)),
-                most[e] = isogi_vol__max(most[e], _mm512_mask_reduce_max_pd(here, at));
-            }
-        for (h = 4 * a - 4; h < 4 * a; h++) {
-            beam->base[h] = (float)(least[0] - slack), beam->slope[h] = (float)((least[1] - least[0]) / length);
-            beam->base[8 + h] = (float)(most[0] + slack), beam->slope[8 + h] = (float)((most[1] - most[0]) / length);
-        }
-    }
+/* The largest of each of eight vectors: of the first four in lane 0 of a row of four each, of the others in lane 1. */
+ISOGI_VOL__AVX512 ISOGI_VOL__INLINE __m512 isogi_vol__largest_of(const __m512 v[8]) {
+    __m512 two[4], four[2], eight;
+    int i;
+#pragma GCC unroll 4
+    for (i = 0; i < 4; i++)
+        two[i] = _mm512_max_ps(_mm512_shuffle_f32x4(v[2 * i], v[2 * i + 1], 0x44), _mm512_shuffle_f32x4(v[2 * i], v[2 * i + 1], 0xee));
+#pragma GCC unroll 2
+    for (i = 0; i < 2; i++)
+        four[i] = _mm512_max_ps(_mm512_shuffle_f32x4(two[2 * i], two[2 * i + 1], 0x88),
+                                _mm512_shuffle_f32x4(two[2 * i], two[2 * i + 1], 0xdd));
+    eight = _mm512_max_ps(_mm512_unpacklo_ps(four[0], four[1]), _mm512_unpackhi_ps(four[0], four[1]));
+    return _mm512_max_ps(eight, _mm512_permute_ps(eight, 0x4e));
 }
 
-/* Children whose numbers on axis 0, 1, 2 are in a set of four. */
-#define ISOGI_VOL__SETS(f) f(0), f(1), f(2), f(3), f(4), f(5), f(6), f(7), f(8), f(9), f(10), f(11), f(12), f(13), f(14), f(15)
-#define ISOGI_VOL__SET(m, one, step) (((m) & 1 ? (one) : 0) | ((m) & 2 ? (one) << (step) : 0) | ((m) & 4 ? (one) << 2 * (step) : 0) | \
-    ((m) & 8 ? (one) << 3 * (step) : 0))
-#define ISOGI_VOL__SET_X(m) ISOGI_VOL__SET(m, (uint64_t)0x1111111111111111u, 1)
-#define ISOGI_VOL__SET_Y(m) ISOGI_VOL__SET(m, (uint64_t)0x000f000f000f000fu, 4)
-#define ISOGI_VOL__SET_Z(m) ISOGI_VOL__SET(m, (uint64_t)0xffffu, 16)
-static const uint64_t isogi_vol__sets[3][16] = {
-    {ISOGI_VOL__SETS(ISOGI_VOL__SET_X)}, {ISOGI_VOL__SETS(ISOGI_VOL__SET_Y)}, {ISOGI_VOL__SETS(ISOGI_VOL__SET_Z)}};
-static const uint64_t isogi_vol__layer_sets[3][4] = {{ISOGI_VOL__SET_X(1), ISOGI_VOL__SET_X(2), ISOGI_VOL__SET_X(4), ISOGI_VOL__SET_X(8)},
-                                                     {ISOGI_VOL__SET_Y(1), ISOGI_VOL__SET_Y(2), ISOGI_VOL__SET_Y(4), ISOGI_VOL__SET_Y(8)},
-                                                     {ISOGI_VOL__SET_Z(1), ISOGI_VOL__SET_Z(2), ISOGI_VOL__SET_Z(4), ISOGI_VOL__SET_Z(8)}};
-#undef ISOGI_VOL__SETS
-#undef ISOGI_VOL__SET
-#undef ISOGI_VOL__SET_X
-#undef ISOGI_VOL__SET_Y
-#undef ISOGI_VOL__SET_Z
-
-/* Those of four sets, one a lane. */
-ISOGI_VOL__AVX512 ISOGI_VOL__INLINE __m512i isogi_vol__in_sets(int axis, __m128i sets) {
-    const uint64_t *all = isogi_vol__sets[axis];
-    return _mm512_permutex2var_epi64(_mm512_loadu_si512(all), _mm512_castsi256_si512(_mm256_cvtepu32_epi64(sets)),
-                                     _mm512_loadu_si512(all + 8));
+ISOGI_VOL__AVX512 ISOGI_VOL__INLINE void isogi_vol__set_beam(isogi_vol__beam *beam, const isogi_vol__packet *k,
+                                                                const struct isogi_vol__ways *ways, unsigned rays) {
+    static const int after[5] = {0, 1, 2, 0, 1};
+    static const uint64_t places[3] = {0xffff, 0x000f000f000f000fu, 0x1111111111111111u}, copies[3] = {0x0001000100010001u, 0x1111, 0xf};
+    const __m512 slack = _mm512_set1_ps(k->padded * 2e-6f), sign = _mm512_set1_ps(-0.0f); /* floats are off by less than half of this */
+    const __m512i lane = _mm512_mask_mov_epi32(_mm512_set1_epi32(__builtin_ctz(rays)), (__mmask16)rays,
+                                               _mm512_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15));
+    const int axis = k->axis;
+    const __m512 main = _mm512_permutexvar_ps(lane, k->at[axis]), way = _mm512_permutexvar_ps(lane, k->dir[axis]);
+    const __m512 to = _mm512_fmadd_ps(_mm512_permutexvar_ps(lane, k->stop), way, main), per = _mm512_div_ps(_mm512_set1_ps(1), way);
+    const float from = _mm512_reduce_min_ps(main), end = _mm512_reduce_max_ps(to);
+    const float length = end - from > 1e-3f ? end - from : 1e-3f;
+    const __m512 begins = _mm512_sub_ps(_mm512_set1_ps(from), main), ends = _mm512_add_ps(begins, _mm512_set1_ps(length));
+    __m512 bound[8], base, slope;
+    int a;
+    beam->axis = axis, beam->from = from, beam->to = end;
+#pragma GCC unroll 2
+    for (a = 0; a < 2; a++) {
+        const __m512 at = _mm512_permutexvar_ps(lane, k->at[after[axis + 1 + a]]);
+        const int rows = axis > 1 - a; /* layers of the main axis are in rows of four lanes, those of the other down these, or vice versa */
+        beam->side[a] = after[axis + 1 + a], beam->main[a] = rows ? ways->row : ways->lane, beam->other[a] = rows ? ways->lane : ways->row;
+        beam->places[a] = places[axis + beam->side[a] - 1], beam->copies[a] = copies[axis + beam->side[a] - 1];
+        slope = _mm512_mul_ps(_mm512_permutexvar_ps(lane, k->dir[beam->side[a]]), per);
+        bound[2 + a] = _mm512_fmadd_ps(slope, begins, at), bound[6 + a] = _mm512_fmadd_ps(slope, ends, at);
+        bound[a] = _mm512_xor_ps(bound[2 + a], sign), bound[4 + a] = _mm512_xor_ps(bound[6 + a], sign);
+    }
+    base = isogi_vol__largest_of(bound);
+    slope = _mm512_mul_ps(_mm512_sub_ps(_mm512_permute_ps(base, 0x55), _mm512_permute_ps(base, 0)), _mm512_set1_ps(1 / length));
+    base = _mm512_add_ps(_mm512_fnmadd_ps(slope, _mm512_set1_ps(from), _mm512_permute_ps(base, 0)), slack);
+    _mm512_store_ps(beam->base, _mm512_mask_xor_ps(base, 0x00ff, base, sign));
+    _mm512_store_ps(beam->slope, _mm512_mask_xor_ps(slope, 0x00ff, slope, sign));
 }
 
 /* Children of a node of level n that the beam may meet; cell: its corner, counted backwards. */
-ISOGI_VOL__AVX512 ISOGI_VOL__INLINE uint64_t isogi_vol__in_beam(const isogi_vol__beam *beam, int n, int64_t cell) {
-    const float size = (float)(1 << 2 * n);
-    const __m512 low = _mm512_set1_ps(beam->from), upper = _mm512_setr_ps(0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1);
-    const __m512 plane = _mm512_fmadd_ps(_mm512_setr_ps(0, 1, 2, 3, 0, 1, 2, 3, 1, 2, 3, 4, 1, 2, 3, 4), _mm512_set1_ps(size),
-                                         _mm512_set1_ps((float)(cell >> 16 * beam->axis & 0xffff)));
-    const __m512 side = _mm512_mask_blend_ps(0xf0f0, _mm512_set1_ps((float)(cell >> 16 * beam->second & 0xffff)),
-                                             _mm512_set1_ps((float)(cell >> 16 * beam->third & 0xffff)));
-    const __m512 way = _mm512_sub_ps(_mm512_min_ps(_mm512_max_ps(plane, low), _mm512_set1_ps(beam->to)), low);
-    __m512 bound = _mm512_sub_ps(_mm512_fmadd_ps(way, _mm512_load_ps(beam->slope), _mm512_load_ps(beam->base)), side);
-    __m512i bits, met;
-    __m256i first, rows, met4;
-    __m128i met2;
-    bound = _mm512_fmadd_ps(bound, _mm512_set1_ps(1 / size), upper);
-    bound = _mm512_min_ps(_mm512_max_ps(bound, _mm512_setzero_ps()), _mm512_set1_ps(4));
-    bits = _mm512_sllv_epi32(_mm512_set1_epi32(1), _mm512_cvttps_epi32(bound));
-    first = _mm512_castsi512_si256(bits);
-    rows = _mm256_sub_epi32(_mm256_max_epu32(_mm512_extracti64x4_epi64(bits, 1), first), first);
-    met = _mm512_and_si512(isogi_vol__in_sets(beam->second, _mm256_castsi256_si128(rows)),
-                           isogi_vol__in_sets(beam->third, _mm256_extracti128_si256(rows, 1)));
-    met4 =
-        _mm256_and_si256(_mm512_castsi512_si256(met), _mm256_loadu_si256((const __m256i *)(const void *)isogi_vol__layer_sets[beam->axis]));
-    met2 = _mm_or_si128(_mm256_castsi256_si128(met4), _mm256_extracti128_si256(met4, 1));
-    return (uint64_t)_mm_cvtsi128_si64(_mm_or_si128(met2, _mm_unpackhi_epi64(met2, met2)));
+ISOGI_VOL__AVX512 ISOGI_VOL__INLINE uint64_t isogi_vol__in_beam(const isogi_vol__beam *beam, const struct isogi_vol__ways *ways, int n,
+                                                                int64_t cell) {
+    const __m512i corner = _mm512_castsi128_si512(_mm_cvtsi64_si128(cell));
+    const __m512 size = _mm512_set1_ps(ways->size[n]), from = _mm512_set1_ps(beam->from), to = _mm512_set1_ps(beam->to);
+    uint64_t met[2];
+    int a;
+#pragma GCC unroll 2
+    for (a = 0; a < 2; a++) {
+        const __m512 begin = isogi_vol__layers16(corner, beam->axis, beam->main[a][n]), end = _mm512_add_ps(begin, size);
+        const __m512 side = isogi_vol__layers16(corner, beam->side[a], beam->other[a][n]);
+        const __m512 lower = _mm512_fmadd_ps(_mm512_min_ps(_mm512_max_ps(begin, from), to), _mm512_set1_ps(beam->slope[4 * a]),
+                                             _mm512_set1_ps(beam->base[4 * a]));
+        const __m512 upper = _mm512_fmadd_ps(_mm512_min_ps(_mm512_max_ps(end, from), to), _mm512_set1_ps(beam->slope[8 + 4 * a]),
+                                             _mm512_set1_ps(beam->base[8 + 4 * a]));
+        const unsigned lanes = _mm512_cmp_ps_mask(lower, _mm512_add_ps(side, size), _CMP_LE_OQ) &
+                               _mm512_cmp_ps_mask(upper, side, _CMP_GE_OQ);
+        met[a] = _pdep_u64(lanes, beam->places[a]) * beam->copies[a];
+    }
+    return met[0] & met[1];
+}
+
+/* What is known of rays that go together, a bit each. */
+typedef struct __attribute__((aligned(64))) isogi_vol__known {
+    int64_t doubted[ISOGI_VOL__PACKET]; /* cells of those in doubt; those of hits stand in the slots */
+    unsigned active, doubts, hits;      /* going on; that have come to a cell in doubt, without waiting for what it says; that have
+                                           certainly passed the surface */
+    unsigned alone;                     /* have not, though: they only came near the cell in which they did */
+    unsigned in, out;                   /* the side on which they are; what is certain of cells that they came near */
+    unsigned seen_in, seen_out;
+} isogi_vol__known;
+
+/* Works out what rays in doubt find in their cells, and the hits, each ray's first one first. */
+ISOGI_VOL__AVX512 static void isogi_vol__settle_all(isogi_vol__batch *b, isogi_vol__pool *s, isogi_vol__known *k, unsigned hits) {
+    const unsigned doubts = b->hits ? k->doubts : k->doubts & ~k->hits, both = doubts & hits;
+    __m512i later[2];
+    unsigned found;
+    int h;
+    k->doubts = 0, k->hits &= ~hits;
+    if (!(doubts | hits)) return;
+    for (h = 0; h < 2; h++) {
+        later[h] = _mm512_load_si512(&s->cell[8 * h]);
+        _mm512_store_si512(&s->cell[8 * h], _mm512_mask_mov_epi64(later[h], (__mmask8)(doubts >> 8 * h),
+                                                                  _mm512_load_si512(&k->doubted[8 * h])));
+    }
+    found = isogi_vol__settle(b, s, doubts | hits, &k->in, &k->out);
+    if (k->hits & ~hits || both & ~found)
+        for (h = 0; h < 2; h++) _mm512_store_si512(&s->cell[8 * h], later[h]);
+    if (both & ~found) found |= isogi_vol__settle(b, s, both & ~found, &k->in, &k->out);
+    k->active &= ~found, k->alone |= hits & ~found, k->hits &= ~found;
+}
+
+/* Goes through the cells of a leaf that can hold the surface; cell: its corner. */
+ISOGI_VOL__AVX512 ISOGI_VOL__INLINE void isogi_vol__look_in_leaf(isogi_vol__batch *b, isogi_vol__pool *s, const isogi_vol__packet *p,
+                                                                 isogi_vol__known *k, const isogi_vol__leaf *leaf, const __m512i voxel[2],
+                                                                 uint64_t mask, unsigned met, int64_t cell, int64_t backwards) {
+    isogi_vol__layers l;
+    __m512 place[3];
+    isogi_vol__open_cells(&l, place, p, s, cell);
+    for (; mask; mask &= mask - 1) {
+        const int child = __builtin_ctzll(mask);
+        const int64_t here = (cell | (int64_t)_pdep_u64((uint64_t)child, 0x000300030003u)) ^ backwards;
+        const __m512 enter = isogi_vol__enter_child(&l, child), leave = isogi_vol__leave_child(&l, child);
+        unsigned lanes = met & k->active, hit, doubt;
+        isogi_vol__sides16 sides;
+        if (!lanes) return;
+        lanes &= _mm512_cmp_ps_mask(enter, leave, _CMP_LE_OQ);
+        isogi_vol__look16(&sides, place, p->dir, enter, leave, child, voxel, leaf->isovalue);
+        hit = lanes & ((sides.out1 & (k->seen_in | sides.in0)) | (sides.in1 & (k->seen_out | sides.out0)));
+        sides.in &= lanes & ~k->out, sides.out &= lanes & ~k->in, doubt = lanes & ~(hit | sides.in | sides.out);
+        k->seen_in |= sides.in, k->seen_out |= sides.out;
+        b->work.cells += (uint64_t)__builtin_popcount(lanes);
+        if (b->hits) isogi_vol__send_for(&b->pyramid->volume, here, 1);
+        if (ISOGI_VOL__UNLIKELY(doubt & k->doubts)) isogi_vol__settle_all(b, s, k, 0), hit &= k->active, doubt &= k->active;
+        _mm512_mask_store_epi64(&s->cell[0], (__mmask8)hit, _mm512_set1_epi64(here));
+        _mm512_mask_store_epi64(&s->cell[8], (__mmask8)(hit >> 8), _mm512_set1_epi64(here));
+        k->hits |= hit, k->active &= ~hit;
+        if (doubt) {
+            _mm512_mask_store_epi64(&k->doubted[0], (__mmask8)doubt, _mm512_set1_epi64(here));
+            _mm512_mask_store_epi64(&k->doubted[8], (__mmask8)(doubt >> 8), _mm512_set1_epi64(here));
+            k->doubts |= doubt;
+        }
+        if (!(k->active & ~k->doubts)) isogi_vol__settle_all(b, s, k, b->hits ? k->hits : 0);
+    }
 }
 
 /* Traces the rays in a pool's first slots, which coincide; the lowest level that has children left first, as walk_one does. */
@@ -5634,87 +5675,62 @@ ISOGI_VOL__AVX512 ISOGI_VOL__NOINLINE static void isogi_vol__trace_packet(isogi_
     const int64_t backwards = (int64_t)((_pdep_u64((uint64_t)octant, 0x000100010001u)) * (((uint64_t)1 << 2 * p->node_levels) - 1));
     const uint8_t *children[ISOGI_VOL__NODE_LEVELS], *node = p->nodes[p->node_level[p->node_levels - 1].first];
     uint64_t left[ISOGI_VOL__NODE_LEVELS];
-    unsigned met[ISOGI_VOL__NODE_LEVELS], active = rays, lanes = rays, in = 0, out = 0, seen_in = 0, seen_out = 0, hits = 0;
+    unsigned met[ISOGI_VOL__NODE_LEVELS], lanes = rays, pending = 0;
     isogi_vol__layers layers[ISOGI_VOL__NODE_LEVELS];
-    isogi_vol__rays16 floats;
-    isogi_vol__places places;
+    isogi_vol__packet packet;
     isogi_vol__beam beam;
-    isogi_vol__leaf leaf;
-    __m512i voxel[2] = {_mm512_setzero_si512(), _mm512_setzero_si512()};
+    isogi_vol__known known;
     int64_t cell = 0; /* corner of the node, counted backwards */
     int n = p->node_levels - 1;
-    isogi_vol__set_beam(&beam, s, rays, backwards, p->node_levels);
-    isogi_vol__set_rays16(&floats, s, p->node_levels);
+    memset(&known, 0, sizeof known), known.active = rays;
+    isogi_vol__set_packet(&packet, s, first, backwards, p->node_levels);
+    isogi_vol__set_beam(&beam, &packet, ways, rays);
     for (;;) {
         /* a node is opened */
+        uint64_t mask = isogi_vol__in_beam(&beam, ways, n, cell);
         b->work.blocks += (uint64_t)__builtin_popcount(lanes);
-        met[n] = lanes, left[n] = isogi_vol__in_beam(&beam, n, cell);
-        if (n) left[n] &= isogi_vol__held(ways, octant, low, high, node);
-        else {
-            const uint64_t held = isogi_vol__held_cells(ways, octant, &leaf, node, level, voxel);
-            left[0] &= isogi_vol__cut_order(&leaf, octant, held);
-        }
-        if (left[n]) {
-            if (n) isogi_vol__open_layers(&layers[n], &floats, n, cell, backwards);
-            else isogi_vol__open_cells(&layers[0], &places, s, cell, backwards);
-            if (n) {
-                const isogi_vol__node_level *below = &p->node_level[n - 1];
-                const int64_t at = cell ^ backwards;
-                const int shift = 2 * n + 2;
+        if (n) {
+            const isogi_vol__node_level *below = &p->node_level[n - 1];
+            const int64_t at = cell ^ backwards;
+            const int shift = 2 * n + 2;
+            mask &= isogi_vol__held(ways, octant, low, high, node);
+            if (mask) {
+                met[n] = lanes, left[n] = mask, pending |= 1u << n;
+                isogi_vol__open_layers(&layers[n], &packet, n, cell);
                 children[n] = p->nodes[below->first + 64 * ((size_t)(at & 0xffff) >> shift) +
                                        64 * below->parents[0] *
                                            (((size_t)(at >> 16 & 0xffff) >> shift) + below->parents[1] * ((size_t)(at >> 32) >> shift))];
             }
+        } else {
+            isogi_vol__leaf leaf;
+            __m512i voxel[2];
+            const uint64_t held = isogi_vol__held_cells(ways, octant, &leaf, node, level, voxel);
+            mask &= isogi_vol__cut_order(&leaf, octant, held);
+            if (mask) isogi_vol__look_in_leaf(b, s, &packet, &known, &leaf, voxel, mask, lanes, cell, backwards);
         }
         /* on to the next child that some rays meet */
-        for (;;) {
-            const isogi_vol__layers *l;
-            __m512 enter, leave;
+        for (lanes = 0; !lanes;) {
             int child;
-            while (!(lanes = met[n] & active) || !left[n])
-                if (++n == p->node_levels) goto out;
-            l = &layers[n];
+            if (!pending || !known.active) goto out;
+            n = __builtin_ctz(pending), lanes = met[n] & known.active;
             child = __builtin_ctzll(left[n]), left[n] &= left[n] - 1;
-            enter = _mm512_max_ps(isogi_vol__enter16(l, 0, child & 3), _mm512_setzero_ps()),
-            leave = _mm512_min_ps(isogi_vol__leave16(l, 0, child & 3), l->stop);
-            enter = _mm512_max_ps(enter, _mm512_max_ps(isogi_vol__enter16(l, 1, child >> 2 & 3), isogi_vol__enter16(l, 2, child >> 4)));
-            leave = _mm512_min_ps(leave, _mm512_min_ps(isogi_vol__leave16(l, 1, child >> 2 & 3), isogi_vol__leave16(l, 2, child >> 4)));
-            lanes &= _mm512_cmp_ps_mask(enter, leave, _CMP_LE_OQ);
-            if (!lanes) continue;
-            cell = (int64_t)(((uint64_t)cell & 0x0000ffffffffffffu & ~(0x000100010001u * ((4u << 2 * n) - 1))) |
-                             _pdep_u64((uint64_t)child, 0x000300030003u) << 2 * n);
-            if (n) {
-                node = children[n] + 128 * (child ^ flip);
-                break;
-            } else {
-                isogi_vol__sides16 sides;
-                unsigned hit, doubt;
-                isogi_vol__look16(&sides, &places, enter, leave, child, voxel, leaf.isovalue);
-                hit = lanes & ((sides.out1 & (seen_in | sides.in0)) | (sides.in1 & (seen_out | sides.out0)));
-                sides.in &= lanes & ~out, sides.out &= lanes & ~in, doubt = lanes & ~(hit | sides.in | sides.out);
-                seen_in |= sides.in, seen_out |= sides.out;
-                b->work.cells += (uint64_t)__builtin_popcount(lanes);
-                /* what is certain to be a hit is worked out at the end, all at once */
-                if (!b->occluded || doubt)
-                    for (child = 0; child < 2; child++)
-                        _mm512_mask_store_epi64(&s->cell[8 * child], (__mmask8)((hit | doubt) >> 8 * child),
-                                                _mm512_set1_epi64(cell ^ backwards));
-                if (hit && b->hits) isogi_vol__send_for(&p->volume, cell ^ backwards, 1);
-                hits |= hit, active &= ~hit;
-                if (doubt) active &= ~isogi_vol__settle(b, s, doubt, &in, &out);
-            }
+            if (!left[n] || !lanes) pending &= pending - 1;
+            lanes &= _mm512_cmp_ps_mask(isogi_vol__enter_child(&layers[n], child), isogi_vol__leave_child(&layers[n], child), _CMP_LE_OQ);
+            cell = (int64_t)(((uint64_t)cell & ways->above[n]) | _pdep_u64((uint64_t)child, ways->digit[n]));
+            node = children[n] + 128 * (child ^ flip);
+            isogi_vol__fetch_node(children[n] + 128 * (__builtin_ctzll(left[n] ? left[n] : (uint64_t)1 << child) ^ flip));
         }
         n--;
     }
 out:
-    if (b->hits && hits) hits &= ~isogi_vol__settle(b, s, hits, &in, &out);
+    isogi_vol__settle_all(b, s, &known, b->hits ? known.hits : 0);
     for (; rays; rays &= rays - 1) {
         const int slot = __builtin_ctz(rays);
         const uint64_t ray = s->ray[slot];
         s->level[slot] = -1;
-        if (b->occluded) b->occluded[ray] = !(active >> slot & 1);
-        else if (active >> slot & 1) memset(&b->hits[ray], 0, sizeof b->hits[0]);
-        else if (hits >> slot & 1) b->work.rays--, isogi_vol__trace_one(b, ray); /* what it hits is next to the cell that it came near */
+        if (b->occluded) b->occluded[ray] = !(known.active >> slot & 1);
+        else if (known.active >> slot & 1) memset(&b->hits[ray], 0, sizeof b->hits[0]);
+        else if (known.alone >> slot & 1) b->work.rays--, isogi_vol__trace_one(b, ray); /* what it hits is next to that cell */
     }
 }
 
@@ -5845,13 +5861,14 @@ ISOGI_VOL__INLINE void isogi_vol__send_for_rays(const char *from, size_t element
    Returns the rays that have a slot now; *odd: those that are left to the code for one. The others miss the box. turn: of a pool, in
    which rays do not stay at the root if they begin in one place, or NULL. alike: rays differ in nothing but direction, as in a bundle. A kernel, longer
    than a screen: nothing in it is worth a name of its own. */
-ISOGI_VOL__AVX512 static unsigned isogi_vol__seat8(isogi_vol__batch *b, isogi_vol__turn *turn, isogi_vol__pool *s, size_t first, int count,
-                                                   const uint8_t *seats, int alike, unsigned *odd) {
+ISOGI_VOL__AVX512 ISOGI_VOL__INLINE unsigned isogi_vol__seat_some(isogi_vol__batch *b, isogi_vol__turn *turn, isogi_vol__pool *s,
+                                                                  size_t first, int count, const uint8_t *seats, int whole, int alike,
+                                                                  unsigned *odd) {
     const isogi_pyramid *p = b->pyramid;
     const __mmask8 lanes = (__mmask8)((1u << count) - 1);
     const __m512i lane = _mm512_maskz_mov_epi64(lanes, _mm512_set_epi64(7, 6, 5, 4, 3, 2, 1, 0)), none = _mm512_setzero_si512();
-    const int whole = seats[0] % 8 == 0 && seats[count - 1] == seats[0] + count - 1; /* a row of slots is stored at once */
     const isogi_vol__spots spots = isogi_vol__spots8(s, seats);
+    char *const row = spots.at[0];
     const size_t element = b->rays ? sizeof *b->rays : sizeof *b->starts,
                  dir_bytes = b->bundle || !b->rays ? sizeof *b->dirs : sizeof *b->rays;
     const char *from = b->rays ? (const char *)(b->rays + (b->bundle ? 0 : first)) : (const char *)(b->starts + (b->bundle ? 0 : first));
@@ -5977,7 +5994,7 @@ ISOGI_VOL__AVX512 static unsigned isogi_vol__seat8(isogi_vol__batch *b, isogi_vo
     meets = (__mmask8)(meets & good);
 #define ISOGI_VOL__PUT(member, value)                                                           \
     do {                                                                                        \
-        if (whole) _mm512_mask_store_epi64(&s->member[seats[0]], lanes, value);                 \
+        if (whole) _mm512_mask_store_epi64(row + ISOGI_VOL__ROW_OF(member), lanes, value);      \
         else isogi_vol__put8(&spots, ISOGI_VOL__ROW_OF(member), value);                         \
     } while (0)
 #define ISOGI_VOL__PUT_REAL(member, value) ISOGI_VOL__PUT(member, _mm512_castpd_si512(value))
@@ -6020,6 +6037,19 @@ ISOGI_VOL__AVX512 static unsigned isogi_vol__seat8(isogi_vol__batch *b, isogi_vo
                              _mm512_or_si512(_mm512_castpd_si512(stop), _mm512_set1_epi64(3)), flip);
     b->work.rays += (uint64_t)__builtin_popcount((unsigned)(lanes & good));
     return meets;
+}
+
+ISOGI_VOL__AVX512 static unsigned isogi_vol__seat8(isogi_vol__batch *b, isogi_vol__turn *turn, isogi_vol__pool *s, size_t first, int count,
+                                                   const uint8_t *seats, unsigned *odd) {
+    const int whole = seats[0] % 8 == 0 && seats[count - 1] == seats[0] + count - 1; /* a row of slots is stored at once */
+    return isogi_vol__seat_some(b, turn, s, first, count, seats, whole, b->bundle, odd);
+}
+
+/* Sixteen rays that differ in nothing but direction, into the first slots. */
+ISOGI_VOL__AVX512 static unsigned isogi_vol__seat_alike(isogi_vol__batch *b, isogi_vol__pool *s, size_t first, unsigned odd[2]) {
+    static const uint8_t seats[16] = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15};
+    const unsigned low = isogi_vol__seat_some(b, NULL, s, first, 8, seats, 1, 1, &odd[0]);
+    return low | isogi_vol__seat_some(b, NULL, s, first + 8, 8, seats + 8, 1, 1, &odd[1]) << 8;
 }
 
 /* ---- a pool of rays ---- */
@@ -6135,7 +6165,7 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE uint64_t isogi_vol__fill_pool(isogi_vol__bat
             const __m128i all = _mm512_castsi512_si128(_mm512_maskz_compress_epi8(open, _mm512_load_si512(b->pyramid->ways->child[0])));
             _mm_storeu_si128((__m128i *)(void *)list, _mm_mask_mov_epi8(_mm_broadcastb_epi8(all), (__mmask16)((1u << n) - 1), all));
         }
-        seated = isogi_vol__seat8(b, turn, s, *next, n, list, b->bundle, &odd);
+        seated = isogi_vol__seat8(b, turn, s, *next, n, list, &odd);
         for (k = 0; k < n; k++, ++*next) {
             if (seated >> k & 1 || (odd >> k & 1 && isogi_vol__seat_odd(b, s, *next, list[k]))) open &= ~((uint64_t)1 << list[k]);
             else if (odd >> k & 1) continue;
@@ -6210,22 +6240,26 @@ ISOGI_VOL__AVX512 static void isogi_vol__clear_pool(isogi_vol__pool *s, int firs
     for (i = 8 * first; i < 8 * groups; i++) s->level[i] = -1, s->address[i] = (uint64_t)(uintptr_t)p->nodes;
 }
 
-/* Whether rays differ in nothing but direction. */
-ISOGI_VOL__AVX512 static int isogi_vol__alike(const isogi_ray *rays, int count) {
+/* Whether sixteen rays differ in nothing but direction. */
+ISOGI_VOL__AVX512 static int isogi_vol__alike(const isogi_ray *rays) {
     const __m512i first = _mm512_loadu_si512(rays);
     __m512i other = _mm512_setzero_si512();
     int i;
     if (sizeof *rays != 64 || offsetof(isogi_ray, dir) != 24) return 0;
-    for (i = 1; i < count; i++) other = _mm512_ternarylogic_epi64(other, first, _mm512_loadu_si512(rays + i), 0xf6);
+#pragma GCC unroll 15
+    for (i = 1; i < ISOGI_VOL__PACKET; i++) other = _mm512_ternarylogic_epi64(other, first, _mm512_loadu_si512(rays + i), 0xf6);
     return !(_mm512_test_epi32_mask(other, other) & ~0x01c0);
 }
 
 /* The next eight to sixteen rays into the first slots of a pool without rays; returns those that have one. */
 ISOGI_VOL__AVX512 ISOGI_VOL__INLINE unsigned isogi_vol__seat_packet(isogi_vol__batch *b, isogi_vol__pool *s, size_t next, int count) {
     static const uint8_t list[16] = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15};
-    const int alike = b->bundle || isogi_vol__alike(b->rays + next, count);
-    unsigned odd[2] = {0, 0}, rays = isogi_vol__seat8(b, NULL, s, next, 8, list, alike, &odd[0]), rest;
-    if (count > 8) rays |= isogi_vol__seat8(b, NULL, s, next + 8, count - 8, list + 8, alike, &odd[1]) << 8;
+    unsigned odd[2] = {0, 0}, rays, rest;
+    if (count == ISOGI_VOL__PACKET && !b->bundle && isogi_vol__alike(b->rays + next)) rays = isogi_vol__seat_alike(b, s, next, odd);
+    else {
+        rays = isogi_vol__seat8(b, NULL, s, next, 8, list, &odd[0]);
+        if (count > 8) rays |= isogi_vol__seat8(b, NULL, s, next + 8, count - 8, list + 8, &odd[1]) << 8;
+    }
     for (rest = ~rays & ((1u << count) - 1); rest; rest &= rest - 1) {
         const int k = __builtin_ctz(rest);
         if ((odd[0] | odd[1] << 8) >> k & 1) rays |= (unsigned)isogi_vol__seat_odd(b, s, next + (size_t)k, k) << k;

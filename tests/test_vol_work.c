@@ -185,7 +185,8 @@ TEST(rays_side_by_side_hit_what_they_hit_alone) {
             isogi_ray rays[MOST];
             isogi_hit together[MOST], alone[MOST], other[MOST];
             uint8_t any[MOST];
-            const int count = pack % 3 ? 16 : 8 + (int)(random_bits(&r) % (MOST - 8)), grid = pack % 6 == 1, axial = pack % 8 == 2;
+            const int count = pack % 3 ? 16 : 8 + (int)(random_bits(&r) % (MOST - 8)), grid = pack % 6 == 1, axial = pack % 8 == 2,
+                      pinhole = (turn + pack) % 4 == 2;
             const double spread = pow(10, random_range(&r, -6, -1.2)),
                          isovalue = levels ? floor(random_range(&r, -3, 3)) / 4 : random_range(&r, -0.7, 0.7);
             double target[3], way[3];
@@ -202,6 +203,7 @@ TEST(rays_side_by_side_hit_what_they_hit_alone) {
                     rays[i].dir[a] = (float)(d * volume.spacing[a]);
                     rays[i].origin[a] =
                         (target[a] + (grid && i % 2 ? 0 : spread * random_range(&r, -1, 1)) - back * way[a]) * volume.spacing[a];
+                    if (pinhole && i) rays[i].origin[a] = rays[0].origin[a];
                 }
                 rays[i].isovalue = pack % 11 == 7 && i == 9 ? isovalue + 0.125 : isovalue,
                 rays[i].tmax = pack % 5 == 4 ? random_range(&r, 50, 70) : 0;
