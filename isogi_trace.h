@@ -556,10 +556,9 @@ static uint32_t isogi_trace__reverse(uint32_t x) {
     return ((x & 0xaaaaaaaau) >> 1) | ((x & 0x55555555u) << 1);
 }
 
-/* A nested scramble: in the bit-reversed number, additions, odd factors and x ^= x * even let a bit depend on lower ones only, so
+/* A nested scramble: in the bit-reversed number x, additions, odd factors and x ^= x * even let a bit depend on lower ones only, so
    the points stay a (0,2)-net; the addition alone makes each of them uniformly distributed over the keys. */
-static double isogi_trace__scramble(uint32_t bits, uint64_t key) {
-    uint32_t x = isogi_trace__reverse(bits);
+static double isogi_trace__scramble(uint32_t x, uint64_t key) {
     x += (uint32_t)key;
     x *= (uint32_t)(key >> 32) | 1u;
     x ^= x * 0x9d5fc2b2u;
@@ -570,35 +569,66 @@ static double isogi_trace__scramble(uint32_t bits, uint64_t key) {
     return (double)isogi_trace__reverse(x) * (1.0 / 4294967296.0);
 }
 
-/* Point `index` of the two-dimensional Sobol sequence, scrambled by the texel's key: the directions of a texel's first rays. */
-static void isogi_trace__sobol(uint64_t texel, uint32_t index, double u[2]) {
-    uint32_t second = 0, column = 0x80000000u, i;
-    for (i = index; i; i >>= 1, column ^= column >> 1)
-        if (i & 1) second ^= column;
-    u[0] = isogi_trace__scramble(isogi_trace__reverse(index), isogi_trace__key(texel, 0x5eed0));
-    u[1] = isogi_trace__scramble(second, isogi_trace__key(texel, 0x5eed1));
+/* The two-dimensional Sobol sequence, scrambled by a texel's key: the directions of a texel's first rays. */
+typedef struct isogi_trace__sequence {
+    uint64_t key[2];
+} isogi_trace__sequence;
+
+static isogi_trace__sequence isogi_trace__sequence_of(uint64_t texel) {
+    isogi_trace__sequence s;
+    s.key[0] = isogi_trace__key(texel, 0x5eed0), s.key[1] = isogi_trace__key(texel, 0x5eed1);
+    return s;
+}
+
+/* Point `index`. With its binary digits as those of a polynomial in X over the numbers modulo 2, the bit-reversed second coordinate is that
+   polynomial at 1 + X (Pascal's triangle): X^16 becomes 1 + X^16, then X^8, and so on. */
+static void isogi_trace__sobol(const isogi_trace__sequence *s, uint32_t index, double u[2]) {
+    uint32_t second = index;
+    second ^= second >> 16;
+    second ^= (second & 0xff00ff00u) >> 8;
+    second ^= (second & 0xf0f0f0f0u) >> 4;
+    second ^= (second & 0xccccccccu) >> 2;
+    second ^= (second & 0xaaaaaaaau) >> 1;
+    u[0] = isogi_trace__scramble(index, s->key[0]);
+    u[1] = isogi_trace__scramble(second, s->key[1]);
 }
 
 /* ==== directions ===================================================================================================== */
 
-/* Two unit vectors that make an orthonormal basis with the unit vector n. */
-static void isogi_trace__basis(const float n[3], double a[3], double b[3]) {
-    double x = (double)n[0], y = (double)n[1], z = (double)n[2], s;
+/* Cosine and sine of 2 pi u, u in 0..1, to 1e-11: Taylor's series within an eighth of a turn of the nearest quarter. */
+static void isogi_trace__circle(double u, double *cosine, double *sine) {
+    int quarter = (int)(4 * u + 0.5);
+    double x = 2 * ISOGI_TRACE__PI * (u - 0.25 * quarter), z = x * x, v[2];
+    v[0] = 1 - z * (1.0 / 2 - z * (1.0 / 24 - z * (1.0 / 720 - z * (1.0 / 40320 - z * (1.0 / 3628800 - z * (1.0 / 479001600))))));
+    v[1] = x * (1 - z * (1.0 / 6 - z * (1.0 / 120 - z * (1.0 / 5040 - z * (1.0 / 362880 - z * (1.0 / 39916800))))));
+    *cosine = v[quarter & 1] * (1 - ((quarter + 1) & 2));
+    *sine = v[1 - (quarter & 1)] * (1 - (quarter & 2));
+}
+
+/* A unit vector n, and two that make an orthonormal basis with it. */
+typedef struct isogi_trace__basis {
+    double a[3], b[3], n[3];
+} isogi_trace__basis;
+
+static void isogi_trace__basis_of(const float n[3], isogi_trace__basis *basis) {
+    double x = (double)n[0], y = (double)n[1], z = (double)n[2], s, *a = basis->a, *b = basis->b;
     if (fabs(x) > fabs(y)) s = 1 / sqrt(x * x + z * z), a[0] = -z * s, a[1] = 0, a[2] = x * s;
     else s = 1 / sqrt(y * y + z * z), a[0] = 0, a[1] = z * s, a[2] = -y * s;
     b[0] = y * a[2] - z * a[1], b[1] = z * a[0] - x * a[2], b[2] = x * a[1] - y * a[0];
+    basis->n[0] = x, basis->n[1] = y, basis->n[2] = z;
 }
 
 /* The direction at angle theta from n, given as cos and sin, and at azimuth 2 pi u. */
-static void isogi_trace__around(const float n[3], double cosine, double sine, double u, float dir[3]) {
-    double a[3], b[3], x = sine * cos(2 * ISOGI_TRACE__PI * u), y = sine * sin(2 * ISOGI_TRACE__PI * u);
+static void isogi_trace__around(const isogi_trace__basis *basis, double cosine, double sine, double u, float dir[3]) {
+    double x, y;
     int i;
-    isogi_trace__basis(n, a, b);
-    for (i = 0; i < 3; i++) dir[i] = (float)(x * a[i] + y * b[i] + cosine * (double)n[i]);
+    isogi_trace__circle(u, &x, &y);
+    x *= sine, y *= sine;
+    for (i = 0; i < 3; i++) dir[i] = (float)(x * basis->a[i] + y * basis->b[i] + cosine * basis->n[i]);
 }
 
-static void isogi_trace__cosine(const float n[3], double u, double v, float dir[3]) {
-    isogi_trace__around(n, sqrt(1 - u), sqrt(u), v, dir);
+static void isogi_trace__cosine(const isogi_trace__basis *basis, double u, double v, float dir[3]) {
+    isogi_trace__around(basis, sqrt(1 - u), sqrt(u), v, dir);
 }
 
 /* ==== surface normals that light may use ============================================================================= */
@@ -860,22 +890,23 @@ static int isogi_trace__is_delta(const isogi_light *light) {
     return light->kind == ISOGI_LIGHT_POINT || (light->kind != ISOGI_LIGHT_RECTANGLE && !(light->radius > 0));
 }
 
-/* Directions uniform in a cone about the unit vector n, 1 - cos(its half angle) = opening. */
-static void isogi_trace__cone(const double n[3], double opening, double u, double v, float dir[3]) {
+/* Directions uniform in a cone about the unit vector of the basis, 1 - cos(its half angle) = opening. */
+static void isogi_trace__cone(const isogi_trace__basis *basis, double opening, double u, double v, float dir[3]) {
     double low = opening * u, sine = sqrt(isogi_trace__clamp(low * (2 - low), 1));
-    float axis[3];
-    axis[0] = (float)n[0], axis[1] = (float)n[1], axis[2] = (float)n[2];
-    isogi_trace__around(axis, 1 - low, sine, v, dir);
+    isogi_trace__around(basis, 1 - low, sine, v, dir);
 }
 
 /* A sphere of radiance I / (pi r^2), seen from outside through a cone of directions, from within all around. */
 static double isogi_trace__sphere(const double to[3], double distance, double radius, double u, double v,
                                   isogi_trace__beam *beam) {
-    double n[3], ratio = radius / distance, opening = 2, along = 0, inside;
+    double ratio = radius / distance, opening = 2, along = 0, inside;
+    float axis[3];
+    isogi_trace__basis basis;
     int a;
     if (ratio < 1) opening = ratio * ratio / (1 + sqrt(1 - ratio * ratio));
-    for (a = 0; a < 3; a++) n[a] = to[a] / distance;
-    isogi_trace__cone(n, opening, u, v, beam->dir);
+    for (a = 0; a < 3; a++) axis[a] = (float)(to[a] / distance);
+    isogi_trace__basis_of(axis, &basis);
+    isogi_trace__cone(&basis, opening, u, v, beam->dir);
     for (a = 0; a < 3; a++) along += to[a] * (double)beam->dir[a];
     inside = along * along - (distance * distance - radius * radius);
     inside = sqrt(inside > 0 ? inside : 0);
@@ -957,6 +988,36 @@ static void isogi_trace__beam_light(isogi_trace__beam *beam, const isogi_light *
     for (a = 0; a < 3; a++) beam->rgb[a] = factor * (double)light->rgb[a];
 }
 
+/* A directional light with an angular size, seen from anywhere. */
+typedef struct isogi_trace__disc {
+    isogi_trace__basis basis; /* about its middle */
+    double opening, rgb[3];
+} isogi_trace__disc;
+
+/* 0: the light is of another kind. */
+static int isogi_trace__disc_set(const isogi_light *light, isogi_trace__disc *disc) {
+    double to[3], length = 0, angle = (double)light->radius; /* at most a right angle */
+    float axis[3];
+    isogi_trace__beam beam;
+    int a;
+    if (light->kind != ISOGI_LIGHT_DIRECTIONAL || !(light->radius > 0)) return 0;
+    for (a = 0; a < 3; a++) to[a] = (double)light->vector[a], length += to[a] * to[a];
+    length = sqrt(length);
+    if (!(length > 0) || !isogi_trace__finite(length)) return 0;
+    for (a = 0; a < 3; a++) axis[a] = (float)(to[a] / length);
+    isogi_trace__basis_of(axis, &disc->basis);
+    disc->opening = 2 * sin(angle / 2) * sin(angle / 2);
+    isogi_trace__beam_light(&beam, light, 2 / (1 + cos(angle))); /* radiance rgb / (pi sin^2) times solid angle 2 pi (1 - cos) */
+    memcpy(disc->rgb, beam.rgb, sizeof disc->rgb);
+    return 1;
+}
+
+static void isogi_trace__disc_beam(const isogi_trace__disc *disc, double u, double v, isogi_trace__beam *beam) {
+    isogi_trace__cone(&disc->basis, disc->opening, u, v, beam->dir);
+    beam->tmax = 0;
+    memcpy(beam->rgb, disc->rgb, sizeof disc->rgb);
+}
+
 /* 0 where the light does not reach `point` by nature. */
 static int isogi_trace__light_beam(const isogi_light *light, const double point[3], double u, double v,
                                    isogi_trace__beam *beam) {
@@ -975,11 +1036,12 @@ static int isogi_trace__light_beam(const isogi_light *light, const double point[
     if (!(length > 0) || !isogi_trace__finite(length)) return 0;
     beam->tmax = 0;
     if (light->kind == ISOGI_LIGHT_DIRECTIONAL && light->radius > 0) {
-        double angle = (double)light->radius; /* at most a right angle */
-        for (a = 0; a < 3; a++) to[a] /= length;
-        isogi_trace__cone(to, 2 * sin(angle / 2) * sin(angle / 2), u, v, beam->dir);
-        factor = 2 / (1 + cos(angle)); /* radiance rgb / (pi sin^2) times solid angle 2 pi (1 - cos) */
-    } else if (light->kind == ISOGI_LIGHT_SPHERE && light->radius > 0) {
+        isogi_trace__disc disc;
+        if (!isogi_trace__disc_set(light, &disc)) return 0;
+        isogi_trace__disc_beam(&disc, u, v, beam);
+        return 1;
+    }
+    if (light->kind == ISOGI_LIGHT_SPHERE && light->radius > 0) {
         factor = isogi_trace__sphere(to, length, (double)light->radius, u, v, beam);
     } else {
         for (a = 0; a < 3; a++) beam->dir[a] = (float)(to[a] / length);
@@ -1015,8 +1077,8 @@ static int isogi_trace__locate(const isogi_volume *v, const double grid[3], isog
     return 1;
 }
 
-/* Trilinear value, kept within the values it is made of, so that a constant stays constant. */
-static double isogi_trace__value(const isogi_volume *v, const isogi_hit *place) {
+/* Trilinear value, kept within the values it is made of, so that a constant stays constant. *least: of the cell's voxels. */
+static double isogi_trace__value_least(const isogi_volume *v, const isogi_hit *place, double *least) {
     double c[8], low = DBL_MAX, high = -DBL_MAX, value;
     int i;
     isogi_volume_corners(v, place->cell, c);
@@ -1024,7 +1086,13 @@ static double isogi_trace__value(const isogi_volume *v, const isogi_hit *place) 
     for (i = 0; i < 8; i += 2) c[i] = isogi_trace__lerp(c[i], c[i + 1], place->local[0]);
     for (i = 0; i < 8; i += 4) c[i] = isogi_trace__lerp(c[i], c[i + 2], place->local[1]);
     value = isogi_trace__lerp(c[0], c[4], place->local[2]);
+    *least = low;
     return value < low ? low : value > high ? high : value;
+}
+
+static double isogi_trace__value(const isogi_volume *v, const isogi_hit *place) {
+    double least;
+    return isogi_trace__value_least(v, place, &least);
 }
 
 /* Bounds of the voxels in [low, high] that may be too wide: from the finest level of the pyramid at which few blocks are read. */
@@ -1435,11 +1503,13 @@ static int isogi_trace__wave_reflect(isogi_trace__wave *w, int i, int j, int dep
 
 /* New directions from every vertex. */
 static void isogi_trace__wave_scatter(isogi_trace__wave *w, int depth) {
+    isogi_trace__basis basis;
     int i;
     for (i = 0; i < w->count; i++) {
         double u = isogi_trace__random(w->key[i], depth, ISOGI_TRACE__DIRECTION);
         double v = isogi_trace__random(w->key[i], depth, ISOGI_TRACE__DIRECTION + 1);
-        isogi_trace__cosine((const float *)w->shading[i], u, v, w->dir[i]);
+        isogi_trace__basis_of((const float *)w->shading[i], &basis);
+        isogi_trace__cosine(&basis, u, v, w->dir[i]);
         isogi_trace__mirror((const float *)w->geometric[i], w->dir[i]);
         w->density[i] =
             isogi_trace__kernel((const float *)w->shading[i], (const float *)w->geometric[i], (const float *)w->dir[i]);
@@ -1448,14 +1518,17 @@ static void isogi_trace__wave_scatter(isogi_trace__wave *w, int depth) {
 
 static void isogi_trace__wave_begin(isogi_trace__wave *w, int first, int count) {
     const isogi_trace__site *site = w->site;
+    const isogi_trace__sequence sequence = isogi_trace__sequence_of(site->key);
+    isogi_trace__basis basis;
     int i, c;
+    isogi_trace__basis_of(site->normal, &basis);
     w->count = count;
     for (i = 0; i < count; i++) {
         double u[2];
         w->slot[i] = i, w->key[i] = isogi_trace__key(site->key, (uint64_t)(first + i));
         w->start[i] = site->place, w->from[i] = (signed char)(site->open ? 0 : w->scene->high ? -1 : 1);
-        isogi_trace__sobol(site->key, (uint32_t)(first + i), u);
-        isogi_trace__cosine(site->normal, u[0], u[1], w->dir[i]);
+        isogi_trace__sobol(&sequence, (uint32_t)(first + i), u);
+        isogi_trace__cosine(&basis, u[0], u[1], w->dir[i]);
         if (site->on_surface) isogi_trace__mirror(site->geometric, w->dir[i]);
         w->density[i] = isogi_trace__site_kernel(site, (const float *)w->dir[i]);
         for (c = 0; c < 3; c++) w->through[i][c] = 1, w->light[i][c] = 0;
@@ -2035,14 +2108,15 @@ static void isogi_trace__texel_grid(const isogi_trace *t, const size_t texel[3],
    texel is inside of its own surface, hence one of the cells around it must reach lower. 0: it does not. */
 static int isogi_trace__texel_place(const isogi_trace *t, const size_t texel[3], isogi_trace__site *site) {
     const isogi_volume *v = t->scene.volume;
-    double grid[3], range[2];
+    double grid[3], range[2], least;
     size_t low[3], high[3];
     int a, border = 0;
     isogi_trace__texel_grid(t, texel, grid);
     for (a = 0; a < 3; a++) border |= grid[a] <= 0 || grid[a] >= (double)(v->size[a] - 1);
     if (!isogi_trace__locate(v, grid, &site->place)) return 0;
-    site->isovalue = isogi_trace__value(v, &site->place);
+    site->isovalue = isogi_trace__value_least(v, &site->place, &least);
     if (!isogi_trace__finite(site->isovalue)) return 0;
+    if (least < site->isovalue && isogi_trace__finite(least)) return 1;
     for (a = 0; a < 3; a++) {
         low[a] = site->place.cell[a], high[a] = low[a] + 1;
         if (site->place.local[a] <= 0 && low[a]) low[a]--;
@@ -3103,6 +3177,8 @@ typedef struct isogi_trace__cast {
     double sum[ISOGI_TRACE__TASK_SPANS], square[ISOGI_TRACE__TASK_SPANS]; /* of luminance by one light */
     int shadow; /* rays towards lights; else cosine-distributed ones */
     int bright; /* the light is the sky */
+    int distant; /* the light is */
+    isogi_trace__disc disc;
     int count;
     isogi_ray ray[ISOGI_TRACE__FLUSH];
     isogi_hit hit[ISOGI_TRACE__FLUSH];
@@ -3466,16 +3542,17 @@ static uint32_t isogi_trace__block(const isogi_trace *t, int level) {
     return sum < samples ? sum : samples;
 }
 
-/* The place of a sample in the sequence. */
-static uint32_t isogi_trace__index(const isogi_trace *t, const isogi_trace__node *n, uint32_t sample) {
+/* The place of a sample in the sequence; those of the samples before *end follow it. */
+static uint32_t isogi_trace__index(const isogi_trace *t, const isogi_trace__node *n, uint32_t sample, uint32_t *end) {
     uint32_t size = 1;
     int level = 0;
+    *end = UINT32_MAX;
     if (!n->brick) return sample;
     if (!isogi_trace__in_blocks(&t->scene.desc)) {
         while (size < (uint32_t)t->scene.desc.samples) size *= 2;
         return n->slot * size + sample;
     }
-    while (isogi_trace__block(t, level + 1) <= sample) level++;
+    while ((*end = isogi_trace__block(t, level + 1)) <= sample) level++;
     size = (uint32_t)4 << (2 * level);
     return ISOGI_TRACE__TEXELS * size + n->slot * size + (sample - isogi_trace__block(t, level));
 }
@@ -3631,12 +3708,16 @@ static void isogi_trace__cast_add(isogi_trace__cast *c, const float dir[3], doub
 static void isogi_trace__span_hemisphere(isogi_trace__cast *c, uint32_t k) {
     const isogi_trace__span *span = &c->span[k];
     const isogi_trace__site *site = &c->site[k];
-    uint32_t i;
+    const isogi_trace__sequence sequence = isogi_trace__sequence_of(c->sequence[k]);
+    isogi_trace__basis basis;
+    uint32_t i, at = 0, known = span->first;
+    isogi_trace__basis_of(site->normal, &basis);
     for (i = span->first; i < span->first + span->count; i++) {
         double u[2];
         float dir[3];
-        isogi_trace__sobol(c->sequence[k], isogi_trace__index(c->trace, &c->span[k].sum, i), u);
-        isogi_trace__cosine(site->normal, u[0], u[1], dir);
+        at = i == known ? isogi_trace__index(c->trace, &span->sum, i, &known) : at + 1;
+        isogi_trace__sobol(&sequence, at, u);
+        isogi_trace__cosine(&basis, u[0], u[1], dir);
         if (site->on_surface) isogi_trace__mirror(site->geometric, dir);
         c->owner[c->count] = k, c->sample[c->count] = i;
         c->weight[c->count] = isogi_trace__site_kernel(site, dir);
@@ -3648,11 +3729,13 @@ static void isogi_trace__span_hemisphere(isogi_trace__cast *c, uint32_t k) {
 static void isogi_trace__span_sky(isogi_trace__cast *c, uint32_t k) {
     const isogi_trace__sky *sky = &c->trace->scene.sky;
     const isogi_trace__span *span = &c->span[k];
-    uint32_t i;
+    const isogi_trace__sequence sequence = isogi_trace__sequence_of(isogi_trace__key(c->sequence[k], 0x5eed2));
+    uint32_t i, at = 0, known = span->first;
     for (i = span->first; i < span->first + span->count; i++) {
         double u[2], cosine, density;
         float dir[3];
-        isogi_trace__sobol(isogi_trace__key(c->sequence[k], 0x5eed2), isogi_trace__index(c->trace, &c->span[k].sum, i), u);
+        at = i == known ? isogi_trace__index(c->trace, &span->sum, i, &known) : at + 1;
+        isogi_trace__sobol(&sequence, at, u);
         density = isogi_trace__sky_direction(sky, u[0], u[1], dir);
         cosine = isogi_trace__site_kernel(&c->site[k], dir) / ISOGI_TRACE__PI;
         if (!(cosine > 0) || !(density > 0)) continue;
@@ -3671,13 +3754,17 @@ static uint32_t isogi_trace__light_samples(uint32_t samples, int is_texel) {
 static void isogi_trace__span_light(isogi_trace__cast *c, uint32_t k, size_t number) {
     const isogi_light *light = &c->trace->scene.desc.lighting.lights[number];
     const isogi_trace__span *span = &c->span[k];
-    uint32_t i, end = isogi_trace__light_samples(span->first + span->count, span->sum.brick != NULL);
+    const isogi_trace__sequence sequence = isogi_trace__sequence_of(isogi_trace__key(c->sequence[k], 0x5eed3 + number));
+    uint32_t i = isogi_trace__light_samples(span->first, span->sum.brick != NULL), at = 0, known = i;
+    const uint32_t end = isogi_trace__light_samples(span->first + span->count, span->sum.brick != NULL);
     int a;
-    for (i = isogi_trace__light_samples(span->first, span->sum.brick != NULL); i < end; i++) {
+    for (; i < end; i++) {
         double u[2], cosine;
         isogi_trace__beam beam;
-        isogi_trace__sobol(isogi_trace__key(c->sequence[k], 0x5eed3 + number), isogi_trace__index(c->trace, &c->span[k].sum, i), u);
-        if (!isogi_trace__light_beam(light, c->site[k].origin, u[0], u[1], &beam)) continue;
+        at = i == known ? isogi_trace__index(c->trace, &span->sum, i, &known) : at + 1;
+        isogi_trace__sobol(&sequence, at, u);
+        if (c->distant) isogi_trace__disc_beam(&c->disc, u[0], u[1], &beam);
+        else if (!isogi_trace__light_beam(light, c->site[k].origin, u[0], u[1], &beam)) continue;
         cosine = isogi_trace__site_kernel(&c->site[k], beam.dir);
         if (!(cosine > 0)) continue;
         for (a = 0; a < 3; a++) c->rgb[c->count][a] = beam.rgb[a] * cosine;
@@ -3702,6 +3789,24 @@ static void isogi_trace__cast_round(isogi_trace__cast *c, uint32_t spans) {
     memset(c->square, 0, sizeof c->square);
 }
 
+/* Normals of the probes among the spans of a task. */
+static void isogi_trace__span_normals(isogi_trace__cast *c, uint32_t spans) {
+    const isogi_trace *t = c->trace;
+    isogi_hit place[ISOGI_TRACE__TASK_SPANS];
+    signed char from[ISOGI_TRACE__TASK_SPANS];
+    float shading[ISOGI_TRACE__TASK_SPANS][3], geometric[ISOGI_TRACE__TASK_SPANS][3];
+    uint32_t owner[ISOGI_TRACE__TASK_SPANS], k, n = 0;
+    for (k = 0; k < spans; k++) {
+        const isogi_trace__node *probe = &c->span[k].sum;
+        if (probe->brick) continue;
+        memcpy(c->site[k].normal, probe->normal, sizeof probe->normal); /* of a cap */
+        if (probe->place.side != 1 && probe->place.side != -1) continue;
+        place[n] = probe->place, from[n] = probe->from, owner[n++] = k;
+    }
+    if (n) isogi_trace__normals(t->scene.pyramid, t->scene.desc.normals, place, from, n, shading, geometric);
+    for (k = 0; k < n; k++) memcpy(c->site[owner[k]].normal, shading[k], sizeof shading[k]);
+}
+
 /* Where span k's rays begin; 0: nowhere (the voxels were changed after the texel was classified, which breaks the contract). */
 static int isogi_trace__span_site(isogi_trace__cast *c, uint32_t k) {
     const isogi_trace *t = c->trace;
@@ -3711,21 +3816,12 @@ static int isogi_trace__span_site(isogi_trace__cast *c, uint32_t k) {
     if (n->brick) {
         const size_t *x = n->texel, *l = t->lattice;
         if (!(isogi_trace__dot(n->normal, n->normal) > 0)) return 0;
-        memset(site, 0, sizeof *site);
-        site->place = n->place, site->isovalue = n->isovalue;
         memcpy(site->normal, n->normal, sizeof site->normal);
         site->key = isogi_trace__key(isogi_trace__key(seed, 2),
                                      (uint64_t)x[0] + (uint64_t)l[0] * ((uint64_t)x[1] + (uint64_t)l[1] * (uint64_t)x[2]));
         c->sequence[k] = isogi_trace__key(isogi_trace__key(seed, 3), (uint64_t)isogi_trace__brick_of(t, x, &n->slot));
-    } else {
-        float geometric[1][3] = {{0, 0, 0}};
-        site->place = n->place, site->isovalue = n->isovalue;
-        memcpy(site->normal, n->normal, sizeof site->normal); /* of a cap */
-        if (n->place.side == 1 || n->place.side == -1)
-            isogi_trace__normals(t->scene.pyramid, t->scene.desc.normals, &n->place, &n->from, 1, &site->normal, geometric);
-        site->key = c->sequence[k] = isogi_trace__key(isogi_trace__key(seed, 4), n->key);
-    }
-    site->from = n->from;
+    } else site->key = c->sequence[k] = isogi_trace__key(isogi_trace__key(seed, 4), n->key);
+    site->place = n->place, site->isovalue = n->isovalue, site->from = n->from;
     isogi_trace__site_start(&t->scene, site);
     return 1;
 }
@@ -3740,6 +3836,7 @@ static void isogi_trace__cast_task(void *arg, size_t task) {
     c->trace = t, c->counters = &t->task_counters[task], c->span = f->spans + f->task[task], c->count = 0, c->shadow = 0, c->bright = 0;
     memset(c->counters, 0, sizeof *c->counters);
     memset(f->direct + f->task[task] * (size_t)t->values, 0, spans * (size_t)t->values * sizeof(float));
+    isogi_trace__span_normals(c, spans);
     for (k = 0; k < spans; k++) {
         isogi_trace__span *s = &c->span[k];
         uint32_t i;
@@ -3757,6 +3854,7 @@ static void isogi_trace__cast_task(void *arg, size_t task) {
     c->bright = 0;
     for (l = 0; l < lighting->light_count; l++) {
         if (isogi_trace__is_delta(&lighting->lights[l])) continue;
+        c->distant = isogi_trace__disc_set(&lighting->lights[l], &c->disc);
         for (k = 0; k < spans; k++)
             if (!c->span[k].sum.hits) isogi_trace__span_light(c, k, l);
         isogi_trace__cast_round(c, spans);
@@ -5794,6 +5892,8 @@ static int isogi_trace__field_reflect(isogi_trace__walk *w, int i, int j, int de
 
 /* Samples first .. first + count - 1 of a point whose first ray starts are set in place[0], normal[0]. */
 static void isogi_trace__field_run(isogi_trace__walk *w, uint64_t key, int first, int count) {
+    const isogi_trace__sequence sequence = isogi_trace__sequence_of(key);
+    isogi_trace__basis basis;
     double cosine[ISOGI_TRACE__WAVE];
     int i, c, depth, alive;
     w->count = count;
@@ -5809,8 +5909,9 @@ static void isogi_trace__field_run(isogi_trace__walk *w, uint64_t key, int first
             double u[2];
             u[0] = isogi_trace__random(w->key[i], depth, ISOGI_TRACE__DIRECTION);
             u[1] = isogi_trace__random(w->key[i], depth, ISOGI_TRACE__DIRECTION + 1);
-            if (!depth) isogi_trace__sobol(key, (uint32_t)(first + i), u);
-            isogi_trace__cosine(w->normal[i], u[0], u[1], dir);
+            if (!depth) isogi_trace__sobol(&sequence, (uint32_t)(first + i), u);
+            isogi_trace__basis_of(w->normal[i], &basis);
+            isogi_trace__cosine(&basis, u[0], u[1], dir);
             cosine[i] = isogi_trace__dot(w->normal[i], dir) / ISOGI_TRACE__PI;
             isogi_trace__field_ray(w, i, i, dir, 0);
         }

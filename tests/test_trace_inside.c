@@ -1,4 +1,4 @@
-/* How isogi_trace.h keeps numbers in few bits. This program looks inside isogi_trace.h. FLAGS: -O0 */
+/* How isogi_trace.h keeps numbers in few bits, and draws directions. This program looks inside isogi_trace.h. FLAGS: -O0 */
 #define ISOGI_IMPLEMENTATION
 #include "isogi_trace.h"
 #include "test.h"
@@ -55,6 +55,30 @@ TEST(errors_are_kept_rounded_up) {
     }
     CHECK(isogi_trace__to_short(0) == 0 && isogi_trace__to_short(HUGE_VALF) == 0x7f80 && isogi_trace__to_short(3.4e38f) == 0x7f80,
           "ends, %d", 0);
+}
+
+/* What directions are drawn by: against the functions of <math.h>, and against the definition of the sequence. */
+TEST(circle_is_that_of_cos_and_sin) {
+    for (int i = 0; i <= 40000; i++) {
+        double u = i / 40000.0, c, s;
+        isogi_trace__circle(u, &c, &s);
+        CHECK(fabs(c - cos(2 * ISOGI_TRACE__PI * u)) < 1e-11 && fabs(s - sin(2 * ISOGI_TRACE__PI * u)) < 1e-11, "%g: %.15g %.15g", u, c, s);
+    }
+}
+
+/* Without a scramble: u[0] is the radical inverse in base 2; u[1] is made of columns each of which is the one before, plus itself shifted
+   by one (the second dimension of Sobol's sequence). */
+TEST(sobol_is_that_of_its_columns) {
+    const isogi_trace__sequence plain = {{0, 0}};
+    for (uint32_t i = 0; i < 5000; i++) {
+        uint32_t index = i < 4096 ? i : i * 2654435761u, first = 0, second = 0, column = 0x80000000u;
+        double u[2], v[2];
+        for (uint32_t rest = index, bit = 0x80000000u; rest; rest >>= 1, bit >>= 1, column ^= column >> 1)
+            if (rest & 1) first |= bit, second ^= column;
+        isogi_trace__sobol(&plain, index, u);
+        v[0] = isogi_trace__scramble(isogi_trace__reverse(first), 0), v[1] = isogi_trace__scramble(isogi_trace__reverse(second), 0);
+        CHECK(!memcmp(u, v, sizeof u), "%u: %g %g, expected %g %g", index, u[0], u[1], v[0], v[1]);
+    }
 }
 
 TEST_MAIN("trace_inside")

@@ -278,13 +278,15 @@ static void naive_trace(naive_path *p, const float albedo[3]) {
         double u, v, cosine, density = 1;
         float dir[3], radiance[3], s[1][3], g[1][3];
         isogi_hit hit;
+        isogi_trace__basis basis;
         if (depth) {
             isogi_trace__normals(p->scene->pyramid, p->scene->desc.normals, &p->start, &from, 1, s, g);
             memcpy(p->shading, s, sizeof s), memcpy(p->geometric, g, sizeof g);
         } else memcpy(p->shading, p->site->normal, sizeof p->shading), memcpy(p->geometric, p->site->geometric, sizeof p->geometric);
         naive_lights(p, depth, through);
         u = naive_number(p), v = naive_number(p);
-        isogi_trace__around(p->shading, u, sqrt(1 - u * u), v, dir);
+        isogi_trace__basis_of(p->shading, &basis);
+        isogi_trace__around(&basis, u, sqrt(1 - u * u), v, dir);
         if (depth || p->site->on_surface) {
             double mirrored;
             isogi_trace__mirror(p->geometric, dir);
