@@ -3070,7 +3070,10 @@ typedef struct isogi_trace__node {
 typedef struct isogi_trace__segment {
     size_t entries, hits;
     uint32_t *node, *begin, *probe;
-    double change, largest; /* by the last pass, of probes */
+    uint32_t *order;        /* of probes: the first `open` are the entries that passes still change; NULL of texels */
+    size_t open;
+    double change, largest; /* by the last pass, of probes, */
+    double settled;         /* the largest value of the other entries */
 } isogi_trace__segment;
 
 /* What the filter compares. lights: variance of the light that is not filtered. albedo, glow: of the surface through the texel, which
@@ -3083,12 +3086,19 @@ typedef struct isogi_trace__guide {
     float hidden, reflected; /* share of rays that hit, and luminance of what was reflected there */
 } isogi_trace__guide;
 
-/* Nodes that stay where they are once they are made. values: their four kinds (below), one after the other. heads: where chains of probes
-   begin, number + 1, 0 = nowhere; NULL of texels. */
+/* What passes read of a probe beside its values: albedo by channel, and 1 / samples. settled: whether the values (of either kind) stay. */
+typedef struct isogi_trace__reflector {
+    float albedo[3], one;
+    uint8_t settled[2];
+} isogi_trace__reflector;
+
+/* Nodes that stay where they are once they are made. guides: of texels; reflectors: of probes. values: their four kinds (below), one after
+   the other. heads: where chains of probes begin, number + 1, 0 = nowhere; NULL of texels. */
 typedef struct isogi_trace__chunk {
     float *values;
     isogi_trace__node *nodes;
     isogi_trace__guide *guides;
+    isogi_trace__reflector *reflectors;
     uint32_t *heads;
 } isogi_trace__chunk;
 
@@ -3199,6 +3209,10 @@ static isogi_trace__guide *isogi_trace__guide_at(const isogi_trace__set *s, size
     return &s->chunks[i / ISOGI_TRACE__CHUNK].guides[i % ISOGI_TRACE__CHUNK];
 }
 
+static isogi_trace__reflector *isogi_trace__reflector_at(const isogi_trace__set *s, size_t i) {
+    return &s->chunks[i / ISOGI_TRACE__CHUNK].reflectors[i % ISOGI_TRACE__CHUNK];
+}
+
 /* v: values of a node. */
 static float *isogi_trace__values_at(const isogi_trace__set *s, size_t i, int kind, size_t v) {
     return s->chunks[i / ISOGI_TRACE__CHUNK].values + ((size_t)kind * ISOGI_TRACE__CHUNK + i % ISOGI_TRACE__CHUNK) * v;
@@ -3212,12 +3226,17 @@ static float *isogi_trace__light_at(const isogi_trace__set *s, size_t i, size_t 
 static void isogi_trace__chunk_free(const isogi_trace *t, isogi_trace__chunk *c) {
     isogi_release(&t->context, c->nodes, ISOGI_TRACE__CHUNK, sizeof *c->nodes);
     isogi_release(&t->context, c->guides, ISOGI_TRACE__CHUNK, sizeof *c->guides);
+    isogi_release(&t->context, c->reflectors, ISOGI_TRACE__CHUNK, sizeof *c->reflectors);
     isogi_release(&t->context, c->values, (size_t)ISOGI_TRACE__KINDS * ISOGI_TRACE__CHUNK, (size_t)t->values * sizeof(float));
     isogi_release(&t->context, c->heads, ISOGI_TRACE__CHUNK, sizeof *c->heads);
 }
 
+static size_t isogi_trace__segment_size(const isogi_trace__segment *s) {
+    return 2 * s->entries + 1 + s->hits + (s->order ? s->entries : 0);
+}
+
 static void isogi_trace__segment_free(const isogi_trace *t, isogi_trace__segment *s) {
-    isogi_release(&t->context, s->node, 2 * s->entries + 1 + s->hits, sizeof(uint32_t));
+    isogi_release(&t->context, s->node, isogi_trace__segment_size(s), sizeof(uint32_t));
 }
 
 static void isogi_trace__set_free(const isogi_trace *t, isogi_trace__set *s) {
@@ -3251,10 +3270,11 @@ static isogi_result isogi_trace__set_reserve(const isogi_trace *t, isogi_trace__
         if (s->chunk_count >= 0xffffffffu / ISOGI_TRACE__CHUNK) return ISOGI_TOO_LARGE;
         if (isogi_trace__chunks_reserve(t, s) != ISOGI_OK) return ISOGI_NO_MEMORY;
         c.nodes = (isogi_trace__node *)isogi_allocate(&t->context, ISOGI_TRACE__CHUNK, sizeof *c.nodes);
-        c.guides = (isogi_trace__guide *)isogi_allocate(&t->context, ISOGI_TRACE__CHUNK, sizeof *c.guides);
+        c.guides = chains ? NULL : (isogi_trace__guide *)isogi_allocate(&t->context, ISOGI_TRACE__CHUNK, sizeof *c.guides);
+        c.reflectors = chains ? (isogi_trace__reflector *)isogi_allocate(&t->context, ISOGI_TRACE__CHUNK, sizeof *c.reflectors) : NULL;
         c.values = (float *)isogi_allocate(&t->context, (size_t)ISOGI_TRACE__KINDS * ISOGI_TRACE__CHUNK, (size_t)t->values * sizeof(float));
         c.heads = chains ? (uint32_t *)isogi_allocate(&t->context, ISOGI_TRACE__CHUNK, sizeof *c.heads) : NULL;
-        if (!c.nodes || !c.guides || !c.values || (chains && !c.heads)) {
+        if (!c.nodes || !c.values || !(chains ? c.reflectors && c.heads : c.guides != NULL)) {
             isogi_trace__chunk_free(t, &c);
             return ISOGI_NO_MEMORY;
         }
@@ -3958,9 +3978,10 @@ static isogi_result isogi_trace__segment_new(isogi_trace *t, isogi_trace__segmen
     for (i = 0; i < f->sample_count; i++) hits += f->catches[i].key != 0;
     memset(s, 0, sizeof *s);
     s->entries = f->span_count, s->hits = hits;
-    s->node = (uint32_t *)isogi_allocate(&t->context, 2 * s->entries + 1 + hits, sizeof(uint32_t));
+    s->node = (uint32_t *)isogi_allocate(&t->context, (f->on_probes ? 3 : 2) * s->entries + 1 + hits, sizeof(uint32_t));
     if (!s->node) return ISOGI_NO_MEMORY;
     s->begin = s->node + s->entries, s->probe = s->begin + s->entries + 1;
+    if (f->on_probes) s->order = s->probe + hits;
     for (i = 0; i < f->span_count; i++) {
         s->node[i] = f->spans[i].node, s->begin[i] = (uint32_t)at;
         for (k = f->spans[i].offset; k < f->spans[i].offset + f->spans[i].count; k++) {
@@ -3970,7 +3991,7 @@ static isogi_result isogi_trace__segment_new(isogi_trace *t, isogi_trace__segmen
             if (!f->catches[k].key) continue;
             result = isogi_trace__probe_of(t, &f->catches[k], f->spans[i].sum.isovalue, &s->probe[at++]);
             if (result == ISOGI_OK) continue;
-            isogi_release(&t->context, s->node, 2 * s->entries + 1 + hits, sizeof(uint32_t));
+            isogi_trace__segment_free(t, s);
             return result;
         }
     }
@@ -4111,8 +4132,7 @@ static double isogi_trace__hit_albedo(const isogi_trace *t, const isogi_trace__n
     return (double)n->albedo[isogi_trace__channel(t, value)];
 }
 
-/* What passes read of probes, in few bytes: light from sky and lights, and in their guides albedo by channel and 1 / samples. The
-   first pass begins without any light. */
+/* What passes read of probes, in few bytes. The first pass begins without any light. */
 static void isogi_trace__direct_task(void *arg, size_t task) {
     const isogi_trace *t = (const isogi_trace *)arg;
     isogi_trace__set *set = &t->feedback->probes;
@@ -4120,54 +4140,73 @@ static void isogi_trace__direct_task(void *arg, size_t task) {
     int a;
     for (; i < end; i++) {
         const isogi_trace__node *n = isogi_trace__node_at(set, i);
-        isogi_trace__guide *g = isogi_trace__guide_at(set, i);
+        isogi_trace__reflector *r = isogi_trace__reflector_at(set, i);
         float *bounce = isogi_trace__values_at(set, i, ISOGI_TRACE__BOUNCE_VALUES, v), *out = isogi_trace__light_at(set, i, v);
         for (a = 0; a < t->values; a++) {
             bounce[a] = (float)isogi_trace__node_direct(t, set, i, a);
             out[a] = 0;
-            if (a < 3) g->albedo[a] = (float)isogi_trace__hit_albedo(t, n, (uint32_t)i, a);
+            if (a < 3) r->albedo[a] = (float)isogi_trace__hit_albedo(t, n, (uint32_t)i, a);
         }
-        g->mean[0] = n->samples ? 1.0f / (float)n->samples : 0;
+        r->one = n->samples ? 1.0f / (float)n->samples : 0;
+        r->settled[0] = r->settled[1] = 0;
     }
 }
 
 /* One pass over the probes of a segment, each of which has one entry: from one kind of OUT_VALUES to the other. by_place: hits have the
-   albedo of the probe that they meet, else that of the probe that they come from. */
+   albedo of the probe that they meet, else that of the probe that they come from. A probe that reads none, or none that will change, has
+   settled with this pass; the next one copies its light to the other kind, and later ones leave it out. */
 static void isogi_trace__pass_segment(isogi_trace__set *set, isogi_trace__segment *s, size_t values, size_t channels, int by_place) {
-    const int from = ISOGI_TRACE__OUT_VALUES + set->out, to = ISOGI_TRACE__OUT_VALUES + 1 - set->out;
-    size_t i, k, a;
+    const int out = set->out, from = ISOGI_TRACE__OUT_VALUES + out, to = ISOGI_TRACE__OUT_VALUES + 1 - out;
+    size_t i, j, k, a, open = 0;
     double largest = 0, most = 0;
-    for (i = 0; i < s->entries; i++) {
-        size_t node = s->node[i];
-        const isogi_trace__guide *g = isogi_trace__guide_at(set, node);
-        const float *bounce = isogi_trace__values_at(set, node, ISOGI_TRACE__BOUNCE_VALUES, values),
-                    *before = isogi_trace__values_at(set, node, from, values);
-        float *after = isogi_trace__values_at(set, node, to, values);
+    for (j = 0; j < s->open; j++) {
+        size_t node;
+        isogi_trace__reflector *r;
+        const float *bounce, *before;
+        float *after;
+        uint8_t settled = 1;
         double sum[3 * ISOGI_TRACE__MAX_ORDER * ISOGI_TRACE__MAX_ORDER];
+        i = s->order[j], node = s->node[i], r = isogi_trace__reflector_at(set, node);
+        before = isogi_trace__values_at(set, node, from, values), after = isogi_trace__values_at(set, node, to, values);
+        if (r->settled[out]) {
+            for (a = 0; a < values; a++) {
+                after[a] = before[a];
+                if (fabs((double)after[a]) > s->settled) s->settled = fabs((double)after[a]);
+            }
+            r->settled[1 - out] = 1;
+            continue;
+        }
+        bounce = isogi_trace__values_at(set, node, ISOGI_TRACE__BOUNCE_VALUES, values);
         for (a = 0; a < values; a++) sum[a] = 0;
         for (k = s->begin[i]; k < s->begin[i + 1]; k++) {
             const float *e = isogi_trace__values_at(set, s->probe[k], from, values);
+            const isogi_trace__reflector *met = isogi_trace__reflector_at(set, s->probe[k]);
+            settled &= met->settled[out];
             if (by_place)
-                for (a = 0; a < values; a++)
-                    sum[a] += (double)isogi_trace__guide_at(set, s->probe[k])->albedo[a % channels] * (double)e[a];
+                for (a = 0; a < values; a++) sum[a] += (double)met->albedo[a % channels] * (double)e[a];
             else
                 for (a = 0; a < values; a++) sum[a] += (double)e[a];
         }
         for (a = 0; a < values; a++) {
-            double share = (double)g->mean[0] * (by_place ? 1 : (double)g->albedo[a % channels]);
+            double share = (double)r->one * (by_place ? 1 : (double)r->albedo[a % channels]);
             double e = (double)bounce[a] + share * sum[a], change = fabs(e - (double)before[a]);
             after[a] = (float)e;
             most = change > most ? change : most, largest = fabs(e) > largest ? fabs(e) : largest;
         }
+        r->settled[1 - out] = settled, s->order[open++] = (uint32_t)i;
     }
-    s->change = most, s->largest = largest;
+    s->open = open, s->change = most, s->largest = largest > s->settled ? largest : s->settled;
 }
 
 static void isogi_trace__pass_task(void *arg, size_t segment) {
     const isogi_trace *t = (const isogi_trace *)arg;
     isogi_trace__set *set = &t->feedback->probes;
     isogi_trace__segment *s = &set->segments[t->feedback->carried + segment];
-    size_t channels = t->scene.desc.mode == ISOGI_TRACE_TRANSFER ? (size_t)t->scene.desc.transfer_channels : 3;
+    size_t channels = t->scene.desc.mode == ISOGI_TRACE_TRANSFER ? (size_t)t->scene.desc.transfer_channels : 3, i;
+    if (!t->feedback->pass) {
+        for (i = 0; i < s->entries; i++) s->order[i] = (uint32_t)i;
+        s->open = s->entries, s->settled = 0;
+    }
     /* the compiler unrolls it */
     if (t->values == 3 && channels == 3 && !t->scene.desc.material) isogi_trace__pass_segment(set, s, 3, 3, 0);
     else isogi_trace__pass_segment(set, s, (size_t)t->values, channels, t->scene.desc.material != NULL);

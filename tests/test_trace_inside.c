@@ -62,7 +62,7 @@ TEST(circle_is_that_of_cos_and_sin) {
     for (int i = 0; i <= 40000; i++) {
         double u = i / 40000.0, c, s;
         isogi_trace__circle(u, &c, &s);
-        CHECK(fabs(c - cos(2 * ISOGI_TRACE__PI * u)) < 1e-11 && fabs(s - sin(2 * ISOGI_TRACE__PI * u)) < 1e-11, "%g: %.15g %.15g", u, c, s);
+        CHECK(fabs(c - cos(2 * PI * u)) < 1e-11 && fabs(s - sin(2 * PI * u)) < 1e-11, "%g: %.15g %.15g", u, c, s);
     }
 }
 
