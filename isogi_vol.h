@@ -2540,6 +2540,291 @@ ISOGI_VOL__AVX2 static void isogi_vol__trilinear_pairs(const isogi_volume *v, is
     _mm512_insertf32x4(_mm512_insertf32x4(_mm512_insertf32x4(_mm512_castps128_ps512(ISOGI_VOL__FLOATS(p, 0)), ISOGI_VOL__FLOATS(p, 1), 1), \
                                           ISOGI_VOL__FLOATS(p, 2), 2), ISOGI_VOL__FLOATS(p, 3), 3)
 ISOGI_VOL__CUBIC(avx512, ISOGI_VOL__AVX512, __m512, _mm512_, 16)
+
+/* ---- trilinear values and gradients in sixteens ----
+
+   For world points in floats, of volumes whose voxels follow each other along x: sixteen points are located, and their memory is asked
+   for, while sixteen others, ISOGI_VOL__AHEAD sixteens in front of them, are computed, so that loads and arithmetic overlap. */
+
+#define ISOGI_VOL__RING 8  /* a power of two */
+#define ISOGI_VOL__AHEAD 4 /* less than that */
+
+typedef struct __attribute__((aligned(64))) isogi_vol__sixteen {
+    float local[3][16];
+    uint64_t bytes[16]; /* all corners of a point, if they are bytes */
+    int32_t voxel[16];  /* a cell's first */
+    int apart;          /* most points are far from those next to them */
+} isogi_vol__sixteen;
+
+typedef struct isogi_vol__sampling {
+    const char *rows[4]; /* of the volume's first cell */
+    const float *points;
+    float *values, *gradients; /* or NULL */
+    size_t count;
+    float high[3], low[3], at_high[3], at_low[3], at_guess[3], last[3]; /* as in isogi_vol__float_grid; first guess; the last cell */
+    int32_t stride[3], reach;                                           /* in voxels; that of all axes together */
+    float slope[3];                                                     /* gradients of raw voxels per grid unit times this are right */
+    double scale, bias;
+    int identity; /* scale and bias change nothing */
+} isogi_vol__sampling;
+
+/* Points 16 i .. 16 i + 15, as isogi_vol__locate_floats does; zeros after the last. */
+ISOGI_VOL__AVX512 ISOGI_VOL__INLINE void isogi_vol__locate16(const isogi_vol__sampling *s, size_t i, isogi_vol__sixteen *out) {
+    const size_t n = s->count - 16 * i;
+    const float *points = s->points + 48 * i;
+    const __m512 zero = _mm512_setzero_ps(), one = _mm512_set1_ps(1);
+    __m512 k0, k1, k2;
+    const __m512i first = _mm512_setr_epi32(0, 3, 6, 9, 12, 15, 18, 21, 24, 27, 30, 33, 36, 39, 42, 45);
+    __m512i voxel = _mm512_setzero_si512(), step;
+    if (n >= 16) k0 = _mm512_loadu_ps(points), k1 = _mm512_loadu_ps(points + 16), k2 = _mm512_loadu_ps(points + 32);
+    else {
+        const uint64_t some = ((uint64_t)1 << 3 * n) - 1;
+        k0 = _mm512_maskz_loadu_ps((__mmask16)some, points), k1 = _mm512_maskz_loadu_ps((__mmask16)(some >> 16), points + 16);
+        k2 = _mm512_maskz_loadu_ps((__mmask16)(some >> 32), points + 32);
+    }
+    /* coordinates r; those in k2 are the last ones */
+#define ISOGI_VOL__AXIS(r, in2) \
+    do { \
+        const __m512i from = _mm512_add_epi32(first, _mm512_set1_epi32(r)); \
+        const __m512 w = _mm512_mask_permutexvar_ps(_mm512_permutex2var_ps(k0, from, k1), in2, from, k2); \
+        const __m512 high = _mm512_set1_ps(s->high[r]), last = _mm512_set1_ps(s->last[r]); \
+        const __m512 guess = _mm512_fmadd_ps(high, w, _mm512_set1_ps(s->at_guess[r])); \
+        __m512 cell = _mm512_roundscale_ps(_mm512_min_ps(_mm512_max_ps(guess, zero), last), _MM_FROUND_TO_ZERO | _MM_FROUND_NO_EXC); \
+        __m512 local = _mm512_add_ps(_mm512_fmadd_ps(high, w, _mm512_sub_ps(_mm512_set1_ps(s->at_high[r]), cell)), \
+                                     _mm512_fmadd_ps(_mm512_set1_ps(s->low[r]), w, _mm512_set1_ps(s->at_low[r]))); \
+        const __mmask16 next = _mm512_mask_cmp_ps_mask(_mm512_cmp_ps_mask(cell, last, _CMP_LT_OQ), local, one, _CMP_GE_OQ); \
+        cell = _mm512_mask_add_ps(cell, next, cell, one), local = _mm512_mask_sub_ps(local, next, local, one); \
+        _mm512_store_ps(out->local[r], _mm512_min_ps(_mm512_max_ps(local, zero), one)); /* of points outside; NaN gives 0 */ \
+        voxel = _mm512_add_epi32(voxel, _mm512_mullo_epi32(_mm512_cvtps_epi32(cell), _mm512_set1_epi32(s->stride[r]))); \
+    } while (0)
+    ISOGI_VOL__AXIS(0, 0xf800);
+    ISOGI_VOL__AXIS(1, 0xf800);
+    ISOGI_VOL__AXIS(2, 0xfc00);
+#undef ISOGI_VOL__AXIS
+    _mm512_store_si512(out->voxel, voxel);
+    step = _mm512_abs_epi32(_mm512_sub_epi32(voxel, _mm512_alignr_epi32(voxel, voxel, 1)));
+    out->apart = __builtin_popcount(_mm512_cmpgt_epi32_mask(step, _mm512_set1_epi32(s->reach))) > 8;
+}
+
+/* Asks for the voxels of located points, as isogi_vol__ask_for_eight does. */
+ISOGI_VOL__AVX512 ISOGI_VOL__INLINE void isogi_vol__ask_for_sixteen(const char *const rows[4], ptrdiff_t size,
+                                                                    const isogi_vol__sixteen *at) {
+    ptrdiff_t q;
+    int k;
+#define ISOGI_VOL__ASK(k) \
+    q = size * at->voxel[k], _mm_prefetch(rows[0] + q, _MM_HINT_T1), _mm_prefetch(rows[1] + q, _MM_HINT_T1), \
+    _mm_prefetch(rows[2] + q, _MM_HINT_T1), _mm_prefetch(rows[3] + q, _MM_HINT_T1)
+    ISOGI_VOL__ASK(0), ISOGI_VOL__ASK(2), ISOGI_VOL__ASK(4), ISOGI_VOL__ASK(6);
+    ISOGI_VOL__ASK(8), ISOGI_VOL__ASK(10), ISOGI_VOL__ASK(12), ISOGI_VOL__ASK(14);
+    for (k = 1; k < 16 && at->apart; k += 2) ISOGI_VOL__ASK(k);
+#undef ISOGI_VOL__ASK
+}
+
+ISOGI_VOL__INLINE int64_t isogi_vol__two_floats(const char *p) {
+    int64_t x;
+    memcpy(&x, p, sizeof x);
+    return x;
+}
+
+ISOGI_VOL__INLINE int32_t isogi_vol__two_shorts(const char *p) {
+    int32_t x;
+    memcpy(&x, p, sizeof x);
+    return x;
+}
+
+/* Corners of sixteen points. Two neighbours along x are one load, which fills a vector of which one lane is kept: there are more loads to
+   be had than shuffles. Four points i, j, k, l of a kind of voxels make vectors v0 .. v3, one for each row. */
+#define ISOGI_VOL__LOAD_FLOATS(p) _mm256_set1_epi64x(isogi_vol__two_floats(p))
+#define ISOGI_VOL__LOAD_SHORTS(p) _mm_set1_epi32(isogi_vol__two_shorts(p))
+#define ISOGI_VOL__KEEP_FLOATS _mm256_mask_mov_epi64
+#define ISOGI_VOL__KEEP_SHORTS _mm_mask_mov_epi32
+#define ISOGI_VOL__ADD(KIND, v, m) \
+    v##0 = ISOGI_VOL__KEEP_##KIND(v##0, m, ISOGI_VOL__LOAD_##KIND(rows[0] + q)), \
+    v##1 = ISOGI_VOL__KEEP_##KIND(v##1, m, ISOGI_VOL__LOAD_##KIND(rows[1] + q)), \
+    v##2 = ISOGI_VOL__KEEP_##KIND(v##2, m, ISOGI_VOL__LOAD_##KIND(rows[2] + q)), \
+    v##3 = ISOGI_VOL__KEEP_##KIND(v##3, m, ISOGI_VOL__LOAD_##KIND(rows[3] + q))
+#define ISOGI_VOL__FOUR(KIND, v, size, i, j, k, l) \
+    q = size * (ptrdiff_t)voxel[i], v##0 = ISOGI_VOL__LOAD_##KIND(rows[0] + q), v##1 = ISOGI_VOL__LOAD_##KIND(rows[1] + q); \
+    v##2 = ISOGI_VOL__LOAD_##KIND(rows[2] + q), v##3 = ISOGI_VOL__LOAD_##KIND(rows[3] + q); \
+    q = size * (ptrdiff_t)voxel[j], ISOGI_VOL__ADD(KIND, v, 2); \
+    q = size * (ptrdiff_t)voxel[k], ISOGI_VOL__ADD(KIND, v, 4); \
+    q = size * (ptrdiff_t)voxel[l], ISOGI_VOL__ADD(KIND, v, 8)
+
+ISOGI_VOL__AVX512 ISOGI_VOL__INLINE void isogi_vol__float_corners(const char *const rows[4], const int32_t voxel[16], __m512 out[8]) {
+    __m256i a0, a1, a2, a3, b0, b1, b2, b3, c0, c1, c2, c3, d0, d1, d2, d3;
+    ptrdiff_t q;
+    ISOGI_VOL__FOUR(FLOATS, a, 4, 0, 1, 4, 5);
+    ISOGI_VOL__FOUR(FLOATS, b, 4, 2, 3, 6, 7);
+    ISOGI_VOL__FOUR(FLOATS, c, 4, 8, 9, 12, 13);
+    ISOGI_VOL__FOUR(FLOATS, d, 4, 10, 11, 14, 15);
+#define ISOGI_VOL__PART(r) \
+    do { \
+        const __m512 even = _mm512_castsi512_ps(_mm512_inserti64x4(_mm512_castsi256_si512(a##r), c##r, 1)); \
+        const __m512 odd = _mm512_castsi512_ps(_mm512_inserti64x4(_mm512_castsi256_si512(b##r), d##r, 1)); \
+        out[2 * r] = _mm512_shuffle_ps(even, odd, 0x88), out[2 * r + 1] = _mm512_shuffle_ps(even, odd, 0xdd); \
+    } while (0)
+    ISOGI_VOL__PART(0);
+    ISOGI_VOL__PART(1);
+    ISOGI_VOL__PART(2);
+    ISOGI_VOL__PART(3);
+#undef ISOGI_VOL__PART
+}
+
+ISOGI_VOL__AVX512 ISOGI_VOL__INLINE void isogi_vol__short_corners(const char *const rows[4], const int32_t voxel[16], int is_signed,
+                                                                  __m512 out[8]) {
+    __m128i a0, a1, a2, a3, b0, b1, b2, b3, c0, c1, c2, c3, d0, d1, d2, d3;
+    ptrdiff_t q;
+    ISOGI_VOL__FOUR(SHORTS, a, 2, 0, 1, 2, 3);
+    ISOGI_VOL__FOUR(SHORTS, b, 2, 4, 5, 6, 7);
+    ISOGI_VOL__FOUR(SHORTS, c, 2, 8, 9, 10, 11);
+    ISOGI_VOL__FOUR(SHORTS, d, 2, 12, 13, 14, 15);
+#define ISOGI_VOL__PART(r) \
+    do { \
+        const __m512i all = _mm512_inserti64x4(_mm512_castsi256_si512(_mm256_set_m128i(b##r, a##r)), _mm256_set_m128i(d##r, c##r), 1); \
+        const __m512i first = _mm512_slli_epi32(all, 16); \
+        out[2 * r] = _mm512_cvtepi32_ps(is_signed ? _mm512_srai_epi32(first, 16) : _mm512_srli_epi32(first, 16)); \
+        out[2 * r + 1] = _mm512_cvtepi32_ps(is_signed ? _mm512_srai_epi32(all, 16) : _mm512_srli_epi32(all, 16)); \
+    } while (0)
+    ISOGI_VOL__PART(0);
+    ISOGI_VOL__PART(1);
+    ISOGI_VOL__PART(2);
+    ISOGI_VOL__PART(3);
+#undef ISOGI_VOL__PART
+}
+#undef ISOGI_VOL__LOAD_FLOATS
+#undef ISOGI_VOL__LOAD_SHORTS
+#undef ISOGI_VOL__KEEP_FLOATS
+#undef ISOGI_VOL__KEEP_SHORTS
+#undef ISOGI_VOL__ADD
+#undef ISOGI_VOL__FOUR
+
+/* Bytes are gathered a sixteen ahead of their use: a vector cannot be loaded from numbers that were stored just now. */
+ISOGI_VOL__INLINE void isogi_vol__gather_bytes(const char *const rows[4], isogi_vol__sixteen *at) {
+    int k;
+    for (k = 0; k < 16; k++) {
+        const ptrdiff_t q = at->voxel[k];
+        uint16_t x[4];
+        memcpy(&x[0], rows[0] + q, 2), memcpy(&x[1], rows[1] + q, 2), memcpy(&x[2], rows[2] + q, 2), memcpy(&x[3], rows[3] + q, 2);
+        at->bytes[k] = (x[0] | (uint32_t)x[1] << 16) | (uint64_t)(x[2] | (uint32_t)x[3] << 16) << 32;
+    }
+}
+
+ISOGI_VOL__AVX512 ISOGI_VOL__INLINE void isogi_vol__byte_corners(const isogi_vol__sixteen *at, int is_signed, __m512 out[8]) {
+    const __m512i low = _mm512_load_si512(&at->bytes[0]), high = _mm512_load_si512(&at->bytes[8]), one = _mm512_set1_epi32(1 << 24);
+    __m512i from = _mm512_slli_epi32(_mm512_setr_epi32(0, 8, 16, 24, 32, 40, 48, 56, 64, 72, 80, 88, 96, 104, 112, 120), 24);
+    int k;
+    for (k = 0; k < 8; k++, from = _mm512_add_epi32(from, one)) { /* to the upper end of 32 bits */
+        const __m512i x = _mm512_maskz_permutex2var_epi8(0x8888888888888888u, low, from, high);
+        out[k] = _mm512_cvtepi32_ps(is_signed ? _mm512_srai_epi32(x, 24) : _mm512_srli_epi32(x, 24));
+    }
+}
+
+ISOGI_VOL__AVX512 ISOGI_VOL__INLINE void isogi_vol__store16(float *out, size_t n, __m512 v) {
+    if (n >= 16) _mm512_storeu_ps(out, v);
+    else _mm512_mask_storeu_ps(out, (__mmask16)((1u << n) - 1), v);
+}
+
+ISOGI_VOL__AVX512 ISOGI_VOL__INLINE __m512 isogi_vol__halves(__m512d low, __m512d high) {
+    return _mm512_insertf32x8(_mm512_castps256_ps512(_mm512_cvtpd_ps(low)), _mm512_cvtpd_ps(high), 1);
+}
+
+ISOGI_VOL__AVX512 static __m512 isogi_vol__scaled16(const isogi_vol__sampling *s, __m512 v) {
+    const __m512d scale = _mm512_set1_pd(s->scale), bias = _mm512_set1_pd(s->bias);
+    return isogi_vol__halves(_mm512_fmadd_pd(scale, _mm512_cvtps_pd(_mm512_castps512_ps256(v)), bias),
+                             _mm512_fmadd_pd(scale, _mm512_cvtps_pd(_mm512_extractf32x8_ps(v, 1)), bias));
+}
+
+/* Coordinates x, y, z of the gradients of points 16 i and on, one after the other; in2: where z is. */
+ISOGI_VOL__AVX512 ISOGI_VOL__INLINE void isogi_vol__gradients16(const isogi_vol__sampling *s, size_t i, __m512 x, __m512 y, __m512 z) {
+    float *out = s->gradients + 48 * i;
+    const size_t n = 3 * (s->count - 16 * i);
+    x = _mm512_mul_ps(x, _mm512_set1_ps(s->slope[0])), y = _mm512_mul_ps(y, _mm512_set1_ps(s->slope[1]));
+    z = _mm512_mul_ps(z, _mm512_set1_ps(s->slope[2]));
+#define ISOGI_VOL__THIRD(r, in2, ...) \
+    do { \
+        const __m512i from = _mm512_setr_epi32(__VA_ARGS__); \
+        const __m512 all = _mm512_mask_permutexvar_ps(_mm512_permutex2var_ps(x, from, y), in2, from, z); \
+        if (n > 16 * r) isogi_vol__store16(out + 16 * r, n - 16 * r, all); \
+    } while (0)
+    ISOGI_VOL__THIRD(0, 0x4924, 0, 16, 0, 1, 17, 1, 2, 18, 2, 3, 19, 3, 4, 20, 4, 5);
+    ISOGI_VOL__THIRD(1, 0x2492, 21, 5, 6, 22, 6, 7, 23, 7, 8, 24, 8, 9, 25, 9, 10, 26);
+    ISOGI_VOL__THIRD(2, 0x9249, 10, 11, 27, 11, 12, 28, 12, 13, 29, 13, 14, 30, 14, 15, 31, 15);
+#undef ISOGI_VOL__THIRD
+}
+
+ISOGI_VOL__AVX512 ISOGI_VOL__INLINE void isogi_vol__trilinear16(const isogi_vol__sampling *s, isogi_type type) {
+    isogi_vol__sixteen ring[ISOGI_VOL__RING];
+    const char *const rows[4] = {s->rows[0], s->rows[1], s->rows[2], s->rows[3]};
+    const ptrdiff_t size = type == ISOGI_F32 ? 4 : type <= ISOGI_I8 ? 1 : 2;
+    const size_t sixteens = s->count / 16 + (s->count % 16 > 0);
+    const int bytes = type <= ISOGI_I8, is_signed = type == ISOGI_I8 || type == ISOGI_I16;
+    size_t next, i;
+    for (next = 0; next < sixteens + ISOGI_VOL__AHEAD; next++) {
+        const isogi_vol__sixteen *now;
+        const __m512 one = _mm512_set1_ps(1);
+        __m512 c[8], z0, z1, at0, at1, at2, rest0, rest1, rest2;
+        if (next < sixteens) isogi_vol__locate16(s, next, &ring[next % ISOGI_VOL__RING]);
+        if (next && next < sixteens) isogi_vol__ask_for_sixteen(rows, size, &ring[(next - 1) % ISOGI_VOL__RING]);
+        i = next - ISOGI_VOL__AHEAD; /* wraps: the ring is a power of two */
+        if (bytes && i + 1 < sixteens) isogi_vol__gather_bytes(rows, &ring[(i + 1) % ISOGI_VOL__RING]);
+        if (next < ISOGI_VOL__AHEAD) continue;
+        now = &ring[i % ISOGI_VOL__RING];
+        if (bytes) isogi_vol__byte_corners(now, is_signed, c);
+        else if (type == ISOGI_F32) isogi_vol__float_corners(rows, now->voxel, c);
+        else isogi_vol__short_corners(rows, now->voxel, is_signed, c);
+        at0 = _mm512_load_ps(now->local[0]), at1 = _mm512_load_ps(now->local[1]), at2 = _mm512_load_ps(now->local[2]);
+        rest0 = _mm512_sub_ps(one, at0), rest1 = _mm512_sub_ps(one, at1), rest2 = _mm512_sub_ps(one, at2);
+#define ISOGI_VOL__MIX(axis, a, b) ISOGI_VOL__BLEND(avx512, _mm512_, a, b, axis)
+#define ISOGI_VOL__RISE(a, b) _mm512_sub_ps(c[b], c[a])
+        if (s->values) {
+            z0 = ISOGI_VOL__MIX(1, ISOGI_VOL__MIX(0, c[0], c[1]), ISOGI_VOL__MIX(0, c[2], c[3]));
+            z1 = ISOGI_VOL__MIX(1, ISOGI_VOL__MIX(0, c[4], c[5]), ISOGI_VOL__MIX(0, c[6], c[7]));
+            z0 = ISOGI_VOL__MIX(2, z0, z1);
+            isogi_vol__store16(s->values + 16 * i, s->count - 16 * i, s->identity ? z0 : isogi_vol__scaled16(s, z0));
+        }
+        if (s->gradients) {
+            const __m512 x0 = ISOGI_VOL__MIX(1, ISOGI_VOL__RISE(0, 1), ISOGI_VOL__RISE(2, 3));
+            const __m512 x1 = ISOGI_VOL__MIX(1, ISOGI_VOL__RISE(4, 5), ISOGI_VOL__RISE(6, 7));
+            const __m512 y0 = ISOGI_VOL__MIX(0, ISOGI_VOL__RISE(0, 2), ISOGI_VOL__RISE(1, 3));
+            const __m512 y1 = ISOGI_VOL__MIX(0, ISOGI_VOL__RISE(4, 6), ISOGI_VOL__RISE(5, 7));
+            z0 = ISOGI_VOL__MIX(0, ISOGI_VOL__RISE(0, 4), ISOGI_VOL__RISE(1, 5));
+            z1 = ISOGI_VOL__MIX(0, ISOGI_VOL__RISE(2, 6), ISOGI_VOL__RISE(3, 7));
+            isogi_vol__gradients16(s, i, ISOGI_VOL__MIX(2, x0, x1), ISOGI_VOL__MIX(2, y0, y1), ISOGI_VOL__MIX(1, z0, z1));
+        }
+#undef ISOGI_VOL__MIX
+#undef ISOGI_VOL__RISE
+    }
+}
+
+/* A whole call, if it is of the kind that this serves. */
+ISOGI_VOL__AVX512 static int isogi_vol__sample16(const isogi_pyramid *p, const float (*world)[3], size_t count, float *values,
+                                                 float (*gradients)[3]) {
+    const isogi_volume *v = &p->volume;
+    const isogi_vol__float_grid *g = &p->float_grid;
+    const ptrdiff_t dy = v->size[1] > 1 ? v->stride[1] : 0, dz = v->size[2] > 1 ? v->stride[2] : 0;
+    isogi_vol__sampling s;
+    int a;
+    if (!g->usable || v->size[0] < 2 || v->stride[0] != (ptrdiff_t)isogi_vol__type_size(v->type)) return 0;
+    s.rows[0] = (const char *)v->data, s.rows[1] = s.rows[0] + dy, s.rows[2] = s.rows[0] + dz, s.rows[3] = s.rows[1] + dz;
+    s.points = (const float *)world, s.count = count, s.values = values, s.gradients = (float *)gradients, s.reach = 0;
+    s.scale = v->scale, s.bias = v->bias, s.identity = v->scale >= 1 && v->scale <= 1 && v->bias >= 0 && v->bias <= 0;
+    for (a = 0; a < 3; a++) {
+        const double slope = v->scale * p->to_grid[4 * a];
+        if (gradients && !(fabs(slope) > 1e-30 && fabs(slope) < 1e30)) return 0;
+        s.high[a] = g->high[a], s.low[a] = g->low[a], s.at_high[a] = g->at_high[a], s.at_low[a] = g->at_low[a];
+        s.at_guess[a] = g->at_high[a] - 1.0f / 512, s.last[a] = (float)(p->cells[a] - 1), s.slope[a] = (float)slope;
+        s.stride[a] = g->stride[a], s.reach += abs(g->stride[a]);
+    }
+    switch (v->type) {
+    case ISOGI_U8: isogi_vol__trilinear16(&s, ISOGI_U8); break;
+    case ISOGI_I8: isogi_vol__trilinear16(&s, ISOGI_I8); break;
+    case ISOGI_U16: isogi_vol__trilinear16(&s, ISOGI_U16); break;
+    case ISOGI_I16: isogi_vol__trilinear16(&s, ISOGI_I16); break;
+    case ISOGI_F32: isogi_vol__trilinear16(&s, ISOGI_F32); break;
+    case ISOGI_F64: return 0;
+    }
+    return 1;
+}
 #endif
 
 #ifdef ISOGI_VOL__NEON
@@ -2863,6 +3148,11 @@ static isogi_result isogi_vol__sample(const isogi_pyramid *p, isogi_filter filte
     if (!p || (count && !world && !grid) || filter < ISOGI_FILTER_LINEAR || filter > ISOGI_FILTER_CATMULL_ROM) return ISOGI_INVALID;
 #if defined(ISOGI_VOL__SSE2) || defined(ISOGI_VOL__NEON)
     if (isogi_vol__blockwise(p, filter)) {
+#ifdef ISOGI_VOL__AVX
+        if (filter == ISOGI_FILTER_LINEAR && world && p->path >= ISOGI_VOL__PATH_AVX512 &&
+            isogi_vol__sample16(p, world, count, values, gradients))
+            return ISOGI_OK;
+#endif
         isogi_vol__sample_blocks(p, filter, &at, count, values, gradients);
         return ISOGI_OK;
     }
@@ -5302,10 +5592,6 @@ typedef struct __attribute__((aligned(64))) isogi_vol__layers {
     __m512 per[3], first[3], last[3], stop; /* from somewhere on, the rays enter layer i of children at i per - first,
                                                leave it at (i + 1) per - last */
 } isogi_vol__layers;
-
-ISOGI_VOL__AVX512 ISOGI_VOL__INLINE __m512 isogi_vol__halves(__m512d low, __m512d high) {
-    return _mm512_insertf32x8(_mm512_castps256_ps512(_mm512_cvtpd_ps(low)), _mm512_cvtpd_ps(high), 1);
-}
 
 /* Rays of a packet as they go through cells that are counted backwards where they fall, hence upwards along all axes. */
 typedef struct __attribute__((aligned(64))) isogi_vol__packet {

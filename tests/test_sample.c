@@ -502,6 +502,80 @@ TEST(nothing_is_read_beyond_the_volume) {
 #endif
 }
 
+/* Pages that hold `bytes` at their end, with nothing behind; NULL if there is no such memory. */
+static char *fenced(size_t bytes) {
+#if defined(__unix__)
+    const size_t page = 4096, all = (bytes + page - 1) / page * page;
+    char *memory = (char *)mmap(NULL, all + page, PROT_NONE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
+    if (memory == (char *)MAP_FAILED || mprotect(memory, all, PROT_READ | PROT_WRITE)) return NULL;
+    return memory + all - bytes;
+#else
+    (void)bytes;
+    return NULL;
+#endif
+}
+
+/* Of any number of points; what is not asked for changes nothing in what is. */
+TEST(nothing_is_read_or_written_beyond_the_points) {
+    enum { MOST = 70 };
+    static float values[MOST], gradients[MOST][3];
+    float *points = (float *)(void *)fenced(sizeof gradients), *value = (float *)(void *)fenced(sizeof values);
+    float *gradient = (float *)(void *)fenced(sizeof gradients);
+    test_random r = {11};
+    if (!points || !value || !gradient) SKIP("no memory to be protected");
+    for (int type = ISOGI_U8; type <= ISOGI_F64; type++)
+        for (int path = 0; path < PATHS; path++) {
+            lattice l = lattice_new((isogi_type)type, PACKED, 9, 11, 10, &r);
+            const isogi_context context = {.threads = 1, .force_path = path};
+            isogi_pyramid *p = NULL;
+            CHECK(isogi_vol_build(&p, &l.volume, &context) == ISOGI_OK, "built");
+            for (int f = 0; f < 3; f++)
+                for (int n = 1; n <= MOST; n++) {
+                    float *at = points + 3 * (MOST - n), *v = value + (MOST - n), *g = gradient + 3 * (MOST - n);
+                    for (int i = 0; i < 3 * n; i++) at[i] = (float)random_range(&r, -0.5, 9);
+                    isogi_vol_sample_filtered(p, filters[f], (const float(*)[3])(void *)at, (size_t)n, values, gradients);
+                    isogi_vol_sample_filtered(p, filters[f], (const float(*)[3])(void *)at, (size_t)n, v, NULL);
+                    isogi_vol_sample_filtered(p, filters[f], (const float(*)[3])(void *)at, (size_t)n, NULL, (float(*)[3])(void *)g);
+                    CHECK(!memcmp(values, v, (size_t)n * sizeof *v) && !memcmp(gradients, g, 3 * (size_t)n * sizeof *g),
+                          "type %d, path %d, filter %d: %d points", type, path, f, n);
+                }
+            isogi_vol_free(p);
+            free(l.memory);
+        }
+}
+
+/* Scales that floats do not reach, of voxels that make up for it. */
+TEST(scales_beyond_floats) {
+    enum { COUNT = 60 };
+    static float data[6 * 6 * 6], points[COUNT][3], values[COUNT], gradients[COUNT][3];
+    test_random r = {12};
+    for (int n = 0; n < 2; n++)
+        for (int path = 0; path < PATHS; path++) {
+            const double unit = n ? 1e20 : 1e-20;
+            const isogi_volume v = {.data = data, .type = ISOGI_F32, .size = {6, 6, 6}, .scale = n ? 1e-41 : 1e41};
+            const isogi_context context = {.threads = 1, .force_path = path}, plain = {.threads = 1, .force_path = 1};
+            isogi_pyramid *p[2] = {NULL, NULL};
+            const double most = unit * v.scale;
+            for (int i = 0; i < 216; i++) data[i] = (float)(unit * random_range(&r, -1, 1));
+            for (int i = 0; i < COUNT; i++)
+                for (int a = 0; a < 3; a++) points[i][a] = (float)random_range(&r, 0, 5);
+            CHECK(isogi_vol_build(&p[0], &v, &context) == ISOGI_OK && isogi_vol_build(&p[1], &v, &plain) == ISOGI_OK, "built");
+            for (int f = 0; f < 3; f++) {
+                float value[COUNT], gradient[COUNT][3];
+                isogi_vol_sample_filtered(p[0], filters[f], (const float(*)[3])points, COUNT, values, gradients);
+                isogi_vol_sample_filtered(p[1], filters[f], (const float(*)[3])points, COUNT, value, gradient);
+                for (int i = 0; i < COUNT; i++) {
+                    CHECK(fabs((double)values[i] - (double)value[i]) < 1e-6 * most, "path %d, filter %d: %g, not %g of %g", path, f,
+                          (double)values[i], (double)value[i], most);
+                    for (int a = 0; a < 3; a++)
+                        CHECK(fabs((double)gradients[i][a] - (double)gradient[i][a]) < 4e-6 * most, "path %d, filter %d: %g, not %g of %g",
+                              path, f, (double)gradients[i][a], (double)gradient[i][a], most);
+                }
+            }
+            isogi_vol_free(p[0]), isogi_vol_free(p[1]);
+        }
+}
+
 /* ---- interpolation ---- */
 
 static double marschner_lobb(double x, double y, double z, double gradient[3]) {
