@@ -2322,46 +2322,47 @@ ISOGI_VOL__INLINE const char *isogi_vol__first_tap(const isogi_volume *v, ptrdif
 /* Cubic filters for n points all of whose taps exist. Every four lanes are a point of their own and hold four taps of a row; rows are
    summed along y, then z, and x comes last. Taps count relative to the cell's first voxel, so that rounding is relative to the variation
    among them: hence the slices go 1, 2, 3, 0. What a width has to offer: SPREAD, a number for each point; TILE, four numbers for every
-   point; LANE, the number of one lane of four in all of them; TURN, lanes moved down by one of four; ROW, a row of each point, q[...]
-   bytes from p; SUMS, the sums of four vectors over lanes, side by side. sum is a parameter of its own since gcc 12 forgets calls that
-   only write into b. */
+   point; LANE, the number of one lane of four in all of them; SUMS, the sums of four vectors over lanes, side by side. ROW: a row of each
+   point as floats, r bytes from at0, at1 ...; KIND: of what voxels. sum is a parameter of its own since gcc 12 forgets calls that only
+   write into b. */
 #define ISOGI_VOL__WEIGHTS(NAME, L, axis, w, d)                                                                                  \
     u = ISOGI_VOL__SPREAD_##NAME(&b->local[axis][i]), half = ISOGI_VOL__MADD_##NAME(c3, u, c2);                                  \
     w = ISOGI_VOL__MADD_##NAME(ISOGI_VOL__MADD_##NAME(half, u, c1), u, c0);                                                      \
     d = ISOGI_VOL__MADD_##NAME(ISOGI_VOL__MADD_##NAME(c3, u, L##add_ps(half, half)), u, c1)
 #define ISOGI_VOL__ALONG_Y(NAME, L, w)                                                                                           \
     ISOGI_VOL__MADD_##NAME(w##3, row3, ISOGI_VOL__MADD_##NAME(w##2, row2, ISOGI_VOL__MADD_##NAME(w##1, row1, L##mul_ps(w##0, row0))))
-#define ISOGI_VOL__CUBIC(NAME, ATTRIBUTES, V, L, WIDTH)                                                                          \
-    ATTRIBUTES static void isogi_vol__cubic_##NAME(const isogi_vol__taps_at *taps, const isogi_vol__block *b, int from, int n, \
-        float *sum) { \
+#define ISOGI_VOL__SLICE(NAME, L, ROW, k, to_next)                                                                               \
+    row0 = ROW(0), row1 = ROW(sy), row2 = ROW(2 * sy), row3 = ROW(sy3), at0 += to_next, at1 += to_next, at2 += to_next, at3 += to_next; \
+    if ((k) == 1) base = ISOGI_VOL__LANE_##NAME(row1, 1);                                                                        \
+    row0 = L##sub_ps(row0, base), row1 = L##sub_ps(row1, base), row2 = L##sub_ps(row2, base), row3 = L##sub_ps(row3, base);      \
+    slice = ISOGI_VOL__ALONG_Y(NAME, L, wy), slope = ISOGI_VOL__ALONG_Y(NAME, L, dy), u = ISOGI_VOL__LANE_##NAME(wz, k);         \
+    value = ISOGI_VOL__MADD_##NAME(u, slice, value), by_y = ISOGI_VOL__MADD_##NAME(u, slope, by_y);                              \
+    by_z = ISOGI_VOL__MADD_##NAME(ISOGI_VOL__LANE_##NAME(dz, k), slice, by_z)
+#define ISOGI_VOL__CUBIC(NAME, ATTRIBUTES, V, L, WIDTH, KIND, ROW)                                                               \
+    ATTRIBUTES static void isogi_vol__cubic_##KIND##_##NAME(const isogi_vol__taps_at *taps, const isogi_vol__block *b, int from, int n, \
+                                                            float *sum) {                                                        \
         const float(*powers)[4] = taps->powers;                                                                                  \
         const V c0 = ISOGI_VOL__TILE_##NAME(powers[0]), c1 = ISOGI_VOL__TILE_##NAME(powers[1]), c2 = ISOGI_VOL__TILE_##NAME(powers[2]); \
         const V c3 = ISOGI_VOL__TILE_##NAME(powers[3]), to_value = ISOGI_VOL__TILE_##NAME(powers[4]);                            \
-        const ptrdiff_t sy = taps->y, sz = taps->z;                                                                              \
-        int i, k;                                                                                                                \
+        const ptrdiff_t sy = taps->y, sz = taps->z, sy3 = 3 * sy, back = -3 * sz;                                                \
+        int i;                                                                                                                   \
         for (i = from; i < n; i += WIDTH / 4) {                                                                                  \
             const ptrdiff_t *q = taps->offset + (i - from);                                                                      \
-            const char *p = taps->first + sz;                                                                                    \
+            const char *first = taps->first + sz, *at0 = first + q[0], *at1 = WIDTH > 4 ? first + q[1] : at0;                    \
+            const char *at2 = WIDTH > 8 ? first + q[2] : at0, *at3 = WIDTH > 8 ? first + q[3] : at0;                             \
             V u, half, wx, dx, wy, dy, wz, dz, wy0, wy1, wy2, wy3, dy0, dy1, dy2, dy3, slice, slope, base, row0, row1, row2, row3; \
             V value = L##setzero_ps(), by_y = value, by_z = value;                                                               \
-            ISOGI_VOL__WEIGHTS(NAME, L, 0, wx, dx);                                                                              \
             ISOGI_VOL__WEIGHTS(NAME, L, 1, wy, dy);                                                                              \
-            ISOGI_VOL__WEIGHTS(NAME, L, 2, wz, dz);                                                                              \
             wy0 = ISOGI_VOL__LANE_##NAME(wy, 0), wy1 = ISOGI_VOL__LANE_##NAME(wy, 1);                                            \
             wy2 = ISOGI_VOL__LANE_##NAME(wy, 2), wy3 = ISOGI_VOL__LANE_##NAME(wy, 3);                                            \
             dy0 = ISOGI_VOL__LANE_##NAME(dy, 0), dy1 = ISOGI_VOL__LANE_##NAME(dy, 1);                                            \
             dy2 = ISOGI_VOL__LANE_##NAME(dy, 2), dy3 = ISOGI_VOL__LANE_##NAME(dy, 3);                                            \
-            base = row0 = row1 = row2 = row3 = value;                                                                            \
-            for (k = 0; k < 4; k++, p += k == 3 ? -3 * sz : sz) {                                                                \
-                row0 = ISOGI_VOL__ROW_##NAME(p), row1 = ISOGI_VOL__ROW_##NAME(p + sy);                                           \
-                row2 = ISOGI_VOL__ROW_##NAME(p + 2 * sy), row3 = ISOGI_VOL__ROW_##NAME(p + 3 * sy);                              \
-                if (!k) base = ISOGI_VOL__LANE_##NAME(row1, 1);                                                                  \
-                row0 = L##sub_ps(row0, base), row1 = L##sub_ps(row1, base), row2 = L##sub_ps(row2, base), row3 = L##sub_ps(row3, base); \
-                slice = ISOGI_VOL__ALONG_Y(NAME, L, wy), slope = ISOGI_VOL__ALONG_Y(NAME, L, dy);                                \
-                wz = ISOGI_VOL__TURN_##NAME(wz), dz = ISOGI_VOL__TURN_##NAME(dz), u = ISOGI_VOL__LANE_##NAME(wz, 0);             \
-                value = ISOGI_VOL__MADD_##NAME(u, slice, value), by_y = ISOGI_VOL__MADD_##NAME(u, slope, by_y);                  \
-                by_z = ISOGI_VOL__MADD_##NAME(ISOGI_VOL__LANE_##NAME(dz, 0), slice, by_z);                                       \
-            }                                                                                                                    \
+            ISOGI_VOL__WEIGHTS(NAME, L, 2, wz, dz);                                                                              \
+            ISOGI_VOL__SLICE(NAME, L, ROW, 1, sz);                                                                               \
+            ISOGI_VOL__SLICE(NAME, L, ROW, 2, sz);                                                                               \
+            ISOGI_VOL__SLICE(NAME, L, ROW, 3, back);                                                                             \
+            ISOGI_VOL__SLICE(NAME, L, ROW, 0, 0);                                                                                \
+            ISOGI_VOL__WEIGHTS(NAME, L, 0, wx, dx);                                                                              \
             slice = ISOGI_VOL__SUMS_##NAME(L##mul_ps(value, wx), L##mul_ps(value, dx), L##mul_ps(by_y, wx), L##mul_ps(by_z, wx)); \
             L##storeu_ps(sum + 4 * i, ISOGI_VOL__MADD_##NAME(base, to_value, slice));                                            \
         }                                                                                                                        \
@@ -2392,7 +2393,6 @@ ISOGI_VOL__INLINE const char *isogi_vol__first_tap(const isogi_volume *v, ptrdif
 #define ISOGI_VOL__SPREAD_base(p) _mm_set1_ps(*(p))
 #define ISOGI_VOL__TILE_base(p) _mm_loadu_ps(p)
 #define ISOGI_VOL__LANE_base(v, i) _mm_shuffle_ps(v, v, 0x55 * (i))
-#define ISOGI_VOL__TURN_base(v) _mm_shuffle_ps(v, v, 0x39)
 /* sums of a and b in turn, of c and d, then of all; S: vectors */
 #define ISOGI_VOL__HALVES(L, a, b) L##add_ps(L##unpacklo_ps(a, b), L##unpackhi_ps(a, b))
 #define ISOGI_VOL__WHOLES(L, s, t) L##add_ps(L##shuffle_ps(s, t, 0x44), L##shuffle_ps(s, t, 0xee))
@@ -2411,12 +2411,11 @@ ISOGI_VOL__INLINE __m128i isogi_vol__four_bytes(const char *p) {
 #define ISOGI_VOL__U16_base(p) _mm_cvtepi32_ps(_mm_srli_epi32(ISOGI_VOL__SHORTS(p), 16))
 #define ISOGI_VOL__I16_base(p) _mm_cvtepi32_ps(_mm_srai_epi32(ISOGI_VOL__SHORTS(p), 16))
 #define ISOGI_VOL__F32_base(p) _mm_loadu_ps((const float *)(const void *)(p))
-#define ISOGI_VOL__FLOATS(p, i) ISOGI_VOL__F32_base((p) + q[i])
-#define ISOGI_VOL__ROW_base(p) ISOGI_VOL__FLOATS(p, 0)
+#define ISOGI_VOL__ROW_base(r) ISOGI_VOL__F32_base(at0 + (r))
 ISOGI_VOL__TRILINEAR(base, , __m128, _mm_)
 ISOGI_VOL__TRILINEAR_BLOCK(base, , __m128, _mm_, 4)
 ISOGI_VOL__WIDEN(base, , _mm_)
-ISOGI_VOL__CUBIC(base, , __m128, _mm_, 4)
+ISOGI_VOL__CUBIC(base, , __m128, _mm_, 4, f32, ISOGI_VOL__ROW_base)
 #endif
 
 #ifdef ISOGI_VOL__AVX
@@ -2425,9 +2424,14 @@ ISOGI_VOL__CUBIC(base, , __m128, _mm_, 4)
 #define ISOGI_VOL__SPREAD_avx2(p) _mm256_set_m128(_mm_set1_ps((p)[1]), _mm_set1_ps((p)[0]))
 #define ISOGI_VOL__TILE_avx2(p) _mm256_broadcast_ps((const __m128 *)(const void *)(p))
 #define ISOGI_VOL__LANE_avx2(v, i) _mm256_permute_ps(v, 0x55 * (i))
-#define ISOGI_VOL__TURN_avx2(v) _mm256_permute_ps(v, 0x39)
 #define ISOGI_VOL__SUMS_avx2(a, b, c, d) ISOGI_VOL__WHOLES(_mm256_, ISOGI_VOL__HALVES(_mm256_, a, b), ISOGI_VOL__HALVES(_mm256_, c, d))
-#define ISOGI_VOL__ROW_avx2(p) _mm256_set_m128(ISOGI_VOL__FLOATS(p, 1), ISOGI_VOL__FLOATS(p, 0))
+#define ISOGI_VOL__ROW_avx2(r) _mm256_set_m128(ISOGI_VOL__F32_base(at1 + (r)), ISOGI_VOL__F32_base(at0 + (r)))
+#define ISOGI_VOL__BYTES_avx2(r) _mm_unpacklo_epi32(isogi_vol__four_bytes(at0 + (r)), isogi_vol__four_bytes(at1 + (r)))
+#define ISOGI_VOL__SHORTS_avx2(r) _mm_unpacklo_epi64(ISOGI_VOL__EIGHT(at0 + (r)), ISOGI_VOL__EIGHT(at1 + (r)))
+#define ISOGI_VOL__ROW_U8_avx2(r) _mm256_cvtepi32_ps(_mm256_cvtepu8_epi32(ISOGI_VOL__BYTES_avx2(r)))
+#define ISOGI_VOL__ROW_I8_avx2(r) _mm256_cvtepi32_ps(_mm256_cvtepi8_epi32(ISOGI_VOL__BYTES_avx2(r)))
+#define ISOGI_VOL__ROW_U16_avx2(r) _mm256_cvtepi32_ps(_mm256_cvtepu16_epi32(ISOGI_VOL__SHORTS_avx2(r)))
+#define ISOGI_VOL__ROW_I16_avx2(r) _mm256_cvtepi32_ps(_mm256_cvtepi16_epi32(ISOGI_VOL__SHORTS_avx2(r)))
 #define ISOGI_VOL__U8_avx2(p) _mm_cvtepi32_ps(_mm_cvtepu8_epi32(isogi_vol__four_bytes(p)))
 #define ISOGI_VOL__I8_avx2(p) _mm_cvtepi32_ps(_mm_cvtepi8_epi32(isogi_vol__four_bytes(p)))
 #define ISOGI_VOL__U16_avx2(p) _mm_cvtepi32_ps(_mm_cvtepu16_epi32(ISOGI_VOL__EIGHT(p)))
@@ -2436,7 +2440,11 @@ ISOGI_VOL__CUBIC(base, , __m128, _mm_, 4)
 ISOGI_VOL__TRILINEAR(avx2, ISOGI_VOL__AVX2, __m256, _mm256_)
 ISOGI_VOL__TRILINEAR_BLOCK(avx2, ISOGI_VOL__AVX2, __m256, _mm256_, 8)
 ISOGI_VOL__WIDEN(avx2, ISOGI_VOL__AVX2, _mm_)
-ISOGI_VOL__CUBIC(avx2, ISOGI_VOL__AVX2, __m256, _mm256_, 8)
+ISOGI_VOL__CUBIC(avx2, ISOGI_VOL__AVX2, __m256, _mm256_, 8, f32, ISOGI_VOL__ROW_avx2)
+ISOGI_VOL__CUBIC(avx2, ISOGI_VOL__AVX2, __m256, _mm256_, 8, u8, ISOGI_VOL__ROW_U8_avx2)
+ISOGI_VOL__CUBIC(avx2, ISOGI_VOL__AVX2, __m256, _mm256_, 8, i8, ISOGI_VOL__ROW_I8_avx2)
+ISOGI_VOL__CUBIC(avx2, ISOGI_VOL__AVX2, __m256, _mm256_, 8, u16, ISOGI_VOL__ROW_U16_avx2)
+ISOGI_VOL__CUBIC(avx2, ISOGI_VOL__AVX2, __m256, _mm256_, 8, i16, ISOGI_VOL__ROW_I16_avx2)
 
 /* Corners of eight points in a row of voxels that follow each other, and their neighbours along x. Two neighbours are one load: gathers are
    slower on many processors. */
@@ -2534,12 +2542,40 @@ ISOGI_VOL__AVX2 static void isogi_vol__trilinear_pairs(const isogi_volume *v, is
     _mm512_permutexvar_ps(_mm512_setr_epi32(0, 0, 0, 0, 1, 1, 1, 1, 2, 2, 2, 2, 3, 3, 3, 3), _mm512_castps128_ps512(_mm_loadu_ps(p)))
 #define ISOGI_VOL__TILE_avx512(p) _mm512_broadcast_f32x4(_mm_loadu_ps(p))
 #define ISOGI_VOL__LANE_avx512(v, i) _mm512_permute_ps(v, 0x55 * (i))
-#define ISOGI_VOL__TURN_avx512(v) _mm512_permute_ps(v, 0x39)
 #define ISOGI_VOL__SUMS_avx512(a, b, c, d) ISOGI_VOL__WHOLES(_mm512_, ISOGI_VOL__HALVES(_mm512_, a, b), ISOGI_VOL__HALVES(_mm512_, c, d))
-#define ISOGI_VOL__ROW_avx512(p)                                                                                                 \
-    _mm512_insertf32x4(_mm512_insertf32x4(_mm512_insertf32x4(_mm512_castps128_ps512(ISOGI_VOL__FLOATS(p, 0)), ISOGI_VOL__FLOATS(p, 1), 1), \
-                                          ISOGI_VOL__FLOATS(p, 2), 2), ISOGI_VOL__FLOATS(p, 3), 3)
-ISOGI_VOL__CUBIC(avx512, ISOGI_VOL__AVX512, __m512, _mm512_, 16)
+ISOGI_VOL__INLINE int32_t isogi_vol__four_bytes_of(const char *p) {
+    int32_t x;
+    memcpy(&x, p, sizeof x);
+    return x;
+}
+
+ISOGI_VOL__INLINE int64_t isogi_vol__eight_bytes_of(const char *p) {
+    int64_t x;
+    memcpy(&x, p, sizeof x);
+    return x;
+}
+
+/* A quarter of a vector is kept of one that is loaded into all of them. */
+#define ISOGI_VOL__FLOATS(v, m, p) _mm512_mask_broadcast_f32x4(v, m, ISOGI_VOL__F32_base(p))
+#define ISOGI_VOL__ROW_avx512(r)                                                                                                 \
+    ISOGI_VOL__FLOATS(ISOGI_VOL__FLOATS(ISOGI_VOL__FLOATS(_mm512_broadcast_f32x4(ISOGI_VOL__F32_base(at0 + (r))), 0x00f0, at1 + (r)), 0x0f00, \
+                                        at2 + (r)), 0xf000, at3 + (r))
+#define ISOGI_VOL__WORDS(v, m, p) _mm_mask_mov_epi32(v, m, _mm_set1_epi32(isogi_vol__four_bytes_of(p)))
+#define ISOGI_VOL__BYTES_avx512(r)                                                                                               \
+    ISOGI_VOL__WORDS(ISOGI_VOL__WORDS(ISOGI_VOL__WORDS(isogi_vol__four_bytes(at0 + (r)), 2, at1 + (r)), 4, at2 + (r)), 8, at3 + (r))
+#define ISOGI_VOL__QUADS(v, m, p) _mm256_mask_mov_epi64(v, m, _mm256_set1_epi64x(isogi_vol__eight_bytes_of(p)))
+#define ISOGI_VOL__SHORTS_avx512(r)                                                                                              \
+    ISOGI_VOL__QUADS(ISOGI_VOL__QUADS(ISOGI_VOL__QUADS(_mm256_castsi128_si256(ISOGI_VOL__EIGHT(at0 + (r))), 2, at1 + (r)), 4, at2 + (r)), 8, \
+                     at3 + (r))
+#define ISOGI_VOL__ROW_U8_avx512(r) _mm512_cvtepi32_ps(_mm512_cvtepu8_epi32(ISOGI_VOL__BYTES_avx512(r)))
+#define ISOGI_VOL__ROW_I8_avx512(r) _mm512_cvtepi32_ps(_mm512_cvtepi8_epi32(ISOGI_VOL__BYTES_avx512(r)))
+#define ISOGI_VOL__ROW_U16_avx512(r) _mm512_cvtepi32_ps(_mm512_cvtepu16_epi32(ISOGI_VOL__SHORTS_avx512(r)))
+#define ISOGI_VOL__ROW_I16_avx512(r) _mm512_cvtepi32_ps(_mm512_cvtepi16_epi32(ISOGI_VOL__SHORTS_avx512(r)))
+ISOGI_VOL__CUBIC(avx512, ISOGI_VOL__AVX512, __m512, _mm512_, 16, f32, ISOGI_VOL__ROW_avx512)
+ISOGI_VOL__CUBIC(avx512, ISOGI_VOL__AVX512, __m512, _mm512_, 16, u8, ISOGI_VOL__ROW_U8_avx512)
+ISOGI_VOL__CUBIC(avx512, ISOGI_VOL__AVX512, __m512, _mm512_, 16, i8, ISOGI_VOL__ROW_I8_avx512)
+ISOGI_VOL__CUBIC(avx512, ISOGI_VOL__AVX512, __m512, _mm512_, 16, u16, ISOGI_VOL__ROW_U16_avx512)
+ISOGI_VOL__CUBIC(avx512, ISOGI_VOL__AVX512, __m512, _mm512_, 16, i16, ISOGI_VOL__ROW_I16_avx512)
 
 /* ---- trilinear values and gradients in sixteens ----
 
@@ -2620,22 +2656,10 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE void isogi_vol__ask_for_sixteen(const char *
 #undef ISOGI_VOL__ASK
 }
 
-ISOGI_VOL__INLINE int64_t isogi_vol__two_floats(const char *p) {
-    int64_t x;
-    memcpy(&x, p, sizeof x);
-    return x;
-}
-
-ISOGI_VOL__INLINE int32_t isogi_vol__two_shorts(const char *p) {
-    int32_t x;
-    memcpy(&x, p, sizeof x);
-    return x;
-}
-
 /* Corners of sixteen points. Two neighbours along x are one load, which fills a vector of which one lane is kept: there are more loads to
    be had than shuffles. Four points i, j, k, l of a kind of voxels make vectors v0 .. v3, one for each row. */
-#define ISOGI_VOL__LOAD_FLOATS(p) _mm256_set1_epi64x(isogi_vol__two_floats(p))
-#define ISOGI_VOL__LOAD_SHORTS(p) _mm_set1_epi32(isogi_vol__two_shorts(p))
+#define ISOGI_VOL__LOAD_FLOATS(p) _mm256_set1_epi64x(isogi_vol__eight_bytes_of(p))
+#define ISOGI_VOL__LOAD_SHORTS(p) _mm_set1_epi32(isogi_vol__four_bytes_of(p))
 #define ISOGI_VOL__KEEP_FLOATS _mm256_mask_mov_epi64
 #define ISOGI_VOL__KEEP_SHORTS _mm_mask_mov_epi32
 #define ISOGI_VOL__ADD(KIND, v, m) \
@@ -2840,7 +2864,6 @@ ISOGI_VOL__AVX512 static int isogi_vol__sample16(const isogi_pyramid *p, const f
 #define ISOGI_VOL__SPREAD_base(p) vdupq_n_f32(*(p))
 #define ISOGI_VOL__TILE_base(p) vld1q_f32(p)
 #define ISOGI_VOL__LANE_base(v, i) vdupq_laneq_f32(v, i)
-#define ISOGI_VOL__TURN_base(v) vextq_f32(v, v, 1)
 #define ISOGI_VOL__SUMS_base(a, b, c, d) vpaddq_f32(vpaddq_f32(a, b), vpaddq_f32(c, d))
 ISOGI_VOL__INLINE uint8x8_t isogi_vol__four_bytes(const char *p) {
     uint32_t x;
@@ -2857,11 +2880,11 @@ ISOGI_VOL__INLINE uint16x4_t isogi_vol__four_shorts(const char *p) {
 #define ISOGI_VOL__U16_base(p) vcvtq_f32_u32(vmovl_u16(isogi_vol__four_shorts(p)))
 #define ISOGI_VOL__I16_base(p) vcvtq_f32_s32(vmovl_s16(vreinterpret_s16_u16(isogi_vol__four_shorts(p))))
 #define ISOGI_VOL__F32_base(p) vld1q_f32((const float *)(const void *)(p))
-#define ISOGI_VOL__ROW_base(p) ISOGI_VOL__F32_base((p) + q[0])
+#define ISOGI_VOL__ROW_base(r) ISOGI_VOL__F32_base(at0 + (r))
 ISOGI_VOL__TRILINEAR(base, , float32x4_t, isogi_vol__neon_)
 ISOGI_VOL__TRILINEAR_BLOCK(base, , float32x4_t, isogi_vol__neon_, 4)
 ISOGI_VOL__WIDEN(base, , isogi_vol__neon_)
-ISOGI_VOL__CUBIC(base, , float32x4_t, isogi_vol__neon_, 4)
+ISOGI_VOL__CUBIC(base, , float32x4_t, isogi_vol__neon_, 4, f32, ISOGI_VOL__ROW_base)
 #endif
 
 #if defined(ISOGI_VOL__AVX) && !defined(__clang__)
@@ -2886,19 +2909,28 @@ static int isogi_vol__blockwise(const isogi_pyramid *p, isogi_filter filter) {
     return (v->stride[0] == (ptrdiff_t)isogi_vol__type_size(v->type) && low[0] < high[0] && low[1] < high[1] && low[2] < high[2]);
 }
 
-static void isogi_vol__cubic_points(const isogi_pyramid *p, const isogi_vol__taps_at *taps, isogi_vol__block *b, int from, int n) {
+/* type: of the taps. */
+static void isogi_vol__cubic_points(const isogi_pyramid *p, isogi_type type, const isogi_vol__taps_at *taps, isogi_vol__block *b, int from,
+                                    int n) {
 #ifdef ISOGI_VOL__AVX
-    if (p->path >= ISOGI_VOL__PATH_AVX512) {
-        isogi_vol__cubic_avx512(taps, b, from, n, b->sum);
-        return;
+#define ISOGI_VOL__PATHS(KIND)                                                                                                   \
+    if (p->path >= ISOGI_VOL__PATH_AVX512) isogi_vol__cubic_##KIND##_avx512(taps, b, from, n, b->sum);                           \
+    else isogi_vol__cubic_##KIND##_avx2(taps, b, from, n, b->sum);                                                               \
+    return
+    if (p->path >= ISOGI_VOL__PATH_AVX2) {
+        switch (type) {
+        case ISOGI_U8: ISOGI_VOL__PATHS(u8);
+        case ISOGI_I8: ISOGI_VOL__PATHS(i8);
+        case ISOGI_U16: ISOGI_VOL__PATHS(u16);
+        case ISOGI_I16: ISOGI_VOL__PATHS(i16);
+        case ISOGI_F32: ISOGI_VOL__PATHS(f32);
+        case ISOGI_F64: break;
+        }
     }
-    if (p->path == ISOGI_VOL__PATH_AVX2) {
-        isogi_vol__cubic_avx2(taps, b, from, n, b->sum);
-        return;
-    }
+#undef ISOGI_VOL__PATHS
 #endif
-    isogi_vol__cubic_base(taps, b, from, n, b->sum);
-    (void)p;
+    isogi_vol__cubic_f32_base(taps, b, from, n, b->sum);
+    (void)p, (void)type;
 }
 
 /* The 64 taps of point i side by side. At the border they are those of the nearest inner cell, moved by one along each axis concerned;
@@ -2955,7 +2987,8 @@ ISOGI_VOL__INLINE void isogi_vol__ask_for_taps(const isogi_volume *v, const isog
 #endif
 }
 
-/* Raw values and gradients of a block. Floats are taken where they lie; integers, and points at the border, are copied first. */
+/* Raw values and gradients of a block. Voxels are taken where they lie; points at the border, and integers in portable code, are copied
+   first, as floats. */
 static void isogi_vol__cubic_block(const isogi_pyramid *p, isogi_filter filter, isogi_vol__block *b, int n) {
     const isogi_volume *v = &p->volume;
     const double(*c)[4] = isogi_vol__taps[filter == ISOGI_FILTER_CATMULL_ROM];
@@ -2971,7 +3004,7 @@ static void isogi_vol__cubic_block(const isogi_pyramid *p, isogi_filter filter, 
     isogi_vol__inner_cells(p, low, high);
     for (i = 0; i < n; i += 16) {
         const int end = i + 16 < n ? i + 16 : n, whole = (end + 3) & ~3;
-        int32_t beyond = v->type == ISOGI_F32 ? 0 : -1;
+        int32_t beyond = v->type == ISOGI_F32 || p->path >= ISOGI_VOL__PATH_AVX2 ? 0 : -1;
         for (k = end; k < i + 16; k++) { /* the last point again */
             for (a = 0; a < 3; a++) b->cell[a][k] = b->cell[a][end - 1];
             b->offset[k] = b->offset[end - 1];
@@ -2985,7 +3018,7 @@ static void isogi_vol__cubic_block(const isogi_pyramid *p, isogi_filter filter, 
             taps.first = (const char *)(const void *)some, taps.offset = offset, taps.y = 4 * sizeof(float), taps.z = 16 * sizeof(float);
         }
         isogi_vol__ask_for_taps(v, b, i, n, apart);
-        isogi_vol__cubic_points(p, &taps, b, i, end);
+        isogi_vol__cubic_points(p, beyond < 0 ? ISOGI_F32 : v->type, &taps, b, i, end);
         for (k = i; k < end && beyond < 0 && v->type == ISOGI_F32; k++) b->sum[4 * k] += base[k - i];
     }
 }
