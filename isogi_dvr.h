@@ -90,7 +90,7 @@
    Matter whose value does not change along the ray has no side: its ambient term is the mean of both.
    ISOGI_DVR_VISIBILITY scatters light isotropically and shadows it (Kronander 2011):
 
-       g_s = rgb / (4 pi) * max(0, sum_i L_i V_i)         per channel
+       g_s = rgb / (4 pi) * max(least, sum_i L_i V_i)     per channel
 
    where L are the SH coefficients of the light that arrives (environment, directional lights as deltas or discs; lamps are added at
    every sample as isogi_sh_project has them there: points and spheres with their inverse square, within a sphere evenly from
@@ -100,9 +100,13 @@
    light on a surface is that of the points in front of it, without the darkness of those below. Where nothing casts shadows, V(w) = 1,
    and a sky of radiance 1 from everywhere gives g_s = rgb / (4 pi) * 4 pi = rgb: colour is the albedo, and under a uniform sky of 1 a
    medium without shadows looks as it does unlit. A directional light of irradiance E gives g_s = rgb E V / (4 pi). The truncated series
-   can be negative: it is clamped at zero. Matter that is dense for the grid is lit as what is in front of it: in physical space V is
-   looked up off = r x^2 / (x^2 + 16) nearer to the eye, where r is 1.5 grid distances, as they are along the ray, and x the optical
-   depth of r in the matter of the sample.
+   can be negative, most of all where matter hides the brightest of a sky, and black there is the worst error of a picture: light is at
+   least a quarter of what the mean radiance of the environment gives through V (with anisotropy times (1 - |g|) / (1 + |g|)^2, the least
+   that scattering does). Shadows of directional lights and lamps may be black. RMSE of sRGB values at 400 places on surfaces, orders 2,
+   3, 4, against light from 2048 directions, clamped at zero and so: engine under Uffizi's sky, rotated, .26 .144 .040 and .075 .050 .040;
+   bonsai under Grace's .115 .075 .061 and .115 .072 .046; where nothing rings below zero, the same.
+   Matter that is dense for the grid is lit as what is in front of it: in physical space V is looked up off = r x^2 / (x^2 + 16) nearer to
+   the eye, where r is 1.5 grid distances, as they are along the ray, and x the optical depth of r in the matter of the sample.
 
    Visibility is sampled in `directions` directions and projected to SH, by one of the methods of isogi_dvr_method. Brute force
    marches every ray from every grid point through the same transfer function (in the same space; peaks attenuate at every
@@ -4953,9 +4957,29 @@ typedef struct isogi_dvr__lights {
     size_t count;
     float sh[3 * ISOGI_DVR__MAX_ORDER * ISOGI_DVR__MAX_ORDER]; /* visibility: of all distant lights; local: irradiance of the environment */
     double mean[3];                                            /* of the environment's radiance */
+    float least[3];                                            /* visibility: light that is scattered at least, times V(0) */
     int dark;                                                  /* the environment is black */
     int local;                                                 /* shade by local visibility */
 } isogi_dvr__lights;
+
+/* A truncated series rings below zero where V sees dim parts of a sky that is bright elsewhere, and parts that are black would be the
+   darkest in the picture. No light is less than this share of what it would be if the environment were the same all around, and came
+   from where the phase function is least. */
+#define ISOGI_DVR__LEAST_LIGHT 0.25
+
+/* Of all distant light, which is projected, what the environment alone has. */
+static isogi_result isogi_dvr__set_least(isogi_dvr__lights *l, double anisotropy) {
+    isogi_lighting directional = l->distant;
+    float sh[3] = {0, 0, 0};
+    double g = fabs(anisotropy), share = ISOGI_DVR__LEAST_LIGHT * (1 - g) / ((1 + g) * (1 + g)) / (4 * ISOGI_DVR__PI);
+    isogi_result result = ISOGI_OK;
+    int a;
+    memset(&directional.env, 0, sizeof directional.env);
+    if (directional.light_count) result = isogi_sh_project(sh, 1, &directional, NULL);
+    for (a = 0; a < 3; a++) /* a millionth less: what rounding leaves of directional lights is no sky */
+        l->least[a] = (float)(share * isogi_dvr__clamp(0.999999 * (double)l->sh[a] - (double)sh[a], 1e30));
+    return result;
+}
 
 static isogi_result isogi_dvr__set_lights(isogi_dvr__lights *l, const isogi_dvr *d, const isogi_lighting *lighting) {
     isogi_lighting environment;
@@ -4976,7 +5000,10 @@ static isogi_result isogi_dvr__set_lights(isogi_dvr__lights *l, const isogi_dvr 
     }
     l->distant.env = lighting->env, l->distant.lights = l->list, l->distant.light_count = distant;
     if (nearby) l->nearby.lights = l->list + distant, l->nearby.light_count = nearby;
-    if (d->desc.shading == ISOGI_DVR_VISIBILITY) return isogi_sh_project(l->sh, d->desc.order, &l->distant, NULL);
+    if (d->desc.shading == ISOGI_DVR_VISIBILITY) {
+        result = isogi_sh_project(l->sh, d->desc.order, &l->distant, NULL);
+        return result == ISOGI_OK ? isogi_dvr__set_least(l, d->desc.anisotropy) : result;
+    }
     memset(&environment, 0, sizeof environment);
     environment.env = lighting->env;
     result = isogi_sh_project(l->sh, ISOGI_DVR__LOCAL_ORDER, &environment, NULL);
@@ -5028,6 +5055,7 @@ static void isogi_dvr__shade_visibility(const isogi_dvr *d, const isogi_dvr__lig
         }
         sum /= 4 * ISOGI_DVR__PI;
         if (fabs(d->desc.anisotropy) > 0) sum = isogi_dvr__scatter(d, light, v, dir);
+        if (sum < (double)(l->least[a] * v[0])) sum = (double)(l->least[a] * v[0]);
         out[a] = isogi_dvr__clamp(sum, 1e30) + d->desc.emission;
     }
 }
@@ -5951,7 +5979,7 @@ static void isogi_dvr__add4(float *out, const float *from, float factor) {
 #endif
 }
 
-/* Radiance scattered at grid points: 1/(4 pi) L . V with the phase function's weights, not yet clamped. */
+/* Radiance scattered at grid points: 1/(4 pi) L . V. */
 typedef struct isogi_dvr__frame_job {
     isogi_dvr__frame frame;
     const isogi_dvr__lights *lights;
@@ -5969,6 +5997,10 @@ static void isogi_dvr__frame_light(void *arg, size_t task) {
         const float *v = d->visibility + point * d->coefficients;
         float sum[4] = {0, 0, 0, 0}, open = isogi_dvr__openness(v[0]);
         for (c = 0; c < d->coefficients; c++) isogi_dvr__add4(sum, sh[c], v[c]);
+        for (c = 0; c < 3; c++) {
+            float least = job->lights->least[c] * v[0];
+            sum[c] = sum[c] > least ? sum[c] : least;
+        }
         sum[3] = 1; /* openness, which the light is multiplied by, and divided by between grid points */
         for (c = 0; c < 4; c++) job->frame.light[point][c] = sum[c] * open;
     }
@@ -7668,6 +7700,7 @@ ISOGI_API isogi_result isogi_dvr_tets_render(const isogi_tets *tets, const isogi
 #undef ISOGI_DVR__SLAB
 #undef ISOGI_DVR__LANES
 #undef ISOGI_DVR__RAYS
+#undef ISOGI_DVR__LEAST_LIGHT
 #undef ISOGI_DVR__TABLE
 #undef ISOGI_DVR__BATCH
 #undef ISOGI_DVR__GAIN

@@ -188,6 +188,35 @@ TEST(scattering_follows_henyey_and_greenstein) {
     field_free(&f);
 }
 
+/* A floor that is lit by half of a sky of 1, above a glare that it hides: the series of order 3 is negative there, and light 0 would be as
+   wrong as can be. A directional light in the place of the glare, which casts a shadow that is black, adds nothing. */
+static double ground(double x, double y, double z) { return (void)x, (void)z, y < 0.5; }
+
+TEST(a_sky_that_glares_behind_matter_does_not_blacken_what_it_lights_from_in_front) {
+    enum { WIDTH = 32, HEIGHT = 16 };
+    static float image[WIDTH * HEIGHT * 3];
+    field f = field_of(ground, 25);
+    const isogi_transfer_point p[] = {{0.5, {1, 1, 1}, 0}, {0.5, {1, 1, 1}, 3}, {1, {1, 1, 1}, 3}};
+    const isogi_transfer transfer = {p, 3, NULL, 0};
+    const double eye[3] = {13, 60, 8}, target[3] = {12, 12, 12};
+    const isogi_light sun = {.vector = {0, -1, 0}, .rgb = {10, 10, 10}};
+    for (int i = 0; i < WIDTH * HEIGHT * 3; i++) image[i] = i / 3 / WIDTH < HEIGHT - 2 ? 1 : 60;
+    const isogi_lighting glare = {.env = {.rgb = image, .width = WIDTH, .height = HEIGHT}}, below = {.lights = &sun, .light_count = 1};
+    for (int way = 0; way < 4; way++) { /* both paths of physical space; forward scattering */
+        const isogi_dvr_desc desc = {.pyramid = f.pyramid, .shading = ISOGI_DVR_VISIBILITY, .grid = {13, 13, 13}, .order = way < 3 ? 3 : 2,
+                                     .classification = way % 2 ? ISOGI_DVR_POST_CLASSIFIED : ISOGI_DVR_EXACT,
+                                     .anisotropy = way == 2 ? 0.05 : 0};
+        isogi_dvr *dvr = dvr_new(&desc, &transfer);
+        float lit[4], dark[4];
+        CHECK(isogi_dvr_step(dvr, 0, NULL) == ISOGI_OK, "step");
+        colour_of(dvr, eye, target, &glare, lit, NULL), colour_of(dvr, eye, target, &below, dark, NULL);
+        CHECK(lit[3] > 0.99f && lit[0] > 0.25f && lit[0] < 0.65f, "way %d: light %g, not about 0.5", way, (double)lit[0]);
+        CHECK(dark[0] < 1e-6f, "way %d: %g in a shadow", way, (double)dark[0]);
+        isogi_dvr_free(dvr);
+    }
+    field_free(&f);
+}
+
 /* ---- depth ---- */
 
 /* Matter from x = 16 to 40: opacity begins at the face, half of it is reached ln 2 further or so. */
