@@ -209,7 +209,8 @@ typedef void isogi_trace_material_function(void *user, double isovalue, const do
    FLOAT   12 / 4   6e-8 of the value
    HALF     6 / 2   5e-4 of the value
    RGB9E5   4 / -   2e-3 of the largest of the three channels; irradiance alone, 0 or more
-   BYTE     3 / 1   irradiance: square roots, 4e-3 of sqrt(value * largest); transfer: 4e-3 of the texel's largest coefficient
+   BYTE     3 / 1   irradiance: square roots, 4e-3 of sqrt(value * largest); transfer: 4e-3 of the texel's largest coefficient.
+                    Exported as they are, for the hardware to interpolate: 2e-3 and 4e-3 of their scales (isogi_trace_export_scales)
    `make test` prints the measured table. HALF and RGB9E5 hold up to 65000 times the irradiance of an open surface
    (measured as isogi_trace_report.unit is), BYTE twice as much (four times with reflections); brighter texels are cut off there. Below
    some 1e-4 of that irradiance HALF and RGB9E5 err by more than the share above: their steps are no finer than about 1e-7 of it. */
@@ -380,8 +381,9 @@ ISOGI_API isogi_trace *isogi_trace_high(isogi_trace *trace);
    surface, not computed) hold the mean of those around them, three texels deep, and beyond that the mean of all: plain hardware
    interpolation then shows no dark seams.
    Light is what the hardware reads times a scale: scales[3] of RGB, or scales[order^2 channels]; 1 for FLOAT; for HALF and RGB9E5
-   another power of two where something is brighter than these hold, or nothing as bright as 0.5; for BYTE the largest value. HALF and
-   RGB9E5 keep to the errors above from 6e-5 times the scale on; what is darker has steps of 6e-8 times the scale.
+   another power of two where something is brighter than these hold, or nothing as bright as 0.5; for BYTE the largest value (of
+   RGB, or of the coefficient), in whose 255th or 127th parts it counts: errors up to 2e-3 or 4e-3 of the scale. HALF and RGB9E5 keep to
+   the errors above from 6e-5 times the scale on; what is darker has steps of 6e-8 times the scale.
    export_size: bytes that isogi_trace_export fills, 0 where the format is not for this mode. format 0 = that of the storage.
    ISOGI_INVALID where `bytes` are too few; takes a byte a texel of scratch memory. Readers: any number of threads may export. */
 ISOGI_API size_t isogi_trace_export_size(const isogi_trace *trace, int format);
