@@ -5358,7 +5358,11 @@ ISOGI_API isogi_result isogi_trace_load(isogi_trace *trace, const void *block, s
     isogi_result result;
     if (!trace || trace->coarse || !block) return ISOGI_INVALID;
     result = isogi_trace__block_check(trace, from, bytes, &used);
-    if (result == ISOGI_OK && trace->high) result = isogi_trace__block_check(trace->high, from + used, bytes - used, &used_high);
+    if (result == ISOGI_OK && trace->high) {
+        if (used == bytes) return ISOGI_INVALID; /* of one side: a block of another description */
+        result = isogi_trace__block_check(trace->high, from + used, bytes - used, &used_high);
+    } else if (result == ISOGI_OK && used != bytes) /* so is one of both sides */
+        return isogi_trace__block_check(trace, from + used, bytes - used, &used_high) == ISOGI_CORRUPT ? ISOGI_CORRUPT : ISOGI_INVALID;
     if (result == ISOGI_OK && used + used_high != bytes) result = ISOGI_CORRUPT;
     if (result == ISOGI_OK) result = isogi_trace__block_load(trace, from);
     if (result == ISOGI_OK && trace->high) result = isogi_trace__block_load(trace->high, from + used);

@@ -601,7 +601,7 @@ TEST(blocks_belong_to_their_description) {
     isogi_vol_build(&other_pyramid, &volume, NULL);
     volume.data = s.data, volume.origin[1] = 2;
     isogi_vol_build(&shifted, &volume, NULL);
-    enum { FIELDS = 46, SAME = 6 };
+    enum { FIELDS = 47, SAME = 6 };
     for (int base = 0; base < 5; base++) {
         isogi_trace_desc good = store_desc(&s, base == 4 ? ISOGI_TRACE_TRANSFER : ISOGI_TRACE_IRRADIANCE, 0, 1);
         isogi_trace *t, *other;
@@ -670,6 +670,7 @@ TEST(blocks_belong_to_their_description) {
             case 44: d.seed += (uint64_t)1 << 40; break;
             case 45: d.lighting.lights = NULL, d.lighting.light_count = 0, d.lighting.env.sh = NULL, d.lighting.env.sh_order = 0,
                 d.lighting.env.rgb = NULL, d.lighting.env.width = d.lighting.env.height = 0; break;
+            case 46: d.sides = ISOGI_TRACE_BOTH_SIDES; break;
             case FIELDS: d.lazy = 1; break;
             case FIELDS + 1: d.lookup = ISOGI_TRACE_BSPLINE; break;
             case FIELDS + 2: d.isovalue_min = -0.1, d.isovalue_max = 0.1; break;
@@ -690,6 +691,20 @@ TEST(blocks_belong_to_their_description) {
             isogi_trace_free(other);
         }
         CHECK(refused > 30, "%d descriptions were refused", refused);
+        for (int side = 0; side < 2; side++) { /* both sides for one, cut where the first ends, and with something else after it */
+            isogi_trace_desc d = good;
+            isogi_trace *both;
+            uint8_t *two;
+            size_t size_two;
+            d.sides = ISOGI_TRACE_BOTH_SIDES, both = baked(&d), two = save_now(both, &size_two);
+            d.sides = side ? ISOGI_TRACE_HIGH_SIDE : ISOGI_TRACE_LOW_SIDE, other = baked(&d);
+            CHECK(isogi_trace_load(other, two, size_two) == ISOGI_INVALID, "base %d: both sides for side %d", base, side);
+            two[size_two - 20] ^= 1;
+            CHECK(isogi_trace_load(other, two, size_two) == (side ? ISOGI_INVALID : ISOGI_CORRUPT), "base %d: side %d", base, side);
+            CHECK(isogi_trace_load(both, two, size_two) == ISOGI_CORRUPT, "base %d: damaged", base);
+            CHECK(isogi_trace_load(both, two, size) == ISOGI_INVALID, "base %d: the low side alone", base);
+            isogi_trace_free(both), isogi_trace_free(other), free(two);
+        }
         isogi_trace_free(t), free(block);
     }
     isogi_vol_free(other_pyramid), isogi_vol_free(shifted), scene_free(&s), scene_free(&s2);
