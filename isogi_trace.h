@@ -146,7 +146,7 @@
                 time; request, step and relight alone, without readers.
    Determinism  The same bits for any number of threads and any budget of steps. PATHS: a texel's light depends on the description
                 and its place alone, lazily or fully, in parts (desc.box_first, isogi_trace_load), in any order of requests.
-                FEEDBACK: which probes there are depends on what was asked for and in which order: within 5 % (rms over points).
+                FEEDBACK: which probes there are depends on what was asked for and in which order: within 3 % (rms over points).
                 Instruction paths (isogi_context.force_path) give the same hits and the same bits; but a ray that grazes the surface
                 within rounding, one in 100,000, may be seen either way: light then differs by what that one sample brings.
                 All of this is for IEEE arithmetic: with -ffast-math light is right within its errors, and no bits are promised.
@@ -272,7 +272,7 @@ typedef struct isogi_trace_desc {
                                   sensible. Not with lazy or a box; such a texture cannot be exported or saved */
     size_t box_first[3], box_end[3]; /* only texels box_first <= i < box_end: a part of the bake; all 0 = all. PATHS: in the bits of the
                                   whole. FEEDBACK: each part has probes and passes of its own, reads nothing of the others, and differs
-                                  from the whole by what probes are uncertain by: 0.5 to 2 % (rms) where reflections matter */
+                                  from the whole by what probes are uncertain by: within 3 % (rms over points) */
 } isogi_trace_desc;
 
 typedef struct isogi_trace isogi_trace;

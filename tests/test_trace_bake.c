@@ -555,7 +555,7 @@ TEST(instruction_paths_agree) {
     }
 }
 
-/* Lazily other probes may be the first in their cells: the same light within 5 % (rms), as the header says; with 84 samples the
+/* Lazily other probes may be the first in their cells: the same light within 3 % (rms), as the header says; with 84 samples the
    difference is the same, so it is the probes, not the noise. */
 TEST(lazily_and_fully_agree) {
     double q[5] = {12, 11, 12, 15, 7}, square = 0, sum = 0;
@@ -568,7 +568,7 @@ TEST(lazily_and_fully_agree) {
     bake_and_sample(&d, NULL, (const float(*)[3])points, n, lazy);
     for (int i = 0; i < n; i++) square += pow((double)(full[i][1] - lazy[i][1]), 2), sum += (double)full[i][1] * (double)full[i][1];
     printf("    lazily against fully: %.4f (rms)\n", sqrt(square / sum));
-    CHECK(sqrt(square / sum) < 0.05, "rms %g", sqrt(square / sum));
+    CHECK(n > 150 && sqrt(square / sum) < 0.03, "rms %g", sqrt(square / sum));
     scene_free(&s);
 }
 
@@ -798,7 +798,7 @@ TEST(error_falls_with_the_samples) {
     }
 }
 
-/* Boxes baked apart by feedback have probes of their own: by what these are uncertain by (2 %) the parts differ from the whole. */
+/* Boxes baked apart by feedback have probes of their own: the parts differ from the whole by less than 3 % (rms), as the header says. */
 TEST(parts_by_feedback_are_near_the_whole) {
     double q[1] = {0.35}, square = 0, all = 0;
     const int side = LONG_SUITE ? 24 : 12;
