@@ -54,8 +54,9 @@
 
    What a texel means
 
-     Place and isovalue     texel (i,j,k) lies at lattice_min + (lattice_max - lattice_min) * i / (lattice - 1), in grid coordinates;
-                            its isovalue v is the trilinear value there: it lies on its own isosurface.
+     Place and isovalue     texel (i,j,k) lies at lattice_min + (lattice_max - lattice_min) * i / (lattice - 1), in grid coordinates,
+                            the only one along an axis in the middle; its isovalue v is the trilinear value there: it lies on its
+                            own isosurface.
      Normal                 of the smoothed (B-spline) or the trilinear field there, desc.normals, towards lower values. In a plane of
                             the voxels' lattice, the mean of the trilinear ones of all cells that touch the place; this, or that of
                             one of the cells, also where the smoothed gradient vanishes (sheets and rods one voxel thick, whose
@@ -105,7 +106,7 @@
        out vec4 colour;
        void main() {
            vec3 size = vec3(textureSize(light, 0));
-           vec3 texel = (grid - lattice_min) / (lattice_max - lattice_min) * (size - 1.0) + 0.5;
+           vec3 texel = (grid - lattice_min) / max(lattice_max - lattice_min, 1e-6) * (size - 1.0) + 0.5;
            vec3 irradiance = scale * texture(light, texel / size).rgb;
            colour = vec4(albedo * irradiance / 3.14159265, 1.0);
        }
@@ -121,7 +122,7 @@
        out vec4 colour;
        void main() {
            vec3 size = vec3(textureSize(transfer[0], 0)), irradiance = vec3(0.0);
-           vec3 place = ((grid - lattice_min) / (lattice_max - lattice_min) * (size - 1.0) + 0.5) / size;
+           vec3 place = ((grid - lattice_min) / max(lattice_max - lattice_min, 1e-6) * (size - 1.0) + 0.5) / size;
            for (int p = 0; p < 7; p++) {
                vec4 t = scale[p] * texture(transfer[p], place);
                irradiance += t.x * lighting[4 * p] + t.y * lighting[4 * p + 1] + t.z * lighting[4 * p + 2] + t.w * lighting[4 * p + 3];
@@ -150,8 +151,9 @@
                 Instruction paths (isogi_context.force_path) give the same hits and the same bits; but a ray that grazes the surface
                 within rounding, one in 100,000, may be seen either way: light then differs by what that one sample brings.
                 All of this is for IEEE arithmetic: with -ffast-math light is right within its errors, and no bits are promised.
-   Limits       Order 6; 2^24 samples; paths end after 10000 reflections. White surfaces that enclose a light truly have infinite
-                light: what is computed then is finite and has no meaning; its error says so, and isogi_trace_report.diverges.
+   Limits       Order 6; 2^24 samples; 2^31 - 1 texels along an axis (more: ISOGI_TOO_LARGE); paths end after 10000 reflections.
+                White surfaces that enclose a light truly have infinite light: what is computed then is finite and has no meaning;
+                its error says so, and isogi_trace_report.diverges.
                 Voxels of 1e-150 to 1e150 world units: squares of lengths must neither vanish nor overflow. Where matter is
                 thinner than the lattice's spacing a lookup mixes the light of both of its sides.
    Cost         PATHS: samples * (1 + lights that have a size) rays for a texel, and as many for each reflection. FEEDBACK:
@@ -231,7 +233,7 @@ typedef struct isogi_trace_desc {
                                   lamp brings to a place, are dimmed to 1e30 where they are more, and so is the lighting of TRANSFER */
     isogi_trace_mode mode;
     int order;                 /* TRANSFER: 1..6; 0 = 5 */
-    size_t lattice[3];         /* texels along x, y, z; 0 = one per voxel along that axis */
+    size_t lattice[3];         /* texels along x, y, z, up to 2^31 - 1; 0 = one per voxel along that axis */
     double lattice_min[3], lattice_max[3]; /* grid coordinates (voxels) of the first and last texel, within the volume; all zero =
                                               the whole volume */
     float albedo[3];           /* diffuse RGB reflectance, 0..1 */
@@ -2363,6 +2365,7 @@ static isogi_result isogi_trace__set_lattice(isogi_trace *t) {
         if (t->first[a] < 0 || t->last[a] < t->first[a] || t->last[a] > end) return ISOGI_INVALID;
         t->lattice[a] = d->lattice[a] ? d->lattice[a] : (size_t)(t->last[a] - t->first[a] + 0.5) + 1;
         if (t->lattice[a] > 0x7fffffff) return ISOGI_TOO_LARGE;
+        if (t->lattice[a] == 1) t->first[a] = t->last[a] = (t->first[a] + t->last[a]) / 2;
         t->step[a] = t->lattice[a] > 1 ? (t->last[a] - t->first[a]) / (double)(t->lattice[a] - 1) : 0;
         t->size[a] = (t->lattice[a] + ISOGI_TRACE__SIDE - 1) / ISOGI_TRACE__SIDE;
         if (t->brick_count > SIZE_MAX / sizeof(void *) / ISOGI_TRACE__TEXELS / t->size[a]) return ISOGI_TOO_LARGE;

@@ -685,6 +685,34 @@ TEST(lattice_of_its_own_resolution) {
     scene_free(&s);
 }
 
+/* The only texel along an axis lies in the middle: as the one of a lattice that is that plane. More than 2^31 - 1 are too many. */
+TEST(a_single_texel_lies_in_the_middle) {
+    double q[5] = {10, 9, 10, 13, 6};
+    scene s = scene_make(21, 20, 19, NULL, pit, q);
+    for (int k = 0; k < 6; k++) {
+        isogi_trace_desc d = desc_make(&s, 0.5f, 0, 4);
+        float points[50][3], e[2][50][3], most = 0;
+        test_random r = {3};
+        for (int i = 0; i < 50; i++)
+            for (int a = 0; a < 3; a++) points[i][a] = (float)random_range(&r, 4, 12);
+        for (int b = 0; b < 3; b++) d.lattice_max[b] = k < 3 ? (double)s.volume.size[b] - 1 : 13, d.lattice_min[b] = k < 3 ? 0 : 4;
+        if (k >= 3) d.lattice[k % 3] = 1;
+        else memset(d.lattice_max, 0, sizeof d.lattice_max), d.lattice[k] = 1; /* the whole volume */
+        bake_and_sample(&d, NULL, (const float(*)[3])points, 50, e[0]);
+        for (int b = 0; b < 3; b++) d.lattice[b] = 0, d.lattice_max[b] = k < 3 ? (double)s.volume.size[b] - 1 : 13;
+        d.lattice_min[k % 3] = d.lattice_max[k % 3] = k < 3 ? d.lattice_max[k] / 2 : 8.5;
+        bake_and_sample(&d, NULL, (const float(*)[3])points, 50, e[1]);
+        for (int i = 0; i < 50; i++) most = fmaxf(most, e[0][i][1]);
+        CHECK(!memcmp(e[0], e[1], sizeof e[0]) && most > 0.1f, "lattice %d: E %g, in the middle %g, at most %g", k, (double)e[0][0][1],
+              (double)e[1][0][1], (double)most);
+    }
+    isogi_trace_desc d = desc_make(&s, 0.5f, 0, 4);
+    isogi_trace *t = NULL;
+    d.lattice[1] = (size_t)1 << 31, d.lattice[0] = d.lattice[2] = 1;
+    CHECK(isogi_trace_create(&t, &d, NULL) == ISOGI_TOO_LARGE && !t, "%d texels", -1);
+    scene_free(&s);
+}
+
 /* Voxels twice as high as wide: the same ball in the world gets the same light, and a lamp's inverse square is of the world. */
 TEST(anisotropic_spacing) {
     double q[4] = {15.5, 15.5, 15.5, 9.3}, spacing[3] = {1, 1, 2}, worst = 0, flat[1] = {8}, d = length3(3, 6, 4);
