@@ -472,6 +472,7 @@ ISOGI_API size_t isogi_trace_memory(const isogi_trace *trace); /* bytes that the
 #define ISOGI_TRACE__GROUP 65536   /* texels that are worked on together, about */
 #define ISOGI_TRACE__CHUNK 2048    /* nodes that are allocated together; a power of two, and a multiple of SWEEP */
 #define ISOGI_TRACE__PROBE_MOST 8    /* samples of a probe: as many as there are hits that read it, but no more than this */
+#define ISOGI_TRACE__WATCHED 6       /* passes that look for probes whose light has settled */
 #define ISOGI_TRACE__PROBE_ERROR 0.02 /* standard error of light from probes */
 #define ISOGI_TRACE__CELL 2.0       /* of probes that texels read, in voxels, */
 #define ISOGI_TRACE__CELL_FAR 8.0   /* and of those that only probes read */
@@ -1169,6 +1170,12 @@ ISOGI_API void isogi_trace_material(const isogi_trace_desc *desc, double isovalu
 
 /* ==== scene: what is the same for every texel ======================================================================== */
 
+/* Cells of probes of one size, see isogi_trace__probe_key. */
+typedef struct isogi_trace__cells {
+    double size, along[3]; /* in the shortest voxel edges, and in voxels along each axis */
+    isogi_level blocks;    /* of the pyramid, about as large */
+} isogi_trace__cells;
+
 typedef struct isogi_trace__scene {
     isogi_trace_desc desc; /* with the zero defaults filled in */
     const isogi_pyramid *pyramid;
@@ -1183,6 +1190,8 @@ typedef struct isogi_trace__scene {
     double range;      /* of the volume's values, from the least to the largest; 1 if they are all the same */
     double open_light; /* luminance of the irradiance of an open texel, averaged over orientations: the unit of desc.error */
     int high;    /* light is gathered on the high side */
+    double least; /* shortest edge of a voxel */
+    isogi_trace__cells cells[9];
     double reach[ISOGI_TRACE__WAVE]; /* of rays, or all zero */
 } isogi_trace__scene;
 
@@ -1198,6 +1207,24 @@ typedef struct isogi_trace__site {
     int open;         /* the origin lies beyond an open border: what a ray meets first may be a surface seen from within */
     uint64_t key;
 } isogi_trace__site;
+
+static void isogi_trace__scene_cells(isogi_trace__scene *scene) {
+    const double *voxel = scene->voxel;
+    int a, k, n;
+    scene->least = voxel[0];
+    for (a = 1; a < 3; a++) scene->least = voxel[a] < scene->least ? voxel[a] : scene->least;
+    for (k = 0; k < 9; k++) {
+        isogi_trace__cells *c = &scene->cells[k];
+        isogi_level coarser;
+        c->size = ldexp(ISOGI_TRACE__CELL, k);
+        for (a = 0; a < 3; a++) {
+            double side = scene->least * c->size, half = ISOGI_TRACE__HALF * voxel[a];
+            c->along[a] = (side > half ? side : half) / voxel[a];
+        }
+        c->blocks = isogi_vol_level(scene->pyramid, 0);
+        for (n = 1; c->blocks.cells < c->size && (coarser = isogi_vol_level(scene->pyramid, n)).cells; n++) c->blocks = coarser;
+    }
+}
 
 static void isogi_trace__scene_matrix(isogi_trace__scene *scene) {
     const isogi_volume *v = scene->volume;
@@ -1853,6 +1880,7 @@ static isogi_result isogi_trace__scene_set(isogi_trace__scene *scene, const isog
     if (!(d->offset > 0 || d->offset < 0)) d->offset = 0.25f;
     if (!d->transfer_channels) d->transfer_channels = isogi_trace__grey(d) ? 1 : 3;
     isogi_trace__scene_matrix(scene);
+    if (d->pyramid) isogi_trace__scene_cells(scene);
     if (!d->storage) d->storage = d->mode == ISOGI_TRACE_TRANSFER ? ISOGI_TRACE_HALF : ISOGI_TRACE_FLOAT;
     scene->unit = 1;
     if (d->mode == ISOGI_TRACE_IRRADIANCE && d->storage != ISOGI_TRACE_FLOAT) {
@@ -3049,7 +3077,6 @@ static isogi_result isogi_trace__bake_batch(isogi_trace *t, size_t count) {
 /* What is gathered at one point: a texel (brick set) or a probe. Sums are over samples, in units of irradiance / pi but for light. */
 typedef struct isogi_trace__node {
     uint64_t cell;   /* probe: key of its cell; first what is read where a probe is looked for */
-    uint32_t next;   /* probe: number + 1 of the next one in its chain */
     float alike;     /* probe: tells the light of isovalues that differ from its own by less than this share of the volume's range */
     double isovalue;
     float normal[3];
@@ -3097,13 +3124,19 @@ typedef struct isogi_trace__reflector {
     uint8_t settled[2];
 } isogi_trace__reflector;
 
-/* Nodes that stay where they are once they are made. guides: of texels; reflectors: of probes. values: their four kinds (below), one after
-   the other. heads: where chains of probes begin, number + 1, 0 = nowhere; NULL of texels. */
+/* The next probe of a chain, number + 1, 0 = none; and of its own cell that part of the key which tells one chain from another. */
+typedef struct isogi_trace__link {
+    uint32_t next, tag;
+} isogi_trace__link;
+
+/* Nodes that stay where they are once they are made. guides: of texels; reflectors, links: of probes. values: their four kinds (below), one
+   after the other. heads: where chains of probes begin, number + 1, 0 = nowhere; NULL of texels. */
 typedef struct isogi_trace__chunk {
     float *values;
     isogi_trace__node *nodes;
     isogi_trace__guide *guides;
     isogi_trace__reflector *reflectors;
+    isogi_trace__link *links;
     uint32_t *heads;
 } isogi_trace__chunk;
 
@@ -3120,6 +3153,7 @@ enum {
 typedef struct isogi_trace__set {
     isogi_trace__chunk *chunks;
     size_t count, chunk_count, chunk_capacity;
+    size_t head_bit; /* the largest power of two that is no more than the number of chains */
     int out; /* 0 or 1: where the light is that was worked out last */
     isogi_trace__segment *segments;
     size_t segment_count, segment_capacity;
@@ -3218,6 +3252,10 @@ static isogi_trace__reflector *isogi_trace__reflector_at(const isogi_trace__set 
     return &s->chunks[i / ISOGI_TRACE__CHUNK].reflectors[i % ISOGI_TRACE__CHUNK];
 }
 
+static isogi_trace__link *isogi_trace__link_at(const isogi_trace__set *s, size_t i) {
+    return &s->chunks[i / ISOGI_TRACE__CHUNK].links[i % ISOGI_TRACE__CHUNK];
+}
+
 /* v: values of a node. */
 static float *isogi_trace__values_at(const isogi_trace__set *s, size_t i, int kind, size_t v) {
     return s->chunks[i / ISOGI_TRACE__CHUNK].values + ((size_t)kind * ISOGI_TRACE__CHUNK + i % ISOGI_TRACE__CHUNK) * v;
@@ -3232,6 +3270,7 @@ static void isogi_trace__chunk_free(const isogi_trace *t, isogi_trace__chunk *c)
     isogi_release(&t->context, c->nodes, ISOGI_TRACE__CHUNK, sizeof *c->nodes);
     isogi_release(&t->context, c->guides, ISOGI_TRACE__CHUNK, sizeof *c->guides);
     isogi_release(&t->context, c->reflectors, ISOGI_TRACE__CHUNK, sizeof *c->reflectors);
+    isogi_release(&t->context, c->links, ISOGI_TRACE__CHUNK, sizeof *c->links);
     isogi_release(&t->context, c->values, (size_t)ISOGI_TRACE__KINDS * ISOGI_TRACE__CHUNK, (size_t)t->values * sizeof(float));
     isogi_release(&t->context, c->heads, ISOGI_TRACE__CHUNK, sizeof *c->heads);
 }
@@ -3277,9 +3316,10 @@ static isogi_result isogi_trace__set_reserve(const isogi_trace *t, isogi_trace__
         c.nodes = (isogi_trace__node *)isogi_allocate(&t->context, ISOGI_TRACE__CHUNK, sizeof *c.nodes);
         c.guides = chains ? NULL : (isogi_trace__guide *)isogi_allocate(&t->context, ISOGI_TRACE__CHUNK, sizeof *c.guides);
         c.reflectors = chains ? (isogi_trace__reflector *)isogi_allocate(&t->context, ISOGI_TRACE__CHUNK, sizeof *c.reflectors) : NULL;
+        c.links = chains ? (isogi_trace__link *)isogi_allocate(&t->context, ISOGI_TRACE__CHUNK, sizeof *c.links) : NULL;
         c.values = (float *)isogi_allocate(&t->context, (size_t)ISOGI_TRACE__KINDS * ISOGI_TRACE__CHUNK, (size_t)t->values * sizeof(float));
         c.heads = chains ? (uint32_t *)isogi_allocate(&t->context, ISOGI_TRACE__CHUNK, sizeof *c.heads) : NULL;
-        if (!c.nodes || !c.values || !(chains ? c.reflectors && c.heads : c.guides != NULL)) {
+        if (!c.nodes || !c.values || !(chains ? c.reflectors && c.links && c.heads : c.guides != NULL)) {
             isogi_trace__chunk_free(t, &c);
             return ISOGI_NO_MEMORY;
         }
@@ -3319,16 +3359,14 @@ static isogi_result isogi_trace__feedback_new(isogi_trace *t) {
 
 /* Isovalues that are many voxels apart have other keys, or there would be too many probes of one key: the number of such a class, out of
    the range of values in a block about as large as the cell, at its middle. */
-static uint64_t isogi_trace__class(const isogi_trace__scene *scene, const double middle[3], double size, double isovalue) {
-    isogi_level level = isogi_vol_level(scene->pyramid, 0), coarser;
+static uint64_t isogi_trace__class(const isogi_level *level, const double middle[3], double isovalue) {
     const float *range;
     size_t block[3];
     double width;
-    int a, n;
-    for (n = 1; level.cells < size && (coarser = isogi_vol_level(scene->pyramid, n)).cells; n++) level = coarser;
-    for (a = 0; a < 3; a++) block[a] = (size_t)isogi_trace__clamp(middle[a] / level.cells, (double)(level.size[a] - 1));
-    range = level.range[block[0] + level.size[0] * (block[1] + level.size[1] * block[2])];
-    width = ISOGI_TRACE__CLASS * ((double)range[1] - (double)range[0]) / level.cells;
+    int a;
+    for (a = 0; a < 3; a++) block[a] = (size_t)isogi_trace__clamp(middle[a] / level->cells, (double)(level->size[a] - 1));
+    range = level->range[block[0] + level->size[0] * (block[1] + level->size[1] * block[2])];
+    width = ISOGI_TRACE__CLASS * ((double)range[1] - (double)range[0]) / level->cells;
     return (uint64_t)isogi_trace__clamp(width > 0 ? (isovalue - (double)range[0]) / width : 0, 4e9);
 }
 
@@ -3338,32 +3376,30 @@ static uint64_t isogi_trace__class(const isogi_trace__scene *scene, const double
    cut into very many. Isovalues are apart, see isogi_trace__alike. */
 static uint64_t isogi_trace__probe_key(const isogi_trace__scene *scene, const isogi_hit *hit, const float normal[3], double t,
                                        double cell, double isovalue) {
-    const double *voxel = scene->voxel;
-    double least = voxel[0], size = ISOGI_TRACE__CELL, middle[3];
+    const isogi_trace__cells *cells;
+    double middle[3], far = t / scene->least;
     uint64_t key = 0;
     int a, axis = 0, level = 0;
-    for (a = 1; a < 3; a++) {
-        if (voxel[a] < least) least = voxel[a];
+    for (a = 1; a < 3; a++)
         if (fabsf(normal[a]) > fabsf(normal[axis])) axis = a;
-    }
-    for (; size < cell && size * ISOGI_TRACE__NEAR_RATIO < t / least; level++) size *= 2;
-    for (; level < 8 && size * ISOGI_TRACE__CELL_RATIO < t / least; level++) size *= 2;
+    for (cells = scene->cells; level < 8; level++, cells++)
+        if (!(cells->size * (cells->size < cell ? ISOGI_TRACE__NEAR_RATIO : ISOGI_TRACE__CELL_RATIO) < far)) break;
     for (a = 0; a < 3; a++) {
-        double side = least * size, half = ISOGI_TRACE__HALF * voxel[a];
-        double along = (side > half ? side : half) / voxel[a], x = (hit->cell[a] + hit->local[a]) / along + 1;
+        double x = (hit->cell[a] + hit->local[a]) / cells->along[a] + 1;
         key = isogi_trace__key(key, (uint64_t)isogi_trace__clamp(x, 4e9));
-        middle[a] = (floor(x) - 0.5) * along;
+        middle[a] = (floor(x) - 0.5) * cells->along[a];
     }
-    key = isogi_trace__key(key, isogi_trace__class(scene, middle, size, isovalue));
+    key = isogi_trace__key(key, isogi_trace__class(&cells->blocks, middle, isovalue));
     return isogi_trace__key(key, (uint64_t)(16 * level + 2 * axis + (normal[axis] < 0))) | 1;
 }
 
-/* Where the chain of a cell begins: as many chains as there is room for probes, numbered by the low bits of the key; those beyond the end
+static uint32_t isogi_trace__tag(uint64_t cell) { return (uint32_t)(cell >> 20); }
+
+/* Where the chain of a cell begins: as many chains as there is room for probes, numbered by the low bits of the tag; those beyond the end
    by one bit less (linear hashing, Litwin 1980). */
 static uint32_t *isogi_trace__head(const isogi_trace__set *s, uint64_t cell) {
-    size_t heads = s->chunk_count * ISOGI_TRACE__CHUNK, bit = ISOGI_TRACE__CHUNK, i;
-    while (2 * bit <= heads) bit *= 2;
-    i = (size_t)(cell >> 20) & (2 * bit - 1);
+    size_t heads = s->chunk_count * ISOGI_TRACE__CHUNK, bit = s->head_bit, i;
+    i = isogi_trace__tag(cell) & (2 * bit - 1);
     if (i >= heads) i -= bit;
     return &s->chunks[i / ISOGI_TRACE__CHUNK].heads[i % ISOGI_TRACE__CHUNK];
 }
@@ -3374,14 +3410,15 @@ static void isogi_trace__heads_new(isogi_trace__set *s) {
     size_t last = s->chunk_count - 1, from = 1, i;
     uint32_t *heads = s->chunks[last].heads;
     memset(heads, 0, ISOGI_TRACE__CHUNK * sizeof *heads);
+    for (s->head_bit = ISOGI_TRACE__CHUNK; 2 * s->head_bit <= s->chunk_count * ISOGI_TRACE__CHUNK;) s->head_bit *= 2;
     while (2 * from <= last) from *= 2;
     for (i = 0; i < ISOGI_TRACE__CHUNK && last; i++) {
         uint32_t *stay = &s->chunks[last - from].heads[i], *go = &heads[i], probe = *stay;
         while (probe) {
-            isogi_trace__node *n = isogi_trace__node_at(s, probe - 1);
-            if ((n->cell >> 20) / ISOGI_TRACE__CHUNK & from) *go = probe, go = &n->next;
-            else *stay = probe, stay = &n->next;
-            probe = n->next;
+            isogi_trace__link *link = isogi_trace__link_at(s, probe - 1);
+            if (link->tag / ISOGI_TRACE__CHUNK & from) *go = probe, go = &link->next;
+            else *stay = probe, stay = &link->next;
+            probe = link->next;
         }
         *stay = *go = 0;
     }
@@ -3442,17 +3479,18 @@ static int isogi_trace__same_colours(const isogi_trace *t, const isogi_trace__ca
     return same;
 }
 
-/* How much the trilinear field changes over a voxel along each grid axis. */
+/* How much the trilinear field changes over a voxel along each grid axis: along one after the other, differences of what there is and means
+   by the place of both. */
 static void isogi_trace__slopes(const isogi_trace__scene *scene, const isogi_hit *place, double slope[3]) {
-    const double *x = place->local;
-    double corner[8];
-    int a, i;
+    const double u = place->local[0], v = place->local[1], w = place->local[2];
+    double corner[8], x[4], dx[4], y[2], dy[2];
+    int i;
     isogi_volume_corners(scene->volume, place->cell, corner);
-    for (a = 0; a < 3; a++) {
-        int b = (a + 1) % 3, c = (a + 2) % 3;
-        for (slope[a] = 0, i = 0; i < 8; i++)
-            slope[a] += (i >> a & 1 ? corner[i] : -corner[i]) * (i >> b & 1 ? x[b] : 1 - x[b]) * (i >> c & 1 ? x[c] : 1 - x[c]);
-    }
+    for (i = 0; i < 4; i++) dx[i] = corner[2 * i + 1] - corner[2 * i], x[i] = corner[2 * i] * (1 - u) + corner[2 * i + 1] * u;
+    for (i = 0; i < 2; i++) dy[i] = x[2 * i + 1] - x[2 * i], y[i] = x[2 * i] * (1 - v) + x[2 * i + 1] * v;
+    slope[0] = (dx[0] * (1 - v) + dx[1] * v) * (1 - w) + (dx[2] * (1 - v) + dx[3] * v) * w;
+    slope[1] = dy[0] * (1 - w) + dy[1] * w;
+    slope[2] = y[1] - y[0];
 }
 
 /* Length of a vector whose squares need not be numbers: values may be of any size. */
@@ -3490,8 +3528,9 @@ static uint32_t isogi_trace__probe_find(const isogi_trace *t, const isogi_trace_
     *key = c->key, *end = NULL;
     if (!set->chunk_count) return 0;
     for (at = isogi_trace__head(set, c->key); *at;) {
-        isogi_trace__node *n = isogi_trace__node_at(set, *at - 1);
-        if (n->cell == c->key) {
+        isogi_trace__link *link = isogi_trace__link_at(set, *at - 1);
+        const isogi_trace__node *n = link->tag == isogi_trace__tag(c->key) ? isogi_trace__node_at(set, *at - 1) : NULL;
+        if (n && n->cell == c->key) {
             double other = fabs(n->isovalue - isovalue) / t->scene.range;
             if (other < least && isogi_trace__same_place(t, c, n) && isogi_trace__same_colours(t, c, n->isovalue, isovalue)) {
                 if (other < (double)n->alike || isogi_trace__zero(other)) return *at;
@@ -3500,19 +3539,22 @@ static uint32_t isogi_trace__probe_find(const isogi_trace *t, const isogi_trace_
             if (tries++ == 32) return nearest ? nearest : *at;
             *key = isogi_trace__key(*key, 1);
         }
-        at = &n->next;
+        at = &link->next;
     }
     *end = at;
     return 0;
 }
 
-/* Reads ahead of a search: where the chain begins, and its first probe. */
-static void isogi_trace__probe_ahead(const isogi_trace__set *set, const isogi_trace__catch *c, int what) {
+/* What a search will read first: where the chain begins, the link of its first probe, and that probe where it is of the cell. To be sent
+   for by the caller: a function that does nothing else would be left out by compilers. */
+static const void *isogi_trace__probe_ahead(const isogi_trace__set *set, const isogi_trace__catch *c, int what) {
     const uint32_t *head;
-    if (!c->key || c->probe || !set->chunk_count) return;
+    if (!c->key || c->probe || !set->chunk_count) return c;
     head = isogi_trace__head(set, c->key);
-    if (what == 0) ISOGI_TRACE__AHEAD(head);
-    else if (*head) ISOGI_TRACE__AHEAD(isogi_trace__node_at(set, *head - 1));
+    if (what == 0) return head;
+    if (!*head) return c;
+    if (what == 1) return isogi_trace__link_at(set, *head - 1);
+    return isogi_trace__link_at(set, *head - 1)->tag == isogi_trace__tag(c->key) ? (const void *)isogi_trace__node_at(set, *head - 1) : c;
 }
 
 /* The number of the probe of a hit, which is made if there is none: not yet by isogi_trace__probe_finish. */
@@ -3534,6 +3576,7 @@ static isogi_result isogi_trace__probe_of(isogi_trace *t, const isogi_trace__cat
     n->isovalue = isovalue;
     n->place = c->hit, n->cell = c->key, n->key = key, n->from = c->from, n->alike = c->alike;
     memcpy(n->normal, c->normal, sizeof n->normal);
+    isogi_trace__link_at(set, set->count)->tag = isogi_trace__tag(n->cell), isogi_trace__link_at(set, set->count)->next = 0;
     *probe = (uint32_t)set->count++, *end = *probe + 1;
     return ISOGI_OK;
 }
@@ -3657,9 +3700,16 @@ static void isogi_trace__cast_probes(isogi_trace__cast *c, int first, int count)
     for (i = first; i < first + count; i++) {
         const isogi_trace__span *span = &c->span[c->owner[i]];
         hit[n] = &t->feedback->catches[span->offset + (c->sample[i] - span->first)], isovalue[n] = span->sum.isovalue;
-        if (hit[n]->key) isogi_trace__probe_ahead(&t->feedback->probes, hit[n++], 0);
+        if (!hit[n]->key) continue;
+        ISOGI_TRACE__AHEAD(isogi_trace__probe_ahead(&t->feedback->probes, hit[n], 0));
+        n++;
     }
-    for (i = 0; i < n; i++) isogi_trace__probe_ahead(&t->feedback->probes, hit[i], 1);
+    for (i = 0; i < n; i++) ISOGI_TRACE__AHEAD(isogi_trace__probe_ahead(&t->feedback->probes, hit[i], 1));
+    for (i = 0; i < n; i++) {
+        const char *probe = (const char *)isogi_trace__probe_ahead(&t->feedback->probes, hit[i], 2);
+        ISOGI_TRACE__AHEAD(probe);
+        ISOGI_TRACE__AHEAD(probe + 64);
+    }
     for (i = 0; i < n; i++) {
         uint64_t made;
         uint32_t *end;
@@ -3978,7 +4028,7 @@ static isogi_result isogi_trace__segments_reserve(const isogi_trace *t, isogi_tr
 /* The segment of the batch's hits; probes are made where there are none. */
 static isogi_result isogi_trace__segment_new(isogi_trace *t, isogi_trace__segment *s) {
     isogi_trace__feedback *f = t->feedback;
-    const size_t early = 8, late = 4; /* catches ahead; they stand in the order of their spans */
+    const size_t early = 24, middle = 16, late = 8; /* catches ahead; they stand in the order of their spans */
     size_t i, hits = 0, at = 0, k;
     for (i = 0; i < f->sample_count; i++) hits += f->catches[i].key != 0;
     memset(s, 0, sizeof *s);
@@ -3991,8 +4041,9 @@ static isogi_result isogi_trace__segment_new(isogi_trace *t, isogi_trace__segmen
         s->node[i] = f->spans[i].node, s->begin[i] = (uint32_t)at;
         for (k = f->spans[i].offset; k < f->spans[i].offset + f->spans[i].count; k++) {
             isogi_result result;
-            if (k + early < f->sample_count) isogi_trace__probe_ahead(&f->probes, &f->catches[k + early], 0);
-            if (k + late < f->sample_count) isogi_trace__probe_ahead(&f->probes, &f->catches[k + late], 1);
+            if (k + early < f->sample_count) ISOGI_TRACE__AHEAD(isogi_trace__probe_ahead(&f->probes, &f->catches[k + early], 0));
+            if (k + middle < f->sample_count) ISOGI_TRACE__AHEAD(isogi_trace__probe_ahead(&f->probes, &f->catches[k + middle], 1));
+            if (k + late < f->sample_count) ISOGI_TRACE__AHEAD(isogi_trace__probe_ahead(&f->probes, &f->catches[k + late], 2));
             if (!f->catches[k].key) continue;
             result = isogi_trace__probe_of(t, &f->catches[k], f->spans[i].sum.isovalue, &s->probe[at++]);
             if (result == ISOGI_OK) continue;
@@ -4159,8 +4210,9 @@ static void isogi_trace__direct_task(void *arg, size_t task) {
 
 /* One pass over the probes of a segment, each of which has one entry: from one kind of OUT_VALUES to the other. by_place: hits have the
    albedo of the probe that they meet, else that of the probe that they come from. A probe that reads none, or none that will change, has
-   settled with this pass; the next one copies its light to the other kind, and later ones leave it out. */
-static void isogi_trace__pass_segment(isogi_trace__set *set, isogi_trace__segment *s, size_t values, size_t channels, int by_place) {
+   settled with this pass; the next one copies its light to the other kind, and later ones leave it out. watch: that is looked at. */
+static void isogi_trace__pass_segment(isogi_trace__set *set, isogi_trace__segment *s, size_t values, size_t channels, int by_place,
+                                      int watch) {
     const int out = set->out, from = ISOGI_TRACE__OUT_VALUES + out, to = ISOGI_TRACE__OUT_VALUES + 1 - out;
     size_t i, j, k, a, open = 0;
     double largest = 0, most = 0;
@@ -4169,7 +4221,7 @@ static void isogi_trace__pass_segment(isogi_trace__set *set, isogi_trace__segmen
         isogi_trace__reflector *r;
         const float *bounce, *before;
         float *after;
-        uint8_t settled = 1;
+        uint8_t settled = (uint8_t)watch;
         double sum[3 * ISOGI_TRACE__MAX_ORDER * ISOGI_TRACE__MAX_ORDER];
         i = s->order[j], node = s->node[i], r = isogi_trace__reflector_at(set, node);
         before = isogi_trace__values_at(set, node, from, values), after = isogi_trace__values_at(set, node, to, values);
@@ -4186,7 +4238,7 @@ static void isogi_trace__pass_segment(isogi_trace__set *set, isogi_trace__segmen
         for (k = s->begin[i]; k < s->begin[i + 1]; k++) {
             const float *e = isogi_trace__values_at(set, s->probe[k], from, values);
             const isogi_trace__reflector *met = isogi_trace__reflector_at(set, s->probe[k]);
-            settled &= met->settled[out];
+            if (watch) settled &= met->settled[out];
             if (by_place)
                 for (a = 0; a < values; a++) sum[a] += (double)met->albedo[a % channels] * (double)e[a];
             else
@@ -4212,9 +4264,12 @@ static void isogi_trace__pass_task(void *arg, size_t segment) {
         for (i = 0; i < s->entries; i++) s->order[i] = (uint32_t)i;
         s->open = s->entries, s->settled = 0;
     }
-    /* the compiler unrolls it */
-    if (t->values == 3 && channels == 3 && !t->scene.desc.material) isogi_trace__pass_segment(set, s, 3, 3, 0);
-    else isogi_trace__pass_segment(set, s, (size_t)t->values, channels, t->scene.desc.material != NULL);
+    /* the compiler unrolls it; after a few passes nearly all of the probes that are left read each other in a circle */
+    if (t->values == 3 && channels == 3 && !t->scene.desc.material)
+        isogi_trace__pass_segment(set, s, 3, 3, 0, t->feedback->pass < ISOGI_TRACE__WATCHED);
+    else
+        isogi_trace__pass_segment(set, s, (size_t)t->values, channels, t->scene.desc.material != NULL,
+                                  t->feedback->pass < ISOGI_TRACE__WATCHED);
 }
 
 /* A pass over all probes has ended: whether it was the last. There are as many as reflections (the first brings what comes from sky and
