@@ -458,6 +458,7 @@ ISOGI_API size_t isogi_trace_memory(const isogi_trace *trace); /* bytes that the
 #define ISOGI_TRACE__WAVE 32         /* paths that are traced together */
 #define ISOGI_TRACE__BATCH 4096      /* texels in one parallel run, */
 #define ISOGI_TRACE__TASKS 256       /* in at most so many tasks */
+#define ISOGI_TRACE__POINTS 8192     /* that are requested together, at most */
 #define ISOGI_TRACE__TASK 4          /* points of the caller's own in a task */
 #define ISOGI_TRACE__MAX_DEPTH 10000 /* of a path, so that nothing hangs */
 #define ISOGI_TRACE__MAX_ORDER 6
@@ -2906,19 +2907,25 @@ static void isogi_trace__learn_task(void *arg, size_t task) {
     for (i = 0; i < count; i++) ref[i].brick->state[ref[i].slot] = state[i]; /* each by one task alone */
 }
 
-/* Classifies the texels that lookups at the next points will read, as many as a batch holds, on all cores. *end: of these points. */
-static isogi_result isogi_trace__learn_points(isogi_trace *t, const float (*points)[3], size_t count, size_t *end) {
+/* Classifies the texels that lookups at the next points will read, as many as a batch holds, on all cores. *end: of these points. again:
+   bits of those that lie in the same cell as the one before them without that bit. */
+static isogi_result isogi_trace__learn_points(isogi_trace *t, const float (*points)[3], size_t count, size_t *end, uint64_t *again) {
     isogi_context silent = t->context;
     isogi_trace__job job;
     isogi_result result = ISOGI_OK;
     size_t i, known[3] = {SIZE_MAX, 0, 0};
     job.trace = t, job.first = job.count = 0;
+    memset(again, 0, ISOGI_TRACE__POINTS / 8);
+    if (count > ISOGI_TRACE__POINTS) count = ISOGI_TRACE__POINTS;
     for (i = 0; i < count && job.count + 64 <= ISOGI_TRACE__BATCH && result == ISOGI_OK; i++) {
         size_t cell[3];
         double local[3];
         int k, all = 1;
         isogi_trace__cell(t, points[i], cell, local);
-        if (isogi_trace__seen(cell, local, known)) continue;
+        if (isogi_trace__seen(cell, local, known)) {
+            again[i / 64] |= (uint64_t)1 << i % 64;
+            continue;
+        }
         for (k = 0; k < isogi_trace__tap_count(t) && result == ISOGI_OK; k++) {
             isogi_trace__ref *ref = &t->batch[job.count];
             size_t index;
@@ -2934,6 +2941,7 @@ static isogi_result isogi_trace__learn_points(isogi_trace *t, const float (*poin
                 ref->brick->state[ref->slot] = ISOGI_TRACE__NOT_ASKED, job.count++;
         }
         if (all) memcpy(known, cell, sizeof known);
+        else known[0] = SIZE_MAX;
     }
     *end = i, silent.progress = NULL;
     isogi_parallel(&silent, (job.count + ISOGI_TRACE__TEXELS - 1) / ISOGI_TRACE__TEXELS, isogi_trace__learn_task, &job, 0, 1);
@@ -2941,38 +2949,36 @@ static isogi_result isogi_trace__learn_points(isogi_trace *t, const float (*poin
     return result;
 }
 
-static isogi_result isogi_trace__want_points(isogi_trace *t, const float (*points)[3], size_t count) {
-    size_t i, known[3] = {SIZE_MAX, 0, 0};
+static isogi_result isogi_trace__want_points(isogi_trace *t, const float (*points)[3], size_t count, const uint64_t *again) {
+    size_t i;
+    int lacking = 1;
     for (i = 0; i < count; i++) {
         size_t cell[3], texel[3];
         double local[3];
         isogi_result result = ISOGI_OK;
-        int k, lacking = 1, all = 1;
+        int k;
+        if (!lacking && (again[i / 64] >> i % 64 & 1)) continue; /* the nearest texel that has a surface may be another one */
         isogi_trace__cell(t, points[i], cell, local);
-        if (isogi_trace__seen(cell, local, known)) continue;
-        for (k = 0; k < isogi_trace__tap_count(t) && result == ISOGI_OK; k++) {
-            if (!(isogi_trace__tap(t, cell, local, k, texel) > 0)) {
-                all = 0;
-                continue;
-            }
+        for (lacking = 1, k = 0; k < isogi_trace__tap_count(t) && result == ISOGI_OK; k++) {
+            if (!(isogi_trace__tap(t, cell, local, k, texel) > 0)) continue;
             result = isogi_trace__want(t, texel, 0);
             if (result == ISOGI_OK) lacking = lacking && isogi_trace__state(t, texel) == ISOGI_TRACE__NO_SURFACE;
         }
         if (result == ISOGI_OK && lacking) result = isogi_trace__want_nearest(t, cell, local);
         if (result != ISOGI_OK) return result;
-        if (all && !lacking) memcpy(known, cell, sizeof known);
     }
     return ISOGI_OK;
 }
 
 ISOGI_API isogi_result isogi_trace_request(isogi_trace *trace, const float (*points)[3], size_t count) {
     isogi_result result = ISOGI_OK;
+    uint64_t again[ISOGI_TRACE__POINTS / 64];
     size_t i, end;
     if (!trace || (count && !points)) return ISOGI_INVALID;
     if (!trace->scene.desc.lazy || trace->coarse) return ISOGI_OK;
     for (i = 0; i < count && result == ISOGI_OK; i += end) {
-        result = isogi_trace__learn_points(trace, points + i, count - i, &end);
-        if (result == ISOGI_OK) result = isogi_trace__want_points(trace, points + i, end);
+        result = isogi_trace__learn_points(trace, points + i, count - i, &end, again);
+        if (result == ISOGI_OK) result = isogi_trace__want_points(trace, points + i, end, again);
     }
     return result;
 }
@@ -3159,10 +3165,12 @@ typedef struct isogi_trace__set {
     size_t segment_count, segment_capacity;
 } isogi_trace__set;
 
-/* Samples first .. first + count - 1 of a node, and what they brought. */
+/* Samples first .. first + count - 1 of a node, and what they brought, as the node has it. */
 typedef struct isogi_trace__span {
     uint32_t node, first, count, offset; /* offset: of its samples in the batch */
-    isogi_trace__node sum;
+    const isogi_trace__node *of;
+    int nowhere; /* there is no place for its rays to begin */
+    double steady[3], light[3], light_spread, bright[3], bright_spread, square;
 } isogi_trace__span;
 
 /* What became of one cosine-distributed ray; side 0: it escaped. */
@@ -3377,13 +3385,13 @@ static uint64_t isogi_trace__class(const isogi_level *level, const double middle
 static uint64_t isogi_trace__probe_key(const isogi_trace__scene *scene, const isogi_hit *hit, const float normal[3], double t,
                                        double cell, double isovalue) {
     const isogi_trace__cells *cells;
-    double middle[3], far = t / scene->least;
+    double middle[3], length = t / scene->least;
     uint64_t key = 0;
     int a, axis = 0, level = 0;
     for (a = 1; a < 3; a++)
         if (fabsf(normal[a]) > fabsf(normal[axis])) axis = a;
     for (cells = scene->cells; level < 8; level++, cells++)
-        if (!(cells->size * (cells->size < cell ? ISOGI_TRACE__NEAR_RATIO : ISOGI_TRACE__CELL_RATIO) < far)) break;
+        if (!(cells->size * (cells->size < cell ? ISOGI_TRACE__NEAR_RATIO : ISOGI_TRACE__CELL_RATIO) < length)) break;
     for (a = 0; a < 3; a++) {
         double x = (hit->cell[a] + hit->local[a]) / cells->along[a] + 1;
         key = isogi_trace__key(key, (uint64_t)isogi_trace__clamp(x, 4e9));
@@ -3648,7 +3656,7 @@ static void isogi_trace__cast_escape(isogi_trace__cast *c, int i) {
     isogi_trace__env_light(&scene->desc.lighting.env, dir, radiance);
     for (a = 0; a < 3; a++) rgb[a] = weight * (double)radiance[a], direct[a] += (float)rgb[a];
     luminance = isogi_trace__luminance(rgb);
-    span->sum.square += luminance * luminance;
+    span->square += luminance * luminance;
 }
 
 /* Light that the surface sends out itself where a ray hit. */
@@ -3660,10 +3668,10 @@ static void isogi_trace__cast_glow(isogi_trace__cast *c, isogi_trace__span *span
     if (t->scene.desc.mode == ISOGI_TRACE_TRANSFER) return;
     for (a = 0; a < 3; a++) grid[a] = at->hit.cell[a] + at->hit.local[a];
     isogi_vol_to_world(t->scene.pyramid, grid, point);
-    isogi_trace_material(&t->scene.desc, span->sum.isovalue, point, albedo, emission);
+    isogi_trace_material(&t->scene.desc, span->of->isovalue, point, albedo, emission);
     for (a = 0; a < 3; a++) rgb[a] = (double)emission[a], direct[a] += emission[a];
     luminance = isogi_trace__luminance(rgb);
-    span->sum.square += luminance * luminance;
+    span->square += luminance * luminance;
 }
 
 /* It hit: the key of the probe that will tell the light there. A ray that meets the surface from the side where it is not has begun
@@ -3687,7 +3695,7 @@ static void isogi_trace__cast_hit(isogi_trace__cast *c, int i) {
     if (t->scene.desc.emission_count || t->scene.desc.material) isogi_trace__cast_glow(c, span, to);
     if (!t->scene.desc.bounces) return;
     to->key = isogi_trace__probe_key(&t->scene, &to->hit, to->normal, length,
-                                     span->sum.brick ? ISOGI_TRACE__CELL : ISOGI_TRACE__CELL_FAR, span->sum.isovalue);
+                                     span->of->brick ? ISOGI_TRACE__CELL : ISOGI_TRACE__CELL_FAR, span->of->isovalue);
     to->probe = 0;
 }
 
@@ -3699,7 +3707,7 @@ static void isogi_trace__cast_probes(isogi_trace__cast *c, int first, int count)
     int i, n = 0;
     for (i = first; i < first + count; i++) {
         const isogi_trace__span *span = &c->span[c->owner[i]];
-        hit[n] = &t->feedback->catches[span->offset + (c->sample[i] - span->first)], isovalue[n] = span->sum.isovalue;
+        hit[n] = &t->feedback->catches[span->offset + (c->sample[i] - span->first)], isovalue[n] = span->of->isovalue;
         if (!hit[n]->key) continue;
         ISOGI_TRACE__AHEAD(isogi_trace__probe_ahead(&t->feedback->probes, hit[n], 0));
         n++;
@@ -3732,7 +3740,7 @@ static void isogi_trace__cast_land(isogi_trace__cast *c, int first, int count) {
                 for (a = 0; a < 3; a++) c->rgb[i][a] = c->weight[i] * (double)radiance[a];
             }
             luminance = isogi_trace__luminance(c->rgb[i]);
-            for (a = 0; a < 3; a++) *(c->bright ? &span->sum.bright[a] : &span->sum.light[a]) += c->rgb[i][a];
+            for (a = 0; a < 3; a++) *(c->bright ? &span->bright[a] : &span->light[a]) += c->rgb[i][a];
             c->sum[c->owner[i]] += luminance, c->square[c->owner[i]] += luminance * luminance;
             continue;
         }
@@ -3790,7 +3798,7 @@ static void isogi_trace__span_hemisphere(isogi_trace__cast *c, uint32_t k) {
     for (i = span->first; i < span->first + span->count; i++) {
         double u[2];
         float dir[3];
-        at = i == known ? isogi_trace__index(c->trace, &span->sum, i, &known) : at + 1;
+        at = i == known ? isogi_trace__index(c->trace, span->of, i, &known) : at + 1;
         isogi_trace__sobol(&sequence, at, u);
         isogi_trace__cosine(&basis, u[0], u[1], dir);
         if (site->on_surface) isogi_trace__mirror(site->geometric, dir);
@@ -3809,7 +3817,7 @@ static void isogi_trace__span_sky(isogi_trace__cast *c, uint32_t k) {
     for (i = span->first; i < span->first + span->count; i++) {
         double u[2], cosine, density;
         float dir[3];
-        at = i == known ? isogi_trace__index(c->trace, &span->sum, i, &known) : at + 1;
+        at = i == known ? isogi_trace__index(c->trace, span->of, i, &known) : at + 1;
         isogi_trace__sobol(&sequence, at, u);
         density = isogi_trace__sky_direction(sky, u[0], u[1], dir);
         cosine = isogi_trace__site_kernel(&c->site[k], dir) / ISOGI_TRACE__PI;
@@ -3830,13 +3838,13 @@ static void isogi_trace__span_light(isogi_trace__cast *c, uint32_t k, size_t num
     const isogi_light *light = &c->trace->scene.desc.lighting.lights[number];
     const isogi_trace__span *span = &c->span[k];
     const isogi_trace__sequence sequence = isogi_trace__sequence_of(isogi_trace__key(c->sequence[k], 0x5eed3 + number));
-    uint32_t i = isogi_trace__light_samples(span->first, span->sum.brick != NULL), at = 0, known = i;
-    const uint32_t end = isogi_trace__light_samples(span->first + span->count, span->sum.brick != NULL);
+    uint32_t i = isogi_trace__light_samples(span->first, span->of->brick != NULL), at = 0, known = i;
+    const uint32_t end = isogi_trace__light_samples(span->first + span->count, span->of->brick != NULL);
     int a;
     for (; i < end; i++) {
         double u[2], cosine;
         isogi_trace__beam beam;
-        at = i == known ? isogi_trace__index(c->trace, &span->sum, i, &known) : at + 1;
+        at = i == known ? isogi_trace__index(c->trace, span->of, i, &known) : at + 1;
         isogi_trace__sobol(&sequence, at, u);
         if (c->distant) isogi_trace__disc_beam(&c->disc, u[0], u[1], &beam);
         else if (!isogi_trace__light_beam(light, c->site[k].origin, u[0], u[1], &beam)) continue;
@@ -3854,11 +3862,11 @@ static void isogi_trace__cast_round(isogi_trace__cast *c, uint32_t spans) {
     isogi_trace__cast_flush(c);
     for (k = 0; k < spans && c->shadow; k++) {
         const isogi_trace__span *s = &c->span[k];
-        int texel = s->sum.brick != NULL;
+        int texel = s->of->brick != NULL;
         uint32_t n =
             c->bright ? s->count : isogi_trace__light_samples(s->first + s->count, texel) - isogi_trace__light_samples(s->first, texel);
         double spread = n ? c->square[k] - c->sum[k] * c->sum[k] / n : 0;
-        *(c->bright ? &c->span[k].sum.bright_spread : &c->span[k].sum.light_spread) += spread > 0 ? spread : 0;
+        *(c->bright ? &c->span[k].bright_spread : &c->span[k].light_spread) += spread > 0 ? spread : 0;
     }
     memset(c->sum, 0, sizeof c->sum);
     memset(c->square, 0, sizeof c->square);
@@ -3872,7 +3880,7 @@ static void isogi_trace__span_normals(isogi_trace__cast *c, uint32_t spans) {
     float shading[ISOGI_TRACE__TASK_SPANS][3], geometric[ISOGI_TRACE__TASK_SPANS][3];
     uint32_t owner[ISOGI_TRACE__TASK_SPANS], k, n = 0;
     for (k = 0; k < spans; k++) {
-        const isogi_trace__node *probe = &c->span[k].sum;
+        const isogi_trace__node *probe = c->span[k].of;
         if (probe->brick) continue;
         memcpy(c->site[k].normal, probe->normal, sizeof probe->normal); /* of a cap */
         if (probe->place.side != 1 && probe->place.side != -1) continue;
@@ -3885,16 +3893,17 @@ static void isogi_trace__span_normals(isogi_trace__cast *c, uint32_t spans) {
 /* Where span k's rays begin; 0: nowhere (the voxels were changed after the texel was classified, which breaks the contract). */
 static int isogi_trace__span_site(isogi_trace__cast *c, uint32_t k) {
     const isogi_trace *t = c->trace;
-    isogi_trace__node *n = &c->span[k].sum;
+    const isogi_trace__node *n = c->span[k].of;
     isogi_trace__site *site = &c->site[k];
     uint64_t seed = t->scene.desc.seed;
     if (n->brick) {
         const size_t *x = n->texel, *l = t->lattice;
+        uint32_t slot;
         if (!(isogi_trace__dot(n->normal, n->normal) > 0)) return 0;
         memcpy(site->normal, n->normal, sizeof site->normal);
         site->key = isogi_trace__key(isogi_trace__key(seed, 2),
                                      (uint64_t)x[0] + (uint64_t)l[0] * ((uint64_t)x[1] + (uint64_t)l[1] * (uint64_t)x[2]));
-        c->sequence[k] = isogi_trace__key(isogi_trace__key(seed, 3), (uint64_t)isogi_trace__brick_of(t, x, &n->slot));
+        c->sequence[k] = isogi_trace__key(isogi_trace__key(seed, 3), (uint64_t)isogi_trace__brick_of(t, x, &slot));
     } else site->key = c->sequence[k] = isogi_trace__key(isogi_trace__key(seed, 4), n->key);
     site->place = n->place, site->isovalue = n->isovalue, site->from = n->from;
     isogi_trace__site_start(&t->scene, site);
@@ -3916,26 +3925,26 @@ static void isogi_trace__cast_task(void *arg, size_t task) {
         isogi_trace__span *s = &c->span[k];
         uint32_t i;
         for (i = 0; i < s->count; i++) f->catches[s->offset + i].key = 0;
-        if (!isogi_trace__span_site(c, k) || isogi_trace__dark(&t->scene)) s->sum.hits = 1, c->site[k].isovalue = 0;
+        if (!isogi_trace__span_site(c, k) || isogi_trace__dark(&t->scene)) s->nowhere = 1, c->site[k].isovalue = 0;
     }
     for (k = 0; k < spans; k++)
-        if (!c->span[k].sum.hits) isogi_trace__span_hemisphere(c, k);
+        if (!c->span[k].nowhere) isogi_trace__span_hemisphere(c, k);
     isogi_trace__cast_round(c, spans);
     if (t->scene.desc.mode == ISOGI_TRACE_TRANSFER) return;
     c->shadow = c->bright = 1;
     for (k = 0; k < spans && t->scene.sky.on; k++)
-        if (!c->span[k].sum.hits) isogi_trace__span_sky(c, k);
+        if (!c->span[k].nowhere) isogi_trace__span_sky(c, k);
     isogi_trace__cast_round(c, spans);
     c->bright = 0;
     for (l = 0; l < lighting->light_count; l++) {
         if (isogi_trace__is_delta(&lighting->lights[l])) continue;
         c->distant = isogi_trace__disc_set(&lighting->lights[l], &c->disc);
         for (k = 0; k < spans; k++)
-            if (!c->span[k].sum.hits) isogi_trace__span_light(c, k, l);
+            if (!c->span[k].nowhere) isogi_trace__span_light(c, k, l);
         isogi_trace__cast_round(c, spans);
     }
     for (k = 0; k < spans; k++)
-        if (!c->span[k].sum.hits && !c->span[k].first) isogi_trace__site_lights(&t->scene, &c->site[k], c->span[k].sum.steady, c->counters);
+        if (!c->span[k].nowhere && !c->span[k].first) isogi_trace__site_lights(&t->scene, &c->site[k], c->span[k].steady, c->counters);
 }
 
 /* ---- a batch: filled, traced, taken over ---- */
@@ -3955,11 +3964,7 @@ static int isogi_trace__spans_add(isogi_trace *t, const isogi_trace__set *set, s
              f->sample_count - f->spans[f->task[f->task_count - 1]].offset >= ISOGI_TRACE__SPAN))
             f->task[f->task_count++] = (uint32_t)f->span_count;
         memset(s, 0, sizeof *s);
-        s->node = (uint32_t)node, s->first = first, s->count = count, s->offset = (uint32_t)f->sample_count;
-        s->sum.place = n->place, s->sum.isovalue = n->isovalue, s->sum.key = n->key, s->sum.brick = n->brick, s->sum.from = n->from;
-        memcpy(s->sum.texel, n->texel, sizeof n->texel);
-        memcpy(s->sum.normal, n->normal, sizeof n->normal);
-        s->sum.slot = n->slot;
+        s->node = (uint32_t)node, s->of = n, s->first = first, s->count = count, s->offset = (uint32_t)f->sample_count;
         f->span_count++, f->sample_count += count, first += count;
     }
     return 1;
@@ -4045,7 +4050,7 @@ static isogi_result isogi_trace__segment_new(isogi_trace *t, isogi_trace__segmen
             if (k + middle < f->sample_count) ISOGI_TRACE__AHEAD(isogi_trace__probe_ahead(&f->probes, &f->catches[k + middle], 1));
             if (k + late < f->sample_count) ISOGI_TRACE__AHEAD(isogi_trace__probe_ahead(&f->probes, &f->catches[k + late], 2));
             if (!f->catches[k].key) continue;
-            result = isogi_trace__probe_of(t, &f->catches[k], f->spans[i].sum.isovalue, &s->probe[at++]);
+            result = isogi_trace__probe_of(t, &f->catches[k], f->spans[i].of->isovalue, &s->probe[at++]);
             if (result == ISOGI_OK) continue;
             isogi_trace__segment_free(t, s);
             return result;
@@ -4084,8 +4089,8 @@ static void isogi_trace__span_commit(isogi_trace *t, isogi_trace__set *set, cons
     int a, fresh = n->brick && !n->samples;
     for (a = 0; a < t->values; a++) direct[a] += from[a];
     for (a = 0; a < 3; a++)
-        n->steady[a] += s->sum.steady[a], n->light[a] += s->sum.light[a], n->bright[a] += s->sum.bright[a];
-    n->light_spread += s->sum.light_spread, n->bright_spread += s->sum.bright_spread, n->square += s->sum.square;
+        n->steady[a] += s->steady[a], n->light[a] += s->light[a], n->bright[a] += s->bright[a];
+    n->light_spread += s->light_spread, n->bright_spread += s->bright_spread, n->square += s->square;
     n->samples = s->first + s->count, n->light_samples = isogi_trace__light_samples(n->samples, n->brick != NULL), n->hits += hits;
     if (n->samples == (n->brick ? isogi_trace__block(t, n->level + 1) : n->wanted)) n->level++;
     if (fresh) isogi_trace__texel_guess(t, s->node);
