@@ -2555,18 +2555,16 @@ ISOGI_VOL__INLINE int64_t isogi_vol__eight_bytes_of(const char *p) {
     return x;
 }
 
-/* A quarter of a vector is kept of one that is loaded into all of them. */
+/* A row of each of four points; what is loaded fills a vector of which a quarter is kept. */
+#define ISOGI_VOL__FOUR_ROWS(KEEP, first, m1, m2, m3, r) KEEP(KEEP(KEEP(first, m1, at1 + (r)), m2, at2 + (r)), m3, at3 + (r))
 #define ISOGI_VOL__FLOATS(v, m, p) _mm512_mask_broadcast_f32x4(v, m, ISOGI_VOL__F32_base(p))
+#define ISOGI_VOL__BYTES_KEPT(v, m, p) _mm_mask_mov_epi32(v, m, _mm_set1_epi32(isogi_vol__four_bytes_of(p)))
+#define ISOGI_VOL__SHORTS_KEPT(v, m, p) _mm256_mask_mov_epi64(v, m, _mm256_set1_epi64x(isogi_vol__eight_bytes_of(p)))
 #define ISOGI_VOL__ROW_avx512(r)                                                                                                 \
-    ISOGI_VOL__FLOATS(ISOGI_VOL__FLOATS(ISOGI_VOL__FLOATS(_mm512_broadcast_f32x4(ISOGI_VOL__F32_base(at0 + (r))), 0x00f0, at1 + (r)), 0x0f00, \
-                                        at2 + (r)), 0xf000, at3 + (r))
-#define ISOGI_VOL__WORDS(v, m, p) _mm_mask_mov_epi32(v, m, _mm_set1_epi32(isogi_vol__four_bytes_of(p)))
-#define ISOGI_VOL__BYTES_avx512(r)                                                                                               \
-    ISOGI_VOL__WORDS(ISOGI_VOL__WORDS(ISOGI_VOL__WORDS(isogi_vol__four_bytes(at0 + (r)), 2, at1 + (r)), 4, at2 + (r)), 8, at3 + (r))
-#define ISOGI_VOL__QUADS(v, m, p) _mm256_mask_mov_epi64(v, m, _mm256_set1_epi64x(isogi_vol__eight_bytes_of(p)))
+    ISOGI_VOL__FOUR_ROWS(ISOGI_VOL__FLOATS, _mm512_broadcast_f32x4(ISOGI_VOL__F32_base(at0 + (r))), 0x00f0, 0x0f00, 0xf000, r)
+#define ISOGI_VOL__BYTES_avx512(r) ISOGI_VOL__FOUR_ROWS(ISOGI_VOL__BYTES_KEPT, isogi_vol__four_bytes(at0 + (r)), 2, 4, 8, r)
 #define ISOGI_VOL__SHORTS_avx512(r)                                                                                              \
-    ISOGI_VOL__QUADS(ISOGI_VOL__QUADS(ISOGI_VOL__QUADS(_mm256_castsi128_si256(ISOGI_VOL__EIGHT(at0 + (r))), 2, at1 + (r)), 4, at2 + (r)), 8, \
-                     at3 + (r))
+    ISOGI_VOL__FOUR_ROWS(ISOGI_VOL__SHORTS_KEPT, _mm256_castsi128_si256(ISOGI_VOL__EIGHT(at0 + (r))), 2, 4, 8, r)
 #define ISOGI_VOL__ROW_U8_avx512(r) _mm512_cvtepi32_ps(_mm512_cvtepu8_epi32(ISOGI_VOL__BYTES_avx512(r)))
 #define ISOGI_VOL__ROW_I8_avx512(r) _mm512_cvtepi32_ps(_mm512_cvtepi8_epi32(ISOGI_VOL__BYTES_avx512(r)))
 #define ISOGI_VOL__ROW_U16_avx512(r) _mm512_cvtepi32_ps(_mm512_cvtepu16_epi32(ISOGI_VOL__SHORTS_avx512(r)))
@@ -4484,6 +4482,7 @@ typedef struct isogi_vol__turn {
     int levels, any;
     int shared;                        /* the rays are a bundle that begins within the box */
     uint64_t choosing;                 /* rays that need their next node, a bit each */
+    uint64_t ahead[2];                 /* rays that pass blocks which lie outside altogether, or inside; kept where any hit will do */
     int leaves, doubts;
     uint8_t at_leaf[ISOGI_VOL__POOL + 8], in_doubt[ISOGI_VOL__POOL + 8];
     uint64_t cells;
@@ -4675,6 +4674,25 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE __m512i isogi_vol__marked(const isogi_vol__p
     return isogi_vol__mirror8(inner, _mm512_load_si512(&s->flip[i]));
 }
 
+/* Where any hit will do: which rays pass children, other than cells, that lie inside or outside altogether. Children beyond the volume are
+   neither, but where the isovalue is among the least of codes: nothing is then said. */
+ISOGI_VOL__AVX512 ISOGI_VOL__INLINE void isogi_vol__look_ahead(isogi_vol__turn *turn, const isogi_vol__pool *s, int i, __mmask8 rays,
+                                                               const uint64_t mask[4][8], __m512i passed) {
+    const __m512i inside = _mm512_load_si512(mask[1]), outside = _mm512_load_si512(mask[2]); /* largest >= low, least < beyond */
+    const __m512i low = _mm512_load_si512(&s->low[i]);
+    passed = isogi_vol__mirror8(passed, _mm512_load_si512(&s->flip[i]));
+    turn->ahead[0] |= (uint64_t)_mm512_mask_test_epi64_mask(rays, passed, _mm512_andnot_si512(inside, outside)) << i;
+    turn->ahead[1] |= (uint64_t)_mm512_mask_test_epi64_mask(_mm512_mask_test_epi64_mask(rays, low, low), passed,
+                                                            _mm512_andnot_si512(outside, inside)) << i;
+}
+
+/* Rays that cross the surface somewhere: the field is continuous, and they come to both of its sides. */
+ISOGI_VOL__AVX512 ISOGI_VOL__INLINE unsigned isogi_vol__between(const isogi_vol__turn *turn, const isogi_vol__pool *s, int i) {
+    const __m512i side = _mm512_load_si512(&s->side[i]);
+    const unsigned outside = _mm512_testn_epi64_mask(side, side), inside = _mm512_cmpeq_epi64_mask(side, _mm512_set1_epi64(1));
+    return (outside | (unsigned)(turn->ahead[0] >> i)) & (inside | (unsigned)(turn->ahead[1] >> i)) & 255;
+}
+
 /* Answers the nodes of the rays from slot i on. */
 ISOGI_VOL__AVX512 ISOGI_VOL__INLINE void isogi_vol__answer(isogi_vol__turn *turn, isogi_vol__pool *s, int i) {
     const __m512i level = _mm512_load_si512(&s->level[i]), zero = _mm512_setzero_si512();
@@ -4685,6 +4703,7 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE void isogi_vol__answer(isogi_vol__turn *turn
     const __m512i passed = isogi_vol__passed(&s->origin[0][i], &s->inverse[0][i], ISOGI_VOL__POOL, _mm512_load_si512(&s->end[i]), level,
                                              _mm512_load_si512(&s->cell[i]));
     const __m512i marked = _mm512_maskz_and_epi64(lives, passed, isogi_vol__marked(s, i, leaf, (const uint64_t(*)[8])mask, tail));
+    if (turn->any) isogi_vol__look_ahead(turn, s, i, (__mmask8)(lives & ~leaf), (const uint64_t(*)[8])mask, passed);
     const __mmask8 some = _mm512_test_epi64_mask(marked, marked);
     const unsigned cells = (unsigned)(some & leaf);
     int n;
@@ -6406,6 +6425,9 @@ ISOGI_VOL__AVX512 static void isogi_vol__move(isogi_vol__pool *s, isogi_vol__tur
 #undef ISOGI_VOL__MOVE_ROW
     _mm512_mask_store_epi64(&s->level[8 * from], leave, _mm512_set1_epi64(-1));
     _mm512_store_si512(place, _mm512_load_si512(turn->p->ways->child[0]));
+    for (i = 0; i < 2; i++)
+        turn->ahead[i] = (turn->ahead[i] & ~((uint64_t)take << 8 * to)) |
+                         (uint64_t)_pdep_u32(_pext_u32((unsigned)(turn->ahead[i] >> 8 * from), leave), take) << 8 * to;
     for (; l; l &= l - 1, t &= t - 1) place[8 * from + __builtin_ctz(l)] = (uint8_t)(8 * to + __builtin_ctz(t));
     _mm512_storeu_si512(turn->at_leaf, _mm512_permutexvar_epi8(_mm512_loadu_si512(turn->at_leaf), _mm512_load_si512(place)));
     _mm512_storeu_si512(turn->in_doubt, _mm512_permutexvar_epi8(_mm512_loadu_si512(turn->in_doubt), _mm512_load_si512(place)));
@@ -6485,6 +6507,7 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE uint64_t isogi_vol__fill_pool(isogi_vol__bat
             _mm_storeu_si128((__m128i *)(void *)list, _mm_mask_mov_epi8(_mm_broadcastb_epi8(all), (__mmask16)((1u << n) - 1), all));
         }
         seated = isogi_vol__seat8(b, turn, s, *next, n, list, &odd);
+        turn->ahead[0] &= ~open, turn->ahead[1] &= ~open;
         for (k = 0; k < n; k++, ++*next) {
             if (seated >> k & 1 || (odd >> k & 1 && isogi_vol__seat_odd(b, s, *next, list[k]))) open &= ~((uint64_t)1 << list[k]);
             else if (odd >> k & 1) continue;
@@ -6608,7 +6631,7 @@ ISOGI_VOL__AVX512 ISOGI_VOL__NOINLINE static void isogi_vol__run_pool(isogi_vol_
                                                                       int groups, uint64_t open, size_t *next, size_t end) {
     const uint64_t seats = ~(uint64_t)0 >> (64 - 8 * groups);
     int i, share = b->bundle && b->bundle_count == 1;
-    turn->choosing = 0;
+    turn->choosing = turn->ahead[0] = turn->ahead[1] = 0;
     isogi_vol__take_rows_down(b, turn, s, seats & ~open);
     for (;;) {
         int answered = 0, waits;
@@ -6628,8 +6651,12 @@ ISOGI_VOL__AVX512 ISOGI_VOL__NOINLINE static void isogi_vol__run_pool(isogi_vol_
         open |= isogi_vol__decide_all(b, turn, s, waits);
         open |= isogi_vol__look_all(b, turn, s, waits);
         for (i = 0; i < groups; i++) {
-            const unsigned choosing = (unsigned)(turn->choosing >> 8 * i & 255);
-            unsigned done = choosing ? isogi_vol__choose(turn, s, 8 * i, (__mmask8)choosing) : 0;
+            unsigned choosing = (unsigned)(turn->choosing >> 8 * i & 255), crossing, done;
+            for (crossing = turn->any ? choosing & isogi_vol__between(turn, s, 8 * i) : 0; crossing; crossing &= crossing - 1) {
+                const int slot = 8 * i + __builtin_ctz(crossing);
+                b->occluded[s->ray[slot]] = 1, open |= (uint64_t)1 << slot, choosing ^= crossing & (0u - crossing);
+            }
+            done = choosing ? isogi_vol__choose(turn, s, 8 * i, (__mmask8)choosing) : 0;
             open |= (uint64_t)done << 8 * i;
             for (; done; done &= done - 1) {
                 const uint64_t ray = s->ray[8 * i + __builtin_ctz(done)];
