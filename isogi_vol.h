@@ -66,7 +66,8 @@
    coincide, up to sixteen in a row as in a tile of pixels, go as one and are faster still; rays that follow each other from one place
    come down to its leaf together. Cells are looked at in float first, from 8-bit voxels that lie together in two cache lines for 4x4x4
    cells, with an error bound: what is certain needs nothing else, and only cells in doubt, the hits and one cell for every 25 rays
-   besides, read your voxels and are solved in double.
+   besides, read your voxels and are solved in double. Where any hit will do, a ray is done once it is known to pass a block that lies
+   inside and one that lies outside.
 
    History  1.0  first release
 */

@@ -228,4 +228,55 @@ TEST(rays_side_by_side_hit_what_they_hit_alone) {
           hits, wrong_any, wrong_plain);
 }
 
+/* Any hit, where rays pass whole blocks of either side, and blocks that lie beyond the volume: of random balls in a volume, or of single
+   voxels, at isovalues just above the least value and just below the largest. */
+TEST(any_hit_is_a_hit) {
+    enum { COUNT = 4000 };
+    static const int sizes[3][3] = {{21, 33, 73}, {81, 21, 37}, {69, 70, 25}};
+    static isogi_ray rays[COUNT];
+    static isogi_hit hits[COUNT], alone;
+    static uint8_t any[COUNT];
+    test_random r = {31};
+    long hit = 0, wrong = 0;
+    for (int n = 0; n < 12; n++) {
+        const int *size = sizes[n % 3], balls = n / 3 % 2, up = n / 6;
+        const size_t voxels = (size_t)size[0] * (size_t)size[1] * (size_t)size[2];
+        uint8_t *data = (uint8_t *)malloc(voxels);
+        isogi_volume v = {.data = data, .type = ISOGI_U8, .size = {(size_t)size[0], (size_t)size[1], (size_t)size[2]}};
+        const isogi_context context = {.threads = 1};
+        isogi_pyramid *p = NULL;
+        double ball[8][4];
+        for (int k = 0; k < 32; k++) ball[k / 4][k % 4] = k % 4 < 3 ? random_range(&r, 0, size[k % 4]) : random_range(&r, 3, 25);
+        for (size_t i = 0; i < voxels; i++) {
+            const double at[3] = {(double)(i % v.size[0]), (double)(i / v.size[0] % v.size[1]), (double)(i / v.size[0] / v.size[1])};
+            int inside = !balls && random_bits(&r) % 300 == 0;
+            for (int k = 0; k < 8 && balls; k++)
+                inside |= (at[0] - ball[k][0]) * (at[0] - ball[k][0]) + (at[1] - ball[k][1]) * (at[1] - ball[k][1]) +
+                              (at[2] - ball[k][2]) * (at[2] - ball[k][2]) < ball[k][3] * ball[k][3];
+            data[i] = inside != up ? 255 : 0;
+        }
+        CHECK(isogi_vol_build(&p, &v, &context) == ISOGI_OK, "built");
+        for (int i = 0; i < COUNT; i++) {
+            memset(&rays[i], 0, sizeof rays[i]);
+            for (int a = 0; a < 3; a++)
+                rays[i].origin[a] = random_range(&r, -0.2, 1.2) * (size[a] - 1), rays[i].dir[a] = (float)random_range(&r, -1, 1);
+            if (i % 3 == 0) rays[i].dir[i / 3 % 3] = 0;
+            if (i % 6 == 0) rays[i].dir[(i / 3 + 1) % 3] = 0;
+            if (i % 5 == 0) rays[i].tmax = random_range(&r, 1, 60);
+            rays[i].isovalue = i % 2 ? 0.5 : i % 4 ? 254.5 : 128;
+        }
+        isogi_vol_intersect(p, rays, COUNT, hits, NULL);
+        isogi_vol_occluded(p, rays, COUNT, any, NULL);
+        for (int i = 0; i < COUNT; i++) {
+            hit += hits[i].side != 0, wrong += any[i] != (hits[i].side != 0);
+            if (i % 8) continue;
+            isogi_vol_intersect(p, &rays[i], 1, &alone, NULL);
+            wrong += any[i] != (alone.side != 0);
+        }
+        isogi_vol_free(p);
+        free(data);
+    }
+    CHECK(hit > COUNT && !wrong, "%ld of %ld hits differ", wrong, hit);
+}
+
 TEST_MAIN("vol_work")
