@@ -5047,35 +5047,83 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE __m512d isogi_vol__snap8(__m512d at, __m512d
     return _mm512_mask_mov_pd(at, _mm512_cmp_pd_mask(at, _mm512_sub_pd(one, slack), _CMP_GT_OQ), one);
 }
 
-/* The root of everyday cubics: cubic_refine's first loop. *slow: those that need its second one. */
-ISOGI_VOL__AVX512 ISOGI_VOL__INLINE __m512d isogi_vol__refine8(const __m512d b[4], __mmask8 lanes, __mmask8 *slow) {
+/* What eight rays find in cells: those that stay on their side, that cross the surface, and that are left to the code for one; the cell's
+   cubic, where they enter and leave it, and when. */
+typedef struct isogi_vol__decision {
+    __m512d bezier[4], from[3], to[3], begin, end, base, root;
+    __m512i cell;
+    __mmask8 same, cross, odd, inside;
+} isogi_vol__decision;
+
+/* The roots of everyday cubics: cubic_refine's first loop, for one or two groups of eight, whose steps wait for each other if they go one
+   by one. Those that need its second loop are odd. */
+ISOGI_VOL__AVX512 ISOGI_VOL__INLINE void isogi_vol__refine8(isogi_vol__batch *b, isogi_vol__decision *k, int groups) {
     const __m512d zero = _mm512_setzero_pd(), one = _mm512_set1_pd(1), three = _mm512_set1_pd(3), two = _mm512_set1_pd(2);
-    const __m512d c1 = ISOGI_VOL__MUL(three, ISOGI_VOL__SUB(b[1], b[0]));
-    const __m512d c2 = ISOGI_VOL__MUL(three, ISOGI_VOL__ADD(ISOGI_VOL__SUB(b[0], b[1]), ISOGI_VOL__SUB(b[2], b[1])));
-    const __m512d c3 = ISOGI_VOL__ADD(ISOGI_VOL__SUB(b[3], b[0]), ISOGI_VOL__MUL(three, ISOGI_VOL__SUB(b[1], b[2])));
-    const __m512d bend = ISOGI_VOL__MUL(_mm512_set1_pd(1e13), ISOGI_VOL__ADD(_mm512_abs_pd(c2), ISOGI_VOL__MUL(three, _mm512_abs_pd(c3))));
-    __m512d s = _mm512_div_pd(b[0], ISOGI_VOL__SUB(b[0], b[3])), next = s;
-    __mmask8 due = lanes;
-    int i;
-    *slow = (__mmask8)(lanes & (_mm512_cmp_pd_mask(b[0], zero, _CMP_EQ_OQ) | _mm512_cmp_pd_mask(b[3], zero, _CMP_EQ_OQ)));
-    due = (__mmask8)(due & ~*slow);
-    for (i = 0; i < 4 && due; i++) {
-        const __m512d ss = ISOGI_VOL__MUL(s, s);
-        const __m512d value =
-            ISOGI_VOL__ADD(ISOGI_VOL__ADD(b[0], ISOGI_VOL__MUL(s, c1)), ISOGI_VOL__MUL(ss, ISOGI_VOL__ADD(c2, ISOGI_VOL__MUL(s, c3))));
-        const __m512d slope =
-            ISOGI_VOL__ADD(ISOGI_VOL__ADD(c1, ISOGI_VOL__MUL(ISOGI_VOL__MUL(two, s), c2)), ISOGI_VOL__MUL(ss, ISOGI_VOL__MUL(three, c3)));
-        const __m512d step = _mm512_div_pd(value, slope), at = ISOGI_VOL__SUB(s, step);
-        const __mmask8 kept = _mm512_mask_cmp_pd_mask(_mm512_cmp_pd_mask(at, zero, _CMP_GE_OQ), at, one, _CMP_LE_OQ);
-        const __mmask8 done = _mm512_cmp_pd_mask(ISOGI_VOL__MUL(ISOGI_VOL__MUL(bend, step), step), _mm512_abs_pd(slope), _CMP_LE_OQ);
-        *slow = (__mmask8)(*slow | (due & ~kept));
-        due = (__mmask8)(due & kept);
-        next = _mm512_mask_mov_pd(next, (__mmask8)(due & done), at);
-        due = (__mmask8)(due & ~done);
-        s = at;
+    __m512d c1[2], c2[2], c3[2], bend[2], s[2];
+    __mmask8 due[2] = {0, 0}, slow[2];
+    int i, g;
+#pragma GCC unroll 2
+    for (g = 0; g < groups; g++) {
+        const __m512d *const p = k[g].bezier;
+        c1[g] = ISOGI_VOL__MUL(three, ISOGI_VOL__SUB(p[1], p[0]));
+        c2[g] = ISOGI_VOL__MUL(three, ISOGI_VOL__ADD(ISOGI_VOL__SUB(p[0], p[1]), ISOGI_VOL__SUB(p[2], p[1])));
+        c3[g] = ISOGI_VOL__ADD(ISOGI_VOL__SUB(p[3], p[0]), ISOGI_VOL__MUL(three, ISOGI_VOL__SUB(p[1], p[2])));
+        bend[g] = ISOGI_VOL__MUL(_mm512_set1_pd(1e13), ISOGI_VOL__ADD(_mm512_abs_pd(c2[g]), ISOGI_VOL__MUL(three, _mm512_abs_pd(c3[g]))));
+        k[g].root = s[g] = _mm512_div_pd(p[0], ISOGI_VOL__SUB(p[0], p[3]));
+        slow[g] = (__mmask8)(k[g].cross & (_mm512_cmp_pd_mask(p[0], zero, _CMP_EQ_OQ) | _mm512_cmp_pd_mask(p[3], zero, _CMP_EQ_OQ)));
+        due[g] = (__mmask8)(k[g].cross & ~slow[g]);
     }
-    *slow = (__mmask8)(*slow | due);
-    return next;
+    for (i = 0; i < 4 && due[0] | due[1]; i++) {
+#pragma GCC unroll 2
+        for (g = 0; g < groups; g++) {
+            const __m512d ss = ISOGI_VOL__MUL(s[g], s[g]);
+            const __m512d value = ISOGI_VOL__ADD(ISOGI_VOL__ADD(k[g].bezier[0], ISOGI_VOL__MUL(s[g], c1[g])),
+                                                 ISOGI_VOL__MUL(ss, ISOGI_VOL__ADD(c2[g], ISOGI_VOL__MUL(s[g], c3[g]))));
+            const __m512d slope = ISOGI_VOL__ADD(ISOGI_VOL__ADD(c1[g], ISOGI_VOL__MUL(ISOGI_VOL__MUL(two, s[g]), c2[g])),
+                                                 ISOGI_VOL__MUL(ss, ISOGI_VOL__MUL(three, c3[g])));
+            const __m512d step = _mm512_div_pd(value, slope), at = ISOGI_VOL__SUB(s[g], step);
+            const __mmask8 kept = _mm512_mask_cmp_pd_mask(_mm512_cmp_pd_mask(at, zero, _CMP_GE_OQ), at, one, _CMP_LE_OQ);
+            const __mmask8 done =
+                _mm512_cmp_pd_mask(ISOGI_VOL__MUL(ISOGI_VOL__MUL(bend[g], step), step), _mm512_abs_pd(slope), _CMP_LE_OQ);
+            slow[g] = (__mmask8)(slow[g] | (due[g] & ~kept));
+            due[g] = (__mmask8)(due[g] & kept);
+            k[g].root = _mm512_mask_mov_pd(k[g].root, (__mmask8)(due[g] & done), at);
+            due[g] = (__mmask8)(due[g] & ~done);
+            s[g] = at;
+        }
+    }
+#pragma GCC unroll 2
+    for (g = 0; g < groups; g++) {
+        slow[g] = (__mmask8)(slow[g] | due[g]);
+        b->work.cubics -= (uint64_t)__builtin_popcount(slow[g]);
+        k[g].odd = (__mmask8)(k[g].odd | slow[g]), k[g].cross = (__mmask8)(k[g].cross & ~slow[g]);
+    }
+}
+
+/* Hits of rays that cross; slots: of the eight. */
+ISOGI_VOL__AVX512 ISOGI_VOL__INLINE void isogi_vol__write8(isogi_vol__batch *b, const isogi_vol__pool *s, const uint8_t *slots,
+                                                           const isogi_vol__decision *k) {
+    const __m512d one = _mm512_set1_pd(1), rest = _mm512_sub_pd(one, k->root);
+    const __m512i field = _mm512_set1_epi64(0xffff), z = _mm512_and_si512(_mm512_srli_epi64(k->cell, 32), field);
+    const __m512d t = ISOGI_VOL__ADD(k->base, ISOGI_VOL__ADD(k->begin, ISOGI_VOL__MUL(k->root, ISOGI_VOL__SUB(k->end, k->begin))));
+    const __m512d x = isogi_vol__lerp8(k->from[0], k->to[0], k->root, rest), y = isogi_vol__lerp8(k->from[1], k->to[1], k->root, rest);
+    const __m512d w = isogi_vol__lerp8(k->from[2], k->to[2], k->root, rest);
+    const __m512i side = _mm512_mask_mov_epi64(_mm512_set1_epi64((int64_t)1 << 32), k->inside, _mm512_set1_epi64(-((int64_t)1 << 32)));
+    const __m512i low = _mm512_or_si512(_mm512_and_si512(k->cell, field),
+                                        _mm512_slli_epi64(_mm512_and_si512(_mm512_srli_epi64(k->cell, 16), field), 32)),
+                  high = _mm512_or_si512(z, side);
+    __attribute__((aligned(64))) double part[2][3][8]; /* of even lanes, then of odd ones: pairs of eight bytes */
+    unsigned lanes;
+    _mm512_store_pd(part[0][0], _mm512_unpacklo_pd(t, x)), _mm512_store_pd(part[1][0], _mm512_unpackhi_pd(t, x));
+    _mm512_store_pd(part[0][1], _mm512_unpacklo_pd(y, w)), _mm512_store_pd(part[1][1], _mm512_unpackhi_pd(y, w));
+    _mm512_store_si512(part[0][2], _mm512_unpacklo_epi64(low, high)), _mm512_store_si512(part[1][2], _mm512_unpackhi_epi64(low, high));
+    for (lanes = k->cross; lanes; lanes &= lanes - 1) {
+        const int i = __builtin_ctz(lanes);
+        isogi_hit *hit = &b->hits[s->ray[slots[i]]];
+        double(*from)[8] = part[i & 1];
+        _mm_storeu_pd(&hit->t, _mm_load_pd(from[0] + (i & 6))), _mm_storeu_pd(&hit->local[1], _mm_load_pd(from[1] + (i & 6)));
+        _mm_storeu_si128((__m128i *)(void *)hit->cell, _mm_load_si128((const __m128i *)(const void *)(from[2] + (i & 6))));
+    }
 }
 
 /* Corner x + 2y + 4z of eight cells, minus the isovalue. */
@@ -5150,17 +5198,15 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE __mmask8 isogi_vol__left8(const __m512d b[4]
     return (__mmask8)(lanes & (rises | falls) & ~stays & _mm512_cmp_pd_mask(b[3], zero, _CMP_NEQ_OQ));
 }
 
-ISOGI_VOL__AVX512 static unsigned isogi_vol__decide8(isogi_vol__batch *b, isogi_vol__pool *s, const uint8_t *seats, unsigned some,
-                                                     unsigned *alone) {
-    const __mmask8 lanes = (__mmask8)some;
-    const __m128i list = _mm_loadl_epi64((const __m128i *)(const void *)seats);
-    /* can be loaded at once */
-    const int row = seats[0] % 8 == 0 && _mm_cvtsi128_si64(list) == (int64_t)(0x0706050403020100u + seats[0] * 0x0101010101010101u);
-    const __m512i slot = isogi_vol__slots8(seats);
+/* row: the slots are eight in a row; cell, side: of them. */
+ISOGI_VOL__AVX512 ISOGI_VOL__INLINE void isogi_vol__decide_some(isogi_vol__batch *b, isogi_vol__pool *s, const uint8_t *seats, int row,
+                                                                __mmask8 lanes, __m512i cell, __m512i side, isogi_vol__decision *d) {
     const isogi_vol__spots spots = isogi_vol__spots8(s, seats);
-#define ISOGI_VOL__TAKE(member) (row ? _mm512_load_si512(&s->member[seats[0]]) : isogi_vol__pick8(&spots, ISOGI_VOL__ROW_OF(member)))
+    char *const begins = spots.at[0];
+#define ISOGI_VOL__TAKE(member) \
+    (row ? _mm512_load_si512(begins + ISOGI_VOL__ROW_OF(member)) : isogi_vol__pick8(&spots, ISOGI_VOL__ROW_OF(member)))
 #define ISOGI_VOL__TAKE_REAL(member) _mm512_castsi512_pd(ISOGI_VOL__TAKE(member))
-    const __m512i cell = ISOGI_VOL__TAKE(cell), side = ISOGI_VOL__TAKE(side), three = _mm512_set1_epi64(3);
+    const __m512i three = _mm512_set1_epi64(3);
     const __m512i in = _mm512_and_si512(_mm512_srli_epi64(cell, 48), three), out = _mm512_and_si512(_mm512_srli_epi64(cell, 50), three);
     const __m512d zero = _mm512_setzero_pd(), one = _mm512_set1_pd(1), stop = ISOGI_VOL__TAKE_REAL(stop);
     /* rays that leave a surface, which most do without coming back to it in the same cell; a ray's first cell behind a border of the
@@ -5169,15 +5215,14 @@ ISOGI_VOL__AVX512 static unsigned isogi_vol__decide8(isogi_vol__batch *b, isogi_
                    leaving = (__mmask8)(starts & first & lanes);
     __mmask8 odd = (__mmask8)((starts & ~first) | _mm512_mask_cmpge_epi64_mask(first, ISOGI_VOL__TAKE(entry_axis), _mm512_setzero_si512())),
              low, high, b_low, b_high, inside, same, cross;
-    __mmask8 left = 0, slow;
+    __mmask8 left = 0;
     const __m512d base = ISOGI_VOL__TAKE_REAL(base);
-    __m512d c[8], from[3], to[3], bezier[4], begin = zero, end = stop, root, steepest = zero;
-    *alone = 0;
+    __m512d c[8], from[3], to[3], bezier[4], begin = zero, end = stop, steepest = zero;
+    int a;
     isogi_vol__corners8(b->pyramid, cell, lanes, ISOGI_VOL__TAKE_REAL(isovalue), c);
     {
         __m512d origin[3], dir[3], at[3];
         __mmask8 fall[3];
-        int a;
 #pragma GCC unroll 8
         for (a = 0; a < 3; a++) {
             const __mmask8 enters = _mm512_cmpeq_epi64_mask(in, _mm512_set1_epi64(a)),
@@ -5265,35 +5310,29 @@ ISOGI_VOL__AVX512 static unsigned isogi_vol__decide8(isogi_vol__batch *b, isogi_
         cross = (__mmask8)(cross & lanes & ~odd), same = (__mmask8)((same & lanes & ~odd) | left);
     }
     b->work.cubics += (uint64_t)__builtin_popcount((unsigned)(same | cross));
-    _mm512_mask_i64scatter_epi64(s->side, same, slot, _mm512_maskz_set1_epi64(inside, 1), 8);
-    if (b->hits && cross) {
-        __attribute__((aligned(64))) double t[8], local[3][8];
-        unsigned k;
-        root = isogi_vol__refine8(bezier, cross, &slow);
-        b->work.cubics -= (uint64_t)__builtin_popcount(slow);
-        odd = (__mmask8)(odd | slow), cross = (__mmask8)(cross & ~slow);
-        {
-            const __m512d rest = _mm512_sub_pd(one, root);
-            _mm512_store_pd(
-                t, ISOGI_VOL__ADD(base, ISOGI_VOL__ADD(begin, ISOGI_VOL__MUL(root, ISOGI_VOL__SUB(end, begin)))));
-            _mm512_store_pd(local[0], isogi_vol__lerp8(from[0], to[0], root, rest));
-            _mm512_store_pd(local[1], isogi_vol__lerp8(from[1], to[1], root, rest));
-            _mm512_store_pd(local[2], isogi_vol__lerp8(from[2], to[2], root, rest));
-        }
-        for (k = cross; k; k &= k - 1) {
-            const int i = __builtin_ctz(k), place = seats[i];
-            const int64_t xyz = s->cell[place];
-            isogi_hit *hit = &b->hits[s->ray[place]];
-            hit->t = t[i], hit->local[0] = local[0][i], hit->local[1] = local[1][i], hit->local[2] = local[2][i];
-            hit->cell[0] = (uint32_t)(xyz & 0xffff), hit->cell[1] = (uint32_t)(xyz >> 16 & 0xffff),
-            hit->cell[2] = (uint32_t)(xyz >> 32 & 0xffff);
-            hit->side = inside >> i & 1 ? -1 : 1;
-        }
-    }
+#pragma GCC unroll 3
+    for (a = 0; a < 3; a++) d->from[a] = from[a], d->to[a] = to[a];
+#pragma GCC unroll 4
+    for (a = 0; a < 4; a++) d->bezier[a] = bezier[a];
+    d->begin = begin, d->end = end, d->base = base, d->cell = cell;
+    d->same = same, d->cross = cross, d->odd = odd, d->inside = inside;
 #undef ISOGI_VOL__TAKE
 #undef ISOGI_VOL__TAKE_REAL
-    *alone = odd;
-    return cross;
+}
+
+ISOGI_VOL__AVX512 static unsigned isogi_vol__decide8(isogi_vol__batch *b, isogi_vol__pool *s, const uint8_t *seats, unsigned some,
+                                                     unsigned *alone) {
+    const __m128i list = _mm_loadl_epi64((const __m128i *)(const void *)seats);
+    /* can be loaded at once */
+    const int row = seats[0] % 8 == 0 && _mm_cvtsi128_si64(list) == (int64_t)(0x0706050403020100u + seats[0] * 0x0101010101010101u);
+    const isogi_vol__spots spots = isogi_vol__spots8(s, seats);
+    isogi_vol__decision k;
+    isogi_vol__decide_some(b, s, seats, row, (__mmask8)some, isogi_vol__pick8(&spots, ISOGI_VOL__ROW_OF(cell)),
+                           isogi_vol__pick8(&spots, ISOGI_VOL__ROW_OF(side)), &k);
+    if (k.same) _mm512_mask_i64scatter_epi64(s->side, k.same, isogi_vol__slots8(seats), _mm512_maskz_set1_epi64(k.inside, 1), 8);
+    if (b->hits && k.cross) isogi_vol__refine8(b, &k, 1), isogi_vol__write8(b, s, seats, &k);
+    *alone = k.odd;
+    return k.cross;
 }
 
 /* Sends for the voxels of a cell in doubt; soon: they are needed at once. */
@@ -5642,7 +5681,7 @@ static void isogi_vol__trace_one(isogi_vol__batch *b, size_t i) {
 #define ISOGI_VOL__REACH 4e-6f /* times below are sums of a few numbers up to 4 children, with errors below 1e-6 */
 
 typedef struct __attribute__((aligned(64))) isogi_vol__layers {
-    __m512 per[3], first[3], last[3], stop; /* from somewhere on, the rays enter layer i of children at i per - first,
+    __m512 per[3], first[3], last[3], stop; /* from somewhere on, the rays enter layer i of cells at i per - first,
                                                leave it at (i + 1) per - last */
 } isogi_vol__layers;
 
@@ -5650,6 +5689,7 @@ typedef struct __attribute__((aligned(64))) isogi_vol__layers {
 typedef struct __attribute__((aligned(64))) isogi_vol__packet {
     double place[3][ISOGI_VOL__PACKET], way[3][ISOGI_VOL__PACKET];
     __m512 at[3], dir[3], inverse[3], stop; /* the same in float; stop: a little more */
+    __m512 enter[3], leave[3];              /* planes of nodes are met at place * inverse - these: nodes are wider than they are */
     float padded;                           /* cells of the root */
     int axis;                               /* on which they are fastest */
 } isogi_vol__packet;
@@ -5675,29 +5715,34 @@ ISOGI_VOL__AVX512 static void isogi_vol__set_packet(isogi_vol__packet *k, const 
     }
     k->stop = _mm512_mul_ps(isogi_vol__halves(_mm512_load_pd(&s->stop[0]), _mm512_load_pd(&s->stop[8])), _mm512_set1_ps(1.000001f));
     k->padded = (float)(1 << 2 * levels);
+    /* floats are off by less than 2^-21 of what the root measures; nodes are widened by twice as much */
+#pragma GCC unroll 3
+    for (a = 0; a < 3; a++) {
+        const __m512 reach = _mm512_set1_ps(1e-6f * k->padded);
+        k->enter[a] = _mm512_mul_ps(_mm512_add_ps(k->at[a], reach), k->inverse[a]);
+        k->leave[a] = _mm512_mul_ps(_mm512_sub_ps(k->at[a], reach), k->inverse[a]);
+    }
     k->axis = k->way[1][first] > k->way[0][first];
     if (k->way[2][first] > k->way[k->axis][first]) k->axis = 2;
 }
 
-/* The layers of a node above the leaves; cell: its corner. Times count from where the rays begin: these floats are off by less than 2^-21
-   of what the root measures; children are widened by twice as much. */
-ISOGI_VOL__AVX512 ISOGI_VOL__INLINE void isogi_vol__open_layers(isogi_vol__layers *l, const isogi_vol__packet *k, int n, int64_t cell) {
-    const float size = (float)(1 << 2 * n);
-    const __m512 reach = _mm512_set1_ps(1e-6f * k->padded / size);
+/* Which rays meet a node or come near it; size: of its sides; cell: its corner. */
+ISOGI_VOL__AVX512 ISOGI_VOL__INLINE __mmask16 isogi_vol__meet_node(const isogi_vol__packet *k, int64_t cell, float size) {
+    const __m128 corner = _mm_cvtepi32_ps(_mm_cvtepu16_epi32(_mm_cvtsi64_si128(cell)));
+    __attribute__((aligned(16))) float low[4], high[4];
+    __m512 enter = _mm512_setzero_ps(), leave = k->stop;
     int a;
+    _mm_store_ps(low, corner), _mm_store_ps(high, _mm_add_ps(corner, _mm_set1_ps(size)));
 #pragma GCC unroll 3
     for (a = 0; a < 3; a++) {
-        const __m512 corner = _mm512_set1_ps((float)(cell >> 16 * a & 0xffff));
-        const __m512 at = _mm512_mul_ps(_mm512_sub_ps(k->at[a], corner), _mm512_set1_ps(1 / size));
-        const __m512 per = _mm512_mul_ps(k->inverse[a], _mm512_set1_ps(size));
-        l->per[a] = per, l->first[a] = _mm512_mul_ps(_mm512_add_ps(at, reach), per),
-        l->last[a] = _mm512_mul_ps(_mm512_sub_ps(at, reach), per);
+        enter = _mm512_max_ps(enter, _mm512_fmsub_ps(_mm512_set1_ps(low[a]), k->inverse[a], k->enter[a]));
+        leave = _mm512_min_ps(leave, _mm512_fmsub_ps(_mm512_set1_ps(high[a]), k->inverse[a], k->leave[a]));
     }
-    l->stop = k->stop;
+    return _mm512_cmp_ps_mask(enter, leave, _CMP_LE_OQ);
 }
 
-/* Those of a leaf, from where the rays come to its first plane on the axis on which they are fastest: rays that meet it are then next to
-   it, and their places in cells are exact. */
+/* The layers of cells of a leaf, from where the rays come to its first plane on the axis on which they are fastest: rays that meet it
+   are then next to it, and their places in cells are exact. */
 ISOGI_VOL__AVX512 ISOGI_VOL__INLINE void isogi_vol__open_cells(isogi_vol__layers *l, __m512 place[3], const isogi_vol__packet *k,
                                                                const isogi_vol__pool *s, int64_t cell) {
     const __m512 reach = _mm512_set1_ps(ISOGI_VOL__REACH);
@@ -5735,7 +5780,7 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE __m512 isogi_vol__leave16(const isogi_vol__l
     return _mm512_fmsub_ps(_mm512_set1_ps(isogi_vol__layer_numbers[layer + 1]), l->per[axis], l->last[axis]);
 }
 
-/* When the rays enter a child, and when they leave it. */
+/* When the rays enter a cell, and when they leave it. */
 ISOGI_VOL__AVX512 ISOGI_VOL__INLINE __m512 isogi_vol__enter_child(const isogi_vol__layers *l, int child) {
     return _mm512_max_ps(_mm512_max_ps(isogi_vol__enter16(l, 0, child & 3), _mm512_setzero_ps()),
                          _mm512_max_ps(isogi_vol__enter16(l, 1, child >> 2 & 3), isogi_vol__enter16(l, 2, child >> 4)));
@@ -5793,21 +5838,24 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE void isogi_vol__look16(isogi_vol__sides16 *s
     sides->out = sides->out0 & sides->out1 & _mm512_cmp_ps_mask(_mm512_max_ps(sum1, sum2), third_low, _CMP_LT_OQ);
 }
 
-/* Rays in doubt, each of its slot's cell: those that pass it are decided in double. Returns hits; in, out: the sides on which rays are
-   known to be. */
-ISOGI_VOL__AVX512 static unsigned isogi_vol__settle(isogi_vol__batch *b, isogi_vol__pool *s, unsigned doubt, unsigned *in, unsigned *out) {
-    const __m512i three = _mm512_set1_epi64(3), none = _mm512_set1_epi64(-1), zero = _mm512_setzero_si512();
+/* Rays in doubt, each of its slot's cell: those that pass it are decided in double. Returns hits; in, known: the sides on which rays are;
+   *alone: those that are left to the code for one. Not inlined, so that its stack does not add to that of that code. */
+ISOGI_VOL__AVX512 ISOGI_VOL__NOINLINE static unsigned isogi_vol__settle16(isogi_vol__batch *b, isogi_vol__pool *s, unsigned doubt,
+                                                                          unsigned in, unsigned known, unsigned *alone) {
+    static const uint8_t slots[16] = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15};
+    const __m512i three = _mm512_set1_epi64(3), none = _mm512_set1_epi64(-1);
+    isogi_vol__decision k[2];
     unsigned hits = 0;
-    int h;
+    int h, g, first[2], groups = 0;
     for (h = 0; h < 16; h += 8) {
-        const __mmask8 inside = (__mmask8)(*in >> h), known = (__mmask8)((*in | *out) >> h);
-        __m512i cell = _mm512_load_si512(&s->cell[h]), begin = three, end = _mm512_load_si512(&s->end[h]), side;
+        const __m512i old = _mm512_load_si512(&s->cell[h]);
+        const __m512i side = _mm512_mask_mov_epi64(none, (__mmask8)(known >> h), _mm512_maskz_set1_epi64((__mmask8)(in >> h), 1));
+        __m512i cell = old, begin = three, end = _mm512_load_si512(&s->end[h]);
         __m512d origin[3], inverse[3], dir[3];
         __m256 from[3], to[3];
         __mmask8 passed;
-        uint8_t seats[8];
-        unsigned alone, some;
         int a;
+        _mm512_store_si512(&s->side[h], side);
         if (!(doubt >> h & 255)) continue;
 #pragma GCC unroll 3
         for (a = 0; a < 3; a++)
@@ -5818,19 +5866,33 @@ ISOGI_VOL__AVX512 static unsigned isogi_vol__settle(isogi_vol__batch *b, isogi_v
         if (!passed) continue;
         cell = _mm512_or_si512(cell, _mm512_or_si512(_mm512_slli_epi64(_mm512_and_si512(begin, three), 48),
                                                      _mm512_slli_epi64(_mm512_and_si512(end, three), 50)));
-        _mm512_mask_store_epi64(&s->cell[h], passed, cell);
-        _mm512_store_si512(&s->side[h], _mm512_mask_mov_epi64(none, known, _mm512_maskz_set1_epi64(inside, 1)));
-        _mm_storel_epi64((__m128i *)(void *)seats, _mm_add_epi8(_mm_set1_epi8((char)h), _mm_set_epi64x(0, 0x0706050403020100)));
-        some = isogi_vol__decide8(b, s, seats, passed, &alone);
-        for (; alone; alone &= alone - 1) {
-            isogi_hit any;
-            a = __builtin_ctz(alone);
-            some |= (unsigned)isogi_vol__decide(b, s, h + a, b->hits ? &b->hits[s->ray[h + a]] : &any) << a;
-        }
-        hits |= some << h;
-        side = _mm512_load_si512(&s->side[h]);
-        *in = (*in & ~(255u << h)) | (unsigned)_mm512_cmpgt_epi64_mask(side, zero) << h;
-        *out = (*out & ~(255u << h)) | (unsigned)_mm512_cmpeq_epi64_mask(side, zero) << h;
+        cell = _mm512_mask_mov_epi64(old, passed, cell);
+        _mm512_store_si512(&s->cell[h], cell);
+        isogi_vol__decide_some(b, s, slots + h, 1, passed, cell, side, &k[groups]);
+        _mm512_store_si512(&s->side[h], _mm512_mask_mov_epi64(side, k[groups].same, _mm512_maskz_set1_epi64(k[groups].inside, 1)));
+        first[groups++] = h;
+    }
+    if (b->hits && groups == 1 && k[0].cross) isogi_vol__refine8(b, k, 1);
+    else if (b->hits && groups == 2 && k[0].cross | k[1].cross) isogi_vol__refine8(b, k, 2);
+    for (g = 0, *alone = 0; g < groups; g++) {
+        if (b->hits && k[g].cross) isogi_vol__write8(b, s, slots + first[g], &k[g]);
+        hits |= (unsigned)k[g].cross << first[g], *alone |= (unsigned)k[g].odd << first[g];
+    }
+    return hits;
+}
+
+ISOGI_VOL__AVX512 static unsigned isogi_vol__settle(isogi_vol__batch *b, isogi_vol__pool *s, unsigned doubt, unsigned *in, unsigned *out) {
+    unsigned alone, hits = isogi_vol__settle16(b, s, doubt, *in, *in | *out, &alone);
+    int h;
+    for (; alone; alone &= alone - 1) {
+        const int slot = __builtin_ctz(alone);
+        isogi_hit any;
+        hits |= (unsigned)isogi_vol__decide(b, s, slot, b->hits ? &b->hits[s->ray[slot]] : &any) << slot;
+    }
+    for (h = 0, *in = *out = 0; h < 16; h += 8) {
+        const __m512i side = _mm512_load_si512(&s->side[h]);
+        *in |= (unsigned)_mm512_cmpgt_epi64_mask(side, _mm512_setzero_si512()) << h;
+        *out |= (unsigned)_mm512_testn_epi64_mask(side, side) << h;
     }
     return hits;
 }
@@ -6015,13 +6077,12 @@ ISOGI_VOL__AVX512 ISOGI_VOL__NOINLINE static void isogi_vol__trace_packet(isogi_
     const uint8_t *children[ISOGI_VOL__NODE_LEVELS], *node = p->nodes[p->node_level[p->node_levels - 1].first];
     uint64_t left[ISOGI_VOL__NODE_LEVELS];
     unsigned met[ISOGI_VOL__NODE_LEVELS], lanes = rays, pending = 0;
-    isogi_vol__layers layers[ISOGI_VOL__NODE_LEVELS];
     isogi_vol__packet packet;
     isogi_vol__beam beam;
     isogi_vol__known known;
     int64_t cell = 0; /* corner of the node, counted backwards */
     int n = p->node_levels - 1;
-    memset(&known, 0, sizeof known), known.active = rays;
+    known.active = rays, known.doubts = known.hits = known.alone = known.in = known.out = known.seen_in = known.seen_out = 0;
     isogi_vol__set_packet(&packet, s, first, backwards, p->node_levels);
     isogi_vol__set_beam(&beam, &packet, ways, rays);
     for (;;) {
@@ -6035,7 +6096,6 @@ ISOGI_VOL__AVX512 ISOGI_VOL__NOINLINE static void isogi_vol__trace_packet(isogi_
             mask &= isogi_vol__held(ways, octant, low, high, node);
             if (mask) {
                 met[n] = lanes, left[n] = mask, pending |= 1u << n;
-                isogi_vol__open_layers(&layers[n], &packet, n, cell);
                 children[n] = p->nodes[below->first + 64 * ((size_t)(at & 0xffff) >> shift) +
                                        64 * below->parents[0] *
                                            (((size_t)(at >> 16 & 0xffff) >> shift) + below->parents[1] * ((size_t)(at >> 32) >> shift))];
@@ -6054,8 +6114,8 @@ ISOGI_VOL__AVX512 ISOGI_VOL__NOINLINE static void isogi_vol__trace_packet(isogi_
             n = __builtin_ctz(pending), lanes = met[n] & known.active;
             child = __builtin_ctzll(left[n]), left[n] &= left[n] - 1;
             if (!left[n] || !lanes) pending &= pending - 1;
-            lanes &= _mm512_cmp_ps_mask(isogi_vol__enter_child(&layers[n], child), isogi_vol__leave_child(&layers[n], child), _CMP_LE_OQ);
             cell = (int64_t)(((uint64_t)cell & ways->above[n]) | _pdep_u64((uint64_t)child, ways->digit[n]));
+            lanes &= isogi_vol__meet_node(&packet, cell, ways->size[n]);
             node = children[n] + 128 * (child ^ flip);
             isogi_vol__fetch_node(children[n] + 128 * (__builtin_ctzll(left[n] ? left[n] : (uint64_t)1 << child) ^ flip));
         }
@@ -6198,8 +6258,8 @@ ISOGI_VOL__INLINE void isogi_vol__send_for_rays(const char *from, size_t element
 /* Sets up to eight rays up at once and puts them into slots (beyond `count` the first one again; what is written of rays that get none does
    no harm): the operations of begin and aim, in their order and without contraction.
    Returns the rays that have a slot now; *odd: those that are left to the code for one. The others miss the box. turn: of a pool, in
-   which rays do not stay at the root if they begin in one place, or NULL. alike: rays differ in nothing but direction, as in a bundle. A kernel, longer
-   than a screen: nothing in it is worth a name of its own. */
+   which rays do not stay at the root if they begin in one place, or NULL. alike: rays differ in nothing but direction, as in a bundle. A
+   kernel, longer than a screen: nothing in it is worth a name of its own. */
 ISOGI_VOL__AVX512 ISOGI_VOL__INLINE unsigned isogi_vol__seat_some(isogi_vol__batch *b, isogi_vol__turn *turn, isogi_vol__pool *s,
                                                                   size_t first, int count, const uint8_t *seats, int whole, int alike,
                                                                   unsigned *odd) {
@@ -6384,8 +6444,9 @@ ISOGI_VOL__AVX512 static unsigned isogi_vol__seat8(isogi_vol__batch *b, isogi_vo
     return isogi_vol__seat_some(b, turn, s, first, count, seats, whole, b->bundle, odd);
 }
 
-/* Sixteen rays that differ in nothing but direction, into the first slots. */
-ISOGI_VOL__AVX512 static unsigned isogi_vol__seat_alike(isogi_vol__batch *b, isogi_vol__pool *s, size_t first, unsigned odd[2]) {
+/* Sixteen rays that differ in nothing but direction, into the first slots. Not inlined, for the sake of the stack. */
+ISOGI_VOL__AVX512 ISOGI_VOL__NOINLINE static unsigned isogi_vol__seat_alike(isogi_vol__batch *b, isogi_vol__pool *s, size_t first,
+                                                                            unsigned odd[2]) {
     static const uint8_t seats[16] = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15};
     const unsigned low = isogi_vol__seat_some(b, NULL, s, first, 8, seats, 1, 1, &odd[0]);
     return low | isogi_vol__seat_some(b, NULL, s, first + 8, 8, seats + 8, 1, 1, &odd[1]) << 8;
