@@ -770,6 +770,8 @@ typedef struct isogi_trace__sky {
     float *mean;   /* width * height */
     double *row;   /* height + 1 cumulative sums */
     double *pixel; /* height * (width + 1) cumulative sums of a row */
+    double *cosine; /* height + 1: of the angles between rows and the top */
+    uint32_t *near_row, *near_pixel; /* height, height * width: intervals where searches begin, see isogi_trace__search */
     size_t width, height;
 } isogi_trace__sky;
 
@@ -796,7 +798,10 @@ static void isogi_trace__sky_free(isogi_trace__sky *sky, const isogi_context *co
     isogi_release(context, sky->mean, sky->width * sky->height, sizeof(float));
     isogi_release(context, sky->row, sky->height + 1, sizeof(double));
     isogi_release(context, sky->pixel, sky->height * (sky->width + 1), sizeof(double));
-    sky->mean = NULL, sky->row = NULL, sky->pixel = NULL;
+    isogi_release(context, sky->cosine, sky->height + 1, sizeof(double));
+    isogi_release(context, sky->near_row, sky->height, sizeof(uint32_t));
+    isogi_release(context, sky->near_pixel, sky->width * sky->height, sizeof(uint32_t));
+    sky->mean = NULL, sky->row = sky->pixel = sky->cosine = NULL, sky->near_row = sky->near_pixel = NULL;
 }
 
 static int isogi_trace__is_identity(const float m[9]) {
@@ -804,6 +809,27 @@ static int isogi_trace__is_identity(const float m[9]) {
     for (i = 0; i < 9; i++)
         if (!isogi_trace__zero((double)m[i])) return 0;
     return 1;
+}
+
+/* Cumulative sums are searched from the interval that the beginning of the share u, in equal steps, falls into: on average one or two away
+   from that of u itself (Chen and Asau 1974). */
+static void isogi_trace__search_set(const double *sum, size_t count, uint32_t *near_to) {
+    size_t i, low = 0;
+    for (i = 0; i < count; i++) {
+        double x = (double)i / (double)count * sum[count];
+        while (low + 1 < count && sum[low + 1] <= x) low++;
+        near_to[i] = (uint32_t)low;
+    }
+}
+
+/* The interval that the share u of all falls into, and the place in it, 0..1. */
+static size_t isogi_trace__search(const double *sum, size_t count, const uint32_t *near_to, double u, double *place) {
+    double x = u * sum[count];
+    size_t low = near_to[(size_t)isogi_trace__clamp(u * (double)count, (double)(count - 1))];
+    while (low && sum[low] > x) low--;
+    while (low + 1 < count && sum[low + 1] <= x) low++;
+    *place = sum[low + 1] > sum[low] ? isogi_trace__clamp((x - sum[low]) / (sum[low + 1] - sum[low]), 1) : 0.5;
+    return low;
 }
 
 /* An image without peaks is left to the cosine-distributed rays: they find it as well, with half the rays. */
@@ -816,7 +842,11 @@ static isogi_result isogi_trace__sky_build(isogi_trace__sky *sky, const isogi_en
     sky->mean = (float *)isogi_allocate(context, sky->width * sky->height, sizeof(float));
     sky->row = (double *)isogi_allocate(context, sky->height + 1, sizeof(double));
     sky->pixel = (double *)isogi_allocate(context, sky->height * (sky->width + 1), sizeof(double));
-    if (!sky->mean || !sky->row || !sky->pixel) return ISOGI_NO_MEMORY;
+    sky->cosine = (double *)isogi_allocate(context, sky->height + 1, sizeof(double));
+    sky->near_row = (uint32_t *)isogi_allocate(context, sky->height, sizeof(uint32_t));
+    sky->near_pixel = (uint32_t *)isogi_allocate(context, sky->width * sky->height, sizeof(uint32_t));
+    if (!sky->mean || !sky->row || !sky->pixel || !sky->cosine || !sky->near_row || !sky->near_pixel) return ISOGI_NO_MEMORY;
+    for (y = 0; y <= sky->height; y++) sky->cosine[y] = cos(ISOGI_TRACE__PI * (double)y / (double)sky->height);
     sky->row[0] = 0;
     for (y = 0; y < sky->height; y++) {
         double *sum = sky->pixel + y * (sky->width + 1), step = ISOGI_TRACE__PI / (double)sky->height;
@@ -829,37 +859,27 @@ static isogi_result isogi_trace__sky_build(isogi_trace__sky *sky, const isogi_en
             if ((double)mean > peak) peak = (double)mean;
         }
         sky->row[y + 1] = sky->row[y] + sum[sky->width];
+        isogi_trace__search_set(sum, sky->width, sky->near_pixel + y * sky->width);
     }
+    isogi_trace__search_set(sky->row, sky->height, sky->near_row);
     sky->total = sky->row[sky->height];
     sky->on = sky->total > 0 && peak * 4 * ISOGI_TRACE__PI > 8 * sky->total;
     return ISOGI_OK;
 }
 
-/* The interval of cumulative sums that x falls into, and the place in it, 0..1. */
-static size_t isogi_trace__search(const double *sum, size_t count, double x, double *place) {
-    size_t low = 0, half;
-    for (; count > 1; count -= half) { /* without a branch: which half is a matter of chance */
-        half = count / 2;
-        low += sum[low + half] <= x ? half : 0;
-    }
-    *place = sum[low + 1] > sum[low] ? isogi_trace__clamp((x - sum[low]) / (sum[low + 1] - sum[low]), 1) : 0.5;
-    return low;
-}
-
 /* A direction (world) drawn from the image, and its density (per steradian); layout of isogi_env. */
 static double isogi_trace__sky_direction(const isogi_trace__sky *sky, double u, double v, float dir[3]) {
-    double place, longitude, d[3], sine, top, bottom;
-    size_t y = isogi_trace__search(sky->row, sky->height, u * sky->total, &place), x;
+    double place, d[3], sine, top, bottom;
+    size_t y = isogi_trace__search(sky->row, sky->height, sky->near_row, u, &place), x;
     const double *sum = sky->pixel + y * (sky->width + 1);
     const float *m = sky->env->rotation;
     int a;
-    top = cos(ISOGI_TRACE__PI * (double)y / (double)sky->height);
-    bottom = cos(ISOGI_TRACE__PI * (double)(y + 1) / (double)sky->height);
+    top = sky->cosine[y], bottom = sky->cosine[y + 1];
     d[1] = top + (bottom - top) * place;
-    x = isogi_trace__search(sum, sky->width, v * sum[sky->width], &place);
-    longitude = 2 * ISOGI_TRACE__PI * (((double)x + place) / (double)sky->width - 0.5);
+    x = isogi_trace__search(sum, sky->width, sky->near_pixel + y * sky->width, v, &place);
     sine = sqrt(isogi_trace__clamp(1 - d[1] * d[1], 1));
-    d[0] = sine * sin(longitude), d[2] = -sine * cos(longitude);
+    isogi_trace__circle(isogi_trace__clamp(((double)x + place) / (double)sky->width, 1), &d[2], &d[0]);
+    d[0] *= -sine, d[2] *= sine; /* half a turn less */
     for (a = 0; a < 3; a++)
         dir[a] = !sky->turned ? (float)d[a]
                               : (float)((double)m[3 * a] * d[0] + (double)m[3 * a + 1] * d[1] + (double)m[3 * a + 2] * d[2]);
