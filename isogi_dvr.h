@@ -96,8 +96,8 @@
    every sample as isogi_sh_project has them there: points and spheres with their inverse square, within a sphere evenly from
    everywhere, rectangles exactly; matter behind a lamp shadows it as matter before it does) and V those of the transmittance from the
    sample to the border of the box in all directions, interpolated between the eight nearest points of a regular grid, of which the more
-   open count more: the trilinear weight of each times min(1, 2 m)^2, where m >= 0.005 is the mean of its V over all directions. So the
-   light on a surface is that of the points in front of it, without the darkness of those below. Where nothing casts shadows, V(w) = 1,
+   open count more: the trilinear weight of each times min(1, 5 m)^2, where m >= 0.005 is the mean of its V over all directions. So the
+   light on what is opaque is that of the points in front of it, without the darkness of those below. Where nothing casts shadows, V(w) = 1,
    and a sky of radiance 1 from everywhere gives g_s = rgb / (4 pi) * 4 pi = rgb: colour is the albedo, and under a uniform sky of 1 a
    medium without shadows looks as it does unlit. A directional light of irradiance E gives g_s = rgb E V / (4 pi). The truncated series
    can be negative, most of all where matter hides the brightest of a sky, and black there is the worst error of a picture: light is at
@@ -134,12 +134,12 @@
    Megabytes of visibility and RMSE of a frame against a regular grid of 129, 193, 193 points an axis (make bench ONLY=visibility):
 
        points an axis               33             65             97             129            193
-       torus-    regular        1.2  .0172     9.4  .0105     32   .0072     76   .0037
-       sphere    coarsest 8     1.6  .0174     7.1  .0101     18   .0082     25   .0030
-       ml256     regular        1.2  .0711     9.4  .0284     32   .0121     76   .0068    255  .0006
-                 coarsest 8     0.9  .0676     6.8  .0286     15   .0118     41   .0067    109  .0000
-       bonsai    regular        0.5  .0420     4.2  .0247     14   .0129     34   .0071    113  .0005
-                 coarsest 8     0.7  .0413     4.4  .0243     11   .0127     21   .0070     57  .0001
+       torus-    regular        1.2  .0180     9.4  .0115     32   .0102     76   0
+       sphere    coarsest 8     1.6  .0180     7.1  .0115     18   .0110     25   .0030
+       ml256     regular        1.2  .0600     9.4  .0233     32   .0100     76   .0057    255  0
+                 coarsest 8     0.9  .0600     6.8  .0233     15   .0100     41   .0057    109  .0000
+       bonsai    regular        0.5  .0396     4.2  .0197     14   .0104     34   .0059    113  0
+                 coarsest 8     0.7  .0396     4.4  .0197     11   .0104     21   .0059     57  .0001
 
    Tetrahedral meshes. isogi_dvr_tets_render draws points, values and tetrahedra, unlit, in both spaces: in a tetrahedron the field
    is linear, so that both integrals are exact. Rays go from face to face, leave and enter again where the mesh has gaps; tetrahedra
@@ -3351,11 +3351,12 @@ static void isogi_dvr__add(isogi_counters *to, const isogi_counters *from) {
     to->samples += from->samples, to->blocks_skipped += from->blocks_skipped;
 }
 
-/* What a grid point counts for in shading. One on a surface sees half of its surroundings, one below it hardly any, knows nothing of the
-   surface beside it, and would leave a dark blotch there: it stands back behind its neighbours outside. */
+/* What a grid point counts for in shading. One on a surface sees half of its surroundings, one below what is opaque hardly any, knows
+   nothing of the surface beside it, and would leave a dark blotch there: it stands back behind its neighbours outside. In matter that
+   lets light in, what points below see is what dims it there: those that see a fifth count in full. */
 static float isogi_dvr__openness(float v0) {
-    float share = v0 / 1.7724539f; /* of half of sqrt(4 pi) */
-    share = share > 0.01f ? share : 0.01f;
+    float share = v0 / 0.70898154f; /* of a fifth of sqrt(4 pi) */
+    share = share > 0.025f ? share : 0.025f;
     return share < 1 ? share * share : 1;
 }
 

@@ -92,6 +92,40 @@ TEST(blocks_that_the_border_cuts_thin_keep_to_the_budget) {
     isogi_vol_free(pyramid);
 }
 
+/* Matter that lets light in dims what is below its surface. A ball of optical depth 0.4 a voxel is 1.8 times as bright on a grid of 4
+   voxels, whose light is that in front of it, as on one of half a voxel; if all points that see less than half of their surroundings
+   counted for less, it would be 2.0 times. */
+TEST(translucent_matter_is_dimmed_by_itself_on_coarse_grids_too) {
+    enum { SIDE = 33, WIDTH = 24 };
+    static float ball[SIDE][SIDE][SIDE], image[WIDTH * WIDTH][4];
+    const float sky[3] = {3.5449077f, 3.5449077f, 3.5449077f};
+    const isogi_lighting lighting = {.env = {.sh = sky, .sh_order = 1}};
+    const isogi_volume volume = {.data = ball, .type = ISOGI_F32, .size = {SIDE, SIDE, SIDE}};
+    const isogi_transfer_point p[] = {{0, {1, 1, 1}, 0}, {4, {1, 1, 1}, 0}, {5, {1, 1, 1}, 0.4f}, {16, {1, 1, 1}, 0.4f}};
+    const isogi_transfer transfer = {p, 4, NULL, 0};
+    const isogi_view view = {.width = WIDTH, .height = WIDTH, .eye = {50, 40, 60}, .target = {16, 16, 16}, .fov = 30};
+    isogi_pyramid *pyramid = NULL;
+    for (int i = 0; i < SIDE * SIDE * SIDE; i++)
+        ball[i / SIDE / SIDE][i / SIDE % SIDE][i % SIDE] =
+            (float)(16 - sqrt(pow(i % SIDE - 16, 2) + pow(i / SIDE % SIDE - 16, 2) + pow(i / SIDE / SIDE - 16, 2)));
+    CHECK(isogi_vol_build(&pyramid, &volume, &serial) == ISOGI_OK, "build");
+    for (int way = 0; way < 2; way++) {
+        double light[2] = {0, 0};
+        for (int fine = 0; fine < 2; fine++) {
+            const size_t n = fine ? 65 : 9;
+            const isogi_dvr_desc desc = {.pyramid = pyramid, .shading = ISOGI_DVR_VISIBILITY, .order = 2, .grid = {n, n, n},
+                                         .classification = way ? ISOGI_DVR_POST_CLASSIFIED : ISOGI_DVR_EXACT, .visibility_step = 0.5};
+            isogi_dvr *dvr = renderer(desc, &transfer, &serial);
+            CHECK(isogi_dvr_step(dvr, 0, NULL) == ISOGI_OK, "step");
+            CHECK(isogi_dvr_render(dvr, &view, &lighting, image, NULL, NULL) == ISOGI_OK, "render");
+            for (int i = 0; i < WIDTH * WIDTH; i++) light[fine] += (double)image[i][0];
+            isogi_dvr_free(dvr);
+        }
+        CHECK(light[0] < 1.9 * light[1] && light[0] > 0.9 * light[1], "way %d: %g times as bright", way, light[0] / light[1]);
+    }
+    isogi_vol_free(pyramid);
+}
+
 /* Above an opaque floor, grid points at every node of the lattice and at every other: a ray of a sweep that runs within the floor is no
    neighbour of theirs, whatever its share. Light is that of the same directions by brute force, on every path. */
 TEST(sweeps_do_not_blur_light_across_the_surface_of_an_opaque_floor) {
