@@ -380,8 +380,8 @@ ISOGI_API isogi_trace *isogi_trace_high(isogi_trace *trace);
    (GL_RGB9_E5 from GL_UNSIGNED_INT_5_9_9_9_REV), BYTE 3 (GL_RGB8). TRANSFER: value v = coefficient * channels + channel stands in
    component v % 4 of plane v / 4, and every plane is a whole RGBA texture: FLOAT 16 bytes a texel, HALF 8, BYTE 4 (GL_RGBA8_SNORM).
    Components are in the machine's byte order. Texels hold what lookups read there, drafts too. Those without light of their own (no
-   surface, not computed) hold the mean of those around them, three texels deep, and beyond that the mean of all: plain hardware
-   interpolation then shows no dark seams.
+   surface, not computed) hold the mean of the up to 26 around them by 1 / distance^2, three texels deep, and beyond that the mean
+   of all: plain hardware interpolation then shows no dark seams.
    Light is what the hardware reads times a scale: scales[3] of RGB, or scales[order^2 channels]; 1 for FLOAT; for HALF and RGB9E5
    another power of two where something is brighter than these hold, or nothing as bright as 0.5; for BYTE the largest value (of
    RGB, or of the coefficient), in whose 255th or 127th parts it counts: errors up to 2e-3 or 4e-3 of the scale. HALF and RGB9E5 keep to

@@ -256,6 +256,45 @@ TEST(export_holds_drafts) {
     scene_free(&s);
 }
 
+/* Two texels side by side have light, no other: what surrounds them. Three texels deep the mean of those around, by 1 / distance^2; beyond,
+   the mean of both. */
+TEST(export_fills_what_has_no_light) {
+    double q[1] = {8.3};
+    scene s = scene_make(17, 17, 17, NULL, ground, q);
+    isogi_light lamp = {.kind = ISOGI_LIGHT_POINT, .vector = {8, 9.5f, 8}, .rgb = {3, 2, 1}};
+    /* of the texel at (8 + x, 8 + y, 8 + z) the part of the first one's light, at (8,8,8); the second is at (9,8,8) */
+    static const struct { int at[3]; double first; } place[] = {
+        {{0, 0, 0}, 1}, {{1, 0, 0}, 0}, {{-1, 0, 0}, 1}, {{-2, 0, 0}, 1}, {{-3, 0, 0}, 1}, {{-4, 0, 0}, 0.5}, {{-5, 0, 0}, 0.5},
+        {{2, 1, -1}, 0}, {{3, 0, 1}, 0}, {{4, 2, 0}, 0}, {{5, 0, 0}, 0.5}, {{7, 8, 8}, 0.5}, {{-8, -8, -8}, 0.5},
+        {{0, 1, 0}, 2.0 / 3}, {{1, 0, -1}, 1.0 / 3}, {{0, 1, 1}, 0.6}, {{1, -1, 1}, 0.4},
+        /* two deep: (-1,1,0) has 1, (0,1,0) 2/3, (1,1,0) 1/3, beside it in z 1, 3/5, 2/5 */
+        {{0, 2, 0}, (2.0 / 3 + (1 + 1.0 / 3) / 2 + 2 * 0.6 / 2 + 2 * (1 + 0.4) / 3) / (1 + 2.0 / 2 + 2.0 / 2 + 4.0 / 3)},
+        {{0, 4, 0}, 0.5}, {{1, 4, 0}, 0.5}, {{0, 0, -5}, 0.5}};
+    for (int format = ISOGI_TRACE_FLOAT; format <= ISOGI_TRACE_BYTE; format++) {
+        isogi_trace_desc d = desc_make(&s, 0, 0, 4);
+        float scales[3], value[3], e[2][3], points[2][3] = {{8, 8, 8}, {9, 8, 8}};
+        uint8_t *bytes;
+        d.lighting.lights = &lamp, d.lighting.light_count = 1, d.lighting.env.sh_order = 0, d.lighting.env.sh = NULL;
+        for (int a = 0; a < 3; a++) d.box_first[a] = 8, d.box_end[a] = a ? 9 : 10;
+        isogi_trace *t = baked(&d);
+        isogi_trace_sample(t, (const float(*)[3])points, 2, e, NULL);
+        CHECK(e[1][2] > 0 && e[0][2] > 1.2f * e[1][2], "E %g and %g", (double)e[0][2], (double)e[1][2]);
+        CHECK(export_now(t, format, &bytes, scales) == ISOGI_OK, "format %d", format);
+        for (size_t i = 0; i < sizeof place / sizeof *place; i++) {
+            size_t texel = (size_t)(8 + place[i].at[0] + 17 * (8 + place[i].at[1] + 17 * (8 + place[i].at[2])));
+            exported(t, format, bytes, scales, texel, value);
+            for (int c = 0; c < 3; c++) {
+                double expected = place[i].first * (double)e[0][c] + (1 - place[i].first) * (double)e[1][c];
+                CHECK(fabs((double)value[c] - expected) < (format == ISOGI_TRACE_FLOAT ? 1e-6 : 0.01) * (double)e[0][0],
+                      "%s, texel %d %d %d: %g, expected %g", format_name[format], place[i].at[0], place[i].at[1], place[i].at[2],
+                      (double)value[c], expected);
+            }
+        }
+        free(bytes), isogi_trace_free(t);
+    }
+    scene_free(&s);
+}
+
 /* Plain trilinear interpolation of the dense array next to surfaces, as hardware does it, against the library's lookup, which leaves
    invalid texels out. Left as zeros, invalid texels darken their neighbourhood by half and more: those are the seams. */
 TEST(exported_texture_has_no_seams) {
