@@ -458,6 +458,36 @@ TEST(gloss_against_its_integral) {
           sqrt(error[1] / size), sqrt(unshadowed / size));
 }
 
+/* Reflections let the floor of a white pit take in more than an open surface would, from near its horizon: openness ends at 1. Under the
+   even sky gloss is 1 there, as of an open surface, and nowhere more. */
+TEST(gloss_is_no_brighter_than_in_the_open) {
+    double q[5] = {10, 12, 10, 15, 6};
+    scene s = scene_make(21, 21, 21, NULL, pit, q);
+    isogi_trace_desc d = desc_make(&s, 0.95f, -1, 64);
+    isogi_trace *t = NULL;
+    float points[200][3], normals[200][3], views[200][3], rgb[200][3];
+    int n = surface_points(&s, 0, 200, 5, points), open = 0, hidden = 0;
+    test_random r = {9};
+    d.mode = ISOGI_TRACE_TRANSFER, d.order = 5, d.lazy = 1;
+    CHECK(isogi_trace_create(&t, &d, NULL) == ISOGI_OK, "points %d", n);
+    isogi_trace_request(t, (const float(*)[3])points, (size_t)n), isogi_trace_step(t, 0, NULL);
+    isogi_vol_sample_smooth(s.pyramid, (const float(*)[3])points, (size_t)n, NULL, normals);
+    for (int i = 0; i < n; i++) {
+        double length = length3((double)normals[i][0], (double)normals[i][1], (double)normals[i][2]), w[3];
+        random_direction(&r, w);
+        for (int a = 0; a < 3; a++) normals[i][a] = (float)(-(double)normals[i][a] / length), views[i][a] = (float)w[a];
+        if (w[0] * (double)normals[i][0] + w[1] * (double)normals[i][1] + w[2] * (double)normals[i][2] < 0)
+            for (int a = 0; a < 3; a++) views[i][a] = -views[i][a];
+    }
+    isogi_trace_sample_gloss(t, (const float(*)[3])points, (const float(*)[3])normals, (const float(*)[3])views, 12, (size_t)n, rgb);
+    for (int i = 0; i < n; i++) {
+        open += fabs((double)rgb[i][1] - 1) < 1e-4, hidden += rgb[i][1] < 0.9f;
+        CHECK(rgb[i][1] < 1.0001f && rgb[i][1] >= 0, "point %d: %g", i, (double)rgb[i][1]);
+    }
+    CHECK(open > 5 && hidden > 20, "%d of %d points are as bright as in the open, %d darker", open, n, hidden);
+    isogi_trace_free(t), scene_free(&s);
+}
+
 /* ---- SH projection of a rectangle -------------------------------------------------------------------------------------------- */
 
 TEST(rectangle_in_spherical_harmonics) {
