@@ -467,6 +467,24 @@ TEST(requests_on_faces_follow_those_inside) {
     scene_free(&s);
 }
 
+/* Zero is the default: 64 samples, by either method, and in gather. */
+TEST(samples_are_64_by_default) {
+    double q[5] = {5, 4.5, 5, 6.5, 3};
+    scene s = scene_make(11, 10, 11, NULL, pit, q);
+    float points[20][3], e[3][20][3];
+    int n = surface_points(&s, 0, 20, 15, points);
+    for (int method = 0; method < 3; method++) {
+        for (int k = 0; k < 3; k++) {
+            isogi_trace_desc d = desc_make(&s, 0.8f, 1, k == 0 ? 0 : k == 1 ? 64 : 65);
+            d.method = (isogi_trace_method)(method & 1), d.lazy = 1;
+            if (method < 2) bake_and_sample(&d, NULL, (const float(*)[3])points, n, e[k]);
+            else isogi_trace_gather(&d, (const float(*)[3])points, NULL, (size_t)n, e[k], NULL, NULL);
+        }
+        CHECK(n == 20 && !memcmp(e[0], e[1], sizeof e[0]) && memcmp(e[1], e[2], sizeof e[0]), "method %d", method);
+    }
+    scene_free(&s);
+}
+
 /* Another seed is another estimate; the same seed the same, in gather as well. */
 TEST(seed_decides) {
     double q[5] = {10, 9, 10, 13, 6};
@@ -681,6 +699,39 @@ TEST(lattice_of_its_own_resolution) {
         isogi_trace_sample(t, (const float(*)[3])points, 100, e, NULL);
         for (int k = 0; k < 100; k++) CHECK(fabs((double)e[k][0] - PI) < 1e-4, "lattice %d: E %g", i, (double)e[k][0]);
         isogi_trace_free(t);
+    }
+    scene_free(&s);
+}
+
+/* Points beyond the lattice read what its border has, whatever the lookup: beyond faces, edges and corners, near and far. */
+TEST(points_beyond_the_lattice_read_its_border) {
+    double q[5] = {10, 9, 10, 13, 6};
+    scene s = scene_make(21, 20, 19, NULL, pit, q);
+    for (int k = 0; k < 8; k++) {
+        isogi_trace_desc d = desc_make(&s, 0.5f, 0, 1);
+        static float points[2][300][3], e[2][300][3];
+        double low[3] = {0, 0, 0}, high[3] = {20, 19, 18};
+        int lit = 0;
+        test_random r = {(uint64_t)k};
+        d.lookup = (isogi_trace_lookup)(k / 2);
+        for (int a = 0; a < 3 && k % 2; a++) {
+            low[a] = d.lattice_min[a] = 3.25, high[a] = d.lattice_max[a] = 14.75;
+            d.lattice[a] = 10;
+        }
+        for (int i = 0; i < 300; i++)
+            for (int a = 0; a < 3; a++) {
+                double off = random_range(&r, 0, i % 3 ? 1 : 30), x = random_range(&r, low[a], high[a]);
+                int beyond = random_bits(&r) % 2 || a == i % 3;
+                if (beyond) x = random_bits(&r) % 2 ? low[a] : high[a];
+                points[0][i][a] = (float)x, points[1][i][a] = (float)(!beyond ? x : x <= low[a] ? x - off : x + off);
+            }
+        bake_and_sample(&d, NULL, (const float(*)[3])points[0], 600, e[0]);
+        for (int i = 0; i < 300; i++) {
+            lit += e[0][i][1] > 0.5f;
+            CHECK(!memcmp(e[0][i], e[1][i], sizeof e[0][i]), "case %d, point %d: E %g, at the border %g", k, i, (double)e[1][i][1],
+                  (double)e[0][i][1]);
+        }
+        CHECK(lit > 50, "case %d: %d points have light", k, lit);
     }
     scene_free(&s);
 }
