@@ -72,7 +72,7 @@ TEST(analytic_sphere_and_plane) {
     double q[5] = {16, 16, 16, 4, 6}, worst = 0;
     analytic a = {ball_over_plane, q, 32, 0.25};
     isogi_trace_desc d = {.lighting.env = {.sh = white_sky, .sh_order = 1}, .samples = 1024, .offset = 1e-4f};
-    float points[8][3], up[8][3], e[8][3], error[8];
+    float points[8][3], up[8][3], e[8][3], again[3][8][3], error[8];
     for (int i = 0; i < 8; i++) {
         points[i][0] = (float)(16 + 0.8 * i), points[i][1] = 6, points[i][2] = (float)(16 - 0.5 * i);
         up[i][0] = up[i][2] = 0, up[i][1] = 1;
@@ -90,6 +90,12 @@ TEST(analytic_sphere_and_plane) {
     isogi_trace_gather_field(&d, analytic_intersect, &a, (const float(*)[3])points, (const float(*)[3])up, 8, e, error, NULL);
     for (int i = 0; i < 8; i++) worst = fmax(worst, fabs((double)e[i][0] - PI));
     CHECK(worst < 1e-4, "white furnace: %.6f off", worst);
+    for (int k = 0; k < 3; k++) { /* 64 samples are the default */
+        d.samples = k == 0 ? 64 : k == 1 ? 0 : 65, d.bounces = 0;
+        isogi_trace_gather_field(&d, analytic_intersect, &a, (const float(*)[3])points, (const float(*)[3])up, 8, again[k], NULL, NULL);
+    }
+    CHECK(!memcmp(again[0], again[1], sizeof again[0]) && memcmp(again[0], again[2], sizeof again[0]), "E %.6f, with 64 samples %.6f",
+          (double)again[1][0][0], (double)again[0][0][0]);
 }
 
 /* The gyroid itself and the voxels of it: the means differ by what voxels do to the surface (1 %) and by the noise. Every light too. */
