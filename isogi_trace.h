@@ -4982,6 +4982,17 @@ ISOGI_API isogi_result isogi_trace_step(isogi_trace *trace, uint64_t max_rays, d
 
 /* ==== what has been achieved ========================================================================================= */
 
+/* Error of a texel of TRANSFER under a uniform sky of radiance 1, whose square is that sky. */
+static double isogi_trace__open_error(const isogi_trace *t, const float *values, double error) {
+    double rgb[3], light, spread;
+    int c;
+    if (!isogi_trace__finite(error)) return error;
+    for (c = 0; c < 3; c++) rgb[c] = 3.5449077018110318 * (double)values[t->scene.desc.transfer_channels == 1 ? 0 : c];
+    light = isogi_trace__luminance(rgb), spread = light * (ISOGI_TRACE__PI - light);
+    return sqrt(error * error * (spread > 0 ? spread : 0) +
+                isogi_trace__unseen(ISOGI_TRACE__PI, light, error > 0 ? 1 / (error * error) : 1e9));
+}
+
 static void isogi_trace__status_add(const isogi_trace *t, isogi_trace_report *r) {
     float values[3 * ISOGI_TRACE__MAX_ORDER * ISOGI_TRACE__MAX_ORDER];
     size_t i;
@@ -4998,6 +5009,7 @@ static void isogi_trace__status_add(const isogi_trace *t, isogi_trace_report *r)
             for (a = 0; a < 3; a++) rgb[a] = (double)values[a];
             r->texels++, r->drafts += t->bricks[i]->state[slot] == ISOGI_TRACE__DRAFT;
             if (t->scene.desc.mode == ISOGI_TRACE_IRRADIANCE) r->light += isogi_trace__luminance(rgb) * isogi_trace__luminance(rgb);
+            else error = isogi_trace__open_error(t, values, error);
             if (error > r->worst) r->worst = error;
             if (isogi_trace__finite(error)) r->error += error * error;
         }

@@ -798,6 +798,63 @@ TEST(error_falls_with_the_samples) {
     }
 }
 
+/* The report against all texels that can be read, each looked up at its own place: counts, light, mean and largest error, of one side or
+   both, and of both levels of a hierarchy. Pits of one voxel, at every other coarse texel along each axis, leave a corner of every coarse
+   cell without a surface, so that all fine texels are computed. TRANSFER: under a uniform sky. */
+static double pitted_gyroid(const double p[3], const double *q) {
+    return fmod(p[0], 4) == 2 && fmod(p[1], 4) == 2 && fmod(p[2], 4) == 2 ? -9 : gyroid(p, q);
+}
+static void report_by_texels(isogi_trace *t, isogi_trace_report *sum) {
+    size_t lattice[3], at[3];
+    isogi_trace_shape(t, lattice, NULL, NULL);
+    for (at[2] = 0; at[2] < lattice[2]; at[2]++)
+        for (at[1] = 0; at[1] < lattice[1]; at[1]++)
+            for (at[0] = 0; at[0] < lattice[0]; at[0]++) {
+                float point[1][3], e[1][3], error[1];
+                double luminance;
+                for (int a = 0; a < 3; a++) point[0][a] = (float)(8 * (double)at[a] / (double)(lattice[a] - 1));
+                if (!isogi_trace_valid(t, at)) continue;
+                isogi_trace_sample(t, (const float(*)[3])point, 1, e, error);
+                luminance = 0.2126 * (double)e[0][0] + 0.7152 * (double)e[0][1] + 0.0722 * (double)e[0][2];
+                sum->texels++, sum->light += luminance * luminance, sum->error += (double)error[0] * (double)error[0];
+                sum->worst = fmax(sum->worst, (double)error[0]);
+            }
+}
+TEST(report_is_that_of_all_texels) {
+    double q[1] = {0.45};
+    scene s = scene_make(9, 9, 9, NULL, pitted_gyroid, q);
+    for (int k = 0; k < 16; k++) {
+        isogi_light sun = light_make(ISOGI_LIGHT_DIRECTIONAL, 1, 2, 3, 2, 0.3);
+        isogi_trace_desc d = feedback(&s, 0.7f, k % 2 ? 2 : 0, 4);
+        isogi_trace *t = NULL, *coarse = NULL;
+        isogi_trace_report report, sum;
+        d.method = k & 1 ? ISOGI_TRACE_FEEDBACK : ISOGI_TRACE_PATHS, d.storage = ISOGI_TRACE_FLOAT;
+        d.sides = k & 2 ? ISOGI_TRACE_BOTH_SIDES : ISOGI_TRACE_LOW_SIDE, d.hierarchy = k & 4 ? 0.2f : 0;
+        d.mode = k & 8 ? ISOGI_TRACE_TRANSFER : ISOGI_TRACE_IRRADIANCE, d.albedo[1] = 0.5f;
+        if (!d.mode) d.lighting.lights = &sun, d.lighting.light_count = 1;
+        memset(&sum, 0, sizeof sum);
+        CHECK(isogi_trace_create(&t, &d, NULL) == ISOGI_OK && isogi_trace_step(t, 0, NULL) == ISOGI_OK, "case %d", k);
+        report_by_texels(t, &sum);
+        if (k & 2) report_by_texels(isogi_trace_high(t), &sum);
+        if (k & 4) { /* the coarse texels alone */
+            d.hierarchy = 0, d.lattice[0] = d.lattice[1] = d.lattice[2] = 5;
+            CHECK(isogi_trace_create(&coarse, &d, NULL) == ISOGI_OK && isogi_trace_step(coarse, 0, NULL) == ISOGI_OK, "case %d", k);
+            report_by_texels(coarse, &sum);
+            if (k & 2) report_by_texels(isogi_trace_high(coarse), &sum);
+        }
+        sum.light = d.mode ? 0 : sqrt(sum.light / (double)sum.texels), sum.error = sqrt(sum.error / (double)sum.texels);
+        isogi_trace_status(t, &report);
+        CHECK(report.texels == sum.texels && sum.texels > 200 && !report.drafts, "case %d: %d texels, by lookups %d, %d drafts", k,
+              (int)report.texels, (int)sum.texels, (int)report.drafts);
+        CHECK(fabs(report.light - sum.light) <= 1e-4 * sum.light && fabs(report.error - sum.error) < 1e-4 * sum.error &&
+                  fabs(report.worst - sum.worst) < 1e-4 * sum.worst,
+              "case %d: light %g, errors %g and %g, by lookups %g, %g and %g", k, report.light, report.error, report.worst, sum.light,
+              sum.error, sum.worst);
+        isogi_trace_free(t), isogi_trace_free(coarse);
+    }
+    scene_free(&s);
+}
+
 /* Boxes baked apart by feedback have probes of their own: the parts differ from the whole by less than 3 % (rms), as the header says. */
 TEST(parts_by_feedback_are_near_the_whole) {
     double q[1] = {0.35}, square = 0, all = 0;
