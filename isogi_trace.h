@@ -290,11 +290,11 @@ ISOGI_API void isogi_trace_free(isogi_trace *trace);
 ISOGI_API isogi_result isogi_trace_request(isogi_trace *trace, const float (*points)[3], size_t count);
 
 /* Works until about max_rays rays are traced (0 = to the end), whole texels, or as long as that takes in other work. *remaining (may be
-   NULL): fraction of the texels asked for that are still to do, 0 = finished; it never rises but by a request. ISOGI_CANCELLED and
+   NULL): about the fraction of the work asked for that is still to do, 0 = finished; it never rises but by a request. ISOGI_CANCELLED and
    ISOGI_NO_MEMORY leave a texture that can be read and stepped on. Not at the same time as any other call on this texture.
    FEEDBACK: when a block of samples is complete passes without rays carry the light over all probes to all texels at work; they are cut
    into pieces, too, as is what comes before the first ray and after the last one, and counted as the rays that take about as long.
-   Meanwhile *remaining hardly falls, and what a request adds has to wait. */
+   Meanwhile what a request adds has to wait. */
 ISOGI_API isogi_result isogi_trace_step(isogi_trace *trace, uint64_t max_rays, double *remaining);
 
 /* Lookup (desc.lookup) among the texels that are valid and computed. irradiance[count] (RGB); error[count]: standard error of its
@@ -470,6 +470,9 @@ ISOGI_API size_t isogi_trace_memory(const isogi_trace *trace); /* bytes that the
 #define ISOGI_TRACE__TASK_SPANS 32 /* pieces in a task */
 #define ISOGI_TRACE__FLUSH 64      /* rays in one call */
 #define ISOGI_TRACE__SWEEP 256     /* nodes in a task that traces no rays */
+#define ISOGI_TRACE__PIECE 65536   /* rays that take as long as what is done without any before progress is told of, */
+#define ISOGI_TRACE__PLACING 1.5   /* samples that take as long as finding where a texel lies, */
+#define ISOGI_TRACE__CARRYING 2.5  /* as what each level takes beside its texels' rays; for progress alone */
 #define ISOGI_TRACE__GROUP 65536   /* texels that are worked on together, about */
 #define ISOGI_TRACE__CHUNK 2048    /* nodes that are allocated together; a power of two, and a multiple of SWEEP */
 #define ISOGI_TRACE__PROBE_MOST 8    /* samples of a probe: as many as there are hits that read it, but no more than this */
@@ -3226,7 +3229,9 @@ struct isogi_trace__feedback {
     size_t made, made_bricks, made_texels; /* of the queue: bricks that are done, bricks and texels to do */
     size_t placed;   /* texels before this one know where they lie */
     size_t open;     /* texels that want more samples than they have at the end of a level */
-    uint64_t partial; /* samples of texels that are not finished */
+    uint64_t partial; /* samples of texels that are not finished, */
+    uint64_t unfinished; /* of which there are so many */
+    double probe_part; /* of the probes at this level that are known, those whose rays are traced */
     uint64_t probes_before; /* of groups of texels that are finished */
 };
 
@@ -4566,6 +4571,7 @@ static void isogi_trace__finish_task(isogi_trace *t, size_t task) {
         if (n->finished) continue;
         if (n->samples >= (uint32_t)t->scene.desc.samples || (target > 0 && (double)n->error <= target)) {
             n->finished = 1, n->brick->state[n->slot] = ISOGI_TRACE__DONE, f->partial -= n->samples, t->wanted--, t->done++;
+            f->unfinished--;
         } else f->open++;
     }
 }
@@ -4592,7 +4598,7 @@ static void isogi_trace__group_free(isogi_trace *t) {
     isogi_trace__set_free(t, &f->texels);
     isogi_trace__set_free(t, &f->probes);
     f->cursor = f->probe_cursor = f->probe_end = f->probe_counted = f->placed = f->carried = f->span_count = 0;
-    f->phase = ISOGI_TRACE__AT_REST, f->unpublished = f->making = 0, f->partial = 0;
+    f->phase = ISOGI_TRACE__AT_REST, f->unpublished = f->making = f->level = 0, f->partial = f->unfinished = 0, f->probe_part = 0;
 }
 
 /* ---- carrying the light over ---- */
@@ -4649,7 +4655,7 @@ static void isogi_trace__phase_end(isogi_trace *t) {
     case ISOGI_TRACE__PUBLISH: f->phase = ISOGI_TRACE__FINISH, f->open = 0; break;
     case ISOGI_TRACE__FINISH:
         f->phase = f->open || t->scene.desc.lazy ? ISOGI_TRACE__AT_REST : ISOGI_TRACE__FORGET;
-        f->level++, f->cursor = 0, f->unpublished = f->phase == ISOGI_TRACE__FORGET;
+        f->level++, f->cursor = 0, f->probe_part = 0, f->unpublished = f->phase == ISOGI_TRACE__FORGET;
         break;
     default: isogi_trace__group_free(t);
     }
@@ -4669,6 +4675,40 @@ static uint64_t isogi_trace__carry(isogi_trace *t, uint64_t limit) {
     f->carried += count;
     if (f->carried >= tasks) isogi_trace__phase_end(t);
     return cost;
+}
+
+/* ---- progress ---- */
+
+/* The part of a level after its texels' rays that is done: rays of probes, passes, whose number is not known, and what is written. */
+static double isogi_trace__carried(const isogi_trace__feedback *f) {
+    size_t tasks = isogi_trace__phase_tasks(f);
+    double done = tasks ? (double)f->carried / (double)tasks : 0;
+    switch (f->phase) {
+    case ISOGI_TRACE__AT_REST: return 0.4 * f->probe_part;
+    case ISOGI_TRACE__DIRECT: return 0.4 + 0.05 * done;
+    case ISOGI_TRACE__PASS: return 0.65 - 0.2 / (1 + 0.2 * ((double)f->pass + done));
+    case ISOGI_TRACE__CLEAR: return 0.65 + 0.02 * done;
+    case ISOGI_TRACE__BOUNCE: return 0.67 + 0.08 * ((double)f->segment + done) / ((double)f->texels.segment_count + 1);
+    case ISOGI_TRACE__GUIDE: return 0.75 + 0.05 * done;
+    case ISOGI_TRACE__PUBLISH: return 0.8 + 0.18 * done;
+    default: return 0.98 + 0.02 * done;
+    }
+}
+
+/* Work that is done for texels that are not finished, in texels. */
+static double isogi_trace__begun(const isogi_trace *t) {
+    const isogi_trace__feedback *f = t->feedback;
+    double all = ISOGI_TRACE__PLACING + t->scene.desc.samples, placed;
+    int level;
+    for (level = 0; isogi_trace__block(t, level) < (uint32_t)t->scene.desc.samples; level++) all += ISOGI_TRACE__CARRYING;
+    placed = f->texels.count ? ISOGI_TRACE__PLACING * (double)f->placed / (double)f->texels.count : 0;
+    return ((double)f->partial + (double)f->unfinished * (placed + ISOGI_TRACE__CARRYING * (f->level + isogi_trace__carried(f)))) / all;
+}
+
+/* What the context's progress is told: 0 to 1 for all that this texture was asked for, as a part of what is baked with it. */
+static double isogi_trace__told(const isogi_trace *t) {
+    double all = (double)t->wanted + (double)t->done;
+    return isogi_trace__lerp(t->share[0], t->share[1], all > 0 ? ((double)t->done + isogi_trace__begun(t)) / all : 0);
 }
 
 /* ---- stepping ---- */
@@ -4735,7 +4775,7 @@ static isogi_result isogi_trace__nodes_of(isogi_trace *t, size_t index, int even
         isogi_trace__node_clear(t, set, set->count);
         n->brick = brick, n->slot = slot;
         isogi_trace__texel_of(t, index, slot, n->texel);
-        brick->node[slot] = (uint32_t)++set->count;
+        brick->node[slot] = (uint32_t)++set->count, t->feedback->unfinished++;
         if (brick->state[slot] == ISOGI_TRACE__WANTED) brick->state[slot] = ISOGI_TRACE__QUEUED;
     }
     return ISOGI_OK;
@@ -4757,7 +4797,10 @@ static isogi_result isogi_trace__nodes_make(isogi_trace *t, uint64_t limit, uint
     isogi_trace__feedback *f = t->feedback;
     isogi_result result = ISOGI_OK;
     size_t before = f->texels.count, bricks = 0;
-    if (!f->making) f->making = 1, f->made = f->made_texels = 0, f->made_bricks = t->queue_count - t->queue_first;
+    if (!f->making) {
+        f->making = 1, f->made = f->made_texels = 0, f->made_bricks = t->queue_count - t->queue_first;
+        f->level = 0, f->probe_part = 0;
+    }
     for (; f->making == 1 && isogi_trace__made_cost(bricks, f->texels.count - before) < limit; bricks++) {
         result = isogi_trace__nodes_of(t, t->queue[t->queue_first + f->made], 1);
         if (result != ISOGI_OK) break;
@@ -4788,16 +4831,17 @@ static void isogi_trace__feedback_rest(isogi_trace *t) {
 static isogi_result isogi_trace__trace_batch(isogi_trace *t, uint64_t limit, uint64_t *spent) {
     isogi_trace__feedback *f = t->feedback;
     const size_t cursor = f->cursor, probe_cursor = f->probe_cursor;
-    double all = (double)(t->wanted + t->done) * t->scene.desc.samples, left, after;
+    double from = isogi_trace__told(t), to, part;
     isogi_result result;
     int none = isogi_trace__spans_fill(t, limit, spent);
     f->unpublished |= f->span_count != 0;
     if (none) f->phase = ISOGI_TRACE__DIRECT;
     if (!f->span_count) return ISOGI_OK;
-    left = ((double)t->done * t->scene.desc.samples + (double)f->partial) / all;
-    after = left + (f->on_probes ? 0 : (double)f->sample_count / all);
-    result = isogi_trace__spans_run(t, isogi_trace__lerp(t->share[0], t->share[1], left),
-                                    isogi_trace__lerp(t->share[0], t->share[1], after));
+    part = f->on_probes ? (double)f->probe_cursor / (double)f->probes.count : 0;
+    f->probe_part = part > f->probe_part ? part : f->probe_part;
+    f->partial += f->on_probes ? 0 : f->sample_count, to = isogi_trace__told(t);
+    f->partial -= f->on_probes ? 0 : f->sample_count;
+    result = isogi_trace__spans_run(t, from, to);
     if (result != ISOGI_OK) f->cursor = cursor, f->probe_cursor = probe_cursor; /* it is still to come */
     return result;
 }
@@ -4808,11 +4852,15 @@ static isogi_result isogi_trace__feedback_step(isogi_trace *t, uint64_t max_rays
     isogi_result result = ISOGI_OK;
     while (result == ISOGI_OK && (t->wanted || f->unpublished)) {
         uint64_t used = t->counters.rays - begin + other, left = max_rays ? max_rays - used : SIZE_MAX / 4;
+        const uint64_t piece = left < ISOGI_TRACE__PIECE || !t->context.progress ? left : ISOGI_TRACE__PIECE;
+        int silent = f->phase != ISOGI_TRACE__AT_REST || f->placed < f->texels.count;
         if (max_rays && used >= max_rays) break;
         if (isogi_trace__nodes_wanted(t)) result = isogi_trace__nodes_make(t, left, &other);
-        else if (f->placed < f->texels.count) other += isogi_trace__place(t, left);
+        else if (f->placed < f->texels.count) other += isogi_trace__place(t, piece);
         else if (f->phase == ISOGI_TRACE__AT_REST) result = isogi_trace__trace_batch(t, max_rays ? left / each + 1 : UINT64_MAX, &other);
-        else other += isogi_trace__carry(t, left);
+        else other += isogi_trace__carry(t, piece);
+        if (silent && result == ISOGI_OK && t->context.progress && t->context.progress(t->context.user, isogi_trace__told(t)))
+            result = ISOGI_CANCELLED;
     }
     *spent += t->counters.rays - begin + other;
     return result;
@@ -4952,7 +5000,7 @@ static isogi_result isogi_trace__step_levels(isogi_trace *trace, uint64_t max_ra
 static void isogi_trace__progress(const isogi_trace *t, double *wanted, double *done) {
     double left = (double)t->wanted, all = (double)t->wanted + (double)t->done;
     if (t->feedback && (t->wanted || t->feedback->unpublished)) {
-        left -= (double)t->feedback->partial / t->scene.desc.samples;
+        left -= isogi_trace__begun(t);
         left = left > 1e-6 ? left : 1e-6;
     }
     if (t->coarse && !t->refined) {
@@ -5412,7 +5460,7 @@ static void isogi_trace__node_loaded(isogi_trace *t, const isogi_trace__brick *b
     isogi_trace__node *n;
     if (!brick->node || !brick->node[slot]) return;
     n = isogi_trace__node_at(&t->feedback->texels, brick->node[slot] - 1);
-    if (!n->finished) t->feedback->partial -= n->samples;
+    if (!n->finished) t->feedback->partial -= n->samples, t->feedback->unfinished--;
     n->finished = 2;
 }
 

@@ -798,6 +798,56 @@ TEST(error_falls_with_the_samples) {
     }
 }
 
+/* What is to do falls as the work is done, in steps of one budget: nowhere is it told for long that nothing was done, and passes and
+   what is written after the last ray have their share. The context's progress says the same. */
+static int last_fraction(void *user, double fraction) {
+    double *last = (double *)user;
+    last[1] += fraction < last[0] || fraction > 1;
+    last[0] = fraction;
+    return 0;
+}
+TEST(remaining_falls_as_the_work_is_done) {
+    double q[5] = {12, 11, 12, 15, 7};
+    scene s = scene_make(25, 25, 25, NULL, pit, q);
+    float points[300][3];
+    int n = surface_points(&s, 0, 300, 9, points);
+    for (int k = 0; k < 8; k++) {
+        if (!LONG_SUITE && k > 1 && k < 6) continue;
+        static double left[4000];
+        double last[2] = {0, 0}, before = 1, off = 0;
+        isogi_context context = {.progress = last_fraction, .user = last, .threads = 1};
+        isogi_trace_desc d = feedback(&s, 0.7f, -1, k & 4 ? 4 : LONG_SUITE ? 40 : 20);
+        isogi_trace *t = NULL;
+        isogi_counters counters[2];
+        int steps = 0, ended = 0, still = 0, most = 0, from = 0;
+        d.lazy = k & 1, d.mode = k & 2 ? ISOGI_TRACE_TRANSFER : ISOGI_TRACE_IRRADIANCE, d.order = 2;
+        d.isovalue_min = -0.5, d.isovalue_max = 0.5;
+        memset(counters, 0, sizeof counters);
+        CHECK(isogi_trace_create(&t, &d, &context) == ISOGI_OK, "case %d", k);
+        isogi_trace_request(t, (const float(*)[3])points, (size_t)n);
+        for (left[0] = 1; left[steps] > 0 && steps < 3999; before = left[steps]) {
+            if (isogi_trace_step(t, 400, &left[++steps]) != ISOGI_OK) abort();
+            memset(&counters[1], 0, sizeof counters[1]), isogi_trace_counters(t, &counters[1]);
+            if (counters[1].rays > counters[0].rays) ended = steps;
+            counters[0] = counters[1];
+            CHECK(left[steps] <= before && fabs(1 - last[0] - left[steps]) < 0.02, "case %d, step %d: %g to do, after %g, told %g", k,
+                  steps, left[steps], before, last[0]);
+        }
+        for (int i = 1; i <= steps; i++) {
+            off = fmax(off, fabs(1 - left[i] - (double)i / steps));
+            if (left[from] - left[i] > 0.01) from = i;
+            still = i - from, most = still > most ? still : most;
+        }
+        printf("    case %d: %d steps, %.2f from even, %.2f without any change, at the last ray %.3f to do\n", k, steps, off,
+               (double)most / steps, left[ended]);
+        CHECK(left[steps] <= 0 && !(last[1] > 0) && most < 0.15 * steps && left[ended] > 0.02,
+              "case %d: %g off, %d of %d steps without a change, at the last ray %g to do, fell %g times", k, off, most, steps, left[ended],
+              last[1]);
+        isogi_trace_free(t);
+    }
+    scene_free(&s);
+}
+
 /* The report against all texels that can be read, each looked up at its own place: counts, light, mean and largest error, of one side or
    both, and of both levels of a hierarchy. Pits of one voxel, at every other coarse texel along each axis, leave a corner of every coarse
    cell without a surface, so that all fine texels are computed. TRANSFER: under a uniform sky. */
