@@ -90,10 +90,11 @@
      probe: a point near by on the same isosurface or one that runs closely beside it (up to .15 voxels by the gradient), in cells of
      2 voxels (of the shortest edge, but half a voxel along every axis at least) or an eighth of the ray's length, whose own
      hemisphere is gathered once in the same way; passes over the probes then bring all reflections without rays. What
-     the sky and reflections bring is averaged over texels up to two away that face the same way and whose isosurfaces run close to each
-     other, as far as their noise could explain the difference; lights are not, so that their shadows stay sharp (desc.unfiltered:
-     nothing is). Probes cost accuracy: less than 0.1 % of
-     the mean and 1.5 % at a point in narrow channels of albedo 0.8 (test_trace_bake --long prints it). Lazy and adaptive bakes take samples
+     the sky and reflections bring is read from a plane, fitted to the light of texels up to two away that face the same way and whose
+     isosurfaces run close to each other, as far as their noise could explain the difference (with one or two samples, of which none is
+     known, all of them); their samples are well spread together. Lights are not filtered, so that their shadows stay sharp
+     (desc.unfiltered: nothing is). Probes cost accuracy: half a per cent of
+     the mean and 1.8 % at a point in narrow channels of albedo 0.8 (test_trace_bake --long prints it). Lazy and adaptive bakes take samples
      in blocks of 4, 16, 64, ... and every other texel along each axis first: soon every lookup has a value.
      A hit from within (only through an open border can a ray get there) is a surface too, with its normal turned.
 
@@ -255,7 +256,7 @@ typedef struct isogi_trace_desc {
                                   open texel gets, averaged over all orientations, or once more samples would hardly lower it: light
                                   from probes is itself uncertain by 2 %; 0 = every texel gets all its samples */
     int unfiltered;            /* non-zero: FEEDBACK averages no light over neighbouring texels, to see what that is worth: the same error
-                                  takes two to four times the samples (make bench, rows filter-) */
+                                  takes two to eight times the samples (make bench, rows filter-) */
     uint64_t seed;
     float offset;              /* rays start this many voxels along the normal, up to 1 (a wall may be that thin); 0 = 0.25;
                                   negative = on the surface */
@@ -488,11 +489,14 @@ ISOGI_API size_t isogi_trace_memory(const isogi_trace *trace); /* bytes that the
 #define ISOGI_TRACE__CLASS 1.2      /* the same for isovalues that are looked for together, by the range of values around */
 #define ISOGI_TRACE__COLOURS 0.05   /* of albedo, or share of the glow, by which isosurfaces of the same probe may differ */
 #define ISOGI_TRACE__NOISE 1.0      /* variances of the difference of two texels' light that the filter takes for noise, */
-#define ISOGI_TRACE__NOISE_FEW 4.0  /* and this many more over the number of samples, since those of few are uncertain */
+#define ISOGI_TRACE__NOISE_FEW 8.0  /* and this many more over the number of samples, since those of few are uncertain: */
+#define ISOGI_TRACE__NOISE_KNOWN 3  /* with fewer than this nothing is known of it */
+#define ISOGI_TRACE__RIDGE 3.0      /* samples of the texel itself, a texel away, that say that light is the same everywhere */
 #define ISOGI_TRACE__SHEET 0.7      /* texels between two isosurfaces that the filter takes for one */
 #define ISOGI_TRACE__FILTER 6       /* squared distance of the farthest texels of the filter, of which there are so many: */
 #define ISOGI_TRACE__FILTERED 81
 #define ISOGI_TRACE__BLURRED 0.18   /* of a texel's own variance: that of what the filter blurs */
+#define ISOGI_TRACE__TURNED 16      /* texels along an axis that share a scramble of their samples */
 #define ISOGI_TRACE__LIGHT_FIRST 4u /* samples of a texel with one of each light */
 #if defined(__GNUC__) && !defined(__TINYC__)
 #define ISOGI_TRACE__AHEAD(p) __builtin_prefetch(p)
@@ -3256,6 +3260,7 @@ typedef struct isogi_trace__cast {
     isogi_trace__span *span; /* of this task */
     isogi_trace__site site[ISOGI_TRACE__TASK_SPANS];
     uint64_t sequence[ISOGI_TRACE__TASK_SPANS];
+    double turn[ISOGI_TRACE__TASK_SPANS][2]; /* of the sequence */
     double sum[ISOGI_TRACE__TASK_SPANS], square[ISOGI_TRACE__TASK_SPANS]; /* of luminance by one light */
     int shadow; /* rays towards lights; else cosine-distributed ones */
     int bright; /* the light is the sky */
@@ -3631,8 +3636,7 @@ static void isogi_trace__probe_finish(const isogi_trace *t, size_t i) {
 
 /* ---- blocks of samples ---- */
 
-/* With lazy or adaptive baking a texel's samples come in blocks of 4, 16, 64, ...: coarse first. Each block is a stretch of one Sobol
-   sequence that the texels of a brick share, so that it is well spread for a texel as well as for its neighbourhood. */
+/* With lazy or adaptive baking a texel's samples come in blocks of 4, 16, 64, ...: coarse first. */
 static int isogi_trace__in_blocks(const isogi_trace_desc *d) { return d->lazy || d->error > 0; }
 
 /* Samples of a texel's blocks before number `level`. */
@@ -3643,19 +3647,28 @@ static uint32_t isogi_trace__block(const isogi_trace *t, int level) {
     return sum < samples ? sum : samples;
 }
 
-/* The place of a sample in the sequence; those of the samples before *end follow it. */
-static uint32_t isogi_trace__index(const isogi_trace *t, const isogi_trace__node *n, uint32_t sample, uint32_t *end) {
-    uint32_t size = 1;
-    int level = 0;
-    *end = UINT32_MAX;
-    if (!n->brick) return sample;
-    if (!isogi_trace__in_blocks(&t->scene.desc)) {
-        while (size < (uint32_t)t->scene.desc.samples) size *= 2;
-        return n->slot * size + sample;
+/* Samples of a node are one stretch of a Sobol sequence. Texels near each other share its scramble, and each turns it (Cranley and
+   Patterson 1976) by this much for a step along each axis, so that those around a texel, which the filter averages, are well spread
+   together: on surfaces of all directions, with 1, 2 and 4 samples, by a search at random for the least low frequencies of their sum. */
+static void isogi_trace__turn(const size_t texel[3], double turn[2]) {
+    static const double step[2][3] = {{0.22891, 0.49289, 0.10247}, {0.85142, 0.83062, 0.54863}};
+    int a;
+    for (a = 0; a < 2; a++) {
+        double x = step[a][0] * (double)texel[0] + step[a][1] * (double)texel[1] + step[a][2] * (double)texel[2];
+        turn[a] = x - floor(x);
     }
-    while ((*end = isogi_trace__block(t, level + 1)) <= sample) level++;
-    size = (uint32_t)4 << (2 * level);
-    return ISOGI_TRACE__TEXELS * size + n->slot * size + (sample - isogi_trace__block(t, level));
+}
+
+/* Number `sample` of the sequence. */
+static void isogi_trace__turned(const isogi_trace__sequence *s, uint32_t sample, const double turn[2], double u[2]) {
+    int a;
+    isogi_trace__sobol(s, sample, u);
+    for (a = 0; a < 2; a++) u[a] += turn[a], u[a] -= u[a] >= 1 ? 1 : 0;
+}
+
+static uint64_t isogi_trace__turned_key(const size_t texel[3]) {
+    const size_t side = ISOGI_TRACE__TURNED;
+    return isogi_trace__key(isogi_trace__key(texel[0] / side, texel[1] / side), texel[2] / side);
 }
 
 /* ---- rays of a task, gathered into batches ---- */
@@ -3818,13 +3831,12 @@ static void isogi_trace__span_hemisphere(isogi_trace__cast *c, uint32_t k) {
     const isogi_trace__site *site = &c->site[k];
     const isogi_trace__sequence sequence = isogi_trace__sequence_of(c->sequence[k]);
     isogi_trace__basis basis;
-    uint32_t i, at = 0, known = span->first;
+    uint32_t i;
     isogi_trace__basis_of(site->normal, &basis);
     for (i = span->first; i < span->first + span->count; i++) {
         double u[2];
         float dir[3];
-        at = i == known ? isogi_trace__index(c->trace, span->of, i, &known) : at + 1;
-        isogi_trace__sobol(&sequence, at, u);
+        isogi_trace__turned(&sequence, i, c->turn[k], u);
         isogi_trace__cosine(&basis, u[0], u[1], dir);
         if (site->on_surface) isogi_trace__mirror(site->geometric, dir);
         c->owner[c->count] = k, c->sample[c->count] = i;
@@ -3838,12 +3850,11 @@ static void isogi_trace__span_sky(isogi_trace__cast *c, uint32_t k) {
     const isogi_trace__sky *sky = &c->trace->scene.sky;
     const isogi_trace__span *span = &c->span[k];
     const isogi_trace__sequence sequence = isogi_trace__sequence_of(isogi_trace__key(c->sequence[k], 0x5eed2));
-    uint32_t i, at = 0, known = span->first;
+    uint32_t i;
     for (i = span->first; i < span->first + span->count; i++) {
         double u[2], cosine, density;
         float dir[3];
-        at = i == known ? isogi_trace__index(c->trace, span->of, i, &known) : at + 1;
-        isogi_trace__sobol(&sequence, at, u);
+        isogi_trace__turned(&sequence, i, c->turn[k], u);
         density = isogi_trace__sky_direction(sky, u[0], u[1], dir);
         cosine = isogi_trace__site_kernel(&c->site[k], dir) / ISOGI_TRACE__PI;
         if (!(cosine > 0) || !(density > 0)) continue;
@@ -3863,14 +3874,13 @@ static void isogi_trace__span_light(isogi_trace__cast *c, uint32_t k, size_t num
     const isogi_light *light = &c->trace->scene.desc.lighting.lights[number];
     const isogi_trace__span *span = &c->span[k];
     const isogi_trace__sequence sequence = isogi_trace__sequence_of(isogi_trace__key(c->sequence[k], 0x5eed3 + number));
-    uint32_t i = isogi_trace__light_samples(span->first, span->of->brick != NULL), at = 0, known = i;
+    uint32_t i = isogi_trace__light_samples(span->first, span->of->brick != NULL);
     const uint32_t end = isogi_trace__light_samples(span->first + span->count, span->of->brick != NULL);
     int a;
     for (; i < end; i++) {
         double u[2], cosine;
         isogi_trace__beam beam;
-        at = i == known ? isogi_trace__index(c->trace, span->of, i, &known) : at + 1;
-        isogi_trace__sobol(&sequence, at, u);
+        isogi_trace__turned(&sequence, i, c->turn[k], u);
         if (c->distant) isogi_trace__disc_beam(&c->disc, u[0], u[1], &beam);
         else if (!isogi_trace__light_beam(light, c->site[k].origin, u[0], u[1], &beam)) continue;
         cosine = isogi_trace__site_kernel(&c->site[k], beam.dir);
@@ -3923,13 +3933,13 @@ static int isogi_trace__span_site(isogi_trace__cast *c, uint32_t k) {
     uint64_t seed = t->scene.desc.seed;
     if (n->brick) {
         const size_t *x = n->texel, *l = t->lattice;
-        uint32_t slot;
         if (!(isogi_trace__dot(n->normal, n->normal) > 0)) return 0;
         memcpy(site->normal, n->normal, sizeof site->normal);
         site->key = isogi_trace__key(isogi_trace__key(seed, 2),
                                      (uint64_t)x[0] + (uint64_t)l[0] * ((uint64_t)x[1] + (uint64_t)l[1] * (uint64_t)x[2]));
-        c->sequence[k] = isogi_trace__key(isogi_trace__key(seed, 3), (uint64_t)isogi_trace__brick_of(t, x, &slot));
-    } else site->key = c->sequence[k] = isogi_trace__key(isogi_trace__key(seed, 4), n->key);
+        c->sequence[k] = isogi_trace__key(isogi_trace__key(seed, 3), isogi_trace__turned_key(x));
+        isogi_trace__turn(x, c->turn[k]);
+    } else site->key = c->sequence[k] = isogi_trace__key(isogi_trace__key(seed, 4), n->key), c->turn[k][0] = c->turn[k][1] = 0;
     site->place = n->place, site->isovalue = n->isovalue, site->from = n->from;
     isogi_trace__site_start(&t->scene, site);
     return 1;
@@ -4436,8 +4446,8 @@ static double isogi_trace__other_colours(const isogi_trace *t, const isogi_trace
     return ISOGI_TRACE__PI * hidden * isogi_trace__luminance(glow) + most * isogi_trace__luminance(albedo);
 }
 
-/* What lies around a texel, itself included: guides of those that have one, and squares of their distances. */
-static int isogi_trace__around_texel(const isogi_trace *t, const size_t texel[3], const isogi_trace__guide **guide, int *apart) {
+/* What lies around a texel, itself included: guides of those that have one, and how far they are. */
+static int isogi_trace__around_texel(const isogi_trace *t, const size_t texel[3], const isogi_trace__guide **guide, int (*apart)[3]) {
     const isogi_trace__set *set = &t->feedback->texels;
     size_t brick[3][5], pitch = 1;
     uint32_t slot[3][5], node;
@@ -4461,15 +4471,22 @@ static int isogi_trace__around_texel(const isogi_trace *t, const size_t texel[3]
                 if (!b || !b->node) continue;
                 node = b->node[slot[0][d[0] + 2] + slot[1][d[1] + 2] + slot[2][d[2] + 2]];
                 if (!node || !isogi_trace__guide_at(set, node - 1)->samples) continue;
-                guide[count] = isogi_trace__guide_at(set, node - 1), apart[count++] = square;
+                guide[count] = isogi_trace__guide_at(set, node - 1);
+                for (a = 0; a < 3; a++) apart[count][a] = d[a];
+                count++;
             }
     return count;
 }
 
-/* How much the filter takes of a texel's light for another at a distance (its square, in texels), 0 to 1: less the farther it is, by
-   place and by what lies between their isosurfaces, the more it faces another way, and the more their light differs beyond its noise. */
+/* Variance of a texel's light, as the filter takes it to be: that of few samples tells nothing. */
+static double isogi_trace__guessed_variance(const isogi_trace__guide *g) {
+    return g->samples < ISOGI_TRACE__NOISE_KNOWN ? (double)g->luminance * (double)g->luminance / g->samples : (double)g->variance;
+}
+
+/* How much a texel's light counts for another at a distance (its square, in texels), 0 to 1: less the farther it is, by place and by
+   what lies between their isosurfaces, the more it faces another way, and the more their light differs beyond its noise. */
 static double isogi_trace__filter_weight(const isogi_trace *t, const isogi_trace__guide *g, const isogi_trace__guide *q, int square) {
-    double facing, between = g->isovalue - q->isovalue, away = (double)square / 8, apart, noise, colours,
+    double facing, between = g->isovalue - q->isovalue, away = (double)square / 16, apart, noise, colours,
            steep = ISOGI_TRACE__SHEET * (g->steep > q->steep ? g->steep : q->steep);
     if (!isogi_trace__zero(between)) {
         if (!(fabs(between) < 4 * steep)) return 0;
@@ -4477,11 +4494,11 @@ static double isogi_trace__filter_weight(const isogi_trace *t, const isogi_trace
     }
     facing = isogi_trace__dot(g->normal, q->normal);
     if (!(facing > 0.5)) return 0;
-    noise = (double)g->variance + (double)q->variance;
+    noise = isogi_trace__guessed_variance(g) + isogi_trace__guessed_variance(q);
     apart = (double)g->luminance - (double)q->luminance, colours = isogi_trace__other_colours(t, g, q);
     noise *= ISOGI_TRACE__NOISE + ISOGI_TRACE__NOISE_FEW / 2 * (1.0 / g->samples + 1.0 / q->samples);
     apart = apart * apart - noise;
-    if (colours > 0) apart = (apart > 0 ? apart : 0) + 4 * colours * colours;
+    if (colours > 0) apart = (apart > 0 ? apart : 0) + 4 * ISOGI_TRACE__NOISE * colours * colours;
     if (apart > 0) {
         if (!(noise > 0)) return 0;
         away += apart / noise;
@@ -4490,28 +4507,72 @@ static double isogi_trace__filter_weight(const isogi_trace *t, const isogi_trace
     return facing * facing;
 }
 
-/* Mean over the texels around. Writes the filtered rgb, its variance, and the variance of other light, averaged over the same texels.
-   Returns the number of samples that this is as good as. */
+/* Solves m x = b, m symmetric and positive definite: xx, yy, zz, xy, xz, yz. */
+static void isogi_trace__solve3(const double m[6], const double b[3], double x[3]) {
+    double c0 = m[1] * m[2] - m[5] * m[5], c1 = m[4] * m[5] - m[3] * m[2], c2 = m[3] * m[5] - m[4] * m[1],
+           c3 = m[0] * m[2] - m[4] * m[4], c4 = m[3] * m[4] - m[0] * m[5], c5 = m[0] * m[1] - m[3] * m[3],
+           scale = 1 / (m[0] * c0 + m[3] * c1 + m[4] * c2);
+    x[0] = scale * (c0 * b[0] + c1 * b[1] + c2 * b[2]);
+    x[1] = scale * (c1 * b[0] + c3 * b[1] + c4 * b[2]);
+    x[2] = scale * (c2 * b[0] + c4 * b[1] + c5 * b[2]);
+}
+
+/* Weights of the texels around become those of a plane that is fitted to their light by least squares, read at the texel itself: local
+   linear regression (Moon, Carr and Yoon 2014), with a penalty on slopes (ridge) that `own` scales. They sum to 1; some may be negative. */
+static void isogi_trace__fit(double *weight, const int (*apart)[3], int count, double own) {
+    double total = 0, mean[3] = {0, 0, 0}, square[6] = {0, 0, 0, 0, 0, 0}, slope[3];
+    int i, a;
+    for (i = 0; i < count; i++) {
+        const double w = weight[i], x = apart[i][0], y = apart[i][1], z = apart[i][2];
+        total += w, mean[0] += w * x, mean[1] += w * y, mean[2] += w * z;
+        square[0] += w * x * x, square[1] += w * y * y, square[2] += w * z * z;
+        square[3] += w * x * y, square[4] += w * x * z, square[5] += w * y * z;
+    }
+    for (a = 0; a < 3; a++) mean[a] /= total;
+    for (a = 0; a < 3; a++) square[a] += ISOGI_TRACE__RIDGE * own - total * mean[a] * mean[a];
+    square[3] -= total * mean[0] * mean[1], square[4] -= total * mean[0] * mean[2], square[5] -= total * mean[1] * mean[2];
+    isogi_trace__solve3(square, mean, slope);
+    for (i = 0; i < count; i++) {
+        double along = 0;
+        for (a = 0; a < 3; a++) along += slope[a] * (apart[i][a] - mean[a]);
+        weight[i] *= 1 / total - along;
+    }
+}
+
+/* A plane through the light of the texels around. Writes the filtered rgb, within what they have, its variance, and the variance of other
+   light, averaged over the same texels. Returns the number of samples that this is as good as. */
 static double isogi_trace__filter(const isogi_trace *t, size_t node, double rgb[3], double variance[2]) {
     const isogi_trace__set *set = &t->feedback->texels;
     const isogi_trace__guide *g = isogi_trace__guide_at(set, node), *around[ISOGI_TRACE__FILTERED];
-    double total = 0, squares = 0;
-    int square[ISOGI_TRACE__FILTERED], count = isogi_trace__around_texel(t, isogi_trace__node_at(set, node)->texel, around, square), i, a;
-    rgb[0] = rgb[1] = rgb[2] = variance[0] = variance[1] = 0;
+    double weight[ISOGI_TRACE__FILTERED], squares = 0, low[3], high[3];
+    int apart[ISOGI_TRACE__FILTERED][3], i, a, n = 0,
+        count = isogi_trace__around_texel(t, isogi_trace__node_at(set, node)->texel, around, apart);
     for (i = 0; i < count; i++) {
         const isogi_trace__guide *q = around[i];
-        double w = q == g ? 1 : isogi_trace__filter_weight(t, g, q, square[i]);
+        const int *d = apart[i];
+        double w = q == g ? 1 : isogi_trace__filter_weight(t, g, q, d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
         if (!(w > 0)) continue;
-        squares += w * w * q->samples;
-        w *= q->samples;
-        total += w;
-        for (a = 0; a < 3; a++) rgb[a] += w * (double)q->mean[a];
+        around[n] = q, weight[n] = w * q->samples;
+        for (a = 0; a < 3; a++) apart[n][a] = d[a];
+        n++;
+    }
+    isogi_trace__fit(weight, (const int(*)[3])apart, n, g->samples);
+    rgb[0] = rgb[1] = rgb[2] = variance[0] = variance[1] = 0;
+    for (a = 0; a < 3; a++) low[a] = high[a] = (double)g->mean[a];
+    for (i = 0; i < n; i++) {
+        const isogi_trace__guide *q = around[i];
+        const double w = weight[i];
+        squares += w * w / q->samples;
+        for (a = 0; a < 3; a++) {
+            const double light = (double)q->mean[a];
+            rgb[a] += w * light, low[a] = light < low[a] ? light : low[a], high[a] = light > high[a] ? light : high[a];
+        }
         variance[0] += w * w * (double)q->variance;
         variance[1] += w * (double)q->lights;
     }
-    for (a = 0; a < 3; a++) rgb[a] /= total;
-    variance[0] /= total * total, variance[1] /= total;
-    return total * total / squares;
+    for (a = 0; a < 3; a++) rgb[a] = rgb[a] < low[a] ? low[a] : rgb[a] > high[a] ? high[a] : rgb[a];
+    if (variance[1] < 0) variance[1] = 0;
+    return 1 / squares;
 }
 
 /* The same, with the variance of what the filter blurs; or the texel's own. */
@@ -4541,6 +4602,7 @@ static void isogi_trace__publish_task(void *arg, size_t task) {
         double rgb[3], variance[2], probes = 0;
         int a;
         if (!n->samples || n->finished == 2) continue;
+        if (n->finished && n->samples < (uint32_t)t->scene.desc.samples) continue; /* its error, which was low enough, stays so */
         if (t->scene.desc.mode == ISOGI_TRACE_TRANSFER) {
             error = n->samples > 1 && !t->feedback->diverges ? (float)(1 / sqrt((double)n->samples)) : ISOGI_TRACE__NOT_READY;
             isogi_trace__record_write(t, isogi_trace__record(t, n->brick, n->slot), isogi_trace__light_at(set, i, v), error);
@@ -6206,10 +6268,13 @@ ISOGI_API isogi_result isogi_trace_gather_field(const isogi_trace_desc *desc, is
 #undef ISOGI_TRACE__DEPTH
 #undef ISOGI_TRACE__NOISE
 #undef ISOGI_TRACE__NOISE_FEW
+#undef ISOGI_TRACE__NOISE_KNOWN
+#undef ISOGI_TRACE__RIDGE
 #undef ISOGI_TRACE__SHEET
 #undef ISOGI_TRACE__FILTER
 #undef ISOGI_TRACE__FILTERED
 #undef ISOGI_TRACE__BLURRED
+#undef ISOGI_TRACE__TURNED
 #undef ISOGI_TRACE__LIGHT_FIRST
 #undef ISOGI_TRACE__AHEAD
 #undef ISOGI_TRACE__PLANE

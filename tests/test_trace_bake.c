@@ -242,28 +242,73 @@ TEST(probes_do_not_breed) {
 }
 
 /* The light of bright spots in an image is averaged over neighbours as that of the other sky is: on the sides of a pit, with 4 samples,
-   .47 of the error that paths of 4 samples have (a filter of the nearest 27 texels: .54; none: .69, by better numbers alone). */
+   half of the error that paths of 4 samples have, of four runs (a filter of the nearest 27 texels: .54; none: .69). */
 TEST(bright_spots_of_the_sky_are_filtered) {
-    enum { WIDTH = 64, HEIGHT = 32 };
-    static float image[HEIGHT][WIDTH][3], points[200][3], e[3][200][3];
+    enum { WIDTH = 64, HEIGHT = 32, RUNS = 4 };
+    static float image[HEIGHT][WIDTH][3], points[200][3], e[200][3], reference[200][3];
     double q[5] = {24, 22, 24, 26, 16}, rms[2] = {0, 0};
     scene s = scene_make(48, 48, 48, NULL, pit, q);
     int n = surface_points(&s, 0, 200, 7, points);
     for (int y = 0; y < HEIGHT; y++)
         for (int x = 0; x < WIDTH; x++)
             for (int c = 0; c < 3; c++) image[y][x][c] = y > 4 && y < 9 && x % 16 < 4 ? 40.0f : 0.2f;
-    for (int kind = 0; kind < 3; kind++) {
-        isogi_trace_desc d = desc_make(&s, 0, 0, kind == 2 ? 256 : 4);
-        d.method = kind ? ISOGI_TRACE_PATHS : ISOGI_TRACE_FEEDBACK, d.lazy = 1;
+    for (int run = 0; run <= 2 * RUNS; run++) {
+        isogi_trace_desc d = desc_make(&s, 0, 0, run ? 4 : 256);
+        d.method = run % 2 ? ISOGI_TRACE_FEEDBACK : ISOGI_TRACE_PATHS, d.lazy = 1, d.seed = (uint64_t)(run + 1) / 2;
         memset(&d.lighting, 0, sizeof d.lighting);
         d.lighting.env.rgb = &image[0][0][0], d.lighting.env.width = WIDTH, d.lighting.env.height = HEIGHT;
-        bake_and_sample(&d, NULL, (const float(*)[3])points, n, e[kind]);
+        bake_and_sample(&d, NULL, (const float(*)[3])points, n, run ? e : reference);
+        for (int i = 0; run && i < n; i++) rms[run % 2] += pow((double)e[i][1] - (double)reference[i][1], 2) / (n * RUNS);
     }
-    for (int kind = 0; kind < 2; kind++)
-        for (int i = 0; i < n; i++) rms[kind] += pow((double)e[kind][i][1] - (double)e[2][i][1], 2) / n;
-    printf("    error %.4f, by paths %.4f\n", sqrt(rms[0]), sqrt(rms[1]));
-    CHECK(n > 100 && sqrt(rms[0]) < 0.51 * sqrt(rms[1]), "error %.4f, by paths %.4f", sqrt(rms[0]), sqrt(rms[1]));
+    printf("    error %.4f, by paths %.4f\n", sqrt(rms[1]), sqrt(rms[0]));
+    CHECK(n > 100 && sqrt(rms[1]) < 0.51 * sqrt(rms[0]), "error %.4f, by paths %.4f", sqrt(rms[1]), sqrt(rms[0]));
     scene_free(&s);
+}
+
+/* One or two samples a texel are worth baking: those of the texels around make up for them, on the sides of a pit under a sky that is
+   brighter above. The error over that of light which is not filtered, of four runs: .47 of 1 sample, .50 of 2 (where texels do not turn
+   a common sequence: .92, .90; by the noise of so few samples: 1, .63). */
+TEST(few_samples_are_filtered) {
+    enum { RUNS = 4 };
+    static const float sky[4][3] = {{3, 3, 3}, {1, 1, 1}, {0, 0, 0}, {0, 0, 0}};
+    static float points[200][3], e[200][3], reference[200][3];
+    double q[5] = {24, 22, 24, 26, 16};
+    scene s = scene_make(48, 48, 48, NULL, pit, q);
+    int n = surface_points(&s, 0, 200, 7, points);
+    for (int samples = 1; samples <= 2; samples++) {
+        double rms[2] = {0, 0};
+        for (int run = samples > 1; run <= 2 * RUNS; run++) {
+            isogi_trace_desc d = desc_make(&s, 0, 0, run ? samples : 256);
+            d.method = run ? ISOGI_TRACE_FEEDBACK : ISOGI_TRACE_PATHS, d.unfiltered = run % 2, d.seed = (uint64_t)(run + 1) / 2;
+            d.lazy = 1, d.lighting.env.sh = &sky[0][0], d.lighting.env.sh_order = 2;
+            bake_and_sample(&d, NULL, (const float(*)[3])points, n, run ? e : reference);
+            for (int i = 0; run && i < n; i++) rms[run % 2] += pow((double)e[i][1] - (double)reference[i][1], 2) / (n * RUNS);
+        }
+        printf("    %d: error %.4f, unfiltered %.4f: %.3f\n", samples, sqrt(rms[0]), sqrt(rms[1]), sqrt(rms[0] / rms[1]));
+        CHECK(n > 100 && sqrt(rms[0]) < 0.55 * sqrt(rms[1]), "%d: error %.4f, unfiltered %.4f", samples, sqrt(rms[0]), sqrt(rms[1]));
+    }
+    scene_free(&s);
+}
+
+/* What is fitted is a plane: weights sum to 1, and where the texel itself counts for nothing, light that is linear in place comes out
+   as it is, from texels on one side alone, too. */
+TEST(planes_are_fitted_exactly) {
+    for (int run = 0; run < 200; run++) {
+        double weight[40], sum = 0, first[3] = {0, 0, 0};
+        int apart[40][3], n = 8 + run % 32;
+        for (int i = 0; i < n; i++) {
+            uint64_t key = isogi_trace__mix((uint64_t)(64 * run + i + 1));
+            weight[i] = 0.1 + isogi_trace__unit(key);
+            for (int a = 0; a < 3; a++) apart[i][a] = (int)(isogi_trace__mix(key + (uint64_t)a) % 5) - (run % 2 ? 0 : 2);
+        }
+        isogi_trace__fit(weight, (const int(*)[3])apart, n, 1e-9);
+        for (int i = 0; i < n; i++) {
+            sum += weight[i];
+            for (int a = 0; a < 3; a++) first[a] += weight[i] * apart[i][a];
+        }
+        CHECK(fabs(sum - 1) < 1e-12, "run %d: weights sum to 1 %+g", run, sum - 1);
+        for (int a = 0; a < 3; a++) CHECK(fabs(first[a]) < 1e-6, "run %d: axis %d: %g", run, a, first[a]);
+    }
 }
 
 /* Which texels share light depends on no unit of values: not even where squares of them are no numbers. */
@@ -313,7 +358,7 @@ TEST(unfiltered_texels_stand_alone) {
 }
 
 /* Light from probes is not exactly that at the hit: its bias against paths, measured where it matters most (a gyroid's narrow
-   channels, albedo 0.8), printed, and bounded. Long: 1364 samples, noise 0.2 %; quick: 84 samples at 60
+   channels, albedo 0.8), of three runs, which differ by 0.4 %, printed, and bounded. Long: 1364 samples, noise 0.2 %; quick: 84 samples at 60
    points, noise 1 % of the mean and 5 % at a point. */
 TEST(bias_against_paths_is_small) {
     double q[1] = {0.3};
@@ -323,13 +368,14 @@ TEST(bias_against_paths_is_small) {
     double bias = 0, square = 0, mean = 0;
     int n = surface_points(&s, 0, LONG_SUITE ? 200 : 60, 5, points);
     d.lazy = 1;
-    for (int method = 0; method < 2; method++) {
-        d.method = (isogi_trace_method)method;
-        bake_and_sample(&d, NULL, (const float(*)[3])points, n, e[method]);
-    }
-    for (int i = 0; i < n; i++) {
-        double apart = (double)e[0][i][1] - (double)e[1][i][1];
-        bias += apart / n, square += apart * apart / n, mean += (double)e[1][i][1] / n;
+    d.method = ISOGI_TRACE_PATHS;
+    bake_and_sample(&d, NULL, (const float(*)[3])points, n, e[1]);
+    for (d.method = ISOGI_TRACE_FEEDBACK; d.seed < 3; d.seed++) {
+        bake_and_sample(&d, NULL, (const float(*)[3])points, n, e[0]);
+        for (int i = 0; i < n; i++) {
+            double apart = (double)e[0][i][1] - (double)e[1][i][1];
+            bias += apart / (3 * n), square += apart * apart / (3 * n), mean += (double)e[1][i][1] / (3 * n);
+        }
     }
     printf("    bias %.4f of the mean, root mean square difference %.4f\n", bias / mean, sqrt(square) / mean);
     CHECK(fabs(bias) < (LONG_SUITE ? 0.01 : 0.025) * mean && sqrt(square) < (LONG_SUITE ? 0.03 : 0.06) * mean, "bias %g, rms %g of %g",

@@ -783,7 +783,7 @@ static void bench(FILE *csv, const char *name, int quick, int tables) {
     }
     d = s.desc;
     for (int i = 0; i < (quick ? 5 : 9); i++) { /* the curve, and the first point below the error of naive */
-        const int sweep[2][9] = {{1, 3, 4, 6, 8, 16, 64, 128, 256}, {1, 3, 4, 8, 16}};
+        const int sweep[2][9] = {{1, 2, 3, 4, 8, 16, 64, 128, 256}, {1, 2, 4, 8, 16}};
         d.samples = sweep[quick][i], o = ours(&d, &two);
         snprintf(setting, sizeof setting, "samples=%d", d.samples);
         row(csv, "", &s, d.samples == (quick ? 8 : 64) ? "default" : "feedback", setting, o.seconds, o.error, o.rays, "rays");
