@@ -759,8 +759,12 @@ TEST(a_single_texel_lies_in_the_middle) {
     }
     isogi_trace_desc d = desc_make(&s, 0.5f, 0, 4);
     isogi_trace *t = NULL;
+    scarce memory = {1, 0}; /* none for so many texels */
+    isogi_context context = {.alloc = scarce_alloc, .release = scarce_release, .user = &memory, .threads = 1};
     d.lattice[1] = (size_t)1 << 31, d.lattice[0] = d.lattice[2] = 1;
-    CHECK(isogi_trace_create(&t, &d, NULL) == ISOGI_TOO_LARGE && !t, "%d texels", -1);
+    CHECK(isogi_trace_create(&t, &d, &context) == ISOGI_TOO_LARGE && !t && !memory.blocks, "%ld blocks", memory.blocks);
+    d.lattice[1]--, memory.left = 1;
+    CHECK(isogi_trace_create(&t, &d, &context) == ISOGI_NO_MEMORY && !t && !memory.blocks, "%ld blocks", memory.blocks);
     scene_free(&s);
 }
 
