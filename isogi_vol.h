@@ -4442,6 +4442,16 @@ static int isogi_vol__walk_fast(isogi_vol__walk *w, const isogi_vol__ticks *k, i
 #pragma GCC diagnostic ignored "-Wsign-conversion" /* and of masks in its own macros, at -O0 */
 #endif
 #define ISOGI_VOL__POOL 64
+#define ISOGI_VOL__PACKET 16 /* see sixteen rays side by side */
+
+/* Rays of a packet as they go through cells that are counted backwards where they fall, hence upwards along all axes. */
+typedef struct __attribute__((aligned(64))) isogi_vol__packet {
+    double place[3][ISOGI_VOL__PACKET], way[3][ISOGI_VOL__PACKET];
+    __m512 at[3], dir[3], inverse[3], stop; /* the same in float; stop: a little more */
+    __m512 enter[3], leave[3];              /* planes of nodes are met at place * inverse - these: nodes are wider than they are */
+    float padded;                           /* cells of the root */
+    int axis;                               /* on which they are fastest */
+} isogi_vol__packet;
 
 /* One number for each ray of the pool. What stays the same all along comes last, behind the levels that are not needed. */
 typedef struct __attribute__((aligned(64))) isogi_vol__pool {
@@ -4459,8 +4469,11 @@ typedef struct __attribute__((aligned(64))) isogi_vol__pool {
                                            only to be looked at in double */
     double stop[ISOGI_VOL__POOL], deflated[ISOGI_VOL__POOL]; /* of the walk; stop: its end */
     uint64_t ray[ISOGI_VOL__POOL];
-    uint64_t mask[ISOGI_VOL__NODE_LEVELS][ISOGI_VOL__POOL]; /* children still to come of the node of each level,
-                                                               counted backwards on falling axes */
+    union {
+        uint64_t mask[ISOGI_VOL__NODE_LEVELS][ISOGI_VOL__POOL]; /* children still to come of the node of each level,
+                                                                   counted backwards on falling axes */
+        isogi_vol__packet packet; /* which is alone in the pool */
+    } of;
     /* the same for all rays of a bundle that begins within the box */
     double origin[3][ISOGI_VOL__POOL], base[ISOGI_VOL__POOL], isovalue[ISOGI_VOL__POOL]; /* of the walk */
     int64_t low[ISOGI_VOL__POOL], beyond[ISOGI_VOL__POOL]; /* what the isovalue can be in 8 bits: low .. beyond - 1 */
@@ -4710,7 +4723,7 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE void isogi_vol__answer(isogi_vol__turn *turn
     int n;
 #pragma GCC unroll 8
     for (n = 0; n < turn->levels; n++)
-        _mm512_mask_store_epi64(s->mask[n] + i, _mm512_cmpeq_epi64_mask(level, _mm512_set1_epi64(n)), marked);
+        _mm512_mask_store_epi64(s->of.mask[n] + i, _mm512_cmpeq_epi64_mask(level, _mm512_set1_epi64(n)), marked);
     _mm512_store_si512(&s->pending[i],
                        _mm512_mask_or_epi64(_mm512_load_si512(&s->pending[i]), (__mmask8)(some & ~leaf), _mm512_load_si512(&s->pending[i]),
                                             _mm512_sllv_epi64(_mm512_set1_epi64(1), level)));
@@ -4732,11 +4745,11 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE unsigned isogi_vol__choose(const isogi_vol__
     int k;
 #pragma GCC unroll 8
     for (k = 1; k < turn->levels; k++)
-        mask = _mm512_mask_load_epi64(mask, _mm512_cmpeq_epi64_mask(n, _mm512_set1_epi64(k)), s->mask[k] + i);
+        mask = _mm512_mask_load_epi64(mask, _mm512_cmpeq_epi64_mask(n, _mm512_set1_epi64(k)), s->of.mask[k] + i);
     rest = _mm512_and_si512(mask, _mm512_sub_epi64(mask, one));
 #pragma GCC unroll 8
     for (k = 1; k < turn->levels; k++)
-        _mm512_mask_store_epi64(s->mask[k] + i, _mm512_mask_cmpeq_epi64_mask(some, n, _mm512_set1_epi64(k)), rest);
+        _mm512_mask_store_epi64(s->of.mask[k] + i, _mm512_mask_cmpeq_epi64_mask(some, n, _mm512_set1_epi64(k)), rest);
     child = _mm512_xor_si512(_mm512_popcnt_epi64(_mm512_andnot_si512(mask, _mm512_sub_epi64(mask, one))), _mm512_load_si512(&s->flip[i]));
     pending =
         _mm512_mask_and_epi64(pending, (__mmask8)(some & _mm512_testn_epi64_mask(rest, rest)), pending, _mm512_sub_epi64(pending, one));
@@ -4931,7 +4944,7 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE unsigned isogi_vol__look(isogi_vol__turn *tu
 #define ISOGI_VOL__TAKE(member) isogi_vol__pick8(&spots, ISOGI_VOL__ROW_OF(member))
 #define ISOGI_VOL__TAKE_REAL(member) _mm512_castsi512_pd(ISOGI_VOL__TAKE(member))
     const isogi_vol__spots spots = isogi_vol__spots8(s, seats);
-    const __m512i mask = ISOGI_VOL__TAKE(mask[0]), below = _mm512_sub_epi64(mask, _mm512_set1_epi64(1)),
+    const __m512i mask = ISOGI_VOL__TAKE(of.mask[0]), below = _mm512_sub_epi64(mask, _mm512_set1_epi64(1)),
                   rest = _mm512_and_si512(mask, below);
     const __m512i child = _mm512_xor_si512(_mm512_popcnt_epi64(_mm512_andnot_si512(mask, below)), ISOGI_VOL__TAKE(flip));
     const __m512i side = ISOGI_VOL__TAKE(side);
@@ -4942,8 +4955,8 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE unsigned isogi_vol__look(isogi_vol__turn *tu
     isogi_vol__sides sides;
     __mmask8 sure, hit = 0;
     int a;
-    if (count == 8) isogi_vol__put8(&spots, ISOGI_VOL__ROW_OF(mask[0]), rest);
-    else _mm512_mask_i64scatter_epi64(s->mask[0], lanes, slot, rest, 8);
+    if (count == 8) isogi_vol__put8(&spots, ISOGI_VOL__ROW_OF(of.mask[0]), rest);
+    else _mm512_mask_i64scatter_epi64(s->of.mask[0], lanes, slot, rest, 8);
 #pragma GCC unroll 8
     for (a = 0; a < 3; a++)
         inverse[a] = ISOGI_VOL__TAKE_REAL(inverse[a]), dir[a] = ISOGI_VOL__TAKE_REAL(dir[a]),
@@ -5677,22 +5690,12 @@ static void isogi_vol__trace_one(isogi_vol__batch *b, size_t i) {
    with; a cell in doubt is left to the times and numbers in double that a pool goes by, by which a ray may only have come near: hits are
    the same. What a ray's side is comes from there alone, since cells that it comes near may be out of its order. All rays fall along the
    same axes and count backwards there, so one order of children suits them all. */
-#define ISOGI_VOL__PACKET 16
 #define ISOGI_VOL__REACH 4e-6f /* times below are sums of a few numbers up to 4 children, with errors below 1e-6 */
 
 typedef struct __attribute__((aligned(64))) isogi_vol__layers {
     __m512 per[3], first[3], last[3], stop; /* from somewhere on, the rays enter layer i of cells at i per - first,
                                                leave it at (i + 1) per - last */
 } isogi_vol__layers;
-
-/* Rays of a packet as they go through cells that are counted backwards where they fall, hence upwards along all axes. */
-typedef struct __attribute__((aligned(64))) isogi_vol__packet {
-    double place[3][ISOGI_VOL__PACKET], way[3][ISOGI_VOL__PACKET];
-    __m512 at[3], dir[3], inverse[3], stop; /* the same in float; stop: a little more */
-    __m512 enter[3], leave[3];              /* planes of nodes are met at place * inverse - these: nodes are wider than they are */
-    float padded;                           /* cells of the root */
-    int axis;                               /* on which they are fastest */
-} isogi_vol__packet;
 
 ISOGI_VOL__AVX512 static void isogi_vol__set_packet(isogi_vol__packet *k, const isogi_vol__pool *s, int first, int64_t backwards,
                                                     int levels) {
@@ -6077,14 +6080,14 @@ ISOGI_VOL__AVX512 ISOGI_VOL__NOINLINE static void isogi_vol__trace_packet(isogi_
     const uint8_t *children[ISOGI_VOL__NODE_LEVELS], *node = p->nodes[p->node_level[p->node_levels - 1].first];
     uint64_t left[ISOGI_VOL__NODE_LEVELS];
     unsigned met[ISOGI_VOL__NODE_LEVELS], lanes = rays, pending = 0;
-    isogi_vol__packet packet;
+    isogi_vol__packet *packet = &s->of.packet;
     isogi_vol__beam beam;
     isogi_vol__known known;
     int64_t cell = 0; /* corner of the node, counted backwards */
     int n = p->node_levels - 1;
     known.active = rays, known.doubts = known.hits = known.alone = known.in = known.out = known.seen_in = known.seen_out = 0;
-    isogi_vol__set_packet(&packet, s, first, backwards, p->node_levels);
-    isogi_vol__set_beam(&beam, &packet, ways, rays);
+    isogi_vol__set_packet(packet, s, first, backwards, p->node_levels);
+    isogi_vol__set_beam(&beam, packet, ways, rays);
     for (;;) {
         /* a node is opened */
         uint64_t mask = isogi_vol__in_beam(&beam, ways, n, cell);
@@ -6105,7 +6108,7 @@ ISOGI_VOL__AVX512 ISOGI_VOL__NOINLINE static void isogi_vol__trace_packet(isogi_
             __m512i voxel[2];
             const uint64_t held = isogi_vol__held_cells(ways, octant, &leaf, node, level, voxel);
             mask &= isogi_vol__cut_order(&leaf, octant, held);
-            if (mask) isogi_vol__look_in_leaf(b, s, &packet, &known, &leaf, voxel, mask, lanes, cell, backwards);
+            if (mask) isogi_vol__look_in_leaf(b, s, packet, &known, &leaf, voxel, mask, lanes, cell, backwards);
         }
         /* on to the next child that some rays meet */
         for (lanes = 0; !lanes;) {
@@ -6115,7 +6118,7 @@ ISOGI_VOL__AVX512 ISOGI_VOL__NOINLINE static void isogi_vol__trace_packet(isogi_
             child = __builtin_ctzll(left[n]), left[n] &= left[n] - 1;
             if (!left[n] || !lanes) pending &= pending - 1;
             cell = (int64_t)(((uint64_t)cell & ways->above[n]) | _pdep_u64((uint64_t)child, ways->digit[n]));
-            lanes &= isogi_vol__meet_node(&packet, cell, ways->size[n]);
+            lanes &= isogi_vol__meet_node(packet, cell, ways->size[n]);
             node = children[n] + 128 * (child ^ flip);
             isogi_vol__fetch_node(children[n] + 128 * (__builtin_ctzll(left[n] ? left[n] : (uint64_t)1 << child) ^ flip));
         }
@@ -6194,13 +6197,13 @@ ISOGI_VOL__AVX512 static void isogi_vol__descend8(isogi_vol__turn *turn, isogi_v
                                 held);
         if (n) {
             const __m512i bit = _mm512_sllv_epi64(one, _mm512_xor_si512(child, flip)), rest = _mm512_andnot_si512(bit, mask);
-            ISOGI_VOL__PUT(mask[n], rest);
+            ISOGI_VOL__PUT(of.mask[n], rest);
             pending = _mm512_mask_or_epi64(pending, _mm512_mask_test_epi64_mask(going, rest, rest), pending, _mm512_set1_epi64(1 << n));
             going = _mm512_mask_test_epi64_mask(going, mask, bit);
         }
     }
     cells = _mm512_mask_test_epi64_mask((__mmask8)(going & lanes), mask, mask);
-    ISOGI_VOL__PUT(mask[0], mask);
+    ISOGI_VOL__PUT(of.mask[0], mask);
     ISOGI_VOL__PUT(pending, pending);
     ISOGI_VOL__PUT(cell, _mm512_set1_epi64(d->cell));
     ISOGI_VOL__PUT(level, _mm512_set1_epi64(-1));
@@ -6471,7 +6474,7 @@ ISOGI_VOL__AVX512 static void isogi_vol__share(isogi_vol__turn *turn, isogi_vol_
    eight bytes. */
 ISOGI_VOL__AVX512 static void isogi_vol__move(isogi_vol__pool *s, isogi_vol__turn *turn, int from, __mmask8 leave, int to, __mmask8 take) {
     __attribute__((aligned(64))) uint8_t place[64];
-    const int last = (int)(offsetof(isogi_vol__pool, mask) / sizeof s->ray) + turn->levels,
+    const int last = (int)(offsetof(isogi_vol__pool, of) / sizeof s->ray) + turn->levels,
               rest = (int)(offsetof(isogi_vol__pool, origin) / sizeof s->ray);
     char *row = (char *)s;
     unsigned l = leave, t = take;
@@ -6596,7 +6599,7 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE uint64_t isogi_vol__decide_all(isogi_vol__ba
             if (hits >> k & 1) {
                 if (b->occluded) b->occluded[s->ray[slot]] = 1;
                 open |= (uint64_t)1 << slot;
-            } else if (s->mask[0][slot]) turn->at_leaf[turn->leaves++] = (uint8_t)slot;
+            } else if (s->of.mask[0][slot]) turn->at_leaf[turn->leaves++] = (uint8_t)slot;
             else turn->choosing |= (uint64_t)1 << slot;
         }
     }
@@ -6639,7 +6642,7 @@ ISOGI_VOL__AVX512 static void isogi_vol__clear_pool(isogi_vol__pool *s, int firs
         for (k = first; k < groups; k++) _mm512_store_si512(row + 64 * k, _mm512_setzero_si512());
     for (k = 0; k < first; k++) {
         _mm512_store_pd(s->step + 8 * k, _mm512_setzero_pd());
-        for (i = 0; i < ISOGI_VOL__NODE_LEVELS; i++) _mm512_store_si512(s->mask[i] + 8 * k, _mm512_setzero_si512());
+        for (i = 0; i < ISOGI_VOL__NODE_LEVELS; i++) _mm512_store_si512(s->of.mask[i] + 8 * k, _mm512_setzero_si512());
     }
     for (i = 8 * first; i < 8 * groups; i++) s->level[i] = -1, s->address[i] = (uint64_t)(uintptr_t)p->nodes;
 }
