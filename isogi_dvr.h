@@ -168,6 +168,7 @@
    ISOGI_DVR_IMPLEMENTATION   in one file: the code of this header alone
    ISOGI_API                  how functions are declared, in all isogi headers; default extern (extern "C" in C++)
    ISOGI_NO_THREADS           isogi_vol.h: no threads
+   ISOGI_NO_SIMD              plain C only; else vectors (gcc 9 or later, clang), on x86-64 AVX2 or AVX-512 where the machine has them
 
    Memory, threads, determinism
 
@@ -205,8 +206,7 @@
    leaves a quarter of the error. `order` 2 is ambient light with a direction, 3 soft shadows, 4 and more for a directional light.
    `grid`: shadows cannot be finer than its distances; time is proportional to its points. `directions`: at least 2 order^2.
 
-   History: exact rays in data space, pre-integration, silhouettes, two-sided light since. Version 1 - ray casting in both spaces, peaks,
-   brute-force SH visibility.
+   History  1.0  first release
 */
 #ifndef ISOGI_DVR_H
 #define ISOGI_DVR_H
@@ -370,7 +370,9 @@ typedef struct isogi_view {
    Where up is along the line of sight, another up is chosen; where eye and target coincide, the view is along -z. */
 ISOGI_API void isogi_view_ray(const isogi_view *view, double x, double y, double origin[3], float dir[3]);
 
-/* A renderer without a transfer function (all transparent) and without shadows. context NULL = the pyramid's. */
+/* A renderer without a transfer function (all transparent) and without shadows. context NULL = the pyramid's. ISOGI_INVALID for a
+   description outside its documented ranges. *dvr is written on success alone. The paper's method, for which voxels are read, calls the
+   progress callback, with a fraction of 0 throughout: ISOGI_CANCELLED where it asks for that. */
 ISOGI_API isogi_result isogi_dvr_create(isogi_dvr **dvr, const isogi_dvr_desc *desc, const isogi_context *context);
 ISOGI_API void isogi_dvr_free(isogi_dvr *dvr); /* NULL is fine */
 

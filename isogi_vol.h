@@ -42,13 +42,15 @@
    - ISOGI_IMPLEMENTATION       implements every isogi header that the file includes
    - ISOGI_VOL_IMPLEMENTATION   implements this one alone
    - ISOGI_NO_THREADS           everything runs on the calling thread
+   - ISOGI_NO_SIMD              plain C only; else SSE2 or NEON, and on x86-64 AVX2 or AVX-512, chosen at run time (gcc, clang)
    - ISOGI_API                  linkage of public functions, if extern does not suit
 
    Memory       Through isogi_context, or malloc. A pyramid takes about 2.2 bytes for every voxel: bounds of blocks, and all voxels
                 in 8 bits of their block's range; and 23 KB.
                 A mesh keeps some 3/4 byte of scratch memory for every voxel until it is freed.
                 Stack use stays below 32 KB.
-   Threads      A pyramid is const once built: any number of threads may read it. Building and meshing use the context's threads.
+   Threads      A pyramid is const once built: any number of threads may read it. Building, updating, prefiltering and meshing use the
+                context's threads; rays, samples and normals run on the thread that calls.
    Determinism  The same input gives the same bits for any number of threads. With -ffast-math hits of ordinary numbers are right but for
                 more rounding, those of denormal or huge ones (1e300) may be NaN, and nothing that this header says to be the same
                 bits on two ways need be so.
