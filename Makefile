@@ -118,13 +118,17 @@ check:
 
 # ---- benchmarks: one at a time, since they measure ----
 
-bench: build/bench/plot
+bench: $(if $(BENCHES),build/bench/plot,bench-unknown)
 	@$(QUIET_MAKE) $(BENCHES)
 	@for b in $(patsubst build/bench/bench_%,%,$(BENCHES)); do \
 		echo "$$b"; \
 		build/bench/bench_$$b $(if $(QUICK),--quick) build/bench/$$b.csv && \
 		build/bench/plot build/bench/$$b.csv build/bench/$$b.svg || exit 1; \
 	done
+
+bench-unknown:
+	@echo "make bench: there is no benchmark ONLY=$(ONLY), but $(patsubst tests/bench/bench_%.c,%,$(wildcard tests/bench/bench_*.c))" >&2
+	@false
 
 bench-peers: build/flags
 	@if echo '#include <embree3/rtcore.h>' | $(CC) -E - > build/bench/peers.log 2>&1; then \
@@ -140,5 +144,5 @@ clean:
 -include $(wildcard build/*.d build/tests/*.d build/bench/*.d)
 
 FORCE:
-.PHONY: all demo figures pictures programs test check bench bench-peers clean FORCE
+.PHONY: all demo figures pictures programs test check bench bench-unknown bench-peers clean FORCE
 .DELETE_ON_ERROR:
