@@ -3695,32 +3695,6 @@ static isogi_result isogi_dvr__update_matter(isogi_dvr *d, uint64_t max_rays, do
     return ISOGI_OK;
 }
 
-/* ==== half floats ==================================================================================================== */
-
-/* Rounded to nearest, ties to even; what is too large becomes the largest. */
-static uint16_t isogi_dvr__to_half(float x) {
-    uint32_t bits, sign, rest, shift;
-    memcpy(&bits, &x, sizeof bits);
-    sign = bits >> 16 & 0x8000u, bits &= 0x7fffffffu;
-    if (bits >= 0x477fe000u) return (uint16_t)(sign | 0x7bffu);
-    if (bits < 0x33000001u) return (uint16_t)sign;
-    if (bits < 0x38800000u) { /* denormal: the mantissa with its leading 1, shifted */
-        shift = 126 - (bits >> 23), bits = (bits & 0x7fffffu) | 0x800000u;
-        rest = bits & (((uint32_t)1 << shift) - 1), bits >>= shift;
-        return (uint16_t)(sign | (bits + (rest > (uint32_t)1 << (shift - 1) || (rest == (uint32_t)1 << (shift - 1) && (bits & 1)))));
-    }
-    return (uint16_t)(sign | ((bits - 0x38000000u + 0xfffu + (bits >> 13 & 1)) >> 13));
-}
-
-/* No denormal float is touched, which would take a hundred times as long. */
-static float isogi_dvr__from_half(uint16_t h) {
-    uint32_t rest = h & 0x7fffu, bits = (rest << 13) + 0x38000000u;
-    float x;
-    memcpy(&x, &bits, sizeof x);
-    if (rest < 0x400u) x = (float)rest * 5.9604644775390625e-8f; /* 2^-24 */
-    return h & 0x8000u ? -x : x;
-}
-
 /* ==== selection of levels ============================================================================================ */
 
 /* CIE L*u*v* (D65) of a colour seen through one voxel over black. */
@@ -3972,7 +3946,7 @@ static isogi_result isogi_dvr__lay_out(isogi_dvr *d, const uint8_t *level, const
         to = sh + first[b->total + i] * d->coefficients;
         if (lit[i] == b->lit[i]) memcpy(to, b->sh + b->first[b->total + i] * d->coefficients, count * sizeof *to);
         else
-            for (k = 0; k < count; k++) to[k] = k % d->coefficients ? 0 : isogi_dvr__to_half((float)(2 * sqrt(ISOGI_DVR__PI)));
+            for (k = 0; k < count; k++) to[k] = k % d->coefficients ? 0 : isogi_float_to_half((float)(2 * sqrt(ISOGI_DVR__PI)));
     }
     isogi_release(&d->context, b->first, 2 * b->total, sizeof *first);
     isogi_release(&d->context, b->data, b->data_count, sizeof *data);
@@ -4189,7 +4163,7 @@ static void isogi_dvr__local_task(void *arg, size_t i) {
     size_t block = b->order[job->first + i], n = b->lit[block], fine = isogi_dvr__make_window(d, block, window), every = fine / n, node[3],
            side[3], c;
     size_t at[3] = {block % b->count[0], block / b->count[0] % b->count[1], block / b->count[0] / b->count[1]};
-    uint16_t *out = b->sh + b->first[b->total + block] * d->coefficients, clear = isogi_dvr__to_half((float)(2 * sqrt(ISOGI_DVR__PI)));
+    uint16_t *out = b->sh + b->first[b->total + block] * d->coefficients, clear = isogi_float_to_half((float)(2 * sqrt(ISOGI_DVR__PI)));
     memset(&job->work[i], 0, sizeof *job->work);
     job->work[i].blocks++;
     isogi_dvr__sides(b, block, n, side);
@@ -4207,7 +4181,7 @@ static void isogi_dvr__local_task(void *arg, size_t i) {
                 isogi_dvr__touching(b, b->lit, at, node, n, &coarsest, &owner);
                 if (owner != block || b->lit[coarsest] < n) continue;
                 for (c = 0; c < d->coefficients; c++)
-                    out[c] = fine ? isogi_dvr__to_half(sum[c][node[0] * every]) : (uint16_t)(c ? 0 : clear);
+                    out[c] = fine ? isogi_float_to_half(sum[c][node[0] * every]) : (uint16_t)(c ? 0 : clear);
                 job->work[i].rays += (uint64_t)d->desc.directions, job->work[i].texels++;
             }
         }
@@ -4225,7 +4199,7 @@ static void isogi_dvr__local_at(const isogi_dvr *d, size_t block, const double p
     for (k = 0; k < 8; k++) {
         const uint16_t *v = base + corner[k] * d->coefficients;
         if (!(w[k] > 0)) continue;
-        for (c = 0; c < d->coefficients; c++) out[c] += w[k] * isogi_dvr__from_half(v[c]);
+        for (c = 0; c < d->coefficients; c++) out[c] += w[k] * isogi_half_to_float(v[c]);
     }
 }
 
@@ -4250,7 +4224,7 @@ static void isogi_dvr__finish_task(void *arg, size_t block) {
                 if (b->lit[coarsest] >= n && owner == block) continue;
                 isogi_dvr__node_position(b, block, n, node, position);
                 isogi_dvr__local_at(d, b->lit[coarsest] < n ? coarsest : owner, position, v);
-                for (c = 0; c < d->coefficients; c++) out[c] = isogi_dvr__to_half(v[c]);
+                for (c = 0; c < d->coefficients; c++) out[c] = isogi_float_to_half(v[c]);
             }
 }
 
@@ -4274,7 +4248,7 @@ static void isogi_dvr__toward_task(void *arg, size_t task) {
     for (; node < end; node++) {
         float sum[ISOGI_DVR__TOWARD] = {0};
         for (c = 0; c < d->coefficients; c++) {
-            float v = isogi_dvr__from_half(b->sh[node * d->coefficients + c]);
+            float v = isogi_half_to_float(b->sh[node * d->coefficients + c]);
             for (k = 0; k < ISOGI_DVR__TOWARD; k++) sum[k] += v * basis[c][k];
         }
         for (k = 0; k < job->count; k++) job->scratch[k * job->scratch_count + node] = sum[k];

@@ -2010,29 +2010,6 @@ static uint64_t isogi_trace__get(const uint8_t *from, int bytes) {
     return value;
 }
 
-/* IEEE binary16, to nearest, ties to even; beyond its range the largest finite value; NaN is 0. All in integers: denormals too. */
-static uint32_t isogi_trace__to_half(float x) {
-    uint32_t bits = isogi_trace__float_bits(x), sign = bits >> 16 & 0x8000u, shift, kept, rest;
-    bits &= 0x7fffffffu;
-    if (bits > 0x7f800000u) return 0;
-    if (bits >= 0x477fe000u) return sign | 0x7bffu; /* 65504 */
-    if (bits < 0x33000000u) return sign;            /* 2^-25 and less: half of the smallest */
-    if (bits >= 0x38800000u) { /* 2^-14: normal */
-        bits -= 112u << 23;
-        return sign | (bits + 0xfffu + (bits >> 13 & 1)) >> 13;
-    }
-    shift = 126 - (bits >> 23);
-    kept = (bits & 0x7fffffu) | 0x800000u;
-    rest = kept & ((1u << shift) - 1), kept >>= shift;
-    return sign | (kept + (rest > 1u << (shift - 1) || (rest == 1u << (shift - 1) && (kept & 1))));
-}
-
-static float isogi_trace__from_half(uint32_t half) {
-    uint32_t exponent = half >> 10 & 31, mantissa = half & 1023;
-    float x = exponent ? isogi_trace__bits_float((exponent + 112) << 23 | mantissa << 13) : (float)mantissa * (1.0f / 16777216);
-    return half & 0x8000u ? -x : x;
-}
-
 /* Three mantissas of 9 bits and a common exponent (EXT_texture_shared_exponent). Negative values and NaN are 0. */
 static uint32_t isogi_trace__to_rgb9e5(const float rgb[3]) {
     float x[3], most = 0;
@@ -2116,7 +2093,7 @@ static void isogi_trace__record_write(const isogi_trace *t, uint8_t *record, con
     switch (t->format) {
     case ISOGI_TRACE_HALF:
         for (i = 0; i < t->values; i++)
-            isogi_trace__put(record + 2 + 2 * i, isogi_trace__to_half((float)((double)values[i] / t->scene.unit)), 2);
+            isogi_trace__put(record + 2 + 2 * i, isogi_float_to_half((float)((double)values[i] / t->scene.unit)), 2);
         break;
     case ISOGI_TRACE_RGB9E5:
         for (i = 0; i < 3; i++) rgb[i] = (float)((double)values[i] / t->scene.unit);
@@ -2134,7 +2111,7 @@ static void isogi_trace__record_read(const isogi_trace *t, const uint8_t *record
     int i;
     switch (t->format) {
     case ISOGI_TRACE_HALF:
-        for (i = 0; i < t->values; i++) values[i] = unit * isogi_trace__from_half((uint32_t)(from[2 * i] | from[2 * i + 1] << 8));
+        for (i = 0; i < t->values; i++) values[i] = unit * isogi_half_to_float((uint16_t)(from[2 * i] | from[2 * i + 1] << 8));
         break;
     case ISOGI_TRACE_RGB9E5:
         isogi_trace__from_rgb9e5((uint32_t)isogi_trace__get(from, 4), values);
@@ -5219,7 +5196,7 @@ static void isogi_trace__export_write(isogi_trace__export *e, size_t texel, cons
     }
     for (v = 0; v < e->values; v++) {
         uint8_t *at = isogi_trace__export_at(e, texel, v);
-        uint16_t half = (uint16_t)isogi_trace__to_half(x[v]);
+        uint16_t half = isogi_float_to_half(x[v]);
         if (e->format == ISOGI_TRACE_FLOAT) memcpy(at, &x[v], 4);
         else if (e->format == ISOGI_TRACE_HALF) memcpy(at, &half, 2);
         else if (!e->transfer) *at = (uint8_t)(255 * isogi_trace__clamp((double)x[v], 1) + 0.5);
@@ -5235,7 +5212,7 @@ static void isogi_trace__export_read(const isogi_trace__export *e, size_t texel,
     for (v = 0; v < e->values; v++) {
         const uint8_t *at = isogi_trace__export_at(e, texel, v);
         if (e->format == ISOGI_TRACE_FLOAT) memcpy(&values[v], at, 4);
-        else if (e->format == ISOGI_TRACE_HALF) memcpy(&half, at, 2), values[v] = isogi_trace__from_half(half);
+        else if (e->format == ISOGI_TRACE_HALF) memcpy(&half, at, 2), values[v] = isogi_half_to_float(half);
         else if (e->format == ISOGI_TRACE_BYTE) values[v] = e->transfer ? (float)(*at < 128 ? *at : *at - 256) / 127 : (float)*at / 255;
         values[v] *= e->scale[v];
     }

@@ -78,6 +78,7 @@
 
 #include <stddef.h>
 #include <stdint.h>
+#include <string.h>
 
 /* ---- shared block 1: the same text stands in isogi_sh.h and isogi_vol.h ------------------------------------------ */
 #ifndef ISOGI_SHARED_BLOCK
@@ -153,6 +154,29 @@ ISOGI_API void *isogi_allocate(const isogi_context *context, size_t count, size_
 ISOGI_API void isogi_release(const isogi_context *context, void *p, size_t count, size_t size);
 ISOGI_API isogi_result isogi_parallel(const isogi_context *context, size_t n, void (*task)(void *arg, size_t i), void *arg,
                                       double from, double to);
+
+/* Numbers in 16 bits (IEEE binary16), for the same: to nearest, ties to even; beyond the range, 65504, the largest finite one; NaN is 0.
+   All in integers, but for what is below 2^-14 on the way back: no denormal float is touched, which would take a hundred times as long. */
+static inline uint16_t isogi_float_to_half(float x) {
+    uint32_t bits, sign, shift, rest;
+    memcpy(&bits, &x, sizeof bits);
+    sign = bits >> 16 & 0x8000u, bits &= 0x7fffffffu;
+    if (bits > 0x7f800000u) return 0;
+    if (bits >= 0x477fe000u) return (uint16_t)(sign | 0x7bffu);                                          /* 65504 */
+    if (bits < 0x33000000u) return (uint16_t)sign;                                                       /* below 2^-25 */
+    if (bits >= 0x38800000u) return (uint16_t)(sign | ((bits - 0x38000000u + 0xfffu + (bits >> 13 & 1)) >> 13)); /* from 2^-14: normal */
+    shift = 126 - (bits >> 23), bits = (bits & 0x7fffffu) | 0x800000u; /* denormal: the mantissa with its leading 1, shifted */
+    rest = bits & (((uint32_t)1 << shift) - 1), bits >>= shift;
+    return (uint16_t)(sign | (bits + (rest > (uint32_t)1 << (shift - 1) || (rest == (uint32_t)1 << (shift - 1) && (bits & 1)))));
+}
+
+static inline float isogi_half_to_float(uint16_t half) {
+    uint32_t rest = half & 0x7fffu, bits = (rest << 13) + 0x38000000u;
+    float x;
+    memcpy(&x, &bits, sizeof x);
+    if (rest < 0x400u) x = (float)rest * (1.0f / 16777216); /* 2^-24 */
+    return half & 0x8000u ? -x : x;
+}
 
 /* ---- volumes ------------------------------------------------------------------------------------------------------- */
 
@@ -448,7 +472,6 @@ ISOGI_API void isogi_vol_mesh_free(const isogi_pyramid *pyramid, isogi_mesh *mes
 #include <float.h>
 #include <math.h>
 #include <stdlib.h>
-#include <string.h>
 #ifndef ISOGI_NO_THREADS
 #ifdef _WIN32
 #ifndef WIN32_LEAN_AND_MEAN

@@ -4,25 +4,6 @@
 #include "test.h"
 #include "trace_scenes.h"
 
-/* Every finite half is itself again; between neighbours the nearer one is taken, of equals the even one. */
-TEST(half_is_to_nearest_even) {
-    for (uint32_t h = 0; h < 0x7c00; h++) {
-        float x = isogi_trace__from_half(h), next = isogi_trace__from_half(h + 1 < 0x7c00 ? h + 1 : h);
-        double exact = h < 1024 ? ldexp(h, -24) : ldexp(1024 + h % 1024, (int)(h >> 10) - 25);
-        float middle = (float)(0.5 * ((double)x + (double)next)), above = nextafterf(middle, 1e9f), below = nextafterf(middle, 0);
-        CHECK((double)x >= exact && (double)x <= exact, "half %x: %g, expected %g", h, (double)x, exact);
-        CHECK(isogi_trace__to_half(x) == h && (h == 0 || isogi_trace__to_half(-x) == (h | 0x8000)), "half %x is %x", h,
-              isogi_trace__to_half(x));
-        if (h + 1 == 0x7c00) continue;
-        CHECK(isogi_trace__to_half(middle) == (h & 1 ? h + 1 : h), "middle above %x: %x", h, isogi_trace__to_half(middle));
-        CHECK(isogi_trace__to_half(above) == h + 1 && isogi_trace__to_half(below) == h, "beside the middle above %x", h);
-    }
-    const float odd[6] = {1e30f, 65504, 65519, 65520, 1e-30f, 3e-45f};
-    const uint32_t expected[6] = {0x7bff, 0x7bff, 0x7bff, 0x7bff, 0, 0};
-    for (int i = 0; i < 6; i++) CHECK(isogi_trace__to_half(odd[i]) == expected[i], "%g: %x", (double)odd[i], isogi_trace__to_half(odd[i]));
-    CHECK(isogi_trace__to_half((float)nan_value()) == 0, "NaN: %x", isogi_trace__to_half((float)nan_value()));
-}
-
 /* Within half a step of the largest channel, over all magnitudes; what was unpacked packs to itself; never NaN, never infinite. */
 TEST(rgb9e5_is_within_half_a_step) {
     test_random r = {3};

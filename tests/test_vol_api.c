@@ -6,6 +6,27 @@
 #include "reference_ray.h"
 #include <float.h>
 
+/* ---- numbers in 16 bits ---- */
+
+/* Every finite half is itself again; between neighbours the nearer one is taken, of equals the even one. */
+TEST(half_is_to_nearest_even) {
+    for (uint16_t h = 0; h < 0x7c00; h++) {
+        float x = isogi_half_to_float(h), next = isogi_half_to_float((uint16_t)(h + (h < 0x7bff)));
+        double exact = h < 1024 ? ldexp(h, -24) : ldexp(1024 + h % 1024, (int)(h >> 10) - 25);
+        float middle = (float)(0.5 * ((double)x + (double)next)), above = nextafterf(middle, 1e9f), below = nextafterf(middle, 0);
+        CHECK((double)x >= exact && (double)x <= exact, "half %x: %g, expected %g", h, (double)x, exact);
+        CHECK(isogi_float_to_half(x) == h && (h == 0 || isogi_float_to_half(-x) == (h | 0x8000)), "half %x is %x", h,
+              isogi_float_to_half(x));
+        if (h + 1 == 0x7c00) continue;
+        CHECK(isogi_float_to_half(middle) == (h & 1 ? h + 1 : h), "middle above %x: %x", h, isogi_float_to_half(middle));
+        CHECK(isogi_float_to_half(above) == h + 1 && isogi_float_to_half(below) == h, "beside the middle above %x", h);
+    }
+    const float odd[6] = {1e30f, 65504, 65519, 65520, 1e-30f, 3e-45f};
+    const uint32_t expected[6] = {0x7bff, 0x7bff, 0x7bff, 0x7bff, 0, 0};
+    for (int i = 0; i < 6; i++) CHECK(isogi_float_to_half(odd[i]) == expected[i], "%g: %x", (double)odd[i], isogi_float_to_half(odd[i]));
+    CHECK(isogi_float_to_half(NAN) == 0, "NaN: %x", isogi_float_to_half(NAN));
+}
+
 /* ---- voxels one by one ---- */
 
 TEST(corners_and_ranges_are_those_of_the_voxels) {
