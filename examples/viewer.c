@@ -339,36 +339,51 @@ static void list_modes(unsigned use, char text[256]) {
     if (use) strcat(text, "--mode "), list_names(mode_name, MODE_COUNT, use, 1, text + strlen(text));
 }
 
+/* What an option is called and what it does, in lines of at most 100 columns. */
+static void print_option(const char *left, const char *text) {
+    size_t column = (size_t)printf("  %-28s", left);
+    if (column > 30) printf("\n%30s", ""), column = 30;
+    while (*text) {
+        size_t word = strcspn(text, " ");
+        if (column + 1 + word > 100) printf("\n%30s", ""), column = 30;
+        printf(" %.*s", (int)word, text);
+        column += 1 + word, text += word + (text[word] == ' ');
+    }
+    putchar('\n');
+}
+
 static void print_help(void) {
     puts("build/viewer VOLUME [options]      volume in, globally lit picture out\n\n"
-         "VOLUME is a raw file named like engine_256x256x128_uint8.raw (x fastest, little-endian; uint8 int8 uint16 int16\n"
-         "float32 float64), or procedural:NAME[:N] with N voxels along the longest axis:");
+         "VOLUME is a raw file named like engine_256x256x128_uint8.raw (x fastest, little-endian; uint8 int8\n"
+         "uint16 int16 float32 float64), or procedural:NAME[:N] with N voxels along the longest axis:");
     for (size_t i = 0; i < PROCEDURAL_SHAPE_COUNT; i++) printf("  %-20s %s\n", procedural_shapes[i].name, procedural_shapes[i].summary);
     puts("\nOptions");
     for (size_t i = 0; i < OPTION_COUNT; i++) {
-        char left[64], modes[256];
+        char left[64], modes[256], text[1024];
         snprintf(left, sizeof left, "%s %s", option_list[i].name, option_list[i].argument ? option_list[i].argument : "");
         list_modes(option_list[i].use, modes);
-        if (option_list[i].use == ANY) printf("  %-28s %s\n", left, option_list[i].help);
-        else printf("  %-28s %s (%s)\n", left, option_list[i].help, modes);
-        if (option_list[i].parse == parse_scene) printf("  %-28s %s\n", "", option_list[i].allowed);
+        if (option_list[i].use == ANY) snprintf(text, sizeof text, "%s", option_list[i].help);
+        else snprintf(text, sizeof text, "%s (%s)", option_list[i].help, modes);
+        print_option(left, text);
+        if (option_list[i].parse == parse_scene) print_option("", option_list[i].allowed);
     }
     puts("  --help                       this text\n\n"
          "Modes\n"
-         "  lambert, phong               light by the normal alone, no shadows: the usual picture, to compare with\n"
+         "  lambert, phong               light by the normal alone, no shadows: to compare with\n"
          "  vicinity                     a uniform sky of its own, no reflections: how open each place is\n"
          "  irradiance                   global light baked into a texture, only where this view looks\n"
          "  transfer                     the same by spherical harmonics, which can be relit without new rays\n"
          "  pathtrace                    no texture: paths from every pixel, the reference\n"
          "  dvr                          volume rendering, lit by spherical-harmonics visibility\n"
-         "  scale-invariant              volume rendering per unit of data: the same picture at any scale of space\n\n"
-         "Light: without --env and --light a sky (radiance 1 above to 0.3 below) and a sun. The exposure is set so that nine tenths\n"
-         "of what is seen are below 0.6 of white; up to 0.7 the picture is linear, above it bends to white; then it is coded as sRGB.\n"
+         "  scale-invariant              volume rendering per unit of data: the same at any scale of space\n\n"
+         "Light: without --env and --light a sky (radiance 1 above to 0.3 below) and a sun. The exposure is\n"
+         "set so that nine tenths of what is seen are below 0.6 of white; up to 0.7 the picture is linear,\n"
+         "above it bends to white; then it is coded as sRGB.\n"
          "The variable ISOGI_DATA names the folder of the volumes that --scene asks for.\n\n"
          "Examples\n"
          "  build/viewer procedural:engine-block --out engine.png\n"
          "  build/viewer head_256x256x99_uint8.raw --spacing 1,1,2 --iso 130 --env studio.hdr --out head.png\n"
-         "  build/viewer procedural:gyroid --mode vicinity --clip 1,0,0,-40 --clip 0,-1,0,100 --size 600x600 --stats\n"
+         "  build/viewer procedural:gyroid --mode vicinity --clip 1,0,0,-40 --clip 0,-1,0,100 --stats\n"
          "  build/viewer --scene engine --mode pathtrace --samples 256 --out reference.png\n"
          "  build/viewer procedural:skull --light directional:1,2,3:4,3.8,3.5:3 --camera 20,10,2.4");
 }
@@ -1479,14 +1494,14 @@ static int write_picture(viewer *v) {
 }
 
 static int check_surface(viewer *v) {
-    size_t covered = 0, pixels = (size_t)v->o.width * (size_t)v->o.height;
+    size_t covered = 0, surface = 0, pixels = (size_t)v->o.width * (size_t)v->o.height;
     for (int s = 0; s < v->o.antialias; s++)
-        for (size_t i = 0; i < pixels; i++) covered += v->seen[s][i] != RASTER_NONE;
+        for (size_t i = 0; i < pixels; i++) covered += v->seen[s][i] != RASTER_NONE, surface += v->seen[s][i] < SECTION;
     v->covered = covered;
     stat_line(v, "coverage", "%.6f", (double)covered / (double)pixels / v->o.antialias);
-    if (!covered)
-        fprintf(stderr, "note: no surface is in view at isovalue %.9g (the data range from %.9g to %.9g)\n", v->isovalue, v->range[0],
-                v->range[1]);
+    if (!surface)
+        fprintf(stderr, "note: no surface is in view at isovalue %.9g (the data range from %.9g to %.9g)%s\n", v->isovalue, v->range[0],
+                v->range[1], covered ? ": what is seen are the sides of the volume, or of a cut" : "");
     return 1;
 }
 

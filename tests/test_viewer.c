@@ -689,6 +689,18 @@ TEST(an_existing_file_survives_every_failure) {
     check_refused(command, "folder");
 }
 
+/* A picture without a surface says so, be it empty or of the sides of a volume that is matter throughout; no other does. */
+TEST(pictures_without_a_surface_are_told) {
+    static const char *const words[] = {"--iso 9", "--iso 9 --raycast", "--iso -9", "--iso -9 --raycast", "--mode pathtrace --iso -9", "",
+                                        "--clip 1,0,0,-12", "--raycast"};
+    char command[512];
+    for (int k = 0; k < 8; k++) {
+        snprintf(command, sizeof command, "procedural:gyroid:24 --size 16x16 --samples 4 %s --out '%s'", words[k], temporary("note.png"));
+        run_result r = run_viewer(command);
+        CHECK(r.status == 0 && !strstr(r.error, "no surface is in view") == (k > 4), "%s: %s", words[k], r.error);
+    }
+}
+
 TEST(stats_are_key_value_lines_and_help_is_complete) {
     static const char *const keys[] = {"size 32x32x32", "range ",           "isovalue ",        "triangles ",
                                        "rays_light ",   "rays_per_second ", "texels_computed ", "texels_requested ",
@@ -715,6 +727,8 @@ TEST(stats_are_key_value_lines_and_help_is_complete) {
         CHECK(system(shell) == 0, "--help fails");
         read_text(temporary("help"), help, sizeof help);
         for (size_t i = 0; i < sizeof named / sizeof named[0]; i++) CHECK(strstr(help, named[i]), "--help does not tell of %s", named[i]);
+        for (char *line = strtok(help, "\n"); line; line = strtok(NULL, "\n"))
+            CHECK(strlen(line) <= 100, "%zu columns: %s", strlen(line), line);
     }
 }
 
