@@ -1531,6 +1531,21 @@ TEST(fits_find_one_light) {
     CHECK(isogi_sh_dominant_direction(direction, rgb, c, 1) == ISOGI_INVALID, "%s", "order 1");
 }
 
+/* A red, a green and a blue light along the axes: degree 1 adds their directions up, weighed by their luminances (Rec. 709). */
+TEST(the_dominant_direction_is_that_of_luminance) {
+    static const double luminance[3] = {0.2126, 0.7152, 0.0722}, power[3] = {3, 1, 7};
+    isogi_light light[3];
+    float c[3 * 9], direction[3];
+    double length = 0;
+    memset(light, 0, sizeof light);
+    for (int k = 0; k < 3; k++) light[k].vector[k] = 1, light[k].rgb[k] = (float)power[k], length += pow(power[k] * luminance[k], 2);
+    const isogi_lighting lighting = {.lights = light, .light_count = 3};
+    CHECK(isogi_sh_project(c, 3, &lighting, NULL) == ISOGI_OK, "%s", "project");
+    CHECK(isogi_sh_dominant_direction(direction, NULL, c, 3) == ISOGI_OK, "%s", "fit");
+    for (int k = 0; k < 3; k++)
+        CHECK(fabs((double)direction[k] - power[k] * luminance[k] / sqrt(length)) < 1e-6, "axis %d: %g", k, (double)direction[k]);
+}
+
 /* Truncation: what an order misses of three environments, in the mean of squares (Parseval); falls with the order, and faster the
    smoother the environment is: a point light not at all, a hemisphere as 1/order, a soft lobe exponentially. */
 TEST(truncation_error_falls_with_order) {
