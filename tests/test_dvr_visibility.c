@@ -274,4 +274,129 @@ TEST(opacity_does_not_depend_on_the_step) {
     isogi_vol_free(pyramid);
 }
 
+/* ---- where pictures look visibility up ---- */
+
+enum { ALONG = 4 }; /* points of the grid along each axis */
+
+/* The mean of V at a place of the box, of the eight points around, each by its trilinear weight times min(1, 5 m)^2. */
+static double weighed_visibility(double m[ALONG][ALONG][ALONG], const double place[3], const double size[3]) {
+    double sum = 0, total = 0, u[3];
+    int cell[3];
+    for (int a = 0; a < 3; a++) {
+        double x = fmin(fmax(place[a] / size[a], 0), 1) * (ALONG - 1);
+        cell[a] = x < ALONG - 2 ? (int)x : ALONG - 2, u[a] = x - cell[a];
+    }
+    for (int k = 0; k < 8; k++) {
+        double mean = m[cell[2] + (k >> 2)][cell[1] + (k >> 1 & 1)][cell[0] + (k & 1)], open = fmin(1, 5 * fmax(mean, 0.005));
+        double w = (k & 1 ? u[0] : 1 - u[0]) * (k & 2 ? u[1] : 1 - u[1]) * (k & 4 ? u[2] : 1 - u[2]) * open * open;
+        sum += w * mean, total += w;
+    }
+    return sum / total;
+}
+
+/* Homogeneous matter under a sky of 1: the picture is the integral along the ray of what the header says, with visibility looked up
+   r x^2 / (x^2 + 16) in front of each place. On every path, by exact rays, and by samples. */
+TEST(visibility_is_looked_up_in_front_of_dense_matter_among_open_points) {
+    enum { X = 17, Y = 13, Z = 15, SIDE = 4 };
+    static const double size[3] = {X - 1, Y - 1, Z - 1};
+    static const float extinction[] = {0.1f, 0.4f, 0.8f, 3};
+    static float filled[Z][Y][X];
+    const isogi_volume volume = {.data = filled, .type = ISOGI_F32, .size = {X, Y, Z}};
+    const float sky[3] = {3.5449077f, 3.5449077f, 3.5449077f};
+    const isogi_lighting lighting = {.env = {.sh = sky, .sh_order = 1}};
+    isogi_pyramid *pyramid = NULL;
+    double worst[2] = {0, 0};
+    for (int i = 0; i < X * Y * Z; i++) filled[i / X / Y][i / X % Y][i % X] = (float)(i % X);
+    CHECK(isogi_vol_build(&pyramid, &volume, &serial) == ISOGI_OK, "build");
+    for (int n = 0; n < 4 * 6; n++) { /* paths 1 to 4, a bound, jitter */
+        const int way = n / 4;
+        const double tau = (double)extinction[n % 4];
+        const isogi_context context = {.threads = 1, .force_path = way < 4 ? way + 1 : 0};
+        const isogi_dvr_desc desc = {.pyramid = pyramid, .shading = ISOGI_DVR_VISIBILITY, .grid = {ALONG, ALONG, ALONG}, .step = 0.05,
+                                     .visibility_step = 1, .opaque = 1, .bound = way == 4 ? 0.01 : 0, .jitter = way == 5,
+                                     .directions = 128};
+        const isogi_transfer_point point = {0, {1, 1, 1}, extinction[n % 4]};
+        const isogi_transfer transfer = {&point, 1, NULL, 0};
+        const isogi_view view = {.width = SIDE, .height = SIDE, .eye = {30, 45, 60}, .target = {8, 6, 7}, .fov = 6};
+        double m[ALONG][ALONG][ALONG];
+        float image[SIDE * SIDE][4];
+        isogi_dvr *dvr = renderer(desc, &transfer, &context);
+        CHECK(isogi_dvr_step(dvr, 0, NULL) == ISOGI_OK, "step");
+        for (int i = 0; i < ALONG * ALONG * ALONG; i++) {
+            const int at[3] = {i % ALONG, i / ALONG % ALONG, i / ALONG / ALONG};
+            float p[3], v[9];
+            for (int a = 0; a < 3; a++) p[a] = (float)(size[a] * at[a] / (ALONG - 1));
+            CHECK(isogi_dvr_sample_visibility(dvr, (const float(*)[3])p, 1, v) == ISOGI_OK, "sample");
+            m[at[2]][at[1]][at[0]] = (double)(v[0] / sky[0]);
+        }
+        CHECK(isogi_dvr_render(dvr, &view, &lighting, image, NULL, NULL) == ISOGI_OK, "render");
+        isogi_dvr_free(dvr);
+        for (int i = 0; i < SIDE * SIDE; i++) {
+            enum { STEPS = 3000 };
+            double o[3], from = 0, to = 1e9, sum = 0, square = 0, r, off, clear = 1;
+            float d[3];
+            isogi_view_ray(&view, i % SIDE, i / SIDE, o, d);
+            for (int a = 0; a < 3; a++) {
+                double near = (size[a] - o[a]) / (double)d[a], far = -o[a] / (double)d[a]; /* all components are negative */
+                from = fmax(from, near), to = fmin(to, far);
+                square += pow((double)d[a] * (ALONG - 1) / size[a], 2);
+            }
+            r = 1.5 / sqrt(square), off = r * pow(tau * r, 2) / (pow(tau * r, 2) + 16);
+            for (int k = 0; k < STEPS; k++) {
+                double t = from + (to - from) * pow((k + 0.5) / STEPS, 2), length = (to - from) * (2 * k + 1) / STEPS / STEPS, place[3];
+                double lost = 1 - exp(-tau * length);
+                for (int a = 0; a < 3; a++) place[a] = o[a] + fmax(t - off, from) * (double)d[a];
+                sum += clear * lost * weighed_visibility(m, place, size), clear *= 1 - lost;
+            }
+            worst[way == 4] = fmax(worst[way == 4], fabs((double)image[i][0] - sum));
+            /* exact rays look light up once in a cell */
+            CHECK(fabs((double)image[i][0] - sum) < (way == 4 ? 2e-3 : 1e-4), "way %d, extinction %g, pixel %d: %g, not %g", way, tau, i,
+                  (double)image[i][0], sum);
+        }
+    }
+    printf("    largest difference of samples %.2g, of exact rays %.2g\n", worst[0], worst[1]);
+    isogi_vol_free(pyramid);
+}
+
+/* The face of opaque matter, wherever between points of a coarse grid it lies, from above and aslant: half of a sky of 1, and up to .04
+   more, as light is looked up in front of it and the matter ends at the sides; a sun has one brightness all over. */
+TEST(the_face_of_opaque_matter_is_evenly_lit) {
+    enum { SIDE = 33, W = 12 };
+    static float ground[SIDE][SIDE][SIDE];
+    const isogi_volume volume = {.data = ground, .type = ISOGI_F32, .size = {SIDE, SIDE, SIDE}, .spacing = {4, 4, 1}};
+    const float sky[3] = {3.5449077f, 3.5449077f, 3.5449077f};
+    const isogi_light sun = {.kind = ISOGI_LIGHT_DIRECTIONAL, .vector = {1, 0.5f, 2}, .rgb = {4, 4, 4}};
+    const isogi_lighting light[2] = {{.env = {.sh = sky, .sh_order = 1}}, {.lights = &sun, .light_count = 1}};
+    const isogi_transfer_point p[] = {{0, {1, 1, 1}, 0}, {0, {1, 1, 1}, 20}};
+    const isogi_transfer transfer = {p, 2, NULL, 0};
+    double range[2][2] = {{9, 0}, {9, 0}};
+    for (int n = 0; n < 4; n++) {
+        static const float heights[4] = {14, 15.9f, 16, 16.3f}; /* points of the grid are four apart, from 0 */
+        const float height = heights[n];
+        const isogi_dvr_desc desc = {.shading = ISOGI_DVR_VISIBILITY, .grid = {9, 9, 9}, .directions = 256};
+        isogi_dvr_desc with = desc;
+        isogi_pyramid *pyramid = NULL;
+        for (int i = 0; i < SIDE * SIDE * SIDE; i++)
+            ground[i / SIDE / SIDE][i / SIDE % SIDE][i % SIDE] = height - (float)(i / SIDE / SIDE);
+        CHECK(isogi_vol_build(&pyramid, &volume, &serial) == ISOGI_OK, "build");
+        with.pyramid = pyramid;
+        isogi_dvr *dvr = renderer(with, &transfer, &serial);
+        CHECK(isogi_dvr_step(dvr, 0, NULL) == ISOGI_OK, "step");
+        for (int k = 0; k < 4; k++) { /* from above and aslant, sky and sun */
+            isogi_view view = {.width = W, .height = W, .eye = {64, 64, 300}, .target = {64, 64, height}, .fov = 4};
+            float image[W * W][4];
+            if (k & 1) view.eye[0] = 464, view.eye[2] = height + 60, view.fov = 1;
+            CHECK(isogi_dvr_render(dvr, &view, &light[k >> 1], image, NULL, NULL) == ISOGI_OK, "render");
+            for (int i = 0; i < W * W; i++) {
+                if (image[i][3] < 0.99f) continue;
+                range[k >> 1][0] = fmin(range[k >> 1][0], (double)(image[i][0] / image[i][3]));
+                range[k >> 1][1] = fmax(range[k >> 1][1], (double)(image[i][0] / image[i][3]));
+            }
+        }
+        isogi_dvr_free(dvr), isogi_vol_free(pyramid);
+    }
+    CHECK(range[0][0] > 0.49 && range[0][1] < 0.55, "sky %g to %g", range[0][0], range[0][1]);
+    CHECK(range[1][1] - range[1][0] < 0.02, "sun %g to %g", range[1][0], range[1][1]);
+}
+
 TEST_MAIN("dvr_visibility")
