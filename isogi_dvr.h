@@ -320,8 +320,8 @@ typedef struct isogi_dvr_desc {
                                where the function is 0 on more than six ranges of values, some end later with AVX-512 than without */
     uint32_t jitter;        /* not 0: every pixel's samples are moved by a part of a step of its own, which turns rings of large steps into
                                noise. The same number gives the same picture. Sampled rays only; physical space is post-classified then */
-    double visibility_step; /* sampling distance along visibility rays, as `step`; 0 = twice `step`. Sweeps: distance of the lattice
-                               of extinction, rounded so that grid points are on it; 0 = 2 */
+    double visibility_step; /* sampling distance along visibility rays, as `step`; 0 = twice `step`, or 1 where that is 0. Sweeps: distance
+                               of the lattice of extinction, rounded so that grid points are on it; 0 = 2 */
     isogi_dvr_method method;
     isogi_dvr_sphere sphere;
     double anisotropy;      /* of scattering, -1..1 (both excluded): g of Henyey and Greenstein; 0 = isotropic; with visibility only */

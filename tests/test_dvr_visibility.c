@@ -83,6 +83,13 @@ TEST(blocks_that_the_border_cuts_thin_keep_to_the_budget) {
             if (m && !n)
                 CHECK(report.points == 33 * 33 * 33 && report.data_bytes == 36 * 36 * 36 * sizeof(float), "%zu points, %zu bytes",
                       report.points, report.data_bytes);
+            /* four coefficients of two bytes at every node, and two places and a number for each block, with three bytes */
+            if (m && !n)
+                CHECK(report.local_bytes == 36 * 36 * 36 * 4 * 2 && report.index_bytes == 27 * (3 * sizeof(size_t) + 3) &&
+                          report.global_bytes == POINTS * 4 * sizeof(float),
+                      "%zu bytes of local visibility, %zu of the index, %zu of global visibility", report.local_bytes, report.index_bytes,
+                      report.global_bytes);
+            if (m) CHECK(fabs(report.reduction / (CUT * CUT * CUT / (double)report.points) - 1) < 1e-12, "reduction %g", report.reduction);
             isogi_dvr_free(dvr);
         }
         for (int i = 0; i < 4 * POINTS; i++)
@@ -270,6 +277,45 @@ TEST(opacity_does_not_depend_on_the_step) {
         CHECK(fabs((double)pixel[0][3] - (1 - exp(-expected))) < 1e-4, "step %g: %g", step,
               (double)pixel[0][3]); /* 1024 classes, float sums */
         isogi_dvr_free(dvr);
+    }
+    isogi_vol_free(pyramid);
+}
+
+/* What is 0 in a description is what the header says: light and pictures are the same bits. */
+TEST(zero_is_the_default_that_is_stated) {
+    enum { POINTS = 200, W = 12 };
+    isogi_pyramid *pyramid = linear_field();
+    const isogi_view view = {.width = W, .height = W, .eye = {100, 90, 120}, .target = {24, 24, 24}};
+    const isogi_light sun = {.kind = ISOGI_LIGHT_DIRECTIONAL, .vector = {1, 2, 3}, .rgb = {1, 1, 1}};
+    const isogi_lighting lighting = {.lights = &sun, .light_count = 1};
+    for (int n = 0; n < 5; n++) { /* sweeps, brute force with a step of its own and without, the paper's method, data space */
+        static float v[2][POINTS][9], points[POINTS][3], image[2][W * W][4];
+        isogi_dvr_desc d[2];
+        memset(d, 0, sizeof d);
+        for (int k = 0; k < 2; k++) {
+            d[k].pyramid = pyramid, d[k].shading = ISOGI_DVR_VISIBILITY;
+            d[k].method = n == 0 ? ISOGI_DVR_METHOD_DEFAULT : n == 3 ? ISOGI_DVR_PAPER : ISOGI_DVR_BRUTE;
+            if (n == 1) d[k].step = 0.7;
+            if (n == 4) d[k].space = ISOGI_DVR_DATA, d[k].classification = ISOGI_DVR_POST_CLASSIFIED;
+            if (n) d[k].directions = 16;
+        }
+        d[1].unit = 1, d[1].order = 3, d[1].opaque = 0.999f, d[1].coarsest = 1, d[1].radius = 16, d[1].reduction = 4, d[1].table = 256;
+        d[1].tolerance = 0.5, d[1].grid[0] = d[1].grid[1] = d[1].grid[2] = 13; /* of 49 voxels */
+        d[1].visibility_step = n == 0 ? 2 : n == 1 ? 1.4 : 1;
+        if (!n) d[1].directions = 64, d[1].method = ISOGI_DVR_SWEEP;
+        if (n != 1) d[1].step = n == 4 ? 0.5 : 1;
+        for (int k = 0; k < 2; k++) {
+            isogi_dvr *dvr = renderer(d[k], &ramp_transfer, &serial);
+            test_random r = {9};
+            for (int i = 0; i < POINTS; i++)
+                for (int a = 0; a < 3; a++) points[i][a] = (float)random_range(&r, 0, N - 1);
+            CHECK(isogi_dvr_step(dvr, 0, NULL) == ISOGI_OK, "step");
+            CHECK(isogi_dvr_sample_visibility(dvr, (const float(*)[3])points, POINTS, v[k][0]) == ISOGI_OK, "sample");
+            CHECK(isogi_dvr_render(dvr, &view, &lighting, image[k], NULL, NULL) == ISOGI_OK, "render");
+            isogi_dvr_free(dvr);
+        }
+        CHECK(!memcmp(v[0], v[1], sizeof v[0]), "case %d: visibility %g, not %g", n, (double)v[0][0][0], (double)v[1][0][0]);
+        CHECK(!memcmp(image[0], image[1], sizeof image[0]), "case %d: pictures", n);
     }
     isogi_vol_free(pyramid);
 }
