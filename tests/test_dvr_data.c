@@ -640,6 +640,30 @@ TEST(local_light_without_a_gradient_and_within_a_lamp) {
     field_free(&flat);
 }
 
+/* A rectangle shines from its centre, by the cosine to its normal, to one side alone: a peak ten voxels away, which faces it. */
+TEST(rectangles_shine_to_one_side) {
+    tilt[0] = 1, tilt[1] = 0, tilt[2] = 0;
+    field f = field_of(tilted, 6);
+    const isogi_peak peak = {0.5, {0.8f, 0.6f, 0.4f}, 0.5f};
+    const isogi_transfer surface = {NULL, 0, &peak, 1};
+    const double eye[3] = {-20, 2.5, 2.5}, target[3] = {5, 2.5, 2.5};
+    for (int n = 0; n < 2 * 4; n++) {
+        const double angle = n / 2 * PI / 3, s = sin(angle), c = cos(angle);
+        const isogi_light lamp = {.kind = ISOGI_LIGHT_RECTANGLE, .vector = {-7.5f, 2.5f, 2.5f}, .rgb = {300, 300, 300},
+                                  .edge = {{(float)-s, (float)c, 0}, {0, 0, 1}}}; /* shines along c, s, 0 */
+        const isogi_lighting lighting = {.lights = &lamp, .light_count = 1};
+        const isogi_dvr_desc desc = {.pyramid = f.pyramid, .shading = n % 2 ? ISOGI_DVR_TWO_SIDED : ISOGI_DVR_LOCAL};
+        isogi_dvr *dvr = dvr_new(&desc, &surface);
+        pixel p = cast(dvr, eye, target, &lighting);
+        for (int a = 0; a < 3; a++) {
+            double expected = 0.5 * (double)peak.rgb[a] * 3 * fmax(c, 0) / PI;
+            CHECK(fabs((double)p.c[a] - expected) < 1e-5, "turned by %g, channel %d: %g, not %g", angle, a, (double)p.c[a], expected);
+        }
+        isogi_dvr_free(dvr);
+    }
+    field_free(&f);
+}
+
 /* ---- a second field ---- */
 
 TEST(a_second_field_colours_peaks) {
