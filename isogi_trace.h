@@ -6275,6 +6275,11 @@ ISOGI_API isogi_result isogi_trace_gather_field(const isogi_trace_desc *desc, is
 #undef ISOGI_TRACE__SAMPLES
 #undef ISOGI_TRACE__VERSION
 #undef ISOGI_TRACE__HEADER
+#undef ISOGI_TRACE__CARRYING
+#undef ISOGI_TRACE__PIECE
+#undef ISOGI_TRACE__PLACING
+#undef ISOGI_TRACE__POINTS
+#undef ISOGI_TRACE__WATCHED
 #endif /* ISOGI_TRACE_IMPLEMENTATION */
 
 /* ---------------------------------------------------------------------------------------------------------------------

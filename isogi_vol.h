@@ -8455,9 +8455,6 @@ ISOGI_API void isogi_vol_mesh_free(const isogi_pyramid *pyramid, isogi_mesh *mes
 #undef ISOGI_VOL__SUMS_base
 #undef ISOGI_VOL__TILE_avx512
 #undef ISOGI_VOL__TRILINEAR_BLOCK
-#undef ISOGI_VOL__TURN_avx2
-#undef ISOGI_VOL__TURN_avx512
-#undef ISOGI_VOL__TURN_base
 #undef ISOGI_VOL__WEIGHTS
 #undef ISOGI_VOL__WHOLES
 #undef ISOGI_VOL__BLEND
@@ -8523,4 +8520,21 @@ ISOGI_API void isogi_vol_mesh_free(const isogi_pyramid *pyramid, isogi_mesh *mes
 #undef ISOGI_VOL__MAX_THREADS
 #undef ISOGI_VOL__PACKET
 #undef ISOGI_VOL__REACH
+#undef ISOGI_VOL__AHEAD
+#undef ISOGI_VOL__BYTES_KEPT
+#undef ISOGI_VOL__BYTES_avx2
+#undef ISOGI_VOL__BYTES_avx512
+#undef ISOGI_VOL__FOUR_ROWS
+#undef ISOGI_VOL__RING
+#undef ISOGI_VOL__ROW_I16_avx2
+#undef ISOGI_VOL__ROW_I16_avx512
+#undef ISOGI_VOL__ROW_I8_avx2
+#undef ISOGI_VOL__ROW_I8_avx512
+#undef ISOGI_VOL__ROW_U16_avx2
+#undef ISOGI_VOL__ROW_U16_avx512
+#undef ISOGI_VOL__ROW_U8_avx2
+#undef ISOGI_VOL__ROW_U8_avx512
+#undef ISOGI_VOL__SHORTS_KEPT
+#undef ISOGI_VOL__SHORTS_avx2
+#undef ISOGI_VOL__SHORTS_avx512
 #endif /* ISOGI_VOL_IMPLEMENTATION */

@@ -358,8 +358,8 @@ TEST(unfiltered_texels_stand_alone) {
 }
 
 /* Light from probes is not exactly that at the hit: its bias against paths, measured where it matters most (a gyroid's narrow
-   channels, albedo 0.8), of three runs, which differ by 0.4 %, printed, and bounded. Long: 1364 samples, noise 0.2 %; quick: 84 samples at 60
-   points, noise 1 % of the mean and 5 % at a point. */
+   channels, albedo 0.8), of three runs, which differ by 0.8 %, printed, and bounded. Long: 1364 samples, noise 0.2 %; quick: 84 samples at
+   60 points, noise 1 % of the mean and 5 % at a point. */
 TEST(bias_against_paths_is_small) {
     double q[1] = {0.3};
     scene s = scene_make(48, 48, 48, NULL, gyroid, q);

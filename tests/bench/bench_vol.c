@@ -7,9 +7,9 @@
    (usual_rays.h) against `default`, on one ray of METHOD_STRIDE. t99: 99th percentile of the error of t in voxels. Per ray: blocks, cells
    and cubics looked at. Other rows name their error in `setting`.
    bundle64: BUNDLES bundles a call; bundle64alone: one.
-   Samples along rays: at half-voxel steps inside the volume, along the primary rays in their order, as a renderer takes them: one tile of 4x4
-   rays after the other, four tiles a call, in every 16th row of tiles (--quick: every 64th); the gap between rows does the cache no good.
-   Along far rays: 256 steps of rays 32 pixels apart, which share no memory.
+   Samples along rays: at half-voxel steps inside the volume, along the primary rays in their order, as a renderer takes them: one tile of
+   4x4 rays after the other, four tiles a call, in every 16th row of tiles (--quick: every 64th); the gap between rows does the cache no
+   good. Along far rays: 256 steps of rays 32 pixels apart, which share no memory.
    A table of goals and peers' figures for the same work is printed at the end. */
 #define ISOGI_IMPLEMENTATION
 #include "isogi_vol.h"
@@ -202,8 +202,8 @@ static void spread_points(const scene *s, int places, float (*points)[3]) {
     }
 }
 
-/* Along all primary rays in their order, those of four tiles of pixels a call; or all points in one call, of rays 32 pixels apart or anywhere.
-   Making the points takes no time. bytes: the field in 8 bits. */
+/* Along all primary rays in their order, those of four tiles of pixels a call; or all points in one call, of rays 32 pixels apart or
+   anywhere. Making the points takes no time. bytes: the field in 8 bits. */
 static void bench_samples(const scene *s, const char *name, int what, int places, int bytes) {
     const size_t most = places == ALONG_RAYS ? TILES * LONGEST : SPREAD, voxels = (size_t)N * N * N;
     const size_t calls = places == ALONG_RAYS ? RAYS / TILES : 1, row_of_tiles = 4 * WIDTH / TILES;
