@@ -101,10 +101,11 @@
    and a sky of radiance 1 from everywhere gives g_s = rgb / (4 pi) * 4 pi = rgb: colour is the albedo, and under a uniform sky of 1 a
    medium without shadows looks as it does unlit. A directional light of irradiance E gives g_s = rgb E V / (4 pi). The truncated series
    can be negative, most of all where matter hides the brightest of a sky, and black there is the worst error of a picture: light is at
-   least a quarter of what the mean radiance of the environment gives through V (with anisotropy times (1 - |g|) / (1 + |g|)^2, the least
-   that scattering does). Shadows of directional lights and lamps may be black. RMSE of sRGB values at 400 places on surfaces, orders 2,
-   3, 4, against light from 2048 directions, clamped at zero and so: engine under Uffizi's sky, rotated, .26 .144 .040 and .075 .050 .040;
-   bonsai under Grace's .115 .075 .061 and .115 .072 .046; where nothing rings below zero, the same.
+   least a quarter (order 5: an eighth, 6: nothing) of what the mean radiance of the environment gives through V (with anisotropy times
+   (1 - |g|) / (1 + |g|)^2, the least that scattering does). Shadows of directional lights and lamps may be black; a sun in an image has
+   no shadow that is: where all that is bright of a sky is hidden, light is that much too high. RMSE of sRGB values at 400 places on
+   surfaces, orders 2, 3, 4, against light from 2048 directions, clamped at zero and so: engine under Uffizi's sky, rotated, .26 .144 .040
+   and .075 .050 .040; bonsai under Grace's .115 .075 .061 and .115 .072 .046.
    Matter that is dense for the grid is lit as what is in front of it: in physical space V is looked up off = r x^2 / (x^2 + 16) nearer to
    the eye, where r is 1.5 grid distances, as they are along the ray, and x the optical depth of r in the matter of the sample.
 
@@ -4940,15 +4941,15 @@ typedef struct isogi_dvr__lights {
 } isogi_dvr__lights;
 
 /* A truncated series rings below zero where V sees dim parts of a sky that is bright elsewhere, and parts that are black would be the
-   darkest in the picture. No light is less than this share of what it would be if the environment were the same all around, and came
-   from where the phase function is least. */
-#define ISOGI_DVR__LEAST_LIGHT 0.25
+   darkest in the picture. No light is less than a share of what it would be if the environment were the same all around, and came from
+   where the phase function is least: less with higher orders, which ring less. */
+static double isogi_dvr__least_share(int order) { return order <= 4 ? 0.25 : order == 5 ? 0.125 : 0; }
 
 /* Of all distant light, which is projected, what the environment alone has. */
-static isogi_result isogi_dvr__set_least(isogi_dvr__lights *l, double anisotropy) {
+static isogi_result isogi_dvr__set_least(isogi_dvr__lights *l, int order, double anisotropy) {
     isogi_lighting directional = l->distant;
     float sh[3] = {0, 0, 0};
-    double g = fabs(anisotropy), share = ISOGI_DVR__LEAST_LIGHT * (1 - g) / ((1 + g) * (1 + g)) / (4 * ISOGI_DVR__PI);
+    double g = fabs(anisotropy), share = isogi_dvr__least_share(order) * (1 - g) / ((1 + g) * (1 + g)) / (4 * ISOGI_DVR__PI);
     isogi_result result = ISOGI_OK;
     int a;
     memset(&directional.env, 0, sizeof directional.env);
@@ -4979,7 +4980,7 @@ static isogi_result isogi_dvr__set_lights(isogi_dvr__lights *l, const isogi_dvr 
     if (nearby) l->nearby.lights = l->list + distant, l->nearby.light_count = nearby;
     if (d->desc.shading == ISOGI_DVR_VISIBILITY) {
         result = isogi_sh_project(l->sh, d->desc.order, &l->distant, NULL);
-        return result == ISOGI_OK ? isogi_dvr__set_least(l, d->desc.anisotropy) : result;
+        return result == ISOGI_OK ? isogi_dvr__set_least(l, d->desc.order, d->desc.anisotropy) : result;
     }
     memset(&environment, 0, sizeof environment);
     environment.env = lighting->env;
@@ -7677,7 +7678,6 @@ ISOGI_API isogi_result isogi_dvr_tets_render(const isogi_tets *tets, const isogi
 #undef ISOGI_DVR__SLAB
 #undef ISOGI_DVR__LANES
 #undef ISOGI_DVR__RAYS
-#undef ISOGI_DVR__LEAST_LIGHT
 #undef ISOGI_DVR__TABLE
 #undef ISOGI_DVR__BATCH
 #undef ISOGI_DVR__GAIN

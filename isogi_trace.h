@@ -148,13 +148,15 @@
                 time; request, step and relight alone, without readers.
    Determinism  The same bits for any number of threads and any budget of steps. PATHS: a texel's light depends on the description
                 and its place alone, lazily or fully, in parts (desc.box_first, isogi_trace_load), in any order of requests.
-                FEEDBACK: which probes there are depends on what was asked for and in which order: within 3 % (rms over points).
+                FEEDBACK: which probes there are depends on what was asked for and in which order: 1 to 3 % (rms over points) where light
+                is even, up to 10 % with few samples under a peaky sky or albedo near 1: about as much as light errs there.
                 Instruction paths (isogi_context.force_path) give the same hits and the same bits; but a ray that grazes the surface
                 within rounding, one in 100,000, may be seen either way: light then differs by what that one sample brings.
                 All of this is for IEEE arithmetic: with -ffast-math light is right within its errors, and no bits are promised.
    Limits       Order 6; 2^24 samples; 2^31 - 1 texels along an axis (more: ISOGI_TOO_LARGE); paths end after 10000 reflections.
                 White surfaces that enclose a light truly have infinite light: what is computed then is finite and has no meaning;
-                its error says so, and isogi_trace_report.diverges.
+                its error says so, and isogi_trace_report.diverges. Under matter (HIGH_SIDE) of albedo above .9 narrow places may err by
+                several times the error that is told.
                 Voxels of 1e-150 to 1e150 world units: squares of lengths must neither vanish nor overflow. Where matter is
                 thinner than the lattice's spacing a lookup mixes the light of both of its sides.
    Cost         PATHS: samples * (1 + lights that have a size) rays for a texel, and as many for each reflection. FEEDBACK:
@@ -275,7 +277,7 @@ typedef struct isogi_trace_desc {
                                   sensible. Not with lazy or a box; such a texture cannot be exported or saved */
     size_t box_first[3], box_end[3]; /* only texels box_first <= i < box_end: a part of the bake; all 0 = all. PATHS: in the bits of the
                                   whole. FEEDBACK: each part has probes and passes of its own, reads nothing of the others, and differs
-                                  from the whole by what probes are uncertain by: within 3 % (rms over points) */
+                                  from the whole by what probes are uncertain by: see Determinism */
 } isogi_trace_desc;
 
 typedef struct isogi_trace isogi_trace;
@@ -400,8 +402,9 @@ ISOGI_API isogi_result isogi_trace_export_scales(const isogi_trace *trace, int f
    the bits of the whole, FEEDBACK to what each box came to by itself. Only desc.isovalue_min, isovalue_max, lazy, lookup and box may
    differ; else the answer is ISOGI_INVALID (lighting, tables and the ranges of the volume's blocks are compared by hash; a material
    function cannot be). Any bytes may be loaded: those that are damaged, cut off or of another version are ISOGI_CORRUPT and change
-   nothing. ISOGI_NO_MEMORY: some of the texels are loaded. isogi_trace_load counts as a
-   writer. Hierarchical textures are not saved: their size is 0, and the calls answer ISOGI_INVALID. */
+   nothing (what is left of a block of both sides that is cut off where the first one ends is a block of that side: ISOGI_INVALID).
+   ISOGI_NO_MEMORY: some of the texels are loaded. isogi_trace_load counts as a writer. Hierarchical textures are not saved: their size is
+   0, and the calls answer ISOGI_INVALID. */
 ISOGI_API size_t isogi_trace_save_size(const isogi_trace *trace);
 ISOGI_API isogi_result isogi_trace_save(const isogi_trace *trace, void *block, size_t bytes); /* bytes: isogi_trace_save_size or more */
 ISOGI_API isogi_result isogi_trace_load(isogi_trace *trace, const void *block, size_t bytes);
@@ -3212,6 +3215,7 @@ struct isogi_trace__feedback {
     size_t open;     /* texels that want more samples than they have at the end of a level */
     uint64_t partial; /* samples of texels that are not finished, */
     uint64_t unfinished; /* of which there are so many */
+    double most; /* texels that were ever done, with the parts of those that were begun: for progress */
     double probe_part; /* of the probes at this level that are known, those whose rays are traced */
     uint64_t probes_before; /* of groups of texels that are finished */
 };
@@ -4529,7 +4533,7 @@ static double isogi_trace__filter(const isogi_trace *t, size_t node, double rgb[
         const int *d = apart[i];
         double w = q == g ? 1 : isogi_trace__filter_weight(t, g, q, d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
         if (!(w > 0)) continue;
-        around[n] = q, weight[n] = w * q->samples;
+        around[n] = q, weight[n] = w * (q->samples < 1e4 * g->samples ? q->samples : 1e4 * g->samples); /* what the fit can solve */
         for (a = 0; a < 3; a++) apart[n][a] = d[a];
         n++;
     }
@@ -4637,7 +4641,7 @@ static void isogi_trace__group_free(isogi_trace *t) {
     isogi_trace__set_free(t, &f->texels);
     isogi_trace__set_free(t, &f->probes);
     f->cursor = f->probe_cursor = f->probe_end = f->probe_counted = f->placed = f->carried = f->span_count = 0;
-    f->phase = ISOGI_TRACE__AT_REST, f->unpublished = f->making = f->level = 0, f->partial = f->unfinished = 0, f->probe_part = 0;
+    f->phase = ISOGI_TRACE__AT_REST, f->unpublished = f->making = f->level = 0, f->partial = f->unfinished = 0, f->probe_part = f->most = 0;
 }
 
 /* ---- carrying the light over ---- */
@@ -4734,14 +4738,17 @@ static double isogi_trace__carried(const isogi_trace__feedback *f) {
     }
 }
 
-/* Work that is done for texels that are not finished, in texels. */
+/* Work that is done for texels that are not finished, in texels. What was begun stays so: levels begin anew where a request brings more
+   texels, which the others have behind them. */
 static double isogi_trace__begun(const isogi_trace *t) {
-    const isogi_trace__feedback *f = t->feedback;
-    double all = ISOGI_TRACE__PLACING + t->scene.desc.samples, placed;
+    isogi_trace__feedback *f = t->feedback;
+    double all = ISOGI_TRACE__PLACING + t->scene.desc.samples, placed, begun;
     int level;
     for (level = 0; isogi_trace__block(t, level) < (uint32_t)t->scene.desc.samples; level++) all += ISOGI_TRACE__CARRYING;
     placed = f->texels.count ? ISOGI_TRACE__PLACING * (double)f->placed / (double)f->texels.count : 0;
-    return ((double)f->partial + (double)f->unfinished * (placed + ISOGI_TRACE__CARRYING * (f->level + isogi_trace__carried(f)))) / all;
+    begun = ((double)f->partial + (double)f->unfinished * (placed + ISOGI_TRACE__CARRYING * (f->level + isogi_trace__carried(f)))) / all;
+    if (f->most < (double)t->done + begun) f->most = (double)t->done + begun;
+    return f->most - (double)t->done;
 }
 
 /* What the context's progress is told: 0 to 1 for all that this texture was asked for, as a part of what is baked with it. */
@@ -5845,7 +5852,7 @@ static void isogi_trace__change_commit(isogi_trace__change *c) {
     isogi_release(&t->context, t->queue, t->queue_capacity, sizeof *t->queue);
     t->queue = c->queue, t->queue_capacity = c->capacity, t->queue_first = 0, t->queue_count = count;
     t->refined = 0, t->refine_next = 0, t->least = 1;
-    if (t->feedback) isogi_trace__making_anew(t->feedback, count);
+    if (t->feedback) isogi_trace__making_anew(t->feedback, count), t->feedback->most = 0;
     if (!c->desc) return;
     isogi_trace__sky_free(&c->scene.sky, &t->context);
     t->lighting_hash = c->lighting_hash, t->colours_hash = c->colours_hash;
