@@ -258,7 +258,7 @@ typedef struct isogi_trace_desc {
                                   open texel gets, averaged over all orientations, or once more samples would hardly lower it: light
                                   from probes is itself uncertain by 2 %; 0 = every texel gets all its samples */
     int unfiltered;            /* non-zero: FEEDBACK averages no light over neighbouring texels, to see what that is worth: the same error
-                                  takes two to eight times the samples (make bench, rows filter-) */
+                                  takes four to ten times the samples, where they are few (make bench, rows filter-) */
     uint64_t seed;
     float offset;              /* rays start this many voxels along the normal, up to 1 (a wall may be that thin); 0 = 0.25;
                                   negative = on the surface */

@@ -242,7 +242,7 @@ TEST(probes_do_not_breed) {
 }
 
 /* The light of bright spots in an image is averaged over neighbours as that of the other sky is: on the sides of a pit, with 4 samples,
-   half of the error that paths of 4 samples have, of four runs (a filter of the nearest 27 texels: .54; none: .69). */
+   half of the error that paths of 4 samples have, of four runs. */
 TEST(bright_spots_of_the_sky_are_filtered) {
     enum { WIDTH = 64, HEIGHT = 32, RUNS = 4 };
     static float image[HEIGHT][WIDTH][3], points[200][3], e[200][3], reference[200][3];
