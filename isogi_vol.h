@@ -2331,13 +2331,17 @@ static void isogi_vol__fetch(const isogi_volume *v, int n, const isogi_vol__bloc
 
 /* ---- cubic filters ---- */
 
+/* x, read as if it had no sign, is (x ^ flip) - flip. */
+static int32_t isogi_vol__flip_of(isogi_type type) { return type == ISOGI_I8 ? 0x80 : type == ISOGI_I16 ? 0x8000 : 0; }
+
 /* Taps of points as floats: point n's begin offset[n] bytes from `first`, rows and slices follow at y and z; powers: of the filter, and
-   {1, 0, 0, 0}. */
+   {1, 0, 0, 0}. flip: see above. */
 typedef struct isogi_vol__taps_at {
     const char *first;
     const ptrdiff_t *offset;
     ptrdiff_t y, z;
     float powers[5][4];
+    int32_t flip;
 } isogi_vol__taps_at;
 
 /* The first tap of a point. */
@@ -2454,10 +2458,10 @@ ISOGI_VOL__CUBIC(base, , __m128, _mm_, 4, f32, ISOGI_VOL__ROW_base)
 #define ISOGI_VOL__ROW_avx2(r) _mm256_set_m128(ISOGI_VOL__F32_base(at1 + (r)), ISOGI_VOL__F32_base(at0 + (r)))
 #define ISOGI_VOL__BYTES_avx2(r) _mm_unpacklo_epi32(isogi_vol__four_bytes(at0 + (r)), isogi_vol__four_bytes(at1 + (r)))
 #define ISOGI_VOL__SHORTS_avx2(r) _mm_unpacklo_epi64(ISOGI_VOL__EIGHT(at0 + (r)), ISOGI_VOL__EIGHT(at1 + (r)))
-#define ISOGI_VOL__ROW_U8_avx2(r) _mm256_cvtepi32_ps(_mm256_cvtepu8_epi32(ISOGI_VOL__BYTES_avx2(r)))
-#define ISOGI_VOL__ROW_I8_avx2(r) _mm256_cvtepi32_ps(_mm256_cvtepi8_epi32(ISOGI_VOL__BYTES_avx2(r)))
-#define ISOGI_VOL__ROW_U16_avx2(r) _mm256_cvtepi32_ps(_mm256_cvtepu16_epi32(ISOGI_VOL__SHORTS_avx2(r)))
-#define ISOGI_VOL__ROW_I16_avx2(r) _mm256_cvtepi32_ps(_mm256_cvtepi16_epi32(ISOGI_VOL__SHORTS_avx2(r)))
+#define ISOGI_VOL__FLIPPED_avx2(x) \
+    _mm256_cvtepi32_ps(_mm256_sub_epi32(_mm256_xor_si256(x, _mm256_set1_epi32(taps->flip)), _mm256_set1_epi32(taps->flip)))
+#define ISOGI_VOL__ROW_BYTES_avx2(r) ISOGI_VOL__FLIPPED_avx2(_mm256_cvtepu8_epi32(ISOGI_VOL__BYTES_avx2(r)))
+#define ISOGI_VOL__ROW_SHORTS_avx2(r) ISOGI_VOL__FLIPPED_avx2(_mm256_cvtepu16_epi32(ISOGI_VOL__SHORTS_avx2(r)))
 #define ISOGI_VOL__U8_avx2(p) _mm_cvtepi32_ps(_mm_cvtepu8_epi32(isogi_vol__four_bytes(p)))
 #define ISOGI_VOL__I8_avx2(p) _mm_cvtepi32_ps(_mm_cvtepi8_epi32(isogi_vol__four_bytes(p)))
 #define ISOGI_VOL__U16_avx2(p) _mm_cvtepi32_ps(_mm_cvtepu16_epi32(ISOGI_VOL__EIGHT(p)))
@@ -2467,10 +2471,8 @@ ISOGI_VOL__TRILINEAR(avx2, ISOGI_VOL__AVX2, __m256, _mm256_)
 ISOGI_VOL__TRILINEAR_BLOCK(avx2, ISOGI_VOL__AVX2, __m256, _mm256_, 8)
 ISOGI_VOL__WIDEN(avx2, ISOGI_VOL__AVX2, _mm_)
 ISOGI_VOL__CUBIC(avx2, ISOGI_VOL__AVX2, __m256, _mm256_, 8, f32, ISOGI_VOL__ROW_avx2)
-ISOGI_VOL__CUBIC(avx2, ISOGI_VOL__AVX2, __m256, _mm256_, 8, u8, ISOGI_VOL__ROW_U8_avx2)
-ISOGI_VOL__CUBIC(avx2, ISOGI_VOL__AVX2, __m256, _mm256_, 8, i8, ISOGI_VOL__ROW_I8_avx2)
-ISOGI_VOL__CUBIC(avx2, ISOGI_VOL__AVX2, __m256, _mm256_, 8, u16, ISOGI_VOL__ROW_U16_avx2)
-ISOGI_VOL__CUBIC(avx2, ISOGI_VOL__AVX2, __m256, _mm256_, 8, i16, ISOGI_VOL__ROW_I16_avx2)
+ISOGI_VOL__CUBIC(avx2, ISOGI_VOL__AVX2, __m256, _mm256_, 8, bytes, ISOGI_VOL__ROW_BYTES_avx2)
+ISOGI_VOL__CUBIC(avx2, ISOGI_VOL__AVX2, __m256, _mm256_, 8, shorts, ISOGI_VOL__ROW_SHORTS_avx2)
 
 /* Corners of eight points in a row of voxels that follow each other, and their neighbours along x. Two neighbours are one load: gathers are
    slower on many processors. */
@@ -2591,15 +2593,13 @@ ISOGI_VOL__INLINE int64_t isogi_vol__eight_bytes_of(const char *p) {
 #define ISOGI_VOL__BYTES_avx512(r) ISOGI_VOL__FOUR_ROWS(ISOGI_VOL__BYTES_KEPT, isogi_vol__four_bytes(at0 + (r)), 2, 4, 8, r)
 #define ISOGI_VOL__SHORTS_avx512(r)                                                                                              \
     ISOGI_VOL__FOUR_ROWS(ISOGI_VOL__SHORTS_KEPT, _mm256_castsi128_si256(ISOGI_VOL__EIGHT(at0 + (r))), 2, 4, 8, r)
-#define ISOGI_VOL__ROW_U8_avx512(r) _mm512_cvtepi32_ps(_mm512_cvtepu8_epi32(ISOGI_VOL__BYTES_avx512(r)))
-#define ISOGI_VOL__ROW_I8_avx512(r) _mm512_cvtepi32_ps(_mm512_cvtepi8_epi32(ISOGI_VOL__BYTES_avx512(r)))
-#define ISOGI_VOL__ROW_U16_avx512(r) _mm512_cvtepi32_ps(_mm512_cvtepu16_epi32(ISOGI_VOL__SHORTS_avx512(r)))
-#define ISOGI_VOL__ROW_I16_avx512(r) _mm512_cvtepi32_ps(_mm512_cvtepi16_epi32(ISOGI_VOL__SHORTS_avx512(r)))
+#define ISOGI_VOL__FLIPPED_avx512(x) \
+    _mm512_cvtepi32_ps(_mm512_sub_epi32(_mm512_xor_si512(x, _mm512_set1_epi32(taps->flip)), _mm512_set1_epi32(taps->flip)))
+#define ISOGI_VOL__ROW_BYTES_avx512(r) ISOGI_VOL__FLIPPED_avx512(_mm512_cvtepu8_epi32(ISOGI_VOL__BYTES_avx512(r)))
+#define ISOGI_VOL__ROW_SHORTS_avx512(r) ISOGI_VOL__FLIPPED_avx512(_mm512_cvtepu16_epi32(ISOGI_VOL__SHORTS_avx512(r)))
 ISOGI_VOL__CUBIC(avx512, ISOGI_VOL__AVX512, __m512, _mm512_, 16, f32, ISOGI_VOL__ROW_avx512)
-ISOGI_VOL__CUBIC(avx512, ISOGI_VOL__AVX512, __m512, _mm512_, 16, u8, ISOGI_VOL__ROW_U8_avx512)
-ISOGI_VOL__CUBIC(avx512, ISOGI_VOL__AVX512, __m512, _mm512_, 16, i8, ISOGI_VOL__ROW_I8_avx512)
-ISOGI_VOL__CUBIC(avx512, ISOGI_VOL__AVX512, __m512, _mm512_, 16, u16, ISOGI_VOL__ROW_U16_avx512)
-ISOGI_VOL__CUBIC(avx512, ISOGI_VOL__AVX512, __m512, _mm512_, 16, i16, ISOGI_VOL__ROW_I16_avx512)
+ISOGI_VOL__CUBIC(avx512, ISOGI_VOL__AVX512, __m512, _mm512_, 16, bytes, ISOGI_VOL__ROW_BYTES_avx512)
+ISOGI_VOL__CUBIC(avx512, ISOGI_VOL__AVX512, __m512, _mm512_, 16, shorts, ISOGI_VOL__ROW_SHORTS_avx512)
 
 /* ---- trilinear values and gradients in sixteens ----
 
@@ -2625,6 +2625,7 @@ typedef struct isogi_vol__sampling {
     int32_t stride[3], reach;                                           /* in voxels; that of all axes together */
     float slope[3];                                                     /* gradients of raw voxels per grid unit times this are right */
     double scale, bias;
+    int32_t flip; /* of integers */
     int identity; /* scale and bias change nothing */
 } isogi_vol__sampling;
 
@@ -2718,8 +2719,9 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE void isogi_vol__float_corners(const char *co
 #undef ISOGI_VOL__PART
 }
 
-ISOGI_VOL__AVX512 ISOGI_VOL__INLINE void isogi_vol__short_corners(const char *const rows[4], const int32_t voxel[16], int is_signed,
+ISOGI_VOL__AVX512 ISOGI_VOL__INLINE void isogi_vol__short_corners(const char *const rows[4], const int32_t voxel[16], int32_t flip,
                                                                   __m512 out[8]) {
+    const __m512i sign = _mm512_set1_epi32(flip);
     __m128i a0, a1, a2, a3, b0, b1, b2, b3, c0, c1, c2, c3, d0, d1, d2, d3;
     ptrdiff_t q;
     ISOGI_VOL__FOUR(SHORTS, a, 2, 0, 1, 2, 3);
@@ -2729,9 +2731,9 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE void isogi_vol__short_corners(const char *co
 #define ISOGI_VOL__PART(r) \
     do { \
         const __m512i all = _mm512_inserti64x4(_mm512_castsi256_si512(_mm256_set_m128i(b##r, a##r)), _mm256_set_m128i(d##r, c##r), 1); \
-        const __m512i first = _mm512_slli_epi32(all, 16); \
-        out[2 * r] = _mm512_cvtepi32_ps(is_signed ? _mm512_srai_epi32(first, 16) : _mm512_srli_epi32(first, 16)); \
-        out[2 * r + 1] = _mm512_cvtepi32_ps(is_signed ? _mm512_srai_epi32(all, 16) : _mm512_srli_epi32(all, 16)); \
+        const __m512i first = _mm512_and_si512(all, _mm512_set1_epi32(0xffff)), second = _mm512_srli_epi32(all, 16); \
+        out[2 * r] = _mm512_cvtepi32_ps(_mm512_sub_epi32(_mm512_xor_si512(first, sign), sign)); \
+        out[2 * r + 1] = _mm512_cvtepi32_ps(_mm512_sub_epi32(_mm512_xor_si512(second, sign), sign)); \
     } while (0)
     ISOGI_VOL__PART(0);
     ISOGI_VOL__PART(1);
@@ -2757,13 +2759,14 @@ ISOGI_VOL__INLINE void isogi_vol__gather_bytes(const char *const rows[4], isogi_
     }
 }
 
-ISOGI_VOL__AVX512 ISOGI_VOL__INLINE void isogi_vol__byte_corners(const isogi_vol__sixteen *at, int is_signed, __m512 out[8]) {
+ISOGI_VOL__AVX512 ISOGI_VOL__INLINE void isogi_vol__byte_corners(const isogi_vol__sixteen *at, int32_t flip, __m512 out[8]) {
     const __m512i low = _mm512_load_si512(&at->bytes[0]), high = _mm512_load_si512(&at->bytes[8]), one = _mm512_set1_epi32(1 << 24);
+    const __m512i sign = _mm512_set1_epi32(flip);
     __m512i from = _mm512_slli_epi32(_mm512_setr_epi32(0, 8, 16, 24, 32, 40, 48, 56, 64, 72, 80, 88, 96, 104, 112, 120), 24);
     int k;
     for (k = 0; k < 8; k++, from = _mm512_add_epi32(from, one)) { /* to the upper end of 32 bits */
         const __m512i x = _mm512_maskz_permutex2var_epi8(0x8888888888888888u, low, from, high);
-        out[k] = _mm512_cvtepi32_ps(is_signed ? _mm512_srai_epi32(x, 24) : _mm512_srli_epi32(x, 24));
+        out[k] = _mm512_cvtepi32_ps(_mm512_sub_epi32(_mm512_xor_si512(_mm512_srli_epi32(x, 24), sign), sign));
     }
 }
 
@@ -2800,12 +2803,10 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE void isogi_vol__gradients16(const isogi_vol_
 #undef ISOGI_VOL__THIRD
 }
 
-ISOGI_VOL__AVX512 ISOGI_VOL__INLINE void isogi_vol__trilinear16(const isogi_vol__sampling *s, isogi_type type) {
+ISOGI_VOL__AVX512 ISOGI_VOL__INLINE void isogi_vol__trilinear16(const isogi_vol__sampling *s, ptrdiff_t size) {
     isogi_vol__sixteen ring[ISOGI_VOL__RING];
     const char *const rows[4] = {s->rows[0], s->rows[1], s->rows[2], s->rows[3]};
-    const ptrdiff_t size = type == ISOGI_F32 ? 4 : type <= ISOGI_I8 ? 1 : 2;
     const size_t sixteens = s->count / 16 + (s->count % 16 > 0);
-    const int bytes = type <= ISOGI_I8, is_signed = type == ISOGI_I8 || type == ISOGI_I16;
     size_t next, i;
     for (next = 0; next < sixteens + ISOGI_VOL__AHEAD; next++) {
         const isogi_vol__sixteen *now;
@@ -2814,12 +2815,12 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE void isogi_vol__trilinear16(const isogi_vol_
         if (next < sixteens) isogi_vol__locate16(s, next, &ring[next % ISOGI_VOL__RING]);
         if (next && next < sixteens) isogi_vol__ask_for_sixteen(rows, size, &ring[(next - 1) % ISOGI_VOL__RING]);
         i = next - ISOGI_VOL__AHEAD; /* wraps: the ring is a power of two */
-        if (bytes && i + 1 < sixteens) isogi_vol__gather_bytes(rows, &ring[(i + 1) % ISOGI_VOL__RING]);
+        if (size == 1 && i + 1 < sixteens) isogi_vol__gather_bytes(rows, &ring[(i + 1) % ISOGI_VOL__RING]);
         if (next < ISOGI_VOL__AHEAD) continue;
         now = &ring[i % ISOGI_VOL__RING];
-        if (bytes) isogi_vol__byte_corners(now, is_signed, c);
-        else if (type == ISOGI_F32) isogi_vol__float_corners(rows, now->voxel, c);
-        else isogi_vol__short_corners(rows, now->voxel, is_signed, c);
+        if (size == 1) isogi_vol__byte_corners(now, s->flip, c);
+        else if (size == 2) isogi_vol__short_corners(rows, now->voxel, s->flip, c);
+        else isogi_vol__float_corners(rows, now->voxel, c);
         at0 = _mm512_load_ps(now->local[0]), at1 = _mm512_load_ps(now->local[1]), at2 = _mm512_load_ps(now->local[2]);
         rest0 = _mm512_sub_ps(one, at0), rest1 = _mm512_sub_ps(one, at1), rest2 = _mm512_sub_ps(one, at2);
 #define ISOGI_VOL__MIX(axis, a, b) ISOGI_VOL__BLEND(avx512, _mm512_, a, b, axis)
@@ -2855,7 +2856,8 @@ ISOGI_VOL__AVX512 static int isogi_vol__sample16(const isogi_pyramid *p, const f
     if (!g->usable || v->size[0] < 2 || v->stride[0] != (ptrdiff_t)isogi_vol__type_size(v->type)) return 0;
     s.rows[0] = (const char *)v->data, s.rows[1] = s.rows[0] + dy, s.rows[2] = s.rows[0] + dz, s.rows[3] = s.rows[1] + dz;
     s.points = (const float *)world, s.count = count, s.values = values, s.gradients = (float *)gradients, s.reach = 0;
-    s.scale = v->scale, s.bias = v->bias, s.identity = v->scale >= 1 && v->scale <= 1 && v->bias >= 0 && v->bias <= 0;
+    s.flip = isogi_vol__flip_of(v->type), s.scale = v->scale, s.bias = v->bias;
+    s.identity = v->scale >= 1 && v->scale <= 1 && v->bias >= 0 && v->bias <= 0;
     for (a = 0; a < 3; a++) {
         const double slope = v->scale * p->to_grid[4 * a];
         if (gradients && !(fabs(slope) > 1e-30 && fabs(slope) < 1e30)) return 0;
@@ -2864,11 +2866,11 @@ ISOGI_VOL__AVX512 static int isogi_vol__sample16(const isogi_pyramid *p, const f
         s.stride[a] = g->stride[a], s.reach += abs(g->stride[a]);
     }
     switch (v->type) {
-    case ISOGI_U8: isogi_vol__trilinear16(&s, ISOGI_U8); break;
-    case ISOGI_I8: isogi_vol__trilinear16(&s, ISOGI_I8); break;
-    case ISOGI_U16: isogi_vol__trilinear16(&s, ISOGI_U16); break;
-    case ISOGI_I16: isogi_vol__trilinear16(&s, ISOGI_I16); break;
-    case ISOGI_F32: isogi_vol__trilinear16(&s, ISOGI_F32); break;
+    case ISOGI_U8:
+    case ISOGI_I8: isogi_vol__trilinear16(&s, 1); break;
+    case ISOGI_U16:
+    case ISOGI_I16: isogi_vol__trilinear16(&s, 2); break;
+    case ISOGI_F32: isogi_vol__trilinear16(&s, 4); break;
     case ISOGI_F64: return 0;
     }
     return 1;
@@ -2943,10 +2945,10 @@ static void isogi_vol__cubic_points(const isogi_pyramid *p, isogi_type type, con
     return
     if (p->path >= ISOGI_VOL__PATH_AVX2) {
         switch (type) {
-        case ISOGI_U8: ISOGI_VOL__PATHS(u8);
-        case ISOGI_I8: ISOGI_VOL__PATHS(i8);
-        case ISOGI_U16: ISOGI_VOL__PATHS(u16);
-        case ISOGI_I16: ISOGI_VOL__PATHS(i16);
+        case ISOGI_U8:
+        case ISOGI_I8: ISOGI_VOL__PATHS(bytes);
+        case ISOGI_U16:
+        case ISOGI_I16: ISOGI_VOL__PATHS(shorts);
         case ISOGI_F32: ISOGI_VOL__PATHS(f32);
         case ISOGI_F64: break;
         }
@@ -3024,7 +3026,7 @@ static void isogi_vol__cubic_block(const isogi_pyramid *p, isogi_filter filter, 
     int i, k, a, apart = b->next && isogi_vol__far_apart(b->next);
     memset(&taps, 0, sizeof taps);
     for (i = 0; i < 16; i++) taps.powers[i / 4][i % 4] = (float)c[i / 4][i % 4], offset[i] = i * 64 * (ptrdiff_t)sizeof *some;
-    taps.powers[4][0] = 1;
+    taps.powers[4][0] = 1, taps.flip = isogi_vol__flip_of(v->type);
     isogi_vol__inner_cells(p, low, high);
     for (i = 0; i < n; i += 16) {
         const int end = i + 16 < n ? i + 16 : n, whole = (end + 3) & ~3;
@@ -8526,14 +8528,12 @@ ISOGI_API void isogi_vol_mesh_free(const isogi_pyramid *pyramid, isogi_mesh *mes
 #undef ISOGI_VOL__BYTES_avx512
 #undef ISOGI_VOL__FOUR_ROWS
 #undef ISOGI_VOL__RING
-#undef ISOGI_VOL__ROW_I16_avx2
-#undef ISOGI_VOL__ROW_I16_avx512
-#undef ISOGI_VOL__ROW_I8_avx2
-#undef ISOGI_VOL__ROW_I8_avx512
-#undef ISOGI_VOL__ROW_U16_avx2
-#undef ISOGI_VOL__ROW_U16_avx512
-#undef ISOGI_VOL__ROW_U8_avx2
-#undef ISOGI_VOL__ROW_U8_avx512
+#undef ISOGI_VOL__ROW_BYTES_avx2
+#undef ISOGI_VOL__ROW_BYTES_avx512
+#undef ISOGI_VOL__ROW_SHORTS_avx2
+#undef ISOGI_VOL__ROW_SHORTS_avx512
+#undef ISOGI_VOL__FLIPPED_avx2
+#undef ISOGI_VOL__FLIPPED_avx512
 #undef ISOGI_VOL__SHORTS_KEPT
 #undef ISOGI_VOL__SHORTS_avx2
 #undef ISOGI_VOL__SHORTS_avx512
