@@ -239,7 +239,7 @@ static void bench_samples(const scene *s, const char *name, int what, int places
         if (run >= 0) seconds[run] = used;
     }
     if (places == ALONG_RAYS)
-        snprintf(setting, sizeof setting, "%serror: largest of value; 1024x1024 rays in every %zuth row of tiles, %d a call",
+        snprintf(setting, sizeof setting, "%serror: largest of value; 1024x1024 rays in every %zuth row of tiles; %d a call",
                  samplings[what], every, TILES);
     else snprintf(setting, sizeof setting, "%serror: largest of value", samplings[what]);
     row(name, NULL, "default", setting, median(seconds, runs), worst, work, "samples");
