@@ -324,8 +324,8 @@ TEST(zero_is_the_default_that_is_stated) {
 
 enum { ALONG = 4 }; /* points of the grid along each axis */
 
-/* The mean of V at a place of the box, of the eight points around, each by its trilinear weight times min(1, 5 m)^2. */
-static double weighed_visibility(double m[ALONG][ALONG][ALONG], const double place[3], const double size[3]) {
+/* The mean of V at a place of the box, of the eight points around, each by its trilinear weight times 1 + w (min(1, 5 m)^2 - 1). */
+static double weighed_visibility(double m[ALONG][ALONG][ALONG], const double place[3], const double size[3], double by) {
     double sum = 0, total = 0, u[3];
     int cell[3];
     for (int a = 0; a < 3; a++) {
@@ -334,14 +334,14 @@ static double weighed_visibility(double m[ALONG][ALONG][ALONG], const double pla
     }
     for (int k = 0; k < 8; k++) {
         double mean = m[cell[2] + (k >> 2)][cell[1] + (k >> 1 & 1)][cell[0] + (k & 1)], open = fmin(1, 5 * fmax(mean, 0.005));
-        double w = (k & 1 ? u[0] : 1 - u[0]) * (k & 2 ? u[1] : 1 - u[1]) * (k & 4 ? u[2] : 1 - u[2]) * open * open;
+        double w = (k & 1 ? u[0] : 1 - u[0]) * (k & 2 ? u[1] : 1 - u[1]) * (k & 4 ? u[2] : 1 - u[2]) * (1 + by * (open * open - 1));
         sum += w * mean, total += w;
     }
     return sum / total;
 }
 
 /* Homogeneous matter under a sky of 1: the picture is the integral along the ray of what the header says, with visibility looked up
-   r x^2 / (x^2 + 16) in front of each place. On every path, by exact rays, and by samples. */
+   r x^2 / (x^2 + 16) in front of each place, among open points the more the denser it is. On every path, by exact rays, and by samples. */
 TEST(visibility_is_looked_up_in_front_of_dense_matter_among_open_points) {
     enum { X = 17, Y = 13, Z = 15, SIDE = 4 };
     static const double size[3] = {X - 1, Y - 1, Z - 1};
@@ -392,7 +392,7 @@ TEST(visibility_is_looked_up_in_front_of_dense_matter_among_open_points) {
                 double t = from + (to - from) * pow((k + 0.5) / STEPS, 2), length = (to - from) * (2 * k + 1) / STEPS / STEPS, place[3];
                 double lost = 1 - exp(-tau * length);
                 for (int a = 0; a < 3; a++) place[a] = o[a] + fmax(t - off, from) * (double)d[a];
-                sum += clear * lost * weighed_visibility(m, place, size), clear *= 1 - lost;
+                sum += clear * lost * weighed_visibility(m, place, size, fmax(0, 2 * off / r - 1)), clear *= 1 - lost;
             }
             worst[way == 4] = fmax(worst[way == 4], fabs((double)image[i][0] - sum));
             /* exact rays look light up once in a cell */
