@@ -3991,24 +3991,43 @@ static isogi_result isogi_dvr__count_blocks(isogi_dvr *d, uint64_t max_rays, dou
     return result;
 }
 
+/* Whether data on a block's faces change, as that of a coarser block beside it does. */
+static int isogi_dvr__faces_change(const isogi_dvr__blocks *b, size_t block, const uint8_t *level) {
+    size_t at[3] = {block % b->count[0], block / b->count[0] % b->count[1], block / b->count[0] / b->count[1]}, low[3], high[3], c[3];
+    int a;
+    for (a = 0; a < 3; a++) low[a] = at[a] ? at[a] - 1 : 0, high[a] = at[a] + 1 < b->count[a] ? at[a] + 1 : at[a];
+    for (c[2] = low[2]; c[2] <= high[2]; c[2]++)
+        for (c[1] = low[1]; c[1] <= high[1]; c[1]++)
+            for (c[0] = low[0]; c[0] <= high[0]; c[0]++) {
+                size_t i = c[0] + b->count[0] * (c[1] + b->count[1] * c[2]);
+                if (level[i] == b->level[i]) continue;
+                if ((level[i] && level[i] < level[block]) || (b->level[i] && b->level[i] < level[block])) return 1;
+            }
+    return 0;
+}
+
 /* New levels for a new classification, the data packed anew, and the list of blocks whose local visibility has to follow: those with a
-   changed block within reach of a ray. */
+   block within reach of a ray whose data or classification changed, and those beside one that holds no visibility any more, as nodes on its
+   faces are their own now. */
 static isogi_result isogi_dvr__update_blocks(isogi_dvr *d) {
     isogi_dvr__blocks *b = &d->blocks;
-    uint8_t *level = (uint8_t *)isogi_allocate(&d->context, 3 * b->total, 1), *lit = level + b->total, *changed = lit + b->total;
+    uint8_t *level = (uint8_t *)isogi_allocate(&d->context, 4 * b->total, 1), *lit = level + b->total, *changed = lit + b->total;
+    uint8_t *gone = changed + b->total;
     isogi_result result = level ? ISOGI_OK : ISOGI_NO_MEMORY;
     isogi_context whole = d->context;
     size_t i;
     whole.progress = NULL;
     if (result == ISOGI_OK) result = isogi_dvr__select_levels(d, level);
     for (i = 0; result == ISOGI_OK && i < b->total; i++) {
-        changed[i] = d->changed[i] || level[i] != b->level[i];
+        changed[i] = d->changed[i] || level[i] != b->level[i] || isogi_dvr__faces_change(b, i, level);
         lit[i] = level[i] ? level[i] : isogi_dvr__any_near(b, i, b->reach, level) ? 2 : 0;
+        gone[i] = b->lit[i] && !lit[i];
     }
     for (i = 0; result == ISOGI_OK && i < b->total; i++)
-        b->stale[i] = b->stale[i] || lit[i] != b->lit[i] || isogi_dvr__any_near(b, i, b->reach > 1 ? b->reach : 1, changed);
+        b->stale[i] = b->stale[i] || lit[i] != b->lit[i] || isogi_dvr__any_near(b, i, b->reach > 1 ? b->reach : 1, changed) ||
+                      isogi_dvr__any_near(b, i, 1, gone);
     if (result == ISOGI_OK) result = isogi_dvr__lay_out(d, level, lit);
-    isogi_release(&d->context, level, 3 * b->total, 1);
+    isogi_release(&d->context, level, 4 * b->total, 1);
     for (b->packing = 1; result == ISOGI_OK && b->packing <= 16; b->packing *= 2) {
         result = isogi_parallel(&whole, b->total, isogi_dvr__pack_task, d, 0, 0);
     }

@@ -344,6 +344,128 @@ TEST(an_edit_of_the_transfer_function_recomputes_the_blocks_that_it_changes) {
     field_free(&f);
 }
 
+/* Blocks in a row: e is empty, c of one value and l of many, which absorb, m of one larger value and n of many, whose extinction an edit
+   takes away and gives back. What depends on it is seen as by a new renderer, however far it is. */
+typedef struct edited_row { const char *why, *blocks; double radius, reduction; } edited_row;
+static const edited_row edited_rows[] = {
+    {"a ray of 32 voxels sees two blocks", "llllln", 32, 1},
+    {"the budget goes to other blocks, and with it their levels", "clllnl", 16, 1600},
+    {"data on the face between two blocks are those of the coarser one", "clleen", 16, 1000},
+    {"data on the face between two blocks are those of the coarser one", "cllllm", 16, 846},
+    {"nodes between two empty blocks are those of the one that sees matter", "ceemee", 16, 1000}};
+
+TEST(an_edit_is_seen_as_far_as_anything_depends_on_it) {
+    enum { X = 97, Y = 17, PLACES = 500 };
+    static float at[PLACES][3], v[2][PLACES][4], local[2][PLACES][4], value[2][PLACES];
+    for (size_t n = 0; n < sizeof edited_rows / sizeof *edited_rows; n++) {
+        const edited_row *row = &edited_rows[n];
+        const isogi_dvr_desc desc = {.pyramid = NULL, .shading = ISOGI_DVR_VISIBILITY, .method = ISOGI_DVR_PAPER, .order = 2,
+                                     .directions = 32, .grid = {25, 3, 3}, .radius = row->radius, .reduction = row->reduction};
+        isogi_dvr_desc with = desc;
+        isogi_transfer_point p[] = {{0, {1, 0, 0}, 0},  {6, {0, 1, 0}, 0.02f}, {10, {0, 0, 1}, 0.15f}, {14, {1, 1, 0}, 0.05f},
+                                    {20, {1, 1, 1}, 0}, {24, {1, 1, 1}, 0},    {27, {1, 0, 0}, 0.1f},  {34, {0, 1, 1}, 0.4f},
+                                    {40, {0, 1, 1}, 0.003f}};
+        const isogi_transfer transfer = {p, 9, NULL, 0};
+        field f = field_new(X, Y, Y);
+        test_random r = {61 + n};
+        for (size_t i = 0; i < field_count(&f); i++) { /* faces between blocks of different kinds are empty */
+            size_t x = i % X, block = x < X - 1 ? x / 16 : X / 16 - 1;
+            char kind = row->blocks[block], before = row->blocks[x % 16 || !x ? block : block - 1];
+            int none = kind == 'e' || before == 'e' || (kind < 'm') != (before < 'm');
+            f.value[i] = none ? 22 : (kind < 'm' ? 10 : 30) + (kind == 'l' || kind == 'n' ? random_range(&r, 0, 1) + 2.5 * cos((double)(i / X % Y) * PI / 8) : 0);
+        }
+        field_build(&f), with.pyramid = f.pyramid;
+        for (int i = 0; i < PLACES; i++)
+            for (int a = 0; a < 3; a++) at[i][a] = a ? (float)random_range(&r, 0, Y - 1) : (float)(X - 1) * (float)i / (PLACES - 1);
+        isogi_dvr *dvr = dvr_new(&with, &transfer);
+        for (int edit = 0; edit < 3; edit++) {
+            double most[3] = {0, 0, 0};
+            p[6].extinction = edit % 2 ? 0 : 0.1f, p[7].extinction = edit % 2 ? 0 : 0.4f;
+            isogi_dvr *fresh = dvr_new(&with, &transfer);
+            CHECK(isogi_dvr_set_transfer(dvr, &transfer) == ISOGI_OK && isogi_dvr_step(dvr, 0, NULL) == ISOGI_OK &&
+                      isogi_dvr_step(fresh, 0, NULL) == ISOGI_OK,
+                  "step");
+            for (int k = 0; k < 2; k++) {
+                isogi_dvr_sample_visibility(k ? fresh : dvr, (const float(*)[3])at, PLACES, v[k][0]);
+                isogi_dvr_sample_blocks(k ? fresh : dvr, (const float(*)[3])at, PLACES, value[k], local[k][0]);
+            }
+            isogi_dvr_free(fresh);
+            for (int i = 0; i < 4 * PLACES; i++) {
+                most[0] = fmax(most[0], fabs((double)v[0][i / 4][i % 4] - (double)v[1][i / 4][i % 4]));
+                most[1] = fmax(most[1], fabs((double)local[0][i / 4][i % 4] - (double)local[1][i / 4][i % 4]));
+                most[2] = fmax(most[2], fabs((double)value[0][i / 4] - (double)value[1][i / 4]));
+            }
+            CHECK(!(most[0] > 0) && !(most[1] > 0) && !(most[2] > 0), "%s (%s), edit %d: visibility off by %g, local by %g, values by %g",
+                  row->why, row->blocks, edit, most[0], most[1], most[2]);
+        }
+        isogi_dvr_free(dvr);
+        field_free(&f);
+    }
+}
+
+/* Edits of one point, clip planes and steps that are broken off, in any order: what is seen at the end is what a new renderer sees, though
+   it computes only what changed. Eight layers of blocks along x, of which an edit touches two or three; levels of others change as the
+   budget goes elsewhere, and local rays of up to two blocks reach across. */
+TEST(edits_in_any_order_end_like_a_new_renderer) {
+    enum { X = 129, Y = 33, POINTS = 9, PLACES = 150 };
+    static const struct { int method, coarsest; double radius, reduction; } kind[] = {
+        {ISOGI_DVR_PAPER, 0, 6, 3}, {ISOGI_DVR_PAPER, 0, 16, 30}, {ISOGI_DVR_PAPER, 0, 24, 8}, {ISOGI_DVR_PAPER, 0, 32, 60},
+        {ISOGI_DVR_PAPER, 0, 16, 8}, {ISOGI_DVR_SWEEP, 0, 0, 0}, {ISOGI_DVR_SWEEP, 8, 0, 0}, {ISOGI_DVR_BRUTE, 0, 0, 0}};
+    static float at[PLACES][3], v[2][PLACES][4], local[2][PLACES][4], value[2][PLACES];
+    field f = field_new(X, Y, Y);
+    test_random r = {31};
+    int partial = 0;
+    for (size_t i = 0; i < field_count(&f); i++) f.value[i] = (double)(i % X) + 7 * random_range(&r, -1, 1);
+    field_build(&f);
+    for (int n = 0; n < 8; n++) {
+        const isogi_dvr_desc desc = {.pyramid = f.pyramid, .shading = ISOGI_DVR_VISIBILITY, .method = (isogi_dvr_method)kind[n].method,
+                                     .order = 2, .directions = 16, .grid = {17, 5, 5}, .coarsest = kind[n].coarsest,
+                                     .radius = kind[n].radius, .reduction = kind[n].reduction};
+        isogi_transfer_point p[POINTS];
+        const isogi_transfer transfer = {p, POINTS, NULL, 0};
+        for (int i = 0; i < POINTS; i++) p[i] = (isogi_transfer_point){16.0 * i, {1, (float)i / 8, 0.5f}, i && i < 8 ? 0.02f * (float)(i % 3) : 0.003f};
+        isogi_dvr *dvr = dvr_new(&desc, &transfer);
+        CHECK(isogi_dvr_step(dvr, 0, NULL) == ISOGI_OK, "step");
+        for (int edit = 0; edit < (LONG_SUITE ? 60 : 2); edit++) {
+            const double plane[1][4] = {{random_range(&r, -1, 1), random_range(&r, -0.5, 0.5), random_range(&r, -0.5, 0.5), 60}};
+            isogi_transfer_point *q = &p[1 + random_bits(&r) % (POINTS - 2)];
+            double most[3] = {0, 0, 0};
+            q->extinction = random_unit(&r) < 0.4 ? 0 : (float)random_range(&r, 0.005, 0.2), q->rgb[0] = (float)random_unit(&r);
+            CHECK(isogi_dvr_set_transfer(dvr, &transfer) == ISOGI_OK, "edit");
+            size_t cut = random_unit(&r) < 0.3;
+            CHECK(isogi_dvr_set_clip(dvr, plane, cut) == ISOGI_OK, "clip");
+            if (random_unit(&r) < 0.5) {
+                double remaining;
+                CHECK(isogi_dvr_step(dvr, 1 + random_bits(&r) % 9000, &remaining) == ISOGI_OK, "step");
+                partial += remaining > 0;
+                if (random_unit(&r) < 0.5) continue; /* the next edit comes before this one is done */
+            }
+            CHECK(isogi_dvr_step(dvr, 0, NULL) == ISOGI_OK, "step");
+            isogi_dvr *fresh = dvr_new(&desc, &transfer);
+            CHECK(isogi_dvr_set_clip(fresh, plane, cut) == ISOGI_OK && isogi_dvr_step(fresh, 0, NULL) == ISOGI_OK, "step");
+            for (int i = 0; i < PLACES; i++)
+                for (int a = 0; a < 3; a++) at[i][a] = (float)random_range(&r, 0, (a ? Y : X) - 1);
+            for (int k = 0; k < 2; k++) {
+                isogi_dvr_sample_visibility(k ? fresh : dvr, (const float(*)[3])at, PLACES, v[k][0]);
+                if (kind[n].method == ISOGI_DVR_PAPER)
+                    isogi_dvr_sample_blocks(k ? fresh : dvr, (const float(*)[3])at, PLACES, value[k], local[k][0]);
+            }
+            for (int i = 0; i < 4 * PLACES; i++) {
+                most[0] = fmax(most[0], fabs((double)v[0][i / 4][i % 4] - (double)v[1][i / 4][i % 4]));
+                most[1] = fmax(most[1], fabs((double)local[0][i / 4][i % 4] - (double)local[1][i / 4][i % 4]));
+                most[2] = fmax(most[2], fabs((double)value[0][i / 4] - (double)value[1][i / 4]));
+            }
+            /* the function's ends stay as they are, and so do the classes of values: then bits are the same */
+            CHECK(!(most[0] > 0) && !(most[1] > 0) && !(most[2] > 0), "kind %d, edit %d: visibility off by %g, local by %g, values by %g", n,
+                  edit, most[0], most[1], most[2]);
+            isogi_dvr_free(fresh);
+        }
+        isogi_dvr_free(dvr);
+    }
+    CHECK(partial > (LONG_SUITE ? 50 : 1), "%d steps that were broken off", partial);
+    field_free(&f);
+}
+
 /* What is cut away costs no points: the others get its levels, and light comes in through the cut. */
 TEST(clip_planes_select_levels_anew_and_let_light_in) {
     field f = field_noise(65, 5); /* 4 x 4 x 4 blocks, none of them simple */
