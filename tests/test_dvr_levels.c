@@ -62,6 +62,26 @@ TEST(blocks_of_different_steps_meet_without_a_seam) {
     field_free(&f);
 }
 
+static double lower_half(double x, double y, double z) { return (void)x, (void)y, z < 0.49; }
+
+/* The lower half is opaque within a distance of the grid. Of eight layers of 64 blocks the two at its face hold every point; the others,
+   which are empty or buried, hold every eighth. */
+TEST(blocks_that_are_buried_are_as_coarse_as_empty_ones) {
+    field f = field_of(lower_half, N);
+    const isogi_transfer_point p[] = {{0.5, {1, 1, 1}, 0}, {0.5, {1, 1, 1}, 8}};
+    const isogi_transfer transfer = {p, 2, NULL, 0};
+    isogi_dvr_desc desc = several(&f, 65, 8);
+    desc.directions = 8, desc.order = 1, desc.visibility_step = 1;
+    isogi_dvr *dvr = stepped(&desc, &transfer, NULL);
+    isogi_dvr_report report;
+    CHECK(isogi_dvr_inspect(dvr, &report) == ISOGI_OK, "inspect");
+    CHECK(report.step_count[0] == 128 && !report.step_count[1] && !report.step_count[2] && report.step_count[3] == 384,
+          "blocks that hold every 1st, 2nd, 4th, 8th point: %zu %zu %zu %zu", report.step_count[0], report.step_count[1],
+          report.step_count[2], report.step_count[3]);
+    isogi_dvr_free(dvr);
+    field_free(&f);
+}
+
 static double height(double x, double y, double z) { return (void)x, (void)y, 48 * z; }
 
 /* A slab of 8 voxels whose optical depth across is 0.65, its upper face just below a border of blocks: within it and up to two distances

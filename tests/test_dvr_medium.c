@@ -228,6 +228,89 @@ TEST(a_sky_that_glares_behind_matter_does_not_blacken_what_it_lights_from_in_fro
     field_free(&f);
 }
 
+/* A medium too thin for shadows under a sky of 1 + k cos, along whose dark side the eye looks: degree 1 of what is scattered is g k, so that
+   the series is 1 + g k, and where that is less than the least that the header states, light is that least. */
+TEST(the_least_light_of_a_sky_is_as_stated_for_all_orders_and_phase_functions) {
+    field f = field_of(even, 12);
+    const isogi_transfer_point point = {0, {1, 1, 1}, 1e-5f};
+    const isogi_transfer transfer = {&point, 1, NULL, 0};
+    const double eye[3] = {5, 6, -40}, target[3] = {5, 6, 6}, g[] = {0.05, 0.3, 0.6, 0.9, -0.05, -0.3, -0.6, -0.9},
+                 share[] = {0, 0, 0.25, 0.25, 0.25, 0.125, 0};
+    for (int order = 2; order <= 6; order++)
+        for (int n = 0; n < 8; n++) {
+            const isogi_dvr_desc desc = {
+                .pyramid = f.pyramid, .shading = ISOGI_DVR_VISIBILITY, .anisotropy = g[n], .order = order, .grid = {2, 2, 2}};
+            isogi_dvr *dvr = dvr_new(&desc, &transfer);
+            for (int dark = 0; dark < 2; dark++) {
+                const double k = (g[n] > 0 ? -1 : 1) * (dark ? 60 : 0.2), size = fabs(g[n]);
+                float sh[12] = {0}, c[4];
+                for (int a = 0; a < 3; a++) sh[a] = (float)sqrt(4 * PI), sh[6 + a] = (float)(k * sqrt(4 * PI / 3)); /* degree 1 along z */
+                const isogi_lighting lighting = {.env = {.sh = sh, .sh_order = 2}};
+                const double expected = fmax(1 + g[n] * k, share[order] * (1 - size) / ((1 + size) * (1 + size)));
+                colour_of(dvr, eye, target, &lighting, c, NULL);
+                CHECK(fabs((double)(c[0] / c[3]) - expected) < 1e-4, "order %d, g %g, k %g: light %g, not %g", order, g[n], k,
+                      (double)(c[0] / c[3]), expected);
+            }
+            isogi_dvr_free(dvr);
+        }
+    field_free(&f);
+}
+
+/* Saw teeth, rising to a step or falling from one: what lies just below a step counts to its lower side, and a linear field passes teeth of
+   half their height on average, however few classes of values there are to each. */
+TEST(teeth_of_a_transfer_function_keep_their_opacity) {
+    enum { TEETH = 600 };
+    static isogi_transfer_point p[2 * TEETH];
+    field f = field_of(along_x, 49);
+    const isogi_transfer transfer = {p, 2 * TEETH, NULL, 0};
+    const double eye[3] = {-30, 20.3, 20.6}, target[3] = {50, 20.3, 20.6};
+    for (int falling = 0; falling < 2; falling++)
+        for (int path = 1; path <= 4; path++) {
+            const isogi_context context = {.threads = 1, .force_path = path};
+            const isogi_dvr_desc desc = {.pyramid = f.pyramid, .opaque = 1};
+            for (int i = 0; i < 2 * TEETH; i++)
+                p[i] = (isogi_transfer_point){48.0 / TEETH * ((i + 1) / 2), {1, 1, 1}, i % 2 != falling ? 0.04f : 0};
+            isogi_dvr *dvr = dvr_new_with(&desc, &transfer, &context);
+            float c[4];
+            colour_of(dvr, eye, target, NULL, c, NULL);
+            double depth = -log1p(-(double)c[3]);
+            CHECK(fabs(depth - 0.96) < 2e-3, "%s, path %d: depth %g, not 0.96", falling ? "falling" : "rising", path, depth);
+            isogi_dvr_free(dvr);
+        }
+    field_free(&f);
+}
+
+/* Light falls off into a medium that is lit from where the eye is. Of a piece of optical depth 2 the front is seen most, and light is looked
+   up there: within a tenth of what small steps give, of which light from the middle of pieces is less than two thirds. */
+TEST(light_is_that_of_where_a_long_piece_is_seen) {
+    enum { SIDE = 65 };
+    static float data[SIDE * SIDE * SIDE]; /* floats: the vectors of every path read these */
+    const isogi_volume volume = {.data = data, .type = ISOGI_F32, .size = {SIDE, SIDE, SIDE}};
+    isogi_pyramid *pyramid = NULL;
+    const isogi_transfer_point point = {0, {1, 1, 1}, 0.25f};
+    const isogi_transfer transfer = {&point, 1, NULL, 0};
+    const isogi_light lamp = {.vector = {-1, 0, 0}, .rgb = {10, 10, 10}};
+    const isogi_lighting lighting = {.lights = &lamp, .light_count = 1};
+    const isogi_view view = {.width = 8, .height = 8, .eye = {-90, 32, 32}, .target = {50, 32, 32}, .fov = 5};
+    for (int i = 0; i < SIDE * SIDE * SIDE; i++) data[i] = 2;
+    CHECK(isogi_vol_build(&pyramid, &volume, &serial) == ISOGI_OK, "build");
+    for (int path = 1; path <= 4; path++) {
+        const isogi_context context = {.threads = 1, .force_path = path};
+        double light[2] = {0, 0};
+        for (int n = 0; n < 2; n++) {
+            const isogi_dvr_desc desc = {.pyramid = pyramid, .shading = ISOGI_DVR_VISIBILITY, .order = 3, .directions = 32, .opaque = 1,
+                                         .grid = {33, 5, 5}, .step = n ? 8 : 0.2, .visibility_step = 2};
+            isogi_dvr *dvr = dvr_new_with(&desc, &transfer, &context);
+            CHECK(isogi_dvr_step(dvr, 0, NULL) == ISOGI_OK, "step");
+            float(*image)[4] = picture(dvr, &view, &lighting, NULL, NULL);
+            for (int i = 0; i < 64; i++) light[n] += (double)image[i][0];
+            free(image), isogi_dvr_free(dvr);
+        }
+        CHECK(light[1] > 0.9 * light[0] && light[1] < 1.1 * light[0], "path %d: %g of what small steps give", path, light[1] / light[0]);
+    }
+    isogi_vol_free(pyramid);
+}
+
 /* ---- depth ---- */
 
 /* Matter from x = 16 to 40: opacity begins at the face, half of it is reached ln 2 further or so. */
@@ -320,6 +403,36 @@ TEST(jitter_is_off_by_default_repeats_itself_and_is_right_on_average) {
         CHECK(error[1] < (LONG_SUITE ? 0.35 : 0.5) * error[0] && error[0] > 0.002, "space %d: RMSE %g of the mean, %g without jitter",
               space, error[1], error[0]);
         free(fine), free(plain);
+    }
+    field_free(&f);
+}
+
+/* All pixels look along the same ray, at shells thinner than a step: shifts that are independent of each other make differences between
+   neighbours twice as large, squared, as between a pixel and their mean. */
+TEST(jitter_is_a_pixels_own) {
+    enum { SIDE = 32 };
+    field f = field_of(along_x, 49);
+    const isogi_transfer_point p[] = {{10, {1, 1, 1}, 0}, {11, {1, 1, 1}, 0.2f}, {12, {1, 1, 1}, 0}, {30, {1, 1, 1}, 0}, {33, {1, 1, 1}, 0.1f}};
+    const isogi_transfer transfer = {p, 5, NULL, 0};
+    const isogi_view view = {.width = SIDE, .height = SIDE, .eye = {-30, 20, 21}, .target = {50, 20, 21}, .fov = 0.001f};
+    for (uint32_t seed = 0; seed < 8; seed++) {
+        const isogi_dvr_desc desc = {.pyramid = f.pyramid, .classification = ISOGI_DVR_POST_CLASSIFIED, .step = 5, .opaque = 1,
+                                     .jitter = seed};
+        isogi_dvr *dvr = dvr_new(&desc, &transfer);
+        float(*image)[4] = picture(dvr, &view, NULL, NULL, NULL);
+        double mean = 0, square = 0, across = 0, down = 0;
+        for (int i = 0; i < SIDE * SIDE; i++) mean += (double)image[i][3] / (SIDE * SIDE);
+        for (int i = 0; i < SIDE * SIDE; i++) {
+            square += pow((double)image[i][3] - mean, 2) / (SIDE * SIDE);
+            if (i % SIDE) across += pow((double)image[i][3] - (double)image[i - 1][3], 2) / (SIDE * (SIDE - 1));
+            if (i >= SIDE) down += pow((double)image[i][3] - (double)image[i - SIDE][3], 2) / (SIDE * (SIDE - 1));
+        }
+        if (!seed) CHECK(square < 1e-10, "without jitter pixels differ by %g", sqrt(square));
+        else /* 1024 pixels: a standard deviation of 0.06 to 0.1 */
+            CHECK(square > 1e-3 && fabs(across / square - 2) < 0.4 && fabs(down / square - 2) < 0.4,
+                  "seed %u: pixels differ by %g from their mean, squared %g and %g times that from those beside and below", (unsigned)seed,
+                  sqrt(square), across / square, down / square);
+        free(image), isogi_dvr_free(dvr);
     }
     field_free(&f);
 }

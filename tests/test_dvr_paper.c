@@ -125,6 +125,45 @@ TEST(blocks_are_raised_in_the_order_of_their_significance) {
     field_free(&f);
 }
 
+/* Five blocks around one grey of luminance 0.1, each with another opaque colour besides. Differences in CIE L*u*v* (D65), from left to
+   right: 19.2 of lightness (luminance 0.25), 20.8 of u*, 6.4 of lightness (luminance 0.14), 22.4 of lightness (luminance 0.02), 30.6 of v*.
+   Neither hue differs in luminance, and luminance itself goes 0.15, 0, 0.04, 0.08, 0. Blocks are raised by the largest difference, all of
+   them once before any is raised again, as their differences are within a factor of 16. */
+TEST(hue_counts_as_lightness_does_when_levels_are_chosen) {
+    enum { X = 81, Y = 17, BLOCKS = 5, PLACES = 11 };
+    static const float colour[BLOCKS][3] = {{0.25f, 0.25f, 0.25f}, {0.1705f, 0.07903f, 0.1f}, {0.14f, 0.14f, 0.14f},
+                                            {0.02f, 0.02f, 0.02f}, {0.09f, 0.0929f, 0.2f}};
+    static const struct { int points; uint8_t level[BLOCKS]; } expected[] = {
+        {5, {1, 1, 1, 1, 1}},  {12, {1, 1, 1, 1, 2}},  {19, {1, 1, 1, 2, 2}},  {26, {1, 2, 1, 2, 2}},  {33, {2, 2, 1, 2, 2}},
+        {40, {2, 2, 2, 2, 2}}, {96, {2, 2, 2, 2, 4}},  {152, {2, 2, 2, 4, 4}}, {208, {2, 4, 2, 4, 4}}, {264, {4, 4, 2, 4, 4}},
+        {320, {4, 4, 4, 4, 4}}};
+    field f = field_new(X, Y, Y);
+    isogi_transfer_point p[4 * BLOCKS + 2];
+    const isogi_transfer transfer = {p, 4 * BLOCKS + 2, NULL, 0};
+    for (int i = 0; i < 2 * BLOCKS + 1; i++) /* the colours at 0.08 to 0.4 from the middle, to both sides, each 0.04 wide */
+        for (int end = 0; end < 2; end++) {
+            isogi_transfer_point *q = &p[2 * i + end];
+            q->value = 0.5 + 0.08 * (i - BLOCKS) + (end ? 0.02 : -0.02), q->extinction = 40;
+            for (int a = 0; a < 3; a++) q->rgb[a] = i == BLOCKS ? 0.1f : colour[abs(i - BLOCKS) - 1][a];
+        }
+    for (int i = 0; i < X * Y * Y; i++) { /* a chequerboard, whose averages are the middle */
+        const int x = i % X, y = i / X % Y, z = i / X / Y, face = x % 16 == 0 || y % 16 == 0 || z % 16 == 0;
+        f.value[i] = face ? 0.5 : 0.5 + ((x + y + z) % 2 ? 0.08 : -0.08) * (1 + x / 16);
+    }
+    field_build(&f);
+    for (int n = 0; n < PLACES; n++) {
+        const isogi_dvr_desc desc = {.pyramid = f.pyramid, .shading = ISOGI_DVR_VISIBILITY, .method = ISOGI_DVR_PAPER, .directions = 8,
+                                     .order = 1, .grid = {2, 2, 2}, .reduction = X * Y * Y / (expected[n].points + 0.5)};
+        isogi_dvr *dvr = dvr_new(&desc, &transfer);
+        isogi_dvr_report report;
+        CHECK(isogi_dvr_step(dvr, 5 * 64 * 8, NULL) == ISOGI_OK && isogi_dvr_inspect(dvr, &report) == ISOGI_OK, "step");
+        CHECK(!memcmp(report.level, expected[n].level, BLOCKS), "%d points: levels %d %d %d %d %d", expected[n].points, report.level[0],
+              report.level[1], report.level[2], report.level[3], report.level[4]);
+        isogi_dvr_free(dvr);
+    }
+    field_free(&f);
+}
+
 /* ---- pictures between steps ---- */
 
 /* More matter in an edit darkens every place: whatever has been stepped so far, pixels lie between the picture before and that after, and

@@ -91,6 +91,24 @@ TEST(suggestions_part_what_the_histogram_parts) {
     }
 }
 
+/* Air of one value takes three fifths of the voxels, and would be a class of its own; the three classes are those of what it surrounds. */
+TEST(suggestions_do_not_count_air_as_a_class) {
+    test_random r = {10};
+    field f = field_new(30, 24, 24);
+    double threshold;
+    for (size_t i = 0; i < field_count(&f); i++) {
+        size_t x = i % 30;
+        f.value[i] = x < 18 ? 0 : (x < 22 ? 1 : x < 26 ? 2 : 3.2) + random_range(&r, -0.15, 0.15);
+    }
+    field_build(&f);
+    for (int space = 0; space < 2; space++) {
+        isogi_transfer_point p[ISOGI_SUGGEST_POINTS];
+        CHECK(isogi_transfer_suggest(f.pyramid, (isogi_dvr_space)space, p, &threshold) == ISOGI_OK, "suggest");
+        CHECK(threshold > 1.13 && threshold < 1.87 && p[3].value > 2.13 && p[3].value < 3.07, "thresholds %g %g", threshold, p[3].value);
+    }
+    field_free(&f);
+}
+
 TEST(suggestions_for_odd_volumes_are_valid) {
     isogi_transfer_point p[ISOGI_SUGGEST_POINTS];
     const isogi_transfer t = {p, ISOGI_SUGGEST_POINTS, NULL, 0};
