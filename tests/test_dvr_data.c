@@ -511,8 +511,9 @@ TEST(silhouettes_follow_the_angle_between_surface_and_view) {
     }
 }
 
-/* Volumes turned, stretched and sheared: of a medium of constant extinction per unit of data, silhouettes make the integral of |grad s| along
-   the ray (eq. 17), the gradient that of space; here by Simpson's rule on a sixteenth of a cell. Noise, whose gradient turns within cells. */
+/* Volumes turned, stretched and sheared: of a medium of constant extinction per unit of data, silhouettes make the integral of |grad s|
+   along the ray (eq. 17), the gradient that of space; here by Simpson's rule on a sixteenth of a cell. Noise, whose gradient turns within
+   cells. */
 TEST(silhouettes_integrate_the_gradient_of_space_along_the_ray) {
     enum { SIDE = 8, PARTS = 16 };
     test_random r = {43};

@@ -228,8 +228,8 @@ TEST(a_sky_that_glares_behind_matter_does_not_blacken_what_it_lights_from_in_fro
     field_free(&f);
 }
 
-/* A medium too thin for shadows under a sky of 1 + k cos, along whose dark side the eye looks: degree 1 of what is scattered is g k, so that
-   the series is 1 + g k, and where that is less than the least that the header states, light is that least. */
+/* A medium too thin for shadows under a sky of 1 + k cos, along whose dark side the eye looks: degree 1 of what is scattered is g k, so
+   that the series is 1 + g k, and where that is less than the least that the header states, light is that least. */
 TEST(the_least_light_of_a_sky_is_as_stated_for_all_orders_and_phase_functions) {
     field f = field_of(even, 12);
     const isogi_transfer_point point = {0, {1, 1, 1}, 1e-5f};
@@ -280,8 +280,8 @@ TEST(teeth_of_a_transfer_function_keep_their_opacity) {
     field_free(&f);
 }
 
-/* Light falls off into a medium that is lit from where the eye is. Of a piece of optical depth 2 the front is seen most, and light is looked
-   up there: within a tenth of what small steps give, of which light from the middle of pieces is less than two thirds. */
+/* Light falls off into a medium that is lit from where the eye is. Of a piece of optical depth 2 the front is seen most, and light is
+   looked up there: four fifths of what small steps give, as it falls off ever less; light from the middle is less than three fifths. */
 TEST(light_is_that_of_where_a_long_piece_is_seen) {
     enum { SIDE = 65 };
     static float data[SIDE * SIDE * SIDE]; /* floats: the vectors of every path read these */
@@ -306,7 +306,7 @@ TEST(light_is_that_of_where_a_long_piece_is_seen) {
             for (int i = 0; i < 64; i++) light[n] += (double)image[i][0];
             free(image), isogi_dvr_free(dvr);
         }
-        CHECK(light[1] > 0.9 * light[0] && light[1] < 1.1 * light[0], "path %d: %g of what small steps give", path, light[1] / light[0]);
+        CHECK(light[1] > 0.75 * light[0] && light[1] < light[0], "path %d: %g of what small steps give", path, light[1] / light[0]);
     }
     isogi_vol_free(pyramid);
 }
@@ -412,7 +412,8 @@ TEST(jitter_is_off_by_default_repeats_itself_and_is_right_on_average) {
 TEST(jitter_is_a_pixels_own) {
     enum { SIDE = 32 };
     field f = field_of(along_x, 49);
-    const isogi_transfer_point p[] = {{10, {1, 1, 1}, 0}, {11, {1, 1, 1}, 0.2f}, {12, {1, 1, 1}, 0}, {30, {1, 1, 1}, 0}, {33, {1, 1, 1}, 0.1f}};
+    const isogi_transfer_point p[] = {{10, {1, 1, 1}, 0}, {11, {1, 1, 1}, 0.2f}, {12, {1, 1, 1}, 0},
+                                      {30, {1, 1, 1}, 0}, {33, {1, 1, 1}, 0.1f}};
     const isogi_transfer transfer = {p, 5, NULL, 0};
     const isogi_view view = {.width = SIDE, .height = SIDE, .eye = {-30, 20, 21}, .target = {50, 20, 21}, .fov = 0.001f};
     for (uint32_t seed = 0; seed < 8; seed++) {
