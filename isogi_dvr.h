@@ -36,7 +36,7 @@
    sum up to the opacity: what an unlit pixel's colour errs by is at most the bound times its opacity. (`opaque` below 1 ends rays
    early and adds 1 - opaque. Light is looked up once for a piece within a cell, by its first part: the opacity of that is what two-sided
    light takes, its extinction what says how far off dense matter visibility is looked up.) Errors measured on random fields and functions
-   with bounds 1, .1, .01, .001: .046, .006, .0006, .0001 (test_dvr_bound); samples know no bound, as a cell may hold what they miss. A
+   with bounds 1, .1, .01, .001: .046, .010, .0007, .00015 (test_dvr_bound); samples know no bound, as a cell may hold what they miss. A
    frame of the gyroid takes some 10, 15 and 60 times that of samples with bounds 1, .1 and .01: the time of what is cut by colour goes as
    1 / bound, and every point of the function between the values at a cell's two ends is one more part.
 

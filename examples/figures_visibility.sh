@@ -1,7 +1,8 @@
 #!/bin/sh
 # Figure 14 of Kronander et al. 2011 with our data, into build/figures (or $1): a volume under one light by local diffuse shading (the
 # baseline), by local visibility, and by global visibility, by the paper's method and by sweeps, in one and in several resolutions; numbers
-# are differences to global visibility by sweeps, at its exposure, RMS in sRGB values of 0 to 1. With ISOGI_DATA engine, else engine-block.
+# are differences to global visibility by sweeps, RMS in sRGB values of 0 to 1, each picture at an exposure of its own, at which its mean is
+# the same: how many times that of the first is told, too. With ISOGI_DATA engine, else engine-block.
 # Pictures and captions are added to the HTML file FIGURES_PAGE in the folder, if that is set.
 #     SIDE=512   pixels; default 320
 out=${1:-build/figures} side=${SIDE:-320}
@@ -14,15 +15,17 @@ failed=0
 
 echo "<h2>Kronander 2011, shading by gradients, by local and by global visibility (figure 14)</h2>" >> "$page"
 echo "figure 14: shading by gradients, by local and by global visibility: $scene"
-# NAME CAPTION VIEWER_ARGUMENTS...; the first one gives the exposure of all
+# NAME CAPTION VIEWER_ARGUMENTS...
 picture() {
     name=$1 caption=$2
     shift 2
     if stats=$(build/viewer $scene --mode dvr --size "${side}x$side" $light "$@" --stats --out "$out/$name.png"); then
         number=$(echo "$stats" | sed -n 's/^difference_rms //p')
-        [ "$number" ] || exposure=$(echo "$stats" | sed -n 's/^exposure //p')
-        echo "    $name   $caption${number:+   difference $number}"
-        echo "<figure><img src=\"$name.png\" alt=\"$name\"><figcaption>$caption${number:+<br>difference $number}</figcaption></figure>" >> "$page"
+        exposure=$(echo "$stats" | sed -n 's/^exposure //p')
+        [ "$number" ] || first=$exposure
+        told="difference $number, exposure x $(awk "BEGIN { printf \"%.3g\", $exposure / $first }")"
+        echo "    $name   $caption${number:+   $told}"
+        echo "<figure><img src=\"$name.png\" alt=\"$name\"><figcaption>$caption${number:+<br>$told}</figcaption></figure>" >> "$page"
     else failed=1
     fi
 }
@@ -31,6 +34,6 @@ for way in "14-diffuse|local diffuse shading|--shading local" "14-local|local vi
     "14-paper|global visibility, paper's method|--method paper --order 3 --directions 64" \
     "14-several|global visibility, several resolutions|--coarsest 8 --order 3 --directions 64"; do
     name=${way%%|*} rest=${way#*|}
-    picture "$name" "${rest%%|*}" ${rest#*|} --exposure "$exposure" --compare "$out/14-global.png"
+    picture "$name" "${rest%%|*}" ${rest#*|} --compare "$out/14-global.png"
 done
 exit $failed

@@ -259,7 +259,9 @@ static const option option_list[] = {
     {"--reach", "R", GATHERED, "surfaces further away than this (world units) cast no shadow; default 0 = unlimited", NUMBERS, AT(reach), 0,
      1, 0, 1e9, .allowed = "a number, 0 or more"},
     {"--storage", "NAME", BAKED, "how the texture is held: default, float, half, rgb9e5, byte", NAMED(storage_name, storage)},
-    {"--compare", "FILE.png", ANY, "tell how far the picture is from this one: difference_rms, of what is seen, in sRGB values of 0 to 1",
+    {"--compare", "FILE.png", ANY,
+     "tell how far the picture is from this one: difference_rms, of what is seen, in sRGB values of 0 to 1; the automatic "
+     "exposure is then one at which both have the same mean",
      TEXT, .offset = AT(compare)},
     {"--tf", "FILE", VOLUMES,
      "transfer function: lines \"value extinction r g b\" or \"peak value opacity r g b\"; default the scene's or "
@@ -1473,18 +1475,30 @@ static void compare_picture(const viewer *v, const unsigned char *bytes) {
     printf("difference_rms %.6f\n", seen ? sqrt(sum / (double)seen) : 0);
 }
 
+/* Into bytes; how much brighter what is seen is than what the picture to compare with, if any, has there: the sum of all values. */
+static double expose_picture(const viewer *v, double exposure, unsigned char *bytes) {
+    double sum = 0;
+    for (size_t i = 0; i < (size_t)v->o.width * (size_t)v->o.height; i++) {
+        double behind[3];
+        backdrop(v, (int)(i % (size_t)v->o.width), (int)(i / (size_t)v->o.width), behind);
+        picture_pixel(v->picture[i], exposure, behind, bytes + 3 * i);
+        for (size_t c = 3 * i; v->compared && v->picture[i][3] > 0 && c < 3 * i + 3; c++) sum += bytes[c] - v->compared[c];
+    }
+    return sum;
+}
+
 static int write_picture(viewer *v) {
     size_t pixels = (size_t)v->o.width * (size_t)v->o.height;
     double begun = seconds(), exposure = v->o.exposure;
     unsigned char *bytes = (unsigned char *)malloc(pixels * 3);
     int ok;
     if (!bytes) return fail(v, "the picture", ISOGI_NO_MEMORY);
-    if (!(exposure > 0)) exposure = picture_exposure((const float(*)[4])v->picture, pixels, 0.9, 0.6);
-    for (size_t i = 0; i < pixels; i++) {
-        double behind[3];
-        backdrop(v, (int)(i % (size_t)v->o.width), (int)(i / (size_t)v->o.width), behind);
-        picture_pixel(v->picture[i], exposure, behind, bytes + 3 * i);
+    if (!(exposure > 0)) {
+        exposure = picture_exposure((const float(*)[4])v->picture, pixels, 0.9, 0.6);
+        for (double factor = 64; v->compared && factor > 1.0005; factor = sqrt(factor))
+            exposure *= expose_picture(v, exposure, bytes) < 0 ? factor : 1 / factor;
     }
+    expose_picture(v, exposure, bytes);
     if (v->compared) compare_picture(v, bytes);
     ok = png_write(v->o.out, bytes, v->o.width, v->o.height, 3, v->error);
     free(bytes);

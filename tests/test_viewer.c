@@ -1060,6 +1060,23 @@ TEST(fog_lies_over_sections_too) {
           difference);
 }
 
+/* A picture that is compared is as bright as the other one, whatever light it has. */
+TEST(compared_pictures_have_the_same_mean) {
+    const char *dark = temporary("dark.png");
+    char command[1024];
+    double difference = 1, exposure = 0;
+    run_result r;
+    snprintf(command, sizeof command, "procedural:gyroid:24 --mode lambert --size 64x48 --exposure 0.12 --out '%s'", dark);
+    r = run_viewer(command);
+    CHECK(r.status == 0, "%d: %s", r.status, r.error);
+    snprintf(command, sizeof command, "procedural:gyroid:24 --mode lambert --size 64x48 --compare '%s' --stats --out '%s'", dark,
+             temporary("same.png"));
+    r = run_viewer(command);
+    CHECK(r.status == 0 && sscanf(strstr(r.output, "difference_rms"), "difference_rms %lf", &difference) == 1 && difference < 0.001 &&
+              sscanf(strstr(r.output, "\nexposure"), " exposure %lf", &exposure) == 1 && fabs(exposure - 0.12) < 0.001,
+          "%d: %s: difference %g, exposure %g", r.status, r.error, difference, exposure);
+}
+
 /* What a scene is made of is kept, too: its volume, and its environment. */
 TEST(data_of_scenes_is_not_overwritten) {
     static const char *const bad[][2] = {{"--scene fuel --out '%s/fuel_64x64x64_uint8.raw'", "--out: %s/fuel_64x64x64_uint8.raw"},

@@ -5,7 +5,8 @@
    One thread, CPU seconds. Volumes are procedural, as the scenes name them: Marschner-Lobb and gyroid on the cube, here 128^3
    (64^3 with --quick). Frames: standard view, shaded by visibility under a uniform sky and a directional light; error = RMSE of
    sRGB values against steps of a sixteenth of a voxel, same visibility. Visibility: order 3 on a grid of 8^3 (6^3); error =
-   relative RMSE of all coefficients against 2048 rays. Methods: default; steps, rays = other settings of the same code.
+   relative RMSE of all coefficients against 2048 rays by brute force in steps of a quarter of a voxel. Methods: default; steps, rays = other
+   settings of the same code.
    Data space: frames of 512x512 at 256^3 (--quick: without the finest steps); tables of pieces. Frames of the scenes: error against
    visibility of 2048 rays by brute force on the same grid, kept in build/bench/: computing it takes minutes, once, and goes on where it
    was stopped. A table of goals is printed at the end. --dry: all rows in seconds, to look at the table's form: scenes of 16 voxels, with
@@ -119,7 +120,7 @@ static void bench_frames(const char *scene, const isogi_pyramid *pyramid, const 
 }
 
 static void bench_visibility(const char *scene, const isogi_pyramid *pyramid, const isogi_transfer *transfer) {
-    const int rays[5] = {2048, 16, 32, 64, 256};
+    const int rays[6] = {2048, 16, 32, 64, 256, 256};
     size_t count = points * points * points;
     float *v = (float *)malloc(count * 9 * sizeof(float)), *reference = (float *)malloc(count * 9 * sizeof(float));
     float(*places)[3] = (float(*)[3])malloc(count * sizeof *places);
@@ -127,9 +128,15 @@ static void bench_visibility(const char *scene, const isogi_pyramid *pyramid, co
         size_t c[3] = {i % points, i / points % points, i / points / points};
         for (int a = 0; a < 3; a++) places[i][a] = (float)(2 * (double)c[a] / (double)(points - 1) - 1);
     }
-    for (int s = 0; s < 5; s++) {
-        const isogi_dvr_desc desc = {
-            .pyramid = pyramid, .shading = ISOGI_DVR_VISIBILITY, .directions = rays[s], .grid = {points, points, points}};
+    for (int s = 0; s < 6; s++) { /* the first is the reference; the last on a lattice as fine as the voxels */
+        const isogi_dvr_desc desc = {.pyramid = pyramid,
+                                     .shading = ISOGI_DVR_VISIBILITY,
+                                     .method = s ? ISOGI_DVR_METHOD_DEFAULT : ISOGI_DVR_BRUTE,
+                                     .visibility_step = s == 5 ? 1
+                                                        : s    ? 0
+                                                               : 0.25,
+                                     .directions = rays[s],
+                                     .grid = {points, points, points}};
         isogi_dvr *dvr = create(&desc, transfer);
         double sum = 0, norm = 0, seconds = cpu_seconds();
         char setting[64];
@@ -140,7 +147,7 @@ static void bench_visibility(const char *scene, const isogi_pyramid *pyramid, co
             double d = (double)v[i] - (double)reference[i];
             sum += d * d, norm += (double)reference[i] * (double)reference[i];
         }
-        snprintf(setting, sizeof setting, "%d rays", rays[s]);
+        snprintf(setting, sizeof setting, s == 5 ? "%d rays; lattice 1" : "%d rays", rays[s]);
         if (s)
             row("visibility", scene, rays[s] == 64 ? "default" : "rays", setting, seconds, sqrt(sum / norm), (double)count * rays[s],
                 "ray");
@@ -207,7 +214,20 @@ static void bench_scale_invariant(void) {
 }
 
 /* Kraus 2005, figure 8e and f: pieces of rays through tetrahedra by tables of two dimensions, which data space needs, against three, which
-   physical space needs; and by the integrals themselves. Error: RMSE of opacity. */
+   physical space needs; and by the integrals themselves. Error: RMSE of opacity against long double, piece by piece of the function. */
+static long double bench_opacity(const isogi_transfer *t, double x, double y, double length) {
+    const long double low = fmin(x, y), high = fmax(x, y), span = high - low;
+    long double depth = 0;
+    for (size_t i = 0; i + 1 < t->point_count; i++) {
+        const isogi_transfer_point *p = t->points + i;
+        const long double from = fmaxl(low, (long double)p->value), to = fminl(high, (long double)p[1].value),
+                          slope = ((long double)p[1].extinction - (long double)p->extinction) / ((long double)p[1].value - p->value);
+        if (!(to > from) && (span > 0 || low < (long double)p->value || low >= (long double)p[1].value)) continue;
+        depth += ((long double)p->extinction + slope * ((from + to) / 2 - p->value)) * (span > 0 ? (to - from) / span : 1);
+    }
+    return -expm1l(-depth * length);
+}
+
 static void bench_tables(void) {
     enum { SIDE = 128, LENGTHS = 32 };
     const int COUNT = dry ? 2000 : 200000;
@@ -218,7 +238,7 @@ static void bench_tables(void) {
     isogi_dvr__integral g;
     isogi_dvr_desc desc = {.space = ISOGI_DVR_DATA};
     float *table = (float *)malloc(sizeof(float[4]) * SIDE * SIDE * LENGTHS);
-    double (*piece)[3] = (double(*)[3])malloc((size_t)COUNT * sizeof *piece), *exact = (double *)malloc((size_t)COUNT * sizeof *exact);
+    double (*piece)[3] = (double(*)[3])malloc((size_t)COUNT * sizeof *piece), *opacity = (double *)malloc((size_t)COUNT * sizeof *opacity);
     uint64_t state = 1;
     if (isogi_dvr__transfer_copy(&own, &transfer, &serial) != ISOGI_OK || isogi_dvr__integral_build(&g, &own, &desc, &serial) != ISOGI_OK)
         exit(1);
@@ -231,7 +251,8 @@ static void bench_tables(void) {
     for (int dimensions = 2; dimensions < 4; dimensions++)
         for (int way = 0; way < 2; way++) {
             size_t layers = dimensions == 3 ? LENGTHS : 1;
-            double sum = 0, glow = 0, seconds;
+            double glow = 0, seconds;
+            long double sum = 0;
             for (size_t i = 0; !way && i < SIDE * SIDE * layers; i++) { /* [length][front][back] */
                 double x = (double)(i / SIDE % SIDE) / (SIDE - 1), y = (double)(i % SIDE) / (SIDE - 1);
                 isogi_dvr__layer layer = {{0, 0, 0}, 1};
@@ -241,12 +262,12 @@ static void bench_tables(void) {
             }
             seconds = cpu_seconds();
             for (int i = 0; i < COUNT; i++) {
-                double x = piece[i][0] * (SIDE - 1), y = piece[i][1] * (SIDE - 1), z = piece[i][2] * (LENGTHS - 1), opacity;
+                double x = piece[i][0] * (SIDE - 1), y = piece[i][1] * (SIDE - 1), z = piece[i][2] * (LENGTHS - 1);
                 if (!way) {
                     isogi_dvr__layer layer = {{0, 0, 0}, 1};
                     isogi_dvr__add_values(&g, piece[i][0], piece[i][1], dimensions == 3 ? piece[i][2] : fabs(piece[i][1] - piece[i][0]),
                                           &layer);
-                    exact[i] = opacity = 1 - layer.clear, glow += layer.rgb[0];
+                    opacity[i] = 1 - layer.clear, glow += layer.rgb[0];
                 } else {
                     size_t c[3] = {(size_t)x < SIDE - 2 ? (size_t)x : SIDE - 2, (size_t)y < SIDE - 2 ? (size_t)y : SIDE - 2,
                                    (size_t)z < LENGTHS - 2 ? (size_t)z : LENGTHS - 2};
@@ -260,17 +281,21 @@ static void bench_tables(void) {
                                                          : 1 - u[2]);
                         for (int a = 0; a < 4; a++) v[a] += weight * (double)at[a];
                     }
-                    opacity = v[3], glow += v[0];
+                    opacity[i] = v[3], glow += v[0];
                 }
-                sum += pow(opacity - exact[i], 2);
             }
             seconds = cpu_seconds() - seconds;
+            for (int i = 0; i < COUNT; i++) {
+                long double d = opacity[i] - bench_opacity(&transfer, piece[i][0], piece[i][1],
+                                                           dimensions == 3 ? piece[i][2] : fabs(piece[i][1] - piece[i][0]));
+                sum += d * d;
+            }
             if (!(glow > 0)) exit(1);
             row("tet-pieces", dimensions == 3 ? "physical" : "data", way ? dimensions == 3 ? "table-3d" : "table-2d" : "default",
-                way ? "128 entries a side" : "integrals", seconds, sqrt(sum / COUNT), COUNT, "piece");
+                way ? "128 entries a side" : "integrals", seconds, (double)sqrtl(sum / COUNT), COUNT, "piece");
         }
     isogi_dvr__integral_free(&g, &serial), isogi_dvr__transfer_free(&own, &serial);
-    free(table), free(piece), free(exact);
+    free(table), free(piece), free(opacity);
 }
 
 /* ---- the scenes: frames and updates of a transfer function ------------------------------------------------------------------- */
@@ -492,7 +517,7 @@ static void bench_frame(const bench_scene *s, const isogi_pyramid *pyramid, cons
         char setting[32];
         if (isogi_dvr_create(&dvr, &desc, i ? &threads : &all) != ISOGI_OK || isogi_dvr_set_transfer(dvr, transfer) != ISOGI_OK) exit(1);
         view.width = view.height = PIXELS;
-        if (!i) brute_visibility(dvr, &view, transfer, s->name, dry ? 0.1 : 0.01); /* dry: noise */
+        if (!i) brute_visibility(dvr, &view, transfer, s->name, 0, dry ? 0.1 : 0.01); /* dry: noise */
         else if (isogi_dvr_step(dvr, 0, NULL) != ISOGI_OK) exit(1);
         for (int turn = 0; turn < (i ? 3 : 1); turn++) {
             double begun = s->threads == 1 ? cpu_seconds() : wall_seconds();

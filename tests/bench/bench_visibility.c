@@ -2,20 +2,30 @@
 
        build/bench/bench_visibility [--quick] [--only SCENE] [--study NAME] [--sweeps] OUT.csv
 
-   --study: rays, coefficients, blocks, grid, resolutions, frames or shading alone; --sweeps: without the paper's method, which takes most
-   of the time.
+   --study: rays, coefficients, blocks, grid, resolutions, frames, shading or tables alone; --sweeps: without the paper's method, which
+   takes most of the time.
 
    Two threads, wall seconds. torus-sphere-plane, the paper's worst case (9 coefficients, 128 rays, radius 16, 1:3, grid 64^3), and bonsai
    under Grace (4 coefficients, 64 rays, radius 16, 1:6.7, grid 64x64x32); one parameter is varied at a time, by sweeps (the default) and by
-   the paper's method, which alone has a reduction and a radius. Time: of a whole update; in frames-*, of a frame. Errors are those of the
-   frame of 512x512 in the standard view, once as RMSE of sRGB values (cases ...-rmse), once as the share of pixels that look different with
-   a probability above 75 % (cases ...-seen; Yee and Newman 2004, with Daly's psychometric function: tests/perceptual.h; 45 degrees wide,
-   100 cd/m^2), against sweeps with 2048 rays on the same grid (rays, reduction, radius), 36 coefficients (coefficients), a grid of twice
-   the points along each axis of the finest one, which is 256x256x128 for bonsai and 128^3 for torus-sphere-plane (grid; takes 3 GB), a
-   regular grid of 129 or 193 points along each axis (resolutions, ml256 too). --quick: torus-sphere-plane at 48^3, 128x128 pixels, a few
-   settings. */
+   the paper's method, which alone has a reduction and a radius. Time: of a whole update; in frames-* and shading-*, of a frame. Errors are
+   those of the frame of 512x512 in the standard view, as RMSE of sRGB values and, in cases ...-seen, as the share of pixels that look
+   different with a probability above 75 % (Yee and Newman 2004, with Daly's psychometric function: tests/perceptual.h; 45 degrees wide,
+   100 cd/m^2), against the same frame with another visibility:
+
+       rays, reduction, radius, frames, shading, tables   as many coefficients of 2048 rays by brute force, at the same grid points
+       coefficients        light from 2048 directions, each by its own ray, at the same grid points, without spherical harmonics; rows
+                           "truncation" are coefficients of those rays, at the time of their frame
+       grid                brute force on a grid of twice the points along each axis of the finest one; 32 rays, as all rows have, of which
+                           "brute" are brute force on the coarser grids, at the time of their frame
+       resolutions         a regular grid of 129 or 193 points along each axis by sweeps: what coarser grids lose (ml256 too)
+
+   What is computed by brute force is kept in build/bench/ and goes on where it was stopped (brute_reference.h): with all scenes it takes
+   half an hour, once. shading-*: every picture at an exposure at which the mean of its sRGB values is the reference's; the setting says how
+   many times the reference's that is. table-2-*: work is megabytes. --quick: torus-sphere-plane at 48^3, 128x128 pixels, a few settings;
+   its sweeps err by their lattice of 2 voxels more than by rays or grid, which rows "lattice 1" show. */
 #define ISOGI_IMPLEMENTATION
 #include "isogi_dvr.h"
+#include "brute_reference.h"
 #include "hdr.h"
 #include "perceptual.h"
 #include "picture.h"
@@ -29,6 +39,10 @@ static FILE *csv;
 static int quick, sweeps_alone, SIDE = 512;
 static const char *only_study;
 
+/* What 2048 rays by brute force tell of a grid point: coefficients of order 4, and at LIGHT the light that arrives, RGB. A renderer of
+   order 5 computes it, whose kernel has that many columns. */
+enum { DIRECTIONS = 2048, LIGHT = 16, TRUTH = 25 };
+
 typedef struct study {
     const char *name;
     isogi_pyramid *pyramid;
@@ -37,6 +51,7 @@ typedef struct study {
     isogi_dvr_desc base;
     isogi_view view;
     double exposure;
+    float (*truth)[TRUTH]; /* at grid points; NULL until it is asked for */
 } study;
 
 static double wall_seconds(void) {
@@ -58,76 +73,181 @@ static void need(isogi_result result, const char *what) {
     exit(1);
 }
 
-/* A frame in display values over black: sRGB of what the exposure makes of it. */
-typedef struct frame { float (*srgb)[3]; double update, render; isogi_dvr_report report; } frame;
+/* ---- references ---- */
 
-static frame frame_of(const study *s, const isogi_dvr_desc *desc, int local, const isogi_lighting *lighting) {
-    frame f = {.srgb = (float(*)[3])malloc((size_t)SIDE * (size_t)SIDE * sizeof(float[3])), .render = 1e9};
-    float(*image)[4] = (float(*)[4])malloc((size_t)SIDE * (size_t)SIDE * sizeof *image);
-    isogi_view view = s->view;
+/* Light into the last columns of a kernel, one for each channel: an image's, of each direction what is nearest to it of all directions;
+   of a directional light, whose direction takes the place of the nearest. */
+static void put_light(isogi_dvr *d, const isogi_lighting *lighting) {
+    const isogi_env *env = &lighting->env;
+    for (size_t k = 0; k < DIRECTIONS; k++)
+        for (int c = LIGHT; c < TRUTH; c++) d->kernel[k * TRUTH + (size_t)c] = 0;
+    for (int i = 0; i < env->width * env->height + (int)lighting->light_count; i++) {
+        const isogi_light *light = i < env->width * env->height ? NULL : &lighting->lights[i - env->width * env->height];
+        double w[3], area = 1, most = -2;
+        size_t nearest = 0;
+        float rgb[3];
+        if (light) {
+            for (int a = 0; a < 3; a++) w[a] = (double)light->vector[a], rgb[a] = light->rgb[a];
+            vector_normalize(w);
+        } else {
+            const double row = pi * (i / env->width + 0.5) / env->height, turn = 2 * pi * ((i % env->width + 0.5) / env->width - 0.5);
+            w[0] = sin(row) * sin(turn), w[1] = cos(row), w[2] = -sin(row) * cos(turn);
+            area = 2 * pi / env->width * 2 * sin(row) * sin(0.5 * pi / env->height);
+            for (int a = 0; a < 3; a++) rgb[a] = env->rgb[3 * i + a];
+        }
+        for (size_t k = 0; k < DIRECTIONS; k++) {
+            const double *v = d->direction[k] + 3, dot = v[0] * w[0] + v[1] * w[1] + v[2] * w[2];
+            if (dot > most) most = dot, nearest = k;
+        }
+        if (light) memcpy(d->direction[nearest] + 3, w, sizeof w), isogi_dvr__transform(d->to_grid, w, d->direction[nearest]);
+        for (int a = 0; a < 3; a++) d->kernel[nearest * TRUTH + LIGHT + (size_t)a] += (float)(area * (double)rgb[a]);
+    }
+}
+
+static const float (*truth_of(study *s))[TRUTH] {
+    isogi_dvr_desc desc = s->base;
     isogi_dvr *dvr = NULL;
-    if (!f.srgb || !image) exit(1);
+    const size_t bytes = desc.grid[0] * desc.grid[1] * desc.grid[2] * sizeof *s->truth;
+    if (s->truth) return (const float(*)[TRUTH])s->truth;
+    desc.method = ISOGI_DVR_BRUTE, desc.order = 5, desc.directions = DIRECTIONS, desc.visibility_step = 0.05;
+    need(isogi_dvr_create(&dvr, &desc, &two), "create"), need(isogi_dvr_set_transfer(dvr, &s->transfer), "set_transfer");
+    put_light(dvr, &s->lighting);
+    brute_visibility(dvr, &s->view, &s->transfer, s->name, brute_hash(1, dvr->kernel, dvr->kernel_count * sizeof *dvr->kernel), 0.01);
+    s->truth = (float(*)[TRUTH])malloc(bytes);
+    if (!s->truth) exit(1);
+    memcpy(s->truth, dvr->visibility, bytes), isogi_dvr_free(dvr);
+    return (const float(*)[TRUTH])s->truth;
+}
+
+/* Where visibility comes from. */
+typedef enum source {
+    COMPUTED, /* from the method that is measured */
+    BRUTE,    /* from brute force with the same directions */
+    TRUNCATED, /* from the truth: as many coefficients as the order has */
+    WHOLE     /* and the light itself: coefficients 1 to 3 of order 2 are the channels of light, which an environment of these three sees */
+} source;
+
+static void fill(isogi_dvr *d, study *s, source from) {
+    const float(*truth)[TRUTH] = from == BRUTE ? NULL : truth_of(s);
+    if (from == BRUTE) {
+        brute_visibility(d, &s->view, &s->transfer, s->name, 0, 0.05); /* few rays, of which each may graze what is opaque */
+        return;
+    }
+    for (size_t i = 0; i < d->point_count; i++)
+        for (size_t c = 0; c < d->coefficients; c++)
+            d->visibility[i * d->coefficients + c] = truth[i][c && from == WHOLE ? LIGHT + c - 1 : c];
+    d->next = d->point_count;
+}
+
+/* A frame in display values over black: sRGB of what the exposure makes of it. */
+typedef struct frame { float (*srgb)[3], (*image)[4]; double update, render, mean; isogi_dvr_report report; } frame;
+
+static void display(frame *f, double exposure) {
+    f->mean = 0;
+    for (int i = 0; i < 3 * SIDE * SIDE; i++) {
+        double x = fmin(1, fmax(0, (double)f->image[i / 3][i % 3] * exposure));
+        f->srgb[i / 3][i % 3] = (float)(x <= 0.0031308 ? 12.92 * x : 1.055 * pow(x, 1 / 2.4) - 0.055);
+        f->mean += (double)f->srgb[i / 3][i % 3] / (3.0 * SIDE * SIDE);
+    }
+}
+
+/* An exposure of its own, at which the mean is that of another frame; how many times the usual one. */
+static double expose_like(frame *f, const study *s, const frame *other) {
+    double low = 1e-4, high = 1e4;
+    for (int i = 0; i < 40; i++) {
+        display(f, sqrt(low * high) * s->exposure);
+        if (f->mean < other->mean) low = sqrt(low * high);
+        else high = sqrt(low * high);
+    }
+    return sqrt(low * high);
+}
+
+static void release(frame *f) { free(f->srgb), free(f->image); }
+
+static frame frame_from(study *s, const isogi_dvr_desc *changed, source from, int local, const isogi_lighting *lighting) {
+    static const float channels[12] = {0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1}; /* of order 2 */
+    const isogi_lighting whole = {.env = {.sh = channels, .sh_order = 2}};
+    frame f = {.srgb = (float(*)[3])malloc((size_t)SIDE * (size_t)SIDE * sizeof(float[3])), .render = 1e9};
+    isogi_view view = s->view;
+    isogi_dvr_desc desc = *changed;
+    isogi_dvr *dvr = NULL;
+    f.image = (float(*)[4])malloc((size_t)SIDE * (size_t)SIDE * sizeof *f.image);
+    if (!f.srgb || !f.image) exit(1);
     view.local = local;
-    need(isogi_dvr_create(&dvr, desc, &two), "create");
+    if (from != COMPUTED) desc.method = ISOGI_DVR_BRUTE, desc.visibility_step = 0.05;
+    if (from == WHOLE) desc.order = 2, lighting = &whole;
+    need(isogi_dvr_create(&dvr, &desc, &two), "create");
     f.update = wall_seconds();
-    need(isogi_dvr_set_transfer(dvr, &s->transfer), "set_transfer"), need(isogi_dvr_step(dvr, 0, NULL), "step");
+    need(isogi_dvr_set_transfer(dvr, &s->transfer), "set_transfer");
+    if (from == COMPUTED) need(isogi_dvr_step(dvr, 0, NULL), "step");
+    else fill(dvr, s, from);
     f.update = wall_seconds() - f.update;
     for (int turn = 0; turn < (quick ? 1 : 2); turn++) {
         double begun = wall_seconds();
-        need(isogi_dvr_render(dvr, &view, lighting, image, NULL, NULL), "render");
+        need(isogi_dvr_render(dvr, &view, lighting, f.image, NULL, NULL), "render");
         f.render = fmin(f.render, wall_seconds() - begun);
     }
     isogi_dvr_inspect(dvr, &f.report), f.report.level = NULL;
-    for (int i = 0; i < 3 * SIDE * SIDE; i++) {
-        double x = fmin(1, fmax(0, (double)image[i / 3][i % 3] * s->exposure));
-        f.srgb[i / 3][i % 3] = (float)(x <= 0.0031308 ? 12.92 * x : 1.055 * pow(x, 1 / 2.4) - 0.055);
-    }
-    isogi_dvr_free(dvr), free(image);
+    isogi_dvr_free(dvr);
+    display(&f, s->exposure);
     return f;
+}
+
+static frame frame_of(study *s, const isogi_dvr_desc *desc) { return frame_from(s, desc, COMPUTED, 0, &s->lighting); }
+
+static double rmse(const frame *f, const frame *reference) {
+    double sum = 0;
+    for (int i = 0; i < 3 * SIDE * SIDE; i++) sum += pow((double)f->srgb[i / 3][i % 3] - (double)reference->srgb[i / 3][i % 3], 2);
+    return sqrt(sum / (3.0 * SIDE * SIDE));
 }
 
 /* Two rows, one for each error. `rendering`: of the frame's time instead of the update's. */
 static void rows(const char *name, const study *s, const char *method, const char *setting, const frame *f, const frame *reference,
                  int rendering, double work, const char *unit) {
-    double sum = 0, seconds = rendering ? f->render : f->update;
-    for (int i = 0; i < 3 * SIDE * SIDE; i++) sum += pow((double)f->srgb[i / 3][i % 3] - (double)reference->srgb[i / 3][i % 3], 2);
-    row(name, s->name, "-rmse", method, setting, seconds, sqrt(sum / (3.0 * SIDE * SIDE)), work, unit);
+    double seconds = rendering ? f->render : f->update;
+    row(name, s->name, "-rmse", method, setting, seconds, rmse(f, reference), work, unit);
     row(name, s->name, "-seen", method, setting, seconds,
         fmax(0, perceptual_difference((const float(*)[3])f->srgb, (const float(*)[3])reference->srgb, SIDE, SIDE, 45, 0.75)), work, unit);
 }
 
-static void measure(const char *name, const study *s, const isogi_dvr_desc *desc, int is_default, const char *setting,
+static void measure(const char *name, study *s, const isogi_dvr_desc *desc, int is_default, const char *setting,
                     const frame *reference) {
-    frame f = frame_of(s, desc, 0, &s->lighting);
+    frame f = frame_of(s, desc);
     rows(name, s,
          is_default                        ? "default"
          : desc->method == ISOGI_DVR_PAPER ? "paper"
                                            : "sweep",
          setting, &f, reference, 0, (double)(desc->grid[0] * desc->grid[1] * desc->grid[2]) * desc->directions, "ray");
-    free(f.srgb);
+    release(&f);
 }
 
 /* Figure 8: rays. The paper's method up to 256: its time goes with them. */
-static void study_rays(const study *s) {
+static void study_rays(study *s) {
     isogi_dvr_desc desc = s->base;
-    desc.directions = quick ? 256 : 2048;
-    frame reference = frame_of(s, &desc, 0, &s->lighting);
-    for (int paper = 0; paper < 2 - sweeps_alone; paper++)
-        for (int rays = 16; rays <= (quick ? 64 : paper ? 256 : 2048); rays *= 2) {
+    frame reference = frame_from(s, &desc, TRUNCATED, 0, &s->lighting);
+    for (int way = 0; way < 3 - sweeps_alone; way++) /* sweeps on their lattice of 2 voxels and on one of 1, the paper's method */
+        for (int rays = 16; rays <= (quick ? 64 : way == 2 ? 256 : 2048); rays *= 2) {
             char setting[32];
             desc = s->base, desc.directions = rays;
-            if (paper) desc.method = ISOGI_DVR_PAPER;
-            snprintf(setting, sizeof setting, "%d rays", rays);
-            measure("rays", s, &desc, !paper && rays == (quick ? 64 : s->base.directions), setting, &reference);
+            if (way == 1) desc.visibility_step = 1;
+            if (way == 2) desc.method = ISOGI_DVR_PAPER;
+            snprintf(setting, sizeof setting, way == 1 ? "%d rays; lattice 1" : "%d rays", rays);
+            measure("rays", s, &desc, !way && rays == (quick ? 64 : s->base.directions), setting, &reference);
         }
-    free(reference.srgb);
+    release(&reference);
 }
 
 /* Figure 9: coefficients. */
-static void study_coefficients(const study *s) {
+static void study_coefficients(study *s) {
     isogi_dvr_desc desc = s->base;
-    desc.order = 6, desc.directions = 256;
-    frame reference = frame_of(s, &desc, 0, &s->lighting);
+    frame reference = frame_from(s, &desc, WHOLE, 0, &s->lighting);
+    for (int order = 1; order <= 4; order++) {
+        char setting[32];
+        desc.order = order;
+        frame f = frame_from(s, &desc, TRUNCATED, 0, &s->lighting);
+        snprintf(setting, sizeof setting, "%d coefficients", order * order);
+        rows("coefficients", s, "truncation", setting, &f, &reference, 1, 1, "frame"), release(&f);
+    }
     for (int paper = 0; paper < (quick || sweeps_alone ? 1 : 2); paper++)
         for (int order = 1; order <= 4; order++) {
             char setting[32];
@@ -136,16 +256,15 @@ static void study_coefficients(const study *s) {
             snprintf(setting, sizeof setting, "%d coefficients", order * order);
             measure("coefficients", s, &desc, !paper && order == s->base.order, setting, &reference);
         }
-    free(reference.srgb);
+    release(&reference);
 }
 
 /* Figures 10 and 12: reduction and radius, of the paper's method alone; sweeps stand beside it. */
-static void study_blocks(const study *s) {
+static void study_blocks(study *s) {
     const double reductions[] = {33, 13, 6.7, 3.3, 1.7}, radii[] = {4, 8, 12, 16, 32};
     isogi_dvr_desc desc = s->base;
     char setting[32];
-    desc.directions = quick ? 256 : 2048;
-    frame reference = frame_of(s, &desc, 0, &s->lighting);
+    frame reference = frame_from(s, &desc, TRUNCATED, 0, &s->lighting);
     measure("reduction", s, &s->base, 1, "sweeps", &reference), measure("radius", s, &s->base, 1, "sweeps", &reference);
     for (int i = 0; i < 5 && !sweeps_alone; i++) {
         if (quick && i % 2) continue;
@@ -156,53 +275,56 @@ static void study_blocks(const study *s) {
         snprintf(setting, sizeof setting, "radius %g", radii[i]);
         measure("radius", s, &desc, 0, setting, &reference);
     }
-    free(reference.srgb);
+    release(&reference);
 }
 
-/* Figure 11: grids from half the base's points along each axis to twice or four times; the reference has twice as many as the last. */
-static void study_grids(const study *s) {
+/* Figure 11: grids from half the base's points along each axis to twice or four times; the reference has twice as many as the last. What
+   the grid alone does is told by brute force with the same directions. */
+static void study_grids(study *s) {
     size_t most = quick ? 2 : s->base.order > 2 ? 4 : 8;
     isogi_dvr_desc desc = s->base;
+    desc.directions = 32;
     for (int a = 0; a < 3; a++) desc.grid[a] *= most;
-    frame reference = frame_of(s, &desc, 0, &s->lighting);
-    for (int paper = 0; paper < (quick || sweeps_alone ? 1 : 2); paper++)
-        for (size_t half = 1; half <= most; half *= 2) { /* in halves of the base */
+    frame reference = frame_from(s, &desc, BRUTE, 0, &s->lighting);
+    for (int way = 0; way < (quick || sweeps_alone ? 2 : 3); way++)
+        for (size_t half = 1; half <= (way < 2 ? most : 2); half *= 2) { /* in halves of the base */
             char setting[80];
-            desc = s->base;
-            for (int a = 0; a < 3; a++) desc.grid[a] = desc.grid[a] * half / 2;
-            if (paper) desc.method = ISOGI_DVR_PAPER;
-            if (paper && half > 2) continue;
+            for (int a = 0; a < 3; a++) desc.grid[a] = s->base.grid[a] * half / 2;
+            if (way == 2) desc.method = ISOGI_DVR_PAPER;
             snprintf(setting, sizeof setting, "%zux%zux%zu", desc.grid[0], desc.grid[1], desc.grid[2]);
-            measure("grid", s, &desc, !paper && half == 2, setting, &reference);
+            if (way == 1) {
+                frame f = frame_from(s, &desc, BRUTE, 0, &s->lighting);
+                rows("grid", s, "brute", setting, &f, &reference, 1, 1, "frame"), release(&f);
+            } else measure("grid", s, &desc, !way && half == 2, setting, &reference);
         }
-    free(reference.srgb);
+    release(&reference);
 }
 
 /* Several resolutions beside the regular grid (coarsest 1): memory is in the setting. */
-static void study_resolutions(const study *s) {
+static void study_resolutions(study *s) {
     const size_t points[] = {33, 65, 97, 129, 193};
-    const int last = quick ? 1 : s->pyramid && isogi_vol_volume(s->pyramid)->size[0] > 128 ? 4 : 3;
+    const int last = s->pyramid && isogi_vol_volume(s->pyramid)->size[0] > 128 ? 4 : 3;
     isogi_dvr_desc desc = s->base;
     desc.grid[0] = desc.grid[1] = desc.grid[2] = points[last], desc.visibility_step = 1;
-    frame reference = frame_of(s, &desc, 0, &s->lighting);
+    frame reference = frame_of(s, &desc);
     for (int coarsest = 1; coarsest <= 8; coarsest *= 8)
         for (int n = 0; n <= last - (coarsest == 1); n++) { /* the last regular grid is the reference */
             char setting[80];
             desc = s->base, desc.coarsest = coarsest, desc.grid[0] = desc.grid[1] = desc.grid[2] = points[n];
-            frame f = frame_of(s, &desc, 0, &s->lighting);
+            frame f = frame_of(s, &desc);
             snprintf(setting, sizeof setting, "%zu^3: %.2f MB", points[n], (double)f.report.global_bytes / 1e6);
             rows("resolutions", s,
                  coarsest > 1 ? "coarsest-8"
                  : n          ? "regular"
                               : "default",
                  setting, &f, &reference, 0, (double)f.report.grid_points * desc.directions, "ray");
-            free(f.srgb);
+            release(&f);
         }
-    free(reference.srgb);
+    release(&reference);
 }
 
-/* Figure 13: a frame by the kind of light and the number of coefficients; no error but that of the light itself: 0. */
-static void study_frames(const study *s) {
+/* Figure 13: a frame by the kind of light and the number of coefficients. */
+static void study_frames(study *s) {
     const isogi_volume *v = isogi_vol_volume(s->pyramid);
     isogi_light lights[2] = {{.kind = ISOGI_LIGHT_DIRECTIONAL, .vector = {1, 1, 1}, .rgb = {3, 3, 3}}, {.kind = ISOGI_LIGHT_POINT}};
     double far = 0;
@@ -217,63 +339,62 @@ static void study_frames(const study *s) {
             isogi_dvr_desc desc = s->base;
             if (!kind && !lighting.env.rgb && !lighting.env.sh) continue;
             desc.order = order, desc.directions = 32;
-            frame f = frame_of(s, &desc, 0, &lighting);
+            frame reference = frame_from(s, &desc, TRUNCATED, 0, &lighting), f = frame_from(s, &desc, COMPUTED, 0, &lighting);
             snprintf(setting, sizeof setting, "%s %d coefficients", kinds[kind], order * order);
-            row("frames", s->name, "", order == s->base.order && kind == 1 ? "default" : kinds[kind], setting, f.render, 0, 1, "frame");
-            free(f.srgb);
+            row("frames", s->name, "", order == s->base.order && kind == 1 ? "default" : kinds[kind], setting, f.render,
+                rmse(&f, &reference), 1, "frame");
+            release(&f), release(&reference);
         }
 }
 
-/* Figure 14: local diffuse shading, local visibility, global visibility, against global visibility by 2048 rays. */
-static void study_shading(const study *s) {
-    isogi_dvr_desc desc = s->base;
-    frame f, reference;
-    desc.directions = quick ? 256 : 2048;
-    reference = frame_of(s, &desc, 0, &s->lighting);
-    f = frame_of(s, &s->base, 0, &s->lighting), rows("shading", s, "default", "global visibility", &f, &reference, 1, 1, "frame"),
-    free(f.srgb);
-    desc = s->base, desc.method = ISOGI_DVR_PAPER;
-    for (int local = 0; local < 2 && !sweeps_alone; local++) {
-        f = frame_of(s, &desc, local, &s->lighting);
-        rows("shading", s, local ? "paper-local" : "paper", local ? "local visibility" : "global visibility", &f, &reference, 1, 1,
-             "frame"),
-            free(f.srgb);
+/* Figure 14: local diffuse shading, local visibility, global visibility, and no light at all; each at an exposure of its own. */
+static void study_shading(study *s) {
+    static const struct { const char *method, *setting; isogi_dvr_method by; isogi_dvr_shading shading; int local; } list[] = {
+        {"default", "global visibility", ISOGI_DVR_METHOD_DEFAULT, ISOGI_DVR_VISIBILITY, 0},
+        {"paper", "global visibility", ISOGI_DVR_PAPER, ISOGI_DVR_VISIBILITY, 0},
+        {"paper-local", "local visibility", ISOGI_DVR_PAPER, ISOGI_DVR_VISIBILITY, 1},
+        {"diffuse", "by the gradient", ISOGI_DVR_METHOD_DEFAULT, ISOGI_DVR_LOCAL, 0},
+        {"unlit", "unlit", ISOGI_DVR_METHOD_DEFAULT, ISOGI_DVR_UNLIT, 0}};
+    frame reference = frame_from(s, &s->base, TRUNCATED, 0, &s->lighting);
+    for (size_t i = 0; i < sizeof list / sizeof *list; i++) {
+        char setting[64];
+        isogi_dvr_desc desc = s->base;
+        if (sweeps_alone && list[i].by == ISOGI_DVR_PAPER) continue;
+        desc.method = list[i].by, desc.shading = list[i].shading;
+        frame f = frame_from(s, &desc, COMPUTED, list[i].local, &s->lighting);
+        snprintf(setting, sizeof setting, "%s; exposure x %.3g", list[i].setting, expose_like(&f, s, &reference));
+        rows("shading", s, list[i].method, setting, &f, &reference, 1, 1, "frame"), release(&f);
     }
-    desc = s->base, desc.shading = ISOGI_DVR_LOCAL;
-    f = frame_of(s, &desc, 0, &s->lighting), rows("shading", s, "diffuse", "by the gradient", &f, &reference, 1, 1, "frame"), free(f.srgb);
-    desc.shading = ISOGI_DVR_UNLIT;
-    f = frame_of(s, &desc, 0, &s->lighting), rows("shading", s, "unlit", "", &f, &reference, 1, 1, "frame"), free(f.srgb);
-    free(reference.srgb);
+    release(&reference);
 }
 
-/* Tables 1 and 2: update and frame at the paper's own settings, and bytes: in megabytes where the error stands elsewhere. */
-static void tables(const study *s) {
-    isogi_dvr_desc desc = s->base;
-    frame f = frame_of(s, &desc, 0, &s->lighting);
+/* Tables 1 and 2: update and frame at the paper's own settings, and megabytes. */
+static void tables(study *s) {
     const double megabyte = 1 << 20;
-    row("table-1", s->name, "", "default", "update", f.update, 0, 1, "update"),
-        row("table-1", s->name, "", "frame", "by sweeps", f.render, 0, 1, "frame");
-    row("table-2", s->name, "", "default", "megabytes: global", f.update, (double)f.report.global_bytes / megabyte, 1, "update");
-    free(f.srgb);
-    if (sweeps_alone) return;
-    desc.method = ISOGI_DVR_PAPER, f = frame_of(s, &desc, 0, &s->lighting);
-    row("table-1", s->name, "", "paper", "update", f.update, 0, 1, "update"),
-        row("table-1", s->name, "", "paper-frame", "by blocks", f.render, 0, 1, "frame");
-    row("table-2", s->name, "", "paper", "megabytes: data", f.update, (double)f.report.data_bytes / megabyte, 1, "update");
-    row("table-2", s->name, "", "paper", "megabytes: index", f.update, (double)f.report.index_bytes / megabyte, 1, "update");
-    row("table-2", s->name, "", "paper", "megabytes: local", f.update, (double)f.report.local_bytes / megabyte, 1, "update");
-    row("table-2", s->name, "", "paper", "megabytes: global", f.update, (double)f.report.global_bytes / megabyte, 1, "update");
-    row("table-2", s->name, "", "paper", "megabytes: all", f.update,
-        (double)(f.report.data_bytes + f.report.index_bytes + f.report.local_bytes + f.report.global_bytes) / megabyte, 1, "update");
-    free(f.srgb);
+    frame reference = frame_from(s, &s->base, TRUNCATED, 0, &s->lighting);
+    for (int paper = 0; paper < 2 - sweeps_alone; paper++) {
+        isogi_dvr_desc desc = s->base;
+        if (paper) desc.method = ISOGI_DVR_PAPER;
+        frame f = frame_of(s, &desc);
+        const double error = rmse(&f, &reference);
+        const size_t bytes[4] = {f.report.global_bytes, f.report.local_bytes, f.report.index_bytes, f.report.data_bytes};
+        static const char *const names[5] = {"global", "local", "index", "data", "all"};
+        row("table-1", s->name, "", paper ? "paper" : "default", "update", f.update, error, 1, "update");
+        row("table-1", s->name, "", paper ? "paper-frame" : "frame", paper ? "by blocks" : "by sweeps", f.render, error, 1, "frame");
+        for (int i = 0; i < (paper ? 5 : 1); i++)
+            row("table-2", s->name, "", paper ? "paper" : "default", names[i], f.update, error,
+                (double)(i < 4 ? bytes[i] : bytes[0] + bytes[1] + bytes[2] + bytes[3]) / megabyte, "megabyte");
+        release(&f);
+    }
+    release(&reference);
 }
 
-static void studies(const study *s) {
-    static const struct { const char *name; void (*run)(const study *); } list[] = {
+static void studies(study *s) {
+    static const struct { const char *name; void (*run)(study *); } list[] = {
         {"rays", study_rays}, {"coefficients", study_coefficients}, {"blocks", study_blocks}, {"grid", study_grids},
         {"resolutions", study_resolutions}, {"frames", study_frames}, {"shading", study_shading}};
     for (size_t i = 0; i < sizeof list / sizeof *list; i++)
-        if (!only_study || !strcmp(only_study, list[i].name)) list[i].run(s);
+        if (only_study ? !strcmp(only_study, list[i].name) : !quick || list[i].run != study_resolutions) list[i].run(s);
 }
 
 static void look_at(study *s, const double toward[3], const float up[3]) {
@@ -316,7 +437,7 @@ static void bench_procedural(void) {
     if (quick) s.base.grid[0] = s.base.grid[1] = s.base.grid[2] = 24, s.base.directions = 64;
     look_at(&s, toward, up), expose(&s);
     studies(&s);
-    isogi_vol_free(s.pyramid), procedural_free(&volume);
+    isogi_vol_free(s.pyramid), procedural_free(&volume), free(s.truth);
 }
 
 /* Marschner-Lobb in a box of side 2 under a sun and a sky, for several resolutions alone. */
@@ -390,9 +511,9 @@ static void bench_real(int which) {
         s[which].lighting.env.rgb = image.rgb, s[which].lighting.env.width = image.width, s[which].lighting.env.height = image.height;
     need(isogi_vol_build(&s[which].pyramid, &volume, &two), "build");
     look_at(&s[which], which ? upright : turned, up[!which]), expose(&s[which]);
-    if (!only_study) tables(&s[which]);
+    if (!only_study || !strcmp(only_study, "tables")) tables(&s[which]);
     if (!which) studies(s);
-    isogi_vol_free(s[which].pyramid), free(image.rgb), free(data);
+    isogi_vol_free(s[which].pyramid), free(image.rgb), free(data), free(s[which].truth);
 }
 
 int main(int argc, char **argv) {

@@ -87,8 +87,8 @@ static uint64_t brute_hash(uint64_t key, const void *data, size_t bytes) {
     return key;
 }
 
-/* All that defines it but the library's own code. */
-static uint64_t brute_key(const isogi_dvr *d, const isogi_transfer *transfer) {
+/* All that defines it but the library's own code, and what `also` stands for where it is not 0. */
+static uint64_t brute_key(const isogi_dvr *d, const isogi_transfer *transfer, uint64_t also) {
     const isogi_volume *v = isogi_vol_volume(d->desc.pyramid);
     const double numbers[] = {(double)d->desc.order, (double)d->desc.directions, BRUTE_STEP, (double)d->desc.grid[0],
                               (double)d->desc.grid[1], (double)d->desc.grid[2], (double)v->size[0], (double)v->size[1],
@@ -98,6 +98,7 @@ static uint64_t brute_key(const isogi_dvr *d, const isogi_transfer *transfer) {
         key = brute_hash(key, &transfer->points[i].value, sizeof(double));
         key = brute_hash(key, &transfer->points[i].extinction, sizeof(float));
     }
+    if (also) key = brute_hash(key, &also, sizeof also);
     return brute_hash(key, v->data, v->size[0] * v->size[1] * v->size[2] * (v->type == ISOGI_F32 ? 4 : 1));
 }
 
@@ -274,7 +275,7 @@ static void brute_check(const isogi_dvr *d, const uint8_t *marked, const char *n
     }
     if (sum <= limit * limit * norm) return;
     remove(path);
-    fprintf(stderr, "bench_dvr: %s: kept visibility and brute force differ by %.3g at %zu points\n", name, sqrt(sum / norm), looked);
+    fprintf(stderr, "%s: kept visibility and brute force differ by %.3g at %zu points\n", name, sqrt(sum / norm), looked);
     exit(1);
 }
 
@@ -285,8 +286,9 @@ static double brute_now(void) {
 }
 
 /* To a renderer whose method is brute force, in place of isogi_dvr_step: visibility where the view looks. Kept as it is computed; limit is
-   that of brute_check. */
-static void brute_visibility(isogi_dvr *d, const isogi_view *view, const isogi_transfer *transfer, const char *name, double limit) {
+   that of brute_check. also: a number of what the caller has put into `direction` and `kernel`, 0 where they are the library's. */
+static void brute_visibility(isogi_dvr *d, const isogi_view *view, const isogi_transfer *transfer, const char *name, uint64_t also,
+                             double limit) {
     uint8_t *needed = (uint8_t *)calloc(d->point_count, 2), *marked = needed + d->point_count;
     uint32_t *point = (uint32_t *)malloc(d->point_count * sizeof *point);
     size_t count = 0, n = d->coefficients, known = 0, done, rays = (size_t)d->desc.directions;
@@ -298,7 +300,8 @@ static void brute_visibility(isogi_dvr *d, const isogi_view *view, const isogi_t
     if (!needed || !point || !job.dir) exit(1);
     memset(d->visibility, 0, d->point_count * n * sizeof *d->visibility); /* what is in the dark counts for nothing */
     brute_mark(d, view, transfer, needed), memcpy(marked, needed, d->point_count);
-    snprintf(path, sizeof path, "build/bench/brute-%s-%d-%016llx", name, d->desc.directions, (unsigned long long)brute_key(d, transfer));
+    snprintf(path, sizeof path, "build/bench/brute-%s-%d-%016llx", name, d->desc.directions,
+             (unsigned long long)brute_key(d, transfer, also));
     file = fopen(path, "r+b");
     if (!file) file = fopen(path, "w+b");
     if (file) known = brute_read(file, d, needed);

@@ -43,8 +43,8 @@ wanted() {
     visibility) scene=torus-sphere-plane
         for error in rmse seen; do
             echo "rays-$scene-$error:sweep*2" "rays-$scene-$error:paper*3" "coefficients-$scene-$error:sweep*3" \
-                "reduction-$scene-$error:paper*3" "radius-$scene-$error:paper*3" "grid-$scene-$error:sweep" \
-                "resolutions-$scene-$error:coarsest-8" "shading-$scene-$error:diffuse" "shading-$scene-$error:paper-local" \
+                "reduction-$scene-$error:paper*3" "radius-$scene-$error:paper*3" "grid-$scene-$error:sweep" "grid-$scene-$error:brute*2" \
+                "coefficients-$scene-$error:truncation*4" "shading-$scene-$error:diffuse" "shading-$scene-$error:paper-local" \
                 "shading-$scene-$error:unlit"
         done
         echo "frames-$scene" "frames-$scene:directional*3" "frames-$scene:point*4" ;;
