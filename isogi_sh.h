@@ -1623,6 +1623,7 @@ typedef int32_t isogi_sh__i16 __attribute__((vector_size(64), aligned(4), may_al
 typedef int64_t isogi_sh__l4 __attribute__((vector_size(32), aligned(8), may_alias));
 typedef long long isogi_sh__l8 __attribute__((vector_size(64), aligned(8), may_alias));
 typedef double isogi_sh__d2 __attribute__((vector_size(16), aligned(8), may_alias));
+typedef double isogi_sh__two __attribute__((aligned(4), may_alias)); /* 2 floats */
 
 #define ISOGI_SH__AVX2 __attribute__((target("avx2,fma")))
 #define ISOGI_SH__AVX512 __attribute__((target("avx2,fma,avx512f,avx512vl,avx512dq")))
@@ -1650,11 +1651,13 @@ typedef double isogi_sh__d2 __attribute__((vector_size(16), aligned(8), may_alia
 #if defined(__clang__)
 #define ISOGI_SH__HALF_D8(v, k) __builtin_shufflevector(v, v, 4 * k, 4 * k + 1, 4 * k + 2, 4 * k + 3)
 #define ISOGI_SH__JOIN_F8(a, b) __builtin_shufflevector(a, b, 0, 1, 2, 3, 4, 5, 6, 7)
+#define ISOGI_SH__TWICE_F4(p) ISOGI_SH__JOIN_F8(*(const isogi_sh__f4 *)(p), *(const isogi_sh__f4 *)(p))
 #define ISOGI_SH__JOIN_HALVES(a, b) __builtin_shufflevector(a, b, 0, 1, 2, 3, 4, 5, 6, 7)
 #define ISOGI_SH__JOIN_F16(a, b, c, d) __builtin_shufflevector(ISOGI_SH__JOIN_F8(a, b), ISOGI_SH__JOIN_F8(c, d), 0, 1, 2, 3, 4, 5, 6, 7, \
     8, 9, 10, 11, 12, 13, 14, 15)
 #else
 #define ISOGI_SH__JOIN_F8(a, b) ((isogi_sh__f8)__builtin_ia32_vinsertf128_ps256(__builtin_ia32_ps256_ps(a), b, 1))
+#define ISOGI_SH__TWICE_F4(p) __builtin_ia32_vbroadcastf128_ps256((const isogi_sh__f4 *)(p))
 #define ISOGI_SH__HALF_D8(v, k) ((isogi_sh__d4)__builtin_ia32_extractf64x4_mask(v, k, none, ISOGI_SH__ALL8))
 #define ISOGI_SH__JOIN_HALVES(a, b) ((isogi_sh__d8)__builtin_ia32_insertf64x4_mask(__builtin_ia32_pd512_256pd(a), b, 1, \
     __builtin_ia32_pd512_256pd(a), ISOGI_SH__ALL8))
@@ -3399,58 +3402,69 @@ ISOGI_API isogi_result isogi_sh_rotation_build(float *rotation, int order, const
 }
 
 #ifdef ISOGI_SH__SIMD
-/* One channel of order 5: columns times numbers. What is loaded and stored past a band is overwritten by the next one; the ninth
-   row of degree 4 is a sum of its own. Loads are what this waits for, so most of the numbers are spread from registers, four a
-   load: the empty assembly keeps the compiler from fetching each by itself. */
+/* One channel of order 5: columns times numbers. What is loaded and stored past a band is overwritten by the next one. Loads are what
+   this waits for, so the numbers are spread from registers, four a load: the empty assembly keeps the compiler from fetching each by
+   itself. Degree 4 has nine rows: of an even column the first eight are loaded, of an odd one the last eight, so that the ninth rows of
+   two neighbours stand together. Degrees 0 and 1 share four lanes. */
 #define ISOGI_SH__COLUMN(sum, offset, x) sum = ISOGI_SH__FMA_F8(*(const isogi_sh__f8 *)(rotation + (offset)), x, sum)
-#define ISOGI_SH__FOUR(i)                                                                                                             \
-    four = __builtin_shufflevector(*(const isogi_sh__f4 *)(in + (i)), *(const isogi_sh__f4 *)(in + (i)), 0, 1, 2, 3, 0, 1, 2, 3); \
-    __asm__("" : "+x"(four))
-#define ISOGI_SH__OF_FOUR(i) x = __builtin_shufflevector(four, four, i, i, i, i, i + 4, i + 4, i + 4, i + 4)
-#define ISOGI_SH__BOTH(j) ISOGI_SH__COLUMN(d, 84 + 9 * (j), x), last = __builtin_fmaf(rotation[92 + 9 * (j)], x[0], last)
+#define ISOGI_SH__FOUR(i) four = ISOGI_SH__TWICE_F4(in + (i)); __asm__("" : "+x"(four))
+#define ISOGI_SH__SPREAD(i) __builtin_shufflevector(four, four, i, i, i, i, i + 4, i + 4, i + 4, i + 4)
+#define ISOGI_SH__OF_FOUR(i, sum, offset) ISOGI_SH__COLUMN(sum, offset, ISOGI_SH__SPREAD(i))
+#define ISOGI_SH__NINTH(i, j)                                                                                           \
+    ((isogi_sh__f4)(isogi_sh__d2){*(const isogi_sh__two *)(rotation + (i)), *(const isogi_sh__two *)(rotation + (j))} * \
+     __builtin_shufflevector(four, four, 0, 1, 2, 3))
 ISOGI_SH__AVX2 static isogi_result isogi_sh__apply_order5(float *out, const float *in, const float *rotation) {
-    isogi_sh__f8 zero = {0}, a = zero, b = zero, c = zero, d = zero, x = ISOGI_SH__SPLAT_F8(in[16]), four;
-    float last = 0;
-    int j;
-    ISOGI_SH__BOTH(0);
-    ISOGI_SH__UNROLL9
-    for (j = 0; j < 3; j++) ISOGI_SH__COLUMN(a, 1 + 3 * j, ISOGI_SH__SPLAT_F8(in[1 + j]));
-    ISOGI_SH__FOUR(17);
-    ISOGI_SH__OF_FOUR(0), ISOGI_SH__BOTH(1);
-    ISOGI_SH__OF_FOUR(1), ISOGI_SH__BOTH(2);
-    ISOGI_SH__OF_FOUR(2), ISOGI_SH__BOTH(3);
-    ISOGI_SH__OF_FOUR(3), ISOGI_SH__BOTH(4);
+    isogi_sh__f8 zero = {0}, b = zero, c = zero, even, odd = zero, x = ISOGI_SH__SPLAT_F8(in[24]), four;
+    isogi_sh__f4 none = {0}, a = *(const isogi_sh__f4 *)in, ninth, rest;
+    ISOGI_SH__FOUR(16);
+    ninth = ISOGI_SH__NINTH(92, 110);
+    even = ISOGI_SH__SPREAD(0) * *(const isogi_sh__f8 *)(rotation + 84);
+    ISOGI_SH__OF_FOUR(1, odd, 94);
+    ISOGI_SH__OF_FOUR(2, even, 102);
+    ISOGI_SH__OF_FOUR(3, odd, 112);
+    ISOGI_SH__FOUR(20);
+    ninth += ISOGI_SH__NINTH(128, 146);
+    ISOGI_SH__OF_FOUR(0, even, 120);
+    ISOGI_SH__OF_FOUR(1, odd, 130);
+    ISOGI_SH__OF_FOUR(2, even, 138);
+    ISOGI_SH__OF_FOUR(3, odd, 148);
+    ISOGI_SH__COLUMN(even, 156, x);
+    ISOGI_SH__FOUR(8);
+    ISOGI_SH__OF_FOUR(0, b, 30);
+    ISOGI_SH__OF_FOUR(1, c, 35);
+    ISOGI_SH__OF_FOUR(2, c, 42);
+    ISOGI_SH__OF_FOUR(3, c, 49);
     ISOGI_SH__FOUR(4);
-    ISOGI_SH__OF_FOUR(0), ISOGI_SH__COLUMN(b, 10, x);
-    ISOGI_SH__OF_FOUR(1), ISOGI_SH__COLUMN(b, 15, x);
-    ISOGI_SH__OF_FOUR(2), ISOGI_SH__COLUMN(b, 20, x);
-    ISOGI_SH__OF_FOUR(3), ISOGI_SH__COLUMN(b, 25, x);
-    ISOGI_SH__COLUMN(b, 30, ISOGI_SH__SPLAT_F8(in[8]));
-    ISOGI_SH__FOUR(9);
-    ISOGI_SH__OF_FOUR(0), ISOGI_SH__COLUMN(c, 35, x);
-    ISOGI_SH__OF_FOUR(1), ISOGI_SH__COLUMN(c, 42, x);
-    ISOGI_SH__OF_FOUR(2), ISOGI_SH__COLUMN(c, 49, x);
-    ISOGI_SH__OF_FOUR(3), ISOGI_SH__COLUMN(c, 56, x);
-    ISOGI_SH__FOUR(21);
-    ISOGI_SH__OF_FOUR(0), ISOGI_SH__BOTH(5);
-    ISOGI_SH__OF_FOUR(1), ISOGI_SH__BOTH(6);
-    ISOGI_SH__OF_FOUR(2), ISOGI_SH__BOTH(7);
-    ISOGI_SH__OF_FOUR(3), ISOGI_SH__BOTH(8);
+    ISOGI_SH__OF_FOUR(0, b, 10);
+    ISOGI_SH__OF_FOUR(1, b, 15);
+    ISOGI_SH__OF_FOUR(2, b, 20);
+    ISOGI_SH__OF_FOUR(3, b, 25);
     ISOGI_SH__FOUR(12);
-    ISOGI_SH__OF_FOUR(1), ISOGI_SH__COLUMN(c, 63, x);
-    ISOGI_SH__OF_FOUR(2), ISOGI_SH__COLUMN(c, 70, x);
-    ISOGI_SH__OF_FOUR(3), ISOGI_SH__COLUMN(c, 77, x);
-    out[0] = rotation[0] * in[0];
-    *(isogi_sh__f8 *)(out + 1) = a;
+    ISOGI_SH__OF_FOUR(0, c, 56);
+    ISOGI_SH__OF_FOUR(1, c, 63);
+    ISOGI_SH__OF_FOUR(2, c, 70);
+    ISOGI_SH__OF_FOUR(3, c, 77);
+    __asm__("" : "+x"(a));
+    rest = *(const isogi_sh__f4 *)(rotation + 3) * __builtin_shufflevector(a, a, 2, 2, 2, 2);
+    rest += *(const isogi_sh__f4 *)(rotation + 6) * __builtin_shufflevector(a, a, 3, 3, 3, 3);
+    a = *(const isogi_sh__f4 *)rotation * __builtin_shufflevector(a, a, 0, 1, 1, 1) + __builtin_shufflevector(none, rest, 0, 5, 6, 7);
+    *(isogi_sh__f4 *)out = a;
     *(isogi_sh__f8 *)(out + 4) = b;
     *(isogi_sh__f8 *)(out + 9) = c;
-    *(isogi_sh__f8 *)(out + 16) = d;
-    out[24] = last;
+    /* odd: row 8 and rows 1 to 7; ninth: rows 8 and 0 */
+    odd = __builtin_shufflevector(odd, odd, 7, 0, 1, 2, 3, 4, 5, 6);
+    ninth += __builtin_shufflevector(ninth, ninth, 2, 3, 0, 1);
+    __asm__("" : "+x"(odd));
+    out[24] = __builtin_fmaf(rotation[164], x[0], ninth[0] + odd[0]);
+    ninth = __builtin_shufflevector(ninth, ninth, 1, 1, 3, 3);
+    even += __builtin_ia32_blendps256(odd, __builtin_shufflevector(ninth, none, 0, 1, 2, 3, 4, 5, 6, 7), 1);
+    *(isogi_sh__f8 *)(out + 16) = even;
     return ISOGI_OK;
 }
+#undef ISOGI_SH__NINTH
+#undef ISOGI_SH__SPREAD
 #undef ISOGI_SH__COLUMN
 #undef ISOGI_SH__OF_FOUR
-#undef ISOGI_SH__BOTH
 #undef ISOGI_SH__FOUR
 #endif
 
