@@ -2126,7 +2126,7 @@ static size_t isogi_sh__eval_rows_f32(float *y, int order, const float (*directi
 }
 
 /* The same for structures of arrays, whose functions stand `stride` apart. */
-static size_t isogi_sh__eval_columns_f32(float *out, size_t stride, int order, const float *x, const float *y, const float *z,
+ISOGI_SH__INLINE size_t isogi_sh__eval_columns_f32(float *out, size_t stride, int order, const float *x, const float *y, const float *z,
                                          size_t count) {
     size_t done = 0;
     int level = 0;
@@ -2159,12 +2159,14 @@ static size_t isogi_sh__eval_columns_f64(double *out, size_t stride, int order, 
 }
 #endif
 
-/* count * order^2 elements of `size` bytes are addressable */
-static int isogi_sh__fits(size_t count, int order, size_t size) { return count <= (size_t)-1 / 2 / size / ISOGI_SH_COUNT(order); }
+/* count * order^2 elements of `size` bytes are addressable; it takes no division where they are at the highest order */
+ISOGI_SH__INLINE int isogi_sh__fits(size_t count, int order, size_t size) {
+    return count <= (size_t)-1 / 2 / size / ISOGI_SH_COUNT(ISOGI_SH_MAX_ORDER) || count <= (size_t)-1 / 2 / size / ISOGI_SH_COUNT(order);
+}
 
 /* count directions, and as many values of every channel, of `size` bytes a number are */
-static int isogi_sh__samples_fit(size_t count, int channels, size_t size) {
-    return count <= (size_t)-1 / 2 / size / (size_t)(channels > 3 ? channels : 3);
+ISOGI_SH__INLINE int isogi_sh__samples_fit(size_t count, int channels, size_t size) {
+    return count <= (size_t)-1 / 2 / size / 16 || count <= (size_t)-1 / 2 / size / (size_t)(channels > 3 ? channels : 3);
 }
 
 ISOGI_API isogi_result isogi_sh_eval(float *y, int order, const float (*direction)[3], size_t count) {
@@ -2215,17 +2217,24 @@ ISOGI_API isogi_result isogi_sh_eval_f64(double *y, int order, const double (*di
     return ISOGI_OK;
 }
 
-static isogi_result isogi_sh__eval_soa(void *basis, int is_double, int order, const void *x, const void *y, const void *z, size_t count) {
+/* directions from i on, those first that are not for vector units */
+ISOGI_SH__APART isogi_result isogi_sh__eval_soa(void *basis, int is_double, int order, const void *x, const void *y, const void *z,
+                                                size_t i, size_t count) {
     isogi_sh__output out = {NULL, 1, 0, 0};
-    size_t i = 0, size = is_double ? sizeof(double) : sizeof(float);
-    if (!isogi_sh__order_ok(order) || (count && (!basis || !x || !y || !z))) return ISOGI_INVALID;
-    if (!isogi_sh__fits(count, order, size)) return ISOGI_TOO_LARGE;
     out.data = basis;
     out.index_stride = count;
     out.is_double = is_double;
     while (i < count) {
         isogi_sh__unit u[ISOGI_SH__LANES];
-        int k, lanes;
+        int k, lanes = count - i < ISOGI_SH__LANES ? (int)(count - i) : ISOGI_SH__LANES;
+        for (k = 0; k < lanes; k++) {
+            size_t j = i + (size_t)k;
+            if (is_double) u[k] = isogi_sh__normalise(((const double *)x)[j], ((const double *)y)[j], ((const double *)z)[j]);
+            else
+                u[k] = isogi_sh__normalise((double)((const float *)x)[j], (double)((const float *)y)[j], (double)((const float *)z)[j]);
+        }
+        isogi_sh__eval_block(&out, i, lanes, order, u);
+        i += (size_t)lanes;
 #ifdef ISOGI_SH__VECTORS
         if (!is_double)
             i += isogi_sh__eval_columns_f32((float *)basis + i, count, order, (const float *)x + i, (const float *)y + i,
@@ -2236,25 +2245,28 @@ static isogi_result isogi_sh__eval_soa(void *basis, int is_double, int order, co
             i += isogi_sh__eval_columns_f64((double *)basis + i, count, order, (const double *)x + i, (const double *)y + i,
                                             (const double *)z + i, count - i);
 #endif
-        lanes = count - i < ISOGI_SH__LANES ? (int)(count - i) : ISOGI_SH__LANES;
-        for (k = 0; k < lanes; k++) {
-            size_t j = i + (size_t)k;
-            if (is_double) u[k] = isogi_sh__normalise(((const double *)x)[j], ((const double *)y)[j], ((const double *)z)[j]);
-            else
-                u[k] = isogi_sh__normalise((double)((const float *)x)[j], (double)((const float *)y)[j], (double)((const float *)z)[j]);
-        }
-        if (lanes) isogi_sh__eval_block(&out, i, lanes, order, u);
-        i += (size_t)lanes;
     }
     return ISOGI_OK;
 }
 
 ISOGI_API isogi_result isogi_sh_eval_soa(float *basis, int order, const float *x, const float *y, const float *z, size_t count) {
-    return isogi_sh__eval_soa(basis, 0, order, x, y, z, count);
+    size_t done = 0;
+    if (!isogi_sh__order_ok(order) || (count && (!basis || !x || !y || !z))) return ISOGI_INVALID;
+    if (!isogi_sh__fits(count, order, sizeof *basis)) return ISOGI_TOO_LARGE;
+#ifdef ISOGI_SH__VECTORS
+    done = isogi_sh__eval_columns_f32(basis, count, order, x, y, z, count);
+#endif
+    return done < count ? isogi_sh__eval_soa(basis, 0, order, x, y, z, done, count) : ISOGI_OK;
 }
 
 ISOGI_API isogi_result isogi_sh_eval_soa_f64(double *basis, int order, const double *x, const double *y, const double *z, size_t count) {
-    return isogi_sh__eval_soa(basis, 1, order, x, y, z, count);
+    size_t done = 0;
+    if (!isogi_sh__order_ok(order) || (count && (!basis || !x || !y || !z))) return ISOGI_INVALID;
+    if (!isogi_sh__fits(count, order, sizeof *basis)) return ISOGI_TOO_LARGE;
+#ifdef ISOGI_SH__SIMD
+    done = isogi_sh__eval_columns_f64(basis, count, order, x, y, z, count);
+#endif
+    return done < count ? isogi_sh__eval_soa(basis, 1, order, x, y, z, done, count) : ISOGI_OK;
 }
 
 /* ==== gradients ====================================================================================================== */
