@@ -1690,13 +1690,25 @@ ISOGI_SH__AVX2 ISOGI_SH__INLINE void isogi_sh__join_f8_turn(float *y, size_t n, 
     for (; i < n; i++)
         for (k = 0; k < 4; k++) y[n * k + i] = in[pitch * i + k];
 }
-/* y[k][i] = row i of column k for an 8 x 8 tile in memory */
-ISOGI_SH__AVX2 ISOGI_SH__INLINE void isogi_sh__transpose_f8(float *y, size_t n, const isogi_sh__f8 *row) {
+/* y[k][i] = row i of column k for one or two 8 x 8 tiles in memory; see isogi_sh__transpose_f16 */
+ISOGI_SH__AVX2 ISOGI_SH__INLINE void isogi_sh__transpose_f8(float *y, size_t n, const isogi_sh__f8 *row, size_t tiles) {
     const float *in = (const float *)row;
-    size_t half, i = 0, pitch = 8;
+    size_t half, tile, k, pitch = 8;
     for (half = 0; half < 2; half++, y += 4 * n, in += 4) {
-        isogi_sh__f8 a = ISOGI_SH__ROWS_F8(0), b = ISOGI_SH__ROWS_F8(1), c = ISOGI_SH__ROWS_F8(2), d = ISOGI_SH__ROWS_F8(3);
-        ISOGI_SH__TURN(isogi_sh__f8, F8)
+        isogi_sh__f8 v[2][4];
+        ISOGI_SH__UNROLL
+        for (tile = 0; tile < tiles; tile++) {
+            isogi_sh__f8 a = ISOGI_SH__ROWS_F8(8 * tile), b = ISOGI_SH__ROWS_F8(8 * tile + 1), c = ISOGI_SH__ROWS_F8(8 * tile + 2),
+                         d = ISOGI_SH__ROWS_F8(8 * tile + 3);
+            isogi_sh__f8 e = ISOGI_SH__LOW_F8(a, b), f = ISOGI_SH__HIGH_F8(a, b), g = ISOGI_SH__LOW_F8(c, d), h = ISOGI_SH__HIGH_F8(c, d);
+            v[tile][0] = ISOGI_SH__EVEN_F8(e, g), v[tile][1] = ISOGI_SH__ODD_F8(e, g);
+            v[tile][2] = ISOGI_SH__EVEN_F8(f, h), v[tile][3] = ISOGI_SH__ODD_F8(f, h);
+        }
+        ISOGI_SH__UNROLL
+        for (k = 0; k < 4; k++) {
+            ISOGI_SH__UNROLL
+            for (tile = 0; tile < tiles; tile++) *(isogi_sh__f8 *)(y + n * k + 8 * tile) = v[tile][k];
+        }
     }
 }
 
@@ -1753,16 +1765,17 @@ ISOGI_SH__AVX512 ISOGI_SH__INLINE void isogi_sh__eval_f16_turn(float *y, size_t 
 }
 
 ISOGI_SH__AVX2 ISOGI_SH__INLINE void isogi_sh__eval_d4_turn(double *y, size_t n, const isogi_sh__d4 *row) {
-    int half;
+    isogi_sh__d4 v[2][4];
+    size_t half, k;
     ISOGI_SH__UNROLL
-    for (half = 0; half < 2; half++, row += 4, y += 4) {
+    for (half = 0; half < 2; half++, row += 4) {
         isogi_sh__d4 a = __builtin_shufflevector(row[0], row[1], 0, 4, 2, 6), b = __builtin_shufflevector(row[0], row[1], 1, 5, 3, 7);
         isogi_sh__d4 c = __builtin_shufflevector(row[2], row[3], 0, 4, 2, 6), d = __builtin_shufflevector(row[2], row[3], 1, 5, 3, 7);
-        *(isogi_sh__d4 *)y = __builtin_shufflevector(a, c, 0, 1, 4, 5);
-        *(isogi_sh__d4 *)(y + n) = __builtin_shufflevector(b, d, 0, 1, 4, 5);
-        *(isogi_sh__d4 *)(y + 2 * n) = __builtin_shufflevector(a, c, 2, 3, 6, 7);
-        *(isogi_sh__d4 *)(y + 3 * n) = __builtin_shufflevector(b, d, 2, 3, 6, 7);
+        v[half][0] = __builtin_shufflevector(a, c, 0, 1, 4, 5), v[half][1] = __builtin_shufflevector(b, d, 0, 1, 4, 5);
+        v[half][2] = __builtin_shufflevector(a, c, 2, 3, 6, 7), v[half][3] = __builtin_shufflevector(b, d, 2, 3, 6, 7);
     }
+    ISOGI_SH__UNROLL
+    for (k = 0; k < 4; k++) *(isogi_sh__d4 *)(y + n * k) = v[0][k], *(isogi_sh__d4 *)(y + n * k + 4) = v[1][k];
 }
 
 /* y[pitch i] = quarter i of each of four vectors, in turn */
@@ -1789,11 +1802,12 @@ ISOGI_SH__AVX512 ISOGI_SH__INLINE void isogi_sh__eval_d8_turn(double *y, size_t 
 }
 
 /* The same for 16 rows of floats and 8 of doubles from memory, where halves of two rows are joined by an insertion, so that one shuffle
-   is less and whole vectors are stored. */
-ISOGI_SH__AVX512 ISOGI_SH__INLINE void isogi_sh__transpose_f16(float *y, size_t n, const isogi_sh__f16 *row) {
+   is less and whole vectors are stored. Of `tiles` tiles, 1 or 2, those of a direction are stored one after the other where stores are what
+   this waits for: neighbours that cross lines of the cache are written in two thirds of the time. */
+ISOGI_SH__AVX512 ISOGI_SH__INLINE void isogi_sh__transpose_f16(float *y, size_t n, const isogi_sh__f16 *row, size_t tiles) {
     const float *in = (const float *)row;
     size_t half, k, pitch = 16;
-    for (half = 0; half < 2; half++, y += 8 * n, in += 8) {
+    for (half = 0; half < 2 * tiles; half++, y += half & 1 ? 8 * n : 16 - 8 * n, in += half & 1 ? 8 : 248) {
         isogi_sh__f16 v[2][4];
         ISOGI_SH__UNROLL
         for (k = 0; k < 2; k++) {
@@ -1815,21 +1829,35 @@ ISOGI_SH__AVX512 ISOGI_SH__INLINE void isogi_sh__transpose_f16(float *y, size_t 
     }
 }
 
-ISOGI_SH__AVX512 ISOGI_SH__INLINE void isogi_sh__transpose_d8(double *y, size_t n, const isogi_sh__d8 *row) {
+ISOGI_SH__AVX512 ISOGI_SH__INLINE void isogi_sh__transpose_d8(double *y, size_t n, const isogi_sh__d8 *row, size_t tiles) {
     const double *in = (const double *)row;
-    size_t half, pitch = 8;
+    size_t half, tile, k, pitch = 8;
     for (half = 0; half < 2; half++, y += 4 * n, in += 4) {
-        const isogi_sh__d8 a = ISOGI_SH__JOIN_D8(0, 2), b = ISOGI_SH__JOIN_D8(1, 3), c = ISOGI_SH__JOIN_D8(4, 6),
-                           d = ISOGI_SH__JOIN_D8(5, 7);
-        isogi_sh__d8 e = __builtin_shufflevector(a, b, 0, 8, 2, 10, 4, 12, 6, 14),
-                     f = __builtin_shufflevector(a, b, 1, 9, 3, 11, 5, 13, 7, 15);
-        isogi_sh__d8 g = __builtin_shufflevector(c, d, 0, 8, 2, 10, 4, 12, 6, 14),
-                     h = __builtin_shufflevector(c, d, 1, 9, 3, 11, 5, 13, 7, 15);
-        *(isogi_sh__d8 *)y = __builtin_shufflevector(e, g, 0, 1, 4, 5, 8, 9, 12, 13);
-        *(isogi_sh__d8 *)(y + n) = __builtin_shufflevector(f, h, 0, 1, 4, 5, 8, 9, 12, 13);
-        *(isogi_sh__d8 *)(y + 2 * n) = __builtin_shufflevector(e, g, 2, 3, 6, 7, 10, 11, 14, 15);
-        *(isogi_sh__d8 *)(y + 3 * n) = __builtin_shufflevector(f, h, 2, 3, 6, 7, 10, 11, 14, 15);
+        isogi_sh__d8 v[2][4];
+        ISOGI_SH__UNROLL
+        for (tile = 0; tile < tiles; tile++) {
+            const isogi_sh__d8 a = ISOGI_SH__JOIN_D8(8 * tile, 8 * tile + 2), b = ISOGI_SH__JOIN_D8(8 * tile + 1, 8 * tile + 3),
+                               c = ISOGI_SH__JOIN_D8(8 * tile + 4, 8 * tile + 6), d = ISOGI_SH__JOIN_D8(8 * tile + 5, 8 * tile + 7);
+            isogi_sh__d8 e = __builtin_shufflevector(a, b, 0, 8, 2, 10, 4, 12, 6, 14),
+                         f = __builtin_shufflevector(a, b, 1, 9, 3, 11, 5, 13, 7, 15);
+            isogi_sh__d8 g = __builtin_shufflevector(c, d, 0, 8, 2, 10, 4, 12, 6, 14),
+                         h = __builtin_shufflevector(c, d, 1, 9, 3, 11, 5, 13, 7, 15);
+            v[tile][0] = __builtin_shufflevector(e, g, 0, 1, 4, 5, 8, 9, 12, 13);
+            v[tile][1] = __builtin_shufflevector(f, h, 0, 1, 4, 5, 8, 9, 12, 13);
+            v[tile][2] = __builtin_shufflevector(e, g, 2, 3, 6, 7, 10, 11, 14, 15);
+            v[tile][3] = __builtin_shufflevector(f, h, 2, 3, 6, 7, 10, 11, 14, 15);
+        }
+        ISOGI_SH__UNROLL
+        for (k = 0; k < 4; k++) {
+            ISOGI_SH__UNROLL
+            for (tile = 0; tile < tiles; tile++) *(isogi_sh__d8 *)(y + n * k + 8 * tile) = v[tile][k];
+        }
     }
+}
+
+ISOGI_SH__AVX2 ISOGI_SH__INLINE void isogi_sh__transpose_d4(double *y, size_t n, const isogi_sh__d4 *row, size_t tiles) {
+    size_t tile;
+    for (tile = 0; tile < tiles; tile++) isogi_sh__eval_d4_turn(y + 8 * tile, n, row + 8 * tile);
 }
 
 /* directions into coordinates */
@@ -2018,8 +2046,10 @@ ISOGI_SH__AVX512 ISOGI_SH__INLINE void isogi_sh__eval_d8_split(isogi_sh__d8 *u, 
         if (count <= 16) {                                                                                                     \
             NAME##_turn(out + alone, n, rows + alone);                                                                         \
             if (count == 16) NAME##_turn(out + 8, n, rows + 8);                                                                \
-        } else                                                                                                                 \
-            for (k = alone; k < count; k += TILE) at = k < count - TILE ? k : count - TILE, TURN(out + at, n, rows + at);      \
+        } else {                                                                                                               \
+            for (k = alone; k + 2 * TILE <= count; k += 2 * TILE) TURN(out + k, n, rows + k, 2);                               \
+            for (; k < count; k += TILE) at = k < count - TILE ? k : count - TILE, TURN(out + at, n, rows + at, 1);            \
+        }                                                                                                                      \
     }                                                                                                                          \
     /* order 5, with the next directions made ready meanwhile */                                                               \
     TARGET static size_t NAME##_rows5(T *out, const T (*direction)[3], size_t count) {                                         \
@@ -2082,7 +2112,7 @@ ISOGI_SH__AVX512 ISOGI_SH__INLINE void isogi_sh__eval_d8_split(isogi_sh__d8 *u, 
     ISOGI_SH__DEFINE_FUSED(NAME, TARGET, double, V, I, WIDTH, ISOGI_SH__FMA_##SUFFIX, ISOGI_SH__LESS_##SUFFIX, isogi_sh__polynomials_f64, \
         1e-25, TURN, TILE)
 ISOGI_SH__DEFINE_F32(isogi_sh__eval_f8, ISOGI_SH__AVX2, isogi_sh__f8, isogi_sh__i8, 8, F8, isogi_sh__transpose_f8, 8)
-ISOGI_SH__DEFINE_F64(isogi_sh__eval_d4, ISOGI_SH__AVX2, isogi_sh__d4, isogi_sh__l4, 4, D4, isogi_sh__eval_d4_turn, 8)
+ISOGI_SH__DEFINE_F64(isogi_sh__eval_d4, ISOGI_SH__AVX2, isogi_sh__d4, isogi_sh__l4, 4, D4, isogi_sh__transpose_d4, 8)
 ISOGI_SH__DEFINE_F32(isogi_sh__eval_f16, ISOGI_SH__AVX512, isogi_sh__f16, isogi_sh__i16, 16, F16, isogi_sh__transpose_f16, 16)
 ISOGI_SH__DEFINE_F64(isogi_sh__eval_d8, ISOGI_SH__AVX512, isogi_sh__d8, isogi_sh__l8, 8, D8, isogi_sh__transpose_d8, 8)
 
@@ -3999,7 +4029,7 @@ ISOGI_SH__AVX2 static void isogi_sh__product_order5(float *out, const float *f, 
         }
     }
     for (i = 0; i < 24; i += 8) {
-        isogi_sh__transpose_f8((float *)turned, 8, scratch + i);
+        isogi_sh__transpose_f8((float *)turned, 8, scratch + i, 1);
         *(isogi_sh__f8 *)(out + i) = ((turned[0] + turned[1]) + (turned[2] + turned[3])) + ((turned[4] + turned[5]) + turned[6]);
     }
     out[24] =
