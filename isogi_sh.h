@@ -3452,9 +3452,12 @@ ISOGI_API isogi_result isogi_sh_rotation_build(float *rotation, int order, const
 #define ISOGI_SH__FOUR(i) four = ISOGI_SH__TWICE_F4(in + (i)); __asm__("" : "+x"(four))
 #define ISOGI_SH__SPREAD(i) __builtin_shufflevector(four, four, i, i, i, i, i + 4, i + 4, i + 4, i + 4)
 #define ISOGI_SH__OF_FOUR(i, sum, offset) ISOGI_SH__COLUMN(sum, offset, ISOGI_SH__SPREAD(i))
-#define ISOGI_SH__NINTH(i, j)                                                                                           \
-    ((isogi_sh__f4)(isogi_sh__d2){*(const isogi_sh__two *)(rotation + (i)), *(const isogi_sh__two *)(rotation + (j))} * \
-     __builtin_shufflevector(four, four, 0, 1, 2, 3))
+#define ISOGI_SH__NINTH(i, j) (isogi_sh__two_pairs(rotation + (i), rotation + (j)) * __builtin_shufflevector(four, four, 0, 1, 2, 3))
+ISOGI_SH__AVX2 ISOGI_SH__INLINE isogi_sh__f4 isogi_sh__two_pairs(const float *a, const float *b) {
+    isogi_sh__d2 pairs = {*(const isogi_sh__two *)a, *(const isogi_sh__two *)b};
+    return (isogi_sh__f4)pairs;
+}
+
 ISOGI_SH__AVX2 static isogi_result isogi_sh__apply_order5(float *out, const float *in, const float *rotation) {
     isogi_sh__f8 zero = {0}, b = zero, c = zero, even, odd = zero, x = ISOGI_SH__SPLAT_F8(in[24]), four;
     isogi_sh__f4 none = {0}, a = *(const isogi_sh__f4 *)in, ninth, rest;
@@ -5469,6 +5472,7 @@ ISOGI_API isogi_result isogi_sh_fit_directional(float direction[3], float rgb[3]
 #undef ISOGI_SH__ODD_F16
 #undef ISOGI_SH__ODD_F8
 #undef ISOGI_SH__PUT_F16
+#undef ISOGI_SH__TWICE_F4
 #undef ISOGI_SH__ROWS_F16
 #undef ISOGI_SH__ROWS_F8
 #undef ISOGI_SH__ROW_F4
