@@ -161,7 +161,7 @@ TEST(several_resolutions_err_as_the_fine_grid_at_the_memory_of_a_coarse_one) {
     field_free(&f);
 }
 
-/* Vectors of every path read the blocks as the plain code does; so do lights nearby, which are looked up without a table of light. */
+/* Vectors of every path read the blocks as the plain code does; so do lights nearby, which are added to it. */
 TEST(every_path_reads_the_blocks) {
     static float image[5][SIDE * SIDE][4];
     field f = field_of(ball, N);

@@ -446,6 +446,51 @@ TEST(visibility_is_looked_up_in_front_of_dense_matter_among_open_points) {
     isogi_vol_free(pyramid);
 }
 
+/* Lamps of every kind, in and beside soft matter and a sky: pre-integrated pictures of every path are those of samples a sixteenth of a
+   voxel apart, which isogi_sh_project lights one by one. */
+TEST(lamps_light_pieces_of_rays_as_they_light_samples) {
+    enum { SIDE = 33, W = 12 };
+    static float ball[SIDE][SIDE][SIDE], image[2][W * W][4];
+    const isogi_volume volume = {.data = ball, .type = ISOGI_F32, .size = {SIDE, SIDE, SIDE}};
+    const float sky[3] = {1, 0.5f, 0.2f};
+    const isogi_light lamps[4] = {
+        {.kind = ISOGI_LIGHT_POINT, .vector = {60, 50, 40}, .rgb = {9000, 6000, 3000}},
+        {.kind = ISOGI_LIGHT_POINT, .vector = {20, 27, 22}, .rgb = {400, 200, 300}},
+        {.kind = ISOGI_LIGHT_SPHERE, .vector = {10, 45, 30}, .rgb = {4000, 2000, 3000}, .radius = 8},
+        {.kind = ISOGI_LIGHT_RECTANGLE, .vector = {16, 16, 60}, .rgb = {3000, 5000, 4000}, .edge = {{-10, 0, 0}, {0, 10, 0}}}};
+    const isogi_transfer_point p[] = {{0, {1, 1, 1}, 0}, {2, {1, 0.8f, 0.6f}, 0.03f}, {16, {0.6f, 0.8f, 1}, 0.3f}};
+    const isogi_transfer transfer = {p, 3, NULL, 0};
+    const isogi_view view = {.width = W, .height = W, .eye = {70, 55, 80}, .target = {16, 16, 16}, .fov = 25};
+    isogi_pyramid *pyramid = NULL;
+    double worst = 0;
+    for (int i = 0; i < SIDE * SIDE * SIDE; i++)
+        ball[i / SIDE / SIDE][i / SIDE % SIDE][i % SIDE] =
+            (float)fmax(0, 14 - sqrt(pow(i % SIDE - 16, 2) + pow(i / SIDE % SIDE - 16, 2) + pow(i / SIDE / SIDE - 16, 2)));
+    CHECK(isogi_vol_build(&pyramid, &volume, &serial) == ISOGI_OK, "build");
+    for (int n = 0; n < 5 * 2; n++) { /* each lamp, then all; orders 2 and 4 */
+        const isogi_lighting lighting = {.env = {.sh = sky, .sh_order = 1}, .lights = lamps + n % 5 % 4, .light_count = n % 5 < 4 ? 1 : 4};
+        for (int path = 0; path <= 4; path++) { /* path 0: samples */
+            const isogi_context context = {.threads = 1, .force_path = path};
+            const isogi_dvr_desc desc = {.pyramid = pyramid, .shading = ISOGI_DVR_VISIBILITY, .order = 2 + n / 5 * 2, .grid = {9, 9, 9},
+                                         .step = path ? 0 : 0.0625, .visibility_step = 1, .opaque = 1,
+                                         .classification = path ? ISOGI_DVR_EXACT : ISOGI_DVR_POST_CLASSIFIED};
+            isogi_dvr *dvr = renderer(desc, &transfer, path ? &context : &serial);
+            double sum = 0, norm = 0;
+            CHECK(isogi_dvr_step(dvr, 0, NULL) == ISOGI_OK, "step");
+            CHECK(isogi_dvr_render(dvr, &view, &lighting, image[path > 0], NULL, NULL) == ISOGI_OK, "render");
+            isogi_dvr_free(dvr);
+            for (int i = 0; i < 3 * W * W; i++) {
+                double x = (double)image[0][i / 3][i % 3], y = (double)image[path > 0][i / 3][i % 3];
+                sum += (x - y) * (x - y), norm += x * x;
+            }
+            worst = fmax(worst, sqrt(sum / norm));
+            CHECK(sqrt(sum / norm) < 0.007, "lamps %d, order %d, path %d: relative RMSE %g", n % 5, 2 + n / 5 * 2, path, sqrt(sum / norm));
+        }
+    }
+    printf("    largest relative RMSE %.2g\n", worst);
+    isogi_vol_free(pyramid);
+}
+
 /* The face of opaque matter, wherever between points of a coarse grid it lies, from above and aslant: half of a sky of 1, and up to .04
    more, as light is looked up in front of it and the matter ends at the sides; a sun has one brightness all over. */
 TEST(the_face_of_opaque_matter_is_evenly_lit) {
