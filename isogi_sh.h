@@ -295,9 +295,10 @@ ISOGI_API isogi_result isogi_sh_zonal_to_direction(float *c, int order, const fl
 typedef enum isogi_sh_window_kind { ISOGI_SH_HANN = 0, ISOGI_SH_LANCZOS, ISOGI_SH_GAUSS } isogi_sh_window_kind;
 ISOGI_API isogi_result isogi_sh_window(float *out, const float *in, int order, int channels, isogi_sh_window_kind kind, double width);
 
-/* The widest (weakest) window under which no channel is negative anywhere, by bisection over a grid of 3 order latitudes with
-   local refinement: what stays negative is below 1e-5 of the channel's largest value. width (may be NULL) receives it, 0 where
-   none is needed. ISOGI_INVALID where a channel's mean is negative. Order 32 at most, else ISOGI_TOO_LARGE. */
+/* A window under which no channel is negative anywhere, wider ones being too weak: by bisection, over a grid of 3 order latitudes whose
+   lowest 64 troughs are refined. What stays negative is below 1e-5 of the channel's largest value. (Narrower windows than the one found may
+   be too weak again: Lanczos at width 1.577 is the answer for a case that 2.363 serves, too.) width (may be NULL) receives it, 0 where none
+   is needed. ISOGI_INVALID where a channel's mean is negative. Order 32 at most, else ISOGI_TOO_LARGE. */
 ISOGI_API isogi_result isogi_sh_dering(float *out, const float *in, int order, int channels, isogi_sh_window_kind kind, double *width);
 
 /* energy[order]: the sum of squares over each degree and all channels. */
@@ -355,6 +356,7 @@ ISOGI_API isogi_result isogi_sh_fit_directional(float direction[3], float rgb[3]
 #define ISOGI_SH__TURNS 15        /* the highest degree whose quarter turn is tabled */
 #define ISOGI_SH__TOGETHER 4  /* channels, or columns of a matrix, that are rotated in one pass */
 #define ISOGI_SH__DERING_ORDER 32
+#define ISOGI_SH__TROUGHS 64 /* of a channel, that are followed to their depth */
 #define ISOGI_SH__GROUP 5     /* orders m that are projected in one pass */
 
 /* 16-byte vectors where the compiler's target has them; 32 and 64 bytes by the processor that runs. gcc for Windows does not align its
@@ -4253,10 +4255,20 @@ static double isogi_sh__windowed(const float *c, int order, int channels, const 
     return value;
 }
 
-/* Walks downhill from u by shrinking steps: the depth of the trough the grid has found. */
-static double isogi_sh__descend(const float *c, int order, int channels, const double *factor, isogi_sh__unit u, double value) {
-    double step = 1.0 / (double)(3 * order);
-    while (step > 1e-5) {
+/* A place of the grid that is no higher than those around it. */
+typedef struct isogi_sh__trough {
+    double value;
+    isogi_sh__unit at;
+} isogi_sh__trough;
+
+/* Whether a trough goes below `limit`: walks downhill by shrinking steps, until it is below, or until it is so far above, for a function of
+   this order whose values differ by `spread`, that nothing a step away can be below: second derivatives are at most spread / 2 times the
+   square of the degree. */
+static int isogi_sh__goes_below(const float *c, int order, int channels, const double *factor, const isogi_sh__trough *trough, double limit,
+                                double spread) {
+    double step = 1.0 / (double)(3 * order), value = trough->value;
+    isogi_sh__unit u = trough->at;
+    while (step > 1e-5 && value >= limit) {
         int axis, moved = 0;
         for (axis = 0; axis < 6; axis++) {
             double s = axis & 1 ? -step : step, other;
@@ -4265,56 +4277,88 @@ static double isogi_sh__descend(const float *c, int order, int channels, const d
             other = isogi_sh__windowed(c, order, channels, factor, v);
             if (other < value - 1e-15 * fabs(value)) value = other, u = v, moved = 1;
         }
-        if (!moved) step /= 2;
+        if (moved) continue;
+        if (value - 2 * spread * (order * step) * (order * step) > limit) return 0;
+        step /= 2;
     }
-    return value;
+    return value < limit;
 }
 
-/* Smallest and largest value of one channel under a window, on a grid of 3 order latitudes; the smallest is refined. */
-static void isogi_sh__range(double range[2], const float *c, int order, int channels, const double *factor) {
-    double cosines[ISOGI_SH__DERING_ORDER], sines[ISOGI_SH__DERING_ORDER], q[ISOGI_SH_MAX_ORDER];
-    isogi_sh__unit lowest = {0, 0, 1, 0};
-    int i, j, l, m, rows = 3 * order, columns = 6 * order;
-    range[0] = range[1] = isogi_sh__windowed(c, order, channels, factor, lowest);
-    for (i = 0; i < rows; i++) {
-        double t = ISOGI_SH__PI * ((double)i + 0.5) / (double)rows, z = cos(t), sine = sin(t), diagonal = 0, power = 1;
-        for (m = 0; m < order; m++) {
-            cosines[m] = sines[m] = 0;
-            diagonal = isogi_sh__next_diagonal(diagonal, m);
-            isogi_sh__column(q, order, m, diagonal, z, 0);
-            for (l = m; l < order; l++) {
-                cosines[m] += power * factor[l] * q[l] * (double)c[channels * (l * (l + 1) + m)];
-                sines[m] += power * factor[l] * q[l] * (double)c[channels * (l * (l + 1) - m)];
-            }
-            power *= sine;
+/* Keeps the lowest troughs; the first one is the highest of them. */
+static int isogi_sh__keep_trough(isogi_sh__trough *list, int count, double value, isogi_sh__unit at) {
+    int i;
+    if (count < ISOGI_SH__TROUGHS) i = count++;
+    else if (value < list[0].value) i = 0;
+    else return count;
+    list[i].value = value, list[i].at = at;
+    for (i = 1; i < count; i++)
+        if (list[i].value > list[0].value) {
+            isogi_sh__trough swap = list[0];
+            list[0] = list[i], list[i] = swap;
         }
-        for (j = 0; j < columns; j++) {
-            double phi = 2 * ISOGI_SH__PI * (double)j / (double)columns, x = cos(phi), y = sin(phi), cm = 1, sm = 0, value = 0, turned;
-            for (m = 0; m < order; m++) {
-                value += cm * cosines[m] + (m ? sm * sines[m] : 0);
-                turned = x * cm - y * sm;
-                sm = x * sm + y * cm;
-                cm = turned;
-            }
-            range[1] = value > range[1] ? value : range[1];
-            if (value < range[0]) {
-                range[0] = value;
-                lowest = isogi_sh__normalise(sine * x, sine * y, z);
-            }
+    return count;
+}
+
+/* One channel under a window, along a latitude. */
+static void isogi_sh__windowed_row(double *value, const float *c, int order, int channels, const double *factor, double t) {
+    double cosines[ISOGI_SH__DERING_ORDER], sines[ISOGI_SH__DERING_ORDER], q[ISOGI_SH_MAX_ORDER];
+    double z = cos(t), sine = sin(t), diagonal = 0, power = 1;
+    int j, l, m, columns = 6 * order;
+    for (m = 0; m < order; m++) {
+        cosines[m] = sines[m] = 0;
+        diagonal = isogi_sh__next_diagonal(diagonal, m);
+        isogi_sh__column(q, order, m, diagonal, z, 0);
+        for (l = m; l < order; l++) {
+            cosines[m] += power * factor[l] * q[l] * (double)c[channels * (l * (l + 1) + m)];
+            sines[m] += power * factor[l] * q[l] * (double)c[channels * (l * (l + 1) - m)];
+        }
+        power *= sine;
+    }
+    for (j = 0; j < columns; j++) {
+        double phi = 2 * ISOGI_SH__PI * (double)j / (double)columns, x = cos(phi), y = sin(phi), cm = 1, sm = 0, turned;
+        value[j] = 0;
+        for (m = 0; m < order; m++) {
+            value[j] += cm * cosines[m] + (m ? sm * sines[m] : 0);
+            turned = x * cm - y * sm;
+            sm = x * sm + y * cm;
+            cm = turned;
         }
     }
-    range[0] = isogi_sh__descend(c, order, channels, factor, lowest, range[0]);
+}
+
+/* Whether one channel under a window is negative anywhere, by a millionth of its largest value: on a grid of 3 order latitudes, whose
+   troughs are followed to their depth. */
+static int isogi_sh__is_negative(const float *c, int order, int channels, const double *factor) {
+    double row[3][6 * ISOGI_SH__DERING_ORDER], range[2] = {1e300, -1e300};
+    isogi_sh__trough trough[ISOGI_SH__TROUGHS];
+    int i, j, k, rows = 3 * order, columns = 6 * order, count = 0;
+    isogi_sh__windowed_row(row[0], c, order, channels, factor, 0.5 * ISOGI_SH__PI / (double)rows);
+    for (i = 0; i < rows; i++) {
+        const double *here = row[i % 3], *above = i ? row[(i + 2) % 3] : here, *below = i + 1 < rows ? row[(i + 1) % 3] : here;
+        double t = ISOGI_SH__PI * ((double)i + 0.5) / (double)rows;
+        if (i + 1 < rows) isogi_sh__windowed_row(row[(i + 1) % 3], c, order, channels, factor, t + ISOGI_SH__PI / (double)rows);
+        for (j = 0; j < columns; j++) {
+            double value = here[j], phi = 2 * ISOGI_SH__PI * (double)j / (double)columns;
+            int lowest = 1;
+            range[0] = value < range[0] ? value : range[0], range[1] = value > range[1] ? value : range[1];
+            for (k = j + columns - 1; k <= j + columns + 1; k++)
+                lowest = lowest && value <= above[k % columns] && value <= here[k % columns] && value <= below[k % columns];
+            if (!lowest) continue;
+            count = isogi_sh__keep_trough(trough, count, value, isogi_sh__normalise(sin(t) * cos(phi), sin(t) * sin(phi), cos(t)));
+        }
+    }
+    if (range[0] < -1e-6 * range[1]) return 1;
+    for (i = 0; i < count; i++)
+        if (isogi_sh__goes_below(c, order, channels, factor, &trough[i], -1e-6 * range[1], range[1] - range[0])) return 1;
+    return 0;
 }
 
 /* inverse: 1 / width, 0 for no window */
 static int isogi_sh__is_positive(const float *c, int order, int channels, isogi_sh_window_kind kind, double inverse, double *factor) {
-    double range[2];
     int l, k;
     for (l = 0; l < order; l++) factor[l] = inverse > 0 ? isogi_sh__window(kind, (double)l, 1 / inverse) : 1;
-    for (k = 0; k < channels; k++) {
-        isogi_sh__range(range, c + k, order, channels, factor);
-        if (range[0] < -1e-6 * range[1]) return 0;
-    }
+    for (k = 0; k < channels; k++)
+        if (isogi_sh__is_negative(c + k, order, channels, factor)) return 0;
     return 1;
 }
 
@@ -5523,6 +5567,7 @@ ISOGI_API isogi_result isogi_sh_fit_directional(float direction[3], float rgb[3]
 #undef ISOGI_SH__LOW
 #undef ISOGI_SH__NARROW
 #undef ISOGI_SH__DERING_ORDER
+#undef ISOGI_SH__TROUGHS
 #undef ISOGI_SH__TOGETHER
 #undef ISOGI_SH__DIM
 #undef ISOGI_SH__TURNS

@@ -554,6 +554,18 @@ TEST(environment_lookup_has_the_stated_orientation) {
             }
     }
     isogi_env plain = {.rgb = &image[0][0][0], .width = W, .height = H};
+    for (int n = -3; n <= 3; n++) /* across the seam, between the last column and the first */
+        for (int j = 0; j < H; j++) {
+            double d[3], x = 0.25 * n;
+            texel_direction(d, n < 0 ? 1 + x / 2 / W : x / 2 / W, (j + 0.5) / H);
+            float direction[3] = {(float)d[0], (float)d[1], (float)d[2]};
+            isogi_env_radiance(&plain, direction, rgb);
+            for (int k = 0; k < 3; k++) {
+                double between = (0.5 - x / 2) * (double)image[j][W - 1][k] + (0.5 + x / 2) * (double)image[j][0][k];
+                CHECK(fabs((double)rgb[k] - between) < 1e-5, "row %d, %g of a texel past the seam: %g, not %g", j, x / 2, (double)rgb[k],
+                      between);
+            }
+        }
     float centre[3] = {0, 0, -1}, up[3] = {0, 1, 0};
     isogi_env_radiance(&plain, centre, rgb);
     float expected = (image[3][7][0] + image[3][8][0] + image[4][7][0] + image[4][8][0]) / 4;
@@ -821,6 +833,11 @@ TEST(random_projection_converges) {
     CHECK(isogi_sh_project_random(strata, 4, 2, n, 1, 1, smooth_function, NULL) == ISOGI_OK, "%d", 1);
     CHECK(isogi_sh_project_random(again, 4, 2, n, 1, 1, smooth_function, NULL) == ISOGI_OK && !memcmp(again, strata, sizeof again), "%d",
           2);
+    CHECK(isogi_sh_project_random(again, 4, 2, n, 1, 2, smooth_function, NULL) == ISOGI_OK && memcmp(again, strata, sizeof again), "%s",
+          "another seed gives other samples");
+    isogi_sh_project_function(exact, 4, 2, 4, smooth_function, NULL), isogi_sh_project_function(again, 4, 2, 0, smooth_function, NULL);
+    CHECK(!memcmp(again, exact, sizeof again), "%s", "a resolution of 0 is the order");
+    isogi_sh_project_function(exact, 4, 2, 512, smooth_function, NULL);
     for (int i = 0; i < 32; i++) {
         rms[0] += (plain[i] - exact[i]) * (plain[i] - exact[i]) / 32;
         rms[1] += (strata[i] - exact[i]) * (strata[i] - exact[i]) / 32;
@@ -1352,6 +1369,37 @@ TEST(zonal_functions) {
     }
 }
 
+/* Coefficient by coefficient, at every order that has code of its own and every level, for directions of length 1, next to it, and far from
+   it: z[l] sqrt(4 pi / (2 l + 1)) y, to a few roundings of floats. */
+TEST(zonal_functions_are_turned_exactly) {
+    enum { MOST = 12, N = MOST * MOST };
+    static const double lengths[] = {1, 1.0003, 0.9997, 1.003, 0.99, 1.03, 0.9, 7, 1e-3};
+    test_random r = {33};
+    for (int level = 0; level <= 2; level++) {
+        double worst[MOST + 1] = {0};
+        instruction_level = level < BEST_LEVEL ? level : BEST_LEVEL;
+        for (int order = 1; order <= MOST; order++)
+            for (int round = 0; round < 180; round++) {
+                float zonal[MOST], lobe[N + 1], direction[3];
+                double d[1][3], y[N];
+                random_direction(&r, d[0]);
+                if (round % 20 == 0) d[0][round / 20 % 3] *= 1e-4;
+                for (int k = 0; k < 3; k++) direction[k] = (float)(d[0][k] * lengths[round % 9]), d[0][k] = (double)direction[k];
+                for (int l = 0; l < order; l++) zonal[l] = (float)random_range(&r, -1, 1);
+                lobe[order * order] = 5;
+                CHECK(isogi_sh_zonal_to_direction(lobe, order, zonal, direction) == ISOGI_OK, "order %d", order);
+                CHECK(lobe[order * order] == 5, "order %d: one too many is written", order);
+                isogi_sh_eval_f64(y, order, (const double(*)[3])d, 1);
+                for (int l = 0; l < order; l++)
+                    for (int i = l * l; i < (l + 1) * (l + 1); i++)
+                        worst[order] = fmax(worst[order], fabs((double)lobe[i] - (double)zonal[l] * sqrt(4 * pi / (2 * l + 1)) * y[i]));
+            }
+        for (int order = 1; order <= MOST; order++)
+            CHECK(worst[order] < 6e-7, "level %d, order %d: off by %g", level, order, worst[order]);
+    }
+    instruction_level = BEST_LEVEL;
+}
+
 TEST(sums_scalings_and_energy) {
     float a[12] = {1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12}, b[12] = {3, 3, 3, 3, 3, 3, 3, 3, 3, 3, 3, 3}, c[12];
     double energy[2];
@@ -1423,6 +1471,59 @@ TEST(windows_and_deringing) {
 }
 
 /* Converted back and forth nothing changes, and written-out values of degree 1 and 2 are where other software has them. */
+/* Degree 1 alone, f = 1 - k cos: a window that leaves 1 / k of it is the widest that will do. The channel that needs it most decides. */
+TEST(deringing_finds_the_widest_window_of_one_degree) {
+    test_random r = {34};
+    for (int round = 0; round < 60; round++) {
+        float c[4 * 3], out[4 * 3];
+        double most = 0, width = -1, left, expected;
+        for (int channel = 0; channel < 3; channel++) {
+            double d[3], k = random_range(&r, 1.05, 3), scale = random_range(&r, 0.1, 10);
+            random_direction(&r, d);
+            most = fmax(most, k);
+            c[channel] = (float)(scale * sqrt(4 * pi));
+            for (int a = 0; a < 3; a++) c[3 * (a + 1) + channel] = (float)(scale * k * sqrt(4 * pi / 3) * d[a]);
+        }
+        left = 1 / most;
+        expected = round % 2 ? 2 / sqrt(-log2(left)) : pi / acos(2 * left - 1);
+        CHECK(isogi_sh_dering(out, c, 2, 3, round % 2 ? ISOGI_SH_GAUSS : ISOGI_SH_HANN, &width) == ISOGI_OK, "round %d", round);
+        CHECK(fabs(width / expected - 1) < 1e-4, "round %d: width %g, not %g", round, width, expected);
+    }
+}
+
+/* Three soft lights and a sky have many troughs, and the deepest need not be the lowest on any grid. */
+TEST(deringing_finds_every_trough) {
+    enum { MOST = 16, N = MOST * MOST, PLACES = 8000 };
+    static float d[PLACES][3], value[PLACES][3];
+    test_random r = {35};
+    for (int i = 0; i < PLACES; i++) {
+        double z = 1 - (2 * i + 1.0) / PLACES, s = sqrt(1 - z * z), phi = 2 * pi * fmod(i * 0.6180339887498949, 1);
+        d[i][0] = (float)(s * cos(phi)), d[i][1] = (float)(s * sin(phi)), d[i][2] = (float)z;
+    }
+    for (int round = 0; round < (LONG_SUITE ? 300 : 30); round++) {
+        const int order = round % 6 == 5 ? MOST : round % 2 ? 8 : 4;
+        isogi_light lights[3];
+        const isogi_lighting lighting = {.lights = lights, .light_count = 3};
+        float c[3 * N], out[3 * N], low[3] = {0, 0, 0}, high[3] = {0, 0, 0};
+        double width;
+        memset(lights, 0, sizeof lights);
+        for (int i = 0; i < 9; i++) {
+            lights[i / 3].vector[i % 3] = (float)random_range(&r, -1, 1), lights[i / 3].rgb[i % 3] = (float)random_range(&r, 0.2, 1.2);
+            lights[i / 3].radius = (float)random_range(&r, 0, 0.3);
+        }
+        isogi_sh_project(c, order, &lighting, NULL);
+        for (int k = 0; k < 3; k++) c[k] += (float)(random_range(&r, 0.05, 0.35) * order * order / 12);
+        CHECK(isogi_sh_dering(out, c, order, 3, ISOGI_SH_HANN, &width) == ISOGI_OK, "round %d", round);
+        isogi_sh_eval_sum(value[0], out, order, 3, (const float(*)[3])d, PLACES);
+        for (int i = 0; i < 3 * PLACES; i++) {
+            low[i % 3] = fminf(low[i % 3], value[i / 3][i % 3]), high[i % 3] = fmaxf(high[i % 3], value[i / 3][i % 3]);
+        }
+        for (int k = 0; k < 3; k++)
+            CHECK(low[k] > -1e-5f * high[k], "order %d, channel %d, width %g: lowest %g of %g", order, k, width, (double)low[k],
+                  (double)high[k]);
+    }
+}
+
 TEST(conventions_convert) {
     enum { ORDER = 6, N = ORDER * ORDER };
     float c[2 * N], there[2 * N], back[2 * N];
