@@ -90,7 +90,7 @@
      probe: a point near by on the same isosurface or one that runs closely beside it (up to .15 voxels by the gradient), in cells of
      2 voxels (of the shortest edge, but half a voxel along every axis at least) or an eighth of the ray's length, whose own
      hemisphere is gathered once in the same way; passes over the probes then bring all reflections without rays. What
-     the sky and reflections bring is read from a plane, fitted to the light of texels up to two away that face the same way and whose
+     the sky and reflections bring is read from a plane, fitted to the light of texels up to three away that face the same way and whose
      isosurfaces run close to each other, as far as their noise could explain the difference (with one or two samples, of which none is
      known, all of them); their samples are well spread together. Lights are not filtered, so that their shadows stay sharp
      (desc.unfiltered: nothing is). Probes cost accuracy: half a per cent of
@@ -496,8 +496,13 @@ ISOGI_API size_t isogi_trace_memory(const isogi_trace *trace); /* bytes that the
 #define ISOGI_TRACE__NOISE_KNOWN 3  /* with fewer than this nothing is known of it */
 #define ISOGI_TRACE__RIDGE 3.0      /* samples of the texel itself, a texel away, that say that light is the same everywhere */
 #define ISOGI_TRACE__SHEET 0.7      /* texels between two isosurfaces that the filter takes for one */
-#define ISOGI_TRACE__FILTER 6       /* squared distance of the farthest texels of the filter, of which there are so many: */
-#define ISOGI_TRACE__FILTERED 81
+#define ISOGI_TRACE__FILTER 12      /* squared distance of the farthest texels of the filter, */
+#define ISOGI_TRACE__REACH 3        /* along an axis, */
+#define ISOGI_TRACE__ROWS 37        /* in so many rows; */
+#define ISOGI_TRACE__ROW 10         /* texels of a brick, and of those around it, along an axis, */
+#define ISOGI_TRACE__DENSE 1008     /* of all rows, with room for a vector behind */
+#define ISOGI_TRACE__LANES 8        /* floats of a vector */
+#define ISOGI_TRACE__NEAR 24        /* squared distance at which a texel counts for 1/e */
 #define ISOGI_TRACE__BLURRED 0.18   /* of a texel's own variance: that of what the filter blurs */
 #define ISOGI_TRACE__TURNED 16      /* texels along an axis that share a scramble of their samples */
 #define ISOGI_TRACE__LIGHT_FIRST 4u /* samples of a texel with one of each light */
@@ -505,6 +510,13 @@ ISOGI_API size_t isogi_trace_memory(const isogi_trace *trace); /* bytes that the
 #define ISOGI_TRACE__AHEAD(p) __builtin_prefetch(p)
 #else
 #define ISOGI_TRACE__AHEAD(p) ((void)(p))
+#endif
+#if (defined(__clang__) || (defined(__GNUC__) && __GNUC__ >= 9)) && !defined(__TINYC__) && !defined(ISOGI_NO_SIMD) && \
+    (!defined(__FLT_EVAL_METHOD__) || __FLT_EVAL_METHOD__ == 0)
+#define ISOGI_TRACE__VECTORS
+#if defined(__x86_64__) && (defined(__clang__) || !defined(_WIN32)) /* gcc for Windows does not align its stack for 32-byte vectors */
+#define ISOGI_TRACE__AVX2 __attribute__((target("avx2"))) /* without fused operations: the same bits */
+#endif
 #endif
 
 /* ==== numbers that survive -ffast-math =============================================================================== */
@@ -1978,6 +1990,7 @@ struct isogi_trace {
     float light[3 * ISOGI_TRACE__MAX_ORDER * ISOGI_TRACE__MAX_ORDER]; /* TRANSFER: of the lighting, RGB interleaved */
     float square[3 * ISOGI_TRACE__MAX_ORDER * ISOGI_TRACE__MAX_ORDER]; /* TRANSFER: of the lighting's square, for the error */
     isogi_trace *high; /* BOTH_SIDES: the other side's texture, owned */
+    int wide;      /* AVX2 may be used */
     isogi_trace *coarse; /* hierarchy: the texture of every second texel, owned */
     int refined;         /* the cells in which it is not enough are wanted, */
     size_t refine_next;  /* as far as to this one */
@@ -3366,6 +3379,10 @@ static isogi_result isogi_trace__feedback_new(isogi_trace *t) {
     t->feedback = f;
     if (!f) return ISOGI_NO_MEMORY;
     memset(f, 0, sizeof *f);
+#ifdef ISOGI_TRACE__AVX2
+    __builtin_cpu_init();
+    t->wide = __builtin_cpu_supports("avx2") && (t->context.force_path <= 0 || t->context.force_path >= 3);
+#endif
     f->spans = (isogi_trace__span *)isogi_allocate(&t->context, ISOGI_TRACE__SPANS, sizeof *f->spans);
     f->catches = (isogi_trace__catch *)isogi_allocate(&t->context, ISOGI_TRACE__SAMPLES, sizeof *f->catches);
     f->casts = (isogi_trace__cast *)isogi_allocate(&t->context, ISOGI_TRACE__TASKS, sizeof *f->casts);
@@ -4412,81 +4429,35 @@ static void isogi_trace__guide_task(void *arg, size_t task) {
     }
 }
 
-/* How much the light of two texels differs because their isosurfaces have other colours: what no sample has to show. */
-static double isogi_trace__other_colours(const isogi_trace *t, const isogi_trace__guide *g, const isogi_trace__guide *q) {
-    const isogi_trace_desc *d = &t->scene.desc;
-    double hidden = ((double)g->hidden + (double)q->hidden) / 2, most, glow[3], albedo[3];
-    int a;
-    if (!d->albedo_count && !d->emission_count && !d->material) return 0;
-    for (a = 0; a < 3; a++) {
-        double larger = (double)(g->albedo[a] > q->albedo[a] ? g->albedo[a] : q->albedo[a]);
-        glow[a] = fabs((double)g->glow[a] - (double)q->glow[a]);
-        albedo[a] = larger > 0 ? fabs((double)g->albedo[a] - (double)q->albedo[a]) / larger : 0;
-    }
-    most = (double)(g->reflected > q->reflected ? g->reflected : q->reflected);
-    return ISOGI_TRACE__PI * hidden * isogi_trace__luminance(glow) + most * isogi_trace__luminance(albedo);
-}
+/* ---- what neighbours share: the filter ---- */
 
-/* What lies around a texel, itself included: guides of those that have one, and how far they are. */
-static int isogi_trace__around_texel(const isogi_trace *t, const size_t texel[3], const isogi_trace__guide **guide, int (*apart)[3]) {
-    const isogi_trace__set *set = &t->feedback->texels;
-    size_t brick[3][5], pitch = 1;
-    uint32_t slot[3][5], node;
-    int first[3], last[3], d[3], a, count = 0;
-    for (a = 0; a < 3; a++) {
-        size_t after = t->lattice[a] - 1 - texel[a];
-        first[a] = texel[a] < 2 ? -(int)texel[a] : -2, last[a] = after < 2 ? (int)after : 2;
-        for (d[0] = first[a]; d[0] <= last[a]; d[0]++) {
-            size_t x = texel[a] + (size_t)d[0]; /* wraps twice */
-            brick[a][d[0] + 2] = x / ISOGI_TRACE__SIDE * pitch, slot[a][d[0] + 2] = (uint32_t)(x % ISOGI_TRACE__SIDE) << (2 * a);
-        }
-        pitch *= t->size[a];
-    }
-    for (d[2] = first[2]; d[2] <= last[2]; d[2]++)
-        for (d[1] = first[1]; d[1] <= last[1]; d[1]++)
-            for (d[0] = first[0]; d[0] <= last[0]; d[0]++) {
-                const int square = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
-                const isogi_trace__brick *b;
-                if (square > ISOGI_TRACE__FILTER) continue;
-                b = t->bricks[brick[0][d[0] + 2] + brick[1][d[1] + 2] + brick[2][d[2] + 2]];
-                if (!b || !b->node) continue;
-                node = b->node[slot[0][d[0] + 2] + slot[1][d[1] + 2] + slot[2][d[2] + 2]];
-                if (!node || !isogi_trace__guide_at(set, node - 1)->samples) continue;
-                guide[count] = isogi_trace__guide_at(set, node - 1);
-                for (a = 0; a < 3; a++) apart[count][a] = d[a];
-                count++;
-            }
-    return count;
-}
+/* A brick's texels and those around them, dense: number x + ROW (y + ROW z), as one vector is read along x. Arrays hold numbers everywhere,
+   samples 0 where there is no texel. Isovalues count from one of them in the steepest step from texel to texel, in two floats; luminance
+   in the largest one, its variance in the square of that: squares of either need not be numbers. */
+typedef struct isogi_trace__dense {
+    double unit; /* of luminance */
+    int count;
+    int tinted; /* colours differ by isovalue or by place */
+    uint16_t at[ISOGI_TRACE__ROW * ISOGI_TRACE__ROW * ISOGI_TRACE__ROW], filled[ISOGI_TRACE__ROW * ISOGI_TRACE__ROW]; /* bits of x */
+    const isogi_trace__guide *guide[ISOGI_TRACE__ROW * ISOGI_TRACE__ROW * ISOGI_TRACE__ROW];
+    float samples[ISOGI_TRACE__DENSE], high[ISOGI_TRACE__DENSE], low[ISOGI_TRACE__DENSE];
+    float steps[ISOGI_TRACE__DENSE]; /* SHEETs per unit of isovalues */
+    float normal[3][ISOGI_TRACE__DENSE], luminance[ISOGI_TRACE__DENSE];
+    float guessed[ISOGI_TRACE__DENSE]; /* variance, as the filter takes it to be: that of few samples tells nothing, */
+    float noise[ISOGI_TRACE__DENSE];   /* and half of what counts as noise for it */
+    float mean[3][ISOGI_TRACE__DENSE], variance[ISOGI_TRACE__DENSE], lights[ISOGI_TRACE__DENSE];
+    float albedo[3][ISOGI_TRACE__DENSE], glow[3][ISOGI_TRACE__DENSE], hidden[ISOGI_TRACE__DENSE], reflected[ISOGI_TRACE__DENSE];
+} isogi_trace__dense;
 
-/* Variance of a texel's light, as the filter takes it to be: that of few samples tells nothing. */
-static double isogi_trace__guessed_variance(const isogi_trace__guide *g) {
-    return g->samples < ISOGI_TRACE__NOISE_KNOWN ? (double)g->luminance * (double)g->luminance / g->samples : (double)g->variance;
-}
+/* What texels share with one of them. */
+typedef struct isogi_trace__blend {
+    double rgb[3];
+    double variance, lights; /* of what is shared, of other light averaged over the same texels */
+    double alike;            /* the number of samples that it is as good as; 0: nothing is shared */
+} isogi_trace__blend;
 
-/* How much a texel's light counts for another at a distance (its square, in texels), 0 to 1: less the farther it is, by place and by
-   what lies between their isosurfaces, the more it faces another way, and the more their light differs beyond its noise. */
-static double isogi_trace__filter_weight(const isogi_trace *t, const isogi_trace__guide *g, const isogi_trace__guide *q, int square) {
-    double facing, between = g->isovalue - q->isovalue, away = (double)square / 16, apart, noise, colours,
-           steep = ISOGI_TRACE__SHEET * (g->steep > q->steep ? g->steep : q->steep);
-    if (!isogi_trace__zero(between)) {
-        if (!(fabs(between) < 4 * steep)) return 0;
-        away += between / steep * (between / steep);
-    }
-    facing = isogi_trace__dot(g->normal, q->normal);
-    if (!(facing > 0.5)) return 0;
-    noise = isogi_trace__guessed_variance(g) + isogi_trace__guessed_variance(q);
-    apart = (double)g->luminance - (double)q->luminance, colours = isogi_trace__other_colours(t, g, q);
-    noise *= ISOGI_TRACE__NOISE + ISOGI_TRACE__NOISE_FEW / 2 * (1.0 / g->samples + 1.0 / q->samples);
-    apart = apart * apart - noise;
-    if (colours > 0) apart = (apart > 0 ? apart : 0) + 4 * ISOGI_TRACE__NOISE * colours * colours;
-    if (apart > 0) {
-        if (!(noise > 0)) return 0;
-        away += apart / noise;
-    }
-    facing = facing * facing / (1 + away / 8), facing *= facing, facing *= facing; /* near exp(-away) */
-    return facing * facing;
-}
+/* Sums of weights, by place: 1, x, y, z, xx, yy, zz, xy, xz, yz. */
+enum { ISOGI_TRACE__MOMENTS = 10 };
 
 /* Solves m x = b, m symmetric and positive definite: xx, yy, zz, xy, xz, yz. */
 static void isogi_trace__solve3(const double m[6], const double b[3], double x[3]) {
@@ -4499,106 +4470,388 @@ static void isogi_trace__solve3(const double m[6], const double b[3], double x[3
 }
 
 /* Weights of the texels around become those of a plane that is fitted to their light by least squares, read at the texel itself: local
-   linear regression (Moon, Carr and Yoon 2014), with a penalty on slopes (ridge) that `own` scales. They sum to 1; some may be negative. */
-static void isogi_trace__fit(double *weight, const int (*apart)[3], int count, double own) {
-    double total = 0, mean[3] = {0, 0, 0}, square[6] = {0, 0, 0, 0, 0, 0}, slope[3];
-    int i, a;
-    for (i = 0; i < count; i++) {
-        const double w = weight[i], x = apart[i][0], y = apart[i][1], z = apart[i][2];
-        total += w, mean[0] += w * x, mean[1] += w * y, mean[2] += w * z;
-        square[0] += w * x * x, square[1] += w * y * y, square[2] += w * z * z;
-        square[3] += w * x * y, square[4] += w * x * z, square[5] += w * y * z;
-    }
-    for (a = 0; a < 3; a++) mean[a] /= total;
-    for (a = 0; a < 3; a++) square[a] += ISOGI_TRACE__RIDGE * own - total * mean[a] * mean[a];
-    square[3] -= total * mean[0] * mean[1], square[4] -= total * mean[0] * mean[2], square[5] -= total * mean[1] * mean[2];
-    isogi_trace__solve3(square, mean, slope);
-    for (i = 0; i < count; i++) {
-        double along = 0;
-        for (a = 0; a < 3; a++) along += slope[a] * (apart[i][a] - mean[a]);
-        weight[i] *= 1 / total - along;
-    }
-}
-
-/* A plane through the light of the texels around. Writes the filtered rgb, within what they have, its variance, and the variance of other
-   light, averaged over the same texels. Returns the number of samples that this is as good as. */
-static double isogi_trace__filter(const isogi_trace *t, size_t node, double rgb[3], double variance[2]) {
-    const isogi_trace__set *set = &t->feedback->texels;
-    const isogi_trace__guide *g = isogi_trace__guide_at(set, node), *around[ISOGI_TRACE__FILTERED];
-    double weight[ISOGI_TRACE__FILTERED], squares = 0, low[3], high[3];
-    int apart[ISOGI_TRACE__FILTERED][3], i, a, n = 0,
-        count = isogi_trace__around_texel(t, isogi_trace__node_at(set, node)->texel, around, apart);
-    for (i = 0; i < count; i++) {
-        const isogi_trace__guide *q = around[i];
-        const int *d = apart[i];
-        double w = q == g ? 1 : isogi_trace__filter_weight(t, g, q, d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
-        if (!(w > 0)) continue;
-        around[n] = q, weight[n] = w * (q->samples < 1e4 * g->samples ? q->samples : 1e4 * g->samples); /* what the fit can solve */
-        for (a = 0; a < 3; a++) apart[n][a] = d[a];
-        n++;
-    }
-    isogi_trace__fit(weight, (const int(*)[3])apart, n, g->samples);
-    rgb[0] = rgb[1] = rgb[2] = variance[0] = variance[1] = 0;
-    for (a = 0; a < 3; a++) low[a] = high[a] = (double)g->mean[a];
-    for (i = 0; i < n; i++) {
-        const isogi_trace__guide *q = around[i];
-        const double w = weight[i];
-        squares += w * w / q->samples;
-        for (a = 0; a < 3; a++) {
-            const double light = (double)q->mean[a];
-            rgb[a] += w * light, low[a] = light < low[a] ? light : low[a], high[a] = light > high[a] ? light : high[a];
-        }
-        variance[0] += w * w * (double)q->variance;
-        variance[1] += w * (double)q->lights;
-    }
-    for (a = 0; a < 3; a++) rgb[a] = rgb[a] < low[a] ? low[a] : rgb[a] > high[a] ? high[a] : rgb[a];
-    if (variance[1] < 0) variance[1] = 0;
-    return 1 / squares;
-}
-
-/* The same, with the variance of what the filter blurs; or the texel's own. */
-static double isogi_trace__shared(const isogi_trace *t, size_t node, double rgb[3], double variance[2]) {
-    const isogi_trace__guide *g = isogi_trace__guide_at(&t->feedback->texels, node);
-    double alike = (double)g->samples;
+   linear regression (Moon, Carr and Yoon 2014), with a penalty on slopes (ridge) that `own` scales. By plane[0] + plane[1] x + plane[2] y +
+   plane[3] z; they then sum to 1; some may be negative. */
+static void isogi_trace__fit(const double moment[ISOGI_TRACE__MOMENTS], double own, double plane[4]) {
+    double total = moment[0], mean[3], square[6], slope[3];
     int a;
-    if (!t->scene.desc.unfiltered) {
-        alike = isogi_trace__filter(t, node, rgb, variance), variance[0] += ISOGI_TRACE__BLURRED * (double)g->variance;
-        return alike;
-    }
-    for (a = 0; a < 3; a++) rgb[a] = (double)g->mean[a];
-    variance[0] = (double)g->variance, variance[1] = (double)g->lights;
-    return alike;
+    for (a = 0; a < 3; a++) mean[a] = moment[1 + a] / total;
+    for (a = 0; a < 3; a++) square[a] = moment[4 + a] + ISOGI_TRACE__RIDGE * own - total * mean[a] * mean[a];
+    square[3] = moment[7] - total * mean[0] * mean[1];
+    square[4] = moment[8] - total * mean[0] * mean[2], square[5] = moment[9] - total * mean[1] * mean[2];
+    isogi_trace__solve3(square, mean, slope);
+    plane[0] = 1 / total;
+    for (a = 0; a < 3; a++) plane[0] += slope[a] * mean[a], plane[1 + a] = -slope[a];
 }
 
-/* Light and error of every texel into its brick. */
+/* Of a row, where the texel itself is the fourth. */
+static const float isogi_trace__along[ISOGI_TRACE__LANES] = {-3, -2, -1, 0, 1, 2, 3, 99}, isogi_trace__nought[ISOGI_TRACE__LANES] = {0};
+
+/* Rows within FILTER of the texel: y, z. */
+static const int isogi_trace__rows[ISOGI_TRACE__ROWS][2] = {{-1, -3}, {0, -3}, {1, -3}, {-2, -2}, {-1, -2}, {0, -2}, {1, -2}, {2, -2},
+    {-3, -1}, {-2, -1}, {-1, -1}, {0, -1}, {1, -1}, {2, -1}, {3, -1}, {-3, 0}, {-2, 0}, {-1, 0}, {0, 0}, {1, 0}, {2, 0}, {3, 0}, {-3,
+    1}, {-2, 1}, {-1, 1}, {0, 1}, {1, 1}, {2, 1}, {3, 1}, {-2, 2}, {-1, 2}, {0, 2}, {1, 2}, {2, 2}, {-1, 3}, {0, 3}, {1, 3}};
+
+#define ISOGI_TRACE__FLOATS(F, p) (*(const F *)(const void *)(p))
+
+/* The blend of the texel at a number of the block. A texel's light counts for another, 0 to 1, less the farther it is, by place and by
+   what lies between their isosurfaces, the more it faces another way, and the more their light differs beyond its noise (and by what
+   their colours must make it differ, which no sample has to show): near exp(-those squares). Weights are kept for all rows; then they
+   become those of the plane. Vectors of W floats; all sums are by lane, so that they are the same bits for all W. F: of floats. */
+#define ISOGI_TRACE__DEFINE_BLEND(name, attribute, F, W, KEEP, PICK)                                                                       \
+    attribute static void name(const isogi_trace__dense *b, size_t centre, isogi_trace__blend *to) {                                       \
+        const int reach = ISOGI_TRACE__REACH, parts = ISOGI_TRACE__LANES / W;                                                              \
+        const int middle[3] = {(int)centre % ISOGI_TRACE__ROW, (int)centre / ISOGI_TRACE__ROW % ISOGI_TRACE__ROW,                          \
+                               (int)centre / ISOGI_TRACE__ROW / ISOGI_TRACE__ROW};                                                         \
+        float kept[ISOGI_TRACE__ROWS][ISOGI_TRACE__LANES], sum[ISOGI_TRACE__MOMENTS][ISOGI_TRACE__LANES];                                  \
+        float place[ISOGI_TRACE__ROWS + 1][2];                                                                                             \
+        int rows = 0, i, l;                                                                                                                \
+        size_t start[ISOGI_TRACE__ROWS + 1];                                                                                               \
+        double moment[ISOGI_TRACE__MOMENTS], plane[4], squares = 0;                                                                        \
+        const float most = 1e4f * b->samples[centre];                                                                                      \
+        F total[ISOGI_TRACE__LANES / W], m[9][ISOGI_TRACE__LANES / W];                                                                     \
+        F blend[6][ISOGI_TRACE__LANES / W], least[3][ISOGI_TRACE__LANES / W], largest[3][ISOGI_TRACE__LANES / W];                          \
+        to->alike = 0;                                                                                                                     \
+        for (l = 0; l < parts; l++) {                                                                                                      \
+            const F none = ISOGI_TRACE__FLOATS(F, isogi_trace__nought);                                                                    \
+            total[l] = none, m[0][l] = none, m[1][l] = none, m[2][l] = none, m[3][l] = none, m[4][l] = none, m[5][l] = none;               \
+            m[6][l] = none, m[7][l] = none, m[8][l] = none;                                                                                \
+        }                                                                                                                                  \
+        for (i = 0; i < ISOGI_TRACE__ROWS; i++) {                                                                                          \
+            const int *x = isogi_trace__rows[i];                                                                                           \
+            const size_t row = (size_t)(middle[1] + x[0] + ISOGI_TRACE__ROW * (middle[2] + x[1]));                                         \
+            place[rows][0] = (float)x[0], place[rows][1] = (float)x[1];                                                                    \
+            start[rows] = row * ISOGI_TRACE__ROW + (size_t)(middle[0] - reach);                                                            \
+            rows += ((uint32_t)b->filled[row] >> (middle[0] - reach) & 0x7f) != 0;                                                         \
+        }                                                                                                                                  \
+        for (i = 0; i < rows; i++) {                                                                                                       \
+            const float y = place[i][0], z = place[i][1], yz = y * y + z * z;                                                              \
+            for (l = 0; l < parts; l++) {                                                                                                  \
+                const size_t k = start[i] + (size_t)(l * W);                                                                               \
+                const F none = ISOGI_TRACE__FLOATS(F, isogi_trace__nought), along = ISOGI_TRACE__FLOATS(F, isogi_trace__along + l * W),    \
+                        square = along * along + yz, samples = ISOGI_TRACE__FLOATS(F, b->samples + k), limit = none + most,                \
+                        own = none + b->steps[centre], steps = ISOGI_TRACE__FLOATS(F, b->steps + k),                                       \
+                        between = ((b->high[centre] - ISOGI_TRACE__FLOATS(F, b->high + k)) +                                               \
+                                   (b->low[centre] - ISOGI_TRACE__FLOATS(F, b->low + k))) *                                                \
+                                  PICK(steps < own, steps, own),                                                                           \
+                        facing = ISOGI_TRACE__FLOATS(F, b->normal[0] + k) * b->normal[0][centre] +                                         \
+                                 ISOGI_TRACE__FLOATS(F, b->normal[1] + k) * b->normal[1][centre] +                                         \
+                                 ISOGI_TRACE__FLOATS(F, b->normal[2] + k) * b->normal[2][centre],                                          \
+                        differ = ISOGI_TRACE__FLOATS(F, b->luminance + k) - b->luminance[centre];                                          \
+                F noise = (ISOGI_TRACE__FLOATS(F, b->guessed + k) + b->guessed[centre]) *                                                  \
+                          (ISOGI_TRACE__FLOATS(F, b->noise + k) + b->noise[centre]),                                                       \
+                  apart = differ * differ - noise, w;                                                                                      \
+                apart = KEEP(apart > 0.0f, apart);                                                                                         \
+                if (b->tinted) {                                                                                                           \
+                    const F reflected = ISOGI_TRACE__FLOATS(F, b->reflected + k), mine = none + b->reflected[centre];                      \
+                    F glow = none, albedo = none, more;                                                                                    \
+                    int a;                                                                                                                 \
+                    for (a = 0; a < 3; a++) {                                                                                              \
+                        const float part = a == 0 ? 0.2126f : a == 1 ? 0.7152f : 0.0722f;                                                  \
+                        const F one = ISOGI_TRACE__FLOATS(F, b->albedo[a] + k), two = none + b->albedo[a][centre],                         \
+                                step = ISOGI_TRACE__FLOATS(F, b->glow[a] + k) - b->glow[a][centre],                                        \
+                                larger = PICK(one > two, one, two), other = PICK(one > two, two, one), tiny = none + 1e-30f;               \
+                        glow += part * PICK(step < 0.0f, -step, step);                                                                     \
+                        albedo += part * ((larger - other) / PICK(larger > tiny, larger, tiny));                                           \
+                    }                                                                                                                      \
+                    more = (float)ISOGI_TRACE__PI / 2 * (ISOGI_TRACE__FLOATS(F, b->hidden + k) + b->hidden[centre]) * glow +               \
+                           PICK(reflected > mine, reflected, mine) * albedo;                                                               \
+                    apart += (float)(4 * ISOGI_TRACE__NOISE) * more * more;                                                                \
+                }                                                                                                                          \
+                noise += 1e-30f;                                                                                                           \
+                w = facing * facing * (8.0f * noise) /                                                                                     \
+                    (noise * (8.0f + square * (float)(1.0 / ISOGI_TRACE__NEAR) + between * between) + apart);                              \
+                w = KEEP((w > 0.01f) & (facing > 0.5f) & (between < 4.0f) & (between > -4.0f) & (square <= (float)ISOGI_TRACE__FILTER), w);\
+                w *= w, w *= w, w *= w;                                                                                                    \
+                w = KEEP(samples > 0.0f, w * PICK(samples < limit, samples, limit)); /* what the fit can solve */                          \
+                *(F *)(void *)(kept[i] + l * W) = w;                                                                                       \
+            }                                                                                                                              \
+        }                                                                                                                                  \
+        for (i = 0; i < rows; i++) {                                                                                                       \
+            const float y = place[i][0], z = place[i][1];                                                                                  \
+            for (l = 0; l < parts; l++) {                                                                                                  \
+                const F along = ISOGI_TRACE__FLOATS(F, isogi_trace__along + l * W);                                                        \
+                F w = ISOGI_TRACE__FLOATS(F, kept[i] + l * W), part = w * y;                                                               \
+                total[l] += w, m[1][l] += part, m[4][l] += part * y, part = w * z;                                                         \
+                m[2][l] += part, m[5][l] += part * z, m[8][l] += part * y;                                                                 \
+                w *= along, m[0][l] += w, m[6][l] += w * y, m[7][l] += w * z, m[3][l] += w * along;                                        \
+            }                                                                                                                              \
+        }                                                                                                                                  \
+        for (l = 0; l < parts; l++) {                                                                                                      \
+            int a;                                                                                                                         \
+            *(F *)(void *)(sum[0] + l * W) = total[l];                                                                                     \
+            for (a = 0; a < 9; a++) *(F *)(void *)(sum[1 + a] + l * W) = m[a][l];                                                          \
+        }                                                                                                                                  \
+        isogi_trace__lanes(sum, ISOGI_TRACE__MOMENTS, moment);                                                                             \
+        if (!(moment[0] > 0)) return;                                                                                                      \
+        isogi_trace__fit(moment, (double)b->samples[centre], plane);                                                                       \
+        for (l = 0; l < parts; l++) {                                                                                                      \
+            const F none = ISOGI_TRACE__FLOATS(F, isogi_trace__nought);                                                                    \
+            int a;                                                                                                                         \
+            for (a = 0; a < 6; a++) blend[a][l] = none;                                                                                    \
+            for (a = 0; a < 3; a++) least[a][l] = largest[a][l] = none + b->mean[a][centre];                                               \
+        }                                                                                                                                  \
+        for (i = 0; i < rows; i++) {                                                                                                       \
+            const float y = place[i][0], z = place[i][1];                                                                                  \
+            const float constant = (float)plane[0] + (float)plane[2] * y + (float)plane[3] * z, rising = (float)plane[1];                  \
+            for (l = 0; l < parts; l++) {                                                                                                  \
+                const size_t k = start[i] + (size_t)(l * W);                                                                               \
+                const F along = ISOGI_TRACE__FLOATS(F, isogi_trace__along + l * W), none = ISOGI_TRACE__FLOATS(F, isogi_trace__nought),    \
+                        before = ISOGI_TRACE__FLOATS(F, kept[i] + l * W), w = before * (constant + rising * along), ww = w * w,            \
+                        samples = ISOGI_TRACE__FLOATS(F, b->samples + k), one = none + 1.0f;                                               \
+                blend[3][l] += ww / PICK(samples > one, samples, one);                                                                     \
+                blend[4][l] += ww * ISOGI_TRACE__FLOATS(F, b->variance + k), blend[5][l] += w * ISOGI_TRACE__FLOATS(F, b->lights + k);     \
+                ISOGI_TRACE__BLEND_CHANNEL(F, PICK, 0)                                                                                     \
+                ISOGI_TRACE__BLEND_CHANNEL(F, PICK, 1)                                                                                     \
+                ISOGI_TRACE__BLEND_CHANNEL(F, PICK, 2)                                                                                     \
+            }                                                                                                                              \
+        }                                                                                                                                  \
+        for (l = 0; l < parts; l++) {                                                                                                      \
+            int a;                                                                                                                         \
+            for (a = 0; a < 6; a++) *(F *)(void *)(sum[a] + l * W) = blend[a][l];                                                          \
+        }                                                                                                                                  \
+        isogi_trace__lanes(sum, 6, moment);                                                                                                \
+        for (l = 0; l < parts; l++) {                                                                                                      \
+            int a;                                                                                                                         \
+            for (a = 0; a < 3; a++)                                                                                                        \
+                *(F *)(void *)(sum[a] + l * W) = least[a][l], *(F *)(void *)(sum[3 + a] + l * W) = largest[a][l];                          \
+        }                                                                                                                                  \
+        for (i = 0; i < 3; i++) {                                                                                                          \
+            double low = (double)sum[i][0], high = (double)sum[3 + i][0];                                                                  \
+            for (l = 1; l < ISOGI_TRACE__LANES; l++) {                                                                                     \
+                low = (double)sum[i][l] < low ? (double)sum[i][l] : low;                                                                   \
+                high = (double)sum[3 + i][l] > high ? (double)sum[3 + i][l] : high;                                                        \
+            }                                                                                                                              \
+            to->rgb[i] = moment[i] < low ? low : moment[i] > high ? high : moment[i];                                                      \
+        }                                                                                                                                  \
+        squares = moment[3], to->variance = moment[4], to->lights = moment[5] > 0 ? moment[5] : 0, to->alike = 1 / squares;                \
+    }
+
+#define ISOGI_TRACE__BLEND_CHANNEL(F, PICK, a)                                                     \
+    {                                                                                              \
+        const F light = ISOGI_TRACE__FLOATS(F, b->mean[a] + k);                                    \
+        blend[a][l] += w * light;                                                                  \
+        least[a][l] = PICK((before > 0.0f) & (light < least[a][l]), light, least[a][l]);           \
+        largest[a][l] = PICK((before > 0.0f) & (light > largest[a][l]), light, largest[a][l]);     \
+    }
+
+static void isogi_trace__lanes(float (*lane)[ISOGI_TRACE__LANES], int count, double *sum) {
+    int i;
+    for (i = 0; i < count; i++) {
+        const float *x = lane[i];
+        sum[i] = ((double)x[0] + (double)x[1]) + ((double)x[2] + (double)x[3]);
+        sum[i] += ((double)x[4] + (double)x[5]) + ((double)x[6] + (double)x[7]);
+    }
+}
+
+#define ISOGI_TRACE__KEEP(mask, x) ((mask) ? (x) : 0)
+#define ISOGI_TRACE__PICK(mask, x, y) ((mask) ? (x) : (y))
+ISOGI_TRACE__DEFINE_BLEND(isogi_trace__blend_plain, , float, 1, ISOGI_TRACE__KEEP, ISOGI_TRACE__PICK)
+
+#ifdef ISOGI_TRACE__VECTORS
+typedef float isogi_trace__f4 __attribute__((vector_size(16), aligned(4), may_alias));
+typedef int32_t isogi_trace__i4 __attribute__((vector_size(16), aligned(4), may_alias));
+#define ISOGI_TRACE__KEEP_F4(mask, x) ((isogi_trace__f4)((isogi_trace__i4)(mask) & (isogi_trace__i4)(x)))
+#define ISOGI_TRACE__PICK_F4(mask, x, y) \
+    ((isogi_trace__f4)(((isogi_trace__i4)(mask) & (isogi_trace__i4)(x)) | (~(isogi_trace__i4)(mask) & (isogi_trace__i4)(y))))
+ISOGI_TRACE__DEFINE_BLEND(isogi_trace__blend_f4, , isogi_trace__f4, 4, ISOGI_TRACE__KEEP_F4, ISOGI_TRACE__PICK_F4)
+#endif
+
+#ifdef ISOGI_TRACE__AVX2
+typedef float isogi_trace__f8 __attribute__((vector_size(32), aligned(4), may_alias));
+typedef int32_t isogi_trace__i8 __attribute__((vector_size(32), aligned(4), may_alias));
+#define ISOGI_TRACE__KEEP_F8(mask, x) ((isogi_trace__f8)((isogi_trace__i8)(mask) & (isogi_trace__i8)(x)))
+#define ISOGI_TRACE__PICK_F8(mask, x, y) \
+    ((isogi_trace__f8)(((isogi_trace__i8)(mask) & (isogi_trace__i8)(x)) | (~(isogi_trace__i8)(mask) & (isogi_trace__i8)(y))))
+ISOGI_TRACE__DEFINE_BLEND(isogi_trace__blend_f8, ISOGI_TRACE__AVX2, isogi_trace__f8, 8, ISOGI_TRACE__KEEP_F8, ISOGI_TRACE__PICK_F8)
+#endif
+
+/* By the best instruction path; all give the same bits. */
+static void isogi_trace__blend_of(const isogi_trace *t, const isogi_trace__dense *b, size_t centre, isogi_trace__blend *to) {
+#ifdef ISOGI_TRACE__AVX2
+    if (t->wide) {
+        isogi_trace__blend_f8(b, centre, to);
+        return;
+    }
+#endif
+#ifdef ISOGI_TRACE__VECTORS
+    if (t->context.force_path != 1) {
+        isogi_trace__blend_f4(b, centre, to);
+        return;
+    }
+#endif
+    (void)t;
+    isogi_trace__blend_plain(b, centre, to);
+}
+
+static uint32_t isogi_trace__lowest_bit(uint64_t bits) {
+#if defined(__GNUC__) && !defined(__TINYC__)
+    return (uint32_t)__builtin_ctzll(bits);
+#else
+    uint32_t i = 0;
+    while (!(bits >> i & 1)) i++;
+    return i;
+#endif
+}
+
+/* Texels of a brick within REACH of its neighbour at -1, 0, 1 along an axis: bits. */
+static uint64_t isogi_trace__within_reach(const int d[3]) {
+    static const uint64_t line[3][3] = {{0xeeeeeeeeeeeeeeeeu, 0xffffffffffffffffu, 0x7777777777777777u},
+                                        {0xfff0fff0fff0fff0u, 0xffffffffffffffffu, 0x0fff0fff0fff0fffu},
+                                        {0xffffffffffff0000u, 0xffffffffffffffffu, 0x0000ffffffffffffu}};
+    return line[0][d[0] + 1] & line[1][d[1] + 1] & line[2][d[2] + 1];
+}
+
+/* The guides of a brick's texels and of those around them, and where they stand. */
+static void isogi_trace__block_find(const isogi_trace *t, const size_t brick[3], isogi_trace__dense *b) {
+    const isogi_trace__set *set = &t->feedback->texels;
+    int d[3], a;
+    b->count = 0;
+    memset(b->filled, 0, sizeof b->filled);
+    for (d[2] = -1; d[2] <= 1; d[2]++)
+        for (d[1] = -1; d[1] <= 1; d[1]++)
+            for (d[0] = -1; d[0] <= 1; d[0]++) {
+                const isogi_trace__brick *other;
+                size_t at[3];
+                uint64_t held;
+                uint32_t first[3]; /* place of the brick's first texel; wraps */
+                int beyond = 0;
+                for (a = 0; a < 3; a++) {
+                    at[a] = brick[a] + (size_t)d[a], beyond |= at[a] >= t->size[a]; /* wraps */
+                    first[a] = (uint32_t)(ISOGI_TRACE__REACH + ISOGI_TRACE__SIDE * d[a]);
+                }
+                other = beyond ? NULL : t->bricks[at[0] + t->size[0] * (at[1] + t->size[1] * at[2])];
+                if (!other || !other->node) continue;
+                for (held = other->held & isogi_trace__within_reach(d); held; held &= held - 1) {
+                    const uint32_t slot = isogi_trace__lowest_bit(held), node = other->node[slot], x = first[0] + slot % 4,
+                                   row = first[1] + slot / 4 % 4 + ISOGI_TRACE__ROW * (first[2] + slot / 16);
+                    if (!node) continue;
+                    b->guide[b->count] = isogi_trace__guide_at(set, node - 1);
+                    ISOGI_TRACE__AHEAD(b->guide[b->count]);
+                    ISOGI_TRACE__AHEAD((const char *)b->guide[b->count] + sizeof(isogi_trace__guide) - 1);
+                    b->at[b->count++] = (uint16_t)(row * ISOGI_TRACE__ROW + x);
+                    b->filled[row] = (uint16_t)(b->filled[row] | 1u << x);
+                }
+            }
+}
+
+static double isogi_trace__within_both(double x, double most) { return x > most ? most : x < -most ? -most : x; }
+
+/* Finite: what is infinite is as good as a large number. */
+static float isogi_trace__bounded(double x) { return (float)(x < 1e30 ? x : 1e30); }
+
+/* The block around a brick. */
+static void isogi_trace__block_fill(const isogi_trace *t, const size_t brick[3], isogi_trace__dense *b) {
+    const isogi_trace_desc *d = &t->scene.desc;
+    double most = 0, steepest = 0, base = 0;
+    int i, a;
+    memset(b->samples, 0, sizeof b->samples);
+    isogi_trace__block_find(t, brick, b);
+    for (i = 0; i < b->count; i++) {
+        const isogi_trace__guide *g = b->guide[i];
+        most = fabs((double)g->luminance) > most ? fabs((double)g->luminance) : most;
+        steepest = g->steep > steepest ? g->steep : steepest;
+    }
+    most = most > 0 ? 1 / most : 1, steepest = 1 / (steepest > 1e-300 ? steepest : 1e-300);
+    if (b->count) base = b->guide[0]->isovalue;
+    b->unit = 1 / most, b->tinted = d->albedo_count || d->emission_count || d->material;
+    for (i = 0; i < b->count; i++) {
+        const isogi_trace__guide *g = b->guide[i];
+        const size_t at = b->at[i];
+        const double one = g->samples ? 1.0 / g->samples : 0, iso = (g->isovalue - base) * steepest,
+                     luminance = (double)g->luminance * most, variance = (double)isogi_trace__bounded((double)g->variance) * (most * most);
+        b->samples[at] = (float)g->samples;
+        b->high[at] = (float)isogi_trace__within_both(iso, 1e30);
+        b->low[at] = (float)isogi_trace__within_both(iso - (double)b->high[at], 1e30);
+        b->steps[at] = isogi_trace__bounded(1 / (ISOGI_TRACE__SHEET * (g->steep * steepest) + 1e-30));
+        b->luminance[at] = (float)luminance, b->variance[at] = isogi_trace__bounded(variance);
+        b->guessed[at] = isogi_trace__bounded(g->samples < ISOGI_TRACE__NOISE_KNOWN ? luminance * luminance * one : variance);
+        b->noise[at] = (float)(ISOGI_TRACE__NOISE / 2 + ISOGI_TRACE__NOISE_FEW / 2 * one);
+        b->lights[at] = isogi_trace__bounded((double)g->lights);
+        for (a = 0; a < 3; a++) b->normal[a][at] = g->normal[a], b->mean[a][at] = g->mean[a];
+        if (!b->tinted) continue;
+        b->hidden[at] = g->hidden, b->reflected[at] = (float)((double)g->reflected * most);
+        for (a = 0; a < 3; a++) b->albedo[a][at] = g->albedo[a], b->glow[a][at] = isogi_trace__bounded((double)g->glow[a] * most);
+    }
+}
+
+/* Light and error of a texel into its brick. blend: what it shares with those around; NULL of transfer, and where nothing is filtered. */
+static void isogi_trace__publish(isogi_trace *t, size_t i, const isogi_trace__blend *blend) {
+    isogi_trace__set *set = &t->feedback->texels;
+    isogi_trace__node *n = isogi_trace__node_at(set, i);
+    const isogi_trace__guide *g = isogi_trace__guide_at(set, i);
+    const float *reflected = isogi_trace__values_at(set, i, ISOGI_TRACE__BOUNCE_VALUES, (size_t)t->values);
+    const int known = n->samples > 1 && !t->feedback->diverges;
+    double probes = 0, variance = (double)g->variance, lights = (double)g->lights, alike = (double)g->samples, bounce[3];
+    float to[3], error;
+    int a;
+    if (t->scene.desc.mode == ISOGI_TRACE_TRANSFER) {
+        error = known ? (float)(1 / sqrt((double)n->samples)) : ISOGI_TRACE__NOT_READY;
+        isogi_trace__record_write(t, isogi_trace__record(t, n->brick, n->slot), isogi_trace__light_at(set, i, (size_t)t->values), error);
+    } else {
+        if (blend) {
+            variance = blend->variance + ISOGI_TRACE__BLURRED * variance, alike = blend->alike;
+            lights = lights < 1e30 ? blend->lights : lights;
+        }
+        for (a = 0; a < 3; a++) {
+            double light = blend ? blend->rgb[a] : (double)g->mean[a];
+            to[a] = (float)(light + n->steady[a] + (n->light_samples ? n->light[a] / n->light_samples : 0));
+            bounce[a] = (double)reflected[a] / n->samples;
+        }
+        variance += isogi_trace__unseen(t->scene.possible, (double)g->luminance, alike) + lights;
+        probes = ISOGI_TRACE__PROBE_ERROR * isogi_trace__luminance(bounce);
+        error = known ? (float)sqrt(variance + probes * probes) : ISOGI_TRACE__NOT_READY;
+        isogi_trace__record_write(t, isogi_trace__record(t, n->brick, n->slot), to, error);
+    }
+    n->error = 9 * (double)error * (double)error < 10 * probes * probes ? 0 : error; /* more samples would not lower it */
+}
+
+/* Whether it has new light to publish. Where its error was low enough before the last sample, it stays so. */
+static int isogi_trace__unpublished(const isogi_trace *t, const isogi_trace__node *n) {
+    return n->samples && n->finished != 2 && !(n->finished && n->samples < (uint32_t)t->scene.desc.samples);
+}
+
+/* All texels of a brick, filtered. */
+static void isogi_trace__publish_brick(isogi_trace *t, size_t i, isogi_trace__dense *b) {
+    const isogi_trace__set *set = &t->feedback->texels;
+    const isogi_trace__node *any = isogi_trace__node_at(set, i);
+    const size_t first = ISOGI_TRACE__REACH * (1 + ISOGI_TRACE__ROW * (1 + ISOGI_TRACE__ROW));
+    size_t brick[3];
+    uint32_t slot;
+    int a, filled = 0;
+    for (a = 0; a < 3; a++) brick[a] = any->texel[a] / ISOGI_TRACE__SIDE;
+    for (slot = 0; slot < ISOGI_TRACE__TEXELS; slot++) {
+        const uint32_t node = any->brick->node[slot];
+        isogi_trace__blend blend;
+        if (!node || !isogi_trace__unpublished(t, isogi_trace__node_at(set, node - 1))) continue;
+        if (!filled) isogi_trace__block_fill(t, brick, b);
+        filled = 1;
+        isogi_trace__blend_of(t, b, first + slot % 4 + ISOGI_TRACE__ROW * (slot / 4 % 4 + ISOGI_TRACE__ROW * (slot / 16)), &blend);
+        blend.variance *= b->unit * b->unit;
+        isogi_trace__publish(t, node - 1, blend.alike > 0 ? &blend : NULL);
+    }
+}
+
+/* Where the filter is at work, bricks at a time: each by the task that has the last of its nodes. */
 static void isogi_trace__publish_task(void *arg, size_t task) {
     isogi_trace *t = (isogi_trace *)arg;
     isogi_trace__set *set = &t->feedback->texels;
-    size_t i, end = isogi_trace__sweep(t, task, set->count, &i), v = (size_t)t->values;
+    isogi_trace__dense *block = (isogi_trace__dense *)(void *)t->feedback->casts + task;
+    size_t i, end = isogi_trace__sweep(t, task, set->count, &i);
+    const int filtered = t->scene.desc.mode == ISOGI_TRACE_IRRADIANCE && !t->scene.desc.unfiltered;
+    uint32_t slot;
+    if (filtered) memset(block, 0, sizeof *block); /* rays were here before */
     for (; i < end; i++) {
-        isogi_trace__node *n = isogi_trace__node_at(set, i);
-        const isogi_trace__guide *g = isogi_trace__guide_at(set, i);
-        const float *reflected = isogi_trace__values_at(set, i, ISOGI_TRACE__BOUNCE_VALUES, v);
-        float to[3], error;
-        double rgb[3], variance[2], probes = 0;
-        int a;
-        if (!n->samples || n->finished == 2) continue;
-        if (n->finished && n->samples < (uint32_t)t->scene.desc.samples) continue; /* its error, which was low enough, stays so */
-        if (t->scene.desc.mode == ISOGI_TRACE_TRANSFER) {
-            error = n->samples > 1 && !t->feedback->diverges ? (float)(1 / sqrt((double)n->samples)) : ISOGI_TRACE__NOT_READY;
-            isogi_trace__record_write(t, isogi_trace__record(t, n->brick, n->slot), isogi_trace__light_at(set, i, v), error);
-        } else {
-            double alike = isogi_trace__shared(t, i, rgb, variance), bounce[3];
-            for (a = 0; a < 3; a++) {
-                to[a] = (float)(rgb[a] + n->steady[a] + (n->light_samples ? n->light[a] / n->light_samples : 0));
-                bounce[a] = (double)reflected[a] / n->samples;
-            }
-            variance[0] += isogi_trace__unseen(t->scene.possible, (double)g->luminance, alike) + variance[1];
-            probes = ISOGI_TRACE__PROBE_ERROR * isogi_trace__luminance(bounce);
-            error = n->samples > 1 && !t->feedback->diverges ? (float)sqrt(variance[0] + probes * probes) : ISOGI_TRACE__NOT_READY;
-            isogi_trace__record_write(t, isogi_trace__record(t, n->brick, n->slot), to, error);
+        const isogi_trace__node *n = isogi_trace__node_at(set, i);
+        uint32_t last = 0;
+        if (!filtered) {
+            if (isogi_trace__unpublished(t, n)) isogi_trace__publish(t, i, NULL);
+            continue;
         }
-        n->error = 9 * (double)error * (double)error < 10 * probes * probes ? 0 : error; /* more samples would not lower it */
+        if (i + 1 < set->count && isogi_trace__node_at(set, i + 1)->brick == n->brick) continue;
+        for (slot = 0; slot < ISOGI_TRACE__TEXELS; slot++)
+            if (n->brick->node[slot] > last) last = n->brick->node[slot];
+        if (last == i + 1) isogi_trace__publish_brick(t, i, block);
     }
 }
 
@@ -4661,7 +4914,7 @@ static uint64_t isogi_trace__phase_cost(const isogi_trace__feedback *f, size_t t
     const isogi_trace__segment *s = f->phase == ISOGI_TRACE__PASS ? f->probes.segments + task : f->texels.segments + f->segment;
     if (f->phase == ISOGI_TRACE__PASS) return s->entries / 8 + s->hits / 64 + 1;
     if (f->phase == ISOGI_TRACE__BOUNCE) return ISOGI_TRACE__SWEEP / 8 + s->hits * ISOGI_TRACE__SWEEP / s->entries / 64;
-    if (f->phase == ISOGI_TRACE__PUBLISH) return ISOGI_TRACE__SWEEP;
+    if (f->phase == ISOGI_TRACE__PUBLISH) return ISOGI_TRACE__SWEEP / 2;
     return f->phase == ISOGI_TRACE__FORGET ? ISOGI_TRACE__SWEEP / 2 : ISOGI_TRACE__SWEEP / 8;
 }
 
@@ -4707,16 +4960,18 @@ static void isogi_trace__phase_end(isogi_trace *t) {
 /* The next tasks of the phase at work, about as long as `limit` rays, at least one. Returns what they count as. */
 static uint64_t isogi_trace__carry(isogi_trace *t, uint64_t limit) {
     isogi_trace__feedback *f = t->feedback;
+    const size_t blocks = ISOGI_TRACE__TASKS * sizeof *f->casts / sizeof(isogi_trace__dense); /* that lie where rays did */
     size_t tasks = isogi_trace__phase_tasks(f), count = 0, i;
     uint64_t cost = 0;
     isogi_context silent = t->context;
     silent.progress = NULL;
+    if (f->phase == ISOGI_TRACE__PUBLISH && tasks > f->carried + blocks) tasks = f->carried + blocks;
     while (f->carried + count < tasks && cost < limit) cost += isogi_trace__phase_cost(f, f->carried + count++);
     if (f->phase >= ISOGI_TRACE__FINISH) /* they count what is done, and give memory back: one by one */
         for (i = 0; i < count; i++) isogi_trace__phase_task(t, i);
     else if (count) isogi_parallel(&silent, count, isogi_trace__phase_task, t, 0, 1);
     f->carried += count;
-    if (f->carried >= tasks) isogi_trace__phase_end(t);
+    if (f->carried >= isogi_trace__phase_tasks(f)) isogi_trace__phase_end(t);
     return cost;
 }
 
@@ -6256,7 +6511,23 @@ ISOGI_API isogi_result isogi_trace_gather_field(const isogi_trace_desc *desc, is
 #undef ISOGI_TRACE__RIDGE
 #undef ISOGI_TRACE__SHEET
 #undef ISOGI_TRACE__FILTER
-#undef ISOGI_TRACE__FILTERED
+#undef ISOGI_TRACE__REACH
+#undef ISOGI_TRACE__ROWS
+#undef ISOGI_TRACE__ROW
+#undef ISOGI_TRACE__DENSE
+#undef ISOGI_TRACE__LANES
+#undef ISOGI_TRACE__NEAR
+#undef ISOGI_TRACE__VECTORS
+#undef ISOGI_TRACE__AVX2
+#undef ISOGI_TRACE__FLOATS
+#undef ISOGI_TRACE__DEFINE_BLEND
+#undef ISOGI_TRACE__BLEND_CHANNEL
+#undef ISOGI_TRACE__KEEP
+#undef ISOGI_TRACE__PICK
+#undef ISOGI_TRACE__KEEP_F4
+#undef ISOGI_TRACE__PICK_F4
+#undef ISOGI_TRACE__KEEP_F8
+#undef ISOGI_TRACE__PICK_F8
 #undef ISOGI_TRACE__BLURRED
 #undef ISOGI_TRACE__TURNED
 #undef ISOGI_TRACE__LIGHT_FIRST
