@@ -226,7 +226,7 @@ static void study_rays(study *s) {
     isogi_dvr_desc desc = s->base;
     frame reference = frame_from(s, &desc, TRUNCATED, 0, &s->lighting);
     for (int way = 0; way < 3 - sweeps_alone; way++) /* sweeps on their lattice of 2 voxels and on one of 1, the paper's method */
-        for (int rays = 16; rays <= (quick ? 64 : way == 2 ? 256 : 2048); rays *= 2) {
+        for (int rays = 16; rays <= (quick ? 64 : way ? 256 : 2048); rays *= 2) {
             char setting[32];
             desc = s->base, desc.directions = rays;
             if (way == 1) desc.visibility_step = 1;
