@@ -12,6 +12,7 @@
 #define PROCEDURAL_H
 
 #include "isogi_vol.h"
+#include "large.h"
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -391,7 +392,7 @@ static inline isogi_result procedural_make(const procedural_shape *shape, size_t
         job.size[a] = (shape->size[a] * job.longest + largest / 2) / largest;
         if (job.size[a] < 2) job.size[a] = 2;
     }
-    job.data = (unsigned char *)malloc(bytes * job.size[0] * job.size[1] * job.size[2]);
+    job.data = (unsigned char *)large_allocate(bytes * job.size[0] * job.size[1] * job.size[2]);
     if (!job.data) return ISOGI_NO_MEMORY;
     result = isogi_parallel(context, job.size[2], procedural_slice, &job, 0, 1);
     if (result != ISOGI_OK) {

@@ -10,6 +10,7 @@
 
 #include "files.h"
 #include "isogi_vol.h"
+#include "large.h"
 #include <ctype.h>
 
 static inline size_t volume_type_bytes(isogi_type type) {
@@ -97,7 +98,7 @@ static inline int volume_read(const char *path, isogi_volume *volume, char *erro
         close(file);
         return 0;
     }
-    data = (unsigned char *)malloc(bytes);
+    data = (unsigned char *)large_allocate(bytes);
     ok = data ? file_read_bytes(file, path, data, bytes, error) : file_fail(error, "%s: out of memory", path);
     close(file);
     if (!ok) {

@@ -5,8 +5,8 @@
    One thread, CPU seconds. Volumes are procedural, as the scenes name them: Marschner-Lobb and gyroid on the cube, here 128^3
    (64^3 with --quick). Frames: standard view, shaded by visibility under a uniform sky and a directional light; error = RMSE of
    sRGB values against steps of a sixteenth of a voxel, same visibility. Visibility: order 3 on a grid of 8^3 (6^3); error =
-   relative RMSE of all coefficients against 2048 rays by brute force in steps of a quarter of a voxel. Methods: default; steps, rays = other
-   settings of the same code.
+   relative RMSE of all coefficients against 2048 rays by brute force in steps of a quarter of a voxel. Methods: default; steps, rays =
+   other settings of the same code.
    Data space: frames of 512x512 at 256^3 (--quick: without the finest steps); tables of pieces. Frames of the scenes: error against
    visibility of 2048 rays by brute force on the same grid, kept in build/bench/: computing it takes minutes, once, and goes on where it
    was stopped. A table of goals is printed at the end. --dry: all rows in seconds, to look at the table's form: scenes of 16 voxels, with

@@ -3,6 +3,7 @@
 #define VOL_SCENES_H
 
 #include "isogi_vol.h"
+#include "large.h"
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -134,7 +135,7 @@ static scene scene_new(int gyroid, int n, int surfaces) {
     scene s = {.n = n, .isovalue = gyroid ? 0 : 0.5};
     size_t voxels = (size_t)n * (size_t)n * (size_t)n;
     snprintf(s.name, sizeof s.name, "%s%d", gyroid ? "gyroid" : "ml", n);
-    s.data = (float *)malloc(voxels * sizeof(float)), s.reference = (double *)malloc(voxels * sizeof(double));
+    s.data = (float *)large_allocate(voxels * sizeof(float)), s.reference = (double *)malloc(voxels * sizeof(double));
     field_fill(s.data, gyroid, n);
     for (size_t i = 0; i < voxels; i++) s.reference[i] = (double)s.data[i];
     isogi_volume volume = {.data = s.data, .type = ISOGI_F32, .size = {(size_t)n, (size_t)n, (size_t)n}};
