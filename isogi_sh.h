@@ -65,7 +65,9 @@
    Determinism  The same input on the same instruction path gives the same bits. Paths agree within the float errors below.
    Accuracy     Largest absolute error against 128 bits, poles and all: double 1e-15 at degree 4, 5e-15 at 10, 2e-14 at 20, 1.5e-13 at 50,
                 7e-13 at 100 (all near poles, some .01 to .1 off them, for m = 0 and +-1; up to twice as much in x87 registers, as on
-                32-bit x86); float 4.5e-7 at 4, 2.2e-6 at 10, 1e-5 at 20. tests/test_sh.c states and checks each.
+                32-bit x86); float 4.5e-7 at 4, 2.2e-6 at 10, 1e-5 at 20, and 3e-7 beyond, where floats are rounded doubles. Gradients,
+                which grow as degree^1.5, in double 4e-15 at degree 4, 4e-14 at 10, 4e-13 at 20, 5e-11 (of 284) at 100; in float those
+                rounded. tests/test_sh.c states and checks each.
                 All bounds assume IEEE arithmetic: -ffast-math may reorder what cancels, and costs up to four times as much, six at
                 degree 100.
    Limits       Order 1..101 (degree 0..100), 1..16 channels. Counts times order^2 must be addressable.
@@ -287,7 +289,8 @@ ISOGI_API isogi_result isogi_sh_convolve_cosine(float *out, const float *in, int
 /* Zonal coefficients of the clamped cosine around +z. */
 ISOGI_API isogi_result isogi_sh_cosine_zonal(float *zonal, int order);
 
-/* c[order*order] = the axis-symmetric function of zonal coefficients z[order], turned from +z to `direction`. */
+/* c[order*order] = the axis-symmetric function of zonal coefficients z[order], turned from +z to `direction`. To the rounding
+   of floats, at order 5 to 4.5e-7 of the largest z. */
 ISOGI_API isogi_result isogi_sh_zonal_to_direction(float *c, int order, const float *zonal, const float direction[3]);
 
 /* Factors that fade high degrees, against rings. width > 0, in degrees: HANN (1 + cos(pi l / width)) / 2 and LANCZOS
@@ -295,10 +298,10 @@ ISOGI_API isogi_result isogi_sh_zonal_to_direction(float *c, int order, const fl
 typedef enum isogi_sh_window_kind { ISOGI_SH_HANN = 0, ISOGI_SH_LANCZOS, ISOGI_SH_GAUSS } isogi_sh_window_kind;
 ISOGI_API isogi_result isogi_sh_window(float *out, const float *in, int order, int channels, isogi_sh_window_kind kind, double width);
 
-/* A window under which no channel is negative anywhere, wider ones being too weak: by bisection, over a grid of 3 order latitudes whose
-   lowest 64 troughs are refined. What stays negative is below 1e-5 of the channel's largest value. (Narrower windows than the one found may
-   be too weak again: Lanczos at width 1.577 is the answer for a case that 2.363 serves, too.) width (may be NULL) receives it, 0 where none
-   is needed. ISOGI_INVALID where a channel's mean is negative. Order 32 at most, else ISOGI_TOO_LARGE. */
+/* The widest (weakest) window under which no channel is negative anywhere: certainly nothing below -1e-5 of its largest value is left,
+   and windows that are wider by steps of 2 % all leave something below -1e-6. width (may be NULL) receives it, at most 1e-5 of it too
+   narrow, or 0 where none is needed. It takes a millisecond a channel at order 8, ten at 16, and up to two seconds at 32, longest where
+   a bright light stands in a dark sky. ISOGI_INVALID where a channel's mean is negative. Order 32 at most, else ISOGI_TOO_LARGE. */
 ISOGI_API isogi_result isogi_sh_dering(float *out, const float *in, int order, int channels, isogi_sh_window_kind kind, double *width);
 
 /* energy[order]: the sum of squares over each degree and all channels. */
@@ -313,7 +316,10 @@ typedef enum isogi_sh_normalisation {
 typedef enum isogi_sh_ordering {
     ISOGI_SH_ACN = 0, /* m = -l .. l */
     ISOGI_SH_SID,     /* m = l, -l, l-1, -(l-1), .. 0 */
-    ISOGI_SH_PAIRS    /* m = 0, 1, -1, 2, -2, .. */
+    ISOGI_SH_PAIRS,   /* m = 0, 1, -1, 2, -2, .. */
+    ISOGI_SH_FUMA     /* Furse and Malham's W XYZ RSTUV KLMNOPQ: SID in degree 1, else PAIRS. Their coefficients are SN3D's of no
+                         Condon-Shortley phase times 1/sqrt 2 (W); 1 (X Y Z R K); 2/sqrt 3 (S T U V); sqrt(45/32) (L M);
+                         3/sqrt 5 (N O); sqrt(8/5) (P Q) */
 } isogi_sh_ordering;
 typedef struct isogi_sh_convention {
     isogi_sh_normalisation normalisation;
@@ -356,7 +362,6 @@ ISOGI_API isogi_result isogi_sh_fit_directional(float direction[3], float rgb[3]
 #define ISOGI_SH__TURNS 15        /* the highest degree whose quarter turn is tabled */
 #define ISOGI_SH__TOGETHER 4  /* channels, or columns of a matrix, that are rotated in one pass */
 #define ISOGI_SH__DERING_ORDER 32
-#define ISOGI_SH__TROUGHS 64 /* of a channel, that are followed to their depth */
 #define ISOGI_SH__GROUP 5     /* orders m that are projected in one pass */
 
 /* 16-byte vectors where the compiler's target has them; 32 and 64 bytes by the processor that runs. gcc for Windows does not align its
@@ -3756,31 +3761,36 @@ static void isogi_sh__zonal_order5(float *c, const float *zonal, isogi_sh__unit 
 }
 
 #ifdef ISOGI_SH__SIMD
-/* The same in float, for directions of length 1 to 1e-3 (else 0): c[i] is a lobe's factor times a polynomial of z^2, times z where
-   l - m is odd, times cosine or sine of m. Here x, y, z, cm, sm stand in all lanes, and blends pick them. */
+/* The same in float, for directions of length 1 to 1e-3 (else 0): c[i] is a lobe's factor times a polynomial of z^2 and ww = x^2 + y^2
+   (of z alone its terms cancel near poles), times z where l - m is odd, times cosine or sine of m. Here x, y, z, cm, sm stand in all lanes,
+   and blends pick them. Constant terms, those of ww, of zz and of zz ww: a, b and d by degree. */
 ISOGI_SH__AVX2 static int isogi_sh__zonal_order5_f8(float *c, const float *zonal, const float d[3]) {
     const isogi_sh__f8 zero = {0}, one = {1, 1, 1, 1, 1, 1, 1, 1};
-    const isogi_sh__f8 a0 = {1.0f, 1.0f, 1.0f, 1.0f, 0.866025404f, 1.73205081f, -0.5f, 1.73205081f};
-    const isogi_sh__f8 a1 = {0, 0, 0, 0, 0, 0, 1.5f, 0};
-    const isogi_sh__f8 b0 = {0.866025404f, 0.790569415f, 1.93649167f, -0.612372436f, -1.5f, -0.612372436f, 1.93649167f, 0.790569415f};
-    const isogi_sh__f8 b1 = {0, 0, 0, 3.06186218f, 2.5f, 3.06186218f, 0, 0};
-    const isogi_sh__f8 d0 = {0.739509973f, 2.09165007f, -0.559016994f, -2.37170825f, 0.375f, -2.37170825f, -0.559016994f, 2.09165007f};
-    const isogi_sh__f8 d1 = {0, 0, 3.91311896f, 5.53398591f, -3.75f, 5.53398591f, 3.91311896f, 0};
-    const isogi_sh__f8 d2 = {0, 0, 0, 0, 4.375f, 0, 0, 0};
+    const isogi_sh__f8 a0 = {1.0f, 1.0f, 1.0f, 1.0f, 0.866025404f, 1.73205081f, 0, 1.73205081f};
+    const isogi_sh__f8 a1 = {0, 0, 0, 0, 0, 0, -0.5f, 0};
+    const isogi_sh__f8 a2 = {0, 0, 0, 0, 0, 0, 1.0f, 0};
+    const isogi_sh__f8 b0 = {0.866025404f, 0.790569415f, 1.93649167f, 0, 0, 0, 1.93649167f, 0.790569415f};
+    const isogi_sh__f8 b1 = {0, 0, 0, -0.612372436f, -1.5f, -0.612372436f, 0, 0};
+    const isogi_sh__f8 b2 = {0, 0, 0, 2.44948974f, 1.0f, 2.44948974f, 0, 0};
+    const isogi_sh__f8 d0 = {0.739509973f, 2.09165007f, 0, 0, 0, 0, 0, 2.09165007f};
+    const isogi_sh__f8 d1 = {0, 0, -0.559016994f, -2.37170825f, 0.375f, -2.37170825f, -0.559016994f, 0};
+    const isogi_sh__f8 d2 = {0, 0, 3.35410197f, 3.16227766f, 1.0f, 3.16227766f, 3.35410197f, 0};
+    const isogi_sh__f8 d3 = {0, 0, 0, 0, -4.375f, 0, 0, 0};
     isogi_sh__f8 x = ISOGI_SH__SPLAT_F8(d[0]), y = ISOGI_SH__SPLAT_F8(d[1]), z = ISOGI_SH__SPLAT_F8(d[2]), scale;
-    isogi_sh__f8 e = one - ISOGI_SH__FMA_F8(x, x, ISOGI_SH__FMA_F8(y, y, z * z));
-    isogi_sh__f8 c2, s2, c3, s3, c4, s4, zz, v, w;
+    isogi_sh__f8 e = ISOGI_SH__FMA_F8(-x, x, ISOGI_SH__FMA_F8(-y, y, ISOGI_SH__FMA_F8(-z, z, one)));
+    isogi_sh__f8 c2, s2, c3, s3, c4, s4, zz, ww, v, w;
     isogi_sh__f8 l2 = ISOGI_SH__SPLAT_F8(zonal[2]), l3 = ISOGI_SH__SPLAT_F8(zonal[3]), l4 = ISOGI_SH__SPLAT_F8(zonal[4]);
     if (!isogi_sh__below(e[0], 1e-3f)) return 0;
-    scale = ISOGI_SH__FMA_F8(e, ISOGI_SH__FMA_F8(e, one * 0.375f, one * 0.5f), one);
-    x *= scale, y *= scale, z *= scale, zz = z * z;
+    scale = e * ISOGI_SH__FMA_F8(e, one * 0.375f, one * 0.5f);
+    x = ISOGI_SH__FMA_F8(x, scale, x), y = ISOGI_SH__FMA_F8(y, scale, y), z = ISOGI_SH__FMA_F8(z, scale, z);
+    zz = z * z, ww = ISOGI_SH__FMA_F8(x, x, y * y);
     c2 = (x - y) * (x + y), s2 = (x + x) * y;
     c3 = ISOGI_SH__FMA_F8(x, c2, -(y * s2)), s3 = ISOGI_SH__FMA_F8(x, s2, y * c2), c4 = ISOGI_SH__FMA_F8(c2, c2, -(s2 * s2)),
     s4 = (c2 + c2) * s2;
     /* degrees 0, 1 and 2 but for its last: 1; y 1 x; s2 y 1 x */
     w = __builtin_shufflevector(one, x, 0, 1, 2, 11, 4, 5, 6, 15), w = __builtin_shufflevector(w, y, 0, 9, 2, 3, 4, 13, 6, 7);
-    w = __builtin_shufflevector(w, s2, 0, 1, 2, 3, 12, 5, 6, 7) * ISOGI_SH__FMA_F8(a1, zz, a0) *
-        __builtin_shufflevector(one, z, 0, 1, 10, 3, 4, 13, 6, 15);
+    w = __builtin_shufflevector(w, s2, 0, 1, 2, 3, 12, 5, 6, 7) *
+        ISOGI_SH__FMA_F8(a2, zz, ISOGI_SH__FMA_F8(a1, ww, a0)) * __builtin_shufflevector(one, z, 0, 1, 10, 3, 4, 13, 6, 15);
     v = __builtin_shufflevector(zonal[1] - zero, l2, 0, 1, 2, 3, 12, 13, 14, 15),
     v = __builtin_shufflevector(v, zonal[0] - zero, 8, 1, 2, 3, 4, 5, 6, 7);
     *(isogi_sh__f8 *)c = w * v;
@@ -3788,9 +3798,10 @@ ISOGI_SH__AVX2 static int isogi_sh__zonal_order5_f8(float *c, const float *zonal
     v = __builtin_shufflevector(one, x, 0, 1, 2, 3, 4, 13, 6, 7), v = __builtin_shufflevector(v, y, 0, 1, 2, 11, 4, 5, 6, 7);
     v = __builtin_shufflevector(v, c2, 8, 1, 2, 3, 4, 5, 14, 7), v = __builtin_shufflevector(v, s2, 0, 1, 10, 3, 4, 5, 6, 7);
     v = __builtin_shufflevector(v, c3, 0, 1, 2, 3, 4, 5, 6, 15), v = __builtin_shufflevector(v, s3, 0, 9, 2, 3, 4, 5, 6, 7);
-    w = v * ISOGI_SH__FMA_F8(b1, zz, b0) * __builtin_shufflevector(one, z, 0, 1, 10, 3, 12, 5, 14, 7);
+    w = v * ISOGI_SH__FMA_F8(b2, zz, ISOGI_SH__FMA_F8(b1, ww, b0)) * __builtin_shufflevector(one, z, 0, 1, 10, 3, 12, 5, 14, 7);
     *(isogi_sh__f8 *)(c + 8) = w * __builtin_shufflevector(l3, l2, 8, 1, 2, 3, 4, 5, 6, 7);
-    w = ISOGI_SH__FMA_F8(ISOGI_SH__FMA_F8(d2, zz, d1), zz, d0) * __builtin_shufflevector(one, z, 0, 9, 2, 11, 4, 13, 6, 15);
+    w = ISOGI_SH__FMA_F8(ISOGI_SH__FMA_F8(d3, ww, d2), zz, ISOGI_SH__FMA_F8(d1, ww, d0)) *
+        __builtin_shufflevector(one, z, 0, 9, 2, 11, 4, 13, 6, 15);
     *(isogi_sh__f8 *)(c + 16) = __builtin_shufflevector(v, s4, 8, 1, 2, 3, 4, 5, 6, 7) * w * l4;
     c[24] = 0.739509973f * c4[0] * l4[0];
     return 1;
@@ -3853,13 +3864,13 @@ ISOGI_API isogi_result isogi_sh_band_energy(double *energy, const float *c, int 
 
 static int isogi_sh__convention_ok(isogi_sh_convention v) {
     return (int)v.normalisation >= (int)ISOGI_SH_ORTHONORMAL && (int)v.normalisation <= (int)ISOGI_SH_SN3D &&
-           (int)v.ordering >= (int)ISOGI_SH_ACN && (int)v.ordering <= (int)ISOGI_SH_PAIRS;
+           (int)v.ordering >= (int)ISOGI_SH_ACN && (int)v.ordering <= (int)ISOGI_SH_FUMA;
 }
 
 static int isogi_sh__position(isogi_sh_ordering ordering, int l, int m) {
     int away = m < 0 ? -m : m;
     if (ordering == ISOGI_SH_ACN) return l * l + l + m;
-    if (ordering == ISOGI_SH_SID) return l * l + 2 * (l - away) + (m < 0 ? 1 : 0);
+    if (ordering == ISOGI_SH_SID || (ordering == ISOGI_SH_FUMA && l == 1)) return l * l + 2 * (l - away) + (m < 0 ? 1 : 0);
     return l * l + (m > 0 ? 2 * m - 1 : 2 * away);
 }
 
@@ -4239,142 +4250,207 @@ ISOGI_API isogi_result isogi_sh_product_matrix(float *matrix, const float *f, in
 
 /* ==== de-ringing ====================================================================================================== */
 
-/* One channel under a window: value at a direction. */
-static double isogi_sh__windowed(const float *c, int order, int channels, const double *factor, isogi_sh__unit u) {
-    double q[ISOGI_SH_MAX_ORDER], cm = 1, sm = 0, diagonal = 0, value = 0, t;
-    int l, m;
-    for (m = 0; m < order; m++) {
-        diagonal = isogi_sh__next_diagonal(diagonal, m);
-        isogi_sh__column(q, order, m, diagonal, u.z, u.z_low);
-        for (l = m; l < order; l++)
-            value += factor[l] * q[l] * (cm * (double)c[channels * (l * (l + 1) + m)] + sm * (double)c[channels * (l * (l + 1) - m)]);
-        t = u.x * cm - u.y * sm;
-        sm = u.x * sm + u.y * cm;
-        cm = t;
+/* One channel under a window; where it was last found below zero (colatitude and longitude); and of the row that is looked at, sums of
+   cos m p and of sin m p: of the value, its derivative by the colatitude, and its Laplacian. */
+typedef struct isogi_sh__ringing {
+    const float *c;
+    const double *factor;
+    int order, channels;
+    double highest, second, third, place[2], azimuth[3][2][ISOGI_SH__DERING_ORDER];
+} isogi_sh__ringing;
+
+/* The first `sums` of the three. With functions q of m without their power of the sine s, d/dz q = sqrt((l - m) (l + m + 1)) q of m + 1,
+   at m = 0 by a root of 2 less. */
+static void isogi_sh__ringing_row(isogi_sh__ringing *f, double colatitude, int sums) {
+    double column[2][ISOGI_SH_MAX_ORDER], z = cos(colatitude), sine = sin(colatitude), diagonal = isogi_sh__next_diagonal(0, 0), power = 1;
+    int i, k, l, m, n = f->order;
+    isogi_sh__column(column[0], n, 0, diagonal, z, 0);
+    for (m = 0; m < n; m++) {
+        const double *q = column[m & 1], *above = column[(m + 1) & 1];
+        double sum[3][2] = {{0, 0}, {0, 0}, {0, 0}};
+        diagonal = isogi_sh__next_diagonal(diagonal, m + 1);
+        if (m + 1 < n) isogi_sh__column(column[(m + 1) & 1], n, m + 1, diagonal, z, 0);
+        for (k = 0; k < (m ? 2 : 1); k++)
+            for (l = m; l < n; l++) {
+                double c = f->factor[l] * (double)f->c[f->channels * (l * (l + 1) + (k ? -m : m))];
+                sum[0][k] += c * q[l];
+                if (sums < 3) continue;
+                if (l > m) sum[1][k] -= c * sqrt((double)((l - m) * (l + m + 1)) * (m ? 1 : 0.5)) * above[l];
+                sum[2][k] -= c * (double)(l * (l + 1)) * q[l];
+            }
+        for (k = 0; k < 2; k++) {
+            sum[1][k] *= power * sine;
+            if (m) sum[1][k] += (double)m * power / sine * z * sum[0][k];
+            for (i = 0; i < sums; i++) f->azimuth[i][k][m] = i == 1 ? sum[i][k] : power * sum[i][k];
+        }
+        power *= sine;
+    }
+}
+
+static double isogi_sh__ringing_at(const isogi_sh__ringing *f, double longitude) {
+    double x = cos(longitude), y = sin(longitude), cm = 1, sm = 0, value = 0, turned;
+    int m;
+    for (m = 0; m < f->order; m++) {
+        value += cm * f->azimuth[0][0][m] + sm * f->azimuth[0][1][m];
+        turned = x * cm - y * sm;
+        sm = x * sm + y * cm;
+        cm = turned;
     }
     return value;
 }
 
-/* A place of the grid that is no higher than those around it. */
-typedef struct isogi_sh__trough {
-    double value;
-    isogi_sh__unit at;
-} isogi_sh__trough;
-
-/* Whether a trough goes below `limit`: walks downhill by shrinking steps, until it is below, or until it is so far above, for a function of
-   this order whose values differ by `spread`, that nothing a step away can be below: second derivatives are at most spread / 2 times the
-   square of the degree. */
-static int isogi_sh__goes_below(const float *c, int order, int channels, const double *factor, const isogi_sh__trough *trough, double limit,
-                                double spread) {
-    double step = 1.0 / (double)(3 * order), value = trough->value;
-    isogi_sh__unit u = trough->at;
-    while (step > 1e-5 && value >= limit) {
-        int axis, moved = 0;
-        for (axis = 0; axis < 6; axis++) {
-            double s = axis & 1 ? -step : step, other;
-            isogi_sh__unit v =
-                isogi_sh__normalise(u.x + (axis / 2 == 0 ? s : 0), u.y + (axis / 2 == 1 ? s : 0), u.z + (axis / 2 == 2 ? s : 0));
-            other = isogi_sh__windowed(c, order, channels, factor, v);
-            if (other < value - 1e-15 * fabs(value)) value = other, u = v, moved = 1;
-        }
-        if (moved) continue;
-        if (value - 2 * spread * (order * step) * (order * step) > limit) return 0;
-        step /= 2;
+/* The largest second derivative along any great circle there: the larger eigenvalue of the Hessian, whose trace is the Laplacian. */
+static double isogi_sh__ringing_bend(const isogi_sh__ringing *f, double colatitude, double longitude) {
+    double x = cos(longitude), y = sin(longitude), cm = 1, sm = 0, p = 0, pp = 0, t = 0, tp = 0, trace = 0, turned,
+        sine = sin(colatitude), z = cos(colatitude), along, across;
+    int m;
+    for (m = 0; m < f->order; m++) {
+        pp -= (double)(m * m) * (cm * f->azimuth[0][0][m] + sm * f->azimuth[0][1][m]);
+        p += (double)m * (cm * f->azimuth[0][1][m] - sm * f->azimuth[0][0][m]);
+        t += cm * f->azimuth[1][0][m] + sm * f->azimuth[1][1][m];
+        tp += (double)m * (cm * f->azimuth[1][1][m] - sm * f->azimuth[1][0][m]);
+        trace += cm * f->azimuth[2][0][m] + sm * f->azimuth[2][1][m];
+        turned = x * cm - y * sm;
+        sm = x * sm + y * cm;
+        cm = turned;
     }
-    return value < limit;
+    along = pp / (sine * sine) + z / sine * t;
+    across = (tp - z / sine * p) / sine;
+    return 0.5 * trace + sqrt((along - 0.5 * trace) * (along - 0.5 * trace) + across * across);
 }
 
-/* Keeps the lowest troughs; the first one is the highest of them. */
-static int isogi_sh__keep_trough(isogi_sh__trough *list, int count, double value, isogi_sh__unit at) {
-    int i;
-    if (count < ISOGI_SH__TROUGHS) i = count++;
-    else if (value < list[0].value) i = 0;
-    else return count;
-    list[i].value = value, list[i].at = at;
-    for (i = 1; i < count; i++)
-        if (list[i].value > list[0].value) {
-            isogi_sh__trough swap = list[0];
-            list[0] = list[i], list[i] = swap;
-        }
-    return count;
+/* Bounds |f_l| of each degree (Cauchy and Schwarz); returns their sum, which bounds |f|. */
+static double isogi_sh__ringing_bounds(double *bound, const isogi_sh__ringing *f) {
+    double sum = 0;
+    int i, l;
+    for (l = 0; l < f->order; l++) {
+        double squares = 0;
+        for (i = l * l; i < (l + 1) * (l + 1); i++) squares += (double)f->c[f->channels * i] * (double)f->c[f->channels * i];
+        bound[l] = f->factor[l] * sqrt((double)(2 * l + 1) / (4 * ISOGI_SH__PI) * squares);
+        sum += bound[l];
+    }
+    return sum;
 }
 
-/* One channel under a window, along a latitude. */
-static void isogi_sh__windowed_row(double *value, const float *c, int order, int channels, const double *factor, double t) {
-    double cosines[ISOGI_SH__DERING_ORDER], sines[ISOGI_SH__DERING_ORDER], q[ISOGI_SH_MAX_ORDER];
-    double z = cos(t), sine = sin(t), diagonal = 0, power = 1;
-    int j, l, m, columns = 6 * order;
-    for (m = 0; m < order; m++) {
-        cosines[m] = sines[m] = 0;
-        diagonal = isogi_sh__next_diagonal(diagonal, m);
-        isogi_sh__column(q, order, m, diagonal, z, 0);
-        for (l = m; l < order; l++) {
-            cosines[m] += power * factor[l] * q[l] * (double)c[channels * (l * (l + 1) + m)];
-            sines[m] += power * factor[l] * q[l] * (double)c[channels * (l * (l + 1) - m)];
-        }
-        power *= sine;
-    }
-    for (j = 0; j < columns; j++) {
-        double phi = 2 * ISOGI_SH__PI * (double)j / (double)columns, x = cos(phi), y = sin(phi), cm = 1, sm = 0, turned;
-        value[j] = 0;
-        for (m = 0; m < order; m++) {
-            value[j] += cm * cosines[m] + (m ? sm * sines[m] : 0);
-            turned = x * cm - y * sm;
-            sm = x * sm + y * cm;
-            cm = turned;
-        }
+/* Bounds of the second and third derivatives along great circles, on which f is a trigonometric polynomial: by Bernstein's inequality a
+   power of its degree times half the range of f, which is at most `range`; degrees above any k may be counted by their own bounds. */
+static void isogi_sh__ringing_derivatives(isogi_sh__ringing *f, double range) {
+    double bound[ISOGI_SH__DERING_ORDER], rest[2] = {0, 0};
+    int k;
+    isogi_sh__ringing_bounds(bound, f);
+    for (k = f->order - 1; k >= 0; k--) {
+        double second = (double)(k * k), third = second * (double)k, two, three;
+        two = 0.5 * second * range + rest[0], three = 0.5 * third * range + rest[1];
+        if (k == f->order - 1 || two < f->second) f->second = two;
+        if (k == f->order - 1 || three < f->third) f->third = three;
+        rest[0] += second * bound[k], rest[1] += third * bound[k], range += 2 * bound[k];
     }
 }
 
-/* Whether one channel under a window is negative anywhere, by a millionth of its largest value: on a grid of 3 order latitudes, whose
-   troughs are followed to their depth. */
-static int isogi_sh__is_negative(const float *c, int order, int channels, const double *factor) {
-    double row[3][6 * ISOGI_SH__DERING_ORDER], range[2] = {1e300, -1e300};
-    isogi_sh__trough trough[ISOGI_SH__TROUGHS];
-    int i, j, k, rows = 3 * order, columns = 6 * order, count = 0;
-    isogi_sh__windowed_row(row[0], c, order, channels, factor, 0.5 * ISOGI_SH__PI / (double)rows);
-    for (i = 0; i < rows; i++) {
-        const double *here = row[i % 3], *above = i ? row[(i + 2) % 3] : here, *below = i + 1 < rows ? row[(i + 1) % 3] : here;
-        double t = ISOGI_SH__PI * ((double)i + 0.5) / (double)rows;
-        if (i + 1 < rows) isogi_sh__windowed_row(row[(i + 1) % 3], c, order, channels, factor, t + ISOGI_SH__PI / (double)rows);
-        for (j = 0; j < columns; j++) {
-            double value = here[j], phi = 2 * ISOGI_SH__PI * (double)j / (double)columns;
-            int lowest = 1;
-            range[0] = value < range[0] ? value : range[0], range[1] = value > range[1] ? value : range[1];
-            for (k = j + columns - 1; k <= j + columns + 1; k++)
-                lowest = lowest && value <= above[k % columns] && value <= here[k % columns] && value <= below[k % columns];
-            if (!lowest) continue;
-            count = isogi_sh__keep_trough(trough, count, value, isogi_sh__normalise(sin(t) * cos(phi), sin(t) * sin(phi), cos(t)));
+/* Whether some of the `count` <= 32 cells of a row of square cells, of which pi / size are between the poles, holds a value below -1e-6 of
+   the highest. Where f is least its slope is 0: the middle of a cell that holds that place, d from it at most, is higher by at
+   most second d^2 / 2, and by bend d^2 / 2 + third d^3 / 3, bend being the second derivative in the middle. Cells whose middles are
+   higher still are dropped, the others split in four, until nothing below -8e-6 can be left. */
+static int isogi_sh__ringing_search(isogi_sh__ringing *f, int row, double size, const int *cell, int count) {
+    double colatitude = size * ((double)row + 0.5), sine = sin(colatitude);
+    /* of the chord to a corner: 4 sin^2 (size/4) (1 + sines of both latitudes), and below 2 % more along the arc for 6 rows or more */
+    double square = 1.02 * 0.25 * size * size * (1 + sine * (sine + 0.5 * size));
+    int i, child[64], children = 0;
+    isogi_sh__ringing_row(f, colatitude, 3);
+    for (i = 0; i < count; i++) {
+        double longitude = size * ((double)cell[i] + 0.5), value = isogi_sh__ringing_at(f, longitude), bend;
+        if (value < -1e-6 * f->highest) {
+            f->place[0] = colatitude, f->place[1] = longitude;
+            return 1;
         }
+        if (value - 0.5 * f->second * square >= -8e-6 * f->highest) continue;
+        bend = isogi_sh__ringing_bend(f, colatitude, longitude);
+        if (value - (bend > 0 ? 0.5 * bend : 0) * square - f->third / 3 * square * sqrt(square) >= -8e-6 * f->highest) continue;
+        child[children++] = 2 * cell[i], child[children++] = 2 * cell[i] + 1;
     }
-    if (range[0] < -1e-6 * range[1]) return 1;
-    for (i = 0; i < count; i++)
-        if (isogi_sh__goes_below(c, order, channels, factor, &trough[i], -1e-6 * range[1], range[1] - range[0])) return 1;
+    for (i = 0; i < children; i += 32) {
+        int some = children - i < 32 ? children - i : 32;
+        if (isogi_sh__ringing_search(f, 2 * row, 0.5 * size, child + i, some)) return 1;
+        if (isogi_sh__ringing_search(f, 2 * row + 1, 0.5 * size, child + i, some)) return 1;
+    }
     return 0;
 }
 
-/* inverse: 1 / width, 0 for no window */
-static int isogi_sh__is_positive(const float *c, int order, int channels, isogi_sh_window_kind kind, double inverse, double *factor) {
+/* Whether the channel falls below -1e-6 of its largest value; where not, it is above -8e-6 of it for certain. A grid of 3 order latitudes
+   finds the range to a part that Bernstein's inequality bounds, and a search from the grid's cells the rest. */
+static int isogi_sh__is_ringing(isogi_sh__ringing *f) {
+    double least[3 * ISOGI_SH__DERING_ORDER], lowest = 0, highest = 0,
+        size = ISOGI_SH__PI / (double)(3 * f->order), margin;
+    int i, j, at[2] = {0, 0}, cell[32], rows = 3 * f->order, columns = 6 * f->order;
+    for (i = 0; i < rows; i++) {
+        isogi_sh__ringing_row(f, size * ((double)i + 0.5), 1);
+        for (j = 0; j < columns; j++) {
+            double value = isogi_sh__ringing_at(f, size * ((double)j + 0.5));
+            least[i] = j == 0 || value < least[i] ? value : least[i];
+            highest = i + j == 0 || value > highest ? value : highest;
+            if (i + j == 0 || value < lowest) lowest = value, at[0] = i, at[1] = j;
+        }
+    }
+    if (lowest < -1e-6 * highest || !(highest > 0)) {
+        f->place[0] = size * ((double)at[0] + 0.5), f->place[1] = size * ((double)at[1] + 0.5);
+        return lowest < 0;
+    }
+    f->highest = highest;
+    isogi_sh__ringing_derivatives(f, (highest - lowest) / cos((double)(f->order - 1) * 0.7142 * size));
+    if (isogi_sh__ringing_search(f, at[0], size, at + 1, 1)) return 1;
+    margin = 0.5 * f->second * 1.02 * 0.25 * size * size * (2 + 0.5 * size) - 8e-6 * highest;
+    for (i = 0; i < rows; i++)
+        for (j = 0; j < columns && least[i] < margin; j += 32) {
+            int k, some = columns - j < 32 ? columns - j : 32;
+            for (k = 0; k < some; k++) cell[k] = j + k;
+            if (isogi_sh__ringing_search(f, i, size, cell, some)) return 1;
+        }
+    return 0;
+}
+
+/* Whether any channel rings under a window of width 1 / inverse (0: none). `last`: -1, or a channel that rang under another window: where
+   it did it is asked first, since windows that are narrower by a little leave it so. */
+static int isogi_sh__any_ringing(isogi_sh__ringing *f, const float *c, isogi_sh_window_kind kind, double inverse, double *factor,
+                                 int *last) {
+    double bound[ISOGI_SH__DERING_ORDER];
     int l, k;
-    for (l = 0; l < order; l++) factor[l] = inverse > 0 ? isogi_sh__window(kind, (double)l, 1 / inverse) : 1;
-    for (k = 0; k < channels; k++)
-        if (isogi_sh__is_negative(c + k, order, channels, factor)) return 0;
-    return 1;
+    for (l = 0; l < f->order; l++) factor[l] = inverse > 0 ? isogi_sh__window(kind, (double)l, 1 / inverse) : 1;
+    if (*last >= 0) {
+        f->c = c + *last;
+        isogi_sh__ringing_row(f, f->place[0], 1);
+        if (isogi_sh__ringing_at(f, f->place[1]) < -1e-6 * isogi_sh__ringing_bounds(bound, f)) return 1;
+    }
+    for (k = 0; k < f->channels; k++) {
+        f->c = c + k;
+        if (isogi_sh__is_ringing(f)) {
+            *last = k;
+            return 1;
+        }
+    }
+    return 0;
 }
 
 ISOGI_API isogi_result isogi_sh_dering(float *out, const float *in, int order, int channels, isogi_sh_window_kind kind, double *width) {
-    double factor[ISOGI_SH_MAX_ORDER], weak = 0, strong = 4; /* at 4 no degree but 0 is left of any window */
-    int i, k;
+    double factor[ISOGI_SH_MAX_ORDER], weak = 0, strong; /* inverse widths */
+    isogi_sh__ringing f;
+    int i, k, last = -1;
     if (!out || !in || !isogi_sh__shape_ok(order, channels) || !isogi_sh__window_ok(kind)) return ISOGI_INVALID;
     if (order > ISOGI_SH__DERING_ORDER) return ISOGI_TOO_LARGE;
     for (k = 0; k < channels; k++)
         if (!(in[k] >= 0)) return ISOGI_INVALID;
     if (!isogi_sh__finite_array(in, (size_t)channels * ISOGI_SH_COUNT(order))) return ISOGI_INVALID;
-    if (isogi_sh__is_positive(in, order, channels, kind, 0, factor)) strong = 0;
-    for (i = 0; i < 20 && strong > 0; i++) {
+    memset(&f, 0, sizeof f);
+    f.factor = factor, f.order = order, f.channels = channels;
+    strong = order > 1 && isogi_sh__any_ringing(&f, in, kind, 0, factor, &last) ? 1 / (64 * (double)order) : 0;
+    /* A window narrower than one without rings may have them again: from the weak side. At 16 no degree but 0 is left of any window. */
+    while (strong > 0 && strong < 16 && isogi_sh__any_ringing(&f, in, kind, strong, factor, &last)) {
+        weak = strong;
+        strong = strong * 1.02 < 16 ? strong * 1.02 : 16;
+    }
+    for (i = 0; i < 15 && strong > 0 && strong < 16; i++) {
         double middle = 0.5 * (weak + strong);
-        if (isogi_sh__is_positive(in, order, channels, kind, middle, factor)) strong = middle;
-        else weak = middle;
+        if (isogi_sh__any_ringing(&f, in, kind, middle, factor, &last)) weak = middle;
+        else strong = middle;
     }
     for (i = 0; i < order; i++) factor[i] = strong > 0 ? isogi_sh__window(kind, (double)i, 1 / strong) : 1;
     isogi_sh__scale_bands(out, in, order, channels, factor);
@@ -4425,12 +4501,12 @@ ISOGI_API isogi_result isogi_sh_project_function(double *c, int order, int chann
     return ISOGI_OK;
 }
 
-/* Fejer's first weight for colatitude t = pi (row + 1/2) / rows, on z = cos t: their sum is 2. */
+/* Fejer's first weight for colatitude t = pi (row + 1/2) / rows, on z = cos t: their sum is 2. The recursion loses k^2 ulps of a term that
+   counts 1 / k^2. */
 static double isogi_sh__fejer(int row, int rows) {
     double angle = ISOGI_SH__PI * ((double)(2 * row + 1)) / (double)rows, sum = 1, c = cos(angle), now = c, before = 1, next;
     int k;
-    for (k = 1; k <= rows / 2; k++) { /* cos(k angle), restarted so that the recursion cannot drift */
-        if ((k & 31) == 0) now = cos((double)k * angle), before = cos((double)(k - 1) * angle);
+    for (k = 1; k <= rows / 2; k++) { /* now = cos(k angle) */
         sum -= 2 * now / ((double)(2 * k - 1) * (double)(2 * k + 1));
         next = 2 * c * now - before;
         before = now;
@@ -4537,8 +4613,7 @@ ISOGI_SH__AVX2 static void isogi_sh__image_block(isogi_sh__f8 (*sum)[9], const f
     for (j = 0; j < 3; j++) isogi_sh__image_row(sum[j], rest[0] + 8 * j, 24, 24, factor + whole + 8 * j);
 }
 
-/* Fejer's weights of ISOGI_SH__ROWS rows side by side, from c = cos 2t; see isogi_sh__fejer. Chebyshev's recursion loses k^2 ulps of
-   a term that counts 1 / k^2. */
+/* Fejer's weights of ISOGI_SH__ROWS rows side by side, from c = cos 2t; see isogi_sh__fejer. */
 ISOGI_SH__AVX2 static void isogi_sh__fejer_rows(double *weight, const double *cosine, int rows) {
     isogi_sh__d4 zero = {0}, c[2], now[2], before[2], sum[2];
     int j, k;
@@ -5567,7 +5642,6 @@ ISOGI_API isogi_result isogi_sh_fit_directional(float direction[3], float rgb[3]
 #undef ISOGI_SH__LOW
 #undef ISOGI_SH__NARROW
 #undef ISOGI_SH__DERING_ORDER
-#undef ISOGI_SH__TROUGHS
 #undef ISOGI_SH__TOGETHER
 #undef ISOGI_SH__DIM
 #undef ISOGI_SH__TURNS

@@ -172,33 +172,39 @@ TEST(double_evaluation_is_exact_at_any_distance_from_poles) {
     }
 }
 
-/* The same in float, in batches, against the reference at the float direction. */
+/* The same in float, in batches of both layouts, against the reference at the float direction. From degree 21 on floats are rounded
+   doubles. */
 TEST(float_evaluation_is_exact) {
-    static const struct { int degree; double bound; } cases[] = {{4, 4.5e-7}, {10, 2.2e-6}, {20, 1e-5}, {100, 5e-4}};
-    static float d[8192][3];
+    static const struct { int degree; double bound; } cases[] = {{4, 4.5e-7}, {10, 2.2e-6}, {20, 1e-5}, {21, 3e-7}, {50, 3e-7},
+        {100, 3e-7}};
+    enum { MOST = 8192 };
+    static float d[MOST][3], x[3][MOST];
     static quad expected[MAX_COUNT];
     test_random r = {3};
-    double wide[3];
-    size_t count = 0;
-    for (int i = 0; hard_direction(wide, i, &r); i++, count++)
-        for (int k = 0; k < 3; k++) d[count][k] = (float)wide[k];
     for (size_t c = 0; c < sizeof cases / sizeof *cases; c++) {
         int order = cases[c].degree + 1, n = order * order;
-        size_t step = !LONG_SUITE && order > 20 ? 37 : 1;
-        float *y = (float *)malloc((size_t)n * count * sizeof *y);
-        double worst = 0;
-        CHECK(isogi_sh_eval(y, order, (const float(*)[3])d, count) == ISOGI_OK, "degree %d", cases[c].degree);
-        for (size_t i = 0; i < count; i += step) {
+        size_t step = order < 21 ? 1 : (LONG_SUITE ? 5 : order > 50 ? 19 : 7), count = 0;
+        double worst = 0, wide[3];
+        r.state = 3;
+        for (int i = 0; hard_direction(wide, i, &r); i += (int)step, count++)
+            for (int k = 0; k < 3; k++) x[k][count] = d[count][k] = rounded(wide[k]);
+        float *y = (float *)malloc((size_t)n * count * sizeof *y), *columns = (float *)malloc((size_t)n * count * sizeof *y);
+        CHECK(isogi_sh_eval(y, order, (const float(*)[3])d, count) == ISOGI_OK &&
+                  isogi_sh_eval_soa(columns, order, x[0], x[1], x[2], count) == ISOGI_OK,
+              "degree %d", cases[c].degree);
+        for (size_t i = 0; i < count; i++) {
             quad e[3] = {(quad)d[i][0], (quad)d[i][1], (quad)d[i][2]};
+            if (!LONG_SUITE && order == 101 && i % 2) continue;
             reference_eval(expected, order, e);
             for (int k = 0; k < n; k++) {
-                double error = fabs((double)(expected[k] - (quad)y[(size_t)n * i + (size_t)k]));
+                double error = fmax(fabs((double)(expected[k] - (quad)y[(size_t)n * i + (size_t)k])),
+                                    fabs((double)(expected[k] - (quad)columns[count * (size_t)k + i])));
                 if (!(error <= worst)) worst = error;
             }
         }
         printf("    degree %d: largest error %.3g\n", cases[c].degree, worst);
         CHECK(worst <= cases[c].bound * ROUNDING_FACTOR, "degree %d: error %g, bound %g", cases[c].degree, worst, cases[c].bound);
-        free(y);
+        free(y), free(columns);
     }
 }
 
@@ -452,6 +458,26 @@ static void one_function(void *user, const double d[3], double *value) {
     value[1] = 2 * y[0];
 }
 
+static int calls;
+static void counted(void *user, const double d[3], double *value) {
+    (void)user;
+    calls++;
+    value[0] = d[0] + d[1] * d[2] > 0.3 ? 1 : 0;
+}
+
+/* A resolution of 0 is the order: as many latitudes, twice as many longitudes, and the same numbers. */
+TEST(resolution_of_a_projection_is_the_order_by_default) {
+    double c[49], same[49];
+    for (int order = 1; order <= 7; order++) {
+        calls = 0;
+        CHECK(isogi_sh_project_function(c, order, 1, 0, counted, NULL) == ISOGI_OK && calls == 2 * order * order, "order %d: %d calls",
+              order, calls);
+        CHECK(isogi_sh_project_function(same, order, 1, order, counted, NULL) == ISOGI_OK &&
+                  !memcmp(c, same, (size_t)(order * order) * sizeof *c),
+              "order %d: %g %g", order, c[0], same[0]);
+    }
+}
+
 /* Projecting Y_i returns the i-th unit vector, to order 10, and for a few of the highest degrees. */
 TEST(projecting_a_basis_function_returns_a_unit_vector) {
     static double c[2 * MAX_COUNT];
@@ -554,18 +580,21 @@ TEST(environment_lookup_has_the_stated_orientation) {
             }
     }
     isogi_env plain = {.rgb = &image[0][0][0], .width = W, .height = H};
-    for (int n = -3; n <= 3; n++) /* across the seam, between the last column and the first */
-        for (int j = 0; j < H; j++) {
-            double d[3], x = 0.25 * n;
-            texel_direction(d, n < 0 ? 1 + x / 2 / W : x / 2 / W, (j + 0.5) / H);
-            float direction[3] = {(float)d[0], (float)d[1], (float)d[2]};
-            isogi_env_radiance(&plain, direction, rgb);
-            for (int k = 0; k < 3; k++) {
-                double between = (0.5 - x / 2) * (double)image[j][W - 1][k] + (0.5 + x / 2) * (double)image[j][0][k];
-                CHECK(fabs((double)rgb[k] - between) < 1e-5, "row %d, %g of a texel past the seam: %g, not %g", j, x / 2, (double)rgb[k],
-                      between);
-            }
+    for (int i = 0; i < 600; i++) { /* between texels: bilinear; the first 200 on both sides of the seam, the next beyond the last rows */
+        double u = i < 200 ? random_range(&r, -0.5, 0.5) / W : random_unit(&r), v = random_unit(&r), d[3];
+        if (i >= 200 && i < 400) v = random_range(&r, 0, 0.5) / H, v = i & 1 ? 1 - v : v;
+        texel_direction(d, u, v);
+        const double x = u * W - 0.5, y = fmin(fmax(v * H - 0.5, 0), H - 1), a = x - floor(x), b = y - floor(y);
+        const int left = ((int)floor(x) + W) % W, right = (left + 1) % W, top = (int)floor(y), bottom = top + (top < H - 1);
+        const float direction[3] = {(float)d[0], (float)d[1], (float)d[2]};
+        isogi_env_radiance(&plain, direction, rgb);
+        for (int k = 0; k < 3; k++) {
+            double value = (1 - b) * ((1 - a) * (double)image[top][left][k] + a * (double)image[top][right][k]) +
+                           b * ((1 - a) * (double)image[bottom][left][k] + a * (double)image[bottom][right][k]);
+            CHECK(fabs((double)rgb[k] - value) < 2e-6 / fmax(sin(pi * v), 0.01), "u %g, v %g: %g, expected %g", u, v, (double)rgb[k],
+                  value);
         }
+    }
     float centre[3] = {0, 0, -1}, up[3] = {0, 1, 0};
     isogi_env_radiance(&plain, centre, rgb);
     float expected = (image[3][7][0] + image[3][8][0] + image[4][7][0] + image[4][8][0]) / 4;
@@ -755,35 +784,51 @@ TEST(both_layouts_agree) {
     }
 }
 
-/* Gradients against central differences of the 128-bit reference (step 1e-9: error 1e-15), at poles, on axes and anywhere; tangent. */
+/* Gradients against central differences of the 128-bit reference (step 1e-10: error 1e-14 at degree 100), at poles, on axes and anywhere,
+   at the direction as it is in each type. The bounds are those that the header states; floats are rounded doubles. */
 TEST(gradient_is_the_derivative) {
-    enum { ORDER = 11, N = ORDER * ORDER };
-    static double g[N][3];
-    static float gf[N][3];
-    static quad low[N], high[N];
-    test_random r = {21};
-    double d[1][3], worst = 0, worst_float = 0;
-    for (int i = 0; hard_direction(d[0], i, &r) && i < 400; i += 3) {
-        double length = sqrt(d[0][0] * d[0][0] + d[0][1] * d[0][1] + d[0][2] * d[0][2]);
-        float f[1][3] = {{(float)d[0][0], (float)d[0][1], (float)d[0][2]}};
-        CHECK(isogi_sh_eval_gradient_f64(g, ORDER, (const double(*)[3])d, 1) == ISOGI_OK, "%d", i);
-        CHECK(isogi_sh_eval_gradient(gf, ORDER, (const float(*)[3])f, 1) == ISOGI_OK, "%d", i);
-        for (int axis = 0; axis < 3; axis++) {
-            quad e[3] = {(quad)(d[0][0] / length), (quad)(d[0][1] / length), (quad)(d[0][2] / length)};
-            e[axis] += (quad)1e-9;
-            reference_eval(high, ORDER, e);
-            e[axis] -= (quad)2e-9;
-            reference_eval(low, ORDER, e);
-            for (int k = 0; k < N; k++) {
-                double expected = (double)((high[k] - low[k]) / (quad)2e-9);
-                worst = fmax(worst, fabs(g[k][axis] - expected));
-                worst_float = fmax(worst_float, fabs((double)gf[k][axis] - expected));
-                CHECK(fabs(g[k][axis] - expected) < 1e-12, "Y%d, axis %d: %.17g, expected %.17g", k, axis, g[k][axis], expected);
+    static const struct { int degree; double bound; } cases[] = {{4, 4e-15}, {10, 4e-14}, {20, 4e-13}, {100, 5e-11}};
+    static double g[MAX_COUNT][3];
+    static float gf[MAX_COUNT][3];
+    static quad low[MAX_COUNT], high[MAX_COUNT];
+    for (size_t c = 0; c < sizeof cases / sizeof *cases; c++) {
+        const int order = cases[c].degree + 1, n = order * order, step = (LONG_SUITE ? 1 : 5) * (order > 100 ? 11 : order > 11 ? 5 : 1);
+        test_random r = {21};
+        double d[1][3], worst = 0, worst_float = 0, largest = 0;
+        for (int i = 0; hard_direction(d[0], i, &r) && i < 600; i += step) {
+            float f[1][3] = {{0, 0, 0}};
+            const int as_float = i / step % 2;
+            quad e[3], length = 0;
+            for (int k = 0; k < 3; k++) {
+                f[0][k] = rounded(d[0][k]);
+                if (as_float) d[0][k] = (double)f[0][k];
+                e[k] = (quad)d[0][k], length += e[k] * e[k];
+            }
+            length = quad_sqrt(length);
+            for (int k = 0; k < 3; k++) e[k] /= length;
+            CHECK(isogi_sh_eval_gradient_f64(g, order, (const double(*)[3])d, 1) == ISOGI_OK, "%d", i);
+            CHECK(isogi_sh_eval_gradient(gf, order, (const float(*)[3])f, 1) == ISOGI_OK, "%d", i);
+            for (int axis = 0; axis < 3; axis++) {
+                const quad at = e[axis];
+                e[axis] = at + (quad)1e-10;
+                reference_eval(high, order, e);
+                e[axis] = at - (quad)1e-10;
+                reference_eval(low, order, e);
+                e[axis] = at;
+                for (int k = 0; k < n; k++) {
+                    double expected = (double)((high[k] - low[k]) / (quad)2e-10), error = fabs(g[k][axis] - expected);
+                    worst = error <= worst ? worst : error, largest = fmax(largest, fabs(expected));
+                    if (!as_float) continue;
+                    error = fabs((double)gf[k][axis] - expected) - cases[c].bound; /* a float's rounding is half an ulp: 6e-8 of it */
+                    error = error <= 6e-8 * fabs(expected) ? error / (fabs(expected) + 1e-9) : 1;
+                    worst_float = error <= worst_float ? worst_float : error;
+                }
             }
         }
+        printf("    degree %d: largest error %.3g of %.3g, float %.3g of a value\n", cases[c].degree, worst, largest, worst_float);
+        CHECK(worst <= cases[c].bound * DOUBLE_FACTOR(cases[c].degree), "degree %d: %g", cases[c].degree, worst);
+        CHECK(worst_float <= 6e-8, "degree %d: float %g", cases[c].degree, worst_float);
     }
-    printf("    largest error %.3g, float %.3g\n", worst, worst_float);
-    CHECK(worst_float < 2e-5, "float: %g", worst_float);
 }
 
 /* An expansion evaluated without storing the basis is the dot product with the basis. 1e-13 and, in float, 1e-5: 121 terms of size 1. */
@@ -834,10 +879,9 @@ TEST(random_projection_converges) {
     CHECK(isogi_sh_project_random(again, 4, 2, n, 1, 1, smooth_function, NULL) == ISOGI_OK && !memcmp(again, strata, sizeof again), "%d",
           2);
     CHECK(isogi_sh_project_random(again, 4, 2, n, 1, 2, smooth_function, NULL) == ISOGI_OK && memcmp(again, strata, sizeof again), "%s",
-          "another seed gives other samples");
-    isogi_sh_project_function(exact, 4, 2, 4, smooth_function, NULL), isogi_sh_project_function(again, 4, 2, 0, smooth_function, NULL);
-    CHECK(!memcmp(again, exact, sizeof again), "%s", "a resolution of 0 is the order");
-    isogi_sh_project_function(exact, 4, 2, 512, smooth_function, NULL);
+          "another seed");
+    isogi_sh_project_random(again, 4, 2, n, 0, 2, smooth_function, NULL);
+    CHECK(memcmp(again, plain, sizeof again), "%s", "another seed, independent");
     for (int i = 0; i < 32; i++) {
         rms[0] += (plain[i] - exact[i]) * (plain[i] - exact[i]) / 32;
         rms[1] += (strata[i] - exact[i]) * (strata[i] - exact[i]) / 32;
@@ -1071,7 +1115,7 @@ TEST(rotations_agree_with_each_other) {
     test_random r = {26};
     for (int order = 1; order <= ORDER; order++)
         for (int channels = 1; channels <= CHANNELS; channels++) {
-            double m[9], angle = random_range(&r, -7, 7);
+            double m[9], angle = random_range(&r, -7, 7), applied_worst = 0, once_worst = 0;
             float mf[9];
             random_rotation(&r, m);
             for (int i = 0; i < 9; i++) mf[i] = (float)m[i], m[i] = (double)mf[i];
@@ -1085,9 +1129,12 @@ TEST(rotations_agree_with_each_other) {
             isogi_sh_rotate(g, cf, order, channels, mf);
             for (int i = 0; i < n; i++) {
                 CHECK(fabs(once[i] - applied[i]) < 1e-13, "order %d, %d: %g %g", order, i, once[i], applied[i]);
-                CHECK(fabs(once[i] - (double)f[i]) < 3e-6, "order %d, float apply: %g %g", order, once[i], (double)f[i]);
-                CHECK(fabs(once[i] - (double)g[i]) < 2e-6, "order %d, float rotate: %g %g", order, once[i], (double)g[i]);
+                applied_worst = fmax(applied_worst, fabs(once[i] - (double)f[i]));
+                once_worst = fmax(once_worst, fabs(once[i] - (double)g[i]));
             }
+            if (channels == CHANNELS) printf("    order %d in float: %.3g applied, %.3g at once\n", order, applied_worst, once_worst);
+            CHECK(applied_worst < 1e-6 && once_worst < 1e-6, "order %d, %d channels in float: %g applied, %g at once", order, channels,
+                  applied_worst, once_worst);
             isogi_sh_rotate_f64(c, c, order, channels, m);
             CHECK(!memcmp(c, once, (size_t)n * sizeof *c), "order %d: in place %g %g", order, c[n - 1], once[n - 1]);
             CHECK(isogi_sh_matrix_from_euler_zyz(mf, angle, 0, 0) == ISOGI_OK, "angle %g", angle);
@@ -1305,7 +1352,9 @@ TEST(composed_rotations_do_not_drift) {
 TEST(products_are_exact) {
     enum { MAX = 26, COUNT = 19 };
     static float a[COUNT * MAX * MAX], b[COUNT * MAX * MAX], out[COUNT * MAX * MAX], matrix[MAX * MAX * MAX * MAX];
+    static float single[MAX * MAX];
     static double y[MAX * MAX], expected[MAX * MAX];
+    double worst = 0;
     long double node[64], weight[64];
     test_random r = {29};
     for (int order = 1; order <= (LONG_SUITE ? MAX : 7); order += order < 7 ? 1 : 19) {
@@ -1322,10 +1371,21 @@ TEST(products_are_exact) {
                 for (int k = 0; k < n; k++) f += (double)a[e * n + k] * y[k], g += (double)b[e * n + k] * y[k];
                 for (int k = 0; k < n; k++) expected[k] += (double)weight[i / longitudes] * 2 * pi / longitudes * f * g * y[k];
             }
+            if (e == 0) { /* alone, and in a batch: as a share of what it can be */
+                double norm = 0, other = 0, most = 0;
+                for (int k = 0; k < n; k++) norm += (double)a[k] * (double)a[k], other += (double)b[k] * (double)b[k];
+                isogi_sh_product(single, a, b, order, 1);
+                for (int k = 0; k < n; k++) most = fmax(most, fabs((double)single[k] - expected[k]) / sqrt(norm * other));
+                for (int k = 0; k < n; k++) most = fmax(most, fabs((double)out[k] - expected[k]) / sqrt(norm * other));
+                worst = fmax(worst, most);
+                CHECK(most <= 1e-7, "order %d alone: %g of both norms", order, most);
+            }
             for (int k = 0; k < n; k++)
                 CHECK(fabs((double)out[e * n + k] - expected[k]) < 3e-6 * order, "order %d, %d of %d: %.9g, expected %.9g", order, k, e,
                       (double)out[e * n + k], expected[k]);
         }
+        printf("    order %d: %.3g of both norms\n", order, worst);
+        worst = 0;
         if (order > 7) continue;
         CHECK(isogi_sh_product_matrix(matrix, a, order) == ISOGI_OK, "order %d", order);
         for (int i = 0; i < n; i++) {
@@ -1369,35 +1429,43 @@ TEST(zonal_functions) {
     }
 }
 
-/* Coefficient by coefficient, at every order that has code of its own and every level, for directions of length 1, next to it, and far from
-   it: z[l] sqrt(4 pi / (2 l + 1)) y, to a few roundings of floats. */
-TEST(zonal_functions_are_turned_exactly) {
-    enum { MOST = 12, N = MOST * MOST };
-    static const double lengths[] = {1, 1.0003, 0.9997, 1.003, 0.99, 1.03, 0.9, 7, 1e-3};
-    test_random r = {33};
-    for (int level = 0; level <= 2; level++) {
-        double worst[MOST + 1] = {0};
-        instruction_level = level < BEST_LEVEL ? level : BEST_LEVEL;
-        for (int order = 1; order <= MOST; order++)
-            for (int round = 0; round < 180; round++) {
-                float zonal[MOST], lobe[N + 1], direction[3];
-                double d[1][3], y[N];
-                random_direction(&r, d[0]);
-                if (round % 20 == 0) d[0][round / 20 % 3] *= 1e-4;
-                for (int k = 0; k < 3; k++) direction[k] = (float)(d[0][k] * lengths[round % 9]), d[0][k] = (double)direction[k];
-                for (int l = 0; l < order; l++) zonal[l] = (float)random_range(&r, -1, 1);
-                lobe[order * order] = 5;
-                CHECK(isogi_sh_zonal_to_direction(lobe, order, zonal, direction) == ISOGI_OK, "order %d", order);
-                CHECK(lobe[order * order] == 5, "order %d: one too many is written", order);
-                isogi_sh_eval_f64(y, order, (const double(*)[3])d, 1);
-                for (int l = 0; l < order; l++)
-                    for (int i = l * l; i < (l + 1) * (l + 1); i++)
-                        worst[order] = fmax(worst[order], fabs((double)lobe[i] - (double)zonal[l] * sqrt(4 * pi / (2 * l + 1)) * y[i]));
+/* Every order to 12 and the maximum, at every level, for vectors of any length, those next to 1 too, against 128 bits: roundings of values
+   up to 1, and what the header allows order 5, which has a way in float. */
+TEST(zonal_functions_are_exact) {
+    static const double lengths[] = {1, 1, 1.0004, 0.9996, 1.003, 0.997, 1.02, 0.98, 1.3, 0.7, 3, 1e-30, 1e30};
+    enum { LENGTHS = sizeof lengths / sizeof *lengths };
+    static float lobe[MAX_COUNT + 1];
+    static quad y[MAX_COUNT];
+    for (int order = 1; order <= 13; order++) {
+        const int n = order > 12 ? ISOGI_SH_MAX_ORDER : order;
+        test_random r = {61};
+        double worst[3] = {0, 0, 0};
+        int level = 0;
+        for (int i = 0; i < (n > 12 ? 40 : LONG_SUITE ? 4000 : 260); i++) {
+            double d[3], length = lengths[i % LENGTHS];
+            float v[3], zonal[ISOGI_SH_MAX_ORDER];
+            quad e[3];
+            if (i / LENGTHS % 2) random_direction(&r, d);
+            else hard_direction(d, i / (2 * LENGTHS) * 7 % 294, &r);
+            for (int k = 0; k < 3; k++) v[k] = rounded(length * d[k]), e[k] = (quad)v[k];
+            for (int l = 0; l < n; l++) zonal[l] = (float)random_range(&r, -1, 1);
+            reference_eval(y, n, e);
+            for (level = 0; level < 3 && level <= BEST_LEVEL; level++) {
+                instruction_level = level;
+                lobe[n * n] = 5;
+                CHECK(isogi_sh_zonal_to_direction(lobe, n, zonal, v) == ISOGI_OK && lobe[n * n] == 5, "order %d", n);
+                for (int l = 0; l < n; l++)
+                    for (int k = l * l; k < (l + 1) * (l + 1); k++) {
+                        double error = fabs((double)(y[k] * quad_sqrt(4 * (quad)pi / (quad)(2 * l + 1)) * (quad)zonal[l] - (quad)lobe[k]));
+                        worst[level] = error <= worst[level] ? worst[level] : error;
+                    }
             }
-        for (int order = 1; order <= MOST; order++)
-            CHECK(worst[order] < 6e-7, "level %d, order %d: off by %g", level, order, worst[order]);
+        }
+        instruction_level = BEST_LEVEL;
+        printf("    order %d: %.3g, %.3g, %.3g at levels 0, 1, 2\n", n, worst[0], worst[1], worst[2]);
+        for (int k = 0; k < level; k++)
+            CHECK(worst[k] <= (n == 5 && k > 0 ? 4.5e-7 : 6e-8) * ROUNDING_FACTOR, "order %d, level %d: %g", n, k, worst[k]);
     }
-    instruction_level = BEST_LEVEL;
 }
 
 TEST(sums_scalings_and_energy) {
@@ -1470,69 +1538,116 @@ TEST(windows_and_deringing) {
           "%s", "width");
 }
 
-/* Converted back and forth nothing changes, and written-out values of degree 1 and 2 are where other software has them. */
-/* Degree 1 alone, f = 1 - k cos: a window that leaves 1 / k of it is the widest that will do. The channel that needs it most decides. */
-TEST(deringing_finds_the_widest_window_of_one_degree) {
-    test_random r = {34};
-    for (int round = 0; round < 60; round++) {
-        float c[4 * 3], out[4 * 3];
-        double most = 0, width = -1, left, expected;
-        for (int channel = 0; channel < 3; channel++) {
-            double d[3], k = random_range(&r, 1.05, 3), scale = random_range(&r, 0.1, 10);
-            random_direction(&r, d);
-            most = fmax(most, k);
-            c[channel] = (float)(scale * sqrt(4 * pi));
-            for (int a = 0; a < 3; a++) c[3 * (a + 1) + channel] = (float)(scale * k * sqrt(4 * pi / 3) * d[a]);
-        }
-        left = 1 / most;
-        expected = round % 2 ? 2 / sqrt(-log2(left)) : pi / acos(2 * left - 1);
-        CHECK(isogi_sh_dering(out, c, 2, 3, round % 2 ? ISOGI_SH_GAUSS : ISOGI_SH_HANN, &width) == ISOGI_OK, "round %d", round);
-        CHECK(fabs(width / expected - 1) < 1e-4, "round %d: width %g, not %g", round, width, expected);
-    }
-}
-
-/* Three soft lights and a sky have many troughs, and the deepest need not be the lowest on any grid. */
-TEST(deringing_finds_every_trough) {
-    enum { MOST = 16, N = MOST * MOST, PLACES = 8000 };
-    static float d[PLACES][3], value[PLACES][3];
-    test_random r = {35};
-    for (int i = 0; i < PLACES; i++) {
-        double z = 1 - (2 * i + 1.0) / PLACES, s = sqrt(1 - z * z), phi = 2 * pi * fmod(i * 0.6180339887498949, 1);
+/* Nothing that is negative is left anywhere, in any channel: lights in a sky, whose weak rings have many troughs of almost the same depth,
+   and lights that are alone. Seen from a spiral of directions. */
+TEST(deringing_leaves_nothing_negative) {
+    enum { MOST = 16, COUNT = 12000 };
+    static float d[COUNT][3], value[COUNT], c[3 * MOST * MOST], out[3 * MOST * MOST], one[MOST * MOST];
+    test_random r = {3};
+    double lowest = 0;
+    int windowed = 0;
+    for (int i = 0; i < COUNT; i++) {
+        double z = 1 - 2 * (i + 0.5) / COUNT, phi = i * 2.399963229728653, s = sqrt(1 - z * z);
         d[i][0] = (float)(s * cos(phi)), d[i][1] = (float)(s * sin(phi)), d[i][2] = (float)z;
     }
-    for (int round = 0; round < (LONG_SUITE ? 300 : 30); round++) {
-        const int order = round % 6 == 5 ? MOST : round % 2 ? 8 : 4;
-        isogi_light lights[3];
-        const isogi_lighting lighting = {.lights = lights, .light_count = 3};
-        float c[3 * N], out[3 * N], low[3] = {0, 0, 0}, high[3] = {0, 0, 0};
-        double width;
-        memset(lights, 0, sizeof lights);
-        for (int i = 0; i < 9; i++) {
-            lights[i / 3].vector[i % 3] = (float)random_range(&r, -1, 1), lights[i / 3].rgb[i % 3] = (float)random_range(&r, 0.2, 1.2);
-            lights[i / 3].radius = (float)random_range(&r, 0, 0.3);
+    for (int order = 4; order <= MOST; order += 4)
+        for (int round = 0; round < (LONG_SUITE ? 60 : 8); round++) {
+            isogi_light lights[3];
+            const isogi_lighting lighting = {.lights = lights, .light_count = 3};
+            double width, sky = round % 4 ? random_range(&r, 0.05, 0.35) : 0;
+            memset(lights, 0, sizeof lights);
+            for (int k = 0; k < 3; k++) {
+                double v[3];
+                random_direction(&r, v);
+                for (int a = 0; a < 3; a++) lights[k].vector[a] = (float)v[a], lights[k].rgb[a] = (float)random_range(&r, 0.2, 1.2);
+                lights[k].radius = (float)random_range(&r, 0, 0.3);
+            }
+            isogi_sh_project(c, order, &lighting, NULL);
+            for (int k = 0; k < 3; k++) c[k] += (float)(sky * order * order / 12);
+            CHECK(isogi_sh_dering(out, c, order, 3, (isogi_sh_window_kind)(round % 3), &width) == ISOGI_OK, "order %d", order);
+            windowed += width > 0;
+            for (int k = 0; k < 3; k++) {
+                double low = 0, high = 0;
+                for (int i = 0; i < order * order; i++) one[i] = out[3 * i + k];
+                isogi_sh_eval_sum(value, one, order, 1, (const float(*)[3])d, COUNT);
+                for (int i = 0; i < COUNT; i++) low = fmin(low, (double)value[i]), high = fmax(high, (double)value[i]);
+                lowest = fmin(lowest, low / high);
+                CHECK(low >= -1e-5 * high, "order %d, round %d, channel %d, width %g: %g of the largest", order, round, k, width,
+                      low / high);
+            }
         }
-        isogi_sh_project(c, order, &lighting, NULL);
-        for (int k = 0; k < 3; k++) c[k] += (float)(random_range(&r, 0.05, 0.35) * order * order / 12);
-        CHECK(isogi_sh_dering(out, c, order, 3, ISOGI_SH_HANN, &width) == ISOGI_OK, "round %d", round);
-        isogi_sh_eval_sum(value[0], out, order, 3, (const float(*)[3])d, PLACES);
-        for (int i = 0; i < 3 * PLACES; i++) {
-            low[i % 3] = fminf(low[i % 3], value[i / 3][i % 3]), high[i % 3] = fmaxf(high[i % 3], value[i / 3][i % 3]);
+    printf("    %d windows; lowest value %.3g of the largest\n", windowed, lowest);
+    CHECK(windowed >= 16, "%d windows", windowed);
+}
+
+/* The window is the widest: of degree 1, where it is known; and of lobes at order 9, where narrower ones than the widest ring again, no
+   window of a series of wider ones leaves nothing negative. A sky without a mean becomes black. */
+TEST(deringing_takes_the_widest_window) {
+    enum { ORDER = 9, N = ORDER * ORDER, COUNT = 5000 };
+    static float d[COUNT][3], value[COUNT];
+    float c[3 * N], out[3 * N];
+    test_random r = {60};
+    double width, worst = 0;
+    for (int i = 0; i < COUNT; i++) {
+        double z = 1 - 2 * (i + 0.5) / COUNT, phi = i * 2.399963229728653, s = sqrt(1 - z * z);
+        d[i][0] = (float)(s * cos(phi)), d[i][1] = (float)(s * sin(phi)), d[i][2] = (float)z;
+    }
+    for (int i = 0; i < 30; i++) { /* 1 + b x: as far as the factor of degree 1 is 1 / b, and down to -1e-5 of the largest value */
+        double b = i < 3 ? 1.01 : random_range(&r, 1.1, 20), expected[2];
+        for (int k = 0; k < 12; k++) c[k] = 0;
+        c[1] = (float)sqrt(4 * pi), c[0] = c[2] = 1, c[10] = (float)(b * sqrt(4 * pi / 3));
+        CHECK(isogi_sh_dering(out, c, 2, 3, (isogi_sh_window_kind)(i % 3), &width) == ISOGI_OK, "%d", i);
+        for (int last = 0; last < 2; last++) {
+            double low = 0.01, high = 1000;
+            for (int k = 0; k < 60; k++) {
+                double w = sqrt(low * high), x = 1 / w, factor = i % 3 == 0 ? x < 1 ? (1 + cos(pi * x)) / 2 : 0
+                    : i % 3 == 1 ? x < 1 ? sin(pi * x) / (pi * x) : 0 : exp2(-4 * x * x);
+                if (factor * b > 1 + last * 2e-5) high = w;
+                else low = w;
+            }
+            expected[last] = low;
         }
-        for (int k = 0; k < 3; k++)
-            CHECK(low[k] > -1e-5f * high[k], "order %d, channel %d, width %g: lowest %g of %g", order, k, width, (double)low[k],
-                  (double)high[k]);
+        worst = fmax(worst, 1 - width / expected[0]);
+        CHECK(width > expected[0] * (1 - 1e-5) && width < expected[1], "1 + %g x: width %.9g, not %.9g to %.9g", b, width, expected[0],
+              expected[1]);
+    }
+    printf("    widths of degree 1 are up to %.3g too narrow\n", worst);
+    for (int round = 0; round < 6 + (LONG_SUITE ? 30 : 0); round++) {
+        for (int i = 0; i < N; i++) c[i] = 0;
+        for (int k = 0; k < 1 + round % 4; k++) {
+            double v[3], weight = random_unit(&r);
+            float y[N], direction[1][3];
+            random_direction(&r, v);
+            for (int a = 0; a < 3; a++) direction[0][a] = (float)v[a];
+            isogi_sh_eval(y, ORDER, (const float(*)[3])direction, 1);
+            for (int i = 0; i < N; i++) c[i] += (float)weight * y[i];
+        }
+        CHECK(isogi_sh_dering(out, c, ORDER, 1, (isogi_sh_window_kind)(round % 3), &width) == ISOGI_OK && width > 0, "round %d", round);
+        for (double f = 1.02; f < 60; f *= f < 4 ? 1.03 : 1.5) {
+            double low = 0, high = 0;
+            isogi_sh_window(out, c, ORDER, 1, (isogi_sh_window_kind)(round % 3), width * f);
+            isogi_sh_eval_sum(value, out, ORDER, 1, (const float(*)[3])d, COUNT);
+            for (int i = 0; i < COUNT; i++) low = fmin(low, (double)value[i]), high = fmax(high, (double)value[i]);
+            CHECK(low < -1e-7 * high, "round %d: width %g, and %g leaves nothing negative", round, width, width * f);
+        }
+    }
+    for (int kind = 0; kind < 3; kind++) {
+        for (int i = 0; i < N; i++) c[i] = i ? 1 : 0;
+        CHECK(isogi_sh_dering(out, c, ORDER, 1, (isogi_sh_window_kind)kind, &width) == ISOGI_OK, "kind %d", kind);
+        for (int i = 0; i < N; i++) CHECK(out[i] == 0, "without a mean, kind %d: %g", kind, (double)out[i]);
     }
 }
 
+/* Converted back and forth nothing changes, and written-out values of degree 1 and 2 are where other software has them. */
 TEST(conventions_convert) {
     enum { ORDER = 6, N = ORDER * ORDER };
     float c[2 * N], there[2 * N], back[2 * N];
     test_random r = {33};
     for (int i = 0; i < 2 * N; i++) c[i] = (float)random_range(&r, -1, 1);
-    for (int a = 0; a < 18; a++)
-        for (int b = 0; b < 18; b++) {
-            isogi_sh_convention from = {(isogi_sh_normalisation)(a % 3), (isogi_sh_ordering)(a / 3 % 3), a / 9};
-            isogi_sh_convention to = {(isogi_sh_normalisation)(b % 3), (isogi_sh_ordering)(b / 3 % 3), b / 9};
+    for (int a = 0; a < 24; a++)
+        for (int b = 0; b < 24; b++) {
+            isogi_sh_convention from = {(isogi_sh_normalisation)(a % 3), (isogi_sh_ordering)(a / 3 % 4), a / 12};
+            isogi_sh_convention to = {(isogi_sh_normalisation)(b % 3), (isogi_sh_ordering)(b / 3 % 4), b / 12};
             CHECK(isogi_sh_convert(there, c, ORDER, 2, from, to) == ISOGI_OK &&
                       isogi_sh_convert(back, there, ORDER, 2, to, from) == ISOGI_OK,
                   "%d to %d", a, b);
@@ -1552,6 +1667,17 @@ TEST(conventions_convert) {
     for (int i = 0; i < 9; i++) {
         int odd = pair_order[i] == 1 || pair_order[i] == 3 || pair_order[i] == 5 || pair_order[i] == 7;
         CHECK(fabsf(out[i] - (float)(odd ? -pair_order[i] : pair_order[i])) < 1e-6f, "pairs %d: %g", i, (double)out[i]);
+    }
+    { /* W X Y Z R S T U V K L M N O P Q, which are degree and m of 0 0, 1 1, 1 -1, 1 0, 2 0, 2 1, 2 -1, 2 2, 2 -2, 3 0 .. 3 -3 */
+        static const int m[16] = {0, 1, -1, 0, 0, 1, -1, 2, -2, 0, 1, -1, 2, -2, 3, -3};
+        const isogi_sh_convention fuma = {ISOGI_SH_ORTHONORMAL, ISOGI_SH_FUMA, 0};
+        float sixteen[16], there16[16];
+        for (int i = 0; i < 16; i++) sixteen[i] = (float)i;
+        CHECK(isogi_sh_convert(there16, sixteen, 4, 1, ours, fuma) == ISOGI_OK, "%s", "Furse and Malham");
+        for (int i = 0; i < 16; i++) {
+            int l = (int)sqrt((double)i);
+            CHECK(there16[i] == (float)(l * (l + 1) + m[i]), "Furse and Malham %d: %g", i, (double)there16[i]);
+        }
     }
     ours.ordering = (isogi_sh_ordering)7;
     CHECK(isogi_sh_convert(out, one, 3, 1, ours, sid) == ISOGI_INVALID, "%s", "ordering 7");
@@ -1630,6 +1756,48 @@ TEST(fits_find_one_light) {
     CHECK(isogi_sh_dominant_direction(direction, rgb, c, ORDER) == ISOGI_OK && direction[2] == 1 && rgb[0] == 0, "darkness: %g %g",
           (double)direction[2], (double)rgb[0]);
     CHECK(isogi_sh_dominant_direction(direction, rgb, c, 1) == ISOGI_INVALID, "%s", "order 1");
+}
+
+/* Mean square over all normals of what irradiance of a light `light` along y, and of `ambient`, differ from that of c: degree by degree. */
+static double misfit(const double *c, const double *y, int order, double light, double ambient) {
+    static const double factor[5] = {3.14159265358979324, 2.09439510239319549, 0.785398163397448310, 0, -0.130899693899574718};
+    double sum = 0;
+    for (int l = 0; l < order; l++)
+        for (int i = l * l; i < (l + 1) * (l + 1); i++) {
+            double off = factor[l] * (c[i] - light * y[i] - (i ? 0 : sqrt(4 * pi) * ambient));
+            sum += off * off;
+        }
+    return sum;
+}
+
+/* Nothing near a fit is closer, where its parts are positive and where one of them would be negative and is 0. */
+TEST(fits_are_the_closest_without_negative_parts) {
+    test_random r = {62};
+    int kinds[4] = {0, 0, 0, 0};
+    for (int round = 0; round < 300; round++) {
+        const int order = 2 + round % 4, n = order * order;
+        float c[75], direction[1][3], rgb[3], ambient[3];
+        double wide[3], y[25], one[25];
+        const double base = random_range(&r, -0.5, 1.5);
+        for (int i = 0; i < 3 * n; i++) c[i] = (float)(random_range(&r, -1, 1) + (i < 3 ? base : 0));
+        CHECK(isogi_sh_fit_directional(direction[0], rgb, ambient, c, order) == ISOGI_OK, "round %d", round);
+        for (int k = 0; k < 3; k++) wide[k] = (double)direction[0][k];
+        isogi_sh_eval_f64(y, order, (const double(*)[3])&wide, 1);
+        for (int k = 0; k < 3; k++) {
+            const double light = (double)rgb[k], rest = (double)ambient[k];
+            for (int i = 0; i < n; i++) one[i] = (double)c[3 * i + k];
+            const double best = misfit(one, y, order, light, rest);
+            kinds[2 * (light > 0) + (rest > 0)]++;
+            for (int a = -1; a <= 1; a++)
+                for (int b = -1; b <= 1; b++) {
+                    const double value = misfit(one, y, order, fmax(light + 0.01 * a, 0), fmax(rest + 0.01 * b, 0));
+                    CHECK(value > best - 1e-6, "round %d, channel %d: light %g and ambient %g are %.9g off, %.9g is near", round, k, light,
+                          rest, best, value);
+                }
+        }
+    }
+    CHECK(kinds[0] > 5 && kinds[1] > 20 && kinds[2] > 20 && kinds[3] > 20, "%d %d %d %d fits of each kind", kinds[0], kinds[1], kinds[2],
+          kinds[3]);
 }
 
 /* A red, a green and a blue light along the axes: degree 1 adds their directions up, weighed by their luminances (Rec. 709). */
@@ -1949,6 +2117,13 @@ TEST(lighting_is_validated) {
     CHECK(isogi_lighting_validate(&good) == ISOGI_INVALID, "%s", "a direction of no length");
     lights[0].vector[1] = 1, lights[0].kind = (isogi_light_kind)(ISOGI_LIGHT_RECTANGLE + 1);
     CHECK(isogi_lighting_validate(&good) == ISOGI_INVALID, "%s", "kind");
+    lights[0].kind = ISOGI_LIGHT_RECTANGLE, lights[0].edge[0][0] = 2, lights[0].edge[1][1] = 3; /* at right angles to 1e-3 */
+    for (int i = -1; i <= 1; i += 2) {
+        lights[0].edge[1][0] = (float)i * 3 * 0.9e-3f;
+        CHECK(isogi_lighting_validate(&good) == ISOGI_OK, "%s", "edges at right angles to 0.9e-3");
+        lights[0].edge[1][0] = (float)i * 3 * 1.1e-3f;
+        CHECK(isogi_lighting_validate(&good) == ISOGI_INVALID, "%s", "edges at right angles to 1.1e-3");
+    }
     lights[0].kind = ISOGI_LIGHT_SPHERE, lights[0].radius = -1;
     CHECK(isogi_lighting_validate(&good) == ISOGI_INVALID, "%s", "negative radius");
 }

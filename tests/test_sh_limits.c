@@ -477,16 +477,17 @@ TEST(windows_of_any_order) {
 /* Where each (l, m) goes and by how much it is scaled, and back again from every convention to every other. */
 TEST(conventions_of_any_order) {
     for (int o = 0; o < ORDERS; o++)
-        for (int i = 0; i < 18; i++) {
+        for (int i = 0; i < 24; i++) {
             int order = orders[o], n = order * order;
             isogi_sh_convention ours = {ISOGI_SH_ORTHONORMAL, ISOGI_SH_ACN, 0},
-                                theirs = {(isogi_sh_normalisation)(i % 3), (isogi_sh_ordering)(i / 3 % 3), i / 9};
+                                theirs = {(isogi_sh_normalisation)(i % 3), (isogi_sh_ordering)(i / 3 % 4), i / 12};
             for (int k = 0; k < n; k++) c[k] = (float)(1 + k % 1000);
             CHECK(isogi_sh_convert(d, c, order, 1, ours, theirs) == ISOGI_OK, "%d", i);
             for (int l = 0; l < order; l++)
                 for (int m = -l; m <= l; m++) {
                     int size = m < 0 ? -m : m, pair = 2 * size - (m > 0), sid = m ? 2 * (l - size) + (m < 0) : 2 * l;
-                    int at = l * l + (theirs.ordering == ISOGI_SH_ACN ? l + m : theirs.ordering == ISOGI_SH_PAIRS ? pair : sid);
+                    const int paired = theirs.ordering == ISOGI_SH_PAIRS || (theirs.ordering == ISOGI_SH_FUMA && l != 1);
+                    int at = l * l + (theirs.ordering == ISOGI_SH_ACN ? l + m : paired ? pair : sid);
                     double factor = theirs.normalisation ? 1 / sqrt(4 * pi) : 1; /* coefficients shrink as the basis grows */
                     if (theirs.normalisation == ISOGI_SH_SN3D) factor *= sqrt(2 * l + 1);
                     if (theirs.condon_shortley && m % 2) factor = -factor;
@@ -494,7 +495,7 @@ TEST(conventions_of_any_order) {
                     CHECK(fabs((double)d[at] - value) <= 1.2e-7 * fabs(value), "convention %d, Y_%d^%d: %g, expected %g", i, l, m,
                           (double)d[at], value);
                 }
-            isogi_sh_convention third = {(isogi_sh_normalisation)((i + 1) % 3), (isogi_sh_ordering)((i / 3 + 1) % 3), !(i / 9)};
+            isogi_sh_convention third = {(isogi_sh_normalisation)((i + 1) % 3), (isogi_sh_ordering)((i / 3 + 1) % 4), !(i / 12)};
             CHECK(isogi_sh_convert(e, d, order, 1, theirs, third) == ISOGI_OK && isogi_sh_convert(d, e, order, 1, third, ours) == ISOGI_OK,
                   "%d", i);
             for (int k = 0; k < n; k++)
