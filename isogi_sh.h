@@ -3025,20 +3025,22 @@ static void isogi_sh__rotate(void *out, const void *in, int is_double, int order
     isogi_sh__turns turns;
     int l = 0, i, k, first;
 #ifdef ISOGI_SH__SIMD
-    if (order > (channels == 1 ? 5 : 4) && isogi_sh__level() > 1) {
+    if (order > 5 && isogi_sh__level() > 1) {
         l = order < ISOGI_SH__TURNS + 1 ? order : ISOGI_SH__TURNS + 1;
         isogi_sh__rotate_channels(out, in, is_double, l, channels, e);
         if (l == order) return;
     }
 #endif
     isogi_sh__turns_start(&turns, order, e);
-    if (channels == 1 && l == 0) {
+    if (l == 0) {
         int low = order < 5 ? order * order : 25;
-        for (i = 0; i < low; i++) band[i] = isogi_sh__get(in, is_double, i);
-        isogi_sh__rotate_low(band, order, &turns);
-        for (i = 0; i < low; i++) {
-            if (is_double) ((double *)out)[i] = band[i];
-            else ((float *)out)[i] = (float)band[i];
+        for (k = 0; k < channels; k++) {
+            for (i = 0; i < low; i++) band[i] = isogi_sh__get(in, is_double, channels * i + k);
+            isogi_sh__rotate_low(band, order, &turns);
+            for (i = 0; i < low; i++) {
+                if (is_double) ((double *)out)[channels * i + k] = band[i];
+                else ((float *)out)[channels * i + k] = (float)band[i];
+            }
         }
         l = 5;
     }
@@ -4189,6 +4191,89 @@ ISOGI_SH__AVX512 static void isogi_sh__product_order5_f16(float *out, const floa
     for (i = 0; i < 4; i++) isogi_sh__join_f16_turn(out + 100 * i, 25, (const float *)c + 4 * i, 16, 0);
 }
 #undef ISOGI_SH__FOURIER
+
+/* Other low orders in double, four products side by side. What all of them share: columns at the latitudes z >= 0, degrees l >= m of
+   m = 0, then of m = 1 and so on, and what is integrated counts as. */
+#define ISOGI_SH__SIDE 10 /* orders that go this way */
+typedef struct isogi_sh__product_rows {
+    double q[7][55], weight[7];
+    int count;
+} isogi_sh__product_rows;
+
+static void isogi_sh__product_rows_start(isogi_sh__product_rows *r, int order) {
+    int i, l, m, latitudes = (3 * (order - 1)) / 2 + 1;
+    r->count = (latitudes + 1) / 2;
+    for (i = 0; i < r->count; i++) {
+        double column[ISOGI_SH__SIDE], z, sine, power = 1, *q = r->q[i];
+        isogi_sh__gauss_legendre(&z, &r->weight[i], i, latitudes);
+        r->weight[i] *= (2 * i + 1 == latitudes ? 0.25 : 0.5) * ISOGI_SH__PI; /* the equator is its own mirror image */
+        sine = sqrt((1 - z) * (1 + z));
+        for (m = 0; m < order; m++, power *= sine) {
+            isogi_sh__column(column, order, m, isogi_sh__next_diagonal(0, m), z, 0);
+            for (l = m; l < order; l++) *q++ = power * column[l];
+        }
+    }
+}
+
+/* Terms -m .. m of twice the complex Fourier series at a latitude and at its mirror image: series[mirrored][imaginary], m = 0 in the
+   middle */
+ISOGI_SH__AVX2 static void isogi_sh__series_d4(isogi_sh__d4 series[2][2][2 * ISOGI_SH__SIDE], const isogi_sh__d4 *c, const double *q,
+                                               int order) {
+    isogi_sh__d4 zero = {0};
+    int i, j, l, m;
+    for (m = 0; m < order; m++) {
+        isogi_sh__d4 even = zero, odd = zero, even_s = zero, odd_s = zero;
+        for (l = m; l < order; l += 2, q += 2) {
+            even = ISOGI_SH__FMA_D4(c[l * (l + 1) + m], isogi_sh__eval_d4_splat(q[0]), even);
+            even_s = ISOGI_SH__FMA_D4(c[l * (l + 1) - m], isogi_sh__eval_d4_splat(q[0]), even_s);
+            if (l + 1 == order) break;
+            odd = ISOGI_SH__FMA_D4(c[(l + 1) * (l + 2) + m], isogi_sh__eval_d4_splat(q[1]), odd);
+            odd_s = ISOGI_SH__FMA_D4(c[(l + 1) * (l + 2) - m], isogi_sh__eval_d4_splat(q[1]), odd_s);
+        }
+        if (l + 1 == order) q++;
+        i = order - 1 - m, j = order - 1 + m;
+        series[0][0][i] = series[0][0][j] = even + odd, series[1][0][i] = series[1][0][j] = even - odd;
+        series[0][1][j] = even_s + odd_s, series[1][1][j] = even_s - odd_s;
+        series[0][1][i] = -series[0][1][j], series[1][1][i] = -series[1][1][j];
+    }
+    for (i = 0; i < 2; i++) series[i][0][order - 1] += series[i][0][order - 1], series[i][1][order - 1] = zero;
+}
+
+/* `some` products, at most 4 */
+ISOGI_SH__AVX2 static void isogi_sh__products_d4(float *out, const float *f, const float *g, int order, int some,
+                                                 const isogi_sh__product_rows *r) {
+    isogi_sh__d4 in[2][ISOGI_SH__SIDE * ISOGI_SH__SIDE], total[ISOGI_SH__SIDE * ISOGI_SH__SIDE], zero = {0};
+    isogi_sh__d4 a[2][2][2 * ISOGI_SH__SIDE], b[2][2][2 * ISOGI_SH__SIDE];
+    int i, j, k, l, m, n = order * order;
+    for (i = 0; i < n; i++) {
+        in[0][i] = in[1][i] = total[i] = zero;
+        for (k = 0; k < some; k++) ((double *)&in[0][i])[k] = (double)f[n * k + i], ((double *)&in[1][i])[k] = (double)g[n * k + i];
+    }
+    for (j = 0; j < r->count; j++) {
+        const double *q = r->q[j];
+        isogi_sh__series_d4(a, in[0], q, order);
+        isogi_sh__series_d4(b, in[1], q, order);
+        for (m = 0; m < order; m++) {
+            isogi_sh__d4 c[2], s[2], weight = isogi_sh__eval_d4_splat(r->weight[j]);
+            for (i = 0; i < 2; i++) {
+                isogi_sh__d4 real = zero, real_less = zero, imaginary = zero, more = zero;
+                for (k = m; k <= 2 * order - 2; k++) {
+                    isogi_sh__d4 ac = a[i][0][k], as = a[i][1][k], bc = b[i][0][2 * order - 2 + m - k], bs = b[i][1][2 * order - 2 + m - k];
+                    real = ISOGI_SH__FMA_D4(ac, bc, real), real_less = ISOGI_SH__FMA_D4(as, bs, real_less);
+                    imaginary = ISOGI_SH__FMA_D4(ac, bs, imaginary), more = ISOGI_SH__FMA_D4(as, bc, more);
+                }
+                c[i] = (real - real_less) * weight, s[i] = (imaginary + more) * weight;
+            }
+            for (l = m; l < order; l++, q++) {
+                isogi_sh__d4 *to = total + l * (l + 1), by = isogi_sh__eval_d4_splat(*q);
+                to[m] = ISOGI_SH__FMA_D4((l + m) & 1 ? c[0] - c[1] : c[0] + c[1], by, to[m]);
+                if (m) to[-m] = ISOGI_SH__FMA_D4((l + m) & 1 ? s[0] - s[1] : s[0] + s[1], by, to[-m]);
+            }
+        }
+    }
+    for (k = 0; k < some; k++)
+        for (i = 0; i < n; i++) out[n * k + i] = (float)((const double *)&total[i])[k];
+}
 #endif
 
 ISOGI_API isogi_result isogi_sh_product(float *out, const float *a, const float *b, int order, size_t count) {
@@ -4203,6 +4288,14 @@ ISOGI_API isogi_result isogi_sh_product(float *out, const float *a, const float 
         for (; i < count; i++) isogi_sh__product_order5(out + n * i, a + n * i, b + n * i);
         return ISOGI_OK;
     }
+    if (order <= ISOGI_SH__SIDE && isogi_sh__level()) {
+        isogi_sh__product_rows rows;
+        isogi_sh__product_rows_start(&rows, order);
+        for (i = 0; i < count; i += 4)
+            isogi_sh__products_d4(out + n * i, a + n * i, b + n * i, order, count - i < 4 ? (int)(count - i) : 4, &rows);
+        return ISOGI_OK;
+    }
+#undef ISOGI_SH__SIDE
 #endif
     for (i = 0; i < count; i++)
         for (first = 0; first < order; first += ISOGI_SH__GROUP)

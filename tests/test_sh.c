@@ -1347,8 +1347,9 @@ TEST(composed_rotations_do_not_drift) {
 
 /* ---- more algebra ---- */
 
-/* A product's expansion is the projection of the product of the functions, by quadrature of the reference; orders 1..7 and, in the long
-   suite, 26. Then the matrix of a fixed factor does the same, is symmetric, and many at once are one by one. */
+/* A product's expansion is the projection of the product of the functions, by quadrature of the reference; orders 1..11 and, in the long
+   suite, 26; all but order 5 are found in double. Then the matrix of a fixed factor does the same, is symmetric, and many at once are one
+   by one. */
 TEST(products_are_exact) {
     enum { MAX = 26, COUNT = 19 };
     static float a[COUNT * MAX * MAX], b[COUNT * MAX * MAX], out[COUNT * MAX * MAX], matrix[MAX * MAX * MAX * MAX];
@@ -1357,7 +1358,7 @@ TEST(products_are_exact) {
     double worst = 0;
     long double node[64], weight[64];
     test_random r = {29};
-    for (int order = 1; order <= (LONG_SUITE ? MAX : 7); order += order < 7 ? 1 : 19) {
+    for (int order = 1; order <= (LONG_SUITE ? MAX : 11); order += order < 11 ? 1 : 15) {
         int n = order * order, latitudes = (3 * order) / 2 + 1, longitudes = 3 * order;
         for (int i = 0; i < COUNT * n; i++) a[i] = (float)random_range(&r, -1, 1), b[i] = (float)random_range(&r, -1, 1);
         CHECK(isogi_sh_product(out, a, b, order, COUNT) == ISOGI_OK, "order %d", order);
@@ -1381,8 +1382,8 @@ TEST(products_are_exact) {
                 CHECK(most <= 1e-7, "order %d alone: %g of both norms", order, most);
             }
             for (int k = 0; k < n; k++)
-                CHECK(fabs((double)out[e * n + k] - expected[k]) < 3e-6 * order, "order %d, %d of %d: %.9g, expected %.9g", order, k, e,
-                      (double)out[e * n + k], expected[k]);
+                CHECK(fabs((double)out[e * n + k] - expected[k]) < (order == 5 ? 1.5e-5 : 1e-7 + 6e-8 * fabs(expected[k])),
+                      "order %d, %d of %d: %.9g, expected %.9g", order, k, e, (double)out[e * n + k], expected[k]);
         }
         printf("    order %d: %.3g of both norms\n", order, worst);
         worst = 0;
