@@ -4615,6 +4615,18 @@ typedef struct isogi_sh__pixels {
     double unit; /* what a radiance of 1 counts as */
 } isogi_sh__pixels;
 
+/* total[0 or 1][m - first][l][channel], with room for `most` degrees, as coefficients */
+static void isogi_sh__project_store(float *c, int order, const isogi_sh__pixels *p, double (*total)[3], int most) {
+    int k, l, m;
+    for (m = p->first; m < p->end; m++)
+        for (l = m; l < order; l++)
+            for (k = 0; k < p->group; k++) {
+                int at = (m - p->first) * most + l;
+                c[p->channels * (l * (l + 1) + m) + p->channel + k] = (float)total[at][k];
+                if (m > 0) c[p->channels * (l * (l + 1) - m) + p->channel + k] = (float)total[ISOGI_SH__GROUP * most + at][k];
+            }
+}
+
 /* Azimuth sums of one row about the image's pole: sums[0 or 1][m - first][channel] = sum over texels of texel (cos, sin) m p. */
 static void isogi_sh__row_sums(double sums[2][ISOGI_SH__GROUP][3], const isogi_sh__pixels *p, int row) {
     const float *texel = p->image + (size_t)p->channels * (size_t)p->width * (size_t)row + p->channel;
@@ -4778,6 +4790,143 @@ ISOGI_SH__AVX2 static void isogi_sh__project_fast(float *rgb, const float *image
 #undef ISOGI_SH__ROWS
 #endif
 
+#ifdef ISOGI_SH__SIMD
+/* ---- the same in double, of any order and channels, where the width is a multiple of 4 ----
+   Rows are folded as above, one channel in a row of memory, and the sums of two such rows found at once: one channel of two rows. */
+#define ISOGI_SH__FOLD 64 /* columns of a quarter that are folded at once */
+#define ISOGI_SH__ROWS 16 /* rows that share the factors of those columns */
+#define ISOGI_SH__FOLDED_ORDER 32
+typedef double isogi_sh__folded[4][ISOGI_SH__FOLD]; /* differences of opposite texels, two; what m = 2, 6, .. take; sums of all four */
+typedef double isogi_sh__fold_factors[ISOGI_SH__GROUP][2][ISOGI_SH__FOLD]; /* cosines and sines */
+
+/* Zero beyond `columns` */
+static void isogi_sh__fold_factors_start(isogi_sh__fold_factors factor, const isogi_sh__pixels *p, int from, int columns) {
+    double step = 2 * ISOGI_SH__PI / (double)p->width, start = 2 * ISOGI_SH__PI - step * ((double)from + 0.5);
+    int i, m;
+    memset(factor, 0, sizeof(isogi_sh__fold_factors));
+    for (m = p->first; m < p->end; m++) {
+        double x = cos((double)m * start), y = sin((double)m * start), turn_c = cos((double)m * step), turn_s = -sin((double)m * step), t;
+        for (i = 0; i < columns; i++) {
+            factor[m - p->first][0][i] = x, factor[m - p->first][1][i] = y;
+            t = x * turn_c - y * turn_s;
+            y = x * turn_s + y * turn_c;
+            x = t;
+        }
+    }
+}
+
+static void isogi_sh__fold(isogi_sh__folded to, const float *texel, size_t channels, size_t quarter, int columns) {
+    int i;
+    for (i = 0; i < columns; i++, texel += channels) {
+        double a = (double)texel[0], b = (double)texel[quarter], c = (double)texel[2 * quarter], d = (double)texel[3 * quarter];
+        double ac = a + c, bd = b + d;
+        to[0][i] = a - c, to[1][i] = b - d, to[2][i] = ac - bd, to[3][i] = ac + bd;
+    }
+    for (; i & 7; i++) to[0][i] = to[1][i] = to[2][i] = to[3][i] = 0;
+}
+
+#define ISOGI_SH__SUM_D4(v) (((v)[0] + (v)[1]) + ((v)[2] + (v)[3]))
+
+/* sums[row][0 or 1][m - first][channel] += what the columns of two rows add, `rows` of which are wanted */
+ISOGI_SH__AVX2 static void isogi_sh__fold_sums(double (*sums)[2][ISOGI_SH__GROUP][3], int channel, int rows, isogi_sh__folded *f,
+                                               isogi_sh__fold_factors factor, const isogi_sh__pixels *p, int columns) {
+    int i, m, r;
+    for (m = p->first; m < p->end; m++) {
+        const double *c = factor[m - p->first][0], *s = factor[m - p->first][1];
+        isogi_sh__d4 zero = {0}, cosine[2], sine[2];
+        isogi_sh__d4 c0 = zero, c1 = zero, s0 = zero, s1 = zero, c2 = zero, c3 = zero, s2 = zero, s3 = zero;
+        if (m & 1) {
+            for (i = 0; i < columns; i += 4) {
+                isogi_sh__d4 x = *(const isogi_sh__d4 *)(c + i), y = *(const isogi_sh__d4 *)(s + i);
+                isogi_sh__d4 e = *(const isogi_sh__d4 *)(f[0][0] + i), g = *(const isogi_sh__d4 *)(f[0][1] + i);
+                c0 = ISOGI_SH__FMA_D4(e, x, c0), s0 = ISOGI_SH__FMA_D4(e, y, s0);
+                c1 = ISOGI_SH__FMA_D4(g, y, c1), s1 = ISOGI_SH__FMA_D4(g, x, s1);
+                e = *(const isogi_sh__d4 *)(f[1][0] + i), g = *(const isogi_sh__d4 *)(f[1][1] + i);
+                c2 = ISOGI_SH__FMA_D4(e, x, c2), s2 = ISOGI_SH__FMA_D4(e, y, s2);
+                c3 = ISOGI_SH__FMA_D4(g, y, c3), s3 = ISOGI_SH__FMA_D4(g, x, s3);
+            }
+            if (m & 2) c1 = -c1, c3 = -c3;
+            else s1 = -s1, s3 = -s3;
+        } else {
+            const double *a = f[0][m & 2 ? 2 : 3], *b = f[1][m & 2 ? 2 : 3];
+            for (i = 0; i < columns; i += 8) {
+                isogi_sh__d4 x = *(const isogi_sh__d4 *)(c + i), y = *(const isogi_sh__d4 *)(s + i);
+                isogi_sh__d4 e = *(const isogi_sh__d4 *)(a + i), g = *(const isogi_sh__d4 *)(b + i);
+                c0 = ISOGI_SH__FMA_D4(e, x, c0), s0 = ISOGI_SH__FMA_D4(e, y, s0);
+                c2 = ISOGI_SH__FMA_D4(g, x, c2), s2 = ISOGI_SH__FMA_D4(g, y, s2);
+                x = *(const isogi_sh__d4 *)(c + i + 4), y = *(const isogi_sh__d4 *)(s + i + 4);
+                e = *(const isogi_sh__d4 *)(a + i + 4), g = *(const isogi_sh__d4 *)(b + i + 4);
+                c1 = ISOGI_SH__FMA_D4(e, x, c1), s1 = ISOGI_SH__FMA_D4(e, y, s1);
+                c3 = ISOGI_SH__FMA_D4(g, x, c3), s3 = ISOGI_SH__FMA_D4(g, y, s3);
+            }
+        }
+        cosine[0] = c0 + c1, sine[0] = s0 + s1, cosine[1] = c2 + c3, sine[1] = s2 + s3;
+        for (r = 0; r < rows; r++) {
+            sums[r][0][m - p->first][channel] += ISOGI_SH__SUM_D4(cosine[r]);
+            sums[r][1][m - p->first][channel] += ISOGI_SH__SUM_D4(sine[r]);
+        }
+    }
+}
+
+/* Azimuth sums of ISOGI_SH__ROWS rows; see isogi_sh__row_sums. */
+static void isogi_sh__folded_sums(double (*sums)[2][ISOGI_SH__GROUP][3], const isogi_sh__pixels *p, int row, int rows) {
+    isogi_sh__fold_factors factor;
+    isogi_sh__folded folded[2];
+    int from, r, i, k, quarter = p->width / 4;
+    memset(sums, 0, ISOGI_SH__ROWS * sizeof *sums);
+    for (from = 0; from < quarter; from += ISOGI_SH__FOLD) {
+        int columns = quarter - from < ISOGI_SH__FOLD ? quarter - from : ISOGI_SH__FOLD;
+        isogi_sh__fold_factors_start(factor, p, from, columns);
+        for (r = 0; r < rows; r += 2) {
+            int some = rows - r < 2 ? 1 : 2;
+            for (k = 0; k < p->group; k++) {
+                for (i = 0; i < 2; i++) {
+                    size_t at = (size_t)p->width * (size_t)(row + r + (i < some ? i : 0)) + (size_t)from;
+                    isogi_sh__fold(folded[i], p->image + (size_t)p->channels * at + p->channel + k, (size_t)p->channels,
+                                   (size_t)p->channels * (size_t)quarter, columns);
+                }
+                isogi_sh__fold_sums(sums + r, k, some, folded, factor, p, columns);
+            }
+        }
+    }
+}
+
+ISOGI_SH__APART void isogi_sh__project_folded(float *c, int order, const isogi_sh__pixels *p) {
+    double total[2][ISOGI_SH__GROUP][ISOGI_SH__FOLDED_ORDER][3], sums[ISOGI_SH__ROWS][2][ISOGI_SH__GROUP][3], q[ISOGI_SH__FOLDED_ORDER];
+    double weight[8], z[8], sine[8], cosine[8];
+    int row, j, k, l, m, limit = order < p->height ? order : p->height; /* degrees that rows can tell apart */
+    memset(total, 0, sizeof total);
+    for (row = 0; row < p->height; row++) {
+        double power, diagonal = 0, (*sum)[ISOGI_SH__GROUP][3] = sums[row % ISOGI_SH__ROWS];
+        j = row % 8;
+        if (row % ISOGI_SH__ROWS == 0)
+            isogi_sh__folded_sums(sums, p, row, p->height - row < ISOGI_SH__ROWS ? p->height - row : ISOGI_SH__ROWS);
+        if (j == 0) {
+            for (k = 0; k < 8; k++) {
+                double t = ISOGI_SH__PI * ((double)(row + k) + 0.5) / (double)p->height;
+                z[k] = cos(t), sine[k] = sin(t), cosine[k] = (z[k] - sine[k]) * (z[k] + sine[k]);
+            }
+            isogi_sh__fejer_rows(weight, cosine, p->height);
+        }
+        power = p->unit * weight[j] * 2 * ISOGI_SH__PI / (double)p->width;
+        for (m = 0; m < p->end; m++, power *= sine[j]) {
+            diagonal = isogi_sh__next_diagonal(diagonal, m);
+            if (m < p->first || (m && 2 * m >= p->width)) continue;
+            isogi_sh__column(q, order, m, diagonal, z[j], 0);
+            for (l = m; l < limit; l++)
+                for (k = 0; k < p->group; k++) {
+                    total[0][m - p->first][l][k] += power * q[l] * sum[0][m - p->first][k];
+                    total[1][m - p->first][l][k] += power * q[l] * sum[1][m - p->first][k];
+                }
+        }
+    }
+    isogi_sh__project_store(c, order, p, total[0][0], ISOGI_SH__FOLDED_ORDER);
+}
+#undef ISOGI_SH__FOLD
+#undef ISOGI_SH__ROWS
+#undef ISOGI_SH__SUM_D4
+#endif
+
 /* Their part of the projection, in the frame whose z is the image's pole. */
 ISOGI_SH__APART void isogi_sh__project_rows(float *c, int order, const isogi_sh__pixels *p) {
     double total[2][ISOGI_SH__GROUP][ISOGI_SH_MAX_ORDER][3], sums[2][ISOGI_SH__GROUP][3], q[ISOGI_SH_MAX_ORDER];
@@ -4800,12 +4949,7 @@ ISOGI_SH__APART void isogi_sh__project_rows(float *c, int order, const isogi_sh_
             power *= sine;
         }
     }
-    for (m = p->first; m < p->end; m++)
-        for (l = m; l < order; l++)
-            for (k = 0; k < p->group; k++) {
-                c[p->channels * (l * (l + 1) + m) + p->channel + k] = (float)total[0][m - p->first][l][k];
-                if (m > 0) c[p->channels * (l * (l + 1) - m) + p->channel + k] = (float)total[1][m - p->first][l][k];
-            }
+    isogi_sh__project_store(c, order, p, total[0][0], ISOGI_SH_MAX_ORDER);
 }
 
 static int isogi_sh__image_fits(int width, int height, int channels) {
@@ -4843,6 +4987,12 @@ static void isogi_sh__image(float *c, int order, int channels, const float *imag
         for (p.channel = 0; p.channel < channels; p.channel += 3) {
             p.end = p.first + ISOGI_SH__GROUP < order ? p.first + ISOGI_SH__GROUP : order;
             p.group = p.channel + 3 < channels ? 3 : channels - p.channel;
+#ifdef ISOGI_SH__SIMD
+            if (order <= ISOGI_SH__FOLDED_ORDER && !(width & 3) && width >= 32 && isogi_sh__level()) {
+                isogi_sh__project_folded(c, order, &p);
+                continue;
+            }
+#endif
             isogi_sh__project_rows(c, order, &p);
         }
     if (isogi_sh__euler_angles(&e, isogi_sh__image_to_world) == ISOGI_OK) isogi_sh__rotate(c, c, 0, order, channels, &e);

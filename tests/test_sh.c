@@ -2034,6 +2034,33 @@ static void no_rotation(const float m[9]) {
     instruction_level = BEST_LEVEL;
 }
 
+/* Images whose rows are folded, against plain C, to a float's rounding: one to five channels, widths that fill blocks of columns and that
+   do not, few rows and odd numbers of them, orders on both sides of groups and of the last that goes this way. */
+TEST(images_agree_at_every_level) {
+    enum { MOST = 34, WIDTH = 264 };
+    static const int size[][2] = {{32, 1}, {36, 7}, {100, 33}, {256, 16}, {264, 19}, {34, 9}};
+    static const int orders[] = {1, 2, 3, 4, 6, 7, 11, 32, 33};
+    static float image[5 * WIDTH * 33 + 1], c[5 * MOST * MOST], plain[5 * MOST * MOST];
+    test_random r = {43};
+    double worst = 0;
+    for (size_t i = 0; i < sizeof image / sizeof *image; i++) image[i] = (float)exp(random_range(&r, -3, 3));
+    for (size_t k = 0; k < sizeof size / sizeof *size; k++)
+        for (size_t o = 0; o < sizeof orders / sizeof *orders; o++)
+            for (int channels = 1; channels <= 5; channels++) {
+                int n = channels * orders[o] * orders[o];
+                double largest = 0;
+                for (int i = 0; i < n; i++) c[i] = plain[i] = 7;
+                instruction_level = 0;
+                isogi_sh_project_image(plain, orders[o], channels, image, size[k][0], size[k][1]);
+                instruction_level = BEST_LEVEL;
+                isogi_sh_project_image(c, orders[o], channels, image, size[k][0], size[k][1]);
+                for (int i = 0; i < n; i++) largest = fmax(largest, fabs((double)plain[i]));
+                for (int i = 0; i < n; i++) worst = fmax(worst, fabs((double)c[i] - (double)plain[i]) / largest);
+            }
+    printf("    images differ by %.3g of the largest coefficient\n", worst);
+    CHECK(worst <= 6e-8 * ROUNDING_FACTOR, "images differ by %g", worst);
+}
+
 TEST(bad_input_is_reported_and_changes_nothing) {
     float y[27] = {0}, before[27], d[1][3] = {{0, 0, 1}}, m[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1}, image[3 * 8] = {0};
     double c[9] = {0};
