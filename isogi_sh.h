@@ -5098,6 +5098,55 @@ static isogi_sh__unit isogi_sh__cube_direction(int face, double s, double t) {
     }
 }
 
+#ifdef ISOGI_SH__SIMD
+/* Low orders: 16 texels of a row at a time, whose solid angles are those of all faces, and up to 4 channels. */
+#define ISOGI_SH__CUBE_ORDER 10
+ISOGI_SH__AVX2 static void isogi_sh__cube_add(isogi_sh__d4 (*total)[4], int n, const double (*y)[16], const double (*value)[16],
+                                              int channels) {
+    int i, k;
+    for (i = 0; i < n; i++) {
+        const isogi_sh__d4 *a = (const isogi_sh__d4 *)y[i];
+        for (k = 0; k < channels; k++) {
+            const isogi_sh__d4 *b = (const isogi_sh__d4 *)value[k];
+            isogi_sh__d4 less = ISOGI_SH__FMA_D4(a[0], b[0], total[i][k]), more = a[1] * b[1];
+            total[i][k] = ISOGI_SH__FMA_D4(a[2], b[2], less) + ISOGI_SH__FMA_D4(a[3], b[3], more);
+        }
+    }
+}
+
+/* Channels `channel` .. `channel + some - 1` */
+static void isogi_sh__cube_low(float *c, int order, int channels, int channel, int some, const float *const face[6], int size) {
+    isogi_sh__d4 total[ISOGI_SH__CUBE_ORDER * ISOGI_SH__CUBE_ORDER][4];
+    double y[ISOGI_SH__CUBE_ORDER * ISOGI_SH__CUBE_ORDER][16], value[4][16], corner[2][17], direction[3][16], edge = 2 / (double)size;
+    int f, from, i, j, k, n = order * order;
+    memset(total, 0, sizeof total);
+    for (from = 0; from < size; from += 16)
+        for (j = -1; j < size; j++) {
+            double *above = corner[(j + 1) & 1], *below = corner[j & 1], t = edge * (double)j - 1 + edge / 2;
+            for (i = 0; i <= 16; i++)
+                below[i] = from + i <= size ? isogi_sh__corner_angle(edge * (double)(from + i) - 1, edge * (double)(j + 1) - 1) : 0;
+            for (f = 0; f < 6 && j >= 0; f++) {
+                for (i = 0; i < 16; i++) {
+                    int column = from + i < size ? from + i : size - 1, sign = f & 1 ? -1 : 1;
+                    const float *texel = face[f] + ((size_t)j * (size_t)size + (size_t)column) * (size_t)channels + channel;
+                    double s = edge * (double)(from + i) - 1 + edge / 2, solid = below[i + 1] - below[i] - above[i + 1] + above[i];
+                    direction[f / 2][i] = (double)sign;
+                    direction[f / 2 == 0 ? 2 : 0][i] = f == 0 || f == 5 ? -s : s;
+                    direction[f / 2 == 1 ? 2 : 1][i] = f == 2 ? t : -t;
+                    for (k = 0; k < some; k++) value[k][i] = from + i < size ? solid * (double)texel[k] : 0;
+                }
+                isogi_sh_eval_soa_f64(y[0], order < 3 ? 3 : order, direction[0], direction[1], direction[2], 16);
+                isogi_sh__cube_add(total, n, (const double(*)[16])y, (const double(*)[16])value, some);
+            }
+        }
+    for (i = 0; i < n; i++)
+        for (k = 0; k < some; k++) {
+            isogi_sh__d4 sum = total[i][k];
+            c[channels * i + channel + k] = (float)((sum[0] + sum[1]) + (sum[2] + sum[3]));
+        }
+}
+#endif
+
 /* Orders first <= m < end of one channel, over all texels. */
 static void isogi_sh__project_cube(float *c, int order, int channels, int channel, int first, int end, const float *const face[6],
                                    int size) {
@@ -5137,6 +5186,14 @@ ISOGI_API isogi_result isogi_sh_project_cube(float *c, int order, int channels, 
     for (f = 0; f < 6; f++)
         if (!face[f]) return ISOGI_INVALID;
     if (!isogi_sh__image_fits(size, size, channels)) return ISOGI_TOO_LARGE;
+#ifdef ISOGI_SH__SIMD
+    if (order <= ISOGI_SH__CUBE_ORDER && isogi_sh__level()) {
+        for (channel = 0; channel < channels; channel += 4)
+            isogi_sh__cube_low(c, order, channels, channel, channels - channel < 4 ? channels - channel : 4, face, size);
+        return ISOGI_OK;
+    }
+#undef ISOGI_SH__CUBE_ORDER
+#endif
     for (channel = 0; channel < channels; channel++)
         for (first = 0; first < order; first += ISOGI_SH__GROUP)
             isogi_sh__project_cube(c, order, channels, channel, first, first + ISOGI_SH__GROUP < order ? first + ISOGI_SH__GROUP : order,

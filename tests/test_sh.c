@@ -2035,7 +2035,8 @@ static void no_rotation(const float m[9]) {
 }
 
 /* Images whose rows are folded, against plain C, to a float's rounding: one to five channels, widths that fill blocks of columns and that
-   do not, few rows and odd numbers of them, orders on both sides of groups and of the last that goes this way. */
+   do not, few rows and odd numbers of them, orders on both sides of groups and of the last that goes this way. The same for cubes, whose texels are
+   taken sixteen at a time. */
 TEST(images_agree_at_every_level) {
     enum { MOST = 34, WIDTH = 264 };
     static const int size[][2] = {{32, 1}, {36, 7}, {100, 33}, {256, 16}, {264, 19}, {34, 9}};
@@ -2054,6 +2055,22 @@ TEST(images_agree_at_every_level) {
                 isogi_sh_project_image(plain, orders[o], channels, image, size[k][0], size[k][1]);
                 instruction_level = BEST_LEVEL;
                 isogi_sh_project_image(c, orders[o], channels, image, size[k][0], size[k][1]);
+                for (int i = 0; i < n; i++) largest = fmax(largest, fabs((double)plain[i]));
+                for (int i = 0; i < n; i++) worst = fmax(worst, fabs((double)c[i] - (double)plain[i]) / largest);
+            }
+    for (int k = 0; k < 3; k++)
+        for (int order = 1; order <= 11; order += order == 5 ? 5 : 1)
+            for (int channels = 1; channels <= 5; channels += 2) {
+                static const int edge[] = {1, 16, 19};
+                const float *face[6];
+                int n = channels * order * order;
+                double largest = 0;
+                for (int f = 0; f < 6; f++) face[f] = image + 1000 * f;
+                for (int i = 0; i < n; i++) c[i] = plain[i] = 7;
+                instruction_level = 0;
+                isogi_sh_project_cube(plain, order, channels, face, edge[k]);
+                instruction_level = BEST_LEVEL;
+                isogi_sh_project_cube(c, order, channels, face, edge[k]);
                 for (int i = 0; i < n; i++) largest = fmax(largest, fabs((double)plain[i]));
                 for (int i = 0; i < n; i++) worst = fmax(worst, fabs((double)c[i] - (double)plain[i]) / largest);
             }
