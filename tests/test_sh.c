@@ -2035,8 +2035,8 @@ static void no_rotation(const float m[9]) {
 }
 
 /* Images whose rows are folded, against plain C, to a float's rounding: one to five channels, widths that fill blocks of columns and that
-   do not, few rows and odd numbers of them, orders on both sides of groups and of the last that goes this way. The same for cubes, whose texels are
-   taken sixteen at a time. */
+   do not, few rows and odd numbers of them, orders on both sides of groups and of the last that goes this way. The same for cubes,
+   whose texels are taken sixteen at a time. */
 TEST(images_agree_at_every_level) {
     enum { MOST = 34, WIDTH = 264 };
     static const int size[][2] = {{32, 1}, {36, 7}, {100, 33}, {256, 16}, {264, 19}, {34, 9}};

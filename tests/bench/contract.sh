@@ -13,7 +13,8 @@ wanted() {
     case $1 in
     sh) echo eval-aos-f32-L4 eval-aos-f32-L10 eval-aos-f32-L20 eval-soa-f32-L4 eval-soa-f32-L10 eval-soa-f32-L20 eval-aos-f64-L4 \
         eval-aos-f64-L10 rotate-once-n3 rotate-once-n4 rotate-once-n5 rotate-once-n8 rotate-once-n16 rotate-build-n8 rotate-build-n16 \
-        rotate-apply-n5 product-n5 product-batch-n5 zonal-n5 sum-n5 project-equirect-n5 \
+        rotate-apply-n5 product-n5 product-batch-n5 product-batch-n3 product-batch-n8 zonal-n5 sum-n5 project-equirect-n5 \
+        project-equirect-n4 project-equirect-n8 \
         light-directional light-disc light-point light-sphere light-rectangle ;;
     vol) for field in ml256 gyroid256; do
             for rays in primary1 primary16 surface anyhit bundle64; do echo $rays-$field; done
