@@ -5945,6 +5945,7 @@ ISOGI_API isogi_result isogi_sh_fit_directional(float direction[3], float rgb[3]
 #undef ISOGI_SH__TOGETHER
 #undef ISOGI_SH__DIM
 #undef ISOGI_SH__TURNS
+#undef ISOGI_SH__FOLDED_ORDER
 #endif /* implementation */
 
 /* ---------------------------------------------------------------------------------------------------------------------

@@ -5628,9 +5628,9 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE int isogi_vol__walk_cells(isogi_vol__walk *w
                                                               uint64_t mask, __m128i corner, isogi_hit *hit) {
     const struct isogi_vol__ways *ways = w->pyramid->ways;
     const __m256d pace = _mm256_load_pd(c->pace);
+    const __m256d base = _mm256_fmadd_pd(_mm256_load_pd(c->lead), _mm256_set1_pd(4), _mm256_cvtepi32_pd(corner));
     /* how far beyond the faces by which it enters the leaf the ray is when it begins; when it passes them; where it then is in the leaf */
-    const __m256d ahead =
-        _mm256_xor_pd(_mm256_sub_pd(_mm256_load_pd(c->start), _mm256_cvtepi32_pd(corner)), _mm256_load_pd(c->sign));
+    const __m256d ahead = _mm256_xor_pd(_mm256_sub_pd(_mm256_load_pd(c->origin), base), _mm256_load_pd(c->sign));
     const __m512i code0 = _mm512_load_si512(leaf->code), code1 = _mm512_load_si512(leaf->code + 64);
     __m256d enter = _mm256_max_pd(_mm256_fnmadd_pd(ahead, pace, _mm256_setzero_pd()), _mm256_setzero_pd());
     const __m512d layer = _mm512_setr_pd(0, 1, 2, 3, 4, 5, 6, 7);
@@ -5642,9 +5642,12 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE int isogi_vol__walk_cells(isogi_vol__walk *w
     begins_at = _mm256_cvtpd_ps(_mm256_fmadd_pd(enter, _mm256_load_pd(c->rate), ahead));
 #pragma GCC unroll 8
     for (a = 0; a < 3; a++) {
-        const __m512d from = _mm512_permutexvar_pd(_mm512_set1_epi64(a), _mm512_castpd256_pd512(ahead));
-        time[a] = _mm512_cvtpd_ps(_mm512_fmsub_pd(_mm512_sub_pd(layer, from), _mm512_set1_pd(c->pace[a]),
-                                                  _mm512_broadcastsd_pd(_mm256_castpd256_pd128(enter))));
+        const __m512d sign = _mm512_set1_pd(c->sign[a]);
+        const __m512d from = _mm512_permutexvar_pd(_mm512_set1_epi64(a), _mm512_castpd256_pd512(base));
+        const __m512d plane = _mm512_add_pd(from, _mm512_xor_pd(layer, sign));
+        const __m512d way = _mm512_xor_pd(_mm512_sub_pd(plane, _mm512_set1_pd(c->origin[a])), sign);
+        time[a] = _mm512_cvtpd_ps(
+            _mm512_fmsub_pd(way, _mm512_set1_pd(c->pace[a]), _mm512_broadcastsd_pd(_mm256_castpd256_pd128(enter))));
         place[a] = _mm256_sub_ps(_mm256_permutevar8x32_ps(_mm256_castps128_ps256(begins_at), _mm256_set1_epi32(a)), number);
         rate[a] = _mm256_set1_ps((float)c->rate[a]);
     }
@@ -6885,7 +6888,8 @@ ISOGI_VOL__AVX512 ISOGI_VOL__NOINLINE static void isogi_vol__run_pool(isogi_vol_
     turn->choosing = turn->ahead[0] = turn->ahead[1] = 0;
     isogi_vol__take_rows_down(b, turn, s, seats & ~open);
     for (;;) {
-        int answered = 0, waits;
+        uint64_t alive = 0;
+        int answered, waits;
         /* rays of a bundle begin with cells to be looked at, so they come in before that stage; others begin with a node */
         if (!b->bundle || open == seats) open = isogi_vol__fill_pool(b, turn, s, seats, open, next, end);
         if (open == seats) return;
@@ -6894,9 +6898,10 @@ ISOGI_VOL__AVX512 ISOGI_VOL__NOINLINE static void isogi_vol__run_pool(isogi_vol_
         if (open && groups > 1 && *next == end && !turn->choosing) open = isogi_vol__close_ranks(s, turn, groups, open);
         for (i = 0; i < groups; i++) {
             const __mmask8 lives = _mm512_cmpge_epi64_mask(_mm512_load_si512(&s->level[8 * i]), _mm512_setzero_si512());
-            answered += __builtin_popcount(lives);
+            alive |= (uint64_t)lives << 8 * i; /* counted below: gcc 12 may read beyond a mask that it has put by */
             if (lives) isogi_vol__answer(turn, s, 8 * i);
         }
+        answered = __builtin_popcountll(alive);
         b->work.blocks += (uint64_t)answered;
         /* the other stages wait for five rays, of eight at most, unless hardly any is to come: rays that wait take a turn off */
         waits = answered < 8 ? 1 : 5;

@@ -235,6 +235,42 @@ TEST(tangent_rays_and_saddles_hit_like_the_reference) {
 
 /* Rays through corners of the lattice: rounding moves them off it by some 1e-16, and what they meet there must not depend on that. One
    voxel has the isovalue, all others are below it: exact rays touch it, from however far they come, alone or together, on every path. */
+/* Beside faces by one or a few roundings, nearly still on the axes across these: the time to a face is far larger than that to the next
+   surface, and lost where it is reckoned from rounded places. One ray at a time, which has ways of its own, against the plain path. */
+TEST(rays_that_hardly_leave_a_face_hit_alike_on_all_paths) {
+    test_random r = {17};
+    long wrong[PATHS] = {0}, hits = 0, rays = 0;
+    for (int turn = 0; turn < (LONG_SUITE ? 4000 : 150); turn++) {
+        scene s = scene_new(2 + (int)(random_bits(&r) % 7), 2 + (int)(random_bits(&r) % 7), 2 + (int)(random_bits(&r) % 7));
+        scene_noise(&s, turn & 1 ? 0 : 8, &r);
+        scene_build(&s);
+        for (int i = 0; i < 400; i++) {
+            isogi_ray ray = {.isovalue = random_range(&r, -0.5, 0.5)};
+            isogi_hit plain, hit;
+            const int across = (int)(random_bits(&r) % 3); /* the axis on which it moves as others do */
+            for (int a = 0; a < 3; a++) {
+                const double slow = pow(10, -random_range(&r, 13, 18));
+                ray.origin[a] = (double)(random_bits(&r) % (uint64_t)s.size[a]) + (double)((int)(random_bits(&r) % 17) - 8) * 2.3e-16;
+                ray.dir[a] = (float)((a == across || !(random_bits(&r) & 3) ? 1 : slow) * random_range(&r, -2, 2));
+            }
+            isogi_vol_intersect(s.pyramid[1], &ray, 1, &plain, NULL);
+            rays++, hits += plain.side != 0;
+            for (int p = 0; p < PATHS; p++) {
+                isogi_vol_intersect(s.pyramid[p], &ray, 1, &hit, NULL);
+                if (hit.side == plain.side && (!hit.side || fabs(hit.t - plain.t) <= 1e-9 * fmax(1, plain.t))) continue;
+                if (!wrong[p]++)
+                    printf("    path %d: side %d at %.17g, plain %d at %.17g; origin %.17g %.17g %.17g dir %.9g %.9g %.9g\n", p, hit.side,
+                           hit.t, plain.side, plain.t, ray.origin[0], ray.origin[1], ray.origin[2], (double)ray.dir[0], (double)ray.dir[1],
+                           (double)ray.dir[2]);
+            }
+        }
+        scene_free(&s);
+    }
+    printf("    %ld rays, %ld hits\n", rays, hits);
+    for (int p = 0; p < PATHS; p++) CHECK(wrong[p] == 0, "path %d differs for %ld of %ld rays", p, wrong[p], rays);
+    CHECK(hits * 4 > rays, "%ld hits in %ld rays: the test says little", hits, rays);
+}
+
 TEST(one_voxel_is_touched_by_every_ray_through_it) {
     enum { N = 9, RAYS = 16 };
     static float data[N * N * N];
