@@ -152,7 +152,8 @@
                 is even, up to 10 % with few samples under a peaky sky or albedo near 1: about as much as light errs there.
                 Instruction paths (isogi_context.force_path) give the same hits and the same bits; but a ray that grazes the surface
                 within rounding, one in 100,000, may be seen either way: light then differs by what that one sample brings.
-                All of this is for IEEE arithmetic: with -ffast-math light is right within its errors, and no bits are promised.
+                All of this is for IEEE arithmetic: with -ffast-math light is right within its errors, and no bits are promised; where
+                the compiler fuses multiply-adds (gcc without -ffp-contract=off on such targets), paths differ by roundings.
    Limits       Order 6; 2^24 samples; 2^31 - 1 texels along an axis (more: ISOGI_TOO_LARGE); paths end after 10000 reflections.
                 White surfaces that enclose a light truly have infinite light: what is computed then is finite and has no meaning;
                 its error says so, and isogi_trace_report.diverges. Under matter (HIGH_SIDE) of albedo above .9 narrow places may err by
