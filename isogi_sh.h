@@ -301,7 +301,8 @@ ISOGI_API isogi_result isogi_sh_window(float *out, const float *in, int order, i
 /* The widest (weakest) window under which no channel is negative anywhere: certainly nothing below -1e-5 of its largest value is left,
    and windows that are wider by steps of 2 % all leave something below -1e-6. width (may be NULL) receives it, at most 1e-5 of it too
    narrow, or 0 where none is needed. It takes 1 to 10 milliseconds a channel at order 8, 5 to 80 at 16, and up to two seconds at 32,
-   longest where a bright light stands in a dark sky. ISOGI_INVALID where a channel's mean is negative. Order 32 at most, else ISOGI_TOO_LARGE. */
+   longest where a bright light stands in a dark sky. ISOGI_INVALID where a channel's mean is negative. Order 32 at most, else
+   ISOGI_TOO_LARGE. */
 ISOGI_API isogi_result isogi_sh_dering(float *out, const float *in, int order, int channels, isogi_sh_window_kind kind, double *width);
 
 /* energy[order]: the sum of squares over each degree and all channels. */
