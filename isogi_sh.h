@@ -3021,7 +3021,7 @@ ISOGI_SH__AVX512 static void isogi_sh__rotate_channels(void *out, const void *in
 #endif
 
 /* Any order, a few channels at a time; float or double alike. */
-static void isogi_sh__rotate(void *out, const void *in, int is_double, int order, int channels, const isogi_sh__euler *e) {
+ISOGI_SH__APART void isogi_sh__rotate(void *out, const void *in, int is_double, int order, int channels, const isogi_sh__euler *e) {
     double band[2 * ISOGI_SH_MAX_ORDER * ISOGI_SH__TOGETHER], other[2 * ISOGI_SH_MAX_ORDER * ISOGI_SH__TOGETHER];
     isogi_sh__turns turns;
     int l = 0, i, k, first;
