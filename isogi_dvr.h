@@ -6223,12 +6223,12 @@ static void isogi_dvr__fast_lamps(const isogi_dvr__frame *f, const isogi_dvr__fa
     for (i = 0; count && i < nearby->light_count; i++) {
         const isogi_light *light = &nearby->lights[i];
         for (k = 0; light->kind == ISOGI_LIGHT_POINT && k < EIGHT; k++) {
-            double far[3], square, inverse;
-            for (a = 0; a < 3; a++) far[a] = (double)light->vector[a] - (double)world[k < count ? k : 0][a];
-            square = isogi_dvr__dot(far, far);
+            double away[3], square, inverse;
+            for (a = 0; a < 3; a++) away[a] = (double)light->vector[a] - (double)world[k < count ? k : 0][a];
+            square = isogi_dvr__dot(away, away);
             factor[k] = square > 1e-30 ? 1 / (4 * ISOGI_DVR__PI * square) : 0;
             inverse = square > 1e-30 ? 1 / sqrt(square) : 0;
-            for (a = 0; a < 3; a++) to[k][a] = square > 1e-30 ? (float)(far[a] * inverse) : (float)(a == 2);
+            for (a = 0; a < 3; a++) to[k][a] = square > 1e-30 ? (float)(away[a] * inverse) : (float)(a == 2);
         }
         if (light->kind == ISOGI_LIGHT_POINT && isogi_sh_eval(y, order, (const float(*)[3])to, EIGHT) != ISOGI_OK) continue;
         for (k = 0; k < count; k++) {
@@ -6692,9 +6692,9 @@ static void isogi_dvr__fast_beside_lamps(const isogi_dvr__frame *f, const isogi_
     for (a = 0; a < 3; a++) grid[a] = (double)r->origin[a] + ((double)run->first + half) * (double)r->dir[a];
     isogi_vol_to_world(f->dvr->desc.pyramid, grid, world);
     for (i = 0; i < f->lamps->nearby.light_count; i++) {
-        double far[3];
-        for (a = 0; a < 3; a++) far[a] = (double)f->lamps->nearby.lights[i].vector[a] - world[a];
-        if (isogi_dvr__dot(far, far) < limit * limit)
+        double away[3];
+        for (a = 0; a < 3; a++) away[a] = (double)f->lamps->nearby.lights[i].vector[a] - world[a];
+        if (isogi_dvr__dot(away, away) < limit * limit)
             for (a = 0; a < run->pieces; a++) run->change[a] = 1e30f;
     }
 }

@@ -384,7 +384,7 @@ static const char apart[] = "--scene --mode --out --size --nan --compare --depth
 
 /* The bytes of the picture; 0 where the words are refused, in one line. */
 static size_t picture_of(const char *mode, const char *words, unsigned char *bytes, size_t most) {
-    char command[1024] = "procedural:torus-sphere-plane:24 --size 32x32 --threads 1 --mode ", *at = command + strlen(command);
+    char command[1024] = "procedural:torus-sphere-plane:24 --size 48x48 --threads 1 --mode ", *at = command + strlen(command);
     run_result r;
     at += sprintf(at, "%s --out '%s' %s ", mode, temporary("option.png"), strstr("lambert phong dvr scale-invariant", mode) ||
         strstr(words, "--samples") ? "" : "--samples 4");
