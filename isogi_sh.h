@@ -1815,7 +1815,7 @@ ISOGI_SH__AVX512 ISOGI_SH__INLINE void isogi_sh__eval_d8_turn(double *y, size_t 
 ISOGI_SH__AVX512 ISOGI_SH__INLINE void isogi_sh__transpose_f16(float *y, size_t n, const isogi_sh__f16 *row, size_t tiles) {
     const float *in = (const float *)row;
     size_t half, k, pitch = 16;
-    for (half = 0; half < 2 * tiles; half++, y += half & 1 ? 8 * n : 16 - 8 * n, in += half & 1 ? 8 : 248) {
+    for (half = 0; half < 2 * tiles; half++, y += half & 1 ? (ptrdiff_t)(8 * n) : 16 - (ptrdiff_t)(8 * n), in += half & 1 ? 8 : 248) {
         isogi_sh__f16 v[2][4];
         ISOGI_SH__UNROLL
         for (k = 0; k < 2; k++) {
