@@ -3644,6 +3644,7 @@ static int isogi_vol__leave_surface(isogi_vol__walk *w, const isogi_vol__cubic *
     int i, found, layer, on_face = 0;
     for (i = 0; i < 8; i++) steepest = isogi_vol__max(steepest, fabs(corner[i]));
     if (axis >= 0 && (length < ISOGI_VOL__ON_SURFACE || reach < 1e-12 * steepest * cubic->scale)) return 0;
+    if (reach < 1e-15 * steepest * cubic->scale) return 0; /* nothing but rounding, up to the end of the ray */
     w->deflate = 0;
     found = isogi_vol__cubic_deflated(cubic, &w->inside, root);
     for (i = 0; i < 3; i++) on_face |= !(from[i] > 0) || !(from[i] < 1);
