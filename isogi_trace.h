@@ -93,9 +93,9 @@
      the sky and reflections bring is read from a plane, fitted to the light of texels up to three away that face the same way and whose
      isosurfaces run close to each other, as far as their noise could explain the difference (with one or two samples, of which none is
      known, all of them); their samples are well spread together. Lights are not filtered, so that their shadows stay sharp
-     (desc.unfiltered: nothing is). Probes cost accuracy: half a per cent of
-     the mean and 1.8 % at a point in narrow channels of albedo 0.8 (test_trace_bake --long prints it). Lazy and adaptive bakes take samples
-     in blocks of 4, 16, 64, ... and every other texel along each axis first: soon every lookup has a value.
+     (desc.unfiltered: nothing is). TRANSFER is not filtered at all, and takes more samples for it. Probes cost accuracy: half a per
+     cent of the mean and 1.8 % at a point in narrow channels of albedo 0.8 (test_trace_bake --long prints it). Lazy and adaptive bakes
+     take samples in blocks of 4, 16, 64, ... and every other texel along each axis first: soon every lookup has a value.
      A hit from within (only through an open border can a ray get there) is a surface too, with its normal turned.
 
    GLSL that lights a surface by an exported irradiance texture (GL_LINEAR, GL_CLAMP_TO_EDGE); grid: voxel coordinates
@@ -258,8 +258,9 @@ typedef struct isogi_trace_desc {
     float error;               /* FEEDBACK: a texel is good enough once its standard error is below this fraction of the light that an
                                   open texel gets, averaged over all orientations, or once more samples would hardly lower it: light
                                   from probes is itself uncertain by 2 %; 0 = every texel gets all its samples */
-    int unfiltered;            /* non-zero: FEEDBACK averages no light over neighbouring texels, to see what that is worth: the same error
-                                  takes four to ten times the samples, where they are few (make bench, rows filter-) */
+    int unfiltered;            /* non-zero: FEEDBACK averages no light over neighbouring texels (as in TRANSFER it never does), to see what
+                                  that is worth: the same error takes four to ten times the samples, where they are few (make bench,
+                                  rows filter-) */
     uint64_t seed;
     float offset;              /* rays start this many voxels along the normal, up to 1 (a wall may be that thin); 0 = 0.25;
                                   negative = on the surface */

@@ -52,7 +52,7 @@ static int parse(program *p, int argc, char **argv) {
             if (!whole_numbers(argv[++i], ',', 6, 0, 65536, x) || !(x[0] < x[3] && x[1] < x[4] && x[2] < x[5]))
                 return file_fail(s->error, "--box: \"%.80s\" is not allowed: six whole numbers, the last three above the first", argv[i]);
             for (int k = 0; k < 3; k++) s->desc.box_first[k] = (size_t)x[k], s->desc.box_end[k] = (size_t)x[k + 3];
-        } else if (!strcmp(argv[i], "--raw") && i + 1 < argc) p->raw = argv[++i];
+        } else if (!strcmp(argv[i], "--raw") && i + 1 < argc && strncmp(argv[i + 1], "--", 2)) p->raw = argv[++i];
         else if (!strcmp(argv[i], "--format") && i + 1 < argc) {
             if (!parse_name(argv[++i], bake_formats, 5, &p->format))
                 return file_fail(s->error, "--format: \"%.80s\" is not allowed", argv[i]);

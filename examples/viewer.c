@@ -370,6 +370,7 @@ static void print_help(void) {
         if (option_list[i].parse == parse_scene) print_option("", option_list[i].allowed);
     }
     puts("  --help                       this text\n\n"
+         "Of an option that is given twice the last one counts, but for those that may be repeated.\n\n"
          "Modes\n"
          "  lambert, phong               light by the normal alone, no shadows: to compare with\n"
          "  vicinity                     a uniform sky of its own, no reflections: how open each place is\n"
@@ -505,7 +506,8 @@ static int parse_arguments(viewer *v, int argc, char **argv) {
             continue;
         }
         if (p->kind == FLAG) memcpy((char *)o + p->offset, &one, sizeof one);
-        else if (i + 1 >= argc) return file_fail(v->error, "%s: needs a value: %s", p->name, p->argument);
+        else if (i + 1 >= argc || (p->kind == TEXT && !strncmp(argv[i + 1], "--", 2))) /* an option is no name of a file */
+            return file_fail(v->error, "%s: needs a value: %s", p->name, p->argument);
         else if (!parse_value(v, p, argv[++i])) return 0;
         if (p->has) memcpy((char *)o + p->has, &one, sizeof one);
         o->given |= (uint64_t)1 << (p - option_list);

@@ -57,6 +57,26 @@ TEST(links_to_files_yet_to_come_are_followed) {
     check_refusal("build/bake", arguments, 1, "is the file of --out");
 }
 
+/* What takes the place of a file may be read and written by the same people; one that may not be written stays. */
+TEST(permissions_of_files_are_kept) {
+    static const unsigned char pixel[3] = {1, 2, 3};
+    static const mode_t modes[3] = {0640, 0604, 0};
+    char arguments[600], error[FILE_ERROR_SIZE], picture[256], strip[256];
+    struct stat status;
+    strcpy(picture, temporary("pixel.png")), strcpy(strip, temporary("permitted.png"));
+    CHECK(png_write(picture, pixel, 1, 1, 3, error), "%s", error);
+    snprintf(arguments, sizeof arguments, "'%s' '%s'", strip, picture);
+    for (int i = 0; i < 3; i++) {
+        write_bytes(strip, "old", 3);
+        CHECK(chmod(strip, modes[i]) == 0, "chmod");
+        run_result r = run_program("build/strip", arguments);
+        int replaced = stat(strip, &status) == 0 && status.st_size != 3, may = modes[i] || geteuid() == 0;
+        CHECK(replaced == may && (r.status == 0) == may && (status.st_mode & 0777) == modes[i], "%03o: status %d, %03o, %s", modes[i],
+              r.status, status.st_mode & 0777, r.error);
+        unlink(strip);
+    }
+}
+
 /* Every refusal leaves the file named as output as it was. */
 static void check_kept(const char *program, const char *format, int status, const char *must_say) {
     char arguments[1024], kept[256], text[64];
@@ -169,7 +189,8 @@ TEST(strips_hold_their_pictures) {
 
 TEST(bad_bakes_get_one_line) {
     static const char *const bad[][2] = {{"", "VOLUME and --out are needed"}, {"--out '%s'", "VOLUME and --out are needed"},
-        {"procedural:gyroid:8 --out", "--out: needs a value"},
+        {"procedural:gyroid:8 --out", "--out: needs a value"}, {"procedural:gyroid:8 --out --both-sides", "--out: needs a value"},
+        {"procedural:gyroid:8 --out '%s' --raw --both-sides", "its value is missing"},
         {"procedural:teapot --out '%s'", "no such volume"}, {"procedural:gyroid:8 --samples 1 --out '%s'", "corrupt"},
         {"procedural:gyroid:8 --samples 0 --out '%s'", "--samples"},
         {"procedural:gyroid:8 --samples nan --out '%s'", "--samples"}, {"procedural:gyroid:8 --lattice 0,0,0 --out '%s'", "--lattice"},

@@ -456,6 +456,7 @@ TEST(few_paths_are_not_rounded_up_in_silence) {
 TEST(silly_options_get_one_line_that_names_the_option) {
     static const char *const bad[][2] = {
         {"", "VOLUME"}, {"procedural:gyroid --nonsense", "--nonsense"}, {"procedural:gyroid --size", "--size"},
+        {"procedural:gyroid --env --stats", "--env: needs a value"}, {"procedural:gyroid --out --raycast", "--out: needs a value"},
         {"procedural:gyroid --size 0x10", "--size"}, {"procedural:gyroid --size 10", "--size"},
         {"procedural:gyroid --size 10x10x10", "--size"},
         {"procedural:gyroid --size 1e9x1e9", "--size"}, {"procedural:gyroid --size 16384x16384", "--size"},

@@ -71,7 +71,7 @@ static inline int bake_scene_option(bake_scene *s, int argc, char **argv, int *i
     int which, k, ok = 1;
     if (!strcmp(argv[*i], "--both-sides")) return d->sides = ISOGI_TRACE_BOTH_SIDES, 1;
     if (!parse_name(argv[*i], names, 13, &which)) return 0;
-    if (*i + 1 >= argc) return file_fail(s->error, "%s: needs a value", argv[*i]), -1;
+    if (*i + 1 >= argc || !strncmp(argv[*i + 1], "--", 2)) return file_fail(s->error, "%s: needs a value", argv[*i]), -1;
     text = argv[++*i];
     switch (which) {
     case 0: s->out = text; break;

@@ -116,7 +116,7 @@ static inline int file_target(const char *path, char target[PATH_MAX], mode_t *m
         return errno == ENOENT ? file_end_of_links(path, target, error) : file_fail(error, "%s: %s", path, strerror(errno));
     if (S_ISDIR(status.st_mode)) return file_fail(error, "%s: is a folder", path);
     *special = !S_ISREG(status.st_mode);
-    *mode = status.st_mode & 0777;
+    *mode = status.st_mode; /* never 0 where there is a file */
     if (!*special && !realpath(path, target)) return file_fail(error, "%s: %s", path, strerror(errno));
     if (strlen(target) + 32 > PATH_MAX) return file_fail(error, "%.100s...: the name is too long", path);
     return 1;
@@ -201,7 +201,7 @@ static inline int file_write(const char *path, const void *data, size_t size, ch
     }
     file = file_temporary(target, name, path, error);
     if (file < 0) return 0;
-    ok = file_write_bytes(file, (const unsigned char *)data, size) && (!mode || fchmod(file, mode) == 0);
+    ok = file_write_bytes(file, (const unsigned char *)data, size) && (!mode || fchmod(file, mode & 0777) == 0);
     ok = close(file) == 0 && ok;
     ok = ok && rename(name, target) == 0;
     if (!ok) {
