@@ -713,7 +713,7 @@ static void set_default_light(viewer *v) {
     static const double diagonal[3] = {1, 1, 1};
     const scene *s = v->o.scene;
     if (s && s->lit && s->uniform_sky) set_sky(v, one, one);
-    else if (s && v->o.mode >= DVR) {
+    else if (s && s->rendered && v->o.mode >= DVR) {
         const float sky[3] = {s->dvr_sky, s->dvr_sky, s->dvr_sky};
         set_sky(v, sky, sky);
         if (s->sun[0] > 0) add_light(v, diagonal, s->sun, 0);
@@ -753,7 +753,7 @@ static int summarize_light(viewer *v) {
 
 static int set_light(viewer *v) {
     const scene *s = v->o.scene;
-    const char *env = v->o.env, *scene_env = s && v->o.mode != VICINITY ? (v->o.mode >= DVR ? s->dvr_env : s->env) : NULL;
+    const char *env = v->o.env, *scene_env = s && v->o.mode != VICINITY ? (v->o.mode >= DVR && s->rendered ? s->dvr_env : s->env) : NULL;
     isogi_env *e = &v->lighting.env;
     int sky = env && !strcmp(env, "sky");
     isogi_result result;

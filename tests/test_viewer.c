@@ -264,6 +264,27 @@ TEST(methods_local_light_and_presets_are_seen) {
     for (int k = 0; k < 9; k++) free(picture[k]);
 }
 
+/* Scenes of isosurfaces have light for volume rendering, too: what is black at any exposure has none. */
+TEST(every_scene_is_lit_in_volume_rendering) {
+    static const char *const scenes[] = {"engine-block", "cavity", "torus-sphere-plane", "cthead"};
+    for (int k = 0; k < (getenv("ISOGI_DATA") ? 4 : 3); k++) {
+        unsigned char *picture[2] = {NULL, NULL};
+        double outliers;
+        int shape[3];
+        for (int i = 0; i < 2; i++) {
+            char command[512];
+            snprintf(command, sizeof command, "--scene %s --mode dvr --preset grey --size 24x24 --exposure %d --order 2 --directions 16 "
+                     "--grid 8,8,8 --out '%s'", scenes[k], 1 + i, temporary("scene.png"));
+            run_result r = run_viewer(command);
+            CHECK(r.status == 0, "%s: %s", command, r.error);
+            picture[i] = read_picture(temporary("scene.png"), shape);
+        }
+        if (picture[0] && picture[1])
+            CHECK(picture_difference(picture[0], picture[1], 24, 24, &outliers) > 4, "%s is as bright at twice the exposure", scenes[k]);
+        free(picture[0]), free(picture[1]);
+    }
+}
+
 /* Lines end as they do anywhere. */
 TEST(transfer_functions_end_their_lines_by_cr_or_lf) {
     static const char *const text[] = {"-1 0 1 .5 .2\n0 .3 1 .5 .2\n# half\n\n1 1 .2 .5 1\n",
