@@ -164,9 +164,15 @@ TEST(several_resolutions_err_as_the_fine_grid_at_the_memory_of_a_coarse_one) {
 /* Vectors of every path read the blocks as the plain code does; so do lights nearby, which are added to it. */
 TEST(every_path_reads_the_blocks) {
     static float image[5][SIDE * SIDE][4];
+    static float voxels[N * N * N];
     field f = field_of(ball, N);
+    isogi_volume single = *isogi_vol_volume(f.pyramid);
+    isogi_pyramid *doubles = f.pyramid;
     const isogi_light lamp = {.kind = ISOGI_LIGHT_POINT, .vector = {400, 900, 300}, .rgb = {3e6f, 3e6f, 3e6f}};
     const isogi_lighting near_by = {.lights = &lamp, .light_count = 1};
+    for (int i = 0; i < N * N * N; i++) voxels[i] = (float)f.value[i]; /* vectors read floats, not doubles */
+    single.data = voxels, single.type = ISOGI_F32, memset(single.stride, 0, sizeof single.stride);
+    CHECK(isogi_vol_build(&f.pyramid, &single, &serial) == ISOGI_OK, "build");
     for (int kind = 0; kind < 3; kind++) { /* a table of light, lights nearby, light scattered forward */
         for (int path = 1; path <= 4; path++) {
             const isogi_context context = {.threads = 1, .force_path = path};
@@ -186,6 +192,7 @@ TEST(every_path_reads_the_blocks) {
               rms_difference(image[0], image[1], SIDE * SIDE));
         isogi_dvr_free(dvr);
     }
+    isogi_vol_free(f.pyramid), f.pyramid = doubles;
     field_free(&f);
 }
 
