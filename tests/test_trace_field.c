@@ -281,6 +281,43 @@ static void nonsense(void *user, const isogi_ray *rays, size_t count, isogi_trac
 static void empty(void *user, const isogi_ray *rays, size_t count, isogi_trace_surface *surfaces) {
     (void)user, (void)rays, (void)count, (void)surfaces;
 }
+/* A ball that glows, from inside: radius 9, at the origin. */
+static void inside_ball(void *user, const isogi_ray *rays, size_t count, isogi_trace_surface *surfaces) {
+    (void)user;
+    for (size_t i = 0; i < count; i++) {
+        const isogi_ray *r = &rays[i];
+        double b = 0, c = -81;
+        for (int k = 0; k < 3; k++) b += r->origin[k] * (double)r->dir[k], c += r->origin[k] * r->origin[k];
+        surfaces[i].t = sqrt(b * b - c) - b;
+        for (int k = 0; k < 3; k++)
+            surfaces[i].normal[k] = (float)((r->origin[k] + surfaces[i].t * (double)r->dir[k]) / 9), surfaces[i].emission[k] = (float)(k + 1);
+    }
+}
+
+/* Closed form: with all reflections pi / (1 - albedo) of what glows. Paths end by chance from the third reflection on; 64 * 1024 of them,
+   four standard errors are 1 % at albedo 0.8. */
+TEST(all_reflections_in_a_ball_that_glows) {
+    float points[64][3], normals[64][3], e[64][3];
+    test_random random = {9};
+    for (int i = 0; i < 64; i++) {
+        double d[3];
+        random_direction(&random, d);
+        for (int k = 0; k < 3; k++) points[i][k] = (float)(9 * d[k]), normals[i][k] = (float)-d[k];
+    }
+    for (int k = 0; k < 3; k++) {
+        static const float albedo[3] = {0, 0.5f, 0.8f};
+        isogi_trace_desc d = {.albedo = {albedo[k], albedo[k], albedo[k]}, .bounces = -1, .samples = 1024, .offset = 1e-3f};
+        double mean[3] = {0, 0, 0}, expected = PI / (1 - (double)albedo[k]);
+        CHECK(isogi_trace_gather_field(&d, inside_ball, NULL, (const float(*)[3])points, (const float(*)[3])normals, 64, e, NULL, NULL) ==
+                  ISOGI_OK, "albedo %g", (double)albedo[k]);
+        for (int i = 0; i < 64; i++)
+            for (int c = 0; c < 3; c++) mean[c] += (double)e[i][c] / 64;
+        for (int c = 0; c < 3; c++)
+            CHECK(fabs(mean[c] - (c + 1) * expected) < 0.01 * (c + 1) * expected, "albedo %g, channel %d: E %.4f, expected %.4f",
+                  (double)albedo[k], c, mean[c], (c + 1) * expected);
+    }
+}
+
 /* One rule for errors: a ball that sees nothing but one sky has the same error from its voxels and as a field, and none is certain. */
 TEST(errors_where_all_samples_agree) {
     double q[4] = {15.5, 15.5, 15.5, 9};
