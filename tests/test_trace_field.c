@@ -289,8 +289,10 @@ static void inside_ball(void *user, const isogi_ray *rays, size_t count, isogi_t
         double b = 0, c = -81;
         for (int k = 0; k < 3; k++) b += r->origin[k] * (double)r->dir[k], c += r->origin[k] * r->origin[k];
         surfaces[i].t = sqrt(b * b - c) - b;
-        for (int k = 0; k < 3; k++)
-            surfaces[i].normal[k] = (float)((r->origin[k] + surfaces[i].t * (double)r->dir[k]) / 9), surfaces[i].emission[k] = (float)(k + 1);
+        for (int k = 0; k < 3; k++) {
+            surfaces[i].normal[k] = (float)((r->origin[k] + surfaces[i].t * (double)r->dir[k]) / 9);
+            surfaces[i].emission[k] = (float)(k + 1);
+        }
     }
 }
 

@@ -237,7 +237,8 @@ TEST(colour_bleeds_from_probes_as_by_paths) {
         for (int bounces = 4; bounces >= 0; bounces -= 4) {
             isogi_trace_desc d = desc_make(&s, 0.8f, bounces, 84);
             isogi_trace *t = NULL;
-            d.method = method ? ISOGI_TRACE_PATHS : ISOGI_TRACE_FEEDBACK, d.lazy = 1, d.material = red_and_green, d.material_user = &colours;
+            d.method = method ? ISOGI_TRACE_PATHS : ISOGI_TRACE_FEEDBACK, d.lazy = 1;
+            d.material = red_and_green, d.material_user = &colours;
             CHECK(isogi_trace_create(&t, &d, NULL) == ISOGI_OK, "create");
             isogi_trace_request(t, (const float(*)[3])points, (size_t)n), isogi_trace_step(t, 0, NULL);
             isogi_trace_sample(t, (const float(*)[3])points, (size_t)n, bounces ? e : direct, NULL);
