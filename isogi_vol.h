@@ -1445,7 +1445,7 @@ enum { ISOGI_VOL__LEAF_LOW = 125, ISOGI_VOL__LEAF_HIGH, ISOGI_VOL__LEAF_CUT }; /
 #define ISOGI_VOL__DOUBT 0.625f /* error of a value made of codes + 0.5, in steps */
 
 /* Five voxels of a row for each of a strip's leaves; eight bytes are written, of which later rows overwrite three. */
-ISOGI_VOL__INLINE void isogi_vol__code_row(const float *row, int leaves, const float *low, const float *scale, uint8_t *const *out,
+ISOGI_VOL__INLINE void isogi_vol__code_row(const float *row, int leaves, const float *low, const float *scale, uint8_t (*out)[128],
                                            int at) {
     int i;
     for (i = 0; i < leaves; i++, row += 4) {
@@ -1467,25 +1467,128 @@ ISOGI_VOL__INLINE void isogi_vol__code_row(const float *row, int leaves, const f
 }
 
 #ifdef ISOGI_VOL__AVX
-/* unit_row and code_row in one, bit by bit the same, for leaves whose vectors end within the row of raw numbers: a compiler that may
-   contract must not join the two. What lies `ahead` bytes on will soon be wanted, too. */
+/* unit_row and code_row in one, bit by bit the same, for a row of at least eight raw numbers: a compiler that may contract must not join
+   the two. What lies `ahead` bytes on will soon be wanted, too. */
 ISOGI_VOL__TARGET("avx2")
-static void isogi_vol__code_eights(const isogi_vol__build_job *job, const float *row, ptrdiff_t ahead, int leaves, const float *low,
-                                   const float *scale, uint8_t *const *out, int at) {
+static void isogi_vol__code_eights(const isogi_vol__build_job *job, const float *row, int count, ptrdiff_t ahead, int leaves,
+                                   const float *low, const float *scale, uint8_t (*out)[128], int at) {
     const __m256 raw_low = _mm256_set1_ps(job->raw_low), raw_scale = _mm256_set1_ps(job->raw_scale);
+    const __m256i lane = _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7);
     int i;
-    for (i = 0; i < leaves; i++, row += 4) {
-        __m256 unit = _mm256_mul_ps(_mm256_sub_ps(_mm256_loadu_ps(row), raw_low), raw_scale);
+    for (i = 0; i < leaves; i++) {
+        const int beyond = 4 * i + 8 - count; /* of the last leaves: voxels after the row, which repeat its last one */
+        __m256 unit;
         __m256i codes;
         __m128i words;
-        _mm_prefetch((const char *)((uintptr_t)row + (uintptr_t)ahead), _MM_HINT_T0);
+        if (beyond <= 0) unit = _mm256_loadu_ps(row + 4 * i);
+        else unit = _mm256_permutevar8x32_ps(_mm256_loadu_ps(row + count - 8), /* not by way of memory: a load after shorter stores waits */
+                                             _mm256_min_epi32(_mm256_add_epi32(lane, _mm256_set1_epi32(beyond)), _mm256_set1_epi32(7)));
+        unit = _mm256_mul_ps(_mm256_sub_ps(unit, raw_low), raw_scale);
+        _mm_prefetch((const char *)((uintptr_t)(row + 4 * i) + (uintptr_t)ahead), _MM_HINT_T0);
         __asm__("" : "+x"(unit));
         codes = _mm256_cvttps_epi32(_mm256_mul_ps(_mm256_sub_ps(unit, _mm256_broadcast_ss(low + i)), _mm256_broadcast_ss(scale + i)));
         words = _mm_packs_epi32(_mm256_castsi256_si128(codes), _mm256_extracti128_si256(codes, 1));
         _mm_storel_epi64((__m128i *)(void *)(out[i] + at), _mm_packus_epi16(words, words));
     }
 }
+
+#ifndef __clang__
+#pragma GCC diagnostic push
+#pragma GCC diagnostic ignored "-Wmaybe-uninitialized" /* gcc 12 says so of its own undefined vectors */
+#pragma GCC diagnostic ignored "-Wuninitialized"
+#pragma GCC diagnostic ignored "-Wsign-conversion" /* and of masks in its own macros, at -O0 */
 #endif
+/* Sixteen numbers of a row of `count` from number `at` on; its last one is repeated. */
+ISOGI_VOL__AVX512 ISOGI_VOL__INLINE __m512 isogi_vol__row_from(const float *row, int at, int count) {
+    const __m512i lane = _mm512_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
+    const int beyond = at + 16 - count;
+    if (beyond <= 0) return _mm512_loadu_ps(row + at);
+    return _mm512_permutexvar_ps(_mm512_min_epi32(_mm512_add_epi32(lane, _mm512_set1_epi32(beyond)), _mm512_set1_epi32(15)),
+                                 _mm512_loadu_ps(row + count - 16));
+}
+
+/* The same for five rows at a time, of at least sixteen numbers: the 25 voxels of one z of four leaves, one leaf in each quarter of a
+   vector. A row gives a leaf four voxels; its fifth ones are the first ones of the next leaf, four rows of which make one vector. */
+ISOGI_VOL__AVX512
+static void isogi_vol__code_sixteens(const isogi_vol__build_job *job, const float *const *row, int count, ptrdiff_t ahead, int leaves,
+                                     const float *low, const float *scale, uint8_t (*out)[128], int at) {
+    /* 5 voxels of each row: bytes of the first vector below are 0, of the second one 64 and on */
+    static const uint8_t order[32] = {0,  1,  2,  3,  68, 4,  5,  6,  7,  69, 8,  9,  10, 11, 70, 12,
+                                      13, 14, 15, 71, 64, 65, 66, 67, 72, 0,  0,  0,  0,  0,  0,  0};
+    const __m512i quarter = _mm512_setr_epi32(0, 0, 0, 0, 1, 1, 1, 1, 2, 2, 2, 2, 3, 3, 3, 3);
+    const __m512i leaf0 = _mm512_broadcast_i64x4(_mm256_loadu_si256((const __m256i *)(const void *)order));
+    const __m512i from01 = _mm512_mask_add_epi8(leaf0, 0xffffffff00000000u, leaf0, _mm512_set1_epi8(16)),
+                  from23 = _mm512_add_epi8(from01, _mm512_set1_epi8(32));
+    const __m512 raw_low = _mm512_set1_ps(job->raw_low), raw_scale = _mm512_set1_ps(job->raw_scale);
+    int i, y;
+    for (i = 0; i < leaves; i += 4) {
+        const __m512 least = _mm512_permutexvar_ps(quarter, _mm512_castps128_ps512(_mm_loadu_ps(low + i))),
+                     steps = _mm512_permutexvar_ps(quarter, _mm512_castps128_ps512(_mm_loadu_ps(scale + i)));
+        __m512 x[7], next[5];
+        __m512i code[7], rows, rest;
+#pragma GCC unroll 5
+        for (y = 0; y < 5; y++) {
+            x[y] = isogi_vol__row_from(row[y], 4 * i, count);
+            _mm_prefetch((const char *)((uintptr_t)(row[y] + 4 * i) + (uintptr_t)ahead), _MM_HINT_T0);
+        }
+#pragma GCC unroll 5
+        for (y = 0; y < 5; y++) next[y] = isogi_vol__row_from(row[y], 4 * i + 4, count);
+        x[5] = _mm512_castpd_ps(_mm512_unpacklo_pd(_mm512_castps_pd(_mm512_unpacklo_ps(next[0], next[1])),
+                                                   _mm512_castps_pd(_mm512_unpacklo_ps(next[2], next[3]))));
+        x[6] = next[4];
+#pragma GCC unroll 7
+        for (y = 0; y < 7; y++) {
+            __m512 unit = _mm512_mul_ps(_mm512_sub_ps(x[y], raw_low), raw_scale);
+            __asm__("" : "+v"(unit));
+            code[y] = _mm512_cvttps_epi32(_mm512_mul_ps(_mm512_sub_ps(unit, least), steps));
+        }
+        rows = _mm512_packus_epi16(_mm512_packs_epi32(code[0], code[1]), _mm512_packs_epi32(code[2], code[3]));
+        rest = _mm512_packus_epi16(_mm512_packs_epi32(code[4], code[5]), _mm512_packs_epi32(code[6], code[6]));
+        code[0] = _mm512_permutex2var_epi8(rows, from01, rest), code[1] = _mm512_permutex2var_epi8(rows, from23, rest);
+        _mm256_mask_storeu_epi32(out[i] + at, 0x7f, _mm512_castsi512_si256(code[0])); /* 28 bytes: the last ones end with the leaf */
+        _mm256_mask_storeu_epi32(out[i + 1] + at, 0x7f, _mm512_extracti64x4_epi64(code[0], 1));
+        _mm256_mask_storeu_epi32(out[i + 2] + at, 0x7f, _mm512_castsi512_si256(code[1]));
+        _mm256_mask_storeu_epi32(out[i + 3] + at, 0x7f, _mm512_extracti64x4_epi64(code[1], 1));
+    }
+}
+#ifndef __clang__
+#pragma GCC diagnostic pop
+#endif
+#endif
+
+/* The voxels of a strip of leaves. */
+static void isogi_vol__code_strip(const isogi_vol__build_job *job, size_t x0, int count, size_t by, size_t bz, int leaves,
+                                  const float *low, const float *scale, uint8_t (*leaf)[128]) {
+    const isogi_pyramid *p = job->pyramid;
+    const isogi_volume *v = &p->volume;
+    float row[5][ISOGI_VOL__STRIP_VOXELS];
+    int y, z;
+    for (z = 0; z < 5; z++) {
+        const size_t at_z = isogi_vol__min_size(4 * bz + (size_t)z, v->size[2] - 1);
+        size_t at_y[5];
+        for (y = 0; y < 5; y++) at_y[y] = isogi_vol__min_size(4 * by + (size_t)y, v->size[1] - 1);
+#ifdef ISOGI_VOL__AVX
+        if (p->path == ISOGI_VOL__PATH_AVX512 && v->type != ISOGI_F64 && count >= 16) {
+            const float *from[5];
+            const ptrdiff_t ahead = z < 4 ? v->stride[2] : 4 * v->stride[1] - 4 * v->stride[2]; /* next to be read */
+            for (y = 0; y < 5; y++) from[y] = isogi_vol__raw_row(p, x0, at_y[y], at_z, count, row[y]);
+            isogi_vol__code_sixteens(job, from, count, from[0] == row[0] ? 0 : ahead, leaves, low, scale, leaf, 25 * z);
+            continue;
+        }
+        if (p->path >= ISOGI_VOL__PATH_AVX2 && v->type != ISOGI_F64 && count >= 8) {
+            for (y = 0; y < 5; y++) {
+                const float *from = isogi_vol__raw_row(p, x0, at_y[y], at_z, count, row[0]);
+                isogi_vol__code_eights(job, from, count, from == row[0] ? 0 : 2 * v->stride[1], leaves, low, scale, leaf, 5 * y + 25 * z);
+            }
+            continue;
+        }
+#endif
+        for (y = 0; y < 5; y++) {
+            isogi_vol__unit_row(job, x0, at_y[y], at_z, count, row[0]);
+            isogi_vol__code_row(row[0], leaves, low, scale, leaf, 5 * y + 25 * z);
+        }
+    }
+}
 
 /* One row of leaves, a strip of it; `end`: cells along x up to which the job goes. */
 static void isogi_vol__build_strip(const isogi_vol__build_job *job, size_t x0, size_t end, size_t by, size_t bz) {
@@ -1493,39 +1596,26 @@ static void isogi_vol__build_strip(const isogi_vol__build_job *job, size_t x0, s
     const isogi_level *level = &p->level[0];
     const size_t rest = end + 1 - x0;
     const int count = rest < ISOGI_VOL__STRIP + 1 ? (int)rest : ISOGI_VOL__STRIP + 1, leaves = (count - 1 + 3) / 4;
-    float row[ISOGI_VOL__STRIP_VOXELS], low[ISOGI_VOL__STRIP / 4], scale[ISOGI_VOL__STRIP / 4];
-    uint8_t *out[ISOGI_VOL__STRIP / 4], bound[ISOGI_VOL__STRIP / 4][2];
-    int i, y, z, a;
+    float low[ISOGI_VOL__STRIP / 4], scale[ISOGI_VOL__STRIP / 4];
+    uint8_t leaf[ISOGI_VOL__STRIP / 4][128], bound[ISOGI_VOL__STRIP / 4][2];
+    int i, a;
+    for (i = leaves; i & 3; i++) low[i] = scale[i] = 0; /* vectors hold four leaves */
     for (i = 0; i < leaves; i++) {
         const size_t bx = x0 / 4 + (size_t)i;
         const float *range = level->range[bx + level->size[0] * (by + level->size[1] * bz)];
-        out[i] = p->nodes[isogi_vol__node_at(p, 0, bx, by, bz)];
         bound[i][0] = (uint8_t)isogi_vol__quantise(p, (double)range[0]), bound[i][1] = (uint8_t)isogi_vol__quantise(p, (double)range[1]);
         low[i] = (float)bound[i][0], scale[i] = ISOGI_VOL__CODES / (float)(bound[i][1] + 1 - bound[i][0]);
     }
-    for (z = 0; z < 5; z++)
-        for (y = 0; y < 5; y++) {
-            const size_t at_y = isogi_vol__min_size(4 * by + (size_t)y, p->volume.size[1] - 1),
-                         at_z = isogi_vol__min_size(4 * bz + (size_t)z, p->volume.size[2] - 1);
-            int done = 0;
-#ifdef ISOGI_VOL__AVX
-            if (p->path >= ISOGI_VOL__PATH_AVX2 && p->volume.type != ISOGI_F64) {
-                const float *from = isogi_vol__raw_row(p, x0, at_y, at_z, count, row);
-                done = (count - 4) / 4;
-                isogi_vol__code_eights(job, from, from == row ? 0 : 2 * p->volume.stride[1], done, low, scale, out, 5 * y + 25 * z);
-            }
-#endif
-            isogi_vol__unit_row(job, x0 + 4 * (size_t)done, at_y, at_z, count - 4 * done, row);
-            isogi_vol__code_row(row, leaves - done, low + done, scale + done, out + done, 5 * y + 25 * z);
-        }
+    isogi_vol__code_strip(job, x0, count, by, bz, leaves, low, scale, leaf);
     for (i = 0; i < leaves; i++) {
         size_t block[3];
         block[0] = x0 / 4 + (size_t)i, block[1] = by, block[2] = bz;
-        out[i][ISOGI_VOL__LEAF_LOW] = bound[i][0], out[i][ISOGI_VOL__LEAF_HIGH] = bound[i][1], out[i][ISOGI_VOL__LEAF_CUT] = 0;
+        leaf[i][ISOGI_VOL__LEAF_LOW] = bound[i][0], leaf[i][ISOGI_VOL__LEAF_HIGH] = bound[i][1], leaf[i][ISOGI_VOL__LEAF_CUT] = 0;
         for (a = 0; a < 3; a++) {
             const size_t cells = (size_t)p->cells[a] - 4 * block[a];
-            out[i][ISOGI_VOL__LEAF_CUT] |= (uint8_t)((cells < 4 ? 4 - cells : 0) << 2 * a);
+            leaf[i][ISOGI_VOL__LEAF_CUT] |= (uint8_t)((cells < 4 ? 4 - cells : 0) << 2 * a);
         }
+        memcpy(p->nodes[isogi_vol__node_at(p, 0, block[0], by, bz)], leaf[i], sizeof leaf[i]);
     }
 }
 
