@@ -4585,8 +4585,9 @@ static int isogi_vol__walk_fast(isogi_vol__walk *w, const isogi_vol__ticks *k, i
      all on the side on which the ray is, and done with.
    - Cells that are not, in double from the volume's own voxels, by the very code that a ray alone runs: what is found, and all its
      bits, do not depend on the stage before.
-   What a ray needs next is sent for at the end of a turn: while the others have theirs it arrives, in the second cache. The first one
-   waits for so few lines at a time that a turn which sends for more would wait itself. */
+   What a ray needs next is sent for before the others have their turns, and arrives meanwhile. A processor waits for so few lines at a
+   time that all of them at once would hold it up: half of the nodes are sent for at the end of a turn, the others one group after the
+   other while the first ones are answered. */
 #ifdef ISOGI_VOL__AVX
 #ifndef __clang__
 #pragma GCC diagnostic push
@@ -4896,7 +4897,7 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE void isogi_vol__answer(isogi_vol__turn *turn
     turn->leaves += __builtin_popcount(cells);
 }
 
-/* Takes the next child of the lowest level that has any, and sends for it; returns the rays that have none left. */
+/* Takes the next child of the lowest level that has any; returns the rays that have none left. */
 ISOGI_VOL__AVX512 ISOGI_VOL__INLINE unsigned isogi_vol__choose(const isogi_vol__turn *turn, isogi_vol__pool *s, int i, __mmask8 choosing) {
     const __m512i one = _mm512_set1_epi64(1);
     __m512i pending = _mm512_load_si512(&s->pending[i]), mask = _mm512_setzero_si512(), cell = _mm512_load_si512(&s->cell[i]);
@@ -4935,12 +4936,16 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE unsigned isogi_vol__choose(const isogi_vol__
     _mm512_mask_store_epi64(&s->level[i], some, _mm512_sub_epi64(n, one));
     /* whole, so that it can be read at once */
     _mm512_store_si512(&s->address[i], _mm512_mask_mov_epi64(_mm512_load_si512(&s->address[i]), some, address));
-#pragma GCC unroll 8
+    return (unsigned)(choosing & ~some);
+}
+
+/* Sends for the nodes of the rays from slot i on, with no haste: a loop takes less time here than its rounds one after the other. */
+ISOGI_VOL__INLINE void isogi_vol__send_for_nodes(const isogi_vol__pool *s, int i) {
+    int k;
     for (k = 0; k < 8; k++) {
         const char *node = (const char *)(uintptr_t)s->address[i + k];
-        _mm_prefetch(node, _MM_HINT_T1), _mm_prefetch(node + 64, _MM_HINT_T1);
+        _mm_prefetch(node, _MM_HINT_T0), _mm_prefetch(node + 64, _MM_HINT_T0);
     }
-    return (unsigned)(choosing & ~some);
 }
 
 /* Places of eight slots in a pool's first row, and eight numbers from there by plain loads, which take half the time of a gather on
@@ -6522,15 +6527,19 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE void isogi_vol__take_down(isogi_vol__batch *
     isogi_vol__descend8(turn, s, seats, row, lanes, (const double(*)[8])per, end, flip);
 }
 
-/* Sends for rays that come after the next ones, and for where the hits of these will be written; soon: they are needed at once. */
-ISOGI_VOL__INLINE void isogi_vol__send_for_rays(const char *from, size_t element, char *hits, int soon) {
+/* Sends for rays that come after the next ones; soon: they are needed at once. */
+ISOGI_VOL__INLINE void isogi_vol__send_for_rays(const char *from, size_t element, int soon) {
     size_t k;
 #pragma GCC unroll 8
     for (k = 0; k < 8; k++) {
         if (soon) __builtin_prefetch((const void *)((uintptr_t)from + (16 + k) * element), 0);
         else __builtin_prefetch((const void *)((uintptr_t)from + (16 + k) * element), 0, 2);
     }
-    if (!hits) return;
+}
+
+/* Sends for where the hits of the next rays will be written: stores wait for each other, so that one without its line holds all up. */
+ISOGI_VOL__INLINE void isogi_vol__send_for_hits(const isogi_hit *hits, int soon) {
+    size_t k;
 #pragma GCC unroll 6
     for (k = 0; k < 6; k++) {
         if (soon) __builtin_prefetch((const void *)((uintptr_t)hits + 64 * k), 1);
@@ -6569,7 +6578,8 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE unsigned isogi_vol__seat_some(isogi_vol__bat
         const size_t ray = k < count ? (size_t)k : 0;
         at[k] = from + (b->bundle ? 0 : ray * element), dir_at[k] = to + ray * dir_bytes;
     }
-    if (!b->bundle) isogi_vol__send_for_rays(from, element, b->hits ? (char *)(b->hits + first) : NULL, !turn);
+    if (!b->bundle) isogi_vol__send_for_rays(from, element, !turn);
+    if (b->hits) isogi_vol__send_for_hits(b->hits + first, !turn);
     if (b->rays) {
         __m512d relative[3];
 #pragma GCC unroll 8
@@ -6975,7 +6985,7 @@ ISOGI_VOL__AVX512 static void isogi_vol__take_rows_down(isogi_vol__batch *b, iso
 ISOGI_VOL__AVX512 ISOGI_VOL__NOINLINE static void isogi_vol__run_pool(isogi_vol__batch *b, isogi_vol__turn *turn, isogi_vol__pool *s,
                                                                       int groups, uint64_t open, size_t *next, size_t end) {
     const uint64_t seats = ~(uint64_t)0 >> (64 - 8 * groups);
-    int i, share = b->bundle && b->bundle_count == 1;
+    int i, half = (groups + 1) / 2, share = b->bundle && b->bundle_count == 1;
     turn->choosing = turn->ahead[0] = turn->ahead[1] = 0;
     isogi_vol__take_rows_down(b, turn, s, seats & ~open);
     for (;;) {
@@ -6990,6 +7000,7 @@ ISOGI_VOL__AVX512 ISOGI_VOL__NOINLINE static void isogi_vol__run_pool(isogi_vol_
         for (i = 0; i < groups; i++) {
             const __mmask8 lives = _mm512_cmpge_epi64_mask(_mm512_load_si512(&s->level[8 * i]), _mm512_setzero_si512());
             alive |= (uint64_t)lives << 8 * i; /* counted below: gcc 12 may read beyond a mask that it has put by */
+            if (i + half < groups) isogi_vol__send_for_nodes(s, 8 * (i + half));
             if (lives) isogi_vol__answer(turn, s, 8 * i);
         }
         answered = __builtin_popcountll(alive);
@@ -7006,6 +7017,7 @@ ISOGI_VOL__AVX512 ISOGI_VOL__NOINLINE static void isogi_vol__run_pool(isogi_vol_
                 b->occluded[s->ray[slot]] = 1, open |= (uint64_t)1 << slot, choosing ^= crossing & (0u - crossing);
             }
             done = choosing ? isogi_vol__choose(turn, s, 8 * i, (__mmask8)choosing) : 0;
+            if (choosing && i < half) isogi_vol__send_for_nodes(s, 8 * i);
             open |= (uint64_t)done << 8 * i;
             for (; done; done &= done - 1) {
                 const uint64_t ray = s->ray[8 * i + __builtin_ctz(done)];
