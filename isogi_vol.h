@@ -5662,24 +5662,6 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE void isogi_vol__unlock_leaf(const struct iso
     leaf->code = node, leaf->isovalue = x - 0.5f;
 }
 
-/* The same for the cells of a leaf, with those beyond the volume; voxel: its bytes in the ray's order. */
-ISOGI_VOL__AVX512 ISOGI_VOL__INLINE uint64_t isogi_vol__held_cells(const struct isogi_vol__ways *ways, int octant, isogi_vol__leaf *leaf,
-                                                                   const uint8_t *node, float level, __m512i voxel[2]) {
-    const uint64_t low_rows = 0xf7bc0f7bde07bdefu, high_rows = 0x3def781eu; /* bits x + 5y + 25z of cells */
-    const __m512i code0 = _mm512_load_si512(node), code1 = _mm512_load_si512(node + 64);
-    const __m512i low = _mm512_permutex2var_epi8(code0, _mm512_load_si512(ways->voxel[octant]), code1);
-    const __m512i high = _mm512_permutex2var_epi8(code0, _mm512_load_si512(ways->voxel[octant] + 64), code1);
-    __m512i inside, outside;
-    uint64_t in_low, in_high, out_low, out_high;
-    isogi_vol__unlock_leaf(ways, leaf, node, level, &inside, &outside);
-    in_low = _mm512_cmpge_epu8_mask(low, inside), in_high = _mm512_cmpge_epu8_mask(high, inside);
-    out_low = _mm512_cmplt_epu8_mask(low, outside), out_high = _mm512_cmplt_epu8_mask(high, outside);
-    voxel[0] = low, voxel[1] = high;
-    isogi_vol__all_corners(&in_low, &in_high);
-    isogi_vol__all_corners(&out_low, &out_high);
-    return ~(_pext_u64(in_low | out_low, low_rows) | _pext_u64(in_high | out_high, high_rows) << 44);
-}
-
 /* Without the cells of a leaf that lie beyond the volume; they are counted backwards along the axes of `octant`. */
 static uint64_t isogi_vol__cut_order(const isogi_vol__leaf *leaf, int octant, uint64_t mask) {
     const int cut = leaf->code[ISOGI_VOL__LEAF_CUT], x = cut & 3, y = cut >> 2 & 3, z = cut >> 4;
@@ -5826,6 +5808,14 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE uint64_t isogi_vol__split_cells(const struct
     isogi_vol__unlock_leaf(ways, leaf, node, level, &inside, &outside);
     mask = _mm512_mask_cmpge_epu8_mask(_mm512_cmplt_epu8_mask(least, inside), most, outside);
     return ISOGI_VOL__UNLIKELY(node[ISOGI_VOL__LEAF_CUT]) ? isogi_vol__cut_order(leaf, octant, mask) : mask;
+}
+
+/* The voxels of a leaf in the ray's order. */
+ISOGI_VOL__AVX512 ISOGI_VOL__INLINE void isogi_vol__order_voxels(const struct isogi_vol__ways *ways, int octant, const uint8_t *node,
+                                                                 __m512i voxel[2]) {
+    const __m512i code0 = _mm512_load_si512(node), code1 = _mm512_load_si512(node + 64);
+    voxel[0] = _mm512_permutex2var_epi8(code0, _mm512_load_si512(ways->voxel[octant]), code1);
+    voxel[1] = _mm512_permutex2var_epi8(code0, _mm512_load_si512(ways->voxel[octant] + 64), code1);
 }
 
 /* The voxels of a cell will soon be wanted. */
@@ -6056,26 +6046,26 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE void isogi_vol__open_cells(isogi_vol__layers
 /* A layer's number comes from memory, which spreads it in passing. */
 static const float isogi_vol__layer_numbers[5] = {0, 1, 2, 3, 4};
 
-ISOGI_VOL__AVX512 ISOGI_VOL__INLINE __m512 isogi_vol__enter16(const isogi_vol__layers *l, int axis, int layer) {
+ISOGI_VOL__AVX512 ISOGI_VOL__INLINE __m512 isogi_vol__enter16(const isogi_vol__layers *l, int axis, size_t layer) {
     return _mm512_fmsub_ps(_mm512_set1_ps(isogi_vol__layer_numbers[layer]), l->per[axis], l->first[axis]);
 }
 
-ISOGI_VOL__AVX512 ISOGI_VOL__INLINE __m512 isogi_vol__leave16(const isogi_vol__layers *l, int axis, int layer) {
+ISOGI_VOL__AVX512 ISOGI_VOL__INLINE __m512 isogi_vol__leave16(const isogi_vol__layers *l, int axis, size_t layer) {
     return _mm512_fmsub_ps(_mm512_set1_ps(isogi_vol__layer_numbers[layer + 1]), l->per[axis], l->last[axis]);
 }
 
 /* When the rays enter a cell, and when they leave it. */
-ISOGI_VOL__AVX512 ISOGI_VOL__INLINE __m512 isogi_vol__enter_child(const isogi_vol__layers *l, int child) {
-    return _mm512_max_ps(_mm512_max_ps(isogi_vol__enter16(l, 0, child & 3), _mm512_setzero_ps()),
-                         _mm512_max_ps(isogi_vol__enter16(l, 1, child >> 2 & 3), isogi_vol__enter16(l, 2, child >> 4)));
+ISOGI_VOL__AVX512 ISOGI_VOL__INLINE __m512 isogi_vol__enter_child(const isogi_vol__layers *l, const size_t at[3]) {
+    return _mm512_max_ps(_mm512_max_ps(isogi_vol__enter16(l, 0, at[0]), _mm512_setzero_ps()),
+                         _mm512_max_ps(isogi_vol__enter16(l, 1, at[1]), isogi_vol__enter16(l, 2, at[2])));
 }
 
-ISOGI_VOL__AVX512 ISOGI_VOL__INLINE __m512 isogi_vol__leave_child(const isogi_vol__layers *l, int child) {
-    return _mm512_min_ps(_mm512_min_ps(isogi_vol__leave16(l, 0, child & 3), l->stop),
-                         _mm512_min_ps(isogi_vol__leave16(l, 1, child >> 2 & 3), isogi_vol__leave16(l, 2, child >> 4)));
+ISOGI_VOL__AVX512 ISOGI_VOL__INLINE __m512 isogi_vol__leave_child(const isogi_vol__layers *l, const size_t at[3]) {
+    return _mm512_min_ps(_mm512_min_ps(isogi_vol__leave16(l, 0, at[0]), l->stop),
+                         _mm512_min_ps(isogi_vol__leave16(l, 1, at[1]), isogi_vol__leave16(l, 2, at[2])));
 }
 
-/* Cells of a leaf, for isovalue `step`: for which rays it is certain that they stay on one side. Like sides8, for one cell and many rays.
+/* Cells of a leaf: for which rays it is certain that they stay on one side. Like sides8, for one cell and many rays.
    */
 ISOGI_VOL__AVX512 ISOGI_VOL__INLINE __m512 isogi_vol__mix16(__m512 a, __m512 b, __m512 u) {
     return _mm512_fmadd_ps(u, _mm512_sub_ps(b, a), a);
@@ -6084,13 +6074,13 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE __m512 isogi_vol__mix16(__m512 a, __m512 b, 
 typedef struct isogi_vol__sides16 { unsigned in, out, in0, out0, in1, out1; } isogi_vol__sides16;
 
 ISOGI_VOL__AVX512 ISOGI_VOL__INLINE void isogi_vol__look16(isogi_vol__sides16 *sides, const __m512 place[3], const __m512 dir[3],
-                                                           __m512 enter, __m512 leave, int child, const __m512i voxel[2], float step) {
+                                                           __m512 enter, __m512 leave, const size_t at[3], uint8_t lowest,
+                                                           const __m512i voxel[2], const float bound[4]) {
     static const uint8_t corners[16] = {0, 1, 5, 6, 25, 26, 30, 31};
     const __m512 zero = _mm512_setzero_ps(), one = _mm512_set1_ps(1);
-    const __m512 low = _mm512_set1_ps(step - ISOGI_VOL__DOUBT), high = _mm512_set1_ps(step + ISOGI_VOL__DOUBT);
-    const __m512 third_low = _mm512_mul_ps(low, _mm512_set1_ps(3)), third_high = _mm512_mul_ps(high, _mm512_set1_ps(3));
-    const int x = child & 3, y = child >> 2 & 3, z = child >> 4;
-    const __m128i index = _mm_add_epi8(_mm_loadu_si128((const __m128i *)(const void *)corners), _mm_set1_epi8((char)(x + 5 * y + 25 * z)));
+    const __m512 low = _mm512_set1_ps(bound[0]), high = _mm512_set1_ps(bound[1]);
+    const __m512 low3 = _mm512_set1_ps(bound[2]), high3 = _mm512_set1_ps(bound[3]);
+    const __m128i index = _mm_add_epi8(_mm_loadu_si128((const __m128i *)(const void *)corners), _mm_set1_epi8((char)lowest));
     __attribute__((aligned(32))) float corner[8];
     __m512 from[3], to[3], c[2][4], f[2][2][2], sum1, sum2;
     int k, e;
@@ -6098,7 +6088,7 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE void isogi_vol__look16(isogi_vol__sides16 *s
                                 _mm512_castsi512_si128(_mm512_permutex2var_epi8(voxel[0], _mm512_castsi128_si512(index), voxel[1])))));
 #pragma GCC unroll 3
     for (k = 0; k < 3; k++) {
-        const __m512 base = _mm512_sub_ps(place[k], _mm512_set1_ps((float)(k == 0 ? x : k == 1 ? y : z)));
+        const __m512 base = _mm512_sub_ps(place[k], _mm512_set1_ps(isogi_vol__layer_numbers[at[k]]));
         from[k] = _mm512_min_ps(_mm512_max_ps(_mm512_fmadd_ps(enter, dir[k], base), zero), one);
         to[k] = _mm512_min_ps(_mm512_max_ps(_mm512_fmadd_ps(leave, dir[k], base), zero), one);
     }
@@ -6118,8 +6108,8 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE void isogi_vol__look16(isogi_vol__sides16 *s
     sum2 = _mm512_add_ps(f[0][1][1], _mm512_add_ps(f[1][0][1], f[1][1][0]));
     sides->in0 = _mm512_cmp_ps_mask(f[0][0][0], high, _CMP_GT_OQ), sides->out0 = _mm512_cmp_ps_mask(f[0][0][0], low, _CMP_LT_OQ);
     sides->in1 = _mm512_cmp_ps_mask(f[1][1][1], high, _CMP_GT_OQ), sides->out1 = _mm512_cmp_ps_mask(f[1][1][1], low, _CMP_LT_OQ);
-    sides->in = sides->in0 & sides->in1 & _mm512_cmp_ps_mask(_mm512_min_ps(sum1, sum2), third_high, _CMP_GT_OQ);
-    sides->out = sides->out0 & sides->out1 & _mm512_cmp_ps_mask(_mm512_max_ps(sum1, sum2), third_low, _CMP_LT_OQ);
+    sides->in = sides->in0 & sides->in1 & _mm512_cmp_ps_mask(_mm512_min_ps(sum1, sum2), high3, _CMP_GT_OQ);
+    sides->out = sides->out0 & sides->out1 & _mm512_cmp_ps_mask(_mm512_max_ps(sum1, sum2), low3, _CMP_LT_OQ);
 }
 
 /* Rays in doubt, each of its slot's cell: those that pass it are decided in double. Returns hits; in, known: the sides on which rays are;
@@ -6195,17 +6185,20 @@ ISOGI_VOL__AVX512 static int isogi_vol__coincide(const isogi_vol__pool *s, unsig
     for (h = 0; h < 2; h++) {
         const __m512d isovalue = _mm512_sub_pd(_mm512_load_pd(&s->isovalue[8 * h]), _mm512_set1_pd(s->isovalue[first]));
         const __mmask8 here = (__mmask8)(rays >> 8 * h);
-        __mmask8 off = _mm512_mask_cmp_pd_mask(here, isovalue, _mm512_setzero_pd(), _CMP_NEQ_UQ);
-        off |= _mm512_mask_cmpneq_epi64_mask(here, _mm512_load_si512(&s->flip[8 * h]), _mm512_set1_epi64(s->flip[first]));
+        __m512d turned = _mm512_setzero_pd(), apart = turned;
+        __mmask8 off;
+#pragma GCC unroll 3
         for (a = 0; a < 3; a++) {
-            off |= _mm512_mask_cmp_pd_mask(
-                here, _mm512_abs_pd(_mm512_sub_pd(_mm512_load_pd(&s->dir[a][8 * h]), _mm512_set1_pd(s->dir[a][first]))),
-                _mm512_set1_pd(0.06 * most), _CMP_GT_OQ);
-            off |= _mm512_mask_cmp_pd_mask(
-                here, _mm512_abs_pd(_mm512_sub_pd(_mm512_load_pd(&s->origin[a][8 * h]), _mm512_set1_pd(s->origin[a][first]))),
-                _mm512_set1_pd(8), _CMP_GT_OQ);
+            turned = _mm512_max_pd(
+                turned, _mm512_abs_pd(_mm512_sub_pd(_mm512_load_pd(&s->dir[a][8 * h]), _mm512_set1_pd(s->dir[a][first]))));
+            apart = _mm512_max_pd(
+                apart, _mm512_abs_pd(_mm512_sub_pd(_mm512_load_pd(&s->origin[a][8 * h]), _mm512_set1_pd(s->origin[a][first]))));
         }
-        if (off) return 0;
+        off = _mm512_cmp_pd_mask(isovalue, _mm512_setzero_pd(), _CMP_NEQ_UQ);
+        off |= _mm512_cmpneq_epi64_mask(_mm512_load_si512(&s->flip[8 * h]), _mm512_set1_epi64(s->flip[first]));
+        off |= _mm512_cmp_pd_mask(turned, _mm512_set1_pd(0.06 * most), _CMP_GT_OQ);
+        off |= _mm512_cmp_pd_mask(apart, _mm512_set1_pd(8), _CMP_GT_OQ);
+        if (off & here) return 0;
     }
     return 1;
 }
@@ -6324,18 +6317,20 @@ ISOGI_VOL__AVX512 static void isogi_vol__settle_all(isogi_vol__batch *b, isogi_v
 ISOGI_VOL__AVX512 ISOGI_VOL__INLINE void isogi_vol__look_in_leaf(isogi_vol__batch *b, isogi_vol__pool *s, const isogi_vol__packet *p,
                                                                  isogi_vol__known *k, const isogi_vol__leaf *leaf, const __m512i voxel[2],
                                                                  uint64_t mask, unsigned met, int64_t cell, int64_t backwards) {
+    const float low = leaf->isovalue - ISOGI_VOL__DOUBT, high = leaf->isovalue + ISOGI_VOL__DOUBT;
+    const float bound[4] = {low, high, 3 * low, 3 * high};
     isogi_vol__layers l;
     __m512 place[3];
     isogi_vol__open_cells(&l, place, p, s, cell);
     for (; mask; mask &= mask - 1) {
-        const int child = __builtin_ctzll(mask);
+        const size_t child = (size_t)__builtin_ctzll(mask), at[3] = {child & 3, child >> 2 & 3, child >> 4};
         const int64_t here = (cell | (int64_t)_pdep_u64((uint64_t)child, 0x000300030003u)) ^ backwards;
-        const __m512 enter = isogi_vol__enter_child(&l, child), leave = isogi_vol__leave_child(&l, child);
+        const __m512 enter = isogi_vol__enter_child(&l, at), leave = isogi_vol__leave_child(&l, at);
         unsigned lanes = met & k->active, hit, doubt;
         isogi_vol__sides16 sides;
         if (!lanes) return;
         lanes &= _mm512_cmp_ps_mask(enter, leave, _CMP_LE_OQ);
-        isogi_vol__look16(&sides, place, p->dir, enter, leave, child, voxel, leaf->isovalue);
+        isogi_vol__look16(&sides, place, p->dir, enter, leave, at, b->pyramid->ways->lowest[0][child], voxel, bound);
         hit = lanes & ((sides.out1 & (k->seen_in | sides.in0)) | (sides.in1 & (k->seen_out | sides.out0)));
         sides.in &= lanes & ~k->out, sides.out &= lanes & ~k->in, doubt = lanes & ~(hit | sides.in | sides.out);
         k->seen_in |= sides.in, k->seen_out |= sides.out;
@@ -6345,11 +6340,9 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE void isogi_vol__look_in_leaf(isogi_vol__batc
         _mm512_mask_store_epi64(&s->cell[0], (__mmask8)hit, _mm512_set1_epi64(here));
         _mm512_mask_store_epi64(&s->cell[8], (__mmask8)(hit >> 8), _mm512_set1_epi64(here));
         k->hits |= hit, k->active &= ~hit;
-        if (doubt) {
-            _mm512_mask_store_epi64(&k->doubted[0], (__mmask8)doubt, _mm512_set1_epi64(here));
-            _mm512_mask_store_epi64(&k->doubted[8], (__mmask8)(doubt >> 8), _mm512_set1_epi64(here));
-            k->doubts |= doubt;
-        }
+        _mm512_mask_store_epi64(&k->doubted[0], (__mmask8)doubt, _mm512_set1_epi64(here));
+        _mm512_mask_store_epi64(&k->doubted[8], (__mmask8)(doubt >> 8), _mm512_set1_epi64(here));
+        k->doubts |= doubt;
         if (!(k->active & ~k->doubts)) isogi_vol__settle_all(b, s, k, b->hits ? k->hits : 0);
     }
 }
@@ -6391,9 +6384,11 @@ ISOGI_VOL__AVX512 ISOGI_VOL__NOINLINE static void isogi_vol__trace_packet(isogi_
         } else {
             isogi_vol__leaf leaf;
             __m512i voxel[2];
-            const uint64_t held = isogi_vol__held_cells(ways, octant, &leaf, node, level, voxel);
-            mask &= isogi_vol__cut_order(&leaf, octant, held);
-            if (mask) isogi_vol__look_in_leaf(b, s, packet, &known, &leaf, voxel, mask, lanes, cell, backwards);
+            mask &= isogi_vol__split_cells(ways, octant, &leaf, node, level);
+            if (mask) {
+                isogi_vol__order_voxels(ways, octant, node, voxel);
+                isogi_vol__look_in_leaf(b, s, packet, &known, &leaf, voxel, mask, lanes, cell, backwards);
+            }
         }
         /* on to the next child that some rays meet */
         for (lanes = 0; !lanes;) {
@@ -6411,13 +6406,13 @@ ISOGI_VOL__AVX512 ISOGI_VOL__NOINLINE static void isogi_vol__trace_packet(isogi_
     }
 out:
     isogi_vol__settle_all(b, s, &known, b->hits ? known.hits : 0);
-    for (; rays; rays &= rays - 1) {
-        const int slot = __builtin_ctz(rays);
-        const uint64_t ray = s->ray[slot];
-        s->level[slot] = -1;
-        if (b->occluded) b->occluded[ray] = !(known.active >> slot & 1);
-        else if (known.active >> slot & 1) memset(&b->hits[ray], 0, sizeof b->hits[0]);
-        else if (known.alone >> slot & 1) b->work.rays--, isogi_vol__trace_one(b, ray); /* what it hits is next to that cell */
+    _mm512_store_si512(&s->level[0], _mm512_set1_epi64(-1)), _mm512_store_si512(&s->level[8], _mm512_set1_epi64(-1));
+    for (lanes = rays; b->occluded && lanes; lanes &= lanes - 1)
+        b->occluded[s->ray[__builtin_ctz(lanes)]] = !(known.active >> __builtin_ctz(lanes) & 1);
+    for (lanes = rays & (known.active | known.alone); b->hits && lanes; lanes &= lanes - 1) {
+        const int slot = __builtin_ctz(lanes);
+        if (known.active >> slot & 1) memset(&b->hits[s->ray[slot]], 0, sizeof b->hits[0]);
+        else b->work.rays--, isogi_vol__trace_one(b, s->ray[slot]); /* what it hits is next to that cell */
     }
 }
 
@@ -6447,9 +6442,7 @@ ISOGI_VOL__AVX512 static void isogi_vol__prepare_descent(isogi_vol__descent *d, 
             if (!(d->held[n] >> child & 1)) break; /* none goes on: this node's mask is its last one */
         } else {
             isogi_vol__leaf leaf;
-            __m512i voxel[2];
-            const uint64_t held = isogi_vol__held_cells(p->ways, 0, &leaf, node, units, voxel);
-            d->held[0] = isogi_vol__cut_order(&leaf, 0, held), d->leaf = node, d->step = (double)leaf.isovalue;
+            d->held[0] = isogi_vol__split_cells(p->ways, 0, &leaf, node, units), d->leaf = node, d->step = (double)leaf.isovalue;
         }
     }
 }
