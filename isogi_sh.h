@@ -1636,6 +1636,11 @@ typedef double isogi_sh__two __attribute__((aligned(4), may_alias)); /* 2 floats
 #define ISOGI_SH__AVX2 __attribute__((target("avx2,fma")))
 #define ISOGI_SH__AVX512 __attribute__((target("avx2,fma,avx512f,avx512vl,avx512dq")))
 #define ISOGI_SH__SPLAT_F8(x) isogi_sh__eval_f8_splat(x)
+#if defined(__clang__)
+#define ISOGI_SH__FROM_F8(p) ISOGI_SH__SPLAT_F8(*(p))
+#else /* gcc would rather load neighbours together, and shuffle them */
+#define ISOGI_SH__FROM_F8(p) ((isogi_sh__f8)__builtin_ia32_vbroadcastss256(p))
+#endif
 #define ISOGI_SH__ADD_F8(a, x, sum) ISOGI_SH__FMA_F8(a, ISOGI_SH__SPLAT_F8(x), sum) /* of a number x */
 #define ISOGI_SH__FMA_F8(a, b, c) ((isogi_sh__f8)__builtin_ia32_vfmaddps256(a, b, c))
 #define ISOGI_SH__FMA_D4(a, b, c) ((isogi_sh__d4)__builtin_ia32_vfmaddpd256(a, b, c))
@@ -3763,54 +3768,6 @@ static void isogi_sh__zonal_order5(float *c, const float *zonal, isogi_sh__unit 
     }
 }
 
-#ifdef ISOGI_SH__SIMD
-/* The same in float, for directions of length 1 to 1e-3 (else 0): c[i] is a lobe's factor times a polynomial of z^2 and ww = x^2 + y^2
-   (of z alone its terms cancel near poles), times z where l - m is odd, times cosine or sine of m. Here x, y, z, cm, sm stand in all lanes,
-   and blends pick them. Constant terms, those of ww, of zz and of zz ww: a, b and d by degree. */
-ISOGI_SH__AVX2 static int isogi_sh__zonal_order5_f8(float *c, const float *zonal, const float d[3]) {
-    const isogi_sh__f8 zero = {0}, one = {1, 1, 1, 1, 1, 1, 1, 1};
-    const isogi_sh__f8 a0 = {1.0f, 1.0f, 1.0f, 1.0f, 0.866025404f, 1.73205081f, 0, 1.73205081f};
-    const isogi_sh__f8 a1 = {0, 0, 0, 0, 0, 0, -0.5f, 0};
-    const isogi_sh__f8 a2 = {0, 0, 0, 0, 0, 0, 1.0f, 0};
-    const isogi_sh__f8 b0 = {0.866025404f, 0.790569415f, 1.93649167f, 0, 0, 0, 1.93649167f, 0.790569415f};
-    const isogi_sh__f8 b1 = {0, 0, 0, -0.612372436f, -1.5f, -0.612372436f, 0, 0};
-    const isogi_sh__f8 b2 = {0, 0, 0, 2.44948974f, 1.0f, 2.44948974f, 0, 0};
-    const isogi_sh__f8 d0 = {0.739509973f, 2.09165007f, 0, 0, 0, 0, 0, 2.09165007f};
-    const isogi_sh__f8 d1 = {0, 0, -0.559016994f, -2.37170825f, 0.375f, -2.37170825f, -0.559016994f, 0};
-    const isogi_sh__f8 d2 = {0, 0, 3.35410197f, 3.16227766f, 1.0f, 3.16227766f, 3.35410197f, 0};
-    const isogi_sh__f8 d3 = {0, 0, 0, 0, -4.375f, 0, 0, 0};
-    isogi_sh__f8 x = ISOGI_SH__SPLAT_F8(d[0]), y = ISOGI_SH__SPLAT_F8(d[1]), z = ISOGI_SH__SPLAT_F8(d[2]), scale;
-    isogi_sh__f8 e = ISOGI_SH__FMA_F8(-x, x, ISOGI_SH__FMA_F8(-y, y, ISOGI_SH__FMA_F8(-z, z, one)));
-    isogi_sh__f8 c2, s2, c3, s3, c4, s4, zz, ww, v, w;
-    isogi_sh__f8 l2 = ISOGI_SH__SPLAT_F8(zonal[2]), l3 = ISOGI_SH__SPLAT_F8(zonal[3]), l4 = ISOGI_SH__SPLAT_F8(zonal[4]);
-    if (!isogi_sh__below(e[0], 1e-3f)) return 0;
-    scale = e * ISOGI_SH__FMA_F8(e, one * 0.375f, one * 0.5f);
-    x = ISOGI_SH__FMA_F8(x, scale, x), y = ISOGI_SH__FMA_F8(y, scale, y), z = ISOGI_SH__FMA_F8(z, scale, z);
-    zz = z * z, ww = ISOGI_SH__FMA_F8(x, x, y * y);
-    c2 = (x - y) * (x + y), s2 = (x + x) * y;
-    c3 = ISOGI_SH__FMA_F8(x, c2, -(y * s2)), s3 = ISOGI_SH__FMA_F8(x, s2, y * c2), c4 = ISOGI_SH__FMA_F8(c2, c2, -(s2 * s2)),
-    s4 = (c2 + c2) * s2;
-    /* degrees 0, 1 and 2 but for its last: 1; y 1 x; s2 y 1 x */
-    w = __builtin_shufflevector(one, x, 0, 1, 2, 11, 4, 5, 6, 15), w = __builtin_shufflevector(w, y, 0, 9, 2, 3, 4, 13, 6, 7);
-    w = __builtin_shufflevector(w, s2, 0, 1, 2, 3, 12, 5, 6, 7) *
-        ISOGI_SH__FMA_F8(a2, zz, ISOGI_SH__FMA_F8(a1, ww, a0)) * __builtin_shufflevector(one, z, 0, 1, 10, 3, 4, 13, 6, 15);
-    v = __builtin_shufflevector(zonal[1] - zero, l2, 0, 1, 2, 3, 12, 13, 14, 15),
-    v = __builtin_shufflevector(v, zonal[0] - zero, 8, 1, 2, 3, 4, 5, 6, 7);
-    *(isogi_sh__f8 *)c = w * v;
-    /* c2; s3 s2 y 1 x c2 c3, and from s4 on */
-    v = __builtin_shufflevector(one, x, 0, 1, 2, 3, 4, 13, 6, 7), v = __builtin_shufflevector(v, y, 0, 1, 2, 11, 4, 5, 6, 7);
-    v = __builtin_shufflevector(v, c2, 8, 1, 2, 3, 4, 5, 14, 7), v = __builtin_shufflevector(v, s2, 0, 1, 10, 3, 4, 5, 6, 7);
-    v = __builtin_shufflevector(v, c3, 0, 1, 2, 3, 4, 5, 6, 15), v = __builtin_shufflevector(v, s3, 0, 9, 2, 3, 4, 5, 6, 7);
-    w = v * ISOGI_SH__FMA_F8(b2, zz, ISOGI_SH__FMA_F8(b1, ww, b0)) * __builtin_shufflevector(one, z, 0, 1, 10, 3, 12, 5, 14, 7);
-    *(isogi_sh__f8 *)(c + 8) = w * __builtin_shufflevector(l3, l2, 8, 1, 2, 3, 4, 5, 6, 7);
-    w = ISOGI_SH__FMA_F8(ISOGI_SH__FMA_F8(d3, ww, d2), zz, ISOGI_SH__FMA_F8(d1, ww, d0)) *
-        __builtin_shufflevector(one, z, 0, 9, 2, 11, 4, 13, 6, 15);
-    *(isogi_sh__f8 *)(c + 16) = __builtin_shufflevector(v, s4, 8, 1, 2, 3, 4, 5, 6, 7) * w * l4;
-    c[24] = 0.739509973f * c4[0] * l4[0];
-    return 1;
-}
-#endif
-
 /* Kept out of the caller, whose fast way would pay for its registers. */
 ISOGI_SH__APART isogi_result isogi_sh__zonal_to_direction(float *c, int order, const float *zonal, const float direction[3]) {
     double scale[ISOGI_SH_MAX_ORDER], one = 1;
@@ -3826,9 +3783,57 @@ ISOGI_SH__APART isogi_result isogi_sh__zonal_to_direction(float *c, int order, c
     return ISOGI_OK;
 }
 
+#ifdef ISOGI_SH__SIMD
+/* Order 5 in float, for directions of length 1 to 1e-3, others as above: c[i] is a lobe's factor times a polynomial of z^2 and of
+   ww = x^2 + y^2 (of z alone its terms cancel near poles), times z where l - m is odd, times cosine or sine of m. Here x, y, z, cm, sm
+   stand in all lanes, and blends pick them. Constant terms, those of ww, of zz and of zz ww: a, b and d by degree. */
+ISOGI_SH__AVX2 static isogi_result isogi_sh__zonal_order5_f8(float *c, const float *zonal, const float d[3]) {
+    const isogi_sh__f8 one = {1, 1, 1, 1, 1, 1, 1, 1};
+    const isogi_sh__f8 a0 = {1.0f, 1.0f, 1.0f, 1.0f, 0.866025404f, 1.73205081f, 0, 1.73205081f};
+    const isogi_sh__f8 a1 = {0, 0, 0, 0, 0, 0, -0.5f, 0};
+    const isogi_sh__f8 a2 = {0, 0, 0, 0, 0, 0, 1.0f, 0};
+    const isogi_sh__f8 b0 = {0.866025404f, 0.790569415f, 1.93649167f, 0, 0, 0, 1.93649167f, 0.790569415f};
+    const isogi_sh__f8 b1 = {0, 0, 0, -0.612372436f, -1.5f, -0.612372436f, 0, 0};
+    const isogi_sh__f8 b2 = {0, 0, 0, 2.44948974f, 1.0f, 2.44948974f, 0, 0};
+    const isogi_sh__f8 d0 = {0.739509973f, 2.09165007f, 0, 0, 0, 0, 0, 2.09165007f};
+    const isogi_sh__f8 d1 = {0, 0, -0.559016994f, -2.37170825f, 0.375f, -2.37170825f, -0.559016994f, 0};
+    const isogi_sh__f8 d2 = {0, 0, 3.35410197f, 3.16227766f, 1.0f, 3.16227766f, 3.35410197f, 0};
+    const isogi_sh__f8 d3 = {0, 0, 0, 0, -4.375f, 0, 0, 0};
+    isogi_sh__f8 x = ISOGI_SH__FROM_F8(d), y = ISOGI_SH__FROM_F8(d + 1), z = ISOGI_SH__FROM_F8(d + 2), scale;
+    isogi_sh__f8 e = ISOGI_SH__FMA_F8(x, x, ISOGI_SH__FMA_F8(y, y, ISOGI_SH__FMA_F8(z, z, -one)));
+    isogi_sh__f8 c2, s2, c3, s3, c4, s4, zz, ww, v, w;
+    isogi_sh__f8 l2 = ISOGI_SH__FROM_F8(zonal + 2), l3 = ISOGI_SH__FROM_F8(zonal + 3), l4 = ISOGI_SH__FROM_F8(zonal + 4);
+    if (!isogi_sh__below(e[0], 1e-3f)) return isogi_sh__zonal_to_direction(c, 5, zonal, d);
+    scale = e * ISOGI_SH__FMA_F8(e, one * 0.375f, one * -0.5f);
+    x = ISOGI_SH__FMA_F8(x, scale, x), y = ISOGI_SH__FMA_F8(y, scale, y), z = ISOGI_SH__FMA_F8(z, scale, z);
+    zz = z * z, ww = ISOGI_SH__FMA_F8(x, x, y * y);
+    c2 = (x - y) * (x + y), s2 = (x + x) * y;
+    c3 = ISOGI_SH__FMA_F8(x, c2, -(y * s2)), s3 = ISOGI_SH__FMA_F8(x, s2, y * c2), c4 = ISOGI_SH__FMA_F8(c2, c2, -(s2 * s2)),
+    s4 = (c2 + c2) * s2;
+    /* degrees 0, 1 and 2 but for its last: 1; y 1 x; s2 y 1 x */
+    w = __builtin_shufflevector(one, x, 0, 1, 2, 11, 4, 5, 6, 15), w = __builtin_shufflevector(w, y, 0, 9, 2, 3, 4, 13, 6, 7);
+    w = __builtin_shufflevector(w, s2, 0, 1, 2, 3, 12, 5, 6, 7) *
+        ISOGI_SH__FMA_F8(a2, zz, ISOGI_SH__FMA_F8(a1, ww, a0)) * __builtin_shufflevector(one, z, 0, 1, 10, 3, 4, 13, 6, 15);
+    v = __builtin_shufflevector(ISOGI_SH__FROM_F8(zonal + 1), l2, 0, 1, 2, 3, 12, 13, 14, 15),
+    v = __builtin_shufflevector(v, ISOGI_SH__FROM_F8(zonal), 8, 1, 2, 3, 4, 5, 6, 7);
+    *(isogi_sh__f8 *)c = w * v;
+    /* c2; s3 s2 y 1 x c2 c3, and from s4 on */
+    v = __builtin_shufflevector(one, x, 0, 1, 2, 3, 4, 13, 6, 7), v = __builtin_shufflevector(v, y, 0, 1, 2, 11, 4, 5, 6, 7);
+    v = __builtin_shufflevector(v, c2, 8, 1, 2, 3, 4, 5, 14, 7), v = __builtin_shufflevector(v, s2, 0, 1, 10, 3, 4, 5, 6, 7);
+    v = __builtin_shufflevector(v, c3, 0, 1, 2, 3, 4, 5, 6, 15), v = __builtin_shufflevector(v, s3, 0, 9, 2, 3, 4, 5, 6, 7);
+    w = v * ISOGI_SH__FMA_F8(b2, zz, ISOGI_SH__FMA_F8(b1, ww, b0)) * __builtin_shufflevector(one, z, 0, 1, 10, 3, 12, 5, 14, 7);
+    *(isogi_sh__f8 *)(c + 8) = w * __builtin_shufflevector(l3, l2, 8, 1, 2, 3, 4, 5, 6, 7);
+    w = ISOGI_SH__FMA_F8(ISOGI_SH__FMA_F8(d3, ww, d2), zz, ISOGI_SH__FMA_F8(d1, ww, d0)) *
+        __builtin_shufflevector(one, z, 0, 9, 2, 11, 4, 13, 6, 15);
+    *(isogi_sh__f8 *)(c + 16) = __builtin_shufflevector(v, s4, 8, 1, 2, 3, 4, 5, 6, 7) * w * l4;
+    c[24] = 0.739509973f * c4[0] * l4[0];
+    return ISOGI_OK;
+}
+#endif
+
 ISOGI_API isogi_result isogi_sh_zonal_to_direction(float *c, int order, const float *zonal, const float direction[3]) {
 #ifdef ISOGI_SH__SIMD
-    if (order == 5 && c && zonal && direction && isogi_sh__avx2() && isogi_sh__zonal_order5_f8(c, zonal, direction)) return ISOGI_OK;
+    if (order == 5 && c && zonal && direction && isogi_sh__avx2()) return isogi_sh__zonal_order5_f8(c, zonal, direction);
 #endif
     return isogi_sh__zonal_to_direction(c, order, zonal, direction);
 }
@@ -5882,6 +5887,7 @@ ISOGI_API isogi_result isogi_sh_fit_directional(float direction[3], float rgb[3]
 #undef ISOGI_SH__JOIN_F16
 #undef ISOGI_SH__JOIN_D8
 #undef ISOGI_SH__JOIN_F8
+#undef ISOGI_SH__FROM_F8
 #undef ISOGI_SH__JOIN_HALVES
 #undef ISOGI_SH__LESS_D4
 #undef ISOGI_SH__LESS_D8
