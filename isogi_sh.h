@@ -1691,6 +1691,16 @@ typedef double isogi_sh__two __attribute__((aligned(4), may_alias)); /* 2 floats
 #define ISOGI_SH__ODD_F16(a, b) __builtin_shufflevector(a, b, 2, 3, 18, 19, 6, 7, 22, 23, 10, 11, 26, 27, 14, 15, 30, 31)
 #define ISOGI_SH__JOIN_D8(i, j) ISOGI_SH__JOIN_HALVES(*(const isogi_sh__d4 *)(const void *)(in + pitch * (i)), \
     *(const isogi_sh__d4 *)(const void *)(in + pitch * (j)))
+/* Two vectors of quarters a b c d and e f g h become a e c g and b f d h, by one shuffle, which is what transposing waits for, and two
+   blends, which other units do. */
+#define ISOGI_SH__ACROSS_D8(p, q) __builtin_shufflevector(p, q, 2, 3, 8, 9, 6, 7, 12, 13)
+#if defined(__clang__)
+#define ISOGI_SH__BLEND_D8(mask, p, r) __builtin_ia32_selectpd_512((unsigned char)(mask), r, p)
+#else
+#define ISOGI_SH__BLEND_D8(mask, p, r) __builtin_ia32_blendmpd_512_mask(p, r, (unsigned char)(mask))
+#endif
+#define ISOGI_SH__FIRST_D8(p, r) (isogi_sh__d8) ISOGI_SH__BLEND_D8(0xcc, p, r)
+#define ISOGI_SH__SECOND_D8(q, r) (isogi_sh__d8) ISOGI_SH__BLEND_D8(0x33, q, r)
 #define ISOGI_SH__ROWS_F8(j) ISOGI_SH__JOIN_F8(ISOGI_SH__ROW_F4(j), ISOGI_SH__ROW_F4((j) + 4))
 #define ISOGI_SH__ROWS_F16(j) ISOGI_SH__JOIN_F16(ISOGI_SH__ROW_F4(j), ISOGI_SH__ROW_F4((j) + 4), ISOGI_SH__ROW_F4((j) + 8), \
     ISOGI_SH__ROW_F4((j) + 12))
@@ -1824,10 +1834,10 @@ ISOGI_SH__AVX512 ISOGI_SH__INLINE void isogi_sh__transpose_f16(float *y, size_t 
         isogi_sh__f16 v[2][4];
         ISOGI_SH__UNROLL
         for (k = 0; k < 2; k++) {
-            const isogi_sh__f16 a = (isogi_sh__f16)ISOGI_SH__JOIN_D8(8 * k, 8 * k + 4),
-                                b = (isogi_sh__f16)ISOGI_SH__JOIN_D8(8 * k + 1, 8 * k + 5);
-            const isogi_sh__f16 c = (isogi_sh__f16)ISOGI_SH__JOIN_D8(8 * k + 2, 8 * k + 6),
-                                d = (isogi_sh__f16)ISOGI_SH__JOIN_D8(8 * k + 3, 8 * k + 7);
+            const isogi_sh__f16 a = (isogi_sh__f16)ISOGI_SH__JOIN_D8(4 * k, 4 * k + 8),
+                                b = (isogi_sh__f16)ISOGI_SH__JOIN_D8(4 * k + 1, 4 * k + 9);
+            const isogi_sh__f16 c = (isogi_sh__f16)ISOGI_SH__JOIN_D8(4 * k + 2, 4 * k + 10),
+                                d = (isogi_sh__f16)ISOGI_SH__JOIN_D8(4 * k + 3, 4 * k + 11);
             isogi_sh__f16 e = ISOGI_SH__LOW_F16(a, b), f = ISOGI_SH__HIGH_F16(a, b), g = ISOGI_SH__LOW_F16(c, d),
                           h = ISOGI_SH__HIGH_F16(c, d);
             v[k][0] = ISOGI_SH__EVEN_F16(e, g), v[k][1] = ISOGI_SH__ODD_F16(e, g), v[k][2] = ISOGI_SH__EVEN_F16(f, h),
@@ -1835,9 +1845,9 @@ ISOGI_SH__AVX512 ISOGI_SH__INLINE void isogi_sh__transpose_f16(float *y, size_t 
         }
         ISOGI_SH__UNROLL
         for (k = 0; k < 4; k++) {
-            isogi_sh__d8 p = (isogi_sh__d8)v[0][k], q = (isogi_sh__d8)v[1][k];
-            *(isogi_sh__f16 *)(y + n * k) = (isogi_sh__f16)__builtin_shufflevector(p, q, 0, 1, 4, 5, 8, 9, 12, 13);
-            *(isogi_sh__f16 *)(y + n * (k + 4)) = (isogi_sh__f16)__builtin_shufflevector(p, q, 2, 3, 6, 7, 10, 11, 14, 15);
+            isogi_sh__d8 p = (isogi_sh__d8)v[0][k], q = (isogi_sh__d8)v[1][k], r = ISOGI_SH__ACROSS_D8(p, q);
+            *(isogi_sh__d8 *)(void *)(y + n * k) = ISOGI_SH__FIRST_D8(p, r);
+            *(isogi_sh__d8 *)(void *)(y + n * (k + 4)) = ISOGI_SH__SECOND_D8(q, r);
         }
     }
 }
@@ -1925,34 +1935,39 @@ ISOGI_SH__AVX512 ISOGI_SH__INLINE void isogi_sh__eval_d8_split(isogi_sh__d8 *u, 
    column m is (c, s) times a polynomial, times z where l - m is odd; t: the polynomials of that column. centre: where Y_l^0 goes. From
    m = 2 on they are in v + 1/4, which is smaller where sin^m t is not. */
 #define ISOGI_SH__LOW_ORDER 11
-#define ISOGI_SH__P0(NAME, t) NAME##_splat((t)[0])
-#define ISOGI_SH__P1(NAME, t) NAME##_step(ISOGI_SH__P0(NAME, t), v, (t)[1])
-#define ISOGI_SH__P2(NAME, t) NAME##_step(ISOGI_SH__P1(NAME, t), v, (t)[2])
-#define ISOGI_SH__P3(NAME, t) NAME##_step(ISOGI_SH__P2(NAME, t), v, (t)[3])
-#define ISOGI_SH__P4(NAME, t) NAME##_step(ISOGI_SH__P3(NAME, t), v, (t)[4])
-#define ISOGI_SH__P5(NAME, t) NAME##_step(ISOGI_SH__P4(NAME, t), v, (t)[5])
-#define ISOGI_SH__PUT_ONE(V, value) *(V *)centre = value, centre -= step, step -= 2 * stride
-#define ISOGI_SH__PUT_PAIR(V, value) p = value, *(V *)(centre + first) = p * c, *(V *)(centre - first) = p * s, centre -= step, \
-    step -= 2 * stride
-#define ISOGI_SH__POLYNOMIALS(NAME, V, PUT)                                                                                    \
+#define ISOGI_SH__PUT_ONE(V, WIDTH)                                                                                            \
+    *(V *)centre = p[0];                                                                                                       \
+    if (two) *(V *)(centre + WIDTH) = p[1];                                                                                    \
+    centre -= step, step -= 2 * stride
+#define ISOGI_SH__PUT_PAIR(V, WIDTH)                                                                                           \
+    *(V *)(centre + first) = p[0] * c[0], *(V *)(centre - first) = p[0] * s[0];                                                \
+    if (two) *(V *)(centre + first + WIDTH) = p[1] * c[1], *(V *)(centre - first + WIDTH) = p[1] * s[1];                       \
+    centre -= step, step -= 2 * stride
+#define ISOGI_SH__PUT_EVEN(NAME, V, WIDTH, PUT, at, degree) NAME##_polynomial(p, v, t + at, degree, two); PUT(V, WIDTH)
+#define ISOGI_SH__PUT_ODD(NAME, V, WIDTH, PUT, at, degree)                                                                     \
+    NAME##_polynomial(p, v, t + at, degree, two);                                                                              \
+    p[0] *= z[0];                                                                                                              \
+    if (two) p[1] *= z[1];                                                                                                     \
+    PUT(V, WIDTH)
+#define ISOGI_SH__POLYNOMIALS(NAME, V, WIDTH, PUT)                                                                             \
     switch (order - m) {                                                                                                       \
-    case 11: PUT(V, ISOGI_SH__P5(NAME, t + 30)); __attribute__((fallthrough));                                                  \
-    case 10: PUT(V, ISOGI_SH__P4(NAME, t + 25) * z); __attribute__((fallthrough));                               \
-    case 9: PUT(V, ISOGI_SH__P4(NAME, t + 20)); __attribute__((fallthrough));                                    \
-    case 8: PUT(V, ISOGI_SH__P3(NAME, t + 16) * z); __attribute__((fallthrough));                                \
-    case 7: PUT(V, ISOGI_SH__P3(NAME, t + 12)); __attribute__((fallthrough));                                    \
-    case 6: PUT(V, ISOGI_SH__P2(NAME, t + 9) * z); __attribute__((fallthrough));                                 \
-    case 5: PUT(V, ISOGI_SH__P2(NAME, t + 6)); __attribute__((fallthrough));                                     \
-    case 4: PUT(V, ISOGI_SH__P1(NAME, t + 4) * z); __attribute__((fallthrough));                                 \
-    case 3: PUT(V, ISOGI_SH__P1(NAME, t + 2)); __attribute__((fallthrough));                                     \
-    case 2: PUT(V, ISOGI_SH__P0(NAME, t + 1) * z); __attribute__((fallthrough));                                 \
-    default: PUT(V, ISOGI_SH__P0(NAME, t));                                                                      \
+    case 11: ISOGI_SH__PUT_EVEN(NAME, V, WIDTH, PUT, 30, 5); __attribute__((fallthrough));                                     \
+    case 10: ISOGI_SH__PUT_ODD(NAME, V, WIDTH, PUT, 25, 4); __attribute__((fallthrough));                                      \
+    case 9: ISOGI_SH__PUT_EVEN(NAME, V, WIDTH, PUT, 20, 4); __attribute__((fallthrough));                                      \
+    case 8: ISOGI_SH__PUT_ODD(NAME, V, WIDTH, PUT, 16, 3); __attribute__((fallthrough));                                       \
+    case 7: ISOGI_SH__PUT_EVEN(NAME, V, WIDTH, PUT, 12, 3); __attribute__((fallthrough));                                      \
+    case 6: ISOGI_SH__PUT_ODD(NAME, V, WIDTH, PUT, 9, 2); __attribute__((fallthrough));                                        \
+    case 5: ISOGI_SH__PUT_EVEN(NAME, V, WIDTH, PUT, 6, 2); __attribute__((fallthrough));                                       \
+    case 4: ISOGI_SH__PUT_ODD(NAME, V, WIDTH, PUT, 4, 1); __attribute__((fallthrough));                                        \
+    case 3: ISOGI_SH__PUT_EVEN(NAME, V, WIDTH, PUT, 2, 1); __attribute__((fallthrough));                                       \
+    case 2: ISOGI_SH__PUT_ODD(NAME, V, WIDTH, PUT, 1, 0); __attribute__((fallthrough));                                        \
+    default: ISOGI_SH__PUT_EVEN(NAME, V, WIDTH, PUT, 0, 0);                                                                    \
     }
 
 /* Defines NAME(out, stride, order, x, y, z, count): all functions at the first directions, that of index i at out + stride i; WIDTH at a
    time. It returns how many directions are done, and stops before a block whose lengths are out of range. NAME_rows: the same with the
    functions of a direction together. */
-#define ISOGI_SH__DEFINE_FUSED(NAME, TARGET, T, V, I, WIDTH, FMA, LESS, POLYNOMIALS, NEAR_POLE, TURN, TILE)                          \
+#define ISOGI_SH__DEFINE_FUSED(NAME, TARGET, T, V, I, WIDTH, FMA, LESS, POLYNOMIALS, NEAR_POLE, TURN, TILE)                    \
     /* Order 5 with as few multiplications as there are, which is what takes the time here: from squares and their sums, and from \
        functions of lower degree. */                                                                                           \
     TARGET ISOGI_SH__INLINE void NAME##_order5(V *out, const V *u) {                                                           \
@@ -1991,23 +2006,44 @@ ISOGI_SH__AVX512 ISOGI_SH__INLINE void isogi_sh__eval_d8_split(isogi_sh__d8 *u, 
         out[16] = (s * c) * (T)1.2516714708983523;                                                                             \
         out[24] = (c - s) * ((c + s) * (T)0.62583573544917614);                                                                \
     }                                                                                                                          \
-    TARGET ISOGI_SH__INLINE V NAME##_step(V p, V v, T next) { return FMA(p, v, NAME##_splat(next)); }                          \
-    /* one column after the other, each from its last degree */                                                                \
-    TARGET static void NAME##_low(T *out, size_t stride, int order, const V *u) {                                              \
-        V x = u[0], y = u[1], z = u[2], zero = {0}, v = FMA(z, z, -FMA(x, x, y * y)), c = x, s = y, p, before;                 \
+    TARGET ISOGI_SH__INLINE void NAME##_polynomial(V *p, const V *v, const T *t, int degree, int two) {                        \
+        V next = NAME##_splat(t[0]);                                                                                           \
+        int i;                                                                                                                 \
+        p[0] = p[1] = next;                                                                                                    \
+        ISOGI_SH__UNROLL                                                                                                       \
+        for (i = 1; i <= degree; i++) {                                                                                        \
+            next = NAME##_splat(t[i]), p[0] = FMA(p[0], v[0], next);                                                           \
+            if (two) p[1] = FMA(p[1], v[1], next);                                                                             \
+        }                                                                                                                      \
+    }                                                                                                                          \
+    /* One column after the other, each from its last degree, for one vector of directions or two, whose functions stand       \
+       WIDTH apart: two share constants, addresses and jumps. */                                                               \
+    TARGET ISOGI_SH__INLINE void NAME##_columns(T *out, size_t stride, int order, const V *u, const V *other, int two) {       \
+        V x[2] = {u[0], other[0]}, y[2] = {u[1], other[1]}, z[2] = {u[2], other[2]}, v[2], c[2], s[2], p[2], zero = {0}, before; \
+        V r = FMA(x[0], x[0], y[0] * y[0]), q = FMA(x[1], x[1], y[1] * y[1]);                                                  \
         const T *t = POLYNOMIALS;                                                                                              \
         size_t last = (size_t)order - 1, first = 0, step = 2 * stride * last;                                                  \
         T *centre = out + stride * last * (last + 1);                                                                          \
-        int m = 0, clear = !LESS((I)(zero + (T)NEAR_POLE), (I)FMA(x, x, y * y));                                               \
-        ISOGI_SH__POLYNOMIALS(NAME, V, ISOGI_SH__PUT_ONE)                                                                       \
+        int m = 0, clear = !LESS((I)(zero + (T)NEAR_POLE), (I)r) || (two && !LESS((I)(zero + (T)NEAR_POLE), (I)q));            \
+        v[0] = FMA(z[0], z[0], -r), v[1] = FMA(z[1], z[1], -q);                                                                \
+        c[0] = x[0], s[0] = y[0], c[1] = x[1], s[1] = y[1];                                                                    \
+        ISOGI_SH__POLYNOMIALS(NAME, V, WIDTH, ISOGI_SH__PUT_ONE)                                                               \
         for (m = 1; m < order; m++) {                                                                                          \
             t += (ISOGI_SH__LOW_ORDER + 2 - m) * (ISOGI_SH__LOW_ORDER + 2 - m) / 4;                                            \
-            if (m > 1) before = c, c = FMA(x, c, -(y * s)), s = FMA(x, s, y * before);                                         \
-            if (m == 2) v = FMA(z + z, z, zero - (T)0.75);                                                                     \
-            if (clear) c = NAME##_clear(c), s = NAME##_clear(s);                                                               \
+            if (m > 1) {                                                                                                       \
+                before = c[0], c[0] = FMA(x[0], c[0], -(y[0] * s[0])), s[0] = FMA(x[0], s[0], y[0] * before);                  \
+                if (two) before = c[1], c[1] = FMA(x[1], c[1], -(y[1] * s[1])), s[1] = FMA(x[1], s[1], y[1] * before);         \
+            }                                                                                                                  \
+            if (m == 2) v[0] = FMA(z[0] + z[0], z[0], zero - (T)0.75), v[1] = FMA(z[1] + z[1], z[1], zero - (T)0.75);          \
+            if (clear) c[0] = NAME##_clear(c[0]), s[0] = NAME##_clear(s[0]), c[1] = NAME##_clear(c[1]), s[1] = NAME##_clear(s[1]); \
             first += stride, step = 2 * stride * last, centre = out + stride * last * (last + 1);                              \
-            ISOGI_SH__POLYNOMIALS(NAME, V, ISOGI_SH__PUT_PAIR)                                                                  \
+            ISOGI_SH__POLYNOMIALS(NAME, V, WIDTH, ISOGI_SH__PUT_PAIR)                                                          \
         }                                                                                                                      \
+    }                                                                                                                          \
+    TARGET ISOGI_SH__APART void NAME##_low(T *out, size_t stride, int order, const V *u) { NAME##_columns(out, stride, order, u, u, 0); } \
+    TARGET ISOGI_SH__APART void NAME##_low_rows(T *out, int order, const V *u) { NAME##_columns(out, WIDTH, order, u, u, 0); } \
+    TARGET ISOGI_SH__INLINE void NAME##_low_two(T *out, size_t stride, int order, const V *u) {                                \
+        NAME##_columns(out, stride, order, u, u + 4, 1);                                                                       \
     }                                                                                                                          \
     /* degrees from SPLIT on */                                                                                                \
     TARGET static void NAME##_rest(T *out, int order, const V *u, V *state) {                                                  \
@@ -2017,26 +2053,36 @@ ISOGI_SH__AVX512 ISOGI_SH__INLINE void isogi_sh__eval_d8_split(isogi_sh__d8 *u, 
         if (order <= ISOGI_SH__LOW_ORDER) NAME##_low(out, stride, order, u);                                                   \
         else NAME##_any(out, stride, order, u, NULL);                                                                          \
     }                                                                                                                          \
-    /* any order but 5, with the next directions made ready while the values of those before are stored; the last block ends with the last \
-       direction, and repeats some */                                                                                          \
-    TARGET static size_t NAME##_blocks(T *out, size_t stride, int order, const T *x, const T *y, const T *z, size_t count) {   \
+    /* any order but 5, with the next directions made ready while the values of those before are stored; low orders by two vectors while \
+       there are as many; the last block ends with the last direction, and repeats some */                                     \
+    TARGET ISOGI_SH__APART size_t NAME##_pairs(T *out, size_t stride, int order, const T *x, const T *y, const T *z, size_t count) { \
+        V u[2][8];                                                                                                             \
+        size_t i;                                                                                                              \
+        int more, now = 0;                                                                                                     \
+        for (i = 0;; i += 2 * WIDTH, now = !now) {                                                                             \
+            more = i + 2 * WIDTH <= count && NAME##_load(u[now], x + i, y + i, z + i) &&                                       \
+                   NAME##_load(u[now] + 4, x + i + WIDTH, y + i + WIDTH, z + i + WIDTH);                                       \
+            if (i) NAME##_low_two(out + i - 2 * WIDTH, stride, order, u[!now]);                                                \
+            if (!more) return i;                                                                                               \
+        }                                                                                                                      \
+    }                                                                                                                          \
+    TARGET ISOGI_SH__APART size_t NAME##_blocks(T *out, size_t stride, int order, const T *x, const T *y, const T *z, size_t count, \
+                                                size_t begin) {                                                                \
         V u[2][4];                                                                                                             \
         size_t i, at = 0;                                                                                                      \
         int more, now = 0;                                                                                                     \
-        for (i = 0;; i += WIDTH, now = !now) {                                                                                 \
+        for (i = begin;; i += WIDTH, now = !now) {                                                                             \
             size_t next = i < count - WIDTH ? i : count - WIDTH;                                                               \
             more = i < count && NAME##_load(u[now], x + next, y + next, z + next);                                             \
-            if (i) NAME##_block(out + at, stride, order, u[!now]);                                                             \
+            if (i > begin) NAME##_block(out + at, stride, order, u[!now]);                                                     \
             if (!more) return i < count ? i : count;                                                                           \
             at = next;                                                                                                         \
         }                                                                                                                      \
     }                                                                                                                          \
-    TARGET static size_t NAME(T *out, size_t stride, int order, const T *x, const T *y, const T *z, size_t count) {            \
+    TARGET ISOGI_SH__APART size_t NAME##_blocks5(T *out, size_t stride, const T *x, const T *y, const T *z, size_t count) {    \
         V u[4], next[4], basis[25];                                                                                            \
         size_t i, at = 0;                                                                                                      \
         int k, more = 1;                                                                                                       \
-        if (count < WIDTH) return 0;                                                                                           \
-        if (order != 5) return NAME##_blocks(out, stride, order, x, y, z, count);                                              \
         if (!NAME##_load(u, x, y, z)) return 0;                                                                                \
         for (i = WIDTH; more; i += WIDTH) {                                                                                    \
             T *to = out + at;                                                                                                  \
@@ -2050,8 +2096,15 @@ ISOGI_SH__AVX512 ISOGI_SH__INLINE void isogi_sh__eval_d8_split(isogi_sh__d8 *u, 
         i -= WIDTH;                                                                                                            \
         return i < count ? i : count;                                                                                          \
     }                                                                                                                          \
-    /* `count` rows, 9 or more, for as many directions as are lanes: by 8 or TILE, after one alone, \
-        or the last with some that come again */ \
+    TARGET static size_t NAME(T *out, size_t stride, int order, const T *x, const T *y, const T *z, size_t count) {            \
+        size_t begin = 0;                                                                                                      \
+        if (count < WIDTH) return 0;                                                                                           \
+        if (order == 5) return NAME##_blocks5(out, stride, x, y, z, count);                                                    \
+        if (order <= ISOGI_SH__LOW_ORDER && count >= 2 * WIDTH) begin = NAME##_pairs(out, stride, order, x, y, z, count);      \
+        return begin < count ? NAME##_blocks(out, stride, order, x, y, z, count, begin) : count;                               \
+    }                                                                                                                          \
+    /* `count` rows, 9 or more, for as many directions as are lanes: by 8 or TILE, after one alone,                            \
+        or the last with some that come again */                                                                               \
     TARGET ISOGI_SH__INLINE void NAME##_turn_all(T *out, size_t n, const V *rows, size_t count) {                              \
         size_t k, at, alone = count % TILE == 1 || count == 9;                                                                 \
         if (alone)                                                                                                             \
@@ -2090,7 +2143,7 @@ ISOGI_SH__AVX512 ISOGI_SH__INLINE void isogi_sh__eval_d8_split(isogi_sh__d8 *u, 
         }                                                                                                                      \
     }                                                                                                                          \
     TARGET static size_t NAME##_rows(T *out, int order, const T (*direction)[3], size_t count) {                               \
-        V rows[ISOGI_SH__SPLIT * ISOGI_SH__SPLIT] __attribute__((aligned(64))), state[4 * ISOGI_SH__SPLIT - 18], u[2][4];       \
+        V rows[ISOGI_SH__SPLIT * ISOGI_SH__SPLIT] __attribute__((aligned(64))), state[4 * ISOGI_SH__SPLIT - 18], u[2][4];      \
         size_t i, n = ISOGI_SH_COUNT(order), at = 0;                                                                           \
         int from, to, more, now = 0;                                                                                           \
         if (count < WIDTH) return 0;                                                                                           \
@@ -2102,9 +2155,9 @@ ISOGI_SH__AVX512 ISOGI_SH__INLINE void isogi_sh__eval_d8_split(isogi_sh__d8 *u, 
                 NAME##_split(u[now], direction[next]);                                                                         \
                 more = NAME##_unit(u[now]);                                                                                    \
             }                                                                                                                  \
-            for (from = 0; i && from < order; from = to) {                                                       \
+            for (from = 0; i && from < order; from = to) {                                                                     \
                 to = from || order < ISOGI_SH__SPLIT ? order : ISOGI_SH__SPLIT;                                                \
-                if (order <= ISOGI_SH__LOW_ORDER) NAME##_low((T *)rows, WIDTH, order, u[!now]);                                \
+                if (order <= ISOGI_SH__LOW_ORDER) NAME##_low_rows((T *)rows, order, u[!now]);                                  \
                 else if (from) NAME##_rest((T *)rows, order, u[!now], state);                                                  \
                 else NAME##_any((T *)rows, WIDTH, to, u[!now], state);                                                         \
                 NAME##_turn_all(out + n * at + from * from, n, rows, (size_t)(to * to - from * from));                         \
@@ -5887,7 +5940,13 @@ ISOGI_API isogi_result isogi_sh_fit_directional(float direction[3], float rgb[3]
 #undef ISOGI_SH__JOIN_F16
 #undef ISOGI_SH__JOIN_D8
 #undef ISOGI_SH__JOIN_F8
+#undef ISOGI_SH__PUT_EVEN
+#undef ISOGI_SH__PUT_ODD
 #undef ISOGI_SH__FROM_F8
+#undef ISOGI_SH__ACROSS_D8
+#undef ISOGI_SH__BLEND_D8
+#undef ISOGI_SH__FIRST_D8
+#undef ISOGI_SH__SECOND_D8
 #undef ISOGI_SH__JOIN_HALVES
 #undef ISOGI_SH__LESS_D4
 #undef ISOGI_SH__LESS_D8
@@ -5929,11 +5988,6 @@ ISOGI_API isogi_result isogi_sh_fit_directional(float direction[3], float rgb[3]
 #undef ISOGI_SH__DEFINE_EVAL
 #undef ISOGI_SH__DEFINE_FUSED
 #undef ISOGI_SH__LOW_ORDER
-#undef ISOGI_SH__P0
-#undef ISOGI_SH__P1
-#undef ISOGI_SH__P2
-#undef ISOGI_SH__P3
-#undef ISOGI_SH__P4
 #undef ISOGI_SH__POLYNOMIALS
 #undef ISOGI_SH__PUT_PAIR
 #undef ISOGI_SH__PUT_BOTH
@@ -5941,7 +5995,6 @@ ISOGI_API isogi_result isogi_sh_fit_directional(float direction[3], float rgb[3]
 #undef ISOGI_SH__SPLAT_F8
 #undef ISOGI_SH__ADD_F8
 #undef ISOGI_SH__PUT_ONE
-#undef ISOGI_SH__P5
 #undef ISOGI_SH__UNROLL25
 #undef ISOGI_SH__LANES
 #undef ISOGI_SH__CHANNELS
