@@ -582,6 +582,8 @@ typedef struct isogi_dvr__fast_ray {
 typedef struct isogi_dvr__packet {
     float origin[3][ISOGI_DVR__RAYS], dir[3][ISOGI_DVR__RAYS], inverse[3][ISOGI_DVR__RAYS];
     int32_t next[ISOGI_DVR__RAYS], count[ISOGI_DVR__RAYS]; /* next = count: done */
+    int32_t at[ISOGI_DVR__RAYS];                           /* where a ray leaps from: next, or, once it has leapt, the sample after it */
+    uint8_t found[ISOGI_DVR__RAYS];                        /* rays that are to be looked at */
 } isogi_dvr__packet;
 
 typedef struct isogi_dvr__frame isogi_dvr__frame;
@@ -623,7 +625,7 @@ typedef struct isogi_dvr__kernels {
     void (*pass_out)(const isogi_dvr__rows *a, const float w[4]);
     void (*between)(const isogi_dvr__rows *a, const float part[2]);
     void (*exp_row)(float *x, size_t count);
-    void (*leap)(const isogi_dvr *d, isogi_dvr__packet *p, isogi_counters *work);
+    int (*leap)(const isogi_dvr *d, isogi_dvr__packet *p, isogi_counters *work);
     void (*gather)(const isogi_dvr__sums *a);
     void (*local)(const isogi_dvr__local_rays *a, float *clear);
 } isogi_dvr__kernels;
@@ -1870,13 +1872,14 @@ static void isogi_dvr__between(const isogi_dvr__rows *a, const float part[2]) {
     }
 }
 
-/* For every ray of a packet the first sample from `next` on that may see something: the last one before the ray leaves the empty blocks
-   around it. The sample after it is what is looked at: a piece may end in matter. */
-static void isogi_dvr__leap(const isogi_dvr *d, isogi_dvr__packet *p, isogi_counters *work) {
+/* For rays of a packet the first sample from `next` on that may see something: the last one before the ray leaves the empty blocks
+   around it. The sample after it is what is looked at: a piece may end in matter. Returns how many rays have found it; where none has,
+   all are done. Rays that have not may go on next time. */
+static int isogi_dvr__leap(const isogi_dvr *d, isogi_dvr__packet *p, isogi_counters *work) {
     const isogi_level *level = &d->level[0];
-    int k;
+    int k, found = 0;
     for (k = 0; k < ISOGI_DVR__RAYS; k++) {
-        int first = p->next[k], i = first, count = p->count[k];
+        int first = p->at[k], i = first, count = p->count[k];
         while (i < count) {
             float exit = (float)count;
             int c[3], a, free;
@@ -1898,7 +1901,10 @@ static void isogi_dvr__leap(const isogi_dvr *d, isogi_dvr__packet *p, isogi_coun
             i = ((int)exit > i ? (int)exit : i) + 1;
         }
         p->next[k] = i >= count ? count : i > first ? i - 1 : first;
+        p->at[k] = p->next[k];
+        if (i < count) p->found[found++] = (uint8_t)k;
     }
+    return found;
 }
 
 static void isogi_dvr__gather(const isogi_dvr__sums *a) {
@@ -2041,19 +2047,6 @@ ISOGI_DVR__KERNELS(_avx512, __attribute__((target("avx512f,avx512vl,avx512dq,avx
 #define ISOGI_DVR__AVX512 __attribute__((target("avx512f,avx512vl,avx512dq,avx512bw,fma"))) static
 #define ISOGI_DVR__ALWAYS __attribute__((always_inline)) inline
 
-/* Sixteen bytes, put together in registers: what is stored in parts is slow to load as a whole. */
-ISOGI_DVR__AVX512 inline __m512i isogi_dvr__bytes_avx512(const uint8_t *p, __m512i index) {
-#define ISOGI_DVR__BYTE(k) (char)p[at[k]]
-    int32_t at[16];
-    _mm512_storeu_si512(at, index);
-    /* of all lanes: where it names none, gcc 12 warns of its own undefined vectors */
-    return _mm512_maskz_cvtepu8_epi32(0xffff, _mm_setr_epi8(
-        ISOGI_DVR__BYTE(0), ISOGI_DVR__BYTE(1), ISOGI_DVR__BYTE(2), ISOGI_DVR__BYTE(3), ISOGI_DVR__BYTE(4), ISOGI_DVR__BYTE(5),
-        ISOGI_DVR__BYTE(6), ISOGI_DVR__BYTE(7), ISOGI_DVR__BYTE(8), ISOGI_DVR__BYTE(9), ISOGI_DVR__BYTE(10), ISOGI_DVR__BYTE(11),
-        ISOGI_DVR__BYTE(12), ISOGI_DVR__BYTE(13), ISOGI_DVR__BYTE(14), ISOGI_DVR__BYTE(15)));
-#undef ISOGI_DVR__BYTE
-}
-
 /* One leap of the rays k .. k + 15 of a packet that are still going: what of them has to leap again. */
 ISOGI_DVR__AVX512 ISOGI_DVR__ALWAYS __mmask16 isogi_dvr__leap_once_avx512(const isogi_dvr *d, const isogi_dvr__packet *p, int k,
                                                                           __mmask16 going, __m512i *sample, isogi_counters *work) {
@@ -2062,6 +2055,9 @@ ISOGI_DVR__AVX512 ISOGI_DVR__ALWAYS __mmask16 isogi_dvr__leap_once_avx512(const 
     const __m512 at = _mm512_maskz_cvtepi32_ps(0xffff, *sample);
     __m512i c[3], number = _mm512_setzero_si512(), free, to;
     __m512 exit = _mm512_maskz_cvtepi32_ps(0xffff, count);
+    const int *leap = (const int *)(const void *)d->leap;
+    __m256i half[2];
+    int32_t block[16];
     __mmask16 move;
     int a;
     for (a = 2; a >= 0; a--) {
@@ -2070,7 +2066,12 @@ ISOGI_DVR__AVX512 ISOGI_DVR__ALWAYS __mmask16 isogi_dvr__leap_once_avx512(const 
         c[a] = _mm512_maskz_min_epi32(0xffff, _mm512_maskz_srli_epi32(0xffff, c[a], 2), _mm512_set1_epi32((int)(level->size[a] - 1)));
         number = _mm512_add_epi32(c[a], _mm512_mullo_epi32(number, _mm512_set1_epi32((int)level->size[a])));
     }
-    free = isogi_dvr__bytes_avx512(d->leap, number);
+    /* three bytes more are read after each, of what is behind them in the same memory */
+    _mm512_storeu_si512(block, number);
+    half[0] = _mm256_loadu_si256((const __m256i *)(const void *)block), half[0] = _mm256_i32gather_epi32(leap, half[0], 1);
+    half[1] = _mm256_loadu_si256((const __m256i *)(const void *)(block + 8)), half[1] = _mm256_i32gather_epi32(leap, half[1], 1);
+    free = _mm512_mask_broadcast_i64x4(_mm512_castsi256_si512(half[0]), 0xf0, half[1]);
+    free = _mm512_and_si512(free, _mm512_set1_epi32(255));
     move = _mm512_mask_cmpgt_epi32_mask(going, free, _mm512_setzero_si512());
     for (a = 0; a < 3; a++) {
         const __m512 inverse = _mm512_loadu_ps(p->inverse[a] + k);
@@ -2085,23 +2086,33 @@ ISOGI_DVR__AVX512 ISOGI_DVR__ALWAYS __mmask16 isogi_dvr__leap_once_avx512(const 
     return _mm512_mask_cmplt_epi32_mask(move, *sample, count);
 }
 
-/* As isogi_dvr__leap. Two vectors side by side: each waits long for its bytes. */
-ISOGI_DVR__AVX512 void isogi_dvr__leap_avx512(const isogi_dvr *d, isogi_dvr__packet *p, isogi_counters *work) {
+/* As isogi_dvr__leap. Two vectors side by side: each waits long for its bytes. Those rays that have found matter by then do not wait for
+   the last three quarters of the others, which go on next time, beside rays that have passed some matter. */
+ISOGI_DVR__AVX512 int isogi_dvr__leap_avx512(const isogi_dvr *d, isogi_dvr__packet *p, isogi_counters *work) {
     __m512i sample[2];
-    __mmask16 going[2];
-    int k;
+    __mmask16 all[2], going[2];
+    uint32_t found, left;
+    int k, most, count = 0;
     for (k = 0; k < 2; k++)
-        sample[k] = _mm512_loadu_si512(p->next + 16 * k),
-        going[k] = _mm512_cmplt_epi32_mask(sample[k], _mm512_loadu_si512(p->count + 16 * k));
-    while (going[0] | going[1]) {
-        going[0] = isogi_dvr__leap_once_avx512(d, p, 0, going[0], &sample[0], work);
-        going[1] = isogi_dvr__leap_once_avx512(d, p, 16, going[1], &sample[1], work);
-    }
+        sample[k] = _mm512_loadu_si512(p->at + 16 * k),
+        all[k] = going[k] = _mm512_cmplt_epi32_mask(sample[k], _mm512_loadu_si512(p->count + 16 * k));
+    most = __builtin_popcount((uint32_t)all[0] | (uint32_t)all[1] << 16) * 6 / 8;
+    do {
+        for (k = 0, found = left = 0; k < 2; k++) {
+            going[k] = isogi_dvr__leap_once_avx512(d, p, 16 * k, going[k], &sample[k], work);
+            found |= (uint32_t)(_mm512_cmplt_epi32_mask(sample[k], _mm512_loadu_si512(p->count + 16 * k)) & ~going[k]) << 16 * k;
+            left |= (uint32_t)going[k] << 16 * k;
+        }
+    } while (left && (!found || __builtin_popcount(left) > most));
     for (k = 0; k < 2; k++) {
-        const __m512i first = _mm512_loadu_si512(p->next + 16 * k), count = _mm512_loadu_si512(p->count + 16 * k);
-        __m512i to = _mm512_mask_sub_epi32(sample[k], _mm512_cmpgt_epi32_mask(sample[k], first), sample[k], _mm512_set1_epi32(1));
-        _mm512_storeu_si512(p->next + 16 * k, _mm512_mask_mov_epi32(count, _mm512_cmplt_epi32_mask(sample[k], count), to));
+        const __m512i next = _mm512_loadu_si512(p->next + 16 * k), end = _mm512_loadu_si512(p->count + 16 * k);
+        const __mmask16 moved = _mm512_cmpgt_epi32_mask(sample[k], _mm512_loadu_si512(p->at + 16 * k));
+        const __m512i to = _mm512_mask_sub_epi32(next, moved, sample[k], _mm512_set1_epi32(1));
+        _mm512_storeu_si512(p->next + 16 * k, _mm512_maskz_min_epi32(0xffff, to, end));
+        _mm512_storeu_si512(p->at + 16 * k, sample[k]);
     }
+    for (; found; found &= found - 1) p->found[count++] = (uint8_t)__builtin_ctz(found);
+    return count;
 }
 #undef ISOGI_DVR__AVX512
 #undef ISOGI_DVR__ALWAYS
@@ -5898,12 +5909,13 @@ struct isogi_dvr__frame {
     double per_piece, per_unit; /* pieces, and units of extinction, to a world length */
     float piece;        /* as isogi_dvr__fast_ray.piece */
     float end, dim;     /* transmittance at which a ray ends; at which its samples stand twice as far apart */
-    void (*leap)(const isogi_dvr *d, isogi_dvr__packet *p, isogi_counters *work);
+    int (*leap)(const isogi_dvr *d, isogi_dvr__packet *p, isogi_counters *work);
     float tolerance;    /* change of extinction times length, and of what is seen of it, from which on a piece is divided */
     float glow;         /* share of the colour that is emitted */
-    void (*look)(const isogi_dvr__frame *f, const isogi_dvr__fast_ray *r, isogi_dvr__fast_run *run, unsigned lanes); /* a bit a ray */
+    void (*look)(const isogi_dvr__frame *f, const isogi_dvr__fast_ray *r, isogi_dvr__fast_run *run, const uint8_t *ray, int count);
     void (*shade)(const isogi_dvr__frame *f, const isogi_dvr__fast_ray *r, isogi_dvr__fast_state *s, const isogi_dvr__fast_run *run,
                   isogi_counters *work);
+    int eight;          /* rays begin eight at once */
     int sample_kind;    /* of isogi_dvr__sample_kind */
     uint32_t last_word; /* of the same */
 };
@@ -6134,10 +6146,11 @@ static void isogi_dvr__fast_look_one(const isogi_dvr__frame *f, const isogi_dvr_
     }
 }
 
-static void isogi_dvr__fast_look(const isogi_dvr__frame *f, const isogi_dvr__fast_ray *r, isogi_dvr__fast_run *run, unsigned lanes) {
-    int k;
-    for (k = 0; k < ISOGI_DVR__RAYS; k++)
-        if (lanes >> k & 1) isogi_dvr__fast_look_one(f, &r[k], &run[k]);
+/* Of `count` rays, by their numbers. */
+static void isogi_dvr__fast_look(const isogi_dvr__frame *f, const isogi_dvr__fast_ray *r, isogi_dvr__fast_run *run, const uint8_t *ray,
+                                 int count) {
+    int i;
+    for (i = 0; i < count; i++) isogi_dvr__fast_look_one(f, &r[ray[i]], &run[ray[i]]);
 }
 
 /* The eight points around a place: from the nearest row before it to those beside. */
@@ -6255,13 +6268,14 @@ static void isogi_dvr__fast_lamps(const isogi_dvr__frame *f, const isogi_dvr__fa
    where in the piece its surface lies decides about light. */
 static void isogi_dvr__fast_divide(const isogi_dvr__frame *f, const isogi_dvr__fast_ray *r, isogi_dvr__fast_state *s,
                                    const isogi_dvr__fast_run *run, int k, isogi_counters *work) {
+    const uint8_t first = 0;
     isogi_dvr__fast_run part;
     memset(&part, 0, sizeof part);
     part.pieces = ISOGI_DVR__NODES - 1, part.first = run->first + run->stride * (float)k, part.stride = run->stride / (float)part.pieces;
     part.length = part.last = (k + 1 < run->pieces ? run->length : run->last) / (float)part.pieces;
     part.tolerance = 3e38f;
     work->samples += ISOGI_DVR__NODES - 2;
-    f->look(f, r, &part, 1);
+    f->look(f, r, &part, &first, 1);
     f->shade(f, r, s, &part, work);
 }
 
@@ -6338,7 +6352,7 @@ typedef uint16_t isogi_dvr__two_bytes __attribute__((aligned(1), may_alias));
 typedef int32_t isogi_dvr__four_bytes __attribute__((aligned(1), may_alias));
 
 /* The field along x between pairs of voxels of eight samples, by plain loads: gathers take longer, on some machines several times. */
-ISOGI_DVR__AVX2 inline __m256 isogi_dvr__row_f32_avx2(const char *row, const uint32_t at[8], __m256 u) {
+ISOGI_DVR__AVX2 ISOGI_DVR__ALWAYS __m256 isogi_dvr__row_f32_avx2(const char *row, const uint32_t at[8], __m256 u) {
 #define ISOGI_DVR__PAIR(k, l) /* two floats each of samples k and l */ \
     _mm_loadh_pi(_mm_castsi128_ps(_mm_loadl_epi64((const __m128i *)(const void *)(row + at[k]))),          \
                  (const __m64 *)(const void *)(row + at[l]))
@@ -6349,7 +6363,7 @@ ISOGI_DVR__AVX2 inline __m256 isogi_dvr__row_f32_avx2(const char *row, const uin
     return _mm256_fmadd_ps(u, _mm256_sub_ps(to, from), from);
 }
 
-ISOGI_DVR__AVX2 inline __m256 isogi_dvr__row_u8_avx2(const char *row, const uint32_t at[8], __m256 u) {
+ISOGI_DVR__AVX2 ISOGI_DVR__ALWAYS __m256 isogi_dvr__row_u8_avx2(const char *row, const uint32_t at[8], __m256 u) {
 #define ISOGI_DVR__PAIR(k) (short)*(const isogi_dvr__two_bytes *)(const void *)(row + at[k])
     const __m128i pair = _mm_setr_epi16(ISOGI_DVR__PAIR(0), ISOGI_DVR__PAIR(1), ISOGI_DVR__PAIR(2), ISOGI_DVR__PAIR(3), ISOGI_DVR__PAIR(4),
                                         ISOGI_DVR__PAIR(5), ISOGI_DVR__PAIR(6), ISOGI_DVR__PAIR(7));
@@ -6360,7 +6374,7 @@ ISOGI_DVR__AVX2 inline __m256 isogi_dvr__row_u8_avx2(const char *row, const uint
     return _mm256_fmadd_ps(u, _mm256_sub_ps(to, from), from);
 }
 
-ISOGI_DVR__AVX2 inline __m256 isogi_dvr__row_u16_avx2(const char *row, const uint32_t at[8], __m256 u) {
+ISOGI_DVR__AVX2 ISOGI_DVR__ALWAYS __m256 isogi_dvr__row_u16_avx2(const char *row, const uint32_t at[8], __m256 u) {
 #define ISOGI_DVR__PAIR(k) (*(const isogi_dvr__four_bytes *)(const void *)(row + at[k]))
     const __m256i pair = _mm256_setr_epi32(ISOGI_DVR__PAIR(0), ISOGI_DVR__PAIR(1), ISOGI_DVR__PAIR(2), ISOGI_DVR__PAIR(3),
                                            ISOGI_DVR__PAIR(4), ISOGI_DVR__PAIR(5), ISOGI_DVR__PAIR(6), ISOGI_DVR__PAIR(7));
@@ -6371,7 +6385,8 @@ ISOGI_DVR__AVX2 inline __m256 isogi_dvr__row_u16_avx2(const char *row, const uin
 }
 
 /* Cells of samples along an axis, and places in them. */
-ISOGI_DVR__AVX2 inline __m256i isogi_dvr__cells_avx2(const isogi_dvr__frame *f, const isogi_dvr__fast_ray *r, __m256 at, int a, float *u) {
+ISOGI_DVR__AVX2 ISOGI_DVR__ALWAYS __m256i isogi_dvr__cells_avx2(const isogi_dvr__frame *f, const isogi_dvr__fast_ray *r, __m256 at, int a,
+                                                                float *u) {
     __m256 x = _mm256_fmadd_ps(at, _mm256_set1_ps(r->dir[a]), _mm256_set1_ps(r->origin[a]));
     __m256i c;
     x = _mm256_min_ps(_mm256_max_ps(x, _mm256_setzero_ps()), _mm256_set1_ps(f->cells[a]));
@@ -6387,7 +6402,7 @@ typedef struct isogi_dvr__fast_cells {
     unsigned bad;
 } isogi_dvr__fast_cells;
 
-ISOGI_DVR__AVX2 inline void isogi_dvr__run_cells_avx2(const isogi_dvr__frame *f, const isogi_dvr__fast_ray *r,
+ISOGI_DVR__AVX2 ISOGI_DVR__ALWAYS void isogi_dvr__run_cells_avx2(const isogi_dvr__frame *f, const isogi_dvr__fast_ray *r,
                                                       const isogi_dvr__fast_run *run, isogi_dvr__fast_cells *cells) {
     const __m256 lane = _mm256_fmadd_ps(_mm256_set1_ps(run->stride), _mm256_setr_ps(0, 1, 2, 3, 4, 5, 6, 7), _mm256_set1_ps(run->first));
     __m256i offset = isogi_dvr__cells_avx2(f, r, lane, 0, cells->u[0]);
@@ -6414,26 +6429,26 @@ ISOGI_DVR__AVX2 ISOGI_DVR__ALWAYS __m256 isogi_dvr__samples_avx2(const isogi_dvr
 }
 
 /* Lane k + 1 at lane k. */
-ISOGI_DVR__AVX2 inline __m256 isogi_dvr__next_avx2(__m256 x) {
+ISOGI_DVR__AVX2 ISOGI_DVR__ALWAYS __m256 isogi_dvr__next_avx2(__m256 x) {
     return _mm256_permutevar8x32_ps(x, _mm256_setr_epi32(1, 2, 3, 4, 5, 6, 7, 7));
 }
 
-ISOGI_DVR__AVX2 inline __m256 isogi_dvr__magnitude_avx2(__m256 x) { return _mm256_andnot_ps(_mm256_set1_ps(-0.0f), x); }
+ISOGI_DVR__AVX2 ISOGI_DVR__ALWAYS __m256 isogi_dvr__magnitude_avx2(__m256 x) { return _mm256_andnot_ps(_mm256_set1_ps(-0.0f), x); }
 
-ISOGI_DVR__AVX2 inline __m256i isogi_dvr__fast_classes_avx2(const isogi_dvr__frame *f, __m256 value) {
+ISOGI_DVR__AVX2 ISOGI_DVR__ALWAYS __m256i isogi_dvr__fast_classes_avx2(const isogi_dvr__frame *f, __m256 value) {
     return _mm256_cvttps_epi32(_mm256_min_ps(_mm256_max_ps(value, _mm256_setzero_ps()), _mm256_set1_ps(f->top)));
 }
 
 /* Where isogi_dvr__fast_factors takes the mean. */
-ISOGI_DVR__AVX2 inline __m256 isogi_dvr__close_avx2(__m256 difference, __m256i index) {
+ISOGI_DVR__AVX2 ISOGI_DVR__ALWAYS __m256 isogi_dvr__close_avx2(__m256 difference, __m256i index) {
     __m256i next = _mm256_castps_si256(isogi_dvr__next_avx2(_mm256_castsi256_ps(index)));
     __m256 close = _mm256_cmp_ps(isogi_dvr__magnitude_avx2(difference), _mm256_set1_ps(ISOGI_DVR__CLOSE), _CMP_LT_OQ);
     return _mm256_or_ps(close, _mm256_castsi256_ps(_mm256_cmpeq_epi32(index, next)));
 }
 
 /* The extinction of eight classes: integrals before them, so many quanta and the rest, and over them. */
-ISOGI_DVR__AVX2 inline void isogi_dvr__matter_avx2(const isogi_dvr__frame *f, const uint32_t at[8], __m256i *before, __m256 *rest,
-                                                   __m256 *mean) {
+ISOGI_DVR__AVX2 ISOGI_DVR__ALWAYS void isogi_dvr__matter_avx2(const isogi_dvr__frame *f, const uint32_t at[8], __m256i *before,
+                                                              __m256 *rest, __m256 *mean) {
 #define ISOGI_DVR__TWO(k) /* classes k and k + 4 */ \
     _mm256_insertf128_ps(_mm256_castps128_ps256(_mm_load_ps((const float *)(const void *)&f->matter[at[k]])), \
                          _mm_load_ps((const float *)(const void *)&f->matter[at[(k) + 4]]), 1)
@@ -6446,10 +6461,9 @@ ISOGI_DVR__AVX2 inline void isogi_dvr__matter_avx2(const isogi_dvr__frame *f, co
 }
 
 /* Places of samples among the classes, and their classes. */
-ISOGI_DVR__AVX2 ISOGI_DVR__ALWAYS void isogi_dvr__run_classes_avx2(const isogi_dvr__frame *f, isogi_dvr__fast_run *run,
-                                                                   isogi_dvr__fast_cells *cells, int kind) {
+ISOGI_DVR__AVX2 ISOGI_DVR__ALWAYS void isogi_dvr__run_values_avx2(const isogi_dvr__frame *f, isogi_dvr__fast_run *run,
+                                                                  isogi_dvr__fast_cells *cells, __m256 value) {
     const __m256i infinite = _mm256_set1_epi32(0x7f800000);
-    __m256 value = isogi_dvr__samples_avx2(f, cells, kind);
     __m256i bad = _mm256_cmpeq_epi32(_mm256_and_si256(_mm256_castps_si256(value), infinite), infinite);
     value = _mm256_fmadd_ps(value, _mm256_set1_ps(f->value_scale), _mm256_set1_ps(f->value_bias));
     value = _mm256_min_ps(_mm256_max_ps(_mm256_mul_ps(value, _mm256_set1_ps(f->scale)), _mm256_set1_ps(-1e15f)), _mm256_set1_ps(1e15f));
@@ -6459,8 +6473,13 @@ ISOGI_DVR__AVX2 ISOGI_DVR__ALWAYS void isogi_dvr__run_classes_avx2(const isogi_d
     _mm256_storeu_si256((__m256i *)(void *)cells->at, isogi_dvr__fast_classes_avx2(f, value));
 }
 
+ISOGI_DVR__AVX2 ISOGI_DVR__ALWAYS void isogi_dvr__run_classes_avx2(const isogi_dvr__frame *f, isogi_dvr__fast_run *run,
+                                                                   isogi_dvr__fast_cells *cells, int kind) {
+    isogi_dvr__run_values_avx2(f, run, cells, isogi_dvr__samples_avx2(f, cells, kind));
+}
+
 /* What lies between the samples of a run. */
-ISOGI_DVR__AVX2 inline void isogi_dvr__run_matter_avx2(const isogi_dvr__frame *f, isogi_dvr__fast_run *run,
+ISOGI_DVR__AVX2 ISOGI_DVR__ALWAYS void isogi_dvr__run_matter_avx2(const isogi_dvr__frame *f, isogi_dvr__fast_run *run,
                                                        const isogi_dvr__fast_cells *cells) {
     const __m256 value = _mm256_loadu_ps(run->classes);
     const __m256i lane = _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7), index = _mm256_loadu_si256((const __m256i *)(const void *)cells->at);
@@ -6490,27 +6509,74 @@ ISOGI_DVR__AVX2 inline void isogi_dvr__run_matter_avx2(const isogi_dvr__frame *f
 
 /* As isogi_dvr__fast_look: cells of all runs, then values of all, then matter, since each waits long for what is before it, values for
    memory. */
-ISOGI_DVR__AVX2 void isogi_dvr__look_avx2(const isogi_dvr__frame *f, const isogi_dvr__fast_ray *r, isogi_dvr__fast_run *run,
-                                          unsigned lanes) {
 #define ISOGI_DVR__EACH(what) \
-    for (left = lanes; left; left &= left - 1) { \
-        int k = __builtin_ctz(left); \
+    for (n = 0; n < count; n++) { \
+        const int k = ray[n]; \
         what; \
     }
-    isogi_dvr__fast_cells cells[ISOGI_DVR__RAYS];
-    unsigned left;
-    const char *data = (const char *)f->dvr->volume.data;
-    int i;
-    ISOGI_DVR__EACH({
-        isogi_dvr__run_cells_avx2(f, &r[k], &run[k], &cells[k]);
-        for (i = 0; i < 8; i++) __builtin_prefetch(data + cells[k].at[i]);
-    })
-    if (f->sample_kind == 0) ISOGI_DVR__EACH(isogi_dvr__run_classes_avx2(f, &run[k], &cells[k], 0))
-    else if (f->sample_kind == 1) ISOGI_DVR__EACH(isogi_dvr__run_classes_avx2(f, &run[k], &cells[k], 1))
-    else ISOGI_DVR__EACH(isogi_dvr__run_classes_avx2(f, &run[k], &cells[k], 2))
+#define ISOGI_DVR__LOOK(classes, kind) \
+    isogi_dvr__fast_cells cells[ISOGI_DVR__RAYS]; \
+    const char *data = (const char *)f->dvr->volume.data; \
+    int i, n; \
+    ISOGI_DVR__EACH({ \
+        isogi_dvr__run_cells_avx2(f, &r[k], &run[k], &cells[k]); \
+        for (i = 0; i < 8; i++) __builtin_prefetch(data + cells[k].at[i]); \
+    }) \
+    if (kind == 0) ISOGI_DVR__EACH(classes(f, &run[k], &cells[k], 0)) \
+    else if (kind == 1) ISOGI_DVR__EACH(classes(f, &run[k], &cells[k], 1)) \
+    else ISOGI_DVR__EACH(classes(f, &run[k], &cells[k], 2)) \
     ISOGI_DVR__EACH(isogi_dvr__run_matter_avx2(f, &run[k], &cells[k]))
-#undef ISOGI_DVR__EACH
+ISOGI_DVR__AVX2 void isogi_dvr__look_avx2(const isogi_dvr__frame *f, const isogi_dvr__fast_ray *r, isogi_dvr__fast_run *run,
+                                          const uint8_t *ray, int count) {
+    ISOGI_DVR__LOOK(isogi_dvr__run_classes_avx2, f->sample_kind)
 }
+
+#define ISOGI_DVR__AVX512 __attribute__((target("avx2,fma,avx512f,avx512vl,avx512dq,avx512bw"))) static
+/* Pairs of floats of samples k, k + 1, k + 4 and k + 5: loads put them to their places without a shuffle. */
+ISOGI_DVR__AVX512 ISOGI_DVR__ALWAYS __m256 isogi_dvr__pairs_avx512(const char *row, const uint32_t at[8], int k) {
+#define ISOGI_DVR__PAIR(k) _mm_castsi128_pd(_mm_loadl_epi64((const __m128i *)(const void *)(row + at[k])))
+    __m256d x = _mm256_broadcastsd_pd(ISOGI_DVR__PAIR(k));
+    x = _mm256_mask_broadcastsd_pd(x, 2, ISOGI_DVR__PAIR(k + 1)), x = _mm256_mask_broadcastsd_pd(x, 4, ISOGI_DVR__PAIR(k + 4));
+    return _mm256_castpd_ps(_mm256_mask_broadcastsd_pd(x, 8, ISOGI_DVR__PAIR(k + 5)));
+#undef ISOGI_DVR__PAIR
+}
+
+/* The same of samples 0, 1, 4, 5, 2, 3, 6 and 7. Nothing here may leave lanes undefined: gcc 12 warns of that in its own headers. */
+ISOGI_DVR__AVX512 ISOGI_DVR__ALWAYS __m512 isogi_dvr__all_pairs_avx512(const char *row, const uint32_t at[8]) {
+    const __m256d low = _mm256_castps_pd(isogi_dvr__pairs_avx512(row, at, 0)), high = _mm256_castps_pd(isogi_dvr__pairs_avx512(row, at, 2));
+    return _mm512_castpd_ps(_mm512_mask_broadcast_f64x4(_mm512_castpd256_pd512(low), 0xf0, high));
+}
+
+/* As isogi_dvr__samples_avx2 of floats: pairs stay pairs until they stand between their rows. */
+ISOGI_DVR__AVX512 ISOGI_DVR__ALWAYS __m256 isogi_dvr__floats_avx512(const isogi_dvr__frame *f, const isogi_dvr__fast_cells *cells) {
+    const char *data = (const char *)f->dvr->volume.data, *next = data + f->stride[1], *behind = data + f->stride[2],
+               *last = behind + f->stride[1];
+    const __m512i twice = _mm512_setr_epi32(0, 0, 1, 1, 4, 4, 5, 5, 2, 2, 3, 3, 6, 6, 7, 7);
+    const __m512 v = _mm512_maskz_permutexvar_ps(0xffff, twice, _mm512_castps256_ps512(_mm256_loadu_ps(cells->u[1]))),
+                 w = _mm512_maskz_permutexvar_ps(0xffff, twice, _mm512_castps256_ps512(_mm256_loadu_ps(cells->u[2])));
+    __m512 x0 = isogi_dvr__all_pairs_avx512(data, cells->at), x1 = isogi_dvr__all_pairs_avx512(next, cells->at),
+           x2 = isogi_dvr__all_pairs_avx512(behind, cells->at), x3 = isogi_dvr__all_pairs_avx512(last, cells->at);
+    float pair[16];
+    __m256 low, high, from, to;
+    x0 = _mm512_fmadd_ps(v, _mm512_sub_ps(x1, x0), x0), x2 = _mm512_fmadd_ps(v, _mm512_sub_ps(x3, x2), x2);
+    _mm512_storeu_ps(pair, _mm512_fmadd_ps(w, _mm512_sub_ps(x2, x0), x0));
+    low = _mm256_loadu_ps(pair), high = _mm256_loadu_ps(pair + 8);
+    from = _mm256_shuffle_ps(low, high, 0x88), to = _mm256_shuffle_ps(low, high, 0xdd);
+    return _mm256_fmadd_ps(_mm256_loadu_ps(cells->u[0]), _mm256_sub_ps(to, from), from);
+}
+
+ISOGI_DVR__AVX512 ISOGI_DVR__ALWAYS void isogi_dvr__run_classes_avx512(const isogi_dvr__frame *f, isogi_dvr__fast_run *run,
+                                                                       isogi_dvr__fast_cells *cells, int kind) {
+    isogi_dvr__run_values_avx2(f, run, cells, kind ? isogi_dvr__samples_avx2(f, cells, kind) : isogi_dvr__floats_avx512(f, cells));
+}
+
+ISOGI_DVR__AVX512 void isogi_dvr__look_avx512(const isogi_dvr__frame *f, const isogi_dvr__fast_ray *r, isogi_dvr__fast_run *run,
+                                              const uint8_t *ray, int count) {
+    ISOGI_DVR__LOOK(isogi_dvr__run_classes_avx512, f->sample_kind)
+}
+#undef ISOGI_DVR__EACH
+#undef ISOGI_DVR__LOOK
+#undef ISOGI_DVR__AVX512
 
 /* As isogi_dvr__exp. */
 ISOGI_DVR__AVX2 inline __m256 isogi_dvr__exp_avx2(__m256 x) {
@@ -6704,39 +6770,40 @@ static void isogi_dvr__fast_cast(const isogi_dvr__frame *f, const isogi_dvr__fas
                                  isogi_dvr__fast_state s[ISOGI_DVR__RAYS], isogi_counters *work) {
     isogi_dvr__packet p;
     isogi_dvr__fast_run run[ISOGI_DVR__RAYS];
-    int k, a;
-    unsigned any = 1;
+    int k, a, i, count;
     for (k = 0; k < ISOGI_DVR__RAYS; k++) {
         for (a = 0; a < 3; a++) {
             float x = r[k].dir[a];
             p.origin[a][k] = r[k].origin[a], p.dir[a][k] = x, p.inverse[a][k] = fabsf(x) > 1e-20f ? x : x > 0 ? 1e-20f : -1e-20f;
         }
-        p.next[k] = 0, p.count[k] = r[k].count;
+        p.next[k] = p.at[k] = 0, p.count[k] = r[k].count;
         memset(&s[k], 0, sizeof s[k]);
         s[k].clear = 1, run[k].tolerance = f->tolerance;
     }
     for (a = 0; a < 3; a++)
         for (k = 0; k < ISOGI_DVR__RAYS; k++) p.inverse[a][k] = 1 / p.inverse[a][k];
-    while (any) {
-        f->leap(f->dvr, &p, work);
-        for (k = 0, any = 0; k < ISOGI_DVR__RAYS; k++) { /* waiting for memory together */
-            int left = p.count[k] - 1 - p.next[k], stride = s[k].clear < f->dim && left > 2 * (ISOGI_DVR__NODES - 1) ? 2 : 1;
-            run[k].some = 0;
-            if (left <= 0) {
-                p.next[k] = p.count[k];
+    while ((count = f->leap(f->dvr, &p, work)) > 0) {
+        for (i = 0; i < count; i++) { /* waiting for memory together */
+            int left, stride;
+            k = p.found[i], left = p.count[k] - 1 - p.next[k];
+            if (left <= 0) { /* the last sample of all */
+                p.next[k] = p.at[k] = p.count[k], p.found[i--] = p.found[--count];
                 continue;
             }
+            stride = s[k].clear < f->dim && left > 2 * (ISOGI_DVR__NODES - 1) ? 2 : 1;
             run[k].first = (float)p.next[k], run[k].stride = (float)stride,
             run[k].pieces = left < ISOGI_DVR__NODES ? left : ISOGI_DVR__NODES - 1;
             run[k].length = r[k].piece * run[k].stride, run[k].last = left < ISOGI_DVR__NODES ? r[k].last_piece : run[k].length;
-            work->samples += ISOGI_DVR__NODES, any |= 1u << k;
-            p.next[k] += stride * (ISOGI_DVR__NODES - 1);
+            p.at[k] = p.next[k] += stride * (ISOGI_DVR__NODES - 1);
         }
-        f->look(f, r, run, any);
-        for (k = 0; k < ISOGI_DVR__RAYS; k++) {
-            if (run[k].some && f->lamps) isogi_dvr__fast_beside_lamps(f, &r[k], &run[k]);
-            if (run[k].some) f->shade(f, &r[k], &s[k], &run[k], work);
-            if (!(s[k].clear > f->end)) p.next[k] = p.count[k];
+        work->samples += (uint64_t)(ISOGI_DVR__NODES * count);
+        f->look(f, r, run, p.found, count);
+        for (i = 0; i < count; i++) {
+            k = p.found[i];
+            if (!run[k].some) continue;
+            if (f->lamps) isogi_dvr__fast_beside_lamps(f, &r[k], &run[k]);
+            f->shade(f, &r[k], &s[k], &run[k], work);
+            if (!(s[k].clear > f->end)) p.next[k] = p.at[k] = p.count[k];
         }
     }
 }
@@ -6958,12 +7025,90 @@ static void isogi_dvr__depth_fast(const isogi_dvr__render_job *job, isogi_dvr__f
         if (ray[k].count) depth[k] = (float)(ray[k].enter + (double)state[k].place * probe.step * job->dvr->spacing);
 }
 
-/* A packet: eight by four pixels. */
-ISOGI_DVR__APART void isogi_dvr__render_fast(const isogi_dvr__render_job *job, int x0, int y0, isogi_counters *work) {
-    isogi_dvr__fast_ray ray[ISOGI_DVR__RAYS];
-    isogi_dvr__fast_state state[ISOGI_DVR__RAYS];
-    float depth[ISOGI_DVR__RAYS];
+#ifdef ISOGI_DVR__AVX
+#define ISOGI_DVR__AVX512 __attribute__((target("avx512f,avx512vl,avx512dq,avx512bw,fma"))) static
+#define ISOGI_DVR__8(x) _mm512_set1_pd(x)
+/* Directions of eight pixels in a row (grid, of world length 1). */
+ISOGI_DVR__AVX512 void isogi_dvr__toward_avx512(const isogi_dvr__render_job *job, int x0, int y, double dir[3][8]) {
+    const isogi_dvr__camera *c = &job->grid;
+    const __m512d one = ISOGI_DVR__8(1);
+    __m512d across, inverse;
+    double at[2];
+    int a;
+    isogi_dvr__camera_place(&job->camera, job->view, x0, y, at);
+    across = _mm512_add_pd(_mm512_setr_pd(0, 1, 2, 3, 4, 5, 6, 7), ISOGI_DVR__8(x0 + 0.5));
+    across = _mm512_sub_pd(_mm512_mul_pd(ISOGI_DVR__8(2), across), ISOGI_DVR__8(job->view->width));
+    across = _mm512_mul_pd(_mm512_div_pd(across, ISOGI_DVR__8(job->view->height)), ISOGI_DVR__8(job->camera.half));
+    inverse = _mm512_add_pd(_mm512_add_pd(one, _mm512_mul_pd(across, across)), ISOGI_DVR__8(at[1] * at[1]));
+    inverse = _mm512_div_pd(one, _mm512_maskz_sqrt_pd(255, inverse));
+    for (a = 0; a < 3; a++) {
+        __m512d x = _mm512_add_pd(ISOGI_DVR__8(c->forward[a]), _mm512_mul_pd(across, ISOGI_DVR__8(c->right[a])));
+        _mm512_storeu_pd(dir[a], _mm512_mul_pd(_mm512_add_pd(x, ISOGI_DVR__8(at[1] * c->under[a])), inverse));
+    }
+}
+
+/* As isogi_dvr__fast_begin of eight rays, without clip planes; others than those that hit have a count of 0. */
+ISOGI_DVR__AVX512 void isogi_dvr__begin_avx512(const isogi_dvr__frame *f, const double origin[3], const double dir[3][8],
+                                               isogi_dvr__fast_ray r[8]) {
+    const isogi_dvr *d = f->dvr;
+    const __m512d zero = _mm512_setzero_pd(), one = ISOGI_DVR__8(1), piece = ISOGI_DVR__8(f->step * d->spacing);
+    __m512d enter = zero, leave = ISOGI_DVR__8(1e300), sum = zero, pieces, last;
+    float place[3][8], step[3][8], reach[8], end[8];
+    double begin[8];
+    int32_t count[8];
+    __mmask8 hit = 255;
+    int a, k;
+    for (a = 0; a < 3; a++) {
+        const __m512d along = _mm512_loadu_pd(dir[a]), inverse = _mm512_div_pd(one, along);
+        const __m512d t0 = _mm512_mul_pd(ISOGI_DVR__8(-origin[a]), inverse),
+                      t1 = _mm512_mul_pd(ISOGI_DVR__8(d->cells[a] - origin[a]), inverse);
+        const __mmask8 goes = _mm512_cmp_pd_mask(_mm512_andnot_pd(ISOGI_DVR__8(-0.0), along), ISOGI_DVR__8(1e-300), _CMP_GT_OQ);
+        if (!(origin[a] >= 0 && origin[a] <= d->cells[a])) hit = (__mmask8)(hit & goes);
+        enter = _mm512_mask_max_pd(enter, goes, _mm512_maskz_min_pd(255, t0, t1), enter);
+        leave = _mm512_mask_min_pd(leave, goes, _mm512_maskz_max_pd(255, t0, t1), leave);
+    }
+    last = _mm512_sub_pd(leave, enter), pieces = _mm512_sub_pd(_mm512_mul_pd(last, ISOGI_DVR__8(f->per_piece)), ISOGI_DVR__8(1e-6));
+    pieces = _mm512_ceil_pd(pieces);
+    hit = (__mmask8)(hit & _mm512_cmp_pd_mask(enter, leave, _CMP_LT_OQ) & _mm512_cmp_pd_mask(leave, ISOGI_DVR__8(1e300), _CMP_LT_OQ) &
+                     _mm512_cmp_pd_mask(pieces, ISOGI_DVR__8(1e7), _CMP_LT_OQ));
+    for (a = 0; a < 3; a++) {
+        __m512d x = _mm512_loadu_pd(dir[a]), at = _mm512_add_pd(ISOGI_DVR__8(origin[a]), _mm512_mul_pd(enter, x));
+        at = _mm512_maskz_min_pd(255, _mm512_maskz_max_pd(255, at, zero), ISOGI_DVR__8(d->cells[a])), x = _mm512_mul_pd(x, piece);
+        _mm256_storeu_ps(place[a], _mm512_maskz_cvtpd_ps(255, at)), _mm256_storeu_ps(step[a], _mm512_maskz_cvtpd_ps(255, x));
+        x = _mm512_mul_pd(x, ISOGI_DVR__8((double)d->grid_scale[a])), sum = _mm512_add_pd(sum, _mm512_mul_pd(x, x));
+    }
+    _mm256_storeu_ps(reach, _mm256_maskz_div_ps(_mm512_cmp_pd_mask(sum, ISOGI_DVR__8(1e-30), _CMP_GT_OQ), _mm256_set1_ps(1.5f),
+                                                _mm256_sqrt_ps(_mm512_maskz_cvtpd_ps(255, sum))));
+    last = _mm512_sub_pd(last, _mm512_mul_pd(_mm512_sub_pd(pieces, one), piece));
+    last = _mm512_maskz_max_pd(255, _mm512_mul_pd(last, ISOGI_DVR__8(f->per_unit)), zero);
+    _mm256_storeu_ps(end, _mm512_maskz_cvtpd_ps(255, _mm512_maskz_min_pd(255, last, ISOGI_DVR__8(1e30))));
+    _mm512_storeu_pd(begin, enter);
+    _mm256_storeu_si256((__m256i *)(void *)count, _mm512_maskz_cvttpd_epi32(hit, _mm512_add_pd(pieces, one)));
+    for (k = 0; k < 8; k++) {
+        for (a = 0; a < 3; a++) r[k].origin[a] = place[a][k], r[k].dir[a] = step[a][k];
+        r[k].enter = begin[k], r[k].sought = 3e38f, r[k].reach = reach[k], r[k].piece = f->piece, r[k].last_piece = end[k];
+        r[k].count = count[k];
+    }
+}
+#undef ISOGI_DVR__8
+#undef ISOGI_DVR__AVX512
+#endif
+
+/* The rays of a packet. */
+static void isogi_dvr__begin_packet(const isogi_dvr__render_job *job, int x0, int y0, isogi_dvr__fast_ray ray[ISOGI_DVR__RAYS],
+                                    isogi_counters *work) {
     int k, a;
+#ifdef ISOGI_DVR__AVX
+    if (job->fast.frame.eight && x0 + 8 <= job->view->width && y0 + ISOGI_DVR__RAYS / 8 <= job->view->height) {
+        double dir[3][8];
+        for (k = 0; k < ISOGI_DVR__RAYS; k += 8) {
+            isogi_dvr__toward_avx512(job, x0, y0 + k / 8, dir);
+            isogi_dvr__begin_avx512(&job->fast.frame, job->eye, (const double(*)[8])dir, ray + k);
+        }
+        work->rays += ISOGI_DVR__RAYS;
+        return;
+    }
+#endif
     for (k = 0; k < ISOGI_DVR__RAYS; k++) {
         int x = x0 + k % 8, y = y0 + k / 8;
         double at[2], dir[3], inverse;
@@ -6976,6 +7121,15 @@ ISOGI_DVR__APART void isogi_dvr__render_fast(const isogi_dvr__render_job *job, i
         for (a = 0; a < 3; a++) dir[a] = (job->grid.forward[a] + at[0] * job->grid.right[a] + at[1] * job->grid.under[a]) * inverse;
         if (!isogi_dvr__fast_begin(&job->fast.frame, job->eye, dir, &ray[k])) ray[k].count = 0;
     }
+}
+
+/* A packet: eight by four pixels. */
+ISOGI_DVR__APART void isogi_dvr__render_fast(const isogi_dvr__render_job *job, int x0, int y0, isogi_counters *work) {
+    isogi_dvr__fast_ray ray[ISOGI_DVR__RAYS];
+    isogi_dvr__fast_state state[ISOGI_DVR__RAYS];
+    float depth[ISOGI_DVR__RAYS];
+    int k, a;
+    isogi_dvr__begin_packet(job, x0, y0, ray, work);
     isogi_dvr__fast_cast(&job->fast.frame, ray, state, work);
     if (job->depth) isogi_dvr__depth_fast(job, ray, depth, work);
     for (k = 0; k < ISOGI_DVR__RAYS; k++) {
@@ -7048,6 +7202,8 @@ static isogi_result isogi_dvr__begin_frame(isogi_dvr__render_job *job) {
     if (f->sample_kind >= 0 && isogi_dvr__machine() >= 3 && (!d->context.force_path || d->context.force_path > 2) &&
         points < 0x7fffffff && d->held.total < 0x0fffffff)
         f->look = isogi_dvr__look_avx2, f->shade = isogi_dvr__fast_shade_avx2;
+    if (f->look == isogi_dvr__look_avx2 && isogi_dvr__machine() >= 4 && (!d->context.force_path || d->context.force_path > 3))
+        f->look = isogi_dvr__look_avx512, f->eight = !d->clip_count && !d->transparent;
 #endif
     f->count = isogi_dvr__count_classes(d, &low, &scale);
     f->classes = (isogi_dvr__class_entry *)isogi_allocate(&d->context, f->count, sizeof *f->classes);

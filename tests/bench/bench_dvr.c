@@ -16,6 +16,7 @@
 #include "brute_reference.h"
 #include "goals.h"
 #include "hdr.h"
+#include "large.h"
 #include <stdio.h>
 #include <time.h>
 
@@ -179,7 +180,7 @@ static void bench_scale_invariant(void) {
                 {"post-classified", ISOGI_DVR_POST_CLASSIFIED, 0.5}, {"post-classified", ISOGI_DVR_POST_CLASSIFIED, 0.25}};
     const int SIDE = dry ? 16 : 256, SAMPLE = dry ? 16 : 128;
     const size_t n = (size_t)SIDE, pixels = (size_t)FRAME * (size_t)FRAME, sample = (size_t)SAMPLE * (size_t)SAMPLE;
-    float *data = (float *)malloc(n * n * n * sizeof *data);
+    float *data = (float *)large_allocate(n * n * n * sizeof *data);
     float(*image)[4] = (float(*)[4])malloc(pixels * sizeof *image), (*reference)[4] = (float(*)[4])malloc(sample * sizeof *reference);
     for (size_t i = 0; i < n * n * n; i++)
         data[i] = (float)gyroid(2.0 * (double)(i % n) / (SIDE - 1) - 1, 2.0 * (double)(i / n % n) / (SIDE - 1) - 1,
@@ -552,7 +553,7 @@ static void bench_scene_rows(const bench_scene *s) {
     isogi_pyramid *pyramid = NULL;
     hdr_image image = {0};
     char path[512], error[512];
-    void *data = malloc(count * (s->file ? 1 : sizeof(float)));
+    void *data = large_allocate(count * (s->file ? 1 : sizeof(float)));
     memcpy(p, s->point, sizeof p);
     if (s->file) {
         FILE *file;
