@@ -359,6 +359,34 @@ TEST(lengths_and_extinctions_without_measure_are_opaque) {
     field_free(&f);
 }
 
+/* A ray along the faces of the box, beside it, hits nothing: none of its planes is in the way. */
+TEST(rays_beside_the_box_along_its_faces_are_transparent) {
+    enum { WIDTH = 17 };
+    static const isogi_transfer_point points[] = {{0, {1, 1, 1}, 5}, {1, {1, 1, 1}, 5}};
+    static const isogi_transfer transfer = {.points = points, .point_count = 2};
+    static const float data[16][16][16]; /* zeros */
+    const isogi_volume volume = {.data = data, .type = ISOGI_F32, .size = {16, 16, 16}};
+    for (int path = 1; path <= 4; path++)
+        for (int beside = 0; beside < 2; beside++) {
+            const isogi_context context = {.threads = 1, .force_path = path};
+            const float x = beside ? -5 : 3;
+            const isogi_view view = {.width = WIDTH, .height = WIDTH, .fov = 40, .eye = {x, 7, 40}, .target = {x, 7, 0}};
+            isogi_pyramid *pyramid = NULL;
+            isogi_dvr *dvr = NULL;
+            float image[WIDTH * WIDTH][4];
+            CHECK(isogi_vol_build(&pyramid, &volume, &context) == ISOGI_OK, "build");
+            const isogi_dvr_desc desc = {.pyramid = pyramid, .shading = ISOGI_DVR_UNLIT};
+            CHECK(isogi_dvr_create(&dvr, &desc, &context) == ISOGI_OK && isogi_dvr_set_transfer(dvr, &transfer) == ISOGI_OK, "create");
+            CHECK(isogi_dvr_render(dvr, &view, NULL, image, NULL, NULL) == ISOGI_OK, "render");
+            CHECK(image[WIDTH * 8 + 13][3] > 0.99f, "path %d: opacity %g of the box", path, (double)image[WIDTH * 8 + 13][3]);
+            for (int y = 0; y < WIDTH; y++)
+                CHECK(beside ? !(image[WIDTH * y + 8][3] > 0) : y != 8 || image[WIDTH * y + 8][3] > 0.99f, "path %d, row %d: opacity %g",
+                      path, y, (double)image[WIDTH * y + 8][3]);
+            isogi_dvr_free(dvr);
+            isogi_vol_free(pyramid);
+        }
+}
+
 /* Frames of physical space are those of plain code on every path, whatever type voxels have, up to the last voxel of the data. */
 TEST(frames_of_all_types_agree_on_all_paths) {
     enum { WIDTH = 24, HEIGHT = 18 };
