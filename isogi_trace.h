@@ -473,8 +473,9 @@ ISOGI_API size_t isogi_trace_memory(const isogi_trace *trace); /* bytes that the
 #define ISOGI_TRACE__SAMPLES 16384 /* samples of a batch, */
 #define ISOGI_TRACE__SPANS 4096    /* in as many pieces, */
 #define ISOGI_TRACE__SPAN 512      /* of at most this many */
-#define ISOGI_TRACE__TASK_SPANS 32 /* pieces in a task */
-#define ISOGI_TRACE__FLUSH 64      /* rays in one call */
+#define ISOGI_TRACE__TASK_SPANS 128 /* pieces in a task, */
+#define ISOGI_TRACE__CASTS 65      /* in so many tasks at most: each but the last is full, by SPAN samples or by pieces */
+#define ISOGI_TRACE__FLUSH 256     /* rays in one call */
 #define ISOGI_TRACE__SWEEP 256     /* nodes in a task that traces no rays */
 #define ISOGI_TRACE__PIECE 65536   /* rays that take as long as what is done without any before progress is told of, */
 #define ISOGI_TRACE__PLACING 1.5   /* samples that take as long as finding where a texel lies, */
@@ -2911,11 +2912,16 @@ typedef struct isogi_trace__job {
     size_t first, count, each; /* each: texels of a task */
 } isogi_trace__job;
 
-/* What the next pixel will mostly ask for again: a cell all of whose texels have been seen to. Not on its faces, where a lookup reads
-   fewer of them. */
-static int isogi_trace__seen(const size_t cell[3], const double local[3], const size_t known[3]) {
+/* Cells all of whose texels have been seen to: the next pixels, and those of the next lines, will mostly ask for them again. */
+typedef struct isogi_trace__known {
+    uint32_t cell[256][3];
+    int lacking; /* around some point no texel had a surface: of others the nearest that has one may be another */
+} isogi_trace__known;
+
+/* Where a cell stands; NULL for points on its faces, where a lookup reads fewer texels. */
+static uint32_t *isogi_trace__known_at(isogi_trace__known *known, const size_t cell[3], const double local[3]) {
     int inner = local[0] > 0 && local[0] < 1 && local[1] > 0 && local[1] < 1 && local[2] > 0 && local[2] < 1;
-    return inner && !memcmp(cell, known, 3 * sizeof *cell);
+    return inner ? known->cell[(cell[0] + 7 * cell[1] + 61 * cell[2]) & 255] : NULL;
 }
 
 static void isogi_trace__learn_task(void *arg, size_t task) {
@@ -2929,41 +2935,69 @@ static void isogi_trace__learn_task(void *arg, size_t task) {
     for (i = 0; i < count; i++) ref[i].brick->state[ref[i].slot] = state[i]; /* each by one task alone */
 }
 
+/* Texels that a lookup reads: of each the number of its tap, of its brick, and its slot. inner: the point is on no face of the cell.
+   Returns how many. */
+static int isogi_trace__corners(const isogi_trace *t, const size_t cell[3], const double local[3], int inner, uint8_t *tap, size_t *brick,
+                                uint32_t *slot) {
+    int k, a, count = 0;
+    if (inner && t->scene.desc.lookup != ISOGI_TRACE_BSPLINE) { /* all corners */
+        size_t first[2][3];
+        uint32_t part[2][3];
+        for (k = 0; k < 2; k++)
+            for (a = 0; a < 3; a++) {
+                first[k][a] = (cell[a] + (size_t)k) / ISOGI_TRACE__SIDE;
+                part[k][a] = (uint32_t)((cell[a] + (size_t)k) % ISOGI_TRACE__SIDE) << 2 * a;
+            }
+        for (k = 0; k < 8; k++) {
+            brick[k] = first[k & 1][0] + t->size[0] * (first[k >> 1 & 1][1] + t->size[1] * first[k >> 2][2]);
+            slot[k] = part[k & 1][0] + part[k >> 1 & 1][1] + part[k >> 2][2], tap[k] = (uint8_t)k;
+        }
+        return 8;
+    }
+    for (k = 0; k < isogi_trace__tap_count(t); k++) {
+        size_t texel[3];
+        if (!(isogi_trace__tap(t, cell, local, k, texel) > 0)) continue;
+        brick[count] = isogi_trace__brick_of(t, texel, &slot[count]), tap[count++] = (uint8_t)k;
+    }
+    return count;
+}
+
 /* Classifies the texels that lookups at the next points will read, as many as a batch holds, on all cores. *end: of these points. again:
-   bits of those that lie in the same cell as the one before them without that bit. */
-static isogi_result isogi_trace__learn_points(isogi_trace *t, const float (*points)[3], size_t count, size_t *end, uint64_t *again) {
+   bits of those that lie in a cell of points before them. */
+static isogi_result isogi_trace__learn_points(isogi_trace *t, const float (*points)[3], size_t count, size_t *end, uint64_t *again,
+                                              isogi_trace__known *known) {
     isogi_context silent = t->context;
     isogi_trace__job job;
     isogi_result result = ISOGI_OK;
-    size_t i, known[3] = {SIZE_MAX, 0, 0};
+    size_t i;
     job.trace = t, job.first = job.count = 0;
     memset(again, 0, ISOGI_TRACE__POINTS / 8);
     if (count > ISOGI_TRACE__POINTS) count = ISOGI_TRACE__POINTS;
     for (i = 0; i < count && job.count + 64 <= ISOGI_TRACE__BATCH && result == ISOGI_OK; i++) {
         size_t cell[3];
         double local[3];
-        int k, all = 1;
+        size_t brick[64];
+        uint32_t *kept, slot[64];
+        uint8_t tap[64];
+        int k, taps;
         isogi_trace__cell(t, points[i], cell, local);
-        if (isogi_trace__seen(cell, local, known)) {
+        kept = isogi_trace__known_at(known, cell, local);
+        if (kept && kept[0] == cell[0] && kept[1] == cell[1] && kept[2] == cell[2]) {
             again[i / 64] |= (uint64_t)1 << i % 64;
             continue;
         }
-        for (k = 0; k < isogi_trace__tap_count(t) && result == ISOGI_OK; k++) {
+        taps = isogi_trace__corners(t, cell, local, kept != NULL, tap, brick, slot);
+        for (k = 0; k < taps && result == ISOGI_OK; k++) {
             isogi_trace__ref *ref = &t->batch[job.count];
-            size_t index;
-            if (!(isogi_trace__tap(t, cell, local, k, ref->texel) > 0)) {
-                all = 0;
-                continue;
+            if (!t->bricks[brick[k]]) t->bricks[brick[k]] = isogi_trace__brick_new(t);
+            if (!t->bricks[brick[k]]) result = ISOGI_NO_MEMORY;
+            else if (t->bricks[brick[k]]->state[slot[k]] == ISOGI_TRACE__UNKNOWN) {
+                ref->brick = t->bricks[brick[k]], ref->slot = slot[k], job.count++;
+                ref->brick->state[slot[k]] = ISOGI_TRACE__NOT_ASKED;
+                isogi_trace__tap(t, cell, local, tap[k], ref->texel);
             }
-            index = isogi_trace__brick_of(t, ref->texel, &ref->slot);
-            if (!t->bricks[index]) t->bricks[index] = isogi_trace__brick_new(t);
-            ref->brick = t->bricks[index];
-            if (!ref->brick) result = ISOGI_NO_MEMORY;
-            else if (ref->brick->state[ref->slot] == ISOGI_TRACE__UNKNOWN)
-                ref->brick->state[ref->slot] = ISOGI_TRACE__NOT_ASKED, job.count++;
         }
-        if (all) memcpy(known, cell, sizeof known);
-        else known[0] = SIZE_MAX;
+        for (k = 0; k < 3 && kept && taps == isogi_trace__tap_count(t); k++) kept[k] = (uint32_t)cell[k];
     }
     *end = i, silent.progress = NULL;
     isogi_parallel(&silent, (job.count + ISOGI_TRACE__TEXELS - 1) / ISOGI_TRACE__TEXELS, isogi_trace__learn_task, &job, 0, 1);
@@ -2971,21 +3005,27 @@ static isogi_result isogi_trace__learn_points(isogi_trace *t, const float (*poin
     return result;
 }
 
-static isogi_result isogi_trace__want_points(isogi_trace *t, const float (*points)[3], size_t count, const uint64_t *again) {
+static isogi_result isogi_trace__want_points(isogi_trace *t, const float (*points)[3], size_t count, const uint64_t *again,
+                                             isogi_trace__known *known) {
     size_t i;
-    int lacking = 1;
     for (i = 0; i < count; i++) {
-        size_t cell[3], texel[3];
+        size_t cell[3], texel[3], brick[64];
+        uint32_t slot[64];
+        uint8_t tap[64];
         double local[3];
         isogi_result result = ISOGI_OK;
-        int k;
-        if (!lacking && (again[i / 64] >> i % 64 & 1)) continue; /* the nearest texel that has a surface may be another one */
+        int k, taps, lacking = 1;
+        if (!known->lacking && (again[i / 64] >> i % 64 & 1)) continue;
         isogi_trace__cell(t, points[i], cell, local);
-        for (lacking = 1, k = 0; k < isogi_trace__tap_count(t) && result == ISOGI_OK; k++) {
-            if (!(isogi_trace__tap(t, cell, local, k, texel) > 0)) continue;
-            result = isogi_trace__want(t, texel, 0);
-            if (result == ISOGI_OK) lacking = lacking && isogi_trace__state(t, texel) == ISOGI_TRACE__NO_SURFACE;
+        taps = isogi_trace__corners(t, cell, local, isogi_trace__known_at(known, cell, local) != NULL, tap, brick, slot);
+        for (k = 0; k < taps && result == ISOGI_OK; k++) {
+            if (t->bricks[brick[k]]->state[slot[k]] == ISOGI_TRACE__READABLE) {
+                isogi_trace__tap(t, cell, local, tap[k], texel);
+                result = isogi_trace__want(t, texel, 0);
+            }
+            lacking = lacking && t->bricks[brick[k]]->state[slot[k]] == ISOGI_TRACE__NO_SURFACE;
         }
+        known->lacking |= lacking;
         if (result == ISOGI_OK && lacking) result = isogi_trace__want_nearest(t, cell, local);
         if (result != ISOGI_OK) return result;
     }
@@ -2995,12 +3035,14 @@ static isogi_result isogi_trace__want_points(isogi_trace *t, const float (*point
 ISOGI_API isogi_result isogi_trace_request(isogi_trace *trace, const float (*points)[3], size_t count) {
     isogi_result result = ISOGI_OK;
     uint64_t again[ISOGI_TRACE__POINTS / 64];
+    isogi_trace__known known;
     size_t i, end;
     if (!trace || (count && !points)) return ISOGI_INVALID;
     if (!trace->scene.desc.lazy || trace->coarse) return ISOGI_OK;
+    memset(&known, 0xff, sizeof known), known.lacking = 0; /* no cell has that number */
     for (i = 0; i < count && result == ISOGI_OK; i += end) {
-        result = isogi_trace__learn_points(trace, points + i, count - i, &end, again);
-        if (result == ISOGI_OK) result = isogi_trace__want_points(trace, points + i, end, again);
+        result = isogi_trace__learn_points(trace, points + i, count - i, &end, again, &known);
+        if (result == ISOGI_OK) result = isogi_trace__want_points(trace, points + i, end, again, &known);
     }
     return result;
 }
@@ -3228,6 +3270,7 @@ struct isogi_trace__feedback {
     size_t made, made_bricks, made_texels; /* of the queue: bricks that are done, bricks and texels to do */
     size_t placed;   /* texels before this one know where they lie */
     size_t open;     /* texels that want more samples than they have at the end of a level */
+    int bounced;     /* sums over texels' hits are of a level before */
     uint64_t partial; /* samples of texels that are not finished, */
     uint64_t unfinished; /* of which there are so many */
     double most; /* texels that were ever done, with the parts of those that were begun: for progress */
@@ -3370,7 +3413,7 @@ static void isogi_trace__feedback_free(const isogi_trace *t) {
     isogi_trace__set_free(t, &f->probes);
     isogi_release(&t->context, f->spans, ISOGI_TRACE__SPANS, sizeof *f->spans);
     isogi_release(&t->context, f->catches, ISOGI_TRACE__SAMPLES, sizeof *f->catches);
-    isogi_release(&t->context, f->casts, ISOGI_TRACE__TASKS, sizeof *f->casts);
+    isogi_release(&t->context, f->casts, ISOGI_TRACE__CASTS, sizeof *f->casts);
     isogi_release(&t->context, f->direct, ISOGI_TRACE__SPANS, (size_t)t->values * sizeof(float));
     isogi_release(&t->context, f->task, ISOGI_TRACE__SPANS + 1, sizeof *f->task);
     isogi_release(&t->context, f, 1, sizeof *f);
@@ -3387,7 +3430,7 @@ static isogi_result isogi_trace__feedback_new(isogi_trace *t) {
 #endif
     f->spans = (isogi_trace__span *)isogi_allocate(&t->context, ISOGI_TRACE__SPANS, sizeof *f->spans);
     f->catches = (isogi_trace__catch *)isogi_allocate(&t->context, ISOGI_TRACE__SAMPLES, sizeof *f->catches);
-    f->casts = (isogi_trace__cast *)isogi_allocate(&t->context, ISOGI_TRACE__TASKS, sizeof *f->casts);
+    f->casts = (isogi_trace__cast *)isogi_allocate(&t->context, ISOGI_TRACE__CASTS, sizeof *f->casts);
     f->direct = (float *)isogi_allocate(&t->context, ISOGI_TRACE__SPANS, (size_t)t->values * sizeof(float));
     f->task = (uint32_t *)isogi_allocate(&t->context, ISOGI_TRACE__SPANS + 1, sizeof *f->task);
     return f->spans && f->catches && f->casts && f->direct && f->task ? ISOGI_OK : ISOGI_NO_MEMORY;
@@ -3468,6 +3511,7 @@ static void isogi_trace__node_clear(const isogi_trace *t, isogi_trace__set *s, s
     size_t v = (size_t)t->values, begin = offsetof(isogi_trace__node, brick);
     memset((char *)n + begin, 0, sizeof *n - begin);
     memset(isogi_trace__values_at(s, i, ISOGI_TRACE__DIRECT_VALUES, v), 0, v * sizeof(float));
+    memset(isogi_trace__values_at(s, i, ISOGI_TRACE__BOUNCE_VALUES, v), 0, v * sizeof(float));
     memset(isogi_trace__light_at(s, i, v), 0, v * sizeof(float));
 }
 
@@ -3907,14 +3951,14 @@ static void isogi_trace__cast_round(isogi_trace__cast *c, uint32_t spans) {
     memset(c->square, 0, sizeof c->square);
 }
 
-/* Normals of the probes among the spans of a task. */
-static void isogi_trace__span_normals(isogi_trace__cast *c, uint32_t spans) {
+/* Normals of the probes among spans first .. end - 1 of a task, WAVE at most. */
+static void isogi_trace__span_normals(isogi_trace__cast *c, uint32_t first, uint32_t end) {
     const isogi_trace *t = c->trace;
-    isogi_hit place[ISOGI_TRACE__TASK_SPANS];
-    signed char from[ISOGI_TRACE__TASK_SPANS];
-    float shading[ISOGI_TRACE__TASK_SPANS][3], geometric[ISOGI_TRACE__TASK_SPANS][3];
-    uint32_t owner[ISOGI_TRACE__TASK_SPANS], k, n = 0;
-    for (k = 0; k < spans; k++) {
+    isogi_hit place[ISOGI_TRACE__WAVE];
+    signed char from[ISOGI_TRACE__WAVE];
+    float shading[ISOGI_TRACE__WAVE][3], geometric[ISOGI_TRACE__WAVE][3];
+    uint32_t owner[ISOGI_TRACE__WAVE], k, n = 0;
+    for (k = first; k < end; k++) {
         const isogi_trace__node *probe = c->span[k].of;
         if (probe->brick) continue;
         memcpy(c->site[k].normal, probe->normal, sizeof probe->normal); /* of a cap */
@@ -3955,7 +3999,8 @@ static void isogi_trace__cast_task(void *arg, size_t task) {
     c->trace = t, c->counters = &t->task_counters[task], c->span = f->spans + f->task[task], c->count = 0, c->shadow = 0, c->bright = 0;
     memset(c->counters, 0, sizeof *c->counters);
     memset(f->direct + f->task[task] * (size_t)t->values, 0, spans * (size_t)t->values * sizeof(float));
-    isogi_trace__span_normals(c, spans);
+    for (k = 0; k < spans; k += ISOGI_TRACE__WAVE)
+        isogi_trace__span_normals(c, k, spans - k < ISOGI_TRACE__WAVE ? spans : k + ISOGI_TRACE__WAVE);
     for (k = 0; k < spans; k++) {
         isogi_trace__span *s = &c->span[k];
         uint32_t i;
@@ -4896,7 +4941,8 @@ static void isogi_trace__group_free(isogi_trace *t) {
     isogi_trace__set_free(t, &f->texels);
     isogi_trace__set_free(t, &f->probes);
     f->cursor = f->probe_cursor = f->probe_end = f->probe_counted = f->placed = f->carried = f->span_count = 0;
-    f->phase = ISOGI_TRACE__AT_REST, f->unpublished = f->making = f->level = 0, f->partial = f->unfinished = 0, f->probe_part = f->most = 0;
+    f->phase = ISOGI_TRACE__AT_REST, f->unpublished = f->making = f->level = f->bounced = 0, f->partial = f->unfinished = 0;
+    f->probe_part = f->most = 0;
 }
 
 /* ---- carrying the light over ---- */
@@ -4906,6 +4952,7 @@ static size_t isogi_trace__phase_tasks(const isogi_trace__feedback *f) {
     size_t nodes = f->texels.count;
     if (f->phase == ISOGI_TRACE__PASS) return f->probes.segment_count;
     if (f->phase == ISOGI_TRACE__DIRECT) nodes = f->probes.count;
+    if (f->phase == ISOGI_TRACE__CLEAR && !f->bounced) nodes = 0;
     if (f->phase == ISOGI_TRACE__BOUNCE) nodes = f->segment < f->texels.segment_count ? f->texels.segments[f->segment].entries : 0;
     return (nodes + ISOGI_TRACE__SWEEP - 1) / ISOGI_TRACE__SWEEP;
 }
@@ -4945,7 +4992,7 @@ static void isogi_trace__phase_end(isogi_trace *t) {
     case ISOGI_TRACE__PASS:
         if (isogi_trace__pass_end(t)) f->phase = ISOGI_TRACE__CLEAR;
         break;
-    case ISOGI_TRACE__CLEAR: f->phase = ISOGI_TRACE__BOUNCE, f->segment = 0; break;
+    case ISOGI_TRACE__CLEAR: f->phase = ISOGI_TRACE__BOUNCE, f->segment = 0, f->bounced = 1; break;
     case ISOGI_TRACE__BOUNCE:
         if (++f->segment >= f->texels.segment_count) f->phase = ISOGI_TRACE__GUIDE;
         break;
@@ -4962,7 +5009,7 @@ static void isogi_trace__phase_end(isogi_trace *t) {
 /* The next tasks of the phase at work, about as long as `limit` rays, at least one. Returns what they count as. */
 static uint64_t isogi_trace__carry(isogi_trace *t, uint64_t limit) {
     isogi_trace__feedback *f = t->feedback;
-    const size_t blocks = ISOGI_TRACE__TASKS * sizeof *f->casts / sizeof(isogi_trace__dense); /* that lie where rays did */
+    const size_t blocks = ISOGI_TRACE__CASTS * sizeof *f->casts / sizeof(isogi_trace__dense); /* that lie where rays did */
     size_t tasks = isogi_trace__phase_tasks(f), count = 0, i;
     uint64_t cost = 0;
     isogi_context silent = t->context;
@@ -6550,6 +6597,7 @@ ISOGI_API isogi_result isogi_trace_gather_field(const isogi_trace_desc *desc, is
 #undef ISOGI_TRACE__SWEEP
 #undef ISOGI_TRACE__FLUSH
 #undef ISOGI_TRACE__TASK_SPANS
+#undef ISOGI_TRACE__CASTS
 #undef ISOGI_TRACE__SPAN
 #undef ISOGI_TRACE__SPANS
 #undef ISOGI_TRACE__SAMPLES

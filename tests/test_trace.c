@@ -467,6 +467,60 @@ TEST(requests_on_faces_follow_those_inside) {
     scene_free(&s);
 }
 
+/* Lines of points, several to a cell, so that later lines come back to cells of earlier ones: all in one request, against the full bake. */
+TEST(requests_that_come_back_to_a_cell_lack_nothing) {
+    enum { LINE = 52, LINES = 13 * LINE };
+    double q[4] = {11.5, 11.5, 11.5, 8.3};
+    scene s = scene_make(24, 24, 24, NULL, clamped_ball, q);
+    isogi_trace_lookup lookup[2] = {ISOGI_TRACE_TRILINEAR, ISOGI_TRACE_BSPLINE};
+    static float point[LINES * LINE][3], e[LINES * LINE][3], expected[LINES * LINE][3];
+    for (int i = 0; i < LINES * LINE; i++)
+        point[i][0] = 0.2f + 0.43f * (float)(i % LINE), point[i][1] = 0.2f + 0.43f * (float)(i / LINE % LINE),
+        point[i][2] = 3.2f + 0.43f * (float)(i / LINE / LINE);
+    for (int l = 0; l < 2; l++) {
+        isogi_trace_desc d = desc_make(&s, 0, 0, 1);
+        int differ = 0, lit = 0;
+        d.lookup = lookup[l];
+        bake_and_sample(&d, NULL, (const float(*)[3])point, LINES * LINE, expected);
+        d.lazy = 1;
+        bake_and_sample(&d, NULL, (const float(*)[3])point, LINES * LINE, e);
+        for (int i = 0; i < LINES * LINE; i++) differ += memcmp(e[i], expected[i], sizeof e[i]) != 0, lit += expected[i][0] > 0;
+        CHECK(lit > 5000 && !differ, "lookup %d: of %d points with light %d differ from the full bake", l, lit, differ);
+    }
+    scene_free(&s);
+}
+
+/* Points in a cell around which no texel has a surface read the texel that is nearest to each of them. */
+TEST(requests_that_come_back_to_a_cell_without_surface_find_the_nearest) {
+    double q[4] = {11.5, 11.5, 11.5, 8.3};
+    scene s = scene_make(24, 24, 24, NULL, clamped_ball, q);
+    isogi_trace_desc d = desc_make(&s, 0, 0, 1);
+    isogi_trace *whole = NULL, *t = NULL;
+    int tried = 0, differ = 0, apart = 0;
+    isogi_trace_create(&whole, &d, NULL), isogi_trace_step(whole, 0, NULL);
+    d.lazy = 1;
+    for (size_t i = 0; i < 23 * 23 * 23; i++) {
+        float point[8][3], e[8][3], expected[8][3];
+        int have = 0, lit = 0;
+        for (size_t k = 0; k < 8; k++) {
+            size_t texel[3] = {i % 23 + (k & 1), i / 23 % 23 + (k >> 1 & 1), i / 529 + (k >> 2)};
+            have |= isogi_trace_valid(whole, texel);
+            point[k][0] = (float)(i % 23) + (k & 1 ? 0.8f : 0.2f), point[k][1] = (float)(i / 23 % 23) + (k & 2 ? 0.8f : 0.2f),
+            point[k][2] = (float)(i / 529) + (k & 4 ? 0.8f : 0.2f);
+        }
+        if (have) continue;
+        isogi_trace_sample(whole, (const float(*)[3])point, 8, expected, NULL);
+        for (int k = 0; k < 8; k++) lit += expected[k][0] > 0, apart += memcmp(expected[k], expected[0], sizeof expected[0]) != 0;
+        if (!lit) continue;
+        isogi_trace_create(&t, &d, NULL), isogi_trace_request(t, (const float(*)[3])point, 8), isogi_trace_step(t, 0, NULL);
+        isogi_trace_sample(t, (const float(*)[3])point, 8, e, NULL);
+        tried++, differ += memcmp(e, expected, sizeof e) != 0;
+        isogi_trace_free(t);
+    }
+    CHECK(tried > 50 && apart > 50 && !differ, "%d of %d cells differ from the full bake", differ, tried);
+    isogi_trace_free(whole), scene_free(&s);
+}
+
 /* Zero is the default: 64 samples, by either method, and in gather. */
 TEST(samples_are_64_by_default) {
     double q[5] = {5, 4.5, 5, 6.5, 3};
