@@ -2053,19 +2053,18 @@ ISOGI_SH__AVX512 ISOGI_SH__INLINE void isogi_sh__eval_d8_split(isogi_sh__d8 *u, 
         if (order <= ISOGI_SH__LOW_ORDER) NAME##_low(out, stride, order, u);                                                   \
         else NAME##_any(out, stride, order, u, NULL);                                                                          \
     }                                                                                                                          \
-    /* any order but 5, with the next directions made ready while the values of those before are stored; low orders by two vectors while \
-       there are as many; the last block ends with the last direction, and repeats some */                                     \
+    /* low orders, two vectors at a time while there are as many */                                                            \
     TARGET ISOGI_SH__APART size_t NAME##_pairs(T *out, size_t stride, int order, const T *x, const T *y, const T *z, size_t count) { \
-        V u[2][8];                                                                                                             \
+        V u[8];                                                                                                                \
         size_t i;                                                                                                              \
-        int more, now = 0;                                                                                                     \
-        for (i = 0;; i += 2 * WIDTH, now = !now) {                                                                             \
-            more = i + 2 * WIDTH <= count && NAME##_load(u[now], x + i, y + i, z + i) &&                                       \
-                   NAME##_load(u[now] + 4, x + i + WIDTH, y + i + WIDTH, z + i + WIDTH);                                       \
-            if (i) NAME##_low_two(out + i - 2 * WIDTH, stride, order, u[!now]);                                                \
-            if (!more) return i;                                                                                               \
+        for (i = 0; i + 2 * WIDTH <= count; i += 2 * WIDTH) {                                                                  \
+            if (!NAME##_load(u, x + i, y + i, z + i) || !NAME##_load(u + 4, x + i + WIDTH, y + i + WIDTH, z + i + WIDTH)) return i; \
+            NAME##_low_two(out + i, stride, order, u);                                                                         \
         }                                                                                                                      \
+        return i;                                                                                                              \
     }                                                                                                                          \
+    /* any order but 5 from direction `begin` on, with the next directions made ready while the values of those before are stored; the \
+       last block ends with the last direction, and repeats some */                                                            \
     TARGET ISOGI_SH__APART size_t NAME##_blocks(T *out, size_t stride, int order, const T *x, const T *y, const T *z, size_t count, \
                                                 size_t begin) {                                                                \
         V u[2][4];                                                                                                             \
@@ -2079,6 +2078,7 @@ ISOGI_SH__AVX512 ISOGI_SH__INLINE void isogi_sh__eval_d8_split(isogi_sh__d8 *u, 
             at = next;                                                                                                         \
         }                                                                                                                      \
     }                                                                                                                          \
+    /* order 5, likewise */                                                                                                    \
     TARGET ISOGI_SH__APART size_t NAME##_blocks5(T *out, size_t stride, const T *x, const T *y, const T *z, size_t count) {    \
         V u[4], next[4], basis[25];                                                                                            \
         size_t i, at = 0;                                                                                                      \
