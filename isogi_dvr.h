@@ -327,7 +327,9 @@ typedef struct isogi_dvr_desc {
     uint32_t jitter;        /* not 0: every pixel's samples are moved by a part of a step of its own, which turns rings of large steps into
                                noise. The same number gives the same picture. Sampled rays only; physical space is post-classified then */
     double visibility_step; /* sampling distance along visibility rays, as `step`; 0 = twice `step`, or 1 where that is 0. Sweeps: distance
-                               of the lattice of extinction, rounded so that grid points are on it; 0 = 2 */
+                               of the lattice of extinction, rounded so that grid points are on it; 0 = 2. What is opaque from one
+                               voxel to the next wants 1, in three times the time: with 2 its surfaces are lit in blotches (a picture of
+                               torus-sphere-plane differs from brute force of as many directions by RMSE .027 and .009) */
     isogi_dvr_method method;
     isogi_dvr_sphere sphere;
     double anisotropy;      /* of scattering, -1..1 (both excluded): g of Henyey and Greenstein; 0 = isotropic; with visibility only */

@@ -79,7 +79,7 @@ static const scene scenes[] = {
     {.name = "fuel", .volume = "fuel_64x64x64_uint8.raw", .rendered = 1, .isovalue = 30, .sun = {3, 3, 3}, .order = 4, .directions = 128,
      .grid = {64, 64, 64}, .transfer = "0 0 .2 .4 1\n10 0 .2 .4 1\n40 .1 .2 .4 1\n120 .5 1 .8 .2\n255 1 1 .2 .1\n"},
     {.name = "torus-sphere-plane", .volume = "procedural:torus-sphere-plane", .rendered = 1, .isovalue = .5, .sun = {3, 3, 3}, .order = 4,
-     .directions = 128, .grid = {64, 64, 64}}};
+     .directions = 256, .grid = {64, 64, 64}}};
 #define SCENE_COUNT (sizeof scenes / sizeof scenes[0])
 
 typedef struct options {
@@ -1352,13 +1352,15 @@ static int write_depth(viewer *v, const float *depth, int factor) {
     return ok;
 }
 
-/* Shadows of the sun want more than the header's defaults, which are for pictures in motion; sweeps have it in about a second. */
+/* Shadows of the sun want more than the header's defaults, which are for pictures in motion; sweeps have it in about a second. Of few
+   voxels the lattice of sweeps holds each: with every second one surfaces that are opaque from voxel to voxel are lit in blotches. */
 static void set_visibility(const viewer *v, isogi_dvr_desc *desc) {
     const scene *s = v->o.scene && v->o.scene->order ? v->o.scene : NULL;
     int swept = v->o.mode == DVR && !v->transfer.peak_count && v->o.method != ISOGI_DVR_BRUTE && v->o.method != ISOGI_DVR_PAPER;
     desc->order = v->o.order ? v->o.order : s ? s->order : swept ? 4 : 0;
     desc->directions = v->o.directions ? v->o.directions : s ? s->directions : swept ? 256 : 0;
     desc->coarsest = 1 << v->o.coarsest;
+    if (swept && v->volume.size[0] * v->volume.size[1] * v->volume.size[2] <= (size_t)1 << 22) desc->visibility_step = 1;
     for (int a = 0; a < 3; a++) {
         size_t half = (v->volume.size[a] + 1) / 2;
         desc->grid[a] = v->o.grid[a] ? v->o.grid[a] : s ? s->grid[a] : !swept ? 0 : half < 64 ? half : 64;
