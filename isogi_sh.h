@@ -1846,8 +1846,8 @@ ISOGI_SH__AVX512 ISOGI_SH__INLINE void isogi_sh__transpose_f16(float *y, size_t 
         ISOGI_SH__UNROLL
         for (k = 0; k < 4; k++) {
             isogi_sh__d8 p = (isogi_sh__d8)v[0][k], q = (isogi_sh__d8)v[1][k], r = ISOGI_SH__ACROSS_D8(p, q);
-            *(isogi_sh__d8 *)(void *)(y + n * k) = ISOGI_SH__FIRST_D8(p, r);
-            *(isogi_sh__d8 *)(void *)(y + n * (k + 4)) = ISOGI_SH__SECOND_D8(q, r);
+            *(isogi_sh__f16 *)(y + n * k) = (isogi_sh__f16)ISOGI_SH__FIRST_D8(p, r);
+            *(isogi_sh__f16 *)(y + n * (k + 4)) = (isogi_sh__f16)ISOGI_SH__SECOND_D8(q, r);
         }
     }
 }
