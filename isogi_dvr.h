@@ -1461,6 +1461,11 @@ static uint8_t isogi_dvr__cut(const isogi_dvr *d, size_t block) {
     return cut;
 }
 
+/* Bytes that d->leap takes: of blocks, of two tables that they come from, and one more, for a single block: four bytes are read at once. */
+static size_t isogi_dvr__leap_bytes(const isogi_dvr *d) {
+    return 3 * d->level[0].size[0] * d->level[0].size[1] * d->level[0].size[2] + 1;
+}
+
 /* For every block of level 0, how far around it all is empty: the bytes of those that are not spread by one block at a time. */
 static void isogi_dvr__mark_leaps(isogi_dvr *d) {
     const size_t *size = d->level[0].size;
@@ -2662,7 +2667,7 @@ static isogi_result isogi_dvr__allocate_parts(isogi_dvr *d) {
     if (!d->empty_blocks || !d->changed) return ISOGI_NO_MEMORY;
     memset(d->changed, 0, d->changed_count);
     d->cut = (uint8_t *)isogi_allocate(&d->context, d->changed_count, 1);
-    d->leap = (uint8_t *)isogi_allocate(&d->context, 3 * d->level[0].size[0] * d->level[0].size[1] * d->level[0].size[2], 1);
+    d->leap = (uint8_t *)isogi_allocate(&d->context, isogi_dvr__leap_bytes(d), 1);
     if (!d->cut || !d->leap) return ISOGI_NO_MEMORY;
     memset(d->cut, 0, d->changed_count);
     for (n = 0, i = 0; n < ISOGI_DVR__LEVELS; n++) {
@@ -2766,7 +2771,7 @@ ISOGI_API void isogi_dvr_free(isogi_dvr *dvr) {
     isogi_release(&context, dvr->empty_blocks, dvr->block_count, 2);
     isogi_release(&context, dvr->changed, dvr->changed_count, 1);
     isogi_release(&context, dvr->cut, dvr->changed_count, 1);
-    isogi_release(&context, dvr->leap, 3 * dvr->level[0].size[0] * dvr->level[0].size[1] * dvr->level[0].size[2], 1);
+    isogi_release(&context, dvr->leap, isogi_dvr__leap_bytes(dvr), 1);
     isogi_release(&context, dvr->clip, dvr->clip_count, sizeof *dvr->clip);
     isogi_release(&context, dvr->basis, dvr->kernel_count, sizeof *dvr->basis);
     isogi_release(&context, dvr->matter.table, ISOGI_DVR__TABLE, sizeof *dvr->matter.table);
