@@ -171,7 +171,7 @@ TEST(an_update_survives_every_failing_allocation) {
     enum { N = 21 };
     test_random r = {41};
     for (int kind = 0; kind < 3; kind++) {
-        int failures = 0, done = 0;
+        int failures = 0, done = 0, least = 2;
         for (long k = 0; !done && k < 100; k++) {
             scarce memory = {-1, 0};
             isogi_context context = {.alloc = scarce_alloc, .release = scarce_release, .user = &memory, .threads = 1};
@@ -197,10 +197,11 @@ TEST(an_update_survives_every_failing_allocation) {
                 failures++;
             }
             CHECK(same_pyramid(updated, after), "kind %d, allocation %ld: not as built anew", kind, k);
+            if (!kind) least = updated->path == ISOGI_VOL__PATH_AVX512 ? 4 : 3; /* nodes; tables that this path alone reads */
             isogi_vol_free(updated), isogi_vol_free(before), isogi_vol_free(after), field_free(&f);
             CHECK(memory.blocks == 0, "kind %d, allocation %ld: %ld blocks leak", kind, k, memory.blocks);
         }
-        CHECK(done && failures >= (kind ? 2 : 4), "kind %d: %d allocations were tried", kind, failures);
+        CHECK(done && failures >= least, "kind %d: %d allocations were tried", kind, failures);
     }
 }
 
