@@ -6410,7 +6410,7 @@ typedef struct isogi_dvr__fast_cells {
 } isogi_dvr__fast_cells;
 
 ISOGI_DVR__AVX2 ISOGI_DVR__ALWAYS void isogi_dvr__run_cells_avx2(const isogi_dvr__frame *f, const isogi_dvr__fast_ray *r,
-                                                      const isogi_dvr__fast_run *run, isogi_dvr__fast_cells *cells) {
+                                                                 const isogi_dvr__fast_run *run, isogi_dvr__fast_cells *cells) {
     const __m256 lane = _mm256_fmadd_ps(_mm256_set1_ps(run->stride), _mm256_setr_ps(0, 1, 2, 3, 4, 5, 6, 7), _mm256_set1_ps(run->first));
     __m256i offset = isogi_dvr__cells_avx2(f, r, lane, 0, cells->u[0]);
     offset = _mm256_add_epi32(offset, isogi_dvr__cells_avx2(f, r, lane, 1, cells->u[1]));
@@ -6487,7 +6487,7 @@ ISOGI_DVR__AVX2 ISOGI_DVR__ALWAYS void isogi_dvr__run_classes_avx2(const isogi_d
 
 /* What lies between the samples of a run. */
 ISOGI_DVR__AVX2 ISOGI_DVR__ALWAYS void isogi_dvr__run_matter_avx2(const isogi_dvr__frame *f, isogi_dvr__fast_run *run,
-                                                       const isogi_dvr__fast_cells *cells) {
+                                                                  const isogi_dvr__fast_cells *cells) {
     const __m256 value = _mm256_loadu_ps(run->classes);
     const __m256i lane = _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7), index = _mm256_loadu_si256((const __m256i *)(const void *)cells->at);
     __m256 rest, node, sum, change, difference, mean, length, close;
