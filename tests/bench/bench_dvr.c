@@ -540,8 +540,8 @@ static void bench_edit(const bench_scene *s, const isogi_pyramid *pyramid, const
             sum += d * d, norm += (double)v[i] * (double)v[i];
         }
         snprintf(setting, sizeof setting, "%g %% of values", 100 * shares[k]);
-        row("tf-edit", s->name, "edit", setting, seconds, sqrt(sum / norm), (double)(s->grid[0] * s->grid[1] * s->grid[2]) * s->rays,
-            "ray");
+        row("tf-edit", s->name, k ? "edit" : "default", setting, seconds, sqrt(sum / norm),
+            (double)(s->grid[0] * s->grid[1] * s->grid[2]) * s->rays, "ray");
         isogi_dvr_free(dvr), isogi_dvr_free(fresh);
     }
     free(place), free(v);

@@ -38,7 +38,7 @@ wanted() {
              'frame-scale-invariant-gyroid256:post-classified*2' tet-pieces-data:table-2d tet-pieces-physical:table-3d
          for volume in engine_256x256x128 bonsai_256x256x256 fuel_64x64x64; do
             scene=${volume%%_*}
-            have ${volume}_uint8.raw tf-update-$scene tf-update-$scene:paper "tf-update-$scene:sweep*4"
+            have ${volume}_uint8.raw tf-update-$scene tf-update-$scene:paper "tf-update-$scene:sweep*4" "tf-edit-$scene*3"
             [ $scene = fuel ] || have ${volume}_uint8.raw frame-$scene "frame-$scene:steps*2"
          done ;;
     visibility) scene=torus-sphere-plane

@@ -17,7 +17,7 @@ ranks 3 $scene --out "$OUT/part.bake"
 cmp "$OUT/one.bake" "$OUT/part.bake"
 ranks 3 $scene --out "$OUT/part.bake"
 cmp "$OUT/one.bake" "$OUT/part.bake"
-slow="procedural:engine-block:40 --samples 64 --bounces 2"
+slow="procedural:engine-block:40 --samples 256 --bounces 2" # seconds: it must not be over when it is killed
 rm -f "$OUT/killed.bake"
 setsid mpirun --allow-run-as-root --oversubscribe -n 3 build/bake_mpi $slow --save-every 0 --out "$OUT/killed.bake" > "$OUT/message" 2>&1 &
 job=$!
