@@ -140,12 +140,12 @@
    Megabytes of visibility and RMSE of a frame against a regular grid of 129, 193, 193 points an axis (make bench ONLY=visibility):
 
        points an axis               33             65             97             129            193
-       torus-    regular        1.2  .0180     9.4  .0115     32   .0102     76   0
-       sphere    coarsest 8     1.6  .0180     7.1  .0115     18   .0110     25   .0030
-       ml256     regular        1.2  .0600     9.4  .0233     32   .0100     76   .0057    255  0
-                 coarsest 8     0.9  .0600     6.8  .0233     15   .0100     41   .0057    109  .0000
-       bonsai    regular        0.5  .0396     4.2  .0197     14   .0104     34   .0059    113  0
-                 coarsest 8     0.7  .0396     4.4  .0197     11   .0104     21   .0059     57  .0001
+       torus-    regular        1.3  .0213     9.9  .0148     33   .0128     77   0
+       sphere    coarsest 8     1.6  .0213     7.1  .0148     18   .0134     25   .0030
+       ml256     regular        1.3  .0564     9.9  .0191     33   .0090     77   .0050    259  0
+                 coarsest 8     0.9  .0564     6.8  .0191     15   .0090     41   .0050    109  .0000
+       bonsai    regular        0.6  .0399     4.4  .0182     15   .0100     34   .0051    115  0
+                 coarsest 8     0.7  .0399     4.4  .0182     11   .0100     21   .0051     57  .0001
 
    Tetrahedral meshes. isogi_dvr_tets_render draws points, values and tetrahedra, unlit, in both spaces: in a tetrahedron the field
    is linear, so that both integrals are exact. Rays go from face to face, leave and enter again where the mesh has gaps; tetrahedra
