@@ -4401,8 +4401,9 @@ static void isogi_dvr__global_task(void *arg, size_t task) {
 /* Optical depth towards one direction at every node, a slice of the lattice after the other. A bundle of parallel rays, one for
    each node of a slice, runs through the lattice against the direction. From slice to slice the bundle slips sideways by a fraction
    of a node; extinction is interpolated at the rays' places, the depth that a ray has gathered stays with the ray: nothing is
-   interpolated twice, so that a shadow is as sharp after a hundred slices as after one. A ray that leaves at a side is forgotten
-   when it is one node outside, and a new one enters at the other side. At the slices of the visibility grid the transmittance of
+   interpolated twice, so that a shadow is as sharp after a hundred slices as after one. A ray that leaves at a side goes on in matter
+   like that of the side and is forgotten when it is one node outside, and a new one enters at the other side, on which nothing is in the
+   way of grid points. At the slices of the visibility grid the transmittance of
    the four rays around a grid point is interpolated, rays in dense matter counting less: across its surfaces light does not blur, and
    the share of each ray, another one for each direction and grid point, does not show as a weave. */
 typedef struct isogi_dvr__sweep {
@@ -4442,8 +4443,44 @@ static isogi_dvr__slip isogi_dvr__slip_at(const isogi_dvr__sweep *s, size_t slic
     return at;
 }
 
-/* Adds `piece` times the extinction at every ray of the bundle that is within the lattice; `out`: twice, and between the two all rays'
-   transmittance goes to s->row, of every row from ray 0 on. */
+/* Whether rays just outside of a side have left there; which: 0 rows, 1 lanes. */
+static int isogi_dvr__leaves(const isogi_dvr__sweep *s, int which, int high) { return high ? s->slip[which] > 0 : s->slip[which] < 0; }
+
+/* Adds what rays that have left at a side, and are less than a node outside, pass of matter like that of its last nodes: between them and
+   the rays within is what arrives at a grid point on the side. */
+static void isogi_dvr__sweep_left(const isogi_dvr__sweep *s, const isogi_dvr__rows *within, const isogi_dvr__slip *at, const float w[4],
+                                  int out) {
+    isogi_dvr__rows a = *within;
+    float x[4] = {0, 0, 0, 0};
+    int left[2], high[2], n;
+    size_t c, end, node;
+    for (n = 0; n < 2; n++) high[n] = isogi_dvr__leaves(s, n, 1), left[n] = high[n] ? at->part[n] > 0 : isogi_dvr__leaves(s, n, 0);
+    if (left[0]) {
+        x[0] = w[0] + w[2], x[1] = w[1] + w[3], a.rows = 1, a.beside = 0, c = s->size[1] - 1;
+        if (high[0]) a.from += c * a.from_row, a.depth += c * a.depth_row, a.out += c * a.out_row;
+        else a.depth -= a.depth_row, a.out -= a.out_row;
+        if (out) s->kernels.pass_out(&a, x);
+        else s->kernels.pass(&a, x);
+    }
+    if (!left[1]) return;
+    node = high[1] ? s->size[2] - 1 : 0;
+    c = left[0] && !high[0] ? 0 : 1, end = within->rows + 1 + (left[0] && high[0]);
+    x[0] = w[0] + w[1], x[1] = w[2] + w[3];
+    for (; c < end; c++) {
+        const float *r0 = within->from + (c ? c - 1 : 0) * within->from_row + node;
+        const float *r1 = c && c <= within->rows ? r0 + within->beside : r0;
+        float *depth = s->depth + (at->row + c) * s->depth_row + at->lane + (high[1] ? s->size[2] : 0);
+        float more = x[0] * *r0 + x[1] * *r1;
+        if (out) {
+            float *e = s->row + c * s->out_row + (high[1] ? s->size[2] : 0);
+            e[s->weight] = isogi_dvr__counts(more), e[0] = e[s->weight] * isogi_dvr__exp(*depth + more), more *= 2;
+        }
+        *depth += more;
+    }
+}
+
+/* Adds `piece` times the extinction at every ray of the bundle that is within the lattice, or has just left; `out`: twice, and between the
+   two all rays' transmittance goes to s->row, of every row from ray 0 on. */
 static void isogi_dvr__sweep_add(const isogi_dvr__sweep *s, size_t slice, const isogi_dvr__slip *at, float piece, int out) {
     isogi_dvr__rows a;
     float w[4];
@@ -4457,10 +4494,11 @@ static void isogi_dvr__sweep_add(const isogi_dvr__sweep *s, size_t slice, const 
     a.out = s->row + s->out_row + 1, a.out_row = s->out_row, a.weight = s->weight;
     if (!out) {
         s->kernels.pass(&a, w);
+        isogi_dvr__sweep_left(s, &a, at, w, 0);
         return;
     }
     s->kernels.pass_out(&a, w);
-    for (c = 0; c <= s->size[1]; c++) { /* rays that are outside keep what they have */
+    for (c = 0; c <= s->size[1]; c++) { /* rays that are outside keep what they have, unless they have just left */
         const float *depth = s->depth + (at->row + c) * s->depth_row + at->lane;
         float *e = s->row + c * s->out_row;
         if (c && c <= a.rows) {
@@ -4472,6 +4510,7 @@ static void isogi_dvr__sweep_add(const isogi_dvr__sweep *s, size_t slice, const 
             for (i = 0; i <= s->size[2]; i++) e[s->weight + i] = 1;
         }
     }
+    isogi_dvr__sweep_left(s, &a, at, w, 1);
 }
 
 /* Transmittance between the two rays beside every grid point of a row of rays, weighed, and its weight. */
@@ -4481,19 +4520,22 @@ static void isogi_dvr__sweep_row_out(const isogi_dvr__sweep *s, size_t slice, co
     /* the nodes beside */
     const float *low = from + (c ? c - 1 : 0) * s->row_stride, *high = from + (c < s->size[1] ? c : 0) * s->row_stride;
     float *e = s->row, part = at->part[1], share[2];
-    size_t n = s->points[2], i;
-    int within = c && (c < s->size[1] || !(at->part[0] > 0)); /* rays outside count in full, as in sweep_add */
+    size_t n = s->points[2], last = s->size[2] - 1, i;
+    int outside = !c || (c == s->size[1] && at->part[0] > 0); /* rays outside count in full, unless they have just left: as in sweep_add */
+    int left[2] = {isogi_dvr__leaves(s, 1, 0), isogi_dvr__leaves(s, 1, 1)};
     share[0] = s->piece * (1 - at->part[0]), share[1] = c < s->size[1] ? s->piece * at->part[0] : 0;
+    if (c && outside) share[0] = s->piece;
+    if (outside && isogi_dvr__leaves(s, 0, c > 0)) outside = 0;
     for (i = 0; i < n; i++) e[2 * i] = depth[s->first[2] + i * s->every[2]], e[2 * i + 1] = depth[s->first[2] + i * s->every[2] + 1];
     s->kernels.exp_row(e, 2 * n);
     for (i = 0; i < n; i++) {
-        size_t h = s->first[2] + i * s->every[2];
-        float x1 = share[0] * low[h] + share[1] * high[h], x2 = share[0] * low[h + 1] + share[1] * high[h + 1]; /* 0 past the end */
-        float x0 = h ? share[0] * low[h - 1] + share[1] * high[h - 1] : 0, e0 = e[2 * i], e1 = e[2 * i + 1];
+        size_t h = s->first[2] + i * s->every[2], h0 = h ? h - 1 : 0, h2 = h == last && left[1] ? h : h + 1; /* 0 past the end */
+        float x1 = share[0] * low[h] + share[1] * high[h], x2 = share[0] * low[h2] + share[1] * high[h2];
+        float x0 = h || left[0] ? share[0] * low[h0] + share[1] * high[h0] : 0, e0 = e[2 * i], e1 = e[2 * i + 1];
         weight[i] = 1, out[i] = e1 + part * (e0 - e1);
-        if (!within || !(x0 + x1 + x2 > 0)) continue; /* no matter beside it */
-        x0 = h ? isogi_dvr__counts(x0 + part * (x1 - x0)) : 1,
-        x1 = h + 1 < s->size[2] || !(part > 0) ? isogi_dvr__counts(x1 + part * (x2 - x1)) : 1;
+        if (outside || !(x0 + x1 + x2 > 0)) continue; /* no matter beside it */
+        x0 = h || left[0] ? isogi_dvr__counts(x0 + part * (x1 - x0)) : 1,
+        x1 = h < last || left[1] || !(part > 0) ? isogi_dvr__counts(x1 + part * (x2 - x1)) : 1;
         e0 *= x0, e1 *= x1, weight[i] = x1 + part * (x0 - x1), out[i] = e1 + part * (e0 - e1);
     }
 }
@@ -4534,6 +4576,21 @@ static int isogi_dvr__hold_plane(const isogi_dvr__sweep *s, size_t point, float 
     return any;
 }
 
+/* Nothing is in the way of grid points on the faces at which the bundle enters: the ray beside them, which is a part of a node within,
+   knows matter that is behind them. */
+static void isogi_dvr__sweep_faces(const isogi_dvr__sweep *s, float *out) {
+    size_t i, j, n;
+    int a;
+    for (a = 0; a < 2; a++) {
+        n = s->slip[a] > 0 ? 0 : s->points[a + 1] - 1; /* on which face */
+        if (!(s->slip[a] > 0 || s->slip[a] < 0) || s->first[a + 1] + n * s->every[a + 1] != (n ? s->size[a + 1] - 1 : 0)) continue;
+        if (a)
+            for (j = 0; j < s->points[1]; j++) out[j * s->out_stride[1] + n] = 1;
+        else
+            for (i = 0; i < s->points[2]; i++) out[n * s->out_stride[1] + i] = 1;
+    }
+}
+
 /* Transmittance of all grid points towards a direction, in their order (z fastest where slices lie across x), or of all that are held. */
 static void isogi_dvr__sweep_run(isogi_dvr__sweep *s, float *out) {
     size_t k, rays = (s->size[1] + s->size[0] + 2) * s->depth_row;
@@ -4560,6 +4617,7 @@ static void isogi_dvr__sweep_run(isogi_dvr__sweep *s, float *out) {
             isogi_dvr__sweep_points(s, slice, &at, plane);
             isogi_dvr__sweep_add(s, k, &at, s->piece, 0);
         }
+        isogi_dvr__sweep_faces(s, plane);
         if (s->held) isogi_dvr__hold_plane(s, point, out);
     }
 }
