@@ -36,9 +36,10 @@
    sum up to the opacity: what an unlit pixel's colour errs by is at most the bound times its opacity. (`opaque` below 1 ends rays
    early and adds 1 - opaque. Light is looked up once for a piece within a cell, by its first part: the opacity of that is what two-sided
    light takes, its extinction what says how far off dense matter visibility is looked up.) Errors measured on random fields and functions
-   with bounds 1, .1, .01, .001: .046, .010, .0007, .00015 (test_dvr_bound); samples know no bound, as a cell may hold what they miss. A
-   frame of the gyroid takes some 10, 15 and 60 times that of samples with bounds 1, .1 and .01: the time of what is cut by colour goes as
-   1 / bound, and every point of the function between the values at a cell's two ends is one more part.
+   with bounds 1, .1, .01, .001: .046, .010, .0007, .00015 (test_dvr_bound --long); samples know no bound, as a cell may hold what they
+   miss. A frame of the gyroid takes 11, 11 and 18 times that of samples with bounds 1, .1 and .01, and its sRGB values err by .00002 (RMSE)
+   where theirs do by .003 (make bench ONLY=dvr): the time of what is cut by colour goes as 1 / bound, and every point of the function
+   between the values at a cell's two ends is one more part.
 
    Data space. The scale-invariant integral (Kraus 2005, eq. 4): extinction is per unit of the data, a piece of ray over which
    the value changes by ds has opacity 1 - exp(-tau |ds|). Lengths cancel: no scaling of space changes any pixel. Constant data
@@ -50,7 +51,7 @@
                        function, colours and all, in double. There is no step size: `step` means nothing. Against long-double
                        quadrature pixels are right to the rounding of a float, from extinctions of 1e-9 to opaque, in depth too.
                        Unlit and without peaks or silhouettes, pieces of neighbouring cells are joined as long as the value goes one
-                       way, and eight rays go side by side where the machine has AVX-512: a fifth of the time.
+                       way, and eight rays go side by side where the machine has AVX-512: two fifths of the time.
        pre-integrated  Samples a step apart; every pair is looked up in a table (eq. 5 to 7).
        post-classified Samples a step apart, each weighted by the slope grad s . dir of the trilinear field (eq. 10, 11).
 
@@ -102,8 +103,8 @@
    quarter (order 5: an eighth, 6: nothing) of what the mean radiance of the environment gives through V (with anisotropy times (1 - |g|) /
    (1 + |g|)^2, the least that scattering does). Shadows of directional lights and lamps may be black; a sun in an image has no shadow that
    is: where all that is bright of a sky is hidden, light is that much too high. RMSE of sRGB values at 400 places on surfaces, orders 2, 3,
-   4, against light from 2048 directions, clamped at zero and so: engine under Uffizi's sky, rotated, .26 .144 .040 and .075 .050 .040;
-   bonsai under Grace's .115 .075 .061 and .115 .072 .046.
+   4, against light from 2048 directions, clamped at zero and so, of skies turned so that most of their light is hidden: engine under
+   Uffizi's .080 .037 .075 and .043 .031 .038; bonsai under Grace's .136 .072 .064 and .117 .071 .060 (make bench ONLY=visibility).
    Within four steps of a lamp's centre pre-integrated pictures take samples seven times as densely. A frame of 512x512 of bonsai lit by a
    point takes 2.5 (4 coefficients) to 3.4 (16) times that by a directional light.
    Matter that is dense for the grid is lit as what is in front of it: in physical space V is looked up off = r x^2 / (x^2 + 16) nearer to
@@ -165,8 +166,8 @@
    - The border of the volume is no surface: outside of the box is empty space.
    - It reads no files, opens no window, converts nothing to sRGB. Pixels are linear and premultiplied: put a background under
      them with  out = pixel + (1 - opacity) * background. For a display, what examples/common/picture.h does: multiply by an exposure,
-     bend what is above 0.7 by  x -> 0.7 + 0.3 (1 - exp((0.7 - x) / 0.3)), and code as sRGB:  12.92 x  up to 0.0031308, above it
-     1.055 x^(1/2.4) - 0.055.
+     bend what is above 0.7 of the colour (pixel / opacity) by  x -> 0.7 + 0.3 (1 - exp((0.7 - x) / 0.3)), before the background is put
+     under it, and code as sRGB:  12.92 x  up to 0.0031308, above it  1.055 x^(1/2.4) - 0.055.
 
    Options (macros, to be defined before the header is included)
 

@@ -11,6 +11,7 @@
 #include "files.h"
 #include "hdr.h"
 #include "isogi_dvr.h"
+#include "picture.h"
 #include "png.h"
 #include "procedural.h"
 #include "programs.h"
@@ -126,6 +127,56 @@ TEST(a_transfer_function_is_suggested_where_none_is_given) {
         const unsigned char *middle = picture + 3 * (24 * 48 + 24), *corner = picture + 3 * (6 * 48 + 24);
         CHECK(middle[0] > corner[0] + 40, "%s: the ball %d, above it %d", modes[m], middle[0], corner[0]);
         free(picture);
+    }
+}
+
+/* From linear light to 8 bits as the comment of isogi_dvr.h states it: exposure, what is above 0.7 bent, sRGB. */
+static double displayed(double linear, double exposure) {
+    double x = linear * exposure;
+    if (x > 0.7) x = 1 - 0.3 * exp((0.7 - x) / 0.3);
+    return 255 * (x <= 0.0031308 ? 12.92 * x : 1.055 * pow(x, 1 / 2.4) - 0.055);
+}
+
+/* Opaque matter of one colour fills the picture; then pixels by themselves: half covered, over a backdrop, and what no picture should
+   hold. */
+TEST(light_is_displayed_as_the_header_states) {
+    static unsigned char even[8][8][8];
+    static const double colours[4][3] = {{0, 0.0005, 0.002}, {0.1, 0.3, 0.69}, {0.71, 0.9, 1}, {0.02, 0.5, 0.05}};
+    const double exposures[] = {0.4, 1, 2.5}, backdrop[3] = {0.2, 0.05, 0.6};
+    char path[256], function[256], out[256]; /* longer than the next 15 calls */
+    strcpy(path, temporary("even_8x8x8_uint8.raw")), strcpy(function, temporary("even.tf")), strcpy(out, temporary("even.png"));
+    memset(even, 9, sizeof even), write_bytes(path, even, sizeof even);
+    for (int n = 0; n < 4 * 3; n++) {
+        const double *colour = colours[n / 3], exposure = exposures[n % 3];
+        char text[100], command[1024];
+        int shape[3] = {0, 0, 0};
+        snprintf(text, sizeof text, "0 1e6 %g %g %g\n", colour[0], colour[1], colour[2]), write_bytes(function, text, strlen(text));
+        snprintf(command, sizeof command, "'%s' --mode dvr --shading unlit --tf '%s' --exposure %g --size 16x16 --out '%s'", path, function,
+                 exposure, out);
+        run_result r = run_viewer(command);
+        unsigned char *picture = read_picture(out, shape);
+        CHECK(r.status == 0 && picture, "%s", r.error);
+        for (int a = 0; picture && a < 3; a++) {
+            double got = picture[3 * (8 * 16 + 8) + a], expected = displayed(colour[a], exposure);
+            CHECK(fabs(got - expected) < 1.01, "colour %g, exposure %g: %g, not %g", colour[a], exposure, got, expected); /* 0.999 opaque */
+        }
+        free(picture);
+        const float half[4] = {(float)(0.5 * colour[0]), (float)(0.5 * colour[1]), (float)(0.5 * colour[2]), 0.5f};
+        unsigned char coded[3];
+        picture_pixel(half, exposure, backdrop, coded);
+        for (int a = 0; a < 3; a++) {
+            double x = exposure * colour[a], light = 0.5 * (x > 0.7 ? 1 - 0.3 * exp((0.7 - x) / 0.3) : x) + 0.5 * backdrop[a];
+            double expected = displayed(light < 0.7 ? light : 0, 1); /* what is composited is not bent again */
+            if (light < 0.7) CHECK(fabs(coded[a] - expected) < 0.51, "half of %g: %d, not %g", colour[a], coded[a], expected);
+        }
+    }
+    const float odd[5][4] = {{-1, -0.1f, -1e30f, 1}, {NAN, NAN, NAN, 1}, {1e30f, 1e30f, 1e30f, 1}, {1, 1, 1, 0}, {1, 1, 1, NAN}};
+    const int expected[5] = {0, 0, 255, 0, 0}; /* over black */
+    for (int n = 0; n < 5; n++) {
+        unsigned char coded[3];
+        const double black[3] = {0, 0, 0};
+        picture_pixel(odd[n], 1, black, coded);
+        for (int a = 0; a < 3; a++) CHECK(coded[a] == expected[n], "case %d: %d, not %d", n, coded[a], expected[n]);
     }
 }
 

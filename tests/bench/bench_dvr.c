@@ -27,7 +27,7 @@ static int N = 128, WIDTH = 192, POINTS = 1024; /* POINTS: of visibility */
 static int PIXELS = 512, FRAME = 512, REFERENCE = 2048; /* pixels a side of frames whose error, and whose time is measured; directions
                                                            of their reference */
 static size_t points = 8;
-static int dry;
+static int dry, force_path;
 
 static double cpu_seconds(void) {
     struct timespec t;
@@ -75,26 +75,29 @@ static double srgb(double x) {
 }
 
 static isogi_dvr *create(const isogi_dvr_desc *desc, const isogi_transfer *transfer) {
+    const isogi_context context = {.threads = 1, .force_path = force_path};
     isogi_dvr *dvr = NULL;
-    if (isogi_dvr_create(&dvr, desc, &serial) != ISOGI_OK || isogi_dvr_set_transfer(dvr, transfer) != ISOGI_OK) exit(1);
+    if (isogi_dvr_create(&dvr, desc, &context) != ISOGI_OK || isogi_dvr_set_transfer(dvr, transfer) != ISOGI_OK) exit(1);
     return dvr;
 }
 
-/* Frames of one renderer with several steps; the last is the reference. */
+/* Frames of one renderer with several steps, of which the first is the reference; unlit ones with error bounds, too. */
 static void bench_frames(const char *scene, const isogi_pyramid *pyramid, const isogi_transfer *transfer, isogi_dvr_space space,
                          isogi_dvr_shading shading) {
     static const float sky[3] = {3.5449077f, 3.5449077f, 3.5449077f};
     const isogi_light sun = {.vector = {1, 1, 1}, .rgb = {2, 2, 2}};
     const isogi_lighting lighting = {.env = {.sh = sky, .sh_order = 1}, .lights = &sun, .light_count = 1};
-    const double steps[5] = {0.0625, 1, 0.5, 0.25, 0.125}, far = sqrt(3) / sin(pi / 8) / sqrt(1.5 * 1.5 + 1.2 * 1.2 + 2 * 2);
+    const double steps[8] = {0.0625, 1, 0.5, 0.25, 0.125, 0, 0, 0}, bounds[8] = {0, 0, 0, 0, 0, 1, 0.1, 0.01},
+                 far = sqrt(3) / sin(pi / 8) / sqrt(1.5 * 1.5 + 1.2 * 1.2 + 2 * 2);
     const isogi_view view = {.width = WIDTH, .height = WIDTH, .eye = {(float)(1.5 * far), (float)(1.2 * far), (float)(2 * far)}};
     size_t pixels = (size_t)WIDTH * (size_t)WIDTH;
     float(*image)[4] = (float(*)[4])malloc(pixels * sizeof *image), (*reference)[4] = (float(*)[4])malloc(pixels * sizeof *reference);
-    for (int s = 0; s < 5; s++) {
+    for (int s = 0; s < (shading ? 5 : 8); s++) {
         const isogi_dvr_desc desc = {.pyramid = pyramid,
                                      .space = space,
                                      .shading = shading,
                                      .step = steps[s],
+                                     .bound = bounds[s],
                                      .visibility_step = 1,
                                      .directions = 16,
                                      .grid = {8, 8, 8}};
@@ -111,10 +114,10 @@ static void bench_frames(const char *scene, const isogi_pyramid *pyramid, const 
             if (i % 4 < 3) sum += d * d;
         }
         snprintf(name, sizeof name, "frame-%s-%s", space ? "data" : "physical", shading ? "lit" : "unlit");
-        snprintf(setting, sizeof setting, "step %g", steps[s]);
+        snprintf(setting, sizeof setting, s < 5 ? "step %g" : "bound %g", s < 5 ? steps[s] : bounds[s]);
         if (s)
-            row(name, scene, s == (space ? 2 : 1) ? "default" : "steps", setting, seconds, sqrt(sum / (double)(3 * pixels)),
-                (double)count.samples, "sample");
+            row(name, scene, s == (space ? 2 : 1) ? "default" : s < 5 ? "steps" : "bound", setting, seconds,
+                sqrt(sum / (double)(3 * pixels)), (double)count.samples, "sample");
         isogi_dvr_free(dvr);
     }
     free(image), free(reference);
@@ -175,6 +178,7 @@ static double rendered(const isogi_dvr_desc *desc, const isogi_transfer *transfe
 static void bench_scale_invariant(void) {
     const struct { const char *method; isogi_dvr_classification classification; double step;
     } ways[] = {{"reference", ISOGI_DVR_POST_CLASSIFIED, 1 / 64.0},  {"default", ISOGI_DVR_EXACT, 0.5},
+                {"plain", ISOGI_DVR_EXACT, 0.5}, /* rays one by one, as without AVX-512 */
                 {"pre-integrated", ISOGI_DVR_PRE_INTEGRATED, 1},     {"pre-integrated", ISOGI_DVR_PRE_INTEGRATED, 0.5},
                 {"pre-integrated", ISOGI_DVR_PRE_INTEGRATED, 0.25},  {"post-classified", ISOGI_DVR_POST_CLASSIFIED, 1},
                 {"post-classified", ISOGI_DVR_POST_CLASSIFIED, 0.5}, {"post-classified", ISOGI_DVR_POST_CLASSIFIED, 0.25}};
@@ -200,6 +204,7 @@ static void bench_scale_invariant(void) {
         double sum = 0, seconds;
         char setting[64];
         if (w && PIXELS < 512 && ways[w].step < 0.5) continue;
+        force_path = !strcmp(ways[w].method, "plain");
         rendered(&desc, &transfer, SAMPLE, w ? image : reference, &count);
         if (!w) continue;
         for (int i = 0; i < 3 * SAMPLE * SAMPLE; i++)
@@ -210,7 +215,7 @@ static void bench_scale_invariant(void) {
         row("frame-scale-invariant", "gyroid256", ways[w].method, setting, seconds, sqrt(sum / (3 * SAMPLE * SAMPLE)),
             (double)count.samples, "sample");
     }
-    isogi_vol_free(pyramid);
+    force_path = 0, isogi_vol_free(pyramid);
     free(data), free(image), free(reference);
 }
 

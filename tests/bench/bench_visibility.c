@@ -2,8 +2,8 @@
 
        build/bench/bench_visibility [--quick] [--only SCENE] [--study NAME] [--sweeps] OUT.csv
 
-   --study: rays, coefficients, blocks, grid, resolutions, frames, shading or tables alone; --sweeps: without the paper's method, which
-   takes most of the time.
+   --study: rays, coefficients, blocks, grid, resolutions, frames, shading, light or tables alone; --sweeps: without the paper's method,
+   which takes most of the time.
 
    Two threads, wall seconds. torus-sphere-plane, the paper's worst case (9 coefficients, 128 rays, radius 16, 1:3, grid 64^3), and bonsai
    under Grace (4 coefficients, 64 rays, radius 16, 1:6.7, grid 64x64x32); one parameter is varied at a time, by sweeps (the default) and by
@@ -21,8 +21,9 @@
 
    What is computed by brute force is kept in build/bench/ and goes on where it was stopped (brute_reference.h): with all scenes it takes
    half an hour, once. shading-*: every picture at an exposure at which the mean of its sRGB values is the reference's; the setting says how
-   many times the reference's that is. table-2-*: work is megabytes. --quick: torus-sphere-plane at 48^3, 128x128 pixels, a few settings;
-   its sweeps err by their lattice of 2 voxels more than by rays or grid, which rows "lattice 1" show. */
+   many times the reference's that is. table-2-*: work is megabytes. light-*: at places, see study_light. --quick: torus-sphere-plane at
+   48^3, 128x128 pixels, a few settings; its sweeps err by their lattice of 2 voxels more than by rays or grid, which rows "lattice 1"
+   show. */
 #define ISOGI_IMPLEMENTATION
 #include "isogi_dvr.h"
 #include "brute_reference.h"
@@ -142,11 +143,15 @@ static void fill(isogi_dvr *d, study *s, source from) {
 /* A frame in display values over black: sRGB of what the exposure makes of it. */
 typedef struct frame { float (*srgb)[3], (*image)[4]; double update, render, mean; isogi_dvr_report report; } frame;
 
+static double coded(double x) {
+    x = fmin(1, fmax(0, x));
+    return x <= 0.0031308 ? 12.92 * x : 1.055 * pow(x, 1 / 2.4) - 0.055;
+}
+
 static void display(frame *f, double exposure) {
     f->mean = 0;
     for (int i = 0; i < 3 * SIDE * SIDE; i++) {
-        double x = fmin(1, fmax(0, (double)f->image[i / 3][i % 3] * exposure));
-        f->srgb[i / 3][i % 3] = (float)(x <= 0.0031308 ? 12.92 * x : 1.055 * pow(x, 1 / 2.4) - 0.055);
+        f->srgb[i / 3][i % 3] = (float)coded((double)f->image[i / 3][i % 3] * exposure);
         f->mean += (double)f->srgb[i / 3][i % 3] / (3.0 * SIDE * SIDE);
     }
 }
@@ -423,6 +428,137 @@ static void expose(study *s) {
     isogi_dvr_free(dvr), free(image);
 }
 
+/* What series that ring below zero cost: light at 400 places where rays of the view come to half of their opacity, half a voxel before
+   it, from coefficients of 2048 rays, against light from these directions; under skies as they are, and turned so that most of their light
+   is hidden ("behind"). "cut": negative light is black; "default": it is the least that isogi_dvr.h gives. RMSE of sRGB values, each sky at
+   its own exposure. */
+enum { PLACES = 400 };
+
+static size_t places_of(const study *s, float places[PLACES][3]) {
+    enum { SAMPLE = 128 };
+    static float image[SAMPLE * SAMPLE][4], depth[SAMPLE * SAMPLE];
+    isogi_dvr_desc desc = s->base;
+    isogi_view view = s->view;
+    isogi_dvr *dvr = NULL;
+    size_t seen = 0, count = 0;
+    view.width = view.height = SAMPLE, desc.shading = ISOGI_DVR_UNLIT;
+    need(isogi_dvr_create(&dvr, &desc, &two), "create"), need(isogi_dvr_set_transfer(dvr, &s->transfer), "set_transfer");
+    need(isogi_dvr_render(dvr, &view, NULL, image, depth, NULL), "render"), isogi_dvr_free(dvr);
+    for (size_t i = 0; i < SAMPLE * SAMPLE; i++) seen += image[i][3] > 0.9f;
+    for (size_t i = 0, n = 0; i < SAMPLE * SAMPLE && count < PLACES; i++) {
+        double origin[3];
+        float dir[3];
+        if (!(image[i][3] > 0.9f) || n++ * PLACES / seen < count) continue;
+        isogi_view_ray(&view, (double)(i % SAMPLE), (double)(i / SAMPLE), origin, dir);
+        for (int a = 0; a < 3; a++) places[count][a] = (float)(origin[a] + ((double)depth[i] - 0.5) * (double)dir[a]);
+        count++;
+    }
+    return count;
+}
+
+/* Transmittance from a place to the border in steps of half a voxel (voxels are 1 apart, the first at 0). */
+static double clear_along(const study *s, const float place[3], const double dir[3]) {
+    static float at[BRUTE_SAMPLES][3], value[BRUTE_SAMPLES];
+    const isogi_volume *v = isogi_vol_volume(s->pyramid);
+    double depth = 0;
+    size_t count = 0;
+    for (int inside = 1; inside && count < BRUTE_SAMPLES; count++)
+        for (int a = 0; a < 3; a++) {
+            at[count][a] = place[a] + (float)(0.5 * ((double)count + 0.5) * dir[a]);
+            inside &= at[count][a] >= 0 && at[count][a] <= (float)(v->size[a] - 1);
+        }
+    need(isogi_vol_sample(s->pyramid, (const float(*)[3])at, --count, value, NULL), "sample"); /* the last is outside */
+    for (size_t i = 0; i < count && depth < 12; i++) {
+        float rgb[3], extinction;
+        isogi_transfer_at(&s->transfer, (double)value[i], rgb, &extinction), depth += 0.5 * (double)extinction;
+    }
+    return exp(-depth);
+}
+
+/* Turns an environment so that most of its light comes from behind what is seen, where matter hides it from the places: the rotation from
+   its degree 1 to the direction of the view. */
+static void turn_behind(const study *s, isogi_env *env) {
+    const isogi_lighting lighting = {.env = *env};
+    float sh[12];
+    double from[3], to[3], axis[3], cosine;
+    need(isogi_sh_project(sh, 2, &lighting, NULL), "project");
+    for (int a = 0; a < 3; a++)
+        from[a] = (double)sh[a ? 3 * a : 9] + (double)sh[a ? 3 * a + 1 : 10] + (double)sh[a ? 3 * a + 2 : 11], /* y, z, x */
+            to[a] = (double)(s->view.target[a] - s->view.eye[a]);
+    vector_normalize(from), vector_normalize(to), cosine = vector_dot(from, to);
+    for (int a = 0; a < 3; a++) axis[a] = from[(a + 1) % 3] * to[(a + 2) % 3] - from[(a + 2) % 3] * to[(a + 1) % 3];
+    for (int a = 0; a < 3; a++)
+        for (int b = 0; b < 3; b++) {
+            const double cross = a == b ? 0 : (b - a + 3) % 3 == 1 ? -axis[3 - a - b] : axis[3 - a - b];
+            env->rotation[3 * a + b] = (float)((a == b ? cosine : 0) + cross + axis[a] * axis[b] / (1 + cosine));
+        }
+}
+
+static void study_light(study *s) {
+    static const char *const skies[4] = {"grace", "grace-behind", "uffizi", "uffizi-behind"};
+    static float places[PLACES][3], clear[PLACES][DIRECTIONS], y[DIRECTIONS][16], light[DIRECTIONS][3];
+    static double direction[DIRECTIONS][3];
+    const size_t count = places_of(s, places);
+    for (size_t k = 0; k < DIRECTIONS; k++) { /* a spherical Fibonacci lattice */
+        const double z = 1 - (2 * (double)k + 1) / DIRECTIONS, turn = pi * (3 - sqrt(5)) * (double)k;
+        direction[k][0] = sqrt(1 - z * z) * cos(turn), direction[k][1] = sqrt(1 - z * z) * sin(turn), direction[k][2] = z;
+        const float w[1][3] = {{(float)direction[k][0], (float)direction[k][1], (float)z}};
+        need(isogi_sh_eval(y[k], 4, w, 1), "eval");
+        for (size_t i = 0; i < count; i++) clear[i][k] = (float)clear_along(s, places[i], direction[k]);
+    }
+    for (int sky = 0; sky < 4; sky++) {
+        char path[1024], error[512], kind[32];
+        hdr_image image = {0};
+        study own = *s;
+        snprintf(path, sizeof path, "%s/hdr/%s_256x128.hdr", getenv("ISOGI_DATA"), sky > 1 ? "uffizi" : "grace");
+        snprintf(kind, sizeof kind, "-%s", skies[sky]);
+        if (!hdr_read(path, &image, error)) continue;
+        own.lighting = (isogi_lighting){.env = {.rgb = image.rgb, .width = image.width, .height = image.height}};
+        if (sky % 2) turn_behind(s, &own.lighting.env);
+        expose(&own), memset(light, 0, sizeof light);
+        for (int i = 0; i < image.width * image.height; i++) { /* every pixel's light comes from the nearest direction */
+            const double r = pi * (i / image.width + 0.5) / image.height, turn = 2 * pi * ((i % image.width + 0.5) / image.width - 0.5),
+                         still[3] = {sin(r) * sin(turn), cos(r), -sin(r) * cos(turn)};
+            const double area = 2 * pi / image.width * 2 * sin(r) * sin(0.5 * pi / image.height);
+            double w[3];
+            size_t nearest = 0;
+            for (int a = 0; a < 3; a++) {
+                const float *m = own.lighting.env.rotation + 3 * a;
+                w[a] = sky % 2 ? (double)m[0] * still[0] + (double)m[1] * still[1] + (double)m[2] * still[2] : still[a];
+            }
+            for (size_t k = 1; k < DIRECTIONS; k++)
+                if (vector_dot(direction[k], w) > vector_dot(direction[nearest], w)) nearest = k;
+            for (int a = 0; a < 3; a++) light[nearest][a] += (float)(area * (double)image.rgb[3 * i + a]);
+        }
+        for (int order = 2; order <= 4; order++) {
+            isogi_dvr_desc desc = s->base;
+            isogi_dvr__lights lights;
+            isogi_dvr *dvr = NULL;
+            double sum[2] = {0, 0};
+            char setting[32];
+            desc.order = order;
+            need(isogi_dvr_create(&dvr, &desc, &two), "create"), need(isogi_dvr__set_lights(&lights, dvr, &own.lighting), "lights");
+            for (size_t i = 0; i < count; i++)
+                for (int a = 0; a < 3; a++) {
+                    double truth = 0, series = 0, v[16] = {0};
+                    for (size_t k = 0; k < DIRECTIONS; k++) {
+                        truth += (double)clear[i][k] * (double)light[k][a] / (4 * pi);
+                        for (int c = 0; c < order * order; c++) v[c] += 4 * pi / DIRECTIONS * (double)clear[i][k] * (double)y[k][c];
+                    }
+                    for (int c = 0; c < order * order; c++) series += (double)lights.sh[3 * c + a] * v[c] / (4 * pi);
+                    for (int least = 0; least < 2; least++)
+                        sum[least] += pow(coded(own.exposure * fmax(series, least ? (double)lights.least[a] * v[0] : 0)) -
+                                              coded(own.exposure * truth), 2);
+                }
+            snprintf(setting, sizeof setting, "%d coefficients", order * order);
+            for (int least = 0; least < 2; least++)
+                row("light", s->name, kind, least ? "default" : "cut", setting, 0, sqrt(sum[least] / (3.0 * (double)count)), 1, "place");
+            isogi_release(&two, lights.list, lights.count, sizeof *lights.list), isogi_dvr_free(dvr);
+        }
+        free(image.rgb);
+    }
+}
+
 static void bench_procedural(void) {
     static const isogi_transfer_point p[] = {
         {0, {.85f, .8f, .75f}, 0}, {.5, {.85f, .8f, .75f}, 0}, {.5, {.85f, .8f, .75f}, 8}, {1, {.85f, .8f, .75f}, 8}};
@@ -513,6 +649,7 @@ static void bench_real(int which) {
     look_at(&s[which], which ? upright : turned, up[!which]), expose(&s[which]);
     if (!only_study || !strcmp(only_study, "tables")) tables(&s[which]);
     if (!which) studies(s);
+    if (which < 2 && (!only_study || !strcmp(only_study, "light"))) study_light(&s[which]);
     isogi_vol_free(s[which].pyramid), free(image.rgb), free(data), free(s[which].truth);
 }
 
