@@ -4643,6 +4643,16 @@ typedef struct isogi_vol__descent {
     uint64_t held[ISOGI_VOL__NODE_LEVELS]; /* children on the way that can hold the surface, not counted backwards */
 } isogi_vol__descent;
 
+/* The root and its children as one isovalue sees them, for rays that begin anywhere. */
+typedef struct isogi_vol__summit {
+    double isovalue;
+    int low, high;      /* what it can be in 8 bits */
+    uint64_t known;     /* children whose own children are known */
+    uint64_t of[65][2]; /* of the root's children and, last, of the root: those of their children that reach up to the isovalue, and that
+                           reach down to it */
+    int ready;
+} isogi_vol__summit;
+
 /* What the loops share. */
 typedef struct isogi_vol__turn {
     const isogi_pyramid *p;
@@ -4656,6 +4666,7 @@ typedef struct isogi_vol__turn {
     uint8_t at_leaf[ISOGI_VOL__POOL + 8], in_doubt[ISOGI_VOL__POOL + 8];
     uint64_t cells;
     isogi_vol__descent descent; /* the last one */
+    isogi_vol__summit summit;
 } isogi_vol__turn;
 
 /* What is left of 64 children if planes a and b are met in either order: children on the far side of the one that comes later and on
@@ -4895,6 +4906,16 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE void isogi_vol__answer(isogi_vol__turn *turn
         (__m128i *)(void *)(turn->at_leaf + turn->leaves),
         _mm_maskz_compress_epi8((__mmask16)cells, _mm_add_epi8(_mm_set1_epi8((char)i), _mm_set_epi64x(0, 0x0706050403020100))));
     turn->leaves += __builtin_popcount(cells);
+}
+
+/* The number of the first child of masks, which are not counted backwards; without any: above 63. */
+ISOGI_VOL__AVX512 ISOGI_VOL__INLINE __m512i isogi_vol__first_child8(__m512i mask, __m512i flip) {
+    return _mm512_xor_si512(_mm512_popcnt_epi64(_mm512_andnot_si512(mask, _mm512_sub_epi64(mask, _mm512_set1_epi64(1)))), flip);
+}
+
+/* The digits x | y << 16 | z << 32 of children's numbers. */
+ISOGI_VOL__AVX512 ISOGI_VOL__INLINE __m512i isogi_vol__digits8(__m512i child) {
+    return _mm512_and_si512(_mm512_multishift_epi64_epi8(ISOGI_VOL__ALL64(0x2020200420022000), child), ISOGI_VOL__ALL64(0x000300030003));
 }
 
 /* Takes the next child of the lowest level that has any; returns the rays that have none left. */
@@ -6494,30 +6515,139 @@ ISOGI_VOL__AVX512 static void isogi_vol__descend8(isogi_vol__turn *turn, isogi_v
     turn->leaves += __builtin_popcount(cells);
 }
 
-/* Rays of eight that stand at the root are taken down from there if they begin where the first of them does, and are not few. */
-ISOGI_VOL__AVX512 ISOGI_VOL__INLINE void isogi_vol__take_down(isogi_vol__batch *b, isogi_vol__turn *turn, isogi_vol__pool *s,
-                                                              const uint8_t *seats, int row, __mmask8 lanes, const __m512d origin[3],
-                                                              const __m512d inverse[3], __m512d isovalue, __m512i end, __m512i flip) {
-    __attribute__((aligned(64))) double per[3][8];
+/* ---- rays that begin anywhere ----
+
+   The first two nodes of a ray are the root and one of its children: so few that their bounds are compared with an isovalue once for all
+   rays that have it. Rays come into the pool behind them, with a node of the next level to be answered. */
+
+ISOGI_VOL__AVX512 ISOGI_VOL__INLINE void isogi_vol__survey(isogi_vol__summit *summit, int i, const uint8_t *node) {
+    summit->of[i][0] = _mm512_cmpge_epu8_mask(_mm512_load_si512(node + 64), _mm512_set1_epi8((char)summit->low));
+    summit->of[i][1] = _mm512_cmple_epu8_mask(_mm512_load_si512(node), _mm512_set1_epi8((char)summit->high));
+}
+
+/* Children which eight rays pass and which can hold the surface, of nodes whose children reach up to the isovalue, and down to it; as
+   look_ahead says, where any hit will do. */
+ISOGI_VOL__AVX512 ISOGI_VOL__INLINE __m512i isogi_vol__held_at_top(isogi_vol__turn *turn, __m512i passed, __m512i up, __m512i down,
+                                                                   __m512i flip, __m512i bit, __mmask8 lanes) {
+    if (turn->any) {
+        const __m512i mirrored = isogi_vol__mirror8(passed, flip);
+        const __mmask8 out = _mm512_mask_test_epi64_mask(lanes, mirrored, _mm512_andnot_si512(up, down)),
+                       in = _mm512_mask_test_epi64_mask(lanes, mirrored, _mm512_andnot_si512(down, up));
+        if (out) turn->ahead[0] |= (uint64_t)_mm512_mask_reduce_or_epi64(out, bit);
+        if (in && turn->summit.low) turn->ahead[1] |= (uint64_t)_mm512_mask_reduce_or_epi64(in, bit);
+    }
+    return _mm512_and_si512(passed, isogi_vol__mirror8(_mm512_and_si512(up, down), flip));
+}
+
+/* Where nodes of a level are: children of nodes at x | y << 16 | z << 32 among those of the level above. */
+ISOGI_VOL__AVX512 ISOGI_VOL__INLINE __m512i isogi_vol__address8(const isogi_pyramid *p, int n, __m512i parent, __m512i child) {
+    const isogi_vol__node_level *const level = &p->node_level[n];
+    const __m512i field = _mm512_set1_epi64(0xffff), width = _mm512_set1_epi64((int64_t)level->parents[0]);
+    const __m512i x = _mm512_and_si512(parent, field), y = _mm512_and_si512(_mm512_srli_epi64(parent, 16), field);
+    const __m512i z = _mm512_mul_epu32(_mm512_srli_epi64(parent, 32), _mm512_set1_epi64((int64_t)level->parents[1]));
+    const __m512i family = _mm512_add_epi64(x, _mm512_mul_epu32(_mm512_add_epi64(y, z), width));
+    return _mm512_add_epi64(_mm512_add_epi64(_mm512_slli_epi64(family, 13), _mm512_slli_epi64(child, 7)),
+                            _mm512_set1_epi64((int64_t)(uintptr_t)p->nodes[level->first]));
+}
+
+/* Takes rays of one isovalue past the root and the first of its children that can hold the surface. meets: those that meet the box; lanes:
+   and are no copies; place: their origins, then inverses. */
+ISOGI_VOL__AVX512 static void isogi_vol__enter8(isogi_vol__batch *b, isogi_vol__turn *turn, isogi_vol__pool *s, const uint8_t *seats,
+                                                int row, __mmask8 meets, __mmask8 lanes, const double place[6][8], double isovalue,
+                                                __m512i end, __m512i flip) {
+    const isogi_pyramid *p = b->pyramid;
+    isogi_vol__summit *const summit = &turn->summit;
+    const isogi_vol__spots spots = isogi_vol__spots8(s, seats);
+    const int top = turn->levels - 1;
+    const uint8_t *const children = p->nodes[p->node_level[top - 1].first];
+    const __m512i one = _mm512_set1_epi64(1), bit = _mm512_sllv_epi64(one, isogi_vol__slots8(seats));
+    __attribute__((aligned(64))) uint64_t which[8];
+    __m512i mask, rest, child, group, cell, up, down, pending, address;
+    __mmask8 some, more;
+    uint64_t fresh;
+    int k;
+#define ISOGI_VOL__PUT(member, value)                                                           \
+    do {                                                                                        \
+        if (row) _mm512_mask_store_epi64(&s->member[seats[0]], lanes, value);                   \
+        else isogi_vol__put8(&spots, ISOGI_VOL__ROW_OF(member), value);                         \
+    } while (0)
+    if (!summit->ready || memcmp(&summit->isovalue, &isovalue, sizeof isovalue)) {
+        (void)isogi_vol__quantise_isovalue(p, isovalue, &summit->low, &summit->high);
+        summit->isovalue = isovalue, summit->known = 0, summit->ready = 1;
+        isogi_vol__survey(summit, 64, p->nodes[p->node_level[top].first]);
+    }
+    mask = isogi_vol__passed(place[0], place[3], 8, end, _mm512_set1_epi64(top), _mm512_setzero_si512());
+    mask = isogi_vol__held_at_top(turn, mask, _mm512_set1_epi64((int64_t)summit->of[64][0]),
+                                  _mm512_set1_epi64((int64_t)summit->of[64][1]), flip, bit, lanes);
+    some = _mm512_mask_test_epi64_mask(meets, mask, mask), rest = _mm512_and_si512(mask, _mm512_sub_epi64(mask, one));
+    pending = _mm512_mask_set1_epi64(_mm512_setzero_si512(), _mm512_mask_test_epi64_mask(some, rest, rest), 1 << top);
+    ISOGI_VOL__PUT(of.mask[top], rest);
+    child = _mm512_and_si512(isogi_vol__first_child8(mask, flip), _mm512_set1_epi64(63));
+    group = isogi_vol__digits8(child);
+    cell = _mm512_sll_epi64(group, _mm_cvtsi32_si128(2 * top));
+    mask = isogi_vol__passed(place[0], place[3], 8, end, _mm512_set1_epi64(top - 1), cell);
+    fresh = (uint64_t)_mm512_mask_reduce_or_epi64(some, _mm512_sllv_epi64(one, child)) & ~summit->known;
+    for (summit->known |= fresh; fresh; fresh &= fresh - 1)
+        isogi_vol__survey(summit, __builtin_ctzll(fresh), children + 128 * __builtin_ctzll(fresh));
+    b->work.blocks += (uint64_t)(__builtin_popcount((unsigned)lanes) + __builtin_popcount((unsigned)(some & lanes)));
+    _mm512_store_si512(which, child);
+    {
+        const char *at[8];
+#pragma GCC unroll 8
+        for (k = 0; k < 8; k++) at[k] = (const char *)summit->of[which[k]];
+        up = isogi_vol__load_eight(at, 0), down = isogi_vol__load_eight(at, 8);
+    }
+    mask = isogi_vol__held_at_top(turn, mask, up, down, flip, bit, (__mmask8)(some & lanes));
+    more = _mm512_mask_test_epi64_mask(some, mask, mask), rest = _mm512_and_si512(mask, _mm512_sub_epi64(mask, one));
+    pending = _mm512_mask_or_epi64(pending, _mm512_mask_test_epi64_mask(more, rest, rest), pending, _mm512_set1_epi64(1 << (top - 1)));
+    child = _mm512_and_si512(isogi_vol__first_child8(mask, flip), _mm512_set1_epi64(63));
+    cell = _mm512_or_si512(cell, _mm512_sll_epi64(isogi_vol__digits8(child), _mm_cvtsi32_si128(2 * top - 2)));
+    address = _mm512_mask_mov_epi64(_mm512_set1_epi64((int64_t)(uintptr_t)p->nodes), more, isogi_vol__address8(p, top - 2, group, child));
+    _mm512_store_si512(which, address);
+#pragma GCC unroll 8
+    for (k = 0; k < 8; k++) {
+        const char *node = (const char *)(uintptr_t)which[k];
+        _mm_prefetch(node, _MM_HINT_T0), _mm_prefetch(node + 64, _MM_HINT_T0);
+    }
+    ISOGI_VOL__PUT(address, address);
+    ISOGI_VOL__PUT(of.mask[top - 1], rest);
+    ISOGI_VOL__PUT(pending, pending);
+    ISOGI_VOL__PUT(cell, cell);
+    ISOGI_VOL__PUT(level, _mm512_mask_set1_epi64(_mm512_set1_epi64(-1), more, top - 2));
+#undef ISOGI_VOL__PUT
+    if (lanes & ~more) turn->choosing |= (uint64_t)_mm512_mask_reduce_or_epi64((__mmask8)(lanes & ~more), bit);
+}
+
+/* Rays of eight that stand at the root are taken down from there if they have one isovalue, and are not few; whether they are. */
+ISOGI_VOL__AVX512 ISOGI_VOL__INLINE int isogi_vol__take_down(isogi_vol__batch *b, isogi_vol__turn *turn, isogi_vol__pool *s,
+                                                             const uint8_t *seats, int row, __mmask8 meets, __mmask8 lanes,
+                                                             const __m512d origin[3], const __m512d inverse[3], __m512d isovalue,
+                                                             __m512i end, __m512i flip) {
+    __attribute__((aligned(64))) double place[6][8]; /* origins, then inverses */
     __m512i first;
-    __mmask8 off;
+    __mmask8 off = 0;
     double at[3], value;
     int a;
-    if (__builtin_popcount((unsigned)lanes) < 4) return;
+    if (__builtin_popcount((unsigned)lanes) < 4) return 0;
     first = _mm512_set1_epi64(__builtin_ctz((unsigned)lanes));
-    off = _mm512_cmp_pd_mask(isovalue, _mm512_permutexvar_pd(first, isovalue), _CMP_NEQ_UQ);
-#pragma GCC unroll 3
-    for (a = 0; a < 3; a++)
-        off = (__mmask8)(off | _mm512_cmp_pd_mask(origin[a], _mm512_permutexvar_pd(first, origin[a]), _CMP_NEQ_UQ));
-    if (off & lanes) return;
-#pragma GCC unroll 3
-    for (a = 0; a < 3; a++) at[a] = _mm512_cvtsd_f64(_mm512_permutexvar_pd(first, origin[a])), _mm512_store_pd(per[a], inverse[a]);
+    if (_mm512_mask_cmp_pd_mask(lanes, isovalue, _mm512_permutexvar_pd(first, isovalue), _CMP_NEQ_UQ)) return 0;
     value = _mm512_cvtsd_f64(_mm512_permutexvar_pd(first, isovalue));
+#pragma GCC unroll 3
+    for (a = 0; a < 3; a++) {
+        const __m512d same = _mm512_permutexvar_pd(first, origin[a]);
+        off = (__mmask8)(off | _mm512_mask_cmp_pd_mask(lanes, origin[a], same, _CMP_NEQ_UQ));
+        at[a] = _mm512_cvtsd_f64(same), _mm512_store_pd(place[a], origin[a]), _mm512_store_pd(place[3 + a], inverse[a]);
+    }
+    if (off) {
+        isogi_vol__enter8(b, turn, s, seats, row, meets, lanes, (const double(*)[8])place, value, end, flip);
+        return 1;
+    }
     if (turn->descent.cell < 0 || memcmp(turn->descent.origin, at, sizeof at) || memcmp(&turn->descent.isovalue, &value, sizeof value)) {
         isogi_vol__prepare_descent(&turn->descent, b->pyramid, at, value);
         b->work.blocks += (uint64_t)turn->levels; /* at most */
     }
-    isogi_vol__descend8(turn, s, seats, row, lanes, (const double(*)[8])per, end, flip);
+    isogi_vol__descend8(turn, s, seats, row, lanes, (const double(*)[8])place + 3, end, flip);
+    return 1;
 }
 
 /* Sends for rays that come after the next ones; soon: they are needed at once. */
@@ -6543,7 +6673,7 @@ ISOGI_VOL__INLINE void isogi_vol__send_for_hits(const isogi_hit *hits, int soon)
 /* Sets up to eight rays up at once and puts them into slots (beyond `count` the first one again; what is written of rays that get none does
    no harm): the operations of begin and aim, in their order and without contraction.
    Returns the rays that have a slot now; *odd: those that are left to the code for one. The others miss the box. turn: of a pool, in
-   which rays do not stay at the root if they begin in one place, or NULL. alike: rays differ in nothing but direction, as in a bundle. A
+   which rays do not stay at the root if they have one isovalue, or NULL. alike: rays differ in nothing but direction, as in a bundle. A
    kernel, longer than a screen: nothing in it is worth a name of its own. */
 ISOGI_VOL__AVX512 ISOGI_VOL__INLINE unsigned isogi_vol__seat_some(isogi_vol__batch *b, isogi_vol__turn *turn, isogi_vol__pool *s,
                                                                   size_t first, int count, const uint8_t *seats, int whole, int alike,
@@ -6703,10 +6833,6 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE unsigned isogi_vol__seat_some(isogi_vol__bat
                                     _mm512_set1_epi64(1)));
     ISOGI_VOL__PUT(end, _mm512_or_si512(_mm512_castpd_si512(stop), _mm512_set1_epi64(3)));
     ISOGI_VOL__PUT(flip, flip);
-    ISOGI_VOL__PUT(pending, none);
-    ISOGI_VOL__PUT(cell, none);
-    ISOGI_VOL__PUT(level, _mm512_mask_set1_epi64(_mm512_set1_epi64(-1), meets, p->node_levels - 1));
-    ISOGI_VOL__PUT(address, _mm512_set1_epi64((int64_t)(uintptr_t)p->nodes[p->node_level[p->node_levels - 1].first]));
     ISOGI_VOL__PUT(side, inside);
     ISOGI_VOL__PUT(entry_axis, b->rays ? axis : _mm512_set1_epi64(-1));
     ISOGI_VOL__PUT_REAL(base, enter);
@@ -6714,14 +6840,18 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE unsigned isogi_vol__seat_some(isogi_vol__bat
     ISOGI_VOL__PUT_REAL(isovalue, isovalue);
     ISOGI_VOL__PUT(deflated, none);
     ISOGI_VOL__PUT(ray, _mm512_add_epi64(_mm512_set1_epi64((int64_t)first), lane));
+    *odd = (unsigned)(lanes & ~good);
+    if (!turn || !isogi_vol__take_down(b, turn, s, seats, whole, meets, (__mmask8)(meets & lanes), origin, inverse, isovalue,
+                                       _mm512_or_si512(_mm512_castpd_si512(stop), _mm512_set1_epi64(3)), flip)) {
+        ISOGI_VOL__PUT(pending, none);
+        ISOGI_VOL__PUT(cell, none);
+        ISOGI_VOL__PUT(level, _mm512_mask_set1_epi64(_mm512_set1_epi64(-1), meets, p->node_levels - 1));
+        ISOGI_VOL__PUT(address, _mm512_set1_epi64((int64_t)(uintptr_t)p->nodes[p->node_level[p->node_levels - 1].first]));
+    }
 #undef ISOGI_VOL__PUT
 #undef ISOGI_VOL__PUT_REAL
-    *odd = (unsigned)(lanes & ~good), meets = (__mmask8)(meets & lanes);
-    if (turn)
-        isogi_vol__take_down(b, turn, s, seats, whole, meets, origin, inverse, isovalue,
-                             _mm512_or_si512(_mm512_castpd_si512(stop), _mm512_set1_epi64(3)), flip);
     b->work.rays += (uint64_t)__builtin_popcount((unsigned)(lanes & good));
-    return meets;
+    return (unsigned)(meets & lanes);
 }
 
 ISOGI_VOL__AVX512 static unsigned isogi_vol__seat8(isogi_vol__batch *b, isogi_vol__turn *turn, isogi_vol__pool *s, size_t first, int count,
@@ -6854,8 +6984,8 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE uint64_t isogi_vol__fill_pool(isogi_vol__bat
             const __m128i all = _mm512_castsi512_si128(_mm512_maskz_compress_epi8(open, _mm512_load_si512(b->pyramid->ways->child[0])));
             _mm_storeu_si128((__m128i *)(void *)list, _mm_mask_mov_epi8(_mm_broadcastb_epi8(all), (__mmask16)((1u << n) - 1), all));
         }
-        seated = isogi_vol__seat8(b, turn, s, *next, n, list, &odd);
         turn->ahead[0] &= ~open, turn->ahead[1] &= ~open;
+        seated = isogi_vol__seat8(b, turn, s, *next, n, list, &odd);
         for (k = 0; k < n; k++, ++*next) {
             if (seated >> k & 1 || (odd >> k & 1 && isogi_vol__seat_odd(b, s, *next, list[k]))) open &= ~((uint64_t)1 << list[k]);
             else if (odd >> k & 1) continue;
@@ -6968,8 +7098,8 @@ ISOGI_VOL__AVX512 static void isogi_vol__take_rows_down(isogi_vol__batch *b, iso
                                     _mm512_load_pd(&s->inverse[2][i])};
         uint8_t seats[16];
         _mm_storeu_si128((__m128i *)(void *)seats, _mm_add_epi8(_mm_set1_epi8((char)i), _mm_set_epi64x(0, 0x0706050403020100)));
-        isogi_vol__take_down(b, turn, s, seats, 1, (__mmask8)(rays >> i), origin, inverse, _mm512_load_pd(&s->isovalue[i]),
-                             _mm512_load_si512(&s->end[i]), _mm512_load_si512(&s->flip[i]));
+        (void)isogi_vol__take_down(b, turn, s, seats, 1, (__mmask8)(rays >> i), (__mmask8)(rays >> i), origin, inverse,
+                                   _mm512_load_pd(&s->isovalue[i]), _mm512_load_si512(&s->end[i]), _mm512_load_si512(&s->flip[i]));
     }
 }
 
@@ -6984,8 +7114,9 @@ ISOGI_VOL__AVX512 ISOGI_VOL__NOINLINE static void isogi_vol__run_pool(isogi_vol_
     for (;;) {
         uint64_t alive = 0;
         int answered, waits;
-        /* rays of a bundle begin with cells to be looked at, so they come in before that stage; others begin with a node */
-        if (!b->bundle || open == seats) open = isogi_vol__fill_pool(b, turn, s, seats, open, next, end);
+        /* rays of a bundle begin with cells to be looked at, so they come in before that stage; others begin with a node, which is
+           sent for at the end of a turn */
+        if (open == seats) open = isogi_vol__fill_pool(b, turn, s, seats, open, next, end);
         if (open == seats) return;
         if (share) isogi_vol__share(turn, s, groups, __builtin_ctzll(seats & ~open)), share = 0;
         /* those that choose stay where they are */
@@ -7019,6 +7150,7 @@ ISOGI_VOL__AVX512 ISOGI_VOL__NOINLINE static void isogi_vol__run_pool(isogi_vol_
             }
         }
         turn->choosing = 0;
+        if (!b->bundle) open = isogi_vol__fill_pool(b, turn, s, seats, open, next, end);
     }
 }
 
