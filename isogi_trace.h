@@ -470,11 +470,13 @@ ISOGI_API size_t isogi_trace_memory(const isogi_trace *trace); /* bytes that the
 #define ISOGI_TRACE__MAX_ORDER 6
 #define ISOGI_TRACE__NOT_READY HUGE_VALF
 #define ISOGI_TRACE__DEPTH 0.25 /* voxels that must be matter behind the surface of a texel of the high side, at once or up to a voxel on */
-#define ISOGI_TRACE__SAMPLES 16384 /* samples of a batch, */
-#define ISOGI_TRACE__SPANS 4096    /* in as many pieces, */
-#define ISOGI_TRACE__SPAN 512      /* of at most this many */
-#define ISOGI_TRACE__TASK_SPANS 128 /* pieces in a task, */
-#define ISOGI_TRACE__CASTS 65      /* in so many tasks at most: each but the last is full, by SPAN samples or by pieces */
+#define ISOGI_TRACE__SAMPLES 32768 /* samples of a batch, */
+#define ISOGI_TRACE__SPANS 8192    /* in as many spans, */
+#define ISOGI_TRACE__SPAN 512      /* of at most this many; */
+#define ISOGI_TRACE__PIECE_SPANS 128 /* spans in a piece, */
+#define ISOGI_TRACE__PIECES 129    /* in so many pieces at most: each but the last is full, by SPAN samples or by spans; */
+#define ISOGI_TRACE__CASTS 65      /* in so many tasks at most, of 3 pieces at most */
+#define ISOGI_TRACE__HEADS 16384   /* chains of what is new in a batch; a power of two */
 #define ISOGI_TRACE__FLUSH 256     /* rays in one call */
 #define ISOGI_TRACE__SWEEP 256     /* nodes in a task that traces no rays */
 #define ISOGI_TRACE__PIECE 65536   /* rays that take as long as what is done without any before progress is told of, */
@@ -3156,7 +3158,6 @@ typedef struct isogi_trace__node {
     isogi_trace__brick *brick; /* from here on: what is gathered, see isogi_trace__node_clear */
     size_t texel[3];
     uint32_t slot, samples, light_samples, hits;
-    uint32_t readers; /* probe: hits that take their light from it, those that texels are still to make included */
     uint32_t wanted;  /* probe: samples, once its generation has begun */
     float albedo[3];
     signed char level;    /* blocks of samples that are complete */
@@ -3200,7 +3201,8 @@ typedef struct isogi_trace__link {
 } isogi_trace__link;
 
 /* Nodes that stay where they are once they are made. guides: of texels; reflectors, links: of probes. values: their four kinds (below), one
-   after the other. heads: where chains of probes begin, number + 1, 0 = nowhere; NULL of texels. */
+   after the other. heads: where chains of probes begin, number + 1, 0 = nowhere; NULL of texels. readers: of each probe, hits that take their
+   light from it, those that texels are still to make included; apart from the rest, since they are counted by one thread. */
 typedef struct isogi_trace__chunk {
     float *values;
     isogi_trace__node *nodes;
@@ -3208,6 +3210,7 @@ typedef struct isogi_trace__chunk {
     isogi_trace__reflector *reflectors;
     isogi_trace__link *links;
     uint32_t *heads;
+    uint8_t *readers;
 } isogi_trace__chunk;
 
 /* What a node's values are. DIRECT: sums over rays that escaped; BOUNCE: of texels over rays that hit, of probes what comes from sky and
@@ -3233,18 +3236,34 @@ typedef struct isogi_trace__set {
 typedef struct isogi_trace__span {
     uint32_t node, first, count, offset; /* offset: of its samples in the batch */
     const isogi_trace__node *of;
-    int nowhere; /* there is no place for its rays to begin */
+    int nowhere;   /* from here on: what they brought. There is no place for its rays to begin */
+    uint32_t hits; /* that are to be lit */
     double steady[3], light[3], light_spread, bright[3], bright_spread, square;
 } isogi_trace__span;
 
-/* What became of one cosine-distributed ray; side 0: it escaped. */
+/* A piece of a batch: its first span; its hits, the place of the first among those of the batch, and how many of them found no probe. */
+typedef struct isogi_trace__piece {
+    uint32_t span, hits, first_hit, fresh;
+} isogi_trace__piece;
+
+/* How far a search for a hit's probe has come: probes of its cell that it has passed, and the one of them that lies in the hit's plane and
+   whose isovalue is nearest, number + 1, with the difference. */
+typedef struct isogi_trace__quest {
+    double least;
+    uint32_t nearest;
+    int tries;
+} isogi_trace__quest;
+
+/* What became of one cosine-distributed ray; key 0: it escaped. */
 typedef struct isogi_trace__catch {
     uint64_t key;
+    double isovalue; /* of the ray */
     isogi_hit hit;
     float normal[3];
     uint32_t probe; /* number + 1 of the probe of this hit; 0: none was there when the ray was traced, */
-    float alike;    /* and one that is made has this */
+    float alike;    /* and one that is made has this; */
     signed char from;
+    isogi_trace__quest search; /* it passed those that there were */
 } isogi_trace__catch;
 
 struct isogi_trace__feedback {
@@ -3253,8 +3272,10 @@ struct isogi_trace__feedback {
     isogi_trace__catch *catches;
     struct isogi_trace__cast *casts; /* of tasks */
     float *direct; /* of spans */
-    uint32_t *task;
-    size_t span_count, sample_count, task_count;
+    isogi_trace__piece *pieces; /* and one behind them */
+    uint32_t *fresh; /* catches that found no probe: of a piece, from the place of its first sample on */
+    uint32_t *makers, *next, *heads; /* catches that get the new probes; chains of these, place + 1, and where they begin */
+    size_t span_count, sample_count, piece_count;
     size_t cursor, probe_cursor; /* nodes before these have nothing to do at this level */
     size_t probe_end;            /* of the generation of probes at work: later ones were made by its rays, */
     size_t probe_counted;        /* of which those before this one know how many samples they want */
@@ -3296,11 +3317,11 @@ enum {
 typedef struct isogi_trace__cast {
     isogi_trace *trace;
     isogi_counters *counters;
-    isogi_trace__span *span; /* of this task */
-    isogi_trace__site site[ISOGI_TRACE__TASK_SPANS];
-    uint64_t sequence[ISOGI_TRACE__TASK_SPANS];
-    double turn[ISOGI_TRACE__TASK_SPANS][2]; /* of the sequence */
-    double sum[ISOGI_TRACE__TASK_SPANS], square[ISOGI_TRACE__TASK_SPANS]; /* of luminance by one light */
+    isogi_trace__span *span; /* of this piece */
+    isogi_trace__site site[ISOGI_TRACE__PIECE_SPANS];
+    uint64_t sequence[ISOGI_TRACE__PIECE_SPANS];
+    double turn[ISOGI_TRACE__PIECE_SPANS][2]; /* of the sequence */
+    double sum[ISOGI_TRACE__PIECE_SPANS], square[ISOGI_TRACE__PIECE_SPANS]; /* of luminance by one light */
     int shadow; /* rays towards lights; else cosine-distributed ones */
     int bright; /* the light is the sky */
     int distant; /* the light is */
@@ -3333,6 +3354,10 @@ static isogi_trace__link *isogi_trace__link_at(const isogi_trace__set *s, size_t
     return &s->chunks[i / ISOGI_TRACE__CHUNK].links[i % ISOGI_TRACE__CHUNK];
 }
 
+static uint8_t *isogi_trace__readers_at(const isogi_trace__set *s, size_t i) {
+    return &s->chunks[i / ISOGI_TRACE__CHUNK].readers[i % ISOGI_TRACE__CHUNK];
+}
+
 /* v: values of a node. */
 static float *isogi_trace__values_at(const isogi_trace__set *s, size_t i, int kind, size_t v) {
     return s->chunks[i / ISOGI_TRACE__CHUNK].values + ((size_t)kind * ISOGI_TRACE__CHUNK + i % ISOGI_TRACE__CHUNK) * v;
@@ -3350,6 +3375,7 @@ static void isogi_trace__chunk_free(const isogi_trace *t, isogi_trace__chunk *c)
     isogi_release(&t->context, c->links, ISOGI_TRACE__CHUNK, sizeof *c->links);
     isogi_release(&t->context, c->values, (size_t)ISOGI_TRACE__KINDS * ISOGI_TRACE__CHUNK, (size_t)t->values * sizeof(float));
     isogi_release(&t->context, c->heads, ISOGI_TRACE__CHUNK, sizeof *c->heads);
+    isogi_release(&t->context, c->readers, ISOGI_TRACE__CHUNK, sizeof *c->readers);
 }
 
 static size_t isogi_trace__segment_size(const isogi_trace__segment *s) {
@@ -3396,7 +3422,8 @@ static isogi_result isogi_trace__set_reserve(const isogi_trace *t, isogi_trace__
         c.links = chains ? (isogi_trace__link *)isogi_allocate(&t->context, ISOGI_TRACE__CHUNK, sizeof *c.links) : NULL;
         c.values = (float *)isogi_allocate(&t->context, (size_t)ISOGI_TRACE__KINDS * ISOGI_TRACE__CHUNK, (size_t)t->values * sizeof(float));
         c.heads = chains ? (uint32_t *)isogi_allocate(&t->context, ISOGI_TRACE__CHUNK, sizeof *c.heads) : NULL;
-        if (!c.nodes || !c.values || !(chains ? c.reflectors && c.links && c.heads : c.guides != NULL)) {
+        c.readers = chains ? (uint8_t *)isogi_allocate(&t->context, ISOGI_TRACE__CHUNK, sizeof *c.readers) : NULL;
+        if (!c.nodes || !c.values || !(chains ? c.reflectors && c.links && c.heads && c.readers : c.guides != NULL)) {
             isogi_trace__chunk_free(t, &c);
             return ISOGI_NO_MEMORY;
         }
@@ -3415,7 +3442,8 @@ static void isogi_trace__feedback_free(const isogi_trace *t) {
     isogi_release(&t->context, f->catches, ISOGI_TRACE__SAMPLES, sizeof *f->catches);
     isogi_release(&t->context, f->casts, ISOGI_TRACE__CASTS, sizeof *f->casts);
     isogi_release(&t->context, f->direct, ISOGI_TRACE__SPANS, (size_t)t->values * sizeof(float));
-    isogi_release(&t->context, f->task, ISOGI_TRACE__SPANS + 1, sizeof *f->task);
+    isogi_release(&t->context, f->pieces, ISOGI_TRACE__PIECES + 1, sizeof *f->pieces);
+    isogi_release(&t->context, f->fresh, 3 * ISOGI_TRACE__SAMPLES + ISOGI_TRACE__HEADS, sizeof *f->fresh);
     isogi_release(&t->context, f, 1, sizeof *f);
 }
 
@@ -3432,8 +3460,11 @@ static isogi_result isogi_trace__feedback_new(isogi_trace *t) {
     f->catches = (isogi_trace__catch *)isogi_allocate(&t->context, ISOGI_TRACE__SAMPLES, sizeof *f->catches);
     f->casts = (isogi_trace__cast *)isogi_allocate(&t->context, ISOGI_TRACE__CASTS, sizeof *f->casts);
     f->direct = (float *)isogi_allocate(&t->context, ISOGI_TRACE__SPANS, (size_t)t->values * sizeof(float));
-    f->task = (uint32_t *)isogi_allocate(&t->context, ISOGI_TRACE__SPANS + 1, sizeof *f->task);
-    return f->spans && f->catches && f->casts && f->direct && f->task ? ISOGI_OK : ISOGI_NO_MEMORY;
+    f->pieces = (isogi_trace__piece *)isogi_allocate(&t->context, ISOGI_TRACE__PIECES + 1, sizeof *f->pieces);
+    f->fresh = (uint32_t *)isogi_allocate(&t->context, 3 * ISOGI_TRACE__SAMPLES + ISOGI_TRACE__HEADS, sizeof *f->fresh);
+    if (!f->spans || !f->catches || !f->casts || !f->direct || !f->pieces || !f->fresh) return ISOGI_NO_MEMORY;
+    f->makers = f->fresh + ISOGI_TRACE__SAMPLES, f->next = f->makers + ISOGI_TRACE__SAMPLES, f->heads = f->next + ISOGI_TRACE__SAMPLES;
+    return ISOGI_OK;
 }
 
 /* ---- the table of probes ---- */
@@ -3515,9 +3546,9 @@ static void isogi_trace__node_clear(const isogi_trace *t, isogi_trace__set *s, s
     memset(isogi_trace__light_at(s, i, v), 0, v * sizeof(float));
 }
 
-/* The next node of the set. */
-static isogi_trace__node *isogi_trace__node_begin(const isogi_trace *t, isogi_trace__set *s) {
-    isogi_trace__node *n = isogi_trace__node_at(s, s->count);
+/* A new node. */
+static isogi_trace__node *isogi_trace__node_begin(const isogi_trace *t, isogi_trace__set *s, size_t i) {
+    isogi_trace__node *n = isogi_trace__node_at(s, i);
     memset(n, 0, offsetof(isogi_trace__node, brick));
     n->from = (signed char)(t->scene.high ? -1 : 1);
     return n;
@@ -3525,21 +3556,21 @@ static isogi_trace__node *isogi_trace__node_begin(const isogi_trace *t, isogi_tr
 
 /* Whether a probe may stand for a hit: it faces the same way and lies in the hit's plane, or nearly so: half as far from it as the
    smallest cells reach along the normal. */
-static int isogi_trace__same_place(const isogi_trace *t, const isogi_trace__catch *c, const isogi_trace__node *n) {
+static int isogi_trace__same_place(const isogi_trace *t, const isogi_trace__catch *c, const isogi_hit *place, const float normal[3]) {
     const double *voxel = t->scene.voxel;
     double apart = 0, least = voxel[0], reach = 0;
     int a;
     for (a = 0; a < 3; a++) {
         const double *axis = t->scene.axis[a];
-        double facing = axis[0] * (double)n->normal[0] + axis[1] * (double)n->normal[1] + axis[2] * (double)n->normal[2];
-        double d = ((double)c->hit.cell[a] - (double)n->place.cell[a] + c->hit.local[a] - n->place.local[a]) * voxel[a];
+        double facing = axis[0] * (double)normal[0] + axis[1] * (double)normal[1] + axis[2] * (double)normal[2];
+        double d = ((double)c->hit.cell[a] - (double)place->cell[a] + c->hit.local[a] - place->local[a]) * voxel[a];
         double along = 0.5 * ISOGI_TRACE__HALF * voxel[a] * fabs(facing);
         apart += d * facing;
         if (voxel[a] < least) least = voxel[a];
         if (along > reach) reach = along;
     }
     if (ISOGI_TRACE__PLANE * least > reach) reach = ISOGI_TRACE__PLANE * least;
-    return fabs(apart) < reach && isogi_trace__dot(c->normal, n->normal) > 0.5;
+    return fabs(apart) < reach && isogi_trace__dot(c->normal, normal) > 0.5;
 }
 
 /* Whether two isosurfaces have nearly the same colours where c hit: if not, neither's light tells that of the other. */
@@ -3598,40 +3629,43 @@ static double isogi_trace__alike(const isogi_trace__scene *scene, const isogi_hi
     return ISOGI_TRACE__ALIKE * least * (isogi_trace__magnitude(slope) / scene->range);
 }
 
-/* The number + 1 of the probe of a hit; 0: there is none, and it would have *key, and stand at *end of its chain. Probes are only ever
-   added to the end of a chain, so what was found once is found again. Of more than 32 probes of a cell none is added: the one in the
+/* Passes the next probe of the cell: 1: the search ends, with `nearest`. Of more than 32 probes of a cell none is added: the one in the
    hit's plane whose isovalue is nearest stands for it, or the last, whatever its place and colour: else colours that differ at every
    point would need ever more probes, and time to search them. */
-static uint32_t isogi_trace__probe_find(const isogi_trace *t, const isogi_trace__catch *c, double isovalue, uint64_t *key, uint32_t **end) {
-    const isogi_trace__set *set = &t->feedback->probes;
-    double least = HUGE_VAL;
-    uint32_t nearest = 0, *at;
-    int tries = 0;
-    *key = c->key, *end = NULL;
-    if (!set->chunk_count) return 0;
-    for (at = isogi_trace__head(set, c->key); *at;) {
-        isogi_trace__link *link = isogi_trace__link_at(set, *at - 1);
-        const isogi_trace__node *n = link->tag == isogi_trace__tag(c->key) ? isogi_trace__node_at(set, *at - 1) : NULL;
-        if (n && n->cell == c->key) {
-            double other = fabs(n->isovalue - isovalue) / t->scene.range;
-            if (other < least && isogi_trace__same_place(t, c, n) && isogi_trace__same_colours(t, c, n->isovalue, isovalue)) {
-                if (other < (double)n->alike || isogi_trace__zero(other)) return *at;
-                nearest = *at, least = other;
-            }
-            if (tries++ == 32) return nearest ? nearest : *at;
-            *key = isogi_trace__key(*key, 1);
-        }
-        at = &link->next;
+static int isogi_trace__search_on(const isogi_trace *t, const isogi_trace__catch *c, isogi_trace__quest *s, uint32_t number,
+                                  const isogi_hit *place, const float normal[3], double isovalue, float alike) {
+    double other = fabs(isovalue - c->isovalue) / t->scene.range;
+    if (other < s->least && isogi_trace__same_place(t, c, place, normal) && isogi_trace__same_colours(t, c, isovalue, c->isovalue)) {
+        s->nearest = number, s->least = other;
+        if (other < (double)alike || isogi_trace__zero(other)) return 1;
     }
-    *end = at;
-    return 0;
+    if (s->tries++ < 32) return 0;
+    if (!s->nearest) s->nearest = number;
+    return 1;
+}
+
+/* The number + 1 of the probe of a hit; 0: there is none. Probes are only ever added to the end of a chain, so what was found once is
+   found again. */
+static uint32_t isogi_trace__probe_find(const isogi_trace *t, isogi_trace__catch *c) {
+    const isogi_trace__set *set = &t->feedback->probes;
+    isogi_trace__quest search = {HUGE_VAL, 0, 0};
+    uint32_t at = set->chunk_count ? *isogi_trace__head(set, c->key) : 0, found = 0;
+    while (at && !found) {
+        const isogi_trace__link *link = isogi_trace__link_at(set, at - 1);
+        const isogi_trace__node *n = link->tag == isogi_trace__tag(c->key) ? isogi_trace__node_at(set, at - 1) : NULL;
+        if (n && n->cell == c->key && isogi_trace__search_on(t, c, &search, at, &n->place, n->normal, n->isovalue, n->alike))
+            found = search.nearest;
+        at = link->next;
+    }
+    c->search = search;
+    return found;
 }
 
 /* What a search will read first: where the chain begins, the link of its first probe, and that probe where it is of the cell. To be sent
    for by the caller: a function that does nothing else would be left out by compilers. */
 static const void *isogi_trace__probe_ahead(const isogi_trace__set *set, const isogi_trace__catch *c, int what) {
     const uint32_t *head;
-    if (!c->key || c->probe || !set->chunk_count) return c;
+    if (!set->chunk_count) return c;
     head = isogi_trace__head(set, c->key);
     if (what == 0) return head;
     if (!*head) return c;
@@ -3639,37 +3673,63 @@ static const void *isogi_trace__probe_ahead(const isogi_trace__set *set, const i
     return isogi_trace__link_at(set, *head - 1)->tag == isogi_trace__tag(c->key) ? (const void *)isogi_trace__node_at(set, *head - 1) : c;
 }
 
-/* The number of the probe of a hit, which is made if there is none: not yet by isogi_trace__probe_finish. */
-static isogi_result isogi_trace__probe_of(isogi_trace *t, const isogi_trace__catch *c, double isovalue, uint32_t *probe) {
-    isogi_trace__set *set = &t->feedback->probes;
-    isogi_trace__node *n;
-    isogi_result result;
-    uint64_t key;
-    uint32_t *end, known = c->probe ? c->probe : isogi_trace__probe_find(t, c, isovalue, &key, &end);
-    size_t chunks = set->chunk_count;
-    if (known) {
-        *probe = known - 1;
-        return ISOGI_OK;
+/* Probes for hits that found none, the first catches of which become `makers`: chains of what is new, in the order of samples, are gone through in the
+   same way. Returns how many. */
+static size_t isogi_trace__probes_meet(const isogi_trace *t) {
+    isogi_trace__feedback *f = t->feedback;
+    const size_t late = 8; /* hits ahead */
+    size_t piece, made = 0;
+    memset(f->heads, 0, ISOGI_TRACE__HEADS * sizeof *f->heads);
+    for (piece = 0; piece < f->piece_count; piece++) {
+        const uint32_t *fresh = f->fresh + f->spans[f->pieces[piece].span].offset;
+        size_t i, count = f->pieces[piece].fresh;
+        for (i = 0; i < count; i++) {
+            isogi_trace__catch *c = &f->catches[fresh[i]];
+            uint32_t *at = &f->heads[isogi_trace__tag(c->key) & (ISOGI_TRACE__HEADS - 1)];
+            if (i + late < count) ISOGI_TRACE__AHEAD(&f->catches[fresh[i + late]]);
+            for (; *at && !c->probe; at = &f->next[*at - 1]) {
+                const isogi_trace__catch *o = &f->catches[f->makers[*at - 1]];
+                if (o->key != c->key) continue;
+                if (isogi_trace__search_on(t, c, &c->search, o->probe, &o->hit, o->normal, o->isovalue, o->alike))
+                    c->probe = c->search.nearest;
+            }
+            if (c->probe) continue;
+            f->makers[made] = fresh[i], f->next[made] = 0, *at = (uint32_t)++made;
+            c->probe = (uint32_t)(f->probes.count + made);
+        }
     }
-    result = isogi_trace__set_reserve(t, set, 1, 1);
-    if (result != ISOGI_OK) return result;
-    if (set->chunk_count > chunks) (void)isogi_trace__probe_find(t, c, isovalue, &key, &end); /* chains have been split */
-    n = isogi_trace__node_begin(t, set);
-    n->isovalue = isovalue;
-    n->place = c->hit, n->cell = c->key, n->key = key, n->from = c->from, n->alike = c->alike;
-    memcpy(n->normal, c->normal, sizeof n->normal);
-    isogi_trace__link_at(set, set->count)->tag = isogi_trace__tag(n->cell), isogi_trace__link_at(set, set->count)->next = 0;
-    *probe = (uint32_t)set->count++, *end = *probe + 1;
-    return ISOGI_OK;
+    return made;
+}
+
+/* Puts the new probes at the ends of their chains. There is room for them. */
+static void isogi_trace__probes_link(const isogi_trace *t, size_t made) {
+    isogi_trace__feedback *f = t->feedback;
+    isogi_trace__set *set = &f->probes;
+    const size_t early = 16, late = 8; /* probes ahead */
+    size_t i;
+    for (i = 0; i < made; i++) {
+        const isogi_trace__catch *c = &f->catches[f->makers[i]];
+        isogi_trace__link *link = isogi_trace__link_at(set, set->count);
+        uint32_t *at = isogi_trace__head(set, c->key);
+        if (i + early < made) ISOGI_TRACE__AHEAD(&f->catches[f->makers[i + early]]);
+        if (i + late < made) ISOGI_TRACE__AHEAD(isogi_trace__head(set, f->catches[f->makers[i + late]].key));
+        while (*at) at = &isogi_trace__link_at(set, *at - 1)->next;
+        link->tag = isogi_trace__tag(c->key), link->next = 0, *isogi_trace__readers_at(set, set->count) = 0;
+        *at = (uint32_t)++set->count;
+    }
 }
 
 /* The rest of a new probe, apart: it can be done by many at a time. */
-static void isogi_trace__probe_finish(const isogi_trace *t, size_t i) {
+static void isogi_trace__probe_finish(const isogi_trace *t, size_t i, const isogi_trace__catch *c) {
     isogi_trace__set *set = &t->feedback->probes;
-    isogi_trace__node *n = isogi_trace__node_at(set, i);
+    isogi_trace__node *n = isogi_trace__node_begin(t, set, i);
     double grid[3], point[3];
     float emission[3];
     int a;
+    n->isovalue = c->isovalue;
+    n->place = c->hit, n->cell = n->key = c->key, n->from = c->from, n->alike = c->alike;
+    for (a = 0; a < c->search.tries; a++) n->key = isogi_trace__key(n->key, 1);
+    memcpy(n->normal, c->normal, sizeof n->normal);
     isogi_trace__node_clear(t, set, i);
     isogi_trace_albedo(&t->scene.desc, n->isovalue, n->albedo);
     if (!t->scene.desc.material) return;
@@ -3766,7 +3826,7 @@ static void isogi_trace__cast_hit(isogi_trace__cast *c, int i) {
     int side = c->hit[i].side > 0 ? 1 : -1, a;
     double length = c->hit[i].t;
     to->from = (signed char)side;
-    to->hit = c->hit[i];
+    to->hit = c->hit[i], to->isovalue = span->of->isovalue;
     memcpy(to->normal, c->normal[i], sizeof to->normal);
     if (!(isogi_trace__dot(to->normal, to->normal) > 0)) memcpy(to->normal, site->normal, sizeof to->normal);
     else for (a = 0; a < 3 && side < 0; a++) to->normal[a] = -to->normal[a];
@@ -3785,11 +3845,10 @@ static void isogi_trace__cast_hit(isogi_trace__cast *c, int i) {
 static void isogi_trace__cast_probes(isogi_trace__cast *c, int first, int count) {
     const isogi_trace *t = c->trace;
     isogi_trace__catch *hit[ISOGI_TRACE__FLUSH];
-    double isovalue[ISOGI_TRACE__FLUSH];
     int i, n = 0;
     for (i = first; i < first + count; i++) {
         const isogi_trace__span *span = &c->span[c->owner[i]];
-        hit[n] = &t->feedback->catches[span->offset + (c->sample[i] - span->first)], isovalue[n] = span->of->isovalue;
+        hit[n] = &t->feedback->catches[span->offset + (c->sample[i] - span->first)];
         if (!hit[n]->key) continue;
         ISOGI_TRACE__AHEAD(isogi_trace__probe_ahead(&t->feedback->probes, hit[n], 0));
         n++;
@@ -3801,9 +3860,7 @@ static void isogi_trace__cast_probes(isogi_trace__cast *c, int first, int count)
         ISOGI_TRACE__AHEAD(probe + 64);
     }
     for (i = 0; i < n; i++) {
-        uint64_t made;
-        uint32_t *end;
-        hit[i]->probe = isogi_trace__probe_find(t, hit[i], isovalue[i], &made, &end);
+        hit[i]->probe = isogi_trace__probe_find(t, hit[i]);
         if (!hit[i]->probe) hit[i]->alike = (float)isogi_trace__alike(&t->scene, &hit[i]->hit);
     }
 }
@@ -3989,16 +4046,33 @@ static int isogi_trace__span_site(isogi_trace__cast *c, uint32_t k) {
     return 1;
 }
 
-static void isogi_trace__cast_task(void *arg, size_t task) {
-    isogi_trace *t = (isogi_trace *)arg;
+/* Counts the hits of a piece, and lists those that found no probe. */
+static void isogi_trace__piece_hits(const isogi_trace *t, isogi_trace__piece *piece) {
+    isogi_trace__feedback *f = t->feedback;
+    uint32_t *fresh = f->fresh + f->spans[piece->span].offset, i, k;
+    piece->hits = piece->fresh = 0;
+    for (i = piece->span; i < piece[1].span; i++) {
+        isogi_trace__span *s = &f->spans[i];
+        for (k = s->offset; k < s->offset + s->count; k++) {
+            s->hits += f->catches[k].key != 0;
+            if (f->catches[k].key && !f->catches[k].probe) fresh[piece->fresh++] = k;
+        }
+        piece->hits += s->hits;
+    }
+}
+
+static void isogi_trace__cast_piece(isogi_trace__cast *c, isogi_trace__piece *piece) {
+    isogi_trace *t = c->trace;
     isogi_trace__feedback *f = t->feedback;
     const isogi_lighting *lighting = &t->scene.desc.lighting;
-    uint32_t k, spans = f->task[task + 1] - f->task[task];
-    isogi_trace__cast *c = &f->casts[task];
+    uint32_t k, spans = piece[1].span - piece->span;
     size_t l;
-    c->trace = t, c->counters = &t->task_counters[task], c->span = f->spans + f->task[task], c->count = 0, c->shadow = 0, c->bright = 0;
-    memset(c->counters, 0, sizeof *c->counters);
-    memset(f->direct + f->task[task] * (size_t)t->values, 0, spans * (size_t)t->values * sizeof(float));
+    c->span = f->spans + piece->span, c->count = 0, c->shadow = 0, c->bright = 0;
+    memset(f->direct + piece->span * (size_t)t->values, 0, spans * (size_t)t->values * sizeof(float));
+    for (k = 0; k < spans; k++) {
+        const size_t begin = offsetof(isogi_trace__span, nowhere);
+        memset((char *)&c->span[k] + begin, 0, sizeof c->span[k] - begin);
+    }
     for (k = 0; k < spans; k += ISOGI_TRACE__WAVE)
         isogi_trace__span_normals(c, k, spans - k < ISOGI_TRACE__WAVE ? spans : k + ISOGI_TRACE__WAVE);
     for (k = 0; k < spans; k++) {
@@ -4010,6 +4084,7 @@ static void isogi_trace__cast_task(void *arg, size_t task) {
     for (k = 0; k < spans; k++)
         if (!c->span[k].nowhere) isogi_trace__span_hemisphere(c, k);
     isogi_trace__cast_round(c, spans);
+    isogi_trace__piece_hits(t, piece);
     if (t->scene.desc.mode == ISOGI_TRACE_TRANSFER) return;
     c->shadow = c->bright = 1;
     for (k = 0; k < spans && t->scene.sky.on; k++)
@@ -4027,6 +4102,26 @@ static void isogi_trace__cast_task(void *arg, size_t task) {
         if (!c->span[k].nowhere && !c->span[k].first) isogi_trace__site_lights(&t->scene, &c->site[k], c->span[k].steady, c->counters);
 }
 
+/* Tasks of the batch: where it has more pieces than that the first take three, so that short ones come last. */
+static size_t isogi_trace__cast_tasks(const isogi_trace__feedback *f) {
+    return f->piece_count < ISOGI_TRACE__CASTS ? f->piece_count : ISOGI_TRACE__CASTS;
+}
+
+static size_t isogi_trace__cast_first(const isogi_trace__feedback *f, size_t task) {
+    size_t more = f->piece_count - isogi_trace__cast_tasks(f);
+    return task + (2 * task < more ? 2 * task : more);
+}
+
+static void isogi_trace__cast_task(void *arg, size_t task) {
+    isogi_trace *t = (isogi_trace *)arg;
+    isogi_trace__feedback *f = t->feedback;
+    isogi_trace__cast *c = &f->casts[task];
+    size_t i, end = isogi_trace__cast_first(f, task + 1);
+    c->trace = t, c->counters = &t->task_counters[task];
+    memset(c->counters, 0, sizeof *c->counters);
+    for (i = isogi_trace__cast_first(f, task); i < end; i++) isogi_trace__cast_piece(c, &f->pieces[i]);
+}
+
 /* ---- a batch: filled, traced, taken over ---- */
 
 /* Spans of the node's current block, as many as fit. 0: full. */
@@ -4039,11 +4134,10 @@ static int isogi_trace__spans_add(isogi_trace *t, const isogi_trace__set *set, s
         uint32_t count = end - first < ISOGI_TRACE__SPAN ? end - first : ISOGI_TRACE__SPAN;
         if (f->span_count == ISOGI_TRACE__SPANS || f->sample_count + count > ISOGI_TRACE__SAMPLES) return 0;
         if (f->span_count && f->sample_count >= limit) return 0;
-        if (f->span_count > f->task[f->task_count - 1] && /* the task has a span: is it full? */
-            (f->span_count - f->task[f->task_count - 1] == ISOGI_TRACE__TASK_SPANS ||
-             f->sample_count - f->spans[f->task[f->task_count - 1]].offset >= ISOGI_TRACE__SPAN))
-            f->task[f->task_count++] = (uint32_t)f->span_count;
-        memset(s, 0, sizeof *s);
+        if (f->span_count > f->pieces[f->piece_count - 1].span && /* the piece has a span: is it full? */
+            (f->span_count - f->pieces[f->piece_count - 1].span == ISOGI_TRACE__PIECE_SPANS ||
+             f->sample_count - f->spans[f->pieces[f->piece_count - 1].span].offset >= ISOGI_TRACE__SPAN))
+            f->pieces[f->piece_count++].span = (uint32_t)f->span_count;
         s->node = (uint32_t)node, s->of = n, s->first = first, s->count = count, s->offset = (uint32_t)f->sample_count;
         f->span_count++, f->sample_count += count, first += count;
     }
@@ -4060,11 +4154,12 @@ static uint64_t isogi_trace__generation(isogi_trace *t, uint64_t limit) {
     uint32_t most = (uint32_t)t->scene.desc.samples < ISOGI_TRACE__PROBE_MOST ? (uint32_t)t->scene.desc.samples : ISOGI_TRACE__PROBE_MOST;
     for (; f->probe_counted < f->probes.count && limit; f->probe_counted++, limit--) {
         isogi_trace__node *n = isogi_trace__node_at(&f->probes, f->probe_counted);
+        const uint32_t readers = *isogi_trace__readers_at(&f->probes, f->probe_counted);
         uint32_t least = 1;
         int a;
         for (a = 0; a < 3; a++)
             if (n->albedo[a] > 0.9f) least = 2;
-        n->wanted = n->readers > least ? n->readers : least;
+        n->wanted = readers > least ? readers : least;
         if (n->wanted > most) n->wanted = most;
     }
     if (f->probe_counted == f->probes.count) f->probe_end = f->probes.count;
@@ -4078,7 +4173,7 @@ static int isogi_trace__spans_fill(isogi_trace *t, uint64_t limit, uint64_t *spe
     const uint64_t most = limit < UINT64_MAX / 8 ? 8 * limit : limit;
     uint64_t look = most;
     f->span_count = f->sample_count = 0;
-    f->task_count = 1, f->task[0] = 0, f->on_probes = 0;
+    f->piece_count = 1, f->pieces[0].span = 0, f->on_probes = 0;
     for (; f->cursor < f->texels.count && look; f->cursor++, look--) {
         const isogi_trace__node *n = isogi_trace__node_at(&f->texels, f->cursor);
         if (n->finished || n->level != f->level) continue;
@@ -4091,9 +4186,9 @@ static int isogi_trace__spans_fill(isogi_trace *t, uint64_t limit, uint64_t *spe
             if (!isogi_trace__node_at(&f->probes, f->probe_cursor)->level && !isogi_trace__spans_add(t, &f->probes, f->probe_cursor, limit))
                 break;
     }
-    f->task[f->task_count] = (uint32_t)f->span_count, *spent += (most - look) / 8;
+    f->pieces[f->piece_count].span = (uint32_t)f->span_count, *spent += (most - look) / 8;
     if (f->span_count) return 0;
-    f->task_count = 0;
+    f->piece_count = 0;
     return look && f->cursor == f->texels.count;
 }
 
@@ -4110,34 +4205,34 @@ static isogi_result isogi_trace__segments_reserve(const isogi_trace *t, isogi_tr
     return ISOGI_OK;
 }
 
-/* The segment of the batch's hits; probes are made where there are none. */
+/* The segment of the batch's hits, not yet filled, and the probes that it lacks, not yet finished; on failure nothing has been added. */
 static isogi_result isogi_trace__segment_new(isogi_trace *t, isogi_trace__segment *s) {
     isogi_trace__feedback *f = t->feedback;
-    const size_t early = 24, middle = 16, late = 8; /* catches ahead; they stand in the order of their spans */
-    size_t i, hits = 0, at = 0, k;
-    for (i = 0; i < f->sample_count; i++) hits += f->catches[i].key != 0;
+    size_t i, hits = 0, made = isogi_trace__probes_meet(t);
+    isogi_result result;
+    for (i = 0; i < f->piece_count; i++) f->pieces[i].first_hit = (uint32_t)hits, hits += f->pieces[i].hits;
     memset(s, 0, sizeof *s);
     s->entries = f->span_count, s->hits = hits;
     s->node = (uint32_t *)isogi_allocate(&t->context, (f->on_probes ? 3 : 2) * s->entries + 1 + hits, sizeof(uint32_t));
     if (!s->node) return ISOGI_NO_MEMORY;
-    s->begin = s->node + s->entries, s->probe = s->begin + s->entries + 1;
+    s->begin = s->node + s->entries, s->probe = s->begin + s->entries + 1, s->begin[s->entries] = (uint32_t)hits;
     if (f->on_probes) s->order = s->probe + hits;
-    for (i = 0; i < f->span_count; i++) {
-        s->node[i] = f->spans[i].node, s->begin[i] = (uint32_t)at;
-        for (k = f->spans[i].offset; k < f->spans[i].offset + f->spans[i].count; k++) {
-            isogi_result result;
-            if (k + early < f->sample_count) ISOGI_TRACE__AHEAD(isogi_trace__probe_ahead(&f->probes, &f->catches[k + early], 0));
-            if (k + middle < f->sample_count) ISOGI_TRACE__AHEAD(isogi_trace__probe_ahead(&f->probes, &f->catches[k + middle], 1));
-            if (k + late < f->sample_count) ISOGI_TRACE__AHEAD(isogi_trace__probe_ahead(&f->probes, &f->catches[k + late], 2));
-            if (!f->catches[k].key) continue;
-            result = isogi_trace__probe_of(t, &f->catches[k], f->spans[i].of->isovalue, &s->probe[at++]);
-            if (result == ISOGI_OK) continue;
-            isogi_trace__segment_free(t, s);
-            return result;
-        }
+    result = isogi_trace__set_reserve(t, &f->probes, made, 1);
+    if (result != ISOGI_OK) isogi_trace__segment_free(t, s);
+    else isogi_trace__probes_link(t, made);
+    return result;
+}
+
+/* The part of a piece. */
+static void isogi_trace__segment_fill(const isogi_trace *t, const isogi_trace__segment *s, const isogi_trace__piece *piece) {
+    const isogi_trace__feedback *f = t->feedback;
+    uint32_t i, k, at = piece->first_hit;
+    for (i = piece->span; i < piece[1].span; i++) {
+        const isogi_trace__span *span = &f->spans[i];
+        s->node[i] = span->node, s->begin[i] = at;
+        for (k = span->offset; k < span->offset + span->count && span->hits; k++)
+            if (f->catches[k].key) s->probe[at++] = f->catches[k].probe - 1;
     }
-    s->begin[s->entries] = (uint32_t)at;
-    return ISOGI_OK;
 }
 
 /* A first answer, before any probe is known: the surroundings that its rays met are taken to be as bright as the texel itself. */
@@ -4162,7 +4257,7 @@ static void isogi_trace__texel_guess(isogi_trace *t, size_t node) {
 }
 
 /* Takes over what a span brought; a texel that had nothing is given a first answer. */
-static void isogi_trace__span_commit(isogi_trace *t, isogi_trace__set *set, const isogi_trace__span *s, uint32_t hits) {
+static void isogi_trace__span_commit(isogi_trace *t, isogi_trace__set *set, const isogi_trace__span *s) {
     isogi_trace__node *n = isogi_trace__node_at(set, s->node);
     float *direct = isogi_trace__values_at(set, s->node, ISOGI_TRACE__DIRECT_VALUES, (size_t)t->values);
     const float *from = t->feedback->direct + (size_t)(s - t->feedback->spans) * (size_t)t->values;
@@ -4171,7 +4266,7 @@ static void isogi_trace__span_commit(isogi_trace *t, isogi_trace__set *set, cons
     for (a = 0; a < 3; a++)
         n->steady[a] += s->steady[a], n->light[a] += s->light[a], n->bright[a] += s->bright[a];
     n->light_spread += s->light_spread, n->bright_spread += s->bright_spread, n->square += s->square;
-    n->samples = s->first + s->count, n->light_samples = isogi_trace__light_samples(n->samples, n->brick != NULL), n->hits += hits;
+    n->samples = s->first + s->count, n->light_samples = isogi_trace__light_samples(n->samples, n->brick != NULL), n->hits += s->hits;
     if (n->samples == (n->brick ? isogi_trace__block(t, n->level + 1) : n->wanted)) n->level++;
     if (fresh) isogi_trace__texel_guess(t, s->node);
 }
@@ -4183,60 +4278,56 @@ static void isogi_trace__readers_count(isogi_trace *t, const isogi_trace__segmen
     uint32_t weight = !f->on_probes && isogi_trace__block(t, f->level + 1) < (uint32_t)t->scene.desc.samples ? 2 : 1;
     size_t i;
     for (i = 0; i < s->hits; i++) {
-        isogi_trace__node *n = isogi_trace__node_at(&f->probes, s->probe[i]);
-        if (i + 16 < s->hits) ISOGI_TRACE__AHEAD(&isogi_trace__node_at(&f->probes, s->probe[i + 16])->readers);
-        if (n->readers < ISOGI_TRACE__PROBE_MOST) n->readers += weight;
+        uint8_t *readers = isogi_trace__readers_at(&f->probes, s->probe[i]);
+        if (*readers < ISOGI_TRACE__PROBE_MOST) *readers = (uint8_t)(*readers + weight);
     }
 }
 
 typedef struct isogi_trace__taken {
     isogi_trace *trace;
-    const isogi_trace__segment *segment; /* of the batch; NULL: there is none */
-    size_t probes;                       /* new ones begin here */
+    const isogi_trace__segment *segment;
+    size_t probes; /* new ones begin here */
 } isogi_trace__taken;
 
-/* The spans of a task, those of its last node also where they go on in the next one, which leaves them out; then new probes. */
+/* The spans of a piece, those of its last node also where they go on in the next one, which leaves them out; then new probes. */
 static void isogi_trace__take_task(void *arg, size_t task) {
     const isogi_trace__taken *taken = (const isogi_trace__taken *)arg;
     isogi_trace *t = taken->trace;
     isogi_trace__feedback *f = t->feedback;
-    size_t tasks = taken->segment ? f->task_count : 0, i, end;
-    if (task < tasks) {
-        isogi_trace__set *set = f->on_probes ? &f->probes : &f->texels;
-        const uint32_t *begin = taken->segment->begin;
-        for (i = f->task[task]; i && i < f->task[task + 1] && f->spans[i].node == f->spans[i - 1].node;) i++;
-        end = f->task[task + 1];
+    size_t i, end;
+    if (task < f->piece_count) {
+        const isogi_trace__piece *piece = &f->pieces[task];
+        isogi_trace__segment_fill(t, taken->segment, piece);
+        for (i = piece->span; i && i < piece[1].span && f->spans[i].node == f->spans[i - 1].node;) i++;
+        end = piece[1].span;
         while (i < end && end < f->span_count && f->spans[end].node == f->spans[end - 1].node) end++;
-        for (; i < end; i++) isogi_trace__span_commit(t, set, &f->spans[i], begin[i + 1] - begin[i]);
+        for (; i < end; i++) isogi_trace__span_commit(t, f->on_probes ? &f->probes : &f->texels, &f->spans[i]);
         return;
     }
-    i = taken->probes + (task - tasks) * ISOGI_TRACE__SWEEP;
+    i = taken->probes + (task - f->piece_count) * ISOGI_TRACE__SWEEP;
     end = i + ISOGI_TRACE__SWEEP < f->probes.count ? i + ISOGI_TRACE__SWEEP : f->probes.count;
-    for (; i < end; i++) isogi_trace__probe_finish(t, i);
+    for (; i < end; i++) isogi_trace__probe_finish(t, i, &f->catches[f->makers[i - taken->probes]]);
 }
 
-/* Traces the batch and takes it over; on failure nothing but probes without samples has been added. */
+/* Traces the batch and takes it over; on failure nothing has been added. */
 static isogi_result isogi_trace__spans_run(isogi_trace *t, double from, double to) {
     isogi_trace__feedback *f = t->feedback;
     isogi_trace__set *set = f->on_probes ? &f->probes : &f->texels;
     isogi_trace__segment segment;
     isogi_context silent = t->context;
     isogi_trace__taken taken;
-    isogi_result result = isogi_parallel(&t->context, f->task_count, isogi_trace__cast_task, t, from, to);
+    isogi_result result = isogi_parallel(&t->context, isogi_trace__cast_tasks(f), isogi_trace__cast_task, t, from, to);
     size_t i, tasks;
-    taken.trace = t, taken.segment = NULL, taken.probes = f->probes.count, silent.progress = NULL;
+    taken.trace = t, taken.segment = &segment, taken.probes = f->probes.count, silent.progress = NULL;
     if (result == ISOGI_OK) result = isogi_trace__segments_reserve(t, set);
-    if (result == ISOGI_OK) {
-        result = isogi_trace__segment_new(t, &segment);
-        if (result == ISOGI_OK) taken.segment = &segment;
-        tasks = (taken.segment ? f->task_count : 0) + (f->probes.count - taken.probes + ISOGI_TRACE__SWEEP - 1) / ISOGI_TRACE__SWEEP;
-        if (tasks > 16) isogi_parallel(&silent, tasks, isogi_trace__take_task, &taken, 0, 1);
-        else for (i = 0; i < tasks; i++) isogi_trace__take_task(&taken, i); /* not worth a thread */
-    }
+    if (result == ISOGI_OK) result = isogi_trace__segment_new(t, &segment);
     if (result != ISOGI_OK) return result;
+    tasks = f->piece_count + (f->probes.count - taken.probes + ISOGI_TRACE__SWEEP - 1) / ISOGI_TRACE__SWEEP;
+    if (tasks > 16) isogi_parallel(&silent, tasks, isogi_trace__take_task, &taken, 0, 1);
+    else for (i = 0; i < tasks; i++) isogi_trace__take_task(&taken, i); /* not worth a thread */
     set->segments[set->segment_count++] = segment;
     isogi_trace__readers_count(t, &segment);
-    for (i = 0; i < f->task_count; i++) isogi_trace__add(&t->counters, &t->task_counters[i]);
+    for (i = 0; i < isogi_trace__cast_tasks(f); i++) isogi_trace__add(&t->counters, &t->task_counters[i]);
     for (i = 0; i < f->span_count && !f->on_probes; i++) t->counters.texels += !f->spans[i].first;
     if (!f->on_probes) f->partial += f->sample_count;
     return ISOGI_OK;
@@ -5121,7 +5212,7 @@ static isogi_result isogi_trace__nodes_of(isogi_trace *t, size_t index, int even
     for (slot = 0; slot < ISOGI_TRACE__TEXELS; slot++) {
         isogi_trace__node *n;
         if (!(wanted >> slot & 1) || (even && (slot & 0x15))) continue;
-        n = isogi_trace__node_begin(t, set);
+        n = isogi_trace__node_begin(t, set, set->count);
         isogi_trace__node_clear(t, set, set->count);
         n->brick = brick, n->slot = slot;
         isogi_trace__texel_of(t, index, slot, n->texel);
@@ -6596,7 +6687,9 @@ ISOGI_API isogi_result isogi_trace_gather_field(const isogi_trace_desc *desc, is
 #undef ISOGI_TRACE__CHUNK
 #undef ISOGI_TRACE__SWEEP
 #undef ISOGI_TRACE__FLUSH
-#undef ISOGI_TRACE__TASK_SPANS
+#undef ISOGI_TRACE__PIECE_SPANS
+#undef ISOGI_TRACE__PIECES
+#undef ISOGI_TRACE__HEADS
 #undef ISOGI_TRACE__CASTS
 #undef ISOGI_TRACE__SPAN
 #undef ISOGI_TRACE__SPANS
