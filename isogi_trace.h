@@ -3158,10 +3158,7 @@ typedef struct isogi_trace__node {
     isogi_trace__brick *brick; /* from here on: what is gathered, see isogi_trace__node_clear */
     size_t texel[3];
     uint32_t slot, samples, light_samples, hits;
-    uint32_t wanted;  /* probe: samples, once its generation has begun */
     float albedo[3];
-    signed char level;    /* blocks of samples that are complete */
-    signed char finished; /* texel: 1: no more samples are wanted; 2: its light was loaded */
     double steady[3];     /* irradiance by lights without extent */
     double light[3], light_spread;   /* by other lights; sum of squared deviations of its luminance */
     double bright[3], bright_spread; /* by directions drawn by brightness */
@@ -3200,9 +3197,18 @@ typedef struct isogi_trace__link {
     uint32_t next, tag;
 } isogi_trace__link;
 
+/* How far a node has come. */
+typedef struct isogi_trace__stage {
+    signed char level;    /* blocks of samples that are complete */
+    signed char begun;    /* the next one has samples */
+    signed char finished; /* texel: 1: no more samples are wanted; 2: its light was loaded */
+    uint8_t readers;      /* probe: hits that take their light from it, those that texels are still to make included */
+    uint8_t wanted;       /* probe: samples; until its generation begins, the least of them */
+} isogi_trace__stage;
+
 /* Nodes that stay where they are once they are made. guides: of texels; reflectors, links: of probes. values: their four kinds (below), one
-   after the other. heads: where chains of probes begin, number + 1, 0 = nowhere; NULL of texels. readers: of each probe, hits that take their
-   light from it, those that texels are still to make included; apart from the rest, since they are counted by one thread. */
+   after the other. heads: where chains of probes begin, number + 1, 0 = nowhere; NULL of texels. stages: in few bytes
+   what one thread goes through. */
 typedef struct isogi_trace__chunk {
     float *values;
     isogi_trace__node *nodes;
@@ -3210,7 +3216,7 @@ typedef struct isogi_trace__chunk {
     isogi_trace__reflector *reflectors;
     isogi_trace__link *links;
     uint32_t *heads;
-    uint8_t *readers;
+    isogi_trace__stage *stages;
 } isogi_trace__chunk;
 
 /* What a node's values are. DIRECT: sums over rays that escaped; BOUNCE: of texels over rays that hit, of probes what comes from sky and
@@ -3236,14 +3242,19 @@ typedef struct isogi_trace__set {
 typedef struct isogi_trace__span {
     uint32_t node, first, count, offset; /* offset: of its samples in the batch */
     const isogi_trace__node *of;
-    int nowhere;   /* from here on: what they brought. There is no place for its rays to begin */
+    int nowhere;   /* there is no place for its rays to begin */
     uint32_t hits; /* that are to be lit */
     double steady[3], light[3], light_spread, bright[3], bright_spread, square;
 } isogi_trace__span;
 
-/* A piece of a batch: its first span; its hits, the place of the first among those of the batch, and how many of them found no probe. */
+/* Which samples a span has; offset: of the first of them in the batch. */
+typedef struct isogi_trace__plan {
+    uint32_t node, first, count, offset;
+} isogi_trace__plan;
+
+/* A piece of a batch: its first span and sample; its hits, the place of the first among those of the batch, and how many of them found no probe. */
 typedef struct isogi_trace__piece {
-    uint32_t span, hits, first_hit, fresh;
+    uint32_t span, offset, hits, first_hit, fresh;
 } isogi_trace__piece;
 
 /* How far a search for a hit's probe has come: probes of its cell that it has passed, and the one of them that lies in the hit's plane and
@@ -3268,6 +3279,7 @@ typedef struct isogi_trace__catch {
 
 struct isogi_trace__feedback {
     isogi_trace__set texels, probes;
+    isogi_trace__plan *plans; /* of the spans, which each task writes itself */
     isogi_trace__span *spans;
     isogi_trace__catch *catches;
     struct isogi_trace__cast *casts; /* of tasks */
@@ -3354,8 +3366,8 @@ static isogi_trace__link *isogi_trace__link_at(const isogi_trace__set *s, size_t
     return &s->chunks[i / ISOGI_TRACE__CHUNK].links[i % ISOGI_TRACE__CHUNK];
 }
 
-static uint8_t *isogi_trace__readers_at(const isogi_trace__set *s, size_t i) {
-    return &s->chunks[i / ISOGI_TRACE__CHUNK].readers[i % ISOGI_TRACE__CHUNK];
+static isogi_trace__stage *isogi_trace__stage_at(const isogi_trace__set *s, size_t i) {
+    return &s->chunks[i / ISOGI_TRACE__CHUNK].stages[i % ISOGI_TRACE__CHUNK];
 }
 
 /* v: values of a node. */
@@ -3375,7 +3387,7 @@ static void isogi_trace__chunk_free(const isogi_trace *t, isogi_trace__chunk *c)
     isogi_release(&t->context, c->links, ISOGI_TRACE__CHUNK, sizeof *c->links);
     isogi_release(&t->context, c->values, (size_t)ISOGI_TRACE__KINDS * ISOGI_TRACE__CHUNK, (size_t)t->values * sizeof(float));
     isogi_release(&t->context, c->heads, ISOGI_TRACE__CHUNK, sizeof *c->heads);
-    isogi_release(&t->context, c->readers, ISOGI_TRACE__CHUNK, sizeof *c->readers);
+    isogi_release(&t->context, c->stages, ISOGI_TRACE__CHUNK, sizeof *c->stages);
 }
 
 static size_t isogi_trace__segment_size(const isogi_trace__segment *s) {
@@ -3422,8 +3434,8 @@ static isogi_result isogi_trace__set_reserve(const isogi_trace *t, isogi_trace__
         c.links = chains ? (isogi_trace__link *)isogi_allocate(&t->context, ISOGI_TRACE__CHUNK, sizeof *c.links) : NULL;
         c.values = (float *)isogi_allocate(&t->context, (size_t)ISOGI_TRACE__KINDS * ISOGI_TRACE__CHUNK, (size_t)t->values * sizeof(float));
         c.heads = chains ? (uint32_t *)isogi_allocate(&t->context, ISOGI_TRACE__CHUNK, sizeof *c.heads) : NULL;
-        c.readers = chains ? (uint8_t *)isogi_allocate(&t->context, ISOGI_TRACE__CHUNK, sizeof *c.readers) : NULL;
-        if (!c.nodes || !c.values || !(chains ? c.reflectors && c.links && c.heads && c.readers : c.guides != NULL)) {
+        c.stages = (isogi_trace__stage *)isogi_allocate(&t->context, ISOGI_TRACE__CHUNK, sizeof *c.stages);
+        if (!c.nodes || !c.values || !c.stages || !(chains ? c.reflectors && c.links && c.heads : c.guides != NULL)) {
             isogi_trace__chunk_free(t, &c);
             return ISOGI_NO_MEMORY;
         }
@@ -3438,6 +3450,7 @@ static void isogi_trace__feedback_free(const isogi_trace *t) {
     if (!f) return;
     isogi_trace__set_free(t, &f->texels);
     isogi_trace__set_free(t, &f->probes);
+    isogi_release(&t->context, f->plans, ISOGI_TRACE__SPANS, sizeof *f->plans);
     isogi_release(&t->context, f->spans, ISOGI_TRACE__SPANS, sizeof *f->spans);
     isogi_release(&t->context, f->catches, ISOGI_TRACE__SAMPLES, sizeof *f->catches);
     isogi_release(&t->context, f->casts, ISOGI_TRACE__CASTS, sizeof *f->casts);
@@ -3456,13 +3469,14 @@ static isogi_result isogi_trace__feedback_new(isogi_trace *t) {
     __builtin_cpu_init();
     t->wide = __builtin_cpu_supports("avx2") && (t->context.force_path <= 0 || t->context.force_path >= 3);
 #endif
+    f->plans = (isogi_trace__plan *)isogi_allocate(&t->context, ISOGI_TRACE__SPANS, sizeof *f->plans);
     f->spans = (isogi_trace__span *)isogi_allocate(&t->context, ISOGI_TRACE__SPANS, sizeof *f->spans);
     f->catches = (isogi_trace__catch *)isogi_allocate(&t->context, ISOGI_TRACE__SAMPLES, sizeof *f->catches);
     f->casts = (isogi_trace__cast *)isogi_allocate(&t->context, ISOGI_TRACE__CASTS, sizeof *f->casts);
     f->direct = (float *)isogi_allocate(&t->context, ISOGI_TRACE__SPANS, (size_t)t->values * sizeof(float));
     f->pieces = (isogi_trace__piece *)isogi_allocate(&t->context, ISOGI_TRACE__PIECES + 1, sizeof *f->pieces);
     f->fresh = (uint32_t *)isogi_allocate(&t->context, 3 * ISOGI_TRACE__SAMPLES + ISOGI_TRACE__HEADS, sizeof *f->fresh);
-    if (!f->spans || !f->catches || !f->casts || !f->direct || !f->pieces || !f->fresh) return ISOGI_NO_MEMORY;
+    if (!f->plans || !f->spans || !f->catches || !f->casts || !f->direct || !f->pieces || !f->fresh) return ISOGI_NO_MEMORY;
     f->makers = f->fresh + ISOGI_TRACE__SAMPLES, f->next = f->makers + ISOGI_TRACE__SAMPLES, f->heads = f->next + ISOGI_TRACE__SAMPLES;
     return ISOGI_OK;
 }
@@ -3525,7 +3539,9 @@ static void isogi_trace__heads_new(isogi_trace__set *s) {
     for (s->head_bit = ISOGI_TRACE__CHUNK; 2 * s->head_bit <= s->chunk_count * ISOGI_TRACE__CHUNK;) s->head_bit *= 2;
     while (2 * from <= last) from *= 2;
     for (i = 0; i < ISOGI_TRACE__CHUNK && last; i++) {
+        const uint32_t *soon = &s->chunks[last - from].heads[(i + 8) % ISOGI_TRACE__CHUNK];
         uint32_t *stay = &s->chunks[last - from].heads[i], *go = &heads[i], probe = *stay;
+        if (*soon) ISOGI_TRACE__AHEAD(isogi_trace__link_at(s, *soon - 1));
         while (probe) {
             isogi_trace__link *link = isogi_trace__link_at(s, probe - 1);
             if (link->tag / ISOGI_TRACE__CHUNK & from) *go = probe, go = &link->next;
@@ -3541,6 +3557,7 @@ static void isogi_trace__node_clear(const isogi_trace *t, isogi_trace__set *s, s
     isogi_trace__node *n = isogi_trace__node_at(s, i);
     size_t v = (size_t)t->values, begin = offsetof(isogi_trace__node, brick);
     memset((char *)n + begin, 0, sizeof *n - begin);
+    memset(isogi_trace__stage_at(s, i), 0, sizeof(isogi_trace__stage));
     memset(isogi_trace__values_at(s, i, ISOGI_TRACE__DIRECT_VALUES, v), 0, v * sizeof(float));
     memset(isogi_trace__values_at(s, i, ISOGI_TRACE__BOUNCE_VALUES, v), 0, v * sizeof(float));
     memset(isogi_trace__light_at(s, i, v), 0, v * sizeof(float));
@@ -3681,12 +3698,13 @@ static size_t isogi_trace__probes_meet(const isogi_trace *t) {
     size_t piece, made = 0;
     memset(f->heads, 0, ISOGI_TRACE__HEADS * sizeof *f->heads);
     for (piece = 0; piece < f->piece_count; piece++) {
-        const uint32_t *fresh = f->fresh + f->spans[f->pieces[piece].span].offset;
+        const uint32_t *fresh = f->fresh + f->pieces[piece].offset;
         size_t i, count = f->pieces[piece].fresh;
         for (i = 0; i < count; i++) {
             isogi_trace__catch *c = &f->catches[fresh[i]];
             uint32_t *at = &f->heads[isogi_trace__tag(c->key) & (ISOGI_TRACE__HEADS - 1)];
-            if (i + late < count) ISOGI_TRACE__AHEAD(&f->catches[fresh[i + late]]);
+            if (i + late < count) ISOGI_TRACE__AHEAD(&f->catches[fresh[i + late]].key);
+            if (i + late < count) ISOGI_TRACE__AHEAD(&f->catches[fresh[i + late]].search);
             for (; *at && !c->probe; at = &f->next[*at - 1]) {
                 const isogi_trace__catch *o = &f->catches[f->makers[*at - 1]];
                 if (o->key != c->key) continue;
@@ -3705,16 +3723,17 @@ static size_t isogi_trace__probes_meet(const isogi_trace *t) {
 static void isogi_trace__probes_link(const isogi_trace *t, size_t made) {
     isogi_trace__feedback *f = t->feedback;
     isogi_trace__set *set = &f->probes;
-    const size_t early = 16, late = 8; /* probes ahead */
+    const size_t early = 24, middle = 16, late = 8; /* probes ahead */
     size_t i;
     for (i = 0; i < made; i++) {
         const isogi_trace__catch *c = &f->catches[f->makers[i]];
         isogi_trace__link *link = isogi_trace__link_at(set, set->count);
         uint32_t *at = isogi_trace__head(set, c->key);
         if (i + early < made) ISOGI_TRACE__AHEAD(&f->catches[f->makers[i + early]]);
-        if (i + late < made) ISOGI_TRACE__AHEAD(isogi_trace__head(set, f->catches[f->makers[i + late]].key));
+        if (i + middle < made) ISOGI_TRACE__AHEAD(isogi_trace__head(set, f->catches[f->makers[i + middle]].key));
+        if (i + late < made) ISOGI_TRACE__AHEAD(isogi_trace__probe_ahead(set, &f->catches[f->makers[i + late]], 1));
         while (*at) at = &isogi_trace__link_at(set, *at - 1)->next;
-        link->tag = isogi_trace__tag(c->key), link->next = 0, *isogi_trace__readers_at(set, set->count) = 0;
+        link->tag = isogi_trace__tag(c->key), link->next = 0;
         *at = (uint32_t)++set->count;
     }
 }
@@ -3732,10 +3751,12 @@ static void isogi_trace__probe_finish(const isogi_trace *t, size_t i, const isog
     memcpy(n->normal, c->normal, sizeof n->normal);
     isogi_trace__node_clear(t, set, i);
     isogi_trace_albedo(&t->scene.desc, n->isovalue, n->albedo);
-    if (!t->scene.desc.material) return;
-    for (a = 0; a < 3; a++) grid[a] = n->place.cell[a] + n->place.local[a];
-    isogi_vol_to_world(t->scene.pyramid, grid, point);
-    isogi_trace_material(&t->scene.desc, n->isovalue, point, n->albedo, emission);
+    if (t->scene.desc.material) {
+        for (a = 0; a < 3; a++) grid[a] = n->place.cell[a] + n->place.local[a];
+        isogi_vol_to_world(t->scene.pyramid, grid, point);
+        isogi_trace_material(&t->scene.desc, n->isovalue, point, n->albedo, emission);
+    }
+    isogi_trace__stage_at(set, i)->wanted = n->albedo[0] > 0.9f || n->albedo[1] > 0.9f || n->albedo[2] > 0.9f ? 2 : 1;
 }
 
 /* ---- blocks of samples ---- */
@@ -4049,7 +4070,7 @@ static int isogi_trace__span_site(isogi_trace__cast *c, uint32_t k) {
 /* Counts the hits of a piece, and lists those that found no probe. */
 static void isogi_trace__piece_hits(const isogi_trace *t, isogi_trace__piece *piece) {
     isogi_trace__feedback *f = t->feedback;
-    uint32_t *fresh = f->fresh + f->spans[piece->span].offset, i, k;
+    uint32_t *fresh = f->fresh + piece->offset, i, k;
     piece->hits = piece->fresh = 0;
     for (i = piece->span; i < piece[1].span; i++) {
         isogi_trace__span *s = &f->spans[i];
@@ -4070,14 +4091,18 @@ static void isogi_trace__cast_piece(isogi_trace__cast *c, isogi_trace__piece *pi
     c->span = f->spans + piece->span, c->count = 0, c->shadow = 0, c->bright = 0;
     memset(f->direct + piece->span * (size_t)t->values, 0, spans * (size_t)t->values * sizeof(float));
     for (k = 0; k < spans; k++) {
-        const size_t begin = offsetof(isogi_trace__span, nowhere);
-        memset((char *)&c->span[k] + begin, 0, sizeof c->span[k] - begin);
+        const isogi_trace__plan *plan = &f->plans[piece->span + k];
+        isogi_trace__span *s = &c->span[k];
+        memset(s, 0, sizeof *s);
+        s->node = plan->node, s->first = plan->first, s->count = plan->count, s->offset = plan->offset;
+        s->of = isogi_trace__node_at(f->on_probes ? &f->probes : &f->texels, s->node);
     }
     for (k = 0; k < spans; k += ISOGI_TRACE__WAVE)
         isogi_trace__span_normals(c, k, spans - k < ISOGI_TRACE__WAVE ? spans : k + ISOGI_TRACE__WAVE);
     for (k = 0; k < spans; k++) {
         isogi_trace__span *s = &c->span[k];
         uint32_t i;
+        c->counters->texels += !f->on_probes && !s->first;
         for (i = 0; i < s->count; i++) f->catches[s->offset + i].key = 0;
         if (!isogi_trace__span_site(c, k) || isogi_trace__dark(&t->scene)) s->nowhere = 1, c->site[k].isovalue = 0;
     }
@@ -4127,18 +4152,22 @@ static void isogi_trace__cast_task(void *arg, size_t task) {
 /* Spans of the node's current block, as many as fit. 0: full. */
 static int isogi_trace__spans_add(isogi_trace *t, const isogi_trace__set *set, size_t node, uint64_t limit) {
     isogi_trace__feedback *f = t->feedback;
-    const isogi_trace__node *n = isogi_trace__node_at(set, node);
-    uint32_t first = n->samples, end = set == &f->probes ? n->wanted : isogi_trace__block(t, n->level + 1);
+    const isogi_trace__stage *stage = isogi_trace__stage_at(set, node);
+    uint32_t first = set == &f->probes ? 0 : isogi_trace__block(t, stage->level),
+             end = set == &f->probes ? stage->wanted : isogi_trace__block(t, stage->level + 1);
+    if (stage->begun) first = isogi_trace__node_at(set, node)->samples;
     while (first < end) {
-        isogi_trace__span *s = &f->spans[f->span_count];
+        isogi_trace__plan *plan = &f->plans[f->span_count];
+        isogi_trace__piece *piece = &f->pieces[f->piece_count - 1];
         uint32_t count = end - first < ISOGI_TRACE__SPAN ? end - first : ISOGI_TRACE__SPAN;
         if (f->span_count == ISOGI_TRACE__SPANS || f->sample_count + count > ISOGI_TRACE__SAMPLES) return 0;
         if (f->span_count && f->sample_count >= limit) return 0;
-        if (f->span_count > f->pieces[f->piece_count - 1].span && /* the piece has a span: is it full? */
-            (f->span_count - f->pieces[f->piece_count - 1].span == ISOGI_TRACE__PIECE_SPANS ||
-             f->sample_count - f->spans[f->pieces[f->piece_count - 1].span].offset >= ISOGI_TRACE__SPAN))
-            f->pieces[f->piece_count++].span = (uint32_t)f->span_count;
-        s->node = (uint32_t)node, s->of = n, s->first = first, s->count = count, s->offset = (uint32_t)f->sample_count;
+        if (f->span_count > piece->span && /* the piece has a span: is it full? */
+            (f->span_count - piece->span == ISOGI_TRACE__PIECE_SPANS || f->sample_count - piece->offset >= ISOGI_TRACE__SPAN)) {
+            f->piece_count++, piece++;
+            piece->span = (uint32_t)f->span_count, piece->offset = (uint32_t)f->sample_count;
+        }
+        plan->node = (uint32_t)node, plan->first = first, plan->count = count, plan->offset = (uint32_t)f->sample_count;
         f->span_count++, f->sample_count += count, first += count;
     }
     return 1;
@@ -4153,14 +4182,9 @@ static uint64_t isogi_trace__generation(isogi_trace *t, uint64_t limit) {
     isogi_trace__feedback *f = t->feedback;
     uint32_t most = (uint32_t)t->scene.desc.samples < ISOGI_TRACE__PROBE_MOST ? (uint32_t)t->scene.desc.samples : ISOGI_TRACE__PROBE_MOST;
     for (; f->probe_counted < f->probes.count && limit; f->probe_counted++, limit--) {
-        isogi_trace__node *n = isogi_trace__node_at(&f->probes, f->probe_counted);
-        const uint32_t readers = *isogi_trace__readers_at(&f->probes, f->probe_counted);
-        uint32_t least = 1;
-        int a;
-        for (a = 0; a < 3; a++)
-            if (n->albedo[a] > 0.9f) least = 2;
-        n->wanted = readers > least ? readers : least;
-        if (n->wanted > most) n->wanted = most;
+        isogi_trace__stage *stage = isogi_trace__stage_at(&f->probes, f->probe_counted);
+        uint32_t wanted = stage->readers > stage->wanted ? stage->readers : stage->wanted; /* that was the least */
+        stage->wanted = (uint8_t)(wanted < most ? wanted : most);
     }
     if (f->probe_counted == f->probes.count) f->probe_end = f->probes.count;
     return limit;
@@ -4173,17 +4197,17 @@ static int isogi_trace__spans_fill(isogi_trace *t, uint64_t limit, uint64_t *spe
     const uint64_t most = limit < UINT64_MAX / 8 ? 8 * limit : limit;
     uint64_t look = most;
     f->span_count = f->sample_count = 0;
-    f->piece_count = 1, f->pieces[0].span = 0, f->on_probes = 0;
+    f->piece_count = 1, f->pieces[0].span = f->pieces[0].offset = 0, f->on_probes = 0;
     for (; f->cursor < f->texels.count && look; f->cursor++, look--) {
-        const isogi_trace__node *n = isogi_trace__node_at(&f->texels, f->cursor);
-        if (n->finished || n->level != f->level) continue;
+        const isogi_trace__stage *stage = isogi_trace__stage_at(&f->texels, f->cursor);
+        if (stage->finished || stage->level != f->level) continue;
         if (!isogi_trace__spans_add(t, &f->texels, f->cursor, limit)) break;
     }
     if (!f->span_count && f->cursor == f->texels.count) {
         f->on_probes = 1;
         if (f->probe_cursor == f->probe_end) look = isogi_trace__generation(t, look);
         for (; f->probe_cursor < f->probe_end; f->probe_cursor++)
-            if (!isogi_trace__node_at(&f->probes, f->probe_cursor)->level && !isogi_trace__spans_add(t, &f->probes, f->probe_cursor, limit))
+            if (!isogi_trace__stage_at(&f->probes, f->probe_cursor)->level && !isogi_trace__spans_add(t, &f->probes, f->probe_cursor, limit))
                 break;
     }
     f->pieces[f->piece_count].span = (uint32_t)f->span_count, *spent += (most - look) / 8;
@@ -4259,6 +4283,7 @@ static void isogi_trace__texel_guess(isogi_trace *t, size_t node) {
 /* Takes over what a span brought; a texel that had nothing is given a first answer. */
 static void isogi_trace__span_commit(isogi_trace *t, isogi_trace__set *set, const isogi_trace__span *s) {
     isogi_trace__node *n = isogi_trace__node_at(set, s->node);
+    isogi_trace__stage *stage = isogi_trace__stage_at(set, s->node);
     float *direct = isogi_trace__values_at(set, s->node, ISOGI_TRACE__DIRECT_VALUES, (size_t)t->values);
     const float *from = t->feedback->direct + (size_t)(s - t->feedback->spans) * (size_t)t->values;
     int a, fresh = n->brick && !n->samples;
@@ -4267,7 +4292,8 @@ static void isogi_trace__span_commit(isogi_trace *t, isogi_trace__set *set, cons
         n->steady[a] += s->steady[a], n->light[a] += s->light[a], n->bright[a] += s->bright[a];
     n->light_spread += s->light_spread, n->bright_spread += s->bright_spread, n->square += s->square;
     n->samples = s->first + s->count, n->light_samples = isogi_trace__light_samples(n->samples, n->brick != NULL), n->hits += s->hits;
-    if (n->samples == (n->brick ? isogi_trace__block(t, n->level + 1) : n->wanted)) n->level++;
+    stage->begun = n->samples != (n->brick ? isogi_trace__block(t, stage->level + 1) : stage->wanted);
+    if (!stage->begun) stage->level++;
     if (fresh) isogi_trace__texel_guess(t, s->node);
 }
 
@@ -4278,7 +4304,7 @@ static void isogi_trace__readers_count(isogi_trace *t, const isogi_trace__segmen
     uint32_t weight = !f->on_probes && isogi_trace__block(t, f->level + 1) < (uint32_t)t->scene.desc.samples ? 2 : 1;
     size_t i;
     for (i = 0; i < s->hits; i++) {
-        uint8_t *readers = isogi_trace__readers_at(&f->probes, s->probe[i]);
+        uint8_t *readers = &isogi_trace__stage_at(&f->probes, s->probe[i])->readers;
         if (*readers < ISOGI_TRACE__PROBE_MOST) *readers = (uint8_t)(*readers + weight);
     }
 }
@@ -4328,7 +4354,6 @@ static isogi_result isogi_trace__spans_run(isogi_trace *t, double from, double t
     set->segments[set->segment_count++] = segment;
     isogi_trace__readers_count(t, &segment);
     for (i = 0; i < isogi_trace__cast_tasks(f); i++) isogi_trace__add(&t->counters, &t->task_counters[i]);
-    for (i = 0; i < f->span_count && !f->on_probes; i++) t->counters.texels += !f->spans[i].first;
     if (!f->on_probes) f->partial += f->sample_count;
     return ISOGI_OK;
 }
@@ -4945,8 +4970,10 @@ static void isogi_trace__publish(isogi_trace *t, size_t i, const isogi_trace__bl
 }
 
 /* Whether it has new light to publish. Where its error was low enough before the last sample, it stays so. */
-static int isogi_trace__unpublished(const isogi_trace *t, const isogi_trace__node *n) {
-    return n->samples && n->finished != 2 && !(n->finished && n->samples < (uint32_t)t->scene.desc.samples);
+static int isogi_trace__unpublished(const isogi_trace *t, size_t i) {
+    const uint32_t samples = isogi_trace__node_at(&t->feedback->texels, i)->samples;
+    const int finished = isogi_trace__stage_at(&t->feedback->texels, i)->finished;
+    return samples && finished != 2 && !(finished && samples < (uint32_t)t->scene.desc.samples);
 }
 
 /* All texels of a brick, filtered. */
@@ -4961,7 +4988,7 @@ static void isogi_trace__publish_brick(isogi_trace *t, size_t i, isogi_trace__de
     for (slot = 0; slot < ISOGI_TRACE__TEXELS; slot++) {
         const uint32_t node = any->brick->node[slot];
         isogi_trace__blend blend;
-        if (!node || !isogi_trace__unpublished(t, isogi_trace__node_at(set, node - 1))) continue;
+        if (!node || !isogi_trace__unpublished(t, node - 1)) continue;
         if (!filled) isogi_trace__block_fill(t, brick, b);
         filled = 1;
         isogi_trace__blend_of(t, b, first + slot % 4 + ISOGI_TRACE__ROW * (slot / 4 % 4 + ISOGI_TRACE__ROW * (slot / 16)), &blend);
@@ -4983,7 +5010,7 @@ static void isogi_trace__publish_task(void *arg, size_t task) {
         const isogi_trace__node *n = isogi_trace__node_at(set, i);
         uint32_t last = 0;
         if (!filtered) {
-            if (isogi_trace__unpublished(t, n)) isogi_trace__publish(t, i, NULL);
+            if (isogi_trace__unpublished(t, i)) isogi_trace__publish(t, i, NULL);
             continue;
         }
         if (i + 1 < set->count && isogi_trace__node_at(set, i + 1)->brick == n->brick) continue;
@@ -4995,18 +5022,41 @@ static void isogi_trace__publish_task(void *arg, size_t task) {
 
 /* ---- the end of a level ---- */
 
+typedef struct isogi_trace__finished {
+    uint64_t samples;
+    uint32_t finished, open;
+} isogi_trace__finished;
+
+/* What a task counts lies where rays did. */
+static isogi_trace__finished *isogi_trace__finished_of(const isogi_trace__feedback *f, size_t task) {
+    return (isogi_trace__finished *)(void *)f->casts + task;
+}
+
 /* Its light is carried over: texels that are good enough are finished, the others go on. */
 static void isogi_trace__finish_task(isogi_trace *t, size_t task) {
     isogi_trace__feedback *f = t->feedback;
+    isogi_trace__finished sum = {0, 0, 0};
     double target = (double)t->scene.desc.error * t->scene.open_light;
     size_t i, end = isogi_trace__sweep(t, task, f->texels.count, &i);
     for (; i < end; i++) {
         isogi_trace__node *n = isogi_trace__node_at(&f->texels, i);
-        if (n->finished) continue;
+        isogi_trace__stage *stage = isogi_trace__stage_at(&f->texels, i);
+        if (stage->finished) continue;
         if (n->samples >= (uint32_t)t->scene.desc.samples || (target > 0 && (double)n->error <= target)) {
-            n->finished = 1, n->brick->state[n->slot] = ISOGI_TRACE__DONE, f->partial -= n->samples, t->wanted--, t->done++;
-            f->unfinished--;
-        } else f->open++;
+            stage->finished = 1, n->brick->state[n->slot] = ISOGI_TRACE__DONE;
+            sum.samples += n->samples, sum.finished++;
+        } else sum.open++;
+    }
+    *isogi_trace__finished_of(f, task) = sum;
+}
+
+static void isogi_trace__finish_count(isogi_trace *t, size_t tasks) {
+    isogi_trace__feedback *f = t->feedback;
+    size_t i;
+    for (i = 0; i < tasks; i++) {
+        const isogi_trace__finished *sum = isogi_trace__finished_of(f, i);
+        f->partial -= sum->samples, f->unfinished -= sum->finished, f->open += sum->open;
+        t->wanted -= sum->finished, t->done += sum->finished;
     }
 }
 
@@ -5100,16 +5150,19 @@ static void isogi_trace__phase_end(isogi_trace *t) {
 /* The next tasks of the phase at work, about as long as `limit` rays, at least one. Returns what they count as. */
 static uint64_t isogi_trace__carry(isogi_trace *t, uint64_t limit) {
     isogi_trace__feedback *f = t->feedback;
-    const size_t blocks = ISOGI_TRACE__CASTS * sizeof *f->casts / sizeof(isogi_trace__dense); /* that lie where rays did */
+    const size_t blocks = ISOGI_TRACE__CASTS * sizeof *f->casts / sizeof(isogi_trace__dense), /* that lie where rays did */
+        counts = ISOGI_TRACE__CASTS * sizeof *f->casts / sizeof(isogi_trace__finished);
     size_t tasks = isogi_trace__phase_tasks(f), count = 0, i;
     uint64_t cost = 0;
     isogi_context silent = t->context;
     silent.progress = NULL;
     if (f->phase == ISOGI_TRACE__PUBLISH && tasks > f->carried + blocks) tasks = f->carried + blocks;
+    if (f->phase == ISOGI_TRACE__FINISH && tasks > f->carried + counts) tasks = f->carried + counts;
     while (f->carried + count < tasks && cost < limit) cost += isogi_trace__phase_cost(f, f->carried + count++);
-    if (f->phase >= ISOGI_TRACE__FINISH) /* they count what is done, and give memory back: one by one */
+    if (f->phase == ISOGI_TRACE__FORGET) /* memory is given back one by one */
         for (i = 0; i < count; i++) isogi_trace__phase_task(t, i);
     else if (count) isogi_parallel(&silent, count, isogi_trace__phase_task, t, 0, 1);
+    if (f->phase == ISOGI_TRACE__FINISH) isogi_trace__finish_count(t, count);
     f->carried += count;
     if (f->carried >= isogi_trace__phase_tasks(f)) isogi_trace__phase_end(t);
     return cost;
@@ -5898,11 +5951,12 @@ static isogi_result isogi_trace__block_check(const isogi_trace *t, const uint8_t
 
 /* The texel's light came with a block: what is gathered for it is not wanted any more. */
 static void isogi_trace__node_loaded(isogi_trace *t, const isogi_trace__brick *brick, uint32_t slot) {
-    isogi_trace__node *n;
+    isogi_trace__stage *stage;
     if (!brick->node || !brick->node[slot]) return;
-    n = isogi_trace__node_at(&t->feedback->texels, brick->node[slot] - 1);
-    if (!n->finished) t->feedback->partial -= n->samples, t->feedback->unfinished--;
-    n->finished = 2;
+    stage = isogi_trace__stage_at(&t->feedback->texels, brick->node[slot] - 1);
+    if (!stage->finished)
+        t->feedback->partial -= isogi_trace__node_at(&t->feedback->texels, brick->node[slot] - 1)->samples, t->feedback->unfinished--;
+    stage->finished = 2;
 }
 
 /* A block that was checked. */
