@@ -3208,7 +3208,7 @@ typedef struct isogi_trace__stage {
 
 /* Nodes that stay where they are once they are made. guides: of texels; reflectors, links: of probes. values: their four kinds (below), one
    after the other. heads: where chains of probes begin, number + 1, 0 = nowhere; NULL of texels. stages: in few bytes
-   what one thread goes through. */
+   what one thread goes through. where: of texels, 64 times the number of the brick, and the slot. */
 typedef struct isogi_trace__chunk {
     float *values;
     isogi_trace__node *nodes;
@@ -3217,6 +3217,7 @@ typedef struct isogi_trace__chunk {
     isogi_trace__link *links;
     uint32_t *heads;
     isogi_trace__stage *stages;
+    size_t *where;
 } isogi_trace__chunk;
 
 /* What a node's values are. DIRECT: sums over rays that escaped; BOUNCE: of texels over rays that hit, of probes what comes from sky and
@@ -3388,6 +3389,7 @@ static void isogi_trace__chunk_free(const isogi_trace *t, isogi_trace__chunk *c)
     isogi_release(&t->context, c->values, (size_t)ISOGI_TRACE__KINDS * ISOGI_TRACE__CHUNK, (size_t)t->values * sizeof(float));
     isogi_release(&t->context, c->heads, ISOGI_TRACE__CHUNK, sizeof *c->heads);
     isogi_release(&t->context, c->stages, ISOGI_TRACE__CHUNK, sizeof *c->stages);
+    isogi_release(&t->context, c->where, ISOGI_TRACE__CHUNK, sizeof *c->where);
 }
 
 static size_t isogi_trace__segment_size(const isogi_trace__segment *s) {
@@ -3435,7 +3437,8 @@ static isogi_result isogi_trace__set_reserve(const isogi_trace *t, isogi_trace__
         c.values = (float *)isogi_allocate(&t->context, (size_t)ISOGI_TRACE__KINDS * ISOGI_TRACE__CHUNK, (size_t)t->values * sizeof(float));
         c.heads = chains ? (uint32_t *)isogi_allocate(&t->context, ISOGI_TRACE__CHUNK, sizeof *c.heads) : NULL;
         c.stages = (isogi_trace__stage *)isogi_allocate(&t->context, ISOGI_TRACE__CHUNK, sizeof *c.stages);
-        if (!c.nodes || !c.values || !c.stages || !(chains ? c.reflectors && c.links && c.heads : c.guides != NULL)) {
+        c.where = chains ? NULL : (size_t *)isogi_allocate(&t->context, ISOGI_TRACE__CHUNK, sizeof *c.where);
+        if (!c.nodes || !c.values || !c.stages || !(chains ? c.reflectors && c.links && c.heads : c.guides && c.where)) {
             isogi_trace__chunk_free(t, &c);
             return ISOGI_NO_MEMORY;
         }
@@ -3552,12 +3555,11 @@ static void isogi_trace__heads_new(isogi_trace__set *s) {
     }
 }
 
-/* A node without samples: all but what and where it is. */
+/* A node without samples: all but what and where it is, and its stage. */
 static void isogi_trace__node_clear(const isogi_trace *t, isogi_trace__set *s, size_t i) {
     isogi_trace__node *n = isogi_trace__node_at(s, i);
     size_t v = (size_t)t->values, begin = offsetof(isogi_trace__node, brick);
     memset((char *)n + begin, 0, sizeof *n - begin);
-    memset(isogi_trace__stage_at(s, i), 0, sizeof(isogi_trace__stage));
     memset(isogi_trace__values_at(s, i, ISOGI_TRACE__DIRECT_VALUES, v), 0, v * sizeof(float));
     memset(isogi_trace__values_at(s, i, ISOGI_TRACE__BOUNCE_VALUES, v), 0, v * sizeof(float));
     memset(isogi_trace__light_at(s, i, v), 0, v * sizeof(float));
@@ -3734,6 +3736,7 @@ static void isogi_trace__probes_link(const isogi_trace *t, size_t made) {
         if (i + late < made) ISOGI_TRACE__AHEAD(isogi_trace__probe_ahead(set, &f->catches[f->makers[i + late]], 1));
         while (*at) at = &isogi_trace__link_at(set, *at - 1)->next;
         link->tag = isogi_trace__tag(c->key), link->next = 0;
+        memset(isogi_trace__stage_at(set, set->count), 0, sizeof(isogi_trace__stage));
         *at = (uint32_t)++set->count;
     }
 }
@@ -5207,18 +5210,26 @@ static double isogi_trace__told(const isogi_trace *t) {
 
 /* ---- stepping ---- */
 
-/* Where texels lie, and on which isosurface. Without a normal there is no surface: only where the voxels were changed after the
+/* Texels' nodes: where they lie, and on which isosurface. Without a normal there is no surface: only where the voxels were changed after the
    texel was classified, which breaks the contract but must not hang. */
 static void isogi_trace__place_task(void *arg, size_t task) {
     const isogi_trace__job *job = (const isogi_trace__job *)arg;
     const isogi_trace *t = job->trace;
     size_t i = task * ISOGI_TRACE__SWEEP, end = i + ISOGI_TRACE__SWEEP < job->count ? i + ISOGI_TRACE__SWEEP : job->count;
     while (i < end) {
-        const isogi_trace__set *set = &t->feedback->texels;
+        isogi_trace__set *set = &t->feedback->texels;
         size_t count = end - i < ISOGI_TRACE__TEXELS ? end - i : ISOGI_TRACE__TEXELS, texel[ISOGI_TRACE__TEXELS][3], k;
         isogi_trace__site site[ISOGI_TRACE__TEXELS];
         uint8_t valid[ISOGI_TRACE__TEXELS];
-        for (k = 0; k < count; k++) memcpy(texel[k], isogi_trace__node_at(set, job->first + i + k)->texel, sizeof texel[k]);
+        for (k = 0; k < count; k++) {
+            const size_t number = job->first + i + k,
+                         where = set->chunks[number / ISOGI_TRACE__CHUNK].where[number % ISOGI_TRACE__CHUNK];
+            isogi_trace__node *n = isogi_trace__node_begin(t, set, number);
+            isogi_trace__node_clear(t, set, number);
+            n->brick = t->bricks[where / ISOGI_TRACE__TEXELS], n->slot = (uint32_t)(where % ISOGI_TRACE__TEXELS);
+            isogi_trace__texel_of(t, where / ISOGI_TRACE__TEXELS, n->slot, n->texel);
+            memcpy(texel[k], n->texel, sizeof texel[k]);
+        }
         isogi_trace__texel_sites(t, (const size_t(*)[3])texel, count, site, valid);
         for (k = 0; k < count; k++) {
             isogi_trace__node *n = isogi_trace__node_at(set, job->first + i + k);
@@ -5247,7 +5258,7 @@ static uint64_t isogi_trace__place(isogi_trace *t, uint64_t limit) {
     return fresh.count / 2 + 1;
 }
 
-/* Nodes for the wanted texels of a brick; even: of those that are even along all axes. */
+/* Numbers of nodes for the wanted texels of a brick; even: of those that are even along all axes. */
 static isogi_result isogi_trace__nodes_of(isogi_trace *t, size_t index, int even) {
     isogi_trace__set *set = &t->feedback->texels;
     isogi_trace__brick *brick = t->bricks[index];
@@ -5263,12 +5274,9 @@ static isogi_result isogi_trace__nodes_of(isogi_trace *t, size_t index, int even
     if (isogi_trace__set_reserve(t, set, isogi_trace__bits(wanted), 0) != ISOGI_OK) return ISOGI_NO_MEMORY;
     if (even) t->feedback->made_texels += isogi_trace__bits(wanted);
     for (slot = 0; slot < ISOGI_TRACE__TEXELS; slot++) {
-        isogi_trace__node *n;
         if (!(wanted >> slot & 1) || (even && (slot & 0x15))) continue;
-        n = isogi_trace__node_begin(t, set, set->count);
-        isogi_trace__node_clear(t, set, set->count);
-        n->brick = brick, n->slot = slot;
-        isogi_trace__texel_of(t, index, slot, n->texel);
+        memset(isogi_trace__stage_at(set, set->count), 0, sizeof(isogi_trace__stage));
+        set->chunks[set->count / ISOGI_TRACE__CHUNK].where[set->count % ISOGI_TRACE__CHUNK] = ISOGI_TRACE__TEXELS * index + slot;
         brick->node[slot] = (uint32_t)++set->count, t->feedback->unfinished++;
         if (brick->state[slot] == ISOGI_TRACE__WANTED) brick->state[slot] = ISOGI_TRACE__QUEUED;
     }
@@ -5954,8 +5962,10 @@ static void isogi_trace__node_loaded(isogi_trace *t, const isogi_trace__brick *b
     isogi_trace__stage *stage;
     if (!brick->node || !brick->node[slot]) return;
     stage = isogi_trace__stage_at(&t->feedback->texels, brick->node[slot] - 1);
-    if (!stage->finished)
-        t->feedback->partial -= isogi_trace__node_at(&t->feedback->texels, brick->node[slot] - 1)->samples, t->feedback->unfinished--;
+    if (!stage->finished) {
+        t->feedback->unfinished--;
+        if (brick->node[slot] <= t->feedback->placed) t->feedback->partial -= isogi_trace__node_at(&t->feedback->texels, brick->node[slot] - 1)->samples;
+    }
     stage->finished = 2;
 }
 
