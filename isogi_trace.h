@@ -464,7 +464,8 @@ ISOGI_API size_t isogi_trace_memory(const isogi_trace *trace); /* bytes that the
 #define ISOGI_TRACE__WAVE 32         /* paths that are traced together */
 #define ISOGI_TRACE__BATCH 4096      /* texels in one parallel run, */
 #define ISOGI_TRACE__TASKS 256       /* in at most so many tasks */
-#define ISOGI_TRACE__POINTS 8192     /* that are requested together, at most */
+#define ISOGI_TRACE__POINTS 65536    /* that are requested together, at most, */
+#define ISOGI_TRACE__TASK_POINTS 2048 /* and that one task looks through */
 #define ISOGI_TRACE__TASK 4          /* points of the caller's own in a task */
 #define ISOGI_TRACE__MAX_DEPTH 10000 /* of a path, so that nothing hangs */
 #define ISOGI_TRACE__MAX_ORDER 6
@@ -2914,16 +2915,19 @@ typedef struct isogi_trace__job {
     size_t first, count, each; /* each: texels of a task */
 } isogi_trace__job;
 
-/* Cells all of whose texels have been seen to: the next pixels, and those of the next lines, will mostly ask for them again. */
-typedef struct isogi_trace__known {
-    uint32_t cell[256][3];
+/* Points asked for, of which those are told apart that lie in a cell of others before them: the next pixels, and those of the next lines,
+   mostly do. */
+typedef struct isogi_trace__asked {
+    const isogi_trace *trace;
+    const float (*points)[3];
+    size_t count;
+    uint64_t again[ISOGI_TRACE__POINTS / 64]; /* bits of those */
     int lacking; /* around some point no texel had a surface: of others the nearest that has one may be another */
-} isogi_trace__known;
+} isogi_trace__asked;
 
-/* Where a cell stands; NULL for points on its faces, where a lookup reads fewer texels. */
-static uint32_t *isogi_trace__known_at(isogi_trace__known *known, const size_t cell[3], const double local[3]) {
-    int inner = local[0] > 0 && local[0] < 1 && local[1] > 0 && local[1] < 1 && local[2] > 0 && local[2] < 1;
-    return inner ? known->cell[(cell[0] + 7 * cell[1] + 61 * cell[2]) & 255] : NULL;
+/* On faces of its cell a lookup reads fewer texels. */
+static int isogi_trace__inner(const double local[3]) {
+    return local[0] > 0 && local[0] < 1 && local[1] > 0 && local[1] < 1 && local[2] > 0 && local[2] < 1;
 }
 
 static void isogi_trace__learn_task(void *arg, size_t task) {
@@ -2964,31 +2968,51 @@ static int isogi_trace__corners(const isogi_trace *t, const size_t cell[3], cons
     return count;
 }
 
-/* Classifies the texels that lookups at the next points will read, as many as a batch holds, on all cores. *end: of these points. again:
-   bits of those that lie in a cell of points before them. */
-static isogi_result isogi_trace__learn_points(isogi_trace *t, const float (*points)[3], size_t count, size_t *end, uint64_t *again,
-                                              isogi_trace__known *known) {
+/* Of a task's points, by the cells that it has met last. */
+static void isogi_trace__again_task(void *arg, size_t task) {
+    isogi_trace__asked *asked = (isogi_trace__asked *)arg;
+    const isogi_trace *t = asked->trace;
+    uint32_t known[256][3];
+    size_t i = task * ISOGI_TRACE__TASK_POINTS,
+           end = i + ISOGI_TRACE__TASK_POINTS < asked->count ? i + ISOGI_TRACE__TASK_POINTS : asked->count;
+    memset(known, 0xff, sizeof known); /* no cell has that number */
+    memset(asked->again + i / 64, 0, ISOGI_TRACE__TASK_POINTS / 8);
+    for (; i < end; i++) {
+        size_t cell[3], brick[64];
+        uint32_t *kept, slot[64];
+        uint8_t tap[64];
+        double local[3];
+        int a, taps;
+        isogi_trace__cell(t, asked->points[i], cell, local);
+        if (!isogi_trace__inner(local)) continue;
+        kept = known[(cell[0] + 7 * cell[1] + 61 * cell[2]) & 255];
+        if (kept[0] == cell[0] && kept[1] == cell[1] && kept[2] == cell[2]) {
+            asked->again[i / 64] |= (uint64_t)1 << i % 64;
+            continue;
+        }
+        taps = t->scene.desc.lookup == ISOGI_TRACE_BSPLINE ? isogi_trace__corners(t, cell, local, 1, tap, brick, slot) : 8;
+        for (a = 0; a < 3 && taps == isogi_trace__tap_count(t); a++) kept[a] = (uint32_t)cell[a];
+    }
+}
+
+/* Classifies the texels that lookups at the points from `first` on will read, as many as a batch holds, on all cores. *end: of these
+   points. */
+static isogi_result isogi_trace__learn_points(isogi_trace *t, const isogi_trace__asked *asked, size_t first, size_t *end) {
     isogi_context silent = t->context;
     isogi_trace__job job;
     isogi_result result = ISOGI_OK;
     size_t i;
     job.trace = t, job.first = job.count = 0;
-    memset(again, 0, ISOGI_TRACE__POINTS / 8);
-    if (count > ISOGI_TRACE__POINTS) count = ISOGI_TRACE__POINTS;
-    for (i = 0; i < count && job.count + 64 <= ISOGI_TRACE__BATCH && result == ISOGI_OK; i++) {
+    for (i = first; i < asked->count && job.count + 64 <= ISOGI_TRACE__BATCH && result == ISOGI_OK; i++) {
         size_t cell[3];
         double local[3];
         size_t brick[64];
-        uint32_t *kept, slot[64];
+        uint32_t slot[64];
         uint8_t tap[64];
         int k, taps;
-        isogi_trace__cell(t, points[i], cell, local);
-        kept = isogi_trace__known_at(known, cell, local);
-        if (kept && kept[0] == cell[0] && kept[1] == cell[1] && kept[2] == cell[2]) {
-            again[i / 64] |= (uint64_t)1 << i % 64;
-            continue;
-        }
-        taps = isogi_trace__corners(t, cell, local, kept != NULL, tap, brick, slot);
+        if (asked->again[i / 64] >> i % 64 & 1) continue;
+        isogi_trace__cell(t, asked->points[i], cell, local);
+        taps = isogi_trace__corners(t, cell, local, isogi_trace__inner(local), tap, brick, slot);
         for (k = 0; k < taps && result == ISOGI_OK; k++) {
             isogi_trace__ref *ref = &t->batch[job.count];
             if (!t->bricks[brick[k]]) t->bricks[brick[k]] = isogi_trace__brick_new(t);
@@ -2999,7 +3023,6 @@ static isogi_result isogi_trace__learn_points(isogi_trace *t, const float (*poin
                 isogi_trace__tap(t, cell, local, tap[k], ref->texel);
             }
         }
-        for (k = 0; k < 3 && kept && taps == isogi_trace__tap_count(t); k++) kept[k] = (uint32_t)cell[k];
     }
     *end = i, silent.progress = NULL;
     isogi_parallel(&silent, (job.count + ISOGI_TRACE__TEXELS - 1) / ISOGI_TRACE__TEXELS, isogi_trace__learn_task, &job, 0, 1);
@@ -3007,19 +3030,18 @@ static isogi_result isogi_trace__learn_points(isogi_trace *t, const float (*poin
     return result;
 }
 
-static isogi_result isogi_trace__want_points(isogi_trace *t, const float (*points)[3], size_t count, const uint64_t *again,
-                                             isogi_trace__known *known) {
+static isogi_result isogi_trace__want_points(isogi_trace *t, isogi_trace__asked *asked, size_t first, size_t end) {
     size_t i;
-    for (i = 0; i < count; i++) {
+    for (i = first; i < end; i++) {
         size_t cell[3], texel[3], brick[64];
         uint32_t slot[64];
         uint8_t tap[64];
         double local[3];
         isogi_result result = ISOGI_OK;
         int k, taps, lacking = 1;
-        if (!known->lacking && (again[i / 64] >> i % 64 & 1)) continue;
-        isogi_trace__cell(t, points[i], cell, local);
-        taps = isogi_trace__corners(t, cell, local, isogi_trace__known_at(known, cell, local) != NULL, tap, brick, slot);
+        if (!asked->lacking && (asked->again[i / 64] >> i % 64 & 1)) continue;
+        isogi_trace__cell(t, asked->points[i], cell, local);
+        taps = isogi_trace__corners(t, cell, local, isogi_trace__inner(local), tap, brick, slot);
         for (k = 0; k < taps && result == ISOGI_OK; k++) {
             if (t->bricks[brick[k]]->state[slot[k]] == ISOGI_TRACE__READABLE) {
                 isogi_trace__tap(t, cell, local, tap[k], texel);
@@ -3027,7 +3049,7 @@ static isogi_result isogi_trace__want_points(isogi_trace *t, const float (*point
             }
             lacking = lacking && t->bricks[brick[k]]->state[slot[k]] == ISOGI_TRACE__NO_SURFACE;
         }
-        known->lacking |= lacking;
+        asked->lacking |= lacking;
         if (result == ISOGI_OK && lacking) result = isogi_trace__want_nearest(t, cell, local);
         if (result != ISOGI_OK) return result;
     }
@@ -3036,15 +3058,20 @@ static isogi_result isogi_trace__want_points(isogi_trace *t, const float (*point
 
 ISOGI_API isogi_result isogi_trace_request(isogi_trace *trace, const float (*points)[3], size_t count) {
     isogi_result result = ISOGI_OK;
-    uint64_t again[ISOGI_TRACE__POINTS / 64];
-    isogi_trace__known known;
-    size_t i, end;
+    isogi_trace__asked asked;
+    isogi_context silent;
+    size_t first, i, end;
     if (!trace || (count && !points)) return ISOGI_INVALID;
     if (!trace->scene.desc.lazy || trace->coarse) return ISOGI_OK;
-    memset(&known, 0xff, sizeof known), known.lacking = 0; /* no cell has that number */
-    for (i = 0; i < count && result == ISOGI_OK; i += end) {
-        result = isogi_trace__learn_points(trace, points + i, count - i, &end, again, &known);
-        if (result == ISOGI_OK) result = isogi_trace__want_points(trace, points + i, end, again, &known);
+    silent = trace->context, silent.progress = NULL;
+    asked.trace = trace, asked.lacking = 0;
+    for (first = 0; first < count && result == ISOGI_OK; first += asked.count) {
+        asked.points = points + first, asked.count = count - first < ISOGI_TRACE__POINTS ? count - first : ISOGI_TRACE__POINTS;
+        isogi_parallel(&silent, (asked.count - 1) / ISOGI_TRACE__TASK_POINTS + 1, isogi_trace__again_task, &asked, 0, 1);
+        for (i = 0; i < asked.count && result == ISOGI_OK; i = end) {
+            result = isogi_trace__learn_points(trace, &asked, i, &end);
+            if (result == ISOGI_OK) result = isogi_trace__want_points(trace, &asked, i, end);
+        }
     }
     return result;
 }
@@ -3253,7 +3280,8 @@ typedef struct isogi_trace__plan {
     uint32_t node, first, count, offset;
 } isogi_trace__plan;
 
-/* A piece of a batch: its first span and sample; its hits, the place of the first among those of the batch, and how many of them found no probe. */
+/* A piece of a batch: its first span and sample; its hits, the place of the first among those of the batch, and how many of them found no
+   probe. */
 typedef struct isogi_trace__piece {
     uint32_t span, offset, hits, first_hit, fresh;
 } isogi_trace__piece;
@@ -3692,8 +3720,8 @@ static const void *isogi_trace__probe_ahead(const isogi_trace__set *set, const i
     return isogi_trace__link_at(set, *head - 1)->tag == isogi_trace__tag(c->key) ? (const void *)isogi_trace__node_at(set, *head - 1) : c;
 }
 
-/* Probes for hits that found none, the first catches of which become `makers`: chains of what is new, in the order of samples, are gone through in the
-   same way. Returns how many. */
+/* Probes for hits that found none; those that get a new one are `makers`. Chains of these, in the order of samples, are searched like those
+   of probes. Returns how many are new. */
 static size_t isogi_trace__probes_meet(const isogi_trace *t) {
     isogi_trace__feedback *f = t->feedback;
     const size_t late = 8; /* hits ahead */
@@ -4209,9 +4237,10 @@ static int isogi_trace__spans_fill(isogi_trace *t, uint64_t limit, uint64_t *spe
     if (!f->span_count && f->cursor == f->texels.count) {
         f->on_probes = 1;
         if (f->probe_cursor == f->probe_end) look = isogi_trace__generation(t, look);
-        for (; f->probe_cursor < f->probe_end; f->probe_cursor++)
-            if (!isogi_trace__stage_at(&f->probes, f->probe_cursor)->level && !isogi_trace__spans_add(t, &f->probes, f->probe_cursor, limit))
-                break;
+        for (; f->probe_cursor < f->probe_end; f->probe_cursor++) {
+            const isogi_trace__stage *stage = isogi_trace__stage_at(&f->probes, f->probe_cursor);
+            if (!stage->level && !isogi_trace__spans_add(t, &f->probes, f->probe_cursor, limit)) break;
+        }
     }
     f->pieces[f->piece_count].span = (uint32_t)f->span_count, *spent += (most - look) / 8;
     if (f->span_count) return 0;
@@ -5210,8 +5239,8 @@ static double isogi_trace__told(const isogi_trace *t) {
 
 /* ---- stepping ---- */
 
-/* Texels' nodes: where they lie, and on which isosurface. Without a normal there is no surface: only where the voxels were changed after the
-   texel was classified, which breaks the contract but must not hang. */
+/* Texels' nodes: where they lie, and on which isosurface. Without a normal there is no surface: only where the voxels were changed after
+   the texel was classified, which breaks the contract but must not hang. */
 static void isogi_trace__place_task(void *arg, size_t task) {
     const isogi_trace__job *job = (const isogi_trace__job *)arg;
     const isogi_trace *t = job->trace;
@@ -5959,12 +5988,13 @@ static isogi_result isogi_trace__block_check(const isogi_trace *t, const uint8_t
 
 /* The texel's light came with a block: what is gathered for it is not wanted any more. */
 static void isogi_trace__node_loaded(isogi_trace *t, const isogi_trace__brick *brick, uint32_t slot) {
+    isogi_trace__feedback *f = t->feedback;
     isogi_trace__stage *stage;
     if (!brick->node || !brick->node[slot]) return;
-    stage = isogi_trace__stage_at(&t->feedback->texels, brick->node[slot] - 1);
+    stage = isogi_trace__stage_at(&f->texels, brick->node[slot] - 1);
     if (!stage->finished) {
-        t->feedback->unfinished--;
-        if (brick->node[slot] <= t->feedback->placed) t->feedback->partial -= isogi_trace__node_at(&t->feedback->texels, brick->node[slot] - 1)->samples;
+        f->unfinished--;
+        if (brick->node[slot] <= f->placed) f->partial -= isogi_trace__node_at(&f->texels, brick->node[slot] - 1)->samples;
     }
     stage->finished = 2;
 }
@@ -6764,6 +6794,7 @@ ISOGI_API isogi_result isogi_trace_gather_field(const isogi_trace_desc *desc, is
 #undef ISOGI_TRACE__PIECE
 #undef ISOGI_TRACE__PLACING
 #undef ISOGI_TRACE__POINTS
+#undef ISOGI_TRACE__TASK_POINTS
 #undef ISOGI_TRACE__WATCHED
 #endif /* ISOGI_TRACE_IMPLEMENTATION */
 
