@@ -2075,6 +2075,16 @@ static size_t isogi_trace__bits(uint64_t x) {
 
 static size_t isogi_trace__rank(uint64_t held, uint32_t slot) { return isogi_trace__bits(held & (((uint64_t)1 << slot) - 1)); }
 
+static uint32_t isogi_trace__lowest_bit(uint64_t bits) {
+#if defined(__GNUC__) && !defined(__TINYC__)
+    return (uint32_t)__builtin_ctzll(bits);
+#else
+    uint32_t i = 0;
+    while (!(bits >> i & 1)) i++;
+    return i;
+#endif
+}
+
 static uint8_t *isogi_trace__record(const isogi_trace *t, const isogi_trace__brick *brick, uint32_t slot) {
     return brick->records + isogi_trace__rank(brick->held, slot) * t->record;
 }
@@ -3116,16 +3126,26 @@ static int isogi_trace__to_do(const isogi_trace__brick *brick, size_t slot) {
     return brick->state[slot] == ISOGI_TRACE__WANTED || (brick->state[slot] == ISOGI_TRACE__DRAFT && !(brick->node && brick->node[slot]));
 }
 
+/* Bits of all that are. */
+static uint64_t isogi_trace__all_to_do(const isogi_trace__brick *brick) {
+    uint64_t wanted = 0, draft = 0;
+    uint32_t slot;
+    for (slot = 0; slot < ISOGI_TRACE__TEXELS; slot++) {
+        wanted |= (uint64_t)(brick->state[slot] == ISOGI_TRACE__WANTED) << slot;
+        draft |= (uint64_t)(brick->state[slot] == ISOGI_TRACE__DRAFT) << slot;
+    }
+    for (slot = 0; slot < ISOGI_TRACE__TEXELS && draft; slot++)
+        wanted |= (uint64_t)isogi_trace__to_do(brick, slot) << slot;
+    return wanted;
+}
+
 /* The next texels to compute, at most `limit`, with room for their values. Bricks stay in the queue until they are done. */
 static isogi_result isogi_trace__fill_batch(isogi_trace *t, size_t limit, size_t *count) {
     size_t i, slot;
     *count = 0;
     for (i = t->queue_first; i < t->queue_count && *count < limit; i++) {
         isogi_trace__brick *brick = t->bricks[t->queue[i]];
-        uint64_t wanted = 0;
-        for (slot = 0; slot < ISOGI_TRACE__TEXELS; slot++)
-            wanted |= (uint64_t)isogi_trace__to_do(brick, slot) << slot;
-        if (isogi_trace__brick_hold(t, brick, wanted) != ISOGI_OK) return *count ? ISOGI_OK : ISOGI_NO_MEMORY;
+        if (isogi_trace__brick_hold(t, brick, isogi_trace__all_to_do(brick)) != ISOGI_OK) return *count ? ISOGI_OK : ISOGI_NO_MEMORY;
         for (slot = 0; slot < ISOGI_TRACE__TEXELS && *count < limit; slot++) {
             isogi_trace__ref *ref = &t->batch[*count];
             if (!isogi_trace__to_do(brick, slot)) continue;
@@ -4879,16 +4899,6 @@ static void isogi_trace__blend_of(const isogi_trace *t, const isogi_trace__dense
     isogi_trace__blend_plain(b, centre, to);
 }
 
-static uint32_t isogi_trace__lowest_bit(uint64_t bits) {
-#if defined(__GNUC__) && !defined(__TINYC__)
-    return (uint32_t)__builtin_ctzll(bits);
-#else
-    uint32_t i = 0;
-    while (!(bits >> i & 1)) i++;
-    return i;
-#endif
-}
-
 /* Texels of a brick within REACH of its neighbour at -1, 0, 1 along an axis: bits. */
 static uint64_t isogi_trace__within_reach(const int d[3]) {
     static const uint64_t line[3][3] = {{0xeeeeeeeeeeeeeeeeu, 0xffffffffffffffffu, 0x7777777777777777u},
@@ -5291,9 +5301,8 @@ static uint64_t isogi_trace__place(isogi_trace *t, uint64_t limit) {
 static isogi_result isogi_trace__nodes_of(isogi_trace *t, size_t index, int even) {
     isogi_trace__set *set = &t->feedback->texels;
     isogi_trace__brick *brick = t->bricks[index];
-    uint64_t wanted = 0;
+    uint64_t wanted = isogi_trace__all_to_do(brick), left;
     uint32_t slot;
-    for (slot = 0; slot < ISOGI_TRACE__TEXELS; slot++) wanted |= (uint64_t)isogi_trace__to_do(brick, slot) << slot;
     if (isogi_trace__brick_hold(t, brick, wanted) != ISOGI_OK) return ISOGI_NO_MEMORY;
     if (!brick->node && wanted) {
         brick->node = (uint32_t *)isogi_allocate(&t->context, ISOGI_TRACE__TEXELS, sizeof(uint32_t));
@@ -5302,8 +5311,8 @@ static isogi_result isogi_trace__nodes_of(isogi_trace *t, size_t index, int even
     }
     if (isogi_trace__set_reserve(t, set, isogi_trace__bits(wanted), 0) != ISOGI_OK) return ISOGI_NO_MEMORY;
     if (even) t->feedback->made_texels += isogi_trace__bits(wanted);
-    for (slot = 0; slot < ISOGI_TRACE__TEXELS; slot++) {
-        if (!(wanted >> slot & 1) || (even && (slot & 0x15))) continue;
+    for (left = even ? wanted & 0x0000050500000505u : wanted; left; left &= left - 1) {
+        slot = isogi_trace__lowest_bit(left);
         memset(isogi_trace__stage_at(set, set->count), 0, sizeof(isogi_trace__stage));
         set->chunks[set->count / ISOGI_TRACE__CHUNK].where[set->count % ISOGI_TRACE__CHUNK] = ISOGI_TRACE__TEXELS * index + slot;
         brick->node[slot] = (uint32_t)++set->count, t->feedback->unfinished++;
