@@ -306,6 +306,41 @@ TEST(light_on_the_border_of_a_full_box_is_that_from_outside) {
     isogi_vol_free(pyramid);
 }
 
+/* Leaves of two or three voxels behind a steep function, a hard case for sweeps, whose nodes hold extinction instead of values: mean light
+   among them is that of brute force up to what the header says. */
+TEST(fine_matter_errs_by_sweeps_as_stated) {
+    enum { SIDE = 49, POINTS = 13, COUNT = POINTS * POINTS * POINTS };
+    static float leaves[SIDE][SIDE][SIDE], at[COUNT][3], v[COUNT];
+    static const double lattice[] = {0.25, 2, 1, 0.5}, least[] = {0, -0.04, -0.2, -0.07}; /* the first is brute force */
+    const isogi_volume volume = {.data = leaves, .type = ISOGI_F32, .size = {SIDE, SIDE, SIDE}};
+    const isogi_transfer_point p[] = {{0, {1, 1, 1}, 0}, {0.6, {1, 1, 1}, 0}, {0.7, {1, 1, 1}, 0.3f}, {1, {1, 1, 1}, 0.5f}};
+    const isogi_transfer transfer = {p, 4, NULL, 0};
+    isogi_pyramid *pyramid = NULL;
+    double mean[4];
+    for (int i = 0; i < SIDE * SIDE * SIDE; i++) {
+        const double x = 0.9 * (i % SIDE), y = 0.8 * (i / SIDE % SIDE), z = 0.7 * (i / SIDE / SIDE);
+        leaves[i / SIDE / SIDE][i / SIDE % SIDE][i % SIDE] = (float)fmax(0, sin(x) * cos(y) + sin(y) * cos(z) + sin(z) * cos(x) - 0.3);
+    }
+    for (int i = 0; i < COUNT; i++)
+        at[i][0] = (float)(4 * (i % POINTS)), at[i][1] = (float)(4 * (i / POINTS % POINTS)), at[i][2] = (float)(4 * (i / POINTS / POINTS));
+    CHECK(isogi_vol_build(&pyramid, &volume, &serial) == ISOGI_OK, "build");
+    for (int way = 0; way < 4; way++) {
+        const isogi_dvr_desc desc = {.pyramid = pyramid, .shading = ISOGI_DVR_VISIBILITY, .order = 1, .directions = 32,
+                                     .method = way ? ISOGI_DVR_SWEEP : ISOGI_DVR_BRUTE, .grid = {POINTS, POINTS, POINTS},
+                                     .visibility_step = lattice[way]};
+        isogi_dvr *dvr = renderer(desc, &transfer, &serial);
+        CHECK(isogi_dvr_step(dvr, 0, NULL) == ISOGI_OK && isogi_dvr_sample_visibility(dvr, (const float(*)[3])at, COUNT, v) == ISOGI_OK,
+              "step");
+        isogi_dvr_free(dvr), mean[way] = 0;
+        for (int i = 0; i < COUNT; i++) mean[way] += (double)v[i] / COUNT;
+        CHECK(mean[way] / mean[0] - 1 >= least[way] && mean[way] / mean[0] - 1 < 0.04, "lattice of %g voxels: %g, not %g", lattice[way],
+              mean[way], mean[0]);
+    }
+    printf("    mean light by sweeps, lattice of 2, 1, 1/2 voxels: %+.2g, %+.2g, %+.2g of it\n", mean[1] / mean[0] - 1,
+           mean[2] / mean[0] - 1, mean[3] / mean[0] - 1);
+    isogi_vol_free(pyramid);
+}
+
 TEST(visibility_is_the_same_bits_for_any_threads_and_slicing) {
     isogi_pyramid *pyramid = linear_field();
     for (int method = ISOGI_DVR_PAPER; method <= ISOGI_DVR_SWEEP; method++) {

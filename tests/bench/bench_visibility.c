@@ -184,8 +184,9 @@ static frame frame_from(study *s, const isogi_dvr_desc *changed, source from, in
     need(isogi_dvr_create(&dvr, &desc, &two), "create");
     f.update = wall_seconds();
     need(isogi_dvr_set_transfer(dvr, &s->transfer), "set_transfer");
-    if (from == COMPUTED) need(isogi_dvr_step(dvr, 0, NULL), "step");
-    else fill(dvr, s, from);
+    for (double remaining = 1; from == COMPUTED && remaining > 0;) /* few directions at once where each takes a quarter of a gigabyte */
+        need(isogi_dvr_step(dvr, dvr->point_count > 1u << 25 ? 2 * dvr->point_count : 0, &remaining), "step");
+    if (from != COMPUTED) fill(dvr, s, from);
     f.update = wall_seconds() - f.update;
     for (int turn = 0; turn < (quick ? 1 : 2); turn++) {
         double begun = wall_seconds();
@@ -283,8 +284,9 @@ static void study_blocks(study *s) {
     release(&reference);
 }
 
-/* Figure 11: grids from half the base's points along each axis to twice or four times; the reference has twice as many as the last. What
-   the grid alone does is told by brute force with the same directions. */
+/* Figure 11: grids from half the base's points along each axis to twice or four times; the reference has twice as many as the last, and for
+   bonsai sweeps have as many, too: 512x512x256, as the paper, for which 4 GB of memory will do. What the grid alone does is told by brute
+   force with the same directions. */
 static void study_grids(study *s) {
     size_t most = quick ? 2 : s->base.order > 2 ? 4 : 8;
     isogi_dvr_desc desc = s->base;
@@ -292,7 +294,7 @@ static void study_grids(study *s) {
     for (int a = 0; a < 3; a++) desc.grid[a] *= most;
     frame reference = frame_from(s, &desc, BRUTE, 0, &s->lighting);
     for (int way = 0; way < (quick || sweeps_alone ? 2 : 3); way++)
-        for (size_t half = 1; half <= (way < 2 ? most : 2); half *= 2) { /* in halves of the base */
+        for (size_t half = 1; half <= (way == 0 && most == 8 ? 16 : way < 2 ? most : 2); half *= 2) { /* in halves of the base */
             char setting[80];
             for (int a = 0; a < 3; a++) desc.grid[a] = s->base.grid[a] * half / 2;
             if (way == 2) desc.method = ISOGI_DVR_PAPER;
