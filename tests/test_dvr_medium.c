@@ -367,6 +367,66 @@ TEST(depth_through_tetrahedra_is_as_on_the_lattice) {
     isogi_dvr_tets_free(tets);
 }
 
+/* ---- clip planes ---- */
+
+/* A medium of constant extinction in the field x, of which planes in any direction, or the six of a box, leave a part: opacity of what is
+   left along a ray (of the values passed, in data space), from where it begins; and an isosurface that counts where it is left. */
+TEST(planes_and_boxes_cut_pictures_where_they_say) {
+    field f = field_of(along_x, 49);
+    test_random r = {31};
+    const isogi_transfer_point medium = {0, {1, 0.5f, 0.2f}, 0.02f};
+    const isogi_peak peak = {25, {1, 1, 1}, 0.25f};
+    int cut = 0, crossed = 0, nothing = 0;
+    for (int n = 0; n < (LONG_SUITE ? 20000 : 1200); n++) {
+        const int way = n % 6, data = way > 2, peaks = n / 6 % 2, count = n % 5 ? 1 + (int)(random_bits(&r) % 4) : 6;
+        const isogi_transfer transfer = {&medium, 1, &peak, (size_t)peaks};
+        const isogi_context context = {.threads = 1, .force_path = n / 12 % 5};
+        const isogi_dvr_desc desc = {.pyramid = f.pyramid, .space = (isogi_dvr_space)data, .opaque = 1, .bound = way == 2 ? 0.1 : 0,
+                                     .classification = (isogi_dvr_classification)(way == 1 ? 2 : way > 2 ? way - 3 : 0), .step = 0.2};
+        double planes[6][4], target[3], eye[3], origin[3], from = 0, to = 1e9, enter, leave, at;
+        float dir[3];
+        for (int a = 0; a < 3; a++) target[a] = random_range(&r, 16, 32), eye[a] = target[a] + random_range(&r, n % 4 ? -90 : -9, 90);
+        for (int i = 0; i < count; i++) {
+            planes[i][3] = 0;
+            for (int a = 0; a < 3; a++) {
+                planes[i][a] = count < 6 ? random_range(&r, -2, 2) : a == i / 2 ? 1 - 2 * (i % 2) : 0;
+                planes[i][3] -= planes[i][a] * (24 + (count < 6 ? random_range(&r, -12, 12) : i % 2 ? 9 : -9));
+            }
+        }
+        isogi_view view = line_of_sight(eye, target);
+        isogi_dvr *dvr = dvr_new_with(&desc, &transfer, &context);
+        float c[1][4], depth;
+        view.depth = ISOGI_DEPTH_FIRST;
+        CHECK(isogi_dvr_set_clip(dvr, (const double(*)[4])planes, (size_t)count) == ISOGI_OK &&
+                  isogi_dvr_render(dvr, &view, NULL, c, &depth, NULL) == ISOGI_OK,
+              "render");
+        isogi_dvr_free(dvr), isogi_view_ray(&view, 0, 0, origin, dir);
+        for (int a = 0; a < 3; a++) {
+            double low = -origin[a] / (double)dir[a], high = (48 - origin[a]) / (double)dir[a];
+            from = fmax(from, fmin(low, high)), to = fmin(to, fmax(low, high));
+        }
+        enter = from, leave = to;
+        for (int i = 0; i < count; i++) {
+            double here = planes[i][3], slope = 0;
+            for (int a = 0; a < 3; a++) here += planes[i][a] * origin[a], slope += planes[i][a] * (double)dir[a];
+            if (slope > 0) from = fmax(from, -here / slope);
+            else to = fmin(to, -here / slope);
+        }
+        at = (25 - origin[0]) / (double)dir[0];
+        const int passed = peaks && at > from && at < to, left = to > from;
+        if (fabs(at - from) < 1e-3 || fabs(at - to) < 1e-3 || fabs(to - from) < 1e-3) continue;
+        double thick = left ? (double)medium.extinction * (to - from) * (data ? fabs((double)dir[0]) : 1) : 0;
+        double expected = 1 - exp(-thick) * (passed ? 0.75 : 1);
+        cut += left && (from > enter + 1 || to < leave - 1), crossed += passed, nothing += !left && leave > enter + 1;
+        CHECK(fabs((double)c[0][3] - expected) < (way == 0 ? 1e-5 : 2e-6), "case %d, way %d: opacity %g, not %g", n, way,
+              (double)c[0][3], expected);
+        if (!left) CHECK(depth > 1e30f, "case %d: depth %g of nothing", n, (double)depth);
+        else if (thick > 1e-3) CHECK(fabs((double)depth - from) < 1e-3, "case %d, way %d: from %g, not %g", n, way, (double)depth, from);
+    }
+    CHECK(cut > 300 && crossed > 60 && nothing > 20, "%d rays cut, %d cross the surface, %d see nothing", cut, crossed, nothing);
+    field_free(&f);
+}
+
 /* ---- jitter ---- */
 
 TEST(jitter_is_off_by_default_repeats_itself_and_is_right_on_average) {
