@@ -189,9 +189,9 @@
    resolutions a third to 1.4 times as many, as blocks hold their borders each, and a third such set while sweeps finish), with light 4
    more during a picture, 8 where matter is dense for the grid; sweeps as many again (then only until they are done), two floats for each
    node of their lattice, and during a step, for each of up to 16 directions, a float for each grid point and about 6 m (m + 24) of scratch
-   for m nodes on the longest axis. Empty blocks take one byte for each block of the pyramid; a picture in work 20 bytes a pixel, and 48 kB
-   to 768 kB of classes of values in physical space; exact rays, and those with a bound, 150 bytes a point of the transfer function,
-   pre-integrated ones 16 table^2 and 8 a point more. All of it comes from the context's allocator; where that fails the call says so and
+   for m nodes on the longest axis. Empty blocks take one byte for each block of the pyramid; a picture in work 20 bytes a pixel, and 64 kB
+   to 1 MB of classes of values in physical space; the transfer function of exact rays, and of those with a bound, 160 to 220 bytes a point,
+   of pre-integrated ones 16 table^2 and 8 a point more. All of it comes from the context's allocator; where that fails the call says so and
    changes nothing.
    Stack use stays below 32 KB.
    isogi_dvr_set_transfer and isogi_dvr_step are writers: one at a time, and not during another call with the same renderer. All

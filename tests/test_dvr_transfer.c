@@ -149,4 +149,46 @@ TEST(a_suggestion_shows_the_engine_block) {
     isogi_vol_free(pyramid), procedural_free(&volume);
 }
 
+/* ---- memory ---- */
+
+static size_t bytes_held, bytes_most;
+static void *counted(void *user, size_t size, size_t align) {
+    void *p = NULL;
+    (void)user, bytes_held += size, bytes_most = bytes_held > bytes_most ? bytes_held : bytes_most;
+    return posix_memalign(&p, align < sizeof(void *) ? sizeof(void *) : align, size) ? NULL : p;
+}
+static void given_back(void *user, void *p, size_t size) { (void)user, bytes_held -= p ? size : 0, free(p); }
+
+/* The figures under "Memory" in the header: bytes of functions of few and of many points, and of a picture in work. */
+TEST(transfer_functions_and_pictures_take_the_memory_that_is_stated) {
+    enum { SIDE = 128, MOST = 4000 };
+    static isogi_transfer_point p[MOST];
+    static float image[SIDE * SIDE][4];
+    const isogi_context context = {.alloc = counted, .release = given_back, .threads = 2};
+    const isogi_view view = {.width = SIDE, .height = SIDE, .eye = {70, 60, 90}, .target = {11.5f, 11.5f, 11.5f}, .fov = 20};
+    field f = field_waves(24, 3);
+    for (int way = 0; way < 4; way++) /* samples of physical space, and with a bound; exact and pre-integrated in data space */
+        for (int n = 10; n <= MOST; n *= 20) {
+            const isogi_dvr_desc desc = {.pyramid = f.pyramid, .space = (isogi_dvr_space)(way / 2), .bound = way == 1 ? 0.1 : 0,
+                                         .classification = (isogi_dvr_classification)(way == 3), .table = 128};
+            for (int i = 0; i < n; i++) p[i] = (isogi_transfer_point){-1 + 2.0 * i / n, {1, 1, 1}, 0.1f * (float)(i % 3)};
+            const isogi_transfer transfer = {p, (size_t)n, NULL, 0};
+            isogi_dvr *dvr = NULL;
+            CHECK(isogi_dvr_create(&dvr, &desc, &context) == ISOGI_OK, "create");
+            const size_t before = bytes_held;
+            CHECK(isogi_dvr_set_transfer(dvr, &transfer) == ISOGI_OK, "set_transfer");
+            const size_t taken = bytes_held - before - (way == 3 ? 16 * 128 * 128 + 8 * (size_t)n : 0), each = taken / (size_t)n;
+            if (way) CHECK(each >= 100 && each <= 270, "way %d: %zu bytes for each of %d points", way, each, n);
+            bytes_most = bytes_held;
+            if (way != 1 || n < MOST) /* a cell has a part for each point */
+                CHECK(isogi_dvr_render(dvr, &view, NULL, image, NULL, NULL) == ISOGI_OK, "render");
+            const size_t work = bytes_most - bytes_held, least = way == 1 && n == MOST ? 0 : 16 * SIDE * SIDE,
+                         most = 20 * (SIDE + 64) * (SIDE + 64) + (way ? 0 : n < 200 ? 1 << 16 : 1 << 20); /* whole tiles */
+            CHECK(work >= least && work <= most, "way %d, %d points: %zu bytes for a picture", way, n, work);
+            isogi_dvr_free(dvr);
+            CHECK(!bytes_held, "%zu bytes are left", bytes_held);
+        }
+    field_free(&f);
+}
+
 TEST_MAIN("dvr_transfer")
