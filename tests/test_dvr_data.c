@@ -683,6 +683,42 @@ TEST(two_sided_light_is_that_of_the_equation) {
     }
 }
 
+/* The same for a medium: of a constant extinction in f = x all pieces of a ray have one opacity a, so that light that returns is multiplied
+   by the opacity A of them all, and light that passes by A (1 - a): pieces of a cell each in exact rays, of a step each in sampled ones. */
+TEST(two_sided_light_of_a_medium_is_that_of_its_pieces) {
+    test_random r = {45};
+    const isogi_material front = {{0.9f, 0.8f, 0.7f}, {1, 1, 0.5f}, 20}, back = {{0.2f, 0.8f, 0.3f}, {0.5f, 0.25f, 0}, 5},
+                         through = {{0.5f, 1, 1}, {1, 0.5f, 1}, 8};
+    const double ends[2][3] = {{-20, 5.2, 5.4}, {31, 5.2, 5.4}};
+    tilt[0] = 1, tilt[1] = tilt[2] = 0;
+    field f = field_of(tilted, 12);
+    for (int n = 0; n < 180; n++) {
+        const int way = n % 3, rising = n / 3 % 2;
+        const isogi_transfer_point medium = {0, {0.9f, 0.6f, 0.3f}, (float)random_range(&r, 0.5, 20)};
+        const isogi_transfer transfer = {&medium, 1, NULL, 0};
+        const double cd[3] = {(double)0.9f, (double)0.6f, (double)0.3f}, v[3] = {rising ? -1 : 1, 0, 0}, normal[3] = {1, 0, 0};
+        const double whole = -expm1(-(double)medium.extinction), piece = -expm1(-(double)medium.extinction / (way ? 22 : 11));
+        const isogi_material seen[3] = {rising ? front : back, rising ? back : front, through};
+        double l[3], expected[3] = {0, 0, 0};
+        random_direction(&r, l);
+        const isogi_light light = {.vector = {(float)l[0], (float)l[1], (float)l[2]}, .rgb = {3, 3, 3}};
+        const isogi_lighting lighting = {.lights = &light, .light_count = 1};
+        const isogi_dvr_desc desc = {.pyramid = f.pyramid, .space = ISOGI_DVR_DATA, .shading = ISOGI_DVR_TWO_SIDED, .opaque = 1,
+                                     .classification = (isogi_dvr_classification)way, .material = {front, back, through}, .step = 0.5,
+                                     .table = 512};
+        isogi_dvr *dvr = dvr_new(&desc, &transfer);
+        pixel p = cast(dvr, ends[!rising], ends[rising], &lighting);
+        printed_equation(l, v, normal, piece, cd, seen, expected);
+        for (int a = 0; a < 3; a++) {
+            expected[a] *= whole / piece * 3 / PI;
+            CHECK(fabs((double)p.c[a] - expected[a]) < 2e-5, "case %d, way %d, channel %d: %.7g, not %.7g", n, way, a, (double)p.c[a],
+                  expected[a]);
+        }
+        isogi_dvr_free(dvr);
+    }
+    field_free(&f);
+}
+
 TEST(light_that_grazes_neither_returns_nor_passes) {
     tilt[0] = 1, tilt[1] = 0, tilt[2] = 0;
     field f = field_of(tilted, 6);
