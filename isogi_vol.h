@@ -4798,11 +4798,17 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE __m512i isogi_vol__mirror8(__m512i mask, __m
 
 /* The last four bytes of eight nodes. */
 ISOGI_VOL__AVX512 ISOGI_VOL__INLINE __m256i isogi_vol__tails8(const uint64_t address[8]) {
-    int32_t tail[8];
+    __m256i tail[8];
     int k;
 #pragma GCC unroll 8
-    for (k = 0; k < 8; k++) memcpy(&tail[k], (const char *)(uintptr_t)address[k] + 124, sizeof tail[k]);
-    return _mm256_setr_epi32(tail[0], tail[1], tail[2], tail[3], tail[4], tail[5], tail[6], tail[7]);
+    for (k = 0; k < 8; k++) {
+        int32_t last;
+        memcpy(&last, (const char *)(uintptr_t)address[k] + 124, sizeof last);
+        tail[k] = _mm256_set1_epi32(last);
+    }
+#pragma GCC unroll 4
+    for (k = 0; k < 8; k += 2) tail[k] = _mm256_blend_epi32(tail[k], tail[k + 1], 0xaa);
+    return _mm256_blend_epi32(_mm256_blend_epi32(tail[0], tail[2], 0x0c), _mm256_blend_epi32(tail[4], tail[6], 0xc0), 0xf0);
 }
 
 /* Bounds of nodes and voxels of leaves are compared alike, byte by byte, and mean different things: whether the two halves of the node
@@ -4826,6 +4832,7 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE __m256i isogi_vol__compare(isogi_vol__pool *
     beyond = _mm256_mask_mov_epi32(beyond, leaf, _mm256_min_epi32(_mm256_max_epi32(outside, zero), most));
     _mm256_store_si256((__m256i *)(void *)bound[0], _mm256_mullo_epi32(least, _mm256_set1_epi32(0x01010101)));
     _mm256_store_si256((__m256i *)(void *)bound[1], _mm256_mullo_epi32(beyond, _mm256_set1_epi32(0x01010101)));
+    __asm__("" : "+m"(bound)); /* bounds come from memory: broadcast from registers they would cost as much as the comparisons */
 #pragma GCC unroll 8
     for (k = 0; k < 8; k++) {
         const char *node = (const char *)(uintptr_t)s->address[i + k];
@@ -4981,18 +4988,22 @@ ISOGI_VOL__INLINE isogi_vol__spots isogi_vol__spots8(isogi_vol__pool *s, const u
     return spots;
 }
 
-ISOGI_VOL__AVX512 ISOGI_VOL__INLINE __m128i isogi_vol__load_two(const void *first, const void *second) {
-    int64_t low, high;
-    memcpy(&low, first, sizeof low), memcpy(&high, second, sizeof high);
-    return _mm_set_epi64x(high, low);
+ISOGI_VOL__AVX512 ISOGI_VOL__INLINE __m256i isogi_vol__load_each(const void *at) {
+    int64_t value;
+    memcpy(&value, at, sizeof value);
+    return _mm256_set1_epi64x(value);
+}
+
+/* Loads that repeat a number need no shuffle, and any port blends. */
+ISOGI_VOL__AVX512 ISOGI_VOL__INLINE __m256i isogi_vol__load_four(const char *const *at, size_t offset) {
+    const __m256i low = _mm256_blend_epi32(isogi_vol__load_each(at[0] + offset), isogi_vol__load_each(at[1] + offset), 0xcc);
+    const __m256i high = _mm256_blend_epi32(isogi_vol__load_each(at[2] + offset), isogi_vol__load_each(at[3] + offset), 0xcc);
+    return _mm256_blend_epi32(low, high, 0xf0);
 }
 
 /* Numbers of eight bytes at eight places. */
 ISOGI_VOL__AVX512 ISOGI_VOL__INLINE __m512i isogi_vol__load_eight(const char *const at[8], size_t offset) {
-    const __m256i low = _mm256_setr_m128i(isogi_vol__load_two(at[0] + offset, at[1] + offset),
-                                          isogi_vol__load_two(at[2] + offset, at[3] + offset));
-    const __m256i high = _mm256_setr_m128i(isogi_vol__load_two(at[4] + offset, at[5] + offset),
-                                           isogi_vol__load_two(at[6] + offset, at[7] + offset));
+    const __m256i low = isogi_vol__load_four(at, offset), high = isogi_vol__load_four(at + 4, offset);
     return _mm512_inserti64x4(_mm512_castsi256_si512(low), high, 1);
 }
 
@@ -5015,7 +5026,7 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE void isogi_vol__put8(const isogi_vol__spots 
                             : k == 2 ? _mm512_extracti64x2_epi64(value, 2)
                                      : _mm512_extracti64x2_epi64(value, 3);
         _mm_storel_epi64((__m128i *)(void *)(spots->at[2 * k] + row), two);
-        _mm_storel_epi64((__m128i *)(void *)(spots->at[2 * k + 1] + row), _mm_unpackhi_epi64(two, two));
+        _mm_storeh_pi((__m64 *)(void *)(spots->at[2 * k + 1] + row), _mm_castsi128_ps(two));
     }
 }
 
