@@ -370,7 +370,8 @@ typedef struct isogi_dvr isogi_dvr;
 /* Which place along a ray is its depth. */
 typedef enum isogi_depth_kind {
     ISOGI_DEPTH_HALF = 0, /* where half of the pixel's final opacity is reached: what stands for a surface among rasterized geometry */
-    ISOGI_DEPTH_FIRST     /* where opacity begins (a 2^-40th of the final one): geometry before it is not covered by anything */
+    ISOGI_DEPTH_FIRST     /* where opacity begins (a 2^-40th of the final one): geometry before it is not covered by anything; of rays that
+                             are sampled up to a step too far, of exact ones (data space, or a bound) right to rounding */
 } isogi_depth_kind;
 
 /* A pinhole camera. width x height pixels, row 0 on top. */
