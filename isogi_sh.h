@@ -480,7 +480,8 @@ static isogi_sh__unit isogi_sh__normalise(double x, double y, double z) {
    each l > m the factors a_l, -a_l / a_{l-1} of the recursion.
    columns: the same of m = 0; then for each m > 0 polynomials of l = m .. m + 4 and factors of a recursion over even and odd l - m: see
    NAME_column of ISOGI_SH__DEFINE_EVAL.
-   polynomials: for m = 0 .. 10, l = m .. 10 those of isogi_sh__eval_f8_low and its like, the highest coefficient first.
+   polynomials: for m = 0 .. 10, l = m .. 10 those of isogi_sh__eval_f8_low and its like, the highest coefficient first; then for
+   m = 0 .. 4, l = m + 6 .. 10 the factors of a recursion over even and odd l - m: see NAME_function of ISOGI_SH__DEFINE_ELEVEN.
    turn: for l = 1 .. 15, n = 0 .. l, m = n .. l the entries of a quarter turn about y, see isogi_sh__turn_y.
    turn_columns: for l = 1 .. 15, m = 0 .. l all entries (n, m) of it, those of even n, then those of odd n.
    latitudes: for m = 0 .. 4, l = m .. 4 the values q_l^m sin^m at 7 Legendre nodes (and an empty lane); pi times their weights. */
@@ -904,7 +905,7 @@ static const double isogi_sh__columns_f64[603] = {
     -50.389304841602112, 0.58592214932095488, 0.90448214509349101, 5.9310860627793698, 28.466565171920621,
     -0.66201314353303775, 115.26445422597175, -7.6842969483981172, 416.9519730739766, -53.227911456252329, 0.5914212384028037,
 };
-static const float isogi_sh__polynomials_f32[161] = {
+static const float isogi_sh__polynomials_f32[206] = {
     0.282094806f, 0.488602519f, 0.473087341f, 0.157695785f, 0.932940841f, -0.186588168f, 0.925623536f, 0.264463872f,
     -0.343803018f, 1.84196758f, -0.409326136f, -0.497038871f, 1.83556068f, 0.500607491f, -1.16808414f, -0.150976852f,
     3.66174436f, -0.84501791f, -1.92049527f, 0.1963173f, 3.6545856f, 0.974556148f, -3.2610147f, -0.552021325f, 0.347001046f,
@@ -923,9 +924,14 @@ static const float isogi_sh__polynomials_f32[161] = {
     3.01867175f, 10.3567886f, 8.22450829f, 0.830066144f, 23.8880615f, 10.6867647f, -0.984550536f, 0.683184087f, 2.64596057f,
     3.99249578f, 2.46203899f, 10.6964455f, 4.247118f, 13.3538322f, 11.5967493f, 1.68214881f, 0.707162738f, 2.91570663f,
     4.6316967f, 2.92886686f, 12.955121f, 5.62524986f, 0.728926659f, 3.17731762f, 5.2889061f, 3.4099524f, 0.74890095f,
-    3.43189526f, 0.767395139f,
+    3.43189526f, 0.767395139f, 1.98305321f, -0.0257539377f, -1.01354098f, 1.98795271f, -0.0169910491f, -1.006881f,
+    1.99099135f, -0.0120666139f, -1.00400305f, 1.99300718f, -0.00901813153f, -1.00254261f, 1.9944135f, -0.00699794199f,
+    -1.00171876f, 2.03704524f, 0.0522319302f, -0.978800237f, 2.02752638f, 0.0368641168f, -0.987757921f, 2.02127814f,
+    0.0274381656f, -0.9922598f, 2.01694989f, 0.0212310515f, -0.99478358f, 2.14573216f, -0.3413665f, -0.934984744f,
+    2.11115623f, -0.384497911f, -0.959502876f, 2.08774161f, -0.412054241f, -0.972973943f, 2.28030944f, -0.208942369f,
+    -0.897532761f, 2.21753645f, -0.28205508f, -0.932877719f, 2.42918944f, -0.0703186393f, -0.867124736f,
 };
-static const double isogi_sh__polynomials_f64[161] = {
+static const double isogi_sh__polynomials_f64[206] = {
     0.28209479177387814, 0.48860251190291992, 0.47308734787877998, 0.15769578262625999, 0.9329408314752885,
     -0.1865881662950577, 0.92562353550803766, 0.26446386728801075, -0.34380302747441399, 1.8419675786414216,
     -0.40932612858698258, -0.49703887042705031, 1.8355607154777709, 0.50060746785757382, -1.1680840916676722,
@@ -954,7 +960,16 @@ static const double isogi_sh__polynomials_f64[161] = {
     -0.98455054991281876, 0.6831841051919143, 2.6459606618019, 3.9924957454465693, 2.4620390430253845, 10.696445095454319,
     4.2471179055480377, 13.353832715031466, 11.596749463053641, 1.6821488191728877, 0.70716273252459616, 2.9157066406993195,
     4.6316965914244523, 2.9288669622242858, 12.955120656683151, 5.6252497588229469, 0.72892666017482988, 3.1773176489546975,
-    5.2889058608439745, 3.4099524629125626, 0.74890095185318828, 3.4318952998917145, 0.76739511822199002,
+    5.2889058608439745, 3.4099524629125626, 0.74890095185318828, 3.4318952998917145, 0.76739511822199002, 1.983053201505194,
+    -0.025753937681885639, -1.0135409740718178, 1.9879526609838891, -0.016991048384477684, -1.006881027645312,
+    1.9909913500872998, -0.012066614242953333, -1.0040029932510537, 1.9930071616269462, -0.0090181319530631045,
+    -1.0025425658982019, 1.9944134940340694, -0.0069979420843300682, -1.0017188140704978, 2.0370453042160284,
+    0.052231930877334062, -0.97880022814735546, 2.0275263488394164, 0.036864115433443936, -0.98775794018221952,
+    2.0212781788241014, 0.027438165323404092, -0.9922598062206599, 2.0169499550589056, 0.021231052158514795,
+    -0.99478359736899846, 2.1457321982639557, -0.34136648608744746, -0.93498476488130378, 2.1111562044246086,
+    -0.38449790600945927, -0.95950288575837794, 2.0877415483548898, -0.41205425296478088, -0.97297395734845937,
+    2.2803093224518043, -0.20894237004366079, -0.89753276503218704, 2.2175364593886497, -0.28205507597487212,
+    -0.93287769473694482, 2.4291894817946043, -0.070318642894054331, -0.86712474618349289,
 };
 static const double isogi_sh__turn_columns_f64[1495] = {
     -0.0, 1.0, -1.0, 1.0, -0.5, 0.8660254037844386, -0.0, 0.0, 1.0, -1.0, 0.8660254037844386, 0.5, -1.0, 0.0, -0.0,
@@ -1964,6 +1979,139 @@ ISOGI_SH__AVX512 ISOGI_SH__INLINE void isogi_sh__eval_d8_split(isogi_sh__d8 *u, 
     default: ISOGI_SH__PUT_EVEN(NAME, V, WIDTH, PUT, 0, 0);                                                                    \
     }
 
+/* Order 11 by itself, written out in full for sets of 32 registers: loads of constants and sums of addresses take as long there as products
+   do, so that two vectors of directions share the former, and all addresses are one of eleven, up or down by m strides. Columns go from
+   their first degree; the first six functions are the polynomials of above, each later one follows from those 2 and 4 before. */
+#define ISOGI_SH__HIDE(x) __asm__ volatile("" : "+r"(x)) /* what stands in x is not computed anew, nor its constants made ready elsewhere */
+#define ISOGI_SH__ROW(l) gap += step, at += gap; if (!fixed) ISOGI_SH__HIDE(at); h.row[l] = at
+#define ISOGI_SH__DEFINE_ELEVEN(NAME, TARGET, T, V, I, WIDTH, FMA, LESS, POLYNOMIALS, NEAR_POLE, SQUARE_ERROR)                  \
+    typedef struct NAME##_eleven {                                                                                             \
+        V x[2], y[2], z[2], v[2], c[2], s[2], zc[2], zs[2], p[11][2];                                                          \
+        char *row[11]; /* of each degree, where Y_l^0 goes */                                                                  \
+        ptrdiff_t up, down;                                                                                                    \
+        int fixed; /* the stride is known, and addresses are constants */                                                      \
+    } NAME##_eleven;                                                                                                           \
+    TARGET ISOGI_SH__INLINE void NAME##_put(const NAME##_eleven *h, int l, const V *p, const V *c, const V *s, int two) {      \
+        *(V *)(void *)(h->row[l] + h->up) = p[0] * c[0], *(V *)(void *)(h->row[l] + h->down) = p[0] * s[0];                    \
+        if (!two) return;                                                                                                      \
+        *(V *)(void *)(h->row[l] + h->up + WIDTH * sizeof(T)) = p[1] * c[1];                                                   \
+        *(V *)(void *)(h->row[l] + h->down + WIDTH * sizeof(T)) = p[1] * s[1];                                                 \
+    }                                                                                                                          \
+    TARGET ISOGI_SH__INLINE void NAME##_term(V *p, const V *v, T term, int two) {                                              \
+        V next = NAME##_splat(term);                                                                                           \
+        p[0] = FMA(p[0], v[0], next);                                                                                          \
+        if (two) p[1] = FMA(p[1], v[1], next);                                                                                 \
+    }                                                                                                                          \
+    /* degree m + i of column m; t: polynomials of this column, step: factors of its recursion */                              \
+    TARGET ISOGI_SH__INLINE void NAME##_function(NAME##_eleven *h, const T *t, const T *step, int m, int i, int two) {         \
+        V *p = h->p[i], q[2];                                                                                                  \
+        if (m + i > 10) return;                                                                                                \
+        if (i < 6) {                                                                                                           \
+            t += (i + 1) * (i + 1) / 4;                                                                                        \
+            p[0] = p[1] = NAME##_splat(t[0]);                                                                                  \
+            if (i > 1) NAME##_term(p, h->v, t[1], two);                                                                        \
+            if (i > 3) NAME##_term(p, h->v, t[2], two);                                                                        \
+        } else {                                                                                                               \
+            V a = NAME##_splat(step[3 * i - 18]), b = NAME##_splat(step[3 * i - 17]), c = NAME##_splat(step[3 * i - 16]);      \
+            p[0] = FMA(FMA(h->v[0], a, b), h->p[i - 2][0], c * h->p[i - 4][0]);                                                \
+            if (two) p[1] = FMA(FMA(h->v[1], a, b), h->p[i - 2][1], c * h->p[i - 4][1]);                                       \
+        }                                                                                                                      \
+        if ((i & 1) && m > 0 && m < 8) {                                                                                       \
+            NAME##_put(h, m + i, p, h->zc, h->zs, two);                                                                        \
+            return;                                                                                                            \
+        }                                                                                                                      \
+        q[0] = p[0], q[1] = p[1];                                                                                              \
+        if (i & 1) q[0] *= h->z[0];                                                                                            \
+        if ((i & 1) && two) q[1] *= h->z[1];                                                                                   \
+        if (m) {                                                                                                               \
+            NAME##_put(h, m + i, q, h->c, h->s, two);                                                                          \
+            return;                                                                                                            \
+        }                                                                                                                      \
+        *(V *)(void *)h->row[i] = q[0];                                                                                        \
+        if (two) *(V *)(void *)(h->row[i] + WIDTH * sizeof(T)) = q[1];                                                         \
+    }                                                                                                                          \
+    TARGET ISOGI_SH__INLINE void NAME##_ready(NAME##_eleven *h, int m, int k) { /* (x + i y)^m and that times z */             \
+        V zero = {0}, before = h->c[k];                                                                                        \
+        if (m > 1) h->c[k] = FMA(h->x[k], h->c[k], -(h->y[k] * h->s[k])), h->s[k] = FMA(h->x[k], h->s[k], h->y[k] * before);   \
+        if (m == 2) h->v[k] = FMA(h->z[k] + h->z[k], h->z[k], zero - (T)0.75);                                                 \
+        if (m < 8) h->zc[k] = h->z[k] * h->c[k], h->zs[k] = h->z[k] * h->s[k];                                                 \
+    }                                                                                                                          \
+    TARGET ISOGI_SH__INLINE void NAME##_eleventh(NAME##_eleven *h, const T *t, const T *step, ptrdiff_t by, int m, int two) {  \
+        if (m) {                                                                                                               \
+            ptrdiff_t up = h->up + by, down = h->down - by;                                                                    \
+            if (!h->fixed) ISOGI_SH__HIDE(up);                                                                                 \
+            if (!h->fixed) ISOGI_SH__HIDE(down);                                                                               \
+            h->up = up, h->down = down;                                                                                        \
+            NAME##_ready(h, m, 0);                                                                                             \
+            if (two) NAME##_ready(h, m, 1);                                                                                    \
+        }                                                                                                                      \
+        NAME##_function(h, t, step, m, 0, two), NAME##_function(h, t, step, m, 1, two);                                        \
+        NAME##_function(h, t, step, m, 2, two), NAME##_function(h, t, step, m, 3, two);                                        \
+        NAME##_function(h, t, step, m, 4, two), NAME##_function(h, t, step, m, 5, two);                                        \
+        NAME##_function(h, t, step, m, 6, two), NAME##_function(h, t, step, m, 7, two);                                        \
+        NAME##_function(h, t, step, m, 8, two), NAME##_function(h, t, step, m, 9, two);                                        \
+        NAME##_function(h, t, step, m, 10, two);                                                                               \
+    }                                                                                                                          \
+    TARGET ISOGI_SH__INLINE int NAME##_all_eleven(T *out, size_t stride, const V *u, const V *other, int two, int fixed) {     \
+        NAME##_eleven h;                                                                                                       \
+        V r, q, zero = {0};                                                                                                    \
+        const T *t = POLYNOMIALS;                                                                                              \
+        char *at = (char *)out;                                                                                                \
+        ptrdiff_t by = (ptrdiff_t)(stride * sizeof(T)), step, gap = 0;                                                         \
+        h.x[0] = h.c[0] = u[0], h.y[0] = h.s[0] = u[1], h.z[0] = u[2], h.up = h.down = 0, h.row[0] = at, h.fixed = fixed;      \
+        h.x[1] = h.c[1] = other[0], h.y[1] = h.s[1] = other[1], h.z[1] = other[2];                                             \
+        r = FMA(h.x[0], h.x[0], h.y[0] * h.y[0]), q = FMA(h.x[1], h.x[1], h.y[1] * h.y[1]);                                    \
+        h.v[0] = FMA(h.z[0], h.z[0], -r), h.v[1] = FMA(h.z[1], h.z[1], -q);                                                    \
+        if (two) r *= q; /* neither is more than 1 */                                                                          \
+        if (!LESS((I)(zero + (T)NEAR_POLE), (I)r)) return 0;                                                                   \
+        ISOGI_SH__HIDE(t);                                                                                                     \
+        if (!fixed) ISOGI_SH__HIDE(by);                                                                                        \
+        step = 2 * by;                                                                                                         \
+        ISOGI_SH__ROW(1); ISOGI_SH__ROW(2); ISOGI_SH__ROW(3); ISOGI_SH__ROW(4); ISOGI_SH__ROW(5);                              \
+        ISOGI_SH__ROW(6); ISOGI_SH__ROW(7); ISOGI_SH__ROW(8); ISOGI_SH__ROW(9); ISOGI_SH__ROW(10);                             \
+        NAME##_eleventh(&h, t, t + 161, by, 0, two), NAME##_eleventh(&h, t + 36, t + 176, by, 1, two);                         \
+        NAME##_eleventh(&h, t + 66, t + 188, by, 2, two), NAME##_eleventh(&h, t + 91, t + 197, by, 3, two);                    \
+        NAME##_eleventh(&h, t + 111, t + 203, by, 4, two), NAME##_eleventh(&h, t + 127, t, by, 5, two);                        \
+        NAME##_eleventh(&h, t + 139, t, by, 6, two), NAME##_eleventh(&h, t + 148, t, by, 7, two);                              \
+        NAME##_eleventh(&h, t + 154, t, by, 8, two), NAME##_eleventh(&h, t + 158, t, by, 9, two);                              \
+        NAME##_eleventh(&h, t + 160, t, by, 10, two);                                                                          \
+        return 1;                                                                                                              \
+    }                                                                                                                          \
+    TARGET ISOGI_SH__APART int NAME##_eleven_rows(T *out, const V *u) { return NAME##_all_eleven(out, WIDTH, u, u, 0, 1); }    \
+    TARGET ISOGI_SH__APART int NAME##_eleven_one(T *out, size_t stride, const V *u) {                                          \
+        return NAME##_all_eleven(out, stride, u, u, 0, 0);                                                                     \
+    }                                                                                                                          \
+    TARGET ISOGI_SH__APART void NAME##_low(T *out, size_t stride, int order, const V *u);                                      \
+    /* two vectors with lengths to be corrected by roots, or near a pole; 0 if out of range */                                 \
+    TARGET ISOGI_SH__APART int NAME##_eleven_apart(T *out, size_t stride, const T *x, const T *y, const T *z) {                \
+        V u[8];                                                                                                                \
+        if (!NAME##_load(u, x, y, z) || !NAME##_load(u + 4, x + WIDTH, y + WIDTH, z + WIDTH)) return 0;                        \
+        NAME##_low(out, stride, 11, u), NAME##_low(out + WIDTH, stride, 11, u + 4);                                            \
+        return 1;                                                                                                              \
+    }                                                                                                                          \
+    /* two vectors at a time while there are as many: how many directions are done, fewer before lengths out of range */       \
+    TARGET ISOGI_SH__APART size_t NAME##_eleven_two(T *out, size_t stride, const T *x, const T *y, const T *z, size_t count) { \
+        size_t i;                                                                                                              \
+        for (i = 0; i + 2 * WIDTH <= count; i += 2 * WIDTH) {                                                                  \
+            V zero = {0}, u[4], other[4], e, f;                                                                                \
+            u[0] = *(const V *)(x + i), u[1] = *(const V *)(y + i), u[2] = *(const V *)(z + i);                                \
+            other[0] = *(const V *)(x + i + WIDTH), other[1] = *(const V *)(y + i + WIDTH), other[2] = *(const V *)(z + i + WIDTH); \
+            e = NAME##_error(u), f = NAME##_error(other);                                                                      \
+            if (LESS((I)FMA(e, e, f * f), (I)(zero + (T)SQUARE_ERROR))) {                                                      \
+                NAME##_correct(u, e), NAME##_correct(other, f);                                                                \
+                if (NAME##_all_eleven(out + i, stride, u, other, 1, 0)) continue;                                              \
+            }                                                                                                                  \
+            if (!NAME##_eleven_apart(out + i, stride, x + i, y + i, z + i)) break;                                             \
+        }                                                                                                                      \
+        return i;                                                                                                              \
+    }
+#define ISOGI_SH__DEFINE_NO_ELEVEN(NAME, TARGET, T, V, I, WIDTH, FMA, LESS, POLYNOMIALS, NEAR_POLE, SQUARE_ERROR)               \
+    TARGET ISOGI_SH__INLINE int NAME##_eleven_rows(T *out, const V *u) { return (void)out, (void)u, 0; }                       \
+    TARGET ISOGI_SH__INLINE int NAME##_eleven_one(T *out, size_t stride, const V *u) { return (void)out, (void)stride, (void)u, 0; } \
+    TARGET ISOGI_SH__INLINE size_t NAME##_eleven_two(T *out, size_t stride, const T *x, const T *y, const T *z, size_t count) { \
+        return (void)out, (void)stride, (void)x, (void)y, (void)z, (void)count, (size_t)0;                                     \
+    }
+
 /* Defines NAME(out, stride, order, x, y, z, count): all functions at the first directions, that of index i at out + stride i; WIDTH at a
    time. It returns how many directions are done, and stops before a block whose lengths are out of range. NAME_rows: the same with the
    functions of a direction together. */
@@ -2040,10 +2188,14 @@ ISOGI_SH__AVX512 ISOGI_SH__INLINE void isogi_sh__eval_d8_split(isogi_sh__d8 *u, 
             ISOGI_SH__POLYNOMIALS(NAME, V, WIDTH, ISOGI_SH__PUT_PAIR)                                                          \
         }                                                                                                                      \
     }                                                                                                                          \
-    TARGET ISOGI_SH__APART void NAME##_low(T *out, size_t stride, int order, const V *u) { NAME##_columns(out, stride, order, u, u, 0); } \
-    TARGET ISOGI_SH__APART void NAME##_low_rows(T *out, int order, const V *u) { NAME##_columns(out, WIDTH, order, u, u, 0); } \
+    TARGET ISOGI_SH__APART void NAME##_low(T *out, size_t stride, int order, const V *u) {                                     \
+        if (order < 11 || !NAME##_eleven_one(out, stride, u)) NAME##_columns(out, stride, order, u, u, 0);                     \
+    }                                                                                                                          \
+    TARGET ISOGI_SH__APART void NAME##_low_rows(T *out, int order, const V *u) {                                               \
+        if (order < 11 || !NAME##_eleven_rows(out, u)) NAME##_columns(out, WIDTH, order, u, u, 0);                             \
+    }                                                                                                                          \
     TARGET ISOGI_SH__INLINE void NAME##_low_two(T *out, size_t stride, int order, const V *u) {                                \
-        NAME##_columns(out, stride, order, u, u + 4, 1);                                                                       \
+        NAME##_columns(out, stride, order, u, u + 4, 1);                                                                        \
     }                                                                                                                          \
     /* degrees from SPLIT on */                                                                                                \
     TARGET static void NAME##_rest(T *out, int order, const V *u, V *state) {                                                  \
@@ -2100,7 +2252,10 @@ ISOGI_SH__AVX512 ISOGI_SH__INLINE void isogi_sh__eval_d8_split(isogi_sh__d8 *u, 
         size_t begin = 0;                                                                                                      \
         if (count < WIDTH) return 0;                                                                                           \
         if (order == 5) return NAME##_blocks5(out, stride, x, y, z, count);                                                    \
-        if (order <= ISOGI_SH__LOW_ORDER && count >= 2 * WIDTH) begin = NAME##_pairs(out, stride, order, x, y, z, count);      \
+        if (order == 11) begin = NAME##_eleven_two(out, stride, x, y, z, count);                                               \
+        if (begin == count) return count;                                                                                      \
+        if (order <= ISOGI_SH__LOW_ORDER && count >= 2 * WIDTH + begin)                                                        \
+            begin += NAME##_pairs(out + begin, stride, order, x + begin, y + begin, z + begin, count - begin);                 \
         return begin < count ? NAME##_blocks(out, stride, order, x, y, z, count, begin) : count;                               \
     }                                                                                                                          \
     /* `count` rows, 9 or more, for as many directions as are lanes: by 8 or TILE, after one alone,                            \
@@ -2167,20 +2322,28 @@ ISOGI_SH__AVX512 ISOGI_SH__INLINE void isogi_sh__eval_d8_split(isogi_sh__d8 *u, 
         }                                                                                                                      \
     }
 
-#define ISOGI_SH__DEFINE_F32(NAME, TARGET, V, I, WIDTH, SUFFIX, TURN, TILE)                                                              \
+#define ISOGI_SH__DEFINE_F32(NAME, TARGET, V, I, WIDTH, SUFFIX, TURN, TILE, ELEVEN)                                                      \
     ISOGI_SH__DEFINE_EVAL(NAME, TARGET, float, V, I, WIDTH, ISOGI_SH__FMA_##SUFFIX, ISOGI_SH__REST_##SUFFIX, ISOGI_SH__LESS_##SUFFIX, \
                           isogi_sh__columns_f32, 1e-3, 1e-3, 1e-19, sqrtf)                                                           \
+    ELEVEN(NAME, TARGET, float, V, I, WIDTH, ISOGI_SH__FMA_##SUFFIX, ISOGI_SH__LESS_##SUFFIX, isogi_sh__polynomials_f32, 1e-7, \
+        1e-6) \
     ISOGI_SH__DEFINE_FUSED(NAME, TARGET, float, V, I, WIDTH, ISOGI_SH__FMA_##SUFFIX, ISOGI_SH__LESS_##SUFFIX, isogi_sh__polynomials_f32, \
         1e-3, TURN, TILE)
-#define ISOGI_SH__DEFINE_F64(NAME, TARGET, V, I, WIDTH, SUFFIX, TURN, TILE)                                                              \
+#define ISOGI_SH__DEFINE_F64(NAME, TARGET, V, I, WIDTH, SUFFIX, TURN, TILE, ELEVEN)                                                      \
     ISOGI_SH__DEFINE_EVAL(NAME, TARGET, double, V, I, WIDTH, ISOGI_SH__FMA_##SUFFIX, ISOGI_SH__REST_##SUFFIX, ISOGI_SH__LESS_##SUFFIX, \
                           isogi_sh__columns_f64, 1e-6, 1e-25, 1e-200, sqrt)                                                         \
+    ELEVEN(NAME, TARGET, double, V, I, WIDTH, ISOGI_SH__FMA_##SUFFIX, ISOGI_SH__LESS_##SUFFIX, isogi_sh__polynomials_f64, 1e-25, \
+        1e-12) \
     ISOGI_SH__DEFINE_FUSED(NAME, TARGET, double, V, I, WIDTH, ISOGI_SH__FMA_##SUFFIX, ISOGI_SH__LESS_##SUFFIX, isogi_sh__polynomials_f64, \
         1e-25, TURN, TILE)
-ISOGI_SH__DEFINE_F32(isogi_sh__eval_f8, ISOGI_SH__AVX2, isogi_sh__f8, isogi_sh__i8, 8, F8, isogi_sh__transpose_f8, 8)
-ISOGI_SH__DEFINE_F64(isogi_sh__eval_d4, ISOGI_SH__AVX2, isogi_sh__d4, isogi_sh__l4, 4, D4, isogi_sh__transpose_d4, 8)
-ISOGI_SH__DEFINE_F32(isogi_sh__eval_f16, ISOGI_SH__AVX512, isogi_sh__f16, isogi_sh__i16, 16, F16, isogi_sh__transpose_f16, 16)
-ISOGI_SH__DEFINE_F64(isogi_sh__eval_d8, ISOGI_SH__AVX512, isogi_sh__d8, isogi_sh__l8, 8, D8, isogi_sh__transpose_d8, 8)
+ISOGI_SH__DEFINE_F32(isogi_sh__eval_f8, ISOGI_SH__AVX2, isogi_sh__f8, isogi_sh__i8, 8, F8, isogi_sh__transpose_f8, 8,
+                     ISOGI_SH__DEFINE_NO_ELEVEN)
+ISOGI_SH__DEFINE_F64(isogi_sh__eval_d4, ISOGI_SH__AVX2, isogi_sh__d4, isogi_sh__l4, 4, D4, isogi_sh__transpose_d4, 8,
+                     ISOGI_SH__DEFINE_NO_ELEVEN)
+ISOGI_SH__DEFINE_F32(isogi_sh__eval_f16, ISOGI_SH__AVX512, isogi_sh__f16, isogi_sh__i16, 16, F16, isogi_sh__transpose_f16, 16,
+                     ISOGI_SH__DEFINE_ELEVEN)
+ISOGI_SH__DEFINE_F64(isogi_sh__eval_d8, ISOGI_SH__AVX512, isogi_sh__d8, isogi_sh__l8, 8, D8, isogi_sh__transpose_d8, 8,
+                     ISOGI_SH__DEFINE_ELEVEN)
 
 /* 8 single-channel sums */
 ISOGI_SH__AVX2 static int isogi_sh__sum_rows_f32(float *value, const float *c, int order, int channels, const float (*direction)[3]) {
@@ -5988,6 +6151,10 @@ ISOGI_API isogi_result isogi_sh_fit_directional(float direction[3], float rgb[3]
 #undef ISOGI_SH__DEFINE_EVAL
 #undef ISOGI_SH__DEFINE_FUSED
 #undef ISOGI_SH__LOW_ORDER
+#undef ISOGI_SH__HIDE
+#undef ISOGI_SH__ROW
+#undef ISOGI_SH__DEFINE_ELEVEN
+#undef ISOGI_SH__DEFINE_NO_ELEVEN
 #undef ISOGI_SH__POLYNOMIALS
 #undef ISOGI_SH__PUT_PAIR
 #undef ISOGI_SH__PUT_BOTH

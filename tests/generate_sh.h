@@ -78,8 +78,8 @@ static int generate_turn_columns(quad *v) {
     return count;
 }
 
-/* Y_l^m = q_l^m (c_m, s_m) for l < 11: coefficients of q in v = 2 z^2 - 1 for m = 1, in v + 1/4 for m > 1, the highest first, without the
-   factor z of an odd q; m outer. */
+/* Y_l^m = q_l^m (c_m, s_m) for l < 11: coefficients of q in v = 2 z^2 - 1 for m < 2, in v + 1/4 for m > 1, the highest first, without the
+   factor z of an odd q; m outer. After them for each m and l > m + 5 A, B, C of q_l = (A v + B) q_{l-2} + C q_{l-4}, v as above. */
 static int generate_polynomials(quad *v) {
     static quad factors[1024];
     int count = 0;
@@ -103,6 +103,14 @@ static int generate_polynomials(quad *v) {
             for (int k = degree; k >= 0; k--) v[count++] = shifted[k];
         }
     }
+    for (int m = 0; m < GENERATE_LOW; m++)
+        for (int l = m + 6; l < GENERATE_LOW; l++) {
+            quad a[4]; /* of l, l - 1, .. */
+            for (int k = 0; k < 4; k++) a[k] = quad_sqrt((quad)(4 * (l - k) * (l - k) - 1) / (quad)((l - k) * (l - k) - m * m));
+            v[count++] = a[0] * a[1] / 2; /* z^2 is (1 + v) / 2, or (3/4 + v) / 2 */
+            v[count++] = a[0] * a[1] * (m < 2 ? 1 : (quad)3 / 4) / 2 - a[0] * a[1] / (a[2] * a[2]) - a[0] / a[1];
+            v[count++] = -a[0] * a[1] / (a[2] * a[3]);
+        }
     return count;
 }
 
