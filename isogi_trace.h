@@ -464,8 +464,9 @@ ISOGI_API size_t isogi_trace_memory(const isogi_trace *trace); /* bytes that the
 #define ISOGI_TRACE__WAVE 32         /* paths that are traced together */
 #define ISOGI_TRACE__BATCH 4096      /* texels in one parallel run, */
 #define ISOGI_TRACE__TASKS 256       /* in at most so many tasks */
-#define ISOGI_TRACE__POINTS 65536    /* that are requested together, at most, */
+#define ISOGI_TRACE__POINTS 32768    /* that are requested together, at most, */
 #define ISOGI_TRACE__TASK_POINTS 2048 /* and that one task looks through */
+#define ISOGI_TRACE__ON_FACE 0xffffffffu /* in place of the number of a cell */
 #define ISOGI_TRACE__TASK 4          /* points of the caller's own in a task */
 #define ISOGI_TRACE__MAX_DEPTH 10000 /* of a path, so that nothing hangs */
 #define ISOGI_TRACE__MAX_ORDER 6
@@ -2877,6 +2878,16 @@ static void isogi_trace__learn(isogi_trace *t, isogi_trace__brick *brick, uint32
     t->counters.texels_skipped += state == ISOGI_TRACE__NO_SURFACE;
 }
 
+/* A texel is to be computed: its brick goes on the list. */
+static isogi_result isogi_trace__want_slot(isogi_trace *t, size_t index, uint32_t slot) {
+    isogi_trace__brick *brick = t->bricks[index];
+    isogi_result result = brick->queued ? ISOGI_OK : isogi_trace__queue_reserve(t);
+    if (result != ISOGI_OK) return result;
+    brick->state[slot] = ISOGI_TRACE__WANTED, t->wanted++;
+    if (!brick->queued) t->queue[t->queue_count++] = index, brick->queued = 1;
+    return ISOGI_OK;
+}
+
 /* Classifies a texel and puts it on the list if it is to be computed. Whatever the interval of isovalues, but so that no later lookup
    finds another answer: nearest = 1: it is only looked at; 2: it has been found to be the nearest. */
 static isogi_result isogi_trace__want(isogi_trace *t, const size_t texel[3], int nearest) {
@@ -2884,8 +2895,6 @@ static isogi_result isogi_trace__want(isogi_trace *t, const size_t texel[3], int
     int state;
     size_t index = isogi_trace__brick_of(t, texel, &slot);
     isogi_trace__brick *brick = t->bricks[index];
-    isogi_result result = isogi_trace__queue_reserve(t);
-    if (result != ISOGI_OK) return result;
     if (!brick) brick = t->bricks[index] = isogi_trace__brick_new(t);
     if (!brick) return ISOGI_NO_MEMORY;
     if (brick->state[slot] == ISOGI_TRACE__UNKNOWN) isogi_trace__learn(t, brick, slot, isogi_trace__classify(t, texel, 0));
@@ -2896,10 +2905,7 @@ static isogi_result isogi_trace__want(isogi_trace *t, const size_t texel[3], int
     }
     if (nearest == 1 || (brick->state[slot] != ISOGI_TRACE__READABLE && !(nearest && brick->state[slot] == ISOGI_TRACE__BEYOND)))
         return ISOGI_OK;
-    brick->state[slot] = ISOGI_TRACE__WANTED;
-    t->wanted++;
-    if (!brick->queued) t->queue[t->queue_count++] = index, brick->queued = 1;
-    return ISOGI_OK;
+    return isogi_trace__want_slot(t, index, slot);
 }
 
 /* All texels around the point lack a surface: the lookup will read the nearest that has one. */
@@ -2932,6 +2938,7 @@ typedef struct isogi_trace__asked {
     const float (*points)[3];
     size_t count;
     uint64_t again[ISOGI_TRACE__POINTS / 64]; /* bits of those */
+    uint32_t (*cells)[3]; /* of the others that lie on no face, where lookups read the corners; else the first is ON_FACE */
     int lacking; /* around some point no texel had a surface: of others the nearest that has one may be another */
 } isogi_trace__asked;
 
@@ -2994,6 +3001,7 @@ static void isogi_trace__again_task(void *arg, size_t task) {
         double local[3];
         int a, taps;
         isogi_trace__cell(t, asked->points[i], cell, local);
+        asked->cells[i][0] = ISOGI_TRACE__ON_FACE;
         if (!isogi_trace__inner(local)) continue;
         kept = known[(cell[0] + 7 * cell[1] + 61 * cell[2]) & 255];
         if (kept[0] == cell[0] && kept[1] == cell[1] && kept[2] == cell[2]) {
@@ -3002,7 +3010,17 @@ static void isogi_trace__again_task(void *arg, size_t task) {
         }
         taps = t->scene.desc.lookup == ISOGI_TRACE_BSPLINE ? isogi_trace__corners(t, cell, local, 1, tap, brick, slot) : 8;
         for (a = 0; a < 3 && taps == isogi_trace__tap_count(t); a++) kept[a] = (uint32_t)cell[a];
+        for (a = 0; a < 3 && t->scene.desc.lookup != ISOGI_TRACE_BSPLINE; a++) asked->cells[i][a] = (uint32_t)cell[a];
     }
+}
+
+/* The texels that the lookup at point i reads, and its cell and place in it; of a cell that is kept any place within: all read the same. */
+static int isogi_trace__asked_taps(const isogi_trace *t, const isogi_trace__asked *asked, size_t i, size_t cell[3], double local[3],
+                                   uint8_t *tap, size_t *brick, uint32_t *slot) {
+    int a;
+    if (asked->cells[i][0] == ISOGI_TRACE__ON_FACE) isogi_trace__cell(t, asked->points[i], cell, local);
+    else for (a = 0; a < 3; a++) cell[a] = asked->cells[i][a], local[a] = 0.5;
+    return isogi_trace__corners(t, cell, local, isogi_trace__inner(local), tap, brick, slot);
 }
 
 /* Classifies the texels that lookups at the points from `first` on will read, as many as a batch holds, on all cores. *end: of these
@@ -3021,8 +3039,7 @@ static isogi_result isogi_trace__learn_points(isogi_trace *t, const isogi_trace_
         uint8_t tap[64];
         int k, taps;
         if (asked->again[i / 64] >> i % 64 & 1) continue;
-        isogi_trace__cell(t, asked->points[i], cell, local);
-        taps = isogi_trace__corners(t, cell, local, isogi_trace__inner(local), tap, brick, slot);
+        taps = isogi_trace__asked_taps(t, asked, i, cell, local, tap, brick, slot);
         for (k = 0; k < taps && result == ISOGI_OK; k++) {
             isogi_trace__ref *ref = &t->batch[job.count];
             if (!t->bricks[brick[k]]) t->bricks[brick[k]] = isogi_trace__brick_new(t);
@@ -3043,24 +3060,23 @@ static isogi_result isogi_trace__learn_points(isogi_trace *t, const isogi_trace_
 static isogi_result isogi_trace__want_points(isogi_trace *t, isogi_trace__asked *asked, size_t first, size_t end) {
     size_t i;
     for (i = first; i < end; i++) {
-        size_t cell[3], texel[3], brick[64];
+        size_t cell[3], brick[64];
         uint32_t slot[64];
         uint8_t tap[64];
         double local[3];
         isogi_result result = ISOGI_OK;
         int k, taps, lacking = 1;
         if (!asked->lacking && (asked->again[i / 64] >> i % 64 & 1)) continue;
-        isogi_trace__cell(t, asked->points[i], cell, local);
-        taps = isogi_trace__corners(t, cell, local, isogi_trace__inner(local), tap, brick, slot);
+        taps = isogi_trace__asked_taps(t, asked, i, cell, local, tap, brick, slot);
         for (k = 0; k < taps && result == ISOGI_OK; k++) {
-            if (t->bricks[brick[k]]->state[slot[k]] == ISOGI_TRACE__READABLE) {
-                isogi_trace__tap(t, cell, local, tap[k], texel);
-                result = isogi_trace__want(t, texel, 0);
-            }
+            if (t->bricks[brick[k]]->state[slot[k]] == ISOGI_TRACE__READABLE) result = isogi_trace__want_slot(t, brick[k], slot[k]);
             lacking = lacking && t->bricks[brick[k]]->state[slot[k]] == ISOGI_TRACE__NO_SURFACE;
         }
         asked->lacking |= lacking;
-        if (result == ISOGI_OK && lacking) result = isogi_trace__want_nearest(t, cell, local);
+        if (result == ISOGI_OK && lacking) {
+            isogi_trace__cell(t, asked->points[i], cell, local);
+            result = isogi_trace__want_nearest(t, cell, local);
+        }
         if (result != ISOGI_OK) return result;
     }
     return ISOGI_OK;
@@ -3070,11 +3086,13 @@ ISOGI_API isogi_result isogi_trace_request(isogi_trace *trace, const float (*poi
     isogi_result result = ISOGI_OK;
     isogi_trace__asked asked;
     isogi_context silent;
-    size_t first, i, end;
+    size_t first, i, end, most = count < ISOGI_TRACE__POINTS ? count : ISOGI_TRACE__POINTS;
     if (!trace || (count && !points)) return ISOGI_INVALID;
-    if (!trace->scene.desc.lazy || trace->coarse) return ISOGI_OK;
+    if (!trace->scene.desc.lazy || trace->coarse || !count) return ISOGI_OK;
     silent = trace->context, silent.progress = NULL;
     asked.trace = trace, asked.lacking = 0;
+    asked.cells = (uint32_t(*)[3])isogi_allocate(&trace->context, most, sizeof *asked.cells);
+    if (!asked.cells) return ISOGI_NO_MEMORY;
     for (first = 0; first < count && result == ISOGI_OK; first += asked.count) {
         asked.points = points + first, asked.count = count - first < ISOGI_TRACE__POINTS ? count - first : ISOGI_TRACE__POINTS;
         isogi_parallel(&silent, (asked.count - 1) / ISOGI_TRACE__TASK_POINTS + 1, isogi_trace__again_task, &asked, 0, 1);
@@ -3083,6 +3101,7 @@ ISOGI_API isogi_result isogi_trace_request(isogi_trace *trace, const float (*poi
             if (result == ISOGI_OK) result = isogi_trace__want_points(trace, &asked, i, end);
         }
     }
+    isogi_release(&trace->context, asked.cells, most, sizeof *asked.cells);
     return result;
 }
 
@@ -6804,6 +6823,7 @@ ISOGI_API isogi_result isogi_trace_gather_field(const isogi_trace_desc *desc, is
 #undef ISOGI_TRACE__PLACING
 #undef ISOGI_TRACE__POINTS
 #undef ISOGI_TRACE__TASK_POINTS
+#undef ISOGI_TRACE__ON_FACE
 #undef ISOGI_TRACE__WATCHED
 #endif /* ISOGI_TRACE_IMPLEMENTATION */
 
