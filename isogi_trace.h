@@ -477,7 +477,7 @@ ISOGI_API size_t isogi_trace_memory(const isogi_trace *trace); /* bytes that the
 #define ISOGI_TRACE__SPAN 512      /* of at most this many; */
 #define ISOGI_TRACE__PIECE_SPANS 128 /* spans in a piece, */
 #define ISOGI_TRACE__PIECES 129    /* in so many pieces at most: each but the last is full, by SPAN samples or by spans; */
-#define ISOGI_TRACE__CASTS 65      /* in so many tasks at most, of 3 pieces at most */
+#define ISOGI_TRACE__CASTS 49      /* in so many tasks at most */
 #define ISOGI_TRACE__HEADS 16384   /* chains of what is new in a batch; a power of two */
 #define ISOGI_TRACE__FLUSH 256     /* rays in one call */
 #define ISOGI_TRACE__SWEEP 256     /* nodes in a task that traces no rays */
@@ -3252,10 +3252,9 @@ typedef struct isogi_trace__guide {
     float hidden, reflected; /* share of rays that hit, and luminance of what was reflected there */
 } isogi_trace__guide;
 
-/* What passes read of a probe beside its values: albedo by channel, and 1 / samples. settled: whether the values (of either kind) stay. */
+/* What passes read of a probe beside its values: albedo by channel, and 1 / samples. */
 typedef struct isogi_trace__reflector {
     float albedo[3], one;
-    uint8_t settled[2];
 } isogi_trace__reflector;
 
 /* The next probe of a chain, number + 1, 0 = none; and of its own cell that part of the key which tells one chain from another. */
@@ -3274,7 +3273,8 @@ typedef struct isogi_trace__stage {
 
 /* Nodes that stay where they are once they are made. guides: of texels; reflectors, links: of probes. values: their four kinds (below), one
    after the other. heads: where chains of probes begin, number + 1, 0 = nowhere; NULL of texels. stages: in few bytes
-   what one thread goes through. where: of texels, 64 times the number of the brick, and the slot. */
+   what one thread goes through. settled: of probes, whether the values (of either kind, one after the other) stay.
+   where: of texels, 64 times the number of the brick, and the slot. */
 typedef struct isogi_trace__chunk {
     float *values;
     isogi_trace__node *nodes;
@@ -3283,6 +3283,7 @@ typedef struct isogi_trace__chunk {
     isogi_trace__link *links;
     uint32_t *heads;
     isogi_trace__stage *stages;
+    uint8_t *settled;
     size_t *where;
 } isogi_trace__chunk;
 
@@ -3365,6 +3366,7 @@ struct isogi_trace__feedback {
     int unpublished; /* nodes have changed since the light was worked out last */
     int phase;       /* of carrying the light over, */
     size_t carried;  /* tasks of it that are done, */
+    size_t sweeps;   /* and at work, */
     size_t segment, pass; /* texels' segment, pass over the probes */
     double before, middle; /* largest change by the pass before, and 500 passes before */
     int making;      /* nodes: 1 of every other texel along each axis, 2 of the others; 0 when they are made */
@@ -3430,6 +3432,11 @@ static isogi_trace__reflector *isogi_trace__reflector_at(const isogi_trace__set 
     return &s->chunks[i / ISOGI_TRACE__CHUNK].reflectors[i % ISOGI_TRACE__CHUNK];
 }
 
+/* Of the values of one kind, 0 or 1. */
+static uint8_t *isogi_trace__settled_at(const isogi_trace__set *s, size_t i, int out) {
+    return &s->chunks[i / ISOGI_TRACE__CHUNK].settled[(size_t)out * ISOGI_TRACE__CHUNK + i % ISOGI_TRACE__CHUNK];
+}
+
 static isogi_trace__link *isogi_trace__link_at(const isogi_trace__set *s, size_t i) {
     return &s->chunks[i / ISOGI_TRACE__CHUNK].links[i % ISOGI_TRACE__CHUNK];
 }
@@ -3456,6 +3463,7 @@ static void isogi_trace__chunk_free(const isogi_trace *t, isogi_trace__chunk *c)
     isogi_release(&t->context, c->values, (size_t)ISOGI_TRACE__KINDS * ISOGI_TRACE__CHUNK, (size_t)t->values * sizeof(float));
     isogi_release(&t->context, c->heads, ISOGI_TRACE__CHUNK, sizeof *c->heads);
     isogi_release(&t->context, c->stages, ISOGI_TRACE__CHUNK, sizeof *c->stages);
+    isogi_release(&t->context, c->settled, ISOGI_TRACE__CHUNK, 2 * sizeof *c->settled);
     isogi_release(&t->context, c->where, ISOGI_TRACE__CHUNK, sizeof *c->where);
 }
 
@@ -3504,8 +3512,9 @@ static isogi_result isogi_trace__set_reserve(const isogi_trace *t, isogi_trace__
         c.values = (float *)isogi_allocate(&t->context, (size_t)ISOGI_TRACE__KINDS * ISOGI_TRACE__CHUNK, (size_t)t->values * sizeof(float));
         c.heads = chains ? (uint32_t *)isogi_allocate(&t->context, ISOGI_TRACE__CHUNK, sizeof *c.heads) : NULL;
         c.stages = (isogi_trace__stage *)isogi_allocate(&t->context, ISOGI_TRACE__CHUNK, sizeof *c.stages);
+        c.settled = chains ? (uint8_t *)isogi_allocate(&t->context, ISOGI_TRACE__CHUNK, 2 * sizeof *c.settled) : NULL;
         c.where = chains ? NULL : (size_t *)isogi_allocate(&t->context, ISOGI_TRACE__CHUNK, sizeof *c.where);
-        if (!c.nodes || !c.values || !c.stages || !(chains ? c.reflectors && c.links && c.heads : c.guides && c.where)) {
+        if (!c.nodes || !c.values || !c.stages || !(chains ? c.reflectors && c.links && c.heads && c.settled : c.guides && c.where)) {
             isogi_trace__chunk_free(t, &c);
             return ISOGI_NO_MEMORY;
         }
@@ -4197,24 +4206,26 @@ static void isogi_trace__cast_piece(isogi_trace__cast *c, isogi_trace__piece *pi
         if (!c->span[k].nowhere && !c->span[k].first) isogi_trace__site_lights(&t->scene, &c->site[k], c->span[k].steady, c->counters);
 }
 
-/* Tasks of the batch: where it has more pieces than that the first take three, so that short ones come last. */
+/* Tasks of the batch. */
 static size_t isogi_trace__cast_tasks(const isogi_trace__feedback *f) {
     return f->piece_count < ISOGI_TRACE__CASTS ? f->piece_count : ISOGI_TRACE__CASTS;
 }
 
-static size_t isogi_trace__cast_first(const isogi_trace__feedback *f, size_t task) {
-    size_t more = f->piece_count - isogi_trace__cast_tasks(f);
-    return task + (2 * task < more ? 2 * task : more);
+/* Where a task begins that has a share of `count` things: the first tasks have most, since the memory that they work in stays in the
+   cache, the last ones least, so that all threads end together. */
+static size_t isogi_trace__portion(size_t count, size_t tasks, size_t task) {
+    const uint64_t left = tasks - task;
+    return count > tasks ? count - (size_t)((uint64_t)count * left * left / ((uint64_t)tasks * tasks)) : task;
 }
 
 static void isogi_trace__cast_task(void *arg, size_t task) {
     isogi_trace *t = (isogi_trace *)arg;
     isogi_trace__feedback *f = t->feedback;
     isogi_trace__cast *c = &f->casts[task];
-    size_t i, end = isogi_trace__cast_first(f, task + 1);
+    size_t tasks = isogi_trace__cast_tasks(f), i, end = isogi_trace__portion(f->piece_count, tasks, task + 1);
     c->trace = t, c->counters = &t->task_counters[task];
     memset(c->counters, 0, sizeof *c->counters);
-    for (i = isogi_trace__cast_first(f, task); i < end; i++) isogi_trace__cast_piece(c, &f->pieces[i]);
+    for (i = isogi_trace__portion(f->piece_count, tasks, task); i < end; i++) isogi_trace__cast_piece(c, &f->pieces[i]);
 }
 
 /* ---- a batch: filled, traced, taken over ---- */
@@ -4476,7 +4487,7 @@ static void isogi_trace__direct_task(void *arg, size_t task) {
             if (a < 3) r->albedo[a] = (float)isogi_trace__hit_albedo(t, n, (uint32_t)i, a);
         }
         r->one = n->samples ? 1.0f / (float)n->samples : 0;
-        r->settled[0] = r->settled[1] = 0;
+        *isogi_trace__settled_at(set, i, 0) = *isogi_trace__settled_at(set, i, 1) = 0;
     }
 }
 
@@ -4486,34 +4497,38 @@ static void isogi_trace__direct_task(void *arg, size_t task) {
 static void isogi_trace__pass_segment(isogi_trace__set *set, isogi_trace__segment *s, size_t values, size_t channels, int by_place,
                                       int watch) {
     const int out = set->out, from = ISOGI_TRACE__OUT_VALUES + out, to = ISOGI_TRACE__OUT_VALUES + 1 - out;
+    const size_t late = 8; /* entries ahead */
     size_t i, j, k, a, open = 0;
     double largest = 0, most = 0;
     for (j = 0; j < s->open; j++) {
         size_t node;
-        isogi_trace__reflector *r;
+        const isogi_trace__reflector *r;
         const float *bounce, *before;
         float *after;
         uint8_t settled = (uint8_t)watch;
         double sum[3 * ISOGI_TRACE__MAX_ORDER * ISOGI_TRACE__MAX_ORDER];
         i = s->order[j], node = s->node[i], r = isogi_trace__reflector_at(set, node);
         before = isogi_trace__values_at(set, node, from, values), after = isogi_trace__values_at(set, node, to, values);
-        if (r->settled[out]) {
+        if (j + late < s->open)
+            for (k = s->begin[s->order[j + late]]; k < s->begin[s->order[j + late] + 1]; k++)
+                ISOGI_TRACE__AHEAD(isogi_trace__values_at(set, s->probe[k], from, values));
+        if (*isogi_trace__settled_at(set, node, out)) {
             for (a = 0; a < values; a++) {
                 after[a] = before[a];
                 if (fabs((double)after[a]) > s->settled) s->settled = fabs((double)after[a]);
             }
-            r->settled[1 - out] = 1;
+            *isogi_trace__settled_at(set, node, 1 - out) = 1;
             continue;
         }
         bounce = isogi_trace__values_at(set, node, ISOGI_TRACE__BOUNCE_VALUES, values);
         for (a = 0; a < values; a++) sum[a] = 0;
         for (k = s->begin[i]; k < s->begin[i + 1]; k++) {
             const float *e = isogi_trace__values_at(set, s->probe[k], from, values);
-            const isogi_trace__reflector *met = isogi_trace__reflector_at(set, s->probe[k]);
-            if (watch) settled &= met->settled[out];
-            if (by_place)
+            if (watch) settled &= *isogi_trace__settled_at(set, s->probe[k], out);
+            if (by_place) {
+                const isogi_trace__reflector *met = isogi_trace__reflector_at(set, s->probe[k]);
                 for (a = 0; a < values; a++) sum[a] += (double)met->albedo[a % channels] * (double)e[a];
-            else
+            } else
                 for (a = 0; a < values; a++) sum[a] += (double)e[a];
         }
         for (a = 0; a < values; a++) {
@@ -4522,7 +4537,7 @@ static void isogi_trace__pass_segment(isogi_trace__set *set, isogi_trace__segmen
             after[a] = (float)e;
             most = change > most ? change : most, largest = fabs(e) > largest ? fabs(e) : largest;
         }
-        r->settled[1 - out] = settled, s->order[open++] = (uint32_t)i;
+        *isogi_trace__settled_at(set, node, 1 - out) = settled, s->order[open++] = (uint32_t)i;
     }
     s->open = open, s->change = most, s->largest = largest > s->settled ? largest : s->settled;
 }
@@ -5058,19 +5073,15 @@ static void isogi_trace__publish_brick(isogi_trace *t, size_t i, isogi_trace__de
     }
 }
 
-/* Where the filter is at work, bricks at a time: each by the task that has the last of its nodes. */
-static void isogi_trace__publish_task(void *arg, size_t task) {
-    isogi_trace *t = (isogi_trace *)arg;
+/* Nodes of a sweep. Where the filter is at work, bricks at a time: each with the sweep that has the last of its nodes. */
+static void isogi_trace__publish_sweep(isogi_trace *t, size_t sweep, isogi_trace__dense *block) {
     isogi_trace__set *set = &t->feedback->texels;
-    isogi_trace__dense *block = (isogi_trace__dense *)(void *)t->feedback->casts + task;
-    size_t i, end = isogi_trace__sweep(t, task, set->count, &i);
-    const int filtered = t->scene.desc.mode == ISOGI_TRACE_IRRADIANCE && !t->scene.desc.unfiltered;
+    size_t i, end = isogi_trace__sweep(t, sweep, set->count, &i);
     uint32_t slot;
-    if (filtered) memset(block, 0, sizeof *block); /* rays were here before */
     for (; i < end; i++) {
         const isogi_trace__node *n = isogi_trace__node_at(set, i);
         uint32_t last = 0;
-        if (!filtered) {
+        if (!block) {
             if (isogi_trace__unpublished(t, i)) isogi_trace__publish(t, i, NULL);
             continue;
         }
@@ -5079,6 +5090,24 @@ static void isogi_trace__publish_task(void *arg, size_t task) {
             if (n->brick->node[slot] > last) last = n->brick->node[slot];
         if (last == i + 1) isogi_trace__publish_brick(t, i, block);
     }
+}
+
+/* Tasks that publish: their blocks lie where rays did. */
+static size_t isogi_trace__publish_tasks(const isogi_trace__feedback *f) {
+    const size_t blocks = ISOGI_TRACE__CASTS * sizeof *f->casts / sizeof(isogi_trace__dense);
+    return f->sweeps < blocks ? f->sweeps : blocks;
+}
+
+static void isogi_trace__publish_task(void *arg, size_t task) {
+    isogi_trace *t = (isogi_trace *)arg;
+    isogi_trace__dense *block = NULL;
+    const size_t sweeps = t->feedback->sweeps, tasks = isogi_trace__publish_tasks(t->feedback);
+    size_t i = isogi_trace__portion(sweeps, tasks, task), end = isogi_trace__portion(sweeps, tasks, task + 1);
+    if (t->scene.desc.mode == ISOGI_TRACE_IRRADIANCE && !t->scene.desc.unfiltered) {
+        block = (isogi_trace__dense *)(void *)t->feedback->casts + task;
+        memset(block, 0, sizeof *block); /* rays were here before */
+    }
+    for (; i < end; i++) isogi_trace__publish_sweep(t, i, block);
 }
 
 /* ---- the end of a level ---- */
@@ -5211,18 +5240,19 @@ static void isogi_trace__phase_end(isogi_trace *t) {
 /* The next tasks of the phase at work, about as long as `limit` rays, at least one. Returns what they count as. */
 static uint64_t isogi_trace__carry(isogi_trace *t, uint64_t limit) {
     isogi_trace__feedback *f = t->feedback;
-    const size_t blocks = ISOGI_TRACE__CASTS * sizeof *f->casts / sizeof(isogi_trace__dense), /* that lie where rays did */
-        counts = ISOGI_TRACE__CASTS * sizeof *f->casts / sizeof(isogi_trace__finished);
+    const size_t counts = ISOGI_TRACE__CASTS * sizeof *f->casts / sizeof(isogi_trace__finished); /* that lie where rays did */
     size_t tasks = isogi_trace__phase_tasks(f), count = 0, i;
     uint64_t cost = 0;
     isogi_context silent = t->context;
     silent.progress = NULL;
-    if (f->phase == ISOGI_TRACE__PUBLISH && tasks > f->carried + blocks) tasks = f->carried + blocks;
     if (f->phase == ISOGI_TRACE__FINISH && tasks > f->carried + counts) tasks = f->carried + counts;
     while (f->carried + count < tasks && cost < limit) cost += isogi_trace__phase_cost(f, f->carried + count++);
     if (f->phase == ISOGI_TRACE__FORGET) /* memory is given back one by one */
         for (i = 0; i < count; i++) isogi_trace__phase_task(t, i);
-    else if (count) isogi_parallel(&silent, count, isogi_trace__phase_task, t, 0, 1);
+    else if (count) {
+        f->sweeps = count;
+        isogi_parallel(&silent, f->phase == ISOGI_TRACE__PUBLISH ? isogi_trace__publish_tasks(f) : count, isogi_trace__phase_task, t, 0, 1);
+    }
     if (f->phase == ISOGI_TRACE__FINISH) isogi_trace__finish_count(t, count);
     f->carried += count;
     if (f->carried >= isogi_trace__phase_tasks(f)) isogi_trace__phase_end(t);
