@@ -3300,7 +3300,8 @@ enum {
 typedef struct isogi_trace__set {
     isogi_trace__chunk *chunks;
     size_t count, chunk_count, chunk_capacity;
-    size_t head_bit; /* the largest power of two that is no more than the number of chains */
+    size_t headed;   /* chunks whose chains are in use */
+    size_t head_bit; /* the largest power of two that is no more than the number of these chains */
     int out; /* 0 or 1: where the light is that was worked out last */
     isogi_trace__segment *segments;
     size_t segment_count, segment_capacity;
@@ -3497,8 +3498,6 @@ static isogi_result isogi_trace__chunks_reserve(const isogi_trace *t, isogi_trac
     return ISOGI_OK;
 }
 
-static void isogi_trace__heads_new(isogi_trace__set *s);
-
 /* Room for `more` nodes; those that there are stay in their places. chains: they are probes. */
 static isogi_result isogi_trace__set_reserve(const isogi_trace *t, isogi_trace__set *s, size_t more, int chains) {
     while (s->count + more > s->chunk_count * ISOGI_TRACE__CHUNK) {
@@ -3519,7 +3518,6 @@ static isogi_result isogi_trace__set_reserve(const isogi_trace *t, isogi_trace__
             return ISOGI_NO_MEMORY;
         }
         s->chunks[s->chunk_count++] = c;
-        if (chains) isogi_trace__heads_new(s);
     }
     return ISOGI_OK;
 }
@@ -3603,19 +3601,19 @@ static uint32_t isogi_trace__tag(uint64_t cell) { return (uint32_t)(cell >> 20);
 /* Where the chain of a cell begins: as many chains as there is room for probes, numbered by the low bits of the tag; those beyond the end
    by one bit less (linear hashing, Litwin 1980). */
 static uint32_t *isogi_trace__head(const isogi_trace__set *s, uint64_t cell) {
-    size_t heads = s->chunk_count * ISOGI_TRACE__CHUNK, bit = s->head_bit, i;
+    size_t heads = s->headed * ISOGI_TRACE__CHUNK, bit = s->head_bit, i;
     i = isogi_trace__tag(cell) & (2 * bit - 1);
     if (i >= heads) i -= bit;
     return &s->chunks[i / ISOGI_TRACE__CHUNK].heads[i % ISOGI_TRACE__CHUNK];
 }
 
-/* The last chunk is new: its chains take over, in their order, what is theirs by the next bit of the key. So no step has to find a new
-   place for all. */
+/* The chains of the next chunk come into use: they take over, in their order, what is theirs by the next bit of the key. So no step
+   has to find a new place for all. */
 static void isogi_trace__heads_new(isogi_trace__set *s) {
-    size_t last = s->chunk_count - 1, from = 1, i;
+    size_t last = s->headed++, from = 1, i;
     uint32_t *heads = s->chunks[last].heads;
     memset(heads, 0, ISOGI_TRACE__CHUNK * sizeof *heads);
-    for (s->head_bit = ISOGI_TRACE__CHUNK; 2 * s->head_bit <= s->chunk_count * ISOGI_TRACE__CHUNK;) s->head_bit *= 2;
+    for (s->head_bit = ISOGI_TRACE__CHUNK; 2 * s->head_bit <= s->headed * ISOGI_TRACE__CHUNK;) s->head_bit *= 2;
     while (2 * from <= last) from *= 2;
     for (i = 0; i < ISOGI_TRACE__CHUNK && last; i++) {
         const uint32_t *soon = &s->chunks[last - from].heads[(i + 8) % ISOGI_TRACE__CHUNK];
@@ -3744,7 +3742,7 @@ static int isogi_trace__search_on(const isogi_trace *t, const isogi_trace__catch
 static uint32_t isogi_trace__probe_find(const isogi_trace *t, isogi_trace__catch *c) {
     const isogi_trace__set *set = &t->feedback->probes;
     isogi_trace__quest search = {HUGE_VAL, 0, 0};
-    uint32_t at = set->chunk_count ? *isogi_trace__head(set, c->key) : 0, found = 0;
+    uint32_t at = set->headed ? *isogi_trace__head(set, c->key) : 0, found = 0;
     while (at && !found) {
         const isogi_trace__link *link = isogi_trace__link_at(set, at - 1);
         const isogi_trace__node *n = link->tag == isogi_trace__tag(c->key) ? isogi_trace__node_at(set, at - 1) : NULL;
@@ -3760,7 +3758,7 @@ static uint32_t isogi_trace__probe_find(const isogi_trace *t, isogi_trace__catch
    for by the caller: a function that does nothing else would be left out by compilers. */
 static const void *isogi_trace__probe_ahead(const isogi_trace__set *set, const isogi_trace__catch *c, int what) {
     const uint32_t *head;
-    if (!set->chunk_count) return c;
+    if (!set->headed) return c;
     head = isogi_trace__head(set, c->key);
     if (what == 0) return head;
     if (!*head) return c;
@@ -3803,17 +3801,17 @@ static void isogi_trace__probes_link(const isogi_trace *t, size_t made) {
     isogi_trace__set *set = &f->probes;
     const size_t early = 24, middle = 16, late = 8; /* probes ahead */
     size_t i;
+    while (set->headed < set->chunk_count) isogi_trace__heads_new(set);
     for (i = 0; i < made; i++) {
         const isogi_trace__catch *c = &f->catches[f->makers[i]];
-        isogi_trace__link *link = isogi_trace__link_at(set, set->count);
+        isogi_trace__link *link = isogi_trace__link_at(set, set->count + i);
         uint32_t *at = isogi_trace__head(set, c->key);
         if (i + early < made) ISOGI_TRACE__AHEAD(&f->catches[f->makers[i + early]]);
         if (i + middle < made) ISOGI_TRACE__AHEAD(isogi_trace__head(set, f->catches[f->makers[i + middle]].key));
         if (i + late < made) ISOGI_TRACE__AHEAD(isogi_trace__probe_ahead(set, &f->catches[f->makers[i + late]], 1));
         while (*at) at = &isogi_trace__link_at(set, *at - 1)->next;
         link->tag = isogi_trace__tag(c->key), link->next = 0;
-        memset(isogi_trace__stage_at(set, set->count), 0, sizeof(isogi_trace__stage));
-        *at = (uint32_t)++set->count;
+        *at = (uint32_t)(set->count + i + 1);
     }
 }
 
@@ -3835,6 +3833,7 @@ static void isogi_trace__probe_finish(const isogi_trace *t, size_t i, const isog
         isogi_vol_to_world(t->scene.pyramid, grid, point);
         isogi_trace_material(&t->scene.desc, n->isovalue, point, n->albedo, emission);
     }
+    memset(isogi_trace__stage_at(set, i), 0, sizeof(isogi_trace__stage));
     isogi_trace__stage_at(set, i)->wanted = n->albedo[0] > 0.9f || n->albedo[1] > 0.9f || n->albedo[2] > 0.9f ? 2 : 1;
 }
 
@@ -4311,21 +4310,21 @@ static isogi_result isogi_trace__segments_reserve(const isogi_trace *t, isogi_tr
     return ISOGI_OK;
 }
 
-/* The segment of the batch's hits, not yet filled, and the probes that it lacks, not yet finished; on failure nothing has been added. */
-static isogi_result isogi_trace__segment_new(isogi_trace *t, isogi_trace__segment *s) {
+/* The segment of the batch's hits, not yet filled, and room for the probes that it lacks. */
+static isogi_result isogi_trace__segment_new(isogi_trace *t, isogi_trace__segment *s, size_t *made) {
     isogi_trace__feedback *f = t->feedback;
-    size_t i, hits = 0, made = isogi_trace__probes_meet(t);
+    size_t i, hits = 0;
     isogi_result result;
     for (i = 0; i < f->piece_count; i++) f->pieces[i].first_hit = (uint32_t)hits, hits += f->pieces[i].hits;
+    *made = isogi_trace__probes_meet(t);
     memset(s, 0, sizeof *s);
     s->entries = f->span_count, s->hits = hits;
     s->node = (uint32_t *)isogi_allocate(&t->context, (f->on_probes ? 3 : 2) * s->entries + 1 + hits, sizeof(uint32_t));
     if (!s->node) return ISOGI_NO_MEMORY;
     s->begin = s->node + s->entries, s->probe = s->begin + s->entries + 1, s->begin[s->entries] = (uint32_t)hits;
     if (f->on_probes) s->order = s->probe + hits;
-    result = isogi_trace__set_reserve(t, &f->probes, made, 1);
+    result = isogi_trace__set_reserve(t, &f->probes, *made, 1);
     if (result != ISOGI_OK) isogi_trace__segment_free(t, s);
-    else isogi_trace__probes_link(t, made);
     return result;
 }
 
@@ -4394,15 +4393,20 @@ static void isogi_trace__readers_count(isogi_trace *t, const isogi_trace__segmen
 typedef struct isogi_trace__taken {
     isogi_trace *trace;
     const isogi_trace__segment *segment;
-    size_t probes; /* new ones begin here */
+    size_t made; /* new probes */
 } isogi_trace__taken;
 
-/* The spans of a piece, those of its last node also where they go on in the next one, which leaves them out; then new probes. */
+/* First the chains of new probes, which only one thread can see to; then the spans of a piece, those of its last node also where they go
+   on in the next one, which leaves them out; then the new probes themselves. */
 static void isogi_trace__take_task(void *arg, size_t task) {
     const isogi_trace__taken *taken = (const isogi_trace__taken *)arg;
     isogi_trace *t = taken->trace;
     isogi_trace__feedback *f = t->feedback;
     size_t i, end;
+    if (!task--) {
+        isogi_trace__probes_link(t, taken->made);
+        return;
+    }
     if (task < f->piece_count) {
         const isogi_trace__piece *piece = &f->pieces[task];
         isogi_trace__segment_fill(t, taken->segment, piece);
@@ -4412,9 +4416,9 @@ static void isogi_trace__take_task(void *arg, size_t task) {
         for (; i < end; i++) isogi_trace__span_commit(t, f->on_probes ? &f->probes : &f->texels, &f->spans[i]);
         return;
     }
-    i = taken->probes + (task - f->piece_count) * ISOGI_TRACE__SWEEP;
-    end = i + ISOGI_TRACE__SWEEP < f->probes.count ? i + ISOGI_TRACE__SWEEP : f->probes.count;
-    for (; i < end; i++) isogi_trace__probe_finish(t, i, &f->catches[f->makers[i - taken->probes]]);
+    i = (task - f->piece_count) * ISOGI_TRACE__SWEEP;
+    end = i + ISOGI_TRACE__SWEEP < taken->made ? i + ISOGI_TRACE__SWEEP : taken->made;
+    for (; i < end; i++) isogi_trace__probe_finish(t, f->probes.count + i, &f->catches[f->makers[i]]);
 }
 
 /* Traces the batch and takes it over; on failure nothing has been added. */
@@ -4426,13 +4430,14 @@ static isogi_result isogi_trace__spans_run(isogi_trace *t, double from, double t
     isogi_trace__taken taken;
     isogi_result result = isogi_parallel(&t->context, isogi_trace__cast_tasks(f), isogi_trace__cast_task, t, from, to);
     size_t i, tasks;
-    taken.trace = t, taken.segment = &segment, taken.probes = f->probes.count, silent.progress = NULL;
+    taken.trace = t, taken.segment = &segment, taken.made = 0, silent.progress = NULL;
     if (result == ISOGI_OK) result = isogi_trace__segments_reserve(t, set);
-    if (result == ISOGI_OK) result = isogi_trace__segment_new(t, &segment);
+    if (result == ISOGI_OK) result = isogi_trace__segment_new(t, &segment, &taken.made);
     if (result != ISOGI_OK) return result;
-    tasks = f->piece_count + (f->probes.count - taken.probes + ISOGI_TRACE__SWEEP - 1) / ISOGI_TRACE__SWEEP;
+    tasks = 1 + f->piece_count + (taken.made + ISOGI_TRACE__SWEEP - 1) / ISOGI_TRACE__SWEEP;
     if (tasks > 16) isogi_parallel(&silent, tasks, isogi_trace__take_task, &taken, 0, 1);
     else for (i = 0; i < tasks; i++) isogi_trace__take_task(&taken, i); /* not worth a thread */
+    f->probes.count += taken.made;
     set->segments[set->segment_count++] = segment;
     isogi_trace__readers_count(t, &segment);
     for (i = 0; i < isogi_trace__cast_tasks(f); i++) isogi_trace__add(&t->counters, &t->task_counters[i]);
