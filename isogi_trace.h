@@ -139,9 +139,10 @@
 
    Memory       Through the context. Bricks of 4x4x4 texels: 8 bytes for each, 112 where one of its texels is wanted, and for every
                 wanted texel alone 2 + 12 bytes of irradiance, 2 + 2 order^2 channels of transfer, less in other formats; and
-                250 KB. isogi_trace_memory tells. PATHS needs another 4 MB, FEEDBACK 7, and while it works some 400 bytes (TRANSFER: 16
-                more for each coefficient), 2048 times that at once, and 4 for every hit, for each of 65536 texels at a time, for all
-                that were asked for when lazy, and for each probe.
+                250 KB. isogi_trace_memory tells. PATHS needs another 4 MB, FEEDBACK 9 (TRANSFER: 32 KB more for each coefficient),
+                and while it works some 400 bytes (TRANSFER: 16 more for each coefficient), 2048 times that at once, and 4 for every
+                hit, for each of 65536 texels at a time, for all that were asked for when lazy, and for each probe. A request takes
+                12 bytes for each of 32768 points at a time.
                 Any allocation may fail: the call says ISOGI_NO_MEMORY, the texture stays as it was and can go on.
                 Stack use stays below 32 KB (compiled by clang, below 35), nearly all of it that of rays.
    Threads      Rays run on the context's threads. isogi_trace_sample and the other readers may run in any number of threads at a
