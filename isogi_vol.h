@@ -4840,6 +4840,7 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE __m256i isogi_vol__compare(isogi_vol__pool *
         const __m512i l = _mm512_set1_epi32((int)bound[0][k]), h = _mm512_set1_epi32((int)bound[1][k]);
         mask[0][k] = _mm512_cmpge_epu8_mask(a, l), mask[1][k] = _mm512_cmpge_epu8_mask(b, l);
         mask[2][k] = _mm512_cmplt_epu8_mask(a, h), mask[3][k] = _mm512_cmplt_epu8_mask(b, h);
+        __asm__("" : "+m"(mask[0][k]), "+m"(mask[1][k]), "+m"(mask[2][k]), "+m"(mask[3][k])); /* clang would gather them in registers */
     }
     return tail;
 }
@@ -4990,8 +4991,11 @@ ISOGI_VOL__INLINE isogi_vol__spots isogi_vol__spots8(isogi_vol__pool *s, const u
 
 ISOGI_VOL__AVX512 ISOGI_VOL__INLINE __m256i isogi_vol__load_each(const void *at) {
     int64_t value;
+    __m256i each;
     memcpy(&value, at, sizeof value);
-    return _mm256_set1_epi64x(value);
+    each = _mm256_set1_epi64x(value);
+    __asm__("" : "+x"(each)); /* clang would make a shuffle of two of them again */
+    return each;
 }
 
 /* Loads that repeat a number need no shuffle, and any port blends. */
