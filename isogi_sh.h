@@ -1984,7 +1984,7 @@ ISOGI_SH__AVX512 ISOGI_SH__INLINE void isogi_sh__eval_d8_split(isogi_sh__d8 *u, 
    their first degree; the first six functions are the polynomials of above, each later one follows from those 2 and 4 before. */
 #define ISOGI_SH__HIDE(x) __asm__ volatile("" : "+r"(x)) /* what stands in x is not computed anew, nor its constants made ready elsewhere */
 #define ISOGI_SH__ROW(l) gap += step, at += gap; if (!fixed) ISOGI_SH__HIDE(at); h.row[l] = at
-#define ISOGI_SH__DEFINE_ELEVEN(NAME, TARGET, T, V, I, WIDTH, FMA, LESS, POLYNOMIALS, NEAR_POLE, SQUARE_ERROR)                  \
+#define ISOGI_SH__DEFINE_ELEVEN(NAME, TARGET, T, V, I, WIDTH, FMA, LESS, POLYNOMIALS, NEAR_POLE, SQUARE_ERROR, TURN, TILE)     \
     typedef struct NAME##_eleven {                                                                                             \
         V x[2], y[2], z[2], v[2], c[2], s[2], zc[2], zs[2], p[11][2];                                                          \
         char *row[11]; /* of each degree, where Y_l^0 goes */                                                                  \
@@ -2052,7 +2052,22 @@ ISOGI_SH__AVX512 ISOGI_SH__INLINE void isogi_sh__eval_d8_split(isogi_sh__d8 *u, 
         NAME##_function(h, t, step, m, 8, two), NAME##_function(h, t, step, m, 9, two);                                        \
         NAME##_function(h, t, step, m, 10, two);                                                                               \
     }                                                                                                                          \
-    TARGET ISOGI_SH__INLINE int NAME##_all_eleven(T *out, size_t stride, const V *u, const V *other, int two, int fixed) {     \
+    /* one of eight parts of NAME_turn_all for 121 rows */                                                                     \
+    TARGET ISOGI_SH__INLINE void NAME##_part(T *out, const V *rows, int part) {                                                \
+        const size_t alone = 121 % TILE == 1;                                                                                  \
+        size_t k = alone + 2 * TILE * (size_t)part, j;                                                                         \
+        if (!part && alone)                                                                                                    \
+            for (j = 0; j < WIDTH; j++) out[121 * j] = ((const T *)rows)[j];                                                   \
+        if (k + 2 * TILE <= 121) TURN(out + k, 121, rows + k, 2);                                                              \
+        else if (k < 121) {                                                                                                    \
+            j = k < 121 - TILE ? k : 121 - TILE;                                                                               \
+            TURN(out + j, 121, rows + j, 1);                                                                                   \
+            if (k + TILE < 121) TURN(out + 121 - TILE, 121, rows + 121 - TILE, 1);                                             \
+        }                                                                                                                      \
+    }                                                                                                                          \
+    /* done: where `rows` go meanwhile, or NULL */                                                                             \
+    TARGET ISOGI_SH__INLINE int NAME##_all_eleven(T *out, size_t stride, const V *u, const V *other, int two, int fixed, T *done, \
+                                                  const V *rows) {                                                             \
         NAME##_eleven h;                                                                                                       \
         V r, q, zero = {0};                                                                                                    \
         const T *t = POLYNOMIALS;                                                                                              \
@@ -2069,17 +2084,32 @@ ISOGI_SH__AVX512 ISOGI_SH__INLINE void isogi_sh__eval_d8_split(isogi_sh__d8 *u, 
         step = 2 * by;                                                                                                         \
         ISOGI_SH__ROW(1); ISOGI_SH__ROW(2); ISOGI_SH__ROW(3); ISOGI_SH__ROW(4); ISOGI_SH__ROW(5);                              \
         ISOGI_SH__ROW(6); ISOGI_SH__ROW(7); ISOGI_SH__ROW(8); ISOGI_SH__ROW(9); ISOGI_SH__ROW(10);                             \
-        NAME##_eleventh(&h, t, t + 161, by, 0, two), NAME##_eleventh(&h, t + 36, t + 176, by, 1, two);                         \
-        NAME##_eleventh(&h, t + 66, t + 188, by, 2, two), NAME##_eleventh(&h, t + 91, t + 197, by, 3, two);                    \
-        NAME##_eleventh(&h, t + 111, t + 203, by, 4, two), NAME##_eleventh(&h, t + 127, t, by, 5, two);                        \
-        NAME##_eleventh(&h, t + 139, t, by, 6, two), NAME##_eleventh(&h, t + 148, t, by, 7, two);                              \
-        NAME##_eleventh(&h, t + 154, t, by, 8, two), NAME##_eleventh(&h, t + 158, t, by, 9, two);                              \
-        NAME##_eleventh(&h, t + 160, t, by, 10, two);                                                                          \
+        NAME##_eleventh(&h, t + 0, t + 161, by, 0, two);                                                                       \
+        if (fixed && done) NAME##_part(done, rows, 0);                                                                         \
+        NAME##_eleventh(&h, t + 36, t + 176, by, 1, two);                                                                      \
+        if (fixed && done) NAME##_part(done, rows, 1);                                                                         \
+        NAME##_eleventh(&h, t + 66, t + 188, by, 2, two);                                                                      \
+        if (fixed && done) NAME##_part(done, rows, 2);                                                                         \
+        NAME##_eleventh(&h, t + 91, t + 197, by, 3, two);                                                                      \
+        if (fixed && done) NAME##_part(done, rows, 3);                                                                         \
+        NAME##_eleventh(&h, t + 111, t + 203, by, 4, two);                                                                     \
+        if (fixed && done) NAME##_part(done, rows, 4);                                                                         \
+        NAME##_eleventh(&h, t + 127, t + 0, by, 5, two);                                                                       \
+        if (fixed && done) NAME##_part(done, rows, 5);                                                                         \
+        NAME##_eleventh(&h, t + 139, t + 0, by, 6, two);                                                                       \
+        if (fixed && done) NAME##_part(done, rows, 6);                                                                         \
+        NAME##_eleventh(&h, t + 148, t + 0, by, 7, two);                                                                       \
+        if (fixed && done) NAME##_part(done, rows, 7);                                                                         \
+        NAME##_eleventh(&h, t + 154, t + 0, by, 8, two);                                                                       \
+        NAME##_eleventh(&h, t + 158, t + 0, by, 9, two);                                                                       \
+        NAME##_eleventh(&h, t + 160, t + 0, by, 10, two);                                                                      \
         return 1;                                                                                                              \
     }                                                                                                                          \
-    TARGET ISOGI_SH__APART int NAME##_eleven_rows(T *out, const V *u) { return NAME##_all_eleven(out, WIDTH, u, u, 0, 1); }    \
+    TARGET ISOGI_SH__APART int NAME##_eleven_rows(T *out, const V *u, T *done, const V *rows) {                                \
+        return NAME##_all_eleven(out, WIDTH, u, u, 0, 1, done, rows);                                                          \
+    }                                                                                                                          \
     TARGET ISOGI_SH__APART int NAME##_eleven_one(T *out, size_t stride, const V *u) {                                          \
-        return NAME##_all_eleven(out, stride, u, u, 0, 0);                                                                     \
+        return NAME##_all_eleven(out, stride, u, u, 0, 0, NULL, NULL);                                                         \
     }                                                                                                                          \
     TARGET ISOGI_SH__APART void NAME##_low(T *out, size_t stride, int order, const V *u);                                      \
     /* two vectors with lengths to be corrected by roots, or near a pole; 0 if out of range */                                 \
@@ -2099,14 +2129,16 @@ ISOGI_SH__AVX512 ISOGI_SH__INLINE void isogi_sh__eval_d8_split(isogi_sh__d8 *u, 
             e = NAME##_error(u), f = NAME##_error(other);                                                                      \
             if (LESS((I)FMA(e, e, f * f), (I)(zero + (T)SQUARE_ERROR))) {                                                      \
                 NAME##_correct(u, e), NAME##_correct(other, f);                                                                \
-                if (NAME##_all_eleven(out + i, stride, u, other, 1, 0)) continue;                                              \
+                if (NAME##_all_eleven(out + i, stride, u, other, 1, 0, NULL, NULL)) continue;                                  \
             }                                                                                                                  \
             if (!NAME##_eleven_apart(out + i, stride, x + i, y + i, z + i)) break;                                             \
         }                                                                                                                      \
         return i;                                                                                                              \
     }
-#define ISOGI_SH__DEFINE_NO_ELEVEN(NAME, TARGET, T, V, I, WIDTH, FMA, LESS, POLYNOMIALS, NEAR_POLE, SQUARE_ERROR)               \
-    TARGET ISOGI_SH__INLINE int NAME##_eleven_rows(T *out, const V *u) { return (void)out, (void)u, 0; }                       \
+#define ISOGI_SH__DEFINE_NO_ELEVEN(NAME, TARGET, T, V, I, WIDTH, FMA, LESS, POLYNOMIALS, NEAR_POLE, SQUARE_ERROR, TURN, TILE)  \
+    TARGET ISOGI_SH__INLINE int NAME##_eleven_rows(T *out, const V *u, T *done, const V *rows) {                               \
+        return (void)out, (void)u, (void)done, (void)rows, 0;                                                                  \
+    }                                                                                                                          \
     TARGET ISOGI_SH__INLINE int NAME##_eleven_one(T *out, size_t stride, const V *u) { return (void)out, (void)stride, (void)u, 0; } \
     TARGET ISOGI_SH__INLINE size_t NAME##_eleven_two(T *out, size_t stride, const T *x, const T *y, const T *z, size_t count) { \
         return (void)out, (void)stride, (void)x, (void)y, (void)z, (void)count, (size_t)0;                                     \
@@ -2192,10 +2224,10 @@ ISOGI_SH__AVX512 ISOGI_SH__INLINE void isogi_sh__eval_d8_split(isogi_sh__d8 *u, 
         if (order < 11 || !NAME##_eleven_one(out, stride, u)) NAME##_columns(out, stride, order, u, u, 0);                     \
     }                                                                                                                          \
     TARGET ISOGI_SH__APART void NAME##_low_rows(T *out, int order, const V *u) {                                               \
-        if (order < 11 || !NAME##_eleven_rows(out, u)) NAME##_columns(out, WIDTH, order, u, u, 0);                             \
+        if (order < 11 || !NAME##_eleven_rows(out, u, NULL, NULL)) NAME##_columns(out, WIDTH, order, u, u, 0);                 \
     }                                                                                                                          \
     TARGET ISOGI_SH__INLINE void NAME##_low_two(T *out, size_t stride, int order, const V *u) {                                \
-        NAME##_columns(out, stride, order, u, u + 4, 1);                                                                        \
+        NAME##_columns(out, stride, order, u, u + 4, 1);                                                                       \
     }                                                                                                                          \
     /* degrees from SPLIT on */                                                                                                \
     TARGET static void NAME##_rest(T *out, int order, const V *u, V *state) {                                                  \
@@ -2297,12 +2329,32 @@ ISOGI_SH__AVX512 ISOGI_SH__INLINE void isogi_sh__eval_d8_split(isogi_sh__d8 *u, 
             u[0] = next[0], u[1] = next[1], u[2] = next[2], at = after;                                                        \
         }                                                                                                                      \
     }                                                                                                                          \
-    TARGET static size_t NAME##_rows(T *out, int order, const T (*direction)[3], size_t count) {                               \
+    /* order 11 in full vectors: those of the block before are turned into rows meanwhile, some after each column: one takes products, the \
+       other stores */                                                                                                         \
+    TARGET ISOGI_SH__APART size_t NAME##_rows11(T *out, const T (*direction)[3], size_t count) {                               \
+        V rows[2][121] __attribute__((aligned(64))), u[4];                                                                     \
+        size_t i, at = 0;                                                                                                      \
+        int more, now = 0;                                                                                                     \
+        for (i = 0;; i += WIDTH, now = !now) {                                                                                 \
+            size_t next = i < count - WIDTH ? i : count - WIDTH;                                                               \
+            T *done = i ? out + 121 * at : NULL;                                                                               \
+            more = i < count;                                                                                                  \
+            if (more) {                                                                                                        \
+                NAME##_split(u, direction[next]);                                                                              \
+                more = NAME##_unit(u);                                                                                         \
+            }                                                                                                                  \
+            if (!more || !NAME##_eleven_rows((T *)rows[now], u, done, rows[!now])) {                                           \
+                if (done) NAME##_turn_all(done, 121, rows[!now], 121);                                                         \
+                if (!more) return i < count ? i : count;                                                                       \
+                NAME##_low_rows((T *)rows[now], 11, u);                                                                        \
+            }                                                                                                                  \
+            at = next;                                                                                                         \
+        }                                                                                                                      \
+    }                                                                                                                          \
+    TARGET ISOGI_SH__APART size_t NAME##_rows_any(T *out, int order, const T (*direction)[3], size_t count) {                  \
         V rows[ISOGI_SH__SPLIT * ISOGI_SH__SPLIT] __attribute__((aligned(64))), state[4 * ISOGI_SH__SPLIT - 18], u[2][4];      \
         size_t i, n = ISOGI_SH_COUNT(order), at = 0;                                                                           \
         int from, to, more, now = 0;                                                                                           \
-        if (count < WIDTH) return 0;                                                                                           \
-        if (order == 5) return NAME##_rows5(out, direction, count);                                                            \
         for (i = 0;; i += WIDTH, now = !now) {                                                                                 \
             size_t next = i < count - WIDTH ? i : count - WIDTH;                                                               \
             more = i < count;                                                                                                  \
@@ -2320,20 +2372,26 @@ ISOGI_SH__AVX512 ISOGI_SH__INLINE void isogi_sh__eval_d8_split(isogi_sh__d8 *u, 
             if (!more) return i < count ? i : count;                                                                           \
             at = next;                                                                                                         \
         }                                                                                                                      \
+    }                                                                                                                          \
+    TARGET static size_t NAME##_rows(T *out, int order, const T (*direction)[3], size_t count) {                               \
+        if (count < WIDTH) return 0;                                                                                           \
+        if (order == 5) return NAME##_rows5(out, direction, count);                                                            \
+        if (order == 11 && WIDTH * sizeof(T) == 64) return NAME##_rows11(out, direction, count);                               \
+        return NAME##_rows_any(out, order, direction, count);                                                                  \
     }
 
-#define ISOGI_SH__DEFINE_F32(NAME, TARGET, V, I, WIDTH, SUFFIX, TURN, TILE, ELEVEN)                                                      \
+#define ISOGI_SH__DEFINE_F32(NAME, TARGET, V, I, WIDTH, SUFFIX, TURN, TILE, ELEVEN)                                            \
     ISOGI_SH__DEFINE_EVAL(NAME, TARGET, float, V, I, WIDTH, ISOGI_SH__FMA_##SUFFIX, ISOGI_SH__REST_##SUFFIX, ISOGI_SH__LESS_##SUFFIX, \
-                          isogi_sh__columns_f32, 1e-3, 1e-3, 1e-19, sqrtf)                                                           \
+                          isogi_sh__columns_f32, 1e-3, 1e-3, 1e-19, sqrtf)                                                     \
     ELEVEN(NAME, TARGET, float, V, I, WIDTH, ISOGI_SH__FMA_##SUFFIX, ISOGI_SH__LESS_##SUFFIX, isogi_sh__polynomials_f32, 1e-7, \
-        1e-6) \
+        1e-6, TURN, TILE)                                                                                                      \
     ISOGI_SH__DEFINE_FUSED(NAME, TARGET, float, V, I, WIDTH, ISOGI_SH__FMA_##SUFFIX, ISOGI_SH__LESS_##SUFFIX, isogi_sh__polynomials_f32, \
         1e-3, TURN, TILE)
-#define ISOGI_SH__DEFINE_F64(NAME, TARGET, V, I, WIDTH, SUFFIX, TURN, TILE, ELEVEN)                                                      \
+#define ISOGI_SH__DEFINE_F64(NAME, TARGET, V, I, WIDTH, SUFFIX, TURN, TILE, ELEVEN)                                            \
     ISOGI_SH__DEFINE_EVAL(NAME, TARGET, double, V, I, WIDTH, ISOGI_SH__FMA_##SUFFIX, ISOGI_SH__REST_##SUFFIX, ISOGI_SH__LESS_##SUFFIX, \
-                          isogi_sh__columns_f64, 1e-6, 1e-25, 1e-200, sqrt)                                                         \
+                          isogi_sh__columns_f64, 1e-6, 1e-25, 1e-200, sqrt)                                                    \
     ELEVEN(NAME, TARGET, double, V, I, WIDTH, ISOGI_SH__FMA_##SUFFIX, ISOGI_SH__LESS_##SUFFIX, isogi_sh__polynomials_f64, 1e-25, \
-        1e-12) \
+        1e-12, TURN, TILE)                                                                                                     \
     ISOGI_SH__DEFINE_FUSED(NAME, TARGET, double, V, I, WIDTH, ISOGI_SH__FMA_##SUFFIX, ISOGI_SH__LESS_##SUFFIX, isogi_sh__polynomials_f64, \
         1e-25, TURN, TILE)
 ISOGI_SH__DEFINE_F32(isogi_sh__eval_f8, ISOGI_SH__AVX2, isogi_sh__f8, isogi_sh__i8, 8, F8, isogi_sh__transpose_f8, 8,
