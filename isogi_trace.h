@@ -480,6 +480,7 @@ ISOGI_API size_t isogi_trace_memory(const isogi_trace *trace); /* bytes that the
 #define ISOGI_TRACE__PIECES 129    /* in so many pieces at most: each but the last is full, by SPAN samples or by spans; */
 #define ISOGI_TRACE__CASTS 49      /* in so many tasks at most */
 #define ISOGI_TRACE__HEADS 16384   /* chains of what is new in a batch; a power of two */
+#define ISOGI_TRACE__ESCAPED 0xffffffffu /* in place of the number of a probe */
 #define ISOGI_TRACE__FLUSH 256     /* rays in one call */
 #define ISOGI_TRACE__SWEEP 256     /* nodes in a task that traces no rays */
 #define ISOGI_TRACE__PIECE 65536   /* rays that take as long as what is done without any before progress is told of, */
@@ -3356,6 +3357,7 @@ struct isogi_trace__feedback {
     struct isogi_trace__cast *casts; /* of tasks */
     float *direct; /* of spans */
     isogi_trace__piece *pieces; /* and one behind them */
+    uint32_t *found; /* of each catch, number + 1 of its probe; ESCAPED where there was no hit */
     uint32_t *fresh; /* catches that found no probe: of a piece, from the place of its first sample on */
     uint32_t *makers, *next, *heads; /* catches that get the new probes; chains of these, place + 1, and where they begin */
     size_t span_count, sample_count, piece_count;
@@ -3534,7 +3536,7 @@ static void isogi_trace__feedback_free(const isogi_trace *t) {
     isogi_release(&t->context, f->casts, ISOGI_TRACE__CASTS, sizeof *f->casts);
     isogi_release(&t->context, f->direct, ISOGI_TRACE__SPANS, (size_t)t->values * sizeof(float));
     isogi_release(&t->context, f->pieces, ISOGI_TRACE__PIECES + 1, sizeof *f->pieces);
-    isogi_release(&t->context, f->fresh, 3 * ISOGI_TRACE__SAMPLES + ISOGI_TRACE__HEADS, sizeof *f->fresh);
+    isogi_release(&t->context, f->found, 4 * ISOGI_TRACE__SAMPLES + ISOGI_TRACE__HEADS, sizeof *f->found);
     isogi_release(&t->context, f, 1, sizeof *f);
 }
 
@@ -3553,9 +3555,10 @@ static isogi_result isogi_trace__feedback_new(isogi_trace *t) {
     f->casts = (isogi_trace__cast *)isogi_allocate(&t->context, ISOGI_TRACE__CASTS, sizeof *f->casts);
     f->direct = (float *)isogi_allocate(&t->context, ISOGI_TRACE__SPANS, (size_t)t->values * sizeof(float));
     f->pieces = (isogi_trace__piece *)isogi_allocate(&t->context, ISOGI_TRACE__PIECES + 1, sizeof *f->pieces);
-    f->fresh = (uint32_t *)isogi_allocate(&t->context, 3 * ISOGI_TRACE__SAMPLES + ISOGI_TRACE__HEADS, sizeof *f->fresh);
-    if (!f->plans || !f->spans || !f->catches || !f->casts || !f->direct || !f->pieces || !f->fresh) return ISOGI_NO_MEMORY;
-    f->makers = f->fresh + ISOGI_TRACE__SAMPLES, f->next = f->makers + ISOGI_TRACE__SAMPLES, f->heads = f->next + ISOGI_TRACE__SAMPLES;
+    f->found = (uint32_t *)isogi_allocate(&t->context, 4 * ISOGI_TRACE__SAMPLES + ISOGI_TRACE__HEADS, sizeof *f->found);
+    if (!f->plans || !f->spans || !f->catches || !f->casts || !f->direct || !f->pieces || !f->found) return ISOGI_NO_MEMORY;
+    f->fresh = f->found + ISOGI_TRACE__SAMPLES, f->makers = f->fresh + ISOGI_TRACE__SAMPLES;
+    f->next = f->makers + ISOGI_TRACE__SAMPLES, f->heads = f->next + ISOGI_TRACE__SAMPLES;
     return ISOGI_OK;
 }
 
@@ -3788,9 +3791,11 @@ static size_t isogi_trace__probes_meet(const isogi_trace *t) {
                 if (isogi_trace__search_on(t, c, &c->search, o->probe, &o->hit, o->normal, o->isovalue, o->alike))
                     c->probe = c->search.nearest;
             }
-            if (c->probe) continue;
-            f->makers[made] = fresh[i], f->next[made] = 0, *at = (uint32_t)++made;
-            c->probe = (uint32_t)(f->probes.count + made);
+            if (!c->probe) {
+                f->makers[made] = fresh[i], f->next[made] = 0, *at = (uint32_t)++made;
+                c->probe = (uint32_t)(f->probes.count + made);
+            }
+            f->found[fresh[i]] = c->probe;
         }
     }
     return made;
@@ -4154,8 +4159,9 @@ static void isogi_trace__piece_hits(const isogi_trace *t, isogi_trace__piece *pi
     for (i = piece->span; i < piece[1].span; i++) {
         isogi_trace__span *s = &f->spans[i];
         for (k = s->offset; k < s->offset + s->count; k++) {
-            s->hits += f->catches[k].key != 0;
-            if (f->catches[k].key && !f->catches[k].probe) fresh[piece->fresh++] = k;
+            const int hit = f->catches[k].key != 0;
+            s->hits += (uint32_t)hit, f->found[k] = hit ? f->catches[k].probe : ISOGI_TRACE__ESCAPED;
+            if (!f->found[k]) fresh[piece->fresh++] = k;
         }
         piece->hits += s->hits;
     }
@@ -4337,7 +4343,7 @@ static void isogi_trace__segment_fill(const isogi_trace *t, const isogi_trace__s
         const isogi_trace__span *span = &f->spans[i];
         s->node[i] = span->node, s->begin[i] = at;
         for (k = span->offset; k < span->offset + span->count && span->hits; k++)
-            if (f->catches[k].key) s->probe[at++] = f->catches[k].probe - 1;
+            if (f->found[k] != ISOGI_TRACE__ESCAPED) s->probe[at++] = f->found[k] - 1;
     }
 }
 
@@ -6848,6 +6854,7 @@ ISOGI_API isogi_result isogi_trace_gather_field(const isogi_trace_desc *desc, is
 #undef ISOGI_TRACE__PIECE_SPANS
 #undef ISOGI_TRACE__PIECES
 #undef ISOGI_TRACE__HEADS
+#undef ISOGI_TRACE__ESCAPED
 #undef ISOGI_TRACE__CASTS
 #undef ISOGI_TRACE__SPAN
 #undef ISOGI_TRACE__SPANS
