@@ -445,7 +445,8 @@ ISOGI_API isogi_result isogi_dvr_sample_blocks(const isogi_dvr *dvr, const float
    lighting: environment and directional lights (point lights too, at the sample); unused, and may be NULL, when unlit. */
 ISOGI_API isogi_result isogi_dvr_render(const isogi_dvr *dvr, const isogi_view *view, const isogi_lighting *lighting,
                                         float (*premultiplied)[4], float *depth, isogi_counters *counters);
-ISOGI_API void isogi_dvr_counters(const isogi_dvr *dvr, isogi_counters *counters); /* adds what isogi_dvr_step did so far */
+/* Adds what isogi_dvr_step did so far; samples: those of the paper's local visibility. */
+ISOGI_API void isogi_dvr_counters(const isogi_dvr *dvr, isogi_counters *counters);
 
 /* ---- transfer functions to begin with ---- */
 
@@ -4250,6 +4251,7 @@ static void isogi_dvr__local_task(void *arg, size_t i) {
                 for (c = 0; c < d->coefficients; c++)
                     out[c] = fine ? isogi_float_to_half(sum[c][node[0] * every]) : (uint16_t)(c ? 0 : clear);
                 job->work[i].rays += (uint64_t)d->desc.directions, job->work[i].texels++;
+                if (fine) job->work[i].samples += (uint64_t)d->desc.directions * isogi_dvr__local_steps(d, fine);
             }
         }
 }

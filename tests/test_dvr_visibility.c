@@ -390,6 +390,28 @@ TEST(an_edit_computes_only_what_it_changes_and_light_computes_nothing) {
     isogi_vol_free(pyramid);
 }
 
+/* Kronander 2011, 4.2: a ray of local visibility steps from node to node of the finest block around, so coarser ones need fewer samples. */
+TEST(rays_of_local_visibility_take_steps_as_long_as_their_blocks_are_coarse) {
+    isogi_pyramid *pyramid = linear_field();
+    for (int level = 1; level <= 16; level *= 2) { /* all 27 blocks are of this level */
+        const double voxels = (double)N * N * N;
+        const isogi_dvr_desc desc = {.pyramid = pyramid, .shading = ISOGI_DVR_VISIBILITY, .method = ISOGI_DVR_PAPER, .directions = 8,
+                                     .radius = 12, .grid = {3, 3, 3}, .reduction = voxels / (27.0 * level * level * level)};
+        isogi_dvr *dvr = renderer(desc, &ramp_transfer, &serial);
+        isogi_dvr_report report;
+        isogi_counters count = {0};
+        int at = 1;
+        while (1 << (at - 1) < level) at++;
+        CHECK(isogi_dvr_step(dvr, 0, NULL) == ISOGI_OK && isogi_dvr_inspect(dvr, &report) == ISOGI_OK, "step");
+        isogi_dvr_counters(dvr, &count);
+        CHECK(report.level_count[at] == 27, "%d blocks of level %d", (int)report.level_count[at], level);
+        CHECK(count.samples == (count.rays - 27 * 8) * (uint64_t)((12 * level + 15) / 16), "level %d: %.0f samples of %.0f rays", level,
+              (double)count.samples, (double)count.rays); /* 27 * 8 rays are those of global visibility */
+        isogi_dvr_free(dvr);
+    }
+    isogi_vol_free(pyramid);
+}
+
 TEST(opacity_does_not_depend_on_the_step) {
     isogi_pyramid *pyramid = linear_field();
     const isogi_view view = {.width = 1, .height = 1, .eye = {200, 20, 22}, .target = {0, 20, 22}};
