@@ -17,8 +17,9 @@
    error. Its time is that of its texels behind the measured pixels, scaled to all of the view. Wall seconds, two threads, but for the
    rows rays-SCENE.
 
-     speedup-SCENE          work: time of naive over time of the default at the error converged. Where even one sample of the default has
-                            a smaller error e, method equal-error: at that one, for which naive's time is scaled by (converged / e)^2
+     speedup-SCENE          work: time of naive over time of the default at the error converged; method equal-error: at the errors e of
+                            all points of the curve up to 16 samples that are usable, for which naive's time is scaled by
+                            (converged / e)^2 (each the best of three, in turn with naive)
      filter-SCENE           the filter over texels at equal error: seconds of the default with the samples of speedup-, and (method
                             filter-off) of as many samples more as reach its error without; work: seconds over the default's, times the
                             square of the errors' ratio where the most samples tried (32 times) do not suffice
@@ -26,8 +27,7 @@
      lazy-SCENE             seconds to usable, and light at every pixel, from a volume that was just read: the pyramid, request, and
                             steps, on two threads; lazy-converged-SCENE: to converged. The pyramid's share, and a bound that was not
                             reached, in the setting
-     threads-SCENE          work: seconds on one thread over seconds on two (full bench: of two runs each, in turn, the better); seconds: on
-                            two
+     threads-SCENE          work: seconds on one thread over seconds on two (of two runs each, in turn, the better); seconds: on two
      full-SCENE             the whole texture to converged, with the fewest samples that reach it (full bench only)
      table1-SCENE           Wyman 2006, table 1: irradiance, transfer, and the path-traced picture (a path for every pixel that shows the
                             surface), with 100, 625, 2500 and 10,000 samples, whole paths. Lazily: the texels of the view; fully: all
@@ -758,9 +758,10 @@ static void filter_rows(FILE *csv, const bench_scene *s, int samples, outcome on
 
 static void bench(FILE *csv, const char *name, int quick, int tables) {
     bench_scene s;
+    const int sweep[2][9] = {{1, 2, 3, 4, 8, 16, 64, 128, 256}, {1, 2, 4, 8, 16}}, last = quick ? 5 : 9;
     double naives, usable, converged, texels, seconds = HUGE_VAL;
-    outcome o, best = {0};
-    int found = 0;
+    outcome o, best, curve[9];
+    int found = -1;
     char setting[96];
     isogi_trace_desc d;
     if (!scene_load(&s, name)) return;
@@ -782,12 +783,11 @@ static void bench(FILE *csv, const char *name, int quick, int tables) {
         exit(1);
     }
     d = s.desc;
-    for (int i = 0; i < (quick ? 5 : 9); i++) { /* the curve, and the first point below the error of naive */
-        const int sweep[2][9] = {{1, 2, 3, 4, 8, 16, 64, 128, 256}, {1, 2, 4, 8, 16}};
-        d.samples = sweep[quick][i], o = ours(&d, &two);
+    for (int i = 0; i < last; i++) { /* the curve, and the first point below the error of naive */
+        d.samples = sweep[quick][i], curve[i] = o = ours(&d, &two);
         snprintf(setting, sizeof setting, "samples=%d", d.samples);
         row(csv, "", &s, d.samples == (quick ? 8 : 64) ? "default" : "feedback", setting, o.seconds, o.error, o.rays, "rays");
-        if (!found && (o.error <= converged || i == (quick ? 4 : 8))) best = o, found = d.samples;
+        if (found < 0 && (o.error <= converged || i == last - 1)) found = i;
         if (quick || (d.samples & (d.samples - 1))) continue;
         d.method = ISOGI_TRACE_PATHS;
         o = ours(&d, &two), row(csv, "", &s, "paths", setting, o.seconds, o.error, o.rays, "rays");
@@ -796,21 +796,23 @@ static void bench(FILE *csv, const char *name, int quick, int tables) {
     for (int i = 0; i < 2; i++) { /* the best of three, in turn with naive: other work on the machine is no part of either */
         double error, again = 10 * naive(&s, 10, 3, &error, &texels);
         seconds = again < seconds ? again : seconds;
-        d.samples = found, o = ours(&d, &two);
-        best.seconds = o.seconds < best.seconds ? o.seconds : best.seconds;
+        for (int k = 0; k < last && (k <= found || sweep[quick][k] <= 16); k++)
+            d.samples = sweep[quick][k], curve[k].seconds = fmin(curve[k].seconds, ours(&d, &two).seconds);
     }
+    best = curve[found], d.samples = sweep[quick][found];
     seconds *= best.texels / texels * naives * naives / (converged * converged); /* of all texels of the view, at that error */
-    filter_rows(csv, &s, found, best);
-    snprintf(setting, sizeof setting, "samples=%d", found);
+    filter_rows(csv, &s, d.samples, best);
+    snprintf(setting, sizeof setting, "samples=%d", d.samples);
     if (best.error > converged) { /* all of the sweep is worse */
-        snprintf(setting, sizeof setting, "samples=%d (scaled from error %.4f)", found, best.error);
+        snprintf(setting, sizeof setting, "samples=%d (scaled from error %.4f)", d.samples, best.error);
         best.seconds *= best.error * best.error / (converged * converged);
     }
     row(csv, "speedup-", &s, "default", setting, best.seconds, converged, seconds / best.seconds, "x");
-    if (best.error < converged) {
-        double scaled = seconds * converged * converged / (best.error * best.error);
-        snprintf(setting, sizeof setting, "samples=%d (naive scaled to %.0f samples)", found, 100 * pow(naives / best.error, 2));
-        row(csv, "speedup-", &s, "equal-error", setting, best.seconds, best.error, scaled / best.seconds, "x");
+    for (int i = 0; i < last && sweep[quick][i] <= 16; i++) { /* naive's time, as if it had as many samples as its error asks for */
+        const double e = curve[i].error, scaled = seconds * converged * converged / (e * e);
+        if (e > usable) continue;
+        snprintf(setting, sizeof setting, "samples=%d (naive scaled to %.0f samples)", sweep[quick][i], 100 * pow(naives / e, 2));
+        row(csv, "speedup-", &s, "equal-error", setting, curve[i].seconds, e, scaled / curve[i].seconds, "x");
     }
     snprintf(setting, sizeof setting, "samples=100");
     if (naives > converged * 1.0001)
@@ -819,12 +821,12 @@ static void bench(FILE *csv, const char *name, int quick, int tables) {
     d.samples = 8, o = ours(&d, &one);
     row(csv, "rays-", &s, "default", "samples=8", o.seconds, o.error, o.rays, "rays");
     best = ours(&d, &two), seconds = o.seconds;
-    if (!quick) seconds = fmin(seconds, ours(&d, &one).seconds), best.seconds = fmin(best.seconds, ours(&d, &two).seconds);
+    seconds = fmin(seconds, ours(&d, &one).seconds), best.seconds = fmin(best.seconds, ours(&d, &two).seconds);
     row(csv, "threads-", &s, "default", "samples=8", best.seconds, best.error, seconds / best.seconds, "x");
     lazy_row(csv, &s, "lazy-", "usable", usable), lazy_row(csv, &s, "lazy-converged-", "converged", converged);
     if (!quick) {
         d.lazy = 0;
-        for (d.samples = found; (o = ours(&d, &two)).error > converged && d.samples < 256;) d.samples *= 2;
+        for (d.samples = sweep[quick][found]; (o = ours(&d, &two)).error > converged && d.samples < 256;) d.samples *= 2;
         snprintf(setting, sizeof setting, "samples=%d texels=%.0f MB=%.0f", d.samples, o.texels, o.bytes / 1e6);
         row(csv, "full-", &s, "default", setting, o.seconds, o.error, o.rays, "rays");
         table1(csv, &s), table2(csv, &s), lattice_table(csv, &s);
