@@ -445,7 +445,7 @@ ISOGI_API isogi_result isogi_dvr_sample_blocks(const isogi_dvr *dvr, const float
    lighting: environment and directional lights (point lights too, at the sample); unused, and may be NULL, when unlit. */
 ISOGI_API isogi_result isogi_dvr_render(const isogi_dvr *dvr, const isogi_view *view, const isogi_lighting *lighting,
                                         float (*premultiplied)[4], float *depth, isogi_counters *counters);
-/* Adds what isogi_dvr_step did so far; samples: those of the paper's local visibility. */
+/* Adds what isogi_dvr_step did so far; samples: those of the paper's local visibility and, in data space, one for each cell of a ray. */
 ISOGI_API void isogi_dvr_counters(const isogi_dvr *dvr, isogi_counters *counters);
 
 /* ---- transfer functions to begin with ---- */
@@ -4415,9 +4415,9 @@ static void isogi_dvr__global_task(void *arg, size_t task) {
    of a node; extinction is interpolated at the rays' places, the depth that a ray has gathered stays with the ray: nothing is
    interpolated twice, so that a shadow is as sharp after a hundred slices as after one. A ray that leaves at a side goes on in matter
    like that of the side and is forgotten when it is one node outside, and a new one enters at the other side, on which nothing is in the
-   way of grid points. At the slices of the visibility grid the transmittance of
-   the four rays around a grid point is interpolated, rays in dense matter counting less: across its surfaces light does not blur, and
-   the share of each ray, another one for each direction and grid point, does not show as a weave. */
+   way of grid points. At the slices of the visibility grid the transmittance of the four rays around a grid point is interpolated, rays in
+   dense matter counting less: across its surfaces light does not blur, and the share of each ray, another one for each direction and grid
+   point, does not show as a weave. */
 typedef struct isogi_dvr__sweep {
     const float *extinction;       /* node (slice, row, lane) at slice * slice_stride + row * row_stride + lane */
     size_t size[3];                /* nodes: slices, rows, lanes */

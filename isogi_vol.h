@@ -4916,7 +4916,7 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE void isogi_vol__answer(isogi_vol__turn *turn
     turn->leaves += __builtin_popcount(cells);
 }
 
-/* The number of the first child of masks, which are not counted backwards; without any: above 63. */
+/* The number, not counted backwards, of the first child of masks; without any: above 63. */
 ISOGI_VOL__AVX512 ISOGI_VOL__INLINE __m512i isogi_vol__first_child8(__m512i mask, __m512i flip) {
     return _mm512_xor_si512(_mm512_popcnt_epi64(_mm512_andnot_si512(mask, _mm512_sub_epi64(mask, _mm512_set1_epi64(1)))), flip);
 }
@@ -4941,15 +4941,13 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE unsigned isogi_vol__choose(const isogi_vol__
 #pragma GCC unroll 8
     for (k = 1; k < turn->levels; k++)
         _mm512_mask_store_epi64(s->of.mask[k] + i, _mm512_mask_cmpeq_epi64_mask(some, n, _mm512_set1_epi64(k)), rest);
-    child = _mm512_xor_si512(_mm512_popcnt_epi64(_mm512_andnot_si512(mask, _mm512_sub_epi64(mask, one))), _mm512_load_si512(&s->flip[i]));
+    child = isogi_vol__first_child8(mask, _mm512_load_si512(&s->flip[i]));
     pending =
         _mm512_mask_and_epi64(pending, (__mmask8)(some & _mm512_testn_epi64_mask(rest, rest)), pending, _mm512_sub_epi64(pending, one));
     _mm512_store_si512(&s->pending[i], pending);
     /* the cell's digits above the child's, then the child's */
     {
         const __m512i ffff = _mm512_set1_epi64(0xffff), parent = _mm512_add_epi64(shift, _mm512_set1_epi64(2));
-        const __m512i digits = _mm512_and_si512(_mm512_multishift_epi64_epi8(ISOGI_VOL__ALL64(0x2020200420022000), child),
-                                                ISOGI_VOL__ALL64(0x000300030003));
         __m512i x, y, z;
         cell = _mm512_and_si512(cell, _mm512_permutexvar_epi64(n, turn->above));
         x = _mm512_and_si512(_mm512_srlv_epi64(cell, parent), ffff);
@@ -4959,7 +4957,7 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE unsigned isogi_vol__choose(const isogi_vol__
         address = _mm512_add_epi64(x, _mm512_mul_epu32(address, _mm512_permutexvar_epi64(n, turn->parents0)));
         address = _mm512_add_epi64(_mm512_slli_epi64(address, 13), _mm512_slli_epi64(child, 7));
         address = _mm512_add_epi64(address, _mm512_permutexvar_epi64(n, turn->first));
-        cell = _mm512_or_si512(cell, _mm512_sllv_epi64(digits, shift));
+        cell = _mm512_or_si512(cell, _mm512_sllv_epi64(isogi_vol__digits8(child), shift));
     }
     _mm512_mask_store_epi64(&s->cell[i], some, cell);
     _mm512_mask_store_epi64(&s->level[i], some, _mm512_sub_epi64(n, one));
