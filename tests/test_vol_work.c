@@ -228,6 +228,42 @@ TEST(rays_side_by_side_hit_what_they_hit_alone) {
           hits, wrong_any, wrong_plain);
 }
 
+/* Rays from anywhere, in runs of one isovalue: what is known of blocks for one isovalue says nothing of the next. The field rises along z
+   and an axis, so that every isovalue has blocks of its own. */
+TEST(rays_of_one_isovalue_after_the_other_hit_what_they_hit_alone) {
+    enum { COUNT = 6000 };
+    static isogi_ray rays[COUNT];
+    static isogi_hit hits[COUNT], alone;
+    static uint8_t any[COUNT];
+    test_random r = {37};
+    long hit = 0, wrong = 0, wrong_any = 0;
+    for (int n = 0; n < 6; n++) {
+        isogi_volume v = {.type = ISOGI_F32, .size = {50, 66, 83}};
+        const isogi_context context = {.threads = 1, .force_path = n < 3 ? 4 : 0};
+        isogi_pyramid *p = NULL;
+        float *data = (float *)malloc(v.size[0] * v.size[1] * v.size[2] * sizeof *data), *out = data;
+        for (size_t z = 0; z < v.size[2]; z++)
+            for (size_t y = 0; y < v.size[1]; y++)
+                for (size_t x = 0; x < v.size[0]; x++)
+                    *out++ = (float)((double)z / 83 + (double)(n % 3 ? y : x) / 150 + 0.03 * sin(0.7 * (double)x) * sin(0.6 * (double)y));
+        v.data = data;
+        CHECK(isogi_vol_build(&p, &v, &context) == ISOGI_OK, "built");
+        for (int i = 0; i < COUNT; i++) {
+            memset(&rays[i], 0, sizeof rays[i]);
+            for (int a = 0; a < 3; a++)
+                rays[i].origin[a] = random_range(&r, -0.1, 1.1) * (double)(v.size[a] - 1), rays[i].dir[a] = (float)random_range(&r, -1, 1);
+            rays[i].isovalue = 0.05 + 0.1 * (i / 75 * 7 % 13);
+        }
+        isogi_vol_intersect(p, rays, COUNT, hits, NULL), isogi_vol_occluded(p, rays, COUNT, any, NULL);
+        for (int i = 0; i < COUNT; i++) {
+            isogi_vol_intersect(p, &rays[i], 1, &alone, NULL);
+            hit += hits[i].side != 0, wrong += memcmp(&hits[i], &alone, sizeof alone) != 0, wrong_any += any[i] != (alone.side != 0);
+        }
+        isogi_vol_free(p), free(data);
+    }
+    CHECK(hit > 4000 && !wrong && !wrong_any, "of %ld hits %ld are others, occlusions %ld", hit, wrong, wrong_any);
+}
+
 /* Any hit, where rays pass whole blocks of either side, and blocks that lie beyond the volume: of random balls in a volume, or of single
    voxels, at isovalues just above the least value and just below the largest. */
 TEST(any_hit_is_a_hit) {
@@ -263,7 +299,8 @@ TEST(any_hit_is_a_hit) {
             if (i % 3 == 0) rays[i].dir[i / 3 % 3] = 0;
             if (i % 6 == 0) rays[i].dir[(i / 3 + 1) % 3] = 0;
             if (i % 5 == 0) rays[i].tmax = random_range(&r, 1, 60);
-            rays[i].isovalue = i % 2 ? 0.5 : i % 4 ? 254.5 : 128;
+            const int which = n % 2 ? i / 40 : i; /* one by one, and in runs, which rays go through together */
+            rays[i].isovalue = which % 2 ? 0.5 : which % 4 ? 254.5 : 128;
         }
         isogi_vol_intersect(p, rays, COUNT, hits, NULL);
         isogi_vol_occluded(p, rays, COUNT, any, NULL);
