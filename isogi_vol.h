@@ -142,7 +142,7 @@ typedef struct isogi_counters {
     uint64_t cubics;         /* cells whose cubic was set up in double */
     uint64_t texels;         /* texels (trace) or grid points (dvr) computed */
     uint64_t texels_skipped; /* of those asked for, the ones that need no rays */
-    uint64_t samples;        /* volume samples taken along viewing rays */
+    uint64_t samples;        /* volume samples taken along viewing rays; in isogi_dvr_counters as told there */
     uint64_t blocks_skipped; /* blocks stepped over because nothing in them is visible */
 } isogi_counters;
 
