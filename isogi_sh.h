@@ -1816,28 +1816,57 @@ ISOGI_SH__AVX2 ISOGI_SH__INLINE void isogi_sh__eval_d4_turn(double *y, size_t n,
     for (k = 0; k < 4; k++) *(isogi_sh__d4 *)(y + n * k) = v[0][k], *(isogi_sh__d4 *)(y + n * k + 4) = v[1][k];
 }
 
-/* y[pitch i] = quarter i of each of four vectors, in turn */
-ISOGI_SH__AVX512 ISOGI_SH__INLINE void isogi_sh__quarters(double *y, size_t pitch, isogi_sh__d8 a, isogi_sh__d8 b, isogi_sh__d8 c,
-                                                          isogi_sh__d8 d) {
-    isogi_sh__d8 p = __builtin_shufflevector(a, b, 0, 1, 2, 3, 8, 9, 10, 11), q = __builtin_shufflevector(c, d, 0, 1, 2, 3, 8, 9, 10, 11);
-    *(isogi_sh__d8 *)y = __builtin_shufflevector(p, q, 0, 1, 4, 5, 8, 9, 12, 13);
-    *(isogi_sh__d8 *)(y + pitch) = __builtin_shufflevector(p, q, 2, 3, 6, 7, 10, 11, 14, 15);
-    p = __builtin_shufflevector(a, b, 4, 5, 6, 7, 12, 13, 14, 15), q = __builtin_shufflevector(c, d, 4, 5, 6, 7, 12, 13, 14, 15);
-    *(isogi_sh__d8 *)(y + 2 * pitch) = __builtin_shufflevector(p, q, 0, 1, 4, 5, 8, 9, 12, 13);
-    *(isogi_sh__d8 *)(y + 3 * pitch) = __builtin_shufflevector(p, q, 2, 3, 6, 7, 10, 11, 14, 15);
+/* 8 numbers of a direction, from halves of two vectors, and the constant before them where they are the first. What are neighbours in
+   memory is stored one after the other, whatever the compiler would like: stores in another order take a seventh longer. */
+#define ISOGI_SH__IN_ORDER __asm__ volatile("" ::: "memory")
+#define ISOGI_SH__PUT_HALVES(y, k)                                                                                             \
+    ISOGI_SH__IN_ORDER;                                                                                                        \
+    if (first) (y)[-1] = 0.28209479177387814;                                                                                  \
+    *(isogi_sh__d4 *)(y) = ISOGI_SH__HALF_D8(p, k);                                                                            \
+    ISOGI_SH__IN_ORDER; /* clang would join them */                                                                            \
+    *(isogi_sh__d4 *)((y) + 4) = ISOGI_SH__HALF_D8(q, k);                                                                      \
+    ISOGI_SH__IN_ORDER
+ISOGI_SH__AVX512 ISOGI_SH__INLINE void isogi_sh__eval_d8_turn_at(double *y, size_t n, const isogi_sh__d8 *row, int first) {
+    const isogi_sh__d4 none = {0};
+    isogi_sh__d8 v[4][2], p, q;
+    size_t k;
+    (void)none; /* clang */
+    ISOGI_SH__UNROLL
+    for (k = 0; k < 4; k++) {
+        v[k][0] = __builtin_shufflevector(row[2 * k], row[2 * k + 1], 0, 8, 2, 10, 4, 12, 6, 14);
+        v[k][1] = __builtin_shufflevector(row[2 * k], row[2 * k + 1], 1, 9, 3, 11, 5, 13, 7, 15);
+    }
+    ISOGI_SH__UNROLL
+    for (k = 0; k < 2; k++) {
+        p = __builtin_shufflevector(v[0][k], v[1][k], 0, 1, 8, 9, 2, 3, 10, 11);
+        q = __builtin_shufflevector(v[2][k], v[3][k], 0, 1, 8, 9, 2, 3, 10, 11);
+        ISOGI_SH__PUT_HALVES(y + n * k, 0);
+        ISOGI_SH__PUT_HALVES(y + n * (k + 2), 1);
+        p = __builtin_shufflevector(v[0][k], v[1][k], 4, 5, 12, 13, 6, 7, 14, 15);
+        q = __builtin_shufflevector(v[2][k], v[3][k], 4, 5, 12, 13, 6, 7, 14, 15);
+        ISOGI_SH__PUT_HALVES(y + n * (k + 4), 0);
+        ISOGI_SH__PUT_HALVES(y + n * (k + 6), 1);
+    }
 }
 
 ISOGI_SH__AVX512 ISOGI_SH__INLINE void isogi_sh__eval_d8_turn(double *y, size_t n, const isogi_sh__d8 *row) {
-    isogi_sh__d8 even[4], odd[4];
-    int i;
-    ISOGI_SH__UNROLL
-    for (i = 0; i < 4; i++) {
-        even[i] = __builtin_shufflevector(row[2 * i], row[2 * i + 1], 0, 8, 2, 10, 4, 12, 6, 14);
-        odd[i] = __builtin_shufflevector(row[2 * i], row[2 * i + 1], 1, 9, 3, 11, 5, 13, 7, 15);
-    }
-    isogi_sh__quarters(y, 2 * n, even[0], even[1], even[2], even[3]);
-    isogi_sh__quarters(y + n, 2 * n, odd[0], odd[1], odd[2], odd[3]);
+    isogi_sh__eval_d8_turn_at(y, n, row, 0);
 }
+
+/* the same for columns 1 to 8, with column 0, which is constant */
+ISOGI_SH__AVX512 ISOGI_SH__INLINE void isogi_sh__eval_d8_turn_first(double *y, size_t n, const isogi_sh__d8 *row) {
+    isogi_sh__eval_d8_turn_at(y + 1, n, row + 1, 1);
+}
+#define ISOGI_SH__DEFINE_TURN_FIRST(NAME, TARGET, T, V, WIDTH)                                                                 \
+    TARGET ISOGI_SH__INLINE void NAME##_turn_first(T *y, size_t n, const V *row) {                                             \
+        size_t k;                                                                                                              \
+        ISOGI_SH__UNROLL25                                                                                                     \
+        for (k = 0; k < WIDTH; k++) y[n * k] = (T)0.28209479177387814;                                                         \
+        NAME##_turn(y + 1, n, row + 1);                                                                                        \
+    }
+ISOGI_SH__DEFINE_TURN_FIRST(isogi_sh__eval_f8, ISOGI_SH__AVX2, float, isogi_sh__f8, 8)
+ISOGI_SH__DEFINE_TURN_FIRST(isogi_sh__eval_f16, ISOGI_SH__AVX512, float, isogi_sh__f16, 16)
+ISOGI_SH__DEFINE_TURN_FIRST(isogi_sh__eval_d4, ISOGI_SH__AVX2, double, isogi_sh__d4, 4)
 
 /* The same for 16 rows of floats and 8 of doubles from memory, where halves of two rows are joined by an insertion, so that one shuffle
    is less and whole vectors are stored. Of `tiles` tiles, 1 or 2, those of a direction are stored one after the other where stores are what
@@ -2307,7 +2336,7 @@ ISOGI_SH__AVX512 ISOGI_SH__INLINE void isogi_sh__eval_d8_split(isogi_sh__d8 *u, 
     /* order 5, with the next directions made ready meanwhile */                                                               \
     TARGET static size_t NAME##_rows5(T *out, const T (*direction)[3], size_t count) {                                         \
         V zero = {0}, u[4] = {zero, zero, zero, zero}, next[4] = {zero, zero, zero, zero}, basis[25];                          \
-        size_t i, k, at = 0;                                                                                                   \
+        size_t i, at = 0;                                                                                                      \
         int more;                                                                                                              \
         for (i = 0;; i += WIDTH) {                                                                                             \
             size_t after = i < count - WIDTH ? i : count - WIDTH;                                                              \
@@ -2319,9 +2348,7 @@ ISOGI_SH__AVX512 ISOGI_SH__INLINE void isogi_sh__eval_d8_split(isogi_sh__d8 *u, 
             if (i) {                                                                                                           \
                 T *row = out + 25 * at;                                                                                        \
                 NAME##_order5(basis, u);                                                                                       \
-                ISOGI_SH__UNROLL25                                                                                             \
-                for (k = 0; k < WIDTH; k++) row[25 * k] = (T)0.28209479177387814;                                              \
-                NAME##_turn(row + 1, 25, basis + 1);                                                                           \
+                NAME##_turn_first(row, 25, basis);                                                                             \
                 NAME##_turn(row + 9, 25, basis + 9);                                                                           \
                 NAME##_turn(row + 17, 25, basis + 17);                                                                         \
             }                                                                                                                  \
@@ -6147,6 +6174,9 @@ ISOGI_API isogi_result isogi_sh_fit_directional(float direction[3], float rgb[3]
 #undef ISOGI_SH__TABLE_ORDER
 #undef ISOGI_SH__SPLIT
 #undef ISOGI_SH__AVX2
+#undef ISOGI_SH__IN_ORDER
+#undef ISOGI_SH__PUT_HALVES
+#undef ISOGI_SH__DEFINE_TURN_FIRST
 #undef ISOGI_SH__AVX512
 #undef ISOGI_SH__ALL16
 #undef ISOGI_SH__ALL8
