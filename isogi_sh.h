@@ -2477,7 +2477,10 @@ ISOGI_SH__INLINE size_t isogi_sh__eval_columns_f32(float *out, size_t stride, in
     if (order < 3 || order > ISOGI_SH__TABLE_ORDER || count < 4) return 0;
 #ifdef ISOGI_SH__SIMD
     level = isogi_sh__level();
-    if (level > 1) done = isogi_sh__eval_f16(out, stride, order, x, y, z, count);
+    if (level > 1) {
+        if (order == 11 && count % 32 == 0) done = isogi_sh__eval_f16_eleven_two(out, stride, x, y, z, count); /* a call less */
+        if (done < count) done += isogi_sh__eval_f16(out + done, stride, order, x + done, y + done, z + done, count - done);
+    }
     if (level && done < count) done += isogi_sh__eval_f8(out + done, stride, order, x + done, y + done, z + done, count - done);
 #endif
     if (!level) done = isogi_sh__eval_f4(out + done, stride, order, x, y, z, count);
