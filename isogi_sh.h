@@ -1826,7 +1826,8 @@ ISOGI_SH__AVX2 ISOGI_SH__INLINE void isogi_sh__eval_d4_turn(double *y, size_t n,
     ISOGI_SH__IN_ORDER; /* clang would join them */                                                                            \
     *(isogi_sh__d4 *)((y) + 4) = ISOGI_SH__HALF_D8(q, k);                                                                      \
     ISOGI_SH__IN_ORDER
-ISOGI_SH__AVX512 ISOGI_SH__INLINE void isogi_sh__eval_d8_turn_at(double *y, size_t n, const isogi_sh__d8 *row, int first) {
+#define ISOGI_SH__LANE(k) (mixed ? 3 * (k) % 8 : (k)) /* the direction of lane k */
+ISOGI_SH__AVX512 ISOGI_SH__INLINE void isogi_sh__eval_d8_turn_at(double *y, size_t n, const isogi_sh__d8 *row, int first, int mixed) {
     const isogi_sh__d4 none = {0};
     isogi_sh__d8 v[4][2], p, q;
     size_t k;
@@ -1840,30 +1841,35 @@ ISOGI_SH__AVX512 ISOGI_SH__INLINE void isogi_sh__eval_d8_turn_at(double *y, size
     for (k = 0; k < 2; k++) {
         p = __builtin_shufflevector(v[0][k], v[1][k], 0, 1, 8, 9, 2, 3, 10, 11);
         q = __builtin_shufflevector(v[2][k], v[3][k], 0, 1, 8, 9, 2, 3, 10, 11);
-        ISOGI_SH__PUT_HALVES(y + n * k, 0);
-        ISOGI_SH__PUT_HALVES(y + n * (k + 2), 1);
+        ISOGI_SH__PUT_HALVES(y + n * ISOGI_SH__LANE(k), 0);
+        ISOGI_SH__PUT_HALVES(y + n * ISOGI_SH__LANE(k + 2), 1);
         p = __builtin_shufflevector(v[0][k], v[1][k], 4, 5, 12, 13, 6, 7, 14, 15);
         q = __builtin_shufflevector(v[2][k], v[3][k], 4, 5, 12, 13, 6, 7, 14, 15);
-        ISOGI_SH__PUT_HALVES(y + n * (k + 4), 0);
-        ISOGI_SH__PUT_HALVES(y + n * (k + 6), 1);
+        ISOGI_SH__PUT_HALVES(y + n * ISOGI_SH__LANE(k + 4), 0);
+        ISOGI_SH__PUT_HALVES(y + n * ISOGI_SH__LANE(k + 6), 1);
     }
 }
 
 ISOGI_SH__AVX512 ISOGI_SH__INLINE void isogi_sh__eval_d8_turn(double *y, size_t n, const isogi_sh__d8 *row) {
-    isogi_sh__eval_d8_turn_at(y, n, row, 0);
+    isogi_sh__eval_d8_turn_at(y, n, row, 0, 0);
 }
 
-/* the same for columns 1 to 8, with column 0, which is constant */
-ISOGI_SH__AVX512 ISOGI_SH__INLINE void isogi_sh__eval_d8_turn_first(double *y, size_t n, const isogi_sh__d8 *row) {
-    isogi_sh__eval_d8_turn_at(y + 1, n, row + 1, 1);
+/* the same for columns 1 to 8 of order 5, with column 0, which is constant, and for later ones; of doubles, lanes are those of
+   isogi_sh__eval_d8_mixed */
+ISOGI_SH__AVX512 ISOGI_SH__INLINE void isogi_sh__eval_d8_turn_first(double *y, const isogi_sh__d8 *row) {
+    isogi_sh__eval_d8_turn_at(y + 1, 25, row + 1, 1, 1);
+}
+ISOGI_SH__AVX512 ISOGI_SH__INLINE void isogi_sh__eval_d8_turn_mixed(double *y, const isogi_sh__d8 *row) {
+    isogi_sh__eval_d8_turn_at(y, 25, row, 0, 1);
 }
 #define ISOGI_SH__DEFINE_TURN_FIRST(NAME, TARGET, T, V, WIDTH)                                                                 \
-    TARGET ISOGI_SH__INLINE void NAME##_turn_first(T *y, size_t n, const V *row) {                                             \
+    TARGET ISOGI_SH__INLINE void NAME##_turn_first(T *y, const V *row) {                                                       \
         size_t k;                                                                                                              \
         ISOGI_SH__UNROLL25                                                                                                     \
-        for (k = 0; k < WIDTH; k++) y[n * k] = (T)0.28209479177387814;                                                         \
-        NAME##_turn(y + 1, n, row + 1);                                                                                        \
-    }
+        for (k = 0; k < WIDTH; k++) y[25 * k] = (T)0.28209479177387814;                                                        \
+        NAME##_turn(y + 1, 25, row + 1);                                                                                       \
+    }                                                                                                                          \
+    TARGET ISOGI_SH__INLINE void NAME##_turn_mixed(T *y, const V *row) { NAME##_turn(y, 25, row); }
 ISOGI_SH__DEFINE_TURN_FIRST(isogi_sh__eval_f8, ISOGI_SH__AVX2, float, isogi_sh__f8, 8)
 ISOGI_SH__DEFINE_TURN_FIRST(isogi_sh__eval_f16, ISOGI_SH__AVX512, float, isogi_sh__f16, 16)
 ISOGI_SH__DEFINE_TURN_FIRST(isogi_sh__eval_d4, ISOGI_SH__AVX2, double, isogi_sh__d4, 4)
@@ -1964,6 +1970,20 @@ ISOGI_SH__AVX512 ISOGI_SH__INLINE void isogi_sh__eval_d8_split(isogi_sh__d8 *u, 
     u[1] = __builtin_shufflevector(y, c, 0, 1, 2, 3, 4, 8, 11, 14);
     u[2] = __builtin_shufflevector(z, c, 0, 1, 2, 3, 4, 9, 12, 15);
 }
+
+/* The same by blends, which more units do than shuffles, and without vectors of indices, whose loads would wait for stores: the lanes are
+   directions 0 3 6 1 4 7 2 5. */
+ISOGI_SH__AVX512 ISOGI_SH__INLINE void isogi_sh__eval_d8_mixed(isogi_sh__d8 *u, const double *from) {
+    isogi_sh__d8 a = *(const isogi_sh__d8 *)from, b = *(const isogi_sh__d8 *)(from + 8), c = *(const isogi_sh__d8 *)(from + 16), y, z;
+    u[0] = (isogi_sh__d8)ISOGI_SH__BLEND_D8(0x24, ISOGI_SH__BLEND_D8(0x92, a, b), c);
+    y = (isogi_sh__d8)ISOGI_SH__BLEND_D8(0x49, ISOGI_SH__BLEND_D8(0x24, a, b), c);
+    z = (isogi_sh__d8)ISOGI_SH__BLEND_D8(0x92, ISOGI_SH__BLEND_D8(0x49, a, b), c);
+    u[1] = __builtin_shufflevector(y, y, 1, 2, 3, 4, 5, 6, 7, 0);
+    u[2] = __builtin_shufflevector(z, z, 2, 3, 4, 5, 6, 7, 0, 1);
+}
+ISOGI_SH__AVX2 ISOGI_SH__INLINE void isogi_sh__eval_f8_mixed(isogi_sh__f8 *u, const float *from) { isogi_sh__eval_f8_split(u, from); }
+ISOGI_SH__AVX2 ISOGI_SH__INLINE void isogi_sh__eval_d4_mixed(isogi_sh__d4 *u, const double *from) { isogi_sh__eval_d4_split(u, from); }
+ISOGI_SH__AVX512 ISOGI_SH__INLINE void isogi_sh__eval_f16_mixed(isogi_sh__f16 *u, const float *from) { isogi_sh__eval_f16_split(u, from); }
 
 #define ISOGI_SH__REST_F8(one, z) ISOGI_SH__FMA_F8(-(z), z, one)
 #define ISOGI_SH__REST_D4(one, z) ISOGI_SH__FMA_D4(-(z), z, one)
@@ -2342,15 +2362,15 @@ ISOGI_SH__AVX512 ISOGI_SH__INLINE void isogi_sh__eval_d8_split(isogi_sh__d8 *u, 
             size_t after = i < count - WIDTH ? i : count - WIDTH;                                                              \
             more = i < count;                                                                                                  \
             if (more) {                                                                                                        \
-                NAME##_split(next, direction[after]);                                                                          \
+                NAME##_mixed(next, direction[after]);                                                                          \
                 more = NAME##_unit(next);                                                                                      \
             }                                                                                                                  \
             if (i) {                                                                                                           \
                 T *row = out + 25 * at;                                                                                        \
                 NAME##_order5(basis, u);                                                                                       \
-                NAME##_turn_first(row, 25, basis);                                                                             \
-                NAME##_turn(row + 9, 25, basis + 9);                                                                           \
-                NAME##_turn(row + 17, 25, basis + 17);                                                                         \
+                NAME##_turn_first(row, basis);                                                                                 \
+                NAME##_turn_mixed(row + 9, basis + 9);                                                                         \
+                NAME##_turn_mixed(row + 17, basis + 17);                                                                       \
             }                                                                                                                  \
             if (!more) return i < count ? i : count;                                                                           \
             u[0] = next[0], u[1] = next[1], u[2] = next[2], at = after;                                                        \
@@ -6180,6 +6200,7 @@ ISOGI_API isogi_result isogi_sh_fit_directional(float direction[3], float rgb[3]
 #undef ISOGI_SH__IN_ORDER
 #undef ISOGI_SH__PUT_HALVES
 #undef ISOGI_SH__DEFINE_TURN_FIRST
+#undef ISOGI_SH__LANE
 #undef ISOGI_SH__AVX512
 #undef ISOGI_SH__ALL16
 #undef ISOGI_SH__ALL8
