@@ -1330,4 +1330,37 @@ TEST(drafts_of_any_colour_have_errors) {
     scene_free(&s);
 }
 
+/* More points than are looked through together, by many tasks, most of them in cells of others before them: the texels of each alone. */
+TEST(many_points_in_one_request) {
+    enum { POINTS = 70000, PIECE = 1000 };
+    double q[5] = {12, 11, 12, 15, 7};
+    scene s = scene_make(25, 25, 25, NULL, pit, q);
+    float (*points)[3] = (float(*)[3])malloc(POINTS * sizeof *points);
+    isogi_trace_lookup lookup[2] = {ISOGI_TRACE_TRILINEAR, ISOGI_TRACE_BSPLINE};
+    for (int i = 0; i < POINTS; i++) /* slices of the volume, one after the other; every seventh point on faces of cells */
+        for (int a = 0; a < 3; a++) {
+            unsigned bits = (unsigned)(3 * i + a) * 2654435761u;
+            double x = 24 * (a == 2 ? (i / 2800 + (bits >> 8) / 16777216.0) / 25 : (bits >> 8) / 16777216.0);
+            points[i][a] = (float)(i % 7 ? x : floor(x));
+        }
+    for (int l = 0; l < 2; l++) {
+        isogi_trace_desc d = desc_make(&s, 0.5f, 1, 4);
+        isogi_trace *one = NULL, *pieces = NULL;
+        size_t wanted = 0, apart = 0;
+        d.lazy = 1, d.lookup = lookup[l];
+        CHECK(isogi_trace_create(&one, &d, NULL) == ISOGI_OK && isogi_trace_create(&pieces, &d, NULL) == ISOGI_OK, "created");
+        CHECK(isogi_trace_request(one, (const float(*)[3])points, POINTS) == ISOGI_OK, "all at once");
+        for (int i = 0; i < POINTS; i += PIECE)
+            CHECK(isogi_trace_request(pieces, (const float(*)[3])points + i, PIECE) == ISOGI_OK, "from %d on", i);
+        for (size_t i = 0; i < 25 * 25 * 25; i++) {
+            size_t texel[3] = {i % 25, i / 25 % 25, i / 625};
+            wanted += (size_t)isogi_trace_wanted(one, texel);
+            apart += isogi_trace_wanted(one, texel) != isogi_trace_wanted(pieces, texel);
+        }
+        CHECK(wanted > 1000 && !apart, "lookup %d: of %zu texels %zu are wanted in one way alone", l, wanted, apart);
+        isogi_trace_free(one), isogi_trace_free(pieces);
+    }
+    free(points), scene_free(&s);
+}
+
 TEST_MAIN("trace_bake")
