@@ -1483,7 +1483,7 @@ TEST(sums_scalings_and_energy) {
 TEST(windows_and_deringing) {
     enum { ORDER = 8, N = ORDER * ORDER };
     static const char *const names[] = {"Hann", "Lanczos", "Gauss"};
-    static const double at_half[] = {0.5, 0.63661977236758134, 0.5};
+    static const double at_half[] = {0.5, 0.63661977236758134, 0.5}, windowed[] = {0.029, 0.045, 0.027};
     float delta[3 * N], sky[3 * N], out[3 * N], up[3] = {0.3f, 1, 0.2f}, white[3] = {1, 0.9f, 0.8f}, black[3] = {0, 0, 0};
     isogi_light sun = {.vector = {1, 2, 3}, .rgb = {1, 2, 3}};
     isogi_lighting lighting = {.lights = &sun, .light_count = 1};
@@ -1517,6 +1517,9 @@ TEST(windows_and_deringing) {
                    names[kind], low[0], low[1], low[2], width);
             CHECK(low[0] < -0.02, "there are rings to begin with: %g", low[0]);
             CHECK(low[2] > -1e-5, "de-ringed: %g", low[2]);
+            CHECK(which || (fabs(low[0] + 0.14) < 5e-3 && fabs(low[1] + windowed[kind]) < 5e-4), "what the header says of a delta: %g, %g",
+                  low[0], low[1]);
+            CHECK(width > (which ? 2.05 : 1.35) && width < (which ? 2.75 : 1.75), "what the header says of the width: %g", width);
             isogi_sh_window(out, c, ORDER, 3, (isogi_sh_window_kind)kind, width * 1.1);
             double wider = 0;
             for (int j = 0; j < 20000; j++) {
@@ -2059,9 +2062,9 @@ TEST(images_agree_at_every_level) {
                 double largest = 0;
                 for (int i = 0; i < n; i++) c[i] = plain[i] = 7;
                 instruction_level = 0;
-                isogi_sh_project_image(plain, orders[o], channels, image, size[k][0], size[k][1]);
+                CHECK(isogi_sh_project_image(plain, orders[o], channels, image, size[k][0], size[k][1]) == ISOGI_OK, "size %d", (int)k);
                 instruction_level = BEST_LEVEL;
-                isogi_sh_project_image(c, orders[o], channels, image, size[k][0], size[k][1]);
+                CHECK(isogi_sh_project_image(c, orders[o], channels, image, size[k][0], size[k][1]) == ISOGI_OK, "size %d", (int)k);
                 for (int i = 0; i < n; i++) largest = fmax(largest, fabs((double)plain[i]));
                 for (int i = 0; i < n; i++) worst = fmax(worst, fabs((double)c[i] - (double)plain[i]) / largest);
             }
@@ -2075,9 +2078,9 @@ TEST(images_agree_at_every_level) {
                 for (int f = 0; f < 6; f++) face[f] = image + 1000 * f;
                 for (int i = 0; i < n; i++) c[i] = plain[i] = 7;
                 instruction_level = 0;
-                isogi_sh_project_cube(plain, order, channels, face, edge[k]);
+                CHECK(isogi_sh_project_cube(plain, order, channels, face, edge[k]) == ISOGI_OK, "edge %d", edge[k]);
                 instruction_level = BEST_LEVEL;
-                isogi_sh_project_cube(c, order, channels, face, edge[k]);
+                CHECK(isogi_sh_project_cube(c, order, channels, face, edge[k]) == ISOGI_OK, "edge %d", edge[k]);
                 for (int i = 0; i < n; i++) largest = fmax(largest, fabs((double)plain[i]));
                 for (int i = 0; i < n; i++) worst = fmax(worst, fabs((double)c[i] - (double)plain[i]) / largest);
             }

@@ -6,6 +6,7 @@
 #include "isogi_sh.h"
 #include "reference_sh.h"
 #include "stack.h"
+#include <float.h>
 #include "test.h"
 
 static const double pi = 3.14159265358979323846;
@@ -694,6 +695,206 @@ TEST(fits_of_any_order) {
             CHECK(off <= 1e-5 && fabs((double)rgb[0] - 3) <= 1e-4 && fabs((double)ambient[0]) <= 1e-4, "order %d, axis %d: %g off, %g %g",
                   orders[o], a, off, (double)rgb[0], (double)ambient[0]);
         }
+}
+
+/* ---- what doubles reach, and what has a closed form ---- */
+
+/* What the header allows doubles at an order, -ffast-math and x87 registers included. */
+static double allowed_at(int order) {
+    const double bound = order <= 5 ? 1e-15 : order <= 11 ? 5e-15 : order <= 21 ? 2e-14 : 7e-13;
+    return bound * (ROUNDING_FACTOR > 1 ? 6 : 1) * (FLT_EVAL_METHOD == 2 ? 2 : 1);
+}
+
+/* Doubles as short and as long as they are, the zero vector and what is not finite, in every function in double that takes directions:
+   in a batch, in both layouts and alone they are the reference's; what has no direction is +z. */
+TEST(doubles_of_any_length_and_order) {
+    static const double vectors[][3] = {{0, 0, 1}, {5e-324, 0, 0}, {1e-310, 2e-310, -2e-310}, {1.7e308, -1.7e308, 1e308},
+        {1e-300, 0, 1e300}, {0, -1.7e308, 5e-324}, {1e-8, 0, -1}, {0, 1e-8, 1}, {-1e-160, 1e-160, 0}, {1e155, 1, -1e155}, {0, 0, 0},
+        {-0.0, 0, -0.0}, {(double)NAN, 0, 1}, {0, (double)INFINITY, 0}, {1, 2, -(double)INFINITY}};
+    enum { COUNT = sizeof vectors / sizeof *vectors, DIRECTED = 10 };
+    static double y[COUNT * N], columns[COUNT * N], one[N], wide[3 * N], gradient[COUNT][N][3], up[N][3], x[3][COUNT], sum[3 * COUNT];
+    static const double above[1][3] = {{0, 0, 2}};
+    static const int some[] = {1, 2, 5, 21, 101};
+    test_random r = {71};
+    for (int i = 0; i < COUNT; i++)
+        for (int k = 0; k < 3; k++) x[k][i] = vectors[i][k];
+    for (int o = 0; o < 5; o++) {
+        const int order = some[o], n = order * order;
+        double worst = 0, worst_sum = 0, along = 0;
+        for (int i = 0; i < 3 * n; i++) wide[i] = random_range(&r, -1, 1) / n;
+        CHECK(isogi_sh_eval_f64(y, order, vectors, COUNT) == ISOGI_OK &&
+                  isogi_sh_eval_soa_f64(columns, order, x[0], x[1], x[2], COUNT) == ISOGI_OK &&
+                  isogi_sh_eval_sum_f64(sum, wide, order, 3, vectors, COUNT) == ISOGI_OK,
+              "order %d", order);
+        isogi_sh_eval_gradient_f64(up, order, above, 1);
+        for (int i = 0; i < COUNT; i++) {
+            quad v[3] = {0, 0, 1}, length = 1, value[3] = {0, 0, 0};
+            for (int k = 0; k < 3 && i < DIRECTED; k++) v[k] = (quad)vectors[i][k];
+            reference_eval(basis, order, v);
+            isogi_sh_eval_f64(one, order, vectors + i, 1);
+            for (int k = 0; k < n; k++) {
+                const double at[3] = {y[i * n + k], columns[k * COUNT + i], one[k]};
+                for (int p = 0; p < 3; p++) worst = fmax(worst, test_finite(at[p]) ? fabs((double)(basis[k] - (quad)at[p])) : 1e9);
+                for (int channel = 0; channel < 3; channel++) value[channel] += basis[k] * (quad)wide[3 * k + channel];
+            }
+            for (int k = 0; k < 3; k++)
+                worst_sum = fmax(worst_sum, test_finite(sum[3 * i + k]) ? fabs((double)(value[k] - (quad)sum[3 * i + k])) : 1e9);
+            CHECK(isogi_sh_eval_gradient_f64(gradient[i], order, vectors + i, 1) == ISOGI_OK, "vector %d", i);
+            if (i >= DIRECTED)
+                CHECK(!memcmp(gradient[i], up, (size_t)n * sizeof *up), "order %d, vector %d: its gradient is not that of +z", order, i);
+            length = quad_sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
+            for (int k = 0; k < n; k++) {
+                const double *g = gradient[i][k];
+                const quad dot = (quad)g[0] * v[0] + (quad)g[1] * v[1] + (quad)g[2] * v[2];
+                along = fmax(along, test_finite(g[0] + g[1] + g[2]) ? fabs((double)(dot / length)) : 1e9);
+            }
+        }
+        printf("    order %d: %.3g, sums %.3g; gradients along their direction %.3g\n", order, worst, worst_sum, along);
+        CHECK(worst <= allowed_at(order) && worst_sum <= allowed_at(order), "order %d: %g, sums %g", order, worst, worst_sum);
+        CHECK(along <= 1e-12 * order, "order %d: gradients along their direction %g", order, along);
+    }
+}
+
+/* By 0, pi and 1e-9 about each axis, in double: at once, by a matrix and about z, they are evaluation at the direction turned back; and
+   1e-9 is not nothing. */
+TEST(rotations_by_nothing_by_half_a_turn_and_by_little) {
+    static const double angles[] = {0, 3.14159265358979323846, 1e-9};
+    static double wide[N], turned[3][N], y[N];
+    static const int some[] = {1, 2, 6, 17, 101};
+    double *rotation = (double *)malloc(ISOGI_SH_ROTATION_COUNT(MOST) * sizeof *rotation);
+    test_random r = {72};
+    for (int i = 0; rotation && i < 45; i++) {
+        const int order = some[i / 9], n = order * order, axis = i % 3, ways = 1 + (order < 101 || i % 9 == 5 || LONG_SUITE);
+        const double angle = angles[i / 3 % 3];
+        double v[3] = {0, 0, 0}, m[9], to[1][3], back[1][3], norm = 0, moved = 0, expected_value = 0;
+        v[axis] = 1;
+        CHECK(isogi_sh_matrix_from_axis_angle_f64(m, v, angle) == ISOGI_OK, "axis %d, angle %g", axis, angle);
+        for (int k = 0; k < n; k++) wide[k] = random_range(&r, -1, 1), norm += wide[k] * wide[k];
+        CHECK(isogi_sh_rotate_f64(turned[0], wide, order, 1, m) == ISOGI_OK, "axis %d, angle %g", axis, angle);
+        if (ways > 1)
+            CHECK(isogi_sh_rotation_build_f64(rotation, order, m) == ISOGI_OK &&
+                      isogi_sh_rotation_apply_f64(turned[1], wide, order, 1, rotation) == ISOGI_OK, "order %d", order);
+        isogi_sh_rotate_z_f64(turned[2], wide, order, 1, angle);
+        for (int k = 0; k < n; k++) moved = fmax(moved, fabs(turned[0][k] - wide[k]));
+        CHECK(order < 2 || (angle > 0) == (moved > 1e-11), "order %d, axis %d, angle %g moves by %g", order, axis, angle, moved);
+        for (int k = 0; k < 10; k++) {
+            random_direction(&r, to[0]);
+            for (int a = 0; a < 3; a++) back[0][a] = m[a] * to[0][0] + m[3 + a] * to[0][1] + m[6 + a] * to[0][2];
+            isogi_sh_eval_f64(y, order, (const double(*)[3])back, 1);
+            expected_value = 0;
+            for (int j = 0; j < n; j++) expected_value += wide[j] * y[j];
+            isogi_sh_eval_f64(y, order, (const double(*)[3])to, 1);
+            for (int way = 0; way < 3; way++) {
+                double value = 0;
+                if ((way == 1 && ways < 2) || (way == 2 && axis < 2)) continue;
+                for (int j = 0; j < n; j++) value += turned[way][j] * y[j];
+                CHECK(fabs(value - expected_value) <= 2 * allowed_at(order) * sqrt(norm),
+                      "order %d, axis %d, angle %g, way %d: %.17g, not %.17g", order, axis, angle, way, value, expected_value);
+            }
+        }
+    }
+    CHECK(rotation != NULL, "%s", "memory");
+    free(rotation);
+}
+
+/* Ten thousand turns by one matrix: what the header says the norm drifts, of every channel, at orders on all ways but those of tensors. */
+TEST(norms_after_ten_thousand_rotations) {
+    enum { ORDER = 17, CHANNELS = 3 };
+    static double wide[CHANNELS * ORDER * ORDER];
+    static const int some[] = {2, 3, 6, 8, 16, 17};
+    const double axis[3] = {1, 2, -2};
+    double m[9], worst = 0, worst_float = 0;
+    float mf[9];
+    test_random r = {73};
+    CHECK(isogi_sh_matrix_from_axis_angle_f64(m, axis, 0.7) == ISOGI_OK, "%s", "matrix");
+    for (int k = 0; k < 9; k++) mf[k] = (float)m[k];
+    for (int o = 0; o < 6; o++)
+        for (int channels = some[o] == 3 ? 3 : 1; channels <= CHANNELS; channels += 2) {
+            const int n = channels * some[o] * some[o];
+            double before[CHANNELS] = {0, 0, 0}, after[CHANNELS] = {0, 0, 0}, after_float[CHANNELS] = {0, 0, 0};
+            for (int i = 0; i < n; i++)
+                c[i] = (float)random_range(&r, -1, 1), wide[i] = (double)c[i], before[i % channels] += wide[i] * wide[i];
+            for (int i = 0; i < 10000; i++)
+                isogi_sh_rotate_f64(wide, wide, some[o], channels, m), isogi_sh_rotate(c, c, some[o], channels, mf);
+            for (int i = 0; i < n; i++)
+                after[i % channels] += wide[i] * wide[i], after_float[i % channels] += (double)c[i] * (double)c[i];
+            for (int k = 0; k < channels; k++)
+                worst = fmax(worst, fabs(sqrt(after[k] / before[k]) - 1)),
+                worst_float = fmax(worst_float, fabs(sqrt(after_float[k] / before[k]) - 1));
+        }
+    printf("    norms drift by %.3g in double, %.3g in float\n", worst, worst_float);
+    CHECK(worst <= 2e-12 * ROUNDING_FACTOR && worst_float <= 2e-5 * ROUNDING_FACTOR, "drift %g, in float %g", worst, worst_float);
+}
+
+/* The antiderivative of the solid angle of what lies between the centre of a face and (s, t). */
+static double corner(double s, double t) { return atan2(s * t, sqrt(s * s + t * t + 1)); }
+
+/* One texel alone has its solid angle, wherever in whichever face. */
+TEST(texels_of_cubes_have_their_solid_angles) {
+    enum { MOST_TEXELS = 19 };
+    static float texels[6][MOST_TEXELS * MOST_TEXELS];
+    static const int sizes[] = {1, 2, 5, 16, 19};
+    const float *face[6] = {texels[0], texels[1], texels[2], texels[3], texels[4], texels[5]};
+    double worst = 0;
+    for (int k = 0; k < 5; k++)
+        for (int i = 0; i < 6 * sizes[k] * sizes[k]; i++) {
+            const int size = sizes[k], p = i / 6;
+            const double s = 2.0 * (p % size) / size - 1, t = 2.0 * (p / size) / size - 1, step = 2.0 / size;
+            const double angle = corner(s + step, t + step) - corner(s, t + step) - corner(s + step, t) + corner(s, t);
+            texels[i % 6][p] = 1;
+            CHECK(isogi_sh_project_cube(c, 2, 1, face, size) == ISOGI_OK, "size %d", size);
+            worst = fmax(worst, fabs((double)c[0] * sqrt(4 * pi) / angle - 1));
+            texels[i % 6][p] = 0;
+        }
+    CHECK(worst <= 1.2e-7, "a solid angle is off by %g of it", worst);
+}
+
+/* A constant is its mean and nothing else; a sphere of radius r seen from a distance d is a disc of angular radius asin(r / d). */
+TEST(constants_and_spheres) {
+    static const double ratios[] = {1e-6, 0.01, 0.3, 0.9, 0.999};
+    const float rgb[3] = {3, 0.5f, 0}, point[3] = {1, -2, 4};
+    for (int o = 0; o < ORDERS; o++) {
+        const int order = orders[o];
+        CHECK(isogi_sh_constant(c, order, rgb) == ISOGI_OK, "order %d", order);
+        for (int i = 0; i < order * order; i++) expected[i] = i ? 0 : sqrt(4 * pi);
+        for (int k = 0; k < 3; k++) check_channel("constant", order, k, (double)rgb[k]);
+        for (int i = 0; i < 5; i++) {
+            const double distance = 6; /* of (4, -4, 2) */
+            isogi_light light = {
+                .kind = ISOGI_LIGHT_SPHERE, .vector = {5, -6, 6}, .rgb = {3, 0.5f, 0}, .radius = (float)(ratios[i] * distance)};
+            isogi_lighting lighting = {.lights = &light, .light_count = 1};
+            const double part = (double)light.radius / distance, half = asin(part);
+            CHECK(isogi_sh_project(c, order, &lighting, point) == ISOGI_OK, "sphere %d", i);
+            cone_zonal(order, half);
+            for (int l = 0; l < order; l++) zonal[l] /= pi * part * part * distance * distance;
+            turn_zonal(order, (const float[3]){4, -4, 2});
+            for (int k = 0; k < 3; k++) check_channel("sphere", order, k, (double)rgb[k]);
+        }
+    }
+}
+
+/* Of the highest order that is de-ringed: a lamp in a sky, seen from a spiral of directions. */
+TEST(deringing_of_the_highest_order) {
+    enum { ORDER = 32, COUNT = 20000 };
+    static float directions_of[COUNT][3], value[COUNT];
+    const float up[3] = {1, 2, -2}, rgb[3] = {5, 5, 5}, sky[3] = {0.02f, 0.02f, 0.02f};
+    double width = -1, low = 0, high = 0;
+    for (int i = 0; i < COUNT; i++) {
+        const double z = 1 - 2 * (i + 0.5) / COUNT, phi = i * 2.399963229728653, s = sqrt(1 - z * z);
+        directions_of[i][0] = (float)(s * cos(phi)), directions_of[i][1] = (float)(s * sin(phi)), directions_of[i][2] = (float)z;
+    }
+    isogi_sh_cone(c, ORDER, up, 0.1, rgb), isogi_sh_constant(d, ORDER, sky), isogi_sh_add(c, c, d, ORDER, 3);
+    for (int i = 0; i < ORDER * ORDER; i++) e[i] = c[3 * i];
+    for (int windowed = 0; windowed < 2; windowed++) {
+        if (windowed) CHECK(isogi_sh_dering(e, e, ORDER, 1, ISOGI_SH_LANCZOS, &width) == ISOGI_OK && width > 1, "width %g", width);
+        isogi_sh_eval_sum(value, e, ORDER, 1, (const float(*)[3])directions_of, COUNT);
+        low = high = 0;
+        for (int i = 0; i < COUNT; i++) {
+            if ((double)value[i] < low) low = (double)value[i];
+            if ((double)value[i] > high) high = (double)value[i];
+        }
+        CHECK(windowed ? low >= -1e-5 * high : low < -0.01 * high, "windowed %d: %g of the largest", windowed, low / high);
+    }
 }
 
 /* ---- the stack: what the header promises ---- */

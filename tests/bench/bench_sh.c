@@ -159,8 +159,8 @@ static double error_aos_f32(int order, size_t count) { return error_of_basis(ord
 static double error_soa_f32(int order, size_t count) { return error_of_basis(order, count, 0, 1); }
 static double error_aos_f64(int order, size_t count) { return error_of_basis(order, count, 1, 0); }
 
-/* ---- rotation: the reference evaluates the input at the direction rotated back, for 32 directions,
-   and the output at the direction ---- */
+/* ---- rotation: the reference evaluates the input at the direction rotated back, for poles, axes, directions 1e-8 off them and 32
+   random ones, and the output at the direction ---- */
 
 static quad sum_at(int order, const float *c, const double *c64, const quad d[3]) {
     static quad y[MAX_N];
@@ -172,9 +172,9 @@ static quad sum_at(int order, const float *c, const double *c64, const quad d[3]
 
 static double error_of_rotation(int order, const double m[9], int is_double) {
     double worst = 0;
-    for (int i = 0; i < 32; i++) {
+    for (int i = 0; i < HARD + 32; i++) { /* poles, axes and 1e-8 off them first */
         quad d[3], back[3];
-        for (int k = 0; k < 3; k++) d[k] = (quad)directions64[100 + i][k];
+        for (int k = 0; k < 3; k++) d[k] = (quad)directions64[i][k];
         for (int k = 0; k < 3; k++) back[k] = (quad)m[k] * d[0] + (quad)m[3 + k] * d[1] + (quad)m[6 + k] * d[2];
         quad difference = sum_at(order, out, is_double ? out64 : NULL, d) - sum_at(order, in, is_double ? in64 : NULL, back);
         worst = fmax(worst, fabs((double)difference));
