@@ -168,6 +168,7 @@ variants() {
     fi
     variant no-threads "$CC" "-O2 $CONTRACT_OFF -DISOGI_NO_THREADS" '' $(only 'vol|trace')
     variant no-simd "$CC" "-O2 $CONTRACT_OFF -DISOGI_NO_SIMD" '' $(only 'sh|sample|vol|dvr')
+    variant sh-level-0 "$CC" "-O2 $CONTRACT_OFF -DISOGI_SH_LEVEL=0" '' $(only sh)
     variant sh-level-1 "$CC" "-O2 $CONTRACT_OFF -DISOGI_SH_LEVEL=1" '' $(only sh)
     if have clang; then
         variant clang clang "-O2 $CONTRACT_OFF" '' $(only 'sh|sample|vol|mesh|trace|dvr|stack')
