@@ -2174,10 +2174,11 @@ ISOGI_SH__AVX512 ISOGI_SH__INLINE void isogi_sh__eval_f16_mixed(isogi_sh__f16 *u
         size_t i;                                                                                                              \
         for (i = 0; i + 2 * WIDTH <= count; i += 2 * WIDTH) {                                                                  \
             V zero = {0}, u[4], other[4], e, f;                                                                                \
+            const I sign = (I)(zero - 1) ^ (I)(zero + 1);                                                                      \
             u[0] = *(const V *)(x + i), u[1] = *(const V *)(y + i), u[2] = *(const V *)(z + i);                                \
             other[0] = *(const V *)(x + i + WIDTH), other[1] = *(const V *)(y + i + WIDTH), other[2] = *(const V *)(z + i + WIDTH); \
             e = NAME##_error(u), f = NAME##_error(other);                                                                      \
-            if (LESS((I)FMA(e, e, f * f), (I)(zero + (T)SQUARE_ERROR))) {                                                      \
+            if (LESS((I)FMA(e, e, f * f) & ~sign, (I)(zero + (T)SQUARE_ERROR))) { /* NaN of either sign is not less */         \
                 NAME##_correct(u, e), NAME##_correct(other, f);                                                                \
                 if (NAME##_all_eleven(out + i, stride, u, other, 1, 0, NULL, NULL)) continue;                                  \
             }                                                                                                                  \
