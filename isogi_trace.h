@@ -1524,12 +1524,11 @@ static void isogi_trace__wave_escape(isogi_trace__wave *w, int i) {
     float radiance[3];
     int c, k, channels = scene->desc.transfer_channels, count = scene->desc.order * scene->desc.order;
     if (scene->desc.mode == ISOGI_TRACE_TRANSFER) {
-        double grey = (w->through[i][0] + w->through[i][1] + w->through[i][2]) / 3;
         isogi_sh_eval(w->basis, scene->desc.order, (const float(*)[3]) & w->dir[i], 1);
         for (k = 0; k < count; k++)
             for (c = 0; c < channels; c++)
-                w->transfer[k * channels + c] += (channels == 1 ? grey : w->through[i][c]) * (double)w->basis[k];
-        for (c = 0; c < 3; c++) w->light[w->slot[i]][c] += channels == 1 ? grey : w->through[i][c];
+                w->transfer[k * channels + c] += w->through[i][c] * (double)w->basis[k];
+        for (c = 0; c < 3; c++) w->light[w->slot[i]][c] += w->through[i][c];
         return;
     }
     if (!scene->has_env) return;
@@ -1541,7 +1540,7 @@ static void isogi_trace__wave_escape(isogi_trace__wave *w, int i) {
     for (c = 0; c < 3; c++) w->light[w->slot[i]][c] += weight * w->through[i][c] * (double)radiance[c];
 }
 
-/* Colours where path i hit; what is emitted there is brought. */
+/* Colours where path i hit: grey transfer has one channel, of their mean. What is emitted there is brought. */
 static void isogi_trace__wave_material(isogi_trace__wave *w, int i, float albedo[3]) {
     const isogi_trace_desc *desc = &w->scene->desc;
     float emission[3];
@@ -1553,7 +1552,11 @@ static void isogi_trace__wave_material(isogi_trace__wave *w, int i, float albedo
         isogi_vol_to_world(w->scene->pyramid, grid, point);
         isogi_trace__colours(desc, w->site->isovalue, point, albedo, emission);
     }
-    if (desc->mode == ISOGI_TRACE_TRANSFER) return;
+    if (desc->mode == ISOGI_TRACE_TRANSFER) {
+        if (desc->transfer_channels == 1)
+            albedo[0] = albedo[1] = albedo[2] = (float)(((double)albedo[0] + (double)albedo[1] + (double)albedo[2]) / 3);
+        return;
+    }
     for (c = 0; c < 3; c++) w->light[w->slot[i]][c] += w->through[i][c] * (double)emission[c];
 }
 

@@ -491,6 +491,63 @@ TEST(bias_against_paths_is_small) {
     scene_free(&s);
 }
 
+/* Transfer of every order, grey and in colours, by probes and by paths: relit it is the light of paths. One channel for a coloured surface
+   is that of a grey one of its mean albedo. Points in a pit, colours by isovalue, and by place with four reflections; noise of 84 samples
+   and probes at each of 100 points: 0.06 of a mean of 2.6 (rms), 0.5 % of the mean. */
+static void bands(void *user, double isovalue, const double p[3], float albedo[3], float emission[3]) {
+    (void)user, (void)isovalue, (void)emission;
+    for (int c = 0; c < 3; c++) albedo[c] *= (int)floor(p[0] / 3) % 3 == c ? 1 : 0.4f;
+}
+static void grey_bands(void *user, double isovalue, const double p[3], float albedo[3], float emission[3]) {
+    (void)user, (void)isovalue, (void)p, (void)emission;
+    for (int c = 0; c < 3; c++) albedo[c] *= 0.6f;
+}
+TEST(transfer_of_any_order_and_colour_is_lit_as_by_paths) {
+    double q[5] = {12, 11, 12, 15, 7};
+    scene s = scene_make(25, 25, 25, NULL, pit, q);
+    static float points[100][3], e[100][3], truth[100][3], sh[108];
+    const isogi_albedo_point colours[1] = {{0, {0.9f, 0.3f, 0.6f}}}, mean[1] = {{0, {0.6f, 0.6f, 0.6f}}};
+    int n = surface_points(&s, 0, 100, 3, points);
+    for (int order = 1; order <= 6; order++)
+        for (int kind = 0; kind < 4; kind++) { /* three channels; one, of a coloured surface; the same by place */
+            isogi_trace_desc d = desc_make(&s, 0, kind / 2 ? 4 : -1, LONG_SUITE ? 1024 : 256);
+            test_random r = {(uint64_t)order};
+            if (!LONG_SUITE && kind != order % 4) continue;
+            for (int i = 0; i < order * order * 3; i++) sh[i] = (float)(i < 3 ? 4 : random_range(&r, -0.5, 0.5));
+            d.lazy = 1, d.lighting.env.sh = sh, d.lighting.env.sh_order = order;
+            d.albedo_points = kind == 1 ? mean : colours, d.albedo_count = 1;
+            if (kind >= 2) d.albedo_count = 0, d.albedo[0] = d.albedo[1] = d.albedo[2] = 0.9f, d.material = kind == 2 ? bands : grey_bands;
+            bake_and_sample(&d, NULL, (const float(*)[3])points, n, truth);
+            for (int method = 0; method < 2; method++) {
+                isogi_trace_desc transfer = d;
+                isogi_trace *t = NULL;
+                double square = 0, sum[3] = {0, 0, 0}, all[3] = {0, 0, 0};
+                int found = 0, channels = 0;
+                transfer.mode = ISOGI_TRACE_TRANSFER, transfer.method = (isogi_trace_method)method, transfer.order = order;
+                transfer.samples = 84, transfer.seed = 7, transfer.albedo_points = colours;
+                transfer.transfer_channels = kind % 2, transfer.material = kind >= 2 ? bands : NULL;
+                CHECK(isogi_trace_create(&t, &transfer, NULL) == ISOGI_OK, "order %d", order);
+                isogi_trace_request(t, (const float(*)[3])points, (size_t)n), isogi_trace_step(t, 0, NULL);
+                CHECK(isogi_trace_relight(t, &d.lighting) == ISOGI_OK, "order %d", order);
+                isogi_trace_sample(t, (const float(*)[3])points, (size_t)n, e, NULL), isogi_trace_shape(t, NULL, &found, &channels);
+                CHECK(found == order && channels == (kind % 2 ? 1 : 3), "order %d, %d channels", found, channels);
+                for (int i = 0; i < n; i++)
+                    for (int c = 0; c < 3; c++) {
+                        sum[c] += (double)e[i][c] / n, all[c] += (double)truth[i][c] / n;
+                        square += pow((double)e[i][c] - (double)truth[i][c], 2) / n / 3;
+                    }
+                for (int c = 0; c < 3; c++)
+                    CHECK(fabs(sum[c] - all[c]) < 0.02 * all[c], "order %d, kind %d, method %d, channel %d: mean %.4f, by paths %.4f",
+                          order, kind, method, c, sum[c], all[c]);
+                CHECK(sqrt(square) < 0.04 * all[1], "order %d, kind %d, method %d: %.4f off (rms)", order, kind, method, sqrt(square));
+                printf("    order %d, kind %d, method %d: means %+.4f %+.4f %+.4f, rms %.4f of %.4f\n", order, kind, method,
+                       sum[0] - all[0], sum[1] - all[1], sum[2] - all[2], sqrt(square), all[1]);
+                isogi_trace_free(t);
+            }
+        }
+    scene_free(&s);
+}
+
 /* Voxels that are flat, long or both. Cells of probes that were cubes of the smallest spacing would number up to its ratio squared; they
    are half a voxel wide at least, so at most some 8 times as many. Light stays that of paths: noise 1 %, bias of probes as above. */
 TEST(flat_and_long_voxels_need_few_probes) {
