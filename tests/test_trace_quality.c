@@ -61,6 +61,50 @@ TEST(hierarchical_lattice) {
     isogi_trace_free(t), scene_free(&s);
 }
 
+/* What a scene does not need, in rays, texels and cells with and without. The same ball over the ground, as distances everywhere and cut
+   off 1.5 voxels from the surface: what is constant takes a look at each texel, and neither rays nor memory. Of what is left an interval of
+   isovalues takes a part, what a view of it asks for a smaller one, and every texel its samples alone: 8, no more. */
+static double cut_off(const double p[3], const double *q) { return fmax(-1.5, fmin(1.5, ball_over_plane(p, q))); }
+TEST(counters_prove_what_is_skipped) {
+    enum { N = 33 };
+    static const char *const name[6] = {"all values", "cut off", "an interval", "a view", "a view's interval", "constant"};
+    double q[5] = {16, 20, 16, 5.3, 8.4};
+    float points[60][3];
+    isogi_counters c[6];
+    size_t memory[6];
+    for (int k = 0; k < 6; k++) {
+        scene s = scene_make(N, N, N, NULL, k ? cut_off : ball_over_plane, q);
+        isogi_trace_desc d = desc_make(&s, 0.5f, 0, 8);
+        isogi_trace *t = NULL;
+        int n = surface_points(&s, 0, 60, 3, points);
+        if (k == 5) { /* as it could be: all in the air */
+            for (size_t i = 0; i < N * N * N; i++) s.data[i] = -1.5f;
+            isogi_vol_update(s.pyramid, (const size_t[3]){0, 0, 0}, (const size_t[3]){N - 1, N - 1, N - 1}, NULL);
+        }
+        if (k == 2 || k == 4) d.isovalue_min = -0.1, d.isovalue_max = 0.1;
+        d.lazy = k == 3 || k == 4;
+        CHECK(isogi_trace_create(&t, &d, NULL) == ISOGI_OK && isogi_trace_request(t, (const float(*)[3])points, (size_t)n) == ISOGI_OK &&
+                  isogi_trace_step(t, 0, NULL) == ISOGI_OK,
+              "%s", name[k]);
+        memset(&c[k], 0, sizeof c[k]), isogi_trace_counters(t, &c[k]), memory[k] = isogi_trace_memory(t);
+        printf("    %-17s %5d texels, %5d skipped, %6d rays, %8d blocks, %8d cells, %6d bytes\n", name[k], (int)c[k].texels,
+               (int)c[k].texels_skipped, (int)c[k].rays, (int)c[k].blocks, (int)c[k].cells, (int)memory[k]);
+        CHECK(c[k].rays == 8 * c[k].texels, "%s: %d rays for %d texels", name[k], (int)c[k].rays, (int)c[k].texels);
+        if (k < 2 || k == 5)
+            CHECK(c[k].texels + c[k].texels_skipped == N * N * N, "%s: %d texels, %d skipped", name[k], (int)c[k].texels,
+                  (int)c[k].texels_skipped);
+        isogi_trace_free(t), scene_free(&s);
+    }
+    for (int k = 1; k < 4; k++) /* rays that are left end sooner, too */
+        CHECK(3 * c[k].texels < 2 * c[k - 1].texels && 3 * c[k].cells < 2 * c[k - 1].cells && c[k].blocks < c[k - 1].blocks &&
+                  memory[k] < memory[k - 1],
+              "%s: %d of %d texels, %d of %d cells, %d of %d bytes", name[k], (int)c[k].texels, (int)c[k - 1].texels, (int)c[k].cells,
+              (int)c[k - 1].cells, (int)memory[k], (int)memory[k - 1]);
+    CHECK(c[4].texels == c[3].texels && c[4].rays == c[3].rays, "a view reads what its interval reads: %d and %d texels",
+          (int)c[3].texels, (int)c[4].texels);
+    CHECK(c[5].texels == 0 && c[5].rays == 0 && c[5].cells == 0 && c[5].blocks == 0, "constant: %d cells", (int)c[5].cells);
+}
+
 /* Textures of 1/8, 1 and 8 times the volume's texels (Wyman 2006, fig. 12): error against light gathered at the points themselves, with
    enough samples that the lattice is what is seen. Finer is better. */
 TEST(resolution_of_the_texture) {
