@@ -567,6 +567,44 @@ TEST(algebra_of_any_order) {
     }
 }
 
+/* f times g at the highest order (40 in the quick suite: the matrix of 101 has 416 MB) by quadrature of f and g as they are evaluated: from
+   a product, and from the matrix of f, whose entries are within half an ulp, and which is symmetric to the bit. */
+TEST(products_of_the_highest_order) {
+    static double y[N], expected_product[N];
+    const int order = LONG_SUITE ? MOST : 40, n = order * order, latitudes = 3 * order / 2 + 1, longitudes = 3 * order;
+    static long double node[3 * MOST / 2 + 1], weight[3 * MOST / 2 + 1];
+    float *matrix = (float *)malloc((size_t)n * (size_t)n * sizeof *matrix);
+    double worst = 0, worst_matrix = 0;
+    test_random r = {74};
+    if (!matrix) SKIP("no memory");
+    for (int i = 0; i < n; i++) c[i] = (float)random_range(&r, -1, 1), d[i] = (float)random_range(&r, -1, 1), expected_product[i] = 0;
+    reference_nodes(node, weight, latitudes);
+    for (int i = 0; i < latitudes * longitudes; i++) {
+        const double z = (double)node[i / longitudes], s = sqrt((1 - z) * (1 + z)), phi = 2 * pi * (i % longitudes) / longitudes;
+        const double v[1][3] = {{s * cos(phi), s * sin(phi), z}};
+        double f = 0, g = 0, scale = (double)weight[i / longitudes] * 2 * pi / longitudes;
+        isogi_sh_eval_f64(y, order, v, 1);
+        for (int k = 0; k < n; k++) f += (double)c[k] * y[k], g += (double)d[k] * y[k];
+        for (int k = 0; k < n; k++) expected_product[k] += scale * f * g * y[k];
+    }
+    CHECK(isogi_sh_product(e, c, d, order, 1) == ISOGI_OK, "order %d", order);
+    for (int i = 0; i < n; i++) worst = fmax(worst, fabs((double)e[i] - expected_product[i]) - 6e-8 * fabs(expected_product[i]));
+    CHECK(isogi_sh_product_matrix(matrix, c, order) == ISOGI_OK, "order %d", order);
+    for (int i = 0; i < n; i++) {
+        double sum = 0, most = 0;
+        for (int k = 0; k < n; k++) {
+            const float entry = matrix[(size_t)n * (size_t)i + (size_t)k];
+            sum += (double)entry * (double)d[k], most += fabs((double)entry * (double)d[k]);
+            if (k < i && (k % 64 == i % 64 || order < MOST)) /* strides of 40 KB take long */
+                CHECK(!memcmp(&entry, matrix + (size_t)n * (size_t)k + i, sizeof entry), "%d %d: %g", i, k, (double)entry);
+        }
+        worst_matrix = fmax(worst_matrix, fabs(sum - expected_product[i]) - 6e-8 * most);
+    }
+    printf("    order %d: products off by half an ulp and %.3g, the matrix by %.3g\n", order, worst, worst_matrix);
+    CHECK(worst <= 1e-10 && worst_matrix <= 1e-10, "order %d: beyond half an ulp %g, the matrix %g", order, worst, worst_matrix);
+    free(matrix);
+}
+
 TEST(rotations_of_any_order) {
     const double angles[][3] = {{0, 0, 0}, {0, 1e-9, 0}, {0, 3.14159265358979323846, 0}, {3, 1.5, -2}};
     static double wide[N], turned[N];
