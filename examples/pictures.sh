@@ -20,7 +20,7 @@ build/viewer $hydrogen --mode dvr --out "$pieces/volume-1.png"
 build/viewer $hydrogen --mode scale-invariant --out "$pieces/volume-2.png"
 build/strip "$out/volume.png" "$pieces/volume-1.png" "$pieces/volume-2.png"
 
-# The paper's figures 5, 6, 7 and 12: a picture for each argument, which is added to $same, at the exposure of the last one.
+# The paper's figures but the first: a picture for each argument, which is added to $same, at the exposure of the last one.
 strip() { # NAME ARGUMENTS...
     name=$1 parts= n=0
     shift
@@ -33,6 +33,8 @@ strip() { # NAME ARGUMENTS...
     build/strip "$out/$name.png" $parts
 }
 reference="--mode pathtrace --samples $(part 256)"
+same="procedural:hydrogen$coarse --camera 35,10,1.1 --env sky --light directional:0.4,0.8,1:5,4.6,4 --bounces 1 $(side 161)"
+strip figure-4 "--iso 0.2" "--iso 0.24" "--iso 0.26" "--iso 0.26 $reference"
 same="procedural:skull:72 --camera 35,30,0.8 --light directional:-1,0.9,0.8:4,3.8,3.4 $(side 216) --mode pathtrace --bounces 0 --samples $(part 64)"
 strip figure-5 "--normals trilinear --offset -1" "--offset -1" ""
 same="procedural:engine-block$coarse --camera 37,25,0.9 $(side 161) --samples $(part 64)"
@@ -40,3 +42,9 @@ strip figure-6 "--lookup closest-isovalue" "--lookup nearest" "--lookup trilinea
 strip figure-7 "--mode pathtrace --samples 2" "--samples 2" "--samples 8" "--samples 32"
 same="procedural:skull$coarse --camera 30,8,1.2 --env sky --light directional:1,1,0.6:3,2.8,2.4:0.5 $(side 161) --samples $(part 64)"
 strip figure-12 "--lattice 64,72,72" "" "--lattice 256,288,288" "$reference"
+same="procedural:engine-block$coarse --camera 37,25,1.9 $(side 130)"
+strip figure-9 "--mode vicinity" "--mode lambert --fog 2" "--mode phong --ambient normal --shadows on" "--mode lambert --shadows on" ""
+same="procedural:skull$coarse --camera 30,8,1.2 $(side 161)"
+strip figure-10 "--mode vicinity" "--env sky --bounces 0" "--env sky" "--env sky $reference"
+same="procedural:engine-block$coarse --camera 37,25,0.9 $(side 161) --env sky --light directional:0.4,0.8,0.45:3,2.8,2.4:20"
+strip figure-11 "" "--mode transfer --samples $(part 256)" "$reference"
