@@ -2039,6 +2039,8 @@ ISOGI_SH__AVX512 ISOGI_SH__INLINE void isogi_sh__eval_f16_mixed(isogi_sh__f16 *u
     typedef struct NAME##_eleven {                                                                                             \
         V x[2], y[2], z[2], v[2], c[2], s[2], zc[2], zs[2], p[11][2];                                                          \
         char *row[11]; /* of each degree, where Y_l^0 goes */                                                                  \
+        T *done;       /* of rows that are turned meanwhile, or NULL */                                                        \
+        const V *rows;                                                                                                         \
         ptrdiff_t up, down;                                                                                                    \
         int fixed; /* the stride is known, and addresses are constants */                                                      \
     } NAME##_eleven;                                                                                                           \
@@ -2087,6 +2089,19 @@ ISOGI_SH__AVX512 ISOGI_SH__INLINE void isogi_sh__eval_f16_mixed(isogi_sh__f16 *u
         if (m == 2) h->v[k] = FMA(h->z[k] + h->z[k], h->z[k], zero - (T)0.75);                                                 \
         if (m < 8) h->zc[k] = h->z[k] * h->c[k], h->zs[k] = h->z[k] * h->s[k];                                                 \
     }                                                                                                                          \
+    /* one of eight parts of NAME_turn_all for 121 rows */                                                                     \
+    TARGET ISOGI_SH__INLINE void NAME##_part(T *out, const V *rows, int part) {                                                \
+        const size_t alone = 121 % TILE == 1;                                                                                  \
+        size_t k = alone + 2 * TILE * (size_t)part, j;                                                                         \
+        if (!part && alone)                                                                                                    \
+            for (j = 0; j < WIDTH; j++) out[121 * j] = ((const T *)rows)[j];                                                   \
+        if (k + 2 * TILE <= 121) TURN(out + k, 121, rows + k, 2);                                                              \
+        else if (k < 121) {                                                                                                    \
+            j = k < 121 - TILE ? k : 121 - TILE;                                                                               \
+            TURN(out + j, 121, rows + j, 1);                                                                                   \
+            if (k + TILE < 121) TURN(out + 121 - TILE, 121, rows + 121 - TILE, 1);                                             \
+        }                                                                                                                      \
+    }                                                                                                                          \
     TARGET ISOGI_SH__INLINE void NAME##_eleventh(NAME##_eleven *h, const T *t, const T *step, ptrdiff_t by, int m, int two) {  \
         if (m) {                                                                                                               \
             ptrdiff_t up = h->up + by, down = h->down - by;                                                                    \
@@ -2102,19 +2117,7 @@ ISOGI_SH__AVX512 ISOGI_SH__INLINE void isogi_sh__eval_f16_mixed(isogi_sh__f16 *u
         NAME##_function(h, t, step, m, 6, two), NAME##_function(h, t, step, m, 7, two);                                        \
         NAME##_function(h, t, step, m, 8, two), NAME##_function(h, t, step, m, 9, two);                                        \
         NAME##_function(h, t, step, m, 10, two);                                                                               \
-    }                                                                                                                          \
-    /* one of eight parts of NAME_turn_all for 121 rows */                                                                     \
-    TARGET ISOGI_SH__INLINE void NAME##_part(T *out, const V *rows, int part) {                                                \
-        const size_t alone = 121 % TILE == 1;                                                                                  \
-        size_t k = alone + 2 * TILE * (size_t)part, j;                                                                         \
-        if (!part && alone)                                                                                                    \
-            for (j = 0; j < WIDTH; j++) out[121 * j] = ((const T *)rows)[j];                                                   \
-        if (k + 2 * TILE <= 121) TURN(out + k, 121, rows + k, 2);                                                              \
-        else if (k < 121) {                                                                                                    \
-            j = k < 121 - TILE ? k : 121 - TILE;                                                                               \
-            TURN(out + j, 121, rows + j, 1);                                                                                   \
-            if (k + TILE < 121) TURN(out + 121 - TILE, 121, rows + 121 - TILE, 1);                                             \
-        }                                                                                                                      \
+        if (h->fixed && h->done && m < 8) NAME##_part(h->done, h->rows, m); /* one takes products, the other stores */         \
     }                                                                                                                          \
     /* done: where `rows` go meanwhile, or NULL */                                                                             \
     TARGET ISOGI_SH__INLINE int NAME##_all_eleven(T *out, size_t stride, const V *u, const V *other, int two, int fixed, T *done, \
@@ -2125,6 +2128,7 @@ ISOGI_SH__AVX512 ISOGI_SH__INLINE void isogi_sh__eval_f16_mixed(isogi_sh__f16 *u
         char *at = (char *)out;                                                                                                \
         ptrdiff_t by = (ptrdiff_t)(stride * sizeof(T)), step, gap = 0;                                                         \
         h.x[0] = h.c[0] = u[0], h.y[0] = h.s[0] = u[1], h.z[0] = u[2], h.up = h.down = 0, h.row[0] = at, h.fixed = fixed;      \
+        h.done = done, h.rows = rows;                                                                                          \
         h.x[1] = h.c[1] = other[0], h.y[1] = h.s[1] = other[1], h.z[1] = other[2];                                             \
         r = FMA(h.x[0], h.x[0], h.y[0] * h.y[0]), q = FMA(h.x[1], h.x[1], h.y[1] * h.y[1]);                                    \
         h.v[0] = FMA(h.z[0], h.z[0], -r), h.v[1] = FMA(h.z[1], h.z[1], -q);                                                    \
@@ -2136,21 +2140,13 @@ ISOGI_SH__AVX512 ISOGI_SH__INLINE void isogi_sh__eval_f16_mixed(isogi_sh__f16 *u
         ISOGI_SH__ROW(1); ISOGI_SH__ROW(2); ISOGI_SH__ROW(3); ISOGI_SH__ROW(4); ISOGI_SH__ROW(5);                              \
         ISOGI_SH__ROW(6); ISOGI_SH__ROW(7); ISOGI_SH__ROW(8); ISOGI_SH__ROW(9); ISOGI_SH__ROW(10);                             \
         NAME##_eleventh(&h, t + 0, t + 161, by, 0, two);                                                                       \
-        if (fixed && done) NAME##_part(done, rows, 0);                                                                         \
         NAME##_eleventh(&h, t + 36, t + 176, by, 1, two);                                                                      \
-        if (fixed && done) NAME##_part(done, rows, 1);                                                                         \
         NAME##_eleventh(&h, t + 66, t + 188, by, 2, two);                                                                      \
-        if (fixed && done) NAME##_part(done, rows, 2);                                                                         \
         NAME##_eleventh(&h, t + 91, t + 197, by, 3, two);                                                                      \
-        if (fixed && done) NAME##_part(done, rows, 3);                                                                         \
         NAME##_eleventh(&h, t + 111, t + 203, by, 4, two);                                                                     \
-        if (fixed && done) NAME##_part(done, rows, 4);                                                                         \
         NAME##_eleventh(&h, t + 127, t + 0, by, 5, two);                                                                       \
-        if (fixed && done) NAME##_part(done, rows, 5);                                                                         \
         NAME##_eleventh(&h, t + 139, t + 0, by, 6, two);                                                                       \
-        if (fixed && done) NAME##_part(done, rows, 6);                                                                         \
         NAME##_eleventh(&h, t + 148, t + 0, by, 7, two);                                                                       \
-        if (fixed && done) NAME##_part(done, rows, 7);                                                                         \
         NAME##_eleventh(&h, t + 154, t + 0, by, 8, two);                                                                       \
         NAME##_eleventh(&h, t + 158, t + 0, by, 9, two);                                                                       \
         NAME##_eleventh(&h, t + 160, t + 0, by, 10, two);                                                                      \
