@@ -1256,16 +1256,18 @@ TEST(isovalues_beside_each_other_do_not_light_each_other) {
     scene_free(&s);
 }
 
-/* The same where it matters: texels of a scan, full of hollows, against paths. Errors cover what they say they do. */
+/* The same where it matters: texels of a scan, full of hollows, against paths. Errors cover what they say they do: of 1500 texels, against
+   3000 samples, 94 % are within two standard errors, 93 and 96 % of bakes that aim at 2 and 5 %; here there are 160. */
 TEST(errors_are_honest_on_a_scan) {
     enum { N = 32, POINTS = 160 };
     char *path = test_data("cthead8_256x256x99_uint8.raw");
     static uint8_t voxels[N][N][N];
+    static const struct { int samples; float error; double least; } bake[4] = {
+        {400, 0, 0}, {64, 0, 0.95}, {21844, 0.02f, 0.9}, {21844, 0.05f, 0.9}};
     static float points[POINTS][3], e[2][POINTS][3], error[2][POINTS];
     isogi_volume v;
     isogi_pyramid *pyramid;
-    double square = 0, all = 0;
-    int beyond = 0, count = 0;
+    int count = 0;
     test_random r = {7};
     if (!path) SKIP("ISOGI_DATA is not set, or lacks cthead8");
     FILE *file = fopen(path, "rb");
@@ -1283,28 +1285,32 @@ TEST(errors_are_honest_on_a_scan) {
         if (abs(voxels[z][y][x] - 130) > 3) continue;
         points[count][0] = (float)x, points[count][1] = (float)y, points[count++][2] = (float)z;
     }
-    for (int method = 0; method < 2; method++) {
+    for (int k = 0; k < 4; k++) { /* paths first */
         isogi_trace_desc d;
         isogi_trace *t = NULL;
+        double square = 0, all = 0;
+        int beyond = 0, found = 0;
         memset(&d, 0, sizeof d);
         d.pyramid = pyramid, d.lighting.env.sh = white_sky, d.lighting.env.sh_order = 1, d.bounces = -1, d.lookup = ISOGI_TRACE_NEAREST;
-        d.albedo[0] = d.albedo[1] = d.albedo[2] = 0.8f, d.method = (isogi_trace_method)method, d.samples = method ? 400 : 64;
-        if (method) d.lazy = 1;
-        else d.isovalue_min = 127, d.isovalue_max = 133;
+        d.albedo[0] = d.albedo[1] = d.albedo[2] = 0.8f, d.method = k ? ISOGI_TRACE_FEEDBACK : ISOGI_TRACE_PATHS;
+        d.samples = bake[k].samples, d.error = bake[k].error, d.lazy = !k;
+        if (k) d.isovalue_min = 127, d.isovalue_max = 133;
         if (isogi_trace_create(&t, &d, NULL) != ISOGI_OK) abort();
         isogi_trace_request(t, (const float(*)[3])points, POINTS), isogi_trace_step(t, 0, NULL);
-        isogi_trace_sample(t, (const float(*)[3])points, POINTS, e[method], error[method]);
+        isogi_trace_sample(t, (const float(*)[3])points, POINTS, e[!!k], error[!!k]);
         isogi_trace_free(t);
+        for (int i = 0; i < POINTS && k; i++) {
+            double apart = (double)e[1][i][1] - (double)e[0][i][1];
+            if (!test_finite((double)error[0][i]) || !test_finite((double)error[1][i])) continue;
+            beyond += fabs(apart) > 2 * sqrt((double)error[0][i] * (double)error[0][i] + (double)error[1][i] * (double)error[1][i]);
+            square += apart * apart, all += (double)e[0][i][1] * (double)e[0][i][1], found++;
+        }
+        if (!k) continue;
+        printf("    aim %.2f: %.1f %% of %d texels are beyond two standard errors; rms difference %.4f\n", (double)bake[k].error,
+               100.0 * beyond / found, found, sqrt(square / all));
+        CHECK(found > POINTS / 2 && beyond <= (1 - bake[k].least) * found, "aim %g: %d of %d texels are beyond two standard errors",
+              (double)bake[k].error, beyond, found);
     }
-    for (int i = count = 0; i < POINTS; i++) {
-        double apart = (double)e[0][i][1] - (double)e[1][i][1];
-        if (!test_finite((double)error[0][i]) || !test_finite((double)error[1][i])) continue;
-        beyond += fabs(apart) > 2 * sqrt((double)error[0][i] * (double)error[0][i] + (double)error[1][i] * (double)error[1][i]);
-        square += apart * apart, all += (double)e[1][i][1] * (double)e[1][i][1], count++;
-    }
-    printf("    %.1f %% of %d texels are beyond two standard errors; rms difference %.4f\n", 100.0 * beyond / count, count,
-           sqrt(square / all));
-    CHECK(count > POINTS / 2 && beyond < 0.05 * count, "%d of %d texels are beyond two standard errors", beyond, count);
     isogi_vol_free(pyramid);
 }
 
