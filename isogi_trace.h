@@ -1360,7 +1360,7 @@ static void isogi_trace__site_start(const isogi_trace__scene *scene, isogi_trace
     }
     for (a = 0; a < 3; a++) grid[a] = site->place.cell[a] + site->place.local[a];
     isogi_vol_to_world(scene->pyramid, grid, site->origin);
-    site->place.side = 1;
+    if (site->place.side != 2 && site->place.side != -2) site->place.side = 1; /* a probe on a cap is no place of the isosurface */
     isogi_vol_normals(scene->pyramid, &site->place, 1, ISOGI_NORMAL_TRILINEAR, &site->geometric);
     for (a = 0; a < 3 && scene->high; a++) site->geometric[a] = -site->geometric[a];
     if (!(isogi_trace__dot(site->geometric, site->normal) > 0)) memcpy(site->geometric, site->normal, sizeof site->geometric);
@@ -1411,13 +1411,37 @@ typedef struct isogi_trace__wave {
 } isogi_trace__wave;
 
 
-/* Rays from the site itself; a miss has side 0. rays: scratch, as many. */
-static void isogi_trace__site_rays(const isogi_trace__scene *scene, const isogi_trace__site *site, const float (*dirs)[3],
+/* A ray that left the surface and met nothing: where cells meet it may have gone to the wrong side, of which the gradient of one of them
+   knows nothing. Then it has met the surface where it began, from there. side: 1 low, -1 high, 0 not known. Beyond a capped border is
+   the low side, beyond an open one either. */
+static void isogi_trace__hold(const isogi_trace__scene *scene, const isogi_hit *start, const float dir[3], double isovalue, int side,
+                              isogi_hit *hit) {
+    const double *m = scene->to_grid;
+    double d[3], grid[3], speed = 0;
+    int a, plane = 0, beyond = 0, astray;
+    isogi_hit place;
+    for (a = 0; a < 3; a++) plane |= start->local[a] <= 0 || start->local[a] >= 1;
+    if (hit->side || !side || !plane) return;
+    for (a = 0; a < 3; a++)
+        d[a] = m[3 * a] * (double)dir[0] + m[3 * a + 1] * (double)dir[1] + m[3 * a + 2] * (double)dir[2], speed += d[a] * d[a];
+    for (a = 0; a < 3; a++) {
+        grid[a] = start->cell[a] + start->local[a] + (speed > 0 ? 1e-2 * d[a] / sqrt(speed) : 0);
+        beyond |= grid[a] < 0 || grid[a] > (double)(scene->volume->size[a] - 1);
+    }
+    if (beyond) astray = scene->desc.capped && side < 0;
+    else astray = isogi_trace__locate(scene->volume, grid, &place) && (isogi_trace__value(scene->volume, &place) < isovalue) == (side < 0);
+    if (astray) *hit = *start, hit->side = -side;
+}
+
+/* Rays from the site itself, which is on that side of the surface; a miss has side 0. Rays from the surface that go to its other side have
+   met it where they begin, from there. rays: scratch, as many. */
+static void isogi_trace__site_rays(const isogi_trace__scene *scene, const isogi_trace__site *site, int side, const float (*dirs)[3],
                                    const double *tmax, size_t count, isogi_ray *rays, isogi_hit *hits, isogi_counters *counters) {
     size_t i;
     if (site->on_surface) {
         for (i = 0; i < count; i++) hits[i] = site->place;
         isogi_vol_continue(scene->pyramid, hits, dirs, tmax, site->isovalue, scene->flags, count, hits, counters);
+        for (i = 0; i < count; i++) isogi_trace__hold(scene, &site->place, dirs[i], site->isovalue, side, &hits[i]);
         return;
     }
     for (i = 0; i < count; i++) {
@@ -1437,12 +1461,14 @@ static void isogi_trace__shadows_flush(isogi_trace__wave *w, isogi_trace__shadow
     if (w->scene->desc.no_shadows) {
         for (i = 0; i < s->count; i++) s->hit[i].side = 0;
     } else if (!depth) {
-        isogi_trace__site_rays(w->scene, w->site, (const float(*)[3])s->dir, s->tmax, (size_t)s->count, w->ray, s->hit,
-                                w->counters);
+        isogi_trace__site_rays(w->scene, w->site, w->scene->high ? -1 : 1, (const float(*)[3])s->dir, s->tmax, (size_t)s->count, w->ray,
+                               s->hit, w->counters);
     } else {
         for (i = 0; i < s->count; i++) s->start[i] = w->start[s->path[i]];
         isogi_vol_continue(w->scene->pyramid, s->start, (const float(*)[3])s->dir, s->tmax, w->site->isovalue, w->scene->flags,
                            (size_t)s->count, s->hit, w->counters);
+        for (i = 0; i < s->count; i++)
+            isogi_trace__hold(w->scene, &s->start[i], (const float *)s->dir[i], w->site->isovalue, w->from[s->path[i]], &s->hit[i]);
     }
     for (i = 0; i < s->count; i++)
         if (!s->hit[i].side)
@@ -1640,11 +1666,13 @@ static void isogi_trace__wave_run(isogi_trace__wave *w, int first, int count) {
         if (lit) isogi_trace__wave_lights(w, &w->shadows, depth, positions);
         if (lit) isogi_trace__wave_sky(w, &w->shadows, depth);
         if (!depth)
-            isogi_trace__site_rays(scene, w->site, (const float(*)[3])w->dir, scene->reach, (size_t)w->count, w->ray, w->hit, w->counters);
+            isogi_trace__site_rays(scene, w->site, scene->high ? -1 : 1, (const float(*)[3])w->dir, scene->reach, (size_t)w->count, w->ray,
+                                   w->hit, w->counters);
         else
             isogi_vol_continue(scene->pyramid, w->start, (const float(*)[3])w->dir, scene->reach, w->site->isovalue, scene->flags,
                                (size_t)w->count, w->hit, w->counters);
         for (i = 0; i < w->count; i++) {
+            if (depth) isogi_trace__hold(scene, &w->start[i], (const float *)w->dir[i], w->site->isovalue, w->from[i], &w->hit[i]);
             if (!w->hit[i].side || scene->desc.no_shadows) isogi_trace__wave_escape(w, i);
             if (w->hit[i].side && isogi_trace__wave_reflect(w, i, alive, depth)) alive++;
         }
@@ -1671,7 +1699,7 @@ static void isogi_trace__site_lights(const isogi_trace__scene *scene, const isog
         if (!(cosine > 0)) continue;
         beam.tmax = isogi_trace__within(scene, beam.tmax), hit.side = 0;
         if (!scene->desc.no_shadows)
-            isogi_trace__site_rays(scene, site, (const float(*)[3]) & beam.dir, &beam.tmax, 1, &ray, &hit, counters);
+            isogi_trace__site_rays(scene, site, scene->high ? -1 : 1, (const float(*)[3]) & beam.dir, &beam.tmax, 1, &ray, &hit, counters);
         for (c = 0; c < 3 && !hit.side; c++) rgb[c] += beam.rgb[c] * cosine;
     }
 }
@@ -4022,7 +4050,7 @@ static void isogi_trace__cast_add(isogi_trace__cast *c, const float dir[3], doub
     tmax = isogi_trace__within(scene, tmax);
     if (site->on_surface) {
         if (c->shadow && scene->desc.no_shadows) memset(&c->hit[i], 0, sizeof c->hit[i]);
-        else isogi_trace__site_rays(scene, site, (const float(*)[3])dir, &tmax, 1, ray, &c->hit[i], c->counters);
+        else isogi_trace__site_rays(scene, site, site->from, (const float(*)[3])dir, &tmax, 1, ray, &c->hit[i], c->counters);
         c->blocked[i] = c->hit[i].side != 0;
         if (!c->shadow) isogi_vol_normals(scene->pyramid, &c->hit[i], 1, ISOGI_NORMAL_TRILINEAR, &c->normal[i]);
         isogi_trace__cast_land(c, i, 1);

@@ -924,6 +924,24 @@ TEST(rays_from_the_surface_do_not_leak_through_the_ground) {
     isogi_trace_gather(&d, (const float(*)[3])points, NULL, (size_t)n, e, NULL, NULL);
     for (int i = 0; i < n; i++) lit += e[i][0] > 1e-3f;
     CHECK(lit == 0, "%d of %d points see light through the ground", lit, n);
+    for (int k = 0; k < 8; k++) { /* texels lie where cells meet, each of which has a gradient of its own; without offset, and with it */
+        isogi_trace *t = NULL;
+        int valid = 0;
+        d.method = (isogi_trace_method)(k & 1), d.bounces = k >> 1 & 1, d.offset = k >> 2 ? 0 : -1, d.albedo[0] = 0.5f, d.samples = 32;
+        for (int a = 0; a < 3; a++) d.box_first[a] = a == 1 ? 28 : 22, d.box_end[a] = a == 1 ? 36 : 42;
+        CHECK(isogi_trace_create(&t, &d, NULL) == ISOGI_OK && isogi_trace_step(t, 0, NULL) == ISOGI_OK, "case %d", k);
+        lit = 0;
+        for (size_t i = 0; i < 20 * 20 * 8; i++) { /* what is seen from there over the ground is no lower than where the sky ends */
+            const size_t texel[3] = {22 + i % 20, 28 + i / 400, 22 + i / 20 % 20};
+            const float point[1][3] = {{(float)texel[0], (float)texel[1], (float)texel[2]}};
+            float light[1][3], error[1];
+            isogi_trace_sample(t, point, 1, light, error);
+            if (!isogi_trace_valid(t, texel) || !(error[0] < 1e30f)) continue;
+            valid++, lit += light[0][0] > 1e-3f;
+        }
+        CHECK(valid > 1000 && lit == 0, "case %d: %d of %d texels see light through the ground", k, lit, valid);
+        isogi_trace_free(t);
+    }
     scene_free(&s);
 }
 

@@ -30,9 +30,14 @@ TEST(white_furnace) {
         d.lazy = 1;
         bake_and_sample(&d, NULL, (const float(*)[3])points, n, e);
         for (int k = 0; k < n; k++) worst = fmax(worst, fabs((double)e[k][1] - PI)), mean += (double)e[k][1] / n;
-        /* noise makes pockets that are closed on the isosurfaces of some texels */
+        double expected = PI;
+        if (i >= 4) { /* noise makes pockets, closed on the isosurfaces of some texels, and dark: as by paths that are as good as endless */
+            expected = 0, d.method = ISOGI_TRACE_PATHS, d.bounces = 200, d.samples = 64;
+            bake_and_sample(&d, NULL, (const float(*)[3])points, n, e);
+            for (int k = 0; k < n; k++) expected += (double)e[k][1] / n;
+        }
         CHECK(n == wanted && (worst < 0.005 * PI || i >= 4), "%s: largest deviation of E from pi %g", name[i], worst);
-        CHECK(fabs(mean - PI) < (i < 4 ? 0.002 : 0.03) * PI, "%s: mean %g", name[i], mean);
+        CHECK(fabs(mean - expected) < (i < 4 ? 0.002 : 0.02) * PI, "%s: mean %g, expected %g", name[i], mean, expected);
         scene_free(&s);
     }
 }
