@@ -49,7 +49,7 @@ static double irradiance_by_parts(const isogi_light *l, const double p[3], const
                 }
                 area = length3(normal[0], normal[1], normal[2]);
                 for (int a = 0; a < 3; a++) facing -= normal[a] * d[a] / area / sqrt(dd);
-                weight = facing > 0 ? facing / dd * d[1] / sqrt(dd) / n / n : 0; /* intensity / area, times area / n^2 */
+                weight = facing > 0 && d[1] > 0 ? facing / dd * d[1] / sqrt(dd) / n / n : 0; /* intensity / area, times area / n^2 */
             } else {
                 /* directions uniform in the cone that the light fills */
                 double sine = l->kind == ISOGI_LIGHT_SPHERE ? r / length : sin(r), opening, c, az = 2 * PI * t, across;
@@ -65,8 +65,19 @@ static double irradiance_by_parts(const isogi_light *l, const double p[3], const
     return sum;
 }
 
+/* By a texture of the default method, at a point that is one of its texels: that one alone is read. */
+static double lit_texel(const isogi_trace_desc *desc, const float point[3], int channel) {
+    isogi_trace_desc d = *desc;
+    float p[1][3], e[1][3] = {{0, 0, 0}};
+    memcpy(p[0], point, sizeof p[0]);
+    d.method = ISOGI_TRACE_FEEDBACK, d.lazy = 1;
+    bake_and_sample(&d, NULL, (const float(*)[3])p, 1, e);
+    return (double)e[0][channel];
+}
+
 /* Points in the open, in the half shadow and in the core shadow. The voxelised ball differs from the analytic one by 1/60 of a voxel,
-   which moves the shadow's edge by as much: 1.5 % of the unshadowed light, 3 % with 1024 samples (noise 1 %). */
+   which moves the shadow's edge by as much: 1.5 % of the unshadowed light, 3 % with 1024 samples (noise 1 %). By paths, and by the
+   default method, where rays start a quarter of a voxel above the points, and half as many go to lights. */
 TEST(every_light_against_a_sum_over_its_parts) {
     double q[5] = {24, 22, 24, 8, 6}, centre[3] = {24, 42, 30}, u[3] = {14, 0, 0}, v[3] = {0, -3, -9}, close[3] = {9, 6.2, 12};
     double up_u[3] = {0, 0.3, 0}, up_v[3] = {0, 0, 6};
@@ -83,7 +94,101 @@ TEST(every_light_against_a_sum_over_its_parts) {
             double expected = irradiance_by_parts(&lights[i], p, q, i == 3 ? (LONG_SUITE ? 2000 : 500) : LONG_SUITE ? 400 : 200);
             CHECK(fabs(e - expected) < (LONG_SUITE ? 0.015 : 0.03) * open + 1e-6,
                   "light %d, point %d: E %.5f, expected %.5f, unshadowed %.5f", i, k, e, expected, open);
+            if (k == 3) continue; /* no texel */
+            isogi_trace_desc d = desc_make(&s, 0.5f, 0, LONG_SUITE ? 16384 : 2048);
+            memset(&d.lighting, 0, sizeof d.lighting);
+            d.lighting.lights = &lights[i], d.lighting.light_count = 1, p[1] += 0.25;
+            e = lit_texel(&d, points[k], 0), expected = irradiance_by_parts(&lights[i], p, q, i == 3 ? 1000 : 200);
+            CHECK(fabs(e - expected) < (LONG_SUITE ? 0.015 : 0.03) * open + 1e-6,
+                  "by the default method, light %d, point %d: E %.5f, expected %.5f, unshadowed %.5f", i, k, e, expected, open);
         }
+    scene_free(&s);
+}
+
+/* Any number of lights: their light is the sum. Those without extent take no random numbers, so it is exact to rounding; the sized ones
+   come in the first and the last place, each alone on its side of a ball, with 1 % of noise. */
+TEST(lights_add_up) {
+    enum { LIGHTS = 14 };
+    double q[5] = {24, 22, 24, 8, 6}, centre[3] = {30, 40, 24}, u[3] = {5, 0, 0}, v[3] = {0, 0, -5};
+    const float point[3] = {34, 6, 20};
+    scene s = scene_make(49, 49, 49, NULL, ball_over_plane, q);
+    isogi_light lights[LIGHTS];
+    test_random r = {3};
+    for (int sized = 0; sized < 2; sized++) {
+        double sum[3][3] = {{0}}, e[3];
+        for (int i = 0; i < LIGHTS; i++) {
+            double w[3];
+            random_direction(&r, w);
+            lights[i] = i % 2 ? light_make(ISOGI_LIGHT_POINT, 24 + 20 * w[0], 30 + 12 * w[1], 24 + 20 * w[2], 50 + 10 * i, 0)
+                              : light_make(ISOGI_LIGHT_DIRECTIONAL, w[0], fabs(w[1]), w[2], 0.2, 0);
+            lights[i].rgb[i % 3] *= 3;
+        }
+        if (sized) lights[0] = light_make(ISOGI_LIGHT_SPHERE, 44, 30, 20, 300, 2), lights[1] = rectangle_make(centre, u, v, 400);
+        if (sized) lights[LIGHTS - 1] = light_make(ISOGI_LIGHT_DIRECTIONAL, 1, 2, -1, 0.4, 0.2);
+        for (int i = 0; i <= LIGHTS; i++) {
+            isogi_trace_desc d = desc_make(&s, 0.5f, 0, sized ? 1024 : 4);
+            float p[1][3], rgb[1][3];
+            memcpy(p[0], point, sizeof p[0]), memset(&d.lighting, 0, sizeof d.lighting);
+            d.lighting.lights = lights + i % LIGHTS, d.lighting.light_count = i < LIGHTS ? 1 : LIGHTS;
+            isogi_trace_gather(&d, (const float(*)[3])p, NULL, 1, rgb, NULL, NULL);
+            for (int c = 0; c < 3; c++) {
+                e[c] = (double)rgb[0][c];
+                if (i < LIGHTS) sum[0][c] += e[c], sum[1][c] += lit_texel(&d, point, c);
+                else sum[2][c] = lit_texel(&d, point, c);
+            }
+        }
+        for (int c = 0; c < 3; c++) {
+            CHECK(sum[0][c] > 1 && fabs(e[c] - sum[0][c]) < (sized ? 0.01 : 1e-5) * sum[0][c], "sized %d: %.6f, sum %.6f", sized, e[c],
+                  sum[0][c]);
+            CHECK(fabs(sum[2][c] - sum[1][c]) < (sized ? 0.01 : 1e-5) * sum[1][c], "by the default method, sized %d: %.6f, sum %.6f", sized,
+                  sum[2][c], sum[1][c]);
+        }
+    }
+    scene_free(&s);
+}
+
+/* An image whose brightest tenth is as bright as the rest is dark: rays by the cosine and by the image find as much of it, and their
+   weights must sum to one. A convex surface gets the integral of radiance times cosine, here by quadrature; the mean over 60 points is
+   right to 0.3 %. Spherical harmonics of the same environment come on top. */
+TEST(images_and_harmonics_add_up) {
+    enum { W = 32, H = 16 };
+    static float image[H][W][3];
+    double q[4] = {15.5, 15.5, 15.5, 9}, expected = 0, sum[2][2] = {{0}};
+    float points[60][3], normals[60][3], e[60][3];
+    scene s = scene_make(32, 32, 32, NULL, ball, q);
+    isogi_trace_desc d = desc_make(&s, 0, 0, 1024);
+    int n = surface_points(&s, 0, 60, 7, points);
+    for (int i = 0; i < W * H * 3; i++) (&image[0][0][0])[i] = i < 3 * W * 3 ? 1 : 0.02f;
+    isogi_vol_sample_smooth(s.pyramid, (const float(*)[3])points, (size_t)n, NULL, normals);
+    for (int harmonics = 0; harmonics < 2; harmonics++) {
+        memset(&d.lighting, 0, sizeof d.lighting);
+        d.lighting.env.rgb = &image[0][0][0], d.lighting.env.width = W, d.lighting.env.height = H;
+        if (harmonics) d.lighting.env.sh = white_sky, d.lighting.env.sh_order = 1;
+        for (int method = 0; method < 2; method++) {
+            d.method = method ? ISOGI_TRACE_PATHS : ISOGI_TRACE_FEEDBACK, d.lazy = 1;
+            bake_and_sample(&d, NULL, (const float(*)[3])points, n, e);
+            for (int i = 0; i < n; i++) sum[harmonics][method] += (double)e[i][1];
+        }
+    }
+    for (int i = 0; i < n; i++) {
+        double length = length3((double)normals[i][0], (double)normals[i][1], (double)normals[i][2]);
+        for (int y = 0; y < 8 * H; y++)
+            for (int x = 0; x < 4 * W; x++) {
+                double theta = (y + 0.5) * PI / (8 * H), phi = 2 * PI * (x + 0.5) / (4 * W), cosine = 0;
+                float dir[3] = {(float)(sin(theta) * sin(phi)), (float)cos(theta), (float)(-sin(theta) * cos(phi))}, rgb[3];
+                for (int a = 0; a < 3; a++) cosine -= (double)dir[a] * (double)normals[i][a] / length;
+                if (cosine <= 0) continue;
+                isogi_env_radiance(&d.lighting.env, dir, rgb);
+                expected += ((double)rgb[1] - 1) * cosine * sin(theta) * (PI / (8 * H)) * (2 * PI / (4 * W));
+            }
+    }
+    for (int method = 0; method < 2; method++) {
+        printf("    method %d: %.4f of the integral, %.4f with harmonics\n", method, sum[0][method] / expected,
+               sum[1][method] / (expected + n * PI));
+        CHECK(fabs(sum[0][method] - expected) < 0.006 * expected, "method %d: sum %.4f, expected %.4f", method, sum[0][method], expected);
+        CHECK(fabs(sum[1][method] - expected - n * PI) < 0.006 * (expected + n * PI), "method %d, with harmonics: sum %.4f, expected %.4f",
+              method, sum[1][method], expected + n * PI);
+    }
     scene_free(&s);
 }
 
@@ -158,6 +263,32 @@ static void red_and_green(void *user, double isovalue, const double p[3], float 
     (void)isovalue;
     albedo[0] *= p[0] < q->plane ? 1 : 0, albedo[1] *= p[0] < q->plane ? 0 : 1, albedo[2] = 0;
     if (q->wild) albedo[2] = (float)nan_value(), albedo[0] *= 100, emission[1] = -5, emission[2] = (float)nan_value();
+}
+
+/* A hollow black ball whose halves glow in red and green: from its wall all parts look equally large, so E = pi / 2 of each, by both
+   methods. */
+static void glowing_halves(void *user, double isovalue, const double p[3], float albedo[3], float emission[3]) {
+    (void)isovalue, (void)albedo;
+    emission[p[0] > *(const double *)user] = 1;
+}
+TEST(glow_goes_by_place) {
+    double q[5] = {16, 16, 16, 9, 14}, middle = 16;
+    scene s = scene_make(33, 33, 33, NULL, shell, q);
+    isogi_trace_desc d = desc_make(&s, 0, 0, 256);
+    float points[60][3], e[60][3];
+    points_seen_from(&s, 16, 9, 60, points);
+    memset(&d.lighting, 0, sizeof d.lighting);
+    d.material = glowing_halves, d.material_user = &middle, d.lazy = 1;
+    for (int method = 0; method < 2; method++) {
+        double mean[3] = {0, 0, 0};
+        d.method = (isogi_trace_method)method;
+        bake_and_sample(&d, NULL, (const float(*)[3])points, 60, e);
+        for (int i = 0; i < 60; i++)
+            for (int c = 0; c < 3; c++) mean[c] += (double)e[i][c] / 60;
+        CHECK(fabs(mean[0] - PI / 2) < 0.03 && fabs(mean[1] - PI / 2) < 0.03 && mean[2] <= 0, "method %d: E %.4f %.4f %.4f", method,
+              mean[0], mean[1], mean[2]);
+    }
+    scene_free(&s);
 }
 
 static void counted(void *user, double isovalue, const double p[3], float albedo[3], float emission[3]) {
@@ -288,7 +419,8 @@ TEST(high_side_is_the_low_side_of_the_negated_field) {
 }
 
 /* Within matter that is closed nobody sees the sky: at no texel of a noisy ball, whose voxels are full of maxima with nothing behind them,
-   and of capped volumes, whatever way their values fall at the border. Hardly a texel with matter behind it is left out. */
+   and of capped volumes, whatever way their values fall at the border, by either method, also by rays from the surface itself. Hardly a
+   texel with matter behind it is left out. */
 static double noisy_ball(const double p[3], const double *q) {
     double r = length3(p[0] - q[0], p[1] - q[1], p[2] - q[2]);
     return r > q[3] ? 0 : 200 - 10 * r + 8 * roughness(p);
@@ -298,24 +430,24 @@ TEST(high_side_of_closed_matter_is_dark) {
     double q[4] = {9.6, 9.3, 9.5, 8.4}, waves[1] = {0.37}, below[4] = {7.7, 7.3, 0, 15};
     field *f[3] = {noisy_ball, gyroid, from_beyond};
     const double *parameter[3] = {q, waves, below};
-    for (int k = 0; k < 3; k++) {
-        int n = k ? 16 : 20, valid = 0, bright = 0, plain = 0;
+    for (int i = 0; i < 12; i++) {
+        int k = i / 4, n = k ? 16 : 20, valid = 0, bright = 0, plain = 0;
         scene s = scene_make(n, n, n, NULL, f[k], parameter[k]);
         isogi_trace_desc d = desc_make(&s, 0.5f, 1, 8);
         isogi_trace *t = NULL, *low = NULL;
-        d.capped = k > 0;
+        d.capped = k > 0, d.method = i % 2 ? ISOGI_TRACE_FEEDBACK : ISOGI_TRACE_PATHS, d.offset = i % 4 < 2 ? 0 : -1;
         if (isogi_trace_create(&low, &d, NULL) != ISOGI_OK) abort();
         d.sides = ISOGI_TRACE_HIGH_SIDE;
         CHECK(isogi_trace_create(&t, &d, NULL) == ISOGI_OK && isogi_trace_step(t, 0, NULL) == ISOGI_OK, "field %d", k);
-        for (int i = 0; i < n * n * n; i++) {
-            size_t at[3] = {(size_t)(i % n), (size_t)(i / n % n), (size_t)(i / n / n)};
+        for (int texel = 0; texel < n * n * n; texel++) {
+            size_t at[3] = {(size_t)(texel % n), (size_t)(texel / n % n), (size_t)(texel / n / n)};
             float point[1][3] = {{(float)at[0], (float)at[1], (float)at[2]}}, e[1][3] = {{1, 1, 1}};
             plain += isogi_trace_valid(low, at);
             if (!isogi_trace_valid(t, at)) continue;
             isogi_trace_sample(t, (const float(*)[3])point, 1, e, NULL);
             valid++, bright += e[0][1] > 1e-6f;
         }
-        CHECK(!bright && valid > (k == 1 ? 7 : 9) * plain / 10, "field %d: %d of %d texels see the sky; %d on the low side", k, bright,
+        CHECK(!bright && valid > (k == 1 ? 7 : 9) * plain / 10, "case %d: %d of %d texels see the sky; %d on the low side", i, bright,
               valid, plain);
         isogi_trace_free(t), isogi_trace_free(low), scene_free(&s);
     }
@@ -383,9 +515,12 @@ TEST(shadows_can_be_left_out) {
     d.no_shadows = 1;
     isogi_trace_gather(&d, (const float(*)[3])p, NULL, 1, e, NULL, NULL);
     CHECK(fabs((double)e[0][0] - sky - lamps) < 0.01 * sky, "without shadows %.4f, expected %.4f", (double)e[0][0], sky + lamps);
+    double texel = lit_texel(&d, p[0], 0);
+    CHECK(fabs(texel - sky - lamps) < 0.01 * sky, "without shadows, by the default method, %.4f, expected %.4f", texel, sky + lamps);
     d.bounces = 1;
-    isogi_trace_gather(&d, (const float(*)[3])p, NULL, 1, e, NULL, NULL);
+    isogi_trace_gather(&d, (const float(*)[3])p, NULL, 1, e, NULL, NULL), texel = lit_texel(&d, p[0], 0);
     CHECK((double)e[0][0] > sky + lamps + 0.02, "with a reflection %.4f", (double)e[0][0]);
+    CHECK(fabs(texel - (double)e[0][0]) < 0.015 * sky, "with a reflection %.4f, by the default method %.4f", (double)e[0][0], texel);
     scene_free(&s);
 }
 
@@ -404,6 +539,22 @@ TEST(occlusion_has_a_radius) {
         d.reach = (float)reach[i];
         isogi_trace_gather(&d, (const float(*)[3])p, NULL, 1, e, NULL, NULL);
         CHECK(fabs((double)e[0][0] - expected) < 0.01 * PI, "radius %g: E %.4f, expected %.4f", reach[i], (double)e[0][0], expected);
+        for (int off = 0; off < 2; off++) { /* by the default method, from the surface, and a quarter of a voxel above it */
+            isogi_trace_desc t = d;
+            double height = off ? 3.75 : 4;
+            t.offset = off ? 0.25f : -1, expected = reach[i] > height ? PI * height * height / (reach[i] * reach[i]) : PI;
+            CHECK(fabs(lit_texel(&t, p[0], 0) - expected) < 0.01 * PI, "radius %g, by the default method: E %.4f, expected %.4f", reach[i],
+                  lit_texel(&t, p[0], 0), expected);
+        }
+    }
+    for (int i = 0; i < 2; i++) { /* a lamp in the ceiling, which is 4 away, shines through it where that is out of reach */
+        isogi_light lamp = light_make(ISOGI_LIGHT_POINT, 32, 14, 32, 100, 0);
+        memset(&d.lighting, 0, sizeof d.lighting);
+        d.lighting.lights = &lamp, d.lighting.light_count = 1, d.reach = i ? 5 : 2;
+        isogi_trace_gather(&d, (const float(*)[3])p, NULL, 1, e, NULL, NULL);
+        double texel = lit_texel(&d, p[0], 0);
+        CHECK(fabs((double)e[0][0] - (i ? 0 : 1)) < 1e-5 && fabs(texel - (i ? 0 : 1)) < 1e-5, "radius %g: E %.4f, by default %.4f",
+              (double)d.reach, (double)e[0][0], texel);
     }
     scene_free(&s);
 }
@@ -488,6 +639,66 @@ TEST(gloss_against_its_integral) {
            sqrt(unshadowed / size));
     CHECK(sqrt(error[1] / size) < 0.25 && error[1] < 0.25 * unshadowed, "pit: relative error %.3f, without occlusion %.3f",
           sqrt(error[1] / size), sqrt(unshadowed / size));
+}
+
+/* On open ground nothing stands in the way: gloss is the lighting blurred by the lobe, in the mirrored direction, here by quadrature of the
+   lobe; openness by 16384 samples is 1 but for 1 %. In a pit whose walls reflect blue, less green and no red, openness is that of a
+   colour of its own: blue gloss is brightest. */
+TEST(gloss_is_blurred_light_in_the_mirrored_direction) {
+    double q[5] = {8.4, 12, 10, 15, 6};
+    isogi_light suns[2] = {{.vector = {1, 1, 0}, .rgb = {3, 1, 0.5f}}, {.vector = {-1, 2, 1}, .rgb = {0.5f, 1, 2}}};
+    isogi_lighting lighting = {.env = {.sh = white_sky, .sh_order = 1}, .lights = suns, .light_count = 2};
+    float light[108], point[1][3] = {{8, 8.4f, 9}}, up[1][3] = {{0, 1, 0}}, rgb[1][3];
+    scene s = scene_make(17, 17, 17, NULL, ground, q);
+    for (int order = 3; order <= 6; order++) {
+        isogi_trace_desc d = desc_make(&s, 0, 0, 16384);
+        isogi_trace *t = NULL;
+        d.mode = ISOGI_TRACE_TRANSFER, d.order = order, d.lazy = 1, d.lighting = lighting;
+        CHECK(isogi_trace_create(&t, &d, NULL) == ISOGI_OK && isogi_trace_request(t, (const float(*)[3])point, 1) == ISOGI_OK &&
+                  isogi_trace_step(t, 0, NULL) == ISOGI_OK && isogi_sh_project(light, order, &lighting, NULL) == ISOGI_OK,
+              "order %d", order);
+        for (int i = 0; i < 12; i++) {
+            double tilt = 0.11 * i, exponent = i % 3 ? 1.5 + 6 * (i % 3) : 0;
+            float view[1][3] = {{(float)(sin(tilt) * cos(0.8 * i)), (float)cos(tilt), (float)(sin(tilt) * sin(0.8 * i))}}, y[36];
+            const float mirrored[1][3] = {{-view[0][0], view[0][1], -view[0][2]}};
+            CHECK(isogi_trace_sample_gloss(t, (const float(*)[3])point, (const float(*)[3])up, (const float(*)[3])view, exponent, 1, rgb) ==
+                      ISOGI_OK,
+                  "view %d", i);
+            isogi_sh_eval(y, order, mirrored, 1);
+            for (int c = 0; c < 3; c++) {
+                double expected = 0;
+                for (int l = 0; l < order; l++) {
+                    double blur = 0, part = 0;
+                    for (int k = 0; k < 2000; k++) { /* (s + 1) times the integral of x^s P_l */
+                        double x = (k + 0.5) / 2000, p0 = 1, p1 = x;
+                        for (int m = 1; m < l; m++) {
+                            double p2 = ((2 * m + 1) * x * p1 - m * p0) / (m + 1);
+                            p0 = p1, p1 = p2;
+                        }
+                        blur += (exponent + 1) * pow(x, exponent) * (l ? p1 : 1) / 2000;
+                    }
+                    for (int k = l * l; k < (l + 1) * (l + 1); k++) part += (double)light[3 * k + c] * (double)y[k];
+                    expected += blur * part;
+                }
+                expected = fmax(expected, 0);
+                CHECK(fabs((double)rgb[0][c] - expected) < 0.02 * expected + 0.005, "order %d, view %d, channel %d: %.4f, not %.4f",
+                      order, i, c, (double)rgb[0][c], expected);
+            }
+        }
+        isogi_trace_free(t);
+    }
+    scene_free(&s);
+    q[0] = 10;
+    s = scene_make(21, 21, 21, NULL, pit, q);
+    isogi_trace_desc d = desc_make(&s, 0, -1, 256);
+    isogi_trace *t = NULL;
+    const float floor_of_pit[1][3] = {{10, 6, 10}}, aside[1][3] = {{0.8f, 0.6f, 0}};
+    d.mode = ISOGI_TRACE_TRANSFER, d.lazy = 1, d.albedo[1] = 0.5f, d.albedo[2] = 0.9f;
+    CHECK(isogi_trace_create(&t, &d, NULL) == ISOGI_OK && isogi_trace_request(t, floor_of_pit, 1) == ISOGI_OK, "pit");
+    isogi_trace_step(t, 0, NULL), isogi_trace_sample_gloss(t, floor_of_pit, (const float(*)[3])up, aside, 12, 1, rgb);
+    CHECK(rgb[0][0] >= 0 && rgb[0][1] > rgb[0][0] + 0.1f && rgb[0][2] > rgb[0][1] + 0.1f, "gloss %.3f %.3f %.3f", (double)rgb[0][0],
+          (double)rgb[0][1], (double)rgb[0][2]);
+    isogi_trace_free(t), scene_free(&s);
 }
 
 /* Reflections let the floor of a white pit take in more than an open surface would, from near its horizon: openness ends at 1. Under the
