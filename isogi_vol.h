@@ -3532,7 +3532,8 @@ ISOGI_VOL__INLINE int isogi_vol__quadratic_roots(double a, double b, double c, d
 
 /* The root in [low, high], the only one there, with different sides at its ends: Newton from the secant's root, kept inside a shrinking
    bracket; every third step bisects once Newton has had its chance. The first steps go without the bracket and end when the error
-   left, at most |f''| step^2 / (2 |f'|) (Taylor), is below 1e-13; not where the cubic is 0 at an end, which is another root. */
+   left, at most |f''| step^2 / (2 |f'|) (Taylor), is below 1e-13; not where the cubic is 0 at an end, which is another root, nor where
+   it turns back: there, an end nearly 0 is near another root, which lies behind it. */
 ISOGI_VOL__INLINE double isogi_vol__cubic_refine(const isogi_vol__cubic *cubic, double low, double high, double at_low, double at_high,
                                                  int rising) {
     const double *b = cubic->b;
@@ -3543,7 +3544,8 @@ ISOGI_VOL__INLINE double isogi_vol__cubic_refine(const isogi_vol__cubic *cubic, 
     for (i = 0; i < 4 && ((at_low < 0 && at_high > 0) || (at_low > 0 && at_high < 0)); i++) {
         double value = (b[0] + s * c1) + s * s * (c2 + s * c3), slope = (c1 + 2 * s * c2) + s * s * (3 * c3), step = value / slope;
         next = s - step;
-        if (!(next >= low && next <= high)) break;
+        if ((slope > 0) != rising && !i) first = high;
+        if (!(next >= low && next <= high) || (slope > 0) != rising) break;
         if (bend * step * step <= fabs(slope)) return next;
         s = next;
     }
@@ -5296,7 +5298,9 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE void isogi_vol__refine8(isogi_vol__batch *b,
             const __m512d slope = ISOGI_VOL__ADD(ISOGI_VOL__ADD(c1[g], ISOGI_VOL__MUL(ISOGI_VOL__MUL(two, s[g]), c2[g])),
                                                  ISOGI_VOL__MUL(ss, ISOGI_VOL__MUL(three, c3[g])));
             const __m512d step = _mm512_div_pd(value, slope), at = ISOGI_VOL__SUB(s[g], step);
-            const __mmask8 kept = _mm512_mask_cmp_pd_mask(_mm512_cmp_pd_mask(at, zero, _CMP_GE_OQ), at, one, _CMP_LE_OQ);
+            const __mmask8 back = _mm512_movepi64_mask(_mm512_castpd_si512(_mm512_xor_pd(slope, k[g].bezier[3])));
+            const __mmask8 ahead = _mm512_mask_cmp_pd_mask((__mmask8)~back, at, zero, _CMP_GE_OQ);
+            const __mmask8 kept = _mm512_mask_cmp_pd_mask(ahead, at, one, _CMP_LE_OQ);
             const __mmask8 done =
                 _mm512_cmp_pd_mask(ISOGI_VOL__MUL(ISOGI_VOL__MUL(bend[g], step), step), _mm512_abs_pd(slope), _CMP_LE_OQ);
             slow[g] = (__mmask8)(slow[g] | (due[g] & ~kept));

@@ -356,6 +356,102 @@ TEST(behind_a_touched_corner_the_next_surface_is_met) {
         }
 }
 
+/* Along diagonals from voxel to voxel through cells of whole numbers, for isovalues one rounding beside that of the voxel where they
+   leave: there the field is all but 0, by another crossing just behind, but the ray crosses the surface elsewhere in the cell. */
+TEST(a_crossing_is_not_mistaken_for_one_behind_the_end_of_its_cell) {
+    enum { RAYS = 64 };
+    test_random r = {23};
+    long rays = 0, wrong[PATHS] = {0}, alone[PATHS] = {0};
+    for (int turn = 0; turn < (LONG_SUITE ? 40000 : 4000); turn++) {
+        scene s = scene_new(2, 2, 2);
+        double b[4], truth = 0, last = 0;
+        isogi_ray ray[RAYS];
+        isogi_hit hit[RAYS];
+        const int from = (int)(random_bits(&r) & 7);
+        memset(ray, 0, sizeof ray);
+        for (int i = 0; i < 8; i++) s.value[i] = floor(random_range(&r, -40, 41));
+        ray[0].isovalue = nextafter(s.value[7 - from], random_bits(&r) & 1 ? 100 : -100), ray[0].tmax = 4;
+        b[0] = s.value[from] - ray[0].isovalue, b[3] = s.value[7 - from] - ray[0].isovalue, b[1] = b[2] = 0;
+        for (int a = 0; a < 3; a++) {
+            b[1] += (s.value[from ^ (1 << a)] - ray[0].isovalue) / 3, b[2] += (s.value[(7 - from) ^ (1 << a)] - ray[0].isovalue) / 3;
+            ray[0].dir[a] = from >> a & 1 ? -1 : 1, ray[0].origin[a] = (from >> a & 1) - 3 * (double)ray[0].dir[a];
+        }
+        int clear = fabs(b[0]) > 0.01;
+        for (int i = 1; i < 244 && clear && !(truth > 0); i++) {
+            double low = (i - 1) / 256.0, high = i / 256.0, value = 0, u = high;
+            for (int k = 0; k < 60; k++) {
+                const double v = 1 - u;
+                value = v * v * (v * b[0] + 3 * u * b[1]) + u * u * (3 * v * b[2] + u * b[3]);
+                if (!k && (value >= 0) == (b[0] >= 0)) break;
+                if (!k) truth = 1, last = value;
+                if ((value >= 0) == (b[0] >= 0)) low = u;
+                else high = u;
+                u = 0.5 * (low + high);
+            }
+            clear = fabs(truth > 0 ? last : value) > 0.01;
+            if (truth > 0) truth = 3 + high;
+        }
+        if (!clear || !(truth > 0)) {
+            scene_free(&s);
+            continue;
+        }
+        rays++;
+        for (int i = 1; i < RAYS; i++) ray[i] = ray[0];
+        scene_build(&s);
+        for (int p = 0; p < PATHS; p++) {
+            isogi_vol_intersect(s.pyramid[p], ray, 1, hit, NULL);
+            alone[p] += hit[0].side != (b[0] >= 0 ? -1 : 1) || !(fabs(hit[0].t - truth) < 1e-9);
+            isogi_vol_intersect(s.pyramid[p], ray, RAYS, hit, NULL);
+            wrong[p] += hit[RAYS - 1].side != (b[0] >= 0 ? -1 : 1) || !(fabs(hit[RAYS - 1].t - truth) < 1e-9);
+        }
+        scene_free(&s);
+    }
+    printf("    %ld rays\n", rays);
+    for (int p = 0; p < PATHS; p++) CHECK(!wrong[p] && !alone[p], "path %d: %ld of %ld rays, %ld alone", p, wrong[p], rays, alone[p]);
+    CHECK(rays > 500, "%ld rays: the test says little", rays);
+}
+
+/* The same for rays of all directions through voxels of a volume, many at once: just before a hit they are on the other side. */
+TEST(just_before_a_hit_rays_are_on_the_other_side) {
+    enum { RAYS = 96 };
+    test_random r = {29};
+    long hits = 0, wrong[PATHS] = {0};
+    for (int turn = 0; turn < (LONG_SUITE ? 4000 : 200); turn++) {
+        scene s = scene_new(9, 9, 9);
+        isogi_ray ray[RAYS];
+        isogi_hit hit[RAYS];
+        memset(ray, 0, sizeof ray);
+        for (size_t i = 0; i < scene_voxels(&s); i++) s.value[i] = floor(random_range(&r, -40, 41));
+        for (int i = 0; i < RAYS; i++) {
+            int at[3];
+            for (int a = 0; a < 3; a++) {
+                at[a] = 1 + (int)(random_bits(&r) % 7), ray[i].dir[a] = (float)((int)(random_bits(&r) % 129) - 64) / 64;
+                if (fabsf(ray[i].dir[a]) < 0.25f) ray[i].dir[a] = 0.25f;
+                ray[i].origin[a] = at[a] - (double)ray[i].dir[a];
+            }
+            ray[i].isovalue = nextafter(s.value[at[0] + 9 * (at[1] + 9 * at[2])], random_bits(&r) & 1 ? 100 : -100);
+        }
+        scene_build(&s);
+        for (int p = 0; p < PATHS; p++) {
+            isogi_vol_intersect(s.pyramid[p], ray, RAYS, hit, NULL);
+            for (int i = 0; i < RAYS; i++) {
+                const wide_ray g = to_grid(&s, &ray[i]);
+                const wide before = (wide)hit[i].t - (wide)1e-6;
+                int cell[3], finite = 1;
+                if (!hit[i].side || hit[i].t < 1e-5) continue;
+                wide_cell(&s, &g, before, cell);
+                const double value = (double)wide_at(&s, &g, cell, before, ray[i].isovalue, &finite);
+                if (fabs(value) < 1e-10) continue;
+                hits++, wrong[p] += (value >= 0) != (hit[i].side < 0);
+            }
+        }
+        scene_free(&s);
+    }
+    printf("    %ld hits\n", hits);
+    for (int p = 0; p < PATHS; p++) CHECK(!wrong[p], "path %d: %ld hits", p, wrong[p]);
+    CHECK(hits > 20000, "%ld hits: the test says little", hits);
+}
+
 /* All numbers times a power of two: the same hits, however far the squares of values leave the range of double. */
 TEST(values_of_any_size_have_the_same_hits) {
     const double unit[] = {0x1p-900, 0x1p-500, 0x1p500, 0x1p900};
