@@ -485,6 +485,102 @@ TEST(hierarchies_follow_changes) {
     isogi_trace_free(t), isogi_trace_free(fresh), scene_free(&s);
 }
 
+/* ---- anything, in any order --------------------------------------------------------------------------------------------------- */
+
+typedef struct stage { /* what descriptions borrow */
+    isogi_albedo_point colours[2][4], glow[2][2];
+    float image[2][8][16][3], sh[2][9][3];
+    isogi_light light[3];
+} stage;
+
+static int one_of(test_random *r, int n) { return (int)(random_bits(r) % (uint64_t)n); }
+
+static void change_anything(isogi_trace_desc *d, stage *g, test_random *r) {
+    double a = random_range(r, -1, 1), b = random_range(r, -1, 1);
+    switch (one_of(r, 9)) {
+    case 0: d->lighting.lights = g->light, d->lighting.light_count = (size_t)one_of(r, 4); break;
+    case 1: g->light[one_of(r, 3)] = light_make(ISOGI_LIGHT_DIRECTIONAL, a, 1, b, fabs(a), one_of(r, 2) ? 0 : fabs(b)); break;
+    case 2: d->albedo_points = g->colours[one_of(r, 2)], d->albedo_count = 4; break;
+    case 3: g->colours[0][one_of(r, 4)].rgb[one_of(r, 3)] = (float)fabs(a); break; /* in place */
+    case 4:
+        d->isovalue_min = fmin(a, b), d->isovalue_max = fmax(a, b);
+        if (!one_of(r, 3)) d->isovalue_min = d->isovalue_max = 0;
+        break;
+    case 5: d->samples = 1 + one_of(r, 5), d->bounces = one_of(r, 4) - 1; break;
+    case 6: if (d->mode == ISOGI_TRACE_IRRADIANCE) d->emission_points = g->glow[one_of(r, 2)], d->emission_count = 2; break;
+    case 7: d->lighting.env.rgb = &g->image[one_of(r, 2)][0][0][0], d->lighting.env.width = 16, d->lighting.env.height = 8; break;
+    default: d->lookup = (isogi_trace_lookup)one_of(r, 4), d->seed = (uint64_t)one_of(r, 2), d->no_shadows = !one_of(r, 8);
+    }
+}
+
+static stage *stage_make(test_random *r) {
+    stage *g = (stage *)calloc(1, sizeof *g);
+    for (int i = 0; i < 8; i++) g->colours[i / 4][i % 4].value = -1 + 0.6 * (i % 4), g->glow[i / 4][i % 2].value = i % 2;
+    for (int i = 0; i < 24; i++) g->colours[i / 12][i / 3 % 4].rgb[i % 3] = (float)random_range(r, 0, 0.95);
+    for (int i = 0; i < 12; i++) g->glow[i / 6][i / 3 % 2].rgb[i % 3] = (float)random_range(r, 0, 2);
+    for (int i = 0; i < 768; i++) (&g->image[0][0][0][0])[i] = (float)random_range(r, 0, one_of(r, 50) ? 1 : 300);
+    for (int i = 0; i < 54; i++) (&g->sh[0][0][0])[i] = (float)(i % 27 < 3 ? 4 : random_range(r, -0.3, 0.3));
+    for (int i = 0; i < 3; i++) g->light[i] = light_make(ISOGI_LIGHT_DIRECTIONAL, i, 1, 0.3, 1, 0.1 * i);
+    return g;
+}
+
+static isogi_trace *asked(const isogi_trace_desc *d, const float (*points)[3], int n) {
+    isogi_trace *t = NULL;
+    CHECK(isogi_trace_create(&t, d, NULL) == ISOGI_OK && isogi_trace_request(t, points, (size_t)n) == ISOGI_OK, "create and request");
+    return t;
+}
+
+/* Requests, changes of the description, changes of voxels and steps of any size, in any order, of textures of any kind: at the end every
+   point whose isovalue is wanted has the bits of a new texture (which may lack what an earlier interval has brought, hence the error). */
+TEST(changes_in_any_order_give_the_bits_of_a_new_bake) {
+    int compared = 0;
+    for (int k = 0; k < (LONG_SUITE ? 3000 : 150); k++) {
+        test_random r = {(uint64_t)(77 * k + 5)};
+        double q[1] = {0.5}, remaining = 1;
+        stage *g = stage_make(&r);
+        scene s = scene_make(5 + one_of(&r, 9), 5 + one_of(&r, 9), 5 + one_of(&r, 9), NULL, gyroid, q);
+        isogi_trace_desc d = desc_make(&s, (float)random_range(&r, 0, 0.95), one_of(&r, 4) - 1, 1 + one_of(&r, 4));
+        float points[100][3], e[2][100][3], error[100], value[100];
+        if (!one_of(&r, 4)) d.mode = ISOGI_TRACE_TRANSFER, d.order = 1 + one_of(&r, 3), d.transfer_channels = 3;
+        if (!one_of(&r, 3)) d.lattice[0] = (size_t)(1 + one_of(&r, 14)), d.lattice[2] = (size_t)(1 + one_of(&r, 14));
+        d.lazy = one_of(&r, 2), d.sides = one_of(&r, 2) ? ISOGI_TRACE_HIGH_SIDE : ISOGI_TRACE_LOW_SIDE, d.capped = !one_of(&r, 3);
+        d.lighting.env.sh = &g->sh[0][0][0], d.lighting.env.sh_order = 3, d.normals = (isogi_normal_kind)one_of(&r, 2);
+        d.storage = (isogi_trace_format)one_of(&r, 3), d.albedo_points = g->colours[0], d.albedo_count = 4;
+        for (int i = 0; i < 100; i++)
+            for (int a = 0; a < 3; a++) points[i][a] = (float)random_range(&r, -0.5, (double)s.volume.size[a] - 0.5);
+        isogi_trace *t = asked(&d, (const float(*)[3])points, d.lazy ? 30 : 0), *fresh;
+        for (int i = 0; i < 10; i++) {
+            isogi_trace_desc other = d;
+            switch (one_of(&r, 5)) {
+            case 0: CHECK(isogi_trace_request(t, (const float(*)[3])points + one_of(&r, 80), 20) == ISOGI_OK, "case %d", k); break;
+            case 1: change_box(&s, t, &r, one_of(&r, 2)); break;
+            case 2:
+                change_anything(&other, g, &r);
+                CHECK(isogi_trace_change(t, &other) == ISOGI_OK, "case %d", k);
+                d = other;
+                break;
+            default: CHECK(isogi_trace_step(t, (uint64_t)(1 + one_of(&r, 3000)), &remaining) == ISOGI_OK, "case %d", k);
+            }
+        }
+        isogi_trace_request(t, (const float(*)[3])points, 100); /* surfaces may have come */
+        CHECK(isogi_trace_change(t, &d) == ISOGI_OK && isogi_trace_step(t, 0, &remaining) == ISOGI_OK && remaining <= 0, "case %d", k);
+        fresh = asked(&d, (const float(*)[3])points, 100), isogi_trace_step(fresh, 0, NULL);
+        isogi_trace_sample(t, (const float(*)[3])points, 100, e[0], NULL);
+        isogi_trace_sample(fresh, (const float(*)[3])points, 100, e[1], error);
+        isogi_vol_sample(s.pyramid, (const float(*)[3])points, 100, value, NULL);
+        for (int i = 0; i < 100; i++) {
+            int all = !(d.isovalue_min < 0 || d.isovalue_min > 0 || d.isovalue_max < 0 || d.isovalue_max > 0);
+            if (!(error[i] < 1e30f) || !(all || ((double)value[i] >= d.isovalue_min && (double)value[i] <= d.isovalue_max))) continue;
+            CHECK(!memcmp(e[0][i], e[1][i], sizeof e[0][i]), "case %d, point %d: %g, of a new bake %g", k, i, (double)e[0][i][1],
+                  (double)e[1][i][1]);
+            compared++;
+        }
+        isogi_trace_free(t), isogi_trace_free(fresh), scene_free(&s), free(g);
+    }
+    printf("    %d points compared\n", compared);
+    CHECK(compared > 1000, "%d points compared", compared);
+}
+
 /* ---- what cannot change, and memory ---------------------------------------------------------------------------------------------- */
 
 TEST(other_textures_are_refused) {
