@@ -718,6 +718,32 @@ TEST(projections_of_any_order) {
     }
 }
 
+/* Weighted samples at axes of every length, at no direction, which is +z, and at none at all: sums of Y. */
+TEST(samples_of_any_order) {
+    static quad sum[2 * N];
+    static double wide[2 * N];
+    float direction[AXES + 1][3], value[2 * (AXES + 1)], weight[AXES + 1];
+    for (int i = 0; i <= AXES; i++) {
+        for (int k = 0; k < 3; k++) direction[i][k] = i < AXES ? axes[i][k] : 0;
+        value[2 * i] = (float)(i + 1), value[2 * i + 1] = (float)(3 - i), weight[i] = 0.125f * (float)(i % 5);
+    }
+    for (int o = 0; o < ORDERS; o++) {
+        const int order = orders[o], n = order * order;
+        double worst = 0;
+        for (int i = 0; i < 2 * n; i++) sum[i] = 0;
+        for (int i = 0; i <= AXES; i++) {
+            basis_at(order, i < AXES ? axes[i] : axes[0]);
+            for (int k = 0; k < 2 * n; k++) sum[k] += basis[k / 2] * (quad)weight[i] * (quad)value[2 * i + k % 2];
+        }
+        CHECK(isogi_sh_project_samples(wide, order, 2, (const float(*)[3])direction, value, weight, AXES + 1) == ISOGI_OK, "order %d",
+              order);
+        for (int k = 0; k < 2 * n; k++) worst = fmax(worst, test_finite(wide[k]) ? fabs(wide[k] - (double)sum[k]) : 1e9);
+        CHECK(worst <= 1e-12 * order * ROUNDING_FACTOR, "order %d: %g", order, worst);
+        CHECK(isogi_sh_project_samples(wide, order, 2, NULL, NULL, NULL, 0) == ISOGI_OK && wide[0] == 0 && wide[2 * n - 1] == 0,
+              "order %d: nothing is %g", order, wide[0]);
+    }
+}
+
 TEST(fits_of_any_order) {
     for (int o = 1; o < ORDERS; o++)
         for (int a = 0; a < AXES; a++) {
@@ -732,6 +758,10 @@ TEST(fits_of_any_order) {
             for (int k = 0; k < 3; k++) off = fmax(off, fabs((double)direction[k] - (double)axes[a][k] / length));
             CHECK(off <= 1e-5 && fabs((double)rgb[0] - 3) <= 1e-4 && fabs((double)ambient[0]) <= 1e-4, "order %d, axis %d: %g off, %g %g",
                   orders[o], a, off, (double)rgb[0], (double)ambient[0]);
+            CHECK(isogi_sh_dominant_direction(direction, rgb, c, orders[o]) == ISOGI_OK, "axis %d", a);
+            off = fabs((double)rgb[0] - 3) + fabs((double)rgb[1] - 2) + fabs((double)rgb[2] - 1);
+            for (int k = 0; k < 3; k++) off = fmax(off, fabs((double)direction[k] - (double)axes[a][k] / length));
+            CHECK(off <= 1e-5, "order %d, axis %d: dominant direction %g off", orders[o], a, off);
         }
 }
 
