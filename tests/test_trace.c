@@ -181,6 +181,9 @@ TEST(lights_with_a_size_match_analytic_values) {
     CHECK(fabs(e - 0.8) < 0.003 * 0.8 * 3, "disc E %.5f, expected 0.8", e);
     e = lit(&s, &ball_light, p, 0, 4096);
     CHECK(fabs(e - 50 * 6 / (d * d * d)) < 0.01 * e, "sphere E %.5f, expected %.5f", e, 50 * 6 / (d * d * d));
+    ball_light.vector[0] = 15, ball_light.vector[1] = 9; /* about the point: radiance I / (pi r^2) from everywhere */
+    e = lit(&s, &ball_light, p, 0, 65536); /* half of them below the ground: 0.5 % of noise */
+    CHECK(fabs(e - 50.0 / 9) < 0.02 * e, "within the sphere E %.5f, expected %.5f", e, 50.0 / 9);
     e = lit(&s, &dome, p, 0, 4096);
     CHECK(fabs(e - 1) < 0.03, "hemisphere of light E %.5f, expected 1", e);
     /* upper half of a small disc on the horizon: 1/(pi a^2) * integral of the elevation = 2 a / (3 pi) */

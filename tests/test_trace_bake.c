@@ -507,7 +507,7 @@ TEST(bias_against_paths_is_small) {
 
 /* Transfer of every order, grey and in colours, by probes and by paths: relit it is the light of paths. One channel for a coloured surface
    is that of a grey one of its mean albedo. Points in a pit, colours by isovalue, and by place with four reflections; noise of 84 samples
-   and probes at each of 100 points: 0.06 of a mean of 2.6 (rms), 0.5 % of the mean. */
+   and probes at each of 100 points: 0.055 of a mean of 2.6 (rms), 1.3 % of the mean at most. */
 static void bands(void *user, double isovalue, const double p[3], float albedo[3], float emission[3]) {
     (void)user, (void)isovalue, (void)emission;
     for (int c = 0; c < 3; c++) albedo[c] *= (int)floor(p[0] / 3) % 3 == c ? 1 : 0.4f;
@@ -553,7 +553,7 @@ TEST(transfer_of_any_order_and_colour_is_lit_as_by_paths) {
                 for (int c = 0; c < 3; c++)
                     CHECK(fabs(sum[c] - all[c]) < 0.02 * all[c], "order %d, kind %d, method %d, channel %d: mean %.4f, by paths %.4f",
                           order, kind, method, c, sum[c], all[c]);
-                CHECK(sqrt(square) < 0.04 * all[1], "order %d, kind %d, method %d: %.4f off (rms)", order, kind, method, sqrt(square));
+                CHECK(sqrt(square) < 0.03 * all[1], "order %d, kind %d, method %d: %.4f off (rms)", order, kind, method, sqrt(square));
                 printf("    order %d, kind %d, method %d: means %+.4f %+.4f %+.4f, rms %.4f of %.4f\n", order, kind, method,
                        sum[0] - all[0], sum[1] - all[1], sum[2] - all[2], sqrt(square), all[1]);
                 isogi_trace_free(t);
