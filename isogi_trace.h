@@ -4515,7 +4515,8 @@ static double isogi_trace__hit_albedo(const isogi_trace *t, const isogi_trace__n
     return (double)n->albedo[isogi_trace__channel(t, value)];
 }
 
-/* What passes read of probes, in few bytes. The first pass begins without any light. */
+/* What passes read of probes, in few bytes. The first pass begins with what comes from sky and lights; a probe that reads no other has
+   settled. */
 static void isogi_trace__direct_task(void *arg, size_t task) {
     const isogi_trace *t = (const isogi_trace *)arg;
     isogi_trace__set *set = &t->feedback->probes;
@@ -4527,11 +4528,11 @@ static void isogi_trace__direct_task(void *arg, size_t task) {
         float *bounce = isogi_trace__values_at(set, i, ISOGI_TRACE__BOUNCE_VALUES, v), *out = isogi_trace__light_at(set, i, v);
         for (a = 0; a < t->values; a++) {
             bounce[a] = (float)isogi_trace__node_direct(t, set, i, a);
-            out[a] = 0;
+            out[a] = bounce[a];
             if (a < 3) r->albedo[a] = (float)isogi_trace__hit_albedo(t, n, (uint32_t)i, a);
         }
         r->one = n->samples ? 1.0f / (float)n->samples : 0;
-        *isogi_trace__settled_at(set, i, 0) = *isogi_trace__settled_at(set, i, 1) = 0;
+        *isogi_trace__settled_at(set, i, 0) = *isogi_trace__settled_at(set, i, 1) = !n->hits;
     }
 }
 
@@ -4591,7 +4592,7 @@ static void isogi_trace__pass_task(void *arg, size_t segment) {
     isogi_trace__set *set = &t->feedback->probes;
     isogi_trace__segment *s = &set->segments[t->feedback->carried + segment];
     size_t channels = t->scene.desc.mode == ISOGI_TRACE_TRANSFER ? (size_t)t->scene.desc.transfer_channels : 3, i;
-    if (!t->feedback->pass) {
+    if (t->feedback->pass == 1) {
         for (i = 0; i < s->entries; i++) s->order[i] = (uint32_t)i;
         s->open = s->entries, s->settled = 0;
     }
@@ -4603,8 +4604,8 @@ static void isogi_trace__pass_task(void *arg, size_t segment) {
                                   t->feedback->pass < ISOGI_TRACE__WATCHED);
 }
 
-/* A pass over all probes has ended: whether it was the last. There are as many as reflections (the first brings what comes from sky and
-   lights alone), or until all that later ones would add, by the ratio of the last two changes, is below 1/1000. Where albedo 1 meets a
+/* A pass over all probes has ended: whether it was the last. There is one less than reflections (what comes from sky and lights is there
+   before them), or there are passes until all that later ones would add, by the ratio of the last two changes, is below 1/1000. Where albedo 1 meets a
    closed cavity the light grows by the same step for ever: said so when 500 passes have not made the step smaller by a third. */
 static int isogi_trace__pass_end(isogi_trace *t) {
     isogi_trace__feedback *f = t->feedback;
@@ -5261,8 +5262,8 @@ static void isogi_trace__phase_end(isogi_trace *t) {
     f->carried = 0;
     switch (f->phase) {
     case ISOGI_TRACE__DIRECT:
-        f->phase = t->scene.desc.bounces ? ISOGI_TRACE__PASS : ISOGI_TRACE__CLEAR;
-        f->pass = 0, f->before = f->middle = 0, f->diverges = 0;
+        f->phase = t->scene.desc.bounces && t->scene.desc.bounces != 1 ? ISOGI_TRACE__PASS : ISOGI_TRACE__CLEAR;
+        f->pass = 1, f->before = f->middle = 0, f->diverges = 0;
         break;
     case ISOGI_TRACE__PASS:
         if (isogi_trace__pass_end(t)) f->phase = ISOGI_TRACE__CLEAR;
