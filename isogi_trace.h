@@ -4604,9 +4604,10 @@ static void isogi_trace__pass_task(void *arg, size_t segment) {
                                   t->feedback->pass < ISOGI_TRACE__WATCHED);
 }
 
-/* A pass over all probes has ended: whether it was the last. There is one less than reflections (what comes from sky and lights is there
-   before them), or there are passes until all that later ones would add, by the ratio of the last two changes, is below 1/1000. Where albedo 1 meets a
-   closed cavity the light grows by the same step for ever: said so when 500 passes have not made the step smaller by a third. */
+/* A pass over all probes has ended: whether it was the last. There is one less than reflections (what comes from sky and lights is
+   there before them), or there are passes until all that later ones would add, by the ratio of the last two changes, is below 1/1000.
+   Where albedo 1 meets a closed cavity the light grows by the same step for ever: said so when 500 passes have not made the step smaller
+   by a third. */
 static int isogi_trace__pass_end(isogi_trace *t) {
     isogi_trace__feedback *f = t->feedback;
     isogi_trace__set *set = &f->probes;
@@ -4734,7 +4735,8 @@ typedef struct isogi_trace__dense {
     int tinted; /* colours differ by isovalue or by place */
     uint16_t at[ISOGI_TRACE__ROW * ISOGI_TRACE__ROW * ISOGI_TRACE__ROW], filled[ISOGI_TRACE__ROW * ISOGI_TRACE__ROW]; /* bits of x */
     const isogi_trace__guide *guide[ISOGI_TRACE__ROW * ISOGI_TRACE__ROW * ISOGI_TRACE__ROW];
-    float samples[ISOGI_TRACE__DENSE], high[ISOGI_TRACE__DENSE], low[ISOGI_TRACE__DENSE];
+    float samples[ISOGI_TRACE__DENSE], share[ISOGI_TRACE__DENSE]; /* share: 1 / samples */
+    float high[ISOGI_TRACE__DENSE], low[ISOGI_TRACE__DENSE];
     float steps[ISOGI_TRACE__DENSE]; /* SHEETs per unit of isovalues */
     float normal[3][ISOGI_TRACE__DENSE], luminance[ISOGI_TRACE__DENSE];
     float guessed[ISOGI_TRACE__DENSE]; /* variance, as the filter takes it to be: that of few samples tells nothing, */
@@ -4792,7 +4794,7 @@ static const int isogi_trace__rows[ISOGI_TRACE__ROWS][2] = {{-1, -3}, {0, -3}, {
    what lies between their isosurfaces, the more it faces another way, and the more their light differs beyond its noise (and by what
    their colours must make it differ, which no sample has to show): near exp(-those squares). Weights are kept for all rows; then they
    become those of the plane. Vectors of W floats; all sums are by lane, so that they are the same bits for all W. F: of floats. */
-#define ISOGI_TRACE__DEFINE_BLEND(name, attribute, F, W, KEEP, PICK)                                                                       \
+#define ISOGI_TRACE__DEFINE_BLEND(name, attribute, F, W, KEEP, PICK, LESS, MORE)                                                           \
     attribute static void name(const isogi_trace__dense *b, size_t centre, isogi_trace__blend *to) {                                       \
         const int reach = ISOGI_TRACE__REACH, parts = ISOGI_TRACE__LANES / W;                                                              \
         const int middle[3] = {(int)centre % ISOGI_TRACE__ROW, (int)centre / ISOGI_TRACE__ROW % ISOGI_TRACE__ROW,                          \
@@ -4891,13 +4893,12 @@ static const int isogi_trace__rows[ISOGI_TRACE__ROWS][2] = {{-1, -3}, {0, -3}, {
             for (l = 0; l < parts; l++) {                                                                                                  \
                 const size_t k = start[i] + (size_t)(l * W);                                                                               \
                 const F along = ISOGI_TRACE__FLOATS(F, isogi_trace__along + l * W), none = ISOGI_TRACE__FLOATS(F, isogi_trace__nought),    \
-                        before = ISOGI_TRACE__FLOATS(F, kept[i] + l * W), w = before * (constant + rising * along), ww = w * w,            \
-                        samples = ISOGI_TRACE__FLOATS(F, b->samples + k), one = none + 1.0f;                                               \
-                blend[3][l] += ww / PICK(samples > one, samples, one);                                                                     \
+                        before = ISOGI_TRACE__FLOATS(F, kept[i] + l * W), w = before * (constant + rising * along), ww = w * w;            \
+                blend[3][l] += ww * ISOGI_TRACE__FLOATS(F, b->share + k);                                                                  \
                 blend[4][l] += ww * ISOGI_TRACE__FLOATS(F, b->variance + k), blend[5][l] += w * ISOGI_TRACE__FLOATS(F, b->lights + k);     \
-                ISOGI_TRACE__BLEND_CHANNEL(F, PICK, 0)                                                                                     \
-                ISOGI_TRACE__BLEND_CHANNEL(F, PICK, 1)                                                                                     \
-                ISOGI_TRACE__BLEND_CHANNEL(F, PICK, 2)                                                                                     \
+                ISOGI_TRACE__BLEND_CHANNEL(F, PICK, LESS, MORE, 0)                                                                         \
+                ISOGI_TRACE__BLEND_CHANNEL(F, PICK, LESS, MORE, 1)                                                                         \
+                ISOGI_TRACE__BLEND_CHANNEL(F, PICK, LESS, MORE, 2)                                                                         \
             }                                                                                                                              \
         }                                                                                                                                  \
         for (l = 0; l < parts; l++) {                                                                                                      \
@@ -4921,12 +4922,12 @@ static const int isogi_trace__rows[ISOGI_TRACE__ROWS][2] = {{-1, -3}, {0, -3}, {
         squares = moment[3], to->variance = moment[4], to->lights = moment[5] > 0 ? moment[5] : 0, to->alike = 1 / squares;                \
     }
 
-#define ISOGI_TRACE__BLEND_CHANNEL(F, PICK, a)                                                     \
+#define ISOGI_TRACE__BLEND_CHANNEL(F, PICK, LESS, MORE, a)                                         \
     {                                                                                              \
-        const F light = ISOGI_TRACE__FLOATS(F, b->mean[a] + k);                                    \
+        const F light = ISOGI_TRACE__FLOATS(F, b->mean[a] + k),                                    \
+                met = PICK(before > 0.0f, light, none + b->mean[a][centre]);                       \
         blend[a][l] += w * light;                                                                  \
-        least[a][l] = PICK((before > 0.0f) & (light < least[a][l]), light, least[a][l]);           \
-        largest[a][l] = PICK((before > 0.0f) & (light > largest[a][l]), light, largest[a][l]);     \
+        least[a][l] = LESS(met, least[a][l]), largest[a][l] = MORE(met, largest[a][l]);            \
     }
 
 static void isogi_trace__lanes(float (*lane)[ISOGI_TRACE__LANES], int count, double *sum) {
@@ -4940,7 +4941,9 @@ static void isogi_trace__lanes(float (*lane)[ISOGI_TRACE__LANES], int count, dou
 
 #define ISOGI_TRACE__KEEP(mask, x) ((mask) ? (x) : 0)
 #define ISOGI_TRACE__PICK(mask, x, y) ((mask) ? (x) : (y))
-ISOGI_TRACE__DEFINE_BLEND(isogi_trace__blend_plain, , float, 1, ISOGI_TRACE__KEEP, ISOGI_TRACE__PICK)
+#define ISOGI_TRACE__LESS(x, y) ((x) < (y) ? (x) : (y))
+#define ISOGI_TRACE__MORE(x, y) ((x) > (y) ? (x) : (y))
+ISOGI_TRACE__DEFINE_BLEND(isogi_trace__blend_plain, , float, 1, ISOGI_TRACE__KEEP, ISOGI_TRACE__PICK, ISOGI_TRACE__LESS, ISOGI_TRACE__MORE)
 
 #ifdef ISOGI_TRACE__VECTORS
 typedef float isogi_trace__f4 __attribute__((vector_size(16), aligned(4), may_alias));
@@ -4948,7 +4951,15 @@ typedef int32_t isogi_trace__i4 __attribute__((vector_size(16), aligned(4), may_
 #define ISOGI_TRACE__KEEP_F4(mask, x) ((isogi_trace__f4)((isogi_trace__i4)(mask) & (isogi_trace__i4)(x)))
 #define ISOGI_TRACE__PICK_F4(mask, x, y) \
     ((isogi_trace__f4)(((isogi_trace__i4)(mask) & (isogi_trace__i4)(x)) | (~(isogi_trace__i4)(mask) & (isogi_trace__i4)(y))))
-ISOGI_TRACE__DEFINE_BLEND(isogi_trace__blend_f4, , isogi_trace__f4, 4, ISOGI_TRACE__KEEP_F4, ISOGI_TRACE__PICK_F4)
+#ifdef __SSE2__
+#define ISOGI_TRACE__LESS_F4(x, y) ((isogi_trace__f4)__builtin_ia32_minps(x, y))
+#define ISOGI_TRACE__MORE_F4(x, y) ((isogi_trace__f4)__builtin_ia32_maxps(x, y))
+#else
+#define ISOGI_TRACE__LESS_F4(x, y) ISOGI_TRACE__PICK_F4((x) < (y), x, y)
+#define ISOGI_TRACE__MORE_F4(x, y) ISOGI_TRACE__PICK_F4((x) > (y), x, y)
+#endif
+ISOGI_TRACE__DEFINE_BLEND(isogi_trace__blend_f4, , isogi_trace__f4, 4, ISOGI_TRACE__KEEP_F4, ISOGI_TRACE__PICK_F4, ISOGI_TRACE__LESS_F4,
+                          ISOGI_TRACE__MORE_F4)
 #endif
 
 #ifdef ISOGI_TRACE__AVX2
@@ -4957,7 +4968,10 @@ typedef int32_t isogi_trace__i8 __attribute__((vector_size(32), aligned(4), may_
 #define ISOGI_TRACE__KEEP_F8(mask, x) ((isogi_trace__f8)((isogi_trace__i8)(mask) & (isogi_trace__i8)(x)))
 #define ISOGI_TRACE__PICK_F8(mask, x, y) \
     ((isogi_trace__f8)(((isogi_trace__i8)(mask) & (isogi_trace__i8)(x)) | (~(isogi_trace__i8)(mask) & (isogi_trace__i8)(y))))
-ISOGI_TRACE__DEFINE_BLEND(isogi_trace__blend_f8, ISOGI_TRACE__AVX2, isogi_trace__f8, 8, ISOGI_TRACE__KEEP_F8, ISOGI_TRACE__PICK_F8)
+#define ISOGI_TRACE__LESS_F8(x, y) ((isogi_trace__f8)__builtin_ia32_minps256(x, y))
+#define ISOGI_TRACE__MORE_F8(x, y) ((isogi_trace__f8)__builtin_ia32_maxps256(x, y))
+ISOGI_TRACE__DEFINE_BLEND(isogi_trace__blend_f8, ISOGI_TRACE__AVX2, isogi_trace__f8, 8, ISOGI_TRACE__KEEP_F8, ISOGI_TRACE__PICK_F8,
+                          ISOGI_TRACE__LESS_F8, ISOGI_TRACE__MORE_F8)
 #endif
 
 /* By the best instruction path; all give the same bits. */
@@ -5044,7 +5058,7 @@ static void isogi_trace__block_fill(const isogi_trace *t, const size_t brick[3],
         const size_t at = b->at[i];
         const double one = g->samples ? 1.0 / g->samples : 0, iso = (g->isovalue - base) * steepest,
                      luminance = (double)g->luminance * most, variance = (double)isogi_trace__bounded((double)g->variance) * (most * most);
-        b->samples[at] = (float)g->samples;
+        b->samples[at] = (float)g->samples, b->share[at] = (float)one;
         b->high[at] = (float)isogi_trace__within_both(iso, 1e30);
         b->low[at] = (float)isogi_trace__within_both(iso - (double)b->high[at], 1e30);
         b->steps[at] = isogi_trace__bounded(1 / (ISOGI_TRACE__SHEET * (g->steep * steepest) + 1e-30));
@@ -6861,10 +6875,16 @@ ISOGI_API isogi_result isogi_trace_gather_field(const isogi_trace_desc *desc, is
 #undef ISOGI_TRACE__BLEND_CHANNEL
 #undef ISOGI_TRACE__KEEP
 #undef ISOGI_TRACE__PICK
+#undef ISOGI_TRACE__LESS
+#undef ISOGI_TRACE__MORE
 #undef ISOGI_TRACE__KEEP_F4
 #undef ISOGI_TRACE__PICK_F4
+#undef ISOGI_TRACE__LESS_F4
+#undef ISOGI_TRACE__MORE_F4
 #undef ISOGI_TRACE__KEEP_F8
 #undef ISOGI_TRACE__PICK_F8
+#undef ISOGI_TRACE__LESS_F8
+#undef ISOGI_TRACE__MORE_F8
 #undef ISOGI_TRACE__BLURRED
 #undef ISOGI_TRACE__TURNED
 #undef ISOGI_TRACE__LIGHT_FIRST

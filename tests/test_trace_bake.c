@@ -341,7 +341,7 @@ static isogi_trace__dense dense;
 static void dense_put(int x, int y, int z, int samples, double light, double variance) {
     const int row = 3 + y + 10 * (3 + z), at = 10 * row + 3 + x;
     dense.filled[row] = (uint16_t)(dense.filled[row] | 1u << (3 + x));
-    dense.samples[at] = (float)samples, dense.steps[at] = 1, dense.normal[2][at] = 1;
+    dense.samples[at] = (float)samples, dense.share[at] = 1 / (float)samples, dense.steps[at] = 1, dense.normal[2][at] = 1;
     dense.luminance[at] = dense.mean[0][at] = dense.mean[1][at] = dense.mean[2][at] = (float)light;
     dense.variance[at] = dense.guessed[at] = (float)variance, dense.noise[at] = (float)(0.5 + 4.0 / samples);
     dense.albedo[0][at] = dense.albedo[1][at] = dense.albedo[2][at] = 0.5f;
@@ -359,7 +359,8 @@ TEST(blends_are_the_same_bits_on_all_paths) {
             for (int k = 0; k < 12; k++) u[k] = isogi_trace__unit(isogi_trace__mix((uint64_t)(12000 * run + 12 * i + k)));
             if (u[0] * 8 > 1 + run % 8) continue;
             dense.filled[i / 10] = (uint16_t)(dense.filled[i / 10] | 1u << i % 10);
-            dense.samples[i] = (float)floor(1 + 20 * u[1] * u[1]), dense.high[i] = (float)u[2], dense.low[i] = (float)(1e-8 * u[3]);
+            dense.samples[i] = (float)floor(1 + 20 * u[1] * u[1]), dense.share[i] = 1 / dense.samples[i];
+            dense.high[i] = (float)u[2], dense.low[i] = (float)(1e-8 * u[3]);
             dense.steps[i] = (float)(1 + u[4]), dense.guessed[i] = (float)(0.2 * u[5]), dense.noise[i] = (float)(0.5 + u[6]);
             dense.normal[0][i] = (float)(0.5 * u[7]), dense.normal[2][i] = 0.9f, dense.luminance[i] = (float)(0.5 + 0.5 * u[8]);
             dense.lights[i] = (float)u[9], dense.variance[i] = (float)u[10];
