@@ -240,7 +240,8 @@ static double naive_number(naive_path *p) { return isogi_trace__unit(isogi_trace
 
 static void naive_ray(naive_path *p, int depth, const float dir[3], double tmax, isogi_hit *hit) {
     isogi_ray ray;
-    if (!depth) isogi_trace__site_rays(p->scene, p->site, (const float(*)[3])dir, &tmax, 1, &ray, hit, &p->counters);
+    if (!depth)
+        isogi_trace__site_rays(p->scene, p->site, p->scene->high ? -1 : 1, (const float(*)[3])dir, &tmax, 1, &ray, hit, &p->counters);
     else
         isogi_vol_continue(p->scene->pyramid, &p->start, (const float(*)[3])dir, &tmax, p->site->isovalue, p->scene->flags, 1, hit,
                            &p->counters);
