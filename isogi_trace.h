@@ -74,6 +74,7 @@
                             valid; their weights are made to sum to 1 again. So an invalid texel neither darkens nor
                             brightens its neighbours. Where none of the eight is valid, the nearest valid one of the 4x4x4
                             around it is taken; a point without even that has zero light.
+                            Beside the edge of a cap, texels of the cap and of the surface are mixed.
                             Trilinear is the one to use (as the paper found, too): the others are there to be compared with it.
                             Nearest shows the texels as blocks, closest isovalue breaks along their borders, the B-spline mixes
                             in light of isosurfaces two texels away.
