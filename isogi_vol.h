@@ -342,7 +342,8 @@ enum {
 
 /* Inside is f >= isovalue. Points are origin + t * dir, t in [tmin, tmax], world units if dir is a unit vector (any length is
    fine). A hit is the smallest t at which inside changes; what the ray finds where it begins, or where it enters the box, is
-   no hit (unless capped). Each ray has its own isovalue. NaN anywhere, a zero dir, tmin > tmax: a miss.
+   no hit (unless capped). Each ray has its own isovalue. NaN anywhere, an infinite isovalue, a zero dir, tmin > tmax: a
+   miss.
    A ray that runs in a face between cells goes through one of the two, and rounding may choose another one for another tmin: the same
    values, hence the same hits, but where one of the cells is not finite. Likewise a crossing that lies in the volume's border may be -1
    or -2 to a capped ray, and none to another. */
@@ -4319,7 +4320,8 @@ static int isogi_vol__begin_ray(const isogi_vol__batch *b, size_t i, isogi_vol__
         isogi_vol__transform(p->to_grid, relative, w->origin);
         if (!isogi_vol__finite3(w->origin) || !isogi_vol__finite3(ray->origin)) return 0;
     }
-    if (isogi_vol__is_nan(ray->isovalue) || isogi_vol__is_nan(ray->tmin) || isogi_vol__is_nan(ray->tmax) || !(ray->tmin <= tmax)) return 0;
+    if (!isogi_vol__finite64(ray->isovalue)) return 0;
+    if (isogi_vol__is_nan(ray->tmin) || isogi_vol__is_nan(ray->tmax) || !(ray->tmin <= tmax)) return 0;
     if (!isogi_vol__aim(w, b->bundle ? b->dirs[i] : ray->dir, isogi_vol__max(ray->tmin, -ISOGI_VOL__UNLIMITED), tmax)) return 0;
     if (w->entry_axis >= 0 && (ray->flags & ISOGI_RAY_CAPPED)) w->inside = 0, w->cap = 2;
     return 1;
@@ -4337,7 +4339,7 @@ static int isogi_vol__begin_start(const isogi_vol__batch *b, size_t i, isogi_vol
         if (start->cell[a] >= (uint32_t)b->pyramid->cells[a] || !isogi_vol__finite64(start->local[a])) return 0;
         w->origin[a] = start->cell[a] + isogi_vol__clamp(start->local[a], 1);
     }
-    if (isogi_vol__is_nan(b->isovalue) || isogi_vol__is_nan(tmax) || !(tmax >= 0) || !isogi_vol__aim(w, b->dirs[i], 0, tmax)) return 0;
+    if (!isogi_vol__finite64(b->isovalue) || isogi_vol__is_nan(tmax) || !(tmax >= 0) || !isogi_vol__aim(w, b->dirs[i], 0, tmax)) return 0;
     w->entry_axis = -1;
     /* not a cap that is left outwards */
     return w->deflate || w->inside > 0 ||

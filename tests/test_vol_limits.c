@@ -353,6 +353,32 @@ TEST(odd_numbers_end_in_codes_and_misses) {
     }
 }
 
+/* All of the box lies inside of minus infinity, but no path makes a cap of that. */
+TEST(infinite_isovalues_are_misses_on_every_path) {
+    double data[5 * 5 * 5];
+    for (int i = 0; i < 125; i++) data[i] = i % 7;
+    for (int path = 0; path < 5; path++) {
+        isogi_context context = {.threads = 1, .force_path = path};
+        isogi_volume v = {.data = data, .type = ISOGI_F64, .size = {5, 5, 5}};
+        isogi_pyramid *p = NULL;
+        CHECK(isogi_vol_build(&p, &v, &context) == ISOGI_OK, "build");
+        for (int i = 0; i < 4; i++) {
+            isogi_ray ray[70];
+            isogi_hit hit[70];
+            memset(ray, 0, sizeof ray);
+            for (int k = 0; k < 70; k++) {
+                for (int a = 0; a < 3; a++) ray[k].origin[a] = i & 2 ? 2.25 : -1.5, ray[k].dir[a] = 1;
+                ray[k].flags = ISOGI_RAY_CAPPED, ray[k].isovalue = i & 1 ? (double)INFINITY : -(double)INFINITY;
+            }
+            isogi_vol_intersect(p, ray, 1, hit, NULL);
+            CHECK(hit[0].side == 0, "path %d, alone: side %d at %g", path, hit[0].side, hit[0].t);
+            isogi_vol_intersect(p, ray, 70, hit, NULL);
+            CHECK(hit[69].side == 0, "path %d: side %d at %g", path, hit[69].side, hit[69].t);
+        }
+        isogi_vol_free(p);
+    }
+}
+
 /* Descriptions of odd numbers are refused or understood, never followed into the woods. */
 TEST(odd_descriptions_are_refused_or_understood) {
     test_random r = {4};
