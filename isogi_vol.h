@@ -4378,12 +4378,13 @@ ISOGI_VOL__INLINE void isogi_vol__set_axis(isogi_vol__ticks *k, const isogi_vol_
     const int padded = (int)p->level[2].size[a] * 64, down = w->dir[a] < 0, still = !(w->dir[a] > 0 || down);
     const int low = down ? padded - p->cells[a] : 0, high = (down ? padded : p->cells[a]) - 1;
     const double origin = w->origin[a], per = fabs(w->inverse[a]) * scale;
+    const int sign = down ? -1 : 1, base = down ? padded : 0; /* of what is mirrored; the origin is not: it would be rounded */
     double ahead;
     int64_t border;
     int cell = (int)origin;
-    cell = down ? padded - cell - (origin > cell) : cell;
+    cell = base + sign * (cell + (down & (origin > cell)));
     cell = cell > high ? high : cell < low ? low : cell;
-    ahead = (down ? origin - (padded - cell - 1) : cell + 1 - origin) * per; /* a mirrored origin would be rounded */
+    ahead = fabs(base + sign * (cell + 1) - origin) * per;
     k->per[a] = still || !(per < beyond) ? (int64_t)beyond : (int64_t)per;
     k->at[a] = (still || !(ahead < beyond) ? (int64_t)beyond : (int64_t)ahead) - (cell + 1) * k->per[a];
     border = k->at[a] + (high + 1) * k->per[a];
