@@ -277,8 +277,7 @@ ISOGI_API isogi_result isogi_sh_lerp(float *out, const float *a, const float *b,
    order*order long. Exact: the triple products of Y are integrated by Gauss-Legendre. out must not overlap a or b. */
 ISOGI_API isogi_result isogi_sh_product(float *out, const float *a, const float *b, int order, size_t count);
 
-/* matrix[order*order][order*order], row-major and symmetric, so that matrix * b = product of f and b. Not for a matrix that overlaps f.
-   It takes 0.1 ms at order 10, and two seconds at 101. */
+/* matrix[order*order][order*order], row-major and symmetric, so that matrix * b = product of f and b. Not for a matrix that overlaps f. */
 ISOGI_API isogi_result isogi_sh_product_matrix(float *matrix, const float *f, int order);
 
 /* Convolution with an axis-symmetric kernel of zonal coefficients z[order] (its expansion when it stands around +z): scales degree

@@ -342,8 +342,7 @@ enum {
 
 /* Inside is f >= isovalue. Points are origin + t * dir, t in [tmin, tmax], world units if dir is a unit vector (any length is
    fine). A hit is the smallest t at which inside changes; what the ray finds where it begins, or where it enters the box, is
-   no hit (unless capped). Each ray has its own isovalue. NaN anywhere, an infinite isovalue, a zero dir, tmin > tmax: a
-   miss.
+   no hit (unless capped). Each ray has its own isovalue. A miss: NaN anywhere, an infinite isovalue, a zero dir, tmin > tmax.
    A ray that runs in a face between cells goes through one of the two, and rounding may choose another one for another tmin: the same
    values, hence the same hits, but where one of the cells is not finite. Likewise a crossing that lies in the volume's border may be -1
    or -2 to a capped ray, and none to another. */

@@ -20,7 +20,7 @@ build/viewer $hydrogen --mode dvr --out "$pieces/volume-1.png"
 build/viewer $hydrogen --mode scale-invariant --out "$pieces/volume-2.png"
 build/strip "$out/volume.png" "$pieces/volume-1.png" "$pieces/volume-2.png"
 
-# The paper's figures but the first: a picture for each argument, which is added to $same, at the exposure of the last one.
+# The paper's figures 4 to 7 and 9 to 12: a picture for each argument, which is added to $same, at the exposure of the last one.
 strip() { # NAME ARGUMENTS...
     name=$1 parts= n=0
     shift

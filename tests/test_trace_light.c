@@ -917,4 +917,20 @@ TEST(light_of_any_brightness_stays_finite) {
     scene_free(&s);
 }
 
+/* Cells that are not finite hold no surface: rays from the surface itself go through them, on either side. */
+TEST(voxels_that_are_not_finite_cast_no_shadow) {
+    scene s = scene_make(17, 17, 17, NULL, ground, (const double[1]){8});
+    const float p[3] = {8, 8, 8};
+    for (int i = 0; i < 17 * 17 * 17; i++)
+        if (i % 17 >= 9) s.data[i] = (float)nan_value();
+    isogi_vol_update(s.pyramid, (const size_t[3]){0, 0, 0}, (const size_t[3]){16, 16, 16}, NULL);
+    for (int side = 0; side < 2; side++) {
+        isogi_trace_desc d = desc_make(&s, 0, 0, 1024);
+        d.offset = -1, d.normals = ISOGI_NORMAL_TRILINEAR, d.sides = side ? ISOGI_TRACE_HIGH_SIDE : ISOGI_TRACE_LOW_SIDE;
+        double e = lit_texel(&d, p, 0);
+        CHECK(fabs(e - PI) < 0.01, "side %d: E %.4f, expected pi", side, e);
+    }
+    scene_free(&s);
+}
+
 TEST_MAIN("trace_light")

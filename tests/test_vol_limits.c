@@ -374,6 +374,15 @@ TEST(infinite_isovalues_are_misses_on_every_path) {
             CHECK(hit[0].side == 0, "path %d, alone: side %d at %g", path, hit[0].side, hit[0].t);
             isogi_vol_intersect(p, ray, 70, hit, NULL);
             CHECK(hit[69].side == 0, "path %d: side %d at %g", path, hit[69].side, hit[69].t);
+            uint8_t hidden[70];
+            float dirs[70][3];
+            for (int k = 0; k < 70; k++) {
+                memset(&hit[k], 0, sizeof hit[k]), hit[k].side = k % 2 ? 2 : 1;
+                for (int a = 0; a < 3; a++) hit[k].cell[a] = 1, hit[k].local[a] = 0.5, dirs[k][a] = 1;
+            }
+            isogi_vol_occluded(p, ray, 70, hidden, NULL);
+            isogi_vol_continue(p, hit, (const float(*)[3])dirs, NULL, ray[0].isovalue, ISOGI_RAY_CAPPED, 70, hit, NULL);
+            for (int k = 0; k < 70; k++) CHECK(!hidden[k] && !hit[k].side, "path %d, ray %d", path, k);
         }
         isogi_vol_free(p);
     }
