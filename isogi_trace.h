@@ -142,16 +142,17 @@
                 wanted texel alone 2 + 12 bytes of irradiance, 2 + 2 order^2 channels of transfer, less in other formats; and
                 250 KB. isogi_trace_memory tells. PATHS needs another 4 MB, FEEDBACK 9 (TRANSFER: 32 KB more for each coefficient),
                 and while it works some 400 bytes (TRANSFER: 16 more for each coefficient), 2048 times that at once, and 4 for every
-                hit, for each of 65536 texels at a time, for all that were asked for when lazy, and for each probe. A request takes
-                12 bytes for each of 32768 points at a time.
+                hit, for each texel of one cube (ISOGI_TRACE_CUBE), for all that were asked for when lazy, and for each probe: 50 to
+                200 MB where every texel of a cube has a surface. A request takes 12 bytes for each of 32768 points at a time.
                 Any allocation may fail: the call says ISOGI_NO_MEMORY, the texture stays as it was and can go on.
                 Stack use stays below 32 KB (compiled by clang, below 35), nearly all of it that of rays.
    Threads      Rays run on the context's threads. isogi_trace_sample and the other readers may run in any number of threads at a
                 time; request, step and relight alone, without readers.
-   Determinism  The same bits for any number of threads and any budget of steps. PATHS: a texel's light depends on the description
-                and its place alone, lazily or fully, in parts (desc.box_first, isogi_trace_load), in any order of requests.
-                FEEDBACK: which probes there are depends on what was asked for and in which order: 1 to 3 % (rms over points) where light
-                is even, up to 10 % with few samples under a peaky sky or albedo near 1: about as much as light errs there.
+   Determinism  The same bits for any number of threads and any budget of steps, and in parts (desc.box_first, isogi_trace_load).
+                PATHS: a texel's light depends on the description and its place alone, lazily or fully, in any order of requests.
+                FEEDBACK: which probes there are depends on the interval of isovalues, and when lazy on what was asked for and in which
+                order: 1 to 3 % (rms over points) where light is even, up to 10 % with few samples under a peaky sky or albedo near 1:
+                about as much as light errs there.
                 Instruction paths (isogi_context.force_path) give the same hits and the same bits; but a ray that grazes the surface
                 within rounding, one in 100,000, may be seen either way: light then differs by what that one sample brings.
                 All of this is for IEEE arithmetic: with -ffast-math light is right within its errors, and no bits are promised; where
@@ -280,10 +281,14 @@ typedef struct isogi_trace_desc {
                                   where a texel has no surface. 0.1 to 0.5 is sensible. Saves rays and memory where light varies
                                   slowly (in a cavity two thirds of both at 0.4), but on scans, full of edges, it takes about as
                                   many (make bench, rows lattice-). Not with lazy or a box; such a texture cannot be exported or saved */
-    size_t box_first[3], box_end[3]; /* only texels box_first <= i < box_end: a part of the bake; all 0 = all. PATHS: in the bits of the
-                                  whole. FEEDBACK: each part has probes and passes of its own, reads nothing of the others, and differs
-                                  from the whole by what probes are uncertain by: see Determinism */
+    size_t box_first[3], box_end[3]; /* only texels box_first <= i < box_end: a part of the bake, in the bits of the whole; all 0 = all.
+                                  FEEDBACK, unless lazy: these and all others of the cubes that they lie in, see ISOGI_TRACE_CUBE */
 } isogi_trace_desc;
+
+/* FEEDBACK, unless lazy: texels along each edge of the cubes, counted from texel 0, that are baked one after the other, and the memory
+   given back in between. All that texels lend each other (probes, passes over them, the filter) stays within a cube: what is baked of the
+   others, where and when, changes no bit, and parts of a bake have nothing to exchange. A box takes whole cubes. So cut where cubes end. */
+enum { ISOGI_TRACE_CUBE = 64 };
 
 typedef struct isogi_trace isogi_trace;
 
@@ -402,12 +407,12 @@ ISOGI_API isogi_result isogi_trace_export_scales(const isogi_trace *trace, int f
 
 /* ---- save, load, merge ----
    A block of bytes holds the texels computed so far: the same bytes on every machine. Loading adds them to a texture that was created
-   from the same description: so a bake is resumed, to the same bits as if it had never stopped (FEEDBACK: full bakes, of which whole
-   groups of some 65536 texels are saved), and boxes baked apart (desc.box_first) are merged by loading one after the other: PATHS to
-   the bits of the whole, FEEDBACK to what each box came to by itself. Only desc.isovalue_min, isovalue_max, lazy, lookup and box may
-   differ; else the answer is ISOGI_INVALID (lighting, tables and the ranges of the volume's blocks are compared by hash; a material
-   function cannot be). Any bytes may be loaded: those that are damaged, cut off or of another version are ISOGI_CORRUPT and change
-   nothing (what is left of a block of both sides that is cut off where the first one ends is a block of that side: ISOGI_INVALID).
+   from the same description: so a bake is resumed, to the same bits as if it had never stopped, and boxes baked apart (desc.box_first)
+   are merged by loading one after the other, to the bits of the whole (FEEDBACK: unless lazy, and within the same interval of
+   isovalues; whole cubes are saved, ISOGI_TRACE_CUBE). Only desc.isovalue_min, isovalue_max, lazy, lookup and box may differ; else the
+   answer is ISOGI_INVALID (lighting, tables and the ranges of the volume's blocks are compared by hash; a material function cannot be).
+   Any bytes may be loaded: those that are damaged, cut off or of another version are ISOGI_CORRUPT and change nothing (what is left of a
+   block of both sides that is cut off where the first one ends is a block of that side: ISOGI_INVALID).
    ISOGI_NO_MEMORY: some of the texels are loaded. isogi_trace_load counts as a writer. Hierarchical textures are not saved: their size is
    0, and the calls answer ISOGI_INVALID. */
 ISOGI_API size_t isogi_trace_save_size(const isogi_trace *trace);
@@ -488,7 +493,6 @@ ISOGI_API size_t isogi_trace_memory(const isogi_trace *trace); /* bytes that the
 #define ISOGI_TRACE__PIECE 65536   /* rays that take as long as what is done without any before progress is told of, */
 #define ISOGI_TRACE__PLACING 1.5   /* samples that take as long as finding where a texel lies, */
 #define ISOGI_TRACE__CARRYING 2.5  /* as what each level takes beside its texels' rays; for progress alone */
-#define ISOGI_TRACE__GROUP 65536   /* texels that are worked on together, about */
 #define ISOGI_TRACE__CHUNK 2048    /* nodes that are allocated together; a power of two, and a multiple of SWEEP */
 #define ISOGI_TRACE__PROBE_MOST 8    /* samples of a probe: as many as there are hits that read it, but no more than this */
 #define ISOGI_TRACE__WATCHED 6       /* passes that look for probes whose light has settled */
@@ -2331,6 +2335,20 @@ static int isogi_trace__texel_of(const isogi_trace *t, size_t brick, size_t slot
     return texel[0] < t->lattice[0] && texel[1] < t->lattice[1] && texel[2] < t->lattice[2];
 }
 
+/* The brick at a place in the order in which the lattice is baked: cube by cube. */
+static size_t isogi_trace__in_order(const isogi_trace *t, size_t place) {
+    const size_t most = ISOGI_TRACE_CUBE / ISOGI_TRACE__SIDE;
+    size_t first[3], side[3], each = t->size[0] * t->size[1]; /* bricks of a cube, of a row and of a layer of them, by one along the axis */
+    int a;
+    for (a = 2; a >= 0; a--) {
+        first[a] = place / (each * most) * most, place -= first[a] * each;
+        side[a] = t->size[a] - first[a] < most ? t->size[a] - first[a] : most;
+        each = a == 2 ? side[2] * t->size[0] : side[2] * side[1];
+    }
+    return first[0] + place % side[0] +
+           t->size[0] * (first[1] + place / side[0] % side[1] + t->size[1] * (first[2] + place / side[0] / side[1]));
+}
+
 static isogi_trace__brick *isogi_trace__brick_new(const isogi_trace *t) {
     isogi_trace__brick *brick = (isogi_trace__brick *)isogi_allocate(&t->context, 1, sizeof *brick);
     if (brick) memset(brick, 0, sizeof *brick);
@@ -2428,12 +2446,12 @@ static int isogi_trace__meets_box(const isogi_trace *t, const size_t low[3], con
 
 static isogi_result isogi_trace__classify_all(isogi_trace *t) {
     isogi_context silent = t->context;
-    size_t brick, end[3];
+    size_t place, end[3];
     isogi_result result;
     int a;
     silent.progress = NULL;
-    for (brick = 0; brick < t->brick_count; brick++) {
-        size_t texel[3];
+    for (place = 0; place < t->brick_count; place++) {
+        size_t texel[3], brick = isogi_trace__in_order(t, place);
         isogi_trace__texel_of(t, brick, 0, texel);
         for (a = 0; a < 3; a++) {
             end[a] = texel[a] + ISOGI_TRACE__SIDE - 1;
@@ -2457,9 +2475,14 @@ static isogi_result isogi_trace__feedback_new(isogi_trace *t);
 
 /* ==== create and free ================================================================================================ */
 
+/* Whether all texels of a cube are baked together, as those of a bake by feedback that is not lazy. */
+static int isogi_trace__by_cubes(const isogi_trace_desc *d) {
+    return d->method == ISOGI_TRACE_FEEDBACK && !d->lazy && !(d->hierarchy > 0);
+}
+
 static isogi_result isogi_trace__set_lattice(isogi_trace *t) {
     const isogi_trace_desc *d = &t->scene.desc;
-    int whole = 1, a, boxed;
+    int whole = 1, a, boxed, empty;
     for (a = 0; a < 3; a++) whole &= isogi_trace__zero(d->lattice_min[a]) && isogi_trace__zero(d->lattice_max[a]);
     t->brick_count = 1;
     for (a = 0; a < 3; a++) {
@@ -2478,6 +2501,12 @@ static isogi_result isogi_trace__set_lattice(isogi_trace *t) {
     for (a = 0; a < 3; a++) {
         t->box_first[a] = boxed ? d->box_first[a] : 0, t->box_end[a] = boxed ? d->box_end[a] : t->lattice[a];
         if (t->box_first[a] > t->box_end[a] || t->box_end[a] > t->lattice[a]) return ISOGI_INVALID;
+    }
+    empty = t->box_first[0] == t->box_end[0] || t->box_first[1] == t->box_end[1] || t->box_first[2] == t->box_end[2];
+    for (a = 0; a < 3 && isogi_trace__by_cubes(d) && !empty; a++) { /* texels of a cube share light: all of them, or none */
+        size_t beyond = t->box_end[a] + ISOGI_TRACE_CUBE - 1;
+        t->box_first[a] -= t->box_first[a] % ISOGI_TRACE_CUBE, beyond -= beyond % ISOGI_TRACE_CUBE;
+        t->box_end[a] = beyond < t->lattice[a] ? beyond : t->lattice[a];
     }
     return ISOGI_OK;
 }
@@ -3409,7 +3438,7 @@ struct isogi_trace__feedback {
     size_t segment, pass; /* texels' segment, pass over the probes */
     double before, middle; /* largest change by the pass before, and 500 passes before */
     int making;      /* nodes: 1 of every other texel along each axis, 2 of the others; 0 when they are made */
-    size_t made, made_bricks, made_texels; /* of the queue: bricks that are done, bricks and texels to do */
+    size_t made, made_bricks; /* of the queue: bricks that are done, and to do */
     size_t placed;   /* texels before this one know where they lie */
     size_t open;     /* texels that want more samples than they have at the end of a level */
     int bounced;     /* sums over texels' hits are of a level before */
@@ -5421,7 +5450,6 @@ static isogi_result isogi_trace__nodes_of(isogi_trace *t, size_t index, int even
         memset(brick->node, 0, ISOGI_TRACE__TEXELS * sizeof(uint32_t));
     }
     if (isogi_trace__set_reserve(t, set, isogi_trace__bits(wanted), 0) != ISOGI_OK) return ISOGI_NO_MEMORY;
-    if (even) t->feedback->made_texels += isogi_trace__bits(wanted);
     for (left = even ? wanted & 0x0000050500000505u : wanted; left; left &= left - 1) {
         slot = isogi_trace__lowest_bit(left);
         memset(isogi_trace__stage_at(set, set->count), 0, sizeof(isogi_trace__stage));
@@ -5442,6 +5470,14 @@ static int isogi_trace__nodes_wanted(const isogi_trace *t) {
 /* Rays that take as long. */
 static uint64_t isogi_trace__made_cost(size_t bricks, size_t nodes) { return bricks / 2 + nodes / 4; }
 
+/* Whether two bricks are of one group: when lazy all are, else those of a cube, which come one after the other. */
+static int isogi_trace__together(const isogi_trace *t, size_t one, size_t two) {
+    const size_t side = ISOGI_TRACE_CUBE / ISOGI_TRACE__SIDE, rows = t->size[1];
+    if (t->scene.desc.lazy) return 1;
+    return one % t->size[0] / side == two % t->size[0] / side && one / t->size[0] % rows / side == two / t->size[0] % rows / side &&
+           one / t->size[0] / rows / side == two / t->size[0] / rows / side;
+}
+
 /* Makes them: of all bricks in the queue when lazy, else of a group; every other texel along each axis first. As many as take about as
    long as `limit` rays, which are added to *spent. */
 static isogi_result isogi_trace__nodes_make(isogi_trace *t, uint64_t limit, uint64_t *spent) {
@@ -5449,13 +5485,13 @@ static isogi_result isogi_trace__nodes_make(isogi_trace *t, uint64_t limit, uint
     isogi_result result = ISOGI_OK;
     size_t before = f->texels.count, bricks = 0;
     if (!f->making) {
-        f->making = 1, f->made = f->made_texels = 0, f->made_bricks = t->queue_count - t->queue_first;
+        f->making = 1, f->made = 0, f->made_bricks = t->queue_count - t->queue_first;
         f->level = 0, f->probe_part = 0;
     }
     for (; f->making == 1 && isogi_trace__made_cost(bricks, f->texels.count - before) < limit; bricks++) {
         result = isogi_trace__nodes_of(t, t->queue[t->queue_first + f->made], 1);
         if (result != ISOGI_OK) break;
-        if (++f->made < f->made_bricks && (t->scene.desc.lazy || f->made_texels < ISOGI_TRACE__GROUP)) continue;
+        if (++f->made < f->made_bricks && isogi_trace__together(t, t->queue[t->queue_first], t->queue[t->queue_first + f->made])) continue;
         f->making = 2;
     }
     for (; f->making == 2 && result == ISOGI_OK && isogi_trace__made_cost(bricks, f->texels.count - before) < limit; bricks++) {
@@ -6420,7 +6456,7 @@ static void isogi_trace__feedback_reset(isogi_trace *t) {
 /* The queue has become another one, of `bricks` bricks: nodes that are being made go on with those it holds. */
 static void isogi_trace__making_anew(isogi_trace__feedback *f, size_t bricks) {
     if (!f->making) return;
-    f->making = bricks > 0, f->made = f->made_texels = 0, f->made_bricks = bricks;
+    f->making = bricks > 0, f->made = 0, f->made_bricks = bricks;
     if (!bricks) f->level = 0, f->cursor = 0;
 }
 
@@ -6438,12 +6474,13 @@ static void isogi_trace__drop_fine(isogi_trace *t) {
 static void isogi_trace__change_commit(isogi_trace__change *c) {
     isogi_trace *t = c->trace;
     int begin = !c->desc || c->all || c->colours, converts = c->desc && !isogi_trace__zero(c->scene.unit - t->scene.unit);
-    size_t i, texel[3], count = 0;
+    size_t place, texel[3], count = 0;
     uint32_t slot;
     if (begin) isogi_trace__feedback_reset(t);
     if (c->desc && c->all) isogi_trace__drop_fine(t);
     t->wanted = t->done = 0;
-    for (i = 0; i < t->brick_count; i++) {
+    for (place = 0; place < t->brick_count; place++) {
+        const size_t i = isogi_trace__in_order(t, place);
         isogi_trace__brick *brick = t->bricks[i];
         if (!brick) continue;
         brick->queued = 0;
@@ -6903,7 +6940,6 @@ ISOGI_API isogi_result isogi_trace_gather_field(const isogi_trace_desc *desc, is
 #undef ISOGI_TRACE__PROBE_ERROR
 #undef ISOGI_TRACE__PROBE_MOST
 #undef ISOGI_TRACE__NEAR_RATIO
-#undef ISOGI_TRACE__GROUP
 #undef ISOGI_TRACE__CHUNK
 #undef ISOGI_TRACE__SWEEP
 #undef ISOGI_TRACE__FLUSH
