@@ -26,6 +26,7 @@ static void help(void) {
          "The result is the same bits in any case.\n\nOptions");
     fputs(bake_scene_help, stdout);
     puts("  --box X,Y,Z,X,Y,Z          only texels from the first three numbers to before the last three\n"
+         "                             (by feedback all of the cubes of 64 texels a side, counted from 0, that these lie in)\n"
          "  --merge FILE...            puts parts together (up to the next option); what none of them holds is baked\n"
          "  --raw FILE                 the dense texture as well, ready for a GPU: isogi_trace_export\n"
          "  --format NAME              of --raw: float, half, rgb9e5 or byte; default that of the storage\n"

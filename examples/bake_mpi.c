@@ -9,10 +9,10 @@
 
 #include <mpi.h>
 
-enum { SIDE = 16, ASK = 1, WORK, RESULT }; /* texels along a brick; what a message is */
+enum { ASK = 1, WORK, RESULT }; /* what a message is */
 
 typedef struct bricks {
-    size_t lattice[3], size[3], count;
+    size_t side, lattice[3], size[3], count;
 } bricks;
 
 /* Rank 0 asks for all texels; to the others the lattice is enough: nothing is classified, since nothing is asked for. */
@@ -22,18 +22,19 @@ static isogi_result empty_texture(const bake_scene *s, int rank, isogi_trace **t
     return isogi_trace_create(trace, &desc, &s->context);
 }
 
-static void count_bricks(const isogi_trace *trace, bricks *b) {
+/* Texels along a brick: by feedback those of a cube, of which a box takes all. */
+static void count_bricks(const bake_scene *s, const isogi_trace *trace, bricks *b) {
     isogi_trace_shape(trace, b->lattice, NULL, NULL);
-    b->count = 1;
-    for (int a = 0; a < 3; a++) b->size[a] = (b->lattice[a] + SIDE - 1) / SIDE, b->count *= b->size[a];
+    b->count = 1, b->side = s->desc.method == ISOGI_TRACE_FEEDBACK ? ISOGI_TRACE_CUBE : 16;
+    for (int a = 0; a < 3; a++) b->size[a] = (b->lattice[a] + b->side - 1) / b->side, b->count *= b->size[a];
 }
 
 /* Texels first <= i < end. */
 static void brick_place(const bricks *b, size_t brick, size_t first[3], size_t end[3]) {
     size_t at[3] = {brick % b->size[0], brick / b->size[0] % b->size[1], brick / b->size[0] / b->size[1]};
     for (int a = 0; a < 3; a++) {
-        first[a] = at[a] * SIDE;
-        end[a] = first[a] + SIDE < b->lattice[a] ? first[a] + SIDE : b->lattice[a];
+        first[a] = at[a] * b->side;
+        end[a] = first[a] + b->side < b->lattice[a] ? first[a] + b->side : b->lattice[a];
     }
 }
 
@@ -160,7 +161,7 @@ static int run(bake_scene *s, int argc, char **argv, int rank, int ranks) {
     MPI_Allreduce(MPI_IN_PLACE, &failing, 1, MPI_INT, MPI_MIN, MPI_COMM_WORLD);
     if (!ok && rank != failing) s->error[0] = 0;
     if (failing == ranks) {
-        count_bricks(whole, &b);
+        count_bricks(s, whole, &b);
         if (rank) work(s, &b);
         else {
             result = ranks > 1 ? coordinate(s, whole, &b, ranks - 1) : alone(s, whole, &b);

@@ -38,6 +38,8 @@ static const char *const bake_scene_help =
     "  --light KIND:X,Y,Z:...     as build/viewer --help says; may be repeated, 16 times at most\n"
     "  --albedo R,G,B             diffuse reflectance; default 0.7,0.7,0.7\n"
     "  --bounces N                reflections; -1 = all, the default\n"
+    "  --feedback                 the light that rays meet is that of points near by, all reflections for the rays of one: faster, and\n"
+    "                             less noise, but not unbiased as the whole paths are that are followed by default\n"
     "  --samples N                paths per texel; default 64\n"
     "  --lattice X,Y,Z            texels; default one per voxel\n"
     "  --storage NAME             float, half, rgb9e5 or byte; default float for irradiance, half for transfer\n"
@@ -51,7 +53,7 @@ static inline void bake_scene_begin(bake_scene *s) {
     memset(s, 0, sizeof *s);
     s->spacing[0] = s->spacing[1] = s->spacing[2] = 1, s->save_every = 60;
     s->desc.bounces = -1, s->desc.albedo[0] = s->desc.albedo[1] = s->desc.albedo[2] = 0.7f;
-    s->desc.method = ISOGI_TRACE_PATHS; /* parts of a bake are then the same bits as the whole */
+    s->desc.method = ISOGI_TRACE_PATHS; /* the reference */
 }
 
 static inline int bake_integer(const char *text, double low, double high, int *out) {
@@ -70,6 +72,7 @@ static inline int bake_scene_option(bake_scene *s, int argc, char **argv, int *i
     double x[3];
     int which, k, ok = 1;
     if (!strcmp(argv[*i], "--both-sides")) return d->sides = ISOGI_TRACE_BOTH_SIDES, 1;
+    if (!strcmp(argv[*i], "--feedback")) return d->method = ISOGI_TRACE_FEEDBACK, 1;
     if (!parse_name(argv[*i], names, 13, &which)) return 0;
     if (*i + 1 >= argc || !strncmp(argv[*i + 1], "--", 2)) return file_fail(s->error, "%s: needs a value", argv[*i]), -1;
     text = argv[++*i];

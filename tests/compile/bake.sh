@@ -16,6 +16,18 @@ grep -q '^20x20x20 texels, scales 1 1 1$' "$OUT/log"
 cp "$OUT/a.bake" "$OUT/resumed.bake"
 build/bake $scene --out "$OUT/resumed.bake"
 cmp "$OUT/whole.bake" "$OUT/resumed.bake"
+# by feedback, too, where the boxes end within a cube of 64 texels; what holds other light is no part of it
+by_feedback="$scene --feedback --lattice 100,9,9"
+build/bake $by_feedback --out "$OUT/feedback.bake"
+build/bake $by_feedback --box 0,0,0,30,9,9 --out "$OUT/c.bake"
+build/bake $by_feedback --box 70,3,0,100,9,9 --out "$OUT/d.bake"
+[ "$(wc -c < "$OUT/c.bake")" -lt "$(wc -c < "$OUT/feedback.bake")" ]
+build/bake $by_feedback --merge "$OUT/d.bake" "$OUT/c.bake" --out "$OUT/joined.bake"
+cmp "$OUT/feedback.bake" "$OUT/joined.bake"
+build/bake $by_feedback --out "$OUT/d.bake"
+cmp "$OUT/feedback.bake" "$OUT/d.bake"
+build/bake $scene --lattice 100,9,9 --out "$OUT/paths.bake"
+if cmp -s "$OUT/feedback.bake" "$OUT/paths.bake"; then echo "--feedback: the same as by paths"; exit 1; fi
 # the surface at 0 alone is less than all, and just what lies within a hair of it
 build/bake $scene --isovalues 0,0 --out "$OUT/zero.bake"
 build/bake $scene --isovalues -1e-300,0 --out "$OUT/hair.bake"

@@ -11,6 +11,17 @@ ranks 4 $scene --out "$OUT/four.bake"
 ranks 1 $scene --out "$OUT/alone.bake"
 cmp "$OUT/one.bake" "$OUT/four.bake"
 cmp "$OUT/one.bake" "$OUT/alone.bake"
+# by feedback, in bricks of its own; and it goes on with a part
+by_feedback="$scene --feedback --lattice 150,20,70"
+build/bake $by_feedback --out "$OUT/feedback.bake"
+ranks 3 $by_feedback --out "$OUT/feedback-three.bake"
+ranks 1 $by_feedback --out "$OUT/feedback-alone.bake"
+cmp "$OUT/feedback.bake" "$OUT/feedback-three.bake"
+cmp "$OUT/feedback.bake" "$OUT/feedback-alone.bake"
+build/bake $by_feedback --box 60,5,0,70,9,69 --out "$OUT/feedback-part.bake"
+[ "$(wc -c < "$OUT/feedback-part.bake")" -lt "$(wc -c < "$OUT/feedback.bake")" ]
+ranks 2 $by_feedback --out "$OUT/feedback-part.bake"
+cmp "$OUT/feedback.bake" "$OUT/feedback-part.bake"
 # it goes on where a file stops, of either program and however its box lies, and where it was killed
 build/bake $scene --box 3,0,0,40,40,17 --out "$OUT/part.bake"
 ranks 3 $scene --out "$OUT/part.bake"
