@@ -3446,7 +3446,8 @@ struct isogi_trace__feedback {
     uint64_t unfinished; /* of which there are so many */
     double most; /* texels that were ever done, with the parts of those that were begun: for progress */
     double probe_part; /* of the probes at this level that are known, those whose rays are traced */
-    uint64_t probes_before; /* of groups of texels that are finished */
+    uint64_t probes_before; /* of groups of texels that are finished, */
+    int diverged;           /* one of which did not settle */
 };
 
 /* When a block of samples is complete the light at probes is worked out, then that of the texels. That takes no rays, but as long as many:
@@ -5259,7 +5260,7 @@ static void isogi_trace__forget_task(isogi_trace *t, size_t task) {
 /* The next group begins anew, so that a bake that was saved in between goes on to the same bits. */
 static void isogi_trace__group_free(isogi_trace *t) {
     isogi_trace__feedback *f = t->feedback;
-    f->probes_before += f->probes.count;
+    f->probes_before += f->probes.count, f->diverged |= f->diverges;
     isogi_trace__set_free(t, &f->texels);
     isogi_trace__set_free(t, &f->probes);
     f->cursor = f->probe_cursor = f->probe_end = f->probe_counted = f->placed = f->carried = f->span_count = 0;
@@ -5751,7 +5752,7 @@ static void isogi_trace__status_add(const isogi_trace *t, isogi_trace_report *r)
     if (t->coarse) isogi_trace__status_add(t->coarse, r);
     if (!t->feedback) return;
     r->probes += t->feedback->probes_before + t->feedback->probes.count;
-    r->diverges |= t->feedback->diverges;
+    r->diverges |= t->feedback->diverges | t->feedback->diverged;
 }
 
 ISOGI_API void isogi_trace_status(const isogi_trace *trace, isogi_trace_report *report) {
@@ -6450,7 +6451,7 @@ static void isogi_trace__feedback_reset(isogi_trace *t) {
     isogi_trace__feedback *f = t->feedback;
     if (!f) return;
     isogi_trace__feedback_rest(t);
-    f->level = f->diverges = 0, f->probes_before = 0;
+    f->level = f->diverges = f->diverged = 0, f->probes_before = 0;
 }
 
 /* The queue has become another one, of `bricks` bricks: nodes that are being made go on with those it holds. */

@@ -167,6 +167,11 @@ TEST(endless_light_is_reported) {
         CHECK((error[0] > 1e30f) == (variant == 0) && e[0][1] > 0 && e[0][1] < 1e30f, "variant %d: E %g, error %g", variant,
               (double)e[0][1], (double)error[0]);
         if (variant == 1) CHECK(fabs((double)e[0][1] - 100 * PI) < 0.02 * 100 * PI, "R 0.99: E %g", (double)e[0][1]);
+        isogi_trace_free(t), t = NULL;
+        d.lazy = 0, d.lattice[0] = ISOGI_TRACE_CUBE + 6, d.lattice[1] = d.lattice[2] = 8; /* the last cube lies outside the shell */
+        CHECK(isogi_trace_create(&t, &d, NULL) == ISOGI_OK && isogi_trace_step(t, 0, NULL) == ISOGI_OK, "variant %d", variant);
+        isogi_trace_status(t, &report);
+        CHECK(variant == 2 || report.diverges == (variant == 0), "variant %d: diverges %d in two cubes", variant, report.diverges);
         isogi_trace_free(t), scene_free(&s);
     }
 }
