@@ -4327,12 +4327,13 @@ static int isogi_trace__spans_add(isogi_trace *t, const isogi_trace__set *set, s
 
 /* The probes that rays have met since are the next generation. A hit is worth one path that goes on from there, so each has as many
    samples as there are hits that read it: few are read by more than two, and with more samples than readers in a room that is closed,
-   probes would breed probes until they fill it. Two at least where nearly all light is reflected: probes whose only rays meet one
-   another are a room without a way out. Counted once, between generations, so that slices of a bake do not matter. Returns how many of
-   `limit` probes were left. */
+   probes would breed probes until they fill it. Two at least where nearly all light is reflected, also where texels have one: probes whose
+   only rays meet one another are a room without a way out. Counted once, between generations, so that slices of a bake do not matter.
+   Returns how many of `limit` probes were left. */
 static uint64_t isogi_trace__generation(isogi_trace *t, uint64_t limit) {
     isogi_trace__feedback *f = t->feedback;
     uint32_t most = (uint32_t)t->scene.desc.samples < ISOGI_TRACE__PROBE_MOST ? (uint32_t)t->scene.desc.samples : ISOGI_TRACE__PROBE_MOST;
+    most = most > 1 ? most : 2;
     for (; f->probe_counted < f->probes.count && limit; f->probe_counted++, limit--) {
         isogi_trace__stage *stage = isogi_trace__stage_at(&f->probes, f->probe_counted);
         uint32_t wanted = stage->readers > stage->wanted ? stage->readers : stage->wanted; /* that was the least */
