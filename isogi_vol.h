@@ -67,10 +67,11 @@
    Batches go through a pool of 64 rays, eight to an instruction where there is AVX-512, so hand over many at a time: from 64 on all
    rays are faster than alone (twice to four times), from 500 on nothing is left to gain. There, rays of one isovalue that nearly
    coincide, up to sixteen in a row as in a tile of pixels, go as one and are faster still; rays that follow each other from one place
-   come down to its leaf together. Cells are looked at in float first, from 8-bit voxels that lie together in two cache lines for 4x4x4
-   cells, with an error bound: what is certain needs nothing else, and only cells in doubt, the hits and one cell for every 25 rays
-   besides, read your voxels and are solved in double. Where any hit will do, a ray is done once it is known to pass a block that lies
-   inside and one that lies outside.
+   come down to its leaf together, and where they are many (12 from a surface, 48 from elsewhere), they pass the cells round it at once,
+   as far as slopes there let none of them meet the surface. Cells are looked at in float first, from 8-bit voxels that lie together in two
+   cache lines for 4x4x4 cells, with an error bound: what is certain needs nothing else, and only cells in doubt, the hits and one cell for
+   every 25 rays besides, read your voxels and are solved in double. Where any hit will do, a ray is done once it is known to pass a block
+   that lies inside and one that lies outside.
 
    History  1.0  first release
 */
@@ -4265,6 +4266,7 @@ typedef struct isogi_vol__batch {
     isogi_ray bundle_ray;
     isogi_hit bundle_start;
     int bundle;        /* all rays are the first one, or leave from the first start, but for dirs[i] */
+    size_t count;      /* of all rays */
     isogi_hit *hits;   /* either this */
     uint8_t *occluded; /* or this */
     isogi_counters work;
@@ -4273,7 +4275,7 @@ typedef struct isogi_vol__batch {
 /* Member by member: of one memset compilers make an instruction that is slow to start. */
 ISOGI_VOL__INLINE void isogi_vol__clear_batch(isogi_vol__batch *b, const isogi_pyramid *pyramid) {
     b->pyramid = pyramid, b->rays = NULL, b->starts = NULL, b->dirs = NULL, b->tmax = NULL, b->isovalue = 0, b->flags = 0, b->bundle = 0;
-    b->bundles = NULL, b->each = b->bundle_count = b->opened = 0;
+    b->bundles = NULL, b->each = b->bundle_count = b->opened = b->count = 0;
     b->hits = NULL, b->occluded = NULL;
     b->work.rays = b->work.blocks = b->work.cells = b->work.cubics = 0;
 }
@@ -4623,6 +4625,7 @@ typedef struct __attribute__((aligned(64))) isogi_vol__pool {
     uint64_t address[ISOGI_VOL__POOL];  /* of that node, or of the leaf whose cells are being looked at */
     int64_t cell[ISOGI_VOL__POOL];      /* x | y << 16 | z << 32 of the last cell of the way; nodes are what its leading digits say */
     int64_t flip[ISOGI_VOL__POOL];      /* child = child counted backwards ^ flip */
+    int64_t begin[ISOGI_VOL__POOL];     /* nothing is there before: a time of a plane, axis 3 */
     double step[ISOGI_VOL__POOL];       /* the isovalue in steps of the leaf, for voxels of code + 0.5 */
     int64_t side[ISOGI_VOL__POOL];      /* 1 inside, 0 outside, -1 not known; of these 2 side - 4 while leaving a surface:
                                            only to be looked at in double */
@@ -4640,12 +4643,24 @@ typedef struct __attribute__((aligned(64))) isogi_vol__pool {
     int64_t entry_axis[ISOGI_VOL__POOL];
 } isogi_vol__pool;
 
+/* What is known of the field round the cell in which rays begin: by how much it rises at most, a cell along an axis, towards the isovalue
+   and beyond. Entry n holds for cells up to n away, by axes and by octants of directions (bit a: falls along axis a). */
+#define ISOGI_VOL__CLEARED 3
+#define ISOGI_VOL__ROUND (2 * ISOGI_VOL__CLEARED) /* voxels along an axis */
+typedef struct __attribute__((aligned(32))) isogi_vol__clearing {
+    float rise[ISOGI_VOL__CLEARED][3][8]; /* these in raw voxels */
+    double corner[3];   /* of that cell */
+    double value, sure; /* the field where the rays begin, relative to the isovalue, negative on their side; what is certainly there */
+    int side;           /* theirs; -1: nothing is known */
+} isogi_vol__clearing;
+
 /* The way from the root to the leaf in which rays begin. */
 typedef struct isogi_vol__descent {
     double origin[3], isovalue, step;
     int64_t cell; /* in which they begin; -1: not prepared */
     const uint8_t *leaf;
     uint64_t held[ISOGI_VOL__NODE_LEVELS]; /* children on the way that can hold the surface, not counted backwards */
+    isogi_vol__clearing clearing;
 } isogi_vol__descent;
 
 /* The root and its children as one isovalue sees them, for rays that begin anywhere. */
@@ -4710,10 +4725,10 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE __m512i isogi_vol__time_of(__m512d plane, __
     return _mm512_ternarylogic_epi64(t, ISOGI_VOL__ALL64(~(uint64_t)3), _mm512_set1_epi64(axis), 0xea);
 }
 
-/* Which children of their nodes eight rays pass, in their own order; cell: the nodes' corners. origin and inverse: of the rays, `stride`
-   numbers from axis to axis. */
-ISOGI_VOL__AVX512 static __m512i isogi_vol__passed(const double *origin, const double *inverse, size_t stride, __m512i end, __m512i level,
-                                                   __m512i cell) {
+/* Which children of their nodes eight rays pass from `begin` to `end`, in their own order; cell: the nodes' corners. origin and inverse: of
+   the rays, `stride` numbers from axis to axis. */
+ISOGI_VOL__AVX512 static __m512i isogi_vol__passed(const double *origin, const double *inverse, size_t stride, __m512i begin,
+                                                   __m512i end, __m512i level, __m512i cell) {
     /* children measure 4 to the power of level; on axes on which a ray falls planes go from the node's far border downwards */
     const __m512d child = _mm512_castsi512_pd(_mm512_slli_epi64(_mm512_add_epi64(_mm512_add_epi64(level, level), _mm512_set1_epi64(1023)),
                                                                 52));
@@ -4738,7 +4753,7 @@ ISOGI_VOL__AVX512 static __m512i isogi_vol__passed(const double *origin, const d
     ISOGI_VOL__AXIS(2)
 #undef ISOGI_VOL__AXIS
     /* planes behind the origin come before */
-    in = _mm512_max_epi64(_mm512_max_epi64(t00, t10), _mm512_max_epi64(t20, _mm512_set1_epi64(3)));
+    in = _mm512_max_epi64(_mm512_max_epi64(t00, t10), _mm512_max_epi64(t20, begin));
     out = _mm512_min_epi64(_mm512_min_epi64(t04, t14), _mm512_min_epi64(t24, end));
     {
         const uint64_t *order = isogi_vol__orders;
@@ -4900,8 +4915,8 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE void isogi_vol__answer(isogi_vol__turn *turn
     __attribute__((aligned(64))) uint64_t mask[4][8];
     const __m256i tail = isogi_vol__compare(s, i, leaf, mask);
     /* meanwhile the masks get to where they can be read as vectors */
-    const __m512i passed = isogi_vol__passed(&s->origin[0][i], &s->inverse[0][i], ISOGI_VOL__POOL, _mm512_load_si512(&s->end[i]), level,
-                                             _mm512_load_si512(&s->cell[i]));
+    const __m512i passed = isogi_vol__passed(&s->origin[0][i], &s->inverse[0][i], ISOGI_VOL__POOL, _mm512_load_si512(&s->begin[i]),
+                                             _mm512_load_si512(&s->end[i]), level, _mm512_load_si512(&s->cell[i]));
     const __m512i marked = _mm512_maskz_and_epi64(lives, passed, isogi_vol__marked(s, i, leaf, (const uint64_t(*)[8])mask, tail));
     if (turn->any) isogi_vol__look_ahead(turn, s, i, (__mmask8)(lives & ~leaf), (const uint64_t(*)[8])mask, passed);
     const __mmask8 some = _mm512_test_epi64_mask(marked, marked);
@@ -5222,7 +5237,7 @@ static int isogi_vol__seat(isogi_vol__pool *s, int i, const isogi_vol__walk *w) 
         flip |= fall ? 3 << 2 * a : 0;
     }
     memcpy(&s->end[i], &end, sizeof end);
-    s->end[i] |= 3;
+    s->end[i] |= 3, s->begin[i] = 3;
     s->flip[i] = flip, s->low[i] = low, s->beyond[i] = high + 1;
     s->level[i] = p->node_levels - 1, s->pending[i] = 0, s->cell[i] = 0;
     s->address[i] = (uint64_t)(uintptr_t)p->nodes[p->node_level[p->node_levels - 1].first];
@@ -6488,30 +6503,166 @@ ISOGI_VOL__AVX512 static void isogi_vol__prepare_descent(isogi_vol__descent *d, 
     }
 }
 
+/* Rays that begin in one place first come through the same few cells. How steep the field is there is bounded once for all of them; each
+   learns from its direction how far it certainly stays on its side: its way through cells and nodes begins behind.
+
+   Within a cell a slope along an axis lies between the differences along its four edges, so the largest difference of all edges in reach
+   bounds it. Lanes stand for places upwards and downwards from the first cell: x in fours, z in halves; rows go outwards along y,
+   ring by ring of y and z. Bounds are widened by more than floats err by. way: of the rays, roughly; if they begin on a surface, bounds
+   hold for the side to which it goes. Not inlined, for the sake of the stack. */
+ISOGI_VOL__AVX512 ISOGI_VOL__NOINLINE
+static void isogi_vol__look_round(isogi_vol__descent *d, const isogi_pyramid *p, const double way[3], int on_surface) {
+    enum { REACH = ISOGI_VOL__CLEARED };
+    isogi_vol__clearing *const c = &d->clearing;
+    const isogi_volume *v = &p->volume;
+    const __m512i octants = _mm512_setr_epi32(0, 4, 16, 20, 8, 12, 24, 28, 0, 0, 0, 0, 0, 0, 0, 0);
+    const __m256i spread = _mm256_setr_epi32(2, 3, 4, 5, 3, 2, 1, 0);
+    __attribute__((aligned(32))) float row[ISOGI_VOL__ROUND][ISOGI_VOL__ROUND][8];
+    double corner[8], local[3], slope[3], least = 1e300, most = -1e300, error;
+    __m512 rise[2][3];
+    __m256 sign;
+    int at[3], a, i, k, n, inside;
+    c->side = -1;
+    if (v->type == ISOGI_F64) return;
+    for (a = 0; a < 3; a++) {
+        at[a] = (int)(d->cell >> 16 * a & 0xffff);
+        if (at[a] < REACH - 1 || at[a] + (a ? REACH : 5) > p->cells[a]) return;
+        c->corner[a] = (double)at[a], local[a] = d->origin[a] - c->corner[a];
+    }
+    isogi_vol__read_corners(v, at, corner);
+    for (i = 0; i < 8; i++) least = isogi_vol__min(least, corner[i]), most = isogi_vol__max(most, corner[i]);
+    c->value = isogi_vol__trilinear(corner, local, slope) - d->isovalue;
+    error = 1e-13 * (fabs(v->bias) + fabs(d->isovalue) + isogi_vol__max(fabs(least), fabs(most)));
+    error /= fabs(v->scale), c->value /= fabs(v->scale); /* from here on in raw voxels */
+    most /= fabs(v->scale), least /= fabs(v->scale);
+    c->sure = -1e-8 * (most - least) - error;
+    inside = on_surface ? slope[0] * way[0] + slope[1] * way[1] + slope[2] * way[2] > 0 : c->value > 0;
+    if (!(most - least > 1e-30)) return; /* no denormal floats */
+    if (on_surface ? !(fabs(c->value) < -c->sure) : !(fabs(c->value) > error)) return;
+    c->value = on_surface ? 0 : error - fabs(c->value);
+    sign = _mm256_castsi256_ps(_mm256_set1_epi32(inside == (v->scale > 0) ? INT32_MIN : 0)); /* -ffast-math would take -0 for 0 */
+    for (k = 0; k < ISOGI_VOL__ROUND; k++)
+        for (i = 0; i < ISOGI_VOL__ROUND; i++) {
+            float buffer[8];
+            const float *from = isogi_vol__raw_row(p, (size_t)(at[0] - REACH + 1), (size_t)(at[1] - REACH + 1 + i),
+                                                   (size_t)(at[2] - REACH + 1 + k), 8, buffer);
+            _mm256_store_ps(row[k][i], _mm256_xor_ps(_mm256_permutevar8x32_ps(_mm256_loadu_ps(from), spread), sign));
+        }
+    for (i = 0; i < 6; i++) rise[i % 2][i / 2] = _mm512_set1_ps(-3e38f);
+    for (n = 0; n <= REACH; n++) {
+        for (i = 0; i <= 2 * n; i++) {
+            const int y = i < n ? i : n, z = i < n ? n : 2 * n - i;
+#pragma GCC unroll 2
+            for (k = 0; k < 2; k++) {
+                const int up = REACH - 1 + z, down = REACH - z, across = k ? REACH - y : REACH - 1 + y,
+                          before = k ? across + 1 : across - 1;
+#define ISOGI_VOL__BOTH(up, down, y) \
+    _mm512_insertf32x8(_mm512_castps256_ps512(_mm256_load_ps(row[up][y])), _mm256_load_ps(row[down][y]), 1)
+                const __m512 here = ISOGI_VOL__BOTH(up, down, across);
+                rise[k][0] = _mm512_max_ps(rise[k][0], _mm512_sub_ps(_mm512_permute_ps(here, 0x39), here));
+                if (y) rise[k][1] = _mm512_max_ps(rise[k][1], _mm512_sub_ps(here, ISOGI_VOL__BOTH(up, down, before)));
+                if (z) rise[k][2] = _mm512_max_ps(rise[k][2], _mm512_sub_ps(here, ISOGI_VOL__BOTH(up - 1, down + 1, across)));
+#undef ISOGI_VOL__BOTH
+            }
+        }
+#pragma GCC unroll 3
+        for (a = 0; a < 3; a++) {
+            const __mmask16 lanes = (__mmask16)(0x1111 * ((1 << (a ? n + 1 : n)) - 1)); /* edges within reach */
+            __m512 largest[2];
+            __m256 eight;
+            if (!n) break;
+#pragma GCC unroll 2
+            for (k = 0; k < 2; k++) {
+                largest[k] = _mm512_mask_mov_ps(_mm512_set1_ps(-3e38f), lanes, rise[k][a]);
+                largest[k] = _mm512_max_ps(largest[k], _mm512_permute_ps(largest[k], 0xb1));
+                largest[k] = _mm512_max_ps(largest[k], _mm512_permute_ps(largest[k], 0x4e));
+            }
+            eight = _mm512_castps512_ps256(_mm512_permutex2var_ps(largest[0], octants, largest[1]));
+            eight = _mm256_fmadd_ps(_mm256_andnot_ps(_mm256_set1_ps(-0.0f), eight), _mm256_set1_ps(1e-6f),
+                                    _mm256_add_ps(eight, _mm256_set1_ps((float)error)));
+            _mm256_store_ps(c->rise[n - 1][a], eight);
+        }
+    }
+    c->side = inside;
+}
+
+/* Up to which time of a plane eight rays certainly stay on their side; *lanes: those that do. What bounds the field is linear from where a
+   ray leaves the cells within n of the first one to where it leaves those within n + 1, so it is enough to look there; and it never falls
+   again after a rise, as bounds of more cells are no less. */
+ISOGI_VOL__AVX512 ISOGI_VOL__INLINE __m512i isogi_vol__cleared8(const isogi_vol__descent *d, const double place[9][8], __mmask8 *lanes) {
+    const isogi_vol__clearing *c = &d->clearing;
+    const __m512d zero = _mm512_setzero_pd();
+    __m512d origin[3], inverse[3], way[3], t[3], value = _mm512_set1_pd(c->value), before = zero, reach = zero;
+    __m256i number = _mm256_setzero_si256();
+    __m512i until = ISOGI_VOL__ALL64(0x7fffffffffffffffu);
+    __mmask8 fall[3], sure = 0;
+    int a, n;
+#pragma GCC unroll 3
+    for (a = 0; a < 3; a++) {
+        origin[a] = _mm512_set1_pd(d->origin[a]), inverse[a] = _mm512_load_pd(place[3 + a]);
+        way[a] = _mm512_abs_pd(_mm512_load_pd(place[6 + a]));
+        fall[a] = _mm512_movepi64_mask(_mm512_castpd_si512(inverse[a]));
+        number = _mm256_mask_or_epi32(number, fall[a], number, _mm256_set1_epi32(1 << a));
+        t[a] = _mm512_sub_pd(_mm512_mask_mov_pd(_mm512_set1_pd(c->corner[a] + 1), fall[a], _mm512_set1_pd(c->corner[a])), origin[a]);
+        t[a] = _mm512_mul_pd(t[a], inverse[a]), inverse[a] = _mm512_abs_pd(inverse[a]);
+    }
+    for (n = 0; n < ISOGI_VOL__CLEARED; n++) {
+#define ISOGI_VOL__RISE(a) _mm512_cvtps_pd(_mm256_permutevar8x32_ps(_mm256_load_ps(c->rise[n][a]), number))
+        const __m512d out = _mm512_min_pd(_mm512_min_pd(t[0], t[1]), t[2]);
+        __m512d rise = _mm512_mul_pd(way[0], ISOGI_VOL__RISE(0));
+        __mmask8 here;
+        rise = _mm512_fmadd_pd(way[1], ISOGI_VOL__RISE(1), rise);
+        rise = _mm512_fmadd_pd(way[2], ISOGI_VOL__RISE(2), rise);
+#undef ISOGI_VOL__RISE
+        value = _mm512_fmadd_pd(rise, _mm512_sub_pd(out, before), value), before = out;
+        here = _mm512_cmp_pd_mask(value, _mm512_set1_pd(c->sure), _CMP_LT_OQ);
+        sure = (__mmask8)(sure | here), reach = _mm512_mask_mov_pd(reach, here, _mm512_set1_pd(n));
+#pragma GCC unroll 3
+        for (a = 0; a < 3; a++) t[a] = _mm512_add_pd(t[a], inverse[a]);
+    }
+#pragma GCC unroll 3
+    for (a = 0; a < 3; a++) {
+        const __m512d corner = _mm512_set1_pd(c->corner[a]);
+        const __m512d plane = _mm512_mask_sub_pd(_mm512_add_pd(corner, _mm512_add_pd(reach, _mm512_set1_pd(1))), fall[a], corner, reach);
+        until = _mm512_min_epi64(until, isogi_vol__time_of(plane, origin[a], _mm512_load_pd(place[3 + a]), a));
+    }
+    *lanes = sure;
+    return _mm512_mask_or_epi64(_mm512_set1_epi64(3), sure, until, _mm512_set1_epi64(3));
+}
+
 /* Takes rays that stand at the root to the leaf in which they begin, or as far as children can hold the surface. row: the slots are eight
    in a row; else what is written of the others does no harm. */
 ISOGI_VOL__AVX512 static void isogi_vol__descend8(isogi_vol__turn *turn, isogi_vol__pool *s, const uint8_t *seats, int row, __mmask8 lanes,
-                                                  const double inverse[3][8], __m512i end, __m512i flip) {
+                                                  const double place[9][8], __m512i end, __m512i flip) {
     const isogi_vol__descent *d = &turn->descent;
     const __m512i one = _mm512_set1_epi64(1), zero = _mm512_setzero_si512();
     const __m128i list = _mm_loadl_epi64((const __m128i *)(const void *)seats);
     const isogi_vol__spots spots = isogi_vol__spots8(s, seats);
-    __attribute__((aligned(64))) double origin[3][8];
-    __m512i pending = zero, mask = zero;
+    __m512i pending = zero, mask = zero, begin = _mm512_set1_epi64(3);
     __mmask8 going = 0xff;
     unsigned cells;
-    int a, n;
+    int n;
 #define ISOGI_VOL__PUT(member, value)                                                           \
     do {                                                                                        \
         if (row) _mm512_mask_store_epi64(&s->member[seats[0]], lanes, value);                   \
         else isogi_vol__put8(&spots, ISOGI_VOL__ROW_OF(member), value);                         \
     } while (0)
-    for (a = 0; a < 3; a++) _mm512_store_pd(origin[a], _mm512_set1_pd(d->origin[a]));
+    if (d->clearing.side >= 0) {
+        const __m512i side = row ? _mm512_load_si512(&s->side[seats[0]]) : isogi_vol__pick8(&spots, ISOGI_VOL__ROW_OF(side));
+        const __m512i free = _mm512_set1_epi64(d->clearing.side);
+        __mmask8 sure;
+        begin = isogi_vol__cleared8(d, place, &sure);
+        /* but for rays that go onward from the other side */
+        sure = _mm512_mask_cmpneq_epi64_mask(sure, side, _mm512_set1_epi64(2 * !d->clearing.side - 4));
+        begin = _mm512_mask_mov_epi64(_mm512_set1_epi64(3), sure, begin);
+        ISOGI_VOL__PUT(side, _mm512_mask_mov_epi64(side, sure, free));
+        ISOGI_VOL__PUT(begin, begin);
+    }
     for (n = turn->levels - 1; going & lanes && n >= 0; n--) {
         const uint64_t digits = 0x000100010001u * (((uint64_t)4 << 2 * n) - 1);
         const __m512i held = isogi_vol__mirror8(_mm512_set1_epi64((int64_t)d->held[n]), flip);
         const __m512i child = _mm512_set1_epi64((int64_t)_pext_u64((uint64_t)d->cell >> 2 * n, 0x000300030003u));
-        mask = _mm512_and_si512(isogi_vol__passed(origin[0], inverse[0], 8, end, _mm512_set1_epi64(n),
+        mask = _mm512_and_si512(isogi_vol__passed(place[0], place[3], 8, begin, end, _mm512_set1_epi64(n),
                                                   _mm512_set1_epi64((int64_t)((uint64_t)d->cell & ~digits))),
                                 held);
         if (n) {
@@ -6596,7 +6747,7 @@ ISOGI_VOL__AVX512 static void isogi_vol__enter8(isogi_vol__batch *b, isogi_vol__
         summit->isovalue = isovalue, summit->known = 0, summit->ready = 1;
         isogi_vol__survey(summit, 64, p->nodes[p->node_level[top].first]);
     }
-    mask = isogi_vol__passed(place[0], place[3], 8, end, _mm512_set1_epi64(top), _mm512_setzero_si512());
+    mask = isogi_vol__passed(place[0], place[3], 8, _mm512_set1_epi64(3), end, _mm512_set1_epi64(top), _mm512_setzero_si512());
     mask = isogi_vol__held_at_top(turn, mask, _mm512_set1_epi64((int64_t)summit->of[64][0]),
                                   _mm512_set1_epi64((int64_t)summit->of[64][1]), flip, bit, lanes);
     some = _mm512_mask_test_epi64_mask(meets, mask, mask), rest = _mm512_and_si512(mask, _mm512_sub_epi64(mask, one));
@@ -6605,7 +6756,7 @@ ISOGI_VOL__AVX512 static void isogi_vol__enter8(isogi_vol__batch *b, isogi_vol__
     child = _mm512_and_si512(isogi_vol__first_child8(mask, flip), _mm512_set1_epi64(63));
     group = isogi_vol__digits8(child);
     cell = _mm512_sll_epi64(group, _mm_cvtsi32_si128(2 * top));
-    mask = isogi_vol__passed(place[0], place[3], 8, end, _mm512_set1_epi64(top - 1), cell);
+    mask = isogi_vol__passed(place[0], place[3], 8, _mm512_set1_epi64(3), end, _mm512_set1_epi64(top - 1), cell);
     fresh = (uint64_t)_mm512_mask_reduce_or_epi64(some, _mm512_sllv_epi64(one, child)) & ~summit->known;
     for (summit->known |= fresh; fresh; fresh &= fresh - 1)
         isogi_vol__survey(summit, __builtin_ctzll(fresh), children + 128 * __builtin_ctzll(fresh));
@@ -6638,12 +6789,24 @@ ISOGI_VOL__AVX512 static void isogi_vol__enter8(isogi_vol__batch *b, isogi_vol__
     if (lanes & ~more) turn->choosing |= (uint64_t)_mm512_mask_reduce_or_epi64((__mmask8)(lanes & ~more), bit);
 }
 
-/* Rays of eight that stand at the root are taken down from there if they have one isovalue, and are not few; whether they are. */
+/* Whether the ray and those after it that begin in the same place are so many that it pays to look round; on a surface each would have to
+   leave it in double. */
+static int isogi_vol__are_many(const isogi_vol__batch *b, size_t number) {
+    const size_t enough = b->starts ? 12 : 48, last = number + enough - 1;
+    if (b->bundle) return b->each >= enough;
+    if (last >= b->count) return 0;
+    if (b->rays) return !memcmp(b->rays[number].origin, b->rays[last].origin, sizeof b->rays->origin);
+    return !memcmp(b->starts[number].cell, b->starts[last].cell, sizeof b->starts->cell) &&
+           !memcmp(b->starts[number].local, b->starts[last].local, sizeof b->starts->local);
+}
+
+/* Rays of eight that stand at the root are taken down from there if they have one isovalue, and are not few; whether they are. number: of
+   the first. */
 ISOGI_VOL__AVX512 ISOGI_VOL__INLINE int isogi_vol__take_down(isogi_vol__batch *b, isogi_vol__turn *turn, isogi_vol__pool *s,
-                                                             const uint8_t *seats, int row, __mmask8 meets, __mmask8 lanes,
-                                                             const __m512d origin[3], const __m512d inverse[3], __m512d isovalue,
-                                                             __m512i end, __m512i flip) {
-    __attribute__((aligned(64))) double place[6][8]; /* origins, then inverses */
+                                                             size_t number, const uint8_t *seats, int row, __mmask8 meets,
+                                                             __mmask8 lanes, const __m512d origin[3], const __m512d inverse[3],
+                                                             const __m512d dir[3], __m512d isovalue, __m512i end, __m512i flip) {
+    __attribute__((aligned(64))) double place[9][8]; /* origins, inverses, directions */
     __m512i first;
     __mmask8 off = 0;
     double at[3], value;
@@ -6657,6 +6820,7 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE int isogi_vol__take_down(isogi_vol__batch *b
         const __m512d same = _mm512_permutexvar_pd(first, origin[a]);
         off = (__mmask8)(off | _mm512_mask_cmp_pd_mask(lanes, origin[a], same, _CMP_NEQ_UQ));
         at[a] = _mm512_cvtsd_f64(same), _mm512_store_pd(place[a], origin[a]), _mm512_store_pd(place[3 + a], inverse[a]);
+        _mm512_store_pd(place[6 + a], dir[a]);
     }
     if (off) {
         isogi_vol__enter8(b, turn, s, seats, row, meets, lanes, (const double(*)[8])place, value, end, flip);
@@ -6664,9 +6828,16 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE int isogi_vol__take_down(isogi_vol__batch *b
     }
     if (turn->descent.cell < 0 || memcmp(turn->descent.origin, at, sizeof at) || memcmp(&turn->descent.isovalue, &value, sizeof value)) {
         isogi_vol__prepare_descent(&turn->descent, b->pyramid, at, value);
+        turn->descent.clearing.side = -1;
+        if (isogi_vol__are_many(b, number)) {
+            double way[3];
+#pragma GCC unroll 3
+            for (a = 0; a < 3; a++) way[a] = _mm512_mask_reduce_add_pd(lanes, dir[a]);
+            isogi_vol__look_round(&turn->descent, b->pyramid, way, b->starts != NULL);
+        }
         b->work.blocks += (uint64_t)turn->levels; /* at most */
     }
-    isogi_vol__descend8(turn, s, seats, row, lanes, (const double(*)[8])place + 3, end, flip);
+    isogi_vol__descend8(turn, s, seats, row, lanes, (const double(*)[8])place, end, flip);
     return 1;
 }
 
@@ -6852,6 +7023,7 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE unsigned isogi_vol__seat_some(isogi_vol__bat
                    _mm512_add_epi64(_mm512_min_epi64(_mm512_cvttpd_epi64(ISOGI_VOL__ADD(q, _mm512_set1_pd(0.01))), _mm512_set1_epi64(253)),
                                     _mm512_set1_epi64(1)));
     ISOGI_VOL__PUT(end, _mm512_or_si512(_mm512_castpd_si512(stop), _mm512_set1_epi64(3)));
+    if (turn) ISOGI_VOL__PUT(begin, _mm512_set1_epi64(3)); /* packets need none */
     ISOGI_VOL__PUT(flip, flip);
     ISOGI_VOL__PUT(side, inside);
     ISOGI_VOL__PUT(entry_axis, b->rays ? axis : _mm512_set1_epi64(-1));
@@ -6861,7 +7033,7 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE unsigned isogi_vol__seat_some(isogi_vol__bat
     ISOGI_VOL__PUT(deflated, none);
     ISOGI_VOL__PUT(ray, _mm512_add_epi64(_mm512_set1_epi64((int64_t)first), lane));
     *odd = (unsigned)(lanes & ~good);
-    if (!turn || !isogi_vol__take_down(b, turn, s, seats, whole, meets, (__mmask8)(meets & lanes), origin, inverse, isovalue,
+    if (!turn || !isogi_vol__take_down(b, turn, s, first, seats, whole, meets, (__mmask8)(meets & lanes), origin, inverse, d, isovalue,
                                        _mm512_or_si512(_mm512_castpd_si512(stop), _mm512_set1_epi64(3)), flip)) {
         ISOGI_VOL__PUT(pending, none);
         ISOGI_VOL__PUT(cell, none);
@@ -6969,8 +7141,9 @@ static int isogi_vol__seat_odd(isogi_vol__batch *b, isogi_vol__pool *s, size_t i
     return 0;
 }
 
-/* Sends for the nodes in which the rays of a bundle begin. */
-ISOGI_VOL__INLINE void isogi_vol__send_for_bundle(const isogi_pyramid *p, const isogi_bundle *bundle) {
+/* Sends for the nodes in which the rays of a bundle begin; round: for the voxels round that place, too. */
+ISOGI_VOL__INLINE void isogi_vol__send_for_bundle(const isogi_pyramid *p, const isogi_bundle *bundle, int round) {
+    const ptrdiff_t *const stride = p->volume.stride;
     double grid[3];
     size_t at[3];
     int a;
@@ -6980,6 +7153,13 @@ ISOGI_VOL__INLINE void isogi_vol__send_for_bundle(const isogi_pyramid *p, const 
     for (a = 0; a < 2; a++) {
         const uint8_t *node = p->nodes[isogi_vol__node_at(p, a, at[0] >> (2 * a + 2), at[1] >> (2 * a + 2), at[2] >> (2 * a + 2))];
         _mm_prefetch((const char *)node, _MM_HINT_T1), _mm_prefetch((const char *)node + 64, _MM_HINT_T1);
+    }
+    for (a = 0; round && a < ISOGI_VOL__ROUND * ISOGI_VOL__ROUND; a++) {
+        const uintptr_t row = (uintptr_t)p->volume.data + (uintptr_t)(((ptrdiff_t)at[0] - ISOGI_VOL__CLEARED + 1) * stride[0]) +
+                              (uintptr_t)(((ptrdiff_t)at[1] + a % ISOGI_VOL__ROUND - ISOGI_VOL__CLEARED + 1) * stride[1]) +
+                              (uintptr_t)(((ptrdiff_t)at[2] + a / ISOGI_VOL__ROUND - ISOGI_VOL__CLEARED + 1) * stride[2]);
+        _mm_prefetch((const char *)row, _MM_HINT_T1);
+        _mm_prefetch((const char *)(row + (uintptr_t)((ISOGI_VOL__ROUND - 1) * stride[0])), _MM_HINT_T1);
     }
 }
 
@@ -6997,7 +7177,8 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE uint64_t isogi_vol__fill_pool(isogi_vol__bat
         if (b->bundle_count > 1) {
             const size_t bundle = *next / b->each, left = (bundle + 1) * b->each - *next;
             if (bundle != b->opened) isogi_vol__open_bundle(b, bundle);
-            if (*next == bundle * b->each && bundle + 1 < b->bundle_count) isogi_vol__send_for_bundle(b->pyramid, b->bundles + bundle + 1);
+            if (*next == bundle * b->each && bundle + 1 < b->bundle_count)
+                isogi_vol__send_for_bundle(b->pyramid, b->bundles + bundle + 1, isogi_vol__are_many(b, *next));
             n = left < (size_t)n ? (int)left : n;
         }
         {
@@ -7116,10 +7297,13 @@ ISOGI_VOL__AVX512 static void isogi_vol__take_rows_down(isogi_vol__batch *b, iso
         const __m512d origin[3] = {_mm512_load_pd(&s->origin[0][i]), _mm512_load_pd(&s->origin[1][i]), _mm512_load_pd(&s->origin[2][i])};
         const __m512d inverse[3] = {_mm512_load_pd(&s->inverse[0][i]), _mm512_load_pd(&s->inverse[1][i]),
                                     _mm512_load_pd(&s->inverse[2][i])};
+        const __m512d dir[3] = {_mm512_load_pd(&s->dir[0][i]), _mm512_load_pd(&s->dir[1][i]), _mm512_load_pd(&s->dir[2][i])};
         uint8_t seats[16];
         _mm_storeu_si128((__m128i *)(void *)seats, _mm_add_epi8(_mm_set1_epi8((char)i), _mm_set_epi64x(0, 0x0706050403020100)));
-        (void)isogi_vol__take_down(b, turn, s, seats, 1, (__mmask8)(rays >> i), (__mmask8)(rays >> i), origin, inverse,
-                                   _mm512_load_pd(&s->isovalue[i]), _mm512_load_si512(&s->end[i]), _mm512_load_si512(&s->flip[i]));
+        _mm512_store_si512(&s->begin[i], _mm512_set1_epi64(3));
+        (void)isogi_vol__take_down(b, turn, s, (size_t)s->ray[i + __builtin_ctzll(rays >> i)], seats, 1, (__mmask8)(rays >> i),
+                                   (__mmask8)(rays >> i), origin, inverse, dir, _mm512_load_pd(&s->isovalue[i]),
+                                   _mm512_load_si512(&s->end[i]), _mm512_load_si512(&s->flip[i]));
     }
 }
 
@@ -7218,6 +7402,7 @@ ISOGI_VOL__AVX512 static void isogi_vol__trace_pool(isogi_vol__batch *b, size_t 
 
 static isogi_result isogi_vol__trace(isogi_vol__batch *b, size_t count, isogi_counters *counters) {
     size_t i = 0;
+    b->count = count;
 #ifdef ISOGI_VOL__AVX
     if (b->pyramid->fast && b->pyramid->path == ISOGI_VOL__PATH_AVX512 &&
         (count > 3 || b->pyramid->context.force_path == ISOGI_VOL__PATH_AVX512))
@@ -8846,6 +9031,8 @@ ISOGI_API void isogi_vol_mesh_free(const isogi_pyramid *pyramid, isogi_mesh *mes
 #undef ISOGI_VOL__NODE_AVX2
 #undef ISOGI_VOL__NODE_BASE
 #undef ISOGI_VOL__POOL
+#undef ISOGI_VOL__CLEARED
+#undef ISOGI_VOL__ROUND
 #undef ISOGI_VOL__ROW_OF
 #undef ISOGI_VOL__SLOPE
 #undef ISOGI_VOL__SUB
