@@ -114,31 +114,18 @@ static int generate_polynomials(quad *v) {
     return count;
 }
 
-/* For the recursions of columns on vector units: factors of m = 0 as above; for each m > 0 polynomials in w = z^2 for l = m .. m + 4, the
-   highest coefficient first, without the factor z of an odd one; then for each l up to the end of the table A, B, C of
-   q_l = (A w + B) q_{l-2} + C q_{l-4}. */
+/* For vector units, which take two columns at a time: factors of m = 0 as above; for each odd m q_m, a_{m+1}, q_{m+1}, and for each later l
+   those of both recursions. */
 static int generate_columns(quad *v) {
+    static quad factors[1024];
     int count = 3 * GENERATE_ORDER;
-    quad q = quad_sqrt(1 / (4 * generate_pi()));
-    generate_factors(v);
-    for (int m = 1; m < GENERATE_ORDER; m++) {
-        quad a[GENERATE_ORDER + 5], p[5][3] = {{0}};
-        q *= quad_sqrt((quad)(2 * m + 1) / (quad)(m == 1 ? 1 : 2 * m));
-        for (int l = m + 1; l <= m + 4 || l < GENERATE_ORDER; l++) a[l - m] = quad_sqrt((quad)(4 * l * l - 1) / (quad)(l * l - m * m));
-        p[0][0] = q, p[1][0] = a[1] * q;
-        for (int d = 2; d < 5; d++)
-            for (int k = 0; k < 3; k++) {
-                int raised = k - (d % 2 == 0); /* z times z raises the power of w */
-                p[d][k] = (raised < 0 ? 0 : a[d] * p[d - 1][raised]) - a[d] / a[d - 1] * p[d - 2][k];
-            }
-        for (int d = 0; d < 5; d++)
-            for (int k = d / 2; k >= 0; k--) v[count++] = p[d][k];
-        for (int d = 5; m + d < GENERATE_ORDER; d++) {
-            quad slope = a[d] * a[d - 1];
-            v[count++] = slope;
-            v[count++] = -slope / (a[d - 2] * a[d - 2]) - a[d] / a[d - 1];
-            v[count++] = -slope / (a[d - 2] * a[d - 3]);
-        }
+    generate_factors(factors);
+    for (int i = 0; i < count; i++) v[i] = factors[i];
+    for (int m = 1; m < GENERATE_ORDER; m += 2) {
+        const quad *p = factors + 3 * GENERATE_ORDER + (m - 1) * (2 * GENERATE_ORDER - 1 - m), *q = p + 2 * (GENERATE_ORDER - m) - 1;
+        v[count++] = p[0], v[count++] = p[1], v[count++] = q[0];
+        for (int l = m + 2; l < GENERATE_ORDER; l++)
+            for (int k = 0; k < 4; k++) v[count++] = k < 2 ? p[2 * (l - m) - 1 + k] : q[2 * (l - m) - 5 + k];
     }
     return count;
 }
