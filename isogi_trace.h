@@ -143,7 +143,7 @@
                 250 KB. isogi_trace_memory tells. PATHS needs another 4 MB, FEEDBACK 9 (TRANSFER: 32 KB more for each coefficient),
                 and while it works some 400 bytes (TRANSFER: 16 more for each coefficient), 2048 times that at once, and 4 for every
                 hit, for each texel of one cube (ISOGI_TRACE_CUBE), for all that were asked for when lazy, and for each probe: 50 to
-                200 MB where every texel of a cube has a surface. A request takes 12 bytes for each of 32768 points at a time.
+                300 MB where every texel of a cube has a surface. A request takes 12 bytes for each of 32768 points at a time.
                 Any allocation may fail: the call says ISOGI_NO_MEMORY, the texture stays as it was and can go on.
                 Stack use stays below 32 KB (compiled by clang, below 35), nearly all of it that of rays.
    Threads      Rays run on the context's threads. isogi_trace_sample and the other readers may run in any number of threads at a
