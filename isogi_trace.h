@@ -287,7 +287,8 @@ typedef struct isogi_trace_desc {
 
 /* FEEDBACK, unless lazy: texels along each edge of the cubes, counted from texel 0, that are baked one after the other, and the memory
    given back in between. All that texels lend each other (probes, passes over them, the filter) stays within a cube: what is baked of the
-   others, where and when, changes no bit, and parts of a bake have nothing to exchange. A box takes whole cubes. So cut where cubes end. */
+   others, where and when, changes no bit, and parts of a bake have nothing to exchange. A box takes whole cubes. So cut where cubes end;
+   a lattice of up to 64 texels an axis is one part. At the borders of cubes the filter sees one side alone. */
 enum { ISOGI_TRACE_CUBE = 64 };
 
 typedef struct isogi_trace isogi_trace;
