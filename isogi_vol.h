@@ -4658,6 +4658,7 @@ typedef struct __attribute__((aligned(32))) isogi_vol__clearing {
 typedef struct isogi_vol__descent {
     double origin[3], isovalue, step;
     int64_t cell; /* in which they begin; -1: not prepared */
+    int on_surface; /* whether they leave one there */
     const uint8_t *leaf;
     uint64_t held[ISOGI_VOL__NODE_LEVELS]; /* children on the way that can hold the surface, not counted backwards */
     isogi_vol__clearing clearing;
@@ -6511,7 +6512,7 @@ ISOGI_VOL__AVX512 static void isogi_vol__prepare_descent(isogi_vol__descent *d, 
    ring by ring of y and z. Bounds are widened by more than floats err by. way: of the rays, roughly; if they begin on a surface, bounds
    hold for the side to which it goes. Not inlined, for the sake of the stack. */
 ISOGI_VOL__AVX512 ISOGI_VOL__NOINLINE
-static void isogi_vol__look_round(isogi_vol__descent *d, const isogi_pyramid *p, const double way[3], int on_surface) {
+static void isogi_vol__look_round(isogi_vol__descent *d, const isogi_pyramid *p, const double way[3]) {
     enum { REACH = ISOGI_VOL__CLEARED };
     isogi_vol__clearing *const c = &d->clearing;
     const isogi_volume *v = &p->volume;
@@ -6536,10 +6537,10 @@ static void isogi_vol__look_round(isogi_vol__descent *d, const isogi_pyramid *p,
     error /= fabs(v->scale), c->value /= fabs(v->scale); /* from here on in raw voxels */
     most /= fabs(v->scale), least /= fabs(v->scale);
     c->sure = -1e-8 * (most - least) - error;
-    inside = on_surface ? slope[0] * way[0] + slope[1] * way[1] + slope[2] * way[2] > 0 : c->value > 0;
+    inside = d->on_surface ? slope[0] * way[0] + slope[1] * way[1] + slope[2] * way[2] > 0 : c->value > 0;
     if (!(most - least > 1e-30)) return; /* no denormal floats */
-    if (on_surface ? !(fabs(c->value) < -c->sure) : !(fabs(c->value) > error)) return;
-    c->value = on_surface ? 0 : error - fabs(c->value);
+    if (d->on_surface ? !(fabs(c->value) < -c->sure) : !(fabs(c->value) > error)) return;
+    c->value = d->on_surface ? 0 : error - fabs(c->value);
     sign = _mm256_castsi256_ps(_mm256_set1_epi32(inside == (v->scale > 0) ? INT32_MIN : 0)); /* -ffast-math would take -0 for 0 */
     for (k = 0; k < ISOGI_VOL__ROUND; k++)
         for (i = 0; i < ISOGI_VOL__ROUND; i++) {
@@ -6826,14 +6827,15 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE int isogi_vol__take_down(isogi_vol__batch *b
         isogi_vol__enter8(b, turn, s, seats, row, meets, lanes, (const double(*)[8])place, value, end, flip);
         return 1;
     }
-    if (turn->descent.cell < 0 || memcmp(turn->descent.origin, at, sizeof at) || memcmp(&turn->descent.isovalue, &value, sizeof value)) {
+    if (turn->descent.cell < 0 || memcmp(turn->descent.origin, at, sizeof at) || memcmp(&turn->descent.isovalue, &value, sizeof value) ||
+        turn->descent.on_surface != (b->starts != NULL)) {
         isogi_vol__prepare_descent(&turn->descent, b->pyramid, at, value);
-        turn->descent.clearing.side = -1;
+        turn->descent.on_surface = b->starts != NULL, turn->descent.clearing.side = -1;
         if (isogi_vol__are_many(b, number)) {
             double way[3];
 #pragma GCC unroll 3
             for (a = 0; a < 3; a++) way[a] = _mm512_mask_reduce_add_pd(lanes, dir[a]);
-            isogi_vol__look_round(&turn->descent, b->pyramid, way, b->starts != NULL);
+            isogi_vol__look_round(&turn->descent, b->pyramid, way);
         }
         b->work.blocks += (uint64_t)turn->levels; /* at most */
     }

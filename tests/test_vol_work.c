@@ -362,6 +362,44 @@ TEST(rays_of_one_place_hit_what_they_hit_alone_and_look_at_fewer_cells) {
         CHECK((double)whole.cells < 0.85 * (double)parts.cells, "%g cells, %g", (double)whole.cells, (double)parts.cells);
 }
 
+/* Rays that leave a surface and rays that merely begin in the same place, in one call: what is known of the sides of the ones says nothing
+   of the others, which cross the surface at once where rounding has put them beyond it. */
+TEST(rays_that_leave_a_surface_say_nothing_of_rays_that_begin_there) {
+    enum { SIDE = 16, EACH = 64, TURNS = 100 };
+    static float data[SIDE][SIDE][SIDE], dirs[3 * EACH][3];
+    static isogi_hit together[3 * EACH];
+    static uint8_t any[3 * EACH];
+    isogi_volume v = {.data = data, .type = ISOGI_F32, .size = {SIDE, SIDE, SIDE}};
+    isogi_context context = {.threads = 1, .force_path = 4};
+    isogi_pyramid *p;
+    test_random r = {59};
+    long hit = 0, wrong = 0, wrong_any = 0;
+    for (int z = 0; z < SIDE; z++)
+        for (int y = 0; y < SIDE; y++)
+            for (int x = 0; x < SIDE; x++) data[z][y][x] = (float)(sin(0.3 * x) + cos(0.2 * y) * sin(0.3 * z));
+    CHECK(isogi_vol_build(&p, &v, &context) == ISOGI_OK, "build");
+    for (int turn = 0; turn < TURNS; turn++) {
+        isogi_bundle b[3] = {{.isovalue = random_range(&r, -0.7, 0.7)}};
+        isogi_ray ray = {.origin = {8, 8, 8}, .isovalue = b[0].isovalue};
+        isogi_hit start, alone;
+        for (int a = 0; a < 3; a++) ray.dir[a] = (float)random_range(&r, -1, 1);
+        isogi_vol_intersect(p, &ray, 1, &start, NULL);
+        if (!start.side) continue;
+        for (int a = 0; a < 3; a++) b[0].origin[a] = start.cell[a] + start.local[a];
+        b[2] = b[1] = b[0], b[turn % 2 ? 0 : 1].start = b[2].start = &start;
+        for (int i = 0; i < 3 * EACH; i++)
+            for (int a = 0; a < 3; a++) dirs[i][a] = (float)random_range(&r, -1, 1);
+        isogi_vol_bundles(p, b, 3, (const float(*)[3])dirs, EACH, together, NULL);
+        isogi_vol_bundles_occluded(p, b, 3, (const float(*)[3])dirs, EACH, any, NULL);
+        for (int i = 0; i < 3 * EACH; i++) {
+            isogi_vol_bundle(p, &b[i / EACH], (const float(*)[3])dirs + i, 1, &alone, NULL);
+            hit += alone.side != 0, wrong += !same_hit(&together[i], &alone), wrong_any += any[i] != (alone.side != 0);
+        }
+    }
+    CHECK(hit > 4000 && !wrong && !wrong_any, "of %ld hits %ld are others, occlusions %ld", hit, wrong, wrong_any);
+    isogi_vol_free(p);
+}
+
 /* Any hit, where rays pass whole blocks of either side, and blocks that lie beyond the volume: of random balls in a volume, or of single
    voxels, at isovalues just above the least value and just below the largest. */
 TEST(any_hit_is_a_hit) {
