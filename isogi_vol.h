@@ -1694,15 +1694,13 @@ static isogi_result isogi_vol__fill_nodes(isogi_vol__build_job *job, const isogi
 struct isogi_vol__ways {
     int32_t lane[ISOGI_VOL__NODE_LEVELS][16], row[ISOGI_VOL__NODE_LEVELS][16]; /* 0 1 2 3 children of a level, in cells, along rows of four
                                                                                   lanes, and down those rows */
-    float across[4][16], down[4][16]; /* 4 i + 0 1 2 3 along rows of four lanes, and down those rows: a child's children by its digit i */
+    float within[64][16];                /* a child's children by its digits i: 4 i + 0 1 2 3 in a row of four lanes for each axis */
     uint8_t corner[8][8][64];            /* a leaf's voxels at the corners of its cells, and at the lowest one; axes counted backwards */
     uint8_t lowest[8][64], beside[8][64]; /* as in voxel; from the lowest to eight times each corner, counted backwards likewise */
-    float digits[64][4];                 /* 4 times a child's digits */
     int32_t inner[64][4];                /* the digits */
     uint8_t child[8][64], voxel[8][128]; /* children of nodes and voxels of leaves with axes counted backwards: bit a of the index */
     int32_t stride[ISOGI_VOL__NODE_LEVELS][4]; /* from a node's coordinates to the number of the 64 that hold its children, which are of
                                                   this level */
-    float sizes[8][4];                   /* children of a level, in cells */
     uint64_t first[ISOGI_VOL__NODE_LEVELS]; /* of those nodes, in bytes */
     float size[ISOGI_VOL__NODE_LEVELS];  /* of a child, in cells */
     float wide[ISOGI_VOL__NODE_LEVELS];  /* the same, with what rays alone widen it by on both sides */
@@ -1717,7 +1715,6 @@ struct isogi_vol__ways {
 
 ISOGI_VOL__COLD static void isogi_vol__set_ways(struct isogi_vol__ways *ways, const isogi_vol__node_level *level, int levels) {
     int i, f, a;
-    memset(ways->sizes, 0, sizeof ways->sizes);
     for (i = 0; i < levels; i++) {
         ways->stride[i][0] = 1, ways->stride[i][1] = (int32_t)level[i].parents[0], ways->stride[i][3] = 0;
         ways->stride[i][2] = (int32_t)(level[i].parents[0] * level[i].parents[1]);
@@ -1726,15 +1723,12 @@ ISOGI_VOL__COLD static void isogi_vol__set_ways(struct isogi_vol__ways *ways, co
     ways->reach = ISOGI_VOL__NEAR(levels);
     for (i = 0; i < ISOGI_VOL__NODE_LEVELS; i++) {
         for (a = 0; a < 16; a++) ways->lane[i][a] = (a & 3) << 2 * i, ways->row[i][a] = a >> 2 << 2 * i;
-        for (a = 0; a < 4; a++) ways->sizes[i][a] = (float)(1 << 2 * i);
         ways->size[i] = (float)(1 << 2 * i), ways->wide[i] = ways->size[i] + 2 * ISOGI_VOL__NEAR(levels);
         ways->above[i] = 0x0000ffffffffffffu & ~(0x000100010001u * (((uint64_t)4 << 2 * i) - 1)),
         ways->digit[i] = (uint64_t)0x000300030003u << 2 * i;
     }
     for (i = 0; i < 64; i++) {
-        ways->across[i >> 4][i & 15] = (float)(4 * (i >> 4) + (i & 3)), ways->down[i >> 4][i & 15] = (float)(4 * (i >> 4) + (i >> 2 & 3));
-        for (a = 0; a < 3; a++) ways->digits[i][a] = (float)(4 * (i >> 2 * a & 3));
-        ways->digits[i][3] = 0;
+        for (a = 0; a < 16; a++) ways->within[i][a] = a < 12 ? (float)(4 * (i >> (a >> 2 << 1) & 3) + (a & 3)) : 0;
         for (a = 0; a < 3; a++) ways->inner[i][a] = i >> 2 * a & 3;
         ways->inner[i][3] = 0;
     }
@@ -5610,11 +5604,9 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE void isogi_vol__open_turn(isogi_vol__turn *t
 typedef struct __attribute__((aligned(64))) isogi_vol__course {
     double origin[4], inverse[4];          /* as in a pool; the fourth is 0 */
     double sign[4], lead[4];               /* -0 on axes along which the ray falls, else 0; there 1, else 0 */
-    double start[4];                       /* origin, less 4 on axes along which the ray falls */
     double pace[4], rate[4];               /* units of time a cell, all positive, and cells a unit: on its fastest axis a ray takes 1 */
-    float step[8][4];                      /* time that children of a level take */
-    float enter[ISOGI_VOL__NODE_LEVELS][4], leave[ISOGI_VOL__NODE_LEVELS][4]; /* when the node of the next level is entered, and when its
-                                              first child of this level is left, both widened: by each axis for itself */
+    __m512 cell;                           /* time that a cell takes, in a row of four lanes for each axis */
+    __m512 enter[ISOGI_VOL__NODE_LEVELS];  /* when the node of the next level is entered, widened: by each axis for itself, likewise */
     double end;              /* where the ray ends, in these units */
     float last;              /* a little more */
     int64_t stop;            /* as in a pool */
@@ -5644,19 +5636,17 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE int isogi_vol__set_course(isogi_vol__course 
     const __m256d pace = _mm256_min_pd(_mm256_mul_pd(_mm256_andnot_pd(minus, inverse), most), _mm256_set1_pd(1e30));
     const __m128 per = _mm256_cvtpd_ps(pace), at = _mm256_cvtpd_ps(start), reach = _mm_set1_ps(ways->reach);
     const __m128 enter = _mm_mul_ps(_mm_sub_ps(_mm_sub_ps(_mm_setzero_ps(), reach), at), per);
-    const __m512 steps = _mm512_broadcast_f32x4(per);
+    const __m512i rows = _mm512_setr_epi32(0, 0, 0, 0, 1, 1, 1, 1, 2, 2, 2, 2, 3, 3, 3, 3);
     if (!(w->end > 1e-150) || !(w->end < 1e150)) return 0;
     c->level = isogi_vol__quantise_isovalue(p, w->isovalue, &c->low, &c->high);
     c->octant = fall, c->flip = (int)(3 * _pdep_u32(fall, 0x15));
     c->entry_axis = w->entry_axis, c->cells = 0;
     memcpy(&c->stop, &w->end, sizeof c->stop), c->stop |= 3;
     _mm256_store_pd(c->origin, origin), _mm256_store_pd(c->inverse, inverse), _mm256_store_pd(c->sign, sign);
-    _mm256_store_pd(c->start, _mm256_mask_sub_pd(origin, fall, origin, _mm256_set1_pd(4)));
     _mm256_store_pd(c->lead, _mm256_maskz_mov_pd(fall, _mm256_set1_pd(1)));
     _mm256_store_pd(c->pace, pace), _mm256_store_pd(c->rate, _mm256_div_pd(size, most));
-    _mm512_storeu_ps(c->step[0], _mm512_mul_ps(steps, _mm512_loadu_ps(ways->sizes[0])));
-    _mm512_storeu_ps(c->step[4], _mm512_mul_ps(steps, _mm512_loadu_ps(ways->sizes[4])));
-    _mm_store_ps(c->enter[top], enter), _mm_store_ps(c->leave[top], _mm_fmadd_ps(per, _mm_set1_ps(ways->wide[top]), enter));
+    c->cell = _mm512_permutexvar_ps(rows, _mm512_castps128_ps512(per));
+    c->enter[top] = _mm512_permutexvar_ps(rows, _mm512_castps128_ps512(enter));
     c->end = isogi_vol__min(w->end * _mm256_cvtsd_f64(most), 1e30);
     c->last = (float)(c->end * 1.000001);
     return 1;
@@ -5669,32 +5659,26 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE __m512 isogi_vol__layers16(__m512i corner, i
     return _mm512_cvtepi32_ps(_mm512_add_epi32(first, _mm512_load_si512(layer)));
 }
 
-/* Which children of a node the ray passes or comes near, in its own order; the node is child `child` of one whose times are known.
-   Rows of four lanes stand for pairs of layers, of x and y, x and z, y and z. It enters no child before it begins, nor leaves one
-   after it ends: one bound on each side of every axis does. */
-ISOGI_VOL__AVX512 ISOGI_VOL__INLINE uint64_t isogi_vol__way(const isogi_vol__course *c, const struct isogi_vol__ways *ways, int level,
+/* Which children of a node the ray passes or comes near, in its own order; the node is child `child` of one whose times are known. By
+   every two axes: rows of four lanes are layers of one of them, each lane in a row a layer of the other. It enters no child before it
+   begins, nor leaves one after it ends: one bound on each side of every axis does. Above leaves, the node's own times are kept. */
+ISOGI_VOL__AVX512 ISOGI_VOL__INLINE uint64_t isogi_vol__way(isogi_vol__course *c, const struct isogi_vol__ways *ways, int level,
                                                             int child) {
-    const __m512 zero = _mm512_setzero_ps(), last = _mm512_set1_ps(c->last);
-    const __m512 x = _mm512_load_ps(ways->across[child & 3]), y = _mm512_load_ps(ways->down[child >> 2 & 3]),
-                 y_lane = _mm512_load_ps(ways->across[child >> 2 & 3]), z = _mm512_load_ps(ways->down[child >> 4]);
-#define ISOGI_VOL__WHEN(layer, side, a) _mm512_fmadd_ps(layer, _mm512_set1_ps(c->step[level][a]), _mm512_set1_ps(c->side[level][a]))
-    const __m512 x_in = _mm512_max_ps(ISOGI_VOL__WHEN(x, enter, 0), zero), x_out = _mm512_min_ps(ISOGI_VOL__WHEN(x, leave, 0), last);
-    const __m512 y_in = _mm512_max_ps(ISOGI_VOL__WHEN(y, enter, 1), zero), y_out = _mm512_min_ps(ISOGI_VOL__WHEN(y, leave, 1), last);
-    const __m512 z_in = ISOGI_VOL__WHEN(z, enter, 2), z_out = ISOGI_VOL__WHEN(z, leave, 2);
-    const __mmask16 xy = _mm512_cmp_ps_mask(_mm512_max_ps(x_in, y_in), _mm512_min_ps(x_out, y_out), _CMP_LE_OQ),
-                    xz = _mm512_cmp_ps_mask(_mm512_max_ps(x_in, z_in), _mm512_min_ps(x_out, z_out), _CMP_LE_OQ),
-                    yz = _mm512_cmp_ps_mask(_mm512_max_ps(ISOGI_VOL__WHEN(y_lane, enter, 1), z_in),
-                                            _mm512_min_ps(ISOGI_VOL__WHEN(y_lane, leave, 1), z_out), _CMP_LE_OQ);
-#undef ISOGI_VOL__WHEN
+    const __m512i down = _mm512_setr_epi32(4, 4, 4, 4, 5, 5, 5, 5, 6, 6, 6, 6, 7, 7, 7, 7), four = _mm512_set1_epi32(4);
+    const __m512 step = _mm512_mul_ps(c->cell, _mm512_set1_ps(ways->size[level]));
+    const __m512 times = _mm512_fmadd_ps(_mm512_load_ps(ways->within[child]), step, c->enter[level]);
+    const __m512 leave = _mm512_min_ps(_mm512_fmadd_ps(c->cell, _mm512_set1_ps(ways->wide[level]), times), _mm512_set1_ps(c->last));
+    const __m512 enter = _mm512_max_ps(times, _mm512_setzero_ps());
+    const __m512 x_in = _mm512_shuffle_f32x4(enter, enter, 0), x_out = _mm512_shuffle_f32x4(leave, leave, 0);
+    const __m512 y_in = _mm512_permutexvar_ps(down, enter), y_out = _mm512_permutexvar_ps(down, leave);
+    const __m512 y_in_row = _mm512_shuffle_f32x4(enter, enter, 0x55), y_out_row = _mm512_shuffle_f32x4(leave, leave, 0x55);
+    const __m512 z_in = _mm512_permutexvar_ps(_mm512_add_epi32(down, four), enter),
+                 z_out = _mm512_permutexvar_ps(_mm512_add_epi32(down, four), leave);
+    const __mmask16 xy = _mm512_cmp_ps_mask(x_in, y_out, _CMP_LE_OQ) & _mm512_cmp_ps_mask(y_in, x_out, _CMP_LE_OQ);
+    const __mmask16 xz = _mm512_cmp_ps_mask(x_in, z_out, _CMP_LE_OQ) & _mm512_cmp_ps_mask(z_in, x_out, _CMP_LE_OQ);
+    const __mmask16 yz = _mm512_cmp_ps_mask(y_in_row, z_out, _CMP_LE_OQ) & _mm512_cmp_ps_mask(z_in, y_out_row, _CMP_LE_OQ);
+    if (level) c->enter[level - 1] = _mm512_permute_ps(times, 0);
     return xy * 0x0001000100010001u & _pdep_u64(xz, 0x000f000f000f000fu) * 0x1111u & _pdep_u64(yz, 0x1111111111111111u) * 0xfu;
-}
-
-/* And the times of the node itself, for its children's sake. */
-ISOGI_VOL__AVX512 ISOGI_VOL__INLINE void isogi_vol__enter_node(isogi_vol__course *c, const struct isogi_vol__ways *ways, int level,
-                                                               int child) {
-    const __m128 enter = _mm_fmadd_ps(_mm_load_ps(ways->digits[child]), _mm_load_ps(c->step[level]), _mm_load_ps(c->enter[level]));
-    const __m128 wide = _mm_mul_ps(_mm_load_ps(c->step[0]), _mm_set1_ps(ways->wide[level - 1]));
-    _mm_store_ps(c->enter[level - 1], enter), _mm_store_ps(c->leave[level - 1], _mm_add_ps(enter, wide));
 }
 
 /* Which children of a node can hold the surface, in the ray's order. */
@@ -5928,7 +5912,6 @@ ISOGI_VOL__AVX512 static int isogi_vol__walk_one(isogi_vol__walk *w, isogi_hit *
             number = _mm_add_epi32(number, _mm_shuffle_epi32(number, 0x4e));
             number = _mm_add_epi32(number, _mm_shuffle_epi32(number, 0xb1));
             children[n] = (const uint8_t *)p->nodes + ways->first[n - 1] + ((size_t)(uint32_t)_mm_cvtsi128_si32(number) << 13);
-            isogi_vol__enter_node(&c, ways, n, child);
             if (n == 1) {
                 found = isogi_vol__walk_leaves(w, &c, children[1], mask, place[1], hit);
                 if (found) break;
