@@ -5011,10 +5011,12 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE __m256i isogi_vol__load_each(const void *at)
     return each;
 }
 
-/* Loads that repeat a number need no shuffle, and any port blends. */
+/* Loads that repeat a number need no shuffle, and any port blends. Strides may be negative: as offsets they wrap round. */
 ISOGI_VOL__AVX512 ISOGI_VOL__INLINE __m256i isogi_vol__load_four(const char *const *at, size_t offset) {
-    const __m256i low = _mm256_blend_epi32(isogi_vol__load_each(at[0] + offset), isogi_vol__load_each(at[1] + offset), 0xcc);
-    const __m256i high = _mm256_blend_epi32(isogi_vol__load_each(at[2] + offset), isogi_vol__load_each(at[3] + offset), 0xcc);
+#define ISOGI_VOL__EACH(k) isogi_vol__load_each((const void *)((uintptr_t)at[k] + offset))
+    const __m256i low = _mm256_blend_epi32(ISOGI_VOL__EACH(0), ISOGI_VOL__EACH(1), 0xcc);
+    const __m256i high = _mm256_blend_epi32(ISOGI_VOL__EACH(2), ISOGI_VOL__EACH(3), 0xcc);
+#undef ISOGI_VOL__EACH
     return _mm256_blend_epi32(low, high, 0xf0);
 }
 

@@ -300,6 +300,10 @@ TEST(rays_of_one_place_hit_what_they_hit_alone_and_look_at_fewer_cells) {
         if (bytes == 1) v.scale = 1.0 / 60, v.bias = -127.0 / 60;
         for (int a = 0; a < 3; a++) v.spacing[a] = turn % 3 ? 1 : random_range(&r, 0.3, 2);
         v.data = data;
+        if (turn % 5 == 3) { /* rows and slices backwards */
+            v.stride[0] = 4, v.stride[1] = -4 * (ptrdiff_t)v.size[0], v.stride[2] = v.stride[1] * (ptrdiff_t)v.size[1];
+            v.data = (const float *)(const void *)data + voxels - v.size[0];
+        }
         CHECK(isogi_vol_build(&p, &v, &context) == ISOGI_OK && isogi_vol_build(&plain, &v, &slow) == ISOGI_OK, "build");
         for (int pack = 0; pack < PACKS; pack++) {
             const int kind = pack % 3; /* from a surface, onward from it, from near it */
@@ -397,6 +401,45 @@ TEST(rays_that_leave_a_surface_say_nothing_of_rays_that_begin_there) {
         }
     }
     CHECK(hit > 4000 && !wrong && !wrong_any, "of %ld hits %ld are others, occlusions %ld", hit, wrong, wrong_any);
+    isogi_vol_free(p);
+}
+
+/* In a linear field slopes are bounds that are reached: rays of one place whose hits lie just before, or just behind, the planes up to
+   which they pass the cells at once. Every isovalue is that of such a point of the first ray. */
+TEST(rays_of_one_place_hit_a_plane_just_before_they_leave_the_cells_round_it) {
+    enum { SIDE = 16, EACH = 64, TURNS = 4000 };
+    static float data[SIDE][SIDE][SIDE], dirs[EACH][3];
+    static isogi_hit together[EACH];
+    isogi_volume v = {.data = data, .type = ISOGI_F32, .size = {SIDE, SIDE, SIDE}};
+    isogi_context context = {.threads = 1, .force_path = 4};
+    const double slope[3] = {0.7, -0.9, 0.37};
+    isogi_pyramid *p;
+    test_random r = {61};
+    long hit = 0, wrong = 0;
+    for (int z = 0; z < SIDE; z++)
+        for (int y = 0; y < SIDE; y++)
+            for (int x = 0; x < SIDE; x++) data[z][y][x] = (float)(slope[0] * x + slope[1] * y + slope[2] * z);
+    CHECK(isogi_vol_build(&p, &v, &context) == ISOGI_OK, "build");
+    for (int turn = 0; turn < TURNS; turn++) {
+        const double near = (turn % 2 ? 1 : -1) * pow(10, random_range(&r, -9, -2));
+        isogi_bundle b = {.isovalue = 0};
+        double out = 1e30;
+        for (int a = 0; a < 3; a++) b.origin[a] = random_range(&r, 4, 9);
+        for (int i = 0; i < EACH; i++)
+            for (int a = 0; a < 3; a++) dirs[i][a] = (float)random_range(&r, -1, 1);
+        for (int a = 0; a < 3; a++) { /* to the planes behind 1 to 3 cells */
+            const double d = (double)dirs[0][a], plane = floor(b.origin[a]) + (d > 0 ? 1 + turn % 3 : -(turn % 3));
+            out = fmin(out, (plane - b.origin[a]) / d);
+        }
+        for (int a = 0; a < 3; a++) b.isovalue += slope[a] * (b.origin[a] + out * (1 + near) * (double)dirs[0][a]);
+        isogi_vol_bundle(p, &b, (const float(*)[3])dirs, EACH, together, NULL);
+        for (int i = 0; i < EACH; i += i ? 9 : 1) {
+            isogi_hit alone;
+            isogi_vol_bundle(p, &b, (const float(*)[3])dirs + i, 1, &alone, NULL);
+            hit += alone.side != 0, wrong += !same_hit(&together[i], &alone);
+        }
+    }
+    CHECK(hit > TURNS && !wrong, "of %ld hits %ld are others", hit, wrong);
     isogi_vol_free(p);
 }
 
