@@ -163,17 +163,19 @@ TEST(probes_are_counted) {
     scene_free(&s);
 }
 
-/* Albedo 1 in a closed cavity with a light inside: true light is infinite. It ends, and says so; an open one is not accused. */
+/* Albedo 1 in a closed cavity with a light inside: true light is infinite. It ends, and says so; an open one is not accused, nor is one
+   that loses a 1400th at each reflection, whose steps fall by less than a third in 500 passes. */
 TEST(endless_light_is_reported) {
     double q[5] = {15.5, 15.5, 15.5, 8, 13}, open[5] = {16, 15, 16, 22.3, 12};
     isogi_albedo_point glow[1] = {{0, {1, 1, 1}}};
-    for (int variant = 0; variant < 3; variant++) {
-        scene s = scene_make(32, 32, 32, NULL, variant < 2 ? shell : pit, variant < 2 ? q : open);
-        isogi_trace_desc d = feedback(&s, variant == 1 ? 0.99f : 1, -1, 8);
+    const float albedo[4] = {1, 0.99f, 1, 0.9993f};
+    for (int variant = 0; variant < 4; variant++) {
+        scene s = scene_make(32, 32, 32, NULL, variant == 2 ? pit : shell, variant == 2 ? open : q);
+        isogi_trace_desc d = feedback(&s, albedo[variant], -1, 8);
         isogi_trace *t = NULL;
         isogi_trace_report report;
         float point[1][3] = {{7.6f, 15.5f, 15.5f}}, e[1][3], error[1];
-        if (variant < 2) d.emission_points = glow, d.emission_count = 1, d.lighting.env.sh = NULL, d.lighting.env.sh_order = 0;
+        if (variant != 2) d.emission_points = glow, d.emission_count = 1, d.lighting.env.sh = NULL, d.lighting.env.sh_order = 0;
         if (variant == 2) point[0][0] = 16, point[0][1] = 3.1f, point[0][2] = 16;
         d.lazy = 1;
         CHECK(isogi_trace_create(&t, &d, NULL) == ISOGI_OK && isogi_trace_request(t, (const float(*)[3])point, 1) == ISOGI_OK &&
@@ -184,8 +186,14 @@ TEST(endless_light_is_reported) {
         CHECK(report.diverges == (variant == 0), "variant %d: diverges %d, E %g", variant, report.diverges, (double)e[0][1]);
         CHECK((error[0] > 1e30f) == (variant == 0) && e[0][1] > 0 && e[0][1] < 1e30f, "variant %d: E %g, error %g", variant,
               (double)e[0][1], (double)error[0]);
-        if (variant == 1) CHECK(fabs((double)e[0][1] - 100 * PI) < 0.02 * 100 * PI, "R 0.99: E %g", (double)e[0][1]);
+        if (variant & 1)
+            CHECK(fabs((double)e[0][1] * (1 - (double)albedo[variant]) - PI) < 0.02 * PI, "R %g: E %g", (double)albedo[variant],
+                  (double)e[0][1]);
         isogi_trace_free(t), t = NULL;
+        if (variant == 3) { /* as variant 1, in longer time */
+            scene_free(&s);
+            continue;
+        }
         d.lazy = 0, d.lattice[0] = ISOGI_TRACE_CUBE + 6, d.lattice[1] = d.lattice[2] = 8; /* the last cube lies outside the shell */
         CHECK(isogi_trace_create(&t, &d, NULL) == ISOGI_OK && isogi_trace_step(t, 0, NULL) == ISOGI_OK, "variant %d", variant);
         isogi_trace_status(t, &report);
