@@ -400,7 +400,8 @@ ISOGI_API int isogi_vol_next_interval(const isogi_pyramid *pyramid, const isogi_
                                       double from, double interval[2], isogi_counters *counters);
 
 /* Rays that share everything but the direction: what gathering light at a point needs. The same bits as rays of their own, but for rays
-   that begin or end in a voxel which has the isovalue itself, as they do in batches: what is decided there by rounding may differ. */
+   that begin or end in a voxel which has the isovalue itself, as they do in batches: what is decided there by rounding may differ. And but
+   for starts a little off the surface, which a ray of its own may meet again right behind them (isogi_vol_continue), and a bundle not. */
 typedef struct isogi_bundle {
     const isogi_hit *start; /* the rays leave from this hit as in isogi_vol_continue, and origin and tmin are not read; NULL: from origin */
     double origin[3];
