@@ -3282,20 +3282,19 @@ static isogi_result isogi_trace__bake_batch(isogi_trace *t, size_t count) {
 /* What is gathered at one point: a texel (brick set) or a probe. Sums are over samples, in units of irradiance / pi but for light. */
 typedef struct isogi_trace__node {
     uint64_t cell;   /* probe: key of its cell; first what is read where a probe is looked for */
-    float alike;     /* probe: tells the light of isovalues that differ from its own by less than this share of the volume's range */
     double isovalue;
     float normal[3];
+    float alike;     /* probe: tells the light of isovalues that differ from its own by less than this share of the volume's range */
     isogi_hit place; /* where */
     uint64_t key;    /* probe: of its random numbers */
-    signed char from;     /* side of the surface: 1 low, -1 high */
-    isogi_trace__brick *brick; /* from here on: what is gathered, see isogi_trace__node_clear */
-    size_t texel[3];
-    uint32_t slot, samples, light_samples, hits;
-    float albedo[3];
+    isogi_trace__brick *brick; /* texel: where its light goes; NULL of probes */
+    uint32_t texel[3], slot;
+    uint32_t samples, light_samples, hits;
+    signed char from; /* side of the surface: 1 low, -1 high */
+    float albedo[3], error;
     double steady[3];     /* irradiance by lights without extent */
     double light[3], light_spread;   /* by other lights; sum of squared deviations of its luminance */
     double bright[3], bright_spread; /* by directions drawn by brightness */
-    float error;
     double square, bounce_square;    /* squared luminance of rays that escaped, and of those that hit */
 } isogi_trace__node;
 
@@ -3699,21 +3698,15 @@ static void isogi_trace__heads_new(isogi_trace__set *s) {
     }
 }
 
-/* A node without samples: all but what and where it is, and its stage. */
-static void isogi_trace__node_clear(const isogi_trace *t, isogi_trace__set *s, size_t i) {
+/* A new node: without a place and without samples; but for its stage. */
+static isogi_trace__node *isogi_trace__node_begin(const isogi_trace *t, isogi_trace__set *s, size_t i) {
     isogi_trace__node *n = isogi_trace__node_at(s, i);
-    size_t v = (size_t)t->values, begin = offsetof(isogi_trace__node, brick);
-    memset((char *)n + begin, 0, sizeof *n - begin);
+    size_t v = (size_t)t->values;
+    memset(n, 0, sizeof *n);
+    n->from = (signed char)(t->scene.high ? -1 : 1);
     memset(isogi_trace__values_at(s, i, ISOGI_TRACE__DIRECT_VALUES, v), 0, v * sizeof(float));
     memset(isogi_trace__values_at(s, i, ISOGI_TRACE__BOUNCE_VALUES, v), 0, v * sizeof(float));
     memset(isogi_trace__light_at(s, i, v), 0, v * sizeof(float));
-}
-
-/* A new node. */
-static isogi_trace__node *isogi_trace__node_begin(const isogi_trace *t, isogi_trace__set *s, size_t i) {
-    isogi_trace__node *n = isogi_trace__node_at(s, i);
-    memset(n, 0, offsetof(isogi_trace__node, brick));
-    n->from = (signed char)(t->scene.high ? -1 : 1);
     return n;
 }
 
@@ -3898,7 +3891,6 @@ static void isogi_trace__probe_finish(const isogi_trace *t, size_t i, const isog
     n->place = c->hit, n->cell = n->key = c->key, n->from = c->from, n->alike = c->alike;
     for (a = 0; a < c->search.tries; a++) n->key = isogi_trace__key(n->key, 1);
     memcpy(n->normal, c->normal, sizeof n->normal);
-    isogi_trace__node_clear(t, set, i);
     isogi_trace_albedo(&t->scene.desc, n->isovalue, n->albedo);
     if (t->scene.desc.material) {
         for (a = 0; a < 3; a++) grid[a] = n->place.cell[a] + n->place.local[a];
@@ -4204,7 +4196,7 @@ static int isogi_trace__span_site(isogi_trace__cast *c, uint32_t k) {
     isogi_trace__site *site = &c->site[k];
     uint64_t seed = t->scene.desc.seed;
     if (n->brick) {
-        const size_t *x = n->texel, *l = t->lattice;
+        const size_t x[3] = {n->texel[0], n->texel[1], n->texel[2]}, *l = t->lattice;
         if (!(isogi_trace__dot(n->normal, n->normal) > 0)) return 0;
         memcpy(site->normal, n->normal, sizeof site->normal);
         site->key = isogi_trace__key(isogi_trace__key(seed, 2),
@@ -4711,12 +4703,14 @@ static double isogi_trace__mean_variance(double sum, double square, double n) {
 static void isogi_trace__guide_begin(const isogi_trace *t, const isogi_trace__node *n, isogi_trace__guide *g) {
     const isogi_trace_desc *d = &t->scene.desc;
     double point[3], slope[3];
+    size_t texel[3];
     int a;
     isogi_trace__slopes(&t->scene, &n->place, slope);
     for (a = 0; a < 3; a++) slope[a] *= t->step[a];
     g->isovalue = n->isovalue, g->steep = isogi_trace__magnitude(slope);
     if (!d->albedo_count && !d->emission_count && !d->material) return;
-    isogi_trace__texel_grid(t, n->texel, point);
+    for (a = 0; a < 3; a++) texel[a] = n->texel[a];
+    isogi_trace__texel_grid(t, texel, point);
     isogi_vol_to_world(t->scene.pyramid, point, point);
     isogi_trace_material(d, n->isovalue, point, g->albedo, g->glow);
 }
@@ -5404,14 +5398,14 @@ static void isogi_trace__place_task(void *arg, size_t task) {
         size_t count = end - i < ISOGI_TRACE__TEXELS ? end - i : ISOGI_TRACE__TEXELS, texel[ISOGI_TRACE__TEXELS][3], k;
         isogi_trace__site site[ISOGI_TRACE__TEXELS];
         uint8_t valid[ISOGI_TRACE__TEXELS];
+        int a;
         for (k = 0; k < count; k++) {
             const size_t number = job->first + i + k,
                          where = set->chunks[number / ISOGI_TRACE__CHUNK].where[number % ISOGI_TRACE__CHUNK];
             isogi_trace__node *n = isogi_trace__node_begin(t, set, number);
-            isogi_trace__node_clear(t, set, number);
             n->brick = t->bricks[where / ISOGI_TRACE__TEXELS], n->slot = (uint32_t)(where % ISOGI_TRACE__TEXELS);
-            isogi_trace__texel_of(t, where / ISOGI_TRACE__TEXELS, n->slot, n->texel);
-            memcpy(texel[k], n->texel, sizeof texel[k]);
+            isogi_trace__texel_of(t, where / ISOGI_TRACE__TEXELS, n->slot, texel[k]);
+            for (a = 0; a < 3; a++) n->texel[a] = (uint32_t)texel[k][a];
         }
         isogi_trace__texel_sites(t, (const size_t(*)[3])texel, count, site, valid);
         for (k = 0; k < count; k++) {
