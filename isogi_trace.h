@@ -5439,16 +5439,16 @@ static uint64_t isogi_trace__place(isogi_trace *t, uint64_t limit) {
 static isogi_result isogi_trace__nodes_of(isogi_trace *t, size_t index, int even) {
     isogi_trace__set *set = &t->feedback->texels;
     isogi_trace__brick *brick = t->bricks[index];
-    uint64_t wanted = isogi_trace__all_to_do(brick), left;
+    uint64_t wanted = isogi_trace__all_to_do(brick), left = even ? wanted & 0x0000050500000505u : wanted;
     uint32_t slot;
     if (isogi_trace__brick_hold(t, brick, wanted) != ISOGI_OK) return ISOGI_NO_MEMORY;
-    if (!brick->node && wanted) {
+    if (isogi_trace__set_reserve(t, set, isogi_trace__bits(wanted), 0) != ISOGI_OK) return ISOGI_NO_MEMORY;
+    if (!brick->node && left) { /* given back with its nodes: not without any */
         brick->node = (uint32_t *)isogi_allocate(&t->context, ISOGI_TRACE__TEXELS, sizeof(uint32_t));
         if (!brick->node) return ISOGI_NO_MEMORY;
         memset(brick->node, 0, ISOGI_TRACE__TEXELS * sizeof(uint32_t));
     }
-    if (isogi_trace__set_reserve(t, set, isogi_trace__bits(wanted), 0) != ISOGI_OK) return ISOGI_NO_MEMORY;
-    for (left = even ? wanted & 0x0000050500000505u : wanted; left; left &= left - 1) {
+    for (; left; left &= left - 1) {
         slot = isogi_trace__lowest_bit(left);
         memset(isogi_trace__stage_at(set, set->count), 0, sizeof(isogi_trace__stage));
         set->chunks[set->count / ISOGI_TRACE__CHUNK].where[set->count % ISOGI_TRACE__CHUNK] = ISOGI_TRACE__TEXELS * index + slot;

@@ -480,6 +480,31 @@ TEST(feedback_at_work_takes_a_block) {
     scene_free(&s);
 }
 
+/* A cube at work gets a block that holds all of it while the next one is still to be baked. In the bricks at low x only texels of odd x
+   have a surface: in the first of two rounds over the cube's bricks these have nothing to bake. */
+TEST(feedback_at_work_takes_a_cube) {
+    double q[2] = {0.5, 3};
+    scene s = scene_make(8, 8, ISOGI_TRACE_CUBE + 4, NULL, gyroid_in_air, q);
+    isogi_trace_desc d = store_desc(&s, ISOGI_TRACE_IRRADIANCE, 0, 1), first = d;
+    d.method = first.method = ISOGI_TRACE_FEEDBACK, first.box_end[0] = first.box_end[1] = 8, first.box_end[2] = ISOGI_TRACE_CUBE;
+    isogi_trace *whole = baked(&d), *cube = baked(&first), *part = NULL;
+    uint8_t *a, *b, *c;
+    size_t size_a, size_b, size_c;
+    a = save_now(whole, &size_a), b = save_now(cube, &size_b);
+    CHECK(size_b > size_a / 2 && size_b < size_a, "%d of %d bytes", (int)size_b, (int)size_a);
+    for (uint64_t rays = 1; rays < 2000; rays += rays) {
+        double remaining = 1;
+        isogi_trace_create(&part, &d, NULL);
+        isogi_trace_step(part, rays, &remaining);
+        CHECK(remaining > 0 && isogi_trace_load(part, b, size_b) == ISOGI_OK, "after %d rays", (int)rays);
+        CHECK(isogi_trace_step(part, 0, &remaining) == ISOGI_OK && remaining <= 0, "after %d rays: remaining %g", (int)rays, remaining);
+        c = save_now(part, &size_c);
+        CHECK(size_a == size_c && !memcmp(a, c, size_a), "after %d rays: %d and %d bytes", (int)rays, (int)size_a, (int)size_c);
+        isogi_trace_free(part), free(c);
+    }
+    isogi_trace_free(whole), isogi_trace_free(cube), free(a), free(b), scene_free(&s);
+}
+
 /* A block of one part of a volume is none of another part, though its voxels are the same. */
 TEST(blocks_of_other_chunks_are_refused) {
     double q[4] = {4, 4, 4, 3};
