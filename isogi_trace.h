@@ -5280,9 +5280,10 @@ static size_t isogi_trace__phase_tasks(const isogi_trace__feedback *f) {
 /* Rays that take as long as one of them: one for 64 hits, for 8 nodes that are read in passing, for one that is filtered, for 2 that
    are given back. */
 static uint64_t isogi_trace__phase_cost(const isogi_trace__feedback *f, size_t task) {
-    const isogi_trace__segment *s = f->phase == ISOGI_TRACE__PASS ? f->probes.segments + task : f->texels.segments + f->segment;
-    if (f->phase == ISOGI_TRACE__PASS) return s->entries / 8 + s->hits / 64 + 1;
-    if (f->phase == ISOGI_TRACE__BOUNCE) return ISOGI_TRACE__SWEEP / 8 + s->hits * ISOGI_TRACE__SWEEP / s->entries / 64;
+    const isogi_trace__segment *s = f->phase == ISOGI_TRACE__PASS ? f->probes.segments : f->texels.segments; /* NULL without hits */
+    if (f->phase == ISOGI_TRACE__PASS) return s[task].entries / 8 + s[task].hits / 64 + 1;
+    if (f->phase == ISOGI_TRACE__BOUNCE)
+        return ISOGI_TRACE__SWEEP / 8 + s[f->segment].hits * ISOGI_TRACE__SWEEP / s[f->segment].entries / 64;
     if (f->phase == ISOGI_TRACE__PUBLISH) return ISOGI_TRACE__SWEEP / 2;
     return f->phase == ISOGI_TRACE__FORGET ? ISOGI_TRACE__SWEEP / 2 : ISOGI_TRACE__SWEEP / 8;
 }
