@@ -89,13 +89,13 @@
      lost (a white surface under a white sky stays white). bounces = -1: Russian roulette from the third reflection on.
      So with ISOGI_TRACE_PATHS, the reference. By default (FEEDBACK) a path ends at its first hit and takes the light there from a
      probe: a point near by on the same isosurface or one that runs closely beside it (up to .15 voxels by the gradient), in cells of
-     2 voxels (of the shortest edge, but half a voxel along every axis at least) or an eighth of the ray's length, whose own
-     hemisphere is gathered once in the same way; passes over the probes then bring all reflections without rays. What
-     the sky and reflections bring is read from a plane, fitted to the light of texels up to three away that face the same way and whose
-     isosurfaces run close to each other, as far as their noise could explain the difference (with one or two samples, of which none is
-     known, all of them; from four on in two rounds: the second compares what the first has smoothed); their samples are well spread
-     together. Lights are not filtered, so that their shadows stay sharp
-     (desc.unfiltered: nothing is). TRANSFER is not filtered at all, and takes more samples for it. Probes cost accuracy: half a per
+     2 voxels (of the shortest edge, but half a voxel along every axis at least; where lights throw shadows less with more than 8
+     samples: 1.4 with 16, 1 from 32 on) or an eighth of the ray's length, whose own hemisphere is gathered once in the same way;
+     passes over the probes then bring all reflections without rays. What the sky and reflections bring is read from a plane, fitted to
+     the light of texels up to three away that face the same way and whose isosurfaces run close to each other, as far as their noise
+     could explain the difference (with one or two samples, of which none is known, all of them; from four on in two rounds: the second
+     compares what the first has smoothed); their samples are well spread together. Lights are not filtered, so that their shadows stay
+     sharp (desc.unfiltered: nothing is). TRANSFER is not filtered at all, and takes more samples for it. Probes cost accuracy: half a per
      cent of the mean and 1.8 % at a point in narrow channels of albedo 0.8 (test_trace_bake --long prints it). Lazy and adaptive bakes
      take samples in blocks of 4, 16, 64, ... and every other texel along each axis first: soon every lookup has a value.
      A hit from within (only through an open border can a ray get there) is a surface too, with its normal turned.
@@ -143,8 +143,9 @@
                 wanted texel alone 2 + 12 bytes of irradiance, 2 + 2 order^2 channels of transfer, less in other formats; and
                 250 KB. isogi_trace_memory tells. PATHS needs another 4 MB, FEEDBACK 9 (TRANSFER: 32 KB more for each coefficient),
                 and while it works some 400 bytes (TRANSFER: 16 more for each coefficient), 2048 times that at once, and 4 for every
-                hit, for each texel of one cube (ISOGI_TRACE_CUBE), for all that were asked for when lazy, and for each probe: 50 to
-                300 MB where every texel of a cube has a surface. A request takes 12 bytes for each of 32768 points at a time.
+                hit, for each texel of one cube (ISOGI_TRACE_CUBE), for all that were asked for when lazy, and for each probe: where
+                every texel of a cube has a surface 190 MB with 1 sample, 460 with 64, and 740 where there are lights. A request takes
+                12 bytes for each of 32768 points at a time.
                 Any allocation may fail: the call says ISOGI_NO_MEMORY, the texture stays as it was and can go on.
                 Stack use stays below 32 KB (compiled by clang, below 35), nearly all of it that of rays.
    Threads      Rays run on the context's threads. isogi_trace_sample and the other readers may run in any number of threads at a
@@ -309,7 +310,8 @@ ISOGI_API isogi_result isogi_trace_request(isogi_trace *trace, const float (*poi
    ISOGI_NO_MEMORY leave a texture that can be read and stepped on. Not at the same time as any other call on this texture.
    FEEDBACK: when a block of samples is complete passes without rays carry the light over all probes to all texels at work; they are cut
    into pieces, too, as is what comes before the first ray and after the last one, and counted as the rays that take about as long.
-   Meanwhile what a request adds has to wait. */
+   Meanwhile what a request adds has to wait. To the end, and where no progress callback can stop it, that is done once, after the last
+   block (unless desc.error may end a texel before): a tenth less time, the same bits. */
 ISOGI_API isogi_result isogi_trace_step(isogi_trace *trace, uint64_t max_rays, double *remaining);
 
 /* Lookup (desc.lookup) among the texels that are valid and computed. irradiance[count] (RGB); error[count]: standard error of its
@@ -500,6 +502,8 @@ ISOGI_API size_t isogi_trace_memory(const isogi_trace *trace); /* bytes that the
 #define ISOGI_TRACE__WATCHED 6       /* passes that look for probes whose light has settled */
 #define ISOGI_TRACE__PROBE_ERROR 0.02 /* standard error of light from probes */
 #define ISOGI_TRACE__CELL 2.0       /* of probes that texels read, in voxels, */
+#define ISOGI_TRACE__CELL_LEAST 1.0 /* down to this where lights throw shadows and there are more samples than */
+#define ISOGI_TRACE__CELL_SAMPLES 8.0
 #define ISOGI_TRACE__CELL_FAR 8.0   /* and of those that only probes read */
 #define ISOGI_TRACE__HALF 0.5       /* of a voxel: the least extent of a cell along an axis */
 #define ISOGI_TRACE__CELL_RATIO 8   /* length of rays to size of cells, */
@@ -1270,15 +1274,25 @@ typedef struct isogi_trace__site {
     uint64_t key;
 } isogi_trace__site;
 
+/* The size of the smallest cells. Where lights throw shadows a probe near an edge has the light of either side, for all hits of its cell:
+   noise that no more samples take away, but smaller cells do. The sky's light varies too slowly on surfaces to be worth more probes. Nor
+   are they where texels may be good enough long before all samples are taken. */
+static double isogi_trace__scene_cell(const isogi_trace_desc *d) {
+    double size = ISOGI_TRACE__CELL;
+    if (d->lighting.light_count && !d->no_shadows && !(d->error > 0) && d->samples > ISOGI_TRACE__CELL_SAMPLES)
+        size *= sqrt(ISOGI_TRACE__CELL_SAMPLES / d->samples);
+    return size > ISOGI_TRACE__CELL_LEAST ? size : ISOGI_TRACE__CELL_LEAST;
+}
+
 static void isogi_trace__scene_cells(isogi_trace__scene *scene) {
-    const double *voxel = scene->voxel;
+    const double *voxel = scene->voxel, size = isogi_trace__scene_cell(&scene->desc);
     int a, k, n;
     scene->least = voxel[0];
     for (a = 1; a < 3; a++) scene->least = voxel[a] < scene->least ? voxel[a] : scene->least;
     for (k = 0; k < 9; k++) {
         isogi_trace__cells *c = &scene->cells[k];
         isogi_level coarser;
-        c->size = ldexp(ISOGI_TRACE__CELL, k);
+        c->size = ldexp(size, k);
         for (a = 0; a < 3; a++) {
             double side = scene->least * c->size, half = ISOGI_TRACE__HALF * voxel[a];
             c->along[a] = (side > half ? side : half) / voxel[a];
@@ -4004,7 +4018,7 @@ static void isogi_trace__cast_hit(isogi_trace__cast *c, int i) {
     if (t->scene.desc.emission_count || t->scene.desc.material) isogi_trace__cast_glow(c, span, to);
     if (!t->scene.desc.bounces) return;
     to->key = isogi_trace__probe_key(&t->scene, &to->hit, to->normal, length,
-                                     span->of->brick ? ISOGI_TRACE__CELL : ISOGI_TRACE__CELL_FAR, span->of->isovalue);
+                                     span->of->brick ? t->scene.cells[0].size : ISOGI_TRACE__CELL_FAR, span->of->isovalue);
     to->probe = 0;
 }
 
@@ -5331,6 +5345,9 @@ static void isogi_trace__phase_task(void *arg, size_t task) {
     }
 }
 
+/* On to the next block of samples. */
+static void isogi_trace__level_next(isogi_trace__feedback *f) { f->level++, f->cursor = 0, f->probe_part = 0; }
+
 /* All tasks of the phase are done. */
 static void isogi_trace__phase_end(isogi_trace *t) {
     isogi_trace__feedback *f = t->feedback;
@@ -5352,7 +5369,7 @@ static void isogi_trace__phase_end(isogi_trace *t) {
     case ISOGI_TRACE__PUBLISH: f->phase = ISOGI_TRACE__FINISH, f->open = 0; break;
     case ISOGI_TRACE__FINISH:
         f->phase = f->open || t->scene.desc.lazy ? ISOGI_TRACE__AT_REST : ISOGI_TRACE__FORGET;
-        f->level++, f->cursor = 0, f->probe_part = 0, f->unpublished = f->phase == ISOGI_TRACE__FORGET;
+        isogi_trace__level_next(f), f->unpublished = f->phase == ISOGI_TRACE__FORGET;
         break;
     default: isogi_trace__group_free(t);
     }
@@ -5545,7 +5562,14 @@ static void isogi_trace__feedback_rest(isogi_trace *t) {
     isogi_trace__group_free(t);
 }
 
-/* Traces the next batch; where nothing is left to trace at this level its light is to be carried over. */
+/* Whether nobody can look at the light before the next block of samples: the step goes on to its end, and no texel may be good enough. */
+static int isogi_trace__level_unseen(const isogi_trace *t, int to_the_end) {
+    return to_the_end && !t->context.progress && !(t->scene.desc.error > 0) &&
+           isogi_trace__block(t, t->feedback->level + 1) < (uint32_t)t->scene.desc.samples;
+}
+
+/* Traces the next batch; where nothing is left to trace at this level its light is to be carried over. limit: UINT64_MAX: the step goes on
+   to its end. */
 static isogi_result isogi_trace__trace_batch(isogi_trace *t, uint64_t limit, uint64_t *spent) {
     isogi_trace__feedback *f = t->feedback;
     const size_t cursor = f->cursor, probe_cursor = f->probe_cursor;
@@ -5553,7 +5577,8 @@ static isogi_result isogi_trace__trace_batch(isogi_trace *t, uint64_t limit, uin
     isogi_result result;
     int none = isogi_trace__spans_fill(t, limit, spent);
     f->unpublished |= f->span_count != 0;
-    if (none) f->phase = ISOGI_TRACE__DIRECT;
+    if (none && isogi_trace__level_unseen(t, limit == UINT64_MAX)) isogi_trace__level_next(f);
+    else if (none) f->phase = ISOGI_TRACE__DIRECT;
     if (!f->span_count) return ISOGI_OK;
     part = f->on_probes ? (double)f->probe_cursor / (double)f->probes.count : 0;
     f->probe_part = part > f->probe_part ? part : f->probe_part;
@@ -6970,6 +6995,8 @@ ISOGI_API isogi_result isogi_trace_gather_field(const isogi_trace_desc *desc, is
 #undef ISOGI_TRACE__HALF
 #undef ISOGI_TRACE__CELL_FAR
 #undef ISOGI_TRACE__CELL
+#undef ISOGI_TRACE__CELL_LEAST
+#undef ISOGI_TRACE__CELL_SAMPLES
 #undef ISOGI_TRACE__PROBE_ERROR
 #undef ISOGI_TRACE__PROBE_MOST
 #undef ISOGI_TRACE__NEAR_RATIO
