@@ -3326,7 +3326,8 @@ typedef struct isogi_trace__segment {
 } isogi_trace__segment;
 
 /* What the filter compares. pilot: luminance by its first round, and the variance of that. lights: variance of the light that is not
-   filtered. albedo, glow: of the surface through the texel, which is the one that its rays meet. steep: by how much the field changes from texel to texel, along its gradient. */
+   filtered. albedo, glow: of the surface through the texel, which is the one that its rays meet. steep: by how much the field changes
+   from texel to texel, along its gradient. */
 typedef struct isogi_trace__guide {
     double isovalue, steep;
     float normal[3], mean[3], luminance, variance, pilot, pilot_variance, lights;

@@ -267,6 +267,46 @@ TEST(steps_stay_near_their_budget) {
 
 /* ---- against paths ------------------------------------------------------------------------------------------------------- */
 
+/* A sun shines into a pit, and half of its light is reflected: a probe beside the shadow's edge has all of it or none. Its cells are as
+   small as the number of samples asks for; the sky alone needs no smaller ones. */
+TEST(probes_lie_closer_beside_shadows) {
+    enum { POINTS = 300, RUNS = 4 };
+    static float points[POINTS][3], e[POINTS][3], reference[POINTS][3];
+    double q[5] = {24, 22, 24, 26, 16}, probes[2][2], rms = 0, mean = 0;
+    scene s = scene_make(48, 48, 48, NULL, pit, q);
+    isogi_light sun = light_make(ISOGI_LIGHT_DIRECTIONAL, 1, 1, 0.2, 3, 0.01);
+    int n = surface_points(&s, 0, POINTS, 7, points);
+    for (int lit = 0; lit < 2; lit++)
+        for (int many = 0; many < 2; many++) {
+            isogi_trace_desc d = feedback(&s, 0.5f, -1, many ? 64 : 8);
+            isogi_trace *t = NULL;
+            isogi_trace_report report;
+            d.lazy = 1, d.lighting.lights = &sun, d.lighting.light_count = (size_t)lit;
+            CHECK(isogi_trace_create(&t, &d, NULL) == ISOGI_OK, "lit %d", lit);
+            CHECK(isogi_trace_request(t, (const float(*)[3])points, (size_t)n) == ISOGI_OK && isogi_trace_step(t, 0, NULL) == ISOGI_OK,
+                  "lit %d", lit);
+            isogi_trace_status(t, &report);
+            probes[lit][many] = (double)report.probes;
+            isogi_trace_free(t);
+        }
+    for (int run = 0; run <= RUNS; run++) {
+        isogi_trace_desc d = feedback(&s, 0.5f, -1, run ? 64 : 2048);
+        d.lazy = 1, d.lighting.lights = &sun, d.lighting.light_count = 1, d.seed = (uint64_t)run;
+        if (!run) d.method = ISOGI_TRACE_PATHS;
+        bake_and_sample(&d, NULL, (const float(*)[3])points, n, run ? e : reference);
+        for (int i = 0; i < n; i++) {
+            if (run) rms += pow((double)e[i][1] - (double)reference[i][1], 2) / (n * RUNS);
+            else mean += (double)reference[i][1] / n;
+        }
+    }
+    printf("    probes of 8 and 64 samples: %.0f, %.0f; beside shadows %.0f, %.0f; error %.4f\n", probes[0][0], probes[0][1], probes[1][0],
+           probes[1][1], sqrt(rms) / mean);
+    CHECK(fabs(probes[0][0] - probes[1][0]) < 0.01 * probes[0][0] && probes[1][1] > 1.2 * probes[0][1], "%.0f, %.0f and %.0f, %.0f",
+          probes[0][0], probes[0][1], probes[1][0], probes[1][1]);
+    CHECK(sqrt(rms) < 0.01 * mean, "error %.4f", sqrt(rms) / mean);
+    scene_free(&s);
+}
+
 /* A hit is worth one path that goes on: probes do not fill a closed room for the light of one place in it. With two
    samples each they did, 2600 here. */
 TEST(probes_do_not_breed) {
@@ -332,6 +372,32 @@ TEST(few_samples_are_filtered) {
         printf("    %d: error %.4f, unfiltered %.4f: %.3f\n", samples, sqrt(rms[0]), sqrt(rms[1]), sqrt(rms[0] / rms[1]));
         CHECK(n > 100 && sqrt(rms[0]) < 0.55 * sqrt(rms[1]), "%d: error %.4f, unfiltered %.4f", samples, sqrt(rms[0]), sqrt(rms[1]));
     }
+    scene_free(&s);
+}
+
+/* A black ball all but touches the ground: what it leaves of the sky falls to nothing within a few voxels. With 16 samples the filter takes
+   two fifths of the error by noise. Where it goes by what texels have gathered themselves, which tells light apart by no less than that
+   noise, it lets .06 of the light in below the ball; by what its first round has smoothed, half of that. */
+TEST(soft_shadows_are_not_blurred) {
+    enum { SIDE = 24, POINTS = SIDE * SIDE, RUNS = 4 };
+    static float points[POINTS][3], e[POINTS][3], reference[POINTS][3];
+    double q[5] = {24, 21, 24, 8, 12}, rms[2] = {0, 0}, leak[2] = {0, 0};
+    scene s = scene_make(48, 48, 48, NULL, ball_over_plane, q);
+    for (int i = 0; i < POINTS; i++) points[i][0] = 12.5f + (float)(i % SIDE), points[i][1] = 12, points[i][2] = 12.5f + (float)(i / SIDE);
+    for (int run = 0; run <= 2 * RUNS; run++) {
+        isogi_trace_desc d = feedback(&s, 0, 0, run ? 16 : 2048);
+        d.lazy = 1, d.unfiltered = run % 2, d.seed = (uint64_t)(run + 1) / 2;
+        if (!run) d.method = ISOGI_TRACE_PATHS;
+        bake_and_sample(&d, NULL, (const float(*)[3])points, POINTS, run ? e : reference);
+        for (int i = 0; i < POINTS && run; i++) {
+            const double off = ((double)e[i][1] - (double)reference[i][1]) / PI;
+            rms[run % 2] += off * off / (POINTS * RUNS);
+            if (length3((double)points[i][0] - q[0], 0, (double)points[i][2] - q[2]) < 2) leak[run % 2] += off / (12 * RUNS);
+        }
+    }
+    printf("    error %.4f, unfiltered %.4f; leak %.4f, %.4f\n", sqrt(rms[0]), sqrt(rms[1]), leak[0], leak[1]);
+    CHECK(sqrt(rms[0]) < 0.61 * sqrt(rms[1]) && fabs(leak[0]) < 0.045, "error %.4f, unfiltered %.4f, leak %.4f", sqrt(rms[0]), sqrt(rms[1]),
+          leak[0]);
     scene_free(&s);
 }
 
@@ -707,6 +773,33 @@ TEST(same_bits_for_any_threads_and_budget) {
             CHECK(!memcmp(e, first, sizeof e), "way %d: budget %g differs", way, (double)budget[i]);
             isogi_trace_free(t);
         }
+    }
+    scene_free(&s);
+}
+
+static int go_on(void *user, double fraction) { return (void)user, (void)fraction, 0; }
+
+/* Between blocks of samples light is worked out for whoever looks. Where a step goes to its end, and no callback can stop it, nobody does:
+   three blocks take less than two thirds of the tasks, to the same bits. With a target for errors each block is needed. */
+TEST(light_that_nobody_sees_is_not_worked_out) {
+    enum { POINTS = 200 };
+    double q[5] = {15.5, 15, 15.5, 18, 12};
+    scene s = scene_make(32, 32, 32, NULL, pit, q);
+    float points[POINTS][3], e[2][POINTS][3];
+    int n = surface_points(&s, 0, POINTS, 5, points);
+    for (int adaptive = 0; adaptive < 2; adaptive++) {
+        size_t tasks[2];
+        for (int watched = 0; watched < 2; watched++) {
+            demand asked = {0};
+            isogi_context counting = {.parallel_for = count_tasks, .user = &asked, .progress = watched ? go_on : NULL};
+            isogi_trace_desc d = feedback(&s, 0.7f, -1, 64);
+            d.lazy = 1, d.error = adaptive ? 1e-4f : 0;
+            bake_and_sample(&d, &counting, (const float(*)[3])points, n, e[watched]);
+            tasks[watched] = asked.tasks;
+        }
+        printf("    %s: %d tasks, %d when watched\n", adaptive ? "to a target" : "all samples", (int)tasks[0], (int)tasks[1]);
+        CHECK(adaptive ? tasks[0] == tasks[1] : 3 * tasks[0] < 2 * tasks[1], "%d tasks, %d when watched", (int)tasks[0], (int)tasks[1]);
+        CHECK(!memcmp(e[0], e[1], (size_t)n * sizeof e[0][0]), "other light when watched, %d", adaptive);
     }
     scene_free(&s);
 }
