@@ -90,14 +90,14 @@
      So with ISOGI_TRACE_PATHS, the reference. By default (FEEDBACK) a path ends at its first hit and takes the light there from a
      probe: a point near by on the same isosurface or one that runs closely beside it (up to .15 voxels by the gradient), in cells of
      2 voxels (of the shortest edge, but half a voxel along every axis at least; where lights throw shadows less with more than 8
-     samples: 1.4 with 16, 1 from 32 on) or an eighth of the ray's length, whose own hemisphere is gathered once in the same way;
-     passes over the probes then bring all reflections without rays. What the sky and reflections bring is read from a plane, fitted to
-     the light of texels up to three away that face the same way and whose isosurfaces run close to each other, as far as their noise
-     could explain the difference (with one or two samples, of which none is known, all of them; from four on in two rounds: the second
-     compares what the first has smoothed); their samples are well spread together. Lights are not filtered, so that their shadows stay
-     sharp (desc.unfiltered: nothing is). TRANSFER is not filtered at all, and takes more samples for it. Probes cost accuracy: half a per
-     cent of the mean and 1.8 % at a point in narrow channels of albedo 0.8 (test_trace_bake --long prints it). Lazy and adaptive bakes
-     take samples in blocks of 4, 16, 64, ... and every other texel along each axis first: soon every lookup has a value.
+     samples: 1.4 with 16, 1 from 32 on, but without desc.error) or an eighth of the ray's length, whose own hemisphere is gathered once
+     in the same way; passes over the probes then bring all reflections without rays. What the sky and reflections bring is read from a
+     plane, fitted to the light of texels up to three away that face the same way and whose isosurfaces run close to each other, as far as
+     their noise could explain the difference (with one or two samples, of which none is known, all of them; from four on in two rounds:
+     the second compares what the first has smoothed); their samples are well spread together. Lights are not filtered, so that their
+     shadows stay sharp (desc.unfiltered: nothing is). TRANSFER is not filtered at all, and takes more samples for it. Probes cost
+     accuracy: half a per cent of the mean and 1.8 % at a point in narrow channels of albedo 0.8 (test_trace_bake --long prints it). Lazy
+     and adaptive bakes take samples in blocks of 4, 16, 64, ... and every other texel along each axis first: soon every lookup has a value.
      A hit from within (only through an open border can a ray get there) is a surface too, with its normal turned.
 
    GLSL that lights a surface by an exported irradiance texture (GL_LINEAR, GL_CLAMP_TO_EDGE); grid: voxel coordinates
@@ -311,7 +311,8 @@ ISOGI_API isogi_result isogi_trace_request(isogi_trace *trace, const float (*poi
    FEEDBACK: when a block of samples is complete passes without rays carry the light over all probes to all texels at work; they are cut
    into pieces, too, as is what comes before the first ray and after the last one, and counted as the rays that take about as long.
    Meanwhile what a request adds has to wait. To the end, and where no progress callback can stop it, that is done once, after the last
-   block (unless desc.error may end a texel before): a tenth less time, the same bits. */
+   block (unless desc.error may end a texel before): a tenth less time, the same bits. Should memory run out on the way, light that has
+   not been worked out is a first guess. */
 ISOGI_API isogi_result isogi_trace_step(isogi_trace *trace, uint64_t max_rays, double *remaining);
 
 /* Lookup (desc.lookup) among the texels that are valid and computed. irradiance[count] (RGB); error[count]: standard error of its
@@ -1279,7 +1280,8 @@ typedef struct isogi_trace__site {
    are they where texels may be good enough long before all samples are taken. */
 static double isogi_trace__scene_cell(const isogi_trace_desc *d) {
     double size = ISOGI_TRACE__CELL;
-    if (d->lighting.light_count && !d->no_shadows && !(d->error > 0) && d->samples > ISOGI_TRACE__CELL_SAMPLES)
+    if (d->mode == ISOGI_TRACE_IRRADIANCE && d->lighting.light_count && !d->no_shadows && !(d->error > 0) &&
+        d->samples > ISOGI_TRACE__CELL_SAMPLES)
         size *= sqrt(ISOGI_TRACE__CELL_SAMPLES / d->samples);
     return size > ISOGI_TRACE__CELL_LEAST ? size : ISOGI_TRACE__CELL_LEAST;
 }
@@ -3661,10 +3663,10 @@ static uint64_t isogi_trace__class(const isogi_level *level, const double middle
     return (uint64_t)isogi_trace__clamp(width > 0 ? (isovalue - (double)range[0]) / width : 0, 4e9);
 }
 
-/* Cells of 2 voxels, of 4 for rays longer than 16 voxels, and so on: an eighth of the length at most. Rays of probes, whose light
-   matters less, take half of their length up to `cell` voxels; no more, or what stands beside a narrow gap would light it. In units of
-   the shortest voxel edge, so that they are cubes in the world, but half a voxel along every axis at least: flat or long voxels would be
-   cut into very many. Isovalues are apart, see isogi_trace__alike. */
+/* Cells of isogi_trace__scene_cell voxels, twice as large for rays longer than eight times that, and so on: an eighth of the length at
+   most. Rays of probes, whose light matters less, take half of their length up to `cell` voxels; no more, or what stands beside a narrow
+   gap would light it. In units of the shortest voxel edge, so that they are cubes in the world, but half a voxel along every axis at
+   least: flat or long voxels would be cut into very many. Isovalues are apart, see isogi_trace__alike. */
 static uint64_t isogi_trace__probe_key(const isogi_trace__scene *scene, const isogi_hit *hit, const float normal[3], double t,
                                        double cell, double isovalue) {
     const isogi_trace__cells *cells;
@@ -4727,6 +4729,7 @@ static void isogi_trace__guide_begin(const isogi_trace *t, const isogi_trace__no
     isogi_trace__slopes(&t->scene, &n->place, slope);
     for (a = 0; a < 3; a++) slope[a] *= t->step[a];
     g->isovalue = n->isovalue, g->steep = isogi_trace__magnitude(slope);
+    g->pilot = g->pilot_variance = 0; /* until it has samples */
     if (!d->albedo_count && !d->emission_count && !d->material) return;
     for (a = 0; a < 3; a++) texel[a] = n->texel[a];
     isogi_trace__texel_grid(t, texel, point);
@@ -5104,6 +5107,7 @@ static void isogi_trace__block_fill(const isogi_trace *t, const size_t brick[3],
     for (i = 0; i < b->count; i++) {
         const isogi_trace__guide *g = b->guide[i];
         most = fabs((double)g->luminance) > most ? fabs((double)g->luminance) : most;
+        if (second) most = fabs((double)g->pilot) > most ? fabs((double)g->pilot) : most;
         steepest = g->steep > steepest ? g->steep : steepest;
     }
     most = most > 0 ? 1 / most : 1, steepest = 1 / (steepest > 1e-300 ? steepest : 1e-300);
@@ -5112,20 +5116,17 @@ static void isogi_trace__block_fill(const isogi_trace *t, const size_t brick[3],
     for (i = 0; i < b->count; i++) {
         const isogi_trace__guide *g = b->guide[i];
         const size_t at = b->at[i];
-        const double one = g->samples ? 1.0 / g->samples : 0, iso = (g->isovalue - base) * steepest,
-                     luminance = (double)g->luminance * most, variance = (double)isogi_trace__bounded((double)g->variance) * (most * most);
+        const double one = g->samples ? 1.0 / g->samples : 0, iso = (g->isovalue - base) * steepest;
+        const double luminance = (double)(second ? g->pilot : g->luminance) * most;
+        const double variance = (double)isogi_trace__bounded((double)g->variance) * (most * most);
+        const double noise = second ? (double)g->pilot_variance * (most * most) : variance;
         b->samples[at] = (float)g->samples, b->share[at] = (float)one;
         b->high[at] = (float)isogi_trace__within_both(iso, 1e30);
         b->low[at] = (float)isogi_trace__within_both(iso - (double)b->high[at], 1e30);
         b->steps[at] = isogi_trace__bounded(1 / (ISOGI_TRACE__SHEET * (g->steep * steepest) + 1e-30));
         b->luminance[at] = (float)luminance, b->variance[at] = isogi_trace__bounded(variance);
-        b->guessed[at] = isogi_trace__bounded(g->samples < ISOGI_TRACE__NOISE_KNOWN ? luminance * luminance * one : variance);
-        b->noise[at] = (float)(ISOGI_TRACE__NOISE / 2 + ISOGI_TRACE__NOISE_FEW / 2 * one);
-        if (second) {
-            b->luminance[at] = (float)((double)g->pilot * most);
-            b->guessed[at] = isogi_trace__bounded((double)g->pilot_variance * (most * most));
-            b->noise[at] *= (float)ISOGI_TRACE__NOISE_PILOT;
-        }
+        b->guessed[at] = isogi_trace__bounded(g->samples < ISOGI_TRACE__NOISE_KNOWN ? luminance * luminance * one : noise);
+        b->noise[at] = (float)((second ? ISOGI_TRACE__NOISE_PILOT : 1) * (ISOGI_TRACE__NOISE / 2 + ISOGI_TRACE__NOISE_FEW / 2 * one));
         b->lights[at] = isogi_trace__bounded((double)g->lights);
         for (a = 0; a < 3; a++) b->normal[a][at] = g->normal[a], b->mean[a][at] = g->mean[a];
         if (!b->tinted) continue;
@@ -5169,7 +5170,7 @@ static void isogi_trace__publish(isogi_trace *t, size_t i, const isogi_trace__bl
 static void isogi_trace__pilot(isogi_trace *t, size_t i, const isogi_trace__blend *blend) {
     isogi_trace__guide *g = isogi_trace__guide_at(&t->feedback->texels, i);
     g->pilot = blend ? (float)isogi_trace__luminance(blend->rgb) : g->luminance;
-    g->pilot_variance = blend ? isogi_trace__bounded(blend->variance) : g->variance;
+    g->pilot_variance = isogi_trace__bounded(blend ? blend->variance : (double)g->variance);
 }
 
 /* Whether it has new light to publish. Where its error was low enough before the last sample, it stays so. */
@@ -5184,6 +5185,7 @@ static void isogi_trace__publish_brick(isogi_trace *t, size_t i, isogi_trace__de
     const isogi_trace__set *set = &t->feedback->texels;
     const isogi_trace__node *any = isogi_trace__node_at(set, i);
     const size_t first = ISOGI_TRACE__REACH * (1 + ISOGI_TRACE__ROW * (1 + ISOGI_TRACE__ROW));
+    const int first_round = t->feedback->phase == ISOGI_TRACE__PILOT; /* of all that have samples: others compare with them */
     size_t brick[3];
     uint32_t slot;
     int a, filled = 0;
@@ -5191,12 +5193,12 @@ static void isogi_trace__publish_brick(isogi_trace *t, size_t i, isogi_trace__de
     for (slot = 0; slot < ISOGI_TRACE__TEXELS; slot++) {
         const uint32_t node = any->brick->node[slot];
         isogi_trace__blend blend;
-        if (!node || !isogi_trace__unpublished(t, node - 1)) continue;
+        if (!node || !(first_round ? isogi_trace__node_at(set, node - 1)->samples > 0 : isogi_trace__unpublished(t, node - 1))) continue;
         if (!filled) isogi_trace__block_fill(t, brick, b);
         filled = 1;
         isogi_trace__blend_of(t, b, first + slot % 4 + ISOGI_TRACE__ROW * (slot / 4 % 4 + ISOGI_TRACE__ROW * (slot / 16)), &blend);
         blend.variance *= b->unit * b->unit;
-        if (t->feedback->phase == ISOGI_TRACE__PILOT) isogi_trace__pilot(t, node - 1, blend.alike > 0 ? &blend : NULL);
+        if (first_round) isogi_trace__pilot(t, node - 1, blend.alike > 0 ? &blend : NULL);
         else isogi_trace__publish(t, node - 1, blend.alike > 0 ? &blend : NULL);
     }
 }
@@ -5569,16 +5571,16 @@ static int isogi_trace__level_unseen(const isogi_trace *t, int to_the_end) {
            isogi_trace__block(t, t->feedback->level + 1) < (uint32_t)t->scene.desc.samples;
 }
 
-/* Traces the next batch; where nothing is left to trace at this level its light is to be carried over. limit: UINT64_MAX: the step goes on
-   to its end. */
-static isogi_result isogi_trace__trace_batch(isogi_trace *t, uint64_t limit, uint64_t *spent) {
+/* Traces the next batch; where nothing is left to trace at this level its light is to be carried over. to_the_end: the step has no
+   other limit. */
+static isogi_result isogi_trace__trace_batch(isogi_trace *t, uint64_t limit, int to_the_end, uint64_t *spent) {
     isogi_trace__feedback *f = t->feedback;
     const size_t cursor = f->cursor, probe_cursor = f->probe_cursor;
     double from = isogi_trace__told(t), to, part;
     isogi_result result;
     int none = isogi_trace__spans_fill(t, limit, spent);
     f->unpublished |= f->span_count != 0;
-    if (none && isogi_trace__level_unseen(t, limit == UINT64_MAX)) isogi_trace__level_next(f);
+    if (none && isogi_trace__level_unseen(t, to_the_end)) isogi_trace__level_next(f);
     else if (none) f->phase = ISOGI_TRACE__DIRECT;
     if (!f->span_count) return ISOGI_OK;
     part = f->on_probes ? (double)f->probe_cursor / (double)f->probes.count : 0;
@@ -5601,7 +5603,8 @@ static isogi_result isogi_trace__feedback_step(isogi_trace *t, uint64_t max_rays
         if (max_rays && used >= max_rays) break;
         if (isogi_trace__nodes_wanted(t)) result = isogi_trace__nodes_make(t, left, &other);
         else if (f->placed < f->texels.count) other += isogi_trace__place(t, piece);
-        else if (f->phase == ISOGI_TRACE__AT_REST) result = isogi_trace__trace_batch(t, max_rays ? left / each + 1 : UINT64_MAX, &other);
+        else if (f->phase == ISOGI_TRACE__AT_REST)
+            result = isogi_trace__trace_batch(t, max_rays ? (left - 1) / each + 1 : UINT64_MAX, !max_rays, &other);
         else other += isogi_trace__carry(t, piece);
         if (silent && result == ISOGI_OK && t->context.progress && t->context.progress(t->context.user, isogi_trace__told(t)))
             result = ISOGI_CANCELLED;

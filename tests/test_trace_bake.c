@@ -267,43 +267,33 @@ TEST(steps_stay_near_their_budget) {
 
 /* ---- against paths ------------------------------------------------------------------------------------------------------- */
 
-/* A sun shines into a pit, and half of its light is reflected: a probe beside the shadow's edge has all of it or none. Its cells are as
-   small as the number of samples asks for; the sky alone needs no smaller ones. */
-TEST(probes_lie_closer_beside_shadows) {
-    enum { POINTS = 300, RUNS = 4 };
-    static float points[POINTS][3], e[POINTS][3], reference[POINTS][3];
-    double q[5] = {24, 22, 24, 26, 16}, probes[2][2], rms = 0, mean = 0;
+/* Where a sun throws shadows cells of probes are as small as the number of samples asks for, down to a voxel; the sky alone needs no
+   smaller ones, nor do few samples, nor where a target ends the bake of a texel. What it brings: the error on engine-block with 16 and more
+   samples (bench_trace). */
+TEST(probes_lie_closer_where_lights_throw_shadows) {
+    double q[5] = {24, 22, 24, 26, 16}, probes[2][3];
     scene s = scene_make(48, 48, 48, NULL, pit, q);
     isogi_light sun = light_make(ISOGI_LIGHT_DIRECTIONAL, 1, 1, 0.2, 3, 0.01);
-    int n = surface_points(&s, 0, POINTS, 7, points);
+    static float points[300][3];
+    int n = surface_points(&s, 0, 300, 7, points);
     for (int lit = 0; lit < 2; lit++)
-        for (int many = 0; many < 2; many++) {
-            isogi_trace_desc d = feedback(&s, 0.5f, -1, many ? 64 : 8);
+        for (int way = 0; way < 3; way++) {
+            isogi_trace_desc d = feedback(&s, 0.5f, -1, way ? 64 : 8);
             isogi_trace *t = NULL;
             isogi_trace_report report;
-            d.lazy = 1, d.lighting.lights = &sun, d.lighting.light_count = (size_t)lit;
+            d.lazy = 1, d.error = way == 2 ? 1e-9f : 0, d.lighting.lights = &sun, d.lighting.light_count = (size_t)lit;
             CHECK(isogi_trace_create(&t, &d, NULL) == ISOGI_OK, "lit %d", lit);
             CHECK(isogi_trace_request(t, (const float(*)[3])points, (size_t)n) == ISOGI_OK && isogi_trace_step(t, 0, NULL) == ISOGI_OK,
                   "lit %d", lit);
             isogi_trace_status(t, &report);
-            probes[lit][many] = (double)report.probes;
+            probes[lit][way] = (double)report.probes;
             isogi_trace_free(t);
         }
-    for (int run = 0; run <= RUNS; run++) {
-        isogi_trace_desc d = feedback(&s, 0.5f, -1, run ? 64 : 2048);
-        d.lazy = 1, d.lighting.lights = &sun, d.lighting.light_count = 1, d.seed = (uint64_t)run;
-        if (!run) d.method = ISOGI_TRACE_PATHS;
-        bake_and_sample(&d, NULL, (const float(*)[3])points, n, run ? e : reference);
-        for (int i = 0; i < n; i++) {
-            if (run) rms += pow((double)e[i][1] - (double)reference[i][1], 2) / (n * RUNS);
-            else mean += (double)reference[i][1] / n;
-        }
-    }
-    printf("    probes of 8 and 64 samples: %.0f, %.0f; beside shadows %.0f, %.0f; error %.4f\n", probes[0][0], probes[0][1], probes[1][0],
-           probes[1][1], sqrt(rms) / mean);
-    CHECK(fabs(probes[0][0] - probes[1][0]) < 0.01 * probes[0][0] && probes[1][1] > 1.2 * probes[0][1], "%.0f, %.0f and %.0f, %.0f",
-          probes[0][0], probes[0][1], probes[1][0], probes[1][1]);
-    CHECK(sqrt(rms) < 0.01 * mean, "error %.4f", sqrt(rms) / mean);
+    printf("    probes of 8 samples, of 64, to a target: %.0f, %.0f, %.0f; where a sun shines %.0f, %.0f, %.0f\n", probes[0][0],
+           probes[0][1], probes[0][2], probes[1][0], probes[1][1], probes[1][2]);
+    CHECK(fabs(probes[0][0] - probes[1][0]) < 0.01 * probes[0][0] && fabs(probes[0][2] - probes[1][2]) < 0.01 * probes[0][2],
+          "%.0f, %.0f and %.0f, %.0f", probes[0][0], probes[0][2], probes[1][0], probes[1][2]);
+    CHECK(probes[1][1] > 1.2 * probes[0][1] && probes[1][1] < 2 * probes[0][1], "%.0f and %.0f", probes[0][1], probes[1][1]);
     scene_free(&s);
 }
 
@@ -773,6 +763,92 @@ TEST(same_bits_for_any_threads_and_budget) {
             CHECK(!memcmp(e, first, sizeof e), "way %d: budget %g differs", way, (double)budget[i]);
             isogi_trace_free(t);
         }
+    }
+    scene_free(&s);
+}
+
+/* Memory as allocators hand it out: full of old bytes. */
+static void *filled_alloc(void *user, size_t size, size_t align) {
+    void *p = NULL;
+    if (posix_memalign(&p, align < sizeof(void *) ? sizeof(void *) : align, size)) return NULL;
+    return memset(p, *(const int *)user, size);
+}
+static void filled_release(void *user, void *p, size_t size) { (void)user, (void)size, free(p); }
+
+/* Light that is loaded over texels that have begun is what others beside them compare theirs with, too: nothing that they read was in
+   memory before. Loaded after the first samples, and in the middle of what follows them. */
+TEST(light_is_the_same_in_any_memory) {
+    enum { POINTS = 200, FILLS = 3 };
+    const int fill[FILLS] = {0, 0x41, 0xff};
+    const uint64_t budgets[3] = {1500, 5000, 9000};
+    double q[5] = {15.5, 15, 15.5, 18, 12};
+    scene s = scene_make(32, 32, 32, NULL, pit, q);
+    static float points[POINTS][3], e[FILLS][POINTS][3];
+    int n = surface_points(&s, 0, POINTS, 5, points);
+    isogi_trace_desc d = feedback(&s, 0.7f, -1, 20);
+    isogi_trace *half = NULL;
+    d.lazy = 1;
+    CHECK(isogi_trace_create(&half, &d, NULL) == ISOGI_OK, "create %d", 0);
+    CHECK(isogi_trace_request(half, (const float(*)[3])points, (size_t)n / 2) == ISOGI_OK && isogi_trace_step(half, 0, NULL) == ISOGI_OK,
+          "bake %d", 0);
+    size_t size = isogi_trace_save_size(half);
+    void *block = malloc(size);
+    CHECK(isogi_trace_save(half, block, size) == ISOGI_OK, "save %d", 0);
+    for (int b = 0; b < 3; b++)
+        for (int k = 0; k < FILLS; k++) {
+            isogi_context context = {.alloc = filled_alloc, .release = filled_release, .user = (void *)(uintptr_t)&fill[k]};
+            isogi_trace *t = NULL;
+            CHECK(isogi_trace_create(&t, &d, &context) == ISOGI_OK, "create %d", k);
+            isogi_trace_request(t, (const float(*)[3])points, (size_t)n), isogi_trace_step(t, budgets[b], NULL);
+            CHECK(isogi_trace_load(t, block, size) == ISOGI_OK && isogi_trace_step(t, 0, NULL) == ISOGI_OK, "load %d", k);
+            isogi_trace_sample(t, (const float(*)[3])points, (size_t)n, e[k], NULL);
+            isogi_trace_free(t);
+            CHECK(!memcmp(e[k], e[0], sizeof e[0]), "after %d rays: other light in memory of %d", (int)budgets[b], fill[k]);
+        }
+    free(block), isogi_trace_free(half), scene_free(&s);
+}
+
+/* A budget may be any number: the largest is as good as none. */
+TEST(the_largest_budget_is_no_other) {
+    double q[5] = {15.5, 15, 15.5, 18, 12};
+    scene s = scene_make(32, 32, 32, NULL, pit, q);
+    float points[50][3], e[2][50][3];
+    int n = surface_points(&s, 0, 50, 5, points);
+    for (int k = 0; k < 2; k++) {
+        isogi_trace_desc d = feedback(&s, 0.7f, -1, 8);
+        isogi_trace *t = NULL;
+        double remaining = 1;
+        d.lazy = 1;
+        CHECK(isogi_trace_create(&t, &d, NULL) == ISOGI_OK, "create %d", k);
+        isogi_trace_request(t, (const float(*)[3])points, (size_t)n), isogi_trace_step(t, 1000, NULL);
+        CHECK(isogi_trace_step(t, k ? UINT64_MAX : 0, &remaining) == ISOGI_OK && remaining <= 0, "remaining %g", remaining);
+        isogi_trace_sample(t, (const float(*)[3])points, (size_t)n, e[k], NULL);
+        isogi_trace_free(t);
+    }
+    CHECK(!memcmp(e[0], e[1], (size_t)n * sizeof e[0][0]), "other light, %d points", n);
+    scene_free(&s);
+}
+
+/* Transfer knows no lights: the same bits whatever shines, also where that changes while it is baked. */
+TEST(transfer_does_not_know_the_lights) {
+    enum { POINTS = 100 };
+    double q[5] = {24, 22, 24, 26, 16};
+    scene s = scene_make(48, 48, 48, NULL, pit, q);
+    isogi_light sun = light_make(ISOGI_LIGHT_DIRECTIONAL, 1, 1, 0.2, 3, 0.01);
+    static float points[POINTS][3], transfer[3][POINTS * 4];
+    int n = surface_points(&s, 0, POINTS, 5, points);
+    for (int k = 0; k < 3; k++) { /* dark, lit, lit from the middle on */
+        isogi_trace_desc d = feedback(&s, 0.7f, -1, 64);
+        isogi_trace *t = NULL;
+        d.lazy = 1, d.mode = ISOGI_TRACE_TRANSFER, d.order = 2, d.lighting.lights = &sun, d.lighting.light_count = k == 1;
+        CHECK(isogi_trace_create(&t, &d, NULL) == ISOGI_OK, "create %d", k);
+        isogi_trace_request(t, (const float(*)[3])points, (size_t)n), isogi_trace_step(t, 30000, NULL);
+        d.lighting.light_count = k > 0;
+        CHECK(k < 2 || isogi_trace_change(t, &d) == ISOGI_OK, "change %d", k);
+        CHECK(isogi_trace_step(t, 0, NULL) == ISOGI_OK, "step %d", k);
+        CHECK(isogi_trace_sample_transfer(t, (const float(*)[3])points, (size_t)n, transfer[k]) == ISOGI_OK, "sample %d", k);
+        CHECK(!memcmp(transfer[k], transfer[0], sizeof transfer[0]), "other transfer, %d", k);
+        isogi_trace_free(t);
     }
     scene_free(&s);
 }
