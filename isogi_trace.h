@@ -216,7 +216,7 @@ typedef enum isogi_trace_sides {
 typedef void isogi_trace_material_function(void *user, double isovalue, const double point[3], float albedo[3], float emission[3]);
 
 /* How a texel's light is held, and exported. Bytes for a texel of RGB / of a coefficient; error of what was computed, which itself
-   has an error of about 1.1 % with 16 samples (an engine block; README.md):
+   has an error of about 1 % with 16 samples (an engine block; README.md):
    FLOAT   12 / 4   6e-8 of the value
    HALF     6 / 2   5e-4 of the value
    RGB9E5   4 / -   2e-3 of the largest of the three channels; irradiance alone, 0 or more
