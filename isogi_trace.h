@@ -497,7 +497,7 @@ ISOGI_API size_t isogi_trace_memory(const isogi_trace *trace); /* bytes that the
 #define ISOGI_TRACE__SWEEP 256     /* nodes in a task that traces no rays */
 #define ISOGI_TRACE__PIECE 65536   /* rays that take as long as what is done without any before progress is told of, */
 #define ISOGI_TRACE__PLACING 1.5   /* samples that take as long as finding where a texel lies, */
-#define ISOGI_TRACE__CARRYING 2.5  /* as what each level takes beside its texels' rays; for progress alone */
+#define ISOGI_TRACE__CARRYING 3.0  /* as what each level takes beside its texels' rays; for progress alone */
 #define ISOGI_TRACE__CHUNK 2048    /* nodes that are allocated together; a power of two, and a multiple of SWEEP */
 #define ISOGI_TRACE__PROBE_MOST 8    /* samples of a probe: as many as there are hits that read it, but no more than this */
 #define ISOGI_TRACE__WATCHED 6       /* passes that look for probes whose light has settled */
