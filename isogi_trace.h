@@ -83,21 +83,23 @@
 
      E = integral of L (n.w) dw over the hemisphere: paths start in cosine-distributed directions (a scrambled Sobol sequence) and
      are reflected at every hit by the albedo at the isovalue. A path that leaves brings the environment; at each of its vertices
-     every light is tried by a shadow ray, and an image with bright spots by a direction drawn by its brightness, weighed against the
-     cosine (balance heuristic). Vertices are hits on the exact trilinear surface, left without an epsilon. There the hemisphere is
+     every light is tried by a shadow ray, and an uneven image by a direction drawn by its brightness, weighed against the cosine
+     (balance heuristic). Vertices are hits on the exact trilinear surface, left without an epsilon. There the hemisphere is
      that of the normal of desc.normals, its part below the trilinear surface mirrored up: no ray enters matter, and no energy is
      lost (a white surface under a white sky stays white). bounces = -1: Russian roulette from the third reflection on.
-     So with ISOGI_TRACE_PATHS, the reference. By default (FEEDBACK) a path ends at its first hit and takes the light there from a
-     probe: a point near by on the same isosurface or one that runs closely beside it (up to .15 voxels by the gradient), in cells of
-     2 voxels (of the shortest edge, but half a voxel along every axis at least; where lights throw shadows less with more than 8
-     samples: 1.4 with 16, 1 from 32 on, but without desc.error) or an eighth of the ray's length, whose own hemisphere is gathered once
-     in the same way; passes over the probes then bring all reflections without rays. What the sky and reflections bring is read from a
-     plane, fitted to the light of texels up to three away that face the same way and whose isosurfaces run close to each other, as far as
-     their noise could explain the difference (with one or two samples, of which none is known, all of them; from four on in two rounds:
-     the second compares what the first has smoothed); their samples are well spread together. Lights are not filtered, so that their
-     shadows stay sharp (desc.unfiltered: nothing is). TRANSFER is not filtered at all, and takes more samples for it. Probes cost
+     So with ISOGI_TRACE_PATHS, the reference. By default (FEEDBACK) a path ends at its first hit and takes the light there from a probe: a
+     point near by on the same isosurface or one that runs closely beside it (up to .15 voxels by the gradient), in cells of 2 voxels (of
+     the shortest edge, but half a voxel along every axis at least; where lights throw shadows less with more than 8 samples: 1.4 with 16,
+     1 from 32 on, but without desc.error) or an eighth of the ray's length, whose own hemisphere is gathered once in the same way; passes
+     over the probes then bring all reflections without rays. What the sky and reflections bring is read from a plane, fitted to the light
+     of texels up to three away that face the same way and whose isosurfaces run close to each other, as far as their noise could explain
+     the difference (with one or two samples, of which none is known, all of them; from four on in two rounds: the second compares what the
+     first has smoothed); their samples are well spread together. With each sample go two to four rays drawn by the brightness of an uneven
+     image: they need no probe, and take a quarter to two fifths of the error that one of them leaves. Lights are not filtered, so that
+     their shadows stay sharp (desc.unfiltered: nothing is). TRANSFER is not filtered at all, and takes more samples for it. Probes cost
      accuracy: half a per cent of the mean and 1.8 % at a point in narrow channels of albedo 0.8 (test_trace_bake --long prints it). Lazy
-     and adaptive bakes take samples in blocks of 4, 16, 64, ... and every other texel along each axis first: soon every lookup has a value.
+     and adaptive bakes take samples in blocks of 4, 16, 64, ... and every other texel along each axis first: soon every lookup has a
+     value.
      A hit from within (only through an open border can a ray get there) is a surface too, with its normal turned.
 
    GLSL that lights a surface by an exported irradiance texture (GL_LINEAR, GL_CLAMP_TO_EDGE); grid: voxel coordinates
@@ -165,9 +167,10 @@
                 several times the error that is told.
                 Voxels of 1e-150 to 1e150 world units: squares of lengths must neither vanish nor overflow. Where matter is
                 thinner than the lattice's spacing a lookup mixes the light of both of its sides.
-   Cost         PATHS: samples * (1 + lights that have a size) rays for a texel, and as many for each reflection. FEEDBACK:
-                samples * (1 + half of these lights), each of the first four with all lights; for each probe as if by as many
-                samples as hits read it, 1 (2 where the albedo is above .9) to 8.
+   Cost         PATHS: samples * (1 + lights that have a size) rays for a texel, and as many for each reflection; an uneven image counts
+                as a light. FEEDBACK: samples * (1 + half of these lights), each of the first four with all lights, and for an image
+                up to 2 to 4, half of which are below the horizon; for each probe as if by as many samples as hits read it, 1 (2
+                where the albedo is above .9) to 8, with one ray to the image for each.
 
    History  1.0  first release
 */
@@ -530,6 +533,8 @@ ISOGI_API size_t isogi_trace_memory(const isogi_trace *trace); /* bytes that the
 #define ISOGI_TRACE__BLURRED 0.18   /* of a texel's own variance: that of what the filter blurs */
 #define ISOGI_TRACE__TURNED 16      /* texels along an axis that share a scramble of their samples */
 #define ISOGI_TRACE__LIGHT_FIRST 4u /* samples of a texel with one of each light */
+#define ISOGI_TRACE__UNEVEN 1.2     /* mean square of an image over the square of its mean that makes directions be drawn from it, */
+#define ISOGI_TRACE__SKY_RAYS 4     /* up to so many for each sample of a texel */
 #if defined(__GNUC__) && !defined(__TINYC__)
 #define ISOGI_TRACE__AHEAD(p) __builtin_prefetch(p)
 #else
@@ -810,7 +815,7 @@ static void isogi_trace__env_light(const isogi_env *env, const float dir[3], flo
    1/8 6/8 1/8) / total. Rows and pixels are found in cumulative sums. */
 typedef struct isogi_trace__sky {
     const isogi_env *env;
-    int on;        /* whether directions are drawn from it */
+    int rays;      /* directions drawn from it for each cosine-distributed one of a texel (of others 1); 0: none */
     int turned;    /* it has a rotation */
     double total;  /* integral of luminance over the sphere */
     float *mean;   /* width * height */
@@ -878,9 +883,10 @@ static size_t isogi_trace__search(const double *sum, size_t count, const uint32_
     return low;
 }
 
-/* An image without peaks is left to the cosine-distributed rays: they find it as well, with half the rays. */
+/* An even image is left to the cosine-distributed rays: they find it as well, with fewer rays. The more uneven it is, the more rays are
+   worth while. */
 static isogi_result isogi_trace__sky_build(isogi_trace__sky *sky, const isogi_env *env, const isogi_context *context) {
-    double peak = 0;
+    double square = 0;
     size_t x, y;
     sky->env = env, sky->turned = !isogi_trace__is_identity(env->rotation);
     if (!env->rgb) return ISOGI_OK;
@@ -901,17 +907,21 @@ static isogi_result isogi_trace__sky_build(isogi_trace__sky *sky, const isogi_en
         for (x = 0; x < sky->width; x++) {
             float mean = (float)isogi_trace__pixel_mean(env, (int)x, (int)y);
             sky->mean[x + sky->width * y] = mean;
-            sum[x + 1] = sum[x] + (double)mean * area;
-            if ((double)mean > peak) peak = (double)mean;
+            sum[x + 1] = sum[x] + (double)mean * area, square += (double)mean * (double)mean * area;
         }
         sky->row[y + 1] = sky->row[y] + sum[sky->width];
         isogi_trace__search_set(sum, sky->width, sky->near_pixel + y * sky->width);
     }
     isogi_trace__search_set(sky->row, sky->height, sky->near_row);
     sky->total = sky->row[sky->height];
-    sky->on = sky->total > 0 && peak * 4 * ISOGI_TRACE__PI > 8 * sky->total;
+    square *= 4 * ISOGI_TRACE__PI / (sky->total * sky->total); /* over that of the mean; NaN where all is black */
+    if (square > ISOGI_TRACE__UNEVEN) sky->rays = square < ISOGI_TRACE__SKY_RAYS - 1 ? 1 + (int)square : ISOGI_TRACE__SKY_RAYS;
     return ISOGI_OK;
 }
+
+/* Directions drawn from the image for each cosine-distributed one. The rays of a texel to the sky end anywhere and need no probe: several
+   of them cost little. */
+static int isogi_trace__sky_rays(const isogi_trace__sky *sky, int is_texel) { return is_texel || !sky->rays ? sky->rays : 1; }
 
 /* A direction (world) drawn from the image, and its density (per steradian); layout of isogi_env. */
 static double isogi_trace__sky_direction(const isogi_trace__sky *sky, double u, double v, float dir[3]) {
@@ -1556,7 +1566,7 @@ static void isogi_trace__wave_lights(isogi_trace__wave *w, isogi_trace__shadows 
 static void isogi_trace__wave_sky(isogi_trace__wave *w, isogi_trace__shadows *s, int depth) {
     const isogi_trace__sky *sky = &w->scene->sky;
     int i, c;
-    if (!sky->on) return;
+    if (!sky->rays) return;
     for (i = 0; i < w->count; i++) {
         double u = isogi_trace__random(w->key[i], depth, ISOGI_TRACE__ENVIRONMENT);
         double v = isogi_trace__random(w->key[i], depth, ISOGI_TRACE__ENVIRONMENT + 1), density, cosine, rgb[3];
@@ -1586,7 +1596,7 @@ static void isogi_trace__wave_escape(isogi_trace__wave *w, int i) {
         return;
     }
     if (!scene->has_env) return;
-    if (scene->sky.on) {
+    if (scene->sky.rays) {
         double cosine = w->density[i] / ISOGI_TRACE__PI;
         weight = cosine / (cosine + isogi_trace__sky_density(&scene->sky, (const float *)w->dir[i]));
     }
@@ -3978,7 +3988,9 @@ static void isogi_trace__cast_escape(isogi_trace__cast *c, int i) {
         return;
     }
     if (!scene->has_env) return;
-    if (scene->sky.on) weight = c->weight[i] / (c->weight[i] + ISOGI_TRACE__PI * isogi_trace__sky_density(&scene->sky, dir));
+    if (scene->sky.rays)
+        weight = c->weight[i] / (c->weight[i] + ISOGI_TRACE__PI * isogi_trace__sky_rays(&scene->sky, span->of->brick != NULL) *
+                                                    isogi_trace__sky_density(&scene->sky, dir));
     isogi_trace__env_light(&scene->desc.lighting.env, dir, radiance);
     for (a = 0; a < 3; a++) rgb[a] = weight * (double)radiance[a], direct[a] += (float)rgb[a];
     luminance = isogi_trace__luminance(rgb);
@@ -4135,15 +4147,16 @@ static void isogi_trace__span_sky(isogi_trace__cast *c, uint32_t k) {
     const isogi_trace__sky *sky = &c->trace->scene.sky;
     const isogi_trace__span *span = &c->span[k];
     const isogi_trace__sequence sequence = isogi_trace__sequence_of(isogi_trace__key(c->sequence[k], 0x5eed2));
+    const uint32_t rays = (uint32_t)isogi_trace__sky_rays(sky, span->of->brick != NULL);
     uint32_t i;
-    for (i = span->first; i < span->first + span->count; i++) {
+    for (i = rays * span->first; i < rays * (span->first + span->count); i++) {
         double u[2], cosine, density;
         float dir[3];
         isogi_trace__turned(&sequence, i, c->turn[k], u);
         density = isogi_trace__sky_direction(sky, u[0], u[1], dir);
         cosine = isogi_trace__site_kernel(&c->site[k], dir) / ISOGI_TRACE__PI;
         if (!(cosine > 0) || !(density > 0)) continue;
-        c->weight[c->count] = cosine / (density + cosine);
+        c->weight[c->count] = cosine / (rays * density + cosine);
         c->owner[c->count] = k;
         isogi_trace__cast_add(c, dir, 0);
     }
@@ -4183,8 +4196,8 @@ static void isogi_trace__cast_round(isogi_trace__cast *c, uint32_t spans) {
     for (k = 0; k < spans && c->shadow; k++) {
         const isogi_trace__span *s = &c->span[k];
         int texel = s->of->brick != NULL;
-        uint32_t n =
-            c->bright ? s->count : isogi_trace__light_samples(s->first + s->count, texel) - isogi_trace__light_samples(s->first, texel);
+        uint32_t n = c->bright ? s->count * (uint32_t)isogi_trace__sky_rays(&c->trace->scene.sky, texel)
+                               : isogi_trace__light_samples(s->first + s->count, texel) - isogi_trace__light_samples(s->first, texel);
         double spread = n ? c->square[k] - c->sum[k] * c->sum[k] / n : 0;
         *(c->bright ? &c->span[k].bright_spread : &c->span[k].light_spread) += spread > 0 ? spread : 0;
     }
@@ -4276,7 +4289,7 @@ static void isogi_trace__cast_piece(isogi_trace__cast *c, isogi_trace__piece *pi
     isogi_trace__piece_hits(t, piece);
     if (t->scene.desc.mode == ISOGI_TRACE_TRANSFER) return;
     c->shadow = c->bright = 1;
-    for (k = 0; k < spans && t->scene.sky.on; k++)
+    for (k = 0; k < spans && t->scene.sky.rays; k++)
         if (!c->span[k].nowhere) isogi_trace__span_sky(c, k);
     isogi_trace__cast_round(c, spans);
     c->bright = 0;
@@ -4749,6 +4762,7 @@ static void isogi_trace__guide_task(void *arg, size_t task) {
     isogi_trace *t = (isogi_trace *)arg;
     isogi_trace__set *set = &t->feedback->texels;
     size_t i, end = isogi_trace__sweep(t, task, set->count, &i), v = (size_t)t->values;
+    const double rays = isogi_trace__sky_rays(&t->scene.sky, 1);
     for (; i < end; i++) {
         const isogi_trace__node *n = isogi_trace__node_at(set, i);
         isogi_trace__guide *g = isogi_trace__guide_at(set, i);
@@ -4768,7 +4782,7 @@ static void isogi_trace__guide_task(void *arg, size_t task) {
         if (t->scene.desc.mode == ISOGI_TRACE_TRANSFER) continue;
         g->luminance = (float)(ISOGI_TRACE__PI * scale * (isogi_trace__luminance(rgb) + isogi_trace__luminance(n->bright)));
         spread = isogi_trace__mean_variance(isogi_trace__luminance(rgb), n->square + n->bounce_square, (double)n->samples);
-        if (n->samples > 1) spread += n->bright_spread * scale / (n->samples - 1);
+        if (n->samples * rays > 1) spread += n->bright_spread * scale * rays / (n->samples * rays - 1);
         g->variance = (float)(ISOGI_TRACE__PI * ISOGI_TRACE__PI * spread);
         for (a = 0; a < 3; a++) rgb[a] = scale * (double)bounce[a];
         g->hidden = (float)(scale * (t->scene.desc.bounces ? n->hits : n->samples)); /* hits are counted if they reflect */
@@ -5594,7 +5608,7 @@ static isogi_result isogi_trace__trace_batch(isogi_trace *t, uint64_t limit, int
 
 static isogi_result isogi_trace__feedback_step(isogi_trace *t, uint64_t max_rays, uint64_t *spent) {
     isogi_trace__feedback *f = t->feedback;
-    uint64_t begin = t->counters.rays, each = 1 + (uint64_t)t->scene.sky.on + (uint64_t)t->scene.desc.lighting.light_count, other = 0;
+    uint64_t begin = t->counters.rays, each = 1 + (uint64_t)t->scene.sky.rays + (uint64_t)t->scene.desc.lighting.light_count, other = 0;
     isogi_result result = ISOGI_OK;
     while (result == ISOGI_OK && (t->wanted || f->unpublished)) {
         uint64_t used = t->counters.rays - begin + other, left = max_rays ? max_rays - used : SIZE_MAX / 4;
@@ -6780,7 +6794,7 @@ static void isogi_trace__field_lights(isogi_trace__walk *w, int depth) {
                 density = 0;
             } else { /* the environment's image by brightness, weighed against the cosine */
                 float radiance[3];
-                if (!sky->on) continue;
+                if (!sky->rays) continue;
                 density = isogi_trace__sky_direction(sky, u, v, beam.dir);
                 cosine = isogi_trace__dot(w->normal[i], beam.dir) / ISOGI_TRACE__PI;
                 density += cosine;
@@ -6801,7 +6815,7 @@ static void isogi_trace__field_escape(isogi_trace__walk *w, int i, double cosine
     float radiance[3];
     int c;
     if (!scene->has_env) return;
-    if (scene->sky.on) weight = cosine / (cosine + isogi_trace__sky_density(&scene->sky, w->ray[i].dir));
+    if (scene->sky.rays) weight = cosine / (cosine + isogi_trace__sky_density(&scene->sky, w->ray[i].dir));
     isogi_trace__env_light(&scene->desc.lighting.env, w->ray[i].dir, radiance);
     for (c = 0; c < 3; c++) w->light[w->slot[i]][c] += weight * w->through[i][c] * (double)radiance[c];
 }
@@ -6958,6 +6972,8 @@ ISOGI_API isogi_result isogi_trace_gather_field(const isogi_trace_desc *desc, is
 #undef ISOGI_TRACE__DEPTH
 #undef ISOGI_TRACE__NOISE
 #undef ISOGI_TRACE__NOISE_FEW
+#undef ISOGI_TRACE__UNEVEN
+#undef ISOGI_TRACE__SKY_RAYS
 #undef ISOGI_TRACE__NOISE_KNOWN
 #undef ISOGI_TRACE__PILOT_SAMPLES
 #undef ISOGI_TRACE__NOISE_PILOT
