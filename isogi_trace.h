@@ -596,9 +596,8 @@ static double isogi_trace__unit(uint64_t bits) { return (double)(bits >> 11) * (
 enum {
     ISOGI_TRACE__DIRECTION = 0, /* and 1 */
     ISOGI_TRACE__ROULETTE = 2,
-    ISOGI_TRACE__ENVIRONMENT = 3, /* and 4, 5 */
-    ISOGI_TRACE__LIGHT = 6,       /* and on: two for each light, by a second key */
-    ISOGI_TRACE__DIMENSIONS = 8
+    ISOGI_TRACE__LIGHT = 3, /* two for each light, by a second key */
+    ISOGI_TRACE__DIMENSIONS = 4
 };
 
 static double isogi_trace__random(uint64_t key, int depth, int purpose) {
@@ -648,6 +647,23 @@ static void isogi_trace__sobol(const isogi_trace__sequence *s, uint32_t index, d
     second ^= (second & 0xaaaaaaaau) >> 1;
     u[0] = isogi_trace__scramble(index, s->key[0]);
     u[1] = isogi_trace__scramble(second, s->key[1]);
+}
+
+/* Of samples of a light: number 0 is the environment's image, the others follow. */
+static isogi_trace__sequence isogi_trace__light_sequence(uint64_t texel, size_t light) {
+    return isogi_trace__sequence_of(isogi_trace__key(texel, 0x5eed2 + (uint64_t)light));
+}
+
+/* Where the path of sample `index` tries a light from its vertex at `depth`; those at the texel itself are well spread together. */
+static void isogi_trace__light_sample(uint64_t texel, uint32_t index, uint64_t path, int depth, size_t light, double u[2]) {
+    if (!depth) {
+        const isogi_trace__sequence sequence = isogi_trace__light_sequence(texel, light);
+        isogi_trace__sobol(&sequence, index, u);
+        return;
+    }
+    path = isogi_trace__key(path, (uint64_t)depth * ISOGI_TRACE__DIMENSIONS + ISOGI_TRACE__LIGHT);
+    path = isogi_trace__key(path, (uint64_t)light);
+    u[0] = isogi_trace__unit(isogi_trace__key(path, 0)), u[1] = isogi_trace__unit(isogi_trace__key(path, 1));
 }
 
 /* ==== directions ===================================================================================================== */
@@ -1432,6 +1448,7 @@ typedef struct isogi_trace__wave {
     double light[ISOGI_TRACE__WAVE][3]; /* of each sample: what its path brought */
     float basis[ISOGI_TRACE__MAX_ORDER * ISOGI_TRACE__MAX_ORDER];          /* TRANSFER: scratch for SH values */
     double transfer[3 * ISOGI_TRACE__MAX_ORDER * ISOGI_TRACE__MAX_ORDER]; /* TRANSFER: sum over samples, coefficients x channels */
+    int first;                          /* sample of slot 0 */
     int count;                          /* paths alive; the arrays below are of these */
     int slot[ISOGI_TRACE__WAVE];
     uint64_t key[ISOGI_TRACE__WAVE];
@@ -1535,6 +1552,10 @@ static void isogi_trace__shadows_add(isogi_trace__wave *w, isogi_trace__shadows 
     s->count++;
 }
 
+static void isogi_trace__wave_sample(const isogi_trace__wave *w, int i, int depth, size_t light, double u[2]) {
+    isogi_trace__light_sample(w->site->key, (uint32_t)(w->first + w->slot[i]), w->key[i], depth, light, u);
+}
+
 /* Next-event estimation at the vertices of all paths: the lights, one after the other. At the site, lights without extent are left
    out: isogi_trace__site_lights does them once. */
 static void isogi_trace__wave_lights(isogi_trace__wave *w, isogi_trace__shadows *s, int depth, float (*positions)[3]) {
@@ -1545,13 +1566,11 @@ static void isogi_trace__wave_lights(isogi_trace__wave *w, isogi_trace__shadows 
         const isogi_light *light = &lighting->lights[l];
         if (!depth && isogi_trace__is_delta(light)) continue;
         for (i = 0; i < w->count; i++) {
-            uint64_t key = isogi_trace__key(
-                isogi_trace__key(w->key[i], (uint64_t)depth * ISOGI_TRACE__DIMENSIONS + ISOGI_TRACE__LIGHT), l);
-            double u = isogi_trace__unit(isogi_trace__key(key, 0)), v = isogi_trace__unit(isogi_trace__key(key, 1));
-            double point[3], cosine;
+            double point[3], cosine, u[2];
             isogi_trace__beam beam;
+            isogi_trace__wave_sample(w, i, depth, 1 + l, u);
             for (c = 0; c < 3; c++) point[c] = depth ? (double)positions[i][c] : w->site->origin[c];
-            if (!isogi_trace__light_beam(light, point, u, v, &beam)) continue;
+            if (!isogi_trace__light_beam(light, point, u[0], u[1], &beam)) continue;
             cosine = isogi_trace__cosine_at(w, i, depth, beam.dir);
             if (!(cosine > 0)) continue;
             for (c = 0; c < 3; c++) beam.rgb[c] *= cosine / ISOGI_TRACE__PI;
@@ -1568,10 +1587,10 @@ static void isogi_trace__wave_sky(isogi_trace__wave *w, isogi_trace__shadows *s,
     int i, c;
     if (!sky->rays) return;
     for (i = 0; i < w->count; i++) {
-        double u = isogi_trace__random(w->key[i], depth, ISOGI_TRACE__ENVIRONMENT);
-        double v = isogi_trace__random(w->key[i], depth, ISOGI_TRACE__ENVIRONMENT + 1), density, cosine, rgb[3];
+        double u[2], density, cosine, rgb[3];
         float dir[3], radiance[3];
-        density = isogi_trace__sky_direction(sky, u, v, dir);
+        isogi_trace__wave_sample(w, i, depth, 0, u);
+        density = isogi_trace__sky_direction(sky, u[0], u[1], dir);
         cosine = isogi_trace__cosine_at(w, i, depth, dir) / ISOGI_TRACE__PI;
         if (!(cosine > 0) || !(density > 0)) continue;
         isogi_trace__env_light(sky->env, dir, radiance);
@@ -1672,7 +1691,7 @@ static void isogi_trace__wave_begin(isogi_trace__wave *w, int first, int count) 
     isogi_trace__basis basis;
     int i, c;
     isogi_trace__basis_of(site->normal, &basis);
-    w->count = count;
+    w->first = first, w->count = count;
     for (i = 0; i < count; i++) {
         double u[2];
         w->slot[i] = i, w->key[i] = isogi_trace__key(site->key, (uint64_t)(first + i));
@@ -1756,12 +1775,32 @@ static double isogi_trace__unseen(double possible, double met, double n) {
     return most * most / ((n + 2) * (n + 2));
 }
 
+/* What paths of one place have brought: their mean, the sum of squares of what they differ from it by (Welford's running update: no
+   cancellation), and the most. */
+typedef struct isogi_trace__spread {
+    double mean, square, most;
+} isogi_trace__spread;
+
+static void isogi_trace__spread_add(isogi_trace__spread *s, const double rgb[3], int number) {
+    double luminance = isogi_trace__luminance(rgb), before = luminance - s->mean;
+    s->mean += before / (number + 1), s->square += before * (luminance - s->mean);
+    if (luminance > s->most) s->most = luminance;
+}
+
+/* Standard error of irradiance by n paths. What they have not met may be as bright as the brightest of them: where most are alike and a
+   few far brighter, the variance alone tells of too little whenever those few are missing. */
+static float isogi_trace__spread_error(const isogi_trace__spread *s, int n, double possible) {
+    double variance = n > 1 ? ISOGI_TRACE__PI * ISOGI_TRACE__PI * s->square / ((double)n * (n - 1)) : 0;
+    return n > 1 ? (float)sqrt(variance + isogi_trace__unseen(possible, ISOGI_TRACE__PI * s->most, n)) : ISOGI_TRACE__NOT_READY;
+}
+
 /* Computes one site: values[3] (RGB irradiance) or values[order*order*channels], and the standard error of the luminance (TRANSFER:
    1 / sqrt(samples), from which isogi_trace__variance works it out under the lighting). */
 static void isogi_trace__gather_site(const isogi_trace__scene *scene, const isogi_trace__site *site, isogi_trace__wave *wave,
                                      float *values, float *error, isogi_counters *counters) {
     const isogi_trace_desc *desc = &scene->desc;
-    double sum[3] = {0, 0, 0}, mean = 0, square = 0, direct[3] = {0, 0, 0};
+    isogi_trace__spread spread = {0, 0, 0};
+    double sum[3] = {0, 0, 0}, direct[3] = {0, 0, 0};
     int coefficients = desc->order * desc->order * desc->transfer_channels, first, i, c;
     wave->scene = scene, wave->site = site, wave->counters = counters;
     memset(wave->transfer, 0, sizeof wave->transfer);
@@ -1770,16 +1809,11 @@ static void isogi_trace__gather_site(const isogi_trace__scene *scene, const isog
         int count = desc->samples - first < ISOGI_TRACE__WAVE ? desc->samples - first : ISOGI_TRACE__WAVE;
         isogi_trace__wave_run(wave, first, count);
         for (i = 0; i < count; i++) {
-            /* Welford's running variance: no cancellation */
-            double luminance = isogi_trace__luminance(wave->light[i]), before = luminance - mean;
-            mean += before / (first + i + 1);
-            square += before * (luminance - mean);
+            isogi_trace__spread_add(&spread, wave->light[i], first + i);
             for (c = 0; c < 3; c++) sum[c] += wave->light[i][c];
         }
     }
-    square *= ISOGI_TRACE__PI * ISOGI_TRACE__PI / ((double)desc->samples * (desc->samples > 1 ? desc->samples - 1 : 1));
-    *error = desc->samples > 1 ? (float)sqrt(square + isogi_trace__unseen(scene->possible, ISOGI_TRACE__PI * mean, desc->samples))
-        : ISOGI_TRACE__NOT_READY;
+    *error = isogi_trace__spread_error(&spread, desc->samples, scene->possible);
     if (desc->samples > 1 && desc->mode == ISOGI_TRACE_TRANSFER) *error = (float)(1 / sqrt((double)desc->samples));
     if (desc->mode == ISOGI_TRACE_TRANSFER) {
         for (i = 0; i < coefficients; i++) values[i] = (float)(ISOGI_TRACE__PI * wave->transfer[i] / desc->samples);
@@ -4146,7 +4180,7 @@ static void isogi_trace__span_hemisphere(isogi_trace__cast *c, uint32_t k) {
 static void isogi_trace__span_sky(isogi_trace__cast *c, uint32_t k) {
     const isogi_trace__sky *sky = &c->trace->scene.sky;
     const isogi_trace__span *span = &c->span[k];
-    const isogi_trace__sequence sequence = isogi_trace__sequence_of(isogi_trace__key(c->sequence[k], 0x5eed2));
+    const isogi_trace__sequence sequence = isogi_trace__light_sequence(c->sequence[k], 0);
     const uint32_t rays = (uint32_t)isogi_trace__sky_rays(sky, span->of->brick != NULL);
     uint32_t i;
     for (i = rays * span->first; i < rays * (span->first + span->count); i++) {
@@ -4171,7 +4205,7 @@ static uint32_t isogi_trace__light_samples(uint32_t samples, int is_texel) {
 static void isogi_trace__span_light(isogi_trace__cast *c, uint32_t k, size_t number) {
     const isogi_light *light = &c->trace->scene.desc.lighting.lights[number];
     const isogi_trace__span *span = &c->span[k];
-    const isogi_trace__sequence sequence = isogi_trace__sequence_of(isogi_trace__key(c->sequence[k], 0x5eed3 + number));
+    const isogi_trace__sequence sequence = isogi_trace__light_sequence(c->sequence[k], 1 + number);
     uint32_t i = isogi_trace__light_samples(span->first, span->of->brick != NULL);
     const uint32_t end = isogi_trace__light_samples(span->first + span->count, span->of->brick != NULL);
     int a;
@@ -6775,27 +6809,25 @@ static void isogi_trace__field_flush(isogi_trace__walk *w, int count) {
             w->light[w->slot[w->owner[i]]][c] += w->through[w->owner[i]][c] * w->gain[i][c];
 }
 
-static void isogi_trace__field_lights(isogi_trace__walk *w, int depth) {
+static void isogi_trace__field_lights(isogi_trace__walk *w, uint64_t site, int first, int depth) {
     const isogi_lighting *lighting = &w->field->scene.desc.lighting;
     const isogi_trace__sky *sky = &w->field->scene.sky;
     size_t l;
     int i, c, count;
     for (l = 0; l <= lighting->light_count; l++) {
         for (count = i = 0; i < w->count; i++) {
-            uint64_t key = isogi_trace__key(w->key[i], (uint64_t)depth * ISOGI_TRACE__DIMENSIONS + ISOGI_TRACE__LIGHT);
-            double u, v, cosine, density;
+            double u[2], cosine, density;
             isogi_trace__beam beam;
-            key = isogi_trace__key(key, l), u = isogi_trace__unit(isogi_trace__key(key, 0)),
-            v = isogi_trace__unit(isogi_trace__key(key, 1));
+            isogi_trace__light_sample(site, (uint32_t)(first + w->slot[i]), w->key[i], depth, l, u);
             beam.tmax = 0;
-            if (l < lighting->light_count) {
-                if (!isogi_trace__light_beam(&lighting->lights[l], w->place[i], u, v, &beam)) continue;
+            if (l) {
+                if (!isogi_trace__light_beam(&lighting->lights[l - 1], w->place[i], u[0], u[1], &beam)) continue;
                 cosine = isogi_trace__dot(w->normal[i], beam.dir) / ISOGI_TRACE__PI;
                 density = 0;
             } else { /* the environment's image by brightness, weighed against the cosine */
                 float radiance[3];
                 if (!sky->rays) continue;
-                density = isogi_trace__sky_direction(sky, u, v, beam.dir);
+                density = isogi_trace__sky_direction(sky, u[0], u[1], beam.dir);
                 cosine = isogi_trace__dot(w->normal[i], beam.dir) / ISOGI_TRACE__PI;
                 density += cosine;
                 isogi_trace__env_light(sky->env, beam.dir, radiance);
@@ -6857,7 +6889,7 @@ static void isogi_trace__field_run(isogi_trace__walk *w, uint64_t key, int first
         for (c = 0; c < 3; c++) w->through[i][c] = 1, w->light[i][c] = 0;
     }
     for (depth = 0; w->count; depth++, w->count = alive) {
-        isogi_trace__field_lights(w, depth);
+        isogi_trace__field_lights(w, key, first, depth);
         for (i = 0; i < w->count; i++) {
             float dir[3];
             double u[2];
@@ -6894,7 +6926,8 @@ static void isogi_trace__field_point(const isogi_trace__field *f, size_t index) 
     const isogi_trace_desc *d = &f->scene.desc;
     isogi_trace__walk w;
     uint64_t key = isogi_trace__key(isogi_trace__key(d->seed, 2), (uint64_t)index);
-    double sum[3] = {0, 0, 0}, mean = 0, square = 0, place[3], length = sqrt(isogi_trace__dot(f->normals[index], f->normals[index]));
+    isogi_trace__spread spread = {0, 0, 0};
+    double sum[3] = {0, 0, 0}, place[3], length = sqrt(isogi_trace__dot(f->normals[index], f->normals[index]));
     float normal[3];
     int first, i, c;
     memset(f->irradiance[index], 0, sizeof f->irradiance[index]);
@@ -6911,15 +6944,12 @@ static void isogi_trace__field_point(const isogi_trace__field *f, size_t index) 
         memcpy(w.place[0], place, sizeof place), memcpy(w.normal[0], normal, sizeof normal);
         isogi_trace__field_run(&w, key, first, count);
         for (i = 0; i < count; i++) {
-            double luminance = isogi_trace__luminance(w.light[i]), before = luminance - mean;
-            mean += before / (first + i + 1), square += before * (luminance - mean);
+            isogi_trace__spread_add(&spread, w.light[i], first + i);
             for (c = 0; c < 3; c++) sum[c] += w.light[i][c];
         }
     }
     for (c = 0; c < 3; c++) f->irradiance[index][c] = (float)(ISOGI_TRACE__PI * sum[c] / d->samples);
-    if (d->samples < 2) return;
-    square *= ISOGI_TRACE__PI * ISOGI_TRACE__PI / ((double)d->samples * (d->samples - 1));
-    f->error[index] = (float)sqrt(square + isogi_trace__unseen(isogi_trace__field_open(f, place), ISOGI_TRACE__PI * mean, d->samples));
+    f->error[index] = isogi_trace__spread_error(&spread, d->samples, isogi_trace__field_open(f, place));
 }
 
 static void isogi_trace__field_task(void *arg, size_t task) {

@@ -266,7 +266,7 @@ TEST(bright_spot_of_an_image_is_found) {
     }
     CHECK(worst < 1, "largest error in units of 2 %% and 4 standard errors: %g", worst);
     for (int i = 0; i < n; i++)
-        CHECK(error[i] < 0.1f * e[i][0] + 0.02f, "E %g with a standard error of %g", (double)e[i][0], (double)error[i]);
+        CHECK(error[i] < 0.12f * e[i][0] + 0.02f, "E %g with a standard error of %g", (double)e[i][0], (double)error[i]);
     scene_free(&s);
 }
 
@@ -910,7 +910,7 @@ TEST(rays_from_the_surface_do_not_leak_through_the_ground) {
     }
     isogi_vol_free(s.pyramid);
     if (isogi_vol_build(&s.pyramid, &s.volume, NULL) != ISOGI_OK) abort();
-    for (int y = H / 2 + 1; y < H; y++)
+    for (int y = H / 2 + 3; y < H; y++) /* over 22 voxels the ground falls by 5 degrees at most */
         for (int x = 0; x < W; x++) sky[y][x][0] = sky[y][x][1] = sky[y][x][2] = 1;
     memset(&d.lighting, 0, sizeof d.lighting);
     d.pyramid = s.pyramid, d.offset = -1;

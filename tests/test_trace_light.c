@@ -379,13 +379,13 @@ TEST(colours_are_asked_for_once) {
 }
 
 /* The pit's light takes the colour of the wall opposite: near the red wall more green arrives by reflection, and the other way
-   round (a little: from the wall of a sphere all its parts look equally large, only their light differs); the mean of both walls is the
-   same by symmetry. The colours of tables and callback are those of isogi_trace_material. */
+   round (a tenth: from the wall of a sphere all its parts look equally large, only their light differs); the mean of both walls is the
+   same by symmetry. Noise of each is .7 %. The colours of tables and callback are those of isogi_trace_material. */
 TEST(colour_bleeds) {
     double q[5] = {16, 15, 16, 22, 10}, e[2][3];
     paint colours = {16, 0};
     scene s = scene_make(33, 33, 33, NULL, pit, q);
-    isogi_trace_desc d = desc_make(&s, 0.8f, 4, 2048);
+    isogi_trace_desc d = desc_make(&s, 0.8f, 4, 131072);
     float points[2][3] = {{6, 15, 16}, {26, 15, 16}}, light[2][3], direct[2][3], albedo[3], emission[3];
     double place[3] = {3, 4, 5};
     d.material = red_and_green, d.material_user = &colours;
@@ -394,7 +394,7 @@ TEST(colour_bleeds) {
     isogi_trace_gather(&d, (const float(*)[3])points, NULL, 2, direct, NULL, NULL);
     for (int i = 0; i < 2; i++)
         for (int c = 0; c < 3; c++) e[i][c] = (double)light[i][c] - (double)direct[i][c];
-    CHECK(e[0][1] > 1.1 * e[0][0] && e[1][0] > 1.1 * e[1][1], "reflected: %.3f %.3f at the red wall, %.3f %.3f at the green one", e[0][0],
+    CHECK(e[0][1] > 1.06 * e[0][0] && e[1][0] > 1.06 * e[1][1], "reflected: %.3f %.3f at the red wall, %.3f %.3f at the green one", e[0][0],
           e[0][1], e[1][0], e[1][1]);
     CHECK(fabs(e[0][0] + e[1][0] - e[0][1] - e[1][1]) < 0.03 * (e[0][0] + e[1][0]), "red %.4f, green %.4f in all", e[0][0] + e[1][0],
           e[0][1] + e[1][1]);
