@@ -96,10 +96,10 @@
      the difference (with one or two samples, of which none is known, all of them; from four on in two rounds: the second compares what the
      first has smoothed); their samples are well spread together. With each sample go two to four rays drawn by the brightness of an uneven
      image: they need no probe, and take a quarter to two fifths of the error that one of them leaves. Lights are not filtered, so that
-     their shadows stay sharp (desc.unfiltered: nothing is). TRANSFER is not filtered at all, and takes more samples for it. Probes cost
-     accuracy: half a per cent of the mean and 1.8 % at a point in narrow channels of albedo 0.8 (test_trace_bake --long prints it). Lazy
-     and adaptive bakes take samples in blocks of 4, 16, 64, ... and every other texel along each axis first: soon every lookup has a
-     value.
+     their shadows stay sharp (desc.unfiltered: nothing is); wide ones, with soft shadows everywhere, are sampled up to four times instead.
+     TRANSFER is not filtered at all, and takes more samples for it. Probes cost accuracy: half a per cent of the mean and 1.8 % at a point
+     in narrow channels of albedo 0.8 (test_trace_bake --long prints it). Lazy and adaptive bakes take samples in blocks of 4, 16, 64, ...
+     and every other texel along each axis first: soon every lookup has a value.
      A hit from within (only through an open border can a ray get there) is a surface too, with its normal turned.
 
    GLSL that lights a surface by an exported irradiance texture (GL_LINEAR, GL_CLAMP_TO_EDGE); grid: voxel coordinates
@@ -167,10 +167,10 @@
                 several times the error that is told.
                 Voxels of 1e-150 to 1e150 world units: squares of lengths must neither vanish nor overflow. Where matter is
                 thinner than the lattice's spacing a lookup mixes the light of both of its sides.
-   Cost         PATHS: samples * (1 + lights that have a size) rays for a texel, and as many for each reflection; an uneven image counts
-                as a light. FEEDBACK: samples * (1 + half of these lights), each of the first four with all lights, and for an image
-                up to 2 to 4, half of which are below the horizon; for each probe as if by as many samples as hits read it, 1 (2
-                where the albedo is above .9) to 8, with one ray to the image for each.
+   Cost         PATHS: samples * (1 + lights that have a size) rays for a texel, and as many for each reflection; an uneven image counts as
+                a light. FEEDBACK: samples * (1 + half of these lights), each of the first four with all lights, with four times as many
+                where one looks wider than 8 degrees; and for an image 2 to 4, half of which are below the horizon; for each probe as if by
+                as many samples as hits read it, 1 (2 where the albedo is above .9) to 8, with one ray to the image for each.
 
    History  1.0  first release
 */
@@ -532,7 +532,8 @@ ISOGI_API size_t isogi_trace_memory(const isogi_trace *trace); /* bytes that the
 #define ISOGI_TRACE__NEAR 24        /* squared distance at which a texel counts for 1/e */
 #define ISOGI_TRACE__BLURRED 0.18   /* of a texel's own variance: that of what the filter blurs */
 #define ISOGI_TRACE__TURNED 16      /* texels along an axis that share a scramble of their samples */
-#define ISOGI_TRACE__LIGHT_FIRST 4u /* samples of a texel with one of each light */
+#define ISOGI_TRACE__LIGHT_FIRST 4u /* samples of a texel with one of each light; of wide ones, half so many with four */
+#define ISOGI_TRACE__WIDE 0.07      /* half the angle (radians) of lights that are wide */
 #define ISOGI_TRACE__UNEVEN 1.2     /* mean square of an image over the square of its mean that makes directions be drawn from it, */
 #define ISOGI_TRACE__SKY_RAYS 4     /* up to so many for each sample of a texel */
 #if defined(__GNUC__) && !defined(__TINYC__)
@@ -1283,6 +1284,7 @@ typedef struct isogi_trace__scene {
     double range;      /* of the volume's values, from the least to the largest; 1 if they are all the same */
     double open_light; /* luminance of the irradiance of an open texel, averaged over orientations: the unit of desc.error */
     int high;    /* light is gathered on the high side */
+    int wide;    /* some light looks wide: its half-shadows are everywhere */
     double least; /* shortest edge of a voxel */
     isogi_trace__cells cells[9];
     double reach[ISOGI_TRACE__WAVE]; /* of rays, or all zero */
@@ -2013,6 +2015,28 @@ static isogi_result isogi_trace__open_light(isogi_trace__scene *scene) {
     return result;
 }
 
+/* Whether some light looks wide from the middle of the volume. */
+static int isogi_trace__wide_lights(const isogi_trace__scene *scene) {
+    double middle[3], least = isogi_trace__middle(scene, middle);
+    size_t k;
+    int a;
+    for (k = 0; k < scene->desc.lighting.light_count; k++) {
+        const isogi_light *l = &scene->desc.lighting.lights[k];
+        double to[3], u = 0, v = 0, apart = 1, size = (double)l->radius;
+        float point[3];
+        if (isogi_trace__is_delta(l)) continue;
+        isogi_trace__measure_from(l, middle, least, point);
+        for (a = 0; a < 3; a++) {
+            to[a] = (double)l->vector[a] - (double)point[a];
+            u += (double)l->edge[0][a] * (double)l->edge[0][a], v += (double)l->edge[1][a] * (double)l->edge[1][a];
+        }
+        if (l->kind != ISOGI_LIGHT_DIRECTIONAL) apart = sqrt(isogi_trace__dot_wide(to, to));
+        if (l->kind == ISOGI_LIGHT_RECTANGLE) size = sqrt(sqrt(u) * sqrt(v) / ISOGI_TRACE__PI); /* of a disc as large */
+        if (size > ISOGI_TRACE__WIDE * apart) return 1;
+    }
+    return 0;
+}
+
 /* The scene of a valid description. What it allocates is freed by isogi_trace__sky_free, on failure too. */
 static isogi_result isogi_trace__scene_set(isogi_trace__scene *scene, const isogi_trace_desc *desc,
                                            const isogi_context *context) {
@@ -2045,6 +2069,7 @@ static isogi_result isogi_trace__scene_set(isogi_trace__scene *scene, const isog
     if (d->mode == ISOGI_TRACE_TRANSFER) return ISOGI_OK;
     result = isogi_trace__open_light(scene);
     if (result != ISOGI_OK) return result;
+    scene->wide = isogi_trace__wide_lights(scene);
     return isogi_trace__sky_build(&scene->sky, &d->lighting.env, context);
 }
 
@@ -4196,18 +4221,21 @@ static void isogi_trace__span_sky(isogi_trace__cast *c, uint32_t k) {
     }
 }
 
-/* Samples of lights go with every second of the others, but at texels with each of the first four: what lights bring is not filtered. */
-static uint32_t isogi_trace__light_samples(uint32_t samples, int is_texel) {
-    if (is_texel && samples <= ISOGI_TRACE__LIGHT_FIRST) return samples;
-    return (samples + 1 + (is_texel ? ISOGI_TRACE__LIGHT_FIRST : 0)) / 2;
+/* Samples of each light that go with the first so many others: one with every second, but more at texels, as what lights bring is not
+   filtered: one with each of the first four; of wide lights four with each of the first two, then two. */
+static uint32_t isogi_trace__light_samples(const isogi_trace__scene *scene, uint32_t samples, int is_texel) {
+    const uint32_t first = ISOGI_TRACE__LIGHT_FIRST;
+    if (!is_texel) return (samples + 1) / 2;
+    if (scene->wide) return samples <= first / 2 ? first * samples : 2 * samples + first;
+    return samples <= first ? samples : (samples + 1 + first) / 2;
 }
 
 static void isogi_trace__span_light(isogi_trace__cast *c, uint32_t k, size_t number) {
     const isogi_light *light = &c->trace->scene.desc.lighting.lights[number];
     const isogi_trace__span *span = &c->span[k];
     const isogi_trace__sequence sequence = isogi_trace__light_sequence(c->sequence[k], 1 + number);
-    uint32_t i = isogi_trace__light_samples(span->first, span->of->brick != NULL);
-    const uint32_t end = isogi_trace__light_samples(span->first + span->count, span->of->brick != NULL);
+    uint32_t i = isogi_trace__light_samples(&c->trace->scene, span->first, span->of->brick != NULL);
+    const uint32_t end = isogi_trace__light_samples(&c->trace->scene, span->first + span->count, span->of->brick != NULL);
     int a;
     for (; i < end; i++) {
         double u[2], cosine;
@@ -4229,9 +4257,11 @@ static void isogi_trace__cast_round(isogi_trace__cast *c, uint32_t spans) {
     isogi_trace__cast_flush(c);
     for (k = 0; k < spans && c->shadow; k++) {
         const isogi_trace__span *s = &c->span[k];
+        const isogi_trace__scene *scene = &c->trace->scene;
         int texel = s->of->brick != NULL;
-        uint32_t n = c->bright ? s->count * (uint32_t)isogi_trace__sky_rays(&c->trace->scene.sky, texel)
-                               : isogi_trace__light_samples(s->first + s->count, texel) - isogi_trace__light_samples(s->first, texel);
+        uint32_t n = s->count * (uint32_t)isogi_trace__sky_rays(&scene->sky, texel);
+        if (!c->bright)
+            n = isogi_trace__light_samples(scene, s->first + s->count, texel) - isogi_trace__light_samples(scene, s->first, texel);
         double spread = n ? c->square[k] - c->sum[k] * c->sum[k] / n : 0;
         *(c->bright ? &c->span[k].bright_spread : &c->span[k].light_spread) += spread > 0 ? spread : 0;
     }
@@ -4506,7 +4536,8 @@ static void isogi_trace__span_commit(isogi_trace *t, isogi_trace__set *set, cons
     for (a = 0; a < 3; a++)
         n->steady[a] += s->steady[a], n->light[a] += s->light[a], n->bright[a] += s->bright[a];
     n->light_spread += s->light_spread, n->bright_spread += s->bright_spread, n->square += s->square;
-    n->samples = s->first + s->count, n->light_samples = isogi_trace__light_samples(n->samples, n->brick != NULL), n->hits += s->hits;
+    n->samples = s->first + s->count, n->hits += s->hits;
+    n->light_samples = isogi_trace__light_samples(&t->scene, n->samples, n->brick != NULL);
     stage->begun = n->samples != (n->brick ? isogi_trace__block(t, stage->level + 1) : stage->wanted);
     if (!stage->begun) stage->level++;
     if (fresh) isogi_trace__texel_guess(t, s->node);
@@ -5642,7 +5673,8 @@ static isogi_result isogi_trace__trace_batch(isogi_trace *t, uint64_t limit, int
 
 static isogi_result isogi_trace__feedback_step(isogi_trace *t, uint64_t max_rays, uint64_t *spent) {
     isogi_trace__feedback *f = t->feedback;
-    uint64_t begin = t->counters.rays, each = 1 + (uint64_t)t->scene.sky.rays + (uint64_t)t->scene.desc.lighting.light_count, other = 0;
+    uint64_t begin = t->counters.rays, other = 0,
+             each = 1 + (uint64_t)t->scene.sky.rays + (t->scene.wide ? 4 : 1) * (uint64_t)t->scene.desc.lighting.light_count;
     isogi_result result = ISOGI_OK;
     while (result == ISOGI_OK && (t->wanted || f->unpublished)) {
         uint64_t used = t->counters.rays - begin + other, left = max_rays ? max_rays - used : SIZE_MAX / 4;
@@ -7036,6 +7068,7 @@ ISOGI_API isogi_result isogi_trace_gather_field(const isogi_trace_desc *desc, is
 #undef ISOGI_TRACE__BLURRED
 #undef ISOGI_TRACE__TURNED
 #undef ISOGI_TRACE__LIGHT_FIRST
+#undef ISOGI_TRACE__WIDE
 #undef ISOGI_TRACE__AHEAD
 #undef ISOGI_TRACE__PLANE
 #undef ISOGI_TRACE__COLOURS

@@ -399,6 +399,56 @@ TEST(uneven_skies_get_more_rays) {
     scene_free(&s), scene_free(&round);
 }
 
+/* Lights that look wide, whose half-shadows are everywhere, get 2 n + 4 rays with n samples of a texel, others (n + 5) / 2: counted on a
+   ball, half of which faces the light. What they bring to a pit is that of paths, the same in blocks and at once, and the error that is
+   told covers it (three to six times as much). */
+TEST(wide_lights_get_more_rays) {
+    enum { SAMPLES = 8, LIGHTS = 5, RUNS = 4 };
+    const isogi_light lights[LIGHTS] = {light_make(ISOGI_LIGHT_DIRECTIONAL, 0.3, 1, 0.2, 3, 0.03),
+                                        light_make(ISOGI_LIGHT_SPHERE, 12, 112, 12, 30000, 4),
+                                        light_make(ISOGI_LIGHT_DIRECTIONAL, 0.3, 1, 0.2, 3, 0.2),
+                                        light_make(ISOGI_LIGHT_SPHERE, 12, 112, 12, 30000, 20),
+                                        {ISOGI_LIGHT_RECTANGLE, {12, 112, 12}, {30000, 30000, 30000}, 0, {{40, 0, 0}, {0, 0, 40}}}};
+    static float points[100][3], e[2][100][3], reference[100][3], error[100];
+    double q[5] = {12, 11, 12, 13, 8}, o[4] = {12, 12, 12, 8};
+    scene s = scene_make(24, 24, 24, NULL, pit, q), round = scene_make(24, 24, 24, NULL, ball, o);
+    int n = surface_points(&s, 0, 100, 7, points);
+    for (int k = 0; k < LIGHTS; k++) {
+        const double wide = k > 1;
+        double rays, sum[2] = {0, 0}, mean[2] = {0, 0};
+        isogi_trace_desc d = desc_make(&round, 0, 0, SAMPLES);
+        isogi_counters counters = {0};
+        isogi_trace *t = NULL;
+        memset(&d.lighting, 0, sizeof d.lighting), d.lighting.lights = &lights[k], d.lighting.light_count = 1;
+        d.method = ISOGI_TRACE_FEEDBACK;
+        isogi_trace_create(&t, &d, NULL), isogi_trace_step(t, 0, NULL), isogi_trace_counters(t, &counters), isogi_trace_free(t);
+        rays = (double)counters.rays / (double)counters.texels - SAMPLES;
+        CHECK(fabs(rays / (wide ? SAMPLES + 2 : 3) - 1) < 0.15, "light %d: %.2f rays", k, rays);
+        d.pyramid = s.pyramid, d.method = ISOGI_TRACE_PATHS, d.lazy = 1, d.samples = 1024;
+        bake_and_sample(&d, NULL, (const float(*)[3])points, n, reference);
+        d.method = ISOGI_TRACE_FEEDBACK, d.samples = 6, d.isovalue_min = -0.01, d.isovalue_max = 0.01;
+        for (int run = 0; run < RUNS; run++) {
+            d.seed = (uint64_t)run;
+            for (int lazy = 0; lazy < 2; lazy++) {
+                d.lazy = lazy, t = NULL, isogi_trace_create(&t, &d, NULL);
+                isogi_trace_request(t, (const float(*)[3])points, (size_t)n), isogi_trace_step(t, 0, NULL);
+                isogi_trace_sample(t, (const float(*)[3])points, (size_t)n, e[lazy], error), isogi_trace_free(t);
+            }
+            for (int i = 0; i < n; i++) {
+                const double light = (double)e[0][i][1], expected = (double)reference[i][1];
+                CHECK(fabs(light - (double)e[1][i][1]) <= 1e-5 * light + 1e-6, "blocks %g, at once %g", (double)e[1][i][1], light);
+                mean[0] += light, mean[1] += expected;
+                sum[0] += (light - expected) * (light - expected), sum[1] += (double)error[i] * (double)error[i];
+            }
+        }
+        printf("    light %d: %.2f rays, error %.4f of %.4f, told %.2f of it\n", k, rays, sqrt(sum[0] / (n * RUNS)), mean[1] / (n * RUNS),
+               sqrt(sum[1] / sum[0]));
+        CHECK(fabs(mean[0] - mean[1]) < 0.01 * mean[1], "light %d: %g, by paths %g", k, mean[0], mean[1]);
+        CHECK(sum[1] > 2 * sum[0], "light %d: told %.2f of the error", k, sqrt(sum[1] / sum[0]));
+    }
+    scene_free(&s), scene_free(&round);
+}
+
 /* One or two samples a texel are worth baking: those of the texels around make up for them, on the sides of a pit under a sky that is
    brighter above. The error over that of light which is not filtered, of four runs: .42 of 1 sample, .45 of 2 (where texels do not turn
    a common sequence: .92, .90; by the noise of so few samples: 1, .63). */
