@@ -96,10 +96,10 @@
      the difference (with one or two samples, of which none is known, all of them; from four on in two rounds: the second compares what the
      first has smoothed); their samples are well spread together. With each sample go two to four rays drawn by the brightness of an uneven
      image: they need no probe, and take a quarter to two fifths of the error that one of them leaves. Lights are not filtered, so that
-     their shadows stay sharp (desc.unfiltered: nothing is); wide ones, with soft shadows everywhere, are sampled up to four times instead.
-     TRANSFER is not filtered at all, and takes more samples for it. Probes cost accuracy: half a per cent of the mean and 1.8 % at a point
-     in narrow channels of albedo 0.8 (test_trace_bake --long prints it). Lazy and adaptive bakes take samples in blocks of 4, 16, 64, ...
-     and every other texel along each axis first: soon every lookup has a value.
+     their shadows stay sharp (desc.unfiltered: nothing is); where one is wide, with soft shadows everywhere, all are sampled up to four
+     times as often instead. TRANSFER is not filtered at all, and takes more samples for it. Probes cost accuracy: half a per cent of the
+     mean and 1.8 % at a point in narrow channels of albedo 0.8 (test_trace_bake --long prints it). Lazy and adaptive bakes take samples in
+     blocks of 4, 16, 64, ... and every other texel along each axis first: soon every lookup has a value.
      A hit from within (only through an open border can a ray get there) is a surface too, with its normal turned.
 
    GLSL that lights a surface by an exported irradiance texture (GL_LINEAR, GL_CLAMP_TO_EDGE); grid: voxel coordinates
@@ -168,9 +168,10 @@
                 Voxels of 1e-150 to 1e150 world units: squares of lengths must neither vanish nor overflow. Where matter is
                 thinner than the lattice's spacing a lookup mixes the light of both of its sides.
    Cost         PATHS: samples * (1 + lights that have a size) rays for a texel, and as many for each reflection; an uneven image counts as
-                a light. FEEDBACK: samples * (1 + half of these lights), each of the first four with all lights, with four times as many
-                where one looks wider than 8 degrees; and for an image 2 to 4, half of which are below the horizon; for each probe as if by
-                as many samples as hits read it, 1 (2 where the albedo is above .9) to 8, with one ray to the image for each.
+                a light. FEEDBACK: samples * (1 + half of these lights), each of the first four with all lights; where any light looks
+                wider than 8 degrees from the middle of the volume, four rays to every light with each of the first two samples, then two;
+                and for an image 2 to 4, half of which are below the horizon; for each probe as if by as many samples as hits read it, 1 (2
+                where the albedo is above .9) to 8, with one ray to the image for each.
 
    History  1.0  first release
 */
@@ -1506,6 +1507,7 @@ static void isogi_trace__site_rays(const isogi_trace__scene *scene, const isogi_
         memset(ray, 0, sizeof *ray);
         memcpy(ray->origin, site->origin, sizeof ray->origin);
         memcpy(ray->dir, dirs[i], sizeof ray->dir);
+        /* cppcheck-suppress objectIndex */
         ray->flags = scene->flags, ray->isovalue = site->isovalue, ray->tmax = tmax[i];
     }
     isogi_vol_intersect(scene->pyramid, rays, count, hits, counters);
@@ -1618,8 +1620,8 @@ static void isogi_trace__wave_escape(isogi_trace__wave *w, int i) {
     }
     if (!scene->has_env) return;
     if (scene->sky.rays) {
-        double cosine = w->density[i] / ISOGI_TRACE__PI;
-        weight = cosine / (cosine + isogi_trace__sky_density(&scene->sky, (const float *)w->dir[i]));
+        double cosine = w->density[i] / ISOGI_TRACE__PI, density = isogi_trace__sky_density(&scene->sky, (const float *)w->dir[i]);
+        if (density > 0) weight = cosine / (cosine + density);
     }
     isogi_trace__env_light(&scene->desc.lighting.env, (const float *)w->dir[i], radiance);
     for (c = 0; c < 3; c++) w->light[w->slot[i]][c] += weight * w->through[i][c] * (double)radiance[c];
@@ -1790,7 +1792,7 @@ static void isogi_trace__spread_add(isogi_trace__spread *s, const double rgb[3],
 }
 
 /* Standard error of irradiance by n paths. What they have not met may be as bright as the brightest of them: where most are alike and a
-   few far brighter, the variance alone tells of too little whenever those few are missing. */
+   few far brighter, the variance alone tells of too little whenever too few of those were met. */
 static float isogi_trace__spread_error(const isogi_trace__spread *s, int n, double possible) {
     double variance = n > 1 ? ISOGI_TRACE__PI * ISOGI_TRACE__PI * s->square / ((double)n * (n - 1)) : 0;
     return n > 1 ? (float)sqrt(variance + isogi_trace__unseen(possible, ISOGI_TRACE__PI * s->most, n)) : ISOGI_TRACE__NOT_READY;
@@ -2015,7 +2017,7 @@ static isogi_result isogi_trace__open_light(isogi_trace__scene *scene) {
     return result;
 }
 
-/* Whether some light looks wide from the middle of the volume. */
+/* Whether some light looks wide, by its area, from the middle of the volume. */
 static int isogi_trace__wide_lights(const isogi_trace__scene *scene) {
     double middle[3], least = isogi_trace__middle(scene, middle);
     size_t k;
@@ -2024,7 +2026,7 @@ static int isogi_trace__wide_lights(const isogi_trace__scene *scene) {
         const isogi_light *l = &scene->desc.lighting.lights[k];
         double to[3], u = 0, v = 0, apart = 1, size = (double)l->radius;
         float point[3];
-        if (isogi_trace__is_delta(l)) continue;
+        if (isogi_trace__is_delta(l) || !(l->rgb[0] > 0 || l->rgb[1] > 0 || l->rgb[2] > 0)) continue;
         isogi_trace__measure_from(l, middle, least, point);
         for (a = 0; a < 3; a++) {
             to[a] = (double)l->vector[a] - (double)point[a];
@@ -4037,7 +4039,7 @@ static void isogi_trace__cast_escape(isogi_trace__cast *c, int i) {
     isogi_trace__span *span = &c->span[c->owner[i]];
     float *direct = t->feedback->direct + (size_t)(span - t->feedback->spans) * (size_t)t->values;
     const float *dir = c->ray[i].dir;
-    double weight = 1, rgb[3], luminance;
+    double weight = 1, density = 0, rgb[3], luminance;
     float basis[ISOGI_TRACE__MAX_ORDER * ISOGI_TRACE__MAX_ORDER], radiance[3];
     int k, a, channels = scene->desc.transfer_channels, count = scene->desc.order * scene->desc.order;
     if (scene->desc.mode == ISOGI_TRACE_TRANSFER) {
@@ -4047,9 +4049,8 @@ static void isogi_trace__cast_escape(isogi_trace__cast *c, int i) {
         return;
     }
     if (!scene->has_env) return;
-    if (scene->sky.rays)
-        weight = c->weight[i] / (c->weight[i] + ISOGI_TRACE__PI * isogi_trace__sky_rays(&scene->sky, span->of->brick != NULL) *
-                                                    isogi_trace__sky_density(&scene->sky, dir));
+    if (scene->sky.rays) density = ISOGI_TRACE__PI * isogi_trace__sky_density(&scene->sky, dir);
+    if (density > 0) weight = c->weight[i] / (c->weight[i] + isogi_trace__sky_rays(&scene->sky, span->of->brick != NULL) * density);
     isogi_trace__env_light(&scene->desc.lighting.env, dir, radiance);
     for (a = 0; a < 3; a++) rgb[a] = weight * (double)radiance[a], direct[a] += (float)rgb[a];
     luminance = isogi_trace__luminance(rgb);
@@ -4258,10 +4259,10 @@ static void isogi_trace__cast_round(isogi_trace__cast *c, uint32_t spans) {
     for (k = 0; k < spans && c->shadow; k++) {
         const isogi_trace__span *s = &c->span[k];
         const isogi_trace__scene *scene = &c->trace->scene;
-        int texel = s->of->brick != NULL;
-        uint32_t n = s->count * (uint32_t)isogi_trace__sky_rays(&scene->sky, texel);
-        if (!c->bright)
-            n = isogi_trace__light_samples(scene, s->first + s->count, texel) - isogi_trace__light_samples(scene, s->first, texel);
+        const int texel = s->of->brick != NULL;
+        const uint32_t before = isogi_trace__light_samples(scene, s->first, texel),
+                       after = isogi_trace__light_samples(scene, s->first + s->count, texel),
+                       n = c->bright ? s->count * (uint32_t)isogi_trace__sky_rays(&scene->sky, texel) : after - before;
         double spread = n ? c->square[k] - c->sum[k] * c->sum[k] / n : 0;
         *(c->bright ? &c->span[k].bright_spread : &c->span[k].light_spread) += spread > 0 ? spread : 0;
     }
@@ -6846,7 +6847,7 @@ static void isogi_trace__field_lights(isogi_trace__walk *w, uint64_t site, int f
     const isogi_trace__sky *sky = &w->field->scene.sky;
     size_t l;
     int i, c, count;
-    for (l = 0; l <= lighting->light_count; l++) {
+    for (l = sky->rays ? 0 : 1; l <= lighting->light_count; l++) {
         for (count = i = 0; i < w->count; i++) {
             double u[2], cosine, density;
             isogi_trace__beam beam;
@@ -6858,7 +6859,6 @@ static void isogi_trace__field_lights(isogi_trace__walk *w, uint64_t site, int f
                 density = 0;
             } else { /* the environment's image by brightness, weighed against the cosine */
                 float radiance[3];
-                if (!sky->rays) continue;
                 density = isogi_trace__sky_direction(sky, u[0], u[1], beam.dir);
                 cosine = isogi_trace__dot(w->normal[i], beam.dir) / ISOGI_TRACE__PI;
                 density += cosine;
@@ -6875,11 +6875,12 @@ static void isogi_trace__field_lights(isogi_trace__walk *w, uint64_t site, int f
 
 static void isogi_trace__field_escape(isogi_trace__walk *w, int i, double cosine) {
     const isogi_trace__scene *scene = &w->field->scene;
-    double weight = 1;
+    double weight = 1, density = 0;
     float radiance[3];
     int c;
     if (!scene->has_env) return;
-    if (scene->sky.rays) weight = cosine / (cosine + isogi_trace__sky_density(&scene->sky, w->ray[i].dir));
+    if (scene->sky.rays) density = isogi_trace__sky_density(&scene->sky, w->ray[i].dir);
+    if (density > 0) weight = cosine / (cosine + density);
     isogi_trace__env_light(&scene->desc.lighting.env, w->ray[i].dir, radiance);
     for (c = 0; c < 3; c++) w->light[w->slot[i]][c] += weight * w->through[i][c] * (double)radiance[c];
 }

@@ -378,9 +378,9 @@ TEST(colours_are_asked_for_once) {
     scene_free(&s);
 }
 
-/* The pit's light takes the colour of the wall opposite: near the red wall more green arrives by reflection, and the other way
-   round (a tenth: from the wall of a sphere all its parts look equally large, only their light differs); the mean of both walls is the
-   same by symmetry. Noise of each is .7 %. The colours of tables and callback are those of isogi_trace_material. */
+/* The pit's light takes the colour of the wall opposite: near the red wall more green arrives by reflection, and the other way round (by
+   1.09 to 1.12: from the wall of a sphere all its parts look equally large, only their light differs); the mean of both walls is the same
+   by symmetry. Noise of each is .7 %. The colours of tables and callback are those of isogi_trace_material. */
 TEST(colour_bleeds) {
     double q[5] = {16, 15, 16, 22, 10}, e[2][3];
     paint colours = {16, 0};
