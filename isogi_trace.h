@@ -5674,8 +5674,9 @@ static isogi_result isogi_trace__trace_batch(isogi_trace *t, uint64_t limit, int
 
 static isogi_result isogi_trace__feedback_step(isogi_trace *t, uint64_t max_rays, uint64_t *spent) {
     isogi_trace__feedback *f = t->feedback;
-    uint64_t begin = t->counters.rays, other = 0,
-             each = 1 + (uint64_t)t->scene.sky.rays + (t->scene.wide ? 4 : 1) * (uint64_t)t->scene.desc.lighting.light_count;
+    const uint64_t lights = (uint64_t)t->scene.desc.lighting.light_count,
+                   each = 1 + (uint64_t)t->scene.sky.rays + isogi_trace__light_samples(&t->scene, 1, 1) * lights;
+    uint64_t begin = t->counters.rays, other = 0;
     isogi_result result = ISOGI_OK;
     while (result == ISOGI_OK && (t->wanted || f->unpublished)) {
         uint64_t used = t->counters.rays - begin + other, left = max_rays ? max_rays - used : SIZE_MAX / 4;

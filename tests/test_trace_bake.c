@@ -353,20 +353,43 @@ static double sky_with_patch(float (*image)[64][3], int height, float bright) {
     return sum[2] * sum[0] / (sum[1] * sum[1]);
 }
 
+/* Bakes by four seeds, not lazily and lazily, in blocks: the same light. Sums over n points and all seeds: of light, of squares of what it
+   differs from the reference by, and of squares of the errors that are told. */
+typedef struct bake_sums { double light, square, told; } bake_sums;
+enum { BAKE_SEEDS = 4 };
+static bake_sums bake_both_ways(isogi_trace_desc d, const float (*points)[3], int n, const float (*reference)[3]) {
+    static float e[2][200][3], error[2][200];
+    bake_sums sum = {0, 0, 0};
+    for (d.seed = 0; d.seed < BAKE_SEEDS; d.seed++) {
+        for (d.lazy = 0; d.lazy < 2; d.lazy++) {
+            isogi_trace *t = NULL;
+            isogi_trace_create(&t, &d, NULL), isogi_trace_request(t, points, (size_t)n), isogi_trace_step(t, 0, NULL);
+            isogi_trace_sample(t, points, (size_t)n, e[d.lazy], error[d.lazy]), isogi_trace_free(t);
+        }
+        for (int i = 0; i < n; i++) {
+            const double light = (double)e[0][i][1], apart = light - (double)reference[i][1];
+            CHECK(fabs(light - (double)e[1][i][1]) <= 1e-5 * light + 1e-6, "blocks %g, at once %g", (double)e[1][i][1], light);
+            sum.light += light, sum.square += apart * apart, sum.told += pow((double)error[0][i], 2);
+        }
+    }
+    return sum;
+}
+
 /* The more uneven an image, the more rays does a texel send to its bright parts with each sample: none, 2, 3 (of mean squares above 2) and
    4 (above 3). Those below the horizon are not traced: on a ball, half of all. What is told of their noise is as near to it as under an
    even sky (unfiltered: four times the error, as samples are well spread and a lookup's texels have noise of their own), and six samples
    bring the same in blocks and at once. */
 TEST(uneven_skies_get_more_rays) {
-    enum { HEIGHT = 32, RUNS = 4 };
+    enum { HEIGHT = 32 };
     static const float bright[4] = {1.5f, 5, 10, 40};
-    static float image[HEIGHT][64][3], points[200][3], e[2][200][3], reference[200][3], error[2][200];
+    static float image[HEIGHT][64][3], points[200][3], reference[200][3];
     double q[5] = {12, 11, 12, 13, 8}, o[4] = {12, 12, 12, 8}, told[4];
     scene s = scene_make(24, 24, 24, NULL, pit, q), round = scene_make(24, 24, 24, NULL, ball, o);
     int n = surface_points(&s, 0, 200, 7, points);
     for (int k = 0; k < 4; k++) {
         const double uneven = sky_with_patch(image, HEIGHT, bright[k]);
-        double sum[2] = {0, 0}, rays;
+        double rays;
+        bake_sums sum;
         isogi_trace_desc d = desc_make(&round, 0, 0, 8);
         isogi_counters counters = {0};
         isogi_trace *t = NULL;
@@ -378,22 +401,10 @@ TEST(uneven_skies_get_more_rays) {
         d.pyramid = s.pyramid, d.lazy = 1, d.unfiltered = 1, d.samples = 1024, d.isovalue_min = -0.01, d.isovalue_max = 0.01;
         bake_and_sample(&d, NULL, (const float(*)[3])points, n, reference);
         d.samples = 6;
-        for (int run = 0; run < RUNS; run++) {
-            d.seed = (uint64_t)run;
-            for (int lazy = 0; lazy < 2; lazy++) {
-                d.lazy = lazy, t = NULL, isogi_trace_create(&t, &d, NULL);
-                isogi_trace_request(t, (const float(*)[3])points, (size_t)n), isogi_trace_step(t, 0, NULL);
-                isogi_trace_sample(t, (const float(*)[3])points, (size_t)n, e[lazy], error[lazy]), isogi_trace_free(t);
-            }
-            for (int i = 0; i < n; i++) {
-                CHECK(fabs((double)e[0][i][1] - (double)e[1][i][1]) <= 1e-5 * (double)e[0][i][1], "blocks %g, at once %g",
-                      (double)e[1][i][1], (double)e[0][i][1]);
-                sum[0] += pow((double)e[0][i][1] - (double)reference[i][1], 2), sum[1] += pow((double)error[0][i], 2);
-            }
-        }
-        told[k] = sqrt(sum[1] / sum[0]);
-        printf("    mean square %.2f: %.2f rays to the sky, error %.4f, told %.2f of it\n", uneven, rays, sqrt(sum[0] / (n * RUNS)),
-               told[k]);
+        sum = bake_both_ways(d, (const float(*)[3])points, n, (const float(*)[3])reference);
+        told[k] = sqrt(sum.told / sum.square);
+        printf("    mean square %.2f: %.2f rays to the sky, error %.4f, told %.2f of it\n", uneven, rays,
+               sqrt(sum.square / (n * BAKE_SEEDS)), told[k]);
         CHECK(told[k] > 0.75 * told[0] && told[k] < 1.33 * told[0], "mean square %.2f: told %.2f of it", uneven, told[k]);
     }
     scene_free(&s), scene_free(&round);
@@ -403,19 +414,20 @@ TEST(uneven_skies_get_more_rays) {
    ball, half of which faces the light. What they bring to a pit is that of paths, the same in blocks and at once, and the error that is
    told covers it (three to six times as much). */
 TEST(wide_lights_get_more_rays) {
-    enum { SAMPLES = 8, LIGHTS = 5, RUNS = 4 };
+    enum { SAMPLES = 8, LIGHTS = 5 };
     const isogi_light lights[LIGHTS] = {light_make(ISOGI_LIGHT_DIRECTIONAL, 0.3, 1, 0.2, 3, 0.03),
                                         light_make(ISOGI_LIGHT_SPHERE, 12, 112, 12, 30000, 4),
                                         light_make(ISOGI_LIGHT_DIRECTIONAL, 0.3, 1, 0.2, 3, 0.2),
                                         light_make(ISOGI_LIGHT_SPHERE, 12, 112, 12, 30000, 20),
                                         {ISOGI_LIGHT_RECTANGLE, {12, 112, 12}, {30000, 30000, 30000}, 0, {{40, 0, 0}, {0, 0, 40}}}};
-    static float points[100][3], e[2][100][3], reference[100][3], error[100];
+    static float points[100][3], reference[100][3];
     double q[5] = {12, 11, 12, 13, 8}, o[4] = {12, 12, 12, 8};
     scene s = scene_make(24, 24, 24, NULL, pit, q), round = scene_make(24, 24, 24, NULL, ball, o);
     int n = surface_points(&s, 0, 100, 7, points);
     for (int k = 0; k < LIGHTS; k++) {
         const double wide = k > 1;
-        double rays, sum[2] = {0, 0}, mean[2] = {0, 0};
+        double rays, expected = 0;
+        bake_sums sum;
         isogi_trace_desc d = desc_make(&round, 0, 0, SAMPLES);
         isogi_counters counters = {0};
         isogi_trace *t = NULL;
@@ -427,24 +439,12 @@ TEST(wide_lights_get_more_rays) {
         d.pyramid = s.pyramid, d.method = ISOGI_TRACE_PATHS, d.lazy = 1, d.samples = 1024;
         bake_and_sample(&d, NULL, (const float(*)[3])points, n, reference);
         d.method = ISOGI_TRACE_FEEDBACK, d.samples = 6, d.isovalue_min = -0.01, d.isovalue_max = 0.01;
-        for (int run = 0; run < RUNS; run++) {
-            d.seed = (uint64_t)run;
-            for (int lazy = 0; lazy < 2; lazy++) {
-                d.lazy = lazy, t = NULL, isogi_trace_create(&t, &d, NULL);
-                isogi_trace_request(t, (const float(*)[3])points, (size_t)n), isogi_trace_step(t, 0, NULL);
-                isogi_trace_sample(t, (const float(*)[3])points, (size_t)n, e[lazy], error), isogi_trace_free(t);
-            }
-            for (int i = 0; i < n; i++) {
-                const double light = (double)e[0][i][1], expected = (double)reference[i][1];
-                CHECK(fabs(light - (double)e[1][i][1]) <= 1e-5 * light + 1e-6, "blocks %g, at once %g", (double)e[1][i][1], light);
-                mean[0] += light, mean[1] += expected;
-                sum[0] += (light - expected) * (light - expected), sum[1] += (double)error[i] * (double)error[i];
-            }
-        }
-        printf("    light %d: %.2f rays, error %.4f of %.4f, told %.2f of it\n", k, rays, sqrt(sum[0] / (n * RUNS)), mean[1] / (n * RUNS),
-               sqrt(sum[1] / sum[0]));
-        CHECK(fabs(mean[0] - mean[1]) < 0.01 * mean[1], "light %d: %g, by paths %g", k, mean[0], mean[1]);
-        CHECK(sum[1] > 2 * sum[0], "light %d: told %.2f of the error", k, sqrt(sum[1] / sum[0]));
+        sum = bake_both_ways(d, (const float(*)[3])points, n, (const float(*)[3])reference);
+        for (int i = 0; i < n; i++) expected += BAKE_SEEDS * (double)reference[i][1];
+        printf("    light %d: %.2f rays, error %.4f of %.4f, told %.2f of it\n", k, rays, sqrt(sum.square / (n * BAKE_SEEDS)),
+               expected / (n * BAKE_SEEDS), sqrt(sum.told / sum.square));
+        CHECK(fabs(sum.light - expected) < 0.01 * expected, "light %d: %g, by paths %g", k, sum.light, expected);
+        CHECK(sum.told > 2 * sum.square, "light %d: told %.2f of the error", k, sqrt(sum.told / sum.square));
     }
     scene_free(&s), scene_free(&round);
 }
