@@ -144,7 +144,7 @@
    Memory       Through the context. Bricks of 4x4x4 texels: 8 bytes for each, 112 where one of its texels is wanted, and for every
                 wanted texel alone 2 + 12 bytes of irradiance, 2 + 2 order^2 channels of transfer, less in other formats; and
                 250 KB. isogi_trace_memory tells. PATHS needs another 4 MB, FEEDBACK 9 (TRANSFER: 32 KB more for each coefficient),
-                and while it works some 400 bytes (TRANSFER: 16 more for each coefficient), 2048 times that at once, and 4 for every
+                and while it works some 400 bytes (TRANSFER: 16 more for each coefficient), 8 MB of them at once, and 4 for every
                 hit, for each texel of one cube (ISOGI_TRACE_CUBE), for all that were asked for when lazy, and for each probe: where
                 every texel of a cube has a surface 190 MB with 1 sample, 460 with 64, and 740 where there are lights. A request takes
                 12 bytes for each of 32768 points at a time.
@@ -502,7 +502,8 @@ ISOGI_API size_t isogi_trace_memory(const isogi_trace *trace); /* bytes that the
 #define ISOGI_TRACE__PIECE 65536   /* rays that take as long as what is done without any before progress is told of, */
 #define ISOGI_TRACE__PLACING 1.5   /* samples that take as long as finding where a texel lies, */
 #define ISOGI_TRACE__CARRYING 3.0  /* as what each level takes beside its texels' rays; for progress alone */
-#define ISOGI_TRACE__CHUNK 2048    /* nodes that are allocated together; a power of two, and a multiple of SWEEP */
+#define ISOGI_TRACE__CHUNK 2048    /* nodes that lie together; a power of two, and a multiple of SWEEP */
+#define ISOGI_TRACE__SLAB 8388608  /* bytes of chunks that are allocated together: some huge pages */
 #define ISOGI_TRACE__PROBE_MOST 8    /* samples of a probe: as many as there are hits that read it, but no more than this */
 #define ISOGI_TRACE__WATCHED 6       /* passes that look for probes whose light has settled */
 #define ISOGI_TRACE__PROBE_ERROR 0.02 /* standard error of light from probes */
@@ -3431,8 +3432,11 @@ typedef struct isogi_trace__stage {
 /* Nodes that stay where they are once they are made. guides: of texels; reflectors, links: of probes. values: their four kinds (below), one
    after the other. heads: where chains of probes begin, number + 1, 0 = nowhere; NULL of texels. stages: in few bytes
    what one thread goes through. settled: of probes, whether the values (of either kind, one after the other) stay.
-   where: of texels, 64 times the number of the brick, and the slot. */
+   where: of texels, 64 times the number of the brick, and the slot. All lie in one block of memory, with those of the next chunks:
+   block, bytes: of the first of these. */
 typedef struct isogi_trace__chunk {
+    uint8_t *block;
+    size_t bytes;
     float *values;
     isogi_trace__node *nodes;
     isogi_trace__guide *guides;
@@ -3456,7 +3460,7 @@ enum {
 /* Texels, or probes. */
 typedef struct isogi_trace__set {
     isogi_trace__chunk *chunks;
-    size_t count, chunk_count, chunk_capacity;
+    size_t count, chunk_count, chunk_made, chunk_capacity; /* chunk_made: those in use, and more that lie in the last block */
     size_t headed;   /* chunks whose chains are in use */
     size_t head_bit; /* the largest power of two that is no more than the number of these chains */
     int out; /* 0 or 1: where the light is that was worked out last */
@@ -3506,6 +3510,8 @@ typedef struct isogi_trace__catch {
 
 struct isogi_trace__feedback {
     isogi_trace__set texels, probes;
+    uint8_t *block; /* of memory, in which the buffers lie: */
+    size_t block_bytes;
     isogi_trace__plan *plans; /* of the spans, which each task writes itself */
     isogi_trace__span *spans;
     isogi_trace__catch *catches;
@@ -3616,16 +3622,38 @@ static float *isogi_trace__light_at(const isogi_trace__set *s, size_t i, size_t 
     return isogi_trace__values_at(s, i, ISOGI_TRACE__OUT_VALUES + s->out, v);
 }
 
-static void isogi_trace__chunk_free(const isogi_trace *t, isogi_trace__chunk *c) {
-    isogi_release(&t->context, c->nodes, ISOGI_TRACE__CHUNK, sizeof *c->nodes);
-    isogi_release(&t->context, c->guides, ISOGI_TRACE__CHUNK, sizeof *c->guides);
-    isogi_release(&t->context, c->reflectors, ISOGI_TRACE__CHUNK, sizeof *c->reflectors);
-    isogi_release(&t->context, c->links, ISOGI_TRACE__CHUNK, sizeof *c->links);
-    isogi_release(&t->context, c->values, (size_t)ISOGI_TRACE__KINDS * ISOGI_TRACE__CHUNK, (size_t)t->values * sizeof(float));
-    isogi_release(&t->context, c->heads, ISOGI_TRACE__CHUNK, sizeof *c->heads);
-    isogi_release(&t->context, c->stages, ISOGI_TRACE__CHUNK, sizeof *c->stages);
-    isogi_release(&t->context, c->settled, ISOGI_TRACE__CHUNK, 2 * sizeof *c->settled);
-    isogi_release(&t->context, c->where, ISOGI_TRACE__CHUNK, sizeof *c->where);
+/* The next `count` elements of a block of memory, of which `used` bytes are; block NULL: the block is only measured. */
+static void *isogi_trace__part(uint8_t *block, size_t *used, size_t count, size_t size) {
+    void *part = block ? block + *used : NULL;
+    *used += (count * size + 63) / 64 * 64;
+    return part;
+}
+
+/* Where the arrays of a chunk lie; bytes. */
+static size_t isogi_trace__chunk_set(const isogi_trace *t, isogi_trace__chunk *c, uint8_t *at, int chains) {
+    const size_t n = ISOGI_TRACE__CHUNK;
+    size_t used = 0;
+    memset(c, 0, sizeof *c);
+    c->nodes = (isogi_trace__node *)isogi_trace__part(at, &used, n, sizeof *c->nodes);
+    c->values = (float *)isogi_trace__part(at, &used, ISOGI_TRACE__KINDS * n, (size_t)t->values * sizeof(float));
+    c->stages = (isogi_trace__stage *)isogi_trace__part(at, &used, n, sizeof *c->stages);
+    if (chains) {
+        c->reflectors = (isogi_trace__reflector *)isogi_trace__part(at, &used, n, sizeof *c->reflectors);
+        c->links = (isogi_trace__link *)isogi_trace__part(at, &used, n, sizeof *c->links);
+        c->heads = (uint32_t *)isogi_trace__part(at, &used, n, sizeof *c->heads);
+        c->settled = (uint8_t *)isogi_trace__part(at, &used, n, 2 * sizeof *c->settled);
+    } else {
+        c->guides = (isogi_trace__guide *)isogi_trace__part(at, &used, n, sizeof *c->guides);
+        c->where = (size_t *)isogi_trace__part(at, &used, n, sizeof *c->where);
+    }
+    return used;
+}
+
+/* The last one. */
+static void isogi_trace__chunk_free(const isogi_trace *t, isogi_trace__set *s) {
+    const isogi_trace__chunk *c = &s->chunks[--s->chunk_made];
+    if (s->chunk_count > s->chunk_made) s->chunk_count = s->chunk_made;
+    isogi_release(&t->context, c->block, 1, c->bytes);
 }
 
 static size_t isogi_trace__segment_size(const isogi_trace__segment *s) {
@@ -3640,46 +3668,66 @@ static void isogi_trace__set_free(const isogi_trace *t, isogi_trace__set *s) {
     size_t i;
     for (i = 0; i < s->segment_count; i++) isogi_trace__segment_free(t, &s->segments[i]);
     isogi_release(&t->context, s->segments, s->segment_capacity, sizeof *s->segments);
-    for (i = 0; i < s->chunk_count; i++) isogi_trace__chunk_free(t, &s->chunks[i]);
+    while (s->chunk_made) isogi_trace__chunk_free(t, s);
     isogi_release(&t->context, s->chunks, s->chunk_capacity, sizeof *s->chunks);
     memset(s, 0, sizeof *s);
 }
 
-/* Room for one more chunk in the list. */
-static isogi_result isogi_trace__chunks_reserve(const isogi_trace *t, isogi_trace__set *s) {
+/* Room for `more` chunks in the list. */
+static isogi_result isogi_trace__chunks_reserve(const isogi_trace *t, isogi_trace__set *s, size_t more) {
     size_t capacity = s->chunk_capacity ? 2 * s->chunk_capacity : 16;
     isogi_trace__chunk *chunks;
-    if (s->chunk_count < s->chunk_capacity) return ISOGI_OK;
+    if (s->chunk_made + more <= s->chunk_capacity) return ISOGI_OK;
     chunks = (isogi_trace__chunk *)isogi_allocate(&t->context, capacity, sizeof *chunks);
     if (!chunks) return ISOGI_NO_MEMORY;
-    if (s->chunk_count) memcpy(chunks, s->chunks, s->chunk_count * sizeof *chunks);
+    if (s->chunk_made) memcpy(chunks, s->chunks, s->chunk_made * sizeof *chunks);
     isogi_release(&t->context, s->chunks, s->chunk_capacity, sizeof *chunks);
     s->chunks = chunks, s->chunk_capacity = capacity;
+    return ISOGI_OK;
+}
+
+/* Another block of chunks: the first has one, the next as many as SLAB bytes hold. */
+static isogi_result isogi_trace__chunks_new(const isogi_trace *t, isogi_trace__set *s, int chains) {
+    isogi_trace__chunk c;
+    const size_t each = isogi_trace__chunk_set(t, &c, NULL, chains), most = ISOGI_TRACE__SLAB / each;
+    const size_t n = s->chunk_made && most > 1 ? most : 1, bytes = n > 1 ? ISOGI_TRACE__SLAB : each;
+    size_t i;
+    uint8_t *block;
+    if (s->chunk_made + n > 0xffffffffu / ISOGI_TRACE__CHUNK) return ISOGI_TOO_LARGE;
+    if (isogi_trace__chunks_reserve(t, s, n) != ISOGI_OK) return ISOGI_NO_MEMORY;
+    block = (uint8_t *)isogi_allocate(&t->context, 1, bytes);
+    if (!block) return ISOGI_NO_MEMORY;
+    for (i = 0; i < n; i++) isogi_trace__chunk_set(t, &s->chunks[s->chunk_made + i], block + i * each, chains);
+    s->chunks[s->chunk_made].block = block, s->chunks[s->chunk_made].bytes = bytes;
+    s->chunk_made += n;
     return ISOGI_OK;
 }
 
 /* Room for `more` nodes; those that there are stay in their places. chains: they are probes. */
 static isogi_result isogi_trace__set_reserve(const isogi_trace *t, isogi_trace__set *s, size_t more, int chains) {
     while (s->count + more > s->chunk_count * ISOGI_TRACE__CHUNK) {
-        isogi_trace__chunk c;
-        if (s->chunk_count >= 0xffffffffu / ISOGI_TRACE__CHUNK) return ISOGI_TOO_LARGE;
-        if (isogi_trace__chunks_reserve(t, s) != ISOGI_OK) return ISOGI_NO_MEMORY;
-        c.nodes = (isogi_trace__node *)isogi_allocate(&t->context, ISOGI_TRACE__CHUNK, sizeof *c.nodes);
-        c.guides = chains ? NULL : (isogi_trace__guide *)isogi_allocate(&t->context, ISOGI_TRACE__CHUNK, sizeof *c.guides);
-        c.reflectors = chains ? (isogi_trace__reflector *)isogi_allocate(&t->context, ISOGI_TRACE__CHUNK, sizeof *c.reflectors) : NULL;
-        c.links = chains ? (isogi_trace__link *)isogi_allocate(&t->context, ISOGI_TRACE__CHUNK, sizeof *c.links) : NULL;
-        c.values = (float *)isogi_allocate(&t->context, (size_t)ISOGI_TRACE__KINDS * ISOGI_TRACE__CHUNK, (size_t)t->values * sizeof(float));
-        c.heads = chains ? (uint32_t *)isogi_allocate(&t->context, ISOGI_TRACE__CHUNK, sizeof *c.heads) : NULL;
-        c.stages = (isogi_trace__stage *)isogi_allocate(&t->context, ISOGI_TRACE__CHUNK, sizeof *c.stages);
-        c.settled = chains ? (uint8_t *)isogi_allocate(&t->context, ISOGI_TRACE__CHUNK, 2 * sizeof *c.settled) : NULL;
-        c.where = chains ? NULL : (size_t *)isogi_allocate(&t->context, ISOGI_TRACE__CHUNK, sizeof *c.where);
-        if (!c.nodes || !c.values || !c.stages || !(chains ? c.reflectors && c.links && c.heads && c.settled : c.guides && c.where)) {
-            isogi_trace__chunk_free(t, &c);
-            return ISOGI_NO_MEMORY;
-        }
-        s->chunks[s->chunk_count++] = c;
+        isogi_result result = s->chunk_count < s->chunk_made ? ISOGI_OK : isogi_trace__chunks_new(t, s, chains);
+        if (result != ISOGI_OK) return result;
+        s->chunk_count++;
     }
     return ISOGI_OK;
+}
+
+/* Where the buffers of a batch lie, in one block of memory; bytes. */
+static size_t isogi_trace__buffers_set(const isogi_trace *t, isogi_trace__feedback *f, uint8_t *block) {
+    size_t used = 0;
+    f->plans = (isogi_trace__plan *)isogi_trace__part(block, &used, ISOGI_TRACE__SPANS, sizeof *f->plans);
+    f->spans = (isogi_trace__span *)isogi_trace__part(block, &used, ISOGI_TRACE__SPANS, sizeof *f->spans);
+    f->catches = (isogi_trace__catch *)isogi_trace__part(block, &used, ISOGI_TRACE__SAMPLES, sizeof *f->catches);
+    f->casts = (isogi_trace__cast *)isogi_trace__part(block, &used, ISOGI_TRACE__CASTS, sizeof *f->casts);
+    f->direct = (float *)isogi_trace__part(block, &used, ISOGI_TRACE__SPANS, (size_t)t->values * sizeof(float));
+    f->pieces = (isogi_trace__piece *)isogi_trace__part(block, &used, ISOGI_TRACE__PIECES + 1, sizeof *f->pieces);
+    f->found = (uint32_t *)isogi_trace__part(block, &used, ISOGI_TRACE__SAMPLES, sizeof *f->found);
+    f->fresh = (uint32_t *)isogi_trace__part(block, &used, ISOGI_TRACE__SAMPLES, sizeof *f->fresh);
+    f->makers = (uint32_t *)isogi_trace__part(block, &used, ISOGI_TRACE__SAMPLES, sizeof *f->makers);
+    f->next = (uint32_t *)isogi_trace__part(block, &used, ISOGI_TRACE__SAMPLES, sizeof *f->next);
+    f->heads = (uint32_t *)isogi_trace__part(block, &used, ISOGI_TRACE__HEADS, sizeof *f->heads);
+    return used;
 }
 
 static void isogi_trace__feedback_free(const isogi_trace *t) {
@@ -3687,13 +3735,7 @@ static void isogi_trace__feedback_free(const isogi_trace *t) {
     if (!f) return;
     isogi_trace__set_free(t, &f->texels);
     isogi_trace__set_free(t, &f->probes);
-    isogi_release(&t->context, f->plans, ISOGI_TRACE__SPANS, sizeof *f->plans);
-    isogi_release(&t->context, f->spans, ISOGI_TRACE__SPANS, sizeof *f->spans);
-    isogi_release(&t->context, f->catches, ISOGI_TRACE__SAMPLES, sizeof *f->catches);
-    isogi_release(&t->context, f->casts, ISOGI_TRACE__CASTS, sizeof *f->casts);
-    isogi_release(&t->context, f->direct, ISOGI_TRACE__SPANS, (size_t)t->values * sizeof(float));
-    isogi_release(&t->context, f->pieces, ISOGI_TRACE__PIECES + 1, sizeof *f->pieces);
-    isogi_release(&t->context, f->found, 4 * ISOGI_TRACE__SAMPLES + ISOGI_TRACE__HEADS, sizeof *f->found);
+    isogi_release(&t->context, f->block, 1, f->block_bytes);
     isogi_release(&t->context, f, 1, sizeof *f);
 }
 
@@ -3706,16 +3748,10 @@ static isogi_result isogi_trace__feedback_new(isogi_trace *t) {
     __builtin_cpu_init();
     t->wide = __builtin_cpu_supports("avx2") && (t->context.force_path <= 0 || t->context.force_path >= 3);
 #endif
-    f->plans = (isogi_trace__plan *)isogi_allocate(&t->context, ISOGI_TRACE__SPANS, sizeof *f->plans);
-    f->spans = (isogi_trace__span *)isogi_allocate(&t->context, ISOGI_TRACE__SPANS, sizeof *f->spans);
-    f->catches = (isogi_trace__catch *)isogi_allocate(&t->context, ISOGI_TRACE__SAMPLES, sizeof *f->catches);
-    f->casts = (isogi_trace__cast *)isogi_allocate(&t->context, ISOGI_TRACE__CASTS, sizeof *f->casts);
-    f->direct = (float *)isogi_allocate(&t->context, ISOGI_TRACE__SPANS, (size_t)t->values * sizeof(float));
-    f->pieces = (isogi_trace__piece *)isogi_allocate(&t->context, ISOGI_TRACE__PIECES + 1, sizeof *f->pieces);
-    f->found = (uint32_t *)isogi_allocate(&t->context, 4 * ISOGI_TRACE__SAMPLES + ISOGI_TRACE__HEADS, sizeof *f->found);
-    if (!f->plans || !f->spans || !f->catches || !f->casts || !f->direct || !f->pieces || !f->found) return ISOGI_NO_MEMORY;
-    f->fresh = f->found + ISOGI_TRACE__SAMPLES, f->makers = f->fresh + ISOGI_TRACE__SAMPLES;
-    f->next = f->makers + ISOGI_TRACE__SAMPLES, f->heads = f->next + ISOGI_TRACE__SAMPLES;
+    f->block_bytes = isogi_trace__buffers_set(t, f, NULL);
+    f->block = (uint8_t *)isogi_allocate(&t->context, 1, f->block_bytes);
+    if (!f->block) return ISOGI_NO_MEMORY;
+    isogi_trace__buffers_set(t, f, f->block);
     return ISOGI_OK;
 }
 
@@ -5362,8 +5398,8 @@ static void isogi_trace__finish_count(isogi_trace *t, size_t tasks) {
 
 /* The last chunks and segments of a set, its share of what is left when `tasks` are. */
 static void isogi_trace__set_shrink(const isogi_trace *t, isogi_trace__set *s, size_t tasks, int chunks) {
-    size_t n = chunks ? (s->chunk_count + tasks - 1) / tasks : 0;
-    for (; n; n--) isogi_trace__chunk_free(t, &s->chunks[--s->chunk_count]);
+    size_t n = chunks ? (s->chunk_made + tasks - 1) / tasks : 0;
+    for (; n; n--) isogi_trace__chunk_free(t, s);
     for (n = (s->segment_count + tasks - 1) / tasks; n; n--) isogi_trace__segment_free(t, &s->segments[--s->segment_count]);
 }
 
@@ -7086,6 +7122,7 @@ ISOGI_API isogi_result isogi_trace_gather_field(const isogi_trace_desc *desc, is
 #undef ISOGI_TRACE__PROBE_MOST
 #undef ISOGI_TRACE__NEAR_RATIO
 #undef ISOGI_TRACE__CHUNK
+#undef ISOGI_TRACE__SLAB
 #undef ISOGI_TRACE__SWEEP
 #undef ISOGI_TRACE__FLUSH
 #undef ISOGI_TRACE__PIECE_SPANS
