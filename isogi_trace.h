@@ -151,7 +151,8 @@
                 Any allocation may fail: the call says ISOGI_NO_MEMORY, the texture stays as it was and can go on.
                 Stack use stays below 32 KB (compiled by clang, below 35), nearly all of it that of rays.
    Threads      Rays run on the context's threads. isogi_trace_sample and the other readers may run in any number of threads at a
-                time; request, step and relight alone, without readers.
+                time; request, step and relight alone, without readers. Request and step keep their threads from beginning to end;
+                steps of a few milliseconds on many cores go better with an isogi_thread_pool.
    Determinism  The same bits for any number of threads and any budget of steps, and in parts (desc.box_first, isogi_trace_load).
                 PATHS: a texel's light depends on the description and its place alone, lazily or fully, in any order of requests.
                 FEEDBACK: which probes there are depends on the interval of isovalues, and when lazy on what was asked for and in which
@@ -2690,6 +2691,29 @@ ISOGI_API isogi_result isogi_trace_create(isogi_trace **trace, const isogi_trace
     return result;
 }
 
+static void isogi_trace__pool_set(isogi_trace *t, isogi_thread_pool *pool) {
+    t->context.thread_pool = pool;
+    if (t->coarse) isogi_trace__pool_set(t->coarse, pool);
+    if (t->high) isogi_trace__pool_set(t->high, pool);
+}
+
+/* A call may have some hundred parts that run on all threads, one after the other: on threads that stay until its end, where these can be
+   had. NULL: nothing to end. */
+static isogi_thread_pool *isogi_trace__pool_begin(isogi_trace *t) {
+    const isogi_context *context = &t->context;
+    isogi_thread_pool *pool = NULL;
+    if (context->thread_pool || context->parallel_for || context->threads == 1) return NULL;
+    if (isogi_thread_pool_create(&pool, context->threads, context) != ISOGI_OK) return NULL;
+    isogi_trace__pool_set(t, pool);
+    return pool;
+}
+
+static void isogi_trace__pool_end(isogi_trace *t, isogi_thread_pool *pool) {
+    if (!pool) return;
+    isogi_trace__pool_set(t, NULL);
+    isogi_thread_pool_free(pool);
+}
+
 ISOGI_API isogi_trace *isogi_trace_high(isogi_trace *trace) {
     return trace ? trace->scene.high ? trace : trace->high : NULL;
 }
@@ -3244,13 +3268,15 @@ ISOGI_API isogi_result isogi_trace_request(isogi_trace *trace, const float (*poi
     isogi_result result = ISOGI_OK;
     isogi_trace__asked asked;
     isogi_context silent;
+    isogi_thread_pool *pool;
     size_t first, i, end, most = count < ISOGI_TRACE__POINTS ? count : ISOGI_TRACE__POINTS;
     if (!trace || (count && !points)) return ISOGI_INVALID;
     if (!trace->scene.desc.lazy || trace->coarse || !count) return ISOGI_OK;
-    silent = trace->context, silent.progress = NULL;
     asked.trace = trace, asked.lacking = 0;
     asked.cells = (uint32_t(*)[3])isogi_allocate(&trace->context, most, sizeof *asked.cells);
     if (!asked.cells) return ISOGI_NO_MEMORY;
+    pool = isogi_trace__pool_begin(trace);
+    silent = trace->context, silent.progress = NULL;
     for (first = 0; first < count && result == ISOGI_OK; first += asked.count) {
         asked.points = points + first, asked.count = count - first < ISOGI_TRACE__POINTS ? count - first : ISOGI_TRACE__POINTS;
         isogi_parallel(&silent, (asked.count - 1) / ISOGI_TRACE__TASK_POINTS + 1, isogi_trace__again_task, &asked, 0, 1);
@@ -3259,6 +3285,7 @@ ISOGI_API isogi_result isogi_trace_request(isogi_trace *trace, const float (*poi
             if (result == ISOGI_OK) result = isogi_trace__want_points(trace, &asked, i, end);
         }
     }
+    isogi_trace__pool_end(trace, pool);
     isogi_release(&trace->context, asked.cells, most, sizeof *asked.cells);
     return result;
 }
@@ -5878,13 +5905,16 @@ static void isogi_trace__progress(const isogi_trace *t, double *wanted, double *
 
 /* The high side has its turn with the rays that the low side leaves, or when that has none to trace. */
 ISOGI_API isogi_result isogi_trace_step(isogi_trace *trace, uint64_t max_rays, double *remaining) {
+    isogi_thread_pool *pool;
     isogi_result result;
     uint64_t used = 0;
     double wanted = 0, done = 0;
     if (!trace) return ISOGI_INVALID;
+    pool = isogi_trace__pool_begin(trace);
     result = isogi_trace__step_levels(trace, max_rays, &used);
     if (result == ISOGI_OK && trace->high && (!max_rays || used < max_rays))
         result = isogi_trace__step_levels(trace->high, max_rays ? max_rays - used : 0, &used);
+    isogi_trace__pool_end(trace, pool);
     isogi_trace__progress(trace, &wanted, &done);
     if (trace->high) isogi_trace__progress(trace->high, &wanted, &done);
     if (!remaining || result != ISOGI_OK) return result;

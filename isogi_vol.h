@@ -53,7 +53,8 @@
                 A mesh keeps some 3/4 byte of scratch memory for every voxel until it is freed.
                 Stack use stays below 32 KB.
    Threads      A pyramid is const once built: any number of threads may read it. Building, updating, prefiltering and meshing use the
-                context's threads; rays, samples and normals run on the thread that calls.
+                context's threads; rays, samples and normals run on the thread that calls. isogi_thread_pool keeps threads from call
+                to call.
    Determinism  The same input gives the same bits for any number of threads. With -ffast-math hits of ordinary numbers are right but for
                 more rounding, those of denormal or huge ones (1e300) may be NaN, and nothing that this header says to be the same
                 bits on two ways need be so.
@@ -122,8 +123,11 @@ static inline const char *isogi_result_string(isogi_result result) {
 
 /* ---- memory, threads, progress ----------------------------------------------------------------------------------- */
 
+/* Threads that stay and wait for work, see isogi_thread_pool_create. */
+typedef struct isogi_thread_pool isogi_thread_pool;
+
 /* All zero, or NULL wherever one is asked for: malloc, one thread per core created and joined per call, silent.
-   A context is copied into what is built with it; `user` must outlive that. */
+   A context is copied into what is built with it; `user` and `thread_pool` must outlive that. */
 typedef struct isogi_context {
     void *(*alloc)(void *user, size_t size, size_t align); /* align: a power of two up to 64; NULL result = no memory */
     void (*release)(void *user, void *p, size_t size);     /* never called with NULL; set both or neither */
@@ -134,6 +138,7 @@ typedef struct isogi_context {
     int threads;    /* 0 = all cores, 1 = serial; ignored where parallel_for is set */
     int force_path; /* instruction path of what is built: 0 = best, 1 = plain reference, 2 = portable, 3 = AVX2, 4 = AVX-512 (Ice Lake,
                        Zen 4), and single rays like batches; no more than the machine has */
+    isogi_thread_pool *thread_pool; /* NULL: threads are created for each call; ignored where parallel_for is set */
 } isogi_context;
 
 /* What work was done, for tests and tuning: it depends on which rays go together, what they hit does not. Every call ADDS to the fields it
@@ -158,6 +163,15 @@ ISOGI_API void *isogi_allocate(const isogi_context *context, size_t count, size_
 ISOGI_API void isogi_release(const isogi_context *context, void *p, size_t count, size_t size);
 ISOGI_API isogi_result isogi_parallel(const isogi_context *context, size_t n, void (*task)(void *arg, size_t i), void *arg,
                                       double from, double to);
+
+/* A thread pool, for the contexts of programs that make many short calls on many cores: to create and to join a thread takes 15 to 60 us,
+   for each of them and every time. threads: as in a context, the calling thread included; a context's own `threads`, where it is not 0, is
+   a limit within the pool. They are created when work first wants them; between calls they sleep, after some 20 us of waiting for more.
+   Any number of contexts and of threads may use a pool: to a call that finds it at work for another, or that is made by a task of its own,
+   it is as if there were none. Results do not depend on it.
+   ISOGI_INVALID: threads below 0. context: whose memory it takes, 3 KB; NULL = malloc. To be freed when no call is at work that uses it. */
+ISOGI_API isogi_result isogi_thread_pool_create(isogi_thread_pool **pool, int threads, const isogi_context *context);
+ISOGI_API void isogi_thread_pool_free(isogi_thread_pool *pool); /* NULL is fine */
 
 /* Numbers in 16 bits (IEEE binary16), for the same: to nearest, ties to even; beyond the range, 65504, the largest finite one; NaN is 0.
    All in integers, but for what is below 2^-14 on the way back: no denormal float is touched, which would take a hundred times as long. */
@@ -574,40 +588,76 @@ ISOGI_API void isogi_release(const isogi_context *context, void *p, size_t count
 
 /* ==== threads ======================================================================================================== */
 
+#define ISOGI_VOL__MAX_THREADS 256
+#if defined(ISOGI_NO_THREADS)
+typedef int isogi_vol__lock;
+#define ISOGI_VOL__LOCK(lock) ((void)(lock))
+#define ISOGI_VOL__UNLOCK(lock) ((void)(lock))
+#elif defined(_WIN32)
+typedef HANDLE isogi_vol__thread;
+typedef CRITICAL_SECTION isogi_vol__lock;
+typedef CONDITION_VARIABLE isogi_vol__signal;
+#define ISOGI_VOL__WORKER(name) DWORD WINAPI name(LPVOID p)
+#define ISOGI_VOL__LOCK_SET(lock) InitializeCriticalSection(lock)
+#define ISOGI_VOL__LOCK_END(lock) DeleteCriticalSection(lock)
+#define ISOGI_VOL__LOCK(lock) EnterCriticalSection(lock)
+#define ISOGI_VOL__UNLOCK(lock) LeaveCriticalSection(lock)
+#define ISOGI_VOL__SIGNAL_SET(signal) InitializeConditionVariable(signal)
+#define ISOGI_VOL__SIGNAL_END(signal) ((void)(signal))
+#define ISOGI_VOL__WAIT(signal, lock) SleepConditionVariableCS(signal, lock, INFINITE)
+#define ISOGI_VOL__WAKE_ONE(signal) WakeConditionVariable(signal)
+#define ISOGI_VOL__WAKE_ALL(signal) WakeAllConditionVariable(signal)
+static int isogi_vol__start(isogi_vol__thread *thread, DWORD(WINAPI *worker)(LPVOID), void *p) {
+    *thread = CreateThread(NULL, 0, worker, p, 0, NULL);
+    return *thread != NULL;
+}
+static void isogi_vol__join(isogi_vol__thread thread) {
+    WaitForSingleObject(thread, INFINITE);
+    CloseHandle(thread);
+}
+static long isogi_vol__processors(void) {
+    SYSTEM_INFO info;
+    GetSystemInfo(&info);
+    return (long)info.dwNumberOfProcessors;
+}
+#else
+typedef pthread_t isogi_vol__thread;
+typedef pthread_mutex_t isogi_vol__lock;
+typedef pthread_cond_t isogi_vol__signal;
+#define ISOGI_VOL__WORKER(name) void *name(void *p)
+#define ISOGI_VOL__LOCK_SET(lock) pthread_mutex_init(lock, NULL)
+#define ISOGI_VOL__LOCK_END(lock) pthread_mutex_destroy(lock)
+#define ISOGI_VOL__LOCK(lock) pthread_mutex_lock(lock)
+#define ISOGI_VOL__UNLOCK(lock) pthread_mutex_unlock(lock)
+#define ISOGI_VOL__SIGNAL_SET(signal) pthread_cond_init(signal, NULL)
+#define ISOGI_VOL__SIGNAL_END(signal) pthread_cond_destroy(signal)
+#define ISOGI_VOL__WAIT(signal, lock) pthread_cond_wait(signal, lock)
+#define ISOGI_VOL__WAKE_ONE(signal) pthread_cond_signal(signal)
+#define ISOGI_VOL__WAKE_ALL(signal) pthread_cond_broadcast(signal)
+static int isogi_vol__start(isogi_vol__thread *thread, void *(*worker)(void *), void *p) {
+    return pthread_create(thread, NULL, worker, p) == 0;
+}
+static void isogi_vol__join(isogi_vol__thread thread) { pthread_join(thread, NULL); }
+static long isogi_vol__processors(void) { return sysconf(_SC_NPROCESSORS_ONLN); }
+#endif
+
 typedef struct isogi_vol__job {
     void (*task)(void *arg, size_t i);
     void *arg;
     size_t next, count;
     int cancelled;
-#ifndef ISOGI_NO_THREADS
-#ifdef _WIN32
-    CRITICAL_SECTION lock;
-#else
-    pthread_mutex_t lock;
-#endif
-#endif
+    isogi_vol__lock lock;
 } isogi_vol__job;
-
-#if defined(ISOGI_NO_THREADS)
-#define ISOGI_VOL__LOCK(job) ((void)(job))
-#define ISOGI_VOL__UNLOCK(job) ((void)(job))
-#elif defined(_WIN32)
-#define ISOGI_VOL__LOCK(job) EnterCriticalSection(&(job)->lock)
-#define ISOGI_VOL__UNLOCK(job) LeaveCriticalSection(&(job)->lock)
-#else
-#define ISOGI_VOL__LOCK(job) pthread_mutex_lock(&(job)->lock)
-#define ISOGI_VOL__UNLOCK(job) pthread_mutex_unlock(&(job)->lock)
-#endif
 
 /* Runs one task; 0 when there is none left. *begun counts the tasks that any thread has begun. */
 static int isogi_vol__job_step(isogi_vol__job *job, size_t *begun) {
     size_t i;
     int run;
-    ISOGI_VOL__LOCK(job);
+    ISOGI_VOL__LOCK(&job->lock);
     run = !job->cancelled && job->next < job->count;
     i = job->next;
     if (run) job->next++;
-    ISOGI_VOL__UNLOCK(job);
+    ISOGI_VOL__UNLOCK(&job->lock);
     if (run) job->task(job->arg, i);
     *begun = i + 1;
     return run;
@@ -619,83 +669,185 @@ static int isogi_vol__report(const isogi_context *context, double from, double t
 }
 
 /* The calling thread's share of the work; it alone calls the progress callback. */
-static void isogi_vol__job_lead(isogi_vol__job *job, const isogi_context *context, double from, double to) {
+ISOGI_VOL__INLINE void isogi_vol__job_lead(isogi_vol__job *job, const isogi_context *context, double from, double to) {
     size_t begun;
     int more = 1;
     while (more && !job->cancelled) { /* only this thread writes `cancelled` */
         more = isogi_vol__job_step(job, &begun);
         if (isogi_vol__report(context, from, to, more ? begun : job->count, job->count)) {
-            ISOGI_VOL__LOCK(job);
+            ISOGI_VOL__LOCK(&job->lock);
             job->cancelled = 1;
-            ISOGI_VOL__UNLOCK(job);
+            ISOGI_VOL__UNLOCK(&job->lock);
         }
     }
 }
 
-#ifndef ISOGI_NO_THREADS
-#define ISOGI_VOL__MAX_THREADS 256
-#ifdef _WIN32
-typedef HANDLE isogi_vol__thread;
-static DWORD WINAPI isogi_vol__worker(LPVOID p) {
+#ifdef ISOGI_NO_THREADS
+struct isogi_thread_pool { isogi_context context; };
+
+static void isogi_vol__job_run(isogi_vol__job *job, const isogi_context *context, double from, double to) {
+    isogi_vol__job_lead(job, context, from, to);
+}
+
+static void isogi_vol__pool_set(isogi_thread_pool *pool, int threads) { (void)pool, (void)threads; }
+static void isogi_vol__pool_end(isogi_thread_pool *pool) { (void)pool; }
+#else
+static int isogi_vol__cores(void) {
+    const long cores = isogi_vol__processors();
+    return cores < 1 ? 1 : cores > ISOGI_VOL__MAX_THREADS ? ISOGI_VOL__MAX_THREADS : (int)cores;
+}
+
+static ISOGI_VOL__WORKER(isogi_vol__worker) {
     size_t begun;
     while (isogi_vol__job_step((isogi_vol__job *)p, &begun)) {}
     return 0;
 }
-static int isogi_vol__start(isogi_vol__thread *thread, isogi_vol__job *job) {
-    *thread = CreateThread(NULL, 0, isogi_vol__worker, job, 0, NULL);
-    return *thread != NULL;
-}
-static void isogi_vol__join(isogi_vol__thread thread) {
-    WaitForSingleObject(thread, INFINITE);
-    CloseHandle(thread);
-}
-static int isogi_vol__cores(void) {
-    SYSTEM_INFO info;
-    GetSystemInfo(&info);
-    return (int)info.dwNumberOfProcessors;
-}
+
+/* What is read without the lock is a hint, after which it is looked at again. */
+#if (defined(__GNUC__) || defined(__clang__)) && !defined(__TINYC__)
+#define ISOGI_VOL__PEEK(x) __atomic_load_n(&(x), __ATOMIC_RELAXED)
+#define ISOGI_VOL__POKE(x, value) __atomic_store_n(&(x), value, __ATOMIC_RELAXED)
+#if defined(__x86_64__) || defined(__i386__)
+#define ISOGI_VOL__PAUSE() __builtin_ia32_pause()
 #else
-typedef pthread_t isogi_vol__thread;
-static void *isogi_vol__worker(void *p) {
+#define ISOGI_VOL__PAUSE() ((void)0)
+#endif
+#define ISOGI_VOL__SPINS 1000
+#else
+#define ISOGI_VOL__PEEK(x) (x)
+#define ISOGI_VOL__POKE(x, value) ((x) = (value))
+#define ISOGI_VOL__PAUSE() ((void)0)
+#define ISOGI_VOL__SPINS 0
+#endif
+
+/* One job at a time. Its threads sleep by `work`; the one that calls waits by `done` until those that joined it are. */
+struct isogi_thread_pool {
+    isogi_context context; /* whose memory it is */
+    isogi_vol__lock lock;
+    isogi_vol__signal work, done;
+    isogi_vol__job *job; /* at work; NULL: none */
+    unsigned number;     /* of the job: a thread looks at each once */
+    int wanted, active;  /* threads that may still join it; that are at it */
+    int asleep, leave;
+    int threads, started; /* with the one that calls; without it */
+    int spins;
+    isogi_vol__thread thread[ISOGI_VOL__MAX_THREADS];
+};
+
+static ISOGI_VOL__WORKER(isogi_vol__pool_worker) {
+    isogi_thread_pool *pool = (isogi_thread_pool *)p;
+    unsigned seen = 0;
     size_t begun;
-    while (isogi_vol__job_step((isogi_vol__job *)p, &begun)) {}
-    return NULL;
+    for (;;) {
+        isogi_vol__job *job = NULL;
+        int i;
+        for (i = 0; i < pool->spins && ISOGI_VOL__PEEK(pool->number) == seen && !ISOGI_VOL__PEEK(pool->leave); i++) ISOGI_VOL__PAUSE();
+        ISOGI_VOL__LOCK(&pool->lock);
+        pool->asleep++;
+        while (pool->number == seen && !pool->leave) ISOGI_VOL__WAIT(&pool->work, &pool->lock);
+        pool->asleep--;
+        seen = pool->number;
+        if (!pool->leave && pool->wanted > 0) {
+            pool->wanted--, job = pool->job;
+            ISOGI_VOL__POKE(pool->active, pool->active + 1);
+        }
+        i = pool->leave;
+        ISOGI_VOL__UNLOCK(&pool->lock);
+        if (i) return 0;
+        if (!job) continue;
+        while (isogi_vol__job_step(job, &begun)) {}
+        ISOGI_VOL__LOCK(&pool->lock);
+        ISOGI_VOL__POKE(pool->active, pool->active - 1);
+        if (!pool->active) ISOGI_VOL__WAKE_ONE(&pool->done);
+        ISOGI_VOL__UNLOCK(&pool->lock);
+    }
 }
-static int isogi_vol__start(isogi_vol__thread *thread, isogi_vol__job *job) {
-    return pthread_create(thread, NULL, isogi_vol__worker, job) == 0;
+
+/* 0: it is at work for another. A thread that cannot be had is done without. */
+ISOGI_VOL__NOINLINE static int isogi_vol__pool_run(isogi_thread_pool *pool, isogi_vol__job *job, int wanted,
+                                                   const isogi_context *context, double from, double to) {
+    int busy, i;
+    ISOGI_VOL__LOCK(&pool->lock);
+    busy = pool->job != NULL;
+    if (!busy) {
+        pool->job = job, pool->wanted = wanted - 1;
+        ISOGI_VOL__POKE(pool->number, pool->number + 1);
+        for (i = 0; i < pool->asleep && i < wanted - 1; i++) ISOGI_VOL__WAKE_ONE(&pool->work);
+    }
+    ISOGI_VOL__UNLOCK(&pool->lock);
+    if (busy) return 0;
+    while (pool->started < wanted - 1 && isogi_vol__start(&pool->thread[pool->started], isogi_vol__pool_worker, pool)) pool->started++;
+    isogi_vol__job_lead(job, context, from, to);
+    for (i = 0; i < pool->spins && ISOGI_VOL__PEEK(pool->active); i++) ISOGI_VOL__PAUSE();
+    ISOGI_VOL__LOCK(&pool->lock);
+    pool->wanted = 0;
+    while (pool->active) ISOGI_VOL__WAIT(&pool->done, &pool->lock);
+    pool->job = NULL;
+    ISOGI_VOL__UNLOCK(&pool->lock);
+    return 1;
 }
-static void isogi_vol__join(isogi_vol__thread thread) { pthread_join(thread, NULL); }
-static int isogi_vol__cores(void) {
-    long cores = sysconf(_SC_NPROCESSORS_ONLN);
-    return cores < 1 ? 1 : cores > ISOGI_VOL__MAX_THREADS ? ISOGI_VOL__MAX_THREADS : (int)cores;
+
+static void isogi_vol__pool_set(isogi_thread_pool *pool, int threads) {
+    const int cores = isogi_vol__cores();
+    pool->threads = threads > ISOGI_VOL__MAX_THREADS ? ISOGI_VOL__MAX_THREADS : threads ? threads : cores;
+    pool->spins = pool->threads <= cores ? ISOGI_VOL__SPINS : 0; /* who waits must not keep others from their work */
+    ISOGI_VOL__LOCK_SET(&pool->lock);
+    ISOGI_VOL__SIGNAL_SET(&pool->work), ISOGI_VOL__SIGNAL_SET(&pool->done);
+}
+
+static void isogi_vol__pool_end(isogi_thread_pool *pool) {
+    ISOGI_VOL__LOCK(&pool->lock);
+    ISOGI_VOL__POKE(pool->leave, 1);
+    ISOGI_VOL__WAKE_ALL(&pool->work);
+    ISOGI_VOL__UNLOCK(&pool->lock);
+    while (pool->started) isogi_vol__join(pool->thread[--pool->started]);
+    ISOGI_VOL__SIGNAL_END(&pool->work), ISOGI_VOL__SIGNAL_END(&pool->done);
+    ISOGI_VOL__LOCK_END(&pool->lock);
+}
+
+/* A thread that cannot be had is done without: the calling thread finishes the work. */
+ISOGI_VOL__NOINLINE static void isogi_vol__new_threads_run(isogi_vol__job *job, int wanted, const isogi_context *context, double from,
+                                                           double to) {
+    isogi_vol__thread threads[ISOGI_VOL__MAX_THREADS];
+    int started = 0;
+    while (started < wanted - 1 && isogi_vol__start(&threads[started], isogi_vol__worker, job)) started++;
+    isogi_vol__job_lead(job, context, from, to);
+    while (started) isogi_vol__join(threads[--started]);
+}
+
+static void isogi_vol__job_run(isogi_vol__job *job, const isogi_context *context, double from, double to) {
+    isogi_thread_pool *pool = context ? context->thread_pool : NULL;
+    int wanted = context && context->threads > 0 ? context->threads : pool ? pool->threads : isogi_vol__cores();
+    if (wanted > ISOGI_VOL__MAX_THREADS) wanted = ISOGI_VOL__MAX_THREADS;
+    if (pool && wanted > pool->threads) wanted = pool->threads;
+    if ((size_t)wanted > job->count) wanted = (int)job->count;
+    ISOGI_VOL__LOCK_SET(&job->lock);
+    if (wanted == 1) isogi_vol__job_lead(job, context, from, to);
+    else if (!pool || !isogi_vol__pool_run(pool, job, wanted, context, from, to))
+        isogi_vol__new_threads_run(job, wanted, context, from, to);
+    ISOGI_VOL__LOCK_END(&job->lock);
 }
 #endif
 
-static void isogi_vol__job_run(isogi_vol__job *job, const isogi_context *context, double from, double to) {
-    isogi_vol__thread threads[ISOGI_VOL__MAX_THREADS];
-    int wanted = context && context->threads > 0 ? context->threads : isogi_vol__cores(), started = 0;
-    if (wanted > ISOGI_VOL__MAX_THREADS) wanted = ISOGI_VOL__MAX_THREADS;
-    if ((size_t)wanted > job->count) wanted = (int)job->count;
-#ifdef _WIN32
-    InitializeCriticalSection(&job->lock);
-#else
-    pthread_mutex_init(&job->lock, NULL);
-#endif
-    /* A thread that cannot be had is done without: the calling thread finishes the work. */
-    while (started < wanted - 1 && isogi_vol__start(&threads[started], job)) started++;
-    isogi_vol__job_lead(job, context, from, to);
-    while (started) isogi_vol__join(threads[--started]);
-#ifdef _WIN32
-    DeleteCriticalSection(&job->lock);
-#else
-    pthread_mutex_destroy(&job->lock);
-#endif
+ISOGI_API isogi_result isogi_thread_pool_create(isogi_thread_pool **pool, int threads, const isogi_context *context) {
+    isogi_thread_pool *p;
+    if (!pool || threads < 0) return ISOGI_INVALID;
+    p = (isogi_thread_pool *)isogi_allocate(context, 1, sizeof *p);
+    if (!p) return ISOGI_NO_MEMORY;
+    memset(p, 0, sizeof *p);
+    if (context) p->context = *context;
+    isogi_vol__pool_set(p, threads);
+    *pool = p;
+    return ISOGI_OK;
 }
-#else
-static void isogi_vol__job_run(isogi_vol__job *job, const isogi_context *context, double from, double to) {
-    isogi_vol__job_lead(job, context, from, to);
+
+ISOGI_API void isogi_thread_pool_free(isogi_thread_pool *pool) {
+    isogi_context context;
+    if (!pool) return;
+    isogi_vol__pool_end(pool);
+    context = pool->context;
+    isogi_release(&context, pool, 1, sizeof *pool);
 }
-#endif
 
 typedef struct isogi_vol__slice {
     void (*task)(void *arg, size_t i);
@@ -9125,6 +9277,18 @@ ISOGI_API void isogi_vol_mesh_free(const isogi_pyramid *pyramid, isogi_mesh *mes
 #undef ISOGI_VOL__LOCK
 #undef ISOGI_VOL__UNLOCK
 #undef ISOGI_VOL__MAX_THREADS
+#undef ISOGI_VOL__WORKER
+#undef ISOGI_VOL__LOCK_SET
+#undef ISOGI_VOL__LOCK_END
+#undef ISOGI_VOL__SIGNAL_SET
+#undef ISOGI_VOL__SIGNAL_END
+#undef ISOGI_VOL__WAIT
+#undef ISOGI_VOL__WAKE_ONE
+#undef ISOGI_VOL__WAKE_ALL
+#undef ISOGI_VOL__PEEK
+#undef ISOGI_VOL__POKE
+#undef ISOGI_VOL__PAUSE
+#undef ISOGI_VOL__SPINS
 #undef ISOGI_VOL__PACKET
 #undef ISOGI_VOL__REACH
 #undef ISOGI_VOL__AHEAD

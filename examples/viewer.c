@@ -541,9 +541,10 @@ static double seconds(void) {
 
 static void *counted_alloc(void *user, size_t size, size_t align) {
     viewer *v = (viewer *)user;
-    void *p = NULL;
+    void *p = isogi_allocate(NULL, 1, size); /* aligned to 64 bytes, which is as much as is ever asked for */
     uint64_t now, peak;
-    if (posix_memalign(&p, align < sizeof(void *) ? sizeof(void *) : align, size) != 0) return NULL;
+    (void)align;
+    if (!p) return NULL;
     now = __atomic_add_fetch(&v->memory, size, __ATOMIC_RELAXED);
     peak = __atomic_load_n(&v->memory_peak, __ATOMIC_RELAXED);
     while (now > peak && !__atomic_compare_exchange_n(&v->memory_peak, &peak, now, 1, __ATOMIC_RELAXED, __ATOMIC_RELAXED)) {}
@@ -551,7 +552,7 @@ static void *counted_alloc(void *user, size_t size, size_t align) {
 }
 static void counted_release(void *user, void *p, size_t size) {
     __atomic_sub_fetch(&((viewer *)user)->memory, size, __ATOMIC_RELAXED);
-    free(p);
+    isogi_release(NULL, p, 1, size);
 }
 
 /* A line that is rewritten on a terminal; elsewhere a new line now and then, and none for what is done within a second or two. */
@@ -1530,6 +1531,7 @@ static int run(viewer *v, int argc, char **argv) {
     if (v->o.compare && !read_compared(v)) return 0;
     if (!v->o.antialias) v->o.antialias = v->o.mode == DVR ? 1 : v->o.mode == PATHTRACE && v->o.samples < 4 ? v->o.samples : 4;
     v->context.alloc = counted_alloc, v->context.release = counted_release, v->context.user = v, v->context.threads = v->o.threads;
+    isogi_thread_pool_create(&v->context.thread_pool, v->o.threads, NULL); /* where it fails there is none, which is as good, but slower */
     stat_line(v, "mode", "%s", mode_name[v->o.mode]);
     if (!load_volume(v)) return 0;
     choose_surface(v);
@@ -1561,6 +1563,7 @@ static void release(viewer *v) {
     isogi_trace_free(v->trace);
     if (v->pyramid) isogi_vol_mesh_free(v->pyramid, &v->mesh);
     isogi_vol_free(v->pyramid);
+    isogi_thread_pool_free(v->context.thread_pool);
     transfer_file_free(&v->transfer);
     volume_free(&v->volume);
 }

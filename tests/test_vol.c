@@ -1,6 +1,9 @@
 /* Properties of isogi_vol.h: volumes, pyramid, sampling, rays. Meshes have their own file. */
 #define ISOGI_IMPLEMENTATION
 #include "isogi_vol.h"
+#include <pthread.h>
+#include <sched.h>
+#include <time.h>
 #include "ray_fields.h"
 #include "reference_ray.h"
 
@@ -875,6 +878,162 @@ TEST(parallel_runs_every_task_once_and_can_be_cancelled) {
     }
     CHECK(isogi_parallel(NULL, 0, square_task, &s, 0, 1) == ISOGI_OK && isogi_parallel(NULL, 5, NULL, &s, 0, 1) == ISOGI_INVALID,
           "edge cases");
+}
+
+/* ---- threads that stay ---- */
+
+/* Counts what was done and by whom: a thread that comes for the first time leaves its mark with itself. */
+typedef struct labour {
+    const isogi_context *context;
+    pthread_key_t mark;
+    pthread_mutex_t lock;
+    long done[64], fresh, at_work, most, inner;
+} labour;
+
+static void labour_task(void *arg, size_t i) {
+    labour *l = (labour *)arg;
+    const int known = pthread_getspecific(l->mark) != NULL;
+    if (!known) pthread_setspecific(l->mark, l);
+    pthread_mutex_lock(&l->lock);
+    l->done[i]++, l->fresh += !known, l->at_work++;
+    l->most = l->at_work > l->most ? l->at_work : l->most;
+    pthread_mutex_unlock(&l->lock);
+    sched_yield();
+    pthread_mutex_lock(&l->lock);
+    l->at_work--;
+    pthread_mutex_unlock(&l->lock);
+}
+
+static labour *labour_begin(const isogi_context *context) {
+    labour *l = (labour *)calloc(1, sizeof *l);
+    l->context = context;
+    if (pthread_key_create(&l->mark, NULL) || pthread_mutex_init(&l->lock, NULL)) abort();
+    pthread_setspecific(l->mark, l); /* the thread that calls is known */
+    return l;
+}
+
+static void labour_end(labour *l) { pthread_key_delete(l->mark), pthread_mutex_destroy(&l->lock), free(l); }
+
+TEST(threads_of_a_pool_stay_and_run_every_task_once) {
+    for (int threads = 0; threads <= 6; threads += 1 + threads / 4) {
+        isogi_context context = {0};
+        CHECK(isogi_thread_pool_create(&context.thread_pool, threads, NULL) == ISOGI_OK, "threads %d", threads);
+        labour *l = labour_begin(&context);
+        const int cores = threads ? threads : 256;
+        long expected[64] = {0};
+        for (int job = 0; job < 400; job++) {
+            const size_t n = 1 + (size_t)(job * 37 % 64);
+            CHECK(isogi_parallel(&context, n, labour_task, l, 0, 1) == ISOGI_OK, "threads %d, job %d", threads, job);
+            for (size_t i = 0; i < n; i++) expected[i]++;
+        }
+        CHECK(!memcmp(expected, l->done, sizeof expected), "threads %d: tasks left out or run twice", threads);
+        CHECK(l->fresh < cores && l->most <= cores, "threads %d: %ld of them came, up to %ld at once", threads, l->fresh, l->most);
+        isogi_thread_pool_free(context.thread_pool);
+        labour_end(l);
+    }
+    isogi_context few = {.threads = 2}; /* a context's own limit */
+    CHECK(isogi_thread_pool_create(&few.thread_pool, 5, NULL) == ISOGI_OK, "pool");
+    labour *l = labour_begin(&few);
+    few.threads = 0, isogi_parallel(&few, 64, labour_task, l, 0, 1); /* so that there are more */
+    few.threads = 2, l->most = 0, memset(l->done, 0, sizeof l->done);
+    for (int job = 0; job < 100; job++) isogi_parallel(&few, 64, labour_task, l, 0, 1);
+    CHECK(l->most <= 2 && l->done[63] == 100, "%ld at once, %ld times", l->most, l->done[63]);
+    few.threads = 1, l->fresh = l->most = 0;
+    for (int job = 0; job < 100; job++) isogi_parallel(&few, 64, labour_task, l, 0, 1);
+    CHECK(l->most == 1 && l->fresh == 0, "%ld at once, %ld other threads", l->most, l->fresh);
+    isogi_thread_pool_free(few.thread_pool);
+    labour_end(l);
+}
+
+static void nap(long nanoseconds) {
+    const struct timespec t = {0, nanoseconds};
+    nanosleep(&t, NULL);
+}
+
+/* Waits for a second thread, 5 s at most, and then some more. */
+static void meeting_task(void *arg, size_t i) {
+    labour *l = (labour *)arg;
+    int met = 0;
+    (void)i;
+    pthread_mutex_lock(&l->lock);
+    l->at_work++, l->most = l->at_work > l->most ? l->at_work : l->most;
+    pthread_mutex_unlock(&l->lock);
+    for (int k = 0; k < 5000 && !met; k++) {
+        nap(1000000);
+        pthread_mutex_lock(&l->lock);
+        met = l->most > 1;
+        pthread_mutex_unlock(&l->lock);
+    }
+    nap(2000000);
+    pthread_mutex_lock(&l->lock);
+    l->at_work--, l->done[0]++;
+    pthread_mutex_unlock(&l->lock);
+}
+
+/* Whoever has fallen asleep, too; and a call waits for all that work for it. */
+TEST(threads_of_a_pool_wake_up_and_are_waited_for) {
+    isogi_context context = {0};
+    int alone = 0;
+#ifdef ISOGI_NO_THREADS
+    alone = 1;
+#endif
+    CHECK(isogi_thread_pool_create(&context.thread_pool, 4, NULL) == ISOGI_OK, "pool");
+    labour *l = labour_begin(&context);
+    for (int job = 0; job < 4 && !alone; job++) {
+        l->most = l->done[0] = 0;
+        isogi_parallel(&context, 8, meeting_task, l, 0, 1);
+        pthread_mutex_lock(&l->lock);
+        CHECK(l->most > 1 && l->most <= 4, "job %d: %ld threads came together", job, l->most);
+        CHECK(l->at_work == 0 && l->done[0] == 8, "job %d: %ld still at work, %ld done", job, l->at_work, l->done[0]);
+        pthread_mutex_unlock(&l->lock);
+        nap(20000000);
+    }
+    isogi_thread_pool_free(context.thread_pool);
+    labour_end(l);
+}
+
+static void inner_task(void *arg, size_t i) {
+    labour *l = (labour *)arg;
+    squares s = {{0}};
+    long right = 0;
+    (void)i;
+    for (int job = 0; job < 20; job++) {
+        memset(&s, 0, sizeof s);
+        right += isogi_parallel(l->context, 50, square_task, &s, 0, 1) == ISOGI_OK && s.out[1] == 1 && s.out[49] == 2401;
+    }
+    pthread_mutex_lock(&l->lock);
+    l->inner += right;
+    pthread_mutex_unlock(&l->lock);
+}
+
+/* Tasks of its own call, and those of several threads. */
+TEST(a_pool_at_work_is_as_if_there_were_none) {
+    isogi_context context = {0}, others = {.threads = 4};
+    int calls = 0;
+    squares s = {{0}};
+    CHECK(isogi_thread_pool_create(&context.thread_pool, 3, NULL) == ISOGI_OK, "pool");
+    labour *l = labour_begin(&context);
+    isogi_parallel(&context, 6, inner_task, l, 0, 1);
+    isogi_parallel(&others, 6, inner_task, l, 0, 1);
+    CHECK(l->inner == 240, "%ld of 240 jobs are right", l->inner);
+    context.progress = cancel, context.user = &calls;
+    CHECK(isogi_parallel(&context, 1000, square_task, &s, 0, 1) == ISOGI_CANCELLED && calls > 0, "%d calls", calls);
+    context.progress = NULL;
+    CHECK(isogi_parallel(&context, 1000, square_task, &s, 0, 1) == ISOGI_OK && s.out[999] == 998001, "after a call was cancelled");
+    isogi_thread_pool_free(context.thread_pool);
+    labour_end(l);
+}
+
+TEST(pools_say_what_is_wrong) {
+    isogi_thread_pool *pool = NULL;
+    allocator a = {0, 1, 0, 0};
+    isogi_context context = {.alloc = test_alloc, .release = test_release, .user = &a};
+    CHECK(isogi_thread_pool_create(&pool, -1, NULL) == ISOGI_INVALID && isogi_thread_pool_create(NULL, 1, NULL) == ISOGI_INVALID && !pool,
+          "arguments");
+    CHECK(isogi_thread_pool_create(&pool, 2, &context) == ISOGI_NO_MEMORY && !pool, "no memory");
+    CHECK(isogi_thread_pool_create(&pool, 100000, &context) == ISOGI_OK && a.live == 1, "%ld blocks", a.live);
+    isogi_thread_pool_free(pool), isogi_thread_pool_free(NULL);
+    CHECK(a.live == 0 && a.wrong_size == 0, "%ld blocks live, %d wrong sizes", a.live, a.wrong_size);
 }
 
 TEST_MAIN("vol")
