@@ -4923,13 +4923,12 @@ static isogi_result isogi_dvr__prepare(isogi_dvr *d, uint64_t *max_rays, double 
 /* Units of work and the rays of each: brute force goes on by grid points, sweeps by planes of the lattice (four voxels are taken for a
    ray) and then by directions, the paper's method by blocks (whose voxels, and then whose short rays, are taken for 64 points') and then
    by directions. */
-ISOGI_API isogi_result isogi_dvr_step(isogi_dvr *dvr, uint64_t max_rays, double *remaining) {
+static isogi_result isogi_dvr__step(isogi_dvr *dvr, uint64_t max_rays, double *remaining) {
     isogi_result result = ISOGI_OK;
     uint64_t units, rays;
     size_t count, end;
     double share = 1; /* of all the work, that of what follows */
     int go_on = 1;
-    if (!dvr) return ISOGI_INVALID;
     if (dvr->transparent && dvr->point_count && (isogi_dvr__by_value(dvr) || !dvr->transfer.peak_count)) {
         /* all blocks are dropped, whatever values they hold: no voxel is read */
         if (dvr->method == ISOGI_DVR_PAPER && !dvr->blocks.ready) result = isogi_dvr__update_blocks(dvr);
@@ -4955,6 +4954,16 @@ ISOGI_API isogi_result isogi_dvr_step(isogi_dvr *dvr, uint64_t max_rays, double 
     if (dvr->method == ISOGI_DVR_SWEEP) result = isogi_dvr__step_sweeps(dvr, end);
     else result = dvr->method == ISOGI_DVR_PAPER && count ? isogi_dvr__step_paper(dvr, end) : isogi_dvr__step_brute(dvr, end);
     if (result == ISOGI_OK && remaining) *remaining = count ? (double)(count - dvr->next) / (double)count * share : 0;
+    return result;
+}
+
+ISOGI_API isogi_result isogi_dvr_step(isogi_dvr *dvr, uint64_t max_rays, double *remaining) {
+    isogi_thread_pool *pool;
+    isogi_result result;
+    if (!dvr) return ISOGI_INVALID;
+    pool = isogi_thread_pool_begin(&dvr->context);
+    result = isogi_dvr__step(dvr, max_rays, remaining);
+    isogi_thread_pool_end(&dvr->context, pool);
     return result;
 }
 

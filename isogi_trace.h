@@ -2691,27 +2691,22 @@ ISOGI_API isogi_result isogi_trace_create(isogi_trace **trace, const isogi_trace
     return result;
 }
 
-static void isogi_trace__pool_set(isogi_trace *t, isogi_thread_pool *pool) {
+/* Around calls of some hundred parts: threads that stay, also for the textures below this one. */
+static void isogi_trace__pool_share(isogi_trace *t, isogi_thread_pool *pool) {
     t->context.thread_pool = pool;
-    if (t->coarse) isogi_trace__pool_set(t->coarse, pool);
-    if (t->high) isogi_trace__pool_set(t->high, pool);
+    if (t->coarse) isogi_trace__pool_share(t->coarse, pool);
+    if (t->high) isogi_trace__pool_share(t->high, pool);
 }
 
-/* A call may have some hundred parts that run on all threads, one after the other: on threads that stay until its end, where these can be
-   had. NULL: nothing to end. */
 static isogi_thread_pool *isogi_trace__pool_begin(isogi_trace *t) {
-    const isogi_context *context = &t->context;
-    isogi_thread_pool *pool = NULL;
-    if (context->thread_pool || context->parallel_for || context->threads == 1) return NULL;
-    if (isogi_thread_pool_create(&pool, context->threads, context) != ISOGI_OK) return NULL;
-    isogi_trace__pool_set(t, pool);
+    isogi_thread_pool *pool = isogi_thread_pool_begin(&t->context);
+    isogi_trace__pool_share(t, t->context.thread_pool);
     return pool;
 }
 
 static void isogi_trace__pool_end(isogi_trace *t, isogi_thread_pool *pool) {
-    if (!pool) return;
-    isogi_trace__pool_set(t, NULL);
-    isogi_thread_pool_free(pool);
+    isogi_thread_pool_end(&t->context, pool);
+    isogi_trace__pool_share(t, t->context.thread_pool);
 }
 
 ISOGI_API isogi_trace *isogi_trace_high(isogi_trace *trace) {

@@ -172,6 +172,10 @@ ISOGI_API isogi_result isogi_parallel(const isogi_context *context, size_t n, vo
    ISOGI_INVALID: threads below 0. context: whose memory it takes, 3 KB; NULL = malloc. To be freed when no call is at work that uses it. */
 ISOGI_API isogi_result isogi_thread_pool_create(isogi_thread_pool **pool, int threads, const isogi_context *context);
 ISOGI_API void isogi_thread_pool_free(isogi_thread_pool *pool); /* NULL is fine */
+/* For code that stands on this header and makes many isogi_parallel calls in one of its own: from begin to end the context has a pool,
+   if it had none, runs more than one thread, and there is memory for it. Hand on what begin returns, which may be NULL. */
+ISOGI_API isogi_thread_pool *isogi_thread_pool_begin(isogi_context *context);
+ISOGI_API void isogi_thread_pool_end(isogi_context *context, isogi_thread_pool *pool);
 
 /* Numbers in 16 bits (IEEE binary16), for the same: to nearest, ties to even; beyond the range, 65504, the largest finite one; NaN is 0.
    All in integers, but for what is below 2^-14 on the way back: no denormal float is touched, which would take a hundred times as long. */
@@ -847,6 +851,19 @@ ISOGI_API void isogi_thread_pool_free(isogi_thread_pool *pool) {
     isogi_vol__pool_end(pool);
     context = pool->context;
     isogi_release(&context, pool, 1, sizeof *pool);
+}
+
+ISOGI_API isogi_thread_pool *isogi_thread_pool_begin(isogi_context *context) {
+    isogi_thread_pool *pool = NULL;
+    if (!context || context->thread_pool || context->parallel_for || context->threads == 1) return NULL;
+    if (isogi_thread_pool_create(&pool, context->threads, context) == ISOGI_OK) context->thread_pool = pool;
+    return pool;
+}
+
+ISOGI_API void isogi_thread_pool_end(isogi_context *context, isogi_thread_pool *pool) {
+    if (!pool) return;
+    context->thread_pool = NULL;
+    isogi_thread_pool_free(pool);
 }
 
 typedef struct isogi_vol__slice {

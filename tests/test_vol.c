@@ -1036,4 +1036,26 @@ TEST(pools_say_what_is_wrong) {
     CHECK(a.live == 0 && a.wrong_size == 0, "%ld blocks live, %d wrong sizes", a.live, a.wrong_size);
 }
 
+/* Where a context has a pool, a scheduler or one thread, or no memory is left, it stays as it is. */
+TEST(calls_of_many_parts_get_a_pool_where_they_can) {
+    allocator a = {0, 0, 0, 0};
+    isogi_context plain = {.alloc = test_alloc, .release = test_release, .user = &a}, context = plain;
+    isogi_thread_pool *pool = isogi_thread_pool_begin(&context), *other;
+    squares s = {{0}};
+    CHECK(pool && context.thread_pool == pool && a.live == 1, "%ld blocks", a.live);
+    other = isogi_thread_pool_begin(&context);
+    isogi_thread_pool_end(&context, other);
+    CHECK(!other && context.thread_pool == pool, "a call within");
+    CHECK(isogi_parallel(&context, 1000, square_task, &s, 0, 1) == ISOGI_OK && s.out[999] == 998001, "the last task: %g", s.out[999]);
+    isogi_thread_pool_end(&context, pool);
+    CHECK(!context.thread_pool && a.live == 0 && a.wrong_size == 0, "%ld blocks", a.live);
+    context.threads = 1;
+    CHECK(!isogi_thread_pool_begin(&context) && !context.thread_pool, "one thread");
+    context = plain, context.parallel_for = backwards;
+    CHECK(!isogi_thread_pool_begin(&context) && !context.thread_pool, "a scheduler");
+    context = plain, a.fail_at = a.calls + 1;
+    CHECK(!isogi_thread_pool_begin(&context) && !context.thread_pool && !isogi_thread_pool_begin(NULL), "no memory, no context");
+    CHECK(a.live == 0, "%ld blocks", a.live);
+}
+
 TEST_MAIN("vol")
