@@ -144,10 +144,10 @@
    Memory       Through the context. Bricks of 4x4x4 texels: 8 bytes for each, 112 where one of its texels is wanted, and for every
                 wanted texel alone 2 + 12 bytes of irradiance, 2 + 2 order^2 channels of transfer, less in other formats; and
                 250 KB. isogi_trace_memory tells. PATHS needs another 4 MB, FEEDBACK 9 (TRANSFER: 32 KB more for each coefficient),
-                and while it works some 400 bytes (TRANSFER: 16 more for each coefficient), 8 MB of them at once, and 4 for every
-                hit, for each texel of one cube (ISOGI_TRACE_CUBE), for all that were asked for when lazy, and for each probe: where
-                every texel of a cube has a surface 190 MB with 1 sample, 460 with 64, and 740 where there are lights. A request takes
-                12 bytes for each of 32768 points at a time.
+                and while it works some 400 bytes (TRANSFER: 16 more for each coefficient), 8 MB of them at once of texels and as
+                many of probes, and 4 for every hit, for each texel of one cube (ISOGI_TRACE_CUBE), for all that were asked for
+                when lazy, and for each probe: where every texel of a cube has a surface 190 MB with 1 sample, 460 with 64, and
+                740 where there are lights. A request takes 12 bytes for each of 32768 points at a time.
                 Any allocation may fail: the call says ISOGI_NO_MEMORY, the texture stays as it was and can go on.
                 Stack use stays below 32 KB (compiled by clang, below 35), nearly all of it that of rays.
    Threads      Rays run on the context's threads. isogi_trace_sample and the other readers may run in any number of threads at a
@@ -3671,7 +3671,7 @@ static size_t isogi_trace__chunk_set(const isogi_trace *t, isogi_trace__chunk *c
     return used;
 }
 
-/* The last one. */
+/* The last one; its block goes with the first chunk that lies in it. While a group is forgotten some may still be in use. */
 static void isogi_trace__chunk_free(const isogi_trace *t, isogi_trace__set *s) {
     const isogi_trace__chunk *c = &s->chunks[--s->chunk_made];
     if (s->chunk_count > s->chunk_made) s->chunk_count = s->chunk_made;
@@ -3700,6 +3700,7 @@ static isogi_result isogi_trace__chunks_reserve(const isogi_trace *t, isogi_trac
     size_t capacity = s->chunk_capacity ? 2 * s->chunk_capacity : 16;
     isogi_trace__chunk *chunks;
     if (s->chunk_made + more <= s->chunk_capacity) return ISOGI_OK;
+    while (capacity < s->chunk_made + more) capacity *= 2;
     chunks = (isogi_trace__chunk *)isogi_allocate(&t->context, capacity, sizeof *chunks);
     if (!chunks) return ISOGI_NO_MEMORY;
     if (s->chunk_made) memcpy(chunks, s->chunks, s->chunk_made * sizeof *chunks);

@@ -41,8 +41,9 @@
 
    - ISOGI_IMPLEMENTATION       implements every isogi header that the file includes
    - ISOGI_VOL_IMPLEMENTATION   implements this one alone
-   - ISOGI_NO_THREADS           everything runs on the calling thread
-   - ISOGI_NO_HUGE_PAGES        blocks of 4 MB and more do not ask Linux for huge pages
+   - ISOGI_NO_THREADS           everything runs on the calling thread (Windows before Vista needs it)
+   - ISOGI_NO_HUGE_PAGES        blocks of 4 MB and more do not ask Linux for huge pages (nor do they where libc hides madvise:
+                                -std=c99 without _DEFAULT_SOURCE)
    - ISOGI_NO_SIMD              plain C only; else SSE2 or NEON, and on x86-64 AVX2 or AVX-512, chosen at run time (gcc, clang)
    - ISOGI_API                  linkage of public functions, if extern does not suit
 
@@ -167,8 +168,8 @@ ISOGI_API isogi_result isogi_parallel(const isogi_context *context, size_t n, vo
 /* A thread pool, for the contexts of programs that make many short calls on many cores: to create and to join a thread takes 15 to 60 us,
    for each of them and every time. threads: as in a context, the calling thread included; a context's own `threads`, where it is not 0, is
    a limit within the pool. They are created when work first wants them; between calls they sleep, after some 20 us of waiting for more.
-   Any number of contexts and of threads may use a pool: to a call that finds it at work for another, or that is made by a task of its own,
-   it is as if there were none. Results do not depend on it.
+   Any number of contexts and of threads may use a pool: for a call that finds it at work for another, or that is made by a task of its own,
+   as many threads are created and joined. Results do not depend on it.
    ISOGI_INVALID: threads below 0. context: whose memory it takes, 3 KB; NULL = malloc. To be freed when no call is at work that uses it. */
 ISOGI_API isogi_result isogi_thread_pool_create(isogi_thread_pool **pool, int threads, const isogi_context *context);
 ISOGI_API void isogi_thread_pool_free(isogi_thread_pool *pool); /* NULL is fine */
@@ -508,6 +509,9 @@ ISOGI_API void isogi_vol_mesh_free(const isogi_pyramid *pyramid, isogi_mesh *mes
 #endif
 #if defined(__linux__) && !defined(ISOGI_NO_HUGE_PAGES)
 #include <sys/mman.h>
+#ifdef MADV_HUGEPAGE /* else libc hides it */
+#define ISOGI_VOL__HUGE_PAGE 2097152
+#endif
 #endif
 
 #define ISOGI_VOL__ON_SURFACE 1e-9 /* cell: how far off the surface a start may be */
@@ -516,7 +520,6 @@ ISOGI_API void isogi_vol_mesh_free(const isogi_pyramid *pyramid, isogi_mesh *mes
 #define ISOGI_VOL__LEVELS 3
 #define ISOGI_VOL__NODE_LEVELS 7 /* 4^7 cells a side */
 #define ISOGI_VOL__TICKS 281474976710656.0 /* 2^48 to a segment: times 2 and 2^14 planes stays within 2^63 */
-#define ISOGI_VOL__HUGE_PAGE 2097152
 #define ISOGI_VOL__FAST_SIZE 8192 /* voxels along an axis up to which fast rays keep 1e-10 cell */
 #if (defined(__GNUC__) || defined(__clang__)) && !defined(__TINYC__)
 #define ISOGI_VOL__INLINE static inline __attribute__((always_inline))
@@ -556,7 +559,7 @@ enum { ISOGI_VOL__PATH_PLAIN = 1, ISOGI_VOL__PATH_BASE, ISOGI_VOL__PATH_AVX2, IS
    the first touch of a small one costs .1 to 8 us, which for a pyramid is more than the rest of its making. */
 static void *isogi_vol__default_alloc(size_t size, size_t align) {
     char *base, *aligned;
-#ifdef MADV_HUGEPAGE
+#ifdef ISOGI_VOL__HUGE_PAGE
     const int huge = size >= 2 * ISOGI_VOL__HUGE_PAGE;
     if (huge) align = ISOGI_VOL__HUGE_PAGE;
 #endif
@@ -566,7 +569,7 @@ static void *isogi_vol__default_alloc(size_t size, size_t align) {
     aligned = base + sizeof(void *);
     aligned += (align - (uintptr_t)aligned % align) % align;
     memcpy(aligned - sizeof(void *), &base, sizeof base);
-#ifdef MADV_HUGEPAGE
+#ifdef ISOGI_VOL__HUGE_PAGE
     if (huge) (void)madvise(aligned, size - size % ISOGI_VOL__HUGE_PAGE, MADV_HUGEPAGE); /* refused, it is as good, but slower */
 #endif
     return aligned;
@@ -693,8 +696,8 @@ static void isogi_vol__job_run(isogi_vol__job *job, const isogi_context *context
     isogi_vol__job_lead(job, context, from, to);
 }
 
-static void isogi_vol__pool_set(isogi_thread_pool *pool, int threads) { (void)pool, (void)threads; }
-static void isogi_vol__pool_end(isogi_thread_pool *pool) { (void)pool; }
+static void isogi_vol__thread_pool_set(isogi_thread_pool *pool, int threads) { (void)pool, (void)threads; }
+static void isogi_vol__thread_pool_end(isogi_thread_pool *pool) { (void)pool; }
 #else
 static int isogi_vol__cores(void) {
     const long cores = isogi_vol__processors();
@@ -733,12 +736,12 @@ struct isogi_thread_pool {
     unsigned number;     /* of the job: a thread looks at each once */
     int wanted, active;  /* threads that may still join it; that are at it */
     int asleep, leave;
-    int threads, started; /* with the one that calls; without it */
-    int spins;
+    int threads, started; /* with the one that calls, 0 = all cores until it is `sized`; without it */
+    int sized, spins;
     isogi_vol__thread thread[ISOGI_VOL__MAX_THREADS];
 };
 
-static ISOGI_VOL__WORKER(isogi_vol__pool_worker) {
+static ISOGI_VOL__WORKER(isogi_vol__thread_pool_worker) {
     isogi_thread_pool *pool = (isogi_thread_pool *)p;
     unsigned seen = 0;
     size_t begun;
@@ -768,7 +771,7 @@ static ISOGI_VOL__WORKER(isogi_vol__pool_worker) {
 }
 
 /* 0: it is at work for another. A thread that cannot be had is done without. */
-ISOGI_VOL__NOINLINE static int isogi_vol__pool_run(isogi_thread_pool *pool, isogi_vol__job *job, int wanted,
+ISOGI_VOL__NOINLINE static int isogi_vol__thread_pool_run(isogi_thread_pool *pool, isogi_vol__job *job, int wanted,
                                                    const isogi_context *context, double from, double to) {
     int busy, i;
     ISOGI_VOL__LOCK(&pool->lock);
@@ -780,7 +783,8 @@ ISOGI_VOL__NOINLINE static int isogi_vol__pool_run(isogi_thread_pool *pool, isog
     }
     ISOGI_VOL__UNLOCK(&pool->lock);
     if (busy) return 0;
-    while (pool->started < wanted - 1 && isogi_vol__start(&pool->thread[pool->started], isogi_vol__pool_worker, pool)) pool->started++;
+    for (; pool->started < wanted - 1; pool->started++)
+        if (!isogi_vol__start(&pool->thread[pool->started], isogi_vol__thread_pool_worker, pool)) break;
     isogi_vol__job_lead(job, context, from, to);
     for (i = 0; i < pool->spins && ISOGI_VOL__PEEK(pool->active); i++) ISOGI_VOL__PAUSE();
     ISOGI_VOL__LOCK(&pool->lock);
@@ -791,15 +795,26 @@ ISOGI_VOL__NOINLINE static int isogi_vol__pool_run(isogi_thread_pool *pool, isog
     return 1;
 }
 
-static void isogi_vol__pool_set(isogi_thread_pool *pool, int threads) {
-    const int cores = isogi_vol__cores();
-    pool->threads = threads > ISOGI_VOL__MAX_THREADS ? ISOGI_VOL__MAX_THREADS : threads ? threads : cores;
-    pool->spins = pool->threads <= cores ? ISOGI_VOL__SPINS : 0; /* who waits must not keep others from their work */
+static void isogi_vol__thread_pool_set(isogi_thread_pool *pool, int threads) {
+    pool->threads = threads;
     ISOGI_VOL__LOCK_SET(&pool->lock);
     ISOGI_VOL__SIGNAL_SET(&pool->work), ISOGI_VOL__SIGNAL_SET(&pool->done);
 }
 
-static void isogi_vol__pool_end(isogi_thread_pool *pool) {
+/* With the one that calls. Cores are counted by the first job that has tasks for several, since that takes 10 us. */
+static int isogi_vol__thread_pool_size(isogi_thread_pool *pool) {
+    ISOGI_VOL__LOCK(&pool->lock);
+    if (!pool->sized) {
+        const int cores = isogi_vol__cores();
+        pool->threads = pool->threads > ISOGI_VOL__MAX_THREADS ? ISOGI_VOL__MAX_THREADS : pool->threads ? pool->threads : cores;
+        pool->spins = pool->threads <= cores ? ISOGI_VOL__SPINS : 0; /* who waits must not keep others from their work */
+        pool->sized = 1;
+    }
+    ISOGI_VOL__UNLOCK(&pool->lock);
+    return pool->threads;
+}
+
+static void isogi_vol__thread_pool_end(isogi_thread_pool *pool) {
     ISOGI_VOL__LOCK(&pool->lock);
     ISOGI_VOL__POKE(pool->leave, 1);
     ISOGI_VOL__WAKE_ALL(&pool->work);
@@ -821,13 +836,16 @@ ISOGI_VOL__NOINLINE static void isogi_vol__new_threads_run(isogi_vol__job *job, 
 
 static void isogi_vol__job_run(isogi_vol__job *job, const isogi_context *context, double from, double to) {
     isogi_thread_pool *pool = context ? context->thread_pool : NULL;
-    int wanted = context && context->threads > 0 ? context->threads : pool ? pool->threads : isogi_vol__cores();
-    if (wanted > ISOGI_VOL__MAX_THREADS) wanted = ISOGI_VOL__MAX_THREADS;
-    if (pool && wanted > pool->threads) wanted = pool->threads;
+    int wanted = context && context->threads > 0 ? context->threads : 0;
+    if (job->count == 1) wanted = 1;
+    if (wanted != 1) {
+        const int most = pool ? isogi_vol__thread_pool_size(pool) : wanted ? ISOGI_VOL__MAX_THREADS : isogi_vol__cores();
+        wanted = wanted && wanted < most ? wanted : most;
+    }
     if ((size_t)wanted > job->count) wanted = (int)job->count;
     ISOGI_VOL__LOCK_SET(&job->lock);
     if (wanted == 1) isogi_vol__job_lead(job, context, from, to);
-    else if (!pool || !isogi_vol__pool_run(pool, job, wanted, context, from, to))
+    else if (!pool || !isogi_vol__thread_pool_run(pool, job, wanted, context, from, to))
         isogi_vol__new_threads_run(job, wanted, context, from, to);
     ISOGI_VOL__LOCK_END(&job->lock);
 }
@@ -840,7 +858,7 @@ ISOGI_API isogi_result isogi_thread_pool_create(isogi_thread_pool **pool, int th
     if (!p) return ISOGI_NO_MEMORY;
     memset(p, 0, sizeof *p);
     if (context) p->context = *context;
-    isogi_vol__pool_set(p, threads);
+    isogi_vol__thread_pool_set(p, threads);
     *pool = p;
     return ISOGI_OK;
 }
@@ -848,15 +866,19 @@ ISOGI_API isogi_result isogi_thread_pool_create(isogi_thread_pool **pool, int th
 ISOGI_API void isogi_thread_pool_free(isogi_thread_pool *pool) {
     isogi_context context;
     if (!pool) return;
-    isogi_vol__pool_end(pool);
+    isogi_vol__thread_pool_end(pool);
     context = pool->context;
     isogi_release(&context, pool, 1, sizeof *pool);
 }
 
 ISOGI_API isogi_thread_pool *isogi_thread_pool_begin(isogi_context *context) {
     isogi_thread_pool *pool = NULL;
+#ifdef ISOGI_NO_THREADS
+    (void)context;
+#else
     if (!context || context->thread_pool || context->parallel_for || context->threads == 1) return NULL;
     if (isogi_thread_pool_create(&pool, context->threads, context) == ISOGI_OK) context->thread_pool = pool;
+#endif
     return pool;
 }
 

@@ -787,7 +787,7 @@ TEST(every_allocation_may_fail) {
     levels.hierarchy = 0.2f, levels.sides = ISOGI_TRACE_BOTH_SIDES;
     for (long k = 0; k < 400 && !finished; k++) {
         scarce memory = {k, 0};
-        isogi_context context = {.alloc = scarce_alloc, .release = scarce_release, .user = &memory, .threads = 1};
+        isogi_context context = {.alloc = scarce_alloc, .release = scarce_release, .user = &memory, .threads = 2}; /* a pool, too */
         for (int kind = 0; kind < 2; kind++) {
             isogi_trace *t = NULL;
             isogi_result result, loaded = ISOGI_OK;
