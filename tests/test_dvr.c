@@ -1062,6 +1062,82 @@ TEST(bad_input_is_refused) {
     field_free(&f);
 }
 
+/* Element i of a volume of a type, from one of the values that all types hold. */
+static void voxel_write(isogi_type type, void *data, size_t i, int value) {
+    if (type == ISOGI_U8) ((uint8_t *)data)[i] = (uint8_t)value;
+    if (type == ISOGI_I8) ((int8_t *)data)[i] = (int8_t)value;
+    if (type == ISOGI_U16) ((uint16_t *)data)[i] = (uint16_t)value;
+    if (type == ISOGI_I16) ((int16_t *)data)[i] = (int16_t)value;
+    if (type == ISOGI_F32) ((float *)data)[i] = (float)value;
+    if (type == ISOGI_F64) ((double *)data)[i] = value;
+}
+
+/* The same values as voxels of every type, in memory from either end, and upside down with a scale below 0: one picture, lit and unlit, in
+   both spaces, and one visibility by each method. */
+TEST(the_type_of_voxels_does_not_show) {
+    enum { SIDE = 19, COUNT = SIDE * SIDE * SIDE, PIXELS = 40 * 40 };
+    static const char *const names[6] = {"float", "double", "uint8", "int8", "uint16", "int16"};
+    static const isogi_type types[6] = {ISOGI_F32, ISOGI_F64, ISOGI_U8, ISOGI_I8, ISOGI_U16, ISOGI_I16};
+    static double room[COUNT];
+    static float visibility[2][8][9];
+    const isogi_transfer even = {hills, 6, NULL, 0}; /* without peaks, which make all methods brute force: pre-integrated,
+                                                             by differences of integrals, which round more */
+    float points[8][3];
+    const isogi_light sun = {.vector = {1, 1, 1}, .rgb = {6, 6, 6}};
+    const isogi_lighting lighting = {.env = {.sh = sky_one, .sh_order = 1}, .lights = &sun, .light_count = 1};
+    field f = field_waves(SIDE, 6); /* for its view */
+    test_random r = {7};
+    const isogi_view view = view_of(&f, 1, &r, 40);
+    for (int i = 0; i < 8; i++)
+        for (int a = 0; a < 3; a++) points[i][a] = 4.5f * (float)(1 + (i >> a & 1));
+    for (int way = 0; way < 7; way++) { /* space, shading; then methods */
+        float(*first)[4] = NULL;
+        for (int n = 0; n < 6 * 3; n++) {
+            const isogi_type type = types[n % 6];
+            const int reversed = n / 6 == 1, upside_down = n / 6 == 2, at = reversed ? COUNT - 1 : 0, step = reversed ? -1 : 1;
+            const int least = type == ISOGI_I8 || type == ISOGI_I16 ? -64 : 0;
+            const ptrdiff_t bytes = type == ISOGI_F64 ? 8 : type == ISOGI_F32 ? 4 : type == ISOGI_U8 || type == ISOGI_I8 ? 1 : 2;
+            isogi_volume volume = {.type = type, .size = {SIDE, SIDE, SIDE}, .scale = upside_down ? -0.015625 : 0.015625};
+            isogi_pyramid *pyramid = NULL;
+            volume.bias = (upside_down ? 0.984375 : -1) - least * volume.scale;
+            for (int i = 0; i < COUNT; i++) {
+                const int value = (int)(63.5 + 50 * fmax(-1, fmin(1, f.value[i])));
+                voxel_write(type, room, (size_t)(at + step * i), (upside_down ? 127 - value : value) + least);
+            }
+            volume.data = (const char *)room + at * bytes;
+            for (int a = 0, stride = step; a < 3; a++, stride *= SIDE) volume.stride[a] = stride * bytes;
+            CHECK(isogi_vol_build(&pyramid, &volume, &serial) == ISOGI_OK, "build");
+            const isogi_dvr_desc desc = {.pyramid = pyramid, .space = way < 4 && way % 2 ? ISOGI_DVR_DATA : ISOGI_DVR_PHYSICAL,
+                                         .shading = way < 2 ? ISOGI_DVR_UNLIT : way == 2 ? ISOGI_DVR_LOCAL : ISOGI_DVR_VISIBILITY,
+                                         .method = way == 5   ? ISOGI_DVR_PAPER
+                                                   : way == 6 ? ISOGI_DVR_BRUTE
+                                                              : ISOGI_DVR_METHOD_DEFAULT,
+                                         .grid = {7, 6, 5}};
+            isogi_dvr *dvr = dvr_new(&desc, way < 5 ? &landscape : &even);
+            CHECK(isogi_dvr_step(dvr, 0, NULL) == ISOGI_OK, "step");
+            float(*image)[4] = picture(dvr, &view, &lighting, NULL, NULL);
+            if (desc.shading == ISOGI_DVR_VISIBILITY)
+                CHECK(isogi_dvr_sample_visibility(dvr, (const float(*)[3])points, 8, visibility[n > 0][0]) == ISOGI_OK, "sample");
+            if (n) {
+                double most = largest_difference(image, first, PIXELS), brightest = 0;
+                for (int i = 0; i < 4 * PIXELS; i++) brightest = fmax(brightest, (double)first[i / 4][i % 4]);
+                most /= brightest;
+                CHECK(brightest > 0.5 && most < (way < 5 ? 2e-5 : 5e-5), "way %d, %s%s%s: pixels differ by %g of %g", way, names[n % 6],
+                      reversed ? ", reversed" : "", upside_down ? ", upside down" : "", most, brightest);
+                for (int i = 0; i < 8 * 9 && desc.shading == ISOGI_DVR_VISIBILITY; i++) {
+                    const float *now = visibility[1][i / 9], *then = visibility[0][i / 9];
+                    CHECK(fabsf(now[i % 9] - then[i % 9]) < 1e-5f, "way %d, %s: visibility %g, not %g", way, names[n % 6],
+                          (double)now[i % 9], (double)then[i % 9]);
+                }
+                free(image);
+            } else first = image;
+            isogi_dvr_free(dvr), isogi_vol_free(pyramid);
+        }
+        free(first);
+    }
+    field_free(&f);
+}
+
 TEST(cells_that_are_not_finite_are_transparent) {
     const double bad[3] = {(double)NAN, (double)INFINITY, -(double)INFINITY};
     for (int n = 0; n < 3; n++)
