@@ -63,7 +63,8 @@
                             texels then have the light of one side).
      Start of rays          desc.offset voxels along the normal; where the trilinear field is still inside there, twice and four times
                             as far, up to one voxel; where that fails, on the surface itself, directions mirrored as at hits. A ray that
-                            goes into matter all the same counts as reflected where it starts.
+                            goes into matter all the same counts as reflected where it starts. Lights are as far away, and seen as
+                            aslant, as from the surface: only whether they are hidden is asked from the start of rays.
      Validity               A texel is left out of every lookup where no surface passes at its place: none of the voxels of the cells
                             around it is lower than v (constant air, local minima: there f >= v all around, such a texel would see the
                             sky through everything), where a voxel is not finite, or where all of these gradients vanish. With desc.capped
@@ -1298,6 +1299,7 @@ typedef struct isogi_trace__site {
     isogi_hit place; /* on its isosurface */
     double isovalue;
     float normal[3];
+    double point[3];  /* where the light arrives: `place` in the world */
     double origin[3]; /* of its rays, world */
     int on_surface;   /* the rays leave from `place` itself */
     float geometric[3]; /* then: the trilinear normal; directions below it are mirrored, as at every later vertex */
@@ -1410,13 +1412,14 @@ static void isogi_trace__site_start(const isogi_trace__scene *scene, isogi_trace
     double grid[3];
     int a, beyond;
     site->on_surface = 1, site->open = 0;
+    for (a = 0; a < 3; a++) grid[a] = site->place.cell[a] + site->place.local[a];
+    isogi_vol_to_world(scene->pyramid, grid, site->point);
     if (isogi_trace__off_surface(scene, site, (double)scene->desc.offset, grid, &beyond)) {
         isogi_vol_to_world(scene->pyramid, grid, site->origin);
         site->on_surface = 0, site->open = beyond && !scene->desc.capped;
         return;
     }
-    for (a = 0; a < 3; a++) grid[a] = site->place.cell[a] + site->place.local[a];
-    isogi_vol_to_world(scene->pyramid, grid, site->origin);
+    memcpy(site->origin, site->point, sizeof site->origin);
     if (site->place.side != 2 && site->place.side != -2) site->place.side = 1; /* a probe on a cap is no place of the isosurface */
     isogi_vol_normals(scene->pyramid, &site->place, 1, ISOGI_NORMAL_TRILINEAR, &site->geometric);
     for (a = 0; a < 3 && scene->high; a++) site->geometric[a] = -site->geometric[a];
@@ -1429,6 +1432,21 @@ static double isogi_trace__site_kernel(const isogi_trace__site *site, const floa
     if (site->on_surface) return isogi_trace__kernel(site->normal, site->geometric, dir);
     cosine = isogi_trace__dot(site->normal, dir);
     return cosine > 0 ? cosine : 0;
+}
+
+/* What a light's beam, as seen from the surface itself, brings there; and the ray that finds out whether it arrives, which begins where the
+   site's rays do. From there a lamp near by would be seen closer, and bring more light than it sends out. 0: none. */
+static int isogi_trace__site_beam(const isogi_trace__site *site, isogi_trace__beam *beam) {
+    const double cosine = isogi_trace__site_kernel(site, beam->dir);
+    double to[3], length;
+    int a;
+    if (!(cosine > 0)) return 0;
+    for (a = 0; a < 3; a++) beam->rgb[a] *= cosine, to[a] = site->point[a] + beam->tmax * (double)beam->dir[a] - site->origin[a];
+    length = sqrt(isogi_trace__dot_wide(to, to));
+    if (site->on_surface || !(beam->tmax > 0) || !(length > 0) || !isogi_trace__finite(length)) return 1;
+    for (a = 0; a < 3; a++) beam->dir[a] = (float)(to[a] / length);
+    beam->tmax = length;
+    return 1;
 }
 
 /* ==== paths ========================================================================================================== */
@@ -1572,14 +1590,17 @@ static void isogi_trace__wave_lights(isogi_trace__wave *w, isogi_trace__shadows 
         const isogi_light *light = &lighting->lights[l];
         if (!depth && isogi_trace__is_delta(light)) continue;
         for (i = 0; i < w->count; i++) {
-            double point[3], cosine, u[2];
+            double point[3], u[2];
             isogi_trace__beam beam;
             isogi_trace__wave_sample(w, i, depth, 1 + l, u);
-            for (c = 0; c < 3; c++) point[c] = depth ? (double)positions[i][c] : w->site->origin[c];
+            for (c = 0; c < 3; c++) point[c] = depth ? (double)positions[i][c] : w->site->point[c];
             if (!isogi_trace__light_beam(light, point, u[0], u[1], &beam)) continue;
-            cosine = isogi_trace__cosine_at(w, i, depth, beam.dir);
-            if (!(cosine > 0)) continue;
-            for (c = 0; c < 3; c++) beam.rgb[c] *= cosine / ISOGI_TRACE__PI;
+            if (depth) {
+                const double cosine = isogi_trace__cosine_at(w, i, depth, beam.dir);
+                if (!(cosine > 0)) continue;
+                for (c = 0; c < 3; c++) beam.rgb[c] *= cosine;
+            } else if (!isogi_trace__site_beam(w->site, &beam)) continue;
+            for (c = 0; c < 3; c++) beam.rgb[c] /= ISOGI_TRACE__PI;
             isogi_trace__shadows_add(w, s, i, beam.dir, beam.tmax, beam.rgb);
         }
         isogi_trace__shadows_flush(w, s, depth);
@@ -1755,15 +1776,12 @@ static void isogi_trace__site_lights(const isogi_trace__scene *scene, const isog
         isogi_trace__beam beam;
         isogi_ray ray;
         isogi_hit hit;
-        double cosine;
         if (!isogi_trace__is_delta(&lighting->lights[l])) continue;
-        if (!isogi_trace__light_beam(&lighting->lights[l], site->origin, 0, 0, &beam)) continue;
-        cosine = isogi_trace__site_kernel(site, beam.dir);
-        if (!(cosine > 0)) continue;
+        if (!isogi_trace__light_beam(&lighting->lights[l], site->point, 0, 0, &beam) || !isogi_trace__site_beam(site, &beam)) continue;
         beam.tmax = isogi_trace__within(scene, beam.tmax), hit.side = 0;
         if (!scene->desc.no_shadows)
             isogi_trace__site_rays(scene, site, scene->high ? -1 : 1, (const float(*)[3]) & beam.dir, &beam.tmax, 1, &ray, &hit, counters);
-        for (c = 0; c < 3 && !hit.side; c++) rgb[c] += beam.rgb[c] * cosine;
+        for (c = 0; c < 3 && !hit.side; c++) rgb[c] += beam.rgb[c];
     }
 }
 
@@ -4296,16 +4314,14 @@ static void isogi_trace__span_light(isogi_trace__cast *c, uint32_t k, size_t num
     const isogi_trace__sequence sequence = isogi_trace__light_sequence(c->sequence[k], 1 + number);
     uint32_t i = isogi_trace__light_samples(&c->trace->scene, span->first, span->of->brick != NULL);
     const uint32_t end = isogi_trace__light_samples(&c->trace->scene, span->first + span->count, span->of->brick != NULL);
-    int a;
     for (; i < end; i++) {
-        double u[2], cosine;
+        double u[2];
         isogi_trace__beam beam;
         isogi_trace__turned(&sequence, i, c->turn[k], u);
         if (c->distant) isogi_trace__disc_beam(&c->disc, u[0], u[1], &beam);
-        else if (!isogi_trace__light_beam(light, c->site[k].origin, u[0], u[1], &beam)) continue;
-        cosine = isogi_trace__site_kernel(&c->site[k], beam.dir);
-        if (!(cosine > 0)) continue;
-        for (a = 0; a < 3; a++) c->rgb[c->count][a] = beam.rgb[a] * cosine;
+        else if (!isogi_trace__light_beam(light, c->site[k].point, u[0], u[1], &beam)) continue;
+        if (!isogi_trace__site_beam(&c->site[k], &beam)) continue;
+        memcpy(c->rgb[c->count], beam.rgb, sizeof beam.rgb);
         c->owner[c->count] = k;
         isogi_trace__cast_add(c, beam.dir, beam.tmax);
     }
