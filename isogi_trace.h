@@ -418,10 +418,12 @@ ISOGI_API isogi_result isogi_trace_export_scales(const isogi_trace *trace, int f
 
 /* ---- save, load, merge ----
    A block of bytes holds the texels computed so far: the same bytes on every machine. Loading adds them to a texture that was created
-   from the same description: so a bake is resumed, to the same bits as if it had never stopped, and boxes baked apart (desc.box_first)
-   are merged by loading one after the other, to the bits of the whole (FEEDBACK: unless lazy, and within the same interval of
-   isovalues; whole cubes are saved, ISOGI_TRACE_CUBE). Only desc.isovalue_min, isovalue_max, lazy, lookup and box may differ; else the
-   answer is ISOGI_INVALID (lighting, tables and the ranges of the volume's blocks are compared by hash; a material function cannot be).
+   from the same description: so a bake is resumed, and boxes baked apart (desc.box_first) are merged by loading one after the other, to
+   the bits of one bake that never stopped. FEEDBACK promises these bits of full bakes within the same interval of isovalues (whole cubes
+   are saved, ISOGI_TRACE_CUBE), and of lazy ones with one request and without desc.error; where a block holds a part of the texels that
+   would have shared probes, the others differ as lazy light does (see Determinism).
+   Only desc.isovalue_min, isovalue_max, lazy, lookup and box may differ; else the answer is ISOGI_INVALID (lighting, tables and the
+   ranges of the volume's blocks are compared by hash; a material function cannot be).
    Any bytes may be loaded: those that are damaged, cut off or of another version are ISOGI_CORRUPT and change nothing (what is left of a
    block of both sides that is cut off where the first one ends is a block of that side: ISOGI_INVALID).
    ISOGI_NO_MEMORY: some of the texels are loaded. isogi_trace_load counts as a writer. Hierarchical textures are not saved: their size is

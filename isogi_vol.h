@@ -48,9 +48,10 @@
    - ISOGI_API                  linkage of public functions, if extern does not suit
 
    Memory       Through isogi_context, or malloc. A pyramid takes about 2.2 bytes for every voxel: bounds of blocks, and all voxels
-                in 8 bits of their block's range; and 31 KB. From malloc, blocks of 4 MB and more ask Linux for huge pages: a
-                pyramid is then built in 1/5 (virtual machines) to 7/10 of the time. Where your voxels lie in such pages, too
-                (madvise, or isogi_allocate), many rays are 5 to 10 % faster.
+                in 8 bits of their block's range; and 31 KB. Blocks of blocks are whole, so thin volumes take more: 7 bytes a voxel
+                where they are 5 voxels thick along one axis, 17 with 2: cut large fields into thick chunks. From malloc, blocks of
+                4 MB and more ask Linux for huge pages: a pyramid is then built in 1/5 (virtual machines) to 7/10 of the time. Where
+                your voxels lie in such pages, too (madvise, or isogi_allocate), many rays are 5 to 10 % faster.
                 A mesh keeps some 3/4 byte of scratch memory for every voxel until it is freed.
                 Stack use stays below 32 KB.
    Threads      A pyramid is const once built: any number of threads may read it. Building, updating, prefiltering and meshing use the
@@ -58,9 +59,12 @@
                 to call.
    Determinism  The same input gives the same bits for any number of threads. With -ffast-math hits of ordinary numbers are right but for
                 more rounding, those of denormal or huge ones (1e300) may be NaN, and nothing that this header says to be the same
-                bits on two ways need be so.
-   Accuracy     Rays are solved in double: against a long double reference no hit is missed or added, and t is right to 1e-12 cell but
-                for grazing rays, whose t is ill-conditioned by nature. `make test` and `make check` show it.
+                bits on two ways need be so. Nor where the compiler fuses multiply-adds, as gcc does with -march=native unless told
+                -ffp-contract=off: hits are then the same, their t and place but for roundings.
+   Accuracy     Rays are solved in double: against a long double reference no hit is missed or added, and t is right to 1e-12 cell, or
+                to its own rounding where the origin is far, but for grazing rays, whose t is ill-conditioned by nature. A ray that runs
+                within the surface, where the field is the isovalue along a stretch of it, has the side that rounding gives it, and
+                may seem to cross. `make test` and `make check` show it.
    Limits       2^31-1 voxels along an axis. Values up to 1e300. isogi_vol_sample takes float points: for volumes far from the
                 origin use isogi_vol_sample_grid, or hits, which hold cell and place in double.
 
@@ -136,9 +140,9 @@ typedef struct isogi_context {
                                                               order, on any threads, and returns when all are done */
     int (*progress)(void *user, double fraction); /* 0..1; non-zero cancels; called on the caller's thread only */
     void *user;
-    int threads;    /* 0 = all cores, 1 = serial; ignored where parallel_for is set */
+    int threads;    /* 0 or less = all cores, 1 = serial; ignored where parallel_for is set */
     int force_path; /* instruction path of what is built: 0 = best, 1 = plain reference, 2 = portable, 3 = AVX2, 4 = AVX-512 (Ice Lake,
-                       Zen 4), and single rays like batches; no more than the machine has */
+                       Zen 4), and single rays like batches; no more than the machine has; other numbers: the best */
     isogi_thread_pool *thread_pool; /* NULL: threads are created for each call; ignored where parallel_for is set */
 } isogi_context;
 
@@ -363,8 +367,10 @@ enum {
 };
 
 /* Inside is f >= isovalue. Points are origin + t * dir, t in [tmin, tmax], world units if dir is a unit vector (any length is
-   fine). A hit is the smallest t at which inside changes; what the ray finds where it begins, or where it enters the box, is
-   no hit (unless capped). Each ray has its own isovalue. A miss: NaN anywhere, an infinite isovalue, a zero dir, tmin > tmax.
+   fine). A hit is the smallest t at which inside changes; the side that the ray finds where it begins, or where it enters the box, is
+   no hit (unless capped). The point of a crossing is inside itself: a ray that ends on the surface, at tmax, meets it if it goes in
+   there, not if it comes out; one that begins there, if it comes out. Each ray has its own isovalue. A miss: NaN anywhere, an infinite
+   isovalue, a zero dir, tmin > tmax.
    A ray that runs in a face between cells goes through one of the two, and rounding may choose another one for another tmin: the same
    values, hence the same hits, but where one of the cells is not finite. Likewise a crossing that lies in the volume's border may be -1
    or -2 to a capped ray, and none to another. */
