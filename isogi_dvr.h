@@ -352,7 +352,9 @@ typedef struct isogi_dvr_desc {
     double emission;        /* share of rgb that glows by itself, besides scattering light; 0..1e6; with visibility only */
     double radius;          /* the paper's method: of local visibility, in units of the smallest voxel spacing, 1..32; 0 = 16 */
     double reduction;       /* the paper's method: voxels of the volume to points of its blocks, at least 1; 0 = 4. A block that is not
-                               transparent holds a point whatever the budget is; those that the border cuts thin come first for more */
+                               transparent holds a point whatever the budget is; those that the border cuts thin come first for more.
+                               One of a single colour holds no more than its corners at any budget: in dense fog that reaches the border
+                               visibility is then a third too large */
     isogi_dvr_classification classification; /* in data space; visibility rays are exact there, unless this says post-classified */
     int table;                               /* entries along a side of the pre-integrated table, which stand where the transfer
                                                 function changes, half by value, half evenly among its pieces; 2..1024; 0 = 256 */
@@ -377,7 +379,7 @@ typedef enum isogi_depth_kind {
 /* A pinhole camera. width x height pixels, row 0 on top. */
 typedef struct isogi_view {
     int width, height;              /* 1..32768 */
-    float eye[3], target[3], up[3]; /* world; up 0 = +y */
+    float eye[3], target[3], up[3]; /* world; up: of any length; 0 = +y */
     float fov;                      /* vertical angle of view in degrees, below 180; 0 = 45 */
     int local;                      /* 0, or 1: shade by local visibility, for cut planes, and lights within. ISOGI_INVALID where the
                                        paper's method is not at work (another method, peaks, data space, unlit, tetrahedra) */
@@ -481,10 +483,11 @@ ISOGI_API isogi_result isogi_transfer_import(const float (*rgba)[4], size_t coun
 
 /* A transfer function for a volume of which nothing is known: values in three classes of least variance (Otsu 1979; the largest bin left
    out, which is air or padding; and up to a thousandth of the voxels at either end of the range where that halves it), the lowest
-   transparent, the others ever denser and warmer. In physical space extinction is per voxel and makes 1/30 of the box's diagonal half
-   opaque soon after the third class begins (the fifth point), twice as dense at the top, a fifth to a seventh of it in the second class:
-   what is dense is seen within what is not; in data space a passage through each upper class is about half opaque. A volume of one value
-   gets points that nothing meets. threshold (may be NULL): where the second class begins, for an isosurface. */
+   transparent, the others ever denser and warmer. In physical space extinction is per smallest voxel spacing and makes 1/30 of the
+   box's diagonal half opaque soon after the third class begins (the fifth point), twice as dense at the top, a fifth to a seventh of it
+   in the second class: what is dense is seen within what is not; in data space a passage through each upper class is about half opaque.
+   A volume of one value gets points that nothing meets. ISOGI_INVALID for a pyramid of a function, which has no voxels. threshold (may
+   be NULL): where the second class begins, for an isosurface. */
 ISOGI_API isogi_result isogi_transfer_suggest(const isogi_pyramid *pyramid, isogi_dvr_space space,
                                               isogi_transfer_point points[ISOGI_SUGGEST_POINTS], double *threshold);
 
@@ -2571,6 +2574,12 @@ static isogi_result isogi_dvr__join(const isogi_dvr *d, const isogi_dvr__held *h
 
 /* ==== create and free ================================================================================================ */
 
+/* World length of a voxel's edge along a grid axis. */
+static double isogi_dvr__edge(const isogi_volume *v, int axis) {
+    const double *m = v->axes + axis;
+    return v->spacing[axis] * sqrt(m[0] * m[0] + m[3] * m[3] + m[6] * m[6]);
+}
+
 /* The inverse of (axes * spacing), and the smallest length of its columns. */
 static void isogi_dvr__set_lattice(isogi_dvr *d) {
     const isogi_volume *v = &d->volume;
@@ -2579,7 +2588,7 @@ static void isogi_dvr__set_lattice(isogi_dvr *d) {
     int r, c;
     d->spacing = 0;
     for (r = 0; r < 3; r++) {
-        double length = v->spacing[r] * sqrt(m[r] * m[r] + m[3 + r] * m[3 + r] + m[6 + r] * m[6 + r]);
+        double length = isogi_dvr__edge(v, r);
         if (!r || length < d->spacing) d->spacing = length;
         d->cells[r] = (int)(v->size[r] - 1);
         for (c = 0; c < 3; c++) {
@@ -6928,7 +6937,7 @@ static int isogi_dvr__fast_begin(const isogi_dvr__frame *f, const double origin[
 static int isogi_dvr__unit(double v[3]) {
     double length = sqrt(isogi_dvr__dot(v, v));
     int a;
-    if (!(length > 1e-30) || !(length < 1e30)) return 0;
+    if (!(length > 1e-100) || !(length < 1e100)) return 0; /* of floats: any but zero */
     for (a = 0; a < 3; a++) v[a] /= length;
     return 1;
 }
@@ -7423,12 +7432,13 @@ ISOGI_API isogi_result isogi_transfer_import(const float (*rgba)[4], size_t coun
 
 #define ISOGI_DVR__BINS 256
 
-/* The two bins between which three classes have least variance: the largest sum of (sum of values)^2 / count. */
+/* The two bins between which three classes have least variance: the largest sum of (sum of values)^2 / count. In the middle of what lies
+   empty between classes: of two values only, halfway between them, and again up to the upper one. */
 static void isogi_dvr__three_classes(double histogram[ISOGI_DVR__BINS], int bin[2]) {
-    double count[ISOGI_DVR__BINS + 1], sum[ISOGI_DVR__BINS + 1], best = -1, total = 0;
+    double count[ISOGI_DVR__BINS + 1], sum[ISOGI_DVR__BINS + 1], best = -1, total = 0, air = 0;
     int i, j, largest = 0;
     for (i = 0; i < ISOGI_DVR__BINS; i++) total += histogram[i], largest = histogram[i] > histogram[largest] ? i : largest;
-    if (histogram[largest] > 0.3 * total) histogram[largest] = 0; /* air, or padding */
+    if (histogram[largest] > 0.3 * total) air = histogram[largest], histogram[largest] = 0; /* or padding */
     count[0] = sum[0] = 0, bin[0] = ISOGI_DVR__BINS / 3, bin[1] = 2 * ISOGI_DVR__BINS / 3;
     for (i = 0; i < ISOGI_DVR__BINS; i++) count[i + 1] = count[i] + histogram[i], sum[i + 1] = sum[i] + i * histogram[i];
     for (i = 1; i < ISOGI_DVR__BINS - 1; i++)
@@ -7440,9 +7450,17 @@ static void isogi_dvr__three_classes(double histogram[ISOGI_DVR__BINS], int bin[
             for (k = 0; k < 3; k++) score += n[k] > 0 ? s[k] * s[k] / n[k] : 0;
             if (score > best * (1 + 1e-12)) best = score, bin[0] = i, bin[1] = j;
         }
+    histogram[largest] += air;
+    for (i = 0; i < 2; i++) {
+        int low = bin[i], high = bin[i];
+        while (low > 0 && !(histogram[low - 1] > 0)) low--;
+        while (high < ISOGI_DVR__BINS && !(histogram[high] > 0)) high++;
+        if (low > 0 && high < ISOGI_DVR__BINS) bin[i] = (low + high) / 2;
+        if (i && bin[1] <= bin[0]) bin[1] = (bin[0] + high) / 2;
+    }
 }
 
-/* Some million voxels of the lattice, the first corner of cells at equal distances. */
+/* Some million voxels of the lattice, at equal distances; of each axis the last ones, too. */
 static void isogi_dvr__histogram(const isogi_pyramid *pyramid, const double range[2], double histogram[ISOGI_DVR__BINS]) {
     const isogi_volume *v = isogi_vol_volume(pyramid);
     size_t step[3];
@@ -7451,13 +7469,19 @@ static void isogi_dvr__histogram(const isogi_pyramid *pyramid, const double rang
     double scale = ISOGI_DVR__BINS / (0.5 * range[1] - 0.5 * range[0]);
     for (a = 0; a < 3; a++) step[a] = 1 + v->size[a] / 101;
     for (a = 0; a < ISOGI_DVR__BINS; a++) histogram[a] = 0;
-    for (c[2] = 0; c[2] == 0 || c[2] < v->size[2] - 1; c[2] += (uint32_t)step[2])
-        for (c[1] = 0; c[1] == 0 || c[1] < v->size[1] - 1; c[1] += (uint32_t)step[1])
-            for (c[0] = 0; c[0] == 0 || c[0] < v->size[0] - 1; c[0] += (uint32_t)step[0]) {
-                double corner[8];
-                isogi_volume_corners(v, c, corner);
-                if (!isogi_dvr__finite64(corner[0])) continue;
-                histogram[(int)isogi_dvr__clamp((0.5 * corner[0] - 0.5 * range[0]) * scale, ISOGI_DVR__BINS - 1)]++;
+    for (c[2] = 0; c[2] < v->size[2]; c[2] += (uint32_t)step[2])
+        for (c[1] = 0; c[1] < v->size[1]; c[1] += (uint32_t)step[1])
+            for (c[0] = 0; c[0] < v->size[0]; c[0] += (uint32_t)step[0]) {
+                double corner[8], value;
+                uint32_t cell[3];
+                int which = 0;
+                for (a = 0; a < 3; a++) { /* the last voxel is the far corner of the cell before it */
+                    const int far_corner = c[a] > 0 && c[a] == v->size[a] - 1;
+                    cell[a] = c[a] - (uint32_t)far_corner, which |= far_corner << a;
+                }
+                isogi_volume_corners(v, cell, corner), value = corner[which];
+                if (!isogi_dvr__finite64(value)) continue;
+                histogram[(int)isogi_dvr__clamp((0.5 * value - 0.5 * range[0]) * scale, ISOGI_DVR__BINS - 1)]++;
             }
 }
 
@@ -7467,8 +7491,10 @@ static double isogi_dvr__part_way(double low, double high, double u) {
     return low + half + half;
 }
 
-/* Leaves out up to a thousandth of the voxels at either end of the range where that halves it. */
+/* Leaves out up to a thousandth of the voxels at either end of the range where that halves it; but not where all others have one value,
+   to which the range would shrink for ever. */
 static void isogi_dvr__leave_outliers(const isogi_pyramid *pyramid, double range[2]) {
+    const double all[2] = {range[0], range[1]};
     double histogram[ISOGI_DVR__BINS], share, first;
     int low, high, pass;
     for (pass = 0; pass < 32 && range[0] < range[1]; pass++) {
@@ -7482,6 +7508,7 @@ static void isogi_dvr__leave_outliers(const isogi_pyramid *pyramid, double range
         first = range[0], range[0] = isogi_dvr__part_way(first, range[1], (double)low / ISOGI_DVR__BINS);
         if (high < ISOGI_DVR__BINS) range[1] = isogi_dvr__part_way(first, range[1], (double)high / ISOGI_DVR__BINS);
     }
+    range[0] = all[0], range[1] = all[1];
 }
 
 ISOGI_API isogi_result isogi_transfer_suggest(const isogi_pyramid *pyramid, isogi_dvr_space space,
@@ -7489,10 +7516,10 @@ ISOGI_API isogi_result isogi_transfer_suggest(const isogi_pyramid *pyramid, isog
     static const float colour[ISOGI_SUGGEST_POINTS][3] = {{0.4f, 0.55f, 0.8f}, {0.4f, 0.55f, 0.8f}, {0.75f, 0.7f, 0.65f},
                                                           {0.85f, 0.75f, 0.6f}, {1, 0.7f, 0.35f},    {1, 0.65f, 0.3f}};
     static const double share[2][ISOGI_SUGGEST_POINTS] = {{0, 0, 0.15, 0.2, 1, 2.2}, {0, 0, 0.3, 0.4, 0.8, 1}};
-    double histogram[ISOGI_DVR__BINS], range[2], at[ISOGI_SUGGEST_POINTS], width, most = 0;
+    double histogram[ISOGI_DVR__BINS], range[2], at[ISOGI_SUGGEST_POINTS], diagonal[3], edge, width, most;
     const isogi_volume *v;
     int bin[2], i, a;
-    if (!pyramid || !points || (unsigned)space > ISOGI_DVR_DATA) return ISOGI_INVALID;
+    if (!pyramid || !points || (unsigned)space > ISOGI_DVR_DATA || !isogi_vol_volume(pyramid)->data) return ISOGI_INVALID;
     v = isogi_vol_volume(pyramid), isogi_vol_range(pyramid, range);
     isogi_dvr__leave_outliers(pyramid, range);
     if (!(range[0] < range[1])) bin[0] = ISOGI_DVR__BINS / 3, bin[1] = 2 * bin[0];
@@ -7501,8 +7528,9 @@ ISOGI_API isogi_result isogi_transfer_suggest(const isogi_pyramid *pyramid, isog
     at[0] = range[0], at[5] = range[1];
     for (i = 0; i < 2; i++) at[2 + i] = isogi_dvr__part_way(range[0], range[1], (double)bin[i] / ISOGI_DVR__BINS);
     at[1] = isogi_dvr__part_way(at[0], at[2], 0.7), at[4] = isogi_dvr__part_way(at[3], at[5], 0.15);
-    for (a = 0; a < 3; a++) most += (double)v->size[a] * (double)v->size[a];
-    most = space == ISOGI_DVR_PHYSICAL ? 0.69 * 30 / sqrt(most) : width > 0 ? 2 / width : 0;
+    for (edge = isogi_dvr__edge(v, 0), a = 1; a < 3; a++) edge = isogi_dvr__edge(v, a) < edge ? isogi_dvr__edge(v, a) : edge;
+    for (a = 0; a < 3; a++) diagonal[a] = (double)v->size[a] * (isogi_dvr__edge(v, a) / edge);
+    most = !(width > 0) ? 0 : space == ISOGI_DVR_PHYSICAL ? 0.69 * 30 / sqrt(isogi_dvr__dot(diagonal, diagonal)) : 2 / width;
     for (i = 0; i < ISOGI_SUGGEST_POINTS; i++) {
         points[i].value = i && !(at[i] > at[i - 1]) ? at[i] = at[i - 1] : at[i];
         points[i].extinction = (float)isogi_dvr__clamp(share[space][i] * most, 3e38);

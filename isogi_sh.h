@@ -125,7 +125,7 @@ static inline const char *isogi_result_string(isogi_result result) {
 /* World space is right-handed, y up by convention. All radiometric values are linear RGB. */
 typedef enum isogi_light_kind {
     ISOGI_LIGHT_DIRECTIONAL = 0, /* vector: towards the light (any length > 0); rgb: irradiance on a surface that faces it;
-                                    radius: angular radius in radians, 0 = a mathematical direction */
+                                    radius: angular radius in radians, up to pi / 2; 0 = a mathematical direction */
     ISOGI_LIGHT_POINT,           /* vector: position; rgb: radiant intensity, so that E = rgb cos / distance^2; radius unused */
     ISOGI_LIGHT_SPHERE,          /* vector: centre; rgb: radiant intensity as seen from afar; radius: world units */
     ISOGI_LIGHT_RECTANGLE        /* vector: centre; edge: its two sides (world), at right angles to 1e-3; it shines to the side of
@@ -209,9 +209,10 @@ ISOGI_API isogi_result isogi_sh_project_random(double *c, int order, int channel
 ISOGI_API isogi_result isogi_sh_project_samples(double *c, int order, int channels, const float (*direction)[3], const float *value,
                                                 const float *weight, size_t count);
 
-/* Coefficients (RGB interleaved) of an equirectangular RGB image laid out and oriented as in isogi_env. Fejer weights in
-   latitude: exact for the band limit of the image; what rows and columns cannot tell apart (degrees l >= height; of orders about the
-   image's axis, which is y, those with 2 m >= width) is zero. Sums end at FLT_MAX. The second takes any number of channels, 1..16. */
+/* Coefficients (RGB interleaved) of an equirectangular RGB image laid out and oriented as in isogi_env. Fejer weights in latitude:
+   coefficients of degree l of an image of degrees up to n are exact where l + n < height; what rows and columns cannot tell apart
+   (degrees l >= height; of orders about the image's axis, which is y, those with 2 m >= width) is zero. Sums end at FLT_MAX; pixels are
+   not checked. The second takes any number of channels, 1..16. */
 ISOGI_API isogi_result isogi_sh_project_equirect(float *rgb, int order, const float *image, int width, int height);
 ISOGI_API isogi_result isogi_sh_project_image(float *c, int order, int channels, const float *image, int width, int height);
 
@@ -343,7 +344,8 @@ ISOGI_API isogi_result isogi_sh_hemisphere_sky(float *c, int order, const float 
 ISOGI_API isogi_result isogi_sh_gradient_sky(float *c, int order, const float up[3], const float sky[3], const float ground[3]);
 
 /* The direction most light comes from: that of degree 1 of the luminance (Rec. 709); +z where there is none. Order >= 2. rgb (may be NULL):
-   irradiance of the one directional light there that gives surfaces the closest irradiance, in the mean of squares. */
+   irradiance of the one directional light there that gives surfaces the closest irradiance, in the mean of squares and as far as `order`
+   knows either: the coefficients of a light give that light. */
 ISOGI_API isogi_result isogi_sh_dominant_direction(float direction[3], float rgb[3], const float *c, int order);
 
 /* The same with an ambient term: irradiance `rgb` from `direction` plus radiance `ambient` from everywhere. Neither is negative. */

@@ -127,6 +127,56 @@ TEST(suggestions_for_odd_volumes_are_valid) {
     CHECK(isogi_transfer_suggest(NULL, ISOGI_DVR_DATA, p, NULL) == ISOGI_INVALID, "NULL");
 }
 
+/* Few voxels in emptiness, a layer at the end of an axis, and masks have two values: classes begin halfway between them. A single value is
+   not seen, in either space. */
+TEST(suggestions_for_one_and_two_values) {
+    enum { SIDE = 32, COUNT = SIDE * SIDE * SIDE };
+    static uint8_t data[COUNT];
+    for (int n = 0; n < 4; n++) {
+        isogi_volume volume = {.data = data, .type = ISOGI_U8, .size = {SIDE, SIDE, n == 1 ? 2 : SIDE}};
+        const double low = n == 3 ? 7 : 0, high = n == 2 ? 1 : n == 3 ? 7 : 200;
+        isogi_pyramid *pyramid = NULL;
+        for (int i = 0; i < COUNT; i++) {
+            const int x = i % SIDE - 16, y = i / SIDE % SIDE - 16, z = i / SIDE / SIDE;
+            const int in = n == 0 ? x * x + y * y + (z - 16) * (z - 16) < 4 : n == 1 ? z == 1 : x * x + y * y < 80;
+            data[i] = (uint8_t)(in ? high : low);
+        }
+        CHECK(isogi_vol_build(&pyramid, &volume, NULL) == ISOGI_OK, "build");
+        for (int space = 0; space < 2; space++) {
+            isogi_transfer_point p[ISOGI_SUGGEST_POINTS];
+            const isogi_transfer t = {p, ISOGI_SUGGEST_POINTS, NULL, 0};
+            float rgb[3], of_low, of_high;
+            double threshold;
+            CHECK(isogi_transfer_suggest(pyramid, (isogi_dvr_space)space, p, &threshold) == ISOGI_OK, "suggest");
+            isogi_transfer_at(&t, low, rgb, &of_low), isogi_transfer_at(&t, high, rgb, &of_high);
+            CHECK(of_low <= 0 && (n == 3 ? of_high <= 0 : of_high > 0.001f && of_high < 100), "case %d: %g, %g", n, (double)of_low,
+                  (double)of_high);
+            CHECK(fabs(threshold - 0.5 * (low + high)) <= 0.01 * (high - low), "case %d: threshold %g", n, threshold);
+        }
+        isogi_vol_free(pyramid);
+    }
+}
+
+/* A thirtieth of the box's diagonal is half opaque at the fifth point, whatever the shape of voxels is. */
+TEST(suggestions_know_the_shape_of_voxels) {
+    static const double depth[] = {1, 5, 0.1};
+    field f = field_new(24, 24, 24);
+    test_random r = {12};
+    for (size_t i = 0; i < field_count(&f); i++) f.value[i] = random_unit(&r);
+    for (int n = 0; n < 3; n++) {
+        const isogi_volume volume = {.data = f.value, .type = ISOGI_F64, .size = {24, 24, 24}, .spacing = {2, 2, 2 * depth[n]}};
+        const double least = fmin(1, depth[n]), diagonal = 24 * sqrt(2 + depth[n] * depth[n]) / least; /* in smallest spacings */
+        isogi_transfer_point p[ISOGI_SUGGEST_POINTS];
+        isogi_pyramid *pyramid = NULL;
+        CHECK(isogi_vol_build(&pyramid, &volume, NULL) == ISOGI_OK, "build");
+        CHECK(isogi_transfer_suggest(pyramid, ISOGI_DVR_PHYSICAL, p, NULL) == ISOGI_OK, "suggest");
+        CHECK(fabs(exp(-(double)p[4].extinction * diagonal / 30) - 0.5) < 0.01, "depth %g: transparency %g", depth[n],
+              exp(-(double)p[4].extinction * diagonal / 30));
+        isogi_vol_free(pyramid);
+    }
+    field_free(&f);
+}
+
 TEST(a_suggestion_shows_the_engine_block) {
     isogi_volume volume = {.data = NULL};
     isogi_pyramid *pyramid = NULL;
