@@ -1,5 +1,5 @@
 # make           the viewer and the example programs, into build/
-# make demo      volume in, globally lit pictures out: build/demo/*.png    (VOLUME=FILE ISO=V for your own)
+# make demo      volume in, globally lit pictures out: build/demo/*.png    (VOLUME=FILE ISO=V SPACING=X,Y,Z UP=X,Y,Z: your own)
 # make figures   the figures of the papers, with our data, and how far they are from path tracing: build/figures/index.html
 # make pictures  the pictures of README.md anew: examples/*.png
 # make test      the quick tests, under two minutes; ends with "N passed, N failed, N skipped"
@@ -93,6 +93,8 @@ build/flags: FORCE
 
 demo: export VOLUME := $(VOLUME)
 demo: export ISO := $(ISO)
+demo: export SPACING := $(SPACING)
+demo: export UP := $(UP)
 demo: build/viewer
 	@sh examples/demo.sh
 

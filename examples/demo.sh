@@ -1,5 +1,6 @@
 #!/bin/sh
-# Volume in, globally lit pictures out, into build/demo. VOLUME and ISO in the environment choose a file of the user's own.
+# Volume in, globally lit pictures out, into build/demo. VOLUME in the environment chooses a file of the user's own; ISO, SPACING and UP are
+# the viewer's options for it.
 out=build/demo
 mkdir -p "$out"
 begun=$(date +%s)
@@ -19,8 +20,9 @@ picture() {
 if [ "$VOLUME" ]; then
     name=$(basename "$VOLUME")
     name=${name%%.*}
-    picture "$name-phong" "$name, light by the normal alone" "$VOLUME" --mode phong ${ISO:+--iso "$ISO"}
-    picture "$name" "$name, global light" "$VOLUME" --mode irradiance ${ISO:+--iso "$ISO"}
+    set -- "$VOLUME" ${ISO:+--iso "$ISO"} ${SPACING:+--spacing "$SPACING"} ${UP:+--up "$UP"}
+    picture "$name-phong" "$name, light by the normal alone" "$@" --mode phong
+    picture "$name" "$name, global light" "$@" --mode irradiance
 else
     picture engine-block-phong "An engine block, light by the normal alone: the usual picture, to compare with" \
         procedural:engine-block --mode phong --size 640x640
@@ -30,5 +32,5 @@ else
     picture hydrogen "A hydrogen orbital, volume rendered, shaded by what each point sees of the sky" procedural:hydrogen --mode dvr
 fi
 echo "$(($(date +%s) - begun)) s in all"
-[ "$VOLUME" ] || echo "A volume of your own: make demo VOLUME=head_256x256x99_uint8.raw ISO=130"
+[ "$VOLUME" ] || echo "A volume of your own: make demo VOLUME=head_256x256x99_uint8.raw ISO=130 SPACING=1,1,2"
 exit $failed

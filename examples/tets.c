@@ -45,7 +45,9 @@ static int read_tets(const char *path, char *error) {
     if (!file_read(path, (size_t)1 << 31, &data, &size, error)) return 0;
     if (size < 12 || memcmp(data, "TETS", 4)) return file_fail(error, "%s: is not a .tet file", path);
     memcpy(count, data + 4, 8);
-    if (size - 12 != 16 * ((size_t)count[0] + count[1])) return file_fail(error, "%s: is cut off", path);
+    if (size - 12 != 16 * ((size_t)count[0] + count[1]))
+        return file_fail(error, "%s: has %zu bytes; %u points and %u tetrahedra take %zu", path, size, count[0], count[1],
+                         12 + 16 * ((size_t)count[0] + count[1]));
     points = (float(*)[3])malloc(count[0] * sizeof *points + 1), values = (float *)malloc(count[0] * sizeof *values + 1);
     tets = (uint32_t(*)[4])malloc(count[1] * sizeof *tets + 1);
     if (!points || !values || !tets) return file_fail(error, "out of memory");
@@ -90,7 +92,7 @@ int main(int argc, char **argv) {
     for (int a = 0; a < 3; a++) {
         static const double toward[3] = {1.5, 1.2, 2};
         view.target[a] = (float)(0.5 * (low[a] + high[a]));
-        view.eye[a] = (float)(0.5 * (low[a] + high[a]) + 2.5 * radius * toward[a] / 2.773);
+        view.eye[a] = (float)(0.5 * (low[a] + high[a]) + 3 * radius * toward[a] / 2.773);
     }
     double third = (most - least) / 3, half = 0.03 * (most - least);
     const isogi_peak peaks[] = {{least + third, {.2f, .45f, .9f}, 0.2f}, {least + 2 * third, {.9f, .5f, .15f}, 0.3f}};

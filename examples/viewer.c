@@ -212,7 +212,9 @@ static const option option_list[] = {
      "peak that is suggested",
      NUMBERS, AT(isovalue), AT(has_iso), 1, -1e300, 1e300, .allowed = "a number"},
     {"--raycast", 0, SURFACES, "exact rays instead of the rasterized mesh", FLAG, .offset = AT(raycast)},
-    {"--clip", "A,B,C,D", ANY, "keep only a x + b y + c z + d >= 0 (world); what is cut shows the data; may be repeated",
+    {"--clip", "A,B,C,D", ANY,
+     "keep only a x + b y + c z + d >= 0 (world); what is cut shows the data; what is cut away of a surface still throws its shadow; may "
+     "be repeated",
      PARSED(parse_clip, "four numbers from -1e9 to 1e9, the first three not all zero (at least 1e-9 in length), at most 32 times")},
     {"--spacing", "X,Y,Z", ANY, "size of a voxel; default 1,1,1", NUMBERS, VALUE(spacing), 3, 1e-9, 1e9,
      .allowed = "three numbers, 1e-9 to 1e9"},
@@ -280,7 +282,7 @@ static const option option_list[] = {
      "from, 3 soft shadows, more for directional lights; default 4 (a scene: its own; without sweeps, for peaks or by --method, 3)",
      INTEGER, AT(order), 0, 1, 1, 6, .allowed = "a whole number, 1 to 6"},
     {"--directions", "N", VOLUMES,
-     "rays from each grid point of visibility, at least 2 order^2; default 256 (a scene: its own; without "
+     "rays from each grid point of visibility, better no fewer than 2 order^2; default 256 (a scene: its own; without "
      "sweeps 64)",
      INTEGER, AT(directions), 0, 1, 1, 65536, .allowed = "a whole number, 1 to 65536"},
     {"--grid", "X,Y,Z", VOLUMES,
@@ -993,6 +995,8 @@ static int bake(viewer *v) {
     stat_line(v, "texels_computed", "%llu", (unsigned long long)done.texels);
     stat_line(v, "texels_skipped", "%llu", (unsigned long long)done.texels_skipped);
     stat_line(v, "texture_bytes", "%zu", isogi_trace_memory(v->trace));
+    if (!done.texels && v->covered)
+        fprintf(stderr, "note: no texel has a surface: the lattice is too coarse for this one, which stays black; see --lattice\n");
     return 1;
 }
 
@@ -1292,6 +1296,8 @@ static char *points_as_text(const isogi_transfer_point *points, int count, char 
 
 /* For a volume of which nothing is known: what its histogram suggests. In data space with the isosurface that is asked for, or the one that
    bounds the second class of values; what stands between surfaces is thin then. */
+static const double DENSEST = 9.9e29; /* a file may say 1e30, and as a float that is more */
+
 static int default_transfer(viewer *v) {
     isogi_transfer_point points[ISOGI_SUGGEST_POINTS];
     isogi_dvr_space space = v->o.mode == DVR ? ISOGI_DVR_PHYSICAL : ISOGI_DVR_DATA;
@@ -1301,7 +1307,7 @@ static int default_transfer(viewer *v) {
     if (result != ISOGI_OK) return fail(v, "a transfer function", result);
     if (v->o.has_iso || v->shape) threshold = v->isovalue;
     for (int i = 0; i < ISOGI_SUGGEST_POINTS; i++)
-        points[i].extinction = (float)fmin((double)points[i].extinction * (space ? 0.4 : 1), 1e30);
+        points[i].extinction = (float)fmin((double)points[i].extinction * (space ? 0.4 : 1), DENSEST);
     at = points_as_text(points, ISOGI_SUGGEST_POINTS, text, end);
     if (space == ISOGI_DVR_DATA) snprintf(at, (size_t)(end - at), "peak %.17g .6 .95 .88 .75\n", threshold);
     return transfer_parse(text, &v->transfer, v->error);
@@ -1314,7 +1320,7 @@ static int preset_transfer(viewer *v) {
     isogi_result result = isogi_transfer_suggest(v->pyramid, v->o.mode == DVR ? ISOGI_DVR_PHYSICAL : ISOGI_DVR_DATA, points, NULL);
     if (result != ISOGI_OK) return fail(v, "--preset: what the volume's values suggest", result);
     result = isogi_transfer_preset((isogi_preset)v->o.preset, points[1].value, points[5].value,
-                                   (float)fmin((double)points[v->o.mode == DVR ? 4 : 5].extinction, 1e30), points);
+                                   (float)fmin((double)points[v->o.mode == DVR ? 4 : 5].extinction, DENSEST), points);
     if (result != ISOGI_OK) return file_fail(v->error, "--preset: the volume has a single value");
     points_as_text(points, ISOGI_PRESET_POINTS, text, text + sizeof text);
     return transfer_parse(text, &v->transfer, v->error);
@@ -1500,8 +1506,11 @@ static int write_picture(viewer *v) {
     if (!bytes) return fail(v, "the picture", ISOGI_NO_MEMORY);
     if (!(exposure > 0)) {
         exposure = picture_exposure((const float(*)[4])v->picture, pixels, 0.9, 0.6);
-        for (double factor = 64; v->compared && factor > 1.0005; factor = sqrt(factor))
-            exposure *= expose_picture(v, exposure, bytes) < 0 ? factor : 1 / factor;
+        for (double factor = 64; v->compared && factor > 1.0005; factor = sqrt(factor)) {
+            const double brighter = expose_picture(v, exposure, bytes);
+            if (brighter < 0 || brighter > 0) exposure *= brighter < 0 ? factor : 1 / factor;
+            else break;
+        }
     }
     expose_picture(v, exposure, bytes);
     if (v->compared) compare_picture(v, bytes);

@@ -8,6 +8,7 @@
 #include <errno.h>
 #include <fcntl.h>
 #include <limits.h>
+#include <signal.h>
 #include <stdarg.h>
 #include <stdint.h>
 #include <stdio.h>
@@ -191,6 +192,9 @@ static inline int file_write(const char *path, const void *data, size_t size, ch
     char target[PATH_MAX], name[PATH_MAX];
     mode_t mode;
     int special, file, ok;
+#ifdef SIGXFSZ
+    signal(SIGXFSZ, SIG_IGN); /* a file larger than the shell allows is an error to be told, not the end of the program */
+#endif
     if (!file_target(path, target, &mode, &special, error)) return 0;
     if (special) {
         file = open(path, O_WRONLY);

@@ -150,20 +150,23 @@ static inline size_t volume_not_finite(isogi_volume *v, const double *replace, s
 }
 
 /* An isovalue for a volume of which nothing is known: the threshold that parts the histogram into two classes of least variance
-   (Otsu 1979). The largest single bin is left out: it is padding or air, and would outweigh the object. */
+   (Otsu 1979). The largest single bin is left out: it is padding or air, and would outweigh the object; but not where all other voxels
+   have one value, as in a mask: halfway between the two, then. */
 static inline double volume_guess_isovalue(const isogi_volume *v, const double range[2]) {
     enum { bins = 512 };
     double histogram[bins] = {0}, total = 0, sum = 0, low = 0, low_sum = 0, best = -1, least = 0, most = 0;
     size_t i, count = v->size[0] * v->size[1] * v->size[2], stride = 1 + count / 20000000;
-    int b, largest = 0;
+    int b, largest = 0, bins_used = 0;
     if (!(range[1] > range[0])) return range[0];
     for (i = 0; i < count; i += stride) {
         double x = (volume_voxel(v, i) - range[0]) / (range[1] - range[0]) * (bins - 1) + 0.5;
         if (x >= 0 && x < bins) histogram[(int)x]++;
     }
-    for (b = 0; b < bins; b++)
+    for (b = 0; b < bins; b++) {
+        bins_used += histogram[b] > 0;
         if (histogram[b] > histogram[largest]) largest = b;
-    if (histogram[largest] > 0.3 * (double)(count / stride)) histogram[largest] = 0;
+    }
+    if (bins_used > 2 && histogram[largest] > 0.3 * (double)(count / stride)) histogram[largest] = 0;
     for (b = 0; b < bins; b++) total += histogram[b], sum += b * histogram[b];
     for (b = 0; b < bins - 1; b++) {
         double high, difference, between;
