@@ -142,8 +142,8 @@ TEST(bad_meshes_of_tetrahedra_get_one_line) {
     const struct { const char *name; size_t size; unsigned char bytes[64]; const char *say;
     } files[] = {{"empty.tet", 0, {0}, "is not a .tet file"},
                  {"other.tet", 16, {"RIFFxxxxxxxxxxx"}, "is not a .tet file"},
-                 {"cut.tet", 20, {'T', 'E', 'T', 'S', 4, 0, 0, 0, 1}, "is cut off"},
-                 {"vast.tet", 20, {'T', 'E', 'T', 'S', 255, 255, 255, 255, 255, 255, 255, 255}, "is cut off"},
+                 {"cut.tet", 20, {'T', 'E', 'T', 'S', 4, 0, 0, 0, 1}, "has 20 bytes"},
+                 {"vast.tet", 20, {'T', 'E', 'T', 'S', 255, 255, 255, 255, 255, 255, 255, 255}, "has 20 bytes"},
                  {"none.tet", 12, {'T', 'E', 'T', 'S'}, "invalid"},                                     /* no point */
                  {"beyond.tet", 44, {'T', 'E', 'T', 'S', 1, 0, 0, 0, 1, 0, 0, 0, [28] = 9}, "invalid"}, /* a corner that is no point */
                  {"short_4x4x4_uint8.raw", 63, {0}, "63 bytes"}};
