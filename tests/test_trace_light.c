@@ -889,7 +889,7 @@ TEST(lamps_near_walls_bring_no_more_than_they_send) {
     const isogi_light lamp[2] = {light_make(ISOGI_LIGHT_POINT, middle + 2, middle, middle, 100, 0),
                                  light_make(ISOGI_LIGHT_SPHERE, middle, middle - 2, middle + 1, 100, 0.5)};
     CHECK(isogi_vol_build(&pyramid, &volume, NULL) == ISOGI_OK, "build");
-    for (int way = 0; way < 8; way++) { /* method, offset, lamp */
+    for (int way = 0; way < 8; way += LONG_SUITE || way < 3 ? 1 : 3) { /* method, offset, lamp */
         const isogi_trace_desc d = {.pyramid = pyramid, .lighting = {.lights = &lamp[way / 4], .light_count = 1}, .bounces = -1,
                                     .samples = way % 2 ? 32 : 64, .method = way % 2 ? ISOGI_TRACE_PATHS : ISOGI_TRACE_FEEDBACK,
                                     .offset = way / 2 % 2 ? 1 : 0.25f, .albedo = {0.8f, 0.8f, 0.8f}, .isovalue_min = -0.1,
