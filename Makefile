@@ -89,7 +89,7 @@ build/flags: FORCE
 	@mkdir -p build/tests build/bench build/demo
 	@printf '%s\n' '$(CC) $(C99) $(CFLAGS) $(LIBS)' | cmp -s - $@ || printf '%s\n' '$(CC) $(C99) $(CFLAGS) $(LIBS)' > $@
 
-# ---- demo: VOLUME and ISO reach the script through the environment, whatever characters they hold ----
+# ---- demo: what the user chose reaches the script through the environment, whatever characters it holds ----
 
 demo: export VOLUME := $(VOLUME)
 demo: export ISO := $(ISO)

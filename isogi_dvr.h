@@ -7432,8 +7432,9 @@ ISOGI_API isogi_result isogi_transfer_import(const float (*rgba)[4], size_t coun
 
 #define ISOGI_DVR__BINS 256
 
-/* The two bins between which three classes have least variance: the largest sum of (sum of values)^2 / count. In the middle of what lies
-   empty between classes: of two values only, halfway between them, and again up to the upper one. */
+/* The two bins at which three classes of least variance part: the largest sum of (sum of values)^2 / count. Each is moved to the middle of
+   the empty bins around it; where both fall into one gap, as between two values, the second goes halfway up from the first. The range ends
+   in values, be they among those that were counted or not. */
 static void isogi_dvr__three_classes(double histogram[ISOGI_DVR__BINS], int bin[2]) {
     double count[ISOGI_DVR__BINS + 1], sum[ISOGI_DVR__BINS + 1], best = -1, total = 0, air = 0;
     int i, j, largest = 0;
@@ -7453,31 +7454,31 @@ static void isogi_dvr__three_classes(double histogram[ISOGI_DVR__BINS], int bin[
     histogram[largest] += air;
     for (i = 0; i < 2; i++) {
         int low = bin[i], high = bin[i];
-        while (low > 0 && !(histogram[low - 1] > 0)) low--;
-        while (high < ISOGI_DVR__BINS && !(histogram[high] > 0)) high++;
-        if (low > 0 && high < ISOGI_DVR__BINS) bin[i] = (low + high) / 2;
+        while (low > 1 && !(histogram[low - 1] > 0)) low--;
+        while (high < ISOGI_DVR__BINS - 1 && !(histogram[high] > 0)) high++;
+        bin[i] = (low + high) / 2;
         if (i && bin[1] <= bin[0]) bin[1] = (bin[0] + high) / 2;
     }
 }
 
-/* Some million voxels of the lattice, at equal distances; of each axis the last ones, too. */
+/* Some million voxels of the lattice, at equal distances, of each axis the last ones, too. */
 static void isogi_dvr__histogram(const isogi_pyramid *pyramid, const double range[2], double histogram[ISOGI_DVR__BINS]) {
     const isogi_volume *v = isogi_vol_volume(pyramid);
-    size_t step[3];
-    uint32_t c[3];
+    size_t count[3], i[3];
     int a;
     double scale = ISOGI_DVR__BINS / (0.5 * range[1] - 0.5 * range[0]);
-    for (a = 0; a < 3; a++) step[a] = 1 + v->size[a] / 101;
+    for (a = 0; a < 3; a++) count[a] = v->size[a] < 101 ? v->size[a] : 101;
     for (a = 0; a < ISOGI_DVR__BINS; a++) histogram[a] = 0;
-    for (c[2] = 0; c[2] < v->size[2]; c[2] += (uint32_t)step[2])
-        for (c[1] = 0; c[1] < v->size[1]; c[1] += (uint32_t)step[1])
-            for (c[0] = 0; c[0] < v->size[0]; c[0] += (uint32_t)step[0]) {
+    for (i[2] = 0; i[2] < count[2]; i[2]++)
+        for (i[1] = 0; i[1] < count[1]; i[1]++)
+            for (i[0] = 0; i[0] < count[0]; i[0]++) {
                 double corner[8], value;
                 uint32_t cell[3];
                 int which = 0;
                 for (a = 0; a < 3; a++) { /* the last voxel is the far corner of the cell before it */
-                    const int far_corner = c[a] > 0 && c[a] == v->size[a] - 1;
-                    cell[a] = c[a] - (uint32_t)far_corner, which |= far_corner << a;
+                    const size_t last = v->size[a] - 1, voxel = last ? (size_t)((uint64_t)i[a] * last / (count[a] - 1)) : 0;
+                    const int far_corner = voxel > 0 && voxel == last;
+                    cell[a] = (uint32_t)voxel - (uint32_t)far_corner, which |= far_corner << a;
                 }
                 isogi_volume_corners(v, cell, corner), value = corner[which];
                 if (!isogi_dvr__finite64(value)) continue;

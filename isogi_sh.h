@@ -210,7 +210,7 @@ ISOGI_API isogi_result isogi_sh_project_samples(double *c, int order, int channe
                                                 const float *weight, size_t count);
 
 /* Coefficients (RGB interleaved) of an equirectangular RGB image laid out and oriented as in isogi_env. Fejer weights in latitude:
-   coefficients of degree l of an image of degrees up to n are exact where l + n < height; what rows and columns cannot tell apart
+   coefficients of degree l of an image of degrees up to n are exact where l + n < height and width; what rows and columns cannot tell apart
    (degrees l >= height; of orders about the image's axis, which is y, those with 2 m >= width) is zero. Sums end at FLT_MAX; pixels are
    not checked. The second takes any number of channels, 1..16. */
 ISOGI_API isogi_result isogi_sh_project_equirect(float *rgb, int order, const float *image, int width, int height);

@@ -154,7 +154,8 @@
    Threads      Rays run on the context's threads. isogi_trace_sample and the other readers may run in any number of threads at a
                 time; request, step and relight alone, without readers. Request and step keep their threads from beginning to end;
                 steps of a few milliseconds on many cores go better with an isogi_thread_pool.
-   Determinism  The same bits for any number of threads and any budget of steps, and in parts (desc.box_first, isogi_trace_load).
+   Determinism  The same bits for any number of threads and any budget of steps, and in parts (desc.box_first, isogi_trace_load, which
+                tells of what).
                 PATHS: a texel's light depends on the description and its place alone, lazily or fully, in any order of requests.
                 FEEDBACK: which probes there are depends on the interval of isovalues, and when lazy on what was asked for and in which
                 order: 1 to 3 % (rms over points) where light is even, up to 10 % with few samples under a peaky sky or albedo near 1:
@@ -274,7 +275,7 @@ typedef struct isogi_trace_desc {
                                   rows filter-) */
     uint64_t seed;
     float offset;              /* rays start this many voxels along the normal, up to 1 (a wall may be that thin); 0 = 0.25;
-                                  negative = on the surface */
+                                  negative = on the surface; lamps are as far away as from the surface all the same */
     isogi_normal_kind normals; /* of the hemisphere that is integrated over */
     double isovalue_min, isovalue_max; /* only texels that a surface within this interval reads; both 0 = all. Where none of a lookup's
                                           eight texels is valid, the nearest one of the 4x4x4 may be missing, unless lazy: it is then
@@ -424,7 +425,7 @@ ISOGI_API isogi_result isogi_trace_export_scales(const isogi_trace *trace, int f
    would have shared probes, the others differ as lazy light does (see Determinism).
    Only desc.isovalue_min, isovalue_max, lazy, lookup and box may differ; else the answer is ISOGI_INVALID (lighting, tables and the
    ranges of the volume's blocks are compared by hash; a material function cannot be).
-   Any bytes may be loaded: those that are damaged, cut off or of another version are ISOGI_CORRUPT and change nothing (what is left of a
+   Any bytes may be loaded: those that are damaged, cut off or of another layout are ISOGI_CORRUPT and change nothing (what is left of a
    block of both sides that is cut off where the first one ends is a block of that side: ISOGI_INVALID).
    ISOGI_NO_MEMORY: some of the texels are loaded. isogi_trace_load counts as a writer. Hierarchical textures are not saved: their size is
    0, and the calls answer ISOGI_INVALID. */
@@ -454,8 +455,8 @@ typedef struct isogi_trace_surface {
 typedef void isogi_trace_intersect_function(void *user, const isogi_ray *rays, size_t count, isogi_trace_surface *surfaces);
 
 /* isogi_trace_gather on such a surface. normals are needed: unit, to the side that the light is wanted for. Uses lighting, albedo,
-   samples, bounces, seed, reach and no_shadows; offset: how far off along the normal rays start, in world units, 0 or more. The
-   other fields are not read, the pyramid may be NULL. context NULL: malloc and all cores. */
+   samples, bounces, seed, reach and no_shadows; offset: how far off along the normal rays start, in world units, 0 or more (lamps are as
+   far away as from the surface). The other fields are not read, the pyramid may be NULL. context NULL: malloc and all cores. */
 ISOGI_API isogi_result isogi_trace_gather_field(const isogi_trace_desc *desc, isogi_trace_intersect_function *intersect, void *user,
                                                 const float (*points)[3], const float (*normals)[3], size_t count,
                                                 float (*irradiance)[3], float *error, const isogi_context *context);
@@ -1156,6 +1157,19 @@ static int isogi_trace__light_beam(const isogi_light *light, const double point[
     return beam->tmax >= 0 && isogi_trace__finite(factor);
 }
 
+/* The beam that a lamp sends to `point`, begun at `origin` near by, where rays start: it ends at the same place of the lamp, and brings
+   what it did. Were lamps seen from there, they would be closer than they are, and bring more than they send out. Distant light stays. */
+static void isogi_trace__beam_from(isogi_trace__beam *beam, const double point[3], const double origin[3]) {
+    double to[3], length;
+    int a;
+    if (!(beam->tmax > 0)) return;
+    for (a = 0; a < 3; a++) to[a] = point[a] - origin[a] + beam->tmax * (double)beam->dir[a];
+    length = sqrt(isogi_trace__dot_wide(to, to));
+    if (!isogi_trace__finite(length)) return;
+    beam->tmax = length > 0 ? length : DBL_MIN; /* 0 would be unlimited */
+    for (a = 0; a < 3 && length > 0; a++) beam->dir[a] = (float)(to[a] / length);
+}
+
 /* ==== voxels and texels ============================================================================================== */
 
 /* A colour from outside: within [0, most], NaN is 0. */
@@ -1436,19 +1450,14 @@ static double isogi_trace__site_kernel(const isogi_trace__site *site, const floa
     return cosine > 0 ? cosine : 0;
 }
 
-/* What a light's beam, as seen from the surface itself, brings there; and the ray that finds out whether it arrives, which begins where the
-   site's rays do. From there a lamp near by would be seen closer, and bring more light than it sends out. 0: none. */
+/* What a light's beam, as seen from the surface itself, brings there; then the beam is the ray that finds out whether it arrives. 0: it
+   brings none. */
 static int isogi_trace__site_beam(const isogi_trace__site *site, isogi_trace__beam *beam) {
     const double cosine = isogi_trace__site_kernel(site, beam->dir);
-    double to[3], length;
     int a;
-    if (!(cosine > 0)) return 0;
-    for (a = 0; a < 3; a++) beam->rgb[a] *= cosine, to[a] = site->point[a] + beam->tmax * (double)beam->dir[a] - site->origin[a];
-    length = sqrt(isogi_trace__dot_wide(to, to));
-    if (site->on_surface || !(beam->tmax > 0) || !(length > 0) || !isogi_trace__finite(length)) return 1;
-    for (a = 0; a < 3; a++) beam->dir[a] = (float)(to[a] / length);
-    beam->tmax = length;
-    return 1;
+    for (a = 0; a < 3; a++) beam->rgb[a] *= cosine;
+    if (!site->on_surface) isogi_trace__beam_from(beam, site->point, site->origin);
+    return cosine > 0;
 }
 
 /* ==== paths ========================================================================================================== */
@@ -1893,7 +1902,7 @@ static int isogi_trace__fields_valid(const isogi_trace_desc *d) {
     if (d->order < 0 || d->order > ISOGI_TRACE__MAX_ORDER || d->bounces < -1 || d->samples < 0 || d->samples > 1 << 24)
         return 0;
     if (d->transfer_channels != 0 && d->transfer_channels != 1 && d->transfer_channels != 3) return 0;
-    if (!isogi_trace__finite((double)d->offset) || d->offset > 1) return 0;
+    if (!isogi_trace__finite((double)d->offset)) return 0;
     if (!isogi_trace__finite(d->isovalue_min) || !isogi_trace__finite(d->isovalue_max) || d->isovalue_min > d->isovalue_max)
         return 0;
     if (!isogi_trace__finite3(d->lattice_min) || !isogi_trace__finite3(d->lattice_max)) return 0;
@@ -1906,9 +1915,9 @@ static int isogi_trace__fields_valid(const isogi_trace_desc *d) {
     return d->mode == ISOGI_TRACE_IRRADIANCE || isogi_trace__distant(&d->lighting);
 }
 
-/* A field given by a function has no voxels to be baked. */
+/* A field given by a function has no voxels to be baked. offset: in voxels. */
 static int isogi_trace__desc_valid(const isogi_trace_desc *d) {
-    return d && d->pyramid && isogi_vol_volume(d->pyramid)->data && isogi_trace__fields_valid(d);
+    return d && d->pyramid && isogi_vol_volume(d->pyramid)->data && isogi_trace__fields_valid(d) && d->offset <= 1;
 }
 
 /* Grey surfaces need one set of coefficients. */
@@ -4087,7 +4096,8 @@ static uint32_t isogi_trace__block(const isogi_trace *t, int level) {
 
 /* Samples of a node are one stretch of a Sobol sequence. Texels near each other share its scramble, and each turns it (Cranley and
    Patterson 1976) by this much for a step along each axis, so that those around a texel, which the filter averages, are well spread
-   together: on surfaces of all directions, with 1, 2 and 4 samples, by a search at random for the least low frequencies of their sum. */
+   together: on surfaces of all directions, with 1, 2 and 4 samples, by a search at random for the least low frequencies of their sum.
+   Probes are turned by the voxels' cell in which they lie. */
 static void isogi_trace__turn(const size_t texel[3], double turn[2]) {
     static const double step[2][3] = {{0.22891, 0.49289, 0.10247}, {0.85142, 0.83062, 0.54863}};
     int a;
@@ -4378,6 +4388,11 @@ static int isogi_trace__span_site(isogi_trace__cast *c, uint32_t k) {
         site->key = isogi_trace__key(isogi_trace__key(seed, 2),
                                      (uint64_t)x[0] + (uint64_t)l[0] * ((uint64_t)x[1] + (uint64_t)l[1] * (uint64_t)x[2]));
         c->sequence[k] = isogi_trace__key(isogi_trace__key(seed, 3), isogi_trace__turned_key(x));
+        isogi_trace__turn(x, c->turn[k]);
+    } else if (n->key == n->cell) { /* the first probe of its cell: turned like a texel, since hits of one texel read many of a wall */
+        const size_t x[3] = {n->place.cell[0], n->place.cell[1], n->place.cell[2]};
+        site->key = isogi_trace__key(isogi_trace__key(seed, 4), n->key);
+        c->sequence[k] = isogi_trace__key(isogi_trace__key(seed, 5), isogi_trace__turned_key(x));
         isogi_trace__turn(x, c->turn[k]);
     } else site->key = c->sequence[k] = isogi_trace__key(isogi_trace__key(seed, 4), n->key), c->turn[k][0] = c->turn[k][1] = 0;
     site->place = n->place, site->isovalue = n->isovalue, site->from = n->from;
@@ -6879,7 +6894,8 @@ typedef struct isogi_trace__walk {
     int count; /* of paths alive */
     int slot[ISOGI_TRACE__WAVE];
     uint64_t key[ISOGI_TRACE__WAVE];
-    double place[ISOGI_TRACE__WAVE][3], through[ISOGI_TRACE__WAVE][3], light[ISOGI_TRACE__WAVE][3]; /* light: by slot */
+    double point[ISOGI_TRACE__WAVE][3], place[ISOGI_TRACE__WAVE][3]; /* of vertices, and where their rays start */
+    double through[ISOGI_TRACE__WAVE][3], light[ISOGI_TRACE__WAVE][3]; /* light: by slot */
     float normal[ISOGI_TRACE__WAVE][3];
     isogi_ray ray[ISOGI_TRACE__WAVE];
     isogi_trace_surface met[ISOGI_TRACE__WAVE];
@@ -6930,17 +6946,17 @@ static void isogi_trace__field_lights(isogi_trace__walk *w, uint64_t site, int f
     int i, c, count;
     for (l = sky->rays ? 0 : 1; l <= lighting->light_count; l++) {
         for (count = i = 0; i < w->count; i++) {
-            double u[2], cosine, density;
+            double u[2], cosine;
             isogi_trace__beam beam;
             isogi_trace__light_sample(site, (uint32_t)(first + w->slot[i]), w->key[i], depth, l, u);
             beam.tmax = 0;
             if (l) {
-                if (!isogi_trace__light_beam(&lighting->lights[l - 1], w->place[i], u[0], u[1], &beam)) continue;
+                if (!isogi_trace__light_beam(&lighting->lights[l - 1], w->point[i], u[0], u[1], &beam)) continue;
                 cosine = isogi_trace__dot(w->normal[i], beam.dir) / ISOGI_TRACE__PI;
-                density = 0;
+                isogi_trace__beam_from(&beam, w->point[i], w->place[i]);
             } else { /* the environment's image by brightness, weighed against the cosine */
                 float radiance[3];
-                density = isogi_trace__sky_direction(sky, u[0], u[1], beam.dir);
+                double density = isogi_trace__sky_direction(sky, u[0], u[1], beam.dir);
                 cosine = isogi_trace__dot(w->normal[i], beam.dir) / ISOGI_TRACE__PI;
                 density += cosine;
                 isogi_trace__env_light(sky->env, beam.dir, radiance);
@@ -6983,14 +6999,14 @@ static int isogi_trace__field_reflect(isogi_trace__walk *w, int i, int j, int de
     }
     for (c = 0; c < 3; c++) {
         w->through[j][c] = through[c] / survive;
-        w->place[j][c] = w->ray[i].origin[c] + w->met[i].t * (double)w->ray[i].dir[c] + (double)d->offset * (double)w->met[i].normal[c];
-        w->normal[j][c] = w->met[i].normal[c];
+        w->point[j][c] = w->ray[i].origin[c] + w->met[i].t * (double)w->ray[i].dir[c], w->normal[j][c] = w->met[i].normal[c];
+        w->place[j][c] = w->point[j][c] + (double)d->offset * (double)w->normal[j][c];
     }
     w->slot[j] = w->slot[i], w->key[j] = w->key[i];
     return 1;
 }
 
-/* Samples first .. first + count - 1 of a point whose first ray starts are set in place[0], normal[0]. */
+/* Samples first .. first + count - 1 of a point, which is set in point[0], place[0], normal[0]. */
 static void isogi_trace__field_run(isogi_trace__walk *w, uint64_t key, int first, int count) {
     const isogi_trace__sequence sequence = isogi_trace__sequence_of(key);
     isogi_trace__basis basis;
@@ -6999,7 +7015,8 @@ static void isogi_trace__field_run(isogi_trace__walk *w, uint64_t key, int first
     w->count = count;
     for (i = 0; i < count; i++) {
         w->slot[i] = i, w->key[i] = isogi_trace__key(key, (uint64_t)(first + i));
-        memcpy(w->place[i], w->place[0], sizeof w->place[0]), memcpy(w->normal[i], w->normal[0], sizeof w->normal[0]);
+        memcpy(w->point[i], w->point[0], sizeof w->point[0]), memcpy(w->place[i], w->place[0], sizeof w->place[0]);
+        memcpy(w->normal[i], w->normal[0], sizeof w->normal[0]);
         for (c = 0; c < 3; c++) w->through[i][c] = 1, w->light[i][c] = 0;
     }
     for (depth = 0; w->count; depth++, w->count = alive) {
@@ -7025,13 +7042,10 @@ static void isogi_trace__field_run(isogi_trace__walk *w, uint64_t key, int first
 }
 
 /* What a sample at a point may bring: the sky on average, and the lights from there. What glows is known where it was met. */
-static double isogi_trace__field_open(const isogi_trace__field *f, const double place[3]) {
+static double isogi_trace__field_open(const isogi_trace__field *f, const float point[3]) {
     isogi_lighting lights = f->scene.desc.lighting;
-    float point[3];
     double open = 0;
-    int c;
     memset(&lights.env, 0, sizeof lights.env);
-    for (c = 0; c < 3; c++) point[c] = (float)place[c];
     if (lights.light_count) isogi_trace__open_at(&lights, point, &open);
     return open + f->scene.possible;
 }
@@ -7041,7 +7055,7 @@ static void isogi_trace__field_point(const isogi_trace__field *f, size_t index) 
     isogi_trace__walk w;
     uint64_t key = isogi_trace__key(isogi_trace__key(d->seed, 2), (uint64_t)index);
     isogi_trace__spread spread = {0, 0, 0};
-    double sum[3] = {0, 0, 0}, place[3], length = sqrt(isogi_trace__dot(f->normals[index], f->normals[index]));
+    double sum[3] = {0, 0, 0}, point[3], place[3], length = sqrt(isogi_trace__dot(f->normals[index], f->normals[index]));
     float normal[3];
     int first, i, c;
     memset(f->irradiance[index], 0, sizeof f->irradiance[index]);
@@ -7049,13 +7063,13 @@ static void isogi_trace__field_point(const isogi_trace__field *f, size_t index) 
     if (!(length > 0) || !isogi_trace__finite(length)) return;
     for (c = 0; c < 3; c++) {
         normal[c] = (float)((double)f->normals[index][c] / length);
-        place[c] = (double)f->points[index][c] + (double)d->offset * (double)normal[c];
+        point[c] = (double)f->points[index][c], place[c] = point[c] + (double)d->offset * (double)normal[c];
     }
     if (!isogi_trace__finite3(place)) return;
     w.field = f;
     for (first = 0; first < d->samples; first += ISOGI_TRACE__WAVE) {
         int count = d->samples - first < ISOGI_TRACE__WAVE ? d->samples - first : ISOGI_TRACE__WAVE;
-        memcpy(w.place[0], place, sizeof place), memcpy(w.normal[0], normal, sizeof normal);
+        memcpy(w.point[0], point, sizeof point), memcpy(w.place[0], place, sizeof place), memcpy(w.normal[0], normal, sizeof normal);
         isogi_trace__field_run(&w, key, first, count);
         for (i = 0; i < count; i++) {
             isogi_trace__spread_add(&spread, w.light[i], first + i);
@@ -7063,7 +7077,7 @@ static void isogi_trace__field_point(const isogi_trace__field *f, size_t index) 
         }
     }
     for (c = 0; c < 3; c++) f->irradiance[index][c] = (float)(ISOGI_TRACE__PI * sum[c] / d->samples);
-    f->error[index] = isogi_trace__spread_error(&spread, d->samples, isogi_trace__field_open(f, place));
+    f->error[index] = isogi_trace__spread_error(&spread, d->samples, isogi_trace__field_open(f, f->points[index]));
 }
 
 static void isogi_trace__field_task(void *arg, size_t task) {

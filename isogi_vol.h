@@ -59,8 +59,8 @@
                 to call.
    Determinism  The same input gives the same bits for any number of threads. With -ffast-math hits of ordinary numbers are right but for
                 more rounding, those of denormal or huge ones (1e300) may be NaN, and nothing that this header says to be the same
-                bits on two ways need be so. Nor where the compiler fuses multiply-adds, as gcc does with -march=native unless told
-                -ffp-contract=off: hits are then the same, their t and place but for roundings.
+                bits on two ways need be so. These bits may differ, too, where the compiler fuses multiply-adds, as gcc does with
+                -march=native unless told -ffp-contract=off: hits are then the same, their t and place but for roundings.
    Accuracy     Rays are solved in double: against a long double reference no hit is missed or added, and t is right to 1e-12 cell, or
                 to its own rounding where the origin is far, but for grazing rays, whose t is ill-conditioned by nature. A ray that runs
                 within the surface, where the field is the isovalue along a stretch of it, has the side that rounding gives it, and

@@ -121,7 +121,7 @@ typedef struct viewer {
     isogi_counters counters;
     double started, said, tracing_begun, stage_begun;
     const char *stage; /* what the library's own progress is told as; NULL = silently */
-    uint64_t covered, traced; /* samples that show a surface, and those of them whose light is known */
+    uint64_t covered, surface, traced; /* samples that show anything, the surface, and those whose light is known */
     char saying;
     unsigned char *compared;  /* the picture to compare with */
     uint64_t memory, memory_peak;
@@ -995,7 +995,7 @@ static int bake(viewer *v) {
     stat_line(v, "texels_computed", "%llu", (unsigned long long)done.texels);
     stat_line(v, "texels_skipped", "%llu", (unsigned long long)done.texels_skipped);
     stat_line(v, "texture_bytes", "%zu", isogi_trace_memory(v->trace));
-    if (!done.texels && v->covered)
+    if (!done.texels && v->surface)
         fprintf(stderr, "note: no texel has a surface: the lattice is too coarse for this one, which stays black; see --lattice\n");
     return 1;
 }
@@ -1294,10 +1294,10 @@ static char *points_as_text(const isogi_transfer_point *points, int count, char 
     return at;
 }
 
-/* For a volume of which nothing is known: what its histogram suggests. In data space with the isosurface that is asked for, or the one that
-   bounds the second class of values; what stands between surfaces is thin then. */
 static const double DENSEST = 9.9e29; /* a file may say 1e30, and as a float that is more */
 
+/* For a volume of which nothing is known: what its histogram suggests. In data space with the isosurface that is asked for, or the one that
+   bounds the second class of values; what stands between surfaces is thin then. */
 static int default_transfer(viewer *v) {
     isogi_transfer_point points[ISOGI_SUGGEST_POINTS];
     isogi_dvr_space space = v->o.mode == DVR ? ISOGI_DVR_PHYSICAL : ISOGI_DVR_DATA;
@@ -1525,7 +1525,7 @@ static int check_surface(viewer *v) {
     size_t covered = 0, surface = 0, pixels = (size_t)v->o.width * (size_t)v->o.height;
     for (int s = 0; s < v->o.antialias; s++)
         for (size_t i = 0; i < pixels; i++) covered += v->seen[s][i] != RASTER_NONE, surface += v->seen[s][i] < SECTION;
-    v->covered = covered;
+    v->covered = covered, v->surface = surface;
     stat_line(v, "coverage", "%.6f", (double)covered / (double)pixels / v->o.antialias);
     if (!surface)
         fprintf(stderr, "note: no surface is in view at isovalue %.9g (the data range from %.9g to %.9g)%s\n", v->isovalue, v->range[0],

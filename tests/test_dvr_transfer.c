@@ -157,6 +157,30 @@ TEST(suggestions_for_one_and_two_values) {
     }
 }
 
+static double nothing(void *user, const double point[3], double gradient[3]) {
+    (void)user, (void)point;
+    gradient[0] = gradient[1] = gradient[2] = 0;
+    return 1;
+}
+
+/* The last layer of a long axis is counted, and a pyramid of a function has nothing to count. */
+TEST(suggestions_see_last_layers_and_refuse_functions) {
+    static uint8_t data[512 * 4];
+    const isogi_volume volume = {.data = data, .type = ISOGI_U8, .size = {2, 512, 2}};
+    isogi_transfer_point p[ISOGI_SUGGEST_POINTS];
+    isogi_pyramid *pyramid = NULL;
+    double threshold;
+    for (int i = 0; i < 512 * 4; i++) data[i] = i / 2 % 512 < 510 ? 0 : i / 2 % 512 < 511 ? 100 : 200;
+    CHECK(isogi_vol_build(&pyramid, &volume, NULL) == ISOGI_OK, "build");
+    CHECK(isogi_transfer_suggest(pyramid, ISOGI_DVR_PHYSICAL, p, &threshold) == ISOGI_OK, "suggest");
+    CHECK(threshold > 90 && threshold < 110, "threshold %g", threshold);
+    isogi_vol_free(pyramid), pyramid = NULL;
+    const isogi_field function = {.value = nothing, .hessian = 1, .high = {1, 1, 1}, .cells = {4, 4, 4}};
+    CHECK(isogi_vol_build_field(&pyramid, &function, NULL) == ISOGI_OK, "build a function's");
+    CHECK(isogi_transfer_suggest(pyramid, ISOGI_DVR_PHYSICAL, p, &threshold) == ISOGI_INVALID, "a function");
+    isogi_vol_free(pyramid);
+}
+
 /* A thirtieth of the box's diagonal is half opaque at the fifth point, whatever the shape of voxels is. */
 TEST(suggestions_know_the_shape_of_voxels) {
     static const double depth[] = {1, 5, 0.1};

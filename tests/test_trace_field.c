@@ -320,6 +320,32 @@ TEST(all_reflections_in_a_ball_that_glows) {
     }
 }
 
+static void dark_ball(void *user, const isogi_ray *rays, size_t count, isogi_trace_surface *surfaces) {
+    inside_ball(user, rays, count, surfaces);
+    for (size_t i = 0; i < count; i++) memset(surfaces[i].emission, 0, sizeof surfaces[i].emission);
+}
+
+/* However far off the surface rays start, a lamp within the ball brings no more than it sends out. */
+TEST(lamps_are_as_far_away_as_from_the_surface) {
+    float points[64][3], normals[64][3], e[2][64][3];
+    double mean[2] = {0, 0};
+    const isogi_light lamp = light_make(ISOGI_LIGHT_POINT, 3, 1, 0, 100, 0);
+    test_random random = {10};
+    for (int i = 0; i < 64; i++) {
+        double d[3];
+        random_direction(&random, d);
+        for (int k = 0; k < 3; k++) points[i][k] = (float)(9 * d[k]), normals[i][k] = (float)-d[k];
+    }
+    for (int k = 0; k < 2; k++) {
+        const isogi_trace_desc d = {.albedo = {0.5f, 0.5f, 0.5f}, .bounces = -1, .samples = 256, .offset = k ? 2 : 1e-3f,
+                                    .lighting = {.lights = &lamp, .light_count = 1}};
+        CHECK(isogi_trace_gather_field(&d, dark_ball, NULL, (const float(*)[3])points, (const float(*)[3])normals, 64, e[k], NULL, NULL) ==
+                  ISOGI_OK, "offset %d", k);
+        for (int i = 0; i < 64; i++) mean[k] += (double)e[k][i][0] / 64;
+    }
+    CHECK(fabs(mean[1] / mean[0] - 1) < 0.02, "%g from 2 units off, %g on the surface", mean[1], mean[0]);
+}
+
 /* One rule for errors: a ball that sees nothing but one sky has the same error from its voxels and as a field, and none is certain. */
 TEST(errors_where_all_samples_agree) {
     double q[4] = {15.5, 15.5, 15.5, 9};

@@ -873,8 +873,32 @@ TEST(lamps_in_the_middle_are_lamps_like_others) {
     scene_free(&s);
 }
 
-/* Light at the end of what floats hold, by each way to bring it, comes to finite light and finite or endless errors; an even sky of any
-   such radiance counts as the brightest one. */
+/* A slit between the ground and matter above it, and a lamp in it: rays start a voxel above the ground, right below that matter, and go to
+   the lamp as it is seen from there. */
+TEST(rays_go_to_a_lamp_from_where_they_start) {
+    enum { N = 16 };
+    static float data[N * N * N];
+    isogi_pyramid *pyramid = NULL;
+    for (int i = 0; i < N * N * N; i++) {
+        const float y = (float)(i / N % N);
+        data[i] = fmaxf(5.5f - y, fminf(y - 6.8f, 9.5f - y)); /* the slit is 1.2 voxels high */
+    }
+    const isogi_volume volume = {.data = data, .type = ISOGI_F32, .size = {N, N, N}};
+    const isogi_light lamps[2] = {light_make(ISOGI_LIGHT_POINT, 10, 6.6, 8, 50, 0), light_make(ISOGI_LIGHT_SPHERE, 10, 6.6, 8, 50, 0.02)};
+    const float point[1][3] = {{4, 5.5f, 8}};
+    const double square = 36 + 1.1 * 1.1, expected = 50 * 1.1 / (square * sqrt(square));
+    CHECK(isogi_vol_build(&pyramid, &volume, NULL) == ISOGI_OK, "build");
+    for (int k = 0; k < 4; k++) { /* lamp, offset */
+        const isogi_trace_desc d = {.pyramid = pyramid, .lighting = {.lights = &lamps[k & 1], .light_count = 1}, .samples = 16,
+                                    .offset = k > 1 ? 1 : -1};
+        float e[1][3];
+        CHECK(isogi_trace_gather(&d, point, NULL, 1, e, NULL, NULL) == ISOGI_OK, "gather");
+        CHECK(fabs((double)e[0][0] / expected - 1) < 0.02, "lamp %d, offset %g: E %g, not %g", k & 1, (double)d.offset, (double)e[0][0],
+              expected);
+    }
+    isogi_vol_free(pyramid);
+}
+
 /* A lamp in a closed shell, wherever it stands: the wall keeps 1 - albedo of what it gets, so its mean irradiance is the lamp's flux over
    area and 1 - albedo. However far off the surface rays start, they bring no more than the lamp sends out: texels and probes are as far
    from it as the surface is. */
@@ -918,6 +942,8 @@ TEST(lamps_near_walls_bring_no_more_than_they_send) {
     isogi_vol_free(pyramid);
 }
 
+/* Light at the end of what floats hold, by each way to bring it, comes to finite light and finite or endless errors; an even sky of any
+   such radiance counts as the brightest one. */
 TEST(light_of_any_brightness_stays_finite) {
     static const float levels[2] = {1e30f, 3.4028234e38f};
     double q[5] = {6, 8, 6, 3, 3};

@@ -141,9 +141,16 @@ TEST(a_speck_is_shown_and_a_coarse_lattice_named) {
     const char *path = temporary("speck_40x40x40_uint8.raw");
     write_bytes(path, speck, sizeof speck);
     for (int m = 0; m < 4; m++) {
-        snprintf(command, sizeof command, "'%s' --mode %s --size 33x33 --out '%s'", path, ways[m], temporary("speck.png"));
+        const char *out = temporary("speck.png");
+        snprintf(command, sizeof command, "'%s' --mode %s --size 33x33 --out '%s'", path, ways[m], out);
         r = run_viewer(command);
         CHECK(r.status == 0 && !*r.error, "%s: %s", ways[m], r.error);
+        int shape[3] = {0, 0, 0};
+        unsigned char *picture = read_picture(out, shape);
+        if (!picture) continue;
+        const int middle = picture[3 * (16 * 33 + 16)], beside = picture[3 * (16 * 33 + 5)];
+        CHECK(middle > beside + 60, "%s: the speck %d, beside it %d", ways[m], middle, beside);
+        free(picture);
     }
     snprintf(command, sizeof command, "'%s' --lattice 2,2,2 --samples 1 --size 33x33 --out '%s'", path, temporary("speck.png"));
     r = run_viewer(command);
@@ -790,7 +797,8 @@ TEST(pictures_without_a_surface_are_told) {
     for (int k = 0; k < 8; k++) {
         snprintf(command, sizeof command, "procedural:gyroid:24 --size 16x16 --samples 4 %s --out '%s'", words[k], temporary("note.png"));
         run_result r = run_viewer(command);
-        CHECK(r.status == 0 && !strstr(r.error, "no surface is in view") == (k > 4), "%s: %s", words[k], r.error);
+        CHECK(r.status == 0 && !strstr(r.error, "no surface is in view") == (k > 4) && !strstr(r.error, "lattice"), "%s: %s", words[k],
+              r.error);
     }
 }
 
@@ -1191,6 +1199,28 @@ TEST(compared_pictures_have_the_same_mean) {
              temporary("same.png"));
     r = run_viewer(command);
     CHECK(r.status == 0 && !strcmp(r.output, "difference_rms 0.000000\n"), "%d: %s: %s", r.status, r.error, r.output);
+}
+
+/* A row of one pixel in a block that is stored: filters 0 to 4 there are, and no others. */
+TEST(unknown_filters_of_png_are_damage) {
+    for (unsigned filter = 0; filter < 8; filter++) {
+        static const unsigned char signature[8] = {137, 80, 78, 71, 13, 10, 26, 10};
+        unsigned char file[128] = {0}, *p = file + 8, *pixels = NULL;
+        char error[FILE_ERROR_SIZE] = "";
+        int shape[3];
+        memcpy(file, signature, 8);
+        png_put32(p + 8, 1), png_put32(p + 12, 1), p[16] = 8, p[17] = 2;
+        png_chunk(p, "IHDR", 13), p += 25;
+        const unsigned char stored[11] = {0x78, 1, 1, 4, 0, 0xfb, 0xff, (unsigned char)filter, 10, 20, 30};
+        memcpy(p + 8, stored, sizeof stored), png_put32(p + 19, png_adler(stored + 7, 4));
+        png_chunk(p, "IDAT", 15), p += 27;
+        png_chunk(p, "IEND", 0), p += 12;
+        const int read = png_decode(file, (size_t)(p - file), &pixels, shape, error);
+        CHECK(read == (filter < 5), "filter %u: %d, %s", filter, read, error);
+        CHECK(read ? pixels[0] == 10 && pixels[1] == 20 && pixels[2] == 30 : strstr(error, "damaged") != NULL, "filter %u: %s", filter,
+              error);
+        if (read) free(pixels);
+    }
 }
 
 /* What a scene is made of is kept, too: its volume, and its environment. */

@@ -472,7 +472,10 @@ static inline int png_decode(const unsigned char *file, size_t size, unsigned ch
         const unsigned char *from = raw + y * (row + 1);
         unsigned char *to = out + y * row, *above = y ? to - row : NULL;
         size_t pixel = (size_t)found[2];
-        if (from[0] > 4) ok = file_fail(error, "is damaged");
+        if (from[0] > 4) {
+            ok = file_fail(error, "is damaged");
+            break;
+        }
         for (i = 0; i < row; i++) {
             int a = i >= pixel ? to[i - pixel] : 0, b = above ? above[i] : 0, c = above && i >= pixel ? above[i - pixel] : 0;
             to[i] = (unsigned char)(from[1 + i] + png_predict(from[0], a, b, c));
