@@ -2171,13 +2171,18 @@ static isogi_dvr__kernels isogi_dvr__choose_kernels(int force_path) {
    interpolated first and classified after, at points about a voxel apart. Rows are padded with zeros, because vectors run over
    their ends. Two layouts: x fastest, for directions mostly along y or z, and z fastest, for those along x. */
 
+/* World length of a voxel's edge along a grid axis. */
+static double isogi_dvr__edge(const isogi_volume *v, int axis) {
+    const double *m = v->axes + axis;
+    return v->spacing[axis] * sqrt(m[0] * m[0] + m[3] * m[3] + m[6] * m[6]);
+}
+
 static isogi_result isogi_dvr__plan_matter(isogi_dvr *d) {
     isogi_dvr__matter *m = &d->matter;
     double step = d->desc.visibility_step > 0 ? d->desc.visibility_step : 2;
     int a, n;
     for (a = 0; a < 3; a++) {
-        const double *column = d->volume.axes + a;
-        double voxel = d->volume.spacing[a] * sqrt(column[0] * column[0] + column[3] * column[3] + column[6] * column[6]);
+        double voxel = isogi_dvr__edge(&d->volume, a);
         size_t points = d->desc.grid[a], intervals = points > 1 ? points - 1 : 2;
         m->every[a] = (size_t)isogi_dvr__clamp(d->cells[a] * voxel / (step * d->spacing * (double)intervals) + 0.5, 65536);
         if (!m->every[a]) m->every[a] = 1;
@@ -2574,12 +2579,6 @@ static isogi_result isogi_dvr__join(const isogi_dvr *d, const isogi_dvr__held *h
 
 /* ==== create and free ================================================================================================ */
 
-/* World length of a voxel's edge along a grid axis. */
-static double isogi_dvr__edge(const isogi_volume *v, int axis) {
-    const double *m = v->axes + axis;
-    return v->spacing[axis] * sqrt(m[0] * m[0] + m[3] * m[3] + m[6] * m[6]);
-}
-
 /* The inverse of (axes * spacing), and the smallest length of its columns. */
 static void isogi_dvr__set_lattice(isogi_dvr *d) {
     const isogi_volume *v = &d->volume;
@@ -2751,13 +2750,9 @@ ISOGI_API isogi_result isogi_dvr_create(isogi_dvr **dvr, const isogi_dvr_desc *d
     if (!(d->desc.unit > 0)) d->desc.unit = d->spacing;
     if (isogi_dvr__method(d) != ISOGI_DVR_SWEEP) d->desc.coarsest = 1;
     for (a = 0; a < 3 && d->desc.coarsest > 1; a++) d->desc.grid[a] = d->desc.grid[a] > 1 ? (d->desc.grid[a] + 6) / 8 * 8 + 1 : 9;
+    for (a = 0; a < 3; a++) longest += d->cells[a] * (isogi_dvr__edge(&d->volume, a) / d->spacing);
     for (a = 0; a < 3; a++) {
-        const double *m = d->volume.axes + a;
-        longest += d->cells[a] * (d->volume.spacing[a] / d->spacing) * sqrt(m[0] * m[0] + m[3] * m[3] + m[6] * m[6]);
-    }
-    for (a = 0; a < 3; a++) {
-        const double *m = d->volume.axes + a;
-        double distance = d->volume.spacing[a] / d->spacing * sqrt(m[0] * m[0] + m[3] * m[3] + m[6] * m[6]);
+        double distance = isogi_dvr__edge(&d->volume, a) / d->spacing;
         d->grid_scale[a] = d->cells[a] ? (float)(((double)d->desc.grid[a] - 1) / d->cells[a]) : 0;
         if (!(d->grid_scale[a] > 0)) continue;
         distance /= (double)d->grid_scale[a];

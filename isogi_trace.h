@@ -1601,17 +1601,15 @@ static void isogi_trace__wave_lights(isogi_trace__wave *w, isogi_trace__shadows 
         const isogi_light *light = &lighting->lights[l];
         if (!depth && isogi_trace__is_delta(light)) continue;
         for (i = 0; i < w->count; i++) {
-            double point[3], u[2];
+            double point[3], cosine, u[2];
             isogi_trace__beam beam;
             isogi_trace__wave_sample(w, i, depth, 1 + l, u);
             for (c = 0; c < 3; c++) point[c] = depth ? (double)positions[i][c] : w->site->point[c];
             if (!isogi_trace__light_beam(light, point, u[0], u[1], &beam)) continue;
-            if (depth) {
-                const double cosine = isogi_trace__cosine_at(w, i, depth, beam.dir);
-                if (!(cosine > 0)) continue;
-                for (c = 0; c < 3; c++) beam.rgb[c] *= cosine;
-            } else if (!isogi_trace__site_beam(w->site, &beam)) continue;
-            for (c = 0; c < 3; c++) beam.rgb[c] /= ISOGI_TRACE__PI;
+            cosine = isogi_trace__cosine_at(w, i, depth, beam.dir);
+            if (!(cosine > 0)) continue;
+            for (c = 0; c < 3; c++) beam.rgb[c] *= cosine / ISOGI_TRACE__PI;
+            if (!depth && !w->site->on_surface) isogi_trace__beam_from(&beam, w->site->point, w->site->origin);
             isogi_trace__shadows_add(w, s, i, beam.dir, beam.tmax, beam.rgb);
         }
         isogi_trace__shadows_flush(w, s, depth);

@@ -296,16 +296,21 @@ static void inside_ball(void *user, const isogi_ray *rays, size_t count, isogi_t
     }
 }
 
-/* Closed form: with all reflections pi / (1 - albedo) of what glows. Paths end by chance from the third reflection on; 64 * 1024 of them,
-   four standard errors are 1 % at albedo 0.8. */
-TEST(all_reflections_in_a_ball_that_glows) {
-    float points[64][3], normals[64][3], e[64][3];
-    test_random random = {9};
+/* 64 points of it, with normals to the inside. */
+static void inside_points(uint64_t seed, float (*points)[3], float (*normals)[3]) {
+    test_random random = {seed};
     for (int i = 0; i < 64; i++) {
         double d[3];
         random_direction(&random, d);
         for (int k = 0; k < 3; k++) points[i][k] = (float)(9 * d[k]), normals[i][k] = (float)-d[k];
     }
+}
+
+/* Closed form: with all reflections pi / (1 - albedo) of what glows. Paths end by chance from the third reflection on; 64 * 1024 of them,
+   four standard errors are 1 % at albedo 0.8. */
+TEST(all_reflections_in_a_ball_that_glows) {
+    float points[64][3], normals[64][3], e[64][3];
+    inside_points(9, points, normals);
     for (int k = 0; k < 3; k++) {
         static const float albedo[3] = {0, 0.5f, 0.8f};
         isogi_trace_desc d = {.albedo = {albedo[k], albedo[k], albedo[k]}, .bounces = -1, .samples = 1024, .offset = 1e-3f};
@@ -330,12 +335,7 @@ TEST(lamps_are_as_far_away_as_from_the_surface) {
     float points[64][3], normals[64][3], e[2][64][3];
     double mean[2] = {0, 0};
     const isogi_light lamp = light_make(ISOGI_LIGHT_POINT, 3, 1, 0, 100, 0);
-    test_random random = {10};
-    for (int i = 0; i < 64; i++) {
-        double d[3];
-        random_direction(&random, d);
-        for (int k = 0; k < 3; k++) points[i][k] = (float)(9 * d[k]), normals[i][k] = (float)-d[k];
-    }
+    inside_points(10, points, normals);
     for (int k = 0; k < 2; k++) {
         const isogi_trace_desc d = {.albedo = {0.5f, 0.5f, 0.5f}, .bounces = -1, .samples = 256, .offset = k ? 2 : 1e-3f,
                                     .lighting = {.lights = &lamp, .light_count = 1}};

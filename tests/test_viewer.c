@@ -1177,27 +1177,26 @@ TEST(fog_lies_over_sections_too) {
           difference);
 }
 
+/* A picture made with options, then the same compared with it. */
+static run_result compared_with(const char *options, const char *then) {
+    const char *first = temporary("first.png");
+    char command[1024];
+    snprintf(command, sizeof command, "procedural:gyroid:24 --mode lambert --size 64x48 %s --out '%s'", options, first);
+    run_result r = run_viewer(command);
+    CHECK(r.status == 0, "%d: %s", r.status, r.error);
+    snprintf(command, sizeof command, "procedural:gyroid:24 --mode lambert --size 64x48 --compare '%s' %s --out '%s'", first, then,
+             temporary("same.png"));
+    return run_viewer(command);
+}
+
 /* A picture that is compared is as bright as the other one, whatever light it has. */
 TEST(compared_pictures_have_the_same_mean) {
-    const char *dark = temporary("dark.png");
-    char command[1024];
     double difference = 1, exposure = 0;
-    run_result r;
-    snprintf(command, sizeof command, "procedural:gyroid:24 --mode lambert --size 64x48 --exposure 0.12 --out '%s'", dark);
-    r = run_viewer(command);
-    CHECK(r.status == 0, "%d: %s", r.status, r.error);
-    snprintf(command, sizeof command, "procedural:gyroid:24 --mode lambert --size 64x48 --compare '%s' --stats --out '%s'", dark,
-             temporary("same.png"));
-    r = run_viewer(command);
+    run_result r = compared_with("--exposure 0.12", "--stats");
     CHECK(r.status == 0 && sscanf(strstr(r.output, "difference_rms"), "difference_rms %lf", &difference) == 1 && difference < 0.001 &&
               sscanf(strstr(r.output, "\nexposure"), " exposure %lf", &exposure) == 1 && fabs(exposure - 0.12) < 0.001,
           "%d: %s: difference %g, exposure %g", r.status, r.error, difference, exposure);
-    snprintf(command, sizeof command, "procedural:gyroid:24 --mode lambert --size 64x48 --out '%s'", dark);
-    r = run_viewer(command);
-    CHECK(r.status == 0, "%d: %s", r.status, r.error);
-    snprintf(command, sizeof command, "procedural:gyroid:24 --mode lambert --size 64x48 --compare '%s' --out '%s'", dark,
-             temporary("same.png"));
-    r = run_viewer(command);
+    r = compared_with("", "");
     CHECK(r.status == 0 && !strcmp(r.output, "difference_rms 0.000000\n"), "%d: %s: %s", r.status, r.error, r.output);
 }
 
