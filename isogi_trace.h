@@ -421,8 +421,8 @@ ISOGI_API isogi_result isogi_trace_export_scales(const isogi_trace *trace, int f
    A block of bytes holds the texels computed so far: the same bytes on every machine. Loading adds them to a texture that was created
    from the same description: so a bake is resumed, and boxes baked apart (desc.box_first) are merged by loading one after the other, to
    the bits of one bake that never stopped. FEEDBACK promises these bits of full bakes within the same interval of isovalues (whole cubes
-   are saved, ISOGI_TRACE_CUBE), and of lazy ones with one request and without desc.error; where a block holds a part of the texels that
-   would have shared probes, the others differ as lazy light does (see Determinism).
+   are saved, ISOGI_TRACE_CUBE), and of lazy ones that were asked for everything while they had nothing to do (all of it is saved, or
+   nothing yet); what is asked for after that was finished would have shared its probes, and differs as lazy light does (see Determinism).
    Only desc.isovalue_min, isovalue_max, lazy, lookup and box may differ; else the answer is ISOGI_INVALID (lighting, tables and the
    ranges of the volume's blocks are compared by hash; a material function cannot be).
    Any bytes may be loaded: those that are damaged, cut off or of another layout are ISOGI_CORRUPT and change nothing (what is left of a
@@ -2591,6 +2591,7 @@ static isogi_result isogi_trace__classify_all(isogi_trace *t) {
 
 static void isogi_trace__feedback_free(const isogi_trace *t);
 static void isogi_trace__hash_changeable(isogi_trace *t);
+static void isogi_trace__settle(const isogi_trace *t);
 static isogi_result isogi_trace__feedback_new(isogi_trace *t);
 
 /* ==== create and free ================================================================================================ */
@@ -3087,6 +3088,7 @@ static isogi_result isogi_trace__want_slot(isogi_trace *t, size_t index, uint32_
     isogi_trace__brick *brick = t->bricks[index];
     isogi_result result = brick->queued ? ISOGI_OK : isogi_trace__queue_reserve(t);
     if (result != ISOGI_OK) return result;
+    isogi_trace__settle(t);
     brick->state[slot] = ISOGI_TRACE__WANTED, t->wanted++;
     if (!brick->queued) t->queue[t->queue_count++] = index, brick->queued = 1;
     return ISOGI_OK;
@@ -3585,7 +3587,8 @@ struct isogi_trace__feedback {
     double before, middle; /* largest change by the pass before, and 500 passes before */
     int making;      /* nodes: 1 of every other texel along each axis, 2 of the others; 0 when they are made */
     size_t made, made_bricks; /* of the queue: bricks that are done, and to do */
-    size_t placed;   /* texels before this one know where they lie */
+    size_t placed;   /* texels before this one know where they lie; */
+    size_t settled;  /* those before this one were finished when the texture last had nothing to do */
     size_t open;     /* texels that want more samples than they have at the end of a level */
     int bounced;     /* sums over texels' hits are of a level before */
     uint64_t partial; /* samples of texels that are not finished, */
@@ -5465,7 +5468,7 @@ static void isogi_trace__group_free(isogi_trace *t) {
     f->probes_before += f->probes.count, f->diverged |= f->diverges;
     isogi_trace__set_free(t, &f->texels);
     isogi_trace__set_free(t, &f->probes);
-    f->cursor = f->probe_cursor = f->probe_end = f->probe_counted = f->placed = f->carried = f->span_count = 0;
+    f->cursor = f->probe_cursor = f->probe_end = f->probe_counted = f->placed = f->settled = f->carried = f->span_count = 0;
     f->phase = ISOGI_TRACE__AT_REST, f->unpublished = f->making = f->level = f->bounced = 0, f->partial = f->unfinished = 0;
     f->probe_part = f->most = 0;
 }
@@ -5719,6 +5722,11 @@ static isogi_result isogi_trace__nodes_make(isogi_trace *t, uint64_t limit, uint
     }
     *spent += isogi_trace__made_cost(bricks, f->texels.count - before);
     return result;
+}
+
+/* To be called before there is something to do: all nodes that there are have been finished. */
+static void isogi_trace__settle(const isogi_trace *t) {
+    if (t->feedback && !t->wanted) t->feedback->settled = t->feedback->texels.count;
 }
 
 /* All nodes are forgotten, also where the memory for a group's ran out half way. */
@@ -6273,13 +6281,24 @@ static uint64_t isogi_trace__hash_trace(const isogi_trace *t) {
     return isogi_trace__hash_volume(hash, t->scene.pyramid);
 }
 
-/* Texels to be saved. A group of full feedback is saved as a whole: what is left of it would be gathered with other probes. */
+/* Texels' nodes before this one are saved. A group of full feedback, and what a lazy texture was asked for while it had nothing to do, is
+   saved as a whole: what is left of it would be gathered with other probes. */
+static size_t isogi_trace__settled_nodes(const isogi_trace *t) {
+    const isogi_trace__feedback *f = t->feedback;
+    if (!f || f->phase == ISOGI_TRACE__FORGET || (t->scene.desc.lazy && !t->wanted)) return SIZE_MAX;
+    return t->scene.desc.lazy ? f->settled : 0;
+}
+
+/* Texels to be saved: those that are done, but for nodes that are not settled, unless their light was loaded. */
 static uint64_t isogi_trace__done_texels(const isogi_trace *t, const isogi_trace__brick *brick) {
+    const size_t settled = isogi_trace__settled_nodes(t);
     uint64_t done = 0;
     uint32_t slot;
-    if (brick && brick->node && !t->scene.desc.lazy && t->feedback->phase != ISOGI_TRACE__FORGET) return 0;
-    for (slot = 0; brick && slot < ISOGI_TRACE__TEXELS; slot++)
-        done |= (uint64_t)(brick->state[slot] == ISOGI_TRACE__DONE) << slot;
+    for (slot = 0; brick && slot < ISOGI_TRACE__TEXELS; slot++) {
+        const size_t node = brick->node ? brick->node[slot] : 0;
+        if (brick->state[slot] != ISOGI_TRACE__DONE) continue;
+        done |= (uint64_t)(node <= settled || isogi_trace__stage_at(&t->feedback->texels, node - 1)->finished == 2) << slot;
+    }
     return done;
 }
 
@@ -6707,6 +6726,7 @@ static void isogi_trace__change_commit(isogi_trace__change *c) {
     uint32_t slot;
     if (begin) isogi_trace__feedback_reset(t);
     if (c->desc && c->all) isogi_trace__drop_fine(t);
+    isogi_trace__settle(t);
     t->wanted = t->done = 0;
     for (place = 0; place < t->brick_count; place++) {
         const size_t i = isogi_trace__in_order(t, place);

@@ -440,6 +440,42 @@ TEST(feedback_resumes_to_the_same_bits) {
     scene_free(&s);
 }
 
+/* Lazy and adaptive: some texels are finished while others, which share their probes, are not. What one request asked for is saved when
+   all of it is finished, and nothing of it before; what was finished before the next request stays in the block. */
+TEST(lazy_feedback_resumes_to_the_same_bits) {
+    double q[2] = {0.5, 2.5};
+    scene s = scene_make(16, 16, 16, NULL, gyroid_in_air, q);
+    float points[60][3];
+    int n = surface_points(&s, 0, 60, 1, points), apart = 0;
+    isogi_trace_desc d = store_desc(&s, ISOGI_TRACE_IRRADIANCE, 0, 64);
+    d.method = ISOGI_TRACE_FEEDBACK, d.bounces = 2, d.error = 0.05f, d.lazy = 1;
+    for (uint64_t rays = 1000; rays < 20000; rays += 4000) {
+        isogi_trace *t[2] = {NULL, NULL};
+        uint8_t *block[4];
+        size_t bytes[4];
+        isogi_trace_report report;
+        double remaining = 1;
+        int open = 0;
+        for (int k = 0; k < 2; k++) CHECK(isogi_trace_create(&t[k], &d, NULL) == ISOGI_OK, "%d rays", (int)rays);
+        isogi_trace_request(t[0], (const float(*)[3])points, (size_t)n / 2), isogi_trace_step(t[0], rays, &remaining);
+        for (size_t i = 0; i < 16 * 16 * 16; i++) open += isogi_trace_wanted(t[0], (size_t[3]){i % 16, i / 16 % 16, i / 256});
+        block[0] = save_now(t[0], &bytes[0]);
+        CHECK(isogi_trace_load(t[1], block[0], bytes[0]) == ISOGI_OK, "%d rays", (int)rays);
+        isogi_trace_request(t[1], (const float(*)[3])points, (size_t)n / 2);
+        for (int k = 0; k < 2; k++) isogi_trace_step(t[k], 0, NULL), block[1 + k] = save_now(t[k], &bytes[1 + k]);
+        CHECK(bytes[1] == bytes[2] && !memcmp(block[1], block[2], bytes[1]), "%d rays: %d and %d bytes", (int)rays, (int)bytes[1],
+              (int)bytes[2]);
+        isogi_trace_status(t[0], &report), apart += open > 0 && open < (int)report.texels / 2;
+        isogi_trace_request(t[0], (const float(*)[3])points, (size_t)n), isogi_trace_step(t[0], rays, &remaining);
+        block[3] = save_now(t[0], &bytes[3]);
+        CHECK(remaining <= 0 || bytes[3] == bytes[1], "%d rays: %d, then %d bytes", (int)rays, (int)bytes[1], (int)bytes[3]);
+        for (int k = 0; k < 4; k++) free(block[k]);
+        isogi_trace_free(t[0]), isogi_trace_free(t[1]);
+    }
+    CHECK(apart, "%d times some were finished and others not", apart);
+    scene_free(&s);
+}
+
 /* Feedback at work, whose texels get a block that holds them all: each counts once, they keep the block's light, and nothing is left to do,
    be it loaded before the first block of samples, within one or after one; what is asked for later is baked as ever. */
 TEST(feedback_at_work_takes_a_block) {
