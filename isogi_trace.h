@@ -4097,7 +4097,8 @@ static uint32_t isogi_trace__block(const isogi_trace *t, int level) {
 
 /* Samples of a node are one stretch of a Sobol sequence. Texels near each other share its scramble, and each turns it (Cranley and
    Patterson 1976) by this much for a step along each axis, so that those around a texel, which the filter averages, are well spread
-   together: on surfaces of all directions, with 1, 2 and 4 samples, by a search at random for the least low frequencies of their sum. */
+   together: on surfaces of all directions, with 1, 2 and 4 samples, by a search at random for the least low frequencies of their sum.
+   Probes are turned by the voxels' cell in which they lie. */
 static void isogi_trace__turn(const size_t texel[3], double turn[2]) {
     static const double step[2][3] = {{0.22891, 0.49289, 0.10247}, {0.85142, 0.83062, 0.54863}};
     int a;
@@ -4387,7 +4388,12 @@ static int isogi_trace__span_site(isogi_trace__cast *c, uint32_t k) {
         memcpy(site->normal, n->normal, sizeof site->normal);
         site->key = isogi_trace__key(isogi_trace__key(seed, 2),
                                      (uint64_t)x[0] + (uint64_t)l[0] * ((uint64_t)x[1] + (uint64_t)l[1] * (uint64_t)x[2]));
-        c->sequence[k] = isogi_trace__key(isogi_trace__key(seed, 3), isogi_trace__turned_key(x));
+        c->sequence[k] = isogi_trace__key(isogi_trace__key(seed, 6), isogi_trace__turned_key(x));
+        isogi_trace__turn(x, c->turn[k]);
+    } else if (n->key == n->cell) { /* the first probe of its cell: turned like a texel, since hits of one texel read many of a wall */
+        const size_t x[3] = {n->place.cell[0], n->place.cell[1], n->place.cell[2]};
+        site->key = isogi_trace__key(isogi_trace__key(seed, 4), n->key);
+        c->sequence[k] = isogi_trace__key(isogi_trace__key(seed, 5), isogi_trace__turned_key(x));
         isogi_trace__turn(x, c->turn[k]);
     } else site->key = c->sequence[k] = isogi_trace__key(isogi_trace__key(seed, 4), n->key), c->turn[k][0] = c->turn[k][1] = 0;
     site->place = n->place, site->isovalue = n->isovalue, site->from = n->from;

@@ -4,7 +4,8 @@
 
 #include "reference_ray.h"
 
-typedef struct quick_truth { int side, decided; } quick_truth;
+/* t: between which the hit lies; the field has one root there. */
+typedef struct quick_truth { int side, decided; double t[2]; } quick_truth;
 
 /* Side of a face of the cell as a whole: 1 inside, 0 outside, -1 both. axis < 0: none. */
 static int face_side(const double c[8], int axis, int upper) {
@@ -15,10 +16,11 @@ static int face_side(const double c[8], int axis, int upper) {
     return inside == 4 ? 1 : inside == 0 ? 0 : -1;
 }
 
-/* Change of side along one cell: 1 with *inside turned, 0, or -1: too near to say. Values are compared with the tolerance, except at
-   the exit through a face whose corners agree. */
-static int quick_cell(const double c[8], const double from[3], const double to[3], int exit_side, double tolerance, int *inside) {
-    double v[4], k1, k2, k3, disc, at[3];
+/* Change of side along one cell: 1 with *inside turned and the part of the way in which that is, 0, or -1: too near to say. Values are
+   compared with the tolerance, except at the exit through a face whose corners agree. */
+static int quick_cell(const double c[8], const double from[3], const double to[3], int exit_side, double tolerance, int *inside,
+                      double part[2]) {
+    double v[4], k1, k2, k3, disc, at[3], turn[4] = {0, 1, 1, 1};
     int n = 0;
     for (int j = 0; j < 4; j++) {
         double p[3], f[4];
@@ -38,13 +40,13 @@ static int quick_cell(const double c[8], const double from[3], const double to[3
         const double r[2] = {k3 != 0 ? q / (3 * k3) : 2, q != 0 ? k1 / q : 2};
         for (int i = 0; i < 2; i++) { /* in order */
             const double x = (r[0] < r[1]) == (i == 0) ? r[0] : r[1];
-            if (x > 0 && x < 1) at[n++] = v[0] + x * (k1 + x * (k2 + x * k3));
+            if (x > 0 && x < 1) turn[n + 1] = x, at[n++] = v[0] + x * (k1 + x * (k2 + x * k3));
         }
     }
-    at[n++] = exit_side < 0 ? v[3] : exit_side ? 2 * tolerance : -2 * tolerance;
+    turn[n + 1] = 1, at[n++] = exit_side < 0 ? v[3] : exit_side ? 2 * tolerance : -2 * tolerance;
     for (int i = 0; i < n; i++) {
         if (fabs(at[i]) <= tolerance) return -1;
-        if ((at[i] >= 0) != *inside) return *inside = !*inside, 1;
+        if ((at[i] >= 0) != *inside) return *inside = !*inside, part[0] = turn[i], part[1] = turn[i + 1], 1;
     }
     return 0;
 }
@@ -52,7 +54,7 @@ static int quick_cell(const double c[8], const double from[3], const double to[3
 /* origin, dir in grid coordinates; tmax 0: none. The field's tolerance must cover the rounding of places and values in double. */
 static quick_truth quick_intersect(const reference_field *f, const double origin[3], const double dir[3], double tmin, double tmax,
                                    double isovalue) {
-    quick_truth truth = {0, 1};
+    quick_truth truth = {0, 1, {0, 0}};
     const double tolerance = (double)f->tolerance;
     double t = tmin, end = tmax > 0 ? tmax : 1e300;
     int cell[3], inside = -1, axis = -1;
@@ -69,7 +71,7 @@ static quick_truth quick_intersect(const reference_field *f, const double origin
         if (nearest < 1e-12 && cell[a] > 0 && cell[a] < f->size[a] - 2) truth.decided = 0;
     }
     while (truth.decided) {
-        double c[8], out = end, from[3], to[3];
+        double c[8], out = end, from[3], to[3], part[2];
         int below = 0, changed;
         const double *corner = f->value + cell[0] + f->size[0] * (cell[1] + f->size[1] * cell[2]);
         axis = -1;
@@ -83,16 +85,19 @@ static quick_truth quick_intersect(const reference_field *f, const double origin
             below += c[i] < 0;
         }
         if (below == 0 || below == 8) {
-            if (inside == (below == 8)) return truth.side = inside ? -1 : 1, truth;
+            if (inside == (below == 8)) return truth.side = inside ? -1 : 1, truth.t[0] = truth.t[1] = t, truth;
             inside = below == 0;
         } else {
             for (int a = 0; a < 3; a++) {
                 from[a] = fmin(fmax(origin[a] + t * dir[a] - cell[a], 0), 1),
                 to[a] = fmin(fmax(origin[a] + out * dir[a] - cell[a], 0), 1);
             }
-            changed = quick_cell(c, from, to, axis < 0 ? -1 : face_side(c, axis, dir[axis] > 0), tolerance, &inside);
+            changed = quick_cell(c, from, to, axis < 0 ? -1 : face_side(c, axis, dir[axis] > 0), tolerance, &inside, part);
             if (changed < 0) truth.decided = 0;
-            if (changed > 0) return truth.side = inside ? 1 : -1, truth;
+            if (changed > 0) {
+                for (int k = 0; k < 2; k++) truth.t[k] = t + (out - t) * part[k];
+                return truth.side = inside ? 1 : -1, truth;
+            }
         }
         if (axis < 0) break;
         cell[axis] += dir[axis] > 0 ? 1 : -1, t = out;

@@ -132,4 +132,23 @@ __attribute__((unused)) static reference_hit reference_intersect(const reference
     return hit;
 }
 
+/* Whether a hit found at t is the one that is truly at `truth`, not one behind it: within 1e-6 cells, or, where the ray grazes, not parted
+   from it by values that differ from the isovalue by more than `least`. */
+__attribute__((unused)) static int reference_same_hit(const reference_field *f, const double origin[3], const double dir[3],
+                                                      double isovalue, double t, real truth, real least) {
+    enum { PLACES = 16 };
+    real most = 0;
+    for (int a = 0; a < 3; a++) most = fmaxl(most, fabsl((real)dir[a]));
+    for (int k = 0; k <= PLACES && fabsl(truth - (real)t) * most > 1e-6L; k++) {
+        real p[3];
+        int cell[3];
+        for (int a = 0; a < 3; a++) {
+            p[a] = (real)origin[a] + (real)dir[a] * (truth + ((real)t - truth) * k / PLACES), cell[a] = (int)floorl(p[a]);
+            cell[a] = cell[a] < 0 ? 0 : cell[a] > f->size[a] - 2 ? f->size[a] - 2 : cell[a];
+        }
+        if (fabsl(reference_value(f, cell, p, (real)isovalue)) > least) return 0;
+    }
+    return 1;
+}
+
 #endif

@@ -1,5 +1,5 @@
 /* Scenes for rays, and the reference of reference_ray.h once more in 113-bit numbers where the compiler has them (else in long double):
-   from the world's ray, with cells that have no surface. For test programs that have included "isogi_vol.h" and "test.h". */
+   from the world's ray, with cells that have no surface, and exact at the isovalue itself. For test programs that have included "isogi_vol.h" and "test.h". */
 #ifndef ISOGI_REFERENCE_WIDE_H
 #define ISOGI_REFERENCE_WIDE_H
 
@@ -8,9 +8,13 @@
 #if defined(__GNUC__) && !defined(__clang__) && defined(__SIZEOF_FLOAT128__)
 __extension__ typedef __float128 wide;
 #define WIDE_BITS 113
+#define WIDE_SNAP 1e-26       /* of a cell: what is nearer to a plane of the lattice lies in it */
+#define WIDE_ROUNDING 0x1p-50 /* of what double rounds by */
 #else
 typedef long double wide;
 #define WIDE_BITS 64
+#define WIDE_SNAP 1e-14
+#define WIDE_ROUNDING 1
 #endif
 
 /* Without libquadmath, which not every processor has: a root from double by three Newton steps, for values whose square is in range. */
@@ -136,7 +140,11 @@ __attribute__((unused)) static void wide_cell(const scene *s, const wide_ray *g,
 
 __attribute__((unused)) static wide wide_at(const scene *s, const wide_ray *g, const int cell[3], wide t, double isovalue, int *finite) {
     wide p[3];
-    for (int a = 0; a < 3; a++) p[a] = g->o[a] + g->d[a] * t;
+    for (int a = 0; a < 3; a++) {
+        p[a] = g->o[a] + g->d[a] * t;
+        wide whole = wide_floor(p[a] + 0.5), off = p[a] - whole; /* at a plane of the lattice: by its voxels alone */
+        if (off < WIDE_SNAP && off > -WIDE_SNAP) p[a] = whole;
+    }
     return wide_value(s, cell, p, isovalue, finite);
 }
 
@@ -176,12 +184,19 @@ __attribute__((unused)) static int wide_turns(const wide v[4], wide c[4], wide a
     return n;
 }
 
-/* First hit by values that are beyond the tolerance; undecided if anything before it comes nearer to the isovalue than that. */
-__attribute__((unused)) static reference_hit wide_intersect(const scene *s, const isogi_ray *ray, wide tolerance) {
+/* Whether a value is inside. Nearer to zero than the tolerance it may be either, as `near` has it; zero itself is no rounded number: all
+   corners that count are at the isovalue. */
+__attribute__((unused)) static int wide_inside(wide value, wide tolerance, int near) {
+    if (value > tolerance || value < -tolerance) return value > 0;
+    return value > 0 || value < 0 ? near : 1;
+}
+
+/* First hit, if all that is within the tolerance is inside (near 1) or outside (0). */
+__attribute__((unused)) static reference_hit wide_read(const scene *s, const isogi_ray *ray, wide tolerance, int near) {
     reference_hit hit = {0, 0, 1};
     wide_ray g = to_grid(s, ray);
     wide t0 = (wide)ray->tmin, t1 = ray->tmax > 0 ? (wide)ray->tmax : (wide)1e30, t[1024], v[4], c[4], at[3];
-    int inside = -1, doubts = 0, cell[3];
+    int inside = -1, cell[3];
     for (int a = 0; a < 3; a++) {
         wide low = -g.o[a], high = (wide)(s->size[a] - 1) - g.o[a];
         if (!(g.d[a] > 0 || g.d[a] < 0)) {
@@ -199,24 +214,21 @@ __attribute__((unused)) static reference_hit wide_intersect(const scene *s, cons
         wide_cell(s, &g, t[i] + length / 2, cell);
         for (int k = 0; k < 4; k++) v[k] = wide_at(s, &g, cell, t[i] + length * (wide)k / 3, ray->isovalue, &finite);
         if (!finite) { inside = -1; continue; }
-        if (inside < 0) doubts += v[0] <= tolerance && v[0] >= -tolerance, inside = v[0] >= 0;
+        if (inside < 0) inside = wide_inside(v[0], tolerance, near);
         int turns = wide_turns(v, c, at);
-        for (int k = 0; k < turns; k++) {
-            wide value = c[0] + at[k] * (c[1] + at[k] * (c[2] + at[k] * c[3]));
-            if (value <= tolerance && value >= -tolerance) doubts++;
-            else if ((value >= 0) != inside) {
-                wide low = k ? at[k - 1] : 0, high = at[k];
-                for (int b = 0; b < 120; b++) {
-                    wide middle = (low + high) / 2;
-                    if ((c[0] + middle * (c[1] + middle * (c[2] + middle * c[3])) >= 0) == inside) low = middle;
-                    else high = middle;
-                }
-                hit.side = inside ? -1 : 1, hit.t = (real)(t[i] + low * length), hit.decided = !doubts;
-                return hit;
+        for (int k = -1; k < turns; k++) {
+            wide low = k > 0 ? at[k - 1] : 0, high = k < 0 ? 0 : at[k];
+            wide value = k < 0 ? v[0] : k == turns - 1 ? v[3] : c[0] + high * (c[1] + high * (c[2] + high * c[3]));
+            if (wide_inside(value, tolerance, near) == inside) continue;
+            for (int b = 0; b < 120; b++) {
+                wide middle = (low + high) / 2;
+                if (wide_inside(c[0] + middle * (c[1] + middle * (c[2] + middle * c[3])), tolerance, near) == inside) low = middle;
+                else high = middle;
             }
+            hit.side = inside ? -1 : 1, hit.t = (real)(t[i] + low * length);
+            return hit;
         }
     }
-    hit.decided = !doubts;
     return hit;
 }
 
@@ -227,6 +239,39 @@ __attribute__((unused)) static double rounding(const scene *s, const isogi_ray *
     double farthest = 1;
     for (int a = 0; a < 3; a++) farthest = fmax(farthest, fmax((double)s->size[a], fabs((double)g.o[a])));
     return 32 * 0x1p-53 * (s->most + fabs(ray->isovalue)) * (1 + farthest) * ROUNDING_FACTOR;
+}
+
+/* Cells along the axis that the ray passes fastest, for a step of 1 in t. */
+__attribute__((unused)) static double wide_speed(const scene *s, const isogi_ray *ray) {
+    wide_ray g = to_grid(s, ray);
+    double most = 0;
+    for (int a = 0; a < 3; a++) most = fmax(most, fabs((double)g.d[a]));
+    return most;
+}
+
+/* First hit; undecided if it depends on which side of the isovalue those values lie that wide numbers cannot tell from it. */
+__attribute__((unused)) static reference_hit wide_intersect(const scene *s, const isogi_ray *ray) {
+    const wide tolerance = (wide)rounding(s, ray) * (wide)WIDE_ROUNDING;
+    reference_hit hit = wide_read(s, ray, tolerance, 1), other = wide_read(s, ray, tolerance, 0);
+    hit.decided = hit.side == other.side && fabs((double)(hit.t - other.t)) * wide_speed(s, ray) < 1e-9;
+    return hit;
+}
+
+/* Whether a hit found at t is the one that is truly at `truth`, not one behind it: as near as double tells, or, where the ray grazes, not
+   parted from it by values that differ from the isovalue. */
+__attribute__((unused)) static int wide_same_hit(const scene *s, const isogi_ray *ray, double t, real truth) {
+    enum { PLACES = 16 };
+    wide_ray g = to_grid(s, ray);
+    double farthest = 0;
+    for (int a = 0; a < 3; a++) farthest = fmax(farthest, fabs((double)g.o[a]));
+    if (fabs((double)(truth - (real)t)) * wide_speed(s, ray) < 1e-9 + 1e-15 * farthest) return 1;
+    for (int k = 0; k <= PLACES; k++) {
+        wide at = (wide)truth + ((wide)t - (wide)truth) * k / PLACES;
+        int cell[3], finite = 1;
+        wide_cell(s, &g, at, cell);
+        if (fabs((double)wide_at(s, &g, cell, at, ray->isovalue, &finite)) > 100 * rounding(s, ray) || !finite) return 0;
+    }
+    return 1;
 }
 
 #endif

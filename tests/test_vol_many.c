@@ -117,13 +117,16 @@ static void compare_task(void *arg, size_t i) {
             quick_truth truth = crowd_truth(&s, &rays[k], 64 * tolerance);
             a->rays++;
             if (!truth.decided) {
-                reference_hit wide_truth = wide_intersect(&s, &rays[k], (wide)tolerance);
+                reference_hit wide_truth = wide_intersect(&s, &rays[k]);
                 a->wide++;
                 if (!wide_truth.decided) { a->undecided++; continue; }
-                truth.side = wide_truth.side;
+                truth.side = wide_truth.side, truth.t[0] = truth.t[1] = (double)wide_truth.t;
             }
             a->hits += truth.side != 0;
             if (hits[k].side != truth.side) a->wrong++, note(a, "side", &s, kind, path, &rays[k], &hits[k], truth.side);
+            else if (truth.side && (hits[k].t < truth.t[0] - 1e-9 || hits[k].t > truth.t[1] + 1e-9) &&
+                     !wide_same_hit(&s, &rays[k], hits[k].t, wide_intersect(&s, &rays[k]).t))
+                a->misplaced++, note(a, "another hit", &s, kind, path, &rays[k], &hits[k], truth.side);
             else if (truth.side) { /* the field at the hit is the isovalue */
                 double corner[8], value = -rays[k].isovalue;
                 const int cell[3] = {(int)hits[k].cell[0], (int)hits[k].cell[1], (int)hits[k].cell[2]};
@@ -247,7 +250,7 @@ TEST(very_many_rays_hit_like_the_reference) {
     const account sum = crowd_run(compare_task, 150000, 1e8, 12.0 * SOME);
     printf("    %ld hits, %ld looked at in %d bits, %ld undecided\n", sum.hits, sum.wide, WIDE_BITS, sum.undecided);
     CHECK(sum.wrong == 0 && sum.misplaced == 0, "%ld wrong, %ld misplaced; %s", sum.wrong, sum.misplaced, sum.first);
-    CHECK(sum.undecided * 50 < sum.rays && sum.hits * 4 > sum.rays &&
+    CHECK((WIDE_BITS == 113 ? !sum.undecided : sum.undecided * 50 < sum.rays) && sum.hits * 4 > sum.rays &&
               sum.rays > (LONG_SUITE && !getenv("ISOGI_TEST_RAYS") ? 1000000 : 100000),
           "%ld undecided, %ld hits of %ld rays", sum.undecided, sum.hits, sum.rays);
 }
