@@ -1,5 +1,6 @@
 /* Scenes for rays, and the reference of reference_ray.h once more in 113-bit numbers where the compiler has them (else in long double):
-   from the world's ray, with cells that have no surface, and exact at the isovalue itself. For test programs that have included "isogi_vol.h" and "test.h". */
+   from the world's ray, with cells that have no surface, and exact at the isovalue itself. For test programs that have included
+   "isogi_vol.h" and "test.h". */
 #ifndef ISOGI_REFERENCE_WIDE_H
 #define ISOGI_REFERENCE_WIDE_H
 
