@@ -1961,7 +1961,7 @@ ISOGI_VOL__COLD static void isogi_vol__set_ways(struct isogi_vol__ways *ways, co
 
 ISOGI_VOL__COLD static isogi_result isogi_vol__reserve_nodes(isogi_pyramid *p) {
     p->node_count = isogi_vol__plan_node_levels(p);
-    if (p->path == ISOGI_VOL__PATH_AVX512 && !p->ways) {
+    if (p->path >= ISOGI_VOL__PATH_AVX2 && !p->ways) {
         p->ways = (struct isogi_vol__ways *)isogi_allocate(&p->context, 1, sizeof *p->ways);
         if (!p->ways) return ISOGI_NO_MEMORY;
         isogi_vol__set_ways(p->ways, p->node_level, p->node_levels);
@@ -4689,100 +4689,446 @@ static int isogi_vol__mixed_cell(isogi_vol__walk *w, int x, int y, int z, int in
     return isogi_vol__visit_cell(w, isogi_vol__max(out, w->t), axis, hit);
 }
 
-/* What the loops over children share. */
-typedef struct isogi_vol__stride {
-    isogi_vol__walk *w;
-    const isogi_vol__ticks *k;
-    isogi_hit *hit;
+/* ---- rides ---- */
+
+/* By steps from child to child, for any machine: as ticks have it. */
+typedef struct isogi_vol__steps {
+    isogi_vol__ticks ticks;
+    isogi_vol__place place[4]; /* among the children of each level; 3: in the grid of the largest nodes */
+    uint64_t mask[3];          /* of these children, those that can hold the surface */
+    int node[4][3];            /* the nodes' coordinates; 3: in the grid, counted backwards where the ray falls */
     int64_t now;
-    int axis; /* the one last crossed */
+    double tick; /* in units of t */
+    int axis;    /* the one last crossed */
+} isogi_vol__steps;
+
+/* By masks of children, with AVX2: as one ray alone goes with AVX-512, see there. */
+typedef struct isogi_vol__trip {
+    double origin[4], inverse[4];                    /* as in a pool; the fourth is 0 */
+    double lead[4];                                  /* 1 on axes along which the ray falls, else 0 */
+    double stop;                                     /* where the ray ends, as in a pool */
+    float cell[3], enter[ISOGI_VOL__NODE_LEVELS][3]; /* as in a course */
+    float last, level, reach;                        /* likewise; the isovalue in 8 bits; what children are widened by on each side */
+    int flip, octant, low, high, entry_axis, in, out;
+    const uint8_t *children[ISOGI_VOL__NODE_LEVELS];     /* of the node of each level, */
+    uint64_t left[ISOGI_VOL__NODE_LEVELS], cells;        /* those still to come, in the ray's order; of the leaf */
+    int32_t place[ISOGI_VOL__NODE_LEVELS][4], child;     /* the nodes' coordinates; the last one's number in its parent */
+    unsigned pending;                                    /* levels that have any left */
+} isogi_vol__trip;
+
+/* A ray on its way from node to node, which can be left where it is going to read memory, and taken up again. */
+typedef struct isogi_vol__ride {
+    isogi_vol__walk walk;
+    const uint8_t *open; /* the node that is to be opened next, or NULL */
     isogi_vol__leaf leaf;
-} isogi_vol__stride;
+    int looked;     /* the present cell is in doubt, and its voxels are sent for */
+    size_t number;  /* the ray's in its batch, */
+    uint32_t flags; /* and its flags */
+    int at;         /* level of the node among whose children it is: level n has children of 4^n cells */
+    union {
+        isogi_vol__steps steps;
+        isogi_vol__trip trip;
+    } by;
+} isogi_vol__ride;
 
-/* Walks the children of node (x, y, z) of a level: cells of level 0, nodes of the level below else. `from` stands on the node.
-   1: hit; 2: the segment has ended; 0: go on. */
-#define ISOGI_VOL__WALK(NAME, TARGET, LEVEL, MASK, CHILD) \
-    TARGET ISOGI_VOL__INLINE int NAME(isogi_vol__stride *s, const isogi_vol__place *from, int x, int y, int z) {                          \
-        const isogi_pyramid *p = s->w->pyramid;                                                                                    \
-        const size_t node = isogi_vol__node_at(p, LEVEL, (size_t)x, (size_t)y, (size_t)z);                                         \
-        const uint64_t mask = MASK(p->nodes[node]);                                                                                \
-        const uint32_t flip = s->k->flip;                                                                                          \
-        const int64_t end = s->k->end;                                                                                             \
-        isogi_vol__place place;                                                                                                    \
-        s->w->count.blocks++;                                                                                                      \
-        if (!mask) {                                                                                                               \
-            s->w->deflate = 0;                                                                                                     \
-            return 0;                                                                                                              \
-        }                                                                                                                          \
-        place = isogi_vol__descend(from, s->now);                                                                                  \
-        do {                                                                                                                       \
-            const uint32_t child = place.state ^ flip;                                                                             \
-            if (mask >> (child & 63) & 1) {                                                                                        \
-                const int result = CHILD(s, &place, 4 * x + (int)(child & 3), 4 * y + (int)(child >> 2 & 3), \
-                    4 * z + (int)(child >> 4 & 3)); \
-                if (result) return result;                                                                                         \
-            } else s->w->deflate = 0;                                                                                              \
-            s->now = isogi_vol__step(&place, &s->axis);                                                                            \
-            if (s->now >= end) return 2;                                                                                           \
-        } while (!(place.state & ISOGI_VOL__LEFT));                                                                                \
-        return 0;                                                                                                                  \
+/* Sends for a node. */
+ISOGI_VOL__INLINE void isogi_vol__ride_to(isogi_vol__ride *r, const uint8_t *node) {
+    r->open = node;
+    ISOGI_VOL__PREFETCH(node);
+    ISOGI_VOL__PREFETCH(node + 64);
+}
+
+/* Sends for the voxels of a cell. */
+ISOGI_VOL__INLINE void isogi_vol__ride_to_cell(isogi_vol__ride *r, int x, int y, int z) {
+    const isogi_volume *v = &r->walk.pyramid->volume;
+    const char *at = (const char *)v->data + x * v->stride[0] + y * v->stride[1] + z * v->stride[2];
+    r->looked = 1;
+    ISOGI_VOL__PREFETCH(at);
+    ISOGI_VOL__PREFETCH(at + v->stride[1]);
+    ISOGI_VOL__PREFETCH(at + v->stride[2]);
+    ISOGI_VOL__PREFETCH(at + v->stride[1] + v->stride[2]);
+}
+
+/* What is certain of the ray in a cell by the hull of Bernstein coefficients in float, from the leaf's voxels: 1: it stays on its side all
+   along; 2: it does not, and any hit will do; 0: nothing. f: values where by each axis (a bit) it enters the cell, 0, or leaves it, 1. */
+ISOGI_VOL__INLINE int isogi_vol__told(isogi_vol__walk *w, const isogi_vol__leaf *leaf, const float f[8]) {
+    const float high = leaf->isovalue + ISOGI_VOL__DOUBT, low = leaf->isovalue - ISOGI_VOL__DOUBT;
+    const float sum1 = f[1] + f[2] + f[4], sum2 = f[3] + f[5] + f[6]; /* three coefficients each */
+    const int in = (f[0] > high) & (f[7] > high) & (sum1 > 3 * high) & (sum2 > 3 * high);
+    const int out = (f[0] < low) & (f[7] < low) & (sum1 < 3 * low) & (sum2 < 3 * low);
+    if (w->inside < 0) w->inside = in ? 1 : out ? 0 : -1;
+    if (w->inside > 0 ? in : out) return 1;
+    return !w->exact && (w->inside > 0 ? f[7] < low : !w->inside && f[7] > high) ? 2 : 0;
+}
+
+/* ---- by steps ---- */
+
+/* Sets it up, among the nodes of the grid; 0: it has to be walked plainly. */
+static int isogi_vol__ride_set_steps(isogi_vol__ride *r) {
+    isogi_vol__steps *s = &r->by.steps;
+    isogi_vol__place *top = &s->place[3];
+    int64_t next[3];
+    int a;
+    if (!isogi_vol__set_ticks(&s->ticks, &r->walk)) return 0;
+    for (a = 0; a < 3; a++)
+        s->node[3][a] = s->ticks.first[a] >> 6, next[a] = s->ticks.at[a] + (int64_t)(64 * s->node[3][a] + 64) * s->ticks.per[a];
+    top->x = next[0], top->y = next[1], top->z = next[2], top->state = 0;
+    top->dx = s->ticks.per[0] << 6, top->dy = s->ticks.per[1] << 6, top->dz = s->ticks.per[2] << 6;
+    s->now = 0, s->axis = r->walk.entry_axis, s->tick = r->walk.end / ISOGI_VOL__TICKS;
+    r->at = 3, r->open = NULL;
+    return 1;
+}
+
+/* What is told of a cell; begin, end: when the ray enters it and leaves it. */
+static int isogi_vol__cell_told(isogi_vol__walk *w, const isogi_vol__leaf *leaf, const int cell[3], double begin, double end) {
+    const uint8_t *code = leaf->code + (cell[0] & 3) + 5 * (cell[1] & 3) + 25 * (cell[2] & 3);
+    float from[3], to[3], x[2][4], y[2][2], f[8];
+    int a, e, k;
+    for (a = 0; a < 3; a++) {
+        const double at = w->origin[a] - cell[a];
+        from[a] = (float)isogi_vol__clamp(at + begin * w->dir[a], 1), to[a] = (float)isogi_vol__clamp(at + end * w->dir[a], 1);
     }
-
-#define ISOGI_VOL__WALK_CELL(NAME, TARGET, CELL)                                                                                    \
-    TARGET ISOGI_VOL__INLINE int NAME(isogi_vol__stride *s, const isogi_vol__place *from, int x, int y, int z) {                   \
-        isogi_vol__place after = *from;                                                                                            \
-        int out;                                                                                                                   \
-        const int64_t t = isogi_vol__step(&after, &out);                                                                           \
-        return CELL(s->w, x, y, z, s->axis, t <= s->k->end ? out : -1, s->hit);                                                    \
+    for (k = 0; k < 4; k++) {
+        const uint8_t *pair = code + 5 * (k & 1) + 25 * (k >> 1);
+        const float low = pair[0], rise = (float)pair[1] - low;
+        x[0][k] = low + from[0] * rise, x[1][k] = low + to[0] * rise;
     }
-
-/* The fast counterpart of walk_on for a walk with planes. */
-#define ISOGI_VOL__WALK_TOP(NAME, TARGET, LARGE)                                                                                    \
-    TARGET static int NAME(isogi_vol__walk *w, const isogi_vol__ticks *k, isogi_hit *hit) {                                        \
-        isogi_vol__place place;                                                                                                    \
-        isogi_vol__stride s;                                                                                                       \
-        int base[3], a, result, axis;                                                                                              \
-        int64_t next[3];                                                                                                           \
-        s.w = w, s.k = k, s.hit = hit, s.now = 0, s.axis = w->entry_axis;                                                          \
-        for (a = 0; a < 3; a++) base[a] = k->first[a] >> 6, next[a] = k->at[a] + (int64_t)(64 * base[a] + 64) * k->per[a];         \
-        place.dx = k->per[0] << 6, place.dy = k->per[1] << 6, place.dz = k->per[2] << 6, place.state = 0;                          \
-        for (;;) {                                                                                                                 \
-            axis = next[1] < next[0];                                                                                              \
-            if (next[2] < next[axis]) axis = 2;                                                                                    \
-            place.x = next[0], place.y = next[1], place.z = next[2];                                                               \
-            result = LARGE(&s, &place, k->mirror[0] ? (k->mirror[0] >> 6) - base[0] : base[0],                                     \
-                           k->mirror[1] ? (k->mirror[1] >> 6) - base[1] : base[1], \
-                               k->mirror[2] ? (k->mirror[2] >> 6) - base[2] : base[2]); \
-            if (result) return result == 1;                                                                                        \
-            s.now = next[axis], s.axis = axis;                                                                                     \
-            if (s.now >= k->end) return 0;                                                                                         \
-            next[axis] += k->per[axis] << 6;                                                                                       \
-            base[axis]++;                                                                                                          \
-        }                                                                                                                          \
+    for (e = 0; e < 2; e++) {
+        for (k = 0; k < 2; k++) {
+            const float low = x[e][2 * k], rise = x[e][2 * k + 1] - low;
+            y[0][k] = low + from[1] * rise, y[1][k] = low + to[1] * rise;
+        }
+        for (k = 0; k < 2; k++)
+            f[e + 2 * k] = y[k][0] + from[2] * (y[k][1] - y[k][0]), f[e + 2 * k + 4] = y[k][0] + to[2] * (y[k][1] - y[k][0]);
     }
+    return isogi_vol__told(w, leaf, f);
+}
 
-#define ISOGI_VOL__WALKS(SUFFIX, TARGET, MASK, LEAF_MASK, CELL)                                                                     \
-    ISOGI_VOL__WALK_CELL(isogi_vol__walk_cell##SUFFIX, TARGET, CELL)                                                               \
-    ISOGI_VOL__WALK(isogi_vol__walk_leaf##SUFFIX, TARGET, 0, LEAF_MASK, isogi_vol__walk_cell##SUFFIX)                              \
-    ISOGI_VOL__WALK(isogi_vol__walk_small##SUFFIX, TARGET, 1, MASK, isogi_vol__walk_leaf##SUFFIX)                                  \
-    ISOGI_VOL__WALK(isogi_vol__walk_large##SUFFIX, TARGET, 2, MASK, isogi_vol__walk_small##SUFFIX)                                 \
-    ISOGI_VOL__WALK_TOP(isogi_vol__walk_fast##SUFFIX, TARGET, isogi_vol__walk_large##SUFFIX)
+/* To the next child, up to where there is one; 0: the segment has ended. */
+static int isogi_vol__ride_step(isogi_vol__ride *r) {
+    isogi_vol__steps *s = &r->by.steps;
+    for (;; r->at++) {
+        s->now = isogi_vol__step(&s->place[r->at], &s->axis);
+        if (s->now >= s->ticks.end) return 0;
+        if (r->at == 3) s->node[3][s->axis]++;
+        if (r->at == 3 || !(s->place[r->at].state & ISOGI_VOL__LEFT)) return 1;
+    }
+}
 
-#define ISOGI_VOL__NODE_BASE(node) isogi_vol__node_mask(node, s->k->low, s->k->high)
-#define ISOGI_VOL__LEAF_BASE(node) isogi_vol__leaf_mask(node, s->k->level, &s->leaf)
-#define ISOGI_VOL__NODE_AVX2(node) isogi_vol__node_mask_avx2(node, s->k->low, s->k->high)
-#define ISOGI_VOL__LEAF_AVX2(node) isogi_vol__leaf_mask_avx2(node, s->k->level, &s->leaf)
-ISOGI_VOL__WALKS(_base, , ISOGI_VOL__NODE_BASE, ISOGI_VOL__LEAF_BASE, isogi_vol__mixed_cell)
+/* Into the child at which the ray is. */
+static void isogi_vol__ride_down(isogi_vol__ride *r) {
+    const isogi_pyramid *p = r->walk.pyramid;
+    isogi_vol__steps *s = &r->by.steps;
+    const int n = --r->at;
+    const uint32_t child = s->place[n + 1].state ^ s->ticks.flip;
+    int *to = s->node[n], a;
+    for (a = 0; a < 3; a++) {
+        if (n < 2) to[a] = 4 * s->node[n + 1][a] + (int)(child >> 2 * a & 3);
+        else to[a] = s->ticks.mirror[a] ? (s->ticks.mirror[a] >> 6) - s->node[3][a] : s->node[3][a];
+    }
+    isogi_vol__ride_to(r, p->nodes[isogi_vol__node_at(p, n, (size_t)to[0], (size_t)to[1], (size_t)to[2])]);
+}
+
+/* Opens the node that was sent for; 0: it has no child that can hold the surface. */
+static int isogi_vol__ride_open(isogi_vol__ride *r) {
+    isogi_vol__steps *s = &r->by.steps;
+    const isogi_vol__ticks *k = &s->ticks;
+    const int n = r->at;
+    const uint64_t mask = n ? isogi_vol__node_mask(r->open, k->low, k->high) : isogi_vol__leaf_mask(r->open, k->level, &r->leaf);
+    r->walk.count.blocks++, r->open = NULL;
+    s->mask[n] = mask;
+    if (mask) s->place[n] = isogi_vol__descend(&s->place[n + 1], s->now);
+    else r->walk.deflate = 0, r->at++;
+    return mask != 0;
+}
+
+/* The cell at which the ray is: 1: hit; 0: none; -1: its voxels are sent for. */
+static int isogi_vol__ride_cell(isogi_vol__ride *r, isogi_hit *hit) {
+    const isogi_vol__steps *s = &r->by.steps;
+    const uint32_t child = s->place[0].state ^ s->ticks.flip;
+    isogi_vol__walk *w = &r->walk;
+    isogi_vol__place after = s->place[0];
+    int axis, told, cell[3], a;
+    const int64_t end = isogi_vol__step(&after, &axis);
+    for (a = 0; a < 3; a++) cell[a] = 4 * s->node[0][a] + (int)(child >> 2 * a & 3);
+    if (!r->looked) {
+        const double ends = isogi_vol__min((double)end * s->tick, w->end);
+        told = w->deflate ? 0 : isogi_vol__cell_told(w, &r->leaf, cell, (double)s->now * s->tick, ends);
+        w->count.cells += told != 0;
+        if (told) return told > 1;
+        isogi_vol__ride_to_cell(r, cell[0], cell[1], cell[2]);
+        return -1;
+    }
+    r->looked = 0;
+    return isogi_vol__mixed_cell(w, cell[0], cell[1], cell[2], s->axis, end <= s->ticks.end ? axis : -1, hit);
+}
+
+/* Goes on to the first hit: 1, or to the end: 0. waits: to where memory is to be read next, which is sent for: -1. */
+static int isogi_vol__ride_steps(isogi_vol__ride *r, int waits, isogi_hit *hit) {
+    const isogi_vol__steps *s = &r->by.steps;
+    if (s->ticks.low > s->ticks.high) return 0;
+    for (;;) {
+        if (r->open && !isogi_vol__ride_open(r)) {
+            if (!isogi_vol__ride_step(r)) return 0;
+        } else if (r->at == 3 || (r->at && s->mask[r->at] >> ((s->place[r->at].state ^ s->ticks.flip) & 63) & 1)) {
+            isogi_vol__ride_down(r);
+            if (waits) return -1;
+        } else {
+            int found = 0;
+            if (r->at || !(s->mask[0] >> ((s->place[0].state ^ s->ticks.flip) & 63) & 1)) r->walk.deflate = 0;
+            else found = isogi_vol__ride_cell(r, hit);
+            if (found > 0) return 1;
+            if (found < 0 && waits) return -1;
+            if (!found && !isogi_vol__ride_step(r)) return 0;
+        }
+    }
+}
+
+/* ---- by masks ---- */
+
 #ifdef ISOGI_VOL__AVX
-ISOGI_VOL__WALKS(_avx2, ISOGI_VOL__TARGET("avx2"), ISOGI_VOL__NODE_AVX2, ISOGI_VOL__LEAF_AVX2, isogi_vol__mixed_cell_avx2)
+
+/* Sets it up; 0: it has to be walked plainly. */
+ISOGI_VOL__TARGET("avx2") static int isogi_vol__ride_set_trip(isogi_vol__ride *r) {
+    const isogi_vol__walk *w = &r->walk;
+    const isogi_pyramid *p = w->pyramid;
+    isogi_vol__trip *c = &r->by.trip;
+    const int top = p->node_levels - 1;
+    const __m256d zero = _mm256_setzero_pd(), minus = _mm256_set1_pd(-0.0), origin = _mm256_loadu_pd(w->origin);
+    const __m256d dir = _mm256_loadu_pd(w->dir), first3 = _mm256_castsi256_pd(_mm256_setr_epi64x(-1, -1, -1, 0));
+    const __m256d still = _mm256_and_pd(_mm256_cmp_pd(dir, zero, _CMP_EQ_OQ), first3);
+    /* a ray that stands still keeps below the upper border */
+    const __m256d beyond = _mm256_and_pd(still, _mm256_cmp_pd(origin, _mm256_loadu_pd(p->box), _CMP_GE_OQ));
+    const __m256d fall = _mm256_and_pd(_mm256_or_pd(_mm256_cmp_pd(dir, zero, _CMP_LT_OQ), beyond), first3);
+    const __m256d huge = _mm256_or_pd(_mm256_set1_pd(1e200), _mm256_and_pd(fall, minus));
+    const __m256d inverse = _mm256_blendv_pd(_mm256_loadu_pd(w->inverse), huge, still), size = _mm256_andnot_pd(minus, dir);
+    const __m256d start = _mm256_blendv_pd(origin, _mm256_sub_pd(_mm256_set1_pd(4 << 2 * top), origin), fall); /* counted like cells */
+    const __m256d pairs = _mm256_max_pd(size, _mm256_permute2f128_pd(size, size, 1));
+    const __m256d most = _mm256_max_pd(pairs, _mm256_permute_pd(pairs, 5));
+    const __m256d pace = _mm256_min_pd(_mm256_mul_pd(_mm256_andnot_pd(minus, inverse), most), _mm256_set1_pd(1e30));
+    float per[4], at[4];
+    uint64_t bits;
+    int a;
+    if (!(w->end > 1e-150) || !(w->end < 1e150)) return 0;
+    _mm_storeu_ps(per, _mm256_cvtpd_ps(pace)), _mm_storeu_ps(at, _mm256_cvtpd_ps(start));
+    c->level = isogi_vol__quantise_isovalue(p, w->isovalue, &c->low, &c->high), c->reach = 2 * ISOGI_VOL__NEAR(p->node_levels);
+    c->octant = _mm256_movemask_pd(fall), c->flip = (c->octant & 1 ? 3 : 0) | (c->octant & 2 ? 12 : 0) | (c->octant & 4 ? 48 : 0);
+    memcpy(&bits, &w->end, sizeof bits), bits |= 3, memcpy(&c->stop, &bits, sizeof bits);
+    _mm256_storeu_pd(c->origin, origin), _mm256_storeu_pd(c->inverse, inverse);
+    _mm256_storeu_pd(c->lead, _mm256_and_pd(fall, _mm256_set1_pd(1)));
+    for (a = 0; a < 3; a++) c->cell[a] = per[a], c->enter[top][a] = (-c->reach - at[a]) * per[a];
+    memset(c->place[top], 0, sizeof c->place[top]);
+    c->last = (float)(isogi_vol__min(w->end * _mm256_cvtsd_f64(most), 1e30) * 1.000001);
+    c->entry_axis = w->entry_axis, c->child = 0, c->pending = 0, c->cells = 0;
+    r->at = top, r->looked = 0;
+    isogi_vol__ride_to(r, p->nodes[p->node_level[top].first]);
+    return 1;
+}
+
+/* Which layers of two axes, a + 4 b, the ray is in at once. */
+ISOGI_VOL__TARGET("avx2") ISOGI_VOL__INLINE uint64_t isogi_vol__layers_met(__m128 in_a, __m128 out_a, __m128 in_b, __m128 out_b) {
+    const __m256i first = _mm256_setr_epi32(0, 0, 0, 0, 1, 1, 1, 1), second = _mm256_setr_epi32(2, 2, 2, 2, 3, 3, 3, 3);
+    const __m256 in = _mm256_insertf128_ps(_mm256_castps128_ps256(in_a), in_a, 1);
+    const __m256 out = _mm256_insertf128_ps(_mm256_castps128_ps256(out_a), out_a, 1);
+    const __m256 in_row = _mm256_castps128_ps256(in_b), out_row = _mm256_castps128_ps256(out_b);
+#define ISOGI_VOL__MET(which) \
+    (unsigned)_mm256_movemask_ps(_mm256_and_ps(_mm256_cmp_ps(in, _mm256_permutevar8x32_ps(out_row, which), _CMP_LE_OQ), \
+                                               _mm256_cmp_ps(_mm256_permutevar8x32_ps(in_row, which), out, _CMP_LE_OQ)))
+    return ISOGI_VOL__MET(first) | ISOGI_VOL__MET(second) << 8;
+#undef ISOGI_VOL__MET
+}
+
+/* Bits 0..15: every fourth of 64, in groups of four that are 16 apart. */
+ISOGI_VOL__INLINE uint64_t isogi_vol__spread_rows(uint64_t x) {
+    x = (x | x << 24) & 0x000000ff000000ffu;
+    return (x | x << 12) & 0x000f000f000f000fu;
+}
+
+/* Which children of a node the ray passes or comes near, in its own order. */
+ISOGI_VOL__TARGET("avx2") ISOGI_VOL__INLINE uint64_t isogi_vol__way_avx2(isogi_vol__trip *c, const struct isogi_vol__ways *ways, int n,
+                                                                           int child) {
+    const __m128 last = _mm_set1_ps(c->last);
+    const float size = ways->size[n], wide = size + 2 * c->reach;
+    __m128 in[3], out[3];
+    uint64_t xy, xz, yz;
+    int a;
+#pragma GCC unroll 4
+    for (a = 0; a < 3; a++) {
+        const __m128 layer = _mm_loadu_ps(ways->within[child] + 4 * a), step = _mm_set1_ps(c->cell[a] * size);
+        const __m128 times = _mm_add_ps(_mm_set1_ps(c->enter[n][a]), _mm_mul_ps(layer, step));
+        in[a] = _mm_max_ps(times, _mm_setzero_ps()), out[a] = _mm_min_ps(_mm_add_ps(times, _mm_set1_ps(c->cell[a] * wide)), last);
+        if (n) c->enter[n - 1][a] = _mm_cvtss_f32(times);
+    }
+    xy = isogi_vol__layers_met(in[0], out[0], in[1], out[1]), xz = isogi_vol__layers_met(in[0], out[0], in[2], out[2]);
+    yz = isogi_vol__spread_rows(isogi_vol__layers_met(in[1], out[1], in[2], out[2]));
+    yz = (yz | yz << 6) & 0x0303030303030303u, yz = (yz | yz << 3) & 0x1111111111111111u;
+    return xy * 0x0001000100010001u & isogi_vol__spread_rows(xz) * 0x1111u & yz * 15;
+}
+
+/* Children counted backwards along the axes of `octant`. */
+ISOGI_VOL__INLINE uint64_t isogi_vol__turn_mask(uint64_t m, int octant) {
+    if (octant & 1) {
+        m = (m >> 1 & 0x5555555555555555u) | (m & 0x5555555555555555u) << 1;
+        m = (m >> 2 & 0x3333333333333333u) | (m & 0x3333333333333333u) << 2;
+    }
+    if (octant & 2) {
+        m = (m >> 4 & 0x0f0f0f0f0f0f0f0fu) | (m & 0x0f0f0f0f0f0f0f0fu) << 4;
+        m = (m >> 8 & 0x00ff00ff00ff00ffu) | (m & 0x00ff00ff00ff00ffu) << 8;
+    }
+    if (octant & 4) {
+        m = (m >> 16 & 0x0000ffff0000ffffu) | (m & 0x0000ffff0000ffffu) << 16;
+        m = m >> 32 | m << 32;
+    }
+    return m;
+}
+
+/* Whether the ray passes a cell as pools have it, when it enters and leaves it, and by which axes; 3: none. */
+ISOGI_VOL__TARGET("avx2")
+ISOGI_VOL__INLINE int isogi_vol__passes_avx2(isogi_vol__trip *c, __m128i cell, double *begin, double *end) {
+    const __m256d at = _mm256_cvtepi32_pd(cell), zero = _mm256_setzero_pd();
+    const __m256d lead = _mm256_loadu_pd(c->lead), origin = _mm256_loadu_pd(c->origin), inverse = _mm256_loadu_pd(c->inverse);
+    const __m256d axes = _mm256_castsi256_pd(_mm256_setr_epi64x(0, 1, 2, 3));
+    const __m256d time = _mm256_castsi256_pd(_mm256_set1_epi64x(~(int64_t)3));
+    __m256d t0 = _mm256_mul_pd(_mm256_sub_pd(_mm256_add_pd(at, lead), origin), inverse);
+    __m256d t1 = _mm256_mul_pd(_mm256_sub_pd(_mm256_sub_pd(_mm256_add_pd(at, _mm256_set1_pd(1)), lead), origin), inverse);
+    uint64_t bits[2];
+    t0 = _mm256_or_pd(_mm256_and_pd(_mm256_max_pd(t0, zero), time), axes);
+    t1 = _mm256_or_pd(_mm256_and_pd(_mm256_max_pd(t1, zero), time), axes);
+    t1 = _mm256_blend_pd(t1, _mm256_set1_pd(c->stop), 8);
+    t0 = _mm256_max_pd(t0, _mm256_permute2f128_pd(t0, t0, 1)), t1 = _mm256_min_pd(t1, _mm256_permute2f128_pd(t1, t1, 1));
+    *begin = _mm256_cvtsd_f64(_mm256_max_pd(t0, _mm256_permute_pd(t0, 5)));
+    *end = _mm256_cvtsd_f64(_mm256_min_pd(t1, _mm256_permute_pd(t1, 5)));
+    memcpy(&bits[0], begin, 8), memcpy(&bits[1], end, 8);
+    c->in = (int)(bits[0] & 3), c->out = (int)(bits[1] & 3);
+    return *begin < *end;
+}
+
+/* cell_told, eight values at a time: x, then y, then z is taken where the ray enters the cell and where it leaves it. code: of the cell's
+   lowest corner. */
+ISOGI_VOL__TARGET("avx2")
+ISOGI_VOL__INLINE int isogi_vol__cell_told_avx2(isogi_vol__walk *w, const isogi_vol__leaf *leaf, const uint8_t *code, __m128i cell,
+                                                double begin, double end) {
+    const __m256d at = _mm256_sub_pd(_mm256_loadu_pd(w->origin), _mm256_cvtepi32_pd(cell));
+    const __m256d dir = _mm256_loadu_pd(w->dir), zero = _mm256_setzero_pd(), one = _mm256_set1_pd(1);
+    const __m256d in = _mm256_add_pd(at, _mm256_mul_pd(_mm256_set1_pd(begin), dir));
+    const __m256d out = _mm256_add_pd(at, _mm256_mul_pd(_mm256_set1_pd(end), dir));
+    const __m128 from = _mm256_cvtpd_ps(_mm256_min_pd(_mm256_max_pd(in, zero), one));
+    const __m128 to = _mm256_cvtpd_ps(_mm256_min_pd(_mm256_max_pd(out, zero), one));
+    const __m256 ends = _mm256_insertf128_ps(_mm256_castps128_ps256(from), to, 1);
+    const __m256 from2 = _mm256_permute2f128_ps(ends, ends, 0x00), to2 = _mm256_permute2f128_ps(ends, ends, 0x11);
+    const __m256i even = _mm256_setr_epi32(0, 2, 4, 6, 0, 2, 4, 6), odd = _mm256_setr_epi32(1, 3, 5, 7, 1, 3, 5, 7);
+    int16_t pair[4];
+    __m256 c, low;
+    float f[8];
+    memcpy(&pair[0], code, 2), memcpy(&pair[1], code + 5, 2), memcpy(&pair[2], code + 25, 2), memcpy(&pair[3], code + 30, 2);
+    c = _mm256_cvtepi32_ps(_mm256_cvtepu8_epi32(_mm_setr_epi16(pair[0], pair[1], pair[2], pair[3], 0, 0, 0, 0)));
+    low = _mm256_permutevar8x32_ps(c, even);
+    c = _mm256_add_ps(low, _mm256_mul_ps(_mm256_permute_ps(ends, 0x00), _mm256_sub_ps(_mm256_permutevar8x32_ps(c, odd), low)));
+    low = _mm256_permute_ps(c, 0x88);
+    c = _mm256_add_ps(low, _mm256_mul_ps(_mm256_shuffle_ps(from2, to2, 0x55), _mm256_sub_ps(_mm256_permute_ps(c, 0xdd), low)));
+    low = _mm256_permute_ps(c, 0x88);
+    c = _mm256_add_ps(low, _mm256_mul_ps(_mm256_shuffle_ps(from2, to2, 0xaa), _mm256_sub_ps(_mm256_permute_ps(c, 0xdd), low)));
+    _mm256_storeu_ps(f, c);
+    return isogi_vol__told(w, leaf, f);
+}
+
+/* The coordinates of a node's child among nodes of its level. */
+ISOGI_VOL__TARGET("avx2") ISOGI_VOL__INLINE __m128i isogi_vol__inner_avx2(const struct isogi_vol__ways *ways, const int32_t node[4],
+                                                                           int child) {
+    return _mm_add_epi32(_mm_slli_epi32(_mm_loadu_si128((const __m128i *)(const void *)node), 2),
+                         _mm_load_si128((const __m128i *)(const void *)ways->inner[child]));
+}
+
+/* Opens the node that was sent for. */
+ISOGI_VOL__TARGET("avx2") ISOGI_VOL__INLINE void isogi_vol__trip_open(isogi_vol__ride *r) {
+    isogi_vol__trip *c = &r->by.trip;
+    const isogi_pyramid *p = r->walk.pyramid;
+    const int n = r->at;
+    const uint64_t way = isogi_vol__way_avx2(c, p->ways, n, c->child);
+    r->walk.count.blocks++;
+    if (n) {
+        const __m128i stride = _mm_load_si128((const __m128i *)(const void *)p->ways->stride[n - 1]);
+        __m128i number = _mm_mullo_epi32(_mm_loadu_si128((const __m128i *)(const void *)c->place[n]), stride);
+        number = _mm_add_epi32(number, _mm_shuffle_epi32(number, 0x4e));
+        number = _mm_add_epi32(number, _mm_shuffle_epi32(number, 0xb1));
+        c->left[n] = way & isogi_vol__turn_mask(isogi_vol__node_mask_avx2(r->open, c->low, c->high), c->octant);
+        c->children[n] = (const uint8_t *)p->nodes + p->ways->first[n - 1] + ((size_t)(uint32_t)_mm_cvtsi128_si32(number) << 13);
+        c->pending |= (unsigned)(c->left[n] != 0) << n;
+    } else c->cells = way & isogi_vol__turn_mask(isogi_vol__leaf_mask_avx2(r->open, c->level, &r->leaf), c->octant);
+    r->open = NULL;
+}
+
+/* Sends for the next node, of the lowest level that has any left; 0: there is none. */
+ISOGI_VOL__TARGET("avx2") ISOGI_VOL__INLINE int isogi_vol__trip_next(isogi_vol__ride *r) {
+    isogi_vol__trip *c = &r->by.trip;
+    int n, here;
+    if (!c->pending) return 0;
+    n = __builtin_ctz(c->pending), c->child = __builtin_ctzll(c->left[n]), here = c->child ^ c->flip;
+    c->left[n] &= c->left[n] - 1;
+    if (!c->left[n]) c->pending &= c->pending - 1;
+    _mm_storeu_si128((__m128i *)(void *)c->place[n - 1], isogi_vol__inner_avx2(r->walk.pyramid->ways, c->place[n], here));
+    isogi_vol__ride_to(r, c->children[n] + 128 * here);
+    r->at = n - 1;
+    return 1;
+}
+
+/* The next cell of the leaf: 1: hit; 0: none; -1: its voxels are sent for. */
+ISOGI_VOL__TARGET("avx2") ISOGI_VOL__INLINE int isogi_vol__trip_cell(isogi_vol__ride *r, isogi_hit *hit) {
+    isogi_vol__trip *c = &r->by.trip;
+    isogi_vol__walk *w = &r->walk;
+    const struct isogi_vol__ways *ways = w->pyramid->ways;
+    const int child = __builtin_ctzll(c->cells) ^ c->flip;
+    const __m128i cell = isogi_vol__inner_avx2(ways, c->place[0], child);
+    const int x = _mm_cvtsi128_si32(cell), y = _mm_extract_epi32(cell, 1), z = _mm_extract_epi32(cell, 2);
+    double begin, end;
+    if (!r->looked && isogi_vol__passes_avx2(c, cell, &begin, &end)) {
+        const int told = w->deflate ? 0 : isogi_vol__cell_told_avx2(w, &r->leaf, r->leaf.code + ways->lowest[0][child], cell, begin, end);
+        if (told > 1) return 1;
+        w->count.cells += told != 0;
+        if (!told) {
+            isogi_vol__ride_to_cell(r, x, y, z);
+            return -1;
+        }
+    }
+    c->cells &= c->cells - 1;
+    if (!r->looked) return 0;
+    r->looked = 0;
+    return isogi_vol__mixed_cell_avx2(w, x, y, z, c->in == 3 ? c->entry_axis : c->in, c->out == 3 ? -1 : c->out, hit);
+}
+
+/* Goes on, as ride_steps does. */
+ISOGI_VOL__TARGET("avx2") static int isogi_vol__ride_trip(isogi_vol__ride *r, int waits, isogi_hit *hit) {
+    isogi_vol__trip *c = &r->by.trip;
+    if (c->low > c->high) return 0;
+    do {
+        if (r->open) isogi_vol__trip_open(r);
+        while (c->cells) {
+            const int found = isogi_vol__trip_cell(r, hit);
+            if (found > 0) return 1;
+            if (found < 0 && waits) return -1;
+        }
+    } while (isogi_vol__trip_next(r) && !waits);
+    if (r->open) return -1;
+    /* what was skipped behind the last cell lies on one side */
+    if (!(r->walk.deflated >= r->walk.end)) r->walk.deflate = 0;
+    return 0;
+}
 #endif
 
-static int isogi_vol__walk_fast(isogi_vol__walk *w, const isogi_vol__ticks *k, isogi_hit *hit) {
-    if (k->low > k->high) return 0;
+/* A ride of a walk that is ready to go; 0: it has to be walked plainly. */
+static int isogi_vol__ride_set(isogi_vol__ride *r) {
+    r->looked = 0;
 #ifdef ISOGI_VOL__AVX
-    if (w->pyramid->path >= ISOGI_VOL__PATH_AVX2) return isogi_vol__walk_fast_avx2(w, k, hit);
+    if (r->walk.pyramid->path >= ISOGI_VOL__PATH_AVX2) return isogi_vol__ride_set_trip(r);
 #endif
-    return isogi_vol__walk_fast_base(w, k, hit);
+    return isogi_vol__ride_set_steps(r);
+}
+
+static int isogi_vol__ride_on(isogi_vol__ride *r, int waits, isogi_hit *hit) {
+#ifdef ISOGI_VOL__AVX
+    if (r->walk.pyramid->path >= ISOGI_VOL__PATH_AVX2) return isogi_vol__ride_trip(r, waits, hit);
+#endif
+    return isogi_vol__ride_steps(r, waits, hit);
 }
 
 /* ==== many rays at once ============================================================================================== */
@@ -6179,18 +6525,18 @@ static int isogi_vol__leaves_inside(isogi_vol__walk *w, uint32_t flags, isogi_hi
 }
 
 /* Walks a ray that is set up: fast where that is right, else plainly. */
-static int isogi_vol__walk_ray(isogi_vol__walk *w, uint32_t flags, isogi_hit *hit) {
-    isogi_vol__ticks ticks;
+static int isogi_vol__walk_ray(isogi_vol__ride *r, isogi_hit *hit) {
+    isogi_vol__walk *w = &r->walk;
 #ifdef ISOGI_VOL__AVX
     if (w->pyramid->fast && w->pyramid->path == ISOGI_VOL__PATH_AVX512) {
         const int found = isogi_vol__enters_inside(w, hit) ? 1 : isogi_vol__walk_one(w, hit);
-        if (found >= 0) return found || isogi_vol__leaves_inside(w, flags, hit);
+        if (found >= 0) return found || isogi_vol__leaves_inside(w, r->flags, hit);
     } else
 #endif
-    if (w->pyramid->fast && isogi_vol__set_ticks(&ticks, w))
-        return isogi_vol__enters_inside(w, hit) || isogi_vol__walk_fast(w, &ticks, hit) || isogi_vol__leaves_inside(w, flags, hit);
+    if (w->pyramid->fast && isogi_vol__ride_set(r))
+        return isogi_vol__enters_inside(w, hit) || isogi_vol__ride_on(r, 0, hit) || isogi_vol__leaves_inside(w, r->flags, hit);
     isogi_vol__first_cell(w);
-    return isogi_vol__walk_on(w, flags, hit);
+    return isogi_vol__walk_on(w, r->flags, hit);
 }
 
 static void isogi_vol__finish(isogi_vol__batch *b, size_t i, const isogi_vol__walk *w, int found) {
@@ -6200,11 +6546,53 @@ static void isogi_vol__finish(isogi_vol__batch *b, size_t i, const isogi_vol__wa
 }
 
 static void isogi_vol__trace_one(isogi_vol__batch *b, size_t i) {
-    isogi_vol__walk w;
+    isogi_vol__ride r;
     isogi_hit any;
-    const int walks = isogi_vol__begin(b, i, &w);
-    isogi_vol__finish(b, i, &w, walks && isogi_vol__walk_ray(&w, isogi_vol__flags(b, i), b->hits ? &b->hits[i] : &any));
+    const int walks = isogi_vol__begin(b, i, &r.walk);
+    r.flags = isogi_vol__flags(b, i);
+    isogi_vol__finish(b, i, &r.walk, walks && isogi_vol__walk_ray(&r, b->hits ? &b->hits[i] : &any));
 }
+
+/* Rays in turn, each up to where it needs memory, which arrives while the others have their turns. */
+#define ISOGI_VOL__RIDES 8
+
+/* The next ray that goes from node to node gets on; those before it that do not are done with. 0: there is none. */
+static int isogi_vol__ride_begin(isogi_vol__batch *b, isogi_vol__ride *r, size_t *next) {
+    isogi_hit any;
+    while (*next < b->count) {
+        const size_t i = (*next)++;
+        isogi_hit *hit = b->hits ? &b->hits[i] : &any;
+        int found = 0;
+        if (b->bundles && i / b->each != b->opened) isogi_vol__open_bundle(b, i / b->each);
+        r->number = i, r->flags = isogi_vol__flags(b, i);
+        if (isogi_vol__begin(b, i, &r->walk)) {
+            if (!isogi_vol__ride_set(r)) {
+                isogi_vol__first_cell(&r->walk);
+                found = isogi_vol__walk_on(&r->walk, r->flags, hit);
+            } else if (!isogi_vol__enters_inside(&r->walk, hit)) return 1;
+            else found = 1;
+        }
+        isogi_vol__finish(b, i, &r->walk, found);
+    }
+    return 0;
+}
+
+static void isogi_vol__trace_rides(isogi_vol__batch *b) {
+    isogi_vol__ride ride[ISOGI_VOL__RIDES];
+    isogi_hit any;
+    size_t next = 0;
+    int n = 0, i = 0;
+    while (n < ISOGI_VOL__RIDES && isogi_vol__ride_begin(b, &ride[n], &next)) n++;
+    for (; n; i = i + 1 < n ? i + 1 : 0) {
+        isogi_vol__ride *r = &ride[i];
+        isogi_hit *hit = b->hits ? &b->hits[r->number] : &any;
+        const int found = isogi_vol__ride_on(r, 1, hit);
+        if (found < 0) continue;
+        isogi_vol__finish(b, r->number, &r->walk, found || isogi_vol__leaves_inside(&r->walk, r->flags, hit));
+        if (!isogi_vol__ride_begin(b, r, &next) && i != --n) *r = ride[n];
+    }
+}
+
 
 #ifdef ISOGI_VOL__AVX
 /* ---- sixteen rays side by side ---- */
@@ -7328,11 +7716,12 @@ ISOGI_VOL__AVX512 static uint64_t isogi_vol__close_ranks(isogi_vol__pool *s, iso
 
 /* A ray that cannot be set up with seven others; whether it takes the slot. */
 static int isogi_vol__seat_odd(isogi_vol__batch *b, isogi_vol__pool *s, size_t i, int slot) {
-    isogi_vol__walk w;
+    isogi_vol__ride r;
     isogi_hit any, *hit = b->hits ? &b->hits[i] : &any;
-    const uint32_t flags = isogi_vol__flags(b, i);
-    if (!isogi_vol__begin(b, i, &w)) isogi_vol__finish(b, i, &w, 0);
-    else if (flags & ISOGI_RAY_CAPPED || !isogi_vol__seat(s, slot, &w)) isogi_vol__finish(b, i, &w, isogi_vol__walk_ray(&w, flags, hit));
+    r.flags = isogi_vol__flags(b, i);
+    if (!isogi_vol__begin(b, i, &r.walk)) isogi_vol__finish(b, i, &r.walk, 0);
+    else if (r.flags & ISOGI_RAY_CAPPED || !isogi_vol__seat(s, slot, &r.walk))
+        isogi_vol__finish(b, i, &r.walk, isogi_vol__walk_ray(&r, hit));
     else {
         s->ray[slot] = i;
         return 1;
@@ -7606,7 +7995,9 @@ static isogi_result isogi_vol__trace(isogi_vol__batch *b, size_t count, isogi_co
     if (b->pyramid->fast && b->pyramid->path == ISOGI_VOL__PATH_AVX512 &&
         (count > 3 || b->pyramid->context.force_path == ISOGI_VOL__PATH_AVX512))
         isogi_vol__trace_pool(b, count), i = count;
+    else
 #endif
+    if (b->pyramid->fast && count > 1) isogi_vol__trace_rides(b), i = count;
     for (; i < count; i++) {
         if (b->bundles && i / b->each != b->opened) isogi_vol__open_bundle(b, i / b->each);
         isogi_vol__trace_one(b, i);
@@ -9222,6 +9613,7 @@ ISOGI_API void isogi_vol_mesh_free(const isogi_pyramid *pyramid, isogi_mesh *mes
 #undef ISOGI_VOL__ADD
 #undef ISOGI_VOL__ALL64
 #undef ISOGI_VOL__CODES
+#undef ISOGI_VOL__RIDES
 #undef ISOGI_VOL__DOUBT
 #undef ISOGI_VOL__LEAF_AVX2
 #undef ISOGI_VOL__LEAF_BASE
