@@ -76,7 +76,8 @@
    rays are faster than alone (twice to four times), from 500 on nothing is left to gain. There, rays of one isovalue that nearly
    coincide, up to sixteen in a row as in a tile of pixels, go as one and are faster still; rays that follow each other from one place
    come down to its leaf together, and where they are many (12 from a surface, 48 from elsewhere), they pass the cells round it at once,
-   as far as slopes there let none of them meet the surface. Cells are looked at in float first, from 8-bit voxels that lie together in two
+   as far as slopes there let none of them meet the surface. Elsewhere eight rays of a batch take turns, each up to where it reads memory,
+   which is half as fast again where rays share little. Cells are looked at in float first, from 8-bit voxels that lie together in two
    cache lines for 4x4x4 cells, with an error bound: what is certain needs nothing else, and only cells in doubt, the hits and one cell for
    every 25 rays besides, read your voxels and are solved in double. Where any hit will do, a ray is done once it is known to pass a block
    that lies inside and one that lies outside.
@@ -1014,7 +1015,7 @@ struct isogi_pyramid {
     isogi_vol__node_level node_level[ISOGI_VOL__NODE_LEVELS];
     int node_levels; /* the last one has a single node */
     double node_scale; /* 8-bit value = floor((value - range[0]) * node_scale) */
-    struct isogi_vol__ways *ways; /* for single rays by AVX-512, else NULL */
+    struct isogi_vol__ways *ways; /* for rays by AVX2 and single ones by AVX-512, else NULL */
     int all_finite;
     int fast; /* 0: only the plain walk is right for this volume */
     int path; /* ISOGI_VOL__PATH_... */
@@ -4779,40 +4780,82 @@ static int isogi_vol__ride_set_steps(isogi_vol__ride *r) {
     return 1;
 }
 
-/* What is told of a cell; begin, end: when the ray enters it and leaves it. */
+/* What is told of a cell; begin, end: when the ray enters it and leaves it. First x, then y, then z is taken there. */
 static int isogi_vol__cell_told(isogi_vol__walk *w, const isogi_vol__leaf *leaf, const int cell[3], double begin, double end) {
     const uint8_t *code = leaf->code + (cell[0] & 3) + 5 * (cell[1] & 3) + 25 * (cell[2] & 3);
-    float from[3], to[3], x[2][4], y[2][2], f[8];
-    int a, e, k;
+    float from[4] = {0, 0, 0, 0}, to[4] = {0, 0, 0, 0}, f[8];
+    int a;
     for (a = 0; a < 3; a++) {
         const double at = w->origin[a] - cell[a];
-        from[a] = (float)isogi_vol__clamp(at + begin * w->dir[a], 1), to[a] = (float)isogi_vol__clamp(at + end * w->dir[a], 1);
+        from[a] = (float)(at + begin * w->dir[a]), to[a] = (float)(at + end * w->dir[a]);
     }
-    for (k = 0; k < 4; k++) {
-        const uint8_t *pair = code + 5 * (k & 1) + 25 * (k >> 1);
-        const float low = pair[0], rise = (float)pair[1] - low;
-        x[0][k] = low + from[0] * rise, x[1][k] = low + to[0] * rise;
+#ifdef ISOGI_VOL__SSE2
+    {
+        const __m128i pairs = _mm_setr_epi32(code[0] | code[1] << 8, code[5] | code[6] << 8, code[25] | code[26] << 8,
+                                             code[30] | code[31] << 8);
+        const __m128 zero = _mm_setzero_ps(), one = _mm_set1_ps(1);
+        const __m128 in = _mm_min_ps(_mm_max_ps(_mm_loadu_ps(from), zero), one), out = _mm_min_ps(_mm_max_ps(_mm_loadu_ps(to), zero), one);
+        __m128 low = _mm_cvtepi32_ps(_mm_and_si128(pairs, _mm_set1_epi32(255))), high = _mm_cvtepi32_ps(_mm_srli_epi32(pairs, 8));
+        __m128 enters, leaves;
+#define ISOGI_VOL__TAKEN(lanes) \
+    high = _mm_sub_ps(high, low), enters = _mm_add_ps(low, _mm_mul_ps(_mm_shuffle_ps(in, in, lanes), high)), \
+    leaves = _mm_add_ps(low, _mm_mul_ps(_mm_shuffle_ps(out, out, lanes), high)), low = _mm_shuffle_ps(enters, leaves, 0x88), \
+    high = _mm_shuffle_ps(enters, leaves, 0xdd)
+        ISOGI_VOL__TAKEN(0x00), ISOGI_VOL__TAKEN(0x55), ISOGI_VOL__TAKEN(0xaa);
+#undef ISOGI_VOL__TAKEN
+        _mm_storeu_ps(f, enters), _mm_storeu_ps(f + 4, leaves);
     }
-    for (e = 0; e < 2; e++) {
-        for (k = 0; k < 2; k++) {
-            const float low = x[e][2 * k], rise = x[e][2 * k + 1] - low;
-            y[0][k] = low + from[1] * rise, y[1][k] = low + to[1] * rise;
+#else
+    {
+        float x[2][4], y[2][2];
+        int e, k;
+        for (a = 0; a < 3; a++) {
+            from[a] = from[a] > 0 ? from[a] < 1 ? from[a] : 1 : 0;
+            to[a] = to[a] > 0 ? to[a] < 1 ? to[a] : 1 : 0;
         }
-        for (k = 0; k < 2; k++)
-            f[e + 2 * k] = y[k][0] + from[2] * (y[k][1] - y[k][0]), f[e + 2 * k + 4] = y[k][0] + to[2] * (y[k][1] - y[k][0]);
+        for (k = 0; k < 4; k++) {
+            const uint8_t *pair = code + 5 * (k & 1) + 25 * (k >> 1);
+            const float low = pair[0], rise = (float)pair[1] - low;
+            x[0][k] = low + from[0] * rise, x[1][k] = low + to[0] * rise;
+        }
+        for (e = 0; e < 2; e++) {
+            for (k = 0; k < 2; k++) {
+                const float low = x[e][2 * k], rise = x[e][2 * k + 1] - low;
+                y[0][k] = low + from[1] * rise, y[1][k] = low + to[1] * rise;
+            }
+            for (k = 0; k < 2; k++)
+                f[e + 2 * k] = y[k][0] + from[2] * (y[k][1] - y[k][0]), f[e + 2 * k + 4] = y[k][0] + to[2] * (y[k][1] - y[k][0]);
+        }
     }
+#endif
     return isogi_vol__told(w, leaf, f);
 }
 
-/* To the next child, up to where there is one; 0: the segment has ended. */
-static int isogi_vol__ride_step(isogi_vol__ride *r) {
+/* From child to child up to one that can hold the surface, of the node at hand or of one above it; 0: the segment ends before. here: the
+   present one counts. */
+static int isogi_vol__ride_seek(isogi_vol__ride *r, int here) {
     isogi_vol__steps *s = &r->by.steps;
-    for (;; r->at++) {
-        s->now = isogi_vol__step(&s->place[r->at], &s->axis);
-        if (s->now >= s->ticks.end) return 0;
-        if (r->at == 3) s->node[3][s->axis]++;
-        if (r->at == 3 || !(s->place[r->at].state & ISOGI_VOL__LEFT)) return 1;
+    const int64_t end = s->ticks.end;
+    const uint32_t flip = s->ticks.flip;
+    int n = r->at, axis = s->axis;
+    isogi_vol__place place = s->place[n];
+    uint64_t mask = n < 3 ? s->mask[n] : ~(uint64_t)0;
+    int64_t now = s->now;
+    for (;; here = 0) {
+        if (!here) {
+            now = isogi_vol__step(&place, &axis);
+            if (now >= end) return 0;
+            if (n == 3) s->node[3][axis]++;
+            else if (place.state & ISOGI_VOL__LEFT) {
+                n++, place = s->place[n], mask = n < 3 ? s->mask[n] : ~(uint64_t)0;
+                continue;
+            }
+        }
+        if (n == 3 || mask >> ((place.state ^ flip) & 63) & 1) break;
+        r->walk.deflate = 0;
     }
+    r->at = n, s->place[n] = place, s->now = now, s->axis = axis;
+    return 1;
 }
 
 /* Into the child at which the ray is. */
@@ -4865,22 +4908,18 @@ static int isogi_vol__ride_cell(isogi_vol__ride *r, isogi_hit *hit) {
 
 /* Goes on to the first hit: 1, or to the end: 0. waits: to where memory is to be read next, which is sent for: -1. */
 static int isogi_vol__ride_steps(isogi_vol__ride *r, int waits, isogi_hit *hit) {
-    const isogi_vol__steps *s = &r->by.steps;
-    if (s->ticks.low > s->ticks.high) return 0;
+    if (r->by.steps.ticks.low > r->by.steps.ticks.high) return 0;
     for (;;) {
-        if (r->open && !isogi_vol__ride_open(r)) {
-            if (!isogi_vol__ride_step(r)) return 0;
-        } else if (r->at == 3 || (r->at && s->mask[r->at] >> ((s->place[r->at].state ^ s->ticks.flip) & 63) & 1)) {
+        int found;
+        if (r->open && !isogi_vol__ride_seek(r, isogi_vol__ride_open(r))) return 0;
+        if (r->at) {
             isogi_vol__ride_down(r);
             if (waits) return -1;
-        } else {
-            int found = 0;
-            if (r->at || !(s->mask[0] >> ((s->place[0].state ^ s->ticks.flip) & 63) & 1)) r->walk.deflate = 0;
-            else found = isogi_vol__ride_cell(r, hit);
-            if (found > 0) return 1;
-            if (found < 0 && waits) return -1;
-            if (!found && !isogi_vol__ride_step(r)) return 0;
+            continue;
         }
+        found = isogi_vol__ride_cell(r, hit);
+        if (found > 0 || (found < 0 && waits)) return found;
+        if (!found && !isogi_vol__ride_seek(r, 0)) return 0;
     }
 }
 

@@ -113,7 +113,7 @@ static void bench_usual(const scene *s, const char *name, const isogi_ray *rays,
     free(t), free(error);
 }
 
-static void bench_rays(const scene *s, const char *name, const isogi_ray *rays, size_t batch, int kind, int usual) {
+static void bench_rays_by(const scene *s, const char *name, const char *method, const isogi_ray *rays, size_t batch, int kind, int usual) {
     isogi_hit *hits = (isogi_hit *)malloc(RAYS * sizeof *hits);
     uint8_t *occluded = (uint8_t *)malloc(RAYS);
     isogi_counters count = {0};
@@ -130,9 +130,27 @@ static void bench_rays(const scene *s, const char *name, const isogi_ray *rays, 
              (double)count.cubics / RAYS);
     if (kind == ANY) snprintf(setting, sizeof setting, "batch %zu; %s", batch, looked);
     else snprintf(setting, sizeof setting, "batch %zu; t99 %.2g voxels; %s", batch, t99, looked);
-    row(name, s->name, "default", setting, median(seconds, runs), error, RAYS, "rays");
+    row(name, s->name, method, setting, median(seconds, runs), error, RAYS, "rays");
     if (usual) bench_usual(s, name, rays, hits);
     free(hits), free(occluded);
+}
+
+static void bench_rays(const scene *s, const char *name, const isogi_ray *rays, size_t batch, int kind, int usual) {
+    bench_rays_by(s, name, "default", rays, batch, kind, usual);
+}
+
+/* As on machines without AVX-512, and without AVX2, too. */
+static void bench_paths(const scene *whole) {
+    static const char *const names[2] = {"without-avx2", "without-avx512"};
+    for (int path = 2; path < 4; path++) {
+        const isogi_context context = {.threads = 1, .force_path = path};
+        scene s = *whole;
+        if (isogi_vol_build(&s.pyramid, isogi_vol_volume(whole->pyramid), &context) != ISOGI_OK) exit(1);
+        bench_rays_by(&s, "primary1", names[path - 2], s.primary, 1, FIRST, 0);
+        bench_rays_by(&s, "surface", names[path - 2], s.surface, RAYS, FIRST, 0);
+        bench_rays_by(&s, "bundle64", names[path - 2], s.bundles, BUNDLES * BUNDLE, SHARED, 0);
+        isogi_vol_free(s.pyramid);
+    }
 }
 
 /* ---- the rest ---- */
@@ -384,6 +402,7 @@ int main(int argc, char **argv) {
         bench_rays(&s, "anyhit", s.surface, RAYS, ANY, 0);
         bench_rays(&s, "bundle64", s.bundles, BUNDLES * BUNDLE, SHARED, 0);
         bench_rays(&s, "bundle64alone", s.bundles, BUNDLE, SHARED, 0);
+        bench_paths(&s);
         if (gyroid) {
             bench_build(&s);
             bench_samples(&s, "trilinear-along-rays", TRILINEAR, ALONG_RAYS, 0);
