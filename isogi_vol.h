@@ -5122,8 +5122,8 @@ ISOGI_VOL__TARGET("avx2") ISOGI_VOL__INLINE int isogi_vol__trip_cell(isogi_vol__
     double begin, end;
     if (!r->looked && isogi_vol__passes_avx2(c, cell, &begin, &end)) {
         const int told = w->deflate ? 0 : isogi_vol__cell_told_avx2(w, &r->leaf, r->leaf.code + ways->lowest[0][child], cell, begin, end);
-        if (told > 1) return 1;
         w->count.cells += told != 0;
+        if (told > 1) return 1;
         if (!told) {
             isogi_vol__ride_to_cell(r, x, y, z);
             return -1;

@@ -105,6 +105,42 @@ TEST(counters_prove_what_is_skipped) {
     CHECK(c[5].texels == 0 && c[5].rays == 0 && c[5].cells == 0 && c[5].blocks == 0, "constant: %d cells", (int)c[5].cells);
 }
 
+/* By feedback, with all reflections: an interval's texels are fewer, a view's fewer still, and so are their rays and cells, those of probes
+   included; with a target for errors texels take fewer samples; without reflections no probe is made. */
+TEST(counters_prove_it_of_reflected_light) {
+    enum { N = 33, CASES = 6 };
+    static const char *const name[CASES] = {"all values", "an interval", "a view", "64 samples", "to a target", "no reflections"};
+    static const int less_than[CASES] = {-1, 0, 1, -1, 3, 2};
+    double q[5] = {16, 20, 16, 5.3, 8.4};
+    float points[60][3];
+    isogi_counters c[CASES] = {{0}};
+    scene s = scene_make(N, N, N, NULL, cut_off, q);
+    int n = surface_points(&s, 0, 60, 3, points);
+    for (int k = 0; k < CASES; k++) {
+        isogi_trace_desc d = desc_make(&s, 0.5f, k == 5 ? 0 : -1, k == 3 || k == 4 ? 64 : 8);
+        isogi_trace_report report;
+        isogi_trace *t = NULL;
+        d.method = ISOGI_TRACE_FEEDBACK, d.lazy = k > 1, d.error = k == 4 ? 0.05f : 0;
+        if (k == 1) d.isovalue_min = -0.1, d.isovalue_max = 0.1;
+        CHECK(isogi_trace_create(&t, &d, NULL) == ISOGI_OK && isogi_trace_request(t, (const float(*)[3])points, (size_t)n) == ISOGI_OK &&
+                  isogi_trace_step(t, 0, NULL) == ISOGI_OK,
+              "%s", name[k]);
+        isogi_trace_counters(t, &c[k]), isogi_trace_status(t, &report);
+        printf("    %-14s %5d texels, %6d probes, %6d rays, %7d cells\n", name[k], (int)c[k].texels, (int)report.probes, (int)c[k].rays,
+               (int)c[k].cells);
+        CHECK((report.probes == 0) == (k == 5), "%s: %d probes", name[k], (int)report.probes);
+        if (less_than[k] >= 0) {
+            const isogi_counters *more = &c[less_than[k]];
+            CHECK(6 * c[k].rays < 5 * more->rays && 6 * c[k].cells < 5 * more->cells, "%s: %d of %d rays, %d of %d cells", name[k],
+                  (int)c[k].rays, (int)more->rays, (int)c[k].cells, (int)more->cells);
+            CHECK(k < 3 ? 3 * c[k].texels < 2 * more->texels : c[k].texels == more->texels, "%s: %d of %d texels", name[k],
+                  (int)c[k].texels, (int)more->texels);
+        }
+        isogi_trace_free(t);
+    }
+    scene_free(&s);
+}
+
 /* Textures of 1/8, 1 and 8 times the volume's texels (Wyman 2006, fig. 12): error against light gathered at the points themselves, with
    enough samples that the lattice is what is seen. Finer is better. */
 TEST(resolution_of_the_texture) {

@@ -341,4 +341,62 @@ TEST(building_survives_every_failing_allocation) {
     CHECK(done, "there are more allocations, %d", done);
 }
 
+/* Bundles, and rays that leave the surface in any direction, hit what single rays do: those of an origin bit by bit, those of a start what
+   a ray finds that begins beside it, but where it grazes. */
+TEST(bundles_and_continued_rays_meet_functions_too) {
+    enum { EACH = 24, TURNS = 60, MOST = 6 };
+    function f = {.wave = 4};
+    isogi_field field = {.value = gyroid, .user = &f, .hessian = 4 * 16, .low = {-1, -1.2, -0.9}, .high = {1.1, 0.8, 1}};
+    isogi_pyramid *p = build_function(&field, 12);
+    test_random r = {77};
+    long hits = 0, left = 0, wrong = 0, wrong_any = 0, wrong_all = 0, wrong_start = 0, grazes = 0;
+    for (int turn = 0; turn < TURNS; turn++) {
+        static isogi_hit together[EACH], alone, all[EACH * MOST], one[MOST], starts[EACH], continued[EACH];
+        static float dirs[EACH][3];
+        uint8_t any[EACH];
+        size_t counts[EACH], count;
+        isogi_bundle b = {.isovalue = random_range(&r, -0.8, 0.8)};
+        isogi_ray ray = {.isovalue = b.isovalue};
+        for (int a = 0; a < 3; a++) ray.origin[a] = b.origin[a] = random_range(&r, field.low[a], field.high[a]);
+        for (int i = 0; i < EACH; i++) {
+            double d[3];
+            random_direction(&r, d);
+            for (int a = 0; a < 3; a++) dirs[i][a] = (float)d[a];
+        }
+        isogi_vol_bundle(p, &b, (const float(*)[3])dirs, EACH, together, NULL);
+        isogi_vol_bundle_occluded(p, &b, (const float(*)[3])dirs, EACH, any, NULL);
+        isogi_vol_bundle_all(p, &b, (const float(*)[3])dirs, EACH, MOST, all, counts, NULL);
+        for (int i = 0; i < EACH; i++) {
+            memcpy(ray.dir, dirs[i], sizeof ray.dir);
+            isogi_vol_intersect(p, &ray, 1, &alone, NULL), isogi_vol_intersect_all(p, &ray, 1, MOST, one, &count, NULL);
+            hits += alone.side != 0, wrong += alone.side != together[i].side || fabs(alone.t - together[i].t) > 0;
+            wrong_any += any[i] != (alone.side != 0), wrong_all += count != counts[i];
+            for (size_t n = 0; n < count && n < counts[i] && n < MOST; n++)
+                wrong_all += one[n].side != all[(size_t)i * MOST + n].side || fabs(one[n].t - all[(size_t)i * MOST + n].t) > 0;
+            starts[i] = together[0];
+        }
+        if (!together[0].side) continue;
+        b.start = &together[0];
+        isogi_vol_continue(p, starts, (const float(*)[3])dirs, NULL, b.isovalue, 0, EACH, continued, NULL);
+        isogi_vol_bundle(p, &b, (const float(*)[3])dirs, EACH, all, NULL);
+        for (int i = 0; i < EACH; i++) {
+            const double beside = 1e-6;
+            double place[3], g[3], slope = 0, steep = 0;
+            wrong_start += continued[i].side != all[i].side || fabs(continued[i].t - all[i].t) > 0;
+            for (int a = 0; a < 3; a++) place[a] = b.origin[a] + together[0].t * (double)dirs[0][a];
+            gyroid(&f, place, g);
+            for (int a = 0; a < 3; a++) slope += g[a] * (double)dirs[i][a], steep += g[a] * g[a];
+            if (fabs(slope) < 1e-2 * sqrt(steep)) { grazes++; continue; }
+            for (int a = 0; a < 3; a++) ray.origin[a] = place[a] + beside * (double)dirs[i][a];
+            memcpy(ray.dir, dirs[i], sizeof ray.dir);
+            isogi_vol_intersect(p, &ray, 1, &alone, NULL);
+            left++, wrong_start += alone.side != continued[i].side || (alone.side && fabs(alone.t + beside - continued[i].t) > 1e-5);
+        }
+    }
+    CHECK(hits > 500 && left > 500 && grazes < left / 10, "%ld hits, %ld rays from the surface, %ld graze it", hits, left, grazes);
+    CHECK(!wrong && !wrong_any && !wrong_all && !wrong_start, "others: %ld in bundles, %ld any hits, %ld in lists, %ld from starts", wrong,
+          wrong_any, wrong_all, wrong_start);
+    isogi_vol_free(p);
+}
+
 TEST_MAIN("vol_field")

@@ -58,6 +58,12 @@ if [ "$1" != quick ]; then
     build/bake $slow --out "$OUT/stopped.bake"
     build/bake $slow --out "$OUT/at-once.bake"
     cmp "$OUT/stopped.bake" "$OUT/at-once.bake"
+    if command -v script > /dev/null; then # on a terminal, a bar that only grows, with the time left
+        script -qec "build/bake $slow --out $OUT/seen.bake" "$OUT/seen" > /dev/null
+        tr '\r' '\n' < "$OUT/seen" | sed -n 's/^\[\(#*\)\.*\] *\([0-9]*\) %, [0-9]* s left .*/\2/p' > "$OUT/parts"
+        [ "$(wc -l < "$OUT/parts")" -ge 3 ] || { echo "no progress seen"; exit 1; }
+        sort -nc "$OUT/parts"
+    fi
     rm -f "$OUT"/*.tmp
 fi
 build/bake --help | grep -q -- '--merge'
