@@ -422,7 +422,8 @@ ISOGI_API isogi_result isogi_trace_export_scales(const isogi_trace *trace, int f
    from the same description: so a bake is resumed, and boxes baked apart (desc.box_first) are merged by loading one after the other, to
    the bits of one bake that never stopped. FEEDBACK promises these bits of full bakes within the same interval of isovalues (whole cubes
    are saved, ISOGI_TRACE_CUBE), and of lazy ones that were asked for everything while they had nothing to do (all of it is saved, or
-   nothing yet); what is asked for after that was finished would have shared its probes, and differs as lazy light does (see Determinism).
+   nothing yet: who asks for more all the time should let a step come to its end before); what is asked for after that was finished would
+   have shared its probes, and differs as lazy light does (see Determinism).
    Only desc.isovalue_min, isovalue_max, lazy, lookup and box may differ; else the answer is ISOGI_INVALID (lighting, tables and the
    ranges of the volume's blocks are compared by hash; a material function cannot be).
    Any bytes may be loaded: those that are damaged, cut off or of another layout are ISOGI_CORRUPT and change nothing (what is left of a
@@ -4098,7 +4099,7 @@ static uint32_t isogi_trace__block(const isogi_trace *t, int level) {
 /* Samples of a node are one stretch of a Sobol sequence. Texels near each other share its scramble, and each turns it (Cranley and
    Patterson 1976) by this much for a step along each axis, so that those around a texel, which the filter averages, are well spread
    together: on surfaces of all directions, with 1, 2 and 4 samples, by a search at random for the least low frequencies of their sum.
-   Probes are turned by the voxels' cell in which they lie. */
+   The first probe of a probes' cell is turned by the voxels' cell in which it lies. */
 static void isogi_trace__turn(const size_t texel[3], double turn[2]) {
     static const double step[2][3] = {{0.22891, 0.49289, 0.10247}, {0.85142, 0.83062, 0.54863}};
     int a;

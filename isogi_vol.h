@@ -76,11 +76,11 @@
    rays are faster than alone (twice to four times), from 500 on nothing is left to gain. There, rays of one isovalue that nearly
    coincide, up to sixteen in a row as in a tile of pixels, go as one and are faster still; rays that follow each other from one place
    come down to its leaf together, and where they are many (12 from a surface, 48 from elsewhere), they pass the cells round it at once,
-   as far as slopes there let none of them meet the surface. Elsewhere eight rays of a batch take turns, each up to where it reads memory,
-   which is half as fast again where rays share little. Cells are looked at in float first, from 8-bit voxels that lie together in two
-   cache lines for 4x4x4 cells, with an error bound: what is certain needs nothing else, and only cells in doubt, the hits and one cell for
-   every 25 rays besides, read your voxels and are solved in double. Where any hit will do, a ray is done once it is known to pass a block
-   that lies inside and one that lies outside.
+   as far as slopes there let none of them meet the surface; and where any hit will do, a ray is done once it is known to pass a block
+   that lies inside and one that lies outside. Without AVX-512 eight rays of a batch take turns, each up to where it reads memory, which
+   is half as fast again where rays share little. Everywhere cells are looked at in float first, from 8-bit voxels that lie together in
+   two cache lines for 4x4x4 cells, with an error bound: what is certain needs nothing else, and only cells in doubt, the hits and one
+   cell for every 25 rays besides, read your voxels and are solved in double.
 
    History  1.0  first release
 */
@@ -1903,7 +1903,7 @@ static isogi_result isogi_vol__fill_nodes(isogi_vol__build_job *job, const isogi
     return ISOGI_OK;
 }
 
-/* What single rays look up, see walk_one. */
+/* What rays by AVX2, and single ones by AVX-512, look up: see rides, and walk_one. */
 struct isogi_vol__ways {
     int32_t lane[ISOGI_VOL__NODE_LEVELS][16], row[ISOGI_VOL__NODE_LEVELS][16]; /* 0 1 2 3 children of a level, in cells, along rows of four
                                                                                   lanes, and down those rows */
@@ -1916,7 +1916,7 @@ struct isogi_vol__ways {
                                                   this level */
     uint64_t first[ISOGI_VOL__NODE_LEVELS]; /* of those nodes, in bytes */
     float size[ISOGI_VOL__NODE_LEVELS];  /* of a child, in cells */
-    float wide[ISOGI_VOL__NODE_LEVELS];  /* the same, with what rays alone widen it by on both sides */
+    float wide[ISOGI_VOL__NODE_LEVELS];  /* the same, with what rays alone widen it by on both sides (AVX-512) */
     float reach;                         /* that, on one side */
     float scale[256];                    /* steps of a leaf in a unit of nodes, by how far its bounds are apart */
     uint64_t above[ISOGI_VOL__NODE_LEVELS], digit[ISOGI_VOL__NODE_LEVELS]; /* digits of packed cells above children of a level;
@@ -4708,9 +4708,10 @@ typedef struct isogi_vol__trip {
     double origin[4], inverse[4];                    /* as in a pool; the fourth is 0 */
     double lead[4];                                  /* 1 on axes along which the ray falls, else 0 */
     double stop;                                     /* where the ray ends, as in a pool */
-    float cell[3], enter[ISOGI_VOL__NODE_LEVELS][3]; /* as in a course */
+    float cell[3], enter[ISOGI_VOL__NODE_LEVELS][3]; /* as in a course, see one ray alone */
     float last, level, reach;                        /* likewise; the isovalue in 8 bits; what children are widened by on each side */
-    int flip, octant, low, high, entry_axis, in, out;
+    int flip, octant, low, high, entry_axis;         /* as in a course */
+    int in, out;                                     /* axes by which the ray enters and leaves the present cell; 3: none */
     const uint8_t *children[ISOGI_VOL__NODE_LEVELS];     /* of the node of each level, */
     uint64_t left[ISOGI_VOL__NODE_LEVELS], cells;        /* those still to come, in the ray's order; of the leaf */
     int32_t place[ISOGI_VOL__NODE_LEVELS][4], child;     /* the nodes' coordinates; the last one's number in its parent */
@@ -4751,7 +4752,8 @@ ISOGI_VOL__INLINE void isogi_vol__ride_to_cell(isogi_vol__ride *r, int x, int y,
 }
 
 /* What is certain of the ray in a cell by the hull of Bernstein coefficients in float, from the leaf's voxels: 1: it stays on its side all
-   along; 2: it does not, and any hit will do; 0: nothing. f: values where by each axis (a bit) it enters the cell, 0, or leaves it, 1. */
+   along; 2: it is on the other one where it leaves the cell, and any hit will do; 0: nothing. f: values where by each axis (a bit) it
+   enters the cell, 0, or leaves it, 1. */
 ISOGI_VOL__INLINE int isogi_vol__told(isogi_vol__walk *w, const isogi_vol__leaf *leaf, const float f[8]) {
     const float high = leaf->isovalue + ISOGI_VOL__DOUBT, low = leaf->isovalue - ISOGI_VOL__DOUBT;
     const float sum1 = f[1] + f[2] + f[4], sum2 = f[3] + f[5] + f[6]; /* three coefficients each */
@@ -4950,7 +4952,8 @@ ISOGI_VOL__TARGET("avx2") static int isogi_vol__ride_set_trip(isogi_vol__ride *r
     int a;
     if (!(w->end > 1e-150) || !(w->end < 1e150)) return 0;
     _mm_storeu_ps(per, _mm256_cvtpd_ps(pace)), _mm_storeu_ps(at, _mm256_cvtpd_ps(start));
-    c->level = isogi_vol__quantise_isovalue(p, w->isovalue, &c->low, &c->high), c->reach = 2 * ISOGI_VOL__NEAR(p->node_levels);
+    c->level = isogi_vol__quantise_isovalue(p, w->isovalue, &c->low, &c->high);
+    c->reach = 2 * ISOGI_VOL__NEAR(p->node_levels); /* each level rounds twice, without fused multiply-adds */
     c->octant = _mm256_movemask_pd(fall), c->flip = (c->octant & 1 ? 3 : 0) | (c->octant & 2 ? 12 : 0) | (c->octant & 4 ? 48 : 0);
     memcpy(&bits, &w->end, sizeof bits), bits |= 3, memcpy(&c->stop, &bits, sizeof bits);
     _mm256_storeu_pd(c->origin, origin), _mm256_storeu_pd(c->inverse, inverse);
@@ -4977,7 +4980,7 @@ ISOGI_VOL__TARGET("avx2") ISOGI_VOL__INLINE uint64_t isogi_vol__layers_met(__m12
 #undef ISOGI_VOL__MET
 }
 
-/* Bits 0..15: every fourth of 64, in groups of four that are 16 apart. */
+/* Bits 0..15 in groups of four that are 16 apart. */
 ISOGI_VOL__INLINE uint64_t isogi_vol__spread_rows(uint64_t x) {
     x = (x | x << 24) & 0x000000ff000000ffu;
     return (x | x << 12) & 0x000f000f000f000fu;
@@ -5028,18 +5031,23 @@ ISOGI_VOL__INLINE int isogi_vol__passes_avx2(isogi_vol__trip *c, __m128i cell, d
     const __m256d lead = _mm256_loadu_pd(c->lead), origin = _mm256_loadu_pd(c->origin), inverse = _mm256_loadu_pd(c->inverse);
     const __m256d axes = _mm256_castsi256_pd(_mm256_setr_epi64x(0, 1, 2, 3));
     const __m256d time = _mm256_castsi256_pd(_mm256_set1_epi64x(~(int64_t)3));
-    __m256d t0 = _mm256_mul_pd(_mm256_sub_pd(_mm256_add_pd(at, lead), origin), inverse);
-    __m256d t1 = _mm256_mul_pd(_mm256_sub_pd(_mm256_sub_pd(_mm256_add_pd(at, _mm256_set1_pd(1)), lead), origin), inverse);
-    uint64_t bits[2];
-    t0 = _mm256_or_pd(_mm256_and_pd(_mm256_max_pd(t0, zero), time), axes);
-    t1 = _mm256_or_pd(_mm256_and_pd(_mm256_max_pd(t1, zero), time), axes);
-    t1 = _mm256_blend_pd(t1, _mm256_set1_pd(c->stop), 8);
-    t0 = _mm256_max_pd(t0, _mm256_permute2f128_pd(t0, t0, 1)), t1 = _mm256_min_pd(t1, _mm256_permute2f128_pd(t1, t1, 1));
-    *begin = _mm256_cvtsd_f64(_mm256_max_pd(t0, _mm256_permute_pd(t0, 5)));
-    *end = _mm256_cvtsd_f64(_mm256_min_pd(t1, _mm256_permute_pd(t1, 5)));
-    memcpy(&bits[0], begin, 8), memcpy(&bits[1], end, 8);
-    c->in = (int)(bits[0] & 3), c->out = (int)(bits[1] & 3);
-    return *begin < *end;
+    const __m256d t0 = _mm256_mul_pd(_mm256_sub_pd(_mm256_add_pd(at, lead), origin), inverse);
+    const __m256d t1 = _mm256_mul_pd(_mm256_sub_pd(_mm256_sub_pd(_mm256_add_pd(at, _mm256_set1_pd(1)), lead), origin), inverse);
+    /* as integers: the number of an axis alone is a denormal, which processors may be told to take for 0 */
+    __m256i in = _mm256_castpd_si256(_mm256_or_pd(_mm256_and_pd(_mm256_max_pd(t0, zero), time), axes)), other;
+    __m256i out = _mm256_castpd_si256(_mm256_or_pd(_mm256_and_pd(_mm256_max_pd(t1, zero), time), axes));
+    int64_t first, last;
+    out = _mm256_castpd_si256(_mm256_blend_pd(_mm256_castsi256_pd(out), _mm256_set1_pd(c->stop), 8));
+    other = _mm256_permute4x64_epi64(in, 0x4e), in = _mm256_blendv_epi8(in, other, _mm256_cmpgt_epi64(other, in));
+    other = _mm256_permute4x64_epi64(in, 0xb1), in = _mm256_blendv_epi8(in, other, _mm256_cmpgt_epi64(other, in));
+    other = _mm256_permute4x64_epi64(out, 0x4e), out = _mm256_blendv_epi8(out, other, _mm256_cmpgt_epi64(out, other));
+    other = _mm256_permute4x64_epi64(out, 0xb1), out = _mm256_blendv_epi8(out, other, _mm256_cmpgt_epi64(out, other));
+    first = _mm_cvtsi128_si64(_mm256_castsi256_si128(in)), last = _mm_cvtsi128_si64(_mm256_castsi256_si128(out));
+    c->in = (int)(first & 3), c->out = (int)(last & 3);
+    if (first >= last) return 0;
+    first &= ~(int64_t)3, last &= ~(int64_t)3;
+    memcpy(begin, &first, sizeof first), memcpy(end, &last, sizeof last);
+    return 1;
 }
 
 /* cell_told, eight values at a time: x, then y, then z is taken where the ray enters the cell and where it leaves it. code: of the cell's
@@ -8036,7 +8044,7 @@ static isogi_result isogi_vol__trace(isogi_vol__batch *b, size_t count, isogi_co
         isogi_vol__trace_pool(b, count), i = count;
     else
 #endif
-    if (b->pyramid->fast && count > 1) isogi_vol__trace_rides(b), i = count;
+    if (b->pyramid->fast && b->pyramid->path < ISOGI_VOL__PATH_AVX512 && count > 1) isogi_vol__trace_rides(b), i = count;
     for (; i < count; i++) {
         if (b->bundles && i / b->each != b->opened) isogi_vol__open_bundle(b, i / b->each);
         isogi_vol__trace_one(b, i);
@@ -9654,12 +9662,8 @@ ISOGI_API void isogi_vol_mesh_free(const isogi_pyramid *pyramid, isogi_mesh *mes
 #undef ISOGI_VOL__CODES
 #undef ISOGI_VOL__RIDES
 #undef ISOGI_VOL__DOUBT
-#undef ISOGI_VOL__LEAF_AVX2
-#undef ISOGI_VOL__LEAF_BASE
 #undef ISOGI_VOL__MUL
 #undef ISOGI_VOL__NEAR
-#undef ISOGI_VOL__NODE_AVX2
-#undef ISOGI_VOL__NODE_BASE
 #undef ISOGI_VOL__POOL
 #undef ISOGI_VOL__CLEARED
 #undef ISOGI_VOL__ROUND
@@ -9724,10 +9728,6 @@ ISOGI_API void isogi_vol_mesh_free(const isogi_pyramid *pyramid, isogi_mesh *mes
 #undef ISOGI_VOL__FAST_SIZE
 #undef ISOGI_VOL__TICKS
 #undef ISOGI_VOL__LEFT
-#undef ISOGI_VOL__WALK
-#undef ISOGI_VOL__WALK_CELL
-#undef ISOGI_VOL__WALK_TOP
-#undef ISOGI_VOL__WALKS
 #undef ISOGI_VOL__TARGET
 #undef ISOGI_VOL__AVX512
 #undef ISOGI_VOL__AVX
@@ -9742,11 +9742,6 @@ ISOGI_API void isogi_vol_mesh_free(const isogi_pyramid *pyramid, isogi_mesh *mes
 #undef ISOGI_VOL__UNLIKELY
 #undef ISOGI_VOL__PREFETCH
 #undef ISOGI_VOL__SSE2
-#undef ISOGI_VOL__AVX
-#undef ISOGI_VOL__TARGET
-#undef ISOGI_VOL__WALKS
-#undef ISOGI_VOL__WALK_CELL
-#undef ISOGI_VOL__WALK_TOP
 #undef ISOGI_VOL__UNLIMITED
 #undef ISOGI_VOL__ON_SURFACE
 #undef ISOGI_VOL__ROUNDING

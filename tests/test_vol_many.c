@@ -90,6 +90,12 @@ static void note(account *a, const char *what, const scene *s, int kind, int pat
              (double)ray->dir[0], (double)ray->dir[1], (double)ray->dir[2], ray->isovalue, hit->side, hit->t, truth);
 }
 
+/* Whether it is not the first hit, for certain. */
+static int is_other(const scene *s, const isogi_ray *ray, const isogi_hit *hit) {
+    const reference_hit truth = wide_intersect(s, ray);
+    return truth.decided && !wide_same_hit(s, ray, hit->t, truth.t);
+}
+
 static void compare_task(void *arg, size_t i) {
     const crowd *c = (const crowd *)arg;
     account *a = &c->task[i];
@@ -124,8 +130,7 @@ static void compare_task(void *arg, size_t i) {
             }
             a->hits += truth.side != 0;
             if (hits[k].side != truth.side) a->wrong++, note(a, "side", &s, kind, path, &rays[k], &hits[k], truth.side);
-            else if (truth.side && (hits[k].t < truth.t[0] - 1e-9 || hits[k].t > truth.t[1] + 1e-9) &&
-                     !wide_same_hit(&s, &rays[k], hits[k].t, wide_intersect(&s, &rays[k]).t))
+            else if (truth.side && (hits[k].t < truth.t[0] - 1e-9 || hits[k].t > truth.t[1] + 1e-9) && is_other(&s, &rays[k], &hits[k]))
                 a->misplaced++, note(a, "another hit", &s, kind, path, &rays[k], &hits[k], truth.side);
             else if (truth.side) { /* the field at the hit is the isovalue */
                 double corner[8], value = -rays[k].isovalue;
