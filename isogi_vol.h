@@ -4706,7 +4706,7 @@ typedef struct isogi_vol__steps {
 /* By masks of children, with AVX2: as one ray alone goes with AVX-512, see there. */
 typedef struct isogi_vol__trip {
     double origin[4], inverse[4];                    /* as in a pool; the fourth is 0 */
-    double lead[4];                                  /* 1 on axes along which the ray falls, else 0 */
+    int32_t lead[4];                                 /* 1 on axes along which the ray falls, else 0 */
     double stop;                                     /* where the ray ends, as in a pool */
     float cell[3], enter[ISOGI_VOL__NODE_LEVELS][3]; /* as in a course, see one ray alone */
     float last, level, reach;                        /* likewise; the isovalue in 8 bits; what children are widened by on each side */
@@ -4957,7 +4957,7 @@ ISOGI_VOL__TARGET("avx2") static int isogi_vol__ride_set_trip(isogi_vol__ride *r
     c->octant = _mm256_movemask_pd(fall), c->flip = (c->octant & 1 ? 3 : 0) | (c->octant & 2 ? 12 : 0) | (c->octant & 4 ? 48 : 0);
     memcpy(&bits, &w->end, sizeof bits), bits |= 3, memcpy(&c->stop, &bits, sizeof bits);
     _mm256_storeu_pd(c->origin, origin), _mm256_storeu_pd(c->inverse, inverse);
-    _mm256_storeu_pd(c->lead, _mm256_and_pd(fall, _mm256_set1_pd(1)));
+    for (a = 0; a < 4; a++) c->lead[a] = c->octant >> a & 1;
     for (a = 0; a < 3; a++) c->cell[a] = per[a], c->enter[top][a] = (-c->reach - at[a]) * per[a];
     memset(c->place[top], 0, sizeof c->place[top]);
     c->last = (float)(isogi_vol__min(w->end * _mm256_cvtsd_f64(most), 1e30) * 1.000001);
@@ -5027,12 +5027,13 @@ ISOGI_VOL__INLINE uint64_t isogi_vol__turn_mask(uint64_t m, int octant) {
 /* Whether the ray passes a cell as pools have it, when it enters and leaves it, and by which axes; 3: none. */
 ISOGI_VOL__TARGET("avx2")
 ISOGI_VOL__INLINE int isogi_vol__passes_avx2(isogi_vol__trip *c, __m128i cell, double *begin, double *end) {
-    const __m256d at = _mm256_cvtepi32_pd(cell), zero = _mm256_setzero_pd();
-    const __m256d lead = _mm256_loadu_pd(c->lead), origin = _mm256_loadu_pd(c->origin), inverse = _mm256_loadu_pd(c->inverse);
+    const __m128i lead = _mm_loadu_si128((const __m128i *)(const void *)c->lead), near_face = _mm_add_epi32(cell, lead);
+    const __m128i far_face = _mm_sub_epi32(_mm_add_epi32(cell, _mm_set1_epi32(1)), lead);
+    const __m256d origin = _mm256_loadu_pd(c->origin), inverse = _mm256_loadu_pd(c->inverse), zero = _mm256_setzero_pd();
     const __m256d axes = _mm256_castsi256_pd(_mm256_setr_epi64x(0, 1, 2, 3));
     const __m256d time = _mm256_castsi256_pd(_mm256_set1_epi64x(~(int64_t)3));
-    const __m256d t0 = _mm256_mul_pd(_mm256_sub_pd(_mm256_add_pd(at, lead), origin), inverse);
-    const __m256d t1 = _mm256_mul_pd(_mm256_sub_pd(_mm256_sub_pd(_mm256_add_pd(at, _mm256_set1_pd(1)), lead), origin), inverse);
+    const __m256d t0 = _mm256_mul_pd(_mm256_sub_pd(_mm256_cvtepi32_pd(near_face), origin), inverse);
+    const __m256d t1 = _mm256_mul_pd(_mm256_sub_pd(_mm256_cvtepi32_pd(far_face), origin), inverse);
     /* as integers: the number of an axis alone is a denormal, which processors may be told to take for 0 */
     __m256i in = _mm256_castpd_si256(_mm256_or_pd(_mm256_and_pd(_mm256_max_pd(t0, zero), time), axes)), other;
     __m256i out = _mm256_castpd_si256(_mm256_or_pd(_mm256_and_pd(_mm256_max_pd(t1, zero), time), axes));
@@ -6605,18 +6606,17 @@ static void isogi_vol__trace_one(isogi_vol__batch *b, size_t i) {
 
 /* The next ray that goes from node to node gets on; those before it that do not are done with. 0: there is none. */
 static int isogi_vol__ride_begin(isogi_vol__batch *b, isogi_vol__ride *r, size_t *next) {
-    isogi_hit any;
     while (*next < b->count) {
         const size_t i = (*next)++;
-        isogi_hit *hit = b->hits ? &b->hits[i] : &any;
+        isogi_hit any;
         int found = 0;
         if (b->bundles && i / b->each != b->opened) isogi_vol__open_bundle(b, i / b->each);
         r->number = i, r->flags = isogi_vol__flags(b, i);
         if (isogi_vol__begin(b, i, &r->walk)) {
             if (!isogi_vol__ride_set(r)) {
                 isogi_vol__first_cell(&r->walk);
-                found = isogi_vol__walk_on(&r->walk, r->flags, hit);
-            } else if (!isogi_vol__enters_inside(&r->walk, hit)) return 1;
+                found = isogi_vol__walk_on(&r->walk, r->flags, b->hits ? &b->hits[i] : &any);
+            } else if (!isogi_vol__enters_inside(&r->walk, b->hits ? &b->hits[i] : &any)) return 1;
             else found = 1;
         }
         isogi_vol__finish(b, i, &r->walk, found);
@@ -6626,16 +6626,16 @@ static int isogi_vol__ride_begin(isogi_vol__batch *b, isogi_vol__ride *r, size_t
 
 static void isogi_vol__trace_rides(isogi_vol__batch *b) {
     isogi_vol__ride ride[ISOGI_VOL__RIDES];
-    isogi_hit any;
     size_t next = 0;
     int n = 0, i = 0;
     while (n < ISOGI_VOL__RIDES && isogi_vol__ride_begin(b, &ride[n], &next)) n++;
     for (; n; i = i + 1 < n ? i + 1 : 0) {
         isogi_vol__ride *r = &ride[i];
-        isogi_hit *hit = b->hits ? &b->hits[r->number] : &any;
-        const int found = isogi_vol__ride_on(r, 1, hit);
+        isogi_hit any;
+        const int found = isogi_vol__ride_on(r, 1, b->hits ? &b->hits[r->number] : &any);
         if (found < 0) continue;
-        isogi_vol__finish(b, r->number, &r->walk, found || isogi_vol__leaves_inside(&r->walk, r->flags, hit));
+        isogi_vol__finish(b, r->number, &r->walk,
+                          found || isogi_vol__leaves_inside(&r->walk, r->flags, b->hits ? &b->hits[r->number] : &any));
         if (!isogi_vol__ride_begin(b, r, &next) && i != --n) *r = ride[n];
     }
 }
