@@ -6593,7 +6593,7 @@ static void isogi_vol__finish(isogi_vol__batch *b, size_t i, const isogi_vol__wa
     else if (!found) memset(&b->hits[i], 0, sizeof b->hits[i]);
 }
 
-static void isogi_vol__trace_one(isogi_vol__batch *b, size_t i) {
+ISOGI_VOL__NOINLINE static void isogi_vol__trace_one(isogi_vol__batch *b, size_t i) {
     isogi_vol__ride r;
     isogi_hit any;
     const int walks = isogi_vol__begin(b, i, &r.walk);
@@ -6624,7 +6624,7 @@ static int isogi_vol__ride_begin(isogi_vol__batch *b, isogi_vol__ride *r, size_t
     return 0;
 }
 
-static void isogi_vol__trace_rides(isogi_vol__batch *b) {
+ISOGI_VOL__NOINLINE static void isogi_vol__trace_rides(isogi_vol__batch *b) {
     isogi_vol__ride ride[ISOGI_VOL__RIDES];
     size_t next = 0;
     int n = 0, i = 0;
