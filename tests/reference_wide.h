@@ -15,7 +15,7 @@ __extension__ typedef __float128 wide;
 typedef long double wide;
 #define WIDE_BITS 64
 #define WIDE_SNAP 1e-14
-#define WIDE_ROUNDING 1
+#define WIDE_ROUNDING 0x1p-8
 #endif
 
 /* Without libquadmath, which not every processor has: a root from double by three Newton steps, for values whose square is in range. */
@@ -254,7 +254,7 @@ __attribute__((unused)) static double wide_speed(const scene *s, const isogi_ray
 __attribute__((unused)) static reference_hit wide_intersect(const scene *s, const isogi_ray *ray) {
     const wide tolerance = (wide)rounding(s, ray) * (wide)WIDE_ROUNDING;
     reference_hit hit = wide_read(s, ray, tolerance, 1), other = wide_read(s, ray, tolerance, 0);
-    hit.decided = hit.side == other.side && fabs((double)(hit.t - other.t)) * wide_speed(s, ray) < 1e-9;
+    hit.decided = hit.side == other.side && fabs((double)(hit.t - other.t)) * wide_speed(s, ray) < (WIDE_BITS == 113 ? 1e-9 : 1e-2);
     return hit;
 }
 
