@@ -5080,11 +5080,26 @@ ISOGI_VOL__INLINE int isogi_vol__cell_told_avx2(isogi_vol__walk *w, const isogi_
     return isogi_vol__told(w, leaf, f);
 }
 
+/* The digits x, y, z of a child's number. */
+ISOGI_VOL__TARGET("avx2") ISOGI_VOL__INLINE __m128i isogi_vol__digits(const struct isogi_vol__ways *ways, int child) {
+    return _mm_load_si128((const __m128i *)(const void *)ways->inner[child]);
+}
+
 /* The coordinates of a node's child among nodes of its level. */
-ISOGI_VOL__TARGET("avx2") ISOGI_VOL__INLINE __m128i isogi_vol__inner_avx2(const struct isogi_vol__ways *ways, const int32_t node[4],
-                                                                           int child) {
-    return _mm_add_epi32(_mm_slli_epi32(_mm_loadu_si128((const __m128i *)(const void *)node), 2),
-                         _mm_load_si128((const __m128i *)(const void *)ways->inner[child]));
+ISOGI_VOL__TARGET("avx2") ISOGI_VOL__INLINE __m128i isogi_vol__inner(const struct isogi_vol__ways *ways, __m128i node, int child) {
+    return _mm_add_epi32(_mm_slli_epi32(node, 2), isogi_vol__digits(ways, child));
+}
+
+/* The 64 children of a node of level n, from its coordinates. */
+ISOGI_VOL__TARGET("avx2") ISOGI_VOL__INLINE const uint8_t *isogi_vol__children(const isogi_pyramid *p, int n, __m128i node) {
+    __m128i number = _mm_mullo_epi32(node, _mm_load_si128((const __m128i *)(const void *)p->ways->stride[n - 1]));
+    number = _mm_add_epi32(number, _mm_shuffle_epi32(number, 0x4e));
+    number = _mm_add_epi32(number, _mm_shuffle_epi32(number, 0xb1));
+    return (const uint8_t *)p->nodes + p->ways->first[n - 1] + ((size_t)(uint32_t)_mm_cvtsi128_si32(number) << 13);
+}
+
+ISOGI_VOL__TARGET("avx2") ISOGI_VOL__INLINE __m128i isogi_vol__trip_place(const isogi_vol__trip *c, int n) {
+    return _mm_loadu_si128((const __m128i *)(const void *)c->place[n]);
 }
 
 /* Opens the node that was sent for. */
@@ -5095,12 +5110,8 @@ ISOGI_VOL__TARGET("avx2") ISOGI_VOL__INLINE void isogi_vol__trip_open(isogi_vol_
     const uint64_t way = isogi_vol__way_avx2(c, p->ways, n, c->child);
     r->walk.count.blocks++;
     if (n) {
-        const __m128i stride = _mm_load_si128((const __m128i *)(const void *)p->ways->stride[n - 1]);
-        __m128i number = _mm_mullo_epi32(_mm_loadu_si128((const __m128i *)(const void *)c->place[n]), stride);
-        number = _mm_add_epi32(number, _mm_shuffle_epi32(number, 0x4e));
-        number = _mm_add_epi32(number, _mm_shuffle_epi32(number, 0xb1));
         c->left[n] = way & isogi_vol__turn_mask(isogi_vol__node_mask_avx2(r->open, c->low, c->high), c->octant);
-        c->children[n] = (const uint8_t *)p->nodes + p->ways->first[n - 1] + ((size_t)(uint32_t)_mm_cvtsi128_si32(number) << 13);
+        c->children[n] = isogi_vol__children(p, n, isogi_vol__trip_place(c, n));
         c->pending |= (unsigned)(c->left[n] != 0) << n;
     } else c->cells = way & isogi_vol__turn_mask(isogi_vol__leaf_mask_avx2(r->open, c->level, &r->leaf), c->octant);
     r->open = NULL;
@@ -5114,7 +5125,7 @@ ISOGI_VOL__TARGET("avx2") ISOGI_VOL__INLINE int isogi_vol__trip_next(isogi_vol__
     n = __builtin_ctz(c->pending), c->child = __builtin_ctzll(c->left[n]), here = c->child ^ c->flip;
     c->left[n] &= c->left[n] - 1;
     if (!c->left[n]) c->pending &= c->pending - 1;
-    _mm_storeu_si128((__m128i *)(void *)c->place[n - 1], isogi_vol__inner_avx2(r->walk.pyramid->ways, c->place[n], here));
+    _mm_storeu_si128((__m128i *)(void *)c->place[n - 1], isogi_vol__inner(r->walk.pyramid->ways, isogi_vol__trip_place(c, n), here));
     isogi_vol__ride_to(r, c->children[n] + 128 * here);
     r->at = n - 1;
     return 1;
@@ -5126,7 +5137,7 @@ ISOGI_VOL__TARGET("avx2") ISOGI_VOL__INLINE int isogi_vol__trip_cell(isogi_vol__
     isogi_vol__walk *w = &r->walk;
     const struct isogi_vol__ways *ways = w->pyramid->ways;
     const int child = __builtin_ctzll(c->cells) ^ c->flip;
-    const __m128i cell = isogi_vol__inner_avx2(ways, c->place[0], child);
+    const __m128i cell = isogi_vol__inner(ways, isogi_vol__trip_place(c, 0), child);
     const int x = _mm_cvtsi128_si32(cell), y = _mm_extract_epi32(cell, 1), z = _mm_extract_epi32(cell, 2);
     double begin, end;
     if (!r->looked && isogi_vol__passes_avx2(c, cell, &begin, &end)) {
@@ -6320,16 +6331,6 @@ static uint64_t isogi_vol__cut_order(const isogi_vol__leaf *leaf, int octant, ui
     return mask & (octant & 4 ? ~(uint64_t)0 << 16 * z : ~(uint64_t)0 >> 16 * z);
 }
 
-/* The digits x, y, z of a child's number. */
-ISOGI_VOL__AVX512 ISOGI_VOL__INLINE __m128i isogi_vol__digits(const struct isogi_vol__ways *ways, int child) {
-    return _mm_load_si128((const __m128i *)(const void *)ways->inner[child]);
-}
-
-/* The coordinates of a node's child among nodes of its level. */
-ISOGI_VOL__AVX512 ISOGI_VOL__INLINE __m128i isogi_vol__inner(const struct isogi_vol__ways *ways, __m128i node, int child) {
-    return _mm_add_epi32(_mm_slli_epi32(node, 2), isogi_vol__digits(ways, child));
-}
-
 /* Whether a ray passes a cell as pools have it, and the axes by which it enters and leaves it; 3: none. */
 ISOGI_VOL__AVX512 ISOGI_VOL__INLINE int isogi_vol__passes(const isogi_vol__course *c, __m128i cell, int *in, int *out) {
     const __m256d at = _mm256_cvtepi32_pd(cell), next = _mm256_add_pd(at, _mm256_set1_pd(1)), lead = _mm256_load_pd(c->lead);
@@ -6516,10 +6517,7 @@ ISOGI_VOL__AVX512 static int isogi_vol__walk_one(isogi_vol__walk *w, isogi_hit *
         uint64_t mask = isogi_vol__way(&c, ways, n, child) & isogi_vol__held(ways, c.octant, c.low, c.high, node);
         w->count.blocks++;
         if (mask) {
-            __m128i number = _mm_mullo_epi32(place[n], _mm_load_si128((const __m128i *)(const void *)ways->stride[n - 1]));
-            number = _mm_add_epi32(number, _mm_shuffle_epi32(number, 0x4e));
-            number = _mm_add_epi32(number, _mm_shuffle_epi32(number, 0xb1));
-            children[n] = (const uint8_t *)p->nodes + ways->first[n - 1] + ((size_t)(uint32_t)_mm_cvtsi128_si32(number) << 13);
+            children[n] = isogi_vol__children(p, n, place[n]);
             if (n == 1) {
                 found = isogi_vol__walk_leaves(w, &c, children[1], mask, place[1], hit);
                 if (found) break;
@@ -6572,6 +6570,11 @@ static int isogi_vol__leaves_inside(isogi_vol__walk *w, uint32_t flags, isogi_hi
     return w->inside == 1 && isogi_vol__cap_exit(w, hit);
 }
 
+static int isogi_vol__walk_plainly(isogi_vol__ride *r, isogi_hit *hit) {
+    isogi_vol__first_cell(&r->walk);
+    return isogi_vol__walk_on(&r->walk, r->flags, hit);
+}
+
 /* Walks a ray that is set up: fast where that is right, else plainly. */
 static int isogi_vol__walk_ray(isogi_vol__ride *r, isogi_hit *hit) {
     isogi_vol__walk *w = &r->walk;
@@ -6583,8 +6586,7 @@ static int isogi_vol__walk_ray(isogi_vol__ride *r, isogi_hit *hit) {
 #endif
     if (w->pyramid->fast && isogi_vol__ride_set(r))
         return isogi_vol__enters_inside(w, hit) || isogi_vol__ride_on(r, 0, hit) || isogi_vol__leaves_inside(w, r->flags, hit);
-    isogi_vol__first_cell(w);
-    return isogi_vol__walk_on(w, r->flags, hit);
+    return isogi_vol__walk_plainly(r, hit);
 }
 
 static void isogi_vol__finish(isogi_vol__batch *b, size_t i, const isogi_vol__walk *w, int found) {
@@ -6613,10 +6615,8 @@ static int isogi_vol__ride_begin(isogi_vol__batch *b, isogi_vol__ride *r, size_t
         if (b->bundles && i / b->each != b->opened) isogi_vol__open_bundle(b, i / b->each);
         r->number = i, r->flags = isogi_vol__flags(b, i);
         if (isogi_vol__begin(b, i, &r->walk)) {
-            if (!isogi_vol__ride_set(r)) {
-                isogi_vol__first_cell(&r->walk);
-                found = isogi_vol__walk_on(&r->walk, r->flags, b->hits ? &b->hits[i] : &any);
-            } else if (!isogi_vol__enters_inside(&r->walk, b->hits ? &b->hits[i] : &any)) return 1;
+            if (!isogi_vol__ride_set(r)) found = isogi_vol__walk_plainly(r, b->hits ? &b->hits[i] : &any);
+            else if (!isogi_vol__enters_inside(&r->walk, b->hits ? &b->hits[i] : &any)) return 1;
             else found = 1;
         }
         isogi_vol__finish(b, i, &r->walk, found);
