@@ -39,16 +39,18 @@ all: $(EXAMPLES)
 # time. A test that looks at what is private to a header (isogi_vol__name), or sets what it is compiled with, holds that header's
 # implementation itself. Test programs are compiled at -O1, in half the time: what they test is in those objects, as its users compile it.
 # The headers that take longest come first. Tests that look inside, or run programs, do little themselves and are compiled at -O0.
-HEADERS := dvr vol sh trace
-OBJECTS := $(HEADERS:%=build/isogi_%.o)
+HEADERS := dvr:DVR vol:VOL sh:SH trace:TRACE
+OBJECTS := $(foreach h,$(HEADERS),build/isogi_$(firstword $(subst :, ,$(h))).o)
 
 # What a source file includes is found by the compiler (the .d files). A line "LIBS: -lname" in a test's first comment names
 # libraries of its own, "FLAGS: -O0" options. What does not compile must not leave an older program behind.
-COMPILE = @rm -f $@; echo "$(CC) $<"; \
-	libs=$$(sed -n '1,20s|.*LIBS: \([^*]*\).*|\1|p' $<); \
-	flags=$$(sed -n '1,20s|.*FLAGS: \([^*]*\).*|\1|p' $<); \
-	shared=$$(for h in $(2); do H=ISOGI_$$(echo $$h | tr a-z A-Z); \
-		grep -q "isogi_$${h}__\|looks inside.*isogi_$$h\|define $${H}_LEVEL" $< || echo "-D$${H}_IMPLEMENTED build/isogi_$$h.o"; done); \
+COMPILE = @rm -f $@; echo "$(CC) $<"; libs= flags= shared=; \
+	eval "$$(sed -n '1,20{s|.*LIBS: \([^*]*\).*|libs="\1"|p;s|.*FLAGS: \([^*]*\).*|flags="\1"|p;}' $<)"; \
+	inside=$$(grep -o 'isogi_[a-z]*__\|looks inside.*\|define ISOGI_[A-Z]*_LEVEL' $<); \
+	for h in $(HEADERS); do \
+		case $$inside in *isogi_$${h%:*}__* | *"looks inside"*isogi_$${h%:*}* | *ISOGI_$${h\#*:}_LEVEL*) ;; \
+		*) shared="$$shared -DISOGI_$${h\#*:}_IMPLEMENTED build/isogi_$${h%:*}.o" ;; esac; \
+	done; \
 	$(CC) $(C99) $(CFLAGS) -MMD -MP -MF $@.d -MT $@ $(1) $$flags -o $@ $< $$shared $(LIBS) $$libs
 
 # As strict C99; what the compiler said is kept for the tests, which want silence.
@@ -57,7 +59,7 @@ $(OBJECTS): build/%.o: %.h tests/compile/one.c build/flags
 		-D$$(echo $* | tr a-z A-Z)_IMPLEMENTATION -c -o $@ tests/compile/one.c 2> $@.said; status=$$?; cat $@.said >&2; exit $$status
 
 build/%: examples/%.c build/flags $(OBJECTS)
-	$(call COMPILE,,$(HEADERS))
+	$(call COMPILE)
 
 # MPI's headers do not keep to our warnings.
 build/bake_mpi: examples/bake_mpi.c build/flags
@@ -65,17 +67,17 @@ build/bake_mpi: examples/bake_mpi.c build/flags
 		-MF $@.d -MT $@ -o $@ $< $(LIBS)
 
 build/tests/%: tests/%.c build/flags $(OBJECTS)
-	$(call COMPILE,$(if $(filter -O2,$(CFLAGS)),-O1) -Itests,$(HEADERS))
+	$(call COMPILE,$(if $(filter -O2,$(CFLAGS)),-O1) -Itests)
 
 build/bench/%: tests/bench/%.c build/flags $(OBJECTS)
-	$(call COMPILE,-Itests,$(HEADERS))
+	$(call COMPILE,-Itests)
 
 # with the peers whose folders are named
 HARMONICS := $(if $(SPHERICART),-DPEER_SPHERICART -isystem "$(SPHERICART)/include" \
 	"-L$(SPHERICART)/lib" "-Wl$(comma)-rpath$(comma)$(SPHERICART)/lib") \
 	$(if $(SHTNS),-DPEER_SHTNS -isystem "$(SHTNS)" "-L$(SHTNS)")
 build/bench/peer_harmonics: tests/bench/peer_harmonics.c build/flags $(OBJECTS) FORCE
-	$(call COMPILE,$(HARMONICS),$(HEADERS)) $(if $(SPHERICART),-lsphericart) $(if $(SHTNS),-lshtns -lfftw3)
+	$(call COMPILE,$(HARMONICS)) $(if $(SPHERICART),-lsphericart) $(if $(SHTNS),-lshtns -lfftw3)
 
 # VTK 9, as Debian's libvtk9-dev installs it.
 VTK      := $(notdir $(lastword $(sort $(wildcard /usr/include/vtk-9*))))

@@ -169,7 +169,7 @@ TEST(endless_light_is_reported) {
     double q[5] = {15.5, 15.5, 15.5, 8, 13}, open[5] = {16, 15, 16, 22.3, 12};
     isogi_albedo_point glow[1] = {{0, {1, 1, 1}}};
     const float albedo[4] = {1, 0.99f, 1, 0.9993f};
-    for (int variant = 0; variant < 4; variant++) {
+    for (int variant = 0; variant < (LONG_SUITE ? 4 : 3); variant++) {
         scene s = scene_make(32, 32, 32, NULL, variant == 2 ? pit : shell, variant == 2 ? open : q);
         isogi_trace_desc d = feedback(&s, albedo[variant], -1, 8);
         isogi_trace *t = NULL;
@@ -392,7 +392,7 @@ TEST(uneven_skies_get_more_rays) {
     double q[5] = {12, 11, 12, 13, 8}, o[4] = {12, 12, 12, 8}, told[4];
     scene s = scene_make(24, 24, 24, NULL, pit, q), round = scene_make(24, 24, 24, NULL, ball, o);
     int n = surface_points(&s, 0, 200, 7, points);
-    for (int k = 0; k < 4; k++) {
+    for (int k = 0; k < 4; k += LONG_SUITE ? 1 : 3) {
         const double uneven = sky_with_patch(image, HEIGHT, bright[k]);
         double rays;
         bake_sums sum;
@@ -430,7 +430,7 @@ TEST(wide_lights_get_more_rays) {
     double q[5] = {12, 11, 12, 13, 8}, o[4] = {12, 12, 12, 8};
     scene s = scene_make(24, 24, 24, NULL, pit, q), round = scene_make(24, 24, 24, NULL, ball, o);
     int n = surface_points(&s, 0, 100, 7, points);
-    for (int k = 0; k < LIGHTS; k++) {
+    for (int k = 0; k < LIGHTS; k += LONG_SUITE ? 1 : 2) {
         const double wide = k > 1;
         double rays, expected = 0;
         bake_sums sum;
@@ -504,115 +504,6 @@ TEST(soft_shadows_are_not_blurred) {
     CHECK(sqrt(rms[0]) < 0.61 * sqrt(rms[1]) && fabs(leak[0]) < 0.045, "error %.4f, unfiltered %.4f, leak %.4f", sqrt(rms[0]), sqrt(rms[1]),
           leak[0]);
     scene_free(&s);
-}
-
-/* What is fitted is a plane: weights sum to 1, and where the texel itself counts for nothing, light that is linear in place comes out
-   as it is, from texels on one side alone, too. */
-TEST(planes_are_fitted_exactly) {
-    for (int run = 0; run < 200; run++) {
-        double weight[40], sum = 0, first[3] = {0, 0, 0};
-        int apart[40][3], n = 8 + run % 32;
-        for (int i = 0; i < n; i++) {
-            uint64_t key = isogi_trace__mix((uint64_t)(64 * run + i + 1));
-            weight[i] = 0.1 + isogi_trace__unit(key);
-            for (int a = 0; a < 3; a++) apart[i][a] = (int)(isogi_trace__mix(key + (uint64_t)a) % 5) - (run % 2 ? 0 : 2);
-        }
-        double moment[10] = {0}, plane[4];
-        for (int i = 0; i < n; i++) {
-            const double w = weight[i], x = apart[i][0], y = apart[i][1], z = apart[i][2];
-            const double of[10] = {1, x, y, z, x * x, y * y, z * z, x * y, x * z, y * z};
-            for (int a = 0; a < 10; a++) moment[a] += w * of[a];
-        }
-        isogi_trace__fit(moment, 1e-9, plane);
-        for (int i = 0; i < n; i++) {
-            weight[i] *= plane[0] + plane[1] * apart[i][0] + plane[2] * apart[i][1] + plane[3] * apart[i][2];
-            sum += weight[i];
-            for (int a = 0; a < 3; a++) first[a] += weight[i] * apart[i][a];
-        }
-        CHECK(fabs(sum - 1) < 1e-12, "run %d: weights sum to 1 %+g", run, sum - 1);
-        for (int a = 0; a < 3; a++) CHECK(fabs(first[a]) < 1e-6, "run %d: axis %d: %g", run, a, first[a]);
-    }
-}
-
-/* ---- what texels share with one of them: the filter's dense blocks ---- */
-
-enum { DENSE_CENTRE = 3 + 10 * (3 + 10 * 3) };
-static isogi_trace__dense dense;
-
-/* A texel of a surface that faces z, without slope; its mean and luminance are light. */
-static void dense_put(int x, int y, int z, int samples, double light, double variance) {
-    const int row = 3 + y + 10 * (3 + z), at = 10 * row + 3 + x;
-    dense.filled[row] = (uint16_t)(dense.filled[row] | 1u << (3 + x));
-    dense.samples[at] = (float)samples, dense.share[at] = 1 / (float)samples, dense.steps[at] = 1, dense.normal[2][at] = 1;
-    dense.luminance[at] = dense.mean[0][at] = dense.mean[1][at] = dense.mean[2][at] = (float)light;
-    dense.variance[at] = dense.guessed[at] = (float)variance, dense.noise[at] = (float)(0.5 + 4.0 / samples);
-    dense.albedo[0][at] = dense.albedo[1][at] = dense.albedo[2][at] = 0.5f;
-}
-
-/* All widths of vectors give the same bits, of blocks full and nearly empty, in one colour and in several. */
-TEST(blends_are_the_same_bits_on_all_paths) {
-    int shared = 0;
-    for (int run = 0; run < 400; run++) {
-        isogi_trace__blend one, other;
-        memset(&dense, 0, sizeof dense), memset(&one, 0, sizeof one);
-        dense.unit = 1, dense.tinted = run % 2;
-        for (int i = 0; i < 1000; i++) {
-            double u[12];
-            for (int k = 0; k < 12; k++) u[k] = isogi_trace__unit(isogi_trace__mix((uint64_t)(12000 * run + 12 * i + k)));
-            if (u[0] * 8 > 1 + run % 8) continue;
-            dense.filled[i / 10] = (uint16_t)(dense.filled[i / 10] | 1u << i % 10);
-            dense.samples[i] = (float)floor(1 + 20 * u[1] * u[1]), dense.share[i] = 1 / dense.samples[i];
-            dense.high[i] = (float)u[2], dense.low[i] = (float)(1e-8 * u[3]);
-            dense.steps[i] = (float)(1 + u[4]), dense.guessed[i] = (float)(0.2 * u[5]), dense.noise[i] = (float)(0.5 + u[6]);
-            dense.normal[0][i] = (float)(0.5 * u[7]), dense.normal[2][i] = 0.9f, dense.luminance[i] = (float)(0.5 + 0.5 * u[8]);
-            dense.lights[i] = (float)u[9], dense.variance[i] = (float)u[10];
-            dense.hidden[i] = (float)u[1], dense.reflected[i] = (float)u[2];
-            for (int a = 0; a < 3; a++)
-                dense.mean[a][i] = (float)u[a], dense.albedo[a][i] = (float)u[8 - a], dense.glow[a][i] = (float)(0.1 * u[11 - a]);
-        }
-        for (int path = 0; path < 3; path++) { /* plain, vectors of 4, of 8 where the machine has them */
-            static isogi_trace t;
-            t.context.force_path = !path, t.wide = 0;
-#if defined(__x86_64__) && defined(__GNUC__)
-            t.wide = path == 2 && __builtin_cpu_supports("avx2");
-#endif
-            isogi_trace__blend_of(&t, &dense, DENSE_CENTRE + (size_t)run % 4 * 111, path ? &other : &one);
-            if (!path) shared += one.alike > 0, other = one;
-            CHECK(!memcmp(&one, &other, sizeof one), "run %d, path %d: %.9g %.9g", run, path, one.rgb[0], other.rgb[0]);
-        }
-    }
-    CHECK(shared > 200, "%d texels share light", shared);
-}
-
-/* Two texels side by side tell no slope of their own: three samples a texel away say that light is even. Least squares of the light a
-   here and slope s, with noise that hides the difference and weights 1 and w:  (0 - a) + w (1 - a - s) = 0,  w (1 - a - s) = 3 s. */
-TEST(slopes_of_the_filter_have_a_penalty) {
-    isogi_trace__blend b;
-    double w = pow(1 / (1 + 1.0 / 24 / 8), 8);
-    memset(&dense, 0, sizeof dense);
-    dense_put(0, 0, 0, 4, 0, 10), dense_put(1, 0, 0, 4, 1, 10);
-    isogi_trace__blend_plain(&dense, DENSE_CENTRE, &b);
-    CHECK(fabs(b.rgb[0] - 3 / (4 + 3 / w)) < 1e-4, "light %g, expected %g", b.rgb[0], 3 / (4 + 3 / w));
-}
-
-/* One new sample among texels that have millions, on a slanted plane: the fit finds their linear light, and is worth no less than they are
-   counted as, 10000 times as many samples each. */
-TEST(many_samples_beside_few_can_be_fitted) {
-    for (int run = 0; run < 20; run++) {
-        isogi_trace__blend b;
-        int count = 0;
-        memset(&dense, 0, sizeof dense);
-        for (int x = -3; x <= 3; x++)
-            for (int y = -3; y <= 3; y++) {
-                const int z = -x - y, own = !x && !y, many = (int)(isogi_trace__mix((uint64_t)(100 * run + 10 * x + y)) % 16777216);
-                if (x * x + y * y + z * z > 12) continue;
-                dense_put(x, y, z, own ? 1 : 1 + many, 1 + 0.1 * x - 0.05 * y, own ? 10 : 5);
-                count++;
-            }
-        isogi_trace__blend_plain(&dense, DENSE_CENTRE, &b);
-        CHECK(count > 12 && fabs(b.rgb[0] - 1) < 1e-3, "run %d: light %g of %d texels", run, b.rgb[0], count);
-        CHECK(b.alike > 1e4 && isogi_trace__finite(b.alike), "run %d: worth %g samples", run, b.alike);
-    }
 }
 
 /* A texel's error keeps .18 of its own variance, which stands for what the filter blurs: there where many texels share their light, it
@@ -1486,7 +1377,7 @@ TEST(report_is_that_of_all_texels) {
    steps, for both sides, adaptively. All texels of the cubes that a box meets are baked, no others. */
 TEST(parts_by_feedback_are_the_whole) {
     double q[1] = {0.35};
-    const size_t size[3] = {ISOGI_TRACE_CUBE + 9, 11, ISOGI_TRACE_CUBE + 5};
+    const size_t size[3] = {ISOGI_TRACE_CUBE + 9, LONG_SUITE ? 11 : 6, ISOGI_TRACE_CUBE + 5};
     scene s = scene_make((int)size[0], (int)size[1], (int)size[2], NULL, gyroid, q);
     for (int k = 0; k < (LONG_SUITE ? 5 : 2); k++) {
         isogi_trace_desc d = feedback(&s, 0.7f, k == 1 ? 2 : -1, k == 1 ? 4 : 3);

@@ -172,7 +172,7 @@ TEST(extreme_values_spacings_and_origins_hit_like_the_reference) {
     test_random r = {3};
     for (int k = 0; k < 4; k++) {
         tally t = {0};
-        for (int v = 0; v < 6; v++) {
+        for (int v = 0; v < (LONG_SUITE ? 6 : 3); v++) {
             scene s = scene_new(7, 9, 6);
             scene_noise(&s, 0, &r);
             for (size_t i = 0; i < scene_voxels(&s); i++) s.value[i] *= unit[k];
