@@ -48,10 +48,11 @@
    - ISOGI_API                  linkage of public functions, if extern does not suit
 
    Memory       Through isogi_context, or malloc. A pyramid takes about 2.2 bytes for every voxel: bounds of blocks, and all voxels
-                in 8 bits of their block's range; and 31 KB. Blocks of blocks are whole, so thin volumes take more: 7 bytes a voxel
-                where they are 5 voxels thick along one axis, 17 with 2: cut large fields into thick chunks. From malloc, blocks of
-                4 MB and more ask Linux for huge pages: a pyramid is then built in 1/5 (virtual machines) to 7/10 of the time. Where
-                your voxels lie in such pages, too (madvise, or isogi_allocate), many rays are 5 to 10 % faster.
+                in 8 bits of their block's range; and 31 KB. Of a volume that is marked compact it keeps the bounds alone, 1/5 byte for
+                every voxel, and rays are slower. Blocks of blocks are whole, so thin volumes take more: 7 bytes a voxel where they are
+                5 voxels thick along one axis, 17 with 2: cut large fields into thick chunks. From malloc, blocks of 4 MB and more ask
+                Linux for huge pages: a pyramid is then built in 1/5 (virtual machines) to 7/10 of the time. Where your voxels lie in
+                such pages, too (madvise, or isogi_allocate), many rays are 5 to 10 % faster.
                 A mesh keeps some 3/4 byte of scratch memory for every voxel until it is freed.
                 Stack use stays below 32 KB.
    Threads      A pyramid is const once built: any number of threads may read it. Building, updating, prefiltering and meshing use the
@@ -237,6 +238,9 @@ typedef struct isogi_volume {
                             ISOGI_F64, for those that are in data */
     /* of a chunk: see above; first up to 2^53, halos up to 2^31-1, without use along an axis of one voxel */
     size_t first[3], halo_low[3], halo_high[3];
+    int compact; /* 1: a pyramid keeps bounds alone, in 1/5 byte for every voxel instead of 2.2. Rays have the same hits, but read the voxels
+                    of four times as many cells: single ones take twice as long and batches of incoherent ones five times as long with
+                    AVX-512, half as long again without. 0: for speed */
 } isogi_volume;
 
 ISOGI_API isogi_result isogi_volume_validate(const isogi_volume *volume);
@@ -1009,7 +1013,7 @@ struct isogi_pyramid {
     size_t broken_count;
     float (*blocks)[2];
     /* bounds for fast rays: nodes of 64 children, least[64] then largest[64], in 8 bits over the volume's range; node n of level 0
-       stands for block n and is a leaf, which holds voxels instead */
+       stands for block n and is a leaf, which holds voxels instead; a compact volume has no leaves */
     uint8_t (*nodes)[128];
     size_t node_count;
     isogi_vol__node_level node_level[ISOGI_VOL__NODE_LEVELS];
@@ -1654,9 +1658,19 @@ static void isogi_vol__unit_row(const isogi_vol__build_job *job, size_t x, size_
 /* A leaf is the node of 4x4x4 cells. It holds no bounds but its voxels: voxel (x,y,z), 0..4 each, at byte x + 5y + 25z, in steps of
    1/254 of what lies between the leaf's own 8-bit bounds, rounded down. So the same two cache lines tell which cells hold the surface,
    and what it does in them to some 2 % of what the field changes by in a cell: enough to see that most rays miss it there. */
-enum { ISOGI_VOL__LEAF_LOW = 125, ISOGI_VOL__LEAF_HIGH, ISOGI_VOL__LEAF_CUT }; /* bounds; 3 - (cells - 1) of each axis, 2 bits each */
+enum { ISOGI_VOL__LEAF_LOW = 125, ISOGI_VOL__LEAF_HIGH, ISOGI_VOL__LEAF_CUT }; /* bounds; see cut_of */
 #define ISOGI_VOL__CODES 254.0f
 #define ISOGI_VOL__DOUBT 0.625f /* error of a value made of codes + 0.5, in steps */
+
+/* How many cells of a block are beyond the volume along each axis, 2 bits each. */
+ISOGI_VOL__INLINE int isogi_vol__cut_of(const isogi_pyramid *p, const size_t block[3]) {
+    int cut = 0, a;
+    for (a = 0; a < 3; a++) {
+        const size_t cells = (size_t)p->cells[a] - 4 * block[a];
+        cut |= (int)(cells < 4 ? 4 - cells : 0) << 2 * a;
+    }
+    return cut;
+}
 
 /* Five voxels of a row for each of a strip's leaves; eight bytes are written, of which later rows overwrite three. */
 ISOGI_VOL__INLINE void isogi_vol__code_row(const float *row, int leaves, const float *low, const float *scale, uint8_t (*out)[128],
@@ -1812,7 +1826,7 @@ static void isogi_vol__build_strip(const isogi_vol__build_job *job, size_t x0, s
     const int count = rest < ISOGI_VOL__STRIP + 1 ? (int)rest : ISOGI_VOL__STRIP + 1, leaves = (count - 1 + 3) / 4;
     float low[ISOGI_VOL__STRIP / 4], scale[ISOGI_VOL__STRIP / 4];
     uint8_t leaf[ISOGI_VOL__STRIP / 4][128], bound[ISOGI_VOL__STRIP / 4][2];
-    int i, a;
+    int i;
     for (i = leaves; i & 3; i++) low[i] = scale[i] = 0; /* vectors hold four leaves */
     for (i = 0; i < leaves; i++) {
         const size_t bx = x0 / 4 + (size_t)i;
@@ -1824,11 +1838,8 @@ static void isogi_vol__build_strip(const isogi_vol__build_job *job, size_t x0, s
     for (i = 0; i < leaves; i++) {
         size_t block[3];
         block[0] = x0 / 4 + (size_t)i, block[1] = by, block[2] = bz;
-        leaf[i][ISOGI_VOL__LEAF_LOW] = bound[i][0], leaf[i][ISOGI_VOL__LEAF_HIGH] = bound[i][1], leaf[i][ISOGI_VOL__LEAF_CUT] = 0;
-        for (a = 0; a < 3; a++) {
-            const size_t cells = (size_t)p->cells[a] - 4 * block[a];
-            leaf[i][ISOGI_VOL__LEAF_CUT] |= (uint8_t)((cells < 4 ? 4 - cells : 0) << 2 * a);
-        }
+        leaf[i][ISOGI_VOL__LEAF_LOW] = bound[i][0], leaf[i][ISOGI_VOL__LEAF_HIGH] = bound[i][1];
+        leaf[i][ISOGI_VOL__LEAF_CUT] = (uint8_t)isogi_vol__cut_of(p, block);
         memcpy(p->nodes[isogi_vol__node_at(p, 0, block[0], by, bz)], leaf[i], sizeof leaf[i]);
     }
 }
@@ -1883,7 +1894,7 @@ ISOGI_VOL__COLD static size_t isogi_vol__plan_node_levels(isogi_pyramid *p) {
             level->size[a] = (((size_t)p->cells[a] - 1) >> (2 * n + 2)) + 1, level->parents[a] = (level->size[a] + 3) / 4;
             nodes *= level->size[a];
         }
-        count += 64 * level->parents[0] * level->parents[1] * level->parents[2];
+        if (n || !p->volume.compact) count += 64 * level->parents[0] * level->parents[1] * level->parents[2];
     }
     p->node_levels = n;
     return count;
@@ -1892,7 +1903,8 @@ ISOGI_VOL__COLD static size_t isogi_vol__plan_node_levels(isogi_pyramid *p) {
 /* The nodes over the blocks of a job, on all levels. */
 static isogi_result isogi_vol__fill_nodes(isogi_vol__build_job *job, const isogi_context *context) {
     const isogi_pyramid *p = job->pyramid;
-    isogi_result result = isogi_parallel(context, job->last[2] - job->first[2] + 1, isogi_vol__build_leaves, job, 0.5, 1);
+    const size_t tasks = p->volume.compact ? 0 : job->last[2] - job->first[2] + 1;
+    isogi_result result = isogi_parallel(context, tasks, isogi_vol__build_leaves, job, 0.5, 1);
     size_t node[3];
     int n;
     if (result != ISOGI_OK) return result;
@@ -4053,7 +4065,7 @@ static int isogi_vol__walk_on(isogi_vol__walk *w, uint32_t flags, isogi_hit *hit
 /* A leaf as one isovalue sees it. Numbers of voxels are x + step (c ... c + 1) with errors below 1/32 of a step, and so is the isovalue:
    codes >= inside are certainly inside, codes < outside certainly outside. */
 typedef struct isogi_vol__leaf {
-    const uint8_t *code;
+    const uint8_t *code; /* NULL where there are no leaves: nothing is known of cells but that the block holds the isovalue */
     float isovalue; /* in steps, for voxels of code + 0.5 */
     int inside, outside;
 } isogi_vol__leaf;
@@ -4087,8 +4099,7 @@ ISOGI_VOL__INLINE uint64_t isogi_vol__pack_cells(uint64_t low, uint64_t high) {
 }
 
 /* Without the cells beyond the volume. */
-ISOGI_VOL__INLINE uint64_t isogi_vol__cut_cells(const isogi_vol__leaf *leaf, uint64_t mask) {
-    const int cut = leaf->code[ISOGI_VOL__LEAF_CUT];
+ISOGI_VOL__INLINE uint64_t isogi_vol__cut_cells(int cut, uint64_t mask) {
     if (ISOGI_VOL__UNLIKELY(cut)) {
         mask &= 0x1111111111111111u * (15u >> (cut & 3));
         mask &= 0x0001000100010001u * (0xffffu >> 4 * (cut >> 2 & 3));
@@ -4097,12 +4108,19 @@ ISOGI_VOL__INLINE uint64_t isogi_vol__cut_cells(const isogi_vol__leaf *leaf, uin
     return mask;
 }
 
+/* Where there are no leaves: any cell of the block can hold the surface. */
+ISOGI_VOL__INLINE uint64_t isogi_vol__no_leaf(const isogi_pyramid *p, size_t x, size_t y, size_t z, isogi_vol__leaf *leaf) {
+    size_t block[3];
+    block[0] = x, block[1] = y, block[2] = z, leaf->code = NULL;
+    return isogi_vol__cut_cells(isogi_vol__cut_of(p, block), ~(uint64_t)0);
+}
+
 /* Which of the 64 cells (x + 4y + 16z) can hold the surface, from the voxels that are certainly inside and outside. */
 ISOGI_VOL__INLINE uint64_t isogi_vol__mixed_cells(const isogi_vol__leaf *leaf, uint64_t in_low, uint64_t in_high, uint64_t out_low,
                                                   uint64_t out_high) {
     isogi_vol__all_corners(&in_low, &in_high);
     isogi_vol__all_corners(&out_low, &out_high);
-    return isogi_vol__cut_cells(leaf, ~isogi_vol__pack_cells(in_low | out_low, in_high | out_high));
+    return isogi_vol__cut_cells(leaf->code[ISOGI_VOL__LEAF_CUT], ~isogi_vol__pack_cells(in_low | out_low, in_high | out_high));
 }
 
 ISOGI_VOL__INLINE uint64_t isogi_vol__leaf_mask(const uint8_t node[128], float level, isogi_vol__leaf *leaf) {
@@ -4233,6 +4251,11 @@ ISOGI_VOL__TARGET("avx2") static int isogi_vol__mixed_cell_avx2(isogi_vol__walk 
     w->cell[0] = x, w->cell[1] = y, w->cell[2] = z, w->entry_axis = in;
     c0 = _mm256_sub_pd(_mm256_add_pd(_mm256_mul_pd(c0, scale), bias), isovalue);
     c1 = _mm256_sub_pd(_mm256_add_pd(_mm256_mul_pd(c1, scale), bias), isovalue);
+    sides = _mm256_movemask_pd(_mm256_cmp_pd(c0, zero, _CMP_GE_OQ)) | _mm256_movemask_pd(_mm256_cmp_pd(c1, zero, _CMP_GE_OQ)) << 4;
+    if ((sides == 0 || sides == 255) && !w->deflate && w->inside != !sides) {
+        w->inside = sides != 0;
+        return 0;
+    }
     /* when the ray passes the faces; every lane gets the number of the one that counts */
     begin = _mm256_and_pd(_mm256_mul_pd(_mm256_sub_pd(_mm256_add_pd(cell, enter), origin), inverse), in_lane);
     end = _mm256_blend_pd(_mm256_mul_pd(_mm256_sub_pd(_mm256_add_pd(cell, leave), origin), inverse), segment_end, 8);
@@ -4241,7 +4264,6 @@ ISOGI_VOL__TARGET("avx2") static int isogi_vol__mixed_cell_avx2(isogi_vol__walk 
     begin = _mm256_or_pd(begin, _mm256_permute_pd(begin, 5)), end = _mm256_or_pd(end, _mm256_permute_pd(end, 5));
     begin = _mm256_max_pd(begin, zero), end = _mm256_max_pd(_mm256_min_pd(end, segment_end), begin);
     w->t = _mm256_cvtsd_f64(begin);
-    sides = _mm256_movemask_pd(_mm256_cmp_pd(c0, zero, _CMP_GE_OQ)) | _mm256_movemask_pd(_mm256_cmp_pd(c1, zero, _CMP_GE_OQ)) << 4;
     w->deflate &= w->t <= w->deflated;
     w->deflated = _mm256_cvtsd_f64(end);
     if (sides == 0 || sides == 255) {
@@ -4871,15 +4893,19 @@ static void isogi_vol__ride_down(isogi_vol__ride *r) {
         if (n < 2) to[a] = 4 * s->node[n + 1][a] + (int)(child >> 2 * a & 3);
         else to[a] = s->ticks.mirror[a] ? (s->ticks.mirror[a] >> 6) - s->node[3][a] : s->node[3][a];
     }
-    isogi_vol__ride_to(r, p->nodes[isogi_vol__node_at(p, n, (size_t)to[0], (size_t)to[1], (size_t)to[2])]);
+    if (n || !p->volume.compact) isogi_vol__ride_to(r, p->nodes[isogi_vol__node_at(p, n, (size_t)to[0], (size_t)to[1], (size_t)to[2])]);
+    else r->open = p->nodes[0]; /* there is nothing to be read */
 }
 
 /* Opens the node that was sent for; 0: it has no child that can hold the surface. */
 static int isogi_vol__ride_open(isogi_vol__ride *r) {
     isogi_vol__steps *s = &r->by.steps;
     const isogi_vol__ticks *k = &s->ticks;
-    const int n = r->at;
-    const uint64_t mask = n ? isogi_vol__node_mask(r->open, k->low, k->high) : isogi_vol__leaf_mask(r->open, k->level, &r->leaf);
+    const isogi_pyramid *p = r->walk.pyramid;
+    const int n = r->at, *at = s->node[0];
+    const uint64_t mask = n                   ? isogi_vol__node_mask(r->open, k->low, k->high)
+                          : p->volume.compact ? isogi_vol__no_leaf(p, (size_t)at[0], (size_t)at[1], (size_t)at[2], &r->leaf)
+                                              : isogi_vol__leaf_mask(r->open, k->level, &r->leaf);
     r->walk.count.blocks++, r->open = NULL;
     s->mask[n] = mask;
     if (mask) s->place[n] = isogi_vol__descend(&s->place[n + 1], s->now);
@@ -4898,7 +4924,7 @@ static int isogi_vol__ride_cell(isogi_vol__ride *r, isogi_hit *hit) {
     for (a = 0; a < 3; a++) cell[a] = 4 * s->node[0][a] + (int)(child >> 2 * a & 3);
     if (!r->looked) {
         const double ends = isogi_vol__min((double)end * s->tick, w->end);
-        told = w->deflate ? 0 : isogi_vol__cell_told(w, &r->leaf, cell, (double)s->now * s->tick, ends);
+        told = w->deflate || !r->leaf.code ? 0 : isogi_vol__cell_told(w, &r->leaf, cell, (double)s->now * s->tick, ends);
         w->count.cells += told != 0;
         if (told) return told > 1;
         isogi_vol__ride_to_cell(r, cell[0], cell[1], cell[2]);
@@ -5111,9 +5137,15 @@ ISOGI_VOL__TARGET("avx2") ISOGI_VOL__INLINE void isogi_vol__trip_open(isogi_vol_
     r->walk.count.blocks++;
     if (n) {
         c->left[n] = way & isogi_vol__turn_mask(isogi_vol__node_mask_avx2(r->open, c->low, c->high), c->octant);
-        c->children[n] = isogi_vol__children(p, n, isogi_vol__trip_place(c, n));
+        c->children[n] = n > 1 || !p->volume.compact ? isogi_vol__children(p, n, isogi_vol__trip_place(c, n)) : NULL;
         c->pending |= (unsigned)(c->left[n] != 0) << n;
-    } else c->cells = way & isogi_vol__turn_mask(isogi_vol__leaf_mask_avx2(r->open, c->level, &r->leaf), c->octant);
+    } else {
+        const int32_t *at = c->place[0];
+        c->cells = way & isogi_vol__turn_mask(p->volume.compact
+                                                  ? isogi_vol__no_leaf(p, (size_t)at[0], (size_t)at[1], (size_t)at[2], &r->leaf)
+                                                  : isogi_vol__leaf_mask_avx2(r->open, c->level, &r->leaf),
+                                              c->octant);
+    }
     r->open = NULL;
 }
 
@@ -5126,7 +5158,8 @@ ISOGI_VOL__TARGET("avx2") ISOGI_VOL__INLINE int isogi_vol__trip_next(isogi_vol__
     c->left[n] &= c->left[n] - 1;
     if (!c->left[n]) c->pending &= c->pending - 1;
     _mm_storeu_si128((__m128i *)(void *)c->place[n - 1], isogi_vol__inner(r->walk.pyramid->ways, isogi_vol__trip_place(c, n), here));
-    isogi_vol__ride_to(r, c->children[n] + 128 * here);
+    if (c->children[n]) isogi_vol__ride_to(r, c->children[n] + 128 * here);
+    else r->open = r->walk.pyramid->nodes[0]; /* there is nothing to be read */
     r->at = n - 1;
     return 1;
 }
@@ -5141,7 +5174,9 @@ ISOGI_VOL__TARGET("avx2") ISOGI_VOL__INLINE int isogi_vol__trip_cell(isogi_vol__
     const int x = _mm_cvtsi128_si32(cell), y = _mm_extract_epi32(cell, 1), z = _mm_extract_epi32(cell, 2);
     double begin, end;
     if (!r->looked && isogi_vol__passes_avx2(c, cell, &begin, &end)) {
-        const int told = w->deflate ? 0 : isogi_vol__cell_told_avx2(w, &r->leaf, r->leaf.code + ways->lowest[0][child], cell, begin, end);
+        const int told = w->deflate || !r->leaf.code
+                             ? 0
+                             : isogi_vol__cell_told_avx2(w, &r->leaf, r->leaf.code + ways->lowest[0][child], cell, begin, end);
         w->count.cells += told != 0;
         if (told > 1) return 1;
         if (!told) {
@@ -6546,6 +6581,11 @@ ISOGI_VOL__AVX512 static int isogi_vol__walk_one(isogi_vol__walk *w, isogi_hit *
 
 /* ==== rays =========================================================================================================== */
 
+/* Whether rays go by AVX-512: those look into leaves. */
+ISOGI_VOL__INLINE int isogi_vol__is_wide(const isogi_pyramid *p) {
+    return p->fast && p->path == ISOGI_VOL__PATH_AVX512 && !p->volume.compact;
+}
+
 /* Fast rays look only at cells that may hold the surface. So a capped ray asks first whether it enters the box inside, by the arithmetic
    of visit_cell: what it says must not be taken back by a cell. */
 static int isogi_vol__enters_inside(isogi_vol__walk *w, isogi_hit *hit) {
@@ -6579,7 +6619,7 @@ static int isogi_vol__walk_plainly(isogi_vol__ride *r, isogi_hit *hit) {
 static int isogi_vol__walk_ray(isogi_vol__ride *r, isogi_hit *hit) {
     isogi_vol__walk *w = &r->walk;
 #ifdef ISOGI_VOL__AVX
-    if (w->pyramid->fast && w->pyramid->path == ISOGI_VOL__PATH_AVX512) {
+    if (isogi_vol__is_wide(w->pyramid)) {
         const int found = isogi_vol__enters_inside(w, hit) ? 1 : isogi_vol__walk_one(w, hit);
         if (found >= 0) return found || isogi_vol__leaves_inside(w, r->flags, hit);
     } else
@@ -8039,12 +8079,11 @@ static isogi_result isogi_vol__trace(isogi_vol__batch *b, size_t count, isogi_co
     size_t i = 0;
     b->count = count;
 #ifdef ISOGI_VOL__AVX
-    if (b->pyramid->fast && b->pyramid->path == ISOGI_VOL__PATH_AVX512 &&
-        (count > 3 || b->pyramid->context.force_path == ISOGI_VOL__PATH_AVX512))
+    if (isogi_vol__is_wide(b->pyramid) && (count > 3 || b->pyramid->context.force_path == ISOGI_VOL__PATH_AVX512))
         isogi_vol__trace_pool(b, count), i = count;
     else
 #endif
-    if (b->pyramid->fast && b->pyramid->path < ISOGI_VOL__PATH_AVX512 && count > 1) isogi_vol__trace_rides(b), i = count;
+    if (b->pyramid->fast && !isogi_vol__is_wide(b->pyramid) && count > 1) isogi_vol__trace_rides(b), i = count;
     for (; i < count; i++) {
         if (b->bundles && i / b->each != b->opened) isogi_vol__open_bundle(b, i / b->each);
         isogi_vol__trace_one(b, i);

@@ -363,6 +363,25 @@ TEST(every_scene_is_lit_in_volume_rendering) {
     }
 }
 
+TEST(compact_pyramids_take_less_memory_and_show_the_same) {
+    unsigned char *picture[2] = {NULL, NULL};
+    double memory[2] = {0, 0}, outliers = 1;
+    int shape[3];
+    for (int i = 0; i < 2; i++) {
+        char command[512];
+        snprintf(command, sizeof command, "procedural:engine-block:96 --mode lambert --raycast --shadows on --size 80x60 --stats %s --out '%s'",
+                 i ? "--compact" : "", temporary("compact.png"));
+        run_result r = run_viewer(command);
+        const char *line = strstr(r.output, "memory_bytes ");
+        CHECK(r.status == 0 && line, "%s: %s", command, r.error);
+        if (line) memory[i] = atof(line + 13);
+        picture[i] = read_picture(temporary("compact.png"), shape);
+    }
+    if (picture[0] && picture[1]) picture_difference(picture[0], picture[1], 80, 60, &outliers);
+    CHECK(outliers < 1e-3 && memory[0] - memory[1] > 1.8 * 96 * 96 * 57, "%.2f %% differ, %g and %g bytes", 100 * outliers, memory[0], memory[1]);
+    free(picture[0]), free(picture[1]);
+}
+
 /* Lines end as they do anywhere. */
 TEST(transfer_functions_end_their_lines_by_cr_or_lf) {
     static const char *const text[] = {"-1 0 1 .5 .2\n0 .3 1 .5 .2\n# half\n\n1 1 .2 .5 1\n",
@@ -479,7 +498,7 @@ static const struct { const char *with, *option, *same; } tried[] = {
     {"", "--step 2", ""}, {"--classification post-classified", "--step 2", ""}, {"", "--bound .01", ""}, {"--bound .01", "--step 2", ""},
     {"--bound .01 --method brute", "--step 3", ""}, {"", "--iso 0.3", ""}, {"", "--clip 1,0,0,-12", ""}, {"", "--exposure 0.4", ""},
     {"", "--aa 9", ""}, {"", "--up 1,0,0", ""}, {"", "--camera 10,20,3", ""}, {"", "--spacing 1,2,1", ""}};
-static const char apart[] = "--scene --mode --out --size --nan --compare --depth --threads --stats --help";
+static const char apart[] = "--scene --mode --out --size --nan --compare --depth --threads --compact --stats --help";
 
 /* The bytes of the picture; 0 where the words are refused, in one line. */
 static size_t picture_of(const char *mode, const char *words, unsigned char *bytes, size_t most) {
@@ -811,7 +830,7 @@ TEST(stats_are_key_value_lines_and_help_is_complete) {
                                         "--ambient",  "--fog",    "--gloss",     "--normals", "--offset",  "--reach",      "--storage",
                                         "--compare",  "--tf",     "--preset",    "--method",  "--order",   "--directions", "--grid",
                                         "--coarsest", "--bound",  "--local",     "--depth",   "--clip",    "--camera",     "--up",
-                                        "--threads",  "--out",    "--stats",  "procedural:", "Examples"};
+                                        "--threads",  "--out",    "--compact", "--stats",  "procedural:", "Examples"};
     char command[512];
     run_result r;
     snprintf(command, sizeof command, "procedural:gyroid:32 --size 32x32 --samples 8 --stats --out '%s'", temporary("stats.png"));

@@ -166,7 +166,8 @@ TEST(a_far_origin_costs_no_precision) {
     field_free(&f);
 }
 
-/* The fast walk and the plain one (force_path 1) are two designs: they must agree on large volumes, on any type, on any path. */
+/* The fast walk and the plain one (force_path 1) are two designs: they must agree on large volumes, on any type, on any path; paths 5 and 6:
+   compact volumes, by the best path and by the portable one. */
 static void compare_walks(int path) {
     test_random r = {20};
     long different = 0, hits = 0;
@@ -186,8 +187,9 @@ static void compare_walks(int path) {
         }
         isogi_volume v = {.data = data, .type = (isogi_type)type, .size = {(size_t)size[0], (size_t)size[1], (size_t)size[2]}};
         if (type == ISOGI_U16) v.scale = 0.01, v.bias = -3;
-        isogi_context plain = {.threads = 1, .force_path = 1}, fast = {.threads = 1, .force_path = path};
+        isogi_context plain = {.threads = 1, .force_path = 1}, fast = {.threads = 1, .force_path = path < 5 ? path : 2 * (path - 5)};
         isogi_pyramid *a = NULL, *b = NULL;
+        v.compact = path > 4;
         isogi_vol_build(&a, &v, &fast);
         isogi_vol_build(&b, &v, &plain);
         field f = {{size[0], size[1], size[2]}, NULL, {0}, NULL};
@@ -221,7 +223,7 @@ static void compare_batches(int path, int kind) {
     enum { COUNT = 3000 };
     test_random r = {21};
     field f = field_new(40, 71, 53);
-    isogi_context plain = {.threads = 1, .force_path = 1}, fast = {.threads = 1, .force_path = path};
+    isogi_context plain = {.threads = 1, .force_path = 1}, fast = {.threads = 1, .force_path = path < 5 ? path : 2 * (path - 5)};
     isogi_pyramid *a = NULL, *b = NULL;
     isogi_ray *rays = (isogi_ray *)malloc(COUNT * sizeof *rays);
     isogi_hit *hits = (isogi_hit *)malloc(COUNT * sizeof *hits), *starts = (isogi_hit *)malloc(COUNT * sizeof *starts);
@@ -229,6 +231,7 @@ static void compare_batches(int path, int kind) {
     uint8_t *occluded = (uint8_t *)malloc(COUNT);
     long different = 0, found = 0;
     field_fill(&f, kind, &r);
+    f.volume.compact = path > 4;
     isogi_vol_build(&a, &f.volume, &fast), isogi_vol_build(&b, &f.volume, &plain);
     for (int i = 0; i < COUNT; i++) {
         double d[3];
@@ -267,7 +270,7 @@ static void compare_batches(int path, int kind) {
 }
 
 TEST(batches_agree_with_single_rays) {
-    for (int path = 0; path < 5; path++)
+    for (int path = 0; path < 7; path++)
         for (int kind = 0; kind < KINDS; kind++) compare_batches(path, kind);
 }
 
@@ -275,6 +278,10 @@ TEST(the_best_and_the_plain_walk_agree) { compare_walks(0); }
 TEST(the_portable_and_the_plain_walk_agree) { compare_walks(2); }
 TEST(the_avx2_and_the_plain_walk_agree) { compare_walks(3); }
 TEST(the_avx512_and_the_plain_walk_agree) { compare_walks(4); }
+TEST(the_walks_of_compact_volumes_and_the_plain_one_agree) {
+    compare_walks(5);
+    if (LONG_SUITE) compare_walks(6);
+}
 
 /* ---- no leaks ---- */
 

@@ -29,7 +29,7 @@ static int same_pyramid(const isogi_pyramid *a, const isogi_pyramid *b) {
                    a->level[n].range[i][1] <= b->level[n].range[i][1] && a->level[n].range[i][1] >= b->level[n].range[i][1];
     if (!same || !a->fast) return same;
     same = a->node_levels == b->node_levels && a->node_scale <= b->node_scale && a->node_scale >= b->node_scale;
-    for (int n = 0; n < a->node_levels && same; n++)
+    for (int n = a->volume.compact != 0; n < a->node_levels && same; n++)
         for (size_t z = 0; z < a->node_level[n].size[2]; z++)
             for (size_t y = 0; y < a->node_level[n].size[1]; y++)
                 for (size_t x = 0; x < a->node_level[n].size[0]; x++) {
@@ -73,7 +73,8 @@ static void check_updates(isogi_type type, double scale, double bias, int shape,
     const size_t sizes[4][3] = {{300, 9, 13}, {20, 33, 30}, {70, 1, 6}, {5, 5, 4}}, *size = sizes[shape];
     size_t voxels = size[0] * size[1] * size[2];
     void *raw = calloc(voxels, 8), *base = calloc(voxels, 8);
-    isogi_volume v = {.data = raw, .type = type, .size = {size[0], size[1], size[2]}, .scale = scale, .bias = bias};
+    isogi_volume v = {.data = raw, .type = type, .size = {size[0], size[1], size[2]}, .scale = scale, .bias = bias,
+        .compact = type % 2 && scale < 1};
     isogi_context context = {.threads = 1, .force_path = shape};
     isogi_pyramid *updated = NULL, *fresh = NULL;
     for (size_t i = 0; i < voxels; i++) store(base, type, i, floor(random_range(r, 20, 100)) + 1e-9 * random_unit(r));

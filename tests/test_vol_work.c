@@ -146,6 +146,43 @@ TEST(rays_look_at_few_nodes_and_cells_and_solve_hardly_more_cubics_than_hits) {
     }
 }
 
+/* Without leaves rays read the voxels of all cells that they pass in blocks of 4^3 that hold the isovalue, and of no others. */
+TEST(rays_of_compact_volumes_look_at_blocks_that_hold_the_isovalue_alone) {
+    static const work most[2][2] = {{{10, 13.5, 3.2}, {11, 15.5, 4}}, {{11.5, 13, 3.2}, {12, 15.5, 4}}};
+    int n = LONG_SUITE ? 256 : 128;
+    for (int gyroid = 0; gyroid < 2; gyroid++) {
+        float *data = field_new(n, gyroid);
+        isogi_ray *rays = (isogi_ray *)malloc(RAYS * sizeof *rays);
+        isogi_hit *hits[2];
+        isogi_volume volume = {.data = data, .type = ISOGI_F32, .size = {(size_t)n, (size_t)n, (size_t)n}};
+        for (int i = 0; i < 2; i++) hits[i] = (isogi_hit *)malloc(RAYS * sizeof(isogi_hit));
+        for (int a = 0; a < 3; a++) volume.spacing[a] = 2.0 / (n - 1), volume.origin[a] = -1;
+        for (int path = 2; path < 5; path++) {
+            isogi_context context = {.threads = 1, .force_path = path};
+            isogi_pyramid *pyramid[2];
+            rays_new(rays, gyroid ? 0 : 0.5);
+            for (int compact = 0; compact < 2; compact++) {
+                volume.compact = compact;
+                CHECK(isogi_vol_build(&pyramid[compact], &volume, &context) == ISOGI_OK, "path %d", path);
+            }
+            for (int surface = 0; surface < 2; surface++) {
+                long different = 0;
+                if (surface) leave_surface(pyramid[0], rays, n);
+                const work full = count_work(pyramid[0], rays, RAYS, hits[0]), done = count_work(pyramid[1], rays, RAYS, hits[1]);
+                for (int i = 0; i < RAYS; i++) different += hits[0][i].side != hits[1][i].side || fabs(hits[0][i].t - hits[1][i].t) > 1e-9;
+                printf("    path %d: %.2f blocks, %.2f cells, %.3f cubics per ray; with leaves %.2f, %.2f, %.3f\n", path, done.blocks,
+                       done.cells, done.cubics, full.blocks, full.cells, full.cubics);
+                CHECK(!different, "path %d: %ld hits differ", path, different);
+                work_check("compact", path, done, &most[gyroid][surface]);
+                CHECK(done.cells > 2 * full.cells, "path %d: %g cells, with leaves %g: are there none?", path, done.cells, full.cells);
+            }
+            for (int compact = 0; compact < 2; compact++) isogi_vol_free(pyramid[compact]);
+        }
+        for (int i = 0; i < 2; i++) free(hits[i]);
+        free(rays), free(data);
+    }
+}
+
 /* A pool takes rays again and again, moves them when few are left, and reports each one once: in batches of any size, hits are
    the same, and so is the work for rays that do not coincide. Occlusion may be certain before a hit is. */
 TEST(batches_of_any_size_give_the_same_bits) {

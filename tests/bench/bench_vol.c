@@ -139,16 +139,18 @@ static void bench_rays(const scene *s, const char *name, const isogi_ray *rays, 
     bench_rays_by(s, name, "default", rays, batch, kind, usual);
 }
 
-/* As on machines without AVX-512, and without AVX2, too. */
+/* As on machines without AVX-512, and without AVX2, too; and on this one with a compact pyramid. */
 static void bench_paths(const scene *whole) {
-    static const char *const names[2] = {"without-avx2", "without-avx512"};
-    for (int path = 2; path < 4; path++) {
-        const isogi_context context = {.threads = 1, .force_path = path};
+    static const char *const names[3] = {"compact", "without-avx2", "without-avx512"};
+    for (int way = 0; way < 3; way++) {
+        const isogi_context context = {.threads = 1, .force_path = way ? way + 1 : 0};
+        isogi_volume volume = *isogi_vol_volume(whole->pyramid);
         scene s = *whole;
-        if (isogi_vol_build(&s.pyramid, isogi_vol_volume(whole->pyramid), &context) != ISOGI_OK) exit(1);
-        bench_rays_by(&s, "primary1", names[path - 2], s.primary, 1, FIRST, 0);
-        bench_rays_by(&s, "surface", names[path - 2], s.surface, RAYS, FIRST, 0);
-        bench_rays_by(&s, "bundle64", names[path - 2], s.bundles, BUNDLES * BUNDLE, SHARED, 0);
+        volume.compact = !way;
+        if (isogi_vol_build(&s.pyramid, &volume, &context) != ISOGI_OK) exit(1);
+        bench_rays_by(&s, "primary1", names[way], s.primary, 1, FIRST, 0);
+        bench_rays_by(&s, "surface", names[way], s.surface, RAYS, FIRST, 0);
+        bench_rays_by(&s, "bundle64", names[way], s.bundles, BUNDLES * BUNDLE, SHARED, 0);
         isogi_vol_free(s.pyramid);
     }
 }
