@@ -238,9 +238,9 @@ typedef struct isogi_volume {
                             ISOGI_F64, for those that are in data */
     /* of a chunk: see above; first up to 2^53, halos up to 2^31-1, without use along an axis of one voxel */
     size_t first[3], halo_low[3], halo_high[3];
-    int compact; /* 1: a pyramid keeps bounds alone, in 1/5 byte for every voxel instead of 2.2. Rays have the same hits, but read the voxels
-                    of four times as many cells: single ones take twice as long and batches of incoherent ones five times as long with
-                    AVX-512, half as long again without. 0: for speed */
+    int compact; /* 1: a pyramid keeps bounds alone, in 1/5 byte for every voxel instead of 2.2. Rays have the same hits, but read the
+                    voxels of four times as many cells: single ones take twice as long and batches of incoherent ones five times as
+                    long with AVX-512, half as long again without. 0: for speed */
 } isogi_volume;
 
 ISOGI_API isogi_result isogi_volume_validate(const isogi_volume *volume);

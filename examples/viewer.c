@@ -86,9 +86,9 @@ typedef struct options {
     uint64_t given; /* a bit for each of option_list */
     const char *volume, *env, *tf, *out, *compare, *depth;
     const scene *scene;
-    int width, height, mode, raycast, bounces, samples, threads, compact, stats, antialias, shading, classification, silhouette, transmission, order,
+    int width, height, mode, raycast, bounces, samples, threads, compact, stats, antialias, classification, silhouette, transmission, order,
         directions;
-    int lookup, shadows, ambient, normals, storage, method, coarsest, local, preset;
+    int lookup, shadows, ambient, normals, storage, method, shading, coarsest, local, preset;
     int has_size, has_iso, has_mode, has_spacing, has_albedo, has_preset, has_camera, has_up, has_nan, has_shading, has_shadows,
         has_ambient, has_gloss, has_step, has_transmission, has_method, has_coarsest, has_silhouette, has_classification;
     double step, bound, fog, gloss, offset, reach, isovalue, spacing[3], clip[ISOGI_DVR_MAX_PLANES][4], azimuth, elevation, distance, up[3],

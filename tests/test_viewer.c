@@ -369,7 +369,8 @@ TEST(compact_pyramids_take_less_memory_and_show_the_same) {
     int shape[3];
     for (int i = 0; i < 2; i++) {
         char command[512];
-        snprintf(command, sizeof command, "procedural:engine-block:96 --mode lambert --raycast --shadows on --size 80x60 --stats %s --out '%s'",
+        snprintf(command, sizeof command,
+                 "procedural:engine-block:96 --mode lambert --raycast --shadows on --size 80x60 --stats %s --out '%s'",
                  i ? "--compact" : "", temporary("compact.png"));
         run_result r = run_viewer(command);
         const char *line = strstr(r.output, "memory_bytes ");
@@ -378,7 +379,8 @@ TEST(compact_pyramids_take_less_memory_and_show_the_same) {
         picture[i] = read_picture(temporary("compact.png"), shape);
     }
     if (picture[0] && picture[1]) picture_difference(picture[0], picture[1], 80, 60, &outliers);
-    CHECK(outliers < 1e-3 && memory[0] - memory[1] > 1.8 * 96 * 96 * 57, "%.2f %% differ, %g and %g bytes", 100 * outliers, memory[0], memory[1]);
+    CHECK(outliers < 1e-3 && memory[0] - memory[1] > 1.8 * 96 * 96 * 57, "%.2f %% differ, %g and %g bytes", 100 * outliers, memory[0],
+          memory[1]);
     free(picture[0]), free(picture[1]);
 }
 

@@ -166,7 +166,7 @@ TEST(a_far_origin_costs_no_precision) {
     field_free(&f);
 }
 
-/* The fast walk and the plain one (force_path 1) are two designs: they must agree on large volumes, on any type, on any path; paths 5 and 6:
+/* The fast walk and the plain one (force_path 1) are two designs: they must agree on large volumes, on any type, on any path; paths 5, 6:
    compact volumes, by the best path and by the portable one. */
 static void compare_walks(int path) {
     test_random r = {20};
