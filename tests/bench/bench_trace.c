@@ -792,7 +792,7 @@ static void bench(FILE *csv, const char *name, int quick, int tables) {
     char setting[96];
     isogi_trace_desc d;
     if (!scene_load(&s, name)) return;
-    view(&s, dry ? 20 : quick ? 400 : 3000);
+    view(&s, dry ? 20 : quick ? 1500 : 3000);
     if (!reference_make(&s)) exit(1);
     if (tables) {
         table2(csv, &s), lattice_table(csv, &s), table1(csv, &s), scene_unload(&s);
