@@ -20,7 +20,7 @@ build/viewer $hydrogen --mode dvr --out "$pieces/volume-1.png"
 build/viewer $hydrogen --mode scale-invariant --out "$pieces/volume-2.png"
 build/strip "$out/volume.png" "$pieces/volume-1.png" "$pieces/volume-2.png"
 
-# The paper's figures 4 to 7 and 9 to 12: a picture for each argument, which is added to $same, at the exposure of the last one.
+# The paper's figures 4 to 12: a picture for each argument, which is added to $same, at the exposure of the last one.
 strip() { # NAME ARGUMENTS...
     name=$1 parts= n=0
     shift
@@ -42,6 +42,8 @@ strip figure-6 "--lookup closest-isovalue" "--lookup nearest" "--lookup trilinea
 strip figure-7 "--mode pathtrace --samples 2" "--samples 2" "--samples 8" "--samples 32"
 same="procedural:skull$coarse --camera 30,8,1.2 --env sky --light directional:1,1,0.6:3,2.8,2.4:0.5 $(side 161) --samples $(part 64)"
 strip figure-12 "--lattice 64,72,72" "" "--lattice 256,288,288" "$reference"
+same="procedural:hydrogen$coarse --camera 30,25,0.8 $(side 161)"
+strip figure-8 "--mode vicinity" "--mode lambert --fog 2" "--mode phong --ambient normal --shadows on" ""
 same="procedural:engine-block$coarse --camera 37,25,1.9 $(side 130)"
 strip figure-9 "--mode vicinity" "--mode lambert --fog 2" "--mode phong --ambient normal --shadows on" "--mode lambert --shadows on" ""
 same="procedural:skull$coarse --camera 30,8,1.2 $(side 161)"
