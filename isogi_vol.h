@@ -8327,6 +8327,21 @@ ISOGI_API isogi_result isogi_vol_positions(const isogi_pyramid *pyramid, const i
     return ISOGI_OK;
 }
 
+/* The gradient of the smoothed field, per grid unit; zero where it is nothing but what rounding has left of voxels that cancel, as in the
+   middle of a sheet: it would point anywhere, on each instruction path elsewhere. */
+static void isogi_vol__smooth_gradient(const isogi_pyramid *p, const int cell[3], const double local[3], double gradient[3]) {
+    const double noise = 1e-14;
+    double most, range[2];
+    size_t first[3], last[3];
+    int a;
+    isogi_vol__cubic_sum(p, ISOGI_FILTER_BSPLINE, cell, local, gradient);
+    most = isogi_vol__largest(gradient[0], gradient[1], gradient[2]);
+    if (!(most > 0 && most < noise * (p->range[1] - p->range[0]))) return;
+    for (a = 0; a < 3; a++) first[a] = cell[a] > 0 ? (size_t)cell[a] - 1 : 0, last[a] = (size_t)cell[a] + 2;
+    isogi_volume_range(&p->volume, first, last, range);
+    if (most < noise * (range[1] - range[0])) gradient[0] = gradient[1] = gradient[2] = 0;
+}
+
 /* Minus the gradient (per grid unit) at a hit; at the cap of a border, a vector out of the nearest face of the box. */
 static void isogi_vol__outward(const isogi_pyramid *p, const isogi_hit *hit, isogi_normal_kind kind, double out[3]) {
     double corner[8], nearest = 2;
@@ -8347,7 +8362,7 @@ static void isogi_vol__outward(const isogi_pyramid *p, const isogi_hit *hit, iso
         for (a = 0; a < 3; a++) grid[a] = hit->cell[a] + hit->local[a];
         isogi_vol__field_at(p, grid, out);
         for (a = 0; a < 3; a++) out[a] *= p->volume.spacing[a]; /* per grid unit; the axes are the world's */
-    } else if (kind == ISOGI_NORMAL_SMOOTH) isogi_vol__cubic_sum(p, ISOGI_FILTER_BSPLINE, cell, hit->local, out);
+    } else if (kind == ISOGI_NORMAL_SMOOTH) isogi_vol__smooth_gradient(p, cell, hit->local, out);
     else isogi_vol__corners(p, cell, 0, corner), isogi_vol__trilinear(corner, hit->local, out);
     for (a = 0; a < 3; a++) out[a] = -out[a];
 }
@@ -9375,7 +9390,7 @@ static void isogi_vol__smoothed_normal(const isogi_vol__mesher *m, size_t at, co
     double n[3], local[3];
     int cell[3], a;
     for (a = 0; a < 3; a++) cell[a] = isogi_vol__cell(grid[a], m->pyramid->volume.size[a], &local[a]);
-    isogi_vol__cubic_sum(m->pyramid, ISOGI_FILTER_BSPLINE, cell, local, n);
+    isogi_vol__smooth_gradient(m->pyramid, cell, local, n);
     for (a = 0; a < 3; a++) n[a] = -n[a];
     isogi_vol__mesh_normal(m, at, n);
 }

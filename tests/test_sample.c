@@ -296,6 +296,45 @@ TEST(constant_voxels_have_no_gradient) {
     }
 }
 
+/* In the middle of a sheet of one voxel, of any values and anywhere on it, the smoothed gradient vanishes, and so does the normal: rounding
+   alone would let it point anywhere. A thousandth of a voxel beside it, the normal is that of the sheet. So in a volume one of whose voxels,
+   far away, is a million times as large. */
+TEST(smoothed_normals_vanish_in_the_middle_of_a_sheet) {
+    enum { SIDE = 12, COUNT = 200 };
+    static double voxels[SIDE * SIDE * SIDE];
+    static isogi_hit hits[COUNT];
+    static float normals[COUNT][3];
+    test_random r = {12};
+    for (int n = 0; n < 4 * 3 * 4; n++) {
+        const int path = 1 + n % 4, axis = n / 4 % 3, kind = n / 12;
+        const isogi_context context = {.threads = 1, .force_path = path};
+        const double high = kind == 1 ? 1000.3 : kind == 2 ? 7e-200 : 1, low = kind == 1 ? 999.1 : kind == 2 ? -3e-200 : -1;
+        isogi_volume v = {.data = voxels, .type = ISOGI_F64, .size = {SIDE, SIDE, SIDE}};
+        isogi_pyramid *p = NULL;
+        for (int i = 0; i < SIDE * SIDE * SIDE; i++) {
+            const int place[3] = {i % SIDE, i / SIDE % SIDE, i / SIDE / SIDE};
+            voxels[i] = place[axis] == 6 ? high : low;
+        }
+        if (kind == 3) voxels[0] = 1e6;
+        CHECK(isogi_vol_build(&p, &v, &context) == ISOGI_OK, "built");
+        for (int beside = 0; beside < 2; beside++) {
+            for (int i = 0; i < COUNT; i++) {
+                hits[i].side = 1;
+                for (int a = 0; a < 3; a++) hits[i].cell[a] = 3 + (uint32_t)(random_bits(&r) % 6), hits[i].local[a] = random_unit(&r);
+                hits[i].cell[axis] = i % 2 ? 6 : 5, hits[i].local[axis] = i % 2 ? 0.001 * beside : 1 - 0.001 * beside;
+            }
+            isogi_vol_normals(p, hits, COUNT, ISOGI_NORMAL_SMOOTH, normals);
+            for (int i = 0; i < COUNT; i++)
+                for (int a = 0; a < 3; a++) {
+                    const double expected = beside && a == axis ? i % 2 ? 1 : -1 : 0;
+                    CHECK(fabs((double)normals[i][a] - expected) <= (beside ? 1e-6 : 0), "kind %d, path %d, axis %d: %g, expected %g", kind,
+                          path, a, (double)normals[i][a], expected);
+                }
+        }
+        isogi_vol_free(p);
+    }
+}
+
 /* The error of a gradient goes with the differences between voxels, whatever they have in common. */
 TEST(gradients_do_not_suffer_from_an_offset) {
     enum { COUNT = 80, CASES = 6 };
