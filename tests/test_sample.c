@@ -296,9 +296,9 @@ TEST(constant_voxels_have_no_gradient) {
     }
 }
 
-/* In the middle of a sheet of one voxel, of any values and anywhere on it, the smoothed gradient vanishes, and so does the normal: rounding
-   alone would let it point anywhere. A thousandth of a voxel beside it, the normal is that of the sheet. So in a volume one of whose voxels,
-   far away, is a million times as large. */
+/* In the middle of a sheet of one voxel, of any values and anywhere on it, the smoothed gradient vanishes, and so does the normal:
+   rounding alone would let it point anywhere. A thousandth of a voxel beside it, the normal is that of the sheet. So in a volume one of
+   whose voxels, far away, is a million times as large. */
 TEST(smoothed_normals_vanish_in_the_middle_of_a_sheet) {
     enum { SIDE = 12, COUNT = 200 };
     static double voxels[SIDE * SIDE * SIDE];
