@@ -43,7 +43,7 @@ HEADERS := dvr:DVR vol:VOL sh:SH trace:TRACE
 OBJECTS := $(foreach h,$(HEADERS),build/isogi_$(firstword $(subst :, ,$(h))).o)
 
 # What a source file includes is found by the compiler (the .d files). A line "LIBS: -lname" in a test's first comment names
-# libraries of its own, "FLAGS: -O0" options. What does not compile must not leave an older program behind.
+# libraries of its own, on another line "FLAGS: -O0" options. What does not compile must not leave an older program behind.
 COMPILE = @rm -f $@; echo "$(CC) $<"; libs= flags= shared=; \
 	eval "$$(sed -n '1,20{s|.*LIBS: \([^*]*\).*|libs="\1"|p;s|.*FLAGS: \([^*]*\).*|flags="\1"|p;}' $<)"; \
 	inside=$$(grep -o 'isogi_[a-z]*__\|looks inside.*\|define ISOGI_[A-Z]*_LEVEL' $<); \

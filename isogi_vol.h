@@ -49,10 +49,10 @@
 
    Memory       Through isogi_context, or malloc. A pyramid takes about 2.2 bytes for every voxel: bounds of blocks, and all voxels
                 in 8 bits of their block's range; and 31 KB. Of a volume that is marked compact it keeps the bounds alone, 1/5 byte for
-                every voxel, and rays are slower. Blocks of blocks are whole, so thin volumes take more: 7 bytes a voxel where they are
-                5 voxels thick along one axis, 17 with 2: cut large fields into thick chunks. From malloc, blocks of 4 MB and more ask
-                Linux for huge pages: a pyramid is then built in 1/5 (virtual machines) to 7/10 of the time. Where your voxels lie in
-                such pages, too (madvise, or isogi_allocate), many rays are 5 to 10 % faster.
+                every voxel, and rays are slower. Blocks of blocks are whole, so thin volumes take more: 7 bytes a voxel (compact 0.6)
+                where they are 5 voxels thick along one axis, 17 (1.4) with 2: cut large fields into thick chunks. From malloc, blocks
+                of 4 MB and more ask Linux for huge pages: a pyramid is then built in 1/5 (virtual machines) to 7/10 of the time. Where
+                your voxels lie in such pages, too (madvise, or isogi_allocate), many rays are 5 to 10 % faster.
                 A mesh keeps some 3/4 byte of scratch memory for every voxel until it is freed.
                 Stack use stays below 32 KB.
    Threads      A pyramid is const once built: any number of threads may read it. Building, updating, prefiltering and meshing use the
@@ -81,7 +81,8 @@
    that lies inside and one that lies outside. Without AVX-512 eight rays of a batch take turns, each up to where it reads memory, which
    is half as fast again where rays share little. Everywhere cells are looked at in float first, from 8-bit voxels that lie together in
    two cache lines for 4x4x4 cells, with an error bound: what is certain needs nothing else, and only cells in doubt, the hits and one
-   cell for every 25 rays besides, read your voxels and are solved in double.
+   cell for every 25 rays besides, read your voxels and are solved in double. Of compact volumes there are no such voxels: rays take turns
+   as without AVX-512, and read yours in every cell that they pass in blocks that hold the isovalue.
 
    History  1.0  first release
 */
@@ -238,9 +239,10 @@ typedef struct isogi_volume {
                             ISOGI_F64, for those that are in data */
     /* of a chunk: see above; first up to 2^53, halos up to 2^31-1, without use along an axis of one voxel */
     size_t first[3], halo_low[3], halo_high[3];
-    int compact; /* 1: a pyramid keeps bounds alone, in 1/5 byte for every voxel instead of 2.2. Rays have the same hits, but read the
-                    voxels of four times as many cells: single ones take twice as long and batches of incoherent ones five times as
-                    long with AVX-512, half as long again without. 0: for speed */
+    int compact; /* not 0: a pyramid keeps bounds alone, in 1/5 byte for every voxel instead of 2.2, and is built in half the time. Rays
+                    have the same hits, but look at four times as many cells, read the voxels of each, and do without AVX-512: where
+                    there is that, single ones take twice as long, batches five times, and those of a picture ten times; else half as
+                    long again. Nothing but rays is slower. 0: for speed */
 } isogi_volume;
 
 ISOGI_API isogi_result isogi_volume_validate(const isogi_volume *volume);
@@ -462,7 +464,8 @@ typedef enum isogi_normal_kind {
     ISOGI_NORMAL_TRILINEAR   /* gradient of the trilinear field: what the ray hit */
 } isogi_normal_kind;
 
-/* World positions of hits; unit normals there, towards lower values, zero where the gradient vanishes. For a miss: zeros. */
+/* World positions of hits; unit normals there, towards lower values, zero where the gradient vanishes but for rounding. For a miss:
+   zeros. */
 ISOGI_API isogi_result isogi_vol_positions(const isogi_pyramid *pyramid, const isogi_hit *hits, size_t count, float (*positions)[3]);
 ISOGI_API isogi_result isogi_vol_normals(const isogi_pyramid *pyramid, const isogi_hit *hits, size_t count, isogi_normal_kind kind,
                                          float (*normals)[3]);
@@ -1987,9 +1990,10 @@ static isogi_result isogi_vol__build_nodes(isogi_pyramid *p) {
     isogi_vol__build_job job;
     isogi_result result;
     p->fast = isogi_vol__plan_nodes(p, &job);
-    if (!p->fast) return ISOGI_OK;
-    result = isogi_vol__reserve_nodes(p);
-    return result == ISOGI_OK ? isogi_vol__fill_nodes(&job, &p->context) : result;
+    result = p->fast ? isogi_vol__reserve_nodes(p) : ISOGI_OK;
+    if (result == ISOGI_OK && p->fast) result = isogi_vol__fill_nodes(&job, &p->context);
+    if (result != ISOGI_OK || (p->fast && !p->volume.compact)) return result;
+    return isogi_vol__report(&p->context, 0.5, 1, 1, 1) ? ISOGI_CANCELLED : ISOGI_OK; /* without leaves all is done */
 }
 
 ISOGI_API isogi_result isogi_vol_build(isogi_pyramid **pyramid, const isogi_volume *volume, const isogi_context *context) {
@@ -4252,7 +4256,7 @@ ISOGI_VOL__TARGET("avx2") static int isogi_vol__mixed_cell_avx2(isogi_vol__walk 
     c0 = _mm256_sub_pd(_mm256_add_pd(_mm256_mul_pd(c0, scale), bias), isovalue);
     c1 = _mm256_sub_pd(_mm256_add_pd(_mm256_mul_pd(c1, scale), bias), isovalue);
     sides = _mm256_movemask_pd(_mm256_cmp_pd(c0, zero, _CMP_GE_OQ)) | _mm256_movemask_pd(_mm256_cmp_pd(c1, zero, _CMP_GE_OQ)) << 4;
-    if ((sides == 0 || sides == 255) && !w->deflate && w->inside != !sides) {
+    if ((sides == 0 || sides == 255) && !w->deflate && w->inside != !sides) { /* nothing happens in it: times are of no use */
         w->inside = sides != 0;
         return 0;
     }
@@ -4734,7 +4738,7 @@ typedef struct isogi_vol__trip {
     float last, level, reach;                        /* likewise; the isovalue in 8 bits; what children are widened by on each side */
     int flip, octant, low, high, entry_axis;         /* as in a course */
     int in, out;                                     /* axes by which the ray enters and leaves the present cell; 3: none */
-    const uint8_t *children[ISOGI_VOL__NODE_LEVELS];     /* of the node of each level, */
+    const uint8_t *children[ISOGI_VOL__NODE_LEVELS];     /* of the node of each level (NULL: leaves, and there are none), */
     uint64_t left[ISOGI_VOL__NODE_LEVELS], cells;        /* those still to come, in the ray's order; of the leaf */
     int32_t place[ISOGI_VOL__NODE_LEVELS][4], child;     /* the nodes' coordinates; the last one's number in its parent */
     unsigned pending;                                    /* levels that have any left */
@@ -4761,6 +4765,9 @@ ISOGI_VOL__INLINE void isogi_vol__ride_to(isogi_vol__ride *r, const uint8_t *nod
     ISOGI_VOL__PREFETCH(node);
     ISOGI_VOL__PREFETCH(node + 64);
 }
+
+/* Whether there is nothing to be read of the node that is to be opened. */
+ISOGI_VOL__INLINE int isogi_vol__ride_knows(const isogi_vol__ride *r) { return !r->at && r->walk.pyramid->volume.compact; }
 
 /* Sends for the voxels of a cell. */
 ISOGI_VOL__INLINE void isogi_vol__ride_to_cell(isogi_vol__ride *r, int x, int y, int z) {
@@ -4942,7 +4949,7 @@ static int isogi_vol__ride_steps(isogi_vol__ride *r, int waits, isogi_hit *hit) 
         if (r->open && !isogi_vol__ride_seek(r, isogi_vol__ride_open(r))) return 0;
         if (r->at) {
             isogi_vol__ride_down(r);
-            if (waits) return -1;
+            if (waits && !isogi_vol__ride_knows(r)) return -1;
             continue;
         }
         found = isogi_vol__ride_cell(r, hit);
@@ -5201,7 +5208,7 @@ ISOGI_VOL__TARGET("avx2") static int isogi_vol__ride_trip(isogi_vol__ride *r, in
             if (found > 0) return 1;
             if (found < 0 && waits) return -1;
         }
-    } while (isogi_vol__trip_next(r) && !waits);
+    } while (isogi_vol__trip_next(r) && (!waits || isogi_vol__ride_knows(r)));
     if (r->open) return -1;
     /* what was skipped behind the last cell lies on one side */
     if (!(r->walk.deflated >= r->walk.end)) r->walk.deflate = 0;
@@ -8328,18 +8335,26 @@ ISOGI_API isogi_result isogi_vol_positions(const isogi_pyramid *pyramid, const i
 }
 
 /* The gradient of the smoothed field, per grid unit; zero where it is nothing but what rounding has left of voxels that cancel, as in the
-   middle of a sheet: it would point anywhere, on each instruction path elsewhere. */
+   middle of a sheet: it would point anywhere, on each instruction path elsewhere. Hardly ever near enough to that to look at the voxels. */
 static void isogi_vol__smooth_gradient(const isogi_pyramid *p, const int cell[3], const double local[3], double gradient[3]) {
+    const isogi_volume *v = &p->volume;
     const double noise = 1e-14;
-    double most, range[2];
-    size_t first[3], last[3];
-    int a;
+    double w[3][4], d[3][4], most, low = DBL_MAX, high = -DBL_MAX;
+    int tap[3][4], a, i;
     isogi_vol__cubic_sum(p, ISOGI_FILTER_BSPLINE, cell, local, gradient);
     most = isogi_vol__largest(gradient[0], gradient[1], gradient[2]);
     if (!(most > 0 && most < noise * (p->range[1] - p->range[0]))) return;
-    for (a = 0; a < 3; a++) first[a] = cell[a] > 0 ? (size_t)cell[a] - 1 : 0, last[a] = (size_t)cell[a] + 2;
-    isogi_volume_range(&p->volume, first, last, range);
-    if (most < noise * (range[1] - range[0])) gradient[0] = gradient[1] = gradient[2] = 0;
+    for (a = 0; a < 3; a++) isogi_vol__tap_weights(ISOGI_FILTER_BSPLINE, v, a, cell[a], local[a], w[a], d[a], tap[a]);
+    for (i = 0; i < 64; i++) { /* taps without weight do not count */
+        const int at[3] = {i & 3, i >> 2 & 3, i >> 4};
+        double value;
+        int counts = 1;
+        for (a = 0; a < 3; a++) counts &= fabs(w[a][at[a]]) + fabs(d[a][at[a]]) > 0;
+        if (!counts) continue;
+        isogi_vol__row(v, tap[0][at[0]], tap[1][at[1]], tap[2][at[2]], 1, &value);
+        low = isogi_vol__min(low, value), high = isogi_vol__max(high, value);
+    }
+    if (most < noise * (high - low)) gradient[0] = gradient[1] = gradient[2] = 0;
 }
 
 /* Minus the gradient (per grid unit) at a hit; at the cap of a border, a vector out of the nearest face of the box. */

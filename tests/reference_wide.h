@@ -31,7 +31,7 @@ __attribute__((unused)) static wide wide_floor(wide x) {
     return whole > x ? whole - 1 : whole;
 }
 
-enum { PATHS = 7 }; /* 5, 6: a compact volume, by the best path and by the portable one */
+enum { PATHS = 7 };
 
 /* ---- volumes, one pyramid for every instruction path ---- */
 
@@ -60,7 +60,7 @@ __attribute__((unused)) static void scene_build(scene *s) {
     for (size_t i = 0; i < scene_voxels(s); i++)
         if (isfinite(s->value[i])) s->most = fmax(s->most, fabs(s->value[i]));
     for (int p = 0; p < PATHS; p++) {
-        isogi_context context = {.threads = 1, .force_path = p < 5 ? p : 2 * (p - 5)};
+        isogi_context context = {.threads = 1, .force_path = forced_path(p)};
         s->volume.compact = p > 4;
         isogi_result result = isogi_vol_build(&s->pyramid[p], &s->volume, &context);
         CHECK(result == ISOGI_OK, "path %d: %s", p, isogi_result_string(result));

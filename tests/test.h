@@ -69,6 +69,10 @@ __attribute__((format(printf, 4, 5))) static void test_fail(const char *file, in
 }
 
 /* Random numbers for tests: splitmix64, so that every test is repeatable and seeded by its own number. */
+/* Rays are tried on seven paths: 0 to 4 are those of isogi_context.force_path; 5 and 6 are of compact volumes, the best and the portable
+   one. This is what force_path has to be. */
+__attribute__((unused)) static int forced_path(int path) { return path < 5 ? path : 2 * (path - 5); }
+
 typedef struct test_random { uint64_t state; } test_random;
 
 __attribute__((unused)) static uint64_t random_bits(test_random *r) {

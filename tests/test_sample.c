@@ -335,6 +335,24 @@ TEST(smoothed_normals_vanish_in_the_middle_of_a_sheet) {
     }
 }
 
+/* What is rounding is told by the voxels that count: a huge one whose weight is 0 changes no normal. */
+TEST(smoothed_normals_go_by_voxels_that_count) {
+    enum { SIDE = 12 };
+    static double voxels[SIDE * SIDE * SIDE];
+    const isogi_hit hit = {.cell = {4, 5, 6}, .local = {0.3, 0.4, 0}, .side = 1};
+    for (int path = 1; path < 5; path++) {
+        const isogi_context context = {.threads = 1, .force_path = path};
+        isogi_volume v = {.data = voxels, .type = ISOGI_F64, .size = {SIDE, SIDE, SIDE}};
+        isogi_pyramid *p = NULL;
+        float n[1][3];
+        for (int i = 0; i < SIDE * SIDE * SIDE; i++) voxels[i] = i / SIDE / SIDE == 8 ? 1e30 : i % SIDE;
+        CHECK(isogi_vol_build(&p, &v, &context) == ISOGI_OK, "built");
+        isogi_vol_normals(p, &hit, 1, ISOGI_NORMAL_SMOOTH, n);
+        CHECK(fabs((double)n[0][0] + 1) < 1e-6, "path %d: %g %g %g", path, (double)n[0][0], (double)n[0][1], (double)n[0][2]);
+        isogi_vol_free(p);
+    }
+}
+
 /* The error of a gradient goes with the differences between voxels, whatever they have in common. */
 TEST(gradients_do_not_suffer_from_an_offset) {
     enum { COUNT = 80, CASES = 6 };

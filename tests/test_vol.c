@@ -166,8 +166,7 @@ TEST(a_far_origin_costs_no_precision) {
     field_free(&f);
 }
 
-/* The fast walk and the plain one (force_path 1) are two designs: they must agree on large volumes, on any type, on any path; paths 5, 6:
-   compact volumes, by the best path and by the portable one. */
+/* The fast walk and the plain one (force_path 1) are two designs: they must agree on large volumes, on any type, on any path. */
 static void compare_walks(int path) {
     test_random r = {20};
     long different = 0, hits = 0;
@@ -187,7 +186,7 @@ static void compare_walks(int path) {
         }
         isogi_volume v = {.data = data, .type = (isogi_type)type, .size = {(size_t)size[0], (size_t)size[1], (size_t)size[2]}};
         if (type == ISOGI_U16) v.scale = 0.01, v.bias = -3;
-        isogi_context plain = {.threads = 1, .force_path = 1}, fast = {.threads = 1, .force_path = path < 5 ? path : 2 * (path - 5)};
+        isogi_context plain = {.threads = 1, .force_path = 1}, fast = {.threads = 1, .force_path = forced_path(path)};
         isogi_pyramid *a = NULL, *b = NULL;
         v.compact = path > 4;
         isogi_vol_build(&a, &v, &fast);
@@ -223,7 +222,7 @@ static void compare_batches(int path, int kind) {
     enum { COUNT = 3000 };
     test_random r = {21};
     field f = field_new(40, 71, 53);
-    isogi_context plain = {.threads = 1, .force_path = 1}, fast = {.threads = 1, .force_path = path < 5 ? path : 2 * (path - 5)};
+    isogi_context plain = {.threads = 1, .force_path = 1}, fast = {.threads = 1, .force_path = forced_path(path)};
     isogi_pyramid *a = NULL, *b = NULL;
     isogi_ray *rays = (isogi_ray *)malloc(COUNT * sizeof *rays);
     isogi_hit *hits = (isogi_hit *)malloc(COUNT * sizeof *hits), *starts = (isogi_hit *)malloc(COUNT * sizeof *starts);
@@ -886,6 +885,33 @@ TEST(parallel_runs_every_task_once_and_can_be_cancelled) {
     }
     CHECK(isogi_parallel(NULL, 0, square_task, &s, 0, 1) == ISOGI_OK && isogi_parallel(NULL, 5, NULL, &s, 0, 1) == ISOGI_INVALID,
           "edge cases");
+}
+
+/* Fractions that a build tells: they rise to 1. */
+typedef struct told_fractions {
+    double last;
+    int falls;
+} told_fractions;
+
+static int note_fraction(void *user, double fraction) {
+    told_fractions *t = (told_fractions *)user;
+    t->falls += !(fraction >= t->last), t->last = fraction;
+    return 0;
+}
+
+TEST(builds_tell_their_progress_up_to_the_end) {
+    for (int kind = 0; kind < 4; kind++) { /* as usual, compact, by plain code, with a voxel that is not a number */
+        field f = field_new(30, 20, 40);
+        told_fractions told = {0, 0};
+        isogi_context context = {.progress = note_fraction, .user = &told, .threads = 1, .force_path = kind == 2};
+        isogi_pyramid *p = NULL;
+        for (int i = 0; i < 30 * 20 * 40; i++) f.value[i] = i % 7;
+        if (kind == 3) f.value[100] = (double)NAN;
+        f.volume.compact = kind == 1;
+        CHECK(isogi_vol_build(&p, &f.volume, &context) == ISOGI_OK, "kind %d", kind);
+        CHECK(told.last >= 1 && told.last <= 1 && !told.falls, "kind %d: %g in the end, %d falls", kind, told.last, told.falls);
+        isogi_vol_free(p), free(f.value);
+    }
 }
 
 /* ---- threads that stay ---- */

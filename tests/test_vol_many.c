@@ -12,7 +12,7 @@
 enum { SOME = 2048, KINDS = 6, TURNS = 24 };
 
 /* Paths in turn, the fast ones more often. */
-static const int paths[TURNS] = {0, 2, 4, 0, 3, 4, 1, 4, 0, 5, 2, 4, 0, 4, 3, 4, 0, 4, 6, 4, 0, 4, 0, 4}; /* 5, 6: as in scene_build */
+static const int paths[TURNS] = {0, 2, 4, 0, 3, 4, 1, 4, 0, 5, 2, 4, 0, 4, 3, 4, 0, 4, 6, 4, 0, 4, 0, 4};
 
 static const char *const kinds[KINDS] = {
     "noise", "waves", "bytes between levels", "bytes at levels", "smooth bytes at levels", "smooth bytes between levels"};
@@ -47,7 +47,7 @@ static scene crowd_scene(int kind, int closed, int path, isogi_pyramid **pyramid
     const int large = kind == 1 || kind >= 4, n = large ? 24 : 9;
     scene s = scene_new(3 + (int)(random_bits(r) % (uint64_t)n), 3 + (int)(random_bits(r) % (uint64_t)n),
                         3 + (int)(random_bits(r) % (uint64_t)n));
-    const isogi_context context = {.threads = 1, .force_path = path < 5 ? path : 2 * (path - 5)};
+    const isogi_context context = {.threads = 1, .force_path = forced_path(path)};
     double wave[3][4];
     for (int w = 0; w < 3; w++)
         for (int a = 0; a < 4; a++) wave[w][a] = random_range(r, -1, 1) * (a < 3 ? 0.6 : 6.28);

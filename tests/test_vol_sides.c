@@ -5,10 +5,10 @@
 #include "ray_fields.h"
 #include "reference_ray.h"
 
-enum { PATHS = 7, MOST = 64 }; /* paths 5, 6: a compact volume, by the best path and by the portable one */
+enum { PATHS = 7, MOST = 64 };
 
 static isogi_pyramid *build_on(const isogi_volume *volume, int path) {
-    isogi_context context = {.threads = 1, .force_path = path < 5 ? path : 2 * (path - 5)};
+    isogi_context context = {.threads = 1, .force_path = forced_path(path)};
     isogi_volume v = *volume;
     isogi_pyramid *p = NULL;
     v.compact = path > 4;

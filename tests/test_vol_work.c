@@ -169,7 +169,7 @@ TEST(rays_of_compact_volumes_look_at_blocks_that_hold_the_isovalue_alone) {
                 long different = 0;
                 if (surface) leave_surface(pyramid[0], rays, n);
                 const work full = count_work(pyramid[0], rays, RAYS, hits[0]), done = count_work(pyramid[1], rays, RAYS, hits[1]);
-                for (int i = 0; i < RAYS; i++) different += hits[0][i].side != hits[1][i].side || fabs(hits[0][i].t - hits[1][i].t) > 1e-9;
+                for (int i = 0; i < RAYS; i++) different += hits[0][i].side != hits[1][i].side || fabs(hits[0][i].t - hits[1][i].t) > 0;
                 printf("    path %d: %.2f blocks, %.2f cells, %.3f cubics per ray; with leaves %.2f, %.2f, %.3f\n", path, done.blocks,
                        done.cells, done.cubics, full.blocks, full.cells, full.cubics);
                 CHECK(!different, "path %d: %ld hits differ", path, different);

@@ -149,6 +149,7 @@ static void bench_paths(const scene *whole) {
         volume.compact = !way;
         if (isogi_vol_build(&s.pyramid, &volume, &context) != ISOGI_OK) exit(1);
         bench_rays_by(&s, "primary1", names[way], s.primary, 1, FIRST, 0);
+        bench_rays_by(&s, "primary16", names[way], s.primary, 16, FIRST, 0);
         bench_rays_by(&s, "surface", names[way], s.surface, RAYS, FIRST, 0);
         bench_rays_by(&s, "bundle64", names[way], s.bundles, BUNDLES * BUNDLE, SHARED, 0);
         isogi_vol_free(s.pyramid);
