@@ -4255,11 +4255,6 @@ ISOGI_VOL__TARGET("avx2") static int isogi_vol__mixed_cell_avx2(isogi_vol__walk 
     w->cell[0] = x, w->cell[1] = y, w->cell[2] = z, w->entry_axis = in;
     c0 = _mm256_sub_pd(_mm256_add_pd(_mm256_mul_pd(c0, scale), bias), isovalue);
     c1 = _mm256_sub_pd(_mm256_add_pd(_mm256_mul_pd(c1, scale), bias), isovalue);
-    sides = _mm256_movemask_pd(_mm256_cmp_pd(c0, zero, _CMP_GE_OQ)) | _mm256_movemask_pd(_mm256_cmp_pd(c1, zero, _CMP_GE_OQ)) << 4;
-    if ((sides == 0 || sides == 255) && !w->deflate && w->inside != !sides) { /* nothing happens in it: times are of no use */
-        w->inside = sides != 0;
-        return 0;
-    }
     /* when the ray passes the faces; every lane gets the number of the one that counts */
     begin = _mm256_and_pd(_mm256_mul_pd(_mm256_sub_pd(_mm256_add_pd(cell, enter), origin), inverse), in_lane);
     end = _mm256_blend_pd(_mm256_mul_pd(_mm256_sub_pd(_mm256_add_pd(cell, leave), origin), inverse), segment_end, 8);
@@ -4268,6 +4263,7 @@ ISOGI_VOL__TARGET("avx2") static int isogi_vol__mixed_cell_avx2(isogi_vol__walk 
     begin = _mm256_or_pd(begin, _mm256_permute_pd(begin, 5)), end = _mm256_or_pd(end, _mm256_permute_pd(end, 5));
     begin = _mm256_max_pd(begin, zero), end = _mm256_max_pd(_mm256_min_pd(end, segment_end), begin);
     w->t = _mm256_cvtsd_f64(begin);
+    sides = _mm256_movemask_pd(_mm256_cmp_pd(c0, zero, _CMP_GE_OQ)) | _mm256_movemask_pd(_mm256_cmp_pd(c1, zero, _CMP_GE_OQ)) << 4;
     w->deflate &= w->t <= w->deflated;
     w->deflated = _mm256_cvtsd_f64(end);
     if (sides == 0 || sides == 255) {
