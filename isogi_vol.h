@@ -533,7 +533,6 @@ ISOGI_API void isogi_vol_mesh_free(const isogi_pyramid *pyramid, isogi_mesh *mes
 #define ISOGI_VOL__UNLIMITED 1e300 /* stands for infinity, which -ffast-math does not promise to keep */
 #define ISOGI_VOL__LEVELS 3
 #define ISOGI_VOL__NODE_LEVELS 7 /* 4^7 cells a side */
-#define ISOGI_VOL__TICKS 281474976710656.0 /* 2^48 to a segment: times 2 and 2^14 planes stays within 2^63 */
 #define ISOGI_VOL__FAST_SIZE 8192 /* voxels along an axis up to which fast rays keep 1e-10 cell */
 #if (defined(__GNUC__) || defined(__clang__)) && !defined(__TINYC__)
 #define ISOGI_VOL__INLINE static inline __attribute__((always_inline))
@@ -1022,7 +1021,7 @@ struct isogi_pyramid {
     isogi_vol__node_level node_level[ISOGI_VOL__NODE_LEVELS];
     int node_levels; /* the last one has a single node */
     double node_scale; /* 8-bit value = floor((value - range[0]) * node_scale) */
-    struct isogi_vol__ways *ways; /* for rays by AVX2 and single ones by AVX-512, else NULL */
+    struct isogi_vol__ways *ways; /* for rays; NULL on the plain path */
     int all_finite;
     int fast; /* 0: only the plain walk is right for this volume */
     int path; /* ISOGI_VOL__PATH_... */
@@ -1918,7 +1917,7 @@ static isogi_result isogi_vol__fill_nodes(isogi_vol__build_job *job, const isogi
     return ISOGI_OK;
 }
 
-/* What rays by AVX2, and single ones by AVX-512, look up: see rides, and walk_one. */
+/* What rays look up: see fast traversal. */
 struct isogi_vol__ways {
     int32_t lane[ISOGI_VOL__NODE_LEVELS][16], row[ISOGI_VOL__NODE_LEVELS][16]; /* 0 1 2 3 children of a level, in cells, along rows of four
                                                                                   lanes, and down those rows */
@@ -1977,7 +1976,7 @@ ISOGI_VOL__COLD static void isogi_vol__set_ways(struct isogi_vol__ways *ways, co
 
 ISOGI_VOL__COLD static isogi_result isogi_vol__reserve_nodes(isogi_pyramid *p) {
     p->node_count = isogi_vol__plan_node_levels(p);
-    if (p->path >= ISOGI_VOL__PATH_AVX2 && !p->ways) {
+    if (p->path >= ISOGI_VOL__PATH_BASE && !p->ways) {
         p->ways = (struct isogi_vol__ways *)isogi_allocate(&p->context, 1, sizeof *p->ways);
         if (!p->ways) return ISOGI_NO_MEMORY;
         isogi_vol__set_ways(p->ways, p->node_level, p->node_levels);
@@ -4064,6 +4063,108 @@ static int isogi_vol__walk_on(isogi_vol__walk *w, uint32_t flags, isogi_hit *hit
     return flags & ISOGI_RAY_CAPPED && w->end_is_border && w->inside == 1 && isogi_vol__cap_exit(w, hit);
 }
 
+/* ==== four floats, and 64 bytes, on any machine ====================================================================== */
+
+#if defined(ISOGI_VOL__SSE2)
+typedef __m128 isogi_vol__four;
+#define ISOGI_VOL__FOUR(operation) _mm_##operation
+#define ISOGI_VOL__EVEN(a, b) _mm_shuffle_ps(a, b, 0x88) /* lanes 0 and 2 of both */
+#define ISOGI_VOL__ODD(a, b) _mm_shuffle_ps(a, b, 0xdd)
+#elif defined(ISOGI_VOL__NEON)
+typedef float32x4_t isogi_vol__four;
+#define ISOGI_VOL__FOUR(operation) isogi_vol__neon_##operation
+#define isogi_vol__neon_min_ps vminq_f32
+#define isogi_vol__neon_max_ps vmaxq_f32
+#define isogi_vol__neon_cvtss_f32(v) vgetq_lane_f32(v, 0)
+#define ISOGI_VOL__EVEN(a, b) vuzp1q_f32(a, b)
+#define ISOGI_VOL__ODD(a, b) vuzp2q_f32(a, b)
+#else
+typedef struct isogi_vol__four { float f[4]; } isogi_vol__four;
+#define ISOGI_VOL__FOUR(operation) isogi_vol__plain_##operation
+#define ISOGI_VOL__EVEN(a, b) isogi_vol__plain_four((a).f[0], (a).f[2], (b).f[0], (b).f[2])
+#define ISOGI_VOL__ODD(a, b) isogi_vol__plain_four((a).f[1], (a).f[3], (b).f[1], (b).f[3])
+#define ISOGI_VOL__LANE_base(v, i) isogi_vol__plain_set1_ps((v).f[i])
+static isogi_vol__four isogi_vol__plain_four(float a, float b, float c, float d) {
+    isogi_vol__four v;
+    v.f[0] = a, v.f[1] = b, v.f[2] = c, v.f[3] = d;
+    return v;
+}
+static isogi_vol__four isogi_vol__plain_set1_ps(float a) { return isogi_vol__plain_four(a, a, a, a); }
+static isogi_vol__four isogi_vol__plain_loadu_ps(const float *p) { return isogi_vol__plain_four(p[0], p[1], p[2], p[3]); }
+static float isogi_vol__plain_cvtss_f32(isogi_vol__four a) { return a.f[0]; }
+static void isogi_vol__plain_storeu_ps(float *p, isogi_vol__four a) { memcpy(p, a.f, sizeof a.f); }
+#define ISOGI_VOL__EACH(name, result) \
+    static isogi_vol__four isogi_vol__plain_##name(isogi_vol__four a, isogi_vol__four b) { \
+        int i; \
+        for (i = 0; i < 4; i++) a.f[i] = result; \
+        return a; \
+    }
+ISOGI_VOL__EACH(add_ps, a.f[i] + b.f[i])
+ISOGI_VOL__EACH(sub_ps, a.f[i] - b.f[i])
+ISOGI_VOL__EACH(mul_ps, a.f[i] * b.f[i])
+ISOGI_VOL__EACH(min_ps, a.f[i] < b.f[i] ? a.f[i] : b.f[i])
+ISOGI_VOL__EACH(max_ps, a.f[i] > b.f[i] ? a.f[i] : b.f[i])
+#undef ISOGI_VOL__EACH
+#endif
+
+/* Bit a + 4 b: interval a of four and b of four others meet. */
+ISOGI_VOL__INLINE uint64_t isogi_vol__met(isogi_vol__four in_a, isogi_vol__four out_a, isogi_vol__four in_b, isogi_vol__four out_b) {
+#if defined(ISOGI_VOL__SSE2)
+#define ISOGI_VOL__MET(b) _mm_castps_si128( \
+    _mm_and_ps(_mm_cmple_ps(in_a, ISOGI_VOL__LANE_base(out_b, b)), _mm_cmple_ps(ISOGI_VOL__LANE_base(in_b, b), out_a)))
+    const __m128i low = _mm_packs_epi32(ISOGI_VOL__MET(0), ISOGI_VOL__MET(1)), high = _mm_packs_epi32(ISOGI_VOL__MET(2), ISOGI_VOL__MET(3));
+    return (unsigned)_mm_movemask_epi8(_mm_packs_epi16(low, high));
+#undef ISOGI_VOL__MET
+#elif defined(ISOGI_VOL__NEON)
+    static const uint32_t bit[4] = {1, 2, 4, 8};
+#define ISOGI_VOL__MET(b) vandq_u32(vshlq_n_u32(bits, 4 * (b)), \
+    vandq_u32(vcleq_f32(in_a, ISOGI_VOL__LANE_base(out_b, b)), vcleq_f32(ISOGI_VOL__LANE_base(in_b, b), out_a)))
+    const uint32x4_t bits = vld1q_u32(bit);
+    return vaddvq_u32(vorrq_u32(vorrq_u32(ISOGI_VOL__MET(0), ISOGI_VOL__MET(1)), vorrq_u32(ISOGI_VOL__MET(2), ISOGI_VOL__MET(3))));
+#undef ISOGI_VOL__MET
+#else
+    unsigned bits = 0;
+    int i;
+    for (i = 0; i < 16; i++) bits |= (unsigned)(in_a.f[i & 3] <= out_b.f[i >> 2] && in_b.f[i >> 2] <= out_a.f[i & 3]) << i;
+    return bits;
+#endif
+}
+
+/* Which of 64 bytes are at least `least`. */
+ISOGI_VOL__INLINE uint64_t isogi_vol__at_least(const uint8_t *byte, int least) {
+#if defined(ISOGI_VOL__SSE2)
+    const __m128i *v = (const __m128i *)(const void *)byte, l = _mm_set1_epi8((char)least);
+#define ISOGI_VOL__LEAST(i) \
+    (uint64_t)(unsigned)_mm_movemask_epi8(_mm_cmpeq_epi8(_mm_max_epu8(_mm_load_si128(v + (i)), l), _mm_load_si128(v + (i)))) << 16 * (i)
+    return ISOGI_VOL__LEAST(0) | ISOGI_VOL__LEAST(1) | ISOGI_VOL__LEAST(2) | ISOGI_VOL__LEAST(3);
+#undef ISOGI_VOL__LEAST
+#elif defined(ISOGI_VOL__NEON)
+    const uint8x16_t l = vdupq_n_u8((uint8_t)least), bits = vreinterpretq_u8_u64(vdupq_n_u64(0x8040201008040201u));
+#define ISOGI_VOL__LEAST(i) vandq_u8(vcgeq_u8(vld1q_u8(byte + 16 * (i)), l), bits)
+    const uint8x16_t low = vpaddq_u8(ISOGI_VOL__LEAST(0), ISOGI_VOL__LEAST(1)), high = vpaddq_u8(ISOGI_VOL__LEAST(2), ISOGI_VOL__LEAST(3));
+    const uint8x16_t all = vpaddq_u8(low, high);
+    return vgetq_lane_u64(vreinterpretq_u64_u8(vpaddq_u8(all, all)), 0);
+#undef ISOGI_VOL__LEAST
+#else
+    uint64_t mask = 0;
+    int i;
+    for (i = 0; i < 64; i++) mask |= (uint64_t)(byte[i] >= least) << i;
+    return mask;
+#endif
+}
+
+/* The number of the lowest bit that is set. */
+ISOGI_VOL__INLINE int isogi_vol__lowest_bit(uint64_t x) {
+#if defined(__GNUC__) && !defined(__TINYC__)
+    return __builtin_ctzll(x);
+#else
+    int n = 0, half;
+    for (half = 32; half; half /= 2)
+        if (!(x & (((uint64_t)1 << half) - 1))) n += half, x >>= half;
+    return n;
+#endif
+}
+
 /* ==== leaves ========================================================================================================= */
 
 /* A leaf as one isovalue sees it. Numbers of voxels are x + step (c ... c + 1) with errors below 1/32 of a step, and so is the isovalue:
@@ -4128,24 +4229,14 @@ ISOGI_VOL__INLINE uint64_t isogi_vol__mixed_cells(const isogi_vol__leaf *leaf, u
 }
 
 ISOGI_VOL__INLINE uint64_t isogi_vol__leaf_mask(const uint8_t node[128], float level, isogi_vol__leaf *leaf) {
-    uint64_t in[2] = {0, 0}, out[2] = {0, 0};
-    int i;
     isogi_vol__open_leaf(leaf, node, level);
-#ifdef ISOGI_VOL__SSE2
-    {
-        const __m128i inside = _mm_set1_epi8((char)leaf->inside), outside = _mm_set1_epi8((char)leaf->outside);
-        for (i = 0; i < 8; i++) {
-            const __m128i code = _mm_load_si128((const __m128i *)(const void *)(node + 16 * i));
-            in[i / 4] |= (uint64_t)(uint32_t)_mm_movemask_epi8(_mm_cmpeq_epi8(_mm_max_epu8(code, inside), code)) << 16 * (i % 4);
-            out[i / 4] |= (uint64_t)(uint32_t)(0xffff ^ _mm_movemask_epi8(_mm_cmpeq_epi8(_mm_max_epu8(code, outside), code)))
-                          << 16 * (i % 4);
-        }
-    }
-#else
-    for (i = 0; i < 125; i++)
-        in[i / 64] |= (uint64_t)(node[i] >= leaf->inside) << i % 64, out[i / 64] |= (uint64_t)(node[i] < leaf->outside) << i % 64;
-#endif
-    return isogi_vol__mixed_cells(leaf, in[0], in[1], out[0], out[1]);
+    return isogi_vol__mixed_cells(leaf, isogi_vol__at_least(node, leaf->inside), isogi_vol__at_least(node + 64, leaf->inside),
+                                  ~isogi_vol__at_least(node, leaf->outside), ~isogi_vol__at_least(node + 64, leaf->outside));
+}
+
+/* Which of the 64 children of a node can hold the isovalue. */
+ISOGI_VOL__INLINE uint64_t isogi_vol__node_mask(const uint8_t node[128], int low, int high) {
+    return isogi_vol__at_least(node + 64, low) & ~isogi_vol__at_least(node, high + 1);
 }
 
 /* ==== AVX2 and AVX-512 =============================================================================================== */
@@ -4205,20 +4296,20 @@ ISOGI_VOL__TARGET("avx2") ISOGI_VOL__INLINE __m256d isogi_vol__lane(int i) {
 /* The corners x + 2y of one z, raw. */
 ISOGI_VOL__TARGET("avx2") ISOGI_VOL__INLINE __m256d isogi_vol__corners4(const isogi_volume *v, const char *p, ptrdiff_t dx, ptrdiff_t dy) {
     const char *q = p + dy;
-#define ISOGI_VOL__FOUR(T) \
+#define ISOGI_VOL__RAW(T) \
     _mm256_set_pd((double)*(const T *)(const void *)(q + dx), (double)*(const T *)(const void *)q, \
         (double)*(const T *)(const void *)(p + dx), \
                   (double)*(const T *)(const void *)p)
     switch (v->type) {
-    case ISOGI_U8: return ISOGI_VOL__FOUR(uint8_t);
-    case ISOGI_I8: return ISOGI_VOL__FOUR(int8_t);
-    case ISOGI_U16: return ISOGI_VOL__FOUR(uint16_t);
-    case ISOGI_I16: return ISOGI_VOL__FOUR(int16_t);
-    case ISOGI_F64: return ISOGI_VOL__FOUR(double);
+    case ISOGI_U8: return ISOGI_VOL__RAW(uint8_t);
+    case ISOGI_I8: return ISOGI_VOL__RAW(int8_t);
+    case ISOGI_U16: return ISOGI_VOL__RAW(uint16_t);
+    case ISOGI_I16: return ISOGI_VOL__RAW(int16_t);
+    case ISOGI_F64: return ISOGI_VOL__RAW(double);
     case ISOGI_F32: break;
     }
-    if (dx != 4) return ISOGI_VOL__FOUR(float);
-#undef ISOGI_VOL__FOUR
+    if (dx != 4) return ISOGI_VOL__RAW(float);
+#undef ISOGI_VOL__RAW
     return _mm256_cvtps_pd(
         _mm_loadh_pi(_mm_castsi128_ps(_mm_loadl_epi64((const __m128i *)(const void *)p)), (const __m64 *)(const void *)q));
 }
@@ -4587,120 +4678,14 @@ static int isogi_vol__begin(isogi_vol__batch *b, size_t i, isogi_vol__walk *w) {
 
 /* ==== fast traversal ================================================================================================= */
 
-/* The same walk, in integer time. Axes along which the ray falls are mirrored, so that every step goes up; plane k of an axis is
-   passed at tick at + k per. All levels take their planes from this one formula, hence agree on what lies between them exactly, and
-   a step is an integer comparison and an addition. Blocks and cells that cannot hold the surface lie strictly on one side, and so do
-   the faces they share with others (a convex sum of numbers of one sign has that sign in floating point too): stepping over them
-   keeps the side. */
-typedef struct isogi_vol__ticks {
-    int64_t at[3], per[3], end;
-    int mirror[3]; /* 0, or one less than the padded number of cells: cell = mirror - mirrored cell */
-    uint32_t flip; /* child = mirrored child ^ flip */
-    int first[3];  /* mirrored cell in which the walk begins */
-    int low, high; /* what the isovalue can be in 8 bits */
-    float level;   /* and unrounded */
-} isogi_vol__ticks;
-
-/* One axis of the planes. Whatever lies beyond the segment is put at twice its length, so that no product overflows. */
-ISOGI_VOL__INLINE void isogi_vol__set_axis(isogi_vol__ticks *k, const isogi_vol__walk *w, int a, double scale) {
-    const isogi_pyramid *p = w->pyramid;
-    const double beyond = 2 * ISOGI_VOL__TICKS;
-    const int padded = (int)p->level[2].size[a] * 64, down = w->dir[a] < 0, still = !(w->dir[a] > 0 || down);
-    const int low = down ? padded - p->cells[a] : 0, high = (down ? padded : p->cells[a]) - 1;
-    const double origin = w->origin[a], per = fabs(w->inverse[a]) * scale;
-    const int sign = down ? -1 : 1, base = down ? padded : 0; /* of what is mirrored; the origin is not: it would be rounded */
-    double ahead;
-    int64_t border;
-    int cell = (int)origin;
-    cell = base + sign * (cell + (down & (origin > cell)));
-    cell = cell > high ? high : cell < low ? low : cell;
-    ahead = fabs(base + sign * (cell + 1) - origin) * per;
-    k->per[a] = still || !(per < beyond) ? (int64_t)beyond : (int64_t)per;
-    k->at[a] = (still || !(ahead < beyond) ? (int64_t)beyond : (int64_t)ahead) - (cell + 1) * k->per[a];
-    border = k->at[a] + (high + 1) * k->per[a];
-    k->end = border < k->end ? border : k->end;
-    k->mirror[a] = down ? padded - 1 : 0;
-    k->flip |= (uint32_t)(down ? 3 : 0) << 2 * a;
-    k->first[a] = cell;
-}
-
-/* Sets up the planes of a walk that is ready to go; 0 if it has to be walked plainly. */
-static int isogi_vol__set_ticks(isogi_vol__ticks *k, const isogi_vol__walk *w) {
-    double scale = ISOGI_VOL__TICKS / w->end;
-    if (!(scale > 0) || !(scale < 1e300)) return 0;
-    k->level = isogi_vol__quantise_isovalue(w->pyramid, w->isovalue, &k->low, &k->high);
-    /* a segment that ends at the border ends with the plane of the border, however that is rounded */
-    k->end = (int64_t)(w->end_is_border ? 2 * ISOGI_VOL__TICKS : ISOGI_VOL__TICKS), k->flip = 0;
-    isogi_vol__set_axis(k, w, 0, scale);
-    isogi_vol__set_axis(k, w, 1, scale);
-    isogi_vol__set_axis(k, w, 2, scale);
-    return k->end > 0;
-}
-
-/* Which of the 64 children of a node can hold the isovalue. */
-ISOGI_VOL__INLINE uint64_t isogi_vol__node_mask(const uint8_t node[128], int low, int high) {
-    uint64_t mask = 0;
-    int i;
-#ifdef ISOGI_VOL__SSE2
-    __m128i l = _mm_set1_epi8((char)low), h = _mm_set1_epi8((char)high);
-    for (i = 0; i < 4; i++) {
-        __m128i least = _mm_load_si128((const __m128i *)(const void *)(node + 16 * i));
-        __m128i largest = _mm_load_si128((const __m128i *)(const void *)(node + 64 + 16 * i));
-        __m128i in = _mm_and_si128(_mm_cmpeq_epi8(_mm_min_epu8(least, h), least), _mm_cmpeq_epi8(_mm_max_epu8(largest, l), largest));
-        mask |= (uint64_t)(uint32_t)_mm_movemask_epi8(in) << 16 * i;
-    }
-#else
-    for (i = 0; i < 64; i++) mask |= (uint64_t)(node[i] <= high && node[64 + i] >= low) << i;
-#endif
-    return mask;
-}
-
-/* Children of a node are walked by one number: bits 0..5 are the child (x + 4y + 16z), bits 8.. the same with a spare bit behind each
-   coordinate, which is set when a step leaves the node. */
-#define ISOGI_VOL__LEFT 0x12400u
-
-/* Where a walk stands among the children of a node: the next plane of each axis, the time between planes, the child. */
-typedef struct isogi_vol__place {
-    int64_t x, y, z, dx, dy, dz;
-    uint32_t state;
-} isogi_vol__place;
-
-/* One axis of a descent into a child that ends at plane `end`: the grandchild in which tick t falls. */
-ISOGI_VOL__INLINE uint32_t isogi_vol__descend_axis(int64_t end, int64_t d, int64_t t, int64_t *next) {
-    int64_t plane = end - 3 * d;
-    uint32_t i = (uint32_t)(t >= plane) + (uint32_t)(t >= plane + d) + (uint32_t)(t >= plane + 2 * d);
-    *next = plane + (int64_t)i * d;
-    return i;
-}
-
-ISOGI_VOL__INLINE isogi_vol__place isogi_vol__descend(const isogi_vol__place *from, int64_t t) {
-    isogi_vol__place p;
-    uint32_t x, y, z;
-    p.dx = from->dx >> 2, p.dy = from->dy >> 2, p.dz = from->dz >> 2;
-    x = isogi_vol__descend_axis(from->x, p.dx, t, &p.x);
-    y = isogi_vol__descend_axis(from->y, p.dy, t, &p.y);
-    z = isogi_vol__descend_axis(from->z, p.dz, t, &p.z);
-    p.state = (x | y << 2 | z << 4) | (x | y << 3 | z << 6) << 8;
-    return p;
-}
-
-/* To the next child, at the time returned; *axis: the one that is crossed. Without branches: they could not be predicted. */
-ISOGI_VOL__INLINE int64_t isogi_vol__step(isogi_vol__place *p, int *axis) {
-    int y_first = p->y < p->x, z_first;
-    int64_t least = y_first ? p->y : p->x;
-    uint32_t delta = y_first ? 4 | 8 << 8 : 1 | 1 << 8;
-    int which = y_first;
-    z_first = p->z < least;
-    least = z_first ? p->z : least;
-    delta = z_first ? 16 | 64 << 8 : delta;
-    which = z_first ? 2 : which;
-    p->x += which == 0 ? p->dx : 0;
-    p->y += which == 1 ? p->dy : 0;
-    p->z += which == 2 ? p->dz : 0;
-    p->state += delta;
-    *axis = which;
-    return least;
-}
+/* Blocks and cells that cannot hold the surface lie strictly on one side, and so do the faces they share with others (a convex sum of
+   numbers of one sign has that sign in floating point too): passing over them keeps the side. The way through a node's 64 children is not
+   walked but found all at once, in float: a ray passes a child if it enters it by no axis later than it leaves it by another, sixteen pairs
+   of layers for every two axes. Axes along which the ray falls are counted backwards, so that it meets children in the order of their
+   numbers x + 4y + 16z. Times of a node follow from its parent's by a multiple of what a child takes, so that those of its children wait
+   for no more than its number. With a rounding for each of seven levels they are off by less than 2^-21 of what the root measures; children
+   are widened by twice as much, so none is left out, and some are kept that the ray only comes near. Which cells of a leaf a ray passes is
+   told in the end by the times that pools go by, see many rays at once. */
 
 /* A cell that may have corners on both sides, entered through `in` and left through `out` (-1: the segment ends in it). */
 static int isogi_vol__mixed_cell(isogi_vol__walk *w, int x, int y, int z, int in, int axis, isogi_hit *hit) {
@@ -4709,30 +4694,24 @@ static int isogi_vol__mixed_cell(isogi_vol__walk *w, int x, int y, int z, int in
     w->entry_axis = in;
     w->t = in < 0 ? 0 : isogi_vol__max(0, (w->cell[in] + (w->dir[in] > 0 ? 0 : 1) - w->origin[in]) * w->inverse[in]);
     if (axis >= 0) out = isogi_vol__min(out, (w->cell[axis] + (w->dir[axis] > 0 ? 1 : 0) - w->origin[axis]) * w->inverse[axis]);
-    return isogi_vol__visit_cell(w, isogi_vol__max(out, w->t), axis, hit);
+    out = isogi_vol__max(out, w->t);
+    w->deflate &= w->t <= w->deflated; /* what was skipped since lies on one side */
+    w->deflated = out;
+    return isogi_vol__visit_cell(w, out, axis, hit);
 }
 
 /* ---- rides ---- */
 
-/* By steps from child to child, for any machine: as ticks have it. */
-typedef struct isogi_vol__steps {
-    isogi_vol__ticks ticks;
-    isogi_vol__place place[4]; /* among the children of each level; 3: in the grid of the largest nodes */
-    uint64_t mask[3];          /* of these children, those that can hold the surface */
-    int node[4][3];            /* the nodes' coordinates; 3: in the grid, counted backwards where the ray falls */
-    int64_t now;
-    double tick; /* in units of t */
-    int axis;    /* the one last crossed */
-} isogi_vol__steps;
-
-/* By masks of children, with AVX2: as one ray alone goes with AVX-512, see there. */
+/* Where a ray is among children of nodes. */
 typedef struct isogi_vol__trip {
     double origin[4], inverse[4];                    /* as in a pool; the fourth is 0 */
     int32_t lead[4];                                 /* 1 on axes along which the ray falls, else 0 */
     double stop;                                     /* where the ray ends, as in a pool */
-    float cell[3], enter[ISOGI_VOL__NODE_LEVELS][3]; /* as in a course, see one ray alone */
-    float last, level, reach;                        /* likewise; the isovalue in 8 bits; what children are widened by on each side */
-    int flip, octant, low, high, entry_axis;         /* as in a course */
+    float cell[3], enter[ISOGI_VOL__NODE_LEVELS][3]; /* time that a cell takes, and when the node of the next level is entered, widened:
+                                                        by each axis for itself; on its fastest axis a ray takes 1 for a cell */
+    float last, level, reach;                        /* where it ends, or a little more; the isovalue in 8 bits, unrounded; what children
+                                                        are widened by on each side */
+    int flip, octant, low, high, entry_axis;         /* what turns children and axes; what the isovalue can be in 8 bits */
     int in, out;                                     /* axes by which the ray enters and leaves the present cell; 3: none */
     const uint8_t *children[ISOGI_VOL__NODE_LEVELS];     /* of the node of each level (NULL: leaves, and there are none), */
     uint64_t left[ISOGI_VOL__NODE_LEVELS], cells;        /* those still to come, in the ray's order; of the leaf */
@@ -4749,10 +4728,7 @@ typedef struct isogi_vol__ride {
     size_t number;  /* the ray's in its batch, */
     uint32_t flags; /* and its flags */
     int at;         /* level of the node among whose children it is: level n has children of 4^n cells */
-    union {
-        isogi_vol__steps steps;
-        isogi_vol__trip trip;
-    } by;
+    isogi_vol__trip trip;
 } isogi_vol__ride;
 
 /* Sends for a node. */
@@ -4789,224 +4765,85 @@ ISOGI_VOL__INLINE int isogi_vol__told(isogi_vol__walk *w, const isogi_vol__leaf 
     return !w->exact && (w->inside > 0 ? f[7] < low : !w->inside && f[7] > high) ? 2 : 0;
 }
 
-/* ---- by steps ---- */
-
-/* Sets it up, among the nodes of the grid; 0: it has to be walked plainly. */
-static int isogi_vol__ride_set_steps(isogi_vol__ride *r) {
-    isogi_vol__steps *s = &r->by.steps;
-    isogi_vol__place *top = &s->place[3];
-    int64_t next[3];
-    int a;
-    if (!isogi_vol__set_ticks(&s->ticks, &r->walk)) return 0;
-    for (a = 0; a < 3; a++)
-        s->node[3][a] = s->ticks.first[a] >> 6, next[a] = s->ticks.at[a] + (int64_t)(64 * s->node[3][a] + 64) * s->ticks.per[a];
-    top->x = next[0], top->y = next[1], top->z = next[2], top->state = 0;
-    top->dx = s->ticks.per[0] << 6, top->dy = s->ticks.per[1] << 6, top->dz = s->ticks.per[2] << 6;
-    s->now = 0, s->axis = r->walk.entry_axis, s->tick = r->walk.end / ISOGI_VOL__TICKS;
-    r->at = 3, r->open = NULL;
-    return 1;
-}
+/* Voxels of a leaf, from the lowest one of a cell to the first ones of its four rows along x. */
+static const uint8_t isogi_vol__row_of[4] = {0, 5, 25, 30};
 
 /* What is told of a cell; begin, end: when the ray enters it and leaves it. First x, then y, then z is taken there. */
-static int isogi_vol__cell_told(isogi_vol__walk *w, const isogi_vol__leaf *leaf, const int cell[3], double begin, double end) {
+static int isogi_vol__cell_told_base(isogi_vol__walk *w, const isogi_vol__leaf *leaf, const int cell[3], double begin, double end) {
     const uint8_t *code = leaf->code + (cell[0] & 3) + 5 * (cell[1] & 3) + 25 * (cell[2] & 3);
-    float from[4] = {0, 0, 0, 0}, to[4] = {0, 0, 0, 0}, f[8];
+    const isogi_vol__four zero = ISOGI_VOL__FOUR(set1_ps)(0), one = ISOGI_VOL__FOUR(set1_ps)(1);
+    isogi_vol__four low, high, enters, leaves, in, out;
+    float from[4] = {0, 0, 0, 0}, to[4] = {0, 0, 0, 0}, first[4], second[4], f[8];
     int a;
     for (a = 0; a < 3; a++) {
         const double at = w->origin[a] - cell[a];
         from[a] = (float)(at + begin * w->dir[a]), to[a] = (float)(at + end * w->dir[a]);
     }
-#ifdef ISOGI_VOL__SSE2
-    {
-        const __m128i pairs = _mm_setr_epi32(code[0] | code[1] << 8, code[5] | code[6] << 8, code[25] | code[26] << 8,
-                                             code[30] | code[31] << 8);
-        const __m128 zero = _mm_setzero_ps(), one = _mm_set1_ps(1);
-        const __m128 in = _mm_min_ps(_mm_max_ps(_mm_loadu_ps(from), zero), one), out = _mm_min_ps(_mm_max_ps(_mm_loadu_ps(to), zero), one);
-        __m128 low = _mm_cvtepi32_ps(_mm_and_si128(pairs, _mm_set1_epi32(255))), high = _mm_cvtepi32_ps(_mm_srli_epi32(pairs, 8));
-        __m128 enters, leaves;
-#define ISOGI_VOL__TAKEN(lanes) \
-    high = _mm_sub_ps(high, low), enters = _mm_add_ps(low, _mm_mul_ps(_mm_shuffle_ps(in, in, lanes), high)), \
-    leaves = _mm_add_ps(low, _mm_mul_ps(_mm_shuffle_ps(out, out, lanes), high)), low = _mm_shuffle_ps(enters, leaves, 0x88), \
-    high = _mm_shuffle_ps(enters, leaves, 0xdd)
-        ISOGI_VOL__TAKEN(0x00), ISOGI_VOL__TAKEN(0x55), ISOGI_VOL__TAKEN(0xaa);
+    for (a = 0; a < 4; a++) first[a] = code[isogi_vol__row_of[a]], second[a] = code[isogi_vol__row_of[a] + 1];
+    in = ISOGI_VOL__FOUR(min_ps)(ISOGI_VOL__FOUR(max_ps)(ISOGI_VOL__FOUR(loadu_ps)(from), zero), one);
+    out = ISOGI_VOL__FOUR(min_ps)(ISOGI_VOL__FOUR(max_ps)(ISOGI_VOL__FOUR(loadu_ps)(to), zero), one);
+    low = ISOGI_VOL__FOUR(loadu_ps)(first), high = ISOGI_VOL__FOUR(loadu_ps)(second);
+#define ISOGI_VOL__TAKEN(axis) \
+    high = ISOGI_VOL__FOUR(sub_ps)(high, low); \
+    enters = ISOGI_VOL__FOUR(add_ps)(low, ISOGI_VOL__FOUR(mul_ps)(ISOGI_VOL__LANE_base(in, axis), high)); \
+    leaves = ISOGI_VOL__FOUR(add_ps)(low, ISOGI_VOL__FOUR(mul_ps)(ISOGI_VOL__LANE_base(out, axis), high)); \
+    low = ISOGI_VOL__EVEN(enters, leaves), high = ISOGI_VOL__ODD(enters, leaves)
+    ISOGI_VOL__TAKEN(0);
+    ISOGI_VOL__TAKEN(1);
+    ISOGI_VOL__TAKEN(2);
 #undef ISOGI_VOL__TAKEN
-        _mm_storeu_ps(f, enters), _mm_storeu_ps(f + 4, leaves);
-    }
-#else
-    {
-        float x[2][4], y[2][2];
-        int e, k;
-        for (a = 0; a < 3; a++) {
-            from[a] = from[a] > 0 ? from[a] < 1 ? from[a] : 1 : 0;
-            to[a] = to[a] > 0 ? to[a] < 1 ? to[a] : 1 : 0;
-        }
-        for (k = 0; k < 4; k++) {
-            const uint8_t *pair = code + 5 * (k & 1) + 25 * (k >> 1);
-            const float low = pair[0], rise = (float)pair[1] - low;
-            x[0][k] = low + from[0] * rise, x[1][k] = low + to[0] * rise;
-        }
-        for (e = 0; e < 2; e++) {
-            for (k = 0; k < 2; k++) {
-                const float low = x[e][2 * k], rise = x[e][2 * k + 1] - low;
-                y[0][k] = low + from[1] * rise, y[1][k] = low + to[1] * rise;
-            }
-            for (k = 0; k < 2; k++)
-                f[e + 2 * k] = y[k][0] + from[2] * (y[k][1] - y[k][0]), f[e + 2 * k + 4] = y[k][0] + to[2] * (y[k][1] - y[k][0]);
-        }
-    }
-#endif
+    ISOGI_VOL__FOUR(storeu_ps)(f, enters), ISOGI_VOL__FOUR(storeu_ps)(f + 4, leaves);
     return isogi_vol__told(w, leaf, f);
 }
 
-/* From child to child up to one that can hold the surface, of the node at hand or of one above it; 0: the segment ends before. here: the
-   present one counts. */
-static int isogi_vol__ride_seek(isogi_vol__ride *r, int here) {
-    isogi_vol__steps *s = &r->by.steps;
-    const int64_t end = s->ticks.end;
-    const uint32_t flip = s->ticks.flip;
-    int n = r->at, axis = s->axis;
-    isogi_vol__place place = s->place[n];
-    uint64_t mask = n < 3 ? s->mask[n] : ~(uint64_t)0;
-    int64_t now = s->now;
-    for (;; here = 0) {
-        if (!here) {
-            now = isogi_vol__step(&place, &axis);
-            if (now >= end) return 0;
-            if (n == 3) s->node[3][axis]++;
-            else if (place.state & ISOGI_VOL__LEFT) {
-                n++, place = s->place[n], mask = n < 3 ? s->mask[n] : ~(uint64_t)0;
-                continue;
-            }
-        }
-        if (n == 3 || mask >> ((place.state ^ flip) & 63) & 1) break;
-        r->walk.deflate = 0;
-    }
-    r->at = n, s->place[n] = place, s->now = now, s->axis = axis;
-    return 1;
-}
-
-/* Into the child at which the ray is. */
-static void isogi_vol__ride_down(isogi_vol__ride *r) {
-    const isogi_pyramid *p = r->walk.pyramid;
-    isogi_vol__steps *s = &r->by.steps;
-    const int n = --r->at;
-    const uint32_t child = s->place[n + 1].state ^ s->ticks.flip;
-    int *to = s->node[n], a;
-    for (a = 0; a < 3; a++) {
-        if (n < 2) to[a] = 4 * s->node[n + 1][a] + (int)(child >> 2 * a & 3);
-        else to[a] = s->ticks.mirror[a] ? (s->ticks.mirror[a] >> 6) - s->node[3][a] : s->node[3][a];
-    }
-    if (n || !p->volume.compact) isogi_vol__ride_to(r, p->nodes[isogi_vol__node_at(p, n, (size_t)to[0], (size_t)to[1], (size_t)to[2])]);
-    else r->open = p->nodes[0]; /* there is nothing to be read */
-}
-
-/* Opens the node that was sent for; 0: it has no child that can hold the surface. */
-static int isogi_vol__ride_open(isogi_vol__ride *r) {
-    isogi_vol__steps *s = &r->by.steps;
-    const isogi_vol__ticks *k = &s->ticks;
-    const isogi_pyramid *p = r->walk.pyramid;
-    const int n = r->at, *at = s->node[0];
-    const uint64_t mask = n                   ? isogi_vol__node_mask(r->open, k->low, k->high)
-                          : p->volume.compact ? isogi_vol__no_leaf(p, (size_t)at[0], (size_t)at[1], (size_t)at[2], &r->leaf)
-                                              : isogi_vol__leaf_mask(r->open, k->level, &r->leaf);
-    r->walk.count.blocks++, r->open = NULL;
-    s->mask[n] = mask;
-    if (mask) s->place[n] = isogi_vol__descend(&s->place[n + 1], s->now);
-    else r->walk.deflate = 0, r->at++;
-    return mask != 0;
-}
-
-/* The cell at which the ray is: 1: hit; 0: none; -1: its voxels are sent for. */
-static int isogi_vol__ride_cell(isogi_vol__ride *r, isogi_hit *hit) {
-    const isogi_vol__steps *s = &r->by.steps;
-    const uint32_t child = s->place[0].state ^ s->ticks.flip;
-    isogi_vol__walk *w = &r->walk;
-    isogi_vol__place after = s->place[0];
-    int axis, told, cell[3], a;
-    const int64_t end = isogi_vol__step(&after, &axis);
-    for (a = 0; a < 3; a++) cell[a] = 4 * s->node[0][a] + (int)(child >> 2 * a & 3);
-    if (!r->looked) {
-        const double ends = isogi_vol__min((double)end * s->tick, w->end);
-        told = w->deflate || !r->leaf.code ? 0 : isogi_vol__cell_told(w, &r->leaf, cell, (double)s->now * s->tick, ends);
-        w->count.cells += told != 0;
-        if (told) return told > 1;
-        isogi_vol__ride_to_cell(r, cell[0], cell[1], cell[2]);
-        return -1;
-    }
-    r->looked = 0;
-    return isogi_vol__mixed_cell(w, cell[0], cell[1], cell[2], s->axis, end <= s->ticks.end ? axis : -1, hit);
-}
-
-/* Goes on to the first hit: 1, or to the end: 0. waits: to where memory is to be read next, which is sent for: -1. */
-static int isogi_vol__ride_steps(isogi_vol__ride *r, int waits, isogi_hit *hit) {
-    if (r->by.steps.ticks.low > r->by.steps.ticks.high) return 0;
-    for (;;) {
-        int found;
-        if (r->open && !isogi_vol__ride_seek(r, isogi_vol__ride_open(r))) return 0;
-        if (r->at) {
-            isogi_vol__ride_down(r);
-            if (waits && !isogi_vol__ride_knows(r)) return -1;
-            continue;
-        }
-        found = isogi_vol__ride_cell(r, hit);
-        if (found > 0 || (found < 0 && waits)) return found;
-        if (!found && !isogi_vol__ride_seek(r, 0)) return 0;
-    }
-}
-
-/* ---- by masks ---- */
-
-#ifdef ISOGI_VOL__AVX
-
 /* Sets it up; 0: it has to be walked plainly. */
-ISOGI_VOL__TARGET("avx2") static int isogi_vol__ride_set_trip(isogi_vol__ride *r) {
+static int isogi_vol__ride_set(isogi_vol__ride *r) {
     const isogi_vol__walk *w = &r->walk;
     const isogi_pyramid *p = w->pyramid;
-    isogi_vol__trip *c = &r->by.trip;
+    isogi_vol__trip *c = &r->trip;
     const int top = p->node_levels - 1;
-    const __m256d zero = _mm256_setzero_pd(), minus = _mm256_set1_pd(-0.0), origin = _mm256_loadu_pd(w->origin);
-    const __m256d dir = _mm256_loadu_pd(w->dir), first3 = _mm256_castsi256_pd(_mm256_setr_epi64x(-1, -1, -1, 0));
-    const __m256d still = _mm256_and_pd(_mm256_cmp_pd(dir, zero, _CMP_EQ_OQ), first3);
-    /* a ray that stands still keeps below the upper border */
-    const __m256d beyond = _mm256_and_pd(still, _mm256_cmp_pd(origin, _mm256_loadu_pd(p->box), _CMP_GE_OQ));
-    const __m256d fall = _mm256_and_pd(_mm256_or_pd(_mm256_cmp_pd(dir, zero, _CMP_LT_OQ), beyond), first3);
-    const __m256d huge = _mm256_or_pd(_mm256_set1_pd(1e200), _mm256_and_pd(fall, minus));
-    const __m256d inverse = _mm256_blendv_pd(_mm256_loadu_pd(w->inverse), huge, still), size = _mm256_andnot_pd(minus, dir);
-    const __m256d start = _mm256_blendv_pd(origin, _mm256_sub_pd(_mm256_set1_pd(4 << 2 * top), origin), fall); /* counted like cells */
-    const __m256d pairs = _mm256_max_pd(size, _mm256_permute2f128_pd(size, size, 1));
-    const __m256d most = _mm256_max_pd(pairs, _mm256_permute_pd(pairs, 5));
-    const __m256d pace = _mm256_min_pd(_mm256_mul_pd(_mm256_andnot_pd(minus, inverse), most), _mm256_set1_pd(1e30));
-    float per[4], at[4];
+    const double most = isogi_vol__largest(w->dir[0], w->dir[1], w->dir[2]);
     uint64_t bits;
     int a;
     if (!(w->end > 1e-150) || !(w->end < 1e150)) return 0;
-    _mm_storeu_ps(per, _mm256_cvtpd_ps(pace)), _mm_storeu_ps(at, _mm256_cvtpd_ps(start));
     c->level = isogi_vol__quantise_isovalue(p, w->isovalue, &c->low, &c->high);
     c->reach = 2 * ISOGI_VOL__NEAR(p->node_levels); /* each level rounds twice, without fused multiply-adds */
-    c->octant = _mm256_movemask_pd(fall), c->flip = (c->octant & 1 ? 3 : 0) | (c->octant & 2 ? 12 : 0) | (c->octant & 4 ? 48 : 0);
+    c->octant = 0, c->flip = 0, c->origin[3] = c->inverse[3] = 0, c->lead[3] = 0;
+    for (a = 0; a < 3; a++) {
+        const int still = !(w->dir[a] > 0 || w->dir[a] < 0);
+        const int fall = w->dir[a] < 0 || (still && w->origin[a] >= p->box[a]); /* one that stands still keeps below the upper border */
+        const double start = fall ? (4 << 2 * top) - w->origin[a] : w->origin[a]; /* counted like cells */
+        c->octant |= fall << a, c->flip |= fall * (3 << 2 * a), c->lead[a] = fall;
+        c->origin[a] = w->origin[a], c->inverse[a] = still ? fall ? -1e200 : 1e200 : w->inverse[a];
+        c->cell[a] = (float)isogi_vol__min(fabs(c->inverse[a]) * most, 1e30);
+        c->enter[top][a] = (-c->reach - (float)start) * c->cell[a];
+    }
     memcpy(&bits, &w->end, sizeof bits), bits |= 3, memcpy(&c->stop, &bits, sizeof bits);
-    _mm256_storeu_pd(c->origin, origin), _mm256_storeu_pd(c->inverse, inverse);
-    for (a = 0; a < 4; a++) c->lead[a] = c->octant >> a & 1;
-    for (a = 0; a < 3; a++) c->cell[a] = per[a], c->enter[top][a] = (-c->reach - at[a]) * per[a];
     memset(c->place[top], 0, sizeof c->place[top]);
-    c->last = (float)(isogi_vol__min(w->end * _mm256_cvtsd_f64(most), 1e30) * 1.000001);
+    c->last = (float)(isogi_vol__min(w->end * most, 1e30) * 1.000001);
     c->entry_axis = w->entry_axis, c->child = 0, c->pending = 0, c->cells = 0;
     r->at = top, r->looked = 0;
     isogi_vol__ride_to(r, p->nodes[p->node_level[top].first]);
     return 1;
 }
 
-/* Which layers of two axes, a + 4 b, the ray is in at once. */
-ISOGI_VOL__TARGET("avx2") ISOGI_VOL__INLINE uint64_t isogi_vol__layers_met(__m128 in_a, __m128 out_a, __m128 in_b, __m128 out_b) {
-    const __m256i first = _mm256_setr_epi32(0, 0, 0, 0, 1, 1, 1, 1), second = _mm256_setr_epi32(2, 2, 2, 2, 3, 3, 3, 3);
-    const __m256 in = _mm256_insertf128_ps(_mm256_castps128_ps256(in_a), in_a, 1);
-    const __m256 out = _mm256_insertf128_ps(_mm256_castps128_ps256(out_a), out_a, 1);
-    const __m256 in_row = _mm256_castps128_ps256(in_b), out_row = _mm256_castps128_ps256(out_b);
-#define ISOGI_VOL__MET(which) \
-    (unsigned)_mm256_movemask_ps(_mm256_and_ps(_mm256_cmp_ps(in, _mm256_permutevar8x32_ps(out_row, which), _CMP_LE_OQ), \
-                                               _mm256_cmp_ps(_mm256_permutevar8x32_ps(in_row, which), out, _CMP_LE_OQ)))
-    return ISOGI_VOL__MET(first) | ISOGI_VOL__MET(second) << 8;
-#undef ISOGI_VOL__MET
+/* When the ray is in each layer of a node's children, by each axis. */
+ISOGI_VOL__INLINE void isogi_vol__trip_layers(isogi_vol__trip *c, const struct isogi_vol__ways *ways, int n, isogi_vol__four in[3],
+                                              isogi_vol__four out[3]) {
+    const isogi_vol__four last = ISOGI_VOL__FOUR(set1_ps)(c->last), zero = ISOGI_VOL__FOUR(set1_ps)(0);
+    const float size = ways->size[n], wide = size + 2 * c->reach, *layer = ways->within[c->child];
+    int a;
+#if defined(__GNUC__) && __GNUC__ >= 8
+#pragma GCC unroll 4
+#endif
+    for (a = 0; a < 3; a++) {
+        const isogi_vol__four step = ISOGI_VOL__FOUR(set1_ps)(c->cell[a] * size), begin = ISOGI_VOL__FOUR(set1_ps)(c->enter[n][a]);
+        const isogi_vol__four layers = ISOGI_VOL__FOUR(loadu_ps)(layer + 4 * a);
+        const isogi_vol__four times = ISOGI_VOL__FOUR(add_ps)(begin, ISOGI_VOL__FOUR(mul_ps)(layers, step));
+        in[a] = ISOGI_VOL__FOUR(max_ps)(times, zero);
+        out[a] = ISOGI_VOL__FOUR(min_ps)(ISOGI_VOL__FOUR(add_ps)(times, ISOGI_VOL__FOUR(set1_ps)(c->cell[a] * wide)), last);
+        if (n) c->enter[n - 1][a] = ISOGI_VOL__FOUR(cvtss_f32)(times);
+    }
 }
 
 /* Bits 0..15 in groups of four that are 16 apart. */
@@ -5015,24 +4852,9 @@ ISOGI_VOL__INLINE uint64_t isogi_vol__spread_rows(uint64_t x) {
     return (x | x << 12) & 0x000f000f000f000fu;
 }
 
-/* Which children of a node the ray passes or comes near, in its own order. */
-ISOGI_VOL__TARGET("avx2") ISOGI_VOL__INLINE uint64_t isogi_vol__way_avx2(isogi_vol__trip *c, const struct isogi_vol__ways *ways, int n,
-                                                                           int child) {
-    const __m128 last = _mm_set1_ps(c->last);
-    const float size = ways->size[n], wide = size + 2 * c->reach;
-    __m128 in[3], out[3];
-    uint64_t xy, xz, yz;
-    int a;
-#pragma GCC unroll 4
-    for (a = 0; a < 3; a++) {
-        const __m128 layer = _mm_loadu_ps(ways->within[child] + 4 * a), step = _mm_set1_ps(c->cell[a] * size);
-        const __m128 times = _mm_add_ps(_mm_set1_ps(c->enter[n][a]), _mm_mul_ps(layer, step));
-        in[a] = _mm_max_ps(times, _mm_setzero_ps()), out[a] = _mm_min_ps(_mm_add_ps(times, _mm_set1_ps(c->cell[a] * wide)), last);
-        if (n) c->enter[n - 1][a] = _mm_cvtss_f32(times);
-    }
-    xy = isogi_vol__layers_met(in[0], out[0], in[1], out[1]), xz = isogi_vol__layers_met(in[0], out[0], in[2], out[2]);
-    yz = isogi_vol__spread_rows(isogi_vol__layers_met(in[1], out[1], in[2], out[2]));
-    yz = (yz | yz << 6) & 0x0303030303030303u, yz = (yz | yz << 3) & 0x1111111111111111u;
+/* Which children of a node the ray passes or comes near, in its own order, from which layers of every two axes it is in at once. */
+ISOGI_VOL__INLINE uint64_t isogi_vol__trip_way(uint64_t xy, uint64_t xz, uint64_t yz) {
+    yz = isogi_vol__spread_rows(yz), yz = (yz | yz << 6) & 0x0303030303030303u, yz = (yz | yz << 3) & 0x1111111111111111u;
     return xy * 0x0001000100010001u & isogi_vol__spread_rows(xz) * 0x1111u & yz * 15;
 }
 
@@ -5053,11 +4875,155 @@ ISOGI_VOL__INLINE uint64_t isogi_vol__turn_mask(uint64_t m, int octant) {
     return m;
 }
 
-/* Whether the ray passes a cell as pools have it, when it enters and leaves it, and by which axes; 3: none. */
+/* The node that was sent for is opened: `mask` of its children are passed, and can hold the surface. */
+ISOGI_VOL__INLINE void isogi_vol__trip_opened(isogi_vol__ride *r, uint64_t mask) {
+    isogi_vol__trip *c = &r->trip;
+    const isogi_pyramid *p = r->walk.pyramid;
+    const int n = r->at;
+    const int32_t *at = c->place[n];
+    r->walk.count.blocks++, r->open = NULL;
+    if (!n) {
+        c->cells = mask;
+        return;
+    }
+    c->left[n] = mask, c->pending |= (unsigned)(mask != 0) << n, c->children[n] = NULL;
+    if (n > 1 || !p->volume.compact)
+        c->children[n] = p->nodes[isogi_vol__node_at(p, n - 1, 4 * (size_t)at[0], 4 * (size_t)at[1], 4 * (size_t)at[2])];
+}
+
+/* The coordinates of a node's child among nodes of its level. */
+ISOGI_VOL__INLINE void isogi_vol__inside_node(int32_t to[4], const int32_t node[4], const int32_t digits[4]) {
+    int a;
+    for (a = 0; a < 4; a++) to[a] = 4 * node[a] + digits[a];
+}
+
+/* Sends for the next node, of the lowest level that has any left; 0: there is none. */
+ISOGI_VOL__INLINE int isogi_vol__trip_next(isogi_vol__ride *r) {
+    isogi_vol__trip *c = &r->trip;
+    int n, here;
+    if (!c->pending) return 0;
+    n = isogi_vol__lowest_bit(c->pending), c->child = isogi_vol__lowest_bit(c->left[n]), here = c->child ^ c->flip;
+    c->left[n] &= c->left[n] - 1;
+    if (!c->left[n]) c->pending &= c->pending - 1;
+    isogi_vol__inside_node(c->place[n - 1], c->place[n], r->walk.pyramid->ways->inner[here]);
+    if (c->children[n]) isogi_vol__ride_to(r, c->children[n] + 128 * here);
+    else r->open = r->walk.pyramid->nodes[0]; /* there is nothing to be read */
+    r->at = n - 1;
+    return 1;
+}
+
+/* Whether the ray passes a cell as pools have it, when it enters and leaves it, and by which axes; 3: none. Times as integers, in whose two
+   lowest bits stands the axis. */
+static int isogi_vol__passes_base(isogi_vol__trip *c, const int32_t cell[4], double *begin, double *end) {
+    int64_t first = 3, last;
+    int a;
+    memcpy(&last, &c->stop, sizeof last);
+    for (a = 0; a < 3; a++) {
+        const double t0 = (cell[a] + c->lead[a] - c->origin[a]) * c->inverse[a];
+        const double t1 = (cell[a] + 1 - c->lead[a] - c->origin[a]) * c->inverse[a];
+        int64_t in, out;
+        memcpy(&in, &t0, sizeof in), memcpy(&out, &t1, sizeof out);
+        /* what is negative is so as an integer, too */
+        in = ((in > 0 ? in : 0) & ~(int64_t)3) | a, out = ((out > 0 ? out : 0) & ~(int64_t)3) | a;
+        first = in > first ? in : first, last = out < last ? out : last;
+    }
+    c->in = (int)(first & 3), c->out = (int)(last & 3);
+    if (first >= last) return 0;
+    first &= ~(int64_t)3, last &= ~(int64_t)3;
+    memcpy(begin, &first, sizeof first), memcpy(end, &last, sizeof last);
+    return 1;
+}
+
+/* Which children of the node that was sent for the ray passes, in its own order, and that can hold the surface. */
+ISOGI_VOL__INLINE uint64_t isogi_vol__trip_mask_base(isogi_vol__ride *r) {
+    isogi_vol__trip *c = &r->trip;
+    const isogi_pyramid *p = r->walk.pyramid;
+    const int32_t *at = c->place[0];
+    const uint64_t held = r->at               ? isogi_vol__node_mask(r->open, c->low, c->high)
+                          : p->volume.compact ? isogi_vol__no_leaf(p, (size_t)at[0], (size_t)at[1], (size_t)at[2], &r->leaf)
+                                              : isogi_vol__leaf_mask(r->open, c->level, &r->leaf);
+    isogi_vol__four in[3], out[3];
+    isogi_vol__trip_layers(c, p->ways, r->at, in, out);
+    return isogi_vol__turn_mask(held, c->octant) & isogi_vol__trip_way(isogi_vol__met(in[0], out[0], in[1], out[1]),
+                                                                       isogi_vol__met(in[0], out[0], in[2], out[2]),
+                                                                       isogi_vol__met(in[1], out[1], in[2], out[2]));
+}
+
+/* The next cell of the leaf: 1: hit; 0: none; -1: its voxels are sent for. And on to the first hit: 1, or to the end: 0; waits: to where
+   memory is to be read next, which is sent for: -1. */
+#define ISOGI_VOL__TRIP(path, target, mixed_cell) \
+    target ISOGI_VOL__INLINE int isogi_vol__trip_cell_##path(isogi_vol__ride *r, isogi_hit *hit) { \
+        isogi_vol__trip *c = &r->trip; \
+        isogi_vol__walk *w = &r->walk; \
+        double begin, end; \
+        int32_t cell[4]; \
+        isogi_vol__inside_node(cell, c->place[0], w->pyramid->ways->inner[isogi_vol__lowest_bit(c->cells) ^ c->flip]); \
+        if (!r->looked && isogi_vol__passes_##path(c, cell, &begin, &end)) { \
+            const int told = w->deflate || !r->leaf.code ? 0 : isogi_vol__cell_told_##path(w, &r->leaf, cell, begin, end); \
+            w->count.cells += told != 0; \
+            if (told > 1) return 1; \
+            if (!told) { \
+                isogi_vol__ride_to_cell(r, cell[0], cell[1], cell[2]); \
+                return -1; \
+            } \
+        } \
+        c->cells &= c->cells - 1; \
+        if (!r->looked) return 0; \
+        r->looked = 0; \
+        return mixed_cell(w, cell[0], cell[1], cell[2], c->in == 3 ? c->entry_axis : c->in, c->out == 3 ? -1 : c->out, hit); \
+    } \
+    target static int isogi_vol__ride_on_##path(isogi_vol__ride *r, int waits, isogi_hit *hit) { \
+        isogi_vol__trip *c = &r->trip; \
+        if (c->low > c->high) return 0; \
+        do { \
+            if (r->open) isogi_vol__trip_opened(r, isogi_vol__trip_mask_##path(r)); \
+            while (c->cells) { \
+                const int found = isogi_vol__trip_cell_##path(r, hit); \
+                if (found > 0) return 1; \
+                if (found < 0 && waits) return -1; \
+            } \
+        } while (isogi_vol__trip_next(r) && (!waits || isogi_vol__ride_knows(r))); \
+        if (r->open) return -1; \
+        /* what was skipped behind the last cell lies on one side */ \
+        if (!(r->walk.deflated >= r->walk.end)) r->walk.deflate = 0; \
+        return 0; \
+    }
+
+ISOGI_VOL__TRIP(base, , isogi_vol__mixed_cell)
+
+#ifdef ISOGI_VOL__AVX
+/* Bit a + 4 b, as isogi_vol__met has it. */
+ISOGI_VOL__TARGET("avx2") ISOGI_VOL__INLINE uint64_t isogi_vol__met_avx2(__m128 in_a, __m128 out_a, __m128 in_b, __m128 out_b) {
+    const __m256i first = _mm256_setr_epi32(0, 0, 0, 0, 1, 1, 1, 1), second = _mm256_setr_epi32(2, 2, 2, 2, 3, 3, 3, 3);
+    const __m256 in = _mm256_insertf128_ps(_mm256_castps128_ps256(in_a), in_a, 1);
+    const __m256 out = _mm256_insertf128_ps(_mm256_castps128_ps256(out_a), out_a, 1);
+    const __m256 in_row = _mm256_castps128_ps256(in_b), out_row = _mm256_castps128_ps256(out_b);
+#define ISOGI_VOL__MET(which) \
+    (unsigned)_mm256_movemask_ps(_mm256_and_ps(_mm256_cmp_ps(in, _mm256_permutevar8x32_ps(out_row, which), _CMP_LE_OQ), \
+                                               _mm256_cmp_ps(_mm256_permutevar8x32_ps(in_row, which), out, _CMP_LE_OQ)))
+    return ISOGI_VOL__MET(first) | ISOGI_VOL__MET(second) << 8;
+#undef ISOGI_VOL__MET
+}
+
+ISOGI_VOL__TARGET("avx2") ISOGI_VOL__INLINE uint64_t isogi_vol__trip_mask_avx2(isogi_vol__ride *r) {
+    isogi_vol__trip *c = &r->trip;
+    const isogi_pyramid *p = r->walk.pyramid;
+    const int32_t *at = c->place[0];
+    __m128 in[3], out[3];
+    uint64_t way, held;
+    isogi_vol__trip_layers(c, p->ways, r->at, in, out);
+    way = isogi_vol__trip_way(isogi_vol__met_avx2(in[0], out[0], in[1], out[1]), isogi_vol__met_avx2(in[0], out[0], in[2], out[2]),
+                              isogi_vol__met_avx2(in[1], out[1], in[2], out[2]));
+    held = r->at               ? isogi_vol__node_mask_avx2(r->open, c->low, c->high)
+           : p->volume.compact ? isogi_vol__no_leaf(p, (size_t)at[0], (size_t)at[1], (size_t)at[2], &r->leaf)
+                               : isogi_vol__leaf_mask_avx2(r->open, c->level, &r->leaf);
+    return way & isogi_vol__turn_mask(held, c->octant);
+}
+
 ISOGI_VOL__TARGET("avx2")
-ISOGI_VOL__INLINE int isogi_vol__passes_avx2(isogi_vol__trip *c, __m128i cell, double *begin, double *end) {
-    const __m128i lead = _mm_loadu_si128((const __m128i *)(const void *)c->lead), near_face = _mm_add_epi32(cell, lead);
-    const __m128i far_face = _mm_sub_epi32(_mm_add_epi32(cell, _mm_set1_epi32(1)), lead);
+ISOGI_VOL__INLINE int isogi_vol__passes_avx2(isogi_vol__trip *c, const int32_t cell[4], double *begin, double *end) {
+    const __m128i at = _mm_loadu_si128((const __m128i *)(const void *)cell), lead = _mm_loadu_si128((const __m128i *)(const void *)c->lead);
+    const __m128i near_face = _mm_add_epi32(at, lead), far_face = _mm_sub_epi32(_mm_add_epi32(at, _mm_set1_epi32(1)), lead);
     const __m256d origin = _mm256_loadu_pd(c->origin), inverse = _mm256_loadu_pd(c->inverse), zero = _mm256_setzero_pd();
     const __m256d axes = _mm256_castsi256_pd(_mm256_setr_epi64x(0, 1, 2, 3));
     const __m256d time = _mm256_castsi256_pd(_mm256_set1_epi64x(~(int64_t)3));
@@ -5080,12 +5046,12 @@ ISOGI_VOL__INLINE int isogi_vol__passes_avx2(isogi_vol__trip *c, __m128i cell, d
     return 1;
 }
 
-/* cell_told, eight values at a time: x, then y, then z is taken where the ray enters the cell and where it leaves it. code: of the cell's
-   lowest corner. */
+/* As cell_told_base, eight values at a time: x, then y, then z is taken where the ray enters the cell and where it leaves it. */
 ISOGI_VOL__TARGET("avx2")
-ISOGI_VOL__INLINE int isogi_vol__cell_told_avx2(isogi_vol__walk *w, const isogi_vol__leaf *leaf, const uint8_t *code, __m128i cell,
+ISOGI_VOL__INLINE int isogi_vol__cell_told_avx2(isogi_vol__walk *w, const isogi_vol__leaf *leaf, const int32_t *cell,
                                                 double begin, double end) {
-    const __m256d at = _mm256_sub_pd(_mm256_loadu_pd(w->origin), _mm256_cvtepi32_pd(cell));
+    const uint8_t *code = leaf->code + (cell[0] & 3) + 5 * (cell[1] & 3) + 25 * (cell[2] & 3);
+    const __m256d at = _mm256_sub_pd(_mm256_loadu_pd(w->origin), _mm256_cvtepi32_pd(_mm_loadu_si128((const __m128i *)(const void *)cell)));
     const __m256d dir = _mm256_loadu_pd(w->dir), zero = _mm256_setzero_pd(), one = _mm256_set1_pd(1);
     const __m256d in = _mm256_add_pd(at, _mm256_mul_pd(_mm256_set1_pd(begin), dir));
     const __m256d out = _mm256_add_pd(at, _mm256_mul_pd(_mm256_set1_pd(end), dir));
@@ -5109,123 +5075,15 @@ ISOGI_VOL__INLINE int isogi_vol__cell_told_avx2(isogi_vol__walk *w, const isogi_
     return isogi_vol__told(w, leaf, f);
 }
 
-/* The digits x, y, z of a child's number. */
-ISOGI_VOL__TARGET("avx2") ISOGI_VOL__INLINE __m128i isogi_vol__digits(const struct isogi_vol__ways *ways, int child) {
-    return _mm_load_si128((const __m128i *)(const void *)ways->inner[child]);
-}
-
-/* The coordinates of a node's child among nodes of its level. */
-ISOGI_VOL__TARGET("avx2") ISOGI_VOL__INLINE __m128i isogi_vol__inner(const struct isogi_vol__ways *ways, __m128i node, int child) {
-    return _mm_add_epi32(_mm_slli_epi32(node, 2), isogi_vol__digits(ways, child));
-}
-
-/* The 64 children of a node of level n, from its coordinates. */
-ISOGI_VOL__TARGET("avx2") ISOGI_VOL__INLINE const uint8_t *isogi_vol__children(const isogi_pyramid *p, int n, __m128i node) {
-    __m128i number = _mm_mullo_epi32(node, _mm_load_si128((const __m128i *)(const void *)p->ways->stride[n - 1]));
-    number = _mm_add_epi32(number, _mm_shuffle_epi32(number, 0x4e));
-    number = _mm_add_epi32(number, _mm_shuffle_epi32(number, 0xb1));
-    return (const uint8_t *)p->nodes + p->ways->first[n - 1] + ((size_t)(uint32_t)_mm_cvtsi128_si32(number) << 13);
-}
-
-ISOGI_VOL__TARGET("avx2") ISOGI_VOL__INLINE __m128i isogi_vol__trip_place(const isogi_vol__trip *c, int n) {
-    return _mm_loadu_si128((const __m128i *)(const void *)c->place[n]);
-}
-
-/* Opens the node that was sent for. */
-ISOGI_VOL__TARGET("avx2") ISOGI_VOL__INLINE void isogi_vol__trip_open(isogi_vol__ride *r) {
-    isogi_vol__trip *c = &r->by.trip;
-    const isogi_pyramid *p = r->walk.pyramid;
-    const int n = r->at;
-    const uint64_t way = isogi_vol__way_avx2(c, p->ways, n, c->child);
-    r->walk.count.blocks++;
-    if (n) {
-        c->left[n] = way & isogi_vol__turn_mask(isogi_vol__node_mask_avx2(r->open, c->low, c->high), c->octant);
-        c->children[n] = n > 1 || !p->volume.compact ? isogi_vol__children(p, n, isogi_vol__trip_place(c, n)) : NULL;
-        c->pending |= (unsigned)(c->left[n] != 0) << n;
-    } else {
-        const int32_t *at = c->place[0];
-        c->cells = way & isogi_vol__turn_mask(p->volume.compact
-                                                  ? isogi_vol__no_leaf(p, (size_t)at[0], (size_t)at[1], (size_t)at[2], &r->leaf)
-                                                  : isogi_vol__leaf_mask_avx2(r->open, c->level, &r->leaf),
-                                              c->octant);
-    }
-    r->open = NULL;
-}
-
-/* Sends for the next node, of the lowest level that has any left; 0: there is none. */
-ISOGI_VOL__TARGET("avx2") ISOGI_VOL__INLINE int isogi_vol__trip_next(isogi_vol__ride *r) {
-    isogi_vol__trip *c = &r->by.trip;
-    int n, here;
-    if (!c->pending) return 0;
-    n = __builtin_ctz(c->pending), c->child = __builtin_ctzll(c->left[n]), here = c->child ^ c->flip;
-    c->left[n] &= c->left[n] - 1;
-    if (!c->left[n]) c->pending &= c->pending - 1;
-    _mm_storeu_si128((__m128i *)(void *)c->place[n - 1], isogi_vol__inner(r->walk.pyramid->ways, isogi_vol__trip_place(c, n), here));
-    if (c->children[n]) isogi_vol__ride_to(r, c->children[n] + 128 * here);
-    else r->open = r->walk.pyramid->nodes[0]; /* there is nothing to be read */
-    r->at = n - 1;
-    return 1;
-}
-
-/* The next cell of the leaf: 1: hit; 0: none; -1: its voxels are sent for. */
-ISOGI_VOL__TARGET("avx2") ISOGI_VOL__INLINE int isogi_vol__trip_cell(isogi_vol__ride *r, isogi_hit *hit) {
-    isogi_vol__trip *c = &r->by.trip;
-    isogi_vol__walk *w = &r->walk;
-    const struct isogi_vol__ways *ways = w->pyramid->ways;
-    const int child = __builtin_ctzll(c->cells) ^ c->flip;
-    const __m128i cell = isogi_vol__inner(ways, isogi_vol__trip_place(c, 0), child);
-    const int x = _mm_cvtsi128_si32(cell), y = _mm_extract_epi32(cell, 1), z = _mm_extract_epi32(cell, 2);
-    double begin, end;
-    if (!r->looked && isogi_vol__passes_avx2(c, cell, &begin, &end)) {
-        const int told = w->deflate || !r->leaf.code
-                             ? 0
-                             : isogi_vol__cell_told_avx2(w, &r->leaf, r->leaf.code + ways->lowest[0][child], cell, begin, end);
-        w->count.cells += told != 0;
-        if (told > 1) return 1;
-        if (!told) {
-            isogi_vol__ride_to_cell(r, x, y, z);
-            return -1;
-        }
-    }
-    c->cells &= c->cells - 1;
-    if (!r->looked) return 0;
-    r->looked = 0;
-    return isogi_vol__mixed_cell_avx2(w, x, y, z, c->in == 3 ? c->entry_axis : c->in, c->out == 3 ? -1 : c->out, hit);
-}
-
-/* Goes on, as ride_steps does. */
-ISOGI_VOL__TARGET("avx2") static int isogi_vol__ride_trip(isogi_vol__ride *r, int waits, isogi_hit *hit) {
-    isogi_vol__trip *c = &r->by.trip;
-    if (c->low > c->high) return 0;
-    do {
-        if (r->open) isogi_vol__trip_open(r);
-        while (c->cells) {
-            const int found = isogi_vol__trip_cell(r, hit);
-            if (found > 0) return 1;
-            if (found < 0 && waits) return -1;
-        }
-    } while (isogi_vol__trip_next(r) && (!waits || isogi_vol__ride_knows(r)));
-    if (r->open) return -1;
-    /* what was skipped behind the last cell lies on one side */
-    if (!(r->walk.deflated >= r->walk.end)) r->walk.deflate = 0;
-    return 0;
-}
+ISOGI_VOL__TRIP(avx2, ISOGI_VOL__TARGET("avx2"), isogi_vol__mixed_cell_avx2)
 #endif
-
-/* A ride of a walk that is ready to go; 0: it has to be walked plainly. */
-static int isogi_vol__ride_set(isogi_vol__ride *r) {
-    r->looked = 0;
-#ifdef ISOGI_VOL__AVX
-    if (r->walk.pyramid->path >= ISOGI_VOL__PATH_AVX2) return isogi_vol__ride_set_trip(r);
-#endif
-    return isogi_vol__ride_set_steps(r);
-}
+#undef ISOGI_VOL__TRIP
 
 static int isogi_vol__ride_on(isogi_vol__ride *r, int waits, isogi_hit *hit) {
 #ifdef ISOGI_VOL__AVX
-    if (r->walk.pyramid->path >= ISOGI_VOL__PATH_AVX2) return isogi_vol__ride_trip(r, waits, hit);
+    if (r->walk.pyramid->path >= ISOGI_VOL__PATH_AVX2) return isogi_vol__ride_on_avx2(r, waits, hit);
 #endif
-    return isogi_vol__ride_steps(r, waits, hit);
+    return isogi_vol__ride_on_base(r, waits, hit);
 }
 
 /* ==== many rays at once ============================================================================================== */
@@ -6252,12 +6110,8 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE void isogi_vol__open_turn(isogi_vol__turn *t
 
 /* ---- one ray alone ---- */
 
-/* A ray alone has nothing to do while it waits, so what counts are waits and branches that are foretold wrongly. The way through a
-   node's children is not walked but found all at once, in float: a ray passes a child if it enters it by no axis later than it leaves it
-   by another, sixteen pairs of layers for every two axes. Times of a node follow from its parent's by a multiple of what a child takes, so
-   that those of its children wait for no more than its number. With a rounding for each of seven levels they are off by less than 2^-21 of
-   what the root measures; children are widened by twice as much, so none is left out, and some are kept that the ray only comes near. All
-   cells of a leaf are looked at together; those in doubt that it only comes near are told by the times that a pool goes by. */
+/* A ray alone has nothing to do while it waits, so what counts are waits and branches that are foretold wrongly. It goes as rides do; all
+   cells of a leaf are looked at together. */
 typedef struct __attribute__((aligned(64))) isogi_vol__course {
     double origin[4], inverse[4];          /* as in a pool; the fourth is 0 */
     double sign[4], lead[4];               /* -0 on axes along which the ray falls, else 0; there 1, else 0 */
@@ -6307,6 +6161,24 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE int isogi_vol__set_course(isogi_vol__course 
     c->end = isogi_vol__min(w->end * _mm256_cvtsd_f64(most), 1e30);
     c->last = (float)(c->end * 1.000001);
     return 1;
+}
+
+/* The digits x, y, z of a child's number. */
+ISOGI_VOL__TARGET("avx2") ISOGI_VOL__INLINE __m128i isogi_vol__digits(const struct isogi_vol__ways *ways, int child) {
+    return _mm_load_si128((const __m128i *)(const void *)ways->inner[child]);
+}
+
+/* The coordinates of a node's child among nodes of its level. */
+ISOGI_VOL__TARGET("avx2") ISOGI_VOL__INLINE __m128i isogi_vol__inner(const struct isogi_vol__ways *ways, __m128i node, int child) {
+    return _mm_add_epi32(_mm_slli_epi32(node, 2), isogi_vol__digits(ways, child));
+}
+
+/* The 64 children of a node of level n, from its coordinates. */
+ISOGI_VOL__TARGET("avx2") ISOGI_VOL__INLINE const uint8_t *isogi_vol__children(const isogi_pyramid *p, int n, __m128i node) {
+    __m128i number = _mm_mullo_epi32(node, _mm_load_si128((const __m128i *)(const void *)p->ways->stride[n - 1]));
+    number = _mm_add_epi32(number, _mm_shuffle_epi32(number, 0x4e));
+    number = _mm_add_epi32(number, _mm_shuffle_epi32(number, 0xb1));
+    return (const uint8_t *)p->nodes + p->ways->first[n - 1] + ((size_t)(uint32_t)_mm_cvtsi128_si32(number) << 13);
 }
 
 /* Where the layers of a node's children begin on an axis; layer: those of lanes. */
@@ -9000,17 +8872,6 @@ typedef struct isogi_vol__mesher {
     uint32_t (*triangles)[3];
 } isogi_vol__mesher;
 
-static int isogi_vol__lowest_bit(uint64_t x) {
-#if defined(__GNUC__) && !defined(__TINYC__)
-    return __builtin_ctzll(x);
-#else
-    int n = 0;
-    for (; !(x & 0xff); x >>= 8) n += 8;
-    for (; !(x & 1); x >>= 1) n++;
-    return n;
-#endif
-}
-
 static uint32_t isogi_vol__bits(uint64_t x) {
     x -= x >> 1 & 0x5555555555555555u;
     x = (x & 0x3333333333333333u) + (x >> 2 & 0x3333333333333333u);
@@ -9791,8 +9652,19 @@ ISOGI_API void isogi_vol_mesh_free(const isogi_pyramid *pyramid, isogi_mesh *mes
 #undef ISOGI_VOL__STRIP_VOXELS
 #undef ISOGI_VOL__HUGE_PAGE
 #undef ISOGI_VOL__FAST_SIZE
-#undef ISOGI_VOL__TICKS
-#undef ISOGI_VOL__LEFT
+#undef ISOGI_VOL__FOUR
+#undef ISOGI_VOL__EVEN
+#undef ISOGI_VOL__ODD
+#undef isogi_vol__neon_add_ps
+#undef isogi_vol__neon_sub_ps
+#undef isogi_vol__neon_mul_ps
+#undef isogi_vol__neon_min_ps
+#undef isogi_vol__neon_max_ps
+#undef isogi_vol__neon_set1_ps
+#undef isogi_vol__neon_setzero_ps
+#undef isogi_vol__neon_loadu_ps
+#undef isogi_vol__neon_storeu_ps
+#undef isogi_vol__neon_cvtss_f32
 #undef ISOGI_VOL__TARGET
 #undef ISOGI_VOL__AVX512
 #undef ISOGI_VOL__AVX
