@@ -1925,6 +1925,8 @@ struct isogi_vol__ways {
     uint8_t corner[8][8][64];            /* a leaf's voxels at the corners of its cells, and at the lowest one; axes counted backwards */
     uint8_t lowest[8][64], beside[8][64]; /* as in voxel; from the lowest to eight times each corner, counted backwards likewise */
     int32_t inner[64][4];                /* the digits */
+    uint8_t turn[8][3][16];              /* what counts a mask of children backwards, by axes: where its bytes come from; what becomes
+                                            of their lower and their upper four bits */
     uint8_t child[8][64], voxel[8][128]; /* children of nodes and voxels of leaves with axes counted backwards: bit a of the index */
     int32_t stride[ISOGI_VOL__NODE_LEVELS][4]; /* from a node's coordinates to the number of the 64 that hold its children, which are of
                                                   this level */
@@ -1963,6 +1965,11 @@ ISOGI_VOL__COLD static void isogi_vol__set_ways(struct isogi_vol__ways *ways, co
     for (i = 0; i < 256; i++) ways->scale[i] = ISOGI_VOL__CODES / (float)(i + 1);
     for (f = 0; f < 8; f++) {
         const int x = f & 1, y = f >> 1 & 1, z = f >> 2;
+        for (i = 0; i < 16; i++) {
+            const int row = x ? i >> 3 | (i >> 1 & 2) | (i << 1 & 4) | (i << 3 & 8) : i;
+            ways->turn[f][0][i] = (uint8_t)(i ^ (y | 6 * z)), ways->turn[f][1][i] = (uint8_t)(y ? row << 4 : row);
+            ways->turn[f][2][i] = (uint8_t)(y ? row : row << 4);
+        }
         for (i = 0; i < 64; i++) {
             const int child = i ^ (3 * x | 12 * y | 48 * z), lowest = (child & 3) + 5 * (child >> 2 & 3) + 25 * (child >> 4);
             ways->child[f][i] = (uint8_t)child, ways->lowest[f][i] = (uint8_t)lowest;
@@ -4853,13 +4860,22 @@ ISOGI_VOL__INLINE uint64_t isogi_vol__spread_rows(uint64_t x) {
 }
 
 /* Which children of a node the ray passes or comes near, in its own order, from which layers of every two axes it is in at once. */
-ISOGI_VOL__INLINE uint64_t isogi_vol__trip_way(uint64_t xy, uint64_t xz, uint64_t yz) {
-    yz = isogi_vol__spread_rows(yz), yz = (yz | yz << 6) & 0x0303030303030303u, yz = (yz | yz << 3) & 0x1111111111111111u;
+ISOGI_VOL__INLINE uint64_t isogi_vol__trip_way(const isogi_vol__four in[3], const isogi_vol__four out[3]) {
+    const uint64_t xy = isogi_vol__met(in[0], out[0], in[1], out[1]), xz = isogi_vol__met(in[0], out[0], in[2], out[2]);
+    uint64_t yz = isogi_vol__spread_rows(isogi_vol__met(in[1], out[1], in[2], out[2]));
+    yz = (yz | yz << 6) & 0x0303030303030303u, yz = (yz | yz << 3) & 0x1111111111111111u;
     return xy * 0x0001000100010001u & isogi_vol__spread_rows(xz) * 0x1111u & yz * 15;
 }
 
 /* Children counted backwards along the axes of `octant`. */
-ISOGI_VOL__INLINE uint64_t isogi_vol__turn_mask(uint64_t m, int octant) {
+ISOGI_VOL__INLINE uint64_t isogi_vol__turn_mask(uint64_t m, const struct isogi_vol__ways *ways, int octant) {
+#ifdef ISOGI_VOL__NEON
+    const uint8_t(*turn)[16] = ways->turn[octant];
+    const uint8x16_t rows = vqtbl1q_u8(vreinterpretq_u8_u64(vdupq_n_u64(m)), vld1q_u8(turn[0]));
+    const uint8x16_t low = vqtbl1q_u8(vld1q_u8(turn[1]), vandq_u8(rows, vdupq_n_u8(15)));
+    return vgetq_lane_u64(vreinterpretq_u64_u8(vorrq_u8(low, vqtbl1q_u8(vld1q_u8(turn[2]), vshrq_n_u8(rows, 4)))), 0);
+#else
+    (void)ways;
     if (octant & 1) {
         m = (m >> 1 & 0x5555555555555555u) | (m & 0x5555555555555555u) << 1;
         m = (m >> 2 & 0x3333333333333333u) | (m & 0x3333333333333333u) << 2;
@@ -4873,6 +4889,7 @@ ISOGI_VOL__INLINE uint64_t isogi_vol__turn_mask(uint64_t m, int octant) {
         m = m >> 32 | m << 32;
     }
     return m;
+#endif
 }
 
 /* The node that was sent for is opened: `mask` of its children are passed, and can hold the surface. */
@@ -4893,8 +4910,13 @@ ISOGI_VOL__INLINE void isogi_vol__trip_opened(isogi_vol__ride *r, uint64_t mask)
 
 /* The coordinates of a node's child among nodes of its level. */
 ISOGI_VOL__INLINE void isogi_vol__inside_node(int32_t to[4], const int32_t node[4], const int32_t digits[4]) {
+#if defined(ISOGI_VOL__SSE2)
+    const __m128i *at = (const __m128i *)(const void *)node, *add = (const __m128i *)(const void *)digits;
+    _mm_storeu_si128((__m128i *)(void *)to, _mm_add_epi32(_mm_slli_epi32(_mm_loadu_si128(at), 2), _mm_loadu_si128(add)));
+#else
     int a;
     for (a = 0; a < 4; a++) to[a] = 4 * node[a] + digits[a];
+#endif
 }
 
 /* Sends for the next node, of the lowest level that has any left; 0: there is none. */
@@ -4944,9 +4966,7 @@ ISOGI_VOL__INLINE uint64_t isogi_vol__trip_mask_base(isogi_vol__ride *r) {
                                               : isogi_vol__leaf_mask(r->open, c->level, &r->leaf);
     isogi_vol__four in[3], out[3];
     isogi_vol__trip_layers(c, p->ways, r->at, in, out);
-    return isogi_vol__turn_mask(held, c->octant) & isogi_vol__trip_way(isogi_vol__met(in[0], out[0], in[1], out[1]),
-                                                                       isogi_vol__met(in[0], out[0], in[2], out[2]),
-                                                                       isogi_vol__met(in[1], out[1], in[2], out[2]));
+    return isogi_vol__turn_mask(held, p->ways, c->octant) & isogi_vol__trip_way(in, out);
 }
 
 /* The next cell of the leaf: 1: hit; 0: none; -1: its voxels are sent for. And on to the first hit: 1, or to the end: 0; waits: to where
@@ -4992,32 +5012,52 @@ ISOGI_VOL__INLINE uint64_t isogi_vol__trip_mask_base(isogi_vol__ride *r) {
 ISOGI_VOL__TRIP(base, , isogi_vol__mixed_cell)
 
 #ifdef ISOGI_VOL__AVX
-/* Bit a + 4 b, as isogi_vol__met has it. */
-ISOGI_VOL__TARGET("avx2") ISOGI_VOL__INLINE uint64_t isogi_vol__met_avx2(__m128 in_a, __m128 out_a, __m128 in_b, __m128 out_b) {
-    const __m256i first = _mm256_setr_epi32(0, 0, 0, 0, 1, 1, 1, 1), second = _mm256_setr_epi32(2, 2, 2, 2, 3, 3, 3, 3);
-    const __m256 in = _mm256_insertf128_ps(_mm256_castps128_ps256(in_a), in_a, 1);
-    const __m256 out = _mm256_insertf128_ps(_mm256_castps128_ps256(out_a), out_a, 1);
-    const __m256 in_row = _mm256_castps128_ps256(in_b), out_row = _mm256_castps128_ps256(out_b);
-#define ISOGI_VOL__MET(which) \
-    (unsigned)_mm256_movemask_ps(_mm256_and_ps(_mm256_cmp_ps(in, _mm256_permutevar8x32_ps(out_row, which), _CMP_LE_OQ), \
-                                               _mm256_cmp_ps(_mm256_permutevar8x32_ps(in_row, which), out, _CMP_LE_OQ)))
-    return ISOGI_VOL__MET(first) | ISOGI_VOL__MET(second) << 8;
+/* What trip_way finds, from all three axes together: a vector has two rows of four children. */
+ISOGI_VOL__TARGET("avx2") ISOGI_VOL__INLINE uint64_t isogi_vol__trip_way_avx2(const __m128 in[3], const __m128 out[3]) {
+    const __m256i row[2] = {_mm256_setr_epi32(0, 0, 0, 0, 1, 1, 1, 1), _mm256_setr_epi32(2, 2, 2, 2, 3, 3, 3, 3)};
+    const __m256i order = _mm256_setr_epi32(0, 4, 1, 5, 2, 6, 3, 7);
+    const __m256 in_x = _mm256_insertf128_ps(_mm256_castps128_ps256(in[0]), in[0], 1);
+    const __m256 out_x = _mm256_insertf128_ps(_mm256_castps128_ps256(out[0]), out[0], 1);
+    __m256 enter[2], leave[2];
+    __m256i slice[4];
+    float in_z[4], out_z[4];
+    int i;
+    _mm_storeu_ps(in_z, in[2]), _mm_storeu_ps(out_z, out[2]);
+#pragma GCC unroll 2
+    for (i = 0; i < 2; i++) {
+        enter[i] = _mm256_max_ps(in_x, _mm256_permutevar8x32_ps(_mm256_castps128_ps256(in[1]), row[i]));
+        leave[i] = _mm256_min_ps(out_x, _mm256_permutevar8x32_ps(_mm256_castps128_ps256(out[1]), row[i]));
+    }
+#define ISOGI_VOL__MET(i, z) _mm256_castps_si256(_mm256_cmp_ps( \
+    _mm256_max_ps(enter[i], _mm256_set1_ps(in_z[z])), _mm256_min_ps(leave[i], _mm256_set1_ps(out_z[z])), _CMP_LE_OQ))
+#pragma GCC unroll 4
+    for (i = 0; i < 4; i++) slice[i] = _mm256_packs_epi32(ISOGI_VOL__MET(0, i), ISOGI_VOL__MET(1, i));
 #undef ISOGI_VOL__MET
+#define ISOGI_VOL__SLICES(i) \
+    (uint64_t)(uint32_t)_mm256_movemask_epi8(_mm256_permutevar8x32_epi32(_mm256_packs_epi16(slice[i], slice[(i) + 1]), order))
+    return ISOGI_VOL__SLICES(0) | ISOGI_VOL__SLICES(2) << 32;
+#undef ISOGI_VOL__SLICES
+}
+
+/* What turn_mask does. */
+ISOGI_VOL__TARGET("avx2") ISOGI_VOL__INLINE uint64_t isogi_vol__turn_mask_avx2(uint64_t m, const struct isogi_vol__ways *ways, int octant) {
+    const __m128i *turn = (const __m128i *)(const void *)ways->turn[octant], half = _mm_set1_epi8(15);
+    const __m128i rows = _mm_shuffle_epi8(_mm_cvtsi64_si128((int64_t)m), _mm_loadu_si128(turn));
+    const __m128i low = _mm_shuffle_epi8(_mm_loadu_si128(turn + 1), _mm_and_si128(rows, half));
+    const __m128i high = _mm_shuffle_epi8(_mm_loadu_si128(turn + 2), _mm_and_si128(_mm_srli_epi16(rows, 4), half));
+    return (uint64_t)_mm_cvtsi128_si64(_mm_or_si128(low, high));
 }
 
 ISOGI_VOL__TARGET("avx2") ISOGI_VOL__INLINE uint64_t isogi_vol__trip_mask_avx2(isogi_vol__ride *r) {
     isogi_vol__trip *c = &r->trip;
     const isogi_pyramid *p = r->walk.pyramid;
     const int32_t *at = c->place[0];
+    const uint64_t held = r->at               ? isogi_vol__node_mask_avx2(r->open, c->low, c->high)
+                          : p->volume.compact ? isogi_vol__no_leaf(p, (size_t)at[0], (size_t)at[1], (size_t)at[2], &r->leaf)
+                                              : isogi_vol__leaf_mask_avx2(r->open, c->level, &r->leaf);
     __m128 in[3], out[3];
-    uint64_t way, held;
     isogi_vol__trip_layers(c, p->ways, r->at, in, out);
-    way = isogi_vol__trip_way(isogi_vol__met_avx2(in[0], out[0], in[1], out[1]), isogi_vol__met_avx2(in[0], out[0], in[2], out[2]),
-                              isogi_vol__met_avx2(in[1], out[1], in[2], out[2]));
-    held = r->at               ? isogi_vol__node_mask_avx2(r->open, c->low, c->high)
-           : p->volume.compact ? isogi_vol__no_leaf(p, (size_t)at[0], (size_t)at[1], (size_t)at[2], &r->leaf)
-                               : isogi_vol__leaf_mask_avx2(r->open, c->level, &r->leaf);
-    return way & isogi_vol__turn_mask(held, c->octant);
+    return isogi_vol__turn_mask_avx2(held, p->ways, c->octant) & isogi_vol__trip_way_avx2(in, out);
 }
 
 ISOGI_VOL__TARGET("avx2")
