@@ -4083,21 +4083,25 @@ typedef float32x4_t isogi_vol__four;
 #define isogi_vol__neon_min_ps vminq_f32
 #define isogi_vol__neon_max_ps vmaxq_f32
 #define isogi_vol__neon_cvtss_f32(v) vgetq_lane_f32(v, 0)
+ISOGI_VOL__INLINE float32x4_t isogi_vol__neon_setr_ps(float a, float b, float c, float d) {
+    const float32x4_t v = {a, b, c, d};
+    return v;
+}
 #define ISOGI_VOL__EVEN(a, b) vuzp1q_f32(a, b)
 #define ISOGI_VOL__ODD(a, b) vuzp2q_f32(a, b)
 #else
 typedef struct isogi_vol__four { float f[4]; } isogi_vol__four;
 #define ISOGI_VOL__FOUR(operation) isogi_vol__plain_##operation
-#define ISOGI_VOL__EVEN(a, b) isogi_vol__plain_four((a).f[0], (a).f[2], (b).f[0], (b).f[2])
-#define ISOGI_VOL__ODD(a, b) isogi_vol__plain_four((a).f[1], (a).f[3], (b).f[1], (b).f[3])
+#define ISOGI_VOL__EVEN(a, b) isogi_vol__plain_setr_ps((a).f[0], (a).f[2], (b).f[0], (b).f[2])
+#define ISOGI_VOL__ODD(a, b) isogi_vol__plain_setr_ps((a).f[1], (a).f[3], (b).f[1], (b).f[3])
 #define ISOGI_VOL__LANE_base(v, i) isogi_vol__plain_set1_ps((v).f[i])
-static isogi_vol__four isogi_vol__plain_four(float a, float b, float c, float d) {
+static isogi_vol__four isogi_vol__plain_setr_ps(float a, float b, float c, float d) {
     isogi_vol__four v;
     v.f[0] = a, v.f[1] = b, v.f[2] = c, v.f[3] = d;
     return v;
 }
-static isogi_vol__four isogi_vol__plain_set1_ps(float a) { return isogi_vol__plain_four(a, a, a, a); }
-static isogi_vol__four isogi_vol__plain_loadu_ps(const float *p) { return isogi_vol__plain_four(p[0], p[1], p[2], p[3]); }
+static isogi_vol__four isogi_vol__plain_set1_ps(float a) { return isogi_vol__plain_setr_ps(a, a, a, a); }
+static isogi_vol__four isogi_vol__plain_loadu_ps(const float *p) { return isogi_vol__plain_setr_ps(p[0], p[1], p[2], p[3]); }
 static float isogi_vol__plain_cvtss_f32(isogi_vol__four a) { return a.f[0]; }
 static void isogi_vol__plain_storeu_ps(float *p, isogi_vol__four a) { memcpy(p, a.f, sizeof a.f); }
 #define ISOGI_VOL__EACH(name, result) \
@@ -4772,24 +4776,21 @@ ISOGI_VOL__INLINE int isogi_vol__told(isogi_vol__walk *w, const isogi_vol__leaf 
     return !w->exact && (w->inside > 0 ? f[7] < low : !w->inside && f[7] > high) ? 2 : 0;
 }
 
-/* Voxels of a leaf, from the lowest one of a cell to the first ones of its four rows along x. */
-static const uint8_t isogi_vol__row_of[4] = {0, 5, 25, 30};
-
 /* What is told of a cell; begin, end: when the ray enters it and leaves it. First x, then y, then z is taken there. */
 static int isogi_vol__cell_told_base(isogi_vol__walk *w, const isogi_vol__leaf *leaf, const int cell[3], double begin, double end) {
     const uint8_t *code = leaf->code + (cell[0] & 3) + 5 * (cell[1] & 3) + 25 * (cell[2] & 3);
     const isogi_vol__four zero = ISOGI_VOL__FOUR(set1_ps)(0), one = ISOGI_VOL__FOUR(set1_ps)(1);
     isogi_vol__four low, high, enters, leaves, in, out;
-    float from[4] = {0, 0, 0, 0}, to[4] = {0, 0, 0, 0}, first[4], second[4], f[8];
+    float from[3], to[3], f[8];
     int a;
     for (a = 0; a < 3; a++) {
         const double at = w->origin[a] - cell[a];
         from[a] = (float)(at + begin * w->dir[a]), to[a] = (float)(at + end * w->dir[a]);
     }
-    for (a = 0; a < 4; a++) first[a] = code[isogi_vol__row_of[a]], second[a] = code[isogi_vol__row_of[a] + 1];
-    in = ISOGI_VOL__FOUR(min_ps)(ISOGI_VOL__FOUR(max_ps)(ISOGI_VOL__FOUR(loadu_ps)(from), zero), one);
-    out = ISOGI_VOL__FOUR(min_ps)(ISOGI_VOL__FOUR(max_ps)(ISOGI_VOL__FOUR(loadu_ps)(to), zero), one);
-    low = ISOGI_VOL__FOUR(loadu_ps)(first), high = ISOGI_VOL__FOUR(loadu_ps)(second);
+    in = ISOGI_VOL__FOUR(min_ps)(ISOGI_VOL__FOUR(max_ps)(ISOGI_VOL__FOUR(setr_ps)(from[0], from[1], from[2], 0), zero), one);
+    out = ISOGI_VOL__FOUR(min_ps)(ISOGI_VOL__FOUR(max_ps)(ISOGI_VOL__FOUR(setr_ps)(to[0], to[1], to[2], 0), zero), one);
+    low = ISOGI_VOL__FOUR(setr_ps)(code[0], code[5], code[25], code[30]);
+    high = ISOGI_VOL__FOUR(setr_ps)(code[1], code[6], code[26], code[31]);
 #define ISOGI_VOL__TAKEN(axis) \
     high = ISOGI_VOL__FOUR(sub_ps)(high, low); \
     enters = ISOGI_VOL__FOUR(add_ps)(low, ISOGI_VOL__FOUR(mul_ps)(ISOGI_VOL__LANE_base(in, axis), high)); \
