@@ -73,16 +73,16 @@
    their hull rejects most cells without solving anything; else the first root is bracketed between extrema and refined by Newton
    steps that never leave the bracket. A walk carries the side it is on from cell to cell, and any change of side is a hit: that is
    why nothing leaks through the faces that cells share.
-   Batches go through a pool of 64 rays, eight to an instruction where there is AVX-512, so hand over many at a time: from 64 on all
-   rays are faster than alone (twice to four times), from 500 on nothing is left to gain. There, rays of one isovalue that nearly
-   coincide, up to sixteen in a row as in a tile of pixels, go as one and are faster still; rays that follow each other from one place
-   come down to its leaf together, and where they are many (12 from a surface, 48 from elsewhere), they pass the cells round it at once,
-   as far as slopes there let none of them meet the surface; and where any hit will do, a ray is done once it is known to pass a block
-   that lies inside and one that lies outside. Without AVX-512 eight rays of a batch take turns, each up to where it reads memory, which
-   is half as fast again where rays share little. Everywhere cells are looked at in float first, from 8-bit voxels that lie together in
-   two cache lines for 4x4x4 cells, with an error bound: what is certain needs nothing else, and only cells in doubt, the hits and one
-   cell for every 25 rays besides, read your voxels and are solved in double. Of compact volumes there are no such voxels: rays take turns
-   as without AVX-512, and read yours in every cell that they pass in blocks that hold the isovalue.
+   Batches go through a pool of 64 rays, eight to an instruction where there is AVX-512, so hand over many at a time: from 64 on
+   all rays are faster than alone (twice to four times), from 500 on nothing is left to gain. There, rays of one isovalue that
+   nearly coincide, up to sixteen in a row as in a tile of pixels, go as one and are faster still; rays that follow each other from
+   one place come down to its leaf together, and where they are many (12 from a surface, 48 from elsewhere), they pass the cells
+   round it at once, as far as slopes there let none of them meet the surface; and where any hit will do, a ray is done once it is
+   known to pass a block that lies inside and one that lies outside. Without AVX-512 eight rays of a batch take turns, each up to
+   where it reads memory. Everywhere cells are looked at in float first, from 8-bit voxels that lie together in two cache lines for
+   4x4x4 cells, with an error bound: what is certain needs nothing else, and only cells in doubt, the hits and one cell for every
+   25 rays besides, read your voxels and are solved in double. Of compact volumes there are no such voxels: rays take turns as
+   without AVX-512, and read yours in every cell that they pass in blocks that hold the isovalue.
 
    History  1.0  first release
 */
@@ -533,7 +533,7 @@ ISOGI_API void isogi_vol_mesh_free(const isogi_pyramid *pyramid, isogi_mesh *mes
 #define ISOGI_VOL__UNLIMITED 1e300 /* stands for infinity, which -ffast-math does not promise to keep */
 #define ISOGI_VOL__LEVELS 3
 #define ISOGI_VOL__NODE_LEVELS 7 /* 4^7 cells a side */
-#define ISOGI_VOL__FAST_SIZE 8192 /* voxels along an axis up to which fast rays keep 1e-10 cell */
+#define ISOGI_VOL__FAST_SIZE 8192 /* voxels along an axis up to which rays and samples go fast */
 #if (defined(__GNUC__) || defined(__clang__)) && !defined(__TINYC__)
 #define ISOGI_VOL__INLINE static inline __attribute__((always_inline))
 #define ISOGI_VOL__NOINLINE __attribute__((noinline))
@@ -1021,7 +1021,7 @@ struct isogi_pyramid {
     isogi_vol__node_level node_level[ISOGI_VOL__NODE_LEVELS];
     int node_levels; /* the last one has a single node */
     double node_scale; /* 8-bit value = floor((value - range[0]) * node_scale) */
-    struct isogi_vol__ways *ways; /* for rays; NULL on the plain path */
+    struct isogi_vol__ways *ways; /* for fast rays, else NULL */
     int all_finite;
     int fast; /* 0: only the plain walk is right for this volume */
     int path; /* ISOGI_VOL__PATH_... */
@@ -1917,7 +1917,7 @@ static isogi_result isogi_vol__fill_nodes(isogi_vol__build_job *job, const isogi
     return ISOGI_OK;
 }
 
-/* What rays look up: see fast traversal. */
+/* What fast rays look up; rides but within, inner, turn and size: see fast traversal. */
 struct isogi_vol__ways {
     int32_t lane[ISOGI_VOL__NODE_LEVELS][16], row[ISOGI_VOL__NODE_LEVELS][16]; /* 0 1 2 3 children of a level, in cells, along rows of four
                                                                                   lanes, and down those rows */
@@ -1939,7 +1939,7 @@ struct isogi_vol__ways {
                                                                               where those have theirs */
 };
 
-/* What a child is widened by on each side, in cells, for a root of `levels` levels. */
+/* What a child is widened by on each side, in cells, for a root of `levels` levels, if times are rounded once for each; else twice this. */
 #define ISOGI_VOL__NEAR(levels) ((float)(1 << 2 * (levels)) * 1e-6f)
 
 ISOGI_VOL__COLD static void isogi_vol__set_ways(struct isogi_vol__ways *ways, const isogi_vol__node_level *level, int levels) {
@@ -1983,7 +1983,7 @@ ISOGI_VOL__COLD static void isogi_vol__set_ways(struct isogi_vol__ways *ways, co
 
 ISOGI_VOL__COLD static isogi_result isogi_vol__reserve_nodes(isogi_pyramid *p) {
     p->node_count = isogi_vol__plan_node_levels(p);
-    if (p->path >= ISOGI_VOL__PATH_BASE && !p->ways) {
+    if (!p->ways) {
         p->ways = (struct isogi_vol__ways *)isogi_allocate(&p->context, 1, sizeof *p->ways);
         if (!p->ways) return ISOGI_NO_MEMORY;
         isogi_vol__set_ways(p->ways, p->node_level, p->node_levels);
@@ -2284,6 +2284,121 @@ ISOGI_API int isogi_vol_may_hold(const isogi_pyramid *pyramid, const size_t firs
     memset(&q, 0, sizeof q);
     q.pyramid = pyramid, q.ranges = ranges, q.count = range_count;
     return isogi_vol__query_box(&q, first, last);
+}
+
+/* ==== four floats, and 64 bytes, on any machine ====================================================================== */
+
+#if defined(ISOGI_VOL__SSE2)
+typedef __m128 isogi_vol__four;
+#define ISOGI_VOL__FOUR(operation) _mm_##operation
+#define ISOGI_VOL__EVEN(a, b) _mm_shuffle_ps(a, b, 0x88) /* lanes 0 and 2 of both */
+#define ISOGI_VOL__ODD(a, b) _mm_shuffle_ps(a, b, 0xdd)
+#define ISOGI_VOL__LANE_base(v, i) _mm_shuffle_ps(v, v, 0x55 * (i))
+#elif defined(ISOGI_VOL__NEON)
+typedef float32x4_t isogi_vol__four;
+#define ISOGI_VOL__FOUR(operation) isogi_vol__neon_##operation
+#define isogi_vol__neon_add_ps vaddq_f32
+#define isogi_vol__neon_sub_ps vsubq_f32
+#define isogi_vol__neon_mul_ps vmulq_f32
+#define isogi_vol__neon_min_ps vminq_f32
+#define isogi_vol__neon_max_ps vmaxq_f32
+#define isogi_vol__neon_set1_ps vdupq_n_f32
+#define isogi_vol__neon_setzero_ps() vdupq_n_f32(0)
+#define isogi_vol__neon_loadu_ps vld1q_f32
+#define isogi_vol__neon_storeu_ps vst1q_f32
+#define isogi_vol__neon_cvtss_f32(v) vgetq_lane_f32(v, 0)
+ISOGI_VOL__INLINE float32x4_t isogi_vol__neon_setr_ps(float a, float b, float c, float d) {
+    const float32x4_t v = {a, b, c, d};
+    return v;
+}
+#define ISOGI_VOL__EVEN(a, b) vuzp1q_f32(a, b)
+#define ISOGI_VOL__ODD(a, b) vuzp2q_f32(a, b)
+#define ISOGI_VOL__LANE_base(v, i) vdupq_laneq_f32(v, i)
+#else
+typedef struct isogi_vol__four { float f[4]; } isogi_vol__four;
+#define ISOGI_VOL__FOUR(operation) isogi_vol__plain_##operation
+#define ISOGI_VOL__EVEN(a, b) isogi_vol__plain_setr_ps((a).f[0], (a).f[2], (b).f[0], (b).f[2])
+#define ISOGI_VOL__ODD(a, b) isogi_vol__plain_setr_ps((a).f[1], (a).f[3], (b).f[1], (b).f[3])
+#define ISOGI_VOL__LANE_base(v, i) isogi_vol__plain_set1_ps((v).f[i])
+static isogi_vol__four isogi_vol__plain_setr_ps(float a, float b, float c, float d) {
+    isogi_vol__four v;
+    v.f[0] = a, v.f[1] = b, v.f[2] = c, v.f[3] = d;
+    return v;
+}
+static isogi_vol__four isogi_vol__plain_set1_ps(float a) { return isogi_vol__plain_setr_ps(a, a, a, a); }
+static isogi_vol__four isogi_vol__plain_loadu_ps(const float *p) { return isogi_vol__plain_setr_ps(p[0], p[1], p[2], p[3]); }
+static float isogi_vol__plain_cvtss_f32(isogi_vol__four a) { return a.f[0]; }
+static void isogi_vol__plain_storeu_ps(float *p, isogi_vol__four a) { memcpy(p, a.f, sizeof a.f); }
+#define ISOGI_VOL__EACH(name, result) \
+    static isogi_vol__four isogi_vol__plain_##name(isogi_vol__four a, isogi_vol__four b) { \
+        int i; \
+        for (i = 0; i < 4; i++) a.f[i] = result; \
+        return a; \
+    }
+ISOGI_VOL__EACH(add_ps, a.f[i] + b.f[i])
+ISOGI_VOL__EACH(sub_ps, a.f[i] - b.f[i])
+ISOGI_VOL__EACH(mul_ps, a.f[i] * b.f[i])
+ISOGI_VOL__EACH(min_ps, a.f[i] < b.f[i] ? a.f[i] : b.f[i])
+ISOGI_VOL__EACH(max_ps, a.f[i] > b.f[i] ? a.f[i] : b.f[i])
+#undef ISOGI_VOL__EACH
+#endif
+
+/* Bit a + 4 b: interval a of four and b of four others meet. */
+ISOGI_VOL__INLINE uint64_t isogi_vol__met(isogi_vol__four in_a, isogi_vol__four out_a, isogi_vol__four in_b, isogi_vol__four out_b) {
+#if defined(ISOGI_VOL__SSE2)
+#define ISOGI_VOL__MET(b) _mm_castps_si128( \
+    _mm_and_ps(_mm_cmple_ps(in_a, ISOGI_VOL__LANE_base(out_b, b)), _mm_cmple_ps(ISOGI_VOL__LANE_base(in_b, b), out_a)))
+    const __m128i low = _mm_packs_epi32(ISOGI_VOL__MET(0), ISOGI_VOL__MET(1)), high = _mm_packs_epi32(ISOGI_VOL__MET(2), ISOGI_VOL__MET(3));
+    return (unsigned)_mm_movemask_epi8(_mm_packs_epi16(low, high));
+#undef ISOGI_VOL__MET
+#elif defined(ISOGI_VOL__NEON)
+    static const uint32_t bit[4] = {1, 2, 4, 8};
+#define ISOGI_VOL__MET(b) vandq_u32(vshlq_n_u32(bits, 4 * (b)), \
+    vandq_u32(vcleq_f32(in_a, ISOGI_VOL__LANE_base(out_b, b)), vcleq_f32(ISOGI_VOL__LANE_base(in_b, b), out_a)))
+    const uint32x4_t bits = vld1q_u32(bit);
+    return vaddvq_u32(vorrq_u32(vorrq_u32(ISOGI_VOL__MET(0), ISOGI_VOL__MET(1)), vorrq_u32(ISOGI_VOL__MET(2), ISOGI_VOL__MET(3))));
+#undef ISOGI_VOL__MET
+#else
+    unsigned bits = 0;
+    int i;
+    for (i = 0; i < 16; i++) bits |= (unsigned)(in_a.f[i & 3] <= out_b.f[i >> 2] && in_b.f[i >> 2] <= out_a.f[i & 3]) << i;
+    return bits;
+#endif
+}
+
+/* Which of 64 bytes, aligned to 16, are at least `least`, 0..255. */
+ISOGI_VOL__INLINE uint64_t isogi_vol__at_least_base(const uint8_t *byte, int least) {
+#if defined(ISOGI_VOL__SSE2)
+    const __m128i *v = (const __m128i *)(const void *)byte, l = _mm_set1_epi8((char)least);
+#define ISOGI_VOL__LEAST(i) \
+    (uint64_t)(unsigned)_mm_movemask_epi8(_mm_cmpeq_epi8(_mm_max_epu8(_mm_load_si128(v + (i)), l), _mm_load_si128(v + (i)))) << 16 * (i)
+    return ISOGI_VOL__LEAST(0) | ISOGI_VOL__LEAST(1) | ISOGI_VOL__LEAST(2) | ISOGI_VOL__LEAST(3);
+#undef ISOGI_VOL__LEAST
+#elif defined(ISOGI_VOL__NEON)
+    const uint8x16_t l = vdupq_n_u8((uint8_t)least), bits = vreinterpretq_u8_u64(vdupq_n_u64(0x8040201008040201u));
+#define ISOGI_VOL__LEAST(i) vandq_u8(vcgeq_u8(vld1q_u8(byte + 16 * (i)), l), bits)
+    const uint8x16_t low = vpaddq_u8(ISOGI_VOL__LEAST(0), ISOGI_VOL__LEAST(1)), high = vpaddq_u8(ISOGI_VOL__LEAST(2), ISOGI_VOL__LEAST(3));
+    const uint8x16_t all = vpaddq_u8(low, high);
+    return vgetq_lane_u64(vreinterpretq_u64_u8(vpaddq_u8(all, all)), 0);
+#undef ISOGI_VOL__LEAST
+#else
+    uint64_t mask = 0;
+    int i;
+    for (i = 0; i < 64; i++) mask |= (uint64_t)(byte[i] >= least) << i;
+    return mask;
+#endif
+}
+
+/* The number of the lowest bit that is set. */
+ISOGI_VOL__INLINE int isogi_vol__lowest_bit(uint64_t x) {
+#if (defined(__GNUC__) || defined(__clang__)) && !defined(__TINYC__)
+    return __builtin_ctzll(x);
+#else
+    int n = 0, half;
+    for (half = 32; half; half /= 2)
+        if (!(x & (((uint64_t)1 << half) - 1))) n += half, x >>= half;
+    return n;
+#endif
 }
 
 /* ==== values and gradients =========================================================================================== */
@@ -2777,7 +2892,6 @@ ISOGI_VOL__INLINE const char *isogi_vol__first_tap(const isogi_volume *v, ptrdif
 #define ISOGI_VOL__INTEGERS_base(p) _mm_cvtepi32_ps(_mm_loadu_si128((const __m128i *)(const void *)(p)))
 #define ISOGI_VOL__SPREAD_base(p) _mm_set1_ps(*(p))
 #define ISOGI_VOL__TILE_base(p) _mm_loadu_ps(p)
-#define ISOGI_VOL__LANE_base(v, i) _mm_shuffle_ps(v, v, 0x55 * (i))
 /* sums of a and b in turn, of c and d, then of all; S: vectors */
 #define ISOGI_VOL__HALVES(L, a, b) L##add_ps(L##unpacklo_ps(a, b), L##unpackhi_ps(a, b))
 #define ISOGI_VOL__WHOLES(L, s, t) L##add_ps(L##shuffle_ps(s, t, 0x44), L##shuffle_ps(s, t, 0xee))
@@ -3047,7 +3161,7 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE void isogi_vol__ask_for_sixteen(const char *
     v##1 = ISOGI_VOL__KEEP_##KIND(v##1, m, ISOGI_VOL__LOAD_##KIND(rows[1] + q)), \
     v##2 = ISOGI_VOL__KEEP_##KIND(v##2, m, ISOGI_VOL__LOAD_##KIND(rows[2] + q)), \
     v##3 = ISOGI_VOL__KEEP_##KIND(v##3, m, ISOGI_VOL__LOAD_##KIND(rows[3] + q))
-#define ISOGI_VOL__FOUR(KIND, v, size, i, j, k, l) \
+#define ISOGI_VOL__LOAD_FOUR(KIND, v, size, i, j, k, l) \
     q = size * (ptrdiff_t)voxel[i], v##0 = ISOGI_VOL__LOAD_##KIND(rows[0] + q), v##1 = ISOGI_VOL__LOAD_##KIND(rows[1] + q); \
     v##2 = ISOGI_VOL__LOAD_##KIND(rows[2] + q), v##3 = ISOGI_VOL__LOAD_##KIND(rows[3] + q); \
     q = size * (ptrdiff_t)voxel[j], ISOGI_VOL__ADD(KIND, v, 2); \
@@ -3057,10 +3171,10 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE void isogi_vol__ask_for_sixteen(const char *
 ISOGI_VOL__AVX512 ISOGI_VOL__INLINE void isogi_vol__float_corners(const char *const rows[4], const int32_t voxel[16], __m512 out[8]) {
     __m256i a0, a1, a2, a3, b0, b1, b2, b3, c0, c1, c2, c3, d0, d1, d2, d3;
     ptrdiff_t q;
-    ISOGI_VOL__FOUR(FLOATS, a, 4, 0, 1, 4, 5);
-    ISOGI_VOL__FOUR(FLOATS, b, 4, 2, 3, 6, 7);
-    ISOGI_VOL__FOUR(FLOATS, c, 4, 8, 9, 12, 13);
-    ISOGI_VOL__FOUR(FLOATS, d, 4, 10, 11, 14, 15);
+    ISOGI_VOL__LOAD_FOUR(FLOATS, a, 4, 0, 1, 4, 5);
+    ISOGI_VOL__LOAD_FOUR(FLOATS, b, 4, 2, 3, 6, 7);
+    ISOGI_VOL__LOAD_FOUR(FLOATS, c, 4, 8, 9, 12, 13);
+    ISOGI_VOL__LOAD_FOUR(FLOATS, d, 4, 10, 11, 14, 15);
 #define ISOGI_VOL__PART(r) \
     do { \
         const __m512 even = _mm512_castsi512_ps(_mm512_inserti64x4(_mm512_castsi256_si512(a##r), c##r, 1)); \
@@ -3079,10 +3193,10 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE void isogi_vol__short_corners(const char *co
     const __m512i sign = _mm512_set1_epi32(flip);
     __m128i a0, a1, a2, a3, b0, b1, b2, b3, c0, c1, c2, c3, d0, d1, d2, d3;
     ptrdiff_t q;
-    ISOGI_VOL__FOUR(SHORTS, a, 2, 0, 1, 2, 3);
-    ISOGI_VOL__FOUR(SHORTS, b, 2, 4, 5, 6, 7);
-    ISOGI_VOL__FOUR(SHORTS, c, 2, 8, 9, 10, 11);
-    ISOGI_VOL__FOUR(SHORTS, d, 2, 12, 13, 14, 15);
+    ISOGI_VOL__LOAD_FOUR(SHORTS, a, 2, 0, 1, 2, 3);
+    ISOGI_VOL__LOAD_FOUR(SHORTS, b, 2, 4, 5, 6, 7);
+    ISOGI_VOL__LOAD_FOUR(SHORTS, c, 2, 8, 9, 10, 11);
+    ISOGI_VOL__LOAD_FOUR(SHORTS, d, 2, 12, 13, 14, 15);
 #define ISOGI_VOL__PART(r) \
     do { \
         const __m512i all = _mm512_inserti64x4(_mm512_castsi256_si512(_mm256_set_m128i(b##r, a##r)), _mm256_set_m128i(d##r, c##r), 1); \
@@ -3101,7 +3215,7 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE void isogi_vol__short_corners(const char *co
 #undef ISOGI_VOL__KEEP_FLOATS
 #undef ISOGI_VOL__KEEP_SHORTS
 #undef ISOGI_VOL__ADD
-#undef ISOGI_VOL__FOUR
+#undef ISOGI_VOL__LOAD_FOUR
 
 /* Bytes are gathered a sixteen ahead of their use: a vector cannot be loaded from numbers that were stored just now. */
 ISOGI_VOL__INLINE void isogi_vol__gather_bytes(const char *const rows[4], isogi_vol__sixteen *at) {
@@ -3233,18 +3347,10 @@ ISOGI_VOL__AVX512 static int isogi_vol__sample16(const isogi_pyramid *p, const f
 #endif
 
 #ifdef ISOGI_VOL__NEON
-#define isogi_vol__neon_add_ps vaddq_f32
-#define isogi_vol__neon_sub_ps vsubq_f32
-#define isogi_vol__neon_mul_ps vmulq_f32
-#define isogi_vol__neon_set1_ps vdupq_n_f32
-#define isogi_vol__neon_setzero_ps() vdupq_n_f32(0)
-#define isogi_vol__neon_loadu_ps vld1q_f32
-#define isogi_vol__neon_storeu_ps vst1q_f32
 #define ISOGI_VOL__MADD_base(a, b, c) vfmaq_f32(c, a, b)
 #define ISOGI_VOL__INTEGERS_base(p) vcvtq_f32_s32(vld1q_s32(p))
 #define ISOGI_VOL__SPREAD_base(p) vdupq_n_f32(*(p))
 #define ISOGI_VOL__TILE_base(p) vld1q_f32(p)
-#define ISOGI_VOL__LANE_base(v, i) vdupq_laneq_f32(v, i)
 #define ISOGI_VOL__SUMS_base(a, b, c, d) vpaddq_f32(vpaddq_f32(a, b), vpaddq_f32(c, d))
 ISOGI_VOL__INLINE uint8x8_t isogi_vol__four_bytes(const char *p) {
     uint32_t x;
@@ -4070,112 +4176,6 @@ static int isogi_vol__walk_on(isogi_vol__walk *w, uint32_t flags, isogi_hit *hit
     return flags & ISOGI_RAY_CAPPED && w->end_is_border && w->inside == 1 && isogi_vol__cap_exit(w, hit);
 }
 
-/* ==== four floats, and 64 bytes, on any machine ====================================================================== */
-
-#if defined(ISOGI_VOL__SSE2)
-typedef __m128 isogi_vol__four;
-#define ISOGI_VOL__FOUR(operation) _mm_##operation
-#define ISOGI_VOL__EVEN(a, b) _mm_shuffle_ps(a, b, 0x88) /* lanes 0 and 2 of both */
-#define ISOGI_VOL__ODD(a, b) _mm_shuffle_ps(a, b, 0xdd)
-#elif defined(ISOGI_VOL__NEON)
-typedef float32x4_t isogi_vol__four;
-#define ISOGI_VOL__FOUR(operation) isogi_vol__neon_##operation
-#define isogi_vol__neon_min_ps vminq_f32
-#define isogi_vol__neon_max_ps vmaxq_f32
-#define isogi_vol__neon_cvtss_f32(v) vgetq_lane_f32(v, 0)
-ISOGI_VOL__INLINE float32x4_t isogi_vol__neon_setr_ps(float a, float b, float c, float d) {
-    const float32x4_t v = {a, b, c, d};
-    return v;
-}
-#define ISOGI_VOL__EVEN(a, b) vuzp1q_f32(a, b)
-#define ISOGI_VOL__ODD(a, b) vuzp2q_f32(a, b)
-#else
-typedef struct isogi_vol__four { float f[4]; } isogi_vol__four;
-#define ISOGI_VOL__FOUR(operation) isogi_vol__plain_##operation
-#define ISOGI_VOL__EVEN(a, b) isogi_vol__plain_setr_ps((a).f[0], (a).f[2], (b).f[0], (b).f[2])
-#define ISOGI_VOL__ODD(a, b) isogi_vol__plain_setr_ps((a).f[1], (a).f[3], (b).f[1], (b).f[3])
-#define ISOGI_VOL__LANE_base(v, i) isogi_vol__plain_set1_ps((v).f[i])
-static isogi_vol__four isogi_vol__plain_setr_ps(float a, float b, float c, float d) {
-    isogi_vol__four v;
-    v.f[0] = a, v.f[1] = b, v.f[2] = c, v.f[3] = d;
-    return v;
-}
-static isogi_vol__four isogi_vol__plain_set1_ps(float a) { return isogi_vol__plain_setr_ps(a, a, a, a); }
-static isogi_vol__four isogi_vol__plain_loadu_ps(const float *p) { return isogi_vol__plain_setr_ps(p[0], p[1], p[2], p[3]); }
-static float isogi_vol__plain_cvtss_f32(isogi_vol__four a) { return a.f[0]; }
-static void isogi_vol__plain_storeu_ps(float *p, isogi_vol__four a) { memcpy(p, a.f, sizeof a.f); }
-#define ISOGI_VOL__EACH(name, result) \
-    static isogi_vol__four isogi_vol__plain_##name(isogi_vol__four a, isogi_vol__four b) { \
-        int i; \
-        for (i = 0; i < 4; i++) a.f[i] = result; \
-        return a; \
-    }
-ISOGI_VOL__EACH(add_ps, a.f[i] + b.f[i])
-ISOGI_VOL__EACH(sub_ps, a.f[i] - b.f[i])
-ISOGI_VOL__EACH(mul_ps, a.f[i] * b.f[i])
-ISOGI_VOL__EACH(min_ps, a.f[i] < b.f[i] ? a.f[i] : b.f[i])
-ISOGI_VOL__EACH(max_ps, a.f[i] > b.f[i] ? a.f[i] : b.f[i])
-#undef ISOGI_VOL__EACH
-#endif
-
-/* Bit a + 4 b: interval a of four and b of four others meet. */
-ISOGI_VOL__INLINE uint64_t isogi_vol__met(isogi_vol__four in_a, isogi_vol__four out_a, isogi_vol__four in_b, isogi_vol__four out_b) {
-#if defined(ISOGI_VOL__SSE2)
-#define ISOGI_VOL__MET(b) _mm_castps_si128( \
-    _mm_and_ps(_mm_cmple_ps(in_a, ISOGI_VOL__LANE_base(out_b, b)), _mm_cmple_ps(ISOGI_VOL__LANE_base(in_b, b), out_a)))
-    const __m128i low = _mm_packs_epi32(ISOGI_VOL__MET(0), ISOGI_VOL__MET(1)), high = _mm_packs_epi32(ISOGI_VOL__MET(2), ISOGI_VOL__MET(3));
-    return (unsigned)_mm_movemask_epi8(_mm_packs_epi16(low, high));
-#undef ISOGI_VOL__MET
-#elif defined(ISOGI_VOL__NEON)
-    static const uint32_t bit[4] = {1, 2, 4, 8};
-#define ISOGI_VOL__MET(b) vandq_u32(vshlq_n_u32(bits, 4 * (b)), \
-    vandq_u32(vcleq_f32(in_a, ISOGI_VOL__LANE_base(out_b, b)), vcleq_f32(ISOGI_VOL__LANE_base(in_b, b), out_a)))
-    const uint32x4_t bits = vld1q_u32(bit);
-    return vaddvq_u32(vorrq_u32(vorrq_u32(ISOGI_VOL__MET(0), ISOGI_VOL__MET(1)), vorrq_u32(ISOGI_VOL__MET(2), ISOGI_VOL__MET(3))));
-#undef ISOGI_VOL__MET
-#else
-    unsigned bits = 0;
-    int i;
-    for (i = 0; i < 16; i++) bits |= (unsigned)(in_a.f[i & 3] <= out_b.f[i >> 2] && in_b.f[i >> 2] <= out_a.f[i & 3]) << i;
-    return bits;
-#endif
-}
-
-/* Which of 64 bytes are at least `least`. */
-ISOGI_VOL__INLINE uint64_t isogi_vol__at_least(const uint8_t *byte, int least) {
-#if defined(ISOGI_VOL__SSE2)
-    const __m128i *v = (const __m128i *)(const void *)byte, l = _mm_set1_epi8((char)least);
-#define ISOGI_VOL__LEAST(i) \
-    (uint64_t)(unsigned)_mm_movemask_epi8(_mm_cmpeq_epi8(_mm_max_epu8(_mm_load_si128(v + (i)), l), _mm_load_si128(v + (i)))) << 16 * (i)
-    return ISOGI_VOL__LEAST(0) | ISOGI_VOL__LEAST(1) | ISOGI_VOL__LEAST(2) | ISOGI_VOL__LEAST(3);
-#undef ISOGI_VOL__LEAST
-#elif defined(ISOGI_VOL__NEON)
-    const uint8x16_t l = vdupq_n_u8((uint8_t)least), bits = vreinterpretq_u8_u64(vdupq_n_u64(0x8040201008040201u));
-#define ISOGI_VOL__LEAST(i) vandq_u8(vcgeq_u8(vld1q_u8(byte + 16 * (i)), l), bits)
-    const uint8x16_t low = vpaddq_u8(ISOGI_VOL__LEAST(0), ISOGI_VOL__LEAST(1)), high = vpaddq_u8(ISOGI_VOL__LEAST(2), ISOGI_VOL__LEAST(3));
-    const uint8x16_t all = vpaddq_u8(low, high);
-    return vgetq_lane_u64(vreinterpretq_u64_u8(vpaddq_u8(all, all)), 0);
-#undef ISOGI_VOL__LEAST
-#else
-    uint64_t mask = 0;
-    int i;
-    for (i = 0; i < 64; i++) mask |= (uint64_t)(byte[i] >= least) << i;
-    return mask;
-#endif
-}
-
-/* The number of the lowest bit that is set. */
-ISOGI_VOL__INLINE int isogi_vol__lowest_bit(uint64_t x) {
-#if defined(__GNUC__) && !defined(__TINYC__)
-    return __builtin_ctzll(x);
-#else
-    int n = 0, half;
-    for (half = 32; half; half /= 2)
-        if (!(x & (((uint64_t)1 << half) - 1))) n += half, x >>= half;
-    return n;
-#endif
-}
-
 /* ==== leaves ========================================================================================================= */
 
 /* A leaf as one isovalue sees it. Numbers of voxels are x + step (c ... c + 1) with errors below 1/32 of a step, and so is the isovalue:
@@ -4239,17 +4239,6 @@ ISOGI_VOL__INLINE uint64_t isogi_vol__mixed_cells(const isogi_vol__leaf *leaf, u
     return isogi_vol__cut_cells(leaf->code[ISOGI_VOL__LEAF_CUT], ~isogi_vol__pack_cells(in_low | out_low, in_high | out_high));
 }
 
-ISOGI_VOL__INLINE uint64_t isogi_vol__leaf_mask(const uint8_t node[128], float level, isogi_vol__leaf *leaf) {
-    isogi_vol__open_leaf(leaf, node, level);
-    return isogi_vol__mixed_cells(leaf, isogi_vol__at_least(node, leaf->inside), isogi_vol__at_least(node + 64, leaf->inside),
-                                  ~isogi_vol__at_least(node, leaf->outside), ~isogi_vol__at_least(node + 64, leaf->outside));
-}
-
-/* Which of the 64 children of a node can hold the isovalue. */
-ISOGI_VOL__INLINE uint64_t isogi_vol__node_mask(const uint8_t node[128], int low, int high) {
-    return isogi_vol__at_least(node + 64, low) & ~isogi_vol__at_least(node, high + 1);
-}
-
 /* ==== AVX2 and AVX-512 =============================================================================================== */
 
 /* Chosen when a pyramid is built. AVX2 does the plain code's operations in the plain code's order, four at a time and without fused
@@ -4266,31 +4255,12 @@ static int isogi_vol__machine(void) {
                : ISOGI_VOL__PATH_AVX2;
 }
 
-ISOGI_VOL__TARGET("avx2") ISOGI_VOL__INLINE uint64_t isogi_vol__node_mask_avx2(const uint8_t node[128], int low, int high) {
-    __m256i l = _mm256_set1_epi8((char)low), h = _mm256_set1_epi8((char)high);
-    const __m256i *v = (const __m256i *)(const void *)node;
-    __m256i least0 = _mm256_load_si256(v), least1 = _mm256_load_si256(v + 1), most0 = _mm256_load_si256(v + 2),
-            most1 = _mm256_load_si256(v + 3);
-    __m256i in0 =
-        _mm256_and_si256(_mm256_cmpeq_epi8(_mm256_min_epu8(least0, h), least0), _mm256_cmpeq_epi8(_mm256_max_epu8(most0, l), most0));
-    __m256i in1 =
-        _mm256_and_si256(_mm256_cmpeq_epi8(_mm256_min_epu8(least1, h), least1), _mm256_cmpeq_epi8(_mm256_max_epu8(most1, l), most1));
-    return (uint64_t)(uint32_t)_mm256_movemask_epi8(in0) | (uint64_t)(uint32_t)_mm256_movemask_epi8(in1) << 32;
-}
-
-ISOGI_VOL__TARGET("avx2")
-ISOGI_VOL__INLINE uint64_t isogi_vol__leaf_mask_avx2(const uint8_t node[128], float level, isogi_vol__leaf *leaf) {
-    const __m256i *v = (const __m256i *)(const void *)node;
-    __m256i inside, outside;
-    isogi_vol__open_leaf(leaf, node, level);
-    inside = _mm256_set1_epi8((char)leaf->inside), outside = _mm256_set1_epi8((char)leaf->outside);
-#define ISOGI_VOL__LEAST(i, a) (uint64_t)(uint32_t)_mm256_movemask_epi8(_mm256_cmpeq_epi8(_mm256_max_epu8(_mm256_load_si256(v + (i)), a), \
-    _mm256_load_si256(v + (i))))
-    return isogi_vol__mixed_cells(leaf, ISOGI_VOL__LEAST(0, inside) | ISOGI_VOL__LEAST(1, inside) << 32,
-                                  ISOGI_VOL__LEAST(2, inside) | ISOGI_VOL__LEAST(3, inside) << 32,
-                                  ~(ISOGI_VOL__LEAST(0, outside) | ISOGI_VOL__LEAST(1, outside) << 32),
-                                  ~(ISOGI_VOL__LEAST(2, outside) | ISOGI_VOL__LEAST(3, outside) << 32));
-#undef ISOGI_VOL__LEAST
+/* What at_least_base does. */
+ISOGI_VOL__TARGET("avx2") ISOGI_VOL__INLINE uint64_t isogi_vol__at_least_avx2(const uint8_t *byte, int least) {
+    const __m256i *v = (const __m256i *)(const void *)byte, l = _mm256_set1_epi8((char)least);
+    const __m256i low = _mm256_loadu_si256(v), high = _mm256_loadu_si256(v + 1);
+    return (uint64_t)(uint32_t)_mm256_movemask_epi8(_mm256_cmpeq_epi8(_mm256_max_epu8(low, l), low)) |
+           (uint64_t)(uint32_t)_mm256_movemask_epi8(_mm256_cmpeq_epi8(_mm256_max_epu8(high, l), high)) << 32;
 }
 
 ISOGI_VOL__TARGET("avx2") ISOGI_VOL__INLINE __m256d isogi_vol__lerp4(__m256d a, __m256d b, __m256d u, __m256d rest) {
@@ -4333,7 +4303,7 @@ ISOGI_VOL__TARGET("avx2") ISOGI_VOL__INLINE __m256d isogi_vol__snap4(__m256d at,
     return _mm256_blendv_pd(at, one, _mm256_cmp_pd(at, _mm256_sub_pd(one, slack), _CMP_GT_OQ));
 }
 
-/* Does what mixed_cell does. */
+/* Does what mixed_cell_base does. */
 ISOGI_VOL__TARGET("avx2") static int isogi_vol__mixed_cell_avx2(isogi_vol__walk *w, int x, int y, int z, int in, int axis, isogi_hit *hit) {
     const isogi_volume *v = &w->pyramid->volume;
     const ptrdiff_t dx = v->stride[0], dy = v->stride[1], dz = v->stride[2];
@@ -4694,19 +4664,20 @@ static int isogi_vol__begin(isogi_vol__batch *b, size_t i, isogi_vol__walk *w) {
    walked but found all at once, in float: a ray passes a child if it enters it by no axis later than it leaves it by another, sixteen pairs
    of layers for every two axes. Axes along which the ray falls are counted backwards, so that it meets children in the order of their
    numbers x + 4y + 16z. Times of a node follow from its parent's by a multiple of what a child takes, so that those of its children wait
-   for no more than its number. With a rounding for each of seven levels they are off by less than 2^-21 of what the root measures; children
-   are widened by twice as much, so none is left out, and some are kept that the ray only comes near. Which cells of a leaf a ray passes is
-   told in the end by the times that pools go by, see many rays at once. */
+   for no more than its number. Roundings, two for each of seven levels and a few more, put them off by less than 2^-20 of what the root
+   measures; children are widened by twice as much, so none is left out, and some are kept that the ray only comes near. Which cells of a
+   leaf a ray passes is told in the end by the times that pools go by, see many rays at once. */
 
-/* A cell that may have corners on both sides, entered through `in` and left through `out` (-1: the segment ends in it). */
-static int isogi_vol__mixed_cell(isogi_vol__walk *w, int x, int y, int z, int in, int axis, isogi_hit *hit) {
+/* A cell that may have corners on both sides, entered and left through the axes `in` and `axis` (-1: the segment begins, ends in it). */
+static int isogi_vol__mixed_cell_base(isogi_vol__walk *w, int x, int y, int z, int in, int axis, isogi_hit *hit) {
     double out = w->end;
     w->cell[0] = x, w->cell[1] = y, w->cell[2] = z;
     w->entry_axis = in;
     w->t = in < 0 ? 0 : isogi_vol__max(0, (w->cell[in] + (w->dir[in] > 0 ? 0 : 1) - w->origin[in]) * w->inverse[in]);
     if (axis >= 0) out = isogi_vol__min(out, (w->cell[axis] + (w->dir[axis] > 0 ? 1 : 0) - w->origin[axis]) * w->inverse[axis]);
     out = isogi_vol__max(out, w->t);
-    w->deflate &= w->t <= w->deflated; /* what was skipped since lies on one side */
+    /* what was skipped since lies on one side; times that are the same differ where registers are longer than a double (x87) */
+    w->deflate &= w->t <= w->deflated * (1 + 1e-15);
     w->deflated = out;
     return isogi_vol__visit_cell(w, out, axis, hit);
 }
@@ -4715,19 +4686,18 @@ static int isogi_vol__mixed_cell(isogi_vol__walk *w, int x, int y, int z, int in
 
 /* Where a ray is among children of nodes. */
 typedef struct isogi_vol__trip {
-    double origin[4], inverse[4];                    /* as in a pool; the fourth is 0 */
-    int32_t lead[4];                                 /* 1 on axes along which the ray falls, else 0 */
-    double stop;                                     /* where the ray ends, as in a pool */
-    float cell[3], enter[ISOGI_VOL__NODE_LEVELS][3]; /* time that a cell takes, and when the node of the next level is entered, widened:
-                                                        by each axis for itself; on its fastest axis a ray takes 1 for a cell */
-    float last, level, reach;                        /* where it ends, or a little more; the isovalue in 8 bits, unrounded; what children
-                                                        are widened by on each side */
-    int flip, octant, low, high, entry_axis;         /* what turns children and axes; what the isovalue can be in 8 bits */
-    int in, out;                                     /* axes by which the ray enters and leaves the present cell; 3: none */
-    const uint8_t *children[ISOGI_VOL__NODE_LEVELS];     /* of the node of each level (NULL: leaves, and there are none), */
-    uint64_t left[ISOGI_VOL__NODE_LEVELS], cells;        /* those still to come, in the ray's order; of the leaf */
-    int32_t place[ISOGI_VOL__NODE_LEVELS][4], child;     /* the nodes' coordinates; the last one's number in its parent */
-    unsigned pending;                                    /* levels that have any left */
+    double inverse[4];            /* as in a pool; the fourth is 0 */
+    int32_t lead[4];              /* 1 on axes along which the ray falls, else 0 */
+    int64_t stop;                 /* where the ray ends, as in a pool */
+    float cell[3];                /* time that a cell takes by each axis; on its fastest axis a ray takes 1 */
+    float enter[ISOGI_VOL__NODE_LEVELS][3]; /* when the node of the next level is entered, widened: by each axis for itself */
+    float last, level;            /* where it ends, or a little more; the isovalue in 8 bits, unrounded */
+    int flip, octant, low, high;  /* children and axes that are counted backwards; what the isovalue can be in 8 bits */
+    int entry_axis, in, out;      /* axes by which the ray enters the volume (-1), and enters and leaves the present cell (3); or none */
+    const uint8_t *children[ISOGI_VOL__NODE_LEVELS]; /* of the node of each level (NULL: leaves, and there are none), */
+    uint64_t left[ISOGI_VOL__NODE_LEVELS], cells;    /* those still to come, in the ray's order; of the leaf */
+    int32_t place[ISOGI_VOL__NODE_LEVELS][4], child; /* the nodes' coordinates; the last one's number in its parent */
+    unsigned pending;                                /* levels that have any left */
 } isogi_vol__trip;
 
 /* A ray on its way from node to node, which can be left where it is going to read memory, and taken up again. */
@@ -4777,7 +4747,8 @@ ISOGI_VOL__INLINE int isogi_vol__told(isogi_vol__walk *w, const isogi_vol__leaf 
 }
 
 /* What is told of a cell; begin, end: when the ray enters it and leaves it. First x, then y, then z is taken there. */
-static int isogi_vol__cell_told_base(isogi_vol__walk *w, const isogi_vol__leaf *leaf, const int cell[3], double begin, double end) {
+static int isogi_vol__cell_told_base(isogi_vol__walk *w, const isogi_vol__leaf *leaf, const int32_t cell[4],
+                                       double begin, double end) {
     const uint8_t *code = leaf->code + (cell[0] & 3) + 5 * (cell[1] & 3) + 25 * (cell[2] & 3);
     const isogi_vol__four zero = ISOGI_VOL__FOUR(set1_ps)(0), one = ISOGI_VOL__FOUR(set1_ps)(1);
     isogi_vol__four low, high, enters, leaves, in, out;
@@ -4811,22 +4782,20 @@ static int isogi_vol__ride_set(isogi_vol__ride *r) {
     isogi_vol__trip *c = &r->trip;
     const int top = p->node_levels - 1;
     const double most = isogi_vol__largest(w->dir[0], w->dir[1], w->dir[2]);
-    uint64_t bits;
     int a;
     if (!(w->end > 1e-150) || !(w->end < 1e150)) return 0;
     c->level = isogi_vol__quantise_isovalue(p, w->isovalue, &c->low, &c->high);
-    c->reach = 2 * ISOGI_VOL__NEAR(p->node_levels); /* each level rounds twice, without fused multiply-adds */
-    c->octant = 0, c->flip = 0, c->origin[3] = c->inverse[3] = 0, c->lead[3] = 0;
+    c->octant = 0, c->flip = 0, c->inverse[3] = 0, c->lead[3] = 0;
     for (a = 0; a < 3; a++) {
         const int still = !(w->dir[a] > 0 || w->dir[a] < 0);
         const int fall = w->dir[a] < 0 || (still && w->origin[a] >= p->box[a]); /* one that stands still keeps below the upper border */
         const double start = fall ? (4 << 2 * top) - w->origin[a] : w->origin[a]; /* counted like cells */
         c->octant |= fall << a, c->flip |= fall * (3 << 2 * a), c->lead[a] = fall;
-        c->origin[a] = w->origin[a], c->inverse[a] = still ? fall ? -1e200 : 1e200 : w->inverse[a];
+        c->inverse[a] = still ? fall ? -1e200 : 1e200 : w->inverse[a];
         c->cell[a] = (float)isogi_vol__min(fabs(c->inverse[a]) * most, 1e30);
-        c->enter[top][a] = (-c->reach - (float)start) * c->cell[a];
+        c->enter[top][a] = (-2 * p->ways->reach - (float)start) * c->cell[a];
     }
-    memcpy(&bits, &w->end, sizeof bits), bits |= 3, memcpy(&c->stop, &bits, sizeof bits);
+    memcpy(&c->stop, &w->end, sizeof c->stop), c->stop |= 3;
     memset(c->place[top], 0, sizeof c->place[top]);
     c->last = (float)(isogi_vol__min(w->end * most, 1e30) * 1.000001);
     c->entry_axis = w->entry_axis, c->child = 0, c->pending = 0, c->cells = 0;
@@ -4839,11 +4808,8 @@ static int isogi_vol__ride_set(isogi_vol__ride *r) {
 ISOGI_VOL__INLINE void isogi_vol__trip_layers(isogi_vol__trip *c, const struct isogi_vol__ways *ways, int n, isogi_vol__four in[3],
                                               isogi_vol__four out[3]) {
     const isogi_vol__four last = ISOGI_VOL__FOUR(set1_ps)(c->last), zero = ISOGI_VOL__FOUR(set1_ps)(0);
-    const float size = ways->size[n], wide = size + 2 * c->reach, *layer = ways->within[c->child];
+    const float size = ways->size[n], wide = size + 4 * ways->reach, *layer = ways->within[c->child];
     int a;
-#if defined(__GNUC__) && __GNUC__ >= 8
-#pragma GCC unroll 4
-#endif
     for (a = 0; a < 3; a++) {
         const isogi_vol__four step = ISOGI_VOL__FOUR(set1_ps)(c->cell[a] * size), begin = ISOGI_VOL__FOUR(set1_ps)(c->enter[n][a]);
         const isogi_vol__four layers = ISOGI_VOL__FOUR(loadu_ps)(layer + 4 * a);
@@ -4861,7 +4827,7 @@ ISOGI_VOL__INLINE uint64_t isogi_vol__spread_rows(uint64_t x) {
 }
 
 /* Which children of a node the ray passes or comes near, in its own order, from which layers of every two axes it is in at once. */
-ISOGI_VOL__INLINE uint64_t isogi_vol__trip_way(const isogi_vol__four in[3], const isogi_vol__four out[3]) {
+ISOGI_VOL__INLINE uint64_t isogi_vol__trip_way_base(const isogi_vol__four in[3], const isogi_vol__four out[3]) {
     const uint64_t xy = isogi_vol__met(in[0], out[0], in[1], out[1]), xz = isogi_vol__met(in[0], out[0], in[2], out[2]);
     uint64_t yz = isogi_vol__spread_rows(isogi_vol__met(in[1], out[1], in[2], out[2]));
     yz = (yz | yz << 6) & 0x0303030303030303u, yz = (yz | yz << 3) & 0x1111111111111111u;
@@ -4869,7 +4835,7 @@ ISOGI_VOL__INLINE uint64_t isogi_vol__trip_way(const isogi_vol__four in[3], cons
 }
 
 /* Children counted backwards along the axes of `octant`. */
-ISOGI_VOL__INLINE uint64_t isogi_vol__turn_mask(uint64_t m, const struct isogi_vol__ways *ways, int octant) {
+ISOGI_VOL__INLINE uint64_t isogi_vol__turn_mask_base(uint64_t m, const struct isogi_vol__ways *ways, int octant) {
 #ifdef ISOGI_VOL__NEON
     const uint8_t(*turn)[16] = ways->turn[octant];
     const uint8x16_t rows = vqtbl1q_u8(vreinterpretq_u8_u64(vdupq_n_u64(m)), vld1q_u8(turn[0]));
@@ -4893,24 +4859,8 @@ ISOGI_VOL__INLINE uint64_t isogi_vol__turn_mask(uint64_t m, const struct isogi_v
 #endif
 }
 
-/* The node that was sent for is opened: `mask` of its children are passed, and can hold the surface. */
-ISOGI_VOL__INLINE void isogi_vol__trip_opened(isogi_vol__ride *r, uint64_t mask) {
-    isogi_vol__trip *c = &r->trip;
-    const isogi_pyramid *p = r->walk.pyramid;
-    const int n = r->at;
-    const int32_t *at = c->place[n];
-    r->walk.count.blocks++, r->open = NULL;
-    if (!n) {
-        c->cells = mask;
-        return;
-    }
-    c->left[n] = mask, c->pending |= (unsigned)(mask != 0) << n, c->children[n] = NULL;
-    if (n > 1 || !p->volume.compact)
-        c->children[n] = p->nodes[isogi_vol__node_at(p, n - 1, 4 * (size_t)at[0], 4 * (size_t)at[1], 4 * (size_t)at[2])];
-}
-
 /* The coordinates of a node's child among nodes of its level. */
-ISOGI_VOL__INLINE void isogi_vol__inside_node(int32_t to[4], const int32_t node[4], const int32_t digits[4]) {
+ISOGI_VOL__INLINE void isogi_vol__child_place(int32_t to[4], const int32_t node[4], const int32_t digits[4]) {
 #if defined(ISOGI_VOL__SSE2)
     const __m128i *at = (const __m128i *)(const void *)node, *add = (const __m128i *)(const void *)digits;
     _mm_storeu_si128((__m128i *)(void *)to, _mm_add_epi32(_mm_slli_epi32(_mm_loadu_si128(at), 2), _mm_loadu_si128(add)));
@@ -4928,7 +4878,7 @@ ISOGI_VOL__INLINE int isogi_vol__trip_next(isogi_vol__ride *r) {
     n = isogi_vol__lowest_bit(c->pending), c->child = isogi_vol__lowest_bit(c->left[n]), here = c->child ^ c->flip;
     c->left[n] &= c->left[n] - 1;
     if (!c->left[n]) c->pending &= c->pending - 1;
-    isogi_vol__inside_node(c->place[n - 1], c->place[n], r->walk.pyramid->ways->inner[here]);
+    isogi_vol__child_place(c->place[n - 1], c->place[n], r->walk.pyramid->ways->inner[here]);
     if (c->children[n]) isogi_vol__ride_to(r, c->children[n] + 128 * here);
     else r->open = r->walk.pyramid->nodes[0]; /* there is nothing to be read */
     r->at = n - 1;
@@ -4937,13 +4887,14 @@ ISOGI_VOL__INLINE int isogi_vol__trip_next(isogi_vol__ride *r) {
 
 /* Whether the ray passes a cell as pools have it, when it enters and leaves it, and by which axes; 3: none. Times as integers, in whose two
    lowest bits stands the axis. */
-static int isogi_vol__passes_base(isogi_vol__trip *c, const int32_t cell[4], double *begin, double *end) {
-    int64_t first = 3, last;
+static int isogi_vol__passes_base(isogi_vol__ride *r, const int32_t cell[4], double *begin, double *end) {
+    isogi_vol__trip *c = &r->trip;
+    const double *origin = r->walk.origin;
+    int64_t first = 3, last = c->stop;
     int a;
-    memcpy(&last, &c->stop, sizeof last);
     for (a = 0; a < 3; a++) {
-        const double t0 = (cell[a] + c->lead[a] - c->origin[a]) * c->inverse[a];
-        const double t1 = (cell[a] + 1 - c->lead[a] - c->origin[a]) * c->inverse[a];
+        const double t0 = (cell[a] + c->lead[a] - origin[a]) * c->inverse[a];
+        const double t1 = (cell[a] + 1 - c->lead[a] - origin[a]) * c->inverse[a];
         int64_t in, out;
         memcpy(&in, &t0, sizeof in), memcpy(&out, &t1, sizeof out);
         /* what is negative is so as an integer, too */
@@ -4957,29 +4908,46 @@ static int isogi_vol__passes_base(isogi_vol__trip *c, const int32_t cell[4], dou
     return 1;
 }
 
-/* Which children of the node that was sent for the ray passes, in its own order, and that can hold the surface. */
-ISOGI_VOL__INLINE uint64_t isogi_vol__trip_mask_base(isogi_vol__ride *r) {
-    isogi_vol__trip *c = &r->trip;
-    const isogi_pyramid *p = r->walk.pyramid;
-    const int32_t *at = c->place[0];
-    const uint64_t held = r->at               ? isogi_vol__node_mask(r->open, c->low, c->high)
-                          : p->volume.compact ? isogi_vol__no_leaf(p, (size_t)at[0], (size_t)at[1], (size_t)at[2], &r->leaf)
-                                              : isogi_vol__leaf_mask(r->open, c->level, &r->leaf);
-    isogi_vol__four in[3], out[3];
-    isogi_vol__trip_layers(c, p->ways, r->at, in, out);
-    return isogi_vol__turn_mask(held, p->ways, c->octant) & isogi_vol__trip_way(in, out);
-}
-
-/* The next cell of the leaf: 1: hit; 0: none; -1: its voxels are sent for. And on to the first hit: 1, or to the end: 0; waits: to where
-   memory is to be read next, which is sent for: -1. */
-#define ISOGI_VOL__TRIP(path, target, mixed_cell) \
+/* The same by every path.
+   leaf_mask: which of the 64 cells (x + 4y + 16z) of a leaf can hold the surface.
+   trip_open: opens the node that was sent for: its children that are passed, and can hold the surface, are the next ones.
+   trip_cell: the next cell of the leaf: 1: hit; 0: none; -1: its voxels are sent for.
+   ride_on: to the first hit: 1, or to the end: 0; waits: to where memory is to be read next, which is sent for: -1. */
+#define ISOGI_VOL__TRIP(path, target) \
+    target ISOGI_VOL__INLINE uint64_t isogi_vol__leaf_mask_##path(const uint8_t node[128], float level, isogi_vol__leaf *leaf) { \
+        isogi_vol__open_leaf(leaf, node, level); \
+        return isogi_vol__mixed_cells(leaf, isogi_vol__at_least_##path(node, leaf->inside), \
+                                      isogi_vol__at_least_##path(node + 64, leaf->inside), \
+                                      ~isogi_vol__at_least_##path(node, leaf->outside), \
+                                      ~isogi_vol__at_least_##path(node + 64, leaf->outside)); \
+    } \
+    target ISOGI_VOL__INLINE void isogi_vol__trip_open_##path(isogi_vol__ride *r) { \
+        isogi_vol__trip *c = &r->trip; \
+        const isogi_pyramid *p = r->walk.pyramid; \
+        const int n = r->at, leaves = !p->volume.compact; \
+        const size_t x = (size_t)c->place[n][0], y = (size_t)c->place[n][1], z = (size_t)c->place[n][2]; \
+        const uint64_t held = \
+            n        ? isogi_vol__at_least_##path(r->open + 64, c->low) & ~isogi_vol__at_least_##path(r->open, c->high + 1) \
+            : leaves ? isogi_vol__leaf_mask_##path(r->open, c->level, &r->leaf) \
+                     : isogi_vol__no_leaf(p, x, y, z, &r->leaf); \
+        isogi_vol__four in[3], out[3]; \
+        uint64_t mask; \
+        isogi_vol__trip_layers(c, p->ways, n, in, out); \
+        mask = isogi_vol__turn_mask_##path(held, p->ways, c->octant) & isogi_vol__trip_way_##path(in, out); \
+        r->walk.count.blocks++, r->open = NULL; \
+        if (!n) c->cells = mask; \
+        else { \
+            c->left[n] = mask, c->pending |= (unsigned)(mask != 0) << n; \
+            c->children[n] = n > 1 || leaves ? p->nodes[isogi_vol__node_at(p, n - 1, 4 * x, 4 * y, 4 * z)] : NULL; \
+        } \
+    } \
     target ISOGI_VOL__INLINE int isogi_vol__trip_cell_##path(isogi_vol__ride *r, isogi_hit *hit) { \
         isogi_vol__trip *c = &r->trip; \
         isogi_vol__walk *w = &r->walk; \
         double begin, end; \
         int32_t cell[4]; \
-        isogi_vol__inside_node(cell, c->place[0], w->pyramid->ways->inner[isogi_vol__lowest_bit(c->cells) ^ c->flip]); \
-        if (!r->looked && isogi_vol__passes_##path(c, cell, &begin, &end)) { \
+        isogi_vol__child_place(cell, c->place[0], w->pyramid->ways->inner[isogi_vol__lowest_bit(c->cells) ^ c->flip]); \
+        if (!r->looked && isogi_vol__passes_##path(r, cell, &begin, &end)) { \
             const int told = w->deflate || !r->leaf.code ? 0 : isogi_vol__cell_told_##path(w, &r->leaf, cell, begin, end); \
             w->count.cells += told != 0; \
             if (told > 1) return 1; \
@@ -4991,13 +4959,14 @@ ISOGI_VOL__INLINE uint64_t isogi_vol__trip_mask_base(isogi_vol__ride *r) {
         c->cells &= c->cells - 1; \
         if (!r->looked) return 0; \
         r->looked = 0; \
-        return mixed_cell(w, cell[0], cell[1], cell[2], c->in == 3 ? c->entry_axis : c->in, c->out == 3 ? -1 : c->out, hit); \
+        return isogi_vol__mixed_cell_##path(w, cell[0], cell[1], cell[2], c->in == 3 ? c->entry_axis : c->in, \
+                                            c->out == 3 ? -1 : c->out, hit); \
     } \
     target static int isogi_vol__ride_on_##path(isogi_vol__ride *r, int waits, isogi_hit *hit) { \
         isogi_vol__trip *c = &r->trip; \
         if (c->low > c->high) return 0; \
         do { \
-            if (r->open) isogi_vol__trip_opened(r, isogi_vol__trip_mask_##path(r)); \
+            if (r->open) isogi_vol__trip_open_##path(r); \
             while (c->cells) { \
                 const int found = isogi_vol__trip_cell_##path(r, hit); \
                 if (found > 0) return 1; \
@@ -5010,10 +4979,10 @@ ISOGI_VOL__INLINE uint64_t isogi_vol__trip_mask_base(isogi_vol__ride *r) {
         return 0; \
     }
 
-ISOGI_VOL__TRIP(base, , isogi_vol__mixed_cell)
+ISOGI_VOL__TRIP(base, )
 
 #ifdef ISOGI_VOL__AVX
-/* What trip_way finds, from all three axes together: a vector has two rows of four children. */
+/* What trip_way_base finds, from all three axes together: a vector has two rows of four children. */
 ISOGI_VOL__TARGET("avx2") ISOGI_VOL__INLINE uint64_t isogi_vol__trip_way_avx2(const __m128 in[3], const __m128 out[3]) {
     const __m256i row[2] = {_mm256_setr_epi32(0, 0, 0, 0, 1, 1, 1, 1), _mm256_setr_epi32(2, 2, 2, 2, 3, 3, 3, 3)};
     const __m256i order = _mm256_setr_epi32(0, 4, 1, 5, 2, 6, 3, 7);
@@ -5040,7 +5009,7 @@ ISOGI_VOL__TARGET("avx2") ISOGI_VOL__INLINE uint64_t isogi_vol__trip_way_avx2(co
 #undef ISOGI_VOL__SLICES
 }
 
-/* What turn_mask does. */
+/* What turn_mask_base does. */
 ISOGI_VOL__TARGET("avx2") ISOGI_VOL__INLINE uint64_t isogi_vol__turn_mask_avx2(uint64_t m, const struct isogi_vol__ways *ways, int octant) {
     const __m128i *turn = (const __m128i *)(const void *)ways->turn[octant], half = _mm_set1_epi8(15);
     const __m128i rows = _mm_shuffle_epi8(_mm_cvtsi64_si128((int64_t)m), _mm_loadu_si128(turn));
@@ -5049,23 +5018,13 @@ ISOGI_VOL__TARGET("avx2") ISOGI_VOL__INLINE uint64_t isogi_vol__turn_mask_avx2(u
     return (uint64_t)_mm_cvtsi128_si64(_mm_or_si128(low, high));
 }
 
-ISOGI_VOL__TARGET("avx2") ISOGI_VOL__INLINE uint64_t isogi_vol__trip_mask_avx2(isogi_vol__ride *r) {
-    isogi_vol__trip *c = &r->trip;
-    const isogi_pyramid *p = r->walk.pyramid;
-    const int32_t *at = c->place[0];
-    const uint64_t held = r->at               ? isogi_vol__node_mask_avx2(r->open, c->low, c->high)
-                          : p->volume.compact ? isogi_vol__no_leaf(p, (size_t)at[0], (size_t)at[1], (size_t)at[2], &r->leaf)
-                                              : isogi_vol__leaf_mask_avx2(r->open, c->level, &r->leaf);
-    __m128 in[3], out[3];
-    isogi_vol__trip_layers(c, p->ways, r->at, in, out);
-    return isogi_vol__turn_mask_avx2(held, p->ways, c->octant) & isogi_vol__trip_way_avx2(in, out);
-}
-
 ISOGI_VOL__TARGET("avx2")
-ISOGI_VOL__INLINE int isogi_vol__passes_avx2(isogi_vol__trip *c, const int32_t cell[4], double *begin, double *end) {
-    const __m128i at = _mm_loadu_si128((const __m128i *)(const void *)cell), lead = _mm_loadu_si128((const __m128i *)(const void *)c->lead);
+ISOGI_VOL__INLINE int isogi_vol__passes_avx2(isogi_vol__ride *r, const int32_t cell[4], double *begin, double *end) {
+    isogi_vol__trip *c = &r->trip;
+    const __m128i at = _mm_loadu_si128((const __m128i *)(const void *)cell);
+    const __m128i lead = _mm_loadu_si128((const __m128i *)(const void *)c->lead);
     const __m128i near_face = _mm_add_epi32(at, lead), far_face = _mm_sub_epi32(_mm_add_epi32(at, _mm_set1_epi32(1)), lead);
-    const __m256d origin = _mm256_loadu_pd(c->origin), inverse = _mm256_loadu_pd(c->inverse), zero = _mm256_setzero_pd();
+    const __m256d origin = _mm256_loadu_pd(r->walk.origin), inverse = _mm256_loadu_pd(c->inverse), zero = _mm256_setzero_pd();
     const __m256d axes = _mm256_castsi256_pd(_mm256_setr_epi64x(0, 1, 2, 3));
     const __m256d time = _mm256_castsi256_pd(_mm256_set1_epi64x(~(int64_t)3));
     const __m256d t0 = _mm256_mul_pd(_mm256_sub_pd(_mm256_cvtepi32_pd(near_face), origin), inverse);
@@ -5074,7 +5033,7 @@ ISOGI_VOL__INLINE int isogi_vol__passes_avx2(isogi_vol__trip *c, const int32_t c
     __m256i in = _mm256_castpd_si256(_mm256_or_pd(_mm256_and_pd(_mm256_max_pd(t0, zero), time), axes)), other;
     __m256i out = _mm256_castpd_si256(_mm256_or_pd(_mm256_and_pd(_mm256_max_pd(t1, zero), time), axes));
     int64_t first, last;
-    out = _mm256_castpd_si256(_mm256_blend_pd(_mm256_castsi256_pd(out), _mm256_set1_pd(c->stop), 8));
+    out = _mm256_blend_epi32(out, _mm256_set1_epi64x(c->stop), 0xc0);
     other = _mm256_permute4x64_epi64(in, 0x4e), in = _mm256_blendv_epi8(in, other, _mm256_cmpgt_epi64(other, in));
     other = _mm256_permute4x64_epi64(in, 0xb1), in = _mm256_blendv_epi8(in, other, _mm256_cmpgt_epi64(other, in));
     other = _mm256_permute4x64_epi64(out, 0x4e), out = _mm256_blendv_epi8(out, other, _mm256_cmpgt_epi64(out, other));
@@ -5089,7 +5048,7 @@ ISOGI_VOL__INLINE int isogi_vol__passes_avx2(isogi_vol__trip *c, const int32_t c
 
 /* As cell_told_base, eight values at a time: x, then y, then z is taken where the ray enters the cell and where it leaves it. */
 ISOGI_VOL__TARGET("avx2")
-ISOGI_VOL__INLINE int isogi_vol__cell_told_avx2(isogi_vol__walk *w, const isogi_vol__leaf *leaf, const int32_t *cell,
+ISOGI_VOL__INLINE int isogi_vol__cell_told_avx2(isogi_vol__walk *w, const isogi_vol__leaf *leaf, const int32_t cell[4],
                                                 double begin, double end) {
     const uint8_t *code = leaf->code + (cell[0] & 3) + 5 * (cell[1] & 3) + 25 * (cell[2] & 3);
     const __m256d at = _mm256_sub_pd(_mm256_loadu_pd(w->origin), _mm256_cvtepi32_pd(_mm_loadu_si128((const __m128i *)(const void *)cell)));
@@ -5116,7 +5075,7 @@ ISOGI_VOL__INLINE int isogi_vol__cell_told_avx2(isogi_vol__walk *w, const isogi_
     return isogi_vol__told(w, leaf, f);
 }
 
-ISOGI_VOL__TRIP(avx2, ISOGI_VOL__TARGET("avx2"), isogi_vol__mixed_cell_avx2)
+ISOGI_VOL__TRIP(avx2, ISOGI_VOL__TARGET("avx2"))
 #endif
 #undef ISOGI_VOL__TRIP
 
@@ -6151,8 +6110,8 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE void isogi_vol__open_turn(isogi_vol__turn *t
 
 /* ---- one ray alone ---- */
 
-/* A ray alone has nothing to do while it waits, so what counts are waits and branches that are foretold wrongly. It goes as rides do; all
-   cells of a leaf are looked at together. */
+/* A ray alone has nothing to do while it waits, so what counts are waits and branches that are foretold wrongly. It goes as rides do, with
+   one rounding for each level, hence by half as wide children; all cells of a leaf are looked at together. */
 typedef struct __attribute__((aligned(64))) isogi_vol__course {
     double origin[4], inverse[4];          /* as in a pool; the fourth is 0 */
     double sign[4], lead[4];               /* -0 on axes along which the ray falls, else 0; there 1, else 0 */
@@ -6209,7 +6168,7 @@ ISOGI_VOL__TARGET("avx2") ISOGI_VOL__INLINE __m128i isogi_vol__digits(const stru
     return _mm_load_si128((const __m128i *)(const void *)ways->inner[child]);
 }
 
-/* The coordinates of a node's child among nodes of its level. */
+/* As child_place, in registers. */
 ISOGI_VOL__TARGET("avx2") ISOGI_VOL__INLINE __m128i isogi_vol__inner(const struct isogi_vol__ways *ways, __m128i node, int child) {
     return _mm_add_epi32(_mm_slli_epi32(node, 2), isogi_vol__digits(ways, child));
 }

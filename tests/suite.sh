@@ -171,6 +171,8 @@ variants() {
     fi
     variant no-threads "$CC" "-O2 $CONTRACT_OFF -DISOGI_NO_THREADS" '' $(only 'vol|trace')
     variant no-simd "$CC" "-O2 $CONTRACT_OFF -DISOGI_NO_SIMD" '' $(only 'sh|sample|vol|dvr')
+    # As processors with registers longer than double do.
+    [ "$(uname -m)" != x86_64 ] || variant x87 "$CC" "-O2 -mfpmath=387 -DISOGI_NO_SIMD" '' $(only 'vol|vol_sides')
     variant sh-level-0 "$CC" "-O2 $CONTRACT_OFF -DISOGI_SH_LEVEL=0" '' $(only sh)
     variant sh-level-1 "$CC" "-O2 $CONTRACT_OFF -DISOGI_SH_LEVEL=1" '' $(only sh)
     if have clang; then
