@@ -4810,6 +4810,9 @@ ISOGI_VOL__INLINE void isogi_vol__trip_layers(isogi_vol__trip *c, const struct i
     const isogi_vol__four last = ISOGI_VOL__FOUR(set1_ps)(c->last), zero = ISOGI_VOL__FOUR(set1_ps)(0);
     const float size = ways->size[n], wide = size + 4 * ways->reach, *layer = ways->within[c->child];
     int a;
+#ifdef __GNUC__
+#pragma GCC unroll 4
+#endif
     for (a = 0; a < 3; a++) {
         const isogi_vol__four step = ISOGI_VOL__FOUR(set1_ps)(c->cell[a] * size), begin = ISOGI_VOL__FOUR(set1_ps)(c->enter[n][a]);
         const isogi_vol__four layers = ISOGI_VOL__FOUR(loadu_ps)(layer + 4 * a);
