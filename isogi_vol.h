@@ -1917,7 +1917,7 @@ static isogi_result isogi_vol__fill_nodes(isogi_vol__build_job *job, const isogi
     return ISOGI_OK;
 }
 
-/* What fast rays look up; rides but within, inner, turn and size: see fast traversal. */
+/* What fast rays look up, rides only within, inner, turn, size and reach: see fast traversal. */
 struct isogi_vol__ways {
     int32_t lane[ISOGI_VOL__NODE_LEVELS][16], row[ISOGI_VOL__NODE_LEVELS][16]; /* 0 1 2 3 children of a level, in cells, along rows of four
                                                                                   lanes, and down those rows */
@@ -4747,8 +4747,7 @@ ISOGI_VOL__INLINE int isogi_vol__told(isogi_vol__walk *w, const isogi_vol__leaf 
 }
 
 /* What is told of a cell; begin, end: when the ray enters it and leaves it. First x, then y, then z is taken there. */
-static int isogi_vol__cell_told_base(isogi_vol__walk *w, const isogi_vol__leaf *leaf, const int32_t cell[4],
-                                       double begin, double end) {
+static int isogi_vol__cell_told_base(isogi_vol__walk *w, const isogi_vol__leaf *leaf, const int32_t cell[4], double begin, double end) {
     const uint8_t *code = leaf->code + (cell[0] & 3) + 5 * (cell[1] & 3) + 25 * (cell[2] & 3);
     const isogi_vol__four zero = ISOGI_VOL__FOUR(set1_ps)(0), one = ISOGI_VOL__FOUR(set1_ps)(1);
     isogi_vol__four low, high, enters, leaves, in, out;
