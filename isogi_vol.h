@@ -540,7 +540,10 @@ ISOGI_API void isogi_vol_mesh_free(const isogi_pyramid *pyramid, isogi_mesh *mes
 #define ISOGI_VOL__COLD __attribute__((cold, noinline)) /* small rather than fast: quick to compile */
 #define ISOGI_VOL__UNLIKELY(x) __builtin_expect(!!(x), 0)
 #define ISOGI_VOL__PREFETCH(address) __builtin_prefetch((const void *)(address))
+#define ISOGI_VOL__PRAGMA(text) _Pragma(#text)
+#define ISOGI_VOL__UNROLL(times) ISOGI_VOL__PRAGMA(GCC unroll times)
 #else
+#define ISOGI_VOL__UNROLL(times)
 #define ISOGI_VOL__NOINLINE
 #define ISOGI_VOL__COLD
 #define ISOGI_VOL__INLINE static inline
@@ -2366,6 +2369,19 @@ ISOGI_VOL__INLINE uint64_t isogi_vol__met(isogi_vol__four in_a, isogi_vol__four 
 #endif
 }
 
+/* Lanes in which a is at most b, a bit each. */
+ISOGI_VOL__INLINE unsigned isogi_vol__at_most_base(isogi_vol__four a, isogi_vol__four b) {
+#if defined(ISOGI_VOL__SSE2)
+    return (unsigned)_mm_movemask_ps(_mm_cmple_ps(a, b));
+#elif defined(ISOGI_VOL__NEON)
+    static const uint32_t bit[4] = {1, 2, 4, 8};
+    return vaddvq_u32(vandq_u32(vcleq_f32(a, b), vld1q_u32(bit)));
+#else
+    return (unsigned)(a.f[0] <= b.f[0]) | (unsigned)(a.f[1] <= b.f[1]) << 1 | (unsigned)(a.f[2] <= b.f[2]) << 2 |
+           (unsigned)(a.f[3] <= b.f[3]) << 3;
+#endif
+}
+
 /* Which of 64 bytes, aligned to 16, are at least `least`, 0..255. */
 ISOGI_VOL__INLINE uint64_t isogi_vol__at_least_base(const uint8_t *byte, int least) {
 #if defined(ISOGI_VOL__SSE2)
@@ -2399,6 +2415,13 @@ ISOGI_VOL__INLINE int isogi_vol__lowest_bit(uint64_t x) {
         if (!(x & (((uint64_t)1 << half) - 1))) n += half, x >>= half;
     return n;
 #endif
+}
+
+/* How many of 16 bits are set. */
+ISOGI_VOL__INLINE unsigned isogi_vol__count_bits(unsigned x) {
+    x -= x >> 1 & 0x5555;
+    x = (x & 0x3333) + (x >> 2 & 0x3333);
+    return ((x + (x >> 4)) & 0x0f0f) * 0x0101 >> 8 & 255;
 }
 
 /* ==== values and gradients =========================================================================================== */
@@ -4774,33 +4797,44 @@ static int isogi_vol__cell_told_base(isogi_vol__walk *w, const isogi_vol__leaf *
     return isogi_vol__told(w, leaf, f);
 }
 
-/* Sets it up; 0: it has to be walked plainly. */
+/* Takes the ray's directions; 0: it has to be walked plainly. */
 static int isogi_vol__ride_set(isogi_vol__ride *r) {
+    const isogi_vol__walk *w = &r->walk;
+    isogi_vol__trip *c = &r->trip;
+    int a;
+    if (!(w->end > 1e-150) || !(w->end < 1e150)) return 0;
+    c->octant = 0, c->inverse[3] = 0, c->lead[3] = 0;
+    for (a = 0; a < 3; a++) {
+        const int still = !(w->dir[a] > 0 || w->dir[a] < 0);
+        /* one that stands still keeps below the upper border */
+        const int fall = w->dir[a] < 0 || (still && w->origin[a] >= w->pyramid->box[a]);
+        c->octant |= fall << a, c->lead[a] = fall;
+        c->inverse[a] = still ? fall ? -1e200 : 1e200 : w->inverse[a];
+    }
+    c->flip = 3 * (c->octant & 1) + 6 * (c->octant & 2) + 12 * (c->octant & 4);
+    memcpy(&c->stop, &w->end, sizeof c->stop), c->stop |= 3;
+    c->entry_axis = w->entry_axis, r->looked = 0;
+    return 1;
+}
+
+/* Sends it to the root. */
+static void isogi_vol__ride_start(isogi_vol__ride *r) {
     const isogi_vol__walk *w = &r->walk;
     const isogi_pyramid *p = w->pyramid;
     isogi_vol__trip *c = &r->trip;
     const int top = p->node_levels - 1;
     const double most = isogi_vol__largest(w->dir[0], w->dir[1], w->dir[2]);
     int a;
-    if (!(w->end > 1e-150) || !(w->end < 1e150)) return 0;
     c->level = isogi_vol__quantise_isovalue(p, w->isovalue, &c->low, &c->high);
-    c->octant = 0, c->flip = 0, c->inverse[3] = 0, c->lead[3] = 0;
     for (a = 0; a < 3; a++) {
-        const int still = !(w->dir[a] > 0 || w->dir[a] < 0);
-        const int fall = w->dir[a] < 0 || (still && w->origin[a] >= p->box[a]); /* one that stands still keeps below the upper border */
-        const double start = fall ? (4 << 2 * top) - w->origin[a] : w->origin[a]; /* counted like cells */
-        c->octant |= fall << a, c->flip |= fall * (3 << 2 * a), c->lead[a] = fall;
-        c->inverse[a] = still ? fall ? -1e200 : 1e200 : w->inverse[a];
+        const double start = c->lead[a] ? (4 << 2 * top) - w->origin[a] : w->origin[a]; /* counted like cells */
         c->cell[a] = (float)isogi_vol__min(fabs(c->inverse[a]) * most, 1e30);
         c->enter[top][a] = (-2 * p->ways->reach - (float)start) * c->cell[a];
     }
-    memcpy(&c->stop, &w->end, sizeof c->stop), c->stop |= 3;
-    memset(c->place[top], 0, sizeof c->place[top]);
     c->last = (float)(isogi_vol__min(w->end * most, 1e30) * 1.000001);
-    c->entry_axis = w->entry_axis, c->child = 0, c->pending = 0, c->cells = 0;
-    r->at = top, r->looked = 0;
+    memset(c->place[top], 0, sizeof c->place[top]);
+    c->child = 0, c->pending = 0, c->cells = 0, r->at = top;
     isogi_vol__ride_to(r, p->nodes[p->node_level[top].first]);
-    return 1;
 }
 
 /* When the ray is in each layer of a node's children, by each axis. */
@@ -4819,6 +4853,30 @@ ISOGI_VOL__INLINE void isogi_vol__trip_layers(isogi_vol__trip *c, const struct i
         in[a] = ISOGI_VOL__FOUR(max_ps)(times, zero);
         out[a] = ISOGI_VOL__FOUR(min_ps)(ISOGI_VOL__FOUR(add_ps)(times, ISOGI_VOL__FOUR(set1_ps)(c->cell[a] * wide)), last);
         if (n) c->enter[n - 1][a] = ISOGI_VOL__FOUR(cvtss_f32)(times);
+    }
+}
+
+/* The beam that holds rays which nearly coincide (see there). Its time is its way on the axis on which they are fastest: it enters a layer
+   at in * where that begins + in_base, and leaves it at out * where that ends + out_base. All is counted backwards where rays fall. */
+typedef struct isogi_vol__beam {
+    float in[3], in_base[3], out[3], out_base[3], from, to;
+    float corner[3]; /* lowest of the node that is to be opened */
+} isogi_vol__beam;
+
+/* What trip_layers finds, of a beam. */
+ISOGI_VOL__INLINE void isogi_vol__beam_layers(const isogi_vol__beam *beam, const struct isogi_vol__ways *ways, int n, isogi_vol__four in[3],
+                                              isogi_vol__four out[3]) {
+    const isogi_vol__four from = ISOGI_VOL__FOUR(set1_ps)(beam->from), to = ISOGI_VOL__FOUR(set1_ps)(beam->to);
+    const isogi_vol__four size = ISOGI_VOL__FOUR(set1_ps)(ways->size[n]);
+    const isogi_vol__four layers = ISOGI_VOL__FOUR(mul_ps)(ISOGI_VOL__FOUR(loadu_ps)(ways->within[0]), size);
+    int a;
+    ISOGI_VOL__UNROLL(3)
+    for (a = 0; a < 3; a++) {
+        const isogi_vol__four begin = ISOGI_VOL__FOUR(add_ps)(layers, ISOGI_VOL__FOUR(set1_ps)(beam->corner[a]));
+        in[a] = ISOGI_VOL__FOUR(mul_ps)(begin, ISOGI_VOL__FOUR(set1_ps)(beam->in[a]));
+        in[a] = ISOGI_VOL__FOUR(max_ps)(ISOGI_VOL__FOUR(add_ps)(in[a], ISOGI_VOL__FOUR(set1_ps)(beam->in_base[a])), from);
+        out[a] = ISOGI_VOL__FOUR(mul_ps)(ISOGI_VOL__FOUR(add_ps)(begin, size), ISOGI_VOL__FOUR(set1_ps)(beam->out[a]));
+        out[a] = ISOGI_VOL__FOUR(min_ps)(ISOGI_VOL__FOUR(add_ps)(out[a], ISOGI_VOL__FOUR(set1_ps)(beam->out_base[a])), to);
     }
 }
 
@@ -4912,7 +4970,8 @@ static int isogi_vol__passes_base(isogi_vol__ride *r, const int32_t cell[4], dou
 
 /* The same by every path.
    leaf_mask: which of the 64 cells (x + 4y + 16z) of a leaf can hold the surface.
-   trip_open: opens the node that was sent for: its children that are passed, and can hold the surface, are the next ones.
+   trip_open: opens the node that was sent for: its children that are passed, by a beam if one is given, and can hold the surface, are the
+   next ones.
    trip_cell: the next cell of the leaf: 1: hit; 0: none; -1: its voxels are sent for.
    ride_on: to the first hit: 1, or to the end: 0; waits: to where memory is to be read next, which is sent for: -1. */
 #define ISOGI_VOL__TRIP(path, target) \
@@ -4923,7 +4982,7 @@ static int isogi_vol__passes_base(isogi_vol__ride *r, const int32_t cell[4], dou
                                       ~isogi_vol__at_least_##path(node, leaf->outside), \
                                       ~isogi_vol__at_least_##path(node + 64, leaf->outside)); \
     } \
-    target ISOGI_VOL__INLINE void isogi_vol__trip_open_##path(isogi_vol__ride *r) { \
+    target ISOGI_VOL__INLINE void isogi_vol__trip_open_##path(isogi_vol__ride *r, const isogi_vol__beam *beam) { \
         isogi_vol__trip *c = &r->trip; \
         const isogi_pyramid *p = r->walk.pyramid; \
         const int n = r->at, leaves = !p->volume.compact; \
@@ -4934,7 +4993,8 @@ static int isogi_vol__passes_base(isogi_vol__ride *r, const int32_t cell[4], dou
                      : isogi_vol__no_leaf(p, x, y, z, &r->leaf); \
         isogi_vol__four in[3], out[3]; \
         uint64_t mask; \
-        isogi_vol__trip_layers(c, p->ways, n, in, out); \
+        if (beam) isogi_vol__beam_layers(beam, p->ways, n, in, out); \
+        else isogi_vol__trip_layers(c, p->ways, n, in, out); \
         mask = isogi_vol__turn_mask_##path(held, p->ways, c->octant) & isogi_vol__trip_way_##path(in, out); \
         r->walk.count.blocks++, r->open = NULL; \
         if (!n) c->cells = mask; \
@@ -4968,7 +5028,7 @@ static int isogi_vol__passes_base(isogi_vol__ride *r, const int32_t cell[4], dou
         isogi_vol__trip *c = &r->trip; \
         if (c->low > c->high) return 0; \
         do { \
-            if (r->open) isogi_vol__trip_open_##path(r); \
+            if (r->open) isogi_vol__trip_open_##path(r, NULL); \
             while (c->cells) { \
                 const int found = isogi_vol__trip_cell_##path(r, hit); \
                 if (found > 0) return 1; \
@@ -6501,8 +6561,10 @@ static int isogi_vol__walk_ray(isogi_vol__ride *r, isogi_hit *hit) {
         if (found >= 0) return found || isogi_vol__leaves_inside(w, r->flags, hit);
     } else
 #endif
-    if (w->pyramid->fast && isogi_vol__ride_set(r))
+    if (w->pyramid->fast && isogi_vol__ride_set(r)) {
+        isogi_vol__ride_start(r);
         return isogi_vol__enters_inside(w, hit) || isogi_vol__ride_on(r, 0, hit) || isogi_vol__leaves_inside(w, r->flags, hit);
+    }
     return isogi_vol__walk_plainly(r, hit);
 }
 
@@ -6520,12 +6582,358 @@ ISOGI_VOL__NOINLINE static void isogi_vol__trace_one(isogi_vol__batch *b, size_t
     isogi_vol__finish(b, i, &r.walk, walks && isogi_vol__walk_ray(&r, b->hits ? &b->hits[i] : &any));
 }
 
-/* Rays in turn, each up to where it needs memory, which arrives while the others have their turns. */
-#define ISOGI_VOL__RIDES 8
+/* ---- rays that nearly coincide ---- */
 
-/* The next ray that goes from node to node gets on; those before it that do not are done with. 0: there is none. */
-static int isogi_vol__ride_begin(isogi_vol__batch *b, isogi_vol__ride *r, size_t *next) {
-    while (*next < b->count) {
+/* Neighbours in a picture, a packet of coherent rays in the field's terms, go from node to node together: a node is opened once for all
+   of them, by the beam that holds them, and a child or cell costs two times for each ray in float, when it enters and when it leaves. Cells
+   are widened by ISOGI_VOL__REACH, more than floats err by, hence none is left out; those that are certainly on a ray's side all along are
+   done with. A cell in doubt is decided as a ray alone does, in the ray's own order: hits are the same, bit by bit. All rays fall along the
+   same axes and count backwards there, so one order of children suits them all. Their time is their way on the axis on which they are
+   fastest. */
+#define ISOGI_VOL__CONVOY 16
+#define ISOGI_VOL__REACH 4e-6f /* times below are sums of a few numbers up to 4 children, with errors below 1e-6 */
+
+typedef struct isogi_vol__convoy {
+    isogi_vol__ride *ride;
+    int count, axis;                           /* axis: on which they are fastest */
+    unsigned active, leaving, inside, outside; /* rays, a bit each: going on; about to leave a surface; else known to be on this side */
+    /* where they begin, how far they go a unit of time, and when they end */
+    double place[3][ISOGI_VOL__CONVOY], way[3][ISOGI_VOL__CONVOY], stop[ISOGI_VOL__CONVOY];
+    float rate[3][ISOGI_VOL__CONVOY], per[3][ISOGI_VOL__CONVOY]; /* way, and what a cell takes by each axis */
+    /* they enter nodes at place * per - begin, and leave them at place * per - finish: nodes are wider than they are; end: a little more */
+    float begin[3][ISOGI_VOL__CONVOY], finish[3][ISOGI_VOL__CONVOY], end[ISOGI_VOL__CONVOY];
+    /* where they are in a leaf when they come to it; from there on they enter layer i of cells at i * per - first, leave it at
+       (i + 1) * per - last, and end at left */
+    float local[3][ISOGI_VOL__CONVOY], first[3][ISOGI_VOL__CONVOY], last[3][ISOGI_VOL__CONVOY], left[ISOGI_VOL__CONVOY];
+    uint8_t corner[8]; /* from a cell's first voxel in its leaf to its corners, counted backwards likewise */
+    isogi_vol__beam beam;
+    isogi_vol__ride lead; /* the beam's: its trip alone */
+} isogi_vol__convoy;
+
+/* Whether all fall along the same axes, have one isovalue, and are not far apart. */
+static int isogi_vol__coincide_in(const isogi_vol__ride *ride, int count) {
+    const isogi_vol__walk *first = &ride[0].walk;
+    const double most = isogi_vol__largest(first->dir[0], first->dir[1], first->dir[2]);
+    int i, a;
+    if (!(most > 1e-12 && most < 1e12)) return 0;
+    for (i = 1; i < count; i++) {
+        const isogi_vol__walk *w = &ride[i].walk;
+        if (ride[i].trip.octant != ride[0].trip.octant || !(w->isovalue <= first->isovalue && w->isovalue >= first->isovalue)) return 0;
+        for (a = 0; a < 3; a++)
+            if (fabs(w->dir[a] - first->dir[a]) > 0.06 * most || fabs(w->origin[a] - first->origin[a]) > 8) return 0;
+    }
+    return 1;
+}
+
+/* The beam: on each of the two other axes all rays lie between two lines, which go through the bounds of their places where the first ray
+   begins and where the last one ends. (The largest of linear functions lies below its chord.) */
+static void isogi_vol__set_beam_of(isogi_vol__convoy *v, int axis, double padded) {
+    isogi_vol__beam *beam = &v->beam;
+    const double slack = 2e-6 * padded; /* floats are off by less than half of this */
+    double from = v->place[axis][0], to = from, length;
+    int a, i;
+    for (i = 0; i < v->count; i++)
+        from = isogi_vol__min(from, v->place[axis][i]), to = isogi_vol__max(to, v->place[axis][i] + v->stop[i]);
+    length = isogi_vol__max(to - from, 1e-3);
+    beam->corner[0] = beam->corner[1] = beam->corner[2] = 0;
+    beam->from = (float)(from - slack), beam->to = (float)(to + slack);
+    for (a = 0; a < 3; a++) {
+        double upper[2] = {-1e300, -1e300}, lower[2] = {1e300, 1e300};
+        if (a == axis) {
+            beam->in[a] = beam->out[a] = 1, beam->in_base[a] = -(float)slack, beam->out_base[a] = (float)slack;
+            continue;
+        }
+        for (i = 0; i < v->count; i++) {
+            const double begin = v->place[a][i] + (from - v->place[axis][i]) * v->way[a][i], end = begin + length * v->way[a][i];
+            upper[0] = isogi_vol__max(upper[0], begin), upper[1] = isogi_vol__max(upper[1], end);
+            lower[0] = isogi_vol__min(lower[0], begin), lower[1] = isogi_vol__min(lower[1], end);
+        }
+        beam->in[a] = (float)isogi_vol__min(length / isogi_vol__max(upper[1] - upper[0], 1e-200), 1e28);
+        beam->out[a] = (float)isogi_vol__min(length / isogi_vol__max(lower[1] - lower[0], 1e-200), 1e28);
+        beam->in_base[a] = (float)(from - (upper[0] + slack) * (double)beam->in[a]);
+        beam->out_base[a] = (float)(from - (lower[0] - slack) * (double)beam->out[a]);
+    }
+}
+
+/* Takes note of the side on which ray i is. */
+ISOGI_VOL__INLINE void isogi_vol__take_side(isogi_vol__convoy *v, const isogi_vol__walk *w, int i) {
+    const unsigned bit = 1u << i;
+    v->leaving &= ~bit, v->inside &= ~bit, v->outside &= ~bit;
+    if (w->deflate) v->leaving |= bit;
+    else if (w->inside > 0) v->inside |= bit;
+    else if (!w->inside) v->outside |= bit;
+}
+
+/* From a cell's first voxel in its leaf to its corner with bits x, y, z. */
+ISOGI_VOL__INLINE int isogi_vol__leaf_corner(int bits) { return (bits & 1) + 5 * (bits >> 1 & 1) + 25 * (bits >> 2); }
+
+/* Sets up the convoy of rays that coincide. Places of rays that there are not are those of the first one. */
+static void isogi_vol__set_convoy(isogi_vol__convoy *v, isogi_vol__ride *ride, int count) {
+    const isogi_vol__trip *c = &ride[0].trip;
+    const double *dir = ride[0].walk.dir;
+    const int levels = ride[0].walk.pyramid->node_levels, y = fabs(dir[1]) > fabs(dir[0]), axis = fabs(dir[2]) > fabs(dir[y]) ? 2 : y;
+    const double padded = 1 << 2 * levels;
+    const float reach = (float)(1e-6 * padded); /* floats are off by half of this, of what the root measures */
+    int i, a;
+    v->ride = ride, v->count = count, v->lead = ride[0];
+    isogi_vol__ride_start(&v->lead);
+    v->active = (1u << count) - 1, v->inside = v->outside = v->leaving = 0;
+    for (i = 0; i < ISOGI_VOL__CONVOY; i++) {
+        const isogi_vol__walk *w = &ride[i < count ? i : 0].walk;
+        const double *inverse = ride[i < count ? i : 0].trip.inverse, most = fabs(w->dir[axis]), pace = 1 / most;
+        for (a = 0; a < 3; a++) {
+            const double place = c->lead[a] ? padded - w->origin[a] : w->origin[a];
+            const float at = (float)place, per = (float)isogi_vol__min(fabs(inverse[a]) * most, 1e28);
+            v->place[a][i] = place, v->way[a][i] = fabs(w->dir[a]) * pace;
+            v->rate[a][i] = (float)v->way[a][i], v->per[a][i] = per;
+            v->begin[a][i] = (at + reach) * per, v->finish[a][i] = (at - reach) * per;
+        }
+        v->stop[i] = w->end * most, v->end[i] = (float)(v->stop[i] * 1.000001);
+        if (i < count) isogi_vol__take_side(v, w, i);
+    }
+    isogi_vol__set_beam_of(v, axis, padded);
+    for (a = 0, v->axis = axis; a < 8; a++) v->corner[a] = (uint8_t)isogi_vol__leaf_corner(a ^ c->octant);
+}
+
+/* The same by every path, four or eight rays at once.
+   convoy_layers: the layers of cells of a leaf, from where the rays come to its first plane on the axis on which they are fastest: rays
+   that meet it are then next to it, and their places in cells are exact. Loops that compilers can make vectors of.
+   convoy_span: when rays enter and leave a box; low: its corner; size: of its sides; in, out: begin and finish, or first and last.
+   convoy_meets: which rays meet the node at the beam's corner, or come near it; size: of its sides.
+   convoy_sides: which of the rays `met` pass a cell of a leaf or come near it, and for which of them it is certain that they are inside, or
+   outside, all along, as told has it; layer: the cell's place; f: its corners; bound: of what is certain, and three times these.
+   convoy_within: which rays certainly pass it, of those that were said to.
+   convoy_leaf: goes through cells of a leaf, those of lead.
+   convoy_on: all rays to their hits or ends. */
+#define ISOGI_VOL__CONVOY_ON(path, target) \
+    target ISOGI_VOL__INLINE void isogi_vol__convoy_layers_##path(isogi_vol__convoy *v, const float corner[3]) { \
+        const double plane = (double)corner[v->axis], *main = v->place[v->axis]; \
+        double zero[ISOGI_VOL__CONVOY]; \
+        int i, a; \
+        for (i = 0; i < ISOGI_VOL__CONVOY; i++) { \
+            const double way = plane - main[i] > 0 ? plane - main[i] : 0; \
+            zero[i] = way < v->stop[i] ? way : v->stop[i]; \
+        } \
+        for (i = 0; i < ISOGI_VOL__CONVOY; i++) v->left[i] = (float)((v->stop[i] - zero[i]) * 1.000001); \
+        for (a = 0; a < 3; a++) { \
+            const double low = (double)corner[a]; \
+            for (i = 0; i < ISOGI_VOL__CONVOY; i++) v->local[a][i] = (float)(v->place[a][i] + zero[i] * v->way[a][i] - low); \
+            for (i = 0; i < ISOGI_VOL__CONVOY; i++) { \
+                v->first[a][i] = (v->local[a][i] + ISOGI_VOL__REACH) * v->per[a][i]; \
+                v->last[a][i] = (v->local[a][i] - ISOGI_VOL__REACH) * v->per[a][i]; \
+            } \
+        } \
+    } \
+    target ISOGI_VOL__INLINE void isogi_vol__convoy_span_##path( \
+        const isogi_vol__convoy *v, int i, const float low[3], float size, const float (*in)[ISOGI_VOL__CONVOY], \
+        const float (*out)[ISOGI_VOL__CONVOY], isogi_vol__wide_##path *enter, isogi_vol__wide_##path *leave) { \
+        int a; \
+        ISOGI_VOL__UNROLL(3) \
+        for (a = 0; a < 3; a++) { \
+            const isogi_vol__wide_##path per = ISOGI_VOL__WIDE_##path(loadu_ps)(v->per[a] + i); \
+            const isogi_vol__wide_##path first = ISOGI_VOL__WIDE_##path(mul_ps)(ISOGI_VOL__WIDE_##path(set1_ps)(low[a]), per); \
+            const isogi_vol__wide_##path last = ISOGI_VOL__WIDE_##path(mul_ps)(ISOGI_VOL__WIDE_##path(set1_ps)(low[a] + size), per); \
+            *enter = ISOGI_VOL__WIDE_##path(max_ps)( \
+                *enter, ISOGI_VOL__WIDE_##path(sub_ps)(first, ISOGI_VOL__WIDE_##path(loadu_ps)(in[a] + i))); \
+            *leave = ISOGI_VOL__WIDE_##path(min_ps)( \
+                *leave, ISOGI_VOL__WIDE_##path(sub_ps)(last, ISOGI_VOL__WIDE_##path(loadu_ps)(out[a] + i))); \
+        } \
+    } \
+    target ISOGI_VOL__INLINE unsigned isogi_vol__convoy_meets_##path(const isogi_vol__convoy *v, float size) { \
+        unsigned lanes = 0; \
+        int i; \
+        ISOGI_VOL__UNROLL(4) \
+        for (i = 0; i < ISOGI_VOL__CONVOY; i += ISOGI_VOL__LANES_##path) { \
+            isogi_vol__wide_##path enter = ISOGI_VOL__WIDE_##path(set1_ps)(0), leave = ISOGI_VOL__WIDE_##path(loadu_ps)(v->end + i); \
+            isogi_vol__convoy_span_##path(v, i, v->beam.corner, size, v->begin, v->finish, &enter, &leave); \
+            lanes |= isogi_vol__at_most_##path(enter, leave) << i; \
+        } \
+        return lanes; \
+    } \
+    target ISOGI_VOL__INLINE unsigned isogi_vol__convoy_within_##path(const isogi_vol__convoy *v, const float layer[3]) { \
+        unsigned lanes = 0; \
+        int i; \
+        for (i = 0; i < ISOGI_VOL__CONVOY; i += ISOGI_VOL__LANES_##path) { \
+            isogi_vol__wide_##path enter = ISOGI_VOL__WIDE_##path(set1_ps)(0), leave = ISOGI_VOL__WIDE_##path(loadu_ps)(v->left + i); \
+            isogi_vol__convoy_span_##path(v, i, layer, 1, v->last, v->first, &enter, &leave); \
+            enter = ISOGI_VOL__WIDE_##path(add_ps)(enter, ISOGI_VOL__WIDE_##path(set1_ps)(1e-5f)); \
+            lanes |= isogi_vol__at_most_##path(enter, leave) << i; \
+        } \
+        return lanes; \
+    } \
+    target ISOGI_VOL__INLINE isogi_vol__wide_##path isogi_vol__mix_##path(isogi_vol__wide_##path a, isogi_vol__wide_##path b, \
+                                                                         isogi_vol__wide_##path u) { \
+        return ISOGI_VOL__WIDE_##path(add_ps)(a, ISOGI_VOL__WIDE_##path(mul_ps)(u, ISOGI_VOL__WIDE_##path(sub_ps)(b, a))); \
+    } \
+    target ISOGI_VOL__INLINE unsigned isogi_vol__convoy_sides_##path(const isogi_vol__convoy *v, unsigned met, const float layer[3], \
+                                                                    const float f[8], const float bound[4], unsigned *inside, \
+                                                                    unsigned *outside) { \
+        const isogi_vol__wide_##path zero = ISOGI_VOL__WIDE_##path(set1_ps)(0), one = ISOGI_VOL__WIDE_##path(set1_ps)(1); \
+        const isogi_vol__wide_##path low = ISOGI_VOL__WIDE_##path(set1_ps)(bound[0]), high = ISOGI_VOL__WIDE_##path(set1_ps)(bound[1]); \
+        const isogi_vol__wide_##path low3 = ISOGI_VOL__WIDE_##path(set1_ps)(bound[2]), high3 = ISOGI_VOL__WIDE_##path(set1_ps)(bound[3]); \
+        unsigned passed = 0, in = 0, out = 0; \
+        int i, a, k; \
+        for (i = 0; i < ISOGI_VOL__CONVOY; i += ISOGI_VOL__LANES_##path) { \
+            isogi_vol__wide_##path enter = zero, leave = ISOGI_VOL__WIDE_##path(loadu_ps)(v->left + i), from[3], to[3]; \
+            isogi_vol__wide_##path c[2][4], value[2][2][2], sum1, sum2; \
+            unsigned lanes = met >> i & ((1u << ISOGI_VOL__LANES_##path) - 1); \
+            if (!lanes) continue; \
+            isogi_vol__convoy_span_##path(v, i, layer, 1, v->first, v->last, &enter, &leave); \
+            lanes &= isogi_vol__at_most_##path(enter, leave); \
+            if (!lanes) continue; \
+            passed |= lanes << i; \
+            ISOGI_VOL__UNROLL(3) \
+            for (a = 0; a < 3; a++) { \
+                const isogi_vol__wide_##path rate = ISOGI_VOL__WIDE_##path(loadu_ps)(v->rate[a] + i); \
+                const isogi_vol__wide_##path base = ISOGI_VOL__WIDE_##path(sub_ps)( \
+                    ISOGI_VOL__WIDE_##path(loadu_ps)(v->local[a] + i), ISOGI_VOL__WIDE_##path(set1_ps)(layer[a])); \
+                from[a] = ISOGI_VOL__WIDE_##path(add_ps)(base, ISOGI_VOL__WIDE_##path(mul_ps)(enter, rate)); \
+                to[a] = ISOGI_VOL__WIDE_##path(add_ps)(base, ISOGI_VOL__WIDE_##path(mul_ps)(leave, rate)); \
+                from[a] = ISOGI_VOL__WIDE_##path(min_ps)(ISOGI_VOL__WIDE_##path(max_ps)(from[a], zero), one); \
+                to[a] = ISOGI_VOL__WIDE_##path(min_ps)(ISOGI_VOL__WIDE_##path(max_ps)(to[a], zero), one); \
+            } \
+            ISOGI_VOL__UNROLL(4) \
+            for (k = 0; k < 4; k++) { \
+                const isogi_vol__wide_##path f0 = ISOGI_VOL__WIDE_##path(set1_ps)(f[2 * k]); \
+                const isogi_vol__wide_##path f1 = ISOGI_VOL__WIDE_##path(set1_ps)(f[2 * k + 1]); \
+                c[0][k] = isogi_vol__mix_##path(f0, f1, from[0]), c[1][k] = isogi_vol__mix_##path(f0, f1, to[0]); \
+            } \
+            ISOGI_VOL__UNROLL(2) \
+            for (k = 0; k < 2; k++) { \
+                const isogi_vol__wide_##path near0 = isogi_vol__mix_##path(c[k][0], c[k][1], from[1]); \
+                const isogi_vol__wide_##path near1 = isogi_vol__mix_##path(c[k][2], c[k][3], from[1]); \
+                const isogi_vol__wide_##path far0 = isogi_vol__mix_##path(c[k][0], c[k][1], to[1]); \
+                const isogi_vol__wide_##path far1 = isogi_vol__mix_##path(c[k][2], c[k][3], to[1]); \
+                value[k][0][0] = isogi_vol__mix_##path(near0, near1, from[2]); \
+                value[k][0][1] = isogi_vol__mix_##path(near0, near1, to[2]); \
+                value[k][1][0] = isogi_vol__mix_##path(far0, far1, from[2]); \
+                value[k][1][1] = isogi_vol__mix_##path(far0, far1, to[2]); \
+            } \
+            sum1 = ISOGI_VOL__WIDE_##path(add_ps)(ISOGI_VOL__WIDE_##path(add_ps)(value[1][0][0], value[0][1][0]), value[0][0][1]); \
+            sum2 = ISOGI_VOL__WIDE_##path(add_ps)(ISOGI_VOL__WIDE_##path(add_ps)(value[0][1][1], value[1][0][1]), value[1][1][0]); \
+            in |= (lanes & isogi_vol__at_most_##path(high, ISOGI_VOL__WIDE_##path(min_ps)(value[0][0][0], value[1][1][1])) & \
+                   isogi_vol__at_most_##path(high3, ISOGI_VOL__WIDE_##path(min_ps)(sum1, sum2))) \
+                  << i; \
+            out |= (lanes & isogi_vol__at_most_##path(ISOGI_VOL__WIDE_##path(max_ps)(value[0][0][0], value[1][1][1]), low) & \
+                    isogi_vol__at_most_##path(ISOGI_VOL__WIDE_##path(max_ps)(sum1, sum2), low3)) \
+                   << i; \
+        } \
+        *inside = in, *outside = out; \
+        return passed; \
+    } \
+    target static void isogi_vol__convoy_leaf_##path(isogi_vol__convoy *v, isogi_vol__batch *b, unsigned met) { \
+        const isogi_vol__ride *lead = &v->lead; \
+        const float low = lead->leaf.isovalue - ISOGI_VOL__DOUBT, high = lead->leaf.isovalue + ISOGI_VOL__DOUBT; \
+        const float bound[4] = {low, high, 3 * low, 3 * high}; \
+        uint64_t cells = lead->trip.cells; \
+        isogi_vol__convoy_layers_##path(v, v->beam.corner); \
+        for (; cells && met & v->active; cells &= cells - 1) { \
+            const int child = isogi_vol__lowest_bit(cells), here = child ^ lead->trip.flip; \
+            const uint8_t *code = lead->leaf.code + (here & 3) + 5 * (here >> 2 & 3) + 25 * (here >> 4); \
+            unsigned in, out, same, passed, found; \
+            float layer[3], f[8]; \
+            int32_t cell[4]; \
+            int i; \
+            layer[0] = (float)(child & 3), layer[1] = (float)(child >> 2 & 3), layer[2] = (float)(child >> 4); \
+            ISOGI_VOL__UNROLL(8) \
+            for (i = 0; i < 8; i++) f[i] = code[v->corner[i]]; \
+            passed = isogi_vol__convoy_sides_##path(v, met & v->active, layer, f, bound, &in, &out); \
+            found = (in | out) & ~(v->inside | v->outside | v->leaving); \
+            if (found) { \
+                found &= isogi_vol__convoy_within_##path(v, layer); \
+                v->inside |= found & in, v->outside |= found & out; \
+                for (; found; found &= found - 1) { \
+                    i = isogi_vol__lowest_bit(found); \
+                    v->ride[i].walk.inside = (int)(in >> i & 1); \
+                } \
+            } \
+            same = (in & v->inside) | (out & v->outside); \
+            b->work.cells += isogi_vol__count_bits(same); \
+            passed &= ~same; \
+            if (!passed) continue; \
+            isogi_vol__child_place(cell, lead->trip.place[0], lead->walk.pyramid->ways->inner[here]); \
+            for (; passed; passed &= passed - 1) { \
+                isogi_vol__ride *r = &v->ride[i = isogi_vol__lowest_bit(passed)]; \
+                isogi_vol__trip *c = &r->trip; \
+                double begin, end; \
+                isogi_hit any; \
+                if (!isogi_vol__passes_##path(r, cell, &begin, &end)) continue; \
+                if (isogi_vol__mixed_cell_##path(&r->walk, cell[0], cell[1], cell[2], c->in == 3 ? c->entry_axis : c->in, \
+                                                 c->out == 3 ? -1 : c->out, b->hits ? &b->hits[r->number] : &any)) { \
+                    v->active &= ~(1u << i); \
+                    isogi_vol__finish(b, r->number, &r->walk, 1); \
+                } else isogi_vol__take_side(v, &r->walk, i); \
+            } \
+        } \
+    } \
+    target static void isogi_vol__convoy_on_##path(isogi_vol__convoy *v, isogi_vol__batch *b) { \
+        isogi_vol__ride *lead = &v->lead; \
+        const isogi_pyramid *p = lead->walk.pyramid; \
+        unsigned met[ISOGI_VOL__NODE_LEVELS], lanes = v->active; \
+        if (lead->trip.low > lead->trip.high) return; \
+        for (;;) { \
+            met[lead->at] = lanes; \
+            b->work.blocks += isogi_vol__count_bits(lanes); \
+            isogi_vol__trip_open_##path(lead, &v->beam); \
+            if (!lead->at && lead->trip.cells) isogi_vol__convoy_leaf_##path(v, b, lanes); \
+            do { \
+                int a; \
+                if (!v->active || !isogi_vol__trip_next(lead)) return; \
+                for (a = 0; a < 3; a++) { /* counted backwards within the root */ \
+                    const int32_t all = (1 << 2 * (p->node_levels - 1 - lead->at)) - 1; \
+                    v->beam.corner[a] = (float)((lead->trip.place[lead->at][a] ^ (all & -lead->trip.lead[a])) << (2 * lead->at + 2)); \
+                } \
+                lanes = met[lead->at + 1] & v->active; \
+                if (lanes) lanes &= isogi_vol__convoy_meets_##path(v, 4 * p->ways->size[lead->at]); \
+            } while (!lanes); \
+        } \
+    }
+
+#define ISOGI_VOL__LANES_base 4
+#define ISOGI_VOL__WIDE_base(operation) ISOGI_VOL__FOUR(operation)
+typedef isogi_vol__four isogi_vol__wide_base;
+ISOGI_VOL__CONVOY_ON(base, )
+
+#ifdef ISOGI_VOL__AVX
+#define ISOGI_VOL__LANES_avx2 8
+#define ISOGI_VOL__WIDE_avx2(operation) _mm256_##operation
+typedef __m256 isogi_vol__wide_avx2;
+ISOGI_VOL__TARGET("avx2") ISOGI_VOL__INLINE unsigned isogi_vol__at_most_avx2(__m256 a, __m256 b) {
+    return (unsigned)_mm256_movemask_ps(_mm256_cmp_ps(a, b, _CMP_LE_OQ));
+}
+ISOGI_VOL__CONVOY_ON(avx2, ISOGI_VOL__TARGET("avx2"))
+#endif
+#undef ISOGI_VOL__CONVOY_ON
+#undef ISOGI_VOL__WIDE_base
+#undef ISOGI_VOL__WIDE_avx2
+#undef ISOGI_VOL__LANES_base
+#undef ISOGI_VOL__LANES_avx2
+
+/* Takes rays that coincide to their hits or ends. Not inlined, so that its stack does not add to that of a ray alone. */
+ISOGI_VOL__NOINLINE static void isogi_vol__trace_convoy(isogi_vol__batch *b, isogi_vol__ride *ride, int count) {
+    isogi_vol__convoy v;
+    int i;
+    isogi_vol__set_convoy(&v, ride, count);
+#ifdef ISOGI_VOL__AVX
+    if (b->pyramid->path >= ISOGI_VOL__PATH_AVX2) isogi_vol__convoy_on_avx2(&v, b);
+    else
+#endif
+    isogi_vol__convoy_on_base(&v, b);
+    for (i = 0; i < count; i++) {
+        isogi_vol__walk *w = &ride[i].walk;
+        isogi_hit any;
+        if (!(v.active >> i & 1)) continue;
+        if (!(w->deflated >= w->end)) w->deflate = 0; /* what was skipped behind the last cell lies on one side */
+        isogi_vol__finish(b, ride[i].number, w,
+                          isogi_vol__leaves_inside(w, ride[i].flags, b->hits ? &b->hits[ride[i].number] : &any));
+    }
+}
+
+/* ---- rays in turns ---- */
+
+/* The next ray before ray `end` that goes from node to node gets on; those before it that do not are done with. 0: there is none. */
+static int isogi_vol__ride_begin(isogi_vol__batch *b, isogi_vol__ride *r, size_t *next, size_t end) {
+    while (*next < end) {
         const size_t i = (*next)++;
         isogi_hit any;
         int found = 0;
@@ -6541,22 +6949,37 @@ static int isogi_vol__ride_begin(isogi_vol__batch *b, isogi_vol__ride *r, size_t
     return 0;
 }
 
+/* Sixteen rays at a time that nearly coincide; where they do not, they and the next ones go in turns, each up to where it needs memory,
+   which arrives while the others have theirs: ever more of them each time. */
 ISOGI_VOL__NOINLINE static void isogi_vol__trace_rides(isogi_vol__batch *b) {
-    isogi_vol__ride ride[ISOGI_VOL__RIDES];
-    size_t next = 0;
-    int n = 0, i = 0;
-    while (n < ISOGI_VOL__RIDES && isogi_vol__ride_begin(b, &ride[n], &next)) n++;
-    for (; n; i = i + 1 < n ? i + 1 : 0) {
-        isogi_vol__ride *r = &ride[i];
-        isogi_hit any;
-        const int found = isogi_vol__ride_on(r, 1, b->hits ? &b->hits[r->number] : &any);
-        if (found < 0) continue;
-        isogi_vol__finish(b, r->number, &r->walk,
-                          found || isogi_vol__leaves_inside(&r->walk, r->flags, b->hits ? &b->hits[r->number] : &any));
-        if (!isogi_vol__ride_begin(b, r, &next) && i != --n) *r = ride[n];
+    const int may_coincide = (!b->bundles || b->bundle_count == 1) && !b->pyramid->volume.compact;
+    isogi_vol__ride ride[ISOGI_VOL__CONVOY];
+    size_t next = 0, run = 64;
+    while (next < b->count) {
+        size_t end = b->count;
+        int n = 0, i;
+        while (n < ISOGI_VOL__CONVOY && isogi_vol__ride_begin(b, &ride[n], &next, end)) n++;
+        if (may_coincide && n >= ISOGI_VOL__CONVOY / 4) {
+            if (isogi_vol__coincide_in(ride, n)) {
+                isogi_vol__trace_convoy(b, ride, n);
+                run = 64;
+                continue;
+            }
+            if (end - next > run) end = next + run, run *= 4;
+        }
+        for (i = 0; i < n; i++) isogi_vol__ride_start(&ride[i]);
+        for (i = 0; n; i = i + 1 < n ? i + 1 : 0) {
+            isogi_vol__ride *r = &ride[i];
+            isogi_hit any;
+            const int found = isogi_vol__ride_on(r, 1, b->hits ? &b->hits[r->number] : &any);
+            if (found < 0) continue;
+            isogi_vol__finish(b, r->number, &r->walk,
+                              found || isogi_vol__leaves_inside(&r->walk, r->flags, b->hits ? &b->hits[r->number] : &any));
+            if (isogi_vol__ride_begin(b, r, &next, end)) isogi_vol__ride_start(r);
+            else if (i != --n) *r = ride[n];
+        }
     }
 }
-
 
 #ifdef ISOGI_VOL__AVX
 /* ---- sixteen rays side by side ---- */
@@ -6567,8 +6990,6 @@ ISOGI_VOL__NOINLINE static void isogi_vol__trace_rides(isogi_vol__batch *b) {
    with; a cell in doubt is left to the times and numbers in double that a pool goes by, by which a ray may only have come near: hits are
    the same. What a ray's side is comes from there alone, since cells that it comes near may be out of its order. All rays fall along the
    same axes and count backwards there, so one order of children suits them all. */
-#define ISOGI_VOL__REACH 4e-6f /* times below are sums of a few numbers up to 4 children, with errors below 1e-6 */
-
 typedef struct __attribute__((aligned(64))) isogi_vol__layers {
     __m512 per[3], first[3], last[3], stop; /* from somewhere on, the rays enter layer i of cells at i per - first,
                                                leave it at (i + 1) per - last */
@@ -6811,13 +7232,13 @@ ISOGI_VOL__AVX512 static int isogi_vol__coincide(const isogi_vol__pool *s, unsig
 
 /* The beam that holds all rays of a packet: along the axis on which they are fastest, bounds of their places on the next two axes, linear
    between its ends. (The least of linear functions lies above its chord.) */
-typedef struct __attribute__((aligned(64))) isogi_vol__beam {
+typedef struct __attribute__((aligned(64))) isogi_vol__wide_beam {
     float base[16], slope[16];                 /* lower bounds on the next axis at 0, on the one after it at 4, then upper ones */
     float from, to;                            /* on the main axis */
     int axis, side[2];
     const int32_t (*main[2])[16], (*other[2])[16]; /* layers of children in 16 lanes, of both pairs of axes */
     uint64_t places[2], copies[2];             /* where children are whose two layers a lane stands for */
-} isogi_vol__beam;
+} isogi_vol__wide_beam;
 
 /* The largest of each of eight vectors: of the first four in lane 0 of a row of four each, of the others in lane 1. */
 ISOGI_VOL__AVX512 ISOGI_VOL__INLINE __m512 isogi_vol__largest_of(const __m512 v[8]) {
@@ -6834,7 +7255,7 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE __m512 isogi_vol__largest_of(const __m512 v[
     return _mm512_max_ps(eight, _mm512_permute_ps(eight, 0x4e));
 }
 
-ISOGI_VOL__AVX512 ISOGI_VOL__INLINE void isogi_vol__set_beam(isogi_vol__beam *beam, const isogi_vol__packet *k,
+ISOGI_VOL__AVX512 ISOGI_VOL__INLINE void isogi_vol__set_beam(isogi_vol__wide_beam *beam, const isogi_vol__packet *k,
                                                                 const struct isogi_vol__ways *ways, unsigned rays) {
     static const int after[5] = {0, 1, 2, 0, 1};
     static const uint64_t places[3] = {0xffff, 0x000f000f000f000fu, 0x1111111111111111u}, copies[3] = {0x0001000100010001u, 0x1111, 0xf};
@@ -6868,7 +7289,7 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE void isogi_vol__set_beam(isogi_vol__beam *be
 }
 
 /* Children of a node of level n that the beam may meet; cell: its corner, counted backwards. */
-ISOGI_VOL__AVX512 ISOGI_VOL__INLINE uint64_t isogi_vol__in_beam(const isogi_vol__beam *beam, const struct isogi_vol__ways *ways, int n,
+ISOGI_VOL__AVX512 ISOGI_VOL__INLINE uint64_t isogi_vol__in_beam(const isogi_vol__wide_beam *beam, const struct isogi_vol__ways *ways, int n,
                                                                 int64_t cell) {
     const __m512i corner = _mm512_castsi128_si512(_mm_cvtsi64_si128(cell));
     const __m512 size = _mm512_set1_ps(ways->size[n]), from = _mm512_set1_ps(beam->from), to = _mm512_set1_ps(beam->to);
@@ -6965,7 +7386,7 @@ ISOGI_VOL__AVX512 ISOGI_VOL__NOINLINE static void isogi_vol__trace_packet(isogi_
     uint64_t left[ISOGI_VOL__NODE_LEVELS];
     unsigned met[ISOGI_VOL__NODE_LEVELS], lanes = rays, pending = 0;
     isogi_vol__packet *packet = &s->of.packet;
-    isogi_vol__beam beam;
+    isogi_vol__wide_beam beam;
     isogi_vol__known known;
     int64_t cell = 0; /* corner of the node, counted backwards */
     int n = p->node_levels - 1;
@@ -9588,7 +10009,6 @@ ISOGI_API void isogi_vol_mesh_free(const isogi_pyramid *pyramid, isogi_mesh *mes
 #undef ISOGI_VOL__ADD
 #undef ISOGI_VOL__ALL64
 #undef ISOGI_VOL__CODES
-#undef ISOGI_VOL__RIDES
 #undef ISOGI_VOL__DOUBT
 #undef ISOGI_VOL__MUL
 #undef ISOGI_VOL__NEAR
@@ -9680,6 +10100,9 @@ ISOGI_API void isogi_vol_mesh_free(const isogi_pyramid *pyramid, isogi_mesh *mes
 #undef ISOGI_VOL__NOINLINE
 #undef ISOGI_VOL__UNLIKELY
 #undef ISOGI_VOL__PREFETCH
+#undef ISOGI_VOL__PRAGMA
+#undef ISOGI_VOL__UNROLL
+#undef ISOGI_VOL__CONVOY
 #undef ISOGI_VOL__SSE2
 #undef ISOGI_VOL__UNLIMITED
 #undef ISOGI_VOL__ON_SURFACE
