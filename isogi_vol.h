@@ -6695,13 +6695,29 @@ static void isogi_vol__set_convoy(isogi_vol__convoy *v, isogi_vol__ride *ride, i
     for (a = 0, v->axis = axis; a < 8; a++) v->corner[a] = (uint8_t)isogi_vol__leaf_corner(a ^ c->octant);
 }
 
+/* Corners of a cell relative to the isovalue, the largest of them 1, counted backwards likewise. 1: it has some on both sides; 2, 4: all of
+   it is inside, outside; 0: nothing is certain. */
+#define ISOGI_VOL__UNSURE 4e-5f /* more than what a cell's width times REACH, and rounding, change a value by */
+static int isogi_vol__convoy_corners(const isogi_vol__convoy *v, const int32_t cell[4], float f[8]) {
+    const isogi_vol__walk *w = &v->lead.walk;
+    double corner[8], most = DBL_MIN;
+    int at[3], i, low = 0, high = 0;
+    for (i = 0; i < 3; i++) at[i] = cell[i];
+    if (!isogi_vol__corners(w->pyramid, at, w->isovalue, corner)) return 0;
+    for (i = 0; i < 8; i++) most = isogi_vol__max(most, fabs(corner[i]));
+    for (i = 0; i < 8; i++) f[i] = (float)(corner[i ^ v->lead.trip.octant] / most);
+    for (i = 0; i < 8; i++) low += corner[i] < 0, high += corner[i] >= 0;
+    return low == 8 ? 4 : high == 8 ? 2 : 1;
+}
+
 /* The same by every path, four or eight rays at once.
    convoy_layers: the layers of cells of a leaf, from where the rays come to its first plane on the axis on which they are fastest: rays
    that meet it are then next to it, and their places in cells are exact. Loops that compilers can make vectors of.
    convoy_span: when rays enter and leave a box; low: its corner; size: of its sides; in, out: begin and finish, or first and last.
    convoy_meets: which rays meet the node at the beam's corner, or come near it; size: of its sides.
    convoy_sides: which of the rays `met` pass a cell of a leaf or come near it, and for which of them it is certain that they are inside, or
-   outside, all along, as told has it; layer: the cell's place; f: its corners; bound: of what is certain, and three times these.
+   outside, all along, as told has it; layer: the cell's place; f: its corners, or NULL; bound: of what is certain, and three times these.
+   convoy_look: the same from the leaf's voxels, or where there is none from the volume's; here: the cell's number, not counted backwards.
    convoy_within: which rays certainly pass it, of those that were said to.
    convoy_leaf: goes through cells of a leaf, those of lead.
    convoy_on: all rays to their hits or ends. */
@@ -6780,8 +6796,8 @@ static void isogi_vol__set_convoy(isogi_vol__convoy *v, isogi_vol__ride *ride, i
             if (!lanes) continue; \
             isogi_vol__convoy_span_##path(v, i, layer, 1, v->first, v->last, &enter, &leave); \
             lanes &= isogi_vol__at_most_##path(enter, leave); \
-            if (!lanes) continue; \
             passed |= lanes << i; \
+            if (!lanes || !f) continue; \
             ISOGI_VOL__UNROLL(3) \
             for (a = 0; a < 3; a++) { \
                 const isogi_vol__wide_##path rate = ISOGI_VOL__WIDE_##path(loadu_ps)(v->rate[a] + i); \
@@ -6821,23 +6837,38 @@ static void isogi_vol__set_convoy(isogi_vol__convoy *v, isogi_vol__ride *ride, i
         *inside = in, *outside = out; \
         return passed; \
     } \
+    target ISOGI_VOL__INLINE unsigned isogi_vol__convoy_look_##path(const isogi_vol__convoy *v, unsigned met, const float layer[3], \
+                                                                   int here, const int32_t cell[4], unsigned *in, unsigned *out) { \
+        const isogi_vol__leaf *leaf = &v->lead.leaf; \
+        float f[8], bound[4]; \
+        int i; \
+        if (leaf->code) { \
+            const uint8_t *code = leaf->code + (here & 3) + 5 * (here >> 2 & 3) + 25 * (here >> 4); \
+            bound[0] = leaf->isovalue - ISOGI_VOL__DOUBT, bound[1] = leaf->isovalue + ISOGI_VOL__DOUBT; \
+            bound[2] = 3 * bound[0], bound[3] = 3 * bound[1]; \
+            ISOGI_VOL__UNROLL(8) \
+            for (i = 0; i < 8; i++) f[i] = code[v->corner[i]]; \
+            return isogi_vol__convoy_sides_##path(v, met, layer, f, bound, in, out); \
+        } \
+        met = isogi_vol__convoy_sides_##path(v, met, layer, NULL, bound, in, out); \
+        i = met ? isogi_vol__convoy_corners(v, cell, f) : 0; \
+        *in = i == 2 ? met : 0, *out = i == 4 ? met : 0; \
+        bound[0] = -ISOGI_VOL__UNSURE, bound[1] = ISOGI_VOL__UNSURE, bound[2] = 3 * bound[0], bound[3] = 3 * bound[1]; \
+        return i == 1 ? isogi_vol__convoy_sides_##path(v, met, layer, f, bound, in, out) : met; \
+    } \
     target static void isogi_vol__convoy_leaf_##path(isogi_vol__convoy *v, isogi_vol__batch *b, unsigned met) { \
         const isogi_vol__ride *lead = &v->lead; \
-        const float low = lead->leaf.isovalue - ISOGI_VOL__DOUBT, high = lead->leaf.isovalue + ISOGI_VOL__DOUBT; \
-        const float bound[4] = {low, high, 3 * low, 3 * high}; \
         uint64_t cells = lead->trip.cells; \
         isogi_vol__convoy_layers_##path(v, v->beam.corner); \
         for (; cells && met & v->active; cells &= cells - 1) { \
             const int child = isogi_vol__lowest_bit(cells), here = child ^ lead->trip.flip; \
-            const uint8_t *code = lead->leaf.code + (here & 3) + 5 * (here >> 2 & 3) + 25 * (here >> 4); \
             unsigned in, out, same, passed, found; \
-            float layer[3], f[8]; \
+            float layer[3]; \
             int32_t cell[4]; \
             int i; \
             layer[0] = (float)(child & 3), layer[1] = (float)(child >> 2 & 3), layer[2] = (float)(child >> 4); \
-            ISOGI_VOL__UNROLL(8) \
-            for (i = 0; i < 8; i++) f[i] = code[v->corner[i]]; \
-            passed = isogi_vol__convoy_sides_##path(v, met & v->active, layer, f, bound, &in, &out); \
+            isogi_vol__child_place(cell, lead->trip.place[0], lead->walk.pyramid->ways->inner[here]); \
+            passed = isogi_vol__convoy_look_##path(v, met & v->active, layer, here, cell, &in, &out); \
             found = (in | out) & ~(v->inside | v->outside | v->leaving); \
             if (found) { \
                 found &= isogi_vol__convoy_within_##path(v, layer); \
@@ -6849,10 +6880,7 @@ static void isogi_vol__set_convoy(isogi_vol__convoy *v, isogi_vol__ride *ride, i
             } \
             same = (in & v->inside) | (out & v->outside); \
             b->work.cells += isogi_vol__count_bits(same); \
-            passed &= ~same; \
-            if (!passed) continue; \
-            isogi_vol__child_place(cell, lead->trip.place[0], lead->walk.pyramid->ways->inner[here]); \
-            for (; passed; passed &= passed - 1) { \
+            for (passed &= ~same; passed; passed &= passed - 1) { \
                 isogi_vol__ride *r = &v->ride[i = isogi_vol__lowest_bit(passed)]; \
                 isogi_vol__trip *c = &r->trip; \
                 double begin, end; \
@@ -6952,7 +6980,7 @@ static int isogi_vol__ride_begin(isogi_vol__batch *b, isogi_vol__ride *r, size_t
 /* Sixteen rays at a time that nearly coincide; where they do not, they and the next ones go in turns, each up to where it needs memory,
    which arrives while the others have theirs: ever more of them each time. */
 ISOGI_VOL__NOINLINE static void isogi_vol__trace_rides(isogi_vol__batch *b) {
-    const int may_coincide = (!b->bundles || b->bundle_count == 1) && !b->pyramid->volume.compact;
+    const int may_coincide = !b->bundles || b->bundle_count == 1;
     isogi_vol__ride ride[ISOGI_VOL__CONVOY];
     size_t next = 0, run = 64;
     while (next < b->count) {
@@ -8377,7 +8405,7 @@ static isogi_result isogi_vol__trace(isogi_vol__batch *b, size_t count, isogi_co
     size_t i = 0;
     b->count = count;
 #ifdef ISOGI_VOL__AVX
-    if (isogi_vol__is_wide(b->pyramid) && (count > 3 || b->pyramid->context.force_path == ISOGI_VOL__PATH_AVX512))
+    if (isogi_vol__is_wide(b->pyramid) && count && (count > 3 || b->pyramid->context.force_path == ISOGI_VOL__PATH_AVX512))
         isogi_vol__trace_pool(b, count), i = count;
     else
 #endif
@@ -10103,6 +10131,7 @@ ISOGI_API void isogi_vol_mesh_free(const isogi_pyramid *pyramid, isogi_mesh *mes
 #undef ISOGI_VOL__PRAGMA
 #undef ISOGI_VOL__UNROLL
 #undef ISOGI_VOL__CONVOY
+#undef ISOGI_VOL__UNSURE
 #undef ISOGI_VOL__SSE2
 #undef ISOGI_VOL__UNLIMITED
 #undef ISOGI_VOL__ON_SURFACE

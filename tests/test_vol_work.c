@@ -248,7 +248,7 @@ static void go_onward(const isogi_pyramid *p, const isogi_hit *hits, int count, 
 
 /* Rays side by side, as those of neighbouring pixels, may go together: they hit what each of them hits alone, with the same bits, on every
    path, kind of grid, direction and border. Some run in lattice planes, along axes, out of corners; some end within the volume, some begin
-   on a surface, all in one direction; some volumes have holes. */
+   on a surface, all in one direction; some volumes have holes, some are compact. */
 TEST(rays_side_by_side_hit_what_they_hit_alone) {
     enum { TURNS = 600, MOST = ABREAST };
     test_random r = {11};
@@ -270,7 +270,7 @@ TEST(rays_side_by_side_hit_what_they_hit_alone) {
                 smooth ? sin(0.4 * smooth * x + 1) + cos(0.37 * smooth * y + turn) * sin(0.3 * smooth * z) : random_range(&r, -1, 1);
             data[i] = holes && random_bits(&r) % 64 == 0 ? NAN : (float)(levels ? floor(4 * v) / 4 : v);
         }
-        volume.data = data;
+        volume.data = data, volume.compact = turn % 5 == 4;
         isogi_pyramid *p, *plain;
         isogi_context context = {.threads = 1, .force_path = path}, slow = {.threads = 1, .force_path = 2};
         CHECK(isogi_vol_build(&p, &volume, &context) == ISOGI_OK && isogi_vol_build(&plain, &volume, &slow) == ISOGI_OK, "build");
