@@ -73,16 +73,16 @@
    their hull rejects most cells without solving anything; else the first root is bracketed between extrema and refined by Newton
    steps that never leave the bracket. A walk carries the side it is on from cell to cell, and any change of side is a hit: that is
    why nothing leaks through the faces that cells share.
-   Batches go through a pool of 64 rays, eight to an instruction where there is AVX-512, so hand over many at a time: from 64 on
-   all rays are faster than alone (twice to four times), from 500 on nothing is left to gain. There, rays of one isovalue that
-   nearly coincide, up to sixteen in a row as in a tile of pixels, go as one and are faster still; rays that follow each other from
-   one place come down to its leaf together, and where they are many (12 from a surface, 48 from elsewhere), they pass the cells
-   round it at once, as far as slopes there let none of them meet the surface; and where any hit will do, a ray is done once it is
-   known to pass a block that lies inside and one that lies outside. Without AVX-512 eight rays of a batch take turns, each up to
-   where it reads memory. Everywhere cells are looked at in float first, from 8-bit voxels that lie together in two cache lines for
-   4x4x4 cells, with an error bound: what is certain needs nothing else, and only cells in doubt, the hits and one cell for every
-   25 rays besides, read your voxels and are solved in double. Of compact volumes there are no such voxels: rays take turns as
-   without AVX-512, and read yours in every cell that they pass in blocks that hold the isovalue.
+   Hand over many rays at a time. Those of one isovalue that nearly coincide, up to sixteen in a row as in a tile of pixels, go as one,
+   twice to five times as fast as alone. Others go through a pool of 64, eight to an instruction, where there is AVX-512: from 64 on
+   all are faster than alone (twice to four times), from 500 on nothing is left to gain. There, rays that follow each other from one
+   place come down to its leaf together, and where they are many (12 from a surface, 48 from elsewhere), they pass the cells round
+   it at once, as far as slopes there let none of them meet the surface; and where any hit will do, a ray is done once it is known to
+   pass a block that lies inside and one that lies outside. Without AVX-512 sixteen rays of a batch take turns, each up to where it
+   reads memory. Everywhere cells are looked at in float first, from 8-bit voxels that lie together in two cache lines for 4x4x4
+   cells, with an error bound: what is certain needs nothing else, and only cells in doubt, the hits and one cell for every 25 rays
+   besides, read your voxels and are solved in double. Of compact volumes there are no such voxels: rays go as without AVX-512, and
+   read yours in every cell that they pass in blocks that hold the isovalue.
 
    History  1.0  first release
 */
@@ -241,8 +241,8 @@ typedef struct isogi_volume {
     size_t first[3], halo_low[3], halo_high[3];
     int compact; /* not 0: a pyramid keeps bounds alone, in 1/5 byte for every voxel instead of 2.2, and is built in half the time. Rays
                     have the same hits, but look at four times as many cells, read the voxels of each, and do without AVX-512: where
-                    there is that, single ones take twice as long, batches five times, and those of a picture ten times; else half as
-                    long again. Nothing but rays is slower. 0: for speed */
+                    there is that, single ones take twice as long, batches five times; else up to two thirds as long again. Nothing
+                    but rays is slower. 0: for speed */
 } isogi_volume;
 
 ISOGI_API isogi_result isogi_volume_validate(const isogi_volume *volume);
@@ -4843,9 +4843,7 @@ ISOGI_VOL__INLINE void isogi_vol__trip_layers(isogi_vol__trip *c, const struct i
     const isogi_vol__four last = ISOGI_VOL__FOUR(set1_ps)(c->last), zero = ISOGI_VOL__FOUR(set1_ps)(0);
     const float size = ways->size[n], wide = size + 4 * ways->reach, *layer = ways->within[c->child];
     int a;
-#ifdef __GNUC__
-#pragma GCC unroll 4
-#endif
+    ISOGI_VOL__UNROLL(3)
     for (a = 0; a < 3; a++) {
         const isogi_vol__four step = ISOGI_VOL__FOUR(set1_ps)(c->cell[a] * size), begin = ISOGI_VOL__FOUR(set1_ps)(c->enter[n][a]);
         const isogi_vol__four layers = ISOGI_VOL__FOUR(loadu_ps)(layer + 4 * a);
@@ -5026,8 +5024,8 @@ static int isogi_vol__passes_base(isogi_vol__ride *r, const int32_t cell[4], dou
     } \
     target static int isogi_vol__ride_on_##path(isogi_vol__ride *r, int waits, isogi_hit *hit) { \
         isogi_vol__trip *c = &r->trip; \
-        if (c->low > c->high) return 0; \
-        do { \
+        if (c->low > c->high) r->open = NULL; /* all is on one side */ \
+        else do { \
             if (r->open) isogi_vol__trip_open_##path(r, NULL); \
             while (c->cells) { \
                 const int found = isogi_vol__trip_cell_##path(r, hit); \
@@ -6483,7 +6481,10 @@ ISOGI_VOL__AVX512 static int isogi_vol__walk_one(isogi_vol__walk *w, isogi_hit *
     int n = p->node_levels - 1, child = 0, found = 0, here;
     isogi_vol__course c;
     if (!isogi_vol__set_course(&c, w)) return -1;
-    if (c.low > c.high) return 0;
+    if (c.low > c.high) {
+        w->deflate = 0; /* all is on one side */
+        return 0;
+    }
     place[n] = _mm_setzero_si128();
     for (;;) {
         uint64_t mask = isogi_vol__way(&c, ways, n, child) & isogi_vol__held(ways, c.octant, c.low, c.high, node);
@@ -6611,7 +6612,7 @@ typedef struct isogi_vol__convoy {
 } isogi_vol__convoy;
 
 /* Whether all fall along the same axes, have one isovalue, and are not far apart. */
-static int isogi_vol__coincide_in(const isogi_vol__ride *ride, int count) {
+static int isogi_vol__rides_coincide(const isogi_vol__ride *ride, int count) {
     const isogi_vol__walk *first = &ride[0].walk;
     const double most = isogi_vol__largest(first->dir[0], first->dir[1], first->dir[2]);
     int i, a;
@@ -6627,9 +6628,10 @@ static int isogi_vol__coincide_in(const isogi_vol__ride *ride, int count) {
 
 /* The beam: on each of the two other axes all rays lie between two lines, which go through the bounds of their places where the first ray
    begins and where the last one ends. (The largest of linear functions lies below its chord.) */
-static void isogi_vol__set_beam_of(isogi_vol__convoy *v, int axis, double padded) {
+static void isogi_vol__set_beam(isogi_vol__convoy *v, double padded) {
     isogi_vol__beam *beam = &v->beam;
     const double slack = 2e-6 * padded; /* floats are off by less than half of this */
+    const int axis = v->axis;
     double from = v->place[axis][0], to = from, length;
     int a, i;
     for (i = 0; i < v->count; i++)
@@ -6675,7 +6677,7 @@ static void isogi_vol__set_convoy(isogi_vol__convoy *v, isogi_vol__ride *ride, i
     const double padded = 1 << 2 * levels;
     const float reach = (float)(1e-6 * padded); /* floats are off by half of this, of what the root measures */
     int i, a;
-    v->ride = ride, v->count = count, v->lead = ride[0];
+    v->ride = ride, v->count = count, v->axis = axis, v->lead = ride[0];
     isogi_vol__ride_start(&v->lead);
     v->active = (1u << count) - 1, v->inside = v->outside = v->leaving = 0;
     for (i = 0; i < ISOGI_VOL__CONVOY; i++) {
@@ -6691,23 +6693,23 @@ static void isogi_vol__set_convoy(isogi_vol__convoy *v, isogi_vol__ride *ride, i
         v->stop[i] = w->end * most, v->end[i] = (float)(v->stop[i] * 1.000001);
         if (i < count) isogi_vol__take_side(v, w, i);
     }
-    isogi_vol__set_beam_of(v, axis, padded);
-    for (a = 0, v->axis = axis; a < 8; a++) v->corner[a] = (uint8_t)isogi_vol__leaf_corner(a ^ c->octant);
+    isogi_vol__set_beam(v, padded);
+    for (a = 0; a < 8; a++) v->corner[a] = (uint8_t)isogi_vol__leaf_corner(a ^ c->octant);
 }
 
-/* Corners of a cell relative to the isovalue, the largest of them 1, counted backwards likewise. 1: it has some on both sides; 2, 4: all of
-   it is inside, outside; 0: nothing is certain. */
+/* Corners of a cell relative to the isovalue, the largest of them 1, counted backwards likewise. 1: all of it is inside; 0: outside; -1: it
+   has some on both sides. Rays are fast where all voxels are finite. */
 #define ISOGI_VOL__UNSURE 4e-5f /* more than what a cell's width times REACH, and rounding, change a value by */
 static int isogi_vol__convoy_corners(const isogi_vol__convoy *v, const int32_t cell[4], float f[8]) {
     const isogi_vol__walk *w = &v->lead.walk;
     double corner[8], most = DBL_MIN;
-    int at[3], i, low = 0, high = 0;
+    int at[3], i, inside = 0;
     for (i = 0; i < 3; i++) at[i] = cell[i];
-    if (!isogi_vol__corners(w->pyramid, at, w->isovalue, corner)) return 0;
+    isogi_vol__corners(w->pyramid, at, w->isovalue, corner);
     for (i = 0; i < 8; i++) most = isogi_vol__max(most, fabs(corner[i]));
     for (i = 0; i < 8; i++) f[i] = (float)(corner[i ^ v->lead.trip.octant] / most);
-    for (i = 0; i < 8; i++) low += corner[i] < 0, high += corner[i] >= 0;
-    return low == 8 ? 4 : high == 8 ? 2 : 1;
+    for (i = 0; i < 8; i++) inside += corner[i] >= 0;
+    return inside == 8 ? 1 : inside ? -1 : 0;
 }
 
 /* The same by every path, four or eight rays at once.
@@ -6716,7 +6718,8 @@ static int isogi_vol__convoy_corners(const isogi_vol__convoy *v, const int32_t c
    convoy_span: when rays enter and leave a box; low: its corner; size: of its sides; in, out: begin and finish, or first and last.
    convoy_meets: which rays meet the node at the beam's corner, or come near it; size: of its sides.
    convoy_sides: which of the rays `met` pass a cell of a leaf or come near it, and for which of them it is certain that they are inside, or
-   outside, all along, as told has it; layer: the cell's place; f: its corners, or NULL; bound: of what is certain, and three times these.
+   outside, all along, as told has it (on the bounds themselves, too: they are wider than errors); layer: the cell's place; f: its corners,
+   or NULL; bound: of what is certain, and three times these.
    convoy_look: the same from the leaf's voxels, or where there is none from the volume's; here: the cell's number, not counted backwards.
    convoy_within: which rays certainly pass it, of those that were said to.
    convoy_leaf: goes through cells of a leaf, those of lead.
@@ -6852,9 +6855,9 @@ static int isogi_vol__convoy_corners(const isogi_vol__convoy *v, const int32_t c
         } \
         met = isogi_vol__convoy_sides_##path(v, met, layer, NULL, bound, in, out); \
         i = met ? isogi_vol__convoy_corners(v, cell, f) : 0; \
-        *in = i == 2 ? met : 0, *out = i == 4 ? met : 0; \
+        *in = i > 0 ? met : 0, *out = i ? 0 : met; \
         bound[0] = -ISOGI_VOL__UNSURE, bound[1] = ISOGI_VOL__UNSURE, bound[2] = 3 * bound[0], bound[3] = 3 * bound[1]; \
-        return i == 1 ? isogi_vol__convoy_sides_##path(v, met, layer, f, bound, in, out) : met; \
+        return i < 0 ? isogi_vol__convoy_sides_##path(v, met, layer, f, bound, in, out) : met; \
     } \
     target static void isogi_vol__convoy_leaf_##path(isogi_vol__convoy *v, isogi_vol__batch *b, unsigned met) { \
         const isogi_vol__ride *lead = &v->lead; \
@@ -6988,7 +6991,7 @@ ISOGI_VOL__NOINLINE static void isogi_vol__trace_rides(isogi_vol__batch *b) {
         int n = 0, i;
         while (n < ISOGI_VOL__CONVOY && isogi_vol__ride_begin(b, &ride[n], &next, end)) n++;
         if (may_coincide && n >= ISOGI_VOL__CONVOY / 4) {
-            if (isogi_vol__coincide_in(ride, n)) {
+            if (isogi_vol__rides_coincide(ride, n)) {
                 isogi_vol__trace_convoy(b, ride, n);
                 run = 64;
                 continue;
@@ -7231,7 +7234,7 @@ ISOGI_VOL__AVX512 static unsigned isogi_vol__settle(isogi_vol__batch *b, isogi_v
 }
 
 /* Whether the rays in a pool's first slots nearly coincide. */
-ISOGI_VOL__AVX512 static int isogi_vol__coincide(const isogi_vol__pool *s, unsigned rays) {
+ISOGI_VOL__AVX512 static int isogi_vol__seats_coincide(const isogi_vol__pool *s, unsigned rays) {
     const int first = __builtin_ctz(rays);
     double most = 0;
     int a, h;
@@ -7260,13 +7263,13 @@ ISOGI_VOL__AVX512 static int isogi_vol__coincide(const isogi_vol__pool *s, unsig
 
 /* The beam that holds all rays of a packet: along the axis on which they are fastest, bounds of their places on the next two axes, linear
    between its ends. (The least of linear functions lies above its chord.) */
-typedef struct __attribute__((aligned(64))) isogi_vol__wide_beam {
+typedef struct __attribute__((aligned(64))) isogi_vol__packet_beam {
     float base[16], slope[16];                 /* lower bounds on the next axis at 0, on the one after it at 4, then upper ones */
     float from, to;                            /* on the main axis */
     int axis, side[2];
     const int32_t (*main[2])[16], (*other[2])[16]; /* layers of children in 16 lanes, of both pairs of axes */
     uint64_t places[2], copies[2];             /* where children are whose two layers a lane stands for */
-} isogi_vol__wide_beam;
+} isogi_vol__packet_beam;
 
 /* The largest of each of eight vectors: of the first four in lane 0 of a row of four each, of the others in lane 1. */
 ISOGI_VOL__AVX512 ISOGI_VOL__INLINE __m512 isogi_vol__largest_of(const __m512 v[8]) {
@@ -7283,7 +7286,7 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE __m512 isogi_vol__largest_of(const __m512 v[
     return _mm512_max_ps(eight, _mm512_permute_ps(eight, 0x4e));
 }
 
-ISOGI_VOL__AVX512 ISOGI_VOL__INLINE void isogi_vol__set_beam(isogi_vol__wide_beam *beam, const isogi_vol__packet *k,
+ISOGI_VOL__AVX512 ISOGI_VOL__INLINE void isogi_vol__set_packet_beam(isogi_vol__packet_beam *beam, const isogi_vol__packet *k,
                                                                 const struct isogi_vol__ways *ways, unsigned rays) {
     static const int after[5] = {0, 1, 2, 0, 1};
     static const uint64_t places[3] = {0xffff, 0x000f000f000f000fu, 0x1111111111111111u}, copies[3] = {0x0001000100010001u, 0x1111, 0xf};
@@ -7317,8 +7320,8 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE void isogi_vol__set_beam(isogi_vol__wide_bea
 }
 
 /* Children of a node of level n that the beam may meet; cell: its corner, counted backwards. */
-ISOGI_VOL__AVX512 ISOGI_VOL__INLINE uint64_t isogi_vol__in_beam(const isogi_vol__wide_beam *beam, const struct isogi_vol__ways *ways, int n,
-                                                                int64_t cell) {
+ISOGI_VOL__AVX512 ISOGI_VOL__INLINE uint64_t isogi_vol__in_beam(const isogi_vol__packet_beam *beam, const struct isogi_vol__ways *ways,
+                                                                int n, int64_t cell) {
     const __m512i corner = _mm512_castsi128_si512(_mm_cvtsi64_si128(cell));
     const __m512 size = _mm512_set1_ps(ways->size[n]), from = _mm512_set1_ps(beam->from), to = _mm512_set1_ps(beam->to);
     uint64_t met[2];
@@ -7414,13 +7417,13 @@ ISOGI_VOL__AVX512 ISOGI_VOL__NOINLINE static void isogi_vol__trace_packet(isogi_
     uint64_t left[ISOGI_VOL__NODE_LEVELS];
     unsigned met[ISOGI_VOL__NODE_LEVELS], lanes = rays, pending = 0;
     isogi_vol__packet *packet = &s->of.packet;
-    isogi_vol__wide_beam beam;
+    isogi_vol__packet_beam beam;
     isogi_vol__known known;
     int64_t cell = 0; /* corner of the node, counted backwards */
     int n = p->node_levels - 1;
     known.active = rays, known.doubts = known.hits = known.alone = known.in = known.out = known.seen_in = known.seen_out = 0;
     isogi_vol__set_packet(packet, s, first, backwards, p->node_levels);
-    isogi_vol__set_beam(&beam, packet, ways, rays);
+    isogi_vol__set_packet_beam(&beam, packet, ways, rays);
     for (;;) {
         /* a node is opened */
         uint64_t mask = isogi_vol__in_beam(&beam, ways, n, cell);
@@ -8378,7 +8381,7 @@ ISOGI_VOL__AVX512 static void isogi_vol__trace_pool(isogi_vol__batch *b, size_t 
             rays = isogi_vol__seat_packet(b, &s, next, n);
             next += (size_t)n;
             if (!rays) continue;
-            if (__builtin_popcount(rays) >= ISOGI_VOL__PACKET / 4 && isogi_vol__coincide(&s, rays)) {
+            if (__builtin_popcount(rays) >= ISOGI_VOL__PACKET / 4 && isogi_vol__seats_coincide(&s, rays)) {
                 isogi_vol__trace_packet(b, &s, rays);
                 run = ISOGI_VOL__POOL;
                 continue;
