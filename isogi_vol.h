@@ -6715,7 +6715,8 @@ static int isogi_vol__convoy_corners(const isogi_vol__convoy *v, const int32_t c
 /* The same by every path, four or eight rays at once.
    convoy_layers: the layers of cells of a leaf, from where the rays come to its first plane on the axis on which they are fastest: rays
    that meet it are then next to it, and their places in cells are exact. Loops that compilers can make vectors of.
-   convoy_span: when rays enter and leave a box; low: its corner; size: of its sides; in, out: begin and finish, or first and last.
+   convoy_span: when rays enter and leave a box; low: its corner; size: of its sides; in, out: begin and finish, or first and last; i: the
+   first of the rays.
    convoy_meets: which rays meet the node at the beam's corner, or come near it; size: of its sides.
    convoy_sides: which of the rays `met` pass a cell of a leaf or come near it, and for which of them it is certain that they are inside, or
    outside, all along, as told has it (on the bounds themselves, too: they are wider than errors); layer: the cell's place; f: its corners,
@@ -6744,8 +6745,8 @@ static int isogi_vol__convoy_corners(const isogi_vol__convoy *v, const int32_t c
         } \
     } \
     target ISOGI_VOL__INLINE void isogi_vol__convoy_span_##path( \
-        const isogi_vol__convoy *v, int i, const float low[3], float size, const float (*in)[ISOGI_VOL__CONVOY], \
-        const float (*out)[ISOGI_VOL__CONVOY], isogi_vol__wide_##path *enter, isogi_vol__wide_##path *leave) { \
+        const isogi_vol__convoy *v, const float low[3], float size, const float (*in)[ISOGI_VOL__CONVOY], \
+        const float (*out)[ISOGI_VOL__CONVOY], isogi_vol__wide_##path *enter, isogi_vol__wide_##path *leave, int i) { \
         int a; \
         ISOGI_VOL__UNROLL(3) \
         for (a = 0; a < 3; a++) { \
@@ -6764,7 +6765,7 @@ static int isogi_vol__convoy_corners(const isogi_vol__convoy *v, const int32_t c
         ISOGI_VOL__UNROLL(4) \
         for (i = 0; i < ISOGI_VOL__CONVOY; i += ISOGI_VOL__LANES_##path) { \
             isogi_vol__wide_##path enter = ISOGI_VOL__WIDE_##path(set1_ps)(0), leave = ISOGI_VOL__WIDE_##path(loadu_ps)(v->end + i); \
-            isogi_vol__convoy_span_##path(v, i, v->beam.corner, size, v->begin, v->finish, &enter, &leave); \
+            isogi_vol__convoy_span_##path(v, v->beam.corner, size, v->begin, v->finish, &enter, &leave, i); \
             lanes |= isogi_vol__at_most_##path(enter, leave) << i; \
         } \
         return lanes; \
@@ -6774,7 +6775,7 @@ static int isogi_vol__convoy_corners(const isogi_vol__convoy *v, const int32_t c
         int i; \
         for (i = 0; i < ISOGI_VOL__CONVOY; i += ISOGI_VOL__LANES_##path) { \
             isogi_vol__wide_##path enter = ISOGI_VOL__WIDE_##path(set1_ps)(0), leave = ISOGI_VOL__WIDE_##path(loadu_ps)(v->left + i); \
-            isogi_vol__convoy_span_##path(v, i, layer, 1, v->last, v->first, &enter, &leave); \
+            isogi_vol__convoy_span_##path(v, layer, 1, v->last, v->first, &enter, &leave, i); \
             enter = ISOGI_VOL__WIDE_##path(add_ps)(enter, ISOGI_VOL__WIDE_##path(set1_ps)(1e-5f)); \
             lanes |= isogi_vol__at_most_##path(enter, leave) << i; \
         } \
@@ -6797,7 +6798,7 @@ static int isogi_vol__convoy_corners(const isogi_vol__convoy *v, const int32_t c
             isogi_vol__wide_##path c[2][4], value[2][2][2], sum1, sum2; \
             unsigned lanes = met >> i & ((1u << ISOGI_VOL__LANES_##path) - 1); \
             if (!lanes) continue; \
-            isogi_vol__convoy_span_##path(v, i, layer, 1, v->first, v->last, &enter, &leave); \
+            isogi_vol__convoy_span_##path(v, layer, 1, v->first, v->last, &enter, &leave, i); \
             lanes &= isogi_vol__at_most_##path(enter, leave); \
             passed |= lanes << i; \
             if (!lanes || !f) continue; \
