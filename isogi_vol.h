@@ -5024,8 +5024,8 @@ static int isogi_vol__passes_base(isogi_vol__ride *r, const int32_t cell[4], dou
     } \
     target static int isogi_vol__ride_on_##path(isogi_vol__ride *r, int waits, isogi_hit *hit) { \
         isogi_vol__trip *c = &r->trip; \
-        if (c->low > c->high) r->open = NULL; /* all is on one side */ \
-        else do { \
+        if (c->low > c->high) return 0; \
+        do { \
             if (r->open) isogi_vol__trip_open_##path(r, NULL); \
             while (c->cells) { \
                 const int found = isogi_vol__trip_cell_##path(r, hit); \
@@ -5033,10 +5033,7 @@ static int isogi_vol__passes_base(isogi_vol__ride *r, const int32_t cell[4], dou
                 if (found < 0 && waits) return -1; \
             } \
         } while (isogi_vol__trip_next(r) && (!waits || isogi_vol__ride_knows(r))); \
-        if (r->open) return -1; \
-        /* what was skipped behind the last cell lies on one side */ \
-        if (!(r->walk.deflated >= r->walk.end)) r->walk.deflate = 0; \
-        return 0; \
+        return r->open ? -1 : 0; \
     }
 
 ISOGI_VOL__TRIP(base, )
@@ -6481,10 +6478,7 @@ ISOGI_VOL__AVX512 static int isogi_vol__walk_one(isogi_vol__walk *w, isogi_hit *
     int n = p->node_levels - 1, child = 0, found = 0, here;
     isogi_vol__course c;
     if (!isogi_vol__set_course(&c, w)) return -1;
-    if (c.low > c.high) {
-        w->deflate = 0; /* all is on one side */
-        return 0;
-    }
+    if (c.low > c.high) return 0;
     place[n] = _mm_setzero_si128();
     for (;;) {
         uint64_t mask = isogi_vol__way(&c, ways, n, child) & isogi_vol__held(ways, c.octant, c.low, c.high, node);
@@ -6510,8 +6504,6 @@ ISOGI_VOL__AVX512 static int isogi_vol__walk_one(isogi_vol__walk *w, isogi_hit *
         n--;
     }
     w->count.cells = c.cells;
-    /* what was skipped behind the last cell lies on one side */
-    if (!found && !(w->deflated >= w->end)) w->deflate = 0;
     return found;
 }
 
@@ -6541,8 +6533,10 @@ static int isogi_vol__enters_inside(isogi_vol__walk *w, isogi_hit *hit) {
     return 1;
 }
 
-/* And one that has found nothing asks whether it leaves the box inside; `inside` is known unless nothing was looked at on the way. */
+/* And one that has found nothing asks whether it leaves the box inside; `inside` is known unless nothing was looked at on the way. What was
+   skipped behind the last cell lies on one side. */
 static int isogi_vol__leaves_inside(isogi_vol__walk *w, uint32_t flags, isogi_hit *hit) {
+    if (!(w->deflated >= w->end)) w->deflate = 0;
     if (!(flags & ISOGI_RAY_CAPPED) || !w->end_is_border) return 0;
     if (w->inside < 0 && !w->deflate) w->inside = isogi_vol__inside_at(w, w->end);
     return w->inside == 1 && isogi_vol__cap_exit(w, hit);
@@ -6606,6 +6600,7 @@ typedef struct isogi_vol__convoy {
     /* where they are in a leaf when they come to it; from there on they enter layer i of cells at i * per - first, leave it at
        (i + 1) * per - last, and end at left */
     float local[3][ISOGI_VOL__CONVOY], first[3][ISOGI_VOL__CONVOY], last[3][ISOGI_VOL__CONVOY], left[ISOGI_VOL__CONVOY];
+    float bound[4];    /* values that are certainly outside and inside in that leaf, and three times these */
     uint8_t corner[8]; /* from a cell's first voxel in its leaf to its corners, counted backwards likewise */
     isogi_vol__beam beam;
     isogi_vol__ride lead; /* the beam's: its trip alone */
@@ -6720,7 +6715,7 @@ static int isogi_vol__convoy_corners(const isogi_vol__convoy *v, const int32_t c
    convoy_meets: which rays meet the node at the beam's corner, or come near it; size: of its sides.
    convoy_sides: which of the rays `met` pass a cell of a leaf or come near it, and for which of them it is certain that they are inside, or
    outside, all along, as told has it (on the bounds themselves, too: they are wider than errors); layer: the cell's place; f: its corners,
-   or NULL; bound: of what is certain, and three times these.
+   or NULL.
    convoy_look: the same from the leaf's voxels, or where there is none from the volume's; here: the cell's number, not counted backwards.
    convoy_within: which rays certainly pass it, of those that were said to.
    convoy_leaf: goes through cells of a leaf, those of lead.
@@ -6786,11 +6781,12 @@ static int isogi_vol__convoy_corners(const isogi_vol__convoy *v, const int32_t c
         return ISOGI_VOL__WIDE_##path(add_ps)(a, ISOGI_VOL__WIDE_##path(mul_ps)(u, ISOGI_VOL__WIDE_##path(sub_ps)(b, a))); \
     } \
     target ISOGI_VOL__INLINE unsigned isogi_vol__convoy_sides_##path(const isogi_vol__convoy *v, unsigned met, const float layer[3], \
-                                                                    const float f[8], const float bound[4], unsigned *inside, \
-                                                                    unsigned *outside) { \
+                                                                    const float f[8], unsigned *inside, unsigned *outside) { \
         const isogi_vol__wide_##path zero = ISOGI_VOL__WIDE_##path(set1_ps)(0), one = ISOGI_VOL__WIDE_##path(set1_ps)(1); \
-        const isogi_vol__wide_##path low = ISOGI_VOL__WIDE_##path(set1_ps)(bound[0]), high = ISOGI_VOL__WIDE_##path(set1_ps)(bound[1]); \
-        const isogi_vol__wide_##path low3 = ISOGI_VOL__WIDE_##path(set1_ps)(bound[2]), high3 = ISOGI_VOL__WIDE_##path(set1_ps)(bound[3]); \
+        const isogi_vol__wide_##path low = ISOGI_VOL__WIDE_##path(set1_ps)(v->bound[0]); \
+        const isogi_vol__wide_##path high = ISOGI_VOL__WIDE_##path(set1_ps)(v->bound[1]); \
+        const isogi_vol__wide_##path low3 = ISOGI_VOL__WIDE_##path(set1_ps)(v->bound[2]); \
+        const isogi_vol__wide_##path high3 = ISOGI_VOL__WIDE_##path(set1_ps)(v->bound[3]); \
         unsigned passed = 0, in = 0, out = 0; \
         int i, a, k; \
         for (i = 0; i < ISOGI_VOL__CONVOY; i += ISOGI_VOL__LANES_##path) { \
@@ -6843,26 +6839,24 @@ static int isogi_vol__convoy_corners(const isogi_vol__convoy *v, const int32_t c
     } \
     target ISOGI_VOL__INLINE unsigned isogi_vol__convoy_look_##path(const isogi_vol__convoy *v, unsigned met, const float layer[3], \
                                                                    int here, const int32_t cell[4], unsigned *in, unsigned *out) { \
-        const isogi_vol__leaf *leaf = &v->lead.leaf; \
-        float f[8], bound[4]; \
+        float f[8]; \
         int i; \
-        if (leaf->code) { \
-            const uint8_t *code = leaf->code + (here & 3) + 5 * (here >> 2 & 3) + 25 * (here >> 4); \
-            bound[0] = leaf->isovalue - ISOGI_VOL__DOUBT, bound[1] = leaf->isovalue + ISOGI_VOL__DOUBT; \
-            bound[2] = 3 * bound[0], bound[3] = 3 * bound[1]; \
+        if (v->lead.leaf.code) { \
+            const uint8_t *code = v->lead.leaf.code + (here & 3) + 5 * (here >> 2 & 3) + 25 * (here >> 4); \
             ISOGI_VOL__UNROLL(8) \
             for (i = 0; i < 8; i++) f[i] = code[v->corner[i]]; \
-            return isogi_vol__convoy_sides_##path(v, met, layer, f, bound, in, out); \
+            return isogi_vol__convoy_sides_##path(v, met, layer, f, in, out); \
         } \
-        met = isogi_vol__convoy_sides_##path(v, met, layer, NULL, bound, in, out); \
+        met = isogi_vol__convoy_sides_##path(v, met, layer, NULL, in, out); \
         i = met ? isogi_vol__convoy_corners(v, cell, f) : 0; \
         *in = i > 0 ? met : 0, *out = i ? 0 : met; \
-        bound[0] = -ISOGI_VOL__UNSURE, bound[1] = ISOGI_VOL__UNSURE, bound[2] = 3 * bound[0], bound[3] = 3 * bound[1]; \
-        return i < 0 ? isogi_vol__convoy_sides_##path(v, met, layer, f, bound, in, out) : met; \
+        return i < 0 ? isogi_vol__convoy_sides_##path(v, met, layer, f, in, out) : met; \
     } \
     target static void isogi_vol__convoy_leaf_##path(isogi_vol__convoy *v, isogi_vol__batch *b, unsigned met) { \
         const isogi_vol__ride *lead = &v->lead; \
+        const float at = lead->leaf.code ? lead->leaf.isovalue : 0, doubt = lead->leaf.code ? ISOGI_VOL__DOUBT : ISOGI_VOL__UNSURE; \
         uint64_t cells = lead->trip.cells; \
+        v->bound[0] = at - doubt, v->bound[1] = at + doubt, v->bound[2] = 3 * v->bound[0], v->bound[3] = 3 * v->bound[1]; \
         isogi_vol__convoy_layers_##path(v, v->beam.corner); \
         for (; cells && met & v->active; cells &= cells - 1) { \
             const int child = isogi_vol__lowest_bit(cells), here = child ^ lead->trip.flip; \
@@ -6955,7 +6949,6 @@ ISOGI_VOL__NOINLINE static void isogi_vol__trace_convoy(isogi_vol__batch *b, iso
         isogi_vol__walk *w = &ride[i].walk;
         isogi_hit any;
         if (!(v.active >> i & 1)) continue;
-        if (!(w->deflated >= w->end)) w->deflate = 0; /* what was skipped behind the last cell lies on one side */
         isogi_vol__finish(b, ride[i].number, w,
                           isogi_vol__leaves_inside(w, ride[i].flags, b->hits ? &b->hits[ride[i].number] : &any));
     }
