@@ -218,7 +218,8 @@ typedef enum isogi_type { ISOGI_U8 = 0, ISOGI_I8, ISOGI_U16, ISOGI_I16, ISOGI_F3
    An axis of size 1 has no cells: such a volume can be sampled, and holds no surface.
 
    Voxels that are not finite: a cell with one at a corner holds no surface for rays and meshes, no ray hits it, no mesh has a triangle
-   in it, and what a ray knew of its side is forgotten in it; all other cells are as if it were not there. Ranges leave such voxels out.
+   in it, and what a ray knew of its side is forgotten in it; all other cells are as if it were not there. Ranges leave such voxels out;
+   rays and meshes skip regions that have no others.
    Trilinear samples next to one, and smooth samples within two voxels of one, are not finite themselves; normals there are zero.
 
    Chunks: a larger field may be looked at in parts, each a volume of its own. Neighbours share the voxels of one plane, and every part
@@ -271,11 +272,11 @@ typedef struct isogi_level {
 /* One pass over the voxels; right for every isovalue and every transfer function. */
 ISOGI_API isogi_result isogi_vol_build(isogi_pyramid **pyramid, const isogi_volume *volume, const isogi_context *context);
 /* After voxels first..last (both ends included, cut to the volume) have changed: brings the pyramid to what a new build would give, bit
-   by bit, at a cost that goes with the box. Only where the range of the whole volume changes, or where the first voxel that is not
-   finite comes or the last one goes, the 8-bit bounds are made anew, which costs about half a build; a lost extreme may have to be
-   looked for in other blocks. The only call that writes to a pyramid: nobody may read it meanwhile. Things built from the pyramid
-   (isogi_trace, isogi_dvr) do not notice. counters->blocks: blocks of 4^3 cells whose voxels were read. Reports no progress, cannot be
-   cancelled. ISOGI_INVALID for an empty box or one beyond the volume; ISOGI_NO_MEMORY: the pyramid is as it was. */
+   by bit, at a cost that goes with the box. Only where the range of the whole volume changes the 8-bit bounds are made anew, which costs
+   about half a build; a lost extreme may have to be looked for in other blocks. The only call that writes to a pyramid: nobody may read
+   it meanwhile. Things built from the pyramid (isogi_trace, isogi_dvr) do not notice. counters->blocks: blocks of 4^3 cells whose voxels
+   were read. Reports no progress, cannot be cancelled. ISOGI_INVALID for an empty box or one beyond the volume; ISOGI_NO_MEMORY: the
+   pyramid is as it was. */
 ISOGI_API isogi_result isogi_vol_update(isogi_pyramid *pyramid, const size_t first[3], const size_t last[3], isogi_counters *counters);
 ISOGI_API void isogi_vol_free(isogi_pyramid *pyramid); /* NULL is fine */
 /* Of no pyramid, these give NULL, zeros, or do nothing. */
@@ -1431,24 +1432,23 @@ static int isogi_vol__bound_eights(const float *const *row, int rows, int count,
 }
 #endif
 
-/* Bounds of one level-0 block, voxel by voxel, for doubles and where numbers are not finite; whether all of them are. */
-static int isogi_vol__bound_block(const isogi_volume *v, size_t bx, size_t by, size_t bz, double range[2]) {
-    int x0 = (int)(4 * bx), x1 = isogi_vol__last_voxel(bx, 4, v->size[0]), y1 = isogi_vol__last_voxel(by, 4, v->size[1]);
-    int z1 = isogi_vol__last_voxel(bz, 4, v->size[2]), x, y, z, finite = 1;
-    range[0] = DBL_MAX, range[1] = -DBL_MAX;
+/* Columns of a strip of blocks, in values, for doubles and where numbers are not finite; broken: columns that have one that is not. */
+static void isogi_vol__bound_values(const isogi_volume *v, size_t x, int count, size_t by, size_t bz, double *least, double *largest,
+                                    uint8_t *broken) {
+    const int y1 = isogi_vol__last_voxel(by, 4, v->size[1]), z1 = isogi_vol__last_voxel(bz, 4, v->size[2]);
+    double row[ISOGI_VOL__STRIP_VOXELS];
+    int i, y, z;
+    for (i = 0; i < count; i++) least[i] = DBL_MAX, largest[i] = -DBL_MAX, broken[i] = 0;
     for (z = (int)(4 * bz); z <= z1; z++)
         for (y = (int)(4 * by); y <= y1; y++) {
-            double row[5];
-            isogi_vol__row(v, x0, y, z, x1 - x0 + 1, row);
-            for (x = 0; x <= x1 - x0; x++) {
-                if (!isogi_vol__finite64(row[x])) {
-                    finite = 0;
-                    continue;
-                }
-                range[0] = isogi_vol__min(range[0], row[x]), range[1] = isogi_vol__max(range[1], row[x]);
+            isogi_vol__row(v, (int)x, y, z, count, row);
+            for (i = 0; i < count; i++) {
+                const int finite = isogi_vol__finite64(row[i]);
+                least[i] = finite && row[i] < least[i] ? row[i] : least[i];
+                largest[i] = finite && row[i] > largest[i] ? row[i] : largest[i];
+                broken[i] |= (uint8_t)!finite;
             }
         }
-    return finite;
 }
 
 /* Columns of a strip of blocks, for all types but double; 0 if a number is not finite. */
@@ -1477,31 +1477,34 @@ static void isogi_vol__build_task(void *arg, size_t task) {
     const isogi_volume *v = &job->pyramid->volume;
     const isogi_level *level = &job->pyramid->level[0];
     float least[ISOGI_VOL__STRIP_VOXELS], largest[ISOGI_VOL__STRIP_VOXELS];
-    double range[2] = {DBL_MAX, -DBL_MAX};
+    double low[ISOGI_VOL__STRIP_VOXELS], high[ISOGI_VOL__STRIP_VOXELS], range[2] = {DBL_MAX, -DBL_MAX};
+    uint8_t holes[ISOGI_VOL__STRIP_VOXELS];
     const size_t bz = job->first[2] + task;
     size_t bx, by, broken = 0;
     for (by = job->first[1]; by <= job->last[1]; by++) {
         const size_t row = level->size[0] * (by + level->size[1] * bz);
         float(*block)[2] = job->pyramid->blocks + row;
         size_t strip = ISOGI_VOL__STRIP / 4, first = 0;
-        int by_rows = 0;
+        int raw = 0;
         for (bx = job->first[0]; bx <= job->last[0]; bx++) {
-            double bound[2];
+            double bound[2] = {DBL_MAX, -DBL_MAX};
+            size_t x, last;
             int finite = 1;
             if ((bx - job->first[0]) % strip == 0) {
-                size_t rest = isogi_vol__min_size(v->size[0], 4 * job->last[0] + 5) - 4 * bx;
+                const size_t rest = isogi_vol__min_size(v->size[0], 4 * job->last[0] + 5) - 4 * bx;
+                const int count = rest < ISOGI_VOL__STRIP + 1 ? (int)rest : ISOGI_VOL__STRIP + 1;
                 first = 4 * bx;
-                by_rows = v->type != ISOGI_F64 &&
-                          isogi_vol__bound_strip(job->pyramid, first, rest < ISOGI_VOL__STRIP + 1 ? (int)rest : ISOGI_VOL__STRIP + 1, by,
-                                                 bz, least, largest);
+                raw = v->type != ISOGI_F64 && isogi_vol__bound_strip(job->pyramid, first, count, by, bz, least, largest);
+                if (!raw) isogi_vol__bound_values(v, first, count, by, bz, low, high, holes);
             }
-            if (by_rows) {
-                size_t x = 4 * bx - first, last = (size_t)isogi_vol__last_voxel(bx, 4, v->size[0]) - first;
-                float low = least[x], high = largest[x], swap;
-                while (x++ < last) low = least[x] < low ? least[x] : low, high = largest[x] > high ? largest[x] : high;
-                swap = v->scale < 0 ? low : high, low = v->scale < 0 ? high : low, high = swap;
-                bound[0] = v->scale * (double)low + v->bias, bound[1] = v->scale * (double)high + v->bias;
-            } else finite = isogi_vol__bound_block(v, bx, by, bz, bound);
+            x = 4 * bx - first, last = (size_t)isogi_vol__last_voxel(bx, 4, v->size[0]) - first;
+            if (raw) {
+                float a = least[x], b = largest[x];
+                while (x++ < last) a = least[x] < a ? least[x] : a, b = largest[x] > b ? largest[x] : b;
+                bound[v->scale < 0] = v->scale * (double)a + v->bias, bound[!(v->scale < 0)] = v->scale * (double)b + v->bias;
+            } else
+                for (; x <= last; x++)
+                    bound[0] = isogi_vol__min(bound[0], low[x]), bound[1] = isogi_vol__max(bound[1], high[x]), finite &= !holes[x];
             job->pyramid->broken[row + bx] = (uint8_t)!finite, broken += !finite;
             block[bx][0] = isogi_vol__float_below(bound[0]), block[bx][1] = isogi_vol__float_above(bound[1]);
             range[0] = isogi_vol__min(range[0], bound[0]), range[1] = isogi_vol__max(range[1], bound[1]);
@@ -1591,7 +1594,12 @@ static isogi_result isogi_vol__build_blocks(isogi_pyramid *p) {
     return ISOGI_OK;
 }
 
-/* ---- the same ranges in 8 bits, for fast rays ---- */
+/* ---- the same ranges in 8 bits, for fast rays ----
+
+   Voxels that are not finite count as above all others here, hence as inside, and what rays skip for lying on one side hides nothing: a
+   cell with such a voxel and one that is outside is looked at in double where the ray may cross from side to side, and forgets what was
+   known; one whose other voxels are all inside is left through a face that is inside, too, or not finite itself. */
+#define ISOGI_VOL__BROKEN 255
 
 /* Monotone, so that comparing 8-bit values never hides a block that holds the isovalue. */
 static int isogi_vol__quantise(const isogi_pyramid *p, double value) {
@@ -1608,6 +1616,13 @@ static float isogi_vol__quantise_isovalue(const isogi_pyramid *p, double isovalu
     *low = q > 0.01 ? (int)(q - 0.01) : 0;
     *high = q < 252 ? (int)(q + 0.01) : 253;
     return (float)q;
+}
+
+/* Bounds of block `at` of level 0. */
+static void isogi_vol__quantise_block(const isogi_pyramid *p, size_t at, uint8_t bound[2]) {
+    const float *range = p->level[0].range[at];
+    bound[0] = (uint8_t)isogi_vol__quantise(p, (double)range[0]);
+    bound[1] = p->broken[at] ? ISOGI_VOL__BROKEN : (uint8_t)isogi_vol__quantise(p, (double)range[1]);
 }
 
 /* Siblings are stored together, since a ray that looks at one soon looks at the next. */
@@ -1628,8 +1643,9 @@ static void isogi_vol__build_node(const isogi_pyramid *p, int n, const size_t no
         out[i] = 255, out[64 + i] = 0; /* beyond the volume: never entered */
         if (x >= children->size[0] || y >= children->size[1] || z >= children->size[2]) continue;
         if (n == 1) {
-            const float *range = p->level[0].range[x + children->size[0] * (y + children->size[1] * z)];
-            out[i] = (uint8_t)isogi_vol__quantise(p, (double)range[0]), out[64 + i] = (uint8_t)isogi_vol__quantise(p, (double)range[1]);
+            uint8_t bound[2];
+            isogi_vol__quantise_block(p, x + children->size[0] * (y + children->size[1] * z), bound);
+            out[i] = bound[0], out[64 + i] = bound[1];
             continue;
         }
         child = p->nodes[isogi_vol__node_at(p, n - 1, x, y, z)];
@@ -1646,9 +1662,9 @@ static void isogi_vol__unit_row(const isogi_vol__build_job *job, size_t x, size_
     const isogi_volume *v = &p->volume;
     int i = 0;
     if (v->type == ISOGI_F64) {
-        double value[1];
-        for (; i < count; i++)
-            isogi_vol__row(v, (int)x + i, (int)y, (int)z, 1, value), out[i] = (float)((value[0] - p->range[0]) * p->node_scale);
+        double value[ISOGI_VOL__STRIP_VOXELS];
+        isogi_vol__row(v, (int)x, (int)y, (int)z, count, value);
+        for (; i < count; i++) out[i] = (float)((value[i] - p->range[0]) * p->node_scale);
     } else {
         const float *row = isogi_vol__raw_row(p, x, y, z, count, out);
 #ifdef ISOGI_VOL__SSE2
@@ -1666,6 +1682,7 @@ static void isogi_vol__unit_row(const isogi_vol__build_job *job, size_t x, size_
 enum { ISOGI_VOL__LEAF_LOW = 125, ISOGI_VOL__LEAF_HIGH, ISOGI_VOL__LEAF_CUT }; /* bounds; see cut_of */
 #define ISOGI_VOL__CODES 254.0f
 #define ISOGI_VOL__DOUBT 0.625f /* error of a value made of codes + 0.5, in steps */
+#define ISOGI_VOL__ABOVE 255.1f /* isovalues in steps are no larger: all codes are certainly outside, but BROKEN is not */
 
 /* How many cells of a block are beyond the volume along each axis, 2 bits each. */
 ISOGI_VOL__INLINE int isogi_vol__cut_of(const isogi_pyramid *p, const size_t block[3]) {
@@ -1823,19 +1840,40 @@ static void isogi_vol__code_strip(const isogi_vol__build_job *job, size_t x0, in
     }
 }
 
+/* Marks the voxels of a leaf that are not finite; range: of the others. */
+static void isogi_vol__mark_broken(const isogi_volume *v, const size_t block[3], const float range[2], uint8_t leaf[128]) {
+    const size_t first = 4 * block[0], rest = v->size[0] - first;
+    const int count = rest < 5 ? (int)rest : 5;
+    int x, y, z;
+    if (range[0] > range[1]) {
+        memset(leaf, ISOGI_VOL__BROKEN, 125);
+        return;
+    }
+    for (z = 0; z < 5; z++)
+        for (y = 0; y < 5; y++, leaf += 5) {
+            double row[5];
+            int broken = 0;
+            isogi_vol__row(v, (int)first, (int)isogi_vol__min_size(4 * block[1] + (size_t)y, v->size[1] - 1),
+                           (int)isogi_vol__min_size(4 * block[2] + (size_t)z, v->size[2] - 1), count, row);
+            for (x = 0; x < 5; x++) {
+                if (x < count) broken = !isogi_vol__finite64(row[x]);
+                if (broken) leaf[x] = ISOGI_VOL__BROKEN;
+            }
+        }
+}
+
 /* One row of leaves, a strip of it; `end`: cells along x up to which the job goes. */
 static void isogi_vol__build_strip(const isogi_vol__build_job *job, size_t x0, size_t end, size_t by, size_t bz) {
     const isogi_pyramid *p = job->pyramid;
     const isogi_level *level = &p->level[0];
-    const size_t rest = end + 1 - x0;
+    const size_t rest = end + 1 - x0, first = x0 / 4 + level->size[0] * (by + level->size[1] * bz);
     const int count = rest < ISOGI_VOL__STRIP + 1 ? (int)rest : ISOGI_VOL__STRIP + 1, leaves = (count - 1 + 3) / 4;
     float low[ISOGI_VOL__STRIP / 4], scale[ISOGI_VOL__STRIP / 4];
     uint8_t leaf[ISOGI_VOL__STRIP / 4][128], bound[ISOGI_VOL__STRIP / 4][2];
     int i;
     for (i = leaves; i & 3; i++) low[i] = scale[i] = 0; /* vectors hold four leaves */
     for (i = 0; i < leaves; i++) {
-        const size_t bx = x0 / 4 + (size_t)i;
-        const float *range = level->range[bx + level->size[0] * (by + level->size[1] * bz)];
+        const float *range = level->range[first + (size_t)i];
         bound[i][0] = (uint8_t)isogi_vol__quantise(p, (double)range[0]), bound[i][1] = (uint8_t)isogi_vol__quantise(p, (double)range[1]);
         low[i] = (float)bound[i][0], scale[i] = ISOGI_VOL__CODES / (float)(bound[i][1] + 1 - bound[i][0]);
     }
@@ -1845,6 +1883,7 @@ static void isogi_vol__build_strip(const isogi_vol__build_job *job, size_t x0, s
         block[0] = x0 / 4 + (size_t)i, block[1] = by, block[2] = bz;
         leaf[i][ISOGI_VOL__LEAF_LOW] = bound[i][0], leaf[i][ISOGI_VOL__LEAF_HIGH] = bound[i][1];
         leaf[i][ISOGI_VOL__LEAF_CUT] = (uint8_t)isogi_vol__cut_of(p, block);
+        if (p->broken[first + (size_t)i]) isogi_vol__mark_broken(&p->volume, block, level->range[first + (size_t)i], leaf[i]);
         memcpy(p->nodes[isogi_vol__node_at(p, 0, block[0], by, bz)], leaf[i], sizeof leaf[i]);
     }
 }
@@ -1877,7 +1916,7 @@ ISOGI_VOL__COLD static int isogi_vol__plan_nodes(isogi_pyramid *p, isogi_vol__bu
     memset(job, 0, sizeof *job);
     job->pyramid = p;
     for (a = 0; a < 3; a++) job->last[a] = p->level[0].size[a] - 1;
-    if (!isogi_vol__may_be_fast(p) || !p->all_finite || !(range > 0) || !(range < 1e300)) return 0;
+    if (!isogi_vol__may_be_fast(p) || !(range > 0) || !(range < 1e300)) return 0;
     p->node_scale = 253 / range; /* odd: isovalues in the middle of the range lie in the middle of a step */
     if (!(p->node_scale < 1e300)) return 0;
     /* the float formula must stay within its margin of the double one, and double roundings far below the steps of leaves */
@@ -2061,6 +2100,7 @@ ISOGI_VOL__COLD static double isogi_vol__find_extreme(const isogi_pyramid *p, in
         for (y = 0; y < level[0].size[1]; y++)
             for (x = 0; x < level[0].size[0]; x++) {
                 const size_t at = x + level[0].size[0] * (y + level[0].size[1] * z);
+                const size_t first[3] = {4 * x, 4 * y, 4 * z}, last[3] = {4 * x + 4, 4 * y + 4, 4 * z + 4};
                 double bound[2], beyond;
                 if (!(x & 15)) i = x / 16 + level[2].size[0] * (y / 16 + level[2].size[1] * (z / 16));
                 if (level[2].range[i][0] > level[2].range[i][1] ||
@@ -2071,7 +2111,7 @@ ISOGI_VOL__COLD static double isogi_vol__find_extreme(const isogi_pyramid *p, in
                 if (level[0].range[at][0] > level[0].range[at][1] ||
                     (end ? level[0].range[at][1] < extreme : level[0].range[at][0] > extreme))
                     continue;
-                isogi_vol__bound_block(&p->volume, x, y, z, bound), ++*blocks;
+                isogi_volume_range(&p->volume, first, last, bound), ++*blocks;
                 found = end ? isogi_vol__max(found, bound[1]) : isogi_vol__min(found, bound[0]);
                 beyond = fabs(found - (double)extreme);
                 if (!(beyond > 0) || beyond < 0.5 * step || (end ? found >= p->range[1] : found <= p->range[0])) return found;
@@ -2162,7 +2202,7 @@ ISOGI_API isogi_result isogi_vol_update(isogi_pyramid *pyramid, const size_t fir
     before = isogi_vol__look_before(p, &job);
     was_fast = p->fast, was_empty = isogi_vol__is_empty(p);
     memcpy(range, p->range, sizeof range);
-    if (!p->nodes && before.broken == p->broken_count && isogi_vol__may_be_fast(p)) result = isogi_vol__reserve_nodes(p);
+    if (!p->nodes && isogi_vol__may_be_fast(p)) result = isogi_vol__reserve_nodes(p);
     if (result == ISOGI_OK) result = isogi_vol__bound_blocks(&job, &context, changed, &broken);
     if (result != ISOGI_OK) return result;
     p->broken_count = p->broken_count - before.broken + broken, p->all_finite = !p->broken_count;
@@ -4167,7 +4207,7 @@ static int isogi_vol__cap_exit(isogi_vol__walk *w, isogi_hit *hit) {
 /* Walks to the first hit; 0 if there is none. */
 static int isogi_vol__walk_on(isogi_vol__walk *w, uint32_t flags, isogi_hit *hit) {
     int top = ISOGI_VOL__LEVELS - 1, low[3], high[3], axis, inside, a;
-    double local[3];
+    double local[3], corner[8];
     if (w->cap == 2) {
         isogi_vol__local(w, 0, local);
         if (!isogi_vol__has_cap(w, local)) w->inside = -1, w->cap = 1;
@@ -4176,11 +4216,9 @@ static int isogi_vol__walk_on(isogi_vol__walk *w, uint32_t flags, isogi_hit *hit
         int before[3], changed = 0;
         double t;
         if (isogi_vol__uniform_block(w, top, low, high, &inside)) {
-            /* Blocks share their faces' voxels, so neighbours that lie on different sides share a face without a finite value: no
-               surface there. */
-            if (w->pyramid->all_finite || w->cap == 2) {
-                if (isogi_vol__state(w, inside, hit)) return 1;
-            } else w->inside = inside;
+            /* Blocks share their faces' voxels, so neighbours that lie on different sides share a face without a finite value. */
+            if (!w->pyramid->all_finite && w->inside == !inside && !isogi_vol__corners(w->pyramid, w->cell, 0, corner)) w->inside = -1;
+            if (isogi_vol__state(w, inside, hit)) return 1;
             w->deflate = 0;
             t = isogi_vol__exit(w, low, high, &axis);
         } else {
@@ -4212,7 +4250,7 @@ typedef struct isogi_vol__leaf {
 ISOGI_VOL__INLINE void isogi_vol__open_leaf(isogi_vol__leaf *leaf, const uint8_t node[128], float level) {
     const float low = (float)node[ISOGI_VOL__LEAF_LOW], high = (float)node[ISOGI_VOL__LEAF_HIGH];
     float x = (level - low) * (ISOGI_VOL__CODES / (high + 1 - low));
-    x = x > -2 ? x : -2, x = x < 257 ? x : 257;
+    x = x > -2 ? x : -2, x = x < ISOGI_VOL__ABOVE ? x : ISOGI_VOL__ABOVE;
     leaf->code = node, leaf->isovalue = x - 0.5f;
     leaf->inside = (int)(x + 3.0625f) - 2, leaf->outside = (int)(x + 2.9375f) - 3;
     leaf->inside = leaf->inside > 0 ? leaf->inside < 255 ? leaf->inside : 255 : 0;
@@ -4290,6 +4328,14 @@ ISOGI_VOL__TARGET("avx2") ISOGI_VOL__INLINE __m256d isogi_vol__lerp4(__m256d a, 
     return _mm256_add_pd(_mm256_mul_pd(rest, a), _mm256_mul_pd(u, b));
 }
 
+/* Whether eight numbers are finite. */
+ISOGI_VOL__TARGET("avx2") ISOGI_VOL__INLINE int isogi_vol__finite8(__m256d a, __m256d b) {
+    const __m256i infinite = _mm256_set1_epi64x(0x7ff0000000000000);
+    const __m256i bad_a = _mm256_cmpeq_epi64(_mm256_and_si256(_mm256_castpd_si256(a), infinite), infinite);
+    const __m256i bad_b = _mm256_cmpeq_epi64(_mm256_and_si256(_mm256_castpd_si256(b), infinite), infinite);
+    return !_mm256_movemask_epi8(_mm256_or_si256(bad_a, bad_b));
+}
+
 /* All bits of one of four lanes set; -1: of none. */
 ISOGI_VOL__TARGET("avx2") ISOGI_VOL__INLINE __m256d isogi_vol__lane(int i) {
     static const uint64_t lane[5][4] = {
@@ -4350,6 +4396,10 @@ ISOGI_VOL__TARGET("avx2") static int isogi_vol__mixed_cell_avx2(isogi_vol__walk 
     w->cell[0] = x, w->cell[1] = y, w->cell[2] = z, w->entry_axis = in;
     c0 = _mm256_sub_pd(_mm256_add_pd(_mm256_mul_pd(c0, scale), bias), isovalue);
     c1 = _mm256_sub_pd(_mm256_add_pd(_mm256_mul_pd(c1, scale), bias), isovalue);
+    if (ISOGI_VOL__UNLIKELY(!w->pyramid->all_finite) && !isogi_vol__finite8(c0, c1)) {
+        w->inside = -1, w->deflate = 0;
+        return 0;
+    }
     /* when the ray passes the faces; every lane gets the number of the one that counts */
     begin = _mm256_and_pd(_mm256_mul_pd(_mm256_sub_pd(_mm256_add_pd(cell, enter), origin), inverse), in_lane);
     end = _mm256_blend_pd(_mm256_mul_pd(_mm256_sub_pd(_mm256_add_pd(cell, leave), origin), inverse), segment_end, 8);
@@ -4673,7 +4723,8 @@ static int isogi_vol__begin_start(const isogi_vol__batch *b, size_t i, isogi_vol
 
 /* Sets a walk up; 0: there is nothing to walk. */
 static int isogi_vol__begin(isogi_vol__batch *b, size_t i, isogi_vol__walk *w) {
-    w->pyramid = b->pyramid, w->inside = -1, w->entry_axis = -1, w->exact = b->hits != NULL, w->cap = 1, w->deflate = 0;
+    w->pyramid = b->pyramid, w->inside = -1, w->entry_axis = -1, w->cap = 1, w->deflate = 0;
+    w->exact = b->hits || !b->pyramid->all_finite; /* a change of side is no hit where a voxel is not finite */
     w->origin[3] = w->deflated = 0;
     w->count.blocks = w->count.cells = w->count.cubics = 0;
     b->work.rays++;
@@ -5409,7 +5460,7 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE __m256i isogi_vol__compare(isogi_vol__pool *
     __m256i inside, outside;
     __attribute__((aligned(32))) uint32_t bound[2][8];
     int k;
-    x = _mm256_min_ps(_mm256_max_ps(x, _mm256_set1_ps(-2)), _mm256_set1_ps(257));
+    x = _mm256_min_ps(_mm256_max_ps(x, _mm256_set1_ps(-2)), _mm256_set1_ps(ISOGI_VOL__ABOVE));
     _mm512_mask_store_pd(&s->step[i], leaf, _mm512_cvtps_pd(_mm256_sub_ps(x, _mm256_set1_ps(0.5f))));
     inside = _mm256_sub_epi32(_mm256_cvttps_epi32(_mm256_add_ps(x, _mm256_set1_ps(3.0625f))), _mm256_set1_epi32(2));
     outside = _mm256_sub_epi32(_mm256_cvttps_epi32(_mm256_add_ps(x, _mm256_set1_ps(2.9375f))), _mm256_set1_epi32(3));
@@ -5848,12 +5899,12 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE __m512d isogi_vol__snap8(__m512d at, __m512d
     return _mm512_mask_mov_pd(at, _mm512_cmp_pd_mask(at, _mm512_sub_pd(one, slack), _CMP_GT_OQ), one);
 }
 
-/* What eight rays find in cells: those that stay on their side, that cross the surface, and that are left to the code for one; the cell's
-   cubic, where they enter and leave it, and when. */
+/* What eight rays find in cells: those that stay on their side, that cross the surface, whose cell is not finite, and that are left to the
+   code for one; the cell's cubic, where they enter and leave it, and when. */
 typedef struct isogi_vol__decision {
     __m512d bezier[4], from[3], to[3], begin, end, base, root;
     __m512i cell;
-    __mmask8 same, cross, odd, inside;
+    __mmask8 same, cross, broken, odd, inside;
 } isogi_vol__decision;
 
 /* The roots of everyday cubics: cubic_refine's first loop, for one or two groups of eight, whose steps wait for each other if they go one
@@ -6017,7 +6068,7 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE void isogi_vol__decide_some(isogi_vol__batch
     const __mmask8 first = _mm512_cmpeq_epi64_mask(in, three), starts = _mm512_cmplt_epi64_mask(side, _mm512_set1_epi64(-1)),
                    leaving = (__mmask8)(starts & first & lanes);
     __mmask8 odd = (__mmask8)((starts & ~first) | _mm512_mask_cmpge_epi64_mask(first, ISOGI_VOL__TAKE(entry_axis), _mm512_setzero_si512())),
-             low, high, b_low, b_high, inside, same, cross;
+             low, high, b_low, b_high, inside, same, cross, broken;
     __mmask8 left = 0;
     const __m512d base = ISOGI_VOL__TAKE_REAL(base);
     __m512d c[8], from[3], to[3], bezier[4], begin = zero, end = stop, steepest = zero;
@@ -6110,7 +6161,9 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE void isogi_vol__decide_some(isogi_vol__batch
         cross = (__mmask8)((inside ^ last) & (~(inside ^ b_low) | (inside ^ b_high)));
         same = (__mmask8)(same & ~leaving), cross = (__mmask8)(cross & ~leaving);
         odd = (__mmask8)((odd | ~(same | cross | left)) & lanes);
-        cross = (__mmask8)(cross & lanes & ~odd), same = (__mmask8)((same & lanes & ~odd) | left);
+        /* of a corner that is not finite no coefficient is */
+        broken = _mm512_mask_cmp_pd_mask(lanes, most, _mm512_set1_pd(DBL_MAX), _CMP_NLE_UQ), odd = (__mmask8)(odd & ~broken);
+        cross = (__mmask8)(cross & lanes & ~(odd | broken)), same = (__mmask8)((same & lanes & ~(odd | broken)) | left);
     }
     b->work.cubics += (uint64_t)__builtin_popcount((unsigned)(same | cross));
 #pragma GCC unroll 3
@@ -6118,7 +6171,7 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE void isogi_vol__decide_some(isogi_vol__batch
 #pragma GCC unroll 4
     for (a = 0; a < 4; a++) d->bezier[a] = bezier[a];
     d->begin = begin, d->end = end, d->base = base, d->cell = cell;
-    d->same = same, d->cross = cross, d->odd = odd, d->inside = inside;
+    d->same = same, d->cross = cross, d->broken = broken, d->odd = odd, d->inside = inside;
 #undef ISOGI_VOL__TAKE
 #undef ISOGI_VOL__TAKE_REAL
 }
@@ -6133,6 +6186,7 @@ ISOGI_VOL__AVX512 static unsigned isogi_vol__decide8(isogi_vol__batch *b, isogi_
     isogi_vol__decide_some(b, s, seats, row, (__mmask8)some, isogi_vol__pick8(&spots, ISOGI_VOL__ROW_OF(cell)),
                            isogi_vol__pick8(&spots, ISOGI_VOL__ROW_OF(side)), &k);
     if (k.same) _mm512_mask_i64scatter_epi64(s->side, k.same, isogi_vol__slots8(seats), _mm512_maskz_set1_epi64(k.inside, 1), 8);
+    if (k.broken) _mm512_mask_i64scatter_epi64(s->side, k.broken, isogi_vol__slots8(seats), _mm512_set1_epi64(-1), 8);
     if (b->hits && k.cross) isogi_vol__refine8(b, &k, 1), isogi_vol__write8(b, s, seats, &k);
     *alone = k.odd;
     return k.cross;
@@ -6277,11 +6331,11 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE uint64_t isogi_vol__held(const struct isogi_
                                        _mm512_set1_epi8((char)isovalue_low));
 }
 
-/* open_leaf without leaving the vector registers; the leaf's bounds hold the isovalue, since its parent's did. */
+/* open_leaf without leaving the vector registers; the isovalue is not below the leaf's bounds, since it was not below its parent's. */
 ISOGI_VOL__AVX512 ISOGI_VOL__INLINE void isogi_vol__unlock_leaf(const struct isogi_vol__ways *ways, isogi_vol__leaf *leaf,
                                                                 const uint8_t *node, float level, __m512i *inside, __m512i *outside) {
     const int low = node[ISOGI_VOL__LEAF_LOW], high = node[ISOGI_VOL__LEAF_HIGH];
-    const float x = (level - (float)low) * ways->scale[(high - low) & 255];
+    const float steps = (level - (float)low) * ways->scale[(high - low) & 255], x = steps < ISOGI_VOL__ABOVE ? steps : ISOGI_VOL__ABOVE;
     /* what is below 0 becomes 0 either way */
     __m128i bound = _mm_cvttps_epi32(_mm_add_ps(_mm_set1_ps(x), _mm_setr_ps(1.0625f, -0.0625f, 0, 0)));
     bound = _mm_packs_epi32(bound, bound), bound = _mm_packus_epi16(bound, bound);
@@ -6526,7 +6580,10 @@ static int isogi_vol__enters_inside(isogi_vol__walk *w, isogi_hit *hit) {
     isogi_vol__first_cell(w);
     isogi_vol__local(w, 0, local);
     if (w->entry_axis >= 0) local[w->entry_axis] = w->dir[w->entry_axis] > 0 ? 0 : 1;
-    isogi_vol__corners(w->pyramid, w->cell, w->isovalue, corner);
+    if (!isogi_vol__corners(w->pyramid, w->cell, w->isovalue, corner)) {
+        w->inside = -1;
+        return 0;
+    }
     isogi_vol__cubic_set(&cubic, corner, local, local);
     if (!(cubic.b[0] >= 0)) return 0;
     isogi_vol__emit(w, 0, local, 2, hit);
@@ -6693,14 +6750,17 @@ static void isogi_vol__set_convoy(isogi_vol__convoy *v, isogi_vol__ride *ride, i
 }
 
 /* Corners of a cell relative to the isovalue, the largest of them 1, counted backwards likewise. 1: all of it is inside; 0: outside; -1: it
-   has some on both sides. Rays are fast where all voxels are finite. */
+   has some on both sides, or one that is not finite: all are then 0, of which nothing is certain. */
 #define ISOGI_VOL__UNSURE 4e-5f /* more than what a cell's width times REACH, and rounding, change a value by */
 static int isogi_vol__convoy_corners(const isogi_vol__convoy *v, const int32_t cell[4], float f[8]) {
     const isogi_vol__walk *w = &v->lead.walk;
     double corner[8], most = DBL_MIN;
     int at[3], i, inside = 0;
     for (i = 0; i < 3; i++) at[i] = cell[i];
-    isogi_vol__corners(w->pyramid, at, w->isovalue, corner);
+    if (!isogi_vol__corners(w->pyramid, at, w->isovalue, corner)) {
+        memset(f, 0, 8 * sizeof *f);
+        return -1;
+    }
     for (i = 0; i < 8; i++) most = isogi_vol__max(most, fabs(corner[i]));
     for (i = 0; i < 8; i++) f[i] = (float)(corner[i ^ v->lead.trip.octant] / most);
     for (i = 0; i < 8; i++) inside += corner[i] >= 0;
@@ -7199,7 +7259,9 @@ ISOGI_VOL__AVX512 ISOGI_VOL__NOINLINE static unsigned isogi_vol__settle16(isogi_
             continue;
         }
         isogi_vol__decide_some(b, s, slots + h, 1, passed, cell, side, &k[groups]);
-        _mm512_store_si512(&s->side[h], _mm512_mask_mov_epi64(side, k[groups].same, _mm512_maskz_set1_epi64(k[groups].inside, 1)));
+        _mm512_store_si512(&s->side[h],
+                           _mm512_mask_mov_epi64(_mm512_mask_mov_epi64(side, k[groups].same, _mm512_maskz_set1_epi64(k[groups].inside, 1)),
+                                                 k[groups].broken, none));
         first[groups++] = h;
     }
     if (b->hits && groups == 1 && k[0].cross) isogi_vol__refine8(b, k, 1);
@@ -7513,10 +7575,12 @@ static void isogi_vol__look_round(isogi_vol__descent *d, const isogi_pyramid *p,
     const isogi_volume *v = &p->volume;
     const __m512i octants = _mm512_setr_epi32(0, 4, 16, 20, 8, 12, 24, 28, 0, 0, 0, 0, 0, 0, 0, 0);
     const __m256i spread = _mm256_setr_epi32(2, 3, 4, 5, 3, 2, 1, 0);
+    const __m256i infinite = _mm256_set1_epi32(0x7f800000);
     __attribute__((aligned(32))) float row[ISOGI_VOL__ROUND][ISOGI_VOL__ROUND][8];
     double corner[8], local[3], slope[3], least = 1e300, most = -1e300, error;
     __m512 rise[2][3];
     __m256 sign;
+    __m256i bad = _mm256_setzero_si256();
     int at[3], a, i, k, n, inside;
     c->side = -1;
     if (v->type == ISOGI_F64) return;
@@ -7542,8 +7606,11 @@ static void isogi_vol__look_round(isogi_vol__descent *d, const isogi_pyramid *p,
             float buffer[8];
             const float *from = isogi_vol__raw_row(p, (size_t)(at[0] - REACH + 1), (size_t)(at[1] - REACH + 1 + i),
                                                    (size_t)(at[2] - REACH + 1 + k), 8, buffer);
-            _mm256_store_ps(row[k][i], _mm256_xor_ps(_mm256_permutevar8x32_ps(_mm256_loadu_ps(from), spread), sign));
+            const __m256 voxels = _mm256_loadu_ps(from);
+            _mm256_store_ps(row[k][i], _mm256_xor_ps(_mm256_permutevar8x32_ps(voxels, spread), sign));
+            bad = _mm256_or_si256(bad, _mm256_cmpeq_epi32(_mm256_and_si256(_mm256_castps_si256(voxels), infinite), infinite));
         }
+    if (_mm256_movemask_epi8(bad)) return;
     for (i = 0; i < 6; i++) rise[i % 2][i / 2] = _mm512_set1_ps(-3e38f);
     for (n = 0; n <= REACH; n++) {
         for (i = 0; i <= 2 * n; i++) {
@@ -8375,7 +8442,8 @@ ISOGI_VOL__AVX512 static void isogi_vol__trace_pool(isogi_vol__batch *b, size_t 
             rays = isogi_vol__seat_packet(b, &s, next, n);
             next += (size_t)n;
             if (!rays) continue;
-            if (__builtin_popcount(rays) >= ISOGI_VOL__PACKET / 4 && isogi_vol__seats_coincide(&s, rays)) {
+            if ((b->hits || b->pyramid->all_finite) && __builtin_popcount(rays) >= ISOGI_VOL__PACKET / 4 &&
+                isogi_vol__seats_coincide(&s, rays)) {
                 isogi_vol__trace_packet(b, &s, rays);
                 run = ISOGI_VOL__POOL;
                 continue;
@@ -8386,7 +8454,7 @@ ISOGI_VOL__AVX512 static void isogi_vol__trace_pool(isogi_vol__batch *b, size_t 
         }
         if (!opened) {
             isogi_vol__open_turn(&turn, b->pyramid);
-            turn.any = b->occluded != NULL, opened = 1;
+            turn.any = b->occluded && b->pyramid->all_finite, opened = 1; /* as in begin */
             isogi_vol__clear_pool(&s, taken, groups, b->pyramid);
         }
         isogi_vol__run_pool(b, &turn, &s, groups, open, &next, end);
@@ -10033,8 +10101,10 @@ ISOGI_API void isogi_vol_mesh_free(const isogi_pyramid *pyramid, isogi_mesh *mes
 
 #undef ISOGI_VOL__ADD
 #undef ISOGI_VOL__ALL64
+#undef ISOGI_VOL__BROKEN
 #undef ISOGI_VOL__CODES
 #undef ISOGI_VOL__DOUBT
+#undef ISOGI_VOL__ABOVE
 #undef ISOGI_VOL__MUL
 #undef ISOGI_VOL__NEAR
 #undef ISOGI_VOL__POOL

@@ -155,7 +155,7 @@ only() { printf '%s\n' $units | grep -E "test_($1)\$"; }
 
 variants() {
     threaded='vol|mesh|trace_bake|dvr_visibility'
-    checked='sh|sh_limits|sample|vol|vol_api|vol_sides|vol_update|vol_field|mesh|trace|trace_bake|trace_light|trace_store|trace_inside|trace_change|dvr|dvr_data|dvr_inside|dvr_tets|dvr_transfer|dvr_visibility|dvr_bound|dvr_hard|dvr_closed|dvr_medium'
+    checked='sh|sh_limits|sample|vol|vol_api|vol_sides|vol_holes|vol_update|vol_field|mesh|trace|trace_bake|trace_light|trace_store|trace_inside|trace_change|dvr|dvr_data|dvr_inside|dvr_tets|dvr_transfer|dvr_visibility|dvr_bound|dvr_hard|dvr_closed|dvr_medium'
     # Those that only start other programs have nothing to be built anew.
     units=
     for program; do
@@ -164,7 +164,7 @@ variants() {
     # A variant runs what it can change: the address sanitizer most of them, the others those that stand for their kind.
     variant O0 "$CC" "-O0 $CONTRACT_OFF" '' $(only sh)
     variant O3 "$CC" "-O3 $CONTRACT_OFF" '' $(only 'sh|vol|vol_update|trace_inside|dvr|dvr_inside|dvr_data')
-    fast_math "$CC" $(only 'sh|sh_limits|sample|vol|vol_sides|trace|dvr|dvr_visibility|dvr_bound|dvr_hard|dvr_classes')
+    fast_math "$CC" $(only 'sh|sh_limits|sample|vol|vol_sides|vol_holes|trace|dvr|dvr_visibility|dvr_bound|dvr_hard|dvr_classes')
     # With products and sums joined as a user's compiler may, all paths still build the same pyramid.
     if grep -qsw fma /proc/cpuinfo; then
         item suite contracted/test_vol_update "$CC -std=gnu99 -O2 -march=x86-64-v3 -I. -Iexamples/common -Itests -o \"\$OUT/test\" tests/test_vol_update.c -lm -lpthread && \"\$OUT/test\" --long"
@@ -193,7 +193,7 @@ emulators() {
     for machine in aarch64 s390x riscv64; do
         if have $machine-linux-gnu-gcc && have qemu-$machine-static; then
             some='sh|sample'
-            [ $machine = aarch64 ] && some='sh|sample|vol|vol_sides|vol_work'
+            [ $machine = aarch64 ] && some='sh|sample|vol|vol_sides|vol_holes|vol_work'
             variant $machine $machine-linux-gnu-gcc "-O2 $CONTRACT_OFF -static" "qemu-$machine-static" $(printf '%s\n' "$@" | grep -E "test_($some)\$")
         else item skip "$machine" "$machine-linux-gnu-gcc or qemu-$machine-static is not installed"
         fi

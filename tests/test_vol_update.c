@@ -166,8 +166,8 @@ static void *scarce_alloc(void *user, size_t size, size_t align) {
 }
 static void scarce_release(void *user, void *p, size_t size) { (void)size, ((scarce *)user)->blocks--, free(p); }
 
-/* The k-th allocation of an update fails, for every k: the pyramid is as it was, and the same update succeeds afterwards. The volume's last
-   voxel that is not finite goes, for which an update needs most: the 8-bit bounds, which were not there. Another comes, and moves. */
+/* The k-th allocation of an update fails, for every k: the pyramid is as it was, and the same update succeeds afterwards. The first values
+   come, for which an update needs most: the 8-bit bounds, which were not there. A voxel that is not finite comes, and moves. */
 TEST(an_update_survives_every_failing_allocation) {
     enum { N = 21 };
     test_random r = {41};
@@ -180,11 +180,11 @@ TEST(an_update_survives_every_failing_allocation) {
             isogi_pyramid *updated = NULL, *before = NULL, *after = NULL;
             isogi_counters counters = {0};
             const size_t first[3] = {3, 4, 5}, last[3] = {8, 9, 20};
-            for (int i = 0; i < N * N * N; i++) f.value[i] = random_range(&r, -1, 1);
+            for (int i = 0; i < N * N * N; i++) f.value[i] = kind ? random_range(&r, -1, 1) : (double)NAN;
             if (kind != 1) *field_at(&f, 5, 6, 7) = (double)NAN;
             CHECK(isogi_vol_build(&updated, &f.volume, &context) == ISOGI_OK, "build");
             CHECK(isogi_vol_build(&before, &f.volume, NULL) == ISOGI_OK, "build");
-            *field_at(&f, 5, 6, 7) = 0.5;
+            *field_at(&f, 5, 6, 7) = 0.5, *field_at(&f, 5, 6, 8) = -0.5;
             if (kind) *field_at(&f, 6, 6, 17) = (double)NAN;
             CHECK(isogi_vol_build(&after, &f.volume, NULL) == ISOGI_OK, "build");
             memory.left = k;

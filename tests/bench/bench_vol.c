@@ -156,19 +156,63 @@ static void bench_paths(const scene *whole) {
     }
 }
 
-/* ---- the rest ---- */
+/* ---- pyramids, and volumes with holes ---- */
 
-static void bench_build(const scene *s) {
+static void bench_build(const isogi_volume *volume, const char *method, const char *setting) {
     double seconds[16];
     for (int run = 0; run < runs; run++) {
         isogi_pyramid *p;
         double start = cpu_seconds();
-        isogi_vol_build(&p, isogi_vol_volume(s->pyramid), &serial);
+        if (isogi_vol_build(&p, volume, &serial) != ISOGI_OK) exit(1);
         seconds[run] = cpu_seconds() - start;
         isogi_vol_free(p);
     }
-    row("pyramid-256", NULL, "default", "float32; error: none possible", median(seconds, runs), 0, (double)N * N * N, "voxels");
+    row("pyramid-256", NULL, method, setting, median(seconds, runs), 0, (double)N * N * N, "voxels");
 }
+
+static void bench_holed_rays(const scene *s, const isogi_pyramid *plain, const char *name, const isogi_ray *rays, size_t batch, int kind) {
+    isogi_hit *hits = (isogi_hit *)malloc(RAYS * sizeof *hits);
+    double seconds[16], wrong = 0;
+    char setting[64];
+    for (int run = 0; run < runs; run++) {
+        double start = cpu_seconds();
+        trace_all(s, rays, batch, kind == SHARED, hits, NULL, NULL);
+        seconds[run] = cpu_seconds() - start;
+    }
+    for (size_t i = 0; i < RAYS; i += METHOD_STRIDE) {
+        isogi_hit hit;
+        isogi_vol_intersect(plain, &rays[i], 1, &hit, NULL);
+        wrong += hit.side != hits[i].side || (hit.side && fabs(hit.t - hits[i].t) > APART * 2 / (N - 1));
+    }
+    snprintf(setting, sizeof setting, "batch %zu; error: against the plain walk", batch);
+    row(name, s->name, "holes", setting, median(seconds, runs), 1e6 * wrong * METHOD_STRIDE / RAYS, RAYS, "rays");
+    free(hits);
+}
+
+/* All voxels out of a ball, which are half of them, are NaN. */
+static void bench_holes(const scene *whole, int build) {
+    const isogi_context plainly = {.threads = 1, .force_path = 1};
+    const size_t voxels = (size_t)N * N * N;
+    isogi_volume volume = *isogi_vol_volume(whole->pyramid);
+    isogi_pyramid *plain;
+    scene s = *whole;
+    s.data = (float *)malloc(voxels * sizeof *s.data);
+    for (size_t i = 0; i < voxels; i++) {
+        double square = 0;
+        for (size_t a = 0, at = i; a < 3; a++, at /= N) square += pow(2.0 * (double)(at % N) / (N - 1) - 1, 2);
+        s.data[i] = square < 1 ? whole->data[i] : (float)NAN;
+    }
+    volume.data = s.data;
+    if (isogi_vol_build(&s.pyramid, &volume, &serial) != ISOGI_OK || isogi_vol_build(&plain, &volume, &plainly) != ISOGI_OK) exit(1);
+    bench_holed_rays(&s, plain, "primary1", s.primary, 1, FIRST);
+    bench_holed_rays(&s, plain, "primary16", s.primary, 16, FIRST);
+    bench_holed_rays(&s, plain, "surface", s.surface, RAYS, FIRST);
+    bench_holed_rays(&s, plain, "bundle64", s.bundles, BUNDLES * BUNDLE, SHARED);
+    if (build) bench_build(&volume, "holes", "float32; error: none possible");
+    isogi_vol_free(s.pyramid), isogi_vol_free(plain), free(s.data);
+}
+
+/* ---- the rest ---- */
 
 /* A cubic B-spline by its definition, for places whose 64 voxels exist; or its slope along an axis (0..2; -1: the value). */
 static real spline_at(const scene *s, const int cell[3], const real u[3], int along) {
@@ -405,9 +449,12 @@ int main(int argc, char **argv) {
         bench_rays(&s, "anyhit", s.surface, RAYS, ANY, 0);
         bench_rays(&s, "bundle64", s.bundles, BUNDLES * BUNDLE, SHARED, 0);
         bench_rays(&s, "bundle64alone", s.bundles, BUNDLE, SHARED, 0);
-        bench_paths(&s);
+        bench_paths(&s), bench_holes(&s, gyroid);
         if (gyroid) {
-            bench_build(&s);
+            isogi_volume volume;
+            volume = *isogi_vol_volume(s.pyramid), bench_build(&volume, "default", "float32; error: none possible");
+            volume.data = s.reference, volume.type = ISOGI_F64, memset(volume.stride, 0, sizeof volume.stride);
+            bench_build(&volume, "doubles", "float64; error: none possible");
             bench_samples(&s, "trilinear-along-rays", TRILINEAR, ALONG_RAYS, 0);
             bench_samples(&s, "trilinear-along-far-rays", TRILINEAR, FAR_RAYS, 0);
             bench_samples(&s, "trilinear-gradients-along-rays", TRILINEAR_GRADIENTS, ALONG_RAYS, 0);
