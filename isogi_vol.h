@@ -1432,16 +1432,25 @@ static int isogi_vol__bound_eights(const float *const *row, int rows, int count,
 }
 #endif
 
+/* Values x .. x + count - 1 of a row, in place where they are. */
+static const double *isogi_vol__value_row(const isogi_volume *v, size_t x, size_t y, size_t z, int count, double *buffer) {
+    const char *p = (const char *)v->data + (ptrdiff_t)x * v->stride[0] + (ptrdiff_t)y * v->stride[1] + (ptrdiff_t)z * v->stride[2];
+    const int plain = v->scale >= 1 && v->scale <= 1 && v->bias >= 0 && v->bias <= 0;
+    if (v->type == ISOGI_F64 && v->stride[0] == 8 && plain) return (const double *)(const void *)p;
+    isogi_vol__row(v, (int)x, (int)y, (int)z, count, buffer);
+    return buffer;
+}
+
 /* Columns of a strip of blocks, in values, for doubles and where numbers are not finite; broken: columns that have one that is not. */
 static void isogi_vol__bound_values(const isogi_volume *v, size_t x, int count, size_t by, size_t bz, double *least, double *largest,
                                     uint8_t *broken) {
     const int y1 = isogi_vol__last_voxel(by, 4, v->size[1]), z1 = isogi_vol__last_voxel(bz, 4, v->size[2]);
-    double row[ISOGI_VOL__STRIP_VOXELS];
+    double buffer[ISOGI_VOL__STRIP_VOXELS];
     int i, y, z;
     for (i = 0; i < count; i++) least[i] = DBL_MAX, largest[i] = -DBL_MAX, broken[i] = 0;
     for (z = (int)(4 * bz); z <= z1; z++)
         for (y = (int)(4 * by); y <= y1; y++) {
-            isogi_vol__row(v, (int)x, y, z, count, row);
+            const double *row = isogi_vol__value_row(v, x, (size_t)y, (size_t)z, count, buffer);
             for (i = 0; i < count; i++) {
                 const int finite = isogi_vol__finite64(row[i]);
                 least[i] = finite && row[i] < least[i] ? row[i] : least[i];
@@ -1662,8 +1671,8 @@ static void isogi_vol__unit_row(const isogi_vol__build_job *job, size_t x, size_
     const isogi_volume *v = &p->volume;
     int i = 0;
     if (v->type == ISOGI_F64) {
-        double value[ISOGI_VOL__STRIP_VOXELS];
-        isogi_vol__row(v, (int)x, (int)y, (int)z, count, value);
+        double buffer[ISOGI_VOL__STRIP_VOXELS];
+        const double *value = isogi_vol__value_row(v, x, y, z, count, buffer);
         for (; i < count; i++) out[i] = (float)((value[i] - p->range[0]) * p->node_scale);
     } else {
         const float *row = isogi_vol__raw_row(p, x, y, z, count, out);
