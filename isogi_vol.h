@@ -77,11 +77,11 @@
    twice to five times as fast as alone. Others go through a pool of 64, eight to an instruction, where there is AVX-512: from 64 on
    all are faster than alone (twice to four times), from 500 on nothing is left to gain. There, rays that follow each other from one
    place come down to its leaf together, and where they are many (12 from a surface, 48 from elsewhere), they pass the cells round
-   it at once, as far as slopes there let none of them meet the surface; and where any hit will do, a ray is done once it is known to
-   pass a block that lies inside and one that lies outside. Without AVX-512 sixteen rays of a batch take turns, each up to where it
-   reads memory. Everywhere cells are looked at in float first, from 8-bit voxels that lie together in two cache lines for 4x4x4
-   cells, with an error bound: what is certain needs nothing else, and only cells in doubt, the hits and one cell for every 25 rays
-   besides, read your voxels and are solved in double. Of compact volumes there are no such voxels: rays go as without AVX-512, and
+   it at once, as far as slopes there let none of them meet the surface; and where any hit will do, and all voxels are finite, a ray is
+   done once it is known to pass a block that lies inside and one that lies outside. Without AVX-512 sixteen rays of a batch take turns,
+   each up to where it reads memory. Everywhere cells are looked at in float first, from 8-bit voxels that lie together in two cache lines
+   for 4x4x4 cells, with an error bound: what is certain needs nothing else, and only cells in doubt, the hits and one cell for every 25
+   rays besides, read your voxels and are solved in double. Of compact volumes there are no such voxels: rays go as without AVX-512, and
    read yours in every cell that they pass in blocks that hold the isovalue.
 
    History  1.0  first release
@@ -1441,13 +1441,13 @@ static const double *isogi_vol__value_row(const isogi_volume *v, size_t x, size_
     return buffer;
 }
 
-/* Columns of a strip of blocks, in values, for doubles and where numbers are not finite; broken: columns that have one that is not. */
+/* Columns of a strip of blocks, in values, for doubles and where numbers are not finite; holed: columns that have one that is not. */
 static void isogi_vol__bound_values(const isogi_volume *v, size_t x, int count, size_t by, size_t bz, double *least, double *largest,
-                                    uint8_t *broken) {
+                                    uint8_t *holed) {
     const int y1 = isogi_vol__last_voxel(by, 4, v->size[1]), z1 = isogi_vol__last_voxel(bz, 4, v->size[2]);
     double buffer[ISOGI_VOL__STRIP_VOXELS];
     int i, y, z;
-    for (i = 0; i < count; i++) least[i] = DBL_MAX, largest[i] = -DBL_MAX, broken[i] = 0;
+    for (i = 0; i < count; i++) least[i] = DBL_MAX, largest[i] = -DBL_MAX, holed[i] = 0;
     for (z = (int)(4 * bz); z <= z1; z++)
         for (y = (int)(4 * by); y <= y1; y++) {
             const double *row = isogi_vol__value_row(v, x, (size_t)y, (size_t)z, count, buffer);
@@ -1455,7 +1455,7 @@ static void isogi_vol__bound_values(const isogi_volume *v, size_t x, int count, 
                 const int finite = isogi_vol__finite64(row[i]);
                 least[i] = finite && row[i] < least[i] ? row[i] : least[i];
                 largest[i] = finite && row[i] > largest[i] ? row[i] : largest[i];
-                broken[i] |= (uint8_t)!finite;
+                holed[i] |= (uint8_t)!finite;
             }
         }
 }
@@ -1487,7 +1487,7 @@ static void isogi_vol__build_task(void *arg, size_t task) {
     const isogi_level *level = &job->pyramid->level[0];
     float least[ISOGI_VOL__STRIP_VOXELS], largest[ISOGI_VOL__STRIP_VOXELS];
     double low[ISOGI_VOL__STRIP_VOXELS], high[ISOGI_VOL__STRIP_VOXELS], range[2] = {DBL_MAX, -DBL_MAX};
-    uint8_t holes[ISOGI_VOL__STRIP_VOXELS];
+    uint8_t holed[ISOGI_VOL__STRIP_VOXELS];
     const size_t bz = job->first[2] + task;
     size_t bx, by, broken = 0;
     for (by = job->first[1]; by <= job->last[1]; by++) {
@@ -1504,7 +1504,7 @@ static void isogi_vol__build_task(void *arg, size_t task) {
                 const int count = rest < ISOGI_VOL__STRIP + 1 ? (int)rest : ISOGI_VOL__STRIP + 1;
                 first = 4 * bx;
                 raw = v->type != ISOGI_F64 && isogi_vol__bound_strip(job->pyramid, first, count, by, bz, least, largest);
-                if (!raw) isogi_vol__bound_values(v, first, count, by, bz, low, high, holes);
+                if (!raw) isogi_vol__bound_values(v, first, count, by, bz, low, high, holed);
             }
             x = 4 * bx - first, last = (size_t)isogi_vol__last_voxel(bx, 4, v->size[0]) - first;
             if (raw) {
@@ -1513,7 +1513,7 @@ static void isogi_vol__build_task(void *arg, size_t task) {
                 bound[v->scale < 0] = v->scale * (double)a + v->bias, bound[!(v->scale < 0)] = v->scale * (double)b + v->bias;
             } else
                 for (; x <= last; x++)
-                    bound[0] = isogi_vol__min(bound[0], low[x]), bound[1] = isogi_vol__max(bound[1], high[x]), finite &= !holes[x];
+                    bound[0] = isogi_vol__min(bound[0], low[x]), bound[1] = isogi_vol__max(bound[1], high[x]), finite &= !holed[x];
             job->pyramid->broken[row + bx] = (uint8_t)!finite, broken += !finite;
             block[bx][0] = isogi_vol__float_below(bound[0]), block[bx][1] = isogi_vol__float_above(bound[1]);
             range[0] = isogi_vol__min(range[0], bound[0]), range[1] = isogi_vol__max(range[1], bound[1]);
@@ -1585,7 +1585,7 @@ static isogi_result isogi_vol__bound_blocks(isogi_vol__build_job *job, const iso
 }
 
 static void isogi_vol__set_range(isogi_pyramid *p, double low, double high) {
-    p->range[0] = low <= high ? low : 0, p->range[1] = low <= high ? high : 0;
+    p->range[0] = low <= high ? low + 0.0 : 0, p->range[1] = low <= high ? high + 0.0 : 0; /* not -0 */
 }
 
 static isogi_result isogi_vol__build_blocks(isogi_pyramid *p) {
@@ -1627,11 +1627,12 @@ static float isogi_vol__quantise_isovalue(const isogi_pyramid *p, double isovalu
     return (float)q;
 }
 
-/* Bounds of block `at` of level 0. */
+/* Bounds of the finite values of block `at` of level 0. */
 static void isogi_vol__quantise_block(const isogi_pyramid *p, size_t at, uint8_t bound[2]) {
     const float *range = p->level[0].range[at];
-    bound[0] = (uint8_t)isogi_vol__quantise(p, (double)range[0]);
-    bound[1] = p->broken[at] ? ISOGI_VOL__BROKEN : (uint8_t)isogi_vol__quantise(p, (double)range[1]);
+    const int empty = range[0] > range[1];
+    bound[0] = empty ? ISOGI_VOL__BROKEN : (uint8_t)isogi_vol__quantise(p, (double)range[0]);
+    bound[1] = empty ? ISOGI_VOL__BROKEN : (uint8_t)isogi_vol__quantise(p, (double)range[1]);
 }
 
 /* Siblings are stored together, since a ray that looks at one soon looks at the next. */
@@ -1652,9 +1653,10 @@ static void isogi_vol__build_node(const isogi_pyramid *p, int n, const size_t no
         out[i] = 255, out[64 + i] = 0; /* beyond the volume: never entered */
         if (x >= children->size[0] || y >= children->size[1] || z >= children->size[2]) continue;
         if (n == 1) {
+            const size_t at = x + children->size[0] * (y + children->size[1] * z);
             uint8_t bound[2];
-            isogi_vol__quantise_block(p, x + children->size[0] * (y + children->size[1] * z), bound);
-            out[i] = bound[0], out[64 + i] = bound[1];
+            isogi_vol__quantise_block(p, at, bound);
+            out[i] = bound[0], out[64 + i] = p->broken[at] ? ISOGI_VOL__BROKEN : bound[1];
             continue;
         }
         child = p->nodes[isogi_vol__node_at(p, n - 1, x, y, z)];
@@ -1687,7 +1689,8 @@ static void isogi_vol__unit_row(const isogi_vol__build_job *job, size_t x, size_
 
 /* A leaf is the node of 4x4x4 cells. It holds no bounds but its voxels: voxel (x,y,z), 0..4 each, at byte x + 5y + 25z, in steps of
    1/254 of what lies between the leaf's own 8-bit bounds, rounded down. So the same two cache lines tell which cells hold the surface,
-   and what it does in them to some 2 % of what the field changes by in a cell: enough to see that most rays miss it there. */
+   and what it does in them to some 2 % of what the field changes by in a cell: enough to see that most rays miss it there. A voxel that is
+   not finite is BROKEN. */
 enum { ISOGI_VOL__LEAF_LOW = 125, ISOGI_VOL__LEAF_HIGH, ISOGI_VOL__LEAF_CUT }; /* bounds; see cut_of */
 #define ISOGI_VOL__CODES 254.0f
 #define ISOGI_VOL__DOUBT 0.625f /* error of a value made of codes + 0.5, in steps */
@@ -1849,7 +1852,7 @@ static void isogi_vol__code_strip(const isogi_vol__build_job *job, size_t x0, in
     }
 }
 
-/* Marks the voxels of a leaf that are not finite; range: of the others. */
+/* Marks the voxels of a leaf that are not finite, which all are where it has no range. */
 static void isogi_vol__mark_broken(const isogi_volume *v, const size_t block[3], const float range[2], uint8_t leaf[128]) {
     const size_t first = 4 * block[0], rest = v->size[0] - first;
     const int count = rest < 5 ? (int)rest : 5;
@@ -1861,13 +1864,10 @@ static void isogi_vol__mark_broken(const isogi_volume *v, const size_t block[3],
     for (z = 0; z < 5; z++)
         for (y = 0; y < 5; y++, leaf += 5) {
             double row[5];
-            int broken = 0;
             isogi_vol__row(v, (int)first, (int)isogi_vol__min_size(4 * block[1] + (size_t)y, v->size[1] - 1),
                            (int)isogi_vol__min_size(4 * block[2] + (size_t)z, v->size[2] - 1), count, row);
-            for (x = 0; x < 5; x++) {
-                if (x < count) broken = !isogi_vol__finite64(row[x]);
-                if (broken) leaf[x] = ISOGI_VOL__BROKEN;
-            }
+            for (x = 0; x < count; x++)
+                if (!isogi_vol__finite64(row[x])) leaf[x] = ISOGI_VOL__BROKEN;
         }
 }
 
@@ -1882,8 +1882,7 @@ static void isogi_vol__build_strip(const isogi_vol__build_job *job, size_t x0, s
     int i;
     for (i = leaves; i & 3; i++) low[i] = scale[i] = 0; /* vectors hold four leaves */
     for (i = 0; i < leaves; i++) {
-        const float *range = level->range[first + (size_t)i];
-        bound[i][0] = (uint8_t)isogi_vol__quantise(p, (double)range[0]), bound[i][1] = (uint8_t)isogi_vol__quantise(p, (double)range[1]);
+        isogi_vol__quantise_block(p, first + (size_t)i, bound[i]);
         low[i] = (float)bound[i][0], scale[i] = ISOGI_VOL__CODES / (float)(bound[i][1] + 1 - bound[i][0]);
     }
     isogi_vol__code_strip(job, x0, count, by, bz, leaves, low, scale, leaf);
@@ -4040,7 +4039,7 @@ typedef struct isogi_vol__walk {
     int inside;     /* 1, 0, -1 = not known */
     int deflate;    /* the walk begins on the surface and has not left it so far */
     double deflated; /* up to where; a cell that begins later is not next to it */
-    int exact;      /* 0: any hit will do */
+    int exact;      /* 0: any_will_do */
     int end_is_border;
     int cap; /* what a hit in the present cell says of its side: 2 right behind the border of a capped volume, else 1 */
     isogi_counters count;
@@ -4225,8 +4224,10 @@ static int isogi_vol__walk_on(isogi_vol__walk *w, uint32_t flags, isogi_hit *hit
         int before[3], changed = 0;
         double t;
         if (isogi_vol__uniform_block(w, top, low, high, &inside)) {
-            /* Blocks share their faces' voxels, so neighbours that lie on different sides share a face without a finite value. */
-            if (!w->pyramid->all_finite && w->inside == !inside && !isogi_vol__corners(w->pyramid, w->cell, 0, corner)) w->inside = -1;
+            /* Blocks share their faces' voxels, so neighbours that lie on different sides share a face without a finite value: no surface
+               there, and the side is forgotten. Else only rounding, or a cap, makes another side of one that is known. */
+            if (!w->pyramid->all_finite && inside >= 0 && w->inside == !inside && !isogi_vol_corners(w->pyramid, w->cell, corner))
+                w->inside = -1;
             if (isogi_vol__state(w, inside, hit)) return 1;
             w->deflate = 0;
             t = isogi_vol__exit(w, low, high, &axis);
@@ -4677,6 +4678,9 @@ static void isogi_vol__open_bundle(isogi_vol__batch *b, size_t n) {
     }
 }
 
+/* Whether a ray is done where it is known to come to both sides. Past a voxel that is not finite it may do so without a hit. */
+static int isogi_vol__any_will_do(const isogi_vol__batch *b) { return b->occluded && b->pyramid->all_finite; }
+
 static uint32_t isogi_vol__flags(const isogi_vol__batch *b, size_t i) { return b->rays ? b->rays[b->bundle ? 0 : i].flags : b->flags; }
 
 /* Whether the field is inside at the present cell's point that lies at t. */
@@ -4733,7 +4737,7 @@ static int isogi_vol__begin_start(const isogi_vol__batch *b, size_t i, isogi_vol
 /* Sets a walk up; 0: there is nothing to walk. */
 static int isogi_vol__begin(isogi_vol__batch *b, size_t i, isogi_vol__walk *w) {
     w->pyramid = b->pyramid, w->inside = -1, w->entry_axis = -1, w->cap = 1, w->deflate = 0;
-    w->exact = b->hits || !b->pyramid->all_finite; /* a change of side is no hit where a voxel is not finite */
+    w->exact = !isogi_vol__any_will_do(b);
     w->origin[3] = w->deflated = 0;
     w->count.blocks = w->count.cells = w->count.cubics = 0;
     b->work.rays++;
@@ -5883,7 +5887,7 @@ ISOGI_VOL__TARGET("avx2") static int isogi_vol__decide(isogi_vol__batch *b, isog
     w.origin[3] = w.dir[3] = w.inverse[3] = 0;
     w.pyramid = b->pyramid, w.base = s->base[i], w.t = 0, w.end = s->stop[i], w.isovalue = s->isovalue[i];
     w.deflate = s->side[i] < -1, w.inside = w.deflate ? (int)s->side[i] / 2 + 2 : (int)s->side[i], w.deflated = s->deflated[i];
-    w.exact = b->hits != NULL, w.cap = 1, w.end_is_border = 0;
+    w.exact = !isogi_vol__any_will_do(b), w.cap = 1, w.end_is_border = 0;
     w.count.cubics = w.count.cells = 0;
     found = isogi_vol__mixed_cell_avx2(&w, (int)(cell & 0xffff), (int)(cell >> 16 & 0xffff), (int)(cell >> 32 & 0xffff),
                                        in == 3 ? (int)s->entry_axis[i] : in, out == 3 ? -1 : out, hit);
@@ -6172,7 +6176,7 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE void isogi_vol__decide_some(isogi_vol__batch
         odd = (__mmask8)((odd | ~(same | cross | left)) & lanes);
         /* of a corner that is not finite no coefficient is */
         broken = _mm512_mask_cmp_pd_mask(lanes, most, _mm512_set1_pd(DBL_MAX), _CMP_NLE_UQ), odd = (__mmask8)(odd & ~broken);
-        cross = (__mmask8)(cross & lanes & ~(odd | broken)), same = (__mmask8)((same & lanes & ~(odd | broken)) | left);
+        cross = (__mmask8)(cross & lanes & ~(odd | broken)), same = (__mmask8)(((same & lanes & ~odd) | left) & ~broken);
     }
     b->work.cubics += (uint64_t)__builtin_popcount((unsigned)(same | cross));
 #pragma GCC unroll 3
@@ -7418,7 +7422,7 @@ typedef struct __attribute__((aligned(64))) isogi_vol__known {
 
 /* Works out what rays in doubt find in their cells, and the hits, each ray's first one first. */
 ISOGI_VOL__AVX512 static void isogi_vol__settle_all(isogi_vol__batch *b, isogi_vol__pool *s, isogi_vol__known *k, unsigned hits) {
-    const unsigned doubts = b->hits ? k->doubts : k->doubts & ~k->hits, both = doubts & hits;
+    const unsigned doubts = isogi_vol__any_will_do(b) ? k->doubts & ~k->hits : k->doubts, both = doubts & hits;
     __m512i later[2];
     unsigned found;
     int h;
@@ -7466,7 +7470,7 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE void isogi_vol__look_in_leaf(isogi_vol__batc
         _mm512_mask_store_epi64(&k->doubted[0], (__mmask8)doubt, _mm512_set1_epi64(here));
         _mm512_mask_store_epi64(&k->doubted[8], (__mmask8)(doubt >> 8), _mm512_set1_epi64(here));
         k->doubts |= doubt;
-        if (!(k->active & ~k->doubts)) isogi_vol__settle_all(b, s, k, b->hits ? k->hits : 0);
+        if (!(k->active & ~k->doubts)) isogi_vol__settle_all(b, s, k, isogi_vol__any_will_do(b) ? 0 : k->hits);
     }
 }
 
@@ -7528,15 +7532,14 @@ ISOGI_VOL__AVX512 ISOGI_VOL__NOINLINE static void isogi_vol__trace_packet(isogi_
         n--;
     }
 out:
-    isogi_vol__settle_all(b, s, &known, b->hits ? known.hits : 0);
+    isogi_vol__settle_all(b, s, &known, isogi_vol__any_will_do(b) ? 0 : known.hits);
     _mm512_store_si512(&s->level[0], _mm512_set1_epi64(-1)), _mm512_store_si512(&s->level[8], _mm512_set1_epi64(-1));
     for (lanes = rays; b->occluded && lanes; lanes &= lanes - 1)
         b->occluded[s->ray[__builtin_ctz(lanes)]] = !(known.active >> __builtin_ctz(lanes) & 1);
-    for (lanes = rays & (known.active | known.alone); b->hits && lanes; lanes &= lanes - 1) {
-        const int slot = __builtin_ctz(lanes);
-        if (known.active >> slot & 1) memset(&b->hits[s->ray[slot]], 0, sizeof b->hits[0]);
-        else b->work.rays--, isogi_vol__trace_one(b, s->ray[slot]); /* what it hits is next to that cell */
-    }
+    for (lanes = rays & known.active; b->hits && lanes; lanes &= lanes - 1)
+        memset(&b->hits[s->ray[__builtin_ctz(lanes)]], 0, sizeof b->hits[0]);
+    for (lanes = known.alone; lanes; lanes &= lanes - 1) /* what they hit is next to that cell */
+        b->work.rays--, isogi_vol__trace_one(b, s->ray[__builtin_ctz(lanes)]);
 }
 
 /* ---- rays that begin in one place ----
@@ -8451,8 +8454,7 @@ ISOGI_VOL__AVX512 static void isogi_vol__trace_pool(isogi_vol__batch *b, size_t 
             rays = isogi_vol__seat_packet(b, &s, next, n);
             next += (size_t)n;
             if (!rays) continue;
-            if ((b->hits || b->pyramid->all_finite) && __builtin_popcount(rays) >= ISOGI_VOL__PACKET / 4 &&
-                isogi_vol__seats_coincide(&s, rays)) {
+            if (__builtin_popcount(rays) >= ISOGI_VOL__PACKET / 4 && isogi_vol__seats_coincide(&s, rays)) {
                 isogi_vol__trace_packet(b, &s, rays);
                 run = ISOGI_VOL__POOL;
                 continue;
@@ -8463,7 +8465,7 @@ ISOGI_VOL__AVX512 static void isogi_vol__trace_pool(isogi_vol__batch *b, size_t 
         }
         if (!opened) {
             isogi_vol__open_turn(&turn, b->pyramid);
-            turn.any = b->occluded && b->pyramid->all_finite, opened = 1; /* as in begin */
+            turn.any = isogi_vol__any_will_do(b), opened = 1;
             isogi_vol__clear_pool(&s, taken, groups, b->pyramid);
         }
         isogi_vol__run_pool(b, &turn, &s, groups, open, &next, end);

@@ -654,6 +654,10 @@ TEST(cells_without_a_surface_hit_like_the_reference) {
         scene_noise(&s, 0, &r);
         for (int k = 0; k < 12; k++)
             s.value[random_bits(&r) % scene_voxels(&s)] = k % 3 == 0 ? (double)NAN : k % 3 == 1 ? (double)INFINITY : -(double)INFINITY;
+        for (int i = 0; i < 9 * 18 * 7 && v % 2; i++) { /* a sheet, and what is out of a ball */
+            const double x = i % 9 - 4, y = i / 9 % 18 - 8.5, z = i / 162 - 3;
+            if (v % 4 == 1 ? i / 9 % 18 == 8 && random_bits(&r) % 4 : x * x + y * y + z * z > 30) s.value[i] = (double)NAN;
+        }
         scene_build(&s);
         run_rays(&s, 0, BATCH, -0.7, 0.7, 0, 0, &t, &r);
         scene_free(&s);

@@ -5,7 +5,8 @@
 #include "ray_fields.h"
 #include "test.h"
 
-/* Single voxels; balls; all but a ball; below a hilly ground; sheets one voxel thick in borders of blocks; a few infinite ones. */
+/* Single voxels; balls; all but a ball; below a hilly ground; sheets one voxel thick in borders of blocks, with low values and high ones in
+   turns between them; a few infinite ones. */
 enum { SPECKS, BALLS, OUTSIDE, GROUND, SHEETS, INFINITE, HOLES };
 
 static int in_ball(const int at[3], const double ball[4]) {
@@ -16,6 +17,7 @@ static int in_ball(const int at[3], const double ball[4]) {
 
 static void make_holes(field *f, int holes, test_random *r) {
     const double odd[3] = {(double)NAN, (double)INFINITY, -(double)INFINITY}, slope = random_range(r, -0.5, 0.5);
+    const uint64_t rare = 15 + random_bits(r) % 150;
     const int axis = (int)(random_bits(r) % 3), most = f->size[0] > f->size[1] ? f->size[0] : f->size[1];
     double ball[3][4];
     for (int i = 0; i < 3; i++) {
@@ -27,12 +29,13 @@ static void make_holes(field *f, int holes, test_random *r) {
         const int x = (int)i % f->size[0], y = (int)i / f->size[0] % f->size[1], z = (int)i / f->size[0] / f->size[1];
         const int at[3] = {x, y, z};
         int hole = 0;
-        if (holes == SPECKS) hole = random_bits(r) % 150 == 0;
+        if (holes == SPECKS) hole = random_bits(r) % rare == 0;
         else if (holes == BALLS) hole = in_ball(at, ball[0]) || in_ball(at, ball[1]) || in_ball(at, ball[2]);
         else if (holes == OUTSIDE) hole = !in_ball(at, ball[0]);
         else if (holes == GROUND) hole = z < 0.3 * f->size[2] + slope * x + sin(0.3 * y);
         else if (holes == SHEETS) hole = at[axis] % 12 == 4 && random_bits(r) % 40;
         else hole = random_bits(r) % 700 == 0;
+        if (holes == SHEETS) f->value[i] += (at[axis] + 7) / 12 % 2 ? 1 : -1;
         if (hole) f->value[i] = odd[holes == INFINITE ? 1 + x % 2 : holes == BALLS ? x % 3 : 0];
     }
 }
@@ -46,7 +49,9 @@ typedef struct holed {
 } holed;
 
 static holed holed_new(int kind, int holes, int floats, test_random *r) {
-    holed h = {.f = field_new(2 + (int)(random_bits(r) % 40), 2 + (int)(random_bits(r) % 40), 2 + (int)(random_bits(r) % 40))};
+    const int large = random_bits(r) % 8 == 0; /* now and then one more level of nodes */
+    const int x = (large ? 65 : 2) + (int)(random_bits(r) % 40), y = 2 + (int)(random_bits(r) % 40), z = 2 + (int)(random_bits(r) % 40);
+    holed h = {.f = field_new(x, y, z)};
     field *f = &h.f;
     field_fill(f, kind, r);
     if (holes < HOLES) make_holes(f, holes, r);
@@ -72,13 +77,15 @@ static void holed_free(holed *h) {
 
 /* Rays from all sides, or side by side: a picture's, whose neighbours nearly coincide. */
 static void make_rays(const holed *h, isogi_ray *rays, int abreast, double isovalue, int capped, test_random *r) {
+    const double spread = random_bits(r) & 1 ? 0.3 : 0.01;
     for (int i = 0; i < TOGETHER; i++) {
         rays[i] = abreast && i ? rays[0] : random_ray(&h->f, isovalue, r);
         for (int a = 0; a < 3 && abreast; a++) {
             if (!i) rays[i].origin[a] -= 50 * (double)rays[i].dir[a];
-            rays[i].dir[a] += (float)random_range(r, -0.002, 0.002), rays[i].origin[a] += random_range(r, -0.3, 0.3);
+            rays[i].dir[a] += (float)random_range(r, -0.002, 0.002), rays[i].origin[a] += spread * random_range(r, -1, 1);
         }
         rays[i].flags = capped && i % 3 == 0 ? ISOGI_RAY_CAPPED : 0;
+        if (i % 11 == 5) rays[i].tmin = random_range(r, -5, 60), rays[i].tmax = rays[i].tmin + random_range(r, 0.1, 30);
     }
 }
 
@@ -125,6 +132,8 @@ static void compare_bundle(found *all, const holed *h, int way, const isogi_hit 
     isogi_bundle bundle = {.isovalue = rays->isovalue};
     const isogi_hit *start = &from[random_bits(r) % TOGETHER];
     if (start->side) bundle.start = start;
+    bundle.flags = (random_bits(r) & 1 ? ISOGI_RAY_CAPPED : 0) | (start->side && random_bits(r) & 1 ? ISOGI_RAY_ONWARD : 0);
+    bundle.tmax = random_bits(r) % 4 ? 0 : random_range(r, 1, 20);
     for (int a = 0; a < 3; a++) bundle.origin[a] = random_range(r, -0.1, 1.1) * (h->f.size[a] - 1) * h->f.volume.spacing[a];
     for (int i = 0; i < TOGETHER; i++) {
         double d[3];
@@ -138,19 +147,34 @@ static void compare_bundle(found *all, const holed *h, int way, const isogi_hit 
     compare_flags(all, any, plain, TOGETHER);
 }
 
+/* Every hit along a few rays. */
+static void compare_all(found *all, const holed *h, int way, const isogi_ray *rays) {
+    enum { FEW = 8, MOST = 12 };
+    isogi_hit hits[FEW * MOST], plain[FEW * MOST];
+    size_t counts[FEW], plain_counts[FEW];
+    isogi_vol_intersect_all(h->way[way], rays, FEW, MOST, hits, counts, NULL);
+    isogi_vol_intersect_all(h->way[0], rays, FEW, MOST, plain, plain_counts, NULL);
+    for (int i = 0; i < FEW; i++) {
+        const int n = (int)(plain_counts[i] < MOST ? plain_counts[i] : MOST);
+        all->different += counts[i] != plain_counts[i];
+        if (counts[i] == plain_counts[i]) compare(all, hits + i * MOST, plain + i * MOST, n, "all", way);
+    }
+}
+
 TEST(rays_past_holes_hit_what_the_plain_walk_hits) {
     test_random r = {71};
     found first = {0, 0}, any = {0, 0}, onward = {0, 0}, bundles = {0, 0};
     for (int turn = 0; turn < (LONG_SUITE ? 6000 : 150); turn++) {
-        holed h = holed_new(turn % KINDS, turn % HOLES, turn % 4 != 3, &r);
+        const int kind = turn / HOLES % KINDS;
+        holed h = holed_new(kind, turn % HOLES, random_bits(&r) % 4 > 0, &r);
         for (int pack = 0; pack < 8; pack++) {
             isogi_ray rays[TOGETHER];
             isogi_hit plain[TOGETHER], hits[TOGETHER];
             uint8_t occluded[TOGETHER];
             double isovalue = random_range(&r, -0.8, 0.8);
-            if (turn % KINDS == QUANTISED && pack & 1) isovalue = floor(2 * isovalue) / 2;
+            if (kind == QUANTISED && random_bits(&r) & 1) isovalue = floor(2 * isovalue) / 2;
             if (pack == 7) isovalue *= 20; /* often in no voxel */
-            make_rays(&h, rays, pack % 2, isovalue, pack % 4 > 1, &r);
+            make_rays(&h, rays, (int)(random_bits(&r) % 2), isovalue, (int)(random_bits(&r) % 2), &r);
             isogi_vol_intersect(h.way[0], rays, TOGETHER, plain, NULL);
             for (int w = 1; w < WAYS; w++) {
                 isogi_vol_intersect(h.way[w], rays, TOGETHER, hits, NULL);
@@ -162,6 +186,7 @@ TEST(rays_past_holes_hit_what_the_plain_walk_hits) {
                     isogi_vol_occluded(h.way[w], &rays[i], 1, &occluded[i], NULL), compare_flags(&any, &occluded[i], &plain[i], 1);
                 }
                 compare_onward(&onward, &h, w, plain, rays, &r), compare_bundle(&bundles, &h, w, plain, rays, &r);
+                compare_all(&onward, &h, w, rays);
             }
         }
         holed_free(&h);

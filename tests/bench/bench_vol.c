@@ -172,21 +172,23 @@ static void bench_build(const isogi_volume *volume, const char *method, const ch
 
 static void bench_holed_rays(const scene *s, const isogi_pyramid *plain, const char *name, const isogi_ray *rays, size_t batch, int kind) {
     isogi_hit *hits = (isogi_hit *)malloc(RAYS * sizeof *hits);
+    uint8_t *occluded = (uint8_t *)malloc(RAYS);
     double seconds[16], wrong = 0;
     char setting[64];
     for (int run = 0; run < runs; run++) {
         double start = cpu_seconds();
-        trace_all(s, rays, batch, kind == SHARED, hits, NULL, NULL);
+        trace_all(s, rays, batch, kind == SHARED, hits, kind == ANY ? occluded : NULL, NULL);
         seconds[run] = cpu_seconds() - start;
     }
     for (size_t i = 0; i < RAYS; i += METHOD_STRIDE) {
         isogi_hit hit;
         isogi_vol_intersect(plain, &rays[i], 1, &hit, NULL);
-        wrong += hit.side != hits[i].side || (hit.side && fabs(hit.t - hits[i].t) > APART * 2 / (N - 1));
+        if (kind == ANY) wrong += (hit.side != 0) != occluded[i];
+        else wrong += hit.side != hits[i].side || (hit.side && fabs(hit.t - hits[i].t) > APART * 2 / (N - 1));
     }
     snprintf(setting, sizeof setting, "batch %zu; error: against the plain walk", batch);
     row(name, s->name, "holes", setting, median(seconds, runs), 1e6 * wrong * METHOD_STRIDE / RAYS, RAYS, "rays");
-    free(hits);
+    free(hits), free(occluded);
 }
 
 /* All voxels out of a ball, which are half of them, are NaN. */
@@ -207,6 +209,7 @@ static void bench_holes(const scene *whole, int build) {
     bench_holed_rays(&s, plain, "primary1", s.primary, 1, FIRST);
     bench_holed_rays(&s, plain, "primary16", s.primary, 16, FIRST);
     bench_holed_rays(&s, plain, "surface", s.surface, RAYS, FIRST);
+    bench_holed_rays(&s, plain, "anyhit", s.surface, RAYS, ANY);
     bench_holed_rays(&s, plain, "bundle64", s.bundles, BUNDLES * BUNDLE, SHARED);
     if (build) bench_build(&volume, "holes", "float32; error: none possible");
     isogi_vol_free(s.pyramid), isogi_vol_free(plain), free(s.data);
