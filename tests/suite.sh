@@ -264,8 +264,12 @@ long)
     item check figures/pictures "PICTURES_OUT=\"\$OUT\" PICTURES_DIVIDE=16 sh examples/pictures.sh"
     item check figures/scale-invariant "ISOGI_DATA= SIDE=48 FIGURES_PAGE=\"\$OUT/index.html\" sh examples/figures_scale_invariant.sh \"\$OUT\" && sh tests/compile/page.sh \"\$OUT\""
     item check figures/visibility "ISOGI_DATA= SIDE=48 FIGURES_PAGE=\"\$OUT/index.html\" sh examples/figures_visibility.sh \"\$OUT\" && sh tests/compile/page.sh \"\$OUT\""
-    if have glslangValidator; then item check glsl/shaders "sh tests/compile/glsl.sh"
-    else item skip glsl/shaders "glslangValidator is not installed"
+    if have glslangValidator; then item check glsl/compiled "sh tests/compile/glsl.sh compile"
+    else item skip glsl/compiled "glslangValidator is not installed"
+    fi
+    if printf '#include <EGL/egl.h>\n#include <GL/glcorearb.h>\n' | $CC -E - > /dev/null 2>&1; then
+        item check glsl/run "sh tests/compile/glsl.sh run"
+    else item skip glsl/run "<EGL/egl.h> and <GL/glcorearb.h> are not installed"
     fi
     if have mpirun && have mpicc; then item check mpi/same-bits "sh tests/compile/mpi.sh"
     else item skip mpi/same-bits "mpicc and mpirun are not installed"
