@@ -1967,7 +1967,7 @@ static isogi_result isogi_vol__fill_nodes(isogi_vol__build_job *job, const isogi
     return ISOGI_OK;
 }
 
-/* What fast rays look up, rides only within, inner, turn, size and reach: see fast traversal. */
+/* What fast rays look up, rides only within, inner, turn, size, wider and reach: see fast traversal. */
 struct isogi_vol__ways {
     int32_t lane[ISOGI_VOL__NODE_LEVELS][16], row[ISOGI_VOL__NODE_LEVELS][16]; /* 0 1 2 3 children of a level, in cells, along rows of four
                                                                                   lanes, and down those rows */
@@ -1982,8 +1982,9 @@ struct isogi_vol__ways {
                                                   this level */
     uint64_t first[ISOGI_VOL__NODE_LEVELS]; /* of those nodes, in bytes */
     float size[ISOGI_VOL__NODE_LEVELS];  /* of a child, in cells */
-    float wide[ISOGI_VOL__NODE_LEVELS];  /* the same, with what rays alone widen it by on both sides (AVX-512) */
-    float reach;                         /* that, on one side */
+    float wide[ISOGI_VOL__NODE_LEVELS];  /* the same, with what rays alone widen it by on both sides (AVX-512), */
+    float wider[ISOGI_VOL__NODE_LEVELS]; /* and with what rides do */
+    float reach;                         /* that of rays alone, on one side */
     float scale[256];                    /* steps of a leaf in a unit of nodes, by how far its bounds are apart */
     uint64_t above[ISOGI_VOL__NODE_LEVELS], digit[ISOGI_VOL__NODE_LEVELS]; /* digits of packed cells above children of a level;
                                                                               where those have theirs */
@@ -2002,7 +2003,8 @@ ISOGI_VOL__COLD static void isogi_vol__set_ways(struct isogi_vol__ways *ways, co
     ways->reach = ISOGI_VOL__NEAR(levels);
     for (i = 0; i < ISOGI_VOL__NODE_LEVELS; i++) {
         for (a = 0; a < 16; a++) ways->lane[i][a] = (a & 3) << 2 * i, ways->row[i][a] = a >> 2 << 2 * i;
-        ways->size[i] = (float)(1 << 2 * i), ways->wide[i] = ways->size[i] + 2 * ISOGI_VOL__NEAR(levels);
+        ways->size[i] = (float)(1 << 2 * i);
+        ways->wide[i] = ways->size[i] + 2 * ISOGI_VOL__NEAR(levels), ways->wider[i] = ways->size[i] + 4 * ISOGI_VOL__NEAR(levels);
         ways->above[i] = 0x0000ffffffffffffu & ~(0x000100010001u * (((uint64_t)4 << 2 * i) - 1)),
         ways->digit[i] = (uint64_t)0x000300030003u << 2 * i;
     }
@@ -2357,7 +2359,6 @@ typedef float32x4_t isogi_vol__four;
 #define isogi_vol__neon_setzero_ps() vdupq_n_f32(0)
 #define isogi_vol__neon_loadu_ps vld1q_f32
 #define isogi_vol__neon_storeu_ps vst1q_f32
-#define isogi_vol__neon_cvtss_f32(v) vgetq_lane_f32(v, 0)
 ISOGI_VOL__INLINE float32x4_t isogi_vol__neon_setr_ps(float a, float b, float c, float d) {
     const float32x4_t v = {a, b, c, d};
     return v;
@@ -2378,7 +2379,6 @@ static isogi_vol__four isogi_vol__plain_setr_ps(float a, float b, float c, float
 }
 static isogi_vol__four isogi_vol__plain_set1_ps(float a) { return isogi_vol__plain_setr_ps(a, a, a, a); }
 static isogi_vol__four isogi_vol__plain_loadu_ps(const float *p) { return isogi_vol__plain_setr_ps(p[0], p[1], p[2], p[3]); }
-static float isogi_vol__plain_cvtss_f32(isogi_vol__four a) { return a.f[0]; }
 static void isogi_vol__plain_storeu_ps(float *p, isogi_vol__four a) { memcpy(p, a.f, sizeof a.f); }
 #define ISOGI_VOL__EACH(name, result) \
     static isogi_vol__four isogi_vol__plain_##name(isogi_vol__four a, isogi_vol__four b) { \
@@ -4776,8 +4776,8 @@ typedef struct isogi_vol__trip {
     double inverse[4];            /* as in a pool; the fourth is 0 */
     int32_t lead[4];              /* 1 on axes along which the ray falls, else 0 */
     int64_t stop;                 /* where the ray ends, as in a pool */
-    float cell[3];                /* time that a cell takes by each axis; on its fastest axis a ray takes 1 */
-    float enter[ISOGI_VOL__NODE_LEVELS][3]; /* when the node of the next level is entered, widened: by each axis for itself */
+    float cell[12];               /* time that a cell takes by each axis, four times each; on its fastest axis a ray takes 1 */
+    float enter[ISOGI_VOL__NODE_LEVELS][12]; /* when the node of the next level is entered, widened: by each axis for itself */
     float last, level;            /* where it ends, or a little more; the isovalue in 8 bits, unrounded */
     int flip, octant, low, high;  /* children and axes that are counted backwards; what the isovalue can be in 8 bits */
     int entry_axis, in, out;      /* axes by which the ray enters the volume (-1), and enters and leaves the present cell (3); or none */
@@ -4790,9 +4790,8 @@ typedef struct isogi_vol__trip {
 /* A ray on its way from node to node, which can be left where it is going to read memory, and taken up again. */
 typedef struct isogi_vol__ride {
     isogi_vol__walk walk;
-    const uint8_t *open; /* the node that is to be opened next, or NULL */
+    const uint8_t *open; /* the node that is to be opened next */
     isogi_vol__leaf leaf;
-    int looked;     /* the present cell is in doubt, and its voxels are sent for */
     size_t number;  /* the ray's in its batch, */
     uint32_t flags; /* and its flags */
     int at;         /* level of the node among whose children it is: level n has children of 4^n cells */
@@ -4806,14 +4805,10 @@ ISOGI_VOL__INLINE void isogi_vol__ride_to(isogi_vol__ride *r, const uint8_t *nod
     ISOGI_VOL__PREFETCH(node + 64);
 }
 
-/* Whether there is nothing to be read of the node that is to be opened. */
-ISOGI_VOL__INLINE int isogi_vol__ride_knows(const isogi_vol__ride *r) { return !r->at && r->walk.pyramid->volume.compact; }
-
 /* Sends for the voxels of a cell. */
-ISOGI_VOL__INLINE void isogi_vol__ride_to_cell(isogi_vol__ride *r, int x, int y, int z) {
+ISOGI_VOL__INLINE void isogi_vol__ride_to_cell(const isogi_vol__ride *r, int x, int y, int z) {
     const isogi_volume *v = &r->walk.pyramid->volume;
     const char *at = (const char *)v->data + x * v->stride[0] + y * v->stride[1] + z * v->stride[2];
-    r->looked = 1;
     ISOGI_VOL__PREFETCH(at);
     ISOGI_VOL__PREFETCH(at + v->stride[1]);
     ISOGI_VOL__PREFETCH(at + v->stride[2]);
@@ -4877,7 +4872,7 @@ static int isogi_vol__ride_set(isogi_vol__ride *r) {
     }
     c->flip = 3 * (c->octant & 1) + 6 * (c->octant & 2) + 12 * (c->octant & 4);
     memcpy(&c->stop, &w->end, sizeof c->stop), c->stop |= 3;
-    c->entry_axis = w->entry_axis, r->looked = 0;
+    c->entry_axis = w->entry_axis;
     return 1;
 }
 
@@ -4892,8 +4887,9 @@ static void isogi_vol__ride_start(isogi_vol__ride *r) {
     c->level = isogi_vol__quantise_isovalue(p, w->isovalue, &c->low, &c->high);
     for (a = 0; a < 3; a++) {
         const double start = c->lead[a] ? (4 << 2 * top) - w->origin[a] : w->origin[a]; /* counted like cells */
-        c->cell[a] = (float)isogi_vol__min(fabs(c->inverse[a]) * most, 1e30);
-        c->enter[top][a] = (-2 * p->ways->reach - (float)start) * c->cell[a];
+        const float cell = (float)isogi_vol__min(fabs(c->inverse[a]) * most, 1e30);
+        ISOGI_VOL__FOUR(storeu_ps)(c->cell + 4 * a, ISOGI_VOL__FOUR(set1_ps)(cell));
+        ISOGI_VOL__FOUR(storeu_ps)(c->enter[top] + 4 * a, ISOGI_VOL__FOUR(set1_ps)((-2 * p->ways->reach - (float)start) * cell));
     }
     c->last = (float)(isogi_vol__min(w->end * most, 1e30) * 1.000001);
     memset(c->place[top], 0, sizeof c->place[top]);
@@ -4905,16 +4901,16 @@ static void isogi_vol__ride_start(isogi_vol__ride *r) {
 ISOGI_VOL__INLINE void isogi_vol__trip_layers(isogi_vol__trip *c, const struct isogi_vol__ways *ways, int n, isogi_vol__four in[3],
                                               isogi_vol__four out[3]) {
     const isogi_vol__four last = ISOGI_VOL__FOUR(set1_ps)(c->last), zero = ISOGI_VOL__FOUR(set1_ps)(0);
-    const float size = ways->size[n], wide = size + 4 * ways->reach, *layer = ways->within[c->child];
+    const isogi_vol__four size = ISOGI_VOL__FOUR(set1_ps)(ways->size[n]), wide = ISOGI_VOL__FOUR(set1_ps)(ways->wider[n]);
     int a;
     ISOGI_VOL__UNROLL(3)
     for (a = 0; a < 3; a++) {
-        const isogi_vol__four step = ISOGI_VOL__FOUR(set1_ps)(c->cell[a] * size), begin = ISOGI_VOL__FOUR(set1_ps)(c->enter[n][a]);
-        const isogi_vol__four layers = ISOGI_VOL__FOUR(loadu_ps)(layer + 4 * a);
-        const isogi_vol__four times = ISOGI_VOL__FOUR(add_ps)(begin, ISOGI_VOL__FOUR(mul_ps)(layers, step));
+        const isogi_vol__four cell = ISOGI_VOL__FOUR(loadu_ps)(c->cell + 4 * a), begin = ISOGI_VOL__FOUR(loadu_ps)(c->enter[n] + 4 * a);
+        const isogi_vol__four layers = ISOGI_VOL__FOUR(loadu_ps)(ways->within[c->child] + 4 * a);
+        const isogi_vol__four times = ISOGI_VOL__FOUR(add_ps)(begin, ISOGI_VOL__FOUR(mul_ps)(layers, ISOGI_VOL__FOUR(mul_ps)(cell, size)));
         in[a] = ISOGI_VOL__FOUR(max_ps)(times, zero);
-        out[a] = ISOGI_VOL__FOUR(min_ps)(ISOGI_VOL__FOUR(add_ps)(times, ISOGI_VOL__FOUR(set1_ps)(c->cell[a] * wide)), last);
-        if (n) c->enter[n - 1][a] = ISOGI_VOL__FOUR(cvtss_f32)(times);
+        out[a] = ISOGI_VOL__FOUR(min_ps)(ISOGI_VOL__FOUR(add_ps)(times, ISOGI_VOL__FOUR(mul_ps)(cell, wide)), last);
+        if (n) ISOGI_VOL__FOUR(storeu_ps)(c->enter[n - 1] + 4 * a, ISOGI_VOL__LANE_base(times, 0));
     }
 }
 
@@ -4949,11 +4945,23 @@ ISOGI_VOL__INLINE uint64_t isogi_vol__spread_rows(uint64_t x) {
 }
 
 /* Which children of a node the ray passes or comes near, in its own order, from which layers of every two axes it is in at once. */
-ISOGI_VOL__INLINE uint64_t isogi_vol__trip_way_base(const isogi_vol__four in[3], const isogi_vol__four out[3]) {
+ISOGI_VOL__INLINE uint64_t isogi_vol__way_base(const isogi_vol__four in[3], const isogi_vol__four out[3]) {
     const uint64_t xy = isogi_vol__met(in[0], out[0], in[1], out[1]), xz = isogi_vol__met(in[0], out[0], in[2], out[2]);
     uint64_t yz = isogi_vol__spread_rows(isogi_vol__met(in[1], out[1], in[2], out[2]));
     yz = (yz | yz << 6) & 0x0303030303030303u, yz = (yz | yz << 3) & 0x1111111111111111u;
     return xy * 0x0001000100010001u & isogi_vol__spread_rows(xz) * 0x1111u & yz * 15;
+}
+
+ISOGI_VOL__INLINE uint64_t isogi_vol__beam_way_base(const isogi_vol__beam *beam, const struct isogi_vol__ways *ways, int n) {
+    isogi_vol__four in[3], out[3];
+    isogi_vol__beam_layers(beam, ways, n, in, out);
+    return isogi_vol__way_base(in, out);
+}
+
+ISOGI_VOL__INLINE uint64_t isogi_vol__trip_way_base(isogi_vol__trip *c, const struct isogi_vol__ways *ways, int n) {
+    isogi_vol__four in[3], out[3];
+    isogi_vol__trip_layers(c, ways, n, in, out);
+    return isogi_vol__way_base(in, out);
 }
 
 /* Children counted backwards along the axes of `octant`. */
@@ -5032,10 +5040,11 @@ static int isogi_vol__passes_base(isogi_vol__ride *r, const int32_t cell[4], dou
 
 /* The same by every path.
    leaf_mask: which of the 64 cells (x + 4y + 16z) of a leaf can hold the surface.
-   trip_open: opens the node that was sent for: its children that are passed, by a beam if one is given, and can hold the surface, are the
-   next ones.
-   trip_cell: the next cell of the leaf: 1: hit; 0: none; -1: its voxels are sent for.
-   ride_on: to the first hit: 1, or to the end: 0; waits: to where memory is to be read next, which is sent for: -1. */
+   on_way: of the children that can hold the surface those that are passed, by a beam if one is given, in the ray's order.
+   trip_open: opens the node that was sent for: these are the next ones; open_node: of nodes and leaves; open_leaf: of cells.
+   trip_look: the next cell of the leaf: 0: nothing is there; -1: it is in doubt, and its voxels are sent for; 1: any hit will do, and there
+   is one. trip_decide: the cell that is in doubt: 1: hit; 0: none.
+   ride_on: to the first hit: 1, or to the end: 0. */
 #define ISOGI_VOL__TRIP(path, target) \
     target ISOGI_VOL__INLINE uint64_t isogi_vol__leaf_mask_##path(const uint8_t node[128], float level, isogi_vol__leaf *leaf) { \
         isogi_vol__open_leaf(leaf, node, level); \
@@ -5044,90 +5053,123 @@ static int isogi_vol__passes_base(isogi_vol__ride *r, const int32_t cell[4], dou
                                       ~isogi_vol__at_least_##path(node, leaf->outside), \
                                       ~isogi_vol__at_least_##path(node + 64, leaf->outside)); \
     } \
-    target ISOGI_VOL__INLINE void isogi_vol__trip_open_##path(isogi_vol__ride *r, const isogi_vol__beam *beam) { \
+    target ISOGI_VOL__INLINE uint64_t isogi_vol__on_way_##path(isogi_vol__ride *r, const isogi_vol__beam *beam, int n, uint64_t held) { \
+        const struct isogi_vol__ways *ways = r->walk.pyramid->ways; \
+        const uint64_t way = beam ? isogi_vol__beam_way_##path(beam, ways, n) : isogi_vol__trip_way_##path(&r->trip, ways, n); \
+        r->walk.count.blocks++; \
+        return isogi_vol__turn_mask_##path(held, ways, r->trip.octant) & way; \
+    } \
+    target ISOGI_VOL__INLINE void isogi_vol__open_node_##path(isogi_vol__ride *r, const isogi_vol__beam *beam) { \
         isogi_vol__trip *c = &r->trip; \
         const isogi_pyramid *p = r->walk.pyramid; \
-        const int n = r->at, leaves = !p->volume.compact; \
+        const int n = r->at; \
         const size_t x = (size_t)c->place[n][0], y = (size_t)c->place[n][1], z = (size_t)c->place[n][2]; \
-        const uint64_t held = \
-            n        ? isogi_vol__at_least_##path(r->open + 64, c->low) & ~isogi_vol__at_least_##path(r->open, c->high + 1) \
-            : leaves ? isogi_vol__leaf_mask_##path(r->open, c->level, &r->leaf) \
-                     : isogi_vol__no_leaf(p, x, y, z, &r->leaf); \
-        isogi_vol__four in[3], out[3]; \
-        uint64_t mask; \
-        if (beam) isogi_vol__beam_layers(beam, p->ways, n, in, out); \
-        else isogi_vol__trip_layers(c, p->ways, n, in, out); \
-        mask = isogi_vol__turn_mask_##path(held, p->ways, c->octant) & isogi_vol__trip_way_##path(in, out); \
-        r->walk.count.blocks++, r->open = NULL; \
-        if (!n) c->cells = mask; \
-        else { \
-            c->left[n] = mask, c->pending |= (unsigned)(mask != 0) << n; \
-            c->children[n] = n > 1 || leaves ? p->nodes[isogi_vol__node_at(p, n - 1, 4 * x, 4 * y, 4 * z)] : NULL; \
-        } \
+        const uint64_t held = isogi_vol__at_least_##path(r->open + 64, c->low) & ~isogi_vol__at_least_##path(r->open, c->high + 1); \
+        c->left[n] = isogi_vol__on_way_##path(r, beam, n, held), c->pending |= (unsigned)(c->left[n] != 0) << n; \
+        c->children[n] = n > 1 || !p->volume.compact ? p->nodes[isogi_vol__node_at(p, n - 1, 4 * x, 4 * y, 4 * z)] : NULL; \
     } \
-    target ISOGI_VOL__INLINE int isogi_vol__trip_cell_##path(isogi_vol__ride *r, isogi_hit *hit) { \
+    target ISOGI_VOL__INLINE void isogi_vol__open_leaf_##path(isogi_vol__ride *r, const isogi_vol__beam *beam) { \
+        isogi_vol__trip *c = &r->trip; \
+        const isogi_pyramid *p = r->walk.pyramid; \
+        const int32_t *place = c->place[0]; \
+        const uint64_t held = \
+            p->volume.compact ? isogi_vol__no_leaf(p, (size_t)place[0], (size_t)place[1], (size_t)place[2], &r->leaf) \
+                              : isogi_vol__leaf_mask_##path(r->open, c->level, &r->leaf); \
+        c->cells = isogi_vol__on_way_##path(r, beam, 0, held); \
+    } \
+    target ISOGI_VOL__INLINE void isogi_vol__trip_open_##path(isogi_vol__ride *r, const isogi_vol__beam *beam) { \
+        if (r->at) isogi_vol__open_node_##path(r, beam); \
+        else isogi_vol__open_leaf_##path(r, beam); \
+    } \
+    target ISOGI_VOL__INLINE int isogi_vol__trip_look_##path(isogi_vol__ride *r) { \
         isogi_vol__trip *c = &r->trip; \
         isogi_vol__walk *w = &r->walk; \
         double begin, end; \
         int32_t cell[4]; \
+        int told = 0; \
         isogi_vol__child_place(cell, c->place[0], w->pyramid->ways->inner[isogi_vol__lowest_bit(c->cells) ^ c->flip]); \
-        if (!r->looked && isogi_vol__passes_##path(r, cell, &begin, &end)) { \
-            const int told = w->deflate || !r->leaf.code ? 0 : isogi_vol__cell_told_##path(w, &r->leaf, cell, begin, end); \
+        if (isogi_vol__passes_##path(r, cell, &begin, &end)) { \
+            if (!w->deflate && r->leaf.code) told = isogi_vol__cell_told_##path(w, &r->leaf, cell, begin, end); \
             w->count.cells += told != 0; \
-            if (told > 1) return 1; \
             if (!told) { \
                 isogi_vol__ride_to_cell(r, cell[0], cell[1], cell[2]); \
                 return -1; \
             } \
         } \
         c->cells &= c->cells - 1; \
-        if (!r->looked) return 0; \
-        r->looked = 0; \
-        return isogi_vol__mixed_cell_##path(w, cell[0], cell[1], cell[2], c->in == 3 ? c->entry_axis : c->in, \
+        return told > 1; \
+    } \
+    target ISOGI_VOL__INLINE int isogi_vol__trip_decide_##path(isogi_vol__ride *r, isogi_hit *hit) { \
+        isogi_vol__trip *c = &r->trip; \
+        int32_t cell[4]; \
+        isogi_vol__child_place(cell, c->place[0], r->walk.pyramid->ways->inner[isogi_vol__lowest_bit(c->cells) ^ c->flip]); \
+        c->cells &= c->cells - 1; \
+        return isogi_vol__mixed_cell_##path(&r->walk, cell[0], cell[1], cell[2], c->in == 3 ? c->entry_axis : c->in, \
                                             c->out == 3 ? -1 : c->out, hit); \
     } \
-    target static int isogi_vol__ride_on_##path(isogi_vol__ride *r, int waits, isogi_hit *hit) { \
+    target static int isogi_vol__ride_on_##path(isogi_vol__ride *r, isogi_hit *hit) { \
         isogi_vol__trip *c = &r->trip; \
         if (c->low > c->high) return 0; \
         do { \
-            if (r->open) isogi_vol__trip_open_##path(r, NULL); \
+            isogi_vol__trip_open_##path(r, NULL); \
             while (c->cells) { \
-                const int found = isogi_vol__trip_cell_##path(r, hit); \
-                if (found > 0) return 1; \
-                if (found < 0 && waits) return -1; \
+                const int found = isogi_vol__trip_look_##path(r); \
+                if (found > 0 || (found && isogi_vol__trip_decide_##path(r, hit))) return 1; \
             } \
-        } while (isogi_vol__trip_next(r) && (!waits || isogi_vol__ride_knows(r))); \
-        return r->open ? -1 : 0; \
+        } while (isogi_vol__trip_next(r)); \
+        return 0; \
     }
 
 ISOGI_VOL__TRIP(base, )
 
 #ifdef ISOGI_VOL__AVX
-/* What trip_way_base finds, from all three axes together: a vector has two rows of four children. */
-ISOGI_VOL__TARGET("avx2") ISOGI_VOL__INLINE uint64_t isogi_vol__trip_way_avx2(const __m128 in[3], const __m128 out[3]) {
-    const __m256i row[2] = {_mm256_setr_epi32(0, 0, 0, 0, 1, 1, 1, 1), _mm256_setr_epi32(2, 2, 2, 2, 3, 3, 3, 3)};
+/* What way_base finds, from all three axes together: a vector has two rows of four children. in, out: of x and y; of z, twice. */
+ISOGI_VOL__TARGET("avx2") ISOGI_VOL__INLINE uint64_t isogi_vol__way_avx2(__m256 in, __m256 out, __m256 in_z, __m256 out_z) {
+    const __m256i row[2] = {_mm256_setr_epi32(4, 4, 4, 4, 5, 5, 5, 5), _mm256_setr_epi32(6, 6, 6, 6, 7, 7, 7, 7)};
     const __m256i order = _mm256_setr_epi32(0, 4, 1, 5, 2, 6, 3, 7);
-    const __m256 in_x = _mm256_insertf128_ps(_mm256_castps128_ps256(in[0]), in[0], 1);
-    const __m256 out_x = _mm256_insertf128_ps(_mm256_castps128_ps256(out[0]), out[0], 1);
-    __m256 enter[2], leave[2];
-    __m256i slice[4];
-    float in_z[4], out_z[4];
-    int i;
-    _mm_storeu_ps(in_z, in[2]), _mm_storeu_ps(out_z, out[2]);
-#pragma GCC unroll 2
-    for (i = 0; i < 2; i++) {
-        enter[i] = _mm256_max_ps(in_x, _mm256_permutevar8x32_ps(_mm256_castps128_ps256(in[1]), row[i]));
-        leave[i] = _mm256_min_ps(out_x, _mm256_permutevar8x32_ps(_mm256_castps128_ps256(out[1]), row[i]));
-    }
-#define ISOGI_VOL__MET(i, z) _mm256_castps_si256(_mm256_cmp_ps( \
-    _mm256_max_ps(enter[i], _mm256_set1_ps(in_z[z])), _mm256_min_ps(leave[i], _mm256_set1_ps(out_z[z])), _CMP_LE_OQ))
-#pragma GCC unroll 4
-    for (i = 0; i < 4; i++) slice[i] = _mm256_packs_epi32(ISOGI_VOL__MET(0, i), ISOGI_VOL__MET(1, i));
+    const __m256 in_x = _mm256_permute2f128_ps(in, in, 0), out_x = _mm256_permute2f128_ps(out, out, 0);
+    const __m256 enter0 = _mm256_max_ps(in_x, _mm256_permutevar8x32_ps(in, row[0])),
+                 enter1 = _mm256_max_ps(in_x, _mm256_permutevar8x32_ps(in, row[1])),
+                 leave0 = _mm256_min_ps(out_x, _mm256_permutevar8x32_ps(out, row[0])),
+                 leave1 = _mm256_min_ps(out_x, _mm256_permutevar8x32_ps(out, row[1]));
+#define ISOGI_VOL__MET(i, z) \
+    _mm256_castps_si256(_mm256_cmp_ps(_mm256_max_ps(enter##i, _mm256_permute_ps(in_z, 0x55 * (z))), \
+                                      _mm256_min_ps(leave##i, _mm256_permute_ps(out_z, 0x55 * (z))), _CMP_LE_OQ))
+#define ISOGI_VOL__LAYER(z) _mm256_packs_epi32(ISOGI_VOL__MET(0, z), ISOGI_VOL__MET(1, z))
+#define ISOGI_VOL__LAYERS(z) \
+    (uint64_t)(uint32_t)_mm256_movemask_epi8( \
+        _mm256_permutevar8x32_epi32(_mm256_packs_epi16(ISOGI_VOL__LAYER(z), ISOGI_VOL__LAYER((z) + 1)), order))
+    return ISOGI_VOL__LAYERS(0) | ISOGI_VOL__LAYERS(2) << 32;
+#undef ISOGI_VOL__LAYERS
+#undef ISOGI_VOL__LAYER
 #undef ISOGI_VOL__MET
-#define ISOGI_VOL__SLICES(i) \
-    (uint64_t)(uint32_t)_mm256_movemask_epi8(_mm256_permutevar8x32_epi32(_mm256_packs_epi16(slice[i], slice[(i) + 1]), order))
-    return ISOGI_VOL__SLICES(0) | ISOGI_VOL__SLICES(2) << 32;
-#undef ISOGI_VOL__SLICES
+}
+
+ISOGI_VOL__TARGET("avx2")
+ISOGI_VOL__INLINE uint64_t isogi_vol__beam_way_avx2(const isogi_vol__beam *beam, const struct isogi_vol__ways *ways, int n) {
+    __m128 in[3], out[3];
+    isogi_vol__beam_layers(beam, ways, n, in, out);
+    return isogi_vol__way_avx2(_mm256_set_m128(in[1], in[0]), _mm256_set_m128(out[1], out[0]), _mm256_set_m128(in[2], in[2]),
+                               _mm256_set_m128(out[2], out[2]));
+}
+
+/* As trip_layers and way_base. */
+ISOGI_VOL__TARGET("avx2")
+ISOGI_VOL__INLINE uint64_t isogi_vol__trip_way_avx2(isogi_vol__trip *c, const struct isogi_vol__ways *ways, int n) {
+    const __m256 last = _mm256_set1_ps(c->last), zero = _mm256_setzero_ps();
+    const __m256 size = _mm256_set1_ps(ways->size[n]), wide = _mm256_set1_ps(ways->wider[n]);
+#define ISOGI_VOL__Z(from) _mm256_broadcast_ps((const __m128 *)(const void *)((from) + 8))
+    const float *within = ways->within[c->child];
+    const __m256 cell = _mm256_loadu_ps(c->cell), cell_z = ISOGI_VOL__Z(c->cell);
+    const __m256 times = _mm256_add_ps(_mm256_loadu_ps(c->enter[n]), _mm256_mul_ps(_mm256_loadu_ps(within), _mm256_mul_ps(cell, size)));
+    const __m256 times_z = _mm256_add_ps(ISOGI_VOL__Z(c->enter[n]), _mm256_mul_ps(ISOGI_VOL__Z(within), _mm256_mul_ps(cell_z, size)));
+#undef ISOGI_VOL__Z
+    if (n) {
+        _mm256_storeu_ps(c->enter[n - 1], _mm256_permute_ps(times, 0));
+        _mm_storeu_ps(c->enter[n - 1] + 8, _mm256_castps256_ps128(_mm256_permute_ps(times_z, 0)));
+    }
+    return isogi_vol__way_avx2(_mm256_max_ps(times, zero), _mm256_min_ps(_mm256_add_ps(times, _mm256_mul_ps(cell, wide)), last),
+                               _mm256_max_ps(times_z, zero), _mm256_min_ps(_mm256_add_ps(times_z, _mm256_mul_ps(cell_z, wide)), last));
 }
 
 /* What turn_mask_base does. */
@@ -5200,11 +5242,11 @@ ISOGI_VOL__TRIP(avx2, ISOGI_VOL__TARGET("avx2"))
 #endif
 #undef ISOGI_VOL__TRIP
 
-static int isogi_vol__ride_on(isogi_vol__ride *r, int waits, isogi_hit *hit) {
+static int isogi_vol__ride_on(isogi_vol__ride *r, isogi_hit *hit) {
 #ifdef ISOGI_VOL__AVX
-    if (r->walk.pyramid->path >= ISOGI_VOL__PATH_AVX2) return isogi_vol__ride_on_avx2(r, waits, hit);
+    if (r->walk.pyramid->path >= ISOGI_VOL__PATH_AVX2) return isogi_vol__ride_on_avx2(r, hit);
 #endif
-    return isogi_vol__ride_on_base(r, waits, hit);
+    return isogi_vol__ride_on_base(r, hit);
 }
 
 /* ==== many rays at once ============================================================================================== */
@@ -6628,7 +6670,7 @@ static int isogi_vol__walk_ray(isogi_vol__ride *r, isogi_hit *hit) {
 #endif
     if (w->pyramid->fast && isogi_vol__ride_set(r)) {
         isogi_vol__ride_start(r);
-        return isogi_vol__enters_inside(w, hit) || isogi_vol__ride_on(r, 0, hit) || isogi_vol__leaves_inside(w, r->flags, hit);
+        return isogi_vol__enters_inside(w, hit) || isogi_vol__ride_on(r, hit) || isogi_vol__leaves_inside(w, r->flags, hit);
     }
     return isogi_vol__walk_plainly(r, hit);
 }
@@ -7047,15 +7089,96 @@ static int isogi_vol__ride_begin(isogi_vol__batch *b, isogi_vol__ride *r, size_t
     return 0;
 }
 
-/* Sixteen rays at a time that nearly coincide; where they do not, they and the next ones go in turns, each up to where it needs memory,
-   which arrives while the others have theirs: ever more of them each time. */
+/* What rays are to do next: open a node, or a leaf, look at a cell, decide about one, or go on to the next node. */
+enum { ISOGI_VOL__OPEN_NODE, ISOGI_VOL__OPEN_LEAF, ISOGI_VOL__LOOK, ISOGI_VOL__DECIDE, ISOGI_VOL__GO_ON, ISOGI_VOL__DEEDS };
+
+/* Rays, by what they do next. */
+typedef struct isogi_vol__agenda {
+    int count[ISOGI_VOL__DEEDS];
+    uint8_t ride[ISOGI_VOL__DEEDS][ISOGI_VOL__CONVOY];
+} isogi_vol__agenda;
+
+ISOGI_VOL__INLINE void isogi_vol__agenda_add(isogi_vol__agenda *agenda, int deed, int i) {
+    agenda->ride[deed][agenda->count[deed]++] = (uint8_t)i;
+}
+
+/* To the root. */
+ISOGI_VOL__INLINE void isogi_vol__agenda_begin(isogi_vol__agenda *agenda, isogi_vol__ride *r, int i) {
+    isogi_vol__ride_start(r);
+    isogi_vol__agenda_add(agenda, r->trip.low > r->trip.high ? ISOGI_VOL__GO_ON : r->at ? ISOGI_VOL__OPEN_NODE : ISOGI_VOL__OPEN_LEAF, i);
+}
+
+/* Done with ride i, whose place the next ray takes; 0: there is none. */
+static int isogi_vol__agenda_renew(isogi_vol__batch *b, isogi_vol__agenda *agenda, isogi_vol__ride *ride, int i, int found, size_t *next,
+                                   size_t end) {
+    isogi_vol__ride *r = &ride[i];
+    isogi_hit any;
+    found = found || isogi_vol__leaves_inside(&r->walk, r->flags, b->hits ? &b->hits[r->number] : &any);
+    isogi_vol__finish(b, r->number, &r->walk, found);
+    if (!isogi_vol__ride_begin(b, r, next, end)) return 0;
+    isogi_vol__agenda_begin(agenda, r, i);
+    return 1;
+}
+
+/* n rays, and those that come after them, go on together, in rounds; in each all that do the same do it one after the other: then few
+   branches are hard to foretell, one ray's arithmetic overlaps the next one's, and memory arrives while others have their turn. What
+   needs none of its own is done in the same round. */
+#define ISOGI_VOL__TAKE_TURNS(path, target) \
+    ISOGI_VOL__NOINLINE target static void isogi_vol__take_turns_##path(isogi_vol__batch *b, isogi_vol__ride *ride, int n, size_t *next, \
+                                                                        size_t end) { \
+        isogi_vol__agenda agenda[2]; \
+        isogi_hit any; \
+        int now = 0, i, k; \
+        memset(agenda, 0, sizeof agenda); \
+        for (i = 0; i < n; i++) isogi_vol__agenda_begin(&agenda[0], &ride[i], i); \
+        for (; n; now = !now) { \
+            isogi_vol__agenda *these = &agenda[now], *then = &agenda[!now]; \
+            memset(then->count, 0, sizeof then->count); \
+            for (k = 0; k < these->count[ISOGI_VOL__OPEN_NODE]; k++) { \
+                i = these->ride[ISOGI_VOL__OPEN_NODE][k]; \
+                isogi_vol__open_node_##path(&ride[i], NULL); \
+                isogi_vol__agenda_add(these, ISOGI_VOL__GO_ON, i); \
+            } \
+            for (k = 0; k < these->count[ISOGI_VOL__OPEN_LEAF]; k++) { \
+                i = these->ride[ISOGI_VOL__OPEN_LEAF][k]; \
+                isogi_vol__open_leaf_##path(&ride[i], NULL); \
+                isogi_vol__agenda_add(these, ride[i].trip.cells ? ISOGI_VOL__LOOK : ISOGI_VOL__GO_ON, i); \
+            } \
+            for (k = 0; k < these->count[ISOGI_VOL__DECIDE]; k++) { \
+                isogi_vol__ride *r = &ride[i = these->ride[ISOGI_VOL__DECIDE][k]]; \
+                if (isogi_vol__trip_decide_##path(r, b->hits ? &b->hits[r->number] : &any)) \
+                    n -= !isogi_vol__agenda_renew(b, then, ride, i, 1, next, end); \
+                else isogi_vol__agenda_add(these, r->trip.cells ? ISOGI_VOL__LOOK : ISOGI_VOL__GO_ON, i); \
+            } \
+            for (k = 0; k < these->count[ISOGI_VOL__LOOK]; k++) { \
+                isogi_vol__ride *r = &ride[i = these->ride[ISOGI_VOL__LOOK][k]]; \
+                const int found = isogi_vol__trip_look_##path(r); \
+                if (found > 0) n -= !isogi_vol__agenda_renew(b, then, ride, i, 1, next, end); \
+                else if (found < 0 || r->trip.cells) isogi_vol__agenda_add(then, found < 0 ? ISOGI_VOL__DECIDE : ISOGI_VOL__LOOK, i); \
+                else isogi_vol__agenda_add(these, ISOGI_VOL__GO_ON, i); \
+            } \
+            for (k = 0; k < these->count[ISOGI_VOL__GO_ON]; k++) { \
+                isogi_vol__ride *r = &ride[i = these->ride[ISOGI_VOL__GO_ON][k]]; \
+                if (isogi_vol__trip_next(r)) isogi_vol__agenda_add(then, r->at ? ISOGI_VOL__OPEN_NODE : ISOGI_VOL__OPEN_LEAF, i); \
+                else n -= !isogi_vol__agenda_renew(b, then, ride, i, 0, next, end); \
+            } \
+        } \
+    }
+
+ISOGI_VOL__TAKE_TURNS(base, )
+#ifdef ISOGI_VOL__AVX
+ISOGI_VOL__TAKE_TURNS(avx2, ISOGI_VOL__TARGET("avx2"))
+#endif
+#undef ISOGI_VOL__TAKE_TURNS
+
+/* Sixteen rays at a time that nearly coincide; where they do not, they and the next ones go in turns, ever more of them each time. */
 ISOGI_VOL__NOINLINE static void isogi_vol__trace_rides(isogi_vol__batch *b) {
     const int may_coincide = !b->bundles || b->bundle_count == 1;
     isogi_vol__ride ride[ISOGI_VOL__CONVOY];
     size_t next = 0, run = 64;
     while (next < b->count) {
         size_t end = b->count;
-        int n = 0, i;
+        int n = 0;
         while (n < ISOGI_VOL__CONVOY && isogi_vol__ride_begin(b, &ride[n], &next, end)) n++;
         if (may_coincide && n >= ISOGI_VOL__CONVOY / 4) {
             if (isogi_vol__rides_coincide(ride, n)) {
@@ -7065,17 +7188,11 @@ ISOGI_VOL__NOINLINE static void isogi_vol__trace_rides(isogi_vol__batch *b) {
             }
             if (end - next > run) end = next + run, run *= 4;
         }
-        for (i = 0; i < n; i++) isogi_vol__ride_start(&ride[i]);
-        for (i = 0; n; i = i + 1 < n ? i + 1 : 0) {
-            isogi_vol__ride *r = &ride[i];
-            isogi_hit any;
-            const int found = isogi_vol__ride_on(r, 1, b->hits ? &b->hits[r->number] : &any);
-            if (found < 0) continue;
-            isogi_vol__finish(b, r->number, &r->walk,
-                              found || isogi_vol__leaves_inside(&r->walk, r->flags, b->hits ? &b->hits[r->number] : &any));
-            if (isogi_vol__ride_begin(b, r, &next, end)) isogi_vol__ride_start(r);
-            else if (i != --n) *r = ride[n];
-        }
+#ifdef ISOGI_VOL__AVX
+        if (b->pyramid->path >= ISOGI_VOL__PATH_AVX2) isogi_vol__take_turns_avx2(b, ride, n, &next, end);
+        else
+#endif
+        isogi_vol__take_turns_base(b, ride, n, &next, end);
     }
 }
 
@@ -10192,7 +10309,6 @@ ISOGI_API void isogi_vol_mesh_free(const isogi_pyramid *pyramid, isogi_mesh *mes
 #undef isogi_vol__neon_setzero_ps
 #undef isogi_vol__neon_loadu_ps
 #undef isogi_vol__neon_storeu_ps
-#undef isogi_vol__neon_cvtss_f32
 #undef ISOGI_VOL__TARGET
 #undef ISOGI_VOL__AVX512
 #undef ISOGI_VOL__AVX
