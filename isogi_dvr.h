@@ -213,8 +213,10 @@
    transparent (rays within its plane do sample it). Up to ISOGI_DVR_MAX_PEAKS peaks (in data space, exact or pre-integrated, any
    number), 2^16 directions, and 2^24 samples on the longest ray. Pre-integrated pictures of physical space tell up to 16384 classes of
    values apart, of those that occur and on which the transfer function depends: a piece of it that is narrower than four of them keeps
-   its opacity, blurred over a class. Errors: ISOGI_INVALID for anything outside of its documented range, ISOGI_TOO_LARGE where sizes
-   overflow or pass these limits, ISOGI_NO_MEMORY, ISOGI_CANCELLED.
+   its opacity, blurred over a class. Floats and doubles that all lie more than 4096 times as far from zero as from each other are
+   post-classified, in double, which takes longer: subtract what they have in common, or let `bias` add it to small ones. Errors:
+   ISOGI_INVALID for anything outside of its documented range, ISOGI_TOO_LARGE where sizes overflow or pass these limits, ISOGI_NO_MEMORY,
+   ISOGI_CANCELLED.
 
    How to choose. `step` 0.5 is right for smooth transfer functions, 0.25 for steep ones; each halving costs twice the time and
    leaves a quarter of the error. `order` 2 is ambient light with a direction, 3 soft shadows, 4 and more for a directional light.
@@ -2205,11 +2207,12 @@ static isogi_result isogi_dvr__plan_matter(isogi_dvr *d) {
 
 #define ISOGI_DVR__READ_ROW(T)                                                                                                   \
     for (i = 0; i < count; i++) out[i] = (float)(v->scale * (double)*(const T *)(const void *)(p + (ptrdiff_t)i * v->stride[0]) + \
-        v->bias); \
+        v->bias - low); \
     break;
 
-/* Voxels first .. first + count - 1 of a row, as floats; what is not finite becomes a NaN. */
-static void isogi_dvr__read_row(const isogi_volume *v, size_t first, size_t count, size_t y, size_t z, float *out) {
+/* Voxels first .. first + count - 1 of a row, as floats that count from `low`: of values that are far from zero little would be left. What
+   is not finite stays so. */
+static void isogi_dvr__read_row(const isogi_volume *v, double low, size_t first, size_t count, size_t y, size_t z, float *out) {
     const char *p = (const char *)v->data + (ptrdiff_t)first * v->stride[0] + (ptrdiff_t)y * v->stride[1] + (ptrdiff_t)z * v->stride[2];
     size_t i;
     switch (v->type) {
@@ -2245,12 +2248,12 @@ static void isogi_dvr__sides(const isogi_dvr__blocks *b, size_t block, size_t n,
     for (a = 0; a < 3; a++) side[a] = at[a] + 1 < b->count[a] ? n : (b->rest[a] * n + 15) / 16;
 }
 
-/* The field at a voxel, the lowest value where it is not finite. */
+/* The field at a voxel, the lowest value where it is not finite. It counts from the lowest value, as all data in blocks does. */
 static float isogi_dvr__voxel(const isogi_dvr *d, size_t x, size_t y, size_t z) {
     float value;
-    isogi_dvr__read_row(&d->volume, x < d->volume.size[0] ? x : d->volume.size[0] - 1, 1, y < d->volume.size[1] ? y : d->volume.size[1] - 1,
-                        z < d->volume.size[2] ? z : d->volume.size[2] - 1, &value);
-    return isogi_dvr__finite32(value) ? value : (float)d->range[0];
+    isogi_dvr__read_row(&d->volume, d->range[0], x < d->volume.size[0] ? x : d->volume.size[0] - 1, 1,
+                        y < d->volume.size[1] ? y : d->volume.size[1] - 1, z < d->volume.size[2] ? z : d->volume.size[2] - 1, &value);
+    return isogi_dvr__finite32(value) ? value : 0;
 }
 
 static float isogi_dvr__lattice_at(const isogi_dvr *d, int step, const size_t c[3]) {
@@ -2317,9 +2320,9 @@ static void isogi_dvr__histogram_task(void *arg, size_t task) {
     count = d->volume.size[0] - 16 * at[0] < 17 ? d->volume.size[0] - 16 * at[0] : 17;
     for (z = 16 * at[2]; z <= 16 * at[2] + 16 && z < d->volume.size[2]; z++)
         for (y = 16 * at[1]; y <= 16 * at[1] + 16 && y < d->volume.size[1]; y++) {
-            isogi_dvr__read_row(&d->volume, 16 * at[0], count, y, z, row);
+            isogi_dvr__read_row(&d->volume, d->range[0], 16 * at[0], count, y, z, row);
             for (x = 0; x < count; x++)
-                if (isogi_dvr__finite32(row[x])) classes |= (uint64_t)1 << b->bin[isogi_dvr__class(d, (double)row[x])];
+                if (isogi_dvr__finite32(row[x])) classes |= (uint64_t)1 << b->bin[isogi_dvr__class(d, d->range[0] + (double)row[x])];
         }
     b->histogram[block] = classes;
 }
@@ -2439,8 +2442,8 @@ static void isogi_dvr__choose_step_task(void *arg, size_t block) {
     isogi_dvr *d = (isogi_dvr *)arg;
     const isogi_dvr__matter *m = &d->matter;
     isogi_dvr__held_block *b = &d->coming.block[block];
-    float least = 1e30f, most = 0, near_by = (float)(d->distance[0] * d->spacing / d->desc.unit),
-          distance = (float)(d->distance[1] * d->spacing / d->desc.unit);
+    float least = 1e30f, most = 0, near_by = (float)isogi_dvr__clamp(d->distance[0] * d->spacing / d->desc.unit, 1e30),
+          distance = (float)isogi_dvr__clamp(d->distance[1] * d->spacing / d->desc.unit, 1e30);
     size_t at[3], low[3], high[3], x, y, z;
     uint32_t coarsest = b->log;
     int a;
@@ -3586,8 +3589,9 @@ static void isogi_dvr__set_table(const isogi_dvr *d, float table[ISOGI_DVR__TABL
     }
 }
 
-/* Values between four rows of voxels. */
-static void isogi_dvr__mix_rows(const isogi_volume *v, size_t first, size_t count, const double position[2], float *row, float *scratch) {
+/* Values between four rows of voxels; they count from `low`. */
+static void isogi_dvr__mix_rows(const isogi_volume *v, double low, size_t first, size_t count, const double position[2], float *row,
+                                float *scratch) {
     size_t c[2], k, i;
     double u[2];
     int a;
@@ -3602,15 +3606,16 @@ static void isogi_dvr__mix_rows(const isogi_volume *v, size_t first, size_t coun
     for (k = 0; k < 4; k++) {
         float w = (float)((k & 1 ? u[0] : 1 - u[0]) * (k & 2 ? u[1] : 1 - u[1]));
         if (!(w > 0)) continue;
-        isogi_dvr__read_row(v, first, count, c[0] + (k & 1), c[1] + (k >> 1), scratch);
+        isogi_dvr__read_row(v, low, first, count, c[0] + (k & 1), c[1] + (k >> 1), scratch);
         for (i = 0; i < count; i++) row[i] += w * scratch[i];
     }
 }
 
-/* sum[i] += extinction at lattice positions from + i * distance (voxels) of a row of voxels that begins at `first`. */
+/* sum[i] += extinction at lattice positions from + i * distance (voxels) of a row of voxels that begins at `first`, less the lowest class's
+   value. */
 static void isogi_dvr__classify_row(const isogi_dvr *d, const float *row, size_t first, size_t last, double from, double distance,
                                     size_t count, float *sum) {
-    float low = (float)d->matter.low, scale = (float)d->matter.scale;
+    float scale = (float)d->matter.scale;
     size_t i;
     for (i = 0; i < count; i++) {
         double x = isogi_dvr__clamp(from + (double)i * distance, (double)last);
@@ -3620,7 +3625,7 @@ static void isogi_dvr__classify_row(const isogi_dvr *d, const float *row, size_t
         u = (float)(x - (double)c), next = row[c + (last > 0) - first];
         value = row[c - first] + u * (next - row[c - first]);
         if (!isogi_dvr__finite32(value)) continue;
-        value = (value - low) * scale;
+        value *= scale;
         value = value > 0 ? value : 0;
         value = value < ISOGI_DVR__TABLE - 1 ? value : ISOGI_DVR__TABLE - 1;
         k = (size_t)value;
@@ -3682,7 +3687,7 @@ static void isogi_dvr__matter_task(void *arg, size_t task) {
                 double position[2];
                 for (a = 0; a < 2; a++)
                     position[a] = ((double)node[a] + ((double)s[a + 1] + 0.5) / (double)n[a + 1] - 0.5) * m->spacing[a + 1];
-                isogi_dvr__mix_rows(&d->volume, first, end - first + 1, position, row, scratch);
+                isogi_dvr__mix_rows(&d->volume, m->low, first, end - first + 1, position, row, scratch);
                 for (s[0] = 0; s[0] < n[0]; s[0]++) {
                     double from = ((double)span[0] + ((double)s[0] + 0.5) / (double)n[0] - 0.5) * m->spacing[0];
                     isogi_dvr__classify_row(d, row, first, last, from, m->spacing[0], count, sum);
@@ -3779,7 +3784,7 @@ static double isogi_dvr__significance(const isogi_dvr *d, size_t block, double (
         c[2] = block / b->count[0] / b->count[1] + (k >> 2);
         mean += 0.125 * (double)isogi_dvr__lattice_at(d, 4, c);
     }
-    isogi_dvr__luv_of(d, mean, at);
+    isogi_dvr__luv_of(d, d->range[0] + mean, at);
     for (i = 0; i < 64; i++) {
         double difference[3] = {luv[i][0] - at[0], luv[i][1] - at[1], luv[i][2] - at[2]}, size = isogi_dvr__dot(difference, difference);
         if ((b->histogram[block] >> i & 1) && size > most) most = size;
@@ -3935,12 +3940,12 @@ static void isogi_dvr__node_position(const isogi_dvr__blocks *b, size_t block, s
 
 /* ---- data in its blocks ---- */
 
-/* The data that the blocks hold, interpolated; what is not held is the lowest value. */
+/* The data that the blocks hold, interpolated, less the lowest value; what is not held is that. */
 static float isogi_dvr__block_value(const isogi_dvr *d, size_t block, const double position[3]) {
     const isogi_dvr__blocks *b = &d->blocks;
     size_t n = b->level[block], base, corner[8], k;
     float w[8], sum = 0;
-    if (!n) return (float)d->range[0];
+    if (!n) return 0;
     base = b->first[block] + isogi_dvr__place(b, block, n, position, corner, w);
     for (k = 0; k < 8; k++) /* a node of no weight may be another thread's at work */
         if (w[k] > 0) sum += w[k] * b->data[base + corner[k]];
@@ -4176,7 +4181,7 @@ static int isogi_dvr__fill_window(const isogi_dvr *d, size_t block, size_t n, co
                     if (!isogi_dvr__kept(d, position)) continue;
                 }
                 value += u[0][node[0]] * (end - value);
-                out[node[0]] = d->matter.table[isogi_dvr__class(d, (double)value)];
+                out[node[0]] = d->matter.table[isogi_dvr__class(d, d->range[0] + (double)value)];
                 any |= out[node[0]] > 0;
             }
         }
@@ -4677,7 +4682,7 @@ static void isogi_dvr__set_sweep(isogi_dvr__sweep *s, const isogi_dvr *d, const 
     s->extinction = m->extinction[turned], s->slice_stride = stride[axis[0]], s->row_stride = stride[axis[1]];
     s->backwards = w[axis[0]] > 0;
     s->slip[0] = -w[axis[1]] / most, s->slip[1] = -w[axis[2]] / most;
-    s->piece = (float)(0.5 / (most * d->desc.unit));
+    s->piece = (float)isogi_dvr__clamp(0.5 / (most * d->desc.unit), 1e30);
     s->kernels = d->kernels;
     s->depth_row = s->size[2] + s->size[0] + 2 + 2 * ISOGI_DVR__LANES, s->weight = s->size[2] + 1 + 2 * ISOGI_DVR__LANES,
     s->out_row = 2 * s->weight;
@@ -4971,10 +4976,16 @@ ISOGI_API isogi_result isogi_dvr_step(isogi_dvr *dvr, uint64_t max_rays, double 
     return result;
 }
 
+/* Whether there can be arrays of so many points, and of coefficients at each. */
+static int isogi_dvr__countable(const isogi_dvr *d, size_t count) {
+    return count <= SIZE_MAX / 2 / sizeof(float) / (d->coefficients > 3 ? d->coefficients : 3);
+}
+
 ISOGI_API isogi_result isogi_dvr_sample_visibility(const isogi_dvr *dvr, const float (*points)[3], size_t count, float *visibility) {
     size_t i;
     int a;
     if (!dvr || !dvr->visibility || (count && (!points || !visibility))) return ISOGI_INVALID;
+    if (!isogi_dvr__countable(dvr, count)) return ISOGI_TOO_LARGE;
     for (i = 0; i < count; i++) {
         double world[3], grid[3];
         for (a = 0; a < 3; a++) world[a] = (double)points[i][a];
@@ -5049,13 +5060,14 @@ ISOGI_API isogi_result isogi_dvr_sample_blocks(const isogi_dvr *dvr, const float
     size_t i, block;
     int a;
     if (!dvr || !dvr->blocks.total || dvr->method != ISOGI_DVR_PAPER || (count && !points)) return ISOGI_INVALID;
+    if (!isogi_dvr__countable(dvr, count)) return ISOGI_TOO_LARGE;
     for (i = 0; i < count; i++) {
         double world[3], grid[3];
         for (a = 0; a < 3; a++) world[a] = (double)points[i][a];
         isogi_vol_to_grid(dvr->desc.pyramid, world, grid);
         for (a = 0; a < 3; a++) grid[a] = isogi_dvr__clamp(grid[a], dvr->cells[a]);
         block = isogi_dvr__block_of(&dvr->blocks, grid);
-        if (values) values[i] = isogi_dvr__block_value(dvr, block, grid);
+        if (values) values[i] = (float)(dvr->range[0] + (double)isogi_dvr__block_value(dvr, block, grid));
         if (visibility) isogi_dvr__local_at(dvr, block, grid, visibility + i * dvr->coefficients);
     }
     return ISOGI_OK;
@@ -5988,7 +6000,7 @@ struct isogi_dvr__frame {
     size_t light_stride[3], light_row[2]; /* floats to the neighbours (0 where there is one point); rows, planes */
     isogi_dvr__held held; /* where light stands, if held.block */
     size_t count;       /* of classes */
-    float low, scale;   /* place of a value among them, which goes on before the first and beyond the last,
+    float scale;        /* place of a value among them, which goes on before the first and beyond the last,
                            both of one extinction and colour */
     float top;          /* of the last class */
     float quantum[4];   /* of their integrals */
@@ -6038,6 +6050,14 @@ static size_t isogi_dvr__count_classes(const isogi_dvr *d, double *low, double *
         isogi_dvr__set_classes(d, span, count, low, scale);
         if (count == 16 * ISOGI_DVR__CLASSES || narrow * *scale >= 4) return count;
     }
+}
+
+/* Whether floats tell values of the classes' span apart. Integers are floats as they are; what they count from is taken off with their
+   bias, in double. */
+#define ISOGI_DVR__TOLD_APART 4096
+static int isogi_dvr__floats_tell(const isogi_volume *v, double low, double span) {
+    double from = fabs(low - v->bias), to = fabs(low + span - v->bias);
+    return (v->type != ISOGI_F32 && v->type != ISOGI_F64) || ISOGI_DVR__TOLD_APART * span >= (from > to ? from : to);
 }
 
 /* Integrals up to each class. */
@@ -6090,8 +6110,9 @@ static void isogi_dvr__frame_classes(isogi_dvr__frame *f, double low, double sca
         for (a = 0; a < 4; a++) e->mean[a] = (float)isogi_dvr__clamp(mean[a] * x, 1e32);
     }
     isogi_dvr__sum_classes(f);
-    f->low = (float)low, f->scale = (float)scale;
-    if ((double)f->low > low) f->low = nextafterf(f->low, -3e38f); /* the least value that occurs may stand on a step: on its upper side */
+    f->scale = (float)scale, f->value_scale = (float)d->volume.scale, f->value_bias = (float)(d->volume.bias - low);
+    if ((double)f->value_bias < d->volume.bias - low) /* the least value that occurs may stand on a step: on its upper side */
+        f->value_bias = nextafterf(f->value_bias, 3e38f);
     f->top = (float)f->count - 0.01f;
 }
 
@@ -6191,7 +6212,7 @@ static void isogi_dvr__fast_classes(const isogi_dvr__frame *f, const isogi_dvr__
             run->classes[i] = 1e30f; /* as AVX2 code: no piece */
             continue;
         }
-        value = (value * (float)v->scale + ((float)v->bias - f->low)) * f->scale;
+        value = (value * f->value_scale + f->value_bias) * f->scale;
         value = value > -1e15f ? value : -1e15f;
         run->classes[i] = value < 1e15f ? value : 1e15f;
     }
@@ -7280,7 +7301,8 @@ static isogi_result isogi_dvr__begin_frame(isogi_dvr__render_job *job) {
     if (f->sample_kind >= 0 && isogi_dvr__joined(d) && isogi_dvr__machine() >= 4 && (!d->context.force_path || d->context.force_path > 3))
         job->eight = blocks < 2e9 && d->cells[0] && d->cells[1] && d->cells[2] && fabs(v->scale) < 1e200 && fabs(v->bias) < 1e200;
 #endif
-    if (!isogi_dvr__fast_space(d) || job->lights.local) return ISOGI_OK;
+    f->count = isogi_dvr__count_classes(d, &low, &scale);
+    if (!isogi_dvr__fast_space(d) || job->lights.local || !isogi_dvr__floats_tell(v, low, (double)f->count / scale)) return ISOGI_OK;
     f->dvr = d, f->step = d->piece, f->look = isogi_dvr__fast_look, f->shade = isogi_dvr__fast_shade, f->glow = (float)d->desc.emission;
     f->end = 1 - d->desc.opaque, f->dim = 0.125f;
     f->leap = blocks < 2e9 ? d->kernels.leap : isogi_dvr__leap;
@@ -7295,12 +7317,10 @@ static isogi_result isogi_dvr__begin_frame(isogi_dvr__render_job *job) {
     if (f->look == isogi_dvr__look_avx2 && isogi_dvr__machine() >= 4 && (!d->context.force_path || d->context.force_path > 3))
         f->look = isogi_dvr__look_avx512, f->eight = !d->clip_count && !d->transparent;
 #endif
-    f->count = isogi_dvr__count_classes(d, &low, &scale);
     f->classes = (isogi_dvr__class_entry *)isogi_allocate(&d->context, f->count, sizeof *f->classes);
     f->matter = (isogi_dvr__matter_entry *)isogi_allocate(&d->context, f->count, sizeof *f->matter);
     if (!f->classes || !f->matter) return ISOGI_NO_MEMORY;
     isogi_dvr__frame_classes(f, low, scale);
-    f->value_scale = (float)v->scale, f->value_bias = (float)v->bias - f->low;
     for (a = 0; a < 3; a++) f->cells[a] = (float)d->cells[a], f->last_cell[a] = d->cells[a] - 1;
     for (a = 0; f->sample_kind >= 0 && a < 3; a++) f->stride[a] = (int32_t)v->stride[a];
     if (d->desc.shading == ISOGI_DVR_UNLIT) {

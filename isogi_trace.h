@@ -278,8 +278,8 @@ typedef struct isogi_trace_desc {
                                   negative = on the surface; lamps are as far away as from the surface all the same */
     isogi_normal_kind normals; /* of the hemisphere that is integrated over */
     double isovalue_min, isovalue_max; /* only texels that a surface within this interval reads; both 0 = all. Where none of a lookup's
-                                          eight texels is valid, the nearest one of the 4x4x4 may be missing, unless lazy: it is then
-                                          dark there */
+                                          eight texels is valid, the nearest one of the 4x4x4 may be missing, unless lazy: another
+                                          of these, or none, is then read there */
     int lazy;                  /* non-zero: only texels that were requested (and that the interval, if there is one, reads) */
     int capped;                /* non-zero: the volume's border closes the surface (ISOGI_RAY_CAPPED) */
     int transfer_channels;     /* TRANSFER: sets of coefficients: 1 = grey (mean albedo), 3 = RGB; 0 = 3 if albedo is coloured, else 1 */
@@ -428,6 +428,7 @@ ISOGI_API isogi_result isogi_trace_export_scales(const isogi_trace *trace, int f
    ranges of the volume's blocks are compared by hash; a material function cannot be).
    Any bytes may be loaded: those that are damaged, cut off or of another layout are ISOGI_CORRUPT and change nothing (what is left of a
    block of both sides that is cut off where the first one ends is a block of that side: ISOGI_INVALID).
+   A lazy texture reads of the 4x4x4 around a point, where none of the eight is valid, what points were asked for.
    ISOGI_NO_MEMORY: some of the texels are loaded. isogi_trace_load counts as a writer. Hierarchical textures are not saved: their size is
    0, and the calls answer ISOGI_INVALID. */
 ISOGI_API size_t isogi_trace_save_size(const isogi_trace *trace);
@@ -2006,8 +2007,9 @@ static isogi_result isogi_trace__scene_unit(isogi_trace__scene *scene) {
         memcpy(glow, scene->desc.emission_points[k].rgb, sizeof glow);
         for (a = 0; a < 3; a++) most = ISOGI_TRACE__PI * (double)glow[a] > most ? ISOGI_TRACE__PI * (double)glow[a] : most;
     }
-    frexp(most, &e);
-    scene->unit = most > 1e-30 && most < 1e30 ? ldexp(1, scene->desc.bounces ? e + 1 : e) : 1;
+    most = isogi_trace__clamp(most, 1e33); /* what short formats hold are then floats that are neither infinite nor 0 */
+    frexp(most > 1e-36 ? most : 1e-36, &e);
+    scene->unit = most > 0 ? ldexp(1, scene->desc.bounces ? e + 1 : e) : 1;
     return ISOGI_OK;
 }
 
@@ -6829,6 +6831,17 @@ typedef struct isogi_trace__points {
     isogi_trace__wave *waves;
 } isogi_trace__points;
 
+/* World points are floats: one that cannot be told from a point on the border is on it. */
+static void isogi_trace__snap_to_border(const isogi_trace__scene *scene, const double world[3], double grid[3]) {
+    int a, c;
+    for (a = 0; a < 3; a++) {
+        double last = (double)(scene->volume->size[a] - 1), slack = 0;
+        for (c = 0; c < 3; c++) slack += fabs(scene->to_grid[3 * a + c] * world[c]) * (double)FLT_EPSILON;
+        if (fabs(grid[a] - last) <= slack) grid[a] = last;
+        if (fabs(grid[a]) <= slack) grid[a] = 0;
+    }
+}
+
 static void isogi_trace__gather_task(void *arg, size_t task) {
     isogi_trace__points *job = (isogi_trace__points *)arg;
     size_t i = job->first + task * ISOGI_TRACE__TASK, end = i + ISOGI_TRACE__TASK < job->count ? i + ISOGI_TRACE__TASK : job->count;
@@ -6842,6 +6855,7 @@ static void isogi_trace__gather_task(void *arg, size_t task) {
         job->error[i] = ISOGI_TRACE__NOT_READY;
         for (a = 0; a < 3; a++) world[a] = (double)job->points[i][a];
         isogi_vol_to_grid(job->scene.pyramid, world, grid);
+        if (!job->normals && job->scene.desc.capped) isogi_trace__snap_to_border(&job->scene, world, grid);
         usable = isogi_trace__finite3(grid) && isogi_trace__locate(job->scene.volume, grid, &site.place);
         if (!usable) continue;
         site.isovalue = isogi_trace__value(job->scene.volume, &site.place);

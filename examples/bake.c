@@ -133,12 +133,11 @@ static int run(program *p, int argc, char **argv) {
 
 int main(int argc, char **argv) {
     static program p;
-    int ok;
-    for (int i = 1; i < argc; i++)
-        if (!strcmp(argv[i], "--help") || !strcmp(argv[i], "-h")) return help(), 0;
+    int ok, asked = 0;
+    for (int i = 1; i < argc; i++) asked |= !strcmp(argv[i], "--help") || !strcmp(argv[i], "-h");
     signal(SIGINT, interrupt), signal(SIGTERM, interrupt);
-    ok = run(&p, argc, argv);
-    if (ok && (fflush(stdout) != 0 || ferror(stdout))) ok = file_fail(p.scene.error, "standard output: %s", strerror(errno));
+    if (asked) help();
+    ok = (asked || run(&p, argc, argv)) && file_printed(p.scene.error);
     if (!ok) fprintf(stderr, "bake: %s\n", p.scene.error);
     isogi_trace_free(p.trace);
     bake_scene_free(&p.scene);

@@ -69,13 +69,14 @@ int main(int argc, char **argv) {
     if (argc < 4 || argc > 5 || (!data && strcmp(argv[2], "physical")) || (argc > 4 && !whole_numbers(argv[4], ',', 1, 1, 8192, &width)))
         return fprintf(stderr, "usage: %s MESH physical|data OUT.png [WIDTH], 1 to 8192 pixels wide\n", argv[0]), 2;
     if (file_same(argv[1], argv[3])) return fprintf(stderr, "tets: %s is MESH and OUT.png\n", argv[3]), 1;
-    int raw = strstr(argv[1], ".raw") != NULL, side = (int)width;
+    size_t length = strlen(argv[1]);
+    int raw = length > 4 && (!strcmp(argv[1] + length - 4, ".raw") || !strcmp(argv[1] + length - 4, ".RAW")), side = (int)width;
     if (!file_writable(argv[3], error)) return fprintf(stderr, "tets: %s\n", error), 1;
     if (raw ? !volume_read(argv[1], &volume, error) || !split(&volume) : !read_tets(argv[1], error))
         return fprintf(stderr, "tets: %s\n", error), 1;
     mesh.points = (const float(*)[3])points, mesh.values = values, mesh.tets = (const uint32_t(*)[4])tets;
     isogi_result result = isogi_dvr_tets_build(&built, &mesh, &report, NULL);
-    if (result == ISOGI_OK && !mesh.point_count) result = ISOGI_INVALID;
+    if (result == ISOGI_OK && !mesh.tet_count) result = ISOGI_INVALID;
     if (result != ISOGI_OK) return fprintf(stderr, "tets: %s: %s\n", argv[1], isogi_result_string(result)), 1;
     printf("%zu tetrahedra, %zu degenerate, %zu faces on the border, %zu crowded\n", mesh.tet_count, report.degenerate, report.border,
            report.crowded);
@@ -119,5 +120,5 @@ int main(int argc, char **argv) {
     if (!png_write(argv[3], bytes, side, side, 3, error)) return fprintf(stderr, "tets: %s\n", error), 1;
     isogi_dvr_tets_free(built);
     free(image), free(bytes), free(points), free(values), free(tets), volume_free(&volume);
-    return 0;
+    return file_printed(error) ? 0 : (fprintf(stderr, "tets: %s\n", error), 1);
 }

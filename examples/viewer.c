@@ -748,11 +748,11 @@ static int summarize_light(viewer *v) {
     result = isogi_sh_project(v->ambient[0], 3, &env, NULL);
     if (result != ISOGI_OK) return fail(v, "the light", result);
     for (int c = 0; c < 3; c++) v->key[c] = 0;
+    for (int c = 0; c < 3; c++) v->mean_light[c] = (double)v->ambient[0][c] * 0.28209479177; /* radiance */
     for (int i = 1; i < 4; i++) v->key[i == 3 ? 0 : i] = picture_luminance(v->ambient[i]);
     if (!vector_normalize(v->key)) memcpy(v->key, v->view.up, sizeof v->key);
     result = isogi_sh_convolve_cosine(v->ambient[0], v->ambient[0], 3, 3);
     ambient_at(v, v->key, v->key_light);
-    for (int c = 0; c < 3; c++) v->mean_light[c] = (double)v->ambient[0][c] * 0.28209479177;
     return result == ISOGI_OK || fail(v, "the light", result);
 }
 
@@ -1112,14 +1112,14 @@ static void lambert(const viewer *v, const float point[3], const double n[3], in
     }
 }
 
-/* Phong 1975: a constant ambient term (or one by normal), the lights (or where there are none, the direction most of the environment
-   comes from), and a highlight of exponent 32 that reflects a fifth. Adds the highlight to specular. */
+/* Phong 1975: a constant ambient term, half the mean light (or one by normal), the lights (or where there are none, the direction most of
+   the environment comes from), and a highlight of exponent 32 that reflects a fifth. Adds the highlight to specular. */
 static void phong(const viewer *v, const float point[3], const double n[3], const float dir[3], double irradiance[3], double specular[3]) {
     double view[3] = {-(double)dir[0], -(double)dir[1], -(double)dir[2]}, reflected[3], facing;
     size_t count = v->o.light_count ? v->o.light_count : 1;
     vector_normalize(view);
     facing = 2 * vector_dot(n, view);
-    for (int i = 0; i < 3; i++) reflected[i] = facing * n[i] - view[i], irradiance[i] = 0.5 * v->mean_light[i];
+    for (int i = 0; i < 3; i++) reflected[i] = facing * n[i] - view[i], irradiance[i] = 0.5 * PI * v->mean_light[i];
     if (v->o.ambient) ambient_at(v, n, irradiance);
     for (size_t k = 0; k < count; k++) {
         double to[3], strength = 1, cosine, highlight;
@@ -1152,12 +1152,12 @@ static void section_colour(const viewer *v, const float point[3], float rgb[3]) 
     }
 }
 
-/* OpenGL's exponential fog, in the colour of half the sky's mean light. */
+/* OpenGL's exponential fog, in the colour of the sky's mean light. */
 static void fog(const viewer *v, const float point[3], float rgb[3]) {
     double to[3], distance = 0, clear;
     for (int i = 0; i < 3; i++) to[i] = (double)point[i] - v->view.eye[i], distance += to[i] * v->view.forward[i];
     clear = exp(-v->o.fog * fmax(0, distance - v->centre_distance + v->radius) / (2 * v->radius));
-    for (int i = 0; i < 3; i++) rgb[i] = (float)(clear * (double)rgb[i] + (1 - clear) * 0.5 * v->mean_light[i]);
+    for (int i = 0; i < 3; i++) rgb[i] = (float)(clear * (double)rgb[i] + (1 - clear) * v->mean_light[i]);
 }
 
 static void shade_sample(const viewer *v, shade_batch *b, size_t i, float rgb[3]) {
@@ -1582,11 +1582,11 @@ static void release(viewer *v) {
 int main(int argc, char **argv) {
     static viewer v;
     int ok;
-    for (int i = 1; i < argc; i++)
-        if (!strcmp(argv[i], "--help") || !strcmp(argv[i], "-h")) return print_help(), 0;
+    int help = 0;
+    for (int i = 1; i < argc; i++) help |= !strcmp(argv[i], "--help") || !strcmp(argv[i], "-h");
     v.started = seconds();
-    ok = run(&v, argc, argv);
-    if (ok && (fflush(stdout) != 0 || ferror(stdout))) ok = file_fail(v.error, "standard output: %s", strerror(errno));
+    if (help) print_help();
+    ok = (help || run(&v, argc, argv)) && file_printed(v.error);
     if (!ok) fprintf(stderr, "viewer: %s\n", v.error);
     release(&v);
     return ok ? 0 : 1;

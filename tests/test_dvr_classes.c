@@ -468,4 +468,79 @@ TEST(light_by_the_gradient_is_post_classified) {
     field_free(&f);
 }
 
+/* 0..7, in steps that bytes and their scale hold exactly, and an offset. */
+static isogi_volume far_from_zero(int type, double offset, double *doubles, uint8_t *bytes) {
+    isogi_volume v = {.size = {8, 8, 8}, .data = type ? (const void *)bytes : (const void *)doubles, .type = type ? ISOGI_U8 : ISOGI_F64};
+    for (int i = 0; i < 512; i++) {
+        bytes[i] = (uint8_t)(32 * (3.5 + 3.5 * sin(i % 8 * 0.7 + i / 8 % 8 * 0.5 + i / 64 * 0.3)));
+        doubles[i] = offset + bytes[i] / 32.0;
+    }
+    if (type) v.scale = 1 / 32.0, v.bias = offset;
+    return v;
+}
+
+/* What is added to all values and to the transfer function changes nothing: neither pictures nor visibility. */
+TEST(values_far_from_zero_are_told_apart) {
+    const double offset[] = {0, 1e6, 1e8};
+    const isogi_view view = {.width = SIDE, .height = SIDE, .eye = {-20, 13, 3}, .target = {3.5f, 3.5f, 3.5f}, .fov = 30};
+    static double doubles[512];
+    static uint8_t bytes[512];
+    static float image[2][SIDE * SIDE][4];
+    for (int type = 0; type < 2; type++)
+        for (int method = 0; method <= ISOGI_DVR_SWEEP; method++) { /* 0: a picture without light */
+            float v[2][27 * COUNT], points[27][3];
+            for (int i = 0; i < 81; i++) (&points[0][0])[i] = (float)(3 * (i % 3 == 0 ? i / 3 % 3 : i % 3 == 1 ? i / 9 % 3 : i / 27));
+            for (int k = 0; k < 3; k++) {
+                const isogi_volume volume = far_from_zero(type, offset[k], doubles, bytes);
+                const isogi_transfer_point p[] = {{offset[k], {1, 0, 0}, 0.3f}, {offset[k] + 2, {0, 1, 0}, 0},
+                                                  {offset[k] + 4, {0, 0, 1}, 0.5f}, {offset[k] + 7, {1, 1, 1}, 0}};
+                const isogi_transfer transfer = {p, 4, NULL, 0};
+                isogi_dvr_desc desc = {.step = 0.1, .grid = {5, 5, 5}, .visibility_step = 1, .opaque = 1};
+                isogi_pyramid *pyramid = NULL;
+                isogi_dvr *dvr;
+                double worst = 0;
+                CHECK(isogi_vol_build(&pyramid, &volume, &serial) == ISOGI_OK, "build");
+                desc.pyramid = pyramid;
+                if (method) desc.shading = ISOGI_DVR_VISIBILITY, desc.method = (isogi_dvr_method)method;
+                dvr = dvr_new(&desc, &transfer);
+                if (method) {
+                    CHECK(isogi_dvr_step(dvr, 0, NULL) == ISOGI_OK, "step");
+                    isogi_dvr_sample_visibility(dvr, (const float(*)[3])points, 27, v[k > 0]);
+                    for (int i = 0; i < 27 * COUNT && k; i++) worst = fmax(worst, fabs((double)v[1][i] - (double)v[0][i]));
+                } else {
+                    CHECK(isogi_dvr_render(dvr, &view, NULL, image[k > 0], NULL, NULL) == ISOGI_OK, "render");
+                    for (int i = 0; i < SIDE * SIDE && k; i++)
+                        for (int c = 0; c < 4; c++) worst = fmax(worst, fabs((double)image[1][i][c] - (double)image[0][i][c]));
+                }
+                CHECK(worst < 2e-3, "type %d, method %d, offset %g: %g", type, method, offset[k], worst);
+                isogi_dvr_free(dvr), isogi_vol_free(pyramid);
+            }
+        }
+}
+
+/* However small the unit of extinction: what has none is transparent. Counts that no array can have are refused. */
+TEST(tiny_units_and_endless_counts) {
+    field f = field_new(8, 8, 8);
+    const isogi_transfer_point p[] = {{0, {1, 1, 1}, 0}, {4, {1, 1, 1}, 0}, {7, {1, 1, 1}, 1}};
+    const isogi_transfer transfer = {p, 3, NULL, 0};
+    const float point[1][3] = {{0, 3, 3}};
+    for (int i = 0; i < 512; i++) f.value[i] = i % 8;
+    field_build(&f);
+    for (int coarsest = 1; coarsest < 3; coarsest++) {
+        double first = 0;
+        for (double unit = 1e-3; unit > 1e-300; unit *= 1e-33) {
+            const isogi_dvr_desc desc = {.pyramid = f.pyramid, .unit = unit, .shading = ISOGI_DVR_VISIBILITY, .method = ISOGI_DVR_SWEEP,
+                .coarsest = coarsest, .grid = {8, 8, 8}, .visibility_step = 1};
+            isogi_dvr *dvr = dvr_new(&desc, &transfer);
+            float v[9] = {0};
+            CHECK(isogi_dvr_step(dvr, 0, NULL) == ISOGI_OK && isogi_dvr_sample_visibility(dvr, point, 1, v) == ISOGI_OK, "step");
+            if (!(first > 0)) first = (double)v[0];
+            CHECK(fabs((double)v[0] - first) < 0.1 && first > 2.9, "unit %g, coarsest %d: %g, not %g", unit, coarsest, (double)v[0], first);
+            CHECK(isogi_dvr_sample_visibility(dvr, point, SIZE_MAX, v) == ISOGI_TOO_LARGE, "SIZE_MAX points");
+            isogi_dvr_free(dvr);
+        }
+    }
+    field_free(&f);
+}
+
 TEST_MAIN("dvr_classes")

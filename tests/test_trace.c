@@ -1301,4 +1301,32 @@ TEST(scans_have_no_specks) {
     if (LONG_SUITE) real_volume("bonsai_256x256x256_uint8.raw", 256, 256, 256, 40);
 }
 
+/* Points of a cap are floats, and may lie beside it by their rounding. */
+TEST(points_on_caps_look_out_of_the_box) {
+    static float data[16 * 16 * 16];
+    const isogi_light sun = {.vector = {1, 0, 0}, .rgb = {1, 1, 1}};
+    for (int i = 0; i < 16 * 16 * 16; i++) data[i] = (float)(i / 16 % 16 + 1);
+    for (int k = 0; k < 12; k++) {
+        const double edge = 0.3 + 0.05 * k;
+        const isogi_volume v = {
+            .data = data, .type = ISOGI_F32, .size = {16, 16, 16}, .spacing = {edge, edge, edge}, .origin = {-3.3, 0, 0}};
+        isogi_pyramid *pyramid = NULL;
+        isogi_trace_desc d = {.samples = 4, .capped = 1, .lighting = {.lights = &sun, .light_count = 1}};
+        isogi_ray ray[32];
+        isogi_hit hit[32];
+        float point[32][3], e[32][3];
+        CHECK(isogi_vol_build(&pyramid, &v, NULL) == ISOGI_OK, "build");
+        d.pyramid = pyramid, memset(ray, 0, sizeof ray);
+        for (int i = 0; i < 32; i++) {
+            ray[i].origin[0] = 20, ray[i].origin[1] = 0.5 + 0.1 * i, ray[i].origin[2] = 1 + 0.06 * i, ray[i].dir[0] = -1;
+            ray[i].isovalue = 0.5, ray[i].flags = ISOGI_RAY_CAPPED;
+        }
+        isogi_vol_intersect(pyramid, ray, 32, hit, NULL), isogi_vol_positions(pyramid, hit, 32, point);
+        CHECK(isogi_trace_gather(&d, (const float(*)[3])point, NULL, 32, e, NULL, NULL) == ISOGI_OK, "gather");
+        for (int i = 0; i < 32; i++)
+            CHECK(fabs((double)e[i][0] - 1) < 1e-3, "spacing %g, point %d, hit %d: %g", edge, i, hit[i].side, (double)e[i][0]);
+        isogi_vol_free(pyramid);
+    }
+}
+
 TEST_MAIN("trace")

@@ -90,6 +90,25 @@ TEST(transfer_of_256_cubed_stays_below_a_gigabyte) {
     isogi_trace_free(t), scene_free(&s);
 }
 
+/* As far as light is told apart at all: radiance is up to 1e30. */
+TEST(short_formats_follow_the_largest_and_the_smallest_light) {
+    const float radiance[] = {1e-33f, 1e-30f, 1e30f};
+    double q[4] = {7.5, 7.5, 7.5, 5};
+    scene s = scene_make(16, 16, 16, NULL, ball, q);
+    const float point[1][3] = {{7.5f, 7.5f, 12.5f}};
+    for (int k = 0; k < 3; k++)
+        for (int format = 1; format < 5; format++) {
+            const float sky[3] = {3.5449077f * radiance[k], 3.5449077f * radiance[k], 3.5449077f * radiance[k]};
+            isogi_trace_desc d = desc_make(&s, 0, 0, 4);
+            float e[1][3];
+            d.lighting.env.sh = sky, d.storage = (isogi_trace_format)format, d.lazy = 1;
+            bake_and_sample(&d, NULL, point, 1, e);
+            CHECK(fabs((double)e[0][0] / (PI * (double)radiance[k]) - 1) < 0.02, "radiance %g, %s: %g", (double)radiance[k],
+                  format_name[format], (double)e[0][0]);
+        }
+    scene_free(&s);
+}
+
 /* Units follow the light: the formats hold a sun of 1e6 beside a sky of 1e-3, and a dim world of 1e-6. */
 TEST(short_formats_follow_the_brightness) {
     double q[4] = {15.5, 15.5, 15.5, 9};

@@ -847,6 +847,8 @@ TEST(stats_are_key_value_lines_and_help_is_complete) {
         char shell[512];
         snprintf(shell, sizeof shell, "'%s' --help >'%s'", viewer && *viewer ? viewer : "build/viewer", temporary("help"));
         CHECK(system(shell) == 0, "--help fails");
+        snprintf(shell, sizeof shell, "'%s' --help >/dev/full 2>&1", viewer && *viewer ? viewer : "build/viewer");
+        CHECK(access("/dev/full", W_OK) != 0 || system(shell) != 0, "--help to a full disk succeeds");
         read_text(temporary("help"), help, sizeof help);
         for (size_t i = 0; i < sizeof named / sizeof named[0]; i++) CHECK(strstr(help, named[i]), "--help does not tell of %s", named[i]);
         for (char *line = strtok(help, "\n"); line; line = strtok(NULL, "\n"))
@@ -1219,6 +1221,26 @@ TEST(compared_pictures_have_the_same_mean) {
           "%d: %s: difference %g, exposure %g", r.status, r.error, difference, exposure);
     r = compared_with("", "");
     CHECK(r.status == 0 && !strcmp(r.output, "difference_rms 0.000000\n"), "%d: %s: %s", r.status, r.error, r.output);
+}
+
+/* Under a sky that is the same everywhere ambient light is the same, constant or by normal, and a white surface is as bright as the sky,
+   and as fog. */
+TEST(ambient_light_and_fog_are_the_sky) {
+    static const char *const then[] = {"--ambient constant", "--ambient constant --fog 50"};
+    const char *first = temporary("first.png");
+    char command[1024];
+    for (int k = 0; k < 2; k++) {
+        double difference = 1;
+        run_result r;
+        snprintf(command, sizeof command, "--scene furnace --mode lambert --ambient normal --exposure 0.5 --size 48x48 --out '%s'", first);
+        r = run_viewer(command);
+        CHECK(r.status == 0, "%d: %s", r.status, r.error);
+        snprintf(command, sizeof command, "--scene furnace --mode lambert %s --exposure 0.5 --size 48x48 --compare '%s' --out '%s'",
+                 then[k], first, temporary("then.png"));
+        r = run_viewer(command);
+        CHECK(r.status == 0 && sscanf(r.output, "difference_rms %lf", &difference) == 1 && difference < 0.004, "%s: %d: %s: %g", then[k],
+              r.status, r.error, difference);
+    }
 }
 
 /* A row of one pixel in a block that is stored: filters 0 to 4 there are, and no others. */

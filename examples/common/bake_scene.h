@@ -196,6 +196,7 @@ static inline int bake_scene_load(bake_scene *s, isogi_trace *trace, const char 
     result = isogi_trace_load(trace, block, size);
     free(block);
     if (result == ISOGI_INVALID) return file_fail(s->error, "%s: holds another texture: volume, light and options must be the same", path);
+    if (result == ISOGI_CORRUPT) return file_fail(s->error, "%s: is no file of a texture, or is damaged", path);
     return result == ISOGI_OK || file_fail(s->error, "%s: %s", path, isogi_result_string(result));
 }
 

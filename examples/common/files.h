@@ -35,6 +35,11 @@ static inline int file_fail(char *error, const char *format, ...) {
     return 0;
 }
 
+/* Whether all that was printed has reached standard output. */
+static inline int file_printed(char *error) {
+    return (fflush(stdout) == 0 && !ferror(stdout)) || file_fail(error, "standard output: %s", strerror(errno));
+}
+
 /* Opens a regular file for reading and tells its size. Returns the descriptor, or -1 with a message. */
 static inline int file_open(const char *path, uint64_t *size, char *error) {
     struct stat status;

@@ -13,6 +13,8 @@ typedef struct hdr_image {
     int width, height;
 } hdr_image;
 
+enum { HDR_MOST = 1 << 27 }; /* pixels, as 16384 x 8192: 1.5 GiB of floats */
+
 typedef struct hdr_source {
     const unsigned char *data;
     size_t size, at;
@@ -111,6 +113,8 @@ static inline int hdr_decode(const unsigned char *data, size_t size, hdr_image *
     /* run-length code holds 127 equal bytes in 2, a repeat at most 2^32 pixels in 16: bound by what real files can reach */
     if ((uint64_t)width * (uint64_t)height / 128 > size - in.at)
         return file_fail(error, "claims %d x %d pixels but holds %zu bytes of them", width, height, size - in.at);
+    if ((uint64_t)width * (uint64_t)height > HDR_MOST)
+        return file_fail(error, "is %d x %d pixels, at most %d million are read", width, height, HDR_MOST >> 20);
     rgb = (float *)malloc((size_t)width * (size_t)height * 3 * sizeof *rgb);
     row = (unsigned char *)malloc((size_t)width * 4);
     if (!rgb || !row) {
