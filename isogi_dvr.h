@@ -6052,12 +6052,14 @@ static size_t isogi_dvr__count_classes(const isogi_dvr *d, double *low, double *
     }
 }
 
-/* Whether floats tell values of the classes' span apart. Integers are floats as they are; what they count from is taken off with their
-   bias, in double. */
+/* Whether floats tell values of the classes' span apart, if there are any to be told. Integers are floats as they are; what they count from
+   is taken off with their bias, in double. */
 #define ISOGI_DVR__TOLD_APART 4096
-static int isogi_dvr__floats_tell(const isogi_volume *v, double low, double span) {
+static int isogi_dvr__floats_tell(const isogi_dvr *d, double low, double span) {
+    const isogi_volume *v = &d->volume;
     double from = fabs(low - v->bias), to = fabs(low + span - v->bias);
-    return (v->type != ISOGI_F32 && v->type != ISOGI_F64) || ISOGI_DVR__TOLD_APART * span >= (from > to ? from : to);
+    return (v->type != ISOGI_F32 && v->type != ISOGI_F64) || !(d->range[0] < d->range[1]) ||
+           ISOGI_DVR__TOLD_APART * span >= (from > to ? from : to);
 }
 
 /* Integrals up to each class. */
@@ -7302,7 +7304,7 @@ static isogi_result isogi_dvr__begin_frame(isogi_dvr__render_job *job) {
         job->eight = blocks < 2e9 && d->cells[0] && d->cells[1] && d->cells[2] && fabs(v->scale) < 1e200 && fabs(v->bias) < 1e200;
 #endif
     f->count = isogi_dvr__count_classes(d, &low, &scale);
-    if (!isogi_dvr__fast_space(d) || job->lights.local || !isogi_dvr__floats_tell(v, low, (double)f->count / scale)) return ISOGI_OK;
+    if (!isogi_dvr__fast_space(d) || job->lights.local || !isogi_dvr__floats_tell(d, low, (double)f->count / scale)) return ISOGI_OK;
     f->dvr = d, f->step = d->piece, f->look = isogi_dvr__fast_look, f->shade = isogi_dvr__fast_shade, f->glow = (float)d->desc.emission;
     f->end = 1 - d->desc.opaque, f->dim = 0.125f;
     f->leap = blocks < 2e9 ? d->kernels.leap : isogi_dvr__leap;
@@ -8143,6 +8145,7 @@ ISOGI_API isogi_result isogi_dvr_tets_render(const isogi_tets *tets, const isogi
 #undef ISOGI_DVR__TOWARD
 #undef ISOGI_DVR__CLASSES
 #undef ISOGI_DVR__CLOSE
+#undef ISOGI_DVR__TOLD_APART
 #undef ISOGI_DVR__NODES
 #undef ISOGI_DVR__ROUNDING
 #undef ISOGI_DVR__APART

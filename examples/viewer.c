@@ -286,8 +286,8 @@ static const option option_list[] = {
      "sweeps 64)",
      INTEGER, AT(directions), 0, 1, 1, 65536, .allowed = "a whole number, 1 to 65536"},
     {"--grid", "X,Y,Z", VOLUMES,
-     "points of visibility: no shadow is finer; default half the voxels along each axis, at most 64 (a "
-     "scene: its own; without sweeps a quarter)",
+     "points of visibility: no shadow is finer; default one per voxel, of more than 4 million half as many along "
+     "each axis, at most 128 (a scene: its own; without sweeps a quarter)",
      SIZES, AT(grid), 0, 3, 1, 1024, .allowed = "three whole numbers, 1 to 1024"},
     {"--coarsest", "N", 1 << DVR,
      "by sweeps: points of visibility stand up to N times as far apart where nothing is seen of them, "
@@ -1362,17 +1362,19 @@ static int write_depth(viewer *v, const float *depth, int factor) {
 }
 
 /* Shadows of the sun want more than the header's defaults, which are for pictures in motion; sweeps have it in about a second. Of few
-   voxels the lattice of sweeps holds each: with every second one surfaces that are opaque from voxel to voxel are lit in blotches. */
+   voxels the lattice of sweeps holds each, and so does the grid: with every second one surfaces that are opaque from voxel to voxel are lit
+   in blotches, and smooth ones in rings. */
 static void set_visibility(const viewer *v, isogi_dvr_desc *desc) {
     const scene *s = v->o.scene && v->o.scene->order ? v->o.scene : NULL;
     int swept = v->o.mode == DVR && !v->transfer.peak_count && v->o.method != ISOGI_DVR_BRUTE && v->o.method != ISOGI_DVR_PAPER;
     desc->order = v->o.order ? v->o.order : s ? s->order : swept ? 4 : 0;
     desc->directions = v->o.directions ? v->o.directions : s ? s->directions : swept ? 256 : 0;
     desc->coarsest = 1 << v->o.coarsest;
-    if (swept && v->volume.size[0] * v->volume.size[1] * v->volume.size[2] <= (size_t)1 << 22) desc->visibility_step = 1;
+    int few = v->volume.size[0] * v->volume.size[1] * v->volume.size[2] <= (size_t)1 << 22;
+    if (swept && few) desc->visibility_step = 1;
     for (int a = 0; a < 3; a++) {
-        size_t half = (v->volume.size[a] + 1) / 2;
-        desc->grid[a] = v->o.grid[a] ? v->o.grid[a] : s ? s->grid[a] : !swept ? 0 : half < 64 ? half : 64;
+        size_t points = few ? v->volume.size[a] : (v->volume.size[a] + 1) / 2;
+        desc->grid[a] = v->o.grid[a] ? v->o.grid[a] : s ? s->grid[a] : !swept ? 0 : points < 128 ? points : 128;
     }
 }
 

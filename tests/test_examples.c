@@ -191,7 +191,7 @@ TEST(bad_bakes_get_one_line) {
     static const char *const bad[][2] = {{"", "VOLUME and --out are needed"}, {"--out '%s'", "VOLUME and --out are needed"},
         {"procedural:gyroid:8 --out", "--out: needs a value"}, {"procedural:gyroid:8 --out --both-sides", "--out: needs a value"},
         {"procedural:gyroid:8 --out '%s' --raw --both-sides", "its value is missing"},
-        {"procedural:teapot --out '%s'", "no such volume"}, {"procedural:gyroid:8 --samples 1 --out '%s'", "corrupt"},
+        {"procedural:teapot --out '%s'", "no such volume"}, {"procedural:gyroid:8 --samples 1 --out '%s'", "is damaged"},
         {"procedural:gyroid:8 --samples 0 --out '%s'", "--samples"},
         {"procedural:gyroid:8 --samples nan --out '%s'", "--samples"}, {"procedural:gyroid:8 --lattice 0,0,0 --out '%s'", "--lattice"},
         {"procedural:gyroid:8 --spacing 0,1,1 --out '%s'", "--spacing"}, {"procedural:gyroid:8 --format best --out '%s'", "--format"},

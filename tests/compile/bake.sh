@@ -75,7 +75,7 @@ refused() {
 }
 refused "no such volume" procedural:nothing --out "$OUT/x.bake"
 refused "another texture" $scene --samples 5 --merge "$OUT/a.bake" --out "$OUT/x.bake"
-refused "corrupt" $scene --merge "$OUT/whole.rgb" --out "$OUT/x.bake"
+refused "is damaged" $scene --merge "$OUT/whole.rgb" --out "$OUT/x.bake"
 refused "box" $scene --box 1,2,3 --out "$OUT/x.bake"
 refused "box" $scene --box 0.5,0,0,16,16,8.5 --out "$OUT/x.bake"
 refused "box" $scene --box 0,0,0,0,0,0 --out "$OUT/x.bake"
