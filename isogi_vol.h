@@ -5040,8 +5040,8 @@ static int isogi_vol__passes_base(isogi_vol__ride *r, const int32_t cell[4], dou
 
 /* The same by every path.
    leaf_mask: which of the 64 cells (x + 4y + 16z) of a leaf can hold the surface.
-   on_way: of the children that can hold the surface those that are passed, by a beam if one is given, in the ray's order.
-   trip_open: opens the node that was sent for: these are the next ones; open_node: of nodes and leaves; open_leaf: of cells.
+   open_node, open_leaf: opens the node that was sent for: of the children on the way those that can hold the surface are the next ones;
+   open_any: one or the other.
    trip_look: the next cell of the leaf: 0: nothing is there; -1: it is in doubt, and its voxels are sent for; 1: any hit will do, and there
    is one. trip_decide: the cell that is in doubt: 1: hit; 0: none.
    ride_on: to the first hit: 1, or to the end: 0. */
@@ -5053,33 +5053,29 @@ static int isogi_vol__passes_base(isogi_vol__ride *r, const int32_t cell[4], dou
                                       ~isogi_vol__at_least_##path(node, leaf->outside), \
                                       ~isogi_vol__at_least_##path(node + 64, leaf->outside)); \
     } \
-    target ISOGI_VOL__INLINE uint64_t isogi_vol__on_way_##path(isogi_vol__ride *r, const isogi_vol__beam *beam, int n, uint64_t held) { \
-        const struct isogi_vol__ways *ways = r->walk.pyramid->ways; \
-        const uint64_t way = beam ? isogi_vol__beam_way_##path(beam, ways, n) : isogi_vol__trip_way_##path(&r->trip, ways, n); \
-        r->walk.count.blocks++; \
-        return isogi_vol__turn_mask_##path(held, ways, r->trip.octant) & way; \
-    } \
-    target ISOGI_VOL__INLINE void isogi_vol__open_node_##path(isogi_vol__ride *r, const isogi_vol__beam *beam) { \
+    target ISOGI_VOL__INLINE void isogi_vol__open_node_##path(isogi_vol__ride *r, uint64_t way) { \
         isogi_vol__trip *c = &r->trip; \
         const isogi_pyramid *p = r->walk.pyramid; \
         const int n = r->at; \
         const size_t x = (size_t)c->place[n][0], y = (size_t)c->place[n][1], z = (size_t)c->place[n][2]; \
         const uint64_t held = isogi_vol__at_least_##path(r->open + 64, c->low) & ~isogi_vol__at_least_##path(r->open, c->high + 1); \
-        c->left[n] = isogi_vol__on_way_##path(r, beam, n, held), c->pending |= (unsigned)(c->left[n] != 0) << n; \
+        c->left[n] = isogi_vol__turn_mask_##path(held, p->ways, c->octant) & way, c->pending |= (unsigned)(c->left[n] != 0) << n; \
         c->children[n] = n > 1 || !p->volume.compact ? p->nodes[isogi_vol__node_at(p, n - 1, 4 * x, 4 * y, 4 * z)] : NULL; \
+        r->walk.count.blocks++; \
     } \
-    target ISOGI_VOL__INLINE void isogi_vol__open_leaf_##path(isogi_vol__ride *r, const isogi_vol__beam *beam) { \
+    target ISOGI_VOL__INLINE void isogi_vol__open_leaf_##path(isogi_vol__ride *r, uint64_t way) { \
         isogi_vol__trip *c = &r->trip; \
         const isogi_pyramid *p = r->walk.pyramid; \
         const int32_t *place = c->place[0]; \
         const uint64_t held = \
             p->volume.compact ? isogi_vol__no_leaf(p, (size_t)place[0], (size_t)place[1], (size_t)place[2], &r->leaf) \
                               : isogi_vol__leaf_mask_##path(r->open, c->level, &r->leaf); \
-        c->cells = isogi_vol__on_way_##path(r, beam, 0, held); \
+        c->cells = isogi_vol__turn_mask_##path(held, p->ways, c->octant) & way; \
+        r->walk.count.blocks++; \
     } \
-    target ISOGI_VOL__INLINE void isogi_vol__trip_open_##path(isogi_vol__ride *r, const isogi_vol__beam *beam) { \
-        if (r->at) isogi_vol__open_node_##path(r, beam); \
-        else isogi_vol__open_leaf_##path(r, beam); \
+    target ISOGI_VOL__INLINE void isogi_vol__open_any_##path(isogi_vol__ride *r, uint64_t way) { \
+        if (r->at) isogi_vol__open_node_##path(r, way); \
+        else isogi_vol__open_leaf_##path(r, way); \
     } \
     target ISOGI_VOL__INLINE int isogi_vol__trip_look_##path(isogi_vol__ride *r) { \
         isogi_vol__trip *c = &r->trip; \
@@ -5111,7 +5107,7 @@ static int isogi_vol__passes_base(isogi_vol__ride *r, const int32_t cell[4], dou
         isogi_vol__trip *c = &r->trip; \
         if (c->low > c->high) return 0; \
         do { \
-            isogi_vol__trip_open_##path(r, NULL); \
+            isogi_vol__open_any_##path(r, isogi_vol__trip_way_##path(c, r->walk.pyramid->ways, r->at)); \
             while (c->cells) { \
                 const int found = isogi_vol__trip_look_##path(r); \
                 if (found > 0 || (found && isogi_vol__trip_decide_##path(r, hit))) return 1; \
@@ -7015,7 +7011,7 @@ static int isogi_vol__convoy_corners(const isogi_vol__convoy *v, const int32_t c
         for (;;) { \
             met[lead->at] = lanes; \
             b->work.blocks += isogi_vol__count_bits(lanes); \
-            isogi_vol__trip_open_##path(lead, &v->beam); \
+            isogi_vol__open_any_##path(lead, isogi_vol__beam_way_##path(&v->beam, p->ways, lead->at)); \
             if (!lead->at && lead->trip.cells) isogi_vol__convoy_leaf_##path(v, b, lanes); \
             do { \
                 int a; \
@@ -7126,6 +7122,7 @@ static int isogi_vol__agenda_renew(isogi_vol__batch *b, isogi_vol__agenda *agend
 #define ISOGI_VOL__TAKE_TURNS(path, target) \
     ISOGI_VOL__NOINLINE target static void isogi_vol__take_turns_##path(isogi_vol__batch *b, isogi_vol__ride *ride, int n, size_t *next, \
                                                                         size_t end) { \
+        const struct isogi_vol__ways *ways = b->pyramid->ways; \
         isogi_vol__agenda agenda[2]; \
         isogi_hit any; \
         int now = 0, i, k; \
@@ -7135,14 +7132,14 @@ static int isogi_vol__agenda_renew(isogi_vol__batch *b, isogi_vol__agenda *agend
             isogi_vol__agenda *these = &agenda[now], *then = &agenda[!now]; \
             memset(then->count, 0, sizeof then->count); \
             for (k = 0; k < these->count[ISOGI_VOL__OPEN_NODE]; k++) { \
-                i = these->ride[ISOGI_VOL__OPEN_NODE][k]; \
-                isogi_vol__open_node_##path(&ride[i], NULL); \
+                isogi_vol__ride *r = &ride[i = these->ride[ISOGI_VOL__OPEN_NODE][k]]; \
+                isogi_vol__open_node_##path(r, isogi_vol__trip_way_##path(&r->trip, ways, r->at)); \
                 isogi_vol__agenda_add(these, ISOGI_VOL__GO_ON, i); \
             } \
             for (k = 0; k < these->count[ISOGI_VOL__OPEN_LEAF]; k++) { \
-                i = these->ride[ISOGI_VOL__OPEN_LEAF][k]; \
-                isogi_vol__open_leaf_##path(&ride[i], NULL); \
-                isogi_vol__agenda_add(these, ride[i].trip.cells ? ISOGI_VOL__LOOK : ISOGI_VOL__GO_ON, i); \
+                isogi_vol__ride *r = &ride[i = these->ride[ISOGI_VOL__OPEN_LEAF][k]]; \
+                isogi_vol__open_leaf_##path(r, isogi_vol__trip_way_##path(&r->trip, ways, 0)); \
+                isogi_vol__agenda_add(these, r->trip.cells ? ISOGI_VOL__LOOK : ISOGI_VOL__GO_ON, i); \
             } \
             for (k = 0; k < these->count[ISOGI_VOL__DECIDE]; k++) { \
                 isogi_vol__ride *r = &ride[i = these->ride[ISOGI_VOL__DECIDE][k]]; \
