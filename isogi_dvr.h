@@ -166,8 +166,9 @@
 
    - No light on tetrahedral meshes, no scattering beyond the first, no refraction, no glossy surfaces.
    - Pictures of physical space without a bound are pre-integrated (ISOGI_DVR_EXACT is the same there), unless they have peaks among
-     the values that occur, local shading (ISOGI_DVR_LOCAL, isogi_view.local), anisotropy, jitter, or an axis of one
-     voxel: those are post-classified, and features narrower than the value's change from sample to sample need a smaller step.
+     the values that occur, local shading (ISOGI_DVR_LOCAL, isogi_view.local), anisotropy, jitter, an axis of one
+     voxel, or floats that tell too few values apart (see Limits): those are post-classified, and features narrower than the value's
+     change from sample to sample need a smaller step.
      Pre-classification (colours interpolated instead of values) is left out on purpose: in data space it would depend on the view, and it
      blurs every surface to the width of a voxel.
    - The border of the volume is no surface: outside of the box is empty space.
@@ -213,8 +214,9 @@
    transparent (rays within its plane do sample it). Up to ISOGI_DVR_MAX_PEAKS peaks (in data space, exact or pre-integrated, any
    number), 2^16 directions, and 2^24 samples on the longest ray. Pre-integrated pictures of physical space tell up to 16384 classes of
    values apart, of those that occur and on which the transfer function depends: a piece of it that is narrower than four of them keeps
-   its opacity, blurred over a class. Floats and doubles that all lie more than 4096 times as far from zero as from each other are
-   post-classified, in double, which takes longer: subtract what they have in common, or let `bias` add it to small ones. Errors:
+   its opacity, blurred over a class. Of floats and doubles they do where the span of these values is at least a 4096th of their distance
+   from zero; else pictures are post-classified, in double, which takes longer: subtract what values have in common, or let `bias` add it
+   to small ones. Errors:
    ISOGI_INVALID for anything outside of its documented range, ISOGI_TOO_LARGE where sizes overflow or pass these limits, ISOGI_NO_MEMORY,
    ISOGI_CANCELLED.
 
@@ -879,7 +881,8 @@ struct isogi_dvr {
     double limit;                 /* with a bound: how far colours may change in a part of a piece */
     double to_grid[9]; /* world directions to grid directions */
     double spacing;    /* the smallest distance of two voxels, world */
-    double range[2];   /* of values */
+    double range[2];   /* of values, */
+    double base;       /* and what they count from in rows and blocks: little would be left in floats of values that are far from zero */
     double visibility_step, piece; /* of visibility rays; of pre-integrated pictures: voxels */
     int cells[3];
     int transparent; /* no value that occurs has any extinction */
@@ -981,15 +984,19 @@ static void isogi_dvr__transfer_span(const isogi_dvr__transfer *t, double span[2
     span[0] = end ? t->points[first].value : 1, span[1] = end ? t->points[end - 1].value : 0;
 }
 
+/* What values count from in rows of floats, if it may be `low`: differences must be floats. */
+static double isogi_dvr__count_from(const isogi_dvr *d, double low) { return 0.5 * d->range[1] - 0.5 * d->range[0] < 1e38 ? low : 0; }
+
 /* `count` classes of values, the class of a value being (value - low) * scale, kept within 0 .. count - 1. The first and the last one hold
    whatever lies before and beyond the values of the span that occur; the others divide these. So neither an outlier nor a wide range of
    values takes classes from the values that the transfer function tells apart. A thousandth of a class keeps the ends of the span, where
    a step may stand, on their upper side whatever is rounded. */
 static void isogi_dvr__set_classes(const isogi_dvr *d, const double span[2], size_t count, double *low, double *scale) {
-    double from = span[0] > d->range[0] ? span[0] : d->range[0], to = span[1] < d->range[1] ? span[1] : d->range[1], width;
+    double from = span[0] > d->range[0] ? span[0] : d->range[0], to = span[1] < d->range[1] ? span[1] : d->range[1], width, least;
     if (!(from < to)) to = from + (d->range[1] > d->range[0] ? 0.5 * d->range[1] - 0.5 * d->range[0] : 0);
     width = (0.5 * to - 0.5 * from) / (0.5 * (double)(count - 2));
-    if (!(width > 1e-7 * fabs(from) / (double)count)) width = 1e-7 * fabs(from) / (double)count;
+    least = d->range[0] < d->range[1] ? 1e-12 * fabs(from) : 1e-7 * fabs(from) / (double)count; /* that doubles tell apart */
+    if (!(width > least)) width = least;
     if (!(width > 1e-300)) width = 1e-30; /* all zero: classes that floats tell apart */
     *low = from - 1.001 * width, *scale = 1 / width;
 }
@@ -2210,8 +2217,7 @@ static isogi_result isogi_dvr__plan_matter(isogi_dvr *d) {
         v->bias - low); \
     break;
 
-/* Voxels first .. first + count - 1 of a row, as floats that count from `low`: of values that are far from zero little would be left. What
-   is not finite stays so. */
+/* Voxels first .. first + count - 1 of a row, as floats that count from `low`. What is not finite stays so. */
 static void isogi_dvr__read_row(const isogi_volume *v, double low, size_t first, size_t count, size_t y, size_t z, float *out) {
     const char *p = (const char *)v->data + (ptrdiff_t)first * v->stride[0] + (ptrdiff_t)y * v->stride[1] + (ptrdiff_t)z * v->stride[2];
     size_t i;
@@ -2248,12 +2254,12 @@ static void isogi_dvr__sides(const isogi_dvr__blocks *b, size_t block, size_t n,
     for (a = 0; a < 3; a++) side[a] = at[a] + 1 < b->count[a] ? n : (b->rest[a] * n + 15) / 16;
 }
 
-/* The field at a voxel, the lowest value where it is not finite. It counts from the lowest value, as all data in blocks does. */
+/* The field at a voxel, the lowest value where it is not finite, less the base, as all data in blocks. */
 static float isogi_dvr__voxel(const isogi_dvr *d, size_t x, size_t y, size_t z) {
     float value;
-    isogi_dvr__read_row(&d->volume, d->range[0], x < d->volume.size[0] ? x : d->volume.size[0] - 1, 1,
+    isogi_dvr__read_row(&d->volume, d->base, x < d->volume.size[0] ? x : d->volume.size[0] - 1, 1,
                         y < d->volume.size[1] ? y : d->volume.size[1] - 1, z < d->volume.size[2] ? z : d->volume.size[2] - 1, &value);
-    return isogi_dvr__finite32(value) ? value : 0;
+    return isogi_dvr__finite32(value) ? value : (float)(d->range[0] - d->base);
 }
 
 static float isogi_dvr__lattice_at(const isogi_dvr *d, int step, const size_t c[3]) {
@@ -2320,9 +2326,9 @@ static void isogi_dvr__histogram_task(void *arg, size_t task) {
     count = d->volume.size[0] - 16 * at[0] < 17 ? d->volume.size[0] - 16 * at[0] : 17;
     for (z = 16 * at[2]; z <= 16 * at[2] + 16 && z < d->volume.size[2]; z++)
         for (y = 16 * at[1]; y <= 16 * at[1] + 16 && y < d->volume.size[1]; y++) {
-            isogi_dvr__read_row(&d->volume, d->range[0], 16 * at[0], count, y, z, row);
+            isogi_dvr__read_row(&d->volume, d->base, 16 * at[0], count, y, z, row);
             for (x = 0; x < count; x++)
-                if (isogi_dvr__finite32(row[x])) classes |= (uint64_t)1 << b->bin[isogi_dvr__class(d, d->range[0] + (double)row[x])];
+                if (isogi_dvr__finite32(row[x])) classes |= (uint64_t)1 << b->bin[isogi_dvr__class(d, d->base + (double)row[x])];
         }
     b->histogram[block] = classes;
 }
@@ -2765,6 +2771,7 @@ ISOGI_API isogi_result isogi_dvr_create(isogi_dvr **dvr, const isogi_dvr_desc *d
     d->piece = desc->step > 0 ? resolved.step : 1;
     d->visibility_step = resolved.visibility_step > 0 ? resolved.visibility_step : 2 * resolved.step;
     isogi_vol_range(resolved.pyramid, d->range);
+    d->base = isogi_dvr__count_from(d, d->range[0]);
     isogi_dvr__set_classes(d, d->range, ISOGI_DVR__TABLE, &d->matter.low, &d->matter.scale);
     d->method = isogi_dvr__method(d);
     d->kernels = isogi_dvr__choose_kernels(d->context.force_path);
@@ -3611,10 +3618,10 @@ static void isogi_dvr__mix_rows(const isogi_volume *v, double low, size_t first,
     }
 }
 
-/* sum[i] += extinction at lattice positions from + i * distance (voxels) of a row of voxels that begins at `first`, less the lowest class's
-   value. */
+/* sum[i] += extinction at lattice positions from + i * distance (voxels) of a row of voxels that begins at `first`; low: where the classes
+   begin in it. */
 static void isogi_dvr__classify_row(const isogi_dvr *d, const float *row, size_t first, size_t last, double from, double distance,
-                                    size_t count, float *sum) {
+                                    size_t count, float low, float *sum) {
     float scale = (float)d->matter.scale;
     size_t i;
     for (i = 0; i < count; i++) {
@@ -3625,7 +3632,7 @@ static void isogi_dvr__classify_row(const isogi_dvr *d, const float *row, size_t
         u = (float)(x - (double)c), next = row[c + (last > 0) - first];
         value = row[c - first] + u * (next - row[c - first]);
         if (!isogi_dvr__finite32(value)) continue;
-        value *= scale;
+        value = (value - low) * scale;
         value = value > 0 ? value : 0;
         value = value < ISOGI_DVR__TABLE - 1 ? value : ISOGI_DVR__TABLE - 1;
         k = (size_t)value;
@@ -3664,6 +3671,7 @@ static int isogi_dvr__row_state(const isogi_dvr *d, const size_t node[2], uint8_
 static void isogi_dvr__matter_task(void *arg, size_t task) {
     isogi_dvr *d = (isogi_dvr *)arg;
     isogi_dvr__matter *m = &d->matter;
+    const double base = isogi_dvr__count_from(d, m->low);
     size_t z = m->plane + task;
     float *scratch = m->scratch + task * m->scratch_row, *row = scratch + d->volume.size[0], *sum = row + d->volume.size[0];
     uint8_t *state = (uint8_t *)(sum + m->size[0]);
@@ -3687,10 +3695,10 @@ static void isogi_dvr__matter_task(void *arg, size_t task) {
                 double position[2];
                 for (a = 0; a < 2; a++)
                     position[a] = ((double)node[a] + ((double)s[a + 1] + 0.5) / (double)n[a + 1] - 0.5) * m->spacing[a + 1];
-                isogi_dvr__mix_rows(&d->volume, m->low, first, end - first + 1, position, row, scratch);
+                isogi_dvr__mix_rows(&d->volume, base, first, end - first + 1, position, row, scratch);
                 for (s[0] = 0; s[0] < n[0]; s[0]++) {
                     double from = ((double)span[0] + ((double)s[0] + 0.5) / (double)n[0] - 0.5) * m->spacing[0];
-                    isogi_dvr__classify_row(d, row, first, last, from, m->spacing[0], count, sum);
+                    isogi_dvr__classify_row(d, row, first, last, from, m->spacing[0], count, (float)(m->low - base), sum);
                 }
             }
         for (i = 0; i < count; i++) {
@@ -3784,7 +3792,7 @@ static double isogi_dvr__significance(const isogi_dvr *d, size_t block, double (
         c[2] = block / b->count[0] / b->count[1] + (k >> 2);
         mean += 0.125 * (double)isogi_dvr__lattice_at(d, 4, c);
     }
-    isogi_dvr__luv_of(d, d->range[0] + mean, at);
+    isogi_dvr__luv_of(d, d->base + mean, at);
     for (i = 0; i < 64; i++) {
         double difference[3] = {luv[i][0] - at[0], luv[i][1] - at[1], luv[i][2] - at[2]}, size = isogi_dvr__dot(difference, difference);
         if ((b->histogram[block] >> i & 1) && size > most) most = size;
@@ -3940,12 +3948,12 @@ static void isogi_dvr__node_position(const isogi_dvr__blocks *b, size_t block, s
 
 /* ---- data in its blocks ---- */
 
-/* The data that the blocks hold, interpolated, less the lowest value; what is not held is that. */
+/* The data that the blocks hold, interpolated, less the base; what is not held is the lowest value. */
 static float isogi_dvr__block_value(const isogi_dvr *d, size_t block, const double position[3]) {
     const isogi_dvr__blocks *b = &d->blocks;
     size_t n = b->level[block], base, corner[8], k;
     float w[8], sum = 0;
-    if (!n) return 0;
+    if (!n) return (float)(d->range[0] - d->base);
     base = b->first[block] + isogi_dvr__place(b, block, n, position, corner, w);
     for (k = 0; k < 8; k++) /* a node of no weight may be another thread's at work */
         if (w[k] > 0) sum += w[k] * b->data[base + corner[k]];
@@ -4181,7 +4189,7 @@ static int isogi_dvr__fill_window(const isogi_dvr *d, size_t block, size_t n, co
                     if (!isogi_dvr__kept(d, position)) continue;
                 }
                 value += u[0][node[0]] * (end - value);
-                out[node[0]] = d->matter.table[isogi_dvr__class(d, d->range[0] + (double)value)];
+                out[node[0]] = d->matter.table[isogi_dvr__class(d, d->base + (double)value)];
                 any |= out[node[0]] > 0;
             }
         }
@@ -5067,7 +5075,7 @@ ISOGI_API isogi_result isogi_dvr_sample_blocks(const isogi_dvr *dvr, const float
         isogi_vol_to_grid(dvr->desc.pyramid, world, grid);
         for (a = 0; a < 3; a++) grid[a] = isogi_dvr__clamp(grid[a], dvr->cells[a]);
         block = isogi_dvr__block_of(&dvr->blocks, grid);
-        if (values) values[i] = (float)(dvr->range[0] + (double)isogi_dvr__block_value(dvr, block, grid));
+        if (values) values[i] = (float)(dvr->base + (double)isogi_dvr__block_value(dvr, block, grid));
         if (visibility) isogi_dvr__local_at(dvr, block, grid, visibility + i * dvr->coefficients);
     }
     return ISOGI_OK;
@@ -6000,12 +6008,12 @@ struct isogi_dvr__frame {
     size_t light_stride[3], light_row[2]; /* floats to the neighbours (0 where there is one point); rows, planes */
     isogi_dvr__held held; /* where light stands, if held.block */
     size_t count;       /* of classes */
-    float scale;        /* place of a value among them, which goes on before the first and beyond the last,
+    float scale;        /* of them to a unit of values; a value's place among them goes on before the first and beyond the last,
                            both of one extinction and colour */
     float top;          /* of the last class */
     float quantum[4];   /* of their integrals */
     isogi_dvr__matter_entry *matter;  /* of the same classes, extinction alone */
-    float cells[3], value_scale, value_bias; /* of voxels' values, which count from low */
+    float cells[3], value_scale, value_bias; /* of voxels' values, less that where the first class begins */
     int32_t last_cell[3], stride[3];  /* bytes */
     double step;        /* voxels between samples */
     double per_piece, per_unit; /* pieces, and units of extinction, to a world length */

@@ -6836,7 +6836,7 @@ static void isogi_trace__snap_to_border(const isogi_trace__scene *scene, const d
     int a, c;
     for (a = 0; a < 3; a++) {
         double last = (double)(scene->volume->size[a] - 1), slack = 0;
-        for (c = 0; c < 3; c++) slack += fabs(scene->to_grid[3 * a + c] * world[c]) * (double)FLT_EPSILON;
+        for (c = 0; c < 3; c++) slack += 0.51 * (double)FLT_EPSILON * fabs(scene->to_grid[3 * a + c] * world[c]);
         if (fabs(grid[a] - last) <= slack) grid[a] = last;
         if (fabs(grid[a]) <= slack) grid[a] = 0;
     }
@@ -6849,15 +6849,15 @@ static void isogi_trace__gather_task(void *arg, size_t task) {
         double world[3], grid[3], length;
         isogi_trace__site site;
         isogi_counters counters;
-        int a, usable, beyond;
+        int a, beyond;
         memset(&counters, 0, sizeof counters);
         memset(job->irradiance[i], 0, sizeof job->irradiance[i]);
         job->error[i] = ISOGI_TRACE__NOT_READY;
         for (a = 0; a < 3; a++) world[a] = (double)job->points[i][a];
         isogi_vol_to_grid(job->scene.pyramid, world, grid);
+        if (!isogi_trace__finite3(grid)) continue;
         if (!job->normals && job->scene.desc.capped) isogi_trace__snap_to_border(&job->scene, world, grid);
-        usable = isogi_trace__finite3(grid) && isogi_trace__locate(job->scene.volume, grid, &site.place);
-        if (!usable) continue;
+        if (!isogi_trace__locate(job->scene.volume, grid, &site.place)) continue;
         site.isovalue = isogi_trace__value(job->scene.volume, &site.place);
         if (!isogi_trace__finite(site.isovalue)) continue;
         if (job->normals) {

@@ -78,11 +78,11 @@
    all are faster than alone (twice to four times), from 500 on nothing is left to gain. There, rays that follow each other from one
    place come down to its leaf together, and where they are many (12 from a surface, 48 from elsewhere), they pass the cells round
    it at once, as far as slopes there let none of them meet the surface; and where any hit will do, and all voxels are finite, a ray is
-   done once it is known to pass a block that lies inside and one that lies outside. Without AVX-512 sixteen rays of a batch take turns,
-   each up to where it reads memory. Everywhere cells are looked at in float first, from 8-bit voxels that lie together in two cache lines
-   for 4x4x4 cells, with an error bound: what is certain needs nothing else, and only cells in doubt, the hits and one cell for every 25
-   rays besides, read your voxels and are solved in double. Of compact volumes there are no such voxels: rays go as without AVX-512, and
-   read yours in every cell that they pass in blocks that hold the isovalue.
+   done once it is known to pass a block that lies inside and one that lies outside. Without AVX-512 sixteen rays of a batch go in rounds:
+   all that do the same, such as to open a node, do it one after the other. Everywhere cells are looked at in float first, from 8-bit
+   voxels that lie together in two cache lines for 4x4x4 cells, with an error bound: what is certain needs nothing else, and only cells in
+   doubt, the hits and one cell for every 25 rays besides, read your voxels and are solved in double. Of compact volumes there are no such
+   voxels: rays go as without AVX-512, and read yours in every cell that they pass in blocks that hold the isovalue.
 
    History  1.0  first release
 */

@@ -481,7 +481,7 @@ static isogi_volume far_from_zero(int type, double offset, double *doubles, uint
 
 /* What is added to all values and to the transfer function changes nothing: neither pictures nor visibility. */
 TEST(values_far_from_zero_are_told_apart) {
-    const double offset[] = {0, 1e6, 1e8};
+    const double offset[] = {0, 1e6, 1e9};
     const isogi_view view = {.width = SIDE, .height = SIDE, .eye = {-20, 13, 3}, .target = {3.5f, 3.5f, 3.5f}, .fov = 30};
     static double doubles[512];
     static uint8_t bytes[512];
@@ -541,6 +541,28 @@ TEST(tiny_units_and_endless_counts) {
         }
     }
     field_free(&f);
+}
+
+/* Values whose differences are no floats: half of the box is opaque, by every method. */
+TEST(the_widest_range_of_floats) {
+    static float data[512];
+    const isogi_volume volume = {.data = data, .type = ISOGI_F32, .size = {8, 8, 8}};
+    const isogi_transfer_point p[] = {{1e38, {1, 1, 1}, 0}, {2e38, {1, 1, 1}, 1}};
+    const isogi_transfer transfer = {p, 2, NULL, 0};
+    const float points[2][3] = {{0, 3.5f, 3.5f}, {6.9f, 3.5f, 3.5f}};
+    isogi_pyramid *pyramid = NULL;
+    for (int i = 0; i < 512; i++) data[i] = i % 8 < 4 ? -3e38f : 3e38f;
+    CHECK(isogi_vol_build(&pyramid, &volume, &serial) == ISOGI_OK, "build");
+    for (int method = ISOGI_DVR_BRUTE; method <= ISOGI_DVR_SWEEP; method++) {
+        const isogi_dvr_desc desc = {.pyramid = pyramid, .shading = ISOGI_DVR_VISIBILITY, .method = (isogi_dvr_method)method,
+            .grid = {8, 8, 8}, .visibility_step = 1, .directions = 64};
+        isogi_dvr *dvr = dvr_new(&desc, &transfer);
+        float v[2][9];
+        CHECK(isogi_dvr_step(dvr, 0, NULL) == ISOGI_OK && isogi_dvr_sample_visibility(dvr, points, 2, v[0]) == ISOGI_OK, "step");
+        CHECK(v[0][0] > 2 && v[1][0] < 0.75f * v[0][0], "method %d: %g, in matter %g", method, (double)v[0][0], (double)v[1][0]);
+        isogi_dvr_free(dvr);
+    }
+    isogi_vol_free(pyramid);
 }
 
 TEST_MAIN("dvr_classes")

@@ -1329,4 +1329,22 @@ TEST(points_on_caps_look_out_of_the_box) {
     }
 }
 
+/* Where grid axes are none of the world's, an infinite point is infinite along each of them. */
+TEST(infinite_points_have_no_light_on_caps) {
+    static float data[8 * 8 * 8];
+    const float point[2][3] = {{HUGE_VALF, 1, 1}, {1, -HUGE_VALF, HUGE_VALF}};
+    isogi_volume v = {.data = data, .type = ISOGI_F32, .size = {8, 8, 8}};
+    const double axes[9] = {2 / 3.0, 2 / 3.0, 1 / 3.0, -2 / 3.0, 1 / 3.0, 2 / 3.0, 1 / 3.0, -2 / 3.0, 2 / 3.0};
+    isogi_pyramid *pyramid = NULL;
+    isogi_trace_desc d = {.samples = 4, .capped = 1, .lighting = {.env = {.sh = white_sky, .sh_order = 1}}};
+    float e[2][3], error[2];
+    for (int i = 0; i < 512; i++) data[i] = (float)(i % 8 + 1);
+    memcpy(v.axes, axes, sizeof axes);
+    CHECK(isogi_vol_build(&pyramid, &v, NULL) == ISOGI_OK, "build");
+    d.pyramid = pyramid;
+    CHECK(isogi_trace_gather(&d, point, NULL, 2, e, error, NULL) == ISOGI_OK, "gather");
+    for (int i = 0; i < 2; i++) CHECK(!(e[i][0] > 0) && error[i] > 1e30f, "point %d: %g, error %g", i, (double)e[i][0], (double)error[i]);
+    isogi_vol_free(pyramid);
+}
+
 TEST_MAIN("trace")

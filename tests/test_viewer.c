@@ -757,6 +757,15 @@ TEST(bad_environments_and_transfer_functions_get_one_line) {
         snprintf(command, sizeof command, "procedural:gyroid:8 --size 8x8 --env '%s' --out '%s'", path, temporary("never.png"));
         check_refused(command, hdr[i][1]);
     }
+    {
+        static const char header[] = "#?RADIANCE\n\n-Y 16384 +X 8193\n";
+        static char bytes[1100000]; /* of black: more than a 128th of the pixels */
+        memcpy(bytes, header, strlen(header));
+        write_bytes(temporary("bad.hdr"), bytes, sizeof bytes);
+        snprintf(command, sizeof command, "procedural:gyroid:8 --size 8x8 --env '%s' --out '%s'", temporary("bad.hdr"),
+                 temporary("never.png"));
+        check_refused(command, "134 million are read");
+    }
     for (size_t i = 0; i < sizeof tf / sizeof tf[0]; i++) {
         const char *path = temporary("bad.txt");
         write_bytes(path, tf[i][0], strlen(tf[i][0]));

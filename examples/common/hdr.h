@@ -114,7 +114,7 @@ static inline int hdr_decode(const unsigned char *data, size_t size, hdr_image *
     if ((uint64_t)width * (uint64_t)height / 128 > size - in.at)
         return file_fail(error, "claims %d x %d pixels but holds %zu bytes of them", width, height, size - in.at);
     if ((uint64_t)width * (uint64_t)height > HDR_MOST)
-        return file_fail(error, "is %d x %d pixels, at most %d million are read", width, height, HDR_MOST >> 20);
+        return file_fail(error, "is %d x %d pixels, at most %d million are read", width, height, HDR_MOST / 1000000);
     rgb = (float *)malloc((size_t)width * (size_t)height * 3 * sizeof *rgb);
     row = (unsigned char *)malloc((size_t)width * 4);
     if (!rgb || !row) {

@@ -66,6 +66,12 @@ static void fail(const char *what) {
     exit(1);
 }
 
+/* There is no driver that could run shaders here. */
+static void leave(const char *what) {
+    printf("glsl: %s: shaders are not run\n", what);
+    exit(77);
+}
+
 /* What the linker calls a function, as another pointer than one to data. */
 static void load(void *to, const char *name) {
     __eglMustCastToProperFunctionPointerType f = eglGetProcAddress(name);
@@ -82,10 +88,10 @@ static void begin(void) {
     EGLConfig config;
     EGLint count = 0;
     GLuint name;
-    if (!eglInitialize(display, NULL, NULL) || !eglBindAPI(EGL_OPENGL_API)) fail("no OpenGL by EGL");
-    if (!eglChooseConfig(display, wanted, &config, 1, &count) || !count) fail("no configuration of EGL");
+    if (!eglInitialize(display, NULL, NULL) || !eglBindAPI(EGL_OPENGL_API)) leave("no OpenGL by EGL");
+    if (!eglChooseConfig(display, wanted, &config, 1, &count) || !count) leave("no configuration of EGL");
     context = eglCreateContext(display, config, EGL_NO_CONTEXT, version);
-    if (context == EGL_NO_CONTEXT || !eglMakeCurrent(display, EGL_NO_SURFACE, EGL_NO_SURFACE, context)) fail("no context of OpenGL 4.0");
+    if (context == EGL_NO_CONTEXT || !eglMakeCurrent(display, EGL_NO_SURFACE, EGL_NO_SURFACE, context)) leave("no context of OpenGL 4.0");
 #define LOAD(type, name) load(&gl##name, "gl" #name);
     FUNCTIONS(LOAD)
     glGenTextures(1, &name), glBindTexture(GL_TEXTURE_2D, name);
@@ -184,8 +190,11 @@ static void choose(const isogi_trace *t, const isogi_trace_desc *d, double isova
         if (!hit.side) continue;
         isogi_vol_positions(d->pyramid, &hit, 1, (float(*)[3])points[count]);
         isogi_vol_to_grid(d->pyramid, (double[3]){(double)points[count][0], (double)points[count][1], (double)points[count][2]}, at);
-        for (int a = 0; a < 3; a++) grid[count][a] = (float)at[a];
-        for (int k = 0; k < 8; k++) {
+        for (int a = 0; a < 3; a++) {
+            grid[count][a] = (float)at[a];
+            valid = valid && at[a] > d->lattice_min[a] && at[a] < d->lattice_max[a];
+        }
+        for (int k = 0; k < 8 && valid; k++) {
             size_t texel[3];
             for (int a = 0; a < 3; a++)
                 texel[a] = (size_t)((at[a] - d->lattice_min[a]) / (d->lattice_max[a] - d->lattice_min[a]) * (double)(d->lattice[a] - 1)) +
@@ -252,7 +261,8 @@ int main(int argc, char **argv) {
             uint8_t *texels = bytes ? (uint8_t *)malloc(bytes) : NULL;
             float scale[28] = {0};
             double error;
-            if (!texels) continue;
+            if (!kind[transfer][format].held && !bytes) continue; /* not for this mode */
+            if (!texels) fail("nothing is exported");
             if (isogi_trace_export(t, format, texels, bytes) != ISOGI_OK || isogi_trace_export_scales(t, format, scale) != ISOGI_OK)
                 fail("no export");
             for (int i = 0; i < (transfer ? 7 : 1); i++)
