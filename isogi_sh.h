@@ -377,6 +377,7 @@ ISOGI_API isogi_result isogi_sh_fit_directional(float direction[3], float rgb[3]
 #endif
 #if !defined(ISOGI_NO_SIMD) && defined(__x86_64__) && (defined(__clang__) || (defined(__GNUC__) && __GNUC__ >= 12 && !defined(_WIN32)))
 #define ISOGI_SH__SIMD 1
+#include <immintrin.h>
 #endif
 #if defined(__clang__)
 #define ISOGI_SH__UNROLL _Pragma("unroll 5")
@@ -1591,7 +1592,6 @@ static int isogi_sh__level(void) {
 
 typedef float isogi_sh__f8 __attribute__((vector_size(32), aligned(4), may_alias));
 typedef float isogi_sh__f16 __attribute__((vector_size(64), aligned(4), may_alias));
-typedef float isogi_sh__plain_f8 __attribute__((vector_size(32)));
 typedef double isogi_sh__d4 __attribute__((vector_size(32), aligned(8), may_alias));
 typedef double isogi_sh__half __attribute__((vector_size(32), aligned(4), may_alias)); /* 8 floats: gcc 12 stores it from where it is */
 typedef double isogi_sh__d8 __attribute__((vector_size(64), aligned(8), may_alias));
@@ -1608,25 +1608,13 @@ typedef double isogi_sh__two __attribute__((aligned(4), may_alias)); /* 2 floats
 #if defined(__clang__)
 #define ISOGI_SH__FROM_F8(p) ISOGI_SH__SPLAT_F8(*(p))
 #else /* gcc would rather load neighbours together, and shuffle them */
-#define ISOGI_SH__FROM_F8(p) ((isogi_sh__f8)__builtin_ia32_vbroadcastss256(p))
+#define ISOGI_SH__FROM_F8(p) ((isogi_sh__f8)_mm256_broadcast_ss(p))
 #endif
 #define ISOGI_SH__ADD_F8(a, x, sum) ISOGI_SH__FMA_F8(a, ISOGI_SH__SPLAT_F8(x), sum) /* of a number x */
-#define ISOGI_SH__FMA_F8(a, b, c) ((isogi_sh__f8)__builtin_ia32_vfmaddps256(a, b, c))
-#define ISOGI_SH__FMA_D4(a, b, c) ((isogi_sh__d4)__builtin_ia32_vfmaddpd256(a, b, c))
-#define ISOGI_SH__ALL8 (unsigned char)0xff
-#if defined(__clang__)
-#define ISOGI_SH__ALL16 (unsigned short)0xffff
-#define ISOGI_SH__MASK8 unsigned char
-#define ISOGI_SH__MASKED_F8(p) ((isogi_sh__plain_f8 *)(void *)(p)) /* what a masked store wants */
-#define ISOGI_SH__MASKED_CONST_F8(p) ((const isogi_sh__plain_f8 *)(const void *)(p))
-#else
-#define ISOGI_SH__ALL16 (short)-1
-#define ISOGI_SH__MASK8 char
-#define ISOGI_SH__MASKED_F8(p) (p)
-#define ISOGI_SH__MASKED_CONST_F8(p) (p)
-#endif
-#define ISOGI_SH__FMA_F16(a, b, c) ((isogi_sh__f16)__builtin_ia32_vfmaddps512_mask(a, b, c, ISOGI_SH__ALL16, 4))
-#define ISOGI_SH__FMA_D8(a, b, c) ((isogi_sh__d8)__builtin_ia32_vfmaddpd512_mask(a, b, c, ISOGI_SH__ALL8, 4))
+#define ISOGI_SH__FMA_F8(a, b, c) ((isogi_sh__f8)_mm256_fmadd_ps((__m256)(a), (__m256)(b), (__m256)(c)))
+#define ISOGI_SH__FMA_D4(a, b, c) ((isogi_sh__d4)_mm256_fmadd_pd((__m256d)(a), (__m256d)(b), (__m256d)(c)))
+#define ISOGI_SH__FMA_F16(a, b, c) ((isogi_sh__f16)_mm512_fmadd_ps((__m512)(a), (__m512)(b), (__m512)(c)))
+#define ISOGI_SH__FMA_D8(a, b, c) ((isogi_sh__d8)_mm512_fmadd_pd((__m512d)(a), (__m512d)(b), (__m512d)(c)))
 
 /* Vectors of several rows that stand one after the other in memory, and halves of a vector: gcc 12 would shuffle where an insertion or
    an extraction costs a third. */
@@ -1637,15 +1625,15 @@ typedef double isogi_sh__two __attribute__((aligned(4), may_alias)); /* 2 floats
 #define ISOGI_SH__JOIN_HALVES(a, b) __builtin_shufflevector(a, b, 0, 1, 2, 3, 4, 5, 6, 7)
 #define ISOGI_SH__JOIN_F16(a, b, c, d) __builtin_shufflevector(ISOGI_SH__JOIN_F8(a, b), ISOGI_SH__JOIN_F8(c, d), 0, 1, 2, 3, 4, 5, 6, 7, \
     8, 9, 10, 11, 12, 13, 14, 15)
-#else
-#define ISOGI_SH__JOIN_F8(a, b) ((isogi_sh__f8)__builtin_ia32_vinsertf128_ps256(__builtin_ia32_ps256_ps(a), b, 1))
-#define ISOGI_SH__TWICE_F4(p) __builtin_ia32_vbroadcastf128_ps256((const isogi_sh__f4 *)(p))
-#define ISOGI_SH__HALF_D8(v, k) ((isogi_sh__d4)__builtin_ia32_extractf64x4_mask(v, k, none, ISOGI_SH__ALL8))
-#define ISOGI_SH__JOIN_HALVES(a, b) ((isogi_sh__d8)__builtin_ia32_insertf64x4_mask(__builtin_ia32_pd512_256pd(a), b, 1, \
-    __builtin_ia32_pd512_256pd(a), ISOGI_SH__ALL8))
-#define ISOGI_SH__PUT_F16(v, a, k) __builtin_ia32_insertf32x4_mask(v, a, k, v, 0xffff)
+#else /* with a mask of all: without, gcc 12 warns of vectors that its own headers leave undefined */
+#define ISOGI_SH__JOIN_F8(a, b) ((isogi_sh__f8)_mm256_insertf128_ps(_mm256_castps128_ps256((__m128)(a)), (__m128)(b), 1))
+#define ISOGI_SH__TWICE_F4(p) _mm256_broadcast_ps((const __m128 *)(const void *)(p))
+#define ISOGI_SH__HALF_D8(v, k) ((isogi_sh__d4)_mm512_maskz_extractf64x4_pd(0xff, (__m512d)(v), k))
+#define ISOGI_SH__JOIN_HALVES(a, b) ((isogi_sh__d8)_mm512_mask_insertf64x4(_mm512_castpd256_pd512((__m256d)(a)), 0xff, \
+    _mm512_castpd256_pd512((__m256d)(a)), (__m256d)(b), 1))
+#define ISOGI_SH__PUT_F16(v, a, k) _mm512_mask_insertf32x4(v, 0xffff, v, (__m128)(a), k)
 #define ISOGI_SH__JOIN_F16(a, b, c, d)                                                                                        \
-    ISOGI_SH__PUT_F16(ISOGI_SH__PUT_F16(ISOGI_SH__PUT_F16(__builtin_ia32_ps512_ps(a), b, 1), c, 2), d, 3)
+    ((isogi_sh__f16)ISOGI_SH__PUT_F16(ISOGI_SH__PUT_F16(ISOGI_SH__PUT_F16(_mm512_castps128_ps512((__m128)(a)), b, 1), c, 2), d, 3))
 #endif
 
 /* y[4][n] = in[n][pitch]: 4 x 4 transposed in each quarter of a vector, whose quarters are rows 4 apart. n is a square, 9 or more: what
@@ -1663,11 +1651,7 @@ typedef double isogi_sh__two __attribute__((aligned(4), may_alias)); /* 2 floats
 /* Two vectors of quarters a b c d and e f g h become a e c g and b f d h, by one shuffle, which is what transposing waits for, and two
    blends, which other units do. */
 #define ISOGI_SH__ACROSS_D8(p, q) __builtin_shufflevector(p, q, 2, 3, 8, 9, 6, 7, 12, 13)
-#if defined(__clang__)
-#define ISOGI_SH__BLEND_D8(mask, p, r) __builtin_ia32_selectpd_512((unsigned char)(mask), r, p)
-#else
-#define ISOGI_SH__BLEND_D8(mask, p, r) __builtin_ia32_blendmpd_512_mask(p, r, (unsigned char)(mask))
-#endif
+#define ISOGI_SH__BLEND_D8(mask, p, r) _mm512_mask_blend_pd(mask, (__m512d)(p), (__m512d)(r))
 #define ISOGI_SH__FIRST_D8(p, r) (isogi_sh__d8) ISOGI_SH__BLEND_D8(0xcc, p, r)
 #define ISOGI_SH__SECOND_D8(q, r) (isogi_sh__d8) ISOGI_SH__BLEND_D8(0x33, q, r)
 #define ISOGI_SH__ROWS_F8(j) ISOGI_SH__JOIN_F8(ISOGI_SH__ROW_F4(j), ISOGI_SH__ROW_F4((j) + 4))
@@ -1733,7 +1717,6 @@ ISOGI_SH__AVX2 ISOGI_SH__INLINE void isogi_sh__eval_f8_turn(float *y, size_t n, 
 }
 
 ISOGI_SH__AVX512 ISOGI_SH__INLINE void isogi_sh__eval_f16_turn(float *y, size_t n, const isogi_sh__f16 *row) {
-    const isogi_sh__d4 none = {0};
     isogi_sh__d8 v[2][4];
     int half;
     size_t k;
@@ -1744,7 +1727,6 @@ ISOGI_SH__AVX512 ISOGI_SH__INLINE void isogi_sh__eval_f16_turn(float *y, size_t 
         v[half][0] = (isogi_sh__d8)ISOGI_SH__EVEN_F16(e, g), v[half][1] = (isogi_sh__d8)ISOGI_SH__ODD_F16(e, g);
         v[half][2] = (isogi_sh__d8)ISOGI_SH__EVEN_F16(f, h), v[half][3] = (isogi_sh__d8)ISOGI_SH__ODD_F16(f, h);
     }
-    (void)none; /* clang */
     ISOGI_SH__UNROLL
     for (k = 0; k < 4; k++) {
         isogi_sh__d8 p = __builtin_shufflevector(v[0][k], v[1][k], 0, 1, 8, 9, 2, 3, 10, 11);
@@ -1782,10 +1764,8 @@ ISOGI_SH__AVX2 ISOGI_SH__INLINE void isogi_sh__eval_d4_turn(double *y, size_t n,
     ISOGI_SH__IN_ORDER
 #define ISOGI_SH__LANE(k) (mixed ? 3 * (k) % 8 : (k)) /* the direction of lane k */
 ISOGI_SH__AVX512 ISOGI_SH__INLINE void isogi_sh__eval_d8_turn_at(double *y, size_t n, const isogi_sh__d8 *row, int first, int mixed) {
-    const isogi_sh__d4 none = {0};
     isogi_sh__d8 v[4][2], p, q;
     size_t k;
-    (void)none; /* clang */
     ISOGI_SH__UNROLL
     for (k = 0; k < 4; k++) {
         v[k][0] = __builtin_shufflevector(row[2 * k], row[2 * k + 1], 0, 8, 2, 10, 4, 12, 6, 14);
@@ -1943,10 +1923,10 @@ ISOGI_SH__AVX512 ISOGI_SH__INLINE void isogi_sh__eval_f16_mixed(isogi_sh__f16 *u
 #define ISOGI_SH__REST_D4(one, z) ISOGI_SH__FMA_D4(-(z), z, one)
 #define ISOGI_SH__REST_F16(one, z) ISOGI_SH__FMA_F16(-(z), z, one)
 #define ISOGI_SH__REST_D8(one, z) ISOGI_SH__FMA_D8(-(z), z, one)
-#define ISOGI_SH__LESS_F8(a, b) (__builtin_ia32_movmskps256((isogi_sh__f8)((a) < (b))) == 0xff)
-#define ISOGI_SH__LESS_D4(a, b) (__builtin_ia32_movmskpd256((isogi_sh__d4)((a) < (b))) == 0xf)
-#define ISOGI_SH__LESS_F16(a, b) ((__builtin_ia32_cmpd512_mask(a, b, 1, 0xffff) & 0xffff) == 0xffff)
-#define ISOGI_SH__LESS_D8(a, b) ((__builtin_ia32_cmpq512_mask(a, b, 1, 0xff) & 0xff) == 0xff)
+#define ISOGI_SH__LESS_F8(a, b) (_mm256_movemask_ps((__m256)((a) < (b))) == 0xff)
+#define ISOGI_SH__LESS_D4(a, b) (_mm256_movemask_pd((__m256d)((a) < (b))) == 0xf)
+#define ISOGI_SH__LESS_F16(a, b) (_mm512_cmplt_epi32_mask((__m512i)(a), (__m512i)(b)) == 0xffff)
+#define ISOGI_SH__LESS_D8(a, b) (_mm512_cmplt_epi64_mask((__m512i)(a), (__m512i)(b)) == 0xff)
 
 /* With fused products: low orders as polynomials in v = cos 2t = z^2 - x^2 - y^2, whose coefficients are small, so that little cancels
    anywhere, and of which no operation waits for the one before (4.7e-7 was seen at order 5 where products are not fused). Function l of
@@ -3221,22 +3201,16 @@ ISOGI_SH__INLINE __attribute__((target("avx2,fma,avx512f,avx512vl,avx512dq"))) v
 /* Eight numbers of float or double at index i, those of the mask; zero elsewhere. */
 ISOGI_SH__INLINE __attribute__((target("avx2,fma,avx512f,avx512vl,avx512dq"))) isogi_sh__d8
 isogi_sh__get_rows(const void *in, int is_double, int i, unsigned mask) {
-    const isogi_sh__d8 none = {0};
-    const isogi_sh__f8 none_f32 = {0};
-    if (is_double) return __builtin_ia32_loadupd512_mask((const double *)in + i, none, (unsigned char)mask);
-    return __builtin_convertvector(
-        (isogi_sh__f8)__builtin_ia32_loadups256_mask(ISOGI_SH__MASKED_CONST_F8((const float *)in + i), none_f32, (unsigned char)mask),
-        isogi_sh__d8);
+    const __mmask8 some = (__mmask8)mask;
+    if (is_double) return (isogi_sh__d8)_mm512_maskz_loadu_pd(some, (const double *)in + i);
+    return __builtin_convertvector((isogi_sh__f8)_mm256_maskz_loadu_ps(some, (const float *)in + i), isogi_sh__d8);
 }
 
 ISOGI_SH__INLINE __attribute__((target("avx2,fma,avx512f,avx512vl,avx512dq"))) void isogi_sh__put_rows(void *out, int is_double, int i,
                                                                                                        isogi_sh__d8 v, unsigned mask) {
-    if (is_double) __builtin_ia32_storeupd512_mask((double *)out + i, v, (unsigned char)mask);
-    else {
-        const isogi_sh__f8 none = {0};
-        __builtin_ia32_storeups256_mask(ISOGI_SH__MASKED_F8((float *)out + i),
-                                        __builtin_ia32_cvtpd2ps512_mask(v, none, (ISOGI_SH__MASK8)-1, 4), (unsigned char)mask);
-    }
+    const __mmask8 some = (__mmask8)mask;
+    if (is_double) _mm512_mask_storeu_pd((double *)out + i, some, (__m512d)v);
+    else _mm256_mask_storeu_ps((float *)out + i, some, _mm512_maskz_cvtpd_ps(0xff, (__m512d)v));
 }
 
 /* The three angles of one rotation. */
@@ -3634,16 +3608,16 @@ isogi_sh__build_columns(double *out, int l, int m, int halves, const isogi_sh__b
         if (m + i > l) break;
         ISOGI_SH__UNROLL
         for (h = halves - 1; h >= 0; h--) {
-            unsigned char up = (unsigned char)(h == halves - 1 ? 255u >> beyond : 255u),
-                          down = (unsigned char)(h == halves - 1 ? 255u << beyond : 255u);
+            const __mmask8 up = (__mmask8)(h == halves - 1 ? 255u >> beyond : 255u),
+                           down = (__mmask8)(h == halves - 1 ? 255u << beyond : 255u);
             const isogi_sh__d8 *o = t->outer[m + i][h], c = y[i][0][h], s = y[i][1][h];
             v = ISOGI_SH__FMA_D8(o[1], c, o[2] * s);
-            __builtin_ia32_storeupd512_mask(plus - 8 * h - 7, __builtin_shufflevector(v, v, 7, 6, 5, 4, 3, 2, 1, 0), down);
-            __builtin_ia32_storeupd512_mask(plus + 8 * h, ISOGI_SH__FMA_D8(o[0], c, -(o[3] * s)), up);
+            _mm512_mask_storeu_pd(plus - 8 * h - 7, down, (__m512d)__builtin_shufflevector(v, v, 7, 6, 5, 4, 3, 2, 1, 0));
+            _mm512_mask_storeu_pd(plus + 8 * h, up, (__m512d)ISOGI_SH__FMA_D8(o[0], c, -(o[3] * s)));
             if (m + i == 0) continue;
             v = ISOGI_SH__FMA_D8(o[0], s, -(o[3] * c));
-            __builtin_ia32_storeupd512_mask(minus - 8 * h - 7, __builtin_shufflevector(v, v, 7, 6, 5, 4, 3, 2, 1, 0), down);
-            __builtin_ia32_storeupd512_mask(minus + 8 * h, ISOGI_SH__FMA_D8(-o[2], c, -(o[1] * s)), up);
+            _mm512_mask_storeu_pd(minus - 8 * h - 7, down, (__m512d)__builtin_shufflevector(v, v, 7, 6, 5, 4, 3, 2, 1, 0));
+            _mm512_mask_storeu_pd(minus + 8 * h, up, (__m512d)ISOGI_SH__FMA_D8(-o[2], c, -(o[1] * s)));
         }
     }
 }
@@ -3795,7 +3769,7 @@ ISOGI_SH__AVX2 static isogi_result isogi_sh__apply_order5(float *out, const floa
     __asm__("" : "+x"(odd));
     out[24] = __builtin_fmaf(rotation[164], x[0], ninth[0] + odd[0]);
     ninth = __builtin_shufflevector(ninth, ninth, 1, 1, 3, 3);
-    even += __builtin_ia32_blendps256(odd, __builtin_shufflevector(ninth, none, 0, 1, 2, 3, 4, 5, 6, 7), 1);
+    even += (isogi_sh__f8)_mm256_blend_ps((__m256)odd, (__m256)__builtin_shufflevector(ninth, none, 0, 1, 2, 3, 4, 5, 6, 7), 1);
     *(isogi_sh__f8 *)(out + 16) = even;
     return ISOGI_OK;
 }
@@ -6245,8 +6219,6 @@ ISOGI_API isogi_result isogi_sh_fit_directional(float direction[3], float rgb[3]
 #undef ISOGI_SH__DEFINE_TURN_FIRST
 #undef ISOGI_SH__LANE
 #undef ISOGI_SH__AVX512
-#undef ISOGI_SH__ALL16
-#undef ISOGI_SH__ALL8
 #undef ISOGI_SH__UNROLL
 #undef ISOGI_SH__DEFINE_F32
 #undef ISOGI_SH__DEFINE_F64
@@ -6293,9 +6265,6 @@ ISOGI_API isogi_result isogi_sh_fit_directional(float direction[3], float rgb[3]
 #undef ISOGI_SH__REST_F16
 #undef ISOGI_SH__REST_D8
 #undef ISOGI_SH__UNROLL9
-#undef ISOGI_SH__MASK8
-#undef ISOGI_SH__MASKED_F8
-#undef ISOGI_SH__MASKED_CONST_F8
 #undef ISOGI_SH__APART
 #undef ISOGI_SH__MERGE
 #undef ISOGI_SH__INLINE

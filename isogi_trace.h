@@ -553,6 +553,9 @@ ISOGI_API size_t isogi_trace_memory(const isogi_trace *trace); /* bytes that the
 #if (defined(__clang__) || (defined(__GNUC__) && __GNUC__ >= 9)) && !defined(__TINYC__) && !defined(ISOGI_NO_SIMD) && \
     (!defined(__FLT_EVAL_METHOD__) || __FLT_EVAL_METHOD__ == 0)
 #define ISOGI_TRACE__VECTORS
+#ifdef __SSE2__
+#include <immintrin.h>
+#endif
 #if defined(__x86_64__) && (defined(__clang__) || !defined(_WIN32)) /* gcc for Windows does not align its stack for 32-byte vectors */
 #define ISOGI_TRACE__AVX2 __attribute__((target("avx2"))) /* without fused operations: the same bits */
 #endif
@@ -5180,8 +5183,8 @@ typedef int32_t isogi_trace__i4 __attribute__((vector_size(16), aligned(4), may_
 #define ISOGI_TRACE__PICK_F4(mask, x, y) \
     ((isogi_trace__f4)(((isogi_trace__i4)(mask) & (isogi_trace__i4)(x)) | (~(isogi_trace__i4)(mask) & (isogi_trace__i4)(y))))
 #ifdef __SSE2__
-#define ISOGI_TRACE__LESS_F4(x, y) ((isogi_trace__f4)__builtin_ia32_minps(x, y))
-#define ISOGI_TRACE__MORE_F4(x, y) ((isogi_trace__f4)__builtin_ia32_maxps(x, y))
+#define ISOGI_TRACE__LESS_F4(x, y) ((isogi_trace__f4)_mm_min_ps((__m128)(x), (__m128)(y)))
+#define ISOGI_TRACE__MORE_F4(x, y) ((isogi_trace__f4)_mm_max_ps((__m128)(x), (__m128)(y)))
 #else
 #define ISOGI_TRACE__LESS_F4(x, y) ISOGI_TRACE__PICK_F4((x) < (y), x, y)
 #define ISOGI_TRACE__MORE_F4(x, y) ISOGI_TRACE__PICK_F4((x) > (y), x, y)
@@ -5196,8 +5199,8 @@ typedef int32_t isogi_trace__i8 __attribute__((vector_size(32), aligned(4), may_
 #define ISOGI_TRACE__KEEP_F8(mask, x) ((isogi_trace__f8)((isogi_trace__i8)(mask) & (isogi_trace__i8)(x)))
 #define ISOGI_TRACE__PICK_F8(mask, x, y) \
     ((isogi_trace__f8)(((isogi_trace__i8)(mask) & (isogi_trace__i8)(x)) | (~(isogi_trace__i8)(mask) & (isogi_trace__i8)(y))))
-#define ISOGI_TRACE__LESS_F8(x, y) ((isogi_trace__f8)__builtin_ia32_minps256(x, y))
-#define ISOGI_TRACE__MORE_F8(x, y) ((isogi_trace__f8)__builtin_ia32_maxps256(x, y))
+#define ISOGI_TRACE__LESS_F8(x, y) ((isogi_trace__f8)_mm256_min_ps((__m256)(x), (__m256)(y)))
+#define ISOGI_TRACE__MORE_F8(x, y) ((isogi_trace__f8)_mm256_max_ps((__m256)(x), (__m256)(y)))
 ISOGI_TRACE__DEFINE_BLEND(isogi_trace__blend_f8, ISOGI_TRACE__AVX2, isogi_trace__f8, 8, ISOGI_TRACE__KEEP_F8, ISOGI_TRACE__PICK_F8,
                           ISOGI_TRACE__LESS_F8, ISOGI_TRACE__MORE_F8)
 #endif
