@@ -140,11 +140,11 @@
 
    - ISOGI_IMPLEMENTATION         implements every isogi header that the file includes
    - ISOGI_TRACE_IMPLEMENTATION   implements this one alone
-   - ISOGI_NO_THREADS, ISOGI_API  as in isogi_vol.h
+   - ISOGI_NO_THREADS, ISOGI_NO_SIMD, ISOGI_API  as in isogi_vol.h
 
    Memory       Through the context. Bricks of 4x4x4 texels: 8 bytes for each, 112 where one of its texels is wanted, and for every
                 wanted texel alone 2 + 12 bytes of irradiance, 2 + 2 order^2 channels of transfer, less in other formats; and
-                250 KB. isogi_trace_memory tells. PATHS needs another 4 MB, FEEDBACK 9 (TRANSFER: 32 KB more for each coefficient),
+                180 KB. isogi_trace_memory tells. PATHS needs another 4 MB, FEEDBACK 9 (TRANSFER: 32 KB more for each coefficient),
                 and while it works some 400 bytes (TRANSFER: 16 more for each coefficient), 8 MB of them at once of texels and as
                 many of probes, and 4 for every hit, for each texel of one cube (ISOGI_TRACE_CUBE), for all that were asked for
                 when lazy, and for each probe: where every texel of a cube has a surface 190 MB with 1 sample, 460 with 64, and
@@ -218,8 +218,9 @@ typedef enum isogi_trace_sides {
     ISOGI_TRACE_BOTH_SIDES /* two textures in one, twice the work: see isogi_trace_high */
 } isogi_trace_sides;
 
-/* Colour that depends on the place, too: called with what the tables say for this isovalue, to change it. From any thread, at any
-   time; the same arguments must give the same colours. What is beyond 0..1 (albedo) or negative (emission) is clamped, NaN is 0. */
+/* Colour that depends on the place, too: called with what the tables say for this isovalue, to change it. point: world.
+   From any thread, at any time; the same arguments must give the same colours. What is beyond 0..1 (albedo) or negative (emission) is
+   clamped, NaN is 0. */
 typedef void isogi_trace_material_function(void *user, double isovalue, const double point[3], float albedo[3], float emission[3]);
 
 /* How a texel's light is held, and exported. Bytes for a texel of RGB / of a coefficient; error of what was computed, which itself
@@ -233,7 +234,7 @@ typedef void isogi_trace_material_function(void *user, double isovalue, const do
    (measured as isogi_trace_report.unit is), BYTE twice as much (four times with reflections); brighter texels are cut off there. Below
    some 1e-4 of that irradiance HALF and RGB9E5 err by more than the share above: their steps are no finer than about 1e-7 of it. */
 typedef enum isogi_trace_format {
-    ISOGI_TRACE_DEFAULT = 0, /* FLOAT for irradiance: with nothing kept for texels without light that is small enough; HALF for
+    ISOGI_TRACE_DEFAULT = 0, /* FLOAT for irradiance, which is small enough, as nothing is kept for texels without light; HALF for
                                 transfer, where it halves by far the largest part of the memory and costs nothing that can be seen */
     ISOGI_TRACE_FLOAT,
     ISOGI_TRACE_HALF,
@@ -244,9 +245,10 @@ typedef enum isogi_trace_format {
 /* All zero but `pyramid`: one texel per voxel, black surface, black sky. The volume, the lights, the environment's image and the
    albedo points are borrowed and must outlive the texture; the description itself is copied. */
 typedef struct isogi_trace_desc {
-    const isogi_pyramid *pyramid;
-    isogi_lighting lighting;   /* IRRADIANCE: what is baked. TRANSFER: unused while baking; see isogi_trace_relight. Radiance, and what a
-                                  lamp brings to a place, are dimmed to 1e30 where they are more, and so is the lighting of TRANSFER */
+    const isogi_pyramid *pyramid; /* of voxels: one of isogi_vol_build_field is ISOGI_INVALID, see isogi_trace_gather_field */
+    isogi_lighting lighting;   /* IRRADIANCE: what is baked. TRANSFER: unused while baking, but distant all the same; see
+                                  isogi_trace_relight. Radiance, and what a lamp brings to a place, are dimmed to 1e30 where they are
+                                  more, and so is the lighting of TRANSFER */
     isogi_trace_mode mode;
     int order;                 /* TRANSFER: 1..6; 0 = 5 */
     size_t lattice[3];         /* texels along x, y, z, up to 2^31 - 1; 0 = one per voxel along that axis */
@@ -256,7 +258,7 @@ typedef struct isogi_trace_desc {
     const isogi_albedo_point *albedo_points; /* piecewise linear in the isovalue, constant beyond its ends; multiplied into albedo
                                                 only if albedo is not all zero, else used alone */
     size_t albedo_count;
-    const isogi_albedo_point *emission_points; /* IRRADIANCE: radiance that the surface itself sends out, by isovalue */
+    const isogi_albedo_point *emission_points; /* radiance that the surface itself sends out, by isovalue. TRANSFER: ISOGI_INVALID */
     size_t emission_count;
     isogi_trace_material_function *material;   /* colours by place; NULL = none. TRANSFER leaves its emission out */
     void *material_user;
@@ -313,7 +315,7 @@ ISOGI_API void isogi_trace_free(isogi_trace *trace);
 ISOGI_API isogi_result isogi_trace_request(isogi_trace *trace, const float (*points)[3], size_t count);
 
 /* Works until about max_rays rays are traced (0 = to the end), whole texels, or as long as that takes in other work. *remaining (may be
-   NULL): about the fraction of the work asked for that is still to do, 0 = finished; it never rises but by a request. ISOGI_CANCELLED and
+   NULL): about the fraction of the work asked for that is still to do, 0 = finished; it rises only by a request or by what changes (change, touch, relight of IRRADIANCE). ISOGI_CANCELLED and
    ISOGI_NO_MEMORY leave a texture that can be read and stepped on. Not at the same time as any other call on this texture.
    FEEDBACK: when a block of samples is complete passes without rays carry the light over all probes to all texels at work; they are cut
    into pieces, too, as is what comes before the first ray and after the last one, and counted as the rays that take about as long.
@@ -325,7 +327,7 @@ ISOGI_API isogi_result isogi_trace_step(isogi_trace *trace, uint64_t max_rays, d
 /* Lookup (desc.lookup) among the texels that are valid and computed. irradiance[count] (RGB); error[count]: standard error of its
    luminance, NULL = not wanted; a point none of whose texels is ready gets the zero vector and error = INFINITY (so does the error
    of a single sample, which is not known, and endless light). Points beyond the lattice are moved to its border.
-   TRANSFER: under the lighting last given to isogi_trace_relight (that of the description at first); its error is an upper bound.
+   TRANSFER: under the lighting last given to isogi_trace_relight or isogi_trace_change (that of the description at first); its error is an upper bound.
    Irradiance below 0 is handed out as it is, here and by isogi_trace_gather: a sky that SH coefficients make negative somewhere brings
    it, and so do the truncated series of TRANSFER where nearly all light is hidden. Before it is shown:  e = e > 0 ? e : 0  a channel.
    Errors cover the true ones (twice the standard error in 95 % of points, with desc.error in 90 % or more, tests/test_trace_bake.c):
@@ -333,7 +335,7 @@ ISOGI_API isogi_result isogi_trace_step(isogi_trace *trace, uint64_t max_rays, d
    and of glows only what emission_points tell: where desc.material alone makes something glow, give the brightest of it there. */
 ISOGI_API isogi_result isogi_trace_sample(const isogi_trace *trace, const float (*points)[3], size_t count, float (*irradiance)[3],
                                           float *error);
-/* A new lighting. TRANSFER: a distant one (environment and directional lights; point lights are ISOGI_INVALID); no rays. IRRADIANCE keeps
+/* A new lighting. TRANSFER: a distant one (environment and directional lights; point, sphere and rectangle lights are ISOGI_INVALID); no rays. IRRADIANCE keeps
    nothing that could be lit anew: isogi_trace_change with this lighting, hence as many rays as all computed texels took at first. */
 ISOGI_API isogi_result isogi_trace_relight(isogi_trace *trace, const isogi_lighting *lighting);
 /* TRANSFER only, for display: glossy light that the surface sends along the unit vector views[i] (away from it, towards the eye),
@@ -344,7 +346,7 @@ ISOGI_API isogi_result isogi_trace_relight(isogi_trace *trace, const isogi_light
    there; shadows come out as soft as the order, and light by reflections counts as openness. Zero where no texel is ready. */
 ISOGI_API isogi_result isogi_trace_sample_gloss(const isogi_trace *trace, const float (*points)[3], const float (*normals)[3],
                                                 const float (*views)[3], double exponent, size_t count, float (*radiance)[3]);
-/* TRANSFER only: interpolated coefficients, transfer[count][order*order][channels]; E = sum_i transfer_i light_i. */
+/* TRANSFER only: interpolated coefficients, transfer[count][order*order][channels], zeros where no texel is ready; E = sum_i transfer_i light_i. */
 ISOGI_API isogi_result isogi_trace_sample_transfer(const isogi_trace *trace, const float (*points)[3], size_t count, float *transfer);
 /* ---- when something changes: only what depends on it is computed again ----
    Texels that are to be computed again keep their light until isogi_trace_step has come to them, can be read meanwhile, and count as
@@ -424,8 +426,8 @@ ISOGI_API isogi_result isogi_trace_export_scales(const isogi_trace *trace, int f
    are saved, ISOGI_TRACE_CUBE), and of lazy ones that were asked for everything while they had nothing to do (all of it is saved, or
    nothing yet: who asks for more all the time should let a step come to its end before); what is asked for after that was finished would
    have shared its probes, and differs as lazy light does (see Determinism).
-   Only desc.isovalue_min, isovalue_max, lazy, lookup and box may differ; else the answer is ISOGI_INVALID (lighting, tables and the
-   ranges of the volume's blocks are compared by hash; a material function cannot be).
+   Only desc.isovalue_min, isovalue_max, lazy, lookup, box and the lighting of TRANSFER may differ; else the answer is ISOGI_INVALID
+   (lighting, tables and the ranges of the volume's blocks are compared by hash; a material function cannot be).
    Any bytes may be loaded: those that are damaged, cut off or of another layout are ISOGI_CORRUPT and change nothing (what is left of a
    block of both sides that is cut off where the first one ends is a block of that side: ISOGI_INVALID).
    A lazy texture reads of the 4x4x4 around a point, where none of the eight is valid, what points were asked for.
@@ -439,7 +441,8 @@ ISOGI_API isogi_result isogi_trace_load(isogi_trace *trace, const void *block, s
    desc.normals says; towards the low side, whichever side is asked for). Uses samples, bounces, seed, offset, normals, capped, side
    (not BOTH), reach, shadows, material and lighting of the description; its mode must be IRRADIANCE. A point that is not finite or has
    no normal, or on the high side no matter to look through (as texels need it: see Validity), gets the zero vector and error = INFINITY.
-   error may be NULL. */
+   Points outside the volume are moved to its border; normals of other lengths are made unit. error may be NULL; context NULL: that of
+   the pyramid. */
 ISOGI_API isogi_result isogi_trace_gather(const isogi_trace_desc *desc, const float (*points)[3], const float (*normals)[3], size_t count,
                                           float (*irradiance)[3], float *error, const isogi_context *context);
 
@@ -458,7 +461,8 @@ typedef void isogi_trace_intersect_function(void *user, const isogi_ray *rays, s
 
 /* isogi_trace_gather on such a surface. normals are needed: unit, to the side that the light is wanted for. Uses lighting, albedo,
    samples, bounces, seed, reach and no_shadows; offset: how far off along the normal rays start, in world units, 0 or more (lamps are as
-   far away as from the surface). The other fields are not read, the pyramid may be NULL. context NULL: malloc and all cores. */
+   far away as from the surface). The other fields must be valid but are not used, the pyramid may be NULL. context NULL: malloc and all
+   cores. */
 ISOGI_API isogi_result isogi_trace_gather_field(const isogi_trace_desc *desc, isogi_trace_intersect_function *intersect, void *user,
                                                 const float (*points)[3], const float (*normals)[3], size_t count,
                                                 float (*irradiance)[3], float *error, const isogi_context *context);
@@ -1133,7 +1137,12 @@ static void isogi_trace__disc_beam(const isogi_trace__disc *disc, double u, doub
 static int isogi_trace__light_beam(const isogi_light *light, const double point[3], double u, double v,
                                    isogi_trace__beam *beam) {
     double to[3], length = 0, factor = 1;
+    isogi_trace__disc disc;
     int a;
+    if (isogi_trace__disc_set(light, &disc)) {
+        isogi_trace__disc_beam(&disc, u, v, beam);
+        return 1;
+    }
     if (light->kind == ISOGI_LIGHT_RECTANGLE) {
         factor = isogi_trace__rectangle(light, point, u, v, beam);
         isogi_trace__beam_light(beam, light, factor);
@@ -1146,12 +1155,6 @@ static int isogi_trace__light_beam(const isogi_light *light, const double point[
     length = sqrt(length);
     if (!(length > 0) || !isogi_trace__finite(length)) return 0;
     beam->tmax = 0;
-    if (light->kind == ISOGI_LIGHT_DIRECTIONAL && light->radius > 0) {
-        isogi_trace__disc disc;
-        if (!isogi_trace__disc_set(light, &disc)) return 0;
-        isogi_trace__disc_beam(&disc, u, v, beam);
-        return 1;
-    }
     if (light->kind == ISOGI_LIGHT_SPHERE && light->radius > 0) {
         factor = isogi_trace__sphere(to, length, (double)light->radius, u, v, beam);
     } else {
@@ -1285,6 +1288,13 @@ ISOGI_API void isogi_trace_material(const isogi_trace_desc *desc, double isovalu
     if (point && desc->material) isogi_trace__colours(desc, isovalue, point, reflected, sent);
     if (albedo) memcpy(albedo, reflected, sizeof reflected);
     if (emission) memcpy(emission, sent, sizeof sent);
+}
+
+static void isogi_trace__to_world(const isogi_pyramid *pyramid, const isogi_hit *place, double world[3]) {
+    double grid[3];
+    int a;
+    for (a = 0; a < 3; a++) grid[a] = place->cell[a] + place->local[a];
+    isogi_vol_to_world(pyramid, grid, world);
 }
 
 /* ==== scene: what is the same for every texel ======================================================================== */
@@ -1433,8 +1443,7 @@ static void isogi_trace__site_start(const isogi_trace__scene *scene, isogi_trace
     double grid[3];
     int a, beyond;
     site->on_surface = 1, site->open = 0;
-    for (a = 0; a < 3; a++) grid[a] = site->place.cell[a] + site->place.local[a];
-    isogi_vol_to_world(scene->pyramid, grid, site->point);
+    isogi_trace__to_world(scene->pyramid, &site->place, site->point);
     if (isogi_trace__off_surface(scene, site, (double)scene->desc.offset, grid, &beyond)) {
         isogi_vol_to_world(scene->pyramid, grid, site->origin);
         site->on_surface = 0, site->open = beyond && !scene->desc.capped;
@@ -1444,7 +1453,10 @@ static void isogi_trace__site_start(const isogi_trace__scene *scene, isogi_trace
     if (site->place.side != 2 && site->place.side != -2) site->place.side = 1; /* a probe on a cap is no place of the isosurface */
     isogi_vol_normals(scene->pyramid, &site->place, 1, ISOGI_NORMAL_TRILINEAR, &site->geometric);
     for (a = 0; a < 3 && scene->high; a++) site->geometric[a] = -site->geometric[a];
-    if (!(isogi_trace__dot(site->geometric, site->normal) > 0)) memcpy(site->geometric, site->normal, sizeof site->geometric);
+    if (isogi_trace__dot(site->geometric, site->normal) > 0) return;
+    /* as at hits: a smoothed normal that points the other way would send rays through matter */
+    if (isogi_trace__dot(site->geometric, site->geometric) > 0) memcpy(site->normal, site->geometric, sizeof site->normal);
+    else memcpy(site->geometric, site->normal, sizeof site->geometric);
 }
 
 /* The kernel of the first integral, cosine / pi for rays that begin off the surface, times pi. */
@@ -1485,7 +1497,6 @@ typedef struct isogi_trace__wave {
     isogi_counters *counters;
     float albedo[3], emission[3];       /* at the site's isovalue */
     double light[ISOGI_TRACE__WAVE][3]; /* of each sample: what its path brought */
-    float basis[ISOGI_TRACE__MAX_ORDER * ISOGI_TRACE__MAX_ORDER];          /* TRANSFER: scratch for SH values */
     double transfer[3 * ISOGI_TRACE__MAX_ORDER * ISOGI_TRACE__MAX_ORDER]; /* TRANSFER: sum over samples, coefficients x channels */
     int first;                          /* sample of slot 0 */
     int count;                          /* paths alive; the arrays below are of these */
@@ -1641,27 +1652,34 @@ static void isogi_trace__wave_sky(isogi_trace__wave *w, isogi_trace__shadows *s,
     isogi_trace__shadows_flush(w, s, depth);
 }
 
+/* Adds what a path brings from the environment, `through` of it, by a ray drawn with the density cosine / pi. */
+static void isogi_trace__escape(const isogi_trace__scene *scene, const float dir[3], double cosine, const double through[3],
+                                double light[3]) {
+    double weight = 1, density = 0;
+    float radiance[3];
+    int c;
+    if (!scene->has_env) return;
+    if (scene->sky.rays) density = isogi_trace__sky_density(&scene->sky, dir);
+    if (density > 0) weight = cosine / (cosine + density);
+    isogi_trace__env_light(&scene->desc.lighting.env, dir, radiance);
+    for (c = 0; c < 3; c++) light[c] += weight * through[c] * (double)radiance[c];
+}
+
 /* Path i has left the volume. */
 static void isogi_trace__wave_escape(isogi_trace__wave *w, int i) {
     const isogi_trace__scene *scene = w->scene;
-    double weight = 1;
-    float radiance[3];
+    float basis[ISOGI_TRACE__MAX_ORDER * ISOGI_TRACE__MAX_ORDER];
     int c, k, channels = scene->desc.transfer_channels, count = scene->desc.order * scene->desc.order;
     if (scene->desc.mode == ISOGI_TRACE_TRANSFER) {
-        isogi_sh_eval(w->basis, scene->desc.order, (const float(*)[3]) & w->dir[i], 1);
+        isogi_sh_eval(basis, scene->desc.order, (const float(*)[3]) & w->dir[i], 1);
         for (k = 0; k < count; k++)
             for (c = 0; c < channels; c++)
-                w->transfer[k * channels + c] += w->through[i][c] * (double)w->basis[k];
+                w->transfer[k * channels + c] += w->through[i][c] * (double)basis[k];
         for (c = 0; c < 3; c++) w->light[w->slot[i]][c] += w->through[i][c];
         return;
     }
-    if (!scene->has_env) return;
-    if (scene->sky.rays) {
-        double cosine = w->density[i] / ISOGI_TRACE__PI, density = isogi_trace__sky_density(&scene->sky, (const float *)w->dir[i]);
-        if (density > 0) weight = cosine / (cosine + density);
-    }
-    isogi_trace__env_light(&scene->desc.lighting.env, (const float *)w->dir[i], radiance);
-    for (c = 0; c < 3; c++) w->light[w->slot[i]][c] += weight * w->through[i][c] * (double)radiance[c];
+    isogi_trace__escape(scene, (const float *)w->dir[i], w->density[i] / ISOGI_TRACE__PI, (const double *)w->through[i],
+                        w->light[w->slot[i]]);
 }
 
 /* Colours where path i hit: grey transfer has one channel, of their mean. What is emitted there is brought. */
@@ -1671,9 +1689,8 @@ static void isogi_trace__wave_material(isogi_trace__wave *w, int i, float albedo
     int c;
     memcpy(albedo, w->albedo, sizeof w->albedo), memcpy(emission, w->emission, sizeof emission);
     if (desc->material) {
-        double grid[3], point[3];
-        for (c = 0; c < 3; c++) grid[c] = w->hit[i].cell[c] + w->hit[i].local[c];
-        isogi_vol_to_world(w->scene->pyramid, grid, point);
+        double point[3];
+        isogi_trace__to_world(w->scene->pyramid, &w->hit[i], point);
         isogi_trace__colours(desc, w->site->isovalue, point, albedo, emission);
     }
     if (desc->mode == ISOGI_TRACE_TRANSFER) {
@@ -1684,24 +1701,26 @@ static void isogi_trace__wave_material(isogi_trace__wave *w, int i, float albedo
     for (c = 0; c < 3; c++) w->light[w->slot[i]][c] += w->through[i][c] * (double)emission[c];
 }
 
+/* The probability that a path goes on with what its reflection at `depth` leaves of its light; 0: it has ended. Russian roulette, below 1
+   even for white surfaces: a path in a closed cavity lives for fifty reflections on average. */
+static double isogi_trace__survive(const isogi_trace_desc *desc, uint64_t key, int depth, const double through[3]) {
+    double most = through[0] > through[1] ? through[0] : through[1];
+    most = most > through[2] ? most : through[2];
+    if (depth == desc->bounces || depth >= ISOGI_TRACE__MAX_DEPTH || !(most > 0)) return 0;
+    if (desc->bounces >= 0 || depth < 3) return 1;
+    most = most < 0.98 ? most : 0.98;
+    return isogi_trace__random(key, depth, ISOGI_TRACE__ROULETTE) < most ? most : 0;
+}
+
 /* Keeps path i as path j, reflected where it hit. 0: it ends there. */
 static int isogi_trace__wave_reflect(isogi_trace__wave *w, int i, int j, int depth) {
-    const isogi_trace__scene *scene = w->scene;
     int side = w->hit[i].side > 0 ? 1 : -1, from = w->from[i], c;
-    double through[3], most = 0, survive = 1;
+    double through[3], survive;
     float albedo[3];
     isogi_trace__wave_material(w, i, albedo);
-    if (depth == scene->desc.bounces || depth >= ISOGI_TRACE__MAX_DEPTH) return 0;
-    for (c = 0; c < 3; c++) {
-        through[c] = w->through[i][c] * (double)albedo[c];
-        if (through[c] > most) most = through[c];
-    }
-    if (!(most > 0)) return 0;
-    if (scene->desc.bounces < 0 && depth >= 3) {
-        /* Russian roulette, below 1 even for white surfaces: a path in a closed cavity lives for fifty reflections on average */
-        survive = most < 0.98 ? most : 0.98;
-        if (isogi_trace__random(w->key[i], depth, ISOGI_TRACE__ROULETTE) >= survive) return 0;
-    }
+    for (c = 0; c < 3; c++) through[c] = w->through[i][c] * (double)albedo[c];
+    survive = isogi_trace__survive(&w->scene->desc, w->key[i], depth, through);
+    if (!(survive > 0)) return 0;
     for (c = 0; c < 3; c++) w->through[j][c] = through[c] / survive;
     w->slot[j] = w->slot[i], w->key[j] = w->key[i];
     /* A ray that meets the surface from the side where it is not has begun within matter (a corner where cells with different
@@ -2079,7 +2098,7 @@ static isogi_result isogi_trace__scene_set(isogi_trace__scene *scene, const isog
                                            const isogi_context *context) {
     isogi_trace_desc *d = &scene->desc;
     isogi_result result;
-    double range[2] = {0, 0};
+    double range[2];
     int i;
     memset(scene, 0, sizeof *scene);
     *d = *desc;
@@ -2087,7 +2106,7 @@ static isogi_result isogi_trace__scene_set(isogi_trace__scene *scene, const isog
     for (i = 0; i < ISOGI_TRACE__WAVE; i++) scene->reach[i] = (double)d->reach;
     scene->pyramid = d->pyramid;
     scene->volume = isogi_vol_volume(d->pyramid);
-    if (d->pyramid) isogi_vol_range(d->pyramid, range);
+    isogi_vol_range(d->pyramid, range);
     scene->range = range[1] > range[0] ? range[1] - range[0] : 1;
     scene->flags = d->capped ? (uint32_t)ISOGI_RAY_CAPPED : 0;
     scene->has_env = d->lighting.env.rgb || d->lighting.env.sh;
@@ -2096,7 +2115,7 @@ static isogi_result isogi_trace__scene_set(isogi_trace__scene *scene, const isog
     if (!(d->offset > 0 || d->offset < 0)) d->offset = 0.25f;
     if (!d->transfer_channels) d->transfer_channels = isogi_trace__grey(d) ? 1 : 3;
     isogi_trace__scene_matrix(scene);
-    if (d->pyramid) isogi_trace__scene_cells(scene);
+    isogi_trace__scene_cells(scene);
     if (!d->storage) d->storage = d->mode == ISOGI_TRACE_TRANSFER ? ISOGI_TRACE_HALF : ISOGI_TRACE_FLOAT;
     scene->unit = 1;
     if (d->mode == ISOGI_TRACE_IRRADIANCE && d->storage != ISOGI_TRACE_FLOAT) {
@@ -2803,6 +2822,13 @@ static int isogi_trace__state(const isogi_trace *t, const size_t texel[3]) {
     return brick->state[slot];
 }
 
+/* Texel i of the 4x4x4 around a lattice cell; 0 where it lies beyond the lattice. */
+static int isogi_trace__texel_around(const isogi_trace *t, const size_t cell[3], int i, size_t texel[3]) {
+    int a, inside = 1;
+    for (a = 0; a < 3; a++) texel[a] = cell[a] + (size_t)(i >> 2 * a & 3) - 1, inside &= texel[a] < t->lattice[a]; /* wraps */
+    return inside;
+}
+
 /* Among the 4x4x4 texels around a lattice cell, the one nearest to the point (in texels; of equals the first) with that state or a
    later one. 0 if there is none. */
 static int isogi_trace__nearest(const isogi_trace *t, const size_t cell[3], const double local[3], int state,
@@ -2810,17 +2836,10 @@ static int isogi_trace__nearest(const isogi_trace *t, const size_t cell[3], cons
     double best = DBL_MAX;
     int i, a;
     for (i = 0; i < 64; i++) {
-        double distance = 0;
+        double distance = 0, d;
         size_t texel[3];
-        int outside = 0;
-        for (a = 0; a < 3; a++) {
-            int shift = (i >> (2 * a) & 3) - 1;
-            double d = shift - local[a];
-            outside |= (shift < 0 && !cell[a]) || (shift > 0 && cell[a] + (size_t)shift >= t->lattice[a]);
-            texel[a] = cell[a] + (size_t)(shift + 1) - 1;
-            distance += d * d;
-        }
-        if (outside || !(distance < best) || isogi_trace__state(t, texel) < state) continue;
+        for (a = 0; a < 3; a++) d = (i >> 2 * a & 3) - 1 - local[a], distance += d * d;
+        if (!isogi_trace__texel_around(t, cell, i, texel) || !(distance < best) || isogi_trace__state(t, texel) < state) continue;
         best = distance;
         memcpy(nearest, texel, 3 * sizeof *nearest);
     }
@@ -2831,11 +2850,9 @@ static int isogi_trace__nearest(const isogi_trace *t, const size_t cell[3], cons
 static double isogi_trace__spline(const isogi_trace *t, const size_t cell[3], const double local[3], int i, size_t texel[3]) {
     double weight = 1;
     int a;
+    if (!isogi_trace__texel_around(t, cell, i, texel)) return 0;
     for (a = 0; a < 3; a++) {
-        int shift = i >> (2 * a) & 3;
-        double d = fabs(shift - 1 - local[a]), rest = 2 - d;
-        if (cell[a] + (size_t)shift < 1 || cell[a] + (size_t)shift - 1 >= t->lattice[a]) return 0;
-        texel[a] = cell[a] + (size_t)shift - 1;
+        double d = fabs((i >> 2 * a & 3) - 1 - local[a]), rest = 2 - d;
         weight *= d < 1 ? (4 - 6 * d * d + 3 * d * d * d) / 6 : rest > 0 ? rest * rest * rest / 6 : 0;
     }
     return weight;
@@ -2990,7 +3007,7 @@ static void isogi_trace__lobe(double exponent, int order, double *g) {
     for (l = 2; l < order; l++) g[l] = g[l - 2] * (exponent - l + 2) / (exponent + l + 1);
 }
 
-/* One point of the above; T its transfer, t->light the lighting. */
+/* One point of isogi_trace_sample_gloss; transfer: T there; t->light: L; g: the factors of the lobe. */
 static void isogi_trace__gloss(const isogi_trace *t, const float *transfer, const float normal[3], const float view[3],
                                const double *g, float rgb[3]) {
     static const double cosine[6] = {3.14159265358979323846, 2.0943951023931953, 0.78539816339744831, 0, -0.13089969389957472, 0};
@@ -3061,14 +3078,16 @@ ISOGI_API int isogi_trace_wanted(const isogi_trace *trace, const size_t texel[3]
     return (state >= ISOGI_TRACE__WANTED && state < ISOGI_TRACE__DONE) || isogi_trace_wanted(trace->high, texel);
 }
 
+static void isogi_trace__add(isogi_counters *to, const isogi_counters *from) {
+    to->rays += from->rays, to->blocks += from->blocks, to->cells += from->cells, to->cubics += from->cubics;
+    to->texels += from->texels, to->texels_skipped += from->texels_skipped;
+}
+
 ISOGI_API void isogi_trace_counters(const isogi_trace *trace, isogi_counters *counters) {
-    const isogi_counters *c;
     if (!trace || !counters) return;
-    c = &trace->counters;
-    counters->rays += c->rays, counters->blocks += c->blocks, counters->cells += c->cells, counters->cubics += c->cubics;
-    counters->texels += c->texels, counters->texels_skipped += c->texels_skipped;
-    if (trace->high) isogi_trace_counters(trace->high, counters);
-    if (trace->coarse) isogi_trace_counters(trace->coarse, counters);
+    isogi_trace__add(counters, &trace->counters);
+    isogi_trace_counters(trace->high, counters);
+    isogi_trace_counters(trace->coarse, counters);
 }
 
 ISOGI_API size_t isogi_trace_memory(const isogi_trace *trace) {
@@ -3124,16 +3143,9 @@ static isogi_result isogi_trace__want(isogi_trace *t, const size_t texel[3], int
 static isogi_result isogi_trace__want_nearest(isogi_trace *t, const size_t cell[3], const double local[3]) {
     size_t texel[3];
     isogi_result result = ISOGI_OK;
-    int i, a;
-    for (i = 0; i < 64 && result == ISOGI_OK; i++) {
-        int outside = 0;
-        for (a = 0; a < 3; a++) {
-            int shift = i >> (2 * a) & 3;
-            outside |= cell[a] + (size_t)shift < 1 || cell[a] + (size_t)shift - 1 >= t->lattice[a];
-            texel[a] = cell[a] + (size_t)shift - 1;
-        }
-        if (!outside) result = isogi_trace__want(t, texel, 1);
-    }
+    int i;
+    for (i = 0; i < 64 && result == ISOGI_OK; i++)
+        if (isogi_trace__texel_around(t, cell, i, texel)) result = isogi_trace__want(t, texel, 1);
     if (result == ISOGI_OK && isogi_trace__nearest(t, cell, local, ISOGI_TRACE__BEYOND, texel)) result = isogi_trace__want(t, texel, 2);
     return result;
 }
@@ -3322,17 +3334,11 @@ ISOGI_API isogi_result isogi_trace_request(isogi_trace *trace, const float (*poi
 
 /* ==== baking within a budget ========================================================================================= */
 
-static void isogi_trace__add(isogi_counters *to, const isogi_counters *from) {
-    to->rays += from->rays, to->blocks += from->blocks, to->cells += from->cells, to->cubics += from->cubics,
-        to->texels += from->texels;
-}
-
 static void isogi_trace__bake_task(void *arg, size_t task) {
     const isogi_trace__job *job = (const isogi_trace__job *)arg;
     isogi_trace *t = job->trace;
     isogi_counters *counters = &t->task_counters[task];
     size_t i = task * job->each, end = i + job->each < job->count ? i + job->each : job->count;
-    memset(counters, 0, sizeof *counters);
     for (; i < end; i++) {
         const isogi_trace__ref *ref = &t->batch[i];
         const size_t *x = ref->texel;
@@ -3393,11 +3399,9 @@ static isogi_result isogi_trace__fill_batch(isogi_trace *t, size_t limit, size_t
 
 /* Takes bricks without wanted texels off the head of the queue. */
 static void isogi_trace__queue_advance(isogi_trace *t) {
-    size_t slot;
     for (; t->queue_first < t->queue_count; t->queue_first++) {
         isogi_trace__brick *brick = t->bricks[t->queue[t->queue_first]];
-        for (slot = 0; slot < ISOGI_TRACE__TEXELS; slot++)
-            if (isogi_trace__to_do(brick, slot)) return;
+        if (isogi_trace__all_to_do(brick)) return;
         brick->queued = 0;
     }
     t->queue_first = t->queue_count = 0;
@@ -3901,7 +3905,7 @@ static isogi_trace__node *isogi_trace__node_begin(const isogi_trace *t, isogi_tr
    smallest cells reach along the normal. */
 static int isogi_trace__same_place(const isogi_trace *t, const isogi_trace__catch *c, const isogi_hit *place, const float normal[3]) {
     const double *voxel = t->scene.voxel;
-    double apart = 0, least = voxel[0], reach = 0;
+    double apart = 0, reach = ISOGI_TRACE__PLANE * t->scene.least;
     int a;
     for (a = 0; a < 3; a++) {
         const double *axis = t->scene.axis[a];
@@ -3909,10 +3913,8 @@ static int isogi_trace__same_place(const isogi_trace *t, const isogi_trace__catc
         double d = ((double)c->hit.cell[a] - (double)place->cell[a] + c->hit.local[a] - place->local[a]) * voxel[a];
         double along = 0.5 * ISOGI_TRACE__HALF * voxel[a] * fabs(facing);
         apart += d * facing;
-        if (voxel[a] < least) least = voxel[a];
         if (along > reach) reach = along;
     }
-    if (ISOGI_TRACE__PLANE * least > reach) reach = ISOGI_TRACE__PLANE * least;
     return fabs(apart) < reach && isogi_trace__dot(c->normal, normal) > 0.5;
 }
 
@@ -3923,8 +3925,7 @@ static int isogi_trace__same_colours(const isogi_trace *t, const isogi_trace__ca
     float albedo[2][3], glow[2][3];
     int a, same = 1;
     if (isogi_trace__zero(one - two) || (!d->albedo_count && !d->emission_count && !d->material)) return 1;
-    for (a = 0; a < 3; a++) point[a] = c->hit.cell[a] + c->hit.local[a];
-    isogi_vol_to_world(t->scene.pyramid, point, point);
+    isogi_trace__to_world(t->scene.pyramid, &c->hit, point);
     isogi_trace_material(d, one, point, albedo[0], glow[0]);
     isogi_trace_material(d, two, point, albedo[1], glow[1]);
     for (a = 0; a < 3; a++) {
@@ -3961,15 +3962,11 @@ static double isogi_trace__magnitude(const double v[3]) {
 /* How far isovalues may lie from that of a probe that tells their light, as a share of the volume's range: as much as the field changes
    in ALIKE voxels there. Where a skin of some value shuts a hollow, isosurfaces next to each other are dark and bright. */
 static double isogi_trace__alike(const isogi_trace__scene *scene, const isogi_hit *hit) {
-    const double *voxel = scene->voxel;
-    double slope[3], least = voxel[0];
+    double slope[3];
     int a;
     isogi_trace__slopes(scene, hit, slope);
-    for (a = 0; a < 3; a++) {
-        slope[a] /= voxel[a];
-        if (voxel[a] < least) least = voxel[a];
-    }
-    return ISOGI_TRACE__ALIKE * least * (isogi_trace__magnitude(slope) / scene->range);
+    for (a = 0; a < 3; a++) slope[a] /= scene->voxel[a];
+    return ISOGI_TRACE__ALIKE * scene->least * (isogi_trace__magnitude(slope) / scene->range);
 }
 
 /* Passes the next probe of the cell: 1: the search ends, with `nearest`. Of more than 32 probes of a cell none is added: the one in the
@@ -4071,19 +4068,14 @@ static void isogi_trace__probes_link(const isogi_trace *t, size_t made) {
 static void isogi_trace__probe_finish(const isogi_trace *t, size_t i, const isogi_trace__catch *c) {
     isogi_trace__set *set = &t->feedback->probes;
     isogi_trace__node *n = isogi_trace__node_begin(t, set, i);
-    double grid[3], point[3];
-    float emission[3];
+    double point[3];
     int a;
     n->isovalue = c->isovalue;
     n->place = c->hit, n->cell = n->key = c->key, n->from = c->from, n->alike = c->alike;
     for (a = 0; a < c->search.tries; a++) n->key = isogi_trace__key(n->key, 1);
     memcpy(n->normal, c->normal, sizeof n->normal);
-    isogi_trace_albedo(&t->scene.desc, n->isovalue, n->albedo);
-    if (t->scene.desc.material) {
-        for (a = 0; a < 3; a++) grid[a] = n->place.cell[a] + n->place.local[a];
-        isogi_vol_to_world(t->scene.pyramid, grid, point);
-        isogi_trace_material(&t->scene.desc, n->isovalue, point, n->albedo, emission);
-    }
+    isogi_trace__to_world(t->scene.pyramid, &n->place, point);
+    isogi_trace_material(&t->scene.desc, n->isovalue, point, n->albedo, NULL);
     memset(isogi_trace__stage_at(set, i), 0, sizeof(isogi_trace__stage));
     isogi_trace__stage_at(set, i)->wanted = n->albedo[0] > 0.9f || n->albedo[1] > 0.9f || n->albedo[2] > 0.9f ? 2 : 1;
 }
@@ -4128,14 +4120,27 @@ static uint64_t isogi_trace__turned_key(const size_t texel[3]) {
 
 /* ---- rays of a task, gathered into batches ---- */
 
-/* A cosine-distributed ray of span k left the volume. */
+static float *isogi_trace__span_direct(const isogi_trace *t, const isogi_trace__span *span) {
+    return t->feedback->direct + (size_t)(span - t->feedback->spans) * (size_t)t->values;
+}
+
+/* Radiance that a cosine-distributed ray brings. */
+static void isogi_trace__span_bring(const isogi_trace *t, isogi_trace__span *span, const double rgb[3]) {
+    float *direct = isogi_trace__span_direct(t, span);
+    double luminance = isogi_trace__luminance(rgb);
+    int a;
+    for (a = 0; a < 3; a++) direct[a] += (float)rgb[a];
+    span->square += luminance * luminance;
+}
+
+/* It left the volume. */
 static void isogi_trace__cast_escape(isogi_trace__cast *c, int i) {
     const isogi_trace *t = c->trace;
     const isogi_trace__scene *scene = &t->scene;
     isogi_trace__span *span = &c->span[c->owner[i]];
-    float *direct = t->feedback->direct + (size_t)(span - t->feedback->spans) * (size_t)t->values;
+    float *direct = isogi_trace__span_direct(t, span);
     const float *dir = c->ray[i].dir;
-    double weight = 1, density = 0, rgb[3], luminance;
+    double weight = 1, density = 0, rgb[3];
     float basis[ISOGI_TRACE__MAX_ORDER * ISOGI_TRACE__MAX_ORDER], radiance[3];
     int k, a, channels = scene->desc.transfer_channels, count = scene->desc.order * scene->desc.order;
     if (scene->desc.mode == ISOGI_TRACE_TRANSFER) {
@@ -4148,24 +4153,21 @@ static void isogi_trace__cast_escape(isogi_trace__cast *c, int i) {
     if (scene->sky.rays) density = ISOGI_TRACE__PI * isogi_trace__sky_density(&scene->sky, dir);
     if (density > 0) weight = c->weight[i] / (c->weight[i] + isogi_trace__sky_rays(&scene->sky, span->of->brick != NULL) * density);
     isogi_trace__env_light(&scene->desc.lighting.env, dir, radiance);
-    for (a = 0; a < 3; a++) rgb[a] = weight * (double)radiance[a], direct[a] += (float)rgb[a];
-    luminance = isogi_trace__luminance(rgb);
-    span->square += luminance * luminance;
+    for (a = 0; a < 3; a++) rgb[a] = weight * (double)radiance[a];
+    isogi_trace__span_bring(t, span, rgb);
 }
 
 /* Light that the surface sends out itself where a ray hit. */
 static void isogi_trace__cast_glow(isogi_trace__cast *c, isogi_trace__span *span, const isogi_trace__catch *at) {
     const isogi_trace *t = c->trace;
-    float *direct = t->feedback->direct + (size_t)(span - t->feedback->spans) * (size_t)t->values, albedo[3], emission[3];
-    double grid[3], point[3], rgb[3], luminance;
+    float emission[3];
+    double point[3], rgb[3];
     int a;
     if (t->scene.desc.mode == ISOGI_TRACE_TRANSFER) return;
-    for (a = 0; a < 3; a++) grid[a] = at->hit.cell[a] + at->hit.local[a];
-    isogi_vol_to_world(t->scene.pyramid, grid, point);
-    isogi_trace_material(&t->scene.desc, span->of->isovalue, point, albedo, emission);
-    for (a = 0; a < 3; a++) rgb[a] = (double)emission[a], direct[a] += emission[a];
-    luminance = isogi_trace__luminance(rgb);
-    span->square += luminance * luminance;
+    isogi_trace__to_world(t->scene.pyramid, &at->hit, point);
+    isogi_trace_material(&t->scene.desc, span->of->isovalue, point, NULL, emission);
+    for (a = 0; a < 3; a++) rgb[a] = (double)emission[a];
+    isogi_trace__span_bring(t, span, rgb);
 }
 
 /* It hit: the key of the probe that will tell the light there. A ray that meets the surface from the side where it is not has begun
@@ -4604,19 +4606,26 @@ static void isogi_trace__segment_fill(const isogi_trace *t, const isogi_trace__s
     }
 }
 
+/* What comes from sky and lights, as irradiance or transfer. */
+static double isogi_trace__node_direct(const isogi_trace *t, const isogi_trace__set *set, size_t node, int value) {
+    const isogi_trace__node *n = isogi_trace__node_at(set, node);
+    const float *direct = isogi_trace__values_at(set, node, ISOGI_TRACE__DIRECT_VALUES, (size_t)t->values);
+    double e = n->samples ? ISOGI_TRACE__PI / n->samples * (double)direct[value] : 0;
+    if (t->scene.desc.mode == ISOGI_TRACE_TRANSFER) return e;
+    if (n->samples) e += ISOGI_TRACE__PI / n->samples * n->bright[value];
+    return e + n->steady[value] + (n->light_samples ? n->light[value] / n->light_samples : 0);
+}
+
 /* A first answer, before any probe is known: the surroundings that its rays met are taken to be as bright as the texel itself. */
 static void isogi_trace__texel_guess(isogi_trace *t, size_t node) {
     isogi_trace__feedback *f = t->feedback;
     isogi_trace__node *n = isogi_trace__node_at(&f->texels, node);
     float to[3 * ISOGI_TRACE__MAX_ORDER * ISOGI_TRACE__MAX_ORDER], error = (float)(1 / sqrt((double)n->samples));
-    const float *direct = isogi_trace__values_at(&f->texels, node, ISOGI_TRACE__DIRECT_VALUES, (size_t)t->values);
     double hidden = (double)n->hits / n->samples, most = 0;
     int i, channels = t->scene.desc.mode == ISOGI_TRACE_TRANSFER ? t->scene.desc.transfer_channels : 3;
     for (i = 0; i < t->values; i++) {
-        int a = i % channels;
-        double e = ISOGI_TRACE__PI / n->samples * ((double)direct[i] + n->bright[a]) + n->steady[a], lost = (double)n->albedo[a] * hidden;
-        if (n->light_samples) e += n->light[a] / n->light_samples;
-        to[i] = (float)(e / (1 - (lost < 0.9 ? lost : 0.9)));
+        double lost = (double)n->albedo[i % channels] * hidden;
+        to[i] = (float)(isogi_trace__node_direct(t, &f->texels, node, i) / (1 - (lost < 0.9 ? lost : 0.9)));
         most = (double)to[i] > most ? (double)to[i] : most;
     }
     if (t->scene.desc.mode == ISOGI_TRACE_IRRADIANCE) /* nothing is known of its spread yet */
@@ -4630,7 +4639,7 @@ static void isogi_trace__span_commit(isogi_trace *t, isogi_trace__set *set, cons
     isogi_trace__node *n = isogi_trace__node_at(set, s->node);
     isogi_trace__stage *stage = isogi_trace__stage_at(set, s->node);
     float *direct = isogi_trace__values_at(set, s->node, ISOGI_TRACE__DIRECT_VALUES, (size_t)t->values);
-    const float *from = t->feedback->direct + (size_t)(s - t->feedback->spans) * (size_t)t->values;
+    const float *from = isogi_trace__span_direct(t, s);
     int a, fresh = n->brick && !n->samples;
     for (a = 0; a < t->values; a++) direct[a] += from[a];
     for (a = 0; a < 3; a++)
@@ -4716,16 +4725,6 @@ static isogi_result isogi_trace__spans_run(isogi_trace *t, double from, double t
 static size_t isogi_trace__sweep(const isogi_trace *t, size_t task, size_t count, size_t *begin) {
     *begin = (t->feedback->carried + task) * ISOGI_TRACE__SWEEP;
     return *begin + ISOGI_TRACE__SWEEP < count ? *begin + ISOGI_TRACE__SWEEP : count;
-}
-
-/* What comes from sky and lights, as irradiance or transfer. */
-static double isogi_trace__node_direct(const isogi_trace *t, const isogi_trace__set *set, size_t node, int value) {
-    const isogi_trace__node *n = isogi_trace__node_at(set, node);
-    const float *direct = isogi_trace__values_at(set, node, ISOGI_TRACE__DIRECT_VALUES, (size_t)t->values);
-    double e = n->samples ? ISOGI_TRACE__PI / n->samples * (double)direct[value] : 0;
-    if (t->scene.desc.mode == ISOGI_TRACE_TRANSFER) return e;
-    if (n->samples) e += ISOGI_TRACE__PI / n->samples * n->bright[value];
-    return e + n->steady[value] + (n->light_samples ? n->light[value] / n->light_samples : 0);
 }
 
 static int isogi_trace__channel(const isogi_trace *t, int value) {
@@ -5502,15 +5501,14 @@ static size_t isogi_trace__phase_tasks(const isogi_trace__feedback *f) {
     return (nodes + ISOGI_TRACE__SWEEP - 1) / ISOGI_TRACE__SWEEP;
 }
 
-/* Rays that take as long as one of them: one for 64 hits, for 8 nodes that are read in passing, for one that is filtered, for 2 that
-   are given back. */
+/* Rays that take as long as one of them: one for 64 hits, for 8 nodes that are read in passing, for 2 that are filtered or
+   given back. */
 static uint64_t isogi_trace__phase_cost(const isogi_trace__feedback *f, size_t task) {
     const isogi_trace__segment *s = f->phase == ISOGI_TRACE__PASS ? f->probes.segments : f->texels.segments; /* NULL without hits */
     if (f->phase == ISOGI_TRACE__PASS) return s[task].entries / 8 + s[task].hits / 64 + 1;
     if (f->phase == ISOGI_TRACE__BOUNCE)
         return ISOGI_TRACE__SWEEP / 8 + s[f->segment].hits * ISOGI_TRACE__SWEEP / s[f->segment].entries / 64;
-    if (isogi_trace__publishing(f)) return ISOGI_TRACE__SWEEP / 2;
-    return f->phase == ISOGI_TRACE__FORGET ? ISOGI_TRACE__SWEEP / 2 : ISOGI_TRACE__SWEEP / 8;
+    return isogi_trace__publishing(f) || f->phase == ISOGI_TRACE__FORGET ? ISOGI_TRACE__SWEEP / 2 : ISOGI_TRACE__SWEEP / 8;
 }
 
 static void isogi_trace__phase_task(void *arg, size_t task) {
@@ -6078,7 +6076,6 @@ static int isogi_trace__export_begin(isogi_trace__export *e, const isogi_trace *
 }
 
 static uint8_t *isogi_trace__export_at(const isogi_trace__export *e, size_t texel, int v) {
-    if (!e->transfer) return e->out + texel * e->texel + (size_t)v * e->component;
     return e->out + (size_t)(v / 4) * e->texels * e->texel + texel * e->texel + (size_t)(v % 4) * e->component;
 }
 
@@ -6167,7 +6164,7 @@ static void isogi_trace__export_fill(isogi_trace__export *e) {
 ISOGI_API size_t isogi_trace_export_size(const isogi_trace *trace, int format) {
     isogi_trace__export e;
     if (!isogi_trace__export_begin(&e, trace, format)) return 0;
-    return e.texels * e.texel * (e.transfer ? (size_t)((e.values + 3) / 4) : 1);
+    return e.texels * e.texel * (size_t)((e.values + 3) / 4);
 }
 
 ISOGI_API isogi_result isogi_trace_export(const isogi_trace *trace, int format, void *texels, size_t bytes) {
@@ -6238,7 +6235,6 @@ static uint64_t isogi_trace__hash_table(uint64_t hash, const isogi_albedo_point 
     return hash;
 }
 
-/* Everything that a texel's light depends on. Lighting is left out for TRANSFER. */
 static uint64_t isogi_trace__hash_lighting(uint64_t hash, const isogi_lighting *l) {
     size_t i;
     hash = isogi_trace__hash_number(isogi_trace__hash_number(hash, (uint64_t)l->env.width), (uint64_t)l->env.height);
@@ -6273,6 +6269,7 @@ static uint64_t isogi_trace__hash_volume(uint64_t hash, const isogi_pyramid *pyr
     return isogi_trace__hash_floats(hash, level.range[0], 2 * level.size[0] * level.size[1] * level.size[2]);
 }
 
+/* Everything that a texel's light depends on. Lighting is left out for TRANSFER. */
 static uint64_t isogi_trace__hash_trace(const isogi_trace *t) {
     const isogi_trace_desc *d = &t->scene.desc;
     const int transfer = d->mode == ISOGI_TRACE_TRANSFER;
@@ -6471,7 +6468,7 @@ typedef struct isogi_trace__change {
     const isogi_trace_desc *desc; /* NULL: voxels change */
     isogi_trace__scene scene;     /* afterwards: as it was */
     float light[3 * ISOGI_TRACE__MAX_ORDER * ISOGI_TRACE__MAX_ORDER];
-    uint64_t lighting_hash, colours_hash;
+    uint64_t lighting_hash;
     int all, colours, choice; /* to be computed again: all; where colours differ. Texels are chosen anew */
     double low[3], high[3];   /* voxels: grid coordinates of what texels and hits there read */
     double range[2];          /* isovalues of surfaces there */
@@ -6529,7 +6526,6 @@ static isogi_result isogi_trace__change_scene(isogi_trace__change *c) {
         isogi_trace__sky_free(&c->scene.sky, &t->context);
         return result;
     }
-    c->colours_hash = isogi_trace__hash_colours(&d);
     c->lighting_hash = d.mode == ISOGI_TRACE_IRRADIANCE ? isogi_trace__hash_lighting(0, &d.lighting) : 0;
     c->choice = !isogi_trace__zero(d.isovalue_min - b->isovalue_min) || !isogi_trace__zero(d.isovalue_max - b->isovalue_max) ||
                 d.lookup != b->lookup;
@@ -6589,29 +6585,17 @@ static int isogi_trace__in_change(const isogi_trace__change *c, const double gri
 }
 
 static int isogi_trace__in_reach(const isogi_trace__change *c, const double grid[3]) {
-    const isogi_trace_desc *d = &c->trace->scene.desc;
-    const isogi_pyramid *pyramid = c->trace->scene.pyramid;
-    const double zero[3] = {0, 0, 0};
-    double world[3], origin[3], edge[3][3], apart = 0, most = 0;
-    int a, b;
-    if (!(d->reach > 0) || d->bounces < 0) return 1;
-    isogi_vol_to_world(pyramid, zero, origin);
-    for (a = 0; a < 3; a++) { /* of a voxel, however axes lie */
-        double one[3] = {0, 0, 0}, square;
-        one[a] = 1;
-        isogi_vol_to_world(pyramid, one, world);
-        for (b = 0; b < 3; b++) edge[a][b] = world[b] - origin[b];
-        square = isogi_trace__dot_wide(edge[a], edge[a]);
-        most = square > most ? square : most;
+    const isogi_trace__scene *scene = &c->trace->scene;
+    double apart = 0, most = 0;
+    int a;
+    if (!(scene->desc.reach > 0) || scene->desc.bounces < 0) return 1;
+    for (a = 0; a < 3; a++) { /* no closer than the planes between which a coordinate lies, however axes lie */
+        const double *slope = scene->to_grid + 3 * a;
+        double voxels = grid[a] < c->low[a] ? c->low[a] - grid[a] : grid[a] > c->high[a] ? grid[a] - c->high[a] : 0;
+        double away = voxels / sqrt(isogi_trace__dot_wide(slope, slope));
+        apart = away > apart ? away : apart, most = scene->voxel[a] > most ? scene->voxel[a] : most;
     }
-    for (a = 0; a < 3; a++) { /* no closer than the planes between which a coordinate lies */
-        const double *u = edge[(a + 1) % 3], *v = edge[(a + 2) % 3];
-        double n[3], voxels = grid[a] < c->low[a] ? c->low[a] - grid[a] : grid[a] > c->high[a] ? grid[a] - c->high[a] : 0, away;
-        for (b = 0; b < 3; b++) n[b] = u[(b + 1) % 3] * v[(b + 2) % 3] - u[(b + 2) % 3] * v[(b + 1) % 3];
-        away = voxels * fabs(isogi_trace__dot_wide(n, edge[a])) / sqrt(isogi_trace__dot_wide(n, n));
-        apart = away > apart ? away : apart;
-    }
-    return apart <= (double)d->reach * (d->bounces + 1) + 2 * sqrt(most); /* rays start up to a voxel off the texel */
+    return apart <= (double)scene->desc.reach * (scene->desc.bounces + 1) + 2 * most; /* rays start up to a voxel off the texel */
 }
 
 /* Whether a computed texel that is not at the changed voxels depends on the change. */
@@ -6762,7 +6746,7 @@ static void isogi_trace__change_commit(isogi_trace__change *c) {
     if (t->feedback) isogi_trace__making_anew(t->feedback, count), t->feedback->most = 0;
     if (!c->desc) return;
     isogi_trace__sky_free(&c->scene.sky, &t->context);
-    t->lighting_hash = c->lighting_hash, t->colours_hash = c->colours_hash;
+    t->lighting_hash = c->lighting_hash, t->colours_hash = isogi_trace__hash_colours(&t->scene.desc);
     if (t->scene.desc.mode == ISOGI_TRACE_TRANSFER) isogi_trace__set_light(t, c->light);
 }
 
@@ -7006,33 +6990,17 @@ static void isogi_trace__field_lights(isogi_trace__walk *w, uint64_t site, int f
     }
 }
 
-static void isogi_trace__field_escape(isogi_trace__walk *w, int i, double cosine) {
-    const isogi_trace__scene *scene = &w->field->scene;
-    double weight = 1, density = 0;
-    float radiance[3];
-    int c;
-    if (!scene->has_env) return;
-    if (scene->sky.rays) density = isogi_trace__sky_density(&scene->sky, w->ray[i].dir);
-    if (density > 0) weight = cosine / (cosine + density);
-    isogi_trace__env_light(&scene->desc.lighting.env, w->ray[i].dir, radiance);
-    for (c = 0; c < 3; c++) w->light[w->slot[i]][c] += weight * w->through[i][c] * (double)radiance[c];
-}
-
 /* Path i goes on as path j from where it met something; 0: it ends. */
 static int isogi_trace__field_reflect(isogi_trace__walk *w, int i, int j, int depth) {
     const isogi_trace_desc *d = &w->field->scene.desc;
-    double most = 0, survive = 1, through[3];
+    double survive, through[3];
     int c;
     for (c = 0; c < 3; c++) {
         w->light[w->slot[i]][c] += w->through[i][c] * (double)w->met[i].emission[c];
         through[c] = w->through[i][c] * (double)w->met[i].albedo[c];
-        most = through[c] > most ? through[c] : most;
     }
-    if (depth == d->bounces || depth >= ISOGI_TRACE__MAX_DEPTH || !(most > 0)) return 0;
-    if (d->bounces < 0 && depth >= 3) {
-        survive = most < 0.98 ? most : 0.98;
-        if (isogi_trace__random(w->key[i], depth, ISOGI_TRACE__ROULETTE) >= survive) return 0;
-    }
+    survive = isogi_trace__survive(d, w->key[i], depth, through);
+    if (!(survive > 0)) return 0;
     for (c = 0; c < 3; c++) {
         w->through[j][c] = through[c] / survive;
         w->point[j][c] = w->ray[i].origin[c] + w->met[i].t * (double)w->ray[i].dir[c], w->normal[j][c] = w->met[i].normal[c];
@@ -7071,7 +7039,8 @@ static void isogi_trace__field_run(isogi_trace__walk *w, uint64_t key, int first
         isogi_trace__field_rays(w, w->count);
         for (alive = i = 0; i < w->count; i++) {
             int met = w->met[i].t > 0;
-            if (!met || w->field->scene.desc.no_shadows) isogi_trace__field_escape(w, i, cosine[i]);
+            if (!met || w->field->scene.desc.no_shadows)
+                isogi_trace__escape(&w->field->scene, w->ray[i].dir, cosine[i], (const double *)w->through[i], w->light[w->slot[i]]);
             if (met && isogi_trace__field_reflect(w, i, alive, depth)) alive++;
         }
     }

@@ -53,7 +53,8 @@
                 where they are 5 voxels thick along one axis, 17 (1.4) with 2: cut large fields into thick chunks. From malloc, blocks
                 of 4 MB and more ask Linux for huge pages: a pyramid is then built in 1/5 (virtual machines) to 7/10 of the time. Where
                 your voxels lie in such pages, too (madvise, or isogi_allocate), many rays are 5 to 10 % faster.
-                A mesh keeps some 3/4 byte of scratch memory for every voxel until it is freed.
+                A mesh keeps some 3/4 byte of scratch memory for every voxel until it is freed (1 to 2 where rows along x are no
+                multiple of 64 voxels, 36 where they have 2).
                 Stack use stays below 32 KB.
    Threads      A pyramid is const once built: any number of threads may read it. Building, updating, prefiltering and meshing use the
                 context's threads; rays, samples and normals run on the thread that calls. isogi_thread_pool keeps threads from call
@@ -474,7 +475,7 @@ ISOGI_API isogi_result isogi_vol_normals(const isogi_pyramid *pyramid, const iso
 /* ---- meshes ---------------------------------------------------------------------------------------------------------------- */
 
 typedef struct isogi_mesh_desc {
-    double isovalue;
+    double isovalue; /* NaN, infinite: ISOGI_INVALID */
     int normals; /* non-zero: smoothed normals too */
     int closed;  /* non-zero: the volume's border closes the surface, as ISOGI_RAY_CAPPED does */
 } isogi_mesh_desc;
@@ -9232,10 +9233,11 @@ static int isogi_vol__trace_loops(const double f[8], unsigned code, isogi_vol__l
     return loops;
 }
 
-/* A point between p and q, one of which is inside and one outside, on the surface. */
-static void isogi_vol__surface_between(const double f[8], const double p[3], const double q[3], double out[3]) {
+/* A point on the surface between p, which is inside or not, and q, which is on the other side. The caller knows it of p: where a passage
+   has no width p lies on the surface, and rounding would say either. */
+static void isogi_vol__surface_between(const double f[8], const double p[3], const double q[3], int inside, double out[3]) {
     double low = 0, high = 1, s = 0.5;
-    int inside = isogi_vol__trilinear(f, p, NULL) >= 0, i, a;
+    int i, a;
     for (i = 0; i < 54; i++) {
         s = 0.5 * (low + high);
         for (a = 0; a < 3; a++) out[a] = isogi_vol__lerp(p[a], q[a], s);
@@ -9364,7 +9366,7 @@ static void isogi_vol__patch_fan(isogi_vol__patch *patch, const double f[8], con
         for (i = 0; i < 8; i++)
             if ((f[i] >= 0) != inside && fabs(f[i]) > most)
                 for (most = fabs(f[i]), a = 0; a < 3; a++) to[a] = i >> a & 1;
-    isogi_vol__surface_between(f, middle, to, patch->extra[patch->extras++]);
+    isogi_vol__surface_between(f, middle, to, inside, patch->extra[patch->extras++]);
 }
 
 /* The saddle of the slice at z. */
@@ -9421,7 +9423,7 @@ static void isogi_vol__patch_passage(isogi_vol__patch *patch, const double f[8],
     for (n = 0; n < 2; n++) {
         int column = n ? 3 - passage->cut : passage->cut;
         corner[0] = column & 1, corner[1] = column >> 1, corner[2] = passage->z[1];
-        isogi_vol__surface_between(f, saddle, corner, extra[1 + 2 * n]);
+        isogi_vol__surface_between(f, saddle, corner, passage->inside, extra[1 + 2 * n]);
     }
     patch->extras += 4;
     for (i = 0; i < one->count; i++) isogi_vol__edge_point(f, one->edge[i], points[0][i]);

@@ -522,6 +522,28 @@ TEST(vertices_lie_on_the_surface) {
     CHECK(inner > 100, "%ld", inner);
 }
 
+/* Passages without width: the saddle in their middle has exactly the isovalue, and rounding says either side. */
+TEST(vertices_of_passages_without_width_lie_on_the_surface) {
+    const double cell[5][9] = {{1, 1, 1, 3, 4, 1, 1, 0, 1.5}, {4, 1, 0, 0, 0, 0, 0, 3, 1},    {1, 0, 2, 1, 0, 4, 0, 0, 1},
+                               {0, 0, 0, 3, 4, 1, 0, 0, 1},   {-1, -1, -1, -3, -4, -1, -1, 0, -1.5}}; /* corners x + 2y + 4z, isovalue */
+    for (int c = 0; c < 5; c++)
+        for (int turn = 0; turn < 8; turn++) {
+            field f = field_new(2, 2, 2);
+            for (int i = 0; i < 8; i++) *field_at(&f, i & 1, i >> 1 & 1, i >> 2) = cell[c][i ^ turn];
+            field_build_with(&f, &serial);
+            isogi_mesh mesh = mesh_of(&f, cell[c][8], 0, 0);
+            for (size_t v = 0; v < mesh.vertex_count; v++) {
+                double p[3];
+                for (int a = 0; a < 3; a++) p[a] = (double)mesh.positions[v][a];
+                CHECK(fabs(trilinear_at(&f, p) - cell[c][8]) < 1e-6, "cell %d turned by %d: (%g %g %g) has %g", c, turn, p[0], p[1], p[2],
+                      trilinear_at(&f, p));
+            }
+            CHECK(mesh.vertex_count > 0, "cell %d", c);
+            isogi_vol_mesh_free(f.pyramid, &mesh);
+            field_free(&f);
+        }
+}
+
 /* A triangle of a sphere's mesh is seen counter-clockwise from its outside, which is the low side; in mirrored axes too. */
 TEST(triangles_turn_counter_clockwise_seen_from_the_low_side) {
     for (int mirrored = 0; mirrored < 2; mirrored++) {
