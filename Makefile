@@ -97,15 +97,18 @@ demo: export VOLUME := $(VOLUME)
 demo: export ISO := $(ISO)
 demo: export SPACING := $(SPACING)
 demo: export UP := $(UP)
-demo: build/viewer
+demo:
+	@$(QUIET_MAKE) build/viewer
 	@sh examples/demo.sh
 
-figures: build/viewer build/isolines build/tets
+figures:
+	@$(QUIET_MAKE) build/viewer build/isolines build/tets
 	@sh examples/figures.sh
 	@FIGURES_PAGE=build/figures/index.html sh examples/figures_scale_invariant.sh
 	@FIGURES_PAGE=build/figures/index.html sh examples/figures_visibility.sh
 
-pictures: build/viewer build/strip
+pictures:
+	@$(QUIET_MAKE) build/viewer build/strip
 	@sh examples/pictures.sh
 
 # ---- tests ----

@@ -251,7 +251,8 @@ typedef struct isogi_trace_desc {
                                   more, and so is the lighting of TRANSFER */
     isogi_trace_mode mode;
     int order;                 /* TRANSFER: 1..6; 0 = 5 */
-    size_t lattice[3];         /* texels along x, y, z, up to 2^31 - 1; 0 = one per voxel along that axis */
+    size_t lattice[3];         /* texels along x, y, z, up to 2^31 - 1; 0 = one per voxel along that axis. Where voxels lie further apart
+                                  than along others give that axis more: else rings show */
     double lattice_min[3], lattice_max[3]; /* grid coordinates (voxels) of the first and last texel, within the volume; all zero =
                                               the whole volume */
     float albedo[3];           /* diffuse RGB reflectance, 0..1 */
@@ -276,12 +277,13 @@ typedef struct isogi_trace_desc {
                                   that is worth: the same error takes four to ten times the samples, where they are few (make bench,
                                   rows filter-) */
     uint64_t seed;
-    float offset;              /* rays start this many voxels along the normal, up to 1 (a wall may be that thin); 0 = 0.25;
+    float offset;              /* rays start this many voxels (in grid coordinates: wherever voxels are longer, so is the way) along
+                                  the normal, up to 1 (a wall may be that thin); 0 = 0.25;
                                   negative = on the surface; lamps are as far away as from the surface all the same */
     isogi_normal_kind normals; /* of the hemisphere that is integrated over */
-    double isovalue_min, isovalue_max; /* only texels that a surface within this interval reads; both 0 = all. Where none of a lookup's
-                                          eight texels is valid, the nearest one of the 4x4x4 may be missing, unless lazy: another
-                                          of these, or none, is then read there */
+    double isovalue_min, isovalue_max; /* only texels that a surface within this interval reads; both 0 = all (0 alone: -DBL_MIN to 0).
+                                          Where none of a lookup's eight texels is valid, the nearest one of the 4x4x4 may be
+                                          missing, unless lazy: another of these, or none, is then read there */
     int lazy;                  /* non-zero: only texels that were requested (and that the interval, if there is one, reads) */
     int capped;                /* non-zero: the volume's border closes the surface (ISOGI_RAY_CAPPED) */
     int transfer_channels;     /* TRANSFER: sets of coefficients: 1 = grey (mean albedo), 3 = RGB; 0 = 3 if albedo is coloured, else 1 */
@@ -315,8 +317,9 @@ ISOGI_API void isogi_trace_free(isogi_trace *trace);
 ISOGI_API isogi_result isogi_trace_request(isogi_trace *trace, const float (*points)[3], size_t count);
 
 /* Works until about max_rays rays are traced (0 = to the end), whole texels, or as long as that takes in other work. *remaining (may be
-   NULL): about the fraction of the work asked for that is still to do, 0 = finished; it rises only by a request or by what changes (change, touch, relight of IRRADIANCE). ISOGI_CANCELLED and
-   ISOGI_NO_MEMORY leave a texture that can be read and stepped on. Not at the same time as any other call on this texture.
+   NULL): about the fraction of the work asked for that is still to do, 0 = finished; it rises only by a request or by what changes
+   (change, touch, relight of IRRADIANCE). ISOGI_CANCELLED and ISOGI_NO_MEMORY leave a texture that can be read and stepped on. Not at the
+   same time as any other call on this texture.
    FEEDBACK: when a block of samples is complete passes without rays carry the light over all probes to all texels at work; they are cut
    into pieces, too, as is what comes before the first ray and after the last one, and counted as the rays that take about as long.
    Meanwhile what a request adds has to wait. To the end, and where no progress callback can stop it, that is done once, after the last
@@ -327,16 +330,21 @@ ISOGI_API isogi_result isogi_trace_step(isogi_trace *trace, uint64_t max_rays, d
 /* Lookup (desc.lookup) among the texels that are valid and computed. irradiance[count] (RGB); error[count]: standard error of its
    luminance, NULL = not wanted; a point none of whose texels is ready gets the zero vector and error = INFINITY (so does the error
    of a single sample, which is not known, and endless light). Points beyond the lattice are moved to its border.
-   TRANSFER: under the lighting last given to isogi_trace_relight or isogi_trace_change (that of the description at first); its error is an upper bound.
+   TRANSFER: under the lighting last given to isogi_trace_relight or isogi_trace_change (that of the description at first); its error is
+   an upper bound.
    Irradiance below 0 is handed out as it is, here and by isogi_trace_gather: a sky that SH coefficients make negative somewhere brings
    it, and so do the truncated series of TRANSFER where nearly all light is hidden. Before it is shown:  e = e > 0 ? e : 0  a channel.
    Errors cover the true ones (twice the standard error in 95 % of points, with desc.error in 90 % or more, tests/test_trace_bake.c):
-   they allow for what samples that agree may all have missed, and for probes 2 % of reflected light. They know nothing of the lattice,
-   and of glows only what emission_points tell: where desc.material alone makes something glow, give the brightest of it there. */
+   they allow for what samples that agree may all have missed, and for probes 2 % of reflected light. That is too little where much of
+   the light is reflected and comes from lights without size, whose shadows are hard: at albedo 0.8, in narrow tunnels, twice the error
+   told covers 60 to 90 % of points. Nor is the error of negative lights told in full. They know nothing of the lattice (on steep fields
+   that adds more than samples do; closer texels help), and of glows only what emission_points tell: where desc.material alone makes
+   something glow, give the brightest of it there. */
 ISOGI_API isogi_result isogi_trace_sample(const isogi_trace *trace, const float (*points)[3], size_t count, float (*irradiance)[3],
                                           float *error);
-/* A new lighting. TRANSFER: a distant one (environment and directional lights; point, sphere and rectangle lights are ISOGI_INVALID); no rays. IRRADIANCE keeps
-   nothing that could be lit anew: isogi_trace_change with this lighting, hence as many rays as all computed texels took at first. */
+/* A new lighting. TRANSFER: a distant one (environment and directional lights; point, sphere and rectangle lights are ISOGI_INVALID); no
+   rays. IRRADIANCE keeps nothing that could be lit anew: isogi_trace_change with this lighting, hence as many rays as all computed texels
+   took at first. */
 ISOGI_API isogi_result isogi_trace_relight(isogi_trace *trace, const isogi_lighting *lighting);
 /* TRANSFER only, for display: glossy light that the surface sends along the unit vector views[i] (away from it, towards the eye),
    about the mirrored direction r, for a Phong lobe of that exponent (0 or more; the order holds lobes up to about order^2) and
@@ -346,7 +354,8 @@ ISOGI_API isogi_result isogi_trace_relight(isogi_trace *trace, const isogi_light
    there; shadows come out as soft as the order, and light by reflections counts as openness. Zero where no texel is ready. */
 ISOGI_API isogi_result isogi_trace_sample_gloss(const isogi_trace *trace, const float (*points)[3], const float (*normals)[3],
                                                 const float (*views)[3], double exponent, size_t count, float (*radiance)[3]);
-/* TRANSFER only: interpolated coefficients, transfer[count][order*order][channels], zeros where no texel is ready; E = sum_i transfer_i light_i. */
+/* TRANSFER only: interpolated coefficients, transfer[count][order*order][channels], zeros where no texel is ready;
+   E = sum_i transfer_i light_i. */
 ISOGI_API isogi_result isogi_trace_sample_transfer(const isogi_trace *trace, const float (*points)[3], size_t count, float *transfer);
 /* ---- when something changes: only what depends on it is computed again ----
    Texels that are to be computed again keep their light until isogi_trace_step has come to them, can be read meanwhile, and count as
@@ -438,8 +447,8 @@ ISOGI_API isogi_result isogi_trace_save(const isogi_trace *trace, void *block, s
 ISOGI_API isogi_result isogi_trace_load(isogi_trace *trace, const void *block, size_t bytes);
 
 /* No lattice: irradiance at a user's own world points, each on the isosurface through it, with a unit normal each (NULL = as
-   desc.normals says; towards the low side, whichever side is asked for). Uses samples, bounces, seed, offset, normals, capped, side
-   (not BOTH), reach, shadows, material and lighting of the description; its mode must be IRRADIANCE. A point that is not finite or has
+   desc.normals says; towards the low side, whichever side is asked for). Uses samples, bounces, seed, offset, normals, capped, sides
+   (not BOTH), reach, no_shadows, material and lighting of the description; its mode must be IRRADIANCE. A point that is not finite or has
    no normal, or on the high side no matter to look through (as texels need it: see Validity), gets the zero vector and error = INFINITY.
    Points outside the volume are moved to its border; normals of other lengths are made unit. error may be NULL; context NULL: that of
    the pyramid. */

@@ -32,5 +32,5 @@ else
     picture hydrogen "A hydrogen orbital, volume rendered, shaded by what each point sees of the sky" procedural:hydrogen --mode dvr
 fi
 echo "$(($(date +%s) - begun)) s in all"
-[ "$VOLUME" ] || echo "A volume of your own: make demo VOLUME=head_256x256x99_uint8.raw ISO=130 SPACING=1,1,2"
+[ "$VOLUME" ] || echo "A volume of your own: make demo VOLUME=head_256x256x99_uint8.raw ISO=130 SPACING=1,1,2 UP=0,0,-1"
 exit $failed

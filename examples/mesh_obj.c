@@ -1,13 +1,15 @@
 /* Writes an isosurface as a Wavefront OBJ file that any modeller opens, and counts what it is made of.
 
-       build/mesh_obj [OUT.obj]        default: build/mesh_obj.obj */
+       build/mesh_obj [OUT.obj]        default: mesh_obj.obj beside the program */
 #define ISOGI_IMPLEMENTATION
 #include "files.h"
 #include "procedural.h"
 #include <stdio.h>
 
 int main(int argc, char **argv) {
-    const char *path = argc > 1 ? argv[1] : "build/mesh_obj.obj";
+    char beside[4096];
+    const char *path = argc > 1 ? argv[1] : beside;
+    snprintf(beside, sizeof beside, "%s.obj", argv[0]);
     if (argc > 2 || *path == '-') return fprintf(stderr, "usage: %s [OUT.obj]\n", argv[0]), 2;
     const procedural_shape *shape = procedural_find("gyroid");
     isogi_volume volume;

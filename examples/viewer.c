@@ -240,8 +240,10 @@ static const option option_list[] = {
      "paths per texel, or per pixel for pathtrace, there rounded up to a multiple of --aa; default "
      "64",
      INTEGER, AT(samples), 0, 1, 1, 1000000, .allowed = "a whole number, 1 to 1000000"},
-    {"--lattice", "X,Y,Z", BAKED, "texels of the illumination texture; default one per voxel", SIZES, AT(lattice), 0, 3, 2, 4096,
-     .allowed = "three whole numbers, 2 to 4096"},
+    {"--lattice", "X,Y,Z", BAKED,
+     "texels of the illumination texture; default one per voxel, more along axes on which voxels lie further "
+     "apart",
+     SIZES, AT(lattice), 0, 3, 2, 4096, .allowed = "three whole numbers, 2 to 4096"},
     {"--lookup", "NAME", BAKED, "how the texture is read: trilinear, nearest, closest-isovalue, bspline", NAMED(lookup_name, lookup)},
     {"--shadows", "on|off", SURFACES,
      "shadows of lights and sky; for lambert and phong, where off is the default, those of lights, per "
@@ -929,6 +931,21 @@ static int view_surface(viewer *v) {
 
 /* ---- light baked into a texture, where the view looks ------------------------------------------------------------------------ */
 
+/* Texels as close along every axis as voxels are along the one on which they are closest, up to four for a voxel: between slices that
+   lie further apart the shadows of one would show as rings in the light of the next. Scenes have their own. */
+static void choose_lattice(const viewer *v, size_t lattice[3]) {
+    double spacing[3], least = HUGE_VAL;
+    memcpy(lattice, v->o.lattice, sizeof v->o.lattice);
+    if (lattice[0] || v->o.scene) return;
+    for (int a = 0; a < 3; a++) {
+        spacing[a] = v->volume.spacing[a] > 0 ? v->volume.spacing[a] : 1;
+        if (v->volume.size[a] > 1 && spacing[a] < least) least = spacing[a];
+    }
+    for (int a = 0; a < 3; a++)
+        if (spacing[a] > least)
+            lattice[a] = (size_t)ceil((double)(v->volume.size[a] - 1) * fmin(spacing[a] / least, 4)) + 1;
+}
+
 static isogi_trace_desc describe_trace(const viewer *v) {
     isogi_trace_desc desc = {.pyramid = v->pyramid, .lighting = v->lighting, .bounces = v->o.mode == VICINITY ? 0 : v->o.bounces,
                              .samples = v->o.samples, .lazy = 1};
@@ -938,7 +955,7 @@ static isogi_trace_desc describe_trace(const viewer *v) {
     desc.mode = v->o.mode == TRANSFER ? ISOGI_TRACE_TRANSFER : ISOGI_TRACE_IRRADIANCE;
     if (v->o.mode == TRANSFER) memset(&desc.lighting, 0, sizeof desc.lighting);
     memcpy(desc.albedo, v->albedo, sizeof desc.albedo);
-    memcpy(desc.lattice, v->o.lattice, sizeof desc.lattice);
+    choose_lattice(v, desc.lattice);
     return desc;
 }
 

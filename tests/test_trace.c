@@ -1347,4 +1347,51 @@ TEST(infinite_points_have_no_light_on_caps) {
     isogi_vol_free(pyramid);
 }
 
+static double noise_around_a_voxel(const double x[3], const double *parameter) {
+    test_random r = {(uint64_t)(x[0] + 100 * x[1] + 10000 * x[2])};
+    (void)parameter;
+    return length3(x[0] - 6, x[1] - 6, x[2] - 6) < 0.5 ? 10 : random_unit(&r);
+}
+
+/* A lamp in a voxel that is matter at every isovalue below lights nothing: not where the smoothed normal points into matter, either. */
+TEST(a_lamp_within_matter_lights_nothing) {
+    enum { POINTS = 4000, LATTICE = 23 };
+    static float points[POINTS][3], light[POINTS][3], texels[LATTICE * LATTICE * LATTICE][3];
+    test_random r = {1};
+    scene s = scene_make(12, 12, 12, NULL, noise_around_a_voxel, NULL);
+    isogi_light lamp = {.kind = ISOGI_LIGHT_POINT, .vector = {6, 6, 6}, .rgb = {10, 10, 10}};
+    isogi_trace_desc d = {.pyramid = s.pyramid, .lighting = {.lights = &lamp, .light_count = 1}, .samples = 4, .capped = 1};
+    for (int i = 0; i < POINTS;) {
+        float value;
+        for (int a = 0; a < 3; a++) points[i][a] = (float)random_range(&r, 3, 9);
+        isogi_vol_sample(s.pyramid, (const float(*)[3])&points[i], 1, &value, NULL);
+        i += value < 1;
+    }
+    CHECK(isogi_trace_gather(&d, (const float(*)[3])points, NULL, POINTS, light, NULL, NULL) == ISOGI_OK, "%d points", POINTS);
+    for (int i = 0; i < POINTS; i++)
+        CHECK(!(light[i][1] > 0), "at %g %g %g: E %g", (double)points[i][0], (double)points[i][1], (double)points[i][2],
+              (double)light[i][1]);
+    for (int a = 0; a < 3; a++) d.lattice[a] = LATTICE, d.lattice_min[a] = 0.13, d.lattice_max[a] = 10.91;
+    for (int method = ISOGI_TRACE_FEEDBACK; method <= ISOGI_TRACE_PATHS; method++) {
+        isogi_trace *t = NULL;
+        long valid = 0;
+        d.method = (isogi_trace_method)method;
+        CHECK(isogi_trace_create(&t, &d, NULL) == ISOGI_OK && isogi_trace_step(t, 0, NULL) == ISOGI_OK &&
+                  isogi_trace_export(t, ISOGI_TRACE_FLOAT, texels, sizeof texels) == ISOGI_OK,
+              "method %d", method);
+        for (size_t i = 0; i < LATTICE * LATTICE * LATTICE; i++) {
+            const size_t texel[3] = {i % LATTICE, i / LATTICE % LATTICE, i / LATTICE / LATTICE};
+            float at[1][3], value;
+            for (int a = 0; a < 3; a++) at[0][a] = (float)(0.13 + 0.49 * (double)texel[a]);
+            isogi_vol_sample(s.pyramid, (const float(*)[3])at, 1, &value, NULL);
+            if (!isogi_trace_valid(t, texel) || !(value < 1)) continue;
+            valid++;
+            CHECK(!(texels[i][1] > 0), "method %d, texel %zu: E %g", method, i, (double)texels[i][1]);
+        }
+        CHECK(valid > 10000, "%ld texels", valid);
+        isogi_trace_free(t);
+    }
+    scene_free(&s);
+}
+
 TEST_MAIN("trace")

@@ -157,6 +157,26 @@ TEST(a_speck_is_shown_and_a_coarse_lattice_named) {
     CHECK(r.status == 0 && strstr(r.error, "the lattice is too coarse"), "%d: %s", r.status, r.error);
 }
 
+/* Texels are as close along every axis as along the one on which voxels are closest, up to four for a voxel; what is asked for counts. */
+TEST(slices_far_apart_get_more_texels) {
+    const char *with[] = {"1,1,2", "1,1,2 --lattice 20,20,39", "1,1,2 --lattice 20,20,20", "0.5,2,9", "0.5,2,9 --lattice 20,77,77"};
+    static char picture[5][1 << 16];
+    size_t size[5];
+    for (int k = 0; k < 5; k++) {
+        char command[1024];
+        snprintf(command, sizeof command, "procedural:gyroid:20 --spacing %s --samples 1 --size 40x40 --out '%s'", with[k],
+                 temporary("slices.png"));
+        run_result r = run_viewer(command);
+        CHECK(r.status == 0, "%s: %s", with[k], r.error);
+        size[k] = read_text(temporary("slices.png"), picture[k], sizeof picture[k]);
+        CHECK(size[k] > 100, "%s: %zu bytes", with[k], size[k]);
+    }
+#define SAME(a, b) (size[a] == size[b] && !memcmp(picture[a], picture[b], size[a]))
+    CHECK(SAME(0, 1) && !SAME(0, 2), "two voxels apart");
+    CHECK(SAME(3, 4), "four texels a voxel at most");
+#undef SAME
+}
+
 /* From linear light to 8 bits as the comment of isogi_dvr.h states it: exposure, what is above 0.7 bent, sRGB. */
 static double displayed(double linear, double exposure) {
     double x = linear * exposure;

@@ -67,6 +67,11 @@ static inline int bake_scene_option(bake_scene *s, int argc, char **argv, int *i
     static const char *const names[13] = {"--out",     "--mode",    "--isovalues", "--spacing", "--env",        "--light",  "--albedo",
                                           "--bounces", "--samples", "--lattice",   "--storage", "--save-every", "--threads"};
     static const char *const modes[2] = {"irradiance", "transfer"};
+    static const char *const allowed[13] = {
+        "a file's name", "irradiance or transfer", "two numbers, the smaller one first", "three numbers above 0", "a Radiance .hdr file",
+        "KIND:X,Y,Z:R,G,B and more, see build/viewer --help", "three numbers, 0 to 1", "a whole number, -1 to 1000",
+        "a whole number, 1 to 16777216", "three whole numbers, 1 to 65536", "a format that --help names", "seconds, 0 or more",
+        "a whole number, 0 to 256"};
     isogi_trace_desc *d = &s->desc;
     const char *text;
     double x[3];
@@ -96,7 +101,7 @@ static inline int bake_scene_option(bake_scene *s, int argc, char **argv, int *i
     case 11: ok = numbers(text, ',', 1, 0, 1e9, &s->save_every); break;
     default: ok = bake_integer(text, 0, 256, &s->context.threads);
     }
-    return ok ? 1 : (file_fail(s->error, "%s: \"%.80s\" is not allowed", argv[*i - 1], text), -1);
+    return ok ? 1 : (file_fail(s->error, "%s: \"%.80s\" is not allowed; allowed: %s", argv[*i - 1], text, allowed[which]), -1);
 }
 
 /* The volume is read, the light is put together. 0 with a message on failure. */
