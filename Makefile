@@ -14,7 +14,8 @@
 CC     ?= cc
 CXX    ?= c++
 CFLAGS ?= -O2 -g1
-WARN   := -Wall -Wextra -Wpedantic -Wconversion -Wsign-conversion -Wshadow -Wdouble-promotion -Wstrict-prototypes
+WARN   := -Wall -Wextra -Wpedantic -Wconversion -Wsign-conversion -Wshadow -Wdouble-promotion -Wstrict-prototypes \
+	-Wno-enum-float-conversion
 C99    := -std=gnu99 $(WARN) -ffp-contract=off -I. -Iexamples/common
 LIBS   := -lm -lpthread
 

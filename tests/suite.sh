@@ -36,7 +36,11 @@ sources() {
 # "one.c" includes HEADER; "all.c" every header; "late.c" includes for the interface first, for the implementation later.
 compile() {
     name=$1 compiler=$2 flags=$3 file=$4
-    item check "compile/$name" "$compiler $flags -I. -c tests/compile/$file -o \"\$OUT/object\""
+    case $flags in
+    *-fsyntax-only*) output= ;;
+    *) output=' -c -o "$OUT/object"' ;;
+    esac
+    item check "compile/$name" "$compiler $flags -I. tests/compile/$file$output"
 }
 
 c_flags() { echo "-std=$1 $WARN_C"; }
@@ -111,6 +115,17 @@ matrix() {
         compile "$cxx-c++11-all-DISOGI_NO_THREADS" $cxx "$(cxx_flags c++11) -O0 -DISOGI_NO_THREADS -DISOGI_IMPLEMENTATION" all.c
         link_items $cc $cxx "$cc-"
     done
+    # The newest clang that is installed, which may know other built-in functions than the one that is called so.
+    newest=$(ls /usr/bin/clang-[0-9] /usr/bin/clang-[0-9][0-9] 2> /dev/null | sort -V | tail -1)
+    if [ -n "$newest" ] && [ "$(readlink -f "$newest")" != "$(readlink -f "$(command -v clang)")" ]; then
+        newest=${newest##*/}
+        for h in $headers; do compile "$newest-c99-$h" $newest "$(c_flags c99) -O2 -DISOGI_IMPLEMENTATION -DHEADER='\"$h.h\"'" one.c; done
+        compile "$newest-c++17-all" $newest "$(cxx_flags c++17) -O0 -DISOGI_IMPLEMENTATION" all.c
+        for test in test_sh test_vol_work test_trace_light; do
+            item suite "$newest/$test" "$newest -std=gnu99 -O1 -ffp-contract=off -I. -Iexamples/common -Itests tests/$test.c -o \"\$OUT/$test\" -lm -lpthread && \"\$OUT/$test\""
+        done
+    else item skip compile/newest-clang "no clang-N is installed but clang itself"
+    fi
     if have tcc; then
         compile tcc-all tcc "-std=c99 -Wall -Werror -DISOGI_IMPLEMENTATION" all.c
     else item skip compile/tcc-all "tcc is not installed"
