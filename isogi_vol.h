@@ -50,9 +50,9 @@
    Memory       Through isogi_context, or malloc. A pyramid takes about 2.2 bytes for every voxel: bounds of blocks, and all voxels
                 in 8 bits of their block's range; and 31 KB. Of a volume that is marked compact it keeps the bounds alone, 1/5 byte for
                 every voxel, and rays are slower. Blocks of blocks are whole, so thin volumes take more: 7 bytes a voxel (compact 0.6)
-                where they are 5 voxels thick along one axis, 17 (1.4) with 2: cut large fields into thick chunks. From malloc, blocks
-                of 4 MB and more ask Linux for huge pages: a pyramid is then built in 1/5 (virtual machines) to 7/10 of the time. Where
-                your voxels lie in such pages, too (madvise, or isogi_allocate), many rays are 5 to 10 % faster.
+                where they are 5 voxels thick along one axis, 17 (1.4) with 2, along two axes more: cut large fields into thick chunks.
+                From malloc, blocks of 4 MB and more ask Linux for huge pages: a pyramid is then built in 1/5 (virtual machines) to 7/10
+                of the time. Where your voxels lie in such pages, too (madvise, or isogi_allocate), many rays are 5 to 10 % faster.
                 A mesh keeps some 3/4 byte of scratch memory for every voxel until it is freed (1 to 2 where rows along x are no
                 multiple of 64 voxels, 36 where they have 2).
                 Stack use stays below 32 KB.
@@ -153,7 +153,7 @@ typedef struct isogi_context {
 /* What work was done, for tests and tuning: it depends on which rays go together, what they hit does not. Every call ADDS to the fields it
    knows; NULL is allowed wherever one is asked for. */
 typedef struct isogi_counters {
-    uint64_t rays;           /* rays traced */
+    uint64_t rays;           /* rays traced; to the next hit counts anew */
     uint64_t blocks;         /* pyramid blocks looked at */
     uint64_t cells;          /* cells whose corner range was read */
     uint64_t cubics;         /* cells whose cubic was set up in double */
