@@ -62,9 +62,10 @@
                             one of the cells, also where the smoothed gradient vanishes (sheets and rods one voxel thick, whose
                             texels then have the light of one side).
      Start of rays          desc.offset voxels along the normal; where the trilinear field is still inside there, twice and four times
-                            as far, up to one voxel; where that fails, on the surface itself, directions mirrored as at hits. A ray that
-                            goes into matter all the same counts as reflected where it starts. Lights are as far away, and seen as
-                            aslant, as from the surface: only whether they are hidden is asked from the start of rays.
+                            as far, up to one voxel; where that fails, on the surface itself, directions mirrored as at hits (within a cell
+                            about its trilinear normal, if the other one points into matter). A ray that goes into matter all the same
+                            counts as reflected where it starts. Lights are as far away, and seen as aslant, as from the surface: only
+                            whether they are hidden is asked from the start of rays.
      Validity               A texel is left out of every lookup where no surface passes at its place: none of the voxels of the cells
                             around it is lower than v (constant air, local minima: there f >= v all around, such a texel would see the
                             sky through everything), where a voxel is not finite, or where all of these gradients vanish. With desc.capped
@@ -1450,7 +1451,7 @@ static int isogi_trace__off_surface(const isogi_trace__scene *scene, const isogi
 /* Rays start off the surface; where that is in matter wherever it was tried, on the surface itself. */
 static void isogi_trace__site_start(const isogi_trace__scene *scene, isogi_trace__site *site) {
     double grid[3];
-    int a, beyond;
+    int a, beyond, plane;
     site->on_surface = 1, site->open = 0;
     isogi_trace__to_world(scene->pyramid, &site->place, site->point);
     if (isogi_trace__off_surface(scene, site, (double)scene->desc.offset, grid, &beyond)) {
@@ -1463,8 +1464,10 @@ static void isogi_trace__site_start(const isogi_trace__scene *scene, isogi_trace
     isogi_vol_normals(scene->pyramid, &site->place, 1, ISOGI_NORMAL_TRILINEAR, &site->geometric);
     for (a = 0; a < 3 && scene->high; a++) site->geometric[a] = -site->geometric[a];
     if (isogi_trace__dot(site->geometric, site->normal) > 0) return;
-    /* as at hits: a smoothed normal that points the other way would send rays through matter */
-    if (isogi_trace__dot(site->geometric, site->geometric) > 0) memcpy(site->normal, site->geometric, sizeof site->normal);
+    /* As at hits: a smoothed normal that points the other way would send rays through matter. But where cells meet, as on caps, the
+       gradient is that of one of them alone; isogi_trace__hold stops what goes into matter there. */
+    for (plane = a = 0; a < 3; a++) plane |= site->place.local[a] <= 0 || site->place.local[a] >= 1;
+    if (!plane && isogi_trace__dot(site->geometric, site->geometric) > 0) memcpy(site->normal, site->geometric, sizeof site->normal);
     else memcpy(site->geometric, site->normal, sizeof site->geometric);
 }
 

@@ -1,6 +1,6 @@
 /* Writes an isosurface as a Wavefront OBJ file that any modeller opens, and counts what it is made of.
 
-       build/mesh_obj [OUT.obj]        default: mesh_obj.obj beside the program */
+       build/mesh_obj [OUT.obj]        default: what the program was called, with .obj */
 #define ISOGI_IMPLEMENTATION
 #include "files.h"
 #include "procedural.h"

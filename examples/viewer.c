@@ -988,6 +988,9 @@ static int bake(viewer *v) {
     isogi_result result;
     double bytes = sizeof(void *) / 64.0, machine = (double)sysconf(_SC_PHYS_PAGES) * (double)sysconf(_SC_PAGESIZE);
     for (int a = 0; a < 3; a++) bytes *= (double)(desc.lattice[a] ? desc.lattice[a] : v->volume.size[a]);
+    if (machine > 0 && bytes > machine / 8 && !v->o.lattice[0]) /* one per voxel has to do */
+        for (int a = 0; a < 3; a++) bytes *= (double)v->volume.size[a] / (double)(desc.lattice[a] ? desc.lattice[a] : v->volume.size[a]),
+                                    desc.lattice[a] = 0;
     if (machine > 0 && bytes > machine / 4)
         return file_fail(v->error, "--lattice: the table of its bricks alone needs %.1f GiB of this machine's %.1f GiB", bytes / 0x1p30,
                          machine / 0x1p30);

@@ -1394,4 +1394,29 @@ TEST(a_lamp_within_matter_lights_nothing) {
     scene_free(&s);
 }
 
+static double rises_with_x(const double x[3], const double *parameter) { return (void)parameter, x[0]; }
+
+/* A cap faces out of the box, wherever rays start: with an offset or on the surface, where the field rises towards it, too. */
+TEST(caps_face_outwards_wherever_rays_start) {
+    const float offset[3] = {0, 1, -1}, point[1][3] = {{9, 4.5f, 5.25f}};
+    scene s = scene_make(10, 10, 10, NULL, rises_with_x, NULL);
+    isogi_light sun = {.kind = ISOGI_LIGHT_DIRECTIONAL, .vector = {1, 0, 0}, .rgb = {1, 1, 1}};
+    isogi_trace_desc d = {.pyramid = s.pyramid, .lighting = {.lights = &sun, .light_count = 1}, .samples = 4, .capped = 1};
+    for (int o = 0; o < 3; o++)
+        for (int method = -1; method <= ISOGI_TRACE_PATHS; method++) {
+            isogi_trace *t = NULL;
+            float e[1][3] = {{0, 0, 0}};
+            d.offset = offset[o], d.method = (isogi_trace_method)(method < 0 ? 0 : method);
+            if (method < 0) CHECK(isogi_trace_gather(&d, point, NULL, 1, e, NULL, NULL) == ISOGI_OK, "offset %g", (double)offset[o]);
+            else {
+                CHECK(isogi_trace_create(&t, &d, NULL) == ISOGI_OK && isogi_trace_step(t, 0, NULL) == ISOGI_OK &&
+                          isogi_trace_sample(t, point, 1, e, NULL) == ISOGI_OK,
+                      "offset %g, method %d", (double)offset[o], method);
+                isogi_trace_free(t);
+            }
+            CHECK(fabs((double)e[0][1] - 1) < 1e-4, "offset %g, method %d: E %g", (double)offset[o], method, (double)e[0][1]);
+        }
+    scene_free(&s);
+}
+
 TEST_MAIN("trace")
