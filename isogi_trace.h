@@ -148,7 +148,8 @@
                 180 KB. isogi_trace_memory tells. PATHS needs another 4 MB, FEEDBACK 9 (TRANSFER: 32 KB more for each coefficient),
                 and while it works some 400 bytes (TRANSFER: 16 more for each coefficient), 8 MB of them at once of texels and as
                 many of probes, and 4 for every hit, for each texel of one cube (ISOGI_TRACE_CUBE), for all that were asked for
-                when lazy, and for each probe: where every texel of a cube has a surface 190 MB with 1 sample, 460 with 64, and
+                when lazy, and for each probe (and 160 more, TRANSFER 48 for each value, where light
+                takes more than 100 reflections to fade): where every texel of a cube has a surface 190 MB with 1 sample, 460 with 64, and
                 740 where there are lights. A request takes 12 bytes for each of 32768 points at a time.
                 Any allocation may fail: the call says ISOGI_NO_MEMORY, the texture stays as it was and can go on.
                 Stack use stays below 32 KB (compiled by clang, below 35), nearly all of it that of rays.
@@ -195,8 +196,8 @@ typedef enum isogi_trace_mode {
 /* How a lookup reads the texels around a point (Wyman et al. 2006, fig. 6). Only valid texels take part in any of them. */
 typedef enum isogi_trace_lookup {
     ISOGI_TRACE_TRILINEAR = 0,    /* the eight around the point, linearly weighted */
-    ISOGI_TRACE_NEAREST,          /* of those eight, the one nearest to the point (in texels; of equals the lower) */
-    ISOGI_TRACE_CLOSEST_ISOVALUE, /* of those eight, the one whose isovalue is closest to that at the point (of equals the nearest) */
+    ISOGI_TRACE_NEAREST,          /* of those eight that it weighs, the one nearest to the point (in texels; of equals the lower) */
+    ISOGI_TRACE_CLOSEST_ISOVALUE, /* of the same, the one whose isovalue is closest to that at the point (of equals the nearest) */
     ISOGI_TRACE_BSPLINE           /* 4x4x4, weighed by the uniform cubic B-spline: smooth, and blurred over two texels */
 } isogi_trace_lookup;
 
@@ -362,9 +363,10 @@ ISOGI_API isogi_result isogi_trace_sample_transfer(const isogi_trace *trace, con
    Texels that are to be computed again keep their light until isogi_trace_step has come to them, can be read meanwhile, and count as
    drafts in isogi_trace_report. With PATHS the result is the same bits as a new bake; FEEDBACK begins with new probes, takes samples
    of lazy texels that were not finished anew, and texels that are kept keep what a neighbour on another isosurface lent them. With
-   desc.hierarchy a change that reaches all texels drops the fine ones, and decides anew where they are needed: until then the coarse ones
-   are read. After any other they stay where they were, also in cells for which a new bake would not have them: more texels than its, and
-   not its bits. Both count as writers; on failure nothing has changed. */
+   desc.hierarchy a change that reaches all texels drops the fine ones, and decides anew where they are needed (coarse ones that another
+   interval of isovalues brought still count): until then the coarse ones are read. After any other they stay where they were, also in
+   cells for which a new bake would not have them: more texels than its, and not its bits.
+   Both count as writers; on failure nothing has changed. */
 
 /* A new description for the same texture. Texels computed again:
      lighting                        IRRADIANCE: all. TRANSFER: none, no rays
@@ -396,8 +398,8 @@ typedef struct isogi_trace_report {
     double unit;      /* IRRADIANCE: light that an open texel gets, averaged over orientations: what desc.error is a fraction of. Measured
                          at the volume's middle, but at least a quarter of its diagonal from a lamp, and before a rectangle. Where
                          emission_points are the only light: that of a surface which sees the brightest of them alone */
-    int diverges;     /* FEEDBACK: reflections add the same light for ever, or fade by less than a 2200th at each (albedo 1, closed, with
-                         a light inside): no value means anything */
+    int diverges;     /* FEEDBACK: reflections add the same light for ever, or so much that all of it is more than 10000 times the
+                         brightest that sky and lights bring (albedo 1, closed, with a light inside): no value means anything */
 } isogi_trace_report;
 ISOGI_API void isogi_trace_status(const isogi_trace *trace, isogi_trace_report *report);
 
@@ -418,7 +420,7 @@ ISOGI_API isogi_trace *isogi_trace_high(isogi_trace *trace);
    component v % 4 of plane v / 4, and every plane is a whole RGBA texture: FLOAT 16 bytes a texel, HALF 8, BYTE 4 (GL_RGBA8_SNORM).
    Components are in the machine's byte order. Texels hold what lookups read there, drafts too. Those without light of their own (no
    surface, not computed) hold the mean of the up to 26 around them by 1 / distance^2, three texels deep, and beyond that the mean
-   of all: plain hardware interpolation then shows no dark seams.
+   of all: plain hardware interpolation then shows no dark seams (as rounded, and rounded again: twice the errors below).
    Light is what the hardware reads times a scale: scales[3] of RGB, or scales[order^2 channels]; 1 for FLOAT; for HALF and RGB9E5
    another power of two where something is brighter than these hold, or nothing as bright as 0.5; for BYTE the largest value (of
    RGB, or of the coefficient), in whose 255th or 127th parts it counts: errors up to 2e-3 or 4e-3 of the scale. HALF and RGB9E5 keep to
@@ -437,11 +439,12 @@ ISOGI_API isogi_result isogi_trace_export_scales(const isogi_trace *trace, int f
    nothing yet: who asks for more all the time should let a step come to its end before); what is asked for after that was finished would
    have shared its probes, and differs as lazy light does (see Determinism).
    Only desc.isovalue_min, isovalue_max, lazy, lookup, box and the lighting of TRANSFER may differ; else the answer is ISOGI_INVALID
-   (lighting, tables and the ranges of the volume's blocks are compared by hash; a material function cannot be).
+   (lighting, tables and the ranges of the volume's blocks are compared by hash; a material function cannot be. Those whose arrays were
+   changed in place are as they were until isogi_trace_change).
    Any bytes may be loaded: those that are damaged, cut off or of another layout are ISOGI_CORRUPT and change nothing (what is left of a
    block of both sides that is cut off where the first one ends is a block of that side: ISOGI_INVALID).
    A lazy texture reads of the 4x4x4 around a point, where none of the eight is valid, what points were asked for.
-   ISOGI_NO_MEMORY: some of the texels are loaded. isogi_trace_load counts as a writer. Hierarchical textures are not saved: their size is
+   ISOGI_NO_MEMORY: none of the texels is loaded. isogi_trace_load counts as a writer. Hierarchical textures are not saved: their size is
    0, and the calls answer ISOGI_INVALID. */
 ISOGI_API size_t isogi_trace_save_size(const isogi_trace *trace);
 ISOGI_API isogi_result isogi_trace_save(const isogi_trace *trace, void *block, size_t bytes); /* bytes: isogi_trace_save_size or more */
@@ -451,8 +454,9 @@ ISOGI_API isogi_result isogi_trace_load(isogi_trace *trace, const void *block, s
    desc.normals says; towards the low side, whichever side is asked for). Uses samples, bounces, seed, offset, normals, capped, sides
    (not BOTH), reach, no_shadows, material and lighting of the description; its mode must be IRRADIANCE. A point that is not finite or has
    no normal, or on the high side no matter to look through (as texels need it: see Validity), gets the zero vector and error = INFINITY.
-   Points outside the volume are moved to its border; normals of other lengths are made unit. error may be NULL; context NULL: that of
-   the pyramid. */
+   Points outside the volume are moved to its border; normals of other lengths are made unit. Where the surface has an edge in a plane of
+   the voxels (masks, sheets one voxel thick, TRILINEAR normals) a point beside that plane, if by rounding alone, has the light of its
+   cell, a texel in it that of the mean normal. error may be NULL; context NULL: that of the pyramid. */
 ISOGI_API isogi_result isogi_trace_gather(const isogi_trace_desc *desc, const float (*points)[3], const float (*normals)[3], size_t count,
                                           float (*irradiance)[3], float *error, const isogi_context *context);
 
@@ -508,6 +512,7 @@ ISOGI_API size_t isogi_trace_memory(const isogi_trace *trace); /* bytes that the
 #define ISOGI_TRACE__TASK 4          /* points of the caller's own in a task */
 #define ISOGI_TRACE__MAX_DEPTH 10000 /* of a path, so that nothing hangs */
 #define ISOGI_TRACE__MAX_ORDER 6
+#define ISOGI_TRACE__VALUES 108      /* of a texel: three channels of the largest order */
 #define ISOGI_TRACE__NOT_READY HUGE_VALF
 #define ISOGI_TRACE__DEPTH 0.25 /* voxels that must be matter behind the surface of a texel of the high side, at once or up to a voxel on */
 #define ISOGI_TRACE__SAMPLES 32768 /* samples of a batch, */
@@ -527,6 +532,10 @@ ISOGI_API size_t isogi_trace_memory(const isogi_trace *trace); /* bytes that the
 #define ISOGI_TRACE__SLAB 8388608  /* bytes of chunks that are allocated together: some huge pages */
 #define ISOGI_TRACE__PROBE_MOST 8    /* samples of a probe: as many as there are hits that read it, but no more than this */
 #define ISOGI_TRACE__WATCHED 6       /* passes that look for probes whose light has settled */
+#define ISOGI_TRACE__PASSES 100      /* after which all that they would still add is worked out at once, */
+#define ISOGI_TRACE__ROUNDS 1000     /* in so many rounds, begun anew */
+#define ISOGI_TRACE__TRIES 4         /* so many times at most, */
+#define ISOGI_TRACE__RESIDUAL 1e-7   /* until a reflection changes this share of the largest light: MAX_DEPTH more a 1000th */
 #define ISOGI_TRACE__PROBE_ERROR 0.02 /* standard error of light from probes */
 #define ISOGI_TRACE__CELL 2.0       /* of probes that texels read, in voxels, */
 #define ISOGI_TRACE__CELL_LEAST 1.0 /* down to this where lights throw shadows and there are more samples than */
@@ -1163,6 +1172,7 @@ static int isogi_trace__light_beam(const isogi_light *light, const double point[
         length += to[a] * to[a];
     }
     length = sqrt(length);
+    if (light->kind == ISOGI_LIGHT_SPHERE && light->radius > 0 && !(length > 0)) to[1] = length = 1e-9 * (double)light->radius; /* within */
     if (!(length > 0) || !isogi_trace__finite(length)) return 0;
     beam->tmax = 0;
     if (light->kind == ISOGI_LIGHT_SPHERE && light->radius > 0) {
@@ -1269,7 +1279,7 @@ static void isogi_trace__colour(const isogi_albedo_point *p, size_t n, double is
     for (c = 0; c < 3; c++)
         rgb[c] = i == 0 || i == n ? p[i ? n - 1 : 0].rgb[c]
                                   : (float)isogi_trace__lerp((double)p[i - 1].rgb[c], (double)p[i].rgb[c],
-                                                             (isovalue - p[i - 1].value) / (p[i].value - p[i - 1].value));
+                                                             (isovalue / 2 - p[i - 1].value / 2) / (p[i].value / 2 - p[i - 1].value / 2));
 }
 
 ISOGI_API void isogi_trace_albedo(const isogi_trace_desc *desc, double isovalue, float rgb[3]) {
@@ -1509,7 +1519,7 @@ typedef struct isogi_trace__wave {
     isogi_counters *counters;
     float albedo[3], emission[3];       /* at the site's isovalue */
     double light[ISOGI_TRACE__WAVE][3]; /* of each sample: what its path brought */
-    double transfer[3 * ISOGI_TRACE__MAX_ORDER * ISOGI_TRACE__MAX_ORDER]; /* TRANSFER: sum over samples, coefficients x channels */
+    double transfer[ISOGI_TRACE__VALUES]; /* TRANSFER: sum over samples, coefficients x channels */
     int first;                          /* sample of slot 0 */
     int count;                          /* paths alive; the arrays below are of these */
     int slot[ISOGI_TRACE__WAVE];
@@ -2192,8 +2202,8 @@ struct isogi_trace {
     isogi_trace__wave *waves; /* PATHS: of tasks */
     isogi_counters *task_counters;
     isogi_counters counters;
-    float light[3 * ISOGI_TRACE__MAX_ORDER * ISOGI_TRACE__MAX_ORDER]; /* TRANSFER: of the lighting, RGB interleaved */
-    float square[3 * ISOGI_TRACE__MAX_ORDER * ISOGI_TRACE__MAX_ORDER]; /* TRANSFER: of the lighting's square, for the error */
+    float light[ISOGI_TRACE__VALUES]; /* TRANSFER: of the lighting, RGB interleaved */
+    float square[ISOGI_TRACE__VALUES]; /* TRANSFER: of the lighting's square, for the error */
     isogi_trace *high; /* BOTH_SIDES: the other side's texture, owned */
     int wide;      /* AVX2 may be used */
     isogi_trace *coarse; /* hierarchy: the texture of every second texel, owned */
@@ -2684,7 +2694,7 @@ static void isogi_trace__set_light(isogi_trace *t, const float *light) {
 
 static isogi_result isogi_trace__set_up(isogi_trace *t, const isogi_trace_desc *desc) {
     isogi_result result = isogi_trace__scene_set(&t->scene, desc, &t->context);
-    float light[3 * ISOGI_TRACE__MAX_ORDER * ISOGI_TRACE__MAX_ORDER];
+    float light[ISOGI_TRACE__VALUES];
     if (result == ISOGI_OK) result = isogi_trace__set_lattice(t);
     if (result != ISOGI_OK) return result;
     t->values =
@@ -2974,7 +2984,7 @@ ISOGI_API isogi_result isogi_trace_sample(const isogi_trace *trace, const float 
     for (i = 0; i < count; i++) {
         isogi_trace__reading r;
         double sum[3] = {0, 0, 0}, variance = 0, shared = 0, rgb[3];
-        float values[3 * ISOGI_TRACE__MAX_ORDER * ISOGI_TRACE__MAX_ORDER];
+        float values[ISOGI_TRACE__VALUES];
         n = isogi_trace__taps(trace, points[i], &r);
         for (k = 0; k < n; k++) {
             double part;
@@ -3000,8 +3010,8 @@ ISOGI_API isogi_result isogi_trace_sample_transfer(const isogi_trace *trace, con
     if (!trace || trace->scene.desc.mode != ISOGI_TRACE_TRANSFER || (count && (!points || !transfer))) return ISOGI_INVALID;
     for (i = 0; i < count; i++) {
         isogi_trace__reading r;
-        float values[3 * ISOGI_TRACE__MAX_ORDER * ISOGI_TRACE__MAX_ORDER];
-        double sum[3 * ISOGI_TRACE__MAX_ORDER * ISOGI_TRACE__MAX_ORDER] = {0};
+        float values[ISOGI_TRACE__VALUES];
+        double sum[ISOGI_TRACE__VALUES] = {0};
         n = isogi_trace__taps(trace, points[i], &r);
         for (k = 0; k < n; k++) {
             isogi_trace__record_read(trace, r.record[k], values);
@@ -3045,7 +3055,7 @@ static void isogi_trace__gloss(const isogi_trace *t, const float *transfer, cons
 
 ISOGI_API isogi_result isogi_trace_sample_gloss(const isogi_trace *trace, const float (*points)[3], const float (*normals)[3],
                                                 const float (*views)[3], double exponent, size_t count, float (*radiance)[3]) {
-    float transfer[3 * ISOGI_TRACE__MAX_ORDER * ISOGI_TRACE__MAX_ORDER];
+    float transfer[ISOGI_TRACE__VALUES];
     double g[ISOGI_TRACE__MAX_ORDER + 1];
     size_t i;
     isogi_result result = ISOGI_OK;
@@ -3355,7 +3365,7 @@ static void isogi_trace__bake_task(void *arg, size_t task) {
         const isogi_trace__ref *ref = &t->batch[i];
         const size_t *x = ref->texel;
         isogi_trace__site site;
-        float values[3 * ISOGI_TRACE__MAX_ORDER * ISOGI_TRACE__MAX_ORDER], error;
+        float values[ISOGI_TRACE__VALUES], error;
         if (!isogi_trace__texel_site(t, x, &site)) {
             /* only where the voxels were changed after they were classified, which breaks the contract but must not hang */
             ref->brick->state[ref->slot] = ISOGI_TRACE__NO_SURFACE;
@@ -3581,8 +3591,25 @@ typedef struct isogi_trace__catch {
     isogi_trace__quest search; /* it passed those that there were */
 } isogi_trace__catch;
 
+/* The hits of a probe's rays. */
+typedef struct isogi_trace__row {
+    const uint32_t *probe;
+    size_t count;
+} isogi_trace__row;
+
+/* What works out the light of probes where it fades slowly, see there: vectors, of each value of each probe; sums over the probes of a
+   chunk, SUMS for each value. */
+typedef struct isogi_trace__solver {
+    size_t bytes; /* of the block of memory in which all of this lies */
+    int stage, round, tries;
+    isogi_trace__row *rows;
+    double *light, *rest, *shadow, *way, *image, *second, *sums;
+    double product[ISOGI_TRACE__VALUES], along[ISOGI_TRACE__VALUES], across[ISOGI_TRACE__VALUES], turn[ISOGI_TRACE__VALUES];
+} isogi_trace__solver;
+
 struct isogi_trace__feedback {
     isogi_trace__set texels, probes;
+    isogi_trace__solver *solver; /* while it is at work */
     uint8_t *block; /* of memory, in which the buffers lie: */
     size_t block_bytes;
     isogi_trace__plan *plans; /* of the spans, which each task writes itself */
@@ -3600,7 +3627,7 @@ struct isogi_trace__feedback {
     size_t probe_counted;        /* of which those before this one know how many samples they want */
     int level;
     int on_probes; /* the batch is of probes */
-    int diverges;   /* the last passes did not settle */
+    int diverges;   /* no light would be all of it */
     int unpublished; /* nodes have changed since the light was worked out last */
     int phase;       /* of carrying the light over, */
     size_t carried;  /* tasks of it that are done, */
@@ -3618,7 +3645,7 @@ struct isogi_trace__feedback {
     double most; /* texels that were ever done, with the parts of those that were begun: for progress */
     double probe_part; /* of the probes at this level that are known, those whose rays are traced */
     uint64_t probes_before; /* of groups of texels that are finished, */
-    int diverged;           /* one of which did not settle */
+    int diverged;           /* one of which diverges */
 };
 
 /* When a block of samples is complete the light at probes is worked out, then that of the texels. That takes no rays, but as long as many:
@@ -3627,6 +3654,7 @@ enum {
     ISOGI_TRACE__AT_REST = 0,
     ISOGI_TRACE__DIRECT,
     ISOGI_TRACE__PASS,
+    ISOGI_TRACE__SOLVE, /* if passes bring it on too slowly */
     ISOGI_TRACE__CLEAR,
     ISOGI_TRACE__BOUNCE,
     ISOGI_TRACE__GUIDE,
@@ -3805,9 +3833,16 @@ static size_t isogi_trace__buffers_set(const isogi_trace *t, isogi_trace__feedba
     return used;
 }
 
+static void isogi_trace__solver_free(const isogi_trace *t) {
+    isogi_trace__feedback *f = t->feedback;
+    if (f->solver) isogi_release(&t->context, f->solver, 1, f->solver->bytes);
+    f->solver = NULL;
+}
+
 static void isogi_trace__feedback_free(const isogi_trace *t) {
     isogi_trace__feedback *f = t->feedback;
     if (!f) return;
+    isogi_trace__solver_free(t);
     isogi_trace__set_free(t, &f->texels);
     isogi_trace__set_free(t, &f->probes);
     isogi_release(&t->context, f->block, 1, f->block_bytes);
@@ -4632,7 +4667,7 @@ static double isogi_trace__node_direct(const isogi_trace *t, const isogi_trace__
 static void isogi_trace__texel_guess(isogi_trace *t, size_t node) {
     isogi_trace__feedback *f = t->feedback;
     isogi_trace__node *n = isogi_trace__node_at(&f->texels, node);
-    float to[3 * ISOGI_TRACE__MAX_ORDER * ISOGI_TRACE__MAX_ORDER], error = (float)(1 / sqrt((double)n->samples));
+    float to[ISOGI_TRACE__VALUES], error = (float)(1 / sqrt((double)n->samples));
     double hidden = (double)n->hits / n->samples, most = 0;
     int i, channels = t->scene.desc.mode == ISOGI_TRACE_TRANSFER ? t->scene.desc.transfer_channels : 3;
     for (i = 0; i < t->values; i++) {
@@ -4788,7 +4823,7 @@ static void isogi_trace__pass_segment(isogi_trace__set *set, isogi_trace__segmen
         const float *bounce, *before;
         float *after;
         uint8_t settled = (uint8_t)watch;
-        double sum[3 * ISOGI_TRACE__MAX_ORDER * ISOGI_TRACE__MAX_ORDER];
+        double sum[ISOGI_TRACE__VALUES];
         i = s->order[j], node = s->node[i], r = isogi_trace__reflector_at(set, node);
         before = isogi_trace__values_at(set, node, from, values), after = isogi_trace__values_at(set, node, to, values);
         if (j + late < s->open)
@@ -4843,9 +4878,9 @@ static void isogi_trace__pass_task(void *arg, size_t segment) {
 
 /* A pass over all probes has ended: whether it was the last. There is one less than reflections (what comes from sky and lights is
    there before them), or there are passes until all that later ones would add, by the ratio of the last two changes, is below 1/1000.
-   Where albedo 1 meets a closed cavity the light grows by the same step for ever: said so when 500 passes have not made the step smaller
-   by a fifth. Steps that fall faster, as in rooms with a narrow way out, are a series of which MAX_DEPTH passes leave out about 1 % at
-   most. */
+   The solver comes before that where light fades slowly. Only without memory for it, and where there are ever so many reflections:
+   light grows by the same step for ever when 500 passes have not made the step smaller by a fifth. Steps that fall faster, as in rooms
+   with a narrow way out, are a series of which MAX_DEPTH passes leave out about 1 % at most. */
 static int isogi_trace__pass_end(isogi_trace *t) {
     isogi_trace__feedback *f = t->feedback;
     isogi_trace__set *set = &f->probes;
@@ -4865,6 +4900,198 @@ static int isogi_trace__pass_end(isogi_trace *t) {
         if (f->diverges || f->pass > ISOGI_TRACE__MAX_DEPTH) return 1;
     }
     return ++f->pass == (size_t)t->scene.desc.bounces; /* never for all */
+}
+
+/* ---- where light fades slowly ----
+
+   The light x of all probes solves  x = b + R x:  b comes from sky and lights, R reflects it once. Passes bring it nearer by the share that
+   is not reflected: at albedo .99 a hundred of them change little, at albedo 1 thousands, where light has to find its way out of narrow
+   channels. What is left after PASSES of them is worked out by BiCGStab (van der Vorst 1992), each value by itself: a round of two
+   reflections and two steps, one along `way`, one along what is then the rest. In double: with float vectors it does not get there.
+   Where albedo 1 meets a closed cavity with a light inside no x solves that: light grows beyond what MAX_DEPTH reflections could bring, or
+   the rest stays; then that of the last pass is kept. */
+enum {
+    ISOGI_TRACE__SOLVE_REST = 0, /* rest = shadow = b - (x - R x) */
+    ISOGI_TRACE__SOLVE_WAY,      /* way = rest + turn (way - across image) */
+    ISOGI_TRACE__SOLVE_IMAGE,    /* image = way - R way */
+    ISOGI_TRACE__SOLVE_HALF,     /* rest = rest - along image */
+    ISOGI_TRACE__SOLVE_SECOND,   /* second = rest - R rest */
+    ISOGI_TRACE__SOLVE_STEP,     /* x = x + along way + across rest, rest = rest - across second */
+    ISOGI_TRACE__SUMS = 4        /* two products of vectors (REST: the largest b in place of the second), the largest rest and x */
+};
+
+/* Its tasks: a chunk of probes each, so that sums are the same whatever the batches were. */
+static size_t isogi_trace__solve_tasks(const isogi_trace__feedback *f) {
+    return (f->probes.count + ISOGI_TRACE__CHUNK - 1) / ISOGI_TRACE__CHUNK;
+}
+
+/* Where its arrays lie, behind it in one block of memory; bytes. */
+static size_t isogi_trace__solver_set(const isogi_trace *t, isogi_trace__solver *s, uint8_t *block) {
+    const size_t n = t->feedback->probes.count, each = (size_t)t->values * sizeof(double);
+    size_t used = 0;
+    isogi_trace__part(block, &used, 1, sizeof *s);
+    s->rows = (isogi_trace__row *)isogi_trace__part(block, &used, n, sizeof *s->rows);
+    s->light = (double *)isogi_trace__part(block, &used, n, each), s->rest = (double *)isogi_trace__part(block, &used, n, each);
+    s->shadow = (double *)isogi_trace__part(block, &used, n, each), s->way = (double *)isogi_trace__part(block, &used, n, each);
+    s->image = (double *)isogi_trace__part(block, &used, n, each), s->second = (double *)isogi_trace__part(block, &used, n, each);
+    s->sums = (double *)isogi_trace__part(block, &used, isogi_trace__solve_tasks(t->feedback) * ISOGI_TRACE__SUMS, each);
+    return used;
+}
+
+/* Light of the probes, which the solver begins with, and ends with. */
+static void isogi_trace__solver_light(const isogi_trace *t, int ends) {
+    const isogi_trace__set *set = &t->feedback->probes;
+    const size_t v = (size_t)t->values;
+    size_t i, a;
+    for (i = 0; i < set->count; i++) {
+        float *out = isogi_trace__light_at(set, i, v);
+        double *light = t->feedback->solver->light + i * v;
+        for (a = 0; a < v; a++)
+            if (ends) out[a] = (float)light[a];
+            else light[a] = (double)out[a];
+    }
+}
+
+/* Without memory for it passes go on. */
+static int isogi_trace__solver_new(isogi_trace *t) {
+    const isogi_trace__set *set = &t->feedback->probes;
+    isogi_trace__solver none, *s;
+    const size_t bytes = isogi_trace__solver_set(t, &none, NULL);
+    uint8_t *block = (uint8_t *)isogi_allocate(&t->context, 1, bytes);
+    size_t k, i;
+    if (!block) return 0;
+    memset(block, 0, bytes);
+    s = t->feedback->solver = (isogi_trace__solver *)(void *)block;
+    isogi_trace__solver_set(t, s, block), s->bytes = bytes;
+    for (k = 0; k < set->segment_count; k++) {
+        const isogi_trace__segment *g = &set->segments[k];
+        for (i = 0; i < g->entries; i++)
+            s->rows[g->node[i]].probe = g->probe + g->begin[i], s->rows[g->node[i]].count = g->begin[i + 1] - g->begin[i];
+    }
+    isogi_trace__solver_light(t, 0);
+    return 1;
+}
+
+/* image = vector - R vector, of a probe. */
+static void isogi_trace__solve_image(const isogi_trace *t, size_t probe, const double *vector, double *image) {
+    const isogi_trace__set *set = &t->feedback->probes;
+    const isogi_trace__row *row = &t->feedback->solver->rows[probe];
+    const isogi_trace__reflector *own = isogi_trace__reflector_at(set, probe);
+    const size_t v = (size_t)t->values;
+    size_t a, k;
+    if (v == 3 && !t->scene.desc.material) { /* what is asked for most */
+        double sum[3] = {0, 0, 0};
+        for (k = 0; k < row->count; k++)
+            for (a = 0; a < 3; a++) sum[a] += vector[row->probe[k] * 3 + a];
+        for (a = 0; a < 3; a++) image[a] = vector[probe * 3 + a] - (double)own->one * (double)own->albedo[a] * sum[a];
+        return;
+    }
+    for (a = 0; a < v; a++) {
+        const int c = isogi_trace__channel(t, (int)a);
+        double sum = 0;
+        for (k = 0; k < row->count; k++) {
+            const isogi_trace__reflector *met = t->scene.desc.material ? isogi_trace__reflector_at(set, row->probe[k]) : own;
+            sum += (double)met->albedo[c] * vector[row->probe[k] * v + a];
+        }
+        image[a] = vector[probe * v + a] - (double)own->one * sum;
+    }
+}
+
+/* One stage of one value, element begin, begin + step, ...: its sums. b: of the first. */
+static void isogi_trace__solve_value(const isogi_trace__solver *s, size_t begin, size_t end, size_t step, size_t a, const float *b,
+                                     double *sum) {
+    const double along = s->along[a], across = s->across[a], turn = s->turn[a];
+    double *light = s->light, *rest = s->rest, *shadow = s->shadow, *way = s->way, *image = s->image, *second = s->second;
+    size_t k;
+    switch (s->stage) {
+    case ISOGI_TRACE__SOLVE_WAY:
+        for (k = begin; k < end; k += step) way[k] = rest[k] + turn * (way[k] - across * image[k]);
+        return;
+    case ISOGI_TRACE__SOLVE_IMAGE:
+        for (k = begin; k < end; k += step) sum[0] += shadow[k] * image[k];
+        return;
+    case ISOGI_TRACE__SOLVE_HALF:
+        for (k = begin; k < end; k += step) rest[k] -= along * image[k];
+        return;
+    case ISOGI_TRACE__SOLVE_SECOND:
+        for (k = begin; k < end; k += step) sum[0] += second[k] * rest[k], sum[1] += second[k] * second[k];
+        return;
+    case ISOGI_TRACE__SOLVE_REST:
+        for (k = begin; k < end; k += step, b += step) {
+            rest[k] = shadow[k] = (double)*b - image[k];
+            if (sum[1] < fabs((double)*b)) sum[1] = fabs((double)*b);
+        }
+        break;
+    default:
+        for (k = begin; k < end; k += step) light[k] += along * way[k] + across * rest[k], rest[k] -= across * second[k];
+    }
+    for (k = begin; k < end; k += step) {
+        sum[0] += shadow[k] * rest[k];
+        if (sum[2] < fabs(rest[k])) sum[2] = fabs(rest[k]);
+        if (sum[3] < fabs(light[k])) sum[3] = fabs(light[k]);
+    }
+}
+
+/* One stage, for the probes of a chunk. */
+static void isogi_trace__solve_task(void *arg, size_t task) {
+    const isogi_trace *t = (const isogi_trace *)arg;
+    const isogi_trace__set *set = &t->feedback->probes;
+    const size_t number = t->feedback->carried + task, first = number * ISOGI_TRACE__CHUNK, v = (size_t)t->values, late = 8;
+    const size_t end = first + ISOGI_TRACE__CHUNK < set->count ? first + ISOGI_TRACE__CHUNK : set->count;
+    isogi_trace__solver *s = t->feedback->solver;
+    const int second = s->stage == ISOGI_TRACE__SOLVE_SECOND;
+    const double *vector = second ? s->rest : s->stage == ISOGI_TRACE__SOLVE_IMAGE ? s->way : s->light;
+    double *sums = s->sums + number * v * ISOGI_TRACE__SUMS;
+    size_t i, k;
+    if (second || s->stage == ISOGI_TRACE__SOLVE_IMAGE || s->stage == ISOGI_TRACE__SOLVE_REST)
+        for (i = first; i < end; i++) {
+            if (i + late < end)
+                for (k = 0; k < s->rows[i + late].count; k++) ISOGI_TRACE__AHEAD(vector + s->rows[i + late].probe[k] * v);
+            isogi_trace__solve_image(t, i, vector, (second ? s->second : s->image) + i * v);
+        }
+    memset(sums, 0, v * ISOGI_TRACE__SUMS * sizeof *sums);
+    for (k = 0; k < v; k++)
+        isogi_trace__solve_value(s, first * v + k, end * v, v, k, isogi_trace__values_at(set, first, ISOGI_TRACE__BOUNCE_VALUES, v) + k,
+                                 sums + k * ISOGI_TRACE__SUMS);
+}
+
+/* x / y where that means something, else 0. */
+static double isogi_trace__quotient(double x, double y) {
+    const double q = x / y;
+    return isogi_trace__finite(q) ? q : 0;
+}
+
+/* A stage has ended for all probes: whether it was the last. */
+static int isogi_trace__solve_end(isogi_trace *t) {
+    isogi_trace__feedback *f = t->feedback;
+    isogi_trace__solver *s = f->solver;
+    const size_t v = (size_t)t->values;
+    int open = 0, endless = 0;
+    size_t a, i;
+    for (a = 0; a < v; a++) {
+        double sum[ISOGI_TRACE__SUMS] = {0};
+        for (i = 0; i < isogi_trace__solve_tasks(f); i++) {
+            const double *part = s->sums + (i * v + a) * ISOGI_TRACE__SUMS;
+            sum[0] += part[0], sum[1] = s->stage ? sum[1] + part[1] : sum[1] < part[1] ? part[1] : sum[1];
+            sum[2] = sum[2] < part[2] ? part[2] : sum[2], sum[3] = sum[3] < part[3] ? part[3] : sum[3];
+        }
+        if (s->stage == ISOGI_TRACE__SOLVE_IMAGE) s->along[a] = isogi_trace__quotient(s->product[a], sum[0]);
+        if (s->stage == ISOGI_TRACE__SOLVE_SECOND) s->across[a] = isogi_trace__quotient(sum[0], sum[1]);
+        if (s->stage != ISOGI_TRACE__SOLVE_REST && s->stage != ISOGI_TRACE__SOLVE_STEP) continue;
+        s->turn[a] = s->stage ? isogi_trace__quotient(sum[0] * s->along[a], s->product[a] * s->across[a]) : 0;
+        s->product[a] = sum[0];
+        open |= !(sum[2] <= ISOGI_TRACE__RESIDUAL * sum[3]);
+        endless |= !s->stage && !(sum[3] <= ISOGI_TRACE__MAX_DEPTH * sum[1]);
+    }
+    if (s->stage == ISOGI_TRACE__SOLVE_REST) {
+        f->diverges = endless || (open && s->tries++ == ISOGI_TRACE__TRIES);
+        if (!open && !endless) isogi_trace__solver_light(t, 1);
+        if (!open || f->diverges) return 1;
+    }
+    f->pass += s->stage == ISOGI_TRACE__SOLVE_STEP;
+    if (s->stage < ISOGI_TRACE__SOLVE_STEP) s->stage++;
+    else s->stage = open && ++s->round % ISOGI_TRACE__ROUNDS ? ISOGI_TRACE__SOLVE_WAY : ISOGI_TRACE__SOLVE_REST;
+    return 0;
 }
 
 /* ---- what a texel ends up with ---- */
@@ -5489,6 +5716,7 @@ static void isogi_trace__forget_task(isogi_trace *t, size_t task) {
 static void isogi_trace__group_free(isogi_trace *t) {
     isogi_trace__feedback *f = t->feedback;
     f->probes_before += f->probes.count, f->diverged |= f->diverges;
+    isogi_trace__solver_free(t);
     isogi_trace__set_free(t, &f->texels);
     isogi_trace__set_free(t, &f->probes);
     f->cursor = f->probe_cursor = f->probe_end = f->probe_counted = f->placed = f->settled = f->carried = f->span_count = 0;
@@ -5507,6 +5735,7 @@ static int isogi_trace__publishing(const isogi_trace__feedback *f) {
 static size_t isogi_trace__phase_tasks(const isogi_trace__feedback *f) {
     size_t nodes = f->texels.count;
     if (f->phase == ISOGI_TRACE__PASS) return f->probes.segment_count;
+    if (f->phase == ISOGI_TRACE__SOLVE) return isogi_trace__solve_tasks(f);
     if (f->phase == ISOGI_TRACE__DIRECT) nodes = f->probes.count;
     if (f->phase == ISOGI_TRACE__CLEAR && !f->bounced) nodes = 0;
     if (f->phase == ISOGI_TRACE__BOUNCE) nodes = f->segment < f->texels.segment_count ? f->texels.segments[f->segment].entries : 0;
@@ -5517,6 +5746,7 @@ static size_t isogi_trace__phase_tasks(const isogi_trace__feedback *f) {
    given back. */
 static uint64_t isogi_trace__phase_cost(const isogi_trace__feedback *f, size_t task) {
     const isogi_trace__segment *s = f->phase == ISOGI_TRACE__PASS ? f->probes.segments : f->texels.segments; /* NULL without hits */
+    if (f->phase == ISOGI_TRACE__SOLVE) return ISOGI_TRACE__CHUNK / 4;
     if (f->phase == ISOGI_TRACE__PASS) return s[task].entries / 8 + s[task].hits / 64 + 1;
     if (f->phase == ISOGI_TRACE__BOUNCE)
         return ISOGI_TRACE__SWEEP / 8 + s[f->segment].hits * ISOGI_TRACE__SWEEP / s[f->segment].entries / 64;
@@ -5527,6 +5757,7 @@ static void isogi_trace__phase_task(void *arg, size_t task) {
     switch (((const isogi_trace *)arg)->feedback->phase) {
     case ISOGI_TRACE__DIRECT: isogi_trace__direct_task(arg, task); break;
     case ISOGI_TRACE__PASS: isogi_trace__pass_task(arg, task); break;
+    case ISOGI_TRACE__SOLVE: isogi_trace__solve_task(arg, task); break;
     case ISOGI_TRACE__CLEAR: isogi_trace__clear_task(arg, task); break;
     case ISOGI_TRACE__BOUNCE: isogi_trace__bounce_task(arg, task); break;
     case ISOGI_TRACE__GUIDE: isogi_trace__guide_task(arg, task); break;
@@ -5551,6 +5782,10 @@ static void isogi_trace__phase_end(isogi_trace *t) {
         break;
     case ISOGI_TRACE__PASS:
         if (isogi_trace__pass_end(t)) f->phase = ISOGI_TRACE__CLEAR;
+        else if (f->pass == ISOGI_TRACE__PASSES && t->scene.desc.bounces < 0 && isogi_trace__solver_new(t)) f->phase = ISOGI_TRACE__SOLVE;
+        break;
+    case ISOGI_TRACE__SOLVE:
+        if (isogi_trace__solve_end(t)) f->phase = ISOGI_TRACE__CLEAR, isogi_trace__solver_free(t);
         break;
     case ISOGI_TRACE__CLEAR: f->phase = ISOGI_TRACE__BOUNCE, f->segment = 0, f->bounced = 1; break;
     case ISOGI_TRACE__BOUNCE:
@@ -5598,7 +5833,8 @@ static double isogi_trace__carried(const isogi_trace__feedback *f) {
     switch (f->phase) {
     case ISOGI_TRACE__AT_REST: return 0.4 * f->probe_part;
     case ISOGI_TRACE__DIRECT: return 0.4 + 0.05 * done;
-    case ISOGI_TRACE__PASS: return 0.65 - 0.2 / (1 + 0.2 * ((double)f->pass + done));
+    case ISOGI_TRACE__PASS:
+    case ISOGI_TRACE__SOLVE: return 0.65 - 0.2 / (1 + 0.2 * ((double)f->pass + done));
     case ISOGI_TRACE__CLEAR: return 0.65 + 0.02 * done;
     case ISOGI_TRACE__BOUNCE: return 0.67 + 0.08 * ((double)f->segment + done) / ((double)f->texels.segment_count + 1);
     case ISOGI_TRACE__GUIDE: return 0.75 + 0.05 * done;
@@ -5833,7 +6069,7 @@ static isogi_result isogi_trace__step_side(isogi_trace *trace, uint64_t max_rays
 
 /* Light at the eight corners of a coarse cell, and the largest of its errors. 0: one of them has none. */
 static int isogi_trace__cell_light(const isogi_trace *c, const size_t cell[3],
-                                   float (*light)[3 * ISOGI_TRACE__MAX_ORDER * ISOGI_TRACE__MAX_ORDER], double *error) {
+                                   float (*light)[ISOGI_TRACE__VALUES], double *error) {
     int i, a;
     for (i = 0; i < 8; i++) {
         const isogi_trace__brick *brick;
@@ -5856,7 +6092,7 @@ static int isogi_trace__cell_light(const isogi_trace *c, const size_t cell[3],
 /* Whether the light at the corners of a coarse cell differs too much to leave out what lies between them: by the norm of the difference
    of two corners' colours, or of all their coefficients. The error is of luminance, or that of a single coefficient (1 / sqrt(4 pi)). */
 static int isogi_trace__cell_varies(const isogi_trace *c, const size_t cell[3], double tolerance) {
-    float light[8][3 * ISOGI_TRACE__MAX_ORDER * ISOGI_TRACE__MAX_ORDER];
+    float light[8][ISOGI_TRACE__VALUES];
     double mean[3] = {0, 0, 0}, apart = 0, size = 0, error = 0, luminance;
     int i, k, a;
     if (!isogi_trace__cell_light(c, cell, light, &error)) return 1;
@@ -5988,7 +6224,7 @@ static double isogi_trace__open_error(const isogi_trace *t, const float *values,
 }
 
 static void isogi_trace__status_add(const isogi_trace *t, isogi_trace_report *r) {
-    float values[3 * ISOGI_TRACE__MAX_ORDER * ISOGI_TRACE__MAX_ORDER];
+    float values[ISOGI_TRACE__VALUES];
     size_t i;
     uint32_t slot;
     for (i = 0; i < t->brick_count; i++)
@@ -6033,14 +6269,14 @@ typedef struct isogi_trace__export {
     size_t texels;           /* in the lattice */
     size_t component, texel; /* bytes */
     uint8_t *out, *filled;   /* filled: 0 = not yet, 1 = computed, n = by pass n - 1 */
-    float scale[3 * ISOGI_TRACE__MAX_ORDER * ISOGI_TRACE__MAX_ORDER];
-    double mean[3 * ISOGI_TRACE__MAX_ORDER * ISOGI_TRACE__MAX_ORDER];
+    float scale[ISOGI_TRACE__VALUES];
+    double mean[ISOGI_TRACE__VALUES];
 } isogi_trace__export;
 
 /* Calls for every texel that can be read, drafts too, in a fixed order. */
 static void isogi_trace__each_texel(isogi_trace__export *e, void (*visit)(isogi_trace__export *e, size_t texel, const float *values)) {
     const isogi_trace *t = e->trace;
-    float values[3 * ISOGI_TRACE__MAX_ORDER * ISOGI_TRACE__MAX_ORDER];
+    float values[ISOGI_TRACE__VALUES];
     size_t i, at[3];
     uint32_t slot;
     for (i = 0; i < t->brick_count; i++) {
@@ -6092,7 +6328,7 @@ static uint8_t *isogi_trace__export_at(const isogi_trace__export *e, size_t texe
 }
 
 static void isogi_trace__export_write(isogi_trace__export *e, size_t texel, const float *values) {
-    float x[3 * ISOGI_TRACE__MAX_ORDER * ISOGI_TRACE__MAX_ORDER];
+    float x[ISOGI_TRACE__VALUES];
     int v;
     for (v = 0; v < e->values; v++) x[v] = (float)((double)values[v] / (double)e->scale[v]);
     if (e->format == ISOGI_TRACE_RGB9E5) {
@@ -6134,7 +6370,7 @@ static void isogi_trace__export_computed(isogi_trace__export *e, size_t texel, c
 /* Mean of the neighbours that were filled before this pass, by 1 / distance^2. 0: there are none. */
 static int isogi_trace__export_around(const isogi_trace__export *e, const size_t at[3], int pass, float *values) {
     const size_t *size = e->trace->lattice;
-    double sum[3 * ISOGI_TRACE__MAX_ORDER * ISOGI_TRACE__MAX_ORDER], total = 0;
+    double sum[ISOGI_TRACE__VALUES], total = 0;
     int i, v;
     for (i = 0; i < 27; i++) {
         int d[3], outside = 0, a;
@@ -6157,7 +6393,7 @@ static int isogi_trace__export_around(const isogi_trace__export *e, const size_t
 /* Three passes outwards, then the mean of all. */
 static void isogi_trace__export_fill(isogi_trace__export *e) {
     const size_t *size = e->trace->lattice;
-    float values[3 * ISOGI_TRACE__MAX_ORDER * ISOGI_TRACE__MAX_ORDER];
+    float values[ISOGI_TRACE__VALUES];
     size_t at[3], texel, computed = 0;
     int pass, v;
     for (texel = 0; texel < e->texels; texel++) computed += e->filled[texel];
@@ -6295,10 +6531,9 @@ static uint64_t isogi_trace__hash_trace(const isogi_trace *t) {
     hash = isogi_trace__hash_floats(isogi_trace__hash_floats(isogi_trace__hash_floats(hash, d->albedo, 3), &d->offset, 1), &d->reach, 1);
     if (d->method == ISOGI_TRACE_FEEDBACK) hash = isogi_trace__hash_floats(hash, &d->error, 1);
     if (d->method == ISOGI_TRACE_FEEDBACK && d->unfiltered) hash = isogi_trace__hash_number(hash, 1);
-    hash = isogi_trace__hash_table(isogi_trace__hash_table(hash, d->albedo_points, d->albedo_count), d->emission_points, d->emission_count);
+    hash = isogi_trace__hash_number(isogi_trace__hash_number(hash, t->colours_hash), t->lighting_hash);
     hash =
         isogi_trace__hash_doubles(isogi_trace__hash_doubles(isogi_trace__hash_doubles(hash, t->first, 3), t->last, 3), &t->scene.unit, 1);
-    if (d->mode == ISOGI_TRACE_IRRADIANCE) hash = isogi_trace__hash_lighting(hash, &d->lighting);
     return isogi_trace__hash_volume(hash, t->scene.pyramid);
 }
 
@@ -6389,7 +6624,7 @@ static isogi_result isogi_trace__block_check(const isogi_trace *t, const uint8_t
         if (bytes - at < 16 + 8) return ISOGI_CORRUPT;
         texels = isogi_trace__bits(isogi_trace__get(block + at + 8, 8));
         at += 16;
-        if (record > 4 * 3 * ISOGI_TRACE__MAX_ORDER * ISOGI_TRACE__MAX_ORDER + 4 || bytes - at < texels * record + 8) return ISOGI_CORRUPT;
+        if (record > 4 * ISOGI_TRACE__VALUES + 4 || bytes - at < texels * record + 8) return ISOGI_CORRUPT;
         at += (size_t)(texels * record);
     }
     if (isogi_trace__get(block + at, 8) != isogi_trace__hash(0xcbf29ce484222325u, block, at)) return ISOGI_CORRUPT;
@@ -6424,23 +6659,32 @@ static void isogi_trace__node_loaded(isogi_trace *t, const isogi_trace__brick *b
     stage->finished = 2;
 }
 
-/* A block that was checked. */
-static isogi_result isogi_trace__block_load(isogi_trace *t, const uint8_t *block) {
+/* Room for the texels of a block that was checked: all that loading it takes. */
+static isogi_result isogi_trace__block_hold(isogi_trace *t, const uint8_t *block) {
+    uint64_t bricks = isogi_trace__get(block + 48, 8), k;
+    const uint8_t *at = block + ISOGI_TRACE__HEADER;
+    for (k = 0; k < bricks; k++) {
+        const uint64_t mask = isogi_trace__get(at + 8, 8);
+        isogi_trace__brick **brick = &t->bricks[(size_t)isogi_trace__get(at, 8)];
+        at += 16 + isogi_trace__bits(mask) * t->record;
+        if (!*brick) {
+            *brick = isogi_trace__brick_new(t);
+            if (!*brick) return ISOGI_NO_MEMORY;
+            if (!t->scene.desc.lazy) memset((*brick)->state, ISOGI_TRACE__NOT_ASKED, sizeof (*brick)->state);
+        }
+        if (isogi_trace__brick_hold(t, *brick, mask) != ISOGI_OK) return ISOGI_NO_MEMORY;
+    }
+    return ISOGI_OK;
+}
+
+static void isogi_trace__block_load(isogi_trace *t, const uint8_t *block) {
     uint64_t bricks = isogi_trace__get(block + 48, 8), k;
     const uint8_t *at = block + ISOGI_TRACE__HEADER;
     uint32_t slot;
     for (k = 0; k < bricks; k++) {
-        size_t index = (size_t)isogi_trace__get(at, 8);
+        isogi_trace__brick *brick = t->bricks[(size_t)isogi_trace__get(at, 8)];
         uint64_t mask = isogi_trace__get(at + 8, 8);
-        isogi_trace__brick *brick = t->bricks[index];
         at += 16;
-        if (!brick) {
-            brick = isogi_trace__brick_new(t);
-            if (!brick) return ISOGI_NO_MEMORY;
-            if (!t->scene.desc.lazy) memset(brick->state, ISOGI_TRACE__NOT_ASKED, sizeof brick->state);
-            t->bricks[index] = brick;
-        }
-        if (isogi_trace__brick_hold(t, brick, mask) != ISOGI_OK) return ISOGI_NO_MEMORY;
         for (slot = 0; slot < ISOGI_TRACE__TEXELS; slot++) {
             if (!(mask >> slot & 1)) continue;
             memcpy(isogi_trace__record(t, brick, slot), at, t->record);
@@ -6452,7 +6696,6 @@ static isogi_result isogi_trace__block_load(isogi_trace *t, const uint8_t *block
         }
     }
     if (t->feedback && !t->scene.desc.lazy && !t->wanted) isogi_trace__feedback_rest(t);
-    return ISOGI_OK;
 }
 
 ISOGI_API isogi_result isogi_trace_load(isogi_trace *trace, const void *block, size_t bytes) {
@@ -6467,9 +6710,12 @@ ISOGI_API isogi_result isogi_trace_load(isogi_trace *trace, const void *block, s
     } else if (result == ISOGI_OK && used != bytes) /* so is one of both sides */
         return isogi_trace__block_check(trace, from + used, bytes - used, &used_high) == ISOGI_CORRUPT ? ISOGI_CORRUPT : ISOGI_INVALID;
     if (result == ISOGI_OK && used + used_high != bytes) result = ISOGI_CORRUPT;
-    if (result == ISOGI_OK) result = isogi_trace__block_load(trace, from);
-    if (result == ISOGI_OK && trace->high) result = isogi_trace__block_load(trace->high, from + used);
-    return result;
+    if (result == ISOGI_OK) result = isogi_trace__block_hold(trace, from);
+    if (result == ISOGI_OK && trace->high) result = isogi_trace__block_hold(trace->high, from + used);
+    if (result != ISOGI_OK) return result;
+    isogi_trace__block_load(trace, from);
+    if (trace->high) isogi_trace__block_load(trace->high, from + used);
+    return ISOGI_OK;
 }
 
 /* ==== changes ======================================================================================================== */
@@ -6479,7 +6725,7 @@ typedef struct isogi_trace__change {
     isogi_trace *trace;
     const isogi_trace_desc *desc; /* NULL: voxels change */
     isogi_trace__scene scene;     /* afterwards: as it was */
-    float light[3 * ISOGI_TRACE__MAX_ORDER * ISOGI_TRACE__MAX_ORDER];
+    float light[ISOGI_TRACE__VALUES];
     uint64_t lighting_hash;
     int all, colours, choice; /* to be computed again: all; where colours differ. Texels are chosen anew */
     double low[3], high[3];   /* voxels: grid coordinates of what texels and hits there read */
@@ -6683,6 +6929,10 @@ static uint8_t isogi_trace__changed_state(const isogi_trace__change *c, const si
     if (c->desc) again = c->choice && (chosen || (state == ISOGI_TRACE__WANTED && !lazy));
     else again = isogi_trace__in_change(c, grid, none) || (chosen && isogi_trace__in_change(c, grid, margin));
     again |= !lazy && state == ISOGI_TRACE__UNKNOWN; /* its brick has just come */
+    if (!again && !c->desc && !lazy && state >= ISOGI_TRACE__WANTED && isogi_trace__in_change(c, grid, margin)) {
+        now = isogi_trace__classify(t, texel, 0); /* no surface of the interval reads it any more */
+        if (now != ISOGI_TRACE__WANTED) return (uint8_t)now;
+    }
     if (!again) return (uint8_t)(state == ISOGI_TRACE__DONE && isogi_trace__depends(c, grid) ? ISOGI_TRACE__DRAFT : state);
     if (lazy && state < ISOGI_TRACE__WANTED) return ISOGI_TRACE__UNKNOWN;
     now = isogi_trace__classify(t, texel, 0);
@@ -6693,7 +6943,7 @@ static uint8_t isogi_trace__changed_state(const isogi_trace__change *c, const si
 static void isogi_trace__change_unit(const isogi_trace__change *c, const isogi_trace__brick *brick, uint32_t slot) {
     isogi_trace *t = c->trace;
     uint8_t *record = isogi_trace__record(t, brick, slot);
-    float values[3 * ISOGI_TRACE__MAX_ORDER * ISOGI_TRACE__MAX_ORDER];
+    float values[ISOGI_TRACE__VALUES];
     double unit = t->scene.unit;
     t->scene.unit = c->scene.unit;
     isogi_trace__record_read(t, record, values);
@@ -6802,7 +7052,7 @@ ISOGI_API isogi_result isogi_trace_touch(isogi_trace *trace, const size_t first[
 }
 
 ISOGI_API isogi_result isogi_trace_relight(isogi_trace *trace, const isogi_lighting *lighting) {
-    float light[3 * ISOGI_TRACE__MAX_ORDER * ISOGI_TRACE__MAX_ORDER];
+    float light[ISOGI_TRACE__VALUES];
     isogi_trace_desc desc;
     isogi_trace *side;
     isogi_result result;
@@ -7031,8 +7281,7 @@ static void isogi_trace__field_run(isogi_trace__walk *w, uint64_t key, int first
     w->count = count;
     for (i = 0; i < count; i++) {
         w->slot[i] = i, w->key[i] = isogi_trace__key(key, (uint64_t)(first + i));
-        memcpy(w->point[i], w->point[0], sizeof w->point[0]), memcpy(w->place[i], w->place[0], sizeof w->place[0]);
-        memcpy(w->normal[i], w->normal[0], sizeof w->normal[0]);
+        for (c = 0; c < 3; c++) w->point[i][c] = w->point[0][c], w->place[i][c] = w->place[0][c], w->normal[i][c] = w->normal[0][c];
         for (c = 0; c < 3; c++) w->through[i][c] = 1, w->light[i][c] = 0;
     }
     for (depth = 0; w->count; depth++, w->count = alive) {
@@ -7142,6 +7391,7 @@ ISOGI_API isogi_result isogi_trace_gather_field(const isogi_trace_desc *desc, is
 #undef ISOGI_TRACE__BATCH
 #undef ISOGI_TRACE__MAX_DEPTH
 #undef ISOGI_TRACE__MAX_ORDER
+#undef ISOGI_TRACE__VALUES
 #undef ISOGI_TRACE__NOT_READY
 #undef ISOGI_TRACE__BRIGHTEST
 #undef ISOGI_TRACE__DEPTH
@@ -7217,6 +7467,10 @@ ISOGI_API isogi_result isogi_trace_gather_field(const isogi_trace_desc *desc, is
 #undef ISOGI_TRACE__TASK_POINTS
 #undef ISOGI_TRACE__ON_FACE
 #undef ISOGI_TRACE__WATCHED
+#undef ISOGI_TRACE__PASSES
+#undef ISOGI_TRACE__ROUNDS
+#undef ISOGI_TRACE__TRIES
+#undef ISOGI_TRACE__RESIDUAL
 #endif /* ISOGI_TRACE_IMPLEMENTATION */
 
 /* ---------------------------------------------------------------------------------------------------------------------

@@ -202,6 +202,82 @@ TEST(endless_light_is_reported) {
     }
 }
 
+/* A context whose allocations fail once: the last of so many. */
+typedef struct nth_failure { int left; } nth_failure;
+static void *nth_alloc(void *user, size_t size, size_t align) {
+    void *p = NULL;
+    if (--((nth_failure *)user)->left == 0) return NULL;
+    return posix_memalign(&p, align < sizeof(void *) ? sizeof(void *) : align, size) ? NULL : p;
+}
+static void nth_release(void *user, void *p, size_t size) { (void)user, (void)size, free(p); }
+
+/* A hollow in matter with a narrow way out. q: centre, radius, radius of the way along z */
+static double bottle(const double p[3], const double *q) {
+    double ball = length3(p[0] - q[0], p[1] - q[1], p[2] - q[2]) - q[3], tube = length3(p[0] - q[0], p[1] - q[1], 0) - q[4];
+    tube = p[2] > q[2] ? tube : ball;
+    return ball < tube ? ball : tube;
+}
+
+static void white(void *user, double isovalue, const double p[3], float albedo[3], float emission[3]) {
+    (void)user, (void)isovalue, (void)p, (void)emission;
+    for (int c = 0; c < 3; c++) albedo[c] *= 2;
+}
+
+/* A white bottle lets one part in thousands of its light out at each reflection. Passes alone would take tens of thousands, and called it
+   endless light. However colours are given, in transfer, too: E = pi all over its inside. */
+TEST(light_finds_its_way_through_narrow_necks) {
+    double q[5] = {15.5, 15.5, 14, 12, 1.6};
+    scene s = scene_make(32, 32, 40, NULL, bottle, q);
+    float points[24][3], e[24][3];
+    const int n = surface_points(&s, 0, 24, 2, points);
+    for (int variant = 0; variant < 4; variant++) {
+        isogi_trace_desc d = feedback(&s, 1, -1, 8);
+        double worst = 0;
+        d.lazy = 1, d.storage = ISOGI_TRACE_FLOAT;
+        if (variant == 1 || variant == 2) d.mode = ISOGI_TRACE_TRANSFER, d.order = 2, d.transfer_channels = 2 * variant - 1;
+        if (variant == 3) d.material = white, d.albedo[0] = d.albedo[1] = d.albedo[2] = 0.5f;
+        bake_and_sample(&d, NULL, (const float(*)[3])points, n, e);
+        for (int k = 0; k < n; k++)
+            for (int c = 0; c < 3; c++) worst = fmax(worst, fabs((double)e[k][c] - PI));
+        CHECK(n == 24 && worst < 0.005 * PI, "variant %d: largest deviation of E from pi %g", variant, worst);
+    }
+    scene_free(&s);
+}
+
+/* Light that fades slowly is worked out in another way than by passes, which a number of bounces asks for: that many reflections each, all
+   that matter here. Each colour by itself, and by passes again where there is no memory for it. */
+TEST(light_that_fades_slowly_is_that_of_many_passes) {
+    double q[5] = {15.5, 15.5, 14, 12, 2.5};
+    scene s = scene_make(32, 32, 40, NULL, bottle, q);
+    float points[24][3], passes[24][3], e[24][3];
+    const int n = surface_points(&s, 0, 24, 2, points);
+    int failed = 1, without = 0;
+    isogi_trace_desc d = feedback(&s, 1, 5000, 8);
+    d.lazy = 1, d.storage = ISOGI_TRACE_FLOAT, d.albedo[0] = 0.995f, d.albedo[1] = 0.6f, d.albedo[2] = 0.98f;
+    bake_and_sample(&d, NULL, (const float(*)[3])points, n, passes);
+    d.bounces = -1;
+    for (int which = 1; failed; which++) { /* the block of memory that there is none for */
+        nth_failure failure = {which};
+        isogi_context context = {.threads = 1, .alloc = nth_alloc, .release = nth_release, .user = &failure};
+        isogi_trace *t = NULL;
+        int done = isogi_trace_create(&t, &d, &context) == ISOGI_OK &&
+                   isogi_trace_request(t, (const float(*)[3])points, (size_t)n) == ISOGI_OK && isogi_trace_step(t, 0, NULL) == ISOGI_OK;
+        failed = failure.left <= 0;
+        if (done) isogi_trace_sample(t, (const float(*)[3])points, (size_t)n, e, NULL);
+        without += done && failed;
+        for (int k = 0; k < n && done; k++)
+            for (int c = 0; c < 3; c++)
+                CHECK(fabs((double)e[k][c] - (double)passes[k][c]) < 2e-3 * PI, "%d, point %d, channel %d: E %.5f, by passes %.5f", which,
+                      k, c, (double)e[k][c], (double)passes[k][c]);
+        CHECK(done || failed, "%d", which);
+        isogi_trace_free(t);
+    }
+    printf("    E %.4f %.4f %.4f pi; done without a block of memory: %d\n", (double)e[0][0] / PI, (double)e[0][1] / PI,
+           (double)e[0][2] / PI, without);
+    CHECK(without == 1, "%d bakes done without a block of memory", without);
+    scene_free(&s);
+}
+
 /* What a context was asked for: tasks, blocks of memory taken and given back; of those taken, how many are as large as those in which
    nodes lie, and bytes of the largest other. */
 typedef struct demand { size_t tasks, blocks, slabs, largest; } demand;
@@ -740,13 +816,13 @@ TEST(probes_follow_the_axes) {
 /* ---- determinism and stepping ---------------------------------------------------------------------------------------------- */
 
 TEST(same_bits_for_any_threads_and_budget) {
-    double q[5] = {8, 7, 8, 10, 5};
-    scene s = scene_make(16, 15, 14, NULL, pit, q);
+    double q[5] = {8, 7, 8, 10, 5}, neck[5] = {7.5, 7, 8, 5, 1.6};
     isogi_light sun = light_make(ISOGI_LIGHT_DIRECTIONAL, 1, 2, 0.5, 2, 0.2);
     static float points[400][3], first[400][3], e[400][3];
-    int n = surface_points(&s, 0, LONG_SUITE ? 400 : 100, 14, points);
-    for (int way = 0; way < 4; way++) { /* full and lazy irradiance, lazy transfer, full adaptive irradiance */
-        isogi_trace_desc d = feedback(&s, 0.8f, -1, LONG_SUITE ? 20 : 8);
+    for (int way = 0; way < 5; way++) { /* full and lazy irradiance, lazy transfer, full adaptive irradiance; white: not by passes alone */
+        scene s = way == 4 ? scene_make(16, 15, 22, NULL, bottle, neck) : scene_make(16, 15, 14, NULL, pit, q);
+        const int n = surface_points(&s, 0, LONG_SUITE ? 400 : 100, 14, points);
+        isogi_trace_desc d = feedback(&s, way == 4 ? 1 : 0.8f, -1, LONG_SUITE ? 20 : 8);
         int threads[4] = {1, 2, 3, 8};
         d.lighting.lights = &sun, d.lighting.light_count = 1, d.lazy = way == 1 || way == 2, d.error = way == 3 ? 0.02f : 0;
         d.mode = way == 2 ? ISOGI_TRACE_TRANSFER : ISOGI_TRACE_IRRADIANCE, d.order = 2;
@@ -772,8 +848,8 @@ TEST(same_bits_for_any_threads_and_budget) {
             CHECK(!memcmp(e, first, sizeof e), "way %d: budget %g differs", way, (double)budget[i]);
             isogi_trace_free(t);
         }
+        scene_free(&s);
     }
-    scene_free(&s);
 }
 
 /* Memory as allocators hand it out: full of old bytes. */

@@ -75,7 +75,16 @@ TEST(irradiance_is_relit_at_the_price_of_a_bake) {
         isogi_trace_sample(fresh, (const float(*)[3])points, (size_t)n, e[2], NULL);
         CHECK(isogi_trace_relight(t, &other.lighting) == ISOGI_OK, "the same again, format %d", format);
         CHECK(finished(t, &other, "the same lighting").rays == 0, "the same lighting costs rays, format %d", format);
-        sun.rgb[0] *= 2; /* in place */
+        sun.rgb[0] *= 2; /* in place: what is saved now is of the light before */
+        {
+            const size_t size = isogi_trace_save_size(t);
+            uint8_t *block = (uint8_t *)malloc(size);
+            isogi_trace *doubled = NULL;
+            CHECK(isogi_trace_create(&doubled, &other, NULL) == ISOGI_OK && isogi_trace_save(t, block, size) == ISOGI_OK &&
+                      isogi_trace_load(doubled, block, size) == ISOGI_INVALID && isogi_trace_load(t, block, size) == ISOGI_OK,
+                  "saved before it is told, format %d", format);
+            isogi_trace_free(doubled), free(block);
+        }
         CHECK(isogi_trace_relight(t, &other.lighting) == ISOGI_OK && finished(t, &other, "changed in place").rays == first.rays,
               "changed in place, format %d", format);
         isogi_trace_free(t), isogi_trace_free(fresh);
@@ -275,9 +284,29 @@ TEST(changed_voxels_bring_texels_into_the_interval) {
         isogi_vol_update(s.pyramid, first, last, NULL);
         CHECK(isogi_trace_touch(t, first, last) == ISOGI_OK, "after %d", k);
         if (!k) CHECK(finished(t, &d, "a lump").texels >= 8, "texels around the lump %d", k);
+        else finished(t, &d, "the ground again");
     }
-    isogi_trace_step(t, 0, NULL);
     isogi_trace_free(t), scene_free(&s);
+}
+
+/* A spike goes that brought texels into the interval, also some that lie too far from it to see it. */
+TEST(changed_voxels_take_texels_out_of_the_interval) {
+    double q[1] = {8};
+    scene s = scene_make(24, 24, 24, NULL, ground, q);
+    const size_t at[3] = {11, 20, 11};
+    float *spike = &s.data[11 + 24 * (20 + 24 * 11)], was = *spike;
+    isogi_trace_desc d = desc_make(&s, 0.5f, 1, 2);
+    isogi_trace *t, *fresh;
+    isogi_trace_report report;
+    *spike = 30, isogi_vol_update(s.pyramid, at, at, NULL);
+    d.isovalue_min = 9, d.isovalue_max = 25, d.lattice[0] = d.lattice[1] = d.lattice[2] = 6;
+    t = baked(&d), isogi_trace_status(t, &report);
+    CHECK(report.texels > 8, "%d texels at the spike", (int)report.texels);
+    isogi_trace_touch(t, at, at), *spike = was, isogi_vol_update(s.pyramid, at, at, NULL), isogi_trace_touch(t, at, at);
+    isogi_trace_step(t, 0, NULL), isogi_trace_status(t, &report);
+    fresh = baked(&d);
+    CHECK(report.texels == 0 && isogi_trace_save_size(t) == isogi_trace_save_size(fresh), "%d texels without it", (int)report.texels);
+    isogi_trace_free(fresh), isogi_trace_free(t), scene_free(&s);
 }
 
 static double ramp(const double p[3], const double *q) { return q[0] * p[0]; }

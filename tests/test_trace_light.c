@@ -877,6 +877,24 @@ TEST(lamps_in_the_middle_are_lamps_like_others) {
     scene_free(&s);
 }
 
+/* Within a spherical lamp light comes evenly from everywhere, L = I / (pi r^2): in its very middle, too. */
+TEST(light_comes_evenly_from_a_lamp_around) {
+    const double q[1] = {8};
+    scene s = scene_make(17, 17, 17, NULL, ground, q);
+    isogi_light lamp = light_make(ISOGI_LIGHT_SPHERE, 8, 8, 8, 4, 2); /* I, r */
+    isogi_trace_desc d = desc_make(&s, 0, 0, 4096);
+    const float points[2][3] = {{8, 8, 8}, {8.5f, 8, 8}};
+    float e[2][3];
+    d.lazy = 1, d.lighting.env.sh = NULL, d.lighting.env.sh_order = 0, d.lighting.lights = &lamp, d.lighting.light_count = 1;
+    for (int method = 0; method < 3; method++) {
+        d.method = method == 2 ? ISOGI_TRACE_FEEDBACK : ISOGI_TRACE_PATHS;
+        if (method) bake_and_sample(&d, NULL, points, 2, e);
+        else isogi_trace_gather(&d, points, NULL, 2, e, NULL, NULL);
+        for (int i = 0; i < 2; i++) CHECK(fabs((double)e[i][0] - 1) < 0.02, "way %d, point %d: E %g", method, i, (double)e[i][0]);
+    }
+    scene_free(&s);
+}
+
 /* A slit between the ground and matter above it, and a lamp in it: rays start a voxel above the ground, right below that matter, and go to
    the lamp as it is seen from there. */
 TEST(rays_go_to_a_lamp_from_where_they_start) {
