@@ -533,9 +533,8 @@ ISOGI_API size_t isogi_trace_memory(const isogi_trace *trace); /* bytes that the
 #define ISOGI_TRACE__PROBE_MOST 8    /* samples of a probe: as many as there are hits that read it, but no more than this */
 #define ISOGI_TRACE__WATCHED 6       /* passes that look for probes whose light has settled */
 #define ISOGI_TRACE__PASSES 100      /* after which all that they would still add is worked out at once, */
-#define ISOGI_TRACE__ROUNDS 1000     /* in so many rounds, begun anew */
-#define ISOGI_TRACE__TRIES 4         /* so many times at most, */
-#define ISOGI_TRACE__RESIDUAL 1e-7   /* until a reflection changes this share of the largest light: MAX_DEPTH more a 1000th */
+#define ISOGI_TRACE__ROUNDS 2000     /* in so many rounds at most, */
+#define ISOGI_TRACE__RESIDUAL 1e-6   /* until one more reflection changes no more than this share of the largest light */
 #define ISOGI_TRACE__PROBE_ERROR 0.02 /* standard error of light from probes */
 #define ISOGI_TRACE__CELL 2.0       /* of probes that texels read, in voxels, */
 #define ISOGI_TRACE__CELL_LEAST 1.0 /* down to this where lights throw shadows and there are more samples than */
@@ -3601,7 +3600,7 @@ typedef struct isogi_trace__row {
    chunk, SUMS for each value. */
 typedef struct isogi_trace__solver {
     size_t bytes; /* of the block of memory in which all of this lies */
-    int stage, round, tries;
+    int stage, round;
     isogi_trace__row *rows;
     double *light, *rest, *shadow, *way, *image, *second, *sums;
     double product[ISOGI_TRACE__VALUES], along[ISOGI_TRACE__VALUES], across[ISOGI_TRACE__VALUES], turn[ISOGI_TRACE__VALUES];
@@ -5084,13 +5083,12 @@ static int isogi_trace__solve_end(isogi_trace *t) {
         endless |= !s->stage && !(sum[3] <= ISOGI_TRACE__MAX_DEPTH * sum[1]);
     }
     if (s->stage == ISOGI_TRACE__SOLVE_REST) {
-        f->diverges = endless || (open && s->tries++ == ISOGI_TRACE__TRIES);
+        f->diverges = endless || (open && s->round >= ISOGI_TRACE__ROUNDS);
         if (!open && !endless) isogi_trace__solver_light(t, 1);
         if (!open || f->diverges) return 1;
     }
-    f->pass += s->stage == ISOGI_TRACE__SOLVE_STEP;
     if (s->stage < ISOGI_TRACE__SOLVE_STEP) s->stage++;
-    else s->stage = open && ++s->round % ISOGI_TRACE__ROUNDS ? ISOGI_TRACE__SOLVE_WAY : ISOGI_TRACE__SOLVE_REST;
+    else f->pass++, s->round++, s->stage = open && s->round < ISOGI_TRACE__ROUNDS ? ISOGI_TRACE__SOLVE_WAY : ISOGI_TRACE__SOLVE_REST;
     return 0;
 }
 
@@ -7469,7 +7467,6 @@ ISOGI_API isogi_result isogi_trace_gather_field(const isogi_trace_desc *desc, is
 #undef ISOGI_TRACE__WATCHED
 #undef ISOGI_TRACE__PASSES
 #undef ISOGI_TRACE__ROUNDS
-#undef ISOGI_TRACE__TRIES
 #undef ISOGI_TRACE__RESIDUAL
 #endif /* ISOGI_TRACE_IMPLEMENTATION */
 
