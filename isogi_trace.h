@@ -399,7 +399,8 @@ typedef struct isogi_trace_report {
                          at the volume's middle, but at least a quarter of its diagonal from a lamp, and before a rectangle. Where
                          emission_points are the only light: that of a surface which sees the brightest of them alone */
     int diverges;     /* FEEDBACK: reflections add the same light for ever, or so much that all of it is more than 10000 times the
-                         brightest that sky and lights bring (albedo 1, closed, with a light inside): no value means anything */
+                         brightest that sky and lights bring (albedo 1, closed, with a light inside; 2000 times where memory runs out):
+                         no value means anything */
 } isogi_trace_report;
 ISOGI_API void isogi_trace_status(const isogi_trace *trace, isogi_trace_report *report);
 
@@ -1274,11 +1275,14 @@ static void isogi_trace__block_range(const isogi_pyramid *pyramid, const size_t 
 static void isogi_trace__colour(const isogi_albedo_point *p, size_t n, double isovalue, float rgb[3]) {
     size_t i = 0;
     int c;
+    double half = 1;
     while (i < n && p[i].value < isovalue) i++;
+    if (i && i < n && !isogi_trace__finite(p[i].value - p[i - 1].value)) half = 0.5;
     for (c = 0; c < 3; c++)
         rgb[c] = i == 0 || i == n ? p[i ? n - 1 : 0].rgb[c]
                                   : (float)isogi_trace__lerp((double)p[i - 1].rgb[c], (double)p[i].rgb[c],
-                                                             (isovalue / 2 - p[i - 1].value / 2) / (p[i].value / 2 - p[i - 1].value / 2));
+                                                             (isovalue * half - p[i - 1].value * half) /
+                                                                 (p[i].value * half - p[i - 1].value * half));
 }
 
 ISOGI_API void isogi_trace_albedo(const isogi_trace_desc *desc, double isovalue, float rgb[3]) {
@@ -3604,6 +3608,7 @@ typedef struct isogi_trace__solver {
     isogi_trace__row *rows;
     double *light, *rest, *shadow, *way, *image, *second, *sums;
     double product[ISOGI_TRACE__VALUES], along[ISOGI_TRACE__VALUES], across[ISOGI_TRACE__VALUES], turn[ISOGI_TRACE__VALUES];
+    double most[ISOGI_TRACE__VALUES]; /* the largest that comes from sky and lights */
 } isogi_trace__solver;
 
 struct isogi_trace__feedback {
@@ -4954,10 +4959,14 @@ static void isogi_trace__solver_light(const isogi_trace *t, int ends) {
 /* Without memory for it passes go on. */
 static int isogi_trace__solver_new(isogi_trace *t) {
     const isogi_trace__set *set = &t->feedback->probes;
+    const size_t each = sizeof(isogi_trace__row) + 8 * (size_t)t->values * sizeof(double); /* more than a probe takes */
     isogi_trace__solver none, *s;
-    const size_t bytes = isogi_trace__solver_set(t, &none, NULL);
-    uint8_t *block = (uint8_t *)isogi_allocate(&t->context, 1, bytes);
-    size_t k, i;
+    uint8_t *block = NULL;
+    size_t bytes = 0, k, i;
+    if (set->count < SIZE_MAX / 2 / each) {
+        bytes = isogi_trace__solver_set(t, &none, NULL);
+        block = (uint8_t *)isogi_allocate(&t->context, 1, bytes);
+    }
     if (!block) return 0;
     memset(block, 0, bytes);
     s = t->feedback->solver = (isogi_trace__solver *)(void *)block;
@@ -5079,13 +5088,15 @@ static int isogi_trace__solve_end(isogi_trace *t) {
         if (s->stage != ISOGI_TRACE__SOLVE_REST && s->stage != ISOGI_TRACE__SOLVE_STEP) continue;
         s->turn[a] = s->stage ? isogi_trace__quotient(sum[0] * s->along[a], s->product[a] * s->across[a]) : 0;
         s->product[a] = sum[0];
+        if (s->stage == ISOGI_TRACE__SOLVE_REST) s->most[a] = sum[1];
         open |= !(sum[2] <= ISOGI_TRACE__RESIDUAL * sum[3]);
-        endless |= !s->stage && !(sum[3] <= ISOGI_TRACE__MAX_DEPTH * sum[1]);
+        endless |= !(sum[3] <= ISOGI_TRACE__MAX_DEPTH * s->most[a]) || !isogi_trace__finite(sum[0]); /* NaN is no maximum */
     }
-    if (s->stage == ISOGI_TRACE__SOLVE_REST) {
-        f->diverges = endless || (open && s->round >= ISOGI_TRACE__ROUNDS);
-        if (!open && !endless) isogi_trace__solver_light(t, 1);
-        if (!open || f->diverges) return 1;
+    f->diverges = endless || (s->stage == ISOGI_TRACE__SOLVE_REST && open && s->round >= ISOGI_TRACE__ROUNDS);
+    if (f->diverges) return 1;
+    if (s->stage == ISOGI_TRACE__SOLVE_REST && !open) {
+        isogi_trace__solver_light(t, 1);
+        return 1;
     }
     if (s->stage < ISOGI_TRACE__SOLVE_STEP) s->stage++;
     else f->pass++, s->round++, s->stage = open && s->round < ISOGI_TRACE__ROUNDS ? ISOGI_TRACE__SOLVE_WAY : ISOGI_TRACE__SOLVE_REST;
