@@ -837,7 +837,7 @@ TEST(same_bits_for_any_threads_and_budget) {
             isogi_trace *t = NULL;
             double remaining = 1, before = 2;
             uint64_t budget[3] = {1, 777, 50000};
-            if (!i && !LONG_SUITE && way) continue;
+            if (!i && (way == 4 || (!LONG_SUITE && way))) continue; /* a hundred passes over segments of a ray: millions of steps */
             isogi_trace_create(&t, &d, NULL);
             isogi_trace_request(t, (const float(*)[3])points, (size_t)n);
             for (int k = 0; remaining > 0 && k < 1000000; k++, before = remaining) {
@@ -845,7 +845,7 @@ TEST(same_bits_for_any_threads_and_budget) {
                 CHECK(remaining <= before, "remaining rose: %g after %g", remaining, before);
             }
             isogi_trace_sample(t, (const float(*)[3])points, (size_t)n, e, NULL);
-            CHECK(!memcmp(e, first, sizeof e), "way %d: budget %g differs", way, (double)budget[i]);
+            CHECK(remaining <= 0 && !memcmp(e, first, sizeof e), "way %d: budget %g differs", way, (double)budget[i]);
             isogi_trace_free(t);
         }
         scene_free(&s);
