@@ -148,9 +148,9 @@
                 180 KB. isogi_trace_memory tells. PATHS needs another 4 MB, FEEDBACK 9 (TRANSFER: 32 KB more for each coefficient),
                 and while it works some 400 bytes (TRANSFER: 16 more for each coefficient), 8 MB of them at once of texels and as
                 many of probes, and 4 for every hit, for each texel of one cube (ISOGI_TRACE_CUBE), for all that were asked for
-                when lazy, and for each probe (and 160 more, TRANSFER 48 for each value, where light
-                takes more than 100 reflections to fade): where every texel of a cube has a surface 190 MB with 1 sample, 460 with 64, and
-                740 where there are lights. A request takes 12 bytes for each of 32768 points at a time.
+                when lazy, and for each probe (160 more, TRANSFER 48 for each value, where light takes over 100 reflections to fade):
+                where every texel of a cube has a surface 190 MB with 1 sample, 460 with 64, and 740 where there are lights.
+                A request takes 12 bytes for each of 32768 points at a time.
                 Any allocation may fail: the call says ISOGI_NO_MEMORY, the texture stays as it was and can go on.
                 Stack use stays below 32 KB (compiled by clang, below 35), nearly all of it that of rays.
    Threads      Rays run on the context's threads. isogi_trace_sample and the other readers may run in any number of threads at a
@@ -1172,7 +1172,7 @@ static int isogi_trace__light_beam(const isogi_light *light, const double point[
         length += to[a] * to[a];
     }
     length = sqrt(length);
-    if (light->kind == ISOGI_LIGHT_SPHERE && light->radius > 0 && !(length > 0)) to[1] = length = 1e-9 * (double)light->radius; /* within */
+    if (light->kind == ISOGI_LIGHT_SPHERE && !(length > 0)) to[1] = length = 1e-9 * (double)light->radius; /* from its very middle */
     if (!(length > 0) || !isogi_trace__finite(length)) return 0;
     beam->tmax = 0;
     if (light->kind == ISOGI_LIGHT_SPHERE && light->radius > 0) {
@@ -1275,14 +1275,11 @@ static void isogi_trace__block_range(const isogi_pyramid *pyramid, const size_t 
 static void isogi_trace__colour(const isogi_albedo_point *p, size_t n, double isovalue, float rgb[3]) {
     size_t i = 0;
     int c;
-    double half = 1;
     while (i < n && p[i].value < isovalue) i++;
-    if (i && i < n && !isogi_trace__finite(p[i].value - p[i - 1].value)) half = 0.5;
     for (c = 0; c < 3; c++)
         rgb[c] = i == 0 || i == n ? p[i ? n - 1 : 0].rgb[c]
                                   : (float)isogi_trace__lerp((double)p[i - 1].rgb[c], (double)p[i].rgb[c],
-                                                             (isovalue * half - p[i - 1].value * half) /
-                                                                 (p[i].value * half - p[i - 1].value * half));
+                                                             (isovalue / 2 - p[i - 1].value / 2) / (p[i].value / 2 - p[i - 1].value / 2));
 }
 
 ISOGI_API void isogi_trace_albedo(const isogi_trace_desc *desc, double isovalue, float rgb[3]) {
