@@ -99,9 +99,10 @@
      first has smoothed); their samples are well spread together. With each sample go two to four rays drawn by the brightness of an uneven
      image: they need no probe, and take a quarter to two fifths of the error that one of them leaves. Lights are not filtered, so that
      their shadows stay sharp (desc.unfiltered: nothing is); where one is wide, with soft shadows everywhere, all are sampled up to four
-     times as often instead. TRANSFER is not filtered at all, and takes more samples for it. Probes cost accuracy: half a per cent of the
-     mean and 1.8 % at a point in narrow channels of albedo 0.8 (test_trace_bake --long prints it). Lazy and adaptive bakes take samples in
-     blocks of 4, 16, 64, ... and every other texel along each axis first: soon every lookup has a value.
+     times as often instead. Of TRANSFER all coefficients are read from that plane, in one round; how much light comes, and from where, must
+     be alike (the first four). Probes cost accuracy: half a per cent of the mean and 1.8 % at a point in narrow channels of albedo 0.8
+     (test_trace_bake --long prints it). Lazy and adaptive bakes take samples in blocks of 4, 16, 64, ... and every other texel along each
+     axis first: soon every lookup has a value.
      A hit from within (only through an open border can a ray get there) is a surface too, with its normal turned.
 
    GLSL that lights a surface by an exported irradiance texture (GL_LINEAR, GL_CLAMP_TO_EDGE); grid: voxel coordinates
@@ -275,9 +276,8 @@ typedef struct isogi_trace_desc {
     float error;               /* FEEDBACK: a texel is good enough once its standard error is below this fraction of the light that an
                                   open texel gets, averaged over all orientations, or once more samples would hardly lower it: light
                                   from probes is itself uncertain by 2 %; 0 = every texel gets all its samples */
-    int unfiltered;            /* non-zero: FEEDBACK averages no light over neighbouring texels (as in TRANSFER it never does), to see what
-                                  that is worth: the same error takes four to ten times the samples, where they are few (make bench,
-                                  rows filter-) */
+    int unfiltered;            /* non-zero: FEEDBACK averages no light over neighbouring texels, to see what that is worth: the same error
+                                  takes four to ten times the samples, where they are few (make bench, rows filter-) */
     uint64_t seed;
     float offset;              /* rays start this many voxels (in grid coordinates: wherever voxels are longer, so is the way) along
                                   the normal, up to 1 (a wall may be that thin); 0 = 0.25;
@@ -553,6 +553,7 @@ ISOGI_API size_t isogi_trace_memory(const isogi_trace *trace); /* bytes that the
 #define ISOGI_TRACE__NOISE_KNOWN 3  /* with fewer than this nothing is known of it */
 #define ISOGI_TRACE__PILOT_SAMPLES 4 /* from so many on the filter goes in two rounds, */
 #define ISOGI_TRACE__NOISE_PILOT 2.0 /* and its second takes so many times the variance of the first for noise */
+#define ISOGI_TRACE__SPREAD 5.0     /* of transfer: variance that n well spread directions leave, times n * n */
 #define ISOGI_TRACE__RIDGE 3.0      /* samples of the texel itself, a texel away, that say that light is the same everywhere */
 #define ISOGI_TRACE__SHEET 0.7      /* texels between two isosurfaces that the filter takes for one */
 #define ISOGI_TRACE__FILTER 12      /* squared distance of the farthest texels of the filter, */
@@ -4779,6 +4780,11 @@ static int isogi_trace__channel(const isogi_trace *t, int value) {
     return t->scene.desc.mode == ISOGI_TRACE_TRANSFER ? value % t->scene.desc.transfer_channels : value;
 }
 
+/* Where a channel begins. */
+static int isogi_trace__first_value(const isogi_trace *t, int channel) {
+    return t->scene.desc.mode == ISOGI_TRACE_TRANSFER && t->scene.desc.transfer_channels == 1 ? 0 : channel;
+}
+
 /* Albedo where a node's rays hit a probe: at the node's isovalue; where colours go by place, that of the probe. Grey transfer has one
    channel, of the mean. */
 static double isogi_trace__hit_albedo(const isogi_trace *t, const isogi_trace__node *n, uint32_t probe, int value) {
@@ -5127,8 +5133,10 @@ static void isogi_trace__bounce_task(void *arg, size_t task) {
             const float *e = isogi_trace__light_at(probes, s->probe[k], v);
             double rgb[3], luminance;
             for (a = 0; a < t->values; a++) bounce[a] += (float)(isogi_trace__hit_albedo(t, n, s->probe[k], a) * (double)e[a]);
-            if (t->scene.desc.mode == ISOGI_TRACE_TRANSFER) continue;
-            for (a = 0; a < 3; a++) rgb[a] = isogi_trace__hit_albedo(t, n, s->probe[k], a) * (double)e[a] / ISOGI_TRACE__PI;
+            for (a = 0; a < 3; a++) {
+                const int value = isogi_trace__first_value(t, a);
+                rgb[a] = isogi_trace__hit_albedo(t, n, s->probe[k], value) * (double)e[value] / ISOGI_TRACE__PI;
+            }
             luminance = isogi_trace__luminance(rgb);
             n->bounce_square += luminance * luminance;
         }
@@ -5157,12 +5165,33 @@ static void isogi_trace__guide_begin(const isogi_trace *t, const isogi_trace__no
     isogi_trace__texel_grid(t, texel, point);
     isogi_vol_to_world(t->scene.pyramid, point, point);
     isogi_trace_material(d, n->isovalue, point, g->albedo, g->glow);
+    for (a = 0; a < 3 && d->mode == ISOGI_TRACE_TRANSFER; a++) g->glow[a] = 0; /* as nodes have it */
 }
 
 /* Variance of the light that is not filtered. */
 static double isogi_trace__light_variance(const isogi_trace__node *n) {
     double l = (double)n->light_samples;
     return l > 1 ? n->light_spread / (l * (l - 1)) : 0;
+}
+
+/* What the filter compares of transfer: the first four coefficients, how much light in `luminance` and from where in `mean`. Their variance
+   is that of whether rays escape, of which the first one shows a fourth, and what directions leave that are well spread. Where all rays
+   escape the first one has none, and a single sample of the others 2 pi / 3 - pi / 4. */
+static void isogi_trace__guide_series(const isogi_trace *t, const isogi_trace__node *n, const float *direct, const float *out,
+                                      isogi_trace__guide *g) {
+    const double escaped = (double)direct[0], one = 0.28209479177387814; /* each of the rays that did adds that */
+    const double samples = n->samples ? (double)n->samples : 1;
+    double rgb[3], variance;
+    int a, k, channels = t->scene.desc.transfer_channels;
+    for (k = 0; k < 4 && k < t->scene.desc.order * t->scene.desc.order; k++) {
+        for (a = 0; a < 3; a++) rgb[a] = (double)out[k * channels + isogi_trace__first_value(t, a)];
+        if (k) g->mean[k - 1] = (float)isogi_trace__luminance(rgb);
+        else g->luminance = (float)isogi_trace__luminance(rgb);
+    }
+    if (t->scene.desc.order < 2) g->mean[0] = g->mean[1] = g->mean[2] = 0;
+    variance = 4 * ISOGI_TRACE__PI * ISOGI_TRACE__PI *
+               isogi_trace__mean_variance((double)g->luminance * samples / ISOGI_TRACE__PI, escaped * one + n->bounce_square, samples);
+    g->variance = (float)(variance + ISOGI_TRACE__SPREAD / (samples * samples));
 }
 
 /* The part of a texel's irradiance that neighbours may share, and its variance: what comes from the sky, by both kinds of rays, and by
@@ -5178,7 +5207,7 @@ static void isogi_trace__guide_task(void *arg, size_t task) {
         const float *direct = isogi_trace__values_at(set, i, ISOGI_TRACE__DIRECT_VALUES, v),
                     *bounce = isogi_trace__values_at(set, i, ISOGI_TRACE__BOUNCE_VALUES, v);
         float *out = isogi_trace__light_at(set, i, v);
-        double scale = n->samples ? 1.0 / n->samples : 0, rgb[3] = {0, 0, 0}, spread;
+        double scale = n->samples ? 1.0 / n->samples : 0, rgb[3] = {0, 0, 0}, reflected[3], spread;
         int a;
         memcpy(g->normal, n->normal, sizeof g->normal);
         g->samples = n->samples, g->lights = (float)isogi_trace__light_variance(n);
@@ -5188,14 +5217,17 @@ static void isogi_trace__guide_task(void *arg, size_t task) {
             rgb[a] = (double)direct[a] + (double)bounce[a] / ISOGI_TRACE__PI;
             g->mean[a] = out[a] + (float)(ISOGI_TRACE__PI * scale * n->bright[a]);
         }
-        if (t->scene.desc.mode == ISOGI_TRACE_TRANSFER) continue;
+        for (a = 0; a < 3; a++) reflected[a] = scale * (double)bounce[isogi_trace__first_value(t, a)];
+        g->hidden = (float)(scale * (t->scene.desc.bounces ? n->hits : n->samples)); /* hits are counted if they reflect */
+        g->reflected = (float)isogi_trace__luminance(reflected);
+        if (t->scene.desc.mode == ISOGI_TRACE_TRANSFER) {
+            isogi_trace__guide_series(t, n, direct, out, g);
+            continue;
+        }
         g->luminance = (float)(ISOGI_TRACE__PI * scale * (isogi_trace__luminance(rgb) + isogi_trace__luminance(n->bright)));
         spread = isogi_trace__mean_variance(isogi_trace__luminance(rgb), n->square + n->bounce_square, (double)n->samples);
         if (n->samples * rays > 1) spread += n->bright_spread * scale * rays / (n->samples * rays - 1);
         g->variance = (float)(ISOGI_TRACE__PI * ISOGI_TRACE__PI * spread);
-        for (a = 0; a < 3; a++) rgb[a] = scale * (double)bounce[a];
-        g->hidden = (float)(scale * (t->scene.desc.bounces ? n->hits : n->samples)); /* hits are counted if they reflect */
-        g->reflected = (float)isogi_trace__luminance(rgb);
     }
 }
 
@@ -5208,6 +5240,8 @@ typedef struct isogi_trace__dense {
     double unit; /* of luminance */
     int count;
     int tinted; /* colours differ by isovalue or by place */
+    int series; /* light is transfer: its first coefficient is the luminance, the next three are the mean, in the same unit, */
+    const float *light[ISOGI_TRACE__ROW * ISOGI_TRACE__ROW * ISOGI_TRACE__ROW]; /* and this is all of it */
     uint16_t at[ISOGI_TRACE__ROW * ISOGI_TRACE__ROW * ISOGI_TRACE__ROW], filled[ISOGI_TRACE__ROW * ISOGI_TRACE__ROW]; /* bits of x */
     const isogi_trace__guide *guide[ISOGI_TRACE__ROW * ISOGI_TRACE__ROW * ISOGI_TRACE__ROW];
     float samples[ISOGI_TRACE__DENSE], share[ISOGI_TRACE__DENSE]; /* share: 1 / samples */
@@ -5225,6 +5259,10 @@ typedef struct isogi_trace__blend {
     double rgb[3];
     double variance, lights; /* of what is shared, of other light averaged over the same texels */
     double alike;            /* the number of samples that it is as good as; 0: nothing is shared */
+    size_t start[ISOGI_TRACE__ROWS + 1]; /* rows of texels: the number of the first, */
+    float weight[ISOGI_TRACE__ROWS][ISOGI_TRACE__LANES]; /* and what each counts */
+    int rows;
+    float series[ISOGI_TRACE__VALUES]; /* of transfer */
 } isogi_trace__blend;
 
 /* Sums of weights, by place: 1, x, y, z, xx, yy, zz, xy, xz, yz. */
@@ -5274,15 +5312,15 @@ static const int isogi_trace__rows[ISOGI_TRACE__ROWS][2] = {{-1, -3}, {0, -3}, {
         const int reach = ISOGI_TRACE__REACH, parts = ISOGI_TRACE__LANES / W;                                                              \
         const int middle[3] = {(int)centre % ISOGI_TRACE__ROW, (int)centre / ISOGI_TRACE__ROW % ISOGI_TRACE__ROW,                          \
                                (int)centre / ISOGI_TRACE__ROW / ISOGI_TRACE__ROW};                                                         \
-        float kept[ISOGI_TRACE__ROWS][ISOGI_TRACE__LANES], sum[ISOGI_TRACE__MOMENTS][ISOGI_TRACE__LANES];                                  \
+        float (*kept)[ISOGI_TRACE__LANES] = to->weight, sum[ISOGI_TRACE__MOMENTS][ISOGI_TRACE__LANES];                                     \
         float place[ISOGI_TRACE__ROWS + 1][2];                                                                                             \
         int rows = 0, i, l;                                                                                                                \
-        size_t start[ISOGI_TRACE__ROWS + 1];                                                                                               \
+        size_t *start = to->start;                                                                                                         \
         double moment[ISOGI_TRACE__MOMENTS], plane[4], squares = 0;                                                                        \
         const float most = 1e4f * b->samples[centre];                                                                                      \
         F total[ISOGI_TRACE__LANES / W], m[9][ISOGI_TRACE__LANES / W];                                                                     \
         F blend[6][ISOGI_TRACE__LANES / W], least[3][ISOGI_TRACE__LANES / W], largest[3][ISOGI_TRACE__LANES / W];                          \
-        to->alike = 0;                                                                                                                     \
+        to->alike = 0, to->rows = 0;                                                                                                       \
         for (l = 0; l < parts; l++) {                                                                                                      \
             const F none = ISOGI_TRACE__FLOATS(F, isogi_trace__nought);                                                                    \
             total[l] = none, m[0][l] = none, m[1][l] = none, m[2][l] = none, m[3][l] = none, m[4][l] = none, m[5][l] = none;               \
@@ -5312,6 +5350,13 @@ static const int isogi_trace__rows[ISOGI_TRACE__ROWS][2] = {{-1, -3}, {0, -3}, {
                 F noise = (ISOGI_TRACE__FLOATS(F, b->guessed + k) + b->guessed[centre]) *                                                  \
                           (ISOGI_TRACE__FLOATS(F, b->noise + k) + b->noise[centre]),                                                       \
                   apart = differ * differ - noise, w;                                                                                      \
+                if (b->series) {                                                                                                           \
+                    int a;                                                                                                                 \
+                    for (a = 0; a < 3; a++) {                                                                                              \
+                        const F more = ISOGI_TRACE__FLOATS(F, b->mean[a] + k) - b->mean[a][centre];                                        \
+                        apart += more * more;                                                                                              \
+                    }                                                                                                                      \
+                }                                                                                                                          \
                 apart = KEEP(apart > 0.0f, apart);                                                                                         \
                 if (b->tinted) {                                                                                                           \
                     const F reflected = ISOGI_TRACE__FLOATS(F, b->reflected + k), mine = none + b->reflected[centre];                      \
@@ -5369,6 +5414,7 @@ static const int isogi_trace__rows[ISOGI_TRACE__ROWS][2] = {{-1, -3}, {0, -3}, {
                 const size_t k = start[i] + (size_t)(l * W);                                                                               \
                 const F along = ISOGI_TRACE__FLOATS(F, isogi_trace__along + l * W), none = ISOGI_TRACE__FLOATS(F, isogi_trace__nought),    \
                         before = ISOGI_TRACE__FLOATS(F, kept[i] + l * W), w = before * (constant + rising * along), ww = w * w;            \
+                if (b->series) *(F *)(void *)(kept[i] + l * W) = w;                                                                        \
                 blend[3][l] += ww * ISOGI_TRACE__FLOATS(F, b->share + k);                                                                  \
                 blend[4][l] += ww * ISOGI_TRACE__FLOATS(F, b->variance + k), blend[5][l] += w * ISOGI_TRACE__FLOATS(F, b->lights + k);     \
                 ISOGI_TRACE__BLEND_CHANNEL(F, PICK, LESS, MORE, 0)                                                                         \
@@ -5394,7 +5440,7 @@ static const int isogi_trace__rows[ISOGI_TRACE__ROWS][2] = {{-1, -3}, {0, -3}, {
             }                                                                                                                              \
             to->rgb[i] = moment[i] < low ? low : moment[i] > high ? high : moment[i];                                                      \
         }                                                                                                                                  \
-        squares = moment[3], to->variance = moment[4], to->lights = moment[5] > 0 ? moment[5] : 0, to->alike = 1 / squares;                \
+        to->rows = rows, squares = moment[3], to->variance = moment[4], to->lights = moment[5] > 0 ? moment[5] : 0, to->alike = 1 / squares;\
     }
 
 #define ISOGI_TRACE__BLEND_CHANNEL(F, PICK, LESS, MORE, a)                                         \
@@ -5499,6 +5545,7 @@ static void isogi_trace__block_find(const isogi_trace *t, const size_t brick[3],
                     const uint32_t slot = isogi_trace__lowest_bit(held), node = other->node[slot], x = first[0] + slot % 4,
                                    row = first[1] + slot / 4 % 4 + ISOGI_TRACE__ROW * (first[2] + slot / 16);
                     if (!node) continue;
+                    b->light[row * ISOGI_TRACE__ROW + x] = isogi_trace__light_at(set, node - 1, (size_t)t->values);
                     b->guide[b->count] = isogi_trace__guide_at(set, node - 1);
                     ISOGI_TRACE__AHEAD(b->guide[b->count]);
                     ISOGI_TRACE__AHEAD((const char *)b->guide[b->count] + sizeof(isogi_trace__guide) - 1);
@@ -5535,7 +5582,7 @@ static void isogi_trace__block_fill(const isogi_trace *t, const size_t brick[3],
     }
     most = most > 0 ? 1 / most : 1, steepest = 1 / (steepest > 1e-300 ? steepest : 1e-300);
     if (b->count) base = b->guide[0]->isovalue;
-    b->unit = 1 / most, b->tinted = d->albedo_count || d->emission_count || d->material;
+    b->unit = 1 / most, b->series = d->mode == ISOGI_TRACE_TRANSFER, b->tinted = d->albedo_count || d->emission_count || d->material;
     for (i = 0; i < b->count; i++) {
         const isogi_trace__guide *g = b->guide[i];
         const size_t at = b->at[i];
@@ -5551,14 +5598,28 @@ static void isogi_trace__block_fill(const isogi_trace *t, const size_t brick[3],
         b->guessed[at] = isogi_trace__bounded(g->samples < ISOGI_TRACE__NOISE_KNOWN ? luminance * luminance * one : noise);
         b->noise[at] = (float)((second ? ISOGI_TRACE__NOISE_PILOT : 1) * (ISOGI_TRACE__NOISE / 2 + ISOGI_TRACE__NOISE_FEW / 2 * one));
         b->lights[at] = isogi_trace__bounded((double)g->lights);
-        for (a = 0; a < 3; a++) b->normal[a][at] = g->normal[a], b->mean[a][at] = g->mean[a];
+        for (a = 0; a < 3; a++) b->normal[a][at] = g->normal[a], b->mean[a][at] = b->series ? (float)((double)g->mean[a] * most) : g->mean[a];
         if (!b->tinted) continue;
         b->hidden[at] = g->hidden, b->reflected[at] = (float)((double)g->reflected * most);
         for (a = 0; a < 3; a++) b->albedo[a][at] = g->albedo[a], b->glow[a][at] = isogi_trace__bounded((double)g->glow[a] * most);
     }
 }
 
-/* Light and error of a texel into its brick. blend: what it shares with those around; NULL of transfer, and where nothing is filtered. */
+/* Transfer of a texel with what it shares. */
+static void isogi_trace__blend_series(const isogi_trace *t, const isogi_trace__dense *b, isogi_trace__blend *blend) {
+    const size_t v = (size_t)t->values;
+    size_t i, l, a;
+    for (a = 0; a < v; a++) blend->series[a] = 0;
+    for (i = 0; i < (size_t)blend->rows; i++)
+        for (l = 0; l < ISOGI_TRACE__LANES; l++) {
+            const float w = blend->weight[i][l], *light;
+            if (!(w < 0 || w > 0)) continue;
+            light = b->light[blend->start[i] + l];
+            for (a = 0; a < v; a++) blend->series[a] += w * light[a];
+        }
+}
+
+/* Light and error of a texel into its brick. blend: what it shares with those around; NULL where nothing is filtered. */
 static void isogi_trace__publish(isogi_trace *t, size_t i, const isogi_trace__blend *blend) {
     isogi_trace__set *set = &t->feedback->texels;
     isogi_trace__node *n = isogi_trace__node_at(set, i);
@@ -5569,8 +5630,11 @@ static void isogi_trace__publish(isogi_trace *t, size_t i, const isogi_trace__bl
     float to[3], error;
     int a;
     if (t->scene.desc.mode == ISOGI_TRACE_TRANSFER) {
-        error = known ? (float)(1 / sqrt((double)n->samples)) : ISOGI_TRACE__NOT_READY;
-        isogi_trace__record_write(t, isogi_trace__record(t, n->brick, n->slot), isogi_trace__light_at(set, i, (size_t)t->values), error);
+        const float *light = blend ? blend->series : isogi_trace__light_at(set, i, (size_t)t->values);
+        variance = 1 / (double)n->samples;
+        if (blend) variance = 1 / blend->alike + ISOGI_TRACE__BLURRED * variance;
+        error = known ? (float)sqrt(variance) : ISOGI_TRACE__NOT_READY;
+        isogi_trace__record_write(t, isogi_trace__record(t, n->brick, n->slot), light, error);
     } else {
         if (blend) {
             variance = blend->variance + ISOGI_TRACE__BLURRED * variance, alike = blend->alike;
@@ -5620,6 +5684,7 @@ static void isogi_trace__publish_brick(isogi_trace *t, size_t i, isogi_trace__de
         if (!filled) isogi_trace__block_fill(t, brick, b);
         filled = 1;
         isogi_trace__blend_of(t, b, first + slot % 4 + ISOGI_TRACE__ROW * (slot / 4 % 4 + ISOGI_TRACE__ROW * (slot / 16)), &blend);
+        if (b->series && blend.alike > 0) isogi_trace__blend_series(t, b, &blend);
         blend.variance *= b->unit * b->unit;
         if (first_round) isogi_trace__pilot(t, node - 1, blend.alike > 0 ? &blend : NULL);
         else isogi_trace__publish(t, node - 1, blend.alike > 0 ? &blend : NULL);
@@ -5656,7 +5721,7 @@ static void isogi_trace__publish_task(void *arg, size_t task) {
     isogi_trace__dense *block = NULL;
     const size_t sweeps = t->feedback->sweeps, tasks = isogi_trace__publish_tasks(t->feedback);
     size_t i = isogi_trace__portion(sweeps, tasks, task), end = isogi_trace__portion(sweeps, tasks, task + 1);
-    if (t->scene.desc.mode == ISOGI_TRACE_IRRADIANCE && !t->scene.desc.unfiltered) {
+    if (!t->scene.desc.unfiltered) {
         block = (isogi_trace__dense *)(void *)t->feedback->casts + task;
         memset(block, 0, sizeof *block); /* rays were here before */
     }
@@ -5899,8 +5964,7 @@ static void isogi_trace__place_task(void *arg, size_t task) {
                 memcpy(n->normal, site[k].normal, sizeof n->normal);
             }
             isogi_trace_albedo(&t->scene.desc, n->isovalue, n->albedo);
-            if (t->scene.desc.mode == ISOGI_TRACE_IRRADIANCE)
-                isogi_trace__guide_begin(t, n, isogi_trace__guide_at(set, job->first + i + k));
+            isogi_trace__guide_begin(t, n, isogi_trace__guide_at(set, job->first + i + k));
         }
         i += count;
     }
@@ -7408,6 +7472,7 @@ ISOGI_API isogi_result isogi_trace_gather_field(const isogi_trace_desc *desc, is
 #undef ISOGI_TRACE__NOISE_KNOWN
 #undef ISOGI_TRACE__PILOT_SAMPLES
 #undef ISOGI_TRACE__NOISE_PILOT
+#undef ISOGI_TRACE__SPREAD
 #undef ISOGI_TRACE__RIDGE
 #undef ISOGI_TRACE__SHEET
 #undef ISOGI_TRACE__FILTER
