@@ -582,6 +582,81 @@ TEST(soft_shadows_are_not_blurred) {
     scene_free(&s);
 }
 
+/* Coefficients of grey transfer, order 5. */
+enum { SERIES = 25 };
+static void bake_series(isogi_trace_desc d, const float (*points)[3], int n, float (*series)[SERIES]) {
+    isogi_trace *t = NULL;
+    d.mode = ISOGI_TRACE_TRANSFER, d.order = 5;
+    CHECK(isogi_trace_create(&t, &d, NULL) == ISOGI_OK && isogi_trace_request(t, points, (size_t)n) == ISOGI_OK &&
+              isogi_trace_step(t, 0, NULL) == ISOGI_OK && isogi_trace_sample_transfer(t, points, (size_t)n, &series[0][0]) == ISOGI_OK,
+          "bake");
+    isogi_trace_free(t);
+}
+
+static double series_error(const float (*series)[SERIES], const float (*reference)[SERIES], int n) {
+    double sum = 0;
+    for (int i = 0; i < n; i++)
+        for (int k = 0; k < SERIES; k++) sum += pow((double)series[i][k] - (double)reference[i][k], 2) / n;
+    return sqrt(sum);
+}
+
+/* In a pit, the error of all coefficients over that of transfer that is not filtered: of a few samples, whose directions tell little of
+   high bands, a sixth is left, of 16 a fifth, of 64 two fifths. */
+TEST(transfer_is_filtered) {
+    enum { POINTS = 200 };
+    const int runs = LONG_SUITE ? 4 : 1;
+    static float points[POINTS][3], e[POINTS][SERIES], reference[POINTS][SERIES];
+    double q[5] = {24, 22, 24, 26, 16};
+    scene s = scene_make(48, 48, 48, NULL, pit, q);
+    int n = surface_points(&s, 0, POINTS, 7, points);
+    isogi_trace_desc d = desc_make(&s, 0.6f, -1, 1024);
+    d.lazy = 1;
+    bake_series(d, (const float(*)[3])points, n, reference);
+    d.method = ISOGI_TRACE_FEEDBACK, d.lazy = 0, d.isovalue_min = -0.01, d.isovalue_max = 0.01;
+    for (d.samples = 4; d.samples <= (LONG_SUITE ? 64 : 16); d.samples *= 4) {
+        double square[2] = {0, 0};
+        for (int run = 0; run < 2 * runs; run++) {
+            d.unfiltered = run % 2, d.seed = (uint64_t)(run / 2 + 1);
+            bake_series(d, (const float(*)[3])points, n, e);
+            square[run % 2] += pow(series_error((const float(*)[SERIES])e, (const float(*)[SERIES])reference, n), 2) / runs;
+        }
+        printf("    %d samples: error %.4f, unfiltered %.4f: %.3f\n", d.samples, sqrt(square[0]), sqrt(square[1]), sqrt(square[0] / square[1]));
+        CHECK(n > 100 && sqrt(square[0]) < (d.samples > 16 ? 0.45 : 0.25) * sqrt(square[1]), "%d samples: error %.4f, unfiltered %.4f",
+              d.samples, sqrt(square[0]), sqrt(square[1]));
+    }
+    scene_free(&s);
+}
+
+static double wall_on_ground(const double p[3], const double *q) {
+    double wall = q[1] - fabs(p[0] - q[2]), top = q[3] - p[1], plane = q[0] - p[1];
+    wall = wall < top ? wall : top;
+    return wall > plane ? wall : plane;
+}
+
+/* On both sides of a thin wall as much of the sky is seen, but the other half of it. The ground there faces the same way and is three
+   texels apart. Were that shared which brings as much light from anywhere, a twentieth of what comes from one side would be the other's. */
+TEST(transfer_is_not_shared_across_walls) {
+    enum { SIDE = 12, POINTS = 2 * SIDE, RUNS = 4 };
+    static float points[POINTS][3], e[POINTS][SERIES], reference[POINTS][SERIES];
+    double q[4] = {8, 0.6, 16, 24}, square[2] = {0, 0}, toward[2] = {0, 0};
+    scene s = scene_make(33, 33, 33, NULL, wall_on_ground, q);
+    isogi_trace_desc d = desc_make(&s, 0, 0, 2048);
+    d.lazy = 1;
+    for (int i = 0; i < POINTS; i++) points[i][0] = i % 2 ? 17.5f : 14.5f, points[i][1] = 8, points[i][2] = 10.5f + (float)(i / 2);
+    bake_series(d, (const float(*)[3])points, POINTS, reference);
+    d.method = ISOGI_TRACE_FEEDBACK, d.samples = 16;
+    for (int run = 0; run < 2 * RUNS; run++) {
+        d.unfiltered = run % 2, d.seed = (uint64_t)(run / 2 + 1);
+        bake_series(d, (const float(*)[3])points, POINTS, e);
+        square[run % 2] += pow(series_error((const float(*)[SERIES])e, (const float(*)[SERIES])reference, POINTS), 2) / RUNS;
+        for (int i = 0; i < POINTS; i++) toward[run % 2] += (double)e[i][3] / (double)reference[i][3] / (POINTS * RUNS);
+    }
+    printf("    error %.4f, unfiltered %.4f; from the side: %.3f, %.3f of the light\n", sqrt(square[0]), sqrt(square[1]), toward[0], toward[1]);
+    CHECK(sqrt(square[0]) < 0.75 * sqrt(square[1]) && fabs(toward[0] - 1) < 0.03, "error %.4f, unfiltered %.4f; from the side %.3f",
+          sqrt(square[0]), sqrt(square[1]), toward[0]);
+    scene_free(&s);
+}
+
 /* A texel's error keeps .18 of its own variance, which stands for what the filter blurs: there where many texels share their light, it
    is nearly all of what is left. */
 TEST(errors_tell_of_what_the_filter_blurs) {
