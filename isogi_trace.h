@@ -486,7 +486,8 @@ ISOGI_API isogi_result isogi_trace_gather_field(const isogi_trace_desc *desc, is
    lattice. */
 ISOGI_API int isogi_trace_valid(const isogi_trace *trace, const size_t texel[3]);
 /* 1 where isogi_trace_step has yet to compute the texel, or to refine it, on either of BOTH_SIDES; 0 where light is there already or
-   none was asked for, for NULL and beyond the lattice. */
+   none was asked for, for NULL and beyond the lattice. Of what comes before and after that, a hierarchy's coarse texels and the filter, it
+   tells nothing: a bake is finished when *remaining is 0. */
 ISOGI_API int isogi_trace_wanted(const isogi_trace *trace, const size_t texel[3]);
 ISOGI_API void isogi_trace_counters(const isogi_trace *trace, isogi_counters *counters); /* adds what was done so far; NULL does nothing */
 ISOGI_API size_t isogi_trace_memory(const isogi_trace *trace); /* bytes that the texture's light takes: bricks and their table */
@@ -1415,12 +1416,13 @@ static int isogi_trace__site_normal(const isogi_trace__scene *scene, const float
     double n[3] = {0, 0, 0}, length = 0;
     int a, c, border = 0, sign = scene->high ? -1 : 1;
     for (a = 0; a < 3; a++) {
-        double x = site->place.cell[a] + site->place.local[a], out = 0;
+        const double x = site->place.cell[a] + site->place.local[a], *row = scene->to_grid + 3 * a;
+        double out = 0;
         if (x <= 0) out = -1;
         if (x >= (double)(scene->volume->size[a] - 1)) out = 1;
         if (isogi_trace__zero(out)) continue;
         border = 1;
-        for (c = 0; c < 3; c++) n[c] += out * scene->to_grid[3 * a + c] * scene->volume->spacing[a];
+        for (c = 0; c < 3; c++) n[c] += out * row[c] / sqrt(isogi_trace__dot_wide(row, row)); /* of that face */
     }
     if (!border || !scene->desc.capped) {
         for (c = 0; c < 3; c++) site->normal[c] = gradient[c] * (float)sign;
@@ -5320,7 +5322,7 @@ static const int isogi_trace__rows[ISOGI_TRACE__ROWS][2] = {{-1, -3}, {0, -3}, {
         const float most = 1e4f * b->samples[centre];                                                                                      \
         F total[ISOGI_TRACE__LANES / W], m[9][ISOGI_TRACE__LANES / W];                                                                     \
         F blend[6][ISOGI_TRACE__LANES / W], least[3][ISOGI_TRACE__LANES / W], largest[3][ISOGI_TRACE__LANES / W];                          \
-        to->alike = 0, to->rows = 0;                                                                                                       \
+        to->alike = to->variance = 0;                                                                                                      \
         for (l = 0; l < parts; l++) {                                                                                                      \
             const F none = ISOGI_TRACE__FLOATS(F, isogi_trace__nought);                                                                    \
             total[l] = none, m[0][l] = none, m[1][l] = none, m[2][l] = none, m[3][l] = none, m[4][l] = none, m[5][l] = none;               \
@@ -5440,7 +5442,8 @@ static const int isogi_trace__rows[ISOGI_TRACE__ROWS][2] = {{-1, -3}, {0, -3}, {
             }                                                                                                                              \
             to->rgb[i] = moment[i] < low ? low : moment[i] > high ? high : moment[i];                                                      \
         }                                                                                                                                  \
-        to->rows = rows, squares = moment[3], to->variance = moment[4], to->lights = moment[5] > 0 ? moment[5] : 0, to->alike = 1 / squares;\
+        squares = moment[3], to->variance = moment[4], to->lights = moment[5] > 0 ? moment[5] : 0, to->alike = 1 / squares;                \
+        to->rows = rows;                                                                                                                   \
     }
 
 #define ISOGI_TRACE__BLEND_CHANNEL(F, PICK, LESS, MORE, a)                                         \
@@ -5598,7 +5601,10 @@ static void isogi_trace__block_fill(const isogi_trace *t, const size_t brick[3],
         b->guessed[at] = isogi_trace__bounded(g->samples < ISOGI_TRACE__NOISE_KNOWN ? luminance * luminance * one : noise);
         b->noise[at] = (float)((second ? ISOGI_TRACE__NOISE_PILOT : 1) * (ISOGI_TRACE__NOISE / 2 + ISOGI_TRACE__NOISE_FEW / 2 * one));
         b->lights[at] = isogi_trace__bounded((double)g->lights);
-        for (a = 0; a < 3; a++) b->normal[a][at] = g->normal[a], b->mean[a][at] = b->series ? (float)((double)g->mean[a] * most) : g->mean[a];
+        for (a = 0; a < 3; a++) {
+            b->normal[a][at] = g->normal[a];
+            b->mean[a][at] = b->series ? (float)((double)g->mean[a] * most) : g->mean[a];
+        }
         if (!b->tinted) continue;
         b->hidden[at] = g->hidden, b->reflected[at] = (float)((double)g->reflected * most);
         for (a = 0; a < 3; a++) b->albedo[a][at] = g->albedo[a], b->glow[a][at] = isogi_trace__bounded((double)g->glow[a] * most);

@@ -877,6 +877,29 @@ TEST(capped_border_is_a_surface) {
     scene_free(&s);
 }
 
+/* Where two of its faces meet the surface looks half way between them, whatever part of the distance of voxels stands in the axes. */
+TEST(edges_of_caps_look_half_way_between_faces) {
+    static float data[9 * 9 * 9], texel[9][9][9][3];
+    const isogi_light sun = {.kind = ISOGI_LIGHT_DIRECTIONAL, .vector = {0, 1, 0}, .rgb = {1, 1, 1}};
+    for (int i = 0; i < 9 * 9 * 9; i++) data[i] = 1;
+    for (int k = 0; k < 4; k++) {
+        isogi_volume v = {.data = data, .type = ISOGI_F32, .size = {9, 9, 9}, .spacing = {1, 1, 1}, .axes = {1, 0, 0, 0, 1, 0, 0, 0, 1}};
+        isogi_trace_desc d = {.lighting = {.lights = &sun, .light_count = 1}, .capped = 1, .samples = 1};
+        isogi_pyramid *pyramid;
+        isogi_trace *t = NULL;
+        *(k & 1 ? &v.axes[0] : &v.spacing[0]) = k & 2 ? 10 : 0.1;
+        CHECK(isogi_vol_build(&pyramid, &v, NULL) == ISOGI_OK, "build");
+        d.pyramid = pyramid;
+        CHECK(isogi_trace_create(&t, &d, NULL) == ISOGI_OK && isogi_trace_step(t, 0, NULL) == ISOGI_OK &&
+                  isogi_trace_export(t, ISOGI_TRACE_FLOAT, texel, sizeof texel) == ISOGI_OK,
+              "bake");
+        CHECK(fabs((double)texel[4][8][4][0] - 1) < 1e-5 && fabs((double)texel[4][8][0][0] - sqrt(0.5)) < 1e-5 &&
+                  fabs((double)texel[8][8][8][0] - sqrt(1 / 3.0)) < 1e-5,
+              "%d: face %g, edge %g, corner %g", k, (double)texel[4][8][4][0], (double)texel[4][8][0][0], (double)texel[8][8][8][0]);
+        isogi_trace_free(t), isogi_vol_free(pyramid);
+    }
+}
+
 /* The cap closes every isovalue, though no voxel lies below the interval there: the interval must not leave its texels out. */
 static double block_falling_at_one_side(const double p[3], const double *unused) {
     (void)unused;

@@ -620,7 +620,8 @@ TEST(transfer_is_filtered) {
             bake_series(d, (const float(*)[3])points, n, e);
             square[run % 2] += pow(series_error((const float(*)[SERIES])e, (const float(*)[SERIES])reference, n), 2) / runs;
         }
-        printf("    %d samples: error %.4f, unfiltered %.4f: %.3f\n", d.samples, sqrt(square[0]), sqrt(square[1]), sqrt(square[0] / square[1]));
+        printf("    %d samples: error %.4f, unfiltered %.4f: %.3f\n", d.samples, sqrt(square[0]), sqrt(square[1]),
+               sqrt(square[0] / square[1]));
         CHECK(n > 100 && sqrt(square[0]) < (d.samples > 16 ? 0.45 : 0.25) * sqrt(square[1]), "%d samples: error %.4f, unfiltered %.4f",
               d.samples, sqrt(square[0]), sqrt(square[1]));
     }
@@ -651,7 +652,8 @@ TEST(transfer_is_not_shared_across_walls) {
         square[run % 2] += pow(series_error((const float(*)[SERIES])e, (const float(*)[SERIES])reference, POINTS), 2) / RUNS;
         for (int i = 0; i < POINTS; i++) toward[run % 2] += (double)e[i][3] / (double)reference[i][3] / (POINTS * RUNS);
     }
-    printf("    error %.4f, unfiltered %.4f; from the side: %.3f, %.3f of the light\n", sqrt(square[0]), sqrt(square[1]), toward[0], toward[1]);
+    printf("    error %.4f, unfiltered %.4f; from the side: %.3f, %.3f of the light\n", sqrt(square[0]), sqrt(square[1]), toward[0],
+           toward[1]);
     CHECK(sqrt(square[0]) < 0.75 * sqrt(square[1]) && fabs(toward[0] - 1) < 0.03, "error %.4f, unfiltered %.4f; from the side %.3f",
           sqrt(square[0]), sqrt(square[1]), toward[0]);
     scene_free(&s);
