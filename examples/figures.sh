@@ -114,7 +114,7 @@ picture 10-vicinity "vicinity shading" $skull $few --mode vicinity
 
 head_of 11 "Textures beside path tracing; differences to it"
 compared 6-reference 11-irradiance "irradiance texture" $engine --samples $(samples 64)
-compared 6-reference 11-transfer "transfer of order 5, with $(samples 128)" $engine --mode transfer --samples $(samples 128)
+compared 6-reference 11-transfer "transfer of order 5" $engine --mode transfer --samples $(samples 64)
 
 head_of 12 "Texture of 1/8, 1 and 8 times the volume's resolution; differences to path tracing"
 picture 12-reference "path tracing" $skull $skull_sun --mode pathtrace --samples $(samples 64)

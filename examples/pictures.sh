@@ -49,4 +49,4 @@ strip figure-9 "--mode vicinity" "--mode lambert --fog 2" "--mode phong --ambien
 same="procedural:skull$coarse --camera 30,8,1.2 $(side 161)"
 strip figure-10 "--mode vicinity" "--env sky --bounces 0" "--env sky" "--env sky $reference"
 same="procedural:engine-block$coarse --camera 37,25,0.9 $(side 161) --env sky --light directional:0.4,0.8,0.45:3,2.8,2.4:20"
-strip figure-11 "" "--mode transfer --samples $(part 256)" "$reference"
+strip figure-11 "" "--mode transfer" "$reference"
