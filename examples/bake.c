@@ -82,7 +82,8 @@ static int bake(program *p) {
     }
     bake_say_end();
     if (result != ISOGI_OK) return file_fail(p->scene.error, "baking: %s", isogi_result_string(result));
-    if (interrupted) fprintf(stderr, "stopped with %.1f %% to do; the same command goes on\n", 100 * remaining);
+    if (interrupted && first < 0) fprintf(stderr, "stopped before it began; the same command goes on\n");
+    else if (interrupted) fprintf(stderr, "stopped with %.1f %% to do; the same command goes on\n", 100 * remaining);
     return 1;
 }
 
@@ -127,7 +128,7 @@ static int run(program *p, int argc, char **argv) {
     if (p->raw && !isogi_trace_export_size(p->trace, p->format)) return file_fail(s->error, "--format: this one is not for this mode");
     for (int i = 0; i < p->merge_count; i++)
         if (!bake_scene_load(s, p->trace, p->merge[i])) return 0;
-    if (!p->merge_count && access(s->out, F_OK) == 0 && !bake_scene_load(s, p->trace, s->out)) return 0;
+    if (access(s->out, F_OK) == 0 && !bake_scene_load(s, p->trace, s->out)) return 0;
     return bake(p) && bake_scene_save(s, p->trace, s->out) && (!p->raw || interrupted || write_raw(p));
 }
 

@@ -174,16 +174,14 @@ static int run(bake_scene *s, int argc, char **argv, int rank, int ranks) {
 
 int main(int argc, char **argv) {
     static bake_scene s;
-    int rank, ranks, ok;
+    int rank, ranks, ok, asked = 0;
     MPI_Init(&argc, &argv);
     MPI_Comm_rank(MPI_COMM_WORLD, &rank);
     MPI_Comm_size(MPI_COMM_WORLD, &ranks);
     for (int i = 1; i < argc; i++)
-        if (!strcmp(argv[i], "--help")) {
-            if (!rank) printf("mpirun -n N build/bake_mpi VOLUME --out FILE [options]\n%s", bake_scene_help);
-            return MPI_Finalize(), 0;
-        }
-    ok = run(&s, argc, argv, rank, ranks);
+        asked |= !strcmp(argv[i], "--help") || !strcmp(argv[i], "-h");
+    if (asked && !rank) printf("mpirun -n N build/bake_mpi VOLUME --out FILE [options]\n%s", bake_scene_help);
+    ok = (asked || run(&s, argc, argv, rank, ranks)) && file_printed(s.error);
     if (!ok && s.error[0]) fprintf(stderr, "bake_mpi: %s\n", s.error);
     bake_scene_free(&s);
     MPI_Finalize();

@@ -1437,6 +1437,7 @@ static int render_volume(viewer *v) {
     if (!set_transfer(v)) return 0;
     set_visibility(v, &desc);
     result = isogi_dvr_create(&dvr, &desc, &context);
+    if (v->o.has_spacing && result == ISOGI_TOO_LARGE) at_fault = "steps of the shortest --spacing on a ray";
     if (v->o.has_step && result == ISOGI_TOO_LARGE) at_fault = v->o.grid[0] ? "--step or --grid" : "--step: samples on a ray";
     if (result == ISOGI_OK) result = isogi_dvr_set_transfer(dvr, &v->transfer.transfer);
     if (result == ISOGI_OK) result = isogi_dvr_set_clip(dvr, (const double(*)[4])v->o.clip, v->o.clip_count);

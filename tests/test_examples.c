@@ -215,6 +215,31 @@ TEST(bad_bakes_get_one_line) {
     for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) check_kept("build/bake", bad[i][0], 1, bad[i][1]);
 }
 
+/* What --out holds is kept whatever is merged into it; a texture of another bake, or what is none, is refused. */
+TEST(merges_go_on_from_what_is_there) {
+    static const char bake[] = "procedural:gyroid:8 --samples 4 --threads 1", *const boxes[2] = {"0,0,0,8,8,3", "0,0,3,8,8,8"};
+    unsigned char *file[2] = {NULL, NULL};
+    char arguments[1024], error[FILE_ERROR_SIZE], part[256];
+    size_t size[2] = {0, 0};
+    strcpy(part, temporary("part"));
+    for (int i = 0; i < 4; i++) { /* all at once; one part, the other one, and both of them */
+        snprintf(arguments, sizeof arguments, "%s --out '%s' %s%s%s%s%s", bake, i == 1 ? part : temporary(i ? "merged" : "whole"),
+                 i % 3 ? "--box " : "", i % 3 ? boxes[i - 1] : "", i == 3 ? "--merge '" : "", i == 3 ? part : "", i == 3 ? "'" : "");
+        run_result r = run_program("build/bake", arguments);
+        CHECK(r.status == 0, "%s: status %d: %s", arguments, r.status, r.error);
+    }
+    for (int i = 0; i < 2; i++)
+        CHECK(file_read(temporary(i ? "merged" : "whole"), 1 << 20, &file[i], &size[i], error), "%s", error);
+    CHECK(size[0] && size[0] == size[1] && file[0] && file[1] && !memcmp(file[0], file[1], size[0]), "%zu and %zu bytes", size[0], size[1]);
+    for (int i = 0; i < 2; i++) free(file[i]);
+    snprintf(arguments, sizeof arguments, "%s --merge '%s' --out '%%s'", bake, part);
+    check_kept("build/bake", arguments, 1, "is damaged");
+    snprintf(arguments, sizeof arguments, "procedural:gyroid:8 --samples 2 --out '%s'", temporary("two"));
+    CHECK(run_program("build/bake", arguments).status == 0, "%s", arguments);
+    snprintf(arguments, sizeof arguments, "%s --merge '%s' --out '%s'", bake, part, temporary("two"));
+    check_refusal("build/bake", arguments, 1, "holds another texture");
+}
+
 /* A file is known by what it is, not by how it is called. */
 TEST(what_is_read_is_not_overwritten) {
     static const unsigned char pixel[3] = {1, 2, 3};

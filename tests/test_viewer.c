@@ -765,7 +765,8 @@ TEST(bad_environments_and_transfer_functions_get_one_line) {
         {"#?RADIANCE\n\n+X 4 -Y 4\n", "columns"}, {"#?RADIANCE\n\n-Y 0 +X 4\nabcd", "claims"},
         {"#?RADIANCE\n\n-Y 99999999 +X 99999999\nabcd", "claims"},
         {"#?RADIANCE\n\n-Y 32768 +X 32768\nabcd", "claims"}, {"#?RADIANCE\nFORMAT=32-bit_rle_xyze\n\n-Y 1 +X 1\nabcd", "FORMAT"},
-        {"#?RADIANCE\nEXPOSURE=0\n\n-Y 1 +X 1\nabcd", "exposure"}, {"#?RADIANCE\n\n-Y 2 +X 2\nabcdabcd", "row 1"}};
+        {"#?RADIANCE\nEXPOSURE=0\n\n-Y 1 +X 1\nabcd", "exposure"}, {"#?RADIANCE\nEXPOSURE=x\n\n-Y 1 +X 1\nabcd", "exposure"},
+        {"#?RADIANCE\n\n-Y 2 +X 2\nabcdabcd", "row 1"}};
     static const char *const tf[][2] = {{"", "no point"}, {"# only words\n", "no point"}, {"1 2 3\n", "line 1"},
         {"1 0 0 0 0\n0 0 0 0 0\n", "ascend"},
         {"1 -1 0 0 0\n", "line 1"}, {"1 0 2 0 0\n", "colour"}, {"\n\nnan 0 0 0 0\n", "line 3"}, {"peak 1 2 1 1 1\n", "opacity"},

@@ -45,8 +45,9 @@ static inline int hdr_header(hdr_source *in, int *width, int *height, char sign[
         double factor;
         if (!strncmp(line, "FORMAT=", 7) && !strstr(line, "32-bit_rle_rgbe"))
             return file_fail(error, "has %.40s; 32-bit_rle_rgbe is read", line);
-        if (sscanf(line, "EXPOSURE=%lf", &factor) == 1) {
-            if (!(factor > 1e-20 && factor < 1e20)) return file_fail(error, "has an impossible exposure");
+        if (!strncmp(line, "EXPOSURE=", 9)) {
+            if (sscanf(line + 9, "%lf", &factor) != 1 || !(factor > 1e-20 && factor < 1e20))
+                return file_fail(error, "has an impossible exposure");
             *exposure = (float)((double)*exposure / factor);
         }
     }
