@@ -99,10 +99,10 @@
      first has smoothed); their samples are well spread together. With each sample go two to four rays drawn by the brightness of an uneven
      image: they need no probe, and take a quarter to two fifths of the error that one of them leaves. Lights are not filtered, so that
      their shadows stay sharp (desc.unfiltered: nothing is); where one is wide, with soft shadows everywhere, all are sampled up to four
-     times as often instead. Of TRANSFER all coefficients are read from that plane, in one round; how much light comes, and from where, must
-     be alike (the first four). Probes cost accuracy: half a per cent of the mean and 1.8 % at a point in narrow channels of albedo 0.8
-     (test_trace_bake --long prints it). Lazy and adaptive bakes take samples in blocks of 4, 16, 64, ... and every other texel along each
-     axis first: soon every lookup has a value.
+     times as often instead. Of TRANSFER all coefficients are read from that plane, in one round; the first four must be alike, and of
+     each band as much is left to the texel as it differs from that by more than noise. Probes cost accuracy: half a per cent of the mean
+     and 1.8 % at a point in narrow channels of albedo 0.8 (test_trace_bake --long prints it). Lazy and adaptive bakes take samples in
+     blocks of 4, 16, 64, ... and every other texel along each axis first: soon every lookup has a value.
      A hit from within (only through an open border can a ray get there) is a surface too, with its normal turned.
 
    GLSL that lights a surface by an exported irradiance texture (GL_LINEAR, GL_CLAMP_TO_EDGE); grid: voxel coordinates
@@ -277,7 +277,8 @@ typedef struct isogi_trace_desc {
                                   open texel gets, averaged over all orientations, or once more samples would hardly lower it: light
                                   from probes is itself uncertain by 2 %; 0 = every texel gets all its samples */
     int unfiltered;            /* non-zero: FEEDBACK averages no light over neighbouring texels, to see what that is worth: the same error
-                                  takes four to ten times the samples, where they are few (make bench, rows filter-) */
+                                  takes four to ten times the samples, where they are few (make bench, rows filter-); of TRANSFER five to
+                                  twenty times */
     uint64_t seed;
     float offset;              /* rays start this many voxels (in grid coordinates: wherever voxels are longer, so is the way) along
                                   the normal, up to 1 (a wall may be that thin); 0 = 0.25;
@@ -555,6 +556,7 @@ ISOGI_API size_t isogi_trace_memory(const isogi_trace *trace); /* bytes that the
 #define ISOGI_TRACE__PILOT_SAMPLES 4 /* from so many on the filter goes in two rounds, */
 #define ISOGI_TRACE__NOISE_PILOT 2.0 /* and its second takes so many times the variance of the first for noise */
 #define ISOGI_TRACE__SPREAD 5.0     /* of transfer: variance that n well spread directions leave, times n * n */
+#define ISOGI_TRACE__SPREAD_FROM 16.0 /* of its higher bands: samples from which on theirs falls like that */
 #define ISOGI_TRACE__RIDGE 3.0      /* samples of the texel itself, a texel away, that say that light is the same everywhere */
 #define ISOGI_TRACE__SHEET 0.7      /* texels between two isosurfaces that the filter takes for one */
 #define ISOGI_TRACE__FILTER 12      /* squared distance of the farthest texels of the filter, */
@@ -2966,7 +2968,7 @@ static void isogi_trace__irradiance(const isogi_trace *t, const float *values, d
 
 /* Variance of a texel's luminance. TRANSFER: a sample is X = pi * throughput * L(direction it left in), throughput at most 1, so that
    E[X^2] <= pi * (E under the lighting's square), and the luminance of a square is no less than the square of the luminance; its
-   record holds 1 / sqrt(samples). */
+   record holds 1 / sqrt(samples), of as many samples as what it shares is as good as, and of what the filter blurs. */
 static double isogi_trace__variance(const isogi_trace *t, const float *values, double error, const double rgb[3]) {
     int count = t->scene.desc.order * t->scene.desc.order, channels = t->scene.desc.transfer_channels, k, c;
     double square[3] = {0, 0, 0}, sky[3], spread;
@@ -3485,14 +3487,15 @@ typedef struct isogi_trace__segment {
     double settled;         /* the largest value of the other entries */
 } isogi_trace__segment;
 
-/* What the filter compares. pilot: luminance by its first round, and the variance of that. lights: variance of the light that is not
-   filtered. albedo, glow: of the surface through the texel, which is the one that its rays meet. steep: by how much the field changes
-   from texel to texel, along its gradient. */
+/* What the filter compares; of transfer see isogi_trace__guide_series. pilot: luminance by its first round, and the variance of that.
+   lights: variance of the light that is not filtered. albedo, glow: of the surface through the texel, which is the one that its rays meet.
+   steep: by how much the field changes from texel to texel, along its gradient. */
 typedef struct isogi_trace__guide {
     double isovalue, steep;
     float normal[3], mean[3], luminance, variance, pilot, pilot_variance, lights;
     uint32_t samples; /* 0: nothing was gathered */
     float albedo[3], glow[3];
+    float spread;            /* of transfer: variance of a coefficient of higher bands */
     float hidden, reflected; /* share of rays that hit, and luminance of what was reflected there */
 } isogi_trace__guide;
 
@@ -5177,8 +5180,8 @@ static double isogi_trace__light_variance(const isogi_trace__node *n) {
 }
 
 /* What the filter compares of transfer: the first four coefficients, how much light in `luminance` and from where in `mean`. Their variance
-   is that of whether rays escape, of which the first one shows a fourth, and what directions leave that are well spread. Where all rays
-   escape the first one has none, and a single sample of the others 2 pi / 3 - pi / 4. */
+   is that of whether rays escape, of which the first one shows a fourth, and what directions leave that are well spread. Directions being
+   that, noise falls faster than with the number of samples: these rules are above it by up to two (tests/test_trace_bake.c). */
 static void isogi_trace__guide_series(const isogi_trace *t, const isogi_trace__node *n, const float *direct, const float *out,
                                       isogi_trace__guide *g) {
     const double escaped = (double)direct[0], one = 0.28209479177387814; /* each of the rays that did adds that */
@@ -5191,9 +5194,12 @@ static void isogi_trace__guide_series(const isogi_trace *t, const isogi_trace__n
         else g->luminance = (float)isogi_trace__luminance(rgb);
     }
     if (t->scene.desc.order < 2) g->mean[0] = g->mean[1] = g->mean[2] = 0;
-    variance = 4 * ISOGI_TRACE__PI * ISOGI_TRACE__PI *
+    variance = ISOGI_TRACE__PI * ISOGI_TRACE__PI *
                isogi_trace__mean_variance((double)g->luminance * samples / ISOGI_TRACE__PI, escaped * one + n->bounce_square, samples);
-    g->variance = (float)(variance + ISOGI_TRACE__SPREAD / (samples * samples));
+    if (samples > 3) variance /= sqrt(samples);
+    g->variance = (float)(t->scene.desc.order < 2 ? variance : 4 * variance + ISOGI_TRACE__SPREAD / (samples * samples));
+    g->spread = (float)(ISOGI_TRACE__PI * ISOGI_TRACE__PI * (escaped * one + n->bounce_square) / (samples * samples));
+    if (samples > ISOGI_TRACE__SPREAD_FROM) g->spread *= (float)(ISOGI_TRACE__SPREAD_FROM / samples);
 }
 
 /* The part of a texel's irradiance that neighbours may share, and its variance: what comes from the sky, by both kinds of rays, and by
@@ -5548,7 +5554,7 @@ static void isogi_trace__block_find(const isogi_trace *t, const size_t brick[3],
                     const uint32_t slot = isogi_trace__lowest_bit(held), node = other->node[slot], x = first[0] + slot % 4,
                                    row = first[1] + slot / 4 % 4 + ISOGI_TRACE__ROW * (first[2] + slot / 16);
                     if (!node) continue;
-                    b->light[row * ISOGI_TRACE__ROW + x] = isogi_trace__light_at(set, node - 1, (size_t)t->values);
+                    if (b->series) b->light[row * ISOGI_TRACE__ROW + x] = isogi_trace__light_at(set, node - 1, (size_t)t->values);
                     b->guide[b->count] = isogi_trace__guide_at(set, node - 1);
                     ISOGI_TRACE__AHEAD(b->guide[b->count]);
                     ISOGI_TRACE__AHEAD((const char *)b->guide[b->count] + sizeof(isogi_trace__guide) - 1);
@@ -5564,7 +5570,7 @@ static double isogi_trace__within_both(double x, double most) { return x > most 
 static float isogi_trace__bounded(double x) { return (float)(x < 1e30 ? x : 1e30); }
 
 /* Whether the filter goes in two rounds: the second tells light that differs from light that is noisy by what the first has found. Of few
-   samples that brings nothing. */
+   samples that brings nothing, and transfer tells by its bands. */
 static int isogi_trace__piloted(const isogi_trace *t) {
     return t->scene.desc.mode == ISOGI_TRACE_IRRADIANCE && !t->scene.desc.unfiltered && t->scene.desc.samples >= ISOGI_TRACE__PILOT_SAMPLES;
 }
@@ -5575,6 +5581,7 @@ static void isogi_trace__block_fill(const isogi_trace *t, const size_t brick[3],
     const int second = t->feedback->phase == ISOGI_TRACE__PUBLISH && isogi_trace__piloted(t);
     double most = 0, steepest = 0, base = 0;
     int i, a;
+    b->series = d->mode == ISOGI_TRACE_TRANSFER;
     memset(b->samples, 0, sizeof b->samples);
     isogi_trace__block_find(t, brick, b);
     for (i = 0; i < b->count; i++) {
@@ -5585,7 +5592,7 @@ static void isogi_trace__block_fill(const isogi_trace *t, const size_t brick[3],
     }
     most = most > 0 ? 1 / most : 1, steepest = 1 / (steepest > 1e-300 ? steepest : 1e-300);
     if (b->count) base = b->guide[0]->isovalue;
-    b->unit = 1 / most, b->series = d->mode == ISOGI_TRACE_TRANSFER, b->tinted = d->albedo_count || d->emission_count || d->material;
+    b->unit = 1 / most, b->tinted = d->albedo_count || d->emission_count || d->material;
     for (i = 0; i < b->count; i++) {
         const isogi_trace__guide *g = b->guide[i];
         const size_t at = b->at[i];
@@ -5611,18 +5618,34 @@ static void isogi_trace__block_fill(const isogi_trace *t, const size_t brick[3],
     }
 }
 
-/* Transfer of a texel with what it shares. */
-static void isogi_trace__blend_series(const isogi_trace *t, const isogi_trace__dense *b, isogi_trace__blend *blend) {
-    const size_t v = (size_t)t->values;
-    size_t i, l, a;
-    for (a = 0; a < v; a++) blend->series[a] = 0;
+/* Transfer of a texel with what it shares; of that less, band by band, where it differs from what the texel has gathered itself by more
+   than noise does (shrinkage, James and Stein 1961): higher bands have not been compared before. The first two bands go together. */
+static void isogi_trace__blend_series(const isogi_trace *t, const isogi_trace__dense *b, size_t node, isogi_trace__blend *blend) {
+    const isogi_trace__set *set = &t->feedback->texels;
+    const isogi_trace__guide *g = isogi_trace__guide_at(set, node);
+    const size_t v = (size_t)t->values, channels = (size_t)t->scene.desc.transfer_channels, lanes = 8;
+    const float *own = isogi_trace__light_at(set, node, v), *light[ISOGI_TRACE__ROWS * ISOGI_TRACE__LANES];
+    float weight[ISOGI_TRACE__ROWS * ISOGI_TRACE__LANES];
+    size_t count = 0, i, l, a, band, begin, end;
     for (i = 0; i < (size_t)blend->rows; i++)
-        for (l = 0; l < ISOGI_TRACE__LANES; l++) {
-            const float w = blend->weight[i][l], *light;
-            if (!(w < 0 || w > 0)) continue;
-            light = b->light[blend->start[i] + l];
-            for (a = 0; a < v; a++) blend->series[a] += w * light[a];
-        }
+        for (l = 0; l < ISOGI_TRACE__LANES; l++)
+            if (blend->weight[i][l] < 0 || blend->weight[i][l] > 0)
+                weight[count] = blend->weight[i][l], light[count++] = b->light[blend->start[i] + l];
+    for (a = 0; a + lanes <= v; a += lanes) { /* the compiler makes vectors of them */
+        float sum[8] = {0};
+        for (i = 0; i < count; i++)
+            for (l = 0; l < 8; l++) sum[l] += weight[i] * light[i][a + l];
+        memcpy(blend->series + a, sum, sizeof sum);
+    }
+    for (; a < v; a++)
+        for (i = 0, blend->series[a] = 0; i < count; i++) blend->series[a] += weight[i] * light[i][a];
+    for (band = t->scene.desc.order > 1, begin = 0; begin < v; band++, begin = end) {
+        double apart = 0, noise = band < 2 ? (double)g->variance : (double)(2 * band + 1) * (double)g->spread, own_part;
+        end = (band + 1) * (band + 1) * channels;
+        for (a = begin; a < end; a++) apart += ((double)own[a] - (double)blend->series[a]) * ((double)own[a] - (double)blend->series[a]);
+        apart /= (double)channels, own_part = apart > noise ? 1 - noise / apart : 0;
+        for (a = begin; a < end; a++) blend->series[a] += (float)(own_part * ((double)own[a] - (double)blend->series[a]));
+    }
 }
 
 /* Light and error of a texel into its brick. blend: what it shares with those around; NULL where nothing is filtered. */
@@ -5690,7 +5713,7 @@ static void isogi_trace__publish_brick(isogi_trace *t, size_t i, isogi_trace__de
         if (!filled) isogi_trace__block_fill(t, brick, b);
         filled = 1;
         isogi_trace__blend_of(t, b, first + slot % 4 + ISOGI_TRACE__ROW * (slot / 4 % 4 + ISOGI_TRACE__ROW * (slot / 16)), &blend);
-        if (b->series && blend.alike > 0) isogi_trace__blend_series(t, b, &blend);
+        if (b->series && blend.alike > 0) isogi_trace__blend_series(t, b, node - 1, &blend);
         blend.variance *= b->unit * b->unit;
         if (first_round) isogi_trace__pilot(t, node - 1, blend.alike > 0 ? &blend : NULL);
         else isogi_trace__publish(t, node - 1, blend.alike > 0 ? &blend : NULL);
@@ -5819,14 +5842,17 @@ static size_t isogi_trace__phase_tasks(const isogi_trace__feedback *f) {
     return (nodes + ISOGI_TRACE__SWEEP - 1) / ISOGI_TRACE__SWEEP;
 }
 
-/* Rays that take as long as one of them: one for 64 hits, for 8 nodes that are read in passing, for 2 that are filtered or
-   given back. */
-static uint64_t isogi_trace__phase_cost(const isogi_trace__feedback *f, size_t task) {
+/* Rays that take as long as one of them: one for 64 hits, for 8 nodes that are read in passing, for 2 that are filtered (of transfer for
+   8 of their values, too) or given back. */
+static uint64_t isogi_trace__phase_cost(const isogi_trace *t, size_t task) {
+    const isogi_trace__feedback *f = t->feedback;
     const isogi_trace__segment *s = f->phase == ISOGI_TRACE__PASS ? f->probes.segments : f->texels.segments; /* NULL without hits */
     if (f->phase == ISOGI_TRACE__SOLVE) return ISOGI_TRACE__CHUNK / 4;
     if (f->phase == ISOGI_TRACE__PASS) return s[task].entries / 8 + s[task].hits / 64 + 1;
     if (f->phase == ISOGI_TRACE__BOUNCE)
         return ISOGI_TRACE__SWEEP / 8 + s[f->segment].hits * ISOGI_TRACE__SWEEP / s[f->segment].entries / 64;
+    if (isogi_trace__publishing(f) && t->scene.desc.mode == ISOGI_TRACE_TRANSFER && !t->scene.desc.unfiltered)
+        return ISOGI_TRACE__SWEEP / 2 + ISOGI_TRACE__SWEEP / 8 * (uint64_t)t->values;
     return isogi_trace__publishing(f) || f->phase == ISOGI_TRACE__FORGET ? ISOGI_TRACE__SWEEP / 2 : ISOGI_TRACE__SWEEP / 8;
 }
 
@@ -5888,7 +5914,7 @@ static uint64_t isogi_trace__carry(isogi_trace *t, uint64_t limit) {
     isogi_context silent = t->context;
     silent.progress = NULL;
     if (f->phase == ISOGI_TRACE__FINISH && tasks > f->carried + counts) tasks = f->carried + counts;
-    while (f->carried + count < tasks && cost < limit) cost += isogi_trace__phase_cost(f, f->carried + count++);
+    while (f->carried + count < tasks && cost < limit) cost += isogi_trace__phase_cost(t, f->carried + count++);
     if (f->phase == ISOGI_TRACE__FORGET) /* memory is given back one by one */
         for (i = 0; i < count; i++) isogi_trace__phase_task(t, i);
     else if (count) {
@@ -7479,6 +7505,7 @@ ISOGI_API isogi_result isogi_trace_gather_field(const isogi_trace_desc *desc, is
 #undef ISOGI_TRACE__PILOT_SAMPLES
 #undef ISOGI_TRACE__NOISE_PILOT
 #undef ISOGI_TRACE__SPREAD
+#undef ISOGI_TRACE__SPREAD_FROM
 #undef ISOGI_TRACE__RIDGE
 #undef ISOGI_TRACE__SHEET
 #undef ISOGI_TRACE__FILTER
