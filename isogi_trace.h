@@ -555,8 +555,8 @@ ISOGI_API size_t isogi_trace_memory(const isogi_trace *trace); /* bytes that the
 #define ISOGI_TRACE__NOISE_KNOWN 3  /* with fewer than this nothing is known of it */
 #define ISOGI_TRACE__PILOT_SAMPLES 4 /* from so many on the filter goes in two rounds, */
 #define ISOGI_TRACE__NOISE_PILOT 2.0 /* and its second takes so many times the variance of the first for noise */
-#define ISOGI_TRACE__SPREAD 5.0     /* of transfer: variance that n well spread directions leave, times n * n */
-#define ISOGI_TRACE__SPREAD_FROM 16.0 /* of its higher bands: samples from which on theirs falls like that */
+#define ISOGI_TRACE__SPREAD 1.25    /* of transfer: variance that n well spread directions leave, times n * n */
+#define ISOGI_TRACE__SPREAD_FROM 16.0 /* of the higher bands: samples from which on theirs falls like that */
 #define ISOGI_TRACE__RIDGE 3.0      /* samples of the texel itself, a texel away, that say that light is the same everywhere */
 #define ISOGI_TRACE__SHEET 0.7      /* texels between two isosurfaces that the filter takes for one */
 #define ISOGI_TRACE__FILTER 12      /* squared distance of the farthest texels of the filter, */
@@ -5197,7 +5197,8 @@ static void isogi_trace__guide_series(const isogi_trace *t, const isogi_trace__n
     variance = ISOGI_TRACE__PI * ISOGI_TRACE__PI *
                isogi_trace__mean_variance((double)g->luminance * samples / ISOGI_TRACE__PI, escaped * one + n->bounce_square, samples);
     if (samples > 3) variance /= sqrt(samples);
-    g->variance = (float)(t->scene.desc.order < 2 ? variance : 4 * variance + ISOGI_TRACE__SPREAD / (samples * samples));
+    if (samples < ISOGI_TRACE__NOISE_KNOWN) variance = (double)g->luminance * (double)g->luminance / samples;
+    g->variance = (float)((t->scene.desc.order < 2 ? 1 : 4) * (variance + ISOGI_TRACE__SPREAD / (samples * samples)));
     g->spread = (float)(ISOGI_TRACE__PI * ISOGI_TRACE__PI * (escaped * one + n->bounce_square) / (samples * samples));
     if (samples > ISOGI_TRACE__SPREAD_FROM) g->spread *= (float)(ISOGI_TRACE__SPREAD_FROM / samples);
 }

@@ -628,6 +628,32 @@ TEST(transfer_is_filtered) {
     scene_free(&s);
 }
 
+/* So it is with one sample, of which no noise is known, and of any order: what an even sky brings to a pit. */
+TEST(few_samples_of_transfer_are_filtered) {
+    enum { POINTS = 200 };
+    static float points[POINTS][3], e[POINTS][3], reference[POINTS][3];
+    double q[5] = {24, 22, 24, 26, 16};
+    scene s = scene_make(48, 48, 48, NULL, pit, q);
+    int n = surface_points(&s, 0, POINTS, 7, points);
+    isogi_trace_desc d = desc_make(&s, 0, 0, 1024);
+    d.lazy = 1;
+    bake_and_sample(&d, NULL, (const float(*)[3])points, n, reference);
+    d.method = ISOGI_TRACE_FEEDBACK, d.mode = ISOGI_TRACE_TRANSFER, d.lazy = 0, d.isovalue_min = -0.01, d.isovalue_max = 0.01;
+    for (d.order = 1; d.order <= 5; d.order += d.order)
+        for (d.samples = 1; d.samples <= 4; d.samples *= 2) {
+            double square[2] = {0, 0};
+            for (d.unfiltered = 0; d.unfiltered < 2; d.unfiltered++) {
+                bake_and_sample(&d, NULL, (const float(*)[3])points, n, e);
+                for (int i = 0; i < n; i++) square[d.unfiltered] += pow((double)e[i][1] - (double)reference[i][1], 2) / n;
+            }
+            printf("    order %d, %d samples: error %.4f, unfiltered %.4f: %.3f\n", d.order, d.samples, sqrt(square[0]), sqrt(square[1]),
+                   sqrt(square[0] / square[1]));
+            CHECK(n > 100 && sqrt(square[0]) < 0.6 * sqrt(square[1]), "order %d, %d samples: error %.4f, unfiltered %.4f", d.order,
+                  d.samples, sqrt(square[0]), sqrt(square[1]));
+        }
+    scene_free(&s);
+}
+
 static double wall_on_ground(const double p[3], const double *q) {
     double wall = q[1] - fabs(p[0] - q[2]), top = q[3] - p[1], plane = q[0] - p[1];
     wall = wall < top ? wall : top;
