@@ -698,7 +698,7 @@ TEST(fine_detail_of_transfer_is_kept) {
     static float points[POINTS][3], e[POINTS][3], error[POINTS], reference[POINTS][3];
     const isogi_light sun = light_make(ISOGI_LIGHT_DIRECTIONAL, 0.5, 0.8, 0.3, 3, 0);
     double q[4] = {6, 8, 1.2, 12}, square[3] = {0, 0, 0};
-    scene s = scene_make(48, 48, 48, NULL, bars_over_ground, q);
+    scene s = scene_make(32, 24, 24, NULL, bars_over_ground, q);
     int n = surface_points(&s, 0, POINTS, 7, points), covered = 0;
     for (int run = 0; run < 3; run++) {
         isogi_trace_desc d = desc_make(&s, 0, 0, run ? 256 : 2048);
