@@ -5624,7 +5624,7 @@ static void isogi_trace__block_fill(const isogi_trace *t, const size_t brick[3],
 static void isogi_trace__blend_series(const isogi_trace *t, const isogi_trace__dense *b, size_t node, isogi_trace__blend *blend) {
     const isogi_trace__set *set = &t->feedback->texels;
     const isogi_trace__guide *g = isogi_trace__guide_at(set, node);
-    const size_t v = (size_t)t->values, channels = (size_t)t->scene.desc.transfer_channels, lanes = 8;
+    const size_t v = (size_t)t->values, channels = (size_t)t->scene.desc.transfer_channels;
     const float *own = isogi_trace__light_at(set, node, v), *light[ISOGI_TRACE__ROWS * ISOGI_TRACE__LANES];
     float weight[ISOGI_TRACE__ROWS * ISOGI_TRACE__LANES];
     size_t count = 0, i, l, a, band, begin, end;
@@ -5632,10 +5632,10 @@ static void isogi_trace__blend_series(const isogi_trace *t, const isogi_trace__d
         for (l = 0; l < ISOGI_TRACE__LANES; l++)
             if (blend->weight[i][l] < 0 || blend->weight[i][l] > 0)
                 weight[count] = blend->weight[i][l], light[count++] = b->light[blend->start[i] + l];
-    for (a = 0; a + lanes <= v; a += lanes) { /* the compiler makes vectors of them */
-        float sum[8] = {0};
+    for (a = 0; a + ISOGI_TRACE__LANES <= v; a += ISOGI_TRACE__LANES) { /* the compiler makes vectors of them */
+        float sum[ISOGI_TRACE__LANES] = {0};
         for (i = 0; i < count; i++)
-            for (l = 0; l < 8; l++) sum[l] += weight[i] * light[i][a + l];
+            for (l = 0; l < ISOGI_TRACE__LANES; l++) sum[l] += weight[i] * light[i][a + l];
         memcpy(blend->series + a, sum, sizeof sum);
     }
     for (; a < v; a++)
