@@ -277,8 +277,8 @@ typedef struct isogi_trace_desc {
                                   open texel gets, averaged over all orientations, or once more samples would hardly lower it: light
                                   from probes is itself uncertain by 2 %; 0 = every texel gets all its samples */
     int unfiltered;            /* non-zero: FEEDBACK averages no light over neighbouring texels, to see what that is worth: the same error
-                                  takes four to ten times the samples, where they are few (make bench, rows filter-); of TRANSFER five to
-                                  twenty times */
+                                  takes four to ten times the samples, where they are few (make bench, rows filter-); of TRANSFER three
+                                  to nine times */
     uint64_t seed;
     float offset;              /* rays start this many voxels (in grid coordinates: wherever voxels are longer, so is the way) along
                                   the normal, up to 1 (a wall may be that thin); 0 = 0.25;
