@@ -5181,7 +5181,7 @@ static double isogi_trace__light_variance(const isogi_trace__node *n) {
 
 /* What the filter compares of transfer: the first four coefficients, how much light in `luminance` and from where in `mean`. Their variance
    is that of whether rays escape, of which the first one shows a fourth, and what directions leave that are well spread. Directions being
-   that, noise falls faster than with the number of samples: these rules are above it by up to two (tests/test_trace_bake.c). */
+   that, noise falls faster than with the number of samples; these rules, by trial, are above it, by up to two. */
 static void isogi_trace__guide_series(const isogi_trace *t, const isogi_trace__node *n, const float *direct, const float *out,
                                       isogi_trace__guide *g) {
     const double escaped = (double)direct[0], one = 0.28209479177387814; /* each of the rays that did adds that */

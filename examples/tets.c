@@ -109,7 +109,9 @@ int main(int argc, char **argv) {
     unsigned char *bytes = (unsigned char *)malloc((size_t)side * (size_t)side * 3);
     if (!image || !bytes) return fprintf(stderr, "tets: out of memory\n"), 1;
     result = isogi_dvr_tets_render(built, &desc, data ? &surfaces : &thick, &view, image, NULL, NULL);
-    if (result != ISOGI_OK) return fprintf(stderr, "tets: %s: its points lie too far apart, or all in one place\n", argv[1]), 1;
+    if (result != ISOGI_OK)
+        return fprintf(stderr, "tets: %s: %s\n", argv[1],
+                       result == ISOGI_INVALID ? "its points lie too far apart, or all in one place" : isogi_result_string(result)), 1;
     const double behind[3] = {0.09, 0.095, 0.1};
     for (size_t i = 0; i < (size_t)side * (size_t)side; i++) {
         const size_t row = 2 * (size_t)side, at = 2 * (i / (size_t)side) * row + 2 * (i % (size_t)side);
