@@ -124,18 +124,19 @@
        #version 400 core
        uniform sampler3D transfer[7];
        uniform vec4 scale[7];         // isogi_trace_export_scales, the last three components 0
-       uniform vec3 lighting[28];     // isogi_sh_project of the lighting of this frame, order 5, the last three 0
+       uniform vec3 light[28], even[28]; // isogi_trace_lighting, of this frame, the last three 0
        uniform vec3 lattice_min, lattice_max, albedo;
        in vec3 grid;
        out vec4 colour;
        void main() {
-           vec3 size = vec3(textureSize(transfer[0], 0)), irradiance = vec3(0.0);
+           vec3 size = vec3(textureSize(transfer[0], 0)), irradiance = vec3(0.0), least = vec3(0.0);
            vec3 place = ((grid - lattice_min) / max(lattice_max - lattice_min, 1e-6) * (size - 1.0) + 0.5) / size;
            for (int p = 0; p < 7; p++) {
                vec4 t = scale[p] * texture(transfer[p], place);
-               irradiance += t.x * lighting[4 * p] + t.y * lighting[4 * p + 1] + t.z * lighting[4 * p + 2] + t.w * lighting[4 * p + 3];
+               irradiance += t.x * light[4 * p] + t.y * light[4 * p + 1] + t.z * light[4 * p + 2] + t.w * light[4 * p + 3];
+               least += t.x * even[4 * p] + t.y * even[4 * p + 1] + t.z * even[4 * p + 2] + t.w * even[4 * p + 3];
            }
-           colour = vec4(albedo * max(irradiance, 0.0) / 3.14159265, 1.0);
+           colour = vec4(albedo * max(max(irradiance, least), 0.0) / 3.14159265, 1.0);
        }
 
    Options, to be defined before the implementation
@@ -336,7 +337,7 @@ ISOGI_API isogi_result isogi_trace_step(isogi_trace *trace, uint64_t max_rays, d
    TRANSFER: under the lighting last given to isogi_trace_relight or isogi_trace_change (that of the description at first); its error is
    an upper bound.
    Irradiance below 0 is handed out as it is, here and by isogi_trace_gather: a sky that SH coefficients make negative somewhere brings
-   it, and so do the truncated series of TRANSFER where nearly all light is hidden. Before it is shown:  e = e > 0 ? e : 0  a channel.
+   it, and so does, with TRANSFER, an uneven one where nearly all light is hidden. Before it is shown:  e = e > 0 ? e : 0  a channel.
    Errors cover the true ones (twice the standard error in 95 % of points, with desc.error in 90 % or more, tests/test_trace_bake.c):
    they allow for what samples that agree may all have missed, and for probes 2 % of reflected light. That is too little where much of
    the light is reflected and comes from lights without size, whose shadows are hard: at albedo 0.8, in narrow tunnels, twice the error
@@ -352,14 +353,21 @@ ISOGI_API isogi_result isogi_trace_relight(isogi_trace *trace, const isogi_light
 /* TRANSFER only, for display: glossy light that the surface sends along the unit vector views[i] (away from it, towards the eye),
    about the mirrored direction r, for a Phong lobe of that exponent (0 or more; the order holds lobes up to about order^2) and
    reflectance 1; normals[i]: unit, on the side that is lit. An approximation: the lighting L is blurred by the lobe G and looked up
-   at r, exactly, but what stands in its way is judged apart from it, by the transfer blurred in the same way over that of an open
-   surface: radiance = (G * L)(r) min(1, (G * T)(r) / (G * cosine)(r)). Exact where nothing is in the way or the light is uniform
-   there; shadows come out as soft as the order, and light by reflections counts as openness. Zero where no texel is ready. */
+   at r, exactly (no less than what of it is even, see isogi_trace_lighting), but what stands in its way is judged apart from it, by the
+   transfer blurred in the same way over that of an open surface: radiance = (G * L)(r) min(1, (G * T)(r) / (G * cosine)(r)). Exact where
+   nothing is in the way or the light is uniform there; shadows come out as soft as the order, and light by reflections counts as
+   openness. Zero where no texel is ready. */
 ISOGI_API isogi_result isogi_trace_sample_gloss(const isogi_trace *trace, const float (*points)[3], const float (*normals)[3],
                                                 const float (*views)[3], double exponent, size_t count, float (*radiance)[3]);
-/* TRANSFER only: interpolated coefficients, transfer[count][order*order][channels], zeros where no texel is ready;
-   E = sum_i transfer_i light_i. */
+/* TRANSFER only: interpolated coefficients, transfer[count][order*order][channels], zeros where no texel is ready. */
 ISOGI_API isogi_result isogi_trace_sample_transfer(const isogi_trace *trace, const float (*points)[3], size_t count, float *transfer);
+/* TRANSFER only: the lighting last given as coefficients of RGB, light[order*order], and what of it is even, even[order*order] (either may
+   be NULL), such that a channel of E = max(sum_i transfer_i light_i, sum_i transfer_i even_i). Bright spots of the sky and lamps bring no
+   less than nothing; but where they are hidden, in narrow places, the truncated series takes light away, often more than all else brings
+   there. Even are coefficients that were given as such (env.sh), an image where it is cut at 4 times the mean of what the cut leaves
+   (seen in 32 x 16 blocks), and lights that do take light away (negative ones). */
+ISOGI_API isogi_result isogi_trace_lighting(const isogi_trace *trace, float (*light)[3], float (*even)[3]);
+
 /* ---- when something changes: only what depends on it is computed again ----
    Texels that are to be computed again keep their light until isogi_trace_step has come to them, can be read meanwhile, and count as
    drafts in isogi_trace_report. With PATHS the result is the same bits as a new bake; FEEDBACK begins with new probes, takes samples
@@ -516,6 +524,8 @@ ISOGI_API size_t isogi_trace_memory(const isogi_trace *trace); /* bytes that the
 #define ISOGI_TRACE__MAX_DEPTH 10000 /* of a path, so that nothing hangs */
 #define ISOGI_TRACE__MAX_ORDER 6
 #define ISOGI_TRACE__VALUES 108      /* of a texel: three channels of the largest order */
+#define ISOGI_TRACE__EVEN 4          /* TRANSFER: an image is even up to so many times its mean, */
+#define ISOGI_TRACE__EVEN_ROWS 16    /* looked at in so many rows of blocks, finer than the largest order */
 #define ISOGI_TRACE__NOT_READY HUGE_VALF
 #define ISOGI_TRACE__DEPTH 0.25 /* voxels that must be matter behind the surface of a texel of the high side, at once or up to a voxel on */
 #define ISOGI_TRACE__SAMPLES 32768 /* samples of a batch, */
@@ -2156,6 +2166,11 @@ static isogi_result isogi_trace__scene_set(isogi_trace__scene *scene, const isog
     return isogi_trace__sky_build(&scene->sky, &d->lighting.env, context);
 }
 
+/* TRANSFER: a lighting's coefficients, RGB interleaved: all of it, and what of it is even, see isogi_trace_lighting. */
+typedef struct isogi_trace__lit {
+    float all[ISOGI_TRACE__VALUES], even[ISOGI_TRACE__VALUES];
+} isogi_trace__lit;
+
 /* ==== the texture: bricks of texels, there where light was asked for ================================================= */
 
 enum {
@@ -2207,7 +2222,7 @@ struct isogi_trace {
     isogi_trace__wave *waves; /* PATHS: of tasks */
     isogi_counters *task_counters;
     isogi_counters counters;
-    float light[ISOGI_TRACE__VALUES]; /* TRANSFER: of the lighting, RGB interleaved */
+    isogi_trace__lit lit;             /* TRANSFER: the lighting */
     float square[ISOGI_TRACE__VALUES]; /* TRANSFER: of the lighting's square, for the error */
     isogi_trace *high; /* BOTH_SIDES: the other side's texture, owned */
     int wide;      /* AVX2 may be used */
@@ -2684,14 +2699,76 @@ static isogi_result isogi_trace__set_lattice(isogi_trace *t) {
     return ISOGI_OK;
 }
 
-static void isogi_trace__set_light(isogi_trace *t, const float *light) {
-    int order = t->scene.desc.order, k, c;
+static double isogi_trace__at_most(float x, double most) { return (double)x < most ? (double)x : most; }
+
+/* An image of the environment's blocks, in each channel cut at EVEN times its mean over the sphere, after the cut. */
+static void isogi_trace__even_image(float (*image)[2 * ISOGI_TRACE__EVEN_ROWS][3], const isogi_env *env) {
+    enum { ROWS = ISOGI_TRACE__EVEN_ROWS, COLUMNS = 2 * ROWS, ROUNDS = 20 };
+    size_t x, y, i, j, width = (size_t)env->width, height = (size_t)env->height;
+    int c, k;
+    for (y = 0; y < ROWS; y++)
+        for (x = 0; x < COLUMNS; x++) {
+            const size_t top = y * height / ROWS, bottom = (y + 1) * height / ROWS, left = x * width / COLUMNS;
+            const size_t right = (x + 1) * width / COLUMNS;
+            double sum[3] = {0, 0, 0}, count = 0;
+            for (j = top; j < bottom || j == top; j++)
+                for (i = left; i < right || i == left; i++, count++)
+                    for (c = 0; c < 3; c++) sum[c] += (double)env->rgb[3 * (j * width + i) + (size_t)c];
+            for (c = 0; c < 3; c++) image[y][x][c] = (float)(sum[c] / count);
+        }
+    for (c = 0; c < 3; c++) {
+        double most = DBL_MAX;
+        for (k = 0; k < ROUNDS; k++) { /* a lone sun in the dark is cut to nothing */
+            double sum = 0, weights = 0;
+            for (y = 0; y < ROWS; y++) {
+                const double weight = sin(ISOGI_TRACE__PI * ((double)y + 0.5) / ROWS);
+                for (x = 0; x < COLUMNS; x++) sum += weight * isogi_trace__at_most(image[y][x][c], most), weights += weight;
+            }
+            most = sum > 0 ? ISOGI_TRACE__EVEN * sum / weights : 0;
+        }
+        for (y = 0; y < ROWS; y++)
+            for (x = 0; x < COLUMNS; x++) image[y][x][c] = (float)isogi_trace__at_most(image[y][x][c], most);
+    }
+}
+
+/* A distant lighting as coefficients, and what of it is even, see isogi_trace_lighting. */
+static isogi_result isogi_trace__project(isogi_trace__lit *lit, int order, const isogi_lighting *lighting, const isogi_context *context) {
+    float(*image)[2 * ISOGI_TRACE__EVEN_ROWS][3], one[ISOGI_TRACE__VALUES];
+    isogi_lighting even = *lighting;
+    size_t i;
+    int k, n = 3 * order * order;
+    isogi_result result = isogi_sh_project(lit->all, order, lighting, NULL);
+    even.light_count = 0;
+    if (result == ISOGI_OK && even.env.rgb) {
+        image = (float(*)[2 * ISOGI_TRACE__EVEN_ROWS][3])isogi_allocate(context, ISOGI_TRACE__EVEN_ROWS, sizeof *image);
+        if (!image) return ISOGI_NO_MEMORY;
+        isogi_trace__even_image(image, &lighting->env);
+        even.env.rgb = image[0][0], even.env.width = 2 * ISOGI_TRACE__EVEN_ROWS, even.env.height = ISOGI_TRACE__EVEN_ROWS;
+        result = isogi_sh_project(lit->even, order, &even, NULL);
+        isogi_release(context, image, ISOGI_TRACE__EVEN_ROWS, sizeof *image);
+    } else if (result == ISOGI_OK) result = isogi_sh_project(lit->even, order, &even, NULL);
+    memset(&even, 0, sizeof even);
+    for (i = 0; i < lighting->light_count && result == ISOGI_OK; i++) {
+        isogi_light taking = lighting->lights[i];
+        for (k = 0; k < 3; k++) taking.rgb[k] = taking.rgb[k] < 0 ? taking.rgb[k] : 0;
+        if (!(taking.rgb[0] < 0 || taking.rgb[1] < 0 || taking.rgb[2] < 0)) continue;
+        even.lights = &taking, even.light_count = 1;
+        result = isogi_sh_project(one, order, &even, NULL);
+        for (k = 0; k < n && result == ISOGI_OK; k++) lit->even[k] += one[k];
+    }
+    return result;
+}
+
+static void isogi_trace__set_light(isogi_trace *t, const isogi_trace__lit *lit) {
+    int order = t->scene.desc.order, n = 3 * order * order, k, c;
+    float both[2 * ISOGI_TRACE__VALUES];
     float one[ISOGI_TRACE__MAX_ORDER * ISOGI_TRACE__MAX_ORDER], square[ISOGI_TRACE__MAX_ORDER * ISOGI_TRACE__MAX_ORDER];
-    memcpy(t->light, light, 3 * (size_t)order * (size_t)order * sizeof(float));
-    isogi_trace__dim(t->light, 3 * order * order);
+    memcpy(both, lit->all, (size_t)n * sizeof *both), memcpy(both + n, lit->even, (size_t)n * sizeof *both);
+    isogi_trace__dim(both, 2 * n);
+    memcpy(t->lit.all, both, (size_t)n * sizeof *both), memcpy(t->lit.even, both + n, (size_t)n * sizeof *both);
     memset(one, 0, sizeof one);
     for (c = 0; c < 3; c++) {
-        for (k = 0; k < order * order; k++) one[k] = t->light[3 * k + c];
+        for (k = 0; k < order * order; k++) one[k] = t->lit.all[3 * k + c];
         isogi_sh_product(square, one, one, order, 1);
         for (k = 0; k < order * order; k++) t->square[3 * k + c] = square[k];
     }
@@ -2699,7 +2776,7 @@ static void isogi_trace__set_light(isogi_trace *t, const float *light) {
 
 static isogi_result isogi_trace__set_up(isogi_trace *t, const isogi_trace_desc *desc) {
     isogi_result result = isogi_trace__scene_set(&t->scene, desc, &t->context);
-    float light[ISOGI_TRACE__VALUES];
+    isogi_trace__lit lit;
     if (result == ISOGI_OK) result = isogi_trace__set_lattice(t);
     if (result != ISOGI_OK) return result;
     t->values =
@@ -2714,9 +2791,9 @@ static isogi_result isogi_trace__set_up(isogi_trace *t, const isogi_trace_desc *
     if (t->bricks) memset(t->bricks, 0, t->brick_count * sizeof *t->bricks);
     if (!t->bricks || !t->batch || !t->task_counters || (desc->method == ISOGI_TRACE_PATHS && !t->waves)) return ISOGI_NO_MEMORY;
     if (desc->mode == ISOGI_TRACE_TRANSFER) {
-        result = isogi_sh_project(light, t->scene.desc.order, &t->scene.desc.lighting, NULL);
+        result = isogi_trace__project(&lit, t->scene.desc.order, &t->scene.desc.lighting, &t->context);
         if (result != ISOGI_OK) return result;
-        isogi_trace__set_light(t, light);
+        isogi_trace__set_light(t, &lit);
     }
     isogi_trace__hash_changeable(t);
     if (desc->hierarchy > 0) t->scene.desc.lazy = 1; /* texels are wanted when the coarse ones are known */
@@ -2955,28 +3032,35 @@ static int isogi_trace__taps(const isogi_trace *t, const float point[3], isogi_t
     return count;
 }
 
-/* Irradiance out of one texel's values. */
-static void isogi_trace__irradiance(const isogi_trace *t, const float *values, double rgb[3]) {
+/* TRANSFER: what a lighting's coefficients bring. */
+static void isogi_trace__series_sum(const isogi_trace *t, const double *values, const float *light, double rgb[3]) {
     int count = t->scene.desc.order * t->scene.desc.order, channels = t->scene.desc.transfer_channels, k, c;
-    for (c = 0; c < 3; c++) {
-        rgb[c] = t->scene.desc.mode == ISOGI_TRACE_TRANSFER ? 0 : (double)values[c];
-        if (t->scene.desc.mode != ISOGI_TRACE_TRANSFER) continue;
-        for (k = 0; k < count; k++)
-            rgb[c] += (double)values[k * channels + (channels == 1 ? 0 : c)] * (double)t->light[3 * k + c];
+    for (c = 0; c < 3; c++)
+        for (rgb[c] = 0, k = 0; k < count; k++) rgb[c] += values[k * channels + (channels == 1 ? 0 : c)] * (double)light[3 * k + c];
+}
+
+/* Irradiance out of the values of a texel, or of several. */
+static void isogi_trace__irradiance(const isogi_trace *t, const double *values, double rgb[3]) {
+    double even[3];
+    int c;
+    if (t->scene.desc.mode != ISOGI_TRACE_TRANSFER) {
+        memcpy(rgb, values, 3 * sizeof *rgb);
+        return;
     }
+    isogi_trace__series_sum(t, values, t->lit.all, rgb), isogi_trace__series_sum(t, values, t->lit.even, even);
+    for (c = 0; c < 3; c++) rgb[c] = rgb[c] > even[c] ? rgb[c] : even[c];
 }
 
 /* Variance of a texel's luminance. TRANSFER: a sample is X = pi * throughput * L(direction it left in), throughput at most 1, so that
    E[X^2] <= pi * (E under the lighting's square), and the luminance of a square is no less than the square of the luminance; its
    record holds 1 / sqrt(samples), of as many samples as what it shares is as good as, and of what the filter blurs. */
-static double isogi_trace__variance(const isogi_trace *t, const float *values, double error, const double rgb[3]) {
-    int count = t->scene.desc.order * t->scene.desc.order, channels = t->scene.desc.transfer_channels, k, c;
-    double square[3] = {0, 0, 0}, sky[3], spread;
+static double isogi_trace__variance(const isogi_trace *t, const double *values, double error) {
+    double square[3], rgb[3], sky[3], spread;
+    int c;
     if (t->scene.desc.mode != ISOGI_TRACE_TRANSFER || !isogi_trace__finite(error)) return error * error;
-    for (c = 0; c < 3; c++)
-        for (k = 0; k < count; k++) square[c] += (double)values[k * channels + (channels == 1 ? 0 : c)] * (double)t->square[3 * k + c];
+    isogi_trace__series_sum(t, values, t->square, square), isogi_trace__series_sum(t, values, t->lit.all, rgb);
     spread = ISOGI_TRACE__PI * isogi_trace__luminance(square) - isogi_trace__luminance(rgb) * isogi_trace__luminance(rgb);
-    for (c = 0; c < 3; c++) sky[c] = ISOGI_TRACE__PI * 0.28209479177387814 * (double)t->light[c];
+    for (c = 0; c < 3; c++) sky[c] = ISOGI_TRACE__PI * 0.28209479177387814 * (double)t->lit.all[c];
     return error * error * (spread > 0 ? spread : 0) +
            isogi_trace__unseen(isogi_trace__luminance(sky), isogi_trace__luminance(rgb), error > 0 ? 1 / (error * error) : 1e9);
 }
@@ -2988,21 +3072,23 @@ ISOGI_API isogi_result isogi_trace_sample(const isogi_trace *trace, const float 
     if (!trace || (count && (!points || !irradiance))) return ISOGI_INVALID;
     for (i = 0; i < count; i++) {
         isogi_trace__reading r;
-        double sum[3] = {0, 0, 0}, variance = 0, shared = 0, rgb[3];
-        float values[ISOGI_TRACE__VALUES];
+        double sum[ISOGI_TRACE__VALUES], values[ISOGI_TRACE__VALUES], variance = 0, shared = 0, rgb[3];
+        float stored[ISOGI_TRACE__VALUES];
         n = isogi_trace__taps(trace, points[i], &r);
+        for (c = 0; c < trace->values; c++) sum[c] = 0;
         for (k = 0; k < n; k++) {
             double part;
-            isogi_trace__record_read(trace, r.record[k], values);
-            isogi_trace__irradiance(trace, values, rgb);
-            for (c = 0; c < 3; c++) sum[c] += r.weight[k] * rgb[c];
-            part = isogi_trace__variance(trace, values, (double)isogi_trace__record_error(r.record[k]), rgb);
+            isogi_trace__record_read(trace, r.record[k], stored);
+            for (c = 0; c < trace->values; c++) values[c] = (double)stored[c], sum[c] += r.weight[k] * values[c];
+            if (!error) continue;
+            part = isogi_trace__variance(trace, values, (double)isogi_trace__record_error(r.record[k]));
             /* paths at texels are independent of each other; filtered ones and probes are shared */
             if (trace->feedback) shared += r.weight[k] * sqrt(part);
             else variance += r.weight[k] * r.weight[k] * part;
         }
         variance += shared * shared;
-        for (c = 0; c < 3; c++) irradiance[i][c] = (float)sum[c];
+        isogi_trace__irradiance(trace, sum, rgb);
+        for (c = 0; c < 3; c++) irradiance[i][c] = (float)rgb[c];
         if (error) error[i] = n ? (float)sqrt(variance) : ISOGI_TRACE__NOT_READY;
     }
     return ISOGI_OK;
@@ -3027,6 +3113,15 @@ ISOGI_API isogi_result isogi_trace_sample_transfer(const isogi_trace *trace, con
     return ISOGI_OK;
 }
 
+ISOGI_API isogi_result isogi_trace_lighting(const isogi_trace *trace, float (*light)[3], float (*even)[3]) {
+    size_t bytes;
+    if (!trace || trace->scene.desc.mode != ISOGI_TRACE_TRANSFER) return ISOGI_INVALID;
+    bytes = 3 * sizeof(float) * (size_t)(trace->scene.desc.order * trace->scene.desc.order);
+    if (light) memcpy(light, trace->lit.all, bytes);
+    if (even) memcpy(even, trace->lit.even, bytes);
+    return ISOGI_OK;
+}
+
 /* Factors g_l by which a Phong lobe of integral 1 blurs degree l: (s + 1) times the integral of x^s P_l(x) over [0,1]. */
 static void isogi_trace__lobe(double exponent, int order, double *g) {
     int l;
@@ -3034,12 +3129,13 @@ static void isogi_trace__lobe(double exponent, int order, double *g) {
     for (l = 2; l < order; l++) g[l] = g[l - 2] * (exponent - l + 2) / (exponent + l + 1);
 }
 
-/* One point of isogi_trace_sample_gloss; transfer: T there; t->light: L; g: the factors of the lobe. */
+/* One point of isogi_trace_sample_gloss; transfer: T there; t->lit: L; g: the factors of the lobe. */
 static void isogi_trace__gloss(const isogi_trace *t, const float *transfer, const float normal[3], const float view[3],
                                const double *g, float rgb[3]) {
     static const double cosine[6] = {3.14159265358979323846, 2.0943951023931953, 0.78539816339744831, 0, -0.13089969389957472, 0};
     float dirs[2][3], y[2][ISOGI_TRACE__MAX_ORDER * ISOGI_TRACE__MAX_ORDER];
-    double open = 0, light[3] = {0, 0, 0}, seen[3] = {0, 0, 0}, facing = 2 * isogi_trace__dot(normal, view);
+    double open = 0, light[3] = {0, 0, 0}, even[3] = {0, 0, 0}, seen[3] = {0, 0, 0};
+    const double facing = 2 * isogi_trace__dot(normal, view);
     int order = t->scene.desc.order, channels = t->scene.desc.transfer_channels, k, c, l;
     for (c = 0; c < 3; c++) dirs[0][c] = (float)(facing * (double)normal[c]) - view[c], dirs[1][c] = normal[c];
     isogi_sh_eval(y[0], order, (const float(*)[3])dirs, 1);
@@ -3050,12 +3146,13 @@ static void isogi_trace__gloss(const isogi_trace *t, const float *transfer, cons
         blurred = g[l] * (double)y[0][k];
         open += cosine[l] * blurred * (double)y[1][k];
         for (c = 0; c < 3; c++) {
-            light[c] += blurred * (double)t->light[3 * k + c];
+            light[c] += blurred * (double)t->lit.all[3 * k + c], even[c] += blurred * (double)t->lit.even[3 * k + c];
             seen[c] += blurred * (double)transfer[k * channels + (channels == 1 ? 0 : c)];
         }
     }
     for (c = 0; c < 3; c++)
-        rgb[c] = (float)(isogi_trace__clamp(light[c], 1e30) * isogi_trace__clamp(seen[c] / (open > 1e-3 ? open : 1e-3), 1));
+        rgb[c] = (float)(isogi_trace__clamp(light[c] > even[c] ? light[c] : even[c], 1e30) *
+                         isogi_trace__clamp(seen[c] / (open > 1e-3 ? open : 1e-3), 1));
 }
 
 ISOGI_API isogi_result isogi_trace_sample_gloss(const isogi_trace *trace, const float (*points)[3], const float (*normals)[3],
@@ -6828,7 +6925,7 @@ typedef struct isogi_trace__change {
     isogi_trace *trace;
     const isogi_trace_desc *desc; /* NULL: voxels change */
     isogi_trace__scene scene;     /* afterwards: as it was */
-    float light[ISOGI_TRACE__VALUES];
+    isogi_trace__lit lit;
     uint64_t lighting_hash;
     int all, colours, choice; /* to be computed again: all; where colours differ. Texels are chosen anew */
     double low[3], high[3];   /* voxels: grid coordinates of what texels and hits there read */
@@ -6882,7 +6979,7 @@ static isogi_result isogi_trace__change_scene(isogi_trace__change *c) {
     d.no_shadows = n->no_shadows;
     for (a = 0; a < 3; a++) d.albedo[a] = n->albedo[a];
     result = isogi_trace__scene_set(&c->scene, &d, &t->context);
-    if (result == ISOGI_OK && d.mode == ISOGI_TRACE_TRANSFER) result = isogi_sh_project(c->light, d.order, &d.lighting, NULL);
+    if (result == ISOGI_OK && d.mode == ISOGI_TRACE_TRANSFER) result = isogi_trace__project(&c->lit, d.order, &d.lighting, &t->context);
     if (result != ISOGI_OK) {
         isogi_trace__sky_free(&c->scene.sky, &t->context);
         return result;
@@ -7112,7 +7209,7 @@ static void isogi_trace__change_commit(isogi_trace__change *c) {
     if (!c->desc) return;
     isogi_trace__sky_free(&c->scene.sky, &t->context);
     t->lighting_hash = c->lighting_hash, t->colours_hash = isogi_trace__hash_colours(&t->scene.desc);
-    if (t->scene.desc.mode == ISOGI_TRACE_TRANSFER) isogi_trace__set_light(t, c->light);
+    if (t->scene.desc.mode == ISOGI_TRACE_TRANSFER) isogi_trace__set_light(t, &c->lit);
 }
 
 /* The same change to both sides and both levels: all of them or none. */
@@ -7155,7 +7252,7 @@ ISOGI_API isogi_result isogi_trace_touch(isogi_trace *trace, const size_t first[
 }
 
 ISOGI_API isogi_result isogi_trace_relight(isogi_trace *trace, const isogi_lighting *lighting) {
-    float light[ISOGI_TRACE__VALUES];
+    isogi_trace__lit lit;
     isogi_trace_desc desc;
     isogi_trace *side;
     isogi_result result;
@@ -7165,10 +7262,10 @@ ISOGI_API isogi_result isogi_trace_relight(isogi_trace *trace, const isogi_light
         return isogi_trace__apply(trace, &desc, NULL, NULL);
     }
     if (!isogi_trace__distant(lighting)) return ISOGI_INVALID;
-    result = isogi_sh_project(light, trace->scene.desc.order, lighting, NULL);
+    result = isogi_trace__project(&lit, trace->scene.desc.order, lighting, &trace->context);
     for (side = trace; side && result == ISOGI_OK; side = side->high) {
-        isogi_trace__set_light(side, light);
-        if (side->coarse) isogi_trace__set_light(side->coarse, light);
+        isogi_trace__set_light(side, &lit);
+        if (side->coarse) isogi_trace__set_light(side->coarse, &lit);
     }
     return result;
 }
@@ -7495,6 +7592,8 @@ ISOGI_API isogi_result isogi_trace_gather_field(const isogi_trace_desc *desc, is
 #undef ISOGI_TRACE__MAX_DEPTH
 #undef ISOGI_TRACE__MAX_ORDER
 #undef ISOGI_TRACE__VALUES
+#undef ISOGI_TRACE__EVEN
+#undef ISOGI_TRACE__EVEN_ROWS
 #undef ISOGI_TRACE__NOT_READY
 #undef ISOGI_TRACE__BRIGHTEST
 #undef ISOGI_TRACE__DEPTH

@@ -652,7 +652,7 @@ TEST(gloss_against_its_integral) {
     double q[5] = {16, 15, 16, 22, 10}, error[2] = {0, 0}, unshadowed = 0, size = 0;
     isogi_light sun = {.vector = {1, 2, 0.5f}, .rgb = {3, 3, 3}, .radius = 0.6f};
     isogi_lighting lighting = {.env = {.sh = white_sky, .sh_order = 1}, .lights = &sun, .light_count = 1};
-    float light[75];
+    float light[75], even[25][3];
     isogi_sh_project(light, 5, &lighting, NULL);
     for (int kind = 0; kind < 2; kind++) {
         scene s = scene_make(33, 33, 33, NULL, kind ? pit : ball, q);
@@ -666,7 +666,7 @@ TEST(gloss_against_its_integral) {
         isogi_trace_create(&t, &d, NULL);
         isogi_trace_request(t, (const float(*)[3])points, (size_t)n);
         isogi_trace_step(t, 0, NULL);
-        isogi_trace_relight(t, &lighting);
+        isogi_trace_relight(t, &lighting), isogi_trace_lighting(t, NULL, even);
         isogi_vol_sample_smooth(s.pyramid, (const float(*)[3])points, (size_t)n, NULL, normals);
         for (int i = 0; i < n; i++) {
             double length = length3((double)normals[i][0], (double)normals[i][1], (double)normals[i][2]);
@@ -676,11 +676,14 @@ TEST(gloss_against_its_integral) {
                                        rgb) == ISOGI_OK,
               "points %d", n);
         for (int i = 0; i < n; i++) {
-            double expected = gloss_by_rays(&s, light, points[i], normals[i], normals[i], 12, LONG_SUITE ? 20000 : 5000), open = 0;
+            double expected = gloss_by_rays(&s, light, points[i], normals[i], normals[i], 12, LONG_SUITE ? 20000 : 5000);
+            double least = gloss_by_rays(&s, even[0], points[i], normals[i], normals[i], 12, LONG_SUITE ? 20000 : 5000), open = 0;
             float y[25];
+            expected = fmax(expected, least);
             isogi_sh_eval(y, 5, (const float(*)[3])normals[i], 1);
             double g[5] = {1, 13.0 / 14, 12.0 / 15, 13.0 / 14 * 11 / 16, 12.0 / 15 * 10 / 17};
             for (int k = 0; k < 25; k++) open += g[(int)sqrt(k + 0.5)] * (double)light[3 * k] * (double)y[k];
+            open = fmax(open, 1); /* the white sky */
             error[kind] += pow((double)rgb[i][0] - expected, 2) / n;
             if (kind) unshadowed += pow(open - expected, 2) / n, size += expected * expected / n;
             else
@@ -697,6 +700,106 @@ TEST(gloss_against_its_integral) {
            sqrt(unshadowed / size));
     CHECK(sqrt(error[1] / size) < 0.25 && error[1] < 0.25 * unshadowed, "pit: relative error %.3f, without occlusion %.3f",
           sqrt(error[1] / size), sqrt(unshadowed / size));
+}
+
+/* With a bright spot and a lamp hidden by a pit's walls, a truncated series would take more light from there than they bring elsewhere.
+   What of the lighting is even bounds that. */
+TEST(hidden_bright_spots_take_no_other_light) {
+    enum { POINTS = 150, WIDTH = 64, HEIGHT = 32 };
+    static float image[HEIGHT][WIDTH][3], points[POINTS][3], e[POINTS][3], truth[POINTS][3], transfer[POINTS][36];
+    const isogi_light lamp = light_make(ISOGI_LIGHT_DIRECTIONAL, 1, 0.15, 0.3, 2, 0);
+    double q[5] = {12, 10, 12, 17, 9};
+    scene s = scene_make(25, 25, 25, NULL, pit, q);
+    int n = surface_points(&s, 0, POINTS, 21, points);
+    isogi_lighting lighting = {.env = {.rgb = image[0][0], .width = WIDTH, .height = HEIGHT}, .lights = &lamp, .light_count = 1};
+    for (int y = 0; y < HEIGHT; y++)
+        for (int x = 0; x < WIDTH; x++)
+            for (int c = 0; c < 3; c++)
+                image[y][x][c] = y > 13 && y < 16 && x > 10 && x < 13 ? 60 - 20 * (float)c : 0.2f + 0.3f * (float)(y < 16) * (float)c;
+    isogi_trace_desc d = desc_make(&s, 0.5f, -1, LONG_SUITE ? 512 : 128);
+    d.lazy = 1, d.lighting = lighting;
+    bake_and_sample(&d, NULL, (const float(*)[3])points, n, truth);
+    for (d.order = 3; d.order <= 6; d.order++) {
+        isogi_trace *t = NULL;
+        float light[36][3], even[36][3], plain[108];
+        double square[2] = {0, 0};
+        int bounded = 0;
+        d.mode = ISOGI_TRACE_TRANSFER;
+        CHECK(isogi_trace_create(&t, &d, NULL) == ISOGI_OK && isogi_trace_request(t, (const float(*)[3])points, (size_t)n) == ISOGI_OK &&
+                  isogi_trace_step(t, 0, NULL) == ISOGI_OK && isogi_trace_lighting(t, light, even) == ISOGI_OK,
+              "order %d", d.order);
+        isogi_trace_sample(t, (const float(*)[3])points, (size_t)n, e, NULL);
+        isogi_trace_sample_transfer(t, (const float(*)[3])points, (size_t)n, transfer[0]);
+        isogi_sh_project(plain, d.order, &lighting, NULL);
+        CHECK(!memcmp(plain, light, sizeof *light * (size_t)(d.order * d.order)), "order %d: another lighting", d.order);
+        for (int i = 0; i < n; i++)
+            for (int c = 0; c < 3; c++) {
+                double all = 0, least = 0, shown;
+                for (int k = 0; k < d.order * d.order; k++) {
+                    const double weight = (double)transfer[0][(size_t)i * (size_t)(d.order * d.order) + (size_t)k];
+                    all += weight * (double)light[k][c], least += weight * (double)even[k][c];
+                }
+                shown = fmax(all, least);
+                CHECK(fabs((double)e[i][c] - shown) < 1e-4 * (1 + fabs(shown)), "order %d: %g, by the sums %g and %g", d.order,
+                      (double)e[i][c], all, least);
+                if (!(least > fmax(all, 0))) continue;
+                square[0] += pow(least - (double)truth[i][c], 2), square[1] += pow(fmax(all, 0) - (double)truth[i][c], 2), bounded++;
+            }
+        printf("    order %d: error of %d of %d values %.4f, were they not bounded %.4f\n", d.order, bounded, 3 * n,
+               sqrt(square[0] / bounded), sqrt(square[1] / bounded));
+        CHECK(bounded > n / 4 && square[0] < 0.5 * square[1], "order %d: error of %d values %.4f, were they not bounded %.4f", d.order,
+              bounded, sqrt(square[0] / bounded), sqrt(square[1] / bounded));
+        isogi_trace_free(t);
+    }
+    scene_free(&s);
+}
+
+/* What is even: all of a sky given by coefficients or of one colour; of a sky with a sun what the sky brings; of a sun in the dark nothing;
+   of lamps those that take light away. */
+TEST(even_part_of_a_lighting) {
+    enum { WIDTH = 48, HEIGHT = 24, N = 25 };
+    static float image[HEIGHT][WIDTH][3];
+    static const float sky[4][3] = {{1, 2, 3}, {0.1f, -0.5f, 0.2f}, {0.3f, 0.1f, -4}, {0, 0.2f, 0.1f}};
+    const isogi_light lamps[2] = {light_make(ISOGI_LIGHT_DIRECTIONAL, 1, 2, 3, 4, 0.2), {.vector = {0, 1, 0}, .rgb = {1, -2, 0}}};
+    const isogi_light taking = {.vector = {0, 1, 0}, .rgb = {0, -2, 0}};
+    double q[5] = {4, 4, 4, 8, 3};
+    scene s = scene_make(9, 9, 9, NULL, ball, q);
+    isogi_trace_desc d = desc_make(&s, 0, 0, 4);
+    isogi_trace *t = NULL;
+    float light[N][3], even[N][3], expected[N][3];
+    isogi_lighting l = {.env = {.sh = sky[0], .sh_order = 2}};
+    d.mode = ISOGI_TRACE_TRANSFER, d.order = 5, d.lighting = l;
+    CHECK(isogi_trace_create(&t, &d, NULL) == ISOGI_OK && isogi_trace_lighting(t, light, even) == ISOGI_OK &&
+              !memcmp(light, even, sizeof light) && even[2][2] <= -4,
+          "coefficients: %g and %g", (double)light[2][2], (double)even[2][2]);
+    l.lights = lamps, l.light_count = 2;
+    isogi_sh_project(expected[0], 5, &(isogi_lighting){.env = l.env, .lights = &taking, .light_count = 1}, NULL);
+    CHECK(isogi_trace_relight(t, &l) == ISOGI_OK && isogi_trace_lighting(t, NULL, even) == ISOGI_OK, "relight");
+    for (int i = 0; i < N; i++)
+        for (int c = 0; c < 3; c++)
+            CHECK(fabsf(even[i][c] - expected[i][c]) < 1e-5f, "lamps, coefficient %d: %g, not %g", i, (double)even[i][c],
+                  (double)expected[i][c]);
+    for (int kind = 0; kind < 3; kind++) { /* of one colour; with a sun; the sun alone */
+        for (int y = 0; y < HEIGHT; y++)
+            for (int x = 0; x < WIDTH; x++)
+                for (int c = 0; c < 3; c++) image[y][x][c] = kind && y == 6 && x == 9 ? 5000 : kind < 2 ? (float)(1 + c) : 0;
+        l = (isogi_lighting){.env = {.rgb = image[0][0], .width = WIDTH, .height = HEIGHT}};
+        CHECK(isogi_trace_relight(t, &l) == ISOGI_OK && isogi_trace_lighting(t, light, even) == ISOGI_OK, "image %d", kind);
+        for (int c = 0; c < 3; c++) {
+            const double mean = sqrt(4 * PI) * (kind < 2 ? 1 + c : 0);
+            CHECK(fabs((double)even[0][c] - mean) < 1e-5 + 0.03 * mean * (kind == 1), "image %d: %g of %g", kind, (double)even[0][c], mean);
+            CHECK(kind || fabsf(even[0][c] - light[0][c]) < 1e-5f, "image %d: %g of %g", kind, (double)even[0][c], (double)light[0][c]);
+            for (int k = 1; k < N; k++)
+                CHECK(fabs((double)even[k][c]) < 1e-5 + 0.05 * mean * (kind == 1), "image %d, coefficient %d: %g", kind, k,
+                      (double)even[k][c]);
+        }
+    }
+    isogi_trace_free(t);
+    d.mode = ISOGI_TRACE_IRRADIANCE;
+    CHECK(isogi_trace_lighting(NULL, light, even) == ISOGI_INVALID && isogi_trace_create(&t, &d, NULL) == ISOGI_OK &&
+              isogi_trace_lighting(t, light, even) == ISOGI_INVALID,
+          "no transfer");
+    isogi_trace_free(t), scene_free(&s);
 }
 
 /* On open ground nothing stands in the way: gloss is the lighting blurred by the lobe, in the mirrored direction, here by quadrature of the
@@ -738,7 +841,7 @@ TEST(gloss_is_blurred_light_in_the_mirrored_direction) {
                     for (int k = l * l; k < (l + 1) * (l + 1); k++) part += (double)light[3 * k + c] * (double)y[k];
                     expected += blur * part;
                 }
-                expected = fmax(expected, 0);
+                expected = fmax(expected, 1); /* the white sky is even */
                 CHECK(fabs((double)rgb[0][c] - expected) < 0.02 * expected + 0.005, "order %d, view %d, channel %d: %.4f, not %.4f",
                       order, i, c, (double)rgb[0][c], expected);
             }

@@ -240,7 +240,7 @@ int main(int argc, char **argv) {
         isogi_trace *t = NULL;
         GLuint p = program(argv[1 + transfer]);
         isogi_lighting lighting = {0};
-        float coefficients[28][3] = {{0}};
+        float coefficients[2][28][3] = {{{0}}};
         daylight_make(&lighting, sky, &sun);
         sun.radius = 0.3f; /* within what order 5 holds */
         for (int a = 0; a < 3; a++) { /* a part of the volume, and another number of texels along each axis */
@@ -249,12 +249,13 @@ int main(int argc, char **argv) {
         }
         d.lighting = lighting;
         if (isogi_trace_create(&t, &d, NULL) != ISOGI_OK || isogi_trace_step(t, 0, NULL) != ISOGI_OK) fail("no light");
-        if (transfer && isogi_sh_project(coefficients[0], 5, &lighting, NULL) != ISOGI_OK) fail("no coefficients");
+        if (transfer && isogi_trace_lighting(t, coefficients[0], coefficients[1]) != ISOGI_OK) fail("no coefficients");
         choose(t, &d, shape->isovalue);
         isogi_trace_sample(t, (const float(*)[3])points, COUNT, light, NULL);
         vector(p, "lattice_min", d.lattice_min), vector(p, "lattice_max", d.lattice_max);
         glUniform3fv(glGetUniformLocation(p, "albedo"), 1, albedo);
-        glUniform3fv(glGetUniformLocation(p, "lighting"), 28, coefficients[0]);
+        if (transfer) glUniform3fv(glGetUniformLocation(p, "light"), 28, coefficients[0][0]);
+        if (transfer) glUniform3fv(glGetUniformLocation(p, "even"), 28, coefficients[1][0]);
         for (int format = ISOGI_TRACE_FLOAT; format <= ISOGI_TRACE_BYTE; format++) {
             static const GLint units[7] = {0, 1, 2, 3, 4, 5, 6};
             size_t bytes = isogi_trace_export_size(t, format);
