@@ -354,7 +354,8 @@ typedef struct isogi_dvr_desc {
                                classification and jitter mean nothing to pictures;
                                rays of visibility have their distance from step all the same */
     double emission;        /* share of rgb that glows by itself, besides scattering light; 0..1e6; with visibility only */
-    double radius;          /* the paper's method: of local visibility, in units of the smallest voxel spacing, 1..32; 0 = 16 */
+    double radius;          /* the paper's method: of local visibility, in units of the smallest voxel spacing, 1..32; 0 = 16. Sheared
+                               axes along which it reaches more than 128 voxels are ISOGI_TOO_LARGE */
     double reduction;       /* the paper's method: voxels of the volume to points of its blocks, at least 1; 0 = 4. A block that is not
                                transparent holds a point whatever the budget is; those that the border cuts thin come first for more.
                                One of a single colour holds no more than its corners at any budget: in dense fog that reaches the border
@@ -403,7 +404,8 @@ ISOGI_API void isogi_dvr_free(isogi_dvr *dvr); /* NULL is fine */
 /* Copied. Visibility has to be stepped again, from the beginning, before it is right for the new function; until a grid point's
    turn comes it keeps what it had. Blocks in which nothing changes are not read again: sweeps and the paper's method then agree with
    a renderer made for this function as if values of voxels had moved by up to a 2048th of the span of values that it tells apart (two
-   classes of values), not to the bit; brute force does to the bit. */
+   classes of values), not to the bit; brute force does to the bit. Where nothing but colours changes, visibility stays as it is, at no
+   cost, and so do the levels of the paper's method, though they suit the colours for which they were chosen. */
 ISOGI_API isogi_result isogi_dvr_set_transfer(isogi_dvr *dvr, const isogi_transfer *transfer);
 
 /* Computes visibility within about max_rays rays (0 = to the end), at least one grid point (brute force), block or direction (the paper's
@@ -418,7 +420,7 @@ ISOGI_API isogi_result isogi_dvr_sample_visibility(const isogi_dvr *dvr, const f
 
 /* Keeps only where plane[0] x + plane[1] y + plane[2] z + plane[3] >= 0 (world) for all planes; at most ISOGI_DVR_MAX_PLANES, a box
    is six; 0 = everything. What is cut off neither absorbs nor shadows: visibility has to be stepped again, as for a new transfer
-   function, and the blocks that no plane touches keep their levels and their classification. Shade a cut by local visibility
+   function, and the blocks that no plane touches keep their classification. Shade a cut by local visibility
    (isogi_view.local): the paper's advice, since the global grid is too coarse for a flat face. */
 #define ISOGI_DVR_MAX_PLANES 32
 ISOGI_API isogi_result isogi_dvr_set_clip(isogi_dvr *dvr, const double (*planes)[4], size_t count);
@@ -442,7 +444,8 @@ typedef struct isogi_dvr_report {
 ISOGI_API isogi_result isogi_dvr_inspect(const isogi_dvr *dvr, isogi_dvr_report *report);
 
 /* The data as the blocks of the paper's method hold it, and the local visibility, at world points; values[count],
-   visibility[count][order*order]; where a block is dropped the lowest value, and no shadow. ISOGI_INVALID with another method. */
+   visibility[count][order*order]; where a block is dropped the lowest value, and no shadow; values beside voxels that are not finite need
+   not be finite. ISOGI_INVALID with another method. */
 ISOGI_API isogi_result isogi_dvr_sample_blocks(const isogi_dvr *dvr, const float (*points)[3], size_t count, float *values,
                                                float *visibility);
 
@@ -551,6 +554,8 @@ ISOGI_API isogi_result isogi_dvr_tets_render(const isogi_tets *tets, const isogi
 #define ISOGI_DVR__LOCAL_ORDER 5           /* of the environment in local shading: the cosine kernel holds little beyond */
 #define ISOGI_DVR__MAX_SAMPLES 16777216.0  /* on one ray */
 #define ISOGI_DVR__NEGLIGIBLE 1e-4         /* transmittance at which a visibility ray ends */
+#define ISOGI_DVR__MAX_REACH 8             /* blocks that local visibility may look at on each side of one */
+#define ISOGI_DVR__NOT_FINITE 62           /* the bin of what is not */
 #define ISOGI_DVR__TILE 16                 /* pixels a side: one task */
 #define ISOGI_DVR__CHUNK 16                /* grid points: one task */
 #define ISOGI_DVR__SLAB 4096               /* grid points between two looks at a cancelled step */
@@ -2241,7 +2246,8 @@ static void isogi_dvr__read_row(const isogi_volume *v, double low, size_t first,
    same function, and there is no seam. Blocks are therefore finished from coarse to fine. */
 
 /* Averages of the data on coarser lattices: nodes 2^step voxels apart, over the blocks' whole extent; each is the last one halved
-   with weights 1/4, 1/2, 1/4, which keeps linear fields. At the border the field goes on by reflection in its last value. */
+   with weights 1/4, 1/2, 1/4, which keeps linear fields. At the border the field goes on by reflection in its last value. What is not
+   finite is left out; where nothing else is, a node is not finite either, and transparent. */
 static size_t isogi_dvr__lattice_index(const isogi_dvr__blocks *b, int step, const size_t c[3]) {
     const size_t *size = b->lattice_size[step];
     return c[0] + size[0] * (c[1] + size[1] * c[2]);
@@ -2254,12 +2260,12 @@ static void isogi_dvr__sides(const isogi_dvr__blocks *b, size_t block, size_t n,
     for (a = 0; a < 3; a++) side[a] = at[a] + 1 < b->count[a] ? n : (b->rest[a] * n + 15) / 16;
 }
 
-/* The field at a voxel, the lowest value where it is not finite, less the base, as all data in blocks. */
+/* The field at a voxel, less the base, as all data in blocks. */
 static float isogi_dvr__voxel(const isogi_dvr *d, size_t x, size_t y, size_t z) {
     float value;
     isogi_dvr__read_row(&d->volume, d->base, x < d->volume.size[0] ? x : d->volume.size[0] - 1, 1,
                         y < d->volume.size[1] ? y : d->volume.size[1] - 1, z < d->volume.size[2] ? z : d->volume.size[2] - 1, &value);
-    return isogi_dvr__finite32(value) ? value : (float)(d->range[0] - d->base);
+    return value;
 }
 
 static float isogi_dvr__lattice_at(const isogi_dvr *d, int step, const size_t c[3]) {
@@ -2281,7 +2287,7 @@ static void isogi_dvr__lattice_task(void *arg, size_t z) {
     c[2] = z;
     for (c[1] = 0; c[1] < size[1]; c[1]++)
         for (c[0] = 0; c[0] < size[0]; c[0]++) {
-            float sum = 0;
+            float sum = 0, weights = 0, value = 0;
             for (k = 0; k < 27; k++) {
                 int o[3] = {k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1};
                 float weight = 0.125f;
@@ -2291,13 +2297,16 @@ static void isogi_dvr__lattice_task(void *arg, size_t z) {
                         from[a] = 2 * c[a];
                     } else weight *= o[a] ? 0.5f : 1.0f, from[a] = (size_t)((ptrdiff_t)(2 * c[a]) + o[a]);
                 }
-                if (weight > 0) sum += weight * isogi_dvr__lattice_at(job->dvr, job->step - 1, from);
+                if (!(weight > 0)) continue;
+                value = isogi_dvr__lattice_at(job->dvr, job->step - 1, from);
+                if (isogi_dvr__finite32(value)) sum += weight * value, weights += weight;
             }
-            b->lattice[job->step][isogi_dvr__lattice_index(b, job->step, c)] = sum;
+            if (weights > 0) value = weights < 1 ? sum / weights : sum;
+            b->lattice[job->step][isogi_dvr__lattice_index(b, job->step, c)] = value;
         }
 }
 
-/* Divides the classes among 64 bins, half by their number and half by how much opacity changes across them, so that no tent is lost in a
+/* Divides the classes among 64 bins but NOT_FINITE, half by their number and half by how much opacity changes across them, so that no tent is lost in a
    bin that is mostly air. A change of colours alone leaves bins as they are. */
 static void isogi_dvr__set_bins(const isogi_dvr *d, uint8_t bin[ISOGI_DVR__TABLE]) {
     double sum = 0, total = 0, last = 0;
@@ -2310,7 +2319,7 @@ static void isogi_dvr__set_bins(const isogi_dvr *d, uint8_t bin[ISOGI_DVR__TABLE
             if (!pass) total = sum;
             else
                 bin[i] = (uint8_t)isogi_dvr__clamp(
-                    1 + 62 * (total > 0 ? 0.5 * (double)i / ISOGI_DVR__TABLE + 0.5 * sum / total : (double)i / ISOGI_DVR__TABLE), 62);
+                    1 + 61 * (total > 0 ? 0.5 * (double)i / ISOGI_DVR__TABLE + 0.5 * sum / total : (double)i / ISOGI_DVR__TABLE), 61);
         }
     bin[0] = 0, bin[ISOGI_DVR__TABLE - 1] = 63; /* what lies outside of the function's span is all alike */
 }
@@ -2328,7 +2337,8 @@ static void isogi_dvr__histogram_task(void *arg, size_t task) {
         for (y = 16 * at[1]; y <= 16 * at[1] + 16 && y < d->volume.size[1]; y++) {
             isogi_dvr__read_row(&d->volume, d->base, 16 * at[0], count, y, z, row);
             for (x = 0; x < count; x++)
-                if (isogi_dvr__finite32(row[x])) classes |= (uint64_t)1 << b->bin[isogi_dvr__class(d, d->base + (double)row[x])];
+                classes |= (uint64_t)1 << (isogi_dvr__finite32(row[x]) ? b->bin[isogi_dvr__class(d, d->base + (double)row[x])]
+                                                                       : ISOGI_DVR__NOT_FINITE);
         }
     b->histogram[block] = classes;
 }
@@ -2370,7 +2380,11 @@ static isogi_result isogi_dvr__plan_blocks(isogi_dvr *d) {
     memset(b->level, 0, 3 * b->total);
     memset(b->first, 0, 2 * b->total * sizeof *b->first);
     b->lit = b->level + b->total, b->stale = b->lit + b->total;
-    b->reach = (size_t)ceil(d->desc.radius / 16);
+    for (a = 0; a < 3; a++) { /* between axes at right angles, the radius; sheared ones it takes further */
+        const double *row = d->to_grid + 3 * a, blocks = d->desc.radius * d->spacing * sqrt(isogi_dvr__dot(row, row)) / 16;
+        if (!(blocks < ISOGI_DVR__MAX_REACH)) return ISOGI_TOO_LARGE;
+        if (ceil(blocks - 1e-9) > (double)b->reach) b->reach = (size_t)ceil(blocks - 1e-9);
+    }
     job.dvr = d;
     for (n = 1; n < 5 && result == ISOGI_OK; n++) {
         job.step = n;
@@ -3785,14 +3799,16 @@ static void isogi_dvr__luv_of(const isogi_dvr *d, double value, double luv[3]) {
 /* The largest difference between what a block holds and its average. */
 static double isogi_dvr__significance(const isogi_dvr *d, size_t block, double (*luv)[3]) {
     const isogi_dvr__blocks *b = &d->blocks;
-    double mean = 0, at[3], most = 0;
+    double mean = 0, nodes = 0, at[3], most = 0;
     size_t c[3], k, i;
     for (k = 0; k < 8; k++) {
+        float value;
         c[0] = block % b->count[0] + (k & 1), c[1] = block / b->count[0] % b->count[1] + (k >> 1 & 1),
         c[2] = block / b->count[0] / b->count[1] + (k >> 2);
-        mean += 0.125 * (double)isogi_dvr__lattice_at(d, 4, c);
+        value = isogi_dvr__lattice_at(d, 4, c);
+        if (isogi_dvr__finite32(value)) mean += (double)value, nodes++;
     }
-    isogi_dvr__luv_of(d, d->base + mean, at);
+    isogi_dvr__luv_of(d, nodes > 0 ? d->base + mean / nodes : d->range[0], at);
     for (i = 0; i < 64; i++) {
         double difference[3] = {luv[i][0] - at[0], luv[i][1] - at[1], luv[i][2] - at[2]}, size = isogi_dvr__dot(difference, difference);
         if ((b->histogram[block] >> i & 1) && size > most) most = size;
@@ -3851,6 +3867,7 @@ static isogi_result isogi_dvr__select_levels(isogi_dvr *d, uint8_t *level) {
         for (end = i + 1; end < ISOGI_DVR__TABLE && b->bin[end] == b->bin[i];) end++;
         isogi_dvr__luv_of(d, d->matter.low + 0.5 * (double)(i + end) / d->matter.scale, luv[b->bin[i]]);
     }
+    memset(luv[ISOGI_DVR__NOT_FINITE], 0, sizeof luv[0]); /* transparent */
     for (i = 0; i < b->total; i++) {
         level[i] = !d->empty[1][i];
         budget -= level[i];
@@ -3948,7 +3965,7 @@ static void isogi_dvr__node_position(const isogi_dvr__blocks *b, size_t block, s
 
 /* ---- data in its blocks ---- */
 
-/* The data that the blocks hold, interpolated, less the base; what is not held is the lowest value. */
+/* The data that the blocks hold, interpolated, less the base; not finite beside what is not; what is not held is the lowest value. */
 static float isogi_dvr__block_value(const isogi_dvr *d, size_t block, const double position[3]) {
     const isogi_dvr__blocks *b = &d->blocks;
     size_t n = b->level[block], base, corner[8], k;
@@ -4188,7 +4205,8 @@ static int isogi_dvr__fill_window(const isogi_dvr *d, size_t block, size_t n, co
                     isogi_dvr__node_position(b, block, n, node, position);
                     if (!isogi_dvr__kept(d, position)) continue;
                 }
-                value += u[0][node[0]] * (end - value);
+                if (u[0][node[0]] > 0) value += u[0][node[0]] * (end - value);
+                if (!isogi_dvr__finite32(value)) continue;
                 out[node[0]] = d->matter.table[isogi_dvr__class(d, d->base + (double)value)];
                 any |= out[node[0]] > 0;
             }
@@ -7444,6 +7462,8 @@ ISOGI_API isogi_result isogi_transfer_import(const float (*rgba)[4], size_t coun
     for (i = 0; i < count; i++) {
         double u = (double)i / (double)(count - 1), opacity = isogi_dvr__clamp((double)rgba[i][3], 1 - 1 / 16777216.0);
         points[i].value = i + 1 < count ? low * (1 - u) + high * u : high;
+        if (points[i].value > high) points[i].value = high; /* as rounding has it, where they are as close */
+        if (i && points[i].value < points[i - 1].value) points[i].value = points[i - 1].value;
         points[i].extinction = (float)isogi_dvr__clamp(-log1p(-opacity) / length, 3e38);
         for (a = 0; a < 3; a++) {
             double x = (double)rgba[i][a];
@@ -7631,10 +7651,11 @@ static isogi_result isogi_dvr__take_tets(isogi_tets *m, isogi_tet_report *report
         for (k = 0; k < 4; k++)
             if (t[k] >= mesh->point_count) return ISOGI_INVALID;
         for (a = 0; a < 3; a++) origin[a] = (double)mesh->points[t[0]][a];
-        for (k = 0; k < 3; k++) {
-            double length;
-            isogi_dvr__sub(mesh->points[t[k + 1]], origin, edge[k]);
-            length = isogi_dvr__dot(edge[k], edge[k]);
+        for (k = 0; k < 3; k++) isogi_dvr__sub(mesh->points[t[k + 1]], origin, edge[k]);
+        for (k = 0; k < 6; k++) { /* from the first point, and between the others */
+            double between[3], length;
+            for (a = 0; a < 3; a++) between[a] = edge[k % 3][a] - (k < 3 ? 0 : edge[(k + 1) % 3][a]);
+            length = isogi_dvr__dot(between, between);
             longest = length > longest ? length : longest;
         }
         longest = sqrt(longest), volume = isogi_dvr__determinant(edge[0], edge[1], edge[2]);
@@ -8142,6 +8163,8 @@ ISOGI_API isogi_result isogi_dvr_tets_render(const isogi_tets *tets, const isogi
 #undef ISOGI_DVR__LOCAL_ORDER
 #undef ISOGI_DVR__MAX_SAMPLES
 #undef ISOGI_DVR__NEGLIGIBLE
+#undef ISOGI_DVR__MAX_REACH
+#undef ISOGI_DVR__NOT_FINITE
 #undef ISOGI_DVR__TILE
 #undef ISOGI_DVR__CHUNK
 #undef ISOGI_DVR__SLAB

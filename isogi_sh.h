@@ -66,7 +66,7 @@
    Accuracy     Largest absolute error against 128 bits, poles and all: double 1e-15 at degree 4, 5e-15 at 10, 2e-14 at 20, 1.5e-13 at 50,
                 7e-13 at 100 (all near poles, some .01 to .1 off them, for m = 0 and +-1; up to twice as much in x87 registers, as on
                 32-bit x86); float 4.5e-7 at 4, 2.2e-6 at 10, 1e-5 at 20, and 3e-7 beyond, where floats are rounded doubles. Gradients,
-                which grow as degree^1.5, in double 4e-15 at degree 4, 4e-14 at 10, 4e-13 at 20, 5e-11 (of 284) at 100; in float those
+                which grow as degree^1.5, in double 4e-15 at degree 4, 4e-14 at 10, 4e-13 at 20, 7e-11 (of 284) at 100; in float those
                 rounded. tests/test_sh.c states and checks each.
                 All bounds assume IEEE arithmetic: -ffast-math may reorder what cancels, and costs up to four times as much, six at
                 degree 100.
@@ -234,9 +234,9 @@ ISOGI_API isogi_result isogi_sh_project(float *rgb, int order, const isogi_light
 /* Rotates: out expands f(R^-1 w), so that a lobe towards d turns into a lobe towards R d; m is R, row-major. ISOGI_INVALID unless
    m is a rotation to 1e-3 (a reflection is none); the nearest Euler angles are used where it is off by more than 1e-6. out may be in.
    Wigner's d(pi/2) between rotations about z: exact at any degree, where the recursion of Ivanic and Ruedenberg (1996, 1998) loses digits
-   beyond 30. One channel of order 3 to 5 in float is turned as tensors by the matrix as it is, whose roundings add up: 5e-4 of the norm
-   after 10,000 calls with one matrix; others drift by 2e-5 of it, and in double by 2e-12. To go on turning, rotate the first expansion by
-   the product of the matrices, or use double. */
+   beyond 30. One channel of order 3 to 5 in float is turned as tensors by the matrix as it is, whose roundings add up: up to 1e-3 of the
+   norm after 10,000 calls with one matrix; others drift by 2e-5 of it, and in double by 2e-12. To go on turning, rotate the first expansion
+   by the product of the matrices, or use double. */
 ISOGI_API isogi_result isogi_sh_rotate(float *out, const float *in, int order, int channels, const float m[9]);
 ISOGI_API isogi_result isogi_sh_rotate_f64(double *out, const double *in, int order, int channels, const double m[9]);
 
@@ -253,7 +253,7 @@ ISOGI_API isogi_result isogi_sh_rotation_apply(float *out, const float *in, int 
 ISOGI_API isogi_result isogi_sh_rotation_apply_f64(double *out, const double *in, int order, int channels, const double *rotation);
 
 /* Rotation matrices: from a quaternion (w, x, y, z; any length > 0), an axis (any length > 0) and an angle (radians, right-handed),
-   and Euler angles Z(a) Y(b) Z(c), c applied first. Entries are right to 1e-15, and rounded to float. */
+   and Euler angles Z(a) Y(b) Z(c), c applied first. Entries are right to 2e-15, and rounded to float. */
 ISOGI_API isogi_result isogi_sh_matrix_from_quaternion(float m[9], const float quaternion[4]);
 ISOGI_API isogi_result isogi_sh_matrix_from_axis_angle(float m[9], const float axis[3], double angle);
 ISOGI_API isogi_result isogi_sh_matrix_from_euler_zyz(float m[9], double a, double b, double c);

@@ -54,6 +54,76 @@ TEST(slabs_are_seen_by_every_set_of_directions) {
     field_free(&f);
 }
 
+/* ---- local visibility ---- */
+
+/* Between sheared axes a ray takes further along an axis than it does through the volume: blocks look that far, the same bits for any
+   number of threads. At a shear whose rays would reach too far, it is said so. */
+TEST(local_visibility_follows_sheared_axes) {
+    enum { N = 40 };
+    static float data[N * N * N];
+    static const double cosine[3] = {0.8, 0.98, 1 - 1e-9};
+    static const isogi_transfer_point p[2] = {{0, {1, 1, 1}, 0}, {1, {1, 1, 1}, 0.05f}};
+    const isogi_transfer transfer = {p, 2, NULL, 0};
+    for (int i = 0; i < N * N * N; i++) data[i] = (float)(i % 7) / 7;
+    for (int k = 0; k < 3; k++) {
+        isogi_volume v = {.data = data, .type = ISOGI_F32, .size = {N, N, N},
+            .axes = {1, 0, 0, 0, 1, cosine[k], 0, 0, sqrt(1 - cosine[k] * cosine[k])}};
+        isogi_pyramid *pyramid = NULL;
+        double middle[3] = {19.5, 19.5, 19.5}, world[3];
+        float place[1][3], seen[3][9];
+        CHECK(isogi_vol_build(&pyramid, &v, NULL) == ISOGI_OK, "cosine %g", cosine[k]);
+        isogi_vol_to_world(pyramid, middle, world);
+        for (int a = 0; a < 3; a++) place[0][a] = (float)world[a];
+        for (int n = 0; n < 3; n++) {
+            const isogi_dvr_desc desc = {.pyramid = pyramid, .shading = ISOGI_DVR_VISIBILITY, .grid = {9, 9, 9}, .reduction = 1,
+                .method = n ? ISOGI_DVR_PAPER : ISOGI_DVR_BRUTE};
+            const isogi_context context = {.threads = 1 + n};
+            isogi_dvr *dvr = NULL;
+            isogi_result result = isogi_dvr_create(&dvr, &desc, &context);
+            if (k == 2 && n) CHECK(result == ISOGI_TOO_LARGE, "cosine %g: %s", cosine[k], isogi_result_string(result));
+            if (k == 2) {
+                isogi_dvr_free(dvr);
+                continue;
+            }
+            CHECK(result == ISOGI_OK && isogi_dvr_set_transfer(dvr, &transfer) == ISOGI_OK && isogi_dvr_step(dvr, 0, NULL) == ISOGI_OK &&
+                      isogi_dvr_sample_visibility(dvr, (const float(*)[3])place, 1, seen[n]) == ISOGI_OK,
+                  "cosine %g, %d", cosine[k], n);
+            isogi_dvr_free(dvr);
+        }
+        if (k < 2)
+            CHECK(fabsf(seen[1][0] - seen[0][0]) < 0.02f * seen[0][0] && !memcmp(seen[1], seen[2], sizeof seen[1]),
+                  "cosine %g: %g by brute force, %g and %g", cosine[k], (double)seen[0][0], (double)seen[1][0], (double)seen[2][0]);
+        isogi_vol_free(pyramid);
+    }
+}
+
+/* What is not finite is as transparent as finite voxels that do not absorb, though the function absorbs at the lowest value that occurs. */
+TEST(what_is_not_finite_throws_no_shadow) {
+    enum { N = 32 };
+    static float data[2][N * N * N];
+    static const isogi_transfer_point p[3] = {{0.5, {1, 1, 1}, 0}, {0.5, {1, 1, 1}, 0.2f}, {100, {1, 1, 1}, 0.2f}};
+    static const float places[3][3] = {{4, 15.5f, 15.5f}, {10, 15.5f, 15.5f}, {24, 15.5f, 15.5f}};
+    const isogi_transfer transfer = {p, 3, NULL, 0};
+    float seen[2][3][9], values[3];
+    for (int i = 0; i < N * N * N; i++)
+        data[0][i] = i % N < 24 ? 0 : 1 + (float)(i % N), data[1][i] = i % N < 24 ? (i % 3 ? NAN : (float)HUGE_VAL) : data[0][i];
+    for (int n = 0; n < 2; n++) {
+        isogi_volume v = {.data = data[n], .type = ISOGI_F32, .size = {N, N, N}};
+        isogi_pyramid *pyramid = NULL;
+        CHECK(isogi_vol_build(&pyramid, &v, NULL) == ISOGI_OK, "%d", n);
+        const isogi_dvr_desc desc = {.pyramid = pyramid, .shading = ISOGI_DVR_VISIBILITY, .grid = {N, N, N}, .reduction = 1,
+            .method = ISOGI_DVR_PAPER};
+        isogi_dvr *dvr = dvr_new(&desc, &transfer);
+        CHECK(isogi_dvr_step(dvr, 0, NULL) == ISOGI_OK && isogi_dvr_sample_visibility(dvr, places, 3, seen[n][0]) == ISOGI_OK &&
+                  isogi_dvr_sample_blocks(dvr, places, 3, values, NULL) == ISOGI_OK && values[2] >= 25 && values[2] <= 25,
+              "step: %g", (double)values[2]);
+        isogi_dvr_free(dvr), isogi_vol_free(pyramid);
+    }
+    for (int i = 0; i < 3; i++)
+        CHECK(fabsf(seen[1][i][0] - seen[0][i][0]) < 0.02f, "x %g: %g, of finite air %g", (double)places[i][0], (double)seen[1][i][0],
+              (double)seen[0][i][0]);
+}
+
 /* ---- the order in which blocks are raised ---- */
 
 /* CIE 1976 L*u*v* of a colour of sRGB's primaries, D65: from the definition, u' and v' of the white point by the same matrix. */

@@ -328,6 +328,20 @@ static const float ahead[3] = {4.1f, 1.45f, 1.55f};
 
 /* Nothing is lost between blocks with points of their own that touch, leave a gap or overlap by a rounding, whichever the eye is in; nor
    where every tetrahedron has points of its own and the eye is on one of them. */
+/* Whichever of its points comes first: its longest edge is the one between the second and the third. */
+TEST(degenerate_tetrahedra_are_so_in_any_order) {
+    static const float points[4][3] = {{0, 5e-13f, 0}, {1, 0, 0}, {-1, 0, 0}, {0, 0, 0.5f}}, values[4] = {0, 0, 1, 1};
+    for (uint32_t first = 0; first < 4; first++) {
+        const uint32_t tet[1][4] = {{first, (first + 1) % 4, (first + 2) % 4, (first + 3) % 4}};
+        const isogi_tet_mesh one = {points, values, 4, tet, 1};
+        isogi_tets *tets = NULL;
+        isogi_tet_report report = {0};
+        CHECK(isogi_dvr_tets_build(&tets, &one, &report, NULL) == ISOGI_OK && report.degenerate == 1, "%u first: %zu", first,
+              report.degenerate);
+        isogi_dvr_tets_free(tets);
+    }
+}
+
 TEST(parts_that_touch_or_overlap_are_seen_to_the_end) {
     const double overlaps[] = {0, -1e-6, 1e-7, 1e-6, 1e-5, 1e-3};
     slope[0] = slope[1] = slope[2] = 0;

@@ -64,6 +64,22 @@ TEST(imported_tables_keep_opacity_and_colour) {
 }
 
 /* Three materials with noise: the thresholds part them. */
+TEST(tables_of_more_entries_than_numbers_are_valid) {
+    enum { COUNT = 322 };
+    static float table[COUNT][4];
+    isogi_transfer_point p[COUNT];
+    test_random r = {8};
+    for (int run = 0; run < 200; run++) {
+        const double low = random_range(&r, -1, 1);
+        double high = low;
+        for (int i = 0; i < 1 + run; i++) high = nextafter(high, 2);
+        const isogi_transfer transfer = {p, COUNT, NULL, 0};
+        CHECK(isogi_transfer_import((const float(*)[4])table, COUNT, low, high, 1, 0, p) == ISOGI_OK &&
+                  isogi_transfer_validate(&transfer) == ISOGI_OK && p[COUNT - 1].value <= high,
+              "%.17g to %.17g", low, high);
+    }
+}
+
 TEST(suggestions_part_what_the_histogram_parts) {
     test_random r = {9};
     for (int n = 0; n < 20; n++) {
