@@ -2306,8 +2306,8 @@ static void isogi_dvr__lattice_task(void *arg, size_t z) {
         }
 }
 
-/* Divides the classes among 64 bins but NOT_FINITE, half by their number and half by how much opacity changes across them, so that no tent is lost in a
-   bin that is mostly air. A change of colours alone leaves bins as they are. */
+/* Divides the classes among 64 bins but NOT_FINITE, half by their number and half by how much opacity changes across them, so that no tent
+   is lost in a bin that is mostly air. A change of colours alone leaves bins as they are. */
 static void isogi_dvr__set_bins(const isogi_dvr *d, uint8_t bin[ISOGI_DVR__TABLE]) {
     double sum = 0, total = 0, last = 0;
     size_t i;

@@ -151,7 +151,8 @@
                 and while it works some 400 bytes (TRANSFER: 16 more for each coefficient), 8 MB of them at once of texels and as
                 many of probes, and 4 for every hit, for each texel of one cube (ISOGI_TRACE_CUBE), for all that were asked for
                 when lazy, and for each probe (160 more, TRANSFER 48 for each value, where light takes over 100 reflections to fade):
-                where every texel of a cube has a surface 190 MB with 1 sample, 460 with 64, and 740 where there are lights.
+                where every texel of a cube has a surface 130 MB, if these are layers, but in a gyroid 280 with 1 sample, 560 with
+                16, 730 with 64, and up to twice that where there are lights.
                 A request takes 12 bytes for each of 32768 points at a time.
                 Any allocation may fail: the call says ISOGI_NO_MEMORY, the texture stays as it was and can go on.
                 Stack use stays below 32 KB (compiled by clang, below 35), nearly all of it that of rays.
@@ -211,7 +212,7 @@ typedef enum isogi_trace_method {
 
 /* A colour at a data value; tables of these are piecewise linear, and constant beyond their ends. */
 typedef struct isogi_albedo_point {
-    double value; /* data value; ascending */
+    double value; /* data value; strictly ascending */
     float rgb[3]; /* albedo: 0..1; emission: radiance, 0 or more */
 } isogi_albedo_point;
 
@@ -263,7 +264,8 @@ typedef struct isogi_trace_desc {
     const isogi_albedo_point *albedo_points; /* piecewise linear in the isovalue, constant beyond its ends; multiplied into albedo
                                                 only if albedo is not all zero, else used alone */
     size_t albedo_count;
-    const isogi_albedo_point *emission_points; /* radiance that the surface itself sends out, by isovalue. TRANSFER: ISOGI_INVALID */
+    const isogi_albedo_point *emission_points; /* radiance that the surface itself sends out, by isovalue, up to 1e30.
+                                                  TRANSFER: ISOGI_INVALID */
     size_t emission_count;
     isogi_trace_material_function *material;   /* colours by place; NULL = none. TRANSFER leaves its emission out */
     void *material_user;
@@ -276,7 +278,7 @@ typedef struct isogi_trace_desc {
     int samples;               /* directions per texel; 0 = 64 */
     float error;               /* FEEDBACK: a texel is good enough once its standard error is below this fraction of the light that an
                                   open texel gets, averaged over all orientations, or once more samples would hardly lower it: light
-                                  from probes is itself uncertain by 2 %; 0 = every texel gets all its samples */
+                                  from probes is itself uncertain by 2 %; 0 = every texel gets all its samples. IRRADIANCE alone */
     int unfiltered;            /* non-zero: FEEDBACK averages no light over neighbouring texels, to see what that is worth: the same error
                                   takes four to ten times the samples, where they are few (make bench, rows filter-); of TRANSFER three
                                   to nine times */
@@ -333,7 +335,8 @@ ISOGI_API isogi_result isogi_trace_step(isogi_trace *trace, uint64_t max_rays, d
 
 /* Lookup (desc.lookup) among the texels that are valid and computed. irradiance[count] (RGB); error[count]: standard error of its
    luminance, NULL = not wanted; a point none of whose texels is ready gets the zero vector and error = INFINITY (so does the error
-   of a single sample, which is not known, and endless light). Points beyond the lattice are moved to its border.
+   of a single sample, which is not known, and endless light), and so does one that is not finite. Points beyond the lattice are moved to
+   its border.
    TRANSFER: under the lighting last given to isogi_trace_relight or isogi_trace_change (that of the description at first); its error is
    an upper bound.
    Irradiance below 0 is handed out as it is, here and by isogi_trace_gather: a sky that SH coefficients make negative somewhere brings
@@ -382,7 +385,8 @@ ISOGI_API isogi_result isogi_trace_lighting(const isogi_trace *trace, float (*li
      albedo, emission, their tables  those on whose isovalue the tables give another colour, since a texel's paths stay on one isosurface
                                      (all, where an array's contents were changed in place, or emission changes what may be the brightest
                                      light, to which errors and the formats below FLOAT refer); none for albedo with 0 bounces
-     isovalue_min, isovalue_max, lookup  none; texels that come in are computed, those that go out stay
+     isovalue_min, isovalue_max, lookup  none; texels that come in are computed, those that go out stay (until isogi_trace_touch
+                                     comes to them)
      material, material_user, samples, bounces, error, seed, offset, reach, no_shadows   all
    All else must be as it was: ISOGI_INVALID. transfer_channels 0 keeps the number of channels. */
 ISOGI_API isogi_result isogi_trace_change(isogi_trace *trace, const isogi_trace_desc *desc);
@@ -390,7 +394,9 @@ ISOGI_API isogi_result isogi_trace_change(isogi_trace *trace, const isogi_trace_
 /* Voxels first..last (both ends included, cut to the volume) are going to change, or have changed. To be called twice, without
    isogi_trace_step in between: before they do, and after isogi_vol_update. Computed again are texels at these voxels or within two of
    them, and those whose isosurface passes there, before or after: no others can see the change. With desc.reach and n bounces, only
-   those within n + 1 reaches. What a lazy texture was asked for at places where there was no surface has to be requested again. */
+   those within n + 1 reaches. What a lazy texture was asked for at places where there was no surface has to be requested again; beyond
+   desc.box_first..box_end light that was merged is kept up, but none is added where there was no surface. A box wholly beyond the volume
+   is ISOGI_INVALID. */
 ISOGI_API isogi_result isogi_trace_touch(isogi_trace *trace, const size_t first[3], const size_t last[3]);
 
 /* Texels along each axis, order (0 for IRRADIANCE), channels (3 for IRRADIANCE). Any of them may be NULL. Of no trace: zeros. */
@@ -1350,6 +1356,7 @@ typedef struct isogi_trace__scene {
     int has_env;
     double unit; /* RGB9E5, HALF and BYTE hold irradiance in units of this power of two, about that of an open surface */
     double possible;   /* what a sample that has not been taken may bring: open_light, or the brightest glow */
+    double square;     /* a power of four about the square of that, or 1: in it floats hold variances of light */
     double range;      /* of the volume's values, from the least to the largest; 1 if they are all the same */
     double open_light; /* luminance of the irradiance of an open texel, averaged over orientations: the unit of desc.error */
     int high;    /* light is gathered on the high side */
@@ -2006,13 +2013,17 @@ static double isogi_trace__middle(const isogi_trace__scene *scene, double middle
     return 0.25 * sqrt(square);
 }
 
+static float isogi_trace__bounded_float(double x) {
+    return x < -(double)FLT_MAX ? -FLT_MAX : x > (double)FLT_MAX ? FLT_MAX : (float)x;
+}
+
 /* Where a lamp is measured: from the middle, but no closer than `least`, since a lamp there would be all that counts, and from before a
    rectangle, which has a dark side. */
 static void isogi_trace__measure_from(const isogi_light *light, const double middle[3], double least, float point[3]) {
     double away[3], front[3] = {1, 0, 0}, apart, length;
     int a, rectangle = light->kind == ISOGI_LIGHT_RECTANGLE, moved;
     const float *u = light->edge[0], *v = light->edge[1];
-    for (a = 0; a < 3; a++) away[a] = middle[a] - (double)light->vector[a], point[a] = (float)middle[a];
+    for (a = 0; a < 3; a++) away[a] = middle[a] - (double)light->vector[a], point[a] = isogi_trace__bounded_float(middle[a]);
     for (a = 0; a < 3 && rectangle; a++)
         front[a] = (double)u[(a + 1) % 3] * (double)v[(a + 2) % 3] - (double)u[(a + 2) % 3] * (double)v[(a + 1) % 3];
     apart = sqrt(isogi_trace__dot_wide(away, away)), length = sqrt(isogi_trace__dot_wide(front, front));
@@ -2021,7 +2032,7 @@ static void isogi_trace__measure_from(const isogi_light *light, const double mid
     if (light->kind == ISOGI_LIGHT_SPHERE && (double)light->radius >= least) return; /* all around, or none of it is close */
     for (a = 0; a < 3; a++) {
         double dir = rectangle || !(apart > 0) ? front[a] / length : away[a] / apart;
-        point[a] = (float)((double)light->vector[a] + (apart > least ? apart : least) * dir);
+        point[a] = isogi_trace__bounded_float((double)light->vector[a] + (apart > least ? apart : least) * dir);
     }
 }
 
@@ -2105,6 +2116,7 @@ static isogi_result isogi_trace__open_light(isogi_trace__scene *scene) {
         if (glow > scene->possible) scene->possible = glow;
     }
     if (!(scene->open_light > 0)) scene->open_light = scene->possible; /* glows are all the light that there is */
+    if (scene->possible > 0) frexp(scene->possible, &a), scene->square = ldexp(1, 2 * a);
     return result;
 }
 
@@ -2148,13 +2160,14 @@ static isogi_result isogi_trace__scene_set(isogi_trace__scene *scene, const isog
     scene->flags = d->capped ? (uint32_t)ISOGI_RAY_CAPPED : 0;
     scene->has_env = d->lighting.env.rgb || d->lighting.env.sh;
     if (!d->order) d->order = 5;
+    if (d->mode == ISOGI_TRACE_TRANSFER) d->error = 0; /* of which light? */
     if (!d->samples) d->samples = 64;
     if (!(d->offset > 0 || d->offset < 0)) d->offset = 0.25f;
     if (!d->transfer_channels) d->transfer_channels = isogi_trace__grey(d) ? 1 : 3;
     isogi_trace__scene_matrix(scene);
     isogi_trace__scene_cells(scene);
     if (!d->storage) d->storage = d->mode == ISOGI_TRACE_TRANSFER ? ISOGI_TRACE_HALF : ISOGI_TRACE_FLOAT;
-    scene->unit = 1;
+    scene->unit = scene->square = 1;
     if (d->mode == ISOGI_TRACE_IRRADIANCE && d->storage != ISOGI_TRACE_FLOAT) {
         result = isogi_trace__scene_unit(scene);
         if (result != ISOGI_OK) return result;
@@ -2223,7 +2236,8 @@ struct isogi_trace {
     isogi_counters *task_counters;
     isogi_counters counters;
     isogi_trace__lit lit;             /* TRANSFER: the lighting */
-    float square[ISOGI_TRACE__VALUES]; /* TRANSFER: of the lighting's square, for the error */
+    float square[ISOGI_TRACE__VALUES]; /* TRANSFER: of the lighting's square, for the error, */
+    double square_unit;                /* in this unit, a power of two */
     isogi_trace *high; /* BOTH_SIDES: the other side's texture, owned */
     int wide;      /* AVX2 may be used */
     isogi_trace *coarse; /* hierarchy: the texture of every second texel, owned */
@@ -2760,15 +2774,18 @@ static isogi_result isogi_trace__project(isogi_trace__lit *lit, int order, const
 }
 
 static void isogi_trace__set_light(isogi_trace *t, const isogi_trace__lit *lit) {
-    int order = t->scene.desc.order, n = 3 * order * order, k, c;
-    float both[2 * ISOGI_TRACE__VALUES];
+    int order = t->scene.desc.order, n = 3 * order * order, k, c, e = 0;
+    float both[2 * ISOGI_TRACE__VALUES], most = 0;
     float one[ISOGI_TRACE__MAX_ORDER * ISOGI_TRACE__MAX_ORDER], square[ISOGI_TRACE__MAX_ORDER * ISOGI_TRACE__MAX_ORDER];
     memcpy(both, lit->all, (size_t)n * sizeof *both), memcpy(both + n, lit->even, (size_t)n * sizeof *both);
     isogi_trace__dim(both, 2 * n);
     memcpy(t->lit.all, both, (size_t)n * sizeof *both), memcpy(t->lit.even, both + n, (size_t)n * sizeof *both);
     memset(one, 0, sizeof one);
+    for (k = 0; k < n; k++) most = fabsf(t->lit.all[k]) > most ? fabsf(t->lit.all[k]) : most;
+    if (most > 0) frexp((double)most, &e);
+    t->square_unit = ldexp(1, 2 * e);
     for (c = 0; c < 3; c++) {
-        for (k = 0; k < order * order; k++) one[k] = t->lit.all[3 * k + c];
+        for (k = 0; k < order * order; k++) one[k] = (float)ldexp((double)t->lit.all[3 * k + c], -e);
         isogi_sh_product(square, one, one, order, 1);
         for (k = 0; k < order * order; k++) t->square[3 * k + c] = square[k];
     }
@@ -3002,6 +3019,8 @@ static int isogi_trace__taps(const isogi_trace *t, const float point[3], isogi_t
     double local[3], total = 0, best[2] = {DBL_MAX, DBL_MAX};
     int i, count = 0, pending = 0, taps = isogi_trace__tap_count(t);
     int one = t->scene.desc.lookup == ISOGI_TRACE_NEAREST || t->scene.desc.lookup == ISOGI_TRACE_CLOSEST_ISOVALUE;
+    for (i = 0; i < 3; i++)
+        if (!isogi_trace__finite((double)point[i])) return 0;
     isogi_trace__cell(t, point, cell, local);
     for (i = 0; i <= taps; i++) {
         const isogi_trace__brick *brick;
@@ -3059,7 +3078,7 @@ static double isogi_trace__variance(const isogi_trace *t, const double *values, 
     int c;
     if (t->scene.desc.mode != ISOGI_TRACE_TRANSFER || !isogi_trace__finite(error)) return error * error;
     isogi_trace__series_sum(t, values, t->square, square), isogi_trace__series_sum(t, values, t->lit.all, rgb);
-    spread = ISOGI_TRACE__PI * isogi_trace__luminance(square) - isogi_trace__luminance(rgb) * isogi_trace__luminance(rgb);
+    spread = ISOGI_TRACE__PI * t->square_unit * isogi_trace__luminance(square) - isogi_trace__luminance(rgb) * isogi_trace__luminance(rgb);
     for (c = 0; c < 3; c++) sky[c] = ISOGI_TRACE__PI * 0.28209479177387814 * (double)t->lit.all[c];
     return error * error * (spread > 0 ? spread : 0) +
            isogi_trace__unseen(isogi_trace__luminance(sky), isogi_trace__luminance(rgb), error > 0 ? 1 / (error * error) : 1e9);
@@ -3585,8 +3604,8 @@ typedef struct isogi_trace__segment {
 } isogi_trace__segment;
 
 /* What the filter compares; of transfer see isogi_trace__guide_series. pilot: luminance by its first round, and the variance of that.
-   lights: variance of the light that is not filtered. albedo, glow: of the surface through the texel, which is the one that its rays meet.
-   steep: by how much the field changes from texel to texel, along its gradient. */
+   lights: variance of the light that is not filtered. Variances are in scene.square. albedo, glow: of the surface through the texel,
+   which is the one that its rays meet. steep: by how much the field changes from texel to texel, along its gradient. */
 typedef struct isogi_trace__guide {
     double isovalue, steep;
     float normal[3], mean[3], luminance, variance, pilot, pilot_variance, lights;
@@ -5306,7 +5325,7 @@ static void isogi_trace__guide_task(void *arg, size_t task) {
     isogi_trace *t = (isogi_trace *)arg;
     isogi_trace__set *set = &t->feedback->texels;
     size_t i, end = isogi_trace__sweep(t, task, set->count, &i), v = (size_t)t->values;
-    const double rays = isogi_trace__sky_rays(&t->scene.sky, 1);
+    const double rays = isogi_trace__sky_rays(&t->scene.sky, 1), square = t->scene.square;
     for (; i < end; i++) {
         const isogi_trace__node *n = isogi_trace__node_at(set, i);
         isogi_trace__guide *g = isogi_trace__guide_at(set, i);
@@ -5316,7 +5335,7 @@ static void isogi_trace__guide_task(void *arg, size_t task) {
         double scale = n->samples ? 1.0 / n->samples : 0, rgb[3] = {0, 0, 0}, reflected[3], spread;
         int a;
         memcpy(g->normal, n->normal, sizeof g->normal);
-        g->samples = n->samples, g->lights = (float)isogi_trace__light_variance(n);
+        g->samples = n->samples, g->lights = (float)(isogi_trace__light_variance(n) / square);
         for (a = 0; a < t->values; a++)
             out[a] = (float)(ISOGI_TRACE__PI * scale * (double)direct[a] + scale * (double)bounce[a]);
         for (a = 0; a < 3 && t->scene.desc.mode == ISOGI_TRACE_IRRADIANCE; a++) {
@@ -5333,7 +5352,7 @@ static void isogi_trace__guide_task(void *arg, size_t task) {
         g->luminance = (float)(ISOGI_TRACE__PI * scale * (isogi_trace__luminance(rgb) + isogi_trace__luminance(n->bright)));
         spread = isogi_trace__mean_variance(isogi_trace__luminance(rgb), n->square + n->bounce_square, (double)n->samples);
         if (n->samples * rays > 1) spread += n->bright_spread * scale * rays / (n->samples * rays - 1);
-        g->variance = (float)(ISOGI_TRACE__PI * ISOGI_TRACE__PI * spread);
+        g->variance = (float)(ISOGI_TRACE__PI * ISOGI_TRACE__PI * spread / square);
     }
 }
 
@@ -5677,7 +5696,7 @@ static int isogi_trace__piloted(const isogi_trace *t) {
 static void isogi_trace__block_fill(const isogi_trace *t, const size_t brick[3], isogi_trace__dense *b) {
     const isogi_trace_desc *d = &t->scene.desc;
     const int second = t->feedback->phase == ISOGI_TRACE__PUBLISH && isogi_trace__piloted(t);
-    double most = 0, steepest = 0, base = 0;
+    double most = 0, steepest = 0, base = 0, square;
     int i, a;
     b->series = d->mode == ISOGI_TRACE_TRANSFER;
     memset(b->samples, 0, sizeof b->samples);
@@ -5690,14 +5709,15 @@ static void isogi_trace__block_fill(const isogi_trace *t, const size_t brick[3],
     }
     most = most > 0 ? 1 / most : 1, steepest = 1 / (steepest > 1e-300 ? steepest : 1e-300);
     if (b->count) base = b->guide[0]->isovalue;
+    square = most * most * t->scene.square;
     b->unit = 1 / most, b->tinted = d->albedo_count || d->emission_count || d->material;
     for (i = 0; i < b->count; i++) {
         const isogi_trace__guide *g = b->guide[i];
         const size_t at = b->at[i];
         const double one = g->samples ? 1.0 / g->samples : 0, iso = (g->isovalue - base) * steepest;
         const double luminance = (double)(second ? g->pilot : g->luminance) * most;
-        const double variance = (double)isogi_trace__bounded((double)g->variance) * (most * most);
-        const double noise = second ? (double)g->pilot_variance * (most * most) : variance;
+        const double variance = (double)isogi_trace__bounded((double)g->variance) * square;
+        const double noise = second ? (double)g->pilot_variance * square : variance;
         b->samples[at] = (float)g->samples, b->share[at] = (float)one;
         b->high[at] = (float)isogi_trace__within_both(iso, 1e30);
         b->low[at] = (float)isogi_trace__within_both(iso - (double)b->high[at], 1e30);
@@ -5753,7 +5773,8 @@ static void isogi_trace__publish(isogi_trace *t, size_t i, const isogi_trace__bl
     const isogi_trace__guide *g = isogi_trace__guide_at(set, i);
     const float *reflected = isogi_trace__values_at(set, i, ISOGI_TRACE__BOUNCE_VALUES, (size_t)t->values);
     const int known = n->samples > 1 && !t->feedback->diverges;
-    double probes = 0, variance = (double)g->variance, lights = (double)g->lights, alike = (double)g->samples, bounce[3];
+    const double square = t->scene.square;
+    double probes = 0, variance = (double)g->variance * square, lights = (double)g->lights, alike = (double)g->samples, bounce[3];
     float to[3], error;
     int a;
     if (t->scene.desc.mode == ISOGI_TRACE_TRANSFER) {
@@ -5772,7 +5793,7 @@ static void isogi_trace__publish(isogi_trace *t, size_t i, const isogi_trace__bl
             to[a] = (float)(light + n->steady[a] + (n->light_samples ? n->light[a] / n->light_samples : 0));
             bounce[a] = (double)reflected[a] / n->samples;
         }
-        variance += isogi_trace__unseen(t->scene.possible, (double)g->luminance, alike) + lights;
+        variance += isogi_trace__unseen(t->scene.possible, (double)g->luminance, alike) + lights * square;
         probes = ISOGI_TRACE__PROBE_ERROR * isogi_trace__luminance(bounce);
         error = known ? (float)sqrt(variance + probes * probes) : ISOGI_TRACE__NOT_READY;
         isogi_trace__record_write(t, isogi_trace__record(t, n->brick, n->slot), to, error);
@@ -5784,7 +5805,7 @@ static void isogi_trace__publish(isogi_trace *t, size_t i, const isogi_trace__bl
 static void isogi_trace__pilot(isogi_trace *t, size_t i, const isogi_trace__blend *blend) {
     isogi_trace__guide *g = isogi_trace__guide_at(&t->feedback->texels, i);
     g->pilot = blend ? (float)isogi_trace__luminance(blend->rgb) : g->luminance;
-    g->pilot_variance = isogi_trace__bounded(blend ? blend->variance : (double)g->variance);
+    g->pilot_variance = isogi_trace__bounded(blend ? blend->variance / t->scene.square : (double)g->variance);
 }
 
 /* Whether it has new light to publish. Where its error was low enough before the last sample, it stays so. */
@@ -7119,6 +7140,14 @@ static void isogi_trace__change_undo(isogi_trace__change *c) {
     isogi_trace__sky_free(&c->scene.sky, &c->trace->context);
 }
 
+/* What a texel is, after a change: one that can be read may have come from another box. */
+static int isogi_trace__classify_again(const isogi_trace *t, const size_t texel[3], int state) {
+    isogi_trace__site site;
+    if (state < ISOGI_TRACE__DRAFT || isogi_trace__in_box(t, texel)) return isogi_trace__classify(t, texel, 0);
+    if (!isogi_trace__in_range(t, texel, texel)) return ISOGI_TRACE__NOT_ASKED;
+    return isogi_trace__texel_site(t, texel, &site) ? ISOGI_TRACE__WANTED : ISOGI_TRACE__NO_SURFACE;
+}
+
 /* The new state of a texel. What can be read stays readable, where it still has a surface. chosen: by the interval of isovalues, or not. */
 static uint8_t isogi_trace__changed_state(const isogi_trace__change *c, const size_t texel[3], int state) {
     const isogi_trace *t = c->trace;
@@ -7130,12 +7159,12 @@ static uint8_t isogi_trace__changed_state(const isogi_trace__change *c, const si
     else again = isogi_trace__in_change(c, grid, none) || (chosen && isogi_trace__in_change(c, grid, margin));
     again |= !lazy && state == ISOGI_TRACE__UNKNOWN; /* its brick has just come */
     if (!again && !c->desc && !lazy && state >= ISOGI_TRACE__WANTED && isogi_trace__in_change(c, grid, margin)) {
-        now = isogi_trace__classify(t, texel, 0); /* no surface of the interval reads it any more */
+        now = isogi_trace__classify_again(t, texel, state); /* no surface of the interval reads it any more */
         if (now != ISOGI_TRACE__WANTED) return (uint8_t)now;
     }
     if (!again) return (uint8_t)(state == ISOGI_TRACE__DONE && isogi_trace__depends(c, grid) ? ISOGI_TRACE__DRAFT : state);
     if (lazy && state < ISOGI_TRACE__WANTED) return ISOGI_TRACE__UNKNOWN;
-    now = isogi_trace__classify(t, texel, 0);
+    now = isogi_trace__classify_again(t, texel, state);
     return (uint8_t)(now == ISOGI_TRACE__WANTED && state >= ISOGI_TRACE__DRAFT ? ISOGI_TRACE__DRAFT : now);
 }
 

@@ -49,12 +49,13 @@
 
    Memory       Through isogi_context, or malloc. A pyramid takes about 2.2 bytes for every voxel: bounds of blocks, and all voxels
                 in 8 bits of their block's range; and 31 KB. Of a volume that is marked compact it keeps the bounds alone, 1/5 byte for
-                every voxel, and rays are slower. Blocks of blocks are whole, so thin volumes take more: 7 bytes a voxel (compact 0.6)
-                where they are 5 voxels thick along one axis, 17 (1.4) with 2, along two axes more: cut large fields into thick chunks.
+                every voxel, and rays are slower. Blocks of blocks are whole, so small and thin volumes take more: 3 bytes a voxel with
+                100^3 of them, 7 (compact 0.6) where they are 5 voxels thick along one axis, 17 (1.4) with 2, along two axes more:
+                cut large fields into thick chunks.
                 From malloc, blocks of 4 MB and more ask Linux for huge pages: a pyramid is then built in 1/5 (virtual machines) to 7/10
                 of the time. Where your voxels lie in such pages, too (madvise, or isogi_allocate), many rays are 5 to 10 % faster.
-                A mesh keeps some 3/4 byte of scratch memory for every voxel until it is freed (1 to 2 where rows along x are no
-                multiple of 64 voxels, 36 where they have 2).
+                A mesh keeps some 3/4 byte of scratch memory for every voxel until it is freed (1 to 2 where rows along x are long
+                but no multiple of 64 voxels, 4 where they have 17, 36 where they have 2).
                 Stack use stays below 32 KB.
    Threads      A pyramid is const once built: any number of threads may read it. Building, updating, prefiltering and meshing use the
                 context's threads; rays, samples and normals run on the thread that calls. isogi_thread_pool keeps threads from call
@@ -67,7 +68,8 @@
                 to its own rounding where the origin is far, but for grazing rays, whose t is ill-conditioned by nature. A ray that runs
                 within the surface, where the field is the isovalue along a stretch of it, has the side that rounding gives it, and
                 may seem to cross. `make test` and `make check` show it.
-   Limits       2^31-1 voxels along an axis. Values up to 1e300. isogi_vol_sample takes float points: for volumes far from the
+   Limits       2^31-1 voxels along an axis. Values up to 1e300. Origins of rays within 1e13 cells of the box: from further away,
+                whether a ray hits may depend on which call is asked. isogi_vol_sample takes float points: for volumes far from the
                 origin use isogi_vol_sample_grid, or hits, which hold cell and place in double.
 
    How rays work: in a cell the field along a ray is a cubic. Its Bernstein coefficients come from the corners by convex sums, so
@@ -314,7 +316,8 @@ ISOGI_API void isogi_vol_to_grid(const isogi_pyramid *pyramid, const double worl
    of at least 2^-16 cell, and may overlook a dip through the surface that is shorter than that, hence shallower than
    hessian * (2^-16 cell)^2. Where a ray runs along the surface these steps grow by a tenth each, so that no ray takes more than some
    hundred of them in a cell. All of this in double, hence to within the rounding errors of the function itself. t is right to those.
-   A function that is not as smooth as `hessian` claims loses hits, but nothing else.
+   A function that is not as smooth as `hessian` claims loses hits, but nothing else; so does one whose values, or hessian |dir|^2, are
+   beyond 1e148, or below 1e-160.
    counters: blocks as for volumes, cubics = calls of the function. */
 typedef struct isogi_field {
     /* gradient per world unit, never NULL; called from any thread; a result that is not finite: no surface in the rest of that cell */
@@ -345,11 +348,12 @@ typedef enum isogi_filter {
 } isogi_filter;
 
 /* At world points; values[count], gradients[count] (per world unit, in world axes); either may be NULL. Outside the box a point
-   is moved to its nearest border point; a coordinate that is not finite leaves it somewhere in the box. Many points a call go
-   several times faster than one, and fastest where neighbours follow each other: points far apart wait for memory. Points are located
-   in double, or to 2^-24 cell where floats can; the rest is float: values err by at most 2^-21 of the largest number that enters them
-   (a voxel, the bias), gradients by 2^-21 (those of cubic filters by 2^-20) of the largest difference between voxels that enter them,
-   per spacing; doubles are sampled in double. The path of instructions may change results within that; the size of a call does not. */
+   is moved to its nearest border point (between sheared axes, along these); a coordinate that is not finite leaves it somewhere in the
+   box. Many points a call go several times faster than one, and fastest where neighbours follow each other: points far apart wait for
+   memory. Points are located in double, or to 2^-24 cell where floats can; the rest is float: values err by at most 2^-21 (those of cubic
+   filters by 2^-19) of the largest number that enters them (a voxel, the bias), gradients by 2^-21 (those of cubic filters by 2^-20) of
+   the largest difference between voxels that enter them, per spacing; doubles are sampled in double. The path of instructions may change
+   results within that; the size of a call does not. */
 ISOGI_API isogi_result isogi_vol_sample(const isogi_pyramid *pyramid, const float (*points)[3], size_t count, float *values,
                                         float (*gradients)[3]); /* trilinear */
 ISOGI_API isogi_result isogi_vol_sample_smooth(const isogi_pyramid *pyramid, const float (*points)[3], size_t count, float *values,
@@ -362,8 +366,8 @@ ISOGI_API isogi_result isogi_vol_sample_grid(const isogi_pyramid *pyramid, isogi
 /* Coefficients with which the B-spline filter interpolates: make a volume of them (float, packed, no scale or bias, else as before),
    build its pyramid and sample it by ISOGI_FILTER_BSPLINE. That is the natural cubic spline: smoother than Catmull-Rom and nearer
    to smooth fields, for 4 bytes a voxel and a pass over the volume; rays and meshes should go on with the voxels themselves.
-   coefficients: size[0] * size[1] * size[2] floats, x fastest. A halo is not read; a voxel that is not finite counts as 0. After
-   ISOGI_CANCELLED the coefficients are of no use. */
+   coefficients: size[0] * size[1] * size[2] floats, x fastest. A halo is not read; a voxel that is not finite, or beyond 1e36, counts
+   as 0. After ISOGI_CANCELLED the coefficients are of no use. */
 ISOGI_API isogi_result isogi_vol_prefilter(const isogi_volume *volume, float *coefficients, const isogi_context *context);
 
 /* ---- rays ---------------------------------------------------------------------------------------------------------------- */
@@ -412,8 +416,8 @@ ISOGI_API isogi_result isogi_vol_occluded(const isogi_pyramid *pyramid, const is
    cubic: no epsilon, no self-hit, no leak. A start may be 1e-9 cell off the surface. So where the surface comes back within as much,
    through the face of a cell that lies between, it is not told from the start, but for rays that go onward: they miss no crossing,
    however close it follows. t of the new hit counts from the start. Where the surface has no thickness (a single layer of voxels that
-   equal the isovalue) a ray touches it in one point: that is a hit with side +1, and the ray goes on outside. tmax[count], or NULL =
-   unlimited. flags as in isogi_ray. hits may be starts. */
+   equal the isovalue) a ray touches it in one point: that is a hit with side +1, and the ray goes on outside. tmax[count] (0 = unlimited),
+   or NULL. flags as in isogi_ray. hits may be starts. */
 ISOGI_API isogi_result isogi_vol_continue(const isogi_pyramid *pyramid, const isogi_hit *starts, const float (*dirs)[3],
                                           const double *tmax, double isovalue, uint32_t flags, size_t count, isogi_hit *hits,
                                           isogi_counters *counters);
@@ -429,7 +433,7 @@ ISOGI_API isogi_result isogi_vol_intersect_all(const isogi_pyramid *pyramid, con
 /* What a renderer may not skip: the next piece of the ray, at or behind t = from, that runs through blocks of 4^3 cells in which the
    field may take a value of one of the closed intervals ranges[n] = {low, high}; pieces of neighbouring blocks are one. 1 and
    interval = {begin, end} within the ray's tmin and tmax, or 0 and no change if there is none. Between the pieces the field takes none
-   of these values, but for roundings of 1e-12 cell. The ray's isovalue and flags are not read.
+   of these values, but for roundings of 1e-12 of the way from its origin. The ray's isovalue and flags are not read.
        for (t = ray.tmin; isogi_vol_next_interval(pyramid, &ray, ranges, n, t, piece, NULL); t = piece[1]) ...
    counters->blocks: blocks looked at. */
 ISOGI_API int isogi_vol_next_interval(const isogi_pyramid *pyramid, const isogi_ray *ray, const double (*ranges)[2], size_t range_count,
@@ -3812,7 +3816,8 @@ static void isogi_vol__prefilter_slice(void *arg, size_t z) {
             const size_t count = v->size[0] - x < 64 ? v->size[0] - x : 64;
             double row[64];
             isogi_vol__row(v, (int)x, (int)y, (int)z, (int)count, row);
-            for (k = 0; k < count; k++) out[v->size[0] * y + x + k] = isogi_vol__finite64(row[k]) ? (float)row[k] : 0;
+            for (k = 0; k < count; k++)
+                out[v->size[0] * y + x + k] = isogi_vol__finite64(row[k]) && fabs(row[k]) <= 1e36 ? (float)row[k] : 0;
         }
     isogi_vol__solve_lines(job->pivot, out, v->size[0], 1, v->size[1], v->size[0]);
     isogi_vol__solve_lines(job->pivot, out, v->size[1], v->size[0], v->size[0], 1);
@@ -3857,7 +3862,7 @@ ISOGI_VOL__INLINE void isogi_vol__cubic_rescale(isogi_vol__cubic *cubic) {
     for (i = 0; i < 4; i++) most = isogi_vol__max(most, fabs(cubic->b[i]));
     cubic->scale = 1;
     if (most > 1e-100 && most < 1e100) return;
-    cubic->scale = most < 1 ? 1e150 : 1e-180;
+    cubic->scale = most < 1 ? 1e200 : 1e-180;
     for (i = 0; i < 4; i++) cubic->b[i] *= cubic->scale;
 }
 
@@ -8789,7 +8794,7 @@ ISOGI_API int isogi_vol_next_interval(const isogi_pyramid *pyramid, const isogi_
     slack = 1e-12 * (fabs(w.base) + piece[1] + 1 / isogi_vol__largest(w.dir[0], w.dir[1], w.dir[2]));
     begin = isogi_vol__max(w.base + piece[0] - slack, w.base), end = isogi_vol__min(piece[1] + slack, w.end) + w.base;
     begin = isogi_vol__max(begin, rest.tmin), end = isogi_vol__min(end, isogi_vol__tmax(rest.tmax));
-    if (!found || !(end > begin) || !(w.end > slack)) return 0;
+    if (!found || !(end > begin)) return 0;
     interval[0] = begin, interval[1] = end;
     return 1;
 }

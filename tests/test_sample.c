@@ -794,4 +794,18 @@ TEST(huge_doubles_stay_finite) {
     }
 }
 
+/* Prefiltered, voxels beyond what its floats can hold spoil none but themselves. */
+TEST(prefiltered_coefficients_are_finite) {
+    static const double large[4] = {1e36, 9e36, 1e40, 1e300};
+    for (int k = 0; k < 4; k++) {
+        double data[6][6][6];
+        float out[216];
+        isogi_volume v = {.data = data, .type = ISOGI_F64, .size = {6, 6, 6}};
+        for (int i = 0; i < 216; i++)
+            data[i / 36][i / 6 % 6][i % 6] = i == 100 || k < 2 ? ((i / 36 + i / 6 + i) % 2 ? large[k] : -large[k]) : 1;
+        CHECK(isogi_vol_prefilter(&v, out, NULL) == ISOGI_OK, "%g", large[k]);
+        for (int i = 0; i < 216; i++) CHECK(test_finite((double)out[i]), "%g: coefficient %d is %g", large[k], i, (double)out[i]);
+    }
+}
+
 TEST_MAIN("sample")

@@ -802,6 +802,42 @@ TEST(even_part_of_a_lighting) {
     isogi_trace_free(t), scene_free(&s);
 }
 
+/* Whatever unit light is in: multiplied by a power of two, all light and all errors are the same bits times that, however far squares of it
+   are beyond floats. */
+TEST(light_has_any_unit) {
+    enum { WIDTH = 32, HEIGHT = 16, POINTS = 60 };
+    static float image[2][HEIGHT][WIDTH][3], points[POINTS][3], e[2][POINTS][3], error[2][POINTS];
+    static const int powers[5] = {0, -90, -70, 62, 88};
+    double q[5] = {8, 7, 8, 11, 6};
+    scene s = scene_make(17, 17, 17, NULL, pit, q);
+    int n = surface_points(&s, 0, POINTS, 5, points);
+    for (int y = 0; y < HEIGHT; y++)
+        for (int x = 0; x < WIDTH; x++)
+            for (int c = 0; c < 3; c++) image[0][y][x][c] = y == 3 && x == 9 ? 40 : 0.1f * (float)(y + x % 5 + c);
+    for (int mode = 0; mode < 4; mode++) /* irradiance, transfer; by feedback, by paths */
+        for (int k = 0; k < 5; k++) {
+            isogi_light lights[2] = {light_make(ISOGI_LIGHT_DIRECTIONAL, 1, 3, 0.5, ldexp(2, powers[k]), 0.3),
+                                     light_make(ISOGI_LIGHT_SPHERE, 8, 14, 9, ldexp(20, powers[k]), 1)};
+            isogi_trace_desc d = desc_make(&s, 0.6f, -1, 16);
+            isogi_trace *t = NULL;
+            for (int i = 0; i < 3 * WIDTH * HEIGHT; i++) (&image[1][0][0][0])[i] = (float)ldexp((double)(&image[0][0][0][0])[i], powers[k]);
+            d.lighting = (isogi_lighting){.env = {.rgb = image[1][0][0], .width = WIDTH, .height = HEIGHT}, .lights = lights,
+                .light_count = 2 - (size_t)(mode % 2)};
+            d.mode = (isogi_trace_mode)(mode % 2), d.method = mode / 2 ? ISOGI_TRACE_PATHS : ISOGI_TRACE_FEEDBACK, d.lazy = 1;
+            CHECK(isogi_trace_create(&t, &d, NULL) == ISOGI_OK &&
+                      isogi_trace_request(t, (const float(*)[3])points, (size_t)n) == ISOGI_OK && isogi_trace_step(t, 0, NULL) == ISOGI_OK,
+                  "mode %d", mode);
+            isogi_trace_sample(t, (const float(*)[3])points, (size_t)n, e[k > 0], error[k > 0]), isogi_trace_free(t);
+            for (int i = 0; i < n && k; i++) {
+                int same = ldexp((double)error[0][i], powers[k]) - (double)error[1][i] == 0;
+                for (int c = 0; c < 3; c++) same &= ldexp((double)e[0][i][c], powers[k]) - (double)e[1][i][c] == 0;
+                CHECK(same, "mode %d, times 2^%d: %g becomes %g, error %g %g", mode, powers[k], (double)e[0][i][0],
+                      ldexp((double)e[1][i][0], -powers[k]), (double)error[0][i], ldexp((double)error[1][i], -powers[k]));
+            }
+        }
+    scene_free(&s);
+}
+
 /* On open ground nothing stands in the way: gloss is the lighting blurred by the lobe, in the mirrored direction, here by quadrature of the
    lobe; openness by 16384 samples is 1 but for 1 %. In a pit whose walls reflect blue, less green and no red, openness is that of a
    colour of its own: blue gloss is brightest. */

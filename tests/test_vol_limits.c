@@ -389,6 +389,60 @@ TEST(infinite_isovalues_are_misses_on_every_path) {
 }
 
 /* Descriptions of odd numbers are refused or understood, never followed into the woods. */
+/* However far the ray comes from, and however short the piece: what holds a hit is no gap. */
+TEST(short_pieces_of_far_rays_are_not_skipped) {
+    static float data[8][8][8];
+    isogi_volume v = {.data = data, .type = ISOGI_F32, .size = {8, 8, 8}};
+    isogi_pyramid *p = NULL;
+    for (int i = 0; i < 512; i++) data[i / 64][i / 8 % 8][i % 8] = (float)(i % 8);
+    CHECK(isogi_vol_build(&p, &v, NULL) == ISOGI_OK, "%s", "build");
+    for (int e = 9; e < 41; e++) { /* across an edge of the box */
+        const double far = ldexp(1, e), chord = ldexp(far, -41);
+        const isogi_ray ray = {.origin = {chord - far, far, 2.5}, .dir = {1, -1, 0}, .isovalue = chord / 2};
+        const double range[1][2] = {{chord / 2, chord / 2}};
+        double piece[2] = {0, 0}, t = ray.tmin;
+        isogi_hit hit = {0};
+        int pieces = 0;
+        isogi_vol_intersect(p, &ray, 1, &hit, NULL);
+        for (; pieces < 100 && isogi_vol_next_interval(p, &ray, range, 1, t, piece, NULL); pieces++, t = piece[1])
+            CHECK(piece[1] > piece[0] && piece[0] >= t, "2^%d: %.17g to %.17g", e, piece[0], piece[1]);
+        CHECK(hit.side == 1 && pieces > 0 && pieces < 100 && hit.t <= piece[1], "2^%d: side %d at %.17g, %d pieces", e, hit.side, hit.t,
+              pieces);
+    }
+    isogi_vol_free(p);
+}
+
+/* Doubles so small that squares of a hundredth of the smallest normal number would be nothing: hits are those of ordinary ones. */
+TEST(the_smallest_doubles_are_hit_like_others) {
+    enum { N = 8, RAYS = 2000 };
+    static double data[2][N * N * N];
+    static const int powers[2] = {0, -1050};
+    static isogi_ray rays[2][RAYS];
+    static isogi_hit hits[2][RAYS];
+    test_random r = {77};
+    for (int i = 0; i < N * N * N; i++) data[0][i] = floor(random_range(&r, -1000, 1000)), data[1][i] = ldexp(data[0][i], powers[1]);
+    for (int i = 0; i < RAYS; i++) {
+        isogi_ray *ray = &rays[0][i];
+        for (int a = 0; a < 3; a++) ray->origin[a] = random_range(&r, -1, N), ray->dir[a] = (float)random_range(&r, -1, 1);
+        ray->isovalue = floor(random_range(&r, -900, 900)) + 0.5;
+        rays[1][i] = *ray, rays[1][i].isovalue = ldexp(ray->isovalue, powers[1]);
+    }
+    for (int path = 0; path < 5; path++) {
+        int other = 0;
+        for (int k = 0; k < 2; k++) {
+            isogi_volume v = {.data = data[k], .type = ISOGI_F64, .size = {N, N, N}};
+            const isogi_context context = {.threads = 1, .force_path = path};
+            isogi_pyramid *p = NULL;
+            CHECK(isogi_vol_build(&p, &v, &context) == ISOGI_OK && isogi_vol_intersect(p, rays[k], RAYS, hits[k], NULL) == ISOGI_OK,
+                  "%d", k);
+            isogi_vol_free(p);
+        }
+        for (int i = 0; i < RAYS; i++)
+            other += hits[0][i].side != hits[1][i].side || (hits[0][i].side && fabs(hits[0][i].t - hits[1][i].t) > 1e-5);
+        CHECK(!other, "path %d: %d of %d hits are others", path, other, RAYS);
+    }
+}
+
 TEST(odd_descriptions_are_refused_or_understood) {
     test_random r = {4};
     long built = 0;
