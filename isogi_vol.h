@@ -8794,7 +8794,7 @@ ISOGI_API int isogi_vol_next_interval(const isogi_pyramid *pyramid, const isogi_
     slack = 1e-12 * (fabs(w.base) + piece[1] + 1 / isogi_vol__largest(w.dir[0], w.dir[1], w.dir[2]));
     begin = isogi_vol__max(w.base + piece[0] - slack, w.base), end = isogi_vol__min(piece[1] + slack, w.end) + w.base;
     begin = isogi_vol__max(begin, rest.tmin), end = isogi_vol__min(end, isogi_vol__tmax(rest.tmax));
-    if (!found || !(end > begin)) return 0;
+    if (!found || !(end > begin) || !(w.end > 1e-3 * slack)) return 0; /* what little rounding leaves at a ray's end is no piece */
     interval[0] = begin, interval[1] = end;
     return 1;
 }
