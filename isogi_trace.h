@@ -3381,10 +3381,13 @@ static void isogi_trace__again_task(void *arg, size_t task) {
     }
 }
 
-/* The texels that the lookup at point i reads, and its cell and place in it; of a cell that is kept any place within: all read the same. */
+/* The texels that the lookup at point i reads, and its cell and place in it; of a cell that is kept any place within: all read the same.
+   None, where it is not finite. */
 static int isogi_trace__asked_taps(const isogi_trace *t, const isogi_trace__asked *asked, size_t i, size_t cell[3], double local[3],
                                    uint8_t *tap, size_t *brick, uint32_t *slot) {
     int a;
+    for (a = 0; a < 3; a++)
+        if (!isogi_trace__finite((double)asked->points[i][a])) return 0;
     if (asked->cells[i][0] == ISOGI_TRACE__ON_FACE) isogi_trace__cell(t, asked->points[i], cell, local);
     else for (a = 0; a < 3; a++) cell[a] = asked->cells[i][a], local[a] = 0.5;
     return isogi_trace__corners(t, cell, local, isogi_trace__inner(local), tap, brick, slot);
@@ -3435,6 +3438,7 @@ static isogi_result isogi_trace__want_points(isogi_trace *t, isogi_trace__asked 
         int k, taps, lacking = 1;
         if (!asked->lacking && (asked->again[i / 64] >> i % 64 & 1)) continue;
         taps = isogi_trace__asked_taps(t, asked, i, cell, local, tap, brick, slot);
+        if (!taps) continue;
         for (k = 0; k < taps && result == ISOGI_OK; k++) {
             if (t->bricks[brick[k]]->state[slot[k]] == ISOGI_TRACE__READABLE) result = isogi_trace__want_slot(t, brick[k], slot[k]);
             lacking = lacking && t->bricks[brick[k]]->state[slot[k]] == ISOGI_TRACE__NO_SURFACE;

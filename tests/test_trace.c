@@ -793,6 +793,36 @@ TEST(points_beyond_the_lattice_read_its_border) {
     scene_free(&s);
 }
 
+/* Places that are not finite ask for no texel, among others or alone, and have no light. */
+TEST(points_that_are_not_finite_have_no_light) {
+    double q[1] = {0.4};
+    scene s = scene_make(12, 11, 13, NULL, gyroid, q);
+    for (int k = 0; k < 8; k++) {
+        isogi_trace_desc d = desc_make(&s, 0.5f, 0, 2);
+        const float odd[4] = {(float)nan_value(), HUGE_VALF, -HUGE_VALF, 1e30f};
+        float points[12][3], e[12][3], error[12];
+        isogi_counters counters[2] = {{0}, {0}};
+        isogi_trace *t = NULL;
+        d.lookup = (isogi_trace_lookup)(k / 2), d.lazy = 1, d.mode = (isogi_trace_mode)(k % 2);
+        for (int i = 0; i < 12; i++)
+            for (int a = 0; a < 3; a++) points[i][a] = a == i % 3 ? odd[i / 3] : 5.25f;
+        CHECK(isogi_trace_create(&t, &d, NULL) == ISOGI_OK && isogi_trace_request(t, (const float(*)[3])points, 9) == ISOGI_OK &&
+                  isogi_trace_step(t, 0, NULL) == ISOGI_OK,
+              "case %d", k);
+        isogi_trace_counters(t, &counters[0]);
+        CHECK(isogi_trace_request(t, (const float(*)[3])points, 12) == ISOGI_OK && isogi_trace_step(t, 0, NULL) == ISOGI_OK, "case %d", k);
+        isogi_trace_counters(t, &counters[1]);
+        CHECK(!counters[0].texels && counters[1].texels, "case %d: %d texels, then %d", k, (int)counters[0].texels,
+              (int)counters[1].texels);
+        isogi_trace_sample(t, (const float(*)[3])points, 12, e, error);
+        for (int i = 0; i < 12; i++)
+            CHECK(i < 9 ? !(e[i][1] > 0) && error[i] > 1e30f : e[i][1] > 0, "case %d, point %d: %g, error %g", k, i, (double)e[i][1],
+                  (double)error[i]);
+        isogi_trace_free(t);
+    }
+    scene_free(&s);
+}
+
 /* The only texel along an axis lies in the middle: as the one of a lattice that is that plane. More than 2^31 - 1 are too many. */
 TEST(a_single_texel_lies_in_the_middle) {
     double q[5] = {10, 9, 10, 13, 6};
