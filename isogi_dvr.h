@@ -192,7 +192,8 @@
    resolutions a third to 1.4 times as many, as blocks hold their borders each, and a third such set while sweeps finish), with light 4
    more during a picture, 8 where matter is dense for the grid; sweeps as many again (then only until they are done), two floats for each
    node of their lattice, and during a step, for each of up to 16 directions, a float for each grid point and about 6 m (m + 24) of scratch
-   for m nodes on the longest axis. Empty blocks take one byte for each block of the pyramid; a picture in work 20 bytes a pixel, and 64 kB
+   for m nodes on the longest axis; the paper's method then 12 MB, with a radius above 16 voxels 47 MB, between sheared axes up to 200.
+   Empty blocks take one byte for each block of the pyramid; a picture in work 20 bytes a pixel, and 64 kB
    to 1 MB of classes of values in physical space; the transfer function of exact rays, and of those with a bound, 160 to 220 bytes a point,
    of pre-integrated ones 16 table^2 and 8 a point more. All of it comes from the context's allocator; where that fails the call says so and
    changes nothing.
@@ -355,7 +356,7 @@ typedef struct isogi_dvr_desc {
                                rays of visibility have their distance from step all the same */
     double emission;        /* share of rgb that glows by itself, besides scattering light; 0..1e6; with visibility only */
     double radius;          /* the paper's method: of local visibility, in units of the smallest voxel spacing, 1..32; 0 = 16. Sheared
-                               axes along which it reaches more than 128 voxels are ISOGI_TOO_LARGE */
+                               axes along which it reaches more than 64 voxels are ISOGI_TOO_LARGE */
     double reduction;       /* the paper's method: voxels of the volume to points of its blocks, at least 1; 0 = 4. A block that is not
                                transparent holds a point whatever the budget is; those that the border cuts thin come first for more.
                                One of a single colour holds no more than its corners at any budget: in dense fog that reaches the border
@@ -554,7 +555,7 @@ ISOGI_API isogi_result isogi_dvr_tets_render(const isogi_tets *tets, const isogi
 #define ISOGI_DVR__LOCAL_ORDER 5           /* of the environment in local shading: the cosine kernel holds little beyond */
 #define ISOGI_DVR__MAX_SAMPLES 16777216.0  /* on one ray */
 #define ISOGI_DVR__NEGLIGIBLE 1e-4         /* transmittance at which a visibility ray ends */
-#define ISOGI_DVR__MAX_REACH 8             /* blocks that local visibility may look at on each side of one */
+#define ISOGI_DVR__MAX_REACH 4             /* blocks that local visibility may look at on each side of one */
 #define ISOGI_DVR__NOT_FINITE 62           /* the bin of what is not */
 #define ISOGI_DVR__TILE 16                 /* pixels a side: one task */
 #define ISOGI_DVR__CHUNK 16                /* grid points: one task */
@@ -2382,7 +2383,7 @@ static isogi_result isogi_dvr__plan_blocks(isogi_dvr *d) {
     b->lit = b->level + b->total, b->stale = b->lit + b->total;
     for (a = 0; a < 3; a++) { /* between axes at right angles, the radius; sheared ones it takes further */
         const double *row = d->to_grid + 3 * a, blocks = d->desc.radius * d->spacing * sqrt(isogi_dvr__dot(row, row)) / 16;
-        if (!(blocks < ISOGI_DVR__MAX_REACH)) return ISOGI_TOO_LARGE;
+        if (!(blocks <= ISOGI_DVR__MAX_REACH)) return ISOGI_TOO_LARGE;
         if (ceil(blocks - 1e-9) > (double)b->reach) b->reach = (size_t)ceil(blocks - 1e-9);
     }
     job.dvr = d;
@@ -3808,7 +3809,8 @@ static double isogi_dvr__significance(const isogi_dvr *d, size_t block, double (
         value = isogi_dvr__lattice_at(d, 4, c);
         if (isogi_dvr__finite32(value)) mean += (double)value, nodes++;
     }
-    isogi_dvr__luv_of(d, nodes > 0 ? d->base + mean / nodes : d->range[0], at);
+    if (nodes > 0) isogi_dvr__luv_of(d, d->base + mean / nodes, at);
+    else memset(at, 0, sizeof at);
     for (i = 0; i < 64; i++) {
         double difference[3] = {luv[i][0] - at[0], luv[i][1] - at[1], luv[i][2] - at[2]}, size = isogi_dvr__dot(difference, difference);
         if ((b->histogram[block] >> i & 1) && size > most) most = size;
@@ -4175,13 +4177,15 @@ static size_t isogi_dvr__along(const isogi_dvr *d, size_t block, size_t n, int a
     return i;
 }
 
+/* Between two nodes, of which one that does not count need not be finite. */
+static float isogi_dvr__mix(float from, float to, float u) { return u > 0 ? u < 1 ? from + u * (to - from) : to : from; }
+
 /* A row of the nodes that a block holds, between four of them. */
 static void isogi_dvr__held_row(const float *data, size_t row, size_t plane, float v, float w, float line[17]) {
     size_t i;
     for (i = 0; i < row; i++) {
-        float x = data[i], y = w > 0 ? data[plane + i] : x;
-        if (v > 0) x += v * (data[row + i] - x), y = w > 0 ? y + v * (data[plane + row + i] - y) : x;
-        line[i] = x + w * (y - x);
+        const float x = isogi_dvr__mix(data[i], data[row + i], v);
+        line[i] = w > 0 ? isogi_dvr__mix(x, isogi_dvr__mix(data[plane + i], data[plane + row + i], v), w) : x;
     }
 }
 
@@ -4205,7 +4209,7 @@ static int isogi_dvr__fill_window(const isogi_dvr *d, size_t block, size_t n, co
                     isogi_dvr__node_position(b, block, n, node, position);
                     if (!isogi_dvr__kept(d, position)) continue;
                 }
-                if (u[0][node[0]] > 0) value += u[0][node[0]] * (end - value);
+                value = isogi_dvr__mix(value, end, u[0][node[0]]);
                 if (!isogi_dvr__finite32(value)) continue;
                 out[node[0]] = d->matter.table[isogi_dvr__class(d, d->base + (double)value)];
                 any |= out[node[0]] > 0;

@@ -124,19 +124,19 @@
        #version 400 core
        uniform sampler3D transfer[7];
        uniform vec4 scale[7];         // isogi_trace_export_scales, the last three components 0
-       uniform vec3 light[28], even[28]; // isogi_trace_lighting, of this frame, the last three 0
+       uniform vec3 light[28], least[28]; // isogi_trace_lighting, of this frame, the last three 0
        uniform vec3 lattice_min, lattice_max, albedo;
        in vec3 grid;
        out vec4 colour;
        void main() {
-           vec3 size = vec3(textureSize(transfer[0], 0)), irradiance = vec3(0.0), least = vec3(0.0);
+           vec3 size = vec3(textureSize(transfer[0], 0)), irradiance = vec3(0.0), bound = vec3(0.0);
            vec3 place = ((grid - lattice_min) / max(lattice_max - lattice_min, 1e-6) * (size - 1.0) + 0.5) / size;
            for (int p = 0; p < 7; p++) {
                vec4 t = scale[p] * texture(transfer[p], place);
                irradiance += t.x * light[4 * p] + t.y * light[4 * p + 1] + t.z * light[4 * p + 2] + t.w * light[4 * p + 3];
-               least += t.x * even[4 * p] + t.y * even[4 * p + 1] + t.z * even[4 * p + 2] + t.w * even[4 * p + 3];
+               bound += t.x * least[4 * p] + t.y * least[4 * p + 1] + t.z * least[4 * p + 2] + t.w * least[4 * p + 3];
            }
-           colour = vec4(albedo * max(max(irradiance, least), 0.0) / 3.14159265, 1.0);
+           colour = vec4(albedo * max(max(irradiance, bound), 0.0) / 3.14159265, 1.0);
        }
 
    Options, to be defined before the implementation
@@ -340,7 +340,8 @@ ISOGI_API isogi_result isogi_trace_step(isogi_trace *trace, uint64_t max_rays, d
    TRANSFER: under the lighting last given to isogi_trace_relight or isogi_trace_change (that of the description at first); its error is
    an upper bound.
    Irradiance below 0 is handed out as it is, here and by isogi_trace_gather: a sky that SH coefficients make negative somewhere brings
-   it, and so does, with TRANSFER, an uneven one where nearly all light is hidden. Before it is shown:  e = e > 0 ? e : 0  a channel.
+   it, and so do, with TRANSFER, rings of what isogi_trace_lighting calls the least, where nearly all light is hidden. Before it is shown:
+   e = e > 0 ? e : 0  a channel.
    Errors cover the true ones (twice the standard error in 95 % of points, with desc.error in 90 % or more, tests/test_trace_bake.c):
    they allow for what samples that agree may all have missed, and for probes 2 % of reflected light. That is too little where much of
    the light is reflected and comes from lights without size, whose shadows are hard: at albedo 0.8, in narrow tunnels, twice the error
@@ -350,13 +351,13 @@ ISOGI_API isogi_result isogi_trace_step(isogi_trace *trace, uint64_t max_rays, d
 ISOGI_API isogi_result isogi_trace_sample(const isogi_trace *trace, const float (*points)[3], size_t count, float (*irradiance)[3],
                                           float *error);
 /* A new lighting. TRANSFER: a distant one (environment and directional lights; point, sphere and rectangle lights are ISOGI_INVALID); no
-   rays. IRRADIANCE keeps nothing that could be lit anew: isogi_trace_change with this lighting, hence as many rays as all computed texels
-   took at first. */
+   rays, but 18 KB for a moment. Hand over an image as it is: of its coefficients nobody can tell what bright spots it has. IRRADIANCE
+   keeps nothing that could be lit anew: isogi_trace_change with this lighting, hence as many rays as all computed texels took at first. */
 ISOGI_API isogi_result isogi_trace_relight(isogi_trace *trace, const isogi_lighting *lighting);
 /* TRANSFER only, for display: glossy light that the surface sends along the unit vector views[i] (away from it, towards the eye),
    about the mirrored direction r, for a Phong lobe of that exponent (0 or more; the order holds lobes up to about order^2) and
    reflectance 1; normals[i]: unit, on the side that is lit. An approximation: the lighting L is blurred by the lobe G and looked up
-   at r, exactly (no less than what of it is even, see isogi_trace_lighting), but what stands in its way is judged apart from it, by the
+   at r, exactly (and no less than the least of isogi_trace_lighting), but what stands in its way is judged apart from it, by the
    transfer blurred in the same way over that of an open surface: radiance = (G * L)(r) min(1, (G * T)(r) / (G * cosine)(r)). Exact where
    nothing is in the way or the light is uniform there; shadows come out as soft as the order, and light by reflections counts as
    openness. Zero where no texel is ready. */
@@ -364,12 +365,13 @@ ISOGI_API isogi_result isogi_trace_sample_gloss(const isogi_trace *trace, const 
                                                 const float (*views)[3], double exponent, size_t count, float (*radiance)[3]);
 /* TRANSFER only: interpolated coefficients, transfer[count][order*order][channels], zeros where no texel is ready. */
 ISOGI_API isogi_result isogi_trace_sample_transfer(const isogi_trace *trace, const float (*points)[3], size_t count, float *transfer);
-/* TRANSFER only: the lighting last given as coefficients of RGB, light[order*order], and what of it is even, even[order*order] (either may
-   be NULL), such that a channel of E = max(sum_i transfer_i light_i, sum_i transfer_i even_i). Bright spots of the sky and lamps bring no
-   less than nothing; but where they are hidden, in narrow places, the truncated series takes light away, often more than all else brings
-   there. Even are coefficients that were given as such (env.sh), an image where it is cut at 4 times the mean of what the cut leaves
-   (seen in 32 x 16 blocks), and lights that do take light away (negative ones). */
-ISOGI_API isogi_result isogi_trace_lighting(const isogi_trace *trace, float (*light)[3], float (*even)[3]);
+/* TRANSFER only: coefficients light[order*order], least[order*order] (either may be NULL) of the lighting last given, of which a channel of
+   isogi_trace_sample is E = max(sum_i transfer_i light_i, sum_i transfer_i least_i). light: isogi_sh_project of it. Where a bright spot of
+   the sky, or a lamp, is hidden, in narrow places, this truncated series takes light away, often more than all else brings there; but
+   bright spots bring no less than nothing, so that what is left without them is the least. least: env.sh, whatever it holds; env.rgb cut
+   at 4 times its mean after the cut (in 32 x 16 blocks of equal angles; a smaller image, and a channel in which nothing is that bright,
+   as it is); and lights that do take light away (negative ones). */
+ISOGI_API isogi_result isogi_trace_lighting(const isogi_trace *trace, float (*light)[3], float (*least)[3]);
 
 /* ---- when something changes: only what depends on it is computed again ----
    Texels that are to be computed again keep their light until isogi_trace_step has come to them, can be read meanwhile, and count as
@@ -395,8 +397,8 @@ ISOGI_API isogi_result isogi_trace_change(isogi_trace *trace, const isogi_trace_
    isogi_trace_step in between: before they do, and after isogi_vol_update. Computed again are texels at these voxels or within two of
    them, and those whose isosurface passes there, before or after: no others can see the change. With desc.reach and n bounces, only
    those within n + 1 reaches. What a lazy texture was asked for at places where there was no surface has to be requested again; beyond
-   desc.box_first..box_end light that was merged is kept up, but none is added where there was no surface. A box wholly beyond the volume
-   is ISOGI_INVALID. */
+   desc.box_first..box_end light that was merged is kept up, but none is added where no surface of the interval was. A box wholly beyond
+   the volume is ISOGI_INVALID. */
 ISOGI_API isogi_result isogi_trace_touch(isogi_trace *trace, const size_t first[3], const size_t last[3]);
 
 /* Texels along each axis, order (0 for IRRADIANCE), channels (3 for IRRADIANCE). Any of them may be NULL. Of no trace: zeros. */
@@ -530,8 +532,9 @@ ISOGI_API size_t isogi_trace_memory(const isogi_trace *trace); /* bytes that the
 #define ISOGI_TRACE__MAX_DEPTH 10000 /* of a path, so that nothing hangs */
 #define ISOGI_TRACE__MAX_ORDER 6
 #define ISOGI_TRACE__VALUES 108      /* of a texel: three channels of the largest order */
-#define ISOGI_TRACE__EVEN 4          /* TRANSFER: an image is even up to so many times its mean, */
-#define ISOGI_TRACE__EVEN_ROWS 16    /* looked at in so many rows of blocks, finer than the largest order */
+#define ISOGI_TRACE__FLAT 4          /* TRANSFER: an image has bright spots where it is so many times its mean, */
+#define ISOGI_TRACE__FLAT_ROWS 16    /* looked at in so many rows of blocks, finer than the largest order, */
+#define ISOGI_TRACE__FLAT_ROUNDS 20  /* and so often */
 #define ISOGI_TRACE__NOT_READY HUGE_VALF
 #define ISOGI_TRACE__DEPTH 0.25 /* voxels that must be matter behind the surface of a texel of the high side, at once or up to a voxel on */
 #define ISOGI_TRACE__SAMPLES 32768 /* samples of a batch, */
@@ -2179,9 +2182,9 @@ static isogi_result isogi_trace__scene_set(isogi_trace__scene *scene, const isog
     return isogi_trace__sky_build(&scene->sky, &d->lighting.env, context);
 }
 
-/* TRANSFER: a lighting's coefficients, RGB interleaved: all of it, and what of it is even, see isogi_trace_lighting. */
+/* TRANSFER: a lighting's coefficients, RGB interleaved: of all of it, and of what it brings at least, see isogi_trace_lighting. */
 typedef struct isogi_trace__lit {
-    float all[ISOGI_TRACE__VALUES], even[ISOGI_TRACE__VALUES];
+    float all[ISOGI_TRACE__VALUES], least[ISOGI_TRACE__VALUES];
 } isogi_trace__lit;
 
 /* ==== the texture: bricks of texels, there where light was asked for ================================================= */
@@ -2713,62 +2716,110 @@ static isogi_result isogi_trace__set_lattice(isogi_trace *t) {
     return ISOGI_OK;
 }
 
-static double isogi_trace__at_most(float x, double most) { return (double)x < most ? (double)x : most; }
+/* TRANSFER: an environment's image by blocks, their means and these cut. */
+typedef struct isogi_trace__flat {
+    double mean[ISOGI_TRACE__FLAT_ROWS][2 * ISOGI_TRACE__FLAT_ROWS][3];
+    float rgb[ISOGI_TRACE__FLAT_ROWS][2 * ISOGI_TRACE__FLAT_ROWS][3];
+} isogi_trace__flat;
 
-/* An image of the environment's blocks, in each channel cut at EVEN times its mean over the sphere, after the cut. */
-static void isogi_trace__even_image(float (*image)[2 * ISOGI_TRACE__EVEN_ROWS][3], const isogi_env *env) {
-    enum { ROWS = ISOGI_TRACE__EVEN_ROWS, COLUMNS = 2 * ROWS, ROUNDS = 20 };
-    size_t x, y, i, j, width = (size_t)env->width, height = (size_t)env->height;
-    int c, k;
-    for (y = 0; y < ROWS; y++)
-        for (x = 0; x < COLUMNS; x++) {
-            const size_t top = y * height / ROWS, bottom = (y + 1) * height / ROWS, left = x * width / COLUMNS;
-            const size_t right = (x + 1) * width / COLUMNS;
-            double sum[3] = {0, 0, 0}, count = 0;
-            for (j = top; j < bottom || j == top; j++)
-                for (i = left; i < right || i == left; i++, count++)
-                    for (c = 0; c < 3; c++) sum[c] += (double)env->rgb[3 * (j * width + i) + (size_t)c];
-            for (c = 0; c < 3; c++) image[y][x][c] = (float)(sum[c] / count);
-        }
-    for (c = 0; c < 3; c++) {
-        double most = DBL_MAX;
-        for (k = 0; k < ROUNDS; k++) { /* a lone sun in the dark is cut to nothing */
-            double sum = 0, weights = 0;
-            for (y = 0; y < ROWS; y++) {
-                const double weight = sin(ISOGI_TRACE__PI * ((double)y + 0.5) / ROWS);
-                for (x = 0; x < COLUMNS; x++) sum += weight * isogi_trace__at_most(image[y][x][c], most), weights += weight;
-            }
-            most = sum > 0 ? ISOGI_TRACE__EVEN * sum / weights : 0;
-        }
-        for (y = 0; y < ROWS; y++)
-            for (x = 0; x < COLUMNS; x++) image[y][x][c] = (float)isogi_trace__at_most(image[y][x][c], most);
+/* What a row of the image has in each column of blocks; no pixel is wider than these. */
+static void isogi_trace__flat_row(const float *rgb, int width, double (*row)[3]) {
+    const int columns = 2 * ISOGI_TRACE__FLAT_ROWS;
+    const double share = (double)columns / width;
+    int i, c;
+    memset(row, 0, (size_t)columns * sizeof *row);
+    for (i = 0; i < width; i++, rgb += 3) {
+        const int x = (int)(i * share) < columns ? (int)(i * share) : columns - 1;
+        const double after = (i + 1) * share - (x + 1), here = after > 0 && x + 1 < columns ? share - after : share;
+        for (c = 0; c < 3; c++) row[x][c] += here * (double)rgb[c];
+        for (c = 0; c < 3 && here < share; c++) row[x + 1][c] += after * (double)rgb[c];
     }
 }
 
-/* A distant lighting as coefficients, and what of it is even, see isogi_trace_lighting. */
+/* Means over blocks: what of a row of the image lies in a row of blocks counts by its solid angle. */
+static void isogi_trace__flat_means(isogi_trace__flat *flat, const isogi_env *env) {
+    const int rows = ISOGI_TRACE__FLAT_ROWS, columns = 2 * rows;
+    double row[2 * ISOGI_TRACE__FLAT_ROWS][3];
+    int j, x, y, c;
+    memset(flat->mean, 0, sizeof flat->mean);
+    for (j = 0; j < env->height; j++) {
+        const double top = (double)j / env->height, bottom = (double)(j + 1) / env->height;
+        isogi_trace__flat_row(env->rgb + 3 * (size_t)j * (size_t)env->width, env->width, row);
+        for (y = (int)(top * rows); y < rows && (double)y / rows < bottom; y++) {
+            const double above = (double)y / rows, below = (double)(y + 1) / rows;
+            const double from = top > above ? top : above, to = bottom < below ? bottom : below;
+            const double part = (cos(ISOGI_TRACE__PI * from) - cos(ISOGI_TRACE__PI * to)) /
+                                (cos(ISOGI_TRACE__PI * above) - cos(ISOGI_TRACE__PI * below));
+            for (x = 0; x < columns && part > 0; x++)
+                for (c = 0; c < 3; c++) flat->mean[y][x][c] += part * row[x][c];
+        }
+    }
+}
+
+/* Cuts a channel at FLAT times the mean that the cut leaves, found by rounds: a lone sun in the dark is cut to nothing. 0: nothing is. */
+static int isogi_trace__flat_cut(isogi_trace__flat *flat, int channel) {
+    const int rows = ISOGI_TRACE__FLAT_ROWS, columns = 2 * rows;
+    double most = DBL_MAX;
+    int x, y, k, cut = 0;
+    for (k = 0; k < ISOGI_TRACE__FLAT_ROUNDS; k++) {
+        double sum = 0;
+        for (y = 0; y < rows; y++) {
+            const double angle = cos(ISOGI_TRACE__PI * y / rows) - cos(ISOGI_TRACE__PI * (y + 1) / rows);
+            for (x = 0; x < columns; x++)
+                sum += angle / (2 * columns) * (flat->mean[y][x][channel] < most ? flat->mean[y][x][channel] : most);
+        }
+        most = sum > 0 ? ISOGI_TRACE__FLAT * sum : 0;
+    }
+    for (y = 0; y < rows; y++)
+        for (x = 0; x < columns; x++) {
+            const double mean = flat->mean[y][x][channel];
+            flat->rgb[y][x][channel] = (float)(mean < most ? mean : most), cut |= mean > most;
+        }
+    return cut;
+}
+
+/* Of a sky's coefficients, those that are left where its image is cut; channels in which nothing is stay. An image of pixels larger than
+   blocks has no such spots. */
+static isogi_result isogi_trace__flatten(float *sky, int order, const isogi_env *env, const isogi_context *context) {
+    isogi_trace__flat *flat;
+    float cut[ISOGI_TRACE__VALUES];
+    isogi_lighting lighting;
+    isogi_result result = ISOGI_OK;
+    int c, k, cuts[3], any = 0;
+    if (!env->rgb || env->height < ISOGI_TRACE__FLAT_ROWS || env->width < 2 * ISOGI_TRACE__FLAT_ROWS) return ISOGI_OK;
+    flat = (isogi_trace__flat *)isogi_allocate(context, 1, sizeof *flat);
+    if (!flat) return ISOGI_NO_MEMORY;
+    isogi_trace__flat_means(flat, env);
+    for (c = 0; c < 3; c++) cuts[c] = isogi_trace__flat_cut(flat, c), any |= cuts[c];
+    memset(&lighting, 0, sizeof lighting);
+    lighting.env = *env, lighting.env.rgb = flat->rgb[0][0];
+    lighting.env.width = 2 * ISOGI_TRACE__FLAT_ROWS, lighting.env.height = ISOGI_TRACE__FLAT_ROWS;
+    if (any) result = isogi_sh_project(cut, order, &lighting, NULL);
+    isogi_release(context, flat, 1, sizeof *flat);
+    for (k = 0; any && result == ISOGI_OK && k < 3 * order * order; k++)
+        if (cuts[k % 3]) sky[k] = cut[k];
+    return result;
+}
+
+/* A distant lighting as coefficients, and those of what it brings at least, see isogi_trace_lighting. */
 static isogi_result isogi_trace__project(isogi_trace__lit *lit, int order, const isogi_lighting *lighting, const isogi_context *context) {
-    float(*image)[2 * ISOGI_TRACE__EVEN_ROWS][3], one[ISOGI_TRACE__VALUES];
-    isogi_lighting even = *lighting;
+    float one[ISOGI_TRACE__VALUES];
+    isogi_lighting part = *lighting;
     size_t i;
     int k, n = 3 * order * order;
     isogi_result result = isogi_sh_project(lit->all, order, lighting, NULL);
-    even.light_count = 0;
-    if (result == ISOGI_OK && even.env.rgb) {
-        image = (float(*)[2 * ISOGI_TRACE__EVEN_ROWS][3])isogi_allocate(context, ISOGI_TRACE__EVEN_ROWS, sizeof *image);
-        if (!image) return ISOGI_NO_MEMORY;
-        isogi_trace__even_image(image, &lighting->env);
-        even.env.rgb = image[0][0], even.env.width = 2 * ISOGI_TRACE__EVEN_ROWS, even.env.height = ISOGI_TRACE__EVEN_ROWS;
-        result = isogi_sh_project(lit->even, order, &even, NULL);
-        isogi_release(context, image, ISOGI_TRACE__EVEN_ROWS, sizeof *image);
-    } else if (result == ISOGI_OK) result = isogi_sh_project(lit->even, order, &even, NULL);
-    memset(&even, 0, sizeof even);
-    for (i = 0; i < lighting->light_count && result == ISOGI_OK; i++) {
+    part.light_count = 0;
+    if (result == ISOGI_OK && !lighting->light_count) memcpy(lit->least, lit->all, (size_t)n * sizeof *lit->least);
+    if (result == ISOGI_OK && lighting->light_count) result = isogi_sh_project(lit->least, order, &part, NULL);
+    if (result == ISOGI_OK) result = isogi_trace__flatten(lit->least, order, &part.env, context);
+    memset(&part, 0, sizeof part);
+    for (i = 0; i < lighting->light_count && result == ISOGI_OK; i++) { /* what takes light away */
         isogi_light taking = lighting->lights[i];
         for (k = 0; k < 3; k++) taking.rgb[k] = taking.rgb[k] < 0 ? taking.rgb[k] : 0;
         if (!(taking.rgb[0] < 0 || taking.rgb[1] < 0 || taking.rgb[2] < 0)) continue;
-        even.lights = &taking, even.light_count = 1;
-        result = isogi_sh_project(one, order, &even, NULL);
-        for (k = 0; k < n && result == ISOGI_OK; k++) lit->even[k] += one[k];
+        part.lights = &taking, part.light_count = 1;
+        result = isogi_sh_project(one, order, &part, NULL);
+        for (k = 0; k < n && result == ISOGI_OK; k++) lit->least[k] += one[k];
     }
     return result;
 }
@@ -2777,9 +2828,9 @@ static void isogi_trace__set_light(isogi_trace *t, const isogi_trace__lit *lit) 
     int order = t->scene.desc.order, n = 3 * order * order, k, c, e = 0;
     float both[2 * ISOGI_TRACE__VALUES], most = 0;
     float one[ISOGI_TRACE__MAX_ORDER * ISOGI_TRACE__MAX_ORDER], square[ISOGI_TRACE__MAX_ORDER * ISOGI_TRACE__MAX_ORDER];
-    memcpy(both, lit->all, (size_t)n * sizeof *both), memcpy(both + n, lit->even, (size_t)n * sizeof *both);
+    memcpy(both, lit->all, (size_t)n * sizeof *both), memcpy(both + n, lit->least, (size_t)n * sizeof *both);
     isogi_trace__dim(both, 2 * n);
-    memcpy(t->lit.all, both, (size_t)n * sizeof *both), memcpy(t->lit.even, both + n, (size_t)n * sizeof *both);
+    memcpy(t->lit.all, both, (size_t)n * sizeof *both), memcpy(t->lit.least, both + n, (size_t)n * sizeof *both);
     memset(one, 0, sizeof one);
     for (k = 0; k < n; k++) most = fabsf(t->lit.all[k]) > most ? fabsf(t->lit.all[k]) : most;
     if (most > 0) frexp((double)most, &e);
@@ -3060,14 +3111,14 @@ static void isogi_trace__series_sum(const isogi_trace *t, const double *values, 
 
 /* Irradiance out of the values of a texel, or of several. */
 static void isogi_trace__irradiance(const isogi_trace *t, const double *values, double rgb[3]) {
-    double even[3];
+    double least[3];
     int c;
     if (t->scene.desc.mode != ISOGI_TRACE_TRANSFER) {
         memcpy(rgb, values, 3 * sizeof *rgb);
         return;
     }
-    isogi_trace__series_sum(t, values, t->lit.all, rgb), isogi_trace__series_sum(t, values, t->lit.even, even);
-    for (c = 0; c < 3; c++) rgb[c] = rgb[c] > even[c] ? rgb[c] : even[c];
+    isogi_trace__series_sum(t, values, t->lit.all, rgb), isogi_trace__series_sum(t, values, t->lit.least, least);
+    for (c = 0; c < 3; c++) rgb[c] = rgb[c] > least[c] ? rgb[c] : least[c];
 }
 
 /* Variance of a texel's luminance. TRANSFER: a sample is X = pi * throughput * L(direction it left in), throughput at most 1, so that
@@ -3132,12 +3183,12 @@ ISOGI_API isogi_result isogi_trace_sample_transfer(const isogi_trace *trace, con
     return ISOGI_OK;
 }
 
-ISOGI_API isogi_result isogi_trace_lighting(const isogi_trace *trace, float (*light)[3], float (*even)[3]) {
+ISOGI_API isogi_result isogi_trace_lighting(const isogi_trace *trace, float (*light)[3], float (*least)[3]) {
     size_t bytes;
     if (!trace || trace->scene.desc.mode != ISOGI_TRACE_TRANSFER) return ISOGI_INVALID;
     bytes = 3 * sizeof(float) * (size_t)(trace->scene.desc.order * trace->scene.desc.order);
     if (light) memcpy(light, trace->lit.all, bytes);
-    if (even) memcpy(even, trace->lit.even, bytes);
+    if (least) memcpy(least, trace->lit.least, bytes);
     return ISOGI_OK;
 }
 
@@ -3153,7 +3204,7 @@ static void isogi_trace__gloss(const isogi_trace *t, const float *transfer, cons
                                const double *g, float rgb[3]) {
     static const double cosine[6] = {3.14159265358979323846, 2.0943951023931953, 0.78539816339744831, 0, -0.13089969389957472, 0};
     float dirs[2][3], y[2][ISOGI_TRACE__MAX_ORDER * ISOGI_TRACE__MAX_ORDER];
-    double open = 0, light[3] = {0, 0, 0}, even[3] = {0, 0, 0}, seen[3] = {0, 0, 0};
+    double open = 0, light[3] = {0, 0, 0}, least[3] = {0, 0, 0}, seen[3] = {0, 0, 0};
     const double facing = 2 * isogi_trace__dot(normal, view);
     int order = t->scene.desc.order, channels = t->scene.desc.transfer_channels, k, c, l;
     for (c = 0; c < 3; c++) dirs[0][c] = (float)(facing * (double)normal[c]) - view[c], dirs[1][c] = normal[c];
@@ -3165,12 +3216,12 @@ static void isogi_trace__gloss(const isogi_trace *t, const float *transfer, cons
         blurred = g[l] * (double)y[0][k];
         open += cosine[l] * blurred * (double)y[1][k];
         for (c = 0; c < 3; c++) {
-            light[c] += blurred * (double)t->lit.all[3 * k + c], even[c] += blurred * (double)t->lit.even[3 * k + c];
+            light[c] += blurred * (double)t->lit.all[3 * k + c], least[c] += blurred * (double)t->lit.least[3 * k + c];
             seen[c] += blurred * (double)transfer[k * channels + (channels == 1 ? 0 : c)];
         }
     }
     for (c = 0; c < 3; c++)
-        rgb[c] = (float)(isogi_trace__clamp(light[c] > even[c] ? light[c] : even[c], 1e30) *
+        rgb[c] = (float)(isogi_trace__clamp(light[c] > least[c] ? light[c] : least[c], 1e30) *
                          isogi_trace__clamp(seen[c] / (open > 1e-3 ? open : 1e-3), 1));
 }
 
@@ -7625,8 +7676,9 @@ ISOGI_API isogi_result isogi_trace_gather_field(const isogi_trace_desc *desc, is
 #undef ISOGI_TRACE__MAX_DEPTH
 #undef ISOGI_TRACE__MAX_ORDER
 #undef ISOGI_TRACE__VALUES
-#undef ISOGI_TRACE__EVEN
-#undef ISOGI_TRACE__EVEN_ROWS
+#undef ISOGI_TRACE__FLAT
+#undef ISOGI_TRACE__FLAT_ROWS
+#undef ISOGI_TRACE__FLAT_ROUNDS
 #undef ISOGI_TRACE__NOT_READY
 #undef ISOGI_TRACE__BRIGHTEST
 #undef ISOGI_TRACE__DEPTH

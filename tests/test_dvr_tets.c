@@ -326,8 +326,6 @@ static int wrong_in_fog(const isogi_tets *tets, const float eye[3], const float 
 static const float outside[3] = {-5.1f, 4.9f, 6.07f}, within[3] = {0.33f, 1.91f, 1.07f}, corner[3] = {1, 2, 1};
 static const float ahead[3] = {4.1f, 1.45f, 1.55f};
 
-/* Nothing is lost between blocks with points of their own that touch, leave a gap or overlap by a rounding, whichever the eye is in; nor
-   where every tetrahedron has points of its own and the eye is on one of them. */
 /* Whichever of its points comes first: its longest edge is the one between the second and the third. */
 TEST(degenerate_tetrahedra_are_so_in_any_order) {
     static const float points[4][3] = {{0, 5e-13f, 0}, {1, 0, 0}, {-1, 0, 0}, {0, 0, 0.5f}}, values[4] = {0, 0, 1, 1};
@@ -342,6 +340,8 @@ TEST(degenerate_tetrahedra_are_so_in_any_order) {
     }
 }
 
+/* Nothing is lost between blocks with points of their own that touch, leave a gap or overlap by a rounding, whichever the eye is in; nor
+   where every tetrahedron has points of its own and the eye is on one of them. */
 TEST(parts_that_touch_or_overlap_are_seen_to_the_end) {
     const double overlaps[] = {0, -1e-6, 1e-7, 1e-6, 1e-5, 1e-3};
     slope[0] = slope[1] = slope[2] = 0;

@@ -63,7 +63,7 @@ TEST(imported_tables_keep_opacity_and_colour) {
           "NULL");
 }
 
-/* Three materials with noise: the thresholds part them. */
+/* Where low and high are fewer numbers apart than a table has entries, several points have one value. */
 TEST(tables_of_more_entries_than_numbers_are_valid) {
     enum { COUNT = 322 };
     static float table[COUNT][4];
@@ -80,6 +80,7 @@ TEST(tables_of_more_entries_than_numbers_are_valid) {
     }
 }
 
+/* Three materials with noise: the thresholds part them. */
 TEST(suggestions_part_what_the_histogram_parts) {
     test_random r = {9};
     for (int n = 0; n < 20; n++) {

@@ -388,7 +388,6 @@ TEST(infinite_isovalues_are_misses_on_every_path) {
     }
 }
 
-/* Descriptions of odd numbers are refused or understood, never followed into the woods. */
 /* However far the ray comes from, and however short the piece: what holds a hit is no gap. */
 TEST(short_pieces_of_far_rays_are_not_skipped) {
     static float data[8][8][8];
@@ -443,6 +442,7 @@ TEST(the_smallest_doubles_are_hit_like_others) {
     }
 }
 
+/* Descriptions of odd numbers are refused or understood, never followed into the woods. */
 TEST(odd_descriptions_are_refused_or_understood) {
     test_random r = {4};
     long built = 0;

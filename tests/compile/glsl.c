@@ -255,7 +255,7 @@ int main(int argc, char **argv) {
         vector(p, "lattice_min", d.lattice_min), vector(p, "lattice_max", d.lattice_max);
         glUniform3fv(glGetUniformLocation(p, "albedo"), 1, albedo);
         if (transfer) glUniform3fv(glGetUniformLocation(p, "light"), 28, coefficients[0][0]);
-        if (transfer) glUniform3fv(glGetUniformLocation(p, "even"), 28, coefficients[1][0]);
+        if (transfer) glUniform3fv(glGetUniformLocation(p, "least"), 28, coefficients[1][0]);
         for (int format = ISOGI_TRACE_FLOAT; format <= ISOGI_TRACE_BYTE; format++) {
             static const GLint units[7] = {0, 1, 2, 3, 4, 5, 6};
             size_t bytes = isogi_trace_export_size(t, format);
