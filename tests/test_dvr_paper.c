@@ -84,7 +84,7 @@ TEST(local_visibility_follows_sheared_axes) {
             }
             sum += exp(-depth) / RAYS;
         }
-        for (int n = 0; n < 2; n++) {
+        for (int n = k != 1; n < 2; n++) { /* of the second, on one thread and on two */
             const isogi_dvr_desc desc = {.pyramid = pyramid, .shading = ISOGI_DVR_VISIBILITY, .grid = {2, 2, 2}, .reduction = 1,
                 .method = ISOGI_DVR_PAPER, .directions = 150};
             const isogi_context context = {.threads = 1 + n};
@@ -98,9 +98,9 @@ TEST(local_visibility_follows_sheared_axes) {
             isogi_dvr_free(dvr);
         }
         if (k < 2) {
-            const double mean = (double)seen[0][0] / sqrt(4 * PI);
+            const double mean = (double)seen[1][0] / sqrt(4 * PI);
             printf("    cosine %.2f: %.4f of local light is hidden, %.4f by march\n", cosine[k], 1 - mean, 1 - sum);
-            CHECK(fabs(mean - sum) < 0.05 * (1 - sum) && sum < 0.98 && !memcmp(seen[0], seen[1], sizeof seen[0]),
+            CHECK(fabs(mean - sum) < 0.05 * (1 - sum) && sum < 0.98 && (k != 1 || !memcmp(seen[0], seen[1], sizeof seen[0])),
                   "cosine %g: %g of local light is hidden, %g by march", cosine[k], 1 - mean, 1 - sum);
         }
         isogi_vol_free(pyramid);
