@@ -706,7 +706,7 @@ TEST(gloss_against_its_integral) {
    rest of the lighting brings bounds that. */
 TEST(hidden_bright_spots_take_no_other_light) {
     enum { POINTS = 150, WIDTH = 64, HEIGHT = 32 };
-    static float image[HEIGHT][WIDTH][3], points[POINTS][3], e[POINTS][3], truth[POINTS][3], transfer[POINTS][36];
+    static float image[HEIGHT][WIDTH][3], points[POINTS][3], e[POINTS][3], truth[POINTS][3], transfer[POINTS * 36];
     const isogi_light lamp = light_make(ISOGI_LIGHT_DIRECTIONAL, 1, 0.15, 0.3, 2, 0);
     double q[5] = {12, 10, 12, 17, 9};
     scene s = scene_make(25, 25, 25, NULL, pit, q);
@@ -729,14 +729,14 @@ TEST(hidden_bright_spots_take_no_other_light) {
                   isogi_trace_step(t, 0, NULL) == ISOGI_OK && isogi_trace_lighting(t, light, dim) == ISOGI_OK,
               "order %d", d.order);
         isogi_trace_sample(t, (const float(*)[3])points, (size_t)n, e, NULL);
-        isogi_trace_sample_transfer(t, (const float(*)[3])points, (size_t)n, transfer[0]);
+        isogi_trace_sample_transfer(t, (const float(*)[3])points, (size_t)n, transfer);
         isogi_sh_project(plain, d.order, &lighting, NULL);
         CHECK(!memcmp(plain, light, sizeof *light * (size_t)(d.order * d.order)), "order %d: another lighting", d.order);
         for (int i = 0; i < n; i++)
             for (int c = 0; c < 3; c++) {
                 double all = 0, least = 0, shown;
                 for (int k = 0; k < d.order * d.order; k++) {
-                    const double weight = (double)transfer[0][(size_t)i * (size_t)(d.order * d.order) + (size_t)k];
+                    const double weight = (double)transfer[i * d.order * d.order + k];
                     all += weight * (double)light[k][c], least += weight * (double)dim[k][c];
                 }
                 shown = fmax(all, least);
