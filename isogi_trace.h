@@ -615,6 +615,10 @@ static int isogi_trace__finite(double x) {
     return (bits & 0x7ff0000000000000u) != 0x7ff0000000000000u;
 }
 
+static int isogi_trace__finite_point(const float p[3]) {
+    return isogi_trace__finite((double)p[0]) && isogi_trace__finite((double)p[1]) && isogi_trace__finite((double)p[2]);
+}
+
 static int isogi_trace__finite3(const double v[3]) {
     return isogi_trace__finite(v[0]) && isogi_trace__finite(v[1]) && isogi_trace__finite(v[2]);
 }
@@ -2016,9 +2020,7 @@ static double isogi_trace__middle(const isogi_trace__scene *scene, double middle
     return 0.25 * sqrt(square);
 }
 
-static float isogi_trace__bounded_float(double x) {
-    return x < -(double)FLT_MAX ? -FLT_MAX : x > (double)FLT_MAX ? FLT_MAX : (float)x;
-}
+static double isogi_trace__within_both(double x, double most) { return x > most ? most : x < -most ? -most : x; }
 
 /* Where a lamp is measured: from the middle, but no closer than `least`, since a lamp there would be all that counts, and from before a
    rectangle, which has a dark side. */
@@ -2026,7 +2028,10 @@ static void isogi_trace__measure_from(const isogi_light *light, const double mid
     double away[3], front[3] = {1, 0, 0}, apart, length;
     int a, rectangle = light->kind == ISOGI_LIGHT_RECTANGLE, moved;
     const float *u = light->edge[0], *v = light->edge[1];
-    for (a = 0; a < 3; a++) away[a] = middle[a] - (double)light->vector[a], point[a] = isogi_trace__bounded_float(middle[a]);
+    for (a = 0; a < 3; a++) {
+        away[a] = middle[a] - (double)light->vector[a];
+        point[a] = (float)isogi_trace__within_both(middle[a], (double)FLT_MAX);
+    }
     for (a = 0; a < 3 && rectangle; a++)
         front[a] = (double)u[(a + 1) % 3] * (double)v[(a + 2) % 3] - (double)u[(a + 2) % 3] * (double)v[(a + 1) % 3];
     apart = sqrt(isogi_trace__dot_wide(away, away)), length = sqrt(isogi_trace__dot_wide(front, front));
@@ -2035,7 +2040,7 @@ static void isogi_trace__measure_from(const isogi_light *light, const double mid
     if (light->kind == ISOGI_LIGHT_SPHERE && (double)light->radius >= least) return; /* all around, or none of it is close */
     for (a = 0; a < 3; a++) {
         double dir = rectangle || !(apart > 0) ? front[a] / length : away[a] / apart;
-        point[a] = isogi_trace__bounded_float((double)light->vector[a] + (apart > least ? apart : least) * dir);
+        point[a] = (float)isogi_trace__within_both((double)light->vector[a] + (apart > least ? apart : least) * dir, (double)FLT_MAX);
     }
 }
 
@@ -3070,8 +3075,7 @@ static int isogi_trace__taps(const isogi_trace *t, const float point[3], isogi_t
     double local[3], total = 0, best[2] = {DBL_MAX, DBL_MAX};
     int i, count = 0, pending = 0, taps = isogi_trace__tap_count(t);
     int one = t->scene.desc.lookup == ISOGI_TRACE_NEAREST || t->scene.desc.lookup == ISOGI_TRACE_CLOSEST_ISOVALUE;
-    for (i = 0; i < 3; i++)
-        if (!isogi_trace__finite((double)point[i])) return 0;
+    if (!isogi_trace__finite_point(point)) return 0;
     isogi_trace__cell(t, point, cell, local);
     for (i = 0; i <= taps; i++) {
         const isogi_trace__brick *brick;
@@ -3437,8 +3441,7 @@ static void isogi_trace__again_task(void *arg, size_t task) {
 static int isogi_trace__asked_taps(const isogi_trace *t, const isogi_trace__asked *asked, size_t i, size_t cell[3], double local[3],
                                    uint8_t *tap, size_t *brick, uint32_t *slot) {
     int a;
-    for (a = 0; a < 3; a++)
-        if (!isogi_trace__finite((double)asked->points[i][a])) return 0;
+    if (!isogi_trace__finite_point(asked->points[i])) return 0;
     if (asked->cells[i][0] == ISOGI_TRACE__ON_FACE) isogi_trace__cell(t, asked->points[i], cell, local);
     else for (a = 0; a < 3; a++) cell[a] = asked->cells[i][a], local[a] = 0.5;
     return isogi_trace__corners(t, cell, local, isogi_trace__inner(local), tap, brick, slot);
@@ -5735,8 +5738,6 @@ static void isogi_trace__block_find(const isogi_trace *t, const size_t brick[3],
                 }
             }
 }
-
-static double isogi_trace__within_both(double x, double most) { return x > most ? most : x < -most ? -most : x; }
 
 /* Finite: what is infinite is as good as a large number. */
 static float isogi_trace__bounded(double x) { return (float)(x < 1e30 ? x : 1e30); }
