@@ -4,7 +4,7 @@
 # make pictures  the pictures of README.md anew: examples/*.png
 # make test      the quick tests, under two minutes; ends with "N passed, N failed, N skipped"
 # make check     the long suite: full sizes, every compiler, sanitizer and emulator that is installed
-# make bench     run time against error: build/bench/*.csv and *.svg      (ONLY=sh|vol|trace|dvr|visibility QUICK=1)
+# make bench     run time against error: build/bench/*.csv and *.svg      (ONLY=sh|vol|trace|dvr|visibility|threads QUICK=1)
 # make bench-peers   rays beside Embree 3, on this machine, where <embree3/rtcore.h> is (libembree-dev), frames and meshes beside VTK 9
 #                    where its headers are (libvtk9-dev), and harmonics beside generated code, and beside sphericart and SHTns where
 #                    SPHERICART names a folder with include/ and lib/libsphericart.so, SHTNS one with shtns.h and libshtns.a
