@@ -546,7 +546,9 @@ ISOGI_API size_t isogi_trace_memory(const isogi_trace *trace); /* bytes that the
 #define ISOGI_TRACE__HEADS 16384   /* chains of what is new in a batch; a power of two */
 #define ISOGI_TRACE__ESCAPED 0xffffffffu /* in place of the number of a probe */
 #define ISOGI_TRACE__FLUSH 256     /* rays in one call */
-#define ISOGI_TRACE__SWEEP 256     /* nodes in a task that traces no rays */
+#define ISOGI_TRACE__SWEEP 256     /* nodes in a task that traces no rays, */
+#define ISOGI_TRACE__PASSED 1024   /* probes in one of a pass, */
+#define ISOGI_TRACE__STRANDS 8     /* tasks that divide among them what is known of probes; a power of two */
 #define ISOGI_TRACE__PIECE 65536   /* rays that take as long as what is done without any before progress is told of, */
 #define ISOGI_TRACE__PLACING 1.5   /* samples that take as long as finding where a texel lies, */
 #define ISOGI_TRACE__CARRYING 3.0  /* as what each level takes beside its texels' rays; for progress alone */
@@ -3651,9 +3653,10 @@ typedef struct isogi_trace__node {
     double square, bounce_square;    /* squared luminance of rays that escaped, and of those that hit */
 } isogi_trace__node;
 
-/* The hits of one batch: node[i] has probe[begin[i]] .. probe[begin[i+1] - 1]. */
+/* The hits of one batch, or of PASSED probes of it: node[i] has probe[begin[i]] .. probe[begin[i+1] - 1]. */
 typedef struct isogi_trace__segment {
     size_t entries, hits;
+    size_t numbers; /* in the block of memory that begins at `node`; 0: it lies in that of a segment before */
     uint32_t *node, *begin, *probe;
     uint32_t *order;        /* of probes: the first `open` are the entries that passes still change; NULL of texels */
     size_t open;
@@ -3801,7 +3804,8 @@ struct isogi_trace__feedback {
     isogi_trace__piece *pieces; /* and one behind them */
     uint32_t *found; /* of each catch, number + 1 of its probe; ESCAPED where there was no hit */
     uint32_t *fresh; /* catches that found no probe: of a piece, from the place of its first sample on */
-    uint32_t *makers, *next, *heads; /* catches that get the new probes; chains of these, place + 1, and where they begin */
+    uint32_t *makers, *tags;         /* catches that get the new probes; the tags of their cells; */
+    uint32_t *next, *heads;          /* chains of these, place + 1, and where they begin */
     size_t span_count, sample_count, piece_count;
     size_t cursor, probe_cursor; /* nodes before these have nothing to do at this level */
     size_t probe_end;            /* of the generation of probes at work: later ones were made by its rays, */
@@ -3939,12 +3943,8 @@ static void isogi_trace__chunk_free(const isogi_trace *t, isogi_trace__set *s) {
     isogi_release(&t->context, c->block, 1, c->bytes);
 }
 
-static size_t isogi_trace__segment_size(const isogi_trace__segment *s) {
-    return 2 * s->entries + 1 + s->hits + (s->order ? s->entries : 0);
-}
-
 static void isogi_trace__segment_free(const isogi_trace *t, isogi_trace__segment *s) {
-    isogi_release(&t->context, s->node, isogi_trace__segment_size(s), sizeof(uint32_t));
+    if (s->numbers) isogi_release(&t->context, s->node, s->numbers, sizeof(uint32_t));
 }
 
 static void isogi_trace__set_free(const isogi_trace *t, isogi_trace__set *s) {
@@ -4009,6 +4009,7 @@ static size_t isogi_trace__buffers_set(const isogi_trace *t, isogi_trace__feedba
     f->found = (uint32_t *)isogi_trace__part(block, &used, ISOGI_TRACE__SAMPLES, sizeof *f->found);
     f->fresh = (uint32_t *)isogi_trace__part(block, &used, ISOGI_TRACE__SAMPLES, sizeof *f->fresh);
     f->makers = (uint32_t *)isogi_trace__part(block, &used, ISOGI_TRACE__SAMPLES, sizeof *f->makers);
+    f->tags = (uint32_t *)isogi_trace__part(block, &used, ISOGI_TRACE__SAMPLES, sizeof *f->tags);
     f->next = (uint32_t *)isogi_trace__part(block, &used, ISOGI_TRACE__SAMPLES, sizeof *f->next);
     f->heads = (uint32_t *)isogi_trace__part(block, &used, ISOGI_TRACE__HEADS, sizeof *f->heads);
     return used;
@@ -4086,27 +4087,33 @@ static uint64_t isogi_trace__probe_key(const isogi_trace__scene *scene, const is
 
 static uint32_t isogi_trace__tag(uint64_t cell) { return (uint32_t)(cell >> 20); }
 
-/* Where the chain of a cell begins: as many chains as there is room for probes, numbered by the low bits of the tag; those beyond the end
+/* Where the chain of a tag begins: as many chains as there is room for probes, numbered by its low bits; those beyond the end
    by one bit less (linear hashing, Litwin 1980). */
-static uint32_t *isogi_trace__head(const isogi_trace__set *s, uint64_t cell) {
+static uint32_t *isogi_trace__head(const isogi_trace__set *s, uint32_t tag) {
     size_t heads = s->headed * ISOGI_TRACE__CHUNK, bit = s->head_bit, i;
-    i = isogi_trace__tag(cell) & (2 * bit - 1);
+    i = tag & (2 * bit - 1);
     if (i >= heads) i -= bit;
     return &s->chunks[i / ISOGI_TRACE__CHUNK].heads[i % ISOGI_TRACE__CHUNK];
 }
 
-/* The chains of the next chunk come into use: they take over, in their order, what is theirs by the next bit of the key. So no step
-   has to find a new place for all. */
-static void isogi_trace__heads_new(isogi_trace__set *s) {
-    size_t last = s->headed++, from = 1, i;
-    uint32_t *heads = s->chunks[last].heads;
-    memset(heads, 0, ISOGI_TRACE__CHUNK * sizeof *heads);
+/* All chunks' chains come into use; returns how many chunks' were. */
+static size_t isogi_trace__heads_use(isogi_trace__set *s) {
+    const size_t before = s->headed;
+    s->headed = s->chunk_count;
     for (s->head_bit = ISOGI_TRACE__CHUNK; 2 * s->head_bit <= s->headed * ISOGI_TRACE__CHUNK;) s->head_bit *= 2;
+    return before;
+}
+
+/* The chains of chunk `last` at first .. end - 1 take over, in their order, what is theirs by the next bit of the key. So no step has to
+   find a new place for all; and what a chain passes on stays at the same place within a chunk. */
+static void isogi_trace__heads_new(const isogi_trace__set *s, size_t last, size_t first, size_t end) {
+    uint32_t *heads = s->chunks[last].heads;
+    size_t from = 1, i;
+    memset(heads + first, 0, (end - first) * sizeof *heads);
     while (2 * from <= last) from *= 2;
-    for (i = 0; i < ISOGI_TRACE__CHUNK && last; i++) {
-        const uint32_t *soon = &s->chunks[last - from].heads[(i + 8) % ISOGI_TRACE__CHUNK];
+    for (i = first; i < end && last; i++) {
         uint32_t *stay = &s->chunks[last - from].heads[i], *go = &heads[i], probe = *stay;
-        if (*soon) ISOGI_TRACE__AHEAD(isogi_trace__link_at(s, *soon - 1));
+        if (i + 8 < end && stay[8]) ISOGI_TRACE__AHEAD(isogi_trace__link_at(s, stay[8] - 1));
         while (probe) {
             isogi_trace__link *link = isogi_trace__link_at(s, probe - 1);
             if (link->tag / ISOGI_TRACE__CHUNK & from) *go = probe, go = &link->next;
@@ -4217,7 +4224,7 @@ static int isogi_trace__search_on(const isogi_trace *t, const isogi_trace__catch
 static uint32_t isogi_trace__probe_find(const isogi_trace *t, isogi_trace__catch *c) {
     const isogi_trace__set *set = &t->feedback->probes;
     isogi_trace__quest search = {HUGE_VAL, 0, 0};
-    uint32_t at = set->headed ? *isogi_trace__head(set, c->key) : 0, found = 0;
+    uint32_t at = set->headed ? *isogi_trace__head(set, isogi_trace__tag(c->key)) : 0, found = 0;
     while (at && !found) {
         const isogi_trace__link *link = isogi_trace__link_at(set, at - 1);
         const isogi_trace__node *n = link->tag == isogi_trace__tag(c->key) ? isogi_trace__node_at(set, at - 1) : NULL;
@@ -4234,7 +4241,7 @@ static uint32_t isogi_trace__probe_find(const isogi_trace *t, isogi_trace__catch
 static const void *isogi_trace__probe_ahead(const isogi_trace__set *set, const isogi_trace__catch *c, int what) {
     const uint32_t *head;
     if (!set->headed) return c;
-    head = isogi_trace__head(set, c->key);
+    head = isogi_trace__head(set, isogi_trace__tag(c->key));
     if (what == 0) return head;
     if (!*head) return c;
     if (what == 1) return isogi_trace__link_at(set, *head - 1);
@@ -4263,7 +4270,7 @@ static size_t isogi_trace__probes_meet(const isogi_trace *t) {
                     c->probe = c->search.nearest;
             }
             if (!c->probe) {
-                f->makers[made] = fresh[i], f->next[made] = 0, *at = (uint32_t)++made;
+                f->makers[made] = fresh[i], f->tags[made] = isogi_trace__tag(c->key), f->next[made] = 0, *at = (uint32_t)++made;
                 c->probe = (uint32_t)(f->probes.count + made);
             }
             f->found[fresh[i]] = c->probe;
@@ -4272,23 +4279,26 @@ static size_t isogi_trace__probes_meet(const isogi_trace *t) {
     return made;
 }
 
-/* Puts the new probes at the ends of their chains. There is room for them. */
-static void isogi_trace__probes_link(const isogi_trace *t, size_t made) {
-    isogi_trace__feedback *f = t->feedback;
-    isogi_trace__set *set = &f->probes;
-    const size_t early = 24, middle = 16, late = 8; /* probes ahead */
-    size_t i;
-    while (set->headed < set->chunk_count) isogi_trace__heads_new(set);
-    for (i = 0; i < made; i++) {
-        const isogi_trace__catch *c = &f->catches[f->makers[i]];
-        isogi_trace__link *link = isogi_trace__link_at(set, set->count + i);
-        uint32_t *at = isogi_trace__head(set, c->key);
-        if (i + early < made) ISOGI_TRACE__AHEAD(&f->catches[f->makers[i + early]]);
-        if (i + middle < made) ISOGI_TRACE__AHEAD(isogi_trace__head(set, f->catches[f->makers[i + middle]].key));
-        if (i + late < made) ISOGI_TRACE__AHEAD(isogi_trace__probe_ahead(set, &f->catches[f->makers[i + late]], 1));
-        while (*at) at = &isogi_trace__link_at(set, *at - 1)->next;
-        link->tag = isogi_trace__tag(c->key), link->next = 0;
-        *at = (uint32_t)(set->count + i + 1);
+/* Puts the new probes whose chains are at first .. end - 1 of a chunk at the ends of these. There is room for them. */
+static void isogi_trace__probes_link(const isogi_trace *t, size_t made, size_t first, size_t end) {
+    const isogi_trace__feedback *f = t->feedback;
+    const isogi_trace__set *set = &f->probes;
+    uint32_t some[64], *at;
+    size_t i = 0, k, n;
+    while (i < made) { /* memory is sent for ahead */
+        for (n = 0; i < made && n < 64; i++)
+            if (f->tags[i] % ISOGI_TRACE__CHUNK - first < end - first) some[n++] = (uint32_t)i;
+        for (k = 0; k < n; k++) ISOGI_TRACE__AHEAD(isogi_trace__head(set, f->tags[some[k]]));
+        for (k = 0; k < n; k++) {
+            at = isogi_trace__head(set, f->tags[some[k]]);
+            if (*at) ISOGI_TRACE__AHEAD(isogi_trace__link_at(set, *at - 1));
+        }
+        for (k = 0; k < n; k++) {
+            isogi_trace__link *link = isogi_trace__link_at(set, set->count + some[k]);
+            for (at = isogi_trace__head(set, f->tags[some[k]]); *at;) at = &isogi_trace__link_at(set, *at - 1)->next;
+            link->tag = f->tags[some[k]], link->next = 0;
+            *at = (uint32_t)(set->count + some[k] + 1);
+        }
     }
 }
 
@@ -4296,6 +4306,7 @@ static void isogi_trace__probes_link(const isogi_trace *t, size_t made) {
 static void isogi_trace__probe_finish(const isogi_trace *t, size_t i, const isogi_trace__catch *c) {
     isogi_trace__set *set = &t->feedback->probes;
     isogi_trace__node *n = isogi_trace__node_begin(t, set, i);
+    isogi_trace__stage *stage = isogi_trace__stage_at(set, i);
     double point[3];
     int a;
     n->isovalue = c->isovalue;
@@ -4304,8 +4315,8 @@ static void isogi_trace__probe_finish(const isogi_trace *t, size_t i, const isog
     memcpy(n->normal, c->normal, sizeof n->normal);
     isogi_trace__to_world(t->scene.pyramid, &n->place, point);
     isogi_trace_material(&t->scene.desc, n->isovalue, point, n->albedo, NULL);
-    memset(isogi_trace__stage_at(set, i), 0, sizeof(isogi_trace__stage));
-    isogi_trace__stage_at(set, i)->wanted = n->albedo[0] > 0.9f || n->albedo[1] > 0.9f || n->albedo[2] > 0.9f ? 2 : 1;
+    stage->level = stage->begun = stage->finished = 0; /* readers are another task's */
+    stage->wanted = n->albedo[0] > 0.9f || n->albedo[1] > 0.9f || n->albedo[2] > 0.9f ? 2 : 1;
 }
 
 /* ---- blocks of samples ---- */
@@ -4791,11 +4802,11 @@ static int isogi_trace__spans_fill(isogi_trace *t, uint64_t limit, uint64_t *spe
     return look && f->cursor == f->texels.count;
 }
 
-/* Room for one more segment. */
+/* Room for the segments of one more batch. */
 static isogi_result isogi_trace__segments_reserve(const isogi_trace *t, isogi_trace__set *set) {
     size_t capacity = set->segment_capacity ? 2 * set->segment_capacity : 32;
     isogi_trace__segment *segments;
-    if (set->segment_count < set->segment_capacity) return ISOGI_OK;
+    if (set->segment_count + ISOGI_TRACE__SPANS / ISOGI_TRACE__PASSED <= set->segment_capacity) return ISOGI_OK;
     segments = (isogi_trace__segment *)isogi_allocate(&t->context, capacity, sizeof *segments);
     if (!segments) return ISOGI_NO_MEMORY;
     if (set->segment_count) memcpy(segments, set->segments, set->segment_count * sizeof *segments);
@@ -4812,8 +4823,8 @@ static isogi_result isogi_trace__segment_new(isogi_trace *t, isogi_trace__segmen
     for (i = 0; i < f->piece_count; i++) f->pieces[i].first_hit = (uint32_t)hits, hits += f->pieces[i].hits;
     *made = isogi_trace__probes_meet(t);
     memset(s, 0, sizeof *s);
-    s->entries = f->span_count, s->hits = hits;
-    s->node = (uint32_t *)isogi_allocate(&t->context, (f->on_probes ? 3 : 2) * s->entries + 1 + hits, sizeof(uint32_t));
+    s->entries = f->span_count, s->hits = hits, s->numbers = (f->on_probes ? 3 : 2) * s->entries + 1 + hits;
+    s->node = (uint32_t *)isogi_allocate(&t->context, s->numbers, sizeof(uint32_t));
     if (!s->node) return ISOGI_NO_MEMORY;
     s->begin = s->node + s->entries, s->probe = s->begin + s->entries + 1, s->begin[s->entries] = (uint32_t)hits;
     if (f->on_probes) s->order = s->probe + hits;
@@ -4880,14 +4891,18 @@ static void isogi_trace__span_commit(isogi_trace *t, isogi_trace__set *set, cons
     if (fresh) isogi_trace__texel_guess(t, s->node);
 }
 
-/* Counts the batch's hits at their probes. One of a texel counts twice while blocks of samples are to come, whose hits will read the
-   same probes. As often as there are samples to come costs more rays, at no smaller error. */
-static void isogi_trace__readers_count(isogi_trace *t, const isogi_trace__segment *s) {
+/* Counts the batch's hits at the probes of a strand, 64 of every so many. One of a texel counts twice while blocks of samples are to come,
+   whose hits will read the same probes. As often as there are samples to come costs more rays, at no smaller error. */
+static void isogi_trace__readers_count(isogi_trace *t, size_t made, size_t strand, size_t strands) {
     isogi_trace__feedback *f = t->feedback;
     uint32_t weight = !f->on_probes && isogi_trace__block(t, f->level + 1) < (uint32_t)t->scene.desc.samples ? 2 : 1;
     size_t i;
-    for (i = 0; i < s->hits; i++) {
-        uint8_t *readers = &isogi_trace__stage_at(&f->probes, s->probe[i])->readers;
+    for (i = f->probes.count; i < f->probes.count + made; i++)
+        if ((i / 64 & (strands - 1)) == strand) isogi_trace__stage_at(&f->probes, i)->readers = 0;
+    for (i = 0; i < f->sample_count; i++) {
+        uint8_t *readers;
+        if (f->found[i] == ISOGI_TRACE__ESCAPED || ((f->found[i] - 1) / 64 & (strands - 1)) != strand) continue;
+        readers = &isogi_trace__stage_at(&f->probes, f->found[i] - 1)->readers;
         if (*readers < ISOGI_TRACE__PROBE_MOST) *readers = (uint8_t)(*readers + weight);
     }
 }
@@ -4895,20 +4910,27 @@ static void isogi_trace__readers_count(isogi_trace *t, const isogi_trace__segmen
 typedef struct isogi_trace__taken {
     isogi_trace *trace;
     const isogi_trace__segment *segment;
-    size_t made; /* new probes */
+    size_t made;    /* new probes */
+    size_t headed;  /* chunks whose chains were in use */
+    size_t strands; /* tasks by which chains and readers are divided */
 } isogi_trace__taken;
 
-/* First the chains of new probes, which only one thread can see to; then the spans of a piece, those of its last node also where they go
-   on in the next one, which leaves them out; then the new probes themselves. */
+/* First chains of probes and hits that read them, by strands; then the spans of a piece, those of its last node also where they go on in
+   the next one, which leaves them out; then the new probes themselves. */
 static void isogi_trace__take_task(void *arg, size_t task) {
     const isogi_trace__taken *taken = (const isogi_trace__taken *)arg;
     isogi_trace *t = taken->trace;
     isogi_trace__feedback *f = t->feedback;
     size_t i, end;
-    if (!task--) {
-        isogi_trace__probes_link(t, taken->made);
+    if (task < taken->strands) {
+        const size_t first = task * ISOGI_TRACE__CHUNK / taken->strands;
+        end = (task + 1) * ISOGI_TRACE__CHUNK / taken->strands;
+        for (i = taken->headed; i < f->probes.headed; i++) isogi_trace__heads_new(&f->probes, i, first, end);
+        isogi_trace__probes_link(t, taken->made, first, end);
+        isogi_trace__readers_count(t, taken->made, task, taken->strands);
         return;
     }
+    task -= taken->strands;
     if (task < f->piece_count) {
         const isogi_trace__piece *piece = &f->pieces[task];
         isogi_trace__segment_fill(t, taken->segment, piece);
@@ -4921,6 +4943,19 @@ static void isogi_trace__take_task(void *arg, size_t task) {
     i = (task - f->piece_count) * ISOGI_TRACE__SWEEP;
     end = i + ISOGI_TRACE__SWEEP < taken->made ? i + ISOGI_TRACE__SWEEP : taken->made;
     for (; i < end; i++) isogi_trace__probe_finish(t, f->probes.count + i, &f->catches[f->makers[i]]);
+}
+
+/* Adds a batch's segment; of probes, cut into those that tasks of a pass have. There is room for them. */
+static void isogi_trace__segment_add(isogi_trace__set *set, const isogi_trace__segment *batch) {
+    const size_t most = batch->order ? ISOGI_TRACE__PASSED : batch->entries;
+    size_t i;
+    for (i = 0; i < batch->entries; i += most) {
+        isogi_trace__segment *s = &set->segments[set->segment_count++];
+        *s = *batch;
+        s->entries = batch->entries - i < most ? batch->entries - i : most, s->numbers = i ? 0 : batch->numbers;
+        s->node += i, s->begin += i, s->hits = s->begin[s->entries] - s->begin[0];
+        if (s->order) s->order += i;
+    }
 }
 
 /* Traces the batch and takes it over; on failure nothing has been added. */
@@ -4936,12 +4971,13 @@ static isogi_result isogi_trace__spans_run(isogi_trace *t, double from, double t
     if (result == ISOGI_OK) result = isogi_trace__segments_reserve(t, set);
     if (result == ISOGI_OK) result = isogi_trace__segment_new(t, &segment, &taken.made);
     if (result != ISOGI_OK) return result;
-    tasks = 1 + f->piece_count + (taken.made + ISOGI_TRACE__SWEEP - 1) / ISOGI_TRACE__SWEEP;
-    if (tasks > 16) isogi_parallel(&silent, tasks, isogi_trace__take_task, &taken, 0, 1);
+    taken.headed = isogi_trace__heads_use(&f->probes);
+    tasks = f->piece_count + (taken.made + ISOGI_TRACE__SWEEP - 1) / ISOGI_TRACE__SWEEP;
+    taken.strands = tasks < 16 ? 1 : ISOGI_TRACE__STRANDS, tasks += taken.strands;
+    if (taken.strands > 1) isogi_parallel(&silent, tasks, isogi_trace__take_task, &taken, 0, 1);
     else for (i = 0; i < tasks; i++) isogi_trace__take_task(&taken, i); /* not worth a thread */
     f->probes.count += taken.made;
-    set->segments[set->segment_count++] = segment;
-    isogi_trace__readers_count(t, &segment);
+    isogi_trace__segment_add(set, &segment);
     for (i = 0; i < isogi_trace__cast_tasks(f); i++) isogi_trace__add(&t->counters, &t->task_counters[i]);
     if (!f->on_probes) f->partial += f->sample_count;
     return ISOGI_OK;
@@ -7739,6 +7775,8 @@ ISOGI_API isogi_result isogi_trace_gather_field(const isogi_trace_desc *desc, is
 #undef ISOGI_TRACE__CHUNK
 #undef ISOGI_TRACE__SLAB
 #undef ISOGI_TRACE__SWEEP
+#undef ISOGI_TRACE__PASSED
+#undef ISOGI_TRACE__STRANDS
 #undef ISOGI_TRACE__FLUSH
 #undef ISOGI_TRACE__PIECE_SPANS
 #undef ISOGI_TRACE__PIECES
