@@ -569,6 +569,7 @@ ISOGI_API isogi_result isogi_dvr_tets_render(const isogi_tets *tets, const isogi
 #define ISOGI_DVR__CLASSES 1024            /* of values, for pictures; 16 times as many for a transfer function with narrow pieces */
 #define ISOGI_DVR__NODES 8                 /* samples of a ray taken at once */
 #define ISOGI_DVR__LEAP 6                  /* blocks of 4^3 that a ray steps over at once, to each side */
+#define ISOGI_DVR__MARKED 8192             /* blocks in a task that marks which are empty */
 #if defined(__GNUC__)
 #define ISOGI_DVR__APART static __attribute__((noinline)) /* so that the stacks of several ways do not add up */
 #else
@@ -1490,29 +1491,9 @@ static uint8_t isogi_dvr__cut(const isogi_dvr *d, size_t block) {
     return cut;
 }
 
-/* Bytes that d->leap takes: of blocks, of two tables that they come from, and one more, for a single block: four bytes are read at once. */
+/* Bytes that d->leap takes: of blocks, of a table that they come from, and three more: four bytes are read at once. */
 static size_t isogi_dvr__leap_bytes(const isogi_dvr *d) {
-    return 3 * d->level[0].size[0] * d->level[0].size[1] * d->level[0].size[2] + 1;
-}
-
-/* For every block of level 0, how far around it all is empty: the bytes of those that are not spread by one block at a time. */
-static void isogi_dvr__mark_leaps(isogi_dvr *d) {
-    const size_t *size = d->level[0].size;
-    size_t count = size[0] * size[1] * size[2], stride[3], i, j;
-    uint8_t *full = d->leap + count, *next = full + count;
-    int k, a;
-    stride[0] = 1, stride[1] = size[0], stride[2] = size[0] * size[1];
-    for (i = 0; i < count; i++) full[i] = !d->empty[0][i], d->leap[i] = 0;
-    for (k = 0; k < ISOGI_DVR__LEAP; k++) {
-        for (i = 0; i < count; i++) d->leap[i] = (uint8_t)(d->leap[i] + !full[i]);
-        for (a = 0; a < 3; a++) {
-            size_t line = stride[a] * size[a];
-            memcpy(next, full, count);
-            for (j = 0; j + line <= count; j += line) /* whole lines of this axis lie `line` apart */
-                for (i = j; i + stride[a] < j + line; i++) next[i] |= full[i + stride[a]], next[i + stride[a]] |= full[i];
-            memcpy(full, next, count);
-        }
-    }
+    return 2 * d->level[0].size[0] * d->level[0].size[1] * d->level[0].size[2] + 3;
 }
 
 /* A block of level 1 that is cut off, and those of level 0 in it. */
@@ -1526,40 +1507,88 @@ static void isogi_dvr__mark_cut(isogi_dvr *d, size_t block) {
     }
 }
 
-/* Empty blocks of level 0: how many levels are empty there. Where the smallest block is not empty, no larger one is: ranges of values
-   contain those of their parts, and isogi_dvr__mark_cut marks with a block what it is made of. */
-static void isogi_dvr__mark_around(isogi_dvr *d) {
+/* Empty blocks of level 0 in a slice: how many levels are empty there. Where the smallest block is not empty, no larger one is: ranges of
+   values contain those of their parts, and isogi_dvr__mark_cut marks with a block what it is made of. */
+static void isogi_dvr__mark_around(isogi_dvr *d, size_t z) {
     const size_t *size = d->level[0].size;
-    size_t x, y, z, i = 0;
+    size_t x, y, i = size[0] * size[1] * z;
     int n;
-    for (z = 0; z < size[2]; z++)
-        for (y = 0; y < size[1]; y++)
-            for (x = 0; x < size[0]; x++, i++)
-                for (n = 0; n < ISOGI_DVR__LEVELS && d->empty[0][i]; n++) {
-                    const isogi_level *around = &d->level[n];
-                    size_t block = (x >> 2 * n) + around->size[0] * ((y >> 2 * n) + around->size[1] * (z >> 2 * n));
-                    if (d->empty[n][block]) d->empty[0][i] = (uint8_t)(n + 1);
-                }
+    for (y = 0; y < size[1]; y++)
+        for (x = 0; x < size[0]; x++, i++)
+            for (n = 0; n < ISOGI_DVR__LEVELS && d->empty[0][i]; n++) {
+                const isogi_level *around = &d->level[n];
+                size_t block = (x >> 2 * n) + around->size[0] * ((y >> 2 * n) + around->size[1] * (z >> 2 * n));
+                if (d->empty[n][block]) d->empty[0][i] = (uint8_t)(n + 1);
+            }
 }
 
-static void isogi_dvr__mark_empty(isogi_dvr *d) {
-    size_t i, count;
+/* Blocks to the nearest one that is not empty, counted along the axis on which it is farthest: to[] with another axis, at place `at` of
+   `size` along it, than from[] has. */
+static void isogi_dvr__leap_along(const uint8_t *from, uint8_t *to, size_t at, size_t size, size_t stride) {
+    uint8_t least = *from, k;
+    for (k = 1; k < least; k++) {
+        uint8_t next = at < k ? least : from[-(ptrdiff_t)(k * stride)];
+        if (at + k < size && from[k * stride] < next) next = from[k * stride];
+        next = next < k ? k : next;
+        least = next < least ? next : least;
+    }
+    *to = least;
+}
+
+/* Marks blocks by their ranges, of all levels one after the other; */
+static void isogi_dvr__mark_task(void *arg, size_t task) {
+    const isogi_dvr *d = (const isogi_dvr *)arg;
+    const size_t end = d->block_count / ISOGI_DVR__MARKED == task ? d->block_count : (task + 1) * ISOGI_DVR__MARKED;
+    size_t i = task * ISOGI_DVR__MARKED, first = 0, count;
     int n;
-    d->transparent = 1;
-    for (n = 0; n < ISOGI_DVR__LEVELS; n++) {
+    for (n = 0; n < ISOGI_DVR__LEVELS; n++, first += count) {
         const isogi_level *level = &d->level[n];
         count = level->size[0] * level->size[1] * level->size[2];
-        for (i = 0; i < count; i++) {
-            const float *range = level->range[i];
-            d->empty[n][i] = (uint8_t)isogi_dvr__range_empty(d, range);
-            if (!d->empty[n][i]) d->transparent = 0;
-            if (d->steady[n]) d->steady[n][i] = (uint8_t)isogi_dvr__range_steady(&d->transfer, range);
+        for (; i < end && i - first < count; i++) {
+            const float *range = level->range[i - first];
+            d->empty[n][i - first] = (uint8_t)isogi_dvr__range_empty(d, range);
+            if (d->steady[n]) d->steady[n][i - first] = (uint8_t)isogi_dvr__range_steady(&d->transfer, range);
         }
     }
+}
+
+/* and those of level 0 in a slice by what is around, rays that leap along x and y; */
+static void isogi_dvr__around_task(void *arg, size_t z) {
+    isogi_dvr *d = (isogi_dvr *)arg;
+    const size_t *size = d->level[0].size, slice = size[0] * size[1], first = slice * z;
+    uint8_t *flat = d->leap + slice * size[2] + first, *to = d->leap + first;
+    size_t i;
+    isogi_dvr__mark_around(d, z);
+    if (d->desc.space != ISOGI_DVR_PHYSICAL) return;
+    for (i = 0; i < slice; i++) flat[i] = d->empty[0][first + i] ? ISOGI_DVR__LEAP : 0;
+    for (i = 0; i < slice; i++) isogi_dvr__leap_along(flat + i, to + i, i % size[0], size[0], 1);
+    for (i = 0; i < slice; i++) isogi_dvr__leap_along(to + i, flat + i, i / size[0], size[1], size[0]);
+}
+
+/* along z, too. */
+static void isogi_dvr__leap_task(void *arg, size_t z) {
+    const isogi_dvr *d = (const isogi_dvr *)arg;
+    const size_t *size = d->level[0].size, slice = size[0] * size[1], first = slice * z;
+    const uint8_t *flat = d->leap + slice * size[2] + first;
+    size_t i;
+    for (i = 0; i < slice; i++) isogi_dvr__leap_along(flat + i, d->leap + first + i, z, size[2], slice);
+}
+
+/* What the transfer function and the planes leave empty. It is never done by half. */
+static void isogi_dvr__mark_empty(isogi_dvr *d) {
+    isogi_context whole = d->context;
+    const isogi_level *top = &d->level[ISOGI_DVR__LEVELS - 1];
+    const size_t slices = d->level[0].size[2];
+    size_t i;
+    whole.progress = NULL;
+    isogi_parallel(&whole, d->block_count / ISOGI_DVR__MARKED + 1, isogi_dvr__mark_task, d, 0, 0);
+    d->transparent = 1; /* if the largest blocks are empty all others are */
+    for (i = 0; i < top->size[0] * top->size[1] * top->size[2]; i++)
+        if (!d->empty[ISOGI_DVR__LEVELS - 1][i]) d->transparent = 0;
     for (i = 0; i < d->changed_count; i++)
         if (d->cut[i] == 2) isogi_dvr__mark_cut(d, i);
-    isogi_dvr__mark_around(d);
-    if (d->desc.space == ISOGI_DVR_PHYSICAL) isogi_dvr__mark_leaps(d);
+    isogi_parallel(&whole, slices, isogi_dvr__around_task, d, 0, 0);
+    if (d->desc.space == ISOGI_DVR_PHYSICAL) isogi_parallel(&whole, slices, isogi_dvr__leap_task, d, 0, 0);
 }
 
 /* Extinction just below a value. */
@@ -8185,6 +8214,7 @@ ISOGI_API isogi_result isogi_dvr_tets_render(const isogi_tets *tets, const isogi
 #undef ISOGI_DVR__ROUNDING
 #undef ISOGI_DVR__APART
 #undef ISOGI_DVR__LEAP
+#undef ISOGI_DVR__MARKED
 #undef ISOGI_DVR__VECTORS
 #undef ISOGI_DVR__V
 #undef ISOGI_DVR__C

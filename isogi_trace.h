@@ -4915,22 +4915,13 @@ typedef struct isogi_trace__taken {
     size_t strands; /* tasks by which chains and readers are divided */
 } isogi_trace__taken;
 
-/* First chains of probes and hits that read them, by strands; then the spans of a piece, those of its last node also where they go on in
-   the next one, which leaves them out; then the new probes themselves. */
+/* First the spans of a piece, those of its last node also where they go on in the next one, which leaves them out; then the new probes,
+   which many threads so are the first to touch; then chains of probes and hits that read them, by strands. */
 static void isogi_trace__take_task(void *arg, size_t task) {
     const isogi_trace__taken *taken = (const isogi_trace__taken *)arg;
     isogi_trace *t = taken->trace;
     isogi_trace__feedback *f = t->feedback;
-    size_t i, end;
-    if (task < taken->strands) {
-        const size_t first = task * ISOGI_TRACE__CHUNK / taken->strands;
-        end = (task + 1) * ISOGI_TRACE__CHUNK / taken->strands;
-        for (i = taken->headed; i < f->probes.headed; i++) isogi_trace__heads_new(&f->probes, i, first, end);
-        isogi_trace__probes_link(t, taken->made, first, end);
-        isogi_trace__readers_count(t, taken->made, task, taken->strands);
-        return;
-    }
-    task -= taken->strands;
+    size_t i, first, end;
     if (task < f->piece_count) {
         const isogi_trace__piece *piece = &f->pieces[task];
         isogi_trace__segment_fill(t, taken->segment, piece);
@@ -4940,9 +4931,17 @@ static void isogi_trace__take_task(void *arg, size_t task) {
         for (; i < end; i++) isogi_trace__span_commit(t, f->on_probes ? &f->probes : &f->texels, &f->spans[i]);
         return;
     }
-    i = (task - f->piece_count) * ISOGI_TRACE__SWEEP;
-    end = i + ISOGI_TRACE__SWEEP < taken->made ? i + ISOGI_TRACE__SWEEP : taken->made;
-    for (; i < end; i++) isogi_trace__probe_finish(t, f->probes.count + i, &f->catches[f->makers[i]]);
+    task -= f->piece_count, i = task * ISOGI_TRACE__SWEEP;
+    if (i < taken->made) {
+        end = i + ISOGI_TRACE__SWEEP < taken->made ? i + ISOGI_TRACE__SWEEP : taken->made;
+        for (; i < end; i++) isogi_trace__probe_finish(t, f->probes.count + i, &f->catches[f->makers[i]]);
+        return;
+    }
+    task -= (taken->made + ISOGI_TRACE__SWEEP - 1) / ISOGI_TRACE__SWEEP;
+    first = task * ISOGI_TRACE__CHUNK / taken->strands, end = (task + 1) * ISOGI_TRACE__CHUNK / taken->strands;
+    for (i = taken->headed; i < f->probes.headed; i++) isogi_trace__heads_new(&f->probes, i, first, end);
+    isogi_trace__probes_link(t, taken->made, first, end);
+    isogi_trace__readers_count(t, taken->made, task, taken->strands);
 }
 
 /* Adds a batch's segment; of probes, cut into those that tasks of a pass have. There is room for them. */
