@@ -1579,6 +1579,7 @@ static void isogi_dvr__mark_empty(isogi_dvr *d) {
     isogi_context whole = d->context;
     const isogi_level *top = &d->level[ISOGI_DVR__LEVELS - 1];
     const size_t slices = d->level[0].size[2];
+    isogi_thread_pool *pool = isogi_thread_pool_begin(&whole);
     size_t i;
     whole.progress = NULL;
     isogi_parallel(&whole, d->block_count / ISOGI_DVR__MARKED + 1, isogi_dvr__mark_task, d, 0, 0);
@@ -1589,6 +1590,7 @@ static void isogi_dvr__mark_empty(isogi_dvr *d) {
         if (d->cut[i] == 2) isogi_dvr__mark_cut(d, i);
     isogi_parallel(&whole, slices, isogi_dvr__around_task, d, 0, 0);
     if (d->desc.space == ISOGI_DVR_PHYSICAL) isogi_parallel(&whole, slices, isogi_dvr__leap_task, d, 0, 0);
+    isogi_thread_pool_end(&whole, pool);
 }
 
 /* Extinction just below a value. */

@@ -1528,11 +1528,11 @@ static void isogi_vol__build_task(void *arg, size_t task) {
     job->broken[task] = broken;
 }
 
-/* Level n over these blocks of level 0, from level n-1: four blocks a side. */
-static void isogi_vol__build_level(isogi_pyramid *p, int n, const size_t first[3], const size_t last[3]) {
+/* Level n over these blocks of level 0, from level n-1: four blocks a side. Every `step`th slice of it, from one on. */
+static void isogi_vol__build_level(isogi_pyramid *p, int n, const size_t first[3], const size_t last[3], size_t slice, size_t step) {
     const isogi_level *from = &p->level[n - 1], *to = &p->level[n];
     size_t x, y, z, i, j, k;
-    for (z = first[2] >> 2 * n; z <= last[2] >> 2 * n; z++)
+    for (z = (first[2] >> 2 * n) + slice; z <= last[2] >> 2 * n; z += step)
         for (y = first[1] >> 2 * n; y <= last[1] >> 2 * n; y++)
             for (x = first[0] >> 2 * n; x <= last[0] >> 2 * n; x++) {
                 float(*out)[2] = p->blocks + (to->range - (const float(*)[2])p->blocks) + x + to->size[0] * (y + to->size[1] * z);
@@ -1545,6 +1545,19 @@ static void isogi_vol__build_level(isogi_pyramid *p, int n, const size_t first[3
                             if (r[1] > (*out)[1]) (*out)[1] = r[1];
                         }
             }
+}
+
+/* Tasks in which slices of 64 children are brought together: one where they are too few to be worth a thread. */
+static size_t isogi_vol__gathering_tasks(const isogi_vol__build_job *job) {
+    size_t slice = 1;
+    int a;
+    for (a = 0; a < 2; a++) slice *= (job->last[a] >> 2) - (job->first[a] >> 2) + 1;
+    return slice < 64 ? 1 : (job->last[2] >> 2) - (job->first[2] >> 2) + 1;
+}
+
+static void isogi_vol__level_task(void *arg, size_t task) {
+    const isogi_vol__build_job *job = (const isogi_vol__build_job *)arg;
+    isogi_vol__build_level(job->pyramid, 1, job->first, job->last, task, isogi_vol__gathering_tasks(job));
 }
 
 /* Sizes of all levels; the number of blocks, or 0 on overflow. */
@@ -1581,8 +1594,8 @@ static isogi_result isogi_vol__bound_blocks(isogi_vol__build_job *job, const iso
             range[0] = isogi_vol__min(range[0], job->range[i][0]), range[1] = isogi_vol__max(range[1], job->range[i][1]);
             *broken += job->broken[i];
         }
-        isogi_vol__build_level(p, 1, job->first, job->last);
-        isogi_vol__build_level(p, 2, job->first, job->last);
+        result = isogi_parallel(context, isogi_vol__gathering_tasks(job), isogi_vol__level_task, job, 0.5, 0.5);
+        isogi_vol__build_level(p, 2, job->first, job->last, 0, 1);
     }
     isogi_release(&p->context, job->range, tasks, sizeof *job->range);
     isogi_release(&p->context, job->broken, tasks, sizeof *job->broken);
@@ -1957,19 +1970,30 @@ ISOGI_VOL__COLD static size_t isogi_vol__plan_node_levels(isogi_pyramid *p) {
     return count;
 }
 
+/* Nodes of level n, every `step`th slice from one on. */
+static void isogi_vol__build_node_level(const isogi_vol__build_job *job, int n, size_t slice, size_t step) {
+    size_t node[3];
+    for (node[2] = (job->first[2] >> 2 * n) + slice; node[2] <= job->last[2] >> 2 * n; node[2] += step)
+        for (node[1] = job->first[1] >> 2 * n; node[1] <= job->last[1] >> 2 * n; node[1]++)
+            for (node[0] = job->first[0] >> 2 * n; node[0] <= job->last[0] >> 2 * n; node[0]++)
+                isogi_vol__build_node(job->pyramid, n, node);
+}
+
+static void isogi_vol__nodes_task(void *arg, size_t task) {
+    const isogi_vol__build_job *job = (const isogi_vol__build_job *)arg;
+    isogi_vol__build_node_level(job, 1, task, isogi_vol__gathering_tasks(job));
+}
+
 /* The nodes over the blocks of a job, on all levels. */
 static isogi_result isogi_vol__fill_nodes(isogi_vol__build_job *job, const isogi_context *context) {
     const isogi_pyramid *p = job->pyramid;
     const size_t tasks = p->volume.compact ? 0 : job->last[2] - job->first[2] + 1;
     isogi_result result = isogi_parallel(context, tasks, isogi_vol__build_leaves, job, 0.5, 1);
-    size_t node[3];
     int n;
-    if (result != ISOGI_OK) return result;
-    for (n = 1; n < p->node_levels; n++)
-        for (node[2] = job->first[2] >> 2 * n; node[2] <= job->last[2] >> 2 * n; node[2]++)
-            for (node[1] = job->first[1] >> 2 * n; node[1] <= job->last[1] >> 2 * n; node[1]++)
-                for (node[0] = job->first[0] >> 2 * n; node[0] <= job->last[0] >> 2 * n; node[0]++) isogi_vol__build_node(p, n, node);
-    return ISOGI_OK;
+    if (result == ISOGI_OK && p->node_levels > 1)
+        result = isogi_parallel(context, isogi_vol__gathering_tasks(job), isogi_vol__nodes_task, job, 1, 1);
+    for (n = 2; n < p->node_levels && result == ISOGI_OK; n++) isogi_vol__build_node_level(job, n, 0, 1);
+    return result;
 }
 
 /* What fast rays look up, rides only within, inner, turn, size, wider and reach: see fast traversal. */
@@ -2062,6 +2086,7 @@ static isogi_result isogi_vol__build_nodes(isogi_pyramid *p) {
 ISOGI_API isogi_result isogi_vol_build(isogi_pyramid **pyramid, const isogi_volume *volume, const isogi_context *context) {
     isogi_result result = isogi_volume_validate(volume);
     isogi_pyramid *p;
+    isogi_thread_pool *pool;
     size_t blocks, first = 0;
     int n, a;
     if (!pyramid) return ISOGI_INVALID;
@@ -2089,9 +2114,11 @@ ISOGI_API isogi_result isogi_vol_build(isogi_pyramid **pyramid, const isogi_volu
             p->level[n].range = (const float(*)[2])p->blocks + first;
             first += p->level[n].size[0] * p->level[n].size[1] * p->level[n].size[2];
         }
+        pool = isogi_thread_pool_begin(&p->context);
         result = isogi_vol__build_blocks(p);
+        if (result == ISOGI_OK) result = isogi_vol__build_nodes(p);
+        isogi_thread_pool_end(&p->context, pool);
     }
-    if (result == ISOGI_OK) result = isogi_vol__build_nodes(p);
     if (result == ISOGI_OK) *pyramid = p;
     else isogi_vol_free(p);
     return result;
@@ -9108,7 +9135,7 @@ static isogi_result isogi_vol__fill_field(isogi_pyramid *p) {
     result = isogi_parallel(&p->context, p->level[0].size[2], isogi_vol__field_task, p, 0, 1);
     if (result != ISOGI_OK) return result;
     for (a = 0; a < 3; a++) last[a] = p->level[0].size[a] - 1;
-    isogi_vol__build_level(p, 1, first, last), isogi_vol__build_level(p, 2, first, last);
+    isogi_vol__build_level(p, 1, first, last, 0, 1), isogi_vol__build_level(p, 2, first, last, 0, 1);
     for (i = 0; i < p->level[2].size[0] * p->level[2].size[1] * p->level[2].size[2]; i++)
         low = isogi_vol__min(low, (double)p->level[2].range[i][0]), high = isogi_vol__max(high, (double)p->level[2].range[i][1]);
     p->range[0] = isogi_vol__max(low, -1e300), p->range[1] = isogi_vol__min(high, 1e300);
