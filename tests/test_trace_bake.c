@@ -609,7 +609,7 @@ TEST(transfer_is_filtered) {
     double q[5] = {24, 22, 24, 26, 16};
     scene s = scene_make(48, 48, 48, NULL, pit, q);
     int n = surface_points(&s, 0, POINTS, 7, points);
-    isogi_trace_desc d = desc_make(&s, 0.6f, -1, 1024);
+    isogi_trace_desc d = desc_make(&s, 0.6f, -1, LONG_SUITE ? 1024 : 512);
     d.lazy = 1;
     bake_series(d, (const float(*)[3])points, n, reference);
     d.method = ISOGI_TRACE_FEEDBACK, d.lazy = 0, d.isovalue_min = -0.01, d.isovalue_max = 0.01;
@@ -635,7 +635,7 @@ TEST(few_samples_of_transfer_are_filtered) {
     double q[5] = {24, 22, 24, 26, 16};
     scene s = scene_make(48, 48, 48, NULL, pit, q);
     int n = surface_points(&s, 0, POINTS, 7, points);
-    isogi_trace_desc d = desc_make(&s, 0, 0, 1024);
+    isogi_trace_desc d = desc_make(&s, 0, 0, LONG_SUITE ? 1024 : 512);
     d.lazy = 1;
     bake_and_sample(&d, NULL, (const float(*)[3])points, n, reference);
     d.method = ISOGI_TRACE_FEEDBACK, d.mode = ISOGI_TRACE_TRANSFER, d.lazy = 0, d.isovalue_min = -0.01, d.isovalue_max = 0.01;
@@ -701,7 +701,7 @@ TEST(fine_detail_of_transfer_is_kept) {
     scene s = scene_make(32, 24, 24, NULL, bars_over_ground, q);
     int n = surface_points(&s, 0, POINTS, 7, points), covered = 0;
     for (int run = 0; run < 3; run++) {
-        isogi_trace_desc d = desc_make(&s, 0, 0, run ? 256 : 2048);
+        isogi_trace_desc d = desc_make(&s, 0, 0, run ? 256 : LONG_SUITE ? 2048 : 1024);
         isogi_trace *t = NULL;
         d.mode = ISOGI_TRACE_TRANSFER, d.order = 5, d.lighting.lights = &sun, d.lighting.light_count = 1, d.lazy = !run;
         if (run) d.method = ISOGI_TRACE_FEEDBACK, d.unfiltered = run == 1, d.isovalue_min = -0.01, d.isovalue_max = 0.01;

@@ -134,8 +134,8 @@ TEST(odd_sizes_hit_like_the_reference) {
         if (i & 1) scene_waves(&s, &r);
         else scene_noise(&s, 0, &r);
         scene_build(&s);
-        run_rays(&s, 0, LONG_SUITE ? 20000 : 300, -0.8, 0.8, 0, 1, &t, &r);
-        run_rays(&s, 1, LONG_SUITE ? 20000 : 300, -0.8, 0.8, 0, 1, &t, &r);
+        run_rays(&s, 0, LONG_SUITE ? 20000 : 150, -0.8, 0.8, 0, 1, &t, &r);
+        run_rays(&s, 1, LONG_SUITE ? 20000 : 150, -0.8, 0.8, 0, 1, &t, &r);
         scene_free(&s);
     }
     tally_check("sizes", &t, 1);
@@ -156,8 +156,8 @@ TEST(every_type_and_scale_hits_like_the_reference) {
                 scene_encode(&s, (isogi_type)type, scale[k], bias[k]);
                 for (size_t i = 0; i < scene_voxels(&s); i++) low = fmin(low, s.value[i]), high = fmax(high, s.value[i]);
                 scene_build(&s);
-                run_rays(&s, 0, LONG_SUITE ? 20000 : 300, low, high, at_levels ? 1 / 8.0 : 0, 1, &t, &r);
-                if (!at_levels) run_rays(&s, 1, LONG_SUITE ? 20000 : 300, low, high, 0, 1, &t, &r);
+                run_rays(&s, 0, LONG_SUITE ? 20000 : 150, low, high, at_levels ? 1 / 8.0 : 0, 1, &t, &r);
+                if (!at_levels) run_rays(&s, 1, LONG_SUITE ? 20000 : 150, low, high, 0, 1, &t, &r);
                 scene_free(&s);
             }
         tally_check(at_levels ? "at levels" : "between levels", &t, 5);
@@ -178,7 +178,7 @@ TEST(extreme_values_spacings_and_origins_hit_like_the_reference) {
             for (size_t i = 0; i < scene_voxels(&s); i++) s.value[i] *= unit[k];
             for (int a = 0; a < 3; a++) s.volume.spacing[a] = spacing[k][a], s.volume.origin[a] = origin[k] * spacing[k][a];
             scene_build(&s);
-            run_rays(&s, 0, LONG_SUITE ? 20000 : 250, -0.7 * unit[k], 0.7 * unit[k], 0, 0, &t, &r);
+            run_rays(&s, 0, LONG_SUITE ? 20000 : 130, -0.7 * unit[k], 0.7 * unit[k], 0, 0, &t, &r);
             scene_free(&s);
         }
         tally_check("units", &t, 1);
@@ -210,7 +210,7 @@ TEST(rays_from_a_million_cells_away_hit_like_the_reference) {
 TEST(tangent_rays_and_saddles_hit_like_the_reference) {
     test_random r = {5};
     tally t = {0};
-    for (int v = 0; v < (LONG_SUITE ? 2000 : 60); v++) {
+    for (int v = 0; v < (LONG_SUITE ? 2000 : 30); v++) {
         scene s = scene_new(3, 4, 3);
         isogi_ray rays[BATCH];
         scene_noise(&s, v & 1 ? 4 : 0, &r);
@@ -532,7 +532,7 @@ TEST(nearly_constant_cells_hit_like_the_reference) {
         scene_noise(&s, 0, &r);
         for (size_t i = 0; i < scene_voxels(&s); i++) s.value[i] = 1 + s.value[i] * pow(10, -1 - v);
         scene_build(&s);
-        run_rays(&s, 0, LONG_SUITE ? 10000 : 300, 1 - 0.7 * pow(10, -1 - v), 1 + 0.7 * pow(10, -1 - v), 0, 0, &t, &r);
+        run_rays(&s, 0, LONG_SUITE ? 10000 : 150, 1 - 0.7 * pow(10, -1 - v), 1 + 0.7 * pow(10, -1 - v), 0, 0, &t, &r);
         scene_free(&s);
     }
     tally_check("nearly constant", &t, 5);
@@ -649,7 +649,7 @@ TEST(cells_without_a_surface_hit_like_the_reference) {
 #endif
     test_random r = {8};
     tally t = {0};
-    for (int v = 0; v < (LONG_SUITE ? 200 : 10); v++) {
+    for (int v = 0; v < (LONG_SUITE ? 200 : 6); v++) {
         scene s = scene_new(9, 18, 7);
         scene_noise(&s, 0, &r);
         for (int k = 0; k < 12; k++)
