@@ -198,10 +198,10 @@
    of pre-integrated ones 16 table^2 and 8 a point more. All of it comes from the context's allocator; where that fails the call says so and
    changes nothing.
    Stack use stays below 32 KB.
-   isogi_dvr_set_transfer and isogi_dvr_step are writers: one at a time, and not during another call with the same renderer. All
+   isogi_dvr_set_transfer, _set_clip and _step are writers: one at a time, and not during another call with the same renderer. All
    other calls only read and may run at the same time. Calls divide their own work among the context's threads. Results are the
    same bits for any number of threads and however visibility was cut into steps. All promises of equal bits are for IEEE arithmetic:
-   with -ffast-math pictures differ by roundings.
+   with -ffast-math pictures differ by roundings, and values must lie within 8e307.
 
    Samples stand at the middle of pieces of equal length, counted from where the ray enters the box (or from the eye inside it);
    the last piece is what is left. Blocks of the pyramid in which the transfer function has no extinction are stepped over, largest
@@ -215,9 +215,9 @@
    transparent (rays within its plane do sample it). Up to ISOGI_DVR_MAX_PEAKS peaks (in data space, exact or pre-integrated, any
    number), 2^16 directions, and 2^24 samples on the longest ray. Pre-integrated pictures of physical space tell up to 16384 classes of
    values apart, of those that occur and on which the transfer function depends: a piece of it that is narrower than four of them keeps
-   its opacity, blurred over a class. Of floats and doubles they do where the span of these values is at least a 4096th of their distance
-   from zero; else pictures are post-classified, in double, which takes longer: subtract what values have in common, or let `bias` add it
-   to small ones. Errors:
+   its opacity, blurred over a class. They do where the span of these values is 1e-26 to 1e30 and, of floats and doubles, at least a 4096th
+   of their distance from zero; else pictures are post-classified, in double, which takes longer: subtract what values have in common, or
+   let `scale` and `bias` make them of others. With spans beyond that visibility is by brute force, too. Errors:
    ISOGI_INVALID for anything outside of its documented range, ISOGI_TOO_LARGE where sizes overflow or pass these limits, ISOGI_NO_MEMORY,
    ISOGI_CANCELLED.
 
@@ -377,7 +377,8 @@ typedef struct isogi_dvr isogi_dvr;
 
 /* Which place along a ray is its depth. */
 typedef enum isogi_depth_kind {
-    ISOGI_DEPTH_HALF = 0, /* where half of the pixel's final opacity is reached: what stands for a surface among rasterized geometry */
+    ISOGI_DEPTH_HALF = 0, /* where half of the pixel's final opacity is reached: what stands for a surface among rasterized geometry. It
+                             only says which of both is in front: geometry inside of matter shows through where it is a peak */
     ISOGI_DEPTH_FIRST     /* where opacity begins (a 2^-40th of the final one): geometry before it is not covered by anything; of rays that
                              are sampled up to a step too far, of exact ones (data space, or a bound) right to rounding */
 } isogi_depth_kind;
@@ -1004,7 +1005,7 @@ static void isogi_dvr__set_classes(const isogi_dvr *d, const double span[2], siz
     width = (0.5 * to - 0.5 * from) / (0.5 * (double)(count - 2));
     least = d->range[0] < d->range[1] ? 1e-12 * fabs(from) : 1e-7 * fabs(from) / (double)count; /* that doubles tell apart */
     if (!(width > least)) width = least;
-    if (!(width > 1e-300)) width = 1e-30; /* all zero: classes that floats tell apart */
+    if (!(width > 1e-300)) width = d->range[0] < d->range[1] ? 1e-300 : 1e-30; /* all the same: classes that floats tell apart */
     *low = from - 1.001 * width, *scale = 1 / width;
 }
 
@@ -1684,6 +1685,14 @@ static isogi_dvr_method isogi_dvr__method(const isogi_dvr *d) {
     return d->desc.method;
 }
 
+/* Classes a value that floats hold. */
+static int isogi_dvr__float_classes(double scale) { return scale > 1e-30 && scale < 1e31; }
+
+/* The method at work: nor do these know values beyond floats. */
+static isogi_dvr_method isogi_dvr__method_now(const isogi_dvr *d) {
+    return isogi_dvr__float_classes(d->matter.scale) ? isogi_dvr__method(d) : ISOGI_DVR_BRUTE;
+}
+
 ISOGI_API isogi_result isogi_dvr_set_transfer(isogi_dvr *dvr, const isogi_transfer *transfer) {
     isogi_dvr__transfer copy;
     isogi_dvr_method before;
@@ -1713,7 +1722,7 @@ ISOGI_API isogi_result isogi_dvr_set_transfer(isogi_dvr *dvr, const isogi_transf
     changed = isogi_dvr__mark_changed(dvr, marks);
     changed += isogi_dvr__renew_classes(dvr);
     isogi_release(&dvr->context, marks, ISOGI_DVR__TABLE + 1, sizeof *marks);
-    before = dvr->method, dvr->method = isogi_dvr__method(dvr);
+    before = dvr->method, dvr->method = isogi_dvr__method_now(dvr);
     if (changed || dvr->method == ISOGI_DVR_BRUTE || dvr->method != before) isogi_dvr__begin_anew(dvr);
     return ISOGI_OK;
 }
@@ -2819,7 +2828,7 @@ ISOGI_API isogi_result isogi_dvr_create(isogi_dvr **dvr, const isogi_dvr_desc *d
     isogi_vol_range(resolved.pyramid, d->range);
     d->base = isogi_dvr__count_from(d, d->range[0]);
     isogi_dvr__set_classes(d, d->range, ISOGI_DVR__TABLE, &d->matter.low, &d->matter.scale);
-    d->method = isogi_dvr__method(d);
+    d->method = isogi_dvr__method_now(d);
     d->kernels = isogi_dvr__choose_kernels(d->context.force_path);
     resolved.step = resolved.step < d->visibility_step ? resolved.step : d->visibility_step;
     sampled = resolved.space == ISOGI_DVR_PHYSICAL || resolved.classification != ISOGI_DVR_EXACT; /* exact rays take no steps */
@@ -4118,13 +4127,14 @@ static int isogi_dvr__faces_change(const isogi_dvr__blocks *b, size_t block, con
    faces are their own now. */
 static isogi_result isogi_dvr__update_blocks(isogi_dvr *d) {
     isogi_dvr__blocks *b = &d->blocks;
-    uint8_t *level = (uint8_t *)isogi_allocate(&d->context, 4 * b->total, 1), *lit = level + b->total, *changed = lit + b->total;
-    uint8_t *gone = changed + b->total;
-    isogi_result result = level ? ISOGI_OK : ISOGI_NO_MEMORY;
+    uint8_t *level = (uint8_t *)isogi_allocate(&d->context, 4 * b->total, 1), *lit, *changed, *gone;
+    isogi_result result;
     isogi_context whole = d->context;
     size_t i;
+    if (!level) return ISOGI_NO_MEMORY;
+    lit = level + b->total, changed = lit + b->total, gone = changed + b->total;
     whole.progress = NULL;
-    if (result == ISOGI_OK) result = isogi_dvr__select_levels(d, level);
+    result = isogi_dvr__select_levels(d, level);
     for (i = 0; result == ISOGI_OK && i < b->total; i++) {
         changed[i] = d->changed[i] || level[i] != b->level[i] || isogi_dvr__faces_change(b, i, level);
         lit[i] = level[i] ? level[i] : isogi_dvr__any_near(b, i, b->reach, level) ? 2 : 0;
@@ -4719,6 +4729,7 @@ static size_t isogi_dvr__sweep_scratch(const isogi_dvr *d) {
         if (d->matter.size[a] > most) most = d->matter.size[a];
         if (d->desc.grid[a] > row) row = d->desc.grid[a];
     }
+    if (most + 2 * ISOGI_DVR__LANES + 2 > SIZE_MAX / 64 / (most + 2)) return 0; /* more than can be addressed */
     row = 6 * row + 2 * ISOGI_DVR__LANES;
     if (row < 2 * (most + 2) * (most + 1 + 2 * ISOGI_DVR__LANES)) row = 2 * (most + 2) * (most + 1 + 2 * ISOGI_DVR__LANES);
     return (2 * most + 2) * (2 * most + 2 + 2 * ISOGI_DVR__LANES) + row + (d->coming.block ? isogi_dvr__plane_points(d) : 0);
@@ -4946,6 +4957,8 @@ static isogi_result isogi_dvr__step_sweeps(isogi_dvr *d, size_t end) {
     double span = (double)(end - start);
     if (!batch) return d->coming.block ? isogi_dvr__finish_gathered(d) : ISOGI_OK;
     job.dvr = d, job.scratch_count = isogi_dvr__sweep_scratch(d);
+    if (!job.scratch_count || job.scratch_count > SIZE_MAX / 4 / batch || d->padded_count > SIZE_MAX / 4 / batch)
+        return ISOGI_TOO_LARGE;
     job.scratch = (float *)isogi_allocate(&d->context, batch * job.scratch_count, sizeof(float));
     job.transmittance = (float *)isogi_allocate(&d->context, batch * d->padded_count, sizeof(float));
     if (!job.scratch || !job.transmittance) result = ISOGI_NO_MEMORY;
@@ -6113,12 +6126,13 @@ static size_t isogi_dvr__count_classes(const isogi_dvr *d, double *low, double *
     }
 }
 
-/* Whether floats tell values of the classes' span apart, if there are any to be told. Integers are floats as they are; what they count from
-   is taken off with their bias, in double. */
+/* Whether floats hold classes and voxels, and tell values of the classes' span apart, if there are any to be told. Integers are floats as
+   they are; what they count from is taken off with their bias, in double. */
 #define ISOGI_DVR__TOLD_APART 4096
-static int isogi_dvr__floats_tell(const isogi_dvr *d, double low, double span) {
+static int isogi_dvr__floats_tell(const isogi_dvr *d, double low, double scale, double span) {
     const isogi_volume *v = &d->volume;
     double from = fabs(low - v->bias), to = fabs(low + span - v->bias);
+    if (!isogi_dvr__float_classes(scale) || !(fabs(v->scale) > 1e-30 && fabs(v->scale) < 1e30 && from < 1e37 && to < 1e37)) return 0;
     return (v->type != ISOGI_F32 && v->type != ISOGI_F64) || !(d->range[0] < d->range[1]) ||
            ISOGI_DVR__TOLD_APART * span >= (from > to ? from : to);
 }
@@ -7361,11 +7375,13 @@ static isogi_result isogi_dvr__begin_frame(isogi_dvr__render_job *job) {
     blocks = (double)d->level[0].size[0] * (double)d->level[0].size[1] * (double)d->level[0].size[2];
     f->sample_kind = isogi_dvr__sample_kind(v, d->cells, &f->last_word);
 #ifdef ISOGI_DVR__AVX
-    if (f->sample_kind >= 0 && isogi_dvr__joined(d) && isogi_dvr__machine() >= 4 && (!d->context.force_path || d->context.force_path > 3))
+    if (f->sample_kind >= 0 && isogi_dvr__joined(d) && isogi_dvr__machine() >= 4 &&
+        (d->context.force_path <= 0 || d->context.force_path > 3))
         job->eight = blocks < 2e9 && d->cells[0] && d->cells[1] && d->cells[2] && fabs(v->scale) < 1e200 && fabs(v->bias) < 1e200;
 #endif
     f->count = isogi_dvr__count_classes(d, &low, &scale);
-    if (!isogi_dvr__fast_space(d) || job->lights.local || !isogi_dvr__floats_tell(d, low, (double)f->count / scale)) return ISOGI_OK;
+    if (!isogi_dvr__fast_space(d) || job->lights.local || !isogi_dvr__floats_tell(d, low, scale, (double)f->count / scale))
+        return ISOGI_OK;
     f->dvr = d, f->step = d->piece, f->look = isogi_dvr__fast_look, f->shade = isogi_dvr__fast_shade, f->glow = (float)d->desc.emission;
     f->end = 1 - d->desc.opaque, f->dim = 0.125f;
     f->leap = blocks < 2e9 ? d->kernels.leap : isogi_dvr__leap;
@@ -7374,10 +7390,10 @@ static isogi_result isogi_dvr__begin_frame(isogi_dvr__render_job *job) {
     /* no infinity: that times no extinction would be no number */
     f->per_unit = isogi_dvr__clamp(1 / d->desc.unit, 1e300), f->piece = (float)isogi_dvr__clamp(f->step * d->spacing / d->desc.unit, 1e30);
 #ifdef ISOGI_DVR__AVX
-    if (f->sample_kind >= 0 && isogi_dvr__machine() >= 3 && (!d->context.force_path || d->context.force_path > 2) &&
+    if (f->sample_kind >= 0 && isogi_dvr__machine() >= 3 && (d->context.force_path <= 0 || d->context.force_path > 2) &&
         points < 0x7fffffff && d->held.total < 0x0fffffff)
         f->look = isogi_dvr__look_avx2, f->shade = isogi_dvr__fast_shade_avx2;
-    if (f->look == isogi_dvr__look_avx2 && isogi_dvr__machine() >= 4 && (!d->context.force_path || d->context.force_path > 3))
+    if (f->look == isogi_dvr__look_avx2 && isogi_dvr__machine() >= 4 && (d->context.force_path <= 0 || d->context.force_path > 3))
         f->look = isogi_dvr__look_avx512, f->eight = !d->clip_count && !d->transparent;
 #endif
     f->classes = (isogi_dvr__class_entry *)isogi_allocate(&d->context, f->count, sizeof *f->classes);

@@ -68,7 +68,7 @@
                             whether they are hidden is asked from the start of rays.
      Validity               A texel is left out of every lookup where no surface passes at its place: none of the voxels of the cells
                             around it is lower than v (constant air, local minima: there f >= v all around, such a texel would see the
-                            sky through everything), where a voxel is not finite, or where all of these gradients vanish. With desc.capped
+                            sky through everything) or not finite, or where all gradients vanish in them. With desc.capped
                             the border's texels, which face out of the box, are always valid on the low side. On the high side a texel
                             needs matter to look through: one of the places a quarter, half and a whole voxel into the matter must
                             be inside (local maxima have none).
@@ -789,22 +789,6 @@ static double isogi_trace__kernel(const float s[3], const float g[3], const floa
     return (cosine > 0 ? cosine : 0) + (mirrored > 0 ? mirrored : 0);
 }
 
-/* Whether all voxels are finite that the smoothed gradient reads. */
-static int isogi_trace__smooth_exists(const isogi_volume *v, const isogi_hit *place) {
-    double corner[8];
-    uint32_t cell[3];
-    int i, a, inside;
-    for (i = 0; i < 27; i++) {
-        for (inside = 1, a = 0; a < 3; a++) {
-            const int apart = (a == 0 ? i : a == 1 ? i / 3 : i / 9) % 3 - 1;
-            cell[a] = place->cell[a] + (uint32_t)apart; /* wraps */
-            inside &= apart < 0 ? place->cell[a] > 0 : !apart || (size_t)place->cell[a] + 2 < v->size[a];
-        }
-        if (inside && !isogi_volume_corners(v, cell, corner)) return 0;
-    }
-    return 1;
-}
-
 /* A normal where there is no single one: in a plane of the voxels' lattice the trilinear gradient is another on either side, and one of
    them is zero where a mask begins. The mean over the cells that touch the place; where these cancel (a sheet or rod one voxel thick), the
    smoothed one, or that of the first cell that has one. */
@@ -844,7 +828,6 @@ static void isogi_trace__place_normals(const isogi_pyramid *pyramid, isogi_norma
     for (i = 0; i < count; i++) {
         for (plane = a = 0; a < 3; a++) plane |= places[i].local[a] <= 0 || places[i].local[a] >= 1;
         if (kind == ISOGI_NORMAL_TRILINEAR ? !plane : isogi_trace__dot(normals[i], normals[i]) > 0) continue;
-        if (kind == ISOGI_NORMAL_SMOOTH && !isogi_trace__smooth_exists(isogi_vol_volume(pyramid), &places[i])) continue;
         isogi_trace__normal_beside(pyramid, &places[i], normals[i]);
     }
 }
@@ -873,13 +856,15 @@ static void isogi_trace__normals(const isogi_pyramid *pyramid, isogi_normal_kind
 /* Light of any origin is dimmed to this: whatever is summed, and reflected on and on, stays within the range of floats. */
 #define ISOGI_TRACE__BRIGHTEST 1e30
 
-/* Keeps colour and direction. What is infinite comes first to the end of floats. */
+/* Keeps colour and direction. Infinite light comes first to nearly the end of floats, since
+   -ffast-math drops a comparison with the end itself. */
 static void isogi_trace__dim(float *light, int count) {
+    const float end = 3.4e38f;
     float most = 0;
     double factor;
     int i;
     for (i = 0; i < count; i++) {
-        light[i] = light[i] < FLT_MAX ? light[i] : FLT_MAX, light[i] = light[i] > -FLT_MAX ? light[i] : -FLT_MAX;
+        light[i] = light[i] < end ? light[i] : end, light[i] = light[i] > -end ? light[i] : -end;
         most = fabsf(light[i]) > most ? fabsf(light[i]) : most;
     }
     if (!((double)most > ISOGI_TRACE__BRIGHTEST)) return;
@@ -6823,8 +6808,8 @@ static uint64_t isogi_trace__hash_volume(uint64_t hash, const isogi_pyramid *pyr
     hash = isogi_trace__hash_doubles(hash, &v->bias, 1);
     for (a = 0; a < 3; a++) /* of a part of a volume: where it is, and what it knows beyond its border */
         if (v->first[a] || v->halo_low[a] || v->halo_high[a])
-            hash = isogi_trace__hash_number(isogi_trace__hash_number(isogi_trace__hash_number(hash, v->first[a]), v->halo_low[a]),
-                                            v->halo_high[a]);
+            hash = isogi_trace__hash_number(
+                isogi_trace__hash_number(isogi_trace__hash_number(hash + (uint64_t)a, v->first[a]), v->halo_low[a]), v->halo_high[a]);
     if (!level.cells) return hash;
     return isogi_trace__hash_floats(hash, level.range[0], 2 * level.size[0] * level.size[1] * level.size[2]);
 }

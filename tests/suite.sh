@@ -193,7 +193,7 @@ variants() {
     variant sh-level-1 "$CC" "-O2 $CONTRACT_OFF -DISOGI_SH_LEVEL=1" '' $(only sh)
     if have clang; then
         variant clang clang "-O2 $CONTRACT_OFF" '' $(only 'sh|sample|vol|mesh|trace|dvr|stack')
-        fast_math clang $(only 'sh|sh_limits')
+        fast_math clang $(only 'sh|sh_limits|vol_hard')
         variant address+undefined clang "-O1 -g $CONTRACT_OFF -fsanitize=address,undefined,float-cast-overflow -fno-sanitize-recover=all" '' $(only "$checked")
         variant thread clang "-O1 -g $CONTRACT_OFF -fsanitize=thread" 'TSAN_OPTIONS=halt_on_error=1' $(only "$threaded")
     else

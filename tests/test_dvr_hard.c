@@ -218,4 +218,60 @@ TEST(glaring_colours_are_refused_or_clamped) {
     field_free(&f);
 }
 
+/* Pictures and visibility depend on values only by way of the transfer function: the same at any scale of both, by every method. */
+TEST(values_of_any_scale_look_alike) {
+    static const double scales[] = {1, 1e-23, 1e-28, 1e-40, 1e-150, 1e-299, 1e23, 1e32, 1e39, 1e150, 1e299};
+    double first[4] = {0, 0, 0, 0};
+    for (int k = 0; k < 11; k++) {
+        isogi_transfer_point p[3] = {{0.2, {1, 0.5f, 0.2f}, 0}, {0.7, {0.4f, 1, 0.2f}, 2}, {1, {0.1f, 0.2f, 1}, 3}};
+        const isogi_transfer transfer = {p, 3, NULL, 0};
+        const double eye[3] = {4, 5, 20}, target[3] = {4, 5, 4};
+        const float place[1][3] = {{4, 4, 4}};
+        field f = field_new(9, 9, 9);
+        for (int i = 0; i < 729; i++) f.value[i] = (i % 9 + i / 9 % 9) / 16.0 * scales[k];
+        for (int i = 0; i < 3; i++) p[i].value *= scales[k];
+        field_build(&f);
+        for (int way = 0; way < 4; way++) {
+            isogi_dvr_desc desc = {.pyramid = f.pyramid, .unit = 4, .grid = {3, 3, 3}, .directions = 64, .reduction = 1};
+            float v[1][9] = {{0}};
+            double seen;
+            desc.shading = way ? ISOGI_DVR_VISIBILITY : ISOGI_DVR_UNLIT, desc.method = (isogi_dvr_method)way;
+            isogi_dvr *dvr = dvr_new(&desc, &transfer);
+            CHECK(isogi_dvr_step(dvr, 0, NULL) == ISOGI_OK, "step");
+            if (way) CHECK(isogi_dvr_sample_visibility(dvr, place, 1, v[0]) == ISOGI_OK, "visibility");
+            seen = way ? (double)v[0][0] : (double)cast(dvr, eye, target, NULL).c[3];
+            if (!k) first[way] = seen;
+            CHECK(fabs(seen - first[way]) < (way ? 0.2 : 0.004) && seen > 0.2 && seen < 3.2, "scale %g, %d: %g, not %g", scales[k], way, seen,
+                  first[way]);
+            if (way < 2 || k < 1) printf("    scale %g, %d: %.4f\n", scales[k], way, seen);
+            isogi_dvr_free(dvr);
+        }
+        field_free(&f);
+    }
+}
+
+/* As everywhere, numbers that stand for no path are the best one. */
+TEST(paths_of_other_numbers_are_the_best) {
+    field f = field_waves(20, 5);
+    test_random r = {9};
+    const isogi_view view = view_of(&f, 1.5, &r, 24);
+    float(*image[3])[4];
+    for (int shading = 0; shading < 2; shading++) {
+        const isogi_dvr_desc desc = {.pyramid = f.pyramid, .shading = shading ? ISOGI_DVR_VISIBILITY : ISOGI_DVR_UNLIT};
+        const isogi_lighting white = {.env = {.sh = sky_one, .sh_order = 1}};
+        for (int k = 0; k < 3; k++) {
+            const isogi_context context = {.threads = 1, .force_path = k == 1 ? -1 : 9 * k};
+            const isogi_transfer transfer = {hills, 6, NULL, 0};
+            isogi_dvr *dvr = dvr_new_with(&desc, &transfer, &context);
+            CHECK(isogi_dvr_step(dvr, 0, NULL) == ISOGI_OK, "step");
+            image[k] = picture(dvr, &view, &white, NULL, NULL);
+            isogi_dvr_free(dvr);
+        }
+        for (int k = 1; k < 3; k++)
+            CHECK(!memcmp(image[0], image[k], (size_t)view.width * (size_t)view.height * sizeof *image[0]), "shading %d, path %d", shading, k);
+        for (int k = 0; k < 3; k++) free(image[k]);
+    }
+    field_free(&f);
+}
+
 TEST_MAIN("dvr_hard")

@@ -1136,4 +1136,34 @@ static void check_scan(const char *name, int x, int y, int z, double isovalue) {
 TEST(engine_is_watertight) { check_scan("engine_256x256x128_uint8.raw", 256, 256, 128, 80); }
 TEST(bonsai_is_watertight) { check_scan("bonsai_256x256x256_uint8.raw", 256, 256, 256, 40); }
 
+/* Where scale is less than the rounding of scale * raw + bias, several integers are one value: meshes are those of the values. */
+TEST(integers_that_round_together_are_meshed_like_their_values) {
+    test_random r = {77};
+    size_t triangles = 0;
+    for (int k = 0; k < 300; k++) {
+        const double bias = (k & 1 ? -1 : 1) * pow(10, random_range(&r, 15, 19)), scale = (k & 2 ? -1 : 1) * random_range(&r, 0.1, 3);
+        const int n = 5, count = n * n * n;
+        uint8_t raw[125];
+        field f = field_new(n, n, n);
+        isogi_volume v = f.volume;
+        isogi_mesh_desc desc = {0};
+        isogi_mesh of_raw = {0}, of_values = {0};
+        isogi_pyramid *pyramid = NULL;
+        for (int i = 0; i < count; i++) raw[i] = (uint8_t)random_bits(&r), f.value[i] = scale * raw[i] + bias;
+        v.data = raw, v.type = ISOGI_U8, v.scale = scale, v.bias = bias;
+        field_build_with(&f, NULL);
+        CHECK(isogi_vol_build(&pyramid, &v, NULL) == ISOGI_OK, "build");
+        desc.isovalue = scale * (k & 4 ? 128 : 128.5) + bias;
+        CHECK(isogi_vol_mesh(pyramid, &desc, &of_raw) == ISOGI_OK && isogi_vol_mesh(f.pyramid, &desc, &of_values) == ISOGI_OK, "mesh");
+        triangles += of_values.triangle_count;
+        CHECK(of_raw.triangle_count == of_values.triangle_count && of_raw.vertex_count == of_values.vertex_count,
+              "bias %g, scale %g: %zu triangles, of values %zu", bias, scale, of_raw.triangle_count, of_values.triangle_count);
+        CHECK(!of_raw.triangle_count || !memcmp(of_raw.triangles, of_values.triangles, of_raw.triangle_count * sizeof *of_raw.triangles),
+              "bias %g, scale %g: other triangles", bias, scale);
+        isogi_vol_mesh_free(pyramid, &of_raw), isogi_vol_mesh_free(f.pyramid, &of_values);
+        isogi_vol_free(pyramid), field_free(&f);
+    }
+    CHECK(triangles > 10000, "%zu triangles", triangles);
+}
+
 TEST_MAIN("mesh")

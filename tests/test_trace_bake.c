@@ -1895,4 +1895,28 @@ TEST(many_points_in_one_request) {
     free(points), scene_free(&s);
 }
 
+/* Beside voxels that are not finite there is no smoothed normal, but a surface, which rays hit and light reaches. */
+TEST(surfaces_beside_a_mask_are_lit) {
+    double q[1] = {0.4};
+    scene s = scene_make(24, 24, 24, NULL, gyroid, q);
+    static float points[400][3], e[400][3], error[400];
+    int n = 0, dark[2] = {0, 0};
+    for (int i = 0; i < 24 * 24 * 24; i++) {
+        const double x = i % 24 - 11.5, y = i / 24 % 24 - 11.5, z = i / 576 - 11.5;
+        if (x * x + y * y + z * z < 60) s.data[i] = NAN;
+    }
+    isogi_vol_free(s.pyramid);
+    if (isogi_vol_build(&s.pyramid, &s.volume, NULL) != ISOGI_OK) abort();
+    n = surface_points(&s, 0, 400, 3, points);
+    isogi_trace_desc d = desc_make(&s, 0, 0, 16);
+    CHECK(isogi_trace_gather(&d, (const float(*)[3])points, NULL, (size_t)n, e, error, NULL) == ISOGI_OK, "gather");
+    for (int i = 0; i < n; i++) dark[0] += !(error[i] < 1e30f);
+    d.isovalue_min = -0.01, d.isovalue_max = 0.01;
+    bake_and_sample(&d, NULL, (const float(*)[3])points, n, e);
+    for (int i = 0; i < n; i++) dark[1] += !(e[i][1] > 0);
+    printf("    %d points: %d without light by gathering, %d by texels\n", n, dark[0], dark[1]);
+    CHECK(n > 200 && !dark[0] && dark[1] <= n / 100, "%d points: %d without light by gathering, %d by texels", n, dark[0], dark[1]);
+    scene_free(&s);
+}
+
 TEST_MAIN("trace_bake")
