@@ -220,8 +220,8 @@ static const option option_list[] = {
      .allowed = "three numbers, 1e-9 to 1e9"},
     {"--nan", "V", ANY, "put this value in place of voxels that are not finite", NUMBERS, AT(nan_value), AT(has_nan), 1, -1e300, 1e300,
      .allowed = "a number"},
-    {"--camera", "AZ,EL,DIST", ANY, "degrees about and above the horizon of --up; distance in radii of the box's sphere",
-     PARSED(parse_camera, "azimuth in degrees, elevation -90 to 90, distance above 0"), .has = AT(has_camera)},
+    {"--camera", "AZ,EL,DIST", ANY, "degrees about and above the horizon of --up (-90 to 90); distance in radii of the box's sphere",
+     PARSED(parse_camera, "azimuth in degrees, elevation -90 to 90, distance above 0, neither beyond 10000"), .has = AT(has_camera)},
     {"--up", "X,Y,Z", ANY, "which way is up, for the camera and the environment; default 0,1,0",
      PARSED(parse_up, "three numbers, not all zero"), .has = AT(has_up)},
     {"--env", "FILE.hdr", LIT, "environment: equirectangular Radiance picture; sky: the default's sky, to go with --light", TEXT,
@@ -249,7 +249,7 @@ static const option option_list[] = {
      "shadows of lights and sky; for lambert and phong, where off is the default, those of lights, per "
      "pixel",
      NAMED(switch_name, shadows), .has = AT(has_shadows)},
-    {"--ambient", "constant|normal", BY_NORMAL, "the sky's light, the same for all or by normal; default normal, constant for phong",
+    {"--ambient", "constant|normal", BY_NORMAL, "the sky's light, the same for all or by normal; default normal, constant for phong without --env",
      NAMED(ambient_name, ambient), .has = AT(has_ambient)},
     {"--fog", "X", SURFACES, "fade to the sky's mean light with distance: by exp(-X) from the front of the box's sphere to its back",
      NUMBERS, AT(fog), 0, 1, 0, 100, .allowed = "a number, 0 to 100"},
@@ -268,8 +268,8 @@ static const option option_list[] = {
      "exposure is then one at which both have the same mean",
      TEXT, .offset = AT(compare)},
     {"--tf", "FILE", VOLUMES,
-     "transfer function: lines \"value extinction r g b\" or \"peak value opacity r g b\"; default the scene's or "
-     "shape's own, else one suggested by the histogram",
+     "transfer function: lines \"value extinction r g b\" or \"peak value opacity r g b\", colours 0 to 1; # begins a remark; "
+     "default the scene's or shape's own, else one suggested by the histogram",
      TEXT, .offset = AT(tf)},
     {"--shading", "NAME", VOLUMES, "unlit, visibility, local, two-sided; default visibility, for scale-invariant local",
      NAMED(shading_name, shading), .has = AT(has_shading)},
@@ -530,7 +530,7 @@ static int parse_arguments(viewer *v, int argc, char **argv) {
         return file_fail(v->error, "--size: %dx%d is too large; at most 100 million pixels", o->width, o->height);
     if (!o->samples) o->samples = 64;
     if (!o->has_shadows) o->shadows = o->mode > PHONG;
-    if (!o->has_ambient) o->ambient = o->mode != PHONG;
+    if (!o->has_ambient) o->ambient = o->mode != PHONG || o->env; /* a constant one is Phong's, but flat under uneven skies */
     if (o->storage == ISOGI_TRACE_RGB9E5 && o->mode == TRANSFER)
         return file_fail(v->error, "--storage: rgb9e5 holds colours, not the coefficients of --mode transfer");
     return 1;
@@ -771,6 +771,9 @@ static int set_light(viewer *v) {
     if (sky) set_sky(v, sky_above, sky_below);
     else if (env) {
         if (!hdr_read(env, &v->env, v->error)) return 0;
+        if (v->env.width != 2 * v->env.height)
+            fprintf(stderr, "note: %s is %d x %d, not twice as wide as high: it is taken for equirectangular all the same\n", env,
+                    v->env.width, v->env.height);
         e->rgb = v->env.rgb, e->width = v->env.width, e->height = v->env.height;
     }
     for (int i = 0; i < 9; i++) e->rotation[i] = (float)v->rotation[i];
