@@ -249,7 +249,8 @@ static const option option_list[] = {
      "shadows of lights and sky; for lambert and phong, where off is the default, those of lights, per "
      "pixel",
      NAMED(switch_name, shadows), .has = AT(has_shadows)},
-    {"--ambient", "constant|normal", BY_NORMAL, "the sky's light, the same for all or by normal; default normal, constant for phong without --env",
+    {"--ambient", "constant|normal", BY_NORMAL,
+     "the sky's light, the same for all or by normal; default normal, constant for phong without --env",
      NAMED(ambient_name, ambient), .has = AT(has_ambient)},
     {"--fog", "X", SURFACES, "fade to the sky's mean light with distance: by exp(-X) from the front of the box's sphere to its back",
      NUMBERS, AT(fog), 0, 1, 0, 100, .allowed = "a number, 0 to 100"},

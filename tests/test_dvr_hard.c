@@ -241,8 +241,8 @@ TEST(values_of_any_scale_look_alike) {
             if (way) CHECK(isogi_dvr_sample_visibility(dvr, place, 1, v[0]) == ISOGI_OK, "visibility");
             seen = way ? (double)v[0][0] : (double)cast(dvr, eye, target, NULL).c[3];
             if (!k) first[way] = seen;
-            CHECK(fabs(seen - first[way]) < (way ? 0.2 : 0.004) && seen > 0.2 && seen < 3.2, "scale %g, %d: %g, not %g", scales[k], way, seen,
-                  first[way]);
+            CHECK(fabs(seen - first[way]) < (way ? 0.2 : 0.004) && seen > 0.2 && seen < 3.2, "scale %g, %d: %g, not %g", scales[k], way,
+                  seen, first[way]);
             if (way < 2 || k < 1) printf("    scale %g, %d: %.4f\n", scales[k], way, seen);
             isogi_dvr_free(dvr);
         }
@@ -268,7 +268,8 @@ TEST(paths_of_other_numbers_are_the_best) {
             isogi_dvr_free(dvr);
         }
         for (int k = 1; k < 3; k++)
-            CHECK(!memcmp(image[0], image[k], (size_t)view.width * (size_t)view.height * sizeof *image[0]), "shading %d, path %d", shading, k);
+            CHECK(!memcmp(image[0], image[k], (size_t)view.width * (size_t)view.height * sizeof *image[0]), "shading %d, path %d", shading,
+                  k);
         for (int k = 0; k < 3; k++) free(image[k]);
     }
     field_free(&f);

@@ -216,7 +216,8 @@ TEST(more_vertices_than_indices_are_too_large) {
         row[0].vertex[0] = 0x7fffffff, row[1].vertex[2] = 0x7fffffff, row[2].vertex[4] = over ? 2 : 1;
         isogi_result result = isogi_vol__mesh_offsets(row, 3);
         CHECK(result == (over || SIZE_MAX == UINT32_MAX ? ISOGI_TOO_LARGE : ISOGI_OK), "%d: %s", over, isogi_result_string(result));
-        if (result == ISOGI_OK) CHECK(row[3].vertex[0] == UINT32_MAX && row[2].vertex[4] == UINT32_MAX - 1, "%u %u", row[3].vertex[0], row[2].vertex[4]);
+        if (result == ISOGI_OK)
+            CHECK(row[3].vertex[0] == UINT32_MAX && row[2].vertex[4] == UINT32_MAX - 1, "%u %u", row[3].vertex[0], row[2].vertex[4]);
     }
 }
 
