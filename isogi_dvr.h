@@ -216,8 +216,9 @@
    number), 2^16 directions, and 2^24 samples on the longest ray. Pre-integrated pictures of physical space tell up to 16384 classes of
    values apart, of those that occur and on which the transfer function depends: a piece of it that is narrower than four of them keeps
    its opacity, blurred over a class. They do where the span of these values is 1e-26 to 1e30 and, of floats and doubles, at least a 4096th
-   of their distance from zero; else pictures are post-classified, in double, which takes longer: subtract what values have in common, or
-   let `scale` and `bias` make them of others. With spans beyond that visibility is by brute force, too. Errors:
+   of their distance from zero, and where no voxel is beyond floats; else pictures are post-classified, in double, which takes longer:
+   subtract what values have in common, or let `scale` and `bias` make them of others. With spans beyond that, or voxels beyond floats,
+   visibility is by brute force, too. Errors:
    ISOGI_INVALID for anything outside of its documented range, ISOGI_TOO_LARGE where sizes overflow or pass these limits, ISOGI_NO_MEMORY,
    ISOGI_CANCELLED.
 
@@ -570,6 +571,7 @@ ISOGI_API isogi_result isogi_dvr_tets_render(const isogi_tets *tets, const isogi
 #define ISOGI_DVR__CLASSES 1024            /* of values, for pictures; 16 times as many for a transfer function with narrow pieces */
 #define ISOGI_DVR__NODES 8                 /* samples of a ray taken at once */
 #define ISOGI_DVR__LEAP 6                  /* blocks of 4^3 that a ray steps over at once, to each side */
+#define ISOGI_DVR__FLOATS 3.4028235e38     /* to here they go */
 #define ISOGI_DVR__MARKED 8192             /* blocks in a task that marks which are empty */
 #if defined(__GNUC__)
 #define ISOGI_DVR__APART static __attribute__((noinline)) /* so that the stacks of several ways do not add up */
@@ -1536,7 +1538,7 @@ static void isogi_dvr__leap_along(const uint8_t *from, uint8_t *to, size_t at, s
     *to = least;
 }
 
-/* Marks blocks by their ranges, of all levels one after the other; */
+/* Marks blocks by their ranges, of all levels one after the other. */
 static void isogi_dvr__mark_task(void *arg, size_t task) {
     const isogi_dvr *d = (const isogi_dvr *)arg;
     const size_t end = d->block_count / ISOGI_DVR__MARKED == task ? d->block_count : (task + 1) * ISOGI_DVR__MARKED;
@@ -1553,7 +1555,7 @@ static void isogi_dvr__mark_task(void *arg, size_t task) {
     }
 }
 
-/* and those of level 0 in a slice by what is around, rays that leap along x and y; */
+/* Marks blocks of level 0 in a slice by what is around them; how far rays may leap, as far as it goes with x and y. */
 static void isogi_dvr__around_task(void *arg, size_t z) {
     isogi_dvr *d = (isogi_dvr *)arg;
     const size_t *size = d->level[0].size, slice = size[0] * size[1], first = slice * z;
@@ -1566,7 +1568,7 @@ static void isogi_dvr__around_task(void *arg, size_t z) {
     for (i = 0; i < slice; i++) isogi_dvr__leap_along(to + i, flat + i, i / size[0], size[1], size[0]);
 }
 
-/* along z, too. */
+/* How far rays may leap, z included. */
 static void isogi_dvr__leap_task(void *arg, size_t z) {
     const isogi_dvr *d = (const isogi_dvr *)arg;
     const size_t *size = d->level[0].size, slice = size[0] * size[1], first = slice * z;
@@ -1575,14 +1577,17 @@ static void isogi_dvr__leap_task(void *arg, size_t z) {
     for (i = 0; i < slice; i++) isogi_dvr__leap_along(flat + i, d->leap + first + i, z, size[2], slice);
 }
 
-/* What the transfer function and the planes leave empty. It is never done by half. */
+/* What the transfer function and the planes leave empty. It is never done by half; of few blocks by one thread, in less time than others
+   take to come. */
 static void isogi_dvr__mark_empty(isogi_dvr *d) {
     isogi_context whole = d->context;
     const isogi_level *top = &d->level[ISOGI_DVR__LEVELS - 1];
     const size_t slices = d->level[0].size[2];
-    isogi_thread_pool *pool = isogi_thread_pool_begin(&whole);
+    isogi_thread_pool *pool;
     size_t i;
     whole.progress = NULL;
+    if (d->block_count < 2 * ISOGI_DVR__MARKED) whole.parallel_for = NULL, whole.threads = 1;
+    pool = isogi_thread_pool_begin(&whole);
     isogi_parallel(&whole, d->block_count / ISOGI_DVR__MARKED + 1, isogi_dvr__mark_task, d, 0, 0);
     d->transparent = 1; /* if the largest blocks are empty all others are */
     for (i = 0; i < top->size[0] * top->size[1] * top->size[2]; i++)
@@ -1685,12 +1690,15 @@ static isogi_dvr_method isogi_dvr__method(const isogi_dvr *d) {
     return d->desc.method;
 }
 
-/* Classes a value that floats hold. */
-static int isogi_dvr__float_classes(double scale) { return scale > 1e-30 && scale < 1e31; }
+/* Whether floats hold numbers of classes, and all values as they are counted in rows. */
+static int isogi_dvr__float_classes(const isogi_dvr *d, double scale) {
+    if (!(scale > 1e-30 && scale < 1e31)) return 0;
+    return fabs(d->range[0] - d->base) <= ISOGI_DVR__FLOATS && fabs(d->range[1] - d->base) <= ISOGI_DVR__FLOATS;
+}
 
 /* The method at work: nor do these know values beyond floats. */
 static isogi_dvr_method isogi_dvr__method_now(const isogi_dvr *d) {
-    return isogi_dvr__float_classes(d->matter.scale) ? isogi_dvr__method(d) : ISOGI_DVR_BRUTE;
+    return isogi_dvr__float_classes(d, d->matter.scale) ? isogi_dvr__method(d) : ISOGI_DVR_BRUTE;
 }
 
 ISOGI_API isogi_result isogi_dvr_set_transfer(isogi_dvr *dvr, const isogi_transfer *transfer) {
@@ -6132,7 +6140,9 @@ static size_t isogi_dvr__count_classes(const isogi_dvr *d, double *low, double *
 static int isogi_dvr__floats_tell(const isogi_dvr *d, double low, double scale, double span) {
     const isogi_volume *v = &d->volume;
     double from = fabs(low - v->bias), to = fabs(low + span - v->bias);
-    if (!isogi_dvr__float_classes(scale) || !(fabs(v->scale) > 1e-30 && fabs(v->scale) < 1e30 && from < 1e37 && to < 1e37)) return 0;
+    if (!isogi_dvr__float_classes(d, scale) || !(fabs(v->scale) > 1e-30 && fabs(v->scale) < 1e30 && from < 1e37 && to < 1e37)) return 0;
+    if (!(fabs((d->range[0] - v->bias) / v->scale) <= ISOGI_DVR__FLOATS)) return 0;
+    if (!(fabs((d->range[1] - v->bias) / v->scale) <= ISOGI_DVR__FLOATS)) return 0;
     return (v->type != ISOGI_F32 && v->type != ISOGI_F64) || !(d->range[0] < d->range[1]) ||
            ISOGI_DVR__TOLD_APART * span >= (from > to ? from : to);
 }
@@ -8233,6 +8243,7 @@ ISOGI_API isogi_result isogi_dvr_tets_render(const isogi_tets *tets, const isogi
 #undef ISOGI_DVR__APART
 #undef ISOGI_DVR__LEAP
 #undef ISOGI_DVR__MARKED
+#undef ISOGI_DVR__FLOATS
 #undef ISOGI_DVR__VECTORS
 #undef ISOGI_DVR__V
 #undef ISOGI_DVR__C

@@ -60,7 +60,7 @@
      Normal                 of the smoothed (B-spline) or the trilinear field there, desc.normals, towards lower values. In a plane of
                             the voxels' lattice, the mean of the trilinear ones of all cells that touch the place; this, or that of
                             one of the cells, also where the smoothed gradient vanishes (sheets and rods one voxel thick, whose
-                            texels then have the light of one side).
+                            texels then have the light of one side) or reads voxels that are not finite.
      Start of rays          desc.offset voxels along the normal; where the trilinear field is still inside there, twice and four times
                             as far, up to one voxel; where that fails, on the surface itself, directions mirrored as at hits (within a cell
                             about its trilinear normal, if the other one points into matter). A ray that goes into matter all the same
@@ -68,7 +68,7 @@
                             whether they are hidden is asked from the start of rays.
      Validity               A texel is left out of every lookup where no surface passes at its place: none of the voxels of the cells
                             around it is lower than v (constant air, local minima: there f >= v all around, such a texel would see the
-                            sky through everything) or not finite, or where all gradients vanish in them. With desc.capped
+                            sky through everything), where the field is not finite, or where all gradients vanish. With desc.capped
                             the border's texels, which face out of the box, are always valid on the low side. On the high side a texel
                             needs matter to look through: one of the places a quarter, half and a whole voxel into the matter must
                             be inside (local maxima have none).
@@ -547,8 +547,8 @@ ISOGI_API size_t isogi_trace_memory(const isogi_trace *trace); /* bytes that the
 #define ISOGI_TRACE__ESCAPED 0xffffffffu /* in place of the number of a probe */
 #define ISOGI_TRACE__FLUSH 256     /* rays in one call */
 #define ISOGI_TRACE__SWEEP 256     /* nodes in a task that traces no rays, */
-#define ISOGI_TRACE__PASSED 1024   /* probes in one of a pass, */
-#define ISOGI_TRACE__STRANDS 8     /* tasks that divide among them what is known of probes; a power of two */
+#define ISOGI_TRACE__PASSED 1024   /* probes in one of a pass; divides SPANS, */
+#define ISOGI_TRACE__STRANDS 8     /* tasks that divide among them what is known of probes; divides CHUNK, a power of two */
 #define ISOGI_TRACE__PIECE 65536   /* rays that take as long as what is done without any before progress is told of, */
 #define ISOGI_TRACE__PLACING 1.5   /* samples that take as long as finding where a texel lies, */
 #define ISOGI_TRACE__CARRYING 3.0  /* as what each level takes beside its texels' rays; for progress alone */

@@ -1588,15 +1588,15 @@ static isogi_result isogi_vol__bound_blocks(isogi_vol__build_job *job, const iso
     size_t i;
     job->range = (double(*)[2])isogi_allocate(&p->context, tasks, sizeof *job->range);
     job->broken = (size_t *)isogi_allocate(&p->context, tasks, sizeof *job->broken);
-    if (job->range && job->broken) result = isogi_parallel(context, tasks, isogi_vol__build_task, job, 0, 0.5);
+    if (job->range && job->broken) result = isogi_parallel(context, tasks, isogi_vol__build_task, job, 0, 0.45);
     if (result == ISOGI_OK) {
         range[0] = DBL_MAX, range[1] = -DBL_MAX, *broken = 0;
         for (i = 0; i < tasks; i++) {
             range[0] = isogi_vol__min(range[0], job->range[i][0]), range[1] = isogi_vol__max(range[1], job->range[i][1]);
             *broken += job->broken[i];
         }
-        result = isogi_parallel(context, isogi_vol__gathering_tasks(job), isogi_vol__level_task, job, 0.5, 0.5);
-        isogi_vol__build_level(p, 2, job->first, job->last, 0, 1);
+        result = isogi_parallel(context, isogi_vol__gathering_tasks(job), isogi_vol__level_task, job, 0.45, 0.5);
+        if (result == ISOGI_OK) isogi_vol__build_level(p, 2, job->first, job->last, 0, 1);
     }
     isogi_release(&p->context, job->range, tasks, sizeof *job->range);
     isogi_release(&p->context, job->broken, tasks, sizeof *job->broken);
@@ -1989,10 +1989,10 @@ static void isogi_vol__nodes_task(void *arg, size_t task) {
 static isogi_result isogi_vol__fill_nodes(isogi_vol__build_job *job, const isogi_context *context) {
     const isogi_pyramid *p = job->pyramid;
     const size_t tasks = p->volume.compact ? 0 : job->last[2] - job->first[2] + 1;
-    isogi_result result = isogi_parallel(context, tasks, isogi_vol__build_leaves, job, 0.5, 1);
+    const double leaves = p->volume.compact ? 0.5 : 0.95; /* when they are done */
+    isogi_result result = isogi_parallel(context, tasks, isogi_vol__build_leaves, job, 0.5, leaves);
     int n;
-    if (result == ISOGI_OK && p->node_levels > 1)
-        result = isogi_parallel(context, isogi_vol__gathering_tasks(job), isogi_vol__nodes_task, job, 1, 1);
+    if (result == ISOGI_OK) result = isogi_parallel(context, isogi_vol__gathering_tasks(job), isogi_vol__nodes_task, job, leaves, 1);
     for (n = 2; n < p->node_levels && result == ISOGI_OK; n++) isogi_vol__build_node_level(job, n, 0, 1);
     return result;
 }
@@ -2080,8 +2080,8 @@ static isogi_result isogi_vol__build_nodes(isogi_pyramid *p) {
     p->fast = isogi_vol__plan_nodes(p, &job);
     result = p->fast ? isogi_vol__reserve_nodes(p) : ISOGI_OK;
     if (result == ISOGI_OK && p->fast) result = isogi_vol__fill_nodes(&job, &p->context);
-    if (result != ISOGI_OK || (p->fast && !p->volume.compact)) return result;
-    return isogi_vol__report(&p->context, 0.5, 1, 1, 1) ? ISOGI_CANCELLED : ISOGI_OK; /* without leaves all is done */
+    if (result != ISOGI_OK || p->fast) return result;
+    return isogi_vol__report(&p->context, 0.5, 1, 1, 1) ? ISOGI_CANCELLED : ISOGI_OK; /* without nodes all is done */
 }
 
 ISOGI_API isogi_result isogi_vol_build(isogi_pyramid **pyramid, const isogi_volume *volume, const isogi_context *context) {
@@ -2208,7 +2208,7 @@ static int isogi_vol__is_empty(const isogi_pyramid *p) {
 static void isogi_vol__renew_nodes(isogi_pyramid *p, const isogi_vol__build_job *changed, const isogi_context *context, int same_unit) {
     isogi_context whole = p->context;
     isogi_vol__build_job job;
-    whole.progress = NULL;
+    whole.progress = NULL, whole.thread_pool = context->thread_pool;
     p->fast = isogi_vol__plan_nodes(p, &job);
     if (!p->fast) return;
     if (same_unit) memcpy(job.first, changed->first, sizeof job.first), memcpy(job.last, changed->last, sizeof job.last);
@@ -2233,6 +2233,7 @@ ISOGI_API isogi_result isogi_vol_update(isogi_pyramid *pyramid, const size_t fir
     isogi_vol__build_job job;
     isogi_vol__before before;
     isogi_context context;
+    isogi_thread_pool *pool;
     isogi_result result = ISOGI_OK;
     double changed[2], range[2];
     size_t broken;
@@ -2246,13 +2247,17 @@ ISOGI_API isogi_result isogi_vol_update(isogi_pyramid *pyramid, const size_t fir
     was_fast = p->fast, was_empty = isogi_vol__is_empty(p);
     memcpy(range, p->range, sizeof range);
     if (!p->nodes && isogi_vol__may_be_fast(p)) result = isogi_vol__reserve_nodes(p);
-    if (result == ISOGI_OK) result = isogi_vol__bound_blocks(&job, &context, changed, &broken);
     if (result != ISOGI_OK) return result;
-    p->broken_count = p->broken_count - before.broken + broken, p->all_finite = !p->broken_count;
-    isogi_vol__renew_range(p, &before, changed, was_empty, &blocks);
-    isogi_vol__renew_nodes(p, &job, &context, was_fast && !memcmp(range, p->range, sizeof range));
-    if (counters) counters->blocks += blocks;
-    return ISOGI_OK;
+    pool = isogi_thread_pool_begin(&context);
+    result = isogi_vol__bound_blocks(&job, &context, changed, &broken);
+    if (result == ISOGI_OK) {
+        p->broken_count = p->broken_count - before.broken + broken, p->all_finite = !p->broken_count;
+        isogi_vol__renew_range(p, &before, changed, was_empty, &blocks);
+        isogi_vol__renew_nodes(p, &job, &context, was_fast && !memcmp(range, p->range, sizeof range));
+        if (counters) counters->blocks += blocks;
+    }
+    isogi_thread_pool_end(&context, pool);
+    return result;
 }
 
 ISOGI_API void isogi_vol_free(isogi_pyramid *pyramid) {

@@ -250,6 +250,37 @@ TEST(values_of_any_scale_look_alike) {
     }
 }
 
+/* A value far beyond the transfer function's last point is classified as that point, also where no float holds it. */
+TEST(voxels_beyond_floats_are_matter_like_others) {
+    static const double big[] = {2, 1e30, 1e37, 3.4028234663852886e38, 1e39, 1e100, 8e307};
+    static const isogi_transfer_point p[2] = {{0.2, {1, 0.5f, 0.2f}, 0}, {0.7, {0.4f, 1, 0.2f}, 2}};
+    const isogi_transfer transfer = {p, 2, NULL, 0};
+    const double eye[3] = {12, 8, 60}, target[3] = {12, 8, 8};
+    const float place[1][3] = {{4, 8, 8}};
+    double first[4] = {0};
+    for (int k = 0; k < 7; k++) {
+        field f = field_new(17, 17, 17);
+        for (int i = 0; i < 17 * 17 * 17; i++) f.value[i] = i % 17 > 8 ? big[k] : 0;
+        field_build(&f);
+        for (int way = 0; way < 4; way++) {
+            isogi_dvr_desc desc = {.pyramid = f.pyramid, .unit = 1, .grid = {5, 5, 5}, .directions = 64, .reduction = 1};
+            float v[1][9] = {{0}};
+            double seen;
+            desc.shading = way ? ISOGI_DVR_VISIBILITY : ISOGI_DVR_UNLIT, desc.method = (isogi_dvr_method)way;
+            isogi_dvr *dvr = dvr_new(&desc, &transfer);
+            CHECK(isogi_dvr_step(dvr, 0, NULL) == ISOGI_OK, "step");
+            if (way) CHECK(isogi_dvr_sample_visibility(dvr, place, 1, v[0]) == ISOGI_OK, "visibility");
+            seen = way ? (double)v[0][0] : (double)cast(dvr, eye, target, NULL).c[3];
+            if (!k) first[way] = seen;
+            CHECK(fabs(seen - first[way]) < (way ? 0.3 : 0.001) && seen > 0.5 && seen < 2.9, "value %g, %d: %g, not %g", big[k], way, seen,
+                  first[way]);
+            printf("    value %g, %d: %.4f\n", big[k], way, seen);
+            isogi_dvr_free(dvr);
+        }
+        field_free(&f);
+    }
+}
+
 /* As everywhere, numbers that stand for no path are the best one. */
 TEST(paths_of_other_numbers_are_the_best) {
     field f = field_waves(20, 5);

@@ -1,8 +1,9 @@
-/* What more threads bring: every call that divides its work, on 1, 2, 4 ... threads up to the number of cores.
+/* What more threads bring: calls that divide their work, on 1, 2, 4 ... threads up to the number of cores.
 
        build/bench/bench_threads [--quick] OUT.csv
 
-   Wall seconds, the best of three runs, all numbers of threads in turn. Error: 0 where the result is the bits of one thread, else 1.
+   Wall seconds, the best of three runs, all numbers of threads in turn; "visibility" with a renderer and its transfer function, which
+   "transfer-function" is alone. Error: 0 where the result is the bits of one thread, else 1.
    Work, in items of the call; the table at the end says how many times as fast as one thread. The gyroid at 256^3 floats and the
    scene engine-block with 128 voxels along its longest side; --quick: both with 64. */
 #define ISOGI_IMPLEMENTATION
@@ -40,10 +41,9 @@ static void must(isogi_result result, const char *what) {
     exit(1);
 }
 
-/* FNV-1a of what a call brought. */
-static uint64_t hash_of(const void *data, size_t size) {
+/* FNV-1a of what a call brought, after what it brought before. */
+static uint64_t hash_of(uint64_t hash, const void *data, size_t size) {
     const unsigned char *bytes = (const unsigned char *)data;
-    uint64_t hash = 0xcbf29ce484222325u;
     for (size_t i = 0; i < size; i++) hash = (hash ^ bytes[i]) * 0x100000001b3u;
     return hash;
 }
@@ -67,12 +67,18 @@ static double voxels(const isogi_volume *v) { return (double)v->size[0] * (doubl
 static outcome pyramid(const isogi_context *context) {
     isogi_pyramid *p = NULL;
     outcome o = {-wall_seconds(), voxels(&gyroid), 0};
-    isogi_ray ray = {.origin = {-3, -2.5, -2}, .dir = {3, 2.5f, 2.1f}};
-    isogi_hit hit = {0};
     must(isogi_vol_build(&p, &gyroid, context), "pyramid");
     o.seconds += wall_seconds();
-    isogi_vol_intersect(p, &ray, 1, &hit, NULL);
-    o.hash = hash_of(&hit.t, sizeof hit.t);
+    for (int n = 0; n < 3; n++) {
+        const isogi_level level = isogi_vol_level(p, n);
+        o.hash = hash_of(o.hash, level.range, level.size[0] * level.size[1] * level.size[2] * sizeof *level.range);
+    }
+    for (int i = 0; i < 4096; i++) { /* what rays read has no call */
+        const isogi_ray ray = {.origin = {-3, -3, -2}, .dir = {3, 2 + (float)(i % 64) / 32, 1 + (float)(i / 64) / 32}};
+        isogi_hit hit = {0};
+        isogi_vol_intersect(p, &ray, 1, &hit, NULL);
+        o.hash = hash_of(o.hash, &hit.t, sizeof hit.t);
+    }
     isogi_vol_free(p);
     return o;
 }
@@ -86,7 +92,7 @@ static outcome prefilter(const isogi_context *context) {
         memset(coefficients, 0, count * sizeof *coefficients);
     o.seconds -= wall_seconds();
     must(isogi_vol_prefilter(&gyroid, coefficients, context), "prefilter");
-    o.seconds += wall_seconds(), o.hash = hash_of(coefficients, count * sizeof *coefficients);
+    o.seconds += wall_seconds(), o.hash = hash_of(0, coefficients, count * sizeof *coefficients);
     return o;
 }
 
@@ -99,8 +105,9 @@ static outcome mesh_normals(const isogi_context *context) {
     o.seconds -= wall_seconds();
     must(isogi_vol_mesh(p, &desc, &kept), "mesh");
     o.seconds += wall_seconds();
-    o.hash = hash_of(kept.positions, kept.vertex_count * sizeof *kept.positions) ^
-             hash_of(kept.triangles, kept.triangle_count * sizeof *kept.triangles);
+    o.hash = hash_of(0, kept.positions, kept.vertex_count * sizeof *kept.positions);
+    o.hash = hash_of(o.hash, kept.normals, kept.vertex_count * sizeof *kept.normals);
+    o.hash = hash_of(o.hash, kept.triangles, kept.triangle_count * sizeof *kept.triangles);
     isogi_vol_free(p);
     return o;
 }
@@ -129,7 +136,7 @@ static outcome baked(isogi_trace_desc desc, const isogi_context *context) {
     o.seconds += wall_seconds();
     if (desc.mode == ISOGI_TRACE_TRANSFER) must(isogi_trace_relight(trace, &day), "relight");
     isogi_trace_sample(trace, (const float(*)[3])mesh.positions, mesh.vertex_count, light, NULL);
-    o.hash = hash_of(light, mesh.vertex_count * sizeof *light);
+    o.hash = hash_of(0, light, mesh.vertex_count * sizeof *light);
     isogi_trace_counters(trace, &counters), o.work = (double)counters.texels;
     isogi_trace_free(trace), free(light);
     return o;
@@ -159,13 +166,14 @@ static outcome gather(const isogi_context *context) {
     must(isogi_trace_gather(&desc, (const float(*)[3])mesh.positions, (const float(*)[3])mesh.normals, count, light, NULL,
                             context),
          "gather");
-    o.seconds += wall_seconds(), o.hash = hash_of(light, count * sizeof *light);
+    o.seconds += wall_seconds(), o.hash = hash_of(0, light, count * sizeof *light);
     free(light);
     return o;
 }
 
-/* Sheets of the gyroid in fog; the shading decides whether visibility or a frame is measured. */
-static outcome rendered(isogi_dvr_space space, isogi_dvr_shading shading, int frame, const isogi_context *context) {
+/* Sheets of the gyroid in fog. */
+enum { VISIBILITY, TRANSFER, FRAME };
+static outcome rendered(isogi_dvr_space space, isogi_dvr_shading shading, int part, const isogi_context *context) {
     static const isogi_transfer_point points[4] = {{-1.5, {0.2f, 0.3f, 0.9f}, 0.05f},
                                                    {-0.1, {0.9f, 0.8f, 0.6f}, 0.05f},
                                                    {0, {0.9f, 0.8f, 0.6f}, 30},
@@ -178,26 +186,29 @@ static outcome rendered(isogi_dvr_space space, isogi_dvr_shading shading, int fr
     outcome o = {-wall_seconds(), 0, 0};
     isogi_counters counters = {0};
     must(isogi_dvr_create(&dvr, &desc, context), "create");
+    if (part == TRANSFER) o.seconds = -wall_seconds();
     must(isogi_dvr_set_transfer(dvr, &transfer), "transfer function");
+    if (part == TRANSFER) o.seconds += wall_seconds();
     must(isogi_dvr_step(dvr, 0, NULL), "visibility");
-    if (frame) o.seconds = -wall_seconds();
-    else o.seconds += wall_seconds();
+    if (part == VISIBILITY) o.seconds += wall_seconds();
+    if (part == FRAME) o.seconds = -wall_seconds();
     must(isogi_dvr_render(dvr, &view, &day, image, NULL, &counters), "frame");
-    if (frame) o.seconds += wall_seconds();
-    o.work = frame ? (double)PICTURE * PICTURE : 64 * pow(ceil((double)gyroid.size[0] / 4), 3);
-    o.hash = hash_of(image, sizeof image);
+    if (part == FRAME) o.seconds += wall_seconds();
+    o.work = part == FRAME ? (double)PICTURE * PICTURE : part == TRANSFER ? voxels(&gyroid) : 64 * pow(ceil((double)gyroid.size[0] / 4), 3);
+    o.hash = hash_of(0, image, sizeof image);
     isogi_dvr_free(dvr);
     return o;
 }
 
 static outcome visibility(const isogi_context *context) {
-    return rendered(ISOGI_DVR_PHYSICAL, ISOGI_DVR_VISIBILITY, 0, context);
+    return rendered(ISOGI_DVR_PHYSICAL, ISOGI_DVR_VISIBILITY, VISIBILITY, context);
 }
+static outcome transfer_function(const isogi_context *context) { return rendered(ISOGI_DVR_PHYSICAL, ISOGI_DVR_UNLIT, TRANSFER, context); }
 static outcome frame_lit(const isogi_context *context) {
-    return rendered(ISOGI_DVR_PHYSICAL, ISOGI_DVR_VISIBILITY, 1, context);
+    return rendered(ISOGI_DVR_PHYSICAL, ISOGI_DVR_VISIBILITY, FRAME, context);
 }
-static outcome frame_unlit(const isogi_context *context) { return rendered(ISOGI_DVR_PHYSICAL, ISOGI_DVR_UNLIT, 1, context); }
-static outcome frame_data(const isogi_context *context) { return rendered(ISOGI_DVR_DATA, ISOGI_DVR_UNLIT, 1, context); }
+static outcome frame_unlit(const isogi_context *context) { return rendered(ISOGI_DVR_PHYSICAL, ISOGI_DVR_UNLIT, FRAME, context); }
+static outcome frame_data(const isogi_context *context) { return rendered(ISOGI_DVR_DATA, ISOGI_DVR_UNLIT, FRAME, context); }
 
 static const struct call {
     const char *header, *name, *unit;
@@ -212,7 +223,8 @@ static const struct call {
              {"isogi_trace.h", "bake-paths", "texels", bake_paths},
              {"isogi_trace.h", "gather", "points", gather},
              {"isogi_dvr.h", "visibility", "rays", visibility},
-             {"isogi_dvr.h", "frame-lit", "pixels", frame_lit},
+             {"isogi_dvr.h", "transfer-function", "voxels", transfer_function},
+            {"isogi_dvr.h", "frame-lit", "pixels", frame_lit},
              {"isogi_dvr.h", "frame-unlit", "pixels", frame_unlit},
              {"isogi_dvr.h", "frame-scale-invariant", "pixels", frame_data}};
 
