@@ -4092,13 +4092,15 @@ static size_t isogi_trace__heads_use(isogi_trace__set *s) {
 /* The chains of chunk `last` at first .. end - 1 take over, in their order, what is theirs by the next bit of the key. So no step has to
    find a new place for all; and what a chain passes on stays at the same place within a chunk. */
 static void isogi_trace__heads_new(const isogi_trace__set *s, size_t last, size_t first, size_t end) {
-    uint32_t *heads = s->chunks[last].heads;
+    uint32_t *heads = s->chunks[last].heads, *old;
     size_t from = 1, i;
     memset(heads + first, 0, (end - first) * sizeof *heads);
+    if (!last) return;
     while (2 * from <= last) from *= 2;
-    for (i = first; i < end && last; i++) {
-        uint32_t *stay = &s->chunks[last - from].heads[i], *go = &heads[i], probe = *stay;
-        if (i + 8 < end && stay[8]) ISOGI_TRACE__AHEAD(isogi_trace__link_at(s, stay[8] - 1));
+    old = s->chunks[last - from].heads;
+    for (i = first; i < end; i++) {
+        uint32_t *stay = &old[i], *go = &heads[i], probe = *stay;
+        if (i + 8 < end && old[i + 8]) ISOGI_TRACE__AHEAD(isogi_trace__link_at(s, old[i + 8] - 1));
         while (probe) {
             isogi_trace__link *link = isogi_trace__link_at(s, probe - 1);
             if (link->tag / ISOGI_TRACE__CHUNK & from) *go = probe, go = &link->next;
