@@ -218,6 +218,22 @@ TEST(glaring_colours_are_refused_or_clamped) {
     field_free(&f);
 }
 
+/* What the centre of a picture from far along z (way 0) or the mean visibility at a place (else: a method) says of a field. */
+static double seen_by(int way, const field *f, const isogi_transfer *transfer, double unit, size_t grid, const float place[1][3],
+                      const double target[3]) {
+    const double eye[3] = {target[0], target[1], target[2] + 50};
+    const isogi_dvr_desc desc = {.pyramid = f->pyramid, .shading = way ? ISOGI_DVR_VISIBILITY : ISOGI_DVR_UNLIT, .unit = unit,
+        .method = (isogi_dvr_method)way, .grid = {grid, grid, grid}, .directions = 64, .reduction = 1};
+    isogi_dvr *dvr = dvr_new(&desc, transfer);
+    float v[1][9] = {{0}};
+    double seen;
+    CHECK(isogi_dvr_step(dvr, 0, NULL) == ISOGI_OK, "step");
+    if (way) CHECK(isogi_dvr_sample_visibility(dvr, place, 1, v[0]) == ISOGI_OK, "visibility");
+    seen = way ? (double)v[0][0] : (double)cast(dvr, eye, target, NULL).c[3];
+    isogi_dvr_free(dvr);
+    return seen;
+}
+
 /* Pictures and visibility depend on values only by way of the transfer function: the same at any scale of both, by every method. */
 TEST(values_of_any_scale_look_alike) {
     static const double scales[] = {1, 1e-23, 1e-28, 1e-40, 1e-150, 1e-299, 1e23, 1e32, 1e39, 1e150, 1e299};
@@ -225,26 +241,18 @@ TEST(values_of_any_scale_look_alike) {
     for (int k = 0; k < 11; k++) {
         isogi_transfer_point p[3] = {{0.2, {1, 0.5f, 0.2f}, 0}, {0.7, {0.4f, 1, 0.2f}, 2}, {1, {0.1f, 0.2f, 1}, 3}};
         const isogi_transfer transfer = {p, 3, NULL, 0};
-        const double eye[3] = {4, 5, 20}, target[3] = {4, 5, 4};
+        const double target[3] = {4, 5, 4};
         const float place[1][3] = {{4, 4, 4}};
         field f = field_new(9, 9, 9);
         for (int i = 0; i < 729; i++) f.value[i] = (i % 9 + i / 9 % 9) / 16.0 * scales[k];
         for (int i = 0; i < 3; i++) p[i].value *= scales[k];
         field_build(&f);
         for (int way = 0; way < 4; way++) {
-            isogi_dvr_desc desc = {.pyramid = f.pyramid, .unit = 4, .grid = {3, 3, 3}, .directions = 64, .reduction = 1};
-            float v[1][9] = {{0}};
-            double seen;
-            desc.shading = way ? ISOGI_DVR_VISIBILITY : ISOGI_DVR_UNLIT, desc.method = (isogi_dvr_method)way;
-            isogi_dvr *dvr = dvr_new(&desc, &transfer);
-            CHECK(isogi_dvr_step(dvr, 0, NULL) == ISOGI_OK, "step");
-            if (way) CHECK(isogi_dvr_sample_visibility(dvr, place, 1, v[0]) == ISOGI_OK, "visibility");
-            seen = way ? (double)v[0][0] : (double)cast(dvr, eye, target, NULL).c[3];
+            const double seen = seen_by(way, &f, &transfer, 4, 3, place, target);
             if (!k) first[way] = seen;
             CHECK(fabs(seen - first[way]) < (way ? 0.2 : 0.004) && seen > 0.2 && seen < 3.2, "scale %g, %d: %g, not %g", scales[k], way,
                   seen, first[way]);
             if (way < 2 || k < 1) printf("    scale %g, %d: %.4f\n", scales[k], way, seen);
-            isogi_dvr_free(dvr);
         }
         field_free(&f);
     }
@@ -255,7 +263,7 @@ TEST(voxels_beyond_floats_are_matter_like_others) {
     static const double big[] = {2, 1e30, 1e37, 3.4028234663852886e38, 1e39, 1e100, 8e307};
     static const isogi_transfer_point p[2] = {{0.2, {1, 0.5f, 0.2f}, 0}, {0.7, {0.4f, 1, 0.2f}, 2}};
     const isogi_transfer transfer = {p, 2, NULL, 0};
-    const double eye[3] = {12, 8, 60}, target[3] = {12, 8, 8};
+    const double target[3] = {12, 8, 8};
     const float place[1][3] = {{4, 8, 8}};
     double first[4] = {0};
     for (int k = 0; k < 7; k++) {
@@ -263,19 +271,11 @@ TEST(voxels_beyond_floats_are_matter_like_others) {
         for (int i = 0; i < 17 * 17 * 17; i++) f.value[i] = i % 17 > 8 ? big[k] : 0;
         field_build(&f);
         for (int way = 0; way < 4; way++) {
-            isogi_dvr_desc desc = {.pyramid = f.pyramid, .unit = 1, .grid = {5, 5, 5}, .directions = 64, .reduction = 1};
-            float v[1][9] = {{0}};
-            double seen;
-            desc.shading = way ? ISOGI_DVR_VISIBILITY : ISOGI_DVR_UNLIT, desc.method = (isogi_dvr_method)way;
-            isogi_dvr *dvr = dvr_new(&desc, &transfer);
-            CHECK(isogi_dvr_step(dvr, 0, NULL) == ISOGI_OK, "step");
-            if (way) CHECK(isogi_dvr_sample_visibility(dvr, place, 1, v[0]) == ISOGI_OK, "visibility");
-            seen = way ? (double)v[0][0] : (double)cast(dvr, eye, target, NULL).c[3];
+            const double seen = seen_by(way, &f, &transfer, 1, 5, place, target);
             if (!k) first[way] = seen;
             CHECK(fabs(seen - first[way]) < (way ? 0.3 : 0.001) && seen > 0.5 && seen < 2.9, "value %g, %d: %g, not %g", big[k], way, seen,
                   first[way]);
             printf("    value %g, %d: %.4f\n", big[k], way, seen);
-            isogi_dvr_free(dvr);
         }
         field_free(&f);
     }
