@@ -204,10 +204,11 @@
    with -ffast-math pictures differ by roundings, and values must lie within 8e307.
 
    Samples stand at the middle of pieces of equal length, counted from where the ray enters the box (or from the eye inside it);
-   the last piece is what is left. Blocks of the pyramid in which the transfer function has no extinction are stepped over, largest
-   first; the samples elsewhere stay where they are, so pictures are the same bits as without stepping over. In data space a block of
-   one value, or one whose values meet neither extinction nor peak, is empty too. A block in which all values have one extinction and one
-   colour is passed in one piece by brute-force visibility rays and by post-classified unlit ones (if all voxels are finite).
+   the last piece is what is left up to where the ray leaves the box, is cut by a clip plane or ends at geometry (isogi_view.until).
+   Blocks of the pyramid in which the transfer function has no extinction are stepped over, largest first; the samples elsewhere stay where
+   they are, so pictures are the same bits as without stepping over. In data space a block of one value, or one whose values meet neither
+   extinction nor peak, is empty too. A block in which all values have one extinction and one colour is passed in one piece by brute-force
+   visibility rays and by post-classified unlit ones (if all voxels are finite).
 
    Limits
 
@@ -392,6 +393,10 @@ typedef struct isogi_view {
     int local;                      /* 0, or 1: shade by local visibility, for cut planes, and lights within. ISOGI_INVALID where the
                                        paper's method is not at work (another method, peaks, data space, unlit, tetrahedra) */
     isogi_depth_kind depth;         /* what is asked for where depth is */
+    const float *until;             /* [height*width], borrowed for the call: how far from the eye each pixel's ray ends, by opaque geometry
+                                       that stands there; INFINITY where there is none, 0 or less where nothing is to be seen; NULL = no
+                                       geometry. From a rasterizer's depth z along the line of sight: z / (dir . forward). Put the picture
+                                       over that of the geometry as over a background. The geometry throws no shadow */
 } isogi_view;
 
 /* The ray through the centre of pixel (x, y); fractions are allowed: pixel x covers x-1/2 .. x+1/2. dir is a unit vector.
@@ -602,6 +607,7 @@ typedef int32_t isogi_dvr__four_ints __attribute__((vector_size(16), aligned(4),
 /* A ray within the volume, in grid coordinates; sample i stands at origin + i * dir. */
 typedef struct isogi_dvr__fast_ray {
     float origin[3], dir[3], piece, last_piece; /* world length over unit from sample to sample */
+    float end;                                  /* where the last piece ends, in samples: there its last sample is */
     float sought;                               /* optical depth whose place is looked for */
     float reach;                                /* as isogi_dvr__reach_along, in samples */
     double enter;                               /* world length from the eye to the first sample */
@@ -689,6 +695,12 @@ static int isogi_dvr__finite32(float x) {
     uint32_t bits;
     memcpy(&bits, &x, sizeof bits);
     return (bits & 0x7f800000u) != 0x7f800000u;
+}
+
+static int isogi_dvr__nan32(float x) {
+    uint32_t bits;
+    memcpy(&bits, &x, sizeof bits);
+    return (bits & 0x7fffffffu) > 0x7f800000u;
 }
 
 static int isogi_dvr__finite3(const float v[3]) {
@@ -2888,6 +2900,7 @@ typedef struct isogi_dvr__march {
     double piece, scale;      /* t of one piece; optical depth per (extinction * t) in physical space, 1 in data space */
     double shift;             /* pieces by which all of them begin early: the first is cut by the entry */
     int unlit;                /* blocks in which nothing changes may be passed in one piece */
+    int cut;                  /* the ray may end within the box */
     uint64_t next, count;     /* pieces */
     int cell[3], known[3];    /* the cell in `corner`; the smallest block known not to be empty */
     double corner[8], low, high;
@@ -2919,9 +2932,9 @@ static int isogi_dvr__clipped(const isogi_dvr *d, const double origin[3], const 
     return span[0] < span[1] && span[1] < 1e300;
 }
 
-/* The part of a ray within the box and the clip planes, in t; 0 if there is none. */
-static int isogi_dvr__inside(const isogi_dvr *d, const double origin[3], const double dir[3], double span[2]) {
-    double enter = 0, leave = 1e300;
+/* The part of a ray up to `leave` that is within the box and the clip planes, in t; 0 if there is none. */
+static int isogi_dvr__inside(const isogi_dvr *d, const double origin[3], const double dir[3], double leave, double span[2]) {
+    double enter = 0;
     int a;
     for (a = 0; a < 3; a++) {
         double size = d->cells[a], t0, t1, swap;
@@ -2939,14 +2952,15 @@ static int isogi_dvr__inside(const isogi_dvr *d, const double origin[3], const d
     return isogi_dvr__clipped(d, origin, dir, span);
 }
 
-/* 0 if the ray misses the box. `origin` and `dir` in grid space, `world` = length of dir in the world, `step` in voxels. */
+/* 0 if the ray misses the box, or ends before it. `origin` and `dir` in grid space, `world` = length of dir in the world, `until` there,
+   `step` in voxels. */
 static int isogi_dvr__begin(isogi_dvr__march *m, const isogi_dvr *d, const double origin[3], const double dir[3], double world,
-                            double step) {
+                            double until, double step) {
     double span[2], pieces;
     int a;
     memset(m, 0, sizeof *m);
-    if (!isogi_dvr__inside(d, origin, dir, span)) return 0;
-    m->dvr = d, m->enter = span[0], m->length = span[1] - span[0];
+    if (!isogi_dvr__inside(d, origin, dir, until / world, span)) return 0;
+    m->dvr = d, m->enter = span[0], m->length = span[1] - span[0], m->cut = d->clip_count || !(span[1] < until / world);
     for (a = 0; a < 3; a++) {
         m->dir[a] = dir[a];
         m->origin[a] = isogi_dvr__clamp(origin[a] + span[0] * dir[a], d->cells[a]);
@@ -3417,11 +3431,11 @@ typedef struct isogi_dvr__crossings {
 } isogi_dvr__crossings;
 
 static void isogi_dvr__begin_crossings(isogi_dvr__crossings *c, const isogi_dvr *d, const double origin[3], const float dir[3],
-                                       double enter, double length) {
+                                       const isogi_dvr__march *m) {
     isogi_ray ray;
     size_t i;
     int a;
-    c->dvr = d, c->shift = -enter, c->end = d->clip_count ? length : 1e300, c->count = d->transfer.peak_count, c->left = 1;
+    c->dvr = d, c->shift = -m->enter, c->end = m->cut ? m->length : 1e300, c->count = d->transfer.peak_count, c->left = 1;
     memset(&c->work, 0, sizeof c->work);
     if (!c->count) return;
     memset(&ray, 0, sizeof ray);
@@ -3430,7 +3444,7 @@ static void isogi_dvr__begin_crossings(isogi_dvr__crossings *c, const isogi_dvr 
     for (i = 0; i < c->count; i++) {
         memset(&c->hit[i], 0, sizeof c->hit[i]);
         ray.isovalue = d->transfer.peaks[i].isovalue;
-        if (d->clip_count) ray.tmin = enter;
+        if (d->clip_count) ray.tmin = m->enter;
         if (d->transfer.peaks[i].opacity > 0) isogi_vol_intersect(d->desc.pyramid, &ray, 1, &c->hit[i], &c->work);
         c->t[i] = c->hit[i].side && c->hit[i].t + c->shift <= c->end ? c->hit[i].t + c->shift : 1e300;
     }
@@ -3581,7 +3595,8 @@ static double isogi_dvr__transmittance(const isogi_dvr *d, const double grid[3],
     double depth = 0, clear = 1, limit = -log(ISOGI_DVR__NEGLIGIBLE);
     size_t i;
     work->rays++;
-    if (!isogi_dvr__begin(&march, d, grid, direction, sqrt(isogi_dvr__dot(direction + 3, direction + 3)), d->visibility_step)) return 1;
+    if (!isogi_dvr__begin(&march, d, grid, direction, sqrt(isogi_dvr__dot(direction + 3, direction + 3)), 1e300, d->visibility_step))
+        return 1;
     march.unlit = 1;
     if (isogi_dvr__by_value(d)) {
         clear = isogi_dvr__clear_of_values(&march);
@@ -3590,7 +3605,7 @@ static double isogi_dvr__transmittance(const isogi_dvr *d, const double grid[3],
     }
     if (d->transfer.peak_count) {
         float dir[3] = {(float)direction[3], (float)direction[4], (float)direction[5]};
-        isogi_dvr__begin_crossings(crossings, d, world, dir, march.enter, march.length);
+        isogi_dvr__begin_crossings(crossings, d, world, dir, &march);
         while (clear > ISOGI_DVR__NEGLIGIBLE && (i = isogi_dvr__first_crossing(crossings, 1e300)) < crossings->count) {
             clear *= 1 - (double)d->transfer.peaks[i].opacity;
             isogi_dvr__pass_crossing(crossings, i);
@@ -6273,9 +6288,10 @@ static void isogi_dvr__fast_classes(const isogi_dvr__frame *f, const isogi_dvr__
     int i, a, k;
     for (i = 0; i < ISOGI_DVR__NODES; i++) {
         const char *p = (const char *)v->data;
-        float u[3], corner[8], value;
+        float u[3], corner[8], value, at = run->first + run->stride * (float)i;
+        at = at < r->end ? at : r->end;
         for (a = 0; a < 3; a++) {
-            float x = r->origin[a] + (run->first + run->stride * (float)i) * r->dir[a];
+            float x = r->origin[a] + at * r->dir[a];
             int c;
             x = x > 0 ? x : 0, x = x < (float)f->dvr->cells[a] ? x : (float)f->dvr->cells[a];
             c = (int)x, c = c < f->dvr->cells[a] ? c : f->dvr->cells[a] - 1;
@@ -6469,8 +6485,9 @@ static void isogi_dvr__fast_divide(const isogi_dvr__frame *f, const isogi_dvr__f
     const uint8_t first = 0;
     isogi_dvr__fast_run part;
     memset(&part, 0, sizeof part);
-    part.pieces = ISOGI_DVR__NODES - 1, part.first = run->first + run->stride * (float)k, part.stride = run->stride / (float)part.pieces;
+    part.pieces = ISOGI_DVR__NODES - 1, part.first = run->first + run->stride * (float)k;
     part.length = part.last = (k + 1 < run->pieces ? run->length : run->last) / (float)part.pieces;
+    part.stride = part.length / run->length * run->stride;
     part.tolerance = 3e38f;
     work->samples += ISOGI_DVR__NODES - 2;
     f->look(f, r, &part, &first, 1);
@@ -6602,10 +6619,12 @@ typedef struct isogi_dvr__fast_cells {
 
 ISOGI_DVR__AVX2 ISOGI_DVR__ALWAYS void isogi_dvr__run_cells_avx2(const isogi_dvr__frame *f, const isogi_dvr__fast_ray *r,
                                                                  const isogi_dvr__fast_run *run, isogi_dvr__fast_cells *cells) {
-    const __m256 lane = _mm256_fmadd_ps(_mm256_set1_ps(run->stride), _mm256_setr_ps(0, 1, 2, 3, 4, 5, 6, 7), _mm256_set1_ps(run->first));
-    __m256i offset = isogi_dvr__cells_avx2(f, r, lane, 0, cells->u[0]);
-    offset = _mm256_add_epi32(offset, isogi_dvr__cells_avx2(f, r, lane, 1, cells->u[1]));
-    offset = _mm256_add_epi32(offset, isogi_dvr__cells_avx2(f, r, lane, 2, cells->u[2]));
+    __m256 at = _mm256_fmadd_ps(_mm256_set1_ps(run->stride), _mm256_setr_ps(0, 1, 2, 3, 4, 5, 6, 7), _mm256_set1_ps(run->first));
+    __m256i offset;
+    at = _mm256_min_ps(at, _mm256_set1_ps(r->end));
+    offset = isogi_dvr__cells_avx2(f, r, at, 0, cells->u[0]);
+    offset = _mm256_add_epi32(offset, isogi_dvr__cells_avx2(f, r, at, 1, cells->u[1]));
+    offset = _mm256_add_epi32(offset, isogi_dvr__cells_avx2(f, r, at, 2, cells->u[2]));
     _mm256_storeu_si256((__m256i *)(void *)cells->at, offset);
 }
 
@@ -7006,10 +7025,11 @@ static void isogi_dvr__fast_cast(const isogi_dvr__frame *f, const isogi_dvr__fas
     }
 }
 
-/* Of a ray from the eye (grid) along `dir` (grid, of world length 1); 0 if it misses what is kept of the volume. */
-static int isogi_dvr__fast_begin(const isogi_dvr__frame *f, const double origin[3], const double dir[3], isogi_dvr__fast_ray *r) {
+/* Of a ray from the eye (grid) along `dir` (grid, of world length 1) that ends at `until`; 0 if it misses what is kept of the volume. */
+static int isogi_dvr__fast_begin(const isogi_dvr__frame *f, const double origin[3], const double dir[3], double until,
+                                 isogi_dvr__fast_ray *r) {
     const isogi_dvr *d = f->dvr;
-    double span[2] = {0, 1e300}, piece = f->step * d->spacing, pieces, step, sum = 0;
+    double span[2] = {0, until}, piece = f->step * d->spacing, pieces, step, sum = 0;
     int a;
     for (a = 0; a < 3; a++) {
         double inverse = 1 / dir[a], t0 = -origin[a] * inverse, t1 = (d->cells[a] - origin[a]) * inverse;
@@ -7030,7 +7050,7 @@ static int isogi_dvr__fast_begin(const isogi_dvr__frame *f, const double origin[
         step = dir[a] * piece, r->dir[a] = (float)step, step *= (double)d->grid_scale[a], sum += step * step;
     }
     r->enter = span[0], r->sought = 3e38f, r->reach = sum > 1e-30 ? 1.5f / sqrtf((float)sum) : 0;
-    r->piece = f->piece;
+    r->piece = f->piece, r->end = (float)((span[1] - span[0]) * f->per_piece);
     r->last_piece = (float)isogi_dvr__clamp((span[1] - span[0] - (pieces - 1) * piece) * f->per_unit, 1e30);
     return 1;
 }
@@ -7093,11 +7113,21 @@ ISOGI_API void isogi_view_ray(const isogi_view *view, double x, double y, double
 }
 
 static isogi_result isogi_dvr__check_view(const isogi_view *view) {
+    size_t i, pixels;
     if (!view || view->width < 1 || view->height < 1) return ISOGI_INVALID;
     if (view->width > 32768 || view->height > 32768) return ISOGI_TOO_LARGE;
     if (!isogi_dvr__finite3(view->eye) || !isogi_dvr__finite3(view->target) || !isogi_dvr__finite3(view->up)) return ISOGI_INVALID;
     if (!isogi_dvr__finite32(view->fov) || !(view->fov >= 0 && view->fov < 180)) return ISOGI_INVALID;
+    pixels = view->until ? (size_t)view->width * (size_t)view->height : 0;
+    for (i = 0; i < pixels; i++)
+        if (isogi_dvr__nan32(view->until[i])) return ISOGI_INVALID;
     return (unsigned)view->depth > ISOGI_DEPTH_FIRST || (unsigned)view->local > 1 ? ISOGI_INVALID : ISOGI_OK;
+}
+
+/* The distance from the eye at which the ray of a pixel ends. */
+static double isogi_dvr__until(const isogi_view *view, int x, int y) {
+    double until = view->until ? (double)view->until[(size_t)y * (size_t)view->width + (size_t)x] : 1e300;
+    return until < 1e300 ? until : 1e300;
 }
 
 /* The transmittance at whose passing the depth of a pixel is read; below 1 by the least that a double knows. */
@@ -7137,7 +7167,8 @@ static int isogi_dvr__begin_pixel(const isogi_dvr__render_job *job, int x, int y
         ray->dir[a] = rounded, world[a] = (double)ray->dir[a];
     }
     isogi_dvr__transform(d->to_grid, world, dir);
-    if (!isogi_dvr__begin(march, d, job->eye, dir, sqrt(isogi_dvr__dot(world, world)), d->desc.step)) return 0;
+    if (!isogi_dvr__begin(march, d, job->eye, dir, sqrt(isogi_dvr__dot(world, world)), isogi_dvr__until(job->view, x, y),
+                          d->desc.step)) return 0;
     march->silhouette = d->desc.silhouette, march->unlit = d->desc.shading == ISOGI_DVR_UNLIT;
     isogi_dvr__jitter(march, d->desc.jitter, x, y);
     ray->dvr = d, ray->lights = &job->lights, ray->clear = 1, ray->end = 1 - (double)d->desc.opaque;
@@ -7149,7 +7180,7 @@ static void isogi_dvr__cast_pixel(const isogi_dvr__render_job *job, isogi_dvr__p
     double eye[3];
     int a;
     for (a = 0; a < 3; a++) eye[a] = (double)job->view->eye[a];
-    if (!isogi_dvr__by_piece(job->dvr)) isogi_dvr__begin_crossings(crossings, job->dvr, eye, ray->dir, march->enter, march->length);
+    if (!isogi_dvr__by_piece(job->dvr)) isogi_dvr__begin_crossings(crossings, job->dvr, eye, ray->dir, march);
     isogi_dvr__cast(ray, march, crossings);
 }
 
@@ -7247,11 +7278,11 @@ ISOGI_DVR__AVX512 void isogi_dvr__toward_avx512(const isogi_dvr__render_job *job
 
 /* As isogi_dvr__fast_begin of eight rays, without clip planes; others than those that hit have a count of 0. */
 ISOGI_DVR__AVX512 void isogi_dvr__begin_avx512(const isogi_dvr__frame *f, const double origin[3], const double dir[3][8],
-                                               isogi_dvr__fast_ray r[8]) {
+                                               const double until[8], isogi_dvr__fast_ray r[8]) {
     const isogi_dvr *d = f->dvr;
     const __m512d zero = _mm512_setzero_pd(), one = ISOGI_DVR__8(1), piece = ISOGI_DVR__8(f->step * d->spacing);
-    __m512d enter = zero, leave = ISOGI_DVR__8(1e300), sum = zero, pieces, last;
-    float place[3][8], step[3][8], reach[8], end[8];
+    __m512d enter = zero, leave = _mm512_loadu_pd(until), sum = zero, pieces, last;
+    float place[3][8], step[3][8], reach[8], end[8], last_piece[8];
     double begin[8];
     int32_t count[8];
     __mmask8 hit = 255;
@@ -7265,8 +7296,9 @@ ISOGI_DVR__AVX512 void isogi_dvr__begin_avx512(const isogi_dvr__frame *f, const 
         enter = _mm512_mask_max_pd(enter, goes, _mm512_maskz_min_pd(255, t0, t1), enter);
         leave = _mm512_mask_min_pd(leave, goes, _mm512_maskz_max_pd(255, t0, t1), leave);
     }
-    last = _mm512_sub_pd(leave, enter), pieces = _mm512_sub_pd(_mm512_mul_pd(last, ISOGI_DVR__8(f->per_piece)), ISOGI_DVR__8(1e-6));
-    pieces = _mm512_ceil_pd(pieces);
+    last = _mm512_sub_pd(leave, enter), pieces = _mm512_mul_pd(last, ISOGI_DVR__8(f->per_piece));
+    _mm256_storeu_ps(end, _mm512_maskz_cvtpd_ps(255, pieces));
+    pieces = _mm512_ceil_pd(_mm512_sub_pd(pieces, ISOGI_DVR__8(1e-6)));
     hit = (__mmask8)(hit & _mm512_cmp_pd_mask(enter, leave, _CMP_LT_OQ) & _mm512_cmp_pd_mask(leave, ISOGI_DVR__8(1e300), _CMP_LT_OQ) &
                      _mm512_cmp_pd_mask(pieces, ISOGI_DVR__8(1e7), _CMP_LT_OQ));
     for (a = 0; a < 3; a++) {
@@ -7279,13 +7311,13 @@ ISOGI_DVR__AVX512 void isogi_dvr__begin_avx512(const isogi_dvr__frame *f, const 
                                                 _mm256_sqrt_ps(_mm512_maskz_cvtpd_ps(255, sum))));
     last = _mm512_sub_pd(last, _mm512_mul_pd(_mm512_sub_pd(pieces, one), piece));
     last = _mm512_maskz_max_pd(255, _mm512_mul_pd(last, ISOGI_DVR__8(f->per_unit)), zero);
-    _mm256_storeu_ps(end, _mm512_maskz_cvtpd_ps(255, _mm512_maskz_min_pd(255, last, ISOGI_DVR__8(1e30))));
+    _mm256_storeu_ps(last_piece, _mm512_maskz_cvtpd_ps(255, _mm512_maskz_min_pd(255, last, ISOGI_DVR__8(1e30))));
     _mm512_storeu_pd(begin, enter);
     _mm256_storeu_si256((__m256i *)(void *)count, _mm512_maskz_cvttpd_epi32(hit, _mm512_add_pd(pieces, one)));
     for (k = 0; k < 8; k++) {
         for (a = 0; a < 3; a++) r[k].origin[a] = place[a][k], r[k].dir[a] = step[a][k];
-        r[k].enter = begin[k], r[k].sought = 3e38f, r[k].reach = reach[k], r[k].piece = f->piece, r[k].last_piece = end[k];
-        r[k].count = count[k];
+        r[k].enter = begin[k], r[k].sought = 3e38f, r[k].reach = reach[k], r[k].piece = f->piece;
+        r[k].end = end[k], r[k].last_piece = last_piece[k], r[k].count = count[k];
     }
 }
 #undef ISOGI_DVR__8
@@ -7298,10 +7330,11 @@ static void isogi_dvr__begin_packet(const isogi_dvr__render_job *job, int x0, in
     int k, a;
 #ifdef ISOGI_DVR__AVX
     if (job->fast.frame.eight && x0 + 8 <= job->view->width && y0 + ISOGI_DVR__RAYS / 8 <= job->view->height) {
-        double dir[3][8];
+        double dir[3][8], until[8];
         for (k = 0; k < ISOGI_DVR__RAYS; k += 8) {
+            for (a = 0; a < 8; a++) until[a] = isogi_dvr__until(job->view, x0 + a, y0 + k / 8);
             isogi_dvr__toward_avx512(job, x0, y0 + k / 8, dir);
-            isogi_dvr__begin_avx512(&job->fast.frame, job->eye, (const double(*)[8])dir, ray + k);
+            isogi_dvr__begin_avx512(&job->fast.frame, job->eye, (const double(*)[8])dir, until, ray + k);
         }
         work->rays += ISOGI_DVR__RAYS;
         return;
@@ -7317,7 +7350,7 @@ static void isogi_dvr__begin_packet(const isogi_dvr__render_job *job, int x0, in
         isogi_dvr__camera_place(&job->camera, job->view, x, y, at);
         inverse = 1 / sqrt(1 + at[0] * at[0] + at[1] * at[1]); /* the camera's directions are at right angles */
         for (a = 0; a < 3; a++) dir[a] = (job->grid.forward[a] + at[0] * job->grid.right[a] + at[1] * job->grid.under[a]) * inverse;
-        if (!isogi_dvr__fast_begin(&job->fast.frame, job->eye, dir, &ray[k])) ray[k].count = 0;
+        if (!isogi_dvr__fast_begin(&job->fast.frame, job->eye, dir, isogi_dvr__until(job->view, x, y), &ray[k])) ray[k].count = 0;
     }
 }
 
@@ -7893,6 +7926,7 @@ typedef struct isogi_dvr__tet_ray {
     const isogi_tets *mesh;
     const isogi_tet_desc *desc;
     double origin[3], dir[3], speed;
+    double until;    /* t at which it ends */
     double t, value; /* where the ray is, and the field there */
     int chained; /* 2: from the tetrahedron next to this one; 1: over a seam; 0: not at all */
     uint64_t passed;
@@ -7999,9 +8033,10 @@ static void isogi_dvr__tet_gradient(const isogi_tets *m, uint32_t tet, double g[
 }
 
 /* The value at t, kept within the values of the points of the face that the ray is on (a flat tetrahedron's gradient means little), or of
-   all four points where it is within. */
-static double isogi_dvr__tet_value(const isogi_dvr__tet_ray *r, uint32_t face, int within, const double g[3], double t) {
+   all four points where it is on none. */
+static double isogi_dvr__tet_value(const isogi_dvr__tet_ray *r, uint32_t tet, uint32_t on, const double g[3], double t) {
     const isogi_tets *m = r->mesh;
+    const uint32_t face = on == ISOGI_DVR__NO_FACE ? 4 * tet : on;
     uint32_t p[3];
     double value, low, high, at[3];
     int a;
@@ -8013,15 +8048,15 @@ static double isogi_dvr__tet_value(const isogi_dvr__tet_ray *r, uint32_t face, i
         double v = (double)m->mesh.values[p[a]];
         low = v < low ? v : low, high = v > high ? v : high;
     }
-    if (within) {
-        double v = (double)m->mesh.values[m->tet[face >> 2][face & 3]];
+    if (on == ISOGI_DVR__NO_FACE) {
+        double v = (double)m->mesh.values[m->tet[tet][0]];
         low = v < low ? v : low, high = v > high ? v : high;
     }
     value = value > low ? value : low;
     return value < high ? value : high;
 }
 
-/* From t to the exit of a tetrahedron: one linear piece, exact in both spaces. */
+/* On to t, in a tetrahedron: one linear piece, exact in both spaces. in, out: its faces at both ends, or none where an end is within. */
 static void isogi_dvr__pass_tet(isogi_dvr__pixel_ray *pixel, isogi_dvr__tet_ray *r, isogi_dvr__span *s, uint32_t tet, uint32_t in,
                                 uint32_t out, double t) {
     isogi_dvr__stretch *p = &s->piece;
@@ -8029,12 +8064,12 @@ static void isogi_dvr__pass_tet(isogi_dvr__pixel_ray *pixel, isogi_dvr__tet_ray 
     int i;
     isogi_dvr__tet_gradient(r->mesh, tet, g);
     if (r->chained < 2) {
-        double value = in == ISOGI_DVR__NO_FACE ? isogi_dvr__tet_value(r, 4 * tet, 1, g, r->t) : isogi_dvr__tet_value(r, in, 0, g, r->t);
+        double value = isogi_dvr__tet_value(r, tet, in, g, r->t);
         if (!r->chained || fabs(value - r->value) > 1e-6 * (fabs(value) + fabs(r->value))) r->value = value;
     }
     slope = isogi_dvr__dot(g, r->dir), steep = sqrt(isogi_dvr__dot(g, g)) * r->speed;
     p->from = p->t0 = r->t, p->to = t > r->t ? t : r->t, p->dt = p->to - p->from, p->u0 = 0, p->u1 = 1;
-    p->value[0] = r->value, p->value[1] = isogi_dvr__tet_value(r, out, 0, g, p->to);
+    p->value[0] = r->value, p->value[1] = isogi_dvr__tet_value(r, tet, out, g, p->to);
     for (i = 0; i < 4; i++) p->b[i] = p->value[0] + (p->value[1] - p->value[0]) * i / 3;
     r->t = p->to, r->value = p->value[1], r->chained = 2, r->passed++;
     change = fabs(p->value[1] - p->value[0]);
@@ -8091,7 +8126,9 @@ static int isogi_dvr__cast_tets(isogi_dvr__pixel_ray *pixel, isogi_dvr__tet_ray 
             still = t > walked ? 0 : still + 1;
             if (still > 200) return 0;
             walked = t > walked ? t : walked;
+            if (!(t < r->until)) t = r->until, out = ISOGI_DVR__NO_FACE;
             if (t > r->t) isogi_dvr__pass_tet(pixel, r, s, tet, overlaps ? ISOGI_DVR__NO_FACE : in, out, t);
+            if (out == ISOGI_DVR__NO_FACE) return 1;
             in = r->mesh->across[out];
             tet = in == ISOGI_DVR__NO_FACE ? in : in >> 2;
         }
@@ -8115,7 +8152,8 @@ typedef struct isogi_dvr__tet_job {
 } isogi_dvr__tet_job;
 
 /* Tried again along a ray that differs by some billionths where it could not find its way. */
-static void isogi_dvr__try_tets(isogi_dvr__pixel_ray *pixel, const isogi_dvr__tet_job *job, const double origin[3], isogi_counters *work) {
+static void isogi_dvr__try_tets(isogi_dvr__pixel_ray *pixel, const isogi_dvr__tet_job *job, const double origin[3], double until,
+                                isogi_counters *work) {
     isogi_dvr__pixel_ray fresh = *pixel;
     isogi_dvr__tet_ray ray;
     isogi_dvr__span span;
@@ -8125,7 +8163,7 @@ static void isogi_dvr__try_tets(isogi_dvr__pixel_ray *pixel, const isogi_dvr__te
         memset(&ray, 0, sizeof ray), memset(&span, 0, sizeof span);
         ray.mesh = job->mesh, ray.desc = job->desc;
         for (a = 0; a < 3; a++) ray.origin[a] = origin[a], ray.dir[a] = (double)pixel->dir[a] + attempt * (a + 1) * 1e-9;
-        ray.speed = sqrt(isogi_dvr__dot(ray.dir, ray.dir));
+        ray.speed = sqrt(isogi_dvr__dot(ray.dir, ray.dir)), ray.until = until / ray.speed;
         span.silhouette = job->desc->space == ISOGI_DVR_DATA || job->desc->silhouette != ISOGI_DVR_SILHOUETTE_APPROXIMATE
                               ? job->desc->silhouette
                               : ISOGI_DVR_SILHOUETTE_NONE;
@@ -8142,18 +8180,19 @@ static void isogi_dvr__tet_task(void *arg, size_t tile) {
     for (y = y0; y < y0 + ISOGI_DVR__TILE && y < job->view->height; y++)
         for (x = x0; x < x0 + ISOGI_DVR__TILE && x < job->view->width; x++) {
             float *out = job->pixels + 5 * ((size_t)y * (size_t)job->view->width + (size_t)x);
+            const double until = isogi_dvr__until(job->view, x, y);
             isogi_dvr__pixel_ray ray;
             double origin[3];
             memset(&ray, 0, sizeof ray);
             isogi_view_ray(job->view, x, y, origin, ray.dir);
             ray.dvr = job->dvr, ray.clear = 1, ray.end = 1 - (double)job->desc->opaque;
-            isogi_dvr__try_tets(&ray, job, origin, &job->work[tile]);
+            isogi_dvr__try_tets(&ray, job, origin, until, &job->work[tile]);
             for (a = 0; a < 3; a++) out[a] = (float)ray.rgb[a];
             out[3] = (float)(1 - ray.clear), out[4] = HUGE_VALF;
             job->work[tile].rays++;
             if (!job->depth || !(ray.clear < 1)) continue;
             ray.probe = 1, ray.end = isogi_dvr__depth_end(job->view, ray.clear), ray.clear = 1;
-            isogi_dvr__try_tets(&ray, job, origin, &job->work[tile]);
+            isogi_dvr__try_tets(&ray, job, origin, until, &job->work[tile]);
             out[4] = (float)ray.t;
         }
 }

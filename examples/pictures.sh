@@ -20,6 +20,11 @@ build/viewer $hydrogen --mode dvr --out "$pieces/volume-1.png"
 build/viewer $hydrogen --mode scale-invariant --out "$pieces/volume-2.png"
 build/strip "$out/volume.png" "$pieces/volume-1.png" "$pieces/volume-2.png"
 
+block="procedural:engine-block$coarse --camera 37,25,1.9 $(side 280) --aa 4 --mode dvr"
+build/viewer $block --out "$pieces/surface-1.png"
+build/viewer $block --surface 195 --albedo .95,.55,.2 --out "$pieces/surface-2.png"
+build/strip "$out/surface.png" "$pieces/surface-1.png" "$pieces/surface-2.png"
+
 # The paper's figures 4 to 12: a picture for each argument, which is added to $same, at the exposure of the last one.
 strip() { # NAME ARGUMENTS...
     name=$1 parts= n=0

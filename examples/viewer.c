@@ -90,9 +90,9 @@ typedef struct options {
         directions;
     int lookup, shadows, ambient, normals, storage, method, shading, coarsest, local, preset;
     int has_size, has_iso, has_mode, has_spacing, has_albedo, has_preset, has_camera, has_up, has_nan, has_shading, has_shadows,
-        has_ambient, has_gloss, has_step, has_transmission, has_method, has_coarsest, has_silhouette, has_classification;
-    double step, bound, fog, gloss, offset, reach, isovalue, spacing[3], clip[ISOGI_DVR_MAX_PLANES][4], azimuth, elevation, distance, up[3],
-        exposure, nan_value;
+        has_ambient, has_gloss, has_step, has_transmission, has_method, has_coarsest, has_silhouette, has_classification, has_surface;
+    double surface, step, bound, fog, gloss, offset, reach, isovalue, spacing[3], clip[ISOGI_DVR_MAX_PLANES][4], azimuth, elevation,
+        distance, up[3], exposure, nan_value;
     float albedo[3];
     isogi_light lights[MAX_LIGHTS];
     size_t light_count, clip_count, lattice[3], grid[3];
@@ -232,8 +232,8 @@ static const option option_list[] = {
      "angles; it shines towards U x V); may be repeated",
      PARSED(parse_light, "directional|point|sphere:X,Y,Z:R,G,B with an optional :RADIUS (up to 90 degrees; needed for a sphere), or "
                          "rectangle:X,Y,Z:R,G,B:UX,UY,UZ:VX,VY,VZ, at most 64 times")},
-    {"--albedo", "R,G,B", SURFACES, "diffuse reflectance; default 0.7,0.7,0.7", FLOATS, VALUE(albedo), 3, 0, 1,
-     .allowed = "three numbers, 0 to 1"},
+    {"--albedo", "R,G,B", ANY, "diffuse reflectance, in volume rendering that of --surface; default 0.7,0.7,0.7", FLOATS, VALUE(albedo), 3,
+     0, 1, .allowed = "three numbers, 0 to 1"},
     {"--bounces", "N", REFLECTED, "reflections of light; -1 = all, the default", INTEGER, AT(bounces), 0, 1, -1, 1000,
      .allowed = "a whole number, -1 to 1000"},
     {"--samples", "N", GATHERED,
@@ -272,6 +272,10 @@ static const option option_list[] = {
      "transfer function: lines \"value extinction r g b\" or \"peak value opacity r g b\", colours 0 to 1; # begins a remark; "
      "default the scene's or shape's own, else one suggested by the histogram",
      TEXT, .offset = AT(tf)},
+    {"--surface", "V", VOLUMES,
+     "an opaque isosurface as well, which hides the matter behind it; lit as by lambert, in the shadows that it throws of lights, but "
+     "not in those of the matter",
+     NUMBERS, VALUE(surface), 1, -1e300, 1e300, .allowed = "a number"},
     {"--shading", "NAME", VOLUMES, "unlit, visibility, local, two-sided; default visibility, for scale-invariant local",
      NAMED(shading_name, shading), .has = AT(has_shading)},
     {"--preset", "NAME", VOLUMES,
@@ -298,7 +302,7 @@ static const option option_list[] = {
      NAMED(coarsest_name, coarsest), .has = AT(has_coarsest)},
     {"--local", 0, 1 << DVR, "light by local visibility, of --method paper: for clip planes and lights within", FLAG, .offset = AT(local)},
     {"--depth", "FILE.pfm", VOLUMES,
-     "as well: distance from the eye to half of a pixel's opacity, where "
+     "as well: distance from the eye to half of a pixel's opacity (to --surface where less than half lies before it), where "
      "nothing is seen infinity, as floats (the nearest of a pixel's samples)",
      TEXT, .offset = AT(depth)},
     {"--classification", "NAME", VOLUMES, "exact, pre-integrated, post-classified; dvr knows the last one and, for both others, its own",
@@ -418,6 +422,7 @@ static int check_volume(viewer *v) {
     int shadowed = is_shadowed(o);
     if (o->mode < DVR) return 1;
     if (o->tf && o->has_preset) return file_fail(v->error, "give --tf or --preset, not both");
+    if (o->has_albedo && !o->has_surface) return file_fail(v->error, "--albedo: is that of --surface here; matter has its colours");
     if (o->has_iso && (o->tf || o->has_preset))
         return file_fail(v->error, "--iso: is for surfaces and for the transfer function that --mode scale-invariant is suggested; a "
                                    "transfer function has its own values");
@@ -430,7 +435,7 @@ static int check_volume(viewer *v) {
         return file_fail(v->error, "--local: needs --shading visibility and --method paper");
     if (o->has_transmission && !(o->has_shading && o->shading == ISOGI_DVR_TWO_SIDED))
         return file_fail(v->error, "--transmission: needs --shading two-sided");
-    if (o->has_shading && o->shading == ISOGI_DVR_UNLIT && (o->env || o->light_count))
+    if (o->has_shading && o->shading == ISOGI_DVR_UNLIT && (o->env || o->light_count) && !o->has_surface)
         return file_fail(v->error, "%s: --shading unlit has no light", o->env ? "--env" : "--light");
     if (o->bound > 0 && o->has_step && (!shadowed || o->method > ISOGI_DVR_BRUTE)) return file_fail(v->error, "%s", without_step);
     if (o->bound > 0 && o->has_classification) return file_fail(v->error, "--classification: rays with --bound are exact");
@@ -1408,13 +1413,58 @@ static int tell_stage(void *user, double fraction) {
     return 0;
 }
 
+static void forget_view(viewer *v) {
+    for (int s = 0; s < v->o.antialias; s++) {
+        if (v->inverse) free(v->inverse[s]);
+        if (v->seen) free(v->seen[s]);
+    }
+    free(v->inverse), free(v->seen), v->inverse = NULL, v->seen = NULL;
+}
+
+/* The opaque isosurface among the matter, a sample in each pixel of a picture that is `factor` times as large, and how far off it is. */
+static int draw_surface(viewer *v, int factor, float (*picture)[4], float *until) {
+    const options given = v->o;
+    const camera view = v->view;
+    const double isovalue = v->isovalue;
+    const uint64_t rays = v->counters.rays;
+    float(*const small)[4] = v->picture;
+    size_t seen = 0;
+    int ok;
+    v->counters.rays = 0;
+    v->o.mode = LAMBERT, v->o.antialias = v->o.shadows = v->o.ambient = v->o.raycast = 1, v->isovalue = v->o.surface, v->picture = picture;
+    v->o.width *= factor, v->o.height *= factor, v->view.width *= factor, v->view.height *= factor;
+    ok = view_surface(v) && shade_surface(v);
+    for (int y = 0; ok && y < v->o.height; y++)
+        for (int x = 0; x < v->o.width; x++) {
+            size_t i = (size_t)y * (size_t)v->o.width + (size_t)x;
+            double d[3];
+            camera_direction(&v->view, x, y, d);
+            until[i] = v->seen[0][i] == RASTER_NONE ? INFINITY : (float)(sqrt(vector_dot(d, d)) / (double)v->inverse[0][i]);
+            if (v->seen[0][i] == SECTION) until[i] *= 1 - 1e-6f; /* rounded away, it would let matter be seen that begins there */
+            seen += v->seen[0][i] != RASTER_NONE;
+        }
+    if (ok && !seen) fprintf(stderr, "note: no surface is in view at --surface %.9g (the data range from %.9g to %.9g)\n", v->isovalue,
+                             v->range[0], v->range[1]);
+    forget_view(v);
+    v->counters.rays += rays, v->o = given, v->view = view, v->isovalue = isovalue, v->picture = small;
+    return ok;
+}
+
+/* Matter over the surface behind it. */
+static void put_over(float (*matter)[4], float *depth, const float (*surface)[4], const float *until, size_t pixels) {
+    for (size_t i = 0; i < pixels; i++) {
+        if (depth && matter[i][3] < 0.5f && until[i] < 1e30f) depth[i] = until[i];
+        for (int c = 0; c < 4; c++) matter[i][c] += (1 - matter[i][3]) * surface[i][c]; /* opacity last */
+    }
+}
+
 static int render_volume(viewer *v) {
     isogi_dvr_desc desc = {.pyramid = v->pyramid, .space = v->o.mode == DVR ? ISOGI_DVR_PHYSICAL : ISOGI_DVR_DATA,
                            .shading = v->o.mode == DVR ? ISOGI_DVR_VISIBILITY : ISOGI_DVR_LOCAL};
     int factor = (int)(sqrt((double)v->o.antialias) + 1e-9);
     isogi_view view = {.width = v->o.width * factor, .height = v->o.height * factor, .local = v->o.local};
     size_t pixels = (size_t)view.width * (size_t)view.height;
-    float(*large)[4] = NULL, *depth = NULL;
+    float(*large)[4] = NULL, (*surface)[4] = NULL, *depth = NULL, *until = NULL;
     int ok = 1;
     isogi_dvr *dvr = NULL;
     double begun = seconds(), remaining = 1;
@@ -1425,8 +1475,8 @@ static int render_volume(viewer *v) {
     if (view.width > 32768 || view.height > 32768)
         return file_fail(v->error, "--size %dx%d with --aa %d is %dx%d samples; at most 32768 along a side", v->o.width, v->o.height,
                          v->o.antialias, view.width, view.height);
-    /* our pixels and those of the library, with depth */
-    if (!check_memory(v, (double)(factor * factor) / v->o.antialias * (sizeof *large + sizeof *depth + 20))) return 0;
+    /* our pixels and those of the library, with depth, and what is behind them */
+    if (!check_memory(v, (double)(factor * factor) / v->o.antialias * (2 * sizeof *large + 2 * sizeof *depth + 20))) return 0;
     context.progress = tell_stage;
     if (v->o.has_shading) desc.shading = (isogi_dvr_shading)v->o.shading;
     desc.classification = (isogi_dvr_classification)v->o.classification, desc.silhouette = (isogi_dvr_silhouette)v->o.silhouette,
@@ -1457,15 +1507,18 @@ static int render_volume(viewer *v) {
         stat_line(v, "visibility_points", "%zu", report.grid_points);
     large = (float(*)[4])malloc(pixels * sizeof *large);
     if (v->o.depth) depth = (float *)malloc(pixels * sizeof *depth);
-    if (result == ISOGI_OK && (!large || (v->o.depth && !depth))) result = ISOGI_NO_MEMORY;
+    if (v->o.has_surface) surface = (float(*)[4])calloc(pixels, sizeof *surface), until = (float *)malloc(pixels * sizeof *until);
+    if (result == ISOGI_OK && (!large || (v->o.depth && !depth) || (v->o.has_surface && (!surface || !until)))) result = ISOGI_NO_MEMORY;
+    if (result == ISOGI_OK && surface) ok = draw_surface(v, factor, surface, until), view.until = until, begun = seconds();
     v->stage = "picture", v->stage_begun = begun;
-    if (result == ISOGI_OK) result = isogi_dvr_render(dvr, &view, &v->lighting, large, depth, &v->counters);
-    for (size_t i = 0; result == ISOGI_OK && i < pixels; i++) {
+    if (result == ISOGI_OK && ok) result = isogi_dvr_render(dvr, &view, &v->lighting, large, depth, &v->counters);
+    if (result == ISOGI_OK && ok && surface) put_over(large, depth, (const float(*)[4])surface, until, pixels);
+    for (size_t i = 0; ok && result == ISOGI_OK && i < pixels; i++) {
         size_t x = i % (size_t)view.width / (size_t)factor, y = i / (size_t)view.width / (size_t)factor;
         for (int c = 0; c < 4; c++) v->picture[y * (size_t)v->o.width + x][c] += large[i][c] / (float)(factor * factor);
     }
-    if (result == ISOGI_OK && depth) ok = write_depth(v, depth, factor);
-    free(large), free(depth);
+    if (result == ISOGI_OK && ok && depth) ok = write_depth(v, depth, factor);
+    free(large), free(surface), free(depth), free(until);
     isogi_dvr_free(dvr);
     if (!ok) return 0;
     stat_seconds(v, "render", begun);
@@ -1593,11 +1646,8 @@ static int run(viewer *v, int argc, char **argv) {
 }
 
 static void release(viewer *v) {
-    for (int s = 0; s < v->o.antialias; s++) {
-        if (v->inverse) free(v->inverse[s]);
-        if (v->seen) free(v->seen[s]);
-    }
-    free(v->inverse), free(v->seen), free(v->picture), free(v->compared), free(v->env.rgb);
+    forget_view(v);
+    free(v->picture), free(v->compared), free(v->env.rgb);
     isogi_trace_free(v->trace);
     if (v->pyramid) isogi_vol_mesh_free(v->pyramid, &v->mesh);
     isogi_vol_free(v->pyramid);

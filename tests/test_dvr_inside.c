@@ -330,7 +330,7 @@ TEST(monotone_pieces_cover_the_ray_without_a_gap) {
         isogi_dvr__march m;
         isogi_dvr__walk w;
         isogi_dvr__stretch p;
-        if (isogi_dvr__begin(&m, dvr, eye, dir, sqrt(isogi_dvr__dot(dir, dir)), 0.5)) {
+        if (isogi_dvr__begin(&m, dvr, eye, dir, sqrt(isogi_dvr__dot(dir, dir)), 1e300, 0.5)) {
             int pieces = 0;
             isogi_dvr__begin_walk(&w, &m);
             while (isogi_dvr__next_monotone(&w, &p)) {
@@ -392,7 +392,7 @@ TEST(scaling_each_axis_along_with_the_rays_changes_nothing) {
         isogi_dvr__march m = {0};
         isogi_dvr__pixel_ray ray = {.dvr = dvr, .clear = 1};
         memcpy(back, origin, sizeof back);
-        if (isogi_dvr__begin(&m, dvr, back, dir, 1, 0.5)) isogi_dvr__cast_values(&ray, &m);
+        if (isogi_dvr__begin(&m, dvr, back, dir, 1, 1e300, 0.5)) isogi_dvr__cast_values(&ray, &m);
         for (int a = 0; a < 4; a++) {
             double got = a < 3 ? ray.rgb[a] : 1 - ray.clear;
             CHECK(fabs((double)p.c[a] - got) < 1e-7, "ray %d, channel %d: %.9g, not %.9g", n, a, got, (double)p.c[a]);
@@ -417,7 +417,7 @@ static int walk_crossings(const isogi_dvr *dvr, const double origin[3], const fl
     double d[3] = {(double)dir[0], (double)dir[1], (double)dir[2]};
     double touched = -1; /* t at which the last piece ended with the isovalue itself */
     int count = 0;
-    if (!isogi_dvr__begin(&m, dvr, origin, d, 1, 0.5)) return 0;
+    if (!isogi_dvr__begin(&m, dvr, origin, d, 1, 1e300, 0.5)) return 0;
     isogi_dvr__begin_walk(&s.walk, &m);
     while (isogi_dvr__next_monotone(&s.walk, &s.piece) && count < 60)
         if ((s.piece.value[0] >= isovalue) != (s.piece.value[1] >= isovalue)) {

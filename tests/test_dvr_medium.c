@@ -1,4 +1,5 @@
-/* Pictures of media by isogi_dvr.h: every path of physical space, limits, emission and phase function, depth, jitter, steady blocks. */
+/* Pictures of media by isogi_dvr.h: every path of physical space, limits, emission and phase function, depth, geometry, jitter, steady
+   blocks. */
 #define ISOGI_IMPLEMENTATION
 #include "isogi_dvr.h"
 #include "dvr_fields.h"
@@ -429,6 +430,143 @@ TEST(planes_and_boxes_cut_pictures_where_they_say) {
     }
     CHECK(cut > 300 && crossed > 60 && nothing > 20, "%d rays cut, %d cross the surface, %d see nothing", cut, crossed, nothing);
     field_free(&f);
+}
+
+/* ---- geometry among matter ---- */
+
+/* A wall across the view, given by how far off it is in every pixel, ends rays where a clip plane does; infinitely far walls are none. */
+TEST(geometry_ends_rays_where_it_stands) {
+    enum { SIDE = 17, PIXELS = SIDE * SIDE };
+    static const struct { isogi_dvr_space space; isogi_dvr_classification way; isogi_dvr_shading shading; int peaks, local; double bound; }
+        kinds[] = {{0, 0, 0, 0, 0, 0}, {0, 0, 1, 0, 0, 0}, {0, 2, 2, 1, 0, 0}, {0, 0, 3, 1, 0, 0}, {0, 0, 1, 1, 0, 0.1}, {0, 0, 1, 0, 1, 0},
+                   {1, 0, 0, 0, 0, 0}, {1, 0, 1, 1, 0, 0}, {1, 1, 0, 1, 0, 0}, {1, 2, 3, 1, 0, 0}};
+    static const isogi_light lamp = {.kind = ISOGI_LIGHT_POINT, .vector = {40, 20, 60}, .rgb = {3000, 2500, 2000}};
+    const isogi_lighting lighting = {.env = {.sh = sky_one, .sh_order = 1}, .lights = &lamp, .light_count = 1};
+    field f = field_waves(33, 8);
+    test_random r = {77};
+    static float values[33 * 33 * 33]; /* which vectors read */
+    isogi_volume volume = {.data = values, .type = ISOGI_F32, .size = {33, 33, 33}};
+    isogi_pyramid *floats;
+    for (size_t i = 0; i < field_count(&f); i++) values[i] = (float)f.value[i];
+    CHECK(isogi_vol_build(&floats, &volume, &serial) == ISOGI_OK, "build");
+    for (size_t n = 0; n < 3 * sizeof kinds / sizeof *kinds; n++) {
+        const size_t k = n % (sizeof kinds / sizeof *kinds);
+        const isogi_transfer transfer = {hills, 6, sheets, kinds[k].peaks ? 2 : 0};
+        const isogi_context context = {.threads = 1, .force_path = n < sizeof kinds / sizeof *kinds ? 0 : (int)(random_bits(&r) % 5)};
+        const isogi_dvr_desc desc = {.pyramid = n % 3 ? floats : f.pyramid, .space = kinds[k].space, .classification = kinds[k].way,
+                                     .unit = 20, .shading = kinds[k].shading, .bound = kinds[k].bound, .order = 2, .directions = 8,
+                                     .grid = {5, 5, 5}, .step = 0.5, .method = kinds[k].local ? ISOGI_DVR_PAPER : ISOGI_DVR_METHOD_DEFAULT};
+        isogi_dvr *dvr = dvr_new_with(&desc, &transfer, &context);
+        isogi_view view = view_of(&f, 1, &r, SIDE);
+        float until[PIXELS], depth[2][PIXELS], (*whole)[4], (*cut)[4], (*clipped)[4];
+        double plane[4], into = 0, origin[3];
+        int shorter = 0, ended = 0;
+        /* samples stand in the middle of pieces, of the last one elsewhere where it is shorter */
+        const float slack = kinds[k].bound > 0 || (kinds[k].space && !kinds[k].way) ? 1e-5f : 0.03f;
+        CHECK(isogi_dvr_step(dvr, 0, NULL) == ISOGI_OK, "step");
+        view.depth = n % 2 ? ISOGI_DEPTH_FIRST : ISOGI_DEPTH_HALF, view.local = kinds[k].local;
+        whole = picture(dvr, &view, &lighting, depth[0], NULL), view.until = until;
+        for (int i = 0; i < PIXELS; i++) until[i] = i % 2 ? HUGE_VALF : 3e38f;
+        cut = picture(dvr, &view, &lighting, depth[1], NULL);
+        CHECK(!memcmp(whole, cut, sizeof *whole * PIXELS) && !memcmp(depth[0], depth[1], sizeof depth[0]), "kind %zu: far walls are seen",
+              k);
+        free(cut);
+        /* through the middle, aslant, its kept side towards the eye */
+        for (int a = 0; a < 3; a++) plane[a] = view.eye[a] - view.target[a] + (float)random_range(&r, -40, 40);
+        plane[3] = 0;
+        for (int a = 0; a < 3; a++)
+            into += plane[a] * (double)(view.eye[a] - view.target[a]), plane[3] -= plane[a] * (double)view.target[a];
+        for (int a = 0; a < 4; a++) plane[a] *= into < 0 ? -1 : 1;
+        for (int i = 0; i < PIXELS; i++) {
+            double rate = 0, at = plane[3];
+            float dir[3];
+            isogi_view_ray(&view, i % SIDE, i / SIDE, origin, dir);
+            for (int a = 0; a < 3; a++) rate += plane[a] * (double)dir[a], at += plane[a] * origin[a];
+            until[i] = rate < 0 ? (float)(-at / rate) : HUGE_VALF;
+        }
+        cut = picture(dvr, &view, &lighting, depth[0], NULL), view.until = NULL;
+        /* not stepped: visibility is the same as before */
+        if (!view.local) {
+            CHECK(isogi_dvr_set_clip(dvr, (const double(*)[4])plane, 1) == ISOGI_OK, "clip");
+            clipped = picture(dvr, &view, &lighting, depth[1], NULL);
+            for (int i = 0; i < PIXELS; i++)
+                for (int a = 0; a < 4; a++)
+                    CHECK(fabs((double)cut[i][a] - (double)clipped[i][a]) < 1e-4, "kind %zu: pixel %d, channel %d: %g, clipped %g", k, i, a,
+                          (double)cut[i][a], (double)clipped[i][a]);
+            free(clipped);
+        }
+        for (int i = 0; i < PIXELS; i++) {
+            shorter += cut[i][3] < whole[i][3] - 0.01f, ended += cut[i][3] > 0.01f && until[i] < 1e30f;
+            CHECK(cut[i][3] <= whole[i][3] + slack, "kind %zu: pixel %d is more opaque before a wall: %g, %g", k, i, (double)cut[i][3],
+                  (double)whole[i][3]);
+            CHECK(!(depth[0][i] < 1e30f) || depth[0][i] <= until[i] * 1.000001f, "kind %zu: pixel %d is seen %g off, behind %g", k, i,
+                  (double)depth[0][i], (double)until[i]);
+        }
+        CHECK(shorter > PIXELS / 8 && ended > PIXELS / 8, "kind %zu: %d pixels show less, %d something", k, shorter, ended);
+        free(whole), free(cut), view.until = until;
+        for (int i = 0; i < PIXELS; i++) until[i] = i % 3 ? (i % 3 > 1 ? -HUGE_VALF : -1) : 0;
+        cut = picture(dvr, &view, &lighting, depth[0], NULL);
+        for (int i = 0; i < PIXELS; i++) CHECK(!(cut[i][3] > 0) && depth[0][i] > 1e30f, "pixel %d shows what is behind a wall", i);
+        until[PIXELS - 1] = NAN, memcpy(depth[1], depth[0], sizeof depth[0]);
+        CHECK(isogi_dvr_render(dvr, &view, &lighting, cut, depth[0], NULL) == ISOGI_INVALID && !memcmp(depth[1], depth[0], sizeof depth[0]),
+              "a wall nowhere");
+        free(cut), isogi_dvr_free(dvr);
+    }
+    isogi_vol_free(floats), field_free(&f);
+}
+
+/* The last piece of a ray is integrated up to where it ends, whatever the values beyond: extinction that grows by the value, in the field
+   x, ends at a wall or at a clip plane after any part of a step. */
+TEST(rays_end_within_a_step) {
+    enum { N = 49 };
+    static float data[N * N * N];
+    const isogi_transfer_point rising[] = {{0, {1, 0.5f, 0.2f}, 0}, {48, {1, 0.5f, 0.2f}, 0.05f}};
+    const isogi_transfer transfer = {rising, 2, NULL, 0};
+    isogi_volume volume = {.data = data, .type = ISOGI_F32, .size = {N, N, N}};
+    isogi_pyramid *pyramid;
+    test_random r = {41};
+    double worst = 0;
+    for (int i = 0; i < N * N * N; i++) data[i] = (float)(i % N);
+    CHECK(isogi_vol_build(&pyramid, &volume, &serial) == ISOGI_OK, "build");
+    for (int n = 0; n < (LONG_SUITE ? 20000 : 600); n++) {
+        const isogi_context context = {.threads = 1, .force_path = n % 5};
+        const isogi_dvr_desc desc = {.pyramid = pyramid, .opaque = 1, .step = n / 5 % 2 ? 4 : 1, .tolerance = n / 10 % 2 ? 1e-3 : 0};
+        double eye[3], target[3], origin[3], plane[1][4] = {{0}};
+        float dir[3], until[32], c[32][4], depth[32];
+        for (int a = 0; a < 3; a++) target[a] = random_range(&r, 20, 28), eye[a] = target[a] + random_range(&r, -90, 90);
+        isogi_view view = line_of_sight(eye, target);
+        isogi_dvr *dvr = dvr_new_with(&desc, &transfer, &context);
+        view.width = 8, view.height = 4, view.depth = ISOGI_DEPTH_FIRST;
+        isogi_view_ray(&view, 0, 0, origin, dir);
+        double distance = 0;
+        for (int a = 0; a < 3; a++) distance += pow(target[a] - origin[a], 2);
+        distance = sqrt(distance) + random_range(&r, -8, 8);
+        for (int i = 0; i < 32; i++) until[i] = (float)distance;
+        if (n / 20 % 2) { /* across the line of sight: as far off in its middle */
+            for (int a = 0; a < 3; a++)
+                plane[0][a] = -(double)dir[a], plane[0][3] += (double)dir[a] * (origin[a] + distance * (double)dir[a]);
+            CHECK(isogi_dvr_set_clip(dvr, (const double(*)[4])plane, 1) == ISOGI_OK, "clip");
+        } else view.until = until;
+        CHECK(isogi_dvr_render(dvr, &view, NULL, c, depth, NULL) == ISOGI_OK, "render");
+        isogi_dvr_free(dvr);
+        for (int i = 0; i < 32; i++) {
+            double from = 0, to = 1e9, rate = 0, at = plane[0][3];
+            isogi_view_ray(&view, i % 8, i / 8, origin, dir);
+            for (int a = 0; a < 3; a++) {
+                double low = -origin[a] / (double)dir[a], high = (N - 1 - origin[a]) / (double)dir[a];
+                from = fmax(from, fmin(low, high)), to = fmin(to, fmax(low, high));
+                rate += plane[0][a] * (double)dir[a], at += plane[0][a] * origin[a];
+            }
+            to = fmin(to, view.until ? distance : -at / rate);
+            double middle = origin[0] + 0.5 * (from + to) * (double)dir[0];
+            double expected = to > from ? 1 - exp(-0.05 / 48 * middle * (to - from)) : 0;
+            worst = fmax(worst, fabs((double)c[i][3] - expected));
+            /* a ray of nearly one value sees the middle of its class, of 1024 */
+            CHECK(fabs((double)c[i][3] - expected) < 4e-4, "case %d, ray %d: opacity %g, not %g", n, i, (double)c[i][3], expected);
+        }
+    }
+    printf("    largest error of opacity %.2g\n", worst);
+    isogi_vol_free(pyramid);
 }
 
 /* ---- jitter ---- */

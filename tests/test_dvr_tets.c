@@ -225,6 +225,40 @@ TEST(rays_through_edges_and_points_find_their_way) {
     mesh_free(&m);
 }
 
+/* What is seen as far as a wall, over what is seen from there on: the whole. Walls stand within tetrahedra, in holes, before and behind. */
+TEST(geometry_parts_what_is_seen) {
+    test_random r = {5};
+    mesh m = lattice_mesh(7, bumpy, keep_shell);
+    int parted = 0;
+    mesh_build(&m);
+    for (int n = 0; n < (LONG_SUITE ? 20000 : 2000); n++) {
+        const isogi_tet_desc desc = {.space = (isogi_dvr_space)(n % 2), .opaque = 1, .silhouette = (isogi_dvr_silhouette)(n % 4 / 2)};
+        double eye[3], target[3], beyond[3], origin[3];
+        float until = (float)random_range(&r, 0, 20), dir[3];
+        for (int a = 0; a < 3; a++) target[a] = random_range(&r, 1, 4), eye[a] = target[a] + random_range(&r, -9, 9);
+        isogi_view view = line_of_sight(eye, target);
+        isogi_view_ray(&view, 0, 0, origin, dir);
+        for (int a = 0; a < 3; a++) {
+            eye[a] = origin[a], target[a] = origin[a] + 40 * (double)dir[a];
+            beyond[a] = origin[a] + (double)(until * dir[a]);
+        }
+        pixel whole = cast_tets(m.built, &desc, &both, eye, target), rest = cast_tets(m.built, &desc, &both, beyond, target), first;
+        view = line_of_sight(eye, target), view.until = &until;
+        isogi_result result = isogi_dvr_tets_render(m.built, &desc, &both, &view, (float(*)[4])first.c, &first.depth, NULL);
+        CHECK(result == ISOGI_OK, "render: %s", isogi_result_string(result));
+        parted += first.c[3] > 0.01f && rest.c[3] > 0.01f;
+        CHECK(!(first.depth < 1e30f) || first.depth <= until * 1.000001f, "case %d: seen %g off, before %g", n, (double)first.depth,
+              (double)until);
+        for (int a = 0; a < 4; a++) {
+            double sum = (double)first.c[a] + (1 - (double)first.c[3]) * (double)rest.c[a];
+            CHECK(fabs(sum - (double)whole.c[a]) < 1e-4, "case %d, channel %d: %g and %g behind it make %g, not %g", n, a,
+                  (double)first.c[a], (double)rest.c[a], sum, (double)whole.c[a]);
+        }
+    }
+    CHECK(parted > 200, "%d rays end among matter", parted);
+    mesh_free(&m);
+}
+
 /* Every crossing of a peak composites its opacity: counted by brute force along the stretches. */
 TEST(peaks_in_tetrahedra_are_crossed_exactly) {
     test_random r = {3};

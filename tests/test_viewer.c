@@ -519,7 +519,8 @@ static const struct { const char *with, *option, *same; } tried[] = {
     {"--tf PEAK", "--silhouette exact", ""}, {"", "--transmission none", ""}, {"--shading two-sided", "--transmission none", ""},
     {"", "--step 2", ""}, {"--classification post-classified", "--step 2", ""}, {"", "--bound .01", ""}, {"--bound .01", "--step 2", ""},
     {"--bound .01 --method brute", "--step 3", ""}, {"", "--iso 0.3", ""}, {"", "--clip 1,0,0,-12", ""}, {"", "--exposure 0.4", ""},
-    {"", "--aa 9", ""}, {"", "--up 1,0,0", ""}, {"", "--camera 10,20,3", ""}, {"", "--spacing 1,2,1", ""}};
+    {"", "--aa 9", ""}, {"", "--up 1,0,0", ""}, {"", "--camera 10,20,3", ""}, {"", "--spacing 1,2,1", ""}, {"", "--surface 0.4", ""},
+    {"--surface 0.4", "--albedo 0.9,0.3,0.1", ""}};
 static const char apart[] = "--scene --mode --out --size --nan --compare --depth --threads --compact --stats --help";
 
 /* The bytes of the picture; 0 where the words are refused, in one line. */
@@ -537,6 +538,50 @@ static size_t picture_of(const char *mode, const char *words, unsigned char *byt
     r = run_viewer(command);
     CHECK(r.status == 0 || (r.status == 1 && r.lines == 1), "%s: status %d, %zu lines: %s", command, r.status, r.lines, r.error);
     return r.status ? 0 : read_text(temporary("option.png"), (char *)bytes, most);
+}
+
+/* Among matter that is clear the surface is what lambert shows; matter covers it, and what is behind it is hidden. */
+TEST(a_surface_stands_in_the_matter) {
+    enum { SIDE = 48, PIXELS = SIDE * SIDE };
+    static const char *const scene = "procedural:gyroid:24 --size 48x48 --exposure 1 --albedo .9,.6,.2 --light directional:1,1,1:3,2,1";
+    /* clear; before the surface; within it, opaque */
+    static const char *const matter[] = {"-1.5 0 1 1 1\n", "-1.5 0 1 .2 .1\n-.5 0 1 .2 .1\n-.1 .2 .1 .2 1\n0.3 0 .1 .2 1\n",
+                                         "0.5 0 .1 1 .1\n0.5 1e6 .1 1 .1\n"};
+    static const char *const ways[] = {"--mode lambert --shadows on --raycast --iso 0.2 --aa 1", "--mode dvr --shading unlit --surface 0.2",
+                                       "--mode scale-invariant --shading unlit --surface 0.2 --aa 1",
+                                       "--mode dvr --shading unlit --surface 0.2 --aa 4"};
+    static unsigned char map[14 + 4 * PIXELS + 1];
+    unsigned char *picture[6];
+    char command[1024];
+    int shape[3] = {0}, seen = 0, changed[6] = {0};
+    double outliers;
+    for (int n = 0; n < 6; n++) {
+        write_bytes(temporary("matter.tf"), matter[n < 4 ? 0 : n - 3], strlen(matter[n < 4 ? 0 : n - 3]));
+        int length = snprintf(command, sizeof command, "%s %s --out '%s'", scene, ways[n < 4 ? n : 1], temporary("surface.png"));
+        if (n)
+            snprintf(command + length, sizeof command - (size_t)length, " --tf '%s' --depth '%s'", temporary("matter.tf"),
+                     temporary("surface.pfm"));
+        run_result r = run_viewer(command);
+        CHECK(r.status == 0, "%s: %s", command, r.error);
+        picture[n] = read_picture(temporary("surface.png"), shape);
+        if (!picture[n]) return;
+        FILE *file = n ? fopen(temporary("surface.pfm"), "rb") : NULL;
+        CHECK(!n || (file && fread(map, 1, sizeof map, file) == sizeof map - 1), "no depth of %zu bytes", sizeof map - 1);
+        if (file) fclose(file);
+        if (n != 1) continue;
+        for (int i = 0; i < PIXELS; i++) {
+            float depth;
+            memcpy(&depth, map + 14 + 4 * i, sizeof depth), seen += depth < 1e30f;
+        }
+    }
+    for (int n = 1; n < 6; n++)
+        for (int i = 0; i < PIXELS; i++) changed[n] += memcmp(picture[0] + 3 * i, picture[n] + 3 * i, 3) != 0;
+    CHECK(seen > PIXELS / 6, "%d pixels have a depth", seen);
+    CHECK(!changed[1] && !changed[2], "%d and %d pixels differ from those of lambert", changed[1], changed[2]);
+    CHECK(changed[3] && picture_difference(picture[0], picture[3], SIDE, SIDE, &outliers) < 12, "four samples show something else");
+    CHECK(changed[4] > PIXELS / 6, "matter before the surface changes %d pixels", changed[4]);
+    CHECK(changed[5] < seen / 20, "matter behind the surface changes %d pixels of %d", changed[5], seen); /* the box opens some of it */
+    for (int n = 0; n < 6; n++) free(picture[n]);
 }
 
 TEST(every_option_is_refused_or_changes_the_picture) {
