@@ -1580,12 +1580,24 @@ static double expose_picture(const viewer *v, double exposure, unsigned char *by
     return sum;
 }
 
+/* A picture in which everything is black has the wrong light. */
+static void note_darkness(const viewer *v) {
+    size_t seen = 0;
+    for (size_t i = 0; i < (size_t)v->o.width * (size_t)v->o.height; i++) {
+        const float *p = v->picture[i];
+        if (p[0] > 0 || p[1] > 0 || p[2] > 0) return;
+        seen += p[3] > 0;
+    }
+    if (seen) fprintf(stderr, "note: all that is seen is black: no light reaches it, or its colour is black\n");
+}
+
 static int write_picture(viewer *v) {
     size_t pixels = (size_t)v->o.width * (size_t)v->o.height;
     double begun = seconds(), exposure = v->o.exposure;
     unsigned char *bytes = (unsigned char *)malloc(pixels * 3);
     int ok;
     if (!bytes) return fail(v, "the picture", ISOGI_NO_MEMORY);
+    note_darkness(v);
     if (!(exposure > 0)) {
         exposure = picture_exposure((const float(*)[4])v->picture, pixels, 0.9, 0.6);
         for (double factor = 64; v->compared && factor > 1.0005; factor = sqrt(factor)) {

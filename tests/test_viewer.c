@@ -898,6 +898,17 @@ TEST(pictures_without_a_surface_are_told) {
     }
 }
 
+TEST(black_pictures_are_told) {
+    static const char *const words[] = {"--albedo 0,0,0", "--mode lambert --light directional:0,1,0:0,0,0",
+                                        "--mode dvr --light point:-9,0,0:0,0,0", "--samples 4", "--mode lambert --iso 9"};
+    char command[512];
+    for (int k = 0; k < 5; k++) {
+        snprintf(command, sizeof command, "procedural:gyroid:16 --size 16x16 %s --out '%s'", words[k], temporary("black.png"));
+        run_result r = run_viewer(command);
+        CHECK(r.status == 0 && !strstr(r.error, "is black") == (k > 2), "%s: %s", words[k], r.error);
+    }
+}
+
 TEST(stats_are_key_value_lines_and_help_is_complete) {
     static const char *const keys[] = {"size 32x32x32", "range ",           "isovalue ",        "triangles ",
                                        "rays_light ",   "rays_per_second ", "texels_computed ", "texels_requested ",
