@@ -223,7 +223,8 @@ typedef enum isogi_type { ISOGI_U8 = 0, ISOGI_I8, ISOGI_U16, ISOGI_I16, ISOGI_F3
    Voxels that are not finite: a cell with one at a corner holds no surface for rays and meshes, no ray hits it, no mesh has a triangle
    in it, and what a ray knew of its side is forgotten in it; all other cells are as if it were not there. Ranges leave such voxels out;
    rays and meshes skip regions that have no others.
-   Trilinear samples next to one, and smooth samples within two voxels of one, are not finite themselves; normals there are zero.
+   Trilinear samples next to one, and smooth samples within two voxels of one, are not finite themselves. Smooth normals of hits and of
+   meshes are trilinear there.
 
    Chunks: a larger field may be looked at in parts, each a volume of its own. Neighbours share the voxels of one plane, and every part
    owns the cells between its own voxels. halo_low and halo_high say how many voxels of the larger field lie in memory before
@@ -467,7 +468,7 @@ ISOGI_API isogi_result isogi_vol_bundle_all(const isogi_pyramid *pyramid, const 
                                             size_t capacity, isogi_hit *hits, size_t *counts, isogi_counters *counters);
 
 typedef enum isogi_normal_kind {
-    ISOGI_NORMAL_SMOOTH = 0, /* gradient of the cubic B-spline: what to shade with */
+    ISOGI_NORMAL_SMOOTH = 0, /* gradient of the cubic B-spline: what to shade with; trilinear within two voxels of one not finite */
     ISOGI_NORMAL_TRILINEAR   /* gradient of the trilinear field: what the ray hit */
 } isogi_normal_kind;
 
@@ -8897,6 +8898,32 @@ ISOGI_API isogi_result isogi_vol_positions(const isogi_pyramid *pyramid, const i
     return ISOGI_OK;
 }
 
+/* Within two voxels of one that is not finite: the mean of the trilinear gradients of the cells that touch the place and hold the field;
+   where these cancel (a sheet one voxel thick), that of the first one. */
+static void isogi_vol__gradient_beside(const isogi_pyramid *p, const int cell[3], const double local[3], double gradient[3]) {
+    double first[3] = {0, 0, 0}, most = 0;
+    int i, a, found = 0;
+    for (a = 0; a < 3; a++) gradient[a] = 0;
+    for (i = 0; i < 8; i++) {
+        double at[3], corner[8], g[3];
+        int beside[3], exists = 1;
+        for (a = 0; a < 3; a++) {
+            const int lower = local[a] <= 0 && cell[a] > 0, upper = local[a] >= 1 && cell[a] + 1 < p->cells[a];
+            beside[a] = cell[a], at[a] = local[a];
+            if (!(i >> a & 1)) continue;
+            beside[a] += upper - lower, at[a] = lower;
+            exists &= lower | upper;
+        }
+        if (!exists || !isogi_vol__corners(p, beside, 0, corner)) continue;
+        isogi_vol__trilinear(corner, at, g);
+        most = isogi_vol__max(most, isogi_vol__largest(g[0], g[1], g[2]));
+        for (a = 0; a < 3; a++) gradient[a] += g[a], first[a] = found ? first[a] : g[a];
+        found = 1;
+    }
+    for (a = 0; a < 3; a++) gradient[a] = fabs(gradient[a]) > 1e-6 * most ? gradient[a] : 0; /* what rounding has left */
+    if (!(isogi_vol__largest(gradient[0], gradient[1], gradient[2]) > 1e-3 * most)) memcpy(gradient, first, sizeof first);
+}
+
 /* The gradient of the smoothed field, per grid unit; zero where it is nothing but what rounding has left of voxels that cancel, as in the
    middle of a sheet: it would point anywhere, on each instruction path elsewhere. Hardly ever near enough to that to look at the voxels. */
 static void isogi_vol__smooth_gradient(const isogi_pyramid *p, const int cell[3], const double local[3], double gradient[3]) {
@@ -8905,6 +8932,7 @@ static void isogi_vol__smooth_gradient(const isogi_pyramid *p, const int cell[3]
     double w[3][4], d[3][4], most, low = DBL_MAX, high = -DBL_MAX;
     int tap[3][4], a, i;
     isogi_vol__cubic_sum(p, ISOGI_FILTER_BSPLINE, cell, local, gradient);
+    if (!isogi_vol__finite3(gradient)) isogi_vol__gradient_beside(p, cell, local, gradient);
     most = isogi_vol__largest(gradient[0], gradient[1], gradient[2]);
     if (!(most > 0 && most < noise * (p->range[1] - p->range[0]))) return;
     for (a = 0; a < 3; a++) isogi_vol__tap_weights(ISOGI_FILTER_BSPLINE, v, a, cell[a], local[a], w[a], d[a], tap[a]);
@@ -9991,8 +10019,9 @@ static void isogi_vol__edge_normal(const isogi_vol__mesher *m, size_t at, int ax
 #endif
             isogi_vol__edge_gradient(v, p, stride, u, gradient);
         for (a = 0; a < 3; a++) n[(axis + a) % 3] = -gradient[a];
-        isogi_vol__mesh_normal(m, at, n);
-    } else {
+    }
+    if (whole && isogi_vol__finite3(n)) isogi_vol__mesh_normal(m, at, n);
+    else {
         for (a = 0; a < 3; a++) gradient[a] = voxel[a] + (a == axis ? u : 0);
         isogi_vol__smoothed_normal(m, at, gradient);
     }

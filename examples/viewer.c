@@ -1081,6 +1081,10 @@ static void surface_normals(const viewer *v, shade_batch *b) {
         isogi_vol_sample_smooth(v->pyramid, (const float(*)[3])b->point, b->count, NULL, b->normal);
         for (size_t i = 0; i < b->count; i++) {
             double n[3] = {-(double)b->normal[i][0], -(double)b->normal[i][1], -(double)b->normal[i][2]};
+            if (!isfinite(n[0] + n[1] + n[2])) { /* beside voxels that are not finite */
+                isogi_vol_sample(v->pyramid, (const float(*)[3])&b->point[i], 1, NULL, &b->normal[i]);
+                for (int k = 0; k < 3; k++) n[k] = -(double)b->normal[i][k];
+            }
             if (!vector_normalize(n)) memset(n, 0, sizeof n);
             for (int k = 0; k < 3; k++) b->normal[i][k] = (float)n[k];
         }

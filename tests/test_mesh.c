@@ -782,6 +782,65 @@ TEST(cells_with_a_voxel_that_is_not_finite_are_left_out) {
     }
 }
 
+/* A ball whose surroundings are masked out from one or two voxels above its surface: smoothed normals of hits and vertices, which would
+   need what is masked, point out of the ball; those of a sheet one voxel thick, where the field rises on both sides, across it. */
+TEST(surfaces_beside_a_mask_have_normals) {
+    for (int type = 0; type < 2; type++)
+        for (int layer = 0; layer < 4; layer++) {
+            enum { N = 26 };
+            static float floats[N * N * N];
+            const double centre[3] = {12.3, 12.6, 12.1}, radius = 8.2;
+            field f = field_new(N, N, N);
+            double worst[2] = {1, 1};
+            int hits = 0;
+            for (int i = 0; i < N * N * N; i++) {
+                double r = 0;
+                for (int a = 0; a < 3; a++) r += pow((a ? a > 1 ? i / N / N : i / N % N : i % N) - centre[a], 2);
+                f.value[i] = sqrt(r) > radius + 1 + 0.4 * layer ? (double)NAN : radius - sqrt(r), floats[i] = (float)f.value[i];
+            }
+            if (type) f.volume.data = floats, f.volume.type = ISOGI_F32;
+            field_build_with(&f, &serial);
+            isogi_mesh mesh = mesh_of(&f, 0, 1, 0);
+            for (size_t v = 0; v < mesh.vertex_count; v++) {
+                double along = 0, length = 0;
+                for (int a = 0; a < 3; a++) {
+                    double out = (double)mesh.positions[v][a] - centre[a];
+                    along += out * (double)mesh.normals[v][a], length += out * out;
+                }
+                worst[0] = fmin(worst[0], along / sqrt(length));
+            }
+            test_random r = {(uint64_t)layer + 9};
+            for (int n = 0; n < 2000; n++) {
+                isogi_ray ray = {.tmax = 99};
+                isogi_hit hit;
+                float normal[1][3];
+                double d[3], along = 0;
+                random_direction(&r, d);
+                for (int a = 0; a < 3; a++) ray.origin[a] = centre[a], ray.dir[a] = (float)d[a];
+                isogi_vol_intersect(f.pyramid, &ray, 1, &hit, NULL);
+                if (!hit.side) continue;
+                isogi_vol_normals(f.pyramid, &hit, 1, ISOGI_NORMAL_SMOOTH, normal), hits++;
+                for (int a = 0; a < 3; a++) along += d[a] * (double)normal[0][a];
+                worst[1] = fmin(worst[1], along);
+            }
+            CHECK(mesh.vertex_count > 300 && hits > 500, "%zu vertices, %d hits", mesh.vertex_count, hits);
+            CHECK(worst[0] > 0.97 && worst[1] > 0.97, "cosines to the radius from %g at vertices, %g at hits", worst[0], worst[1]);
+            isogi_vol_mesh_free(f.pyramid, &mesh);
+            field_free(&f);
+        }
+    field f = field_new(9, 9, 9);
+    for (int i = 0; i < 729; i++) f.value[i] = i / 81 == 4 ? 1 : i / 81 == 6 ? NAN : -1;
+    field_build_with(&f, &serial);
+    isogi_ray ray = {.origin = {3.5, 4.5, 4.9}, .dir = {0.25f, 0.5f, -1}, .tmax = 9, .isovalue = 1};
+    isogi_hit hit;
+    float normal[1][3];
+    isogi_vol_intersect(f.pyramid, &ray, 1, &hit, NULL);
+    isogi_vol_normals(f.pyramid, &hit, 1, ISOGI_NORMAL_SMOOTH, normal);
+    CHECK(hit.side && !(fabs((double)normal[0][0]) > 1e-6) && !(fabs((double)normal[0][1]) > 1e-6) && fabs((double)normal[0][2]) > 0.999,
+          "side %d, normal %g %g %g", hit.side, (double)normal[0][0], (double)normal[0][1], (double)normal[0][2]);
+    field_free(&f);
+}
+
 /* Blocks that the pyramid knows to be on one side are not read: what is put there behind its back is not seen. A block's diagonal is
    below 7 voxels, so none that meets the surface reaches further than that. */
 TEST(blocks_without_surface_are_not_read) {
