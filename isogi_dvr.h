@@ -380,7 +380,7 @@ typedef struct isogi_dvr isogi_dvr;
 /* Which place along a ray is its depth. */
 typedef enum isogi_depth_kind {
     ISOGI_DEPTH_HALF = 0, /* where half of the pixel's final opacity is reached: what stands for a surface among rasterized geometry. It
-                             only says which of both is in front: geometry inside of matter shows through where it is a peak */
+                             only says which of both is in front: for geometry inside of matter there is isogi_view.until */
     ISOGI_DEPTH_FIRST     /* where opacity begins (a 2^-40th of the final one): geometry before it is not covered by anything; of rays that
                              are sampled up to a step too far, of exact ones (data space, or a bound) right to rounding */
 } isogi_depth_kind;
@@ -393,11 +393,15 @@ typedef struct isogi_view {
     int local;                      /* 0, or 1: shade by local visibility, for cut planes, and lights within. ISOGI_INVALID where the
                                        paper's method is not at work (another method, peaks, data space, unlit, tetrahedra) */
     isogi_depth_kind depth;         /* what is asked for where depth is */
-    const float *until;             /* [height*width], borrowed for the call: how far from the eye each pixel's ray ends, by opaque geometry
-                                       that stands there; INFINITY where there is none, 0 or less where nothing is to be seen; NULL = no
-                                       geometry. From a rasterizer's depth z along the line of sight: z / (dir . forward). Put the picture
-                                       over that of the geometry as over a background. The geometry throws no shadow */
+    const float *until;             /* [height*width], borrowed for the call; NULL = no geometry: see below */
 } isogi_view;
+
+/* Geometry among matter, isogi_view.until: how far from the eye the ray through each pixel's centre ends, at something opaque, which throws
+   no shadow. INFINITY where there is nothing; 0 or less where nothing is to be seen; NaN is ISOGI_INVALID. The picture is put over that of
+   the geometry as over a background (opacity and depth are those of matter alone). From a rasterizer's depth z along the line of sight: z /
+   (dir . forward), dir as isogi_view_ray gives it, forward the one for x = (width - 1) / 2, y = (height - 1) / 2; from a z-buffer of 0..1
+   z = near far / (far - d (far - near)), and INFINITY where d = 1. A peak at which geometry stands is on either side of it, by rounding:
+   an isosurface drawn at a peak of its own value is brought nearer by a millionth. */
 
 /* The ray through the centre of pixel (x, y); fractions are allowed: pixel x covers x-1/2 .. x+1/2. dir is a unit vector.
    Where up is along the line of sight, another up is chosen; where eye and target coincide, the view is along -z. */
@@ -3445,6 +3449,7 @@ static void isogi_dvr__begin_crossings(isogi_dvr__crossings *c, const isogi_dvr 
         memset(&c->hit[i], 0, sizeof c->hit[i]);
         ray.isovalue = d->transfer.peaks[i].isovalue;
         if (d->clip_count) ray.tmin = m->enter;
+        if (m->cut) ray.tmax = (float)isogi_dvr__clamp((m->enter + m->length) * (1 + 1e-6), 3e38);
         if (d->transfer.peaks[i].opacity > 0) isogi_vol_intersect(d->desc.pyramid, &ray, 1, &c->hit[i], &c->work);
         c->t[i] = c->hit[i].side && c->hit[i].t + c->shift <= c->end ? c->hit[i].t + c->shift : 1e300;
     }
@@ -6412,12 +6417,17 @@ static void isogi_dvr__fast_light(const isogi_dvr__frame *f, const isogi_dvr__fa
     }
 }
 
-/* Where along the ray light is looked up for a piece: where it is seen on average, its middle when it is clear, its beginning when it is
-   dense; and off dense matter. */
+/* Where along the ray a piece is seen on average: its middle when it is clear, its beginning when it is dense. */
+static float isogi_dvr__fast_middle(const isogi_dvr__fast_run *run, int k) {
+    float half = k + 1 < run->pieces ? 0.5f : 0.5f * (run->last / run->length);
+    return run->first + run->stride * ((float)k + half / (1 + run->depth[k] * (1.0f / 6)));
+}
+
+/* Where light is looked up for it: there, and off dense matter. */
 static float isogi_dvr__fast_place(const isogi_dvr__fast_ray *r, const isogi_dvr__fast_run *run, int k, float *open) {
     float off = (float)isogi_dvr__stand_off((double)r->reach, (double)(run->mean[k] * (r->piece * r->reach)));
     *open = (float)isogi_dvr__by_openness((double)r->reach, (double)off);
-    off = run->first + run->stride * ((float)k + 0.5f / (1 + run->depth[k] * (1.0f / 6))) - off;
+    off = isogi_dvr__fast_middle(run, k) - off;
     return off > 0 ? off : 0;
 }
 
@@ -6435,7 +6445,7 @@ static void isogi_dvr__fast_lamps(const isogi_dvr__frame *f, const isogi_dvr__fa
     size_t i, c;
     for (k = 0; k < run->pieces; k++) {
         double grid[3], place[3];
-        float seen = run->first + run->stride * ((float)k + 0.5f / (1 + run->depth[k] * (1.0f / 6))), open, at;
+        float seen = isogi_dvr__fast_middle(run, k), open, at;
         if (!(bits >> k & 1)) continue;
         at = isogi_dvr__fast_place(r, run, k, &open);
         for (a = 0; a < 3; a++) {
@@ -6865,7 +6875,9 @@ ISOGI_DVR__AVX2 inline void isogi_dvr__parts_avx2(const isogi_dvr__frame *f, con
     x = _mm256_div_ps(x, _mm256_add_ps(x, _mm256_set1_ps(16)));
     _mm256_storeu_ps(parts->open, _mm256_max_ps(_mm256_fmsub_ps(x, _mm256_set1_ps(2), one), zero));
     x = _mm256_mul_ps(reach, x);
-    at = _mm256_div_ps(half, _mm256_fmadd_ps(_mm256_loadu_ps(run->depth), _mm256_set1_ps(1.0f / 6), one));
+    at = _mm256_castsi256_ps(_mm256_cmpeq_epi32(_mm256_set1_epi32(run->pieces - 1), _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7)));
+    at = _mm256_blendv_ps(half, _mm256_set1_ps(0.5f * (run->last / run->length)), at); /* as isogi_dvr__fast_middle */
+    at = _mm256_div_ps(at, _mm256_fmadd_ps(_mm256_loadu_ps(run->depth), _mm256_set1_ps(1.0f / 6), one));
     at = _mm256_add_ps(at, _mm256_setr_ps(0, 1, 2, 3, 4, 5, 6, 7));
     at = _mm256_max_ps(_mm256_sub_ps(_mm256_fmadd_ps(at, _mm256_set1_ps(run->stride), _mm256_set1_ps(run->first)), x), zero);
     for (a = 0; a < 3; a++) {

@@ -8908,7 +8908,8 @@ static void isogi_vol__gradient_beside(const isogi_pyramid *p, const int cell[3]
         double at[3], corner[8], g[3];
         int beside[3], exists = 1;
         for (a = 0; a < 3; a++) {
-            const int lower = local[a] <= 0 && cell[a] > 0, upper = local[a] >= 1 && cell[a] + 1 < p->cells[a];
+            const int lower = local[a] <= 0 && (cell[a] > 0 || p->volume.halo_low[a]),
+                      upper = local[a] >= 1 && (cell[a] + 1 < p->cells[a] || p->volume.halo_high[a]);
             beside[a] = cell[a], at[a] = local[a];
             if (!(i >> a & 1)) continue;
             beside[a] += upper - lower, at[a] = lower;
@@ -8932,7 +8933,10 @@ static void isogi_vol__smooth_gradient(const isogi_pyramid *p, const int cell[3]
     double w[3][4], d[3][4], most, low = DBL_MAX, high = -DBL_MAX;
     int tap[3][4], a, i;
     isogi_vol__cubic_sum(p, ISOGI_FILTER_BSPLINE, cell, local, gradient);
-    if (!isogi_vol__finite3(gradient)) isogi_vol__gradient_beside(p, cell, local, gradient);
+    if (!isogi_vol__finite3(gradient)) {
+        isogi_vol__gradient_beside(p, cell, local, gradient);
+        return;
+    }
     most = isogi_vol__largest(gradient[0], gradient[1], gradient[2]);
     if (!(most > 0 && most < noise * (p->range[1] - p->range[0]))) return;
     for (a = 0; a < 3; a++) isogi_vol__tap_weights(ISOGI_FILTER_BSPLINE, v, a, cell[a], local[a], w[a], d[a], tap[a]);

@@ -302,8 +302,8 @@ static const option option_list[] = {
      NAMED(coarsest_name, coarsest), .has = AT(has_coarsest)},
     {"--local", 0, 1 << DVR, "light by local visibility, of --method paper: for clip planes and lights within", FLAG, .offset = AT(local)},
     {"--depth", "FILE.pfm", VOLUMES,
-     "as well: distance from the eye to half of a pixel's opacity (to --surface where less than half lies before it), where "
-     "nothing is seen infinity, as floats (the nearest of a pixel's samples)",
+     "as well: distance from the eye to half of the matter's opacity in a pixel, or to --surface where that is less than a half; where "
+     "nothing is seen infinity; as floats (the nearest of a pixel's samples)",
      TEXT, .offset = AT(depth)},
     {"--classification", "NAME", VOLUMES, "exact, pre-integrated, post-classified; dvr knows the last one and, for both others, its own",
      NAMED(classification_name, classification), .has = AT(has_classification)},
@@ -1444,7 +1444,7 @@ static int draw_surface(viewer *v, int factor, float (*picture)[4], float *until
             double d[3];
             camera_direction(&v->view, x, y, d);
             until[i] = v->seen[0][i] == RASTER_NONE ? INFINITY : (float)(sqrt(vector_dot(d, d)) / (double)v->inverse[0][i]);
-            if (v->seen[0][i] == SECTION) until[i] *= 1 - 1e-6f; /* rounded away, it would let matter be seen that begins there */
+            until[i] *= 1 - 1e-6f; /* rounded away, it would let matter be seen that begins there */
             seen += v->seen[0][i] != RASTER_NONE;
         }
     if (ok && !seen) fprintf(stderr, "note: no surface is in view at --surface %.9g (the data range from %.9g to %.9g)\n", v->isovalue,
@@ -1480,7 +1480,8 @@ static int render_volume(viewer *v) {
         return file_fail(v->error, "--size %dx%d with --aa %d is %dx%d samples; at most 32768 along a side", v->o.width, v->o.height,
                          v->o.antialias, view.width, view.height);
     /* our pixels and those of the library, with depth, and what is behind them */
-    if (!check_memory(v, (double)(factor * factor) / v->o.antialias * (2 * sizeof *large + 2 * sizeof *depth + 20))) return 0;
+    if (!check_memory(v, (double)(factor * factor) / v->o.antialias *
+                             ((1.0 + v->o.has_surface) * (double)(sizeof *large + sizeof *depth) + 20))) return 0;
     context.progress = tell_stage;
     if (v->o.has_shading) desc.shading = (isogi_dvr_shading)v->o.shading;
     desc.classification = (isogi_dvr_classification)v->o.classification, desc.silhouette = (isogi_dvr_silhouette)v->o.silhouette,
@@ -1513,6 +1514,7 @@ static int render_volume(viewer *v) {
     if (v->o.depth) depth = (float *)malloc(pixels * sizeof *depth);
     if (v->o.has_surface) surface = (float(*)[4])calloc(pixels, sizeof *surface), until = (float *)malloc(pixels * sizeof *until);
     if (result == ISOGI_OK && (!large || (v->o.depth && !depth) || (v->o.has_surface && (!surface || !until)))) result = ISOGI_NO_MEMORY;
+    if (surface) stat_line(v, "surface", "%.9g", v->o.surface);
     if (result == ISOGI_OK && surface) ok = draw_surface(v, factor, surface, until), view.until = until, begun = seconds();
     v->stage = "picture", v->stage_begun = begun;
     if (result == ISOGI_OK && ok) result = isogi_dvr_render(dvr, &view, &v->lighting, large, depth, &v->counters);

@@ -544,18 +544,18 @@ static size_t picture_of(const char *mode, const char *words, unsigned char *byt
 TEST(a_surface_stands_in_the_matter) {
     enum { SIDE = 48, PIXELS = SIDE * SIDE };
     static const char *const scene = "procedural:gyroid:24 --size 48x48 --exposure 1 --albedo .9,.6,.2 --light directional:1,1,1:3,2,1";
-    /* clear; before the surface; within it, opaque */
+    /* clear; before the surface; within it, opaque; at it */
     static const char *const matter[] = {"-1.5 0 1 1 1\n", "-1.5 0 1 .2 .1\n-.5 0 1 .2 .1\n-.1 .2 .1 .2 1\n0.3 0 .1 .2 1\n",
-                                         "0.5 0 .1 1 .1\n0.5 1e6 .1 1 .1\n"};
+                                         "0.5 0 .1 1 .1\n0.5 1e6 .1 1 .1\n", "-1.5 0 1 1 1\npeak 0.2 0.5 0 0 1\n"};
     static const char *const ways[] = {"--mode lambert --shadows on --raycast --iso 0.2 --aa 1", "--mode dvr --shading unlit --surface 0.2",
                                        "--mode scale-invariant --shading unlit --surface 0.2 --aa 1",
                                        "--mode dvr --shading unlit --surface 0.2 --aa 4"};
     static unsigned char map[14 + 4 * PIXELS + 1];
-    unsigned char *picture[6];
+    unsigned char *picture[7];
     char command[1024];
-    int shape[3] = {0}, seen = 0, changed[6] = {0};
+    int shape[3] = {0}, seen = 0, changed[7] = {0};
     double outliers;
-    for (int n = 0; n < 6; n++) {
+    for (int n = 0; n < 7; n++) {
         write_bytes(temporary("matter.tf"), matter[n < 4 ? 0 : n - 3], strlen(matter[n < 4 ? 0 : n - 3]));
         int length = snprintf(command, sizeof command, "%s %s --out '%s'", scene, ways[n < 4 ? n : 1], temporary("surface.png"));
         if (n)
@@ -570,18 +570,20 @@ TEST(a_surface_stands_in_the_matter) {
         if (file) fclose(file);
         if (n != 1) continue;
         for (int i = 0; i < PIXELS; i++) {
-            float depth;
-            memcpy(&depth, map + 14 + 4 * i, sizeof depth), seen += depth < 1e30f;
+            const unsigned char *at = map + 14 + 4 * i;
+            uint32_t bits = at[0] | (uint32_t)at[1] << 8 | (uint32_t)at[2] << 16 | (uint32_t)at[3] << 24;
+            seen += bits != 0x7f800000;
         }
     }
-    for (int n = 1; n < 6; n++)
+    for (int n = 1; n < 7; n++)
         for (int i = 0; i < PIXELS; i++) changed[n] += memcmp(picture[0] + 3 * i, picture[n] + 3 * i, 3) != 0;
     CHECK(seen > PIXELS / 6, "%d pixels have a depth", seen);
-    CHECK(!changed[1] && !changed[2], "%d and %d pixels differ from those of lambert", changed[1], changed[2]);
+    CHECK(!changed[1] && !changed[2] && !changed[6], "%d, %d and, with a peak at the surface, %d pixels differ from those of lambert",
+          changed[1], changed[2], changed[6]);
     CHECK(changed[3] && picture_difference(picture[0], picture[3], SIDE, SIDE, &outliers) < 12, "four samples show something else");
     CHECK(changed[4] > PIXELS / 6, "matter before the surface changes %d pixels", changed[4]);
     CHECK(changed[5] < seen / 20, "matter behind the surface changes %d pixels of %d", changed[5], seen); /* the box opens some of it */
-    for (int n = 0; n < 6; n++) free(picture[n]);
+    for (int n = 0; n < 7; n++) free(picture[n]);
 }
 
 TEST(every_option_is_refused_or_changes_the_picture) {
