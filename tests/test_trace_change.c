@@ -149,6 +149,144 @@ TEST(colours_concern_their_isovalues) {
     scene_free(&s);
 }
 
+/* ---- one member of the description at a time -------------------------------------------------------------------------------------- */
+
+/* What a change of one member has to cost. SOME: texels of isovalues above 0.4, where a table's last point stood. */
+enum { NONE, SOME, ALL, JOINING };
+
+static void painted(void *user, double isovalue, const double point[3], float albedo[3], float emission[3]) {
+    const float *shade = (const float *)user;
+    (void)isovalue;
+    for (int c = 0; c < 3; c++) albedo[c] *= point[0] > 5 ? shade[0] : shade[1];
+    emission[1] = point[1] > 4 ? shade[1] : 0;
+}
+
+/* Member number k takes another value: d[0] before, d[1] after. What that costs with IRRADIANCE, and with TRANSFER (-1: not allowed). */
+typedef struct member { const char *name; int cost, transfer; } member;
+static const member members[] = {
+    {"samples", ALL, ALL}, {"samples, the default", NONE, NONE}, {"bounces", ALL, ALL}, {"seed", ALL, ALL}, {"offset", ALL, ALL},
+    {"offset, the default", NONE, NONE}, {"reach", ALL, ALL}, {"no_shadows", ALL, ALL}, {"no_shadows, twice", NONE, NONE},
+    {"error", ALL, NONE}, {"material", ALL, ALL}, {"material_user", ALL, ALL}, {"light_count", ALL, NONE}, {"lights", ALL, NONE},
+    {"env.sh_order", ALL, NONE}, {"albedo", ALL, ALL}, {"albedo_count", SOME, SOME}, {"albedo_points", SOME, SOME},
+    {"emission_count", SOME, -1}, {"emission_points", SOME, -1}, {"isovalue_max", JOINING, JOINING}, {"isovalue_min", JOINING, JOINING},
+    {"lookup", JOINING, JOINING}};
+enum { MEMBERS = (int)(sizeof members / sizeof members[0]) };
+
+static void change_member(int k, isogi_trace_desc d[2]) {
+    static const isogi_albedo_point colours[2][3] = {
+        {{-1, {0.5f, 0.6f, 0.7f}}, {0.4, {0.7f, 0.8f, 0.9f}}, {0.8, {0.2f, 0.3f, 0.4f}}},
+        {{-1, {0.5f, 0.6f, 0.7f}}, {0.4, {0.7f, 0.8f, 0.9f}}, {0.8, {0.2f, 0.9f, 0.4f}}}};
+    static const isogi_light lights[2][2] = {
+        {{.vector = {1, 2, 1}, .rgb = {1, 2, 3}, .radius = 0.3f}, {.vector = {-1, 1, 2}, .rgb = {2, 2, 1}}},
+        {{.vector = {1, 2, 1}, .rgb = {1, 2, 3}, .radius = 0.3f}, {.vector = {-1, 1, 1}, .rgb = {2, 2, 1}}}};
+    static const float sky[12] = {3, 3.5f, 4, 0.3f, 0, 0.1f, 0.5f, 0, 0.7f, 0, -0.4f, 0.2f};
+    static float shades[2][2] = {{0.9f, 0.5f}, {0.8f, 0.7f}};
+    for (int i = 0; i < 2; i++) {
+        d[i].lighting.lights = lights[0], d[i].lighting.light_count = 2, d[i].lighting.env.sh = sky, d[i].lighting.env.sh_order = 2;
+        if (k == 10 || k == 11) d[i].material_user = shades[0];
+        if (k == 11) d[i].material = painted;
+        if (k == 16 || k == 17) d[i].albedo_points = colours[0], d[i].albedo_count = 3;
+        if (k == 18 || k == 19) d[i].emission_points = colours[0], d[i].emission_count = 3;
+        if (k > 19) d[i].isovalue_min = -0.2, d[i].isovalue_max = 0.3;
+    }
+    switch (k) {
+    case 0: d[1].samples = 3; break;
+    case 1: d[0].samples = 0, d[1].samples = 64, d[0].bounces = d[1].bounces = 0; break;
+    case 2: d[1].bounces = 1; break;
+    case 3: d[1].seed = 1; break;
+    case 4: d[1].offset = 0.5f; break;
+    case 5: d[1].offset = 0.25f; break;
+    case 6: d[1].reach = 3; break;
+    case 7: d[1].no_shadows = 1; break;
+    case 8: d[0].no_shadows = 1, d[1].no_shadows = 2; break;
+    case 9: d[1].error = 0.2f; break;
+    case 10: d[1].material = painted; break;
+    case 11: d[1].material_user = shades[1]; break;
+    case 12: d[1].lighting.light_count = 1; break;
+    case 13: d[1].lighting.lights = lights[1]; break;
+    case 14: d[1].lighting.env.sh_order = 1; break;
+    case 15: d[1].albedo[1] = 0.3f; break;
+    case 16: d[1].albedo_count = 2; break;
+    case 17: d[1].albedo_points = colours[1]; break;
+    case 18: d[1].emission_count = 2; break;
+    case 19: d[1].emission_points = colours[1]; break;
+    case 20: d[1].isovalue_max = 0.9; break;
+    case 21: d[1].isovalue_min = -0.9; break;
+    default: d[1].lookup = ISOGI_TRACE_BSPLINE; /* reads further */
+    }
+}
+
+/* There and back: each time the bits and the lookups of a new texture; only what depends on the member is computed again, and texels that
+   have left the interval of isovalues are still there when it grows again. */
+static void change_and_back(const scene *s, const member *m, int cost, const isogi_trace_desc d[2]) {
+    float points[40][3], e[2][40][3];
+    isogi_trace *t = baked(&d[0]), *fresh;
+    const uint64_t first = counted(t).texels;
+    const int n = surface_points(s, 0.1, 40, 9, points);
+    for (int back = 0; back < (LONG_SUITE || cost == JOINING ? 2 : 1); back++) {
+        const isogi_trace_desc *now = &d[!back];
+        isogi_counters before = counted(t), took, new_one;
+        double remaining = 1;
+        fresh = baked(now), new_one = counted(fresh);
+        CHECK(isogi_trace_change(t, now) == ISOGI_OK && isogi_trace_step(t, 0, &remaining) == ISOGI_OK && remaining <= 0, "%s", m->name);
+        took = counted(t), took.texels -= before.texels, took.rays -= before.rays;
+        isogi_trace_sample(t, (const float(*)[3])points, (size_t)n, e[0], NULL);
+        isogi_trace_sample(fresh, (const float(*)[3])points, (size_t)n, e[1], NULL);
+        CHECK(!memcmp(e[0], e[1], (size_t)n * sizeof e[0][0]) && fabs((double)e[0][0][0]) > 0.01, "%s: lookups, back %d", m->name, back);
+        CHECK((back && cost == JOINING) || same_bits(t, fresh), "%s: other bits than a new texture, back %d", m->name, back);
+        isogi_trace_free(fresh);
+        const int sides = now->sides == ISOGI_TRACE_BOTH_SIDES ? 2 : 1;
+        const uint64_t expected = cost == ALL ? new_one.texels : cost == JOINING && !back ? new_one.texels - first
+                                : cost == SOME ? (uint64_t)texels_between(t, s, 0.4, 9) : 0;
+        if (cost == SOME && sides == 2) /* of the high side, too */
+            CHECK(took.texels > expected && took.texels < 2 * expected + 20, "%s: %d texels", m->name, (int)took.texels);
+        else CHECK(took.texels == expected, "%s, back %d: %d texels, not %d", m->name, back, (int)took.texels, (int)expected);
+        CHECK(cost == NONE || (cost == JOINING && back) ? took.rays == 0 : took.texels > 0, "%s, back %d: %d texels, %d rays", m->name,
+              back, (int)took.texels, (int)took.rays);
+        CHECK(cost != SOME || 10 * took.texels < 9 * new_one.texels, "%s: %d texels are some", m->name, (int)took.texels);
+    }
+    isogi_trace_free(t);
+}
+/* Large blocks are handed out again: new pages would take most of the time of bakes as small as these. */
+typedef struct reused { void *block[4]; size_t size[4]; } reused;
+static void *reused_alloc(void *user, size_t size, size_t align) {
+    reused *r = (reused *)user;
+    void *p = NULL;
+    for (int i = 0; i < 4; i++)
+        if (r->block[i] && r->size[i] == size) return p = r->block[i], r->block[i] = NULL, p;
+    return posix_memalign(&p, align < 64 ? 64 : align, size) ? NULL : p;
+}
+static void reused_release(void *user, void *p, size_t size) {
+    reused *r = (reused *)user;
+    for (int i = 0; i < 4 && size > 100000; i++)
+        if (!r->block[i]) { r->block[i] = p, r->size[i] = size; return; }
+    free(p);
+}
+
+static void change_each_member(isogi_trace_mode mode) {
+    reused memory = {{NULL}, {0}};
+    const isogi_context serial = {.threads = 1, .alloc = reused_alloc, .release = reused_release, .user = &memory};
+    const int size = LONG_SUITE ? 10 : 6;
+    double q[1] = {0.5};
+    scene s = scene_make(size, size - 1, size, NULL, gyroid, q);
+    isogi_vol_free(s.pyramid), isogi_vol_build(&s.pyramid, &s.volume, &serial);
+    for (int k = 0; k < MEMBERS; k++) {
+        const member *m = &members[k];
+        const int cost = mode == ISOGI_TRACE_IRRADIANCE ? m->cost : m->transfer;
+        isogi_trace_desc d[2] = {desc_make(&s, 0.6f, 2, 2), desc_make(&s, 0.6f, 2, 2)};
+        for (int i = 0; i < 2; i++) {
+            if (mode == ISOGI_TRACE_TRANSFER) d[i].mode = mode, d[i].order = 2, d[i].transfer_channels = 3;
+            if (k % 3 == 0) d[i].sides = ISOGI_TRACE_BOTH_SIDES;
+        }
+        change_member(k, d);
+        if (cost >= 0) change_and_back(&s, m, cost, d);
+    }
+    scene_free(&s);
+    for (int i = 0; i < 4; i++) free(memory.block[i]);
+}
+TEST(every_member_alone_costs_what_depends_on_it) { change_each_member(ISOGI_TRACE_IRRADIANCE); }
+TEST(every_member_alone_costs_what_transfer_depends_on) { change_each_member(ISOGI_TRACE_TRANSFER); }
+
 /* An interval that grows adds texels; one that shrinks costs nothing, and what was computed is still there when it grows again. */
 TEST(isovalues_add_texels) {
     double q[1] = {0.5};
@@ -246,8 +384,8 @@ TEST(changed_voxels_give_the_bits_of_a_new_bake) {
 
 /* What another box has brought is kept up by changes of voxels, too: texels that keep a surface have the bits of a new bake. */
 TEST(merged_boxes_follow_changed_voxels) {
-    enum { N = 16, CUT = 8, ALL = N * N * N };
-    static uint8_t has[ALL];
+    enum { N = 16, CUT = 8, TEXELS = N * N * N };
+    static uint8_t has[TEXELS];
     double q[1] = {0.4};
     test_random r = {11};
     for (int k = 0; k < (LONG_SUITE ? 20 : 4); k++) {
@@ -272,7 +410,7 @@ TEST(merged_boxes_follow_changed_voxels) {
             if (change) change_box(&s, t[0], &r, 1);
             CHECK(isogi_trace_step(t[0], 0, NULL) == ISOGI_OK && (isogi_trace_status(t[0], &report), !report.drafts), "step");
             fresh = baked(&d);
-            for (size_t i = 0; i < ALL; i++) {
+            for (size_t i = 0; i < TEXELS; i++) {
                 const size_t texel[3] = {i % N, i / N % N, i / N / N};
                 const float point[1][3] = {{(float)texel[0], (float)texel[1], (float)texel[2]}};
                 float e[2][1][3];
@@ -283,7 +421,7 @@ TEST(merged_boxes_follow_changed_voxels) {
                 CHECK(!memcmp(e[0], e[1], sizeof e[0]), "round %d, change %d, texel %d %d %d: %g, not %g", k, change, (int)texel[0],
                       (int)texel[1], (int)texel[2], (double)e[0][0][1], (double)e[1][0][1]);
             }
-            CHECK(beyond > ALL / 4 && kept > ALL / 2, "round %d: %d texels are kept, %d of the other box", k, kept, beyond);
+            CHECK(beyond > TEXELS / 4 && kept > TEXELS / 2, "round %d: %d texels are kept, %d of the other box", k, kept, beyond);
             isogi_trace_free(fresh);
         }
         isogi_trace_free(t[0]), isogi_trace_free(t[1]), free(block), scene_free(&s);
@@ -444,6 +582,40 @@ TEST(feedback_follows_changes) {
               moved / mean);
         isogi_trace_free(t), isogi_trace_free(fresh), scene_free(&s);
     }
+}
+
+/* Members that only the default method reads, or reads in its own way: after the change light is that of a new bake, which is elsewhere
+   than before. */
+TEST(feedback_follows_members) {
+    static const int which[6] = {4, 6, 7, 9, 11, 15}; /* the last two are common to both methods */
+    double q[1] = {0.5};
+    scene s = scene_make(11, 10, 11, NULL, gyroid, q);
+    float points[100][3], e[3][100][3];
+    const int n = surface_points(&s, 0.1, 100, 9, points);
+    for (int k = 0; k < (LONG_SUITE ? 6 : 4); k++) {
+        const char *name = members[which[k]].name;
+        isogi_trace_desc d[2] = {desc_make(&s, 0.6f, 2, 4), desc_make(&s, 0.6f, 2, 4)};
+        double sum = 0, mean = 0, moved = 0;
+        isogi_counters before, after;
+        for (int i = 0; i < 2; i++) d[i].method = ISOGI_TRACE_FEEDBACK, d[i].isovalue_min = 0, d[i].isovalue_max = 0.2;
+        if (which[k] == 9) d[0].samples = d[1].samples = 32, d[0].error = 0.05f;
+        change_member(which[k], d);
+        isogi_trace *t = baked(&d[0]), *fresh = baked(&d[1]);
+        isogi_trace_sample(t, (const float(*)[3])points, (size_t)n, e[0], NULL), before = counted(t);
+        CHECK(isogi_trace_change(t, &d[1]) == ISOGI_OK && isogi_trace_step(t, 0, NULL) == ISOGI_OK, "%s", name);
+        isogi_trace_sample(t, (const float(*)[3])points, (size_t)n, e[1], NULL), after = counted(t);
+        isogi_trace_sample(fresh, (const float(*)[3])points, (size_t)n, e[2], NULL);
+        for (int i = 0; i < n; i++)
+            for (int c = 0; c < 3; c++)
+                mean += (double)e[2][i][c] / n, sum += pow((double)e[1][i][c] - (double)e[2][i][c], 2) / n,
+                    moved += pow((double)e[0][i][c] - (double)e[2][i][c], 2) / n;
+        CHECK(sqrt(sum) < 1e-3 * mean && sqrt(moved) > 5e-3 * mean, "%s: %.4f off a new bake, %.4f before", name, sqrt(sum) / mean,
+              sqrt(moved) / mean);
+        CHECK(fabs((double)(after.rays - before.rays) / (double)counted(fresh).rays - 1) < 0.01, "%s: %d rays, not %d", name,
+              (int)(after.rays - before.rays), (int)counted(fresh).rays);
+        isogi_trace_free(t), isogi_trace_free(fresh);
+    }
+    scene_free(&s);
 }
 
 /* Memory that holds no zeros, with more of the same behind it: an index that is read there leads nowhere. */
