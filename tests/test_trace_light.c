@@ -582,6 +582,54 @@ TEST(shadows_can_be_left_out) {
     scene_free(&s);
 }
 
+static void nothing_met(void *user, const isogi_ray *rays, size_t count, isogi_trace_surface *surfaces) {
+    (void)user, (void)rays, (void)count, (void)surfaces;
+}
+/* What no_shadows leaves out is the way from lights and the environment, not that between surfaces. Closed form, within a closed ball of
+   albedo R, where a point sees all others alike: light that arrives directly, as in the open, and by reflections its mean over the ball
+   times R + R^2 + ... Of a distant light the mean is a quarter of its irradiance, of a sky a quarter of its integral over all directions.
+   Means over points: within 3 %; a point within 12 %, since lookups mix texels whose normals lie up to an eighth of a right angle apart,
+   and there is noise of the image's bright spot. */
+TEST(without_shadows_a_closed_ball_is_lit_from_outside) {
+    enum { W = 16, H = 8, POINTS = 24 };
+    static float image[H][W][3];
+    const double q[5] = {11, 11, 11, 4.5, 9.2}, albedo = 0.5;
+    const isogi_light sun[2] = {light_make(ISOGI_LIGHT_DIRECTIONAL, 1, 2, 3, 2, 0), light_make(ISOGI_LIGHT_DIRECTIONAL, 3, -2, 1, 3, 0.3)};
+    scene s = scene_make(23, 23, 23, NULL, shell, q);
+    float points[POINTS][3], normals[POINTS][3], e[POINTS][3], open[POINTS][3];
+    points_seen_from(&s, 11, 4, POINTS, points);
+    for (int i = 0; i < POINTS; i++) {
+        const double length = length3((double)points[i][0] - 11, (double)points[i][1] - 11, (double)points[i][2] - 11);
+        for (int a = 0; a < 3; a++) normals[i][a] = (float)((11 - (double)points[i][a]) / length);
+    }
+    for (int i = 0; i < W * H; i++)
+        for (int c = 0; c < 3; c++) image[i / W][i % W][c] = i == 2 * W + 5 ? 40 : 1;
+    for (int kind = 0; kind < 3; kind++) {
+        isogi_trace_desc d = desc_make(&s, (float)albedo, 0, 256);
+        double mean = (2 + 3 / (0.5 + 0.5 * cos(0.3))) / 4; /* the second's own mean cosine makes it a facing surface's 3 */
+        float integral[3];
+        if (kind) memset(&d.lighting, 0, sizeof d.lighting);
+        if (kind == 1) d.lighting.lights = sun, d.lighting.light_count = 2;
+        if (kind == 2) d.lighting.env.rgb = &image[0][0][0], d.lighting.env.width = W, d.lighting.env.height = H;
+        if (kind != 1) isogi_sh_project(integral, 1, &d.lighting, NULL), mean = (double)integral[0] * sqrt(4 * PI) / 4;
+        isogi_trace_gather_field(&d, nothing_met, NULL, (const float(*)[3])points, (const float(*)[3])normals, POINTS, open, NULL, NULL);
+        d.method = ISOGI_TRACE_FEEDBACK, d.isovalue_min = -0.01, d.isovalue_max = 0.01;
+        d.samples = LONG_SUITE ? 32 : 16, d.lazy = !LONG_SUITE;
+        for (int k = 0; k < 4; k++) { /* dark; direct light; with reflections, rays that start off the surface, or on it */
+            double off = 0, sum = 0, expected = 0;
+            d.no_shadows = k > 0, d.bounces = k == 1 ? 0 : 2, d.offset = k == 3 ? -1 : 0;
+            bake_and_sample(&d, NULL, (const float(*)[3])points, POINTS, e);
+            for (int i = 0; i < POINTS; i++) {
+                const double one = k == 0 ? 0 : (double)open[i][0] + (k > 1 ? (albedo + albedo * albedo) * mean : 0);
+                off = fmax(off, fabs((double)e[i][0] - one)), sum += (double)e[i][0] / POINTS, expected += one / POINTS;
+            }
+            CHECK(fabs(sum - expected) <= 0.03 * expected && off <= 0.12 * expected, "kind %d, case %d: mean %.4f, not %.4f; %.4f off",
+                  kind, k, sum, expected, off);
+        }
+    }
+    scene_free(&s);
+}
+
 /* Ambient occlusion of radius d below an infinite ceiling at height h: only rays within acos(h/d) of the normal are blocked: E = pi
    (h/d)^2; below the height nothing is. The ray starts on the surface. */
 static double slot(const double p[3], const double *q) { return fmax(q[0] - p[1], p[1] - q[1]); }
