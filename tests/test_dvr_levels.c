@@ -237,6 +237,73 @@ TEST(slices_threads_and_edits_of_several_resolutions_give_the_same_bits) {
     field_free(&f);
 }
 
+/* Memory whose allocation number `fail` fails (-1: none); live: blocks in use. */
+typedef struct meagre { int fail, calls, live; } meagre;
+static void *meagre_alloc(void *user, size_t size, size_t align) {
+    meagre *m = (meagre *)user;
+    void *p;
+    if (m->calls++ == m->fail) return NULL;
+    m->live++;
+    return posix_memalign(&p, align < sizeof(void *) ? sizeof(void *) : align, size) ? NULL : p;
+}
+static void meagre_release(void *user, void *p, size_t size) { (void)size, ((meagre *)user)->live -= p != NULL, free(p); }
+
+/* What is half gathered when the function or the planes change is given up: nothing of it shows, nothing leaks, and the end has the bits
+   of a renderer made for the new function. Edits keep the classes of values; `half` is what must remain for directions to be under way. */
+TEST(what_is_half_gathered_is_dropped) {
+    enum { PLACES = 200 };
+    static float v[3][PLACES][9], at[PLACES][3];
+    field f = field_of(ball, 33);
+    isogi_transfer_point edited[5];
+    const isogi_transfer other = {edited, 5, NULL, 0};
+    const double planes[1][4] = {{1, 0.5, 0, -12}};
+    test_random r = {12};
+    memcpy(edited, solid, sizeof edited), edited[2].extinction = edited[3].extinction = 0.3f;
+    for (int i = 0; i < PLACES; i++)
+        for (int a = 0; a < 3; a++) at[i][a] = (float)random_range(&r, -1, 33);
+    for (int coarsest = 2; coarsest <= 8; coarsest *= 2)
+        for (int k = 0; k < (LONG_SUITE ? 10 : 5); k++) { /* back, planes, the same function and planes, freed, to the end */
+            const int edit = k % 5, clips = edit == 1 || edit == 2, slices = k < 5 ? coarsest / 2 : 3;
+            meagre m = {-1, 0, 0};
+            const isogi_context context = {.alloc = meagre_alloc, .release = meagre_release, .user = &m, .threads = 1};
+            isogi_dvr_desc desc = several(&f, 17, coarsest);
+            desc.directions = LONG_SUITE ? 24 : 12;
+            const double half = desc.directions / (desc.directions + 17.0);
+            double remaining = 1;
+            isogi_dvr *dvr = dvr_new_with(&desc, &scenery, &context), *fresh;
+            isogi_dvr_report report[2];
+            CHECK(isogi_dvr_step(dvr, 0, &remaining) == ISOGI_OK && remaining <= 0, "step");
+            isogi_dvr_sample_visibility(dvr, (const float(*)[3])at, PLACES, v[0][0]);
+            CHECK(isogi_dvr_set_transfer(dvr, &other) == ISOGI_OK, "half way: function");
+            for (int i = 0; i < slices || !(remaining < half); i++)
+                CHECK(isogi_dvr_step(dvr, 4000, &remaining) == ISOGI_OK && remaining > 0, "coarsest %d: %g left", coarsest, remaining);
+            isogi_dvr_sample_visibility(dvr, (const float(*)[3])at, PLACES, v[1][0]);
+            CHECK(!memcmp(v[0], v[1], sizeof v[0]), "coarsest %d, edit %d: half of it shows", coarsest, edit);
+            if (edit == 3) { /* freed */
+                isogi_dvr_free(dvr);
+                CHECK(m.live == 0, "coarsest %d: %d blocks of memory left", coarsest, m.live);
+                continue;
+            }
+            if (edit == 0 || edit == 2) CHECK(isogi_dvr_set_transfer(dvr, edit == 2 ? &other : &scenery) == ISOGI_OK, "function");
+            if (clips) CHECK(isogi_dvr_set_clip(dvr, planes, 1) == ISOGI_OK, "planes");
+            isogi_dvr_sample_visibility(dvr, (const float(*)[3])at, PLACES, v[1][0]);
+            CHECK(!memcmp(v[0], v[1], sizeof v[0]), "coarsest %d, edit %d: shows before a step", coarsest, edit);
+            CHECK(isogi_dvr_step(dvr, 0, &remaining) == ISOGI_OK && remaining <= 0, "end");
+            isogi_dvr_inspect(dvr, &report[0]);
+            fresh = dvr_new(&desc, edit ? &other : &scenery);
+            if (clips) isogi_dvr_set_clip(fresh, planes, 1);
+            CHECK(isogi_dvr_step(fresh, 0, NULL) == ISOGI_OK && isogi_dvr_inspect(fresh, &report[1]) == ISOGI_OK, "fresh");
+            isogi_dvr_sample_visibility(dvr, (const float(*)[3])at, PLACES, v[1][0]);
+            isogi_dvr_sample_visibility(fresh, (const float(*)[3])at, PLACES, v[2][0]);
+            CHECK(!memcmp(v[1], v[2], sizeof v[1]) && report[0].grid_points == report[1].grid_points, "coarsest %d, edit %d: other bits",
+                  coarsest, edit);
+            CHECK(!memcmp(v[0], v[1], sizeof v[0]) == !edit, "coarsest %d, edit %d changes nothing", coarsest, edit);
+            isogi_dvr_free(dvr), isogi_dvr_free(fresh);
+            CHECK(m.live == 0, "coarsest %d, edit %d: %d blocks of memory left", coarsest, edit, m.live);
+        }
+    field_free(&f);
+}
+
 /* Peaks are for brute force, which holds the regular grid; the blocks come back with the sweeps. A function that is transparent clears
    what is held. */
 TEST(peaks_take_the_regular_grid_and_sweeps_the_blocks_again) {
@@ -268,16 +335,6 @@ TEST(peaks_take_the_regular_grid_and_sweeps_the_blocks_again) {
 }
 
 /* Memory that runs out: a code, nothing lost, and the next call goes on to the same bits. */
-typedef struct meagre { int fail, calls, live; } meagre;
-static void *meagre_alloc(void *user, size_t size, size_t align) {
-    meagre *m = (meagre *)user;
-    void *p;
-    if (m->calls++ == m->fail) return NULL;
-    m->live++;
-    return posix_memalign(&p, align < sizeof(void *) ? sizeof(void *) : align, size) ? NULL : p;
-}
-static void meagre_release(void *user, void *p, size_t size) { (void)size, ((meagre *)user)->live -= p != NULL, free(p); }
-
 TEST(any_allocation_of_several_resolutions_may_fail) {
     field f = field_of(ball, 33);
     const float at[2][3] = {{16, 14, 16}, {30, 4, 9}};

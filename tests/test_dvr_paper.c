@@ -107,6 +107,52 @@ TEST(local_visibility_follows_sheared_axes) {
     }
 }
 
+/* Local visibility on every instruction path, in blocks of all levels, those that the border cuts thin among them: the paths add up a ray's
+   depth in the same order, with or without fusing products, and hold it in halves. A coefficient is at most sqrt(4 pi), where halves lie
+   2^-9 apart: one that is rounded the other way, and interpolation between such. Global visibility is a product of up to six local
+   ones. */
+TEST(every_path_has_the_same_local_visibility) {
+    enum { PLACES = 400 };
+    static float at[PLACES][3], v[5][2][PLACES * 36];
+    field f = field_new(43, 37, 52);
+    test_random r = {8};
+    size_t levels[6] = {0};
+    const isogi_transfer_point p[] = {{0.3, {1, 0.2f, 0.4f}, 0}, {0.5, {0.3f, 1, 0.4f}, 0.04f}, {1, {0.1f, 1, 1}, 0.3f}};
+    const isogi_transfer transfer = {p, 3, NULL, 0};
+    for (size_t i = 0; i < field_count(&f); i++) { /* rough on one side, smooth on the other, empty beyond */
+        double x = (double)(i % 43) / 42, z = (double)(i / 43 / 37) / 51;
+        f.value[i] = z > 0.8 ? 0 : z + (x < 0.5 ? random_range(&r, 0, 0.5) : 0.1 * x);
+    }
+    field_build(&f);
+    for (int i = 0; i < PLACES; i++)
+        for (int a = 0; a < 3; a++) at[i][a] = (float)random_range(&r, -0.5, f.size[a] - 0.5);
+    for (int order = 1; order <= 6; order += LONG_SUITE ? 1 : 3) {
+        const size_t count = (size_t)(PLACES * order * order);
+        for (int path = 1; path < 5; path++) {
+            const isogi_context context = {.threads = 1, .force_path = path};
+            const isogi_dvr_desc desc = {.pyramid = f.pyramid, .shading = ISOGI_DVR_VISIBILITY, .method = ISOGI_DVR_PAPER,
+                .directions = LONG_SUITE ? 100 : 12, .order = order,
+                .grid = {5, 4, 6}, .reduction = order % 2 ? 8 : 700, .radius = 9};
+            isogi_dvr *dvr = dvr_new_with(&desc, &transfer, &context);
+            isogi_dvr_report report;
+            double most[2] = {0, 0}, least = 9;
+            CHECK(isogi_dvr_step(dvr, 0, NULL) == ISOGI_OK && isogi_dvr_inspect(dvr, &report) == ISOGI_OK &&
+                      isogi_dvr_sample_blocks(dvr, (const float(*)[3])at, PLACES, NULL, v[path][0]) == ISOGI_OK &&
+                      isogi_dvr_sample_visibility(dvr, (const float(*)[3])at, PLACES, v[path][1]) == ISOGI_OK,
+                  "path %d", path);
+            for (int n = 1; n < 6; n++) levels[n] += report.level_count[n];
+            for (int k = 0; k < 2; k++)
+                for (size_t i = 0; i < count; i++) most[k] = fmax(most[k], fabs((double)v[path][k][i] - (double)v[1][k][i]));
+            for (size_t i = 0; i < count; i += (size_t)(order * order)) least = fmin(least, (double)v[path][0][i]);
+            CHECK(most[0] <= 0x1p-9 && most[1] <= 6 * 0x1p-9 && least < 2, "order %d, path %d: local %g, global %g off; at least %g", order,
+                  path, most[0], most[1], least);
+            isogi_dvr_free(dvr);
+        }
+    }
+    for (int n = 1; n < 6; n++) CHECK(levels[n] > 0, "no block of level %d", 1 << (n - 1));
+    field_free(&f);
+}
+
 /* What is not finite is as transparent as finite voxels that do not absorb, though the function absorbs at the lowest value that occurs. */
 TEST(what_is_not_finite_throws_no_shadow) {
     enum { N = 32 };
