@@ -942,6 +942,84 @@ TEST(every_allocation_may_fail) {
     field_free(&f);
 }
 
+/* A renderer's life by the paper's method, call by call; the planes are two, then others, then none. */
+enum { LIFE = 11 };
+static isogi_result live(isogi_dvr **dvr, int call, const isogi_dvr_desc *desc, const isogi_context *context) {
+    static const double planes[3][4] = {{1, 0.5, 0, -3}, {0, -1, 0.2, 6}, {0.3, 0, -1, 5}};
+    static const isogi_transfer_point p[2][3] = {{{-0.2, {1, 1, 1}, 0}, {0.1, {1, 0.2f, 1}, 0.3f}, {1, {0.3f, 1, 1}, 0.4f}},
+                                                 {{-0.2, {1, 1, 1}, 0}, {0.1, {1, 0.2f, 0.1f}, 0.1f}, {1, {0.3f, 1, 1}, 0.9f}}};
+    const isogi_transfer transfer[2] = {{p[0], 3, NULL, 0}, {p[1], 3, NULL, 0}};
+    switch (call) {
+    case 0: return isogi_dvr_create(dvr, desc, context);
+    case 1: return isogi_dvr_set_transfer(*dvr, &transfer[0]);
+    case 2: return isogi_dvr_step(*dvr, 1500, NULL); /* some of it */
+    case 4: return isogi_dvr_set_clip(*dvr, planes, 2);
+    case 6: return isogi_dvr_set_transfer(*dvr, &transfer[1]);
+    case 8: return isogi_dvr_set_clip(*dvr, planes + 1, 2);
+    case 9: return isogi_dvr_set_clip(*dvr, NULL, 0);
+    default: return isogi_dvr_step(*dvr, 0, NULL);
+    }
+}
+
+/* Functions and planes: what fails of these changes nothing. */
+static int is_change(int call) { return call == 1 || call == 4 || call == 6 || call == 8 || call == 9; }
+
+/* What is seen of it: visibility, local and global, the data of its blocks, a picture. Takes no part in what fails. */
+typedef struct seen { float visibility[27][9], local[27][9], values[27], image[30][4]; } seen;
+static void look_at(const isogi_dvr *dvr, scarce *memory, seen *s) {
+    const isogi_lighting lighting = {.env = {.sh = sky_one, .sh_order = 1}};
+    const isogi_view view = {.width = 6, .height = 5, .eye = {60, 70, 80}, .target = {9, 4, 4}};
+    const scarce was = *memory;
+    float at[27][3];
+    for (int i = 0; i < 81; i++) at[i / 3][i % 3] = (float)(i % 3 == 0 ? i / 3 % 3 : i % 3 == 1 ? i / 9 % 3 : i / 27) * 4.3f;
+    memset(s, 0, sizeof *s), memory->until = -1;
+    CHECK(isogi_dvr_sample_visibility(dvr, (const float(*)[3])at, 27, s->visibility[0]) == ISOGI_OK &&
+              isogi_dvr_sample_blocks(dvr, (const float(*)[3])at, 27, s->values, s->local[0]) == ISOGI_OK &&
+              isogi_dvr_render(dvr, &view, &lighting, s->image, NULL, NULL) == ISOGI_OK,
+          "look");
+    *memory = was;
+}
+
+/* Each allocation of each of these calls fails once: that call alone says so. Where it is not a step nothing that is seen changes; the same
+   call then works, and in the end all is seen as if nothing had failed, bit by bit. */
+TEST(every_allocation_of_the_papers_method_may_fail) {
+    static seen expected[LIFE], before, after;
+    field f = field_new(20, 9, 10);
+    test_random r = {14};
+    int failed[LIFE] = {0};
+    for (size_t i = 0; i < field_count(&f); i++) f.value[i] = random_range(&r, -0.3, 0.6) + 0.02 * (double)(i % 20);
+    field_build(&f);
+    const isogi_dvr_desc desc = {.pyramid = f.pyramid, .shading = ISOGI_DVR_VISIBILITY, .method = ISOGI_DVR_PAPER, .grid = {3, 3, 3},
+        .directions = 8, .radius = 6, .reduction = 3};
+    for (int k = -1, more = 1; more; k++) {
+        scarce s = {k, 0, 0, 0};
+        const isogi_context context = {.alloc = scarce_alloc, .release = scarce_release, .user = &s, .threads = 1};
+        isogi_dvr *dvr = NULL;
+        for (int call = 0; call < LIFE; call++) {
+            isogi_result result = live(&dvr, call, &desc, &context);
+            if (result != ISOGI_OK) {
+                CHECK(result == ISOGI_NO_MEMORY && (call || !dvr), "allocation %d, call %d: %s", k, call, isogi_result_string(result));
+                if (is_change(call)) look_at(dvr, &s, &after);
+                CHECK(!is_change(call) || !memcmp(&before, &after, sizeof after), "allocation %d, call %d: half of it shows", k, call);
+                result = live(&dvr, call, &desc, &context);
+                CHECK(result == ISOGI_OK, "allocation %d, call %d again: %s", k, call, isogi_result_string(result));
+                failed[call]++;
+            }
+            if (k < 0 || is_change(call + 1)) look_at(dvr, &s, k < 0 ? &expected[call] : &before);
+            CHECK(k < 0 || !is_change(call + 1) || !memcmp(&before, &expected[call], sizeof before), "allocation %d, call %d: other bits", k,
+                  call);
+        }
+        look_at(dvr, &s, &after);
+        CHECK(!memcmp(&after, &expected[LIFE - 1], sizeof after), "allocation %d: other bits in the end", k);
+        more = k < 0 || s.calls > k;
+        isogi_dvr_free(dvr);
+        CHECK(s.live == 0 && s.bytes == 0, "allocation %d: %d blocks, %d bytes left", k, s.live, (int)s.bytes);
+    }
+    for (int call = 0; call < LIFE; call++)
+        CHECK(failed[call] >= (call == 9 ? 0 : call == 4 || call == 8 ? 1 : 3), "call %d failed %d times", call, failed[call]);
+    field_free(&f);
+}
+
 /* Steps that fail here and there, with each method, before and after edits of the function: what remains falls all the same. */
 TEST(what_remains_does_not_grow_when_memory_runs_out) {
     field f = field_waves(40, 11);
