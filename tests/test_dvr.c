@@ -1006,8 +1006,8 @@ TEST(every_allocation_of_the_papers_method_may_fail) {
                 failed[call]++;
             }
             if (k < 0 || is_change(call + 1)) look_at(dvr, &s, k < 0 ? &expected[call] : &before);
-            CHECK(k < 0 || !is_change(call + 1) || !memcmp(&before, &expected[call], sizeof before), "allocation %d, call %d: other bits", k,
-                  call);
+            CHECK(k < 0 || !is_change(call + 1) || !memcmp(&before, &expected[call], sizeof before), "allocation %d, call %d: other bits",
+                  k, call);
         }
         look_at(dvr, &s, &after);
         CHECK(!memcmp(&after, &expected[LIFE - 1], sizeof after), "allocation %d: other bits in the end", k);

@@ -913,4 +913,52 @@ TEST(every_allocation_may_fail) {
     scene_free(&s);
 }
 
+/* A new lighting of transfer, with an image whose bright spots are looked for: each allocation fails once, on either side and level. The
+   light stays as it was, and the same call works afterwards. */
+TEST(every_allocation_of_a_lighting_may_fail) {
+    enum { W = 64, H = 32 };
+    static float image[2][H][W][3];
+    double q[1] = {0.5};
+    scene s = scene_make(9, 8, 9, NULL, gyroid, q);
+    float points[30][3], e[3][30][3], lit[3][2][9][3];
+    const int n = surface_points(&s, 0, 30, 5, points);
+    const isogi_light dark = {.vector = {1, 2, 3}, .rgb = {-1, 0.5f, 1}};
+    for (int i = 0; i < 2 * W * H * 3; i++) (&image[0][0][0][0])[i] = i / 3 % (W * H) == 900 ? 500 : i < W * H * 3 ? 1 : (float)(i % 7);
+    for (int kind = 0; kind < 4; kind++) {
+        int finished_once = 0;
+        isogi_trace_desc d = desc_make(&s, 0.5f, 1, 2);
+        d.mode = ISOGI_TRACE_TRANSFER, d.order = 3, d.sides = kind & 1 ? ISOGI_TRACE_BOTH_SIDES : ISOGI_TRACE_LOW_SIDE;
+        d.hierarchy = kind & 2 ? 9 : 0;
+        memset(&d.lighting, 0, sizeof d.lighting);
+        d.lighting.env.rgb = &image[0][0][0][0], d.lighting.env.width = W, d.lighting.env.height = H;
+        const isogi_lighting other = {.env = {.rgb = &image[1][0][0][0], .width = W, .height = H}, .lights = &dark, .light_count = 1};
+        for (long k = 0; k < 20 && !finished_once; k++) {
+            scarce memory = {-1, 0};
+            const isogi_context context = {.alloc = scarce_alloc, .release = scarce_release, .user = &memory, .threads = 1};
+            isogi_trace *t = NULL, *side;
+            CHECK(isogi_trace_create(&t, &d, &context) == ISOGI_OK && isogi_trace_step(t, 0, NULL) == ISOGI_OK, "kind %d", kind);
+            side = kind & 1 ? isogi_trace_high(t) : t;
+            for (int call = 0; call < 3; call++) { /* before, after a failure, after it worked */
+                isogi_result result = ISOGI_OK;
+                if (call) memory.left = call == 1 ? k : -1, result = isogi_trace_relight(t, &other);
+                if (call == 1) finished_once = memory.left >= 0;
+                memory.left = -1;
+                CHECK(result == (call == 1 && !finished_once ? ISOGI_NO_MEMORY : ISOGI_OK), "kind %d, allocation %ld: %s", kind, k,
+                      isogi_result_string(result));
+                isogi_trace_sample(side, (const float(*)[3])points, (size_t)n, e[call], NULL);
+                isogi_trace_lighting(side, lit[call][0], lit[call][1]);
+            }
+            const int kept = !memcmp(e[0], e[1], (size_t)n * sizeof e[0][0]) && !memcmp(lit[0], lit[1], sizeof lit[0]);
+            CHECK(kept == !finished_once, "kind %d, allocation %ld: the light %s", kind, k, kept ? "stays" : "changes");
+            CHECK(memcmp(lit[0], lit[2], sizeof lit[0]), "kind %d: no new light", kind);
+            for (int i = 0; i < n; i++) CHECK(memcmp(e[0][i], e[2][i], sizeof e[0][i]), "kind %d: no new light at %d", kind, i);
+            isogi_trace_free(t);
+            CHECK(memory.blocks == 0, "kind %d, allocation %ld: %ld blocks leak", kind, k, memory.blocks);
+            CHECK(!finished_once || k > 0, "kind %d: no allocation at all", kind);
+        }
+        CHECK(finished_once, "kind %d: there are more allocations", kind);
+    }
+    scene_free(&s);
+}
+
 TEST_MAIN("trace_change")
