@@ -914,6 +914,87 @@ TEST(builds_tell_their_progress_up_to_the_end) {
     }
 }
 
+/* A caller who wants to stop at one turn of the progress: what it was told, and memory. */
+typedef struct turns {
+    allocator memory; /* first: contexts have one user */
+    long told, stop_at, told_after;
+    int stopped, falls;
+    double last;
+} turns;
+
+static int stop_at_turn(void *user, double fraction) {
+    turns *t = (turns *)user;
+    t->falls += !(fraction >= t->last && fraction <= 1), t->last = fraction;
+    t->told_after += t->stopped;
+    return ++t->told == t->stop_at && (t->stopped = 1);
+}
+
+static void one_by_one(void *user, size_t n, void (*task)(void *arg, size_t i), void *arg) {
+    (void)user;
+    while (n--) task(arg, n);
+}
+
+static double waves(void *user, const double p[3], double g[3]) {
+    (void)user;
+    for (int a = 0; a < 3; a++) g[a] = cos(p[a]);
+    return sin(p[0]) + sin(p[1]) + sin(p[2]);
+}
+
+/* As usual, compact, by plain code, with a voxel that is not a number; of a function; coefficients alone. */
+enum { AS_USUAL, COMPACT, PLAIN, BROKEN, FUNCTION, COEFFICIENTS, MADE };
+static isogi_result build_kind(int kind, const field *f, isogi_pyramid **p, float *coefficients, const isogi_context *context) {
+    static const isogi_field shape = {.value = waves, .hessian = 1, .high = {9, 7, 8}, .cells = {20, 30, 50}};
+    isogi_context own = *context;
+    isogi_volume volume = f->volume;
+    volume.compact = kind == COMPACT, own.force_path = kind == PLAIN;
+    if (kind == FUNCTION) return isogi_vol_build_field(p, &shape, &own);
+    if (kind == COEFFICIENTS) return isogi_vol_prefilter(&volume, coefficients, &own);
+    return isogi_vol_build(p, &volume, &own);
+}
+
+/* Stopped at every turn of its progress, the last one among them, by one thread, two, or another's scheduler: the code says so, nothing is
+   made, nothing leaks and nobody is asked again. Not stopped, it is told all up to the end, and what is made is the same. */
+TEST(builds_stop_at_any_turn) {
+    enum { X = 17, Y = 21, Z = 30 };
+    static float coefficients[2][X * Y * Z];
+    for (int kind = 0; kind < MADE; kind++) {
+        field f = field_new(X, Y, Z);
+        isogi_pyramid *expected = NULL;
+        for (int i = 0; i < X * Y * Z; i++) f.value[i] = i % 7 + 0.3 * (i % 11);
+        if (kind == BROKEN) f.value[100] = (double)NAN;
+        CHECK(build_kind(kind, &f, &expected, coefficients[0], &serial) == ISOGI_OK, "kind %d", kind);
+        for (int way = 0; way < 3; way++)
+            for (long k = 1, more = 1; more && k < 1000; k += way == 1 && !LONG_SUITE ? 7 : 1) {
+                turns t = {.stop_at = k};
+                const isogi_context context = {.alloc = test_alloc, .release = test_release, .progress = stop_at_turn, .user = &t,
+                    .threads = 1 + (way == 1), .parallel_for = way == 2 ? one_by_one : NULL};
+                isogi_pyramid *const untouched = (isogi_pyramid *)(void *)&t;
+                isogi_pyramid *p = untouched;
+                const isogi_result result = build_kind(kind, &f, &p, coefficients[1], &context);
+                more = t.stopped;
+                CHECK(result == (t.stopped ? ISOGI_CANCELLED : ISOGI_OK) && !t.told_after && !t.falls,
+                      "kind %d, way %d, turn %ld: %s, asked %ld times more, %d falls", kind, way, k, isogi_result_string(result),
+                      t.told_after, t.falls);
+                CHECK(t.stopped || (t.last >= 1 && (way == 1 || k > 3)), "kind %d, way %d: told %g in the end, after %ld turns", kind, way,
+                      t.last, k - 1);
+                CHECK((p == untouched) == (t.stopped || kind == COEFFICIENTS), "kind %d, way %d, turn %ld: a pyramid", kind, way, k);
+                if (!t.stopped && kind == COEFFICIENTS)
+                    CHECK(!memcmp(coefficients[0], coefficients[1], sizeof coefficients[0]), "way %d: other coefficients", way);
+                if (!t.stopped && kind != COEFFICIENTS) {
+                    for (int n = 0; n < 3; n++) {
+                        const isogi_level a = isogi_vol_level(p, n), b = isogi_vol_level(expected, n);
+                        CHECK(!memcmp(a.range, b.range, a.size[0] * a.size[1] * a.size[2] * sizeof *a.range), "kind %d, way %d: level %d",
+                              kind, way, n);
+                    }
+                    isogi_vol_free(p);
+                }
+                CHECK(t.memory.live == 0 && !t.memory.wrong_size, "kind %d, way %d, turn %ld: %ld blocks left", kind, way, k,
+                      t.memory.live);
+            }
+        isogi_vol_free(expected), free(f.value);
+    }
+}
+
 /* ---- threads that stay ---- */
 
 /* Counts what was done and by whom: a thread that comes for the first time leaves its mark with itself. */
