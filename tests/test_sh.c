@@ -791,6 +791,62 @@ TEST(both_layouts_agree) {
     }
 }
 
+/* Columns of order 11 go by 32 directions at a time where their number is a multiple of that, else by fewer: any number of directions, at
+   every level, each against the reference within the bounds of degree 10. Every other 32 have unit lengths, those between powers of two;
+   one direction is too long, too short or none for the fast way, in any place. Nothing is written but what was asked for. */
+TEST(columns_of_order_11_are_exact_for_any_number_of_directions) {
+    enum { ORDER = 11, N = ORDER * ORDER, MOST = 160, ODD = 5 };
+    static const int counts[] = {32, 64, 96, 128, 160, 31, 33, 48, 63, 65, 95, 100, 127, 129};
+    static const float odd[ODD][3] = {{0, 0, 0}, {NAN, 1, 0}, {0, -1e30f, 1e30f}, {1e-30f, 0, -1e-30f}, {3e38f, 3e38f, -3e38f}};
+    static quad expected[MOST][N], strange[ODD][N];
+    static float x[3][MOST + 1], out[MOST * N + 3];
+    static double x64[3][MOST], out64[MOST * N + 2];
+    test_random r = {23};
+    double worst[2] = {0, 0};
+    int spilt = 0, checked = 0;
+    for (int i = 0; i < MOST + ODD; i++) {
+        double d[3];
+        quad e[3];
+        if (i < MOST && (i % 4 || !hard_direction(d, i, &r))) random_direction(&r, d);
+        for (int k = 0; k < 3; k++) {
+            if (i < MOST) x[k][i + 1] = ldexpf(rounded(d[k]), i & 32 ? i % 9 - 4 : 0), x64[k][i] = (double)x[k][i + 1];
+            e[k] = i < MOST ? (quad)x64[k][i] : i < MOST + 2 ? (quad)(k == 2) : (quad)odd[i - MOST][k];
+        }
+        reference_eval(i < MOST ? expected[i] : strange[i - MOST], ORDER, e);
+    }
+    for (size_t c = 0; c < sizeof counts / sizeof *counts; c++)
+        for (int kind = -1; kind < ODD; kind++) {
+            const int count = counts[c], at = (int)(random_bits(&r) % (uint64_t)count);
+            float was[3];
+            if (!LONG_SUITE && kind >= 0 && (int)(c % ODD) != kind) continue;
+            for (int k = 0; k < 3; k++) {
+                was[k] = x[k][at + 1];
+                if (kind >= 0) x[k][at + 1] = odd[kind][k], x64[k][at] = (double)odd[kind][k];
+            }
+            for (instruction_level = 0; instruction_level < 3 && instruction_level <= BEST_LEVEL; instruction_level++) {
+                for (int i = 0; i < MOST * N + 3; i++) out[i] = 99;
+                for (int i = 0; i < MOST * N + 2; i++) out64[i] = 99;
+                CHECK(isogi_sh_eval_soa(out + 1, ORDER, x[0] + 1, x[1] + 1, x[2] + 1, (size_t)count) == ISOGI_OK &&
+                          isogi_sh_eval_soa_f64(out64 + 1, ORDER, x64[0], x64[1], x64[2], (size_t)count) == ISOGI_OK,
+                      "%d directions", count);
+                for (int i = 0; i < count; i++)
+                    for (int k = 0; k < N; k++, checked++) {
+                        const quad right = kind >= 0 && i == at ? strange[kind][k] : expected[i][k];
+                        double error = fabs((double)(right - (quad)out[1 + k * count + i])),
+                               error64 = fabs((double)(right - (quad)out64[1 + k * count + i]));
+                        if (!(error <= worst[0])) worst[0] = error;
+                        if (!(error64 <= worst[1])) worst[1] = error64;
+                    }
+                for (int i = 1 + count * N; i < MOST * N + 2; i++) spilt += out[i] < 99 || out[i] > 99 || out64[i] < 99 || out64[i] > 99;
+                spilt += out[0] < 99 || out64[0] < 99;
+            }
+            instruction_level = BEST_LEVEL;
+            for (int k = 0; k < 3; k++) x[k][at + 1] = was[k], x64[k][at] = (double)was[k];
+        }
+    CHECK(worst[0] <= 2.2e-6 * ROUNDING_FACTOR && worst[1] <= 5e-15 * ROUNDING_FACTOR && !spilt && checked > 100000,
+          "errors %g, of doubles %g; %d numbers written beyond", worst[0], worst[1], spilt);
+}
+
 /* Gradients against central differences of the 128-bit reference (step 1e-10: error 1e-14 at degree 100), at poles, on axes and anywhere,
    at the direction as it is in each type. The bounds are those that the header states; floats are rounded doubles. */
 TEST(gradient_is_the_derivative) {
