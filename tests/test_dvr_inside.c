@@ -179,6 +179,149 @@ TEST(blocks_are_marked_empty_exactly_where_nothing_absorbs) {
     field_free(&f);
 }
 
+/* What the marks of a box of voxels first..last are, by all its voxels: bit 0: none of the values between absorbs; bit 1: all are alike. */
+static int marks_of(const uint8_t *data, const size_t size[3], const size_t first[3], const size_t last[3], const isogi_transfer *t) {
+    double low = 999, high = -1, at[2];
+    float rgb[2][3], extinction[2], most = 0;
+    int alike = 1;
+    for (size_t z = first[2]; z <= last[2]; z++)
+        for (size_t y = first[1]; y <= last[1]; y++)
+            for (size_t x = first[0]; x <= last[0]; x++) {
+                const double value = data[x + size[0] * (y + size[1] * z)];
+                low = fmin(low, value), high = fmax(high, value);
+            }
+    isogi_transfer_at(t, low, rgb[0], &extinction[0]), most = extinction[0];
+    for (size_t i = 0; i <= t->point_count; i++) { /* the function is linear between these; no point lies at a value of a voxel */
+        at[0] = i < t->point_count ? t->points[i].value : high;
+        if (at[0] < low || at[0] > high) continue;
+        if (i < t->point_count) {
+            memcpy(rgb[1], t->points[i].rgb, sizeof rgb[1]), extinction[1] = t->points[i].extinction;
+        } else isogi_transfer_at(t, at[0], rgb[1], &extinction[1]);
+        most = fmaxf(most, extinction[1]);
+        alike = alike && extinction[1] >= extinction[0] && extinction[1] <= extinction[0] && !memcmp(rgb[0], rgb[1], sizeof rgb[0]);
+    }
+    return (most > 0 ? 0 : 1) + 2 * alike;
+}
+
+static void reversed_for(void *user, size_t n, void (*task)(void *, size_t), void *arg) {
+    (void)user;
+    while (n--) task(arg, n);
+}
+
+/* Values in regions along x: most are empty, whole blocks of 64 cells among them; some of one colour, some of noise, some with a voxel here
+   and there. */
+static void fill_regions(uint8_t *data, const size_t size[3], uint64_t seed) {
+    test_random r = {seed};
+    for (size_t x = 0; x < size[0]; x++) {
+        test_random here = {x / 23 + 7}, around = {x / 200 + 31};
+        const uint64_t kind = random_bits(&around) % 2 ? 0 : random_bits(&here) % 8;
+        for (size_t i = x; i < size[0] * size[1] * size[2]; i += size[0]) {
+            const uint64_t bits = kind < 3 ? 0 : random_bits(&r);
+            data[i] = (uint8_t)(kind < 3 ? 0 : kind == 3 ? bits % 10 : kind == 4 ? 20 + bits % 21
+                                : kind == 5 ? bits >> 8 : bits % 300 ? 5 : 200);
+        }
+    }
+}
+
+/* Blocks to the nearest one that is not empty, up to 6. */
+static int free_around(const isogi_dvr *d, const size_t at[3]) {
+    const size_t *size = d->level[0].size;
+    int least = 6;
+    for (int i = 0; i < 13 * 13 * 13; i++) {
+        const int to[3] = {i % 13 - 6, i / 13 % 13 - 6, i / 169 - 6}, far = abs(to[0]) > abs(to[1]) ? abs(to[0]) : abs(to[1]);
+        const size_t x = at[0] + (size_t)to[0], y = at[1] + (size_t)to[1], z = at[2] + (size_t)to[2];
+        const int distance = far > abs(to[2]) ? far : abs(to[2]);
+        if (x < size[0] && y < size[1] && z < size[2] && distance < least && !d->empty[0][x + size[0] * (y + size[1] * z)])
+            least = distance;
+    }
+    return least;
+}
+
+static size_t block_at(const isogi_dvr *d, int level, size_t x, size_t y, size_t z) {
+    return x + d->level[level].size[0] * (y + d->level[level].size[1] * z);
+}
+
+/* Marks of a renderer, of every so many blocks below the highest level, against plain loops; count: of blocks by their mark, and of steady
+   ones. */
+static int wrong_marks(const isogi_dvr *d, const isogi_transfer *transfer, size_t every, size_t count[5]) {
+    const uint8_t *data = (const uint8_t *)d->volume.data;
+    int wrong = 0;
+    for (int n = 2; n >= 0; n--) { /* level 0 says of those above, too */
+        const isogi_level *level = &d->level[n];
+        size_t at[3], i = 0;
+        for (at[2] = 0; at[2] < level->size[2]; at[2]++)
+            for (at[1] = 0; at[1] < level->size[1]; at[1]++)
+                for (at[0] = 0; at[0] < level->size[0]; at[0]++, i++) {
+                    size_t first[3], last[3], up[3];
+                    int mark, out = 0;
+                    if (n < 2 && i % every) continue;
+                    for (int a = 0; a < 3; a++) {
+                        first[a] = at[a] * (size_t)level->cells, last[a] = first[a] + (size_t)level->cells;
+                        if (last[a] > d->volume.size[a] - 1) last[a] = d->volume.size[a] - 1;
+                        up[a] = at[a] * (size_t)level->cells / 16;
+                    }
+                    mark = marks_of(data, d->volume.size, first, last, transfer);
+                    if (n < 2) out = d->cut[block_at(d, 1, up[0], up[1], up[2])] == 2;
+                    int empty = (mark & 1) || out;
+                    for (int k = 1; k < 3 && empty && !n; k++)
+                        empty += d->empty[k][block_at(d, k, at[0] >> 2 * k, at[1] >> 2 * k, at[2] >> 2 * k)];
+                    wrong += d->empty[n][i] != empty || d->steady[n][i] != mark >> 1;
+                    if (!n) count[empty]++, count[4] += (size_t)(mark >> 1), wrong += d->leap[i] != free_around(d, at);
+                }
+    }
+    return wrong;
+}
+
+/* Memory that holds no marks. */
+static void *odd_alloc(void *user, size_t size, size_t align) {
+    void *p = NULL;
+    (void)user;
+    return posix_memalign(&p, align < 64 ? 64 : align, size) ? NULL : memset(p, 0x55, size);
+}
+static void odd_release(void *user, void *p, size_t size) { (void)user, (void)size, free(p); }
+
+/* Many blocks, marked in pieces of 8192, by one thread up to 16384 and by several from there on; their number a multiple of the pieces, a
+   highest level of 64 blocks and more. All marks, planes included, against plain loops over all voxels and all blocks around, and the same
+   bits for one thread, four, and a scheduler that begins with the last task. */
+TEST(marks_of_many_blocks_are_those_of_plain_loops) {
+    static const struct { size_t size[3], blocks; } cases[] = {
+        {{14169, 5, 9}, 8192}, {{4101, 17, 17}, 16722}, {{1769, 25, 25}, 16384}};
+    static const isogi_transfer_point p[] = {{9.5, {1, 1, 1}, 0}, {19.5, {1, 0, 1}, 1}, {40.5, {1, 0, 1}, 1}, {40.5, {1, 1, 1}, 0},
+                                             {99.5, {1, 1, 1}, 0}, {120.5, {0, 1, 1}, 0.5f}, {180.5, {0, 1, 0}, 0.5f}};
+    static const double planes[1][4] = {{1, 0.25, 0, -100}};
+    const isogi_transfer transfer = {p, 7, NULL, 0};
+    for (int c = !LONG_SUITE; c < (LONG_SUITE ? 3 : 2); c++) { /* of 16722 in the quick run */
+        const size_t *size = cases[c].size;
+        uint8_t *data = (uint8_t *)malloc(size[0] * size[1] * size[2]);
+        const isogi_volume v = {.data = data, .type = ISOGI_U8, .size = {size[0], size[1], size[2]}};
+        const isogi_context contexts[3] = {{.threads = 1, .alloc = odd_alloc, .release = odd_release},
+                                           {.threads = 4, .alloc = odd_alloc, .release = odd_release}, {.parallel_for = reversed_for}};
+        isogi_pyramid *pyramid = NULL;
+        isogi_dvr *dvr[3] = {NULL};
+        fill_regions(data, size, 19);
+        CHECK(isogi_vol_build(&pyramid, &v, NULL) == ISOGI_OK, "build");
+        for (int clip = 0; clip < 2; clip++)
+            for (int way = 0; way < 3; way++) {
+                const isogi_dvr_desc desc = {.pyramid = pyramid};
+                size_t count[5] = {0};
+                if (!clip) dvr[way] = dvr_new_with(&desc, &transfer, &contexts[way]);
+                else CHECK(isogi_dvr_set_clip(dvr[way], planes, 1) == ISOGI_OK, "planes");
+                const size_t blocks = dvr[way]->block_count, *fine = dvr[way]->level[0].size, leaps = fine[0] * fine[1] * fine[2];
+                CHECK(blocks == cases[c].blocks, "%zu blocks", blocks);
+                if (way)
+                    CHECK(!memcmp(dvr[way]->empty_blocks, dvr[0]->empty_blocks, 2 * blocks) && !memcmp(dvr[way]->leap, dvr[0]->leap, leaps),
+                          "case %d, way %d: other marks", c, way);
+                else {
+                    const int wrong = wrong_marks(dvr[way], &transfer, LONG_SUITE ? 1 : 19, count);
+                    CHECK(!wrong, "case %d, planes %d: %d marks are wrong", c, clip, wrong);
+                    for (int k = 0; k < 5; k++) CHECK(count[k] > 10, "case %d: %zu blocks of kind %d", c, count[k], k);
+                }
+            }
+        for (int way = 0; way < 3; way++) isogi_dvr_free(dvr[way]);
+        isogi_vol_free(pyramid), free(data);
+    }
+}
+
 static size_t all_tasks; /* of all calls of parallel_for */
 static void summed_for(void *user, size_t n, void (*task)(void *, size_t), void *arg) {
     (void)user, all_tasks += n;
