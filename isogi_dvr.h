@@ -1169,20 +1169,18 @@ static void isogi_dvr__add_values(const isogi_dvr__integral *g, double x, double
     }
 }
 
-/* The value between x and y up to which the piece from x has this depth: K inverted, piece by piece. */
+/* The value between x and y up to which the piece from x has this depth: K inverted, piece by piece. There is a depth, hence points. */
 static double isogi_dvr__value_at_depth(const isogi_dvr__integral *g, double x, double y, double factor, double depth) {
-    size_t n = g->count ? isogi_dvr__points_below(g->points, g->count, x) : 0,
-           to = g->count ? isogi_dvr__points_below(g->points, g->count, y) : 0;
-    while (g->count) {
+    size_t n = isogi_dvr__points_below(g->points, g->count, x), to = isogi_dvr__points_below(g->points, g->count, y);
+    for (;;) {
         double end = n < to ? g->points[n].value : n > to ? g->points[n - 1].value : y, from[4], at[4], k0, k1;
         isogi_dvr__on_piece(g, n, x, from), isogi_dvr__on_piece(g, n, end, at);
         k0 = isogi_dvr__clamp(from[3] * fabs(end - x) * factor, 1e30), k1 = isogi_dvr__clamp(at[3] * fabs(end - x) * factor, 1e30);
         if (0.5 * (k0 + k1) >= depth && depth > 0) return x + isogi_dvr__depth_place(k0, k1, depth) * (end - x);
-        if (n == to) break;
+        if (n == to) return y;
         depth -= 0.5 * (k0 + k1), x = end;
         n = n < to ? n + 1 : n - 1;
     }
-    return y;
 }
 
 /* K(y) - K(x) for x <= y, exactly zero where nothing absorbs. */
@@ -2654,15 +2652,13 @@ static void isogi_dvr__join_task(void *arg, size_t block) {
                 isogi_dvr__join_point(job, block, at, c);
 }
 
-/* No seams in value[points][channels]. */
-static isogi_result isogi_dvr__join(const isogi_dvr *d, const isogi_dvr__held *h, float *value, size_t channels) {
+/* No seams in value[points][channels]. Not cancelled half way; nothing else can keep it from its end. */
+static void isogi_dvr__join(const isogi_dvr *d, const isogi_dvr__held *h, float *value, size_t channels) {
     isogi_dvr__join_job job;
     isogi_context whole = d->context;
-    isogi_result result = ISOGI_OK;
-    whole.progress = NULL; /* not cancelled half way */
+    whole.progress = NULL;
     job.held = h, job.value = value, job.channels = channels;
-    for (job.log = 3; job.log-- > 0 && result == ISOGI_OK;) result = isogi_parallel(&whole, h->total, isogi_dvr__join_task, &job, 0, 0);
-    return result;
+    for (job.log = 3; job.log-- > 0;) isogi_parallel(&whole, h->total, isogi_dvr__join_task, &job, 0, 0);
 }
 
 /* ==== create and free ================================================================================================ */
@@ -4869,18 +4865,13 @@ static isogi_result isogi_dvr__step_brute(isogi_dvr *d, size_t end) {
 /* What directions have gathered, once they all have. */
 static isogi_result isogi_dvr__finish_gathered(isogi_dvr *d) {
     size_t i, c, points = isogi_dvr__coming_points(d);
-    isogi_result result;
     float *out = d->visibility;
     if (d->coming.block || d->held.block) out = (float *)isogi_allocate(&d->context, points * d->coefficients, sizeof *out);
     if (!out) return ISOGI_NO_MEMORY;
     for (i = 0; i < points; i++)
         for (c = 0; c < d->coefficients; c++) out[i * d->coefficients + c] = d->gathered[c * d->padded_count + i];
     if (out != d->visibility) {
-        result = isogi_dvr__join(d, &d->coming, out, d->coefficients);
-        if (result != ISOGI_OK) {
-            isogi_release(&d->context, out, points * d->coefficients, sizeof *out);
-            return result;
-        }
+        isogi_dvr__join(d, &d->coming, out, d->coefficients);
         isogi_release(&d->context, d->visibility, isogi_dvr__held_points(d) * d->coefficients, sizeof *d->visibility);
         isogi_dvr__drop_held(d, &d->held);
         isogi_release(&d->context, d->gathered, d->padded_count * d->coefficients, sizeof *d->gathered);
@@ -7479,8 +7470,9 @@ static isogi_result isogi_dvr__begin_frame(isogi_dvr__render_job *job) {
         f->light_stride[a] = d->desc.grid[a] < 2 ? 0 : a ? f->light_row[a - 1] : 4;
     }
     result = isogi_parallel(&d->context, (points + ISOGI_DVR__GAIN - 1) / ISOGI_DVR__GAIN, isogi_dvr__frame_light, &job->fast, 0, 0);
-    if (result == ISOGI_OK && f->held.block) result = isogi_dvr__join(d, &f->held, f->light[0], 4);
-    return result == ISOGI_OK && f->held.block && f->open ? isogi_dvr__join(d, &f->held, f->open[0], 4) : result;
+    if (result == ISOGI_OK && f->held.block) isogi_dvr__join(d, &f->held, f->light[0], 4);
+    if (result == ISOGI_OK && f->held.block && f->open) isogi_dvr__join(d, &f->held, f->open[0], 4);
+    return result;
 }
 
 static void isogi_dvr__end_frame(isogi_dvr__render_job *job) {

@@ -1228,7 +1228,7 @@ static double isogi_sh__a(int l, int m) { return sqrt((double)(4 * l * l - 1) / 
 /* q_m^m from q_{m-1}^{m-1}; the sqrt 2 of m > 0 is in it. */
 static double isogi_sh__next_diagonal(double q, int m) {
     if (m > 0 && m < ISOGI_SH__TABLE_ORDER) return isogi_sh__table(m)[0];
-    return m == 0 ? 0.28209479177387814347 : q * sqrt((double)(2 * m + 1) / (double)(m == 1 ? 1 : 2 * m));
+    return m == 0 ? 0.28209479177387814347 : q * sqrt((double)(2 * m + 1) / (double)(2 * m));
 }
 
 /* m = 0 near the poles: the three terms nearly cancel there and their roundings grow like l^2, but the differences of

@@ -2428,7 +2428,6 @@ static int isogi_trace__texel_place(const isogi_trace *t, const size_t texel[3],
     for (a = 0; a < 3; a++) {
         low[a] = site->place.cell[a], high[a] = low[a] + 1;
         if (site->place.local[a] <= 0 && low[a]) low[a]--;
-        if (site->place.local[a] >= 1 && high[a] + 1 < v->size[a]) high[a]++;
     }
     isogi_volume_range(v, low, high, range);
     return range[0] < site->isovalue || (border && t->scene.desc.capped);
@@ -2873,7 +2872,6 @@ static isogi_result isogi_trace__coarse_create(isogi_trace *t, const isogi_conte
     for (a = 0; a < 3; a++) {
         if (t->box_first[a] || t->box_end[a] != t->lattice[a]) return ISOGI_INVALID;
         desc.lattice[a] = (t->lattice[a] + 2) / 2, desc.lattice_min[a] = t->first[a], desc.lattice_max[a] = t->last[a];
-        if (desc.lattice[a] > t->lattice[a]) desc.lattice[a] = t->lattice[a];
     }
     desc.hierarchy = 0, desc.lazy = 0, desc.sides = t->scene.high ? ISOGI_TRACE_HIGH_SIDE : ISOGI_TRACE_LOW_SIDE;
     return isogi_trace_create(&t->coarse, &desc, context);

@@ -1076,22 +1076,20 @@ static isogi_volume isogi_vol__resolve(const isogi_volume *volume) {
 
 /* Sizes within range, and every voxel's byte offset within ptrdiff_t. */
 static isogi_result isogi_vol__check_layout(const isogi_volume *v, size_t type_size) {
-    size_t reach = type_size, packed = type_size;
+    size_t reach = type_size; /* of the axes so far: the stride of the next one, where voxels are packed */
     int zero = !v->stride[0] && !v->stride[1] && !v->stride[2], a;
     for (a = 0; a < 3; a++) {
-        ptrdiff_t stride = zero ? (ptrdiff_t)packed : v->stride[a];
-        size_t step, span = v->size[a] - 1, all;
+        ptrdiff_t stride = zero ? (ptrdiff_t)reach : v->stride[a];
+        size_t step, span = v->size[a] - 1;
         if (!v->size[a]) return ISOGI_INVALID;
         if (v->size[a] > 0x7fffffff || v->halo_low[a] > 0x7fffffff || v->halo_high[a] > 0x7fffffff) return ISOGI_TOO_LARGE;
         if ((double)v->first[a] > 9007199254740992.0) return ISOGI_TOO_LARGE; /* 2^53 */
         if (v->halo_low[a] + v->halo_high[a] > SIZE_MAX / 2 - span) return ISOGI_TOO_LARGE;
-        span += v->halo_low[a] + v->halo_high[a], all = span + 1;
+        span += v->halo_low[a] + v->halo_high[a];
         if (stride == PTRDIFF_MIN || stride % (ptrdiff_t)type_size) return ISOGI_INVALID;
         step = (size_t)(stride < 0 ? -stride : stride);
         if (span && step > ((size_t)PTRDIFF_MAX - reach) / span) return ISOGI_TOO_LARGE;
         reach += step * span;
-        if (zero && packed > (size_t)PTRDIFF_MAX / all) return ISOGI_TOO_LARGE;
-        if (zero) packed *= all;
     }
     return ISOGI_OK;
 }
@@ -6447,7 +6445,6 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE void isogi_vol__unlock_leaf(const struct iso
 /* Without the cells of a leaf that lie beyond the volume; they are counted backwards along the axes of `octant`. */
 static uint64_t isogi_vol__cut_order(const isogi_vol__leaf *leaf, int octant, uint64_t mask) {
     const int cut = leaf->code[ISOGI_VOL__LEAF_CUT], x = cut & 3, y = cut >> 2 & 3, z = cut >> 4;
-    if (!cut) return mask;
     mask &= 0x1111111111111111u * (octant & 1 ? 15u << x & 15 : 15u >> x);
     mask &= 0x0001000100010001u * (octant & 2 ? 0xffffu << 4 * y & 0xffff : 0xffffu >> 4 * y);
     return mask & (octant & 4 ? ~(uint64_t)0 << 16 * z : ~(uint64_t)0 >> 16 * z);
