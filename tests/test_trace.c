@@ -855,6 +855,79 @@ TEST(a_single_texel_lies_in_the_middle) {
     scene_free(&s);
 }
 
+/* Many texels of an axis at one place, at either border, and in the middle: as valid as a single one there, with the same light within an
+   interval of isovalues, and as many within one that holds all. Surfaces are looked for in blocks of 4 cells: the last voxel of 33 begins a
+   ninth that is not there. */
+TEST(texels_at_one_place_are_alike) {
+    double q[1] = {0.5};
+    scene s = scene_make(33, 33, 33, NULL, gyroid, q);
+    for (int k = 0; k < (LONG_SUITE ? 9 : 4); k++) {
+        const double at = k / 3 == 0 ? 32 : k / 3 == 1 ? 0 : 16;
+        float points[60][3], value[60], e[3][60][3], most = 0;
+        test_random r = {(uint64_t)(29 + k)};
+        for (int i = 0; i < 60; i++) /* of the interval alone */
+            do {
+                for (int a = 0; a < 3; a++) points[i][a] = a == k % 3 ? (float)at : (float)random_range(&r, 1, 31);
+                isogi_vol_sample(s.pyramid, (const float(*)[3])points + i, 1, value + i, NULL);
+            } while (value[i] < 0.1f || value[i] > 0.3f);
+        isogi_trace *t[4] = {NULL}; /* of a single one, of many, within the interval, within that of all */
+        isogi_trace_report report[4];
+        for (int way = 0; way < 4; way++) {
+            isogi_trace_desc d = desc_make(&s, 0.5f, 0, 4);
+            for (int a = 0; a < 3; a++) d.lattice_max[a] = 32, d.lattice[a] = 9;
+            d.lattice_min[k % 3] = d.lattice_max[k % 3] = at, d.lattice[k % 3] = way ? 7 : 1;
+            if (way >= 2) d.isovalue_min = way == 2 ? 0.1 : -9, d.isovalue_max = way == 2 ? 0.3 : 9;
+            CHECK(isogi_trace_create(&t[way], &d, NULL) == ISOGI_OK && isogi_trace_step(t[way], 0, NULL) == ISOGI_OK, "case %d", k);
+            if (way < 3) isogi_trace_sample(t[way], (const float(*)[3])points, 60, e[way], NULL);
+            isogi_trace_status(t[way], &report[way]);
+        }
+        CHECK(report[1].texels == 7 * report[0].texels && report[3].texels == report[1].texels,
+              "case %d: %d texels, %d and %d", k, (int)report[0].texels, (int)report[1].texels, (int)report[3].texels);
+        for (size_t i = 0; i < 7 * 81; i++) {
+            size_t texel[3], single[3];
+            texel[k % 3] = i / 81, texel[(k + 1) % 3] = i % 9, texel[(k + 2) % 3] = i / 9 % 9;
+            memcpy(single, texel, sizeof single), single[k % 3] = 0;
+            CHECK(isogi_trace_valid(t[0], single) == isogi_trace_valid(t[1], texel), "case %d: texel %d", k, (int)i);
+        }
+        for (int i = 0; i < 60; i++) {
+            most = fmaxf(most, e[1][i][1]);
+            CHECK(!memcmp(e[1][i], e[2][i], sizeof e[1][i]), "case %d: E %g, not %g", k, (double)e[2][i][1], (double)e[1][i][1]);
+        }
+        CHECK(most > 0.1f, "case %d: E %g", k, (double)most);
+        for (int way = 0; way < 4; way++) isogi_trace_free(t[way]);
+    }
+    scene_free(&s);
+}
+
+/* Between voxels of one layer there is no cell, hence no surface: no light, by both methods and for points of one's own. */
+TEST(a_volume_of_one_layer_has_no_texels) {
+    double q[1] = {0.5};
+    for (int k = 0; k < 6; k++) {
+        scene s = scene_make(k % 3 == 0 ? 1 : 9, k % 3 == 1 ? 1 : 8, k % 3 == 2 ? 1 : 7, NULL, gyroid, q);
+        isogi_trace_desc d = desc_make(&s, 0.5f, 1, 4);
+        float points[4][3] = {{0}}, e[4][3], error[4];
+        isogi_trace *t = NULL;
+        isogi_trace_report report;
+        d.method = (isogi_trace_method)(k / 3), d.sides = k & 1 ? ISOGI_TRACE_HIGH_SIDE : ISOGI_TRACE_LOW_SIDE, d.capped = k & 1;
+        for (int i = 0; i < 4; i++)
+            for (int a = 0; a < 3; a++) points[i][a] = a == k % 3 ? 0 : (float)(i + a);
+        CHECK(isogi_trace_create(&t, &d, NULL) == ISOGI_OK && isogi_trace_request(t, (const float(*)[3])points, 4) == ISOGI_OK &&
+                  isogi_trace_step(t, 0, NULL) == ISOGI_OK,
+              "case %d", k);
+        isogi_trace_status(t, &report);
+        for (int way = 0; way < 2; way++) {
+            memset(e, 0x3f, sizeof e), memset(error, 0, sizeof error);
+            isogi_result result = way ? isogi_trace_gather(&d, (const float(*)[3])points, NULL, 4, e, error, NULL)
+                                      : isogi_trace_sample(t, (const float(*)[3])points, 4, e, error);
+            CHECK(result == ISOGI_OK && !report.texels, "case %d: %d texels", k, (int)report.texels);
+            for (int i = 0; i < 4; i++)
+                CHECK(!(e[i][0] > 0 || e[i][1] > 0 || e[i][2] > 0) && !test_finite((double)error[i]), "case %d: E %g, error %g", k,
+                      (double)e[i][1], (double)error[i]);
+        }
+        isogi_trace_free(t), scene_free(&s);
+    }
+}
+
 /* Voxels twice as high as wide: the same ball in the world gets the same light, and a lamp's inverse square is of the world. */
 TEST(anisotropic_spacing) {
     double q[4] = {15.5, 15.5, 15.5, 9.3}, spacing[3] = {1, 1, 2}, worst = 0, flat[1] = {8}, d = length3(3, 6, 4);
