@@ -390,7 +390,7 @@ ISOGI_API isogi_result isogi_trace_lighting(const isogi_trace *trace, float (*li
                                      light, to which errors and the formats below FLOAT refer); none for albedo with 0 bounces
      isovalue_min, isovalue_max, lookup  none; texels that come in are computed, those that go out stay (until isogi_trace_touch
                                      comes to them)
-     material, material_user, samples, bounces, error, seed, offset, reach, no_shadows   all
+     material, material_user, samples, bounces, seed, offset, reach, no_shadows, error (IRRADIANCE)   all
    All else must be as it was: ISOGI_INVALID. transfer_channels 0 keeps the number of channels. */
 ISOGI_API isogi_result isogi_trace_change(isogi_trace *trace, const isogi_trace_desc *desc);
 
