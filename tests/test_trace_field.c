@@ -268,7 +268,8 @@ TEST(tetrahedral_mesh) {
 /* A function that answers nonsense must not break anything: NaN normals, negative t, t beyond tmax, wild colours. */
 static void nonsense(void *user, const isogi_ray *rays, size_t count, isogi_trace_surface *surfaces) {
     test_random *r = (test_random *)user;
-    test_random mine = {r->state ^ (uint64_t)(int64_t)(1e6 * rays[0].origin[0])};
+    test_random mine = {0};
+    memcpy(&mine.state, &rays[0].origin[0], sizeof mine.state), mine.state ^= r->state;
     for (size_t i = 0; i < count; i++) {
         const float odd[6] = {(float)nan_value(), -1, 0, 1e30f, 5, 0.5f};
         surfaces[i].t = (double)odd[random_bits(&mine) % 6];
