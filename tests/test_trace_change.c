@@ -276,7 +276,7 @@ static void change_each_member(isogi_trace_mode mode) {
         isogi_trace_desc d[2] = {desc_make(&s, 0.6f, 2, 2), desc_make(&s, 0.6f, 2, 2)};
         for (int i = 0; i < 2; i++) {
             if (mode == ISOGI_TRACE_TRANSFER) d[i].mode = mode, d[i].order = 2, d[i].transfer_channels = 3;
-            if (k % 3 == 0) d[i].sides = ISOGI_TRACE_BOTH_SIDES;
+            if (k % 6 == 0) d[i].sides = ISOGI_TRACE_BOTH_SIDES;
         }
         change_member(k, d);
         if (cost >= 0) change_and_back(&s, m, cost, d);
