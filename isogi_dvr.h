@@ -213,13 +213,14 @@
    Limits
 
    Values that are not finite: a cell with such a corner is transparent. An axis of one voxel makes a box without volume, which is
-   transparent (rays within its plane do sample it). Up to ISOGI_DVR_MAX_PEAKS peaks (in data space, exact or pre-integrated, any
-   number), 2^16 directions, and 2^24 samples on the longest ray. Pre-integrated pictures of physical space tell up to 16384 classes of
-   values apart, of those that occur and on which the transfer function depends: a piece of it that is narrower than four of them keeps
-   its opacity, blurred over a class. They do where the span of these values is 1e-26 to 1e30 and, of floats and doubles, at least a 4096th
-   of their distance from zero, and where no voxel is beyond floats; else pictures are post-classified, in double, which takes longer:
-   subtract what values have in common, or let `scale` and `bias` make them of others. With spans beyond that, or voxels beyond floats,
-   visibility is by brute force, too. Errors:
+   transparent (rays within its plane do sample it). For sweeps and the paper's method such a voxel alone does not exist: those around it
+   keep their shadows. Up to ISOGI_DVR_MAX_PEAKS peaks (in data space, exact or pre-integrated, any number), 2^16 directions, and 2^24
+   samples on the longest ray. Pre-integrated pictures of physical space tell up to 16384 classes of values apart, of those that occur
+   and on which the transfer function depends: a piece of it that is narrower than four of them keeps its opacity, blurred over a class.
+   They do where the span of these values is 1e-26 to 1e30 and, of floats and doubles, at least a 4096th of their distance from zero, and
+   where no voxel is beyond floats; else pictures are post-classified, in double, which takes longer: subtract what values have in
+   common, or let `scale` and `bias` make them of others. With spans beyond that, or voxels beyond floats, visibility is by brute force,
+   too. Errors:
    ISOGI_INVALID for anything outside of its documented range, ISOGI_TOO_LARGE where sizes overflow or pass these limits, ISOGI_NO_MEMORY,
    ISOGI_CANCELLED.
 
@@ -1016,22 +1017,32 @@ static double isogi_dvr__count_from(const isogi_dvr *d, double low) { return 0.5
 /* `count` classes of values, the class of a value being (value - low) * scale, kept within 0 .. count - 1. The first and the last one hold
    whatever lies before and beyond the values of the span that occur; the others divide these. So neither an outlier nor a wide range of
    values takes classes from the values that the transfer function tells apart. A thousandth of a class keeps the ends of the span, where
-   a step may stand, on their upper side whatever is rounded. */
-static void isogi_dvr__set_classes(const isogi_dvr *d, const double span[2], size_t count, double *low, double *scale) {
-    double from = span[0] > d->range[0] ? span[0] : d->range[0], to = span[1] < d->range[1] ? span[1] : d->range[1], width, least;
+   a step may stand, on their upper side whatever is rounded. Where none stands at the lower end, that and a quarter of a class behind it
+   belong to what lies before: air, the least value of many volumes, would else get the mean of a class in which extinction rises.
+   t: NULL = as if there were a step. */
+static void isogi_dvr__set_classes(const isogi_dvr *d, const isogi_dvr__transfer *t, const double span[2], size_t count, double *low,
+                                   double *scale) {
+    double from = span[0] > d->range[0] ? span[0] : d->range[0], to = span[1] < d->range[1] ? span[1] : d->range[1], width, least, edge;
+    size_t i;
+    int step = !t;
+    for (i = 1; t && i < t->point_count; i++) step |= !(t->points[i - 1].value < from || t->points[i].value > from);
+    edge = step ? 1.001 : 0.75;
     if (!(from < to)) to = from + (d->range[1] > d->range[0] ? 0.5 * d->range[1] - 0.5 * d->range[0] : 0);
-    width = (0.5 * to - 0.5 * from) / (0.5 * (double)(count - 2));
+    width = (0.5 * to - 0.5 * from) / (0.5 * ((double)count - 0.999 - edge)); /* divided by count - 2, or a little more */
     least = d->range[0] < d->range[1] ? 1e-12 * fabs(from) : 1e-7 * fabs(from) / (double)count; /* that doubles tell apart */
     if (!(width > least)) width = least;
     if (!(width > 1e-300)) width = d->range[0] < d->range[1] ? 1e-300 : 1e-30; /* all the same: classes that floats tell apart */
-    *low = from - 1.001 * width, *scale = 1 / width;
+    *low = from - edge * width, *scale = 1 / width;
 }
 
-/* The values that a class stands for: one that lies before or beyond the span for the outer ones. */
-static void isogi_dvr__class_ends(double low, double scale, size_t i, size_t count, double ends[2]) {
+/* The values that a class stands for: one for the outer ones, which hold the ends of the span, too: no value that does not occur, since
+   beyond the last one extinction may begin or end. */
+static void isogi_dvr__class_ends(const isogi_dvr *d, double low, double scale, size_t i, size_t count, double ends[2]) {
     ends[0] = low + ((double)i + (i == 1 ? 0.001 : 0)) / scale, ends[1] = low + (double)(i + 1) / scale;
-    if (!i) ends[1] = ends[0];
-    if (i == count - 1) ends[0] = ends[1];
+    if (i && i < count - 1) return;
+    ends[0] = low + ((double)i + (i ? 0.002 : 0.749)) / scale;
+    ends[0] = i && ends[0] > d->range[1] ? d->range[1] : !i && ends[0] < d->range[0] ? d->range[0] : ends[0];
+    ends[1] = ends[0];
 }
 
 /* The class of a value: 0 .. ISOGI_DVR__TABLE - 1. */
@@ -1640,7 +1651,7 @@ static void isogi_dvr__compare_transfers(isogi_dvr *d, const isogi_dvr__transfer
     for (n = 0; n < 2; n++)
         if (!(span[0] <= span[1]) || (other[0] <= other[1] && (n ? other[n] > span[n] : other[n] < span[n]))) both[n] = other[n];
         else both[n] = span[n];
-    isogi_dvr__set_classes(d, both, ISOGI_DVR__TABLE, &d->matter.low, &d->matter.scale);
+    isogi_dvr__set_classes(d, NULL, both, ISOGI_DVR__TABLE, &d->matter.low, &d->matter.scale);
     memset(marks, 0, (ISOGI_DVR__TABLE + 1) * sizeof *marks);
     for (; to < 1e308; from = to) {
         double at[2] = {0, 0}, end[2] = {0, 0};
@@ -1681,7 +1692,7 @@ static size_t isogi_dvr__renew_classes(isogi_dvr *d) {
     double span[2];
     size_t i, count = 0;
     isogi_dvr__transfer_span(&d->transfer, span);
-    isogi_dvr__set_classes(d, span, ISOGI_DVR__TABLE, &m->low, &m->scale);
+    isogi_dvr__set_classes(d, &d->transfer, span, ISOGI_DVR__TABLE, &m->low, &m->scale);
     if (m->scale > 2 * m->kept_scale) {
         for (i = 0; i < d->changed_count && m->kept_scale > 0; i++) {
             const float *range = d->level[1].range[i];
@@ -2847,7 +2858,7 @@ ISOGI_API isogi_result isogi_dvr_create(isogi_dvr **dvr, const isogi_dvr_desc *d
     d->visibility_step = resolved.visibility_step > 0 ? resolved.visibility_step : 2 * resolved.step;
     isogi_vol_range(resolved.pyramid, d->range);
     d->base = isogi_dvr__count_from(d, d->range[0]);
-    isogi_dvr__set_classes(d, d->range, ISOGI_DVR__TABLE, &d->matter.low, &d->matter.scale);
+    isogi_dvr__set_classes(d, NULL, d->range, ISOGI_DVR__TABLE, &d->matter.low, &d->matter.scale);
     d->method = isogi_dvr__method_now(d);
     d->kernels = isogi_dvr__choose_kernels(d->context.force_path);
     resolved.step = resolved.step < d->visibility_step ? resolved.step : d->visibility_step;
@@ -3659,7 +3670,7 @@ static void isogi_dvr__set_table(const isogi_dvr *d, float table[ISOGI_DVR__TABL
     for (i = 0; i < ISOGI_DVR__TABLE; i++) {
         double ends[2], from, to, mean = 0, x, at;
         size_t next;
-        isogi_dvr__class_ends(d->matter.low, d->matter.scale, i, ISOGI_DVR__TABLE, ends);
+        isogi_dvr__class_ends(d, d->matter.low, d->matter.scale, i, ISOGI_DVR__TABLE, ends);
         from = x = ends[0], to = ends[1];
         if (t->point_count && !(to > from)) mean = isogi_dvr__extinction(t->points, t->point_count, from);
         else if (t->point_count) {
@@ -5341,10 +5352,12 @@ static void isogi_dvr__shade_local(const isogi_dvr *d, const isogi_dvr__lights *
 
 /* Kraus 2005, eq. 19, of a place with this opacity, without the factor opacity that compositing applies: out becomes a factor on the
    transfer function's colour, `add` is the highlight. I_i is irradiance / pi. side: +1 where values rise along the ray, whatever the
-   normal says: so which side the eye is on does not depend on how normals were smoothed. H(0) = 0: light that grazes the surface,
-   and all light where there is no normal, neither comes back nor through; what remains is ambient. */
+   normal says: so which side the eye is on does not depend on how normals were smoothed. 0 where they stay as they are: there the normal
+   does say, by what it was smoothed from. H(0) = 0: light that grazes the surface, and all light where there is no normal, neither
+   comes back nor through; what remains is ambient. */
 static void isogi_dvr__shade_two_sided(const isogi_dvr *d, const isogi_dvr__lights *l, const int cell[3], const double local[3],
                                        const float dir[3], int side, double opacity, double out[3], double add[3]) {
+    const double direction[3] = {(double)dir[0], (double)dir[1], (double)dir[2]};
     const isogi_material *front = &d->desc.material[side > 0 ? 0 : 1], *through = &d->desc.material[2];
     float normal[3];
     double n[3], world[3], grid[3];
@@ -5358,8 +5371,10 @@ static void isogi_dvr__shade_two_sided(const isogi_dvr *d, const isogi_dvr__ligh
     isogi_vol_to_world(d->desc.pyramid, grid, world);
     for (a = 0; a < 3; a++) {
         float ambient = side ? front->diffuse[a] : 0.5f * d->desc.material[0].diffuse[a] + 0.5f * d->desc.material[1].diffuse[a];
-        n[a] = (double)normal[a] * (side ? side : -1), out[a] = l->mean[a] * (double)ambient, add[a] = 0;
+        n[a] = (double)normal[a], out[a] = l->mean[a] * (double)ambient, add[a] = 0;
     }
+    if (!side) side = isogi_dvr__dot(n, direction) > 0 ? -1 : 1, front = &d->desc.material[side > 0 ? 0 : 1];
+    for (a = 0; a < 3; a++) n[a] *= side;
     for (i = 0; i < l->count; i++) {
         double to[3], irradiance = isogi_dvr__reach(&l->list[i], world, to) / ISOGI_DVR__PI, cosine = isogi_dvr__dot(to, n), gloss = 0;
         const isogi_material *m = cosine > 0 ? front : through;
@@ -6140,7 +6155,7 @@ static size_t isogi_dvr__count_classes(const isogi_dvr *d, double *low, double *
         if (width > 0 && width < narrow && !isogi_dvr__alike(&t->points[i], &t->points[i - 1])) narrow = width;
     }
     for (count = ISOGI_DVR__CLASSES;; count *= 2) {
-        isogi_dvr__set_classes(d, span, count, low, scale);
+        isogi_dvr__set_classes(d, t, span, count, low, scale);
         if (count == 16 * ISOGI_DVR__CLASSES || narrow * *scale >= 4) return count;
     }
 }
@@ -6186,7 +6201,7 @@ static void isogi_dvr__frame_classes(isogi_dvr__frame *f, double low, double sca
     for (i = 0; i < f->count; i++) {
         isogi_dvr__class_entry *e = &f->classes[i];
         double ends[2], from, to, x, mean[4] = {0, 0, 0, 0};
-        isogi_dvr__class_ends(low, scale, i, f->count, ends);
+        isogi_dvr__class_ends(d, low, scale, i, f->count, ends);
         from = x = ends[0], to = ends[1];
         next = t->point_count ? isogi_dvr__points_below(t->points, t->point_count, from) : 0;
         while (t->point_count) { /* pieces between the function's points: the product of two linear functions, by Simpson's rule exactly */

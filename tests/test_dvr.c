@@ -728,6 +728,31 @@ TEST(local_shading_faces_the_eye_on_both_sides) {
 /* A slab above a floor: the floor under it is dark, beside it bright. */
 static double floor_and_roof(double x, double y, double z) { return y < 0.1 ? 1 : (y > 0.55 && y < 0.75 && x > 0.55) ? 1 : ((void)z, 0); }
 
+/* A mask's matter, of one value along the ray, has the side that its surface shows to the eye: lit from there it looks alike by every way,
+   and with all values negated. */
+TEST(flat_matter_is_lit_from_the_side_of_the_eye) {
+    enum { N = 17, LONG = 24 };
+    static uint8_t data[LONG][N][N];
+    const isogi_transfer_point rising[] = {{50, {1, 1, 1}, 0}, {100, {1, 1, 1}, 0.8f}};
+    const isogi_transfer_point falling[] = {{-100, {1, 1, 1}, 0.8f}, {-50, {1, 1, 1}, 0}};
+    const double eye[3] = {8.3, 8.3, -20}, target[3] = {8.3, 8.3, 8};
+    const isogi_light sun = {.vector = {0, 0, -1}, .rgb = {(float)PI, (float)PI, (float)PI}};
+    const isogi_lighting lighting = {.lights = &sun, .light_count = 1};
+    for (int k = 8; k < LONG; k++) memset(data[k], 100, sizeof data[k]);
+    for (int n = 0; n < 6; n++) {
+        const isogi_volume v = {.data = data, .type = ISOGI_U8, .size = {N, N, LONG}, .scale = n % 2 ? -1 : 1};
+        const isogi_transfer transfer = {n % 2 ? falling : rising, 2, NULL, 0};
+        isogi_pyramid *pyramid = NULL;
+        CHECK(isogi_vol_build(&pyramid, &v, &serial) == ISOGI_OK, "build");
+        const isogi_dvr_desc desc = {.pyramid = pyramid, .shading = ISOGI_DVR_TWO_SIDED, .bound = n / 2 == 1 ? 0.01 : 0,
+                                     .jitter = n / 2 == 2};
+        isogi_dvr *dvr = dvr_new(&desc, &transfer);
+        pixel p = cast(dvr, eye, target, &lighting);
+        CHECK(fabs((double)p.c[0] - 0.632) < 0.003, "way %d%s: radiance %g", n / 2, n % 2 ? ", negated" : "", (double)p.c[0]);
+        isogi_dvr_free(dvr), isogi_vol_free(pyramid);
+    }
+}
+
 TEST(shadows_fall_away_from_the_light) {
     field f = field_of(floor_and_roof, 24);
     const isogi_transfer_point points[] = {{0, {1, 1, 1}, 0}, {0.3, {1, 1, 1}, 0}, {1, {1, 1, 1}, 3}};

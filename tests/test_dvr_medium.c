@@ -372,6 +372,56 @@ TEST(depth_through_tetrahedra_is_as_on_the_lattice) {
     isogi_dvr_tets_free(tets);
 }
 
+/* Air is the least value of a scan, and extinction rises from there: beside matter, where no block of air is stepped over, it is clear all
+   the same, to rays and to light that passes through it. What is saturated, at the greatest value, has the extinction of that. */
+TEST(ends_of_the_range_are_not_blurred) {
+    enum { N = 40 };
+    static const isogi_type types[] = {ISOGI_U8, ISOGI_I16, ISOGI_F32};
+    static float floats[N * N * N];
+    static int16_t shorts[N * N * N];
+    static uint8_t bytes[N * N * N];
+    const void *const data[] = {bytes, shorts, floats};
+    for (int n = 0; n < 12; n++) {
+        const double air = n % 3 == 1 ? -1000 : n % 3 ? -0.3 : 0, top = n % 3 == 1 ? 3000 : n % 3 ? 7.9 : 255;
+        const isogi_transfer_point rising[] = {{air, {1, 1, 1}, 0}, {n % 2 ? top : 2 * top - air, {1, 1, 1}, n % 2 ? 2 : 4}};
+        const isogi_transfer transfer = {rising, 2, NULL, 0};
+        const isogi_context context = {.threads = 1, .force_path = n / 3};
+        isogi_volume volume = {.data = data[n % 3], .type = types[n % 3], .size = {N, N, N}};
+        float c[1][4], open[2], depth, place[1][3] = {{21.5f, 21.5f, 20}};
+        isogi_pyramid *pyramid;
+        for (int i = 0; i < N * N * N; i++) { /* rods along z, four apart; behind them a block */
+            const int matter = (i % N % 4 == 0 && i / N % N % 4 == 0) || i / N / N > 30;
+            bytes[i] = matter ? 255 : 0, shorts[i] = matter ? 3000 : -1000, floats[i] = (float)(matter ? top : air);
+        }
+        CHECK(isogi_vol_build(&pyramid, &volume, &context) == ISOGI_OK, "build");
+        for (int method = 0; method < 2; method++) {
+            const isogi_dvr_desc desc = {.pyramid = pyramid, .opaque = 1, .shading = ISOGI_DVR_VISIBILITY, .order = 1, .directions = 16,
+                                         .grid = {LONG_SUITE ? 20 : 5, 9, 9}, .visibility_step = 1, .unit = 16,
+                                         .method = method ? ISOGI_DVR_BRUTE : ISOGI_DVR_SWEEP};
+            isogi_dvr *dvr = dvr_new_with(&desc, &transfer, &context);
+            CHECK(isogi_dvr_step(dvr, 0, NULL) == ISOGI_OK &&
+                      isogi_dvr_sample_visibility(dvr, (const float(*)[3])place, 1, &open[method]) == ISOGI_OK,
+                  "step");
+            isogi_dvr_free(dvr);
+        }
+        CHECK(fabs((double)(open[0] - open[1])) < 0.15 * (double)open[1], "case %d: visibility %g by sweeps, %g by brute force", n,
+              (double)open[0], (double)open[1]);
+        const isogi_dvr_desc unlit = {.pyramid = pyramid, .opaque = 1, .unit = 16};
+        isogi_dvr *dvr = dvr_new_with(&unlit, &transfer, &context);
+        const double eye[3] = {21.8, 22.2, -20}, air_end[3] = {21.8, 22.2, 29.5}, within[3] = {21.8, 22.2, 38}, down[3] = {21.8, 22.2, 60};
+        isogi_view view = line_of_sight(eye, within);
+        float until = (float)(air_end[2] - eye[2]);
+        view.until = &until;
+        CHECK(isogi_dvr_render(dvr, &view, NULL, c, &depth, NULL) == ISOGI_OK, "render");
+        CHECK(!(c[0][3] > 1e-6f) && (c[0][3] > 0 || depth > 1e30f), "case %d: air has opacity %g", n, (double)c[0][3]);
+        view = line_of_sight(down, within), until = 31 - 60, until = -until, view.until = &until;
+        CHECK(isogi_dvr_render(dvr, &view, NULL, c, NULL, NULL) == ISOGI_OK, "render");
+        /* 8 voxels at the greatest value, of an extinction of 2 */
+        CHECK(fabs(-log1p(-(double)c[0][3]) - 1) < 2e-4, "case %d: depth %g, not 1", n, -log1p(-(double)c[0][3]));
+        isogi_dvr_free(dvr), isogi_vol_free(pyramid);
+    }
+}
+
 /* ---- clip planes ---- */
 
 /* A medium of constant extinction in the field x, of which planes in any direction, or the six of a box, leave a part: opacity of what is
