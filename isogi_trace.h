@@ -236,8 +236,9 @@ typedef void isogi_trace_material_function(void *user, double isovalue, const do
    BYTE     3 / 1   irradiance: square roots, 4e-3 of sqrt(value * largest); transfer: 4e-3 of the texel's largest coefficient.
                     Exported as they are, for the hardware to interpolate: 2e-3 and 4e-3 of their scales (isogi_trace_export_scales)
    `make test` prints the measured table. HALF and RGB9E5 hold up to 65000 times the irradiance of an open surface
-   (measured as isogi_trace_report.unit is), BYTE twice as much (four times with reflections); brighter texels are cut off there. Below
-   some 1e-4 of that irradiance HALF and RGB9E5 err by more than the share above: their steps are no finer than about 1e-7 of it. */
+   (measured as isogi_trace_report.unit is), BYTE no more than twice that irradiance itself (four times with reflections), which near a
+   lamp is little; brighter texels are cut off there. Below some 1e-4 of that irradiance HALF and RGB9E5 err by more than the share above:
+   their steps are no finer than about 1e-7 of it. */
 typedef enum isogi_trace_format {
     ISOGI_TRACE_DEFAULT = 0, /* FLOAT for irradiance, which is small enough, as nothing is kept for texels without light; HALF for
                                 transfer, where it halves by far the largest part of the memory and costs nothing that can be seen */
