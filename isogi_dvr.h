@@ -3456,7 +3456,7 @@ static void isogi_dvr__begin_crossings(isogi_dvr__crossings *c, const isogi_dvr 
         memset(&c->hit[i], 0, sizeof c->hit[i]);
         ray.isovalue = d->transfer.peaks[i].isovalue;
         if (d->clip_count) ray.tmin = m->enter;
-        if (m->cut) ray.tmax = (float)isogi_dvr__clamp((m->enter + m->length) * (1 + 1e-6), 3e38);
+        if (m->cut) ray.tmax = (m->enter + m->length) * (1 + 1e-6);
         if (d->transfer.peaks[i].opacity > 0) isogi_vol_intersect(d->desc.pyramid, &ray, 1, &c->hit[i], &c->work);
         c->t[i] = c->hit[i].side && c->hit[i].t + c->shift <= c->end ? c->hit[i].t + c->shift : 1e300;
     }
