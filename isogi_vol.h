@@ -8912,8 +8912,9 @@ static void isogi_vol__gradient_beside(const isogi_pyramid *p, const int cell[3]
             beside[a] += upper - lower, at[a] = lower;
             exists &= lower | upper;
         }
-        if (!exists || !isogi_vol__corners(p, beside, 0, corner)) continue;
-        isogi_vol__trilinear(corner, at, g);
+        if (!exists) continue;
+        isogi_vol__corners(p, beside, 0, corner), isogi_vol__trilinear(corner, at, g);
+        if (!isogi_vol__finite3(g)) continue; /* of voxels in the halo only the numbers tell */
         most = isogi_vol__max(most, isogi_vol__largest(g[0], g[1], g[2]));
         for (a = 0; a < 3; a++) gradient[a] += g[a], first[a] = found ? first[a] : g[a];
         found = 1;

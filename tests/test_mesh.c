@@ -841,36 +841,43 @@ TEST(surfaces_beside_a_mask_have_normals) {
     field_free(&f);
 }
 
-/* Two chunks that share a plane, which a mask crosses: there the vertices of both have the same normals. */
+/* Two chunks that share a plane, which a mask crosses, or next to which one begins that only the second holds: there the vertices of both
+   have the same normals. */
 TEST(chunks_agree_beside_a_mask) {
     enum { N = 25, PLANE = 9 };
     static float data[N * N * N];
-    isogi_pyramid *part[2];
-    isogi_mesh mesh[2];
     const isogi_mesh_desc desc = {.isovalue = 0, .normals = 1};
-    int compared = 0;
-    for (int i = 0; i < N * N * N; i++) {
-        double r = sqrt(pow(i % N - 12.3, 2) + pow(i / N % N - 12.1, 2) + pow(i / N / N - 11.8, 2));
-        data[i] = r > 9 ? NAN : (float)(8 - r);
-    }
-    for (int p = 0; p < 2; p++) {
-        isogi_volume v = {.data = data + (p ? PLANE : 0), .type = ISOGI_F32, .size = {p ? N - PLANE : PLANE + 1, N, N}};
-        v.stride[0] = 4, v.stride[1] = 4 * N, v.stride[2] = 4 * N * N;
-        if (p) v.halo_low[0] = PLANE, v.first[0] = PLANE;
-        else v.halo_high[0] = N - 1 - PLANE;
-        memset(&mesh[p], 0, sizeof mesh[p]);
-        CHECK(isogi_vol_build(&part[p], &v, &serial) == ISOGI_OK && isogi_vol_mesh(part[p], &desc, &mesh[p]) == ISOGI_OK, "part %d", p);
-    }
-    for (size_t i = 0; i < mesh[0].vertex_count; i++)
-        for (size_t j = 0; j < mesh[1].vertex_count; j++) {
-            if (memcmp(mesh[0].positions[i], mesh[1].positions[j], sizeof mesh[0].positions[i])) continue;
-            compared++;
-            for (int a = 0; a < 3; a++)
-                CHECK(fabs((double)(mesh[0].normals[i][a] - mesh[1].normals[j][a])) < 1e-5, "vertex %zu: %g and %g along axis %d", i,
-                      (double)mesh[0].normals[i][a], (double)mesh[1].normals[j][a], a);
+    for (int mask = 0; mask < 2; mask++) {
+        isogi_pyramid *part[2];
+        isogi_mesh mesh[2];
+        int compared = 0;
+        for (int i = 0; i < N * N * N; i++) {
+            double r = sqrt(pow(i % N - 12.3, 2) + pow(i / N % N - 12.1, 2) + pow(i / N / N - 11.8, 2));
+            data[i] = (mask ? i % N > PLANE + 1 : r > 9) ? NAN : (float)(8 - r);
         }
-    CHECK(compared > 30, "%d vertices compared", compared);
-    for (int p = 0; p < 2; p++) isogi_vol_mesh_free(part[p], &mesh[p]), isogi_vol_free(part[p]);
+        for (int p = 0; p < 2; p++) {
+            isogi_volume v = {.data = data + (p ? PLANE : 0), .type = ISOGI_F32, .size = {p ? N - PLANE : PLANE + 1, N, N}};
+            v.stride[0] = 4, v.stride[1] = 4 * N, v.stride[2] = 4 * N * N;
+            if (p) v.halo_low[0] = PLANE, v.first[0] = PLANE;
+            else v.halo_high[0] = N - 1 - PLANE;
+            memset(&mesh[p], 0, sizeof mesh[p]);
+            CHECK(isogi_vol_build(&part[p], &v, &serial) == ISOGI_OK && isogi_vol_mesh(part[p], &desc, &mesh[p]) == ISOGI_OK, "part %d", p);
+        }
+        for (size_t i = 0; i < mesh[0].vertex_count; i++)
+            for (size_t j = 0; j < mesh[1].vertex_count; j++) {
+                double length = 0;
+                if (memcmp(mesh[0].positions[i], mesh[1].positions[j], sizeof mesh[0].positions[i])) continue;
+                compared++;
+                for (int a = 0; a < 3; a++) {
+                    length += pow((double)mesh[0].normals[i][a], 2);
+                    CHECK(fabs((double)(mesh[0].normals[i][a] - mesh[1].normals[j][a])) < 1e-5, "vertex %zu: %g and %g along axis %d", i,
+                          (double)mesh[0].normals[i][a], (double)mesh[1].normals[j][a], a);
+                }
+                CHECK(fabs(length - 1) < 1e-5, "vertex %zu: length %g", i, length);
+            }
+        CHECK(compared > 30, "%d vertices compared", compared);
+        for (int p = 0; p < 2; p++) isogi_vol_mesh_free(part[p], &mesh[p]), isogi_vol_free(part[p]);
+    }
 }
 
 /* Blocks that the pyramid knows to be on one side are not read: what is put there behind its back is not seen. A block's diagonal is
