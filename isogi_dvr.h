@@ -1041,8 +1041,7 @@ static void isogi_dvr__class_ends(const isogi_dvr *d, double low, double scale, 
     ends[0] = low + ((double)i + (i == 1 ? 0.001 : 0)) / scale, ends[1] = low + (double)(i + 1) / scale;
     if (i && i < count - 1) return;
     ends[0] = low + ((double)i + (i ? 0.002 : 0.749)) / scale;
-    ends[0] = i && ends[0] > d->range[1] ? d->range[1] : !i && ends[0] < d->range[0] ? d->range[0] : ends[0];
-    ends[1] = ends[0];
+    ends[0] = ends[0] > d->range[0] ? ends[0] : d->range[0], ends[0] = ends[0] < d->range[1] ? ends[0] : d->range[1], ends[1] = ends[0];
 }
 
 /* The class of a value: 0 .. ISOGI_DVR__TABLE - 1. */
