@@ -242,7 +242,7 @@ static const option option_list[] = {
      INTEGER, AT(samples), 0, 1, 1, 1000000, .allowed = "a whole number, 1 to 1000000"},
     {"--lattice", "X,Y,Z", BAKED,
      "texels of the illumination texture; default one per voxel, more along axes on which voxels lie further "
-     "apart",
+     "apart, and two where voxels are more than five pixels wide",
      SIZES, AT(lattice), 0, 3, 2, 4096, .allowed = "three whole numbers, 2 to 4096"},
     {"--lookup", "NAME", BAKED, "how the texture is read: trilinear, nearest, closest-isovalue, bspline", NAMED(lookup_name, lookup)},
     {"--shadows", "on|off", SURFACES,
@@ -941,8 +941,11 @@ static int view_surface(viewer *v) {
 /* ---- light baked into a texture, where the view looks ------------------------------------------------------------------------ */
 
 /* Texels as close along every axis as voxels are along the one on which they are closest, up to four for a voxel: between slices that
-   lie further apart the shadows of one would show as rings in the light of the next. Scenes have their own. */
+   lie further apart the shadows of one would show as rings in the light of the next. Twice as close where voxels are so large in the
+   picture that the steps of a shadow's edge, from texel to texel, would be seen. Scenes have their own. */
+#define WIDE_VOXEL 5 /* pixels */
 static void choose_lattice(const viewer *v, size_t lattice[3]) {
+    const double pixel = 2 * v->view.scale * v->centre_distance / v->o.height; /* in the middle of the box */
     double spacing[3], least = HUGE_VAL;
     memcpy(lattice, v->o.lattice, sizeof v->o.lattice);
     if (lattice[0] || v->o.scene) return;
@@ -950,6 +953,7 @@ static void choose_lattice(const viewer *v, size_t lattice[3]) {
         spacing[a] = v->volume.spacing[a] > 0 ? v->volume.spacing[a] : 1;
         if (v->volume.size[a] > 1 && spacing[a] < least) least = spacing[a];
     }
+    if (least > WIDE_VOXEL * pixel) least /= 2;
     for (int a = 0; a < 3; a++)
         if (spacing[a] > least)
             lattice[a] = (size_t)ceil((double)(v->volume.size[a] - 1) * fmin(spacing[a] / least, 4)) + 1;

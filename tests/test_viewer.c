@@ -177,6 +177,25 @@ TEST(slices_far_apart_get_more_texels) {
 #undef SAME
 }
 
+/* Voxels that are more than five pixels wide have two texels. */
+TEST(large_voxels_get_more_texels) {
+    const char *with[] = {"150", "150 --lattice 24,24,24", "300", "300 --lattice 47,47,47", "300 --lattice 24,24,24"};
+    static char picture[5][1 << 17];
+    size_t size[5];
+    for (int k = 0; k < 5; k++) {
+        char command[1024];
+        snprintf(command, sizeof command, "procedural:gyroid:24 --samples 1 --out '%s' --size 60x%s", temporary("large.png"), with[k]);
+        run_result r = run_viewer(command);
+        CHECK(r.status == 0, "%s: %s", with[k], r.error);
+        size[k] = read_text(temporary("large.png"), picture[k], sizeof picture[k]);
+        CHECK(size[k] > 100 && size[k] < sizeof picture[k] - 1, "%s: %zu bytes", with[k], size[k]);
+    }
+#define SAME(a, b) (size[a] == size[b] && !memcmp(picture[a], picture[b], size[a]))
+    CHECK(SAME(0, 1), "small voxels");
+    CHECK(SAME(2, 3) && !SAME(2, 4), "large voxels");
+#undef SAME
+}
+
 /* From linear light to 8 bits as the comment of isogi_dvr.h states it: exposure, what is above 0.7 bent, sRGB. */
 static double displayed(double linear, double exposure) {
     double x = linear * exposure;
