@@ -258,13 +258,13 @@ analysers() {
 
 case $suite in
 quick)
-    first=' viewer trace trace_bake vol_many mesh vol_hard sh vol trace_store '
+    first=' trace_bake viewer trace_light trace sh mesh vol_hard trace_store trace_change '
     for name in $first; do
-        for program; do [ "${program##*/}" != test_$name ] || item live test_$name "$program"; done
+        for program; do [ "${program##*/}" != test_$name ] || item live test_$name "$program --quick"; done
     done
     matrix_quick
     for program; do
-        case $first in *" ${program##*/test_} "*) ;; *) item live "${program##*/}" "$program" ;; esac
+        case $first in *" ${program##*/test_} "*) ;; *) item live "${program##*/}" "$program --quick" ;; esac
     done
     sources
     item check bake/parts-and-pauses "sh tests/compile/bake.sh quick"

@@ -4,11 +4,13 @@
        TEST(dot_is_symmetric) { CHECK(a == b, "a %g b %g", a, b); }
        TEST_MAIN("sh")
 
-   build/tests/test_sh [--long] [--list] [FILTER]
+   build/tests/test_sh [--quick | --long] [--list] [FILTER]
 
    A test passes when none of its CHECKs fails; each failing CHECK prints its place, its condition and the
    values it was given (the first few of a test, then a count). SKIP("why") ends a test that cannot run here.
-   LONG_SUITE is true under --long: tests then use their full sizes. The last line is "N passed, N failed, N skipped",
+   LONG_SUITE is true under --long, in `make check`: tests then use their full sizes. QUICK_SUITE is true under --quick, in `make test`:
+   some are smaller yet, and SLOW_TESTs, which measure quality rather than find mistakes, are left out. With neither, as programs are built
+   by other compilers and sanitizers in `make check`, all tests run at sizes between. The last line is "N passed, N failed, N skipped",
    which is also written to the file named by ISOGI_TEST_SUMMARY, where that is set, for `make test` to add up. A test that
    crashes is named; the program then ends without counts, which `make test` counts as a failure. */
 #ifndef ISOGI_TEST_H
@@ -27,16 +29,19 @@
 typedef struct test_case {
     const char *name;
     void (*run)(void);
+    int slow;
     struct test_case *next;
 } test_case;
 
 static test_case *test_first, **test_last = &test_first;
-static int test_failures, test_skipped, LONG_SUITE;
+static int test_failures, test_skipped, LONG_SUITE, QUICK_SUITE;
 static jmp_buf test_leave;
 
-#define TEST(name)                                                                                 \
+#define TEST(name) TEST_AS(name, 0)
+#define SLOW_TEST(name) TEST_AS(name, 1)
+#define TEST_AS(name, is_slow)                                                                     \
     static void test_body_##name(void);                                                            \
-    static test_case test_case_##name = {#name, test_body_##name, NULL};                           \
+    static test_case test_case_##name = {#name, test_body_##name, is_slow, NULL};                  \
     __attribute__((constructor)) static void test_register_##name(void) {                          \
         *test_last = &test_case_##name;                                                            \
         test_last = &test_case_##name.next;                                                        \
@@ -155,11 +160,12 @@ static int test_main(const char *suite, int argc, char **argv) {
     setvbuf(stdout, NULL, _IOLBF, 0);
     for (int i = 1; i < argc; i++) {
         if (!strcmp(argv[i], "--long")) LONG_SUITE = 1;
+        else if (!strcmp(argv[i], "--quick")) QUICK_SUITE = 1;
         else if (!strcmp(argv[i], "--list")) {
             for (test_case *t = test_first; t; t = t->next) printf("%s.%s\n", suite, t->name);
             return 0;
         } else if (argv[i][0] == '-') {
-            fprintf(stderr, "usage: %s [--long] [--list] [FILTER]\n", argv[0]);
+            fprintf(stderr, "usage: %s [--quick | --long] [--list] [FILTER]\n", argv[0]);
             return 2;
         } else filter = argv[i];
     }
@@ -169,7 +175,7 @@ static int test_main(const char *suite, int argc, char **argv) {
     for (int i = 0; i < 4; i++) signal(crashes[i], test_crashed);
 #endif
     for (test_case *t = test_first; t; t = t->next)
-        if (!filter || strstr(t->name, filter)) count[test_run(t)]++;
+        if (!(QUICK_SUITE && t->slow) && (!filter || strstr(t->name, filter))) count[test_run(t)]++;
     if (filter && !(count[0] + count[1] + count[2])) {
         fprintf(stderr, "%s: no test's name contains \"%s\"\n", argv[0], filter);
         return 2;

@@ -348,7 +348,7 @@ TEST(reference_topology_agrees_with_fine_sampling) {
     enum { N = 25 };
     int *parent = (int *)malloc(sizeof(int) * N * N * N);
     test_random r = {1};
-    int cells = LONG_SUITE ? 3000 : 200, agree = 0, passages = 0;
+    int cells = LONG_SUITE ? 3000 : QUICK_SUITE ? 80 : 200, agree = 0, passages = 0;
     for (int i = 0; i < cells; i++) {
         long double f[8];
         int n[8] = {0}, loops = 0;
@@ -674,7 +674,7 @@ TEST(normals_agree_with_sampling) {
 /* ---- closed meshes ---- */
 
 TEST(closed_meshes_have_no_border) {
-    for (int i = 0; i < (LONG_SUITE ? 1500 : 500); i++) {
+    for (int i = 0; i < (LONG_SUITE ? 1500 : QUICK_SUITE ? 200 : 500); i++) {
         test_random r = {(uint64_t)i + 7};
         field f = field_new(2 + (int)(random_bits(&r) % 5), 2 + (int)(random_bits(&r) % 5), 2 + (int)(random_bits(&r) % 5));
         int n[3] = {f.size[0], f.size[1], f.size[2]}, inside = 0, parts = 0;

@@ -648,7 +648,7 @@ TEST(intervals_change_while_nodes_are_made) {
     static float points[512][3];
     for (int i = 0; i < 512; i++)
         points[i][0] = (float)(4 * (i & 7)), points[i][1] = (float)(4 * (i >> 3 & 7)), points[i][2] = (float)(4 * (i >> 6));
-    for (int k = 0; k < 18; k++) {
+    for (int k = 0; k < 18; k += QUICK_SUITE ? 5 : 1) {
         isogi_trace_desc d = desc_make(&s, 0.7f, 0, 1);
         isogi_trace_report report;
         isogi_trace *t = NULL, *fresh = NULL;
@@ -680,7 +680,7 @@ TEST(hierarchies_are_made_anew_where_all_light_changes) {
     isogi_light sun = light_make(ISOGI_LIGHT_DIRECTIONAL, 1, 3, 1, 2, 0);
     float points[100][3], e[2][100][3];
     int n = surface_points(&s, 0, 100, 4, points);
-    for (int k = 2; k < 5; k++) {
+    for (int k = 2; k < 5; k += 1 + QUICK_SUITE) {
         isogi_trace_desc d = desc_make(&s, 0.5f, 1, 16), sunny;
         isogi_trace_report report[3];
         d.hierarchy = 0.2f, d.method = k & 1 ? ISOGI_TRACE_FEEDBACK : ISOGI_TRACE_PATHS, d.sides = ISOGI_TRACE_BOTH_SIDES;
@@ -781,7 +781,7 @@ static isogi_trace *asked(const isogi_trace_desc *d, const float (*points)[3], i
    point whose isovalue is wanted has the bits of a new texture (which may lack what an earlier interval has brought, hence the error). */
 TEST(changes_in_any_order_give_the_bits_of_a_new_bake) {
     int compared = 0;
-    for (int k = 0; k < (LONG_SUITE ? 3000 : 150); k++) {
+    for (int k = 0; k < (LONG_SUITE ? 3000 : QUICK_SUITE ? 60 : 150); k++) {
         test_random r = {(uint64_t)(77 * k + 5)};
         double q[1] = {0.5}, remaining = 1;
         stage *g = stage_make(&r);

@@ -167,7 +167,7 @@ TEST(images_and_harmonics_add_up) {
     int n = surface_points(&s, 0, 60, 7, points);
     for (int i = 0; i < W * H * 3; i++) (&image[0][0][0])[i] = i < 3 * W * 3 ? 1 : 0.02f;
     isogi_vol_sample_smooth(s.pyramid, (const float(*)[3])points, (size_t)n, NULL, normals);
-    for (int harmonics = 0; harmonics < 2; harmonics++) {
+    for (int harmonics = QUICK_SUITE; harmonics < 2; harmonics++) {
         memset(&d.lighting, 0, sizeof d.lighting);
         d.lighting.env.rgb = &image[0][0][0], d.lighting.env.width = W, d.lighting.env.height = H;
         if (harmonics) d.lighting.env.sh = white_sky, d.lighting.env.sh_order = 1;
@@ -192,7 +192,8 @@ TEST(images_and_harmonics_add_up) {
     for (int method = 0; method < 2; method++) {
         printf("    method %d: %.4f of the integral, %.4f with harmonics\n", method, sum[0][method] / expected,
                sum[1][method] / (expected + n * PI));
-        CHECK(fabs(sum[0][method] - expected) < 0.006 * expected, "method %d: sum %.4f, expected %.4f", method, sum[0][method], expected);
+        CHECK(QUICK_SUITE || fabs(sum[0][method] - expected) < 0.006 * expected, "method %d: sum %.4f, expected %.4f", method,
+              sum[0][method], expected);
         CHECK(fabs(sum[1][method] - expected - n * PI) < 0.006 * (expected + n * PI), "method %d, with harmonics: sum %.4f, expected %.4f",
               method, sum[1][method], expected + n * PI);
     }
@@ -389,7 +390,7 @@ TEST(colour_bleeds) {
     double q[5] = {16, 15, 16, 22, 10}, e[2][3];
     paint colours = {16, 0};
     scene s = scene_make(33, 33, 33, NULL, pit, q);
-    isogi_trace_desc d = desc_make(&s, 0.8f, 4, 131072);
+    isogi_trace_desc d = desc_make(&s, 0.8f, 4, QUICK_SUITE ? 65536 : 131072);
     float points[2][3] = {{6, 15, 16}, {26, 15, 16}}, light[2][3], direct[2][3], albedo[3], emission[3];
     double place[3] = {3, 4, 5};
     d.material = red_and_green, d.material_user = &colours;
@@ -490,6 +491,7 @@ TEST(high_side_of_closed_matter_is_dark) {
     const double *parameter[3] = {q, waves, below};
     for (int i = 0; i < 12; i++) {
         int k = i / 4, n = k ? 16 : 20, valid = 0, bright = 0, plain = 0;
+        if (QUICK_SUITE && (k + i + i / 2) % 2) continue; /* half of the ways, of each field other ones than of the one before */
         scene s = scene_make(n, n, n, NULL, f[k], parameter[k]);
         isogi_trace_desc d = desc_make(&s, 0.5f, 1, 8);
         isogi_trace *t = NULL, *low = NULL;
@@ -767,7 +769,7 @@ TEST(hidden_bright_spots_take_no_other_light) {
     isogi_trace_desc d = desc_make(&s, 0.5f, -1, LONG_SUITE ? 512 : 128);
     d.lazy = 1, d.lighting = lighting;
     bake_and_sample(&d, NULL, (const float(*)[3])points, n, truth);
-    for (d.order = 3; d.order <= 6; d.order++) {
+    for (d.order = 3; d.order <= 6; d.order += QUICK_SUITE ? 3 : 1) {
         isogi_trace *t = NULL;
         float light[36][3], dim[36][3], plain[108];
         double square[2] = {0, 0};
@@ -1039,7 +1041,7 @@ TEST(lamps_in_the_middle_are_lamps_like_others) {
     for (size_t i = 0; i < 33 * 33 * 33; i++) s.data[i] = -s.data[i];
     isogi_vol_update(s.pyramid, (const size_t[3]){0, 0, 0}, (const size_t[3]){32, 32, 32}, NULL);
     points_seen_from(&s, 16, 7, 14, points);
-    for (int k = 0; k < 5; k++) {
+    for (int k = 0; k < 5; k += 1 + QUICK_SUITE) {
         isogi_light lamp = light_make(ISOGI_LIGHT_POINT, (float)(16 + off[k]), 16, 16, 100, 0);
         isogi_trace_desc d = desc_make(&s, 0.5f, 2, 128);
         isogi_trace_report report = {0};
@@ -1131,7 +1133,7 @@ TEST(lamps_near_walls_bring_no_more_than_they_send) {
     const isogi_light lamp[2] = {light_make(ISOGI_LIGHT_POINT, middle + 2, middle, middle, 100, 0),
                                  light_make(ISOGI_LIGHT_SPHERE, middle, middle - 2, middle + 1, 100, 0.5)};
     CHECK(isogi_vol_build(&pyramid, &volume, NULL) == ISOGI_OK, "build");
-    for (int way = 0; way < 8; way += LONG_SUITE || way < 3 ? 1 : 3) { /* method, offset, lamp */
+    for (int way = QUICK_SUITE ? 2 : 0; way < 8; way += LONG_SUITE || (way < 3 && !QUICK_SUITE) ? 1 : 3) { /* method, offset, lamp */
         const isogi_trace_desc d = {.pyramid = pyramid, .lighting = {.lights = &lamp[way / 4], .light_count = 1}, .bounces = -1,
                                     .samples = way % 2 ? 32 : 64, .method = way % 2 ? ISOGI_TRACE_PATHS : ISOGI_TRACE_FEEDBACK,
                                     .offset = way / 2 % 2 ? 1 : 0.25f, .albedo = {0.8f, 0.8f, 0.8f}, .isovalue_min = -0.1,

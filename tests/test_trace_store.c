@@ -506,7 +506,7 @@ TEST(feedback_at_work_takes_a_block) {
     float points[40][3];
     int n = surface_points(&s, 0, 40, 1, points);
     for (int k = 0; k < 10; k++) {
-        if (!LONG_SUITE && (k / 2 + k) % 2) continue; /* whole and lazy in turn */
+        if ((!LONG_SUITE && (k / 2 + k) % 2) || (QUICK_SUITE && k / 2 % 3)) continue; /* whole and lazy in turn */
         static const uint64_t before[5] = {1, 600, 2500, 6000, 9000};
         isogi_trace_desc d = store_desc(&s, ISOGI_TRACE_IRRADIANCE, 0, 64);
         isogi_trace *whole = NULL, *part = NULL;
@@ -668,7 +668,7 @@ TEST(damaged_blocks_are_refused) {
         size_t size, size_after;
         uint8_t *block = save_now(t, &size), *copy = (uint8_t *)malloc(size + 1), *after;
         isogi_trace_create(&other, &d, NULL);
-        for (int i = 0; i < (LONG_SUITE ? 3000 : 250); i++) {
+        for (int i = 0; i < (LONG_SUITE ? 3000 : QUICK_SUITE ? 125 : 250); i++) {
             size_t length = size;
             memcpy(copy, block, size), copy[size] = 0;
             if (i % 3 == 0) length = (size_t)random_range(&r, 0, (double)size);
@@ -676,7 +676,8 @@ TEST(damaged_blocks_are_refused) {
             else copy[i < 120 ? (size_t)i : (size_t)random_range(&r, 0, (double)size)] ^= (uint8_t)(1 << random_bits(&r) % 8);
             CHECK(isogi_trace_load(other, copy, length) == ISOGI_CORRUPT, "change %d", i);
         }
-        for (int i = 0; i < (LONG_SUITE ? 3000 : 250); i++) { /* the hash is right: sizes, numbers, order, texels and values are checked */
+        /* the hash is right: sizes, numbers, order, texels and values are checked */
+        for (int i = 0; i < (LONG_SUITE ? 3000 : QUICK_SUITE ? 125 : 250); i++) {
             memcpy(copy, block, size);
             for (int k = 0; k < 1 + i % 3; k++)
                 copy[random_bits(&r) % 2 ? 8 + random_bits(&r) % 80 : random_bits(&r) % (size - 8)] = (uint8_t)random_bits(&r);
@@ -892,7 +893,7 @@ TEST(blocks_are_loaded_whole_or_not_at_all) {
     int failed = 1;
     d.method = ISOGI_TRACE_FEEDBACK, d.sides = ISOGI_TRACE_BOTH_SIDES;
     whole = baked(&d), block = save_now(whole, &size);
-    for (long k = 0; failed; k += 7) {
+    for (long k = 0; failed; k += QUICK_SUITE ? 21 : 7) {
         scarce memory = {-1, 0};
         isogi_context context = {.alloc = scarce_alloc, .release = scarce_release, .user = &memory, .threads = 1};
         isogi_trace *t = NULL;

@@ -140,7 +140,7 @@ TEST(a_speck_is_shown_and_a_coarse_lattice_named) {
     for (int i = 0; i < 27; i++) speck[19 + i / 9][19 + i / 3 % 3][19 + i % 3] = 200;
     const char *path = temporary("speck_40x40x40_uint8.raw");
     write_bytes(path, speck, sizeof speck);
-    for (int m = 0; m < 4; m++) {
+    for (int m = 0; m < 4; m += 1 + QUICK_SUITE) {
         const char *out = temporary("speck.png");
         snprintf(command, sizeof command, "'%s' --mode %s --size 33x33 --out '%s'", path, ways[m], out);
         r = run_viewer(command);
@@ -270,7 +270,8 @@ TEST(the_number_of_threads_changes_no_byte) {
     size_t size[2];
     for (int i = 0; i < 2; i++) {
         const char *out = temporary(i ? "three.png" : "one.png");
-        snprintf(command, sizeof command, "procedural:engine-block:64 --samples 16 --size 80x60 --threads %d --out '%s'", i ? 3 : 1, out);
+        snprintf(command, sizeof command, "procedural:engine-block:%d --samples 16 --size 80x60 --threads %d --out '%s'",
+                 QUICK_SUITE ? 40 : 64, i ? 3 : 1, out);
         CHECK(run_viewer(command).status == 0, "%s", command);
         size[i] = read_text(out, text[i], sizeof text[i]);
     }
@@ -359,11 +360,12 @@ TEST(clip_planes_add_up) {
 TEST(methods_local_light_and_presets_are_seen) {
     static const char *const ways[] = {"", "--method sweep", "--method brute", "--method paper", "--method paper --local", "--preset grey",
         "--preset hot", "--preset cool-warm", "--preset spectrum"};
+    const int count = QUICK_SUITE ? 6 : 9;
     unsigned char *picture[9];
     char command[512];
     int shape[3];
     double outliers;
-    for (int k = 0; k < 9; k++) {
+    for (int k = 0; k < count; k++) {
         snprintf(command, sizeof command, "procedural:engine-block:40 --mode dvr --size 48x48 --exposure 1 %s --out '%s'", ways[k],
                  temporary("way.png"));
         run_result r = run_viewer(command);
@@ -372,19 +374,19 @@ TEST(methods_local_light_and_presets_are_seen) {
         if (!picture[k]) return;
     }
     CHECK(!memcmp(picture[0], picture[1], 48 * 48 * 3), "the default is not sweeps");
-    for (int k = 2; k < 9; k++)
+    for (int k = 2; k < count; k++)
         for (int i = k < 5 ? 1 : 0; i < k; i++) {
             double difference = picture_difference(picture[i], picture[k], 48, 48, &outliers);
             CHECK(difference > (k < 5 ? 0.1 : 1), "\"%s\" looks like \"%s\": %g", ways[i], ways[k], difference);
             if (k < 4) CHECK(difference < 12, "\"%s\" differs from \"%s\" by %g", ways[i], ways[k], difference);
         }
-    for (int k = 0; k < 9; k++) free(picture[k]);
+    for (int k = 0; k < count; k++) free(picture[k]);
 }
 
 /* Scenes of isosurfaces have light for volume rendering, too: what is black at any exposure has none. */
 TEST(every_scene_is_lit_in_volume_rendering) {
     static const char *const scenes[] = {"engine-block", "cavity", "torus-sphere-plane", "cthead"};
-    for (int k = 0; k < (getenv("ISOGI_DATA") ? 4 : 3); k++) {
+    for (int k = QUICK_SUITE; k < (getenv("ISOGI_DATA") ? 4 : 3); k++) { /* the first is by far the largest */
         unsigned char *picture[2] = {NULL, NULL};
         double outliers;
         int shape[3];
@@ -1340,7 +1342,7 @@ TEST(ambient_light_and_fog_are_the_sky) {
     snprintf(command, sizeof command, "--scene furnace --mode lambert --ambient normal --exposure 0.5 --size 48x48 --out '%s'", first);
     r = run_viewer(command);
     CHECK(r.status == 0, "%d: %s", r.status, r.error);
-    for (int k = 0; k < 2; k++) {
+    for (int k = QUICK_SUITE; k < 2; k++) {
         double difference = 1;
         snprintf(command, sizeof command, "--scene furnace --mode lambert %s --exposure 0.5 --size 48x48 --compare '%s' --out '%s'",
                  then[k], first, temporary("then.png"));

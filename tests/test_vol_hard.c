@@ -111,13 +111,14 @@ static isogi_ray ray_on_lattice(const scene *s, double isovalue, test_random *r)
 
 static void run_rays(const scene *s, int lattice, int n, double low, double high, double step, int all_finite, tally *t, test_random *r) {
     isogi_ray rays[BATCH];
-    for (int done = 0; done < n; done += BATCH) {
-        for (int i = 0; i < BATCH; i++) {
+    const int batch = QUICK_SUITE ? 200 : BATCH;
+    for (int done = 0; done < n; done += batch) {
+        for (int i = 0; i < batch; i++) {
             double isovalue = random_range(r, low, high);
             if (step > 0) isovalue = step * floor(isovalue / step);
             rays[i] = lattice ? ray_on_lattice(s, isovalue, r) : ray_through(s, isovalue, 60, r);
         }
-        compare_rays(s, rays, BATCH, all_finite, t);
+        compare_rays(s, rays, batch, all_finite, t);
     }
 }
 
@@ -210,7 +211,7 @@ TEST(rays_from_a_million_cells_away_hit_like_the_reference) {
 TEST(tangent_rays_and_saddles_hit_like_the_reference) {
     test_random r = {5};
     tally t = {0};
-    for (int v = 0; v < (LONG_SUITE ? 2000 : 30); v++) {
+    for (int v = 0; v < (LONG_SUITE ? 2000 : QUICK_SUITE ? 12 : 30); v++) {
         scene s = scene_new(3, 4, 3);
         isogi_ray rays[BATCH];
         scene_noise(&s, v & 1 ? 4 : 0, &r);
@@ -284,7 +285,7 @@ TEST(t_and_place_agree_where_rays_run_along_edges) {
     long hits = 0;
     scene_noise(&s, 0, &r);
     scene_build(&s);
-    for (int turn = 0; turn < (LONG_SUITE ? 3000000 : 30000); turn++) {
+    for (int turn = 0; turn < (LONG_SUITE ? 3000000 : QUICK_SUITE ? 10000 : 30000); turn++) {
         enum { RAYS = 4 };
         isogi_ray ray[RAYS];
         isogi_hit one, hit[RAYS];
@@ -460,7 +461,7 @@ TEST(just_before_a_hit_rays_are_on_the_other_side) {
     enum { RAYS = 96 };
     test_random r = {29};
     long hits = 0, wrong[PATHS] = {0};
-    for (int turn = 0; turn < (LONG_SUITE ? 4000 : 200); turn++) {
+    for (int turn = 0; turn < (LONG_SUITE ? 4000 : QUICK_SUITE ? 100 : 200); turn++) {
         scene s = scene_new(9, 9, 9);
         isogi_ray ray[RAYS];
         isogi_hit hit[RAYS];
@@ -659,7 +660,7 @@ TEST(cells_without_a_surface_hit_like_the_reference) {
             if (v % 4 == 1 ? i / 9 % 18 == 8 && random_bits(&r) % 4 : x * x + y * y + z * z > 30) s.value[i] = (double)NAN;
         }
         scene_build(&s);
-        run_rays(&s, 0, BATCH, -0.7, 0.7, 0, 0, &t, &r);
+        run_rays(&s, 0, 150, -0.7, 0.7, 0, 0, &t, &r);
         scene_free(&s);
     }
     tally_check("not finite", &t, 1);

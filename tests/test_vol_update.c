@@ -45,7 +45,7 @@ TEST(all_paths_build_the_same_bits) {
     static const size_t sizes[5][3] = {{300, 9, 13}, {20, 33, 30}, {261, 2, 6}, {47, 21, 5}, {268, 7, 6}};
     test_random r = {9};
     for (int type = ISOGI_U8; type <= ISOGI_F64; type++)
-        for (int n = 0; n < (LONG_SUITE ? 400 : 40); n++) {
+        for (int n = 0; n < (LONG_SUITE ? 400 : QUICK_SUITE ? 20 : 40); n++) {
             const double top = n < 8 ? 250 : random_range(&r, 3, 250);
             const size_t *size = sizes[n % 5], voxels = size[0] * size[1] * size[2], step = n < 4 || n >= 8 ? 1 : 2;
             const ptrdiff_t bytes = (ptrdiff_t)(step * type_bytes((isogi_type)type)), x = (ptrdiff_t)size[0], y = (ptrdiff_t)size[1];
@@ -80,7 +80,7 @@ static void check_updates(isogi_type type, double scale, double bias, int shape,
     for (size_t i = 0; i < voxels; i++) store(base, type, i, floor(random_range(r, 20, 100)) + 1e-9 * random_unit(r));
     memcpy(raw, base, voxels * 8);
     CHECK(isogi_vol_build(&updated, &v, &context) == ISOGI_OK, "build");
-    for (int turn = 0; turn < (LONG_SUITE ? 200 : 40); turn++) {
+    for (int turn = 0; turn < (LONG_SUITE ? 200 : QUICK_SUITE ? 20 : 40); turn++) {
         size_t first[3], last[3], blocks = 1;
         int kind = (int)(random_bits(r) % 6), whole = random_bits(r) % 16 == 0;
         double level = kind == 1 ? 60 : kind == 2 ? random_range(r, 101, 126) : kind == 3 ? random_range(r, 0, 19) : (double)NAN;

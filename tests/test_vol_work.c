@@ -254,7 +254,7 @@ static void go_onward(const isogi_pyramid *p, const isogi_hit *hits, int count, 
 TEST(rays_side_by_side_hit_what_they_hit_alone) {
     enum { TURNS = 600, MOST = ABREAST };
     test_random r = {11};
-    const int turns = LONG_SUITE ? 40 * TURNS : TURNS;
+    const int turns = LONG_SUITE ? 40 * TURNS : QUICK_SUITE ? TURNS / 3 : TURNS;
     long hits = 0, wrong = 0, wrong_plain = 0, wrong_any = 0, spread_out = 0, left = 0, wrong_left = 0;
     for (int turn = 0; turn < turns; turn++) {
         const int smooth = turn % 3, levels = turn % 4 == 1, path = 2 + turn / 12 % 3, length = turn % 50 == 7 ? turn / 50 % 3 : -1;
@@ -374,7 +374,7 @@ TEST(rays_of_one_place_hit_what_they_hit_alone_and_look_at_fewer_cells) {
     test_random r = {53};
     long hit = 0, wrong = 0, wrong_any = 0, wrong_plain = 0, wrong_row = 0;
     isogi_counters whole = {0}, parts = {0}, plainly = {0};
-    const int turns = LONG_SUITE ? 40 * TURNS : TURNS;
+    const int turns = LONG_SUITE ? 40 * TURNS : QUICK_SUITE ? TURNS / 3 : TURNS;
     for (int turn = 0; turn < turns; turn++) {
         const int smooth = turn % 4;
         const size_t more[3] = {random_bits(&r) % 9, random_bits(&r) % 9, random_bits(&r) % 9};
