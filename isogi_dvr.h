@@ -504,8 +504,9 @@ ISOGI_API isogi_result isogi_transfer_import(const float (*rgba)[4], size_t coun
 /* A transfer function for a volume of which nothing is known: values in three classes of least variance (Otsu 1979; the largest bin left
    out, which is air or padding; and up to a thousandth of the voxels at either end of the range where that halves it), the lowest
    transparent, the others ever denser and warmer. In physical space extinction is per smallest voxel spacing and makes 1/30 of the
-   box's diagonal half opaque soon after the third class begins (the fifth point), twice as dense at the top, a fifth to a seventh of it
-   in the second class: what is dense is seen within what is not; in data space a passage through each upper class is about half opaque.
+   diagonal, as long as the voxels in a row along it, half opaque soon after the third class begins (the fifth point), twice as dense at
+   the top, a fifth to a seventh of it in the second class: what is dense is seen within what is not; in data space a passage through each
+   upper class is about half opaque, less where the class is narrow: in proportion.
    A volume of one value gets points that nothing meets. ISOGI_INVALID for a pyramid of a function, which has no voxels. threshold (may
    be NULL): where the second class begins, for an isosurface. */
 ISOGI_API isogi_result isogi_transfer_suggest(const isogi_pyramid *pyramid, isogi_dvr_space space,
@@ -5456,17 +5457,40 @@ static double isogi_dvr__peak_opacity(const isogi_dvr *d, double opacity, const 
     return isogi_dvr__aslant_opacity(d->desc.silhouette, opacity, fabs(cosine));
 }
 
+/* The second field at a hit, in double where it has voxels; 0: it has no value there. */
+static int isogi_dvr__second_value(const isogi_dvr *d, const isogi_hit *hit, double *value) {
+    const isogi_volume *v = isogi_vol_volume(d->desc.second);
+    double at[3], world[3], corner[8];
+    float point[3], read;
+    uint32_t cell[3];
+    int a, i, n;
+    if (!v->data) {
+        isogi_vol_positions(d->desc.pyramid, hit, 1, &point);
+        if (isogi_vol_sample(d->desc.second, (const float(*)[3])&point, 1, &read, NULL) != ISOGI_OK) return 0;
+        *value = (double)read;
+        return !isogi_dvr__is_nan(*value);
+    }
+    for (a = 0; a < 3; a++) at[a] = hit->cell[a] + hit->local[a];
+    isogi_vol_to_world(d->desc.pyramid, at, world), isogi_vol_to_grid(d->desc.second, world, at);
+    for (a = 0; a < 3; a++) {
+        const size_t last = v->size[a] > 1 ? v->size[a] - 2 : 0;
+        at[a] = isogi_dvr__clamp(at[a], (double)(v->size[a] - 1));
+        cell[a] = at[a] < (double)last ? (uint32_t)at[a] : (uint32_t)last, at[a] -= cell[a];
+    }
+    if (!isogi_volume_corners(v, cell, corner)) return 0;
+    for (a = 0, n = 4; a < 3; a++, n /= 2) /* what is the same at both ends is so between them */
+        for (i = 0; i < n; i++) corner[i] = corner[2 * i] + at[a] * (corner[2 * i + 1] - corner[2 * i]);
+    *value = corner[0];
+    return 1;
+}
+
 /* A peak's colour: its own, times that of the second field. */
 static void isogi_dvr__peak_colour(const isogi_dvr *d, const isogi_peak *peak, const isogi_hit *hit, double rgb[3]) {
-    float point[3], value;
-    double factor[3];
+    double factor[3], value;
     int a;
     for (a = 0; a < 3; a++) rgb[a] = (double)peak->rgb[a];
-    if (!d->desc.second || !d->desc.second_count) return;
-    isogi_vol_positions(d->desc.pyramid, hit, 1, &point);
-    if (isogi_vol_sample(d->desc.second, (const float(*)[3])&point, 1, &value, NULL) != ISOGI_OK ||
-        isogi_dvr__is_nan((double)value)) return;
-    isogi_dvr__colour(d->desc.second_points, d->desc.second_count, (double)value, factor);
+    if (!d->desc.second || !d->desc.second_count || !isogi_dvr__second_value(d, hit, &value)) return;
+    isogi_dvr__colour(d->desc.second_points, d->desc.second_count, value, factor);
     for (a = 0; a < 3; a++) rgb[a] *= factor[a];
 }
 
@@ -6159,12 +6183,20 @@ static size_t isogi_dvr__count_classes(const isogi_dvr *d, double *low, double *
     }
 }
 
-/* Whether floats hold classes and voxels, and tell values of the classes' span apart, if there are any to be told. Integers are floats as
-   they are; what they count from is taken off with their bias, in double. */
+/* Whether floats hold classes, their light and voxels, and tell values of the classes' span apart, if there are any to be told. Integers
+   are floats as they are; what they count from is taken off with their bias, in double. */
 #define ISOGI_DVR__TOLD_APART 4096
 static int isogi_dvr__floats_tell(const isogi_dvr *d, double low, double scale, double span) {
     const isogi_volume *v = &d->volume;
-    double from = fabs(low - v->bias), to = fabs(low + span - v->bias);
+    const isogi_dvr__transfer *t = &d->transfer;
+    double from = fabs(low - v->bias), to = fabs(low + span - v->bias), extinction = 0, colour = 0;
+    size_t i;
+    int a;
+    for (i = 0; i < t->point_count; i++) {
+        extinction = fmax(extinction, (double)t->points[i].extinction);
+        for (a = 0; a < 3; a++) colour = fmax(colour, (double)t->points[i].rgb[a]);
+    }
+    if (fmin(extinction, 1e30) * colour > 1e32) return 0;
     if (!isogi_dvr__float_classes(d, scale) || !(fabs(v->scale) > 1e-30 && fabs(v->scale) < 1e30 && from < 1e37 && to < 1e37)) return 0;
     if (!(fabs((d->range[0] - v->bias) / v->scale) <= ISOGI_DVR__FLOATS)) return 0;
     if (!(fabs((d->range[1] - v->bias) / v->scale) <= ISOGI_DVR__FLOATS)) return 0;

@@ -340,7 +340,8 @@ ISOGI_API isogi_result isogi_trace_step(isogi_trace *trace, uint64_t max_rays, d
    of a single sample, which is not known, and endless light), and so does one that is not finite. Points beyond the lattice are moved to
    its border.
    TRANSFER: under the lighting last given to isogi_trace_relight or isogi_trace_change (that of the description at first); its error is
-   an upper bound.
+   an upper bound, but for textures of order 2 with hundreds of samples: there the spread may be twice as much in open places, as the
+   order has no room for the lighting's square.
    Irradiance below 0 is handed out as it is, here and by isogi_trace_gather: a sky that SH coefficients make negative somewhere brings
    it, and so do, with TRANSFER, rings of what isogi_trace_lighting calls the least, where nearly all light is hidden. Before it is shown:
    e = e > 0 ? e : 0  a channel.
@@ -440,7 +441,8 @@ ISOGI_API isogi_trace *isogi_trace_high(isogi_trace *trace);
    component v % 4 of plane v / 4, and every plane is a whole RGBA texture: FLOAT 16 bytes a texel, HALF 8, BYTE 4 (GL_RGBA8_SNORM).
    Components are in the machine's byte order. Texels hold what lookups read there, drafts too. Those without light of their own (no
    surface, not computed) hold the mean of the up to 26 around them by 1 / distance^2, three texels deep, and beyond that the mean
-   of all: plain hardware interpolation then shows no dark seams (as rounded, and rounded again: twice the errors below).
+   of all: plain hardware interpolation then shows no dark seams (as rounded, and rounded again: up to four times the errors below, which
+   are those of the largest around where signs differ).
    Light is what the hardware reads times a scale: scales[3] of RGB, or scales[order^2 channels]; 1 for FLOAT; for HALF and RGB9E5
    another power of two where something is brighter than these hold, or nothing as bright as 0.5; for BYTE the largest value (of
    RGB, or of the coefficient), in whose 255th or 127th parts it counts: errors up to 2e-3 or 4e-3 of the scale. HALF and RGB9E5 keep to
@@ -2749,19 +2751,24 @@ static void isogi_trace__flat_means(isogi_trace__flat *flat, const isogi_env *en
     }
 }
 
-/* Cuts a channel at FLAT times the mean that the cut leaves, found by rounds: a lone sun in the dark is cut to nothing. 0: nothing is. */
+/* Cuts a channel at FLAT times the mean that the cut leaves, by Newton's rounds, which never fall below it: what is left
+   is linear in the cut from one block's mean to the next. A lone sun in the dark is cut to nothing. 0: nothing is cut. */
 static int isogi_trace__flat_cut(isogi_trace__flat *flat, int channel) {
     const int rows = ISOGI_TRACE__FLAT_ROWS, columns = 2 * rows;
     double most = DBL_MAX;
     int x, y, k, cut = 0;
     for (k = 0; k < ISOGI_TRACE__FLAT_ROUNDS; k++) {
-        double sum = 0;
+        double sum = 0, above = 0; /* what is left below the cut; how much of the sphere is above it */
         for (y = 0; y < rows; y++) {
             const double angle = cos(ISOGI_TRACE__PI * y / rows) - cos(ISOGI_TRACE__PI * (y + 1) / rows);
-            for (x = 0; x < columns; x++)
-                sum += angle / (2 * columns) * (flat->mean[y][x][channel] < most ? flat->mean[y][x][channel] : most);
+            for (x = 0; x < columns; x++) {
+                const double mean = flat->mean[y][x][channel];
+                if (mean < most) sum += angle / (2 * columns) * mean;
+                else above += angle / (2 * columns);
+            }
         }
-        most = sum > 0 ? ISOGI_TRACE__FLAT * sum : 0;
+        if (!(ISOGI_TRACE__FLAT * above < 1)) break; /* what is left of that alone is more than the cut allows */
+        most = sum > 0 ? ISOGI_TRACE__FLAT * sum / (1 - ISOGI_TRACE__FLAT * above) : 0;
     }
     for (y = 0; y < rows; y++)
         for (x = 0; x < columns; x++) {

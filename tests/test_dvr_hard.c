@@ -306,4 +306,58 @@ TEST(paths_of_other_numbers_are_the_best) {
     field_free(&f);
 }
 
+/* The second field is read in double: labels of large numbers, and of small differences, far from the origin; a step of colours at the very
+   value of a field that is the same everywhere. Volumes of one geometry, and of another one. */
+TEST(second_field_is_read_in_double) {
+    static double data[8][8][8], label[9][9][9];
+    const double from[5] = {0, 1.6e9, 1e6, 0, 0.7}, step[5] = {1, 10, 0.001, 1, 0}, origin[5] = {0, 0, 0, 33554432, 0};
+    for (int k = 0; k < 5; k++)
+        for (int wider = 0; wider < 2; wider++) {
+            isogi_volume v = {.data = data, .type = ISOGI_F64, .size = {8, 8, 8}, .origin = {origin[k], 0, 0}}, w = v;
+            isogi_pyramid *p = NULL, *q = NULL;
+            const isogi_peak peak = {3.5, {1, 1, 1}, 1};
+            const isogi_transfer transfer = {NULL, 0, &peak, 1};
+            const isogi_transfer_point ramp[2] = {{from[k], {0, 0, 1}, 0}, {from[k] + 7 * step[k], {1, 1, 1}, 0}};
+            const double eye[3] = {origin[k] + 4, 3.5, 20}, target[3] = {origin[k] + 4, 3.5, 0};
+            const int n = wider ? 9 : 8; /* begins a voxel earlier */
+            w.data = label, w.size[0] = w.size[1] = w.size[2] = (size_t)n;
+            for (int a = 0; a < 3; a++) w.origin[a] -= wider;
+            for (int z = 0; z < n; z++)
+                for (int y = 0; y < n; y++)
+                    for (int x = 0; x < n; x++) {
+                        if (z < 8 && y < 8 && x < 8) data[z][y][x] = z;
+                        (&label[0][0][0])[x + n * (y + n * z)] = from[k] + step[k] * (x - wider);
+                    }
+            CHECK(isogi_vol_build(&p, &v, NULL) == ISOGI_OK && isogi_vol_build(&q, &w, NULL) == ISOGI_OK, "build");
+            const isogi_dvr_desc desc = {.pyramid = p, .space = ISOGI_DVR_DATA, .second = q, .second_points = ramp, .second_count = 2};
+            isogi_dvr *dvr = dvr_new(&desc, &transfer);
+            const double expected = step[k] > 0 ? 4 / 7.0 : 1;
+            const pixel seen = cast(dvr, eye, target, NULL);
+            CHECK(fabs((double)seen.c[0] - expected) < 1e-6 && fabs((double)seen.c[2] - 1) < 1e-6, "%g by %g, %d: %g, not %g", from[k],
+                  step[k], wider, (double)seen.c[0], expected);
+            isogi_dvr_free(dvr), isogi_vol_free(p), isogi_vol_free(q);
+        }
+}
+
+/* Colours up to 1e30 are what they are, however dense the matter. */
+TEST(matter_glows_at_any_density) {
+    field f = field_new(8, 8, 8);
+    for (size_t i = 0; i < field_count(&f); i++) f.value[i] = (double)(20 * (i / 64) + 3 * (i % 8));
+    field_build(&f);
+    for (int k = 0; k < 4; k++) {
+        const float rgb = k == 2 ? 1e28f : 1e30f, density = (const float[]){0.1f, 1000, 1e6f, 1e7f}[k];
+        const isogi_transfer_point points[2] = {{0, {rgb, rgb / 2, rgb / 4}, density}, {200, {rgb, rgb / 2, rgb / 4}, density}};
+        const isogi_transfer transfer = {points, 2, NULL, 0};
+        const double eye[3] = {3.5, 3.5, 30}, target[3] = {3.5, 3.5, 0}, opacity = -expm1(-7 * (double)density);
+        const isogi_dvr_desc desc = {.pyramid = f.pyramid, .opaque = 1};
+        isogi_dvr *dvr = dvr_new(&desc, &transfer);
+        const pixel seen = cast(dvr, eye, target, NULL);
+        for (int c = 0; c < 3; c++)
+            CHECK(fabs((double)seen.c[c] / (double)rgb * (1 << c) / opacity - 1) < 1e-3, "density %g, colour %d: %g of %g",
+                  (double)density, c, (double)seen.c[c], (double)rgb);
+        isogi_dvr_free(dvr);
+    }
+    field_free(&f);
+}
+
 TEST_MAIN("dvr_hard")

@@ -854,6 +854,15 @@ TEST(least_part_of_a_lighting) {
             CHECK(off <= (kind == 4 ? 1e-5 : 0.04 * most), "kind %d, %dx%d: coefficients differ by up to %g of %g", kind, width, height,
                   off, most);
         }
+    for (int columns = 2; columns <= 20; columns += 2) { /* part of a black sphere is alike bright: up to a quarter none of it is left */
+        memset(image, 0, sizeof image);
+        for (int i = 0; i < 3 * 64 * 32; i++) image[i] = i / 3 % 64 < columns;
+        l = (isogi_lighting){.env = {.rgb = image, .width = 64, .height = 32}};
+        CHECK(isogi_trace_relight(t, &l) == ISOGI_OK && isogi_trace_lighting(t, light, least) == ISOGI_OK, "%d columns", columns);
+        if (columns == 16) continue; /* a quarter: any cut will do */
+        CHECK(fabsf(least[0][1] - (columns > 16 ? light[0][1] : 0)) < 1e-5f, "%d columns: %g of %g", columns, (double)least[0][1],
+              (double)light[0][1]);
+    }
     isogi_trace_free(t);
     d.mode = ISOGI_TRACE_IRRADIANCE;
     CHECK(isogi_trace_lighting(NULL, light, least) == ISOGI_INVALID && isogi_trace_create(&t, &d, NULL) == ISOGI_OK &&
