@@ -2751,8 +2751,8 @@ static void isogi_trace__flat_means(isogi_trace__flat *flat, const isogi_env *en
     }
 }
 
-/* Cuts a channel at FLAT times the mean that the cut leaves, by Newton's rounds, which never fall below it: what is left
-   is linear in the cut from one block's mean to the next. A lone sun in the dark is cut to nothing. 0: nothing is cut. */
+/* Cuts a channel at FLAT times the mean that the cut leaves, by Newton's rounds, which never fall below it: what is left is linear in the
+   cut from one block's mean to the next. A lone sun in the dark is cut to nothing. 0: nothing is cut. */
 static int isogi_trace__flat_cut(isogi_trace__flat *flat, int channel) {
     const int rows = ISOGI_TRACE__FLAT_ROWS, columns = 2 * rows;
     double most = DBL_MAX;
