@@ -157,19 +157,26 @@ TEST(a_speck_is_shown_and_a_coarse_lattice_named) {
     CHECK(r.status == 0 && strstr(r.error, "the lattice is too coarse"), "%d: %s", r.status, r.error);
 }
 
+/* The bytes of the picture that a command makes, without its --out; how many. */
+static size_t picture_bytes(const char *command, char *bytes, size_t room) {
+    char whole[1024];
+    snprintf(whole, sizeof whole, "%s --out '%s'", command, temporary("lattice.png"));
+    run_result r = run_viewer(whole);
+    CHECK(r.status == 0, "%s: %s", command, r.error);
+    const size_t size = read_text(temporary("lattice.png"), bytes, room);
+    CHECK(size > 100 && size < room - 1, "%s: %zu bytes", command, size);
+    return size;
+}
+
 /* Texels are as close along every axis as along the one on which voxels are closest, up to four for a voxel; what is asked for counts. */
 TEST(slices_far_apart_get_more_texels) {
     const char *with[] = {"1,1,2", "1,1,2 --lattice 20,20,39", "1,1,2 --lattice 20,20,20", "0.5,2,9", "0.5,2,9 --lattice 20,77,77"};
     static char picture[5][1 << 16];
     size_t size[5];
     for (int k = 0; k < 5; k++) {
-        char command[1024];
-        snprintf(command, sizeof command, "procedural:gyroid:20 --spacing %s --samples 1 --size 40x40 --out '%s'", with[k],
-                 temporary("slices.png"));
-        run_result r = run_viewer(command);
-        CHECK(r.status == 0, "%s: %s", with[k], r.error);
-        size[k] = read_text(temporary("slices.png"), picture[k], sizeof picture[k]);
-        CHECK(size[k] > 100, "%s: %zu bytes", with[k], size[k]);
+        char command[256];
+        snprintf(command, sizeof command, "procedural:gyroid:20 --spacing %s --samples 1 --size 40x40", with[k]);
+        size[k] = picture_bytes(command, picture[k], sizeof picture[k]);
     }
 #define SAME(a, b) (size[a] == size[b] && !memcmp(picture[a], picture[b], size[a]))
     CHECK(SAME(0, 1) && !SAME(0, 2), "two voxels apart");
@@ -183,12 +190,9 @@ TEST(large_voxels_get_more_texels) {
     static char picture[5][1 << 17];
     size_t size[5];
     for (int k = 0; k < 5; k++) {
-        char command[1024];
-        snprintf(command, sizeof command, "procedural:gyroid:24 --samples 1 --out '%s' --size 60x%s", temporary("large.png"), with[k]);
-        run_result r = run_viewer(command);
-        CHECK(r.status == 0, "%s: %s", with[k], r.error);
-        size[k] = read_text(temporary("large.png"), picture[k], sizeof picture[k]);
-        CHECK(size[k] > 100 && size[k] < sizeof picture[k] - 1, "%s: %zu bytes", with[k], size[k]);
+        char command[256];
+        snprintf(command, sizeof command, "procedural:gyroid:24 --samples 1 --size 60x%s", with[k]);
+        size[k] = picture_bytes(command, picture[k], sizeof picture[k]);
     }
 #define SAME(a, b) (size[a] == size[b] && !memcmp(picture[a], picture[b], size[a]))
     CHECK(SAME(0, 1), "small voxels");
