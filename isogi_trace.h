@@ -233,7 +233,7 @@ typedef void isogi_trace_material_function(void *user, double isovalue, const do
    FLOAT   12 / 4   6e-8 of the value
    HALF     6 / 2   5e-4 of the value
    RGB9E5   4 / -   2e-3 of the largest of the three channels; irradiance alone, 0 or more
-   BYTE     3 / 1   irradiance: square roots, 4e-3 of sqrt(value * largest); transfer: 4e-3 of the texel's largest coefficient.
+   BYTE     3 / 1   irradiance: square roots, 4e-3 of sqrt(value * the most it holds); transfer: 4e-3 of the texel's largest.
                     Exported as they are, for the hardware to interpolate: 2e-3 and 4e-3 of their scales (isogi_trace_export_scales)
    `make test` prints the measured table. HALF and RGB9E5 hold up to 65000 times the irradiance of an open surface
    (measured as isogi_trace_report.unit is), BYTE no more than twice that irradiance itself (four times with reflections), which near a

@@ -223,14 +223,15 @@ typedef enum isogi_type { ISOGI_U8 = 0, ISOGI_I8, ISOGI_U16, ISOGI_I16, ISOGI_F3
    Voxels that are not finite: a cell with one at a corner holds no surface for rays and meshes, no ray hits it, no mesh has a triangle
    in it, and what a ray knew of its side is forgotten in it; all other cells are as if it were not there. Ranges leave such voxels out;
    rays and meshes skip regions that have no others.
-   Trilinear samples next to one, and smooth samples within two voxels of one, are not finite themselves. Smooth normals of hits and of
-   meshes are trilinear there.
+   Trilinear samples next to one, and smooth samples within two voxels of one (at two, some), are not finite themselves. Smooth normals
+   of hits and of meshes are trilinear within two.
 
    Chunks: a larger field may be looked at in parts, each a volume of its own. Neighbours share the voxels of one plane, and every part
    owns the cells between its own voxels. halo_low and halo_high say how many voxels of the larger field lie in memory before
    and behind those, at the same strides: rays and meshes do not enter them, only the smoothed values and gradients read them (one on
    each side is enough). `first` says where in the larger field voxel (0,0,0) lies. Then the parts have the hits, samples and normals of
-   the whole (to within the rounding of coordinates), and mesh vertices on the plane that two parts share are the same bits in both. */
+   the whole (to within the rounding of coordinates), and mesh vertices on the plane that two parts share are the same bits in both.
+   Where such a plane is itself a sheet of the isovalue without thickness, which the whole reports once, each part reports its own side. */
 typedef struct isogi_volume {
     const void *data;    /* voxel (0,0,0), aligned for its type */
     isogi_type type;
@@ -4853,25 +4854,23 @@ ISOGI_VOL__INLINE void isogi_vol__ride_to_cell(const isogi_vol__ride *r, int x, 
     ISOGI_VOL__PREFETCH(at + v->stride[1] + v->stride[2]);
 }
 
-/* What is certain of the ray in a cell by the hull of Bernstein coefficients in float, from the leaf's voxels: 1: it stays on its side all
-   along; 2: it is on the other one where it leaves the cell, and any hit will do; 0: nothing. f: values where by each axis (a bit) it
-   enters the cell, 0, or leaves it, 1. */
-ISOGI_VOL__INLINE int isogi_vol__told(isogi_vol__walk *w, const isogi_vol__leaf *leaf, const float f[8]) {
-    const float high = leaf->isovalue + ISOGI_VOL__DOUBT, low = leaf->isovalue - ISOGI_VOL__DOUBT;
-    const float sum1 = f[1] + f[2] + f[4], sum2 = f[3] + f[5] + f[6]; /* three coefficients each */
-    const int in = (f[0] > high) & (f[7] > high) & (sum1 > 3 * high) & (sum2 > 3 * high);
-    const int out = (f[0] < low) & (f[7] < low) & (sum1 < 3 * low) & (sum2 < 3 * low);
+/* What is certain of the ray in a cell: 1: it stays on its side all along; 2: it is on the other one where it leaves the cell, and any hit
+   will do; 0: nothing. in, out: whether the hull lies on one side; last: the value where it leaves; high, low: what is certain. */
+ISOGI_VOL__INLINE int isogi_vol__told(isogi_vol__walk *w, int in, int out, float last, float high, float low) {
     if (w->inside < 0) w->inside = in ? 1 : out ? 0 : -1;
     if (w->inside > 0 ? in : out) return 1;
-    return !w->exact && (w->inside > 0 ? f[7] < low : !w->inside && f[7] > high) ? 2 : 0;
+    return !w->exact && (w->inside > 0 ? last < low : !w->inside && last > high) ? 2 : 0;
 }
 
-/* What is told of a cell; begin, end: when the ray enters it and leaves it. First x, then y, then z is taken there. */
+/* What is told of a cell by the hull of Bernstein coefficients in float, from the leaf's voxels; begin, end: when the ray enters it and
+   leaves it. First x, then y, then z is taken there: bit a of the numbers of values says where by axis a, the two inner coefficients are
+   sums of three. */
 static int isogi_vol__cell_told_base(isogi_vol__walk *w, const isogi_vol__leaf *leaf, const int32_t cell[4], double begin, double end) {
     const uint8_t *code = leaf->code + (cell[0] & 3) + 5 * (cell[1] & 3) + 25 * (cell[2] & 3);
     const isogi_vol__four zero = ISOGI_VOL__FOUR(set1_ps)(0), one = ISOGI_VOL__FOUR(set1_ps)(1);
+    const float inside = leaf->isovalue + ISOGI_VOL__DOUBT, outside = leaf->isovalue - ISOGI_VOL__DOUBT;
     isogi_vol__four low, high, enters, leaves, in, out;
-    float from[3], to[3], f[8];
+    float from[3], to[3], f[8], sum1, sum2;
     int a;
     for (a = 0; a < 3; a++) {
         const double at = w->origin[a] - cell[a];
@@ -4891,23 +4890,77 @@ static int isogi_vol__cell_told_base(isogi_vol__walk *w, const isogi_vol__leaf *
     ISOGI_VOL__TAKEN(2);
 #undef ISOGI_VOL__TAKEN
     ISOGI_VOL__FOUR(storeu_ps)(f, enters), ISOGI_VOL__FOUR(storeu_ps)(f + 4, leaves);
-    return isogi_vol__told(w, leaf, f);
+    sum1 = f[1] + f[2] + f[4], sum2 = f[3] + f[5] + f[6];
+    return isogi_vol__told(w, (f[0] > inside) & (f[7] > inside) & (sum1 > 3 * inside) & (sum2 > 3 * inside),
+                           (f[0] < outside) & (f[7] < outside) & (sum1 < 3 * outside) & (sum2 < 3 * outside), f[7], inside, outside);
 }
 
-/* Takes the ray's directions; 0: it has to be walked plainly. */
-static int isogi_vol__ride_set(isogi_vol__ride *r) {
+/* Takes the ray's directions: along which axes it falls, and times per cell. One that stands still keeps below the upper border. */
+static void isogi_vol__ride_face(isogi_vol__ride *r) {
     const isogi_vol__walk *w = &r->walk;
     isogi_vol__trip *c = &r->trip;
     int a;
-    if (!(w->end > 1e-150) || !(w->end < 1e150)) return 0;
     c->octant = 0, c->inverse[3] = 0, c->lead[3] = 0;
     for (a = 0; a < 3; a++) {
         const int still = !(w->dir[a] > 0 || w->dir[a] < 0);
-        /* one that stands still keeps below the upper border */
         const int fall = w->dir[a] < 0 || (still && w->origin[a] >= w->pyramid->box[a]);
         c->octant |= fall << a, c->lead[a] = fall;
         c->inverse[a] = still ? fall ? -1e200 : 1e200 : w->inverse[a];
     }
+}
+
+/* Times of the root, that of a cell by each axis among them; top: its level. */
+static void isogi_vol__ride_times(isogi_vol__trip *c, const isogi_vol__walk *w, float reach, int top, double most) {
+    int a;
+    for (a = 0; a < 3; a++) {
+        const double start = c->lead[a] ? (4 << 2 * top) - w->origin[a] : w->origin[a]; /* counted like cells */
+        const float cell = (float)isogi_vol__min(fabs(c->inverse[a]) * most, 1e30);
+        ISOGI_VOL__FOUR(storeu_ps)(c->cell + 4 * a, ISOGI_VOL__FOUR(set1_ps)(cell));
+        ISOGI_VOL__FOUR(storeu_ps)(c->enter[top] + 4 * a, ISOGI_VOL__FOUR(set1_ps)((-2 * reach - (float)start) * cell));
+    }
+}
+
+#ifdef ISOGI_VOL__AVX
+/* Both for three axes at once; the same bits. */
+ISOGI_VOL__TARGET("avx2") static void isogi_vol__ride_face_avx2(isogi_vol__ride *r) {
+    const isogi_vol__walk *w = &r->walk;
+    isogi_vol__trip *c = &r->trip;
+    const __m256d zero = _mm256_setzero_pd(), dir = _mm256_loadu_pd(w->dir), still = _mm256_cmp_pd(dir, zero, _CMP_EQ_OQ);
+    const __m256d upper = _mm256_cmp_pd(_mm256_loadu_pd(w->origin), _mm256_loadu_pd(w->pyramid->box), _CMP_GE_OQ);
+    const __m256d fall = _mm256_or_pd(_mm256_cmp_pd(dir, zero, _CMP_LT_OQ), _mm256_and_pd(still, upper));
+    const __m256d huge = _mm256_or_pd(_mm256_set1_pd(1e200), _mm256_and_pd(fall, _mm256_set1_pd(-0.0)));
+    const __m256i even = _mm256_setr_epi32(0, 2, 4, 6, 0, 2, 4, 6);
+    const __m128i falls = _mm256_castsi256_si128(_mm256_permutevar8x32_epi32(_mm256_castpd_si256(fall), even));
+    _mm256_storeu_pd(c->inverse, _mm256_blend_pd(_mm256_blendv_pd(_mm256_loadu_pd(w->inverse), huge, still), zero, 8));
+    _mm_storeu_si128((__m128i *)(void *)c->lead, _mm_and_si128(falls, _mm_setr_epi32(1, 1, 1, 0)));
+    c->octant = _mm256_movemask_pd(fall) & 7;
+}
+
+ISOGI_VOL__TARGET("avx2")
+static void isogi_vol__ride_times_avx2(isogi_vol__trip *c, const isogi_vol__walk *w, float reach, int top, double most) {
+    const __m128i lead = _mm_loadu_si128((const __m128i *)(const void *)c->lead);
+    const __m256d fall = _mm256_castsi256_pd(_mm256_cvtepi32_epi64(_mm_sub_epi32(_mm_setzero_si128(), lead)));
+    const __m256d origin = _mm256_loadu_pd(w->origin), back = _mm256_sub_pd(_mm256_set1_pd(4 << 2 * top), origin);
+    const __m128 start = _mm256_cvtpd_ps(_mm256_blendv_pd(origin, back, fall));
+    const __m256d each = _mm256_mul_pd(_mm256_andnot_pd(_mm256_set1_pd(-0.0), _mm256_loadu_pd(c->inverse)), _mm256_set1_pd(most));
+    const __m128 cell = _mm256_cvtpd_ps(_mm256_min_pd(each, _mm256_set1_pd(1e30)));
+    const __m128 enter = _mm_mul_ps(_mm_sub_ps(_mm_set1_ps(-2 * reach), start), cell);
+    _mm_storeu_ps(c->cell, _mm_permute_ps(cell, 0x00)), _mm_storeu_ps(c->enter[top], _mm_permute_ps(enter, 0x00));
+    _mm_storeu_ps(c->cell + 4, _mm_permute_ps(cell, 0x55)), _mm_storeu_ps(c->enter[top] + 4, _mm_permute_ps(enter, 0x55));
+    _mm_storeu_ps(c->cell + 8, _mm_permute_ps(cell, 0xaa)), _mm_storeu_ps(c->enter[top] + 8, _mm_permute_ps(enter, 0xaa));
+}
+#endif
+
+/* Sets a ride up; 0: it has to be walked plainly. */
+static int isogi_vol__ride_set(isogi_vol__ride *r) {
+    const isogi_vol__walk *w = &r->walk;
+    isogi_vol__trip *c = &r->trip;
+    if (!(w->end > 1e-150) || !(w->end < 1e150)) return 0;
+#ifdef ISOGI_VOL__AVX
+    if (w->pyramid->path >= ISOGI_VOL__PATH_AVX2) isogi_vol__ride_face_avx2(r);
+    else
+#endif
+        isogi_vol__ride_face(r);
     c->flip = 3 * (c->octant & 1) + 6 * (c->octant & 2) + 12 * (c->octant & 4);
     memcpy(&c->stop, &w->end, sizeof c->stop), c->stop |= 3;
     c->entry_axis = w->entry_axis;
@@ -4921,14 +4974,12 @@ static void isogi_vol__ride_start(isogi_vol__ride *r) {
     isogi_vol__trip *c = &r->trip;
     const int top = p->node_levels - 1;
     const double most = isogi_vol__largest(w->dir[0], w->dir[1], w->dir[2]);
-    int a;
     c->level = isogi_vol__quantise_isovalue(p, w->isovalue, &c->low, &c->high);
-    for (a = 0; a < 3; a++) {
-        const double start = c->lead[a] ? (4 << 2 * top) - w->origin[a] : w->origin[a]; /* counted like cells */
-        const float cell = (float)isogi_vol__min(fabs(c->inverse[a]) * most, 1e30);
-        ISOGI_VOL__FOUR(storeu_ps)(c->cell + 4 * a, ISOGI_VOL__FOUR(set1_ps)(cell));
-        ISOGI_VOL__FOUR(storeu_ps)(c->enter[top] + 4 * a, ISOGI_VOL__FOUR(set1_ps)((-2 * p->ways->reach - (float)start) * cell));
-    }
+#ifdef ISOGI_VOL__AVX
+    if (p->path >= ISOGI_VOL__PATH_AVX2) isogi_vol__ride_times_avx2(c, w, p->ways->reach, top, most);
+    else
+#endif
+        isogi_vol__ride_times(c, w, p->ways->reach, top, most);
     c->last = (float)(isogi_vol__min(w->end * most, 1e30) * 1.000001);
     memset(c->place[top], 0, sizeof c->place[top]);
     c->child = 0, c->pending = 0, c->cells = 0, r->at = top;
@@ -5257,9 +5308,11 @@ ISOGI_VOL__INLINE int isogi_vol__cell_told_avx2(isogi_vol__walk *w, const isogi_
     const __m256 ends = _mm256_insertf128_ps(_mm256_castps128_ps256(from), to, 1);
     const __m256 from2 = _mm256_permute2f128_ps(ends, ends, 0x00), to2 = _mm256_permute2f128_ps(ends, ends, 0x11);
     const __m256i even = _mm256_setr_epi32(0, 2, 4, 6, 0, 2, 4, 6), odd = _mm256_setr_epi32(1, 3, 5, 7, 1, 3, 5, 7);
+    const float inside = leaf->isovalue + ISOGI_VOL__DOUBT, outside = leaf->isovalue - ISOGI_VOL__DOUBT;
+    const __m128 sums = _mm_setr_ps(1, 1, 3, 3), none = _mm_setzero_ps();
     int16_t pair[4];
     __m256 c, low;
-    float f[8];
+    __m128 hull;
     memcpy(&pair[0], code, 2), memcpy(&pair[1], code + 5, 2), memcpy(&pair[2], code + 25, 2), memcpy(&pair[3], code + 30, 2);
     c = _mm256_cvtepi32_ps(_mm256_cvtepu8_epi32(_mm_setr_epi16(pair[0], pair[1], pair[2], pair[3], 0, 0, 0, 0)));
     low = _mm256_permutevar8x32_ps(c, even);
@@ -5268,8 +5321,13 @@ ISOGI_VOL__INLINE int isogi_vol__cell_told_avx2(isogi_vol__walk *w, const isogi_
     c = _mm256_add_ps(low, _mm256_mul_ps(_mm256_shuffle_ps(from2, to2, 0x55), _mm256_sub_ps(_mm256_permute_ps(c, 0xdd), low)));
     low = _mm256_permute_ps(c, 0x88);
     c = _mm256_add_ps(low, _mm256_mul_ps(_mm256_shuffle_ps(from2, to2, 0xaa), _mm256_sub_ps(_mm256_permute_ps(c, 0xdd), low)));
-    _mm256_storeu_ps(f, c);
-    return isogi_vol__told(w, leaf, f);
+#define ISOGI_VOL__VALUES(a, b, d, e) _mm256_castps256_ps128(_mm256_permutevar8x32_ps(c, _mm256_setr_epi32(a, b, d, e, 0, 0, 0, 0)))
+    hull = _mm_add_ps(ISOGI_VOL__VALUES(0, 7, 1, 3), _mm_blend_ps(none, ISOGI_VOL__VALUES(0, 0, 2, 5), 12));
+    hull = _mm_add_ps(hull, _mm_blend_ps(none, ISOGI_VOL__VALUES(0, 0, 4, 6), 12));
+#undef ISOGI_VOL__VALUES
+    return isogi_vol__told(w, _mm_movemask_ps(_mm_cmp_ps(hull, _mm_mul_ps(sums, _mm_set1_ps(inside)), _CMP_GT_OQ)) == 15,
+                           _mm_movemask_ps(_mm_cmp_ps(hull, _mm_mul_ps(sums, _mm_set1_ps(outside)), _CMP_LT_OQ)) == 15,
+                           _mm_cvtss_f32(_mm_permute_ps(hull, 0x55)), inside, outside);
 }
 
 ISOGI_VOL__TRIP(avx2, ISOGI_VOL__TARGET("avx2"))
@@ -8923,31 +8981,47 @@ static void isogi_vol__gradient_beside(const isogi_pyramid *p, const int cell[3]
     if (!(isogi_vol__largest(gradient[0], gradient[1], gradient[2]) > 1e-3 * most)) memcpy(gradient, first, sizeof first);
 }
 
+/* The B-spline's gradient from those of its 64 taps that have weight; returns how far apart these are. On the plane that two parts of a
+   field share, one counts taps on its other side in which the other has none, and one of these may not be finite. */
+static double isogi_vol__weighty_taps(const isogi_pyramid *p, const int cell[3], const double local[3], double gradient[3]) {
+    const double scale = 4 * p->volume.scale;
+    isogi_volume quarter = p->volume;
+    double w[3][4], d[3][4], base = 0, low = DBL_MAX, high = -DBL_MAX;
+    int tap[3][4], a, i;
+    quarter.scale = 0.25, quarter.bias = 0;
+    for (a = 0; a < 3; a++) isogi_vol__tap_weights(ISOGI_FILTER_BSPLINE, &p->volume, a, cell[a], local[a], w[a], d[a], tap[a]);
+    gradient[0] = gradient[1] = gradient[2] = 0;
+    for (i = 0; i < 64; i++) {
+        const int x = i & 3, y = i >> 2 & 3, z = i >> 4;
+        double value;
+        /* at the upper end of a cell the lowest weight is what rounding leaves of it */
+        if (!(fabs(w[0][x]) + fabs(d[0][x]) > 1e-15 && fabs(w[1][y]) + fabs(d[1][y]) > 1e-15 && fabs(w[2][z]) + fabs(d[2][z]) > 1e-15))
+            continue;
+        isogi_vol__row(&quarter, tap[0][x], tap[1][y], tap[2][z], 1, &value);
+        if (low > high) base = value;
+        low = isogi_vol__min(low, value), high = isogi_vol__max(high, value), value -= base;
+        gradient[0] += d[0][x] * w[1][y] * w[2][z] * value, gradient[1] += w[0][x] * d[1][y] * w[2][z] * value;
+        gradient[2] += w[0][x] * w[1][y] * d[2][z] * value;
+    }
+    for (a = 0; a < 3; a++) gradient[a] *= scale;
+    return fabs(scale) * (high - low);
+}
+
 /* The gradient of the smoothed field, per grid unit; zero where it is nothing but what rounding has left of voxels that cancel, as in the
    middle of a sheet: it would point anywhere, on each instruction path elsewhere. Hardly ever near enough to that to look at the voxels. */
 static void isogi_vol__smooth_gradient(const isogi_pyramid *p, const int cell[3], const double local[3], double gradient[3]) {
-    const isogi_volume *v = &p->volume;
     const double noise = 1e-14;
-    double w[3][4], d[3][4], most, low = DBL_MAX, high = -DBL_MAX;
-    int tap[3][4], a, i;
+    double most, range, sums[3];
     isogi_vol__cubic_sum(p, ISOGI_FILTER_BSPLINE, cell, local, gradient);
+    if (!isogi_vol__finite3(gradient)) isogi_vol__weighty_taps(p, cell, local, gradient);
     if (!isogi_vol__finite3(gradient)) {
         isogi_vol__gradient_beside(p, cell, local, gradient);
         return;
     }
     most = isogi_vol__largest(gradient[0], gradient[1], gradient[2]);
     if (!(most > 0 && most < noise * (p->range[1] - p->range[0]))) return;
-    for (a = 0; a < 3; a++) isogi_vol__tap_weights(ISOGI_FILTER_BSPLINE, v, a, cell[a], local[a], w[a], d[a], tap[a]);
-    for (i = 0; i < 64; i++) { /* taps without weight do not count */
-        const int at[3] = {i & 3, i >> 2 & 3, i >> 4};
-        double value;
-        int counts = 1;
-        for (a = 0; a < 3; a++) counts &= fabs(w[a][at[a]]) + fabs(d[a][at[a]]) > 0;
-        if (!counts) continue;
-        isogi_vol__row(v, tap[0][at[0]], tap[1][at[1]], tap[2][at[2]], 1, &value);
-        low = isogi_vol__min(low, value), high = isogi_vol__max(high, value);
-    }
-    if (most < noise * (high - low)) gradient[0] = gradient[1] = gradient[2] = 0;
+    range = isogi_vol__weighty_taps(p, cell, local, sums);
+    if (most < noise * range) gradient[0] = gradient[1] = gradient[2] = 0;
 }
 
 /* Minus the gradient (per grid unit) at a hit; at the cap of a border, a vector out of the nearest face of the box. */

@@ -9,7 +9,8 @@
 #     check   counts as one: passed when the command succeeds; its output is shown when it fails
 #     skip    counts as one that could not run here; the third field says why
 # A program that crashes, hangs or leaves no counts is a failed one. Each item may write below $OUT, a folder of its own.
-# ISOGI_TEST_SUMMARY, where set, is a file to which the sum is added, so that several runs can be added up in turn.
+# ISOGI_TEST_SUMMARY, where set, is a file to which the sum is added, so that several runs can be added up in turn. UNTIL, where set, is
+# the time, in seconds since 1970, from which on no item is begun any more: what is left is skipped, and counted so.
 
 shown() { sed 's/^/    /' "$1" | tail -n 60; }
 
@@ -17,6 +18,9 @@ one() {
     tab=$(printf '\t')
     kind=${1%%"$tab"*} rest=${1#*"$tab"}
     label=${rest%%"$tab"*} command=${rest#*"$tab"}
+    if [ "$UNTIL" ] && [ "$(date +%s)" -ge "$UNTIL" ] && [ "$kind" != skip ]; then
+        kind=skip command="no time is left"
+    fi
     if [ "$kind" = skip ]; then
         echo "skip $label: $command"
         echo "0 passed, 0 failed, 1 skipped" > "$(mktemp "$RESULTS/XXXXXX")"

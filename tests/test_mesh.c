@@ -841,19 +841,21 @@ TEST(surfaces_beside_a_mask_have_normals) {
     field_free(&f);
 }
 
-/* Two chunks that share a plane, which a mask crosses, or next to which one begins that only the second holds: there the vertices of both
-   have the same normals. */
+/* Two chunks that share a plane, which a mask crosses, or next to which one begins that only the second holds, or two voxels from which one
+   lies at the field's border: there the vertices of both have the same normals. */
 TEST(chunks_agree_beside_a_mask) {
     enum { N = 25, PLANE = 9 };
     static float data[N * N * N];
     const isogi_mesh_desc desc = {.isovalue = 0, .normals = 1};
-    for (int mask = 0; mask < 2; mask++) {
+    for (int mask = 0; mask < 3; mask++) {
         isogi_pyramid *part[2];
         isogi_mesh mesh[2];
         int compared = 0;
         for (int i = 0; i < N * N * N; i++) {
-            double r = sqrt(pow(i % N - 12.3, 2) + pow(i / N % N - 12.1, 2) + pow(i / N / N - 11.8, 2));
-            data[i] = (mask ? i % N > PLANE + 1 : r > 9) ? NAN : (float)(8 - r);
+            const int x = i % N, y = i / N % N, z = i / N / N;
+            const double r = sqrt(pow(x - 12.3, 2) + pow(y - 12.1, 2) + (mask < 2 ? pow(z - 11.8, 2) : 0));
+            const int masked = mask == 0 ? r > 9 : mask == 1 ? x > PLANE + 1 : x == PLANE + 2 && z < 2;
+            data[i] = masked ? NAN : (float)(8 - r + 0.2 * sin(2 * x + z) * (mask == 2));
         }
         for (int p = 0; p < 2; p++) {
             isogi_volume v = {.data = data + (p ? PLANE : 0), .type = ISOGI_F32, .size = {p ? N - PLANE : PLANE + 1, N, N}};
@@ -870,8 +872,8 @@ TEST(chunks_agree_beside_a_mask) {
                 compared++;
                 for (int a = 0; a < 3; a++) {
                     length += pow((double)mesh[0].normals[i][a], 2);
-                    CHECK(fabs((double)(mesh[0].normals[i][a] - mesh[1].normals[j][a])) < 1e-5, "vertex %zu: %g and %g along axis %d", i,
-                          (double)mesh[0].normals[i][a], (double)mesh[1].normals[j][a], a);
+                    CHECK(fabs((double)(mesh[0].normals[i][a] - mesh[1].normals[j][a])) < 1e-5, "mask %d, vertex %zu: %g and %g along axis %d",
+                          mask, i, (double)mesh[0].normals[i][a], (double)mesh[1].normals[j][a], a);
                 }
                 CHECK(fabs(length - 1) < 1e-5, "vertex %zu: length %g", i, length);
             }
