@@ -344,9 +344,10 @@ typedef struct isogi_dvr_desc {
     uint32_t jitter;        /* not 0: every pixel's samples are moved by a part of a step of its own, which turns rings of large steps into
                                noise. The same number gives the same picture. Sampled rays only; physical space is post-classified then */
     double visibility_step; /* sampling distance along visibility rays, as `step`; 0 = twice `step`, or 1 where that is 0. Sweeps: distance
-                               of the lattice of extinction, rounded so that grid points are on it; 0 = 2. What is opaque from one
-                               voxel to the next wants 1, in three times the time: with 2 its surfaces are lit in blotches (a picture of
-                               torus-sphere-plane by 128 directions differs from 2048 by brute force by RMSE .015 and .006) */
+                               of the lattice of extinction, rounded so that grid points are on it, but half a voxel or more along axes
+                               whose voxels are longer; 0 = 2. What is opaque from one voxel to the next wants 1, in three times the
+                               time: with 2 its surfaces are lit in blotches (a picture of torus-sphere-plane by 128 directions differs
+                               from 2048 by brute force by RMSE .015 and .006) */
     isogi_dvr_method method;
     isogi_dvr_sphere sphere;
     double anisotropy;      /* of scattering, -1..1 (both excluded): g of Henyey and Greenstein; 0 = isotropic; with visibility only */
@@ -575,6 +576,7 @@ ISOGI_API isogi_result isogi_dvr_tets_render(const isogi_tets *tets, const isogi
 #define ISOGI_DVR__SLAB 4096               /* grid points between two looks at a cancelled step */
 #define ISOGI_DVR__LANES 16                /* floats of a vector; rows are padded for them */
 #define ISOGI_DVR__TABLE 4096              /* classes of values */
+#define ISOGI_DVR__LOCAL_STEPS 32          /* of a ray of local visibility: its largest radius */
 #define ISOGI_DVR__BATCH 16                /* directions swept at once */
 #define ISOGI_DVR__GAIN 1024               /* grid points: one task of summing up */
 #define ISOGI_DVR__TOWARD 8                /* directions towards which local visibility is evaluated at once */
@@ -643,7 +645,8 @@ typedef struct isogi_dvr__rows {
 
 /* A step of local visibility's rays: see "local and global visibility" below. */
 typedef struct isogi_dvr__local_step {
-    ptrdiff_t offset; /* from a ray's node to the first of the eight around its sample */
+    double way[3];    /* from a ray's node to its sample, in grid coordinates, */
+    ptrdiff_t offset; /* and to the first of the eight nodes around that */
     float weight[8];  /* times the optical depth of the step */
 } isogi_dvr__local_step;
 
@@ -651,6 +654,7 @@ typedef struct isogi_dvr__local_step {
 typedef struct isogi_dvr__local_rays {
     const float *at;
     const isogi_dvr__local_step *step;
+    const int32_t (*within)[2]; /* of each step: the nodes whose samples count, from, to; NULL: all */
     size_t steps, row, plane, count;
 } isogi_dvr__local_rays;
 
@@ -2030,6 +2034,7 @@ static void isogi_dvr__local(const isogi_dvr__local_rays *a, float *clear) {
         float depth = 0;
         for (j = 0; j < a->steps; j++) {
             const float *p = a->at + a->step[j].offset + i, *q = p + a->plane, *w = a->step[j].weight;
+            if (a->within && ((int32_t)i < a->within[j][0] || (int32_t)i >= a->within[j][1])) continue;
             depth += ((w[0] * p[0] + w[1] * p[1]) + (w[2] * p[a->row] + w[3] * p[a->row + 1])) +
                      ((w[4] * q[0] + w[5] * q[1]) + (w[6] * q[a->row] + w[7] * q[a->row + 1]));
         }
@@ -2130,21 +2135,28 @@ static void isogi_dvr__local(const isogi_dvr__local_rays *a, float *clear) {
             }                                                                                                                       \
         }                                                                                                                           \
     }                                                                                                                               \
-    TARGET static void isogi_dvr__local##SUFFIX(const isogi_dvr__local_rays *a, float *clear) {                                     \
-        size_t i, j;                                                                                                                \
-        for (i = 0; i < a->count; i += ISOGI_DVR__LANES) {                                                                          \
-            isogi_dvr__floats depth = {0};                                                                                          \
-            for (j = 0; j < a->steps; j++) {                                                                                        \
+    TARGET static void isogi_dvr__local##SUFFIX(const isogi_dvr__local_rays *a, float *clear) { \
+        static const int32_t lane[ISOGI_DVR__LANES] = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15}; \
+        size_t i, j; \
+        for (i = 0; i < a->count; i += ISOGI_DVR__LANES) { \
+            const isogi_dvr__ints number = ISOGI_DVR__CI(lane) + (int32_t)i; \
+            isogi_dvr__floats depth = {0}; \
+            for (j = 0; j < a->steps; j++) { \
                 const float *p = a->at + a->step[j].offset + i, *q = p + a->plane, *p1 = p + a->row, *q1 = q + a->row, \
                     *w = a->step[j].weight; \
-                depth += ((w[0] * ISOGI_DVR__C(p) + w[1] * ISOGI_DVR__C(p + 1)) + \
-                    (w[2] * ISOGI_DVR__C(p1) + w[3] * ISOGI_DVR__C(p1 + 1))) + \
-                         ((w[4] * ISOGI_DVR__C(q) + w[5] * ISOGI_DVR__C(q + 1)) + \
-                             (w[6] * ISOGI_DVR__C(q1) + w[7] * ISOGI_DVR__C(q1 + 1))); \
-            }                                                                                                                       \
-            ISOGI_DVR__EXP(ISOGI_DVR__V(clear + i), depth)                                                                          \
-        }                                                                                                                           \
-    }                                                                                                                               \
+                isogi_dvr__floats more; \
+                if (a->within && (a->within[j][1] <= (int32_t)i || a->within[j][0] >= (int32_t)i + ISOGI_DVR__LANES)) continue; \
+                more = ((w[0] * ISOGI_DVR__C(p) + w[1] * ISOGI_DVR__C(p + 1)) + \
+                        (w[2] * ISOGI_DVR__C(p1) + w[3] * ISOGI_DVR__C(p1 + 1))) + \
+                       ((w[4] * ISOGI_DVR__C(q) + w[5] * ISOGI_DVR__C(q + 1)) + \
+                        (w[6] * ISOGI_DVR__C(q1) + w[7] * ISOGI_DVR__C(q1 + 1))); \
+                if (a->within && (a->within[j][0] > (int32_t)i || a->within[j][1] < (int32_t)i + ISOGI_DVR__LANES)) \
+                    more = (isogi_dvr__floats)((isogi_dvr__ints)more & ((a->within[j][0] - 1 - number) & (number - a->within[j][1])) >> 31); \
+                depth += more; \
+            } \
+            ISOGI_DVR__EXP(ISOGI_DVR__V(clear + i), depth) \
+        } \
+    } \
     static void isogi_dvr__set_kernels##SUFFIX(isogi_dvr__kernels *k) {                                                             \
         k->pass = isogi_dvr__pass##SUFFIX, k->pass_out = isogi_dvr__pass_out##SUFFIX, k->between = isogi_dvr__between##SUFFIX;      \
         k->exp_row = isogi_dvr__exp_row##SUFFIX, k->gather = isogi_dvr__gather##SUFFIX, k->local = isogi_dvr__local##SUFFIX;         \
@@ -2255,7 +2267,7 @@ static isogi_dvr__kernels isogi_dvr__choose_kernels(int force_path) {
 /* ==== matter: extinction on a lattice ================================================================================ */
 
 /* Sweeps read extinction from a lattice of their own, a whole number of steps to each distance of the visibility grid (so that grid
-   points are nodes) and about `visibility_step` voxels wide. A node holds the mean extinction of the box around it: values are
+   points are nodes) and about `visibility_step` of the smallest voxels wide; two to a voxel suffice where voxels are long. A node holds the mean extinction of the box around it: values are
    interpolated first and classified after, at points about a voxel apart. Rows are padded with zeros, because vectors run over
    their ends. Two layouts: x fastest, for directions mostly along y or z, and z fastest, for those along x. */
 
@@ -2270,9 +2282,9 @@ static isogi_result isogi_dvr__plan_matter(isogi_dvr *d) {
     double step = d->desc.visibility_step > 0 ? d->desc.visibility_step : 2;
     int a, n;
     for (a = 0; a < 3; a++) {
-        double voxel = isogi_dvr__edge(&d->volume, a);
+        const double nodes = isogi_dvr__edge(&d->volume, a) / (step * d->spacing), most = step < 0.5 ? 1 / step : 2; /* a voxel */
         size_t points = d->desc.grid[a], intervals = points > 1 ? points - 1 : 2;
-        m->every[a] = (size_t)isogi_dvr__clamp(d->cells[a] * voxel / (step * d->spacing * (double)intervals) + 0.5, 65536);
+        m->every[a] = (size_t)isogi_dvr__clamp(d->cells[a] * (nodes < most ? nodes : most) / (double)intervals + 0.5, 65536);
         if (!m->every[a]) m->every[a] = 1;
         if (m->every[a] > 65536 / intervals) return ISOGI_TOO_LARGE;
         m->size[a] = intervals * m->every[a] + 1;
@@ -2744,7 +2756,7 @@ static isogi_result isogi_dvr__resolve(isogi_dvr_desc *desc, const isogi_dvr_des
     if (!(desc->radius >= 0) || !(desc->reduction >= 0)) return ISOGI_INVALID;
     if (!(desc->radius > 0)) desc->radius = 16;
     if (!(desc->reduction > 0)) desc->reduction = 4;
-    if (!(desc->radius >= 1 && desc->radius <= 32 && desc->reduction >= 1)) return ISOGI_INVALID;
+    if (!(desc->radius >= 1 && desc->radius <= ISOGI_DVR__LOCAL_STEPS && desc->reduction >= 1)) return ISOGI_INVALID;
     if (!(desc->opaque > 0)) desc->opaque = 0.999f;
     if (!desc->order) desc->order = 3;
     if (!desc->directions) desc->directions = 64;
@@ -4195,8 +4207,9 @@ static isogi_result isogi_dvr__update_blocks(isogi_dvr *d) {
 /* ==== local and global visibility (Kronander 2011, 4.2 and 4.3) ====================================================== */
 
 /* Around a block a window of extinction is laid out, as wide as local rays reach, at the finest level that occurs in it: data as the
-   blocks hold it, classified at the window's nodes, 0 where it is dropped, cut off or outside. For one direction and one step all nodes
-   of a row of the block look at the window at the same place between its nodes, so that whole rows advance at once. */
+   blocks hold it, classified at the window's nodes, 0 where it is dropped. For one direction and one step all nodes of a row of the block
+   look at the window at the same place between its nodes, so that whole rows advance at once. Beside clip planes and the box's faces
+   samples count that lie within them, a range of each row: matter must end there, not fade from node to node. */
 typedef struct isogi_dvr__local_job {
     isogi_dvr *dvr;
     size_t first, packing;
@@ -4231,7 +4244,8 @@ static void isogi_dvr__set_local_steps(const isogi_dvr *d, isogi_dvr__local_step
                 double u[3], depth = (to - from) * d->spacing / d->desc.unit;
                 int a;
                 for (a = 0; a < 3; a++) {
-                    double x = 0.5 * (from + to) * d->spacing * d->direction[k][a] / size, whole = floor(x);
+                    double x, whole;
+                    step->way[a] = 0.5 * (from + to) * d->spacing * d->direction[k][a], x = step->way[a] / size, whole = floor(x);
                     c[a] = (ptrdiff_t)whole, u[a] = x - whole;
                 }
                 step->offset = c[0] + row * (c[1] + side * c[2]);
@@ -4240,13 +4254,14 @@ static void isogi_dvr__set_local_steps(const isogi_dvr *d, isogi_dvr__local_step
             }
 }
 
-/* Where the nodes of level n lie among those that a block holds, along an axis: the node before, and how far past it. Returns how many. */
+/* Where the nodes of level n lie among those that a block holds, along an axis: the node before, and how far past it. Returns how many, up
+   to the first one beyond the volume's border. */
 static size_t isogi_dvr__along(const isogi_dvr *d, size_t block, size_t n, int axis, size_t before[17], float u[17]) {
     const isogi_dvr__blocks *b = &d->blocks;
     size_t at[3] = {block % b->count[0], block / b->count[0] % b->count[1], block / b->count[0] / b->count[1]}, held = b->level[block],
            side[3], i;
     isogi_dvr__sides(b, block, held, side);
-    for (i = 0; i <= n && 16 * at[axis] + 16 * i / n <= (size_t)d->cells[axis]; i++) {
+    for (i = 0; i <= n && (!i || 16 * at[axis] + 16 * (i - 1) / n < (size_t)d->cells[axis]); i++) {
         before[i] = i * held / n < side[axis] ? i * held / n : side[axis] - 1;
         u[i] = (float)i * (float)held / (float)n - (float)before[i];
     }
@@ -4280,11 +4295,6 @@ static int isogi_dvr__fill_window(const isogi_dvr *d, size_t block, size_t n, co
             isogi_dvr__held_row(data, side[0] + 1, (side[0] + 1) * (side[1] + 1), u[1][node[1]], u[2][node[2]], line);
             for (node[0] = 0; node[0] < count[0]; node[0]++) {
                 float value = line[before[0][node[0]]], end = line[before[0][node[0]] + 1];
-                double position[3];
-                if (d->cut[block]) {
-                    isogi_dvr__node_position(b, block, n, node, position);
-                    if (!isogi_dvr__kept(d, position)) continue;
-                }
                 value = isogi_dvr__mix(value, end, u[0][node[0]]);
                 if (!isogi_dvr__finite32(value)) continue;
                 out[node[0]] = d->matter.table[isogi_dvr__class(d, d->base + (double)value)];
@@ -4294,11 +4304,12 @@ static int isogi_dvr__fill_window(const isogi_dvr *d, size_t block, size_t n, co
     return any;
 }
 
-/* The window around a block; its level, 0 if nothing in it absorbs. */
-static size_t isogi_dvr__make_window(const isogi_dvr *d, size_t block, float *window) {
+/* The window around a block; its level, 0 if nothing in it absorbs. bounded: whether a clip plane or a face of the box may part it. */
+static size_t isogi_dvr__make_window(const isogi_dvr *d, size_t block, float *window, int *bounded) {
     const isogi_dvr__blocks *b = &d->blocks;
     size_t at[3] = {block % b->count[0], block / b->count[0] % b->count[1], block / b->count[0] / b->count[1]}, n = b->lit[block], o[3], i;
     int any = 0, pass, a;
+    *bounded = 0;
     for (pass = 0; pass < 2; pass++) { /* first the level, then the nodes */
         if (pass)
             memset(window, 0, isogi_dvr__window_row(b, n) * isogi_dvr__window_side(b, n) * isogi_dvr__window_side(b, n) * sizeof *window);
@@ -4309,8 +4320,10 @@ static size_t isogi_dvr__make_window(const isogi_dvr *d, size_t block, float *wi
                     int within = 1;
                     for (a = 0; a < 3; a++)
                         within = within && at[a] + o[a] >= b->reach && at[a] + o[a] - b->reach < b->count[a], corner[a] = o[a] * n;
+                    for (a = 0; a < 3; a++) *bounded |= !within || (at[a] + o[a] - b->reach + 1 == b->count[a] && b->rest[a] < 16);
                     if (!within) continue;
                     i = at[0] + o[0] - b->reach + b->count[0] * (at[1] + o[1] - b->reach + b->count[1] * (at[2] + o[2] - b->reach));
+                    *bounded |= d->cut[i] != 0;
                     if (!pass) n = b->level[i] > n ? b->level[i] : n;
                     else if (b->level[i]) any |= isogi_dvr__fill_window(d, i, n, corner, window);
                 }
@@ -4318,18 +4331,67 @@ static size_t isogi_dvr__make_window(const isogi_dvr *d, size_t block, float *wi
     return any ? n : 0;
 }
 
-/* SH coefficients of a row of nodes: sum[c][0 .. count - 1] at the window's nodes from `at` on, as many as a vector or two hold. */
-static void isogi_dvr__local_row(const isogi_dvr__local_job *job, size_t n, const float *at, size_t count,
+/* The largest integer that is no more than x, within -65536 .. 65536: without what is slow in portable code. */
+static double isogi_dvr__floor(double x) { return (double)(int32_t)(isogi_dvr__clamp(x + 65536, 131072)) - 65536; }
+
+/* Which of `count` places, from `from` on, `each` to a voxel along x, lie within the box and the planes: within[0] .. within[1] - 1. */
+static void isogi_dvr__places_within(const isogi_dvr *d, const double from[3], double each, size_t count, int32_t within[2]) {
+    const double last = (double)count, slack = 1e-9;
+    double low, high;
+    size_t i;
+    within[0] = within[1] = 0;
+    if (!(from[1] >= -slack && from[1] <= d->cells[1] + slack && from[2] >= -slack && from[2] <= d->cells[2] + slack)) return;
+    low = -isogi_dvr__floor(from[0] * each + slack), high = isogi_dvr__floor((d->cells[0] - from[0]) * each + slack) + 1;
+    for (i = 0; i < d->clip_count; i++) {
+        const double *plane = d->clip[i], least = slack * (fabs(plane[0]) + fabs(plane[1]) + fabs(plane[2]));
+        const double at = isogi_dvr__dot(plane, from) + plane[3] + least;
+        if (fabs(plane[0]) > least) {
+            const double end = isogi_dvr__floor(at * each / fabs(plane[0])); /* the last place before it comes to the plane */
+            if (plane[0] > 0) low = -end > low ? -end : low;
+            else high = end + 1 < high ? end + 1 : high;
+        } else if (!(at >= 0)) return;
+    }
+    within[0] = (int32_t)isogi_dvr__clamp(low, last), within[1] = (int32_t)isogi_dvr__clamp(high, last);
+}
+
+/* Lets the rays of a row that begin at `place` see samples within the box and the planes alone. All of this is convex: where the rays'
+   beginnings and last samples lie within, all do. */
+static void isogi_dvr__part_rays(const isogi_dvr *d, const double place[3], size_t n, int32_t (*within)[2], isogi_dvr__local_rays *rays) {
+    const size_t steps = rays->steps;
+    const double each = (double)n / 16;
+    int32_t ends[2];
+    double from[3];
+    size_t j;
+    int a;
+    rays->within = (const int32_t(*)[2])within;
+    isogi_dvr__places_within(d, place, each, rays->count, ends);
+    for (j = steps, rays->steps = 0; j-- > 0;) { /* from the end, since behind the last one that counts none has to be looked at */
+        for (a = 0; a < 3; a++) from[a] = place[a] + rays->step[j].way[a];
+        isogi_dvr__places_within(d, from, each, rays->count, within[j]);
+        if (!rays->steps && within[j][0] < within[j][1]) rays->steps = j + 1;
+        if (j + 1 == steps && !ends[0] && !within[j][0] && ends[1] == (int32_t)rays->count && within[j][1] == ends[1]) {
+            rays->within = NULL;
+            return;
+        }
+    }
+}
+
+/* SH coefficients of a row of nodes: sum[c][0 .. count - 1] at the window's nodes from `at` on, as many as a vector or two hold. place: the
+   first one's, where the window is parted; else NULL. */
+static void isogi_dvr__local_row(const isogi_dvr__local_job *job, size_t n, const float *at, const double *place, size_t count,
                                  float (*sum)[2 * ISOGI_DVR__LANES]) {
     const isogi_dvr *d = job->dvr;
     const isogi_dvr__local_step *step = job->step + isogi_dvr__steps_before(d, n);
     size_t steps = isogi_dvr__local_steps(d, n), row = isogi_dvr__window_row(&d->blocks, n),
            plane = row * isogi_dvr__window_side(&d->blocks, n), k, c;
     float clear[2 * ISOGI_DVR__LANES];
-    isogi_dvr__local_rays rays = {at, step, steps, row, plane, count};
+    int32_t within[ISOGI_DVR__LOCAL_STEPS][2];
+    isogi_dvr__local_rays rays = {at, step, NULL, steps, row, plane, count};
     isogi_dvr__sums sums = {sum[0], clear, NULL, 2 * ISOGI_DVR__LANES, 0, d->coefficients, 1, count};
     for (c = 0; c < d->coefficients; c++) memset(sum[c], 0, sizeof sum[c]);
     for (k = 0; k < (size_t)d->desc.directions; k++) {
+        rays.steps = steps;
+        if (place) isogi_dvr__part_rays(d, place, n, within, &rays);
         d->kernels.local(&rays, clear);
         rays.step += steps;
         sums.kernel = d->kernel + k * d->coefficients;
@@ -4343,8 +4405,9 @@ static void isogi_dvr__local_task(void *arg, size_t i) {
     isogi_dvr *d = job->dvr;
     isogi_dvr__blocks *b = &d->blocks;
     float *window = job->window + i * job->window_count, sum[ISOGI_DVR__MAX_ORDER * ISOGI_DVR__MAX_ORDER][2 * ISOGI_DVR__LANES];
-    size_t block = b->order[job->first + i], n = b->lit[block], fine = isogi_dvr__make_window(d, block, window), every = fine / n, node[3],
-           side[3], c;
+    int bounded;
+    size_t block = b->order[job->first + i], n = b->lit[block], fine = isogi_dvr__make_window(d, block, window, &bounded), every = fine / n,
+           node[3], side[3], c;
     size_t at[3] = {block % b->count[0], block / b->count[0] % b->count[1], block / b->count[0] / b->count[1]};
     uint16_t *out = b->sh + b->first[b->total + block] * d->coefficients, clear = isogi_float_to_half((float)(2 * sqrt(ISOGI_DVR__PI)));
     memset(&job->work[i], 0, sizeof *job->work);
@@ -4356,10 +4419,12 @@ static void isogi_dvr__local_task(void *arg, size_t i) {
                                                (b->reach * fine + node[1] * every +
                                                 isogi_dvr__window_side(b, fine ? fine : 1) * (b->reach * fine + node[2] * every));
             size_t coarsest, owner, count = side[0] * every;
+            double place[3];
+            node[0] = 0, isogi_dvr__node_position(b, block, n, node, place);
             node[0] = side[0];
             isogi_dvr__touching(b, b->lit, at, node, n, &coarsest, &owner);
             if (owner == block && b->lit[coarsest] == n) count++; /* the row's last node is this block's own, too */
-            if (fine) isogi_dvr__local_row(job, fine, window + row, count, sum);
+            if (fine) isogi_dvr__local_row(job, fine, window + row, bounded ? place : NULL, count, sum);
             for (node[0] = 0; node[0] <= side[0]; node[0]++, out += d->coefficients) {
                 isogi_dvr__touching(b, b->lit, at, node, n, &coarsest, &owner);
                 if (owner != block || b->lit[coarsest] < n) continue;

@@ -341,6 +341,54 @@ TEST(fine_matter_errs_by_sweeps_as_stated) {
     isogi_vol_free(pyramid);
 }
 
+/* Notes the largest piece. */
+static void *noting_alloc(void *user, size_t size, size_t align) {
+    void *p = NULL;
+    if (size > *(size_t *)user) *(size_t *)user = size;
+    return posix_memalign(&p, align < sizeof(void *) ? sizeof(void *) : align, size) ? NULL : p;
+}
+static void noting_release(void *user, void *p, size_t size) { (void)user, (void)size, free(p); }
+
+/* Voxels twenty and a thousand times as long along two axes as along the third are swept with no more than two nodes each: as right as by
+   brute force in small steps, and the largest piece of memory is that of the nodes. */
+TEST(long_voxels_are_swept_with_few_nodes) {
+    enum { SIDE = 25, POINTS = 9, COUNT = POINTS * POINTS * POINTS };
+    static float waves[SIDE][SIDE][SIDE], at[COUNT][3], v[2][COUNT];
+    for (int i = 0; i < SIDE * SIDE * SIDE; i++) {
+        const int x = i % SIDE, y = i / SIDE % SIDE, z = i / SIDE / SIDE;
+        waves[z][y][x] = (float)(0.5 + 0.25 * sin(0.5 * x + 0.3 * z) + 0.25 * cos(0.4 * y - 0.2 * x) * sin(0.35 * z));
+    }
+    for (int length = 20; length <= 1000; length *= 50) {
+        const isogi_volume volume = {
+            .data = waves, .type = ISOGI_F32, .size = {SIDE, SIDE, SIDE}, .spacing = {length, length, 1}};
+        const isogi_transfer_point p[] = {
+            {0.4, {1, 1, 1}, 0}, {0.6, {1, 1, 1}, 0.3f / sqrtf((float)length)}, {0.9, {1, 1, 1}, 0.05f / sqrtf((float)length)}};
+        const isogi_transfer transfer = {p, 3, NULL, 0};
+        isogi_pyramid *pyramid = NULL;
+        size_t most = 0;
+        double error = 0;
+        const isogi_context context = {.threads = 1, .alloc = noting_alloc, .release = noting_release, .user = &most};
+        for (int i = 0; i < COUNT; i++)
+            at[i][0] = (float)(3 * length * (i % POINTS)), at[i][1] = (float)(3 * length * (i / POINTS % POINTS)),
+            at[i][2] = (float)(3 * (i / POINTS / POINTS));
+        CHECK(isogi_vol_build(&pyramid, &volume, &serial) == ISOGI_OK, "build");
+        for (int way = 0; way < 2; way++) {
+            const isogi_dvr_desc desc = {.pyramid = pyramid, .shading = ISOGI_DVR_VISIBILITY, .order = 1, .directions = 32,
+                                         .method = way ? ISOGI_DVR_SWEEP : ISOGI_DVR_BRUTE, .grid = {POINTS, POINTS, POINTS},
+                                         .visibility_step = way ? 0 : length < 100 ? 0.25 : 8};
+            isogi_dvr *dvr = renderer(desc, &transfer, way ? &context : &serial);
+            CHECK(isogi_dvr_step(dvr, 0, NULL) == ISOGI_OK &&
+                      isogi_dvr_sample_visibility(dvr, (const float(*)[3])at, COUNT, v[way]) == ISOGI_OK,
+                  "step");
+            isogi_dvr_free(dvr);
+        }
+        for (int i = 0; i < COUNT; i++) error += pow((double)(v[1][i] - v[0][i]) / sqrt(4 * 3.14159265358979), 2) / COUNT;
+        printf("    voxels of %d: rms error %.3g, largest piece of memory %zu kB\n", length, sqrt(error), most / 1000);
+        CHECK(sqrt(error) < 0.02 && most < 4000000, "voxels of %d: rms error %g, largest piece of memory %zu bytes", length, sqrt(error), most);
+        isogi_vol_free(pyramid);
+    }
+}
+
 TEST(visibility_is_the_same_bits_for_any_threads_and_slicing) {
     isogi_pyramid *pyramid = linear_field();
     for (int method = ISOGI_DVR_PAPER; method <= ISOGI_DVR_SWEEP; method++) {
