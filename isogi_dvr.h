@@ -2151,7 +2151,8 @@ static void isogi_dvr__local(const isogi_dvr__local_rays *a, float *clear) {
                        ((w[4] * ISOGI_DVR__C(q) + w[5] * ISOGI_DVR__C(q + 1)) + \
                         (w[6] * ISOGI_DVR__C(q1) + w[7] * ISOGI_DVR__C(q1 + 1))); \
                 if (a->within && (a->within[j][0] > (int32_t)i || a->within[j][1] < (int32_t)i + ISOGI_DVR__LANES)) \
-                    more = (isogi_dvr__floats)((isogi_dvr__ints)more & ((a->within[j][0] - 1 - number) & (number - a->within[j][1])) >> 31); \
+                    more = (isogi_dvr__floats)((isogi_dvr__ints)more & \
+                                               (((a->within[j][0] - 1 - number) & (number - a->within[j][1])) >> 31)); \
                 depth += more; \
             } \
             ISOGI_DVR__EXP(ISOGI_DVR__V(clear + i), depth) \
@@ -2267,9 +2268,10 @@ static isogi_dvr__kernels isogi_dvr__choose_kernels(int force_path) {
 /* ==== matter: extinction on a lattice ================================================================================ */
 
 /* Sweeps read extinction from a lattice of their own, a whole number of steps to each distance of the visibility grid (so that grid
-   points are nodes) and about `visibility_step` of the smallest voxels wide; two to a voxel suffice where voxels are long. A node holds the mean extinction of the box around it: values are
-   interpolated first and classified after, at points about a voxel apart. Rows are padded with zeros, because vectors run over
-   their ends. Two layouts: x fastest, for directions mostly along y or z, and z fastest, for those along x. */
+   points are nodes) and about `visibility_step` of the smallest voxels wide; two to a voxel suffice where voxels are long. A node holds
+   the mean extinction of the box around it: values are interpolated first and classified after, at points about a voxel apart. Rows are
+   padded with zeros, because vectors run over their ends. Two layouts: x fastest, for directions mostly along y or z, and z fastest, for
+   those along x. */
 
 /* World length of a voxel's edge along a grid axis. */
 static double isogi_dvr__edge(const isogi_volume *v, int axis) {

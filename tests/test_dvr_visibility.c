@@ -384,7 +384,8 @@ TEST(long_voxels_are_swept_with_few_nodes) {
         }
         for (int i = 0; i < COUNT; i++) error += pow((double)(v[1][i] - v[0][i]) / sqrt(4 * 3.14159265358979), 2) / COUNT;
         printf("    voxels of %d: rms error %.3g, largest piece of memory %zu kB\n", length, sqrt(error), most / 1000);
-        CHECK(sqrt(error) < 0.02 && most < 4000000, "voxels of %d: rms error %g, largest piece of memory %zu bytes", length, sqrt(error), most);
+        CHECK(sqrt(error) < 0.02 && most < 4000000, "voxels of %d: rms error %g, largest piece of memory %zu bytes", length, sqrt(error),
+              most);
         isogi_vol_free(pyramid);
     }
 }

@@ -872,8 +872,9 @@ TEST(chunks_agree_beside_a_mask) {
                 compared++;
                 for (int a = 0; a < 3; a++) {
                     length += pow((double)mesh[0].normals[i][a], 2);
-                    CHECK(fabs((double)(mesh[0].normals[i][a] - mesh[1].normals[j][a])) < 1e-5, "mask %d, vertex %zu: %g and %g along axis %d",
-                          mask, i, (double)mesh[0].normals[i][a], (double)mesh[1].normals[j][a], a);
+                    CHECK(fabs((double)(mesh[0].normals[i][a] - mesh[1].normals[j][a])) < 1e-5,
+                          "mask %d, vertex %zu: %g and %g along axis %d", mask, i, (double)mesh[0].normals[i][a],
+                          (double)mesh[1].normals[j][a], a);
                 }
                 CHECK(fabs(length - 1) < 1e-5, "vertex %zu: length %g", i, length);
             }
