@@ -4186,7 +4186,7 @@ static isogi_result isogi_dvr__update_blocks(isogi_dvr *d) {
     result = isogi_dvr__select_levels(d, level);
     for (i = 0; result == ISOGI_OK && i < b->total; i++) {
         changed[i] = d->changed[i] || level[i] != b->level[i] || isogi_dvr__faces_change(b, i, level);
-        lit[i] = level[i] ? level[i] : isogi_dvr__any_near(b, i, b->reach, level) ? 2 : 0;
+        lit[i] = level[i] ? d->cut[i] ? 16 : level[i] : isogi_dvr__any_near(b, i, b->reach, level) ? 2 : 0;
         gone[i] = b->lit[i] && !lit[i];
     }
     for (i = 0; result == ISOGI_OK && i < b->total; i++)
@@ -4209,9 +4209,10 @@ static isogi_result isogi_dvr__update_blocks(isogi_dvr *d) {
 /* ==== local and global visibility (Kronander 2011, 4.2 and 4.3) ====================================================== */
 
 /* Around a block a window of extinction is laid out, as wide as local rays reach, at the finest level that occurs in it: data as the
-   blocks hold it, classified at the window's nodes, 0 where it is dropped. For one direction and one step all nodes of a row of the block
-   look at the window at the same place between its nodes, so that whole rows advance at once. Beside clip planes and the box's faces
-   samples count that lie within them, a range of each row: matter must end there, not fade from node to node. */
+   blocks hold it, classified at the window's nodes, 0 where it is dropped or outside. For one direction and one step all nodes of a row of
+   the block look at the window at the same place between its nodes, so that whole rows advance at once. Beside clip planes those samples
+   count that are not cut off, a range of each row: matter must end there, not fade from node to node. Blocks that a plane cuts hold local
+   visibility at every voxel: just below it changes fast. */
 typedef struct isogi_dvr__local_job {
     isogi_dvr *dvr;
     size_t first, packing;
@@ -4256,14 +4257,13 @@ static void isogi_dvr__set_local_steps(const isogi_dvr *d, isogi_dvr__local_step
             }
 }
 
-/* Where the nodes of level n lie among those that a block holds, along an axis: the node before, and how far past it. Returns how many, up
-   to the first one beyond the volume's border. */
+/* Where the nodes of level n lie among those that a block holds, along an axis: the node before, and how far past it. Returns how many. */
 static size_t isogi_dvr__along(const isogi_dvr *d, size_t block, size_t n, int axis, size_t before[17], float u[17]) {
     const isogi_dvr__blocks *b = &d->blocks;
     size_t at[3] = {block % b->count[0], block / b->count[0] % b->count[1], block / b->count[0] / b->count[1]}, held = b->level[block],
            side[3], i;
     isogi_dvr__sides(b, block, held, side);
-    for (i = 0; i <= n && (!i || 16 * at[axis] + 16 * (i - 1) / n < (size_t)d->cells[axis]); i++) {
+    for (i = 0; i <= n && 16 * at[axis] + 16 * i / n <= (size_t)d->cells[axis]; i++) {
         before[i] = i * held / n < side[axis] ? i * held / n : side[axis] - 1;
         u[i] = (float)i * (float)held / (float)n - (float)before[i];
     }
@@ -4306,12 +4306,12 @@ static int isogi_dvr__fill_window(const isogi_dvr *d, size_t block, size_t n, co
     return any;
 }
 
-/* The window around a block; its level, 0 if nothing in it absorbs. bounded: whether a clip plane or a face of the box may part it. */
-static size_t isogi_dvr__make_window(const isogi_dvr *d, size_t block, float *window, int *bounded) {
+/* The window around a block; its level, 0 if nothing in it absorbs. parted: whether planes may cut something off in it. */
+static size_t isogi_dvr__make_window(const isogi_dvr *d, size_t block, float *window, int *parted) {
     const isogi_dvr__blocks *b = &d->blocks;
     size_t at[3] = {block % b->count[0], block / b->count[0] % b->count[1], block / b->count[0] / b->count[1]}, n = b->lit[block], o[3], i;
     int any = 0, pass, a;
-    *bounded = 0;
+    *parted = 0;
     for (pass = 0; pass < 2; pass++) { /* first the level, then the nodes */
         if (pass)
             memset(window, 0, isogi_dvr__window_row(b, n) * isogi_dvr__window_side(b, n) * isogi_dvr__window_side(b, n) * sizeof *window);
@@ -4322,10 +4322,9 @@ static size_t isogi_dvr__make_window(const isogi_dvr *d, size_t block, float *wi
                     int within = 1;
                     for (a = 0; a < 3; a++)
                         within = within && at[a] + o[a] >= b->reach && at[a] + o[a] - b->reach < b->count[a], corner[a] = o[a] * n;
-                    for (a = 0; a < 3; a++) *bounded |= !within || (at[a] + o[a] - b->reach + 1 == b->count[a] && b->rest[a] < 16);
                     if (!within) continue;
                     i = at[0] + o[0] - b->reach + b->count[0] * (at[1] + o[1] - b->reach + b->count[1] * (at[2] + o[2] - b->reach));
-                    *bounded |= d->cut[i] != 0;
+                    *parted |= d->cut[i] != 0;
                     if (!pass) n = b->level[i] > n ? b->level[i] : n;
                     else if (b->level[i]) any |= isogi_dvr__fill_window(d, i, n, corner, window);
                 }
@@ -4336,28 +4335,24 @@ static size_t isogi_dvr__make_window(const isogi_dvr *d, size_t block, float *wi
 /* The largest integer that is no more than x, within -65536 .. 65536: without what is slow in portable code. */
 static double isogi_dvr__floor(double x) { return (double)(int32_t)(isogi_dvr__clamp(x + 65536, 131072)) - 65536; }
 
-/* Which of `count` places, from `from` on, `each` to a voxel along x, lie within the box and the planes: within[0] .. within[1] - 1. */
+/* Which of `count` places, from `from` on, `each` to a voxel along x, no plane cuts off: within[0] .. within[1] - 1. */
 static void isogi_dvr__places_within(const isogi_dvr *d, const double from[3], double each, size_t count, int32_t within[2]) {
-    const double last = (double)count, slack = 1e-9;
-    double low, high;
+    double low = 0, high = (double)count;
     size_t i;
-    within[0] = within[1] = 0;
-    if (!(from[1] >= -slack && from[1] <= d->cells[1] + slack && from[2] >= -slack && from[2] <= d->cells[2] + slack)) return;
-    low = -isogi_dvr__floor(from[0] * each + slack), high = isogi_dvr__floor((d->cells[0] - from[0]) * each + slack) + 1;
     for (i = 0; i < d->clip_count; i++) {
-        const double *plane = d->clip[i], least = slack * (fabs(plane[0]) + fabs(plane[1]) + fabs(plane[2]));
-        const double at = isogi_dvr__dot(plane, from) + plane[3] + least;
-        if (fabs(plane[0]) > least) {
+        const double *plane = d->clip[i], slack = 1e-9 * (fabs(plane[0]) + fabs(plane[1]) + fabs(plane[2]));
+        const double at = isogi_dvr__dot(plane, from) + plane[3] + slack;
+        if (fabs(plane[0]) > slack) {
             const double end = isogi_dvr__floor(at * each / fabs(plane[0])); /* the last place before it comes to the plane */
             if (plane[0] > 0) low = -end > low ? -end : low;
             else high = end + 1 < high ? end + 1 : high;
-        } else if (!(at >= 0)) return;
+        } else if (!(at >= 0)) high = 0;
     }
-    within[0] = (int32_t)isogi_dvr__clamp(low, last), within[1] = (int32_t)isogi_dvr__clamp(high, last);
+    within[0] = (int32_t)isogi_dvr__clamp(low, (double)count), within[1] = (int32_t)isogi_dvr__clamp(high, (double)count);
 }
 
-/* Lets the rays of a row that begin at `place` see samples within the box and the planes alone. All of this is convex: where the rays'
-   beginnings and last samples lie within, all do. */
+/* Lets the rays of a row that begin at `place` see samples that are not cut off alone. What is left is convex: where the rays' beginnings
+   and last samples lie in it, all do. */
 static void isogi_dvr__part_rays(const isogi_dvr *d, const double place[3], size_t n, int32_t (*within)[2], isogi_dvr__local_rays *rays) {
     const size_t steps = rays->steps;
     const double each = (double)n / 16;
@@ -4407,8 +4402,8 @@ static void isogi_dvr__local_task(void *arg, size_t i) {
     isogi_dvr *d = job->dvr;
     isogi_dvr__blocks *b = &d->blocks;
     float *window = job->window + i * job->window_count, sum[ISOGI_DVR__MAX_ORDER * ISOGI_DVR__MAX_ORDER][2 * ISOGI_DVR__LANES];
-    int bounded;
-    size_t block = b->order[job->first + i], n = b->lit[block], fine = isogi_dvr__make_window(d, block, window, &bounded), every = fine / n,
+    int parted;
+    size_t block = b->order[job->first + i], n = b->lit[block], fine = isogi_dvr__make_window(d, block, window, &parted), every = fine / n,
            node[3], side[3], c;
     size_t at[3] = {block % b->count[0], block / b->count[0] % b->count[1], block / b->count[0] / b->count[1]};
     uint16_t *out = b->sh + b->first[b->total + block] * d->coefficients, clear = isogi_float_to_half((float)(2 * sqrt(ISOGI_DVR__PI)));
@@ -4426,7 +4421,7 @@ static void isogi_dvr__local_task(void *arg, size_t i) {
             node[0] = side[0];
             isogi_dvr__touching(b, b->lit, at, node, n, &coarsest, &owner);
             if (owner == block && b->lit[coarsest] == n) count++; /* the row's last node is this block's own, too */
-            if (fine) isogi_dvr__local_row(job, fine, window + row, bounded ? place : NULL, count, sum);
+            if (fine) isogi_dvr__local_row(job, fine, window + row, parted ? place : NULL, count, sum);
             for (node[0] = 0; node[0] <= side[0]; node[0]++, out += d->coefficients) {
                 isogi_dvr__touching(b, b->lit, at, node, n, &coarsest, &owner);
                 if (owner != block || b->lit[coarsest] < n) continue;
@@ -8388,6 +8383,7 @@ ISOGI_API isogi_result isogi_dvr_tets_render(const isogi_tets *tets, const isogi
 #undef ISOGI_DVR__LANES
 #undef ISOGI_DVR__RAYS
 #undef ISOGI_DVR__TABLE
+#undef ISOGI_DVR__LOCAL_STEPS
 #undef ISOGI_DVR__BATCH
 #undef ISOGI_DVR__GAIN
 #undef ISOGI_DVR__TOWARD

@@ -9013,9 +9013,10 @@ static void isogi_vol__smooth_gradient(const isogi_pyramid *p, const int cell[3]
     const double noise = 1e-14;
     double most, range, sums[3];
     isogi_vol__cubic_sum(p, ISOGI_FILTER_BSPLINE, cell, local, gradient);
-    if (!isogi_vol__finite3(gradient)) isogi_vol__weighty_taps(p, cell, local, gradient);
     if (!isogi_vol__finite3(gradient)) {
-        isogi_vol__gradient_beside(p, cell, local, gradient);
+        range = isogi_vol__weighty_taps(p, cell, local, gradient);
+        if (!isogi_vol__finite3(gradient) || !(isogi_vol__largest(gradient[0], gradient[1], gradient[2]) > noise * range))
+            isogi_vol__gradient_beside(p, cell, local, gradient);
         return;
     }
     most = isogi_vol__largest(gradient[0], gradient[1], gradient[2]);
