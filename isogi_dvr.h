@@ -364,7 +364,7 @@ typedef struct isogi_dvr_desc {
     double reduction;       /* the paper's method: voxels of the volume to points of its blocks, at least 1; 0 = 4. A block that is not
                                transparent holds a point whatever the budget is; those that the border cuts thin come first for more.
                                One of a single colour holds no more than its corners at any budget: in dense fog that reaches the border
-                               visibility is then a third too large */
+                               visibility is then a third too large. One that a clip plane cuts holds local visibility at every voxel */
     isogi_dvr_classification classification; /* in data space; visibility rays are exact there, unless this says post-classified */
     int table;                               /* entries along a side of the pre-integrated table, which stand where the transfer
                                                 function changes, half by value, half evenly among its pieces; 2..1024; 0 = 256 */
@@ -392,8 +392,9 @@ typedef struct isogi_view {
     int width, height;              /* 1..32768 */
     float eye[3], target[3], up[3]; /* world; up: of any length; 0 = +y */
     float fov;                      /* vertical angle of view in degrees, below 180; 0 = 45 */
-    int local;                      /* 0, or 1: shade by local visibility, for cut planes, and lights within. ISOGI_INVALID where the
-                                       paper's method is not at work (another method, peaks, data space, unlit, tetrahedra) */
+    int local;                      /* 0, or 1: shade by local visibility, for cut planes, and lights within. On the box's own faces it is
+                                       too dark: matter fades there over one distance of nodes. ISOGI_INVALID where the paper's method
+                                       is not at work (another method, peaks, data space, unlit, tetrahedra) */
     isogi_depth_kind depth;         /* what is asked for where depth is */
     const float *until;             /* [height*width], borrowed for the call; NULL = no geometry: see below */
 } isogi_view;
