@@ -4854,23 +4854,25 @@ ISOGI_VOL__INLINE void isogi_vol__ride_to_cell(const isogi_vol__ride *r, int x, 
     ISOGI_VOL__PREFETCH(at + v->stride[1] + v->stride[2]);
 }
 
-/* What is certain of the ray in a cell: 1: it stays on its side all along; 2: it is on the other one where it leaves the cell, and any hit
-   will do; 0: nothing. in, out: whether the hull lies on one side; last: the value where it leaves; high, low: what is certain. */
-ISOGI_VOL__INLINE int isogi_vol__told(isogi_vol__walk *w, int in, int out, float last, float high, float low) {
+/* What is certain of the ray in a cell by the hull of Bernstein coefficients in float, from the leaf's voxels: 1: it stays on its side all
+   along; 2: it is on the other one where it leaves the cell, and any hit will do; 0: nothing. f: values where by each axis (a bit) it
+   enters the cell, 0, or leaves it, 1. */
+ISOGI_VOL__INLINE int isogi_vol__told(isogi_vol__walk *w, const isogi_vol__leaf *leaf, const float f[8]) {
+    const float high = leaf->isovalue + ISOGI_VOL__DOUBT, low = leaf->isovalue - ISOGI_VOL__DOUBT;
+    const float sum1 = f[1] + f[2] + f[4], sum2 = f[3] + f[5] + f[6]; /* three coefficients each */
+    const int in = (f[0] > high) & (f[7] > high) & (sum1 > 3 * high) & (sum2 > 3 * high);
+    const int out = (f[0] < low) & (f[7] < low) & (sum1 < 3 * low) & (sum2 < 3 * low);
     if (w->inside < 0) w->inside = in ? 1 : out ? 0 : -1;
     if (w->inside > 0 ? in : out) return 1;
-    return !w->exact && (w->inside > 0 ? last < low : !w->inside && last > high) ? 2 : 0;
+    return !w->exact && (w->inside > 0 ? f[7] < low : !w->inside && f[7] > high) ? 2 : 0;
 }
 
-/* What is told of a cell by the hull of Bernstein coefficients in float, from the leaf's voxels; begin, end: when the ray enters it and
-   leaves it. First x, then y, then z is taken there: bit a of the numbers of values says where by axis a, the two inner coefficients are
-   sums of three. */
+/* What is told of a cell; begin, end: when the ray enters it and leaves it. First x, then y, then z is taken there. */
 static int isogi_vol__cell_told_base(isogi_vol__walk *w, const isogi_vol__leaf *leaf, const int32_t cell[4], double begin, double end) {
     const uint8_t *code = leaf->code + (cell[0] & 3) + 5 * (cell[1] & 3) + 25 * (cell[2] & 3);
     const isogi_vol__four zero = ISOGI_VOL__FOUR(set1_ps)(0), one = ISOGI_VOL__FOUR(set1_ps)(1);
-    const float inside = leaf->isovalue + ISOGI_VOL__DOUBT, outside = leaf->isovalue - ISOGI_VOL__DOUBT;
     isogi_vol__four low, high, enters, leaves, in, out;
-    float from[3], to[3], f[8], sum1, sum2;
+    float from[3], to[3], f[8];
     int a;
     for (a = 0; a < 3; a++) {
         const double at = w->origin[a] - cell[a];
@@ -4890,77 +4892,23 @@ static int isogi_vol__cell_told_base(isogi_vol__walk *w, const isogi_vol__leaf *
     ISOGI_VOL__TAKEN(2);
 #undef ISOGI_VOL__TAKEN
     ISOGI_VOL__FOUR(storeu_ps)(f, enters), ISOGI_VOL__FOUR(storeu_ps)(f + 4, leaves);
-    sum1 = f[1] + f[2] + f[4], sum2 = f[3] + f[5] + f[6];
-    return isogi_vol__told(w, (f[0] > inside) & (f[7] > inside) & (sum1 > 3 * inside) & (sum2 > 3 * inside),
-                           (f[0] < outside) & (f[7] < outside) & (sum1 < 3 * outside) & (sum2 < 3 * outside), f[7], inside, outside);
+    return isogi_vol__told(w, leaf, f);
 }
 
-/* Takes the ray's directions: along which axes it falls, and times per cell. One that stands still keeps below the upper border. */
-static void isogi_vol__ride_face(isogi_vol__ride *r) {
+/* Takes the ray's directions; 0: it has to be walked plainly. */
+static int isogi_vol__ride_set(isogi_vol__ride *r) {
     const isogi_vol__walk *w = &r->walk;
     isogi_vol__trip *c = &r->trip;
     int a;
+    if (!(w->end > 1e-150) || !(w->end < 1e150)) return 0;
     c->octant = 0, c->inverse[3] = 0, c->lead[3] = 0;
     for (a = 0; a < 3; a++) {
         const int still = !(w->dir[a] > 0 || w->dir[a] < 0);
+        /* one that stands still keeps below the upper border */
         const int fall = w->dir[a] < 0 || (still && w->origin[a] >= w->pyramid->box[a]);
         c->octant |= fall << a, c->lead[a] = fall;
         c->inverse[a] = still ? fall ? -1e200 : 1e200 : w->inverse[a];
     }
-}
-
-/* Times of the root, that of a cell by each axis among them; top: its level. */
-static void isogi_vol__ride_times(isogi_vol__trip *c, const isogi_vol__walk *w, float reach, int top, double most) {
-    int a;
-    for (a = 0; a < 3; a++) {
-        const double start = c->lead[a] ? (4 << 2 * top) - w->origin[a] : w->origin[a]; /* counted like cells */
-        const float cell = (float)isogi_vol__min(fabs(c->inverse[a]) * most, 1e30);
-        ISOGI_VOL__FOUR(storeu_ps)(c->cell + 4 * a, ISOGI_VOL__FOUR(set1_ps)(cell));
-        ISOGI_VOL__FOUR(storeu_ps)(c->enter[top] + 4 * a, ISOGI_VOL__FOUR(set1_ps)((-2 * reach - (float)start) * cell));
-    }
-}
-
-#ifdef ISOGI_VOL__AVX
-/* Both for three axes at once; the same bits. */
-ISOGI_VOL__TARGET("avx2") static void isogi_vol__ride_face_avx2(isogi_vol__ride *r) {
-    const isogi_vol__walk *w = &r->walk;
-    isogi_vol__trip *c = &r->trip;
-    const __m256d zero = _mm256_setzero_pd(), dir = _mm256_loadu_pd(w->dir), still = _mm256_cmp_pd(dir, zero, _CMP_EQ_OQ);
-    const __m256d upper = _mm256_cmp_pd(_mm256_loadu_pd(w->origin), _mm256_loadu_pd(w->pyramid->box), _CMP_GE_OQ);
-    const __m256d fall = _mm256_or_pd(_mm256_cmp_pd(dir, zero, _CMP_LT_OQ), _mm256_and_pd(still, upper));
-    const __m256d huge = _mm256_or_pd(_mm256_set1_pd(1e200), _mm256_and_pd(fall, _mm256_set1_pd(-0.0)));
-    const __m256i even = _mm256_setr_epi32(0, 2, 4, 6, 0, 2, 4, 6);
-    const __m128i falls = _mm256_castsi256_si128(_mm256_permutevar8x32_epi32(_mm256_castpd_si256(fall), even));
-    _mm256_storeu_pd(c->inverse, _mm256_blend_pd(_mm256_blendv_pd(_mm256_loadu_pd(w->inverse), huge, still), zero, 8));
-    _mm_storeu_si128((__m128i *)(void *)c->lead, _mm_and_si128(falls, _mm_setr_epi32(1, 1, 1, 0)));
-    c->octant = _mm256_movemask_pd(fall) & 7;
-}
-
-ISOGI_VOL__TARGET("avx2")
-static void isogi_vol__ride_times_avx2(isogi_vol__trip *c, const isogi_vol__walk *w, float reach, int top, double most) {
-    const __m128i lead = _mm_loadu_si128((const __m128i *)(const void *)c->lead);
-    const __m256d fall = _mm256_castsi256_pd(_mm256_cvtepi32_epi64(_mm_sub_epi32(_mm_setzero_si128(), lead)));
-    const __m256d origin = _mm256_loadu_pd(w->origin), back = _mm256_sub_pd(_mm256_set1_pd(4 << 2 * top), origin);
-    const __m128 start = _mm256_cvtpd_ps(_mm256_blendv_pd(origin, back, fall));
-    const __m256d each = _mm256_mul_pd(_mm256_andnot_pd(_mm256_set1_pd(-0.0), _mm256_loadu_pd(c->inverse)), _mm256_set1_pd(most));
-    const __m128 cell = _mm256_cvtpd_ps(_mm256_min_pd(each, _mm256_set1_pd(1e30)));
-    const __m128 enter = _mm_mul_ps(_mm_sub_ps(_mm_set1_ps(-2 * reach), start), cell);
-    _mm_storeu_ps(c->cell, _mm_permute_ps(cell, 0x00)), _mm_storeu_ps(c->enter[top], _mm_permute_ps(enter, 0x00));
-    _mm_storeu_ps(c->cell + 4, _mm_permute_ps(cell, 0x55)), _mm_storeu_ps(c->enter[top] + 4, _mm_permute_ps(enter, 0x55));
-    _mm_storeu_ps(c->cell + 8, _mm_permute_ps(cell, 0xaa)), _mm_storeu_ps(c->enter[top] + 8, _mm_permute_ps(enter, 0xaa));
-}
-#endif
-
-/* Sets a ride up; 0: it has to be walked plainly. */
-static int isogi_vol__ride_set(isogi_vol__ride *r) {
-    const isogi_vol__walk *w = &r->walk;
-    isogi_vol__trip *c = &r->trip;
-    if (!(w->end > 1e-150) || !(w->end < 1e150)) return 0;
-#ifdef ISOGI_VOL__AVX
-    if (w->pyramid->path >= ISOGI_VOL__PATH_AVX2) isogi_vol__ride_face_avx2(r);
-    else
-#endif
-        isogi_vol__ride_face(r);
     c->flip = 3 * (c->octant & 1) + 6 * (c->octant & 2) + 12 * (c->octant & 4);
     memcpy(&c->stop, &w->end, sizeof c->stop), c->stop |= 3;
     c->entry_axis = w->entry_axis;
@@ -4974,12 +4922,14 @@ static void isogi_vol__ride_start(isogi_vol__ride *r) {
     isogi_vol__trip *c = &r->trip;
     const int top = p->node_levels - 1;
     const double most = isogi_vol__largest(w->dir[0], w->dir[1], w->dir[2]);
+    int a;
     c->level = isogi_vol__quantise_isovalue(p, w->isovalue, &c->low, &c->high);
-#ifdef ISOGI_VOL__AVX
-    if (p->path >= ISOGI_VOL__PATH_AVX2) isogi_vol__ride_times_avx2(c, w, p->ways->reach, top, most);
-    else
-#endif
-        isogi_vol__ride_times(c, w, p->ways->reach, top, most);
+    for (a = 0; a < 3; a++) {
+        const double start = c->lead[a] ? (4 << 2 * top) - w->origin[a] : w->origin[a]; /* counted like cells */
+        const float cell = (float)isogi_vol__min(fabs(c->inverse[a]) * most, 1e30);
+        ISOGI_VOL__FOUR(storeu_ps)(c->cell + 4 * a, ISOGI_VOL__FOUR(set1_ps)(cell));
+        ISOGI_VOL__FOUR(storeu_ps)(c->enter[top] + 4 * a, ISOGI_VOL__FOUR(set1_ps)((-2 * p->ways->reach - (float)start) * cell));
+    }
     c->last = (float)(isogi_vol__min(w->end * most, 1e30) * 1.000001);
     memset(c->place[top], 0, sizeof c->place[top]);
     c->child = 0, c->pending = 0, c->cells = 0, r->at = top;
@@ -5308,11 +5258,9 @@ ISOGI_VOL__INLINE int isogi_vol__cell_told_avx2(isogi_vol__walk *w, const isogi_
     const __m256 ends = _mm256_insertf128_ps(_mm256_castps128_ps256(from), to, 1);
     const __m256 from2 = _mm256_permute2f128_ps(ends, ends, 0x00), to2 = _mm256_permute2f128_ps(ends, ends, 0x11);
     const __m256i even = _mm256_setr_epi32(0, 2, 4, 6, 0, 2, 4, 6), odd = _mm256_setr_epi32(1, 3, 5, 7, 1, 3, 5, 7);
-    const float inside = leaf->isovalue + ISOGI_VOL__DOUBT, outside = leaf->isovalue - ISOGI_VOL__DOUBT;
-    const __m128 sums = _mm_setr_ps(1, 1, 3, 3), none = _mm_setzero_ps();
     int16_t pair[4];
     __m256 c, low;
-    __m128 hull;
+    float f[8];
     memcpy(&pair[0], code, 2), memcpy(&pair[1], code + 5, 2), memcpy(&pair[2], code + 25, 2), memcpy(&pair[3], code + 30, 2);
     c = _mm256_cvtepi32_ps(_mm256_cvtepu8_epi32(_mm_setr_epi16(pair[0], pair[1], pair[2], pair[3], 0, 0, 0, 0)));
     low = _mm256_permutevar8x32_ps(c, even);
@@ -5321,13 +5269,8 @@ ISOGI_VOL__INLINE int isogi_vol__cell_told_avx2(isogi_vol__walk *w, const isogi_
     c = _mm256_add_ps(low, _mm256_mul_ps(_mm256_shuffle_ps(from2, to2, 0x55), _mm256_sub_ps(_mm256_permute_ps(c, 0xdd), low)));
     low = _mm256_permute_ps(c, 0x88);
     c = _mm256_add_ps(low, _mm256_mul_ps(_mm256_shuffle_ps(from2, to2, 0xaa), _mm256_sub_ps(_mm256_permute_ps(c, 0xdd), low)));
-#define ISOGI_VOL__VALUES(a, b, d, e) _mm256_castps256_ps128(_mm256_permutevar8x32_ps(c, _mm256_setr_epi32(a, b, d, e, 0, 0, 0, 0)))
-    hull = _mm_add_ps(ISOGI_VOL__VALUES(0, 7, 1, 3), _mm_blend_ps(none, ISOGI_VOL__VALUES(0, 0, 2, 5), 12));
-    hull = _mm_add_ps(hull, _mm_blend_ps(none, ISOGI_VOL__VALUES(0, 0, 4, 6), 12));
-#undef ISOGI_VOL__VALUES
-    return isogi_vol__told(w, _mm_movemask_ps(_mm_cmp_ps(hull, _mm_mul_ps(sums, _mm_set1_ps(inside)), _CMP_GT_OQ)) == 15,
-                           _mm_movemask_ps(_mm_cmp_ps(hull, _mm_mul_ps(sums, _mm_set1_ps(outside)), _CMP_LT_OQ)) == 15,
-                           _mm_cvtss_f32(_mm_permute_ps(hull, 0x55)), inside, outside);
+    _mm256_storeu_ps(f, c);
+    return isogi_vol__told(w, leaf, f);
 }
 
 ISOGI_VOL__TRIP(avx2, ISOGI_VOL__TARGET("avx2"))
