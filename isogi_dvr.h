@@ -7570,6 +7570,13 @@ ISOGI_API isogi_result isogi_dvr_render(const isogi_dvr *dvr, const isogi_view *
 
 /* ---- transfer functions to begin with ---- */
 
+/* The value of point i of `count` that are evenly spaced: in order, too, where low and high are but a few roundings apart. */
+static void isogi_dvr__space_point(isogi_transfer_point *points, size_t i, size_t count, double low, double high) {
+    double u = (double)i / (double)(count - 1), value = i + 1 < count ? low * (1 - u) + high * u : high;
+    value = value < high ? value : high;
+    points[i].value = i && value < points[i - 1].value ? points[i - 1].value : value;
+}
+
 ISOGI_API isogi_result isogi_transfer_preset(isogi_preset preset, double low, double high, float extinction,
                                              isogi_transfer_point points[ISOGI_PRESET_POINTS]) {
     static const float colour[4][5][3] = {
@@ -7585,7 +7592,7 @@ ISOGI_API isogi_result isogi_transfer_preset(isogi_preset preset, double low, do
         double u = (double)i / (ISOGI_PRESET_POINTS - 1);
         int at = i / 2 < 3 ? i / 2 : 3;
         float part = (float)(4 * u - at);
-        points[i].value = i + 1 < ISOGI_PRESET_POINTS ? low * (1 - u) + high * u : high;
+        isogi_dvr__space_point(points, (size_t)i, ISOGI_PRESET_POINTS, low, high);
         points[i].extinction = (float)(u * (double)extinction);
         for (a = 0; a < 3; a++) points[i].rgb[a] = colour[preset][at][a] + part * (colour[preset][at + 1][a] - colour[preset][at][a]);
     }
@@ -7604,10 +7611,8 @@ ISOGI_API isogi_result isogi_transfer_import(const float (*rgba)[4], size_t coun
         for (a = 0; a < 4; a++)
             if (!isogi_dvr__finite32(rgba[i][a]) || !(rgba[i][a] >= 0 && rgba[i][a] <= 1)) return ISOGI_INVALID;
     for (i = 0; i < count; i++) {
-        double u = (double)i / (double)(count - 1), opacity = isogi_dvr__clamp((double)rgba[i][3], 1 - 1 / 16777216.0);
-        points[i].value = i + 1 < count ? low * (1 - u) + high * u : high;
-        if (points[i].value > high) points[i].value = high; /* as rounding has it, where they are as close */
-        if (i && points[i].value < points[i - 1].value) points[i].value = points[i - 1].value;
+        double opacity = isogi_dvr__clamp((double)rgba[i][3], 1 - 1 / 16777216.0);
+        isogi_dvr__space_point(points, i, count, low, high);
         points[i].extinction = (float)isogi_dvr__clamp(-log1p(-opacity) / length, 3e38);
         for (a = 0; a < 3; a++) {
             double x = (double)rgba[i][a];
