@@ -392,7 +392,8 @@ typedef struct isogi_view {
     float eye[3], target[3], up[3]; /* world; up: of any length; 0 = +y */
     float fov;                      /* vertical angle of view in degrees, below 180; 0 = 45 */
     int local;                      /* 0, or 1: shade by local visibility, for cut planes, and lights within. ISOGI_INVALID where the
-                                       paper's method is not at work (another method, peaks, data space, unlit, tetrahedra) */
+                                       paper's method is not at work (another method, peaks, data space, an axis of one voxel,
+                                       unlit, tetrahedra) */
     isogi_depth_kind depth;         /* what is asked for where depth is */
     const float *until;             /* [height*width], borrowed for the call; NULL = no geometry: see below */
 } isogi_view;
@@ -438,12 +439,12 @@ ISOGI_API isogi_result isogi_dvr_sample_visibility(const isogi_dvr *dvr, const f
 #define ISOGI_DVR_MAX_PLANES 32
 ISOGI_API isogi_result isogi_dvr_set_clip(isogi_dvr *dvr, const double (*planes)[4], size_t count);
 
-/* What is held, and where. Blocks are those of the pyramid's level 1, 16 cells a side, x fastest. Without the paper's method there is
-   one level, and only the global part is counted. */
+/* What is held, and where. Blocks are those of the pyramid's level 1, 16 cells a side, x fastest. Where the paper's method is not
+   at work (see isogi_view.local), there is one level, and only the global part is counted. */
 typedef struct isogi_dvr_report {
     size_t block_count[3];
     const uint8_t *level;      /* [blocks], valid until the next writer: 16, 8, 4, 2, 1, or 0 for dropped;
-                                  NULL without the paper's method */
+                                  NULL where the paper's method is not at work */
     size_t level_count[6];     /* blocks that are dropped, or of level 1, 2, 4, 8, 16 */
     size_t points;             /* of all blocks, not counting those repeated on their upper faces */
     double reduction;          /* voxels to points */
@@ -458,7 +459,7 @@ ISOGI_API isogi_result isogi_dvr_inspect(const isogi_dvr *dvr, isogi_dvr_report 
 
 /* The data as the blocks of the paper's method hold it, and the local visibility, at world points; values[count],
    visibility[count][order*order]; where a block is dropped the lowest value, and no shadow; values beside voxels that are not finite need
-   not be finite. ISOGI_INVALID with another method. */
+   not be finite. ISOGI_INVALID where that method is not at work (see isogi_view.local). */
 ISOGI_API isogi_result isogi_dvr_sample_blocks(const isogi_dvr *dvr, const float (*points)[3], size_t count, float *values,
                                                float *visibility);
 
