@@ -394,7 +394,7 @@ typedef struct isogi_view {
     float fov;                      /* vertical angle of view in degrees, below 180; 0 = 45 */
     int local;                      /* 0, or 1: shade by local visibility, for cut planes, and lights within. On the box's own faces it is
                                        too dark: matter fades there over one distance of nodes. ISOGI_INVALID where the paper's method
-                                       is not at work (another method, peaks, data space, unlit, tetrahedra) */
+                                       is not at work (another method, peaks, data space, an axis of one voxel, unlit, tetrahedra) */
     isogi_depth_kind depth;         /* what is asked for where depth is */
     const float *until;             /* [height*width], borrowed for the call; NULL = no geometry: see below */
 } isogi_view;
@@ -440,12 +440,12 @@ ISOGI_API isogi_result isogi_dvr_sample_visibility(const isogi_dvr *dvr, const f
 #define ISOGI_DVR_MAX_PLANES 32
 ISOGI_API isogi_result isogi_dvr_set_clip(isogi_dvr *dvr, const double (*planes)[4], size_t count);
 
-/* What is held, and where. Blocks are those of the pyramid's level 1, 16 cells a side, x fastest. Without the paper's method there is
-   one level, and only the global part is counted. */
+/* What is held, and where. Blocks are those of the pyramid's level 1, 16 cells a side, x fastest. Where the paper's method is not
+   at work (see isogi_view.local), there is one level, and only the global part is counted. */
 typedef struct isogi_dvr_report {
     size_t block_count[3];
     const uint8_t *level;      /* [blocks], valid until the next writer: 16, 8, 4, 2, 1, or 0 for dropped;
-                                  NULL without the paper's method */
+                                  NULL where the paper's method is not at work */
     size_t level_count[6];     /* blocks that are dropped, or of level 1, 2, 4, 8, 16 */
     size_t points;             /* of all blocks, not counting those repeated on their upper faces */
     double reduction;          /* voxels to points */
@@ -460,7 +460,7 @@ ISOGI_API isogi_result isogi_dvr_inspect(const isogi_dvr *dvr, isogi_dvr_report 
 
 /* The data as the blocks of the paper's method hold it, and the local visibility, at world points; values[count],
    visibility[count][order*order]; where a block is dropped the lowest value, and no shadow; values beside voxels that are not finite need
-   not be finite. ISOGI_INVALID with another method. */
+   not be finite. ISOGI_INVALID where that method is not at work (see isogi_view.local). */
 ISOGI_API isogi_result isogi_dvr_sample_blocks(const isogi_dvr *dvr, const float (*points)[3], size_t count, float *values,
                                                float *visibility);
 
@@ -7633,6 +7633,13 @@ ISOGI_API isogi_result isogi_dvr_render(const isogi_dvr *dvr, const isogi_view *
 
 /* ---- transfer functions to begin with ---- */
 
+/* The value of point i of `count` that are evenly spaced: in order, too, where low and high are but a few roundings apart. */
+static void isogi_dvr__space_point(isogi_transfer_point *points, size_t i, size_t count, double low, double high) {
+    double u = (double)i / (double)(count - 1), value = i + 1 < count ? low * (1 - u) + high * u : high;
+    value = value < high ? value : high;
+    points[i].value = i && value < points[i - 1].value ? points[i - 1].value : value;
+}
+
 ISOGI_API isogi_result isogi_transfer_preset(isogi_preset preset, double low, double high, float extinction,
                                              isogi_transfer_point points[ISOGI_PRESET_POINTS]) {
     static const float colour[4][5][3] = {
@@ -7648,7 +7655,7 @@ ISOGI_API isogi_result isogi_transfer_preset(isogi_preset preset, double low, do
         double u = (double)i / (ISOGI_PRESET_POINTS - 1);
         int at = i / 2 < 3 ? i / 2 : 3;
         float part = (float)(4 * u - at);
-        points[i].value = i + 1 < ISOGI_PRESET_POINTS ? low * (1 - u) + high * u : high;
+        isogi_dvr__space_point(points, (size_t)i, ISOGI_PRESET_POINTS, low, high);
         points[i].extinction = (float)(u * (double)extinction);
         for (a = 0; a < 3; a++) points[i].rgb[a] = colour[preset][at][a] + part * (colour[preset][at + 1][a] - colour[preset][at][a]);
     }
@@ -7667,10 +7674,8 @@ ISOGI_API isogi_result isogi_transfer_import(const float (*rgba)[4], size_t coun
         for (a = 0; a < 4; a++)
             if (!isogi_dvr__finite32(rgba[i][a]) || !(rgba[i][a] >= 0 && rgba[i][a] <= 1)) return ISOGI_INVALID;
     for (i = 0; i < count; i++) {
-        double u = (double)i / (double)(count - 1), opacity = isogi_dvr__clamp((double)rgba[i][3], 1 - 1 / 16777216.0);
-        points[i].value = i + 1 < count ? low * (1 - u) + high * u : high;
-        if (points[i].value > high) points[i].value = high; /* as rounding has it, where they are as close */
-        if (i && points[i].value < points[i - 1].value) points[i].value = points[i - 1].value;
+        double opacity = isogi_dvr__clamp((double)rgba[i][3], 1 - 1 / 16777216.0);
+        isogi_dvr__space_point(points, i, count, low, high);
         points[i].extinction = (float)isogi_dvr__clamp(-log1p(-opacity) / length, 3e38);
         for (a = 0; a < 3; a++) {
             double x = (double)rgba[i][a];
@@ -7817,7 +7822,7 @@ struct isogi_tets {
     size_t border_count;
     isogi_dvr__node *node;
     size_t node_count, node_capacity;
-    double size; /* of the whole */
+    double size; /* of the border's box */
 };
 
 /* Points of face f, counter-clockwise seen from outside. */
@@ -7841,17 +7846,10 @@ static double isogi_dvr__determinant(const double a[3], const double b[3], const
 /* Takes over the tetrahedra that have a volume, turned so that it is positive. */
 static isogi_result isogi_dvr__take_tets(isogi_tets *m, isogi_tet_report *report) {
     const isogi_tet_mesh *mesh = &m->mesh;
-    double low[3] = {1e300, 1e300, 1e300}, high[3] = {-1e300, -1e300, -1e300};
     size_t i;
     int a, k;
-    for (i = 0; i < mesh->point_count; i++) {
+    for (i = 0; i < mesh->point_count; i++)
         if (!isogi_dvr__finite3(mesh->points[i]) || !isogi_dvr__finite32(mesh->values[i])) return ISOGI_INVALID;
-        for (a = 0; a < 3; a++) {
-            double x = (double)mesh->points[i][a];
-            low[a] = x < low[a] ? x : low[a], high[a] = x > high[a] ? x : high[a];
-        }
-    }
-    for (a = 0; a < 3; a++) m->size = mesh->point_count && high[a] - low[a] > m->size ? high[a] - low[a] : m->size;
     for (i = 0; i < mesh->tet_count; i++) {
         const uint32_t *t = mesh->tets[i];
         double origin[3], edge[3][3], longest = 0, volume;
@@ -7990,6 +7988,7 @@ ISOGI_API void isogi_dvr_tets_free(isogi_tets *tets) {
 static isogi_result isogi_dvr__build_tets(isogi_tets *m, isogi_tet_report *report) {
     isogi_result result;
     size_t i, n = 0;
+    int a;
     m->tet = (uint32_t(*)[4])isogi_allocate(&m->context, m->mesh.tet_count, sizeof *m->tet);
     if (m->mesh.tet_count && !m->tet) return ISOGI_NO_MEMORY;
     result = isogi_dvr__take_tets(m, report);
@@ -8008,6 +8007,10 @@ static isogi_result isogi_dvr__build_tets(isogi_tets *m, isogi_tet_report *repor
     for (i = 0; i < 4 * m->count; i++)
         if (m->across[i] == ISOGI_DVR__NO_FACE) m->border[n++] = (uint32_t)i;
     isogi_dvr__build_tree(m);
+    for (a = 0; a < 3 && n; a++) {
+        double along = (double)m->node->high[a] - (double)m->node->low[a];
+        m->size = along > m->size ? along : m->size;
+    }
     return ISOGI_OK;
 }
 
@@ -8058,13 +8061,18 @@ static double isogi_dvr__face_t(const isogi_dvr__tet_ray *r, const uint32_t p[3]
 }
 
 /* Which side of the line from point p to point q the ray passes. Both faces of an edge ask with the same numbers, and "upon it" is answered
-   as for a ray turned by a little towards x, by less towards y, by yet less towards z: it hits exactly one face of a closed border. */
+   as for a ray turned by a little towards x, by less towards y, by yet less towards z: it hits exactly one face of a closed border. Where
+   turning decides nothing, as the eye is in line with p and q, the eye is moved in the same way, by yet less. */
 static int isogi_dvr__left_of(const isogi_dvr__tet_ray *r, uint32_t p, uint32_t q) {
     double a[3], b[3], n[3], side;
     int turned = p > q, axis;
     isogi_dvr__sub(r->mesh->mesh.points[turned ? q : p], r->origin, a), isogi_dvr__sub(r->mesh->mesh.points[turned ? p : q], r->origin, b);
     isogi_dvr__cross(a, b, n);
     side = isogi_dvr__dot(n, r->dir);
+    for (axis = 0; axis < 3 && !(side > 0 || side < 0); axis++) side = n[axis];
+    if (side > 0 || side < 0) return (side > 0) != turned;
+    for (axis = 0; axis < 3; axis++) b[axis] -= a[axis];
+    isogi_dvr__cross(r->dir, b, n);
     for (axis = 0; axis < 3 && !(side > 0 || side < 0); axis++) side = n[axis];
     return (side > 0) != turned;
 }
@@ -8197,12 +8205,28 @@ static void isogi_dvr__pass_tet(isogi_dvr__pixel_ray *pixel, isogi_dvr__tet_ray 
     isogi_dvr__divide_piece(pixel, s);
 }
 
-/* The tetrahedron that holds the ray's origin: the first that is found on the way back from where the ray leaves the mesh. Border within
-   `slack` of the origin counts as behind it, for an eye on a face, an edge or a point. */
-static uint32_t isogi_dvr__tet_around(const isogi_dvr__tet_ray *r, double slack) {
+/* What rounding makes of the t at which a ray passes a face, if not nearly along it: by that of doubles, from the distance of its points;
+   returns what floats make of it, points being such, from their coordinates. */
+static double isogi_dvr__rounding(const isogi_dvr__tet_ray *r, uint32_t face, double *doubles) {
+    double distance = 0, coordinate = 0;
+    uint32_t p[3];
+    int a, k;
+    isogi_dvr__face_points(r->mesh, face, p);
+    for (k = 0; k < 3; k++)
+        for (a = 0; a < 3; a++) {
+            const double x = (double)r->mesh->mesh.points[p[k]][a], off = fabs(x - r->origin[a]);
+            distance = off > distance ? off : distance, coordinate = fabs(x) > coordinate ? fabs(x) : coordinate;
+        }
+    *doubles = 1e-12 * distance / r->speed;
+    return 1e-7 * coordinate / r->speed;
+}
+
+/* The tetrahedron that holds the ray's origin: the first that is found on the way back from where the ray leaves the mesh. Border that the
+   origin is on counts as behind it. */
+static uint32_t isogi_dvr__tet_around(const isogi_dvr__tet_ray *r) {
     const isogi_dvr__node *box = r->mesh->node;
     uint32_t face = ISOGI_DVR__NO_FACE;
-    double leave = slack;
+    double leave = 0;
     int a;
     if (!r->mesh->border_count) return ISOGI_DVR__NO_FACE;
     for (a = 0; a < 3; a++)
@@ -8210,23 +8234,25 @@ static uint32_t isogi_dvr__tet_around(const isogi_dvr__tet_ray *r, double slack)
     while ((face = isogi_dvr__next_border(r, leave, face, 1, &leave)) != ISOGI_DVR__NO_FACE) {
         uint32_t at = face;
         size_t steps;
+        double t;
+        isogi_dvr__rounding(r, face, &t);
+        if (leave <= t) continue;
         for (steps = 0; steps < r->mesh->count && at != ISOGI_DVR__NO_FACE; steps++) {
-            double t;
             uint32_t tet = at >> 2, back = isogi_dvr__exit_face(r, tet, at, -1, &t);
             if (back == ISOGI_DVR__NO_FACE) break;
+            if (t <= 0) return tet;
             at = r->mesh->across[back];
-            if (t <= (at == ISOGI_DVR__NO_FACE ? slack : 0)) return tet;
         }
     }
     return ISOGI_DVR__NO_FACE;
 }
 
 /* Through one part of the mesh after the other, in the order in which they are entered; what lies before the end of those passed, where
-   parts overlap, is walked through without being drawn. 0 if the ray runs in circles, which rounding may bring about next to an edge or a
-   point. */
+   parts overlap, is walked through without being drawn. So is what lies behind the eye, in parts that are entered just there: the one
+   around it may be one that ends at the eye. 0 if the ray runs in circles, which rounding may bring about next to an edge or a point. */
 static int isogi_dvr__cast_tets(isogi_dvr__pixel_ray *pixel, isogi_dvr__tet_ray *r, isogi_dvr__span *s) {
-    double last_t = 0, slack = 1e-7 * r->mesh->size / r->speed;
-    uint32_t tet = isogi_dvr__tet_around(r, slack), in = ISOGI_DVR__NO_FACE, last = ISOGI_DVR__NO_FACE;
+    double slack = 1e-7 * r->mesh->size / r->speed, last_t = -slack, seam;
+    uint32_t tet = isogi_dvr__tet_around(r), in = ISOGI_DVR__NO_FACE, last = ISOGI_DVR__NO_FACE;
     r->t = 0, r->chained = 0;
     for (;;) {
         double walked = last_t;
@@ -8249,7 +8275,7 @@ static int isogi_dvr__cast_tets(isogi_dvr__pixel_ray *pixel, isogi_dvr__tet_ray 
         last = in = isogi_dvr__next_border(r, last_t, last, -1, &last_t);
         if (in == ISOGI_DVR__NO_FACE) return 1;
         /* over the seam of two parts that touch, the value goes on if it is the same on both sides */
-        tet = in >> 2, r->chained = r->chained && last_t <= r->t + slack;
+        tet = in >> 2, seam = isogi_dvr__rounding(r, in, &slack), r->chained = r->chained && last_t <= r->t + seam;
     }
 }
 

@@ -432,6 +432,71 @@ TEST(tetrahedra_listed_twice_are_seen_once) {
     }
 }
 
+/* However far a point is that no tetrahedron has, or another part of the mesh: from within a block, from the gap between two and from a
+   corner, opacity and the depth at which it begins are those of the blocks. */
+TEST(what_is_far_off_changes_nothing_near_by) {
+    const isogi_transfer_point medium = {0, {1, 1, 1}, 0.5f};
+    const isogi_transfer fog = {&medium, 1, NULL, 0};
+    const isogi_tet_desc desc = {.opaque = 1};
+    static const float eyes[3][4] = {{0.5f, 0.4f, 0.3f, 0}, {1.7f, 0.4f, 0.3f, 0.3f}, {1, 1, 0, 1}}; /* and where matter begins */
+    static const double length[3] = {1.5, 1, 0};
+    slope[0] = slope[1] = slope[2] = 0;
+    for (int part = 0; part < 2; part++)
+        for (int power = 0; power <= 12; power++) {
+            mesh m = twice(twice(lattice_mesh(2, linear, NULL), 2), 2); /* 0..1, 2..3, and two that are moved off, or taken away */
+            const float far_off = powf(10, (float)power);
+            for (size_t i = 16; i < 32; i++)
+                for (int a = 0; a < 3; a++) m.points[i][a] = 0.001f * far_off * m.points[i][a] + (a == 1 ? 5 + far_off : 0);
+            if (!part) m.view.tet_count /= 2;
+            mesh_build(&m);
+            for (int e = 0; e < 3; e++) {
+                isogi_view view = {.width = 1, .height = 1, .fov = 1, .depth = ISOGI_DEPTH_FIRST,
+                                   .eye = {eyes[e][0], eyes[e][1], eyes[e][2]}};
+                float image[1][4], depth;
+                for (int a = 0; a < 3; a++) view.target[a] = view.eye[a] + (a == 0 ? 1.0f : 0.0f);
+                if (e == 2) view.target[0] = 0, view.target[1] = 0, view.target[2] = 1; /* the diagonal */
+                CHECK(isogi_dvr_tets_render(m.built, &desc, &fog, &view, image, &depth, NULL) == ISOGI_OK, "render");
+                const double exact = -expm1(-0.5 * (e == 2 ? sqrt(3) : length[e]));
+                CHECK(fabs((double)image[0][3] - exact) < 1e-6 && fabsf(depth - (e == 2 ? 0 : eyes[e][3])) < 1e-6f,
+                      "%s %g off, eye %d: opacity %g, not %g, from %g on", part ? "parts" : "points", (double)far_off, e,
+                      (double)image[0][3], exact, (double)depth);
+            }
+            mesh_free(&m);
+        }
+}
+
+/* The eye on points, edges and faces of the border, the ray through others: all of the box is seen from there. */
+TEST(eyes_on_the_border_see_what_is_before_them) {
+    const isogi_transfer_point medium = {0, {1, 1, 1}, 0.3f};
+    const isogi_transfer fog = {&medium, 1, NULL, 0};
+    const isogi_tet_desc desc = {.opaque = 1};
+    test_random r = {6};
+    int wrong = 0;
+    slope[0] = slope[1] = slope[2] = 0;
+    mesh m = lattice_mesh(4, linear, NULL);
+    mesh_build(&m);
+    for (int n = 0; n < (LONG_SUITE ? 200000 : 20000); n++) {
+        isogi_view view = {.width = 1, .height = 1, .fov = 1};
+        double o[3], to = 1e30;
+        float d[3], image[1][4];
+        int parts = 1 + n % 4, along = 0;
+        for (int a = 0; a < 3; a++) {
+            view.eye[a] = (float)floor(random_range(&r, 0, 3 * parts + 1)) / (float)parts;
+            view.target[a] = (float)floor(random_range(&r, 0, 3 * parts + 1)) / (float)parts;
+        }
+        view.eye[n % 3] = n & 64 ? 3 : 0;
+        isogi_view_ray(&view, 0, 0, o, d);
+        for (int a = 0; a < 3; a++) {
+            if (fabsf(d[a]) > 0) to = fmin(to, ((d[a] > 0 ? 3 : 0) - o[a]) / (double)d[a]);
+            else along |= !(o[a] > 0 && o[a] < 3); /* within the border: all or nothing */
+        }
+        CHECK(isogi_dvr_tets_render(m.built, &desc, &fog, &view, image, NULL, NULL) == ISOGI_OK, "render");
+        wrong += !(along && image[0][3] <= 0) && fabs((double)image[0][3] + expm1(-(double)0.3f * to)) > 1e-5;
+    }
+    CHECK(wrong == 0, "%d rays wrong", wrong);
+    mesh_free(&m);
+}
+
 /* Two blocks whose points coincide without being the same: the seam shows nothing, and a peak that lies in it is crossed once. */
 TEST(blocks_that_touch_look_as_one) {
     slope[0] = 1, slope[1] = 0.2, slope[2] = 0.1;

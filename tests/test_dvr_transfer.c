@@ -80,6 +80,21 @@ TEST(tables_of_more_entries_than_numbers_are_valid) {
     }
 }
 
+/* And so have several points of a preset; denormals, too. */
+TEST(presets_of_ranges_of_a_few_roundings_are_valid) {
+    isogi_transfer_point p[ISOGI_PRESET_POINTS];
+    const isogi_transfer transfer = {p, ISOGI_PRESET_POINTS, NULL, 0};
+    test_random r = {11};
+    for (int run = 0; run < 2000; run++) {
+        const double low = run % 4 ? random_range(&r, -1, 1) : (run / 4 % 20 - 10) * 4.9406564584124654e-324;
+        double high = low;
+        for (int i = 0; i < 1 + run % 12; i++) high = nextafter(high, 2);
+        CHECK(isogi_transfer_preset((isogi_preset)(run % 3), low, high, 1, p) == ISOGI_OK &&
+                  isogi_transfer_validate(&transfer) == ISOGI_OK && p[0].value <= low && p[ISOGI_PRESET_POINTS - 1].value >= high,
+              "%.17g to %.17g", low, high);
+    }
+}
+
 /* Three materials with noise: the thresholds part them. */
 TEST(suggestions_part_what_the_histogram_parts) {
     test_random r = {9};
