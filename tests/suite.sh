@@ -177,7 +177,12 @@ variants() {
     for program; do
         case $program in *test_docs | *test_viewer | *test_examples) ;; *) units="$units $program" ;; esac
     done
-    # A variant runs what it can change: the address sanitizer most of them, the others those that stand for their kind.
+    # A variant runs what it can change: the address sanitizer most of them, the others those that stand for their kind. What finds most
+    # comes first, since the last items may find no time left.
+    sanitizer=clang casts=,float-cast-overflow
+    have clang || { sanitizer=$CC casts=; }
+    variant address+undefined "$sanitizer" "-O1 -g $CONTRACT_OFF -fsanitize=address,undefined$casts -fno-sanitize-recover=all" '' $(only "$checked")
+    variant thread "$sanitizer" "-O1 -g $CONTRACT_OFF -fsanitize=thread" 'TSAN_OPTIONS=halt_on_error=1' $(only "$threaded")
     variant O0 "$CC" "-O0 $CONTRACT_OFF" '' $(only sh)
     variant O3 "$CC" "-O3 $CONTRACT_OFF" '' $(only 'sh|vol|vol_update|trace_inside|dvr|dvr_inside|dvr_data')
     fast_math "$CC" $(only 'sh|sh_limits|sample|vol|vol_sides|vol_holes|trace|dvr|dvr_visibility|dvr_bound|dvr_hard|dvr_classes')
@@ -194,12 +199,7 @@ variants() {
     if have clang; then
         variant clang clang "-O2 $CONTRACT_OFF" '' $(only 'sh|sample|vol|mesh|trace|dvr|stack')
         fast_math clang $(only 'sh|sh_limits|vol_hard')
-        variant address+undefined clang "-O1 -g $CONTRACT_OFF -fsanitize=address,undefined,float-cast-overflow -fno-sanitize-recover=all" '' $(only "$checked")
-        variant thread clang "-O1 -g $CONTRACT_OFF -fsanitize=thread" 'TSAN_OPTIONS=halt_on_error=1' $(only "$threaded")
-    else
-        item skip clang "clang is not installed"
-        variant address+undefined "$CC" "-O1 -g $CONTRACT_OFF -fsanitize=address,undefined -fno-sanitize-recover=all" '' $(only "$checked")
-        variant thread "$CC" "-O1 -g $CONTRACT_OFF -fsanitize=thread" 'TSAN_OPTIONS=halt_on_error=1' $(only "$threaded")
+    else item skip clang "clang is not installed"
     fi
 }
 
