@@ -344,10 +344,10 @@ typedef struct isogi_dvr_desc {
     uint32_t jitter;        /* not 0: every pixel's samples are moved by a part of a step of its own, which turns rings of large steps into
                                noise. The same number gives the same picture. Sampled rays only; physical space is post-classified then */
     double visibility_step; /* sampling distance along visibility rays, as `step`; 0 = twice `step`, or 1 where that is 0. Sweeps: distance
-                               of the lattice of extinction, rounded so that grid points are on it, but half a voxel or more along axes
-                               whose voxels are longer; 0 = 2. What is opaque from one voxel to the next wants 1, in three times the
-                               time: with 2 its surfaces are lit in blotches (a picture of torus-sphere-plane by 128 directions differs
-                               from 2048 by brute force by RMSE .015 and .006) */
+                               of the lattice of extinction, rounded so that grid points are on it, but half a voxel at least along
+                               axes whose voxels are longer, or this times a voxel where that is less; 0 = 2. What is opaque from one
+                               voxel to the next wants 1, in three times the time: with 2 its surfaces are lit in blotches (a picture
+                               of torus-sphere-plane by 128 directions differs from 2048 by brute force by RMSE .015 and .006) */
     isogi_dvr_method method;
     isogi_dvr_sphere sphere;
     double anisotropy;      /* of scattering, -1..1 (both excluded): g of Henyey and Greenstein; 0 = isotropic; with visibility only */
@@ -364,7 +364,8 @@ typedef struct isogi_dvr_desc {
     double reduction;       /* the paper's method: voxels of the volume to points of its blocks, at least 1; 0 = 4. A block that is not
                                transparent holds a point whatever the budget is; those that the border cuts thin come first for more.
                                One of a single colour holds no more than its corners at any budget: in dense fog that reaches the border
-                               visibility is then a third too large. One that a clip plane cuts holds local visibility at every voxel */
+                               visibility is then a third too large. One that a clip plane cuts, or the next one to
+                               it, holds local visibility at every voxel */
     isogi_dvr_classification classification; /* in data space; visibility rays are exact there, unless this says post-classified */
     int table;                               /* entries along a side of the pre-integrated table, which stand where the transfer
                                                 function changes, half by value, half evenly among its pieces; 2..1024; 0 = 256 */
@@ -4187,7 +4188,7 @@ static isogi_result isogi_dvr__update_blocks(isogi_dvr *d) {
     result = isogi_dvr__select_levels(d, level);
     for (i = 0; result == ISOGI_OK && i < b->total; i++) {
         changed[i] = d->changed[i] || level[i] != b->level[i] || isogi_dvr__faces_change(b, i, level);
-        lit[i] = level[i] ? d->cut[i] ? 16 : level[i] : isogi_dvr__any_near(b, i, b->reach, level) ? 2 : 0;
+        lit[i] = level[i] ? isogi_dvr__any_near(b, i, 1, d->cut) ? 16 : level[i] : isogi_dvr__any_near(b, i, b->reach, level) ? 2 : 0;
         gone[i] = b->lit[i] && !lit[i];
     }
     for (i = 0; result == ISOGI_OK && i < b->total; i++)
@@ -4212,8 +4213,8 @@ static isogi_result isogi_dvr__update_blocks(isogi_dvr *d) {
 /* Around a block a window of extinction is laid out, as wide as local rays reach, at the finest level that occurs in it: data as the
    blocks hold it, classified at the window's nodes, 0 where it is dropped or outside. For one direction and one step all nodes of a row of
    the block look at the window at the same place between its nodes, so that whole rows advance at once. Beside clip planes those samples
-   count that are not cut off, a range of each row: matter must end there, not fade from node to node. Blocks that a plane cuts hold local
-   visibility at every voxel: just below it changes fast. */
+   count that are not cut off, a range of each row: matter must end there, not fade from node to node. Blocks that a plane cuts, and their
+   neighbours, hold local visibility at every voxel: just below a plane it changes fast. */
 typedef struct isogi_dvr__local_job {
     isogi_dvr *dvr;
     size_t first, packing;

@@ -1,6 +1,6 @@
 #!/bin/sh
 # Lists the items of the quick or of the long suite, one per line, for tests/run.sh: the quick one's longest first, so that none is left
-# alone at the end; the long one's cheap ones first.
+# alone at the end; the long one's cheap ones first, and what finds most before what finds less.
 #
 #     sh tests/suite.sh quick|long TEST_PROGRAMS...
 
@@ -63,7 +63,7 @@ matrix_quick() {
     fi
 }
 
-# Several translation units: all implementations in one, in C and C++ each in its own, and a user of theirs.
+# Several translation units and a user of theirs: all implementations in one, in C++ each in its own; in C the quick suite has that.
 link_items() {
     cc=$1 cxx=$2 prefix=$3
     item check "link/${prefix}one-implementation" "sh tests/compile/link.sh together '$cc' '$cc'"

@@ -438,7 +438,7 @@ TEST(what_is_far_off_changes_nothing_near_by) {
     const isogi_transfer_point medium = {0, {1, 1, 1}, 0.5f};
     const isogi_transfer fog = {&medium, 1, NULL, 0};
     const isogi_tet_desc desc = {.opaque = 1};
-    static const float eyes[3][4] = {{0.5f, 0.4f, 0.3f, 0}, {1.7f, 0.4f, 0.3f, 0.3f}, {1, 1, 0, 1}}; /* and where matter begins */
+    static const float eyes[3][4] = {{0.5f, 0.4f, 0.3f, 0}, {1.7f, 0.4f, 0.3f, 0.3f}, {1, 1, 0, 0}}; /* and where matter begins */
     static const double length[3] = {1.5, 1, 0};
     slope[0] = slope[1] = slope[2] = 0;
     for (int part = 0; part < 2; part++)
@@ -457,7 +457,7 @@ TEST(what_is_far_off_changes_nothing_near_by) {
                 if (e == 2) view.target[0] = 0, view.target[1] = 0, view.target[2] = 1; /* the diagonal */
                 CHECK(isogi_dvr_tets_render(m.built, &desc, &fog, &view, image, &depth, NULL) == ISOGI_OK, "render");
                 const double exact = -expm1(-0.5 * (e == 2 ? sqrt(3) : length[e]));
-                CHECK(fabs((double)image[0][3] - exact) < 1e-6 && fabsf(depth - (e == 2 ? 0 : eyes[e][3])) < 1e-6f,
+                CHECK(fabs((double)image[0][3] - exact) < 1e-6 && fabsf(depth - eyes[e][3]) < 1e-6f,
                       "%s %g off, eye %d: opacity %g, not %g, from %g on", part ? "parts" : "points", (double)far_off, e,
                       (double)image[0][3], exact, (double)depth);
             }
