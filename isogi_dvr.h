@@ -4174,26 +4174,26 @@ static int isogi_dvr__faces_change(const isogi_dvr__blocks *b, size_t block, con
 }
 
 /* New levels for a new classification, the data packed anew, and the list of blocks whose local visibility has to follow: those with a
-   block within reach of a ray whose data or classification changed, and those beside one that holds no visibility any more, as nodes on its
-   faces are their own now. */
+   block within reach of a ray whose data or classification changed, and those beside one that holds visibility no more, or at another
+   level, as nodes on its faces may be their own now. */
 static isogi_result isogi_dvr__update_blocks(isogi_dvr *d) {
     isogi_dvr__blocks *b = &d->blocks;
-    uint8_t *level = (uint8_t *)isogi_allocate(&d->context, 4 * b->total, 1), *lit, *changed, *gone;
+    uint8_t *level = (uint8_t *)isogi_allocate(&d->context, 4 * b->total, 1), *lit, *changed, *relit;
     isogi_result result;
     isogi_context whole = d->context;
     size_t i;
     if (!level) return ISOGI_NO_MEMORY;
-    lit = level + b->total, changed = lit + b->total, gone = changed + b->total;
+    lit = level + b->total, changed = lit + b->total, relit = changed + b->total;
     whole.progress = NULL;
     result = isogi_dvr__select_levels(d, level);
     for (i = 0; result == ISOGI_OK && i < b->total; i++) {
         changed[i] = d->changed[i] || level[i] != b->level[i] || isogi_dvr__faces_change(b, i, level);
         lit[i] = level[i] ? isogi_dvr__any_near(b, i, 1, d->cut) ? 16 : level[i] : isogi_dvr__any_near(b, i, b->reach, level) ? 2 : 0;
-        gone[i] = b->lit[i] && !lit[i];
+        relit[i] = b->lit[i] && b->lit[i] != lit[i];
     }
     for (i = 0; result == ISOGI_OK && i < b->total; i++)
         b->stale[i] = b->stale[i] || lit[i] != b->lit[i] || isogi_dvr__any_near(b, i, b->reach > 1 ? b->reach : 1, changed) ||
-                      isogi_dvr__any_near(b, i, 1, gone);
+                      isogi_dvr__any_near(b, i, 1, relit);
     if (result == ISOGI_OK) result = isogi_dvr__lay_out(d, level, lit);
     isogi_release(&d->context, level, 4 * b->total, 1);
     for (b->packing = 1; result == ISOGI_OK && b->packing <= 16; b->packing *= 2) {

@@ -343,19 +343,39 @@ TEST(an_edit_of_the_transfer_function_recomputes_the_blocks_that_it_changes) {
     field_free(&f);
 }
 
+/* The largest differences between what two renderers of the paper's method, or (not blocks) of others, hold at places: of visibility, local
+   visibility and values. */
+static void differences(const isogi_dvr *a, const isogi_dvr *b, const float (*at)[3], size_t count, int blocks, double most[3]) {
+    enum { MOST = 500 };
+    static float v[2][MOST][4], local[2][MOST][4], value[2][MOST];
+    CHECK(count <= MOST, "%zu places", count);
+    for (int k = 0; k < 2; k++) {
+        isogi_dvr_sample_visibility(k ? b : a, at, count, v[k][0]);
+        if (blocks) isogi_dvr_sample_blocks(k ? b : a, at, count, value[k], local[k][0]);
+    }
+    most[0] = most[1] = most[2] = 0;
+    for (size_t i = 0; i < 4 * count; i++) {
+        most[0] = fmax(most[0], fabs((double)v[0][i / 4][i % 4] - (double)v[1][i / 4][i % 4]));
+        if (blocks) most[1] = fmax(most[1], fabs((double)local[0][i / 4][i % 4] - (double)local[1][i / 4][i % 4]));
+        if (blocks) most[2] = fmax(most[2], fabs((double)value[0][i / 4] - (double)value[1][i / 4]));
+    }
+}
+
 /* Blocks in a row: e is empty, c of one value and l of many, which absorb, m of one larger value and n of many, whose extinction an edit
-   takes away and gives back. What depends on it is seen as by a new renderer, however far it is. */
-typedef struct edited_row { const char *why, *blocks; double radius, reduction; } edited_row;
+   takes away and gives back; where cut is not 0, so does a plane with all below that x. What depends on it is seen as by a new renderer,
+   however far it is. */
+typedef struct edited_row { const char *why, *blocks; double radius, reduction, cut; } edited_row;
 static const edited_row edited_rows[] = {
-    {"a ray of 32 voxels sees two blocks", "llllln", 32, 1},
-    {"the budget goes to other blocks, and with it their levels", "clllnl", 16, 1600},
-    {"data on the face between two blocks are those of the coarser one", "clleen", 16, 1000},
-    {"data on the face between two blocks are those of the coarser one", "cllllm", 16, 846},
-    {"nodes between two empty blocks are those of the one that sees matter", "ceemee", 16, 1000}};
+    {"a ray of 32 voxels sees two blocks", "llllln", 32, 1, 0},
+    {"the budget goes to other blocks, and with it their levels", "clllnl", 16, 1600, 0},
+    {"data on the face between two blocks are those of the coarser one", "clleen", 16, 1000, 0},
+    {"data on the face between two blocks are those of the coarser one", "cllllm", 16, 846, 0},
+    {"nodes between two empty blocks are those of the one that sees matter", "ceemee", 16, 1000, 0},
+    {"nodes between two blocks are those of the coarser one, which a plane close by makes finer", "llllll", 6, 30, 24}};
 
 TEST(an_edit_is_seen_as_far_as_anything_depends_on_it) {
     enum { X = 97, Y = 17, PLACES = 500 };
-    static float at[PLACES][3], v[2][PLACES][4], local[2][PLACES][4], value[2][PLACES];
+    static float at[PLACES][3];
     for (size_t n = 0; n < sizeof edited_rows / sizeof *edited_rows; n++) {
         const edited_row *row = &edited_rows[n];
         const isogi_dvr_desc desc = {.pyramid = NULL, .shading = ISOGI_DVR_VISIBILITY, .method = ISOGI_DVR_PAPER, .order = 2,
@@ -379,22 +399,17 @@ TEST(an_edit_is_seen_as_far_as_anything_depends_on_it) {
             for (int a = 0; a < 3; a++) at[i][a] = a ? (float)random_range(&r, 0, Y - 1) : (float)(X - 1) * (float)i / (PLACES - 1);
         isogi_dvr *dvr = dvr_new(&with, &transfer);
         for (int edit = 0; edit < 3; edit++) {
-            double most[3] = {0, 0, 0};
+            const double plane[1][4] = {{1, 0, 0, -row->cut}};
+            const size_t planes = edit % 2 && row->cut > 0;
+            double most[3];
             p[6].extinction = edit % 2 ? 0 : 0.1f, p[7].extinction = edit % 2 ? 0 : 0.4f;
             isogi_dvr *fresh = dvr_new(&with, &transfer);
-            CHECK(isogi_dvr_set_transfer(dvr, &transfer) == ISOGI_OK && isogi_dvr_step(dvr, 0, NULL) == ISOGI_OK &&
+            CHECK(isogi_dvr_set_transfer(dvr, &transfer) == ISOGI_OK && isogi_dvr_set_clip(dvr, plane, planes) == ISOGI_OK &&
+                      isogi_dvr_set_clip(fresh, plane, planes) == ISOGI_OK && isogi_dvr_step(dvr, 0, NULL) == ISOGI_OK &&
                       isogi_dvr_step(fresh, 0, NULL) == ISOGI_OK,
                   "step");
-            for (int k = 0; k < 2; k++) {
-                isogi_dvr_sample_visibility(k ? fresh : dvr, (const float(*)[3])at, PLACES, v[k][0]);
-                isogi_dvr_sample_blocks(k ? fresh : dvr, (const float(*)[3])at, PLACES, value[k], local[k][0]);
-            }
+            differences(dvr, fresh, (const float(*)[3])at, PLACES, 1, most);
             isogi_dvr_free(fresh);
-            for (int i = 0; i < 4 * PLACES; i++) {
-                most[0] = fmax(most[0], fabs((double)v[0][i / 4][i % 4] - (double)v[1][i / 4][i % 4]));
-                most[1] = fmax(most[1], fabs((double)local[0][i / 4][i % 4] - (double)local[1][i / 4][i % 4]));
-                most[2] = fmax(most[2], fabs((double)value[0][i / 4] - (double)value[1][i / 4]));
-            }
             CHECK(!(most[0] > 0) && !(most[1] > 0) && !(most[2] > 0), "%s (%s), edit %d: visibility off by %g, local by %g, values by %g",
                   row->why, row->blocks, edit, most[0], most[1], most[2]);
         }
@@ -411,7 +426,7 @@ TEST(edits_in_any_order_end_like_a_new_renderer) {
     static const struct { int method, coarsest; double radius, reduction; } kind[] = {
         {ISOGI_DVR_PAPER, 0, 6, 3}, {ISOGI_DVR_PAPER, 0, 16, 30}, {ISOGI_DVR_PAPER, 0, 24, 8}, {ISOGI_DVR_PAPER, 0, 32, 60},
         {ISOGI_DVR_PAPER, 0, 16, 8}, {ISOGI_DVR_SWEEP, 0, 0, 0}, {ISOGI_DVR_SWEEP, 8, 0, 0}, {ISOGI_DVR_BRUTE, 0, 0, 0}};
-    static float at[PLACES][3], v[2][PLACES][4], local[2][PLACES][4], value[2][PLACES];
+    static float at[PLACES][3];
     field f = field_new(X, Y, Y);
     test_random r = {31};
     int partial = 0;
@@ -430,7 +445,7 @@ TEST(edits_in_any_order_end_like_a_new_renderer) {
         for (int edit = 0; edit < (LONG_SUITE ? 60 : 2); edit++) {
             const double plane[1][4] = {{random_range(&r, -1, 1), random_range(&r, -0.5, 0.5), random_range(&r, -0.5, 0.5), 60}};
             isogi_transfer_point *q = &p[1 + random_bits(&r) % (POINTS - 2)];
-            double most[3] = {0, 0, 0};
+            double most[3];
             q->extinction = random_unit(&r) < 0.4 ? 0 : (float)random_range(&r, 0.005, 0.2), q->rgb[0] = (float)random_unit(&r);
             CHECK(isogi_dvr_set_transfer(dvr, &transfer) == ISOGI_OK, "edit");
             size_t cut = random_unit(&r) < 0.3;
@@ -446,16 +461,7 @@ TEST(edits_in_any_order_end_like_a_new_renderer) {
             CHECK(isogi_dvr_set_clip(fresh, plane, cut) == ISOGI_OK && isogi_dvr_step(fresh, 0, NULL) == ISOGI_OK, "step");
             for (int i = 0; i < PLACES; i++)
                 for (int a = 0; a < 3; a++) at[i][a] = (float)random_range(&r, 0, (a ? Y : X) - 1);
-            for (int k = 0; k < 2; k++) {
-                isogi_dvr_sample_visibility(k ? fresh : dvr, (const float(*)[3])at, PLACES, v[k][0]);
-                if (kind[n].method == ISOGI_DVR_PAPER)
-                    isogi_dvr_sample_blocks(k ? fresh : dvr, (const float(*)[3])at, PLACES, value[k], local[k][0]);
-            }
-            for (int i = 0; i < 4 * PLACES; i++) {
-                most[0] = fmax(most[0], fabs((double)v[0][i / 4][i % 4] - (double)v[1][i / 4][i % 4]));
-                most[1] = fmax(most[1], fabs((double)local[0][i / 4][i % 4] - (double)local[1][i / 4][i % 4]));
-                most[2] = fmax(most[2], fabs((double)value[0][i / 4] - (double)value[1][i / 4]));
-            }
+            differences(dvr, fresh, (const float(*)[3])at, PLACES, kind[n].method == ISOGI_DVR_PAPER, most);
             /* the function's ends stay as they are, and so do the classes of values: then bits are the same */
             CHECK(!(most[0] > 0) && !(most[1] > 0) && !(most[2] > 0), "kind %d, edit %d: visibility off by %g, local by %g, values by %g",
                   n, edit, most[0], most[1], most[2]);
