@@ -1,9 +1,15 @@
-/* Tests of isogi_sh.h. The reference is tests/reference_sh.h: 128 bits, from the definition. This program looks inside isogi_sh.h only
-   to choose the instructions. */
-#ifdef ISOGI_SH_LEVEL /* the most that this build may use */
+/* Tests of isogi_sh.h. The reference is tests/reference_sh.h: 128 bits, from the definition. Where this program holds isogi_sh.h itself, as
+   in the long suite, it chooses the instructions, and goes through every level; `make test` links it with what is compiled already. */
+#ifdef ISOGI_SH_IMPLEMENTED /* by the best instructions of the processor: there are no others */
+#undef ISOGI_SH_LEVEL
+#define LINKED 1
+enum { BEST_LEVEL = 0 };
+#elif defined ISOGI_SH_LEVEL /* the most that this build may use */
+#define LINKED 0
 enum { BEST_LEVEL = ISOGI_SH_LEVEL };
 #undef ISOGI_SH_LEVEL
 #else
+#define LINKED 0
 enum { BEST_LEVEL = 99 };
 #endif
 static int instruction_level = BEST_LEVEL; /* a test may hold the header to less than the processor has */
@@ -1532,7 +1538,7 @@ TEST(zonal_functions_are_exact) {
         instruction_level = BEST_LEVEL;
         printf("    order %d: %.3g, %.3g, %.3g at levels 0, 1, 2\n", n, worst[0], worst[1], worst[2]);
         for (int k = 0; k < level; k++)
-            CHECK(worst[k] <= (n == 5 && k > 0 ? 4.5e-7 : 6e-8) * ROUNDING_FACTOR, "order %d, level %d: %g", n, k, worst[k]);
+            CHECK(worst[k] <= (n == 5 && (k > 0 || LINKED) ? 4.5e-7 : 6e-8) * ROUNDING_FACTOR, "order %d, level %d: %g", n, k, worst[k]);
     }
 }
 
@@ -1949,6 +1955,7 @@ TEST(tables_are_as_generated) {
     fclose(header), fclose(made);
 }
 
+#if !LINKED
 /* Rotations at every level against plain C: to 1e-14 in double (the numbers are below 1 and sums of at most 31 of them) and to a float
    ulp of the largest in float, for orders on both sides of the tables' end, one or three channels, in place or not. Nothing past the
    end is written. */
@@ -2085,6 +2092,7 @@ TEST(instruction_levels_agree) {
     CHECK(worst_product < 2e-6, "products differ by %g", worst_product);
     CHECK(worst_image < 1e-6, "images differ by %g", worst_image);
 }
+#endif
 
 /* ---- what is not valid ---- */
 
@@ -2111,6 +2119,7 @@ static void no_rotation(const float m[9]) {
     instruction_level = BEST_LEVEL;
 }
 
+#if !LINKED
 /* Images whose rows are folded, against plain C, to a float's rounding: one to five channels, widths that fill blocks of columns and that
    do not, few rows and odd numbers of them, orders on both sides of groups and of the last that goes this way. The same for cubes,
    whose texels are taken sixteen at a time. */
@@ -2154,6 +2163,7 @@ TEST(images_agree_at_every_level) {
     printf("    images differ by %.3g of the largest coefficient\n", worst);
     CHECK(worst <= 6e-8 * ROUNDING_FACTOR, "images differ by %g", worst);
 }
+#endif
 
 TEST(bad_input_is_reported_and_changes_nothing) {
     float y[27] = {0}, before[27], d[1][3] = {{0, 0, 1}}, m[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1}, image[3 * 8] = {0};

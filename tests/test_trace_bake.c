@@ -400,7 +400,7 @@ TEST(probes_do_not_breed) {
 
 /* The light of bright spots in an image is averaged over neighbours as that of the other sky is: on the sides of a pit, with 4 samples,
    half of the error that paths of 4 samples have, of four runs. */
-TEST(bright_spots_of_the_sky_are_filtered) {
+SLOW_TEST(bright_spots_of_the_sky_are_filtered) {
     enum { WIDTH = 64, HEIGHT = 32, RUNS = 4 };
     static float image[HEIGHT][WIDTH][3], points[200][3], e[200][3], reference[200][3];
     double q[5] = {24, 22, 24, 26, 16}, rms[2] = {0, 0};
@@ -631,7 +631,7 @@ SLOW_TEST(transfer_is_filtered) {
 }
 
 /* So it is with one sample, of which no noise is known, and of any order: what an even sky brings to a pit. */
-TEST(few_samples_of_transfer_are_filtered) {
+SLOW_TEST(few_samples_of_transfer_are_filtered) {
     enum { POINTS = 200 };
     static float points[POINTS][3], e[POINTS][3], reference[POINTS][3];
     double q[5] = {24, 22, 24, 26, 16};
@@ -641,7 +641,7 @@ TEST(few_samples_of_transfer_are_filtered) {
     d.lazy = 1;
     bake_and_sample(&d, NULL, (const float(*)[3])points, n, reference);
     d.method = ISOGI_TRACE_FEEDBACK, d.mode = ISOGI_TRACE_TRANSFER, d.lazy = 0, d.isovalue_min = -0.01, d.isovalue_max = 0.01;
-    for (d.order = QUICK_SUITE ? 4 : 1; d.order <= 5; d.order += d.order)
+    for (d.order = 1; d.order <= 5; d.order += d.order)
         for (d.samples = 1; d.samples <= 4; d.samples *= 2) {
             double square[2] = {0, 0};
             for (d.unfiltered = 0; d.unfiltered < 2; d.unfiltered++) {
@@ -792,7 +792,7 @@ TEST(unfiltered_texels_stand_alone) {
 /* Light from probes is not exactly that at the hit: its bias against paths, measured where it matters most (a gyroid's narrow
    channels, albedo 0.8), of three runs, which differ by 0.8 %, printed, and bounded. Long: 1364 samples, noise 0.2 %; quick: 84 samples at
    60 points, noise 1 % of the mean and 5 % at a point. */
-TEST(bias_against_paths_is_small) {
+SLOW_TEST(bias_against_paths_is_small) {
     double q[1] = {0.3};
     scene s = scene_make(48, 48, 48, NULL, gyroid, q);
     static float points[200][3], e[2][200][3];
@@ -875,13 +875,13 @@ TEST(transfer_of_any_order_and_colour_is_lit_as_by_paths) {
 /* Voxels that are flat, long or both. Cells of probes that were cubes of the smallest spacing would number up to its ratio squared; they
    are half a voxel wide at least, so at most some 8 times as many. Light stays that of paths: noise 0.5 % in the mean over seeds, bias of
    probes as above. */
-TEST(flat_and_long_voxels_need_few_probes) {
+SLOW_TEST(flat_and_long_voxels_need_few_probes) {
     enum { SEEDS = 4 };
     static const double spacings[6][3] = {{1, 1, 1}, {1, 1, 100}, {1, 1, 1000}, {1, 1, 0.01}, {0.1, 1, 10}, {1e-9, 1, 1e9}};
     double q[1] = {0.5};
     scene s = scene_make(24, 24, 24, NULL, gyroid, q);
     uint64_t cubes = 0;
-    for (int k = 0; k < 6; k += 1 + QUICK_SUITE) {
+    for (int k = 0; k < 6; k++) {
         static float points[200][3], e[2][200][3];
         double mean[2] = {0, 0}, remaining = 1;
         isogi_trace_report report = {0};
