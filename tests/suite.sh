@@ -91,7 +91,7 @@ matrix() {
             compile "$cc-$std-all" $cc "$(c_flags $std) -fsyntax-only -DISOGI_IMPLEMENTATION" all.c
             compile "$cc-$std-late" $cc "$(c_flags $std) -fsyntax-only" late.c
         done
-        for option in -O3 $([ $cc = clang ] || echo -O0 -Os -Ofast); do
+        for option in $([ $cc = clang ] || echo -O0 -Os -Ofast); do # clang warns of the same at any level
             compile "$cc-c99-all$option" $cc "$(c_flags c99) $option -DISOGI_IMPLEMENTATION" all.c
         done
         for option in -DISOGI_NO_SIMD -march=x86-64-v3; do
