@@ -1464,6 +1464,7 @@ static int isogi_trace__off_surface(const isogi_trace__scene *scene, const isogi
         speed += n[a] * n[a];
     }
     speed = sqrt(speed);
+    for (a = 0; a < 3; a++) n[a] = fabs(n[a]) > 1e-6 * speed ? n[a] : 0; /* what rounding of turned axes adds decides nothing on caps */
     for (attempt = 0; attempt < 3 && offset > 0 && speed > 0; attempt++, offset *= 2) {
         isogi_hit place;
         if (attempt && offset > 1) break;
@@ -2478,8 +2479,8 @@ static int isogi_trace__in_range(const isogi_trace *t, const size_t low[3], cons
         double end = (double)(v->size[a] - 1);
         first[a] = (size_t)isogi_trace__clamp(floor(t->first[a] + ((double)low[a] - reach) * t->step[a]), end);
         last[a] = (size_t)isogi_trace__clamp(ceil(t->first[a] + ((double)high[a] + reach) * t->step[a]), end);
-        if ((double)low[a] < reach) first[a] = 0;
-        if ((double)high[a] + reach >= (double)t->lattice[a]) last[a] = v->size[a] - 1;
+        if ((double)low[a] < reach || !(t->step[a] > 0)) first[a] = 0;
+        if ((double)high[a] + reach >= (double)t->lattice[a] || !(t->step[a] > 0)) last[a] = v->size[a] - 1;
         cut |= d->capped && (first[a] == 0 || last[a] == v->size[a] - 1);
         voxels *= last[a] - first[a] + 1;
     }
@@ -7398,7 +7399,7 @@ typedef struct isogi_trace__points {
 static void isogi_trace__snap_to_border(const isogi_trace__scene *scene, const double world[3], double grid[3]) {
     int a, c;
     for (a = 0; a < 3; a++) {
-        double last = (double)(scene->volume->size[a] - 1), slack = 0;
+        double last = (double)(scene->volume->size[a] - 1), slack = 1e-9; /* of what is worked out in double */
         for (c = 0; c < 3; c++) slack += 0.51 * (double)FLT_EPSILON * fabs(scene->to_grid[3 * a + c] * world[c]);
         if (fabs(grid[a] - last) <= slack) grid[a] = last;
         if (fabs(grid[a]) <= slack) grid[a] = 0;

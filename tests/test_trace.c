@@ -1010,6 +1010,22 @@ static double block_falling_at_one_side(const double p[3], const double *unused)
     return p[0] < 4 ? 100 - 20 * (4 - p[0]) : 100;
 }
 
+/* However many texels lie in one place along an axis, and whatever isovalues are asked for: what is beyond that place reads them. */
+TEST(texels_at_one_place_are_read_from_afar) {
+    const float point[1][3] = {{4, 4.5f, 4}};
+    double q[1] = {4.5};
+    scene s = scene_make(9, 9, 9, NULL, ground, q);
+    for (int k = 0; k < 20; k++) {
+        isogi_trace_desc d = desc_make(&s, 0, 0, 4);
+        float e[1][3];
+        d.lattice[1] = 1 + (size_t)k / 2, d.lattice_min[1] = d.lattice_max[1] = 1, d.lattice_max[0] = d.lattice_max[2] = 8;
+        d.isovalue_min = -0.1, d.isovalue_max = 0.1, d.lazy = k % 2;
+        bake_and_sample(&d, NULL, point, 1, e);
+        CHECK(fabs((double)e[0][1] - PI) < 1e-3, "%zu texels, %s: E %g", d.lattice[1], d.lazy ? "lazily" : "all", (double)e[0][1]);
+    }
+    scene_free(&s);
+}
+
 TEST(capped_border_is_lit_within_an_isovalue_range) {
     scene s = scene_make(16, 14, 14, NULL, block_falling_at_one_side, NULL);
     isogi_trace_desc d = desc_make(&s, 0.5f, 0, 16);
@@ -1460,6 +1476,68 @@ TEST(points_on_caps_look_out_of_the_box) {
         for (int i = 0; i < 32; i++)
             CHECK(fabs((double)e[i][0] - 1) < 1e-3, "spacing %g, point %d, hit %d: %g", edge, i, hit[i].side, (double)e[i][0]);
         isogi_vol_free(pyramid);
+    }
+}
+
+/* What comes out of matter meets the cap at a place that is there but for a rounding in double, also where the border lies at 0, and no
+   float is as near. The lamp stands above, in the cap's plane: its light falls on the ground alone. */
+TEST(points_where_rays_come_out_of_caps_are_on_them) {
+    enum { RAYS = 200 };
+    static float data[9 * 9 * 9], point[RAYS][3], e[RAYS][3];
+    const isogi_light lamp = {.vector = {0, 0, 1}, .rgb = {10, 10, 10}};
+    test_random r = {5};
+    int beside = 0, met = 0;
+    for (int i = 0; i < 9 * 9 * 9; i++) data[i] = 4.5f - (float)(i / 81) + 0.1f * (float)(i % 9);
+    for (int k = 0; k < 6; k++) {
+        const double edge = 0.31 + 0.1 * k;
+        const isogi_volume v = {.data = data, .type = ISOGI_F32, .size = {9, 9, 9}, .spacing = {edge, edge, edge}};
+        isogi_trace_desc d = {.samples = 4, .capped = 1,
+                              .lighting = {.env = {.sh = white_sky, .sh_order = 1}, .lights = &lamp, .light_count = 1}};
+        isogi_pyramid *pyramid = NULL;
+        int n = 0;
+        CHECK(isogi_vol_build(&pyramid, &v, NULL) == ISOGI_OK, "build");
+        d.pyramid = pyramid;
+        while (n < RAYS) {
+            isogi_ray ray = {.flags = ISOGI_RAY_CAPPED};
+            isogi_hit hit;
+            for (int a = 0; a < 3; a++) {
+                ray.origin[a] = edge * random_range(&r, 2, a == 2 ? 4 : 6);
+                ray.dir[a] = (float)random_range(&r, a == 1 ? -1.2 : -0.2, a == 1 ? -0.6 : 0.2);
+            }
+            isogi_vol_intersect(pyramid, &ray, 1, &hit, NULL);
+            if (hit.side == -2) isogi_vol_positions(pyramid, &hit, 1, &point[n]), beside += fabsf(point[n++][1]) > 0;
+        }
+        CHECK(isogi_trace_gather(&d, (const float(*)[3])point, NULL, RAYS, e, NULL, NULL) == ISOGI_OK, "gather");
+        for (int i = 0; i < RAYS; i++) {
+            if (point[i][1] > 1e-6f) continue; /* of another face */
+            met++;
+            CHECK(fabs((double)e[i][0] - PI) < 1e-3, "spacing %g, at %g %g %g: %g", edge, (double)point[i][0], (double)point[i][1],
+                  (double)point[i][2], (double)e[i][0]);
+        }
+        isogi_vol_free(pyramid);
+    }
+    CHECK(met > 3 * RAYS && beside > 50, "%d points, of which %d lie beside the cap", met, beside);
+}
+
+/* Where the field is the same all along the cap's normal, the rounding of turned axes must not say whether there is matter behind. */
+TEST(caps_of_turned_volumes_have_a_high_side) {
+    static float data[9 * 9 * 9];
+    for (int i = 0; i < 9 * 9 * 9; i++) data[i] = 4.5f - (float)(i / 9 % 9) + 0.1f * (float)(i % 9);
+    for (int k = 0; k < 12; k++) {
+        const double angle = 0.2 * k;
+        isogi_volume v = {.data = data, .type = ISOGI_F32, .size = {9, 9, 9}};
+        isogi_trace_desc d = {.sides = ISOGI_TRACE_HIGH_SIDE, .capped = 1, .samples = 4, .reach = 2,
+                              .lighting = {.env = {.sh = white_sky, .sh_order = 1}}};
+        isogi_pyramid *pyramid = NULL;
+        isogi_trace *t = NULL;
+        int valid = 0;
+        v.axes[0] = v.axes[8] = cos(angle), v.axes[2] = sin(angle), v.axes[6] = -sin(angle), v.axes[4] = 1;
+        CHECK(isogi_vol_build(&pyramid, &v, NULL) == ISOGI_OK, "build");
+        d.pyramid = pyramid;
+        CHECK(isogi_trace_create(&t, &d, NULL) == ISOGI_OK && isogi_trace_step(t, 0, NULL) == ISOGI_OK, "bake");
+        for (size_t i = 0; i < 49; i++) valid += isogi_trace_valid(t, (const size_t[3]){1 + i % 7, 1 + i / 7, 8});
+        CHECK(valid == 49, "turned by %g: %d texels of 49", angle, valid);
+        isogi_trace_free(t), isogi_vol_free(pyramid);
     }
 }
 
