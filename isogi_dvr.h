@@ -421,7 +421,7 @@ ISOGI_API void isogi_dvr_free(isogi_dvr *dvr); /* NULL is fine */
    turn comes it keeps what it had. Blocks in which nothing changes are not read again: sweeps and the paper's method then agree with
    a renderer made for this function as if values of voxels had moved by up to a 2048th of the span of values that it tells apart (two
    classes of values), not to the bit; brute force does to the bit. Where nothing but colours changes, visibility stays as it is, at no
-   cost, and so do the levels of the paper's method, though they suit the colours for which they were chosen. */
+   cost but by brute force, and so do the levels of the paper's method, though they suit the colours for which they were chosen. */
 ISOGI_API isogi_result isogi_dvr_set_transfer(isogi_dvr *dvr, const isogi_transfer *transfer);
 
 /* Computes visibility within about max_rays rays (0 = to the end), at least one grid point (brute force), block or direction (the paper's
@@ -1500,10 +1500,13 @@ static int isogi_dvr__range_steady(const isogi_dvr__transfer *t, const float ran
             !(t->points[n].extinction < t->points[n - 1].extinction) && !(t->points[n].extinction > t->points[n - 1].extinction));
 }
 
+/* How far a place may lie beyond a plane and still be on it: rounding must not part the places of a layer. */
+static double isogi_dvr__slack(const double plane[4]) { return 1e-9 * (fabs(plane[0]) + fabs(plane[1]) + fabs(plane[2])); }
+
 static int isogi_dvr__kept(const isogi_dvr *d, const double grid[3]) {
     size_t i;
     for (i = 0; i < d->clip_count; i++)
-        if (!(isogi_dvr__dot(d->clip[i], grid) + d->clip[i][3] >= 0)) return 0;
+        if (!(isogi_dvr__dot(d->clip[i], grid) + d->clip[i][3] + isogi_dvr__slack(d->clip[i]) >= 0)) return 0;
     return 1;
 }
 
@@ -3746,15 +3749,15 @@ static void isogi_dvr__classify_row(const isogi_dvr *d, const float *row, size_t
     }
 }
 
-/* What a node's blocks ask for: 0 = keep what it has, 1 = nothing absorbs there any more, 2 = compute. One byte for each node of the
-   row (y, z): the most of the blocks that its box touches. Returns whether any is computed, and the span of those. */
+/* What a node's blocks ask for, those that its box touches: 0 = keep what it has, as none of them changed, 1 = none absorbs any more,
+   2 = compute. One byte for each node of the row (y, z). Returns whether any is computed, and the span of those. */
 static int isogi_dvr__row_state(const isogi_dvr *d, const size_t node[2], uint8_t *state, size_t span[2]) {
     const isogi_dvr__matter *m = &d->matter;
     const isogi_level *level = &d->level[1];
     size_t low[3], high[3], x, b[3];
     int a, any = 0;
     for (x = 0; x < m->size[0]; x++) {
-        state[x] = 0;
+        int changed = 0, absorbs = 0;
         for (a = x ? 0 : 2; a >= 0; a--) {
             double at = (double)(a ? node[a - 1] : x) * m->spacing[a], half = 0.5 * m->spacing[a], most = (double)level->size[a] - 1;
             low[a] = (size_t)isogi_dvr__clamp((at - half) / 16 - 1e-9, most), high[a] = (size_t)isogi_dvr__clamp((at + half) / 16, most);
@@ -3763,9 +3766,9 @@ static int isogi_dvr__row_state(const isogi_dvr *d, const size_t node[2], uint8_
             for (b[1] = low[1]; b[1] <= high[1]; b[1]++)
                 for (b[0] = low[0]; b[0] <= high[0]; b[0]++) {
                     size_t block = b[0] + level->size[0] * (b[1] + level->size[1] * b[2]);
-                    uint8_t s = (uint8_t)(d->changed[block] ? (d->empty[1][block] ? 1 : 2) : 0);
-                    if (s > state[x]) state[x] = s;
+                    changed |= d->changed[block], absorbs |= !d->empty[1][block];
                 }
+        state[x] = (uint8_t)(changed ? 1 + absorbs : 0);
         if (state[x] < 2) continue;
         if (!any) span[0] = x;
         span[1] = x, any = 1;
@@ -4174,8 +4177,8 @@ static int isogi_dvr__faces_change(const isogi_dvr__blocks *b, size_t block, con
 }
 
 /* New levels for a new classification, the data packed anew, and the list of blocks whose local visibility has to follow: those with a
-   block within reach of a ray whose data or classification changed, and those beside one that holds visibility no more, or at another
-   level, as nodes on its faces may be their own now. */
+   block within reach of a ray whose data or classification changed, or those of one beside it, as averages on faces are of both blocks;
+   and those beside one that holds visibility no more, or at another level, as nodes on its faces may be their own now. */
 static isogi_result isogi_dvr__update_blocks(isogi_dvr *d) {
     isogi_dvr__blocks *b = &d->blocks;
     uint8_t *level = (uint8_t *)isogi_allocate(&d->context, 4 * b->total, 1), *lit, *changed, *relit;
@@ -4187,7 +4190,8 @@ static isogi_result isogi_dvr__update_blocks(isogi_dvr *d) {
     whole.progress = NULL;
     result = isogi_dvr__select_levels(d, level);
     for (i = 0; result == ISOGI_OK && i < b->total; i++) {
-        changed[i] = d->changed[i] || level[i] != b->level[i] || isogi_dvr__faces_change(b, i, level);
+        changed[i] = (level[i] ? isogi_dvr__any_near(b, i, 1, d->changed) : d->changed[i]) || level[i] != b->level[i] ||
+                     isogi_dvr__faces_change(b, i, level);
         lit[i] = level[i] ? isogi_dvr__any_near(b, i, 1, d->cut) ? 16 : level[i] : isogi_dvr__any_near(b, i, b->reach, level) ? 2 : 0;
         relit[i] = b->lit[i] && b->lit[i] != lit[i];
     }
@@ -4342,8 +4346,7 @@ static void isogi_dvr__places_within(const isogi_dvr *d, const double from[3], d
     double low = 0, high = (double)count;
     size_t i;
     for (i = 0; i < d->clip_count; i++) {
-        const double *plane = d->clip[i], slack = 1e-9 * (fabs(plane[0]) + fabs(plane[1]) + fabs(plane[2]));
-        const double at = isogi_dvr__dot(plane, from) + plane[3] + slack;
+        const double *plane = d->clip[i], slack = isogi_dvr__slack(plane), at = isogi_dvr__dot(plane, from) + plane[3] + slack;
         if (fabs(plane[0]) > slack) {
             const double end = isogi_dvr__floor(at * each / fabs(plane[0])); /* the last place before it comes to the plane */
             if (plane[0] > 0) low = -end > low ? -end : low;
@@ -4458,8 +4461,9 @@ static void isogi_dvr__finish_task(void *arg, size_t block) {
     isogi_dvr__blocks *b = &d->blocks;
     size_t n = b->lit[block], node[3], side[3], c,
            at[3] = {block % b->count[0], block / b->count[0] % b->count[1], block / b->count[0] / b->count[1]};
-    uint16_t *out = b->sh + b->first[b->total + block] * d->coefficients;
+    uint16_t *out;
     if (n != job->packing) return;
+    out = b->sh + b->first[b->total + block] * d->coefficients;
     isogi_dvr__sides(b, block, n, side);
     for (node[2] = 0; node[2] <= side[2]; node[2]++)
         for (node[1] = 0; node[1] <= side[1]; node[1]++)
@@ -4582,7 +4586,8 @@ static void isogi_dvr__global_task(void *arg, size_t task) {
     for (y = 0; y < d->desc.grid[1]; y++) {
         double from[3];
         from[0] = first[0], from[1] = first[1] + (double)y * apart[1], from[2] = first[2] + (double)z * apart[2];
-        isogi_dvr__global_row(d, job->scratch + k * job->scratch_count, from, apart[0], d->desc.grid[0], d->direction[job->first + k],
+        isogi_dvr__global_row(d, job->scratch_count ? job->scratch + k * job->scratch_count : NULL, from, apart[0], d->desc.grid[0],
+                              d->direction[job->first + k],
                               job->transmittance + k * d->padded_count + d->desc.grid[0] * (y + d->desc.grid[1] * z));
     }
 }
@@ -5024,6 +5029,7 @@ static isogi_result isogi_dvr__step_paper(isogi_dvr *d, size_t end) {
         local.step = (isogi_dvr__local_step *)isogi_allocate(&d->context, local.step_count, sizeof *local.step);
         if (!local.window || !local.step) result = ISOGI_NO_MEMORY;
         else isogi_dvr__set_local_steps(d, local.step);
+        isogi_dvr__set_table(d, d->matter.table); /* an edit of colours alone may have moved the classes */
     }
     while (result == ISOGI_OK && d->next < end && d->next < b->due) {
         local.first = d->next, count = (end < b->due ? end : b->due) - d->next;
@@ -5033,10 +5039,9 @@ static isogi_result isogi_dvr__step_paper(isogi_dvr *d, size_t end) {
             isogi_dvr__add(&d->counters, &local.work[i]);
             b->stale[b->order[d->next++]] = 0, d->computed++;
         }
-        if (result == ISOGI_OK && d->next == b->due)
-            for (local.packing = 1; result == ISOGI_OK && local.packing <= 16; local.packing *= 2)
-                result = isogi_parallel(&whole, b->total, isogi_dvr__finish_task, &local, 0, 0);
     }
+    for (local.packing = 1; result == ISOGI_OK && d->next == b->due && local.packing <= 16; local.packing *= 2)
+        result = isogi_parallel(&whole, b->total, isogi_dvr__finish_task, &local, 0, 0);
     isogi_release(&d->context, local.window, batch * local.window_count, sizeof *local.window);
     isogi_release(&d->context, local.step, local.step_count, sizeof *local.step);
     isogi_release(&d->context, local.work, ISOGI_DVR__SLAB / ISOGI_DVR__CHUNK, sizeof *local.work);
@@ -5175,11 +5180,17 @@ ISOGI_API isogi_result isogi_dvr_set_clip(isogi_dvr *dvr, const double (*planes)
     if (count && !clip) return ISOGI_NO_MEMORY;
     isogi_vol_to_world(dvr->desc.pyramid, zero, origin);
     for (i = 0; i < count; i++) {
-        clip[i][3] = isogi_dvr__dot(planes[i], origin) + planes[i][3];
+        double plane[4], most = 0;
+        int power = 0; /* that brings the largest component of the normal, of any length, to a half up to 1 */
+        for (a = 0; a < 3; a++) most = fabs(planes[i][a]) > most ? fabs(planes[i][a]) : most;
+        frexp(most, &power);
+        for (a = 0; a < 4; a++) plane[a] = ldexp(planes[i][a], -power);
+        plane[3] = plane[3] < 1e300 ? plane[3] > -1e300 ? plane[3] : -1e300 : 1e300;
+        clip[i][3] = isogi_dvr__dot(plane, origin) + plane[3];
         for (a = 0; a < 3; a++) {
             unit[0] = a == 0, unit[1] = a == 1, unit[2] = a == 2;
             isogi_vol_to_world(dvr->desc.pyramid, unit, step);
-            clip[i][a] = isogi_dvr__dot(planes[i], step) - isogi_dvr__dot(planes[i], origin);
+            clip[i][a] = isogi_dvr__dot(plane, step) - isogi_dvr__dot(plane, origin);
         }
     }
     isogi_release(&dvr->context, dvr->clip, dvr->clip_count, sizeof *clip);

@@ -473,6 +473,196 @@ TEST(edits_in_any_order_end_like_a_new_renderer) {
     field_free(&f);
 }
 
+/* Steps a renderer to the end, and compares it with a new one at random places. */
+static void check_like_a_new_renderer(isogi_dvr *dvr, const isogi_dvr_desc *desc, const isogi_transfer *transfer, const field *f,
+                                      double allowed, const char *why) {
+    enum { PLACES = 300 };
+    static float at[PLACES][3];
+    test_random r = {17};
+    double most[3];
+    isogi_dvr *fresh = dvr_new(desc, transfer);
+    CHECK(isogi_dvr_step(dvr, 0, NULL) == ISOGI_OK && isogi_dvr_step(fresh, 0, NULL) == ISOGI_OK, "step");
+    for (int i = 0; i < PLACES; i++)
+        for (int a = 0; a < 3; a++) at[i][a] = (float)random_range(&r, 0, f->size[a] - 1);
+    differences(dvr, fresh, (const float(*)[3])at, PLACES, desc->method == ISOGI_DVR_PAPER, most);
+    CHECK(most[0] <= allowed && most[1] <= allowed && most[2] <= allowed, "%s: visibility off by %g, local by %g, values by %g", why,
+          most[0], most[1], most[2]);
+    isogi_dvr_free(fresh);
+}
+
+/* A field of 16 voxels' wide layers along x, its values those of `layer`, and up to `noise` more. */
+static field layers(const double *layer, const double *noise, int count) {
+    field f = field_new(16 * count + 1, 17, 17);
+    test_random r = {3};
+    for (size_t i = 0; i < field_count(&f); i++) {
+        const int x = (int)(i % (size_t)f.size[0]), k = x / 16 < count ? x / 16 : count - 1;
+        f.value[i] = layer[k] + noise[k] * random_unit(&r);
+    }
+    return f;
+}
+
+/* Sweeps: where a block empties, nodes on its faces keep what absorbs in the block beside it, which does not change. */
+TEST(what_absorbs_beside_a_block_that_empties_stays) {
+    const double layer[3] = {30, 10, 10}, none[3] = {0, 0, 0};
+    isogi_transfer_point p[] = {{0, {1, 1, 1}, 0.01f}, {5, {1, 1, 1}, 0},  {8, {1, 1, 1}, 0.1f},
+                                {18, {1, 1, 1}, 0.1f}, {19, {1, 1, 1}, 0}, {22, {1, 1, 1}, 0},
+                                {25, {1, 1, 1}, 0.3f}, {39, {1, 1, 1}, 0.3f}, {40, {1, 1, 1}, 0}};
+    const isogi_transfer transfer = {p, 9, NULL, 0};
+    field f = layers(layer, none, 3);
+    for (int i = 0; i < 17 * 17; i++) f.value[i * 49 + 16] = 20, f.value[i * 49 + 40] = i % 2 ? 40 : 0; /* layers part; a range for all */
+    field_build(&f);
+    const isogi_dvr_desc desc = {.pyramid = f.pyramid, .shading = ISOGI_DVR_VISIBILITY, .method = ISOGI_DVR_SWEEP, .order = 2,
+                                 .directions = 32, .grid = {13, 5, 5}};
+    isogi_dvr *dvr = dvr_new(&desc, &transfer);
+    CHECK(isogi_dvr_step(dvr, 0, NULL) == ISOGI_OK, "step");
+    p[2].extinction = p[3].extinction = 0;
+    CHECK(isogi_dvr_set_transfer(dvr, &transfer) == ISOGI_OK, "edit");
+    check_like_a_new_renderer(dvr, &desc, &transfer, &f, 1e-5, "the second and third block empty");
+    isogi_dvr_free(dvr), field_free(&f);
+}
+
+/* The paper's method: colours move the classes of values, and blocks that are still due must not take new ones for old. */
+TEST(colours_that_change_between_steps_change_no_visibility) {
+    const double layer[4] = {0, 0, 0, 0}, noise[4] = {100, 100, 100, 100};
+    isogi_transfer_point p[] = {{0, {1, 1, 1}, 0.01f}, {50, {1, 1, 1}, 0.01f}, {60, {1, 1, 1}, 0.2f}, {100, {1, 1, 1}, 0.2f}};
+    const isogi_transfer transfer = {p, 4, NULL, 0};
+    field f = layers(layer, noise, 4);
+    field_build(&f);
+    for (int blocks = 0; blocks < 4; blocks++) {
+        const isogi_dvr_desc desc = {.pyramid = f.pyramid, .shading = ISOGI_DVR_VISIBILITY, .method = ISOGI_DVR_PAPER, .order = 2,
+                                     .directions = 32, .grid = {9, 5, 5}, .reduction = 1};
+        double left = 0;
+        p[0].rgb[0] = p[3].rgb[0] = 1;
+        isogi_dvr *dvr = dvr_new(&desc, &transfer);
+        CHECK(isogi_dvr_step(dvr, 64 * 32 * (uint64_t)(4 + blocks), &left) == ISOGI_OK && left > 0, "step");
+        p[0].rgb[0] = p[3].rgb[0] = 0.5f;
+        CHECK(isogi_dvr_set_transfer(dvr, &transfer) == ISOGI_OK, "edit");
+        check_like_a_new_renderer(dvr, &desc, &transfer, &f, 1e-3, "other colours");
+        isogi_dvr_free(dvr);
+    }
+    field_free(&f);
+}
+
+/* The paper's method: data of a coarse block are averages, on its faces of the block beside it, too. What changes in that one alone changes
+   the extinction in both, and is seen by rays of the blocks on either side of them. */
+TEST(averages_on_faces_follow_both_blocks) {
+    const double layer[5] = {10, 10, 30, 30, 30}, none[5] = {0, 0, 0, 0, 0};
+    isogi_transfer_point p[] = {{0, {1, 0, 0}, 0.02f},     {6, {1, 0, 0}, 0.02f},  {8, {1, 1, 1}, 0.02f},
+                                {16.5, {1, 1, 1}, 0.02f},  {16.6, {1, 1, 1}, 0.02f}, {19, {1, 1, 1}, 0.02f},
+                                {19.2, {1, 1, 1}, 0.02f}, {30, {1, 1, 1}, 0.02f}, {31, {1, 1, 1}, 0}};
+    const isogi_transfer transfer = {p, 9, NULL, 0};
+    field f = layers(layer, none, 5);
+    for (int i = 0; i < 17 * 17; i++) {
+        f.value[i * 81 + 32] = 10;
+        for (int x = 1; x < 16; x += 3) f.value[i * 81 + x] = 5; /* a fine block, then a coarse one */
+    }
+    field_build(&f);
+    const isogi_dvr_desc desc = {.pyramid = f.pyramid, .shading = ISOGI_DVR_VISIBILITY, .method = ISOGI_DVR_PAPER, .order = 2,
+                                 .directions = 32, .grid = {21, 5, 5}, .reduction = 81 * 17 * 17 / 4200.0, .radius = 16};
+    isogi_dvr *dvr = dvr_new(&desc, &transfer);
+    CHECK(isogi_dvr_step(dvr, 0, NULL) == ISOGI_OK, "step");
+    p[4].extinction = p[5].extinction = 1; /* of values that occur nowhere, but between 10 and 30 */
+    CHECK(isogi_dvr_set_transfer(dvr, &transfer) == ISOGI_OK, "edit");
+    check_like_a_new_renderer(dvr, &desc, &transfer, &f, 0, "values between two layers");
+    isogi_dvr_free(dvr), field_free(&f);
+}
+
+/* The paper's method: blocks of one cluster are computed, then those that are due of another vanish; faces of the first are finished. */
+TEST(faces_are_finished_where_no_block_is_left) {
+    const double layer[9] = {10, 10, 20, 20, 20, 20, 20, 30, 30}, noise[9] = {3, 3, 0, 0, 0, 0, 0, 1, 1};
+    isogi_transfer_point p[] = {{0, {1, 1, 1}, 0.01f}, {9, {1, 1, 1}, 0},  {13, {1, 1, 1}, 0}, {18, {1, 1, 1}, 0},   {22, {1, 1, 1}, 0},
+                                {29, {1, 1, 1}, 0},    {32, {1, 1, 1}, 0}, {39, {1, 1, 1}, 0}, {40, {1, 1, 1}, 0.01f}};
+    const isogi_transfer transfer = {p, 9, NULL, 0};
+    field f = layers(layer, noise, 9);
+    field_build(&f);
+    const isogi_dvr_desc desc = {.pyramid = f.pyramid, .shading = ISOGI_DVR_VISIBILITY, .method = ISOGI_DVR_PAPER, .order = 2,
+                                 .directions = 32, .grid = {37, 5, 5}, .radius = 16};
+    for (int blocks = 1; blocks < 8; blocks++) {
+        p[1].extinction = p[2].extinction = 0.02f, p[5].extinction = p[6].extinction = 0.05f;
+        isogi_dvr *dvr = dvr_new(&desc, &transfer);
+        CHECK(isogi_dvr_step(dvr, 0, NULL) == ISOGI_OK, "step");
+        p[1].extinction = p[2].extinction = p[5].extinction = p[6].extinction = 0.2f;
+        CHECK(isogi_dvr_set_transfer(dvr, &transfer) == ISOGI_OK && isogi_dvr_step(dvr, 64 * 32 * 9, NULL) == ISOGI_OK && /* histograms */
+                  isogi_dvr_step(dvr, 64 * 32 * (uint64_t)blocks, NULL) == ISOGI_OK,
+              "edit");
+        p[5].extinction = p[6].extinction = 0;
+        CHECK(isogi_dvr_set_transfer(dvr, &transfer) == ISOGI_OK, "second edit");
+        check_like_a_new_renderer(dvr, &desc, &transfer, &f, 0, "a cluster vanishes");
+        isogi_dvr_free(dvr);
+    }
+    field_free(&f);
+}
+
+/* A plane is the same one, however long its normal is. */
+TEST(planes_of_any_length_cut_alike) {
+    static const int power[] = {0, -1040, -1000, -300, 300, 1018};
+    const isogi_transfer_point p[] = {{-1, {1, 0, 0}, 0.02f}, {0, {0, 1, 0}, 0.1f}, {1, {0, 1, 1}, 0.02f}};
+    const isogi_transfer transfer = {p, 3, NULL, 0};
+    const isogi_lighting sky = {.env = {.sh = sky_one, .sh_order = 1}};
+    const isogi_view view = {.width = 16, .height = 16, .eye = {70, 50, 60}, .target = {16, 16, 16}};
+    const float place[1][3] = {{20, 16, 16}};
+    field f = field_waves(33, 5);
+    for (int method = ISOGI_DVR_BRUTE; method <= ISOGI_DVR_SWEEP; method++) {
+        const isogi_dvr_desc desc = {.pyramid = f.pyramid, .shading = ISOGI_DVR_VISIBILITY, .method = (isogi_dvr_method)method, .order = 2,
+                                     .directions = 16, .grid = {5, 5, 5}};
+        float(*first)[4] = NULL, v[2][4];
+        for (size_t k = 0; k < sizeof power / sizeof *power; k++) {
+            const double plane[1][4] = {{ldexp(1, power[k]), ldexp(0.5, power[k]), ldexp(-0.25, power[k]), ldexp(-18, power[k])}};
+            isogi_dvr *dvr = dvr_new(&desc, &transfer);
+            CHECK(isogi_dvr_set_clip(dvr, plane, 1) == ISOGI_OK && isogi_dvr_step(dvr, 0, NULL) == ISOGI_OK, "step");
+            float(*pixels)[4] = picture(dvr, &view, &sky, NULL, NULL);
+            isogi_dvr_sample_visibility(dvr, place, 1, v[k > 0]);
+            if (!k) first = pixels;
+            else
+                CHECK(!(largest_difference(first, pixels, 256) > 0) && !memcmp(v[0], v[1], sizeof v[0]), "%s, times 2^%d: off by %g",
+                      method_name[method], power[k], largest_difference(first, pixels, 256));
+            if (k) free(pixels);
+            isogi_dvr_free(dvr);
+        }
+        free(first);
+    }
+    field_free(&f);
+}
+
+/* Sweeps: planes along the faces of the box cut nothing off, whatever side of a face their rounding puts them on. */
+TEST(planes_along_the_faces_cut_nothing) {
+    static const double edges[] = {0.3, 0.7, 1.1, 0.05}, corners[] = {-1.7, 12.3, 100.1};
+    const isogi_transfer_point p[] = {{0, {1, 1, 1}, 0.3f}};
+    const isogi_transfer transfer = {p, 1, NULL, 0};
+    for (int k = 0; k < 12; k++) {
+        field f = field_new(17, 17, 17);
+        float place[25][3], v[2][25][4];
+        double plane[6][4] = {{0}}, most = 0;
+        for (int a = 0; a < 3; a++) f.volume.spacing[a] = edges[k % 4], f.volume.origin[a] = corners[k / 4];
+        for (size_t i = 0; i < field_count(&f); i++) f.value[i] = 1;
+        field_build(&f);
+        for (int i = 0; i < 2; i++) {
+            const double grid[3] = {16 * i, 16 * i, 16 * i};
+            double world[3];
+            isogi_vol_to_world(f.pyramid, grid, world);
+            for (int a = 0; a < 3; a++) plane[2 * a + i][a] = i ? -1 : 1, plane[2 * a + i][3] = i ? world[a] : -world[a];
+        }
+        for (int i = 0; i < 25; i++) {
+            const double grid[3] = {i % 5 * 4, i / 5 * 4, 8};
+            double world[3];
+            isogi_vol_to_world(f.pyramid, grid, world);
+            for (int a = 0; a < 3; a++) place[i][a] = (float)world[a];
+        }
+        const isogi_dvr_desc desc = {.pyramid = f.pyramid, .shading = ISOGI_DVR_VISIBILITY, .method = ISOGI_DVR_SWEEP,
+                                     .order = 2, .directions = 32, .grid = {5, 5, 5}};
+        for (int cut = 0; cut < 2; cut++) {
+            isogi_dvr *dvr = dvr_new(&desc, &transfer);
+            CHECK(isogi_dvr_set_clip(dvr, (const double(*)[4])plane, cut ? 6 : 0) == ISOGI_OK && isogi_dvr_step(dvr, 0, NULL) == ISOGI_OK,
+                  "step");
+            isogi_dvr_sample_visibility(dvr, (const float(*)[3])place, 25, v[cut][0]);
+            isogi_dvr_free(dvr);
+        }
+        for (int i = 0; i < 100; i++) most = fmax(most, fabs((double)v[0][i / 4][i % 4] - (double)v[1][i / 4][i % 4]));
+        CHECK(most < 1e-6, "spacing %g, origin %g: off by %g", edges[k % 4], corners[k / 4], most);
+        field_free(&f);
+    }
+}
+
 /* What is cut away costs no points: the others get its levels, and light comes in through the cut. */
 TEST(clip_planes_select_levels_anew_and_let_light_in) {
     field f = field_noise(65, 5); /* 4 x 4 x 4 blocks, none of them simple */
