@@ -109,8 +109,8 @@ static void check_program(const char *name, const char *text) {
         snprintf(command, sizeof command, "%s --version", compiler);
         if (cxx && !succeeds(command, output, sizeof output)) continue; /* a C++ compiler is not needed */
         snprintf(command, sizeof command,
-                 "{ %s %s %s %s -Wall -Wextra -Wpedantic -Werror %s -I. -c -o build/docs/%s.o %s && %s %s -o build/docs/%s build/docs/%s.o %s "
-                 "-lm -lpthread && %s build/docs/%s; } 2>&1",
+                 "{ %s %s %s %s -Wall -Wextra -Wpedantic -Werror %s -I. -c -o build/docs/%s.o %s && %s %s -o build/docs/%s build/docs/%s.o "
+                 "%s -lm -lpthread && %s build/docs/%s; } 2>&1",
                  compiler, cxx ? "-x c++ -std=c++11" : "-std=c99", variable("CFLAGS", ""), cxx ? "-O0" : "",
                  LONG_SUITE ? "" : "-DISOGI_SH_IMPLEMENTED -DISOGI_VOL_IMPLEMENTED -DISOGI_TRACE_IMPLEMENTED -DISOGI_DVR_IMPLEMENTED", name,
                  path, compiler, variable("CFLAGS", ""), name, name,

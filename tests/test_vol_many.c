@@ -211,7 +211,8 @@ static void escape_task(void *arg, size_t i) {
 static account crowd_run(void (*task)(void *, size_t), double quick, double rays, double rays_per_task) {
     const double wanted = LONG_SUITE ? number_from("ISOGI_TEST_RAYS", rays) : quick;
     const size_t tasks = (size_t)(wanted / rays_per_task) + 1;
-    crowd c = {(account *)calloc(tasks, sizeof(account)), tasks / 8 + 1, wall_seconds() + (LONG_SUITE ? number_from("ISOGI_TEST_SECONDS", 300) : 60)};
+    const double seconds = LONG_SUITE ? number_from("ISOGI_TEST_SECONDS", 300) : 60;
+    crowd c = {(account *)calloc(tasks, sizeof(account)), tasks / 8 + 1, wall_seconds() + seconds};
     const double begun = wall_seconds();
     account sum = {0};
     isogi_parallel(NULL, tasks, task, &c, 0, 1);
