@@ -172,7 +172,7 @@ only() { printf '%s\n' $units | grep -E "test_($1)\$"; }
 
 variants() {
     threaded='vol|mesh|trace_bake|dvr_visibility'
-    checked='sh|sh_limits|sample|vol|vol_api|vol_sides|vol_holes|vol_update|vol_field|mesh|trace|trace_bake|trace_light|trace_store|trace_inside|trace_change|dvr|dvr_data|dvr_inside|dvr_tets|dvr_transfer|dvr_visibility|dvr_bound|dvr_hard|dvr_closed|dvr_medium'
+    checked='sh|sh_limits|sample|vol|vol_api|vol_sides|vol_holes|vol_update|vol_field|mesh|trace|trace_bake|trace_light|trace_store|trace_inside|trace_change|dvr|dvr_data|dvr_inside|dvr_tets|dvr_transfer|dvr_visibility|dvr_bound|dvr_hard|dvr_closed|dvr_edits|dvr_medium'
     # Those that only start other programs have nothing to be built anew.
     units=
     for program; do
