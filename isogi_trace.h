@@ -348,7 +348,8 @@ ISOGI_API isogi_result isogi_trace_step(isogi_trace *trace, uint64_t max_rays, d
    Errors cover the true ones (twice the standard error in 95 % of points, with desc.error in 90 % or more, tests/test_trace_bake.c):
    they allow for what samples that agree may all have missed, and for probes 2 % of reflected light. That is too little where much of
    the light is reflected and comes from lights without size, whose shadows are hard: at albedo 0.8, in narrow tunnels, twice the error
-   told covers 60 to 90 % of points. Nor is the error of negative lights told in full. They know nothing of the lattice (on steep fields
+   told covers 60 to 90 % of points; and where desc.material changes the albedo within a few voxels: errors may be two and a half times
+   those told (chequers half a voxel wide, of .05 and .95). Nor is the error of negative lights told in full. They know nothing of the lattice (on steep fields
    that adds more than samples do; closer texels help), and of glows only what emission_points tell: where desc.material alone makes
    something glow, give the brightest of it there. */
 ISOGI_API isogi_result isogi_trace_sample(const isogi_trace *trace, const float (*points)[3], size_t count, float (*irradiance)[3],
@@ -574,6 +575,7 @@ ISOGI_API size_t isogi_trace_memory(const isogi_trace *trace); /* bytes that the
 #define ISOGI_TRACE__PLANE 1.0      /* voxels between the planes of a hit and its probe */
 #define ISOGI_TRACE__ALIKE 0.15     /* voxels between the isosurfaces of a hit and its probe, by the gradient there */
 #define ISOGI_TRACE__CLASS 1.2      /* the same for isovalues that are looked for together, by the range of values around */
+#define ISOGI_TRACE__CELL_PROBES 32 /* of a cell, after which none is added: four times as many where there are several colours */
 #define ISOGI_TRACE__COLOURS 0.05   /* of albedo, or share of the glow, by which isosurfaces of the same probe may differ */
 #define ISOGI_TRACE__NOISE 1.0      /* variances of the difference of two texels' light that the filter takes for noise, */
 #define ISOGI_TRACE__NOISE_FEW 8.0  /* and this many more over the number of samples, since those of few are uncertain: */
@@ -1055,7 +1057,7 @@ static double isogi_trace__sphere(const double to[3], double distance, double ra
     float axis[3];
     isogi_trace__basis basis;
     int a;
-    if (ratio < 1) opening = ratio * ratio / (1 + sqrt(1 - ratio * ratio));
+    if (ratio <= 1) opening = ratio * ratio / (1 + sqrt(1 - ratio * ratio)); /* touched, it lies on one side */
     for (a = 0; a < 3; a++) axis[a] = (float)(to[a] / distance);
     isogi_trace__basis_of(axis, &basis);
     isogi_trace__cone(&basis, opening, u, v, beam->dir);
@@ -3747,11 +3749,11 @@ typedef struct isogi_trace__piece {
     uint32_t span, offset, hits, first_hit, fresh;
 } isogi_trace__piece;
 
-/* How far a search for a hit's probe has come: probes of its cell that it has passed, and the one of them that lies in the hit's plane and
-   whose isovalue is nearest, number + 1, with the difference. */
+/* How far a search for a hit's probe has come: probes of its cell that it has passed, and of those in the hit's plane that have its
+   colours, then of all in the plane, the one whose isovalue is nearest, number + 1, with the difference. */
 typedef struct isogi_trace__quest {
-    double least;
-    uint32_t nearest;
+    double least[2];
+    uint32_t nearest[2];
     int tries;
 } isogi_trace__quest;
 
@@ -3761,8 +3763,9 @@ typedef struct isogi_trace__catch {
     double isovalue; /* of the ray */
     isogi_hit hit;
     float normal[3];
-    uint32_t probe; /* number + 1 of the probe of this hit; 0: none was there when the ray was traced, */
-    float alike;    /* and one that is made has this; */
+    float albedo[3]; /* where colours go by place */
+    uint32_t probe;  /* number + 1 of the probe of this hit; 0: none was there when the ray was traced, */
+    float alike;     /* and one that is made has this; */
     signed char from;
     isogi_trace__quest search; /* it passed those that there were */
 } isogi_trace__catch;
@@ -4148,22 +4151,38 @@ static int isogi_trace__same_place(const isogi_trace *t, const isogi_trace__catc
     return fabs(apart) < reach && isogi_trace__dot(c->normal, normal) > 0.5;
 }
 
-/* Whether two isosurfaces have nearly the same colours where c hit: if not, neither's light tells that of the other. */
-static int isogi_trace__same_colours(const isogi_trace *t, const isogi_trace__catch *c, double one, double two) {
-    const isogi_trace_desc *d = &t->scene.desc;
-    double point[3];
-    float albedo[2][3], glow[2][3];
+static int isogi_trace__coloured(const isogi_trace *t) {
+    return t->scene.desc.albedo_count || t->scene.desc.emission_count || t->scene.desc.material;
+}
+
+/* Whether two albedos are nearly the same: light goes as 1 / (1 - albedo) where walls are all that is seen. */
+static int isogi_trace__same_albedo(const float one[3], const float two[3]) {
     int a, same = 1;
-    if (isogi_trace__zero(one - two) || (!d->albedo_count && !d->emission_count && !d->material)) return 1;
-    isogi_trace__to_world(t->scene.pyramid, &c->hit, point);
-    isogi_trace_material(d, one, point, albedo[0], glow[0]);
-    isogi_trace_material(d, two, point, albedo[1], glow[1]);
     for (a = 0; a < 3; a++) {
-        double most = (double)(glow[0][a] > glow[1][a] ? glow[0][a] : glow[1][a]);
-        same = same && fabs((double)albedo[0][a] - (double)albedo[1][a]) <= ISOGI_TRACE__COLOURS;
-        same = same && fabs((double)glow[0][a] - (double)glow[1][a]) <= ISOGI_TRACE__COLOURS * most;
+        const double lost = 1 - (double)(one[a] > two[a] ? one[a] : two[a]);
+        same = same && fabs((double)one[a] - (double)two[a]) <= ISOGI_TRACE__COLOURS * (lost < 0.5 ? 2 * lost : 1);
     }
     return same;
+}
+
+/* Whether isosurfaces of isovalues one, and two, have nearly the same colours where c hit: if not, neither's light tells that of the other.
+   albedo: where a probe lies. */
+static int isogi_trace__same_colours(const isogi_trace *t, const isogi_trace__catch *c, double one, double two, const float albedo[3]) {
+    const isogi_trace_desc *d = &t->scene.desc;
+    double point[3];
+    float by_value[2][3], glow[2][3];
+    int a, same = 1;
+    if (!isogi_trace__coloured(t)) return 1;
+    if (d->material && !isogi_trace__same_albedo(c->albedo, albedo)) return 0;
+    if (isogi_trace__zero(one - two)) return 1;
+    isogi_trace__to_world(t->scene.pyramid, &c->hit, point);
+    isogi_trace_material(d, one, point, by_value[0], glow[0]);
+    isogi_trace_material(d, two, point, by_value[1], glow[1]);
+    for (a = 0; a < 3; a++) {
+        double most = (double)(glow[0][a] > glow[1][a] ? glow[0][a] : glow[1][a]);
+        same = same && fabs((double)glow[0][a] - (double)glow[1][a]) <= ISOGI_TRACE__COLOURS * most;
+    }
+    return same && isogi_trace__same_albedo(by_value[0], by_value[1]);
 }
 
 /* How much the trilinear field changes over a voxel along each grid axis: along one after the other, differences of what there is and means
@@ -4199,18 +4218,21 @@ static double isogi_trace__alike(const isogi_trace__scene *scene, const isogi_hi
     return ISOGI_TRACE__ALIKE * scene->least * (isogi_trace__magnitude(slope) / scene->range);
 }
 
-/* Passes the next probe of the cell: 1: the search ends, with `nearest`. Of more than 32 probes of a cell none is added: the one in the
-   hit's plane whose isovalue is nearest stands for it, or the last, whatever its place and colour: else colours that differ at every
-   point would need ever more probes, and time to search them. */
+/* Passes the next probe of the cell: 1: the search ends, with nearest[0]. Of more than so many probes of a cell none is added: the one in
+   the hit's plane whose isovalue is nearest stands for it, of its colours if there is one, or the last, whatever its place: else colours
+   that differ at every point would need ever more probes, and time to search them. */
 static int isogi_trace__search_on(const isogi_trace *t, const isogi_trace__catch *c, isogi_trace__quest *s, uint32_t number,
-                                  const isogi_hit *place, const float normal[3], double isovalue, float alike) {
+                                  const isogi_hit *place, const float normal[3], double isovalue, const float albedo[3], float alike) {
     double other = fabs(isovalue - c->isovalue) / t->scene.range;
-    if (other < s->least && isogi_trace__same_place(t, c, place, normal) && isogi_trace__same_colours(t, c, isovalue, c->isovalue)) {
-        s->nearest = number, s->least = other;
-        if (other < (double)alike || isogi_trace__zero(other)) return 1;
+    if ((other < s->least[0] || other < s->least[1]) && isogi_trace__same_place(t, c, place, normal)) {
+        if (other < s->least[1]) s->nearest[1] = number, s->least[1] = other;
+        if (other < s->least[0] && isogi_trace__same_colours(t, c, isovalue, c->isovalue, albedo)) {
+            s->nearest[0] = number, s->least[0] = other;
+            if (other < (double)alike || isogi_trace__zero(other)) return 1;
+        }
     }
-    if (s->tries++ < 32) return 0;
-    if (!s->nearest) s->nearest = number;
+    if (s->tries++ < (isogi_trace__coloured(t) ? 4 : 1) * ISOGI_TRACE__CELL_PROBES) return 0;
+    if (!s->nearest[0]) s->nearest[0] = s->nearest[1] ? s->nearest[1] : number;
     return 1;
 }
 
@@ -4218,13 +4240,13 @@ static int isogi_trace__search_on(const isogi_trace *t, const isogi_trace__catch
    found again. */
 static uint32_t isogi_trace__probe_find(const isogi_trace *t, isogi_trace__catch *c) {
     const isogi_trace__set *set = &t->feedback->probes;
-    isogi_trace__quest search = {HUGE_VAL, 0, 0};
+    isogi_trace__quest search = {{HUGE_VAL, HUGE_VAL}, {0, 0}, 0};
     uint32_t at = set->headed ? *isogi_trace__head(set, isogi_trace__tag(c->key)) : 0, found = 0;
     while (at && !found) {
         const isogi_trace__link *link = isogi_trace__link_at(set, at - 1);
         const isogi_trace__node *n = link->tag == isogi_trace__tag(c->key) ? isogi_trace__node_at(set, at - 1) : NULL;
-        if (n && n->cell == c->key && isogi_trace__search_on(t, c, &search, at, &n->place, n->normal, n->isovalue, n->alike))
-            found = search.nearest;
+        if (n && n->cell == c->key && isogi_trace__search_on(t, c, &search, at, &n->place, n->normal, n->isovalue, n->albedo, n->alike))
+            found = search.nearest[0];
         at = link->next;
     }
     c->search = search;
@@ -4261,8 +4283,8 @@ static size_t isogi_trace__probes_meet(const isogi_trace *t) {
             for (; *at && !c->probe; at = &f->next[*at - 1]) {
                 const isogi_trace__catch *o = &f->catches[f->makers[*at - 1]];
                 if (o->key != c->key) continue;
-                if (isogi_trace__search_on(t, c, &c->search, o->probe, &o->hit, o->normal, o->isovalue, o->alike))
-                    c->probe = c->search.nearest;
+                if (isogi_trace__search_on(t, c, &c->search, o->probe, &o->hit, o->normal, o->isovalue, o->albedo, o->alike))
+                    c->probe = c->search.nearest[0];
             }
             if (!c->probe) {
                 f->makers[made] = fresh[i], f->tags[made] = isogi_trace__tag(c->key), f->next[made] = 0, *at = (uint32_t)++made;
@@ -4391,15 +4413,15 @@ static void isogi_trace__cast_escape(isogi_trace__cast *c, int i) {
     isogi_trace__span_bring(t, span, rgb);
 }
 
-/* Light that the surface sends out itself where a ray hit. */
-static void isogi_trace__cast_glow(isogi_trace__cast *c, isogi_trace__span *span, const isogi_trace__catch *at) {
+/* Colours where a ray hit: the albedo, and the light that the surface sends out itself. */
+static void isogi_trace__cast_colours(isogi_trace__cast *c, isogi_trace__span *span, isogi_trace__catch *at) {
     const isogi_trace *t = c->trace;
     float emission[3];
     double point[3], rgb[3];
     int a;
-    if (t->scene.desc.mode == ISOGI_TRACE_TRANSFER) return;
     isogi_trace__to_world(t->scene.pyramid, &at->hit, point);
-    isogi_trace_material(&t->scene.desc, span->of->isovalue, point, NULL, emission);
+    isogi_trace_material(&t->scene.desc, span->of->isovalue, point, at->albedo, emission);
+    if (t->scene.desc.mode == ISOGI_TRACE_TRANSFER) return;
     for (a = 0; a < 3; a++) rgb[a] = (double)emission[a];
     isogi_trace__span_bring(t, span, rgb);
 }
@@ -4422,7 +4444,7 @@ static void isogi_trace__cast_hit(isogi_trace__cast *c, int i) {
         to->hit = site->place, to->from = site->from, length = 0;
         memcpy(to->normal, site->normal, sizeof to->normal);
     }
-    if (t->scene.desc.emission_count || t->scene.desc.material) isogi_trace__cast_glow(c, span, to);
+    if (t->scene.desc.emission_count || t->scene.desc.material) isogi_trace__cast_colours(c, span, to);
     if (!t->scene.desc.bounces) return;
     to->key = isogi_trace__probe_key(&t->scene, &to->hit, to->normal, length,
                                      span->of->brick ? t->scene.cells[0].size : ISOGI_TRACE__CELL_FAR, span->of->isovalue);
@@ -7754,6 +7776,7 @@ ISOGI_API isogi_result isogi_trace_gather_field(const isogi_trace_desc *desc, is
 #undef ISOGI_TRACE__WIDE
 #undef ISOGI_TRACE__AHEAD
 #undef ISOGI_TRACE__PLANE
+#undef ISOGI_TRACE__CELL_PROBES
 #undef ISOGI_TRACE__COLOURS
 #undef ISOGI_TRACE__ALIKE
 #undef ISOGI_TRACE__CLASS

@@ -752,6 +752,24 @@ SLOW_TEST(gloss_against_its_integral) {
           sqrt(error[1] / size), sqrt(unshadowed / size));
 }
 
+/* What touches a point from below the ground lies on one side of it, as if it were a little lower: it is no lamp that holds the point. */
+TEST(lamps_that_touch_a_point_stay_on_their_side) {
+    double q[1] = {6};
+    scene s = scene_make(33, 33, 33, NULL, ground, q);
+    const float point[1][3] = {{16, 6, 16}}, up[1][3] = {{0, 1, 0}};
+    for (int k = 0; k < 4; k++) {
+        const isogi_light lamp = light_make(ISOGI_LIGHT_SPHERE, 16, k % 2 ? 10 : 2, 16, 16, 4);
+        isogi_trace_desc d = desc_make(&s, 0, 0, 256);
+        float e[1][3];
+        d.lighting.env.sh = NULL, d.lighting.env.sh_order = 0, d.lighting.lights = &lamp, d.lighting.light_count = 1;
+        d.offset = k / 2 ? 0 : -1;
+        CHECK(isogi_trace_gather(&d, point, up, 1, e, NULL, NULL) == ISOGI_OK, "gather");
+        CHECK(fabs((double)e[0][0] - k % 2) < 0.02, "from %s, offset %g: E %g", k % 2 ? "above" : "below", (double)d.offset,
+              (double)e[0][0]);
+    }
+    scene_free(&s);
+}
+
 /* With a bright spot and a lamp hidden by a pit's walls, a truncated series would take more light away than all else brings there. What the
    rest of the lighting brings bounds that. */
 SLOW_TEST(hidden_bright_spots_take_no_other_light) {
