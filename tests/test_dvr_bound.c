@@ -268,4 +268,36 @@ TEST(bounds_out_of_range_are_refused) {
     field_free(&f);
 }
 
+static double height_in_voxels(double x, double y, double z) { return (void)x, (void)y, 24 * z; }
+
+/* A skin whose extinction rises from 0 within a cell, lit from where it is looked at: as samples of a hundredth of a voxel see it, however
+   small the bound, and with it the first part of each piece, is. */
+TEST(surfaces_are_as_bright_with_any_bound) {
+    static const double top[3] = {8, 32, 128}, bounds[5] = {0, 1, 0.1, 0.01, 0.001};
+    const isogi_light sun = {.vector = {0.3f, 0.2f, -1}, .rgb = {12.566f, 12.566f, 12.566f}};
+    const isogi_lighting lighting = {.lights = &sun, .light_count = 1};
+    const double eye[3] = {3, 5, -40}, target[3] = {12, 13, 20};
+    field f = field_of(height_in_voxels, 25);
+    for (int k = 0; k < 3; k++) {
+        const isogi_transfer_point p[] = {
+            {11.5, {1, 0, 0}, 0}, {12.5, {0, 1, 1}, (float)top[k]}, {30, {0, 1, 1}, (float)top[k]}};
+        const isogi_transfer transfer = {p, 3, NULL, 0};
+        pixel seen[5];
+        for (int way = 0; way < 5; way++) {
+            const isogi_dvr_desc desc = {.pyramid = f.pyramid, .shading = ISOGI_DVR_VISIBILITY, .opaque = 1, .order = 4, .directions = 256,
+                                         .grid = {7, 7, 7}, .bound = bounds[way], .step = way ? 0 : 0.01, .visibility_step = 0.5,
+                                         .classification = way ? ISOGI_DVR_EXACT : ISOGI_DVR_POST_CLASSIFIED};
+            isogi_dvr *dvr = dvr_new(&desc, &transfer);
+            CHECK(isogi_dvr_step(dvr, 0, NULL) == ISOGI_OK, "step");
+            seen[way] = cast(dvr, eye, target, &lighting);
+            isogi_dvr_free(dvr);
+            for (int a = 0; a < 4; a++)
+                CHECK(fabs((double)seen[way].c[a] - (double)seen[0].c[a]) < (way == 1 ? 0.06 : 0.03) * (double)seen[0].c[3],
+                      "extinction %g, bound %g, channel %d: %g, by samples %g", top[k], bounds[way], a, (double)seen[way].c[a],
+                      (double)seen[0].c[a]);
+        }
+    }
+    field_free(&f);
+}
+
 TEST_MAIN("dvr_bound")
