@@ -349,9 +349,9 @@ ISOGI_API isogi_result isogi_trace_step(isogi_trace *trace, uint64_t max_rays, d
    they allow for what samples that agree may all have missed, and for probes 2 % of reflected light. That is too little where much of
    the light is reflected and comes from lights without size, whose shadows are hard: at albedo 0.8, in narrow tunnels, twice the error
    told covers 60 to 90 % of points; and where desc.material changes the albedo within a few voxels: errors may be two and a half times
-   those told (chequers half a voxel wide, of .05 and .95). Nor is the error of negative lights told in full. They know nothing of the lattice (on steep fields
-   that adds more than samples do; closer texels help), and of glows only what emission_points tell: where desc.material alone makes
-   something glow, give the brightest of it there. */
+   those told (chequers half a voxel wide, of .05 and .95). Nor is the error of negative lights told in full. They know nothing of the
+   lattice (on steep fields that adds more than samples do; closer texels help), and of glows only what emission_points tell: where
+   desc.material alone makes something glow, give the brightest of it there. */
 ISOGI_API isogi_result isogi_trace_sample(const isogi_trace *trace, const float (*points)[3], size_t count, float (*irradiance)[3],
                                           float *error);
 /* A new lighting. TRANSFER: a distant one (environment and directional lights; point, sphere and rectangle lights are ISOGI_INVALID); no
