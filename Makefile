@@ -22,7 +22,7 @@ LIBS   := -lm -lpthread
 # bake_mpi is built where there is an MPI compiler, and by that.
 MPICC    := $(shell command -v mpicc 2>/dev/null)
 EXAMPLES := $(patsubst examples/%.c,build/%,$(filter-out $(if $(MPICC),,examples/bake_mpi.c),$(wildcard examples/*.c)))
-INSIDE   := $(patsubst %,build/tests/test_%,vol_update trace_inside dvr_inside)
+INSIDE   := $(patsubst tests/%.c,build/tests/%,$(shell grep -l 'isogi_[a-z]*__\|looks inside' tests/test_*.c))
 TESTS    := $(filter-out $(INSIDE),$(patsubst tests/%.c,build/tests/%,$(wildcard tests/test_*.c)))
 BENCHES  := $(patsubst tests/bench/%.c,build/bench/%,$(wildcard tests/bench/bench_$(or $(ONLY),*).c))
 

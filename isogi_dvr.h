@@ -1516,7 +1516,7 @@ static uint8_t isogi_dvr__cut(const isogi_dvr *d, size_t block) {
     size_t at[3] = {block % size[0], block / size[0] % size[1], block / size[0] / size[1]}, i;
     uint8_t cut = 0;
     for (i = 0; i < d->clip_count; i++) {
-        double low = d->clip[i][3], high = low;
+        double low = d->clip[i][3] + isogi_dvr__slack(d->clip[i]), high = low;
         int a;
         for (a = 0; a < 3; a++) {
             double from = 16 * (double)at[a] * d->clip[i][a], to = from + 16 * d->clip[i][a];
@@ -2952,7 +2952,7 @@ static int isogi_dvr__clipped(const isogi_dvr *d, const double origin[3], const 
     for (k = 0; k < d->clip_count; k++) {
         double rate = isogi_dvr__dot(d->clip[k], dir), at = isogi_dvr__dot(d->clip[k], origin) + d->clip[k][3];
         if (!(fabs(rate) > 1e-300)) {
-            if (at < 0) return 0;
+            if (at < -isogi_dvr__slack(d->clip[k])) return 0;
             continue;
         }
         at = -at / rate;
@@ -4177,27 +4177,27 @@ static int isogi_dvr__faces_change(const isogi_dvr__blocks *b, size_t block, con
 }
 
 /* New levels for a new classification, the data packed anew, and the list of blocks whose local visibility has to follow: those with a
-   block within reach of a ray whose data or classification changed, or those of one beside it, as averages on faces are of both blocks;
-   and those beside one that holds visibility no more, or at another level, as nodes on its faces may be their own now. */
+   block within reach of a ray whose data or classification changed, or those of one beside it: averages on faces are of both blocks, and a
+   plane makes both fine; and those beside one that holds no visibility any more, as nodes on its faces are their own now. */
 static isogi_result isogi_dvr__update_blocks(isogi_dvr *d) {
     isogi_dvr__blocks *b = &d->blocks;
-    uint8_t *level = (uint8_t *)isogi_allocate(&d->context, 4 * b->total, 1), *lit, *changed, *relit;
+    uint8_t *level = (uint8_t *)isogi_allocate(&d->context, 4 * b->total, 1), *lit, *changed, *gone;
     isogi_result result;
     isogi_context whole = d->context;
     size_t i;
     if (!level) return ISOGI_NO_MEMORY;
-    lit = level + b->total, changed = lit + b->total, relit = changed + b->total;
+    lit = level + b->total, changed = lit + b->total, gone = changed + b->total;
     whole.progress = NULL;
     result = isogi_dvr__select_levels(d, level);
     for (i = 0; result == ISOGI_OK && i < b->total; i++) {
         changed[i] = (level[i] ? isogi_dvr__any_near(b, i, 1, d->changed) : d->changed[i]) || level[i] != b->level[i] ||
                      isogi_dvr__faces_change(b, i, level);
         lit[i] = level[i] ? isogi_dvr__any_near(b, i, 1, d->cut) ? 16 : level[i] : isogi_dvr__any_near(b, i, b->reach, level) ? 2 : 0;
-        relit[i] = b->lit[i] && b->lit[i] != lit[i];
+        gone[i] = b->lit[i] && !lit[i];
     }
     for (i = 0; result == ISOGI_OK && i < b->total; i++)
         b->stale[i] = b->stale[i] || lit[i] != b->lit[i] || isogi_dvr__any_near(b, i, b->reach > 1 ? b->reach : 1, changed) ||
-                      isogi_dvr__any_near(b, i, 1, relit);
+                      isogi_dvr__any_near(b, i, 1, gone);
     if (result == ISOGI_OK) result = isogi_dvr__lay_out(d, level, lit);
     isogi_release(&d->context, level, 4 * b->total, 1);
     for (b->packing = 1; result == ISOGI_OK && b->packing <= 16; b->packing *= 2) {
@@ -5183,7 +5183,7 @@ ISOGI_API isogi_result isogi_dvr_set_clip(isogi_dvr *dvr, const double (*planes)
         double plane[4], most = 0;
         int power = 0; /* that brings the largest component of the normal, of any length, to a half up to 1 */
         for (a = 0; a < 3; a++) most = fabs(planes[i][a]) > most ? fabs(planes[i][a]) : most;
-        frexp(most, &power);
+        (void)frexp(most, &power);
         for (a = 0; a < 4; a++) plane[a] = ldexp(planes[i][a], -power);
         plane[3] = plane[3] < 1e300 ? plane[3] > -1e300 ? plane[3] : -1e300 : 1e300;
         clip[i][3] = isogi_dvr__dot(plane, origin) + plane[3];
@@ -5745,8 +5745,8 @@ static void isogi_dvr__bounded_part(isogi_dvr__pixel_ray *r, isogi_dvr__span *s,
     r->clear = clear;
 }
 
-/* Light of a piece whose parts are known: their number, and with it the extinction of the first, depends on the bound, but the mean of all
-   that absorbs, which says how far off light is looked up, does not. */
+/* Light of a piece whose parts are known: their number, and with it the extinction of the first, depends on the bound; the mean of all
+   that absorbs, which says how far off light is looked up, does not, unless `opaque` ends the ray within. */
 static void isogi_dvr__bounded_light(isogi_dvr__pixel_ray *r, isogi_dvr__span *s) {
     const double *dir = s->walk.m->dir, reach = isogi_dvr__reach_along(r->dvr, dir);
     double off = isogi_dvr__stand_off(reach, s->depth / (s->absorbing * s->piece.dt) * reach);

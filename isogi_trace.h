@@ -348,10 +348,11 @@ ISOGI_API isogi_result isogi_trace_step(isogi_trace *trace, uint64_t max_rays, d
    Errors cover the true ones (twice the standard error in 95 % of points, with desc.error in 90 % or more, tests/test_trace_bake.c):
    they allow for what samples that agree may all have missed, and for probes 2 % of reflected light. That is too little where much of
    the light is reflected and comes from lights without size, whose shadows are hard: at albedo 0.8, in narrow tunnels, twice the error
-   told covers 60 to 90 % of points; and where desc.material changes the albedo within a few voxels: errors may be two and a half times
-   those told (chequers half a voxel wide, of .05 and .95). Nor is the error of negative lights told in full. They know nothing of the
-   lattice (on steep fields that adds more than samples do; closer texels help), and of glows only what emission_points tell: where
-   desc.material alone makes something glow, give the brightest of it there. */
+   told covers 60 to 90 % of points; and where desc.material changes the albedo within a few voxels: a hit has the albedo of its probe's
+   place, and errors may be several times those told (chequers of .05 and .95, half a voxel wide: six times, 7 % of the light). Nor is
+   the error of negative lights told in full. They know nothing of the lattice (on steep fields that adds more than samples do; closer
+   texels help), and of glows only what emission_points tell: where desc.material alone makes something glow, give the brightest of it
+   there. */
 ISOGI_API isogi_result isogi_trace_sample(const isogi_trace *trace, const float (*points)[3], size_t count, float (*irradiance)[3],
                                           float *error);
 /* A new lighting. TRANSFER: a distant one (environment and directional lights; point, sphere and rectangle lights are ISOGI_INVALID); no
@@ -575,8 +576,8 @@ ISOGI_API size_t isogi_trace_memory(const isogi_trace *trace); /* bytes that the
 #define ISOGI_TRACE__PLANE 1.0      /* voxels between the planes of a hit and its probe */
 #define ISOGI_TRACE__ALIKE 0.15     /* voxels between the isosurfaces of a hit and its probe, by the gradient there */
 #define ISOGI_TRACE__CLASS 1.2      /* the same for isovalues that are looked for together, by the range of values around */
-#define ISOGI_TRACE__CELL_PROBES 32 /* of a cell, after which none is added: four times as many where there are several colours */
-#define ISOGI_TRACE__COLOURS 0.05   /* of albedo, or share of the glow, by which isosurfaces of the same probe may differ */
+#define ISOGI_TRACE__CELL_PROBES 32 /* of a cell that are passed before none is added: four times as many where there are colours */
+#define ISOGI_TRACE__COLOURS 0.05   /* of albedo, less above a half, or share of the glow, by which isosurfaces of a probe may differ */
 #define ISOGI_TRACE__NOISE 1.0      /* variances of the difference of two texels' light that the filter takes for noise, */
 #define ISOGI_TRACE__NOISE_FEW 8.0  /* and this many more over the number of samples, since those of few are uncertain: */
 #define ISOGI_TRACE__NOISE_KNOWN 3  /* with fewer than this nothing is known of it */
@@ -3763,9 +3764,8 @@ typedef struct isogi_trace__catch {
     double isovalue; /* of the ray */
     isogi_hit hit;
     float normal[3];
-    float albedo[3]; /* where colours go by place */
-    uint32_t probe;  /* number + 1 of the probe of this hit; 0: none was there when the ray was traced, */
-    float alike;     /* and one that is made has this; */
+    uint32_t probe; /* number + 1 of the probe of this hit; 0: none was there when the ray was traced, */
+    float alike;    /* and one that is made has this; */
     signed char from;
     isogi_trace__quest search; /* it passed those that there were */
 } isogi_trace__catch;
@@ -4151,38 +4151,26 @@ static int isogi_trace__same_place(const isogi_trace *t, const isogi_trace__catc
     return fabs(apart) < reach && isogi_trace__dot(c->normal, normal) > 0.5;
 }
 
-static int isogi_trace__coloured(const isogi_trace *t) {
-    return t->scene.desc.albedo_count || t->scene.desc.emission_count || t->scene.desc.material;
-}
+static int isogi_trace__coloured(const isogi_trace_desc *d) { return d->albedo_count || d->emission_count || d->material; }
 
-/* Whether two albedos are nearly the same: light goes as 1 / (1 - albedo) where walls are all that is seen. */
-static int isogi_trace__same_albedo(const float one[3], const float two[3]) {
-    int a, same = 1;
-    for (a = 0; a < 3; a++) {
-        const double lost = 1 - (double)(one[a] > two[a] ? one[a] : two[a]);
-        same = same && fabs((double)one[a] - (double)two[a]) <= ISOGI_TRACE__COLOURS * (lost < 0.5 ? 2 * lost : 1);
-    }
-    return same;
-}
-
-/* Whether isosurfaces of isovalues one, and two, have nearly the same colours where c hit: if not, neither's light tells that of the other.
-   albedo: where a probe lies. */
-static int isogi_trace__same_colours(const isogi_trace *t, const isogi_trace__catch *c, double one, double two, const float albedo[3]) {
+/* Whether an isosurface has nearly the same colours as that of c, where c hit: if not, neither's light tells that of the other. Where walls
+   are all that is seen light goes as 1 / (1 - albedo). */
+static int isogi_trace__same_colours(const isogi_trace *t, const isogi_trace__catch *c, double isovalue) {
     const isogi_trace_desc *d = &t->scene.desc;
     double point[3];
-    float by_value[2][3], glow[2][3];
+    float albedo[2][3], glow[2][3];
     int a, same = 1;
-    if (!isogi_trace__coloured(t)) return 1;
-    if (d->material && !isogi_trace__same_albedo(c->albedo, albedo)) return 0;
-    if (isogi_trace__zero(one - two)) return 1;
+    if (isogi_trace__zero(isovalue - c->isovalue) || !isogi_trace__coloured(d)) return 1;
     isogi_trace__to_world(t->scene.pyramid, &c->hit, point);
-    isogi_trace_material(d, one, point, by_value[0], glow[0]);
-    isogi_trace_material(d, two, point, by_value[1], glow[1]);
+    isogi_trace_material(d, isovalue, point, albedo[0], glow[0]);
+    isogi_trace_material(d, c->isovalue, point, albedo[1], glow[1]);
     for (a = 0; a < 3; a++) {
-        double most = (double)(glow[0][a] > glow[1][a] ? glow[0][a] : glow[1][a]);
+        const double most = (double)(glow[0][a] > glow[1][a] ? glow[0][a] : glow[1][a]);
+        const double lost = 1 - (double)(albedo[0][a] > albedo[1][a] ? albedo[0][a] : albedo[1][a]);
+        same = same && fabs((double)albedo[0][a] - (double)albedo[1][a]) <= ISOGI_TRACE__COLOURS * (lost < 0.5 ? 2 * lost : 1);
         same = same && fabs((double)glow[0][a] - (double)glow[1][a]) <= ISOGI_TRACE__COLOURS * most;
     }
-    return same && isogi_trace__same_albedo(by_value[0], by_value[1]);
+    return same;
 }
 
 /* How much the trilinear field changes over a voxel along each grid axis: along one after the other, differences of what there is and means
@@ -4222,16 +4210,16 @@ static double isogi_trace__alike(const isogi_trace__scene *scene, const isogi_hi
    the hit's plane whose isovalue is nearest stands for it, of its colours if there is one, or the last, whatever its place: else colours
    that differ at every point would need ever more probes, and time to search them. */
 static int isogi_trace__search_on(const isogi_trace *t, const isogi_trace__catch *c, isogi_trace__quest *s, uint32_t number,
-                                  const isogi_hit *place, const float normal[3], double isovalue, const float albedo[3], float alike) {
+                                  const isogi_hit *place, const float normal[3], double isovalue, float alike) {
     double other = fabs(isovalue - c->isovalue) / t->scene.range;
-    if ((other < s->least[0] || other < s->least[1]) && isogi_trace__same_place(t, c, place, normal)) {
+    if (other < s->least[0] && isogi_trace__same_place(t, c, place, normal)) {
         if (other < s->least[1]) s->nearest[1] = number, s->least[1] = other;
-        if (other < s->least[0] && isogi_trace__same_colours(t, c, isovalue, c->isovalue, albedo)) {
+        if (isogi_trace__same_colours(t, c, isovalue)) {
             s->nearest[0] = number, s->least[0] = other;
             if (other < (double)alike || isogi_trace__zero(other)) return 1;
         }
     }
-    if (s->tries++ < (isogi_trace__coloured(t) ? 4 : 1) * ISOGI_TRACE__CELL_PROBES) return 0;
+    if (s->tries++ < (isogi_trace__coloured(&t->scene.desc) ? 4 : 1) * ISOGI_TRACE__CELL_PROBES) return 0;
     if (!s->nearest[0]) s->nearest[0] = s->nearest[1] ? s->nearest[1] : number;
     return 1;
 }
@@ -4245,7 +4233,7 @@ static uint32_t isogi_trace__probe_find(const isogi_trace *t, isogi_trace__catch
     while (at && !found) {
         const isogi_trace__link *link = isogi_trace__link_at(set, at - 1);
         const isogi_trace__node *n = link->tag == isogi_trace__tag(c->key) ? isogi_trace__node_at(set, at - 1) : NULL;
-        if (n && n->cell == c->key && isogi_trace__search_on(t, c, &search, at, &n->place, n->normal, n->isovalue, n->albedo, n->alike))
+        if (n && n->cell == c->key && isogi_trace__search_on(t, c, &search, at, &n->place, n->normal, n->isovalue, n->alike))
             found = search.nearest[0];
         at = link->next;
     }
@@ -4283,7 +4271,7 @@ static size_t isogi_trace__probes_meet(const isogi_trace *t) {
             for (; *at && !c->probe; at = &f->next[*at - 1]) {
                 const isogi_trace__catch *o = &f->catches[f->makers[*at - 1]];
                 if (o->key != c->key) continue;
-                if (isogi_trace__search_on(t, c, &c->search, o->probe, &o->hit, o->normal, o->isovalue, o->albedo, o->alike))
+                if (isogi_trace__search_on(t, c, &c->search, o->probe, &o->hit, o->normal, o->isovalue, o->alike))
                     c->probe = c->search.nearest[0];
             }
             if (!c->probe) {
@@ -4413,15 +4401,15 @@ static void isogi_trace__cast_escape(isogi_trace__cast *c, int i) {
     isogi_trace__span_bring(t, span, rgb);
 }
 
-/* Colours where a ray hit: the albedo, and the light that the surface sends out itself. */
-static void isogi_trace__cast_colours(isogi_trace__cast *c, isogi_trace__span *span, isogi_trace__catch *at) {
+/* Light that the surface sends out itself where a ray hit. */
+static void isogi_trace__cast_glow(isogi_trace__cast *c, isogi_trace__span *span, const isogi_trace__catch *at) {
     const isogi_trace *t = c->trace;
     float emission[3];
     double point[3], rgb[3];
     int a;
-    isogi_trace__to_world(t->scene.pyramid, &at->hit, point);
-    isogi_trace_material(&t->scene.desc, span->of->isovalue, point, at->albedo, emission);
     if (t->scene.desc.mode == ISOGI_TRACE_TRANSFER) return;
+    isogi_trace__to_world(t->scene.pyramid, &at->hit, point);
+    isogi_trace_material(&t->scene.desc, span->of->isovalue, point, NULL, emission);
     for (a = 0; a < 3; a++) rgb[a] = (double)emission[a];
     isogi_trace__span_bring(t, span, rgb);
 }
@@ -4444,7 +4432,7 @@ static void isogi_trace__cast_hit(isogi_trace__cast *c, int i) {
         to->hit = site->place, to->from = site->from, length = 0;
         memcpy(to->normal, site->normal, sizeof to->normal);
     }
-    if (t->scene.desc.emission_count || t->scene.desc.material) isogi_trace__cast_colours(c, span, to);
+    if (t->scene.desc.emission_count || t->scene.desc.material) isogi_trace__cast_glow(c, span, to);
     if (!t->scene.desc.bounces) return;
     to->key = isogi_trace__probe_key(&t->scene, &to->hit, to->normal, length,
                                      span->of->brick ? t->scene.cells[0].size : ISOGI_TRACE__CELL_FAR, span->of->isovalue);
@@ -5391,7 +5379,7 @@ static void isogi_trace__guide_begin(const isogi_trace *t, const isogi_trace__no
     for (a = 0; a < 3; a++) slope[a] *= t->step[a];
     g->isovalue = n->isovalue, g->steep = isogi_trace__magnitude(slope);
     g->pilot = g->pilot_variance = 0; /* until it has samples */
-    if (!d->albedo_count && !d->emission_count && !d->material) return;
+    if (!isogi_trace__coloured(d)) return;
     for (a = 0; a < 3; a++) texel[a] = n->texel[a];
     isogi_trace__texel_grid(t, texel, point);
     isogi_vol_to_world(t->scene.pyramid, point, point);
@@ -5818,7 +5806,7 @@ static void isogi_trace__block_fill(const isogi_trace *t, const size_t brick[3],
     most = most > 0 ? 1 / most : 1, steepest = 1 / (steepest > 1e-300 ? steepest : 1e-300);
     if (b->count) base = b->guide[0]->isovalue;
     square = most * most * t->scene.square;
-    b->unit = 1 / most, b->tinted = d->albedo_count || d->emission_count || d->material;
+    b->unit = 1 / most, b->tinted = isogi_trace__coloured(d);
     for (i = 0; i < b->count; i++) {
         const isogi_trace__guide *g = b->guide[i];
         const size_t at = b->at[i];

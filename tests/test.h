@@ -9,7 +9,7 @@
    A test passes when none of its CHECKs fails; each failing CHECK prints its place, its condition and the
    values it was given (the first few of a test, then a count). SKIP("why") ends a test that cannot run here.
    LONG_SUITE is true under --long, in `make check`: tests then use their full sizes. QUICK_SUITE is true under --quick, in `make test`:
-   some are smaller yet, and SLOW_TESTs, which measure quality rather than find mistakes, are left out. With neither, as programs are built
+   some are smaller yet, and SLOW_TESTs, which take long for what they find, are left out. With neither, as programs are built
    by other compilers and sanitizers in `make check`, all tests run at sizes between. The last line is "N passed, N failed, N skipped",
    which is also written to the file named by ISOGI_TEST_SUMMARY, where that is set, for `make test` to add up. A test that
    crashes is named; the program then ends without counts, which `make test` counts as a failure. */

@@ -361,7 +361,7 @@ TEST(planes_of_any_length_cut_alike) {
             isogi_dvr *dvr = dvr_new(&desc, &transfer);
             CHECK(isogi_dvr_set_clip(dvr, plane, 1) == ISOGI_OK && isogi_dvr_step(dvr, 0, NULL) == ISOGI_OK, "step");
             float(*pixels)[4] = picture(dvr, &view, &sky, NULL, NULL);
-            isogi_dvr_sample_visibility(dvr, place, 1, v[k > 0]);
+            CHECK(isogi_dvr_sample_visibility(dvr, place, 1, v[k > 0]) == ISOGI_OK, "sample");
             if (!k) first = pixels;
             else
                 CHECK(!(largest_difference(first, pixels, 256) > 0) && !memcmp(v[0], v[1], sizeof v[0]), "%s, times 2^%d: off by %g",
@@ -374,16 +374,17 @@ TEST(planes_of_any_length_cut_alike) {
     field_free(&f);
 }
 
-/* Sweeps: planes along the faces of the box cut nothing off, whatever side of a face their rounding puts them on. */
+/* Planes along the faces of the box cut nothing off, whatever side of a face their rounding puts them on. (Not by brute force: of rays that
+   run within a face, rounding may part some from it at once.) */
 TEST(planes_along_the_faces_cut_nothing) {
     static const double edges[] = {0.3, 0.7, 1.1, 0.05}, corners[] = {-1.7, 12.3, 100.1};
     const isogi_transfer_point p[] = {{0, {1, 1, 1}, 0.3f}};
     const isogi_transfer transfer = {p, 1, NULL, 0};
-    for (int k = 0; k < 12; k++) {
+    for (int k = 0; k < 24; k++) {
         field f = field_new(17, 17, 17);
         float place[25][3], v[2][25][4];
         double plane[6][4] = {{0}}, most = 0;
-        for (int a = 0; a < 3; a++) f.volume.spacing[a] = edges[k % 4], f.volume.origin[a] = corners[k / 4];
+        for (int a = 0; a < 3; a++) f.volume.spacing[a] = edges[k % 4], f.volume.origin[a] = corners[k / 4 % 3];
         for (size_t i = 0; i < field_count(&f); i++) f.value[i] = 1;
         field_build(&f);
         for (int i = 0; i < 2; i++) {
@@ -398,17 +399,20 @@ TEST(planes_along_the_faces_cut_nothing) {
             isogi_vol_to_world(f.pyramid, grid, world);
             for (int a = 0; a < 3; a++) place[i][a] = (float)world[a];
         }
-        const isogi_dvr_desc desc = {.pyramid = f.pyramid, .shading = ISOGI_DVR_VISIBILITY, .method = ISOGI_DVR_SWEEP,
-                                     .order = 2, .directions = 32, .grid = {5, 5, 5}};
+        const isogi_dvr_desc desc = {.pyramid = f.pyramid, .shading = ISOGI_DVR_VISIBILITY,
+                                     .method = k < 12 ? ISOGI_DVR_SWEEP : ISOGI_DVR_PAPER, .order = 2, .directions = 32, .grid = {5, 5, 5}};
         for (int cut = 0; cut < 2; cut++) {
             isogi_dvr *dvr = dvr_new(&desc, &transfer);
             CHECK(isogi_dvr_set_clip(dvr, (const double(*)[4])plane, cut ? 6 : 0) == ISOGI_OK && isogi_dvr_step(dvr, 0, NULL) == ISOGI_OK,
                   "step");
-            isogi_dvr_sample_visibility(dvr, (const float(*)[3])place, 25, v[cut][0]);
+            CHECK(isogi_dvr_sample_visibility(dvr, (const float(*)[3])place, 25, v[cut][0]) == ISOGI_OK, "sample");
             isogi_dvr_free(dvr);
         }
-        for (int i = 0; i < 100; i++) most = fmax(most, fabs((double)v[0][i / 4][i % 4] - (double)v[1][i / 4][i % 4]));
-        CHECK(most < 1e-6, "spacing %g, origin %g: off by %g", edges[k % 4], corners[k / 4], most);
+        for (int i = 0; i < 100; i++) {
+            const double off = fabs((double)v[0][i / 4][i % 4] - (double)v[1][i / 4][i % 4]);
+            if (!(off <= most)) most = off;
+        }
+        CHECK(most < 1e-6, "spacing %g, origin %g: off by %g", edges[k % 4], corners[k / 4 % 3], most);
         field_free(&f);
     }
 }

@@ -1695,24 +1695,17 @@ TEST(isovalues_of_other_colours_do_not_light_each_other) {
 
 static double distance_from(const double p[3], const double *q) { return length3(p[0] - q[0], p[1] - q[1], p[2] - q[2]); }
 
-/* Cubes, half a voxel wide, of two albedos. */
-static void chequered(void *user, double isovalue, const double p[3], float albedo[3], float emission[3]) {
-    const int odd = ((int)floor(2 * p[0]) + (int)floor(2 * p[1]) + (int)floor(2 * p[2])) & 1;
-    (void)user, (void)isovalue;
-    for (int a = 0; a < 3; a++) albedo[a] = odd ? 0.95f : 0.05f, emission[a] = 1;
-}
-
-/* Every isosurface is a closed sphere that lights itself alone, hence E = pi e / (1 - albedo), whatever its neighbours' colours are, and
-   where its own go by place their mean counts. Glow that falls to 0 within a voxel; albedo that rises to .9; cubes of two albedos. */
+/* Every isosurface is a closed sphere that lights itself alone, hence E = pi e / (1 - albedo), whatever its neighbours' colours are: glow
+   that falls to 0 within a voxel; albedo that rises to .9. */
 SLOW_TEST(walls_of_many_colours_have_their_own_light) {
-    static const struct { const char *what; double low, high, bound; } ways[3] = {{"glow by isovalue", 5.6, 6.4, 0.06},
-        {"albedo by isovalue", 6.6, 7.4, 0.032}, {"albedo by place", 5.8, 6.2, 0.075}};
+    static const struct { const char *what; double low, high, bound; } ways[2] = {
+        {"glow by isovalue", 5.6, 6.4, 0.03}, {"albedo by isovalue", 6.6, 7.4, 0.032}};
     static const isogi_albedo_point glow[4] = {{5, {1, 2, 1}}, {5.8, {0, 3, 0.1f}}, {7.1, {0, 0, 0}}, {8.6, {0, 1.7f, 1.2f}}},
                                     white[1] = {{0, {1, 1, 1}}},
                                     albedo[3] = {{5, {0.1f, 0.2f, 0.9f}}, {7.1, {0.2f, 0.9f, 0.1f}}, {8.6, {0.9f, 0.1f, 0.3f}}};
     double q[3] = {10.9, 10.2, 10.2};
     scene s = scene_make(22, 22, 22, NULL, distance_from, q);
-    for (int way = 0; way < 3; way++) {
+    for (int way = 0; way < 2; way++) {
         isogi_trace_desc d = {.pyramid = s.pyramid, .albedo = {0.3f, 0.8f, 0.7f}, .bounces = -1, .lookup = ISOGI_TRACE_NEAREST,
                               .samples = 64, .isovalue_min = ways[way].low, .isovalue_max = ways[way].high};
         isogi_trace *t = NULL;
@@ -1720,16 +1713,14 @@ SLOW_TEST(walls_of_many_colours_have_their_own_light) {
         int count = 0;
         if (way == 0) d.emission_points = glow, d.emission_count = 4;
         if (way == 1) d.emission_points = white, d.emission_count = 1, d.albedo_points = albedo, d.albedo_count = 3;
-        if (way == 2) d.material = chequered;
         CHECK(isogi_trace_create(&t, &d, NULL) == ISOGI_OK && isogi_trace_step(t, 0, NULL) == ISOGI_OK, "%s", ways[way].what);
         for (size_t i = 0; i < 22 * 22 * 22; i++) {
             const float place[1][3] = {{(float)(i % 22), (float)(i / 22 % 22), (float)(i / 22 / 22)}};
             float e[1][3], error[1], reflected[3], sent[3];
             if ((double)s.data[i] < d.isovalue_min || (double)s.data[i] > d.isovalue_max) continue;
-            isogi_trace_sample(t, place, 1, e, error);
-            if (error[0] > 1e30f) continue;
+            CHECK(isogi_trace_sample(t, place, 1, e, error) == ISOGI_OK, "sample");
+            if (!(error[0] < 1e30f)) continue;
             isogi_trace_material(&d, (double)s.data[i], NULL, reflected, sent);
-            if (way == 2) reflected[1] = 0.5f, sent[1] = 1;
             const double expected = PI * (double)sent[1] / (1 - (double)reflected[1]);
             square += pow((double)e[0][1] - expected, 2), size += expected * expected, count++;
         }
