@@ -1,4 +1,4 @@
-/* Transfer functions to begin with: presets, imported tables, suggestions from a histogram. */
+/* Transfer functions to begin with: presets, imported tables, suggestions from a histogram. FLAGS: -O0 */
 #define ISOGI_IMPLEMENTATION
 #include "isogi_dvr.h"
 #include "dvr_fields.h"

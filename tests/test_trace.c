@@ -1,4 +1,5 @@
-/* Tests of isogi_trace.h. Scenes are small analytic fields; isovalue 0 unless said otherwise; radiance 1 = SH coefficient sqrt(4 pi). */
+/* Tests of isogi_trace.h. Scenes are small analytic fields; isovalue 0 unless said otherwise; radiance 1 = SH coefficient sqrt(4 pi).
+   FLAGS: -O0 */
 #define ISOGI_IMPLEMENTATION
 #include "isogi_trace.h"
 #include "test.h"

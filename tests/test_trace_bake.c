@@ -1,4 +1,4 @@
-/* Tests of how isogi_trace.h bakes by default: light at hits from probes, samples in blocks, errors, stepping. */
+/* Tests of how isogi_trace.h bakes by default: light at hits from probes, samples in blocks, errors, stepping. FLAGS: -O0 */
 #define ISOGI_IMPLEMENTATION
 #include "isogi_trace.h"
 #include "test.h"

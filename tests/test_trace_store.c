@@ -1,4 +1,4 @@
-/* Tests of how isogi_trace.h holds light: formats, memory, export for a GPU, save, load and merge. */
+/* Tests of how isogi_trace.h holds light: formats, memory, export for a GPU, save, load and merge. FLAGS: -O0 */
 #define ISOGI_IMPLEMENTATION
 #include "isogi_trace.h"
 #include "test.h"

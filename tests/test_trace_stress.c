@@ -1,4 +1,5 @@
-/* Scenes that strain isogi_trace.h: endless light, suns beside near darkness, volumes and lattices of next to nothing, noise, NaN. */
+/* Scenes that strain isogi_trace.h: endless light, suns beside near darkness, volumes and lattices of next to nothing, noise, NaN.
+   FLAGS: -O0 */
 #define ISOGI_IMPLEMENTATION
 #include "isogi_trace.h"
 #include "test.h"

@@ -1,5 +1,5 @@
 /* Properties of the calls around the rays of isogi_vol.h: voxels read one by one, all hits of a ray, bundles, value ranges, chunks
-   with a halo, very large volumes, arguments that make no sense. */
+   with a halo, very large volumes, arguments that make no sense. FLAGS: -O0 */
 #define ISOGI_IMPLEMENTATION
 #include "isogi_trace.h"
 #include "ray_fields.h"

@@ -1,5 +1,6 @@
 /* On which side of the surface rays of isogi_vol.h are: sides of all hits against what the field says at both ends of a ray, dips and
-   bumps as narrow as rounding allows, and the caps of borders, next to voxels that are not finite too. Huge values and long volumes. */
+   bumps as narrow as rounding allows, and the caps of borders, next to voxels that are not finite too. Huge values and long volumes.
+   FLAGS: -O0 */
 #define ISOGI_IMPLEMENTATION
 #include "isogi_vol.h"
 #include "ray_fields.h"
