@@ -40,8 +40,8 @@ all: $(EXAMPLES)
 # The implementation of each header is compiled once, and switched off in the programs that are linked with it: it takes most of the
 # time. A test that looks at what is private to a header (isogi_vol__name) holds that header's implementation itself, and takes as long:
 # those, INSIDE, are left to `make check`, as are the instruction levels of test_sh. Test programs are compiled at -O1, in half the time:
-# what they test is in those objects, as its users compile it. The headers that take longest come first. Tests
-# that do little themselves are compiled at -O0.
+# what they test is in those objects, as its users compile it. The headers that take longest come first. Tests that do little themselves
+# are compiled at -O0.
 HEADERS := dvr:DVR vol:VOL sh:SH trace:TRACE
 OBJECTS := $(foreach h,$(HEADERS),build/isogi_$(firstword $(subst :, ,$(h))).o)
 

@@ -35,11 +35,11 @@
    weights that the field's course decides; any other such mean differs by less than the bound. Parts are seen with weights that
    sum up to the opacity: what an unlit pixel's colour errs by is at most the bound times its opacity. (`opaque` below 1 ends rays
    early and adds 1 - opaque. Light is looked up once for a piece within a cell: visibility as far off dense matter as the mean extinction
-   in the piece says; two-sided light takes the opacity of its first part.) Errors measured on random fields and functions
-   with bounds 1, .1, .01, .001: .046, .010, .0007, .00015 (test_dvr_bound --long); samples know no bound, as a cell may hold what they
-   miss. A frame of the gyroid takes 11, 11 and 18 times that of samples with bounds 1, .1 and .01, and its sRGB values err by .00002 (RMSE)
-   where theirs do by .003 (make bench ONLY=dvr): the time of what is cut by colour goes as 1 / bound, and every point of the function
-   between the values at a cell's two ends is one more part.
+   in the piece says; two-sided light takes the opacity of its first part.) Errors measured on random fields and functions with bounds 1,
+   .1, .01, .001: .046, .010, .0007, .00015 (test_dvr_bound --long); samples know no bound, as a cell may hold what they miss. A frame of
+   the gyroid takes 11, 11 and 18 times that of samples with bounds 1, .1 and .01, and its sRGB values err by .00002 (RMSE) where theirs do
+   by .003 (make bench ONLY=dvr): the time of what is cut by colour goes as 1 / bound, and every point of the function between the values
+   at a cell's two ends is one more part.
 
    Data space. The scale-invariant integral (Kraus 2005, eq. 4): extinction is per unit of the data, a piece of ray over which
    the value changes by ds has opacity 1 - exp(-tau |ds|). Lengths cancel: no scaling of space changes any pixel. Constant data
@@ -364,8 +364,8 @@ typedef struct isogi_dvr_desc {
     double reduction;       /* the paper's method: voxels of the volume to points of its blocks, at least 1; 0 = 4. A block that is not
                                transparent holds a point whatever the budget is; those that the border cuts thin come first for more.
                                One of a single colour holds no more than its corners at any budget: in dense fog that reaches the border
-                               visibility is then a third too large. One that a clip plane cuts, or the next one to
-                               it, holds local visibility at every voxel */
+                               visibility is then a third too large. One that a clip plane cuts, or the next one to it, holds local
+                               visibility at every voxel */
     isogi_dvr_classification classification; /* in data space; visibility rays are exact there, unless this says post-classified */
     int table;                               /* entries along a side of the pre-integrated table, which stand where the transfer
                                                 function changes, half by value, half evenly among its pieces; 2..1024; 0 = 256 */
