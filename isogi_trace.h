@@ -149,8 +149,8 @@
                 wanted texel alone 2 + 12 bytes of irradiance, 2 + 2 order^2 channels of transfer, less in other formats; and
                 180 KB. isogi_trace_memory tells. PATHS needs another 4 MB, FEEDBACK 9 (TRANSFER: 32 KB more for each coefficient),
                 and while it works some 400 bytes (TRANSFER: 16 more for each coefficient), 8 MB of them at once of texels and as
-                many of probes, and 4 for every hit, for each texel of one cube (ISOGI_TRACE_CUBE), for all that were asked for
-                when lazy, and for each probe (160 more, TRANSFER 48 for each value, where light takes over 100 reflections to fade):
+                many of probes, and 4 for every hit (with desc.material 16), for each texel of one cube (ISOGI_TRACE_CUBE), for all
+                that were asked for when lazy, and for each probe (160 more, TRANSFER 48 for each value, where light takes over 100 reflections to fade):
                 where every texel of a cube has a surface 130 MB, if these are layers, but in a gyroid 280 with 1 sample, 560 with
                 16, 730 with 64, and up to twice that where there are lights.
                 A request takes 12 bytes for each of 32768 points at a time.
@@ -348,9 +348,9 @@ ISOGI_API isogi_result isogi_trace_step(isogi_trace *trace, uint64_t max_rays, d
    Errors cover the true ones (twice the standard error in 95 % of points, with desc.error in 90 % or more, tests/test_trace_bake.c):
    they allow for what samples that agree may all have missed, and for probes 2 % of reflected light. That is too little where much of
    the light is reflected and comes from lights without size, whose shadows are hard: at albedo 0.8, in narrow tunnels, twice the error
-   told covers 60 to 90 % of points; and where desc.material changes the albedo within a few voxels: a hit has the albedo of its probe's
-   place, and errors may be several times those told (chequers of .05 and .95, half a voxel wide: six times, 7 % of the light). Nor is
-   the error of negative lights told in full. They know nothing of the lattice (on steep fields that adds more than samples do; closer
+   told covers 60 to 90 % of points; and where colours change strongly within a few voxels, which samples too near each other may miss:
+   in a closed room of chequers of .05 and .95, 2 voxels wide, errors are twice those told with 16 samples, 3.5 times with 128 (4 % of
+   the light). Nor is the error of negative lights told in full. They know nothing of the lattice (on steep fields that adds more than samples do; closer
    texels help), and of glows only what emission_points tell: where desc.material alone makes something glow, give the brightest of it
    there. */
 ISOGI_API isogi_result isogi_trace_sample(const isogi_trace *trace, const float (*points)[3], size_t count, float (*irradiance)[3],
@@ -1728,7 +1728,13 @@ static void isogi_trace__wave_escape(isogi_trace__wave *w, int i) {
                         w->light[w->slot[i]]);
 }
 
-/* Colours where path i hit: grey transfer has one channel, of their mean. What is emitted there is brought. */
+/* Grey transfer has one channel, of their mean. */
+static void isogi_trace__albedo_channels(const isogi_trace_desc *desc, float albedo[3]) {
+    if (desc->mode == ISOGI_TRACE_TRANSFER && desc->transfer_channels == 1)
+        albedo[0] = albedo[1] = albedo[2] = (float)(((double)albedo[0] + (double)albedo[1] + (double)albedo[2]) / 3);
+}
+
+/* Colours where path i hit. What is emitted there is brought. */
 static void isogi_trace__wave_material(isogi_trace__wave *w, int i, float albedo[3]) {
     const isogi_trace_desc *desc = &w->scene->desc;
     float emission[3];
@@ -1739,11 +1745,8 @@ static void isogi_trace__wave_material(isogi_trace__wave *w, int i, float albedo
         isogi_trace__to_world(w->scene->pyramid, &w->hit[i], point);
         isogi_trace__colours(desc, w->site->isovalue, point, albedo, emission);
     }
-    if (desc->mode == ISOGI_TRACE_TRANSFER) {
-        if (desc->transfer_channels == 1)
-            albedo[0] = albedo[1] = albedo[2] = (float)(((double)albedo[0] + (double)albedo[1] + (double)albedo[2]) / 3);
-        return;
-    }
+    isogi_trace__albedo_channels(desc, albedo);
+    if (desc->mode == ISOGI_TRACE_TRANSFER) return;
     for (c = 0; c < 3; c++) w->light[w->slot[i]][c] += w->through[i][c] * (double)emission[c];
 }
 
@@ -3654,6 +3657,7 @@ typedef struct isogi_trace__segment {
     size_t entries, hits;
     size_t numbers; /* in the block of memory that begins at `node`; 0: it lies in that of a segment before */
     uint32_t *node, *begin, *probe;
+    float (*albedo)[3];     /* of each hit, where colours go by place; else NULL: it is the node's, by isovalue */
     uint32_t *order;        /* of probes: the first `open` are the entries that passes still change; NULL of texels */
     size_t open;
     double change, largest; /* by the last pass, of probes, */
@@ -3672,7 +3676,7 @@ typedef struct isogi_trace__guide {
     float hidden, reflected; /* share of rays that hit, and luminance of what was reflected there */
 } isogi_trace__guide;
 
-/* What passes read of a probe beside its values: albedo by channel, and 1 / samples. */
+/* What passes read of a probe beside its values: albedo by channel where its rays hit (1 if they bring their own), and 1 / samples. */
 typedef struct isogi_trace__reflector {
     float albedo[3], one;
 } isogi_trace__reflector;
@@ -3763,16 +3767,17 @@ typedef struct isogi_trace__catch {
     uint64_t key;
     double isovalue; /* of the ray */
     isogi_hit hit;
-    float normal[3];
+    float normal[3], albedo[3];
     uint32_t probe; /* number + 1 of the probe of this hit; 0: none was there when the ray was traced, */
     float alike;    /* and one that is made has this; */
     signed char from;
     isogi_trace__quest search; /* it passed those that there were */
 } isogi_trace__catch;
 
-/* The hits of a probe's rays. */
+/* The hits of a probe's rays; albedo: as a segment has it. */
 typedef struct isogi_trace__row {
     const uint32_t *probe;
+    const float (*albedo)[3];
     size_t count;
 } isogi_trace__row;
 
@@ -4401,15 +4406,16 @@ static void isogi_trace__cast_escape(isogi_trace__cast *c, int i) {
     isogi_trace__span_bring(t, span, rgb);
 }
 
-/* Light that the surface sends out itself where a ray hit. */
-static void isogi_trace__cast_glow(isogi_trace__cast *c, isogi_trace__span *span, const isogi_trace__catch *at) {
+/* Colours where a ray hit. Light that the surface sends out there is brought. */
+static void isogi_trace__cast_material(isogi_trace__cast *c, isogi_trace__span *span, isogi_trace__catch *at) {
     const isogi_trace *t = c->trace;
     float emission[3];
     double point[3], rgb[3];
     int a;
-    if (t->scene.desc.mode == ISOGI_TRACE_TRANSFER) return;
     isogi_trace__to_world(t->scene.pyramid, &at->hit, point);
-    isogi_trace_material(&t->scene.desc, span->of->isovalue, point, NULL, emission);
+    isogi_trace_material(&t->scene.desc, span->of->isovalue, point, at->albedo, emission);
+    isogi_trace__albedo_channels(&t->scene.desc, at->albedo);
+    if (t->scene.desc.mode == ISOGI_TRACE_TRANSFER) return;
     for (a = 0; a < 3; a++) rgb[a] = (double)emission[a];
     isogi_trace__span_bring(t, span, rgb);
 }
@@ -4432,7 +4438,7 @@ static void isogi_trace__cast_hit(isogi_trace__cast *c, int i) {
         to->hit = site->place, to->from = site->from, length = 0;
         memcpy(to->normal, site->normal, sizeof to->normal);
     }
-    if (t->scene.desc.emission_count || t->scene.desc.material) isogi_trace__cast_glow(c, span, to);
+    if (t->scene.desc.emission_count || t->scene.desc.material) isogi_trace__cast_material(c, span, to);
     if (!t->scene.desc.bounces) return;
     to->key = isogi_trace__probe_key(&t->scene, &to->hit, to->normal, length,
                                      span->of->brick ? t->scene.cells[0].size : ISOGI_TRACE__CELL_FAR, span->of->isovalue);
@@ -4828,11 +4834,13 @@ static isogi_result isogi_trace__segment_new(isogi_trace *t, isogi_trace__segmen
     for (i = 0; i < f->piece_count; i++) f->pieces[i].first_hit = (uint32_t)hits, hits += f->pieces[i].hits;
     *made = isogi_trace__probes_meet(t);
     memset(s, 0, sizeof *s);
-    s->entries = f->span_count, s->hits = hits, s->numbers = (f->on_probes ? 3 : 2) * s->entries + 1 + hits;
+    s->entries = f->span_count, s->hits = hits;
+    s->numbers = (f->on_probes ? 3 : 2) * s->entries + 1 + (t->scene.desc.material ? 4 : 1) * hits;
     s->node = (uint32_t *)isogi_allocate(&t->context, s->numbers, sizeof(uint32_t));
     if (!s->node) return ISOGI_NO_MEMORY;
     s->begin = s->node + s->entries, s->probe = s->begin + s->entries + 1, s->begin[s->entries] = (uint32_t)hits;
     if (f->on_probes) s->order = s->probe + hits;
+    if (t->scene.desc.material) s->albedo = (float(*)[3])(s->probe + hits + (f->on_probes ? s->entries : 0));
     result = isogi_trace__set_reserve(t, &f->probes, *made, 1);
     if (result != ISOGI_OK) isogi_trace__segment_free(t, s);
     return result;
@@ -4845,8 +4853,11 @@ static void isogi_trace__segment_fill(const isogi_trace *t, const isogi_trace__s
     for (i = piece->span; i < piece[1].span; i++) {
         const isogi_trace__span *span = &f->spans[i];
         s->node[i] = span->node, s->begin[i] = at;
-        for (k = span->offset; k < span->offset + span->count && span->hits; k++)
-            if (f->found[k] != ISOGI_TRACE__ESCAPED) s->probe[at++] = f->found[k] - 1;
+        for (k = span->offset; k < span->offset + span->count && span->hits; k++) {
+            if (f->found[k] == ISOGI_TRACE__ESCAPED) continue;
+            if (s->albedo) memcpy(s->albedo[at], f->catches[k].albedo, sizeof *s->albedo);
+            s->probe[at++] = f->found[k] - 1;
+        }
     }
 }
 
@@ -5004,15 +5015,6 @@ static int isogi_trace__first_value(const isogi_trace *t, int channel) {
     return t->scene.desc.mode == ISOGI_TRACE_TRANSFER && t->scene.desc.transfer_channels == 1 ? 0 : channel;
 }
 
-/* Albedo where a node's rays hit a probe: at the node's isovalue; where colours go by place, that of the probe. Grey transfer has one
-   channel, of the mean. */
-static double isogi_trace__hit_albedo(const isogi_trace *t, const isogi_trace__node *n, uint32_t probe, int value) {
-    if (t->scene.desc.material) n = isogi_trace__node_at(&t->feedback->probes, probe);
-    if (t->scene.desc.mode == ISOGI_TRACE_TRANSFER && t->scene.desc.transfer_channels == 1)
-        return ((double)n->albedo[0] + (double)n->albedo[1] + (double)n->albedo[2]) / 3;
-    return (double)n->albedo[isogi_trace__channel(t, value)];
-}
-
 /* What passes read of probes, in few bytes. The first pass begins with what comes from sky and lights; a probe that reads no other has
    settled. */
 static void isogi_trace__direct_task(void *arg, size_t task) {
@@ -5027,18 +5029,19 @@ static void isogi_trace__direct_task(void *arg, size_t task) {
         for (a = 0; a < t->values; a++) {
             bounce[a] = (float)isogi_trace__node_direct(t, set, i, a);
             out[a] = bounce[a];
-            if (a < 3) r->albedo[a] = (float)isogi_trace__hit_albedo(t, n, (uint32_t)i, a);
         }
+        for (a = 0; a < 3; a++) r->albedo[a] = t->scene.desc.material ? 1 : n->albedo[a];
+        isogi_trace__albedo_channels(&t->scene.desc, r->albedo);
         r->one = n->samples ? 1.0f / (float)n->samples : 0;
         *isogi_trace__settled_at(set, i, 0) = *isogi_trace__settled_at(set, i, 1) = !n->hits;
     }
 }
 
-/* One pass over the probes of a segment, each of which has one entry: from one kind of OUT_VALUES to the other. by_place: hits have the
-   albedo of the probe that they meet, else that of the probe that they come from. A probe that reads none, or none that will change, has
-   settled with this pass; the next one copies its light to the other kind, and later ones leave it out. watch: that is looked at. */
-static void isogi_trace__pass_segment(isogi_trace__set *set, isogi_trace__segment *s, size_t values, size_t channels, int by_place,
-                                      int watch) {
+/* One pass over the probes of a segment, each of which has one entry: from one kind of OUT_VALUES to the other. A probe that reads none, or
+   none that will change, has settled with this pass; the next one copies its light to the other kind, and later ones leave it out. watch:
+   that is looked at. albedo: the segment's. */
+static void isogi_trace__pass_segment(isogi_trace__set *set, isogi_trace__segment *s, size_t values, size_t channels,
+                                      const float (*albedo)[3], int watch) {
     const int out = set->out, from = ISOGI_TRACE__OUT_VALUES + out, to = ISOGI_TRACE__OUT_VALUES + 1 - out;
     const size_t late = 8; /* entries ahead */
     size_t i, j, k, a, open = 0;
@@ -5068,14 +5071,13 @@ static void isogi_trace__pass_segment(isogi_trace__set *set, isogi_trace__segmen
         for (k = s->begin[i]; k < s->begin[i + 1]; k++) {
             const float *e = isogi_trace__values_at(set, s->probe[k], from, values);
             if (watch) settled &= *isogi_trace__settled_at(set, s->probe[k], out);
-            if (by_place) {
-                const isogi_trace__reflector *met = isogi_trace__reflector_at(set, s->probe[k]);
-                for (a = 0; a < values; a++) sum[a] += (double)met->albedo[a % channels] * (double)e[a];
-            } else
+            if (albedo)
+                for (a = 0; a < values; a++) sum[a] += (double)albedo[k][a % channels] * (double)e[a];
+            else
                 for (a = 0; a < values; a++) sum[a] += (double)e[a];
         }
         for (a = 0; a < values; a++) {
-            double share = (double)r->one * (by_place ? 1 : (double)r->albedo[a % channels]);
+            double share = (double)r->one * (double)r->albedo[a % channels];
             double e = (double)bounce[a] + share * sum[a], change = fabs(e - (double)before[a]);
             after[a] = (float)e;
             most = change > most ? change : most, largest = fabs(e) > largest ? fabs(e) : largest;
@@ -5095,10 +5097,10 @@ static void isogi_trace__pass_task(void *arg, size_t segment) {
         s->open = s->entries, s->settled = 0;
     }
     /* the compiler unrolls it; after a few passes nearly all of the probes that are left read each other in a circle */
-    if (t->values == 3 && channels == 3 && !t->scene.desc.material)
-        isogi_trace__pass_segment(set, s, 3, 3, 0, t->feedback->pass < ISOGI_TRACE__WATCHED);
+    if (t->values == 3 && channels == 3 && !s->albedo)
+        isogi_trace__pass_segment(set, s, 3, 3, NULL, t->feedback->pass < ISOGI_TRACE__WATCHED);
     else
-        isogi_trace__pass_segment(set, s, (size_t)t->values, channels, t->scene.desc.material != NULL,
+        isogi_trace__pass_segment(set, s, (size_t)t->values, channels, (const float(*)[3])s->albedo,
                                   t->feedback->pass < ISOGI_TRACE__WATCHED);
 }
 
@@ -5195,8 +5197,11 @@ static int isogi_trace__solver_new(isogi_trace *t) {
     isogi_trace__solver_set(t, s, block), s->bytes = bytes;
     for (k = 0; k < set->segment_count; k++) {
         const isogi_trace__segment *g = &set->segments[k];
-        for (i = 0; i < g->entries; i++)
-            s->rows[g->node[i]].probe = g->probe + g->begin[i], s->rows[g->node[i]].count = g->begin[i + 1] - g->begin[i];
+        for (i = 0; i < g->entries; i++) {
+            isogi_trace__row *row = &s->rows[g->node[i]];
+            row->probe = g->probe + g->begin[i], row->count = g->begin[i + 1] - g->begin[i];
+            if (g->albedo) row->albedo = (const float(*)[3])(g->albedo + g->begin[i]);
+        }
     }
     isogi_trace__solver_light(t, 0);
     return 1;
@@ -5209,7 +5214,7 @@ static void isogi_trace__solve_image(const isogi_trace *t, size_t probe, const d
     const isogi_trace__reflector *own = isogi_trace__reflector_at(set, probe);
     const size_t v = (size_t)t->values;
     size_t a, k;
-    if (v == 3 && !t->scene.desc.material) { /* what is asked for most */
+    if (v == 3 && !row->albedo) { /* what is asked for most */
         double sum[3] = {0, 0, 0};
         for (k = 0; k < row->count; k++)
             for (a = 0; a < 3; a++) sum[a] += vector[row->probe[k] * 3 + a];
@@ -5219,10 +5224,8 @@ static void isogi_trace__solve_image(const isogi_trace *t, size_t probe, const d
     for (a = 0; a < v; a++) {
         const int c = isogi_trace__channel(t, (int)a);
         double sum = 0;
-        for (k = 0; k < row->count; k++) {
-            const isogi_trace__reflector *met = t->scene.desc.material ? isogi_trace__reflector_at(set, row->probe[k]) : own;
-            sum += (double)met->albedo[c] * vector[row->probe[k] * v + a];
-        }
+        for (k = 0; k < row->count; k++)
+            sum += (double)(row->albedo ? row->albedo[k] : own->albedo)[c] * vector[row->probe[k] * v + a];
         image[a] = vector[probe * v + a] - (double)own->one * sum;
     }
 }
@@ -5347,15 +5350,15 @@ static void isogi_trace__bounce_task(void *arg, size_t task) {
     for (; i < end; i++) {
         isogi_trace__node *n = isogi_trace__node_at(texels, s->node[i]);
         float *bounce = isogi_trace__values_at(texels, s->node[i], ISOGI_TRACE__BOUNCE_VALUES, v);
+        float own[3] = {n->albedo[0], n->albedo[1], n->albedo[2]};
         int a;
+        isogi_trace__albedo_channels(&t->scene.desc, own);
         for (k = s->begin[i]; k < s->begin[i + 1]; k++) {
-            const float *e = isogi_trace__light_at(probes, s->probe[k], v);
+            const float *e = isogi_trace__light_at(probes, s->probe[k], v), *albedo = s->albedo ? s->albedo[k] : own;
             double rgb[3], luminance;
-            for (a = 0; a < t->values; a++) bounce[a] += (float)(isogi_trace__hit_albedo(t, n, s->probe[k], a) * (double)e[a]);
-            for (a = 0; a < 3; a++) {
-                const int value = isogi_trace__first_value(t, a);
-                rgb[a] = isogi_trace__hit_albedo(t, n, s->probe[k], value) * (double)e[value] / ISOGI_TRACE__PI;
-            }
+            for (a = 0; a < t->values; a++) bounce[a] += (float)((double)albedo[isogi_trace__channel(t, a)] * (double)e[a]);
+            for (a = 0; a < 3; a++)
+                rgb[a] = (double)albedo[a] * (double)e[isogi_trace__first_value(t, a)] / ISOGI_TRACE__PI;
             luminance = isogi_trace__luminance(rgb);
             n->bounce_square += luminance * luminance;
         }

@@ -1732,6 +1732,42 @@ SLOW_TEST(walls_of_many_colours_have_their_own_light) {
     scene_free(&s);
 }
 
+/* Colours finer than the cells of probes: what a ray brings has the albedo of the place that it met. In closed spheres that glow light is
+   even, pi (1 + mean albedo) by one reflection and pi / (1 - mean albedo) by all. Chequers of .05 and .95, one voxel wide, cover half of
+   each. With the albedo of the probes' places it was 4 and 16 % off, however many samples there were. */
+static void chequers(void *user, double isovalue, const double p[3], float albedo[3], float emission[3]) {
+    const int odd = ((int)floor(p[0]) + (int)floor(p[1]) + (int)floor(p[2])) & 1;
+    (void)user, (void)isovalue;
+    for (int c = 0; c < 3; c++) albedo[c] = odd ? 0.05f : 0.95f, emission[c] = 1;
+}
+SLOW_TEST(colours_finer_than_probes_are_those_of_hits) {
+    double q[3] = {10.9, 10.2, 10.2};
+    scene s = scene_make(22, 22, 22, NULL, distance_from, q);
+    for (int all = 0; all < 2; all++) {
+        isogi_trace_desc d = {.pyramid = s.pyramid, .material = chequers, .bounces = all ? -1 : 1, .lookup = ISOGI_TRACE_NEAREST,
+                              .samples = 1024, .isovalue_min = 5.6, .isovalue_max = 6.4};
+        const double expected = all ? 2 * PI : 1.5 * PI;
+        isogi_trace *t = NULL;
+        double square = 0;
+        int count = 0, covered = 0;
+        CHECK(isogi_trace_create(&t, &d, NULL) == ISOGI_OK && isogi_trace_step(t, 0, NULL) == ISOGI_OK, "bounces %d", d.bounces);
+        for (size_t i = 0; i < 22 * 22 * 22; i++) {
+            const float place[1][3] = {{(float)(i % 22), (float)(i / 22 % 22), (float)(i / 22 / 22)}};
+            float e[1][3], error[1];
+            if ((double)s.data[i] < d.isovalue_min || (double)s.data[i] > d.isovalue_max) continue;
+            CHECK(isogi_trace_sample(t, place, 1, e, error) == ISOGI_OK, "sample");
+            if (!(error[0] < 1e30f)) continue;
+            const double apart = (double)e[0][1] - expected;
+            square += apart * apart / expected / expected, covered += fabs(apart) < 2 * (double)error[0], count++;
+        }
+        printf("    bounces %d: %d texels, %.4f off, %.3f covered\n", d.bounces, count, sqrt(square / count), (double)covered / count);
+        CHECK(count > 100 && sqrt(square / count) < (all ? 0.025 : 0.012), "bounces %d: %d texels, %.4f off", d.bounces, count,
+              sqrt(square / count));
+        isogi_trace_free(t);
+    }
+    scene_free(&s);
+}
+
 /* A round hollow whose mouth is shut by a skin of value 128: below that isosurfaces in it are closed and black, above it they see the
    sky, though they lie side by side. Neither may light the other. */
 static double hollow_behind_a_skin(const double p[3], const double *q) {

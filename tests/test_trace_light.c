@@ -357,7 +357,7 @@ static void counted(void *user, double isovalue, const double p[3], float albedo
 }
 
 /* The colours of a texel and of a probe do not change: as many questions after three levels of samples as there are places. One for
-   each probe, one for each texel, and (for its glow, with irradiance) one for each ray that hits, of which there is none about a ball. */
+   each probe, one for each texel, and one for each ray that hits, of which there is none about a ball. */
 TEST(colours_are_asked_for_once) {
     double q[4] = {8, 8, 8, 5};
     scene s = scene_make(17, 17, 17, NULL, ball, q);
