@@ -150,9 +150,9 @@
                 180 KB. isogi_trace_memory tells. PATHS needs another 4 MB, FEEDBACK 9 (TRANSFER: 32 KB more for each coefficient),
                 and while it works some 400 bytes (TRANSFER: 16 more for each coefficient), 8 MB of them at once of texels and as
                 many of probes, and 4 for every hit (with desc.material 16), for each texel of one cube (ISOGI_TRACE_CUBE), for all
-                that were asked for when lazy, and for each probe (160 more, TRANSFER 48 for each value, where light takes over 100 reflections to fade):
-                where every texel of a cube has a surface 130 MB, if these are layers, but in a gyroid 280 with 1 sample, 560 with
-                16, 730 with 64, and up to twice that where there are lights.
+                that were asked for when lazy, and for each probe (160 more, TRANSFER 48 for each value, where light takes over 100
+                reflections to fade): where every texel of a cube has a surface 130 MB, if these are layers, but in a gyroid 280
+                with 1 sample, 560 with 16, 730 with 64, and up to twice that where there are lights.
                 A request takes 12 bytes for each of 32768 points at a time.
                 Any allocation may fail: the call says ISOGI_NO_MEMORY, the texture stays as it was and can go on.
                 Stack use stays below 32 KB (compiled by clang, below 35), nearly all of it that of rays.
@@ -350,9 +350,9 @@ ISOGI_API isogi_result isogi_trace_step(isogi_trace *trace, uint64_t max_rays, d
    the light is reflected and comes from lights without size, whose shadows are hard: at albedo 0.8, in narrow tunnels, twice the error
    told covers 60 to 90 % of points; and where colours change strongly within a few voxels, which samples too near each other may miss:
    in a closed room of chequers of .05 and .95, 2 voxels wide, errors are twice those told with 16 samples, 3.5 times with 128 (4 % of
-   the light). Nor is the error of negative lights told in full. They know nothing of the lattice (on steep fields that adds more than samples do; closer
-   texels help), and of glows only what emission_points tell: where desc.material alone makes something glow, give the brightest of it
-   there. */
+   the light). Nor is the error of negative lights told in full. They know nothing of the lattice (on steep fields that adds more than
+   samples do; closer texels help), and of glows only what emission_points tell: where desc.material alone makes something glow, give the
+   brightest of it there. */
 ISOGI_API isogi_result isogi_trace_sample(const isogi_trace *trace, const float (*points)[3], size_t count, float (*irradiance)[3],
                                           float *error);
 /* A new lighting. TRANSFER: a distant one (environment and directional lights; point, sphere and rectangle lights are ISOGI_INVALID); no
