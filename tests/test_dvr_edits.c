@@ -350,7 +350,7 @@ TEST(random_edits_of_random_scenes_end_like_a_new_renderer) {
     enum { POINTS = 10, PLACES = 200 };
     static float at[PLACES][3];
     int edits = 0;
-    for (int scene = 0; scene < (LONG_SUITE ? 250 : QUICK_SUITE ? 6 : 30); scene++) {
+    for (int scene = 0; scene < (LONG_SUITE ? 250 : QUICK_SUITE ? 3 : 30); scene++) {
         test_random r = {1000 + (uint64_t)scene};
         field f = random_scene(&r);
         limits l = {-1, -1, 0};

@@ -58,7 +58,7 @@ TEST(slabs_are_seen_by_every_set_of_directions) {
 
 /* Between sheared axes a ray takes further along an axis than it does through the volume: what is that far away shadows, as a march along
    4000 rays says, the same bits for any number of threads. A shear by which rays would reach too far is refused. */
-TEST(local_visibility_follows_sheared_axes) {
+SLOW_TEST(local_visibility_follows_sheared_axes) {
     enum { NX = 33, NY = 100, NZ = 100, RAYS = 4000, AT = 48 };
     static float data[NX * NY * NZ];
     static const double cosine[3] = {0.8, 0.95, 0.98};

@@ -1200,7 +1200,7 @@ TEST(light_of_any_brightness_stays_finite) {
     for (int i = 0; i < n; i++) normals[i][0] = normals[i][2] = 0, normals[i][1] = 1;
     for (int way = 0; way < 6; way++) /* even, and a peak; one coefficient, all, with either sign; a directional light */
         for (int mode = 0; mode < 4; mode++)
-            for (int k = 0; k < 2; k++) {
+            for (int k = 0; k < 2 && (!QUICK_SUITE || (way + mode) % 2); k++) {
                 isogi_trace_desc d = desc_make(&s, 0.9f, 4, 8);
                 isogi_light sun = light_make(ISOGI_LIGHT_DIRECTIONAL, 1, 3, 1, (double)levels[k] / 4, 0);
                 isogi_trace *t = NULL;

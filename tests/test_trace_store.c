@@ -71,7 +71,7 @@ TEST(bytes_per_texel_against_error) {
 
 /* What a transfer texture of 256^3 texels, order 5, takes by default: bricks' table, and the texels that have a surface. Extrapolated from
    64^3: a field whose texels are all valid stays below one gigabyte, air costs a thirtieth of it. */
-TEST(transfer_of_256_cubed_stays_below_a_gigabyte) {
+SLOW_TEST(transfer_of_256_cubed_stays_below_a_gigabyte) {
     double q[2] = {0.1, 0};
     scene s = scene_make(64, 64, 64, NULL, gyroid_in_air, q);
     isogi_trace_desc d = store_desc(&s, ISOGI_TRACE_TRANSFER, 0, 1);

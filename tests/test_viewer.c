@@ -324,7 +324,7 @@ TEST(gloss_of_transfer_adds_highlights) {
 }
 
 /* Several clip planes cut what each of them cuts, in any order, of surfaces (by mesh and by rays) and of volumes. */
-TEST(clip_planes_add_up) {
+SLOW_TEST(clip_planes_add_up) {
     static const char *const ways[] = {"--mode vicinity --samples 4", "--mode lambert --raycast", "--mode dvr --exposure 1"};
     static const char *const planes[] = {"--clip 1,0,0,-12", "--clip 0,-1,0,18", "--clip 1,0,0,-12 --clip 0,-1,0,18",
                                          "--clip 0,-1,0,18 --clip 1,0,0,-12", ""};
@@ -361,15 +361,15 @@ TEST(clip_planes_add_up) {
 }
 
 /* What is said of volume rendering changes its picture as it should. */
-TEST(methods_local_light_and_presets_are_seen) {
+SLOW_TEST(methods_local_light_and_presets_are_seen) {
     static const char *const ways[] = {"", "--method sweep", "--method brute", "--method paper", "--method paper --local", "--preset grey",
         "--preset hot", "--preset cool-warm", "--preset spectrum"};
-    const int count = QUICK_SUITE ? 6 : 9;
-    unsigned char *picture[9];
+    enum { COUNT = sizeof ways / sizeof *ways };
+    unsigned char *picture[COUNT];
     char command[512];
     int shape[3];
     double outliers;
-    for (int k = 0; k < count; k++) {
+    for (int k = 0; k < COUNT; k++) {
         snprintf(command, sizeof command, "procedural:engine-block:40 --mode dvr --size 48x48 --exposure 1 %s --out '%s'", ways[k],
                  temporary("way.png"));
         run_result r = run_viewer(command);
@@ -378,19 +378,19 @@ TEST(methods_local_light_and_presets_are_seen) {
         if (!picture[k]) return;
     }
     CHECK(!memcmp(picture[0], picture[1], 48 * 48 * 3), "the default is not sweeps");
-    for (int k = 2; k < count; k++)
+    for (int k = 2; k < COUNT; k++)
         for (int i = k < 5 ? 1 : 0; i < k; i++) {
             double difference = picture_difference(picture[i], picture[k], 48, 48, &outliers);
             CHECK(difference > (k < 5 ? 0.1 : 1), "\"%s\" looks like \"%s\": %g", ways[i], ways[k], difference);
             if (k < 4) CHECK(difference < 12, "\"%s\" differs from \"%s\" by %g", ways[i], ways[k], difference);
         }
-    for (int k = 0; k < count; k++) free(picture[k]);
+    for (int k = 0; k < COUNT; k++) free(picture[k]);
 }
 
 /* Scenes of isosurfaces have light for volume rendering, too: what is black at any exposure has none. */
-TEST(every_scene_is_lit_in_volume_rendering) {
+SLOW_TEST(every_scene_is_lit_in_volume_rendering) {
     static const char *const scenes[] = {"engine-block", "cavity", "torus-sphere-plane", "cthead"};
-    for (int k = QUICK_SUITE; k < (getenv("ISOGI_DATA") ? 4 : 3); k++) { /* the first is by far the largest */
+    for (int k = 0; k < (getenv("ISOGI_DATA") ? 4 : 3); k++) {
         unsigned char *picture[2] = {NULL, NULL};
         double outliers;
         int shape[3];
@@ -408,7 +408,7 @@ TEST(every_scene_is_lit_in_volume_rendering) {
     }
 }
 
-TEST(compact_pyramids_take_less_memory_and_show_the_same) {
+SLOW_TEST(compact_pyramids_take_less_memory_and_show_the_same) {
     unsigned char *picture[2] = {NULL, NULL};
     double memory[2] = {0, 0}, outliers, difference = 1;
     int shape[3];
