@@ -480,7 +480,7 @@ TEST(boxes_hold_what_their_voxels_say) {
 TEST(pieces_of_rays_are_those_whose_blocks_hold_the_ranges) {
     test_random r = {21};
     long within = 0, between = 0, pieces = 0, touching = 0;
-    for (int v = 0; v < (LONG_SUITE ? 200 : QUICK_SUITE ? 12 : 20); v++) {
+    for (int v = 0; v < (LONG_SUITE ? 200 : QUICK_SUITE ? 15 : 20); v++) {
         field f = field_new(70, 34, 66);
         field_fill(&f, v % KINDS, &r);
         for (int i = 0; i < f.size[0] * f.size[1] * f.size[2]; i++) f.value[i] = (double)(float)f.value[i];
