@@ -407,7 +407,8 @@ typedef struct isogi_view {
    z = near far / (far - d (far - near)), and INFINITY where d = 1. A peak at which geometry stands is on either side of it, by rounding:
    an isosurface drawn at a peak of its own value is brought nearer by a millionth. */
 
-/* The ray through the centre of pixel (x, y); fractions are allowed: pixel x covers x-1/2 .. x+1/2. dir is a unit vector.
+/* The ray through the centre of pixel (x, y); fractions are allowed: pixel x covers x-1/2 .. x+1/2. dir is a unit vector,
+   rounded to floats as that of pictures is not: from 1e5 voxels away it leads .01 voxel past.
    Where up is along the line of sight, another up is chosen; where eye and target coincide, the view is along -z. */
 ISOGI_API void isogi_view_ray(const isogi_view *view, double x, double y, double origin[3], float dir[3]);
 
@@ -3271,9 +3272,11 @@ static void isogi_dvr__cubic(const double c[8], const double in[3], const double
             for (n = 0; n < 2; n++) z[i][j][n] = ISOGI_DVR__MIX(y[i][j], n, 2);
 #undef ISOGI_DVR__MIX
     b[0] = z[0][0][0], b[3] = z[1][1][1];
-    b[1] = (0.25 * z[1][0][0] + 0.25 * z[0][1][0] + 0.25 * z[0][0][1]) * (4 / 3.0); /* quarters: three of the largest
-                                                                                       doubles are no double */
-    b[2] = (0.25 * z[1][1][0] + 0.25 * z[1][0][1] + 0.25 * z[0][1][1]) * (4 / 3.0);
+    for (i = 0; i < 2; i++) { /* means of three, of equal ones their own value: constant matter would have extrema else. Quarters and halves:
+                                 three of the largest doubles are no double */
+        const double p = z[1 - i][i][i], q = z[i][1 - i][i], r = z[i][i][1 - i];
+        b[1 + i] = 2 * (0.5 * p + ((0.25 * q - 0.25 * p) + (0.25 * r - 0.25 * p)) * (2 / 3.0));
+    }
 }
 
 static double isogi_dvr__bernstein(const double b[4], double u) {
@@ -3460,22 +3463,27 @@ typedef struct isogi_dvr__crossings {
     isogi_counters work;
 } isogi_dvr__crossings;
 
-static void isogi_dvr__begin_crossings(isogi_dvr__crossings *c, const isogi_dvr *d, const double origin[3], const float dir[3],
+/* The ray begins a voxel before it enters: its direction is rounded to floats, which from afar would lead elsewhere. */
+static void isogi_dvr__begin_crossings(isogi_dvr__crossings *c, const isogi_dvr *d, const double origin[3], const double dir[3],
                                        const isogi_dvr__march *m) {
+    const double before = m->enter - d->spacing / m->speed, start = before > 0 ? before : 0;
     isogi_ray ray;
     size_t i;
     int a;
-    c->dvr = d, c->shift = -m->enter, c->end = m->cut ? m->length : 1e300, c->count = d->transfer.peak_count, c->left = 1;
+    c->dvr = d, c->shift = start - m->enter, c->end = m->cut ? m->length : 1e300, c->count = d->transfer.peak_count, c->left = 1;
     memset(&c->work, 0, sizeof c->work);
     if (!c->count) return;
     memset(&ray, 0, sizeof ray);
-    for (a = 0; a < 3; a++) ray.origin[a] = origin[a], ray.dir[a] = c->dir[a] = dir[a], c->left += 3 * (uint64_t)d->volume.size[a];
+    for (a = 0; a < 3; a++) {
+        ray.origin[a] = origin[a] + start * dir[a], ray.dir[a] = c->dir[a] = (float)dir[a];
+        c->left += 3 * (uint64_t)d->volume.size[a];
+    }
     c->left *= c->count;
     for (i = 0; i < c->count; i++) {
         memset(&c->hit[i], 0, sizeof c->hit[i]);
         ray.isovalue = d->transfer.peaks[i].isovalue;
-        if (d->clip_count) ray.tmin = m->enter;
-        if (m->cut) ray.tmax = (m->enter + m->length) * (1 + 1e-6);
+        if (d->clip_count) ray.tmin = m->enter - start;
+        if (m->cut) ray.tmax = (m->enter + m->length - start) * (1 + 1e-6);
         if (d->transfer.peaks[i].opacity > 0) isogi_vol_intersect(d->desc.pyramid, &ray, 1, &c->hit[i], &c->work);
         c->t[i] = c->hit[i].side && c->hit[i].t + c->shift <= c->end ? c->hit[i].t + c->shift : 1e300;
     }
@@ -3635,8 +3643,7 @@ static double isogi_dvr__transmittance(const isogi_dvr *d, const double grid[3],
         return clear > ISOGI_DVR__NEGLIGIBLE ? clear : 0;
     }
     if (d->transfer.peak_count) {
-        float dir[3] = {(float)direction[3], (float)direction[4], (float)direction[5]};
-        isogi_dvr__begin_crossings(crossings, d, world, dir, &march);
+        isogi_dvr__begin_crossings(crossings, d, world, direction + 3, &march);
         while (clear > ISOGI_DVR__NEGLIGIBLE && (i = isogi_dvr__first_crossing(crossings, 1e300)) < crossings->count) {
             clear *= 1 - (double)d->transfer.peaks[i].opacity;
             isogi_dvr__pass_crossing(crossings, i);
@@ -5474,6 +5481,7 @@ typedef struct isogi_dvr__pixel_ray {
     const isogi_dvr *dvr;
     const isogi_dvr__lights *lights;
     float dir[3];
+    double along[3];      /* dir, not rounded: where the ray goes */
     double clear, rgb[3]; /* transmittance and premultiplied colour so far */
     double end;           /* transmittance at which the ray ends */
     double front[3];      /* from a sample to where its visibility is looked up: grid */
@@ -7294,20 +7302,16 @@ static int isogi_dvr__begin_pixel(const isogi_dvr__render_job *job, int x, int y
                                   isogi_counters *work) {
     const isogi_dvr *d = job->dvr;
     float *out = job->pixels + 5 * ((size_t)y * (size_t)job->view->width + (size_t)x);
-    double world[3], dir[3];
+    double dir[3];
     int a;
     for (a = 0; a < 4; a++) out[a] = 0;
     out[4] = HUGE_VALF;
     work->rays++;
     memset(ray, 0, sizeof *ray);
-    isogi_dvr__camera_ray(&job->camera, job->view, x, y, world);
-    for (a = 0; a < 3; a++) { /* the ray of isogi_view_ray; gcc 12 widens again what it has not rounded, where it makes vectors of it */
-        volatile float rounded = (float)world[a];
-        ray->dir[a] = rounded, world[a] = (double)ray->dir[a];
-    }
-    isogi_dvr__transform(d->to_grid, world, dir);
-    if (!isogi_dvr__begin(march, d, job->eye, dir, sqrt(isogi_dvr__dot(world, world)), isogi_dvr__until(job->view, x, y),
-                          d->desc.step)) return 0;
+    isogi_dvr__camera_ray(&job->camera, job->view, x, y, ray->along);
+    for (a = 0; a < 3; a++) ray->dir[a] = (float)ray->along[a];
+    isogi_dvr__transform(d->to_grid, ray->along, dir);
+    if (!isogi_dvr__begin(march, d, job->eye, dir, 1, isogi_dvr__until(job->view, x, y), d->desc.step)) return 0;
     march->silhouette = d->desc.silhouette, march->unlit = d->desc.shading == ISOGI_DVR_UNLIT;
     isogi_dvr__jitter(march, d->desc.jitter, x, y);
     ray->dvr = d, ray->lights = &job->lights, ray->clear = 1, ray->end = 1 - (double)d->desc.opaque;
@@ -7319,7 +7323,7 @@ static void isogi_dvr__cast_pixel(const isogi_dvr__render_job *job, isogi_dvr__p
     double eye[3];
     int a;
     for (a = 0; a < 3; a++) eye[a] = (double)job->view->eye[a];
-    if (!isogi_dvr__by_piece(job->dvr)) isogi_dvr__begin_crossings(crossings, job->dvr, eye, ray->dir, march);
+    if (!isogi_dvr__by_piece(job->dvr)) isogi_dvr__begin_crossings(crossings, job->dvr, eye, ray->along, march);
     isogi_dvr__cast(ray, march, crossings);
 }
 
@@ -8310,6 +8314,7 @@ typedef struct isogi_dvr__tet_job {
     const isogi_tets *mesh;
     const isogi_tet_desc *desc;
     const isogi_view *view;
+    isogi_dvr__camera camera;
     const isogi_dvr *dvr; /* what the integrals ask for: transfer function and settings */
     size_t across;
     float *pixels; /* as in isogi_dvr__render_job */
@@ -8328,7 +8333,7 @@ static void isogi_dvr__try_tets(isogi_dvr__pixel_ray *pixel, const isogi_dvr__te
         *pixel = fresh;
         memset(&ray, 0, sizeof ray), memset(&span, 0, sizeof span);
         ray.mesh = job->mesh, ray.desc = job->desc;
-        for (a = 0; a < 3; a++) ray.origin[a] = origin[a], ray.dir[a] = (double)pixel->dir[a] + attempt * (a + 1) * 1e-9;
+        for (a = 0; a < 3; a++) ray.origin[a] = origin[a], ray.dir[a] = pixel->along[a] + attempt * (a + 1) * 1e-9;
         ray.speed = sqrt(isogi_dvr__dot(ray.dir, ray.dir)), ray.until = until / ray.speed;
         span.silhouette = job->desc->space == ISOGI_DVR_DATA || job->desc->silhouette != ISOGI_DVR_SILHOUETTE_APPROXIMATE
                               ? job->desc->silhouette
@@ -8350,7 +8355,8 @@ static void isogi_dvr__tet_task(void *arg, size_t tile) {
             isogi_dvr__pixel_ray ray;
             double origin[3];
             memset(&ray, 0, sizeof ray);
-            isogi_view_ray(job->view, x, y, origin, ray.dir);
+            isogi_dvr__camera_ray(&job->camera, job->view, x, y, ray.along);
+            for (a = 0; a < 3; a++) origin[a] = (double)job->view->eye[a], ray.dir[a] = (float)ray.along[a];
             ray.dvr = job->dvr, ray.clear = 1, ray.end = 1 - (double)job->desc->opaque;
             isogi_dvr__try_tets(&ray, job, origin, until, &job->work[tile]);
             for (a = 0; a < 3; a++) out[a] = (float)ray.rgb[a];
@@ -8410,6 +8416,7 @@ ISOGI_API isogi_result isogi_dvr_tets_render(const isogi_tets *tets, const isogi
     result = isogi_dvr__integral_build(&settings.integral, &settings.transfer, &settings.desc, &tets->context);
     if (result == ISOGI_OK) {
         job.mesh = tets, job.desc = &resolved, job.view = view, job.dvr = &settings, job.depth = depth != NULL;
+        isogi_dvr__set_camera(&job.camera, view);
         job.across = ((size_t)view->width + ISOGI_DVR__TILE - 1) / ISOGI_DVR__TILE;
         tiles = job.across * (((size_t)view->height + ISOGI_DVR__TILE - 1) / ISOGI_DVR__TILE);
         result = isogi_dvr__run_tets(&job, &tets->context, tiles, premultiplied, depth, counters);
