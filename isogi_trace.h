@@ -560,7 +560,9 @@ ISOGI_API size_t isogi_trace_memory(const isogi_trace *trace); /* bytes that the
 #define ISOGI_TRACE__CARRYING 3.0  /* as what each level takes beside its texels' rays; for progress alone */
 #define ISOGI_TRACE__CHUNK 2048    /* nodes that lie together; a power of two, and a multiple of SWEEP */
 #define ISOGI_TRACE__SLAB 8388608  /* bytes of chunks that are allocated together: some huge pages */
-#define ISOGI_TRACE__PROBE_MOST 8    /* samples of a probe: as many as there are hits that read it, but no more than this */
+#define ISOGI_TRACE__PROBE_MOST 8    /* samples of a probe: as many as there are hits that read it, but no more than this, */
+#define ISOGI_TRACE__PROBE_DEEP 64   /* or as that share of this which it has of the samples of a texel, or probe, */
+#define ISOGI_TRACE__PROBE_SAME 4    /* so many of which read it at least */
 #define ISOGI_TRACE__WATCHED 6       /* passes that look for probes whose light has settled */
 #define ISOGI_TRACE__PASSES 100      /* after which all that they would still add is worked out at once, */
 #define ISOGI_TRACE__ROUNDS 2000     /* in so many rounds at most, */
@@ -3642,7 +3644,7 @@ typedef struct isogi_trace__node {
     isogi_hit place; /* where */
     uint64_t key;    /* probe: of its random numbers */
     isogi_trace__brick *brick; /* texel: where its light goes; NULL of probes */
-    uint32_t texel[3], slot;
+    uint32_t texel[3], slot; /* slot, of a probe: the batch of its samples */
     uint32_t samples, light_samples, hits;
     signed char from; /* side of the surface: 1 low, -1 high */
     float albedo[3], error;
@@ -3656,6 +3658,7 @@ typedef struct isogi_trace__node {
 typedef struct isogi_trace__segment {
     size_t entries, hits;
     size_t numbers; /* in the block of memory that begins at `node`; 0: it lies in that of a segment before */
+    uint32_t batch; /* of probes: of those that were gathered anew, the slot of the node tells which has its hits */
     uint32_t *node, *begin, *probe;
     float (*albedo)[3];     /* of each hit, where colours go by place; else NULL: it is the node's, by isovalue */
     uint32_t *order;        /* of probes: the first `open` are the entries that passes still change; NULL of texels */
@@ -3693,6 +3696,9 @@ typedef struct isogi_trace__stage {
     signed char finished; /* texel: 1: no more samples are wanted; 2: its light was loaded */
     uint8_t readers;      /* probe: hits that take their light from it, those that texels are still to make included */
     uint8_t wanted;       /* probe: samples; until its generation begins, the least of them */
+    uint8_t deep;         /* probe: samples that a node which reads it often asks for; */
+    uint16_t same;        /* hits of the last one that read it, */
+    uint32_t reader;      /* which is this one: its number, twice, and 1 for a probe */
 } isogi_trace__stage;
 
 /* Nodes that stay where they are once they are made. guides: of texels; reflectors, links: of probes. values: their four kinds (below), one
@@ -3811,6 +3817,10 @@ struct isogi_trace__feedback {
     size_t cursor, probe_cursor; /* nodes before these have nothing to do at this level */
     size_t probe_end;            /* of the generation of probes at work: later ones were made by its rays, */
     size_t probe_counted;        /* of which those before this one know how many samples they want */
+    size_t probe_checked;        /* since the last batch: those before this one have been asked whether they want to be gathered anew, */
+    size_t probe_again;          /* of which this is the first that does, number + 1; 0: none */
+    uint32_t probe_batches;
+    int renewed;                 /* some probes have been */
     int level;
     int on_probes; /* the batch is of probes */
     int diverges;   /* no light would be all of it */
@@ -4780,9 +4790,25 @@ static uint64_t isogi_trace__generation(isogi_trace *t, uint64_t limit) {
     for (; f->probe_counted < f->probes.count && limit; f->probe_counted++, limit--) {
         isogi_trace__stage *stage = isogi_trace__stage_at(&f->probes, f->probe_counted);
         uint32_t wanted = stage->readers > stage->wanted ? stage->readers : stage->wanted; /* that was the least */
-        stage->wanted = (uint8_t)(wanted < most ? wanted : most);
+        wanted = wanted < most ? wanted : most;
+        stage->wanted = (uint8_t)(wanted > stage->deep ? wanted : stage->deep);
     }
     if (f->probe_counted == f->probes.count) f->probe_end = f->probes.count;
+    return limit;
+}
+
+/* Where a texel's rays meet but few probes, as in a pocket, it has their light, and what their few samples do not know its own never
+   would: most often they see no way out at all. Such a probe has more samples, by its share of the texel's; it is gathered anew when it
+   should have twice as many. (By what its samples brought, as that hardly any has escaped, it must not be: those that chance made bright
+   would stay, and light with them.) Asked for when no probe is left to be gathered, so that slices of a bake do not matter. */
+static uint64_t isogi_trace__renewals(isogi_trace *t, uint64_t limit) {
+    isogi_trace__feedback *f = t->feedback;
+    for (; f->probe_checked < f->probes.count && limit; f->probe_checked++, limit--) {
+        isogi_trace__stage *stage = isogi_trace__stage_at(&f->probes, f->probe_checked);
+        if (stage->deep >= 2 * stage->wanted) stage->level = 0, stage->wanted = stage->deep, f->renewed = 1;
+        if (!stage->level && !f->probe_again) f->probe_again = f->probe_checked + 1;
+    }
+    if (f->probe_checked == f->probes.count && f->probe_again) f->probe_cursor = f->probe_again - 1, f->probe_again = 0;
     return limit;
 }
 
@@ -4802,6 +4828,7 @@ static int isogi_trace__spans_fill(isogi_trace *t, uint64_t limit, uint64_t *spe
     if (!f->span_count && f->cursor == f->texels.count) {
         f->on_probes = 1;
         if (f->probe_cursor == f->probe_end) look = isogi_trace__generation(t, look);
+        if (f->probe_cursor == f->probes.count) look = isogi_trace__renewals(t, look);
         for (; f->probe_cursor < f->probe_end; f->probe_cursor++) {
             const isogi_trace__stage *stage = isogi_trace__stage_at(&f->probes, f->probe_cursor);
             if (!stage->level && !isogi_trace__spans_add(t, &f->probes, f->probe_cursor, limit)) break;
@@ -4834,7 +4861,7 @@ static isogi_result isogi_trace__segment_new(isogi_trace *t, isogi_trace__segmen
     for (i = 0; i < f->piece_count; i++) f->pieces[i].first_hit = (uint32_t)hits, hits += f->pieces[i].hits;
     *made = isogi_trace__probes_meet(t);
     memset(s, 0, sizeof *s);
-    s->entries = f->span_count, s->hits = hits;
+    s->entries = f->span_count, s->hits = hits, s->batch = f->probe_batches;
     s->numbers = (f->on_probes ? 3 : 2) * s->entries + 1 + (t->scene.desc.material ? 4 : 1) * hits;
     s->node = (uint32_t *)isogi_allocate(&t->context, s->numbers, sizeof(uint32_t));
     if (!s->node) return ISOGI_NO_MEMORY;
@@ -4889,6 +4916,12 @@ static void isogi_trace__texel_guess(isogi_trace *t, size_t node) {
     n->brick->state[n->slot] = ISOGI_TRACE__DRAFT;
 }
 
+/* A probe is gathered anew. */
+static void isogi_trace__node_clear(isogi_trace__node *n) {
+    memset(n->steady, 0, sizeof n->steady), memset(n->light, 0, sizeof n->light), memset(n->bright, 0, sizeof n->bright);
+    n->light_spread = n->bright_spread = n->square = 0, n->samples = n->light_samples = n->hits = 0;
+}
+
 /* Takes over what a span brought; a texel that had nothing is given a first answer. */
 static void isogi_trace__span_commit(isogi_trace *t, isogi_trace__set *set, const isogi_trace__span *s) {
     isogi_trace__node *n = isogi_trace__node_at(set, s->node);
@@ -4896,6 +4929,8 @@ static void isogi_trace__span_commit(isogi_trace *t, isogi_trace__set *set, cons
     float *direct = isogi_trace__values_at(set, s->node, ISOGI_TRACE__DIRECT_VALUES, (size_t)t->values);
     const float *from = isogi_trace__span_direct(t, s);
     int a, fresh = n->brick && !n->samples;
+    if (!n->brick && !s->first) isogi_trace__node_clear(n), memset(direct, 0, (size_t)t->values * sizeof *direct);
+    if (!n->brick) n->slot = t->feedback->probe_batches;
     for (a = 0; a < t->values; a++) direct[a] += from[a];
     for (a = 0; a < 3; a++)
         n->steady[a] += s->steady[a], n->light[a] += s->light[a], n->bright[a] += s->bright[a];
@@ -4911,15 +4946,28 @@ static void isogi_trace__span_commit(isogi_trace *t, isogi_trace__set *set, cons
    whose hits will read the same probes. As often as there are samples to come costs more rays, at no smaller error. */
 static void isogi_trace__readers_count(isogi_trace *t, size_t made, size_t strand, size_t strands) {
     isogi_trace__feedback *f = t->feedback;
-    uint32_t weight = !f->on_probes && isogi_trace__block(t, f->level + 1) < (uint32_t)t->scene.desc.samples ? 2 : 1;
-    size_t i;
-    for (i = f->probes.count; i < f->probes.count + made; i++)
-        if ((i / 64 & (strands - 1)) == strand) isogi_trace__stage_at(&f->probes, i)->readers = 0;
-    for (i = 0; i < f->sample_count; i++) {
-        uint8_t *readers;
-        if (f->found[i] == ISOGI_TRACE__ESCAPED || ((f->found[i] - 1) / 64 & (strands - 1)) != strand) continue;
-        readers = &isogi_trace__stage_at(&f->probes, f->found[i] - 1)->readers;
-        if (*readers < ISOGI_TRACE__PROBE_MOST) *readers = (uint8_t)(*readers + weight);
+    const uint32_t block = isogi_trace__block(t, f->level + 1) - isogi_trace__block(t, f->level);
+    const uint32_t weight = !f->on_probes && isogi_trace__block(t, f->level + 1) < (uint32_t)t->scene.desc.samples ? 2 : 1;
+    size_t i, k;
+    for (i = f->probes.count; i < f->probes.count + made; i++) {
+        isogi_trace__stage *stage = isogi_trace__stage_at(&f->probes, i);
+        if ((i / 64 & (strands - 1)) == strand) stage->readers = stage->deep = 0, stage->same = 0, stage->reader = 0;
+    }
+    for (i = 0; i < f->span_count; i++) {
+        const isogi_trace__plan *plan = &f->plans[i];
+        const uint32_t reader = 2 * plan->node + (uint32_t)f->on_probes, samples = f->on_probes ? plan->count : block;
+        for (k = plan->offset; k < plan->offset + plan->count; k++) {
+            isogi_trace__stage *stage;
+            uint32_t deep;
+            if (f->found[k] == ISOGI_TRACE__ESCAPED || ((f->found[k] - 1) / 64 & (strands - 1)) != strand) continue;
+            stage = isogi_trace__stage_at(&f->probes, f->found[k] - 1);
+            if (stage->readers < ISOGI_TRACE__PROBE_MOST) stage->readers = (uint8_t)(stage->readers + weight);
+            if (stage->reader != reader) stage->reader = reader, stage->same = 0;
+            if (stage->same < 65535) stage->same++;
+            if (stage->same < ISOGI_TRACE__PROBE_SAME) continue;
+            deep = stage->same < samples ? ISOGI_TRACE__PROBE_DEEP * stage->same / samples : ISOGI_TRACE__PROBE_DEEP;
+            if (deep > stage->deep && deep > ISOGI_TRACE__PROBE_MOST) stage->deep = (uint8_t)deep;
+        }
     }
 }
 
@@ -4991,7 +5039,7 @@ static isogi_result isogi_trace__spans_run(isogi_trace *t, double from, double t
     taken.strands = tasks < 16 ? 1 : ISOGI_TRACE__STRANDS, tasks += taken.strands;
     if (taken.strands > 1) isogi_parallel(&silent, tasks, isogi_trace__take_task, &taken, 0, 1);
     else for (i = 0; i < tasks; i++) isogi_trace__take_task(&taken, i); /* not worth a thread */
-    f->probes.count += taken.made;
+    f->probes.count += taken.made, f->probe_checked = f->probe_again = 0, f->probe_batches++;
     isogi_trace__segment_add(set, &segment);
     for (i = 0; i < isogi_trace__cast_tasks(f); i++) isogi_trace__add(&t->counters, &t->task_counters[i]);
     if (!f->on_probes) f->partial += f->sample_count;
@@ -5093,8 +5141,9 @@ static void isogi_trace__pass_task(void *arg, size_t segment) {
     isogi_trace__segment *s = &set->segments[t->feedback->carried + segment];
     size_t channels = t->scene.desc.mode == ISOGI_TRACE_TRANSFER ? (size_t)t->scene.desc.transfer_channels : 3, i;
     if (t->feedback->pass == 1) {
-        for (i = 0; i < s->entries; i++) s->order[i] = (uint32_t)i;
-        s->open = s->entries, s->settled = 0;
+        for (i = s->open = 0; i < s->entries; i++)
+            if (!t->feedback->renewed || isogi_trace__node_at(set, s->node[i])->slot == s->batch) s->order[s->open++] = (uint32_t)i;
+        s->settled = 0;
     }
     /* the compiler unrolls it; after a few passes nearly all of the probes that are left read each other in a circle */
     if (t->values == 3 && channels == 3 && !s->albedo)
@@ -6038,7 +6087,8 @@ static void isogi_trace__group_free(isogi_trace *t) {
     isogi_trace__set_free(t, &f->texels);
     isogi_trace__set_free(t, &f->probes);
     f->cursor = f->probe_cursor = f->probe_end = f->probe_counted = f->placed = f->settled = f->carried = f->span_count = 0;
-    f->phase = ISOGI_TRACE__AT_REST, f->unpublished = f->making = f->level = f->bounced = 0, f->partial = f->unfinished = 0;
+    f->phase = ISOGI_TRACE__AT_REST, f->unpublished = f->making = f->level = f->bounced = f->renewed = 0, f->partial = f->unfinished = 0;
+    f->probe_checked = f->probe_again = 0;
     f->probe_part = f->most = 0;
 }
 
@@ -6338,7 +6388,8 @@ static isogi_result isogi_trace__trace_batch(isogi_trace *t, uint64_t limit, int
     f->partial += f->on_probes ? 0 : f->sample_count, to = isogi_trace__told(t);
     f->partial -= f->on_probes ? 0 : f->sample_count;
     result = isogi_trace__spans_run(t, from, to);
-    if (result != ISOGI_OK) f->cursor = cursor, f->probe_cursor = probe_cursor; /* it is still to come */
+    if (result != ISOGI_OK) /* it is still to come */
+        f->cursor = cursor, f->probe_cursor = probe_cursor, f->probe_checked = f->probe_again = 0;
     return result;
 }
 
@@ -7779,6 +7830,8 @@ ISOGI_API isogi_result isogi_trace_gather_field(const isogi_trace_desc *desc, is
 #undef ISOGI_TRACE__CELL_SAMPLES
 #undef ISOGI_TRACE__PROBE_ERROR
 #undef ISOGI_TRACE__PROBE_MOST
+#undef ISOGI_TRACE__PROBE_DEEP
+#undef ISOGI_TRACE__PROBE_SAME
 #undef ISOGI_TRACE__NEAR_RATIO
 #undef ISOGI_TRACE__CHUNK
 #undef ISOGI_TRACE__SLAB
