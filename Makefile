@@ -96,10 +96,10 @@ build/flags: FORCE
 
 # ---- demo: what the user chose reaches the script through the environment, whatever characters it holds ----
 
-demo: export VOLUME := $(VOLUME)
-demo: export ISO := $(ISO)
-demo: export SPACING := $(SPACING)
-demo: export UP := $(UP)
+demo: override export VOLUME := $(value VOLUME)
+demo: override export ISO := $(value ISO)
+demo: override export SPACING := $(value SPACING)
+demo: override export UP := $(value UP)
 demo:
 	@$(QUIET_MAKE) build/viewer
 	@sh examples/demo.sh

@@ -350,9 +350,10 @@ ISOGI_API isogi_result isogi_trace_step(isogi_trace *trace, uint64_t max_rays, d
    the light is reflected and comes from lights without size, whose shadows are hard: at albedo 0.8, in narrow tunnels, twice the error
    told covers 60 to 90 % of points; and where colours change strongly within a few voxels, which samples too near each other may miss:
    in a closed room of chequers of .05 and .95, 2 voxels wide, errors are twice those told with 16 samples, 3.5 times with 128 (4 % of
-   the light). Nor is the error of negative lights told in full. They know nothing of the lattice (on steep fields that adds more than
-   samples do; closer texels help), and of glows only what emission_points tell: where desc.material alone makes something glow, give the
-   brightest of it there. */
+   the light); and close to sphere lights that stand half in the ground, of which few samples meet what is above it (7 % of such points
+   lie beyond twice the error). Nor is the error of negative lights told in full. They know nothing of the lattice (on steep fields that
+   adds more than samples do; closer texels help), and of glows only what emission_points tell: where desc.material alone makes something
+   glow, give the brightest of it there. */
 ISOGI_API isogi_result isogi_trace_sample(const isogi_trace *trace, const float (*points)[3], size_t count, float (*irradiance)[3],
                                           float *error);
 /* A new lighting. TRANSFER: a distant one (environment and directional lights; point, sphere and rectangle lights are ISOGI_INVALID); no

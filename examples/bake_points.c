@@ -42,5 +42,6 @@ int main(int argc, char **argv) {
         printf("%c%s", pixel[i] ? ".,:;-=+*oO#%@"[shade < 12 ? shade : 12] : ' ', i % WIDTH == WIDTH - 1 ? "\n" : "");
     }
     isogi_vol_free(pyramid);
-    return result != ISOGI_OK;
+    if (result != ISOGI_OK) return fprintf(stderr, "%s\n", isogi_result_string(result)), 1;
+    return fflush(stdout) || ferror(stdout) ? (perror("standard output"), 1) : 0;
 }

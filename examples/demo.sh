@@ -22,7 +22,7 @@ if [ "$VOLUME" ]; then
     name=${name%%.*}${ISO:+-$(printf %s "$ISO" | tr -c 0-9A-Za-z.+- _)}
     set -- "$VOLUME" ${ISO:+--iso "$ISO"} ${SPACING:+--spacing "$SPACING"} ${UP:+--up "$UP"}
     picture "$name-phong" "$name, light by the normal alone" "$@" --mode phong
-    picture "$name" "$name, global light" "$@" --mode irradiance
+    [ $failed = 1 ] || picture "$name" "$name, global light" "$@" --mode irradiance
 else
     [ "$ISO$SPACING$UP" ] && echo "ISO, SPACING and UP are for a VOLUME of your own: there is none, so these are shapes made here"
     picture engine-block-phong "An engine block, light by the normal alone: the usual picture, to compare with" \

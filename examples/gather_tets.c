@@ -102,5 +102,5 @@ int main(int argc, char **argv) {
         printf("%c%s", pixel[i] ? ".,:;-=+*oO#%@"[shade < 12 ? shade : 12] : ' ', i % WIDTH == WIDTH - 1 ? "\n" : "");
     }
     printf("%zu triangles, %zu points lit\n", triangles, count);
-    return 0;
+    return fflush(stdout) || ferror(stdout) ? (perror("standard output"), 1) : 0;
 }

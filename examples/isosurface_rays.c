@@ -33,5 +33,5 @@ int main(int argc, char **argv) {
             putchar(hit.side ? ".:-=+*#%@"[(int)(light > 0 ? light * 8.9f : 0)] : ' ');
         }
     isogi_vol_free(pyramid);
-    return 0;
+    return fflush(stdout) || ferror(stdout) ? (perror("standard output"), 1) : 0;
 }

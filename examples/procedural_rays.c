@@ -41,5 +41,5 @@ int main(int argc, char **argv) {
         }
     printf("%.0f calls of the function for each of %d rays\n", (double)counters.cubics / (WIDTH * HEIGHT), WIDTH * HEIGHT);
     isogi_vol_free(pyramid);
-    return 0;
+    return fflush(stdout) || ferror(stdout) ? (perror("standard output"), 1) : 0;
 }

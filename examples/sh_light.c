@@ -35,4 +35,5 @@ int main(int argc, char **argv) {
                 putchar(z > 0 ? " .:-=+*#%@"[rgb[1] <= 0 ? 0 : rgb[1] >= 5 ? 9 : (int)(2 * rgb[1])] : ' ');
             }
     }
+    return fflush(stdout) || ferror(stdout) ? (perror("standard output"), 1) : 0;
 }

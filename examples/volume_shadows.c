@@ -38,4 +38,5 @@ int main(int argc, char **argv) {
         for (int i = 0; i < 3; i++)
             for (int x = 0; x < WIDTH; x++) putchar(" .:-=+*#%@"[(int)(9.99f * fminf(sqrtf(0.5f * image[i][row][x][0]), 1))]);
     isogi_vol_free(pyramid);
+    return fflush(stdout) || ferror(stdout) ? (perror("standard output"), 1) : 0;
 }

@@ -17,7 +17,7 @@ static void remove_folder(void) {
 }
 
 static const char *temporary(const char *name) {
-    static char path[16][256];
+    static char path[16][300];
     static int turn;
     if (!*folder) {
         strcpy(folder, "/tmp/isogi_programs_XXXXXX");

@@ -13,6 +13,11 @@ TEST(programs_without_arguments_run) {
         snprintf(path, sizeof path, "build/%s", names[i]);
         run_result r = run_program(path, "");
         CHECK(r.status == 0 && !*r.error && strlen(r.output) > 20, "%s: status %d, %s", names[i], r.status, r.error);
+        if (access("/dev/full", W_OK)) continue;
+        char command[400], text[256];
+        snprintf(command, sizeof command, "build/%s 2>'%s' >/dev/full", names[i], temporary("full"));
+        CHECK(system(command) && read_text(temporary("full"), text, sizeof text) && strstr(text, "standard output: "),
+              "%s to a full disk: \"%s\"", names[i], text);
     }
     for (size_t i = 0; i < 7; i++) {
         char path[64];
@@ -55,6 +60,14 @@ TEST(links_to_files_yet_to_come_are_followed) {
     CHECK(symlink("to_be", temporary("link3")) == 0, "symlink");
     snprintf(arguments, sizeof arguments, "procedural:gyroid:8 --samples 1 --raw '%s' --out '%s'", temporary("to_be"), temporary("link3"));
     check_refusal("build/bake", arguments, 1, "is the file of --out");
+}
+
+TEST(names_may_be_as_long_as_they_can_be) {
+    char name[256], arguments[700];
+    memset(name, 'n', 251), strcpy(name + 251, ".png");
+    snprintf(arguments, sizeof arguments, "procedural:gyroid:8 --mode lambert --size 8x8 --out '%s'", temporary(name));
+    run_result r = run_program("build/viewer", arguments);
+    CHECK(r.status == 0, "status %d: %s", r.status, r.error);
 }
 
 /* What takes the place of a file may be read and written by the same people; one that may not be written stays. */

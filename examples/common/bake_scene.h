@@ -74,7 +74,7 @@ static inline int bake_scene_option(bake_scene *s, int argc, char **argv, int *i
         "a whole number, 0 to 256"};
     isogi_trace_desc *d = &s->desc;
     const char *text;
-    double x[3];
+    double x[3] = {0, 0, 0};
     int which, k, ok = 1;
     if (!strcmp(argv[*i], "--both-sides")) return d->sides = ISOGI_TRACE_BOTH_SIDES, 1;
     if (!strcmp(argv[*i], "--feedback")) return d->method = ISOGI_TRACE_FEEDBACK, 1;
@@ -90,7 +90,10 @@ static inline int bake_scene_option(bake_scene *s, int argc, char **argv, int *i
         d->isovalue_min = x[0] < 0 || x[1] > 0 ? x[0] : -DBL_MIN, d->isovalue_max = x[1];
         break;
     case 3: ok = numbers(text, ',', 3, 1e-9, 1e9, s->spacing); break;
-    case 4: s->env_name = text, ok = hdr_read(text, &s->env, s->error); if (!ok) return -1; break;
+    case 4:
+        free(s->env.rgb), s->env.rgb = NULL, s->env_name = text;
+        if (!hdr_read(text, &s->env, s->error)) return -1;
+        break;
     case 5: ok = d->lighting.light_count < BAKE_LIGHTS && light_parse(text, &s->lights[d->lighting.light_count]),
         d->lighting.light_count += (size_t)ok; break;
     case 6: ok = numbers(text, ',', 3, 0, 1, x); for (k = 0; ok && k < 3; k++) d->albedo[k] = (float)x[k]; break;

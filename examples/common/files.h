@@ -139,9 +139,10 @@ static inline int file_write_bytes(int file, const unsigned char *data, size_t s
 }
 
 static inline int file_temporary(const char *target, char name[PATH_MAX], const char *path, char *error) {
+    const char *slash = strrchr(target, '/');
     int file, attempt = 0;
-    do {
-        snprintf(name, PATH_MAX, "%.*s.%ld-%d.tmp", PATH_MAX - 32, target, (long)getpid(), attempt);
+    do { /* short: the target's own name may be as long as names can be */
+        snprintf(name, PATH_MAX, "%.*s.%ld-%d.tmp", slash ? (int)(slash - target) + 1 : 0, target, (long)getpid(), attempt);
         file = open(name, O_WRONLY | O_CREAT | O_EXCL, 0666);
     } while (file < 0 && errno == EEXIST && ++attempt < 100);
     if (file < 0) file_fail(error, "%s: cannot be written: %s", path, strerror(errno));
