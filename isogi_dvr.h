@@ -3272,8 +3272,8 @@ static void isogi_dvr__cubic(const double c[8], const double in[3], const double
             for (n = 0; n < 2; n++) z[i][j][n] = ISOGI_DVR__MIX(y[i][j], n, 2);
 #undef ISOGI_DVR__MIX
     b[0] = z[0][0][0], b[3] = z[1][1][1];
-    for (i = 0; i < 2; i++) { /* means of three, of equal ones their own value: constant matter would have extrema else. Quarters and halves:
-                                 three of the largest doubles are no double */
+    for (i = 0; i < 2; i++) { /* means of three, of equal ones their own value: constant matter would have extrema else. Quarters and
+                                 halves: three of the largest doubles are no double */
         const double p = z[1 - i][i][i], q = z[i][1 - i][i], r = z[i][i][1 - i];
         b[1 + i] = 2 * (0.5 * p + ((0.25 * q - 0.25 * p) + (0.25 * r - 0.25 * p)) * (2 / 3.0));
     }

@@ -92,7 +92,8 @@
      So with ISOGI_TRACE_PATHS, the reference. By default (FEEDBACK) a path ends at its first hit and takes the light there from a probe: a
      point near by on the same isosurface or one that runs closely beside it (up to .15 voxels by the gradient), in cells of 2 voxels (of
      the shortest edge, but half a voxel along every axis at least; where lights throw shadows less with more than 8 samples: 1.4 with 16,
-     1 from 32 on, but without desc.error) or an eighth of the ray's length, whose own hemisphere is gathered once in the same way; passes
+     1 from 32 on, but without desc.error) or an eighth of the ray's length, whose own hemisphere is gathered in the same way, by as many
+     samples as hits read it, but no more than 8, or its share of 64 in the hits of one texel: in a pocket those meet few probes; passes
      over the probes then bring all reflections without rays. What the sky and reflections bring is read from a plane, fitted to the light
      of texels up to three away that face the same way and whose isosurfaces run close to each other, as far as their noise could explain
      the difference (with one or two samples, of which none is known, all of them; from four on in two rounds: the second compares what the
@@ -101,7 +102,8 @@
      their shadows stay sharp (desc.unfiltered: nothing is); where one is wide, with soft shadows everywhere, all are sampled up to four
      times as often instead. Of TRANSFER all coefficients are read from that plane, in one round; the first four must be alike, and of
      each band as much is left to the texel as it differs from that by more than noise. Probes cost accuracy: half a per cent of the mean
-     and 1.8 % at a point in narrow channels of albedo 0.8 (test_trace_bake --long prints it). Lazy and adaptive bakes take samples in
+     and 1.8 % at a point in narrow channels of albedo 0.8 (test_trace_bake --long prints it); pockets a few voxels wide may be a tenth too
+     bright. Lazy and adaptive bakes take samples in
      blocks of 4, 16, 64, ... and every other texel along each axis first: soon every lookup has a value.
      A hit from within (only through an open border can a ray get there) is a surface too, with its normal turned.
 
@@ -179,7 +181,7 @@
                 a light. FEEDBACK: samples * (1 + half of these lights), each of the first four with all lights; where any light looks
                 wider than 8 degrees from the middle of the volume, four rays to every light with each of the first two samples, then two;
                 and for an image 2 to 4, half of which are below the horizon; for each probe as if by as many samples as hits read it, 1 (2
-                where the albedo is above .9) to 8, with one ray to the image for each.
+                where the albedo is above .9) to 8, in pockets 64, with one ray to the image for each.
 
    History  1.0  first release
 */

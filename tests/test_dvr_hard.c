@@ -455,7 +455,7 @@ TEST(pictures_from_afar_are_those_of_their_rays) {
                     if (peaks && (fabs(x[0] - 11.3) < 0.01 || fabs(x[1] - 11.3) < 0.01 || fabs(to - from) < 0.01)) continue;
                     if (to < from) expected = 0;
                     else if (peaks) expected = (x[0] < 11.3) != (x[1] < 11.3) ? 0.5 : 0;
-                    else expected = -expm1(-(to - from) * sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]) * 0.1 / (N - 1) * (x[0] + x[1]) / 2);
+                    else expected = -expm1(-(to - from) * sqrt(1 + s * s + t * t) * 0.1 / (N - 1) * (x[0] + x[1]) / 2);
                     worst = fmax(worst, fabs((double)image[i][3] - expected)), sure++;
                 }
                 CHECK(sure > SIDE * SIDE / 2 && worst < (way == 0 || way == 2 ? 2e-3 : 1e-5), "%s%s from %g voxels away: %g off",
