@@ -69,6 +69,21 @@ static isogi_dvr *dvr_new_with(const isogi_dvr_desc *desc, const isogi_transfer 
 
 static isogi_dvr *dvr_new(const isogi_dvr_desc *desc, const isogi_transfer *transfer) { return dvr_new_with(desc, transfer, &serial); }
 
+/* The ray of pixel (x, y), worked out in double, as pictures have it: forward + across right + down under, of length 1. */
+__attribute__((unused)) static void view_ray(const isogi_view *view, double x, double y, double origin[3], double dir[3]) {
+    const double half = tan((view->fov > 0 ? (double)view->fov : 45) * PI / 360), up[3] = {0, 1, 0};
+    const double across = (2 * (x + 0.5) - view->width) / view->height * half, down = (2 * (y + 0.5) / view->height - 1) * half;
+    double axis[3][3]; /* forward, right = forward x up, under = forward x right */
+    for (int a = 0; a < 3; a++) origin[a] = (double)view->eye[a], axis[0][a] = (double)view->target[a] - origin[a];
+    for (int k = 0; k < 3; k++) {
+        const double *with = k == 1 ? up : axis[1];
+        for (int a = 0; a < 3 && k; a++) axis[k][a] = axis[0][(a + 1) % 3] * with[(a + 2) % 3] - axis[0][(a + 2) % 3] * with[(a + 1) % 3];
+        const double length = sqrt(axis[k][0] * axis[k][0] + axis[k][1] * axis[k][1] + axis[k][2] * axis[k][2]);
+        for (int a = 0; a < 3; a++) axis[k][a] /= length;
+    }
+    for (int a = 0; a < 3; a++) dir[a] = (axis[0][a] + across * axis[1][a] + down * axis[2][a]) / sqrt(1 + across * across + down * down);
+}
+
 /* One ray: the only pixel of a picture. */
 typedef struct pixel { float c[4], depth; } pixel;
 

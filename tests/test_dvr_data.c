@@ -48,7 +48,7 @@ static void reference_values(const isogi_transfer *t, long double x, long double
 }
 
 /* Premultiplied colour and transmittance up to where the transmittance falls below `end` (at *t, if so); unit-spaced volume at 0. */
-static void reference_ray(const field *f, const isogi_transfer *t, const double eye[3], const float dir[3], int pieces, long double end,
+static void reference_ray(const field *f, const isogi_transfer *t, const double eye[3], const double dir[3], int pieces, long double end,
                           long double out[4], long double *stop, int *crossings) {
     long double ends[2], leave, o[3], d[3];
     for (int a = 0; a < 3; a++) out[a] = 0, o[a] = (long double)eye[a], d[a] = (long double)dir[a];
@@ -108,12 +108,11 @@ TEST(exact_rays_agree_with_a_long_double_quadrature) {
                 const isogi_transfer transfer = {.points = points, .point_count = 12, .peaks = peaks, .peak_count = n % 2 ? 3 : 0};
                 const isogi_dvr_desc desc = {.pyramid = f.pyramid, .space = ISOGI_DVR_DATA, .opaque = 1};
                 isogi_dvr *dvr = dvr_new(&desc, &transfer);
-                double eye[3], target[3], origin[3];
-                float dir[3];
+                double eye[3], target[3], origin[3], dir[3];
                 long double expected[4], stop = -1;
                 random_line(&f, &r, eye, target);
                 isogi_view view = line_of_sight(eye, target);
-                isogi_view_ray(&view, 0, 0, origin, dir);
+                view_ray(&view, 0, 0, origin, dir);
                 pixel p = cast(dvr, eye, target, NULL);
                 double tolerance = 0, errors[4];
                 /* a step of the extinction within a short piece that holds an extremum takes shorter pieces: then these decide */

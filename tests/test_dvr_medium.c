@@ -438,8 +438,7 @@ TEST(planes_and_boxes_cut_pictures_where_they_say) {
         const isogi_context context = {.threads = 1, .force_path = n / 12 % 5};
         const isogi_dvr_desc desc = {.pyramid = f.pyramid, .space = (isogi_dvr_space)data, .opaque = 1, .bound = way == 2 ? 0.1 : 0,
                                      .classification = (isogi_dvr_classification)(way == 1 ? 2 : way > 2 ? way - 3 : 0), .step = 0.2};
-        double planes[6][4], target[3], eye[3], origin[3], from = 0, to = 1e9, enter, leave, at;
-        float dir[3];
+        double planes[6][4], target[3], eye[3], origin[3], dir[3], from = 0, to = 1e9, enter, leave, at;
         for (int a = 0; a < 3; a++) target[a] = random_range(&r, 16, 32), eye[a] = target[a] + random_range(&r, n % 4 ? -90 : -9, 90);
         for (int i = 0; i < count; i++) {
             planes[i][3] = 0;
@@ -455,22 +454,22 @@ TEST(planes_and_boxes_cut_pictures_where_they_say) {
         CHECK(isogi_dvr_set_clip(dvr, (const double(*)[4])planes, (size_t)count) == ISOGI_OK &&
                   isogi_dvr_render(dvr, &view, NULL, c, &depth, NULL) == ISOGI_OK,
               "render");
-        isogi_dvr_free(dvr), isogi_view_ray(&view, 0, 0, origin, dir);
+        isogi_dvr_free(dvr), view_ray(&view, 0, 0, origin, dir);
         for (int a = 0; a < 3; a++) {
-            double low = -origin[a] / (double)dir[a], high = (48 - origin[a]) / (double)dir[a];
+            double low = -origin[a] / dir[a], high = (48 - origin[a]) / dir[a];
             from = fmax(from, fmin(low, high)), to = fmin(to, fmax(low, high));
         }
         enter = from, leave = to;
         for (int i = 0; i < count; i++) {
             double here = planes[i][3], slope = 0;
-            for (int a = 0; a < 3; a++) here += planes[i][a] * origin[a], slope += planes[i][a] * (double)dir[a];
+            for (int a = 0; a < 3; a++) here += planes[i][a] * origin[a], slope += planes[i][a] * dir[a];
             if (slope > 0) from = fmax(from, -here / slope);
             else to = fmin(to, -here / slope);
         }
-        at = (25 - origin[0]) / (double)dir[0];
+        at = (25 - origin[0]) / dir[0];
         const int passed = peaks && at > from && at < to, left = to > from;
         if (fabs(at - from) < 1e-3 || fabs(at - to) < 1e-3 || fabs(to - from) < 1e-3) continue;
-        double thick = left ? (double)medium.extinction * (to - from) * (data ? fabs((double)dir[0]) : 1) : 0;
+        double thick = left ? (double)medium.extinction * (to - from) * (data ? fabs(dir[0]) : 1) : 0;
         double expected = 1 - exp(-thick) * (passed ? 0.75 : 1);
         cut += left && (from > enter + 1 || to < leave - 1), crossed += passed, nothing += !left && leave > enter + 1;
         CHECK(fabs((double)c[0][3] - expected) < (way == 0 ? 1e-5 : 2e-6), "case %d, way %d: opacity %g, not %g", n, way,
