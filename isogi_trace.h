@@ -149,7 +149,7 @@
 
    Memory       Through the context. Bricks of 4x4x4 texels: 8 bytes for each, 112 where one of its texels is wanted, and for every
                 wanted texel alone 2 + 12 bytes of irradiance, 2 + 2 order^2 channels of transfer, less in other formats; and
-                180 KB. isogi_trace_memory tells. PATHS needs another 4 MB, FEEDBACK 9 (TRANSFER: 32 KB more for each coefficient),
+                180 KB. isogi_trace_memory tells. PATHS needs another 4 MB, FEEDBACK 10 (TRANSFER: 32 KB more for each coefficient),
                 and while it works some 400 bytes (TRANSFER: 16 more for each coefficient), 8 MB of them at once of texels and as
                 many of probes, and 4 for every hit (with desc.material 16), for each texel of one cube (ISOGI_TRACE_CUBE), for all
                 that were asked for when lazy, and for each probe (160 more, TRANSFER 48 for each value, where light takes over 100
@@ -3633,7 +3633,7 @@ static isogi_result isogi_trace__bake_batch(isogi_trace *t, size_t count) {
 /* ==== light at hits: probes ========================================================================================= */
 
 /* By default a ray that meets the surface takes the light there from a probe (the records of Ward, Rubinstein and Clear 1988): a point
-   on the surface near the hit whose own hemisphere is gathered in the same way, once. Probes are found by place and normal (Binder,
+   on the surface near the hit whose own hemisphere is gathered in the same way. Probes are found by place and normal (Binder,
    Fricke and Keller 2018), in cells that grow with the ray's length, since a far ray stands for much surface. Light at probes obeys
    E = D + R A E, with D from sky and lights and A the means over hits: n - 1 passes over the probes are n reflections, and they cost no
    rays. */
@@ -3700,7 +3700,7 @@ typedef struct isogi_trace__stage {
     uint8_t readers;      /* probe: hits that take their light from it, those that texels are still to make included */
     uint8_t wanted;       /* probe: samples; until its generation begins, the least of them */
     uint8_t deep;         /* probe: samples that a node which reads it often asks for; */
-    uint16_t same;        /* hits of the last one that read it, */
+    uint16_t same;        /* hits of the last one that read it, in one block or in several that no other read between, */
     uint32_t reader;      /* which is this one: its number, twice, and 1 for a probe */
 } isogi_trace__stage;
 
@@ -4802,11 +4802,13 @@ static uint64_t isogi_trace__generation(isogi_trace *t, uint64_t limit) {
 
 /* Where a texel's rays meet but few probes, as in a pocket, it has their light, and what their few samples do not know its own never
    would: most often they see no way out at all. Such a probe has more samples, by its share of the texel's; it is gathered anew when it
-   should have twice as many. (By what its samples brought, as that hardly any has escaped, it must not be: those that chance made bright
-   would stay, and light with them.) Asked for when no probe is left to be gathered, so that slices of a bake do not matter. */
+   should have twice as many, and its hits before that lie in a segment that passes leave out. (By what its samples brought, as that hardly
+   any has escaped, it must not be: those that chance made bright would stay, and light with them.) Asked for when no probe is left to be
+   gathered, so that slices of a bake do not matter. */
 static uint64_t isogi_trace__renewals(isogi_trace *t, uint64_t limit) {
     isogi_trace__feedback *f = t->feedback;
-    for (; f->probe_checked < f->probes.count && limit; f->probe_checked++, limit--) {
+    /* one of limit for 64 of them: each look is short */
+    for (; f->probe_checked < f->probes.count && limit; f->probe_checked++, limit -= f->probe_checked % 64 == 0) {
         isogi_trace__stage *stage = isogi_trace__stage_at(&f->probes, f->probe_checked);
         if (stage->deep >= 2 * stage->wanted) stage->level = 0, stage->wanted = stage->deep, f->renewed = 1;
         if (!stage->level && !f->probe_again) f->probe_again = f->probe_checked + 1;
@@ -4949,8 +4951,8 @@ static void isogi_trace__span_commit(isogi_trace *t, isogi_trace__set *set, cons
    whose hits will read the same probes. As often as there are samples to come costs more rays, at no smaller error. */
 static void isogi_trace__readers_count(isogi_trace *t, size_t made, size_t strand, size_t strands) {
     isogi_trace__feedback *f = t->feedback;
-    const uint32_t block = isogi_trace__block(t, f->level + 1) - isogi_trace__block(t, f->level);
-    const uint32_t weight = !f->on_probes && isogi_trace__block(t, f->level + 1) < (uint32_t)t->scene.desc.samples ? 2 : 1;
+    const uint32_t most = isogi_trace__block(t, f->level + 1), block = most - isogi_trace__block(t, f->level);
+    const uint32_t weight = !f->on_probes && most < (uint32_t)t->scene.desc.samples ? 2 : 1;
     size_t i, k;
     for (i = f->probes.count; i < f->probes.count + made; i++) {
         isogi_trace__stage *stage = isogi_trace__stage_at(&f->probes, i);
@@ -4969,6 +4971,7 @@ static void isogi_trace__readers_count(isogi_trace *t, size_t made, size_t stran
             if (stage->same < 65535) stage->same++;
             if (stage->same < ISOGI_TRACE__PROBE_SAME) continue;
             deep = stage->same < samples ? ISOGI_TRACE__PROBE_DEEP * stage->same / samples : ISOGI_TRACE__PROBE_DEEP;
+            deep = deep < most ? deep : most; /* no more than texels have so far */
             if (deep > stage->deep && deep > ISOGI_TRACE__PROBE_MOST) stage->deep = (uint8_t)deep;
         }
     }
