@@ -248,10 +248,10 @@ TEST(light_finds_its_way_through_narrow_necks) {
 /* A groove of the engine block so small that a texel's rays meet but two or three probes, nine in ten of whose rays meet each other: its
    light is theirs. With 8 samples at most they saw no way out in two of three bakes, and it stayed dark, .1 of the sky, however many
    samples the texel had. White it has E = pi; with albedo .9 paths bring 1.578 (8192 samples, +-.016), with .7 .784 (+-.013). */
-TEST(pockets_with_few_probes_have_their_light) {
+SLOW_TEST(pockets_with_few_probes_have_their_light) {
     static const double expected[3] = {PI, 1.578, 0.784}, albedo[3] = {1, 0.9, 0.7};
     const float point[1][3] = {{119, 113, 75}};
-    const int seeds = QUICK_SUITE ? 4 : 12;
+    const int seeds = 12;
     const procedural_shape *shape = procedural_find("engine-block");
     isogi_volume volume = {0};
     isogi_pyramid *pyramid = NULL;
