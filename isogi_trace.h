@@ -152,7 +152,7 @@
                 180 KB. isogi_trace_memory tells. PATHS needs another 4 MB, FEEDBACK 10 (TRANSFER: 32 KB more for each coefficient),
                 and while it works some 400 bytes (TRANSFER: 16 more for each coefficient), 8 MB of them at once of texels and as
                 many of probes, and 4 for every hit (with desc.material 16), for each texel of one cube (ISOGI_TRACE_CUBE), for all
-                that were asked for when lazy, and for each probe (160 more, TRANSFER 48 for each value, where light takes over 100
+                that were asked for when lazy, and for each probe (168 more, TRANSFER 48 for each value, where light takes over 100
                 reflections to fade): where every texel of a cube has a surface 130 MB, if these are layers, but in a gyroid 280
                 with 1 sample, 560 with 16, 730 with 64, and up to twice that where there are lights.
                 A request takes 12 bytes for each of 32768 points at a time.
@@ -3822,7 +3822,7 @@ struct isogi_trace__feedback {
     size_t probe_counted;        /* of which those before this one know how many samples they want */
     size_t probe_checked;        /* since the last batch: those before this one have been asked whether they want to be gathered anew, */
     size_t probe_again;          /* of which this is the first that does, number + 1; 0: none */
-    uint32_t probe_batches;
+    uint32_t batches;            /* traced so far: the number of the one at work */
     int renewed;                 /* some probes have been */
     int level;
     int on_probes; /* the batch is of probes */
@@ -4866,7 +4866,7 @@ static isogi_result isogi_trace__segment_new(isogi_trace *t, isogi_trace__segmen
     for (i = 0; i < f->piece_count; i++) f->pieces[i].first_hit = (uint32_t)hits, hits += f->pieces[i].hits;
     *made = isogi_trace__probes_meet(t);
     memset(s, 0, sizeof *s);
-    s->entries = f->span_count, s->hits = hits, s->batch = f->probe_batches;
+    s->entries = f->span_count, s->hits = hits, s->batch = f->batches;
     s->numbers = (f->on_probes ? 3 : 2) * s->entries + 1 + (t->scene.desc.material ? 4 : 1) * hits;
     s->node = (uint32_t *)isogi_allocate(&t->context, s->numbers, sizeof(uint32_t));
     if (!s->node) return ISOGI_NO_MEMORY;
@@ -4935,7 +4935,7 @@ static void isogi_trace__span_commit(isogi_trace *t, isogi_trace__set *set, cons
     const float *from = isogi_trace__span_direct(t, s);
     int a, fresh = n->brick && !n->samples;
     if (!n->brick && !s->first) isogi_trace__node_clear(n), memset(direct, 0, (size_t)t->values * sizeof *direct);
-    if (!n->brick) n->slot = t->feedback->probe_batches;
+    if (!n->brick) n->slot = t->feedback->batches;
     for (a = 0; a < t->values; a++) direct[a] += from[a];
     for (a = 0; a < 3; a++)
         n->steady[a] += s->steady[a], n->light[a] += s->light[a], n->bright[a] += s->bright[a];
@@ -5045,7 +5045,7 @@ static isogi_result isogi_trace__spans_run(isogi_trace *t, double from, double t
     taken.strands = tasks < 16 ? 1 : ISOGI_TRACE__STRANDS, tasks += taken.strands;
     if (taken.strands > 1) isogi_parallel(&silent, tasks, isogi_trace__take_task, &taken, 0, 1);
     else for (i = 0; i < tasks; i++) isogi_trace__take_task(&taken, i); /* not worth a thread */
-    f->probes.count += taken.made, f->probe_checked = f->probe_again = 0, f->probe_batches++;
+    f->probes.count += taken.made, f->probe_checked = f->probe_again = 0, f->batches++;
     isogi_trace__segment_add(set, &segment);
     for (i = 0; i < isogi_trace__cast_tasks(f); i++) isogi_trace__add(&t->counters, &t->task_counters[i]);
     if (!f->on_probes) f->partial += f->sample_count;

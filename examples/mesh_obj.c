@@ -40,5 +40,5 @@ int main(int argc, char **argv) {
     long euler = (long)mesh.vertex_count - (long)mesh.triangle_count / 2;
     printf("%s: %zu vertices, %zu triangles, closed, Euler characteristic %ld\n", path, mesh.vertex_count, mesh.triangle_count, euler);
     isogi_vol_mesh_free(pyramid, &mesh), isogi_vol_free(pyramid), procedural_free(&volume), free(text);
-    return fflush(stdout) || ferror(stdout) ? (perror("standard output"), 1) : 0;
+    return file_printed(error) ? 0 : (fprintf(stderr, "%s\n", error), 1);
 }
