@@ -304,7 +304,7 @@ TEST(exact_rays_know_no_longest_ray) {
 
 /* A point dragged bit by bit narrows the function a little at a time: what is seen in the end is what a renderer sees
    that knew no other. */
-TEST(many_small_edits_end_like_one) {
+SLOW_TEST(many_small_edits_end_like_one) {
     field f = radius_field(49, 1e5);
     const float middle[3] = {24, 24, 24};
     for (int method = ISOGI_DVR_BRUTE; method <= ISOGI_DVR_SWEEP; method++) {

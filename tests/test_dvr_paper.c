@@ -135,7 +135,7 @@ TEST(matter_ends_at_planes_for_local_visibility) {
                 plane[0][a] = (k & 1 ? -1 : 1) * (a == axis ? 1 : oblique ? 0.6 - 0.4 * a : 0);
                 plane[0][3] -= plane[0][a] * (double)place[0][a];
             }
-            CHECK(isogi_dvr_set_clip(dvr, plane, 1) == ISOGI_OK && isogi_dvr_step(dvr, 0, NULL) == ISOGI_OK &&
+            CHECK(isogi_dvr_set_clip(dvr, (const double(*)[4])plane, 1) == ISOGI_OK && isogi_dvr_step(dvr, 0, NULL) == ISOGI_OK &&
                       isogi_dvr_inspect(dvr, &report) == ISOGI_OK && report.level_count[coarse ? 1 : 5] == 1 &&
                       isogi_dvr_sample_blocks(dvr, place, 1, NULL, &seen) == ISOGI_OK,
                   "%zu blocks of level 1, %zu of 16", report.level_count[1], report.level_count[5]);

@@ -504,7 +504,7 @@ TEST(requests_that_come_back_to_a_cell_without_surface_find_the_nearest) {
     int tried = 0, differ = 0, apart = 0;
     isogi_trace_create(&whole, &d, NULL), isogi_trace_step(whole, 0, NULL);
     d.lazy = 1;
-    for (size_t i = 0; i < 23 * 23 * 23; i++) {
+    for (size_t i = 0; i < 23 * 23 * 23; i += QUICK_SUITE ? 5 : 1) {
         float point[8][3], e[8][3], expected[8][3];
         int have = 0, lit = 0;
         for (size_t k = 0; k < 8; k++) {
@@ -625,7 +625,7 @@ static double lookup_reference(const scene *s, const float *light, const float *
 
 /* Every lookup against its definition, at places with and without invalid texels around them, baked fully, lazily and within an
    interval of isovalues. 1e-5: single precision. */
-TEST(lookups_follow_their_definitions) {
+SLOW_TEST(lookups_follow_their_definitions) {
     double q[1] = {0.7};
     scene s = scene_make(16, 14, 13, NULL, gyroid_and_air, q);
     size_t count = 16 * 14 * 13;

@@ -278,7 +278,7 @@ SLOW_TEST(pockets_with_few_probes_have_their_light) {
 
 /* Light that fades slowly is worked out in another way than by passes, which a number of bounces asks for: that many reflections each, all
    that matter here. Each colour by itself, and by passes again where there is no memory for it. */
-TEST(light_that_fades_slowly_is_that_of_many_passes) {
+SLOW_TEST(light_that_fades_slowly_is_that_of_many_passes) {
     double q[5] = {15.5, 15.5, 14, 12, 2.5};
     scene s = scene_make(32, 32, 40, NULL, bottle, q);
     float points[24][3], passes[24][3], e[24][3];
@@ -493,7 +493,7 @@ static bake_sums bake_both_ways(isogi_trace_desc d, const float (*points)[3], in
    4 (above 3). Those below the horizon are not traced: on a ball, half of all. What is told of their noise is as near to it as under an
    even sky (unfiltered: four times the error, as samples are well spread and a lookup's texels have noise of their own), and six samples
    bring the same in blocks and at once. */
-TEST(uneven_skies_get_more_rays) {
+SLOW_TEST(uneven_skies_get_more_rays) {
     enum { HEIGHT = 32 };
     static const float bright[4] = {1.5f, 5, 10, 40};
     static float image[HEIGHT][64][3], points[200][3], reference[200][3];
@@ -528,7 +528,7 @@ TEST(uneven_skies_get_more_rays) {
 /* Lights that look wide, whose half-shadows are everywhere, get 2 n + 4 rays with n samples of a texel, others (n + 5) / 2: counted on a
    ball, half of which faces the light. What they bring to a pit is that of paths, the same in blocks and at once, and the error that is
    told covers it (three to six times as much). */
-TEST(wide_lights_get_more_rays) {
+SLOW_TEST(wide_lights_get_more_rays) {
     enum { SAMPLES = 8, LIGHTS = 5 };
     const isogi_light lights[LIGHTS] = {light_make(ISOGI_LIGHT_DIRECTIONAL, 0.3, 1, 0.2, 3, 0.03),
                                         light_make(ISOGI_LIGHT_SPHERE, 12, 112, 12, 30000, 4),
@@ -1682,7 +1682,7 @@ TEST(parts_by_feedback_are_the_whole) {
    of the border
    between two ranges, against paths. What the filter averages lies on one side of the border then, where the pit is half a voxel
    deeper: 8 %; noise of 4 samples at 100 texels: 3 %. */
-TEST(isovalues_of_other_colours_do_not_light_each_other) {
+SLOW_TEST(isovalues_of_other_colours_do_not_light_each_other) {
     double q[5] = {16, 15, 16, 22.3, 12};
     scene s = scene_make(32, 32, 32, NULL, pit, q);
     isogi_albedo_point glow[2] = {{0, {0, 0, 0}}, {0.001, {3, 3, 3}}},

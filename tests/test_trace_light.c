@@ -891,7 +891,7 @@ TEST(least_part_of_a_lighting) {
 
 /* Whatever unit light is in: multiplied by a power of two, all light and all errors are the same bits times that, however far squares of it
    are beyond floats. */
-TEST(light_has_any_unit) {
+SLOW_TEST(light_has_any_unit) {
     enum { WIDTH = 32, HEIGHT = 16, POINTS = 60 };
     static float image[2][HEIGHT][WIDTH][3], points[POINTS][3], e[2][POINTS][3], error[2][POINTS];
     static const int powers[5] = {0, -90, -70, 62, 88};
@@ -1060,7 +1060,7 @@ TEST(rectangle_in_spherical_harmonics) {
 
 /* A lamp near the middle of a hollow ball, on it, and a rectangle whose back is there: what errors and formats refer to is what it is for
    a lamp that is further off, so bytes hold the light, errors are as small, and the target of an adaptive bake means the same. */
-TEST(lamps_in_the_middle_are_lamps_like_others) {
+SLOW_TEST(lamps_in_the_middle_are_lamps_like_others) {
     const double q[4] = {16, 16, 16, 14}, off[5] = {5, 0, 0.1, 1, 1};
     scene s = scene_make(33, 33, 33, NULL, ball, q);
     float points[14][3], e[3][14][3], error[14];

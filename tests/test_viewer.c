@@ -132,7 +132,7 @@ TEST(a_transfer_function_is_suggested_where_none_is_given) {
 
 /* A speck in emptiness, the densest that is suggested, in both modes, by default and by a preset. And a lattice without a texel on the
    surface says why the picture is black. */
-TEST(a_speck_is_shown_and_a_coarse_lattice_named) {
+SLOW_TEST(a_speck_is_shown_and_a_coarse_lattice_named) {
     static unsigned char speck[40][40][40];
     const char *ways[] = {"dvr", "dvr --preset grey", "scale-invariant", "scale-invariant --preset grey"};
     char command[1024];
