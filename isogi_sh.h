@@ -56,7 +56,7 @@
    - ISOGI_SH_LEVEL             0 SSE2 or NEON, 1 AVX2, 2 AVX-512: uses at most this level
    - ISOGI_API                  linkage of public functions, if extern does not suit
 
-   Memory       None allocated. Stack use stays below 32 KB.
+   Memory       None allocated. Stack use stays below 32 KB (below 60 where the compiler does not optimise).
    Threads      Every function is pure: call them from any thread.
    Speed        Batches of 16 directions and more (8 of doubles) use all lanes of AVX2 and AVX-512, whatever the count. Results that stay
                 in the first-level cache, such as 64 directions at order 11, take half or a third of the time; rows of a structure of
@@ -2120,9 +2120,14 @@ ISOGI_SH__AVX512 ISOGI_SH__INLINE void isogi_sh__eval_f16_mixed(isogi_sh__f16 *u
         return (void)out, (void)u, (void)done, (void)rows, 0;                                                                  \
     }                                                                                                                          \
     TARGET ISOGI_SH__INLINE int NAME##_eleven_one(T *out, size_t stride, const V *u) { return (void)out, (void)stride, (void)u, 0; } \
-    TARGET ISOGI_SH__INLINE size_t NAME##_eleven_two(T *out, size_t stride, const T *x, const T *y, const T *z, size_t count) { \
+    TARGET ISOGI_SH__APART size_t NAME##_eleven_two(T *out, size_t stride, const T *x, const T *y, const T *z, size_t count) {  \
         return (void)out, (void)stride, (void)x, (void)y, (void)z, (void)count, (size_t)0;                                     \
     }
+#ifdef __OPTIMIZE__
+#define ISOGI_SH__DEFINE_WIDE_ELEVEN ISOGI_SH__DEFINE_ELEVEN
+#else /* each would be half a megabyte of code, and take 400 KB of stack */
+#define ISOGI_SH__DEFINE_WIDE_ELEVEN ISOGI_SH__DEFINE_NO_ELEVEN
+#endif
 
 /* Defines NAME(out, stride, order, x, y, z, count): all functions at the first directions, that of index i at out + stride i; WIDTH at a
    time. It returns how many directions are done, and stops before a block whose lengths are out of range. NAME_rows: the same with the
@@ -2380,9 +2385,9 @@ ISOGI_SH__DEFINE_F32(isogi_sh__eval_f8, ISOGI_SH__AVX2, isogi_sh__f8, isogi_sh__
 ISOGI_SH__DEFINE_F64(isogi_sh__eval_d4, ISOGI_SH__AVX2, isogi_sh__d4, isogi_sh__l4, 4, D4, isogi_sh__transpose_d4, 8,
                      ISOGI_SH__DEFINE_NO_ELEVEN)
 ISOGI_SH__DEFINE_F32(isogi_sh__eval_f16, ISOGI_SH__AVX512, isogi_sh__f16, isogi_sh__i16, 16, F16, isogi_sh__transpose_f16, 16,
-                     ISOGI_SH__DEFINE_ELEVEN)
+                     ISOGI_SH__DEFINE_WIDE_ELEVEN)
 ISOGI_SH__DEFINE_F64(isogi_sh__eval_d8, ISOGI_SH__AVX512, isogi_sh__d8, isogi_sh__l8, 8, D8, isogi_sh__transpose_d8, 8,
-                     ISOGI_SH__DEFINE_ELEVEN)
+                     ISOGI_SH__DEFINE_WIDE_ELEVEN)
 
 /* 8 single-channel sums */
 ISOGI_SH__AVX2 static int isogi_sh__sum_rows_f32(float *value, const float *c, int order, int channels, const float (*direction)[3]) {
@@ -6279,6 +6284,7 @@ ISOGI_API isogi_result isogi_sh_fit_directional(float direction[3], float rgb[3]
 #undef ISOGI_SH__ROW
 #undef ISOGI_SH__DEFINE_ELEVEN
 #undef ISOGI_SH__DEFINE_NO_ELEVEN
+#undef ISOGI_SH__DEFINE_WIDE_ELEVEN
 #undef ISOGI_SH__POLYNOMIALS
 #undef ISOGI_SH__PUT_PAIR
 #undef ISOGI_SH__PUT_TWO

@@ -56,7 +56,8 @@
                 of the time. Where your voxels lie in such pages, too (madvise, or isogi_allocate), many rays are 5 to 10 % faster.
                 A mesh keeps some 3/4 byte of scratch memory for every voxel until it is freed (1 to 2 where rows along x are long
                 but no multiple of 64 voxels, 4 where they have 17, 36 where they have 2).
-                Stack use stays below 32 KB.
+                Stack use stays below 32 KB; where the compiler does not optimise, below 70 (gcc) and 140 (clang), and AVX-512 is not
+                used then, which would take more.
    Threads      A pyramid is const once built: any number of threads may read it. Building, updating, prefiltering and meshing use the
                 context's threads; rays, samples and normals run on the thread that calls. isogi_thread_pool keeps threads from call
                 to call.
@@ -4357,12 +4358,14 @@ ISOGI_VOL__INLINE uint64_t isogi_vol__mixed_cells(const isogi_vol__leaf *leaf, u
 static int isogi_vol__machine(void) {
     __builtin_cpu_init();
     if (!__builtin_cpu_supports("avx2") || !__builtin_cpu_supports("fma")) return ISOGI_VOL__PATH_BASE;
-    return __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512bw") && __builtin_cpu_supports("avx512dq") &&
-                   __builtin_cpu_supports("avx512vl") && __builtin_cpu_supports("avx512bitalg") && __builtin_cpu_supports("avx512vbmi") &&
-                   __builtin_cpu_supports("avx512vbmi2") && __builtin_cpu_supports("avx512vpopcntdq") && __builtin_cpu_supports("gfni") &&
-                   __builtin_cpu_supports("bmi") && __builtin_cpu_supports("bmi2")
-               ? ISOGI_VOL__PATH_AVX512
-               : ISOGI_VOL__PATH_AVX2;
+#ifdef __OPTIMIZE__
+    if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512bw") && __builtin_cpu_supports("avx512dq") &&
+        __builtin_cpu_supports("avx512vl") && __builtin_cpu_supports("avx512bitalg") && __builtin_cpu_supports("avx512vbmi") &&
+        __builtin_cpu_supports("avx512vbmi2") && __builtin_cpu_supports("avx512vpopcntdq") && __builtin_cpu_supports("gfni") &&
+        __builtin_cpu_supports("bmi") && __builtin_cpu_supports("bmi2"))
+        return ISOGI_VOL__PATH_AVX512; /* unoptimised, with each of its values in a place of its own, it takes up to 350 KB of stack */
+#endif
+    return ISOGI_VOL__PATH_AVX2;
 }
 
 /* What at_least_base does. */

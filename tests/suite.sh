@@ -184,7 +184,7 @@ variants() {
     have clang || { sanitizer=$CC casts=; }
     variant address+undefined "$sanitizer" "-O1 -g $CONTRACT_OFF -fsanitize=address,undefined$casts -fno-sanitize-recover=all" '' $(only "$checked")
     variant thread "$sanitizer" "-O1 -g $CONTRACT_OFF -fsanitize=thread" 'TSAN_OPTIONS=halt_on_error=1' $(only "$threaded")
-    variant O0 "$CC" "-O0 $CONTRACT_OFF" '' $(only sh)
+    variant O0 "$CC" "-O0 $CONTRACT_OFF" '' $(only 'sh|sh_limits|stack')
     variant O3 "$CC" "-O3 $CONTRACT_OFF" '' $(only 'sh|vol|vol_update|trace_inside|dvr|dvr_inside|dvr_data')
     fast_math "$CC" $(only 'sh|sh_limits|sample|vol|vol_sides|vol_holes|trace|dvr|dvr_visibility|dvr_bound|dvr_hard|dvr_classes')
     # With products and sums joined as a user's compiler may, all paths still build the same pyramid.

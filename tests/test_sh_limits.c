@@ -1036,7 +1036,7 @@ static void use_lights(int order) {
     isogi_sh_dominant_direction(v, rgb, d, order), isogi_sh_fit_directional(v, rgb, ambient, d, order);
 }
 
-TEST(stack_below_32_kilobytes) {
+TEST(calls_take_little_stack) {
     static const struct {
         const char *name;
         void (*run)(int order);
@@ -1058,7 +1058,7 @@ TEST(stack_below_32_kilobytes) {
             if (bytes > most) most = bytes, at = all[o];
         }
         if (LONG_SUITE) printf("    %-22s %6zu bytes at order %d\n", uses[u].name, most, at);
-        CHECK(most < 32768, "%s of order %d: %zu bytes", uses[u].name, at, most);
+        CHECK(most < MOST_BYTES, "%s of order %d: %zu bytes", uses[u].name, at, most);
     }
 }
 #endif

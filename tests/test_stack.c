@@ -5,12 +5,7 @@
 #include "stack.h"
 
 #if STACK_MEASURED
-enum { SIDE = 24, RAYS = 96, MOST_BYTES = 32768 };
-#ifdef __clang__
-enum { MOST_BYTES_TRACE = 35000 }; /* it keeps 2 KB more in the frame of rays that are traced together */
-#else
-enum { MOST_BYTES_TRACE = MOST_BYTES };
-#endif
+enum { SIDE = 24, RAYS = 96 };
 
 static const isogi_context single = {.threads = 1};
 static float voxels[SIDE][SIDE][SIDE], points[RAYS][3], normals[RAYS][3], values[RAYS][3], many[RAYS][108], errors[RAYS];
@@ -89,7 +84,7 @@ static void use_mesh(int variant) {
     isogi_vol_mesh(pyramid, &desc, &mesh), isogi_vol_mesh_free(pyramid, &mesh);
 }
 
-TEST(vol_below_32_kilobytes) {
+TEST(vol_takes_little_stack) {
     for (int path = 0; path <= 4; path++) {
         begin(path);
         largest("rays", use_rays, 3, MOST_BYTES), largest("meshes", use_mesh, 4, MOST_BYTES);
@@ -154,7 +149,7 @@ static void use_gather_field(int variant) {
     isogi_trace_gather_field(&d, floor_below, NULL, (const float(*)[3])points, (const float(*)[3])normals, RAYS, values, errors, &single);
 }
 
-TEST(trace_below_32_kilobytes) {
+TEST(trace_takes_little_stack) {
     begin(0);
     largest("baking", use_bake, 12, MOST_BYTES_TRACE), largest("storage", use_store, 8, MOST_BYTES_TRACE);
     largest("own points", use_gather, 2, MOST_BYTES_TRACE);
@@ -187,7 +182,7 @@ static void use_suggestion(int variant) {
     isogi_transfer_suggest(pyramid, (isogi_dvr_space)variant, p, &threshold);
 }
 
-TEST(dvr_below_32_kilobytes) {
+TEST(dvr_takes_little_stack) {
     begin(0);
     largest("pictures", use_frame, 96, MOST_BYTES), largest("suggestions", use_suggestion, 2, MOST_BYTES);
 }
