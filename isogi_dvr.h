@@ -1277,11 +1277,17 @@ static size_t isogi_dvr__ranks_below(const isogi_dvr__integral *g, double x) {
     return low;
 }
 
+/* The next value below one; of zero the next that is not denormal: programs may have those flushed to zero. */
+static double isogi_dvr__below(double x) {
+    const double least = 2.2250738585072014e-308;
+    return fabs(x) < least ? -least : nextafter(x, -1.7e308);
+}
+
 /* A stretch without extinction, cut below every peak: crossing one means going from below it to the value itself. */
 static void isogi_dvr__add_quiet(isogi_dvr__integral *g, double low, double high) {
     size_t rank = isogi_dvr__ranks_below(g, low);
     for (; rank < g->rank_count && g->rank[rank].isovalue <= high; rank++) {
-        double end = nextafter(g->rank[rank].isovalue, -1.7e308);
+        double end = isogi_dvr__below(g->rank[rank].isovalue);
         if (low <= end) g->quiet[g->quiet_count][0] = low, g->quiet[g->quiet_count++][1] = end;
         low = g->rank[rank].isovalue;
     }
@@ -1299,7 +1305,7 @@ static void isogi_dvr__set_quiet(isogi_dvr__integral *g, int lengths) {
         int loud = (n && g->points[n - 1].extinction > 0) || (n < g->count && g->points[n].extinction > 0);
         if (!(low < high)) continue;
         if (!loud && !open) start = low;
-        if (loud && open) isogi_dvr__add_quiet(g, start, lengths && g->points[n - 1].extinction > 0 ? nextafter(low, -1.7e308) : low);
+        if (loud && open) isogi_dvr__add_quiet(g, start, lengths && g->points[n - 1].extinction > 0 ? isogi_dvr__below(low) : low);
         open = !loud;
     }
     if (open) isogi_dvr__add_quiet(g, start, 1.7e308);

@@ -69,7 +69,8 @@
                 which grow as degree^1.5, in double 4e-15 at degree 4, 4e-14 at 10, 4e-13 at 20, 7e-11 (of 284) at 100; in float those
                 rounded. tests/test_sh.c states and checks each.
                 All bounds assume IEEE arithmetic: -ffast-math may reorder what cancels, and costs up to four times as much, six at
-                degree 100.
+                degree 100. Where denormal numbers are flushed to zero (FTZ, DAZ), vectors shorter than 1e-37 (double 1e-307) have no
+                direction.
    Limits       Order 1..101 (degree 0..100), 1..16 channels. Counts times order^2 must be addressable.
 
    Conventions  Real, orthonormal, without the Condon-Shortley phase, index i = l (l + 1) + m (ACN). Y1..Y3 = sqrt(3 / 4 pi) (y, z, x).

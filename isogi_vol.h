@@ -65,6 +65,8 @@
                 more rounding, those of denormal or huge ones (1e300) may be NaN, and nothing that this header says to be the same
                 bits on two ways need be so. These bits may differ, too, where the compiler fuses multiply-adds, as gcc does with
                 -march=native unless told -ffp-contract=off: hits are then the same, their t and place but for roundings.
+                Where a program has denormal numbers flushed to zero (FTZ, DAZ), values that differ by less than 1e-37 are equal; all else
+                holds.
    Accuracy     Rays are solved in double: against a long double reference no hit is missed or added, and t is right to 1e-12 cell, or
                 to its own rounding where the origin is far, but for grazing rays, whose t is ill-conditioned by nature. A ray that runs
                 within the surface, where the field is the isovalue along a stretch of it, has the side that rounding gives it, and

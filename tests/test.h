@@ -102,6 +102,17 @@ __attribute__((unused)) static int test_finite(double x) {
     return (bits >> 52 & 0x7ff) != 0x7ff;
 }
 
+/* Has denormal numbers flushed to zero, or not, as engines do on their threads; threads begin with what began them has. 0: not here. */
+#if defined(__SSE2__) && !defined(__FAST_MATH__)
+#include <xmmintrin.h>
+__attribute__((unused)) static int flush_denormals(int flush) {
+    _mm_setcsr((_mm_getcsr() & ~0x8040u) | (flush ? 0x8040u : 0));
+    return 1;
+}
+#else
+__attribute__((unused)) static int flush_denormals(int flush) { return (void)flush, 0; }
+#endif
+
 /* Bounds of rounding errors are for arithmetic as it is written; -ffast-math changes the order of sums. */
 #ifdef __FAST_MATH__
 #define ROUNDING_FACTOR 4

@@ -413,10 +413,11 @@ TEST(a_function_has_no_cap_where_it_is_not_finite) {
     }
 }
 
-/* Where values are so large or small that their squares leave the range of double, surfaces are left as elsewhere. */
+/* Where values are so large or small that their squares leave the range of double, surfaces are left as elsewhere; where denormal numbers
+   are zero, above what the header says. */
 TEST(huge_and_tiny_values_change_no_hit) {
-    enum { N = 24, RAYS = 300 };
-    static const double scales[5] = {1, 1e110, 1e200, 1e-150, 1e-290};
+    enum { N = 24, RAYS = 300, FLUSHED = 5, SCALES = 8 };
+    static const double scales[SCALES] = {1, 1e110, 1e200, 1e-150, 1e-290, 1, 1e200, 1e-36};
     static float value[N * N * N];
     static isogi_ray rays[RAYS];
     static isogi_hit hits[RAYS * MOST];
@@ -432,8 +433,9 @@ TEST(huge_and_tiny_values_change_no_hit) {
             rays[i].dir[a] = (float)random_range(&r, -0.5, 0.5),
             rays[i].origin[a] = random_range(&r, 0, N - 1) - 80 * (double)rays[i].dir[a];
     for (int path = 0; path < PATHS; path++)
-        for (int k = 0; k < 5; k++) {
+        for (int k = 0; k < SCALES; k++) {
             const isogi_volume volume = {.data = value, .type = ISOGI_F32, .size = {N, N, N}, .scale = scales[k]};
+            flush_denormals(k >= FLUSHED);
             isogi_pyramid *p = build_on(&volume, path);
             isogi_vol_intersect_all(p, rays, RAYS, MOST, hits, counts, NULL);
             for (int i = 0; i < RAYS; i++) {
@@ -447,6 +449,7 @@ TEST(huge_and_tiny_values_change_no_hit) {
                 CHECK(found == first[i], "scale %g, path %d, ray %d: %d continued, not %d", scales[k], path, i, (int)found, (int)first[i]);
             }
             isogi_vol_free(p);
+            flush_denormals(0);
         }
     CHECK(all > RAYS, "%ld hits", all);
 }
