@@ -352,11 +352,12 @@ ISOGI_API isogi_result isogi_trace_step(isogi_trace *trace, uint64_t max_rays, d
    they allow for what samples that agree may all have missed, and for probes 2 % of reflected light. That is too little where much of
    the light is reflected and comes from lights without size, whose shadows are hard: at albedo 0.8, in narrow tunnels, twice the error
    told covers 60 to 90 % of points; and at any albedo in deep pits a few voxels wide under the sun or a lamp, where reflected light may
-   be a fifth off however many samples there are: with 256 samples and more, or desc.error, 50 to 85 % of points; and where colours change strongly within a few voxels, which samples too near each other may miss:
-   in a closed room of chequers of .05 and .95, 2 voxels wide, errors are twice those told with 16 samples, 3.5 times with 128 (4 % of
-   the light); and close to sphere lights that stand half in the ground, of which few samples meet what is above it (7 % of such points
-   lie beyond twice the error). Nor is the error of negative lights told in full. They know nothing of the lattice (on steep fields that
-   adds more than samples do; closer texels help), and of glows only what emission_points tell: where desc.material alone makes something
+   be a fifth off however many samples there are: with 256 samples and more, or desc.error, 50 to 85 % of points; and where colours
+   change strongly within a few voxels, which samples too near each other may miss: in a closed room of chequers of .05 and .95, 2 voxels
+   wide, errors are twice those told with 16 samples, 3.5 times with 128 (4 % of the light); and close to sphere lights that stand half
+   in the ground, of which few samples meet what is above it (7 % of such points lie beyond twice the error). Nor is the error of
+   negative lights told in full. They know nothing of the lattice (on steep fields that adds more than samples do; closer texels help),
+   and of glows only what emission_points tell: where desc.material alone makes something
    glow, give the brightest of it there. */
 ISOGI_API isogi_result isogi_trace_sample(const isogi_trace *trace, const float (*points)[3], size_t count, float (*irradiance)[3],
                                           float *error);
