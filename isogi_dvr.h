@@ -8084,6 +8084,7 @@ typedef struct isogi_dvr__tet_ray {
     double until;    /* t at which it ends */
     double t, value; /* where the ray is, and the field there */
     int chained; /* 2: from the tetrahedron next to this one; 1: over a seam; 0: not at all */
+    int unsure;  /* whether rounding decided how it passes an edge or a point of the border */
     uint64_t passed;
 } isogi_dvr__tet_ray;
 
@@ -8101,13 +8102,15 @@ static double isogi_dvr__face_t(const isogi_dvr__tet_ray *r, const uint32_t p[3]
 
 /* Which side of the line from point p to point q the ray passes. Both faces of an edge ask with the same numbers, and "upon it" is answered
    as for a ray turned by a little towards x, by less towards y, by yet less towards z: it hits exactly one face of a closed border. Where
-   turning decides nothing, as the eye is in line with p and q, the eye is moved in the same way, by yet less. */
-static int isogi_dvr__left_of(const isogi_dvr__tet_ray *r, uint32_t p, uint32_t q) {
+   turning decides nothing, as the eye is in line with p and q, the eye is moved in the same way, by yet less. Next to a line it is rounding
+   that decides, and `unsure` is set: where several meet in a point, each of them decides for itself. */
+static int isogi_dvr__left_of(const isogi_dvr__tet_ray *r, uint32_t p, uint32_t q, int *unsure) {
     double a[3], b[3], n[3], side;
     int turned = p > q, axis;
     isogi_dvr__sub(r->mesh->mesh.points[turned ? q : p], r->origin, a), isogi_dvr__sub(r->mesh->mesh.points[turned ? p : q], r->origin, b);
     isogi_dvr__cross(a, b, n);
     side = isogi_dvr__dot(n, r->dir);
+    *unsure = side * side <= 1e-28 * isogi_dvr__dot(a, a) * isogi_dvr__dot(b, b) * isogi_dvr__dot(r->dir, r->dir);
     for (axis = 0; axis < 3 && !(side > 0 || side < 0); axis++) side = n[axis];
     if (side > 0 || side < 0) return (side > 0) != turned;
     for (axis = 0; axis < 3; axis++) b[axis] -= a[axis];
@@ -8133,7 +8136,7 @@ static int isogi_dvr__hits_box(const isogi_dvr__tet_ray *r, const isogi_dvr__nod
 }
 
 /* The next border face that leads in (way -1) or out (+1) after (t, face), in the order of t, then of faces: so none is met twice. */
-static uint32_t isogi_dvr__next_border(const isogi_dvr__tet_ray *r, double last_t, uint32_t last, int way, double *found_t) {
+static uint32_t isogi_dvr__next_border(isogi_dvr__tet_ray *r, double last_t, uint32_t last, int way, double *found_t) {
     const isogi_tets *m = r->mesh;
     uint32_t stack[2 * ISOGI_DVR__DEEP], best = ISOGI_DVR__NO_FACE, i;
     int top = 0;
@@ -8149,10 +8152,15 @@ static uint32_t isogi_dvr__next_border(const isogi_dvr__tet_ray *r, double last_
         for (i = n->first; i < n->first + n->count; i++) {
             uint32_t p[3];
             double rate, t;
-            int side;
+            int k, sides = 0, sure = 0, doubts = 0; /* on which sides of its edges: bit 0 right, bit 1 left; 3: not through the face */
             isogi_dvr__face_points(m, m->border[i], p);
-            side = isogi_dvr__left_of(r, p[0], p[1]);
-            if (side != isogi_dvr__left_of(r, p[1], p[2]) || side != isogi_dvr__left_of(r, p[2], p[0])) continue;
+            for (k = 0; k < 3 && sure < 3; k++) {
+                int unsure, side = 1 << isogi_dvr__left_of(r, p[k], p[(k + 1) % 3], &unsure);
+                sides |= side, sure |= unsure ? 0 : side, doubts |= unsure;
+            }
+            if (sure == 3) continue;
+            r->unsure |= doubts;
+            if (sides == 3) continue;
             t = isogi_dvr__face_t(r, p, &rate);
             if (!(rate * way > 0)) continue;
             if (t < last_t || (!(t > last_t) && m->border[i] <= last && last != ISOGI_DVR__NO_FACE)) continue;
@@ -8163,18 +8171,23 @@ static uint32_t isogi_dvr__next_border(const isogi_dvr__tet_ray *r, double last_
     return best;
 }
 
-/* The face by which the ray (dir * way) leaves the tetrahedron that it entered by face `in`: the first plane on the way out. */
-static uint32_t isogi_dvr__exit_face(const isogi_dvr__tet_ray *r, uint32_t tet, uint32_t in, int way, double *exit_t) {
-    uint32_t f, best = ISOGI_DVR__NO_FACE;
-    double nearest = 1e300;
+/* The face by which the ray (dir * way) leaves the tetrahedron that it entered by face `in`: the first plane on the way out. Unsure where
+   it leaves by an edge, on one side of which the mesh goes on. */
+static uint32_t isogi_dvr__exit_face(isogi_dvr__tet_ray *r, uint32_t tet, uint32_t in, int way, double *exit_t) {
+    uint32_t f, best = ISOGI_DVR__NO_FACE, other = ISOGI_DVR__NO_FACE;
+    double nearest = 1e300, second = 1e300;
     for (f = 0; f < 4; f++) {
         uint32_t p[3];
         double rate, t;
         if (4 * tet + f == in) continue;
         isogi_dvr__face_points(r->mesh, 4 * tet + f, p);
         t = isogi_dvr__face_t(r, p, &rate) * way;
-        if (rate * way > 0 && t < nearest) nearest = t, best = 4 * tet + f;
+        if (!(rate * way > 0) || !(t < second)) continue;
+        second = t, other = 4 * tet + f;
+        if (t < nearest) second = nearest, other = best, nearest = t, best = 4 * tet + f;
     }
+    if (other != ISOGI_DVR__NO_FACE && second - nearest <= 1e-13 * (fabs(nearest) + r->mesh->size / r->speed))
+        r->unsure |= (r->mesh->across[best] == ISOGI_DVR__NO_FACE) != (r->mesh->across[other] == ISOGI_DVR__NO_FACE);
     *exit_t = nearest * way;
     return best;
 }
@@ -8262,7 +8275,7 @@ static double isogi_dvr__rounding(const isogi_dvr__tet_ray *r, uint32_t face, do
 
 /* The tetrahedron that holds the ray's origin: the first that is found on the way back from where the ray leaves the mesh. Border that the
    origin is on counts as behind it. */
-static uint32_t isogi_dvr__tet_around(const isogi_dvr__tet_ray *r) {
+static uint32_t isogi_dvr__tet_around(isogi_dvr__tet_ray *r) {
     const isogi_dvr__node *box = r->mesh->node;
     uint32_t face = ISOGI_DVR__NO_FACE;
     double leave = 0;
@@ -8330,24 +8343,25 @@ typedef struct isogi_dvr__tet_job {
     isogi_counters *work;
 } isogi_dvr__tet_job;
 
-/* Tried again along a ray that differs by some billionths where it could not find its way. */
+/* Tried again along a ray that differs by 1e-11, then more, where it could not find its way or may have missed the mesh. */
 static void isogi_dvr__try_tets(isogi_dvr__pixel_ray *pixel, const isogi_dvr__tet_job *job, const double origin[3], double until,
                                 isogi_counters *work) {
     isogi_dvr__pixel_ray fresh = *pixel;
     isogi_dvr__tet_ray ray;
     isogi_dvr__span span;
+    double turn = 0;
     int attempt, a;
-    for (attempt = 0; attempt < 4; attempt++) {
+    for (attempt = 0; attempt < 4; attempt++, turn = attempt > 1 ? 10 * turn : 1e-11) {
         *pixel = fresh;
         memset(&ray, 0, sizeof ray), memset(&span, 0, sizeof span);
         ray.mesh = job->mesh, ray.desc = job->desc;
-        for (a = 0; a < 3; a++) ray.origin[a] = origin[a], ray.dir[a] = pixel->along[a] + attempt * (a + 1) * 1e-9;
+        for (a = 0; a < 3; a++) ray.origin[a] = origin[a], ray.dir[a] = pixel->along[a] + (a + 1) * turn;
         ray.speed = sqrt(isogi_dvr__dot(ray.dir, ray.dir)), ray.until = until / ray.speed;
         span.silhouette = job->desc->space == ISOGI_DVR_DATA || job->desc->silhouette != ISOGI_DVR_SILHOUETTE_APPROXIMATE
                               ? job->desc->silhouette
                               : ISOGI_DVR_SILHOUETTE_NONE;
         span.flat = 1, span.touched_t = -1, span.walk.quiet[0] = 1;
-        if (isogi_dvr__cast_tets(pixel, &ray, &span)) break;
+        if (isogi_dvr__cast_tets(pixel, &ray, &span) && !ray.unsure) break;
     }
     work->cells += ray.passed;
 }

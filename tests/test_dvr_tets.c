@@ -225,6 +225,51 @@ TEST(rays_through_edges_and_points_find_their_way) {
     mesh_free(&m);
 }
 
+static double one_value(double x, double y, double z) { return (void)x, (void)y, (void)z, 1; }
+
+/* Rays from anywhere exactly at points of a lattice, or at middles of its edges, with and without a third of the tetrahedra: what lies
+   behind is not missed. Rays next to the plane of a face are left out. */
+TEST(rays_at_edges_and_points_see_all_that_is_behind) {
+    const isogi_transfer_point fog[] = {{0, {1, 1, 1}, 0.1f}};
+    const isogi_transfer media = {fog, 1, NULL, 0};
+    const isogi_tet_desc desc = {.opaque = 1};
+    static stretch s[64];
+    test_random r = {31};
+    long rays = 0;
+    for (int n = 0; n < (LONG_SUITE ? 20000 : 1500); n++) {
+        mesh m = lattice_mesh(3, one_value, NULL);
+        size_t kept = 0;
+        for (size_t i = 0; i < m.view.tet_count; i++)
+            if (n % 2 || random_bits(&r) % 3) memmove(m.tets[kept++], m.tets[i], sizeof m.tets[0]);
+        m.view.tet_count = kept;
+        mesh_build(&m);
+        for (int i = 0; i < 4; i++) {
+            const int cell = (int)(random_bits(&r) % 8), edge = 1 + (int)(random_bits(&r) % 7);
+            double eye[3], target[3], d[3], length = 0, slant = 1;
+            for (int a = 0; a < 3; a++) {
+                target[a] = i % 2 ? (double)(random_bits(&r) % 3) : (cell >> a & 1) + 0.5 * (edge >> a & 1);
+                eye[a] = (double)(float)(target[a] + random_range(&r, -3, 3));
+            }
+            double far = 0;
+            for (int a = 0; a < 3; a++) d[a] = target[a] - eye[a], far += d[a] * d[a];
+            for (int a = 0; a < 3; a++) d[a] /= sqrt(far);
+            for (int f = 0; f < 9; f++) { /* the planes of faces */
+                static const int normal[9][3] = {
+                    {1, 0, 0}, {0, 1, 0}, {0, 0, 1}, {1, 1, 0}, {1, 0, 1}, {0, 1, 1}, {1, -1, 0}, {1, 0, -1}, {0, 1, -1}};
+                slant = fmin(slant, fabs(normal[f][0] * d[0] + normal[f][1] * d[1] + normal[f][2] * d[2]));
+            }
+            if (slant < 1e-3) continue;
+            const int count = brute_stretches(&m.view, eye, d, s);
+            for (int k = 0; k < count; k++) length += s[k].t[1] - s[k].t[0];
+            const double opacity = (double)cast_tets(m.built, &desc, &media, eye, target).c[3], expected = -expm1(-0.1 * length);
+            rays++;
+            CHECK(fabs(opacity - expected) <= 1e-5, "mesh %d, ray %d: opacity %g, not %g", n, i, opacity, expected);
+        }
+        mesh_free(&m);
+    }
+    CHECK(rays > 4000, "%ld rays", rays);
+}
+
 /* What is seen as far as a wall, over what is seen from there on: the whole. Walls stand within tetrahedra, in holes, before and behind. */
 TEST(geometry_parts_what_is_seen) {
     test_random r = {5};
