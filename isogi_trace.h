@@ -328,8 +328,10 @@ ISOGI_API isogi_result isogi_trace_request(isogi_trace *trace, const float (*poi
 
 /* Works until about max_rays rays are traced (0 = to the end), whole texels, or as long as that takes in other work. *remaining (may be
    NULL): about the fraction of the work asked for that is still to do, 0 = finished; it rises only by a request or by what changes
-   (change, touch, relight of IRRADIANCE). ISOGI_CANCELLED and ISOGI_NO_MEMORY leave a texture that can be read and stepped on. Not at the
-   same time as any other call on this texture.
+   (change, touch, relight of IRRADIANCE); not written on failure. ISOGI_CANCELLED and ISOGI_NO_MEMORY leave a texture that can be read and
+   stepped on. Not at the same time as any other call on this texture.
+   Slices of a frame's time: begin with max_rays = 1000 and scale it by the time that a step took. Progress callbacks that cancel after so
+   many milliseconds get on, too, but what the step was at is lost: smaller pieces of the next one pay for that.
    FEEDBACK: when a block of samples is complete passes without rays carry the light over all probes to all texels at work; they are cut
    into pieces, too, as is what comes before the first ray and after the last one, and counted as the rays that take about as long.
    Meanwhile what a request adds has to wait. To the end, and where no progress callback can stop it, that is done once, after the last
@@ -3820,6 +3822,7 @@ struct isogi_trace__feedback {
     uint32_t *makers, *tags;         /* catches that get the new probes; the tags of their cells; */
     uint32_t *next, *heads;          /* chains of these, place + 1, and where they begin */
     size_t span_count, sample_count, piece_count;
+    size_t patience; /* samples of a batch, so that one is done before the next step is cancelled; 0: as many as fit */
     size_t cursor, probe_cursor; /* nodes before these have nothing to do at this level */
     size_t probe_end;            /* of the generation of probes at work: later ones were made by its rays, */
     size_t probe_counted;        /* of which those before this one know how many samples they want */
@@ -6381,13 +6384,14 @@ static int isogi_trace__level_unseen(const isogi_trace *t, int to_the_end) {
 }
 
 /* Traces the next batch; where nothing is left to trace at this level its light is to be carried over. to_the_end: the step has no
-   other limit. */
+   other limit. A batch that is cancelled is lost, and the next one a quarter of it: who gives steps little time by cancelling them gets
+   on. */
 static isogi_result isogi_trace__trace_batch(isogi_trace *t, uint64_t limit, int to_the_end, uint64_t *spent) {
     isogi_trace__feedback *f = t->feedback;
     const size_t cursor = f->cursor, probe_cursor = f->probe_cursor;
     double from = isogi_trace__told(t), to, part;
     isogi_result result;
-    int none = isogi_trace__spans_fill(t, limit, spent);
+    int none = isogi_trace__spans_fill(t, f->patience && f->patience < limit ? f->patience : limit, spent);
     f->unpublished |= f->span_count != 0;
     if (none && isogi_trace__level_unseen(t, to_the_end)) isogi_trace__level_next(f);
     else if (none) f->phase = ISOGI_TRACE__DIRECT;
@@ -6397,6 +6401,8 @@ static isogi_result isogi_trace__trace_batch(isogi_trace *t, uint64_t limit, int
     f->partial += f->on_probes ? 0 : f->sample_count, to = isogi_trace__told(t);
     f->partial -= f->on_probes ? 0 : f->sample_count;
     result = isogi_trace__spans_run(t, from, to);
+    if (result == ISOGI_CANCELLED) f->patience = f->sample_count / 4 + 1;
+    else if (f->patience) f->patience = f->patience < ISOGI_TRACE__SAMPLES ? f->patience + f->patience / 2 + 1 : 0;
     if (result != ISOGI_OK) /* it is still to come */
         f->cursor = cursor, f->probe_cursor = probe_cursor, f->probe_checked = f->probe_again = 0;
     return result;

@@ -1290,6 +1290,34 @@ TEST(cancelled_bakes_can_go_on) {
     scene_free(&s);
 }
 
+/* Steps that are all cancelled when little is done bring the bake to its end. */
+TEST(steps_that_are_always_cancelled_get_on) {
+    double q[5] = {12, 11, 12, 15, 7};
+    scene s = scene_make(25, 24, 23, NULL, pit, q);
+    float points[100][3], first[100][3], e[100][3];
+    int n = surface_points(&s, 0, 100, 23, points);
+    for (int way = 0; way < 4; way++) {
+        isogi_trace_desc d = desc_make(&s, 0.7f, -1, 16);
+        progress_log log = {0, 0, 0, 1};
+        isogi_context context = {.threads = 1, .progress = progress_count, .user = &log};
+        isogi_trace *t = NULL;
+        isogi_result result = ISOGI_CANCELLED;
+        int steps = 0;
+        d.method = way % 2 ? ISOGI_TRACE_PATHS : ISOGI_TRACE_FEEDBACK, d.lazy = way >= 2;
+        bake_and_sample(&d, NULL, (const float(*)[3])points, n, first);
+        isogi_trace_create(&t, &d, &context), isogi_trace_request(t, (const float(*)[3])points, (size_t)n);
+        for (; result == ISOGI_CANCELLED && steps < 1000; steps++) {
+            log.calls = 0, log.cancel_at = 12, log.last = 0;
+            result = isogi_trace_step(t, 0, NULL);
+        }
+        CHECK(result == ISOGI_OK && steps > 2, "way %d: %s after %d steps", way, isogi_result_string(result), steps);
+        isogi_trace_sample(t, (const float(*)[3])points, (size_t)n, e, NULL);
+        CHECK(!memcmp(e, first, sizeof e), "way %d: other bits", way);
+        isogi_trace_free(t);
+    }
+    scene_free(&s);
+}
+
 static int refused(const isogi_trace_desc *d, isogi_result expected) {
     isogi_trace *t = (isogi_trace *)(void *)&t;
     isogi_result result = isogi_trace_create(&t, d, NULL);
