@@ -428,7 +428,9 @@ ISOGI_API isogi_result isogi_dvr_set_transfer(isogi_dvr *dvr, const isogi_transf
 /* Computes visibility within about max_rays rays (0 = to the end), at least one grid point (brute force), block or direction (the paper's
    method), plane of the lattice or direction (sweeps). Voxels that have to be read for it, after a change, count too: four of a plane
    as a ray, a block as 64 rays for each direction. *remaining (may be NULL): fraction still to do, 0 = finished. When cancelled, what is
-   finished stays and the next call goes on. Without ISOGI_DVR_VISIBILITY there is nothing to do. */
+   finished stays and the next call goes on; but the points, blocks or directions at work are lost, a quarter of so many is tried next,
+   and one of them has to fit between two cancels: for slices of time budgets are better. Without ISOGI_DVR_VISIBILITY there is nothing
+   to do. */
 ISOGI_API isogi_result isogi_dvr_step(isogi_dvr *dvr, uint64_t max_rays, double *remaining);
 
 /* Interpolated visibility coefficients at world points: visibility[count][order*order]. Outside of the box a point is moved to its
@@ -936,6 +938,7 @@ struct isogi_dvr {
     float *visibility; /* [grid points][order * order] */
     isogi_dvr__held held, coming; /* where `visibility` stands; where `gathered` stands, between the first direction and the last */
     size_t next;       /* grid point; sweeps: direction */
+    size_t patience;   /* of these at a time, so that some are done before the next step is cancelled; 0: as many as may be */
     isogi_dvr__matter matter;
     uint8_t *changed;            /* one byte a block of level 1: its classification is no longer what `matter` holds */
     size_t changed_count;
@@ -3853,13 +3856,26 @@ static double isogi_dvr__plane_rays(const isogi_dvr *d, size_t z) {
     return (double)count * 16 * 16 * d->matter.spacing[2] / 4;
 }
 
+/* Points, blocks, directions or planes at a time, at most `count`. What is cancelled is lost, and a quarter is tried next: who gives steps
+   little time by cancelling them gets on. */
+static size_t isogi_dvr__portion(const isogi_dvr *d, size_t count) { return d->patience && d->patience < count ? d->patience : count; }
+
+static isogi_result isogi_dvr__portion_end(isogi_dvr *d, size_t count, isogi_result result) {
+    if (result == ISOGI_CANCELLED) d->patience = count / 4 + 1;
+    else if (d->patience) d->patience = d->patience < ISOGI_DVR__SLAB ? d->patience + d->patience / 2 + 1 : 0;
+    return result;
+}
+
 /* Brings the lattice up to date with the transfer function, in the blocks marked as changed, plane by plane within a budget of rays (0 =
    all); at least one plane. *used: what they count for. */
 static isogi_result isogi_dvr__update_matter(isogi_dvr *d, uint64_t max_rays, double *used) {
     isogi_dvr__matter *m = &d->matter;
+    const size_t piece = isogi_dvr__portion(d, m->size[2] - m->prepared);
+    isogi_context whole = d->context;
     isogi_result result;
     size_t end, rows, n;
-    for (*used = 0, end = m->prepared; end < m->size[2]; end++) {
+    whole.progress = NULL;
+    for (*used = 0, end = m->prepared; end < m->size[2] && end - m->prepared < piece; end++) {
         double rays = isogi_dvr__plane_rays(d, end);
         if (max_rays && end > m->prepared && *used + rays > (double)max_rays) break;
         *used += rays;
@@ -3872,9 +3888,9 @@ static isogi_result isogi_dvr__update_matter(isogi_dvr *d, uint64_t max_rays, do
     result = m->table && m->scratch ? ISOGI_OK : ISOGI_NO_MEMORY;
     if (result == ISOGI_OK) {
         isogi_dvr__set_table(d, m->table);
-        result = isogi_parallel(&d->context, rows, isogi_dvr__matter_task, d, 0, 0);
+        result = isogi_dvr__portion_end(d, rows, isogi_parallel(&d->context, rows, isogi_dvr__matter_task, d, 0, 0));
     }
-    if (result == ISOGI_OK && end == m->size[2]) result = isogi_parallel(&d->context, m->size[1], isogi_dvr__turn_task, d, 0, 0);
+    if (result == ISOGI_OK && end == m->size[2]) result = isogi_parallel(&whole, m->size[1], isogi_dvr__turn_task, d, 0, 0);
     isogi_release(&d->context, m->table, ISOGI_DVR__TABLE, sizeof *m->table);
     isogi_release(&d->context, m->scratch, rows * m->scratch_row, sizeof *m->scratch);
     m->table = m->scratch = NULL;
@@ -4945,11 +4961,12 @@ static isogi_result isogi_dvr__step_brute(isogi_dvr *d, size_t end) {
     while (d->next < end) {
         double span = (double)(end - start);
         size_t tasks;
-        job.first = d->next, job.end = end - job.first < ISOGI_DVR__SLAB ? end : job.first + ISOGI_DVR__SLAB;
+        job.first = d->next, tasks = end - job.first < ISOGI_DVR__SLAB ? end - job.first : ISOGI_DVR__SLAB;
+        job.end = job.first + isogi_dvr__portion(d, tasks);
         tasks = (job.end - job.first + ISOGI_DVR__CHUNK - 1) / ISOGI_DVR__CHUNK;
         result = isogi_parallel(&d->context, tasks, isogi_dvr__step_task, &job, (double)(job.first - start) / span,
                                 (double)(job.end - start) / span);
-        if (result != ISOGI_OK) break;
+        if (isogi_dvr__portion_end(d, job.end - job.first, result) != ISOGI_OK) break;
         for (i = 0; i < tasks; i++) isogi_dvr__add(&d->counters, &job.work[i]);
         d->next = job.end;
     }
@@ -5010,13 +5027,13 @@ static isogi_result isogi_dvr__step_global(isogi_dvr *d, size_t end) {
     if ((b->sh_count && !job.scratch) || !job.transmittance) result = ISOGI_NO_MEMORY;
     else memset(job.transmittance, 0, batch * d->padded_count * sizeof *job.transmittance);
     while (result == ISOGI_OK && d->next < end) {
-        job.first = d->next - b->due, job.count = end - d->next < batch ? end - d->next : batch;
+        job.first = d->next - b->due, job.count = isogi_dvr__portion(d, end - d->next < batch ? end - d->next : batch);
         result = isogi_parallel(&d->context, (b->sh_count + ISOGI_DVR__GAIN - 1) / ISOGI_DVR__GAIN, isogi_dvr__toward_task, &job,
                                 (double)(job.first - start) / span, (double)(job.first - start) / span);
         if (result == ISOGI_OK)
             result = isogi_parallel(&d->context, job.count * d->desc.grid[2], isogi_dvr__global_task, &job,
                                     (double)(job.first - start) / span, (double)(job.first + job.count - start) / span);
-        if (result == ISOGI_OK) result = isogi_dvr__gain(&job, batch);
+        if (isogi_dvr__portion_end(d, job.count, result) == ISOGI_OK) result = isogi_dvr__gain(&job, batch);
         if (result == ISOGI_OK) d->next += job.count, d->counters.rays += job.count * d->point_count;
     }
     isogi_release(&d->context, job.scratch, batch * b->sh_count, sizeof *job.scratch);
@@ -5048,8 +5065,8 @@ static isogi_result isogi_dvr__step_paper(isogi_dvr *d, size_t end) {
     }
     while (result == ISOGI_OK && d->next < end && d->next < b->due) {
         local.first = d->next, count = (end < b->due ? end : b->due) - d->next;
-        if (count > batch) count = batch;
-        result = isogi_parallel(&d->context, count, isogi_dvr__local_task, &local, 0, 0);
+        count = isogi_dvr__portion(d, count < batch ? count : batch);
+        result = isogi_dvr__portion_end(d, count, isogi_parallel(&d->context, count, isogi_dvr__local_task, &local, 0, 0));
         for (i = 0; result == ISOGI_OK && i < count; i++) {
             isogi_dvr__add(&d->counters, &local.work[i]);
             b->stale[b->order[d->next++]] = 0, d->computed++;
@@ -5077,11 +5094,11 @@ static isogi_result isogi_dvr__step_sweeps(isogi_dvr *d, size_t end) {
     job.transmittance = (float *)isogi_allocate(&d->context, batch * d->padded_count, sizeof(float));
     if (!job.scratch || !job.transmittance) result = ISOGI_NO_MEMORY;
     while (result == ISOGI_OK && d->next < end) {
-        job.first = d->next, job.count = end - d->next < batch ? end - d->next : batch;
+        job.first = d->next, job.count = isogi_dvr__portion(d, end - d->next < batch ? end - d->next : batch);
         if (d->next < d->turned && d->turned - d->next < job.count) job.count = d->turned - d->next;
         result = isogi_parallel(&d->context, job.count, isogi_dvr__sweep_task, &job, (double)(job.first - start) / span,
                                 (double)(job.first + job.count - start) / span);
-        if (result == ISOGI_OK) result = isogi_dvr__gain(&job, batch);
+        if (isogi_dvr__portion_end(d, job.count, result) == ISOGI_OK) result = isogi_dvr__gain(&job, batch);
         if (result == ISOGI_OK) d->next += job.count, d->counters.rays += job.count * isogi_dvr__coming_points(d);
     }
     isogi_release(&d->context, job.scratch, batch * job.scratch_count, sizeof(float));
@@ -5104,7 +5121,8 @@ static isogi_result isogi_dvr__prepare(isogi_dvr *d, uint64_t *max_rays, double 
         *go_on = b->counted == b->total;
     } else if (d->method == ISOGI_DVR_SWEEP && d->matter.prepared < d->matter.size[2]) {
         const isogi_dvr__matter *m = &d->matter;
-        result = isogi_dvr__update_matter(d, *max_rays, &used);
+        do result = isogi_dvr__update_matter(d, *max_rays, &used);
+        while (result == ISOGI_OK && !*max_rays && m->prepared < m->size[2]);
         left = ((double)(m->size[2] - m->prepared) + directions) / ((double)m->size[2] + directions);
         *go_on = m->prepared == m->size[2];
     }
