@@ -297,4 +297,15 @@ TEST(transfer_functions_and_pictures_take_the_memory_that_is_stated) {
     field_free(&f);
 }
 
+TEST(the_largest_points_are_looked_up_like_others) {
+    const isogi_transfer_point p[] = {{1.2e308, {1, 1, 1}, 0}, {1.7e308, {1, 1, 1}, 1}};
+    const isogi_transfer transfer = {p, 2, NULL, 0};
+    const double value[] = {1.1e308, 1.45e308, 1.79e308}, expected[] = {0, 0.5, 1};
+    for (int i = 0; i < 3; i++) {
+        float rgb[3], extinction;
+        isogi_transfer_at(&transfer, value[i], rgb, &extinction);
+        CHECK(fabs((double)extinction - expected[i]) < 1e-6, "%g: %g, not %g", value[i], (double)extinction, expected[i]);
+    }
+}
+
 TEST_MAIN("dvr_transfer")

@@ -687,4 +687,38 @@ TEST(the_face_of_opaque_matter_is_evenly_lit) {
     CHECK(range[1][1] - range[1][0] < 0.02, "sun %g to %g", range[1][0], range[1][1]);
 }
 
+/* A plane without matter on either side, seen from both: light on the side that is seen, in both spaces, whether values rise or fall. */
+TEST(sheets_are_lit_on_the_side_that_is_seen) {
+    isogi_pyramid *pyramid = linear_field();
+    const double slope[3] = {1, 0.37, -0.2}, length = sqrt(1 + 0.37 * 0.37 + 0.2 * 0.2);
+    for (int k = 0; k < 16; k++) {
+        const int space = k & 1, turned = k >> 1 & 1;
+        const float opacity = k & 4 ? 0.5f : 1;
+        const isogi_peak peak = {24 * (1 + 0.37 - 0.2) + (k & 8 ? 2.3 : 0), {1, 1, 1}, opacity}; /* at first through a point of the grid */
+        const isogi_transfer transfer = {NULL, 0, &peak, 1};
+        const isogi_dvr_desc desc = {.pyramid = pyramid, .shading = ISOGI_DVR_VISIBILITY, .space = (isogi_dvr_space)space, .order = 3,
+                                     .grid = {9, 9, 9}, .directions = 128};
+        isogi_dvr *dvr = renderer(desc, &transfer, &serial);
+        isogi_view view = {.width = 1, .height = 1, .target = {24, 24, 24}};
+        double seen[2];
+        isogi_dvr_step(dvr, 0, NULL);
+        for (int a = 0; a < 3; a++) view.eye[a] = 24 + (float)((turned ? -60 : 60) * slope[a] / length + (a == 1 ? 20 : 0));
+        for (int behind = 0; behind < 2; behind++) {
+            isogi_light sun = {.kind = ISOGI_LIGHT_DIRECTIONAL};
+            const isogi_lighting lighting = {.lights = &sun, .light_count = 1};
+            float pixel[1][4];
+            for (int a = 0; a < 3; a++) sun.vector[a] = (float)(slope[a] * (turned == behind ? 1 : -1)), sun.rgb[a] = 12.5663706f;
+            CHECK(isogi_dvr_render(dvr, &view, &lighting, pixel, NULL, NULL) == ISOGI_OK, "render");
+            seen[behind] = (double)pixel[0][0] / (double)opacity;
+        }
+        /* translucent: .75 and .69; a point of the grid that lies in it sees one side fully */
+        CHECK(opacity < 1 ? k < 8 || (fabs(seen[0] - 0.75) < 0.3 && fabs(seen[1] - 0.69) < 0.3 && seen[0] > seen[1])
+                          : fabs(seen[0] - 1) < 0.3 && seen[1] < 0.01,
+              "space %d, opacity %g, side %d: %.3f of a sun before it, %.3f of one behind", space, (double)opacity, turned, seen[0],
+              seen[1]);
+        isogi_dvr_free(dvr);
+    }
+    isogi_vol_free(pyramid);
+}
+
 TEST_MAIN("dvr_visibility")
