@@ -4184,6 +4184,11 @@ static int isogi_vol__leave_surface(isogi_vol__walk *w, const isogi_vol__cubic *
     double steepest = 0;
     int i, found, layer, on_face = 0;
     for (i = 0; i < 8; i++) steepest = isogi_vol__max(steepest, fabs(corner[i]));
+    /* behind the cell of the start the field is what it has come to since, on a side that is known: nothing to divide out */
+    if (before >= 0 && w->t > 0 && (before ? cubic->b[0] : -cubic->b[0]) > 1e-14 * steepest * cubic->scale) {
+        w->deflate = 0;
+        return isogi_vol__cubic_first(cubic, before, w->exact, root);
+    }
     if (axis >= 0 && (length < ISOGI_VOL__ON_SURFACE || reach < 1e-12 * steepest * cubic->scale)) return 0;
     if (reach < 1e-15 * steepest * cubic->scale) return 0; /* nothing but rounding, up to the end of the ray */
     w->deflate = 0;

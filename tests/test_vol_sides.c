@@ -454,6 +454,42 @@ TEST(huge_and_tiny_values_change_no_hit) {
     CHECK(all > RAYS, "%ld hits", all);
 }
 
+/* A ray leaves a steep surface less than 1e-9 cell before a cell's face, and passes a saddle in the next one, in whose middle the field is
+   all but 0: what it hits there are roots. Between planes of voxels the field is (1 - 2 y) times a function of z. */
+TEST(hits_behind_a_surface_next_to_a_face_are_roots) {
+    test_random r = {4};
+    double data[5][2][2], worst = 0;
+    long hits = 0;
+    for (int n = 0; n < (LONG_SUITE ? 30000 : 3000); n++) {
+        const double g = random_range(&r, 1, 2), v[3] = {random_range(&r, 1, 2), -random_range(&r, 0.5, 3), -random_range(&r, 0.5, 4)};
+        for (int j = 0; j < 2; j++)
+            for (int i = 0; i < 2; i++) {
+                data[0][j][i] = data[1][j][i] = g;
+                for (int k = 0; k < 3; k++) data[2 + k][j][i] = j ? -v[k] : v[k];
+            }
+        const isogi_volume volume = {.data = data, .type = ISOGI_F64, .size = {2, 2, 5}};
+        isogi_pyramid *p = build_on(&volume, n % PATHS);
+        for (int q = 0; q < 8; q++) {
+            const double off = pow(10, random_range(&r, -12, -8));
+            isogi_ray ray = {.dir = {0, (float)(off * random_range(&r, -2, 2)), 1}};
+            isogi_hit found[16];
+            size_t count;
+            ray.origin[0] = random_unit(&r), ray.origin[1] = 0.5 + off * random_unit(&r) - 2 * (double)ray.dir[1];
+            isogi_vol_intersect_all(p, &ray, 1, 16, found, &count, NULL);
+            for (size_t k = 0; k < count; k++) {
+                const long double y = (long double)ray.origin[1] + (long double)ray.dir[1] * (long double)found[k].t,
+                                  u = (long double)found[k].t - (long double)floor(found[k].t);
+                const int z = (int)found[k].t < 3 ? (int)found[k].t : 3;
+                long double f[2];
+                for (int c = 0; c < 2; c++) f[c] = (long double)data[z + c][0][0] * (1 - y) + (long double)data[z + c][1][0] * y;
+                worst = fmax(worst, (double)fabsl(f[0] + ((int)found[k].t < 4 ? u : 1) * (f[1] - f[0]))), hits++;
+            }
+        }
+        isogi_vol_free(p);
+    }
+    CHECK(hits > 8000 && worst < 1e-11, "%ld hits, the field there is up to %g", hits, worst);
+}
+
 /* Thousands of cells along one axis, as many levels of nodes as there may be: packets of neighbours on every path. */
 TEST(packets_of_long_volumes_agree) {
     enum { LONG = 8192, SHORT = 9, RAYS = 64 * 16 };
