@@ -390,7 +390,8 @@ typedef enum isogi_depth_kind {
                              are sampled up to a step too far, of exact ones (data space, or a bound) right to rounding */
 } isogi_depth_kind;
 
-/* A pinhole camera. width x height pixels, row 0 on top. */
+/* A pinhole camera. width x height pixels, row 0 on top; neither orthographic nor off its axis. Of a view matrix M and a projection P, by
+   columns as in OpenGL: target = eye - (M[2], M[6], M[10]), up = (M[1], M[5], M[9]), fov = 2 atan(1 / P[5]) 180 / pi. */
 typedef struct isogi_view {
     int width, height;              /* 1..32768 */
     float eye[3], target[3], up[3]; /* world; up: of any length; 0 = +y */

@@ -47,7 +47,7 @@
      sharper shadows                 a finer lattice (desc.lattice): the border of a hard shadow is up to one and a half texels wide;
                                      coarser ones are cheaper by the cube, desc.hierarchy is coarse where light varies slowly
      a renderer of your own          export, and the shaders below
-     a bake that takes a night       save now and then, load to go on; desc.box_first to share the work
+     a bake that takes a night       save now and then, load to go on (lazily by PATHS, see there); desc.box_first to share the work
      a texture that is too dark in grooves   more bounces: each adds one reflection, -1 all of them
      a scan cut open by its border   desc.capped here and ISOGI_RAY_CAPPED for viewing rays; else one looks into the solid through
                                      the cut, at surfaces whose outer side is dark because it is shut off
@@ -104,10 +104,12 @@
      each band as much is left to the texel as it differs from that by more than noise. Probes cost accuracy: half a per cent of the mean
      and 1.8 % at a point in narrow channels of albedo 0.8 (test_trace_bake --long prints it); pockets a few voxels wide may be a tenth too
      bright. Lazy and adaptive bakes take samples in
-     blocks of 4, 16, 64, ... and every other texel along each axis first: soon every lookup has a value.
+     blocks of 4, 16, 64, ... and every other texel along each axis first: soon every lookup has a value, and all are smooth when the
+     first block is complete: ask for the present view alone, and for the next one when remaining is 0.
      A hit from within (only through an open border can a ray get there) is a surface too, with its normal turned.
 
-   GLSL that lights a surface by an exported irradiance texture (GL_LINEAR, GL_CLAMP_TO_EDGE); grid: voxel coordinates
+   GLSL that lights a surface by an exported irradiance texture (GL_LINEAR, GL_CLAMP_TO_EDGE); grid: voxel coordinates, isogi_vol_to_grid of
+   world ones; lattice_min, lattice_max: those of the description, or 0 and the volume's size - 1 where it has zeros
 
        #version 330 core
        uniform sampler3D light;
@@ -239,7 +241,7 @@ typedef void isogi_trace_material_function(void *user, double isovalue, const do
    BYTE     3 / 1   irradiance: square roots, 4e-3 of sqrt(value * the most it holds); transfer: 4e-3 of the texel's largest.
                     Exported as they are, for the hardware to interpolate: 2e-3 and 4e-3 of their scales (isogi_trace_export_scales)
    `make test` prints the measured table. HALF and RGB9E5 hold up to 65000 times the irradiance of an open surface
-   (measured as isogi_trace_report.unit is), BYTE no more than twice that irradiance itself (four times with reflections), which near a
+   (measured as isogi_trace_report.unit is), BYTE two to four times that irradiance itself (twice as much with reflections), which near a
    lamp is little; brighter texels are cut off there. Below some 1e-4 of that irradiance HALF and RGB9E5 err by more than the share above:
    their steps are no finer than about 1e-7 of it. */
 typedef enum isogi_trace_format {
@@ -252,7 +254,8 @@ typedef enum isogi_trace_format {
 } isogi_trace_format;
 
 /* All zero but `pyramid`: one texel per voxel, black surface, black sky. The volume, the lights, the environment's image and the
-   albedo points are borrowed and must outlive the texture; the description itself is copied. */
+   albedo points are borrowed and must outlive the texture, or what took their place (isogi_trace_change); the description itself is
+   copied. */
 typedef struct isogi_trace_desc {
     const isogi_pyramid *pyramid; /* of voxels: one of isogi_vol_build_field is ISOGI_INVALID, see isogi_trace_gather_field */
     isogi_lighting lighting;   /* IRRADIANCE: what is baked. TRANSFER: unused while baking, but distant all the same; see
@@ -330,8 +333,9 @@ ISOGI_API isogi_result isogi_trace_request(isogi_trace *trace, const float (*poi
    NULL): about the fraction of the work asked for that is still to do, 0 = finished; it rises only by a request or by what changes
    (change, touch, relight of IRRADIANCE); not written on failure. ISOGI_CANCELLED and ISOGI_NO_MEMORY leave a texture that can be read and
    stepped on. Not at the same time as any other call on this texture.
-   Slices of a frame's time: begin with max_rays = 1000 and scale it by the time that a step took. Progress callbacks that cancel after so
-   many milliseconds get on, too, but what the step was at is lost: smaller pieces of the next one pay for that.
+   Slices of a frame's time: begin with max_rays = 1000 and scale it by the time that a step took (a request takes some 2 us a point that is
+   new; change and touch look at all texels, and cannot be cut). Progress callbacks that cancel after so many milliseconds get on, too, but
+   what the step was at is lost: smaller pieces of the next one pay for that.
    FEEDBACK: when a block of samples is complete passes without rays carry the light over all probes to all texels at work; they are cut
    into pieces, too, as is what comes before the first ray and after the last one, and counted as the rays that take about as long.
    Meanwhile what a request adds has to wait. To the end, and where no progress callback can stop it, that is done once, after the last
@@ -350,17 +354,17 @@ ISOGI_API isogi_result isogi_trace_step(isogi_trace *trace, uint64_t max_rays, d
    Irradiance below 0 is handed out as it is, here and by isogi_trace_gather: a sky that SH coefficients make negative somewhere brings
    it, and so do, with TRANSFER, rings of what isogi_trace_lighting calls the least, where nearly all light is hidden. Before it is shown:
    e = e > 0 ? e : 0  a channel.
-   Errors cover the true ones (twice the standard error in 95 % of points, with desc.error in 90 % or more, tests/test_trace_bake.c):
-   they allow for what samples that agree may all have missed, and for probes 2 % of reflected light. That is too little where much of
-   the light is reflected and comes from lights without size, whose shadows are hard: at albedo 0.8, in narrow tunnels, twice the error
-   told covers 60 to 90 % of points; and at any albedo in deep pits a few voxels wide under the sun or a lamp, where reflected light may
-   be a fifth off however many samples there are: with 256 samples and more, or desc.error, 50 to 85 % of points; and where colours
-   change strongly within a few voxels, which samples too near each other may miss: in a closed room of chequers of .05 and .95, 2 voxels
-   wide, errors are twice those told with 16 samples, 3.5 times with 128 (4 % of the light); and close to sphere lights that stand half
-   in the ground, of which few samples meet what is above it (7 % of such points lie beyond twice the error). Nor is the error of
-   negative lights told in full. They know nothing of the lattice (on steep fields that adds more than samples do; closer texels help),
-   and of glows only what emission_points tell: where desc.material alone makes something
-   glow, give the brightest of it there. */
+   Before a block is first shared an error is a bound, of about the light itself; with few samples, filtered, it is two to four times the
+   true one. Errors cover the true ones (twice the standard error in 95 % of points, with desc.error in 90 % or more,
+   tests/test_trace_bake.c): they allow for what samples that agree may all have missed, and for probes 2 % of reflected light. That is too
+   little where much of the light is reflected and comes from lights without size, whose shadows are hard: at albedo 0.8, in narrow
+   tunnels, twice the error told covers 60 to 90 % of points; and at any albedo in deep pits a few voxels wide under the sun or a lamp,
+   where reflected light may be a fifth off however many samples there are: with 256 samples and more, or desc.error, 50 to 85 % of points;
+   and where colours change strongly within a few voxels, which samples too near each other may miss: in a closed room of chequers of .05
+   and .95, 2 voxels wide, errors are twice those told with 16 samples, 3.5 times with 128 (4 % of the light); and close to sphere lights
+   that stand half in the ground, of which few samples meet what is above it (7 % of such points lie beyond twice the error). Nor is the
+   error of negative lights told in full. They know nothing of the lattice (on steep fields that adds more than samples do; closer texels
+   help), and of glows only what emission_points tell: where desc.material alone makes something glow, give the brightest of it there. */
 ISOGI_API isogi_result isogi_trace_sample(const isogi_trace *trace, const float (*points)[3], size_t count, float (*irradiance)[3],
                                           float *error);
 /* A new lighting. TRANSFER: a distant one (environment and directional lights; point, sphere and rectangle lights are ISOGI_INVALID); no
@@ -467,9 +471,9 @@ ISOGI_API isogi_result isogi_trace_export_scales(const isogi_trace *trace, int f
    A block of bytes holds the texels computed so far: the same bytes on every machine. Loading adds them to a texture that was created
    from the same description: so a bake is resumed, and boxes baked apart (desc.box_first) are merged by loading one after the other, to
    the bits of one bake that never stopped. FEEDBACK promises these bits of full bakes within the same interval of isovalues (whole cubes
-   are saved, ISOGI_TRACE_CUBE), and of lazy ones that were asked for everything while they had nothing to do (all of it is saved, or
-   nothing yet: who asks for more all the time should let a step come to its end before); what is asked for after that was finished would
-   have shared its probes, and differs as lazy light does (see Determinism).
+   are saved, ISOGI_TRACE_CUBE), and of lazy ones that were asked for everything while they had nothing to do. A lazy block holds what was
+   complete when remaining was last 0, and nothing (64 bytes) before that, whatever can be read already: PATHS saves texel by texel. What is
+   asked for after that was finished would have shared its probes, and differs as lazy light does (see Determinism).
    Only desc.isovalue_min, isovalue_max, lazy, lookup, box and the lighting of TRANSFER may differ; else the answer is ISOGI_INVALID
    (lighting, tables and the ranges of the volume's blocks are compared by hash; a material function cannot be. Those whose arrays were
    changed in place are as they were until isogi_trace_change).
