@@ -177,7 +177,7 @@
    Limits       Order 6; 2^24 samples; 2^31 - 1 texels along an axis (more: ISOGI_TOO_LARGE); paths end after 10000 reflections.
                 White surfaces that enclose a light truly have infinite light: what is computed then is finite and has no meaning;
                 its error says so, and isogi_trace_report.diverges. Under matter (HIGH_SIDE) of albedo above .9 narrow places may err by
-                several times the error that is told.
+                several times the error that is told; so may, with desc.reach, what is reflected in capped matter a few voxels thick.
                 Voxels of 1e-150 to 1e150 world units: squares of lengths must neither vanish nor overflow. Where matter is
                 thinner than the lattice's spacing a lookup mixes the light of both of its sides.
    Cost         PATHS: samples * (1 + lights that have a size) rays for a texel, and as many for each reflection; an uneven image counts as
