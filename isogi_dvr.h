@@ -114,7 +114,8 @@
    grid's points the more open then count more: the trilinear weight of each times 1 + w (o - 1), o = min(1, 5 m)^2, where m >= 0.005 is the
    mean of its V over all directions, w = max(0, 2 off / r - 1), and 1 for peaks and in data space. So the light on what is opaque is that
    of the points in front of it, without the darkness of those below. Those behind a peak, by the field's value there, count as far as it
-   lets light through (1 - opacity): a sheet shows the light on the side that is seen, also where the other is as open. RMSE of sRGB
+   lets light through (1 - opacity), and V is looked up r / 12 before it: what is opaque shows the light on the side that is seen, also
+   where the other is as open. RMSE of sRGB
    values of 200x200 pixels against grids of 128^3 points (for ml256 and torus-sphere-plane of twice as many an axis), with weights of w
    = 0, as told, w = 1: bonsai .0112 .0113 .0159, engine .0319 .0319 .0323, ml256 .0120 .0120 .0153, torus-sphere-plane .0145 .0127
    .0127.
@@ -199,7 +200,7 @@
    to 1 MB of classes of values in physical space; the transfer function of exact rays, and of those with a bound, 160 to 220 bytes a point,
    of pre-integrated ones 16 table^2 and 8 a point more. All of it comes from the context's allocator; where that fails the call says so and
    changes nothing.
-   Stack use stays below 32 KB (unoptimised below 70 by gcc, 140 by clang; AVX-512 is not used then).
+   Stack use stays below 32 KB (unoptimised below 70 by gcc, 140 by clang; no AVX-512 of its own is used then).
    isogi_dvr_set_transfer, _set_clip and _step are writers: one at a time, and not during another call with the same renderer. All
    other calls only read and may run at the same time. Calls divide their own work among the context's threads. Results are the
    same bits for any number of threads and however visibility was cut into steps. All promises of equal bits are for IEEE arithmetic:
@@ -431,9 +432,9 @@ ISOGI_API isogi_result isogi_dvr_set_transfer(isogi_dvr *dvr, const isogi_transf
 /* Computes visibility within about max_rays rays (0 = to the end), at least one grid point (brute force), block or direction (the paper's
    method), plane of the lattice or direction (sweeps). Voxels that have to be read for it, after a change, count too: four of a plane
    as a ray, a block as 64 rays for each direction. *remaining (may be NULL): fraction still to do, 0 = finished. When cancelled, what is
-   finished stays and the next call goes on; but the points, blocks or directions at work are lost, a quarter of so many is tried next,
-   and one of them has to fit between two cancels: for slices of time budgets are better. Without ISOGI_DVR_VISIBILITY there is nothing
-   to do. */
+   finished stays and the next call goes on; but the points, planes, blocks or directions at work are lost, about a quarter of so many is
+   tried next, and one of them has to fit between two cancels: for slices of time budgets are better. Without ISOGI_DVR_VISIBILITY there is
+   nothing to do. */
 ISOGI_API isogi_result isogi_dvr_step(isogi_dvr *dvr, uint64_t max_rays, double *remaining);
 
 /* Interpolated visibility coefficients at world points: visibility[count][order*order]. Outside of the box a point is moved to its
@@ -3579,7 +3580,7 @@ typedef struct isogi_dvr__sheet {
 } isogi_dvr__sheet;
 
 /* What a grid point counts for, by its own value. Without one (NaN) it is on no side. */
-static float isogi_dvr__beside(const isogi_dvr *d, const isogi_dvr__sheet *sheet, const size_t point[3]) {
+static float isogi_dvr__sheet_weight(const isogi_dvr *d, const isogi_dvr__sheet *sheet, const size_t point[3]) {
     double corner[8], u[3], value = 0;
     int cell[3], a, n;
     for (a = 0; a < 3; a++) {
@@ -3619,9 +3620,9 @@ static void isogi_dvr__visibility_at(const isogi_dvr *d, const double position[3
         const float *v = d->visibility + base + (k & 1 ? offset[0] : 0) + (k & 2 ? offset[1] : 0) + (k & 4 ? offset[2] : 0);
         float w = (float)((k & 1 ? u[0] : 1 - u[0]) * (k & 2 ? u[1] : 1 - u[1]) * (k & 4 ? u[2] : 1 - u[2]));
         if (open > 0) w *= 1 + (float)open * (isogi_dvr__openness(v[0]) - 1);
-        if (sheet && v[0] > 0) {
+        if (sheet && v[0] > 0 && !d->held.block) {
             const size_t point[3] = {cell[0] + (k & 1), cell[1] + (k >> 1 & 1), cell[2] + (k >> 2)};
-            w *= isogi_dvr__beside(d, sheet, point);
+            w *= isogi_dvr__sheet_weight(d, sheet, point);
         }
         isogi_dvr__add_scaled(out, v, w, d->coefficients);
         total += w;
@@ -3889,7 +3890,7 @@ static size_t isogi_dvr__portion(const isogi_dvr *d, size_t count) { return d->p
 
 static isogi_result isogi_dvr__portion_end(isogi_dvr *d, size_t count, isogi_result result) {
     if (result == ISOGI_CANCELLED) d->patience = count / 4 + 1;
-    else if (d->patience) d->patience = d->patience < ISOGI_DVR__SLAB ? d->patience + d->patience / 2 + 1 : 0;
+    else if (result == ISOGI_OK && d->patience) d->patience = d->patience < ISOGI_DVR__SLAB ? d->patience + d->patience / 2 + 1 : 0;
     return result;
 }
 
@@ -5638,12 +5639,16 @@ static void isogi_dvr__composite_peak(isogi_dvr__pixel_ray *r, const isogi_peak 
     for (a = 0; a < 3; a++) cell[a] = (int)hit->cell[a];
     if (!r->probe && opacity > 0) {
         isogi_dvr__sheet sheet;
-        double off = isogi_dvr__clamp(isogi_dvr__reach_along(r->dvr, r->grid_dir) / 12, t); /* a grid point may lie upon it */
-        sheet.isovalue = peak->isovalue, sheet.behind = opacity < 0.999 ? 1 - opacity : 0.001, sheet.side = hit->side > 0 ? 1 : -1;
-        for (a = 0; a < 3; a++) r->front[a] = -off * r->grid_dir[a];
-        r->sheet = &sheet;
+        if (r->dvr->desc.shading == ISOGI_DVR_VISIBILITY) {
+            /* a little before it, as a grid point may lie upon it */
+            const double off = isogi_dvr__clamp(isogi_dvr__reach_along(r->dvr, r->grid_dir) / 12, t);
+            for (a = 0; a < 3; a++) r->front[a] = -off * r->grid_dir[a];
+            sheet.isovalue = peak->isovalue, sheet.side = hit->side > 0 ? 1 : -1;
+            sheet.behind = opacity < 1 - 1e-6 ? 1 - opacity : 1e-6; /* far less than dark points before it */
+            r->sheet = &sheet;
+        }
         isogi_dvr__peak_colour(r->dvr, peak, hit, rgb);
-        isogi_dvr__shade(r, cell, hit->local, sheet.side, opacity, rgb);
+        isogi_dvr__shade(r, cell, hit->local, hit->side > 0 ? 1 : -1, opacity, rgb);
         isogi_dvr__composite(r, opacity, rgb);
         for (a = 0, r->sheet = NULL; a < 3; a++) r->front[a] = 0;
     }
@@ -8154,10 +8159,10 @@ static double isogi_dvr__face_t(const isogi_dvr__tet_ray *r, const uint32_t p[3]
     return isogi_dvr__dot(n, a) / *rate;
 }
 
-/* Which side of the line from point p to point q the ray passes. Both faces of an edge ask with the same numbers, and "upon it" is answered
-   as for a ray turned by a little towards x, by less towards y, by yet less towards z: it hits exactly one face of a closed border. Where
-   turning decides nothing, as the eye is in line with p and q, the eye is moved in the same way, by yet less. Next to a line it is rounding
-   that decides, and `unsure` is set: where several meet in a point, each of them decides for itself. */
+/* Which side of the line from point p to point q the ray passes. Both faces of these two ask with the same numbers, and "upon it" is
+   answered as for a ray turned by a little towards x, by less towards y, by yet less towards z: it hits exactly one face of a closed
+   border. Where turning decides nothing, as the eye is in line with p and q, the eye is moved in the same way, by yet less. Next to a
+   line it is rounding that decides, and `unsure` is set: where several meet in a point, each of them decides for itself. */
 static int isogi_dvr__left_of(const isogi_dvr__tet_ray *r, uint32_t p, uint32_t q, int *unsure) {
     const float *from = r->mesh->mesh.points[p < q ? p : q], *to = r->mesh->mesh.points[p < q ? q : p];
     const int turned = p > q;
@@ -8167,7 +8172,8 @@ static int isogi_dvr__left_of(const isogi_dvr__tet_ray *r, uint32_t p, uint32_t 
     for (axis = 0; axis < 3; axis++) edge[axis] = (double)to[axis] - (double)from[axis];
     isogi_dvr__cross(a, edge, n);
     side = isogi_dvr__dot(n, r->dir);
-    *unsure = side * side <= 1e-28 * isogi_dvr__dot(a, a) * isogi_dvr__dot(edge, edge) * isogi_dvr__dot(r->dir, r->dir);
+    *unsure = isogi_dvr__dot(n, n) > 0 &&
+              side * side <= 1e-28 * isogi_dvr__dot(a, a) * isogi_dvr__dot(edge, edge) * isogi_dvr__dot(r->dir, r->dir);
     for (axis = 0; axis < 3 && !(side > 0 || side < 0); axis++) side = n[axis];
     if (side > 0 || side < 0) return (side > 0) != turned;
     isogi_dvr__cross(r->dir, edge, n);
@@ -8228,7 +8234,7 @@ static uint32_t isogi_dvr__next_border(isogi_dvr__tet_ray *r, double last_t, uin
 }
 
 /* The face by which the ray (dir * way) leaves the tetrahedron that it entered by face `in`: the first plane on the way out. Unsure where
-   it leaves by an edge, on one side of which the mesh goes on. */
+   it leaves by an edge, on one side of which the mesh goes on (by a point: there next_border is). */
 static uint32_t isogi_dvr__exit_face(isogi_dvr__tet_ray *r, uint32_t tet, uint32_t in, int way, double *exit_t) {
     uint32_t f, best = ISOGI_DVR__NO_FACE, other = ISOGI_DVR__NO_FACE;
     double nearest = 1e300, second = 1e300;
@@ -8405,21 +8411,22 @@ static void isogi_dvr__try_tets(isogi_dvr__pixel_ray *pixel, const isogi_dvr__te
     isogi_dvr__pixel_ray fresh = *pixel;
     isogi_dvr__tet_ray ray;
     isogi_dvr__span span;
-    double turn = 0;
+    static const double turn[4][3] = { /* each another way, along no plane of a lattice */
+        {0, 0, 0}, {1e-13, 0.618e-13, -1.755e-13}, {-0.414e-11, 1.325e-11, 0.732e-11}, {0.577e-9, -1.202e-9, 2.236e-9}};
     int attempt, a;
-    for (attempt = 0; attempt < 4; attempt++, turn = attempt > 1 ? 100 * turn : 1e-13) {
+    for (attempt = 0; attempt < 4; attempt++) {
         *pixel = fresh;
         memset(&ray, 0, sizeof ray), memset(&span, 0, sizeof span);
         ray.mesh = job->mesh, ray.desc = job->desc;
-        for (a = 0; a < 3; a++) ray.origin[a] = origin[a], ray.dir[a] = pixel->along[a] + (a + 1) * turn;
+        for (a = 0; a < 3; a++) ray.origin[a] = origin[a], ray.dir[a] = pixel->along[a] + turn[attempt][a];
         ray.speed = sqrt(isogi_dvr__dot(ray.dir, ray.dir)), ray.until = until / ray.speed;
         span.silhouette = job->desc->space == ISOGI_DVR_DATA || job->desc->silhouette != ISOGI_DVR_SILHOUETTE_APPROXIMATE
                               ? job->desc->silhouette
                               : ISOGI_DVR_SILHOUETTE_NONE;
         span.flat = 1, span.touched_t = -1, span.walk.quiet[0] = 1;
-        if (isogi_dvr__cast_tets(pixel, &ray, &span) && !ray.unsure) break;
+        a = isogi_dvr__cast_tets(pixel, &ray, &span), work->cells += ray.passed;
+        if (a && !ray.unsure) break;
     }
-    work->cells += ray.passed;
 }
 
 static void isogi_dvr__tet_task(void *arg, size_t tile) {

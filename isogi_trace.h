@@ -333,9 +333,9 @@ ISOGI_API isogi_result isogi_trace_request(isogi_trace *trace, const float (*poi
    NULL): about the fraction of the work asked for that is still to do, 0 = finished; it rises only by a request or by what changes
    (change, touch, relight of IRRADIANCE); not written on failure. ISOGI_CANCELLED and ISOGI_NO_MEMORY leave a texture that can be read and
    stepped on. Not at the same time as any other call on this texture.
-   Slices of a frame's time: begin with max_rays = 1000 and scale it by the time that a step took (a request takes some 2 us a point that is
-   new; change and touch look at all texels, and cannot be cut). Progress callbacks that cancel after so many milliseconds get on, too, but
-   what the step was at is lost: smaller pieces of the next one pay for that.
+   Slices of a frame's time: begin with max_rays = 1000 and scale it by the time that a step took (a request takes some 2 us a point that
+   is new; change and touch look at all texels, and cannot be cut). Progress callbacks that cancel after so many milliseconds get on, too;
+   but by FEEDBACK what the step was at is lost, and pays for smaller pieces of the next one.
    FEEDBACK: when a block of samples is complete passes without rays carry the light over all probes to all texels at work; they are cut
    into pieces, too, as is what comes before the first ray and after the last one, and counted as the rays that take about as long.
    Meanwhile what a request adds has to wait. To the end, and where no progress callback can stop it, that is done once, after the last
@@ -6406,7 +6406,7 @@ static isogi_result isogi_trace__trace_batch(isogi_trace *t, uint64_t limit, int
     f->partial -= f->on_probes ? 0 : f->sample_count;
     result = isogi_trace__spans_run(t, from, to);
     if (result == ISOGI_CANCELLED) f->patience = f->sample_count / 4 + 1;
-    else if (f->patience) f->patience = f->patience < ISOGI_TRACE__SAMPLES ? f->patience + f->patience / 2 + 1 : 0;
+    else if (result == ISOGI_OK && f->patience) f->patience = f->patience < ISOGI_TRACE__SAMPLES ? f->patience + f->patience / 2 + 1 : 0;
     if (result != ISOGI_OK) /* it is still to come */
         f->cursor = cursor, f->probe_cursor = probe_cursor, f->probe_checked = f->probe_again = 0;
     return result;

@@ -4176,7 +4176,8 @@ static int isogi_vol__uniform_block(isogi_vol__walk *w, int top, int low[3], int
 /* A cell in which the ray leaves the surface that it starts from; 1 and the root if it comes back to it in the same cell. Still on
    the surface at the exit, because the start lies within rounding of it, or because the ray runs along the surface: the next cell
    divides the root out. A ray that goes on as it came knows its side: where the field has another one, the ray has crossed the surface
-   again, too near to the start to be told from it; only a layer without thickness, where the field is 0, changes the side in silence. */
+   again, too near to the start to be told from it; only a layer without thickness, where the field is 0, changes the side in silence.
+   Behind the start's cell, where the field has left the surface by more than rounding, to the known side, nothing is divided out. */
 static int isogi_vol__leave_surface(isogi_vol__walk *w, const isogi_vol__cubic *cubic, const double corner[8], const double from[3],
                                     const double to[3], int axis, double *root) {
     const double length = isogi_vol__largest(to[0] - from[0], to[1] - from[1], to[2] - from[2]);
@@ -4185,8 +4186,8 @@ static int isogi_vol__leave_surface(isogi_vol__walk *w, const isogi_vol__cubic *
     double steepest = 0;
     int i, found, layer, on_face = 0;
     for (i = 0; i < 8; i++) steepest = isogi_vol__max(steepest, fabs(corner[i]));
-    /* behind the cell of the start the field is what it has come to since, on a side that is known: nothing to divide out */
-    if (before >= 0 && w->t > 0 && (before ? cubic->b[0] : -cubic->b[0]) > 1e-14 * steepest * cubic->scale) {
+    if (before >= 0 && w->t > 0 && reach >= 1e-12 * steepest * cubic->scale &&
+        (before ? cubic->b[0] : -cubic->b[0]) > 1e-14 * steepest * cubic->scale) {
         w->deflate = 0;
         return isogi_vol__cubic_first(cubic, before, w->exact, root);
     }

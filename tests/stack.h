@@ -10,14 +10,17 @@
 #include <pthread.h>
 
 enum { STACK = 1 << 18 };
-#if defined(__OPTIMIZE__) && defined(__clang__)
-enum { MOST_BYTES = 32 << 10, MOST_BYTES_TRACE = 35000 }; /* it keeps 2 KB more in the frame of rays that are traced together */
-#elif defined(__OPTIMIZE__)
-enum { MOST_BYTES = 32 << 10, MOST_BYTES_TRACE = MOST_BYTES };
+#ifdef __OPTIMIZE__
+enum { MOST_BYTES_SH = 32 << 10, MOST_BYTES = 32 << 10 };
 #elif defined(__clang__)
-enum { MOST_BYTES = 140 << 10, MOST_BYTES_TRACE = MOST_BYTES };
+enum { MOST_BYTES_SH = 60 << 10, MOST_BYTES = 140 << 10 };
 #else
-enum { MOST_BYTES = 70 << 10, MOST_BYTES_TRACE = MOST_BYTES };
+enum { MOST_BYTES_SH = 60 << 10, MOST_BYTES = 70 << 10 };
+#endif
+#if defined(__OPTIMIZE__) && defined(__clang__)
+enum { MOST_BYTES_TRACE = 35000 }; /* it keeps 2 KB more in the frame of rays that are traced together */
+#else
+enum { MOST_BYTES_TRACE = MOST_BYTES };
 #endif
 
 typedef struct stack_use {

@@ -250,6 +250,10 @@ TEST(rays_at_edges_and_points_see_all_that_is_behind) {
                 target[a] = i % 2 ? (double)(random_bits(&r) % 3) : (cell >> a & 1) + 0.5 * (edge >> a & 1);
                 eye[a] = (double)(float)(target[a] + random_range(&r, -3, 3));
             }
+            if (i > 1) { /* in one plane with the edge and a direction of small whole numbers */
+                const double along = random_range(&r, -2, 2), across = random_range(&r, -2, 2);
+                for (int a = 0; a < 3; a++) eye[a] = target[a] + along * (edge >> a & 1) + across * (1 + a);
+            }
             double far = 0;
             for (int a = 0; a < 3; a++) d[a] = target[a] - eye[a], far += d[a] * d[a];
             for (int a = 0; a < 3; a++) d[a] /= sqrt(far);
