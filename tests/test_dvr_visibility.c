@@ -714,7 +714,8 @@ TEST(sheets_are_lit_on_the_side_that_is_seen) {
                 CHECK(isogi_dvr_render(dvr, &view, &lighting, pixel, NULL, NULL) == ISOGI_OK, "render");
                 mean[behind] += (double)pixel[0][0] / (double)opacity / 8;
                 CHECK(opacity < 1 || fabs((double)pixel[0][0] - !behind) < (behind ? 0.01 : 0.3),
-                      "space %d, side %d, place %d: %g of a sun %s", space, turned, place, (double)pixel[0][0], behind ? "behind" : "before");
+                      "space %d, side %d, place %d: %g of a sun %s", space, turned, place, (double)pixel[0][0],
+                      behind ? "behind" : "before");
             }
             isogi_dvr_free(dvr);
         }
