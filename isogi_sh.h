@@ -2705,7 +2705,9 @@ ISOGI_SH__INLINE void isogi_sh__add_lobe(float *c, int order, int channels, cons
         for (l = m; l < order; l++) {
             float *plus = c + channels * (l * (l + 1) + m), *minus = c + channels * (l * (l + 1) - m);
             double cosine = scale[l] * q[l] * cm, sine = scale[l] * q[l] * sm; /* 0 where m is */
+            /* cppcheck-suppress objectIndex */
             for (k = 0; k < channels; k++) plus[k] += (float)(colour[k] * cosine);
+            /* cppcheck-suppress objectIndex */
             for (k = 0; k < channels; k++) minus[k] += (float)(colour[k] * sine);
         }
         x = u.x * cm - u.y * sm;
