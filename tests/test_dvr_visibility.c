@@ -687,9 +687,10 @@ TEST(the_face_of_opaque_matter_is_evenly_lit) {
     CHECK(range[1][1] - range[1][0] < 0.02, "sun %g to %g", range[1][0], range[1][1]);
 }
 
-/* A plane without matter on either side, at eight places between the grid's points, at first through one of them, seen from both sides,
-   whether values rise or fall: an opaque one shows the light on the side that is seen. A translucent one that scatters evenly, of opacity
-   .5, shows (1 - .5^2) / 2 / .5 of a sun before it and .5 log(2) / .5 of one behind, which its grid points know but roughly. */
+/* A plane without matter on either side, at eight places between the grid's points, an opaque one at first through one of them, seen from
+   both sides, whether values rise or fall: an opaque one shows the light on the side that is seen. A translucent one that scatters
+   evenly, of opacity .5, shows (1 - .5^2) / 2 / .5 of a sun before it and .5 log(2) / .5 of one behind, which its grid points know but
+   roughly, and by nine harmonics, that overshoot by .15 of the sun. */
 TEST(sheets_are_lit_on_the_side_that_is_seen) {
     isogi_pyramid *pyramid = linear_field();
     const double slope[3] = {1, 0.37, -0.2}, length = sqrt(1 + 0.37 * 0.37 + 0.2 * 0.2);
@@ -698,7 +699,7 @@ TEST(sheets_are_lit_on_the_side_that_is_seen) {
         const float opacity = k & 4 ? 0.5f : 1;
         double mean[2] = {0, 0};
         for (int place = 0; place < 8; place++) {
-            const isogi_peak peak = {24 * (1 + 0.37 - 0.2) + 0.75 * length * place, {1, 1, 1}, opacity};
+            const isogi_peak peak = {24 * (1 + 0.37 - 0.2) + 0.75 * length * (opacity < 1 ? place + 0.4 : place), {1, 1, 1}, opacity};
             const isogi_transfer transfer = {NULL, 0, &peak, 1};
             const isogi_dvr_desc desc = {.pyramid = pyramid, .shading = ISOGI_DVR_VISIBILITY, .space = (isogi_dvr_space)space, .order = 3,
                                          .grid = {9, 9, 9}, .directions = 64};
@@ -719,7 +720,7 @@ TEST(sheets_are_lit_on_the_side_that_is_seen) {
             }
             isogi_dvr_free(dvr);
         }
-        CHECK(opacity < 1 ? fabs(mean[0] - 0.75) < 0.15 && fabs(mean[1] - 0.69) < 0.15 && mean[0] > mean[1] : fabs(mean[0] - 1) < 0.2,
+        CHECK(opacity < 1 ? fabs(mean[0] - 0.75) < 0.25 && fabs(mean[1] - 0.69) < 0.25 && mean[0] > mean[1] : fabs(mean[0] - 1) < 0.2,
               "space %d, opacity %g, side %d: %.3f of a sun before it, %.3f of one behind", space, (double)opacity, turned, mean[0],
               mean[1]);
     }
