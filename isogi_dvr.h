@@ -115,10 +115,9 @@
    mean of its V over all directions, w = max(0, 2 off / r - 1), and 1 for peaks and in data space. So the light on what is opaque is that
    of the points in front of it, without the darkness of those below. Those behind a peak, by the field's value there, count as far as it
    lets light through (1 - opacity), and V is looked up r / 12 before it: what is opaque shows the light on the side that is seen, also
-   where the other is as open. RMSE of sRGB
-   values of 200x200 pixels against grids of 128^3 points (for ml256 and torus-sphere-plane of twice as many an axis), with weights of w
-   = 0, as told, w = 1: bonsai .0112 .0113 .0159, engine .0319 .0319 .0323, ml256 .0120 .0120 .0153, torus-sphere-plane .0145 .0127
-   .0127.
+   where the other is as open. RMSE of sRGB values of 200x200 pixels against grids of 128^3 points (for ml256 and torus-sphere-plane of
+   twice as many an axis), with weights of w = 0, as told, w = 1: bonsai .0112 .0113 .0159, engine .0319 .0319 .0323, ml256 .0120 .0120
+   .0153, torus-sphere-plane .0145 .0127 .0127.
 
    Visibility is sampled in `directions` directions and projected to SH, by one of the methods of isogi_dvr_method. Brute force
    marches every ray from every grid point through the same transfer function (in the same space; peaks attenuate at every
